@@ -1,0 +1,81 @@
+#pragma once
+/// Resistance characteristic curves (rcc) of a zone of a member, layered route: a beam of fibres over the zone's
+/// length. Signs: N and strains positive in tension; a family M(φ; N) holds one curve for each normal force.
+
+#include <string>
+#include <vector>
+
+#include "product/plan.h"
+
+namespace topple::nearfield {
+
+/// What is asked: one zone of one section.
+struct ZoneInput {
+  product::Section section;
+  product::Concrete concrete;
+  product::Steel steel;
+  double length = 0;         // length over which curvature localises [m]
+  double cut_bars = 0;       // fraction of bars cut before (preparation)
+  double cut_concrete = 0;   // fraction of the area taken out before
+  double concrete_loss = 0;  // strength lost in the transition zone beside a charge, 0..1
+  bool cover_lost = false;
+};
+
+/// One axis and one direction of bending: moments against the zone's rotation for each normal force. K forces, J
+/// rotations.
+struct MomentFamily {
+  std::vector<double> normal_force;                  // rising [N] (K)
+  std::vector<double> rotation;                      // total rotation of the zone, rising from 0 [rad] (J)
+  std::vector<double> moment;                        // [N·m] (K x J), row k for normal_force[k]; >= 0
+  std::vector<double> yield_rotation, yield_moment;  // first yield of steel or 0.75 of the peak, per force (K)
+};
+
+/// Plastic shortening or elongation against force magnitude at no bending, elastic part taken out; first value at 0.
+struct AxialCurve {
+  std::vector<double> displacement;  // plastic, rising from 0 [m]
+  std::vector<double> force;         // magnitude [N]
+};
+
+struct Rcc {
+  MomentFamily y_pos, y_neg, z_pos, z_neg;  // bending about local y and z, both directions, magnitudes
+  AxialCurve compression, tension;
+  double EA = 0;                    // axial stiffness of the transformed section [N]
+  double EI_y = 0, EI_z = 0;        // uncracked flexural stiffness [N·m²]
+  double GA = 0;                    // shear stiffness, 5/6 of the gross area [N]
+  double GJ = 0;                    // torsional stiffness, cracked to a fifth [N·m²]
+  double shear_y = 0, shear_z = 0;  // shear capacity without normal force [N]
+  double shear_friction = 0;        // further capacity per newton of compression [-]
+  double torsion = 0;               // torsional capacity [N·m]
+  double damage_share = 0;  // share of the inelastic rotation that is damage (stiffness lost), not plastic: 1 - b
+
+  /// Effective flexural stiffness yield_moment / (yield_rotation / length) at the normal force N.
+  double calc_EI_effective_y(double N) const;
+  double calc_EI_effective_z(double N) const;
+  double length = 0;
+};
+
+/// Curves of an intact or prepared zone. Throws InputError for sections that cannot be computed.
+Rcc make_rcc(const ZoneInput&);
+
+/// What a fired charge leaves: a bare cage of η_s of the bars over the destroyed length. No concrete.
+struct ResidualCage {
+  AxialCurve compression, tension;    // bars buckle in compression, yield in tension
+  double moment_y = 0, moment_z = 0;  // from bar couples [N·m]
+  double shear = 0;                   // dowel and frame action of the bars [N]
+  double EA = 0;                      // [N]
+};
+ResidualCage make_residual_cage(const ZoneInput&, double destroyed_length, double residual_bars);
+
+/// Slab or wall zone per metre of hinge line; unreinforced panels have only their tensile strength.
+struct PanelRcc {
+  double moment_pos = 0, moment_neg = 0;              // yield moments, bottom and top reinforcement [N·m/m]
+  double ultimate_rotation = 0;                       // rupture of the bars [rad]
+  double tension = 0, compression = 0;                // membrane capacities [N/m]
+  double shear_in_plane = 0, shear_out_of_plane = 0;  // [N/m]
+  double EA = 0;                                      // membrane stiffness times length [N/m]
+  double EI = 0;                                      // cracked bending stiffness [N·m²/m]
+  double elongation_at_rupture = 0;                   // [m] over one thickness
+};
+PanelRcc make_panel_rcc(const product::Panel&, const product::Concrete*, const product::Steel*);
+
+}  // namespace topple::nearfield
