@@ -1,0 +1,136 @@
+#pragma once
+/// The native engine: equilibrium under dead load (implicit), then explicit steps through the events to the end.
+/// Constant model, separate state, memory allocated before the loop (docs/theory/multibody.md).
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/progress.h"
+#include "mbs/model.h"
+
+namespace topple::mbs {
+
+/// Energies since the start [J]. Balance: kinetic + gravity + elastic + contact + plastic + damping + friction
+/// + contact_loss + removed = the value at the start, up to `residual`.
+struct Energy {
+  double kinetic = 0;
+  double gravity = 0;       // potential, 0 at the start
+  double elastic = 0;       // stored in elements and cables
+  double contact = 0;       // stored in contacts
+  double plastic = 0;       // dissipated in zones, breaking included
+  double damping = 0;       // dissipated by dampers
+  double friction = 0;      // dissipated in contacts by sliding
+  double contact_loss = 0;  // dissipated in contacts by impact
+  double removed = 0;       // taken away with removed mass and released elements
+  double residual = 0;      // what the balance lacks: the integration error
+  double released = 0;      // potential energy set free so far, the reference of the residual
+};
+
+enum class ElementState : std::uint8_t { Elastic, Yielded, Softening, Broken, Removed };
+
+/// Read-only view of the running system, valid during a callback.
+struct View {
+  double time = 0;
+  std::vector<Pose> X_WB;
+  std::vector<Vec3> v_WB, w_WB;                     // of the centre of mass, of the body; in W
+  std::vector<double> mass;                         // current [kg]
+  std::vector<ElementState> element_state;          // zone elements, then rotational elements
+  std::vector<double> utilisation;                  // largest demand over capacity, same order
+  std::vector<double> rotation;                     // largest plastic rotation, same order [rad]
+  std::vector<double> shortening;                   // plastic shortening, zone elements only [m]
+  std::vector<Vec3> element_force, element_moment;  // of a on b at the marker, in F; zone elements only
+  std::vector<Vec3> joint_force, joint_moment;      // reaction of the parent on the child, in F
+  std::vector<bool> joint_released;
+  std::vector<double> cable_force;
+  Vec3 ground_force;          // of the ground on everything: contact, elements, joints and cables tied to it [N]
+  Vec3 contact_force_ground;  // the part by contact [N]
+  int body_contacts = 0;      // touching points between bodies
+  Energy energy;
+};
+
+/// Something that happened between two frames.
+struct Happening {
+  enum class Kind {
+    EventFired,
+    ElementYielded,
+    ElementSoftening,
+    ElementBroken,
+    JointReleased,
+    CableBroken,
+    GroundContact,
+    BodyContact
+  };
+  Kind kind = Kind::EventFired;
+  double time = 0;
+  int index = -1;      // event, element (zone elements, then rotational), joint, cable or body
+  int other = -1;      // second body of a BodyContact
+  std::string reason;  // of a break: "tension", "crushing", "shear", "rotation", "torsion"
+  double speed = 0;    // of a first contact, normal approach [m/s]
+};
+
+struct Options {
+  double duration = 1;  // [s]
+  double step = 0;      // 0: step_safety times the limit of the stiffest mode
+  double step_safety = 0.7;
+  double frame_interval = 1.0 / 60;  // of on_frame [s]; whole steps, the nearest at or after each instant
+  bool equilibrium = true;           // start from the dead-load equilibrium; false: from the poses of the model
+  double rest_speed = 0;   // stop when, after the last event, no body is faster than this for rest_time; 0: never
+  double rest_time = 0.5;  // [s]
+  int threads = 1;         // results do not depend on it
+  std::function<void(const View&)> on_frame;
+  std::function<void(const Happening&)> on_happening;
+  Progress progress;
+};
+
+struct Summary {
+  enum class Ending { TimeLimit, AtRest, Cancelled, NoEquilibrium, Diverged };
+  Ending ending = Ending::TimeLimit;
+  std::string message;  // a sentence with numbers
+  double time = 0;      // reached [s]
+  double step = 0;      // [s]
+  long steps = 0;
+  double highest_frequency = 0;  // of the elastic system at the start [rad/s]
+  int equilibrium_iterations = 0;
+  double equilibrium_residual = 0;  // largest unbalanced force over the weight
+  double energy_error = 0;          // largest |residual| over the released potential energy
+  double joint_drift = 0;           // largest violation of a joint [m, rad]
+  double wall_time = 0;             // of the stepping [s]
+};
+
+/// Runs the model from its start to its end. Throws InputError if check_model does; everything else is in the summary.
+Summary run(const Model&, const Options&);
+
+class System;  // compiled model and state
+struct SystemDeleter {
+  void operator()(System*) const;
+};
+
+/// A stepping handle for those who steer: run() is made of these.
+class Simulation {
+ public:
+  /// Compiles the model. Throws InputError.
+  Simulation(const Model&, const Options&);
+  ~Simulation();
+  Simulation(Simulation&&) noexcept;
+  Simulation& operator=(Simulation&&) noexcept;
+
+  /// Solves for the dead-load equilibrium; false with `message` if there is none.
+  bool find_equilibrium(std::string& message);
+  /// Advances by one step; false if the state is no longer finite.
+  bool advance_step();
+  double time() const;
+  double step() const;
+  const View& calc_view();
+  /// Everything that changes in time; restoring it on the same model gives the same bits as going on.
+  std::vector<std::byte> snapshot() const;
+  void restore(const std::vector<std::byte>&);
+  Summary summary() const;
+
+ private:
+  std::unique_ptr<System, SystemDeleter> system_;
+};
+
+}  // namespace topple::mbs
