@@ -1,0 +1,16 @@
+#pragma once
+/// Whole files in one go.
+
+#include <string>
+#include <string_view>
+
+namespace topple {
+
+/// The bytes of a file; InputError (E701) if it cannot be read.
+std::string read_file(const std::string& path);
+
+/// Writes `bytes` beside `path` and renames the result over it, so that a failure leaves an old file as it was.
+/// Missing parent folders are made. Throws std::runtime_error that names the path and the reason.
+void replace_file(const std::string& path, std::string_view bytes);
+
+}  // namespace topple
