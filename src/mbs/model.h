@@ -94,8 +94,9 @@ struct ZoneElement {
   std::vector<Station> stations;  // none: elastic; at most two
 };
 
-/// Two bodies joined by an ideal joint. Frames F on the parent and M on the child coincide at the start.
-/// The reaction is that of the parent on the child, in F.
+/// Two bodies joined by an ideal joint. Frames F on the parent and M on the child coincide at the start; x of F points
+/// from the parent to the child where a member's axis matters, the axis of a revolute joint is Fz = Mz. The reaction is
+/// that of the parent on the child, in F: pulled apart, its x component is negative.
 struct Joint {
   enum class Kind { Fixed, Revolute };
   Kind kind = Kind::Fixed;
@@ -103,7 +104,7 @@ struct Joint {
   BodyId parent, child;
   Pose X_PF, X_CM;
   // The joint is released for good when its reaction in F passes one of these.
-  double tension_limit = kUnlimited;   // force along +x of F on the child [N]
+  double tension_limit = kUnlimited;   // pull along x of F [N]
   double shear_limit = kUnlimited;     // resultant across x of F [N]
   double moment_limit = kUnlimited;    // resultant of the constrained moments [N·m]
   double rotation_limit = kUnlimited;  // |angle| of a revolute joint [rad]
