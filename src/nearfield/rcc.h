@@ -22,15 +22,20 @@ struct ZoneInput {
 };
 
 /// One axis and one direction of bending: moments against the zone's rotation for each normal force. K forces, J
-/// rotations.
+/// rotations. The rows of the first force (crushing at no curvature) and of the last (rupture of all bars) are zero,
+/// and so is the last column: beyond the grid the zone is broken. A row that becomes zero earlier has lost its
+/// equilibrium: the section can no longer carry that force. Rotations are measured from the state without moment.
+/// Positive about y: the end at larger x turns about +y, tension at +z. Positive about z: tension at -y.
 struct MomentFamily {
   std::vector<double> normal_force;                  // rising [N] (K)
   std::vector<double> rotation;                      // total rotation of the zone, rising from 0 [rad] (J)
   std::vector<double> moment;                        // [N·m] (K x J), row k for normal_force[k]; >= 0
-  std::vector<double> yield_rotation, yield_moment;  // first yield of steel or 0.75 of the peak, per force (K)
+  std::vector<double> yield_rotation, yield_moment;  // per force (K), positive rotations; the first of: steel yields in
+                                                     // tension, an edge reaches ε_c1, 0.75 of the peak
 };
 
-/// Plastic shortening or elongation against force magnitude at no bending, elastic part taken out; first value at 0.
+/// Plastic shortening or elongation against force magnitude at no bending, elastic part (EA / length) taken out; first
+/// value at 0: in compression 0.75 of the peak, in tension yield of the bars.
 struct AxialCurve {
   std::vector<double> displacement;  // plastic, rising from 0 [m]
   std::vector<double> force;         // magnitude [N]
@@ -54,8 +59,13 @@ struct Rcc {
   double length = 0;
 };
 
-/// Curves of an intact or prepared zone. Throws InputError for sections that cannot be computed.
+/// Curves of an intact or prepared zone. Throws InputError for sections that cannot be computed, and for a length at or
+/// above calc_largest_zone_length.
 Rcc make_rcc(const ZoneInput&);
+
+/// Longest zone (excluded) over which the concrete can soften without giving back more than its crushing or fracture
+/// energy [m]. Losses of strength do not change it.
+double calc_largest_zone_length(const product::Concrete&);
 
 /// What a fired charge leaves: a bare cage of η_s of the bars over the destroyed length. No concrete.
 struct ResidualCage {

@@ -1,0 +1,312 @@
+#include "nearfield/fibres.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+
+namespace topple::nearfield {
+
+namespace {
+
+/// A share of the areas that is left; something must stay for the arithmetic.
+double left_over(double lost) { return std::max(0.0, 1 - lost); }
+
+struct Frame {
+  double depth = 0, breadth = 0;            // along the gradient and across it
+  double core_depth = 0, core_breadth = 0;  // between the centre lines of the ties
+};
+
+Frame make_frame(const ZoneInput& in, Axis axis) {
+  const product::Section& s = in.section;
+  const double edge = 2 * (s.cover + 0.5 * s.tie_diameter);
+  Frame f;
+  f.depth = axis == Axis::Y ? s.height : s.width;
+  f.breadth = axis == Axis::Y ? s.width : s.height;
+  f.core_depth = f.depth - edge;
+  f.core_breadth = f.breadth - edge;
+  return f;
+}
+
+/// Layers from `from` to `to`.
+void add_layers(Fibres& out, int count, double from, double to, double core_breadth, double cover_breadth) {
+  const double t = (to - from) / count;
+  for (int i = 0; i < count; ++i) {
+    out.at.push_back(from + (i + 0.5) * t);
+    out.core_area.push_back(t * core_breadth);
+    out.cover_area.push_back(t * cover_breadth);
+  }
+}
+
+}  // namespace
+
+material::ConcreteInput make_concrete_input(const ZoneInput& in) {
+  const double kept = std::max(0.01, left_over(in.concrete_loss));
+  material::ConcreteInput c;
+  c.fc = kept * in.concrete.fc;
+  c.fct = kept * in.concrete.fct;
+  c.Ec = kept * in.concrete.Ec;
+  c.eps_c1 = in.concrete.eps_c1;
+  c.Gf = kept * in.concrete.Gf;
+  c.Gcl = kept * in.concrete.Gcl;
+  c.l_eq = in.length;
+  return c;
+}
+
+double calc_tie_stress(const ZoneInput& in) {
+  const product::Section& s = in.section;
+  if (in.cover_lost || s.tie_diameter <= 0 || s.tie_spacing <= 0) return 0;
+  const double edge = 2 * (s.cover + 0.5 * s.tie_diameter), b = s.width - edge, h = s.height - edge;
+  if (b <= 0 || h <= 0 || s.tie_spacing >= 2 * std::min(b, h)) return 0;
+  const double bar = 0.25 * 3.14159265358979323846 * s.tie_diameter * s.tie_diameter;
+  const double ratio_y = s.tie_legs_y * bar / (s.tie_spacing * h), ratio_z = s.tie_legs_z * bar / (s.tie_spacing * b);
+  // Arches between held bars: legs along z stand side by side along the width, and the other way round.
+  const double gaps = 2 * b * b / std::max(1, s.tie_legs_z - 1) + 2 * h * h / std::max(1, s.tie_legs_y - 1);
+  const double in_plane = std::max(0.0, 1 - gaps / (6 * b * h));
+  const double along = (1 - s.tie_spacing / (2 * b)) * (1 - s.tie_spacing / (2 * h));
+  return in_plane * along * std::min(ratio_y, ratio_z) * in.steel.fy;
+}
+
+Fibres make_fibres(const ZoneInput& in, Axis axis) {
+  const Frame f = make_frame(in, axis);
+  Fibres out;
+  out.half_depth = 0.5 * f.depth;
+  material::ConcreteInput plain = make_concrete_input(in);
+  out.cover = material::make_concrete(plain);
+  out.core = material::make_concrete(material::confine(plain, {calc_tie_stress(in)}));
+
+  const double kept = in.concrete_loss >= 1 ? 0 : left_over(in.cut_concrete);
+  const double cover_kept = in.cover_lost ? 0 : kept;
+  constexpr int core_layers = 32, cover_layers = 4;
+  if (f.core_depth > 0 && f.core_breadth > 0) {
+    const double a = 0.5 * f.depth, c = 0.5 * f.core_depth;
+    if (cover_kept > 0) add_layers(out, cover_layers, -a, -c, 0, cover_kept * f.breadth);
+    add_layers(out, core_layers, -c, c, kept * f.core_breadth, cover_kept * (f.breadth - f.core_breadth));
+    if (cover_kept > 0) add_layers(out, cover_layers, c, a, 0, cover_kept * f.breadth);
+  } else {
+    add_layers(out, core_layers, -0.5 * f.depth, 0.5 * f.depth, 0, cover_kept * f.breadth);
+  }
+
+  material::SteelInput steel;
+  steel.fy = in.steel.fy, steel.fu = in.steel.fu, steel.Es = in.steel.Es, steel.eps_u = in.steel.eps_u;
+  // Without ties, or with the cover gone, bars are free over the whole zone at most.
+  const double spacing = in.section.tie_spacing;
+  steel.free_length = spacing > 0 && in.section.tie_diameter > 0 ? std::min(spacing, in.length) : in.length;
+  std::vector<double> diameters;
+  const double bars_kept = left_over(in.cut_bars);
+  for (const product::Bar& bar : in.section.bars) {
+    const double at = axis == Axis::Y ? bar.z : bar.y;
+    size_t row = 0;
+    while (row < out.bar_at.size() && !(std::abs(out.bar_at[row] - at) < 1e-9 && diameters[row] == bar.diameter)) ++row;
+    if (row == out.bar_at.size()) {
+      steel.diameter = bar.diameter;
+      out.bar_at.push_back(at);
+      out.bar_area.push_back(0);
+      out.bar_law.push_back(material::make_steel(steel));
+      diameters.push_back(bar.diameter);
+    }
+    out.bar_area[row] += bars_kept * bar.area;
+  }
+  return out;
+}
+
+Resultants calc_resultants(const Fibres& f, double eps_0, double kappa) {
+  Resultants r;
+  const size_t layers = f.at.size();
+  for (size_t i = 0; i < layers; ++i) {
+    const double eps = eps_0 + kappa * f.at[i];
+    double force = 0, tangent = 0;
+    if (f.core_area[i] > 0) {
+      const material::Response a = material::calc_envelope(f.core, eps);
+      force = f.core_area[i] * a.stress, tangent = f.core_area[i] * a.tangent;
+    }
+    if (f.cover_area[i] > 0) {
+      const material::Response a = material::calc_envelope(f.cover, eps);
+      force += f.cover_area[i] * a.stress, tangent += f.cover_area[i] * a.tangent;
+    }
+    r.N += force, r.M += force * f.at[i], r.dN += tangent;
+  }
+  const size_t rows = f.bar_at.size();
+  const bool has_concrete = layers > 0 && f.core_area[layers / 2] > 0;
+  for (size_t i = 0; i < rows; ++i) {
+    const double eps = eps_0 + kappa * f.bar_at[i];
+    const material::SteelResponse s = material::calc_envelope(f.bar_law[i], eps);
+    double stress = s.stress, tangent = s.tangent;
+    if (has_concrete) {  // the bar stands where the layers have counted concrete
+      const material::Response a = material::calc_envelope(f.core, eps);
+      stress -= a.stress, tangent -= a.tangent;
+    }
+    const double force = f.bar_area[i] * stress;
+    r.N += force, r.M += force * f.bar_at[i], r.dN += f.bar_area[i] * tangent;
+  }
+  return r;
+}
+
+namespace {
+
+/// Scale of forces for tolerances [N].
+double calc_force_scale(const Fibres& f) {
+  double scale = 0;
+  for (size_t i = 0; i < f.at.size(); ++i) scale += f.core_area[i] * f.core.fc + f.cover_area[i] * f.cover.fc;
+  for (size_t i = 0; i < f.bar_at.size(); ++i) scale += f.bar_area[i] * f.bar_law[i].fy;
+  return scale;
+}
+
+struct Search {
+  double N = 0, tolerance = 0;
+};
+
+/// The search of find_equilibrium, also giving the resultants there.
+bool find(const Fibres& f, const Search& search, double kappa, double& eps_0, Resultants& at) {
+  constexpr double largest_strain = 0.6, largest_step = 2e-3;
+  double e = eps_0;
+  Resultants r = calc_resultants(f, e, kappa);
+  double residual = r.N - search.N;
+  const auto done = [&] { return std::abs(residual) <= search.tolerance; };
+  const auto accept = [&] {
+    eps_0 = e, at = r;
+    return true;
+  };
+  if (done()) return accept();
+  // Too much internal tension: the section shortens; too little: it lengthens. A bracket is found on the way.
+  const double direction = residual > 0 ? -1 : 1;
+  const auto crossed = [&] { return residual * direction > 0; };
+  double step = 0, other = e;
+  for (int i = 0; !crossed(); ++i) {
+    const double newton = r.dN > 0 ? 1.05 * std::abs(residual) / r.dN : largest_step;
+    step = std::min(std::max(newton, 1.5 * step), largest_step * (1 + 0.2 * i));
+    const bool was_stable = r.dN > 0;
+    other = e;
+    e += direction * step;
+    if (std::abs(e) > largest_strain || i > 400) return false;
+    r = calc_resultants(f, e, kappa);
+    residual = r.N - search.N;
+    if (done()) return accept();
+    if (crossed() || !was_stable || r.dN > 0) continue;
+    // The step went over an extreme of N: equilibrium may lie just before it.
+    const double beyond = e;
+    const Resultants r_beyond = r;
+    double stable = other, unstable = beyond;
+    for (int k = 0; k < 24 && !crossed(); ++k) {
+      e = 0.5 * (stable + unstable);
+      r = calc_resultants(f, e, kappa);
+      residual = r.N - search.N;
+      if (done()) return accept();
+      (r.dN > 0 ? stable : unstable) = e;
+    }
+    if (!crossed()) e = beyond, r = r_beyond, residual = r.N - search.N;
+  }
+  // Newton inside the bracket, bisection where it leaves or stalls.
+  double low = std::min(e, other), high = std::max(e, other);
+  for (int i = 0; i < 80; ++i) {
+    double next = r.dN > 0 ? e - residual / r.dN : low - 1;
+    if (!(next > low && next < high) || i % 6 == 5) next = 0.5 * (low + high);
+    e = next;
+    r = calc_resultants(f, e, kappa);
+    residual = r.N - search.N;
+    if (done() || high - low < 1e-13) break;
+    (residual > 0 ? high : low) = e;
+  }
+  return accept();
+}
+
+}  // namespace
+
+bool find_equilibrium(const Fibres& f, double N, double kappa, double& eps_0) {
+  Resultants r;
+  return find(f, {N, 1e-9 * calc_force_scale(f)}, kappa, eps_0, r);
+}
+
+Peak find_crushing(const Fibres& f) {
+  const auto force = [&](double e) { return -calc_resultants(f, -e, 0).N; };
+  double best = 0, best_strain = 0;
+  double e = 1e-5;
+  constexpr double ratio = 1.15;
+  for (; e < 0.3; e *= ratio) {
+    const double F = force(e);
+    if (F > best) best = F, best_strain = e;
+  }
+  if (best_strain <= 0) return {};
+  // Golden section around the best of the grid.
+  const double g = 0.6180339887498949;
+  double a = best_strain / ratio, b = best_strain * ratio;
+  double c = b - g * (b - a), d = a + g * (b - a), Fc = force(c), Fd = force(d);
+  for (int i = 0; i < 30; ++i) {
+    if (Fc > Fd) {
+      b = d, d = c, Fd = Fc, c = b - g * (b - a), Fc = force(c);
+    } else {
+      a = c, c = d, Fc = Fd, d = a + g * (b - a), Fd = force(d);
+    }
+  }
+  const double strain = 0.5 * (a + b), F = force(strain);
+  return F > best ? Peak{F, strain} : Peak{best, best_strain};
+}
+
+March march_curvature(const Fibres& f, double N, int direction, const std::vector<double>& kappa) {
+  March out;
+  out.moment.assign(kappa.size(), 0.0);
+  const Search search{N, 1e-7 * calc_force_scale(f)};
+  double eps_0 = 0;
+  Resultants r;
+  if (!find(f, search, 0, eps_0, r)) return out;
+
+  // An unsymmetric section bends under N alone: start where M = 0.
+  double origin = 0;
+  const double moment_scale = calc_force_scale(f) * f.half_depth;
+  if (std::abs(r.M) > 1e-9 * moment_scale) {
+    double k0 = 0, M0 = r.M, k1 = (r.M > 0 ? -1 : 1) * 1e-5 / f.half_depth;
+    for (int i = 0; i < 40; ++i) {
+      Resultants r1;
+      double e1 = eps_0;
+      if (!find(f, search, k1, e1, r1)) return out;
+      eps_0 = e1, origin = k1, r = r1;
+      if (std::abs(r1.M) <= 1e-9 * moment_scale) break;
+      const double slope = (r1.M - M0) / (k1 - k0);
+      double step = slope > 0 ? -r1.M / slope : (r1.M > 0 ? -1 : 1) * 1e-4 / f.half_depth;
+      step = std::clamp(step, -5e-4 / f.half_depth, 5e-4 / f.half_depth);
+      k0 = k1, M0 = r1.M, k1 += step;
+    }
+  }
+
+  // First yield: steel in tension, or the compressive strain of the peak at the edge.
+  const auto yields = [&](double e, double k) {
+    for (size_t i = 0; i < f.bar_at.size(); ++i)
+      if (f.bar_area[i] > 0 && e + k * f.bar_at[i] > f.bar_law[i].eps_y) return true;
+    return e - std::abs(k) * f.half_depth < -f.cover.eps_c1;
+  };
+  bool yielded = false;
+  double previous_eps = eps_0, previous_slope = 0;
+  for (size_t j = 1; j < kappa.size(); ++j) {
+    const double k = origin + direction * kappa[j], step = kappa[j] - kappa[j - 1];
+    // Warm start along the last slope while the branch is far from its end.
+    double e = r.dN > 0 ? previous_eps + previous_slope * step : previous_eps;
+    if (!find(f, search, k, e, r)) break;
+    out.moment[j] = std::max(0.0, direction * r.M);
+    out.last = static_cast<int>(j);
+    if (!yielded && yields(e, k)) {
+      // Bisection between the last two points, the strain taken linearly.
+      double low = 0, high = 1;
+      for (int i = 0; i < 30; ++i) {
+        const double s = 0.5 * (low + high);
+        const bool y = yields(previous_eps + s * (e - previous_eps), k - direction * (1 - s) * step);
+        (y ? high : low) = s;
+      }
+      yielded = true;
+      out.yield_kappa = kappa[j - 1] + high * step;
+      out.yield_moment = out.moment[j - 1] + high * (out.moment[j] - out.moment[j - 1]);
+    }
+    previous_slope = (e - previous_eps) / step;
+    previous_eps = e;
+  }
+  const double peak = *std::max_element(out.moment.begin(), out.moment.end());
+  for (size_t j = 1; j < kappa.size() && peak > 0; ++j) {
+    if (out.moment[j] < 0.75 * peak) continue;
+    const double s = (0.75 * peak - out.moment[j - 1]) / (out.moment[j] - out.moment[j - 1]);
+    const double at = kappa[j - 1] + s * (kappa[j] - kappa[j - 1]);
+    if (!yielded || at < out.yield_kappa) out.yield_kappa = at, out.yield_moment = 0.75 * peak;
+    break;
+  }
+  return out;
+}
+
+}  // namespace topple::nearfield

@@ -1,0 +1,59 @@
+#pragma once
+/// A section as layers of concrete and rows of bars for bending about one axis; plane sections, docs/theory/rcc.md.
+
+#include <vector>
+
+#include "material/concrete.h"
+#include "material/steel.h"
+#include "nearfield/rcc.h"
+
+namespace topple::nearfield {
+
+/// L layers and R bar rows. Coordinates from the section's centre; positive strain gradient pulls at positive `at`.
+struct Fibres {
+  std::vector<double> at, core_area, cover_area;  // layers [m], [m²] (L)
+  std::vector<double> bar_at, bar_area;           // rows of equal place and diameter (R)
+  std::vector<material::Steel> bar_law;           // (R)
+  material::Concrete core, cover;
+  double half_depth = 0;  // [m]
+};
+
+/// Stress resultants of a plane of strains.
+struct Resultants {
+  double N = 0, M = 0;  // [N], [N·m], M = ∫ σ · at dA
+  double dN = 0;        // ∂N/∂ε0 [N]
+};
+
+enum class Axis { Y, Z };
+
+/// The section after preparation; the concrete is what is left in `concrete`. Throws InputError.
+Fibres make_fibres(const ZoneInput&, Axis);
+
+/// Resultants at the mean strain ε0 and the curvature κ.
+Resultants calc_resultants(const Fibres&, double eps_0, double kappa);
+
+/// Mean strain at which the section carries N at curvature κ, searched from `eps_0` towards equilibrium, as a section
+/// under a constant force would move. False: no equilibrium on that way; the section can no longer carry N.
+bool find_equilibrium(const Fibres&, double N, double kappa, double& eps_0);
+
+/// One march at constant N from M = 0 on.
+struct March {
+  std::vector<double> moment;  // magnitude for each of the given curvatures (from the one at M = 0), 0 after the loss
+  int last = -1;               // index of the last curvature that could be carried, -1: none
+  double yield_kappa = 0, yield_moment = 0;
+};
+/// `kappa` rises from 0; direction +1 or -1.
+March march_curvature(const Fibres&, double N, int direction, const std::vector<double>& kappa);
+
+/// Largest compressive force at no curvature (magnitude, positive) and the strain there (magnitude).
+struct Peak {
+  double force = 0, strain = 0;
+};
+Peak find_crushing(const Fibres&);
+
+/// Concrete of the zone after losses, before regularisation. The factor of the strength lies in (0, 1].
+material::ConcreteInput make_concrete_input(const ZoneInput&);
+/// Effective lateral stress of the ties on the core, docs/theory/rcc.md (5) to (7).
+double calc_tie_stress(const ZoneInput&);
+
+}  // namespace topple::nearfield

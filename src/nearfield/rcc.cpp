@@ -1,0 +1,301 @@
+#include "nearfield/rcc.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "base/error.h"
+#include "base/unit.h"
+#include "nearfield/fibres.h"
+#include "nearfield/zone.h"
+
+namespace topple::nearfield {
+
+namespace {
+
+constexpr double pi = 3.14159265358979323846;
+
+double calc_bar_force(const ZoneInput& in, double stress) {
+  return (1 - in.cut_bars) * in.section.steel_area() * stress;
+}
+
+/// Rotations from a fraction of cracking to beyond rupture, densest around yield.
+std::vector<double> make_rotations(const ZoneInput& in, double depth, const material::Concrete& concrete) {
+  const double per_strain = in.length / depth;
+  const double eps_y = in.steel.fy / in.steel.Es;
+  const double yield = 1.7 * eps_y * per_strain, crack = 2 * concrete.eps_ct * per_strain;
+  const double first = crack > 0 ? std::min(0.5 * crack, 0.1 * yield) : 0.05 * yield;
+  const double last = std::min(1.0, std::max(5 * in.steel.eps_u * per_strain, 12 * yield));
+  std::vector<double> out{0};
+  const auto extend = [&](double from, double to, double ratio) {
+    if (to <= from) return;
+    const int n = std::max(1, static_cast<int>(std::ceil(std::log(to / from) / std::log(ratio))));
+    for (int i = 1; i <= n; ++i) out.push_back(from * std::pow(to / from, static_cast<double>(i) / n));
+  };
+  out.push_back(first);
+  extend(first, 0.4 * yield, 1.4);
+  extend(out.back(), 6 * yield, 1.15);
+  extend(out.back(), last, 1.22);
+  return out;
+}
+
+/// Normal forces from crushing to rupture of the bars.
+std::vector<double> make_forces(double crushing, double rupture) {
+  std::vector<double> out;
+  for (double share : {1.0, 0.97, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1}) out.push_back(-share * crushing);
+  for (double share : {0.0, 0.4, 0.75, 1.0}) out.push_back(share * rupture);
+  return out;
+}
+
+MomentFamily make_family(const Fibres& fibres, int direction, const std::vector<double>& force,
+                         const std::vector<double>& rotation, double length) {
+  const size_t K = force.size();
+  std::vector<double> kappa(rotation);
+  for (double& k : kappa) k /= length;
+  std::vector<March> marches;
+  marches.reserve(K);
+  int last = 1;
+  for (size_t k = 0; k < K; ++k) {
+    if (k == 0 || k + 1 == K) {
+      marches.emplace_back();
+      marches.back().moment.assign(kappa.size(), 0.0);
+    } else {
+      marches.push_back(march_curvature(fibres, force[k], direction, kappa));
+    }
+    last = std::max(last, marches.back().last);
+  }
+  // The last column is zero: broken.
+  const size_t J = std::min(kappa.size(), static_cast<size_t>(last) + 2);
+  MomentFamily out;
+  out.normal_force = force;
+  out.rotation.assign(rotation.begin(), rotation.begin() + static_cast<std::ptrdiff_t>(J));
+  out.moment.reserve(K * J);
+  for (const March& march : marches) {
+    out.moment.insert(out.moment.end(), march.moment.begin(), march.moment.begin() + static_cast<std::ptrdiff_t>(J));
+    out.moment.back() = 0;
+    out.yield_rotation.push_back(march.yield_kappa * length);
+    out.yield_moment.push_back(march.yield_moment);
+  }
+  // Rows without moment borrow the rotation of the nearest row that has one.
+  for (size_t k = 0; k < K; ++k) {
+    if (out.yield_rotation[k] > 0) continue;
+    for (size_t d = 1; d < K && !(out.yield_rotation[k] > 0); ++d) {
+      if (k + d < K && marches[k + d].yield_kappa > 0)
+        out.yield_rotation[k] = marches[k + d].yield_kappa * length;
+      else if (k >= d && marches[k - d].yield_kappa > 0)
+        out.yield_rotation[k] = marches[k - d].yield_kappa * length;
+    }
+    if (!(out.yield_rotation[k] > 0)) out.yield_rotation[k] = rotation[1];
+  }
+  return out;
+}
+
+bool is_symmetric(const Fibres& f) {
+  for (size_t i = 0; i < f.bar_at.size(); ++i) {
+    double here = 0, mirrored = 0;
+    for (size_t j = 0; j < f.bar_at.size(); ++j) {
+      if (f.bar_law[j].eps_star != f.bar_law[i].eps_star) continue;
+      if (std::abs(f.bar_at[j] - f.bar_at[i]) < 1e-6) here += f.bar_area[j];
+      if (std::abs(f.bar_at[j] + f.bar_at[i]) < 1e-6) mirrored += f.bar_area[j];
+    }
+    if (std::abs(here - mirrored) > 1e-9 * here) return false;
+  }
+  return true;
+}
+
+/// Force against plastic shortening, from 0.75 of the peak through the peak to what buckled bars leave.
+AxialCurve make_compression(const Fibres& f, const Peak& peak, double EA, double length) {
+  const auto force = [&](double e) { return std::max(0.0, -calc_resultants(f, -e, 0).N); };
+  double low = 0, high = peak.strain;
+  for (int i = 0; i < 50; ++i) {
+    const double e = 0.5 * (low + high);
+    (force(e) < 0.75 * peak.force ? low : high) = e;
+  }
+  AxialCurve out;
+  const double start = high, offset = start - force(start) / EA;
+  const auto add = [&](double e) {
+    const double F = force(e), u = length * (e - F / EA - offset);
+    if (!out.displacement.empty() && u <= out.displacement.back() * (1 + 1e-12) + 1e-12 * length) return;
+    out.displacement.push_back(out.displacement.empty() ? 0 : u);
+    out.force.push_back(F);
+  };
+  for (int i = 0; i <= 5; ++i) add(start + (peak.strain - start) * i / 5.0);
+  constexpr int points = 28;
+  double x = 0.15 * peak.strain;
+  const double ratio = std::pow(std::max(1.01, (1 - peak.strain) / x), 1.0 / (points - 1));
+  for (int i = 0; i < points; ++i, x *= ratio) add(std::min(1.0, peak.strain + x));
+  return out;
+}
+
+/// Bars yield, harden and break; a section with few bars starts with its tensile strength and opens one crack.
+AxialCurve make_tension(const ZoneInput& in, const material::Concrete& concrete, double area) {
+  const double yield = calc_bar_force(in, in.steel.fy), rupture = calc_bar_force(in, in.steel.fu);
+  const double cracking = area * concrete.fct;
+  const double eps_pu = in.steel.eps_u - in.steel.fu / in.steel.Es;
+  const double broken = in.length * std::max(eps_pu, 1e-4);
+  AxialCurve out;
+  const auto add = [&](double u) {
+    const double bars = u <= broken ? yield + (rupture - yield) * u / broken : 0;
+    const double crack = area * material::calc_tension(concrete, concrete.eps_ct + u / in.length).stress;
+    out.displacement.push_back(u);
+    out.force.push_back(std::max(bars, crack));
+  };
+  add(0);
+  if (cracking > yield) {
+    const double opened = std::min(concrete.eps_tu * in.length, 0.9 * broken);
+    for (double share : {0.05, 0.1, 0.2, 0.35, 0.6, 1.0}) add(share * opened);
+  }
+  for (double share : {0.25, 0.5, 0.75, 1.0})
+    if (share * broken > out.displacement.back()) add(share * broken);
+  out.displacement.push_back(1.001 * broken);
+  out.force.push_back(0);
+  return out;
+}
+
+/// Shear and torsion, docs/theory/rcc.md (12) to (16).
+void add_shear(const ZoneInput& in, Rcc& out) {
+  const product::Section& s = in.section;
+  const material::ConcreteInput c = make_concrete_input(in);
+  const double edge = 2 * (s.cover + 0.5 * s.tie_diameter);
+  const double b_core = std::max(0.0, s.width - edge), h_core = std::max(0.0, s.height - edge);
+  const double kept = in.concrete_loss >= 1 ? 0 : 1 - in.cut_concrete;
+  const double area = kept * (in.cover_lost ? b_core * h_core : s.area());
+  const bool tied = s.tie_diameter > 0 && s.tie_spacing > 0;
+  const double leg = 0.25 * pi * s.tie_diameter * s.tie_diameter;
+  const double cot30 = std::sqrt(3.0);
+  const double concrete = 0.29 * std::sqrt(c.fc / unit::MPa) * unit::MPa * 0.8 * area;
+  const double crushing = 0.6 * c.fc * 0.8 * area / (cot30 + 1 / cot30);
+  const auto shear = [&](double depth, int legs) {
+    const double ties = tied && depth > 0 ? legs * leg * in.steel.fy * depth * cot30 / s.tie_spacing : 0;
+    return std::min(concrete + ties, crushing);
+  };
+  out.shear_y = shear(b_core, s.tie_legs_y);
+  out.shear_z = shear(h_core, s.tie_legs_z);
+  out.shear_friction = kept > 0 ? (1 - 0.3) / (2 * 3.0) : 0;
+  // A section that is all bars still has their dowels.
+  double dowel = 0;
+  for (const product::Bar& bar : s.bars)
+    dowel += (1 - in.cut_bars) * 2 * in.steel.fy * std::pow(bar.diameter, 3) / 6 / in.length;
+  out.shear_y = std::max(out.shear_y, dowel);
+  out.shear_z = std::max(out.shear_z, dowel);
+
+  const double enclosed = b_core * h_core, perimeter = 2 * (b_core + h_core);
+  const double a = std::max(s.width, s.height), t = std::min(s.width, s.height);
+  const double cracking = kept * c.fct * t * t * a / (3 + 1.8 * t / a);
+  double truss = 0;
+  if (tied && perimeter > 0) {
+    const double along = calc_bar_force(in, in.steel.fy) / perimeter, around = leg * in.steel.fy / s.tie_spacing;
+    const double wall = s.area() / (2 * (s.width + s.height));
+    truss = std::min(2 * enclosed * std::sqrt(along * around), 0.6 * c.fc * kept * enclosed * wall);
+  }
+  out.torsion = std::max(cracking, truss);
+  // Saint-Venant's constant of a rectangle.
+  const double saint_venant = a * t * t * t * (1.0 / 3 - 0.21 * t / a * (1 - std::pow(t / a, 4) / 12));
+  const double G = c.Ec / 2.4;
+  out.GA = 5.0 / 6 * G * kept * s.area();
+  out.GJ = 0.2 * G * kept * saint_venant;
+  if (kept <= 0) out.GA = out.GJ = 0;
+}
+
+double interpolate_EI(const MomentFamily& f, double N, double length) {
+  const size_t K = f.normal_force.size();
+  const auto EI = [&](size_t k) {
+    // Rows without moment take the stiffness of the next row inside.
+    size_t i = k;
+    while (i + 1 < K && i < K / 2 && !(f.yield_moment[i] > 0)) ++i;
+    while (i > 0 && i >= K / 2 && !(f.yield_moment[i] > 0)) --i;
+    return f.yield_moment[i] / f.yield_rotation[i] * length;
+  };
+  if (N <= f.normal_force.front()) return EI(0);
+  if (N >= f.normal_force.back()) return EI(K - 1);
+  const size_t k =
+      static_cast<size_t>(std::upper_bound(f.normal_force.begin(), f.normal_force.end(), N) - f.normal_force.begin());
+  const double s = (N - f.normal_force[k - 1]) / (f.normal_force[k] - f.normal_force[k - 1]);
+  return (1 - s) * EI(k - 1) + s * EI(k);
+}
+
+}  // namespace
+
+double Rcc::calc_EI_effective_y(double N) const {
+  return 0.5 * (interpolate_EI(y_pos, N, length) + interpolate_EI(y_neg, N, length));
+}
+double Rcc::calc_EI_effective_z(double N) const {
+  return 0.5 * (interpolate_EI(z_pos, N, length) + interpolate_EI(z_neg, N, length));
+}
+
+double calc_largest_zone_length(const product::Concrete& concrete) {
+  ZoneInput in;
+  in.concrete = concrete;
+  in.length = 1;
+  return material::calc_largest_l_eq(make_concrete_input(in));
+}
+
+void check_zone(const ZoneInput& in) {
+  const product::Section& s = in.section;
+  const auto complain = [&](const std::string& what, const std::string& help = {}) {
+    throw InputError("E611", "section '" + s.name + "': " + what, help);
+  };
+  const auto is_share = [](double v) { return v >= 0 && v <= 1; };
+  if (!(s.width > 0) || !(s.height > 0)) complain("width and height must be positive");
+  if (!(in.length > 0) || !std::isfinite(in.length)) complain("the length of a zone must be positive");
+  if (!(s.cover >= 0) || !(s.tie_diameter >= 0) || !(s.tie_spacing >= 0))
+    complain("cover, diameter and spacing of the ties must not be negative");
+  if (!is_share(in.cut_bars) || !is_share(in.cut_concrete) || !is_share(in.concrete_loss))
+    complain("cut_bars, cut_concrete and concrete_loss must lie between 0 and 1");
+  for (const product::Bar& bar : s.bars) {
+    if (!(bar.area > 0) || !(bar.diameter > 0)) complain("bars need a positive area and diameter");
+    if (!(std::abs(bar.y) <= 0.5 * s.width) || !(std::abs(bar.z) <= 0.5 * s.height))
+      complain("a bar lies outside of the section", "bars are placed from the section's centre");
+  }
+  if (s.steel_area() > 0.2 * s.area()) complain("the bars fill more than a fifth of the section");
+}
+
+Rcc make_rcc(const ZoneInput& in) {
+  check_zone(in);
+  const Fibres about_y = make_fibres(in, Axis::Y), about_z = make_fibres(in, Axis::Z);
+  Rcc out;
+  out.length = in.length;
+
+  double area = 0;
+  for (size_t i = 0; i < about_y.at.size(); ++i) {
+    const double a = about_y.core_area[i] + about_y.cover_area[i];
+    area += a;
+    out.EI_y += about_y.cover.Ec * a * about_y.at[i] * about_y.at[i];
+  }
+  for (size_t i = 0; i < about_z.at.size(); ++i)
+    out.EI_z += about_z.cover.Ec * (about_z.core_area[i] + about_z.cover_area[i]) * about_z.at[i] * about_z.at[i];
+  const double n = in.steel.Es - (area > 0 ? about_y.cover.Ec : 0);
+  out.EA = about_y.cover.Ec * area;
+  for (size_t i = 0; i < about_y.bar_at.size(); ++i) {
+    out.EA += n * about_y.bar_area[i];
+    out.EI_y += n * about_y.bar_area[i] * about_y.bar_at[i] * about_y.bar_at[i];
+  }
+  for (size_t i = 0; i < about_z.bar_at.size(); ++i)
+    out.EI_z += n * about_z.bar_area[i] * about_z.bar_at[i] * about_z.bar_at[i];
+  if (!(out.EA > 0)) throw InputError("E612", "section '" + in.section.name + "': nothing is left of it");
+
+  const Peak peak = find_crushing(about_y);
+  out.compression = make_compression(about_y, peak, out.EA, in.length);
+  out.tension = make_tension(in, about_y.cover, area);
+  const double rupture = std::max({calc_bar_force(in, in.steel.fu), area * about_y.cover.fct, 1e-6 * peak.force});
+  const std::vector<double> force = make_forces(peak.force, rupture);
+
+  const auto rotation_y = make_rotations(in, in.section.height, about_y.cover);
+  const auto rotation_z = make_rotations(in, in.section.width, about_z.cover);
+  out.y_pos = make_family(about_y, 1, force, rotation_y, in.length);
+  out.y_neg = is_symmetric(about_y) ? out.y_pos : make_family(about_y, -1, force, rotation_y, in.length);
+  const bool same = about_y.at == about_z.at && about_y.core_area == about_z.core_area &&
+                    about_y.cover_area == about_z.cover_area && about_y.bar_at == about_z.bar_at &&
+                    about_y.bar_area == about_z.bar_area && in.section.width == in.section.height;
+  if (same) {
+    out.z_pos = out.y_neg, out.z_neg = out.y_pos;
+  } else {
+    out.z_pos = make_family(about_z, -1, force, rotation_z, in.length);
+    out.z_neg = is_symmetric(about_z) ? out.z_pos : make_family(about_z, 1, force, rotation_z, in.length);
+  }
+  add_shear(in, out);
+  out.damage_share = 1 - about_y.core.b_c;
+  return out;
+}
+
+}  // namespace topple::nearfield
