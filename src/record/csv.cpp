@@ -1,0 +1,144 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include "base/file.h"
+#include "record/record.h"
+
+namespace topple::record {
+
+namespace {
+
+/// A text as RFC 4180 asks for it: in quotes if it needs them, quotes inside doubled.
+std::string quoted(std::string_view text) {
+  if (text.find_first_of("\",\r\n") == std::string_view::npos) return std::string(text);
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"') out += '"';
+    out += c;
+  }
+  return out + '"';
+}
+
+/// The shortest digits that give the same number back; not a number is an empty field.
+template <class Number>
+std::string digits(Number value) {
+  return std::isnan(value) ? std::string() : fmt::format("{}", value);
+}
+
+std::string with_unit(const std::string& name, const std::string& unit) {
+  return unit.empty() ? name : name + " [" + unit + "]";
+}
+
+/// Lines of fields, ended as RFC 4180 asks.
+class Table {
+ public:
+  Table& text(std::string_view value) { return field(quoted(value)); }
+  template <class Number>
+  Table& number(Number value) {
+    return field(digits(value));
+  }
+  Table& whole(int value) { return field(std::to_string(value)); }
+  void end_line() {
+    text_ += "\r\n";
+    starts_line_ = true;
+  }
+  const std::string& str() const { return text_; }
+
+ private:
+  Table& field(const std::string& value) {
+    if (!starts_line_) text_ += ',';
+    starts_line_ = false;
+    text_ += value;
+    return *this;
+  }
+
+  std::string text_;
+  bool starts_line_ = true;
+};
+
+std::string_view name_of(Status status) {
+  switch (status) {
+    case Status::Info:
+      return "info";
+    case Status::Good:
+      return "good";
+    case Status::Warning:
+      return "warning";
+    case Status::Bad:
+      return "bad";
+  }
+  throw std::logic_error("record: unknown status");
+}
+
+std::string make_series(const Record& r) {
+  Table table;
+  table.text("time [s]");
+  for (const Series& series : r.series) {
+    if (series.value.size() != r.time.size()) throw std::logic_error("record: series " + series.id + " does not fit");
+    table.text(with_unit(series.id, series.unit));
+  }
+  table.end_line();
+  for (std::size_t s = 0; s < r.time.size(); ++s) {
+    table.number(r.time[s]);
+    for (const Series& series : r.series) table.number(series.value[s]);
+    table.end_line();
+  }
+  return table.str();
+}
+
+std::string make_events(const Record& r) {
+  Table table;
+  for (const auto* name : {"time [s]", "kind", "subject", "text"}) table.text(name);
+  table.end_line();
+  for (const Event& event : r.events)
+    table.number(event.time).text(event.kind).text(event.subject).text(event.text).end_line();
+  return table.str();
+}
+
+/// Each body with its place in the first and in the last frame.
+std::string make_bodies(const Record& r) {
+  const std::size_t frames = r.time.size(), bodies = r.bodies.size();
+  if (r.position.size() != frames * bodies * 3) throw std::logic_error("record: positions do not fit the bodies");
+  Table table;
+  for (const auto* name : {"name", "kind", "storey", "mass [kg]", "fixed", "start x [m]", "start y [m]", "start z [m]",
+                           "end x [m]", "end y [m]", "end z [m]"})
+    table.text(name);
+  table.end_line();
+  for (std::size_t b = 0; b < bodies; ++b) {
+    const BodyInfo& body = r.bodies[b];
+    table.text(body.name).text(body.kind).whole(body.storey).number(body.mass).whole(body.fixed ? 1 : 0);
+    for (const std::size_t frame : {std::size_t{0}, frames - 1})
+      for (std::size_t k = 0; k < 3; ++k)
+        table.number(frames == 0 ? std::nanf("") : r.position[(frame * bodies + b) * 3 + k]);
+    table.end_line();
+  }
+  return table.str();
+}
+
+std::string make_findings(const Record& r) {
+  Table table;
+  for (const auto* name : {"id", "heading", "title", "text", "value", "unit", "status"}) table.text(name);
+  table.end_line();
+  for (const Finding& finding : r.findings) {
+    table.text(finding.id).text(finding.heading).text(finding.title).text(finding.text);
+    table.number(finding.value).text(finding.unit).text(name_of(finding.status)).end_line();
+  }
+  return table.str();
+}
+
+}  // namespace
+
+void write_csv(const Record& record, const std::string& folder) {
+  const std::filesystem::path where(folder);
+  replace_file(where / "series.csv", make_series(record));
+  replace_file(where / "events.csv", make_events(record));
+  replace_file(where / "bodies.csv", make_bodies(record));
+  replace_file(where / "findings.csv", make_findings(record));
+}
+
+}  // namespace topple::record

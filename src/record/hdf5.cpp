@@ -1,0 +1,624 @@
+#include <hdf5.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <mutex>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+#include "base/file.h"
+#include "record/record.h"
+
+namespace topple::record {
+
+namespace {
+
+constexpr std::string_view format_name = "topple-record";
+constexpr std::int32_t format_version = 1;
+
+/// What the library answers with a negative number; the callers turn it into their own words.
+struct LibraryError {
+  std::string subject;
+};
+
+/// An open object of the library; closes it.
+class Handle {
+ public:
+  Handle(hid_t id, herr_t (*close)(hid_t), const std::string& subject) : id_(id), close_(close) {
+    if (id < 0) throw LibraryError{subject};
+  }
+  Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, H5I_INVALID_HID)), close_(other.close_) {}
+  Handle& operator=(Handle&&) = delete;
+  ~Handle() {
+    if (id_ >= 0) close_(id_);
+  }
+  operator hid_t() const { return id_; }
+
+ private:
+  hid_t id_;
+  herr_t (*close_)(hid_t);
+};
+
+void demand(herr_t answer, const std::string& subject) {
+  if (answer < 0) throw LibraryError{subject};
+}
+
+/// One caller of the library at a time, which does not print its own error stack meanwhile.
+class Session {
+ public:
+  Session() : lock_(mutex()) {
+    H5Eget_auto2(H5E_DEFAULT, &print_, &data_);
+    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  }
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+  ~Session() { H5Eset_auto2(H5E_DEFAULT, print_, data_); }
+
+ private:
+  static std::mutex& mutex() {
+    static std::mutex only;
+    return only;
+  }
+  std::lock_guard<std::mutex> lock_;
+  H5E_auto2_t print_ = nullptr;
+  void* data_ = nullptr;
+};
+
+// ---------------------------------------------------------------------------------------------------------------------
+// How a value of the record lies in the file: its number type, the numbers that one value takes, and the copy.
+
+template <class T>
+struct Cell {
+  using Number = T;
+  static constexpr std::size_t count = 1;
+  static void pack(const T& value, Number* out) { *out = value; }
+  static void unpack(const Number* in, T& value) { value = *in; }
+};
+template <>
+struct Cell<bool> {
+  using Number = std::uint8_t;
+  static constexpr std::size_t count = 1;
+  static void pack(bool value, Number* out) { *out = value ? 1 : 0; }
+  static void unpack(const Number* in, bool& value) { value = *in != 0; }
+};
+template <>
+struct Cell<Status> {
+  using Number = std::uint8_t;
+  static constexpr std::size_t count = 1;
+  static void pack(Status value, Number* out) { *out = static_cast<Number>(value); }
+  static void unpack(const Number* in, Status& value) { value = static_cast<Status>(*in); }
+};
+template <>
+struct Cell<Vec3> {
+  using Number = double;
+  static constexpr std::size_t count = 3;
+  static void pack(const Vec3& v, Number* out) { out[0] = v.x, out[1] = v.y, out[2] = v.z; }
+  static void unpack(const Number* in, Vec3& v) { v = {in[0], in[1], in[2]}; }
+};
+template <>
+struct Cell<Quat> {
+  using Number = double;
+  static constexpr std::size_t count = 4;
+  static void pack(const Quat& q, Number* out) { out[0] = q.w, out[1] = q.x, out[2] = q.y, out[3] = q.z; }
+  static void unpack(const Number* in, Quat& q) { q = {in[0], in[1], in[2], in[3]}; }
+};
+template <>
+struct Cell<std::array<double, 2>> {
+  using Number = double;
+  static constexpr std::size_t count = 2;
+  static void pack(const std::array<double, 2>& p, Number* out) { out[0] = p[0], out[1] = p[1]; }
+  static void unpack(const Number* in, std::array<double, 2>& p) { p = {in[0], in[1]}; }
+};
+
+template <class Number>
+hid_t file_type() {
+  if constexpr (std::is_same_v<Number, double>) return H5T_IEEE_F64LE;
+  if constexpr (std::is_same_v<Number, float>) return H5T_IEEE_F32LE;
+  if constexpr (std::is_same_v<Number, std::uint64_t>) return H5T_STD_U64LE;
+  if constexpr (std::is_same_v<Number, int>) return H5T_STD_I32LE;
+  if constexpr (std::is_same_v<Number, std::uint8_t>) return H5T_STD_U8LE;
+}
+template <class Number>
+hid_t memory_type() {
+  if constexpr (std::is_same_v<Number, double>) return H5T_NATIVE_DOUBLE;
+  if constexpr (std::is_same_v<Number, float>) return H5T_NATIVE_FLOAT;
+  if constexpr (std::is_same_v<Number, std::uint64_t>) return H5T_NATIVE_UINT64;
+  if constexpr (std::is_same_v<Number, int>) return H5T_NATIVE_INT;
+  if constexpr (std::is_same_v<Number, std::uint8_t>) return H5T_NATIVE_UINT8;
+}
+
+/// Text of a fixed number of bytes in UTF-8, filled up with zeros.
+Handle text_type(std::size_t bytes, const std::string& subject) {
+  Handle type(H5Tcopy(H5T_C_S1), H5Tclose, subject);
+  demand(H5Tset_size(type, std::max<std::size_t>(bytes, 1)), subject);
+  demand(H5Tset_strpad(type, H5T_STR_NULLPAD), subject);
+  demand(H5Tset_cset(type, H5T_CSET_UTF8), subject);
+  return type;
+}
+
+/// What stands beside the numbers.
+struct About {
+  std::string_view unit = "", frame = "", meaning = "";
+};
+
+using Shape = std::vector<hsize_t>;
+
+std::size_t size_of(const Shape& shape) {
+  std::size_t size = 1;
+  for (const hsize_t n : shape) size *= static_cast<std::size_t>(n);
+  return size;
+}
+
+// ---------------------------------------------------------------------------------------------------------------------
+
+/// Puts datasets into a file in memory.
+class Writer {
+ public:
+  static constexpr bool writes = true;
+
+  Writer() : file_(make_file()) {
+    const Handle root(H5Gopen2(file_, "/", H5P_DEFAULT), H5Gclose, "/");
+    put_text_attribute(root, "format", format_name);
+    const Handle space(H5Screate(H5S_SCALAR), H5Sclose, "version");
+    const Handle version(H5Acreate2(root, "version", H5T_STD_I32LE, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose,
+                         "version");
+    demand(H5Awrite(version, H5T_NATIVE_INT, &format_version), "version");
+  }
+
+  std::string bytes() const {
+    demand(H5Fflush(file_, H5F_SCOPE_LOCAL), "flush");
+    const ssize_t size = H5Fget_file_image(file_, nullptr, 0);
+    if (size < 0) throw LibraryError{"image"};
+    std::string image(static_cast<std::size_t>(size), '\0');
+    if (H5Fget_file_image(file_, image.data(), image.size()) != size) throw LibraryError{"image"};
+    return image;
+  }
+
+  template <class T>
+  void scalar(const std::string& name, T& value, const About& about) {
+    if constexpr (std::is_same_v<T, std::string>) {
+      const Handle type = text_type(value.size(), name);
+      put(name, type, type, {}, value.c_str(), std::max<std::size_t>(value.size(), 1), about);
+    } else {
+      typename Cell<T>::Number number;
+      Cell<T>::pack(value, &number);
+      put(name, file_type<typename Cell<T>::Number>(), memory_type<typename Cell<T>::Number>(), {}, &number,
+          sizeof number, about);
+    }
+  }
+
+  template <class Number>
+  void block(const std::string& name, std::vector<Number>& values, const Shape& shape, const About& about) {
+    if (values.size() != size_of(shape))
+      throw std::logic_error("record: " + name + " has " + std::to_string(values.size()) + " values instead of " +
+                             std::to_string(size_of(shape)));
+    put(name, file_type<Number>(), memory_type<Number>(), shape, values.data(), values.size() * sizeof(Number), about);
+  }
+
+  template <class Row, class Project>
+  void column(const std::string& name, std::vector<Row>& rows, Project project, const About& about) {
+    using T = std::remove_cvref_t<decltype(project(rows[0]))>;
+    const hsize_t count = rows.size();
+    if constexpr (std::is_same_v<T, std::string>) {
+      std::size_t width = 1;
+      for (Row& row : rows) width = std::max(width, project(row).size());
+      std::string cells(width * rows.size(), '\0');
+      for (std::size_t i = 0; i < rows.size(); ++i) project(rows[i]).copy(cells.data() + i * width, width);
+      const Handle type = text_type(width, name);
+      put(name, type, type, {count}, cells.data(), cells.size(), about);
+    } else {
+      using Number = typename Cell<T>::Number;
+      std::vector<Number> numbers(rows.size() * Cell<T>::count);
+      for (std::size_t i = 0; i < rows.size(); ++i)
+        Cell<T>::pack(project(rows[i]), numbers.data() + i * Cell<T>::count);
+      Shape shape = {count};
+      if (Cell<T>::count > 1) shape.push_back(Cell<T>::count);
+      put(name, file_type<Number>(), memory_type<Number>(), shape, numbers.data(), numbers.size() * sizeof(Number),
+          about);
+    }
+  }
+  /// The column that sets the number of rows when reading.
+  template <class Row, class Project>
+  void first_column(const std::string& name, std::vector<Row>& rows, Project project, const About& about) {
+    column(name, rows, project, about);
+  }
+
+ private:
+  static Handle make_file() {
+    const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "file");
+    demand(H5Pset_fapl_core(access, std::size_t{1} << 20, false), "file");
+    return {H5Fcreate("record", H5F_ACC_TRUNC, H5P_DEFAULT, access), H5Fclose, "file"};
+  }
+
+  static void put_text_attribute(hid_t object, const std::string& name, std::string_view text) {
+    const Handle type = text_type(text.size(), name);
+    const Handle space(H5Screate(H5S_SCALAR), H5Sclose, name);
+    const Handle attribute(H5Acreate2(object, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose, name);
+    demand(H5Awrite(attribute, type, text.data()), name);
+  }
+
+  void put(const std::string& name, hid_t type, hid_t in_memory, const Shape& shape, const void* data,
+           std::size_t bytes, const About& about) {
+    const Handle links(H5Pcreate(H5P_LINK_CREATE), H5Pclose, name);
+    demand(H5Pset_create_intermediate_group(links, 1), name);
+    const Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose, name);
+    demand(H5Pset_obj_track_times(creation, false), name);  // equal records are equal files
+    const Handle space(
+        shape.empty() ? H5Screate(H5S_SCALAR) : H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr),
+        H5Sclose, name);
+    constexpr std::size_t worth_packing = 4096, chunk_bytes = std::size_t{1} << 18;
+    if (!shape.empty() && bytes >= worth_packing) {
+      // whole rows, about a quarter of a megabyte
+      Shape chunk = shape;
+      const std::size_t row = bytes / static_cast<std::size_t>(shape[0]);
+      chunk[0] = std::clamp<hsize_t>(chunk_bytes / std::max<std::size_t>(row, 1), 1, shape[0]);
+      demand(H5Pset_chunk(creation, static_cast<int>(chunk.size()), chunk.data()), name);
+      demand(H5Pset_shuffle(creation), name);
+      demand(H5Pset_deflate(creation, 4), name);
+      demand(H5Pset_fletcher32(creation), name);
+    }
+    const Handle set(H5Dcreate2(file_, name.c_str(), type, space, links, creation, H5P_DEFAULT), H5Dclose, name);
+    if (bytes > 0) demand(H5Dwrite(set, in_memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, data), name);
+    if (!about.unit.empty()) put_text_attribute(set, "unit", about.unit);
+    if (!about.frame.empty()) put_text_attribute(set, "frame", about.frame);
+    if (!about.meaning.empty()) put_text_attribute(set, "meaning", about.meaning);
+  }
+
+  Handle file_;
+};
+
+// ---------------------------------------------------------------------------------------------------------------------
+
+/// Takes datasets out of the bytes of a file.
+class Reader {
+ public:
+  static constexpr bool writes = false;
+
+  Reader(std::string& bytes, std::string path) : path_(std::move(path)), file_bytes_(bytes.size()), file_(open(bytes)) {
+    const Handle root(H5Gopen2(file_, "/", H5P_DEFAULT), H5Gclose, "/");
+    if (text_attribute(root, "format") != format_name) throw LibraryError{"format"};
+    const Handle version(H5Aopen(root, "version", H5P_DEFAULT), H5Aclose, "version");
+    const Handle space(H5Aget_space(version), H5Sclose, "version");
+    int number = 0;
+    if (H5Sget_simple_extent_npoints(space) != 1) throw LibraryError{"version"};
+    demand(H5Aread(version, H5T_NATIVE_INT, &number), "version");
+    if (number != format_version)
+      throw InputError("E703",
+                       path_ + " is a record of version " + std::to_string(number) + "; this program reads version " +
+                           std::to_string(format_version),
+                       "read it with the program that wrote it, or run the plan again");
+  }
+
+  template <class T>
+  void scalar(const std::string& name, T& value, const About&) {
+    const Set set = open_set(name);
+    if (!set.shape.empty()) damaged(name + " is not a single value");
+    if constexpr (std::is_same_v<T, std::string>) {
+      std::vector<std::string> one(1);
+      read_texts(name, set, one, [](std::string& s) -> std::string& { return s; });
+      value = one[0];
+    } else {
+      typename Cell<T>::Number number;
+      demand(H5Dread(set.id, memory_type<typename Cell<T>::Number>(), H5S_ALL, H5S_ALL, H5P_DEFAULT, &number), name);
+      Cell<T>::unpack(&number, value);
+    }
+  }
+
+  template <class Number>
+  void block(const std::string& name, std::vector<Number>& values, const Shape& shape, const About&) {
+    const Set set = open_set(name);
+    if (set.shape != shape) damaged(name + " has another shape than the tables it belongs to");
+    read_numbers(name, set, values);
+  }
+
+  template <class Row, class Project>
+  void column(const std::string& name, std::vector<Row>& rows, Project project, const About&) {
+    const Set set = open_set(name);
+    if (set.shape.empty() || set.shape[0] != rows.size()) damaged(name + " has another length than its table");
+    fill(name, set, rows, project);
+  }
+  template <class Row, class Project>
+  void first_column(const std::string& name, std::vector<Row>& rows, Project project, const About&) {
+    const Set set = open_set(name);
+    if (set.shape.empty()) damaged(name + " is not a list");
+    rows.resize(static_cast<std::size_t>(set.shape[0]));
+    fill(name, set, rows, project);
+  }
+
+  [[noreturn]] void damaged(const std::string& what) const {
+    throw InputError("E704", path_ + " is a damaged record: " + what, "run the plan again");
+  }
+
+ private:
+  struct Set {
+    Handle id;
+    Handle type;
+    Shape shape;
+  };
+
+  static Handle open(std::string& bytes) {
+    if (H5open() < 0 || bytes.empty()) throw LibraryError{"file"};
+    const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "file");
+    demand(H5Pset_fapl_core(access, std::size_t{1} << 20, false), "file");
+    demand(H5Pset_file_image(access, bytes.data(), bytes.size()), "file");
+    return {H5Fopen("record", H5F_ACC_RDONLY, access), H5Fclose, "file"};
+  }
+
+  static std::string text_attribute(hid_t object, const std::string& name) {
+    const Handle attribute(H5Aopen(object, name.c_str(), H5P_DEFAULT), H5Aclose, name);
+    const Handle type(H5Aget_type(attribute), H5Tclose, name);
+    const Handle space(H5Aget_space(attribute), H5Sclose, name);
+    const std::size_t size = H5Tget_size(type);
+    if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) != 0 || size == 0 || size > 1024 ||
+        H5Sget_simple_extent_npoints(space) != 1)
+      throw LibraryError{name};
+    std::string text(size, '\0');
+    demand(H5Aread(attribute, type, text.data()), name);
+    return without_padding(text);
+  }
+
+  static std::string without_padding(std::string_view text) {
+    return std::string(text.substr(0, text.find_last_not_of('\0') + 1));
+  }
+
+  /// Opens a dataset and looks whether its size can be true.
+  Set open_set(const std::string& name) {
+    Handle id(H5Dopen2(file_, name.c_str(), H5P_DEFAULT), H5Dclose, name);
+    const Handle space(H5Dget_space(id), H5Sclose, name);
+    Handle type(H5Dget_type(id), H5Tclose, name);
+    const int rank = H5Sget_simple_extent_ndims(space);
+    if (rank < 0 || rank > 3 || H5Sget_simple_extent_type(space) == H5S_NULL) damaged(name + " has no shape");
+    Shape shape(static_cast<std::size_t>(rank));
+    if (rank > 0) demand(H5Sget_simple_extent_dims(space, shape.data(), nullptr), name);
+    // deflate packs a thousandfold at most: what claims to be larger is not believed
+    constexpr std::size_t most_packed = 1100;
+    const std::size_t stored = static_cast<std::size_t>(H5Dget_storage_size(id)), each = H5Tget_size(type);
+    std::size_t whole = std::max<std::size_t>(each, 1);
+    bool believed = stored <= file_bytes_;
+    for (const hsize_t n : shape)
+      believed = believed && n <= most_packed * file_bytes_ &&
+                 !__builtin_mul_overflow(whole, static_cast<std::size_t>(n), &whole);
+    believed = believed && whole <= most_packed * stored;
+    if (!believed) damaged(name + " claims more data than the file can hold");
+    return {std::move(id), std::move(type), std::move(shape)};
+  }
+
+  template <class Number>
+  void read_numbers(const std::string& name, const Set& set, std::vector<Number>& values) {
+    if (H5Tequal(set.type, file_type<Number>()) <= 0) damaged(name + " holds another type of number");
+    values.resize(size_of(set.shape));
+    if (!values.empty())
+      demand(H5Dread(set.id, memory_type<Number>(), H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), name);
+  }
+
+  template <class Row, class Project>
+  void read_texts(const std::string& name, const Set& set, std::vector<Row>& rows, Project project) {
+    if (H5Tget_class(set.type) != H5T_STRING || H5Tis_variable_str(set.type) != 0)
+      damaged(name + " holds no text of fixed length");
+    const std::size_t width = H5Tget_size(set.type);
+    std::string cells(width * rows.size(), '\0');
+    if (!cells.empty()) demand(H5Dread(set.id, set.type, H5S_ALL, H5S_ALL, H5P_DEFAULT, cells.data()), name);
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      project(rows[i]) = without_padding(std::string_view(cells).substr(i * width, width));
+  }
+
+  template <class Row, class Project>
+  void fill(const std::string& name, const Set& set, std::vector<Row>& rows, Project project) {
+    using T = std::remove_cvref_t<decltype(project(rows[0]))>;
+    if constexpr (std::is_same_v<T, std::string>) {
+      if (set.shape.size() != 1) damaged(name + " has another shape than its table");
+      read_texts(name, set, rows, project);
+    } else {
+      constexpr std::size_t width = Cell<T>::count;
+      if (set.shape.size() != (width > 1 ? 2U : 1U) || size_of(set.shape) != rows.size() * width)
+        damaged(name + " has another shape than its table");
+      std::vector<typename Cell<T>::Number> numbers;
+      read_numbers(name, set, numbers);
+      for (std::size_t i = 0; i < rows.size(); ++i) Cell<T>::unpack(numbers.data() + i * width, project(rows[i]));
+    }
+  }
+
+  std::string path_;
+  std::size_t file_bytes_;
+  Handle file_;
+};
+
+// ---------------------------------------------------------------------------------------------------------------------
+
+/// Lists inside lists lie flat in the file, with the row that each belongs to.
+template <class T>
+struct Owned {
+  int owner = 0;
+  T value;
+};
+
+/// The record and its flat lists.
+struct Flat {
+  std::vector<Owned<BoxShape>> shapes;
+  std::vector<Owned<std::array<double, 2>>> corners;
+  std::vector<double> series;  // (Q x S)
+};
+
+template <class Parent, class Item>
+std::vector<Owned<Item>> flatten(const std::vector<Parent>& parents, std::vector<Item> Parent::*items) {
+  std::vector<Owned<Item>> flat;
+  for (std::size_t i = 0; i < parents.size(); ++i)
+    for (const Item& item : parents[i].*items) flat.push_back({static_cast<int>(i), item});
+  return flat;
+}
+
+/// False if an owner is missing or the owners do not rise.
+template <class Parent, class Item>
+[[nodiscard]] bool unflatten(const std::vector<Owned<Item>>& flat, std::vector<Parent>& parents,
+                             std::vector<Item> Parent::*items) {
+  int last = 0;
+  for (const Owned<Item>& one : flat) {
+    if (one.owner < last || static_cast<std::size_t>(one.owner) >= parents.size()) return false;
+    (parents[static_cast<std::size_t>(one.owner)].*items).push_back(one.value);
+    last = one.owner;
+  }
+  return true;
+}
+
+#define FIELD(name) \
+  [](auto& row) -> auto& { return row.name; }
+
+/// Every dataset of the file, in both directions; docs/record.md is its description.
+template <class Archive>
+void transfer(Archive& a, Record& r, Flat& flat) {
+  Provenance& p = r.provenance;
+  a.scalar("provenance/title", p.title, {});
+  a.scalar("provenance/plan_path", p.plan_path, {});
+  a.scalar("provenance/plan_text", p.plan_text, {});
+  a.scalar("provenance/plan_sha256", p.plan_sha256, {});
+  a.scalar("provenance/program_version", p.program_version, {});
+  a.scalar("provenance/engine", p.engine, {});
+  a.scalar("provenance/machine", p.machine, {});
+  a.scalar("provenance/created", p.created, {});
+  a.scalar("provenance/seed", p.seed, {});
+  a.scalar("provenance/step", p.step, {.unit = "s"});
+  a.scalar("provenance/wall_time", p.wall_time, {.unit = "s"});
+  a.scalar("provenance/threads", p.threads, {});
+
+  Counts& c = r.counts;
+  a.scalar("counts/bodies", c.bodies, {});
+  a.scalar("counts/revolute_joints", c.revolute_joints, {});
+  a.scalar("counts/rigid_joints", c.rigid_joints, {});
+  a.scalar("counts/force_elements", c.force_elements, {});
+  a.scalar("counts/cables", c.cables, {});
+  a.scalar("counts/mass", c.mass, {.unit = "kg"});
+
+  a.first_column("plan_values/group", r.plan_values, FIELD(group), {});
+  a.column("plan_values/key", r.plan_values, FIELD(key), {});
+  a.column("plan_values/value", r.plan_values, FIELD(value), {});
+
+  a.first_column("bodies/name", r.bodies, FIELD(name), {});
+  a.column("bodies/kind", r.bodies, FIELD(kind), {});
+  a.column("bodies/storey", r.bodies, FIELD(storey), {});
+  a.column("bodies/mass", r.bodies, FIELD(mass), {.unit = "kg"});
+  a.column("bodies/fixed", r.bodies, FIELD(fixed), {.meaning = "1: belongs to the ground"});
+
+  a.first_column("shapes/body", flat.shapes, FIELD(owner), {.meaning = "row of bodies"});
+  a.column("shapes/centre", flat.shapes, FIELD(value.X_BS.p), {.unit = "m", .frame = "body"});
+  a.column("shapes/orientation", flat.shapes, FIELD(value.X_BS.q),
+           {.frame = "body", .meaning = "unit quaternion w x y z"});
+  a.column("shapes/half", flat.shapes, FIELD(value.half), {.unit = "m", .frame = "shape", .meaning = "half edges"});
+  a.column("shapes/material", flat.shapes, FIELD(value.material), {});
+
+  a.first_column("zones/name", r.zones, FIELD(name), {});
+  a.column("zones/member", r.zones, FIELD(member), {});
+  a.column("zones/subsystem", r.zones, FIELD(subsystem), {});
+  a.column("zones/body_a", r.zones, FIELD(body_a), {.meaning = "row of bodies, -1 the ground"});
+  a.column("zones/body_b", r.zones, FIELD(body_b), {.meaning = "row of bodies, -1 the ground"});
+  a.column("zones/position", r.zones, FIELD(p_W), {.unit = "m", .frame = "world", .meaning = "at the start"});
+
+  a.first_column("neighbours/name", r.neighbours, FIELD(name), {});
+  a.column("neighbours/is_utility", r.neighbours, FIELD(is_utility), {});
+  a.first_column("neighbour_corners/neighbour", flat.corners, FIELD(owner), {.meaning = "row of neighbours"});
+  a.column("neighbour_corners/position", flat.corners, FIELD(value), {.unit = "m", .frame = "world"});
+  a.first_column("building_outline", r.building_outline, [](auto& corner) -> auto& { return corner; },
+                 {.unit = "m", .frame = "world", .meaning = "counter-clockwise"});
+
+  a.first_column("frames/time", r.time, [](auto& t) -> auto& { return t; }, {.unit = "s"});
+  const hsize_t frames = r.time.size(), bodies = r.bodies.size(), zones = r.zones.size();
+  a.block("frames/position", r.position, {frames, bodies, 3},
+          {.unit = "m", .frame = "world", .meaning = "origin of the body's frame"});
+  a.block("frames/orientation", r.orientation, {frames, bodies, 4},
+          {.frame = "world", .meaning = "unit quaternion w x y z of the body's frame"});
+  a.block("frames/zone_state", r.zone_state, {frames, zones},
+          {.meaning = "0 elastic, 1 yielded, 2 softening, 3 broken, 4 fired"});
+  a.block("frames/zone_utilisation", r.zone_utilisation, {frames, zones}, {.meaning = "demand over capacity"});
+
+  a.first_column("series/id", r.series, FIELD(id), {});
+  a.column("series/title", r.series, FIELD(title), {});
+  a.column("series/unit", r.series, FIELD(unit), {});
+  a.column("series/group", r.series, FIELD(group), {});
+  a.block("series/value", flat.series, {r.series.size(), frames}, {.meaning = "one row per series, see series/unit"});
+
+  a.first_column("events/time", r.events, FIELD(time), {.unit = "s"});
+  a.column("events/kind", r.events, FIELD(kind), {});
+  a.column("events/subject", r.events, FIELD(subject), {});
+  a.column("events/text", r.events, FIELD(text), {});
+
+  a.first_column("findings/id", r.findings, FIELD(id), {});
+  a.column("findings/heading", r.findings, FIELD(heading), {});
+  a.column("findings/title", r.findings, FIELD(title), {});
+  a.column("findings/text", r.findings, FIELD(text), {});
+  a.column("findings/value", r.findings, FIELD(value), {.meaning = "see findings/unit; NaN: no number"});
+  a.column("findings/unit", r.findings, FIELD(unit), {});
+  a.column("findings/status", r.findings, FIELD(status), {.meaning = "0 info, 1 good, 2 warning, 3 bad"});
+
+  a.first_column("not_modelled", r.not_modelled, [](auto& text) -> auto& { return text; }, {});
+  a.scalar("ending/kind", r.ending, {});
+  a.scalar("ending/text", r.ending_text, {});
+}
+
+#undef FIELD
+
+/// What the shapes of the datasets do not show.
+void check_contents(const Reader& reader, const Record& r) {
+  for (std::size_t i = 1; i < r.time.size(); ++i)
+    if (!(r.time[i] > r.time[i - 1])) reader.damaged("frames/time does not rise");
+  const int bodies = static_cast<int>(r.bodies.size());
+  for (const ZoneInfo& zone : r.zones)
+    for (const int body : {zone.body_a, zone.body_b})
+      if (body < -1 || body >= bodies) reader.damaged("zone " + zone.name + " names a body that is not there");
+  for (const std::uint8_t state : r.zone_state)
+    if (state > static_cast<std::uint8_t>(ZoneState::Fired)) reader.damaged("frames/zone_state has an unknown state");
+  for (const Finding& finding : r.findings)
+    if (finding.status > Status::Bad) reader.damaged("findings/status has an unknown status");
+}
+
+}  // namespace
+
+void write_hdf5(const Record& record, const std::string& path) {
+  Record r = record;
+  Flat flat{flatten(r.bodies, &BodyInfo::shapes), flatten(r.neighbours, &Neighbour::footprint), {}};
+  for (const Series& series : r.series) {
+    if (series.value.size() != r.time.size())
+      throw std::logic_error("record: series " + series.id + " has " + std::to_string(series.value.size()) +
+                             " values for " + std::to_string(r.time.size()) + " frames");
+    flat.series.insert(flat.series.end(), series.value.begin(), series.value.end());
+  }
+  std::string bytes;
+  try {
+    const Session session;
+    Writer writer;
+    transfer(writer, r, flat);
+    bytes = writer.bytes();
+  } catch (const LibraryError& error) {
+    throw std::runtime_error("cannot write " + path + ": the HDF5 library refuses " + error.subject);
+  }
+  replace_file(path, bytes);
+}
+
+Record read_hdf5(const std::string& path) {
+  std::string bytes = read_file(path);
+  Record r;
+  Flat flat;
+  try {
+    const Session session;
+    Reader reader(bytes, path);
+    transfer(reader, r, flat);
+    if (!unflatten(flat.shapes, r.bodies, &BodyInfo::shapes)) reader.damaged("shapes/body does not fit the bodies");
+    if (!unflatten(flat.corners, r.neighbours, &Neighbour::footprint))
+      reader.damaged("neighbour_corners/neighbour does not fit the neighbours");
+    for (std::size_t i = 0; i < r.series.size(); ++i) {
+      const auto begin = flat.series.begin() + static_cast<std::ptrdiff_t>(i * r.time.size());
+      r.series[i].value.assign(begin, begin + static_cast<std::ptrdiff_t>(r.time.size()));
+    }
+    check_contents(reader, r);
+  } catch (const LibraryError& error) {
+    throw InputError("E702", path + " is not a complete topple record (looking for \"" + error.subject + "\")",
+                     "give the record.h5 that `topple run` wrote");
+  }
+  return r;
+}
+
+}  // namespace topple::record
