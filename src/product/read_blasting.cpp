@@ -1,0 +1,207 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+#include "product/reading.h"
+
+namespace topple::product {
+
+namespace {
+
+constexpr size_t most_stages = 1000;
+constexpr size_t most_charges = 20000;  // over all stages
+constexpr const char* no_support = "nothing removes a support; the building will stand";
+
+std::string in_metres(double length) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4g m", length);
+  return text;
+}
+
+/// What a charge table says, before it is spread over its members.
+struct ChargeTable {
+  std::vector<Word> words;
+  Charge charge;
+  Place place;
+};
+
+ChargeTable read_charge(TableReader& table) {
+  ChargeTable c;
+  c.place = table.place();
+  c.words = table.words("members");
+  if (!table.has("members")) table.missing("members", "add a line such as members = [\"C-A*-0\"]");
+  c.charge.position = table.quantity("position", Dimension::Length, {0, 1000});
+  c.charge.destroyed_length = table.quantity("destroyed_length", Dimension::Length, {0, 100, true});
+  c.charge.residual_bars = table.quantity("residual_bars", Dimension::Number, fraction, 0);
+  c.charge.transition_damage = table.quantity("transition_damage", Dimension::Number, fraction, 0);
+  c.charge.delay = table.quantity("delay", Dimension::Time, {0, 600}, 0);
+  c.charge.scatter = table.quantity("scatter", Dimension::Time, {0, 1}, 0);
+  c.charge.fails = table.find_flag("fails").value_or(false);
+  c.charge.where = table.complaints().position(c.place);
+  table.finish();
+  return c;
+}
+
+class Blasting {
+ public:
+  Blasting(Reading& reading) : reading_(reading), fired_(reading.plan.members.size()) {}
+
+  /// Puts a charge on each of its members; complains once for each kind of mistake.
+  void spread(TableReader& table, const ChargeTable& from, Stage& stage) {
+    bool is_misplaced = false, is_outside = false, is_removed = false, is_overlapping = false;
+    for (const int index : find_members(reading_, table, "members", from.words)) {
+      const Member& m = reading_.plan.members[static_cast<size_t>(index)];
+      Charge charge = from.charge;
+      charge.member = index;
+      if (m.kind != MemberKind::Column && m.kind != MemberKind::Beam) {
+        if (!std::exchange(is_misplaced, true))
+          table.error("E307", table.place_of("members"), m.name + " is neither a column nor a beam",
+                      "charges fire in columns and beams; take walls out under [preparation]");
+        continue;
+      }
+      if (m.removed && !std::exchange(is_removed, true))
+        table.error("E403", table.place_of("members"), m.name + " is taken out in the preparation",
+                    "leave it out here, or keep it standing");
+      const double low = charge.position - charge.destroyed_length / 2, high = low + charge.destroyed_length;
+      constexpr double slack = 1e-9;  // round-off [m]
+      if ((low < -slack || high > calc_length(m) + slack) && !std::exchange(is_outside, true))
+        table.error("E405", table.place_of("position"),
+                    "the destroyed length, " + in_metres(low) + " to " + in_metres(high) + ", reaches out of " + m.name,
+                    "it is " + in_metres(calc_length(m)) + " long; position is the middle of the destroyed length");
+      for (const auto& [other_low, other_high] : fired_[static_cast<size_t>(index)])
+        if (low < other_high - slack && other_low < high - slack && !std::exchange(is_overlapping, true))
+          table.error("E404", table.place_of("members"), m.name + " has another charge on the same length",
+                      "leave one of them out, or move them apart");
+      fired_[static_cast<size_t>(index)].push_back({low, high});
+      if (++count_ > most_charges) {
+        if (count_ == most_charges + 1)
+          table.error("E209", from.place, "more than " + std::to_string(most_charges) + " charges");
+        return;
+      }
+      if (m.kind == MemberKind::Column) (charge.fails ? failing_columns_ : fired_columns_) += 1;
+      stage.charges.push_back(std::move(charge));
+    }
+  }
+
+  size_t count() const { return count_; }
+  int fired_columns() const { return fired_columns_; }
+  int failing_columns() const { return failing_columns_; }
+
+ private:
+  Reading& reading_;
+  std::vector<std::vector<std::pair<double, double>>> fired_;  // destroyed lengths of each member
+  size_t count_ = 0;
+  int fired_columns_ = 0, failing_columns_ = 0;
+};
+
+void check_times(Reading& reading, const std::vector<const Node*>& nodes) {
+  const std::vector<Stage>& stages = reading.plan.stages;
+  for (size_t i = 1; i < stages.size(); ++i) {
+    const Entry* entry = nodes[i]->find("time");
+    const Place place = entry ? entry->value.place : nodes[i]->place;
+    if (stages[i].time <= stages[i - 1].time)
+      reading.complaints.error("E402", place,
+                               "stage[" + std::to_string(i) + "]: time: is not after the stage before it",
+                               "stages are given in the order in which they fire");
+    for (const Charge& charge : stages[i - 1].charges)
+      if (stages[i - 1].time + charge.delay >= stages[i].time && stages[i].time > stages[i - 1].time) {
+        reading.complaints.warn("W506", {charge.where.line, charge.where.column, 1},
+                                "charge: its delay lasts until the next stage or longer");
+        break;
+      }
+  }
+}
+
+}  // namespace
+
+void read_stages(Reading& reading, TableReader& root) {
+  const std::vector<const Node*> nodes = root.tables("stage");
+  if (nodes.empty() && !root.has("stage")) {
+    reading.complaints.warn("W501", root.place(), "the plan has no charges: the building is only checked for standing");
+    return;
+  }
+  if (nodes.size() > most_stages) {
+    root.error("E209", nodes[most_stages]->place, "more than " + std::to_string(most_stages) + " stages");
+    return;
+  }
+  const int errors_before = reading.complaints.error_count();
+  Blasting blasting(reading);
+  for (size_t i = 0; i < nodes.size(); ++i) {
+    TableReader table(*nodes[i], "stage[" + std::to_string(i) + "]", reading.complaints);
+    Stage stage;
+    stage.name = table.text("name", "stage " + std::to_string(i + 1));
+    stage.time = table.quantity("time", Dimension::Time, {0, 600});
+    stage.where = reading.complaints.position(nodes[i]->place);
+    const std::vector<const Node*> charges = table.tables("charge");
+    if (charges.empty() && table.is_table() && !table.has("charge"))
+      table.error("E406", nodes[i]->place, "the stage has no charge", "add [[stage.charge]] below it");
+    for (size_t k = 0; k < charges.size() && !reading.complaints.is_full(); ++k) {
+      TableReader charge(*charges[k], "charge[" + std::to_string(k) + "]", reading.complaints);
+      const ChargeTable values = read_charge(charge);
+      if (reading.has_grid && blasting.count() <= most_charges) blasting.spread(charge, values, stage);
+    }
+    table.finish();
+    reading.plan.stages.push_back(std::move(stage));
+  }
+  check_times(reading, nodes);
+  if (reading.complaints.error_count() != errors_before || !reading.has_grid || nodes.empty()) return;
+  if (blasting.fired_columns() == 0) {
+    const std::string help = "put charges on columns, such as members = [\"C-A*-0\"], or leave out every [[stage]]";
+    if (blasting.failing_columns() > 0) {
+      reading.complaints.warn("W504", nodes[0]->place, std::string("every charge on a column fails: ") + no_support);
+    } else {
+      reading.complaints.error("E401", nodes[0]->place, no_support, help);
+    }
+  }
+}
+
+void read_cables(Reading& reading, TableReader& root) {
+  const std::vector<const Node*> nodes = root.tables("cable");
+  for (size_t i = 0; i < nodes.size() && !reading.complaints.is_full(); ++i) {
+    TableReader table(*nodes[i], "cable[" + std::to_string(i) + "]", reading.complaints);
+    Cable c;
+    c.name = table.text("name", "cable " + std::to_string(i + 1));
+    c.where = reading.complaints.position(nodes[i]->place);
+    const std::string member = table.text("member");
+    c.position = table.quantity("position", Dimension::Length, {0, 1000});
+    const Node* anchor = table.find("anchor");
+    const std::string help = "write x, y and z, such as anchor = [\"-40 m\", \"10 m\", \"0 m\"]";
+    if (!anchor) {
+      table.missing("anchor", help);
+    } else if (anchor->kind != Node::Kind::Array || anchor->items.size() != 3) {
+      table.error("E202", anchor->place, "anchor: is not a list of three lengths", help);
+    } else {
+      for (int k = 0; k < 3; ++k)
+        c.anchor[k] = read_quantity(anchor->items[static_cast<size_t>(k)], table.label() + ": anchor",
+                                    Dimension::Length, {-10e3, 10e3}, reading.complaints);
+    }
+    c.stiffness = table.quantity("stiffness", Dimension::StiffnessPerLength, {0, 1e12, true});
+    c.pretension = table.quantity("pretension", Dimension::Force, {0, 1e9}, 0);
+    c.strength = table.quantity("strength", Dimension::Force, {0, 1e9, true});
+    table.finish();
+    if (c.strength <= c.pretension)
+      table.error("E207", table.place_of("strength"), "strength: must be above the pretension");
+    if (reading.has_grid && !member.empty()) {
+      const std::vector<int> found = find_members(reading, table, "member", {{member, table.place_of("member")}});
+      if (found.size() > 1) {
+        table.error("E307", table.place_of("member"),
+                    "member: a cable pulls one member, not " + std::to_string(found.size()));
+      } else if (found.size() == 1) {
+        const Member& m = reading.plan.members[static_cast<size_t>(found[0])];
+        c.member = found[0];
+        if (m.kind != MemberKind::Column && m.kind != MemberKind::Beam) {
+          table.error("E307", table.place_of("member"), m.name + " is neither a column nor a beam");
+        } else if (m.removed) {
+          table.error("E403", table.place_of("member"), m.name + " is taken out in the preparation");
+        } else if (c.position > calc_length(m)) {
+          table.error("E306", table.place_of("position"), "position: lies beyond the end of " + m.name,
+                      "it is " + in_metres(calc_length(m)) + " long");
+        }
+      }
+    }
+    reading.plan.cables.push_back(std::move(c));
+  }
+}
+
+}  // namespace topple::product

@@ -1,0 +1,72 @@
+#include <cerrno>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <system_error>
+
+#include "product/reading.h"
+
+namespace topple::product {
+
+namespace {
+
+constexpr std::uintmax_t largest_file = 8u << 20;
+
+}  // namespace
+
+Plan read_plan(const std::string& text, const std::string& name, std::vector<Diagnostic>& warnings) {
+  constexpr const char* byte_order_mark = "\xEF\xBB\xBF";
+  Plan plan;
+  plan.path = name;
+  plan.text = text.starts_with(byte_order_mark) ? text.substr(3) : text;
+  if (text.size() > largest_file)
+    throw InputError(std::vector<Diagnostic>{
+        {Severity::Error, "E107", {name, 1, 1}, 1, "the plan is larger than 8 MB", "a plan describes one building"}});
+  const Node document = parse_document(plan.text, name);
+
+  Complaints complaints(name);
+  Reading reading{plan, complaints, {}, {}, {}, {}, {}, false, {}, {}, {}, {}};
+  TableReader root(document, "", complaints);
+  plan.title = root.text("title", "untitled");
+  read_site(reading, root);
+  read_materials(reading, root);
+  read_sections(reading, root);
+  read_panels(reading, root);
+  read_grid(reading, root);
+  read_members(reading, root);
+  read_preparation(reading, root);
+  read_stages(reading, root);
+  read_cables(reading, root);
+  read_criteria(reading, root);
+  read_analysis(reading, root);
+  root.finish();
+
+  complaints.sort();
+  if (complaints.error_count() > 0) throw InputError(complaints.all());
+  warnings.insert(warnings.end(), complaints.all().begin(), complaints.all().end());
+  return plan;
+}
+
+Plan read_plan_file(const std::string& path, std::vector<Diagnostic>& warnings, std::string& text_out) {
+  namespace fs = std::filesystem;
+  const auto fail = [&](const char* code, const std::string& message, const std::string& help = {}) {
+    throw InputError(std::vector<Diagnostic>{{Severity::Error, code, {path, 0, 0}, 1, message, help}});
+  };
+  text_out.clear();
+  std::error_code status;
+  if (fs::is_directory(path, status)) fail("E106", "is a folder; a plan file is wanted", "give the path of plan.toml");
+  std::ifstream file(path, std::ios::binary);
+  if (!file) fail("E106", "cannot be read: " + std::generic_category().message(errno ? errno : ENOENT));
+  // not by the file's size: a pipe or a device has none
+  std::string bytes;
+  char block[1 << 16];
+  while (file.read(block, sizeof block) || file.gcount() > 0) {
+    bytes.append(block, static_cast<size_t>(file.gcount()));
+    if (bytes.size() > largest_file) fail("E107", "the plan is larger than 8 MB", "a plan describes one building");
+  }
+  if (file.bad()) fail("E106", "cannot be read to its end");
+  text_out = bytes.starts_with("\xEF\xBB\xBF") ? bytes.substr(3) : bytes;
+  return read_plan(bytes, path, warnings);
+}
+
+}  // namespace topple::product

@@ -1,0 +1,157 @@
+#include <algorithm>
+#include <cmath>
+
+#include "product/reading.h"
+
+namespace topple::product {
+
+namespace {
+
+using Point = std::array<double, 2>;
+
+constexpr Range anywhere{-10e3, 10e3};  // coordinates around a site [m]
+constexpr size_t most_corners = 200;
+constexpr size_t most_neighbours = 1000;
+
+double cross(const Point& a, const Point& b, const Point& c) {
+  return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+}
+
+double calc_signed_area(const std::vector<Point>& corners) {
+  double twice = 0;
+  for (size_t i = 0; i < corners.size(); ++i) {
+    const Point &a = corners[i], &b = corners[(i + 1) % corners.size()];
+    twice += a[0] * b[1] - a[1] * b[0];
+  }
+  return twice / 2;
+}
+
+bool crosses_itself(const std::vector<Point>& corners) {
+  const size_t n = corners.size();
+  for (size_t i = 0; i < n; ++i)
+    for (size_t j = i + 2; j < n; ++j) {
+      if (i == 0 && j == n - 1) continue;  // neighbours share a corner
+      const Point &a = corners[i], &b = corners[i + 1], &c = corners[j], &d = corners[(j + 1) % n];
+      if (cross(a, b, c) * cross(a, b, d) < 0 && cross(c, d, a) * cross(c, d, b) < 0) return true;
+    }
+  return false;
+}
+
+std::vector<Point> read_footprint(TableReader& table) {
+  std::vector<Point> corners;
+  const std::string help =
+      "corners in order, such as [[\"-30 m\", \"0 m\"], [\"-20 m\", \"0 m\"], [\"-20 m\", \"9 m\"]]";
+  const Node* node = table.find("footprint");
+  if (!node) {
+    table.missing("footprint", help);
+    return corners;
+  }
+  if (node->kind != Node::Kind::Array) {
+    table.error("E202", node->place, "footprint: is " + name_of(node->kind) + "; a list of corners is wanted", help);
+    return corners;
+  }
+  if (node->items.size() < 3 || node->items.size() > most_corners) {
+    table.error("E205", node->place, "footprint: has " + std::to_string(node->items.size()) + " corners",
+                "allowed: between 3 and " + std::to_string(most_corners));
+    return corners;
+  }
+  bool is_readable = true;
+  for (const Node& item : node->items) {
+    if (item.kind != Node::Kind::Array || item.items.size() != 2) {
+      table.error("E202", item.place, "footprint: a corner is a list of x and y", help);
+      is_readable = false;
+      continue;
+    }
+    const std::string label = table.label() + ": footprint";
+    corners.push_back({read_quantity(item.items[0], label, Dimension::Length, anywhere, table.complaints()),
+                       read_quantity(item.items[1], label, Dimension::Length, anywhere, table.complaints())});
+    is_readable = is_readable && std::isfinite(corners.back()[0]) && std::isfinite(corners.back()[1]);
+  }
+  if (!is_readable) return {};
+  const double area = calc_signed_area(corners);
+  if (std::abs(area) < 0.01) {
+    table.error("E307", node->place, "footprint: encloses no area");
+  } else if (crosses_itself(corners)) {
+    table.error("E307", node->place, "footprint: its edges cross", "give the corners in order around the footprint");
+  } else if (area < 0) {
+    std::reverse(corners.begin(), corners.end());
+  }
+  return corners;
+}
+
+}  // namespace
+
+void read_site(Reading& reading, TableReader& root) {
+  const Node* node = root.table("site");
+  if (!node) return;
+  Plan& plan = reading.plan;
+  TableReader site(*node, "site", reading.complaints);
+  plan.ground.friction = site.quantity("friction", Dimension::Number, {0, 2}, plan.ground.friction);
+  plan.ground.restitution = site.quantity("restitution", Dimension::Number, {0, 1}, plan.ground.restitution);
+  for (const bool is_utility : {false, true}) {
+    const std::string key = is_utility ? "utility" : "neighbour";
+    const std::vector<const Node*> tables = site.tables(key);
+    if (tables.size() > most_neighbours) {
+      site.error("E209", tables[most_neighbours]->place, "more than " + std::to_string(most_neighbours) + " of " + key);
+      continue;
+    }
+    for (size_t i = 0; i < tables.size(); ++i) {
+      TableReader table(*tables[i], key + "[" + std::to_string(i) + "]", reading.complaints);
+      Neighbour n;
+      n.name = table.text("name");
+      n.footprint = read_footprint(table);
+      n.clearance = table.quantity("clearance", Dimension::Length, {0, 1000}, 0);
+      n.vibration_limit = table.quantity("vibration_limit", Dimension::Velocity, {0, 1, true}, 0);
+      n.is_utility = is_utility;
+      n.where = reading.complaints.position(tables[i]->place);
+      table.finish();
+      plan.neighbours.push_back(std::move(n));
+    }
+  }
+  site.finish();
+}
+
+void read_criteria(Reading& reading, TableReader& root) {
+  const Node* node = root.table("criteria");
+  if (!node) return;
+  TableReader table(*node, "criteria", reading.complaints);
+  Criteria& c = reading.plan.criteria;
+  c.where = reading.complaints.position(node->place);
+  c.mechanism = table.find_choice("mechanism", {"topple", "fold", "vertical", "progressive", "partial", "stands"});
+  c.azimuth = table.find_quantity("azimuth", Dimension::Angle, {-360 * unit::deg, 360 * unit::deg});
+  c.azimuth_tolerance = table.find_quantity("azimuth_tolerance", Dimension::Angle, {0, 180 * unit::deg});
+  c.debris_reach = table.find_quantity("debris_reach", Dimension::Length, {0, 1000});
+  c.stands_between_stages = table.find_flag("stands_between_stages");
+  table.finish();
+  if (c.azimuth && !c.azimuth_tolerance)
+    table.missing("azimuth_tolerance", "add a line such as azimuth_tolerance = \"15 deg\"");
+  if (c.azimuth_tolerance && !c.azimuth)
+    table.error("E207", table.place_of("azimuth_tolerance"), "azimuth_tolerance: has no azimuth to go with");
+}
+
+void read_analysis(Reading& reading, TableReader& root) {
+  const Node* node = root.table("analysis");
+  if (!node) {
+    if (!root.has("analysis")) root.missing("analysis", "add [analysis] and under it duration = \"10 s\"");
+    return;
+  }
+  TableReader table(*node, "analysis", reading.complaints);
+  Analysis& a = reading.plan.analysis;
+  a.duration = table.quantity("duration", Dimension::Time, {0.01, 600});
+  a.step = table.quantity("step", Dimension::Time, {1e-7, 0.01}, 0);
+  a.frame_rate = table.quantity("frame_rate", Dimension::Frequency, {1, 1000}, a.frame_rate);
+  a.gravity = table.quantity("gravity", Dimension::Acceleration, {0, 100, true}, a.gravity);
+  a.seed =
+      static_cast<std::uint64_t>(table.find_integer("seed", 0, std::numeric_limits<std::int64_t>::max()).value_or(1));
+  table.finish();
+  for (const Stage& stage : reading.plan.stages)
+    for (const Charge& charge : stage.charges)
+      if (stage.time + charge.delay >= a.duration) {
+        reading.complaints.error("E407", {charge.where.line, charge.where.column, 1},
+                                 "charge: would fire after the end of the analysis",
+                                 "raise duration in [analysis], or fire earlier");
+        return;
+      }
+}
+
+}  // namespace topple::product

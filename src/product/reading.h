@@ -1,0 +1,51 @@
+#pragma once
+/// The steps of reading a plan. Each one fills its part of the plan and complains about what is wrong with it;
+/// values that could not be read are NaN or -1, which no later check complains about again.
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "product/plan.h"
+#include "product/table_reader.h"
+
+namespace topple::product {
+
+inline constexpr int most_storeys = 1000;
+inline constexpr int most_members = 20000;
+
+/// "A*-0" in the manner of file names: * any characters, ? one character.
+bool matches(const std::string& pattern, const std::string& name);
+
+struct Reading {
+  Plan& plan;
+  Complaints& complaints;
+  std::map<std::string, int> concretes, steels, sections, slabs, walls;  // names to indices
+  bool has_grid = false;                                                 // rows, frames and storeys could be read
+  std::vector<bool> section_is_used, panel_is_used;
+  std::vector<Place> section_places, panel_places;
+};
+
+void read_materials(Reading&, TableReader& root);
+void read_sections(Reading&, TableReader& root);
+void read_panels(Reading&, TableReader& root);
+void read_site(Reading&, TableReader& root);
+void read_grid(Reading&, TableReader& root);
+/// Columns, beams, slabs, walls, overrides; checks that nothing hangs in the air.
+void read_members(Reading&, TableReader& root);
+void read_preparation(Reading&, TableReader& root);
+void read_stages(Reading&, TableReader& root);
+void read_cables(Reading&, TableReader& root);
+void read_criteria(Reading&, TableReader& root);
+void read_analysis(Reading&, TableReader& root);
+
+/// Index of a named thing; -1 after a complaint, or without one if the name is empty.
+int find_named(const std::map<std::string, int>& known, const TableReader&, const std::string& key,
+               const std::string& name, const std::string& what);
+
+/// Indices of the members that match one of the patterns, rising; a pattern without a match is a complaint.
+std::vector<int> find_members(const Reading&, const TableReader&, const std::string& key, const std::vector<Word>&);
+
+double calc_length(const Member&);
+
+}  // namespace topple::product

@@ -1,0 +1,22 @@
+#pragma once
+/// What carries what: complains about members that hang in the air.
+
+#include <vector>
+
+#include "product/complaints.h"
+#include "product/plan.h"
+
+namespace topple::product {
+
+/// A member with the places of the plan that made it.
+struct Draft {
+  Member member;
+  std::vector<Place> opening_places;
+  Place rule;
+};
+
+/// Columns and walls above the ground storey need something below, beams something at both ends, slabs at their
+/// corners. Members taken out in the preparation count: the check is about the building as it was built.
+void check_support(const Plan&, const std::vector<Draft>&, Complaints&);
+
+}  // namespace topple::product
