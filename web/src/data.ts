@@ -1,0 +1,189 @@
+/// The run as the page reads it: docs/report-data.md. SI throughout. S frames, B bodies, Z zones.
+
+export type Point = [number, number];
+export type Triple = [number, number, number];
+export type Quadruple = [number, number, number, number];
+export type Status = "info" | "good" | "warning" | "bad";
+
+export interface Shape {
+  centre: Triple; // in the body's frame [m]
+  orientation: Quadruple; // w x y z
+  half: Triple; // half edges [m]
+  material: string;
+}
+export interface Body {
+  name: string;
+  kind: string;
+  storey: number;
+  mass: number | null; // [kg]
+  fixed: boolean;
+  shapes: Shape[];
+}
+export interface Zone {
+  name: string;
+  member: string;
+  subsystem: string;
+  body_a: number; // -1: the ground
+  body_b: number;
+  place: Triple; // at the start [m]
+}
+export interface RunEvent {
+  time: number;
+  kind: string;
+  subject: string;
+  text: string;
+}
+export interface Series {
+  id: string;
+  title: string;
+  unit: string;
+  group: string;
+  value: (number | null)[]; // (S)
+}
+export interface Finding {
+  id: string;
+  heading: string;
+  title: string;
+  text: string;
+  value: number | null;
+  unit: string;
+  status: Status;
+}
+export interface Neighbour {
+  name: string;
+  footprint: Point[];
+  is_utility: boolean;
+}
+export interface Provenance {
+  title: string;
+  plan_path: string;
+  plan_text: string;
+  plan_sha256: string;
+  program_version: string;
+  engine: string;
+  machine: string;
+  created: string;
+  seed: string;
+  step: number | null;
+  wall_time: number | null;
+  threads: number;
+}
+export interface Run {
+  provenance: Provenance;
+  ending: { kind: string; text: string };
+  counts: {
+    bodies: number;
+    revolute_joints: number;
+    rigid_joints: number;
+    force_elements: number;
+    cables: number;
+    mass: number | null;
+  };
+  findings: Finding[];
+  not_modelled: string[];
+  plan_values: { group: string; key: string; value: string }[];
+  events: RunEvent[];
+  neighbours: Neighbour[];
+  building_outline: Point[];
+  bodies: Body[];
+  zones: Zone[];
+  time: number[]; // (S)
+  series: Series[];
+  position: Float32Array; // (S x B x 3)
+  orientation: Float32Array; // (S x B x 4), w x y z
+  zone_state: Uint8Array; // (S x Z)
+  zone_utilisation: Float32Array; // (S x Z)
+}
+
+export function decodeBytes(text: string): Uint8Array {
+  const binary = atob(text);
+  const bytes = new Uint8Array(binary.length);
+  for (let i = 0; i < binary.length; ++i) bytes[i] = binary.charCodeAt(i);
+  return bytes;
+}
+
+/// Little-endian whatever the machine.
+export function decodeFloats(text: string): Float32Array {
+  const bytes = decodeBytes(text);
+  const view = new DataView(bytes.buffer);
+  const values = new Float32Array(bytes.length >> 2);
+  for (let i = 0; i < values.length; ++i) values[i] = view.getFloat32(4 * i, true);
+  return values;
+}
+
+/// Throws an Error with a sentence for people if the text is not the data of a run.
+export function readRun(text: string): Run {
+  // eslint-disable-next-line @typescript-eslint/no-explicit-any -- the one place where untyped data comes in
+  const raw = JSON.parse(text) as any;
+  if (raw === null || typeof raw !== "object" || raw.format !== "topple-report")
+    throw new Error("This file does not hold the data of a run.");
+  if (raw.version !== 1) throw new Error(`The data of this report has version ${raw.version}; this page reads version 1.`);
+  const run: Run = {
+    ...raw,
+    position: decodeFloats(raw.position),
+    orientation: decodeFloats(raw.orientation),
+    zone_state: decodeBytes(raw.zone_state),
+    zone_utilisation: decodeFloats(raw.zone_utilisation),
+  };
+  const S = run.time.length;
+  const expect = (what: string, size: number, expected: number): void => {
+    if (size !== expected) throw new Error(`The data of this report is damaged: ${what} has ${size} values, not ${expected}.`);
+  };
+  expect("position", run.position.length, S * run.bodies.length * 3);
+  expect("orientation", run.orientation.length, S * run.bodies.length * 4);
+  expect("zone_state", run.zone_state.length, S * run.zones.length);
+  expect("zone_utilisation", run.zone_utilisation.length, S * run.zones.length);
+  for (const series of run.series) expect(series.id, series.value.length, S);
+  return run;
+}
+
+/// Frame at or before t, and how far t is on the way to the next one (0..1).
+export function findFrame(time: readonly number[], t: number): { frame: number; fraction: number } {
+  const last = time.length - 1;
+  if (last < 1 || !(t > (time[0] as number))) return { frame: 0, fraction: 0 };
+  if (t >= (time[last] as number)) return { frame: last, fraction: 0 };
+  let low = 0;
+  let high = last;
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if ((time[middle] as number) <= t) low = middle;
+    else high = middle;
+  }
+  const begin = time[low] as number;
+  return { frame: low, fraction: (t - begin) / ((time[high] as number) - begin) };
+}
+
+/// out = the way from quaternion a (at index i of q) to b (at index j), at constant angular speed. w x y z.
+export function slerp(q: Float32Array, i: number, j: number, s: number, out: Quadruple): void {
+  const aw = q[i] as number, ax = q[i + 1] as number, ay = q[i + 2] as number, az = q[i + 3] as number;
+  let bw = q[j] as number, bx = q[j + 1] as number, by = q[j + 2] as number, bz = q[j + 3] as number;
+  let cosine = aw * bw + ax * bx + ay * by + az * bz;
+  if (cosine < 0) {
+    cosine = -cosine;
+    bw = -bw; bx = -bx; by = -by; bz = -bz;
+  }
+  let wa = 1 - s;
+  let wb = s;
+  if (cosine < 0.9995) {
+    const angle = Math.acos(cosine);
+    wa = Math.sin(wa * angle) / Math.sin(angle);
+    wb = Math.sin(wb * angle) / Math.sin(angle);
+  }
+  const w = wa * aw + wb * bw, x = wa * ax + wb * bx, y = wa * ay + wb * by, z = wa * az + wb * bz;
+  const length = Math.hypot(w, x, y, z) || 1;
+  out[0] = w / length; out[1] = x / length; out[2] = y / length; out[3] = z / length;
+}
+
+/// Pose of one body at time t; false where the record holds no finite pose.
+export function calcPose(run: Run, body: number, frame: number, fraction: number, p: Triple, q: Quadruple): boolean {
+  const B = run.bodies.length;
+  const next = fraction > 0 ? frame + 1 : frame;
+  const i = 3 * (frame * B + body);
+  const j = 3 * (next * B + body);
+  for (let k = 0; k < 3; ++k) {
+    const a = run.position[i + k] as number;
+    p[k] = a + fraction * ((run.position[j + k] as number) - a);
+  }
+  slerp(run.orientation, 4 * (frame * B + body), 4 * (next * B + body), fraction, q);
+  return Number.isFinite(p[0] + p[1] + p[2] + q[0] + q[1] + q[2] + q[3]);
+}

@@ -1,0 +1,98 @@
+import type { Finding, Run } from "./data";
+import { StatusSign, StatusWord } from "./signs";
+import { formatDuration } from "./units";
+import { endingWord } from "./vocabulary";
+
+/// The finding that says what happens: the mechanism, else the first one.
+export function findVerdict(run: Run): Finding | undefined {
+  return run.findings.find((f) => f.id === "mechanism") ?? run.findings[0];
+}
+
+export function Header(props: { run: Run }) {
+  const { run } = props;
+  const verdict = findVerdict(run);
+  const { provenance, ending } = run;
+  return (
+    <header class="header">
+      <div class="title-row">
+        <h1>{provenance.title || "Untitled plan"}</h1>
+        <p class="subtitle">
+          topple {provenance.program_version} · {provenance.created || "date unknown"}
+          {provenance.wall_time === null ? "" : ` · computed in ${formatDuration(provenance.wall_time)}`}
+        </p>
+      </div>
+      <div class="verdict-row">
+        <section class={`verdict ${verdict?.status ?? "info"}`} aria-label="Verdict">
+          {verdict === undefined ? (
+            <p class="verdict-text">This run has no findings.</p>
+          ) : (
+            <>
+              <StatusSign status={verdict.status} size={30} />
+              <div>
+                <p class="verdict-title">
+                  {verdict.title} <StatusWord status={verdict.status} />
+                </p>
+                <p class="verdict-text" data-test="verdict">{verdict.text}</p>
+              </div>
+            </>
+          )}
+        </section>
+        <section class="ending" aria-label="How the run ended">
+          <p class="verdict-title">How the run ended</p>
+          <p class="ending-word" data-test="ending">{endingWord[ending.kind] ?? (ending.kind || "Unknown")}</p>
+          <p class="ending-text">{ending.text}</p>
+        </section>
+      </div>
+    </header>
+  );
+}
+
+/// The findings in the given order; neighbours with one heading stand together.
+export function Findings(props: { run: Run }) {
+  const groups: { heading: string; findings: Finding[] }[] = [];
+  for (const finding of props.run.findings) {
+    const last = groups[groups.length - 1];
+    if (last !== undefined && last.heading === finding.heading) last.findings.push(finding);
+    else groups.push({ heading: finding.heading, findings: [finding] });
+  }
+  return (
+    <section class="panel findings" aria-label="Findings">
+      <h2>Findings</h2>
+      {groups.length === 0 && <p class="quiet">None.</p>}
+      {groups.map((group) => (
+        <div class="finding-group">
+          <h3>{group.heading}</h3>
+          {group.findings.map((finding) => (
+            <div class="finding" data-finding={finding.id}>
+              <StatusSign status={finding.status} />
+              <div>
+                <p class="finding-title">
+                  {finding.title !== group.heading && <strong>{finding.title}</strong>}
+                  <StatusWord status={finding.status} />
+                </p>
+                <p>{finding.text}</p>
+              </div>
+            </div>
+          ))}
+        </div>
+      ))}
+    </section>
+  );
+}
+
+export function NotModelled(props: { run: Run }) {
+  return (
+    <section class="panel not-modelled" aria-label="What is not modelled">
+      <h2>What is not modelled</h2>
+      {props.run.not_modelled.length === 0 ? (
+        <p class="quiet">The run names nothing.</p>
+      ) : (
+        <ul>
+          {props.run.not_modelled.map((text) => (
+            <li>{text}</li>
+          ))}
+        </ul>
+      )}
+    </section>
+  );
+}

@@ -1,0 +1,89 @@
+import "uplot/dist/uPlot.min.css";
+import "./style.css";
+import { render } from "preact";
+import { useState } from "preact/hooks";
+import { readRun, type Run } from "./data";
+import { Findings, Header, NotModelled } from "./findings";
+import { Help, listenToKeys } from "./keys";
+import { Plots } from "./plots";
+import type { Scene } from "./scene";
+import { makeState, runClock, type State } from "./state";
+import { Stills, chooseMoments, type Still } from "./stills";
+import { Details, Events, PlanValues } from "./tables";
+import { Timeline } from "./timeline";
+import { View3D } from "./view3d";
+
+const stillSize = { width: 560, height: 400 };
+
+function Page(props: { state: State; fitRef: { current: () => void } }) {
+  const { state, fitRef } = props;
+  const { run } = state;
+  const [stills, setStills] = useState<Still[]>([]);
+
+  const onReady = (scene: Scene | undefined): void => {
+    // The page stands before the pictures are drawn.
+    setTimeout(() => {
+      if (scene !== undefined) {
+        const moments = chooseMoments(run);
+        const pictures = scene.makeStills(moments.map((m) => m.time), stillSize.width, stillSize.height);
+        setStills(moments.map((m, i) => ({ ...m, picture: pictures[i] ?? "" })));
+      }
+      document.documentElement.dataset["ready"] = "yes";
+    }, 0);
+  };
+
+  return (
+    <>
+      <Header run={run} />
+      <main class="layout">
+        <div class="stage">
+          <View3D state={state} onReady={onReady} fitRef={fitRef} />
+          <Timeline state={state} />
+        </div>
+        <div class="side">
+          <Findings run={run} />
+          <NotModelled run={run} />
+        </div>
+        <div class="below">
+          <Stills state={state} stills={stills} />
+          <Plots state={state} />
+          <div class="tables">
+            <Events state={state} />
+            <PlanValues run={run} />
+            <Details run={run} />
+          </div>
+        </div>
+      </main>
+      <Help state={state} />
+    </>
+  );
+}
+
+function start(): void {
+  const root = document.getElementById("page") as HTMLElement;
+  let run: Run;
+  try {
+    run = readRun(document.getElementById("topple-data")?.textContent ?? "null");
+  } catch (error) {
+    render(
+      <main class="layout">
+        <section class="panel" role="alert" data-test="problem">
+          <h1>This report cannot be shown</h1>
+          <p>{error instanceof Error ? error.message : String(error)}</p>
+        </section>
+      </main>,
+      root,
+    );
+    document.documentElement.dataset["ready"] = "yes";
+    return;
+  }
+  document.title = `${run.provenance.title || "Run"} – topple report`;
+  const state = makeState(run);
+  const fitRef = { current: (): void => undefined };
+  runClock(state);
+  listenToKeys(state, () => fitRef.current());
+  root.textContent = "";
+  render(<Page state={state} fitRef={fitRef} />, root);
+}
+
+start();

@@ -1,0 +1,218 @@
+import { effect } from "@preact/signals";
+import { useEffect, useRef, useState } from "preact/hooks";
+import uPlot from "uplot";
+import type { Series } from "./data";
+import type { State } from "./state";
+import { formatNumber, toReadable } from "./units";
+import { groupOrder, groupWord, seriesColours, seriesDashes } from "./vocabulary";
+
+interface Group {
+  id: string;
+  title: string;
+  unit: string;
+  factor: number;
+  series: Series[];
+}
+
+/// Series of one group and one unit share a plot.
+export function makeGroups(series: readonly Series[]): Group[] {
+  const groups: Group[] = [];
+  for (const s of series) {
+    const found = groups.find((g) => g.id === s.group && g.series[0]?.unit === s.unit);
+    if (found !== undefined) found.series.push(s);
+    else {
+      const { unit, factor } = toReadable(s.unit);
+      groups.push({ id: s.group, title: groupWord[s.group] ?? s.title, unit, factor, series: [s] });
+    }
+  }
+  const rank = (g: Group): number => (groupOrder.includes(g.id) ? groupOrder.indexOf(g.id) : groupOrder.length);
+  return groups.map((g, i) => ({ g, i })).sort((a, b) => rank(a.g) - rank(b.g) || a.i - b.i).map(({ g }) => g);
+}
+
+const cssColour = (name: string): string => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+function axis(label: string, isTime: boolean): uPlot.Axis {
+  return {
+    stroke: () => cssColour("--text-quiet"),
+    grid: { stroke: () => cssColour("--line-faint"), width: 1 },
+    ticks: { stroke: () => cssColour("--line-faint"), width: 1, size: 4 },
+    font: "12px system-ui, sans-serif",
+    labelFont: "12px system-ui, sans-serif",
+    label,
+    labelSize: isTime ? 18 : 20,
+    labelGap: 0,
+    size: isTime ? 28 : 50,
+    gap: 4,
+    values: (_, splits) => splits.map((v) => String(Number(v.toPrecision(6))).replace("-", "−")),
+  };
+}
+
+function PlotPanel(props: { state: State; group: Group }) {
+  const { state, group } = props;
+  const { run } = state;
+  const holder = useRef<HTMLDivElement>(null);
+  const values = group.series.map((s) => s.value.map((v) => (v === null ? null : v * group.factor)));
+
+  useEffect(() => {
+    const element = holder.current;
+    if (element === null) return;
+    const cursorLine = document.createElement("div");
+    cursorLine.className = "time-line";
+    const stages = run.events.filter((e) => e.kind === "stage");
+    const plot = new uPlot(
+      {
+        width: Math.max(200, element.clientWidth),
+        height: 220,
+        padding: [10, 12, 0, 0],
+        legend: { show: false },
+        cursor: { drag: { x: false, y: false }, y: false, points: { size: 6 } },
+        scales: { x: { time: false }, y: { range: (_, low, high) => niceRange(low, high) } },
+        axes: [axis("time [s]", true), axis(`[${group.unit || "–"}]`, false)],
+        series: [
+          {},
+          ...group.series.map((s, i) => ({
+            label: s.title,
+            stroke: () => cssColour(`--series-${i % seriesColours.length}`),
+            width: 1.8,
+            dash: seriesDashes[i % seriesDashes.length] as number[],
+            points: { show: run.time.length < 2 },
+          })),
+        ],
+        hooks: {
+          drawClear: [
+            (u) => {
+              const { ctx } = u;
+              ctx.save();
+              ctx.strokeStyle = cssColour("--text-quiet");
+              ctx.setLineDash([3, 3]);
+              for (const stage of stages) {
+                const x = Math.round(u.valToPos(stage.time, "x", true)) + 0.5;
+                if (x < u.bbox.left || x > u.bbox.left + u.bbox.width) continue;
+                ctx.beginPath();
+                ctx.moveTo(x, u.bbox.top);
+                ctx.lineTo(x, u.bbox.top + u.bbox.height);
+                ctx.stroke();
+              }
+              ctx.restore();
+            },
+          ],
+        },
+      },
+      [run.time, ...values],
+      element,
+    );
+    plot.over.appendChild(cursorLine);
+    const placeLine = (): void => {
+      cursorLine.style.transform = `translateX(${plot.valToPos(state.time.value, "x") || 0}px)`;
+    };
+    const seek = (event: PointerEvent): void => {
+      if (event.buttons & 1) state.pauseAt(plot.posToVal(event.clientX - plot.over.getBoundingClientRect().left, "x"));
+    };
+    plot.over.addEventListener("pointerdown", (event) => {
+      plot.over.setPointerCapture(event.pointerId);
+      seek(event);
+    });
+    plot.over.addEventListener("pointermove", seek);
+    const observer = new ResizeObserver(() => {
+      plot.setSize({ width: Math.max(200, element.clientWidth), height: 220 });
+      placeLine();
+    });
+    observer.observe(element);
+    const dark = matchMedia("(prefers-color-scheme: dark)");
+    const redraw = (): void => plot.redraw();
+    dark.addEventListener("change", redraw);
+    const stop = effect(placeLine);
+    return () => {
+      stop();
+      observer.disconnect();
+      dark.removeEventListener("change", redraw);
+      plot.destroy();
+    };
+  }, []);
+
+  return (
+    <section class="panel plot" aria-label={group.title} data-plot={group.id}>
+      <h2>{group.title}</h2>
+      <PlotLegend state={state} group={group} values={values} />
+      <div ref={holder} class="plot-holder" />
+      <DataTable state={state} group={group} values={values} />
+    </section>
+  );
+}
+
+function niceRange(low: number | null, high: number | null): [number, number] {
+  if (low === null || high === null || !Number.isFinite(low + high)) return [0, 1];
+  const a = Math.min(0, low);
+  const b = Math.max(0, high);
+  if (a === b) return [0, 1];
+  const margin = 0.06 * (b - a);
+  return [a < 0 ? a - margin : 0, b > 0 ? b + margin : 0];
+}
+
+function PlotLegend(props: { state: State; group: Group; values: (number | null)[][] }) {
+  const { state, group, values } = props;
+  const frame = state.frame.value;
+  return (
+    <ul class="plot-legend">
+      {group.series.map((s, i) => (
+        <li>
+          <svg width="26" height="8" aria-hidden="true">
+            <line
+              x1="0" y1="4" x2="26" y2="4" stroke-width="2.2"
+              style={{ stroke: `var(--series-${i % seriesColours.length})` }}
+              stroke-dasharray={(seriesDashes[i % seriesDashes.length] as number[]).join(" ")}
+            />
+          </svg>
+          {s.title} <span class="number">{formatNumber(values[i]?.[frame])} {group.unit}</span>
+        </li>
+      ))}
+    </ul>
+  );
+}
+
+function DataTable(props: { state: State; group: Group; values: (number | null)[][] }) {
+  const { state, group, values } = props;
+  const [open, setOpen] = useState(false);
+  return (
+    <details class="data-table" onToggle={(e) => setOpen(e.currentTarget.open)}>
+      <summary>Table of values</summary>
+      {open && (
+        <div class="scroller" tabIndex={0} role="region" aria-label={`Values of ${group.title}`}>
+          <table>
+            <thead>
+              <tr>
+                <th scope="col">time [s]</th>
+                {group.series.map((s) => (
+                  <th scope="col">{s.title} [{group.unit || "–"}]</th>
+                ))}
+              </tr>
+            </thead>
+            <tbody>
+              {state.run.time.map((t, frame) => (
+                <tr>
+                  <td>{t.toFixed(3)}</td>
+                  {values.map((v) => (
+                    <td>{formatNumber(v[frame])}</td>
+                  ))}
+                </tr>
+              ))}
+            </tbody>
+          </table>
+        </div>
+      )}
+    </details>
+  );
+}
+
+export function Plots(props: { state: State }) {
+  const groups = makeGroups(props.state.run.series);
+  if (groups.length === 0 || props.state.run.time.length === 0)
+    return <section class="panel"><h2>Plots</h2><p class="quiet">The record holds no series.</p></section>;
+  return (
+    <div class="plots">
+      {groups.map((group) => (
+        <PlotPanel state={props.state} group={group} />
+      ))}
+    </div>
+  );
+}

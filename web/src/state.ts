@@ -1,0 +1,102 @@
+/// What the viewer looks at. The run itself never changes.
+import { computed, signal } from "@preact/signals";
+import type { Run } from "./data";
+import { findFrame } from "./data";
+import { wordsOfEvent } from "./vocabulary";
+
+export type Colouring = "kind" | "state" | "utilisation";
+export type ZoneMarks = "damaged" | "all" | "none";
+
+export const speeds = [0.1, 0.25, 0.5, 1, 2, 4];
+export const reducedMotion = (): boolean => matchMedia("(prefers-reduced-motion: reduce)").matches;
+
+export function makeState(run: Run) {
+  const begin = run.time[0] ?? 0;
+  const end = run.time[run.time.length - 1] ?? 0;
+  const time = signal(begin);
+  const playing = signal(false);
+  const hiddenKinds = signal<ReadonlySet<string>>(chooseHiddenKinds(run));
+  const frame = computed(() => findFrame(run.time, time.value).frame);
+  const shownEvents = computed(() => run.events.filter((e) => !hiddenKinds.value.has(e.kind)));
+
+  const seek = (t: number): void => {
+    time.value = Math.min(end, Math.max(begin, t));
+  };
+  const pauseAt = (t: number): void => {
+    playing.value = false;
+    seek(t);
+  };
+
+  return {
+    run,
+    begin,
+    end,
+    time,
+    frame,
+    playing,
+    speed: signal(1),
+    selected: signal(-1),
+    colouring: signal<Colouring>("kind"),
+    zoneMarks: signal<ZoneMarks>("damaged"),
+    hiddenKinds,
+    shownEvents,
+    helpOpen: signal(false),
+    seek,
+    pauseAt,
+    togglePlay(): void {
+      if (run.time.length < 2) return;
+      if (!playing.value && time.value >= end) seek(begin);
+      playing.value = !playing.value;
+    },
+    stepFrame(direction: 1 | -1): void {
+      const { frame: at, fraction } = findFrame(run.time, time.value);
+      const target = direction > 0 ? at + 1 : fraction > 0 ? at : at - 1;
+      pauseAt(run.time[Math.min(run.time.length - 1, Math.max(0, target))] ?? begin);
+    },
+    /// To the next moment at which a shown event happens; events of one moment count as one.
+    stepEvent(direction: 1 | -1): void {
+      const apart = 1e-6;
+      const times = shownEvents.value.map((e) => e.time).filter((t) => t >= begin && t <= end);
+      const t = time.value;
+      const ahead = direction > 0 ? times.filter((s) => s > t + apart) : times.filter((s) => s < t - apart);
+      if (ahead.length > 0) pauseAt(direction > 0 ? Math.min(...ahead) : Math.max(...ahead));
+      else pauseAt(direction > 0 ? end : begin);
+    },
+  };
+}
+export type State = ReturnType<typeof makeState>;
+
+/// A long list starts with what an engineer asks for first; nothing is hidden in a short one.
+function chooseHiddenKinds(run: Run): ReadonlySet<string> {
+  if (run.events.length <= 60) return new Set();
+  const count = new Map<string, number>();
+  for (const event of run.events) count.set(event.kind, (count.get(event.kind) ?? 0) + 1);
+  return new Set([...count].filter(([kind, n]) => n > 20 && wordsOfEvent(kind).small).map(([kind]) => kind));
+}
+
+/// Advances the time while playing. With reduced motion it goes on in still pictures, four a second.
+export function runClock(state: State): void {
+  let last = 0;
+  let running = false;
+  const tick = (now: number): void => {
+    if (!state.playing.value) {
+      running = false;
+      return;
+    }
+    const wait = reducedMotion() ? 0.25 : 0;
+    const passed = Math.max(0, now - last) / 1000;
+    if (passed >= wait) {
+      last = now;
+      // A tab that slept does not leap.
+      state.seek(state.time.value + Math.min(passed, 0.5) * state.speed.value);
+      if (state.time.value >= state.end) state.playing.value = false;
+    }
+    requestAnimationFrame(tick);
+  };
+  state.playing.subscribe((playing) => {
+    if (!playing || running) return;
+    running = true;
+    last = performance.now();
+    requestAnimationFrame(tick);
+  });
+}

@@ -1,0 +1,69 @@
+import type { Run } from "./data";
+import type { State } from "./state";
+import { formatTime } from "./units";
+
+export interface Still {
+  time: number;
+  caption: string;
+  picture: string;
+}
+
+/// Moments that tell the story: before anything, after each stage, first touchdown, the end, and what lies between.
+export function chooseMoments(run: Run, count = 6): { time: number; caption: string }[] {
+  const begin = run.time[0];
+  const end = run.time[run.time.length - 1];
+  if (begin === undefined || end === undefined) return [];
+  const moments: { time: number; caption: string; rank: number }[] = [{ time: begin, caption: "before the first charge", rank: 0 }];
+  if (end > begin) {
+    moments.push({ time: end, caption: "end", rank: 0 });
+    const least = (end - begin) / 60;
+    const add = (time: number, caption: string, rank: number): void => {
+      if (time > begin && time < end && moments.every((m) => Math.abs(m.time - time) > least)) moments.push({ time, caption, rank });
+    };
+    for (const e of run.events.filter((e) => e.kind === "stage")) add(e.time, e.subject || "stage", 1);
+    const touchdown = run.events.find((e) => e.kind === "touchdown");
+    if (touchdown !== undefined) add(touchdown.time, "first touchdown", 1);
+    while (moments.length < count) {
+      moments.sort((a, b) => a.time - b.time);
+      // The widest gap says least about what happens in it; the quiet time before the last stage counts little.
+      const lastStage = Math.max(begin, ...run.events.filter((e) => e.kind === "stage").map((e) => e.time));
+      let best = -1;
+      let gap = 0;
+      for (let i = 0; i + 1 < moments.length; ++i) {
+        const a = moments[i]?.time ?? 0;
+        const b = moments[i + 1]?.time ?? 0;
+        const width = (b - a) * (b <= lastStage ? 0.2 : 1);
+        if (width > gap) {
+          gap = width;
+          best = i;
+        }
+      }
+      if (best < 0) break;
+      const middle = ((moments[best]?.time ?? 0) + (moments[best + 1]?.time ?? 0)) / 2;
+      const before = moments.length;
+      add(middle, "", 2);
+      if (moments.length === before) break;
+    }
+  }
+  return moments
+    .sort((a, b) => a.rank - b.rank)
+    .slice(0, count)
+    .sort((a, b) => a.time - b.time);
+}
+
+export function Stills(props: { state: State; stills: Still[] }) {
+  if (props.stills.length === 0) return null;
+  return (
+    <section class="panel stills" aria-label="Sequence">
+      <h2>Sequence</h2>
+      <div class="still-row">
+        {props.stills.map((still) => (
+          <button type="button" title="Go to this time" onClick={() => props.state.pauseAt(still.time)}>
+            <img src={still.picture} alt={`The building at ${formatTime(still.time)}${still.caption === "" ? "" : `, ${still.caption}`}`} />
+            <span><strong>{formatTime(still.time)}</strong>{still.caption === "" ? "" : ` ${still.caption}`}</span>
+          </button>
+        ))}
+      </div>
+    </section>
+  );
+}

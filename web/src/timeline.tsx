@@ -1,0 +1,154 @@
+import { useState } from "preact/hooks";
+import type { RunEvent } from "./data";
+import { EventSign } from "./signs";
+import { speeds, type State } from "./state";
+import { formatTime } from "./units";
+import { wordsOfEvent } from "./vocabulary";
+
+interface Marker {
+  at: number; // 0..1
+  lane: 0 | 1;
+  kind: string;
+  events: RunEvent[];
+}
+
+/// Events so near to each other that their signs would touch share one.
+function makeMarkers(state: State): Marker[] {
+  const span = state.end - state.begin;
+  const markers: Marker[] = [];
+  for (const event of [...state.shownEvents.value].sort((a, b) => a.time - b.time)) {
+    if (event.time < state.begin || event.time > state.end) continue;
+    const at = span > 0 ? (event.time - state.begin) / span : 0;
+    const lane = wordsOfEvent(event.kind).small ? 1 : 0;
+    const near = markers.find((m) => m.lane === lane && m.kind === event.kind && at - m.at < 0.012);
+    if (near !== undefined) near.events.push(event);
+    else markers.push({ at, lane, kind: event.kind, events: [event] });
+  }
+  return markers;
+}
+
+function describe(marker: Marker): string[] {
+  const lines = marker.events.slice(0, 8).map((e) => `${formatTime(e.time)}  ${e.text || wordsOfEvent(e.kind).word}`);
+  if (marker.events.length > 8) lines.push(`and ${marker.events.length - 8} more`);
+  return lines;
+}
+
+function Markers(props: { state: State }) {
+  const { state } = props;
+  const [open, setOpen] = useState<Marker>();
+  return (
+    <div class="markers">
+      {makeMarkers(state).map((marker) => (
+        <button
+          type="button"
+          class={`marker lane-${marker.lane}`}
+          style={{ left: `${100 * marker.at}%` }}
+          aria-label={describe(marker).join("; ")}
+          onClick={() => state.pauseAt(marker.events[0]?.time ?? state.begin)}
+          onPointerEnter={() => setOpen(marker)}
+          onPointerLeave={() => setOpen(undefined)}
+          onFocus={() => setOpen(marker)}
+          onBlur={() => setOpen(undefined)}
+        >
+          <EventSign kind={marker.kind} size={marker.lane === 0 ? 14 : 9} />
+        </button>
+      ))}
+      {open !== undefined && (
+        <div class={`tooltip ${open.at > 0.5 ? "left" : ""}`} role="tooltip" style={{ left: `${100 * open.at}%` }}>
+          {describe(open).map((line) => (
+            <p>{line}</p>
+          ))}
+        </div>
+      )}
+    </div>
+  );
+}
+
+const icons = {
+  begin: "M3 2h2v12H3zM14 2v12L5.5 8z",
+  eventBack: "M8 2v12L1 8zM15 2v12L8 8z",
+  stepBack: "M11 2v12L3 8zM12 2h1.6v12H12z",
+  play: "M3.5 1.5v13L14 8z",
+  pause: "M3 2h3.6v12H3zM9.4 2H13v12H9.4z",
+  step: "M5 2v12l8-6zM2.4 2H4v12H2.4z",
+  event: "M8 2v12l7-6zM1 2v12l7-6z",
+  end: "M11 2h2v12h-2zM2 2v12l8.5-6z",
+};
+
+function IconButton(props: { icon: keyof typeof icons; label: string; keys: string; main?: boolean; test?: string; onClick: () => void }) {
+  return (
+    <button
+      type="button"
+      class={props.main === true ? "icon main" : "icon"}
+      aria-label={props.label}
+      title={`${props.label} (${props.keys})`}
+      data-test={props.test}
+      onClick={props.onClick}
+    >
+      <svg width="14" height="14" viewBox="0 0 16 16" aria-hidden="true">
+        <path d={icons[props.icon]} fill="currentColor" />
+      </svg>
+    </button>
+  );
+}
+
+export function Timeline(props: { state: State }) {
+  const { state } = props;
+  const { run } = state;
+  const playing = state.playing.value;
+  const disabled = run.time.length < 2;
+  return (
+    <section class="panel timeline" aria-label="Timeline">
+      <div class="track">
+        <Markers state={state} />
+        <input
+          type="range"
+          data-test="slider"
+          aria-label="Time"
+          aria-valuetext={formatTime(state.time.value)}
+          min={state.begin}
+          max={state.end}
+          step="any"
+          value={state.time.value}
+          disabled={disabled}
+          onInput={(e) => state.pauseAt(e.currentTarget.valueAsNumber)}
+        />
+      </div>
+      <div class="transport">
+        <IconButton icon="begin" label="To the beginning" keys="Home" onClick={() => state.pauseAt(state.begin)} />
+        <IconButton icon="eventBack" label="Event before" keys="Shift+←" onClick={() => state.stepEvent(-1)} />
+        <IconButton icon="stepBack" label="Frame before" keys="←" onClick={() => state.stepFrame(-1)} />
+        <IconButton
+          icon={playing ? "pause" : "play"}
+          label={playing ? "Pause" : "Play"}
+          keys="Space"
+          main
+          test="play"
+          onClick={() => state.togglePlay()}
+        />
+        <IconButton icon="step" label="Next frame" keys="→" onClick={() => state.stepFrame(1)} />
+        <IconButton icon="event" label="Next event" keys="Shift+→" onClick={() => state.stepEvent(1)} />
+        <IconButton icon="end" label="To the end" keys="End" onClick={() => state.pauseAt(state.end)} />
+        <label>
+          Speed{" "}
+          <select value={String(state.speed.value)} onChange={(e) => (state.speed.value = Number(e.currentTarget.value))}>
+            {speeds.map((speed) => (
+              <option value={String(speed)}>{speed}×</option>
+            ))}
+          </select>
+        </label>
+        <span class="spring" />
+        <span class="clock">
+          <strong data-test="time">{formatTime(state.time.value)}</strong> of {formatTime(state.end)}
+          <span class="quiet">
+            {" "}
+            · frame {run.time.length === 0 ? 0 : state.frame.value + 1} of {run.time.length}
+          </span>
+        </span>
+        <button type="button" class="icon" aria-label="Keys" title="Keys (?)" onClick={() => (state.helpOpen.value = true)}>
+          ?
+        </button>
+      </div>
+    </section>
+  );
+}

@@ -1,0 +1,61 @@
+/// The one place where SI turns into what people read.
+
+interface Readable {
+  unit: string;
+  factor: number;
+}
+const readable: Record<string, Readable> = {
+  rad: { unit: "°", factor: 180 / Math.PI },
+  "rad/s": { unit: "°/s", factor: 180 / Math.PI },
+  J: { unit: "MJ", factor: 1e-6 },
+  N: { unit: "MN", factor: 1e-6 },
+  "N·m": { unit: "MN·m", factor: 1e-6 },
+  "N*m": { unit: "MN·m", factor: 1e-6 },
+  Nm: { unit: "MN·m", factor: 1e-6 },
+  Pa: { unit: "N/mm²", factor: 1e-6 },
+  kg: { unit: "t", factor: 1e-3 },
+  m2: { unit: "m²", factor: 1 },
+  m3: { unit: "m³", factor: 1 },
+};
+
+export function toReadable(unit: string): Readable {
+  return readable[unit] ?? { unit, factor: 1 };
+}
+
+/// Four significant digits; "–" for what is not a number.
+export function formatNumber(value: number | null | undefined, digits = 4): string {
+  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
+  if (value === 0) return "0";
+  const size = Math.abs(value);
+  if (size >= 1e6 || size < 1e-4) {
+    const [mantissa, exponent] = value.toExponential(digits - 1).split("e") as [string, string];
+    return `${mantissa} × 10^${Number(exponent)}`.replace(/-/g, "−");
+  }
+  const decimals = Math.max(0, Math.min(6, digits - 1 - Math.floor(Math.log10(size))));
+  return value.toFixed(decimals).replace("-", "−");
+}
+
+export function formatWith(value: number | null | undefined, unit: string): string {
+  const to = toReadable(unit);
+  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
+  return `${formatNumber(value * to.factor)} ${to.unit}`.trim();
+}
+
+export function formatTime(t: number): string {
+  return `${t.toFixed(3).replace("-", "−")} s`;
+}
+
+export function formatMass(mass: number | null): string {
+  if (mass === null) return "–";
+  return mass >= 10000 ? `${Math.round(mass / 1000).toLocaleString("en-GB").replace(/,/g, "\u202f")} t` : `${formatNumber(mass / 1000, 3)} t`;
+}
+
+/// Wall time: "0.84 s", "3 min 12 s".
+export function formatDuration(seconds: number | null): string {
+  if (seconds === null || !Number.isFinite(seconds)) return "–";
+  if (seconds < 60) return `${formatNumber(seconds, 3)} s`;
+  const whole = Math.round(seconds);
+  const hours = Math.floor(whole / 3600);
+  const minutes = Math.floor((whole % 3600) / 60);
+  return hours > 0 ? `${hours} h ${minutes} min` : `${minutes} min ${whole % 60} s`;
+}

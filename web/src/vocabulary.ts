@@ -1,0 +1,105 @@
+/// Words, colours and signs. Colours follow Okabe and Ito, so that they differ for colour-blind readers too; a word or
+/// a shape always stands beside them.
+import type { Status } from "./data";
+
+export const statusWord: Record<Status, string> = { info: "Note", good: "OK", warning: "Caution", bad: "Problem" };
+
+export interface ZoneStateWords {
+  word: string;
+  colour: string;
+  shape: "circle" | "triangle" | "diamond" | "cross" | "star";
+}
+/// Indexed by ZoneState of the record.
+export const zoneStates: ZoneStateWords[] = [
+  { word: "elastic", colour: "#56b4e9", shape: "circle" },
+  { word: "yielded", colour: "#e69f00", shape: "triangle" },
+  { word: "softening", colour: "#d55e00", shape: "diamond" },
+  { word: "broken", colour: "#7a1f5c", shape: "cross" },
+  { word: "fired", colour: "#cc79a7", shape: "star" },
+];
+
+/// "C-A1-0" says more to its reader with a word in front.
+export const kindWord: Record<string, string> = {
+  column: "Column",
+  beam: "Beam",
+  slab: "Slab",
+  wall: "Wall",
+  node: "Joint block",
+  stump: "Stump",
+};
+const kindColours: Record<string, string> = {
+  column: "#2f6f9f",
+  beam: "#6aaed6",
+  slab: "#b9c0c7",
+  wall: "#d9b98c",
+  node: "#8b97a3",
+  stump: "#8a5a3c",
+};
+const spareColours = ["#009e73", "#cc79a7", "#8c6bb1", "#b3a100"];
+
+export function colourOfKind(kind: string, kinds: readonly string[]): string {
+  const known = kindColours[kind];
+  if (known !== undefined) return known;
+  const spare = kinds.filter((k) => kindColours[k] === undefined).indexOf(kind);
+  return spareColours[Math.max(0, spare) % spareColours.length] as string;
+}
+
+export function wordOfKind(kind: string): string {
+  return kindWord[kind] ?? (kind === "" ? "Part" : kind.charAt(0).toUpperCase() + kind.slice(1));
+}
+
+/// Cividis, at equal distances: readable with and without colour vision.
+const ramp = ["#00224e", "#2a3f6d", "#575d6d", "#7d7c78", "#a59c74", "#d2c060", "#fee838"];
+export const rampCss = `linear-gradient(to right, ${ramp.join(", ")})`;
+export function colourOfUtilisation(utilisation: number): string {
+  const s = Math.min(1, Math.max(0, utilisation)) * (ramp.length - 1);
+  const i = Math.min(ramp.length - 2, Math.floor(s));
+  const mix = (k: number): number => {
+    const a = parseInt((ramp[i] as string).slice(k, k + 2), 16);
+    const b = parseInt((ramp[i + 1] as string).slice(k, k + 2), 16);
+    return Math.round(a + (s - i) * (b - a));
+  };
+  return `rgb(${mix(1)}, ${mix(3)}, ${mix(5)})`;
+}
+
+export interface EventWords {
+  word: string;
+  colour: string;
+  shape: "circle" | "triangle" | "diamond" | "cross" | "star" | "square" | "down";
+  /// Many of these belong to one collapse; they are drawn small and can be hidden.
+  small: boolean;
+}
+const eventWords: Record<string, EventWords> = {
+  stage: { word: "Stage", colour: "#0072b2", shape: "circle", small: false },
+  charge: { word: "Charge", colour: "#cc79a7", shape: "star", small: true },
+  yield: { word: "Yield", colour: "#e69f00", shape: "triangle", small: true },
+  rupture: { word: "Rupture", colour: "#7a1f5c", shape: "cross", small: true },
+  release: { word: "Release", colour: "#d55e00", shape: "diamond", small: true },
+  touchdown: { word: "Touchdown", colour: "#8a5a3c", shape: "down", small: false },
+  contact: { word: "Contact", colour: "#8b97a3", shape: "square", small: true },
+  rest: { word: "Rest", colour: "#009e73", shape: "square", small: false },
+  cable: { word: "Cable", colour: "#009e73", shape: "diamond", small: false },
+  failure: { word: "Failure", colour: "#d55e00", shape: "cross", small: false },
+};
+export function wordsOfEvent(kind: string): EventWords {
+  return eventWords[kind] ?? { word: wordOfKind(kind), colour: "#8b97a3", shape: "circle", small: true };
+}
+
+export const endingWord: Record<string, string> = {
+  at_rest: "At rest",
+  time_limit: "Time limit reached",
+  cancelled: "Cancelled",
+  failed: "Calculation failed",
+};
+
+/// Series of one plot.
+export const seriesColours = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
+export const seriesDashes: number[][] = [[], [8, 4], [2, 3], [10, 3, 2, 3], [5, 2], [1, 2]];
+
+export const groupWord: Record<string, string> = {
+  angle: "Tilt angle",
+  energy: "Energies",
+  force: "Ground force",
+  height: "Height of the centre of mass",
+};
+export const groupOrder = ["angle", "energy", "force"];
