@@ -42,7 +42,7 @@ double calc_largest_l_eq(const ConcreteInput&);
 struct Confinement {
   double stress = 0;  // σ2, effective [Pa]
 };
-/// The core's parameters; the crushing energy grows with the strain that the ties allow.
+/// The core's parameters at the length l_eq of the input; the crushing energy grows with the strain that ties allow.
 ConcreteInput confine(ConcreteInput, const Confinement&);
 
 /// Model Code 2010, 5.1.5.2: 73 f_cm^0.18 N/m. [J/m²]

@@ -67,10 +67,9 @@ SteelResponse advance(const Steel& s, SteelState& state, double eps) {
     tangent = s.hardening;
   }
   // Buckling: no more compression than the envelope's at this strain; what is missing becomes plastic strain.
-  if (eps < 0 && stress < 0) {
+  if (-eps > s.eps_y && stress < 0) {
     const SteelResponse limit = calc_envelope(s, eps);
-    const bool buckles = -eps > s.eps_star || -limit.stress >= s.buckling_stress;
-    if (buckles && stress < limit.stress) {
+    if (stress < limit.stress) {
       stress = limit.stress;
       tangent = limit.tangent;
       state.plastic = eps - stress / s.Es;

@@ -35,14 +35,15 @@ std::vector<double> make_rotations(const ZoneInput& in, double depth, const mate
   out.push_back(first);
   extend(first, 0.4 * yield, 1.4);
   extend(out.back(), 6 * yield, 1.15);
-  extend(out.back(), last, 1.22);
+  extend(out.back(), last, 1.18);
   return out;
 }
 
 /// Normal forces from crushing to rupture of the bars.
 std::vector<double> make_forces(double crushing, double rupture) {
   std::vector<double> out;
-  for (double share : {1.0, 0.97, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1}) out.push_back(-share * crushing);
+  for (double share : {1.0, 0.97, 0.9, 0.8, 0.7, 0.6, 0.5, 0.45, 0.4, 0.35, 0.3, 0.2, 0.1})
+    out.push_back(-share * crushing);
   for (double share : {0.0, 0.4, 0.75, 1.0}) out.push_back(share * rupture);
   return out;
 }
