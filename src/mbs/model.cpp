@@ -82,8 +82,7 @@ class Checker {
         if (!std::isfinite(I(i, j)) || std::abs(I(i, j) - I(j, i)) > 1e-9 * (std::abs(I(i, i)) + std::abs(I(j, j))))
           return fail(place + ".inertia", "must be finite and symmetric");
     const double minor = I(0, 0) * I(1, 1) - I(0, 1) * I(1, 0);
-    if (!(I(0, 0) > 0) || !(minor > 0) || !(determinant(I) > 0))
-      fail(place + ".inertia", "must be positive definite");
+    if (!(I(0, 0) > 0) || !(minor > 0) || !(determinant(I) > 0)) fail(place + ".inertia", "must be positive definite");
   }
   void finish() {
     if (!found_.empty()) throw InputError(std::move(found_));
@@ -149,7 +148,8 @@ void check_model(const Model& model) {
     c.curve(place + ".tension", l.tension);
     if (!(l.biaxial_exponent >= 1 && l.biaxial_exponent <= 10))
       c.fail(place + ".biaxial_exponent", "must lie between 1 and 10");
-    if (!(l.damage_share >= 0 && l.damage_share <= 0.95)) c.fail(place + ".damage_share", "must lie between 0 and 0.95");
+    if (!(l.damage_share >= 0 && l.damage_share <= 0.95))
+      c.fail(place + ".damage_share", "must lie between 0 and 0.95");
     for (double x : {l.rupture_rotation, l.crush_length, l.rupture_elongation, l.shear_y, l.shear_z, l.shear_friction,
                      l.slip_softening, l.slip_rupture, l.torsion, l.twist_rupture})
       c.not_negative(place, x);
@@ -227,14 +227,18 @@ void check_model(const Model& model) {
     c.not_negative(place + ".time", e.time);
     for (const Action& a : e.actions) {
       switch (a.kind) {
-        case Action::Kind::RemoveElement: c.index(place + ".element", a.element, model.elements); break;
+        case Action::Kind::RemoveElement:
+          c.index(place + ".element", a.element, model.elements);
+          break;
         case Action::Kind::SwitchLaw:
           c.index(place + ".element", a.element, model.elements);
           c.index(place + ".law", a.law, model.laws);
           c.finite(place + ".ramp", a.ramp);
           c.not_negative(place + ".ramp", a.ramp);
           break;
-        case Action::Kind::ReleaseJoint: c.index(place + ".joint", a.joint, model.joints); break;
+        case Action::Kind::ReleaseJoint:
+          c.index(place + ".joint", a.joint, model.joints);
+          break;
         case Action::Kind::ReplaceBody:
           c.body(place + ".body", model, a.body, false);
           c.mass_and_inertia(place + ".replacement", a.replacement);

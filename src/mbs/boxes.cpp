@@ -1,0 +1,167 @@
+#include "mbs/boxes.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace topple::mbs {
+
+namespace {
+
+/// Axis number i of a pair of boxes: 0-2 faces of a, 3-5 faces of b, 6-14 products of edges. Zero for parallel edges.
+Vec3 axis_of(const Solid& a, const Solid& b, int i) {
+  if (i < 3) return a.R.column(i);
+  if (i < 6) return b.R.column(i - 3);
+  const Vec3 n = cross(a.R.column((i - 6) / 3), b.R.column((i - 6) % 3));
+  const double length = norm(n);
+  return length > 1e-6 ? (1 / length) * n : Vec3{};
+}
+
+double reach_along(const Solid& s, const Vec3& n) {
+  return std::abs(dot(s.R.column(0), n)) * s.half.x + std::abs(dot(s.R.column(1), n)) * s.half.y +
+         std::abs(dot(s.R.column(2), n)) * s.half.z;
+}
+
+/// Overlap along an axis, negative when apart.
+double overlap_along(const Solid& a, const Solid& b, const Vec3& n) {
+  return reach_along(a, n) + reach_along(b, n) - std::abs(dot(b.p - a.p, n));
+}
+
+/// Cuts a polygon by the half-space dot(n, p) <= offset.
+int clip(const Vec3* in, int count, const Vec3& n, double offset, Vec3* out) {
+  int kept = 0;
+  for (int i = 0; i < count; ++i) {
+    const Vec3 &p = in[i], &q = in[(i + 1) % count];
+    const double dp = dot(n, p) - offset, dq = dot(n, q) - offset;
+    if (dp <= 0) out[kept++] = p;
+    if ((dp < 0 && dq > 0) || (dp > 0 && dq < 0)) out[kept++] = p + (dp / (dp - dq)) * (q - p);
+  }
+  return kept;
+}
+
+/// Face of `reference` with outward normal n (number `face`) against the facing side of `other`.
+void face_points(const Solid& reference, int face, const Vec3& n, const Solid& other, bool flipped, BoxContact& out) {
+  // the side of the other box that looks most against n
+  int side = 0;
+  double most = 0;
+  for (int i = 0; i < 3; ++i) {
+    const double d = dot(other.R.column(i), n);
+    if (std::abs(d) > std::abs(most)) most = d, side = i;
+  }
+  const Vec3 centre = other.p - std::copysign(other.half[side], most) * other.R.column(side);
+  const int u = (side + 1) % 3, v = (side + 2) % 3;
+  const Vec3 du = other.half[u] * other.R.column(u), dv = other.half[v] * other.R.column(v);
+  Vec3 polygon[16] = {centre + du + dv, centre - du + dv, centre - du - dv, centre + du - dv}, cut[16];
+  int count = 4;
+  for (int k = 1; k <= 2; ++k) {
+    const int axis = (face + k) % 3;
+    const Vec3 t = reference.R.column(axis);
+    const double at = dot(t, reference.p), half = reference.half[axis];
+    count = clip(polygon, count, t, at + half, cut);
+    count = clip(cut, count, -t, -at + half, polygon);
+  }
+  const double surface = dot(n, reference.p) + reference.half[face];
+  out.normal = flipped ? -n : n;
+  for (int i = 0; i < count && out.count < 8; ++i) {
+    const double depth = surface - dot(n, polygon[i]);
+    if (depth <= 0) continue;
+    out.p[out.count] = polygon[i] + (0.5 * depth) * n;
+    out.depth[out.count++] = depth;
+  }
+}
+
+void edge_point(const Solid& a, const Solid& b, int i, const Vec3& n, double depth, BoxContact& out) {
+  const int ea = (i - 6) / 3, eb = (i - 6) % 3;
+  Vec3 pa = a.p, pb = b.p;
+  for (int k = 0; k < 3; ++k) {
+    if (k != ea) pa += std::copysign(a.half[k], dot(a.R.column(k), n)) * a.R.column(k);
+    if (k != eb) pb -= std::copysign(b.half[k], dot(b.R.column(k), n)) * b.R.column(k);
+  }
+  const Vec3 u = a.R.column(ea), v = b.R.column(eb), w = pb - pa;
+  const double uv = dot(u, v), denominator = 1 - uv * uv;
+  if (denominator < 1e-9) return;
+  const double s = (dot(u, w) - uv * dot(v, w)) / denominator, t = (uv * dot(u, w) - dot(v, w)) / denominator;
+  out.normal = n;
+  out.p[0] = 0.5 * (pa + s * u + pb + t * v);
+  out.depth[0] = depth;
+  out.count = 1;
+}
+
+void box_box(const Solid& a, const Solid& b, int& axis, BoxContact& out) {
+  if (const Vec3 n = axis_of(a, b, axis); dot(n, n) > 0 && overlap_along(a, b, n) <= 0) return;
+  double least = 1e300;
+  int best = -1;
+  Vec3 normal;
+  for (int i = 0; i < 15; ++i) {
+    const Vec3 n = axis_of(a, b, i);
+    if (dot(n, n) == 0) continue;
+    const double overlap = overlap_along(a, b, n);
+    if (overlap <= 0) {
+      axis = i;
+      return;
+    }
+    // faces are preferred to edges, and the first to the second, unless clearly deeper: the choice stays steady
+    if (overlap < (i < 3 ? 1.0 : i < 6 ? 0.98 : 0.95) * least - (i < 3 ? 0 : 1e-9)) {
+      least = overlap;
+      best = i;
+      normal = dot(n, b.p - a.p) < 0 ? -n : n;
+    }
+  }
+  if (best < 0) return;
+  if (best < 3) {
+    face_points(a, best, normal, b, false, out);
+  } else if (best < 6) {
+    face_points(b, best - 3, -normal, a, true, out);
+  } else {
+    edge_point(a, b, best, normal, least, out);
+  }
+}
+
+void sphere_box(const Solid& sphere, const Solid& box, bool flipped, BoxContact& out) {
+  const Vec3 local = transpose_times(box.R, sphere.p - box.p);
+  Vec3 nearest = local;
+  bool inside = true;
+  for (int k = 0; k < 3; ++k) {
+    nearest[k] = std::clamp(local[k], -box.half[k], box.half[k]);
+    inside = inside && nearest[k] == local[k];
+  }
+  Vec3 n;  // from the sphere to the box, in the box's axes
+  double depth;
+  if (inside) {
+    int k = 0;
+    for (int i = 1; i < 3; ++i)
+      if (box.half[i] - std::abs(local[i]) < box.half[k] - std::abs(local[k])) k = i;
+    n[k] = local[k] >= 0 ? -1 : 1;
+    depth = box.half[k] - std::abs(local[k]) + sphere.radius;
+    nearest[k] = std::copysign(box.half[k], local[k]);
+  } else {
+    const Vec3 d = nearest - local;
+    const double distance = norm(d);
+    depth = sphere.radius - distance;
+    if (depth <= 0) return;
+    n = (1 / distance) * d;
+  }
+  const Vec3 n_W = box.R * n;
+  out.normal = flipped ? -n_W : n_W;
+  out.p[0] = box.p + box.R * nearest;
+  out.depth[0] = depth;
+  out.count = 1;
+}
+
+}  // namespace
+
+void find_contact(const Solid& a, const Solid& b, int& axis, BoxContact& out) {
+  out.count = 0;
+  const bool box_a = a.kind == Shape::Kind::Box, box_b = b.kind == Shape::Kind::Box;
+  if (box_a && box_b) return box_box(a, b, axis, out);
+  if (box_b) return sphere_box(a, b, false, out);
+  if (box_a) return sphere_box(b, a, true, out);
+  const Vec3 d = b.p - a.p;
+  const double distance = norm(d), depth = a.radius + b.radius - distance;
+  if (depth <= 0) return;
+  out.normal = distance > 0 ? (1 / distance) * d : Vec3{0, 0, 1};
+  out.p[0] = a.p + (a.radius - 0.5 * depth) * out.normal;
+  out.depth[0] = depth;
+  out.count = 1;
+}
+
+}  // namespace topple::mbs

@@ -1,0 +1,29 @@
+#pragma once
+/// Where two convex solids touch.
+
+#include "mbs/model.h"
+
+namespace topple::mbs {
+
+/// A box or sphere in W.
+struct Solid {
+  Shape::Kind kind = Shape::Kind::Box;
+  Vec3 p;     // centre
+  Mat3 R;     // axes of a box
+  Vec3 half;  // half edges [m]
+  double radius = 0;
+};
+
+/// Touching points of two solids, at most eight, all with the same normal.
+struct BoxContact {
+  int count = 0;
+  Vec3 normal;      // unit, from the first to the second
+  Vec3 p[8];        // in W, halfway between the surfaces [m]
+  double depth[8];  // > 0 [m]
+};
+
+/// Finds the touching points of two overlapping solids; none when they are apart. `axis` remembers the separating axis
+/// (0 to 14) of the last call and only saves time.
+void find_contact(const Solid& a, const Solid& b, int& axis, BoxContact& out);
+
+}  // namespace topple::mbs

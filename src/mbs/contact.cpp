@@ -1,0 +1,321 @@
+/// Contact with the ground and between bodies (docs/theory/contact.md).
+/// A point's normal force is k δ while bodies approach and e² k δ while they part, so that the impulse of restitution
+/// is e times that of compression (Poisson). Penetration that was there when contact became possible carries no force.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "mbs/boxes.h"
+#include "mbs/system.h"
+
+namespace topple::mbs {
+
+namespace {
+
+constexpr double kSearchMargin = 0.3;    // [m]; shapes nearer than this are watched
+constexpr double kSearchTravel = 0.14;   // [m]; less than half the margin
+constexpr long kSearchPause = 20;        // steps between searches that breaks ask for
+constexpr double kStickStiffness = 0.3;  // of the restituting normal stiffness
+constexpr double kStickDamping = 0.3;    // times mass times contact frequency
+
+/// Share of the full spring rate that acts: 1 while approaching for the whole step, 0 while parting, between them the
+/// part of the step before the approach ends under this force alone.
+double approach_share(double speed, double full_force, double inverse_mass, double h) {
+  if (speed <= 0) return 0;
+  const double after = speed - h * inverse_mass * full_force;
+  return after >= 0 ? 1 : speed / (speed - after);
+}
+
+}  // namespace
+
+void System::find_pairs() {
+  State& s = state;
+  if (s.search_due && s.last_search != 0 && s.step_index - s.last_search < kSearchPause && !s.p_at_search.empty())
+    return;
+  s.search_due = false;
+  s.last_search = std::max(s.step_index, 1L);
+  s.p_at_search = s.p;
+
+  // who holds whom
+  std::vector<std::vector<int>> held(B);
+  std::fill(s.tied_to_ground.begin(), s.tied_to_ground.end(), 0);
+  const auto link = [&](int a, int b) {
+    if (a >= 0 && b >= 0) {
+      held[static_cast<size_t>(a)].push_back(b);
+      held[static_cast<size_t>(b)].push_back(a);
+    }
+    const auto grounded = [&](int x) { return x < 0 || fixed[static_cast<size_t>(x)]; };
+    if (grounded(a) && b >= 0) s.tied_to_ground[static_cast<size_t>(b)] = 1;
+    if (grounded(b) && a >= 0) s.tied_to_ground[static_cast<size_t>(a)] = 1;
+  };
+  for (size_t e = 0; e < elements.size(); ++e)
+    if (s.element[e].live) link(elements[e].a, elements[e].b);
+  for (size_t j = 0; j < joints.size(); ++j)
+    if (s.joint[j].live) link(joints[j].parent, joints[j].child);
+
+  if (model.contact.bodies) {
+    struct Item {
+      Vec3 low, high;
+      int body, shape;
+    };
+    std::vector<Item> items;
+    for (size_t b = 0; b < B; ++b)
+      for (int i = 0; i < s.body[b].shapes; ++i) {
+        const CompiledShape& shape = s.shapes[static_cast<size_t>(s.body[b].first_shape + i)];
+        const Vec3 c = s.p[b] + s.R[b] * shape.p_BS;
+        Vec3 reach{shape.radius, shape.radius, shape.radius};
+        if (shape.kind == Shape::Kind::Box) {
+          const Mat3 R = s.R[b] * shape.R_BS;
+          for (int k = 0; k < 3; ++k)
+            reach[k] =
+                std::abs(R(k, 0)) * shape.half.x + std::abs(R(k, 1)) * shape.half.y + std::abs(R(k, 2)) * shape.half.z;
+        }
+        const Vec3 pad = reach + 0.5 * Vec3{kSearchMargin, kSearchMargin, kSearchMargin};
+        items.push_back({c - pad, c + pad, static_cast<int>(b), i});
+      }
+    // sweep along the axis on which the shapes spread most
+    Vec3 mean, spread;
+    for (const Item& it : items) mean += (0.5 / static_cast<double>(items.size())) * (it.low + it.high);
+    for (const Item& it : items)
+      for (int k = 0; k < 3; ++k) spread[k] += std::pow(0.5 * (it.low[k] + it.high[k]) - mean[k], 2);
+    const int axis = spread.x >= spread.y && spread.x >= spread.z ? 0 : spread.y >= spread.z ? 1 : 2;
+    std::stable_sort(items.begin(), items.end(),
+                     [axis](const Item& x, const Item& y) { return x.low[axis] < y.low[axis]; });
+    std::vector<PairState> found;
+    std::vector<int> mark(B, -1);
+    const auto excluded = [&](int a, int b) {
+      if (fixed[static_cast<size_t>(a)] && fixed[static_cast<size_t>(b)]) return true;
+      // joined, or joined to the same third body: the joint or element between them governs
+      for (const int n : held[static_cast<size_t>(a)]) {
+        if (n == b) return true;
+        for (const int m : held[static_cast<size_t>(n)])
+          if (m == b) return true;
+      }
+      return false;
+    };
+    for (size_t i = 0; i < items.size(); ++i)
+      for (size_t k = i + 1; k < items.size() && items[k].low[axis] <= items[i].high[axis]; ++k) {
+        const Item &x = items[i], &y = items[k];
+        if (x.body == y.body) continue;
+        bool apart = false;
+        for (int c = 0; c < 3; ++c) apart = apart || x.low[c] > y.high[c] || y.low[c] > x.high[c];
+        if (apart || excluded(x.body, y.body)) continue;
+        const bool swap = x.body > y.body;
+        PairState p;
+        p.a = swap ? y.body : x.body;
+        p.b = swap ? x.body : y.body;
+        p.shape_a = swap ? y.shape : x.shape;
+        p.shape_b = swap ? x.shape : y.shape;
+        found.push_back(p);
+      }
+    const auto key = [](const PairState& p) { return std::array<int, 4>{p.a, p.b, p.shape_a, p.shape_b}; };
+    std::sort(found.begin(), found.end(), [&](const PairState& x, const PairState& y) { return key(x) < key(y); });
+    // keep what old pairs remember
+    size_t old = 0;
+    for (PairState& p : found) {
+      while (old < s.pairs.size() && key(s.pairs[old]) < key(p)) ++old;
+      if (old < s.pairs.size() && key(s.pairs[old]) == key(p)) {
+        p = s.pairs[old];
+        s.pairs[old].energy = 0;
+      }
+    }
+    for (const PairState& p : s.pairs) {
+      s.contact_energy -= p.energy;
+      s.contact_loss += p.energy;
+    }
+    s.pairs = std::move(found);
+  }
+}
+
+void System::evaluate_ground_contact(double h) {
+  State& s = state;
+  const Contact& c = model.contact;
+  const double e2 = c.restitution * c.restitution;
+  const Vec3 n = c.normal;
+  for (size_t b = 0; b < B; ++b) {
+    if (fixed[b] || s.body[b].shapes == 0) continue;
+    const BodyConstants& body = s.body[b];
+    const bool possible = !s.tied_to_ground[b];
+    // far above the ground nothing is remembered but that contact is possible
+    const double above = dot(n, s.p[b]) - c.offset - body.radius;
+    if (above > 0.05 && possible) continue;
+    const double stiffness = body.mass * c.contact_frequency * c.contact_frequency;
+    const double stick_stiffness = kStickStiffness * e2 * stiffness;
+    const double stick_damping = kStickDamping * body.mass * c.contact_frequency;
+    for (int i = body.first_shape; i < body.first_shape + body.shapes; ++i) {
+      const CompiledShape& shape = s.shapes[static_cast<size_t>(i)];
+      const bool box = shape.kind == Shape::Kind::Box;
+      const Vec3 centre = s.R[b] * shape.p_BS;
+      const Mat3 R = box ? s.R[b] * shape.R_BS : Mat3{};
+      for (int corner = 0; corner < (box ? 8 : 1); ++corner) {
+        GroundPoint& g = s.ground_points[static_cast<size_t>(shape.first_corner + corner)];
+        const Vec3 r = box ? centre + R * Vec3{corner & 1 ? shape.half.x : -shape.half.x,
+                                               corner & 2 ? shape.half.y : -shape.half.y,
+                                               corner & 4 ? shape.half.z : -shape.half.z}
+                           : centre - shape.radius * n;
+        const double penetration = c.offset - dot(n, s.p[b] + r);
+        if (!possible) {
+          g = {};
+          continue;
+        }
+        if (!g.active) {
+          g.active = true;
+          g.born = std::max(0.0, penetration);
+        }
+        g.born = std::max(0.0, std::min(g.born, penetration));
+        const double depth = penetration - g.born;
+        const Vec3 v = s.v[b] + cross(s.w[b], r);
+        const double approach = -dot(n, v);
+        const Vec3 v_t = v + approach * n;
+        if (depth <= 0) {
+          if (g.touching) {
+            // what the last step left in the springs is lost
+            const double left =
+                0.5 * e2 * stiffness * g.depth * g.depth + 0.5 * stick_stiffness * dot(g.stick, g.stick);
+            s.contact_energy -= left;
+            s.contact_loss += left - 0.5 * g.force * g.depth;
+            g.touching = false;
+            g.stick = g.friction = {};
+            g.depth = g.force = 0;
+          }
+          continue;
+        }
+        const Vec3 lever = transpose_times(s.R[b], cross(r, n));
+        const double inverse_mass = body.inverse_mass + dot(lever, body.inverse_inertia * lever);
+        const double full = stiffness * depth;
+        const double share = approach_share(approach, full, inverse_mass, h);
+        const double f = full * (e2 + (1 - e2) * share);
+
+        const double limit = c.friction * f;
+        Vec3 stick = g.touching ? g.stick + h * v_t : Vec3{};
+        stick -= dot(n, stick) * n;
+        Vec3 ft = -(stick_stiffness * stick + stick_damping * v_t);
+        const double magnitude = norm(ft);
+        if (magnitude > limit) {
+          ft *= limit / magnitude;
+          // the spring follows: it holds what friction can hold
+          stick = stick_stiffness > 0
+                      ? (-1 / stick_stiffness) * (ft + std::min(1.0, limit / magnitude) * stick_damping * v_t)
+                      : Vec3{};
+        }
+        // ledger by the trapezium over the step
+        const double stored_before = 0.5 * e2 * stiffness * g.depth * g.depth;
+        const double stored = 0.5 * e2 * stiffness * depth * depth;
+        const double work = 0.5 * (g.force + f) * (depth - g.depth);
+        s.contact_loss += work - (stored - stored_before);
+        const double stick_before = 0.5 * stick_stiffness * dot(g.stick, g.stick);
+        const double stick_now = 0.5 * stick_stiffness * dot(stick, stick);
+        const double slide_work = -0.5 * h * dot(g.friction + ft, v_t);
+        s.friction += slide_work - (stick_now - stick_before);
+        s.contact_energy += stored - stored_before + stick_now - stick_before;
+
+        g.depth = depth;
+        g.force = f;
+        g.stick = stick;
+        g.friction = ft;
+        if (!g.touching) {
+          g.touching = true;
+          if (!s.touched_ground[b]) {
+            s.touched_ground[b] = 1;
+            say({Happening::Kind::GroundContact, s.time, static_cast<int>(b), -1, {}, std::max(0.0, approach)});
+          }
+        }
+        const Vec3 total = f * n + ft;
+        force[b] += total;
+        torque[b] += cross(r, total);
+        ground_contact += total;
+      }
+    }
+  }
+}
+
+void System::evaluate_body_contact(double h) {
+  State& s = state;
+  const Contact& c = model.contact;
+  const double e2 = c.body_restitution * c.body_restitution;
+  if (s.p_at_search.size() == B) {
+    for (size_t b = 0; b < B && !s.search_due; ++b) {
+      const Vec3 d = s.p[b] - s.p_at_search[b];
+      // rotation moves a shape's far end as well
+      const double turned = norm(s.w[b]) * s.body[b].radius * h * static_cast<double>(s.step_index - s.last_search);
+      if (dot(d, d) > kSearchTravel * kSearchTravel || turned > kSearchTravel) {
+        s.search_due = true;
+        s.last_search = 0;  // not to be put off
+      }
+    }
+  }
+  BoxContact points;
+  for (PairState& pair : s.pairs) {
+    const size_t a = static_cast<size_t>(pair.a), b = static_cast<size_t>(pair.b);
+    const CompiledShape& sa = s.shapes[static_cast<size_t>(s.body[a].first_shape + pair.shape_a)];
+    const CompiledShape& sb = s.shapes[static_cast<size_t>(s.body[b].first_shape + pair.shape_b)];
+    const Vec3 ca = s.p[a] + s.R[a] * sa.p_BS, cb = s.p[b] + s.R[b] * sb.p_BS;
+    const double reach = (sa.kind == Shape::Kind::Box ? norm(sa.half) : sa.radius) +
+                         (sb.kind == Shape::Kind::Box ? norm(sb.half) : sb.radius);
+    points.count = 0;
+    if (dot(cb - ca, cb - ca) < reach * reach) {
+      const Solid A{sa.kind, ca, s.R[a] * sa.R_BS, sa.half, sa.radius},
+          Bb{sb.kind, cb, s.R[b] * sb.R_BS, sb.half, sb.radius};
+      find_contact(A, Bb, pair.axis, points);
+    }
+    double deepest = 0;
+    for (int i = 0; i < points.count; ++i) deepest = std::max(deepest, points.depth[i]);
+    if (!pair.seen) {
+      pair.seen = true;
+      pair.born = deepest;
+    }
+    pair.born = std::min(pair.born, deepest);
+    double stored = 0;
+    bool touching = false;
+    if (points.count > 0 && deepest > pair.born) {
+      const double wa = s.body[a].inverse_mass, wb = s.body[b].inverse_mass;
+      const double reduced = 1 / (wa + wb);
+      const double stiffness = 0.5 * reduced * c.contact_frequency * c.contact_frequency;
+      const Vec3 n = points.normal;  // from a to b
+      for (int i = 0; i < points.count; ++i) {
+        const double depth = points.depth[i] - pair.born;
+        if (depth <= 0) continue;
+        const Vec3 ra = points.p[i] - s.p[a], rb = points.p[i] - s.p[b];
+        const Vec3 v = s.v[a] + cross(s.w[a], ra) - s.v[b] - cross(s.w[b], rb);  // of a against b
+        const double approach = dot(n, v);
+        const Vec3 v_t = v - approach * n;
+        const Vec3 la = transpose_times(s.R[a], cross(ra, n)), lb = transpose_times(s.R[b], cross(rb, n));
+        const double inverse_mass =
+            wa + wb + dot(la, s.body[a].inverse_inertia * la) + dot(lb, s.body[b].inverse_inertia * lb);
+        const double full = stiffness * depth;
+        const double f = full * (e2 + (1 - e2) * approach_share(approach, full, inverse_mass, h));
+        // Coulomb friction, viscous below the speed at which the limit is reached
+        const double speed = norm(v_t), viscous = 0.5 * reduced * c.contact_frequency;
+        const double ft = std::min(c.body_friction * f, viscous * speed);
+        const Vec3 total = -f * n - (speed > 0 ? ft / speed : 0.0) * v_t;  // on a
+        force[a] += total;
+        torque[a] += cross(ra, total);
+        force[b] -= total;
+        torque[b] -= cross(rb, total);
+        if (fixed[a]) ground_contact -= total;
+        if (fixed[b]) ground_contact += total;
+        s.contact_loss += f * (approach - 0.5 * h * inverse_mass * f) * h;
+        s.friction += ft * speed * h;
+        stored += 0.5 * e2 * stiffness * depth * depth;
+        touching = true;
+        ++body_contacts;
+        if (!pair.touching) {
+          const long number = static_cast<long>(pair.a) * static_cast<long>(B) + pair.b;
+          const auto at = std::lower_bound(s.touched_pairs.begin(), s.touched_pairs.end(), number);
+          if (at == s.touched_pairs.end() || *at != number) {
+            s.touched_pairs.insert(at, number);
+            say({Happening::Kind::BodyContact, s.time, pair.a, pair.b, {}, std::max(0.0, approach)});
+          }
+          pair.touching = true;
+        }
+      }
+    }
+    s.contact_loss -= stored - pair.energy;
+    s.contact_energy += stored - pair.energy;
+    pair.energy = stored;
+    pair.touching = touching;
+  }
+}
+
+}  // namespace topple::mbs

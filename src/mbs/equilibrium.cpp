@@ -1,0 +1,365 @@
+/// Dead-load equilibrium by Newton's method with the elastic stiffness, joints by the augmented Lagrangian; and the
+/// stiffest mode by power iteration (docs/theory/multibody.md, eq. 8 to 10). The one place of the module that sees
+/// sparse matrices.
+
+#include <Eigen/Sparse>
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "mbs/system.h"
+
+namespace topple::mbs {
+
+namespace {
+
+using Sparse = Eigen::SparseMatrix<double>;
+using Triplets = std::vector<Eigen::Triplet<double>>;
+using Vector = Eigen::VectorXd;
+
+/// A row of a kinematic matrix: how fast one deformation grows with the velocities of two bodies.
+struct KinematicRow {
+  int a = -1, b = -1;  // place among the free bodies, -1 for held ones
+  Vec3 va, wa, vb, wb;
+};
+
+void add_outer(const KinematicRow& r, double k, Triplets& out) {
+  if (k == 0) return;
+  const int body[2] = {r.a, r.b};
+  const Vec3 part[2][2] = {{r.va, r.wa}, {r.vb, r.wb}};
+  for (int i = 0; i < 2; ++i)
+    for (int j = 0; j < 2; ++j) {
+      if (body[i] < 0 || body[j] < 0) continue;
+      for (int m = 0; m < 6; ++m)
+        for (int n = 0; n < 6; ++n) {
+          const double value = k * part[i][m / 3][m % 3] * part[j][n / 3][n % 3];
+          if (value != 0) out.emplace_back(6 * body[i] + m, 6 * body[j] + n, value);
+        }
+    }
+}
+
+}  // namespace
+
+/// Assembles what both solvers below need.
+class Assembly {
+ public:
+  explicit Assembly(const System& s) : s_(s), place_(s.B, -1) {
+    for (size_t b = 0; b < s.B; ++b)
+      if (!s.fixed[b]) {
+        place_[b] = static_cast<int>(free_.size());
+        free_.push_back(static_cast<int>(b));
+      }
+  }
+  int unknowns() const { return 6 * static_cast<int>(free_.size()); }
+  const std::vector<int>& free_bodies() const { return free_; }
+  int place(int body) const { return body < 0 ? -1 : place_[static_cast<size_t>(body)]; }
+
+  /// Six rows of an element at its marker M, in the axes of F.
+  void element_rows(const CompiledElement& e, KinematicRow rows[6]) const {
+    const Mat3 F = to_matrix(s_.pose_of(e.a).q * e.q_AF);
+    const Vec3 p_M = point(e.b, e.p_BM);
+    for (int i = 0; i < 6; ++i) {
+      const Vec3 axis = F.column(i % 3);
+      KinematicRow r{place(e.a), place(e.b), {}, -axis, {}, axis};
+      if (i < 3) {
+        r.va = -axis;
+        r.vb = axis;
+        r.wa = -cross(p_M - centre(e.a), axis);
+        r.wb = cross(p_M - centre(e.b), axis);
+      }
+      rows[i] = r;
+    }
+  }
+  /// Constraint rows of a joint, and how far each is from closed.
+  int joint_rows(const CompiledJoint& j, KinematicRow rows[6], double gap[6]) const {
+    const Mat3 F = to_matrix(s_.pose_of(j.parent).q * j.q_PF), M = to_matrix(s_.pose_of(j.child).q * j.q_CM);
+    const Vec3 p_F = point(j.parent, j.p_PF), p_M = point(j.child, j.p_CM);
+    for (int i = 0; i < 3; ++i) {
+      Vec3 e;
+      e[i] = 1;
+      rows[i] = {
+          place(j.parent), place(j.child), -e, -cross(p_F - centre(j.parent), e), e, cross(p_M - centre(j.child), e)};
+      gap[i] = (p_M - p_F)[i];
+    }
+    for (int i = 3; i < j.rows; ++i) {
+      Vec3 axis;
+      if (j.kind == Joint::Kind::Fixed) {
+        axis[i - 3] = 1;
+        const Vec3 r =
+            0.5 * (cross(F.column(0), M.column(0)) + cross(F.column(1), M.column(1)) + cross(F.column(2), M.column(2)));
+        gap[i] = r[i - 3];
+      } else {
+        axis = cross(M.column(2), F.column(i - 3));
+        gap[i] = dot(M.column(2), F.column(i - 3));
+      }
+      rows[i] = {place(j.parent), place(j.child), {}, -axis, {}, axis};
+    }
+    return j.rows;
+  }
+  KinematicRow rotational_row(const CompiledJoint& j) const {
+    const Vec3 axis = to_matrix(s_.pose_of(j.parent).q * j.q_PF).column(2);
+    return {place(j.parent), place(j.child), {}, -axis, {}, axis};
+  }
+  KinematicRow cable_row(const Cable& c) const {
+    const Vec3 p_A = point(c.a.index, c.p_A), p_B = point(c.b.index, c.p_B);
+    const Vec3 d = (1 / norm(p_B - p_A)) * (p_B - p_A);
+    return {place(c.a.index),
+            place(c.b.index),
+            -d,
+            -cross(p_A - centre(c.a.index), d),
+            d,
+            cross(p_B - centre(c.b.index), d)};
+  }
+  /// Stiffness (which = 0) or damping (1) of all live elements.
+  Sparse make_matrix(int which) const {
+    Triplets t;
+    t.reserve(144 * 6 * s_.elements.size());
+    for (size_t i = 0; i < s_.elements.size(); ++i) {
+      if (!s_.state.element[i].live) continue;
+      const CompiledElement& e = s_.elements[i];
+      KinematicRow rows[6];
+      element_rows(e, rows);
+      for (int k = 0; k < 6; ++k) add_outer(rows[k], which == 0 ? e.zone.stiffness[k] : e.zone.damping[k], t);
+    }
+    for (const CompiledRotational& r : s_.rotationals)
+      add_outer(rotational_row(s_.joints[static_cast<size_t>(r.joint)]),
+                which == 0 ? r.zone.stiffness[5] : r.zone.damping[5], t);
+    if (which == 0)
+      for (size_t i = 0; i < s_.model.cables.size(); ++i)
+        if (s_.state.cable[i].live) add_outer(cable_row(s_.model.cables[i]), s_.model.cables[i].stiffness, t);
+    Sparse m(unknowns(), unknowns());
+    m.setFromTriplets(t.begin(), t.end());
+    return m;
+  }
+
+ private:
+  Vec3 centre(int body) const { return body < 0 ? Vec3{} : s_.state.p[static_cast<size_t>(body)]; }
+  Vec3 point(int body, const Vec3& p) const {
+    if (body < 0) return p;
+    const size_t b = static_cast<size_t>(body);
+    return s_.state.p[b] + s_.state.R[b] * (p - s_.state.p_offset[b]);
+  }
+  const System& s_;
+  std::vector<int> place_, free_;
+};
+
+void System::choose_step() {
+  const Assembly assembly(*this);
+  const int n = assembly.unknowns();
+  // the lightest a body ever gets counts
+  std::vector<double> inverse_mass(B, 0);
+  std::vector<Mat3> inverse_inertia(B);
+  for (const int b : assembly.free_bodies()) {
+    inverse_mass[static_cast<size_t>(b)] = state.body[static_cast<size_t>(b)].inverse_mass;
+    inverse_inertia[static_cast<size_t>(b)] = calc_world_inverse_inertia(static_cast<size_t>(b));
+  }
+  for (const Event& event : model.events)
+    for (const Action& a : event.actions)
+      if (a.kind == Action::Kind::ReplaceBody) {
+        const size_t b = static_cast<size_t>(a.body.index);
+        if (fixed[b] || 1 / a.replacement.mass < inverse_mass[b]) continue;
+        inverse_mass[b] = 1 / a.replacement.mass;
+        inverse_inertia[b] = state.R[b] * inverse(a.replacement.inertia) * transpose(state.R[b]);
+      }
+  const auto accelerate = [&](const Vector& f) {
+    Vector a(n);
+    for (size_t i = 0; i < assembly.free_bodies().size(); ++i) {
+      const size_t b = static_cast<size_t>(assembly.free_bodies()[i]);
+      const Eigen::Index at = static_cast<Eigen::Index>(6 * i);
+      for (int k = 0; k < 3; ++k) a[at + k] = inverse_mass[b] * f[at + k];
+      const Vec3 w = inverse_inertia[b] * Vec3{f[at + 3], f[at + 4], f[at + 5]};
+      for (int k = 0; k < 3; ++k) a[at + 3 + k] = w[k];
+    }
+    return a;
+  };
+  double elastic = 0, damping_ratio = 0;
+  if (n > 0) {
+    const Sparse K = assembly.make_matrix(0);
+    Vector x(n);
+    // a start that no mode is orthogonal to by symmetry
+    std::uint64_t seed = 88172645463325252ULL;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      seed ^= seed << 13, seed ^= seed >> 7, seed ^= seed << 17;
+      x[i] = static_cast<double>(seed >> 11) * 0x1p-53 - 0.5;
+    }
+    // Rayleigh quotient x K M⁻¹ K x / x K x, which only grows
+    double before = 0;
+    for (int round = 0; round < 2000; ++round) {
+      const Vector f = K * x;
+      const Vector a = accelerate(f);
+      const double xKx = x.dot(f);
+      if (!(xKx > 0)) break;
+      const double omega2 = a.dot(f) / xKx;
+      elastic = std::sqrt(omega2);
+      x = a / a.norm();
+      if (round > 20 && std::abs(omega2 - before) < 1e-6 * omega2) break;
+      before = omega2;
+    }
+    if (elastic > 0) {
+      const Sparse C = assembly.make_matrix(1);
+      const double xCx = x.dot(C * x), xKx = x.dot(K * x);
+      damping_ratio = xKx > 0 ? 0.5 * elastic * xCx / xKx : 0;
+    }
+  }
+  highest_frequency = 1.01 * elastic;  // the iteration stops a little below
+  const bool contact = model.contact.ground || model.contact.bodies;
+  // a corner of a compact box is about seven times lighter than its body
+  const double touching = contact ? std::sqrt(7.0) * model.contact.contact_frequency : 0;
+  const double fastest = std::sqrt(highest_frequency * highest_frequency + touching * touching);
+  const double limit = fastest > 0 ? 2 / fastest * (std::sqrt(1 + damping_ratio * damping_ratio) - damping_ratio)
+                                   : 1e-3 / options.step_safety;
+  step = options.step > 0 ? options.step : options.step_safety * limit;
+  summary.step = step;
+  summary.highest_frequency = highest_frequency;
+}
+
+bool System::find_equilibrium(std::string& message) {
+  const Assembly assembly(*this);
+  const int n = assembly.unknowns();
+  if (n == 0) return true;
+  const auto saved_report = std::exchange(options.on_happening, nullptr);
+  const auto finish = [&](bool good) {
+    options.on_happening = saved_report;
+    return good;
+  };
+
+  // everything must hang on the ground
+  std::vector<int> root(B + 1);
+  for (size_t i = 0; i <= B; ++i) root[i] = static_cast<int>(i);
+  const auto find = [&](int x) {
+    while (root[static_cast<size_t>(x)] != x)
+      x = root[static_cast<size_t>(x)] = root[static_cast<size_t>(root[static_cast<size_t>(x)])];
+    return x;
+  };
+  const auto node = [&](int b) { return b < 0 || fixed[static_cast<size_t>(b)] ? static_cast<int>(B) : b; };
+  const auto join = [&](int a, int b) { root[static_cast<size_t>(find(node(a)))] = find(node(b)); };
+  for (const CompiledElement& e : elements) join(e.a, e.b);
+  for (const CompiledJoint& j : joints) join(j.parent, j.child);
+  for (const int b : assembly.free_bodies())
+    if (find(b) != find(static_cast<int>(B))) {
+      message = "body \"" + model.bodies[static_cast<size_t>(b)].name +
+                "\" is not connected to the ground by any element or joint: there is no dead-load equilibrium";
+      return finish(false);
+    }
+
+  double weight = 0;
+  for (const int b : assembly.free_bodies()) weight += state.body[static_cast<size_t>(b)].mass * norm(model.gravity);
+  if (weight == 0) weight = 1;
+
+  Sparse K = assembly.make_matrix(0);
+  double largest = 0;
+  for (Eigen::Index i = 0; i < n; ++i) largest = std::max(largest, K.coeff(i, i));
+  const double penalty = 30 * std::max(largest, 1.0);
+  {
+    Triplets t;
+    for (const CompiledJoint& j : joints) {
+      KinematicRow rows[6];
+      double gap[6];
+      const int count = assembly.joint_rows(j, rows, gap);
+      for (int i = 0; i < count; ++i) add_outer(rows[i], penalty, t);
+    }
+    Sparse P(n, n);
+    P.setFromTriplets(t.begin(), t.end());
+    K += P;
+  }
+  Eigen::SimplicialLDLT<Sparse> solver(K);
+  if (solver.info() != Eigen::Success) {
+    message = "the stiffness matrix of the dead-load equilibrium could not be factorised: the model is a mechanism";
+    return finish(false);
+  }
+  {
+    const Vector D = solver.vectorD();
+    Eigen::Index worst = 0;
+    const double least = D.minCoeff(&worst);
+    if (!(least > 1e-12 * D.maxCoeff())) {
+      const Eigen::Index unknown = solver.permutationPinv().indices()[worst];
+      message = "body \"" +
+                model.bodies[static_cast<size_t>(assembly.free_bodies()[static_cast<size_t>(unknown / 6)])].name +
+                "\" can move without resistance: the model is a mechanism and has no dead-load equilibrium";
+      return finish(false);
+    }
+  }
+
+  const std::vector<ZoneState> virgin = state.element, virgin_rotational = state.rotational;
+  std::vector<std::array<double, 6>> multiplier(joints.size(), std::array<double, 6>{});
+  double unbalanced = 0, gap_left = 0;
+  constexpr int most = 400;
+  for (int round = 0; round <= most; ++round) {
+    state.element = virgin;
+    state.rotational = virgin_rotational;
+    ground_reaction = {};
+    evaluate_elements(0);
+    evaluate_rotationals(0);
+    evaluate_cables();
+    Vector r(n);
+    for (size_t i = 0; i < assembly.free_bodies().size(); ++i) {
+      const size_t b = static_cast<size_t>(assembly.free_bodies()[i]);
+      const Vec3 f = force[b] + state.body[b].mass * model.gravity;
+      for (int k = 0; k < 3; ++k) {
+        r[static_cast<Eigen::Index>(6 * i) + k] = f[k];
+        r[static_cast<Eigen::Index>(6 * i) + 3 + k] = torque[b][k];
+      }
+    }
+    Vector penalised = r;
+    gap_left = 0;
+    for (size_t j = 0; j < joints.size(); ++j) {
+      KinematicRow rows[6];
+      double gap[6];
+      const int count = assembly.joint_rows(joints[j], rows, gap);
+      JointState& js = state.joint[j];
+      js.force = js.moment = {};
+      for (int i = 0; i < count; ++i) {
+        const KinematicRow& row = rows[i];
+        const double held = multiplier[j][static_cast<size_t>(i)], wanted = held - penalty * gap[i];
+        gap_left = std::max(gap_left, std::abs(gap[i]));
+        const auto load = [&](Vector& on, double f) {
+          for (int k = 0; k < 3; ++k) {
+            if (row.a >= 0) on[6 * row.a + k] += f * row.va[k], on[6 * row.a + 3 + k] += f * row.wa[k];
+            if (row.b >= 0) on[6 * row.b + k] += f * row.vb[k], on[6 * row.b + 3 + k] += f * row.wb[k];
+          }
+        };
+        load(r, wanted);
+        load(penalised, wanted);
+        multiplier[j][static_cast<size_t>(i)] = wanted;
+        js.force += wanted * row.vb;
+        if (i >= 3) js.moment += wanted * row.wb;
+      }
+    }
+    unbalanced = r.lpNorm<Eigen::Infinity>() / weight;
+    summary.equilibrium_iterations = round;
+    summary.equilibrium_residual = unbalanced;
+    if (!std::isfinite(unbalanced)) break;
+    if (unbalanced < 1e-11 && gap_left < 1e-11) break;
+    if (round == most) break;
+    const Vector d = solver.solve(penalised);
+    for (size_t i = 0; i < assembly.free_bodies().size(); ++i) {
+      const size_t b = static_cast<size_t>(assembly.free_bodies()[i]);
+      const Eigen::Index at = static_cast<Eigen::Index>(6 * i);
+      state.p[b] += Vec3{d[at], d[at + 1], d[at + 2]};
+      state.q[b] = normalized(exp_rotation({d[at + 3], d[at + 4], d[at + 5]}) * state.q[b]);
+      state.R[b] = to_matrix(state.q[b]);
+    }
+  }
+  if (!(unbalanced < 1e-8)) {
+    // name the most loaded element: it says where the capacity ends
+    size_t worst = 0;
+    double highest = -1;
+    for (size_t i = 0; i < elements.size(); ++i) {
+      const double u = state.element[i].live ? calc_utilisation(elements[i].zone, laws, 0, state.element[i]) : 1e9;
+      if (u > highest) highest = u, worst = i;
+    }
+    message =
+        "no dead-load equilibrium after " + std::to_string(summary.equilibrium_iterations) +
+        " iterations: the largest unbalanced force is " + std::to_string(unbalanced) + " of the weight" +
+        (elements.empty() ? std::string() : ", the most loaded element is \"" + model.elements[worst].name + "\"");
+    return finish(false);
+  }
+  for (auto* list : {&state.element, &state.rotational})
+    for (ZoneState& z : *list) z.plastic = z.damping = 0;
+  for (size_t b = 0; b < B; ++b) state.v[b] = state.w[b] = state.L[b] = {};
+  return finish(true);
+}
+
+}  // namespace topple::mbs

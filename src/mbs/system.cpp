@@ -1,0 +1,603 @@
+#include "mbs/system.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace topple::mbs {
+
+namespace {
+
+Mat3 world_tensor(const Mat3& R, const Mat3& in_body) { return R * in_body * transpose(R); }
+
+/// Reach of a body's shapes from its centre.
+double calc_radius(const std::vector<CompiledShape>& shapes, int first, int count) {
+  double r = 0;
+  for (int i = first; i < first + count; ++i) {
+    const CompiledShape& s = shapes[static_cast<size_t>(i)];
+    r = std::max(r, norm(s.p_BS) + (s.kind == Shape::Kind::Box ? norm(s.half) : s.radius));
+  }
+  return r;
+}
+
+BodyConstants constants_of(const Body& body) {
+  BodyConstants c;
+  c.mass = body.mass;
+  c.inertia = body.inertia;
+  if (!body.fixed) {
+    c.inverse_mass = 1 / body.mass;
+    c.inverse_inertia = inverse(body.inertia);
+  }
+  return c;
+}
+
+/// Appends a body's shapes in its frame.
+void append_shapes(const Body& body, BodyConstants& c, std::vector<CompiledShape>& shapes) {
+  c.first_shape = static_cast<int>(shapes.size());
+  c.shapes = static_cast<int>(body.shapes.size());
+  for (const Shape& s : body.shapes) shapes.push_back({s.kind, s.X_BS.p, to_matrix(s.X_BS.q), s.half, s.radius, 0});
+  c.radius = calc_radius(shapes, c.first_shape, c.shapes);
+}
+
+}  // namespace
+
+System::System(const Model& m, const Options& o) : model(m), options(o) {
+  check_model(model);
+  compile();
+  choose_step();
+}
+
+void System::compile() {
+  B = model.bodies.size();
+  State& s = state;
+  s = {};
+  s.body.resize(B);
+  s.p.resize(B);
+  s.v.resize(B);
+  s.L.resize(B);
+  s.w.resize(B);
+  s.q.resize(B);
+  s.R.resize(B);
+  s.p_offset.assign(B, {});
+  s.touched_ground.assign(B, 0);
+  s.tied_to_ground.assign(B, 0);
+  fixed.resize(B);
+  for (size_t b = 0; b < B; ++b) {
+    const Body& body = model.bodies[b];
+    s.body[b] = constants_of(body);
+    append_shapes(body, s.body[b], s.shapes);
+    fixed[b] = body.fixed;
+    s.p[b] = body.X_WB.p;
+    s.q[b] = normalized(body.X_WB.q);
+    s.R[b] = to_matrix(s.q[b]);
+    if (!body.fixed) {
+      s.v[b] = body.v_WB;
+      s.w[b] = body.w_WB;
+      s.L[b] = world_tensor(s.R[b], body.inertia) * body.w_WB;
+    }
+  }
+  layout_shapes();
+
+  for (const ZoneLaw& law : model.laws) laws.push_back(compile_law(law));
+
+  const auto inverse_mass = [&](int b) { return b < 0 ? 0.0 : s.body[static_cast<size_t>(b)].inverse_mass; };
+  const auto world_inverse_inertia = [&](int b) {
+    return b < 0 ? Mat3{} : calc_world_inverse_inertia(static_cast<size_t>(b));
+  };
+  for (const ZoneElement& e : model.elements) {
+    CompiledElement c;
+    c.a = e.a.index;
+    c.b = e.b.index;
+    c.p_AF = e.X_AF.p;
+    c.p_BM = e.X_BM.p;
+    c.q_AF = normalized(e.X_AF.q);
+    c.q_BM = normalized(e.X_BM.q);
+    for (int i = 0; i < 3; ++i) {
+      c.zone.stiffness[i] = e.translational_stiffness[i];
+      c.zone.stiffness[3 + i] = e.rotational_stiffness[i];
+    }
+    // the element's own fastest mode, each component alone
+    const Mat3 R_WF = to_matrix(pose_of(c.a).q * c.q_AF);
+    const Vec3 p_WM = pose_of(c.b) * c.p_BM;
+    double fastest = 0;
+    for (int i = 0; i < 6; ++i) {
+      const Vec3 axis = R_WF.column(i % 3);
+      double w = 0;
+      for (const int b : {c.a, c.b}) {
+        if (b < 0) continue;
+        const Vec3 lever = i < 3 ? cross(p_WM - s.p[static_cast<size_t>(b)], axis) : axis;
+        w += (i < 3 ? inverse_mass(b) : 0) + dot(lever, world_inverse_inertia(b) * lever);
+      }
+      fastest = std::max(fastest, std::sqrt(c.zone.stiffness[i] * w));
+    }
+    for (int i = 0; i < 6; ++i)
+      c.zone.damping[i] = fastest > 0 ? 2 * e.damping_ratio * c.zone.stiffness[i] / fastest : 0;
+    c.zone.stations = static_cast<int>(e.stations.size());
+    for (int i = 0; i < c.zone.stations; ++i) {
+      c.zone.x[i] = e.stations[static_cast<size_t>(i)].x;
+      c.zone.law[i] = e.stations[static_cast<size_t>(i)].law.index;
+    }
+    elements.push_back(c);
+  }
+  s.element.resize(elements.size());
+
+  for (const Joint& j : model.joints) {
+    CompiledJoint c;
+    c.kind = j.kind;
+    c.parent = j.parent.index;
+    c.child = j.child.index;
+    c.p_PF = j.X_PF.p;
+    c.p_CM = j.X_CM.p;
+    c.q_PF = normalized(j.X_PF.q);
+    c.q_CM = normalized(j.X_CM.q);
+    c.rows = j.kind == Joint::Kind::Fixed ? 6 : 5;
+    c.tension_limit = j.tension_limit;
+    c.shear_limit = j.shear_limit;
+    c.moment_limit = j.moment_limit;
+    c.rotation_limit = j.rotation_limit;
+    joints.push_back(c);
+  }
+  s.joint.resize(joints.size());
+  for (size_t j = 0; j < joints.size(); ++j)
+    if (joints[j].kind == Joint::Kind::Revolute) s.joint[j].angle = calc_angle(joints[j], 0);
+
+  for (const RotationalElement& r : model.rotational_elements) {
+    CompiledRotational c;
+    c.joint = r.joint.index;
+    CompiledJoint& j = joints[static_cast<size_t>(c.joint)];
+    j.rotational = static_cast<int>(rotationals.size());
+    for (int i = 0; i < 6; ++i) c.zone.stiffness[i] = c.zone.damping[i] = 0;
+    c.zone.stiffness[5] = r.stiffness;
+    c.zone.external_axial = true;
+    const Vec3 axis = to_matrix(pose_of(j.parent).q * j.q_PF).column(2);
+    double w = 0;
+    for (const int b : {j.parent, j.child}) w += dot(axis, world_inverse_inertia(b) * axis);
+    const double fastest = std::sqrt(r.stiffness * w);
+    c.zone.damping[5] = fastest > 0 ? 2 * r.damping_ratio * r.stiffness / fastest : 0;
+    if (r.law.is_valid()) {
+      c.zone.stations = 1;
+      c.zone.law[0] = r.law.index;
+    }
+    rotationals.push_back(c);
+  }
+  s.rotational.resize(rotationals.size());
+
+  s.cable.resize(model.cables.size());
+  for (size_t i = 0; i < model.cables.size(); ++i) {
+    const Cable& c = model.cables[i];
+    const double length = norm(pose_of(c.b.index) * c.p_B - pose_of(c.a.index) * c.p_A);
+    s.cable[i].rest_length = length - c.pretension / c.stiffness;
+    s.cable[i].live = true;
+  }
+
+  event_order.resize(model.events.size());
+  for (size_t i = 0; i < event_order.size(); ++i) event_order[i] = i;
+  std::stable_sort(event_order.begin(), event_order.end(),
+                   [&](size_t a, size_t b) { return model.events[a].time < model.events[b].time; });
+
+  incidence.assign(B, {});
+  for (size_t e = 0; e < elements.size(); ++e) {
+    if (elements[e].a >= 0) incidence[static_cast<size_t>(elements[e].a)].push_back(static_cast<int>(2 * e));
+    if (elements[e].b >= 0) incidence[static_cast<size_t>(elements[e].b)].push_back(static_cast<int>(2 * e + 1));
+  }
+  element_force.assign(elements.size(), {});
+  force.assign(B, {});
+  torque.assign(B, {});
+  s.gravity_at_start = calc_energy().gravity;
+}
+
+void System::layout_shapes() {
+  int corner = 0;
+  for (CompiledShape& shape : state.shapes) {
+    shape.first_corner = corner;
+    corner += shape.kind == Shape::Kind::Box ? 8 : 1;
+  }
+  state.ground_points.resize(static_cast<size_t>(corner));
+}
+
+Mat3 System::calc_world_inverse_inertia(size_t b) const {
+  return world_tensor(state.R[b], state.body[b].inverse_inertia);
+}
+
+double System::calc_angle(const CompiledJoint& j, double previous) const {
+  const Mat3 F = to_matrix(pose_of(j.parent).q * j.q_PF), M = to_matrix(pose_of(j.child).q * j.q_CM);
+  const double angle = std::atan2(dot(M.column(0), F.column(1)), dot(M.column(0), F.column(0)));
+  constexpr double turn = 2 * 3.14159265358979323846;
+  return angle + turn * std::round((previous - angle) / turn);
+}
+
+Six System::calc_deformation(const CompiledElement& e) const {
+  Vec3 p_F = e.p_AF, p_M = e.p_BM;
+  Quat q_F = e.q_AF, q_M = e.q_BM;
+  if (e.a >= 0) {
+    const size_t a = static_cast<size_t>(e.a);
+    p_F = state.p[a] + state.R[a] * (e.p_AF - state.p_offset[a]);
+    q_F = state.q[a] * e.q_AF;
+  }
+  if (e.b >= 0) {
+    const size_t b = static_cast<size_t>(e.b);
+    p_M = state.p[b] + state.R[b] * (e.p_BM - state.p_offset[b]);
+    q_M = state.q[b] * e.q_BM;
+  }
+  const Vec3 u = transpose_times(to_matrix(q_F), p_M - p_F);
+  const Vec3 r = log_rotation(conjugate(q_F) * q_M);
+  return {{u.x, u.y, u.z, r.x, r.y, r.z}};
+}
+
+void System::evaluate_elements(double h) {
+  for (size_t i = 0; i < elements.size(); ++i) {
+    ZoneState& z = state.element[i];
+    ElementForce& out = element_force[i];
+    if (!z.live) {
+      out = {};
+      continue;
+    }
+    const CompiledElement& e = elements[i];
+    Vec3 p_F = e.p_AF, p_M = e.p_BM, origin_a, origin_b;
+    Quat q_F = e.q_AF, q_M = e.q_BM;
+    if (e.a >= 0) {
+      const size_t a = static_cast<size_t>(e.a);
+      origin_a = state.p[a];
+      p_F = origin_a + state.R[a] * (e.p_AF - state.p_offset[a]);
+      q_F = state.q[a] * e.q_AF;
+    }
+    if (e.b >= 0) {
+      const size_t b = static_cast<size_t>(e.b);
+      origin_b = state.p[b];
+      p_M = origin_b + state.R[b] * (e.p_BM - state.p_offset[b]);
+      q_M = state.q[b] * e.q_BM;
+    }
+    const Mat3 R_WF = to_matrix(q_F);
+    const Vec3 u = transpose_times(R_WF, p_M - p_F);
+    const Vec3 r = log_rotation(conjugate(q_F) * q_M);
+    const bool was_yielded = z.yielded;
+    advance_zone(e.zone, laws, {{u.x, u.y, u.z, r.x, r.y, r.z}}, state.time, h, z);
+    const double* f = z.resultant.c;
+    // torque conjugate to the rate of the rotation vector (docs/theory/multibody.md, eq. 4)
+    const Vec3 m{f[3], f[4], f[5]};
+    const double angle2 = dot(r, r);
+    const double kappa =
+        angle2 < 1e-3
+            ? 1.0 / 12 + angle2 / 720 + angle2 * angle2 / 30240
+            : (1 / angle2 - (1 + std::cos(std::sqrt(angle2))) / (2 * std::sqrt(angle2) * std::sin(std::sqrt(angle2))));
+    const Vec3 rm = cross(r, m);
+    const Vec3 t_W = R_WF * (m + 0.5 * rm + kappa * cross(r, rm));
+    const Vec3 f_W = R_WF * Vec3{f[0], f[1], f[2]};
+    out.force = -f_W;
+    out.torque_b = -(cross(p_M - origin_b, f_W) + t_W);
+    out.torque_a = cross(p_M - origin_a, f_W) + t_W;
+    if (z.yielded && !was_yielded) say({Happening::Kind::ElementYielded, state.time, static_cast<int>(i), -1, {}, 0});
+    if (!z.live) {
+      out = {};
+      break_element(i, z.reason);
+    }
+  }
+  for (size_t b = 0; b < B; ++b) {
+    Vec3 f, t;
+    for (const int entry : incidence[b]) {
+      const ElementForce& e = element_force[static_cast<size_t>(entry / 2)];
+      if (entry % 2 == 0) {
+        f -= e.force;
+        t += e.torque_a;
+      } else {
+        f += e.force;
+        t += e.torque_b;
+      }
+    }
+    force[b] = f;
+    torque[b] = t;
+  }
+  for (size_t i = 0; i < elements.size(); ++i) {
+    const CompiledElement& e = elements[i];
+    const auto grounded = [&](int b) { return b < 0 || fixed[static_cast<size_t>(b)]; };
+    if (grounded(e.a)) ground_reaction += element_force[i].force;
+    if (grounded(e.b)) ground_reaction -= element_force[i].force;
+  }
+}
+
+void System::break_element(size_t e, BreakReason reason) {
+  static const char* const words[] = {"", "tension", "crushing", "shear", "rotation", "torsion", "removed"};
+  mark_search_due();
+  say({Happening::Kind::ElementBroken, state.time, static_cast<int>(e), -1, words[static_cast<int>(reason)], 0});
+}
+
+void System::evaluate_rotationals(double h) {
+  for (size_t i = 0; i < rotationals.size(); ++i) {
+    ZoneState& z = state.rotational[i];
+    if (!z.live) continue;
+    const CompiledRotational& c = rotationals[i];
+    const CompiledJoint& j = joints[static_cast<size_t>(c.joint)];
+    JointState& js = state.joint[static_cast<size_t>(c.joint)];
+    const Mat3 F = to_matrix(pose_of(j.parent).q * j.q_PF);
+    const Vec3 axis = F.column(2);
+    js.angle = calc_angle(j, js.angle);
+    const bool was_yielded = z.yielded;
+    Six d;
+    d.c[0] = -dot(F.column(0), js.force);
+    d.c[5] = js.angle;
+    advance_zone(c.zone, laws, d, state.time, h, z);
+    if (z.yielded && !was_yielded)
+      say({Happening::Kind::ElementYielded, state.time, static_cast<int>(elements.size() + i), -1, {}, 0});
+    if (!z.live) {
+      break_element(elements.size() + i, z.reason);
+      continue;
+    }
+    const Vec3 t = z.resultant.c[5] * axis;
+    if (j.child >= 0) torque[static_cast<size_t>(j.child)] -= t;
+    if (j.parent >= 0) torque[static_cast<size_t>(j.parent)] += t;
+  }
+}
+
+void System::evaluate_cables() {
+  for (size_t i = 0; i < model.cables.size(); ++i) {
+    CableState& c = state.cable[i];
+    if (!c.live) continue;
+    const Cable& k = model.cables[i];
+    const auto point = [&](BodyId id, const Vec3& p) {
+      if (id == kGround) return p;
+      const size_t b = static_cast<size_t>(id.index);
+      return state.p[b] + state.R[b] * (p - state.p_offset[b]);
+    };
+    const Vec3 p_A = point(k.a, k.p_A), p_B = point(k.b, k.p_B), d = p_B - p_A;
+    const double length = norm(d), stretch = length - c.rest_length;
+    c.force = stretch > 0 ? k.stiffness * stretch : 0;
+    c.energy = stretch > 0 ? 0.5 * c.force * stretch : 0;
+    if (c.force > k.strength) {
+      c.plastic += c.energy;
+      c.force = c.energy = 0;
+      c.live = false;
+      say({Happening::Kind::CableBroken, state.time, static_cast<int>(i), -1, "tension", 0});
+      continue;
+    }
+    if (c.force == 0) continue;
+    const Vec3 f = (c.force / length) * d;  // on a
+    const auto load = [&](BodyId id, const Vec3& p, const Vec3& on) {
+      if (id == kGround || fixed[static_cast<size_t>(id.index)]) {
+        ground_reaction -= on;
+        return;
+      }
+      const size_t b = static_cast<size_t>(id.index);
+      force[b] += on;
+      torque[b] += cross(p - state.p[b], on);
+    };
+    load(k.a, p_A, f);
+    load(k.b, p_B, -f);
+  }
+}
+
+void System::fire_events() {
+  while (state.next_event < event_order.size()) {
+    const size_t index = event_order[state.next_event];
+    const Event& event = model.events[index];
+    if (event.time > state.time + 1e-9 * step) break;
+    ++state.next_event;
+    for (const Action& a : event.actions) {
+      switch (a.kind) {
+        case Action::Kind::RemoveElement: {
+          ZoneState& z = state.element[static_cast<size_t>(a.element.index)];
+          if (!z.live) break;
+          state.removed += z.energy;
+          z.energy = 0;
+          break_zone(z, BreakReason::Removed);
+          mark_search_due();
+          break;
+        }
+        case Action::Kind::SwitchLaw: {
+          ZoneState& z = state.element[static_cast<size_t>(a.element.index)];
+          z.next_law = a.law.index;
+          z.ramp_begin = state.time;
+          z.ramp = a.ramp;
+          break;
+        }
+        case Action::Kind::ReleaseJoint:
+          release_joint(static_cast<size_t>(a.joint.index), "released");
+          break;
+        case Action::Kind::ReplaceBody:
+          replace_body(static_cast<size_t>(a.body.index), a.replacement);
+          break;
+        case Action::Kind::ReleaseCable: {
+          CableState& c = state.cable[static_cast<size_t>(a.cable)];
+          state.removed += c.energy;
+          c.energy = c.force = 0;
+          c.live = false;
+          break;
+        }
+      }
+    }
+    say({Happening::Kind::EventFired, state.time, static_cast<int>(index), -1, event.name, 0});
+  }
+}
+
+void System::replace_body(size_t b, const Body& replacement) {
+  State& s = state;
+  if (fixed[b]) return;
+  const auto energy = [&] {
+    const Mat3 I = world_tensor(s.R[b], s.body[b].inertia);
+    return 0.5 * s.body[b].mass * dot(s.v[b], s.v[b]) + 0.5 * dot(s.w[b], I * s.w[b]) -
+           s.body[b].mass * dot(model.gravity, s.p[b]);
+  };
+  const double before = energy();
+  const Vec3 moved = replacement.X_WB.p;  // from the old centre to the new one, in B
+  s.v[b] += cross(s.w[b], s.R[b] * moved);
+  s.p[b] += s.R[b] * moved;
+  s.p_offset[b] += moved;
+  s.body[b] = constants_of(replacement);
+  s.L[b] = world_tensor(s.R[b], replacement.inertia) * s.w[b];
+  // the old shapes stay in the list, unused
+  append_shapes(replacement, s.body[b], s.shapes);
+  layout_shapes();
+  s.removed += before - energy();
+  mark_search_due();
+  // contact pairs name shapes by their index within the body, which may be others now
+  std::erase_if(s.pairs, [&](const PairState& pair) {
+    const bool gone = pair.a == static_cast<int>(b) || pair.b == static_cast<int>(b);
+    if (gone) {
+      s.contact_energy -= pair.energy;
+      s.contact_loss += pair.energy;
+    }
+    return gone;
+  });
+}
+
+void System::evaluate_forces(double h) {
+  ground_reaction = {};
+  ground_contact = {};
+  body_contacts = 0;
+  fire_events();
+  evaluate_elements(h);
+  evaluate_rotationals(h);
+  evaluate_cables();
+  if (model.contact.ground || model.contact.bodies) {
+    if (state.search_due) find_pairs();
+    if (model.contact.ground) evaluate_ground_contact(h);
+    if (model.contact.bodies) evaluate_body_contact(h);
+  }
+}
+
+void System::drift(size_t b, double h, const Vec3& p0, const Quat& q0) {
+  State& s = state;
+  s.p[b] = p0 + h * s.v[b];
+  // midpoint rule for the orientation: the spin is constant over the step, the inertia turns with the body
+  const Mat3 R0 = to_matrix(q0);
+  const Vec3 w0 = R0 * (s.body[b].inverse_inertia * transpose_times(R0, s.L[b]));
+  const Mat3 Rm = to_matrix(exp_rotation((0.5 * h) * w0) * q0);
+  const Vec3 w1 = Rm * (s.body[b].inverse_inertia * transpose_times(Rm, s.L[b]));
+  const Mat3 Rn = to_matrix(exp_rotation((0.5 * h) * w1) * q0);
+  s.w[b] = Rn * (s.body[b].inverse_inertia * transpose_times(Rn, s.L[b]));
+  s.q[b] = normalized(exp_rotation(h * s.w[b]) * q0);
+  s.R[b] = to_matrix(s.q[b]);
+}
+
+bool System::advance_step() {
+  State& s = state;
+  const double h = step;
+  const double kick = s.first_kick ? 0.5 * h : h;
+  for (size_t b = 0; b < B; ++b) {
+    if (fixed[b]) continue;
+    s.v[b] += (kick * s.body[b].inverse_mass) * force[b] + kick * model.gravity;
+    s.L[b] += kick * torque[b];
+  }
+  if (clusters_due) build_clusters();
+  p_before.resize(B);
+  q_before.resize(B);
+  for (size_t b = 0; b < B; ++b) {
+    if (fixed[b]) continue;
+    p_before[b] = s.p[b];
+    q_before[b] = s.q[b];
+    if (!in_cluster[b]) drift(b, h, p_before[b], q_before[b]);
+  }
+  solve_joints(h, p_before, q_before);
+  s.first_kick = false;
+  ++s.step_index;
+  s.time = static_cast<double>(s.step_index) * h;
+  check_joints();
+  evaluate_forces(h);
+  // one broken number anywhere reaches this sum within a step
+  double sum = 0;
+  for (size_t b = 0; b < B; ++b) sum += s.p[b].x + s.p[b].y + s.p[b].z + s.v[b].x + s.v[b].y + s.v[b].z;
+  return std::isfinite(sum);
+}
+
+Vec3 System::calc_velocity(size_t b) const {
+  if (fixed[b] || state.first_kick) return state.v[b];
+  const Vec3 a = state.body[b].inverse_mass * (force[b] + joint_force[b]) + model.gravity;
+  return state.v[b] + (0.5 * step) * a;
+}
+
+Vec3 System::calc_angular_velocity(size_t b) const {
+  if (fixed[b]) return {};
+  if (state.first_kick) return state.w[b];
+  return calc_world_inverse_inertia(b) * (state.L[b] + (0.5 * step) * (torque[b] + joint_torque[b]));
+}
+
+Energy System::calc_energy() const {
+  Energy e;
+  for (size_t b = 0; b < B; ++b) {
+    if (fixed[b]) continue;
+    const BodyConstants& c = state.body[b];
+    // both half steps' velocities give the kinetic energy between them
+    const Vec3 v = calc_velocity(b), w = calc_angular_velocity(b);
+    e.kinetic += 0.5 * c.mass * dot(v, v) + 0.5 * dot(w, state.R[b] * (c.inertia * transpose_times(state.R[b], w)));
+    e.gravity -= c.mass * dot(model.gravity, state.p[b]);
+  }
+  e.gravity -= state.gravity_at_start;
+  for (const auto* list : {&state.element, &state.rotational})
+    for (const ZoneState& z : *list) {
+      e.elastic += z.energy;
+      e.plastic += z.plastic;
+      e.damping += z.damping;
+    }
+  for (const CableState& c : state.cable) {
+    e.elastic += c.energy;
+    e.plastic += c.plastic;
+  }
+  e.contact = state.contact_energy;
+  e.friction = state.friction;
+  e.contact_loss = state.contact_loss;
+  e.removed = state.removed;
+  e.residual = e.kinetic + e.gravity + e.elastic + e.contact + e.plastic + e.damping + e.friction + e.contact_loss +
+               e.removed - state.total_at_start;
+  e.released = std::max(state.released, -e.gravity - e.removed);
+  return e;
+}
+
+const View& System::calc_view() {
+  View& v = view;
+  const State& s = state;
+  const size_t E = elements.size(), R = rotationals.size();
+  v.time = s.time;
+  v.X_WB.resize(B);
+  v.v_WB.resize(B);
+  v.w_WB.resize(B);
+  v.mass.resize(B);
+  for (size_t b = 0; b < B; ++b) {
+    v.X_WB[b] = {s.p[b] - s.R[b] * s.p_offset[b], s.q[b]};
+    v.v_WB[b] = calc_velocity(b);
+    v.w_WB[b] = calc_angular_velocity(b);
+    v.mass[b] = s.body[b].mass;
+  }
+  v.element_state.resize(E + R);
+  v.utilisation.resize(E + R);
+  v.rotation.resize(E + R);
+  v.shortening.resize(E);
+  v.element_force.resize(E);
+  v.element_moment.resize(E);
+  const auto fill = [&](size_t at, const ZoneParameters& p, const ZoneState& z) {
+    v.element_state[at] = !z.live ? (z.reason == BreakReason::Removed ? ElementState::Removed : ElementState::Broken)
+                          : is_softening(p, laws, s.time, z) ? ElementState::Softening
+                          : z.yielded                        ? ElementState::Yielded
+                                                             : ElementState::Elastic;
+    v.utilisation[at] = calc_utilisation(p, laws, s.time, z);
+    v.rotation[at] = std::max(z.station[0].reached, z.station[1].reached);
+  };
+  for (size_t i = 0; i < E; ++i) {
+    const ZoneState& z = s.element[i];
+    fill(i, elements[i].zone, z);
+    v.shortening[i] = z.shortened;
+    v.element_force[i] = -Vec3{z.resultant.c[0], z.resultant.c[1], z.resultant.c[2]};
+    v.element_moment[i] = -Vec3{z.resultant.c[3], z.resultant.c[4], z.resultant.c[5]};
+  }
+  for (size_t i = 0; i < R; ++i) fill(E + i, rotationals[i].zone, s.rotational[i]);
+  v.joint_force.resize(joints.size());
+  v.joint_moment.resize(joints.size());
+  v.joint_released.resize(joints.size());
+  Vec3 joints_on_ground;
+  for (size_t j = 0; j < joints.size(); ++j) {
+    const CompiledJoint& c = joints[j];
+    const Mat3 F = to_matrix(pose_of(c.parent).q * c.q_PF);
+    v.joint_force[j] = transpose_times(F, s.joint[j].force);
+    v.joint_moment[j] = transpose_times(F, s.joint[j].moment);
+    v.joint_released[j] = !s.joint[j].live;
+    if (c.parent < 0 || fixed[static_cast<size_t>(c.parent)]) joints_on_ground += s.joint[j].force;
+    if (c.child < 0 || fixed[static_cast<size_t>(c.child)]) joints_on_ground -= s.joint[j].force;
+  }
+  v.cable_force.resize(s.cable.size());
+  for (size_t i = 0; i < s.cable.size(); ++i) v.cable_force[i] = s.cable[i].force;
+  v.ground_force = ground_reaction + ground_contact + joints_on_ground;
+  v.contact_force_ground = ground_contact;
+  v.body_contacts = body_contacts;
+  v.energy = calc_energy();
+  return v;
+}
+
+}  // namespace topple::mbs

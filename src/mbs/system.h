@@ -1,0 +1,222 @@
+#pragma once
+/// Inside of the native engine: the compiled model (constant) and the state (changes in time), kept apart.
+/// B bodies, E zone elements, R rotational elements, J joints, C cables, P contact pairs.
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "mbs/model.h"
+#include "mbs/solver.h"
+#include "mbs/zone.h"
+
+namespace topple::mbs {
+
+/// One rigid body's constants; a ReplaceBody event makes them part of the state.
+struct BodyConstants {
+  double mass = 0, inverse_mass = 0;
+  Mat3 inertia, inverse_inertia;    // in B
+  double radius = 0;                // of the sphere about the centre of mass that holds all shapes [m]
+  int first_shape = 0, shapes = 0;  // into State::shapes
+};
+
+/// Contact shape in its body's frame.
+struct CompiledShape {
+  Shape::Kind kind = Shape::Kind::Box;
+  Vec3 p_BS;
+  Mat3 R_BS;
+  Vec3 half;
+  double radius = 0;
+  int first_corner = 0;  // into State::ground_points: 8 of a box, 1 of a sphere
+};
+
+/// A corner's contact with the ground.
+struct GroundPoint {
+  double born = 0;      // penetration allowed because it was there when contact became possible [m]
+  bool active = false;  // contact is possible
+  bool touching = false;
+  Vec3 stick;                   // tangential displacement of the friction spring [m]
+  double depth = 0, force = 0;  // of the step before
+  Vec3 friction;                // of the step before [N]
+};
+
+/// Two bodies near each other.
+struct PairState {
+  int a = -1, b = -1;            // bodies, a < b
+  int shape_a = 0, shape_b = 0;  // indices within the bodies
+  double born = 0;
+  bool seen = false;  // born is set
+  bool touching = false;
+  int axis = 0;       // separating axis of the step before
+  double energy = 0;  // stored [J]
+};
+
+struct CompiledElement {
+  int a = -1, b = -1;
+  Vec3 p_AF, p_BM;
+  Quat q_AF, q_BM;
+  ZoneParameters zone;
+};
+
+struct CompiledJoint {
+  Joint::Kind kind = Joint::Kind::Fixed;
+  int parent = -1, child = -1;
+  Vec3 p_PF, p_CM;
+  Quat q_PF, q_CM;
+  int rows = 6;
+  double tension_limit, shear_limit, moment_limit, rotation_limit;
+  int rotational = -1;  // element about its axis
+};
+
+/// Rotational element: a zone whose only elastic component is the rotation about z, its normal force the joint's.
+struct CompiledRotational {
+  int joint = -1;
+  ZoneParameters zone;
+};
+
+struct JointState {
+  bool live = true;
+  Vec3 force, moment;  // reaction on the child at the joint, in W [N, N·m]
+  double angle = 0;    // of a revolute joint, continuous [rad]
+};
+
+struct CableState {
+  bool live = true;
+  double rest_length = 0, force = 0, energy = 0, plastic = 0;
+};
+
+/// Everything that changes in time. Plain data: a copy is a snapshot.
+struct State {
+  long step_index = 0;
+  double time = 0;
+  bool first_kick = true;
+  size_t next_event = 0;
+  // bodies (B)
+  std::vector<BodyConstants> body;
+  std::vector<Vec3> p, v, L;  // place; velocity and angular momentum about the centre at the last half step
+  std::vector<Vec3> w;        // angular velocity at the last half step, in W
+  std::vector<Quat> q;
+  std::vector<Mat3> R;
+  std::vector<Vec3> p_offset;  // of the present centre of mass in the frame of the model's body
+  std::vector<CompiledShape> shapes;
+  std::vector<GroundPoint> ground_points;
+  std::vector<unsigned char> touched_ground;
+  // connections
+  std::vector<ZoneState> element;
+  std::vector<ZoneState> rotational;
+  std::vector<JointState> joint;
+  std::vector<CableState> cable;
+  // contact pairs
+  std::vector<PairState> pairs;
+  std::vector<Vec3> p_at_search;
+  std::vector<unsigned char> tied_to_ground;
+  bool search_due = true;
+  long last_search = 0;
+  std::vector<long> touched_pairs;  // a * B + b, sorted
+  // ledger [J]
+  double removed = 0, friction = 0, contact_loss = 0, contact_energy = 0;
+  double total_at_start = 0;
+  double gravity_at_start = 0, largest_residual = 0, released = 0;
+  double largest_drift = 0;
+  long quiet_steps = 0;
+};
+
+/// Forces of one evaluation; scratch, rebuilt at each step.
+struct ElementForce {
+  Vec3 force;               // on b at M, in W; on a the opposite
+  Vec3 torque_a, torque_b;  // about the centres of mass
+};
+
+/// One constraint: direction of a force on the child (opposite on the parent) and the torques on both.
+struct JointRow {
+  Vec3 line, turn_child, turn_parent;
+};
+
+/// One list of joints that share moving bodies, solved together.
+struct JointCluster {
+  std::vector<int> joints;
+  std::vector<int> bodies;  // moving ones
+  int rows = 0;
+};
+
+class System {
+ public:
+  System(const Model& model, const Options& options);
+
+  const Model model;
+  Options options;
+  State state;
+
+  double step = 0;
+  double highest_frequency = 0;
+
+  bool find_equilibrium(std::string& message);
+  bool advance_step();
+  void evaluate_forces(double h);
+  const View& calc_view();
+  Summary summary;
+
+  // constant after compilation
+  size_t B = 0;
+  std::vector<CompiledElement> elements;
+  std::vector<CompiledLaw> laws;
+  std::vector<CompiledJoint> joints;
+  std::vector<CompiledRotational> rotationals;
+  std::vector<size_t> event_order;
+  std::vector<unsigned char> fixed;
+  std::vector<std::vector<int>> incidence;  // elements of each body: 2 * element + side
+
+  // scratch
+  std::vector<ElementForce> element_force;
+  std::vector<Vec3> force, torque;              // applied on bodies (B)
+  std::vector<Vec3> joint_force, joint_torque;  // of the joints on bodies, of the step before (B)
+  std::vector<Vec3> p_before;
+  std::vector<Quat> q_before;
+  std::vector<unsigned char> in_cluster;  // (B)
+  std::vector<JointCluster> clusters;
+  bool clusters_due = true;
+  std::vector<JointRow> joint_rows;
+  std::vector<double> joint_matrix, joint_rhs, joint_impulse;
+  Vec3 ground_reaction, ground_contact;
+  int body_contacts = 0;
+  View view;
+
+  void say(Happening h) const {
+    if (options.on_happening) options.on_happening(h);
+  }
+
+  // parts, one file each
+  void compile();
+  void choose_step();
+  /// Forces at the start, and the ledger set to zero there.
+  void evaluate_start();
+  void fire_events();
+  void evaluate_elements(double h);
+  void evaluate_rotationals(double h);
+  void evaluate_cables();
+  void evaluate_ground_contact(double h);
+  void evaluate_body_contact(double h);
+  void find_pairs();
+  void drift(size_t body, double h, const Vec3& p0, const Quat& q0);
+  void build_clusters();
+  void solve_joints(double h, const std::vector<Vec3>& p0, const std::vector<Quat>& q0);
+  void check_joints();
+  void break_element(size_t e, BreakReason reason);
+  void release_joint(size_t j, const char* reason);
+  void replace_body(size_t b, const Body& replacement);
+  void layout_shapes();
+  void mark_search_due() { state.search_due = true; }
+  /// Angle of a revolute joint from its frames, near `previous`.
+  double calc_angle(const CompiledJoint&, double previous) const;
+  Six calc_deformation(const CompiledElement&) const;
+  Pose pose_of(int body) const {
+    return body < 0 ? Pose{} : Pose{state.p[static_cast<size_t>(body)], state.q[static_cast<size_t>(body)]};
+  }
+  Energy calc_energy() const;
+  /// Velocities at the time of the positions, half a step after the stored ones.
+  Vec3 calc_velocity(size_t body) const;
+  Vec3 calc_angular_velocity(size_t body) const;
+  Mat3 calc_world_inverse_inertia(size_t body) const;
+};
+
+}  // namespace topple::mbs

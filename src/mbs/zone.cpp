@@ -1,0 +1,485 @@
+#include "mbs/zone.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+namespace topple::mbs {
+
+namespace {
+
+/// Largest i with grid[i] <= x, within [0, n-2]; `hint` is where it was last time.
+inline int find_interval(const std::vector<double>& grid, double x, int hint) {
+  const int last = static_cast<int>(grid.size()) - 2;
+  int i = std::clamp(hint, 0, last);
+  while (i > 0 && x < grid[static_cast<size_t>(i)]) --i;
+  while (i < last && x >= grid[static_cast<size_t>(i) + 1]) ++i;
+  return i;
+}
+
+}  // namespace
+
+CompiledLaw compile_law(const ZoneLaw& law) {
+  CompiledLaw c;
+  const MomentFamily* families[2] = {&law.moment_y, &law.moment_z};
+  for (int axis = 0; axis < 2; ++axis) {
+    const MomentFamily& from = *families[axis];
+    CompiledFamily& to = c.moment[axis];
+    to.K = static_cast<int>(from.normal_force.size());
+    to.J = static_cast<int>(from.plastic_rotation.size());
+    to.force = from.normal_force;
+    to.rotation = from.plastic_rotation;
+    to.limit.resize(from.positive.size() * 2);
+    double largest = 0;
+    for (size_t i = 0; i < from.positive.size(); ++i) {
+      to.limit[2 * i] = from.positive[i];
+      to.limit[2 * i + 1] = from.negative[i];
+      largest = std::max({largest, from.positive[i], from.negative[i]});
+    }
+    // The capacity at a rotation is where the interpolated limit reaches zero on the side of compression.
+    to.capacity.resize(static_cast<size_t>(to.J));
+    for (int j = 0; j < to.J; ++j) {
+      double capacity = 0;
+      for (int k = 0; k < to.K; ++k) {
+        const size_t i = 2 * (static_cast<size_t>(k) * static_cast<size_t>(to.J) + static_cast<size_t>(j));
+        if (std::max(to.limit[i], to.limit[i + 1]) > 1e-3 * largest) {
+          capacity = -to.force[static_cast<size_t>(std::max(k - 1, 0))];
+          break;
+        }
+      }
+      to.capacity[static_cast<size_t>(j)] = std::max(capacity, 0.0);
+    }
+    // a zone does not regain capacity by turning further
+    for (int j = 1; j < to.J; ++j)
+      to.capacity[static_cast<size_t>(j)] =
+          std::min(to.capacity[static_cast<size_t>(j)], to.capacity[static_cast<size_t>(j) - 1]);
+  }
+  c.compression = {law.compression.x, law.compression.f};
+  c.tension = {law.tension.x, law.tension.f};
+  c.biaxial_exponent = law.biaxial_exponent;
+  c.damage_share = law.damage_share;
+  c.rupture_rotation = law.rupture_rotation;
+  c.crush_length = law.crush_length;
+  c.rupture_elongation = law.rupture_elongation;
+  c.shear[0] = law.shear_y;
+  c.shear[1] = law.shear_z;
+  c.shear_friction = law.shear_friction;
+  c.slip_softening = law.slip_softening;
+  c.slip_rupture = law.slip_rupture;
+  c.torsion = law.torsion;
+  c.twist_rupture = law.twist_rupture;
+  return c;
+}
+
+double calc_curve(const CompiledCurve& curve, double x) {
+  if (curve.x.empty()) return kUnlimited;
+  if (x <= curve.x.front()) return curve.f.front();
+  if (x >= curve.x.back()) return curve.f.back();
+  const size_t i = static_cast<size_t>(find_interval(curve.x, x, 0));
+  const double t = (x - curve.x[i]) / (curve.x[i + 1] - curve.x[i]);
+  return curve.f[i] + t * (curve.f[i + 1] - curve.f[i]);
+}
+
+MomentLimit calc_moment_limit(const CompiledFamily& family, double normal_force, double rotation, int& k, int& j) {
+  if (family.K == 0) return {kUnlimited, kUnlimited};
+  if (normal_force <= family.force.front() || normal_force >= family.force.back()) {
+    // On the edge itself the table counts; beyond it nothing is left.
+    if (normal_force != family.force.front() && normal_force != family.force.back()) return {0, 0};
+  }
+  k = find_interval(family.force, normal_force, k);
+  j = find_interval(family.rotation, rotation, j);
+  const size_t K = static_cast<size_t>(k), J = static_cast<size_t>(j), width = static_cast<size_t>(family.J);
+  const double t = (normal_force - family.force[K]) / (family.force[K + 1] - family.force[K]);
+  const double s =
+      std::clamp((rotation - family.rotation[J]) / (family.rotation[J + 1] - family.rotation[J]), 0.0, 1.0);
+  const double* a = &family.limit[2 * (K * width + J)];
+  const double* b = a + 2 * width;
+  const double w00 = (1 - t) * (1 - s), w01 = (1 - t) * s, w10 = t * (1 - s), w11 = t * s;
+  return {w00 * a[0] + w01 * a[2] + w10 * b[0] + w11 * b[2], w00 * a[1] + w01 * a[3] + w10 * b[1] + w11 * b[3]};
+}
+
+double calc_compression_capacity(const CompiledFamily& family, double rotation) {
+  if (family.K == 0) return kUnlimited;
+  const size_t last = static_cast<size_t>(family.J) - 1;
+  if (rotation >= family.rotation[last]) return family.capacity[last];
+  const size_t i = static_cast<size_t>(find_interval(family.rotation, rotation, 0));
+  const double t = (rotation - family.rotation[i]) / (family.rotation[i + 1] - family.rotation[i]);
+  return family.capacity[i] + t * (family.capacity[i + 1] - family.capacity[i]);
+}
+
+namespace {
+
+/// The limits in force at a moment in time: those of one law, or two of them blended while a charge takes effect.
+class Limits {
+ public:
+  Limits(const std::vector<CompiledLaw>& laws, int law, const ZoneState& z, double time)
+      : from_(laws[static_cast<size_t>(law)]), to_(from_) {
+    if (z.next_law < 0) return;
+    to_ = laws[static_cast<size_t>(z.next_law)];
+    share_ = z.ramp > 0 ? std::clamp((time - z.ramp_begin) / z.ramp, 0.0, 1.0) : 1.0;
+  }
+
+  /// The law that governs lengths of rupture.
+  const CompiledLaw& law() const { return share_ > 0 ? to_.get() : from_.get(); }
+  double tension(double elongated) const {
+    return blend([&](const CompiledLaw& l) { return calc_curve(l.tension, elongated); });
+  }
+  /// Share of the section that is still there after plastic shortening, and the full compression capacity at a
+  /// rotation.
+  double integrity(double shortened) const {
+    return blend([&](const CompiledLaw& l) {
+      if (l.compression.x.empty()) return 1.0;
+      const double full = l.compression.f.front();
+      return full > 0 ? calc_curve(l.compression, shortened) / full : 0.0;
+    });
+  }
+  double compression(double rotation) const {
+    return blend([&](const CompiledLaw& l) {
+      const double full = l.compression.x.empty() ? kUnlimited : l.compression.f.front();
+      return std::min(
+          {full, calc_compression_capacity(l.moment[0], rotation), calc_compression_capacity(l.moment[1], rotation)});
+    });
+  }
+  MomentLimit moment(int axis, double normal_force, StationState& s) const {
+    MomentLimit a{0, 0}, b{0, 0};
+    if (share_ < 1) a = calc_moment_limit(from_.get().moment[axis], normal_force, s.reached, s.k[axis], s.j[axis]);
+    if (share_ > 0) {
+      int k = 0, j = 0;
+      b = calc_moment_limit(to_.get().moment[axis], normal_force, s.reached, k, j);
+    }
+    return {mix(a.positive, b.positive), mix(a.negative, b.negative)};
+  }
+  double shear(int axis, double slipped, double compression) const {
+    return blend([&](const CompiledLaw& l) {
+      const double left = l.slip_softening > 0 ? std::max(0.0, 1 - slipped / l.slip_softening) : 0.0;
+      const double own = l.shear[axis] == kUnlimited ? kUnlimited : l.shear[axis] * left;
+      return own + l.shear_friction * std::max(0.0, compression);
+    });
+  }
+  double torsion() const {
+    return blend([](const CompiledLaw& l) { return l.torsion; });
+  }
+
+ private:
+  double mix(double a, double b) const { return share_ <= 0 ? a : share_ >= 1 ? b : (1 - share_) * a + share_ * b; }
+  template <class F>
+  double blend(F&& f) const {
+    if (share_ <= 0) return f(from_.get());
+    if (share_ >= 1) return f(to_.get());
+    return mix(f(from_.get()), f(to_.get()));
+  }
+  std::reference_wrapper<const CompiledLaw> from_, to_;
+  double share_ = 0;
+};
+
+/// Rotations and moments of the stations of one bending plane, and the resultants at the marker.
+///   sign  +1 about y (shear along z), -1 about z (shear along y)
+struct Plane {
+  double shear_stiffness, bending_stiffness, sign;
+  double shear_deformation;  // elastic and that of the stations, slip taken out
+  double rotation;
+
+  double shear(const double x[2], const double phi[2], int n) const {
+    double u = shear_deformation;
+    for (int s = 0; s < n; ++s) u -= sign * x[s] * phi[s];
+    return shear_stiffness * u;
+  }
+  double moment(const double phi[2], int n) const {
+    double r = rotation;
+    for (int s = 0; s < n; ++s) r -= phi[s];
+    return bending_stiffness * r;
+  }
+  /// Moment at a station: that at the marker plus the lever of the shear.
+  static double at(double moment, double shear, double x, double sign) { return moment + sign * x * shear; }
+};
+
+constexpr double kTiny = 1e-300;
+
+}  // namespace
+
+void break_zone(ZoneState& z, BreakReason reason) {
+  z.live = false;
+  z.reason = reason;
+  z.plastic += z.energy;
+  z.energy = 0;
+  z.resultant = {};
+  z.has_elastic = false;
+}
+
+void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, const Six& d, double time, double h,
+                  ZoneState& z) {
+  const double* k = p.stiffness;
+  const int n = p.stations;
+
+  double force[6];   // elastic resultants at the marker
+  double phi[2][2];  // inelastic rotation [plane][station], damage included
+  double m[2][2];    // moment at the station [plane][station]
+  double stored_soft = 0;
+  bool flowed = false;
+  double energy_trial = 0;
+
+  force[0] = p.external_axial ? d.c[0] : k[0] * (d.c[0] - z.axial);
+  force[3] = k[3] * (d.c[3] - z.twist);
+
+  // plane 0 bends about y with shear along z; plane 1 bends about z with shear along y
+  const Plane planes[2] = {{k[2], k[4], +1, d.c[2] - z.slip[1], d.c[4]}, {k[1], k[5], -1, d.c[1] - z.slip[0], d.c[5]}};
+  double station_stiffness[2][2];
+  for (int q = 0; q < 2; ++q) {
+    for (int s = 0; s < n; ++s) {
+      station_stiffness[q][s] = planes[q].bending_stiffness + p.x[s] * p.x[s] * planes[q].shear_stiffness;
+      phi[q][s] = z.station[s].phi[q];
+    }
+    // damage adds flexibility at the stations: a small fixed point, exact for one station
+    bool any_soft = false;
+    for (int s = 0; s < n; ++s) any_soft = any_soft || z.station[s].soft[q] > 0;
+    const int sweeps = !any_soft ? 1 : n == 1 ? 1 : 12;
+    for (int sweep = 0; sweep < sweeps; ++sweep)
+      for (int s = 0; s < n; ++s) {
+        const double c = z.station[s].soft[q];
+        phi[q][s] = z.station[s].phi[q];
+        const double v = planes[q].shear(p.x, phi[q], n), b = planes[q].moment(phi[q], n);
+        const double m0 = Plane::at(b, v, p.x[s], planes[q].sign);
+        m[q][s] = m0 / (1 + station_stiffness[q][s] * c);
+        phi[q][s] += c * m[q][s];
+      }
+    const double v = planes[q].shear(p.x, phi[q], n), b = planes[q].moment(phi[q], n);
+    force[q == 0 ? 2 : 1] = v;
+    force[q == 0 ? 4 : 5] = b;
+    for (int s = 0; s < n; ++s) m[q][s] = Plane::at(b, v, p.x[s], planes[q].sign);
+  }
+
+  const auto elastic_energy = [&]() {
+    double e = 0;
+    for (int i = 0; i < 6; ++i)
+      if (k[i] > 0) e += 0.5 * force[i] * force[i] / k[i];
+    return e;
+  };
+  const auto soft_energy = [&]() {
+    double e = 0;
+    for (int q = 0; q < 2; ++q)
+      for (int s = 0; s < n; ++s) e += 0.5 * z.station[s].soft[q] * m[q][s] * m[q][s];
+    return e;
+  };
+  stored_soft = soft_energy();
+  energy_trial = elastic_energy() + stored_soft;
+
+  BreakReason broke = BreakReason::None;
+  if (n > 0) {
+    const Limits limits(laws, p.law[0], z, time);
+
+    // axial force
+    double reached = z.station[0].reached;
+    if (n > 1) reached = std::max(reached, z.station[1].reached);
+    double integrity = limits.integrity(z.shortened);
+    if (p.external_axial) {
+      // held by somebody else
+    } else if (force[0] < 0) {
+      const double capacity = limits.compression(reached);
+      double limit = capacity * integrity;
+      if (-force[0] > limit) {
+        // the curve falls while the zone shortens: one more look at it after the first estimate
+        const double first = (-force[0] - limit) / k[0];
+        integrity = limits.integrity(z.shortened + first);
+        limit = capacity * integrity;
+        const double shortening = (-force[0] - limit) / k[0];
+        z.axial -= shortening;
+        z.shortened += shortening;
+        force[0] = -limit;
+        flowed = true;
+      }
+    } else {
+      double limit = limits.tension(z.elongated);
+      if (force[0] > limit) {
+        const double first = (force[0] - limit) / k[0];
+        limit = limits.tension(z.elongated + first);
+        const double elongation = (force[0] - limit) / k[0];
+        z.axial += elongation;
+        z.elongated += elongation;
+        force[0] = limit;
+        flowed = true;
+      }
+    }
+    if (z.shortened >= limits.law().crush_length) broke = BreakReason::Crushing;
+    if (z.elongated >= limits.law().rupture_elongation) broke = BreakReason::Tension;
+
+    // bending at the stations: radial return on (|My|/Ly)^p + (|Mz|/Lz)^p = 1
+    const int sweeps = n == 1 ? 1 : 12;
+    for (int sweep = 0; sweep < sweeps; ++sweep) {
+      bool changed = false;
+      for (int s = 0; s < n; ++s) {
+        const Limits station_limits(laws, p.law[s], z, time);
+        StationState& st = z.station[s];
+        for (int q = 0; q < 2; ++q)
+          m[q][s] = Plane::at(planes[q].moment(phi[q], n), planes[q].shear(p.x, phi[q], n), p.x[s], planes[q].sign);
+        // what is left of the section carries both the force and the moment
+        const double axial = integrity > 0 ? force[0] / integrity : 0;
+        const MomentLimit ly = station_limits.moment(0, axial, st), lz = station_limits.moment(1, axial, st);
+        const double limit_y = integrity * (m[0][s] >= 0 ? ly.positive : ly.negative);
+        const double limit_z = integrity * (m[1][s] >= 0 ? lz.positive : lz.negative);
+        const double ay = std::abs(m[0][s]), az = std::abs(m[1][s]);
+        if (ay <= 0.5 * limit_y && az <= 0.5 * limit_z) continue;  // p >= 1: inside for sure
+        const double ry = limit_y > 0 ? ay / limit_y : (ay > 0 ? kUnlimited : 0);
+        const double rz = limit_z > 0 ? az / limit_z : (az > 0 ? kUnlimited : 0);
+        const double e = limits.law().biaxial_exponent;
+        double scale_y = 1, scale_z = 1;
+        if (std::isinf(ry) || std::isinf(rz)) {
+          scale_y = std::isinf(ry) ? 0 : std::min(1.0, 1 / std::max(ry, kTiny));
+          scale_z = std::isinf(rz) ? 0 : std::min(1.0, 1 / std::max(rz, kTiny));
+        } else {
+          // the larger ratio taken out of the power, so that an uniaxial state keeps its limit to round-off
+          const double big = std::max(ry, rz), small = std::min(ry, rz);
+          double r = big;
+          if (small > 1e-9 * big) r = big * std::pow(1 + std::pow(small / big, e), 1 / e);
+          if (r <= 1) continue;
+          scale_y = scale_z = 1 / r;
+        }
+        const double scale[2] = {scale_y, scale_z};
+        double length2 = 0, turn2 = 0;
+        for (int q = 0; q < 2; ++q) {
+          const double target = m[q][s] * scale[q];
+          const double turn = (m[q][s] - target) / station_stiffness[q][s];
+          phi[q][s] += turn;
+          m[q][s] = target;
+          length2 += phi[q][s] * phi[q][s];
+          turn2 += turn * turn;
+        }
+        if (turn2 > 0) {
+          changed = flowed = true;
+          st.turned += std::sqrt(turn2);
+          st.reached = std::max(st.reached, std::sqrt(length2));
+        }
+        if (st.reached >= limits.law().rupture_rotation) broke = BreakReason::Rotation;
+      }
+      if (!changed) break;
+    }
+    if (flowed) {
+      // split what is new of the inelastic rotation into a plastic part and added flexibility
+      for (int q = 0; q < 2; ++q) {
+        force[q == 0 ? 2 : 1] = planes[q].shear(p.x, phi[q], n);
+        force[q == 0 ? 4 : 5] = planes[q].moment(phi[q], n);
+        for (int s = 0; s < n; ++s) {
+          StationState& st = z.station[s];
+          m[q][s] = Plane::at(force[q == 0 ? 4 : 5], force[q == 0 ? 2 : 1], p.x[s], planes[q].sign);
+          const double added = phi[q][s] - st.phi[q] - st.soft[q] * m[q][s];
+          const double share = limits.law().damage_share;
+          if (share > 0 && added * m[q][s] > 0 && std::abs(m[q][s]) * (std::abs(phi[q][s]) + kTiny) > 0) {
+            const double most = share * std::abs(phi[q][s]) / std::abs(m[q][s]);
+            st.soft[q] = std::max(st.soft[q], std::min(most, st.soft[q] + share * added / m[q][s]));
+          }
+          st.phi[q] = phi[q][s] - st.soft[q] * m[q][s];
+        }
+      }
+    }
+
+    // shear
+    {
+      const double compression = -force[0];
+      const double limit_y = limits.shear(0, z.slipped, compression), limit_z = limits.shear(1, z.slipped, compression);
+      const double ry = limit_y > 0 ? std::abs(force[1]) / limit_y : (force[1] != 0 ? kUnlimited : 0);
+      const double rz = limit_z > 0 ? std::abs(force[2]) / limit_z : (force[2] != 0 ? kUnlimited : 0);
+      const double r = std::sqrt(ry * ry + rz * rz);
+      if (r > 1) {
+        const double s = std::isinf(r) ? 0 : 1 / r;
+        const double dy = k[1] > 0 ? force[1] * (1 - s) / k[1] : 0, dz = k[2] > 0 ? force[2] * (1 - s) / k[2] : 0;
+        z.slip[0] += dy;
+        z.slip[1] += dz;
+        z.slipped += std::sqrt(dy * dy + dz * dz);
+        force[1] *= s;
+        force[2] *= s;
+        flowed = true;
+        for (int q = 0; q < 2; ++q)
+          for (int st = 0; st < n; ++st)
+            m[q][st] = Plane::at(force[q == 0 ? 4 : 5], force[q == 0 ? 2 : 1], p.x[st], planes[q].sign);
+      }
+      if (z.slipped >= limits.law().slip_rupture) broke = BreakReason::Shear;
+    }
+
+    // torsion
+    if (const double limit = limits.torsion(); std::abs(force[3]) > limit) {
+      const double over = std::copysign((std::abs(force[3]) - limit) / k[3], force[3]);
+      z.twist += over;
+      z.twisted += std::abs(over);
+      force[3] = std::copysign(limit, force[3]);
+      flowed = true;
+    }
+    if (z.twisted >= limits.law().twist_rupture) broke = BreakReason::Torsion;
+  }
+
+  double energy = energy_trial;
+  if (flowed) {
+    energy = elastic_energy() + soft_energy();
+    z.plastic += energy_trial - energy;
+    z.yielded = true;
+  }
+  z.energy = energy;
+  z.normal_force = force[0];
+
+  // damping acts on the rate of the elastic deformation, so it resists no plastic flow
+  for (int i = 0; i < 6; ++i) {
+    const double e = k[i] > 0 ? force[i] / k[i] : 0;
+    double damper = 0;
+    if (z.has_elastic && h > 0) {
+      const double de = e - z.elastic[i];
+      damper = p.damping[i] * de / h;
+      z.damping += 0.5 * (damper + z.damping_power_force[i]) * de;
+    }
+    z.damping_power_force[i] = damper;
+    z.elastic[i] = e;
+    z.resultant.c[i] = force[i] + damper;
+  }
+  z.has_elastic = true;
+  if (broke != BreakReason::None) break_zone(z, broke);
+}
+
+double calc_utilisation(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, double time,
+                        const ZoneState& z) {
+  if (!z.live || p.stations == 0) return 0;
+  const Limits limits(laws, p.law[0], z, time);
+  const auto ratio = [](double demand, double capacity) {
+    if (capacity == kUnlimited) return 0.0;
+    return capacity > 0 ? demand / capacity : (demand > 0 ? 1.0 : 0.0);
+  };
+  double force[6];
+  for (int i = 0; i < 6; ++i) force[i] = p.stiffness[i] * z.elastic[i];
+  force[0] = z.normal_force;
+  double reached = z.station[0].reached;
+  if (p.stations > 1) reached = std::max(reached, z.station[1].reached);
+  const double integrity = limits.integrity(z.shortened);
+  double u = p.external_axial ? 0.0
+             : force[0] < 0   ? ratio(-force[0], limits.compression(reached) * integrity)
+                              : ratio(force[0], limits.tension(z.elongated));
+  for (int s = 0; s < p.stations; ++s) {
+    const Limits station_limits(laws, p.law[s], z, time);
+    StationState st = z.station[s];
+    const double my = force[4] + p.x[s] * force[2], mz = force[5] - p.x[s] * force[1];
+    const double axial = integrity > 0 ? force[0] / integrity : 0;
+    const MomentLimit ly = station_limits.moment(0, axial, st), lz = station_limits.moment(1, axial, st);
+    const double ry = ratio(std::abs(my), integrity * (my >= 0 ? ly.positive : ly.negative));
+    const double rz = ratio(std::abs(mz), integrity * (mz >= 0 ? lz.positive : lz.negative));
+    const double e = limits.law().biaxial_exponent;
+    u = std::max(u, std::pow(std::pow(ry, e) + std::pow(rz, e), 1 / e));
+  }
+  const double vy = ratio(std::abs(force[1]), limits.shear(0, z.slipped, -force[0]));
+  const double vz = ratio(std::abs(force[2]), limits.shear(1, z.slipped, -force[0]));
+  u = std::max(u, std::sqrt(vy * vy + vz * vz));
+  return std::max(u, ratio(std::abs(force[3]), limits.torsion()));
+}
+
+bool is_softening(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, double time, const ZoneState& z) {
+  if (!z.live || p.stations == 0) return false;
+  const Limits limits(laws, p.law[0], z, time);
+  const double integrity = limits.integrity(z.shortened);
+  if (integrity < 0.95) return true;
+  const double axial = z.normal_force / integrity;
+  for (int s = 0; s < p.stations; ++s)
+    for (int q = 0; q < 2; ++q) {
+      const Limits station_limits(laws, p.law[s], z, time);
+      StationState now = z.station[s], fresh;
+      if (now.reached == 0) continue;
+      const MomentLimit a = station_limits.moment(q, axial, now), b = station_limits.moment(q, axial, fresh);
+      if (b.positive != kUnlimited && a.positive + a.negative < 0.85 * (b.positive + b.negative)) return true;
+    }
+  return false;
+}
+
+}  // namespace topple::mbs

@@ -1,0 +1,111 @@
+#pragma once
+/// The law of a zone at work: deformations in, stress resultants out, inelastic history kept (docs/theory/zones.md).
+/// Stress resultants are those of tension-positive structural mechanics: N > 0 pulls, and the force of a on b is minus
+/// them.
+
+#include <cstdint>
+#include <vector>
+
+#include "mbs/model.h"
+
+namespace topple::mbs {
+
+/// A moment family laid out for lookup: K forces by J rotations.
+struct CompiledFamily {
+  int K = 0, J = 0;              // K == 0: unlimited
+  std::vector<double> force;     // (K)
+  std::vector<double> rotation;  // (J)
+  std::vector<double> limit;     // positive and negative side by side (K x J x 2)
+  std::vector<double> capacity;  // compression beyond which no moment is left, per rotation (J)
+};
+
+struct CompiledCurve {
+  std::vector<double> x, f;  // empty: unlimited
+};
+
+struct CompiledLaw {
+  CompiledFamily moment[2];  // about y, about z
+  CompiledCurve compression, tension;
+  double biaxial_exponent = 1.5, damage_share = 0, rupture_rotation = 0, crush_length = 0, rupture_elongation = 0;
+  double shear[2] = {0, 0}, shear_friction = 0, slip_softening = 0, slip_rupture = 0, torsion = 0, twist_rupture = 0;
+};
+
+CompiledLaw compile_law(const ZoneLaw&);
+
+/// Value of a curve, constant beyond its ends; infinity for an empty one.
+double calc_curve(const CompiledCurve&, double x);
+
+/// Limit moments at a normal force and a plastic rotation. k and j are hints from the last call, updated.
+struct MomentLimit {
+  double positive, negative;
+};
+MomentLimit calc_moment_limit(const CompiledFamily&, double normal_force, double rotation, int& k, int& j);
+/// Compression that the zone can still carry at a plastic rotation [N], infinity if unlimited.
+double calc_compression_capacity(const CompiledFamily&, double rotation);
+
+/// Six deformations or resultants: x y z translation, x y z rotation.
+struct Six {
+  double c[6] = {0, 0, 0, 0, 0, 0};
+};
+
+enum class BreakReason : std::uint8_t { None, Tension, Crushing, Shear, Rotation, Torsion, Removed };
+
+/// Inelastic history of a station.
+struct StationState {
+  double phi[2] = {0, 0};            // plastic rotations about y, z [rad]
+  double soft[2] = {0, 0};           // added flexibility by damage [rad/(N·m)]
+  double reached = 0;                // largest inelastic rotation so far [rad]
+  double turned = 0;                 // inelastic path length [rad]
+  int k[2] = {0, 0}, j[2] = {0, 0};  // lookup hints
+};
+
+/// Inelastic history of a six-component zone, its last resultants and its ledger.
+struct ZoneState {
+  bool live = true;
+  BreakReason reason = BreakReason::None;
+  double axial = 0;                      // plastic elongation, signed [m]
+  double shortened = 0, elongated = 0;   // accumulated [m]
+  double slip[2] = {0, 0}, slipped = 0;  // [m]
+  double twist = 0, twisted = 0;         // [rad]
+  StationState station[2];
+  // a law taking over within a ramp
+  int next_law = -1;
+  double ramp_begin = 0, ramp = 0;
+  double elastic[6] = {0, 0, 0, 0, 0, 0};  // elastic deformation of the step before
+  bool has_elastic = false;
+  double normal_force = 0;                             // elastic part of the first resultant, or the external one [N]
+  Six resultant;                                       // elastic and damping together
+  double energy = 0;                                   // stored [J]
+  double plastic = 0;                                  // dissipated [J]
+  double damping = 0;                                  // dissipated [J]
+  double damping_power_force[6] = {0, 0, 0, 0, 0, 0};  // damper's part of the step before
+  bool yielded = false, softening = false;             // for reporting, only ever set
+};
+
+/// Constants of a zone for evaluation.
+struct ZoneParameters {
+  double stiffness[6];
+  double damping[6];
+  int stations = 0;
+  double x[2] = {0, 0};
+  int law[2] = {-1, -1};
+  bool external_axial =
+      false;  // the deformation's first component is the normal force itself; it follows no limit here
+};
+
+/// Evaluates a live zone at a deformation: sets resultant, history, energies; breaks it where a limit of rupture is
+/// passed.
+///   time  of the evaluation [s]; h  since the last one [s], 0 when there is none
+void advance_zone(const ZoneParameters&, const std::vector<CompiledLaw>&, const Six& deformation, double time, double h,
+                  ZoneState&);
+/// Ends a zone: what it stores is booked as dissipated.
+void break_zone(ZoneState&, BreakReason);
+
+/// Largest demand over capacity of a live zone at its last evaluation.
+double calc_utilisation(const ZoneParameters&, const std::vector<CompiledLaw>&, double time, const ZoneState&);
+
+/// Whether a live zone has lost strength: a section shortened to less than 95 % of its compression capacity, or limit
+/// moments below 85 % of those at its first yield (same normal force).
+bool is_softening(const ZoneParameters&, const std::vector<CompiledLaw>&, double time, const ZoneState&);
+
+}  // namespace topple::mbs
