@@ -1,6 +1,6 @@
 import type { Finding, Run } from "./data";
 import { StatusSign, StatusWord } from "./signs";
-import { formatDuration } from "./units";
+import { formatDate, formatDuration } from "./units";
 import { endingWord } from "./vocabulary";
 
 /// The finding that says what happens: the mechanism, else the first one.
@@ -17,7 +17,7 @@ export function Header(props: { run: Run }) {
       <div class="title-row">
         <h1>{provenance.title || "Untitled plan"}</h1>
         <p class="subtitle">
-          topple {provenance.program_version} · {provenance.created || "date unknown"}
+          topple {provenance.program_version} · {formatDate(provenance.created) || "date unknown"}
           {provenance.wall_time === null ? "" : ` · computed in ${formatDuration(provenance.wall_time)}`}
         </p>
       </div>
@@ -66,12 +66,10 @@ export function Findings(props: { run: Run }) {
             <div class="finding" data-finding={finding.id}>
               <StatusSign status={finding.status} />
               <div>
-                <p class="finding-title">
-                  {finding.title !== group.heading && <strong>{finding.title}</strong>}
-                  <StatusWord status={finding.status} />
-                </p>
+                {finding.title !== group.heading && <p class="finding-title">{finding.title}</p>}
                 <p>{finding.text}</p>
               </div>
+              <StatusWord status={finding.status} />
             </div>
           ))}
         </div>

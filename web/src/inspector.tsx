@@ -31,7 +31,7 @@ export function Inspector(props: { state: State }) {
   const events = run.events.filter((e) => names.has(e.subject)).slice(0, 20);
 
   return (
-    <aside class="inspector" aria-label="Member" data-test="inspector">
+    <aside class="panel inspector" aria-label="Member" data-test="inspector">
       <div class="inspector-head">
         <h2 data-test="member-name">{body.name}</h2>
         <button type="button" class="close" aria-label="Close" title="Close (Esc)" onClick={() => (state.selected.value = -1)}>

@@ -1,4 +1,4 @@
-import { useEffect, useRef } from "preact/hooks";
+import { useLayoutEffect, useRef } from "preact/hooks";
 import type { State } from "./state";
 
 const keys: [string, string][] = [
@@ -16,7 +16,7 @@ export function listenToKeys(state: State, fit: () => void): void {
     if (event.ctrlKey || event.altKey || event.metaKey) return;
     const target = event.target instanceof HTMLElement ? event.target : document.body;
     const isSlider = target instanceof HTMLInputElement && target.type === "range";
-    if (!isSlider && target.matches("input, select, textarea")) return;
+    if (!isSlider && event.key !== "Escape" && target.matches("input, select, textarea")) return;
     // What the keyboard has reached keeps its own keys.
     if (event.key === " " && target.matches("button:focus-visible, summary, .scroller")) return;
     if (target.matches(".scroller, pre") && ["Home", "End", "ArrowLeft", "ArrowRight"].includes(event.key)) return;
@@ -45,7 +45,7 @@ export function Help(props: { state: State }) {
   const { state } = props;
   const dialog = useRef<HTMLDialogElement>(null);
   const open = state.helpOpen.value;
-  useEffect(() => {
+  useLayoutEffect(() => {
     const element = dialog.current;
     if (element === null || element.open === open) return;
     if (open) element.showModal();

@@ -4,6 +4,7 @@ import { render } from "preact";
 import { useState } from "preact/hooks";
 import { readRun, type Run } from "./data";
 import { Findings, Header, NotModelled } from "./findings";
+import { Inspector } from "./inspector";
 import { Help, listenToKeys } from "./keys";
 import { Plots } from "./plots";
 import type { Scene } from "./scene";
@@ -39,13 +40,14 @@ function Page(props: { state: State; fitRef: { current: () => void } }) {
         <div class="stage">
           <View3D state={state} onReady={onReady} fitRef={fitRef} />
           <Timeline state={state} />
+          <Stills state={state} stills={stills} />
         </div>
         <div class="side">
+          <Inspector state={state} />
           <Findings run={run} />
           <NotModelled run={run} />
         </div>
         <div class="below">
-          <Stills state={state} stills={stills} />
           <Plots state={state} />
           <div class="tables">
             <Events state={state} />

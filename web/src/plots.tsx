@@ -3,7 +3,7 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import uPlot from "uplot";
 import type { Series } from "./data";
 import type { State } from "./state";
-import { formatNumber, toReadable } from "./units";
+import { formatNumber, formatValue, toReadable } from "./units";
 import { groupOrder, groupWord, seriesColours, seriesDashes } from "./vocabulary";
 
 interface Group {
@@ -79,7 +79,7 @@ function PlotPanel(props: { state: State; group: Group }) {
           })),
         ],
         hooks: {
-          drawClear: [
+          drawAxes: [
             (u) => {
               const { ctx } = u;
               ctx.save();
@@ -118,6 +118,11 @@ function PlotPanel(props: { state: State; group: Group }) {
       placeLine();
     });
     observer.observe(element);
+    // Two plots side by side on A4; the paper's layout comes too late for the observer.
+    const beforePrint = (): void => plot.setSize({ width: 330, height: 200 });
+    const afterPrint = (): void => plot.setSize({ width: Math.max(200, element.clientWidth), height: 220 });
+    addEventListener("beforeprint", beforePrint);
+    addEventListener("afterprint", afterPrint);
     const dark = matchMedia("(prefers-color-scheme: dark)");
     const redraw = (): void => plot.redraw();
     dark.addEventListener("change", redraw);
@@ -125,6 +130,8 @@ function PlotPanel(props: { state: State; group: Group }) {
     return () => {
       stop();
       observer.disconnect();
+      removeEventListener("beforeprint", beforePrint);
+      removeEventListener("afterprint", afterPrint);
       dark.removeEventListener("change", redraw);
       plot.destroy();
     };
@@ -163,7 +170,7 @@ function PlotLegend(props: { state: State; group: Group; values: (number | null)
               stroke-dasharray={(seriesDashes[i % seriesDashes.length] as number[]).join(" ")}
             />
           </svg>
-          {s.title} <span class="number">{formatNumber(values[i]?.[frame])} {group.unit}</span>
+          {s.title} <span class="number now">{formatValue(values[i]?.[frame], group.unit)}</span>
         </li>
       ))}
     </ul>
@@ -209,7 +216,7 @@ export function Plots(props: { state: State }) {
   if (groups.length === 0 || props.state.run.time.length === 0)
     return <section class="panel"><h2>Plots</h2><p class="quiet">The record holds no series.</p></section>;
   return (
-    <div class="plots">
+    <div class={groups.length === 2 || groups.length === 4 ? "plots even" : "plots"}>
       {groups.map((group) => (
         <PlotPanel state={props.state} group={group} />
       ))}

@@ -79,9 +79,10 @@ export class Scene {
   private readonly bodyPose: THREE.Matrix4[];
   private readonly marks: THREE.InstancedMesh[];
   private readonly zonePlace: { body: number; local: THREE.Vector3 }[];
-  private readonly selection: THREE.LineSegments;
+  private readonly selection: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
   private readonly site: Site;
   private readonly bounds = new THREE.Box3();
+  private readonly fitPoints: THREE.Vector3[] = [];
   private readonly kinds: string[];
   private readonly markSize: number;
   private width = 1;
@@ -105,16 +106,15 @@ export class Scene {
 
     this.boxes = this.makeBoxes();
     this.scene.add(this.boxes);
-    this.calcBounds();
-    const buildingHeight = Math.max(1, this.calcBoundsAt(0).max.z);
-    this.markSize = Math.min(0.6, Math.max(0.15, buildingHeight * 0.016));
+    this.collectFitPoints();
+    const buildingHeight = Math.max(1, this.bounds.max.z);
+    this.markSize = Math.min(0.6, Math.max(0.15, buildingHeight * 0.013));
 
     const area = this.bounds.clone();
     for (const n of run.neighbours) for (const [x, y] of n.footprint) if (Number.isFinite(x + y)) area.expandByPoint(new THREE.Vector3(x, y, 0));
     this.site = new Site(run, area, buildingHeight);
     this.gridStep = this.site.gridStep;
     this.scene.add(this.site.group);
-    this.fitToNeighbours(area);
 
     this.zonePlace = run.zones.map((zone) => this.placeZone(zone.place, zone.body_a >= 0 ? zone.body_a : zone.body_b));
     this.marks = zoneStates.map((state) => {
@@ -131,7 +131,7 @@ export class Scene {
     });
 
     const edges = new THREE.EdgesGeometry(new THREE.BoxGeometry(1, 1, 1));
-    this.selection = new THREE.LineSegments(edges, new THREE.LineBasicMaterial({ color: "#d55e00", depthTest: false }));
+    this.selection = new THREE.LineSegments(edges, new THREE.LineBasicMaterial({ depthTest: false }));
     this.selection.renderOrder = 15;
     this.selection.matrixAutoUpdate = false;
     this.selection.visible = false;
@@ -200,9 +200,9 @@ export class Scene {
     }
   }
 
-  private calcBoundsAt(t: number): THREE.Box3 {
-    const box = new THREE.Box3();
-    if (this.run.time.length === 0) return box.set(new THREE.Vector3(), new THREE.Vector3(1, 1, 1));
+  private calcCornersAt(t: number): THREE.Vector3[] {
+    const corners: THREE.Vector3[] = [];
+    if (this.run.time.length === 0) return corners;
     this.calcBodyPoses(t);
     this.shapePose.forEach((shape, i) => {
       const body = this.bodyOfInstance[i] as number;
@@ -211,22 +211,28 @@ export class Scene {
       this.matrix.multiplyMatrices(this.bodyPose[body] as THREE.Matrix4, shape);
       if (this.matrix.determinant() === 0) return;
       for (let k = 0; k < 8; ++k)
-        box.expandByPoint(this.point.set((k & 1) - 0.5, ((k >> 1) & 1) - 0.5, ((k >> 2) & 1) - 0.5).applyMatrix4(this.matrix));
+        corners.push(new THREE.Vector3((k & 1) - 0.5, ((k >> 1) & 1) - 0.5, ((k >> 2) & 1) - 0.5).applyMatrix4(this.matrix));
     });
-    return box.isEmpty() ? box.set(new THREE.Vector3(), new THREE.Vector3(1, 1, 1)) : box;
+    return corners;
   }
 
-  private calcBounds(): void {
+  /// What a fitted picture must show: the building all along the run and the neighbours near to it.
+  private collectFitPoints(): void {
     const { time } = this.run;
-    for (const s of [0, 0.25, 0.5, 0.75, 1]) this.bounds.union(this.calcBoundsAt(time[Math.round(s * (time.length - 1))] ?? 0));
-    this.bounds.min.z = Math.max(this.bounds.min.z, -2);
-    for (const [x, y] of this.run.building_outline) this.bounds.expandByPoint(this.point.set(x, y, 0));
-  }
-
-  /// Neighbours belong into the picture unless they would make the building small.
-  private fitToNeighbours(area: THREE.Box3): void {
-    const own = this.bounds.getSize(new THREE.Vector3()).length();
-    if (area.getSize(new THREE.Vector3()).length() < 1.7 * own) this.bounds.union(area);
+    for (const s of [0, 0.25, 0.5, 0.75, 1])
+      for (const corner of this.calcCornersAt(time[Math.round(s * (time.length - 1))] ?? 0)) {
+        corner.z = Math.max(corner.z, -2);
+        this.fitPoints.push(corner);
+      }
+    for (const [x, y] of this.run.building_outline) this.fitPoints.push(new THREE.Vector3(x, y, 0));
+    if (this.fitPoints.length === 0) this.fitPoints.push(new THREE.Vector3(-5, -5, 0), new THREE.Vector3(5, 5, 5));
+    this.bounds.setFromPoints(this.fitPoints);
+    const near = this.bounds.clone().expandByScalar(0.5 * this.bounds.getSize(new THREE.Vector3()).length());
+    for (const neighbour of this.run.neighbours) {
+      if (neighbour.is_utility) continue;
+      const corners = neighbour.footprint.map(([x, y]) => new THREE.Vector3(x, y, 0));
+      if (corners.every((c) => near.containsPoint(c))) this.fitPoints.push(...corners);
+    }
   }
 
   setDark(dark: boolean): void {
@@ -234,6 +240,7 @@ export class Scene {
     const theme = dark ? darkTheme : lightTheme;
     this.scene.background = new THREE.Color(theme.background);
     this.site.setTheme(theme);
+    this.selection.material.color.set(theme.selection);
     this.onChange();
   }
 
@@ -307,7 +314,8 @@ export class Scene {
   private readonly colour = new THREE.Color();
   private colourBoxes(): void {
     const { frame } = findFrame(this.run.time, this.time);
-    const colours = this.run.bodies.map((_, body) => (body === this.selected ? "#f5d033" : this.colourOfBody(body, frame)));
+    const marked = this.colouring === "kind" ? this.selected : -1;
+    const colours = this.run.bodies.map((_, body) => (body === marked ? "#f5d033" : this.colourOfBody(body, frame)));
     for (let i = 0; i < this.bodyOfInstance.length; ++i)
       this.boxes.setColorAt(i, this.colour.set(colours[this.bodyOfInstance[i] as number] as string));
     if (this.boxes.instanceColor !== null) this.boxes.instanceColor.needsUpdate = true;
@@ -335,30 +343,35 @@ export class Scene {
     this.site.setViewport(height, fov);
   }
 
-  /// Looks at the whole collapse from one side.
+  /// Looks at the whole collapse from one side, as near as the picture allows.
   fit(view?: View): void {
-    const centre = this.bounds.getCenter(new THREE.Vector3());
     const from = view === undefined ? this.camera.position.clone().sub(this.controls.target) : new THREE.Vector3(...viewDirections[view]);
     from.normalize();
     const right = new THREE.Vector3().crossVectors(this.camera.up, from).normalize();
     const up = new THREE.Vector3().crossVectors(from, right);
-    const tall = Math.tan((fov * Math.PI) / 360);
+    const tall = Math.tan((fov * Math.PI) / 360) / 1.05;
     const wide = tall * this.camera.aspect;
-    let distance = 1;
-    for (let k = 0; k < 8; ++k) {
-      const corner = new THREE.Vector3(
-        k & 1 ? this.bounds.max.x : this.bounds.min.x,
-        k & 2 ? this.bounds.max.y : this.bounds.min.y,
-        k & 4 ? this.bounds.max.z : this.bounds.min.z,
-      ).sub(centre);
-      const ahead = corner.dot(from);
-      distance = Math.max(distance, Math.abs(corner.dot(right)) / wide + ahead, Math.abs(corner.dot(up)) / tall + ahead);
+    // A point at (x, y, z) along right, up and from is in the picture if |x - cx| <= (d - z) wide, and so for y: the
+    // largest of x / wide + z and of -x / wide + z give d and cx.
+    let east = -Infinity, west = -Infinity, north = -Infinity, south = -Infinity;
+    for (const point of this.fitPoints) {
+      const x = point.dot(right) / wide, y = point.dot(up) / tall, z = point.dot(from);
+      east = Math.max(east, z + x);
+      west = Math.max(west, z - x);
+      north = Math.max(north, z + y);
+      south = Math.max(south, z - y);
     }
-    this.camera.position.copy(centre).addScaledVector(from, 1.06 * distance);
+    const d = Math.max((east + west) / 2, (north + south) / 2);
+    const depth = this.bounds.getCenter(new THREE.Vector3()).dot(from);
+    const distance = Math.max(1, d - depth);
+    this.controls.target
+      .copy(right).multiplyScalar((wide * (east - west)) / 2)
+      .addScaledVector(up, (tall * (north - south)) / 2)
+      .addScaledVector(from, depth);
+    this.camera.position.copy(this.controls.target).addScaledVector(from, distance);
     this.camera.near = distance / 100;
-    this.camera.far = distance * 10;
+    this.camera.far = distance * 12;
     this.camera.updateProjectionMatrix();
-    this.controls.target.copy(centre);
     this.controls.update();
     this.onChange();
   }
@@ -377,13 +390,15 @@ export class Scene {
 
   /// Pictures of the run at given times, on a light ground so that they print well.
   makeStills(times: readonly number[], width: number, height: number): string[] {
-    const { time, selected, dark } = this;
+    const { time, selected, dark, colouring, zoneMarks } = this;
     const changed = this.onChange;
     const ratio = this.renderer.getPixelRatio();
     const eye = this.camera.position.clone();
     const target = this.controls.target.clone();
     this.onChange = () => undefined;
     this.selected = -1;
+    this.colouring = "kind";
+    this.zoneMarks = "none";
     this.setDark(false);
     this.renderer.setPixelRatio(1);
     this.renderer.setSize(width, height, false);
@@ -402,6 +417,8 @@ export class Scene {
     this.camera.position.copy(eye);
     this.controls.target.copy(target);
     this.selected = selected;
+    this.colouring = colouring;
+    this.zoneMarks = zoneMarks;
     this.renderer.setPixelRatio(ratio);
     this.setDark(dark);
     this.resize(this.width, this.height);

@@ -9,6 +9,7 @@ export interface Theme {
   outline: string;
   neighbour: string;
   utility: string;
+  selection: string;
 }
 export const lightTheme: Theme = {
   background: "#f4f6f8",
@@ -17,6 +18,7 @@ export const lightTheme: Theme = {
   outline: "#1f4e79",
   neighbour: "#6b4f8a",
   utility: "#b3590a",
+  selection: "#c2005f",
 };
 export const darkTheme: Theme = {
   background: "#14181d",
@@ -25,6 +27,7 @@ export const darkTheme: Theme = {
   outline: "#8ec5f0",
   neighbour: "#b79be0",
   utility: "#f0a35e",
+  selection: "#ffd23f",
 };
 
 /// A flat band of some width along a polygon; WebGL's own lines are one pixel wide.
@@ -83,13 +86,13 @@ function makeLabel(text: string): THREE.Sprite {
 export class Site {
   readonly group = new THREE.Group();
   readonly gridStep: number;
-  private readonly materials: Record<keyof Omit<Theme, "background">, THREE.Material & { color: THREE.Color }>;
+  private readonly materials: Record<keyof Omit<Theme, "background" | "selection">, THREE.Material & { color: THREE.Color }>;
   private readonly labels: THREE.Sprite[] = [];
 
   /// `area` is what must lie on the ground plane; `height` that of the building [m].
   constructor(run: Run, area: THREE.Box3, height: number) {
     const size = Math.max(area.max.x - area.min.x, area.max.y - area.min.y, 10);
-    this.gridStep = [1, 2, 5, 10, 20, 50, 100].find((s) => size / s <= 40) ?? 200;
+    this.gridStep = [1, 2, 5, 10, 20, 50, 100].find((s) => size / s <= 24) ?? 200;
     const flat = { side: THREE.DoubleSide };
     this.materials = {
       ground: new THREE.MeshBasicMaterial({ ...flat, polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 }),

@@ -17,7 +17,8 @@ export function makeState(run: Run) {
   const playing = signal(false);
   const hiddenKinds = signal<ReadonlySet<string>>(chooseHiddenKinds(run));
   const frame = computed(() => findFrame(run.time, time.value).frame);
-  const shownEvents = computed(() => run.events.filter((e) => !hiddenKinds.value.has(e.kind)));
+  const inOrder = [...run.events].sort((a, b) => a.time - b.time);
+  const shownEvents = computed(() => inOrder.filter((e) => !hiddenKinds.value.has(e.kind)));
 
   const seek = (t: number): void => {
     time.value = Math.min(end, Math.max(begin, t));
@@ -65,6 +66,13 @@ export function makeState(run: Run) {
   };
 }
 export type State = ReturnType<typeof makeState>;
+
+/// Brings the picture back into view after a jump from further down the page.
+export function showStage(): void {
+  const stage = document.querySelector(".stage");
+  const top = stage?.getBoundingClientRect().top ?? 0;
+  if (top < -80) stage?.scrollIntoView({ behavior: reducedMotion() ? "auto" : "smooth", block: "start" });
+}
 
 /// A long list starts with what an engineer asks for first; nothing is hidden in a short one.
 function chooseHiddenKinds(run: Run): ReadonlySet<string> {

@@ -1,5 +1,5 @@
 import type { Run } from "./data";
-import type { State } from "./state";
+import { showStage, type State } from "./state";
 import { formatTime } from "./units";
 
 export interface Still {
@@ -8,7 +8,8 @@ export interface Still {
   picture: string;
 }
 
-/// Moments that tell the story: before anything, after each stage, first touchdown, the end, and what lies between.
+/// Moments that tell the story: before anything, what each stage left when the next one fires, the first touchdown, the
+/// end, and what lies between.
 export function chooseMoments(run: Run, count = 6): { time: number; caption: string }[] {
   const begin = run.time[0];
   const end = run.time[run.time.length - 1];
@@ -20,13 +21,14 @@ export function chooseMoments(run: Run, count = 6): { time: number; caption: str
     const add = (time: number, caption: string, rank: number): void => {
       if (time > begin && time < end && moments.every((m) => Math.abs(m.time - time) > least)) moments.push({ time, caption, rank });
     };
-    for (const e of run.events.filter((e) => e.kind === "stage")) add(e.time, e.subject || "stage", 1);
+    const stages = run.events.filter((e) => e.kind === "stage");
+    for (const e of stages.slice(1)) add(e.time, `before ${e.subject || "the next stage"}`, 1);
     const touchdown = run.events.find((e) => e.kind === "touchdown");
     if (touchdown !== undefined) add(touchdown.time, "first touchdown", 1);
     while (moments.length < count) {
       moments.sort((a, b) => a.time - b.time);
       // The widest gap says least about what happens in it; the quiet time before the last stage counts little.
-      const lastStage = Math.max(begin, ...run.events.filter((e) => e.kind === "stage").map((e) => e.time));
+      const lastStage = Math.max(begin, ...stages.map((e) => e.time));
       let best = -1;
       let gap = 0;
       for (let i = 0; i + 1 < moments.length; ++i) {
@@ -58,7 +60,7 @@ export function Stills(props: { state: State; stills: Still[] }) {
       <h2>Sequence</h2>
       <div class="still-row">
         {props.stills.map((still) => (
-          <button type="button" title="Go to this time" onClick={() => props.state.pauseAt(still.time)}>
+          <button type="button" title="Go to this time" onClick={() => (props.state.pauseAt(still.time), showStage())}>
             <img src={still.picture} alt={`The building at ${formatTime(still.time)}${still.caption === "" ? "" : `, ${still.caption}`}`} />
             <span><strong>{formatTime(still.time)}</strong>{still.caption === "" ? "" : ` ${still.caption}`}</span>
           </button>

@@ -1,7 +1,8 @@
+import { useComputed } from "@preact/signals";
 import type { Run } from "./data";
 import { EventSign } from "./signs";
-import type { State } from "./state";
-import { formatDuration, formatMass, formatNumber, formatTime } from "./units";
+import { showStage, type State } from "./state";
+import { formatDate, formatDuration, formatMass, formatNumber, formatTime } from "./units";
 import { wordsOfEvent } from "./vocabulary";
 import { findBody } from "./zones";
 
@@ -16,7 +17,8 @@ export function Events(props: { state: State }) {
     if (!next.delete(kind)) next.add(kind);
     state.hiddenKinds.value = next;
   };
-  const now = state.time.value;
+  // Changes only when an event passes, not with every frame.
+  const past = useComputed(() => state.shownEvents.value.filter((e) => e.time <= state.time.value).length).value;
   return (
     <section class="panel events" aria-label="Events">
       <h2>Events</h2>
@@ -31,13 +33,14 @@ export function Events(props: { state: State }) {
         </div>
       )}
       <div class="scroller" tabIndex={0} role="region" aria-label="List of events">
-        {state.shownEvents.value.map((event) => (
+        {state.shownEvents.value.map((event, i) => (
           <button
             type="button"
-            class={`event-link ${event.time <= now ? "past" : ""}`}
+            class={`event-link ${i < past ? "past" : ""}`}
             data-event-time={event.time}
             onClick={() => {
               state.pauseAt(event.time);
+              showStage();
               const body = findBody(run, event.subject);
               if (body >= 0) state.selected.value = body;
             }}
@@ -104,7 +107,7 @@ export function Details(props: { run: Run }) {
     ["Program", `topple ${p.program_version}`],
     ["Engine", p.engine || "–"],
     ["Machine", p.machine || "–"],
-    ["Created", p.created || "–"],
+    ["Created", formatDate(p.created) || "–"],
     ["Seed", p.seed],
     ["Step", p.step === null ? "–" : `${formatNumber(p.step * 1000, 3)} ms`],
     ["Frames", String(time.length)],

@@ -1,4 +1,4 @@
-import { useState } from "preact/hooks";
+import { useMemo, useState } from "preact/hooks";
 import type { RunEvent } from "./data";
 import { EventSign } from "./signs";
 import { speeds, type State } from "./state";
@@ -16,7 +16,7 @@ interface Marker {
 function makeMarkers(state: State): Marker[] {
   const span = state.end - state.begin;
   const markers: Marker[] = [];
-  for (const event of [...state.shownEvents.value].sort((a, b) => a.time - b.time)) {
+  for (const event of state.shownEvents.value) {
     if (event.time < state.begin || event.time > state.end) continue;
     const at = span > 0 ? (event.time - state.begin) / span : 0;
     const lane = wordsOfEvent(event.kind).small ? 1 : 0;
@@ -36,9 +36,11 @@ function describe(marker: Marker): string[] {
 function Markers(props: { state: State }) {
   const { state } = props;
   const [open, setOpen] = useState<Marker>();
+  const events = state.shownEvents.value;
+  const markers = useMemo(() => makeMarkers(state), [events]);
   return (
     <div class="markers">
-      {makeMarkers(state).map((marker) => (
+      {markers.map((marker) => (
         <button
           type="button"
           class={`marker lane-${marker.lane}`}
@@ -92,27 +94,47 @@ function IconButton(props: { icon: keyof typeof icons; label: string; keys: stri
   );
 }
 
+// Slider and clock follow the time on their own, so that the rest stands still while playing.
+function Slider(props: { state: State }) {
+  const { state } = props;
+  return (
+    <input
+      type="range"
+      data-test="slider"
+      aria-label="Time"
+      aria-valuetext={formatTime(state.time.value)}
+      min={state.begin}
+      max={state.end}
+      step="any"
+      value={state.time.value}
+      disabled={state.run.time.length < 2}
+      onInput={(e) => state.pauseAt(e.currentTarget.valueAsNumber)}
+    />
+  );
+}
+
+function Clock(props: { state: State }) {
+  const { state } = props;
+  const frames = state.run.time.length;
+  return (
+    <span class="clock">
+      <strong data-test="time">{formatTime(state.time.value)}</strong> of {formatTime(state.end)}
+      <span class="quiet">
+        {" "}
+        · frame {frames === 0 ? 0 : state.frame.value + 1} of {frames}
+      </span>
+    </span>
+  );
+}
+
 export function Timeline(props: { state: State }) {
   const { state } = props;
-  const { run } = state;
   const playing = state.playing.value;
-  const disabled = run.time.length < 2;
   return (
     <section class="panel timeline" aria-label="Timeline">
       <div class="track">
         <Markers state={state} />
-        <input
-          type="range"
-          data-test="slider"
-          aria-label="Time"
-          aria-valuetext={formatTime(state.time.value)}
-          min={state.begin}
-          max={state.end}
-          step="any"
-          value={state.time.value}
-          disabled={disabled}
-          onInput={(e) => state.pauseAt(e.currentTarget.valueAsNumber)}
-        />
+        <Slider state={state} />
       </div>
       <div class="transport">
         <IconButton icon="begin" label="To the beginning" keys="Home" onClick={() => state.pauseAt(state.begin)} />
@@ -138,13 +160,7 @@ export function Timeline(props: { state: State }) {
           </select>
         </label>
         <span class="spring" />
-        <span class="clock">
-          <strong data-test="time">{formatTime(state.time.value)}</strong> of {formatTime(state.end)}
-          <span class="quiet">
-            {" "}
-            · frame {run.time.length === 0 ? 0 : state.frame.value + 1} of {run.time.length}
-          </span>
-        </span>
+        <Clock state={state} />
         <button type="button" class="icon" aria-label="Keys" title="Keys (?)" onClick={() => (state.helpOpen.value = true)}>
           ?
         </button>

@@ -35,10 +35,16 @@ export function formatNumber(value: number | null | undefined, digits = 4): stri
   return value.toFixed(decimals).replace("-", "−");
 }
 
-export function formatWith(value: number | null | undefined, unit: string): string {
-  const to = toReadable(unit);
-  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
-  return `${formatNumber(value * to.factor)} ${to.unit}`.trim();
+/// A readable number with its unit.
+export function formatValue(value: number | null | undefined, unit: string): string {
+  const number = formatNumber(value);
+  return number === "–" ? number : `${number}${unit === "°" ? "" : " "}${unit}`.trim();
+}
+
+/// "2026-01-01 12:00 UTC" from ISO 8601; anything else stays as it is.
+export function formatDate(text: string): string {
+  const found = /^(\d{4}-\d\d-\d\d)T(\d\d:\d\d)[\d:.]*Z$/.exec(text);
+  return found === null ? text : `${found[1]} ${found[2]} UTC`;
 }
 
 export function formatTime(t: number): string {

@@ -1,6 +1,5 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { effect } from "@preact/signals";
-import { Inspector } from "./inspector";
 import { Scene, type View } from "./scene";
 import { Sign } from "./signs";
 import type { Colouring, State, ZoneMarks } from "./state";
@@ -199,7 +198,6 @@ export function View3D(props: { state: State; onReady: (scene: Scene | undefined
         {hover !== undefined && (
           <span class="hover-name" style={{ left: `${hover.x + 12}px`, top: `${hover.y + 12}px` }}>{hover.name}</span>
         )}
-        <Inspector state={state} />
       </div>
       {problem === "" && <Legend state={state} gridStep={gridStep} />}
     </section>

@@ -30,7 +30,7 @@ export const kindWord: Record<string, string> = {
 const kindColours: Record<string, string> = {
   column: "#2f6f9f",
   beam: "#6aaed6",
-  slab: "#b9c0c7",
+  slab: "#c9ced3",
   wall: "#d9b98c",
   node: "#8b97a3",
   stump: "#8a5a3c",

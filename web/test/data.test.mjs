@@ -1,0 +1,116 @@
+// The parts of the page that need no browser.
+import assert from "node:assert/strict";
+import { describe, it } from "node:test";
+import { build } from "esbuild";
+import { makeSynthetic } from "./synthetic.mjs";
+
+async function load(file) {
+  const result = await build({
+    entryPoints: [new URL(`../src/${file}`, import.meta.url).pathname],
+    bundle: true, write: false, format: "esm", jsx: "automatic", jsxImportSource: "preact", logLevel: "error",
+    external: [],
+  });
+  return import(`data:text/javascript;base64,${Buffer.from(result.outputFiles[0].text).toString("base64")}`);
+}
+
+const { decodeFloats, findFrame, slerp, readRun, calcPose } = await load("data.ts");
+const { formatNumber, formatValue, toReadable, formatDuration, formatDate, formatMass } = await load("units.ts");
+const { chooseMoments } = await load("stills.tsx");
+const { findZonesOfBodies, findBody } = await load("zones.ts");
+const { colourOfUtilisation } = await load("vocabulary.ts");
+
+describe("data", () => {
+  it("reads little-endian floats", () => {
+    // 1.0 is 00 00 80 3f, -2.5 is 00 00 20 c0.
+    assert.deepEqual([...decodeFloats(Buffer.from("0000803f000020c0", "hex").toString("base64"))], [1, -2.5]);
+  });
+
+  it("finds the frame at or before a time", () => {
+    const time = [0, 1, 3, 4];
+    assert.deepEqual(findFrame(time, -1), { frame: 0, fraction: 0 });
+    assert.deepEqual(findFrame(time, 0), { frame: 0, fraction: 0 });
+    assert.deepEqual(findFrame(time, 1), { frame: 1, fraction: 0 });
+    assert.deepEqual(findFrame(time, 2.5), { frame: 1, fraction: 0.75 });
+    assert.deepEqual(findFrame(time, 9), { frame: 3, fraction: 0 });
+    assert.deepEqual(findFrame([], 1), { frame: 0, fraction: 0 });
+    assert.deepEqual(findFrame([2], 5), { frame: 0, fraction: 0 });
+  });
+
+  it("turns at constant speed on the short way", () => {
+    const turn = (angle, sign = 1) => [sign * Math.cos(angle / 2), 0, sign * Math.sin(angle / 2), 0];
+    for (const sign of [1, -1]) {
+      const q = new Float32Array([...turn(0.2), ...turn(1.8, sign)]);
+      const out = [1, 0, 0, 0];
+      slerp(q, 0, 4, 0.25, out);
+      // Float32 quaternions: 1e-6 is ten times their round-off.
+      turn(0.6).forEach((value, k) => assert.ok(Math.abs(out[k] - value) < 1e-6));
+    }
+  });
+
+  it("interpolates a pose between frames", () => {
+    const run = readRun(JSON.stringify(makeSynthetic(10)));
+    const p = [0, 0, 0], q = [1, 0, 0, 0];
+    const B = run.bodies.length;
+    assert.ok(calcPose(run, 20, 6, 0.5, p, q));
+    const a = run.position[3 * (6 * B + 20)], b = run.position[3 * (7 * B + 20)];
+    assert.ok(Math.abs(p[0] - (a + b) / 2) < 1e-9);
+    assert.ok(Math.abs(Math.hypot(...q) - 1) < 1e-12);
+  });
+
+  it("refuses what is not a run", () => {
+    assert.throws(() => readRun("null"), /does not hold/);
+    const data = makeSynthetic(2);
+    assert.throws(() => readRun(JSON.stringify({ ...data, version: 2 })), /version 2/);
+    assert.throws(() => readRun(JSON.stringify({ ...data, zone_state: "" })), /zone_state/);
+  });
+});
+
+describe("units", () => {
+  it("turns SI into what people read", () => {
+    assert.equal(formatValue(Math.PI * toReadable("rad").factor, toReadable("rad").unit), "180.0°");
+    assert.equal(formatValue(18.64e6 * toReadable("N").factor, toReadable("N").unit), "18.64 MN");
+    assert.equal(formatValue(-45e6 * toReadable("J").factor, toReadable("J").unit), "−45.00 MJ");
+    assert.equal(formatValue(1, "furlong"), "1.000 furlong");
+  });
+
+  it("keeps four digits from small to large", () => {
+    assert.deepEqual([0, 0.00123456, 12.3456, 98765.4, 1.23456e9, null, NaN].map((v) => formatNumber(v)),
+      ["0", "0.001235", "12.35", "98765", "1.235 × 10^9", "–", "–"]);
+  });
+
+  it("writes durations, dates and masses", () => {
+    assert.deepEqual([0.84, 192, 7384, null].map(formatDuration), ["0.840 s", "3 min 12 s", "2 h 3 min", "–"]);
+    assert.equal(formatDate("2026-01-01T12:34:56Z"), "2026-01-01 12:34 UTC");
+    assert.equal(formatDate("yesterday"), "yesterday");
+    assert.equal(formatMass(1.9e6), "1\u202f900 t");
+    assert.equal(formatMass(1464), "1.46 t");
+  });
+});
+
+describe("what is shown", () => {
+  it("chooses six moments from the first frame to the last", () => {
+    const moments = chooseMoments(readRun(JSON.stringify(makeSynthetic(60))));
+    assert.equal(moments.length, 6);
+    const times = moments.map((m) => m.time);
+    assert.deepEqual(times, [...times].sort((a, b) => a - b));
+    assert.equal(times[0], 0);
+    assert.equal(times[5], 9);
+    assert.deepEqual(moments.filter((m) => m.caption !== "").map((m) => m.caption),
+      ["before the first charge", "before Stage 2", "first touchdown", "end"]);
+  });
+
+  it("finds the zones of a member and the member of a zone", () => {
+    const run = readRun(JSON.stringify(makeSynthetic(2)));
+    const zones = findZonesOfBodies(run);
+    const column = run.bodies.findIndex((b) => b.name === "C-D1-0");
+    assert.deepEqual(zones[column].map((z) => run.zones[z].name), ["C-D1-0/foot", "C-D1-0/head"]);
+    assert.equal(findBody(run, "C-D1-0/foot"), column);
+    assert.equal(findBody(run, "C-D1-0"), column);
+    assert.equal(findBody(run, "nobody"), -1);
+  });
+
+  it("keeps the ends of the colour ramp", () => {
+    assert.equal(colourOfUtilisation(0), "rgb(0, 34, 78)");
+    assert.equal(colourOfUtilisation(7), "rgb(254, 232, 56)");
+  });
+});

@@ -1,0 +1,332 @@
+// The built page in a browser. TOPPLE_REPORT=FILE tests a report of a real run instead of the made-up one.
+import assert from "node:assert/strict";
+import { mkdir, readFile } from "node:fs/promises";
+import { resolve } from "node:path";
+import { after, before, describe, it } from "node:test";
+import { fileURLToPath } from "node:url";
+import { openPage } from "./browser.mjs";
+import { hostile, makeEmpty, makeSynthetic, writePage } from "./synthetic.mjs";
+
+const out = fileURLToPath(new URL("out/", import.meta.url));
+const given = process.env.TOPPLE_REPORT;
+const report = given === undefined ? `${out}synthetic.html` : resolve(given);
+
+const clock = async (page) => Number((await page.textContent("[data-test=time]")).replace("−", "-").replace(" s", ""));
+const picture = (page) => page.locator("[data-test=canvas]").screenshot();
+const settle = (page) => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+
+async function readData(path) {
+  const text = await readFile(path, "utf8");
+  const open = '<script type="application/json" id="topple-data">';
+  const begin = text.indexOf(open) + open.length;
+  return JSON.parse(text.slice(begin, text.indexOf("</script", begin)));
+}
+
+/// Nothing sticks out of the window or lies on something else in the same row.
+const findOverflow = (page) =>
+  page.evaluate(() => {
+    const wide = [...document.querySelectorAll(".panel, .verdict, .ending, .toolbar > *, .transport > *")].filter(
+      (e) => e.getClientRects().length > 0 && e.getBoundingClientRect().right > innerWidth + 0.5,
+    );
+    const panels = [...document.querySelectorAll(".panel, .verdict, .ending")].map((e) => [e.className, e.getBoundingClientRect()]);
+    const overlaps = [];
+    for (const [a, r] of panels)
+      for (const [b, s] of panels)
+        if (r !== s && r.left < s.right - 1 && s.left < r.right - 1 && r.top < s.bottom - 1 && s.top < r.bottom - 1) overlaps.push(`${a} on ${b}`);
+    return [...wide.map((e) => `${e.className} is too wide`), ...overlaps];
+  });
+
+describe("report page", { timeout: 240000 }, () => {
+  let browser, page, data;
+  before(async () => {
+    await mkdir(out, { recursive: true });
+    if (given === undefined) await writePage(makeSynthetic(300), report);
+    data = await readData(report);
+    browser = await openPage(report);
+    page = browser.page;
+  });
+  after(() => browser?.close());
+
+  it("shows title, verdict and ending", async () => {
+    assert.equal(await page.textContent("h1"), data.provenance.title || "Untitled plan");
+    const verdict = data.findings.find((f) => f.id === "mechanism") ?? data.findings[0];
+    if (verdict !== undefined) assert.equal(await page.textContent("[data-test=verdict]"), verdict.text);
+    assert.ok((await page.textContent(".ending")).includes(data.ending.text));
+    await page.screenshot({ path: `${out}start.png` });
+  });
+
+  it("lists the findings in their order, each with a word beside its colour", async () => {
+    const ids = await page.$$eval(".finding", (list) => list.map((e) => e.getAttribute("data-finding")));
+    assert.deepEqual(ids, data.findings.map((f) => f.id));
+    const texts = await page.$$eval(".finding", (list) => list.map((e) => e.textContent));
+    const words = { info: "Note", good: "OK", warning: "Caution", bad: "Problem" };
+    data.findings.forEach((f, i) => {
+      assert.ok(texts[i].includes(f.text), f.id);
+      assert.ok(texts[i].includes(words[f.status]), f.id);
+    });
+    for (const text of data.not_modelled) assert.ok((await page.textContent(".not-modelled")).includes(text));
+  });
+
+  it("draws the building", async () => {
+    const colours = await page.evaluate(async () => {
+      const canvas = document.querySelector("[data-test=canvas]");
+      await new Promise((done) => requestAnimationFrame(done));
+      return [canvas.width, canvas.height];
+    });
+    assert.ok(colours[0] > 300 && colours[1] > 300);
+    const stills = await page.$$eval(".still-row img", (list) => list.map((i) => i.src));
+    assert.ok(stills.length >= 2);
+    assert.ok(stills.every((src) => src.startsWith("data:image/png;base64,") && src.length > 3000));
+    if (data.time.length > 1) assert.notEqual(stills[0], stills[stills.length - 1], "the first and the last still are the same");
+  });
+
+  it("plays", async () => {
+    await page.keyboard.press("Home");
+    // From where something moves: half way to the end.
+    await page.locator("[data-test=slider]").fill(String((data.time[0] + data.time[data.time.length - 1]) / 2));
+    await settle(page);
+    const begin = await clock(page);
+    const still = await picture(page);
+    await page.click("[data-test=play]");
+    await page.waitForFunction((t) => parseFloat(document.querySelector("[data-test=time]").textContent) > t + 0.3, begin);
+    await page.keyboard.press("Space");
+    const paused = await clock(page);
+    assert.ok(paused > begin);
+    assert.notDeepEqual(await picture(page), still, "the picture did not change");
+    await page.waitForTimeout(200);
+    assert.equal(await clock(page), paused, "space did not pause");
+  });
+
+  it("plays at the chosen speed and stops at the end", async () => {
+    const end = data.time[data.time.length - 1];
+    await page.locator("[data-test=slider]").fill(String(end - 0.2));
+    await page.selectOption(".transport select", "4");
+    await page.click("[data-test=play]");
+    await page.waitForFunction(() => document.querySelector("[data-test=play]").getAttribute("aria-label") === "Play");
+    assert.ok(Math.abs((await clock(page)) - end) < 6e-4); // the clock shows milliseconds
+    await page.selectOption(".transport select", "1");
+    await page.screenshot({ path: `${out}end.png` });
+  });
+
+  it("steps by keys", async () => {
+    await page.locator("h1").click();
+    await page.keyboard.press("Home");
+    assert.ok(Math.abs((await clock(page)) - data.time[0]) < 6e-4);
+    await page.keyboard.press("ArrowRight");
+    assert.ok(Math.abs((await clock(page)) - data.time[1]) < 6e-4);
+    await page.keyboard.press("ArrowLeft");
+    assert.ok(Math.abs((await clock(page)) - data.time[0]) < 6e-4);
+    const stage = data.events.find((e) => e.time > data.time[0]);
+    if (stage !== undefined) {
+      await page.keyboard.press("Shift+ArrowRight");
+      const shown = await page.$$eval("[data-event-time]", (list) => list.map((e) => Number(e.getAttribute("data-event-time"))));
+      const next = Math.min(...shown.filter((t) => t > data.time[0] + 1e-6));
+      assert.ok(Math.abs((await clock(page)) - next) < 6e-4);
+    }
+    await page.keyboard.press("End");
+    assert.ok(Math.abs((await clock(page)) - data.time[data.time.length - 1]) < 6e-4);
+    await page.keyboard.press("?");
+    await page.waitForSelector("dialog.help", { state: "visible" });
+    await page.keyboard.press("Escape");
+    await page.waitForSelector("dialog.help", { state: "hidden" });
+  });
+
+  it("fits the picture again after it was turned", async () => {
+    await page.getByRole("button", { name: "Top" }).click();
+    await settle(page);
+    const fitted = await picture(page);
+    const box = await page.locator("[data-test=canvas]").boundingBox();
+    await page.mouse.move(box.x + 200, box.y + 200);
+    await page.mouse.wheel(0, -600);
+    await settle(page);
+    await page.mouse.move(box.x - 10, box.y - 60);
+    await settle(page);
+    assert.notDeepEqual(await picture(page), fitted, "the wheel did not zoom");
+    await page.keyboard.press("f");
+    await settle(page);
+    assert.deepEqual(await picture(page), fitted);
+    await page.getByRole("button", { name: "Oblique" }).click();
+  });
+
+  it("shows the member under the pointer and the one asked for by name", async () => {
+    await page.keyboard.press("Home");
+    const box = await page.locator("[data-test=canvas]").boundingBox();
+    let found = false;
+    for (let i = 0; i < 48 && !found; ++i) {
+      await page.mouse.click(box.x + (box.width * (1 + (i % 8))) / 9, box.y + (box.height * (1 + Math.floor(i / 8))) / 7);
+      found = (await page.locator("[data-test=inspector]").count()) > 0;
+    }
+    assert.ok(found, "no click met a member");
+    const picked = await page.textContent("[data-test=member-name]");
+    assert.ok(data.bodies.some((b) => b.name === picked));
+
+    const zone = data.zones.find((z) => data.bodies.some((b) => b.name === z.member));
+    if (zone !== undefined) {
+      await page.fill("[data-test=member-search]", zone.member);
+      assert.equal(await page.textContent("[data-test=member-name]"), zone.member);
+      const text = await page.textContent("[data-test=inspector]");
+      assert.ok(text.includes(zone.name) && text.includes(zone.subsystem) && text.includes("utilisation"));
+    }
+    for (const colouring of ["state", "utilisation"]) {
+      await page.selectOption("[data-test=colouring]", colouring);
+      await settle(page);
+      await page.screenshot({ path: `${out}${colouring}.png` });
+    }
+    await page.selectOption("[data-test=colouring]", "kind");
+    await page.keyboard.press("Escape");
+  });
+
+  it("gives each plot a table of its values in readable units", async () => {
+    const plots = page.locator(".plot");
+    const count = await plots.count();
+    assert.equal(count, new Set(data.series.map((s) => `${s.group} ${s.unit}`)).size);
+    for (let i = 0; i < count; ++i) {
+      await plots.nth(i).locator("summary").click();
+      if (data.time.length > 0) await plots.nth(i).locator("tbody tr").first().waitFor();
+      assert.equal(await plots.nth(i).locator("tbody tr").count(), data.time.length);
+    }
+    const angle = data.series.find((s) => s.unit === "rad");
+    if (angle !== undefined) {
+      const cell = await page.locator(`[data-plot=${angle.group}] tbody tr:last-child td:nth-child(2)`).textContent();
+      const degrees = (angle.value[angle.value.length - 1] * 180) / Math.PI;
+      assert.ok(Math.abs(Number(cell.replace("−", "-")) - degrees) <= 1e-3 * Math.abs(degrees) + 1e-3); // four digits are shown
+    }
+    for (let i = 0; i < count; ++i) await plots.nth(i).locator("summary").click();
+  });
+
+  it("jumps to a time in a plot", async () => {
+    const over = page.locator(".plot .u-over").first();
+    await over.scrollIntoViewIfNeeded();
+    const box = await over.boundingBox();
+    await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+    const begin = data.time[0], end = data.time[data.time.length - 1];
+    // One pixel of the plot is the accuracy of a click.
+    assert.ok(Math.abs((await clock(page)) - (begin + end) / 2) < (2 * (end - begin)) / box.width);
+  });
+
+  it("jumps to an event of the list", async () => {
+    const event = page.locator("[data-event-time]").last();
+    if ((await event.count()) === 0) return;
+    await event.click();
+    const time = Number(await event.getAttribute("data-event-time"));
+    const end = data.time[data.time.length - 1];
+    assert.ok(Math.abs((await clock(page)) - Math.min(time, end)) < 6e-4);
+  });
+
+  it("says where it comes from", async () => {
+    const details = await page.textContent(".details");
+    const { provenance: p, counts } = data;
+    for (const text of [p.plan_sha256, p.program_version, p.seed, p.engine, p.machine, String(counts.bodies), String(counts.force_elements)])
+      assert.ok(details.includes(text), text);
+    for (const v of data.plan_values) assert.ok((await page.textContent(".plan-values")).includes(v.value));
+  });
+
+  it("fits wide, narrow, dark and printed", async () => {
+    await page.evaluate(() => scrollTo(0, 0));
+    for (const [name, width, height] of [["wide", 1440, 900], ["large", 1920, 1080], ["narrow", 900, 1000], ["phone", 420, 800]]) {
+      await page.setViewportSize({ width, height });
+      await settle(page);
+      assert.deepEqual(await findOverflow(page), [], name);
+      await page.screenshot({ path: `${out}${name}.png`, fullPage: true });
+    }
+    await page.setViewportSize({ width: 1440, height: 900 });
+    await page.emulateMedia({ colorScheme: "dark" });
+    await settle(page);
+    await page.screenshot({ path: `${out}dark.png`, fullPage: true });
+    await page.emulateMedia({ colorScheme: "light" });
+    const pdf = await page.pdf({ path: `${out}print.pdf`, preferCSSPageSize: true, printBackground: true });
+    assert.ok(pdf.length > 20000);
+  });
+
+  it("reports no error and asks the network for nothing", () => assert.deepEqual(browser.problems, []));
+});
+
+describe("unusual reports", { timeout: 120000 }, () => {
+  before(() => mkdir(out, { recursive: true }));
+
+  async function open(name, data, options) {
+    const path = `${out}${name}.html`;
+    await writePage(data, path);
+    const browser = await openPage(path, options);
+    await browser.page.screenshot({ path: `${out}${name}.png`, fullPage: true });
+    return browser;
+  }
+
+  it("shows an empty record", async () => {
+    const browser = await open("empty", makeEmpty());
+    assert.equal(await browser.page.textContent("h1"), "Untitled plan");
+    assert.equal(await browser.page.textContent("[data-test=ending]"), "Calculation failed");
+    for (const key of ["Space", "ArrowRight", "Shift+ArrowRight", "End", "f"]) await browser.page.keyboard.press(key);
+    assert.equal(await clock(browser.page), 0);
+    assert.deepEqual(browser.problems, []);
+    await browser.close();
+  });
+
+  it("shows a single frame without zones and poses that are not numbers", async () => {
+    const data = makeSynthetic(2);
+    const S = 1, B = data.bodies.length;
+    const floats = (text, count) => Buffer.from(text, "base64").subarray(0, 4 * count);
+    const position = floats(data.position, S * B * 3);
+    position.writeFloatLE(NaN, 0);
+    const browser = await open("single", {
+      ...data, time: [0], zones: [], zone_state: "", zone_utilisation: "", position: position.toString("base64"),
+      orientation: floats(data.orientation, S * B * 4).toString("base64"),
+      series: data.series.map((s) => ({ ...s, value: [null] })),
+    });
+    await browser.page.fill("[data-test=member-search]", data.bodies[0].name);
+    assert.equal(await browser.page.textContent("[data-test=member-name]"), data.bodies[0].name);
+    assert.deepEqual(browser.problems, []);
+    await browser.close();
+  });
+
+  it("keeps everything but the picture without WebGL", async () => {
+    const browser = await open("no-webgl", makeSynthetic(20), { webgl: false });
+    assert.ok(await browser.page.isVisible("[data-test=no-webgl]"));
+    assert.equal(await browser.page.locator(".plot").count(), 4);
+    await browser.page.keyboard.press("End");
+    assert.equal(await clock(browser.page), 9);
+    assert.deepEqual(browser.problems.filter((p) => !/WebGL/i.test(p)), []);
+    await browser.close();
+  });
+
+  it("takes names and texts as text", async () => {
+    const browser = await open("hostile", makeSynthetic(3));
+    const { page } = browser;
+    assert.equal(await page.title(), "Storehouse of seven storeys (synthetic) – topple report");
+    assert.equal(await page.locator(".finding[data-finding='clearance.gas'] .finding-title").textContent(), `Gas main ${hostile}`);
+    await page.fill("[data-test=member-search]", hostile);
+    assert.equal(await page.textContent("[data-test=member-name]"), hostile);
+    assert.equal(await page.locator("img[src=x]").count(), 0);
+    assert.deepEqual(browser.problems, []);
+    await browser.close();
+  });
+
+  it("plays in still pictures where reduced motion is asked for", async () => {
+    const browser = await open("reduced", makeSynthetic(50), { reducedMotion: "reduce" });
+    const { page } = browser;
+    const seen = await page.evaluate(async () => {
+      const times = new Set();
+      document.querySelector("[data-test=play]").click();
+      const end = performance.now() + 1500;
+      while (performance.now() < end) {
+        times.add(document.querySelector("[data-test=time]").textContent);
+        await new Promise((done) => requestAnimationFrame(done));
+      }
+      return times.size;
+    });
+    // 1.5 s at four pictures a second, and the first one.
+    assert.ok(seen >= 2 && seen <= 8, `${seen} pictures`);
+    await browser.close();
+  });
+
+  it("says so when the data cannot be read", async () => {
+    const damaged = makeSynthetic(2);
+    damaged.position = damaged.position.slice(0, 40);
+    for (const [name, data, words] of [["damaged", damaged, /damaged/], ["newer", { ...damaged, version: 9 }, /version 9/], ["other", {}, /does not hold/]]) {
+      const browser = await open(name, data);
+      assert.match(await browser.page.textContent("[data-test=problem]"), words);
+      assert.deepEqual(browser.problems, []);
+      await browser.close();
+    }
+  });
+});
