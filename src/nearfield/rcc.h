@@ -24,8 +24,8 @@ struct ZoneInput {
 /// One axis and one direction of bending: moments against the zone's rotation for each normal force. K forces, J
 /// rotations. The rows of the first force (crushing at no curvature) and of the last (rupture of all bars) are zero,
 /// and so is the last column: beyond the grid the zone is broken. A row that becomes zero earlier has lost its
-/// moment or its equilibrium: the section can no longer carry that force. Rotations are measured from the state without moment.
-/// Positive about y: the end at larger x turns about +y, tension at +z. Positive about z: tension at -y.
+/// moment or its equilibrium: the section can no longer carry that force. Rotations are measured from the state without
+/// moment. Positive about y: the end at larger x turns about +y, tension at +z. Positive about z: tension at -y.
 struct MomentFamily {
   std::vector<double> normal_force;                  // rising [N] (K)
   std::vector<double> rotation;                      // total rotation of the zone, rising from 0 [rad] (J)
