@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <mutex>
 #include <stdexcept>
 #include <string>
@@ -203,20 +204,20 @@ class Writer {
 
   template <class Row, class Project>
   void column(const std::string& name, std::vector<Row>& rows, Project project, const About& about) {
-    using T = std::remove_cvref_t<decltype(project(rows[0]))>;
+    using T = std::remove_cvref_t<decltype(std::invoke(project, rows[0]))>;
     const hsize_t count = rows.size();
     if constexpr (std::is_same_v<T, std::string>) {
       std::size_t width = 1;
-      for (Row& row : rows) width = std::max(width, project(row).size());
+      for (Row& row : rows) width = std::max(width, std::invoke(project, row).size());
       std::string cells(width * rows.size(), '\0');
-      for (std::size_t i = 0; i < rows.size(); ++i) project(rows[i]).copy(cells.data() + i * width, width);
+      for (std::size_t i = 0; i < rows.size(); ++i) std::invoke(project, rows[i]).copy(cells.data() + i * width, width);
       const Handle type = text_type(width, name);
       put(name, type, type, {count}, cells.data(), cells.size(), about);
     } else {
       using Number = typename Cell<T>::Number;
       std::vector<Number> numbers(rows.size() * Cell<T>::count);
       for (std::size_t i = 0; i < rows.size(); ++i)
-        Cell<T>::pack(project(rows[i]), numbers.data() + i * Cell<T>::count);
+        Cell<T>::pack(std::invoke(project, rows[i]), numbers.data() + i * Cell<T>::count);
       Shape shape = {count};
       if (Cell<T>::count > 1) shape.push_back(Cell<T>::count);
       put(name, file_type<Number>(), memory_type<Number>(), shape, numbers.data(), numbers.size() * sizeof(Number),
@@ -301,7 +302,7 @@ class Reader {
     if (!set.shape.empty()) damaged(name + " is not a single value");
     if constexpr (std::is_same_v<T, std::string>) {
       std::vector<std::string> one(1);
-      read_texts(name, set, one, [](std::string& s) -> std::string& { return s; });
+      read_texts(name, set, one, std::identity{});
       value = one[0];
     } else {
       typename Cell<T>::Number number;
@@ -405,12 +406,12 @@ class Reader {
     std::string cells(width * rows.size(), '\0');
     if (!cells.empty()) demand(H5Dread(set.id, set.type, H5S_ALL, H5S_ALL, H5P_DEFAULT, cells.data()), name);
     for (std::size_t i = 0; i < rows.size(); ++i)
-      project(rows[i]) = without_padding(std::string_view(cells).substr(i * width, width));
+      std::invoke(project, rows[i]) = without_padding(std::string_view(cells).substr(i * width, width));
   }
 
   template <class Row, class Project>
   void fill(const std::string& name, const Set& set, std::vector<Row>& rows, Project project) {
-    using T = std::remove_cvref_t<decltype(project(rows[0]))>;
+    using T = std::remove_cvref_t<decltype(std::invoke(project, rows[0]))>;
     if constexpr (std::is_same_v<T, std::string>) {
       if (set.shape.size() != 1) damaged(name + " has another shape than its table");
       read_texts(name, set, rows, project);
@@ -420,7 +421,8 @@ class Reader {
         damaged(name + " has another shape than its table");
       std::vector<typename Cell<T>::Number> numbers;
       read_numbers(name, set, numbers);
-      for (std::size_t i = 0; i < rows.size(); ++i) Cell<T>::unpack(numbers.data() + i * width, project(rows[i]));
+      for (std::size_t i = 0; i < rows.size(); ++i)
+        Cell<T>::unpack(numbers.data() + i * width, std::invoke(project, rows[i]));
     }
   }
 
@@ -438,10 +440,13 @@ struct Owned {
   T value;
 };
 
-/// The record and its flat lists.
+using ShapeRow = Owned<BoxShape>;
+using CornerRow = Owned<std::array<double, 2>>;
+
+/// The record's nested lists, flat.
 struct Flat {
-  std::vector<Owned<BoxShape>> shapes;
-  std::vector<Owned<std::array<double, 2>>> corners;
+  std::vector<ShapeRow> shapes;
+  std::vector<CornerRow> corners;
   std::vector<double> series;  // (Q x S)
 };
 
@@ -465,9 +470,6 @@ template <class Parent, class Item>
   }
   return true;
 }
-
-#define FIELD(name) \
-  [](auto& row) -> auto& { return row.name; }
 
 /// Every dataset of the file, in both directions; docs/record.md is its description.
 template <class Archive>
@@ -494,38 +496,40 @@ void transfer(Archive& a, Record& r, Flat& flat) {
   a.scalar("counts/cables", c.cables, {});
   a.scalar("counts/mass", c.mass, {.unit = "kg"});
 
-  a.first_column("plan_values/group", r.plan_values, FIELD(group), {});
-  a.column("plan_values/key", r.plan_values, FIELD(key), {});
-  a.column("plan_values/value", r.plan_values, FIELD(value), {});
+  a.first_column("plan_values/group", r.plan_values, &KeyValue::group, {});
+  a.column("plan_values/key", r.plan_values, &KeyValue::key, {});
+  a.column("plan_values/value", r.plan_values, &KeyValue::value, {});
 
-  a.first_column("bodies/name", r.bodies, FIELD(name), {});
-  a.column("bodies/kind", r.bodies, FIELD(kind), {});
-  a.column("bodies/storey", r.bodies, FIELD(storey), {});
-  a.column("bodies/mass", r.bodies, FIELD(mass), {.unit = "kg"});
-  a.column("bodies/fixed", r.bodies, FIELD(fixed), {.meaning = "1: belongs to the ground"});
+  a.first_column("bodies/name", r.bodies, &BodyInfo::name, {});
+  a.column("bodies/kind", r.bodies, &BodyInfo::kind, {});
+  a.column("bodies/storey", r.bodies, &BodyInfo::storey, {});
+  a.column("bodies/mass", r.bodies, &BodyInfo::mass, {.unit = "kg"});
+  a.column("bodies/fixed", r.bodies, &BodyInfo::fixed, {.meaning = "1: belongs to the ground"});
 
-  a.first_column("shapes/body", flat.shapes, FIELD(owner), {.meaning = "row of bodies"});
-  a.column("shapes/centre", flat.shapes, FIELD(value.X_BS.p), {.unit = "m", .frame = "body"});
-  a.column("shapes/orientation", flat.shapes, FIELD(value.X_BS.q),
+  a.first_column("shapes/body", flat.shapes, &ShapeRow::owner, {.meaning = "row of bodies"});
+  a.column("shapes/centre", flat.shapes, [](auto& row) -> auto& { return row.value.X_BS.p; },
+           {.unit = "m", .frame = "body"});
+  a.column("shapes/orientation", flat.shapes, [](auto& row) -> auto& { return row.value.X_BS.q; },
            {.frame = "body", .meaning = "unit quaternion w x y z"});
-  a.column("shapes/half", flat.shapes, FIELD(value.half), {.unit = "m", .frame = "shape", .meaning = "half edges"});
-  a.column("shapes/material", flat.shapes, FIELD(value.material), {});
+  a.column("shapes/half", flat.shapes, [](auto& row) -> auto& { return row.value.half; },
+           {.unit = "m", .frame = "shape", .meaning = "half edges"});
+  a.column("shapes/material", flat.shapes, [](auto& row) -> auto& { return row.value.material; }, {});
 
-  a.first_column("zones/name", r.zones, FIELD(name), {});
-  a.column("zones/member", r.zones, FIELD(member), {});
-  a.column("zones/subsystem", r.zones, FIELD(subsystem), {});
-  a.column("zones/body_a", r.zones, FIELD(body_a), {.meaning = "row of bodies, -1 the ground"});
-  a.column("zones/body_b", r.zones, FIELD(body_b), {.meaning = "row of bodies, -1 the ground"});
-  a.column("zones/position", r.zones, FIELD(p_W), {.unit = "m", .frame = "world", .meaning = "at the start"});
+  a.first_column("zones/name", r.zones, &ZoneInfo::name, {});
+  a.column("zones/member", r.zones, &ZoneInfo::member, {});
+  a.column("zones/subsystem", r.zones, &ZoneInfo::subsystem, {});
+  a.column("zones/body_a", r.zones, &ZoneInfo::body_a, {.meaning = "row of bodies, -1 the ground"});
+  a.column("zones/body_b", r.zones, &ZoneInfo::body_b, {.meaning = "row of bodies, -1 the ground"});
+  a.column("zones/position", r.zones, &ZoneInfo::p_W, {.unit = "m", .frame = "world", .meaning = "at the start"});
 
-  a.first_column("neighbours/name", r.neighbours, FIELD(name), {});
-  a.column("neighbours/is_utility", r.neighbours, FIELD(is_utility), {});
-  a.first_column("neighbour_corners/neighbour", flat.corners, FIELD(owner), {.meaning = "row of neighbours"});
-  a.column("neighbour_corners/position", flat.corners, FIELD(value), {.unit = "m", .frame = "world"});
-  a.first_column("building_outline", r.building_outline, [](auto& corner) -> auto& { return corner; },
+  a.first_column("neighbours/name", r.neighbours, &Neighbour::name, {});
+  a.column("neighbours/is_utility", r.neighbours, &Neighbour::is_utility, {});
+  a.first_column("neighbour_corners/neighbour", flat.corners, &CornerRow::owner, {.meaning = "row of neighbours"});
+  a.column("neighbour_corners/position", flat.corners, &CornerRow::value, {.unit = "m", .frame = "world"});
+  a.first_column("building_outline", r.building_outline, std::identity{},
                  {.unit = "m", .frame = "world", .meaning = "counter-clockwise"});
 
-  a.first_column("frames/time", r.time, [](auto& t) -> auto& { return t; }, {.unit = "s"});
+  a.first_column("frames/time", r.time, std::identity{}, {.unit = "s"});
   const hsize_t frames = r.time.size(), bodies = r.bodies.size(), zones = r.zones.size();
   a.block("frames/position", r.position, {frames, bodies, 3},
           {.unit = "m", .frame = "world", .meaning = "origin of the body's frame"});
@@ -535,31 +539,29 @@ void transfer(Archive& a, Record& r, Flat& flat) {
           {.meaning = "0 elastic, 1 yielded, 2 softening, 3 broken, 4 fired"});
   a.block("frames/zone_utilisation", r.zone_utilisation, {frames, zones}, {.meaning = "demand over capacity"});
 
-  a.first_column("series/id", r.series, FIELD(id), {});
-  a.column("series/title", r.series, FIELD(title), {});
-  a.column("series/unit", r.series, FIELD(unit), {});
-  a.column("series/group", r.series, FIELD(group), {});
+  a.first_column("series/id", r.series, &Series::id, {});
+  a.column("series/title", r.series, &Series::title, {});
+  a.column("series/unit", r.series, &Series::unit, {});
+  a.column("series/group", r.series, &Series::group, {});
   a.block("series/value", flat.series, {r.series.size(), frames}, {.meaning = "one row per series, see series/unit"});
 
-  a.first_column("events/time", r.events, FIELD(time), {.unit = "s"});
-  a.column("events/kind", r.events, FIELD(kind), {});
-  a.column("events/subject", r.events, FIELD(subject), {});
-  a.column("events/text", r.events, FIELD(text), {});
+  a.first_column("events/time", r.events, &Event::time, {.unit = "s"});
+  a.column("events/kind", r.events, &Event::kind, {});
+  a.column("events/subject", r.events, &Event::subject, {});
+  a.column("events/text", r.events, &Event::text, {});
 
-  a.first_column("findings/id", r.findings, FIELD(id), {});
-  a.column("findings/heading", r.findings, FIELD(heading), {});
-  a.column("findings/title", r.findings, FIELD(title), {});
-  a.column("findings/text", r.findings, FIELD(text), {});
-  a.column("findings/value", r.findings, FIELD(value), {.meaning = "see findings/unit; NaN: no number"});
-  a.column("findings/unit", r.findings, FIELD(unit), {});
-  a.column("findings/status", r.findings, FIELD(status), {.meaning = "0 info, 1 good, 2 warning, 3 bad"});
+  a.first_column("findings/id", r.findings, &Finding::id, {});
+  a.column("findings/heading", r.findings, &Finding::heading, {});
+  a.column("findings/title", r.findings, &Finding::title, {});
+  a.column("findings/text", r.findings, &Finding::text, {});
+  a.column("findings/value", r.findings, &Finding::value, {.meaning = "see findings/unit; NaN: no number"});
+  a.column("findings/unit", r.findings, &Finding::unit, {});
+  a.column("findings/status", r.findings, &Finding::status, {.meaning = "0 info, 1 good, 2 warning, 3 bad"});
 
-  a.first_column("not_modelled", r.not_modelled, [](auto& text) -> auto& { return text; }, {});
+  a.first_column("not_modelled", r.not_modelled, std::identity{}, {});
   a.scalar("ending/kind", r.ending, {});
   a.scalar("ending/text", r.ending_text, {});
 }
-
-#undef FIELD
 
 /// What the shapes of the datasets do not show.
 void check_contents(const Reader& reader, const Record& r) {
