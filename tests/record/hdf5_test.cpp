@@ -230,6 +230,26 @@ TEST_F(Hdf5, NamesUnitsAndFrames) {
   H5Fclose(file);
 }
 
+TEST_F(Hdf5, HasADescriptionOfEveryDataset) {
+  write_hdf5({}, path("record.h5"));
+  std::vector<std::string> names;
+  const hid_t file = H5Fopen(path("record.h5").c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+  const auto add = [](hid_t, const char* name, const H5O_info_t* info, void* found) -> herr_t {
+    if (info->type == H5O_TYPE_DATASET) static_cast<std::vector<std::string>*>(found)->emplace_back(name);
+    return 0;
+  };
+  ASSERT_GE(H5Ovisit(file, H5_INDEX_NAME, H5_ITER_INC, add, &names), 0);
+  H5Fclose(file);
+  EXPECT_GT(names.size(), 50u);
+  const std::string text = read_file(std::string(TOPPLE_SOURCE_DIR) + "/docs/record.md");
+  for (const std::string& name : names) {
+    // a table of the page names its first column in full and the others by their last part
+    const std::string last = name.substr(name.rfind('/') + 1);
+    EXPECT_TRUE(text.find('`' + name + '`') != std::string::npos || text.find('`' + last + '`') != std::string::npos)
+        << name << " is not in docs/record.md";
+  }
+}
+
 TEST_F(Hdf5, RefusesFilesThatAreNoRecords) {
   EXPECT_EQ(code_of_reading("missing.h5"), "E701");
   replace_file(path("empty.h5"), "");
