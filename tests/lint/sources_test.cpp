@@ -1,4 +1,5 @@
-// Who may include whom: cmake/layers.txt is the rule; the includes and src/CMakeLists.txt follow it.
+// Who may include whom (cmake/layers.txt is the rule; the includes and src/CMakeLists.txt follow it), and other habits
+// of the files.
 
 #include <gtest/gtest.h>
 
@@ -197,6 +198,20 @@ TEST(Sources, HeadersAreGuardedByPragmaOnce) {
   for (const auto* folder : {"src", "apps", "tests", "bench"})
     for (const auto& path : sources_below(root / folder))
       if (path.extension() == ".h") { EXPECT_TRUE(text_of(path).starts_with("#pragma once\n")) << path; }
+}
+
+TEST(Documents, LinkToWhatIsThere) {
+  static const std::regex link(R"(\]\(([^)#:]+)(#[^)]*)?\))");
+  std::vector<fs::path> pages = {root / "README.md", root / "CONTRIBUTING.md", root / "CHANGELOG.md"};
+  for (const auto& entry : fs::recursive_directory_iterator(root / "docs"))
+    if (entry.path().extension() == ".md") pages.push_back(entry.path());
+  for (const auto& page : pages) {
+    const std::string text = text_of(page);
+    EXPECT_FALSE(text.empty()) << page;
+    for (std::sregex_iterator i(text.begin(), text.end(), link), end; i != end; ++i) {
+      EXPECT_TRUE(fs::exists(page.parent_path() / (*i)[1].str())) << page << " links to " << (*i)[1];
+    }
+  }
 }
 
 }  // namespace
