@@ -1,0 +1,121 @@
+#pragma once
+/// Inside of make_model: bodies first (manager.cpp), then connections (connections.cpp), then events (charges.cpp).
+
+#include <array>
+#include <map>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "collapse/assembly.h"
+#include "collapse/law.h"
+#include "collapse/manager.h"
+
+namespace topple::collapse {
+
+/// A place on the grid in the floor above a storey.
+struct GridPoint {
+  int row = 0, frame = 0, storey = 0;
+  auto operator<=>(const GridPoint&) const = default;
+};
+
+/// Where inelastic rotation gathers in a member.
+struct MemberStation {
+  double at = 0;     // from the member's start [m]
+  int zone = -1;     // as prepared, in the library
+  int damaged = -1;  // beside a fired charge; -1 if none is near
+};
+
+/// Columns and beams: what their force elements are made of.
+struct MemberZones {
+  double clear_length = 0;  // between the faces of the joints [m]
+  double clear_start = 0;   // from the member's start to the face [m]
+  double normal_force = 0;  // estimate under dead load, tension positive [N]
+  std::array<MemberStation, 2> station;
+  int element[2] = {-1, -1};  // of each station; the same twice for a whole member
+  int rotational = -1;        // of station 1 of a ground column
+};
+
+struct Builder {
+  const product::Plan& plan;
+  const Knowledge& k;
+  ModelMap& map;
+  int threads;
+
+  Builder(const product::Plan& p, const Knowledge& knowledge, ModelMap& m, int t)
+      : plan(p), k(knowledge), map(m), threads(t) {}
+  mbs::Model build();
+
+  mbs::Model model;
+  ZoneLibrary library;
+  std::vector<Diagnostic> complaints;
+
+  std::map<GridPoint, int> columns, x_beams, y_beams, slabs, x_walls, y_walls;  // members; beams, walls and slabs at
+                                                                                // their lower row and frame
+  std::vector<Assembly> assemblies;
+  std::map<GridPoint, int> node_body;    // assembly that holds the joint of beams and columns
+  std::map<int, int> own_body;           // member -> assembly: shafts of the ground storey, x beams, walls
+  std::map<int, int> stump_body;         // member -> assembly
+  std::map<int, double> lowest_charge;   // charged column -> centre of its lowest charge [m]
+  std::map<GridPoint, double> core_low;  // underside of the joint in W [m]
+  std::map<int, MemberZones> zones;      // columns and beams
+  std::map<std::tuple<int, double, double>, mbs::LawId> laws;
+  bool hinge_about_y = true;
+
+  // bodies
+  void find_direction();
+  void index_members();
+  void make_columns();
+  void make_loose_nodes();
+  void make_beams();
+  void make_slabs();
+  void make_walls();
+  void finish_bodies();
+  Vec3 half_of_node(const GridPoint&) const;
+  int node_at(const GridPoint&) const;
+  int find_at(const std::map<GridPoint, int>&, const GridPoint&) const;
+  int add_assembly(Assembly);
+  void put_on_nodes(std::vector<Part> parts, int axis, double middle, int node_a, int node_b);
+
+  // connections
+  void estimate_normal_forces();
+  void request_zones();
+  void request_station(int member, int which);
+  void connect_ground_column(const GridPoint&, int member);
+  void connect_column(const GridPoint&, int member);
+  void connect_x_beam(const GridPoint&, int member);
+  void connect_y_beam(const GridPoint&, int member);
+  void connect_slab(const GridPoint&, int member);
+  void connect_wall(const GridPoint&, int member, bool along_x);
+  void connect_cables();
+  struct Stiffness {
+    double EA = 0, GA = 0, GJ = 0, EI_y = 0, EI_z = 0;
+  };
+  Stiffness calc_stiffness(const MemberZones&) const;
+  mbs::LawId law_of(int zone, const Stiffness&, const std::string& member);
+  Pose frame_in(int body, const Vec3& p_W, const Mat3& R_WF) const;
+  mbs::ElementId add_element(const std::string& name, int member, int a, int b, const Vec3& p_W, const Mat3& R_WF,
+                             const Vec3& translational, const Vec3& rotational, std::vector<mbs::Station> stations);
+  std::vector<mbs::Station> order_stations(const MemberZones&, const Stiffness&, const std::string& member);
+
+  // events
+  void add_events();
+
+  const product::Member& member(int i) const { return plan.members[static_cast<size_t>(i)]; }
+  const product::Section& section_of(int i) const { return plan.sections[static_cast<size_t>(member(i).section)]; }
+  const product::Concrete& concrete_of(const product::Section& s) const {
+    return plan.concretes[static_cast<size_t>(s.concrete)];
+  }
+  const product::Steel& steel_of(const product::Section& s) const { return plan.steels[static_cast<size_t>(s.steel)]; }
+  const product::Panel& panel_of(int i) const { return plan.panels[static_cast<size_t>(member(i).panel)]; }
+  std::string material_of(const product::Panel& p) const { return p.concrete >= 0 ? "concrete" : "masonry"; }
+  double kept_of(int panel_member) const;
+  void complain(int member, const std::string& what, const std::string& help = {});
+};
+
+/// Axes of the members' frames as columns of R_WF: x along the member.
+Mat3 column_axes();
+Mat3 x_beam_axes();
+Mat3 y_beam_axes();
+
+}  // namespace topple::collapse

@@ -1,0 +1,115 @@
+/// Charges as events of the model (docs/theory/manager.md, section 5).
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "base/error.h"
+#include "collapse/builder.h"
+
+namespace topple::collapse {
+
+using product::Member;
+using product::MemberKind;
+
+void Builder::add_events() {
+  map.schedule = make_schedule(plan, k);
+  std::vector<Assembly> current = assemblies;  // as they are after the events so far
+  std::vector<Vec3> centre;                    // their centres of mass at the start, in W
+  for (const mbs::Body& b : model.bodies) centre.push_back(b.X_WB.p);
+  std::map<int, double> residual;  // element -> least share of bars left by charges so far
+
+  for (const Firing& firing : map.schedule) {
+    if (firing.fails) continue;
+    const product::Charge& c =
+        plan.stages[static_cast<size_t>(firing.stage)].charges[static_cast<size_t>(firing.charge)];
+    const Member& m = member(c.member);
+    const MemberZones& z = zones[c.member];
+    const int axis = m.kind == MemberKind::Column ? 2 : m.row_a != m.row_b ? 0 : 1;
+    const double from = m.start[axis] + c.position - 0.5 * c.destroyed_length;
+    const double to = m.start[axis] + c.position + 0.5 * c.destroyed_length;
+    int which = 0;
+    if (m.kind == MemberKind::Beam && std::abs(c.position - z.station[1].at) < std::abs(c.position - z.station[0].at))
+      which = 1;
+
+    mbs::Event event;
+    event.name = m.name;
+    event.time = firing.time;
+    EventEntry entry{firing.stage, firing.charge, m.name, firing.time, 0};
+
+    const int element = z.element[which];
+    if (const auto it = residual.find(element); it == residual.end() || c.residual_bars < it->second) {
+      residual[element] = c.residual_bars;
+      mbs::Action act;
+      act.kind = mbs::Action::Kind::SwitchLaw;
+      act.element = mbs::ElementId{element};
+      act.ramp = k.charge_release_time;
+      const nearfield::ZoneInput& in = library.input(z.station[static_cast<size_t>(which)].zone);
+      act.law = mbs::add_law(model, make_cage_law(make_residual_cage(in, c.destroyed_length, c.residual_bars),
+                                                  c.destroyed_length, m.name + "/charge", k));
+      event.actions.push_back(act);
+      ZoneEntry& zone = map.elements[static_cast<size_t>(element)];
+      zone.firing_time = std::min(zone.firing_time, firing.time);
+    }
+
+    // the destroyed length is thrown out
+    std::set<int> touched;
+    for (size_t b = 0; b < current.size(); ++b)
+      for (const Part& p : current[b].parts)
+        if (p.member == c.member && p.centre[axis] + p.half[axis] > from && p.centre[axis] - p.half[axis] < to)
+          touched.insert(static_cast<int>(b));
+    for (const int b : touched) {
+      Assembly& a = current[static_cast<size_t>(b)];
+      const std::vector<Part> removed = cut_member(a, c.member, axis, from, to);
+      if (removed.empty()) continue;
+      for (const Part& p : removed) {
+        entry.debris_mass += p.mass;
+        map.debris.push_back({m.name, m.storey, p.mass, p.centre, p.half, firing.time});
+      }
+      mbs::Body replacement = make_body(a, k);
+      const Vec3 p_WB = replacement.X_WB.p;
+      if (a.fixed) {
+        // nothing may hit what is going to be gone: a fixed body carries nothing else
+        mbs::Body& stump = model.bodies[static_cast<size_t>(b)];
+        const Vec3 shift = p_WB - stump.X_WB.p;
+        stump.shapes = replacement.shapes;
+        for (mbs::Shape& s : stump.shapes) s.X_BS.p += shift;
+        continue;
+      }
+      replacement.X_WB = {p_WB - centre[static_cast<size_t>(b)], {}};
+      centre[static_cast<size_t>(b)] = p_WB;
+      mbs::Action act;
+      act.kind = mbs::Action::Kind::ReplaceBody;
+      act.body = mbs::BodyId{b};
+      act.replacement = std::move(replacement);
+      event.actions.push_back(std::move(act));
+    }
+    if (m.kind == MemberKind::Column && m.storey == 0)
+      for (GroundColumn& g : map.ground_columns) g.is_fired |= g.member == m.name;
+
+    // transition zones
+    for (int other : {0, 1}) {
+      const MemberStation& station = z.station[static_cast<size_t>(other)];
+      if (other == which || station.damaged < 0) continue;
+      if (z.element[other] >= 0 && z.element[other] != element) {
+        mbs::Action act;
+        act.kind = mbs::Action::Kind::SwitchLaw;
+        act.element = mbs::ElementId{z.element[other]};
+        act.ramp = k.charge_release_time;
+        act.law = law_of(station.damaged, calc_stiffness(z), m.name + "/transition");
+        event.actions.push_back(act);
+      } else if (z.rotational >= 0) {
+        map.notes.push_back(m.name + ": the charge also damages the hinge at the column's top, which keeps its law.");
+      }
+    }
+    model.events.push_back(std::move(event));
+    map.events.push_back(entry);
+  }
+
+  // a record's body has one set of shapes: what remains; what is thrown out is drawn as debris
+  for (size_t b = 0; b < current.size(); ++b)
+    if (current[b].mass() != assemblies[b].mass())
+      map.bodies[b].shapes = make_shapes(current[b], model.bodies[b].X_WB.p);
+}
+
+}  // namespace topple::collapse

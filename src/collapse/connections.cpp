@@ -1,0 +1,392 @@
+/// Zones, joints and force elements between the bodies (docs/theory/manager.md, sections 2 and 3).
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "collapse/builder.h"
+
+namespace topple::collapse {
+
+using product::Member;
+using product::MemberKind;
+
+namespace {
+
+constexpr const char* kSixComponents = "six-component element";
+constexpr const char* kHinge = "revolute joint + rotational element";
+constexpr const char* kRigid = "rigid joint";
+
+double largest_moment(const mbs::MomentFamily& f) {
+  double m = 0;
+  for (double v : f.positive) m = std::max(m, v);
+  for (double v : f.negative) m = std::max(m, v);
+  return m;
+}
+
+}  // namespace
+
+double Builder::kept_of(int index) const {
+  double kept = 1;
+  for (const product::Weakening& w : member(index).weakenings) kept = std::min(kept, 1 - w.cut_concrete);
+  return std::max(kept, 1e-3);
+}
+
+void Builder::estimate_normal_forces() {
+  // weights go straight down from joint to joint; beams and the walls on them give half to each end
+  std::map<GridPoint, double> load;
+  const double g = plan.analysis.gravity;
+  for (const auto& [at, body] : node_body) load[at] += g * assemblies[static_cast<size_t>(body)].mass();
+  const auto share = [&](int index, const GridPoint& a, const GridPoint& b) {
+    if (!own_body.count(index)) return;
+    const double w = 0.5 * g * assemblies[static_cast<size_t>(own_body[index])].mass();
+    if (load.count(a)) load[a] += w;
+    if (load.count(b)) load[b] += w;
+  };
+  for (const auto& [at, index] : x_beams) share(index, at, {at.row + 1, at.frame, at.storey});
+  for (const auto& [at, index] : x_walls)
+    share(index, {at.row, at.frame, at.storey - 1}, {at.row + 1, at.frame, at.storey - 1});
+  std::map<GridPoint, double> above;
+  for (int s = static_cast<int>(plan.storey_heights.size()) - 1; s >= 0; --s)
+    for (const auto& [at, index] : columns) {
+      if (at.storey != s) continue;
+      const GridPoint up{at.row, at.frame, s + 1};
+      const double force = load[at] + (above.count(up) ? above[up] : 0.0);
+      above[at] = force;
+      zones[index].normal_force = -force;
+    }
+}
+
+void Builder::request_station(int index, int which) {
+  const Member& m = member(index);
+  const product::Section& s = section_of(index);
+  MemberZones& z = zones[index];
+  MemberStation& station = z.station[static_cast<size_t>(which)];
+  const MemberStation& other = z.station[static_cast<size_t>(1 - which)];
+  nearfield::ZoneInput in;
+  in.section = s;
+  in.concrete = concrete_of(s);
+  in.steel = steel_of(s);
+  const bool is_column = m.kind == MemberKind::Column;
+  const double depth = is_column && hinge_about_y ? s.width : s.height;
+  in.length = calc_zone_length(s, in.concrete, in.steel, depth, z.clear_length, k);
+  for (const product::Weakening& w : m.weakenings) {
+    // the nearer station has it; the first one when both are as near
+    const double here = std::abs(w.at - station.at), there = std::abs(w.at - other.at);
+    if (here > there || (here == there && which == 1)) continue;
+    in.cut_bars = std::max(in.cut_bars, w.cut_bars);
+    in.cut_concrete = std::max(in.cut_concrete, w.cut_concrete);
+  }
+  station.zone = library.request(in);
+  // a charge elsewhere in the member may reach this zone
+  if (is_column && m.storey > 0) return;
+  for (const product::Stage& stage : plan.stages)
+    for (const product::Charge& c : stage.charges) {
+      if (c.member != index || c.fails || !(c.transition_damage > 0)) continue;
+      const bool acts_here =
+          is_column ? which == 0 : std::abs(c.position - station.at) <= std::abs(c.position - other.at);
+      const double gap = std::abs(c.position - station.at) - 0.5 * c.destroyed_length;
+      if (acts_here || gap > k.charge_transition_reach * depth) continue;
+      in.concrete_loss = std::max(in.concrete_loss, c.transition_damage);
+      in.cover_lost = true;
+      station.damaged = library.request(in);
+    }
+}
+
+void Builder::request_zones() {
+  for (const auto& [at, index] : columns) {
+    MemberZones& z = zones[index];
+    z.clear_length = core_low[at] - member(index).start.z;
+    const auto charged = lowest_charge.find(index);
+    if (at.storey == 0 && charged != lowest_charge.end()) z.station[0].at = charged->second;
+    z.station[1].at = z.clear_length;
+  }
+  for (const auto* beams : {&x_beams, &y_beams})
+    for (const auto& [at, index] : *beams) {
+      MemberZones& z = zones[index];
+      z.station[0].at = z.clear_start;
+      z.station[1].at = z.clear_start + z.clear_length;
+    }
+  for (const auto* members : {&columns, &x_beams, &y_beams})
+    for (const auto& [at, index] : *members)
+      for (int which : {0, 1}) request_station(index, which);
+}
+
+Builder::Stiffness Builder::calc_stiffness(const MemberZones& z) const {
+  Stiffness s;
+  for (const MemberStation& station : z.station) {
+    // a preparation is local, so the member keeps the stiffness of its better end
+    const nearfield::Rcc& rcc = library.rcc(station.zone);
+    s.EA = std::max(s.EA, rcc.EA);
+    s.GA = std::max(s.GA, rcc.GA);
+    s.GJ = std::max(s.GJ, rcc.GJ);
+    s.EI_y = std::max(s.EI_y, rcc.calc_EI_effective_y(z.normal_force));
+    s.EI_z = std::max(s.EI_z, rcc.calc_EI_effective_z(z.normal_force));
+  }
+  return s;
+}
+
+mbs::LawId Builder::law_of(int zone, const Stiffness& s, const std::string& name) {
+  const auto key = std::make_tuple(zone, s.EI_y, s.EI_z);
+  if (const auto it = laws.find(key); it != laws.end()) return it->second;
+  const mbs::LawId id = mbs::add_law(model, make_zone_law(library.rcc(zone), s.EI_y, s.EI_z, name, k));
+  laws[key] = id;
+  return id;
+}
+
+Pose Builder::frame_in(int body, const Vec3& p_W, const Mat3& R_WF) const {
+  const Vec3 origin = body < 0 ? Vec3{} : model.bodies[static_cast<size_t>(body)].X_WB.p;
+  return {p_W - origin, to_quat(R_WF)};
+}
+
+mbs::ElementId Builder::add_element(const std::string& name, int index, int a, int b, const Vec3& p_W, const Mat3& R_WF,
+                                    const Vec3& translational, const Vec3& rotational,
+                                    std::vector<mbs::Station> stations) {
+  mbs::ZoneElement e;
+  e.name = name;
+  e.a = a < 0 ? mbs::kGround : mbs::BodyId{a};
+  e.b = mbs::BodyId{b};
+  e.X_AF = frame_in(a, p_W, R_WF);
+  e.X_BM = frame_in(b, p_W, R_WF);
+  e.translational_stiffness = translational;
+  e.rotational_stiffness = rotational;
+  e.damping_ratio = k.zone_damping_ratio;
+  e.stations = std::move(stations);
+  ZoneEntry entry;
+  entry.name = name, entry.member = member(index).name, entry.subsystem = kSixComponents;
+  entry.body_a = a, entry.body_b = b, entry.p_W = p_W;
+  map.elements.push_back(entry);
+  return mbs::add_element(model, std::move(e));
+}
+
+/// Both stations of a whole member, the weaker one first: its law also limits axial force, shear and torsion.
+std::vector<mbs::Station> Builder::order_stations(const MemberZones& z, const Stiffness& s, const std::string& name) {
+  const auto capacity = [this](const MemberStation& station) {
+    const nearfield::Rcc& rcc = library.rcc(station.zone);
+    return *std::max_element(rcc.compression.force.begin(), rcc.compression.force.end());
+  };
+  std::vector<mbs::Station> out{{-0.5 * z.clear_length, law_of(z.station[0].zone, s, name)},
+                                {0.5 * z.clear_length, law_of(z.station[1].zone, s, name)}};
+  if (capacity(z.station[1]) < capacity(z.station[0])) std::swap(out[0], out[1]);
+  return out;
+}
+
+void Builder::connect_ground_column(const GridPoint& at, int index) {
+  const Member& m = member(index);
+  MemberZones& z = zones[index];
+  const Stiffness s = calc_stiffness(z);
+  const double L = z.clear_length;
+  const int shaft = own_body.at(index), node = node_at(at);
+  const int stump = stump_body.count(index) ? stump_body[index] : -1;
+  Vec3 foot = m.start;
+  if (stump >= 0) foot.z += z.station[0].at;
+  // both ends of the column turn about the hinge axis, only its foot about the other one
+  Vec3 rotational{s.GJ / L, 3 * s.EI_y / L, 3 * s.EI_z / L};
+  rotational[hinge_about_y ? 2 : 1] *= 2;
+  z.element[0] = add_element(m.name + "/foot", index, stump, shaft, foot, column_axes(), {s.EA / L, s.GA / L, s.GA / L},
+                             rotational, {{0, law_of(z.station[0].zone, s, m.name + "/foot")}})
+                     .index;
+
+  mbs::Joint joint;
+  joint.kind = mbs::Joint::Kind::Revolute;
+  joint.name = m.name + "/top";
+  joint.parent = mbs::BodyId{shaft};
+  joint.child = mbs::BodyId{node};
+  const Vec3 top{m.start.x, m.start.y, core_low.at(at)};
+  // x along the member from the parent to the child, z the hinge axis
+  const Mat3 axes = hinge_about_y ? column_axes() : Mat3::from_columns({0, 0, 1}, {0, -1, 0}, {1, 0, 0});
+  joint.X_PF = frame_in(shaft, top, axes);
+  joint.X_CM = frame_in(node, top, axes);
+  const nearfield::Rcc& rcc = library.rcc(z.station[1].zone);
+  mbs::ZoneLaw law = model.laws[static_cast<size_t>(law_of(z.station[1].zone, s, m.name + "/top").index)];
+  if (!hinge_about_y) law.moment_z = law.moment_y;
+  law.name = m.name + "/top";
+  const double stiffness = 6 * (hinge_about_y ? s.EI_z : s.EI_y) / L;
+  joint.tension_limit = *std::max_element(rcc.tension.force.begin(), rcc.tension.force.end());
+  // the limit that follows the normal force is the foot's, which carries the same shear; here the largest possible one
+  const double crushing = *std::max_element(rcc.compression.force.begin(), rcc.compression.force.end());
+  joint.shear_limit = std::max(rcc.shear_y, rcc.shear_z) + rcc.shear_friction * crushing;
+  joint.rotation_limit = law.rupture_rotation + largest_moment(law.moment_z) / stiffness;
+  ZoneEntry entry;
+  entry.name = joint.name, entry.member = m.name, entry.subsystem = kHinge;
+  entry.body_a = shaft, entry.body_b = node, entry.p_W = top;
+  map.joints.push_back(entry);
+  map.rotationals.push_back(entry);
+  mbs::RotationalElement hinge;
+  hinge.name = joint.name;
+  hinge.joint = mbs::add_joint(model, joint);
+  hinge.stiffness = stiffness;
+  hinge.damping_ratio = k.zone_damping_ratio;
+  hinge.law = mbs::add_law(model, law);
+  z.rotational = static_cast<int>(model.rotational_elements.size());
+  model.rotational_elements.push_back(hinge);
+  map.ground_columns.push_back({m.name, m.start, top, false, z.normal_force, hinge});
+}
+
+void Builder::connect_column(const GridPoint& at, int index) {
+  const Member& m = member(index);
+  const int below = node_at({at.row, at.frame, at.storey - 1});
+  if (below < 0) return complain(index, "stands on nothing", "a column or a beam must end below it");
+  MemberZones& z = zones[index];
+  const Stiffness s = calc_stiffness(z);
+  const double L = z.clear_length;
+  const auto bending = [&](double EI) { return 12 * EI / (L * L * L) / (1 + 12 * EI / (s.GA * L * L)); };
+  Vec3 middle = m.start;
+  middle.z += 0.5 * L;
+  z.element[0] = z.element[1] = add_element(m.name, index, below, node_at(at), middle, column_axes(),
+                                            {s.EA / L, bending(s.EI_z), bending(s.EI_y)},
+                                            {s.GJ / L, s.EI_y / L, s.EI_z / L}, order_stations(z, s, m.name))
+                                    .index;
+}
+
+void Builder::connect_x_beam(const GridPoint& at, int index) {
+  const Member& m = member(index);
+  MemberZones& z = zones[index];
+  const Stiffness s = calc_stiffness(z);
+  const double L = z.clear_length;
+  const int body = own_body.at(index);
+  const Vec3 translational{2 * s.EA / L, 2 * s.GA / L, 2 * s.GA / L};
+  const Vec3 rotational{2 * s.GJ / L, 6 * s.EI_y / L, 6 * s.EI_z / L};
+  for (int end : {0, 1}) {
+    const int node = node_at({at.row + end, at.frame, at.storey});
+    const std::string name = m.name + (end == 0 ? "/start" : "/end");
+    Vec3 face = m.start;
+    face.x += z.station[static_cast<size_t>(end)].at;
+    z.element[end] =
+        add_element(name, index, end == 0 ? node : body, end == 0 ? body : node, face, x_beam_axes(), translational,
+                    rotational, {{0, law_of(z.station[static_cast<size_t>(end)].zone, s, name)}})
+            .index;
+  }
+}
+
+void Builder::connect_y_beam(const GridPoint& at, int index) {
+  const Member& m = member(index);
+  MemberZones& z = zones[index];
+  const Stiffness s = calc_stiffness(z);
+  const double L = z.clear_length;
+  const auto bending = [&](double EI) { return 12 * EI / (L * L * L) / (1 + 12 * EI / (s.GA * L * L)); };
+  Vec3 middle = m.start;
+  middle.y += z.clear_start + 0.5 * L;
+  z.element[0] = z.element[1] = add_element(m.name, index, node_at(at), node_at({at.row, at.frame + 1, at.storey}),
+                                            middle, y_beam_axes(), {s.EA / L, bending(s.EI_z), bending(s.EI_y)},
+                                            {s.GJ / L, s.EI_y / L, s.EI_z / L}, order_stations(z, s, m.name))
+                                    .index;
+}
+
+void Builder::connect_slab(const GridPoint& at, int index) {
+  const int near = find_at(x_beams, at), far = find_at(x_beams, {at.row, at.frame + 1, at.storey});
+  if (near < 0 || far < 0) return;  // its parts hang on joints, which the beams along y connect
+  const Member& m = member(index);
+  const product::Panel& panel = panel_of(index);
+  const nearfield::PanelRcc rcc = nearfield::make_panel_rcc(
+      panel, panel.concrete < 0 ? nullptr : &plan.concretes[static_cast<size_t>(panel.concrete)],
+      panel.steel < 0 ? nullptr : &plan.steels[static_cast<size_t>(panel.steel)]);
+  const double kept = kept_of(index), span = m.end.y - m.start.y, width = zones[near].clear_length;
+  const double EA = rcc.EA * width * kept, EI = rcc.EI * width * kept;
+  const Vec3 middle{m.start.x + zones[near].clear_start + 0.5 * width, 0.5 * (m.start.y + m.end.y), m.start.z};
+  // a strip as a prismatic member, concentrated at the middle of the bay; in its plane a deep beam with shear
+  const double in_plane = EA / 2.4 / 1.2 / span;
+  add_element(m.name, index, own_body.at(near), own_body.at(far), middle, y_beam_axes(),
+              {EA / span, in_plane, 12 * EI / (span * span * span)},
+              {EI / span, EI / span, EA * width * width / 12 / span},
+              {{0, mbs::add_law(model, make_slab_law(rcc, width, kept, m.name, k))}});
+}
+
+void Builder::connect_wall(const GridPoint& at, int index, bool along_x) {
+  if (!own_body.count(index)) return;  // part of the joints below
+  const Member& m = member(index);
+  const int body = own_body.at(index);
+  const product::Panel& panel = panel_of(index);
+  const nearfield::PanelRcc rcc = nearfield::make_panel_rcc(
+      panel, panel.concrete < 0 ? nullptr : &plan.concretes[static_cast<size_t>(panel.concrete)],
+      panel.steel < 0 ? nullptr : &plan.steels[static_cast<size_t>(panel.steel)]);
+  const int axis = along_x ? 0 : 1;
+  double low = 1e30, high = -1e30, open = 0;
+  for (const Part& p : assemblies[static_cast<size_t>(body)].parts) {
+    low = std::min(low, p.centre[axis] - p.half[axis]);
+    high = std::max(high, p.centre[axis] + p.half[axis]);
+  }
+  for (const product::Opening& o : m.openings) open += o.width;
+  const double width = std::max(high - low - open, 0.05 * (high - low)), kept = kept_of(index), height = m.height;
+  const int floor = at.storey == 0 ? -1 : own_body.at(find_at(x_beams, {at.row, at.frame, at.storey - 1}));
+  Vec3 base = m.start;
+  base[axis] = 0.5 * (low + high);
+
+  mbs::Joint joint;
+  joint.kind = mbs::Joint::Kind::Fixed;
+  joint.name = m.name + "/base";
+  joint.parent = floor < 0 ? mbs::kGround : mbs::BodyId{floor};
+  joint.child = mbs::BodyId{body};
+  joint.X_PF = frame_in(floor, base, column_axes());
+  joint.X_CM = frame_in(body, base, column_axes());
+  joint.tension_limit = rcc.tension * width * kept;
+  joint.shear_limit = rcc.shear_in_plane * width * kept;
+  // overturning about one edge of the wall, its own weight helping
+  joint.moment_limit =
+      0.5 * (high - low) *
+      (0.5 * joint.tension_limit + plan.analysis.gravity * assemblies[static_cast<size_t>(body)].mass());
+  ZoneEntry entry;
+  entry.name = joint.name, entry.member = m.name, entry.subsystem = kRigid;
+  entry.body_a = floor, entry.body_b = body, entry.p_W = base;
+  map.joints.push_back(entry);
+  mbs::add_joint(model, joint);
+
+  const int beam = along_x ? find_at(x_beams, at) : -1;
+  if (beam < 0) return;
+  const double E_t = rcc.EA * kept;  // modulus times thickness
+  const double shear = k.wall_stiffness_share * E_t / 2.4 * width / height;
+  const double axial = k.wall_axial_share * E_t * width / height;
+  const double across = 3 * rcc.EI * width / (height * height * height);
+  Vec3 head = base;
+  head.z += height;
+  const double span = high - low;
+  add_element(m.name + "/head", index, body, own_body.at(beam), head, column_axes(), {axial, shear, across},
+              {across * span * span / 12, 3 * rcc.EI * width / height, axial * span * span / 12},
+              {{0, mbs::add_law(model, make_wall_law(rcc, width, height, kept, m.name + "/head", k))}});
+}
+
+void Builder::connect_cables() {
+  for (const product::Cable& c : plan.cables) {
+    const Member& m = member(c.member);
+    if (m.removed) {
+      complaints.push_back(
+          {Severity::Error, "E624", c.where, 1, "cable " + c.name + ": " + m.name + " was taken out", ""});
+      continue;
+    }
+    const GridPoint at{m.row_a, m.frame_a, m.storey};
+    const double length = norm(m.end - m.start), share = length > 0 ? c.position / length : 0;
+    const Vec3 p_W = m.start + share * (m.end - m.start);
+    int body = -1;
+    if (m.kind == MemberKind::Column) {
+      body = node_at(at);
+      if (at.storey == 0 && c.position < zones[c.member].clear_length) body = own_body.at(c.member);
+      if (stump_body.count(c.member) && c.position < lowest_charge[c.member]) body = stump_body[c.member];
+    } else if (own_body.count(c.member)) {
+      body = own_body.at(c.member);
+    } else if (m.kind == MemberKind::Beam || m.kind == MemberKind::Wall) {
+      const int floor = m.kind == MemberKind::Wall ? at.storey - 1 : at.storey;
+      const int a = node_at({m.row_a, m.frame_a, floor}), b = node_at({m.row_b, m.frame_b, floor});
+      body = share < 0.5 || b < 0 ? (a < 0 ? b : a) : b;
+    } else if (m.kind == MemberKind::Slab) {
+      const int frame = share < 0.5 ? m.frame_a : m.frame_b;
+      const int beam = find_at(x_beams, {m.row_a, frame, m.storey});
+      body = beam >= 0 ? own_body.at(beam) : node_at({share < 0.5 ? m.row_a : m.row_b, frame, m.storey});
+    }
+    if (body < 0) {
+      complaints.push_back({Severity::Error, "E624", c.where, 1, "cable " + c.name + ": nothing to tie it to", ""});
+      continue;
+    }
+    mbs::Cable cable;
+    cable.name = c.name;
+    cable.a = mbs::BodyId{body};
+    cable.b = mbs::kGround;
+    cable.p_A = p_W - model.bodies[static_cast<size_t>(body)].X_WB.p;
+    cable.p_B = c.anchor;
+    cable.stiffness = c.stiffness;
+    cable.pretension = c.pretension;
+    cable.strength = c.strength > 0 ? c.strength : mbs::kUnlimited;
+    model.cables.push_back(cable);
+  }
+}
+
+}  // namespace topple::collapse

@@ -1,0 +1,119 @@
+#include "collapse/knowledge.h"
+
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+#include "collapse/knowledge_data.h"
+
+namespace topple::collapse {
+
+namespace {
+
+using Field = double Knowledge::*;
+
+const std::map<std::string, Field>& fields() {
+  static const std::map<std::string, Field> table{
+      {"zone.length_by_depth", &Knowledge::zone_length_by_depth},
+      {"zone.length_by_span", &Knowledge::zone_length_by_span},
+      {"zone.length_by_bar", &Knowledge::zone_length_by_bar},
+      {"zone.length_at_most", &Knowledge::zone_length_at_most},
+      {"zone.rupture_rotation", &Knowledge::zone_rupture_rotation},
+      {"zone.slip_softening", &Knowledge::zone_slip_softening},
+      {"zone.slip_rupture", &Knowledge::zone_slip_rupture},
+      {"zone.twist_rupture", &Knowledge::zone_twist_rupture},
+      {"zone.biaxial_exponent", &Knowledge::zone_biaxial_exponent},
+      {"zone.damping_ratio", &Knowledge::zone_damping_ratio},
+      {"slab.elongation_lengths", &Knowledge::slab_elongation_lengths},
+      {"wall.stiffness_share", &Knowledge::wall_stiffness_share},
+      {"wall.axial_share", &Knowledge::wall_axial_share},
+      {"wall.crush_share", &Knowledge::wall_crush_share},
+      {"charge.release_time", &Knowledge::charge_release_time},
+      {"charge.cage_rupture_rotation", &Knowledge::charge_cage_rupture_rotation},
+      {"charge.transition_reach", &Knowledge::charge_transition_reach},
+      {"charge.scatter_limit", &Knowledge::charge_scatter_limit},
+      {"body.least_radius_of_gyration", &Knowledge::body_least_radius_of_gyration},
+      {"contact.gap", &Knowledge::contact_gap},
+      {"contact.body_friction", &Knowledge::contact_body_friction},
+      {"contact.body_restitution", &Knowledge::contact_body_restitution},
+      {"contact.frequency", &Knowledge::contact_frequency},
+      {"rest.speed", &Knowledge::rest_speed},
+      {"rest.time", &Knowledge::rest_time},
+      {"stands.displacement", &Knowledge::stands_displacement},
+      {"mechanism.moved_displacement", &Knowledge::mechanism_moved_displacement},
+      {"mechanism.stands_share", &Knowledge::mechanism_stands_share},
+      {"mechanism.partial_share", &Knowledge::mechanism_partial_share},
+      {"mechanism.topple_rear_share", &Knowledge::mechanism_topple_rear_share},
+      {"mechanism.coherent_share", &Knowledge::mechanism_coherent_share},
+      {"mechanism.fold_share", &Knowledge::mechanism_fold_share},
+      {"mechanism.fold_rotation", &Knowledge::mechanism_fold_rotation},
+      {"mechanism.direction_tolerance", &Knowledge::mechanism_direction_tolerance},
+      {"mechanism.aborted_rotation", &Knowledge::mechanism_aborted_rotation},
+      {"verification.energy_error", &Knowledge::verification_energy_error},
+      {"verification.equilibrium_residual", &Knowledge::verification_equilibrium_residual},
+  };
+  return table;
+}
+
+}  // namespace
+
+Knowledge read_knowledge(const std::string& text, const std::string& name) {
+  using nlohmann::json;
+  std::vector<Diagnostic> complaints;
+  const auto complain = [&](const std::string& what) {
+    complaints.push_back({Severity::Error, "E661", {name, 0, 0}, 1, what, "`topple rules --json` writes a whole set"});
+  };
+  Knowledge knowledge{};
+  const json document = json::parse(text, nullptr, false);
+  if (document.is_discarded() || !document.is_object() || !document.contains("rules") ||
+      !document["rules"].is_array()) {
+    complain("is not a JSON object with a list \"rules\"");
+    throw InputError(complaints);
+  }
+  std::map<std::string, bool> seen;
+  for (const json& entry : document["rules"]) {
+    Rule rule;
+    const auto word = [&](const char* key) {
+      return entry.is_object() && entry.contains(key) && entry[key].is_string() ? entry[key].get<std::string>()
+                                                                                : std::string();
+    };
+    rule.id = word("id"), rule.unit = word("unit"), rule.text = word("text"), rule.reason = word("reason");
+    if (rule.id.empty() || rule.text.empty() || rule.reason.empty()) {
+      complain("a rule without id, text or reason: " + entry.dump().substr(0, 80));
+      continue;
+    }
+    const auto field = fields().find(rule.id);
+    if (field == fields().end()) {
+      std::vector<std::string> known;
+      for (const auto& [id, f] : fields()) known.push_back(id);
+      const std::string near = nearest_name(rule.id, known);
+      complain("there is no rule \"" + rule.id + "\"" + (near.empty() ? "" : "; did you mean \"" + near + "\"?"));
+      continue;
+    }
+    if (seen[rule.id]) {
+      complain("rule \"" + rule.id + "\" is given twice");
+      continue;
+    }
+    seen[rule.id] = true;
+    if (!entry.contains("value") || !entry["value"].is_number() || !std::isfinite(entry["value"].get<double>()) ||
+        entry["value"].get<double>() <= 0) {
+      complain("rule \"" + rule.id + "\" needs a value > 0");
+      continue;
+    }
+    rule.value = entry["value"].get<double>();
+    knowledge.*(field->second) = rule.value;
+    knowledge.rules.push_back(std::move(rule));
+  }
+  for (const auto& [id, field] : fields())
+    if (!seen[id]) complain("rule \"" + id + "\" is missing");
+  if (!complaints.empty()) throw InputError(complaints);
+  return knowledge;
+}
+
+const Knowledge& default_knowledge() {
+  static const Knowledge knowledge = read_knowledge(kKnowledgeText, "data/knowledge.json");
+  return knowledge;
+}
+
+}  // namespace topple::collapse

@@ -1,0 +1,418 @@
+#include "collapse/manager.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "collapse/builder.h"
+
+namespace topple::collapse {
+
+using product::Member;
+using product::MemberKind;
+
+Mat3 column_axes() { return Mat3::from_columns({0, 0, 1}, {1, 0, 0}, {0, 1, 0}); }
+Mat3 x_beam_axes() { return Mat3::identity(); }
+Mat3 y_beam_axes() { return Mat3::from_columns({0, 1, 0}, {-1, 0, 0}, {0, 0, 1}); }
+
+double calc_standing_mass(const product::Plan& plan) {
+  double mass = 0;
+  for (const Member& m : plan.members) {
+    if (m.removed) continue;
+    mass += product::calc_mass(plan, m);
+    if (m.kind == MemberKind::Slab)
+      mass +=
+          plan.storey_loads[static_cast<size_t>(m.storey)] * std::abs((m.end.x - m.start.x) * (m.end.y - m.start.y));
+  }
+  return mass;
+}
+
+void Builder::complain(int i, const std::string& what, const std::string& help) {
+  complaints.push_back({Severity::Error, "E621", member(i).where, 1, member(i).name + ": " + what, help});
+}
+
+int Builder::find_at(const std::map<GridPoint, int>& members, const GridPoint& at) const {
+  const auto it = members.find(at);
+  return it == members.end() ? -1 : it->second;
+}
+
+int Builder::node_at(const GridPoint& at) const { return find_at(node_body, at); }
+
+int Builder::add_assembly(Assembly a) {
+  assemblies.push_back(std::move(a));
+  return static_cast<int>(assemblies.size()) - 1;
+}
+
+void Builder::find_direction() {
+  double azimuth = 3.14159265358979323846;
+  if (plan.criteria.azimuth) {
+    azimuth = *plan.criteria.azimuth;
+    map.is_direction_planned = true;
+  } else {
+    // away from the ground columns that keep standing, along the grid
+    Vec3 all, standing;
+    int n_all = 0, n_standing = 0;
+    for (size_t i = 0; i < plan.members.size(); ++i) {
+      const Member& m = plan.members[i];
+      if (m.kind != MemberKind::Column || m.storey != 0 || m.removed) continue;
+      bool fired = false;
+      for (const product::Stage& s : plan.stages)
+        for (const product::Charge& c : s.charges) fired |= c.member == static_cast<int>(i) && !c.fails;
+      all += m.start, ++n_all;
+      if (!fired) standing += m.start, ++n_standing;
+    }
+    if (n_standing > 0 && n_all > n_standing) {
+      const Vec3 d = (1.0 / n_all) * all - (1.0 / n_standing) * standing;
+      if (std::abs(d.x) > 1e-6 || std::abs(d.y) > 1e-6)
+        azimuth = std::abs(d.x) >= std::abs(d.y) ? std::atan2(0.0, d.x) : std::atan2(d.y, 0.0);
+    }
+  }
+  map.fall_direction = {std::cos(azimuth), std::sin(azimuth), 0};
+  map.hinge_axis = cross({0, 0, 1}, map.fall_direction);
+  hinge_about_y = std::abs(map.fall_direction.x) >= std::abs(map.fall_direction.y);
+}
+
+void Builder::index_members() {
+  for (size_t i = 0; i < plan.members.size(); ++i) {
+    const Member& m = plan.members[i];
+    const int index = static_cast<int>(i);
+    if (m.removed) continue;
+    const GridPoint at{m.row_a, m.frame_a, m.storey};
+    std::map<GridPoint, int>* into = nullptr;
+    const int rows = m.row_b - m.row_a, frames = m.frame_b - m.frame_a;
+    switch (m.kind) {
+      case MemberKind::Column:
+        into = &columns;
+        break;
+      case MemberKind::Slab:
+        into = &slabs;
+        break;
+      case MemberKind::Beam:
+        into = rows != 0 ? &x_beams : &y_beams;
+        break;
+      case MemberKind::Wall:
+        into = rows != 0 ? &x_walls : &y_walls;
+        break;
+    }
+    const bool fits = m.kind == MemberKind::Column ? rows == 0 && frames == 0
+                      : m.kind == MemberKind::Slab ? rows == 1 && frames == 1
+                                                   : (rows == 1 && frames == 0) || (rows == 0 && frames == 1);
+    if (!fits) {
+      complain(index, "must go from one grid line to the next");
+      continue;
+    }
+    if ((m.kind == MemberKind::Column || m.kind == MemberKind::Beam) &&
+        (m.section < 0 || section_of(index).steel < 0)) {
+      complain(index, "needs a section with reinforcement");
+      continue;
+    }
+    if (const auto [it, is_new] = into->emplace(at, index); !is_new)
+      complain(index, "stands in the same place as " + member(it->second).name);
+  }
+  for (const product::Stage& stage : plan.stages)
+    for (const product::Charge& c : stage.charges) {
+      const Member& m = member(c.member);
+      if (m.removed) complain(c.member, "has a charge but was taken out before");
+      if (m.kind != MemberKind::Column && m.kind != MemberKind::Beam)
+        complain(c.member, "charges act on columns and beams only",
+                 "walls and slabs can be taken out in [preparation]");
+      if (m.kind != MemberKind::Column) continue;
+      const auto [it, is_new] = lowest_charge.emplace(c.member, c.position);
+      if (!is_new) it->second = std::min(it->second, c.position);
+    }
+}
+
+/// Half extents of a joint along x and y.
+Vec3 Builder::half_of_node(const GridPoint& at) const {
+  int column = find_at(columns, at);
+  if (column < 0) column = find_at(columns, {at.row, at.frame, at.storey + 1});
+  if (column >= 0) return {0.5 * section_of(column).width, 0.5 * section_of(column).height, 0};
+  Vec3 half;
+  for (int back : {0, 1}) {
+    if (const int b = find_at(y_beams, {at.row, at.frame - back, at.storey}); b >= 0)
+      half.x = std::max(half.x, 0.5 * section_of(b).width);
+    if (const int b = find_at(x_beams, {at.row - back, at.frame, at.storey}); b >= 0)
+      half.y = std::max(half.y, 0.5 * section_of(b).width);
+  }
+  return half;
+}
+
+void Builder::make_columns() {
+  for (const auto& [at, index] : columns) {
+    const Member& m = member(index);
+    const product::Section& s = section_of(index);
+    const double height = m.end.z - m.start.z;
+    // the joint reaches down to the underside of the deepest beam
+    double low = m.end.z;
+    for (int back : {0, 1}) {
+      for (const int b : {find_at(x_beams, {at.row - back, at.frame, at.storey}),
+                          find_at(y_beams, {at.row, at.frame - back, at.storey})})
+        if (b >= 0) low = std::min(low, member(b).start.z - 0.5 * section_of(b).height);
+    }
+    if (low >= m.end.z) low = m.end.z - std::min(std::max(s.width, s.height), 0.25 * height);
+    if (low - m.start.z < 0.1) {
+      complain(index, "no clear height is left below its beams");
+      continue;
+    }
+    core_low[at] = low;
+    const double mass = product::calc_mass(plan, m);
+    const auto slice = [&](double from, double to) {
+      const Vec3 half{0.5 * s.width, 0.5 * s.height, 0};
+      Vec3 a = m.start - half, b = m.start + half;
+      a.z = m.start.z + from, b.z = m.start.z + to;
+      return make_part(a, b, mass * (to - from) / height, index);
+    };
+    const auto charged = lowest_charge.find(index);
+    double split = charged == lowest_charge.end() ? 0 : charged->second;
+    if (split > 0 && split >= low - m.start.z - 0.02) {
+      complain(index, "a charge lies in the joint above the clear height of " + std::to_string(low - m.start.z) + " m",
+               "place it lower");
+      continue;
+    }
+    if (split < 0.02) split = 0;
+    const std::string point = m.name.size() > 2 ? m.name.substr(1) : "-" + m.name;
+    if (at.storey == 0) {
+      if (split > 0) stump_body[index] = add_assembly({m.name + "/stump", "stump", 0, true, {slice(0, split)}});
+      own_body[index] = add_assembly({m.name, "column", 0, false, {slice(split, low - m.start.z)}});
+      node_body[at] = add_assembly({"N" + point, "node", 0, false, {slice(low - m.start.z, height)}});
+    } else {
+      // what lies below a charge belongs to the body that it stands on
+      const int below = node_at({at.row, at.frame, at.storey - 1});
+      if (split > 0 && below >= 0) {
+        assemblies[static_cast<size_t>(below)].parts.push_back(slice(0, split));
+        stump_body[index] = below;
+      } else {
+        split = 0;
+      }
+      node_body[at] = add_assembly({m.name, "column", at.storey, false, {slice(split, height)}});
+    }
+  }
+}
+
+/// Joints of beams where no column ends from below.
+void Builder::make_loose_nodes() {
+  const auto need = [&](const GridPoint& at) {
+    if (node_at(at) >= 0) return;
+    const std::string point =
+        plan.row_names[static_cast<size_t>(at.row)] + plan.frame_names[static_cast<size_t>(at.frame)];
+    node_body[at] = add_assembly({"N-" + point + "-" + std::to_string(at.storey), "node", at.storey, false, {}});
+  };
+  for (const auto& [at, index] : x_beams) need(at), need({at.row + 1, at.frame, at.storey});
+  for (const auto& [at, index] : y_beams) need(at), need({at.row, at.frame + 1, at.storey});
+}
+
+/// Shares boxes between the bodies of two joints, each getting what lies on its side of the middle.
+void Builder::put_on_nodes(std::vector<Part> parts, int axis, double middle, int node_a, int node_b) {
+  for (const Part& p : parts) {
+    const double low = p.centre[axis] - p.half[axis], high = p.centre[axis] + p.half[axis];
+    for (const bool first : {true, false}) {
+      const int node = first ? node_a : node_b;
+      const double from = first ? low : std::max(low, middle), to = first ? std::min(high, middle) : high;
+      if (!(to - from > 1e-9)) continue;
+      Part piece = p;
+      piece.centre[axis] = 0.5 * (from + to);
+      piece.half[axis] = 0.5 * (to - from);
+      piece.mass = p.mass * (to - from) / (high - low);
+      assemblies[static_cast<size_t>(node)].parts.push_back(piece);
+    }
+  }
+}
+
+void Builder::make_beams() {
+  for (const auto* beams : {&x_beams, &y_beams})
+    for (const auto& [at, index] : *beams) {
+      const bool along_x = beams == &x_beams;
+      const Member& m = member(index);
+      const product::Section& s = section_of(index);
+      const GridPoint other{at.row + along_x, at.frame + !along_x, at.storey};
+      const int axis = along_x ? 0 : 1;
+      MemberZones& z = zones[index];
+      z.clear_start = half_of_node(at)[axis];
+      const double end = half_of_node(other)[axis], length = norm(m.end - m.start);
+      z.clear_length = length - z.clear_start - end;
+      if (z.clear_length < 0.1) {
+        complain(index, "no clear length is left between its columns");
+        continue;
+      }
+      Vec3 half{0.5 * s.width, 0.5 * s.width, 0.5 * s.height};
+      half[axis] = 0;
+      Vec3 low = m.start - half, high = m.end + half;
+      low[axis] += z.clear_start, high[axis] -= end;
+      const double mass = product::calc_mass(plan, m);
+      const int a = node_at(at), b = node_at(other);
+      // a joint without a column is a piece of the beams that meet in it
+      double kept = mass;
+      for (const auto& [node, face, sign] : {std::tuple{a, low[axis], -1.0}, std::tuple{b, high[axis], 1.0}}) {
+        Assembly& joint = assemblies[static_cast<size_t>(node)];
+        const bool has_column = !joint.parts.empty() && joint.parts.front().member >= 0 &&
+                                member(joint.parts.front().member).kind == MemberKind::Column;
+        if (has_column) continue;
+        const double share = 0.5 * s.height / z.clear_length;
+        Part piece = make_part(low, high, mass * share, index);
+        piece.half[axis] = std::max(0.5 * s.width, 0.05);
+        piece.centre[axis] = face + sign * piece.half[axis];
+        joint.parts.push_back(piece);
+        kept -= mass * share;
+      }
+      if (along_x) {
+        own_body[index] = add_assembly({m.name, "beam", at.storey, false, {make_part(low, high, kept, index)}});
+      } else {
+        put_on_nodes({make_part(low, high, kept, index)}, axis, 0.5 * (low[axis] + high[axis]), a, b);
+      }
+    }
+}
+
+void Builder::make_slabs() {
+  for (const auto& [at, index] : slabs) {
+    const Member& m = member(index);
+    const double thickness = panel_of(index).thickness;
+    const double load = plan.storey_loads[static_cast<size_t>(at.storey)];
+    const double mass = product::calc_mass(plan, m) + load * std::abs((m.end.x - m.start.x) * (m.end.y - m.start.y));
+    // the strips keep clear of the joints and of the beams across
+    const auto edge = [&](int row) {
+      double half = 0;
+      for (int f : {at.frame, at.frame + 1}) half = std::max(half, half_of_node({row, f, at.storey}).x);
+      if (const int b = find_at(y_beams, {row, at.frame, at.storey}); b >= 0)
+        half = std::max(half, 0.5 * section_of(b).width);
+      return half;
+    };
+    const double x0 = m.start.x + edge(at.row), x1 = m.end.x - edge(at.row + 1), xm = 0.5 * (x0 + x1);
+    const double z0 = m.start.z - 0.5 * thickness, z1 = m.start.z + 0.5 * thickness;
+    const double ym = 0.5 * (m.start.y + m.end.y);
+    bool carried = false;
+    std::array<bool, 2> has{};
+    for (int side : {0, 1}) {
+      const GridPoint line{at.row, at.frame + side, at.storey};
+      has[static_cast<size_t>(side)] =
+          find_at(x_beams, line) >= 0 || (node_at(line) >= 0 && node_at({at.row + 1, at.frame + side, at.storey}) >= 0);
+    }
+    for (int side : {0, 1}) {
+      if (!has[static_cast<size_t>(side)]) continue;
+      const bool alone = !has[static_cast<size_t>(1 - side)];
+      const GridPoint line{at.row, at.frame + side, at.storey};
+      double y0 = side == 0 ? m.start.y : ym, y1 = side == 0 ? ym : m.end.y;
+      if (alone) y0 = m.start.y, y1 = m.end.y;
+      const double share = alone ? mass : 0.5 * mass;
+      const int beam = find_at(x_beams, line);
+      if (beam >= 0 && own_body.count(beam)) {
+        assemblies[static_cast<size_t>(own_body[beam])].parts.push_back(
+            make_part({x0, y0, z0}, {x1, y1, z1}, share, index, material_of(panel_of(index))));
+      } else {
+        put_on_nodes({make_part({x0, y0, z0}, {x1, y1, z1}, share, index, material_of(panel_of(index)))}, 0, xm,
+                     node_at(line), node_at({at.row + 1, at.frame + side, at.storey}));
+      }
+      carried = true;
+    }
+    if (!carried) complain(index, "no beam and no columns carry it");
+  }
+}
+
+void Builder::make_walls() {
+  for (const auto* walls : {&x_walls, &y_walls})
+    for (const auto& [at, index] : *walls) {
+      const bool along_x = walls == &x_walls;
+      const Member& m = member(index);
+      const GridPoint other{at.row + along_x, at.frame + !along_x, at.storey};
+      const int axis = along_x ? 0 : 1;
+      const auto face = [&](const GridPoint& p) {
+        const int column = find_at(columns, p);
+        return column < 0 ? 0.0 : 0.5 * (along_x ? section_of(column).width : section_of(column).height);
+      };
+      const double clear_a = face(at), clear_b = face(other);
+      const double from = m.start[axis] + clear_a, to = m.end[axis] - clear_b;
+      const double mass = product::calc_mass(plan, m);
+      if (to - from < 0.1 || m.height < 0.1 || !(mass > 0)) {
+        complain(index, "nothing is left of the wall between its columns");
+        continue;
+      }
+      std::vector<Part> parts = make_wall_parts(m, index, panel_of(index).thickness, mass, along_x, clear_a, clear_b,
+                                                material_of(panel_of(index)));
+      const GridPoint floor{at.row, at.frame, at.storey - 1};
+      const bool on_beam = along_x && at.storey > 0 && own_body.count(find_at(x_beams, floor));
+      if (at.storey == 0 || on_beam) {
+        own_body[index] = add_assembly({m.name, "wall", at.storey, false, std::move(parts)});
+        continue;
+      }
+      int a = node_at(floor), b = node_at({other.row, other.frame, other.storey - 1});
+      if (a < 0 && b < 0) {
+        complain(index, "stands on no beam and on no column");
+        continue;
+      }
+      if (a < 0) a = b;
+      if (b < 0) b = a;
+      put_on_nodes(std::move(parts), axis, 0.5 * (from + to), a, b);
+    }
+}
+
+void Builder::finish_bodies() {
+  for (const Assembly& a : assemblies) {
+    if (!(a.mass() > 0)) {
+      complaints.push_back({Severity::Error, "E622", {}, 1, a.name + ": a joint without mass", ""});
+      continue;
+    }
+    mbs::Body body = make_body(a, k);
+    BodyEntry entry{a.name, a.kind, a.storey, false, make_shapes(a, body.X_WB.p)};
+    entry.is_upper = !a.fixed && !(a.storey == 0 && (a.kind == "column" || a.kind == "wall"));
+    map.mass += body.mass;
+    if (!a.fixed) map.moving_mass += body.mass;
+    map.bodies.push_back(std::move(entry));
+    mbs::add_body(model, std::move(body));
+  }
+}
+
+mbs::Model Builder::build() {
+  const auto stop_if_wrong = [this] {
+    if (!complaints.empty()) throw InputError(complaints);
+  };
+  model.name = plan.title;
+  model.gravity = {0, 0, -plan.analysis.gravity};
+  model.contact.friction = plan.ground.friction;
+  model.contact.restitution = plan.ground.restitution;
+  model.contact.body_friction = k.contact_body_friction;
+  model.contact.body_restitution = k.contact_body_restitution;
+  model.contact.contact_frequency = k.contact_frequency;
+  find_direction();
+  index_members();
+  stop_if_wrong();
+  make_columns();
+  make_loose_nodes();
+  stop_if_wrong();
+  make_beams();
+  stop_if_wrong();
+  make_slabs();
+  make_walls();
+  stop_if_wrong();
+  finish_bodies();
+  stop_if_wrong();
+  if (model.bodies.empty()) throw InputError("E623", "the plan has no members that stand");
+
+  estimate_normal_forces();
+  request_zones();
+  library.compute(threads);
+  for (const auto& [at, index] : columns) at.storey == 0 ? connect_ground_column(at, index) : connect_column(at, index);
+  for (const auto& [at, index] : x_beams) connect_x_beam(at, index);
+  for (const auto& [at, index] : y_beams) connect_y_beam(at, index);
+  for (const auto& [at, index] : slabs) connect_slab(at, index);
+  for (const auto& [at, index] : x_walls) connect_wall(at, index, true);
+  for (const auto& [at, index] : y_walls) connect_wall(at, index, false);
+  connect_cables();
+  add_events();
+  stop_if_wrong();
+  for (size_t s = 0; s < plan.storey_loads.size(); ++s) {
+    const bool has_slab = std::any_of(slabs.begin(), slabs.end(),
+                                      [&](const auto& entry) { return entry.first.storey == static_cast<int>(s); });
+    if (plan.storey_loads[s] > 0 && !has_slab)
+      map.notes.push_back("The floor load above storey " + std::to_string(s) +
+                          " is left out: there is no slab to carry it.");
+  }
+  if (!hinge_about_y && !y_walls.empty())
+    map.notes.push_back("The fall is across the rows; walls in the rows count with their weight only.");
+  return std::move(model);
+}
+
+mbs::Model make_model(const product::Plan& plan, const Knowledge& knowledge, ModelMap& map, int threads) {
+  map = {};
+  return Builder(plan, knowledge, map, threads).build();
+}
+
+}  // namespace topple::collapse

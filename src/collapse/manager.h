@@ -1,0 +1,84 @@
+#pragma once
+/// The simulation manager: plan and knowledge in, special multibody system out (docs/theory/manager.md).
+
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "collapse/knowledge.h"
+#include "collapse/schedule.h"
+#include "mbs/model.h"
+#include "product/plan.h"
+#include "record/record.h"
+
+namespace topple::collapse {
+
+/// What a body of the model is in the plan.
+struct BodyEntry {
+  std::string name, kind;  // as in record::BodyInfo
+  int storey = 0;
+  bool is_upper = false;                 // belongs to the upper block: everything that moves but the ground storey's
+                                         // columns and walls
+  std::vector<record::BoxShape> shapes;  // members as built, in B
+};
+
+/// What a connection of the model is in the plan.
+struct ZoneEntry {
+  std::string name, member, subsystem;  // as in record::ZoneInfo
+  int body_a = -1, body_b = -1;
+  Vec3 p_W;
+  double firing_time = std::numeric_limits<double>::infinity();  // of the charge that acts on it [s]
+};
+
+/// What an event of the model is in the plan.
+struct EventEntry {
+  int stage = 0, charge = 0;  // indices into the plan
+  std::string member;
+  double time = 0;         // [s]
+  double debris_mass = 0;  // dropped from the model [kg]
+};
+
+/// A length of a member that a charge destroys; it leaves the model when the charge fires.
+struct DebrisEntry {
+  std::string member;
+  int storey = 0;
+  double mass = 0;    // [kg]
+  Vec3 centre, half;  // box along W's axes before that [m]
+  double time = 0;    // [s]
+};
+
+/// A ground-storey column as a hinge for the block above it.
+struct GroundColumn {
+  std::string member;
+  Vec3 p_foot, p_top;              // zone I and zone II, in W [m]
+  bool is_fired = false;           // a charge on it fires in this plan
+  double normal_force = 0;         // estimate under dead load, tension positive [N]
+  mbs::RotationalElement element;  // of zone II
+};
+
+/// Ties between plan and model. B bodies, E zone elements, R rotational elements, J joints.
+struct ModelMap {
+  std::vector<BodyEntry> bodies;       // (B)
+  std::vector<ZoneEntry> elements;     // (E)
+  std::vector<ZoneEntry> rotationals;  // (R)
+  std::vector<ZoneEntry> joints;       // (J)
+  std::vector<EventEntry> events;      // as Model::events
+  std::vector<DebrisEntry> debris;
+  std::vector<GroundColumn> ground_columns;
+  std::vector<Firing> schedule;    // failing charges included
+  std::vector<std::string> notes;  // what the manager had to decide, in sentences
+  Vec3 fall_direction{-1, 0, 0};   // planned, horizontal unit vector; away from the remaining supports if unplanned
+  Vec3 hinge_axis{0, -1, 0};       // rotation about it by a positive angle leans towards fall_direction
+  bool is_direction_planned = false;
+  double mass = 0;         // of all bodies [kg]
+  double moving_mass = 0;  // without fixed ones [kg]
+};
+
+/// Builds the model. Throws InputError for plans that cannot be built, naming the member.
+///   threads  for the resistance curves; the model does not depend on it
+mbs::Model make_model(const product::Plan&, const Knowledge&, ModelMap& map, int threads = 1);
+
+/// Mass of everything that stands before the first charge: members and floor loads [kg].
+double calc_standing_mass(const product::Plan&);
+
+}  // namespace topple::collapse
