@@ -1,14 +1,12 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <stdexcept>
 #include <string_view>
-#include <system_error>
 
+#include "base/file.h"
 #include "record/record.h"
 
 namespace topple::record {
@@ -190,21 +188,13 @@ void write_report(const Record& record, const std::string& bundle, const std::st
   const std::size_t at = bundle.find(marker);
   if (at == std::string::npos || bundle.find(marker, at + 1) != std::string::npos)
     throw std::runtime_error(path + ": the report page to fill must hold the marker " + std::string(marker) + " once");
-  const std::string data = escape_for_html(to_report_json(record));
-
-  const std::string part = path + ".part";
-  std::ofstream out(part, std::ios::binary | std::ios::trunc);
   const std::string_view page = bundle;
-  out << page.substr(0, at) << R"(<script type="application/json" id="topple-data">)" << data << "</script>"
-      << page.substr(at + marker.size());
-  out.close();
-  std::error_code failed;
-  if (out) std::filesystem::rename(part, path, failed);
-  if (!out || failed) {
-    std::error_code ignored;
-    std::filesystem::remove(part, ignored);
-    throw std::runtime_error(path + ": cannot write the report" + (failed ? ": " + failed.message() : ""));
-  }
+  std::string filled(page.substr(0, at));
+  filled += R"(<script type="application/json" id="topple-data">)";
+  filled += escape_for_html(to_report_json(record));
+  filled += "</script>";
+  filled += page.substr(at + marker.size());
+  replace_file(path, filled);
 }
 
 }  // namespace topple::record

@@ -6,8 +6,8 @@
 #include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
+#include "base/file.h"
 #include "record/record.h"
 
 namespace topple::record {
@@ -76,13 +76,6 @@ Record make_record() {
   r.ending = "time_limit";
   r.ending_text = "Stopped while moving.";
   return r;
-}
-
-std::string read_file(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
 }
 
 std::string temporary(const std::string& name) { return testing::TempDir() + "topple_report_test_" + name; }
@@ -187,7 +180,6 @@ TEST(ReportPage, TakesThePlaceOfTheMarker) {
   EXPECT_THAT(page, testing::StartsWith("<body><script type=\"application/json\" id=\"topple-data\">{"));
   EXPECT_THAT(page, testing::EndsWith("}</script><p>end</p></body>"));
   EXPECT_EQ(data_of_page(page), json::parse(to_report_json(make_record())));
-  EXPECT_FALSE(std::filesystem::exists(path + ".part"));
   std::filesystem::remove(path);
 }
 
@@ -213,11 +205,14 @@ TEST(ReportPage, RefusesAPageWithoutOneMarker) {
 }
 
 TEST(ReportPage, NamesThePathItCannotWrite) {
-  const std::string path = temporary("missing") + "/folder/report.html";
+  const std::string file = temporary("file");
+  std::ofstream(file) << "not a folder";
+  const std::string path = file + "/report.html";
   try {
     write_report(make_record(), "<!--TOPPLE-DATA-->", path);
-    FAIL() << "wrote into a folder that does not exist";
+    FAIL() << "wrote below a file";
   } catch (const std::runtime_error& error) { EXPECT_THAT(error.what(), testing::HasSubstr(path)); }
+  std::filesystem::remove(file);
 }
 
 }  // namespace

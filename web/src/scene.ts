@@ -77,7 +77,7 @@ export class Scene {
   private readonly bodyOfInstance: number[] = [];
   private readonly shapePose: THREE.Matrix4[] = [];
   private readonly bodyPose: THREE.Matrix4[];
-  private readonly marks: THREE.InstancedMesh[];
+  private readonly marks: THREE.InstancedMesh<THREE.BufferGeometry, THREE.MeshBasicMaterial>[];
   private readonly zonePlace: { body: number; local: THREE.Vector3 }[];
   private readonly selection: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
   private readonly site: Site;
@@ -241,6 +241,7 @@ export class Scene {
     this.scene.background = new THREE.Color(theme.background);
     this.site.setTheme(theme);
     this.selection.material.color.set(theme.selection);
+    zoneStates.forEach((state, i) => this.marks[i]?.material.color.set((dark ? state.onDark : undefined) ?? state.colour));
     this.onChange();
   }
 
@@ -337,10 +338,10 @@ export class Scene {
     this.onChange();
   }
 
-  private useAspect(width: number, height: number): void {
+  private useAspect(width: number, height: number, labelScale = 1): void {
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
-    this.site.setViewport(height, fov);
+    this.site.setViewport(height / labelScale, fov);
   }
 
   /// Looks at the whole collapse from one side, as near as the picture allows.
@@ -402,7 +403,7 @@ export class Scene {
     this.setDark(false);
     this.renderer.setPixelRatio(1);
     this.renderer.setSize(width, height, false);
-    this.useAspect(width, height);
+    this.useAspect(width, height, 1.7); // stills are shown smaller than they are drawn
     this.fit("oblique");
     const canvas = document.createElement("canvas");
     canvas.width = width;

@@ -1,5 +1,5 @@
 import type { Status } from "./data";
-import { statusWord, wordsOfEvent, zoneStates } from "./vocabulary";
+import { statusWord, wordsOfEvent, zoneStates, type ZoneStateWords } from "./vocabulary";
 
 const paths: Record<string, string> = {
   circle: "M8 2.5a5.5 5.5 0 1 0 .01 0Z",
@@ -16,7 +16,7 @@ export function Sign(props: { shape: string; colour: string; size?: number }) {
   const size = props.size ?? 12;
   return (
     <svg class="sign" width={size} height={size} viewBox="0 0 16 16" aria-hidden="true">
-      <path d={paths[props.shape] ?? (paths["circle"] as string)} fill={props.colour} />
+      <path d={paths[props.shape] ?? (paths["circle"] as string)} style={{ fill: props.colour }} />
     </svg>
   );
 }
@@ -48,12 +48,16 @@ export function StatusWord(props: { status: Status }) {
   return <span class={`status-word ${props.status}`}>{statusWord[props.status]}</span>;
 }
 
+export function ZoneSign(props: { words: ZoneStateWords }) {
+  return <Sign shape={props.words.shape} colour={props.words.onDark === undefined ? props.words.colour : "var(--broken)"} />;
+}
+
 export function ZoneStateWord(props: { state: number }) {
   const words = zoneStates[props.state];
   if (words === undefined) return <span>unknown</span>;
   return (
     <span class="with-sign">
-      <Sign shape={words.shape} colour={words.colour} /> {words.word}
+      <ZoneSign words={words} /> {words.word}
     </span>
   );
 }

@@ -1,7 +1,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { effect } from "@preact/signals";
 import { Scene, type View } from "./scene";
-import { Sign } from "./signs";
+import { ZoneSign } from "./signs";
 import type { Colouring, State, ZoneMarks } from "./state";
 import { colourOfKind, rampCss, wordOfKind, zoneStates } from "./vocabulary";
 import { findZonesOfBodies } from "./zones";
@@ -43,7 +43,7 @@ function Legend(props: { state: State; gridStep: number }) {
           {zoneStates.map((s, i) =>
             i === 0 && marks === "damaged" && colouring !== "state" ? null : (
               <span class="with-sign">
-                <Sign shape={s.shape} colour={s.colour} /> {s.word}
+                <ZoneSign words={s} /> {s.word}
               </span>
             ),
           )}

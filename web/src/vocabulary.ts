@@ -7,6 +7,8 @@ export const statusWord: Record<Status, string> = { info: "Note", good: "OK", wa
 export interface ZoneStateWords {
   word: string;
   colour: string;
+  /// Where the colour would drown in a dark ground.
+  onDark?: string;
   shape: "circle" | "triangle" | "diamond" | "cross" | "star";
 }
 /// Indexed by ZoneState of the record.
@@ -14,7 +16,7 @@ export const zoneStates: ZoneStateWords[] = [
   { word: "elastic", colour: "#56b4e9", shape: "circle" },
   { word: "yielded", colour: "#e69f00", shape: "triangle" },
   { word: "softening", colour: "#d55e00", shape: "diamond" },
-  { word: "broken", colour: "#7a1f5c", shape: "cross" },
+  { word: "broken", colour: "#7a1f5c", onDark: "#b9a3ff", shape: "cross" },
   { word: "fired", colour: "#cc79a7", shape: "star" },
 ];
 
@@ -48,8 +50,8 @@ export function wordOfKind(kind: string): string {
   return kindWord[kind] ?? (kind === "" ? "Part" : kind.charAt(0).toUpperCase() + kind.slice(1));
 }
 
-/// Cividis, at equal distances: readable with and without colour vision.
-const ramp = ["#00224e", "#2a3f6d", "#575d6d", "#7d7c78", "#a59c74", "#d2c060", "#fee838"];
+/// Light to dark, so that it can be read with and without colour vision and in print.
+const ramp = ["#fbf8ea", "#fee6a8", "#fec44f", "#fe9929", "#d95f0e", "#993404", "#5c1f05"];
 export const rampCss = `linear-gradient(to right, ${ramp.join(", ")})`;
 export function colourOfUtilisation(utilisation: number): string {
   const s = Math.min(1, Math.max(0, utilisation)) * (ramp.length - 1);
@@ -73,9 +75,9 @@ const eventWords: Record<string, EventWords> = {
   stage: { word: "Stage", colour: "#0072b2", shape: "circle", small: false },
   charge: { word: "Charge", colour: "#cc79a7", shape: "star", small: true },
   yield: { word: "Yield", colour: "#e69f00", shape: "triangle", small: true },
-  rupture: { word: "Rupture", colour: "#7a1f5c", shape: "cross", small: true },
+  rupture: { word: "Rupture", colour: "var(--broken)", shape: "cross", small: true },
   release: { word: "Release", colour: "#d55e00", shape: "diamond", small: true },
-  touchdown: { word: "Touchdown", colour: "#8a5a3c", shape: "down", small: false },
+  touchdown: { word: "Touchdown", colour: "var(--touchdown)", shape: "down", small: false },
   contact: { word: "Contact", colour: "#8b97a3", shape: "square", small: true },
   rest: { word: "Rest", colour: "#009e73", shape: "square", small: false },
   cable: { word: "Cable", colour: "#009e73", shape: "diamond", small: false },

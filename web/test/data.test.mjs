@@ -110,7 +110,7 @@ describe("what is shown", () => {
   });
 
   it("keeps the ends of the colour ramp", () => {
-    assert.equal(colourOfUtilisation(0), "rgb(0, 34, 78)");
-    assert.equal(colourOfUtilisation(7), "rgb(254, 232, 56)");
+    assert.equal(colourOfUtilisation(0), "rgb(251, 248, 234)");
+    assert.equal(colourOfUtilisation(7), "rgb(92, 31, 5)");
   });
 });
