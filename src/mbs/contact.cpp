@@ -120,12 +120,28 @@ void System::find_pairs() {
         s.pairs[old].energy = 0;
       }
     }
-    for (const PairState& p : s.pairs) {
-      s.contact_energy -= p.energy;
-      s.contact_loss += p.energy;
-    }
+    for (const PairState& p : s.pairs) s.contact_energy -= p.energy;
     s.pairs = std::move(found);
   }
+}
+
+void System::push(size_t b, const Vec3& lever, const Vec3& f) {
+  const Vec3 t = cross(lever, f);
+  force[b] += f;
+  torque[b] += t;
+  contact_force[b] += f;
+  contact_torque[b] += t;
+}
+
+void System::add_contact_work(double h) {
+  double power = 0;
+  for (size_t b = 0; b < B; ++b) {
+    const Vec3 &f = contact_force[b], &t = contact_torque[b];
+    if ((f == Vec3{} && t == Vec3{}) || fixed[b]) continue;
+    power += dot(f, calc_velocity(b)) + dot(t, calc_angular_velocity(b));
+  }
+  state.contact_work += 0.5 * h * (state.contact_power + power);
+  state.contact_power = power;
 }
 
 void System::evaluate_ground_contact(double h) {
@@ -170,14 +186,11 @@ void System::evaluate_ground_contact(double h) {
         const Vec3 v_t = v + approach * n;
         if (depth <= 0) {
           if (g.touching) {
-            // what the last step left in the springs is lost
-            const double left =
+            s.contact_energy -=
                 0.5 * e2 * stiffness * g.depth * g.depth + 0.5 * stick_stiffness * dot(g.stick, g.stick);
-            s.contact_energy -= left;
-            s.contact_loss += left - 0.5 * g.force * g.depth;
             g.touching = false;
             g.stick = g.friction = {};
-            g.depth = g.force = 0;
+            g.depth = 0;
           }
           continue;
         }
@@ -199,19 +212,15 @@ void System::evaluate_ground_contact(double h) {
                       ? (-1 / stick_stiffness) * (ft + std::min(1.0, limit / magnitude) * stick_damping * v_t)
                       : Vec3{};
         }
-        // ledger by the trapezium over the step
-        const double stored_before = 0.5 * e2 * stiffness * g.depth * g.depth;
-        const double stored = 0.5 * e2 * stiffness * depth * depth;
-        const double work = 0.5 * (g.force + f) * (depth - g.depth);
-        s.contact_loss += work - (stored - stored_before);
+        const double stored_before =
+            0.5 * e2 * stiffness * g.depth * g.depth + 0.5 * stick_stiffness * dot(g.stick, g.stick);
         const double stick_before = 0.5 * stick_stiffness * dot(g.stick, g.stick);
         const double stick_now = 0.5 * stick_stiffness * dot(stick, stick);
         const double slide_work = -0.5 * h * dot(g.friction + ft, v_t);
         s.friction += slide_work - (stick_now - stick_before);
-        s.contact_energy += stored - stored_before + stick_now - stick_before;
+        s.contact_energy += 0.5 * e2 * stiffness * depth * depth + stick_now - stored_before;
 
         g.depth = depth;
-        g.force = f;
         g.stick = stick;
         g.friction = ft;
         if (!g.touching) {
@@ -222,8 +231,7 @@ void System::evaluate_ground_contact(double h) {
           }
         }
         const Vec3 total = f * n + ft;
-        force[b] += total;
-        torque[b] += cross(r, total);
+        push(b, r, total);
         ground_contact += total;
       }
     }
@@ -289,13 +297,10 @@ void System::evaluate_body_contact(double h) {
         const double speed = norm(v_t), viscous = 0.5 * reduced * c.contact_frequency;
         const double ft = std::min(c.body_friction * f, viscous * speed);
         const Vec3 total = -f * n - (speed > 0 ? ft / speed : 0.0) * v_t;  // on a
-        force[a] += total;
-        torque[a] += cross(ra, total);
-        force[b] -= total;
-        torque[b] -= cross(rb, total);
+        push(a, ra, total);
+        push(b, rb, -total);
         if (fixed[a]) ground_contact -= total;
         if (fixed[b]) ground_contact += total;
-        s.contact_loss += f * (approach - 0.5 * h * inverse_mass * f) * h;
         s.friction += ft * speed * h;
         stored += 0.5 * e2 * stiffness * depth * depth;
         touching = true;
@@ -311,7 +316,6 @@ void System::evaluate_body_contact(double h) {
         }
       }
     }
-    s.contact_loss -= stored - pair.energy;
     s.contact_energy += stored - pair.energy;
     pair.energy = stored;
     pair.touching = touching;

@@ -183,6 +183,8 @@ void System::compile() {
   element_force.assign(elements.size(), {});
   force.assign(B, {});
   torque.assign(B, {});
+  contact_force.assign(B, {});
+  contact_torque.assign(B, {});
   s.gravity_at_start = calc_energy().gravity;
 }
 
@@ -431,10 +433,7 @@ void System::replace_body(size_t b, const Body& replacement) {
   // contact pairs name shapes by their index within the body, which may be others now
   std::erase_if(s.pairs, [&](const PairState& pair) {
     const bool gone = pair.a == static_cast<int>(b) || pair.b == static_cast<int>(b);
-    if (gone) {
-      s.contact_energy -= pair.energy;
-      s.contact_loss += pair.energy;
-    }
+    if (gone) s.contact_energy -= pair.energy;
     return gone;
   });
 }
@@ -448,9 +447,12 @@ void System::evaluate_forces(double h) {
   evaluate_rotationals(h);
   evaluate_cables();
   if (model.contact.ground || model.contact.bodies) {
+    std::fill(contact_force.begin(), contact_force.end(), Vec3{});
+    std::fill(contact_torque.begin(), contact_torque.end(), Vec3{});
     if (state.search_due) find_pairs();
     if (model.contact.ground) evaluate_ground_contact(h);
     if (model.contact.bodies) evaluate_body_contact(h);
+    add_contact_work(h);
   }
 }
 
@@ -533,7 +535,8 @@ Energy System::calc_energy() const {
   }
   e.contact = state.contact_energy;
   e.friction = state.friction;
-  e.contact_loss = state.contact_loss;
+  // what contact took from the bodies and neither stores nor rubbed away
+  e.contact_loss = -state.contact_work - state.friction - state.contact_energy;
   e.removed = state.removed;
   e.residual = e.kinetic + e.gravity + e.elastic + e.contact + e.plastic + e.damping + e.friction + e.contact_loss +
                e.removed - state.total_at_start;

@@ -35,9 +35,9 @@ struct GroundPoint {
   double born = 0;      // penetration allowed because it was there when contact became possible [m]
   bool active = false;  // contact is possible
   bool touching = false;
-  Vec3 stick;                   // tangential displacement of the friction spring [m]
-  double depth = 0, force = 0;  // of the step before
-  Vec3 friction;                // of the step before [N]
+  Vec3 stick;        // tangential displacement of the friction spring [m]
+  double depth = 0;  // of the step before [m]
+  Vec3 friction;     // of the step before [N]
 };
 
 /// Two bodies near each other.
@@ -114,7 +114,8 @@ struct State {
   long last_search = 0;
   std::vector<long> touched_pairs;  // a * B + b, sorted
   // ledger [J]
-  double removed = 0, friction = 0, contact_loss = 0, contact_energy = 0;
+  double removed = 0, friction = 0, contact_energy = 0;
+  double contact_work = 0, contact_power = 0;  // of all contact forces on the bodies [J, W]
   double total_at_start = 0;
   double gravity_at_start = 0, largest_residual = 0, released = 0;
   double largest_drift = 0;
@@ -168,8 +169,9 @@ class System {
 
   // scratch
   std::vector<ElementForce> element_force;
-  std::vector<Vec3> force, torque;              // applied on bodies (B)
-  std::vector<Vec3> joint_force, joint_torque;  // of the joints on bodies, of the step before (B)
+  std::vector<Vec3> force, torque;                  // applied on bodies (B)
+  std::vector<Vec3> contact_force, contact_torque;  // the part by contact (B)
+  std::vector<Vec3> joint_force, joint_torque;      // of the joints on bodies, of the step before (B)
   std::vector<Vec3> p_before;
   std::vector<Quat> q_before;
   std::vector<unsigned char> in_cluster;  // (B)
@@ -197,6 +199,9 @@ class System {
   void evaluate_ground_contact(double h);
   void evaluate_body_contact(double h);
   void find_pairs();
+  /// A contact force on a body at a lever from its centre.
+  void push(size_t body, const Vec3& lever, const Vec3& f);
+  void add_contact_work(double h);
   void drift(size_t body, double h, const Vec3& p0, const Quat& q0);
   void build_clusters();
   void solve_joints(double h, const std::vector<Vec3>& p0, const std::vector<Quat>& q0);

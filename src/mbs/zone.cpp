@@ -56,6 +56,13 @@ CompiledLaw compile_law(const ZoneLaw& law) {
   }
   c.compression = {law.compression.x, law.compression.f};
   c.tension = {law.tension.x, law.tension.f};
+  if (!law.compression.f.empty()) {
+    const auto peak = std::max_element(law.compression.f.begin(), law.compression.f.end());
+    c.peak_compression = *peak;
+    c.peak_shortening = law.compression.x[static_cast<size_t>(peak - law.compression.f.begin())];
+  } else {
+    c.peak_shortening = kUnlimited;
+  }
   c.biaxial_exponent = law.biaxial_exponent;
   c.damage_share = law.damage_share;
   c.rupture_rotation = law.rupture_rotation;
@@ -124,20 +131,19 @@ class Limits {
   double tension(double elongated) const {
     return blend([&](const CompiledLaw& l) { return calc_curve(l.tension, elongated); });
   }
-  /// Share of the section that is still there after plastic shortening, and the full compression capacity at a
-  /// rotation.
+  /// Share of the section that is still there: 1 until the peak of the compression curve, then what is left of it.
   double integrity(double shortened) const {
     return blend([&](const CompiledLaw& l) {
-      if (l.compression.x.empty()) return 1.0;
-      const double full = l.compression.f.front();
-      return full > 0 ? calc_curve(l.compression, shortened) / full : 0.0;
+      if (shortened <= l.peak_shortening) return 1.0;
+      return l.peak_compression > 0 ? calc_curve(l.compression, shortened) / l.peak_compression : 0.0;
     });
   }
-  double compression(double rotation) const {
+  /// Largest compression after a rotation and a plastic shortening.
+  double compression(double rotation, double shortened, double share) const {
     return blend([&](const CompiledLaw& l) {
-      const double full = l.compression.x.empty() ? kUnlimited : l.compression.f.front();
-      return std::min(
-          {full, calc_compression_capacity(l.moment[0], rotation), calc_compression_capacity(l.moment[1], rotation)});
+      return std::min(calc_curve(l.compression, shortened),
+                      share * std::min(calc_compression_capacity(l.moment[0], rotation),
+                                       calc_compression_capacity(l.moment[1], rotation)));
     });
   }
   MomentLimit moment(int axis, double normal_force, StationState& s) const {
@@ -274,17 +280,16 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
     if (p.external_axial) {
       // held by somebody else
     } else if (force[0] < 0) {
-      const double capacity = limits.compression(reached);
-      double limit = capacity * integrity;
+      double limit = limits.compression(reached, z.shortened, integrity);
       if (-force[0] > limit) {
         // the curve falls while the zone shortens: one more look at it after the first estimate
         const double first = (-force[0] - limit) / k[0];
         integrity = limits.integrity(z.shortened + first);
-        limit = capacity * integrity;
-        const double shortening = (-force[0] - limit) / k[0];
+        limit = limits.compression(reached, z.shortened + first, integrity);
+        const double shortening = std::max(0.0, (-force[0] - limit) / k[0]);
         z.axial -= shortening;
         z.shortened += shortening;
-        force[0] = -limit;
+        force[0] = std::max(force[0], -limit);
         flowed = true;
       }
     } else {
@@ -446,7 +451,7 @@ double calc_utilisation(const ZoneParameters& p, const std::vector<CompiledLaw>&
   if (p.stations > 1) reached = std::max(reached, z.station[1].reached);
   const double integrity = limits.integrity(z.shortened);
   double u = p.external_axial ? 0.0
-             : force[0] < 0   ? ratio(-force[0], limits.compression(reached) * integrity)
+             : force[0] < 0   ? ratio(-force[0], limits.compression(reached, z.shortened, integrity))
                               : ratio(force[0], limits.tension(z.elongated));
   for (int s = 0; s < p.stations; ++s) {
     const Limits station_limits(laws, p.law[s], z, time);

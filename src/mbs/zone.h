@@ -26,6 +26,7 @@ struct CompiledCurve {
 struct CompiledLaw {
   CompiledFamily moment[2];  // about y, about z
   CompiledCurve compression, tension;
+  double peak_compression = 0, peak_shortening = 0;  // of the compression curve [N, m]
   double biaxial_exponent = 1.5, damage_share = 0, rupture_rotation = 0, crush_length = 0, rupture_elongation = 0;
   double shear[2] = {0, 0}, shear_friction = 0, slip_softening = 0, slip_rupture = 0, torsion = 0, twist_rupture = 0;
 };

@@ -1,0 +1,202 @@
+// Contact with the ground and between bodies.
+#include <gtest/gtest.h>
+
+#include "models.h"
+
+namespace topple::mbs {
+namespace {
+
+using test::make_box;
+
+Options free_options(double duration, double step) {
+  Options o;
+  o.duration = duration;
+  o.step = step;
+  o.equilibrium = false;
+  o.frame_interval = step;
+  return o;
+}
+
+TEST(GroundContact, BallBouncesWithItsRestitution) {
+  // h = 10 m, e = 0.5: impacts at 1.427843123, 2.855686246, 3.569607807 s
+  Model m;
+  Body ball;
+  ball.name = "ball";
+  ball.mass = 10;
+  ball.inertia = Mat3::diagonal({0.1, 0.1, 0.1});
+  ball.X_WB.p = {0, 0, 10.1};
+  Shape s;
+  s.kind = Shape::Kind::Sphere;
+  s.radius = 0.1;
+  ball.shapes = {s};
+  add_body(m, ball);
+  m.contact.restitution = 0.5;
+  m.contact.contact_frequency = 1e4;
+  std::vector<double> impacts;
+  bool down = false;
+  Options o = free_options(3.8, 1e-5);
+  o.on_frame = [&](const View& v) {
+    const bool now = v.contact_force_ground.z > 0;
+    if (now && !down) impacts.push_back(v.time);
+    down = now;
+  };
+  const Summary sum = run(m, o);
+  ASSERT_GE(impacts.size(), 3u);
+  EXPECT_NEAR(impacts[0], 1.427843123, 1e-3);
+  EXPECT_NEAR(impacts[1], 2.855686246, 2e-3);
+  EXPECT_NEAR(impacts[2], 3.569607807, 3e-3);
+  EXPECT_LT(sum.energy_error, 0.01);
+}
+
+/// A flat box on a plane that slopes by 30° along x, friction 0.3.
+Model make_slope(double speed_uphill) {
+  const double a = 3.14159265358979323846 / 6;
+  Model m;
+  m.contact.normal = {std::sin(a), 0, std::cos(a)};
+  m.contact.friction = 0.3;
+  Body b = make_box("box", 100, {1, 1, 0.05}, 0.05 * m.contact.normal);
+  b.X_WB.q = exp_rotation({0, a, 0});
+  b.v_WB = -speed_uphill * Vec3{std::cos(a), 0, -std::sin(a)};
+  add_body(m, b);
+  return m;
+}
+
+TEST(GroundContact, BoxSlidesDownTheSlopeAtItsAcceleration) {
+  double travelled = 0;
+  Vec3 start;
+  Options o = free_options(1, 1e-4);
+  o.on_frame = [&](const View& v) {
+    if (v.time == 0) start = v.X_WB[0].p;
+    travelled = norm(v.X_WB[0].p - start);
+  };
+  const Summary s = run(make_slope(0), o);
+  EXPECT_NEAR(2 * travelled, 2.356287237, 5e-3);  // the contact settles within a few ms first
+  EXPECT_LT(s.energy_error, 0.01);
+}
+
+TEST(GroundContact, BoxThrownUphillStopsWhereItShould) {
+  double highest = 0, when = 0;
+  Vec3 start;
+  Options o = free_options(1, 1e-4);
+  o.on_frame = [&](const View& v) {
+    if (v.time == 0) start = v.X_WB[0].p;
+    const double d = -(v.X_WB[0].p - start).x / std::cos(3.14159265358979323846 / 6);
+    if (d > highest) highest = d, when = v.time;
+  };
+  (void)run(make_slope(5), o);
+  EXPECT_NEAR(highest, 1.677016595, 5e-3);
+  EXPECT_NEAR(when, 0.670806638, 3e-3);
+}
+
+TEST(GroundContact, BoxAtRestStaysAtRestOnASlopeItsFrictionHolds) {
+  Model m = make_slope(0);
+  m.contact.friction = 0.7;  // tan 30° = 0.577
+  Vec3 early, late;
+  Options o = free_options(3, 2e-4);
+  o.on_frame = [&](const View& v) {
+    if (v.time < 1) early = v.X_WB[0].p;
+    late = v.X_WB[0].p;
+  };
+  (void)run(m, o);
+  EXPECT_LT(norm(late - early), 1e-5);
+}
+
+TEST(BodyContact, StackStaysAndLosesNoHeight) {
+  Model m;
+  for (int i = 0; i < 4; ++i)
+    add_body(m, make_box("b" + std::to_string(i), 500, {0.5, 0.5, 0.25}, {0, 0, 0.25 + 0.5 * i}));
+  Vec3 top;
+  Options o = free_options(3, 2e-4);
+  double fastest = 0;
+  o.on_frame = [&](const View& v) {
+    top = v.X_WB[3].p;
+    fastest = 0;
+    for (const Vec3& u : v.v_WB) fastest = std::max(fastest, norm(u));
+  };
+  const Summary s = run(m, o);
+  EXPECT_NEAR(top.z, 1.75, 0.01);
+  EXPECT_LT(fastest, 1e-3);
+  EXPECT_LT(std::hypot(top.x, top.y), 1e-3);
+  (void)s;
+}
+
+TEST(BodyContact, ImpactKeepsMomentum) {
+  Model m;
+  m.gravity = {};
+  m.contact.ground = false;
+  m.contact.body_restitution = 0.4;
+  Body a = make_box("a", 3, {0.5, 0.5, 0.5}, {0, 0, 0}), b = make_box("b", 1, {0.5, 0.5, 0.5}, {1.2, 0.3, 0.2});
+  a.v_WB = {2, 0, 0};
+  add_body(m, a);
+  add_body(m, b);
+  Vec3 p, spin;
+  double closing = 0;
+  Options o = free_options(1, 1e-4);
+  o.on_frame = [&](const View& v) {
+    p = 3 * v.v_WB[0] + v.v_WB[1];
+    spin = {};
+    for (size_t i = 0; i < 2; ++i) {
+      const Mat3 R = to_matrix(v.X_WB[i].q);
+      spin += cross(v.X_WB[i].p, v.mass[i] * v.v_WB[i]) + R * (m.bodies[i].inertia * transpose_times(R, v.w_WB[i]));
+    }
+    closing = v.v_WB[1].x - v.v_WB[0].x;
+  };
+  const Summary s = run(m, o);
+  EXPECT_NEAR(p.x, 6, 1e-9);
+  EXPECT_NEAR(p.y, 0, 1e-9);
+  EXPECT_NEAR(spin.z, 0, 1e-9);
+  EXPECT_GT(closing, 0);  // they part
+  (void)s;
+}
+
+TEST(BodyContact, CentralImpactHasItsRestitution) {
+  Model m;
+  m.gravity = {};
+  m.contact.ground = false;
+  m.contact.body_restitution = 0.4;
+  Body a = make_box("a", 3, {0.5, 0.5, 0.5}, {0, 0, 0}), b = make_box("b", 1, {0.4, 0.4, 0.4}, {1.2, 0, 0});
+  a.v_WB = {2, 0, 0};
+  add_body(m, a);
+  add_body(m, b);
+  double parting = 0;
+  Energy e;
+  Options o = free_options(1, 1e-5);
+  o.frame_interval = 0.1;
+  o.on_frame = [&](const View& v) {
+    parting = v.v_WB[1].x - v.v_WB[0].x;
+    e = v.energy;
+  };
+  (void)run(m, o);
+  EXPECT_NEAR(parting, 0.4 * 2, 0.005 * 2);
+  // lost: half the reduced mass times (1 - e²) v²
+  EXPECT_NEAR(e.contact_loss, 0.5 * 0.75 * (1 - 0.16) * 4, 0.01 * 1.26);
+  EXPECT_NEAR(e.residual, 0, 0.01 * 1.26);
+}
+
+TEST(BodyContact, DebrisComesToRest) {
+  Model m;
+  int n = 0;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      for (int k = 0; k < 3; ++k) {
+        Body b = make_box("d" + std::to_string(n), 300, {0.3, 0.2, 0.15},
+                          {0.5 * i + 0.07 * k, 0.5 * j - 0.05 * k, 0.6 + 0.7 * k});
+        b.X_WB.q = exp_rotation({0.3 * i, 0.2 * j, 0.5 * k});
+        add_body(m, b);
+        ++n;
+      }
+  Options o = free_options(20, 2e-4);
+  o.frame_interval = 0.1;
+  o.rest_speed = 0.05;
+  double lowest = 1e9;
+  o.on_frame = [&](const View& v) {
+    for (const Pose& X : v.X_WB) lowest = std::min(lowest, X.p.z);
+  };
+  const Summary s = run(m, o);
+  EXPECT_EQ(s.ending, Summary::Ending::AtRest) << s.message;
+  EXPECT_GT(lowest, 0.10);  // nobody sinks through: the thinnest half edge is 0.15 m
+  EXPECT_LT(s.energy_error, 0.02);
+}
+
+}  // namespace
+}  // namespace topple::mbs

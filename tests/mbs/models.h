@@ -1,0 +1,78 @@
+#pragma once
+/// Small multibody models with known answers.
+
+#include <cmath>
+
+#include "mbs/model.h"
+#include "mbs/solver.h"
+
+namespace topple::mbs::test {
+
+inline Mat3 box_inertia(double mass, const Vec3& half) {
+  const double c = mass / 3;
+  return Mat3::diagonal({c * (half.y * half.y + half.z * half.z), c * (half.x * half.x + half.z * half.z),
+                         c * (half.x * half.x + half.y * half.y)});
+}
+
+inline Body make_box(const std::string& name, double mass, const Vec3& half, const Vec3& p) {
+  Body b;
+  b.name = name;
+  b.mass = mass;
+  b.inertia = box_inertia(mass, half);
+  b.X_WB.p = p;
+  Shape s;
+  s.half = half;
+  b.shapes.push_back(s);
+  return b;
+}
+
+/// Rotation that takes the member axis x upwards and leaves y along -y... the frame of columns: x up, z along W's y.
+inline Quat upright() { return to_quat(Mat3::from_columns({0, 0, 1}, {1, 0, 0}, {0, 1, 0})); }
+
+/// Prismatic member of n rigid segments along +x from the ground, joined by bushings at the cells' centres: bodies are
+/// the pieces between the centres of the cells of length L/n, so the first and the last are half as long.
+struct Cantilever {
+  Model model;
+  BodyId tip;
+};
+inline Cantilever make_cantilever(int n, double length, double width, double height, double E, double density) {
+  Cantilever c;
+  c.model.gravity = {};
+  c.model.contact.ground = c.model.contact.bodies = false;
+  const double cell = length / n, area = width * height;
+  const double Iy = width * std::pow(height, 3) / 12, Iz = height * std::pow(width, 3) / 12;
+  BodyId before = kGround;
+  Vec3 p_before;
+  for (int i = 0; i < n; ++i) {
+    const double begin = (i + 0.5) * cell, end = i + 1 < n ? (i + 1.5) * cell : length;
+    const Vec3 p{(begin + end) / 2, 0, 0};
+    const Vec3 half{(end - begin) / 2, width / 2, height / 2};
+    const BodyId b = add_body(c.model, make_box("s" + std::to_string(i), density * area * (end - begin), half, p));
+    ZoneElement e;
+    e.name = "z" + std::to_string(i);
+    e.a = before;
+    e.b = b;
+    e.X_AF.p = Vec3{begin, 0, 0} - p_before;
+    e.X_BM.p = Vec3{begin, 0, 0} - p;
+    e.translational_stiffness = {E * area / cell, 12 * E * Iz / std::pow(cell, 3), 12 * E * Iy / std::pow(cell, 3)};
+    e.rotational_stiffness = {0.4 * E * 2 * Iy / cell, E * Iy / cell, E * Iz / cell};
+    e.damping_ratio = 0;
+    add_element(c.model, e);
+    before = b;
+    p_before = p;
+    c.tip = b;
+  }
+  return c;
+}
+
+/// Elastic-plastic law of one axis: limit moment about z whatever the normal force, bending about y unlimited.
+inline ZoneLaw plastic_hinge(double moment) {
+  ZoneLaw law;
+  law.moment_z.normal_force = {-1e12, 1e12};
+  law.moment_z.plastic_rotation = {0, 10};
+  law.moment_z.positive = {moment, moment, moment, moment};
+  law.moment_z.negative = law.moment_z.positive;
+  return law;
+}
+
+}  // namespace topple::mbs::test
