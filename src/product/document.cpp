@@ -4,6 +4,16 @@
 #include <cmath>
 #include <string_view>
 
+namespace {
+/// A demand inside the parser that does not hold: hostile text reaches some of them.
+struct ParserDoubt {};
+[[noreturn]] void throw_doubt() { throw ParserDoubt{}; }
+}  // namespace
+
+// With NDEBUG the parser would let the compiler assume its demands; here they stay and are thrown.
+#pragma push_macro("NDEBUG")
+#undef NDEBUG
+#define TOML_ASSERT(expression) ((expression) ? void(0) : throw_doubt())
 // deeper nesting than any plan has; bounds the recursion of the parser and of the tree's destructor
 #define TOML_MAX_NESTED_VALUES 16
 #define TOML_ENABLE_FORMATTERS 0
@@ -12,6 +22,7 @@
 #pragma GCC diagnostic ignored "-Wshadow"
 #include <toml++/toml.h>
 #pragma GCC diagnostic pop
+#pragma pop_macro("NDEBUG")
 
 namespace topple::product {
 
@@ -27,6 +38,9 @@ constexpr int deepest_key = 16;
                                             std::move(message),
                                             std::move(help)}});
 }
+
+/// The first byte of a character.
+bool is_lead(char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; }
 
 /// Length of the well-formed UTF-8 sequence at the front of `text`, 0 if there is none.
 size_t sequence_length(std::string_view text) {
@@ -69,6 +83,7 @@ void check_key_depth(const std::string& text, const std::string& file) {
   bool block = false;  // the open string has three of them
   for (size_t i = 0; i < text.size(); ++i, ++place.column) {
     const char c = text[i];
+    if (!is_lead(c)) --place.column;
     const auto three = [&](char q) { return text.compare(i, 3, std::string(3, q)) == 0; };
     if (c == '\n') {
       ++place.line, place.column = 0, dots = 0;
@@ -77,6 +92,8 @@ void check_key_depth(const std::string& text, const std::string& file) {
       if (c == '\\' && quote == '"') {
         if (i + 1 < text.size() && text[i + 1] != '\n') ++i, ++place.column;
       } else if (c == quote && (!block || three(quote))) {
+        // up to two more quotes before a block's end belong to its text
+        while (block && i + 3 < text.size() && text[i + 3] == c) ++i, ++place.column;
         if (block) i += 2, place.column += 2;
         quote = 0, block = false;
       }
@@ -91,6 +108,14 @@ void check_key_depth(const std::string& text, const std::string& file) {
       fail(file, "E105", place, "nested deeper than " + std::to_string(deepest_key) + " levels", "");
     }
   }
+}
+
+/// "Error while parsing array: expected ..." without the parser's preface.
+std::string plain_message(const std::string& message) {
+  constexpr std::string_view preface = "Error while parsing ";
+  if (!message.starts_with(preface)) return message;
+  const size_t colon = message.find(": ");
+  return colon == std::string::npos ? message : message.substr(colon + 2);
 }
 
 Place place_of(const toml::source_region& region) {
@@ -157,10 +182,17 @@ Place place_of_doubled_key(const std::string& text, Place at, const std::string&
     if (begin == std::string::npos) return at;
     ++begin;
   }
-  const auto is_lead = [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; };
   size_t end = begin;
   for (int column = 1; end < text.size() && text[end] != '\n'; ++end)
     if (is_lead(text[end]) && column++ == at.column) break;
+  if (end < text.size() && text[end] == '[') {  // a table: its header
+    const size_t close_bracket = text.rfind(']', std::min(text.find_first_of("#\n", end), text.size() - 1));
+    if (close_bracket != std::string::npos && close_bracket > end)
+      at.width =
+          static_cast<int>(std::count_if(text.begin() + static_cast<std::ptrdiff_t>(end),
+                                         text.begin() + static_cast<std::ptrdiff_t>(close_bracket) + 1, is_lead));
+    return at;
+  }
   const size_t found = std::string_view(text).substr(begin, end - begin).rfind(key);
   if (key.empty() || found == std::string_view::npos) return at;
   const auto count = [&](size_t from, size_t to) {
@@ -168,6 +200,38 @@ Place place_of_doubled_key(const std::string& text, Place at, const std::string&
                                           text.begin() + static_cast<std::ptrdiff_t>(to), is_lead));
   };
   return {at.line, 1 + count(begin, begin + found), count(begin + found, begin + found + key.size())};
+}
+
+/// The line that gave the parser its doubt: the first line whose end makes the text up to there doubtful.
+Place find_doubtful_line(std::string_view text) {
+  std::vector<size_t> ends;  // behind each line
+  for (size_t i = 0; i < text.size(); ++i)
+    if (text[i] == '\n') ends.push_back(i + 1);
+  ends.push_back(text.size());
+  const auto is_clear = [&](size_t end) {
+    try {
+      static_cast<void>(toml::parse(text.substr(0, end)));
+    } catch (const toml::parse_error&) {
+    } catch (const ParserDoubt&) { return false; }
+    return true;
+  };
+  const auto at = std::min(std::partition_point(ends.begin(), ends.end(), is_clear), ends.end() - 1);
+  const size_t begin = at == ends.begin() ? 0 : *(at - 1);
+  const std::string_view line = text.substr(begin, *at - begin);
+  const size_t first = std::min(line.find_first_not_of(" \t"), line.size());
+  return {static_cast<int>(at - ends.begin()) + 1, static_cast<int>(first == line.size() ? 0 : first) + 1, 1};
+}
+
+/// A place in the text: the parser counts one too many behind the text's end.
+Place clamp_to_text(Place place, const std::string& text) {
+  int line = 1, column = 1;
+  for (size_t i = 0; i < text.size() && line < place.line; ++i) line += text[i] == '\n';
+  place.line = line;
+  size_t begin = 0;
+  for (int i = 1; i < line; ++i) begin = text.find('\n', begin) + 1;
+  for (size_t i = begin; i < text.size() && text[i] != '\n'; ++i) column += is_lead(text[i]);
+  place.column = std::min(place.column, column);
+  return place;
 }
 
 }  // namespace
@@ -208,17 +272,19 @@ Node parse_document(const std::string& text, const std::string& file) {
     node.place = {};
     return node;
   } catch (const toml::parse_error& error) {
-    std::string message(error.description());
-    Place place = place_of(error.source());
+    const std::string message = plain_message(std::string(error.description()));
+    Place place = clamp_to_text(place_of(error.source()), text);
     place.width = 1;
     if (message.find("cannot redefine existing") != std::string::npos) {
       place = place_of_doubled_key(text, place, message);
-      fail(file, "E102", place, message, "each key and each table may be given once");
+      fail(file, "E102", place, "duplicate key: " + message, "each key and each table can be given once");
     }
     if (message.find("TOML_MAX_NESTED_VALUES") != std::string::npos)
       fail(file, "E105", place, "nested deeper than " + std::to_string(deepest_key) + " levels", "");
-    fail(file, "E101", place, message, "");
-  }
+    const bool is_behind_value = message.starts_with("expected a comment or whitespace");
+    fail(file, "E101", place, message,
+         is_behind_value ? "a value with a unit is a string in quotes, such as \"3.14 m\"" : "");
+  } catch (const ParserDoubt&) { fail(file, "E101", find_doubtful_line(text), "this line is not TOML", ""); }
 }
 
 }  // namespace topple::product

@@ -29,8 +29,7 @@ struct ChargeTable {
 ChargeTable read_charge(TableReader& table) {
   ChargeTable c;
   c.place = table.place();
-  c.words = table.words("members");
-  if (!table.has("members")) table.missing("members", "add a line such as members = [\"C-A*-0\"]");
+  c.words = table.required_words("members", "[\"C-A*-0\"]");
   c.charge.position = table.quantity("position", Dimension::Length, {0, 1000});
   c.charge.destroyed_length = table.quantity("destroyed_length", Dimension::Length, {0, 100, true});
   c.charge.residual_bars = table.quantity("residual_bars", Dimension::Number, fraction, 0);
@@ -95,21 +94,38 @@ class Blasting {
   int fired_columns_ = 0, failing_columns_ = 0;
 };
 
-void check_times(Reading& reading, const std::vector<const Node*>& nodes) {
+/// When a table of charges fires.
+struct Firing {
+  size_t stage = 0;
+  double delay = 0;
+  Place place;
+};
+
+void check_times(Reading& reading, const std::vector<const Node*>& nodes, const std::vector<Firing>& firings) {
   const std::vector<Stage>& stages = reading.plan.stages;
-  for (size_t i = 1; i < stages.size(); ++i) {
+  Complaints& complaints = reading.complaints;
+  const auto place_of_time = [&](size_t i) {
     const Entry* entry = nodes[i]->find("time");
-    const Place place = entry ? entry->value.place : nodes[i]->place;
+    return entry ? entry->value.place : nodes[i]->place;
+  };
+  for (size_t i = 1; i < stages.size(); ++i)
     if (stages[i].time <= stages[i - 1].time)
-      reading.complaints.error("E402", place,
-                               "stage[" + std::to_string(i) + "]: time: is not after the stage before it",
-                               "stages are given in the order in which they fire");
-    for (const Charge& charge : stages[i - 1].charges)
-      if (stages[i - 1].time + charge.delay >= stages[i].time && stages[i].time > stages[i - 1].time) {
-        reading.complaints.warn("W506", {charge.where.line, charge.where.column, 1},
-                                "charge: its delay lasts until the next stage or longer");
-        break;
-      }
+      complaints.error("E402", place_of_time(i),
+                       "stage[" + std::to_string(i) + "]: time: is not after the stage before it",
+                       "stages are given in the order in which they fire");
+  const double duration = reading.plan.analysis.duration;
+  for (const Firing& firing : firings) {
+    const double time = stages[firing.stage].time, next = time + firing.delay;
+    const bool has_next = firing.stage + 1 < stages.size();
+    if (time >= duration) {
+      complaints.error("E407", place_of_time(firing.stage), "time: the stage fires after the end of the analysis",
+                       "raise duration in [analysis], or fire earlier");
+    } else if (next >= duration) {
+      complaints.error("E407", firing.place, "the charge fires after the end of the analysis",
+                       "raise duration in [analysis], or shorten its delay");
+    } else if (has_next && stages[firing.stage + 1].time > time && next >= stages[firing.stage + 1].time) {
+      complaints.warn("W506", firing.place, "the charge's delay lasts until the next stage or longer");
+    }
   }
 }
 
@@ -127,6 +143,7 @@ void read_stages(Reading& reading, TableReader& root) {
   }
   const int errors_before = reading.complaints.error_count();
   Blasting blasting(reading);
+  std::vector<Firing> firings;
   for (size_t i = 0; i < nodes.size(); ++i) {
     TableReader table(*nodes[i], "stage[" + std::to_string(i) + "]", reading.complaints);
     Stage stage;
@@ -139,12 +156,13 @@ void read_stages(Reading& reading, TableReader& root) {
     for (size_t k = 0; k < charges.size() && !reading.complaints.is_full(); ++k) {
       TableReader charge(*charges[k], "charge[" + std::to_string(k) + "]", reading.complaints);
       const ChargeTable values = read_charge(charge);
+      firings.push_back({i, values.charge.delay, values.place});
       if (reading.has_grid && blasting.count() <= most_charges) blasting.spread(charge, values, stage);
     }
     table.finish();
     reading.plan.stages.push_back(std::move(stage));
   }
-  check_times(reading, nodes);
+  check_times(reading, nodes, firings);
   if (reading.complaints.error_count() != errors_before || !reading.has_grid || nodes.empty()) return;
   if (blasting.fired_columns() == 0) {
     const std::string help = "put charges on columns, such as members = [\"C-A*-0\"], or leave out every [[stage]]";

@@ -157,13 +157,18 @@ void apply_rule(Builder& builder, MemberKind kind, const Node& node, const std::
     draft.member.panel = find_named(is_wall ? reading.walls : reading.slabs, table, "panel", table.text("panel"),
                                     is_wall ? "wall" : "slab");
   }
+  const int errors_before = reading.complaints.error_count();
   std::vector<bool> storeys(plan.storey_heights.size(), true);
   if (const Node* marks = table.find("storeys"); marks && !storeys.empty()) {
     storeys.assign(storeys.size(), false);
     mark_storeys(table, *marks, storeys, false);
   }
-  std::vector<Word> at = table.words("at"), except = table.words("except");
-  if (!table.has("at")) at.push_back({"*", node.place});
+  std::vector<Word> at = table.has("at") ? table.required_words("at", "\"*\"") : std::vector<Word>{},
+                    except = table.words("except");
+  if (!table.has("at")) {
+    table.find("at");
+    at.push_back({"*", node.place});
+  }
   std::optional<std::string> along;
   bool perimeter = false;
   if (is_line) {
@@ -171,6 +176,7 @@ void apply_rule(Builder& builder, MemberKind kind, const Node& node, const std::
     perimeter = table.find_flag("perimeter").value_or(false);
   }
   if (kind == MemberKind::Wall) draft.member.openings = read_openings(table, draft.opening_places);
+  if (reading.complaints.error_count() != errors_before) reading.knows_members = false;
   table.finish();
   if (!reading.has_grid || reading.complaints.is_full()) return;
 
@@ -197,11 +203,13 @@ void apply_rule(Builder& builder, MemberKind kind, const Node& node, const std::
   std::vector<std::string> names;
   for_each_place(plan, kind, {true}, [&](const Key& key) { names.push_back(span_name(plan, key)); });
   const auto complain = [&](const char* key, const std::vector<Word>& words, const std::vector<int>& counts) {
-    for (size_t i = 0; i < words.size(); ++i)
-      if (counts[i] == 0)
-        table.error("E302", words[i].place, std::string(key) + ": nothing on the grid matches " + quoted(words[i].text),
-                    did_you_mean(words[i].text, names,
-                                 names.empty() ? "the grid is too small" : "names here look like " + names.front()));
+    for (size_t i = 0; i < words.size(); ++i) {
+      if (counts[i] > 0) continue;
+      reading.knows_members = false;
+      table.error("E302", words[i].place, std::string(key) + ": nothing on the grid matches " + quoted(words[i].text),
+                  did_you_mean(words[i].text, names,
+                               names.empty() ? "the grid is too small" : "names here look like " + names.front()));
+    }
   };
   complain("at", at, hits);
   complain("except", except, except_hits);
@@ -289,13 +297,16 @@ void finish_geometry(Builder& builder) {
     Member& m = draft.member;
     const double storey_height = plan.storey_heights[static_cast<size_t>(m.storey)];
     place_axis(plan, m);
-    if (m.kind == MemberKind::Beam && m.section >= 0 &&
-        plan.sections[static_cast<size_t>(m.section)].height >= storey_height)
-      complain(draft, m.name + ": the beam is as deep as the storey is high");
+    const bool is_beam = m.kind == MemberKind::Beam && m.section >= 0;
+    const bool is_slab = m.kind == MemberKind::Slab && m.panel >= 0;
+    if ((is_beam && plan.sections[static_cast<size_t>(m.section)].height >= storey_height) ||
+        (is_slab && plan.panels[static_cast<size_t>(m.panel)].thickness >= storey_height))
+      complain(draft, m.name + ": is as deep as the storey is high");
     if (m.kind != MemberKind::Wall) continue;
     m.height = storey_height - calc_depth_above(builder, key);
-    if (m.height < 0.1) complain(draft, m.name + ": no height is left for the wall below the beam or slab above");
-    check_openings(builder, key, draft, complained_openings);
+    if (m.height > 0 && m.height < 0.1)
+      complain(draft, m.name + ": no height is left for the wall below the beam or slab above");
+    if (m.height >= 0.1) check_openings(builder, key, draft, complained_openings);
   }
 }
 
@@ -308,8 +319,7 @@ void apply_overrides(Builder& builder, TableReader& root) {
   }
   for (size_t i = 0; i < nodes.size(); ++i) {
     TableReader table(*nodes[i], "override[" + std::to_string(i) + "]", reading.complaints);
-    const std::vector<Word> words = table.words("members");
-    if (!table.has("members")) table.missing("members", "add a line such as members = \"C-A1-0\"");
+    const std::vector<Word> words = table.required_words("members", "\"C-A1-0\"");
     const std::string section_name = table.text("section", {}), panel_name = table.text("panel", {});
     const int section = find_named(reading.sections, table, "section", section_name, "section");
     std::vector<Place> opening_places;
@@ -388,14 +398,12 @@ std::vector<int> find_members(const Reading& reading, const TableReader& table, 
                               const std::vector<Word>& words) {
   const std::vector<Member>& members = reading.plan.members;
   std::vector<bool> found(members.size(), false);
-  if (table.has(key) && words.empty() && reading.complaints.error_count() == 0)
-    table.error("E302", table.place_of(key), key + ": names no member");
   for (const Word& word : words) {
     if (reading.complaints.is_full()) break;
     bool has_match = false;
     for (size_t i = 0; i < members.size(); ++i)
       if (matches(word.text, members[i].name)) found[i] = has_match = true;
-    if (has_match) continue;
+    if (has_match || !reading.knows_members) continue;
     std::vector<std::string> names;
     for (const Member& m : members) names.push_back(m.name);
     const bool is_pattern = word.text.find_first_of("*?") != std::string::npos;
@@ -458,8 +466,7 @@ void read_preparation(Reading& reading, TableReader& root) {
   const std::vector<const Node*> nodes = table.tables("weaken");
   for (size_t i = 0; i < nodes.size() && !reading.complaints.is_full(); ++i) {
     TableReader weaken(*nodes[i], "weaken[" + std::to_string(i) + "]", reading.complaints);
-    const std::vector<Word> words = weaken.words("members");
-    if (!weaken.has("members")) weaken.missing("members", "add a line such as members = \"C-A1-0\"");
+    const std::vector<Word> words = weaken.required_words("members", "\"C-A1-0\"");
     Weakening w;
     w.at = weaken.quantity("at", Dimension::Length, {0, 1000});
     w.cut_bars = weaken.quantity("cut_bars", Dimension::Number, fraction, 0);

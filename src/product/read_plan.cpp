@@ -25,7 +25,7 @@ Plan read_plan(const std::string& text, const std::string& name, std::vector<Dia
   const Node document = parse_document(plan.text, name);
 
   Complaints complaints(name);
-  Reading reading{plan, complaints, {}, {}, {}, {}, {}, false, {}, {}, {}, {}};
+  Reading reading{plan, complaints, {}, {}, {}, {}, {}, false, true, {}, {}, {}, {}};
   TableReader root(document, "", complaints);
   plan.title = root.text("title", "untitled");
   read_site(reading, root);
@@ -33,12 +33,13 @@ Plan read_plan(const std::string& text, const std::string& name, std::vector<Dia
   read_sections(reading, root);
   read_panels(reading, root);
   read_grid(reading, root);
+  check_neighbours(reading);
   read_members(reading, root);
   read_preparation(reading, root);
+  read_analysis(reading, root);
   read_stages(reading, root);
   read_cables(reading, root);
   read_criteria(reading, root);
-  read_analysis(reading, root);
   root.finish();
 
   complaints.sort();

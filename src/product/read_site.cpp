@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "product/reading.h"
 
@@ -70,9 +71,9 @@ std::vector<Point> read_footprint(TableReader& table) {
   if (!is_readable) return {};
   const double area = calc_signed_area(corners);
   if (std::abs(area) < 0.01) {
-    table.error("E307", node->place, "footprint: encloses no area");
+    table.error("E308", node->place, "footprint: encloses no area");
   } else if (crosses_itself(corners)) {
-    table.error("E307", node->place, "footprint: its edges cross", "give the corners in order around the footprint");
+    table.error("E308", node->place, "footprint: its edges cross", "give the corners in order around the footprint");
   } else if (area < 0) {
     std::reverse(corners.begin(), corners.end());
   }
@@ -111,6 +112,27 @@ void read_site(Reading& reading, TableReader& root) {
   site.finish();
 }
 
+void check_neighbours(Reading& reading) {
+  const Plan& plan = reading.plan;
+  if (!reading.has_grid) return;
+  const double x0 = plan.row_offsets.front(), x1 = plan.row_offsets.back();
+  const double y0 = plan.frame_offsets.front(), y1 = plan.frame_offsets.back();
+  const Point middle{(x0 + x1) / 2, (y0 + y1) / 2};
+  for (const Neighbour& n : plan.neighbours) {
+    bool overlaps = false, holds_middle = false;
+    for (size_t i = 0, j = n.footprint.size() - 1; i < n.footprint.size(); j = i++) {
+      const Point &a = n.footprint[i], &b = n.footprint[j];
+      overlaps = overlaps || (a[0] > x0 && a[0] < x1 && a[1] > y0 && a[1] < y1);
+      if ((a[1] > middle[1]) != (b[1] > middle[1]) &&
+          middle[0] < a[0] + (b[0] - a[0]) * (middle[1] - a[1]) / (b[1] - a[1]))
+        holds_middle = !holds_middle;
+    }
+    if (overlaps || holds_middle)
+      reading.complaints.warn("W505", {n.where.line, n.where.column, n.is_utility ? 16 : 18},
+                              quoted(n.name) + ": its footprint overlaps the building");
+  }
+}
+
 void read_criteria(Reading& reading, TableReader& root) {
   const Node* node = root.table("criteria");
   if (!node) return;
@@ -130,6 +152,7 @@ void read_criteria(Reading& reading, TableReader& root) {
 }
 
 void read_analysis(Reading& reading, TableReader& root) {
+  reading.plan.analysis.duration = std::numeric_limits<double>::quiet_NaN();
   const Node* node = root.table("analysis");
   if (!node) {
     if (!root.has("analysis")) root.missing("analysis", "add [analysis] and under it duration = \"10 s\"");
@@ -144,14 +167,6 @@ void read_analysis(Reading& reading, TableReader& root) {
   a.seed =
       static_cast<std::uint64_t>(table.find_integer("seed", 0, std::numeric_limits<std::int64_t>::max()).value_or(1));
   table.finish();
-  for (const Stage& stage : reading.plan.stages)
-    for (const Charge& charge : stage.charges)
-      if (stage.time + charge.delay >= a.duration) {
-        reading.complaints.error("E407", {charge.where.line, charge.where.column, 1},
-                                 "charge: would fire after the end of the analysis",
-                                 "raise duration in [analysis], or fire earlier");
-        return;
-      }
 }
 
 }  // namespace topple::product

@@ -22,6 +22,7 @@ struct Reading {
   Complaints& complaints;
   std::map<std::string, int> concretes, steels, sections, slabs, walls;  // names to indices
   bool has_grid = false;                                                 // rows, frames and storeys could be read
+  bool knows_members = true;  // every rule says clearly where its members stand
   std::vector<bool> section_is_used, panel_is_used;
   std::vector<Place> section_places, panel_places;
 };
@@ -31,6 +32,8 @@ void read_sections(Reading&, TableReader& root);
 void read_panels(Reading&, TableReader& root);
 void read_site(Reading&, TableReader& root);
 void read_grid(Reading&, TableReader& root);
+/// Warns of neighbours that stand where the building stands.
+void check_neighbours(Reading&);
 /// Columns, beams, slabs, walls, overrides; checks that nothing hangs in the air.
 void read_members(Reading&, TableReader& root);
 void read_preparation(Reading&, TableReader& root);

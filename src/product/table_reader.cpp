@@ -10,6 +10,7 @@ namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr size_t longest_text = 200;
+constexpr size_t most_words = 1000;
 
 /// The unit in which people think of the dimension, and its size in SI.
 std::pair<const char*, double> usual_unit(Dimension dimension) {
@@ -156,7 +157,7 @@ void TableReader::error(const char* code, Place place, const std::string& messag
 }
 
 void TableReader::missing(const std::string& key, const std::string& help) const {
-  if (is_table_) error("E201", node_.place, "missing key " + quoted(key), help);
+  if (is_table_) error("E201", node_.place, (label_.empty() ? "missing table " : "missing key ") + quoted(key), help);
 }
 
 double TableReader::quantity(const std::string& key, Dimension dimension, Range range) {
@@ -251,19 +252,46 @@ std::int64_t TableReader::integer(const std::string& key, std::int64_t low, std:
 
 std::vector<Word> TableReader::words(const std::string& key) {
   const Node* node = find(key);
-  if (!node) return {};
-  if (node->kind == Node::Kind::String) return {{node->text, node->place}};
   std::vector<Word> list;
+  const auto add = [&](const Node& item) {
+    if (item.text.empty() || item.text.size() > longest_text) {
+      error("E205", item.place, key + (item.text.empty() ? ": holds an empty string" : ": holds a very long string"),
+            "allowed: 1 to " + std::to_string(longest_text) + " characters");
+    } else {
+      list.push_back({item.text, item.place});
+    }
+  };
+  if (!node) return list;
+  if (node->kind == Node::Kind::String) {
+    add(*node);
+    return list;
+  }
   if (node->kind != Node::Kind::Array) {
     error("E202", node->place, key + ": is " + name_of(node->kind) + "; a string or a list of strings is wanted");
     return list;
   }
+  if (node->items.size() > most_words) {
+    error("E209", node->place, key + ": holds " + std::to_string(node->items.size()) + " strings",
+          "allowed: at most " + std::to_string(most_words));
+    return list;
+  }
   for (const Node& item : node->items) {
     if (item.kind == Node::Kind::String) {
-      list.push_back({item.text, item.place});
+      add(item);
     } else {
       error("E202", item.place, key + ": holds " + name_of(item.kind) + "; strings are wanted");
     }
+  }
+  return list;
+}
+
+std::vector<Word> TableReader::required_words(const std::string& key, const std::string& example) {
+  const int errors_before = complaints_.error_count();
+  std::vector<Word> list = words(key);
+  if (!has(key)) {
+    missing(key, "add a line such as " + key + " = " + example);
+  } else if (list.empty() && complaints_.error_count() == errors_before) {
+    error("E205", place_of(key), key + ": is an empty list", "write " + key + " = " + example);
   }
   return list;
 }
@@ -298,6 +326,7 @@ const Node* TableReader::table(const std::string& key) {
 
 void TableReader::finish() const {
   for (const Entry& entry : node_.entries) {
+    if (complaints_.is_full()) return;
     bool is_known = false;
     for (const std::string& key : known_) is_known = is_known || key == entry.key;
     if (!is_known)

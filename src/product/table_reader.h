@@ -55,6 +55,8 @@ class TableReader {
   std::int64_t integer(const std::string& key, std::int64_t low, std::int64_t high);
   /// A string or a list of strings; empty if not given.
   std::vector<Word> words(const std::string& key);
+  /// The same, but at least one; `example` helps who forgot it.
+  std::vector<Word> required_words(const std::string& key, const std::string& example);
   /// The tables of `[[key]]`, none if not given.
   std::vector<const Node*> tables(const std::string& key);
   /// The table `[key]`, nullptr if not given; a complaint if it is something else.
