@@ -209,6 +209,7 @@ void break_zone(ZoneState& z, BreakReason reason) {
   z.plastic += z.energy;
   z.energy = 0;
   z.resultant = {};
+  for (double& f : z.elastic_force) f = 0;
   z.has_elastic = false;
 }
 
@@ -410,14 +411,28 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
     if (z.twisted >= limits.law().twist_rupture) broke = BreakReason::Torsion;
   }
 
-  double energy = energy_trial;
-  if (flowed) {
-    energy = elastic_energy() + soft_energy();
-    z.plastic += energy_trial - energy;
+  const bool broken = broke != BreakReason::None;
+  const double energy = broken ? 0 : flowed ? elastic_energy() + soft_energy() : energy_trial;
+  if (broken)
+    for (double& f : force) f = 0;
+  if (flowed || broken) {
+    // what was put in since the last evaluation and is not stored is gone; work by the trapezium, as the bodies feel it
+    double work = 0;
+    for (int i = p.external_axial ? 1 : 0; i < 6; ++i)
+      work += 0.5 * (z.elastic_force[i] + force[i]) * (d.c[i] - z.deformation[i]);
+    z.plastic += work - (energy - z.energy);
     z.yielded = true;
   }
   z.energy = energy;
   z.normal_force = force[0];
+  for (int i = 0; i < 6; ++i) {
+    z.elastic_force[i] = force[i];
+    z.deformation[i] = d.c[i];
+  }
+  if (broken) {
+    break_zone(z, broke);
+    return;
+  }
 
   // damping acts on the rate of the elastic deformation, so it resists no plastic flow
   for (int i = 0; i < 6; ++i) {
@@ -426,14 +441,13 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
     if (z.has_elastic && h > 0) {
       const double de = e - z.elastic[i];
       damper = p.damping[i] * de / h;
-      z.damping += 0.5 * (damper + z.damping_power_force[i]) * de;
+      z.damping += 0.5 * (damper + z.damper_force[i]) * de;
     }
-    z.damping_power_force[i] = damper;
+    z.damper_force[i] = damper;
     z.elastic[i] = e;
     z.resultant.c[i] = force[i] + damper;
   }
   z.has_elastic = true;
-  if (broke != BreakReason::None) break_zone(z, broke);
 }
 
 double calc_utilisation(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, double time,

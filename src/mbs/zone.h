@@ -74,13 +74,15 @@ struct ZoneState {
   double ramp_begin = 0, ramp = 0;
   double elastic[6] = {0, 0, 0, 0, 0, 0};  // elastic deformation of the step before
   bool has_elastic = false;
-  double normal_force = 0;                             // elastic part of the first resultant, or the external one [N]
-  Six resultant;                                       // elastic and damping together
-  double energy = 0;                                   // stored [J]
-  double plastic = 0;                                  // dissipated [J]
-  double damping = 0;                                  // dissipated [J]
-  double damping_power_force[6] = {0, 0, 0, 0, 0, 0};  // damper's part of the step before
-  bool yielded = false, softening = false;             // for reporting, only ever set
+  double normal_force = 0;                       // elastic part of the first resultant, or the external one [N]
+  Six resultant;                                 // elastic and damping together
+  double energy = 0;                             // stored [J]
+  double plastic = 0;                            // dissipated [J]
+  double damping = 0;                            // dissipated [J]
+  double deformation[6] = {0, 0, 0, 0, 0, 0};    // of the step before
+  double elastic_force[6] = {0, 0, 0, 0, 0, 0};  // resultants without the damper, of the step before
+  double damper_force[6] = {0, 0, 0, 0, 0, 0};   // the damper's part of the step before
+  bool yielded = false, softening = false;       // for reporting, only ever set
 };
 
 /// Constants of a zone for evaluation.
