@@ -1,6 +1,6 @@
 // Builds dist/report.html: one page with its script and style inside and a marker where the data of a run goes.
 import { createHash } from "node:crypto";
-import { mkdir, readFile, writeFile } from "node:fs/promises";
+import { mkdir, readFile, readdir, writeFile } from "node:fs/promises";
 import { build } from "esbuild";
 
 const marker = "<!--TOPPLE-DATA-->";
@@ -12,6 +12,7 @@ const result = await build({
   bundle: true,
   minify: true,
   write: false,
+  metafile: true,
   format: "iife",
   target: ["es2020", "chrome100", "firefox100"],
   charset: "utf8",
@@ -27,7 +28,20 @@ const style = text(".css");
 // Only this very script may run and nothing may be fetched, whatever the text of a plan holds.
 const digest = createHash("sha256").update(script).digest("base64");
 const policy = `default-src 'none'; script-src 'sha256-${digest}'; style-src 'unsafe-inline'; img-src data: blob:`;
-const notices = "three, preact, @preact/signals: MIT. uPlot: MIT.";
+
+/// The licences of the libraries that went into the script; they ask to go with every copy.
+async function findNotices() {
+  const inputs = Object.keys(result.metafile.inputs);
+  const names = new Set(inputs.map((path) => /^node_modules\/((?:@[^/]+\/)?[^/]+)\//.exec(path)?.[1]).filter(Boolean));
+  const texts = [...names].sort().map(async (name) => {
+    const folder = new URL(`node_modules/${name}/`, import.meta.url);
+    const file = (await readdir(folder)).find((entry) => /^licen[cs]e/i.test(entry));
+    if (file === undefined) throw new Error(`${name} has no licence`);
+    return `${name}\n\n${(await readFile(new URL(file, folder), "utf8")).trim()}\n`;
+  });
+  return (await Promise.all(texts)).join("\n").replace(/</g, "&lt;");
+}
+const notices = await findNotices();
 
 const template = await readFile(new URL("src/report.html", import.meta.url), "utf8");
 const page = template

@@ -216,7 +216,7 @@ export function Plots(props: { state: State }) {
   if (groups.length === 0 || props.state.run.time.length === 0)
     return <section class="panel"><h2>Plots</h2><p class="quiet">The record holds no series.</p></section>;
   return (
-    <div class={groups.length === 2 || groups.length === 4 ? "plots even" : "plots"}>
+    <div class={`plots ${groups.length === 1 ? "one" : groups.length === 2 || groups.length === 4 ? "even" : ""}`}>
       {groups.map((group) => (
         <PlotPanel state={props.state} group={group} />
       ))}

@@ -22,7 +22,7 @@ export function chooseMoments(run: Run, count = 6): { time: number; caption: str
       if (time > begin && time < end && moments.every((m) => Math.abs(m.time - time) > least)) moments.push({ time, caption, rank });
     };
     const stages = run.events.filter((e) => e.kind === "stage");
-    for (const e of stages.slice(1)) add(e.time, `before ${e.subject || "the next stage"}`, 1);
+    for (const e of stages.slice(1).slice(-2)) add(e.time, `before ${e.subject || "the next stage"}`, 1);
     const touchdown = run.events.find((e) => e.kind === "touchdown");
     if (touchdown !== undefined) add(touchdown.time, "first touchdown", 1);
     while (moments.length < count) {
