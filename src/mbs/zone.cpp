@@ -200,6 +200,8 @@ struct Plane {
 };
 
 constexpr double kTiny = 1e-300;
+constexpr double kMostDamage =
+    19;  // added flexibility over the elastic one: unloading keeps a twentieth of the stiffness
 
 }  // namespace
 
@@ -343,7 +345,7 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
         double length2 = 0, turn2 = 0;
         for (int q = 0; q < 2; ++q) {
           const double target = m[q][s] * scale[q];
-          const double turn = (m[q][s] - target) / station_stiffness[q][s];
+          const double turn = station_stiffness[q][s] > 0 ? (m[q][s] - target) / station_stiffness[q][s] : 0;
           phi[q][s] += turn;
           m[q][s] = target;
           length2 += phi[q][s] * phi[q][s];
@@ -369,7 +371,8 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
           const double added = phi[q][s] - st.phi[q] - st.soft[q] * m[q][s];
           const double share = limits.law().damage_share;
           if (share > 0 && added * m[q][s] > 0 && std::abs(m[q][s]) * (std::abs(phi[q][s]) + kTiny) > 0) {
-            const double most = share * std::abs(phi[q][s]) / std::abs(m[q][s]);
+            const double most =
+                std::min(share * std::abs(phi[q][s]) / std::abs(m[q][s]), kMostDamage / station_stiffness[q][s]);
             st.soft[q] = std::max(st.soft[q], std::min(most, st.soft[q] + share * added / m[q][s]));
           }
           st.phi[q] = phi[q][s] - st.soft[q] * m[q][s];
