@@ -212,7 +212,8 @@ Plan read_plan_file(const std::string& path, std::vector<Diagnostic>& warnings, 
 /// The commented template that `topple new` writes; it passes `topple check`.
 std::string plan_template();
 
-/// Mass of a member's own material without openings [kg].
+/// Mass of a member's own material without openings [kg]; pieces that members share are counted once (docs/plan.md).
+/// The plan's members must be in the order of read_plan.
 double calc_mass(const Plan&, const Member&);
 
 }  // namespace topple::product

@@ -149,7 +149,7 @@ void apply_rule(Builder& builder, MemberKind kind, const Node& node, const std::
   Draft draft;
   draft.member.kind = kind;
   draft.member.where = reading.complaints.position(node.place);
-  draft.rule = node.place;
+  draft.rule = draft.shape = node.place;
   if (is_bar) {
     draft.member.section = find_named(reading.sections, table, "section", table.text("section"), "section");
   } else {
@@ -291,7 +291,7 @@ void finish_geometry(Builder& builder) {
   Complaints& complaints = builder.reading.complaints;
   std::set<int> complained_openings, complained_rules;
   const auto complain = [&](const Draft& draft, const std::string& message) {
-    if (complained_rules.insert(draft.rule.line).second) complaints.error("E305", draft.rule, message);
+    if (complained_rules.insert(draft.shape.line).second) complaints.error("E305", draft.shape, message);
   };
   for (auto& [key, draft] : builder.drafts) {
     Member& m = draft.member;
@@ -353,7 +353,7 @@ void apply_overrides(Builder& builder, TableReader& root) {
         draft.member.panel = panel;
       }
       if (has_openings) draft.member.openings = openings, draft.opening_places = opening_places;
-      draft.rule = nodes[i]->place;
+      draft.shape = nodes[i]->place;
     }
   }
 }

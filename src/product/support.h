@@ -12,7 +12,8 @@ namespace topple::product {
 struct Draft {
   Member member;
   std::vector<Place> opening_places;
-  Place rule;
+  Place rule;   // that put it there
+  Place shape;  // that gave it its section, panel and openings: the rule or an override
 };
 
 /// Columns and walls above the ground storey need something below, beams something at both ends, slabs at their

@@ -3,7 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <regex>
+#include <set>
 #include <sstream>
 
 #include "plan_text.h"
@@ -316,6 +320,12 @@ TEST(HangingMembers, WallOverNothing) {
       "");
 }
 
+TEST(HangingMembers, AreReportedAtTheRuleThatPutThemThereNotAtAnOverride) {
+  EXPECT_EQ(said_about_frame("[[columns]]\nsection = \"column\"\nat = \"A1\"\nstoreys = 1\n"
+                             "[[override]]\nmembers = \"C-A1-1\"\nsection = \"beam\"\n"),
+            "E304 line 1: C-A1-1: hangs in the air: no column, wall or beam below\n");
+}
+
 TEST(HangingMembers, ManyOfARuleAreOneComplaint) {
   const std::string said = said_about_frame("[[columns]]\nsection = \"column\"\nstoreys = 1\n");
   EXPECT_EQ(said, "E304 line 1: C-A1-1, C-A2-1, C-A3-1 and 3 more: hangs in the air: no column, wall or beam below\n");
@@ -599,6 +609,21 @@ TEST(Limits, TooManyMembersAreAnError) {
   for (const Diagnostic& d : complaints_about(replaced(too_many, lines, "frames = { " + frames + " }")))
     codes.push_back(d.code);
   EXPECT_THAT(codes, testing::Contains("E209"));
+}
+
+TEST(Documentation, ListsExactlyTheCodesThatAreUsed) {
+  const std::filesystem::path root = TOPPLE_SOURCE_DIR;
+  const auto collect = [](const std::filesystem::path& path, const std::regex& pattern, std::set<std::string>& codes) {
+    std::ifstream file(path);
+    const std::string text{std::istreambuf_iterator<char>(file), {}};
+    for (std::sregex_iterator it(text.begin(), text.end(), pattern), end; it != end; ++it) codes.insert((*it)[1]);
+  };
+  std::set<std::string> used, listed;
+  for (const auto& entry : std::filesystem::directory_iterator(root / "src/product"))
+    if (entry.path().extension() == ".cpp") collect(entry.path(), std::regex("\"([EW][0-9]{3})\""), used);
+  collect(root / "docs/plan.md", std::regex("\\| ([EW][0-9]{3}) \\|"), listed);
+  EXPECT_GT(used.size(), 30u);
+  EXPECT_EQ(used, listed);
 }
 
 }  // namespace
