@@ -14,6 +14,9 @@ using product::MemberKind;
 
 void Builder::add_events() {
   map.schedule = make_schedule(plan, k);
+  for (size_t s = 0; s < plan.stages.size(); ++s)
+    map.stages.push_back("stage " + std::to_string(s + 1) + " \"" + plan.stages[s].name +
+                         "\": " + std::to_string(plan.stages[s].charges.size()) + " charges");
   std::vector<Assembly> current = assemblies;  // as they are after the events so far
   std::vector<Vec3> centre;                    // their centres of mass at the start, in W
   for (const mbs::Body& b : model.bodies) centre.push_back(b.X_WB.p);

@@ -319,12 +319,18 @@ void Builder::connect_wall(const GridPoint& at, int index, bool along_x) {
   joint.child = mbs::BodyId{body};
   joint.X_PF = frame_in(floor, base, column_axes());
   joint.X_CM = frame_in(body, base, column_axes());
-  joint.tension_limit = rcc.tension * width * kept;
-  joint.shear_limit = rcc.shear_in_plane * width * kept;
-  // overturning about one edge of the wall, its own weight helping
+  // openings seldom reach the floor, so the base is longer than the wall above it
+  double open_base = 0;
+  for (const product::Opening& o : m.openings)
+    if (o.sill < 1e-6) open_base += o.width;
+  const double base_width = std::max(high - low - open_base, width);
+  joint.tension_limit = rcc.tension * base_width * kept;
+  joint.shear_limit = rcc.shear_in_plane * base_width * kept;
+  // the shear flow of a panel runs around its edges, so the joint bears the couple of the largest shear at the head
   joint.moment_limit =
+      rcc.shear_in_plane * width * kept * height +
       0.5 * (high - low) *
-      (0.5 * joint.tension_limit + plan.analysis.gravity * assemblies[static_cast<size_t>(body)].mass());
+          (0.5 * joint.tension_limit + plan.analysis.gravity * assemblies[static_cast<size_t>(body)].mass());
   ZoneEntry entry;
   entry.name = joint.name, entry.member = m.name, entry.subsystem = kRigid;
   entry.body_a = floor, entry.body_b = body, entry.p_W = base;

@@ -371,6 +371,7 @@ mbs::Model Builder::build() {
   model.contact.body_friction = k.contact_body_friction;
   model.contact.body_restitution = k.contact_body_restitution;
   model.contact.contact_frequency = k.contact_frequency;
+  map.ground_storey_height = plan.storey_heights.empty() ? 0 : plan.storey_heights.front();
   find_direction();
   index_members();
   stop_if_wrong();

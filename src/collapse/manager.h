@@ -65,13 +65,15 @@ struct ModelMap {
   std::vector<EventEntry> events;      // as Model::events
   std::vector<DebrisEntry> debris;
   std::vector<GroundColumn> ground_columns;
-  std::vector<Firing> schedule;    // failing charges included
-  std::vector<std::string> notes;  // what the manager had to decide, in sentences
-  Vec3 fall_direction{-1, 0, 0};   // planned, horizontal unit vector; away from the remaining supports if unplanned
-  Vec3 hinge_axis{0, -1, 0};       // rotation about it by a positive angle leans towards fall_direction
+  std::vector<std::string> stages;  // a line for each stage of the plan
+  std::vector<Firing> schedule;     // failing charges included
+  std::vector<std::string> notes;   // what the manager had to decide, in sentences
+  Vec3 fall_direction{-1, 0, 0};    // planned, horizontal unit vector; away from the remaining supports if unplanned
+  Vec3 hinge_axis{0, -1, 0};        // rotation about it by a positive angle leans towards fall_direction
   bool is_direction_planned = false;
-  double mass = 0;         // of all bodies [kg]
-  double moving_mass = 0;  // without fixed ones [kg]
+  double ground_storey_height = 0;  // [m]
+  double mass = 0;                  // of all bodies [kg]
+  double moving_mass = 0;           // without fixed ones [kg]
 };
 
 /// Builds the model. Throws InputError for plans that cannot be built, naming the member.

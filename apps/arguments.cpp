@@ -1,0 +1,82 @@
+#include "arguments.h"
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+
+namespace topple::apps {
+
+std::variant<Arguments, int> parse_arguments(int argc, char** argv) {
+  Arguments a;
+  CLI::App app{"topple shows a demolition engineer how a building will come down.", "topple"};
+  app.require_subcommand(1);
+  app.set_version_flag("--version", "topple " TOPPLE_VERSION);
+  app.footer(R"(Examples:
+  topple new storehouse.toml                       write a commented plan to begin with
+  topple check storehouse.toml                     report everything that is wrong with it
+  topple run storehouse.toml -o out                simulate; findings, out/record.h5, out/report.html
+  topple run storehouse.toml -o out --json         the same for programs (docs/run.md)
+  topple mbs run out/model.json -o again           run a multibody model on its own
+  topple report out/record.h5 -o report.html       make the page from a record
+
+Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterion of the plan is violated.)");
+
+  const auto add_run_options = [&a](CLI::App* verb) {
+    verb->add_option("-o,--output", a.output, "folder for the results; it is made if missing")->required();
+    verb->add_option("--duration", a.duration, "simulated time, such as \"10 s\"");
+    verb->add_option("--step", a.step, "time step, such as \"0.1 ms\"; chosen from the stiffest element if not given");
+    verb->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
+    verb->add_option("--engine", a.engine, "program that solves the multibody model");
+    verb->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
+    verb->add_flag("--csv", a.csv, "also write tables for spreadsheets");
+    verb->add_flag("--verbose", a.verbose, "show every event");
+    CLI::Option* none = verb->add_flag("--no-report", a.no_report, "do not write report.html");
+    verb->add_flag("--report", a.report, "fail if report.html cannot be written")->excludes(none);
+  };
+
+  CLI::App* verb_new = app.add_subcommand("new", "Write a commented plan to begin with.");
+  verb_new->add_option("file", a.input, "file to write; an existing one is left alone")->required();
+
+  CLI::App* check = app.add_subcommand("check", "Report everything that is wrong with a plan.");
+  check->add_option("plan", a.input, "plan (TOML)")->required();
+  check->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones");
+  check->add_flag("--json", a.json, "one JSON object on standard output");
+
+  CLI::App* run = app.add_subcommand("run", "Simulate a plan.");
+  run->add_option("plan", a.input, "plan (TOML)")->required();
+  run->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones");
+  add_run_options(run);
+
+  CLI::App* rules = app.add_subcommand("rules", "Show the knowledge rules of the simulation manager.");
+  rules->add_flag("--json", a.json, "as a file that --knowledge reads");
+
+  CLI::App* mbs = app.add_subcommand("mbs", "Work with multibody models.");
+  mbs->require_subcommand(1);
+  CLI::App* mbs_run = mbs->add_subcommand("run", "Run a multibody model on its own.");
+  mbs_run->add_option("model", a.input, "multibody model (JSON)")->required();
+  mbs_run->add_option("--frame-rate", a.frame_rate, "poses kept, such as \"60 Hz\"");
+  add_run_options(mbs_run);
+
+  CLI::App* report = app.add_subcommand("report", "Make the self-contained page from a record.");
+  report->add_option("record", a.input, "record (HDF5)")->required();
+  report->add_option("-o,--output", a.output, "page to write")->required();
+
+  CLI::App* version = app.add_subcommand("version", "Show the version.");
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    const int code = app.exit(e, std::cout, std::cerr);
+    return code == 0 ? kOk : kBadInput;
+  }
+  using Verb = Arguments::Verb;
+  if (verb_new->parsed()) a.verb = Verb::New;
+  if (check->parsed()) a.verb = Verb::Check;
+  if (run->parsed()) a.verb = Verb::Run;
+  if (rules->parsed()) a.verb = Verb::Rules;
+  if (mbs_run->parsed()) a.verb = Verb::MbsRun;
+  if (report->parsed()) a.verb = Verb::Report;
+  if (version->parsed()) a.verb = Verb::Version;
+  return a;
+}
+
+}  // namespace topple::apps

@@ -1,0 +1,27 @@
+#pragma once
+/// What the user typed, understood.
+
+#include <string>
+#include <variant>
+
+namespace topple::apps {
+
+struct Arguments {
+  enum class Verb { None, New, Check, Run, Rules, MbsRun, Report, Version };
+  Verb verb = Verb::None;
+  std::string input;      // plan, model, record, or the file to write
+  std::string output;     // folder or file
+  std::string knowledge;  // file of rules, empty: built in
+  std::string engine = "native";
+  std::string duration, step, frame_rate;  // quantities as typed; empty: the plan's
+  int threads = 1;
+  bool json = false, csv = false, no_report = false, report = false, verbose = false;
+};
+
+/// Exit codes of every verb.
+inline constexpr int kOk = 0, kRunFailed = 1, kBadInput = 2, kCriterionViolated = 3;
+
+/// Reads the command line. Either arguments, or the exit code with which to stop at once: help and errors are printed.
+std::variant<Arguments, int> parse_arguments(int argc, char** argv);
+
+}  // namespace topple::apps

@@ -1,0 +1,324 @@
+#include "commands.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "base/error.h"
+#include "base/file.h"
+#include "base/unit.h"
+#include "collapse/run.h"
+#include "mbs/model_json.h"
+#include "product/plan.h"
+#include "record/record.h"
+#include "terminal.h"
+
+namespace topple::apps {
+
+namespace fs = std::filesystem;
+using json = nlohmann::ordered_json;
+
+namespace {
+
+const char* word_of(record::Status s) {
+  switch (s) {
+    case record::Status::Info:
+      return "info";
+    case record::Status::Good:
+      return "good";
+    case record::Status::Warning:
+      return "warning";
+    case record::Status::Bad:
+      return "bad";
+  }
+  return "";
+}
+
+json to_json(const Diagnostic& d) {
+  return {{"severity", d.severity == Severity::Error ? "error" : "warning"},
+          {"code", d.code},
+          {"file", d.where.file},
+          {"line", d.where.line},
+          {"column", d.where.column},
+          {"message", d.message},
+          {"help", d.help}};
+}
+
+std::string dump(const json& j) { return j.dump(2, ' ', false, json::error_handler_t::replace); }
+
+/// Complaints on standard error, the number of errors.
+int print_diagnostics(const std::vector<Diagnostic>& list, const std::string& text) {
+  int errors = 0;
+  for (const Diagnostic& d : list) {
+    std::fputs(render(d, text, has_colour(stderr)).c_str(), stderr);
+    errors += d.severity == Severity::Error;
+  }
+  return errors;
+}
+
+std::string count_words(int n, const char* what) { return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s"); }
+
+/// All complaints of an InputError, and the JSON object if that was asked for.
+int refuse(const InputError& e, const std::vector<Diagnostic>& warnings, const std::string& text, bool as_json) {
+  std::vector<Diagnostic> all = e.diagnostics();
+  all.insert(all.end(), warnings.begin(), warnings.end());
+  const int errors = print_diagnostics(all, text);
+  std::fprintf(stderr, "%s. Nothing was run.\n", count_words(errors, "error").c_str());
+  if (as_json) {
+    json out{{"exit_code", kBadInput}, {"diagnostics", json::array()}};
+    for (const Diagnostic& d : all) out["diagnostics"].push_back(to_json(d));
+    std::printf("%s\n", dump(out).c_str());
+  }
+  return kBadInput;
+}
+
+/// A quantity from the command line; a bare number counts in the SI unit.
+double read_quantity(const std::string& text, Dimension dimension, const char* option) {
+  if (text.empty()) return 0;
+  Quantity q = parse_quantity(text, dimension);
+  if (!q.value) {
+    const Quantity bare = parse_quantity(text, Dimension::Number);
+    if (bare.value) q = bare;
+  }
+  if (!q.value || !(*q.value > 0))
+    throw InputError("E801", fmt::format("{} \"{}\": {}", option, text, q.value ? "must be > 0" : q.problem),
+                     "units: " + units_of(dimension));
+  return *q.value;
+}
+
+collapse::RunOptions make_options(const Arguments& a) {
+  collapse::RunOptions o;
+  o.duration = read_quantity(a.duration, Dimension::Time, "--duration");
+  o.step = read_quantity(a.step, Dimension::Time, "--step");
+  o.frame_rate = read_quantity(a.frame_rate, Dimension::Frequency, "--frame-rate");
+  o.threads = a.threads;
+  o.engine = a.engine;
+  o.program_version = TOPPLE_VERSION;
+  return o;
+}
+
+collapse::Knowledge load_knowledge(const Arguments& a) {
+  return a.knowledge.empty() ? collapse::default_knowledge()
+                             : collapse::read_knowledge(read_file(a.knowledge), a.knowledge);
+}
+
+/// The built page: beside an installed program, or in the source tree.
+std::optional<std::string> find_bundle() {
+  std::error_code ignored;
+  const fs::path program = fs::read_symlink("/proc/self/exe", ignored);
+  for (const fs::path& p :
+       {program.parent_path().parent_path() / "share" / "topple" / "report.html", fs::path(TOPPLE_REPORT_BUNDLE)})
+    if (fs::is_regular_file(p, ignored)) return read_file(p.string());
+  return std::nullopt;
+}
+
+constexpr const char* kNoBundle =
+    "The report page is not built, so there is no report.html (run `npm ci && npm run build` in web/, then `topple "
+    "report`).";
+
+void make_folder(const std::string& path) {
+  std::error_code failure;
+  fs::create_directories(path, failure);
+  if (failure) throw std::runtime_error(path + ": the folder cannot be made: " + failure.message());
+}
+
+/// Files of a finished record. `failed_report` is set when a report was asked for and could not be made.
+std::vector<std::pair<std::string, std::string>> write_files(const record::Record& r, const Arguments& a,
+                                                             bool& failed_report) {
+  std::vector<std::pair<std::string, std::string>> files;
+  const auto in = [&a](const char* name) { return (fs::path(a.output) / name).string(); };
+  record::write_hdf5(r, in("record.h5"));
+  files.emplace_back("record", in("record.h5"));
+  if (a.csv) {
+    record::write_csv(r, a.output);
+    for (const char* name : {"series.csv", "events.csv", "bodies.csv", "findings.csv"})
+      files.emplace_back(fs::path(name).stem().string(), in(name));
+  }
+  if (!a.no_report) {
+    if (const auto bundle = find_bundle()) {
+      record::write_report(r, *bundle, in("report.html"));
+      files.emplace_back("report", in("report.html"));
+    } else {
+      std::fprintf(stderr, "%s\n", kNoBundle);
+      failed_report = a.report;
+    }
+  }
+  return files;
+}
+
+json summary_json(const record::Record& r, const std::vector<std::pair<std::string, std::string>>& files,
+                  int exit_code) {
+  json out;
+  out["title"] = r.provenance.title;
+  out["exit_code"] = exit_code;
+  out["ending"] = r.ending;
+  out["ending_text"] = r.ending_text;
+  out["simulated_time"] = r.time.empty() ? 0 : r.time.back();
+  out["wall_time"] = r.provenance.wall_time;
+  out["step"] = r.provenance.step;
+  out["seed"] = r.provenance.seed;
+  out["engine"] = r.provenance.engine;
+  out["version"] = r.provenance.program_version;
+  out["counts"] = {{"bodies", r.counts.bodies},
+                   {"revolute_joints", r.counts.revolute_joints},
+                   {"rigid_joints", r.counts.rigid_joints},
+                   {"force_elements", r.counts.force_elements},
+                   {"cables", r.counts.cables},
+                   {"mass", r.counts.mass}};
+  out["findings"] = json::array();
+  out["violated"] = json::array();
+  for (const record::Finding& f : r.findings) {
+    out["findings"].push_back({{"id", f.id},
+                               {"heading", f.heading},
+                               {"title", f.title},
+                               {"text", f.text},
+                               {"value", std::isfinite(f.value) ? json(f.value) : json(nullptr)},
+                               {"unit", f.unit},
+                               {"status", word_of(f.status)}});
+    if (f.status == record::Status::Bad && (f.id.rfind("criterion.", 0) == 0 || f.id.rfind("clearance.", 0) == 0))
+      out["violated"].push_back(f.id);
+  }
+  out["files"] = json::object();
+  for (const auto& [what, path] : files) out["files"][what] = path;
+  return out;
+}
+
+int exit_code_of(const record::Record& r, bool failed_report) {
+  if (r.ending == "failed" || r.ending == "cancelled" || failed_report) return kRunFailed;
+  return collapse::violates_criteria(r) ? kCriterionViolated : kOk;
+}
+
+int close_run(const record::Record& r, const Arguments& a, std::FILE* out,
+              std::vector<std::pair<std::string, std::string>> files) {
+  bool failed_report = false;
+  for (auto& f : write_files(r, a, failed_report)) files.push_back(std::move(f));
+  const int code = exit_code_of(r, failed_report);
+  print_findings(out, r);
+  std::fprintf(out, "\n%s Computed in %.1f s.\n", r.ending_text.c_str(), r.provenance.wall_time);
+  for (const auto& [what, path] : files) std::fprintf(out, "Wrote %s\n", path.c_str());
+  if (a.json) std::printf("%s\n", dump(summary_json(r, files, code)).c_str());
+  return code;
+}
+
+}  // namespace
+
+int write_template(const Arguments& a) {
+  if (fs::exists(a.input)) {
+    std::fprintf(stderr, "%s exists already and is left as it is.\n", a.input.c_str());
+    return kBadInput;
+  }
+  replace_file(a.input, product::plan_template());
+  std::printf("Wrote %s. Next: topple check %s\n", a.input.c_str(), a.input.c_str());
+  return kOk;
+}
+
+int check_plan(const Arguments& a) {
+  std::vector<Diagnostic> warnings;
+  std::string text;
+  try {
+    const product::Plan plan = product::read_plan_file(a.input, warnings, text);
+    const collapse::Knowledge knowledge = load_knowledge(a);
+    collapse::ModelMap map;
+    const mbs::Model model = collapse::make_model(plan, knowledge, map, a.threads);
+    mbs::check_model(model);
+    print_diagnostics(warnings, text);
+    if (a.json) {
+      json out{{"exit_code", kOk}, {"diagnostics", json::array()}};
+      for (const Diagnostic& d : warnings) out["diagnostics"].push_back(to_json(d));
+      std::printf("%s\n", dump(out).c_str());
+    } else {
+      std::printf("%s: no errors, %s\n", a.input.c_str(),
+                  count_words(static_cast<int>(warnings.size()), "warning").c_str());
+    }
+    return kOk;
+  } catch (const InputError& e) { return refuse(e, warnings, text, a.json); }
+}
+
+int run_plan_file(const Arguments& a, const std::atomic<bool>& cancel) {
+  std::vector<Diagnostic> warnings;
+  std::string text;
+  std::FILE* out = a.json ? stderr : stdout;
+  try {
+    const collapse::RunOptions options = make_options(a);
+    const product::Plan plan = product::read_plan_file(a.input, warnings, text);
+    const collapse::Knowledge knowledge = load_knowledge(a);
+    print_diagnostics(warnings, text);
+    make_folder(a.output);
+    ProgressLine progress;
+    EventPrinter events(out, a.verbose, progress);
+    std::vector<std::pair<std::string, std::string>> files;
+    collapse::RunCallbacks callbacks;
+    callbacks.on_model = [&](const mbs::Model& model, const collapse::ModelMap& map, const record::Counts& counts) {
+      std::fprintf(out, "%s\n", plan.title.c_str());
+      print_counts(out, counts, map.mass);
+      const std::string path = (fs::path(a.output) / "model.json").string();
+      replace_file(path, mbs::to_json(model));
+      files.emplace_back("model", path);
+    };
+    callbacks.on_event = [&](const record::Event& e) { events.print(e); };
+    callbacks.progress.report = [&](double done, double whole) { progress.show(done, whole); };
+    callbacks.progress.cancel = &cancel;
+    const record::Record r = collapse::run_plan(plan, knowledge, options, callbacks);
+    progress.clear();
+    return close_run(r, a, out, std::move(files));
+  } catch (const InputError& e) { return refuse(e, warnings, text, a.json); }
+}
+
+int run_model_file(const Arguments& a, const std::atomic<bool>& cancel) {
+  std::FILE* out = a.json ? stderr : stdout;
+  try {
+    const collapse::RunOptions options = make_options(a);
+    const mbs::Model model = mbs::model_from_json(read_file(a.input), a.input);
+    make_folder(a.output);
+    ProgressLine progress;
+    EventPrinter events(out, a.verbose, progress);
+    collapse::RunCallbacks callbacks;
+    callbacks.on_model = [&](const mbs::Model& m, const collapse::ModelMap& map, const record::Counts& counts) {
+      std::fprintf(out, "%s\n", m.name.c_str());
+      print_counts(out, counts, map.mass);
+    };
+    callbacks.on_event = [&](const record::Event& e) { events.print(e); };
+    callbacks.progress.report = [&](double done, double whole) { progress.show(done, whole); };
+    callbacks.progress.cancel = &cancel;
+    const record::Record r = collapse::run_model(model, options, callbacks);
+    progress.clear();
+    return close_run(r, a, out, {});
+  } catch (const InputError& e) { return refuse(e, {}, {}, a.json); }
+}
+
+int show_rules(const Arguments& a) {
+  const collapse::Knowledge& k = collapse::default_knowledge();
+  if (a.json) {
+    json out{{"title", "Knowledge rules of the simulation manager"}, {"rules", json::array()}};
+    for (const collapse::Rule& r : k.rules)
+      out["rules"].push_back(
+          {{"id", r.id}, {"value", r.value}, {"unit", r.unit}, {"text", r.text}, {"reason", r.reason}});
+    std::printf("%s\n", dump(out).c_str());
+    return kOk;
+  }
+  for (const collapse::Rule& r : k.rules)
+    std::printf("%s = %s%s\n    %s\n    because: %s\n", r.id.c_str(), fmt::format("{:g}", r.value).c_str(),
+                r.unit == "1" ? "" : (" " + r.unit).c_str(), r.text.c_str(), r.reason.c_str());
+  return kOk;
+}
+
+int write_report_file(const Arguments& a) {
+  try {
+    const record::Record r = record::read_hdf5(a.input);
+    const auto bundle = find_bundle();
+    if (!bundle) {
+      std::fprintf(stderr, "%s\n", kNoBundle);
+      return kRunFailed;
+    }
+    record::write_report(r, *bundle, a.output);
+    std::printf("Wrote %s\n", a.output.c_str());
+    return kOk;
+  } catch (const InputError& e) { return refuse(e, {}, {}, false); }
+}
+
+}  // namespace topple::apps

@@ -1,0 +1,17 @@
+#pragma once
+/// The verbs of the command line; each returns its exit code.
+
+#include <atomic>
+
+#include "arguments.h"
+
+namespace topple::apps {
+
+int write_template(const Arguments&);
+int check_plan(const Arguments&);
+int run_plan_file(const Arguments&, const std::atomic<bool>& cancel);
+int show_rules(const Arguments&);
+int run_model_file(const Arguments&, const std::atomic<bool>& cancel);
+int write_report_file(const Arguments&);
+
+}  // namespace topple::apps

@@ -1,0 +1,59 @@
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <exception>
+
+#include "arguments.h"
+#include "base/error.h"
+#include "commands.h"
+
+namespace {
+
+std::atomic<bool> cancel = false;
+
+/// The first interrupt ends the run at its next step with its record written; the second one ends the program.
+extern "C" void on_interrupt(int) {
+  cancel.store(true, std::memory_order_relaxed);
+  std::signal(SIGINT, SIG_DFL);
+}
+
+int dispatch(const topple::apps::Arguments& a) {
+  using topple::apps::Arguments;
+  switch (a.verb) {
+    case Arguments::Verb::New:
+      return topple::apps::write_template(a);
+    case Arguments::Verb::Check:
+      return topple::apps::check_plan(a);
+    case Arguments::Verb::Run:
+      return topple::apps::run_plan_file(a, cancel);
+    case Arguments::Verb::Rules:
+      return topple::apps::show_rules(a);
+    case Arguments::Verb::MbsRun:
+      return topple::apps::run_model_file(a, cancel);
+    case Arguments::Verb::Report:
+      return topple::apps::write_report_file(a);
+    case Arguments::Verb::Version:
+      std::puts("topple " TOPPLE_VERSION);
+      return topple::apps::kOk;
+    case Arguments::Verb::None:
+      break;
+  }
+  return topple::apps::kBadInput;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::signal(SIGINT, on_interrupt);
+  const auto arguments = topple::apps::parse_arguments(argc, argv);
+  if (const int* code = std::get_if<int>(&arguments)) return *code;
+  try {
+    return dispatch(std::get<topple::apps::Arguments>(arguments));
+  } catch (const topple::InputError& e) {
+    std::fprintf(stderr, "%s\n", e.what());
+    return topple::apps::kBadInput;
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "topple: %s\n", e.what());
+    return topple::apps::kRunFailed;
+  }
+}

@@ -1,0 +1,112 @@
+#include "terminal.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "base/unit.h"
+
+namespace topple::apps {
+
+bool has_colour(std::FILE* f) {
+  const char* no = std::getenv("NO_COLOR");
+  return (no == nullptr || *no == '\0') && isatty(fileno(f)) != 0;
+}
+
+ProgressLine::ProgressLine() : is_terminal_(isatty(fileno(stderr)) != 0), start_(Clock::now()), last_(start_) {}
+
+std::string ProgressLine::words(double done, double whole, double elapsed) {
+  const double factor = elapsed > 0 ? done / elapsed : 0;
+  const double left = done > 0 ? elapsed * (whole - done) / done : 0;
+  return fmt::format("{:.2f} of {:.2f} s simulated, {:.2g} x real time, {:.0f} s left", done, whole, factor, left);
+}
+
+void ProgressLine::show(double done, double whole) {
+  const Clock::time_point now = Clock::now();
+  const double since = std::chrono::duration<double>(now - last_).count();
+  if (since < (is_terminal_ ? 0.1 : 5.0)) return;
+  last_ = now;
+  const std::string text = words(done, whole, std::chrono::duration<double>(now - start_).count());
+  if (!is_terminal_) {
+    std::fprintf(stderr, "%s\n", text.c_str());
+    return;
+  }
+  constexpr int width = 24;
+  const int full = std::clamp(static_cast<int>(width * done / whole), 0, width);
+  std::fprintf(stderr, "\r\x1b[K[%s%s] %s", std::string(static_cast<size_t>(full), '=').c_str(),
+               std::string(static_cast<size_t>(width - full), ' ').c_str(), text.c_str());
+  std::fflush(stderr);
+  is_shown_ = true;
+}
+
+void ProgressLine::clear() {
+  if (!is_shown_) return;
+  std::fprintf(stderr, "\r\x1b[K");
+  std::fflush(stderr);
+  is_shown_ = false;
+}
+
+EventPrinter::EventPrinter(std::FILE* out, bool verbose, ProgressLine& progress)
+    : out_(out), verbose_(verbose), colour_(has_colour(out)), progress_(progress) {}
+
+void EventPrinter::print(const record::Event& e) {
+  static const std::map<std::string, int> most{
+      {"yield", 3}, {"rupture", 8}, {"release", 4}, {"touchdown", 4}, {"contact", 0}};
+  const auto limit = most.find(e.kind);
+  if (!verbose_ && limit != most.end()) {
+    const int n = ++shown_[e.kind];
+    if (n > limit->second) {
+      if (n == limit->second + 1 && limit->second > 0) {
+        progress_.clear();
+        std::fprintf(out_, "  %8.3f s  ... further events \"%s\" are in the record\n", e.time, e.kind.c_str());
+      }
+      return;
+    }
+  }
+  progress_.clear();
+  const bool strong = e.kind == "stage" || e.kind == "failure" || e.kind == "rest";
+  std::fprintf(out_, "  %8.3f s  %s%s%s\n", e.time, strong && colour_ ? "\x1b[1m" : "", e.text.c_str(),
+               strong && colour_ ? "\x1b[0m" : "");
+  std::fflush(out_);
+}
+
+void print_counts(std::FILE* out, const record::Counts& c, double standing_mass) {
+  std::fprintf(out, "%s\n",
+               fmt::format("Model: {} rigid bodies, {} revolute joints, {} rigid joints, {} force elements{}; {:.0f} t",
+                           c.bodies, c.revolute_joints, c.rigid_joints, c.force_elements,
+                           c.cables > 0 ? fmt::format(", {} cables", c.cables) : "", standing_mass / unit::t)
+                   .c_str());
+}
+
+void print_findings(std::FILE* out, const record::Record& r) {
+  const bool colour = has_colour(out);
+  std::string heading;
+  for (const record::Finding& f : r.findings) {
+    if (f.heading != heading) {
+      heading = f.heading;
+      std::fprintf(out, "\n%s%s%s\n", colour ? "\x1b[1m" : "", heading.c_str(), colour ? "\x1b[0m" : "");
+    }
+    const char* mark = "  ";
+    const char* tint = "";
+    switch (f.status) {
+      case record::Status::Info:
+        break;
+      case record::Status::Good:
+        mark = "ok", tint = "\x1b[32m";
+        break;
+      case record::Status::Warning:
+        mark = "! ", tint = "\x1b[33m";
+        break;
+      case record::Status::Bad:
+        mark = "X ", tint = "\x1b[31m";
+        break;
+    }
+    const std::string title = f.title == heading ? "" : f.title + ": ";
+    std::fprintf(out, "  %s%s%s %s%s\n", colour ? tint : "", mark, colour ? "\x1b[0m" : "", title.c_str(),
+                 f.text.c_str());
+  }
+}
+
+}  // namespace topple::apps

@@ -1,0 +1,49 @@
+#pragma once
+/// What people see while it runs: progress, events, findings.
+
+#include <chrono>
+#include <cstdio>
+#include <map>
+#include <string>
+
+#include "record/record.h"
+
+namespace topple::apps {
+
+/// Whether escape sequences may be written to a stream: a terminal, and NO_COLOR unset or empty.
+bool has_colour(std::FILE*);
+
+/// Progress of simulated time on standard error: one line that renews itself on a terminal, a line now and then
+/// otherwise.
+class ProgressLine {
+ public:
+  ProgressLine();
+  void show(double done, double whole);
+  /// Takes the line away, so that something else can be written.
+  void clear();
+  /// Words of the line: simulated time, real-time factor and what is left.
+  static std::string words(double done, double whole, double elapsed);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  bool is_terminal_ = false, is_shown_ = false;
+  Clock::time_point start_, last_;
+};
+
+/// Prints events as they happen; of the frequent kinds only the first few, unless `verbose`.
+class EventPrinter {
+ public:
+  EventPrinter(std::FILE* out, bool verbose, ProgressLine& progress);
+  void print(const record::Event&);
+
+ private:
+  std::FILE* out_;
+  bool verbose_, colour_;
+  ProgressLine& progress_;
+  std::map<std::string, int> shown_;
+};
+
+void print_findings(std::FILE*, const record::Record&);
+void print_counts(std::FILE*, const record::Counts&, double standing_mass);
+
+}  // namespace topple::apps

@@ -1,0 +1,126 @@
+#include "collapse/debris.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <map>
+
+namespace topple::collapse {
+
+namespace {
+
+double cross2(const Point2& o, const Point2& a, const Point2& b) {
+  return (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0]);
+}
+
+bool contains(const Polygon& polygon, const Point2& p) {
+  bool inside = false;
+  for (size_t i = 0, j = polygon.size() - 1; i < polygon.size(); j = i++) {
+    const Point2 &a = polygon[i], &b = polygon[j];
+    if ((a[1] > p[1]) != (b[1] > p[1]) && p[0] < (b[0] - a[0]) * (p[1] - a[1]) / (b[1] - a[1]) + a[0]) inside = !inside;
+  }
+  return inside;
+}
+
+double point_segment(const Point2& p, const Point2& a, const Point2& b) {
+  const double dx = b[0] - a[0], dy = b[1] - a[1], l2 = dx * dx + dy * dy;
+  const double t = l2 > 0 ? std::clamp(((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / l2, 0.0, 1.0) : 0;
+  return std::hypot(p[0] - a[0] - t * dx, p[1] - a[1] - t * dy);
+}
+
+bool segments_cross(const Point2& a, const Point2& b, const Point2& c, const Point2& d) {
+  const double p = cross2(a, b, c), q = cross2(a, b, d), r = cross2(c, d, a), s = cross2(c, d, b);
+  return ((p > 0) != (q > 0)) && ((r > 0) != (s > 0));
+}
+
+}  // namespace
+
+Polygon calc_hull(std::vector<Point2> points) {
+  std::sort(points.begin(), points.end());
+  points.erase(std::unique(points.begin(), points.end()), points.end());
+  if (points.size() < 3) return points;
+  Polygon hull(2 * points.size());
+  size_t n = 0;
+  for (size_t pass = 0; pass < 2; ++pass) {
+    const size_t start = n;
+    for (size_t i = 0; i < points.size(); ++i) {
+      const Point2& p = pass == 0 ? points[i] : points[points.size() - 1 - i];
+      while (n >= start + 2 && cross2(hull[n - 2], hull[n - 1], p) <= 0) --n;
+      hull[n++] = p;
+    }
+    --n;
+  }
+  hull.resize(n);
+  return hull;
+}
+
+double calc_distance(const Polygon& a, const Polygon& b) {
+  if (a.empty() || b.empty()) return std::numeric_limits<double>::infinity();
+  if (contains(a, b.front()) || contains(b, a.front())) return 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (size_t i = 0; i < a.size(); ++i)
+    for (size_t j = 0; j < b.size(); ++j) {
+      const Point2 &a0 = a[i], &a1 = a[(i + 1) % a.size()], &b0 = b[j], &b1 = b[(j + 1) % b.size()];
+      if (segments_cross(a0, a1, b0, b1)) return 0;
+      least = std::min({least, point_segment(a0, b0, b1), point_segment(b0, a0, a1)});
+    }
+  return least;
+}
+
+double calc_area(const Polygon& p) {
+  double twice = 0;
+  for (size_t i = 0; i < p.size(); ++i) {
+    const Point2 &a = p[i], &b = p[(i + 1) % p.size()];
+    twice += a[0] * b[1] - a[1] * b[0];
+  }
+  return 0.5 * std::abs(twice);
+}
+
+Polygon calc_outline(const PlacedBox& box) {
+  const Mat3 R = to_matrix(box.X_WS.q);
+  std::vector<Point2> points;
+  for (int i = 0; i < 8; ++i) {
+    const Vec3 p = box.X_WS.p + R * Vec3{i & 1 ? box.half.x : -box.half.x, i & 2 ? box.half.y : -box.half.y,
+                                         i & 4 ? box.half.z : -box.half.z};
+    points.push_back({p.x, p.y});
+  }
+  return calc_hull(std::move(points));
+}
+
+Heap calc_heap(const std::vector<PlacedBox>& boxes, double cell) {
+  Heap heap;
+  std::map<std::pair<std::int64_t, std::int64_t>, double> top;
+  for (const PlacedBox& box : boxes) {
+    const Mat3 R = to_matrix(box.X_WS.q);
+    Vec3 reach;
+    for (int i = 0; i < 3; ++i)
+      reach[i] = std::abs(R(i, 0)) * box.half.x + std::abs(R(i, 1)) * box.half.y + std::abs(R(i, 2)) * box.half.z;
+    heap.height = std::max(heap.height, box.X_WS.p.z + reach.z);
+    const auto first = [&](double v) { return static_cast<std::int64_t>(std::floor(v / cell)); };
+    for (std::int64_t i = first(box.X_WS.p.x - reach.x); i <= first(box.X_WS.p.x + reach.x); ++i)
+      for (std::int64_t j = first(box.X_WS.p.y - reach.y); j <= first(box.X_WS.p.y + reach.y); ++j) {
+        // where a plumb line through the cell's middle leaves the box
+        const Vec3 p{(static_cast<double>(i) + 0.5) * cell - box.X_WS.p.x,
+                     (static_cast<double>(j) + 0.5) * cell - box.X_WS.p.y, -box.X_WS.p.z};
+        const Vec3 o = transpose_times(R, p), d = transpose_times(R, Vec3{0, 0, 1});
+        double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
+        for (int c = 0; c < 3; ++c) {
+          if (std::abs(d[c]) < 1e-12) {
+            if (std::abs(o[c]) > box.half[c]) high = low = std::numeric_limits<double>::quiet_NaN();
+            continue;
+          }
+          const double a = (-box.half[c] - o[c]) / d[c], b = (box.half[c] - o[c]) / d[c];
+          low = std::max(low, std::min(a, b));
+          high = std::min(high, std::max(a, b));
+        }
+        if (!(high > low) || high <= 0) continue;
+        double& z = top[{i, j}];
+        z = std::max(z, high);
+      }
+  }
+  for (const auto& [at, z] : top) heap.volume += z * cell * cell;
+  return heap;
+}
+
+}  // namespace topple::collapse

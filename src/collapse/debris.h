@@ -1,0 +1,36 @@
+#pragma once
+/// Plane geometry of what lies about after a collapse.
+
+#include <array>
+#include <vector>
+
+#include "base/linalg.h"
+
+namespace topple::collapse {
+
+using Point2 = std::array<double, 2>;
+using Polygon = std::vector<Point2>;
+
+/// Convex hull, counter-clockwise, without points on its edges.
+Polygon calc_hull(std::vector<Point2> points);
+/// Distance between the areas of two simple polygons; 0 where they overlap.
+double calc_distance(const Polygon&, const Polygon&);
+double calc_area(const Polygon&);
+
+/// A box as it lies in W.
+struct PlacedBox {
+  Pose X_WS;
+  Vec3 half;
+};
+/// Hull of a box seen from above.
+Polygon calc_outline(const PlacedBox&);
+
+/// Heap of boxes above the ground: bulk volume under their upper surface, and its highest point.
+struct Heap {
+  double height = 0;  // [m]
+  double volume = 0;  // [m³]
+};
+/// Heights are sampled on a grid of `cell` [m]; the volume's error is of the order of the outline times the cell.
+Heap calc_heap(const std::vector<PlacedBox>&, double cell);
+
+}  // namespace topple::collapse

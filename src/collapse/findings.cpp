@@ -1,0 +1,426 @@
+#include "collapse/findings.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "base/unit.h"
+#include "collapse/debris.h"
+#include "collapse/rigid_block.h"
+
+namespace topple::collapse {
+
+namespace {
+
+using record::Finding;
+using record::Status;
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr double kPi = 3.14159265358979323846;
+
+/// Everything that the sections below share.
+struct Context {
+  const product::Plan& plan;
+  const mbs::Model& model;
+  const ModelMap& map;
+  const Knowledge& k;
+  const Recorder& recorder;
+  const mbs::Summary& summary;
+  record::Record& r;
+
+  void add(const std::string& id, const std::string& heading, const std::string& title, const std::string& text,
+           double value = kNone, const std::string& unit = "", Status status = Status::Info) const {
+    r.findings.push_back({id, heading, title, text, value, unit, status});
+  }
+  /// First and last firing of each stage that fires at all.
+  struct StageTimes {
+    size_t stage;
+    double first, last;
+  };
+  std::vector<StageTimes> stage_times() const {
+    std::map<int, StageTimes> times;
+    for (const Firing& f : map.schedule) {
+      if (f.fails) continue;
+      const auto [it, is_new] = times.emplace(f.stage, StageTimes{static_cast<size_t>(f.stage), f.time, f.time});
+      it->second.first = std::min(it->second.first, f.time);
+      it->second.last = std::max(it->second.last, f.time);
+    }
+    std::vector<StageTimes> out;
+    for (const auto& [s, t] : times) out.push_back(t);
+    return out;
+  }
+  std::string stage_name(size_t s) const { return plan.stages[s].name; }
+  std::vector<PlacedBox> boxes_at(size_t frame, bool moving_only) const {
+    std::vector<PlacedBox> boxes;
+    const size_t B = r.bodies.size();
+    for (size_t b = 0; b < B; ++b) {
+      if (moving_only && r.bodies[b].fixed) continue;
+      const Pose X_WB = pose(frame, b);
+      for (const record::BoxShape& s : r.bodies[b].shapes) boxes.push_back({X_WB * s.X_BS, s.half});
+    }
+    return boxes;
+  }
+  Pose pose(size_t frame, size_t body) const {
+    const float* p = &r.position[3 * (frame * r.bodies.size() + body)];
+    const float* q = &r.orientation[4 * (frame * r.bodies.size() + body)];
+    return {{p[0], p[1], p[2]}, normalized(Quat{q[0], q[1], q[2], q[3]})};
+  }
+};
+
+std::string azimuth_words(double azimuth) {
+  double degrees = azimuth / unit::deg;
+  if (degrees < -0.5) degrees += 360;
+  return fmt::format("{:.0f} deg", degrees);
+}
+
+Mechanism judge(const Context& c) {
+  MechanismInput in;
+  in.frames = c.recorder.block_frames();
+  in.touchdown = c.recorder.first_touchdown();
+  in.fall_direction = c.map.fall_direction;
+  in.is_direction_planned = c.map.is_direction_planned;
+  in.direction_tolerance = c.plan.criteria.azimuth_tolerance.value_or(0);
+  in.storey_height = c.map.ground_storey_height;
+  in.came_to_rest = c.summary.ending == mbs::Summary::Ending::AtRest;
+  double mass = 0, centre = 0, front = -1e30, rear = 1e30;
+  for (size_t b = 0; b < c.model.bodies.size(); ++b) {
+    if (!c.map.bodies[b].is_upper) continue;
+    const mbs::Body& body = c.model.bodies[b];
+    mass += body.mass;
+    centre += body.mass * dot(body.X_WB.p, in.fall_direction);
+    for (const record::BoxShape& s : c.map.bodies[b].shapes)
+      for (const Point2& p : calc_outline({body.X_WB * s.X_BS, s.half})) {
+        const double along = p[0] * in.fall_direction.x + p[1] * in.fall_direction.y;
+        front = std::max(front, along);
+        rear = std::min(rear, along);
+      }
+  }
+  if (mass > 0) {
+    in.front = front - centre / mass;
+    in.rear = centre / mass - rear;
+  }
+  return judge_mechanism(in, c.k);
+}
+
+void add_mechanism(const Context& c, const Mechanism& m) {
+  Status status = Status::Info;
+  if (m.name == "wrong direction") status = Status::Bad;
+  if (c.plan.criteria.mechanism) status = *c.plan.criteria.mechanism == m.name ? Status::Good : Status::Bad;
+  c.add("mechanism", "Mechanism", "Mechanism: " + m.name, m.text, m.tilt, "rad", status);
+}
+
+bool add_stability(const Context& c) {
+  // each interval of standing: its last frame before the next stage, and what happened in it
+  const auto stages = c.stage_times();
+  bool stood = true;
+  const auto& block = c.recorder.block_frames();
+  const auto& zones = c.recorder.zone_frames();
+  const auto frame_before = [&](double t) {
+    size_t i = 0;
+    while (i + 1 < block.size() && block[i + 1].time <= t + 1e-9) ++i;
+    return i;
+  };
+  const auto describe = [&](const std::string& id, const std::string& title, size_t i, bool settled) {
+    const ZoneFrame& z = zones[i];
+    const bool has = z.zone >= 0 && z.utilisation > 0;
+    const double margin = has ? 1 / z.utilisation : kNone;
+    const double away = norm(block[i].displacement);
+    const bool stands = away < c.k.stands_displacement && std::isfinite(away);
+    std::string text = has ? fmt::format("The lowest margin is {:.2f} in zone {} ({:.0f} % used)", margin,
+                                         c.r.zones[static_cast<size_t>(z.zone)].name, 100 * z.utilisation)
+                           : std::string("No zone is loaded");
+    text += fmt::format(", {} zones have yielded", z.yielded);
+    if (settled)
+      text += fmt::format(
+          ", {} are broken; the upper block has moved by {:.1f} cm and its fastest part moves at {:.3f} m/s", z.broken,
+          100 * away, block[i].fastest);
+    text += stands ? "." : ": it does not stand.";
+    const Status status = !stands ? Status::Bad : z.yielded > 0 || z.broken > 0 ? Status::Warning : Status::Good;
+    c.add(id, "Stability", title, text, margin, "1", status);
+    return stands;
+  };
+  if (block.empty()) return true;
+  describe("stability.start", "Before the first charge", 0, false);
+  for (size_t s = 0; s + 1 < stages.size(); ++s) {
+    if (stages[s + 1].first > block.back().time) break;
+    const size_t i = frame_before(stages[s + 1].first);
+    stood &= describe(
+        fmt::format("stability.stage_{}", s + 1),
+        fmt::format("Between \"{}\" and \"{}\"", c.stage_name(stages[s].stage), c.stage_name(stages[s + 1].stage)), i,
+        true);
+  }
+  return stood;
+}
+
+struct Reach {
+  double largest = 0;
+};
+
+Reach add_debris(const Context& c, const Mechanism& m) {
+  Reach reach;
+  const size_t last = c.r.time.size() - 1;
+  if (std::isnan(m.azimuth)) {
+    c.add("azimuth", "Fall and debris", "Direction of fall",
+          "The mass centre moved by less than half a metre to any side.", kNone, "rad");
+  } else {
+    const double planned = std::atan2(c.map.fall_direction.y, c.map.fall_direction.x);
+    const double off = std::remainder(m.azimuth - planned, 2 * kPi);
+    std::string text = fmt::format("The mass centre moved towards {}", azimuth_words(m.azimuth));
+    if (c.map.is_direction_planned)
+      text += fmt::format(", {:.0f} deg from the planned {}", std::abs(off) / unit::deg, azimuth_words(planned));
+    c.add("azimuth", "Fall and debris", "Direction of fall", text + ".", m.azimuth, "rad");
+  }
+  std::vector<Point2> corners;
+  const std::vector<PlacedBox> boxes = c.boxes_at(last, true);
+  for (const PlacedBox& b : boxes)
+    for (const Point2& p : calc_outline(b)) corners.push_back(p);
+  const Polygon hull = calc_hull(corners);
+  double low[2] = {1e30, 1e30}, high[2] = {-1e30, -1e30}, low0[2] = {1e30, 1e30}, high0[2] = {-1e30, -1e30};
+  for (const Point2& p : hull)
+    for (size_t i : {0UL, 1UL}) low[i] = std::min(low[i], p[i]), high[i] = std::max(high[i], p[i]);
+  for (const auto& p : c.r.building_outline)
+    for (size_t i : {0UL, 1UL}) low0[i] = std::min(low0[i], p[i]), high0[i] = std::max(high0[i], p[i]);
+  const double side[4] = {std::max(0.0, low0[0] - low[0]), std::max(0.0, high[0] - high0[0]),
+                          std::max(0.0, low0[1] - low[1]), std::max(0.0, high[1] - high0[1])};
+  reach.largest = *std::max_element(side, side + 4);
+  c.add("debris.reach", "Fall and debris", "Reach of the debris",
+        fmt::format("Beyond the footprint: {:.1f} m towards -x, {:.1f} m towards +x, {:.1f} m towards -y, {:.1f} m "
+                    "towards +y; the outline of all parts encloses {:.0f} m2.",
+                    side[0], side[1], side[2], side[3], calc_area(hull)),
+        reach.largest, "m");
+  const Heap heap = calc_heap(boxes, 0.25);
+  c.add("debris.height", "Fall and debris", "Height of the hill",
+        fmt::format("The highest point of all parts lies {:.1f} m above the ground.", heap.height), heap.height, "m");
+  c.add("debris.volume", "Fall and debris", "Volume of the hill",
+        fmt::format("Bulk volume under the upper surface of all parts: {:.0f} m3.", heap.volume), heap.volume, "m3");
+  return reach;
+}
+
+void add_clearances(const Context& c) {
+  for (const product::Neighbour& n : c.plan.neighbours) {
+    double nlow[2] = {1e30, 1e30}, nhigh[2] = {-1e30, -1e30};
+    for (const auto& p : n.footprint)
+      for (size_t i : {0UL, 1UL}) nlow[i] = std::min(nlow[i], p[i]), nhigh[i] = std::max(nhigh[i], p[i]);
+    double least = std::numeric_limits<double>::infinity(), when = 0;
+    std::string who;
+    for (size_t f = 0; f < c.r.time.size(); ++f)
+      for (size_t b = 0; b < c.r.bodies.size(); ++b) {
+        if (f > 0 && c.r.bodies[b].fixed) continue;
+        const Pose X_WB = c.pose(f, b);
+        for (const record::BoxShape& s : c.r.bodies[b].shapes) {
+          const PlacedBox box{X_WB * s.X_BS, s.half};
+          const double radius = norm(s.half);
+          const double gap[2] = {std::max({nlow[0] - box.X_WS.p.x - radius, box.X_WS.p.x - radius - nhigh[0], 0.0}),
+                                 std::max({nlow[1] - box.X_WS.p.y - radius, box.X_WS.p.y - radius - nhigh[1], 0.0})};
+          if (std::hypot(gap[0], gap[1]) >= least) continue;
+          const double d = calc_distance(calc_outline(box), n.footprint);
+          if (d < least) least = d, when = c.r.time[f], who = c.r.bodies[b].name;
+        }
+      }
+    const bool asked = n.clearance > 0;
+    std::string text = fmt::format("The nearest part, {}, comes to {:.1f} m at {:.2f} s", who, least, when);
+    if (least <= 0) text = fmt::format("{} lands on it at {:.2f} s", who, when);
+    if (asked) text += fmt::format("; the limit is {:.1f} m", n.clearance);
+    const Status status = !asked                 ? (least > 0 ? Status::Info : Status::Warning)
+                          : least >= n.clearance ? Status::Good
+                                                 : Status::Bad;
+    c.add("clearance." + n.name, "Clearance", n.name, text + ".", least, "m", status);
+  }
+}
+
+void add_touchdown(const Context& c) {
+  const double t = c.recorder.first_touchdown();
+  if (!std::isfinite(t)) {
+    c.add("touchdown.first", "Touchdown", "First touchdown", "No part of the upper block touched the ground.", kNone,
+          "s");
+  } else {
+    const double kinetic = c.recorder.kinetic_at(t);
+    c.add(
+        "touchdown.first", "Touchdown", "First touchdown",
+        fmt::format("{} is the first part of the upper block on the ground, at {:.2f} s, when {:.1f} MJ are in motion.",
+                    c.recorder.first_touchdown_body(), t, kinetic * 1e-6),
+        t, "s");
+    double largest = 0, when = 0;
+    const auto series = std::find_if(c.r.series.begin(), c.r.series.end(),
+                                     [](const record::Series& s) { return s.id == "energy_kinetic"; });
+    for (size_t i = 0; i < c.r.time.size(); ++i)
+      if (series->value[i] > largest) largest = series->value[i], when = c.r.time[i];
+    c.add("touchdown.energy", "Touchdown", "Largest energy in motion",
+          fmt::format("{:.1f} MJ at {:.2f} s.", largest * 1e-6, when), largest, "J");
+    c.add("touchdown.force", "Touchdown", "Largest ground force",
+          fmt::format("{:.1f} MN at {:.2f} s, {:.1f} times the weight; taken at frames {:.3f} s apart.",
+                      c.recorder.largest_ground_force() * 1e-6, c.recorder.largest_ground_force_time(),
+                      c.recorder.largest_ground_force() / (c.map.moving_mass * std::max(norm(c.model.gravity), 1e-9)),
+                      c.r.time.size() > 1 ? c.r.time[1] - c.r.time[0] : 0.0),
+          c.recorder.largest_ground_force(), "N");
+  }
+  c.add("vibration", "Touchdown", "Ground vibration",
+        "Not given: a screening needs the site's attenuation coefficients from the user.", kNone, "");
+}
+
+void add_rigid_block(const Context& c) {
+  const auto stages = c.stage_times();
+  if (stages.empty()) return;
+  const Vec3 d = c.map.fall_direction, axis = c.map.hinge_axis;
+  // the block pivots over the foremost row that keeps standing
+  double foremost = -1e30;
+  for (const GroundColumn& g : c.map.ground_columns)
+    if (!g.is_fired) foremost = std::max(foremost, dot(g.p_top, d));
+  std::vector<const GroundColumn*> row;
+  for (const GroundColumn& g : c.map.ground_columns)
+    if (!g.is_fired && dot(g.p_top, d) > foremost - 0.5) row.push_back(&g);
+  if (row.empty()) return;
+  RigidBlock block;
+  block.gravity = norm(c.model.gravity);
+  block.release = stages.back().last;
+  Vec3 pivot, centre;
+  for (const GroundColumn* g : row) pivot += (1.0 / static_cast<double>(row.size())) * g->p_top;
+  for (size_t b = 0; b < c.model.bodies.size(); ++b) {
+    if (!c.map.bodies[b].is_upper) continue;
+    const mbs::Body& body = c.model.bodies[b];
+    block.mass += body.mass;
+    centre += body.mass * body.X_WB.p;
+    const Vec3 arm = body.X_WB.p - pivot;
+    block.inertia += dot(axis, body.inertia * axis) + body.mass * (dot(arm, arm) - std::pow(dot(arm, axis), 2));
+  }
+  centre *= 1 / block.mass;
+  block.ahead = dot(centre - pivot, d);
+  block.above = (centre - pivot).z;
+  const double share = -block.mass * block.gravity / static_cast<double>(row.size());
+  for (const GroundColumn* g : row) {
+    const mbs::MomentFamily& f = c.model.laws[static_cast<size_t>(g->element.law.index)].moment_z;
+    double most = 0;
+    const size_t J = f.plastic_rotation.size();
+    for (size_t n = 0; n + 1 < f.normal_force.size(); ++n) {
+      if (share < f.normal_force[n] || share > f.normal_force[n + 1]) continue;
+      const double s = (share - f.normal_force[n]) / (f.normal_force[n + 1] - f.normal_force[n]);
+      for (size_t j = 0; j < J; ++j)
+        most = std::max({most, (1 - s) * f.positive[n * J + j] + s * f.positive[(n + 1) * J + j],
+                         (1 - s) * f.negative[n * J + j] + s * f.negative[(n + 1) * J + j]});
+    }
+    block.plastic_moment += most;
+  }
+  record::Series series{"tilt_angle_rigid_block", "Tilt angle of a rigid block", "rad", "angle",
+                        calc_rigid_block(block, c.r.time)};
+  const double when = block.release + 1;
+  const auto at = std::lower_bound(c.r.time.begin(), c.r.time.end(), when - 1e-9);
+  const std::string model_words = fmt::format(
+      "A rigid block of {:.0f} t over {} hinges with {:.2f} MNm in all, its mass centre {:.2f} m ahead of them",
+      block.mass / unit::t, row.size(), block.plastic_moment * 1e-6, block.ahead);
+  if (block.mass * block.gravity * block.ahead <= block.plastic_moment) {
+    c.add("rigid_block", "Mechanism", "Rigid block", model_words + ", would not tilt.", kNone, "rad");
+  } else if (at != c.r.time.end()) {
+    const size_t i = static_cast<size_t>(at - c.r.time.begin());
+    const double here = c.r.series.front().value[i], there = series.value[i];
+    c.add(
+        "rigid_block", "Mechanism", "Rigid block",
+        fmt::format("{}, has turned by {:.1f} deg 1 s after the last stage; the model by {:.1f} deg ({:+.1f} deg). The "
+                    "block has no yielding storeys, no sway of the ground storey and no axial shortening of columns.",
+                    model_words, there / unit::deg, here / unit::deg, (here - there) / unit::deg),
+        here - there, "rad");
+  }
+  c.r.series.insert(c.r.series.begin() + 1, std::move(series));
+}
+
+void add_events(const Context& c) {
+  std::map<std::string, int> n;
+  for (const record::Event& e : c.r.events) ++n[e.kind];
+  c.add("events", "Events", "Events",
+        fmt::format("{} charges, {} zones yielded, {} broke, {} joints came off, {} parts touched the ground.",
+                    n["charge"], n["yield"], n["rupture"], n["release"], n["touchdown"]),
+        static_cast<double>(c.r.events.size()), "1");
+  size_t i = 0;
+  for (const std::string& note : c.map.notes)
+    c.add("note." + std::to_string(++i), "Events", "Note", note, kNone, "", Status::Warning);
+}
+
+void add_criteria(const Context& c, const Mechanism& m, bool stood, const Reach& reach) {
+  const product::Criteria& want = c.plan.criteria;
+  const auto judge_one = [&](const std::string& id, const std::string& title, bool met, const std::string& text,
+                             double value, const std::string& unit) {
+    c.add("criterion." + id, "Criteria", title, text, value, unit, met ? Status::Good : Status::Bad);
+  };
+  if (want.mechanism)
+    judge_one("mechanism", "Mechanism", m.name == *want.mechanism,
+              fmt::format("Asked: {}; found: {}.", *want.mechanism, m.name), kNone, "");
+  if (want.azimuth) {
+    const double off = std::abs(std::remainder(m.azimuth - *want.azimuth, 2 * kPi));
+    const double tolerance = want.azimuth_tolerance.value_or(c.k.mechanism_direction_tolerance);
+    judge_one("azimuth", "Direction", off <= tolerance,
+              std::isnan(m.azimuth) ? fmt::format("Asked: {} +- {:.0f} deg; nothing fell to any side.",
+                                                  azimuth_words(*want.azimuth), tolerance / unit::deg)
+                                    : fmt::format("Asked: {} +- {:.0f} deg; found: {}.", azimuth_words(*want.azimuth),
+                                                  tolerance / unit::deg, azimuth_words(m.azimuth)),
+              off, "rad");
+  }
+  if (want.debris_reach)
+    judge_one("debris_reach", "Reach of the debris", reach.largest <= *want.debris_reach,
+              fmt::format("Asked: at most {:.1f} m; found: {:.1f} m.", *want.debris_reach, reach.largest),
+              reach.largest, "m");
+  if (want.stands_between_stages)
+    judge_one("stands_between_stages", "Standing between stages", stood == *want.stands_between_stages,
+              fmt::format("Asked: {}; found: {}.", *want.stands_between_stages ? "stands" : "falls",
+                          stood ? "stands" : "falls"),
+              kNone, "");
+}
+
+void add_verification(const Context& c) {
+  const mbs::Summary& s = c.summary;
+  c.add("verification.energy", "Verification", "Energy balance",
+        fmt::format("The largest error of the energy balance is {:.2g} % of the released potential energy (accepted: "
+                    "{:.2g} %).",
+                    100 * s.energy_error, 100 * c.k.verification_energy_error),
+        s.energy_error, "1", s.energy_error <= c.k.verification_energy_error ? Status::Good : Status::Bad);
+  const double reaction = c.recorder.start_reaction_error();
+  // charges that fire at the very beginning are already at work in the first frame
+  const bool early = !c.map.events.empty() && c.model.events.front().time <= 0;
+  c.add(
+      "verification.equilibrium", "Verification", "Equilibrium under dead load",
+      fmt::format("Largest unbalanced force over the weight {:.1e} after {} iterations; reactions of the ground differ "
+                  "from the weight by {:.1e} of it{}.",
+                  s.equilibrium_residual, s.equilibrium_iterations, reaction,
+                  early ? " (the first charges fire in this instant)" : ""),
+      early ? s.equilibrium_residual : reaction, "1",
+      std::max(s.equilibrium_residual, early ? 0.0 : reaction) <= c.k.verification_equilibrium_residual ? Status::Good
+                                                                                                        : Status::Bad);
+  c.add("verification.step", "Verification", "Time step",
+        fmt::format("{:.3g} ms, {} steps, fastest mode {:.0f} rad/s; joints drift by at most {:.1e}.", s.step * 1e3,
+                    s.steps, s.highest_frequency, s.joint_drift),
+        s.step, "s");
+}
+
+}  // namespace
+
+void add_findings(const product::Plan& plan, const mbs::Model& model, const ModelMap& map, const Knowledge& k,
+                  const Recorder& recorder, const mbs::Summary& summary, record::Record& r) {
+  r.not_modelled = {"fragments thrown by the charges",
+                    "air overpressure",
+                    "dust",
+                    "ground vibration (a screening needs the site's coefficients)",
+                    "wind, and people's behaviour; no distance given here is a safe distance",
+                    "cracking of slabs within a bay, of walls within a panel and of members between their end zones",
+                    "infill and finishes beyond their weight"};
+  const Context c{plan, model, map, k, recorder, summary, r};
+  if (r.time.empty()) {
+    c.add("mechanism", "Mechanism", "No result", r.ending_text, kNone, "", Status::Bad);
+    return;
+  }
+  const Mechanism m = judge(c);
+  add_mechanism(c, m);
+  add_rigid_block(c);
+  const bool stood = add_stability(c);
+  const Reach reach = add_debris(c, m);
+  add_clearances(c);
+  add_touchdown(c);
+  add_events(c);
+  if (r.ending == "at_rest" || r.ending == "time_limit") add_criteria(c, m, stood, reach);
+  std::string list;
+  for (const std::string& s : r.not_modelled) list += (list.empty() ? "" : "; ") + s;
+  c.add("not_modelled", "Not modelled", "Not modelled", list + ".", kNone, "");
+  add_verification(c);
+}
+
+}  // namespace topple::collapse

@@ -1,0 +1,94 @@
+#include "collapse/mechanism.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/unit.h"
+
+namespace topple::collapse {
+
+double calc_tilt(const Quat& q, const Vec3& fall_direction) {
+  const Vec3 axis = cross({0, 0, 1}, fall_direction);
+  // twist of the rotation about the axis
+  return 2 * std::atan2(q.x * axis.x + q.y * axis.y + q.z * axis.z, q.w);
+}
+
+Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
+  constexpr double pi = 3.14159265358979323846;
+  Mechanism out;
+  const BlockFrame& last = in.frames.back();
+  const bool touched = std::isfinite(in.touchdown);
+  const BlockFrame* at = &last;
+  if (touched) {
+    for (const BlockFrame& f : in.frames)
+      if (f.time >= in.touchdown) {
+        at = &f;
+        break;
+      }
+  }
+  out.time = touched ? in.touchdown : last.time;
+  out.moved = last.moved;
+  const Vec3 run = last.centre - in.frames.front().centre;
+  out.azimuth = std::hypot(run.x, run.y) < 0.5 ? std::numeric_limits<double>::quiet_NaN() : std::atan2(run.y, run.x);
+
+  // the way it leans when it touches down: the planned one, unless it turned more about another axis
+  const Vec3 turned = log_rotation(at->rotation);
+  Vec3 direction = in.fall_direction;
+  const Vec3 lean = cross({turned.x, turned.y, 0}, {0, 0, 1});
+  if (norm(lean) > 1e-3) direction = (1 / norm(lean)) * lean;
+  out.tilt = norm(Vec3{turned.x, turned.y, 0});
+  const Mat3 R = to_matrix(at->rotation);
+  const auto drop_of = [&](const Vec3& arm) { return -(at->displacement + R * arm - arm).z; };
+  const double along = std::abs(dot(direction, in.fall_direction)) > 0.5 ? dot(direction, in.fall_direction) : 1;
+  const double front_reach = along > 0 ? in.front : in.rear, rear_reach = along > 0 ? in.rear : in.front;
+  const double front = drop_of(front_reach * direction), rear = drop_of(-rear_reach * direction);
+  out.drop = -at->displacement.z;
+  out.rear_share = front > 1e-3 ? std::max(0.0, rear) / front : 1;
+  double off = std::atan2(direction.y, direction.x) - std::atan2(in.fall_direction.y, in.fall_direction.x);
+  off = std::remainder(off, 2 * pi);
+
+  const std::string when = touched ? fmt::format("at first touchdown of the upper block ({:.2f} s)", out.time)
+                                   : fmt::format("at the end ({:.2f} s)", out.time);
+  const std::string motion = fmt::format(
+      "{} it had turned by {:.1f} deg, its mass centre had come down by {:.2f} m, its rear edge by {:.0f} % "
+      "of its front edge; {:.0f} % of the mass came down",
+      when, out.tilt / unit::deg, out.drop, 100 * out.rear_share, 100 * out.moved);
+  const double height_left = in.frames.front().height > 0 ? last.height / in.frames.front().height : 1;
+  const double final_tilt = norm(log_rotation(last.rotation));
+  if (out.moved < k.mechanism_stands_share) {
+    out.name = "stands";
+    out.text = fmt::format("The building stands: {:.1f} % of its mass came down.", 100 * out.moved);
+  } else if (out.moved < k.mechanism_partial_share) {
+    out.name = "partial";
+    out.text = fmt::format("Partial collapse: {}.", motion);
+  } else if (in.came_to_rest && final_tilt < k.mechanism_aborted_rotation && height_left > 0.5) {
+    out.name = "partial";
+    out.text = fmt::format("Aborted collapse: at rest, leaning by {:.1f} deg with {:.0f} % of its height left; {}.",
+                           final_tilt / unit::deg, 100 * height_left, motion);
+  } else if (at->forward >= k.mechanism_fold_share && at->backward >= k.mechanism_fold_share) {
+    out.name = "fold";
+    out.text = fmt::format("It folds: {:.0f} % of the upper mass turns forward, {:.0f} % backward; {}.",
+                           100 * at->forward, 100 * at->backward, motion);
+  } else if (at->connected < k.mechanism_coherent_share) {
+    out.name = "progressive";
+    out.text = fmt::format("Progressive collapse: the largest connected part held {:.0f} % of the upper mass; {}.",
+                           100 * at->connected, motion);
+  } else if (out.rear_share >= k.mechanism_topple_rear_share) {
+    out.name = "vertical";
+    out.text = fmt::format("It comes down vertically (telescoping): {}.", motion);
+  } else if (std::abs(off) > (in.direction_tolerance > 0 ? in.direction_tolerance : k.mechanism_direction_tolerance) &&
+             in.is_direction_planned) {
+    out.name = "wrong direction";
+    out.text = fmt::format("It topples in the wrong direction, {:.0f} deg off the plan: {}.", off / unit::deg, motion);
+  } else {
+    out.name = "topple";
+    out.text = fmt::format("It topples: {}.", motion);
+  }
+  if (out.name != "stands" && !in.came_to_rest) out.text += " Parts were still moving when the run ended.";
+  return out;
+}
+
+}  // namespace topple::collapse

@@ -1,0 +1,54 @@
+#pragma once
+/// How it came down: classes of collapse from the motion of the upper block (docs/theory/manager.md, section 6).
+
+#include <string>
+#include <vector>
+
+#include "base/linalg.h"
+#include "collapse/knowledge.h"
+
+namespace topple::collapse {
+
+/// Motion of the upper block at one frame. The block is the largest group of upper bodies that are still connected.
+struct BlockFrame {
+  double time = 0;       // [s]
+  Quat rotation;         // mass-weighted mean rotation of the block since the start
+  Vec3 displacement;     // of the block's mass centre since the start [m]
+  double connected = 1;  // mass of the block over the mass of all upper bodies
+  double moved = 0;      // share of all moving mass that has come down
+  double forward = 0;    // share of the upper mass that turned by more than mechanism.fold_rotation about the axis
+  double backward = 0;   // the same against it
+  double height = 0;     // of the mass centre of all moving mass [m]
+  Vec3 centre;           // that mass centre [m]
+  double fastest = 0;    // largest speed of an upper body [m/s]
+};
+
+struct MechanismInput {
+  std::vector<BlockFrame> frames;
+  double touchdown = 0;           // first touchdown of an upper body; NaN if there was none [s]
+  Vec3 fall_direction{-1, 0, 0};  // planned, or expected
+  bool is_direction_planned = false;
+  double direction_tolerance = 0;  // [rad]
+  double front = 0, rear = 0;      // reach of the upper block from its mass centre along and against the direction [m]
+  double storey_height = 0;        // of the ground storey [m]
+  bool came_to_rest = false;
+};
+
+struct Mechanism {
+  std::string name;       // "topple", "fold", "vertical", "progressive", "partial", "wrong direction", "stands"
+  std::string text;       // a sentence with its numbers
+  double time = 0;        // of judgement: first touchdown of the upper block, else the end [s]
+  double tilt = 0;        // then, towards the direction [rad]
+  double rear_share = 0;  // then, drop of the rear edge over that of the front edge
+  double drop = 0;        // then, of the block's mass centre [m]
+  double moved = 0;       // at the end, share of the moving mass
+  double azimuth = 0;     // in which the mass centre moved, NaN below half a metre [rad]
+};
+
+/// Rotation about the axis that leans by a positive angle towards the direction [rad].
+double calc_tilt(const Quat& rotation, const Vec3& fall_direction);
+
+/// Judges frames; there is at least one.
+Mechanism judge_mechanism(const MechanismInput&, const Knowledge&);
+
+}  // namespace topple::collapse

@@ -1,0 +1,407 @@
+#include "collapse/recorder.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <set>
+
+#include "base/unit.h"
+
+namespace topple::collapse {
+
+namespace {
+
+constexpr size_t kMostContacts = 300;  // events of parts hitting each other kept in a record
+constexpr double kLeastSpeed = 0.5;    // of a contact that is worth an event [m/s]
+
+enum SeriesIndex {
+  kTilt,
+  kGroundForce,
+  kHeight,
+  kKinetic,
+  kGravity,
+  kElastic,
+  kContact,
+  kPlastic,
+  kDamping,
+  kFriction,
+  kContactLoss,
+  kRemoved,
+  kResidual,
+  kBroken,
+  kConnected
+};
+
+int find_root(std::vector<int>& parent, int i) {
+  while (parent[static_cast<size_t>(i)] != i) {
+    parent[static_cast<size_t>(i)] = parent[static_cast<size_t>(parent[static_cast<size_t>(i)])];
+    i = parent[static_cast<size_t>(i)];
+  }
+  return i;
+}
+
+}  // namespace
+
+Recorder::Recorder(const mbs::Model& model, const ModelMap& map, const Knowledge& k, record::Record& record,
+                   const RunCallbacks& callbacks)
+    : model_(model), map_(map), k_(k), record_(record), callbacks_(callbacks) {
+  for (size_t b = 0; b < model.bodies.size(); ++b) {
+    record::BodyInfo info;
+    info.name = map.bodies[b].name;
+    info.kind = map.bodies[b].kind;
+    info.storey = map.bodies[b].storey;
+    info.mass = model.bodies[b].mass;
+    info.fixed = model.bodies[b].fixed;
+    info.shapes = map.bodies[b].shapes;
+    record.bodies.push_back(std::move(info));
+  }
+  for (size_t d = 0; d < map.debris.size(); ++d) {
+    record::BodyInfo info;
+    int piece = 1;
+    for (size_t e = 0; e < d; ++e) piece += map.debris[e].member == map.debris[d].member;
+    info.name = map.debris[d].member + "/debris" + (piece > 1 ? std::to_string(piece) : "");
+    info.kind = "debris";
+    info.storey = map.debris[d].storey;
+    info.mass = map.debris[d].mass;
+    info.shapes.push_back({{}, map.debris[d].half, "concrete"});
+    record.bodies.push_back(std::move(info));
+  }
+  for (const auto* list : {&map.elements, &map.rotationals})
+    for (const ZoneEntry& z : *list) record.zones.push_back({z.name, z.member, z.subsystem, z.body_a, z.body_b, z.p_W});
+  for (size_t j = 0; j < model.joints.size(); ++j) {
+    if (model.joints[j].kind != mbs::Joint::Kind::Fixed) continue;
+    fixed_joints_.push_back(static_cast<int>(j));
+    const ZoneEntry& z = map.joints[j];
+    record.zones.push_back({z.name, z.member, z.subsystem, z.body_a, z.body_b, z.p_W});
+  }
+  record.series = {{"tilt_angle", "Tilt angle", "rad", "angle", {}},
+                   {"ground_force", "Ground force", "N", "force", {}},
+                   {"mass_centre_height", "Height of the mass centre", "m", "height", {}},
+                   {"energy_kinetic", "Kinetic", "J", "energy", {}},
+                   {"energy_gravity", "Potential", "J", "energy", {}},
+                   {"energy_elastic", "Elastic", "J", "energy", {}},
+                   {"energy_contact", "Stored in contacts", "J", "energy", {}},
+                   {"energy_plastic", "Dissipated in zones", "J", "energy", {}},
+                   {"energy_damping", "Dissipated by damping", "J", "energy", {}},
+                   {"energy_friction", "Dissipated by friction", "J", "energy", {}},
+                   {"energy_contact_loss", "Dissipated by impact", "J", "energy", {}},
+                   {"energy_removed", "Taken away with debris", "J", "energy", {}},
+                   {"energy_residual", "Error of the balance", "J", "energy", {}},
+                   {"broken_zones", "Broken zones", "1", "count", {}},
+                   {"connected_share", "Connected share of the upper block", "1", "share", {}}};
+}
+
+const ZoneEntry& Recorder::entry_of(int element) const {
+  const size_t i = static_cast<size_t>(element);
+  return i < map_.elements.size() ? map_.elements[i] : map_.rotationals[i - map_.elements.size()];
+}
+
+BlockFrame Recorder::calc_block(const mbs::View& v) const {
+  BlockFrame out;
+  out.time = v.time;
+  const size_t B = model_.bodies.size();
+  std::vector<int> parent(B);
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto is_upper = [&](int b) { return b >= 0 && map_.bodies[static_cast<size_t>(b)].is_upper; };
+  const auto link = [&](mbs::BodyId a, mbs::BodyId b) {
+    if (is_upper(a.index) && is_upper(b.index))
+      parent[static_cast<size_t>(find_root(parent, a.index))] = find_root(parent, b.index);
+  };
+  for (size_t e = 0; e < model_.elements.size(); ++e)
+    if (v.element_state[e] < mbs::ElementState::Broken) link(model_.elements[e].a, model_.elements[e].b);
+  for (size_t j = 0; j < model_.joints.size(); ++j)
+    if (!v.joint_released[j]) link(model_.joints[j].parent, model_.joints[j].child);
+  std::vector<double> group(B, 0);
+  double upper = 0, moving = 0, moved = 0, forward = 0, backward = 0;
+  const double far =
+      k_.mechanism_moved_displacement * (map_.ground_storey_height > 0 ? map_.ground_storey_height : 1.0);
+  for (size_t b = 0; b < B; ++b) {
+    if (model_.bodies[b].fixed) continue;
+    const double m = v.mass[b];
+    moving += m;
+    out.centre += m * v.X_WB[b].p;
+    if (norm(v.X_WB[b].p - start_[b].p) > far) moved += m;
+    if (!map_.bodies[b].is_upper) continue;
+    upper += m;
+    group[static_cast<size_t>(find_root(parent, static_cast<int>(b)))] += m;
+    const double turn = calc_tilt(v.X_WB[b].q * conjugate(start_[b].q), map_.fall_direction);
+    if (turn > k_.mechanism_fold_rotation) forward += m;
+    if (turn < -k_.mechanism_fold_rotation) backward += m;
+    out.fastest = std::max(out.fastest, norm(v.v_WB[b]));
+  }
+  if (moving > 0) {
+    out.centre *= 1 / moving;
+    out.height = out.centre.z;
+    out.moved = moved / moving;
+  }
+  if (!(upper > 0)) return out;
+  out.forward = forward / upper;
+  out.backward = backward / upper;
+  const int largest = static_cast<int>(std::max_element(group.begin(), group.end()) - group.begin());
+  out.connected = group[static_cast<size_t>(largest)] / upper;
+  // mean of unit quaternions of one hemisphere, exact to second order in their spread
+  Quat sum{0, 0, 0, 0}, reference{1, 0, 0, 0};
+  double heaviest = -1;
+  for (size_t b = 0; b < B; ++b)
+    if (is_upper(static_cast<int>(b)) && find_root(parent, static_cast<int>(b)) == largest && v.mass[b] > heaviest) {
+      heaviest = v.mass[b];
+      reference = v.X_WB[b].q * conjugate(start_[b].q);
+    }
+  Vec3 shift;
+  for (size_t b = 0; b < B; ++b) {
+    if (!is_upper(static_cast<int>(b)) || find_root(parent, static_cast<int>(b)) != largest) continue;
+    const Quat q = v.X_WB[b].q * conjugate(start_[b].q);
+    const double side = q.w * reference.w + q.x * reference.x + q.y * reference.y + q.z * reference.z;
+    const double w = side < 0 ? -v.mass[b] : v.mass[b];
+    sum = {sum.w + w * q.w, sum.x + w * q.x, sum.y + w * q.y, sum.z + w * q.z};
+    shift += v.mass[b] * (v.X_WB[b].p - start_[b].p);
+  }
+  out.rotation = normalized(sum);
+  out.displacement = (1 / group[static_cast<size_t>(largest)]) * shift;
+  return out;
+}
+
+void Recorder::add_frame(const mbs::View& v) {
+  // an engine may show the last state twice
+  if (!record_.time.empty() && v.time <= record_.time.back()) return;
+  const size_t B = model_.bodies.size();
+  if (start_.empty()) {
+    start_ = v.X_WB;
+    double weight = 0;
+    for (size_t b = 0; b < B; ++b)
+      if (!model_.bodies[b].fixed) weight += model_.bodies[b].mass * norm(model_.gravity);
+    reaction_error_ = weight > 0 ? std::abs(norm(v.ground_force) - weight) / weight : 0;
+  }
+  record_.time.push_back(v.time);
+  const auto put = [this](const Pose& X) {
+    for (double c : {X.p.x, X.p.y, X.p.z}) record_.position.push_back(static_cast<float>(c));
+    for (double c : {X.q.w, X.q.x, X.q.y, X.q.z}) record_.orientation.push_back(static_cast<float>(c));
+  };
+  for (size_t b = 0; b < B; ++b) put(v.X_WB[b]);
+  for (const DebrisEntry& d : map_.debris) {
+    // falls freely onto the ground
+    const double t = std::max(0.0, v.time - d.time);
+    Vec3 p = d.centre;
+    p.z = std::max(std::min(p.z, d.half.z), p.z - 0.5 * norm(model_.gravity) * t * t);
+    put({p, {}});
+  }
+
+  ZoneFrame zf;
+  zf.time = v.time;
+  const size_t E = model_.elements.size(), n = E + model_.rotational_elements.size();
+  for (size_t i = 0; i < n; ++i) {
+    const bool fired = entry_of(static_cast<int>(i)).firing_time <= v.time;
+    record::ZoneState state = record::ZoneState::Elastic;
+    switch (v.element_state[i]) {
+      case mbs::ElementState::Elastic:
+        state = record::ZoneState::Elastic;
+        break;
+      case mbs::ElementState::Yielded:
+        state = record::ZoneState::Yielded;
+        break;
+      case mbs::ElementState::Softening:
+        state = record::ZoneState::Softening;
+        break;
+      case mbs::ElementState::Broken:
+        state = record::ZoneState::Broken;
+        break;
+      case mbs::ElementState::Removed:
+        state = record::ZoneState::Fired;
+        break;
+    }
+    if (fired) state = record::ZoneState::Fired;
+    record_.zone_state.push_back(static_cast<std::uint8_t>(state));
+    record_.zone_utilisation.push_back(static_cast<float>(v.utilisation[i]));
+    zf.broken += state == record::ZoneState::Broken;
+    zf.yielded += state == record::ZoneState::Yielded || state == record::ZoneState::Softening;
+    if (state < record::ZoneState::Broken && v.utilisation[i] > zf.utilisation) {
+      zf.utilisation = v.utilisation[i];
+      zf.zone = static_cast<int>(i);
+    }
+  }
+  for (size_t f = 0; f < fixed_joints_.size(); ++f) {
+    const size_t j = static_cast<size_t>(fixed_joints_[f]);
+    const mbs::Joint& joint = model_.joints[j];
+    const Vec3 r = v.joint_force[j];
+    const double u = v.joint_released[j]
+                         ? 0
+                         : std::max({-r.x / joint.tension_limit, std::hypot(r.y, r.z) / joint.shear_limit,
+                                     norm(v.joint_moment[j]) / joint.moment_limit, 0.0});
+    record_.zone_state.push_back(
+        static_cast<std::uint8_t>(v.joint_released[j] ? record::ZoneState::Broken : record::ZoneState::Elastic));
+    record_.zone_utilisation.push_back(static_cast<float>(u));
+    zf.broken += v.joint_released[j];
+    if (u > zf.utilisation) {
+      zf.utilisation = u;
+      zf.zone = static_cast<int>(n + f);
+    }
+  }
+  zone_frames_.push_back(zf);
+  shortening_ = v.shortening;
+  rotation_ = v.rotation;
+
+  const BlockFrame block = calc_block(v);
+  block_.push_back(block);
+  const mbs::Energy& e = v.energy;
+  const double values[] = {calc_tilt(block.rotation, map_.fall_direction),
+                           dot(v.ground_force, model_.contact.normal),
+                           block.height,
+                           e.kinetic,
+                           e.gravity,
+                           e.elastic,
+                           e.contact,
+                           e.plastic,
+                           e.damping,
+                           e.friction,
+                           e.contact_loss,
+                           e.removed,
+                           e.residual,
+                           static_cast<double>(zf.broken),
+                           block.connected};
+  for (size_t i = 0; i < std::size(values); ++i) series(i).value.push_back(values[i]);
+  if (values[kGroundForce] > largest_ground_force_) {
+    largest_ground_force_ = values[kGroundForce];
+    largest_ground_force_time_ = v.time;
+  }
+}
+
+double Recorder::kinetic_at(double time) const {
+  const auto it = std::lower_bound(record_.time.begin(), record_.time.end(), time);
+  const size_t i = std::min(static_cast<size_t>(it - record_.time.begin()), record_.time.size() - 1);
+  return record_.series[kKinetic].value[i];
+}
+
+void Recorder::add_event(record::Event event) {
+  if (callbacks_.on_event) callbacks_.on_event(event);
+  record_.events.push_back(std::move(event));
+}
+
+void Recorder::add_happening(const mbs::Happening& h) {
+  using Kind = mbs::Happening::Kind;
+  const auto body = [&](int b) { return b < 0 ? std::string("the ground") : map_.bodies[static_cast<size_t>(b)].name; };
+  switch (h.kind) {
+    case Kind::EventFired: {
+      const mbs::Event& event = model_.events[static_cast<size_t>(h.index)];
+      if (map_.events.empty()) {
+        add_event({h.time, "charge", event.name, fmt::format("{} at {:.3f} s", event.name, h.time)});
+        break;
+      }
+      const EventEntry& entry = map_.events[static_cast<size_t>(h.index)];
+      if (entry.stage > stage_shown_) {
+        stage_shown_ = entry.stage;
+        add_event({h.time, "stage", map_.stages[static_cast<size_t>(entry.stage)],
+                   map_.stages[static_cast<size_t>(entry.stage)]});
+      }
+      add_event({h.time, "charge", entry.member,
+                 fmt::format("{} fired {:.3f} s, {:.1f} t of concrete thrown out", entry.member, h.time,
+                             entry.debris_mass / unit::t)});
+      break;
+    }
+    case Kind::ElementYielded: {
+      const ZoneEntry& z = entry_of(h.index);
+      if (z.firing_time <= h.time) break;  // the charge did that
+      add_event({h.time, "yield", z.name, fmt::format("zone {} yields", z.name)});
+      break;
+    }
+    case Kind::ElementSoftening: {
+      const ZoneEntry& z = entry_of(h.index);
+      if (z.firing_time <= h.time) break;
+      add_event({h.time, "yield", z.name, fmt::format("zone {} softens", z.name)});
+      break;
+    }
+    case Kind::ElementBroken: {
+      const ZoneEntry& z = entry_of(h.index);
+      if (h.reason == "removed") break;
+      const size_t i = static_cast<size_t>(h.index);
+      std::string how = "breaks";
+      if (h.reason == "tension") how = "is torn apart";
+      if (h.reason == "shear") how = "is sheared off";
+      if (h.reason == "torsion") how = "is twisted off";
+      // lengths are those of the law that rules, which the zone has just reached
+      const bool has_law = i < model_.elements.size() && !model_.elements[i].stations.empty();
+      if (h.reason == "crushing") {
+        how = "is crushed";
+        if (has_law && z.firing_time > h.time) {
+          const double u = model_.laws[static_cast<size_t>(model_.elements[i].stations.front().law.index)].crush_length;
+          if (std::isfinite(u)) how = fmt::format("is crushed (shortening {:.2f} m)", u);
+        }
+      }
+      if (h.reason == "rotation") how = "breaks by rotation";
+      add_event({h.time, "rupture", z.name, fmt::format("zone {} {}", z.name, how)});
+      break;
+    }
+    case Kind::JointReleased: {
+      const ZoneEntry& z = map_.joints[static_cast<size_t>(h.index)];
+      add_event({h.time, "release", z.name, fmt::format("joint {} comes off ({})", z.name, h.reason)});
+      break;
+    }
+    case Kind::CableBroken: {
+      const std::string name = model_.cables[static_cast<size_t>(h.index)].name;
+      add_event({h.time, "cable", name, fmt::format("cable {} breaks", name)});
+      break;
+    }
+    case Kind::GroundContact: {
+      const bool upper = map_.bodies[static_cast<size_t>(h.index)].is_upper;
+      if (upper && !std::isfinite(touchdown_)) {
+        touchdown_ = h.time;
+        touchdown_body_ = body(h.index);
+      }
+      add_event({h.time, "touchdown", body(h.index),
+                 fmt::format("{} touches the ground at {:.1f} m/s", body(h.index), h.speed)});
+      break;
+    }
+    case Kind::BodyContact:
+      if (h.speed < kLeastSpeed || ++contacts_ > kMostContacts) break;
+      add_event({h.time, "contact", body(h.index),
+                 fmt::format("{} hits {} at {:.1f} m/s", body(h.index), body(h.other), h.speed)});
+      break;
+  }
+}
+
+void Recorder::finish() {
+  std::stable_sort(record_.events.begin(), record_.events.end(),
+                   [](const record::Event& a, const record::Event& b) { return a.time < b.time; });
+}
+
+ModelMap describe_model(const mbs::Model& model) {
+  ModelMap map;
+  std::set<std::string> names;
+  const auto unique_name = [&names](const std::string& given, const char* kind, size_t i) {
+    std::string name = given.empty() ? std::string(kind) + "-" + std::to_string(i) : given;
+    if (!names.insert(name).second) names.insert(name += "#" + std::to_string(i));
+    return name;
+  };
+  for (size_t b = 0; b < model.bodies.size(); ++b) {
+    const mbs::Body& body = model.bodies[b];
+    BodyEntry entry;
+    entry.name = unique_name(body.name, "body", b);
+    entry.kind = "body";
+    entry.is_upper = !body.fixed;
+    for (const mbs::Shape& s : body.shapes) {
+      const double r = s.radius;
+      entry.shapes.push_back({s.X_BS, s.kind == mbs::Shape::Kind::Box ? s.half : Vec3{r, r, r}, "concrete"});
+    }
+    map.mass += body.mass;
+    if (!body.fixed) map.moving_mass += body.mass;
+    map.bodies.push_back(std::move(entry));
+  }
+  const auto place = [&](mbs::BodyId id, const Pose& X) {
+    return id == mbs::kGround ? X.p : model.bodies[static_cast<size_t>(id.index)].X_WB * X.p;
+  };
+  for (const mbs::ZoneElement& e : model.elements)
+    map.elements.push_back({e.name, "", "six-component element", e.a.index, e.b.index, place(e.a, e.X_AF)});
+  for (const mbs::Joint& j : model.joints)
+    map.joints.push_back({j.name, "", j.kind == mbs::Joint::Kind::Fixed ? "rigid joint" : "revolute joint",
+                          j.parent.index, j.child.index, place(j.parent, j.X_PF)});
+  for (const mbs::RotationalElement& r : model.rotational_elements) {
+    ZoneEntry z = map.joints[static_cast<size_t>(r.joint.index)];
+    z.name = r.name;
+    z.subsystem = "revolute joint + rotational element";
+    map.rotationals.push_back(z);
+  }
+  return map;
+}
+
+}  // namespace topple::collapse

@@ -1,0 +1,67 @@
+#pragma once
+/// Turns an engine's frames and happenings into a record.
+
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "collapse/manager.h"
+#include "collapse/mechanism.h"
+#include "collapse/run.h"
+
+namespace topple::collapse {
+
+/// State of the zones at one frame, for the margins.
+struct ZoneFrame {
+  double time = 0;
+  double utilisation = 0;  // largest of the zones that no charge has acted on and that are not broken
+  int zone = -1;           // index into Record::zones
+  int yielded = 0, broken = 0;
+};
+
+class Recorder {
+ public:
+  /// `map` must belong to the model; for a bare model see describe_model.
+  Recorder(const mbs::Model&, const ModelMap&, const Knowledge&, record::Record&, const RunCallbacks&);
+
+  void add_frame(const mbs::View&);
+  void add_happening(const mbs::Happening&);
+  void add_event(record::Event);
+  /// Series and events are complete after this.
+  void finish();
+
+  const std::vector<BlockFrame>& block_frames() const { return block_; }
+  const std::vector<ZoneFrame>& zone_frames() const { return zone_frames_; }
+  double first_touchdown() const { return touchdown_; }  // of an upper body; NaN if none [s]
+  std::string first_touchdown_body() const { return touchdown_body_; }
+  double start_reaction_error() const { return reaction_error_; }  // |reaction - weight| / weight at the first frame
+  double largest_ground_force() const { return largest_ground_force_; }
+  double largest_ground_force_time() const { return largest_ground_force_time_; }
+  double kinetic_at(double time) const;
+
+ private:
+  record::Series& series(size_t i) { return record_.series[i]; }
+  BlockFrame calc_block(const mbs::View&) const;
+  const ZoneEntry& entry_of(int element) const;
+
+  const mbs::Model& model_;
+  const ModelMap& map_;
+  const Knowledge& k_;
+  record::Record& record_;
+  const RunCallbacks& callbacks_;
+  std::vector<Pose> start_;
+  std::vector<BlockFrame> block_;
+  std::vector<ZoneFrame> zone_frames_;
+  std::vector<double> shortening_, rotation_;
+  std::vector<int> fixed_joints_;
+  int stage_shown_ = -1;
+  double touchdown_ = std::numeric_limits<double>::quiet_NaN();
+  std::string touchdown_body_;
+  double reaction_error_ = 0, largest_ground_force_ = 0, largest_ground_force_time_ = 0;
+  size_t contacts_ = 0;
+};
+
+/// Entries for a model that comes from a file.
+ModelMap describe_model(const mbs::Model&);
+
+}  // namespace topple::collapse

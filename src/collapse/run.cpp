@@ -1,0 +1,217 @@
+#include "collapse/run.h"
+
+#include <fmt/format.h>
+#include <sys/utsname.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+
+#include "base/hash.h"
+#include "base/unit.h"
+#include "collapse/debris.h"
+#include "collapse/findings.h"
+#include "collapse/recorder.h"
+#include "engines/engine.h"
+
+namespace topple::collapse {
+
+namespace {
+
+std::string now_utc() {
+  const std::time_t now = std::time(nullptr);
+  std::tm utc{};
+  gmtime_r(&now, &utc);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
+  return text;
+}
+
+std::string machine_words() {
+  utsname u{};
+  return uname(&u) == 0 ? fmt::format("{} {}", u.sysname, u.machine) : "unknown";
+}
+
+void fill_ending(const mbs::Summary& s, record::Record& record) {
+  using Ending = mbs::Summary::Ending;
+  switch (s.ending) {
+    case Ending::AtRest:
+      record.ending = "at_rest";
+      record.ending_text = fmt::format("Everything came to rest at {:.2f} s.", s.time);
+      break;
+    case Ending::TimeLimit:
+      record.ending = "time_limit";
+      record.ending_text = fmt::format("Stopped by the time limit of {:.2f} s.", s.time);
+      break;
+    case Ending::Cancelled:
+      record.ending = "cancelled";
+      record.ending_text = fmt::format("Cancelled at {:.2f} s.", s.time);
+      break;
+    case Ending::NoEquilibrium:
+      record.ending = "failed";
+      record.ending_text = "There is no equilibrium under dead load before the first charge: " + s.message + ".";
+      break;
+    case Ending::Diverged:
+      record.ending = "failed";
+      record.ending_text = fmt::format("The computation failed at {:.3f} s: {}.", s.time, s.message);
+      break;
+  }
+}
+
+void fill_plan_values(const product::Plan& plan, const ModelMap& map, record::Record& r) {
+  const auto add = [&r](const char* group, const std::string& key, const std::string& value) {
+    r.plan_values.push_back({group, key, value});
+  };
+  const auto joined = [](const std::vector<std::string>& names, const std::vector<double>& at) {
+    std::string out;
+    for (size_t i = 0; i < names.size(); ++i) out += fmt::format("{}{} at {:g} m", i ? ", " : "", names[i], at[i]);
+    return out;
+  };
+  add("Building", "Rows", joined(plan.row_names, plan.row_offsets));
+  add("Building", "Frames", joined(plan.frame_names, plan.frame_offsets));
+  add("Building", "Storeys", std::to_string(plan.storey_heights.size()));
+  if (!plan.storey_heights.empty())
+    add("Building", "Height", fmt::format("{:.2f} m", plan.level(static_cast<int>(plan.storey_heights.size()) - 1)));
+  add("Building", "Mass", fmt::format("{:.0f} t", calc_standing_mass(plan) / unit::t));
+  for (const product::Concrete& c : plan.concretes)
+    add("Materials", "Concrete " + c.name,
+        fmt::format("fc {:.3g} N/mm2, fct {:.3g} N/mm2, Ec {:.5g} N/mm2", c.fc / unit::MPa, c.fct / unit::MPa,
+                    c.Ec / unit::MPa));
+  for (const product::Steel& s : plan.steels)
+    add("Materials", "Steel " + s.name,
+        fmt::format("fy {:.4g} N/mm2, fu {:.4g} N/mm2, rupture at {:.3g} %", s.fy / unit::MPa, s.fu / unit::MPa,
+                    100 * s.eps_u));
+  for (const product::Section& s : plan.sections)
+    add("Sections", s.name,
+        fmt::format("{:.3g} x {:.3g} cm, bars {:.3g} cm2, ties {:.3g} mm every {:.3g} cm", s.width / unit::cm,
+                    s.height / unit::cm, s.steel_area() / unit::cm2, s.tie_diameter / unit::mm,
+                    s.tie_spacing / unit::cm));
+  for (const product::Stage& s : plan.stages) {
+    std::string members;
+    for (const product::Charge& c : s.charges)
+      members += (members.empty() ? "" : ", ") + plan.members[static_cast<size_t>(c.member)].name +
+                 (c.fails ? " (fails)" : "");
+    add("Blasting", fmt::format("{} at {:g} s", s.name, s.time), members);
+  }
+  for (const product::Cable& c : plan.cables)
+    add("Blasting", "Cable " + c.name,
+        fmt::format("on {}, pretension {:.0f} kN", plan.members[static_cast<size_t>(c.member)].name,
+                    c.pretension / unit::kN));
+  add("Site", "Friction and restitution", fmt::format("{:g}, {:g}", plan.ground.friction, plan.ground.restitution));
+  add("Planned fall", "Azimuth",
+      map.is_direction_planned
+          ? fmt::format("{:.0f} deg", std::atan2(map.fall_direction.y, map.fall_direction.x) / unit::deg)
+          : "not given");
+}
+
+void fill_building(const product::Plan& plan, const mbs::Model& model, const ModelMap& map, record::Record& r) {
+  std::vector<Point2> corners;
+  for (size_t b = 0; b < model.bodies.size(); ++b)
+    for (const record::BoxShape& s : map.bodies[b].shapes)
+      for (const Point2& p : calc_outline({model.bodies[b].X_WB * s.X_BS, s.half})) corners.push_back(p);
+  r.building_outline = calc_hull(std::move(corners));
+  for (const product::Neighbour& n : plan.neighbours) r.neighbours.push_back({n.name, n.footprint, n.is_utility});
+}
+
+mbs::Options make_options(const RunOptions& in, double duration, double step, double frame_rate, const Knowledge& k,
+                          Recorder& recorder, const Progress& progress) {
+  mbs::Options o;
+  o.duration = in.duration > 0 ? in.duration : duration;
+  o.step = in.step > 0 ? in.step : step;
+  const double rate = in.frame_rate > 0 ? in.frame_rate : frame_rate;
+  o.frame_interval = 1 / (rate > 0 ? rate : 60);
+  o.rest_speed = k.rest_speed;
+  o.rest_time = k.rest_time;
+  o.threads = in.threads;
+  o.on_frame = [&recorder](const mbs::View& v) { recorder.add_frame(v); };
+  o.on_happening = [&recorder](const mbs::Happening& h) { recorder.add_happening(h); };
+  o.progress = progress;
+  return o;
+}
+
+void fill_provenance(const RunOptions& options, const engines::Engine& engine, record::Record& r) {
+  r.provenance.program_version = options.program_version;
+  r.provenance.engine = engine.name();
+  r.provenance.machine = machine_words();
+  r.provenance.created = now_utc();
+  r.provenance.threads = options.threads;
+}
+
+void finish(const mbs::Summary& summary, Recorder& recorder, record::Record& r) {
+  r.provenance.step = summary.step;
+  r.provenance.wall_time = summary.wall_time;
+  fill_ending(summary, r);
+  const bool failed = r.ending == "failed";
+  recorder.add_event({summary.time, failed ? "failure" : "rest", r.ending, r.ending_text});
+  recorder.finish();
+}
+
+}  // namespace
+
+record::Counts count(const mbs::Model& model) {
+  record::Counts c;
+  c.bodies = static_cast<int>(model.bodies.size());
+  for (const mbs::Joint& j : model.joints)
+    ++(j.kind == mbs::Joint::Kind::Revolute ? c.revolute_joints : c.rigid_joints);
+  c.force_elements = static_cast<int>(model.elements.size() + model.rotational_elements.size());
+  c.cables = static_cast<int>(model.cables.size());
+  for (const mbs::Body& b : model.bodies)
+    if (!b.fixed) c.mass += b.mass;
+  return c;
+}
+
+record::Record run_plan(const product::Plan& plan, const Knowledge& k, const RunOptions& options,
+                        const RunCallbacks& callbacks) {
+  const std::unique_ptr<engines::Engine> engine = engines::make_engine(options.engine);
+  ModelMap map;
+  const mbs::Model model = make_model(plan, k, map, options.threads);
+  record::Record r;
+  r.counts = count(model);
+  if (callbacks.on_model) callbacks.on_model(model, map, r.counts);
+  r.provenance.title = plan.title;
+  r.provenance.plan_path = plan.path;
+  r.provenance.plan_text = plan.text;
+  r.provenance.plan_sha256 = calc_sha256(plan.text);
+  r.provenance.seed = plan.analysis.seed;
+  fill_provenance(options, *engine, r);
+  fill_plan_values(plan, map, r);
+  fill_building(plan, model, map, r);
+
+  Recorder recorder(model, map, k, r, callbacks);
+  for (const Firing& f : map.schedule)
+    if (f.fails) {
+      const product::Charge& c = plan.stages[static_cast<size_t>(f.stage)].charges[static_cast<size_t>(f.charge)];
+      const std::string& name = plan.members[static_cast<size_t>(c.member)].name;
+      recorder.add_event({f.time, "charge", name, fmt::format("the charge of {} does not fire", name)});
+    }
+  const mbs::Summary summary =
+      engine->run(model, make_options(options, plan.analysis.duration, plan.analysis.step, plan.analysis.frame_rate, k,
+                                      recorder, callbacks.progress));
+  finish(summary, recorder, r);
+  add_findings(plan, model, map, k, recorder, summary, r);
+  return r;
+}
+
+record::Record run_model(const mbs::Model& model, const RunOptions& options, const RunCallbacks& callbacks) {
+  const std::unique_ptr<engines::Engine> engine = engines::make_engine(options.engine);
+  mbs::check_model(model);
+  const Knowledge& k = default_knowledge();
+  const ModelMap map = describe_model(model);
+  record::Record r;
+  r.counts = count(model);
+  if (callbacks.on_model) callbacks.on_model(model, map, r.counts);
+  r.provenance.title = model.name;
+  fill_provenance(options, *engine, r);
+  Recorder recorder(model, map, k, r, callbacks);
+  const mbs::Summary summary = engine->run(model, make_options(options, 10, 0, 60, k, recorder, callbacks.progress));
+  finish(summary, recorder, r);
+  return r;
+}
+
+bool violates_criteria(const record::Record& r) {
+  return std::any_of(r.findings.begin(), r.findings.end(), [](const record::Finding& f) {
+    return f.status == record::Status::Bad && (f.id.rfind("criterion.", 0) == 0 || f.id.rfind("clearance.", 0) == 0);
+  });
+}
+
+}  // namespace topple::collapse

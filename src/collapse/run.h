@@ -1,0 +1,43 @@
+#pragma once
+/// From a plan to a record: model, equilibrium, run, findings.
+
+#include <functional>
+#include <string>
+
+#include "base/progress.h"
+#include "collapse/knowledge.h"
+#include "collapse/manager.h"
+#include "mbs/solver.h"
+#include "product/plan.h"
+#include "record/record.h"
+
+namespace topple::collapse {
+
+struct RunOptions {
+  double duration = 0;    // 0: the plan's [s]
+  double step = 0;        // 0: the plan's, or chosen from the stiffest mode [s]
+  double frame_rate = 0;  // 0: the plan's [1/s]
+  int threads = 1;
+  std::string engine = "native";
+  std::string program_version;  // for the record
+};
+
+struct RunCallbacks {
+  std::function<void(const mbs::Model&, const ModelMap&, const record::Counts&)> on_model;  // before the equilibrium
+  std::function<void(const record::Event&)> on_event;                                       // as it happens
+  Progress progress;  // done and whole in simulated seconds
+};
+
+/// Runs a plan. Throws InputError for what cannot be built; everything else is in the record: `ending` is "at_rest",
+/// "time_limit", "cancelled" or "failed", and the findings say which criteria are violated.
+record::Record run_plan(const product::Plan&, const Knowledge&, const RunOptions&, const RunCallbacks&);
+
+/// Runs a bare multibody model: poses, energies and events, without findings about a building.
+record::Record run_model(const mbs::Model&, const RunOptions&, const RunCallbacks&);
+
+/// Whether a finding says that the plan's criteria or clearances are not met.
+bool violates_criteria(const record::Record&);
+
+record::Counts count(const mbs::Model&);
+
+}  // namespace topple::collapse
