@@ -301,7 +301,8 @@ void System::evaluate_body_contact(double h) {
         push(b, rb, -total);
         if (fixed[a]) ground_contact -= total;
         if (fixed[b]) ground_contact += total;
-        s.friction += ft * speed * h;
+        // the speed halfway through the kick of this force alone
+        s.friction += ft * std::max(0.0, speed - 0.5 * h * inverse_mass * ft) * h;
         stored += 0.5 * e2 * stiffness * depth * depth;
         touching = true;
         ++body_contacts;

@@ -112,8 +112,8 @@ class Assembly {
             d,
             cross(p_B - centre(c.b.index), d)};
   }
-  /// Stiffness (which = 0) or damping (1) of all live elements.
-  Sparse make_matrix(int which) const {
+  /// Stiffness of all live elements: at rest, or that of fast motion, which the springs behind the dampers add to.
+  Sparse make_stiffness(bool fast) const {
     Triplets t;
     t.reserve(144 * 6 * s_.elements.size());
     for (size_t i = 0; i < s_.elements.size(); ++i) {
@@ -121,14 +121,13 @@ class Assembly {
       const CompiledElement& e = s_.elements[i];
       KinematicRow rows[6];
       element_rows(e, rows);
-      for (int k = 0; k < 6; ++k) add_outer(rows[k], which == 0 ? e.zone.stiffness[k] : e.zone.damping[k], t);
+      for (int k = 0; k < 6; ++k) add_outer(rows[k], (fast ? 1 + e.zone.viscous : 1) * e.zone.stiffness[k], t);
     }
     for (const CompiledRotational& r : s_.rotationals)
       add_outer(rotational_row(s_.joints[static_cast<size_t>(r.joint)]),
-                which == 0 ? r.zone.stiffness[5] : r.zone.damping[5], t);
-    if (which == 0)
-      for (size_t i = 0; i < s_.model.cables.size(); ++i)
-        if (s_.state.cable[i].live) add_outer(cable_row(s_.model.cables[i]), s_.model.cables[i].stiffness, t);
+                (fast ? 1 + r.zone.viscous : 1) * r.zone.stiffness[5], t);
+    for (size_t i = 0; i < s_.model.cables.size(); ++i)
+      if (s_.state.cable[i].live) add_outer(cable_row(s_.model.cables[i]), s_.model.cables[i].stiffness, t);
     Sparse m(unknowns(), unknowns());
     m.setFromTriplets(t.begin(), t.end());
     return m;
@@ -174,9 +173,9 @@ void System::choose_step() {
     }
     return a;
   };
-  double elastic = 0, damping_ratio = 0;
+  double elastic = 0;
   if (n > 0) {
-    const Sparse K = assembly.make_matrix(0);
+    const Sparse K = assembly.make_stiffness(true);
     Vector x(n);
     // a start that no mode is orthogonal to by symmetry
     std::uint64_t seed = 88172645463325252ULL;
@@ -197,20 +196,17 @@ void System::choose_step() {
       if (round > 20 && std::abs(omega2 - before) < 1e-6 * omega2) break;
       before = omega2;
     }
-    if (elastic > 0) {
-      const Sparse C = assembly.make_matrix(1);
-      const double xCx = x.dot(C * x), xKx = x.dot(K * x);
-      damping_ratio = xKx > 0 ? 0.5 * elastic * xCx / xKx : 0;
-    }
   }
   highest_frequency = 1.01 * elastic;  // the iteration stops a little below
   const bool contact = model.contact.ground || model.contact.bodies;
   // a corner of a compact box is about seven times lighter than its body
   const double touching = contact ? std::sqrt(7.0) * model.contact.contact_frequency : 0;
   const double fastest = std::sqrt(highest_frequency * highest_frequency + touching * touching);
-  const double limit = fastest > 0 ? 2 / fastest * (std::sqrt(1 + damping_ratio * damping_ratio) - damping_ratio)
-                                   : 1e-3 / options.step_safety;
+  const double limit = fastest > 0 ? 2 / fastest : 1e-3 / options.step_safety;
   step = options.step > 0 ? options.step : options.step_safety * limit;
+  const double relaxation = 1 - std::exp(-step * model.damping_frequency);
+  for (CompiledElement& e : elements) e.zone.relaxation = relaxation;
+  for (CompiledRotational& r : rotationals) r.zone.relaxation = relaxation;
   summary.step = step;
   summary.highest_frequency = highest_frequency;
 }
@@ -250,13 +246,13 @@ bool System::find_equilibrium(std::string& message) {
 
   double largest = 1;
   {
-    const Sparse K = assembly.make_matrix(0);
+    const Sparse K = assembly.make_stiffness(false);
     for (Eigen::Index i = 0; i < n; ++i) largest = std::max(largest, K.coeff(i, i));
   }
   const double penalty = 30 * largest;
   Eigen::SimplicialLDLT<Sparse> solver;
   const auto factorise = [&] {
-    Sparse K = assembly.make_matrix(0);
+    Sparse K = assembly.make_stiffness(false);
     Triplets t;
     for (const CompiledJoint& j : joints) {
       KinematicRow rows[6];

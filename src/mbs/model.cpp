@@ -27,6 +27,9 @@ class Checker {
   void not_negative(const std::string& place, double x) {
     if (!(x >= 0)) fail(place, "must not be negative, is " + std::to_string(x));
   }
+  void damping(const std::string& place, double x) {
+    if (!(x >= 0 && x <= 0.2)) fail(place, "must lie between 0 and 0.2, is " + std::to_string(x));
+  }
   void pose(const std::string& place, const Pose& X) {
     finite(place + ".p", X.p);
     const double n = X.q.w * X.q.w + X.q.x * X.q.x + X.q.y * X.q.y + X.q.z * X.q.z;
@@ -125,6 +128,8 @@ LawId add_law(Model& model, ZoneLaw law) {
 void check_model(const Model& model) {
   Checker c;
   c.finite("gravity", model.gravity);
+  if (!(model.damping_frequency > 0) || !std::isfinite(model.damping_frequency))
+    c.fail("damping_frequency", "must be > 0");
   for (size_t i = 0; i < model.bodies.size(); ++i) {
     const Body& b = model.bodies[i];
     const std::string place = at("bodies", i, b.name);
@@ -168,7 +173,7 @@ void check_model(const Model& model) {
     }
     c.finite(place + ".translational_stiffness", e.translational_stiffness);
     c.finite(place + ".rotational_stiffness", e.rotational_stiffness);
-    c.not_negative(place + ".damping_ratio", e.damping_ratio);
+    c.damping(place + ".damping_ratio", e.damping_ratio);
     if (e.stations.size() > 2) c.fail(place + ".stations", "has more than two stations");
     for (const Station& s : e.stations) {
       c.finite(place + ".stations.x", s.x);
@@ -192,7 +197,7 @@ void check_model(const Model& model) {
     c.index(place + ".law", r.law, model.laws, true);
     c.finite(place + ".stiffness", r.stiffness);
     c.not_negative(place + ".stiffness", r.stiffness);
-    c.not_negative(place + ".damping_ratio", r.damping_ratio);
+    c.damping(place + ".damping_ratio", r.damping_ratio);
     if (r.joint.is_valid() && static_cast<size_t>(r.joint.index) < model.joints.size() &&
         model.joints[static_cast<size_t>(r.joint.index)].kind != Joint::Kind::Revolute)
       c.fail(place + ".joint", "is not a revolute joint");

@@ -90,7 +90,7 @@ struct ZoneElement {
   Pose X_AF, X_BM;
   Vec3 translational_stiffness;   // along x, y, z of F [N/m]
   Vec3 rotational_stiffness;      // about x, y, z of F [N·m/rad]
-  double damping_ratio = 0.05;    // of the element's own fastest mode; acts on the elastic deformation only
+  double damping_ratio = 0.05;    // share of critical damping at Model::damping_frequency, 0 to 0.2
   std::vector<Station> stations;  // none: elastic; at most two
 };
 
@@ -116,7 +116,7 @@ struct RotationalElement {
   std::string name;
   JointId joint;
   double stiffness = 0;         // [N·m/rad]
-  double damping_ratio = 0.05;  // of the joint's own mode
+  double damping_ratio = 0.05;  // as of a zone element
   LawId law;                    // invalid: elastic
 };
 
@@ -172,6 +172,9 @@ struct Event {
 struct Model {
   std::string name;
   Vec3 gravity{0, 0, -9.81};  // [m/s²]
+  /// Where the damping of elements peaks; it falls with the distance from it in both directions (standard linear
+  /// solid), so it costs the step nothing and resists no rigid motion [rad/s].
+  double damping_frequency = 62.8;
   std::vector<Body> bodies;
   std::vector<Joint> joints;
   std::vector<ZoneElement> elements;

@@ -289,6 +289,7 @@ Event event_from(const Node& n) {
 std::string to_json(const Model& m) {
   Json j{{"format", kFormat}, {"version", kVersion}, {"name", m.name}};
   j["gravity"] = json_of(m.gravity);
+  j["damping_frequency"] = m.damping_frequency;
   j["bodies"] = Json::array();
   for (const Body& b : m.bodies) j["bodies"].push_back(json_of(b));
   j["joints"] = Json::array();
@@ -405,13 +406,14 @@ Model model_from_json(const std::string& text, const std::string& name) {
     throw InputError(std::vector<Diagnostic>{d});
   }
   const Node root(json, "", name);
-  root.only({"format", "version", "name", "gravity", "bodies", "joints", "elements", "rotational_elements", "laws",
-             "cables", "contact", "events"});
+  root.only({"format", "version", "name", "gravity", "damping_frequency", "bodies", "joints", "elements",
+             "rotational_elements", "laws", "cables", "contact", "events"});
   if (root["format"].text() != kFormat) root["format"].fail(std::string("must be \"") + kFormat + "\"");
   if (root["version"].integer() != kVersion) root["version"].fail("must be " + std::to_string(kVersion));
   Model m;
   if (root.has("name")) m.name = root["name"].text();
   if (root.has("gravity")) m.gravity = root["gravity"].vec3();
+  read(root, "damping_frequency", m.damping_frequency);
   for (const Node& n : root["bodies"].items()) m.bodies.push_back(body_from(n));
   if (root.has("joints"))
     for (const Node& n : root["joints"].items()) {

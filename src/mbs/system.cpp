@@ -31,6 +31,10 @@ BodyConstants constants_of(const Body& body) {
   return c;
 }
 
+/// Spring behind the damper over the elastic spring, so that the loss at the damping frequency is that of the ratio:
+/// loss factor 2ζ = (r/2) / (1 + r/2).
+double viscous_share(double damping_ratio) { return 4 * damping_ratio / (1 - 2 * damping_ratio); }
+
 /// Appends a body's shapes in its frame.
 void append_shapes(const Body& body, BodyConstants& c, std::vector<CompiledShape>& shapes) {
   c.first_shape = static_cast<int>(shapes.size());
@@ -80,10 +84,6 @@ void System::compile() {
 
   for (const ZoneLaw& law : model.laws) laws.push_back(compile_law(law));
 
-  const auto inverse_mass = [&](int b) { return b < 0 ? 0.0 : s.body[static_cast<size_t>(b)].inverse_mass; };
-  const auto world_inverse_inertia = [&](int b) {
-    return b < 0 ? Mat3{} : calc_world_inverse_inertia(static_cast<size_t>(b));
-  };
   for (const ZoneElement& e : model.elements) {
     CompiledElement c;
     c.a = e.a.index;
@@ -96,22 +96,7 @@ void System::compile() {
       c.zone.stiffness[i] = e.translational_stiffness[i];
       c.zone.stiffness[3 + i] = e.rotational_stiffness[i];
     }
-    // the element's own fastest mode, each component alone
-    const Mat3 R_WF = to_matrix(pose_of(c.a).q * c.q_AF);
-    const Vec3 p_WM = pose_of(c.b) * c.p_BM;
-    double fastest = 0;
-    for (int i = 0; i < 6; ++i) {
-      const Vec3 axis = R_WF.column(i % 3);
-      double w = 0;
-      for (const int b : {c.a, c.b}) {
-        if (b < 0) continue;
-        const Vec3 lever = i < 3 ? cross(p_WM - s.p[static_cast<size_t>(b)], axis) : axis;
-        w += (i < 3 ? inverse_mass(b) : 0) + dot(lever, world_inverse_inertia(b) * lever);
-      }
-      fastest = std::max(fastest, std::sqrt(c.zone.stiffness[i] * w));
-    }
-    for (int i = 0; i < 6; ++i)
-      c.zone.damping[i] = fastest > 0 ? 2 * e.damping_ratio * c.zone.stiffness[i] / fastest : 0;
+    c.zone.viscous = viscous_share(e.damping_ratio);
     c.zone.stations = static_cast<int>(e.stations.size());
     for (int i = 0; i < c.zone.stations; ++i) {
       c.zone.x[i] = e.stations[static_cast<size_t>(i)].x;
@@ -146,14 +131,10 @@ void System::compile() {
     c.joint = r.joint.index;
     CompiledJoint& j = joints[static_cast<size_t>(c.joint)];
     j.rotational = static_cast<int>(rotationals.size());
-    for (int i = 0; i < 6; ++i) c.zone.stiffness[i] = c.zone.damping[i] = 0;
+    for (int i = 0; i < 6; ++i) c.zone.stiffness[i] = 0;
     c.zone.stiffness[5] = r.stiffness;
     c.zone.external_axial = true;
-    const Vec3 axis = to_matrix(pose_of(j.parent).q * j.q_PF).column(2);
-    double w = 0;
-    for (const int b : {j.parent, j.child}) w += dot(axis, world_inverse_inertia(b) * axis);
-    const double fastest = std::sqrt(r.stiffness * w);
-    c.zone.damping[5] = fastest > 0 ? 2 * r.damping_ratio * r.stiffness / fastest : 0;
+    c.zone.viscous = viscous_share(r.damping_ratio);
     if (r.law.is_valid()) {
       c.zone.stations = 1;
       c.zone.law[0] = r.law.index;
@@ -378,8 +359,8 @@ void System::fire_events() {
         case Action::Kind::RemoveElement: {
           ZoneState& z = state.element[static_cast<size_t>(a.element.index)];
           if (!z.live) break;
-          state.removed += z.energy;
-          z.energy = 0;
+          state.removed += z.energy + z.damper_energy;
+          z.energy = z.damper_energy = 0;
           break_zone(z, BreakReason::Removed);
           mark_search_due();
           break;
@@ -525,7 +506,7 @@ Energy System::calc_energy() const {
   e.gravity -= state.gravity_at_start;
   for (const auto* list : {&state.element, &state.rotational})
     for (const ZoneState& z : *list) {
-      e.elastic += z.energy;
+      e.elastic += z.energy + z.damper_energy;
       e.plastic += z.plastic;
       e.damping += z.damping;
     }

@@ -208,10 +208,10 @@ constexpr double kMostDamage =
 void break_zone(ZoneState& z, BreakReason reason) {
   z.live = false;
   z.reason = reason;
-  z.plastic += z.energy;
-  z.energy = 0;
+  z.plastic += z.energy + z.damper_energy;
+  z.energy = z.damper_energy = 0;
   z.resultant = {};
-  for (double& f : z.elastic_force) f = 0;
+  for (int i = 0; i < 6; ++i) z.elastic_force[i] = z.damper_force[i] = 0;
   z.has_elastic = false;
 }
 
@@ -428,28 +428,35 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
   }
   z.energy = energy;
   z.normal_force = force[0];
-  for (int i = 0; i < 6; ++i) {
-    z.elastic_force[i] = force[i];
-    z.deformation[i] = d.c[i];
-  }
   if (broken) {
+    for (int i = 0; i < 6; ++i) z.deformation[i] = d.c[i];
     break_zone(z, broke);
     return;
   }
 
-  // damping acts on the rate of the elastic deformation, so it resists no plastic flow
+  // A damper in series with a spring, both beside the elastic deformation (standard linear solid): no plastic flow is
+  // damped, nothing is at rest. The damper follows the mean of the step.
+  double damper_energy = 0;
   for (int i = 0; i < 6; ++i) {
     const double e = k[i] > 0 ? force[i] / k[i] : 0;
     double damper = 0;
-    if (z.has_elastic && h > 0) {
-      const double de = e - z.elastic[i];
-      damper = p.damping[i] * de / h;
-      z.damping += 0.5 * (damper + z.damper_force[i]) * de;
+    if (p.viscous > 0 && z.has_elastic && h > 0) {
+      z.flowed[i] += p.relaxation * (0.5 * (e + z.elastic[i]) - z.flowed[i]);
+      const double stretch = e - z.flowed[i];
+      damper = p.viscous * k[i] * stretch;
+      damper_energy += 0.5 * damper * stretch;
+      z.damping += 0.5 * (damper + z.damper_force[i]) * (d.c[i] - z.deformation[i]);
+    } else {
+      z.flowed[i] = e;
     }
     z.damper_force[i] = damper;
     z.elastic[i] = e;
+    z.elastic_force[i] = force[i];
+    z.deformation[i] = d.c[i];
     z.resultant.c[i] = force[i] + damper;
   }
+  z.damping -= damper_energy - z.damper_energy;
+  z.damper_energy = damper_energy;
   z.has_elastic = true;
 }
 

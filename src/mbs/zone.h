@@ -82,13 +82,16 @@ struct ZoneState {
   double deformation[6] = {0, 0, 0, 0, 0, 0};    // of the step before
   double elastic_force[6] = {0, 0, 0, 0, 0, 0};  // resultants without the damper, of the step before
   double damper_force[6] = {0, 0, 0, 0, 0, 0};   // the damper's part of the step before
+  double flowed[6] = {0, 0, 0, 0, 0, 0};         // of the dampers [m, rad]
+  double damper_energy = 0;                      // stored behind the dampers [J]
   bool yielded = false, softening = false;       // for reporting, only ever set
 };
 
 /// Constants of a zone for evaluation.
 struct ZoneParameters {
   double stiffness[6];
-  double damping[6];
+  double viscous = 0;     // stiffness of the spring behind the damper over the elastic one
+  double relaxation = 0;  // share of that spring's deformation that the damper takes in one step
   int stations = 0;
   double x[2] = {0, 0};
   int law[2] = {-1, -1};

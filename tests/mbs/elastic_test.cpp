@@ -178,6 +178,45 @@ TEST(Portal, OfRigidMembersWithEndZonesIsExactInDoubleCurvature) {
   EXPECT_NEAR(2000 / sag_of(m, 0, {}).x, stiffness, 0.002 * stiffness);
 }
 
+TEST(Damping, IsThatOfTheRatioAtItsFrequency) {
+  // free vibration on a spring tuned to the damping frequency: logarithmic decrement 2πζ
+  for (const double ratio : {0.02, 0.05}) {
+    Model m;
+    m.gravity = {};
+    m.contact.ground = m.contact.bodies = false;
+    m.damping_frequency = 60;
+    Body b = make_box("mass", 1000, {0.1, 0.1, 0.1}, {0, 0, 0});
+    b.v_WB = {1, 0, 0};
+    add_body(m, b);
+    ZoneElement e;
+    e.a = kGround;
+    e.b = {0};
+    e.translational_stiffness = {1000 * 60 * 60, 1e6, 1e6};
+    e.rotational_stiffness = {1e6, 1e6, 1e6};
+    e.damping_ratio = ratio;
+    add_element(m, e);
+    Options o;
+    o.equilibrium = false;
+    o.duration = 1;
+    o.step = 1e-4;
+    o.frame_interval = 1e-4;
+    std::vector<double> peaks;
+    double a = 0, c = 0;
+    o.on_frame = [&](const View& v) {
+      const double x = v.X_WB[0].p.x;
+      if (c > a && c > x && c > 0) peaks.push_back(c);
+      a = c;
+      c = x;
+    };
+    const Summary s = run(m, o);
+    ASSERT_GT(peaks.size(), 6u);
+    const double decrement = std::log(peaks[0] / peaks[5]) / 5;
+    // the solid is a little stiffer than its spring, so it swings a little above the peak of the loss: 2 %
+    EXPECT_NEAR(decrement / (2 * 3.14159265358979323846), ratio, 0.03 * ratio);
+    EXPECT_LT(std::abs(s.energy_error), 1e-3);
+  }
+}
+
 /// A mass on a vertical spring whose axial law yields at Rp, loaded at once by its weight P.
 double peak_over_yield(double ratio) {
   const double k = 1e6, mass = 1000, P = mass * 9.81, Rp = P / ratio;

@@ -109,8 +109,9 @@ TEST(RotationalElement, TurnsPlasticallyAtItsLimit) {
   Summary s = run(m, o);
   EXPECT_GT(rotation, 0.05);
   EXPECT_LT(s.energy_error, 1e-3);
-  // angular acceleration (M - limit) / (1/3) as long as the rod is near the horizontal: cos of 0.12 rad is 0.7 % off
-  EXPECT_NEAR(w, 3 * (weight_moment - limit) * 0.2, 0.02 * 3 * (weight_moment - limit) * 0.2);
+  // angular acceleration (M - limit) / (1/3) as long as the rod is near the horizontal; the hinge
+  // gives way elastically for its first 3e-4 rad, at half the resistance: 1 ms of 200 ms at the full moment, 1 to 3 %
+  EXPECT_NEAR(w, 3 * (weight_moment - limit) * 0.2, 0.04 * 3 * (weight_moment - limit) * 0.2);
   // and a limit above the moment holds the rod
   m.laws[0] = test::plastic_hinge(3 * weight_moment);
   o.duration = 0.05;

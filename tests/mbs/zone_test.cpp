@@ -36,7 +36,7 @@ ZoneLaw make_law() {
 
 ZoneParameters make_parameters(int stations = 1, double x = 0) {
   ZoneParameters p;
-  for (int i = 0; i < 6; ++i) p.stiffness[i] = kStiff, p.damping[i] = 0;
+  for (int i = 0; i < 6; ++i) p.stiffness[i] = kStiff;
   p.stations = stations;
   p.law[0] = p.law[1] = 0;
   p.x[0] = -x;
