@@ -1,0 +1,13 @@
+#pragma once
+/// The scene `frame255`: a frame of boxes on linear-brittle connections that topples.
+
+#include "mbs/model.h"
+
+namespace topple::bench {
+
+/// Five storeys, eight bays of 5 m by one of 6 m: 90 columns, 125 beams and 40 slabs, 1900 t, joined by 660
+/// six-component connections that are elastic up to their limits and then gone. After 1 ms the front row of nine
+/// columns loses its hold on the ground; 0.8 m are free below the columns, so that the frame drops in front and breaks.
+mbs::Model make_frame();
+
+}  // namespace topple::bench
