@@ -113,15 +113,17 @@ class Assembly {
             cross(p_B - centre(c.b.index), d)};
   }
   /// Stiffness of all live elements: at rest, or that of fast motion, which the springs behind the dampers add to.
-  Sparse make_stiffness(bool fast) const {
+  /// `share` of each element's own stiffness is left, 1 if empty.
+  Sparse make_stiffness(bool fast, const std::vector<double>& share = {}) const {
     Triplets t;
     t.reserve(144 * 6 * s_.elements.size());
     for (size_t i = 0; i < s_.elements.size(); ++i) {
       if (!s_.state.element[i].live) continue;
       const CompiledElement& e = s_.elements[i];
+      const double factor = (fast ? 1 + e.zone.viscous : 1) * (share.empty() ? 1 : share[i]);
       KinematicRow rows[6];
       element_rows(e, rows);
-      for (int k = 0; k < 6; ++k) add_outer(rows[k], (fast ? 1 + e.zone.viscous : 1) * e.zone.stiffness[k], t);
+      for (int k = 0; k < 6; ++k) add_outer(rows[k], factor * e.zone.stiffness[k], t);
     }
     for (const CompiledRotational& r : s_.rotationals)
       add_outer(rotational_row(s_.joints[static_cast<size_t>(r.joint)]),
@@ -147,35 +149,19 @@ class Assembly {
 void System::choose_step() {
   const Assembly assembly(*this);
   const int n = assembly.unknowns();
-  // the lightest a body ever gets counts
-  std::vector<double> inverse_mass(B, 0);
-  std::vector<Mat3> inverse_inertia(B);
-  for (const int b : assembly.free_bodies()) {
-    inverse_mass[static_cast<size_t>(b)] = state.body[static_cast<size_t>(b)].inverse_mass;
-    inverse_inertia[static_cast<size_t>(b)] = calc_world_inverse_inertia(static_cast<size_t>(b));
-  }
-  for (const Event& event : model.events)
-    for (const Action& a : event.actions)
-      if (a.kind == Action::Kind::ReplaceBody) {
-        const size_t b = static_cast<size_t>(a.body.index);
-        if (fixed[b] || 1 / a.replacement.mass < inverse_mass[b]) continue;
-        inverse_mass[b] = 1 / a.replacement.mass;
-        inverse_inertia[b] = state.R[b] * inverse(a.replacement.inertia) * transpose(state.R[b]);
+  const auto find_highest = [&](const std::vector<double>& inverse_mass, const std::vector<Mat3>& inverse_inertia,
+                                const Sparse& K) {
+    const auto accelerate = [&](const Vector& f) {
+      Vector a(n);
+      for (size_t i = 0; i < assembly.free_bodies().size(); ++i) {
+        const size_t b = static_cast<size_t>(assembly.free_bodies()[i]);
+        const Eigen::Index at = static_cast<Eigen::Index>(6 * i);
+        for (int k = 0; k < 3; ++k) a[at + k] = inverse_mass[b] * f[at + k];
+        const Vec3 w = inverse_inertia[b] * Vec3{f[at + 3], f[at + 4], f[at + 5]};
+        for (int k = 0; k < 3; ++k) a[at + 3 + k] = w[k];
       }
-  const auto accelerate = [&](const Vector& f) {
-    Vector a(n);
-    for (size_t i = 0; i < assembly.free_bodies().size(); ++i) {
-      const size_t b = static_cast<size_t>(assembly.free_bodies()[i]);
-      const Eigen::Index at = static_cast<Eigen::Index>(6 * i);
-      for (int k = 0; k < 3; ++k) a[at + k] = inverse_mass[b] * f[at + k];
-      const Vec3 w = inverse_inertia[b] * Vec3{f[at + 3], f[at + 4], f[at + 5]};
-      for (int k = 0; k < 3; ++k) a[at + 3 + k] = w[k];
-    }
-    return a;
-  };
-  double elastic = 0;
-  if (n > 0) {
-    const Sparse K = assembly.make_stiffness(true);
+      return a;
+    };
     Vector x(n);
     // a start that no mode is orthogonal to by symmetry
     std::uint64_t seed = 88172645463325252ULL;
@@ -184,18 +170,45 @@ void System::choose_step() {
       x[i] = static_cast<double>(seed >> 11) * 0x1p-53 - 0.5;
     }
     // Rayleigh quotient x K M⁻¹ K x / x K x, which only grows
-    double before = 0;
+    double frequency = 0, before = 0;
     for (int round = 0; round < 2000; ++round) {
       const Vector f = K * x;
       const Vector a = accelerate(f);
       const double xKx = x.dot(f);
       if (!(xKx > 0)) break;
       const double omega2 = a.dot(f) / xKx;
-      elastic = std::sqrt(omega2);
+      frequency = std::sqrt(omega2);
       x = a / a.norm();
       if (round > 20 && std::abs(omega2 - before) < 1e-6 * omega2) break;
       before = omega2;
     }
+    return frequency;
+  };
+  double elastic = 0;
+  if (n > 0) {
+    std::vector<double> inverse_mass(B, 0);
+    std::vector<Mat3> inverse_inertia(B);
+    for (const int b : assembly.free_bodies()) {
+      inverse_mass[static_cast<size_t>(b)] = state.body[static_cast<size_t>(b)].inverse_mass;
+      inverse_inertia[static_cast<size_t>(b)] = calc_world_inverse_inertia(static_cast<size_t>(b));
+    }
+    elastic = find_highest(inverse_mass, inverse_inertia, assembly.make_stiffness(true));
+    // and after the events, which make bodies lighter and elements softer
+    std::vector<double> share(elements.size(), 1);
+    bool changes = false;
+    for (const Event& event : model.events)
+      for (const Action& a : event.actions) {
+        changes = changes || a.kind == Action::Kind::ReplaceBody;
+        if (a.kind == Action::Kind::SwitchLaw) share[static_cast<size_t>(a.element.index)] = a.stiffness_share;
+        if (a.kind == Action::Kind::RemoveElement) share[static_cast<size_t>(a.element.index)] = 0;
+        if (a.kind != Action::Kind::ReplaceBody) continue;
+        const size_t b = static_cast<size_t>(a.body.index);
+        if (fixed[b] || 1 / a.replacement.mass < inverse_mass[b]) continue;
+        inverse_mass[b] = 1 / a.replacement.mass;
+        inverse_inertia[b] = state.R[b] * inverse(a.replacement.inertia) * transpose(state.R[b]);
+      }
+    if (changes)
+      elastic = std::max(elastic, find_highest(inverse_mass, inverse_inertia, assembly.make_stiffness(true, share)));
   }
   highest_frequency = 1.01 * elastic;  // the iteration stops a little below
   const bool contact = model.contact.ground || model.contact.bodies;

@@ -240,6 +240,8 @@ void check_model(const Model& model) {
           c.index(place + ".law", a.law, model.laws);
           c.finite(place + ".ramp", a.ramp);
           c.not_negative(place + ".ramp", a.ramp);
+          if (!(a.stiffness_share > 0 && a.stiffness_share <= 1))
+            c.fail(place + ".stiffness_share", "must lie in (0, 1], is " + std::to_string(a.stiffness_share));
           break;
         case Action::Kind::ReleaseJoint:
           c.index(place + ".joint", a.joint, model.joints);

@@ -148,7 +148,7 @@ struct Contact {
 struct Action {
   enum class Kind {
     RemoveElement,  // element
-    SwitchLaw,      // element (all stations) and a rotational element's: limits go over to `law` within `ramp`
+    SwitchLaw,      // element: the limits of all its stations go over to those of `law` within `ramp`
     ReleaseJoint,   // joint
     ReplaceBody,  // body: mass, inertia and shapes of `replacement`; X_WB of it is its new centre of mass in the old B
     ReleaseCable  // cable
@@ -159,7 +159,8 @@ struct Action {
   BodyId body;
   int cable = -1;
   LawId law;
-  double ramp = 0;  // [s]
+  double ramp = 0;             // [s]
+  double stiffness_share = 1;  // SwitchLaw: what is left of the element's stiffness after the ramp, (0, 1]
   Body replacement;
 };
 

@@ -255,7 +255,7 @@ Event event_from(const Node& n) {
   e.time = n["time"].number();
   if (n.has("name")) e.name = n["name"].text();
   for (const Node& a : n["actions"].items()) {
-    a.only({"do", "element", "joint", "body", "cable", "law", "ramp", "replacement"});
+    a.only({"do", "element", "joint", "body", "cable", "law", "ramp", "stiffness_share", "replacement"});
     Action action;
     const std::string word = a["do"].text();
     if (word == word_of(Action::Kind::RemoveElement)) {
@@ -266,6 +266,7 @@ Event event_from(const Node& n) {
       action.element = {a["element"].integer()};
       action.law = {a["law"].integer()};
       read(a, "ramp", action.ramp);
+      read(a, "stiffness_share", action.stiffness_share);
     } else if (word == word_of(Action::Kind::ReleaseJoint)) {
       action.kind = Action::Kind::ReleaseJoint;
       action.joint = {a["joint"].integer()};
@@ -363,6 +364,7 @@ std::string to_json(const Model& m) {
           x["element"] = a.element.index;
           x["law"] = a.law.index;
           x["ramp"] = a.ramp;
+          x["stiffness_share"] = a.stiffness_share;
           break;
         case Action::Kind::ReleaseJoint:
           x["joint"] = a.joint.index;

@@ -370,6 +370,7 @@ void System::fire_events() {
           z.next_law = a.law.index;
           z.ramp_begin = state.time;
           z.ramp = a.ramp;
+          z.next_share = a.stiffness_share;
           break;
         }
         case Action::Kind::ReleaseJoint:

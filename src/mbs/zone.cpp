@@ -203,6 +203,34 @@ constexpr double kTiny = 1e-300;
 constexpr double kMostDamage =
     19;  // added flexibility over the elastic one: unloading keeps a twentieth of the stiffness
 
+/// The stiffness goes over to its share without a jump of the forces: the rest of the deformation becomes permanent.
+/// The stations of a two-station element share the change of rotation evenly, and its shear the change of displacement.
+void soften(const ZoneParameters& p, ZoneState& z) {
+  const double change = 1 / (z.next_share) - 1 / z.share;
+  const auto flexed = [&](int i) { return p.stiffness[i] > 0 ? change * z.elastic_force[i] / p.stiffness[i] : 0; };
+  z.axial -= flexed(0);
+  z.slip[0] -= flexed(1);
+  z.slip[1] -= flexed(2);
+  z.twist -= flexed(3);
+  if (p.stations > 0) {
+    for (int q = 0; q < 2; ++q) {
+      for (int s = 0; s < p.stations; ++s) z.station[s].phi[q] -= flexed(4 + q) / p.stations;
+      double lever = 0;
+      for (int s = 0; s < p.stations; ++s) lever += p.x[s] / p.stations;
+      (q == 0 ? z.slip[1] : z.slip[0]) += (q == 0 ? 1 : -1) * lever * flexed(4 + q);
+    }
+  }
+  for (int i = 0; i < 6; ++i) {
+    z.elastic[i] += flexed(i);
+    z.flowed[i] += flexed(i);
+  }
+  double stored = 0;
+  for (int i = p.external_axial ? 1 : 0; i < 6; ++i) stored += 0.5 * z.elastic_force[i] * flexed(i);
+  z.energy += stored;
+  z.plastic -= stored;
+  z.share = z.next_share;
+}
+
 }  // namespace
 
 void break_zone(ZoneState& z, BreakReason reason) {
@@ -217,7 +245,9 @@ void break_zone(ZoneState& z, BreakReason reason) {
 
 void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, const Six& d, double time, double h,
                   ZoneState& z) {
-  const double* k = p.stiffness;
+  if (z.next_share != z.share && time >= z.ramp_begin + z.ramp) soften(p, z);
+  double k[6];
+  for (int i = 0; i < 6; ++i) k[i] = z.share * p.stiffness[i];
   const int n = p.stations;
 
   double force[6];   // elastic resultants at the marker
@@ -469,7 +499,7 @@ double calc_utilisation(const ZoneParameters& p, const std::vector<CompiledLaw>&
     return capacity > 0 ? demand / capacity : (demand > 0 ? 1.0 : 0.0);
   };
   double force[6];
-  for (int i = 0; i < 6; ++i) force[i] = p.stiffness[i] * z.elastic[i];
+  for (int i = 0; i < 6; ++i) force[i] = z.elastic_force[i];
   force[0] = z.normal_force;
   double reached = z.station[0].reached;
   if (p.stations > 1) reached = std::max(reached, z.station[1].reached);

@@ -72,6 +72,8 @@ struct ZoneState {
   // a law taking over within a ramp
   int next_law = -1;
   double ramp_begin = 0, ramp = 0;
+  double next_share = 1;                   // of the stiffness, once the ramp is over
+  double share = 1;                        // of the stiffness now
   double elastic[6] = {0, 0, 0, 0, 0, 0};  // elastic deformation of the step before
   bool has_elastic = false;
   double normal_force = 0;                       // elastic part of the first resultant, or the external one [N]

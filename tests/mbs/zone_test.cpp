@@ -237,5 +237,26 @@ TEST(Zone, AChargeTakesTheLimitsAwayWithinItsRamp) {
   EXPECT_LT(-w.z.resultant.c[0], 0.21e6);
 }
 
+TEST(Zone, SoftensWithoutAJumpOfItsForces) {
+  for (const int stations : {1, 2}) {
+    Walk w(make_law(), make_parameters(stations, 1));
+    const Six d{{-2e-3, 0.4e-3, -0.3e-3, 1e-4, 2e-4, -3e-4}};
+    w.go(d, 50);
+    const Six before = w.z.resultant;
+    w.z.next_law = 0;
+    w.z.next_share = 0.1;
+    w.go(d, 1);
+    for (int i = 0; i < 6; ++i) EXPECT_NEAR(w.z.resultant.c[i], before.c[i], 1e-9 * kStiff * 1e-3) << i;
+    // and a tenth of the stiffness from here on
+    Six more = d;
+    more.c[0] -= 1e-4;
+    more.c[3] += 1e-4;
+    w.go(more, 1);
+    EXPECT_NEAR(w.z.resultant.c[0] - before.c[0], -1e-4 * 0.1 * kStiff, 1e-6 * kStiff * 1e-4);
+    EXPECT_NEAR(w.z.resultant.c[3] - before.c[3], 1e-4 * 0.1 * kStiff, 1e-6 * kStiff * 1e-4);
+    EXPECT_NEAR(w.z.energy + w.z.plastic, w.work, 1e-9 * w.work + 1e-9);
+  }
+}
+
 }  // namespace
 }  // namespace topple::mbs
