@@ -9,6 +9,12 @@
 
 namespace topple::collapse {
 
+namespace {
+
+constexpr double kLeastStiffnessShare = 1e-3;  // of a fired zone, so that its forces die out smoothly
+
+}  // namespace
+
 using product::Member;
 using product::MemberKind;
 
@@ -48,8 +54,11 @@ void Builder::add_events() {
       act.element = mbs::ElementId{element};
       act.ramp = k.charge_release_time;
       const nearfield::ZoneInput& in = library.input(z.station[static_cast<size_t>(which)].zone);
-      act.law = mbs::add_law(model, make_cage_law(make_residual_cage(in, c.destroyed_length, c.residual_bars),
-                                                  c.destroyed_length, m.name + "/charge", k));
+      const nearfield::ResidualCage cage = make_residual_cage(in, c.destroyed_length, c.residual_bars);
+      act.law = mbs::add_law(model, make_cage_law(cage, c.destroyed_length, m.name + "/charge", k));
+      // bars alone are as soft as they are long
+      const double before = model.elements[static_cast<size_t>(element)].translational_stiffness.x;
+      act.stiffness_share = std::clamp(cage.EA / (c.destroyed_length * before), kLeastStiffnessShare, 1.0);
       event.actions.push_back(act);
       ZoneEntry& zone = map.elements[static_cast<size_t>(element)];
       zone.firing_time = std::min(zone.firing_time, firing.time);
