@@ -62,21 +62,26 @@ double interpolate(const std::vector<double>& force, const std::vector<Row>& row
   return (1 - s) * rows[k - 1].at(phi) + s * rows[k].at(phi);
 }
 
+/// Rotation at which the last of the rows ends.
+double find_end(const std::vector<Row>& positive, const std::vector<Row>& negative) {
+  double end = 0;
+  for (const auto* rows : {&positive, &negative})
+    for (const Row& r : *rows) end = std::max(end, r.rotation.back());
+  return end;
+}
+
+/// Rows of both directions on one grid of rotations up to the largest one, densest near yield.
 mbs::MomentFamily make_family(const nearfield::MomentFamily& positive, const nearfield::MomentFamily& negative,
-                              double EI, double length) {
-  constexpr int points = 33;
+                              double EI, double length, double largest) {
+  constexpr int points = 40;
+  constexpr double ratio = 1.15;
   mbs::MomentFamily out;
   std::vector<Row> pos, neg;
-  double last = 1e-3;
   for (size_t k = 0; k < positive.normal_force.size(); ++k) pos.push_back(make_row(positive, k, EI, length));
   for (size_t k = 0; k < negative.normal_force.size(); ++k) neg.push_back(make_row(negative, k, EI, length));
-  for (const auto* rows : {&pos, &neg})
-    for (const Row& r : *rows) last = std::max(last, r.rotation.back());
-  // dense near yield, where the curves bend
-  for (int j = 0; j < points; ++j) {
-    const double s = static_cast<double>(j) / (points - 1);
-    out.plastic_rotation.push_back(last * s * s);
-  }
+  const double last = std::clamp(find_end(pos, neg), 1e-3, largest);
+  for (int j = 0; j < points; ++j)
+    out.plastic_rotation.push_back(last * (std::pow(ratio, j) - 1) / (std::pow(ratio, points - 1) - 1));
   out.normal_force = positive.normal_force;
   out.normal_force.insert(out.normal_force.end(), negative.normal_force.begin(), negative.normal_force.end());
   std::sort(out.normal_force.begin(), out.normal_force.end());
@@ -162,13 +167,12 @@ mbs::ZoneLaw make_zone_law(const nearfield::Rcc& rcc, double EI_y, double EI_z, 
                            const Knowledge& k) {
   mbs::ZoneLaw law;
   law.name = name;
-  law.moment_y = make_family(rcc.y_pos, rcc.y_neg, EI_y, rcc.length);
-  law.moment_z = make_family(rcc.z_pos, rcc.z_neg, EI_z, rcc.length);
+  law.moment_y = make_family(rcc.y_pos, rcc.y_neg, EI_y, rcc.length, k.zone_rupture_rotation);
+  law.moment_z = make_family(rcc.z_pos, rcc.z_neg, EI_z, rcc.length, k.zone_rupture_rotation);
   law.biaxial_exponent = k.zone_biaxial_exponent;
   law.damage_share = rcc.damage_share;
   // the last rotation of a family is where nothing of the moment is left
-  law.rupture_rotation = std::min(k.zone_rupture_rotation,
-                                  std::max(law.moment_y.plastic_rotation.back(), law.moment_z.plastic_rotation.back()));
+  law.rupture_rotation = std::max(law.moment_y.plastic_rotation.back(), law.moment_z.plastic_rotation.back());
   law.compression = make_curve(rcc.compression);
   law.tension = make_curve(rcc.tension);
   law.crush_length = rcc.length;

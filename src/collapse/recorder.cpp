@@ -270,7 +270,9 @@ void Recorder::add_frame(const mbs::View& v) {
 double Recorder::kinetic_at(double time) const {
   const auto it = std::lower_bound(record_.time.begin(), record_.time.end(), time);
   const size_t i = std::min(static_cast<size_t>(it - record_.time.begin()), record_.time.size() - 1);
-  return record_.series[kKinetic].value[i];
+  for (const record::Series& s : record_.series)
+    if (s.id == "energy_kinetic") return s.value[i];
+  return 0;
 }
 
 void Recorder::add_event(record::Event event) {

@@ -1,0 +1,111 @@
+#include "collapse/mechanism.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+namespace topple::collapse {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+/// A block of 12 m x 19 m that hinges at its rear edge and at last lies before it; falls towards -x.
+MechanismInput synthetic(double tilt_at_touchdown, double drop_of_rear, double moved) {
+  MechanismInput in;
+  in.touchdown = 1;
+  in.front = in.rear = 6;
+  in.storey_height = 3;
+  in.fall_direction = {-1, 0, 0};
+  for (int i = 0; i <= 2; ++i) {
+    BlockFrame f;
+    f.time = i;
+    const double a = tilt_at_touchdown * i;
+    f.rotation = exp_rotation({0, -a, 0});
+    // the rear edge 6 m behind the mass centre comes down by drop_of_rear
+    f.displacement = {-6 * (1 - std::cos(a)), 0, -6 * std::sin(a) - drop_of_rear * i};
+    f.moved = moved * i / 2;
+    f.height = 12 - 4 * i;
+    f.centre = {6 - 3.0 * i * (tilt_at_touchdown != 0), 0, f.height};
+    in.frames.push_back(f);
+  }
+  return in;
+}
+
+std::string name_of(const MechanismInput& in) { return judge_mechanism(in, default_knowledge()).name; }
+
+TEST(Mechanism, TurningOverTheRearEdgeIsToppling) {
+  const Mechanism m = judge_mechanism(synthetic(0.2, 0, 1), default_knowledge());
+  EXPECT_EQ(m.name, "topple");
+  EXPECT_NEAR(m.tilt, 0.2, 1e-12);
+  EXPECT_NEAR(m.rear_share, 0, 1e-12);
+  EXPECT_NEAR(m.azimuth, std::acos(-1.0), 1e-12);
+}
+
+TEST(Mechanism, ComingDownWithoutTurningIsVertical) {
+  const Mechanism m = judge_mechanism(synthetic(0, 2.4, 1), default_knowledge());
+  EXPECT_EQ(m.name, "vertical");
+  EXPECT_NEAR(m.rear_share, 1, 1e-12);
+  EXPECT_TRUE(std::isnan(m.azimuth));
+}
+
+TEST(Mechanism, TheRearEdgeDecidesBetweenBoth) {
+  // front edge: 12 sin 0.2 = 2.38 m more than the rear one
+  EXPECT_EQ(name_of(synthetic(0.2, 2.3, 1)), "topple");
+  EXPECT_EQ(name_of(synthetic(0.2, 2.5, 1)), "vertical");
+}
+
+TEST(Mechanism, LittleMassDownMeansStandingOrPartial) {
+  EXPECT_EQ(name_of(synthetic(0, 0, 0.01)), "stands");
+  EXPECT_EQ(name_of(synthetic(0.2, 0, 0.3)), "partial");
+}
+
+TEST(Mechanism, AtRestWhileLeaningIsAborted) {
+  MechanismInput in = synthetic(0.1, 0, 1);
+  in.came_to_rest = true;
+  in.frames.back().height = 10;
+  const Mechanism m = judge_mechanism(in, default_knowledge());
+  EXPECT_EQ(m.name, "partial");
+  EXPECT_THAT(m.text, testing::StartsWith("Aborted collapse"));
+}
+
+TEST(Mechanism, TurningToTheOtherSideIsTheWrongDirection) {
+  MechanismInput in = synthetic(0.2, 0, 1);
+  in.is_direction_planned = true;
+  EXPECT_EQ(name_of(in), "topple");
+  in.fall_direction = {0, 1, 0};  // planned to the side
+  EXPECT_EQ(name_of(in), "wrong direction");
+  in.is_direction_planned = false;
+  EXPECT_EQ(name_of(in), "topple");
+}
+
+TEST(Mechanism, TwoPartsTurningAgainstEachOtherFold) {
+  MechanismInput in = synthetic(0.02, 2, 1);
+  for (BlockFrame& f : in.frames) f.forward = 0.4, f.backward = 0.35;
+  EXPECT_EQ(name_of(in), "fold");
+}
+
+TEST(Mechanism, ABlockInPiecesIsProgressive) {
+  MechanismInput in = synthetic(0.2, 0, 1);
+  for (BlockFrame& f : in.frames) f.connected = 0.3;
+  EXPECT_EQ(name_of(in), "progressive");
+}
+
+TEST(Mechanism, WithoutTouchdownTheLastFrameCounts) {
+  MechanismInput in = synthetic(0.2, 0, 1);
+  in.touchdown = kNaN;
+  const Mechanism m = judge_mechanism(in, default_knowledge());
+  EXPECT_EQ(m.time, 2);
+  EXPECT_NEAR(m.tilt, 0.4, 1e-12);
+  EXPECT_THAT(m.text, testing::HasSubstr("still moving"));
+}
+
+TEST(Mechanism, TiltIsSignedTowardsTheDirection) {
+  EXPECT_NEAR(calc_tilt(exp_rotation({0, -0.3, 0}), {-1, 0, 0}), 0.3, 1e-12);
+  EXPECT_NEAR(calc_tilt(exp_rotation({0, -0.3, 0}), {1, 0, 0}), -0.3, 1e-12);
+  EXPECT_NEAR(calc_tilt(exp_rotation({-0.3, 0, 0}), {0, 1, 0}), 0.3, 1e-12);
+}
+
+}  // namespace
+}  // namespace topple::collapse
