@@ -1,0 +1,121 @@
+#!/usr/bin/env bash
+# One case of the command line's test: cli_test.sh CASE PROGRAM SOURCE_FOLDER WORK_FOLDER
+set -u
+case_name=$1 topple=$2 source=$3 work=$4
+rm -rf "$work" && mkdir -p "$work" && cd "$work" || exit 1
+plan=$source/tests/data/short.toml
+failures=0
+
+# expect CODE COMMAND...: runs it, keeps what it wrote in out and err
+expect() {
+  local wanted=$1; shift
+  "$@" >out 2>err
+  local got=$?
+  if [ "$got" -ne "$wanted" ]; then
+    echo "exit code $got instead of $wanted: $*"; head -20 out err; failures=$((failures + 1))
+  fi
+}
+# has FILE TEXT: the file holds the text
+has() { grep -qF -- "$2" "$1" || { echo "$1 does not hold: $2"; head -20 "$1"; failures=$((failures + 1)); }; }
+lacks() { ! grep -qF -- "$2" "$1" || { echo "$1 holds: $2"; failures=$((failures + 1)); }; }
+exists() { [ -s "$1" ] || { echo "no file $1"; failures=$((failures + 1)); }; }
+is_json() { python3 -c 'import json,sys; json.load(open(sys.argv[1]))' "$1" || { echo "$1 is not JSON"; failures=$((failures + 1)); }; }
+
+case $case_name in
+usage)
+  expect 0 "$topple" --help; has out "Examples:"; has out "Exit codes"
+  expect 0 "$topple" run --help; has out "--json"
+  expect 0 "$topple" --version; has out "topple "
+  expect 0 "$topple" version; has out "topple "
+  expect 2 "$topple"
+  expect 2 "$topple" rnu
+  expect 2 "$topple" run
+  expect 2 "$topple" run "$plan"; has err "--output"
+  expect 2 "$topple" run "$plan" -o a --threads 0
+  expect 2 "$topple" run "$plan" -o a --duration "3 apples"; has err "--duration"
+  expect 2 "$topple" run "$plan" -o a --duration "-3 s"
+  expect 2 "$topple" run "$plan" -o a --engine adams; has err "there is no engine"
+  expect 0 "$topple" rules; has out "zone.rupture_rotation = 0.35 rad"; has out "because:"
+  expect 0 "$topple" rules --json; is_json out; cp out rules.json
+  expect 0 "$topple" check "$plan" --knowledge rules.json
+  sed 's/"zone.rupture_rotation"/"zone.rupture_rotatoin"/' rules.json >wrong.json
+  expect 2 "$topple" check "$plan" --knowledge wrong.json; has err 'did you mean "zone.rupture_rotation"'
+  ;;
+new)
+  expect 0 "$topple" new plan.toml; exists plan.toml
+  expect 0 "$topple" check plan.toml; has out "no errors"
+  echo mine >plan.toml
+  expect 2 "$topple" new plan.toml; has err "exists already"
+  has plan.toml mine
+  expect 1 "$topple" new /proc/nowhere/plan.toml
+  ;;
+check)
+  expect 0 "$topple" check "$plan"; has out "no errors"
+  sed -e 's/^destroyed_length/destoryed_length/' -e 's/"30 GPa"/"30 m"/' "$plan" >wrong.toml
+  expect 2 "$topple" check wrong.toml
+  has err "wrong.toml:"; has err "destoryed_length"; has err "did you mean"; has err "errors. Nothing was run."
+  expect 2 "$topple" run wrong.toml -o out_folder; has err "Nothing was run."
+  [ ! -e out_folder ] || { echo "a folder was made for a wrong plan"; failures=$((failures + 1)); }
+  expect 2 "$topple" check wrong.toml --json; is_json out; has out '"line"'
+  expect 2 "$topple" check missing.toml
+  expect 2 "$topple" check .
+  : >empty.toml; expect 2 "$topple" check empty.toml
+  NO_COLOR=1 expect 2 "$topple" check wrong.toml; lacks err $'\x1b'
+  ;;
+run)
+  expect 0 "$topple" run "$plan" -o a/b --csv --no-report
+  has out "rigid bodies"; has out "revolute joints"; has out "force elements"
+  has out "Mechanism"; has out "Not modelled"; has out "Verification"; has out "Wrote a/b/record.h5"
+  for f in record.h5 model.json series.csv events.csv bodies.csv findings.csv; do exists a/b/$f; done
+  [ ! -e a/b/report.html ] || { echo "a report although --no-report"; failures=$((failures + 1)); }
+  [ "$(grep -n '^Mechanism' out | cut -d: -f1)" -lt "$(grep -n '^Stability' out | cut -d: -f1)" ] || failures=$((failures + 1))
+  lacks out $'\x1b'
+  printf '\n[criteria]\nmechanism = "stands"\n' | cat "$plan" - >stands.toml
+  expect 3 "$topple" run stands.toml -o c --no-report; has out "Asked: stands"
+  expect 1 "$topple" run "$plan" -o /proc/nowhere --no-report
+  # the same plan and seed give the same bytes of poses
+  expect 0 "$topple" run "$plan" -o d --csv --no-report --threads 2
+  cmp a/b/series.csv d/series.csv || failures=$((failures + 1))
+  ;;
+json)
+  expect 0 "$topple" run "$plan" -o a --no-report --json
+  is_json out; has out '"findings"'; has out '"exit_code": 0'; has out '"record": "a/record.h5"'; has out '"bodies"'
+  has err "rigid bodies"
+  printf '\n[criteria]\nmechanism = "stands"\n' | cat "$plan" - >stands.toml
+  expect 3 "$topple" run stands.toml -o c --no-report --json; is_json out; has out '"criterion.mechanism"'
+  printf 'title = 3\n' >wrong.toml
+  expect 2 "$topple" run wrong.toml -o c --json; is_json out; has out '"diagnostics"'
+  ;;
+mbs)
+  expect 0 "$topple" run "$plan" -o a --no-report
+  expect 0 "$topple" mbs run a/model.json -o b --csv --no-report --duration 0.8s; exists b/record.h5
+  expect 2 "$topple" mbs run missing.json -o c
+  echo '{"bodies": 3}' >wrong.json; expect 2 "$topple" mbs run wrong.json -o c
+  head -c 1000 a/model.json >cut.json; expect 2 "$topple" mbs run cut.json -o c
+  ;;
+report)
+  expect 0 "$topple" run "$plan" -o a --no-report
+  if [ -s "$source/web/dist/report.html" ]; then
+    expect 0 "$topple" report a/record.h5 -o r.html; exists r.html; has r.html "Short run"
+    expect 0 "$topple" run "$plan" -o b; exists b/report.html
+  else
+    expect 1 "$topple" report a/record.h5 -o r.html; has err "report page is not built"
+    expect 0 "$topple" run "$plan" -o b; has err "report page is not built"
+    expect 1 "$topple" run "$plan" -o b --report
+  fi
+  echo nonsense >wrong.h5
+  expect 2 "$topple" report wrong.h5 -o r2.html
+  expect 2 "$topple" report missing.h5 -o r2.html
+  ;;
+cancel)
+  "$topple" run "$source/examples/weida/plan.toml" -o a --no-report --duration 500s >out 2>err &
+  pid=$!
+  for _ in $(seq 100); do grep -q "fired" out && break; sleep 0.1; done
+  kill -INT $pid
+  wait $pid; code=$?
+  [ $code -eq 1 ] || { echo "exit code $code after an interrupt"; head out err; failures=$((failures + 1)); }
+  exists a/record.h5; has out "Cancelled at"
+  ;;
+*) echo "no case $case_name"; failures=1 ;;
+esac
+exit $((failures > 0))
