@@ -125,9 +125,33 @@ constexpr Mat3 to_matrix(const Quat& q) {
 /// Quaternion of a rotation matrix (Shepperd's choice of the largest component).
 Quat to_quat(const Mat3& R);
 /// Rotation by the vector r [rad] (axis times angle).
-Quat exp_rotation(const Vec3& r);
+inline Quat exp_rotation(const Vec3& r) {
+  const double half2 = 0.25 * dot(r, r);
+  // sin(a)/a and cos(a) of the half angle a; series below 1e-4 rad², where they are exact to round-off
+  double s, c;
+  if (half2 < 1e-4) {
+    s = 1 - half2 / 6 * (1 - half2 / 20 * (1 - half2 / 42));
+    c = 1 - half2 / 2 * (1 - half2 / 12 * (1 - half2 / 30));
+  } else {
+    const double a = std::sqrt(half2);
+    s = std::sin(a) / a;
+    c = std::cos(a);
+  }
+  return {c, 0.5 * s * r.x, 0.5 * s * r.y, 0.5 * s * r.z};
+}
 /// Rotation vector of q, angle in [0, π].
-Vec3 log_rotation(const Quat& q);
+inline Vec3 log_rotation(const Quat& q) {
+  const double sign = q.w < 0 ? -1 : 1;
+  const Vec3 v{sign * q.x, sign * q.y, sign * q.z};
+  const double s2 = dot(v, v);
+  if (s2 < 1e-3) {
+    // 2 asin(s)/s with s = |v|; the series is exact to round-off here
+    return (2 * (1 + s2 * (1.0 / 6 + s2 * (3.0 / 40 + s2 * (15.0 / 336 + s2 * (105.0 / 3456 + s2 * 945.0 / 42240)))))) *
+           v;
+  }
+  const double s = std::sqrt(s2);
+  return (2 * std::atan2(s, sign * q.w) / s) * v;
+}
 
 struct Pose {
   Vec3 p;

@@ -199,6 +199,62 @@ struct Plane {
   static double at(double moment, double shear, double x, double sign) { return moment + sign * x * shear; }
 };
 
+/// Whether forces lie within the bounds that were found safe.
+bool is_safe(int stations, const double force[6], const double m[2][2], const ZoneState& z) {
+  if (z.next_law >= 0 || force[0] < z.safe_force[0] || force[0] > z.safe_force[1] ||
+      std::abs(force[3]) > z.safe_torsion)
+    return false;
+  if (std::abs(force[1]) / z.safe_shear[0] + std::abs(force[2]) / z.safe_shear[1] > 1) return false;
+  for (int s = 0; s < stations; ++s)
+    if (std::abs(m[0][s]) / z.safe_moment[0] + std::abs(m[1][s]) / z.safe_moment[1] > 1) return false;
+  return true;
+}
+
+/// Least limit moment of a family between two normal forces: at an end or at a force of the table, for it is linear
+/// between.
+double find_least_moment(const CompiledFamily& family, double from, double to, double rotation) {
+  double least = kUnlimited;
+  int k = 0, j = 0;
+  const auto look = [&](double force) {
+    const MomentLimit limit = calc_moment_limit(family, force, rotation, k, j);
+    least = std::min({least, limit.positive, limit.negative});
+  };
+  look(from);
+  look(to);
+  for (const double f : family.force)
+    if (f > from && f < to) look(f);
+  return least;
+}
+
+void find_safe_bounds(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, const Limits& limits, double force,
+                      ZoneState& z) {
+  double reach = kUnlimited, reached = 0;
+  for (int s = 0; s < p.stations; ++s) {
+    reached = std::max(reached, z.station[s].reached);
+    for (const CompiledFamily& family : laws[static_cast<size_t>(p.law[s])].moment)
+      if (family.K > 0) reach = std::min(reach, 0.03 * (family.force.back() - family.force.front()));
+  }
+  const double whole = limits.integrity(z.shortened);
+  double from = force - reach, to = force + reach;
+  if (!p.external_axial) {
+    from = std::max(from, -limits.compression(reached, z.shortened, whole));
+    to = std::min(to, limits.tension(z.elongated));
+  }
+  z.safe_force[0] = 1, z.safe_force[1] = -1;
+  if (whole != 1 || !(from <= to)) return;
+  for (int q = 0; q < 2; ++q) {
+    z.safe_moment[q] = kUnlimited;
+    for (int s = 0; s < p.stations; ++s)
+      z.safe_moment[q] = std::min(z.safe_moment[q], find_least_moment(laws[static_cast<size_t>(p.law[s])].moment[q],
+                                                                      from, to, z.station[s].reached));
+    z.safe_shear[q] = limits.shear(q, z.slipped, -to);
+    if (!(z.safe_moment[q] > 0 && z.safe_shear[q] > 0)) return;
+  }
+  z.safe_torsion = limits.torsion();
+  z.safe_force[0] = from;
+  z.safe_force[1] = to;
+}
+
 constexpr double kTiny = 1e-300;
 constexpr double kMostDamage =
     19;  // added flexibility over the elastic one: unloading keeps a twentieth of the stiffness
@@ -303,7 +359,7 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
   energy_trial = elastic_energy() + stored_soft;
 
   BreakReason broke = BreakReason::None;
-  if (n > 0) {
+  if (n > 0 && !is_safe(n, force, m, z)) {
     const Limits limits(laws, p.law[0], z, time);
 
     // axial force
@@ -442,6 +498,11 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
       flowed = true;
     }
     if (z.twisted >= limits.law().twist_rupture) broke = BreakReason::Torsion;
+    if (flowed || z.next_law >= 0) {
+      z.safe_force[0] = 1, z.safe_force[1] = -1;
+    } else {
+      find_safe_bounds(p, laws, limits, force[0], z);
+    }
   }
 
   const bool broken = broke != BreakReason::None;
