@@ -247,6 +247,11 @@ void Builder::connect_x_beam(const GridPoint& at, int index) {
   const int body = own_body.at(index);
   const Vec3 translational{2 * s.EA / L, 2 * s.GA / L, 2 * s.GA / L};
   const Vec3 rotational{2 * s.GJ / L, 6 * s.EI_y / L, 6 * s.EI_z / L};
+  // fixed-end moments of the weight it carries: at rest the ends are turned so that they pull at the top
+  double mass = assemblies[static_cast<size_t>(body)].mass();
+  if (const int wall = find_at(x_walls, {at.row, at.frame, at.storey + 1}); wall >= 0 && own_body.count(wall))
+    mass += assemblies[static_cast<size_t>(own_body.at(wall))].mass();
+  const double turn = plan.analysis.gravity * mass * L / 12 / rotational.y;
   for (int end : {0, 1}) {
     const int node = node_at({at.row + end, at.frame, at.storey});
     const std::string name = m.name + (end == 0 ? "/start" : "/end");
@@ -256,6 +261,8 @@ void Builder::connect_x_beam(const GridPoint& at, int index) {
         add_element(name, index, end == 0 ? node : body, end == 0 ? body : node, face, x_beam_axes(), translational,
                     rotational, {{0, law_of(z.station[static_cast<size_t>(end)].zone, s, name)}})
             .index;
+    mbs::ZoneElement& e = model.elements.back();
+    e.X_BM.q = e.X_BM.q * exp_rotation({0, turn, 0});
   }
 }
 

@@ -141,24 +141,14 @@ BlockFrame Recorder::calc_block(const mbs::View& v) const {
   out.backward = backward / upper;
   const int largest = static_cast<int>(std::max_element(group.begin(), group.end()) - group.begin());
   out.connected = group[static_cast<size_t>(largest)] / upper;
-  // mean of unit quaternions of one hemisphere, exact to second order in their spread
-  Quat sum{0, 0, 0, 0}, reference{1, 0, 0, 0};
-  double heaviest = -1;
-  for (size_t b = 0; b < B; ++b)
-    if (is_upper(static_cast<int>(b)) && find_root(parent, static_cast<int>(b)) == largest && v.mass[b] > heaviest) {
-      heaviest = v.mass[b];
-      reference = v.X_WB[b].q * conjugate(start_[b].q);
-    }
+  std::vector<FitBody> block;
   Vec3 shift;
   for (size_t b = 0; b < B; ++b) {
     if (!is_upper(static_cast<int>(b)) || find_root(parent, static_cast<int>(b)) != largest) continue;
-    const Quat q = v.X_WB[b].q * conjugate(start_[b].q);
-    const double side = q.w * reference.w + q.x * reference.x + q.y * reference.y + q.z * reference.z;
-    const double w = side < 0 ? -v.mass[b] : v.mass[b];
-    sum = {sum.w + w * q.w, sum.x + w * q.x, sum.y + w * q.y, sum.z + w * q.z};
+    block.push_back({v.mass[b], model_.bodies[b].inertia, start_[b], v.X_WB[b]});
     shift += v.mass[b] * (v.X_WB[b].p - start_[b].p);
   }
-  out.rotation = normalized(sum);
+  out.rotation = fit_rotation(block);
   out.displacement = (1 / group[static_cast<size_t>(largest)]) * shift;
   return out;
 }
