@@ -281,22 +281,46 @@ void Builder::connect_y_beam(const GridPoint& at, int index) {
 }
 
 void Builder::connect_slab(const GridPoint& at, int index) {
-  const int near = find_at(x_beams, at), far = find_at(x_beams, {at.row, at.frame + 1, at.storey});
-  if (near < 0 || far < 0) return;  // its parts hang on joints, which the beams along y connect
   const Member& m = member(index);
   const product::Panel& panel = panel_of(index);
   const nearfield::PanelRcc rcc = nearfield::make_panel_rcc(
       panel, panel.concrete < 0 ? nullptr : &plan.concretes[static_cast<size_t>(panel.concrete)],
       panel.steel < 0 ? nullptr : &plan.steels[static_cast<size_t>(panel.steel)]);
-  const double kept = kept_of(index), span = m.end.y - m.start.y, width = zones[near].clear_length;
-  const double EA = rcc.EA * width * kept, EI = rcc.EI * width * kept;
-  const Vec3 middle{m.start.x + zones[near].clear_start + 0.5 * width, 0.5 * (m.start.y + m.end.y), m.start.z};
-  // a strip as a prismatic member, concentrated at the middle of the bay; in its plane a deep beam with shear
-  const double in_plane = EA / 2.4 / 1.2 / span;
-  add_element(m.name, index, own_body.at(near), own_body.at(far), middle, y_beam_axes(),
-              {EA / span, in_plane, 12 * EI / (span * span * span)},
-              {EI / span, EI / span, EA * width * width / 12 / span},
-              {{0, mbs::add_law(model, make_slab_law(rcc, width, kept, m.name, k))}});
+  const double kept = kept_of(index), span_x = m.end.x - m.start.x, span_y = m.end.y - m.start.y;
+  const Vec3 middle = 0.5 * (m.start + m.end);
+  // a strip as a prismatic member, concentrated at its middle; in its plane a deep beam with shear
+  const auto join = [&](const std::string& name, int a, int b, const Vec3& p_W, const Mat3& axes, double width,
+                        double span) {
+    if (a < 0 || b < 0 || a == b) return;
+    const double EA = rcc.EA * width * kept, EI = rcc.EI * width * kept;
+    add_element(name, index, a, b, p_W, axes, {EA / span, EA / 2.4 / 1.2 / span, 12 * EI / (span * span * span)},
+                {EI / span, EI / span, EA * width * width / 12 / span},
+                {{0, mbs::add_law(model, make_slab_law(rcc, width, kept, name, k))}});
+  };
+  // on each side a beam carries it, or the two joints at its corners do
+  std::array<int, 2> beam{};
+  std::array<std::array<int, 2>, 2> corner{};  // [side][x]
+  for (int side : {0, 1}) {
+    const size_t i = static_cast<size_t>(side);
+    const int x_beam = find_at(x_beams, {at.row, at.frame + side, at.storey});
+    beam[i] = x_beam < 0 ? -1 : own_body.at(x_beam);
+    for (int x : {0, 1}) corner[i][static_cast<size_t>(x)] = node_at({at.row + x, at.frame + side, at.storey});
+  }
+  const auto clear = [&](int row) { return half_of_node({row, at.frame, at.storey}).x; };
+  const double width = span_x - clear(at.row) - clear(at.row + 1);
+  if (beam[0] >= 0 && beam[1] >= 0) {
+    const Vec3 p_W{m.start.x + clear(at.row) + 0.5 * width, middle.y, middle.z};
+    join(m.name, beam[0], beam[1], p_W, y_beam_axes(), width, span_y);
+    return;
+  }
+  for (size_t x : {0UL, 1UL})
+    join(m.name + (x == 0 ? "/y1" : "/y2"), beam[0] >= 0 ? beam[0] : corner[0][x],
+         beam[1] >= 0 ? beam[1] : corner[1][x], {middle.x + (x == 0 ? -0.25 : 0.25) * span_x, middle.y, middle.z},
+         y_beam_axes(), 0.5 * width, span_y);
+  for (size_t side : {0UL, 1UL})
+    if (beam[side] < 0)
+      join(m.name + (side == 0 ? "/x1" : "/x2"), corner[side][0], corner[side][1],
+           {middle.x, middle.y + (side == 0 ? -0.25 : 0.25) * span_y, middle.z}, x_beam_axes(), 0.5 * span_y, span_x);
 }
 
 void Builder::connect_wall(const GridPoint& at, int index, bool along_x) {

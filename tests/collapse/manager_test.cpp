@@ -120,6 +120,11 @@ TEST(Manager, AFloorWithoutBeamsAlongXHangsOnTheJoints) {
   expect_exact_mass(plan, b);
   EXPECT_TRUE(
       std::none_of(b.map.bodies.begin(), b.map.bodies.end(), [](const BodyEntry& e) { return e.kind == "beam"; }));
+  // 4 feet, 4 hinges, 2 beams and the slab's four strips between its quarters
+  EXPECT_EQ(b.counts.force_elements, 14);
+  std::string message;
+  mbs::Simulation s(b.model, {});
+  EXPECT_TRUE(s.find_equilibrium(message)) << message;
 }
 
 TEST(Manager, BuildsALoneColumn) {
