@@ -19,11 +19,13 @@ constexpr long kSearchPause = 20;        // steps between searches that breaks a
 constexpr double kStickStiffness = 0.3;  // of the restituting normal stiffness
 constexpr double kStickDamping = 0.3;    // times mass times contact frequency
 
+constexpr double kPointShare = 0.25;  // of a pair's stiffness at each of its points, four of which make a face
+
 /// Share of the full spring rate that acts: 1 while approaching for the whole step, 0 while parting, between them the
-/// part of the step before the approach ends under this force alone.
-double approach_share(double speed, double full_force, double inverse_mass, double h) {
+/// part of the step before the approach ends under the forces of `points` such contacts.
+double approach_share(double speed, double full_force, double inverse_mass, int points, double h) {
   if (speed <= 0) return 0;
-  const double after = speed - h * inverse_mass * full_force;
+  const double after = speed - h * inverse_mass * points * full_force;
   return after >= 0 ? 1 : speed / (speed - after);
 }
 
@@ -197,7 +199,7 @@ void System::evaluate_ground_contact(double h) {
         const Vec3 lever = transpose_times(s.R[b], cross(r, n));
         const double inverse_mass = body.inverse_mass + dot(lever, body.inverse_inertia * lever);
         const double full = stiffness * depth;
-        const double share = approach_share(approach, full, inverse_mass, h);
+        const double share = approach_share(approach, full, inverse_mass, std::max(1, s.contact_count[b]), h);
         const double f = full * (e2 + (1 - e2) * share);
 
         const double limit = c.friction * f;
@@ -223,6 +225,7 @@ void System::evaluate_ground_contact(double h) {
         g.depth = depth;
         g.stick = stick;
         g.friction = ft;
+        ++contact_count[b];
         if (!g.touching) {
           g.touching = true;
           if (!s.touched_ground[b]) {
@@ -279,7 +282,8 @@ void System::evaluate_body_contact(double h) {
     if (points.count > 0 && deepest > pair.born) {
       const double wa = s.body[a].inverse_mass, wb = s.body[b].inverse_mass;
       const double reduced = 1 / (wa + wb);
-      const double stiffness = 0.5 * reduced * c.contact_frequency * c.contact_frequency;
+      const double stiffness = kPointShare * reduced * c.contact_frequency * c.contact_frequency;
+      const int others = std::max({points.count, fixed[a] ? 0 : s.contact_count[a], fixed[b] ? 0 : s.contact_count[b]});
       const Vec3 n = points.normal;  // from a to b
       for (int i = 0; i < points.count; ++i) {
         const double depth = points.depth[i] - pair.born;
@@ -292,9 +296,12 @@ void System::evaluate_body_contact(double h) {
         const double inverse_mass =
             wa + wb + dot(la, s.body[a].inverse_inertia * la) + dot(lb, s.body[b].inverse_inertia * lb);
         const double full = stiffness * depth;
-        const double f = full * (e2 + (1 - e2) * approach_share(approach, full, inverse_mass, h));
+        const double f = full * (e2 + (1 - e2) * approach_share(approach, full, inverse_mass, others, h));
         // Coulomb friction, viscous below the speed at which the limit is reached
-        const double speed = norm(v_t), viscous = 0.5 * reduced * c.contact_frequency;
+        // and never more than brings all the points to rest within two steps
+        const double speed = norm(v_t);
+        double viscous = 0.5 * reduced * c.contact_frequency;
+        if (h > 0) viscous = std::min(viscous, 0.5 / (h * inverse_mass * others));
         const double ft = std::min(c.body_friction * f, viscous * speed);
         const Vec3 total = -f * n - (speed > 0 ? ft / speed : 0.0) * v_t;  // on a
         push(a, ra, total);
@@ -306,6 +313,8 @@ void System::evaluate_body_contact(double h) {
         stored += 0.5 * e2 * stiffness * depth * depth;
         touching = true;
         ++body_contacts;
+        ++contact_count[a];
+        ++contact_count[b];
         if (!pair.touching) {
           const long number = static_cast<long>(pair.a) * static_cast<long>(B) + pair.b;
           const auto at = std::lower_bound(s.touched_pairs.begin(), s.touched_pairs.end(), number);

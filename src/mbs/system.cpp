@@ -166,6 +166,8 @@ void System::compile() {
   torque.assign(B, {});
   contact_force.assign(B, {});
   contact_torque.assign(B, {});
+  contact_count.assign(B, 0);
+  s.contact_count.assign(B, 0);
   s.gravity_at_start = calc_energy().gravity;
 }
 
@@ -431,10 +433,12 @@ void System::evaluate_forces(double h) {
   if (model.contact.ground || model.contact.bodies) {
     std::fill(contact_force.begin(), contact_force.end(), Vec3{});
     std::fill(contact_torque.begin(), contact_torque.end(), Vec3{});
+    std::fill(contact_count.begin(), contact_count.end(), 0);
     if (state.search_due) find_pairs();
     if (model.contact.ground) evaluate_ground_contact(h);
     if (model.contact.bodies) evaluate_body_contact(h);
     add_contact_work(h);
+    state.contact_count.swap(contact_count);
   }
 }
 

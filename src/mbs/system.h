@@ -101,6 +101,7 @@ struct State {
   std::vector<CompiledShape> shapes;
   std::vector<GroundPoint> ground_points;
   std::vector<unsigned char> touched_ground;
+  std::vector<int> contact_count;    // touching points of each body in the step before (B)
   // connections
   std::vector<ZoneState> element;
   std::vector<ZoneState> rotational;
@@ -181,6 +182,7 @@ class System {
   std::vector<double> joint_matrix, joint_rhs, joint_impulse;
   Vec3 ground_reaction, ground_contact;
   int body_contacts = 0;
+  std::vector<int> contact_count;  // being counted (B)
   View view;
 
   void say(Happening h) const {
