@@ -250,7 +250,7 @@ void System::evaluate_body_contact(double h) {
       const Vec3 d = s.p[b] - s.p_at_search[b];
       // rotation moves a shape's far end as well
       const double turned = norm(s.w[b]) * s.body[b].radius * h * static_cast<double>(s.step_index - s.last_search);
-      if (dot(d, d) > kSearchTravel * kSearchTravel || turned > kSearchTravel) {
+      if (norm(d) + turned > kSearchTravel) {
         s.search_due = true;
         s.last_search = 0;  // not to be put off
       }

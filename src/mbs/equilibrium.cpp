@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <utility>
 
 #include "mbs/system.h"
@@ -195,14 +196,22 @@ void System::choose_step() {
     elastic = find_highest(inverse_mass, inverse_inertia, assembly.make_stiffness(true));
     // and after the events, which make bodies lighter and elements softer
     std::vector<double> share(elements.size(), 1);
+    std::vector<double> soft_from(elements.size(), kUnlimited);  // when an element has its share only
     bool changes = false;
     for (const Event& event : model.events)
       for (const Action& a : event.actions) {
-        changes = changes || a.kind == Action::Kind::ReplaceBody;
-        if (a.kind == Action::Kind::SwitchLaw) share[static_cast<size_t>(a.element.index)] = a.stiffness_share;
-        if (a.kind == Action::Kind::RemoveElement) share[static_cast<size_t>(a.element.index)] = 0;
+        const size_t e = static_cast<size_t>(a.element.index);
+        if (a.kind == Action::Kind::SwitchLaw) share[e] = a.stiffness_share, soft_from[e] = event.time + a.ramp;
+        if (a.kind == Action::Kind::RemoveElement) share[e] = 0, soft_from[e] = event.time;
+      }
+    for (const Event& event : model.events)
+      for (const Action& a : event.actions) {
         if (a.kind != Action::Kind::ReplaceBody) continue;
+        changes = true;
         const size_t b = static_cast<size_t>(a.body.index);
+        // what still holds the lighter body at full stiffness counts in full
+        for (const int entry : incidence[b])
+          if (const size_t e = static_cast<size_t>(entry / 2); soft_from[e] > event.time) share[e] = 1;
         if (fixed[b] || 1 / a.replacement.mass < inverse_mass[b]) continue;
         inverse_mass[b] = 1 / a.replacement.mass;
         inverse_inertia[b] = state.R[b] * inverse(a.replacement.inertia) * transpose(state.R[b]);
@@ -231,6 +240,7 @@ bool System::find_equilibrium(std::string& message) {
   const auto saved_report = std::exchange(options.on_happening, nullptr);
   const auto finish = [&](bool good) {
     options.on_happening = saved_report;
+    ignores_limits = false;
     return good;
   };
 
@@ -299,6 +309,10 @@ bool System::find_equilibrium(std::string& message) {
 
   const std::vector<ZoneState> virgin = state.element, virgin_rotational = state.rotational;
   std::vector<std::array<double, 6>> multiplier(joints.size(), std::array<double, 6>{});
+  // first without limits, so that an overloaded element can be named; then with them
+  ignores_limits = true;
+  size_t most_loaded = 0;
+  double most_load = 0;
   double unbalanced = 0, gap_left = 0, best = 1e300;
   int idle = 0;
   constexpr int most = 400;
@@ -348,11 +362,19 @@ bool System::find_equilibrium(std::string& message) {
     summary.equilibrium_iterations = round;
     summary.equilibrium_residual = unbalanced;
     if (!std::isfinite(unbalanced)) break;
-    if (unbalanced < 1e-11 && gap_left < 1e-11) break;
+    if (ignores_limits && ((unbalanced < 1e-6 && gap_left < 1e-6) || round == most / 2)) {
+      for (size_t i = 0; i < elements.size(); ++i)
+        if (const double u = calc_utilisation(elements[i].zone, laws, 0, state.element[i]); u > most_load)
+          most_load = u, most_loaded = i;
+      ignores_limits = false;
+      continue;
+    }
+    if (!ignores_limits && unbalanced < 1e-11 && gap_left < 1e-11) break;
     // round-off ends the improvement of very stiff models earlier
     idle = unbalanced < 0.5 * best ? 0 : idle + 1;
     best = std::min(best, unbalanced);
     if (round == most || (idle > 10 && unbalanced < good_enough)) break;
+    state.element = virgin;
     if (round < fresh && !factorise()) return finish(false);
     const Vector d = solver.solve(penalised);
     for (size_t i = 0; i < assembly.free_bodies().size(); ++i) {
@@ -364,17 +386,17 @@ bool System::find_equilibrium(std::string& message) {
     }
   }
   if (!(unbalanced < good_enough)) {
-    // name the most loaded element: it says where the capacity ends
-    size_t worst = 0;
-    double highest = -1;
-    for (size_t i = 0; i < elements.size(); ++i) {
-      const double u = state.element[i].live ? calc_utilisation(elements[i].zone, laws, 0, state.element[i]) : 1e9;
-      if (u > highest) highest = u, worst = i;
+    char numbers[200];
+    std::snprintf(numbers, sizeof numbers,
+                  "no dead-load equilibrium after %d iterations: the largest unbalanced force is %.2g of the weight",
+                  summary.equilibrium_iterations, unbalanced);
+    message = numbers;
+    if (most_load > 0) {
+      std::snprintf(numbers, sizeof numbers,
+                    "; without limits element \"%s\" would be loaded to %.0f %% of its capacity",
+                    model.elements[most_loaded].name.substr(0, 60).c_str(), 100 * most_load);
+      message += numbers;
     }
-    message =
-        "no dead-load equilibrium after " + std::to_string(summary.equilibrium_iterations) +
-        " iterations: the largest unbalanced force is " + std::to_string(unbalanced) + " of the weight" +
-        (elements.empty() ? std::string() : ", the most loaded element is \"" + model.elements[worst].name + "\"");
     return finish(false);
   }
   for (auto* list : {&state.element, &state.rotational})

@@ -282,6 +282,7 @@ void System::check_joints() {
     const CompiledJoint& j = joints[i];
     JointState& js = state.joint[i];
     if (!js.live) continue;
+    if (j.kind == Joint::Kind::Revolute && j.rotational < 0) js.angle = calc_angle(j, js.angle);
     const Mat3 F = to_matrix(pose_of(j.parent).q * j.q_PF);
     const double along = dot(F.column(0), js.force);
     const double across2 = dot(js.force, js.force) - along * along;

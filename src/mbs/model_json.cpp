@@ -129,6 +129,7 @@ class Node {
   }
   int integer() const {
     if (!json_->is_number_integer()) fail("must be a whole number");
+    if (json_->is_number_unsigned() && json_->get<std::uint64_t>() > 100'000'000) fail("is out of range");
     const auto x = json_->get<std::int64_t>();
     if (x < -1 || x > 100'000'000) fail("is out of range: " + std::to_string(x));
     return static_cast<int>(x);

@@ -4,6 +4,8 @@
 #include <type_traits>
 
 #include "base/error.h"
+#include "base/hash.h"
+#include "mbs/model_json.h"
 #include "mbs/system.h"
 
 namespace topple::mbs {
@@ -61,8 +63,8 @@ class Reader {
 };
 
 /// Every member of the state and what the next step takes over from this one.
-template <class Archive, class S, class Sys>
-void visit(Archive& ar, S& s, Sys& sys) {
+template <class Archive, class S, class C>
+void visit(Archive& ar, S& s, C& sys) {
   ar(s.step_index), ar(s.time), ar(s.first_kick), ar(s.next_event);
   ar(s.body), ar(s.p), ar(s.v), ar(s.L), ar(s.w), ar(s.q), ar(s.R), ar(s.p_offset);
   ar(s.shapes), ar(s.ground_points), ar(s.touched_ground), ar(s.contact_count);
@@ -75,14 +77,29 @@ void visit(Archive& ar, S& s, Sys& sys) {
   ar(sys.ground_reaction), ar(sys.ground_contact), ar(sys.body_contacts);
 }
 
-constexpr std::uint64_t kMagic = 0x31534e41504f54ULL;  // "TOPANS1"
+constexpr std::uint64_t kMagic = 0x32534e41504f54ULL;  // "TOPANS2"
+
+/// What of the system's scratch the next step takes over, under the same names.
+struct Carried {
+  std::vector<Vec3> force, torque, contact_force, contact_torque, joint_force, joint_torque;
+  std::vector<ElementForce> element_force;
+  Vec3 ground_reaction, ground_contact;
+  int body_contacts = 0;
+};
+
+/// A fingerprint of the model and the step.
+const std::string& identity_of(System& system) {
+  if (system.identity.empty()) system.identity = calc_sha256(to_json(system.model) + std::to_string(system.step));
+  return system.identity;
+}
 
 }  // namespace
 
-std::vector<std::byte> write_snapshot(const System& system) {
+std::vector<std::byte> write_snapshot(System& system) {
   Writer w;
   w(kMagic);
-  w(system.B), w(system.elements.size()), w(system.joints.size()), w(system.step);
+  const std::string& identity = identity_of(system);
+  w(std::vector<char>(identity.begin(), identity.end()));
   visit(w, system.state, system);
   return std::move(w.bytes);
 }
@@ -90,17 +107,28 @@ std::vector<std::byte> write_snapshot(const System& system) {
 void read_snapshot(const std::vector<std::byte>& bytes, System& system) {
   Reader r(bytes);
   std::uint64_t magic = 0;
-  size_t bodies = 0, elements = 0, joints = 0;
-  double step = 0;
-  r(magic), r(bodies), r(elements), r(joints), r(step);
-  if (magic != kMagic || bodies != system.B || elements != system.elements.size() || joints != system.joints.size() ||
-      step != system.step)
-    Reader::fail();
+  std::vector<char> identity;
+  r(magic);
+  if (magic != kMagic) Reader::fail();
+  r(identity);
+  if (std::string(identity.begin(), identity.end()) != identity_of(system)) Reader::fail();
   State state;
-  visit(r, state, system);
+  Carried carried;
+  visit(r, state, carried);
   if (!r.is_at_end()) Reader::fail();
   system.state = std::move(state);
+  system.force = std::move(carried.force);
+  system.torque = std::move(carried.torque);
+  system.contact_force = std::move(carried.contact_force);
+  system.contact_torque = std::move(carried.contact_torque);
+  system.joint_force = std::move(carried.joint_force);
+  system.joint_torque = std::move(carried.joint_torque);
+  system.element_force = std::move(carried.element_force);
+  system.ground_reaction = carried.ground_reaction;
+  system.ground_contact = carried.ground_contact;
+  system.body_contacts = carried.body_contacts;
   system.clusters_due = true;
+  system.started = true;
 }
 
 }  // namespace topple::mbs

@@ -8,7 +8,7 @@ namespace topple::mbs {
 
 class System;
 
-std::vector<std::byte> write_snapshot(const System&);
+std::vector<std::byte> write_snapshot(System&);
 /// Throws InputError if the bytes are not a snapshot of this model.
 void read_snapshot(const std::vector<std::byte>&, System&);
 

@@ -11,27 +11,35 @@ namespace topple::mbs {
 
 void SystemDeleter::operator()(System* s) const { delete s; }
 
-Simulation::Simulation(const Model& model, const Options& options) : system_(new System(model, options)) {
-  system_->evaluate_start();
-}
+Simulation::Simulation(const Model& model, const Options& options) : system_(new System(model, options)) {}
 Simulation::~Simulation() = default;
 Simulation::Simulation(Simulation&&) noexcept = default;
 Simulation& Simulation::operator=(Simulation&&) noexcept = default;
 
-bool Simulation::find_equilibrium(std::string& message) {
-  const bool found = system_->find_equilibrium(message);
-  if (found) system_->evaluate_start();
-  return found;
+bool Simulation::find_equilibrium(std::string& message) { return system_->find_equilibrium(message); }
+bool Simulation::advance_step() {
+  system_->start();
+  return system_->advance_step();
 }
-bool Simulation::advance_step() { return system_->advance_step(); }
 double Simulation::time() const { return system_->state.time; }
 double Simulation::step() const { return system_->step; }
-const View& Simulation::calc_view() { return system_->calc_view(); }
-std::vector<std::byte> Simulation::snapshot() const { return write_snapshot(*system_); }
+const View& Simulation::calc_view() {
+  system_->start();
+  return system_->calc_view();
+}
+std::vector<std::byte> Simulation::snapshot() const {
+  system_->start();
+  return write_snapshot(*system_);
+}
 void Simulation::restore(const std::vector<std::byte>& bytes) { read_snapshot(bytes, *system_); }
 Summary Simulation::summary() const { return system_->summary; }
 
+void System::start() {
+  if (!started) evaluate_start();
+}
+
 void System::evaluate_start() {
+  started = true;
   joint_force.assign(B, {});
   joint_torque.assign(B, {});
   clusters_due = true;
@@ -72,16 +80,26 @@ Summary run(const Model& model, const Options& options) {
       return out;
     }
   }
-  s.evaluate_start();
+  s.start();
   const double h = s.step;
   const long steps = static_cast<long>(std::ceil(options.duration / h - 1e-9));
   double last_event = 0;
   for (const Event& e : model.events) last_event = std::max(last_event, e.time);
   const long rest_steps = std::max(1L, static_cast<long>(options.rest_time / h));
+  const double interval = std::max(options.frame_interval, h);
   const auto begin = std::chrono::steady_clock::now();
   long frame = 0;
+  double shown = -1;
+  std::vector<bool> softened(s.elements.size() + s.rotationals.size(), false);
   const auto show = [&] {
+    if (shown == s.state.time) return;
+    shown = s.state.time;
     const View& v = s.calc_view();
+    for (size_t i = 0; i < softened.size(); ++i)
+      if (!softened[i] && v.element_state[i] == ElementState::Softening) {
+        softened[i] = true;
+        s.say({Happening::Kind::ElementSoftening, s.state.time, static_cast<int>(i), -1, {}, 0});
+      }
     s.state.largest_residual = std::max(s.state.largest_residual, std::abs(v.energy.residual));
     s.state.released = v.energy.released;
     if (options.on_frame) options.on_frame(v);
@@ -94,10 +112,10 @@ Summary run(const Model& model, const Options& options) {
       out.ending = Summary::Ending::Diverged;
       break;
     }
-    const bool due = s.state.time >= static_cast<double>(frame) * options.frame_interval - 0.5 * h;
+    const bool due = s.state.time >= static_cast<double>(frame) * interval - 0.5 * h;
     if (due) {
       show();
-      while (s.state.time >= static_cast<double>(frame) * options.frame_interval - 0.5 * h) ++frame;
+      while (s.state.time >= static_cast<double>(frame) * interval - 0.5 * h) ++frame;
       if (options.progress.report) options.progress.report(s.state.time, options.duration);
     }
     if (options.progress.is_cancelled()) {

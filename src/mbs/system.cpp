@@ -236,7 +236,14 @@ void System::evaluate_elements(double h) {
     const Vec3 u = transpose_times(R_WF, p_M - p_F);
     const Vec3 r = log_rotation(conjugate(q_F) * q_M);
     const bool was_yielded = z.yielded;
-    advance_zone(e.zone, laws, {{u.x, u.y, u.z, r.x, r.y, r.z}}, state.time, h, z);
+    const Six d{{u.x, u.y, u.z, r.x, r.y, r.z}};
+    if (ignores_limits) {
+      ZoneParameters elastic = e.zone;
+      elastic.stations = 0;
+      advance_zone(elastic, laws, d, state.time, h, z);
+    } else {
+      advance_zone(e.zone, laws, d, state.time, h, z);
+    }
     const double* f = z.resultant.c;
     // torque conjugate to the rate of the rotation vector (docs/theory/multibody.md, eq. 4)
     const Vec3 m{f[3], f[4], f[5]};
@@ -300,7 +307,13 @@ void System::evaluate_rotationals(double h) {
     Six d;
     d.c[0] = -dot(F.column(0), js.force);
     d.c[5] = js.angle;
-    advance_zone(c.zone, laws, d, state.time, h, z);
+    if (ignores_limits) {
+      ZoneParameters elastic = c.zone;
+      elastic.stations = 0;
+      advance_zone(elastic, laws, d, state.time, h, z);
+    } else {
+      advance_zone(c.zone, laws, d, state.time, h, z);
+    }
     if (z.yielded && !was_yielded)
       say({Happening::Kind::ElementYielded, state.time, static_cast<int>(elements.size() + i), -1, {}, 0});
     if (!z.live) {
@@ -369,8 +382,9 @@ void System::fire_events() {
         }
         case Action::Kind::SwitchLaw: {
           ZoneState& z = state.element[static_cast<size_t>(a.element.index)];
+          if (z.next_law >= 0) z.base_law = z.next_law;
           z.next_law = a.law.index;
-          z.ramp_begin = state.time;
+          z.ramp_begin = event.time;
           z.ramp = a.ramp;
           z.next_share = a.stiffness_share;
           break;

@@ -101,7 +101,7 @@ struct State {
   std::vector<CompiledShape> shapes;
   std::vector<GroundPoint> ground_points;
   std::vector<unsigned char> touched_ground;
-  std::vector<int> contact_count;    // touching points of each body in the step before (B)
+  std::vector<int> contact_count;  // touching points of each body in the step before (B)
   // connections
   std::vector<ZoneState> element;
   std::vector<ZoneState> rotational;
@@ -168,6 +168,9 @@ class System {
   std::vector<unsigned char> fixed;
   std::vector<std::vector<int>> incidence;  // elements of each body: 2 * element + side
 
+  bool ignores_limits = false;  // elements stay elastic (equilibrium's first phase)
+  bool started = false;         // forces at the start are there
+
   // scratch
   std::vector<ElementForce> element_force;
   std::vector<Vec3> force, torque;                  // applied on bodies (B)
@@ -178,6 +181,7 @@ class System {
   std::vector<unsigned char> in_cluster;  // (B)
   std::vector<JointCluster> clusters;
   bool clusters_due = true;
+  std::string identity;  // of the model, for snapshots
   std::vector<JointRow> joint_rows;
   std::vector<double> joint_matrix, joint_rhs, joint_impulse;
   Vec3 ground_reaction, ground_contact;
@@ -194,6 +198,7 @@ class System {
   void choose_step();
   /// Forces at the start, and the ledger set to zero there.
   void evaluate_start();
+  void start();
   void fire_events();
   void evaluate_elements(double h);
   void evaluate_rotationals(double h);

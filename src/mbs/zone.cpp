@@ -120,7 +120,7 @@ namespace {
 class Limits {
  public:
   Limits(const std::vector<CompiledLaw>& laws, int law, const ZoneState& z, double time)
-      : from_(laws[static_cast<size_t>(law)]), to_(from_) {
+      : from_(laws[static_cast<size_t>(z.base_law < 0 ? law : z.base_law)]), to_(from_) {
     if (z.next_law < 0) return;
     to_ = laws[static_cast<size_t>(z.next_law)];
     share_ = z.ramp > 0 ? std::clamp((time - z.ramp_begin) / z.ramp, 0.0, 1.0) : 1.0;
@@ -414,7 +414,7 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
         if (ay <= 0.5 * limit_y && az <= 0.5 * limit_z) continue;  // p >= 1: inside for sure
         const double ry = limit_y > 0 ? ay / limit_y : (ay > 0 ? kUnlimited : 0);
         const double rz = limit_z > 0 ? az / limit_z : (az > 0 ? kUnlimited : 0);
-        const double e = limits.law().biaxial_exponent;
+        const double e = station_limits.law().biaxial_exponent;
         double scale_y = 1, scale_z = 1;
         if (std::isinf(ry) || std::isinf(rz)) {
           scale_y = std::isinf(ry) ? 0 : std::min(1.0, 1 / std::max(ry, kTiny));
@@ -442,7 +442,7 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
           st.turned += std::sqrt(turn2);
           st.reached = std::max(st.reached, std::sqrt(length2));
         }
-        if (st.reached >= limits.law().rupture_rotation) broke = BreakReason::Rotation;
+        if (st.reached >= station_limits.law().rupture_rotation) broke = BreakReason::Rotation;
       }
       if (!changed) break;
     }
@@ -455,7 +455,7 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
           StationState& st = z.station[s];
           m[q][s] = Plane::at(force[q == 0 ? 4 : 5], force[q == 0 ? 2 : 1], p.x[s], planes[q].sign);
           const double added = phi[q][s] - st.phi[q] - st.soft[q] * m[q][s];
-          const double share = limits.law().damage_share;
+          const double share = Limits(laws, p.law[s], z, time).law().damage_share;
           if (share > 0 && added * m[q][s] > 0 && std::abs(m[q][s]) * (std::abs(phi[q][s]) + kTiny) > 0) {
             const double most =
                 std::min(share * std::abs(phi[q][s]) / std::abs(m[q][s]), kMostDamage / station_stiffness[q][s]);
@@ -536,7 +536,9 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
       const double stretch = e - z.flowed[i];
       damper = p.viscous * k[i] * stretch;
       damper_energy += 0.5 * damper * stretch;
-      z.damping += 0.5 * (damper + z.damper_force[i]) * (d.c[i] - z.deformation[i]);
+      const double mean = 0.5 * (damper + z.damper_force[i]), stretched = e - z.elastic[i];
+      z.damping += mean * stretched;
+      z.plastic += mean * (d.c[i] - z.deformation[i] - stretched);
     } else {
       z.flowed[i] = e;
     }
@@ -576,7 +578,7 @@ double calc_utilisation(const ZoneParameters& p, const std::vector<CompiledLaw>&
     const MomentLimit ly = station_limits.moment(0, axial, st), lz = station_limits.moment(1, axial, st);
     const double ry = ratio(std::abs(my), integrity * (my >= 0 ? ly.positive : ly.negative));
     const double rz = ratio(std::abs(mz), integrity * (mz >= 0 ? lz.positive : lz.negative));
-    const double e = limits.law().biaxial_exponent;
+    const double e = station_limits.law().biaxial_exponent;
     u = std::max(u, std::pow(std::pow(ry, e) + std::pow(rz, e), 1 / e));
   }
   const double vy = ratio(std::abs(force[1]), limits.shear(0, z.slipped, -force[0]));

@@ -70,6 +70,7 @@ struct ZoneState {
   double twist = 0, twisted = 0;         // [rad]
   StationState station[2];
   // a law taking over within a ramp
+  int base_law = -1;  // of all stations instead of their own, once a switch is done and another begins
   int next_law = -1;
   double ramp_begin = 0, ramp = 0;
   double next_share = 1;                   // of the stiffness, once the ramp is over
