@@ -93,6 +93,8 @@ struct Builder {
   };
   Stiffness calc_stiffness(const MemberZones&) const;
   mbs::LawId law_of(int zone, const Stiffness&, const std::string& member);
+  /// Law of a rotational element: bending about the hinge axis is that about z of its frame.
+  mbs::LawId hinge_law_of(int zone, const Stiffness&, const std::string& name);
   Pose frame_in(int body, const Vec3& p_W, const Mat3& R_WF) const;
   mbs::ElementId add_element(const std::string& name, int member, int a, int b, const Vec3& p_W, const Mat3& R_WF,
                              const Vec3& translational, const Vec3& rotational, std::vector<mbs::Station> stations);

@@ -43,6 +43,10 @@ void Builder::add_events() {
 
     mbs::Event event;
     event.name = m.name;
+    // concrete and stiffness go together, when the ramp of the limits is over
+    mbs::Event lighter;
+    lighter.time = firing.time + k.charge_release_time;
+    lighter.name = m.name + " thrown out";
     event.time = firing.time;
     EventEntry entry{firing.stage, firing.charge, m.name, firing.time, 0};
 
@@ -94,7 +98,7 @@ void Builder::add_events() {
       act.kind = mbs::Action::Kind::ReplaceBody;
       act.body = mbs::BodyId{b};
       act.replacement = std::move(replacement);
-      event.actions.push_back(std::move(act));
+      lighter.actions.push_back(std::move(act));
     }
     if (m.kind == MemberKind::Column && m.storey == 0)
       for (GroundColumn& g : map.ground_columns) g.is_fired |= g.member == m.name;
@@ -111,10 +115,19 @@ void Builder::add_events() {
         act.law = law_of(station.damaged, calc_stiffness(z), m.name + "/transition");
         event.actions.push_back(act);
       } else if (z.rotational >= 0) {
-        map.notes.push_back(m.name + ": the charge also damages the hinge at the column's top, which keeps its law.");
+        mbs::Action act;
+        act.kind = mbs::Action::Kind::SwitchLaw;
+        act.rotational = z.rotational;
+        act.ramp = k.charge_release_time;
+        act.law = hinge_law_of(station.damaged, calc_stiffness(z), m.name + "/transition");
+        event.actions.push_back(act);
       }
     }
     model.events.push_back(std::move(event));
+    map.events.push_back(entry);
+    if (lighter.actions.empty()) continue;
+    model.events.push_back(std::move(lighter));
+    entry.is_aftermath = true;
     map.events.push_back(entry);
   }
 

@@ -134,6 +134,12 @@ mbs::LawId Builder::law_of(int zone, const Stiffness& s, const std::string& name
   return id;
 }
 
+mbs::LawId Builder::hinge_law_of(int zone, const Stiffness& s, const std::string& name) {
+  mbs::ZoneLaw law = make_zone_law(library.rcc(zone), s.EI_y, s.EI_z, name, k);
+  if (!hinge_about_y) law.moment_z = law.moment_y;
+  return mbs::add_law(model, law);
+}
+
 Pose Builder::frame_in(int body, const Vec3& p_W, const Mat3& R_WF) const {
   const Vec3 origin = body < 0 ? Vec3{} : model.bodies[static_cast<size_t>(body)].X_WB.p;
   return {p_W - origin, to_quat(R_WF)};
@@ -198,9 +204,8 @@ void Builder::connect_ground_column(const GridPoint& at, int index) {
   joint.X_PF = frame_in(shaft, top, axes);
   joint.X_CM = frame_in(node, top, axes);
   const nearfield::Rcc& rcc = library.rcc(z.station[1].zone);
-  mbs::ZoneLaw law = model.laws[static_cast<size_t>(law_of(z.station[1].zone, s, m.name + "/top").index)];
-  if (!hinge_about_y) law.moment_z = law.moment_y;
-  law.name = m.name + "/top";
+  const mbs::LawId law_id = hinge_law_of(z.station[1].zone, s, m.name + "/top");
+  const mbs::ZoneLaw& law = model.laws[static_cast<size_t>(law_id.index)];
   const double stiffness = 6 * (hinge_about_y ? s.EI_z : s.EI_y) / L;
   joint.tension_limit = *std::max_element(rcc.tension.force.begin(), rcc.tension.force.end());
   // the limit that follows the normal force is the foot's, which carries the same shear; here the largest possible one
@@ -217,7 +222,7 @@ void Builder::connect_ground_column(const GridPoint& at, int index) {
   hinge.joint = mbs::add_joint(model, joint);
   hinge.stiffness = stiffness;
   hinge.damping_ratio = k.zone_damping_ratio;
-  hinge.law = mbs::add_law(model, law);
+  hinge.law = law_id;
   z.rotational = static_cast<int>(model.rotational_elements.size());
   model.rotational_elements.push_back(hinge);
   map.ground_columns.push_back({m.name, m.start, top, false, z.normal_force, hinge});

@@ -310,6 +310,15 @@ void add_rigid_block(const Context& c) {
   const std::string model_words = fmt::format(
       "A rigid block of {:.0f} t over {} hinges with {:.2f} MNm in all, its mass centre {:.2f} m ahead of them",
       block.mass / unit::t, row.size(), block.plastic_moment * 1e-6, block.ahead);
+  // a block that has already left its place is not released from rest
+  bool rests = true;
+  for (const BlockFrame& f : c.recorder.block_frames())
+    rests &= f.time > block.release || norm(f.displacement) < c.k.stands_displacement;
+  if (!rests) {
+    c.add("rigid_block", "Mechanism", "Rigid block",
+          "No comparison: the upper block was in motion before the last stage fired.", kNone, "rad");
+    return;
+  }
   if (block.mass * block.gravity * block.ahead <= block.plastic_moment) {
     c.add("rigid_block", "Mechanism", "Rigid block", model_words + ", would not tilt.", kNone, "rad");
   } else if (at != c.r.time.end()) {

@@ -34,8 +34,9 @@ struct ZoneEntry {
 struct EventEntry {
   int stage = 0, charge = 0;  // indices into the plan
   std::string member;
-  double time = 0;         // [s]
-  double debris_mass = 0;  // dropped from the model [kg]
+  double time = 0;            // [s]
+  double debris_mass = 0;     // dropped from the model [kg]
+  bool is_aftermath = false;  // the concrete leaving, after the charge itself
 };
 
 /// A length of a member that a charge destroys; it leaves the model when the charge fires.

@@ -281,6 +281,7 @@ void Recorder::add_happening(const mbs::Happening& h) {
         break;
       }
       const EventEntry& entry = map_.events[static_cast<size_t>(h.index)];
+      if (entry.is_aftermath) break;
       if (entry.stage > stage_shown_) {
         stage_shown_ = entry.stage;
         add_event({h.time, "stage", map_.stages[static_cast<size_t>(entry.stage)],
