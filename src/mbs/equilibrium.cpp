@@ -200,6 +200,7 @@ void System::choose_step() {
     bool changes = false;
     for (const Event& event : model.events)
       for (const Action& a : event.actions) {
+        if (!a.element.is_valid()) continue;
         const size_t e = static_cast<size_t>(a.element.index);
         if (a.kind == Action::Kind::SwitchLaw) share[e] = a.stiffness_share, soft_from[e] = event.time + a.ramp;
         if (a.kind == Action::Kind::RemoveElement) share[e] = 0, soft_from[e] = event.time;

@@ -244,7 +244,10 @@ void check_model(const Model& model) {
           c.index(place + ".element", a.element, model.elements);
           break;
         case Action::Kind::SwitchLaw:
-          c.index(place + ".element", a.element, model.elements);
+          if (a.rotational < 0) c.index(place + ".element", a.element, model.elements);
+          if (a.rotational >= 0 && static_cast<size_t>(a.rotational) >= model.rotational_elements.size())
+            c.fail(place + ".rotational", "names no rotational element");
+          if (a.rotational >= 0 && a.element.is_valid()) c.fail(place, "names an element and a rotational element");
           c.index(place + ".law", a.law, model.laws);
           if (a.element.is_valid() && static_cast<size_t>(a.element.index) < model.elements.size() &&
               model.elements[static_cast<size_t>(a.element.index)].stations.empty())

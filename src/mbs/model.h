@@ -158,6 +158,7 @@ struct Action {
   JointId joint;
   BodyId body;
   int cable = -1;
+  int rotational = -1;  // SwitchLaw: a rotational element instead of an element
   LawId law;
   double ramp = 0;             // [s]
   double stiffness_share = 1;  // SwitchLaw: what is left of the element's stiffness after the ramp, (0, 1]

@@ -256,7 +256,7 @@ Event event_from(const Node& n) {
   e.time = n["time"].number();
   if (n.has("name")) e.name = n["name"].text();
   for (const Node& a : n["actions"].items()) {
-    a.only({"do", "element", "joint", "body", "cable", "law", "ramp", "stiffness_share", "replacement"});
+    a.only({"do", "element", "rotational", "joint", "body", "cable", "law", "ramp", "stiffness_share", "replacement"});
     Action action;
     const std::string word = a["do"].text();
     if (word == word_of(Action::Kind::RemoveElement)) {
@@ -264,7 +264,12 @@ Event event_from(const Node& n) {
       action.element = {a["element"].integer()};
     } else if (word == word_of(Action::Kind::SwitchLaw)) {
       action.kind = Action::Kind::SwitchLaw;
-      action.element = {a["element"].integer()};
+      if (a.has("rotational")) {
+        action.rotational = a["rotational"].integer();
+        if (action.rotational < 0) a["rotational"].fail("must not be negative");
+      } else {
+        action.element = {a["element"].integer()};
+      }
       action.law = {a["law"].integer()};
       read(a, "ramp", action.ramp);
       read(a, "stiffness_share", action.stiffness_share);
@@ -362,7 +367,11 @@ std::string to_json(const Model& m) {
           x["element"] = a.element.index;
           break;
         case Action::Kind::SwitchLaw:
-          x["element"] = a.element.index;
+          if (a.rotational >= 0) {
+            x["rotational"] = a.rotational;
+          } else {
+            x["element"] = a.element.index;
+          }
           x["law"] = a.law.index;
           x["ramp"] = a.ramp;
           x["stiffness_share"] = a.stiffness_share;

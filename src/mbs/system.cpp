@@ -381,7 +381,8 @@ void System::fire_events() {
           break;
         }
         case Action::Kind::SwitchLaw: {
-          ZoneState& z = state.element[static_cast<size_t>(a.element.index)];
+          ZoneState& z = a.rotational >= 0 ? state.rotational[static_cast<size_t>(a.rotational)]
+                                           : state.element[static_cast<size_t>(a.element.index)];
           if (z.next_law >= 0) z.base_law = z.next_law;
           z.next_law = a.law.index;
           z.ramp_begin = event.time;

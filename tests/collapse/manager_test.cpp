@@ -80,7 +80,7 @@ TEST(Manager, BuildsTheStorehouseInThePapersOrder) {
   EXPECT_EQ(b.counts.force_elements, 602);
   expect_exact_mass(plan, b);
   EXPECT_NEAR(b.map.fall_direction.x, -1, 1e-12);
-  EXPECT_EQ(b.model.events.size(), 15u);
+  EXPECT_EQ(b.model.events.size(), 30u);  // 15 charges, and what each throws out when its ramp is over
 }
 
 TEST(Manager, ShapesOfPartsThatAreNotJoinedKeepApart) {
@@ -196,25 +196,31 @@ TEST(Manager, StiffnessOfMembersIsThatOfPrismaticBars) {
 TEST(Manager, AChargeRemovesItsLengthFromTheShaft) {
   const product::Plan plan = read(portal(charge("C-A1-0")));
   const Built b = build(plan);
-  ASSERT_EQ(b.model.events.size(), 1u);
-  const mbs::Event& e = b.model.events[0];
-  ASSERT_EQ(e.actions.size(), 2u);
-  EXPECT_EQ(e.actions[0].kind, mbs::Action::Kind::SwitchLaw);
-  EXPECT_EQ(b.model.elements[static_cast<size_t>(e.actions[0].element.index)].name, "C-A1-0/foot");
-  EXPECT_EQ(e.actions[1].kind, mbs::Action::Kind::ReplaceBody);
+  ASSERT_EQ(b.model.events.size(), 2u);
+  const mbs::Event &fired = b.model.events[0], &gone = b.model.events[1];
+  ASSERT_FALSE(fired.actions.empty());
+  const mbs::Action& limits = fired.actions[0];
+  EXPECT_EQ(limits.kind, mbs::Action::Kind::SwitchLaw);
+  EXPECT_EQ(b.model.elements[static_cast<size_t>(limits.element.index)].name, "C-A1-0/foot");
+  EXPECT_LT(limits.stiffness_share, 0.1);  // bars alone, over the destroyed length
+  EXPECT_NEAR(gone.time, fired.time + limits.ramp, 1e-12);
+  EXPECT_TRUE(b.map.events[1].is_aftermath);
+  ASSERT_EQ(gone.actions.size(), 1u);
+  const mbs::Action& lighter = gone.actions[0];
+  EXPECT_EQ(lighter.kind, mbs::Action::Kind::ReplaceBody);
   // 1 m of a column of 0.3 x 0.4 m goes, half of it from the stump
   const double per_metre = plan.concretes[0].density * 0.12;
   EXPECT_NEAR(b.map.events[0].debris_mass, per_metre, 1e-6);
-  const mbs::Body& shaft = b.model.bodies[static_cast<size_t>(e.actions[1].body.index)];
-  EXPECT_NEAR(shaft.mass - e.actions[1].replacement.mass, 0.5 * per_metre, 1e-6);
+  const mbs::Body& shaft = b.model.bodies[static_cast<size_t>(lighter.body.index)];
+  EXPECT_NEAR(shaft.mass - lighter.replacement.mass, 0.5 * per_metre, 1e-6);
   // what is left reaches from 1.5 m to the underside of the beam at 2.5 m: its centre rises by a quarter of a metre
-  EXPECT_NEAR(e.actions[1].replacement.X_WB.p.z, 0.25, 1e-9);
+  EXPECT_NEAR(lighter.replacement.X_WB.p.z, 0.25, 1e-9);
 }
 
 TEST(Manager, AFailingChargeDoesNothing) {
   const product::Plan plan = read(portal(charge("C-A1-0", "0 s", "fails = true") + charge("C-B1-0", "0.5 s")));
   const Built b = build(plan);
-  EXPECT_EQ(b.model.events.size(), 1u);
+  EXPECT_EQ(b.model.events.size(), 2u);  // one charge and what it throws out
   EXPECT_EQ(b.map.schedule.size(), 2u);
   EXPECT_EQ(b.map.events[0].member, "C-B1-0");
 }
