@@ -12,6 +12,7 @@ struct Solid {
   Mat3 R;     // axes of a box
   Vec3 half;  // half edges [m]
   double radius = 0;
+  double reach = 0;  // radius of the sphere around it [m]
 };
 
 /// Touching points of two solids, at most eight, all with the same normal.

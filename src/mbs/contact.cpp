@@ -256,20 +256,30 @@ void System::evaluate_body_contact(double h) {
       }
     }
   }
+  // each shape where it is now, at most once a step
+  solids.resize(s.shapes.size());
+  solid_step.resize(s.shapes.size(), -1);
+  const auto solid_of = [&](size_t body, int shape) -> const Solid& {
+    const size_t i = static_cast<size_t>(s.body[body].first_shape + shape);
+    if (solid_step[i] != s.step_index) {
+      solid_step[i] = s.step_index;
+      const CompiledShape& c_shape = s.shapes[i];
+      solids[i] = {c_shape.kind,
+                   s.p[body] + s.R[body] * c_shape.p_BS,
+                   s.R[body] * c_shape.R_BS,
+                   c_shape.half,
+                   c_shape.radius,
+                   c_shape.kind == Shape::Kind::Box ? norm(c_shape.half) : c_shape.radius};
+    }
+    return solids[i];
+  };
   BoxContact points;
   for (PairState& pair : s.pairs) {
     const size_t a = static_cast<size_t>(pair.a), b = static_cast<size_t>(pair.b);
-    const CompiledShape& sa = s.shapes[static_cast<size_t>(s.body[a].first_shape + pair.shape_a)];
-    const CompiledShape& sb = s.shapes[static_cast<size_t>(s.body[b].first_shape + pair.shape_b)];
-    const Vec3 ca = s.p[a] + s.R[a] * sa.p_BS, cb = s.p[b] + s.R[b] * sb.p_BS;
-    const double reach = (sa.kind == Shape::Kind::Box ? norm(sa.half) : sa.radius) +
-                         (sb.kind == Shape::Kind::Box ? norm(sb.half) : sb.radius);
+    const Solid &A = solid_of(a, pair.shape_a), &Bb = solid_of(b, pair.shape_b);
+    const double reach = A.reach + Bb.reach;
     points.count = 0;
-    if (dot(cb - ca, cb - ca) < reach * reach) {
-      const Solid A{sa.kind, ca, s.R[a] * sa.R_BS, sa.half, sa.radius},
-          Bb{sb.kind, cb, s.R[b] * sb.R_BS, sb.half, sb.radius};
-      find_contact(A, Bb, pair.axis, points);
-    }
+    if (dot(Bb.p - A.p, Bb.p - A.p) < reach * reach) find_contact(A, Bb, pair.axis, points);
     double deepest = 0;
     for (int i = 0; i < points.count; ++i) deepest = std::max(deepest, points.depth[i]);
     if (!pair.seen) {

@@ -75,7 +75,7 @@ class Assembly {
   }
   /// Constraint rows of a joint, and how far each is from closed.
   int joint_rows(const CompiledJoint& j, KinematicRow rows[6], double gap[6]) const {
-    const Mat3 F = to_matrix(s_.pose_of(j.parent).q * j.q_PF), M = to_matrix(s_.pose_of(j.child).q * j.q_CM);
+    const Mat3 F = s_.rotation_of(j.parent) * j.R_PF, M = s_.rotation_of(j.child) * j.R_CM;
     const Vec3 p_F = point(j.parent, j.p_PF), p_M = point(j.child, j.p_CM);
     for (int i = 0; i < 3; ++i) {
       Vec3 e;
@@ -100,7 +100,7 @@ class Assembly {
     return j.rows;
   }
   KinematicRow rotational_row(const CompiledJoint& j) const {
-    const Vec3 axis = to_matrix(s_.pose_of(j.parent).q * j.q_PF).column(2);
+    const Vec3 axis = (s_.rotation_of(j.parent) * j.R_PF).column(2);
     return {place(j.parent), place(j.child), {}, -axis, {}, axis};
   }
   KinematicRow cable_row(const Cable& c) const {

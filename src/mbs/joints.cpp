@@ -31,17 +31,17 @@ Frames frames_of(const State& s, const CompiledJoint& j) {
     const size_t b = static_cast<size_t>(j.parent);
     f.lever_parent = s.R[b] * (j.p_PF - s.p_offset[b]);
     f.p_F = s.p[b] + f.lever_parent;
-    f.F = s.R[b] * to_matrix(j.q_PF);
+    f.F = s.R[b] * j.R_PF;
   } else {
-    f.F = to_matrix(j.q_PF);
+    f.F = j.R_PF;
   }
   if (j.child >= 0) {
     const size_t b = static_cast<size_t>(j.child);
     f.lever_child = s.R[b] * (j.p_CM - s.p_offset[b]);
     f.p_M = s.p[b] + f.lever_child;
-    f.M = s.R[b] * to_matrix(j.q_CM);
+    f.M = s.R[b] * j.R_CM;
   } else {
-    f.M = to_matrix(j.q_CM);
+    f.M = j.R_CM;
   }
   return f;
 }
@@ -96,7 +96,7 @@ void System::build_clusters() {
   clusters_due = false;
 }
 
-void System::solve_joints(double h, const std::vector<Vec3>& p0, const std::vector<Quat>& q0) {
+void System::solve_joints(double h) {
   State& s = state;
   const double impulse_time = s.first_kick ? 0.5 * h : h;
   std::fill(joint_force.begin(), joint_force.end(), Vec3{});
@@ -134,6 +134,8 @@ void System::solve_joints(double h, const std::vector<Vec3>& p0, const std::vect
       }
       at += static_cast<size_t>(j.rows);
     }
+    for (const int b : cluster.bodies)
+      world_inverse_inertia[static_cast<size_t>(b)] = calc_world_inverse_inertia(static_cast<size_t>(b));
     // A = J M^-1 J^T, joint by joint where they share a moving body
     size_t at_i = 0;
     for (const int index_i : cluster.joints) {
@@ -146,7 +148,7 @@ void System::solve_joints(double h, const std::vector<Vec3>& p0, const std::vect
           if (b < 0 || fixed[static_cast<size_t>(b)]) continue;
           for (const int side_k : {0, 1}) {
             if (b != (side_k == 0 ? jk.parent : jk.child)) continue;
-            const Mat3 W = calc_world_inverse_inertia(static_cast<size_t>(b));
+            const Mat3& W = world_inverse_inertia[static_cast<size_t>(b)];
             const double w = s.body[static_cast<size_t>(b)].inverse_mass * (side_i == side_k ? 1 : -1);
             for (int c = 0; c < jk.rows; ++c) {
               const JointRow& rc = rows[at_k + static_cast<size_t>(c)];
@@ -219,12 +221,12 @@ void System::solve_joints(double h, const std::vector<Vec3>& p0, const std::vect
       if (j.child >= 0) {
         const size_t b = static_cast<size_t>(j.child);
         vc = s.v[b];
-        wc = calc_world_inverse_inertia(b) * s.L[b];
+        wc = world_inverse_inertia[b] * s.L[b];
       }
       if (j.parent >= 0) {
         const size_t b = static_cast<size_t>(j.parent);
         vp = s.v[b];
-        wp = calc_world_inverse_inertia(b) * s.L[b];
+        wp = world_inverse_inertia[b] * s.L[b];
       }
       for (int r = 0; r < j.rows; ++r, ++at) {
         const JointRow& row = rows[at];
@@ -237,7 +239,8 @@ void System::solve_joints(double h, const std::vector<Vec3>& p0, const std::vect
       for (size_t r = 0; r < n; ++r) total[r] += rhs[r];
       apply(rhs);
       for (const int b : cluster.bodies)
-        drift(static_cast<size_t>(b), h, p0[static_cast<size_t>(b)], q0[static_cast<size_t>(b)]);
+        drift(static_cast<size_t>(b), h, p_before[static_cast<size_t>(b)], q_before[static_cast<size_t>(b)],
+              R_before[static_cast<size_t>(b)]);
       at = 0;
       drift_left = 0;
       for (const int index : cluster.joints) {
@@ -283,7 +286,7 @@ void System::check_joints() {
     JointState& js = state.joint[i];
     if (!js.live) continue;
     if (j.kind == Joint::Kind::Revolute && j.rotational < 0) js.angle = calc_angle(j, js.angle);
-    const Mat3 F = to_matrix(pose_of(j.parent).q * j.q_PF);
+    const Mat3 F = rotation_of(j.parent) * j.R_PF;
     const double along = dot(F.column(0), js.force);
     const double across2 = dot(js.force, js.force) - along * along;
     if (-along > j.tension_limit) {

@@ -128,6 +128,7 @@ void read_snapshot(const std::vector<std::byte>& bytes, System& system) {
   system.ground_contact = carried.ground_contact;
   system.body_contacts = carried.body_contacts;
   system.clusters_due = true;
+  system.solid_step.clear();
   system.started = true;
 }
 

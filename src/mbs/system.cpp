@@ -113,8 +113,8 @@ void System::compile() {
     c.child = j.child.index;
     c.p_PF = j.X_PF.p;
     c.p_CM = j.X_CM.p;
-    c.q_PF = normalized(j.X_PF.q);
-    c.q_CM = normalized(j.X_CM.q);
+    c.R_PF = to_matrix(normalized(j.X_PF.q));
+    c.R_CM = to_matrix(normalized(j.X_CM.q));
     c.rows = j.kind == Joint::Kind::Fixed ? 6 : 5;
     c.tension_limit = j.tension_limit;
     c.shear_limit = j.shear_limit;
@@ -167,6 +167,10 @@ void System::compile() {
   contact_force.assign(B, {});
   contact_torque.assign(B, {});
   contact_count.assign(B, 0);
+  p_before.resize(B);
+  q_before.resize(B);
+  R_before.resize(B);
+  world_inverse_inertia.resize(B);
   s.contact_count.assign(B, 0);
   s.gravity_at_start = calc_energy().gravity;
 }
@@ -185,7 +189,7 @@ Mat3 System::calc_world_inverse_inertia(size_t b) const {
 }
 
 double System::calc_angle(const CompiledJoint& j, double previous) const {
-  const Mat3 F = to_matrix(pose_of(j.parent).q * j.q_PF), M = to_matrix(pose_of(j.child).q * j.q_CM);
+  const Mat3 F = rotation_of(j.parent) * j.R_PF, M = rotation_of(j.child) * j.R_CM;
   const double angle = std::atan2(dot(M.column(0), F.column(1)), dot(M.column(0), F.column(0)));
   constexpr double turn = 2 * 3.14159265358979323846;
   return angle + turn * std::round((previous - angle) / turn);
@@ -300,7 +304,7 @@ void System::evaluate_rotationals(double h) {
     const CompiledRotational& c = rotationals[i];
     const CompiledJoint& j = joints[static_cast<size_t>(c.joint)];
     JointState& js = state.joint[static_cast<size_t>(c.joint)];
-    const Mat3 F = to_matrix(pose_of(j.parent).q * j.q_PF);
+    const Mat3 F = rotation_of(j.parent) * j.R_PF;
     const Vec3 axis = F.column(2);
     js.angle = calc_angle(j, js.angle);
     const bool was_yielded = z.yielded;
@@ -457,18 +461,20 @@ void System::evaluate_forces(double h) {
   }
 }
 
-void System::drift(size_t b, double h, const Vec3& p0, const Quat& q0) {
+void System::drift(size_t b, double h, const Vec3& p0, const Quat& q0, const Mat3& R0) {
   State& s = state;
+  const Mat3& inverse_inertia = s.body[b].inverse_inertia;
+  const Vec3& L = s.L[b];
   s.p[b] = p0 + h * s.v[b];
-  // midpoint rule for the orientation: the spin is constant over the step, the inertia turns with the body
-  const Mat3 R0 = to_matrix(q0);
-  const Vec3 w0 = R0 * (s.body[b].inverse_inertia * transpose_times(R0, s.L[b]));
-  const Mat3 Rm = to_matrix(exp_rotation((0.5 * h) * w0) * q0);
-  const Vec3 w1 = Rm * (s.body[b].inverse_inertia * transpose_times(Rm, s.L[b]));
-  const Mat3 Rn = to_matrix(exp_rotation((0.5 * h) * w1) * q0);
-  s.w[b] = Rn * (s.body[b].inverse_inertia * transpose_times(Rn, s.L[b]));
-  s.q[b] = normalized(exp_rotation(h * s.w[b]) * q0);
+  // angular velocity in the middle of the step: the angular momentum is constant, the inertia turns with the body
+  const Vec3 w0 = R0 * (inverse_inertia * transpose_times(R0, L));
+  const Vec3 w1 = w0 - (0.5 * h) * (R0 * (inverse_inertia * transpose_times(R0, cross(w0, L))));
+  const Quat q = exp_rotation(h * w1) * q0;
+  // one step of Newton's method for the length, which round-off alone has changed
+  const double unit = 1.5 - 0.5 * (q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
+  s.q[b] = {unit * q.w, unit * q.x, unit * q.y, unit * q.z};
   s.R[b] = to_matrix(s.q[b]);
+  s.w[b] = s.R[b] * (inverse_inertia * transpose_times(s.R[b], L));
 }
 
 bool System::advance_step() {
@@ -481,15 +487,17 @@ bool System::advance_step() {
     s.L[b] += kick * torque[b];
   }
   if (clusters_due) build_clusters();
-  p_before.resize(B);
-  q_before.resize(B);
   for (size_t b = 0; b < B; ++b) {
     if (fixed[b]) continue;
-    p_before[b] = s.p[b];
-    q_before[b] = s.q[b];
-    if (!in_cluster[b]) drift(b, h, p_before[b], q_before[b]);
+    if (!in_cluster[b]) {
+      drift(b, h, s.p[b], s.q[b], Mat3(s.R[b]));
+    } else {
+      p_before[b] = s.p[b];
+      q_before[b] = s.q[b];
+      R_before[b] = s.R[b];
+    }
   }
-  solve_joints(h, p_before, q_before);
+  solve_joints(h);
   s.first_kick = false;
   ++s.step_index;
   s.time = static_cast<double>(s.step_index) * h;
@@ -588,7 +596,7 @@ const View& System::calc_view() {
   Vec3 joints_on_ground;
   for (size_t j = 0; j < joints.size(); ++j) {
     const CompiledJoint& c = joints[j];
-    const Mat3 F = to_matrix(pose_of(c.parent).q * c.q_PF);
+    const Mat3 F = rotation_of(c.parent) * c.R_PF;
     v.joint_force[j] = transpose_times(F, s.joint[j].force);
     v.joint_moment[j] = transpose_times(F, s.joint[j].moment);
     v.joint_released[j] = !s.joint[j].live;

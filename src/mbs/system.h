@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "mbs/boxes.h"
 #include "mbs/model.h"
 #include "mbs/solver.h"
 #include "mbs/zone.h"
@@ -62,7 +63,7 @@ struct CompiledJoint {
   Joint::Kind kind = Joint::Kind::Fixed;
   int parent = -1, child = -1;
   Vec3 p_PF, p_CM;
-  Quat q_PF, q_CM;
+  Mat3 R_PF, R_CM;
   int rows = 6;
   double tension_limit, shear_limit, moment_limit, rotation_limit;
   int rotational = -1;  // element about its axis
@@ -178,7 +179,8 @@ class System {
   std::vector<Vec3> joint_force, joint_torque;      // of the joints on bodies, of the step before (B)
   std::vector<Vec3> p_before;
   std::vector<Quat> q_before;
-  std::vector<unsigned char> in_cluster;  // (B)
+  std::vector<Mat3> R_before, world_inverse_inertia;  // of jointed bodies (B)
+  std::vector<unsigned char> in_cluster;              // (B)
   std::vector<JointCluster> clusters;
   bool clusters_due = true;
   std::string identity;  // of the model, for snapshots
@@ -187,6 +189,8 @@ class System {
   Vec3 ground_reaction, ground_contact;
   int body_contacts = 0;
   std::vector<int> contact_count;  // being counted (B)
+  std::vector<Solid> solids;       // shapes in W, as of solid_step
+  std::vector<long> solid_step;
   View view;
 
   void say(Happening h) const {
@@ -209,9 +213,10 @@ class System {
   /// A contact force on a body at a lever from its centre.
   void push(size_t body, const Vec3& lever, const Vec3& f);
   void add_contact_work(double h);
-  void drift(size_t body, double h, const Vec3& p0, const Quat& q0);
+  /// Moves a body from its pose at the beginning of the step to the end of it.
+  void drift(size_t body, double h, const Vec3& p0, const Quat& q0, const Mat3& R0);
   void build_clusters();
-  void solve_joints(double h, const std::vector<Vec3>& p0, const std::vector<Quat>& q0);
+  void solve_joints(double h);
   void check_joints();
   void break_element(size_t e, BreakReason reason);
   void release_joint(size_t j, const char* reason);
@@ -221,6 +226,7 @@ class System {
   /// Angle of a revolute joint from its frames, near `previous`.
   double calc_angle(const CompiledJoint&, double previous) const;
   Six calc_deformation(const CompiledElement&) const;
+  Mat3 rotation_of(int body) const { return body < 0 ? Mat3::identity() : state.R[static_cast<size_t>(body)]; }
   Pose pose_of(int body) const {
     return body < 0 ? Pose{} : Pose{state.p[static_cast<size_t>(body)], state.q[static_cast<size_t>(body)]};
   }

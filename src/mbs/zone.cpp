@@ -199,17 +199,6 @@ struct Plane {
   static double at(double moment, double shear, double x, double sign) { return moment + sign * x * shear; }
 };
 
-/// Whether forces lie within the bounds that were found safe.
-bool is_safe(int stations, const double force[6], const double m[2][2], const ZoneState& z) {
-  if (z.next_law >= 0 || force[0] < z.safe_force[0] || force[0] > z.safe_force[1] ||
-      std::abs(force[3]) > z.safe_torsion)
-    return false;
-  if (std::abs(force[1]) / z.safe_shear[0] + std::abs(force[2]) / z.safe_shear[1] > 1) return false;
-  for (int s = 0; s < stations; ++s)
-    if (std::abs(m[0][s]) / z.safe_moment[0] + std::abs(m[1][s]) / z.safe_moment[1] > 1) return false;
-  return true;
-}
-
 /// Least limit moment of a family between two normal forces: at an end or at a force of the table, for it is linear
 /// between.
 double find_least_moment(const CompiledFamily& family, double from, double to, double rotation) {
@@ -248,9 +237,23 @@ void find_safe_bounds(const ZoneParameters& p, const std::vector<CompiledLaw>& l
       z.safe_moment[q] = std::min(z.safe_moment[q], find_least_moment(laws[static_cast<size_t>(p.law[s])].moment[q],
                                                                       from, to, z.station[s].reached));
     z.safe_shear[q] = limits.shear(q, z.slipped, -to);
-    if (!(z.safe_moment[q] > 0 && z.safe_shear[q] > 0)) return;
+    if (!(z.safe_moment[q] > 0 && z.safe_shear[q] > 0 && limits.torsion() > 0)) return;
   }
-  z.safe_torsion = limits.torsion();
+  for (int q = 0; q < 2; ++q) {
+    z.safe_moment[q] = 1 / z.safe_moment[q];
+    z.safe_shear[q] = 1 / z.safe_shear[q];
+  }
+  z.safe_torsion = 1 / limits.torsion();
+  // what the springs do not see
+  double turned[2] = {0, 0}, shifted[2] = {0, 0};
+  for (int s = 0; s < p.stations; ++s)
+    for (int q = 0; q < 2; ++q) {
+      if (z.station[s].soft[q] > 0) return;
+      turned[q] += z.station[s].phi[q];
+      shifted[q] += p.x[s] * z.station[s].phi[q];
+    }
+  const double offset[6] = {z.axial, z.slip[0] - shifted[1], z.slip[1] + shifted[0], z.twist, turned[0], turned[1]};
+  std::copy(offset, offset + 6, z.offset);
   z.safe_force[0] = from;
   z.safe_force[1] = to;
 }
@@ -299,8 +302,52 @@ void break_zone(ZoneState& z, BreakReason reason) {
   z.has_elastic = false;
 }
 
+namespace {
+
+/// The common case: a zone whose forces stay inside its safe bounds is a spring with a damper. False if it is not so.
+bool advance_inside_bounds(const ZoneParameters& p, const Six& d, double h, ZoneState& z) {
+  if (z.next_law >= 0 || z.safe_force[0] > z.safe_force[1] || !z.has_elastic || h <= 0) return false;
+  double e[6], f[6];
+  for (int i = 0; i < 6; ++i) {
+    e[i] = d.c[i] - z.offset[i];
+    f[i] = p.stiffness[i] * e[i];
+  }
+  if (p.external_axial) {
+    e[0] = 0;
+    f[0] = d.c[0];
+  }
+  if (f[0] < z.safe_force[0] || f[0] > z.safe_force[1] || std::abs(f[3]) * z.safe_torsion > 1) return false;
+  if (std::abs(f[1]) * z.safe_shear[0] + std::abs(f[2]) * z.safe_shear[1] > 1) return false;
+  for (int s = 0; s < p.stations; ++s)
+    if (std::abs(f[4] + p.x[s] * f[2]) * z.safe_moment[0] + std::abs(f[5] - p.x[s] * f[1]) * z.safe_moment[1] > 1)
+      return false;
+  double energy = 0, damper_energy = 0, damped = 0;
+  for (int i = 0; i < 6; ++i) {
+    const double before = z.elastic[i], stretched = e[i] - before;
+    const double flowed = z.flowed[i] + p.relaxation * (0.5 * (e[i] + before) - z.flowed[i]);
+    const double stretch = e[i] - flowed, damper = p.viscous * p.stiffness[i] * stretch;
+    energy += 0.5 * f[i] * e[i];
+    damper_energy += 0.5 * damper * stretch;
+    damped += 0.5 * (damper + z.damper_force[i]) * stretched;
+    z.flowed[i] = flowed;
+    z.damper_force[i] = damper;
+    z.elastic[i] = e[i];
+    z.elastic_force[i] = f[i];
+    z.deformation[i] = d.c[i];
+    z.resultant.c[i] = f[i] + damper;
+  }
+  z.damping += damped - (damper_energy - z.damper_energy);
+  z.damper_energy = damper_energy;
+  z.energy = energy;
+  z.normal_force = f[0];
+  return true;
+}
+
+}  // namespace
+
 void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, const Six& d, double time, double h,
                   ZoneState& z) {
+  if (advance_inside_bounds(p, d, h, z)) return;
   if (z.next_share != z.share && time >= z.ramp_begin + z.ramp) soften(p, z);
   double k[6];
   for (int i = 0; i < 6; ++i) k[i] = z.share * p.stiffness[i];
@@ -324,19 +371,20 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
       station_stiffness[q][s] = planes[q].bending_stiffness + p.x[s] * p.x[s] * planes[q].shear_stiffness;
       phi[q][s] = z.station[s].phi[q];
     }
-    // damage adds flexibility at the stations: a small fixed point, exact for one station
-    bool any_soft = false;
-    for (int s = 0; s < n; ++s) any_soft = any_soft || z.station[s].soft[q] > 0;
-    const int sweeps = !any_soft ? 1 : n == 1 ? 1 : 12;
-    for (int sweep = 0; sweep < sweeps; ++sweep)
-      for (int s = 0; s < n; ++s) {
-        const double c = z.station[s].soft[q];
-        phi[q][s] = z.station[s].phi[q];
-        const double v = planes[q].shear(p.x, phi[q], n), b = planes[q].moment(phi[q], n);
-        const double m0 = Plane::at(b, v, p.x[s], planes[q].sign);
-        m[q][s] = m0 / (1 + station_stiffness[q][s] * c);
-        phi[q][s] += c * m[q][s];
-      }
+    // damage adds flexibility at the stations: (1 + S C) m = m0, two by two at most
+    double c[2] = {0, 0};
+    for (int s = 0; s < n; ++s) c[s] = z.station[s].soft[q];
+    if (c[0] > 0 || c[1] > 0) {
+      double m0[2] = {0, 0};
+      const double v = planes[q].shear(p.x, phi[q], n), b = planes[q].moment(phi[q], n);
+      for (int s = 0; s < n; ++s) m0[s] = Plane::at(b, v, p.x[s], planes[q].sign);
+      const double cross = planes[q].bending_stiffness + p.x[0] * p.x[1] * planes[q].shear_stiffness;
+      const double s11 = 1 + station_stiffness[q][0] * c[0], s22 = n > 1 ? 1 + station_stiffness[q][1] * c[1] : 1;
+      const double s12 = n > 1 ? cross * c[1] : 0, s21 = n > 1 ? cross * c[0] : 0;
+      const double determinant = s11 * s22 - s12 * s21;
+      phi[q][0] += c[0] * (m0[0] * s22 - m0[1] * s12) / determinant;
+      if (n > 1) phi[q][1] += c[1] * (m0[1] * s11 - m0[0] * s21) / determinant;
+    }
     const double v = planes[q].shear(p.x, phi[q], n), b = planes[q].moment(phi[q], n);
     force[q == 0 ? 2 : 1] = v;
     force[q == 0 ? 4 : 5] = b;
@@ -359,7 +407,7 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
   energy_trial = elastic_energy() + stored_soft;
 
   BreakReason broke = BreakReason::None;
-  if (n > 0 && !is_safe(n, force, m, z)) {
+  if (n > 0) {
     const Limits limits(laws, p.law[0], z, time);
 
     // axial force
@@ -438,7 +486,8 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
           turn2 += turn * turn;
         }
         if (turn2 > 0) {
-          changed = flowed = true;
+          flowed = true;
+          if (turn2 > 1e-18 * length2) changed = true;  // the other station feels it
           st.turned += std::sqrt(turn2);
           st.reached = std::max(st.reached, std::sqrt(length2));
         }

@@ -89,11 +89,13 @@ struct ZoneState {
   double damper_energy = 0;                      // stored behind the dampers [J]
   bool yielded = false;                          // has ever passed a limit
   // Bounds within which no limit is passed whatever the combination, for normal forces in a range; renewed when the
-  // force leaves the range, void (an empty range) after any inelastic step. They only save time.
-  double safe_force[2] = {1, -1};  // [N]
-  double safe_moment[2] = {0, 0};  // |My|/a + |Mz|/b <= 1 at each station [N·m]
-  double safe_shear[2] = {0, 0};   // |Vy|/a + |Vz|/b <= 1 [N]
-  double safe_torsion = 0;         // [N·m]
+  // force leaves the range, void (an empty range) after any inelastic step. With them goes the inelastic part of the
+  // deformation at the marker: inside the bounds the zone is a spring from there. They only save time.
+  double safe_force[2] = {1, -1};         // [N]
+  double safe_moment[2] = {0, 0};         // |My| a + |Mz| b <= 1 at each station [1/(N·m)]
+  double safe_shear[2] = {0, 0};          // |Vy| a + |Vz| b <= 1 [1/N]
+  double safe_torsion = 0;                // |T| a <= 1 [1/(N·m)]
+  double offset[6] = {0, 0, 0, 0, 0, 0};  // [m, rad]
 };
 
 /// Constants of a zone for evaluation.
