@@ -105,6 +105,12 @@ TEST_P(LighterBodyPhysics, KeepsTheAutomaticStepStable) {
   // as stiff as ever
   const double firing = 0.05, ramp = 0.02, thrown_out = firing + GetParam() * ramp, share = 0.05, left = 20;
   Column c = make_column();
+  for (ZoneElement& e : c.model.elements) {
+    // the fastest mode is along the column, and most of its stiffness is that of the zone that fires
+    const double k = &e == &c.model.elements[0] ? 8e8 : 24e8;
+    e.translational_stiffness = {k, 1e-2 * k, 1e-2 * k};
+    e.rotational_stiffness = {1e-3 * k, 1e-3 * k, 1e-3 * k};
+  }
   const LawId weak = add_law(c.model, crushing_at(2e4));
   Event charge;
   charge.time = firing;
@@ -128,7 +134,7 @@ TEST_P(LighterBodyPhysics, KeepsTheAutomaticStepStable) {
   EXPECT_LT(s.energy_error, 0.02);
   // stiffness along the column on what is left of the piece, the block as good as fixed above it; the springs behind
   // the dampers add 4 ζ / (1 - 2 ζ)
-  const double fast = 1 + 4 * 0.05 / 0.9, k = 8e8 * (1 + (GetParam() < 1 ? 1 : share));
+  const double fast = 1 + 4 * 0.05 / 0.9, k = 8e8 * (1 + 3 * (GetParam() < 1 ? 1 : share));
   EXPECT_GT(s.highest_frequency, 0.99 * std::sqrt(fast * k / left));
   EXPECT_LT(s.step * std::sqrt(fast * k / left), 2);
 }
