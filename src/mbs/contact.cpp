@@ -295,32 +295,55 @@ void System::evaluate_body_contact(double h) {
       const double stiffness = kPointShare * reduced * c.contact_frequency * c.contact_frequency;
       const int others = std::max({points.count, fixed[a] ? 0 : s.contact_count[a], fixed[b] ? 0 : s.contact_count[b]});
       const Vec3 n = points.normal;  // from a to b
+      struct Point {
+        Vec3 ra, rb, v_t;
+        double normal_force = 0, inverse_mass = 0, approach = 0;
+      } found[8];
+      int count = 0;
+      double total_force = 0;
+      Vec3 slide;  // velocity of a against b in the plane of contact, weighted by the normal forces
       for (int i = 0; i < points.count; ++i) {
         const double depth = points.depth[i] - pair.born;
         if (depth <= 0) continue;
-        const Vec3 ra = points.p[i] - s.p[a], rb = points.p[i] - s.p[b];
-        const Vec3 v = s.v[a] + cross(s.w[a], ra) - s.v[b] - cross(s.w[b], rb);  // of a against b
-        const double approach = dot(n, v);
-        const Vec3 v_t = v - approach * n;
-        const Vec3 la = transpose_times(s.R[a], cross(ra, n)), lb = transpose_times(s.R[b], cross(rb, n));
-        const double inverse_mass =
-            wa + wb + dot(la, s.body[a].inverse_inertia * la) + dot(lb, s.body[b].inverse_inertia * lb);
+        Point& p = found[count++];
+        p.ra = points.p[i] - s.p[a];
+        p.rb = points.p[i] - s.p[b];
+        const Vec3 v = s.v[a] + cross(s.w[a], p.ra) - s.v[b] - cross(s.w[b], p.rb);
+        p.approach = dot(n, v);
+        p.v_t = v - p.approach * n;
+        const Vec3 la = transpose_times(s.R[a], cross(p.ra, n)), lb = transpose_times(s.R[b], cross(p.rb, n));
+        p.inverse_mass = wa + wb + dot(la, s.body[a].inverse_inertia * la) + dot(lb, s.body[b].inverse_inertia * lb);
         const double full = stiffness * depth;
-        const double f = full * (e2 + (1 - e2) * approach_share(approach, full, inverse_mass, others, h));
-        // Coulomb friction, viscous below the speed at which the limit is reached
-        // and never more than brings all the points to rest within two steps
-        const double speed = norm(v_t);
+        p.normal_force = full * (e2 + (1 - e2) * approach_share(p.approach, full, p.inverse_mass, others, h));
+        total_force += p.normal_force;
+        slide += p.normal_force * p.v_t;
+        stored += 0.5 * e2 * stiffness * depth * depth;
+      }
+      // Coulomb friction: a spring that sticks until the limit, and viscous below it, though never more than brings all
+      // the points to rest within two steps
+      const double stick_stiffness = kStickStiffness * e2 * stiffness / kPointShare;
+      const double stick_before = 0.5 * stick_stiffness * dot(pair.stick, pair.stick);
+      if (!pair.touching) pair.stick = {};
+      if (total_force > 0) pair.stick += (h / total_force) * slide;
+      pair.stick -= dot(pair.stick, n) * n;
+      const double held = stick_stiffness * norm(pair.stick), most = c.body_friction * total_force;
+      if (held > most) pair.stick *= most / held;
+      const double stick_now = 0.5 * stick_stiffness * dot(pair.stick, pair.stick);
+      stored += stick_now;
+      s.friction -= stick_now - stick_before;
+      for (int i = 0; i < count; ++i) {
+        const Point& p = found[i];
         double viscous = 0.5 * reduced * c.contact_frequency;
-        if (h > 0) viscous = std::min(viscous, 0.5 / (h * inverse_mass * others));
-        const double ft = std::min(c.body_friction * f, viscous * speed);
-        const Vec3 total = -f * n - (speed > 0 ? ft / speed : 0.0) * v_t;  // on a
-        push(a, ra, total);
-        push(b, rb, -total);
+        if (h > 0) viscous = std::min(viscous, 0.5 / (h * p.inverse_mass * others));
+        Vec3 t = -(stick_stiffness * p.normal_force / total_force) * pair.stick - viscous * p.v_t;
+        if (const double size = norm(t), limit = c.body_friction * p.normal_force; size > limit) t *= limit / size;
+        // the velocity halfway through the kick of this force alone
+        s.friction -= h * dot(t, p.v_t + (0.5 * h * p.inverse_mass) * t);
+        const Vec3 total = t - p.normal_force * n;  // on a
+        push(a, p.ra, total);
+        push(b, p.rb, -total);
         if (fixed[a]) ground_contact -= total;
         if (fixed[b]) ground_contact += total;
-        // the speed halfway through the kick of this force alone
-        s.friction += ft * std::max(0.0, speed - 0.5 * h * inverse_mass * ft) * h;
-        stored += 0.5 * e2 * stiffness * depth * depth;
         touching = true;
         ++body_contacts;
         ++contact_count[a];
@@ -330,12 +353,13 @@ void System::evaluate_body_contact(double h) {
           const auto at = std::lower_bound(s.touched_pairs.begin(), s.touched_pairs.end(), number);
           if (at == s.touched_pairs.end() || *at != number) {
             s.touched_pairs.insert(at, number);
-            say({Happening::Kind::BodyContact, s.time, pair.a, pair.b, {}, std::max(0.0, approach)});
+            say({Happening::Kind::BodyContact, s.time, pair.a, pair.b, {}, std::max(0.0, p.approach)});
           }
           pair.touching = true;
         }
       }
     }
+    if (!touching) pair.stick = {};
     s.contact_energy += stored - pair.energy;
     pair.energy = stored;
     pair.touching = touching;

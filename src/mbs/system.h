@@ -50,6 +50,7 @@ struct PairState {
   bool touching = false;
   int axis = 0;       // separating axis of the step before
   double energy = 0;  // stored [J]
+  Vec3 stick;         // tangential displacement of the friction spring, of a against b [m]
 };
 
 struct CompiledElement {

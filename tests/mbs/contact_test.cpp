@@ -120,6 +120,38 @@ TEST(BodyContact, StackStaysAndLosesNoHeight) {
   (void)s;
 }
 
+TEST(BodyContact, BoxSticksOnATiltedBoxThatFrictionHolds) {
+  // the lower box is fixed and leans by 25°, tan = 0.466 against a friction of 0.6
+  const double a = 25 * 3.14159265358979323846 / 180;
+  Model m;
+  m.contact.ground = false;
+  Body base = make_box("base", 1, {2, 2, 0.5}, {});
+  base.fixed = true;
+  base.X_WB.q = exp_rotation({0, a, 0});
+  Body box = make_box("box", 500, {0.3, 0.3, 0.2}, 0.7 * Vec3{std::sin(a), 0, std::cos(a)});
+  box.X_WB.q = base.X_WB.q;
+  add_body(m, base);
+  add_body(m, box);
+  Vec3 early, late;
+  Options o = free_options(4, 2e-4);
+  o.on_frame = [&](const View& v) {
+    if (v.time < 1) early = v.X_WB[1].p;
+    late = v.X_WB[1].p;
+  };
+  (void)run(m, o);
+  EXPECT_LT(norm(late - early), 1e-4);
+  m.contact.body_friction = 0.3;  // and this one slides: a = g (sin - μ cos)
+  o.duration = 0.5;
+  Vec3 start;
+  o.on_frame = [&](const View& v) {
+    if (v.time == 0) start = v.X_WB[1].p;
+    late = v.X_WB[1].p;
+  };
+  (void)run(m, o);
+  const double expected = 0.5 * 9.81 * (std::sin(a) - 0.3 * std::cos(a)) * 0.25;
+  EXPECT_NEAR(norm(late - start), expected, 0.02 * expected);  // the contact settles within a few ms first
+}
+
 TEST(BodyContact, ImpactKeepsMomentum) {
   Model m;
   m.gravity = {};
