@@ -1,6 +1,6 @@
 import type { Finding, Run } from "./data";
 import { StatusSign, StatusWord } from "./signs";
-import { formatDate, formatDuration } from "./units";
+import { formatDate, formatDuration, prettify } from "./units";
 import { endingWord } from "./vocabulary";
 
 /// The finding that says what happens: the mechanism, else the first one.
@@ -32,18 +32,43 @@ export function Header(props: { run: Run }) {
                 <p class="verdict-title">
                   {verdict.title} <StatusWord status={verdict.status} />
                 </p>
-                <p class="verdict-text" data-test="verdict">{verdict.text}</p>
+                <p class="verdict-text" data-test="verdict">{prettify(verdict.text)}</p>
               </div>
             </>
           )}
         </section>
-        <section class="ending" aria-label="How the run ended">
-          <p class="verdict-title">How the run ended</p>
-          <p class="ending-word" data-test="ending">{endingWord[ending.kind] ?? (ending.kind || "Unknown")}</p>
-          <p class="ending-text">{ending.text}</p>
+        <section class={`ending ${run.findings.some((f) => f.status === "bad") ? "bad" : ""}`} aria-label="Limits and ending">
+          <Summary run={run} />
+          <p class="ending-text">
+            <strong data-test="ending">{endingWord[ending.kind] ?? (ending.kind || "Unknown")}</strong>: {prettify(ending.text)}
+          </p>
         </section>
       </div>
     </header>
+  );
+}
+
+/// What is not as it should be, each with a way to its finding.
+function Summary(props: { run: Run }) {
+  const { findings } = props.run;
+  const verdict = findVerdict(props.run);
+  const criteria = findings.filter((f) => f.id.startsWith("criterion.") || f.id.startsWith("clearance."));
+  const met = criteria.filter((f) => f.status !== "bad").length;
+  const open = findings.filter((f) => f !== verdict && (f.status === "bad" || f.status === "warning"));
+  open.sort((a, b) => Number(b.status === "bad") - Number(a.status === "bad"));
+  const most = 4;
+  return (
+    <>
+      <p class="verdict-title">
+        {criteria.length === 0 ? "The plan sets no limits" : met === criteria.length ? `All ${met} limits of the plan kept` : `${met} of ${criteria.length} limits of the plan kept`}
+      </p>
+      {open.slice(0, most).map((f) => (
+        <a class="open-finding" href={`#finding-${f.id}`} data-test="open-finding">
+          <StatusSign status={f.status} size={14} /> <StatusWord status={f.status} /> <span>{f.title}</span>
+        </a>
+      ))}
+      {open.length > most && <p class="ending-text">and {open.length - most} more below</p>}
+    </>
   );
 }
 
@@ -51,6 +76,7 @@ export function Header(props: { run: Run }) {
 export function Findings(props: { run: Run }) {
   const groups: { heading: string; findings: Finding[] }[] = [];
   for (const finding of props.run.findings) {
+    if (finding.id === "not_modelled" && props.run.not_modelled.length > 0) continue; // has a panel of its own
     const last = groups[groups.length - 1];
     if (last !== undefined && last.heading === finding.heading) last.findings.push(finding);
     else groups.push({ heading: finding.heading, findings: [finding] });
@@ -63,11 +89,11 @@ export function Findings(props: { run: Run }) {
         <div class="finding-group">
           <h3>{group.heading}</h3>
           {group.findings.map((finding) => (
-            <div class="finding" data-finding={finding.id}>
+            <div class="finding" data-finding={finding.id} id={`finding-${finding.id}`}>
               <StatusSign status={finding.status} />
               <div>
                 {finding.title !== group.heading && <p class="finding-title">{finding.title}</p>}
-                <p>{finding.text}</p>
+                <p>{prettify(finding.text)}</p>
               </div>
               <StatusWord status={finding.status} />
             </div>

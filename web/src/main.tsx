@@ -41,6 +41,7 @@ function Page(props: { state: State; fitRef: { current: () => void } }) {
           <View3D state={state} onReady={onReady} fitRef={fitRef} />
           <Timeline state={state} />
           <Stills state={state} stills={stills} />
+          <Plots state={state} />
         </div>
         <div class="side">
           <Inspector state={state} />
@@ -48,7 +49,6 @@ function Page(props: { state: State; fitRef: { current: () => void } }) {
           <NotModelled run={run} />
         </div>
         <div class="below">
-          <Plots state={state} />
           <div class="tables">
             <Events state={state} />
             <PlanValues run={run} />

@@ -1,10 +1,10 @@
 import { effect } from "@preact/signals";
 import { useEffect, useRef, useState } from "preact/hooks";
 import uPlot from "uplot";
-import type { Series } from "./data";
+import type { Run, Series } from "./data";
 import type { State } from "./state";
-import { formatNumber, formatValue, toReadable } from "./units";
-import { groupOrder, groupWord, seriesColours, seriesDashes } from "./vocabulary";
+import { formatNumber, formatTime, formatValue, toReadable } from "./units";
+import { dashOfSeries, groupOrder, groupWord, seriesColours } from "./vocabulary";
 
 interface Group {
   id: string;
@@ -29,6 +29,12 @@ export function makeGroups(series: readonly Series[]): Group[] {
   return groups.map((g, i) => ({ g, i })).sort((a, b) => rank(a.g) - rank(b.g) || a.i - b.i).map(({ g }) => g);
 }
 
+/// First frame in which less than half of the upper block holds together: from there on its angle means nothing.
+export function findCoherent(run: Run): number | undefined {
+  const first = run.series.find((s) => s.id === "connected_share")?.value.findIndex((v) => v !== null && v < 0.5) ?? -1;
+  return first < 0 ? undefined : first;
+}
+
 const cssColour = (name: string): string => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 function axis(label: string, isTime: boolean): uPlot.Axis {
@@ -51,7 +57,8 @@ function PlotPanel(props: { state: State; group: Group }) {
   const { state, group } = props;
   const { run } = state;
   const holder = useRef<HTMLDivElement>(null);
-  const values = group.series.map((s) => s.value.map((v) => (v === null ? null : v * group.factor)));
+  const coherent = group.id === "angle" ? findCoherent(run) : undefined;
+  const values = group.series.map((s) => s.value.map((v, i) => (v === null || i >= (coherent ?? Infinity) ? null : v * group.factor)));
 
   useEffect(() => {
     const element = holder.current;
@@ -67,14 +74,14 @@ function PlotPanel(props: { state: State; group: Group }) {
         legend: { show: false },
         cursor: { drag: { x: false, y: false }, y: false, points: { size: 6 } },
         scales: { x: { time: false }, y: { range: (_, low, high) => niceRange(low, high) } },
-        axes: [axis("time [s]", true), axis(`[${group.unit || "–"}]`, false)],
+        axes: [axis("time [s]", true), axis(group.unit === "" ? "" : `[${group.unit}]`, false)],
         series: [
           {},
           ...group.series.map((s, i) => ({
             label: s.title,
             stroke: () => cssColour(`--series-${i % seriesColours.length}`),
             width: 1.8,
-            dash: seriesDashes[i % seriesDashes.length] as number[],
+            dash: dashOfSeries(i),
             points: { show: run.time.length < 2 },
           })),
         ],
@@ -142,6 +149,11 @@ function PlotPanel(props: { state: State; group: Group }) {
       <h2>{group.title}</h2>
       <PlotLegend state={state} group={group} values={values} />
       <div ref={holder} class="plot-holder" />
+      {coherent !== undefined && (
+        <p class="quiet plot-note">
+          Ends at {formatTime(run.time[coherent] ?? 0)}, when less than half of the upper block holds together.
+        </p>
+      )}
       <DataTable state={state} group={group} values={values} />
     </section>
   );
@@ -167,7 +179,7 @@ function PlotLegend(props: { state: State; group: Group; values: (number | null)
             <line
               x1="0" y1="4" x2="26" y2="4" stroke-width="2.2"
               style={{ stroke: `var(--series-${i % seriesColours.length})` }}
-              stroke-dasharray={(seriesDashes[i % seriesDashes.length] as number[]).join(" ")}
+              stroke-dasharray={dashOfSeries(i).join(" ")}
             />
           </svg>
           {s.title} <span class="number now">{formatValue(values[i]?.[frame], group.unit)}</span>
@@ -190,7 +202,7 @@ function DataTable(props: { state: State; group: Group; values: (number | null)[
               <tr>
                 <th scope="col">time [s]</th>
                 {group.series.map((s) => (
-                  <th scope="col">{s.title} [{group.unit || "–"}]</th>
+                  <th scope="col">{s.title}{group.unit === "" ? "" : ` [${group.unit}]`}</th>
                 ))}
               </tr>
             </thead>
@@ -216,7 +228,7 @@ export function Plots(props: { state: State }) {
   if (groups.length === 0 || props.state.run.time.length === 0)
     return <section class="panel"><h2>Plots</h2><p class="quiet">The record holds no series.</p></section>;
   return (
-    <div class={`plots ${groups.length === 1 ? "one" : groups.length === 2 || groups.length === 4 ? "even" : ""}`}>
+    <div class={`plots ${groups.length === 1 ? "one" : ""}`}>
       {groups.map((group) => (
         <PlotPanel state={props.state} group={group} />
       ))}

@@ -6,7 +6,7 @@ import { calcPose, findFrame } from "./data";
 import { Site, darkTheme, lightTheme } from "./site";
 import type { Colouring, ZoneMarks } from "./state";
 import { colourOfKind, colourOfUtilisation, zoneStates } from "./vocabulary";
-import type { ZonesOfBody } from "./zones";
+import { findParts, partOfShape, type ZonesOfBody } from "./zones";
 
 export type View = "oblique" | "front" | "side" | "top";
 const viewDirections: Record<View, Triple> = {
@@ -16,6 +16,7 @@ const viewDirections: Record<View, Triple> = {
   top: [0, -1e-3, 1],
 };
 const fov = 32;
+const broken = 3; // index in zoneStates
 const outside = new THREE.Matrix4().makeScale(0, 0, 0);
 
 function makeMarkGeometry(shape: string): THREE.BufferGeometry {
@@ -75,6 +76,7 @@ export class Scene {
   private readonly controls: OrbitControls;
   private readonly boxes: THREE.InstancedMesh;
   private readonly bodyOfInstance: number[] = [];
+  private readonly partOfInstance: string[] = [];
   private readonly shapePose: THREE.Matrix4[] = [];
   private readonly bodyPose: THREE.Matrix4[];
   private readonly marks: THREE.InstancedMesh<THREE.BufferGeometry, THREE.MeshBasicMaterial>[];
@@ -101,7 +103,7 @@ export class Scene {
   ) {
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-    this.kinds = [...new Set(run.bodies.map((b) => b.kind))];
+    this.kinds = findParts(run);
     this.bodyPose = run.bodies.map(() => new THREE.Matrix4());
 
     this.boxes = this.makeBoxes();
@@ -156,6 +158,7 @@ export class Scene {
       for (const shape of body.shapes) {
         const [w, x, y, z] = shape.orientation;
         this.bodyOfInstance.push(index);
+        this.partOfInstance.push(partOfShape(body, shape));
         this.shapePose.push(
           new THREE.Matrix4().compose(
             new THREE.Vector3(...shape.centre),
@@ -273,12 +276,15 @@ export class Scene {
   private placeMarks(): void {
     const Z = this.run.zones.length;
     const { frame } = findFrame(this.run.time, this.time);
+    // A break is marked while it is fresh: later its parts lie apart, and marks would hide them.
+    const earlier = findFrame(this.run.time, this.time - 0.4).frame;
+    const before = this.run.zone_state.subarray(earlier * Z, (earlier + 1) * Z);
     for (const mesh of this.marks) mesh.count = 0;
     if (this.zoneMarks !== "none" && this.run.time.length > 0)
       for (let z = 0; z < Z; ++z) {
         const state = this.run.zone_state[frame * Z + z] as number;
         const mesh = this.marks[state];
-        if (mesh === undefined || (state === 0 && this.zoneMarks === "damaged")) continue;
+        if (mesh === undefined || (this.zoneMarks === "damaged" && (state === 0 || (state === broken && before[z] === broken)))) continue;
         const { body, local } = this.zonePlace[z] as { body: number; local: THREE.Vector3 };
         this.point.copy(local);
         if (body >= 0) this.point.applyMatrix4(this.bodyPose[body] as THREE.Matrix4);
@@ -295,7 +301,6 @@ export class Scene {
   private colourOfBody(body: number, frame: number): string {
     const info = this.run.bodies[body];
     if (info === undefined) return "#b9c0c7";
-    if (this.colouring === "kind") return colourOfKind(info.kind, this.kinds);
     const Z = this.run.zones.length;
     const zones = this.zonesOfBody[body] ?? [];
     if (zones.length === 0) return "#c3c9cf";
@@ -315,10 +320,13 @@ export class Scene {
   private readonly colour = new THREE.Color();
   private colourBoxes(): void {
     const { frame } = findFrame(this.run.time, this.time);
-    const marked = this.colouring === "kind" ? this.selected : -1;
-    const colours = this.run.bodies.map((_, body) => (body === marked ? "#f5d033" : this.colourOfBody(body, frame)));
-    for (let i = 0; i < this.bodyOfInstance.length; ++i)
-      this.boxes.setColorAt(i, this.colour.set(colours[this.bodyOfInstance[i] as number] as string));
+    const byKind = this.colouring === "kind";
+    const colours = byKind ? [] : this.run.bodies.map((_, body) => this.colourOfBody(body, frame));
+    for (let i = 0; i < this.bodyOfInstance.length; ++i) {
+      const body = this.bodyOfInstance[i] as number;
+      const ofKind = body === this.selected ? "#f5d033" : colourOfKind(this.partOfInstance[i] as string, this.kinds);
+      this.boxes.setColorAt(i, this.colour.set(byKind ? ofKind : (colours[body] as string)));
+    }
     if (this.boxes.instanceColor !== null) this.boxes.instanceColor.needsUpdate = true;
   }
 
@@ -338,10 +346,10 @@ export class Scene {
     this.onChange();
   }
 
-  private useAspect(width: number, height: number, labelScale = 1): void {
+  private useAspect(width: number, height: number): void {
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
-    this.site.setViewport(height / labelScale, fov);
+    this.site.setViewport(height, fov);
   }
 
   /// Looks at the whole collapse from one side, as near as the picture allows.
@@ -386,6 +394,8 @@ export class Scene {
   }
 
   render(): void {
+    this.camera.updateMatrixWorld();
+    this.site.placeLabels(this.camera, this.width, this.bounds.getCenter(this.point));
     this.renderer.render(this.scene, this.camera);
   }
 
@@ -400,10 +410,11 @@ export class Scene {
     this.selected = -1;
     this.colouring = "kind";
     this.zoneMarks = "none";
+    this.site.showLabels(false); // too large for small pictures
     this.setDark(false);
     this.renderer.setPixelRatio(1);
     this.renderer.setSize(width, height, false);
-    this.useAspect(width, height, 1.7); // stills are shown smaller than they are drawn
+    this.useAspect(width, height);
     this.fit("oblique");
     const canvas = document.createElement("canvas");
     canvas.width = width;
@@ -420,6 +431,7 @@ export class Scene {
     this.selected = selected;
     this.colouring = colouring;
     this.zoneMarks = zoneMarks;
+    this.site.showLabels(true);
     this.renderer.setPixelRatio(ratio);
     this.setDark(dark);
     this.resize(this.width, this.height);

@@ -88,6 +88,8 @@ export class Site {
   readonly gridStep: number;
   private readonly materials: Record<keyof Omit<Theme, "background" | "selection">, THREE.Material & { color: THREE.Color }>;
   private readonly labels: THREE.Sprite[] = [];
+  /// Labels of long things, which may stand at any of these places.
+  private readonly roaming: { label: THREE.Sprite; places: THREE.Vector3[] }[] = [];
 
   /// `area` is what must lie on the ground plane; `height` that of the building [m].
   constructor(run: Run, area: THREE.Box3, height: number) {
@@ -145,7 +147,14 @@ export class Site {
       this.group.add(new THREE.Mesh(makeRibbon(points, points.length > 2, width, 0.04), solid));
     }
     const centre = points.reduce((sum, p) => [sum[0] + p[0] / points.length, sum[1] + p[1] / points.length] as Point, [0, 0] as Point);
-    if (name !== "") this.addLabel(name, centre[0], centre[1], up + 0.3);
+    if (name === "") return;
+    const label = this.addLabel(name, centre[0], centre[1], up + 0.3);
+    if (!isUtility) return;
+    const places = points.flatMap(([x, y], i) => {
+      const [bx, by] = points[(i + 1) % points.length] as Point;
+      return Array.from({ length: 12 }, (_, k) => new THREE.Vector3(x + (k / 12) * (bx - x), y + (k / 12) * (by - y), up + 0.3));
+    });
+    this.roaming.push({ label, places });
   }
 
   private addAxes(area: THREE.Box3, width: number): void {
@@ -165,11 +174,34 @@ export class Site {
     }
   }
 
-  private addLabel(text: string, x: number, y: number, z: number): void {
+  /// Puts the labels of long things where they are in the picture and farthest from `centre`.
+  placeLabels(camera: THREE.PerspectiveCamera, width: number, centre: THREE.Vector3): void {
+    const middle = centre.clone().project(camera);
+    const p = new THREE.Vector3();
+    for (const { label, places } of this.roaming) {
+      const margin = (label.userData["pixels"] as { width: number }).width / Math.max(1, width);
+      let best = -1;
+      for (const place of places) {
+        p.copy(place).project(camera);
+        if (p.z > 1 || Math.abs(p.x) > 0.98 - margin || p.y < -0.95 || p.y > 0.88) continue;
+        const far = Math.hypot((p.x - middle.x) * camera.aspect, p.y - middle.y);
+        if (far <= best) continue;
+        best = far;
+        label.position.copy(place);
+      }
+    }
+  }
+
+  showLabels(visible: boolean): void {
+    for (const label of this.labels) label.visible = visible;
+  }
+
+  private addLabel(text: string, x: number, y: number, z: number): THREE.Sprite {
     const label = makeLabel(text);
     label.position.set(x, y, z);
     this.labels.push(label);
     this.group.add(label);
+    return label;
   }
 
   setTheme(theme: Theme): void {

@@ -23,8 +23,9 @@ export function chooseMoments(run: Run, count = 6): { time: number; caption: str
     };
     const stages = run.events.filter((e) => e.kind === "stage");
     for (const e of stages.slice(1).slice(-2)) add(e.time, `before ${e.subject || "the next stage"}`, 1);
-    const touchdown = run.events.find((e) => e.kind === "touchdown");
-    if (touchdown !== undefined) add(touchdown.time, "first touchdown", 1);
+    const block = run.findings.find((f) => f.id === "touchdown.first")?.value ?? undefined;
+    const touchdown = block ?? run.events.find((e) => e.kind === "touchdown")?.time;
+    if (touchdown !== undefined) add(touchdown, block === undefined ? "first touchdown" : "upper block touches down", 1);
     while (moments.length < count) {
       moments.sort((a, b) => a.time - b.time);
       // The widest gap says least about what happens in it; the quiet time before the last stage counts little.

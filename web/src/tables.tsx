@@ -2,7 +2,7 @@ import { useComputed } from "@preact/signals";
 import type { Run } from "./data";
 import { EventSign } from "./signs";
 import { showStage, type State } from "./state";
-import { formatDate, formatDuration, formatMass, formatNumber, formatTime } from "./units";
+import { formatDate, formatDuration, formatMass, formatNumber, formatTime, prettify } from "./units";
 import { wordsOfEvent } from "./vocabulary";
 import { findBody } from "./zones";
 
@@ -73,7 +73,7 @@ export function PlanValues(props: { run: Run }) {
               {plan_values.filter((v) => v.group === group).map((v) => (
                 <tr>
                   <th scope="row">{v.key}</th>
-                  <td>{v.value}</td>
+                  <td>{prettify(v.value)}</td>
                 </tr>
               ))}
             </tbody>
@@ -99,7 +99,7 @@ export function Details(props: { run: Run }) {
     ["Rigid joints", String(counts.rigid_joints)],
     ["Force elements", String(counts.force_elements)],
     ["Cables", String(counts.cables)],
-    ["Mass", formatMass(counts.mass)],
+    ["Mass that moves", formatMass(counts.mass)],
   ];
   const origin: [string, string][] = [
     ["Plan", p.plan_path || "–"],

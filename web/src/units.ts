@@ -14,6 +14,7 @@ const readable: Record<string, Readable> = {
   Nm: { unit: "MN·m", factor: 1e-6 },
   Pa: { unit: "N/mm²", factor: 1e-6 },
   kg: { unit: "t", factor: 1e-3 },
+  "1": { unit: "", factor: 1 },
   m2: { unit: "m²", factor: 1 },
   m3: { unit: "m³", factor: 1 },
 };
@@ -37,8 +38,23 @@ export function formatNumber(value: number | null | undefined, digits = 4): stri
 
 /// A readable number with its unit.
 export function formatValue(value: number | null | undefined, unit: string): string {
-  const number = formatNumber(value);
+  const number = unit === "" && Number.isInteger(value) ? String(value).replace("-", "−") : formatNumber(value);
   return number === "–" ? number : `${number}${unit === "°" ? "" : " "}${unit}`.trim();
+}
+
+/// Texts of the record are plain: "12 deg +- 3 deg", "40 m2", "towards -x".
+export function prettify(text: string): string {
+  return text
+    .replace(/(\d) deg\b/g, "$1°")
+    .replace(/(\d) (?=(?:%|[kMG]?[NJW]|[kcm]?m|m?s|t|Hz|MNm|kNm)(?:[23]?[\s.,;:)/]|[23]?$))/g, "$1\u00a0")
+    .replace(/(\d) x (?=\d)/g, "$1 × ")
+    .replace(/\b((?:c|m|N\/[cm]?|kg\/)?m)([23])\b/g, (_, unit: string, power: string) => unit + (power === "2" ? "²" : "³"))
+    .replace(/ \+- /g, " ± ")
+    .replace(/ -(?=[xy\d])/g, " −")
+    .replace(/\b(\d(?:\.\d+)?)e([+-])0*(\d+)/g, (_, mantissa: string, sign: string, power: string) => {
+      const raised = [...power].map((digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(digit)]).join("");
+      return `${mantissa}·10${sign === "-" ? "⁻" : ""}${raised}`;
+    });
 }
 
 /// "2026-01-01 12:00 UTC" from ISO 8601; anything else stays as it is.

@@ -1,10 +1,10 @@
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { effect } from "@preact/signals";
 import { Scene, type View } from "./scene";
 import { ZoneSign } from "./signs";
 import type { Colouring, State, ZoneMarks } from "./state";
 import { colourOfKind, rampCss, wordOfKind, zoneStates } from "./vocabulary";
-import { findZonesOfBodies } from "./zones";
+import { findParts, findZonesOfBodies } from "./zones";
 
 const views: [View, string, string][] = [
   ["oblique", "Oblique", "From the front left"],
@@ -16,7 +16,7 @@ const views: [View, string, string][] = [
 function Legend(props: { state: State; gridStep: number }) {
   const { state } = props;
   const { run } = state;
-  const kinds = [...new Set(run.bodies.map((b) => b.kind))];
+  const kinds = useMemo(() => findParts(run), [run]);
   const colouring = state.colouring.value;
   const marks = state.zoneMarks.value;
   const buildings = run.neighbours.some((n) => !n.is_utility);
@@ -153,7 +153,7 @@ export function View3D(props: { state: State; onReady: (scene: Scene | undefined
         <label>
           Zones{" "}
           <select value={state.zoneMarks.value} onChange={(e) => (state.zoneMarks.value = e.currentTarget.value as ZoneMarks)}>
-            <option value="damaged">not elastic</option>
+            <option value="damaged">damaged, new breaks</option>
             <option value="all">all</option>
             <option value="none">none</option>
           </select>

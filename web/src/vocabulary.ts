@@ -28,6 +28,7 @@ export const kindWord: Record<string, string> = {
   wall: "Wall",
   node: "Joint block",
   stump: "Stump",
+  debris: "Blasted concrete",
 };
 const kindColours: Record<string, string> = {
   column: "#2f6f9f",
@@ -36,6 +37,7 @@ const kindColours: Record<string, string> = {
   wall: "#d9b98c",
   node: "#8b97a3",
   stump: "#8a5a3c",
+  debris: "#c2452d",
 };
 const spareColours = ["#009e73", "#cc79a7", "#8c6bb1", "#b3a100"];
 
@@ -79,7 +81,7 @@ const eventWords: Record<string, EventWords> = {
   release: { word: "Release", colour: "#d55e00", shape: "diamond", small: true },
   touchdown: { word: "Touchdown", colour: "var(--touchdown)", shape: "down", small: false },
   contact: { word: "Contact", colour: "#8b97a3", shape: "square", small: true },
-  rest: { word: "Rest", colour: "#009e73", shape: "square", small: false },
+  rest: { word: "End", colour: "#009e73", shape: "square", small: false },
   cable: { word: "Cable", colour: "#009e73", shape: "diamond", small: false },
   failure: { word: "Failure", colour: "#d55e00", shape: "cross", small: false },
 };
@@ -96,7 +98,11 @@ export const endingWord: Record<string, string> = {
 
 /// Series of one plot.
 export const seriesColours = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
-export const seriesDashes: number[][] = [[], [8, 4], [2, 3], [10, 3, 2, 3], [5, 2], [1, 2]];
+const seriesDashes: number[][] = [[], [8, 4], [2, 3], [10, 3, 2, 3], [5, 2], [1, 2]];
+
+/// The dash changes with the colour, and again when the colours are used up.
+export const dashOfSeries = (i: number): number[] =>
+  seriesDashes[(i + Math.floor(i / seriesColours.length)) % seriesDashes.length] as number[];
 
 export const groupWord: Record<string, string> = {
   angle: "Tilt angle",

@@ -1,5 +1,5 @@
 /// Which zones speak for a body: those of its member, or those that touch it if its member has none.
-import type { Run } from "./data";
+import type { Body, Run, Shape } from "./data";
 
 export type ZonesOfBody = number[][];
 
@@ -23,4 +23,26 @@ export function findBody(run: Run, subject: string): number {
   if (zone === undefined) return -1;
   const member = run.bodies.findIndex((b) => b.name === zone.member);
   return member >= 0 ? member : Math.max(zone.body_a, zone.body_b);
+}
+
+/// What a shape of a column or beam is: members carry the panels that are cast to them. A shape of at most 20 cm is a
+/// slab if it lies and a wall if it stands.
+export function partOfShape(body: Body, shape: Shape): string {
+  if (body.kind !== "column" && body.kind !== "beam" && body.kind !== "node") return body.kind;
+  const least = Math.min(...shape.half);
+  if (!(2 * least <= 0.2001)) return body.kind;
+  const axis = shape.half.indexOf(least);
+  const [w, x, y, z] = shape.orientation;
+  // how upright the thin direction is
+  const up = [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)][axis] as number;
+  return Math.abs(up) > 0.7 ? "slab" : "wall";
+}
+
+/// The kinds of parts of a run, in the order of their first shape.
+export function findParts(run: Run): string[] {
+  const found = new Set<string>();
+  for (const body of run.bodies) for (const shape of body.shapes) found.add(partOfShape(body, shape));
+  const order = ["column", "beam", "slab", "wall", "node", "stump", "debris"];
+  const rank = (kind: string): number => (order.includes(kind) ? order.indexOf(kind) : order.length);
+  return [...found].sort((a, b) => rank(a) - rank(b));
 }

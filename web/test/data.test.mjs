@@ -1,22 +1,14 @@
 // The parts of the page that need no browser.
 import assert from "node:assert/strict";
 import { describe, it } from "node:test";
-import { build } from "esbuild";
+import { load } from "./load.mjs";
 import { makeSynthetic } from "./synthetic.mjs";
 
-async function load(file) {
-  const result = await build({
-    entryPoints: [new URL(`../src/${file}`, import.meta.url).pathname],
-    bundle: true, write: false, format: "esm", jsx: "automatic", jsxImportSource: "preact", logLevel: "error",
-    external: [],
-  });
-  return import(`data:text/javascript;base64,${Buffer.from(result.outputFiles[0].text).toString("base64")}`);
-}
-
 const { decodeFloats, findFrame, slerp, readRun, calcPose } = await load("data.ts");
-const { formatNumber, formatValue, toReadable, formatDuration, formatDate, formatMass } = await load("units.ts");
+const { formatNumber, formatValue, toReadable, formatDuration, formatDate, formatMass, prettify } = await load("units.ts");
+const { findCoherent } = await load("plots.tsx");
 const { chooseMoments } = await load("stills.tsx");
-const { findZonesOfBodies, findBody } = await load("zones.ts");
+const { findZonesOfBodies, findBody, partOfShape } = await load("zones.ts");
 const { colourOfUtilisation } = await load("vocabulary.ts");
 
 describe("data", () => {
@@ -112,5 +104,38 @@ describe("what is shown", () => {
   it("keeps the ends of the colour ramp", () => {
     assert.equal(colourOfUtilisation(0), "rgb(251, 248, 234)");
     assert.equal(colourOfUtilisation(7), "rgb(92, 31, 5)");
+  });
+});
+
+describe("words", () => {
+  it("writes degrees, powers and signs as people do", () => {
+    assert.equal(prettify("leans by 9.1 deg, 180 deg +- 15 deg"), "leans by 9.1°, 180° ± 15°");
+    assert.equal(prettify("1435 m2. 2470 m3; 25 N/mm2, 64 cm2, 1800 kg/m3"), "1435\u00a0m². 2470\u00a0m³; 25\u00a0N/mm², 64\u00a0cm², 1800 kg/m³");
+    assert.equal(prettify("20.7 m towards -x, 5.2e-10 of it, 2.1 x 3"), "20.7\u00a0m towards −x, 5.2·10⁻¹⁰ of it, 2.1 × 3");
+  });
+  it("leaves names alone", () => {
+    for (const name of ["W-C5D5-6/head", "C-A1-0", "N-A2-0 touches", "Rows A and B", "mm2x"]) assert.equal(prettify(name), name);
+  });
+});
+
+describe("parts", () => {
+  const shape = (half, orientation = [1, 0, 0, 0]) => ({ centre: [0, 0, 0], orientation, half, material: "" });
+  it("tells panels from the members that carry them", () => {
+    const beam = { kind: "beam" };
+    assert.equal(partOfShape(beam, shape([1.3, 0.2, 0.35])), "beam");
+    assert.equal(partOfShape(beam, shape([1.3, 1.4, 0.075])), "slab");
+    assert.equal(partOfShape({ kind: "column" }, shape([0.05, 0.9, 0.4])), "wall");
+    // a quarter turn about y lays the thin direction of a standing panel upright
+    assert.equal(partOfShape(beam, shape([0.05, 0.9, 0.4], [Math.SQRT1_2, 0, Math.SQRT1_2, 0])), "slab");
+    assert.equal(partOfShape({ kind: "debris" }, shape([0.05, 0.9, 0.4])), "debris");
+  });
+});
+
+describe("angles", () => {
+  it("end when less than half of the block is connected", () => {
+    const run = (value) => ({ series: [{ id: "connected_share", value }] });
+    assert.equal(findCoherent(run([1, 0.7, 0.5, 0.4, 0.6])), 3);
+    assert.equal(findCoherent(run([1, 0.7])), undefined);
+    assert.equal(findCoherent({ series: [] }), undefined);
   });
 });
