@@ -1,7 +1,10 @@
 #include "arguments.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <iostream>
+
+#include "base/error.h"
 
 namespace topple::apps {
 
@@ -62,6 +65,17 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
 
   CLI::App* version = app.add_subcommand("version", "Show the version.");
 
+  if (argc > 1 && argv[1][0] != '-') {
+    std::vector<std::string> verbs;
+    for (const CLI::App* verb : app.get_subcommands([](CLI::App*) { return true; })) verbs.push_back(verb->get_name());
+    if (std::find(verbs.begin(), verbs.end(), argv[1]) == verbs.end()) {
+      const std::string near = nearest_name(argv[1], verbs);
+      std::cerr << "topple: there is no verb \"" << argv[1] << '"';
+      if (!near.empty()) std::cerr << "; did you mean \"" << near << "\"?";
+      std::cerr << "\nRun topple --help for the verbs.\n";
+      return kBadInput;
+    }
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

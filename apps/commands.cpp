@@ -151,6 +151,11 @@ std::vector<std::pair<std::string, std::string>> write_files(const record::Recor
   return files;
 }
 
+/// A finding that makes the exit code 3.
+bool is_violated(const record::Finding& f) {
+  return f.status == record::Status::Bad && (f.id.rfind("criterion.", 0) == 0 || f.id.rfind("clearance.", 0) == 0);
+}
+
 json summary_json(const record::Record& r, const std::vector<std::pair<std::string, std::string>>& files,
                   int exit_code) {
   json out;
@@ -180,8 +185,7 @@ json summary_json(const record::Record& r, const std::vector<std::pair<std::stri
                                {"value", std::isfinite(f.value) ? json(f.value) : json(nullptr)},
                                {"unit", f.unit},
                                {"status", word_of(f.status)}});
-    if (f.status == record::Status::Bad && (f.id.rfind("criterion.", 0) == 0 || f.id.rfind("clearance.", 0) == 0))
-      out["violated"].push_back(f.id);
+    if (is_violated(f)) out["violated"].push_back(f.id);
   }
   out["files"] = json::object();
   for (const auto& [what, path] : files) out["files"][what] = path;
@@ -200,6 +204,8 @@ int close_run(const record::Record& r, const Arguments& a, std::FILE* out,
   const int code = exit_code_of(r, failed_report);
   print_findings(out, r);
   std::fprintf(out, "\n%s Computed in %.1f s.\n", r.ending_text.c_str(), r.provenance.wall_time);
+  for (const record::Finding& f : r.findings)
+    if (is_violated(f)) std::fprintf(out, "Violated: %s (%s)\n", f.title.c_str(), f.heading.c_str());
   for (const auto& [what, path] : files) std::fprintf(out, "Wrote %s\n", path.c_str());
   if (a.json) std::printf("%s\n", dump(summary_json(r, files, code)).c_str());
   return code;
@@ -232,8 +238,8 @@ int check_plan(const Arguments& a) {
       for (const Diagnostic& d : warnings) out["diagnostics"].push_back(to_json(d));
       std::printf("%s\n", dump(out).c_str());
     } else {
-      std::printf("%s: no errors, %s\n", a.input.c_str(),
-                  count_words(static_cast<int>(warnings.size()), "warning").c_str());
+      std::printf("%s: no errors, %s. Next: topple run %s -o out\n", a.input.c_str(),
+                  count_words(static_cast<int>(warnings.size()), "warning").c_str(), a.input.c_str());
     }
     return kOk;
   } catch (const InputError& e) { return refuse(e, warnings, text, a.json); }

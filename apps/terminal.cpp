@@ -1,6 +1,7 @@
 #include "terminal.h"
 
 #include <fmt/format.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -15,12 +16,43 @@ bool has_colour(std::FILE* f) {
   return (no == nullptr || *no == '\0') && isatty(fileno(f)) != 0;
 }
 
+std::string wrap(const std::string& text, int width, int indent) {
+  std::string out;
+  int column = indent;
+  size_t i = 0;
+  while (i < text.size()) {
+    const size_t end = std::min(text.find(' ', i), text.size());
+    const int length = static_cast<int>(end - i);
+    if (column > indent) {
+      if (width > 0 && column + 1 + length > width) {
+        out += "\n" + std::string(static_cast<size_t>(indent), ' ');
+        column = indent;
+      } else {
+        out += ' ';
+        ++column;
+      }
+    }
+    out.append(text, i, end - i);
+    column += length;
+    i = end + 1;
+  }
+  return out;
+}
+
+int find_width(std::FILE* f) {
+  winsize size{};
+  if (isatty(fileno(f)) == 0) return 0;
+  if (ioctl(fileno(f), TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return 80;
+  return std::clamp(static_cast<int>(size.ws_col), 40, 120);
+}
+
 ProgressLine::ProgressLine() : is_terminal_(isatty(fileno(stderr)) != 0), start_(Clock::now()), last_(start_) {}
 
 std::string ProgressLine::words(double done, double whole, double elapsed) {
   const double factor = elapsed > 0 ? done / elapsed : 0;
   const double left = done > 0 ? elapsed * (whole - done) / done : 0;
-  return fmt::format("{:.2f} of {:.2f} s simulated, {:.2g} x real time, {:.0f} s left", done, whole, factor, left);
+  return fmt::format("{:.2f} of {:.2f} s simulated, {:.2f} x real time, about {:.0f} s left", done, whole, factor,
+                     left);
 }
 
 void ProgressLine::show(double done, double whole) {
@@ -60,7 +92,8 @@ void EventPrinter::print(const record::Event& e) {
     if (n > limit->second) {
       if (n == limit->second + 1 && limit->second > 0) {
         progress_.clear();
-        std::fprintf(out_, "  %8.3f s  ... further events \"%s\" are in the record\n", e.time, e.kind.c_str());
+        std::fprintf(out_, "  %8.3f s  ... more of kind \"%s\" in the record (--verbose shows all)\n", e.time,
+                     e.kind.c_str());
       }
       return;
     }
@@ -82,6 +115,7 @@ void print_counts(std::FILE* out, const record::Counts& c, double standing_mass)
 
 void print_findings(std::FILE* out, const record::Record& r) {
   const bool colour = has_colour(out);
+  const int width = find_width(out);
   std::string heading;
   for (const record::Finding& f : r.findings) {
     if (f.heading != heading) {
@@ -103,9 +137,10 @@ void print_findings(std::FILE* out, const record::Record& r) {
         mark = "X ", tint = "\x1b[31m";
         break;
     }
-    const std::string title = f.title == heading ? "" : f.title + ": ";
-    std::fprintf(out, "  %s%s%s %s%s\n", colour ? tint : "", mark, colour ? "\x1b[0m" : "", title.c_str(),
-                 f.text.c_str());
+    // "Mechanism: topple" under "Mechanism" says what its text says
+    const std::string title = f.title == heading || f.title.rfind(heading + ": ", 0) == 0 ? "" : f.title + ": ";
+    std::fprintf(out, "  %s%s%s %s\n", colour ? tint : "", mark, colour ? "\x1b[0m" : "",
+                 wrap(title + f.text, width, 5).c_str());
   }
 }
 

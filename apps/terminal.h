@@ -13,6 +13,13 @@ namespace topple::apps {
 /// Whether escape sequences may be written to a stream: a terminal, and NO_COLOR unset or empty.
 bool has_colour(std::FILE*);
 
+/// Columns of a terminal, 40 to 120; 0 where lines may be as long as they like.
+int find_width(std::FILE*);
+
+/// Breaks a text at spaces so that no line passes `width`, if that is not 0. Lines after the first begin with `indent`
+/// spaces; the first is printed after as many.
+std::string wrap(const std::string& text, int width, int indent);
+
 /// Progress of simulated time on standard error: one line that renews itself on a terminal, a line now and then
 /// otherwise.
 class ProgressLine {

@@ -70,6 +70,11 @@ struct Context {
   }
 };
 
+/// "no zone has yielded", "1 zone has yielded", "2 zones have yielded".
+std::string count_words(long n, const char* none, const char* one, const char* many) {
+  return n == 0 ? none : fmt::format("{} {}", n, n == 1 ? one : many);
+}
+
 std::string azimuth_words(double azimuth) {
   double degrees = azimuth / unit::deg;
   if (degrees < -0.5) degrees += 360;
@@ -129,14 +134,14 @@ bool add_stability(const Context& c) {
     const double margin = has ? 1 / z.utilisation : kNone;
     const double away = norm(block[i].displacement);
     const bool stands = away < c.k.stands_displacement && std::isfinite(away);
-    std::string text = has ? fmt::format("The lowest margin is {:.2f} in zone {} ({:.0f} % used)", margin,
-                                         c.r.zones[static_cast<size_t>(z.zone)].name, 100 * z.utilisation)
+    std::string text = has ? fmt::format("Zone {} is nearest to its resistance and uses {:.0f} % of it (margin {:.2f})",
+                                         c.r.zones[static_cast<size_t>(z.zone)].name, 100 * z.utilisation, margin)
                            : std::string("No zone is loaded");
-    text += fmt::format(", {} zones have yielded", z.yielded);
+    text += "; " + count_words(z.yielded, "no zone has yielded", "zone has yielded", "zones have yielded");
     if (settled)
-      text += fmt::format(
-          ", {} are broken; the upper block has moved by {:.1f} cm and its fastest part moves at {:.3f} m/s", z.broken,
-          100 * away, block[i].fastest);
+      text +=
+          fmt::format(", {}. The upper block has moved by {:.1f} cm and its fastest part moves at {:.3f} m/s",
+                      count_words(z.broken, "none is broken", "is broken", "are broken"), 100 * away, block[i].fastest);
     text += stands ? "." : ": it does not stand.";
     const Status status = !stands ? Status::Bad : z.yielded > 0 || z.broken > 0 ? Status::Warning : Status::Good;
     c.add(id, "Stability", title, text, margin, "1", status);
@@ -171,7 +176,8 @@ Reach add_debris(const Context& c, const Mechanism& m) {
     std::string text = fmt::format("The mass centre moved towards {}", azimuth_words(m.azimuth));
     if (c.map.is_direction_planned)
       text += fmt::format(", {:.0f} deg from the planned {}", std::abs(off) / unit::deg, azimuth_words(planned));
-    c.add("azimuth", "Fall and debris", "Direction of fall", text + ".", m.azimuth, "rad");
+    c.add("azimuth", "Fall and debris", "Direction of fall", text + " (0 deg is +x, counter-clockwise).", m.azimuth,
+          "rad");
   }
   std::vector<Point2> corners;
   const std::vector<PlacedBox> boxes = c.boxes_at(last, true);
@@ -250,12 +256,14 @@ void add_touchdown(const Context& c) {
       if (series->value[i] > largest) largest = series->value[i], when = c.r.time[i];
     c.add("touchdown.energy", "Touchdown", "Largest energy in motion",
           fmt::format("{:.1f} MJ at {:.2f} s.", largest * 1e-6, when), largest, "J");
-    c.add("touchdown.force", "Touchdown", "Largest ground force",
-          fmt::format("{:.1f} MN at {:.2f} s, {:.1f} times the weight; taken at frames {:.3f} s apart.",
-                      c.recorder.largest_ground_force() * 1e-6, c.recorder.largest_ground_force_time(),
-                      c.recorder.largest_ground_force() / (c.map.moving_mass * std::max(norm(c.model.gravity), 1e-9)),
-                      c.r.time.size() > 1 ? c.r.time[1] - c.r.time[0] : 0.0),
-          c.recorder.largest_ground_force(), "N");
+    c.add(
+        "touchdown.force", "Touchdown", "Largest ground force",
+        fmt::format("{:.1f} MN at {:.2f} s, {:.1f} times the weight; read every {:.3f} s, so that shorter peaks can be "
+                    "higher.",
+                    c.recorder.largest_ground_force() * 1e-6, c.recorder.largest_ground_force_time(),
+                    c.recorder.largest_ground_force() / (c.map.moving_mass * std::max(norm(c.model.gravity), 1e-9)),
+                    c.r.time.size() > 1 ? c.r.time[1] - c.r.time[0] : 0.0),
+        c.recorder.largest_ground_force(), "N");
   }
   c.add("vibration", "Touchdown", "Ground vibration",
         "Not given: a screening needs the site's attenuation coefficients from the user.", kNone, "");
@@ -308,27 +316,30 @@ void add_rigid_block(const Context& c) {
   const double when = block.release + 1;
   const auto at = std::lower_bound(c.r.time.begin(), c.r.time.end(), when - 1e-9);
   const std::string model_words = fmt::format(
-      "A rigid block of {:.0f} t over {} hinges with {:.2f} MNm in all, its mass centre {:.2f} m ahead of them",
+      "a rigid block in its place ({:.0f} t on {} plastic hinges of {:.2f} MNm in all, its mass centre "
+      "{:.2f} m ahead of them)",
       block.mass / unit::t, row.size(), block.plastic_moment * 1e-6, block.ahead);
   // a block that has already left its place is not released from rest
   bool rests = true;
   for (const BlockFrame& f : c.recorder.block_frames())
     rests &= f.time > block.release || norm(f.displacement) < c.k.stands_displacement;
   if (!rests) {
-    c.add("rigid_block", "Mechanism", "Rigid block",
+    c.add("rigid_block", "Mechanism", "Beside a rigid block",
           "No comparison: the upper block was in motion before the last stage fired.", kNone, "rad");
     return;
   }
   if (block.mass * block.gravity * block.ahead <= block.plastic_moment) {
-    c.add("rigid_block", "Mechanism", "Rigid block", model_words + ", would not tilt.", kNone, "rad");
+    c.add("rigid_block", "Mechanism", "Beside a rigid block", "By comparison, " + model_words + " would not tilt.",
+          kNone, "rad");
   } else if (at != c.r.time.end()) {
     const size_t i = static_cast<size_t>(at - c.r.time.begin());
     const double here = c.r.series.front().value[i], there = series.value[i];
     c.add(
-        "rigid_block", "Mechanism", "Rigid block",
-        fmt::format("{}, has turned by {:.1f} deg 1 s after the last stage; the model by {:.1f} deg ({:+.1f} deg). The "
-                    "block has no yielding storeys, no sway of the ground storey and no axial shortening of columns.",
-                    model_words, there / unit::deg, here / unit::deg, (here - there) / unit::deg),
+        "rigid_block", "Mechanism", "Beside a rigid block",
+        fmt::format("1 s after the last stage the upper block leans by {:.1f} deg; {} would lean by {:.1f} deg. Unlike "
+                    "the model, that block has no yielding storeys, no swaying ground storey and no columns that "
+                    "shorten.",
+                    here / unit::deg, model_words, there / unit::deg),
         here - there, "rad");
   }
   c.r.series.insert(c.r.series.begin() + 1, std::move(series));
@@ -402,18 +413,20 @@ void add_verification(const Context& c) {
   const double reaction = c.recorder.start_reaction_error();
   // charges that fire at the very beginning are already at work in the first frame
   const bool early = !c.map.events.empty() && c.model.events.front().time <= 0;
-  c.add(
-      "verification.equilibrium", "Verification", "Equilibrium under dead load",
-      fmt::format("Largest unbalanced force over the weight {:.1e} after {} iterations; reactions of the ground differ "
-                  "from the weight by {:.1e} of it{}.",
-                  s.equilibrium_residual, s.equilibrium_iterations, reaction,
-                  early ? " (the first charges fire in this instant)" : ""),
-      early ? s.equilibrium_residual : reaction, "1",
-      std::max(s.equilibrium_residual, early ? 0.0 : reaction) <= c.k.verification_equilibrium_residual ? Status::Good
-                                                                                                        : Status::Bad);
+  c.add("verification.equilibrium", "Verification", "Equilibrium under dead load",
+        fmt::format(
+            "After {1} iterations the largest unbalanced force is {0:.1e} of the weight, and the reactions of the "
+            "ground differ from the weight by {2:.1e} of it{3}.",
+            s.equilibrium_residual, s.equilibrium_iterations, reaction,
+            early ? " (the first charges fire in this instant)" : ""),
+        early ? s.equilibrium_residual : reaction, "1",
+        std::max(s.equilibrium_residual, early ? 0.0 : reaction) <= c.k.verification_equilibrium_residual
+            ? Status::Good
+            : Status::Bad);
   c.add("verification.step", "Verification", "Time step",
-        fmt::format("{:.3g} ms, {} steps, fastest mode {:.0f} rad/s; joints drift by at most {:.1e}.", s.step * 1e3,
-                    s.steps, s.highest_frequency, s.joint_drift),
+        fmt::format(
+            "{:.3g} ms in {} steps; the fastest mode has {:.0f} rad/s, and joints drift by at most {:.1e} m or rad.",
+            s.step * 1e3, s.steps, s.highest_frequency, s.joint_drift),
         s.step, "s");
 }
 

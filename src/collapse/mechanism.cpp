@@ -87,11 +87,11 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
   double off = std::atan2(direction.y, direction.x) - std::atan2(in.fall_direction.y, in.fall_direction.x);
   off = std::remainder(off, 2 * pi);
 
-  const std::string when = touched ? fmt::format("at first touchdown of the upper block ({:.2f} s)", out.time)
-                                   : fmt::format("at the end ({:.2f} s)", out.time);
+  const std::string when = touched ? fmt::format("when the upper block first touches the ground, at {:.2f} s", out.time)
+                                   : fmt::format("at the end, {:.2f} s", out.time);
   const std::string motion = fmt::format(
-      "{} it had turned by {:.1f} deg, its mass centre had come down by {:.2f} m, its rear edge by {:.0f} % "
-      "of its front edge; {:.0f} % of the mass came down",
+      "{}, it leans by {:.1f} deg, its mass centre has come down by {:.2f} m, and its rear edge {:.0f} % as far as its "
+      "front edge. In the end {:.0f} % of the mass has come down",
       when, out.tilt / unit::deg, out.drop, 100 * out.rear_share, 100 * out.moved);
   const double height_left = in.frames.front().height > 0 ? last.height / in.frames.front().height : 1;
   const double final_tilt = norm(log_rotation(last.rotation));
@@ -111,7 +111,7 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
                            100 * at->forward, 100 * at->backward, motion);
   } else if (at->connected < k.mechanism_coherent_share) {
     out.name = "progressive";
-    out.text = fmt::format("Progressive collapse: the largest connected part held {:.0f} % of the upper mass; {}.",
+    out.text = fmt::format("Progressive collapse: the largest connected part holds {:.0f} % of the upper mass; {}.",
                            100 * at->connected, motion);
   } else if (out.rear_share >= k.mechanism_topple_rear_share) {
     out.name = "vertical";

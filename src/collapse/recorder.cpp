@@ -288,8 +288,7 @@ void Recorder::add_happening(const mbs::Happening& h) {
                    map_.stages[static_cast<size_t>(entry.stage)]});
       }
       add_event({h.time, "charge", entry.member,
-                 fmt::format("{} fired {:.3f} s, {:.1f} t of concrete thrown out", entry.member, h.time,
-                             entry.debris_mass / unit::t)});
+                 fmt::format("{} fired, {:.1f} t of concrete thrown out", entry.member, entry.debris_mass / unit::t)});
       break;
     }
     case Kind::ElementYielded: {

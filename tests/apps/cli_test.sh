@@ -28,7 +28,7 @@ usage)
   expect 0 "$topple" --version; has out "topple "
   expect 0 "$topple" version; has out "topple "
   expect 2 "$topple"
-  expect 2 "$topple" rnu
+  expect 2 "$topple" rnu; has err 'did you mean "run"?'
   expect 2 "$topple" run
   expect 2 "$topple" run "$plan"; has err "--output"
   expect 2 "$topple" run "$plan" -o a --threads 0
@@ -71,7 +71,7 @@ run)
   [ "$(grep -n '^Mechanism' out | cut -d: -f1)" -lt "$(grep -n '^Stability' out | cut -d: -f1)" ] || failures=$((failures + 1))
   lacks out $'\x1b'
   printf '\n[criteria]\nmechanism = "stands"\n' | cat "$plan" - >stands.toml
-  expect 3 "$topple" run stands.toml -o c --no-report; has out "Asked: stands"
+  expect 3 "$topple" run stands.toml -o c --no-report; has out "Asked: stands"; has out "Violated: Mechanism (Criteria)"
   expect 1 "$topple" run "$plan" -o /proc/nowhere --no-report
   # the same plan and seed give the same bytes of poses
   expect 0 "$topple" run "$plan" -o d --csv --no-report --threads 2
