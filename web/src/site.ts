@@ -89,7 +89,7 @@ export class Site {
   private readonly materials: Record<keyof Omit<Theme, "background" | "selection">, THREE.Material & { color: THREE.Color }>;
   private readonly labels: THREE.Sprite[] = [];
   /// Labels of long things, which may stand at any of these places.
-  private readonly roaming: { label: THREE.Sprite; places: THREE.Vector3[] }[] = [];
+  private readonly roaming: { label: THREE.Sprite; home: THREE.Vector3; places: THREE.Vector3[] }[] = [];
 
   /// `area` is what must lie on the ground plane; `height` that of the building [m].
   constructor(run: Run, area: THREE.Box3, height: number) {
@@ -154,7 +154,7 @@ export class Site {
       const [bx, by] = points[(i + 1) % points.length] as Point;
       return Array.from({ length: 12 }, (_, k) => new THREE.Vector3(x + (k / 12) * (bx - x), y + (k / 12) * (by - y), up + 0.3));
     });
-    this.roaming.push({ label, places });
+    this.roaming.push({ label, home: label.position.clone(), places });
   }
 
   private addAxes(area: THREE.Box3, width: number): void {
@@ -178,14 +178,15 @@ export class Site {
   placeLabels(camera: THREE.PerspectiveCamera, width: number, centre: THREE.Vector3): void {
     const middle = centre.clone().project(camera);
     const p = new THREE.Vector3();
-    for (const { label, places } of this.roaming) {
+    for (const { label, home, places } of this.roaming) {
+      label.position.copy(home);
       const margin = (label.userData["pixels"] as { width: number }).width / Math.max(1, width);
       let best = -1;
       for (const place of places) {
         p.copy(place).project(camera);
         if (p.z > 1 || Math.abs(p.x) > 0.98 - margin || p.y < -0.95 || p.y > 0.88) continue;
         const far = Math.hypot((p.x - middle.x) * camera.aspect, p.y - middle.y);
-        if (far <= best) continue;
+        if (far <= best + 0.01) continue; // the first of equals, so that round-off does not move it
         best = far;
         label.position.copy(place);
       }

@@ -1,4 +1,4 @@
-import type { Run } from "./data";
+import { findFrame, type Run } from "./data";
 import { showStage, type State } from "./state";
 import { formatTime } from "./units";
 
@@ -26,25 +26,33 @@ export function chooseMoments(run: Run, count = 6): { time: number; caption: str
     const block = run.findings.find((f) => f.id === "touchdown.first")?.value ?? undefined;
     const touchdown = block ?? run.events.find((e) => e.kind === "touchdown")?.time;
     if (touchdown !== undefined) add(touchdown, block === undefined ? "first touchdown" : "upper block touches down", 1);
+    const lastStage = Math.max(begin, ...stages.map((e) => e.time));
+    // How far the collapse has come: by the height of the mass centre, else by the time since the last stage.
+    const height = run.series.find((s) => s.id === "mass_centre_height")?.value;
+    const progress = run.time.map((t, i) => {
+      const fallen = (height?.[0] ?? 0) - (height?.[i] ?? height?.[0] ?? 0);
+      return height === undefined ? Math.max(0, t - lastStage) : fallen;
+    });
+    const progressAt = (t: number): number => progress[findFrame(run.time, t).frame] ?? 0;
     while (moments.length < count) {
       moments.sort((a, b) => a.time - b.time);
-      // The widest gap says least about what happens in it; the quiet time before the last stage counts little.
-      const lastStage = Math.max(begin, ...stages.map((e) => e.time));
       let best = -1;
       let gap = 0;
       for (let i = 0; i + 1 < moments.length; ++i) {
-        const a = moments[i]?.time ?? 0;
-        const b = moments[i + 1]?.time ?? 0;
-        const width = (b - a) * (b <= lastStage ? 0.2 : 1);
-        if (width > gap) {
+        const from = moments[i]?.time ?? 0, to = moments[i + 1]?.time ?? 0;
+        const width = progressAt(to) - progressAt(from);
+        if (width > gap && to - from > 2.2 * least) {
           gap = width;
           best = i;
         }
       }
       if (best < 0) break;
-      const middle = ((moments[best]?.time ?? 0) + (moments[best + 1]?.time ?? 0)) / 2;
+      const from = moments[best]?.time ?? 0, to = moments[best + 1]?.time ?? 0;
+      const middle = progressAt(from) + gap / 2;
+      const frame = run.time.findIndex((t, i) => t > from && (progress[i] as number) >= middle);
       const before = moments.length;
-      add(middle, "", 2);
+      add(run.time[frame] ?? from, "", 2);
+      if (moments.length === before) add((from + to) / 2, "", 2);
       if (moments.length === before) break;
     }
   }

@@ -161,7 +161,7 @@ describe("report page", { timeout: 240000 }, () => {
   });
 
   it("fits the picture again after it was turned", async () => {
-    await page.getByRole("button", { name: "Top" }).click();
+    await page.getByRole("button", { name: "Top", exact: true }).click();
     await settle(page);
     const fitted = await picture(page);
     const box = await page.locator("[data-test=canvas]").boundingBox();
@@ -174,7 +174,7 @@ describe("report page", { timeout: 240000 }, () => {
     await page.keyboard.press("f");
     await settle(page);
     assert.deepEqual(await picture(page), fitted);
-    await page.getByRole("button", { name: "Oblique" }).click();
+    await page.getByRole("button", { name: "Oblique", exact: true }).click();
   });
 
   it("shows the member under the pointer and the one asked for by name", async () => {
