@@ -16,24 +16,6 @@ namespace {
 constexpr size_t kMostContacts = 300;  // events of parts hitting each other kept in a record
 constexpr double kLeastSpeed = 0.5;    // of a contact that is worth an event [m/s]
 
-enum SeriesIndex {
-  kTilt,
-  kGroundForce,
-  kHeight,
-  kKinetic,
-  kGravity,
-  kElastic,
-  kContact,
-  kPlastic,
-  kDamping,
-  kFriction,
-  kContactLoss,
-  kRemoved,
-  kResidual,
-  kBroken,
-  kConnected
-};
-
 int find_root(std::vector<int>& parent, int i) {
   while (parent[static_cast<size_t>(i)] != i) {
     parent[static_cast<size_t>(i)] = parent[static_cast<size_t>(parent[static_cast<size_t>(i)])];
@@ -235,8 +217,10 @@ void Recorder::add_frame(const mbs::View& v) {
   const BlockFrame block = calc_block(v);
   block_.push_back(block);
   const mbs::Energy& e = v.energy;
+  const double ground_force = dot(v.ground_force, model_.contact.normal);
+  // in the order of the list that the constructor makes
   const double values[] = {calc_tilt(block.rotation, map_.fall_direction),
-                           dot(v.ground_force, model_.contact.normal),
+                           ground_force,
                            block.height,
                            e.kinetic,
                            e.gravity,
@@ -251,8 +235,8 @@ void Recorder::add_frame(const mbs::View& v) {
                            static_cast<double>(zf.broken),
                            block.connected};
   for (size_t i = 0; i < std::size(values); ++i) series(i).value.push_back(values[i]);
-  if (values[kGroundForce] > largest_ground_force_) {
-    largest_ground_force_ = values[kGroundForce];
+  if (ground_force > largest_ground_force_) {
+    largest_ground_force_ = ground_force;
     largest_ground_force_time_ = v.time;
   }
 }
@@ -300,7 +284,7 @@ void Recorder::add_happening(const mbs::Happening& h) {
     case Kind::ElementSoftening: {
       const ZoneEntry& z = entry_of(h.index);
       if (z.firing_time <= h.time) break;
-      add_event({h.time, "yield", z.name, fmt::format("zone {} softens", z.name)});
+      add_event({h.time, "softening", z.name, fmt::format("zone {} softens", z.name)});
       break;
     }
     case Kind::ElementBroken: {

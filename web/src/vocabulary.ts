@@ -77,6 +77,7 @@ const eventWords: Record<string, EventWords> = {
   stage: { word: "Stage", colour: "#0072b2", shape: "circle", small: false },
   charge: { word: "Charge", colour: "#cc79a7", shape: "star", small: true },
   yield: { word: "Yield", colour: "#e69f00", shape: "triangle", small: true },
+  softening: { word: "Softening", colour: "#b8860b", shape: "triangle", small: true },
   rupture: { word: "Rupture", colour: "var(--broken)", shape: "cross", small: true },
   release: { word: "Release", colour: "#d55e00", shape: "diamond", small: true },
   touchdown: { word: "Touchdown", colour: "var(--touchdown)", shape: "down", small: false },
