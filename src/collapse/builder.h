@@ -75,7 +75,7 @@ struct Builder {
   int node_at(const GridPoint&) const;
   int find_at(const std::map<GridPoint, int>&, const GridPoint&) const;
   int add_assembly(Assembly);
-  void put_on_nodes(std::vector<Part> parts, int axis, double middle, int node_a, int node_b);
+  void put_on_nodes(const std::vector<Part>& parts, int axis, double middle, int node_a, int node_b);
 
   // connections
   void estimate_normal_forces();

@@ -15,7 +15,6 @@ namespace topple::collapse {
 
 namespace {
 
-using record::Finding;
 using record::Status;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();

@@ -156,7 +156,7 @@ void Builder::make_columns() {
     }
     core_low[at] = low;
     const double mass = product::calc_mass(plan, m);
-    const auto slice = [&](double from, double to) {
+    const auto slice = [&, index = index](double from, double to) {
       const Vec3 half{0.5 * s.width, 0.5 * s.height, 0};
       Vec3 a = m.start - half, b = m.start + half;
       a.z = m.start.z + from, b.z = m.start.z + to;
@@ -202,7 +202,7 @@ void Builder::make_loose_nodes() {
 }
 
 /// Shares boxes between the bodies of two joints, each getting what lies on its side of the middle.
-void Builder::put_on_nodes(std::vector<Part> parts, int axis, double middle, int node_a, int node_b) {
+void Builder::put_on_nodes(const std::vector<Part>& parts, int axis, double middle, int node_a, int node_b) {
   for (const Part& p : parts) {
     const double low = p.centre[axis] - p.half[axis], high = p.centre[axis] + p.half[axis];
     for (const bool first : {true, false}) {
@@ -269,7 +269,7 @@ void Builder::make_slabs() {
     const double load = plan.storey_loads[static_cast<size_t>(at.storey)];
     const double mass = product::calc_mass(plan, m) + load * std::abs((m.end.x - m.start.x) * (m.end.y - m.start.y));
     // the strips keep clear of the joints and of the beams across
-    const auto edge = [&](int row) {
+    const auto edge = [&, at = at](int row) {
       double half = 0;
       for (int f : {at.frame, at.frame + 1}) half = std::max(half, half_of_node({row, f, at.storey}).x);
       if (const int b = find_at(y_beams, {row, at.frame, at.storey}); b >= 0)
@@ -340,7 +340,7 @@ void Builder::make_walls() {
       }
       if (a < 0) a = b;
       if (b < 0) b = a;
-      put_on_nodes(std::move(parts), axis, 0.5 * (from + to), a, b);
+      put_on_nodes(parts, axis, 0.5 * (from + to), a, b);
     }
 }
 
