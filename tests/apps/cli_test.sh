@@ -41,6 +41,26 @@ usage)
   sed 's/"zone.rupture_rotation"/"zone.rupture_rotatoin"/' rules.json >wrong.json
   expect 2 "$topple" check "$plan" --knowledge wrong.json; has err 'did you mean "zone.rupture_rotation"'
   ;;
+readme)
+  # every command in the shell blocks of these pages exists
+  commands=0
+  for page in README.md docs/getting-started.md docs/run.md docs/mbs-model.md; do
+    while read -r word verb rest; do
+      case $word in
+      script/*) [ -x "$source/$word" ] || { echo "$page shows $word, which cannot be called"; failures=$((failures + 1)); } ;;
+      topple)
+        [ "$verb" = mbs ] && verb="mbs ${rest%% *}"
+        expect 0 "$topple" $verb --help # two words for mbs
+        ;;
+      *) continue ;;
+      esac
+      commands=$((commands + 1))
+    done < <(awk '/^```sh/ {inside = 1; next} /^```/ {inside = 0} inside' "$source/$page" | tr '&' '\n')
+  done
+  [ $commands -ge 8 ] || { echo "only $commands commands found"; failures=$((failures + 1)); }
+  # of README's own blocks
+  for command in script/demo script/test "topple new" "topple check" "topple run"; do has "$source/README.md" "$command"; done
+  ;;
 new)
   expect 0 "$topple" new plan.toml; exists plan.toml
   expect 0 "$topple" check plan.toml; has out "no errors"
