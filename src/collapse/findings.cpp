@@ -191,11 +191,34 @@ Reach add_debris(const Context& c, const Mechanism& m) {
   const double side[4] = {std::max(0.0, low0[0] - low[0]), std::max(0.0, high[0] - high0[0]),
                           std::max(0.0, low0[1] - low[1]), std::max(0.0, high[1] - high0[1])};
   reach.largest = *std::max_element(side, side + 4);
-  c.add("debris.reach", "Fall and debris", "Reach of the debris",
-        fmt::format("Beyond the footprint: {:.1f} m towards -x, {:.1f} m towards +x, {:.1f} m towards -y, {:.1f} m "
-                    "towards +y; the outline of all parts encloses {:.0f} m2.",
-                    side[0], side[1], side[2], side[3], calc_area(hull)),
-        reach.largest, "m");
+  // a single piece may fly far: how far beyond the footprint each part lies, and which is the last
+  std::vector<std::pair<double, size_t>> ways;
+  double mass = 0;
+  for (size_t b = 0; b < c.r.bodies.size(); ++b) {
+    if (c.r.bodies[b].fixed) continue;
+    double way = 0;
+    const Pose X_WB = c.pose(last, b);
+    for (const record::BoxShape& s : c.r.bodies[b].shapes)
+      for (const Point2& p : calc_outline({X_WB * s.X_BS, s.half}))
+        for (size_t i : {0UL, 1UL}) way = std::max({way, low0[i] - p[i], p[i] - high0[i]});
+    ways.emplace_back(way, b);
+    mass += c.r.bodies[b].mass;
+  }
+  std::sort(ways.begin(), ways.end());
+  double within = 0, most = 0;
+  for (const auto& [way, b] : ways) {
+    most = way;
+    within += c.r.bodies[b].mass;
+    if (within >= 0.95 * mass) break;
+  }
+  std::string text = fmt::format(
+      "Beyond the footprint: {:.1f} m towards -x, {:.1f} m towards +x, {:.1f} m towards -y, {:.1f} m towards +y; the "
+      "outline of all parts encloses {:.0f} m2.",
+      side[0], side[1], side[2], side[3], calc_area(hull));
+  if (!ways.empty() && reach.largest > 0)
+    text += fmt::format(" 95 % of the mass lies within {:.1f} m of it; the farthest part is {}.", most,
+                        c.r.bodies[ways.back().second].name);
+  c.add("debris.reach", "Fall and debris", "Reach of the debris", text, reach.largest, "m");
   const Heap heap = calc_heap(boxes, 0.25);
   c.add("debris.height", "Fall and debris", "Height of the hill",
         fmt::format("The highest point of all parts lies {:.1f} m above the ground.", heap.height), heap.height, "m");
