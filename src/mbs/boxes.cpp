@@ -2,28 +2,55 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace topple::mbs {
 
 namespace {
 
-/// Axis number i of a pair of boxes: 0-2 faces of a, 3-5 faces of b, 6-14 products of edges. Zero for parallel edges.
+/// Overlaps of two boxes along the fifteen axes that can separate them: 0-2 faces of a, 3-5 faces of b, 6-14 products
+/// of edges (Gottschalk, Lin and Manocha 1996). Negative when apart; infinite along a product of parallel edges.
+class Overlaps {
+ public:
+  Overlaps(const Solid& a, const Solid& b) : a_(a.half), b_(b.half) {
+    const Vec3 d = b.p - a.p;
+    for (int i = 0; i < 3; ++i) {
+      const Vec3 ai = a.R.column(i);
+      t_[i] = dot(ai, d);
+      for (int j = 0; j < 3; ++j) {
+        c_[i][j] = dot(ai, b.R.column(j));
+        m_[i][j] = std::abs(c_[i][j]);
+      }
+    }
+  }
+  double operator()(int axis) const {
+    if (axis < 3) return a_[axis] + b_.x * m_[axis][0] + b_.y * m_[axis][1] + b_.z * m_[axis][2] - std::abs(t_[axis]);
+    if (axis < 6) {
+      const int j = axis - 3;
+      return b_[j] + a_.x * m_[0][j] + a_.y * m_[1][j] + a_.z * m_[2][j] - std::abs(along_b(j));
+    }
+    const int i = (axis - 6) / 3, j = (axis - 6) % 3;
+    const double length2 = 1 - c_[i][j] * c_[i][j];
+    if (length2 < 1e-12) return std::numeric_limits<double>::infinity();
+    const int i1 = (i + 1) % 3, i2 = (i + 2) % 3, j1 = (j + 1) % 3, j2 = (j + 2) % 3;
+    const double reach = a_[i1] * m_[i2][j] + a_[i2] * m_[i1][j] + b_[j1] * m_[i][j2] + b_[j2] * m_[i][j1];
+    const double overlap = reach - std::abs(t_[i2] * c_[i1][j] - t_[i1] * c_[i2][j]);
+    // only a penetration needs its true length
+    return overlap <= 0 ? overlap : overlap / std::sqrt(length2);
+  }
+
+ private:
+  double along_b(int j) const { return t_.x * c_[0][j] + t_.y * c_[1][j] + t_.z * c_[2][j]; }
+  Vec3 a_, b_, t_;
+  double c_[3][3], m_[3][3];
+};
+
+/// Unit vector of an axis.
 Vec3 axis_of(const Solid& a, const Solid& b, int i) {
   if (i < 3) return a.R.column(i);
   if (i < 6) return b.R.column(i - 3);
   const Vec3 n = cross(a.R.column((i - 6) / 3), b.R.column((i - 6) % 3));
-  const double length = norm(n);
-  return length > 1e-6 ? (1 / length) * n : Vec3{};
-}
-
-double reach_along(const Solid& s, const Vec3& n) {
-  return std::abs(dot(s.R.column(0), n)) * s.half.x + std::abs(dot(s.R.column(1), n)) * s.half.y +
-         std::abs(dot(s.R.column(2), n)) * s.half.z;
-}
-
-/// Overlap along an axis, negative when apart.
-double overlap_along(const Solid& a, const Solid& b, const Vec3& n) {
-  return reach_along(a, n) + reach_along(b, n) - std::abs(dot(b.p - a.p, n));
+  return (1 / norm(n)) * n;
 }
 
 /// Cuts a polygon by the half-space dot(n, p) <= offset.
@@ -87,14 +114,12 @@ void edge_point(const Solid& a, const Solid& b, int i, const Vec3& n, double dep
 }
 
 void box_box(const Solid& a, const Solid& b, int& axis, BoxContact& out) {
-  if (const Vec3 n = axis_of(a, b, axis); dot(n, n) > 0 && overlap_along(a, b, n) <= 0) return;
-  double least = 1e300;
+  const Overlaps overlap_along(a, b);
+  if (overlap_along(axis) <= 0) return;
+  double least = std::numeric_limits<double>::infinity();
   int best = -1;
-  Vec3 normal;
   for (int i = 0; i < 15; ++i) {
-    const Vec3 n = axis_of(a, b, i);
-    if (dot(n, n) == 0) continue;
-    const double overlap = overlap_along(a, b, n);
+    const double overlap = overlap_along(i);
     if (overlap <= 0) {
       axis = i;
       return;
@@ -103,10 +128,11 @@ void box_box(const Solid& a, const Solid& b, int& axis, BoxContact& out) {
     if (overlap < (i < 3 ? 1.0 : i < 6 ? 0.98 : 0.95) * least - (i < 3 ? 0 : 1e-9)) {
       least = overlap;
       best = i;
-      normal = dot(n, b.p - a.p) < 0 ? -n : n;
     }
   }
   if (best < 0) return;
+  Vec3 normal = axis_of(a, b, best);
+  if (dot(normal, b.p - a.p) < 0) normal = -normal;
   if (best < 3) {
     face_points(a, best, normal, b, false, out);
   } else if (best < 6) {

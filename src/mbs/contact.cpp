@@ -19,8 +19,6 @@ constexpr long kSearchPause = 20;        // steps between searches that breaks a
 constexpr double kStickStiffness = 0.3;  // of the restituting normal stiffness
 constexpr double kStickDamping = 0.3;    // times mass times contact frequency
 
-constexpr double kPointShare = 0.25;  // of a pair's stiffness at each of its points, four of which make a face
-
 /// Share of the full spring rate that acts: 1 while approaching for the whole step, 0 while parting, between them the
 /// part of the step before the approach ends under the forces of `points` such contacts.
 double approach_share(double speed, double full_force, double inverse_mass, int points, double h) {
@@ -119,31 +117,40 @@ void System::find_pairs() {
       while (old < s.pairs.size() && key(s.pairs[old]) < key(p)) ++old;
       if (old < s.pairs.size() && key(s.pairs[old]) == key(p)) {
         p = s.pairs[old];
-        s.pairs[old].energy = 0;
+        s.pairs[old].energy = s.pairs[old].stick_energy = 0;
       }
     }
-    for (const PairState& p : s.pairs) s.contact_energy -= p.energy;
+    for (const PairState& p : s.pairs) {
+      s.contact_energy -= p.energy;
+      s.stick_energy -= p.stick_energy;
+    }
     s.pairs = std::move(found);
   }
 }
 
-void System::push(size_t b, const Vec3& lever, const Vec3& f) {
-  const Vec3 t = cross(lever, f);
+void System::push(size_t b, const Vec3& lever, const Vec3& normal, const Vec3& friction) {
+  const Vec3 f = normal + friction, t_friction = cross(lever, friction), t = cross(lever, normal) + t_friction;
   force[b] += f;
   torque[b] += t;
   contact_force[b] += f;
   contact_torque[b] += t;
+  friction_force[b] += friction;
+  friction_torque[b] += t_friction;
 }
 
 void System::add_contact_work(double h) {
-  double power = 0;
+  double power = 0, friction = 0;
   for (size_t b = 0; b < B; ++b) {
     const Vec3 &f = contact_force[b], &t = contact_torque[b];
     if ((f == Vec3{} && t == Vec3{}) || fixed[b]) continue;
-    power += dot(f, calc_velocity(b)) + dot(t, calc_angular_velocity(b));
+    const Vec3 v = calc_velocity(b), w = calc_angular_velocity(b);
+    power += dot(f, v) + dot(t, w);
+    friction += dot(friction_force[b], v) + dot(friction_torque[b], w);
   }
   state.contact_work += 0.5 * h * (state.contact_power + power);
+  state.friction_work += 0.5 * h * (state.friction_power + friction);
   state.contact_power = power;
+  state.friction_power = friction;
 }
 
 void System::evaluate_ground_contact(double h) {
@@ -188,10 +195,10 @@ void System::evaluate_ground_contact(double h) {
         const Vec3 v_t = v + approach * n;
         if (depth <= 0) {
           if (g.touching) {
-            s.contact_energy -=
-                0.5 * e2 * stiffness * g.depth * g.depth + 0.5 * stick_stiffness * dot(g.stick, g.stick);
+            s.contact_energy -= 0.5 * e2 * stiffness * g.depth * g.depth;
+            s.stick_energy -= 0.5 * stick_stiffness * dot(g.stick, g.stick);
             g.touching = false;
-            g.stick = g.friction = {};
+            g.stick = {};
             g.depth = 0;
           }
           continue;
@@ -214,17 +221,11 @@ void System::evaluate_ground_contact(double h) {
                       ? (-1 / stick_stiffness) * (ft + std::min(1.0, limit / magnitude) * stick_damping * v_t)
                       : Vec3{};
         }
-        const double stored_before =
-            0.5 * e2 * stiffness * g.depth * g.depth + 0.5 * stick_stiffness * dot(g.stick, g.stick);
-        const double stick_before = 0.5 * stick_stiffness * dot(g.stick, g.stick);
-        const double stick_now = 0.5 * stick_stiffness * dot(stick, stick);
-        const double slide_work = -0.5 * h * dot(g.friction + ft, v_t);
-        s.friction += slide_work - (stick_now - stick_before);
-        s.contact_energy += 0.5 * e2 * stiffness * depth * depth + stick_now - stored_before;
+        s.contact_energy += 0.5 * e2 * stiffness * (depth * depth - g.depth * g.depth);
+        s.stick_energy += 0.5 * stick_stiffness * (dot(stick, stick) - dot(g.stick, g.stick));
 
         g.depth = depth;
         g.stick = stick;
-        g.friction = ft;
         ++contact_count[b];
         if (!g.touching) {
           g.touching = true;
@@ -233,9 +234,8 @@ void System::evaluate_ground_contact(double h) {
             say({Happening::Kind::GroundContact, s.time, static_cast<int>(b), -1, {}, std::max(0.0, approach)});
           }
         }
-        const Vec3 total = f * n + ft;
-        push(b, r, total);
-        ground_contact += total;
+        push(b, r, f * n, ft);
+        ground_contact += f * n + ft;
       }
     }
   }
@@ -287,12 +287,13 @@ void System::evaluate_body_contact(double h) {
       pair.born = deepest;
     }
     pair.born = std::min(pair.born, deepest);
-    double stored = 0;
+    double stored = 0, stick_stored = 0;
     bool touching = false;
     if (points.count > 0 && deepest > pair.born) {
       const double wa = s.body[a].inverse_mass, wb = s.body[b].inverse_mass;
       const double reduced = 1 / (wa + wb);
-      const double stiffness = kPointShare * reduced * c.contact_frequency * c.contact_frequency;
+      // shared among the points, so that a change of their number is no jolt
+      const double stiffness = reduced * c.contact_frequency * c.contact_frequency / points.count;
       const int others = std::max({points.count, fixed[a] ? 0 : s.contact_count[a], fixed[b] ? 0 : s.contact_count[b]});
       const Vec3 n = points.normal;  // from a to b
       struct Point {
@@ -321,27 +322,22 @@ void System::evaluate_body_contact(double h) {
       }
       // Coulomb friction: a spring that sticks until the limit, and viscous below it, though never more than brings all
       // the points to rest within two steps
-      const double stick_stiffness = kStickStiffness * e2 * stiffness / kPointShare;
-      const double stick_before = 0.5 * stick_stiffness * dot(pair.stick, pair.stick);
+      const double stick_stiffness = kStickStiffness * e2 * stiffness * points.count;
       if (!pair.touching) pair.stick = {};
       if (total_force > 0) pair.stick += (h / total_force) * slide;
       pair.stick -= dot(pair.stick, n) * n;
       const double held = stick_stiffness * norm(pair.stick), most = c.body_friction * total_force;
       if (held > most) pair.stick *= most / held;
-      const double stick_now = 0.5 * stick_stiffness * dot(pair.stick, pair.stick);
-      stored += stick_now;
-      s.friction -= stick_now - stick_before;
+      stick_stored = 0.5 * stick_stiffness * dot(pair.stick, pair.stick);
       for (int i = 0; i < count; ++i) {
         const Point& p = found[i];
         double viscous = 0.5 * reduced * c.contact_frequency;
         if (h > 0) viscous = std::min(viscous, 0.5 / (h * p.inverse_mass * others));
         Vec3 t = -(stick_stiffness * p.normal_force / total_force) * pair.stick - viscous * p.v_t;
         if (const double size = norm(t), limit = c.body_friction * p.normal_force; size > limit) t *= limit / size;
-        // the velocity halfway through the kick of this force alone
-        s.friction -= h * dot(t, p.v_t + (0.5 * h * p.inverse_mass) * t);
-        const Vec3 total = t - p.normal_force * n;  // on a
-        push(a, p.ra, total);
-        push(b, p.rb, -total);
+        const Vec3 normal = -p.normal_force * n, total = normal + t;  // on a
+        push(a, p.ra, normal, t);
+        push(b, p.rb, -normal, -t);
         if (fixed[a]) ground_contact -= total;
         if (fixed[b]) ground_contact += total;
         touching = true;
@@ -361,7 +357,9 @@ void System::evaluate_body_contact(double h) {
     }
     if (!touching) pair.stick = {};
     s.contact_energy += stored - pair.energy;
+    s.stick_energy += stick_stored - pair.stick_energy;
     pair.energy = stored;
+    pair.stick_energy = stick_stored;
     pair.touching = touching;
   }
 }

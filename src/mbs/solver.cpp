@@ -123,12 +123,17 @@ Summary run(const Model& model, const Options& options) {
       break;
     }
     if (options.rest_speed > 0 && s.state.time > last_event) {
-      double fastest2 = 0;
+      double fastest2 = 0, twice_kinetic = 0, mass = 0;
       for (size_t b = 0; b < s.B; ++b) {
-        const double turning = s.state.body[b].radius * s.state.body[b].radius * dot(s.state.w[b], s.state.w[b]);
-        fastest2 = std::max(fastest2, dot(s.state.v[b], s.state.v[b]) + turning);
+        if (s.fixed[b]) continue;
+        const Vec3 &v = s.state.v[b], &w = s.state.w[b];
+        fastest2 = std::max(fastest2, dot(v, v));
+        twice_kinetic += s.state.body[b].mass * dot(v, v) + dot(w, s.state.L[b]);
+        mass += s.state.body[b].mass;
       }
-      s.state.quiet_steps = fastest2 < options.rest_speed * options.rest_speed ? s.state.quiet_steps + 1 : 0;
+      const double limit2 = options.rest_speed * options.rest_speed;
+      const bool quiet = twice_kinetic < limit2 * mass && fastest2 < 100 * limit2;
+      s.state.quiet_steps = quiet ? s.state.quiet_steps + 1 : 0;
       if (s.state.quiet_steps >= rest_steps) {
         out.ending = Summary::Ending::AtRest;
         show();

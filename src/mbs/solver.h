@@ -77,7 +77,9 @@ struct Options {
   double step_safety = 0.7;
   double frame_interval = 1.0 / 60;  // of on_frame [s]; whole steps, the nearest at or after each instant
   bool equilibrium = true;           // start from the dead-load equilibrium; false: from the poses of the model
-  double rest_speed = 0;   // stop when, after the last event, no body is faster than this for rest_time; 0: never
+  /// Stop when, after the last event and for rest_time, the speed that stands for the kinetic energy per mass is below
+  /// this and no centre of mass is faster than ten times this; 0: never [m/s].
+  double rest_speed = 0;
   double rest_time = 0.5;  // [s]
   int threads = 1;         // results do not depend on it
   std::function<void(const View&)> on_frame;

@@ -166,6 +166,8 @@ void System::compile() {
   torque.assign(B, {});
   contact_force.assign(B, {});
   contact_torque.assign(B, {});
+  friction_force.assign(B, {});
+  friction_torque.assign(B, {});
   contact_count.assign(B, 0);
   p_before.resize(B);
   q_before.resize(B);
@@ -436,7 +438,10 @@ void System::replace_body(size_t b, const Body& replacement) {
   // contact pairs name shapes by their index within the body, which may be others now
   std::erase_if(s.pairs, [&](const PairState& pair) {
     const bool gone = pair.a == static_cast<int>(b) || pair.b == static_cast<int>(b);
-    if (gone) s.contact_energy -= pair.energy;
+    if (gone) {
+      s.contact_energy -= pair.energy;
+      s.stick_energy -= pair.stick_energy;
+    }
     return gone;
   });
 }
@@ -452,6 +457,8 @@ void System::evaluate_forces(double h) {
   if (model.contact.ground || model.contact.bodies) {
     std::fill(contact_force.begin(), contact_force.end(), Vec3{});
     std::fill(contact_torque.begin(), contact_torque.end(), Vec3{});
+    std::fill(friction_force.begin(), friction_force.end(), Vec3{});
+    std::fill(friction_torque.begin(), friction_torque.end(), Vec3{});
     std::fill(contact_count.begin(), contact_count.end(), 0);
     if (state.search_due) find_pairs();
     if (model.contact.ground) evaluate_ground_contact(h);
@@ -542,10 +549,10 @@ Energy System::calc_energy() const {
     e.elastic += c.energy;
     e.plastic += c.plastic;
   }
-  e.contact = state.contact_energy;
-  e.friction = state.friction;
+  e.contact = state.contact_energy + state.stick_energy;
+  e.friction = -state.friction_work - state.stick_energy;
   // what contact took from the bodies and neither stores nor rubbed away
-  e.contact_loss = -state.contact_work - state.friction - state.contact_energy;
+  e.contact_loss = -(state.contact_work - state.friction_work) - state.contact_energy;
   e.removed = state.removed;
   e.residual = e.kinetic + e.gravity + e.elastic + e.contact + e.plastic + e.damping + e.friction + e.contact_loss +
                e.removed - state.total_at_start;

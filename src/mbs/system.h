@@ -38,7 +38,6 @@ struct GroundPoint {
   bool touching = false;
   Vec3 stick;        // tangential displacement of the friction spring [m]
   double depth = 0;  // of the step before [m]
-  Vec3 friction;     // of the step before [N]
 };
 
 /// Two bodies near each other.
@@ -50,7 +49,8 @@ struct PairState {
   bool touching = false;
   int axis = 0;       // separating axis of the step before
   double energy = 0;  // stored [J]
-  Vec3 stick;         // tangential displacement of the friction spring, of a against b [m]
+  double stick_energy = 0;
+  Vec3 stick;  // tangential displacement of the friction spring, of a against b [m]
 };
 
 struct CompiledElement {
@@ -117,8 +117,9 @@ struct State {
   long last_search = 0;
   std::vector<long> touched_pairs;  // a * B + b, sorted
   // ledger [J]
-  double removed = 0, friction = 0, contact_energy = 0;
-  double contact_work = 0, contact_power = 0;  // of all contact forces on the bodies [J, W]
+  double removed = 0, contact_energy = 0, stick_energy = 0;
+  double contact_work = 0, contact_power = 0;    // of all contact forces on the bodies [J, W]
+  double friction_work = 0, friction_power = 0;  // the part by friction
   double total_at_start = 0;
   double gravity_at_start = 0, largest_residual = 0, released = 0;
   double largest_drift = 0;
@@ -175,9 +176,10 @@ class System {
 
   // scratch
   std::vector<ElementForce> element_force;
-  std::vector<Vec3> force, torque;                  // applied on bodies (B)
-  std::vector<Vec3> contact_force, contact_torque;  // the part by contact (B)
-  std::vector<Vec3> joint_force, joint_torque;      // of the joints on bodies, of the step before (B)
+  std::vector<Vec3> force, torque;                    // applied on bodies (B)
+  std::vector<Vec3> contact_force, contact_torque;    // the part by contact (B)
+  std::vector<Vec3> friction_force, friction_torque;  // and of that by friction (B)
+  std::vector<Vec3> joint_force, joint_torque;        // of the joints on bodies, of the step before (B)
   std::vector<Vec3> p_before;
   std::vector<Quat> q_before;
   std::vector<Mat3> R_before, world_inverse_inertia;  // of jointed bodies (B)
@@ -212,7 +214,7 @@ class System {
   void evaluate_body_contact(double h);
   void find_pairs();
   /// A contact force on a body at a lever from its centre.
-  void push(size_t body, const Vec3& lever, const Vec3& f);
+  void push(size_t body, const Vec3& lever, const Vec3& normal, const Vec3& friction);
   void add_contact_work(double h);
   /// Moves a body from its pose at the beginning of the step to the end of it.
   void drift(size_t body, double h, const Vec3& p0, const Quat& q0, const Mat3& R0);
