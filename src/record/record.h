@@ -36,9 +36,9 @@ struct ZoneInfo {
 };
 
 struct Event {
-  double time = 0;  // [s]
-  std::string
-      kind;  // "stage", "charge", "yield", "softening", "rupture", "release", "touchdown", "contact", "rest", "cable", "failure"
+  double time = 0;   // [s]
+  std::string kind;  // "stage", "charge", "yield", "softening", "rupture", "release", "touchdown", "contact", "rest",
+                     // "cable", "failure"
   std::string subject;  // member or zone
   std::string text;     // a sentence
 };

@@ -444,6 +444,17 @@ TEST(Frames, RiseStrictlyInTimeToTheLast) {
 
 // ------------------------------------------------------------------------------------------------------------ refusals
 
+/// Poses and energies of two runs to the last bit. (The bytes of snapshots hold padding, which means nothing.)
+void expect_same_state(Simulation& a, Simulation& b) {
+  const View &x = a.calc_view(), &y = b.calc_view();
+  EXPECT_EQ(x.X_WB, y.X_WB);
+  EXPECT_EQ(x.v_WB, y.v_WB);
+  EXPECT_EQ(x.w_WB, y.w_WB);
+  EXPECT_EQ(x.utilisation, y.utilisation);
+  EXPECT_EQ(x.energy.elastic, y.energy.elastic);
+  EXPECT_EQ(x.energy.residual, y.energy.residual);
+}
+
 TEST(SnapshotReplay, RefusesASnapshotOfOtherMassesAndStaysAsItIs) {
   const Column c = make_column();
   Column heavier = make_column();
@@ -465,12 +476,12 @@ TEST(SnapshotReplay, RefusesASnapshotOfOtherMassesAndStaysAsItIs) {
   }
   bytes.push_back(std::byte{0});
   EXPECT_THROW(s.restore(bytes), InputError);
-  EXPECT_EQ(s.snapshot(), twin.snapshot());
+  expect_same_state(s, twin);
   for (int i = 0; i < 100; ++i) {
     ASSERT_TRUE(s.advance_step());
     ASSERT_TRUE(twin.advance_step());
   }
-  EXPECT_EQ(s.snapshot(), twin.snapshot());
+  expect_same_state(s, twin);
 }
 
 TEST(SnapshotReplay, RefusesASnapshotOfAnotherStep) {
