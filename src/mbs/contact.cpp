@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 
 #include "mbs/boxes.h"
 #include "mbs/system.h"
@@ -13,9 +14,9 @@ namespace topple::mbs {
 
 namespace {
 
-constexpr double kSearchMargin = 0.3;    // [m]; shapes nearer than this are watched
-constexpr double kSearchTravel = 0.14;   // [m]; less than half the margin
-constexpr long kSearchPause = 20;        // steps between searches that breaks ask for
+constexpr double kSearchMargin = 0.2;    // [m]; shapes nearer than this are watched
+constexpr double kSearchTravel = 0.09;   // [m]; less than half the margin
+constexpr long kSearchPause = 40;        // steps between searches that breaks ask for
 constexpr double kStickStiffness = 0.3;  // of the restituting normal stiffness
 constexpr double kStickDamping = 0.3;    // times mass times contact frequency
 
@@ -38,12 +39,13 @@ void System::find_pairs() {
   s.p_at_search = s.p;
 
   // who holds whom
-  std::vector<std::vector<int>> held(B);
+  std::vector<std::array<int, 2>> links;
+  links.reserve(2 * (elements.size() + joints.size()));
   std::fill(s.tied_to_ground.begin(), s.tied_to_ground.end(), 0);
   const auto link = [&](int a, int b) {
     if (a >= 0 && b >= 0) {
-      held[static_cast<size_t>(a)].push_back(b);
-      held[static_cast<size_t>(b)].push_back(a);
+      links.push_back({a, b});
+      links.push_back({b, a});
     }
     const auto grounded = [&](int x) { return x < 0 || fixed[static_cast<size_t>(x)]; };
     if (grounded(a) && b >= 0) s.tied_to_ground[static_cast<size_t>(b)] = 1;
@@ -53,6 +55,15 @@ void System::find_pairs() {
     if (s.element[e].live) link(elements[e].a, elements[e].b);
   for (size_t j = 0; j < joints.size(); ++j)
     if (s.joint[j].live) link(joints[j].parent, joints[j].child);
+  std::vector<int> first(B + 1, 0), held(links.size());
+  for (const auto& l : links) ++first[static_cast<size_t>(l[0]) + 1];
+  for (size_t b = 0; b < B; ++b) first[b + 1] += first[b];
+  std::vector<int> filled(first.begin(), first.end() - 1);
+  for (const auto& l : links) held[static_cast<size_t>(filled[static_cast<size_t>(l[0])]++)] = l[1];
+  const auto holders = [&](int b) {
+    const size_t i = static_cast<size_t>(b);
+    return std::span<const int>(held.data() + first[i], static_cast<size_t>(first[i + 1] - first[i]));
+  };
 
   if (model.contact.bodies) {
     struct Item {
@@ -83,13 +94,12 @@ void System::find_pairs() {
     std::stable_sort(items.begin(), items.end(),
                      [axis](const Item& x, const Item& y) { return x.low[axis] < y.low[axis]; });
     std::vector<PairState> found;
-    std::vector<int> mark(B, -1);
     const auto excluded = [&](int a, int b) {
       if (fixed[static_cast<size_t>(a)] && fixed[static_cast<size_t>(b)]) return true;
       // joined, or joined to the same third body: the joint or element between them governs
-      for (const int n : held[static_cast<size_t>(a)]) {
+      for (const int n : holders(a)) {
         if (n == b) return true;
-        for (const int m : held[static_cast<size_t>(n)])
+        for (const int m : holders(n))
           if (m == b) return true;
       }
       return false;

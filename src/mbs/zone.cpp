@@ -221,7 +221,7 @@ void find_safe_bounds(const ZoneParameters& p, const std::vector<CompiledLaw>& l
   for (int s = 0; s < p.stations; ++s) {
     reached = std::max(reached, z.station[s].reached);
     for (const CompiledFamily& family : laws[static_cast<size_t>(p.law[s])].moment)
-      if (family.K > 0) reach = std::min(reach, 0.03 * (family.force.back() - family.force.front()));
+      if (family.K > 0) reach = std::min(reach, 0.06 * (family.force.back() - family.force.front()));
   }
   const double whole = limits.integrity(z.shortened);
   double from = force - reach, to = force + reach;
@@ -257,6 +257,9 @@ void find_safe_bounds(const ZoneParameters& p, const std::vector<CompiledLaw>& l
   z.safe_force[0] = from;
   z.safe_force[1] = to;
 }
+
+/// x to the power e, quickly for the exponent that is usual.
+double raised(double x, double e) { return e == 1.5 ? x * std::sqrt(x) : std::pow(x, e); }
 
 constexpr double kTiny = 1e-300;
 constexpr double kMostDamage =
@@ -468,10 +471,10 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
           scale_y = std::isinf(ry) ? 0 : std::min(1.0, 1 / std::max(ry, kTiny));
           scale_z = std::isinf(rz) ? 0 : std::min(1.0, 1 / std::max(rz, kTiny));
         } else {
+          if (raised(ry, e) + raised(rz, e) <= 1) continue;
           // the larger ratio taken out of the power, so that an uniaxial state keeps its limit to round-off
           const double big = std::max(ry, rz), small = std::min(ry, rz);
-          double r = big;
-          if (small > 1e-9 * big) r = big * std::pow(1 + std::pow(small / big, e), 1 / e);
+          const double r = small > 1e-9 * big ? big * std::pow(1 + raised(small / big, e), 1 / e) : big;
           if (r <= 1) continue;
           scale_y = scale_z = 1 / r;
         }

@@ -158,7 +158,7 @@ TEST(SwitchLaw, ASecondOneBeginsWhereTheFirstEnded) {
     c.model.events = {second, first};  // the order of the list does not matter
     Options o;
     o.duration = 0.2;
-    o.frame_interval = 1e-4;
+    o.step = o.frame_interval = 1e-4;
     double most = 0, least = 1e30, midway = 0;
     o.on_frame = [&](const View& v) {
       const double push = std::abs(v.element_force[1].x);
