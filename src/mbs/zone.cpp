@@ -244,18 +244,35 @@ void find_safe_bounds(const ZoneParameters& p, const std::vector<CompiledLaw>& l
     z.safe_shear[q] = 1 / z.safe_shear[q];
   }
   z.safe_torsion = 1 / limits.torsion();
-  // what the springs do not see
+  // what the springs do not see, and how damage softens them: flexibilities add up
   double turned[2] = {0, 0}, shifted[2] = {0, 0};
-  for (int s = 0; s < p.stations; ++s)
-    for (int q = 0; q < 2; ++q) {
-      if (z.station[s].soft[q] > 0) return;
+  z.is_softened = false;
+  for (int q = 0; q < 2; ++q) {
+    const double ks = p.stiffness[q == 0 ? 2 : 1], kb = p.stiffness[q == 0 ? 4 : 5], sign = q == 0 ? 1 : -1;
+    double c = 0, cx = 0, cxx = 0;
+    for (int s = 0; s < p.stations; ++s) {
       turned[q] += z.station[s].phi[q];
       shifted[q] += p.x[s] * z.station[s].phi[q];
+      c += z.station[s].soft[q];
+      cx += sign * p.x[s] * z.station[s].soft[q];
+      cxx += p.x[s] * p.x[s] * z.station[s].soft[q];
     }
-  const double offset[6] = {z.axial, z.slip[0] - shifted[1], z.slip[1] + shifted[0], z.twist, turned[0], turned[1]};
-  std::copy(offset, offset + 6, z.offset);
+    double* plane = z.plane[q];
+    plane[0] = ks, plane[1] = 0, plane[2] = kb;
+    if (c == 0) continue;
+    z.is_softened = true;
+    if (!(kb > 0)) return;
+    if (ks > 0) {
+      const double f11 = 1 / ks + cxx, f12 = cx, f22 = 1 / kb + c, determinant = f11 * f22 - f12 * f12;
+      plane[0] = f22 / determinant, plane[1] = -f12 / determinant, plane[2] = f11 / determinant;
+    } else {
+      plane[2] = 1 / (1 / kb + c);
+    }
+  }
   z.safe_force[0] = from;
   z.safe_force[1] = to;
+  const double offset[6] = {z.axial, z.slip[0] - shifted[1], z.slip[1] + shifted[0], z.twist, turned[0], turned[1]};
+  std::copy(offset, offset + 6, z.offset);
 }
 
 /// x to the power e, quickly for the exponent that is usual.
@@ -310,28 +327,39 @@ namespace {
 /// The common case: a zone whose forces stay inside its safe bounds is a spring with a damper. False if it is not so.
 bool advance_inside_bounds(const ZoneParameters& p, const Six& d, double h, ZoneState& z) {
   if (z.next_law >= 0 || z.safe_force[0] > z.safe_force[1] || !z.has_elastic || h <= 0) return false;
-  double e[6], f[6];
+  double u[6], e[6], f[6];  // deformation from the offset, its elastic part, resultant
   for (int i = 0; i < 6; ++i) {
-    e[i] = d.c[i] - z.offset[i];
+    u[i] = e[i] = d.c[i] - z.offset[i];
     f[i] = p.stiffness[i] * e[i];
   }
   if (p.external_axial) {
-    e[0] = 0;
+    u[0] = e[0] = 0;
     f[0] = d.c[0];
+  }
+  if (z.is_softened) {
+    for (int q = 0; q < 2; ++q) {
+      const int shear = q == 0 ? 2 : 1, bend = q == 0 ? 4 : 5;
+      f[shear] = z.plane[q][0] * u[shear] + z.plane[q][1] * u[bend];
+      f[bend] = z.plane[q][1] * u[shear] + z.plane[q][2] * u[bend];
+      e[shear] = p.stiffness[shear] > 0 ? f[shear] / p.stiffness[shear] : 0;
+      e[bend] = p.stiffness[bend] > 0 ? f[bend] / p.stiffness[bend] : 0;
+    }
   }
   if (f[0] < z.safe_force[0] || f[0] > z.safe_force[1] || std::abs(f[3]) * z.safe_torsion > 1) return false;
   if (std::abs(f[1]) * z.safe_shear[0] + std::abs(f[2]) * z.safe_shear[1] > 1) return false;
   for (int s = 0; s < p.stations; ++s)
     if (std::abs(f[4] + p.x[s] * f[2]) * z.safe_moment[0] + std::abs(f[5] - p.x[s] * f[1]) * z.safe_moment[1] > 1)
       return false;
-  double energy = 0, damper_energy = 0, damped = 0;
+  double energy = 0, damper_energy = 0, damped = 0, bled = 0;
   for (int i = 0; i < 6; ++i) {
     const double before = z.elastic[i], stretched = e[i] - before;
     const double flowed = z.flowed[i] + p.relaxation * (0.5 * (e[i] + before) - z.flowed[i]);
     const double stretch = e[i] - flowed, damper = p.viscous * p.stiffness[i] * stretch;
-    energy += 0.5 * f[i] * e[i];
+    energy += 0.5 * f[i] * u[i];
     damper_energy += 0.5 * damper * stretch;
-    damped += 0.5 * (damper + z.damper_force[i]) * stretched;
+    const double mean = 0.5 * (damper + z.damper_force[i]);
+    damped += mean * stretched;
+    bled += mean * (d.c[i] - z.deformation[i] - stretched);
     z.flowed[i] = flowed;
     z.damper_force[i] = damper;
     z.elastic[i] = e[i];
@@ -339,6 +367,7 @@ bool advance_inside_bounds(const ZoneParameters& p, const Six& d, double h, Zone
     z.deformation[i] = d.c[i];
     z.resultant.c[i] = f[i] + damper;
   }
+  if (z.is_softened) z.plastic += bled;  // what the damper does on the part that damage softened
   z.damping += damped - (damper_energy - z.damper_energy);
   z.damper_energy = damper_energy;
   z.energy = energy;
