@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <span>
+#include <utility>
 
 #include "mbs/boxes.h"
 #include "mbs/system.h"
@@ -91,9 +92,11 @@ void System::find_pairs() {
     for (const Item& it : items)
       for (int k = 0; k < 3; ++k) spread[k] += std::pow(0.5 * (it.low[k] + it.high[k]) - mean[k], 2);
     const int axis = spread.x >= spread.y && spread.x >= spread.z ? 0 : spread.y >= spread.z ? 1 : 2;
-    std::stable_sort(items.begin(), items.end(),
-                     [axis](const Item& x, const Item& y) { return x.low[axis] < y.low[axis]; });
-    std::vector<PairState> found;
+    std::vector<std::pair<double, int>> order(items.size());
+    for (size_t i = 0; i < items.size(); ++i) order[i] = {items[i].low[axis], static_cast<int>(i)};
+    std::sort(order.begin(), order.end());
+    using Key = std::array<int, 4>;  // bodies, shapes
+    std::vector<Key> found;
     const auto excluded = [&](int a, int b) {
       if (fixed[static_cast<size_t>(a)] && fixed[static_cast<size_t>(b)]) return true;
       // joined, or joined to the same third body: the joint or element between them governs
@@ -104,28 +107,29 @@ void System::find_pairs() {
       }
       return false;
     };
-    for (size_t i = 0; i < items.size(); ++i)
-      for (size_t k = i + 1; k < items.size() && items[k].low[axis] <= items[i].high[axis]; ++k) {
-        const Item &x = items[i], &y = items[k];
+    for (size_t i = 0; i < order.size(); ++i) {
+      const Item& x = items[static_cast<size_t>(order[i].second)];
+      for (size_t k = i + 1; k < order.size() && order[k].first <= x.high[axis]; ++k) {
+        const Item& y = items[static_cast<size_t>(order[k].second)];
         if (x.body == y.body) continue;
-        bool apart = false;
-        for (int c = 0; c < 3; ++c) apart = apart || x.low[c] > y.high[c] || y.low[c] > x.high[c];
-        if (apart || excluded(x.body, y.body)) continue;
-        const bool swap = x.body > y.body;
-        PairState p;
-        p.a = swap ? y.body : x.body;
-        p.b = swap ? x.body : y.body;
-        p.shape_a = swap ? y.shape : x.shape;
-        p.shape_b = swap ? x.shape : y.shape;
-        found.push_back(p);
+        if (x.low.x > y.high.x || y.low.x > x.high.x || x.low.y > y.high.y || y.low.y > x.high.y ||
+            x.low.z > y.high.z || y.low.z > x.high.z)
+          continue;
+        if (excluded(x.body, y.body)) continue;
+        found.push_back(x.body < y.body ? Key{x.body, y.body, x.shape, y.shape}
+                                        : Key{y.body, x.body, y.shape, x.shape});
       }
-    const auto key = [](const PairState& p) { return std::array<int, 4>{p.a, p.b, p.shape_a, p.shape_b}; };
-    std::sort(found.begin(), found.end(), [&](const PairState& x, const PairState& y) { return key(x) < key(y); });
+    }
+    std::sort(found.begin(), found.end());
     // keep what old pairs remember
+    std::vector<PairState> pairs(found.size());
     size_t old = 0;
-    for (PairState& p : found) {
-      while (old < s.pairs.size() && key(s.pairs[old]) < key(p)) ++old;
-      if (old < s.pairs.size() && key(s.pairs[old]) == key(p)) {
+    const auto key = [](const PairState& p) { return Key{p.a, p.b, p.shape_a, p.shape_b}; };
+    for (size_t i = 0; i < found.size(); ++i) {
+      PairState& p = pairs[i];
+      p.a = found[i][0], p.b = found[i][1], p.shape_a = found[i][2], p.shape_b = found[i][3];
+      while (old < s.pairs.size() && key(s.pairs[old]) < found[i]) ++old;
+      if (old < s.pairs.size() && key(s.pairs[old]) == found[i]) {
         p = s.pairs[old];
         s.pairs[old].energy = s.pairs[old].stick_energy = 0;
       }
@@ -134,7 +138,7 @@ void System::find_pairs() {
       s.contact_energy -= p.energy;
       s.stick_energy -= p.stick_energy;
     }
-    s.pairs = std::move(found);
+    s.pairs = std::move(pairs);
   }
 }
 
