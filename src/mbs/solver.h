@@ -81,7 +81,7 @@ struct Options {
   /// this and no centre of mass is faster than ten times this; 0: never [m/s].
   double rest_speed = 0;
   double rest_time = 0.5;  // [s]
-  int threads = 1;         // results do not depend on it
+  int threads = 1;         // used from 2,048 zone elements on; results do not depend on it
   std::function<void(const View&)> on_frame;
   std::function<void(const Happening&)> on_happening;
   Progress progress;

@@ -4,9 +4,13 @@
 #include <cmath>
 #include <limits>
 
+#include "base/parallel.h"
+
 namespace topple::mbs {
 
 namespace {
+
+constexpr size_t kElementsForThreads = 2048;  // below, waking threads costs more than they save
 
 Mat3 world_tensor(const Mat3& R, const Mat3& in_body) { return R * in_body * transpose(R); }
 
@@ -162,6 +166,7 @@ void System::compile() {
     if (elements[e].b >= 0) incidence[static_cast<size_t>(elements[e].b)].push_back(static_cast<int>(2 * e + 1));
   }
   element_force.assign(elements.size(), {});
+  element_news.assign(elements.size(), 0);
   force.assign(B, {});
   torque.assign(B, {});
   contact_force.assign(B, {});
@@ -215,60 +220,73 @@ Six System::calc_deformation(const CompiledElement& e) const {
   return {{u.x, u.y, u.z, r.x, r.y, r.z}};
 }
 
+void System::evaluate_element(size_t i, double h) {
+  element_news[i] = 0;
+  ZoneState& z = state.element[i];
+  ElementForce& out = element_force[i];
+  if (!z.live) {
+    out = {};
+    return;
+  }
+  const CompiledElement& e = elements[i];
+  Vec3 p_F = e.p_AF, p_M = e.p_BM, origin_a, origin_b;
+  Quat q_F = e.q_AF, q_M = e.q_BM;
+  if (e.a >= 0) {
+    const size_t a = static_cast<size_t>(e.a);
+    origin_a = state.p[a];
+    p_F = origin_a + state.R[a] * (e.p_AF - state.p_offset[a]);
+    q_F = state.q[a] * e.q_AF;
+  }
+  if (e.b >= 0) {
+    const size_t b = static_cast<size_t>(e.b);
+    origin_b = state.p[b];
+    p_M = origin_b + state.R[b] * (e.p_BM - state.p_offset[b]);
+    q_M = state.q[b] * e.q_BM;
+  }
+  const Mat3 R_WF = to_matrix(q_F);
+  const Vec3 u = transpose_times(R_WF, p_M - p_F);
+  const Vec3 r = log_rotation(conjugate(q_F) * q_M);
+  const bool was_yielded = z.yielded;
+  const Six d{{u.x, u.y, u.z, r.x, r.y, r.z}};
+  if (ignores_limits) {
+    ZoneParameters elastic = e.zone;
+    elastic.stations = 0;
+    advance_zone(elastic, laws, d, state.time, h, z);
+  } else {
+    advance_zone(e.zone, laws, d, state.time, h, z);
+  }
+  const double* f = z.resultant.c;
+  // torque conjugate to the rate of the rotation vector (docs/theory/multibody.md, eq. 4)
+  const Vec3 m{f[3], f[4], f[5]};
+  const double angle2 = dot(r, r);
+  const double kappa =
+      angle2 < 1e-3
+          ? 1.0 / 12 + angle2 / 720 + angle2 * angle2 / 30240
+          : (1 / angle2 - (1 + std::cos(std::sqrt(angle2))) / (2 * std::sqrt(angle2) * std::sin(std::sqrt(angle2))));
+  const Vec3 rm = cross(r, m);
+  const Vec3 t_W = R_WF * (m + 0.5 * rm + kappa * cross(r, rm));
+  const Vec3 f_W = R_WF * Vec3{f[0], f[1], f[2]};
+  out.force = -f_W;
+  out.torque_b = -(cross(p_M - origin_b, f_W) + t_W);
+  out.torque_a = cross(p_M - origin_a, f_W) + t_W;
+  if (!z.live) out = {};
+  element_news[i] = static_cast<unsigned char>((z.yielded && !was_yielded ? 1 : 0) + (z.live ? 0 : 2));
+}
+
 void System::evaluate_elements(double h) {
+  // each element writes its own places only; sums and reports follow in order, so threads change no bit
+  if (options.threads > 1 && elements.size() >= kElementsForThreads) {
+    constexpr size_t chunk = 256;
+    (void)parallel_for((elements.size() + chunk - 1) / chunk, options.threads, [&](size_t c) {
+      for (size_t i = c * chunk; i < std::min(elements.size(), (c + 1) * chunk); ++i) evaluate_element(i, h);
+    });
+  } else {
+    for (size_t i = 0; i < elements.size(); ++i) evaluate_element(i, h);
+  }
   for (size_t i = 0; i < elements.size(); ++i) {
-    ZoneState& z = state.element[i];
-    ElementForce& out = element_force[i];
-    if (!z.live) {
-      out = {};
-      continue;
-    }
-    const CompiledElement& e = elements[i];
-    Vec3 p_F = e.p_AF, p_M = e.p_BM, origin_a, origin_b;
-    Quat q_F = e.q_AF, q_M = e.q_BM;
-    if (e.a >= 0) {
-      const size_t a = static_cast<size_t>(e.a);
-      origin_a = state.p[a];
-      p_F = origin_a + state.R[a] * (e.p_AF - state.p_offset[a]);
-      q_F = state.q[a] * e.q_AF;
-    }
-    if (e.b >= 0) {
-      const size_t b = static_cast<size_t>(e.b);
-      origin_b = state.p[b];
-      p_M = origin_b + state.R[b] * (e.p_BM - state.p_offset[b]);
-      q_M = state.q[b] * e.q_BM;
-    }
-    const Mat3 R_WF = to_matrix(q_F);
-    const Vec3 u = transpose_times(R_WF, p_M - p_F);
-    const Vec3 r = log_rotation(conjugate(q_F) * q_M);
-    const bool was_yielded = z.yielded;
-    const Six d{{u.x, u.y, u.z, r.x, r.y, r.z}};
-    if (ignores_limits) {
-      ZoneParameters elastic = e.zone;
-      elastic.stations = 0;
-      advance_zone(elastic, laws, d, state.time, h, z);
-    } else {
-      advance_zone(e.zone, laws, d, state.time, h, z);
-    }
-    const double* f = z.resultant.c;
-    // torque conjugate to the rate of the rotation vector (docs/theory/multibody.md, eq. 4)
-    const Vec3 m{f[3], f[4], f[5]};
-    const double angle2 = dot(r, r);
-    const double kappa =
-        angle2 < 1e-3
-            ? 1.0 / 12 + angle2 / 720 + angle2 * angle2 / 30240
-            : (1 / angle2 - (1 + std::cos(std::sqrt(angle2))) / (2 * std::sqrt(angle2) * std::sin(std::sqrt(angle2))));
-    const Vec3 rm = cross(r, m);
-    const Vec3 t_W = R_WF * (m + 0.5 * rm + kappa * cross(r, rm));
-    const Vec3 f_W = R_WF * Vec3{f[0], f[1], f[2]};
-    out.force = -f_W;
-    out.torque_b = -(cross(p_M - origin_b, f_W) + t_W);
-    out.torque_a = cross(p_M - origin_a, f_W) + t_W;
-    if (z.yielded && !was_yielded) say({Happening::Kind::ElementYielded, state.time, static_cast<int>(i), -1, {}, 0});
-    if (!z.live) {
-      out = {};
-      break_element(i, z.reason);
-    }
+    if (element_news[i] == 0) continue;
+    if (element_news[i] & 1) say({Happening::Kind::ElementYielded, state.time, static_cast<int>(i), -1, {}, 0});
+    if (element_news[i] & 2) break_element(i, state.element[i].reason);
   }
   for (size_t b = 0; b < B; ++b) {
     Vec3 f, t;

@@ -176,6 +176,7 @@ class System {
 
   // scratch
   std::vector<ElementForce> element_force;
+  std::vector<unsigned char> element_news;            // 1 has yielded now, 2 has broken now (E)
   std::vector<Vec3> force, torque;                    // applied on bodies (B)
   std::vector<Vec3> contact_force, contact_torque;    // the part by contact (B)
   std::vector<Vec3> friction_force, friction_torque;  // and of that by friction (B)
@@ -207,6 +208,7 @@ class System {
   void evaluate_start();
   void start();
   void fire_events();
+  void evaluate_element(size_t element, double h);
   void evaluate_elements(double h);
   void evaluate_rotationals(double h);
   void evaluate_cables();

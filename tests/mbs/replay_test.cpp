@@ -120,6 +120,49 @@ TEST(ThreadsReplay, GiveTheSameBits) {
   EXPECT_EQ(ends[0], ends[2]);
 }
 
+TEST(ThreadsReplay, GiveTheSameBitsForALargeModel) {
+  // 400 towers of six zones each: enough for the elements to be shared among threads
+  const Model one = make_tower();
+  Model m;
+  m.laws = one.laws;
+  for (int t = 0; t < 400; ++t) {
+    const Vec3 shift{3.0 * (t % 20), 3.0 * (t / 20), 0};
+    const int first = static_cast<int>(m.bodies.size());
+    for (Body b : one.bodies) {
+      b.X_WB.p += shift;
+      add_body(m, b);
+    }
+    for (ZoneElement e : one.elements) {
+      if (e.a == kGround) {
+        e.X_AF.p += shift;
+      } else {
+        e.a.index += first;
+      }
+      e.b.index += first;
+      add_element(m, e);
+    }
+  }
+  std::vector<std::uint64_t> ends;
+  std::vector<int> broken;
+  for (const int threads : {1, 2, 4}) {
+    Options o;
+    o.equilibrium = false;
+    o.duration = 0.12;
+    o.threads = threads;
+    std::uint64_t h = 0;
+    int breaks = 0;
+    o.on_happening = [&](const Happening& x) { breaks += x.kind == Happening::Kind::ElementBroken; };
+    o.on_frame = [&](const View& v) { h = h * 31 + hash_of(v); };
+    (void)run(m, o);
+    ends.push_back(h);
+    broken.push_back(breaks);
+  }
+  EXPECT_EQ(ends[0], ends[1]);
+  EXPECT_EQ(ends[0], ends[2]);
+  EXPECT_EQ(broken[0], broken[1]);
+  EXPECT_EQ(broken[0], broken[2]);
+}
+
 TEST(ModelJsonReplay, GivesTheSameRunFromTheFile) {
   const Model m = make_tower();
   const Model back = model_from_json(to_json(m), "tower.json");
