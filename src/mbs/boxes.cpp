@@ -113,15 +113,33 @@ void edge_point(const Solid& a, const Solid& b, int i, const Vec3& n, double dep
   out.count = 1;
 }
 
+/// Gap along the face that separated two boxes last time, negative if it does no more or was no face.
+double find_face_gap(const Solid& a, const Solid& b, int axis) {
+  if (axis >= 6) return -1;
+  const bool of_a = axis < 3;
+  const Solid &own = of_a ? a : b, &other = of_a ? b : a;
+  const int i = of_a ? axis : axis - 3;
+  const Vec3 n = own.R.column(i);
+  const double reach = std::abs(dot(other.R.column(0), n)) * other.half.x +
+                       std::abs(dot(other.R.column(1), n)) * other.half.y +
+                       std::abs(dot(other.R.column(2), n)) * other.half.z;
+  return std::abs(dot(b.p - a.p, n)) - own.half[i] - reach;
+}
+
 void box_box(const Solid& a, const Solid& b, int& axis, BoxContact& out) {
+  if (const double gap = find_face_gap(a, b, axis); gap >= 0) {
+    out.gap = gap;
+    return;
+  }
   const Overlaps overlap_along(a, b);
-  if (overlap_along(axis) <= 0) return;
+  if (axis >= 6 && overlap_along(axis) <= 0) return;
   double least = std::numeric_limits<double>::infinity();
   int best = -1;
   for (int i = 0; i < 15; ++i) {
     const double overlap = overlap_along(i);
     if (overlap <= 0) {
       axis = i;
+      if (i < 6) out.gap = -overlap;
       return;
     }
     // faces are preferred to edges, and the first to the second, unless clearly deeper: the choice stays steady
@@ -177,6 +195,7 @@ void sphere_box(const Solid& sphere, const Solid& box, bool flipped, BoxContact&
 
 void find_contact(const Solid& a, const Solid& b, int& axis, BoxContact& out) {
   out.count = 0;
+  out.gap = 0;
   const bool box_a = a.kind == Shape::Kind::Box, box_b = b.kind == Shape::Kind::Box;
   if (box_a && box_b) return box_box(a, b, axis, out);
   if (box_b) return sphere_box(a, b, false, out);

@@ -21,6 +21,7 @@ struct BoxContact {
   Vec3 normal;      // unit, from the first to the second
   Vec3 p[8];        // in W, halfway between the surfaces [m]
   double depth[8];  // > 0 [m]
+  double gap = 0;   // without points: the solids are at least this far apart [m]
 };
 
 /// Finds the touching points of two overlapping solids; none when they are apart. `axis` remembers the separating axis

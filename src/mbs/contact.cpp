@@ -17,7 +17,9 @@ namespace {
 
 constexpr double kSearchMargin = 0.2;    // [m]; shapes nearer than this are watched
 constexpr double kSearchTravel = 0.09;   // [m]; less than half the margin
-constexpr long kSearchPause = 40;        // steps between searches that breaks ask for
+constexpr long kSearchPause = 80;        // steps between searches that breaks ask for
+constexpr double kUnforeseenSpeed = 2;   // [m/s]; what two bodies may gain while they are left alone
+constexpr long kLongestRest = 40;        // steps
 constexpr double kStickStiffness = 0.3;  // of the restituting normal stiffness
 constexpr double kStickDamping = 0.3;    // times mass times contact frequency
 
@@ -97,25 +99,26 @@ void System::find_pairs() {
     std::sort(order.begin(), order.end());
     using Key = std::array<int, 4>;  // bodies, shapes
     std::vector<Key> found;
-    const auto excluded = [&](int a, int b) {
-      if (fixed[static_cast<size_t>(a)] && fixed[static_cast<size_t>(b)]) return true;
-      // joined, or joined to the same third body: the joint or element between them governs
+    // joined, or joined to the same third body: the joint or element between them governs
+    std::vector<int> near(B, -1);  // the last body that the body is near to in this sense
+    const auto mark_near = [&](int a) {
+      near[static_cast<size_t>(a)] = a;
       for (const int n : holders(a)) {
-        if (n == b) return true;
-        for (const int m : holders(n))
-          if (m == b) return true;
+        near[static_cast<size_t>(n)] = a;
+        for (const int m : holders(n)) near[static_cast<size_t>(m)] = a;
       }
-      return false;
     };
     for (size_t i = 0; i < order.size(); ++i) {
       const Item& x = items[static_cast<size_t>(order[i].second)];
+      mark_near(x.body);
       for (size_t k = i + 1; k < order.size() && order[k].first <= x.high[axis]; ++k) {
         const Item& y = items[static_cast<size_t>(order[k].second)];
         if (x.body == y.body) continue;
         if (x.low.x > y.high.x || y.low.x > x.high.x || x.low.y > y.high.y || y.low.y > x.high.y ||
             x.low.z > y.high.z || y.low.z > x.high.z)
           continue;
-        if (excluded(x.body, y.body)) continue;
+        if (near[static_cast<size_t>(y.body)] == x.body) continue;
+        if (fixed[static_cast<size_t>(x.body)] && fixed[static_cast<size_t>(y.body)]) continue;
         found.push_back(x.body < y.body ? Key{x.body, y.body, x.shape, y.shape}
                                         : Key{y.body, x.body, y.shape, x.shape});
       }
@@ -289,11 +292,24 @@ void System::evaluate_body_contact(double h) {
   };
   BoxContact points;
   for (PairState& pair : s.pairs) {
+    if (s.step_index < pair.apart_until) continue;
     const size_t a = static_cast<size_t>(pair.a), b = static_cast<size_t>(pair.b);
     const Solid &A = solid_of(a, pair.shape_a), &Bb = solid_of(b, pair.shape_b);
     const double reach = A.reach + Bb.reach;
     points.count = 0;
-    if (dot(Bb.p - A.p, Bb.p - A.p) < reach * reach) find_contact(A, Bb, pair.axis, points);
+    if (const double distance2 = dot(Bb.p - A.p, Bb.p - A.p); distance2 < reach * reach) {
+      find_contact(A, Bb, pair.axis, points);
+    } else {
+      points.gap = std::sqrt(distance2) - reach;
+    }
+    if (points.count == 0 && points.gap > 0 && pair.seen && !pair.touching && h > 0) {
+      // nothing to do until they can have met
+      const double closing = norm(s.v[a] - s.v[b]) + norm(s.w[a]) * s.body[a].radius + norm(s.w[b]) * s.body[b].radius;
+      const double steps = points.gap / ((closing + kUnforeseenSpeed) * h);
+      pair.apart_until = s.step_index + std::min(kLongestRest, static_cast<long>(steps));
+      pair.born = 0;
+      continue;
+    }
     double deepest = 0;
     for (int i = 0; i < points.count; ++i) deepest = std::max(deepest, points.depth[i]);
     if (!pair.seen) {

@@ -50,7 +50,8 @@ struct PairState {
   int axis = 0;       // separating axis of the step before
   double energy = 0;  // stored [J]
   double stick_energy = 0;
-  Vec3 stick;  // tangential displacement of the friction spring, of a against b [m]
+  long apart_until = 0;  // step before which they cannot meet
+  Vec3 stick;            // tangential displacement of the friction spring, of a against b [m]
 };
 
 struct CompiledElement {

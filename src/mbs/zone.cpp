@@ -244,6 +244,9 @@ void find_safe_bounds(const ZoneParameters& p, const std::vector<CompiledLaw>& l
     z.safe_shear[q] = 1 / z.safe_shear[q];
   }
   z.safe_torsion = 1 / limits.torsion();
+  z.safe_exponent = kUnlimited;
+  for (int s = 0; s < p.stations; ++s)
+    z.safe_exponent = std::min(z.safe_exponent, laws[static_cast<size_t>(p.law[s])].biaxial_exponent);
   // what the springs do not see, and how damage softens them: flexibilities add up
   double turned[2] = {0, 0}, shifted[2] = {0, 0};
   z.is_softened = false;
@@ -346,10 +349,13 @@ bool advance_inside_bounds(const ZoneParameters& p, const Six& d, double h, Zone
     }
   }
   if (f[0] < z.safe_force[0] || f[0] > z.safe_force[1] || std::abs(f[3]) * z.safe_torsion > 1) return false;
-  if (std::abs(f[1]) * z.safe_shear[0] + std::abs(f[2]) * z.safe_shear[1] > 1) return false;
-  for (int s = 0; s < p.stations; ++s)
-    if (std::abs(f[4] + p.x[s] * f[2]) * z.safe_moment[0] + std::abs(f[5] - p.x[s] * f[1]) * z.safe_moment[1] > 1)
-      return false;
+  const double vy = f[1] * z.safe_shear[0], vz = f[2] * z.safe_shear[1];
+  if (vy * vy + vz * vz > 1) return false;
+  for (int s = 0; s < p.stations; ++s) {
+    const double my = std::abs(f[4] + p.x[s] * f[2]) * z.safe_moment[0];
+    const double mz = std::abs(f[5] - p.x[s] * f[1]) * z.safe_moment[1];
+    if (my + mz > 1 && raised(my, z.safe_exponent) + raised(mz, z.safe_exponent) > 1) return false;
+  }
   double energy = 0, damper_energy = 0, damped = 0, bled = 0;
   for (int i = 0; i < 6; ++i) {
     const double before = z.elastic[i], stretched = e[i] - before;
@@ -581,7 +587,7 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
     if (z.twisted >= limits.law().twist_rupture) broke = BreakReason::Torsion;
     if (flowed || z.next_law >= 0) {
       z.safe_force[0] = 1, z.safe_force[1] = -1;
-    } else {
+    } else if (!(force[0] >= z.safe_force[0] && force[0] <= z.safe_force[1])) {
       find_safe_bounds(p, laws, limits, force[0], z);
     }
   }

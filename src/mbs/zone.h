@@ -92,8 +92,9 @@ struct ZoneState {
   // force leaves the range, void (an empty range) after any inelastic step. With them goes the inelastic part of the
   // deformation at the marker: inside the bounds the zone is a spring from there.
   double safe_force[2] = {1, -1};               // [N]
-  double safe_moment[2] = {0, 0};               // |My| a + |Mz| b <= 1 at each station [1/(N·m)]
-  double safe_shear[2] = {0, 0};                // |Vy| a + |Vz| b <= 1 [1/N]
+  double safe_moment[2] = {0, 0};               // (|My| a)^p + (|Mz| b)^p <= 1 at each station [1/(N·m)]
+  double safe_exponent = 1;                     // p
+  double safe_shear[2] = {0, 0};                // (Vy a)² + (Vz b)² <= 1 [1/N]
   double safe_torsion = 0;                      // |T| a <= 1 [1/(N·m)]
   double offset[6] = {0, 0, 0, 0, 0, 0};        // [m, rad]
   double plane[2][3] = {{0, 0, 0}, {0, 0, 0}};  // stiffness of both bending planes with what damage softens:
