@@ -126,6 +126,7 @@ void System::find_pairs() {
     std::sort(found.begin(), found.end());
     // keep what old pairs remember
     std::vector<PairState> pairs(found.size());
+    std::vector<long> apart_until(found.size(), 0);
     size_t old = 0;
     const auto key = [](const PairState& p) { return Key{p.a, p.b, p.shape_a, p.shape_b}; };
     for (size_t i = 0; i < found.size(); ++i) {
@@ -134,6 +135,7 @@ void System::find_pairs() {
       while (old < s.pairs.size() && key(s.pairs[old]) < found[i]) ++old;
       if (old < s.pairs.size() && key(s.pairs[old]) == found[i]) {
         p = s.pairs[old];
+        apart_until[i] = s.pair_apart_until[old];
         s.pairs[old].energy = s.pairs[old].stick_energy = 0;
       }
     }
@@ -142,6 +144,7 @@ void System::find_pairs() {
       s.stick_energy -= p.stick_energy;
     }
     s.pairs = std::move(pairs);
+    s.pair_apart_until = std::move(apart_until);
   }
 }
 
@@ -186,10 +189,19 @@ void System::evaluate_ground_contact(double h) {
     const double stick_stiffness = kStickStiffness * e2 * stiffness;
     const double stick_damping = kStickDamping * body.mass * c.contact_frequency;
     for (int i = body.first_shape; i < body.first_shape + body.shapes; ++i) {
-      const CompiledShape& shape = s.shapes[static_cast<size_t>(i)];
+      CompiledShape& shape = s.shapes[static_cast<size_t>(i)];
       const bool box = shape.kind == Shape::Kind::Box;
       const Vec3 centre = s.R[b] * shape.p_BS;
       const Mat3 R = box ? s.R[b] * shape.R_BS : Mat3{};
+      if (possible && shape.is_clear) {
+        // all its points are known not to touch: they do not as long as it stays above the ground
+        const Vec3 down = box ? transpose_times(R, n) : Vec3{};
+        const double reach =
+            box ? std::abs(down.x) * shape.half.x + std::abs(down.y) * shape.half.y + std::abs(down.z) * shape.half.z
+                : shape.radius;
+        if (dot(n, s.p[b] + centre) - c.offset > reach) continue;
+      }
+      shape.is_clear = possible;
       for (int corner = 0; corner < (box ? 8 : 1); ++corner) {
         GroundPoint& g = s.ground_points[static_cast<size_t>(shape.first_corner + corner)];
         const Vec3 r = box ? centre + R * Vec3{corner & 1 ? shape.half.x : -shape.half.x,
@@ -210,6 +222,7 @@ void System::evaluate_ground_contact(double h) {
         const Vec3 v = s.v[b] + cross(s.w[b], r);
         const double approach = -dot(n, v);
         const Vec3 v_t = v + approach * n;
+        if (g.born > 0 || depth > 0) shape.is_clear = false;
         if (depth <= 0) {
           if (g.touching) {
             s.contact_energy -= 0.5 * e2 * stiffness * g.depth * g.depth;
@@ -291,8 +304,9 @@ void System::evaluate_body_contact(double h) {
     return solids[i];
   };
   BoxContact points;
-  for (PairState& pair : s.pairs) {
-    if (s.step_index < pair.apart_until) continue;
+  for (size_t number_of_pair = 0; number_of_pair < s.pairs.size(); ++number_of_pair) {
+    if (s.step_index < s.pair_apart_until[number_of_pair]) continue;
+    PairState& pair = s.pairs[number_of_pair];
     const size_t a = static_cast<size_t>(pair.a), b = static_cast<size_t>(pair.b);
     const Solid &A = solid_of(a, pair.shape_a), &Bb = solid_of(b, pair.shape_b);
     const double reach = A.reach + Bb.reach;
@@ -306,7 +320,7 @@ void System::evaluate_body_contact(double h) {
       // nothing to do until they can have met
       const double closing = norm(s.v[a] - s.v[b]) + norm(s.w[a]) * s.body[a].radius + norm(s.w[b]) * s.body[b].radius;
       const double steps = points.gap / ((closing + kUnforeseenSpeed) * h);
-      pair.apart_until = s.step_index + std::min(kLongestRest, static_cast<long>(steps));
+      s.pair_apart_until[number_of_pair] = s.step_index + std::min(kLongestRest, static_cast<long>(steps));
       pair.born = 0;
       continue;
     }

@@ -117,7 +117,7 @@ class Assembly {
   /// `share` of each element's own stiffness is left, 1 if empty.
   Sparse make_stiffness(bool fast, const std::vector<double>& share = {}) const {
     Triplets t;
-    t.reserve(144 * 6 * s_.elements.size());
+    t.reserve(size_t{144} * 6 * s_.elements.size());
     for (size_t i = 0; i < s_.elements.size(); ++i) {
       if (!s_.state.element[i].live) continue;
       const CompiledElement& e = s_.elements[i];

@@ -142,6 +142,7 @@ void System::solve_joints(double h) {
       const CompiledJoint& ji = joints[static_cast<size_t>(index_i)];
       size_t at_k = 0;
       for (const int index_k : cluster.joints) {
+        if (at_k > at_i) break;  // the lower triangle is enough
         const CompiledJoint& jk = joints[static_cast<size_t>(index_k)];
         for (const int side_i : {0, 1}) {
           const int b = side_i == 0 ? ji.parent : ji.child;
@@ -153,7 +154,7 @@ void System::solve_joints(double h) {
             for (int c = 0; c < jk.rows; ++c) {
               const JointRow& rc = rows[at_k + static_cast<size_t>(c)];
               const Vec3 Wt = W * (side_k == 0 ? rc.turn_parent : rc.turn_child);
-              for (int r = 0; r < ji.rows; ++r) {
+              for (int r = at_k == at_i ? c : 0; r < ji.rows; ++r) {
                 const JointRow& rr = rows[at_i + static_cast<size_t>(r)];
                 A[(at_i + static_cast<size_t>(r)) * n + at_k + static_cast<size_t>(c)] +=
                     w * dot(rr.line, rc.line) + dot(side_i == 0 ? rr.turn_parent : rr.turn_child, Wt);

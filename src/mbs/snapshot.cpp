@@ -69,7 +69,8 @@ void visit(Archive& ar, S& s, C& sys) {
   ar(s.body), ar(s.p), ar(s.v), ar(s.L), ar(s.w), ar(s.q), ar(s.R), ar(s.p_offset);
   ar(s.shapes), ar(s.ground_points), ar(s.touched_ground), ar(s.contact_count);
   ar(s.element), ar(s.rotational), ar(s.joint), ar(s.cable);
-  ar(s.pairs), ar(s.p_at_search), ar(s.tied_to_ground), ar(s.search_due), ar(s.last_search), ar(s.touched_pairs);
+  ar(s.pairs), ar(s.pair_apart_until), ar(s.p_at_search), ar(s.tied_to_ground), ar(s.search_due), ar(s.last_search),
+      ar(s.touched_pairs);
   ar(s.removed), ar(s.contact_energy), ar(s.stick_energy), ar(s.contact_work), ar(s.contact_power), ar(s.friction_work),
       ar(s.friction_power), ar(s.total_at_start);
   ar(s.gravity_at_start), ar(s.largest_residual), ar(s.released), ar(s.largest_drift), ar(s.quiet_steps);

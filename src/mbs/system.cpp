@@ -43,7 +43,8 @@ double viscous_share(double damping_ratio) { return 4 * damping_ratio / (1 - 2 *
 void append_shapes(const Body& body, BodyConstants& c, std::vector<CompiledShape>& shapes) {
   c.first_shape = static_cast<int>(shapes.size());
   c.shapes = static_cast<int>(body.shapes.size());
-  for (const Shape& s : body.shapes) shapes.push_back({s.kind, s.X_BS.p, to_matrix(s.X_BS.q), s.half, s.radius, 0});
+  for (const Shape& s : body.shapes)
+    shapes.push_back({s.kind, s.X_BS.p, to_matrix(s.X_BS.q), s.half, s.radius, 0, false});
   c.radius = calc_radius(shapes, c.first_shape, c.shapes);
 }
 
@@ -454,14 +455,18 @@ void System::replace_body(size_t b, const Body& replacement) {
   s.removed += before - energy();
   mark_search_due();
   // contact pairs name shapes by their index within the body, which may be others now
-  std::erase_if(s.pairs, [&](const PairState& pair) {
-    const bool gone = pair.a == static_cast<int>(b) || pair.b == static_cast<int>(b);
-    if (gone) {
-      s.contact_energy -= pair.energy;
-      s.stick_energy -= pair.stick_energy;
+  size_t kept = 0;
+  for (size_t i = 0; i < s.pairs.size(); ++i) {
+    if (s.pairs[i].a == static_cast<int>(b) || s.pairs[i].b == static_cast<int>(b)) {
+      s.contact_energy -= s.pairs[i].energy;
+      s.stick_energy -= s.pairs[i].stick_energy;
+      continue;
     }
-    return gone;
-  });
+    s.pairs[kept] = s.pairs[i];
+    s.pair_apart_until[kept++] = s.pair_apart_until[i];
+  }
+  s.pairs.resize(kept);
+  s.pair_apart_until.resize(kept);
 }
 
 void System::evaluate_forces(double h) {

@@ -28,7 +28,8 @@ struct CompiledShape {
   Mat3 R_BS;
   Vec3 half;
   double radius = 0;
-  int first_corner = 0;  // into State::ground_points: 8 of a box, 1 of a sphere
+  int first_corner = 0;   // into State::ground_points: 8 of a box, 1 of a sphere
+  bool is_clear = false;  // no point touches the ground or remembers that it did
 };
 
 /// A corner's contact with the ground.
@@ -50,8 +51,7 @@ struct PairState {
   int axis = 0;       // separating axis of the step before
   double energy = 0;  // stored [J]
   double stick_energy = 0;
-  long apart_until = 0;  // step before which they cannot meet
-  Vec3 stick;            // tangential displacement of the friction spring, of a against b [m]
+  Vec3 stick;  // tangential displacement of the friction spring, of a against b [m]
 };
 
 struct CompiledElement {
@@ -112,6 +112,7 @@ struct State {
   std::vector<CableState> cable;
   // contact pairs
   std::vector<PairState> pairs;
+  std::vector<long> pair_apart_until;  // step before which the bodies of a pair cannot meet
   std::vector<Vec3> p_at_search;
   std::vector<unsigned char> tied_to_ground;
   bool search_due = true;
@@ -198,7 +199,7 @@ class System {
   std::vector<long> solid_step;
   View view;
 
-  void say(Happening h) const {
+  void say(const Happening& h) const {
     if (options.on_happening) options.on_happening(h);
   }
 
