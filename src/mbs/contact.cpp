@@ -342,8 +342,9 @@ void System::evaluate_body_contact(double h) {
       const Vec3 n = points.normal;  // from a to b
       struct Point {
         Vec3 ra, rb, v_t;
-        double normal_force = 0, inverse_mass = 0, approach = 0;
-      } found[8];
+        double normal_force, inverse_mass, approach;
+      };
+      Point found[8];  // written before it is read
       int count = 0;
       double total_force = 0;
       Vec3 slide;  // velocity of a against b in the plane of contact, weighted by the normal forces

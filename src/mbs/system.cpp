@@ -548,7 +548,8 @@ Vec3 System::calc_velocity(size_t b) const {
 Vec3 System::calc_angular_velocity(size_t b) const {
   if (fixed[b]) return {};
   if (state.first_kick) return state.w[b];
-  return calc_world_inverse_inertia(b) * (state.L[b] + (0.5 * step) * (torque[b] + joint_torque[b]));
+  const Vec3 L = state.L[b] + (0.5 * step) * (torque[b] + joint_torque[b]);
+  return state.R[b] * (state.body[b].inverse_inertia * transpose_times(state.R[b], L));
 }
 
 Energy System::calc_energy() const {
