@@ -132,7 +132,7 @@ Summary run(const Model& model, const Options& options) {
         mass += s.state.body[b].mass;
       }
       const double limit2 = options.rest_speed * options.rest_speed;
-      const bool quiet = twice_kinetic < limit2 * mass && fastest2 < 100 * limit2;
+      const bool quiet = twice_kinetic < limit2 * mass && fastest2 < 625 * limit2;
       s.state.quiet_steps = quiet ? s.state.quiet_steps + 1 : 0;
       if (s.state.quiet_steps >= rest_steps) {
         out.ending = Summary::Ending::AtRest;

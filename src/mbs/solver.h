@@ -78,7 +78,7 @@ struct Options {
   double frame_interval = 1.0 / 60;  // of on_frame [s]; whole steps, the nearest at or after each instant
   bool equilibrium = true;           // start from the dead-load equilibrium; false: from the poses of the model
   /// Stop when, after the last event and for rest_time, the speed that stands for the kinetic energy per mass is below
-  /// this and no centre of mass is faster than ten times this; 0: never [m/s].
+  /// this and no centre of mass is faster than 25 times this; 0: never [m/s].
   double rest_speed = 0;
   double rest_time = 0.5;  // [s]
   int threads = 1;         // used from 2,048 zone elements on; results do not depend on it
