@@ -248,6 +248,9 @@ void check_model(const Model& model) {
           if (a.rotational >= 0 && static_cast<size_t>(a.rotational) >= model.rotational_elements.size())
             c.fail(place + ".rotational", "names no rotational element");
           if (a.rotational >= 0 && a.element.is_valid()) c.fail(place, "names an element and a rotational element");
+          if (a.rotational >= 0 && static_cast<size_t>(a.rotational) < model.rotational_elements.size() &&
+              !model.rotational_elements[static_cast<size_t>(a.rotational)].law.is_valid())
+            c.fail(place + ".rotational", "has no law that could change");
           c.index(place + ".law", a.law, model.laws);
           if (a.element.is_valid() && static_cast<size_t>(a.element.index) < model.elements.size() &&
               model.elements[static_cast<size_t>(a.element.index)].stations.empty())

@@ -61,20 +61,6 @@ class Table {
   bool starts_line_ = true;
 };
 
-std::string_view name_of(Status status) {
-  switch (status) {
-    case Status::Info:
-      return "info";
-    case Status::Good:
-      return "good";
-    case Status::Warning:
-      return "warning";
-    case Status::Bad:
-      return "bad";
-  }
-  throw std::logic_error("record: unknown status");
-}
-
 std::string make_series(const Record& r) {
   Table table;
   table.text("time [s]");

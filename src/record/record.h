@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/linalg.h"
@@ -53,6 +54,8 @@ struct Series {
 };
 
 enum class Status { Info, Good, Warning, Bad };
+/// "info", "good", "warning", "bad": the words in files.
+std::string_view name_of(Status);
 
 /// One line of the answer, in the order shown to the user.
 struct Finding {

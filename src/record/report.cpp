@@ -69,20 +69,6 @@ json to_json(const BodyInfo& body) {
           {"mass", number(body.mass)}, {"fixed", body.fixed}, {"shapes", std::move(shapes)}};
 }
 
-const char* name_of(Status status) {
-  switch (status) {
-    case Status::Info:
-      return "info";
-    case Status::Good:
-      return "good";
-    case Status::Warning:
-      return "warning";
-    case Status::Bad:
-      return "bad";
-  }
-  return "info";
-}
-
 json to_json(const Provenance& p) {
   return {{"title", p.title},
           {"plan_path", p.plan_path},

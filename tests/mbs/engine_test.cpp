@@ -504,6 +504,23 @@ TEST(CheckModel, RefusesASwitchOfAnElementWithoutStations) {
   EXPECT_THAT(complaint_of([&] { check_model(c.model); }), HasSubstr("has no station whose law could change"));
 }
 
+TEST(CheckModel, RefusesASwitchOfARotationalElementWithoutALaw) {
+  Model m = make_rod();
+  RotationalElement r;
+  r.joint = {0};
+  r.stiffness = 1e4;
+  m.rotational_elements = {r};
+  add_law(m, ZoneLaw{});
+  Event e;
+  Action a;
+  a.kind = Action::Kind::SwitchLaw;
+  a.rotational = 0;
+  a.law = {0};
+  e.actions = {a};
+  m.events = {e};
+  EXPECT_THAT(complaint_of([&] { check_model(m); }), HasSubstr("has no law that could change"));
+}
+
 TEST(CheckModel, RefusesLengthsOfRuptureThatAreZero) {
   for (double ZoneLaw::*length : {&ZoneLaw::rupture_rotation, &ZoneLaw::crush_length, &ZoneLaw::rupture_elongation,
                                   &ZoneLaw::slip_rupture, &ZoneLaw::twist_rupture}) {
