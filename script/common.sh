@@ -26,7 +26,7 @@ build_page() {
     say "fetching the page's libraries (npm ci)"
     [[ $want == test ]] || options+=(--omit=dev)
     (cd web && npm ci "${options[@]}") ||
-      fail "npm ci failed in web/" "it needs the network (registry.npmjs.org or the registry of your .npmrc)"
+      fail "npm ci failed in web/" "it needs the npm registry that your .npmrc names"
     printf '%s' "$lock $want" >"$stamp"
   fi
   if [[ ! -s $page || -n $(find web/src web/build.mjs web/package.json web/package-lock.json -newer "$page" -print -quit) ]]; then
