@@ -203,24 +203,6 @@ double System::calc_angle(const CompiledJoint& j, double previous) const {
   return angle + turn * std::round((previous - angle) / turn);
 }
 
-Six System::calc_deformation(const CompiledElement& e) const {
-  Vec3 p_F = e.p_AF, p_M = e.p_BM;
-  Quat q_F = e.q_AF, q_M = e.q_BM;
-  if (e.a >= 0) {
-    const size_t a = static_cast<size_t>(e.a);
-    p_F = state.p[a] + state.R[a] * (e.p_AF - state.p_offset[a]);
-    q_F = state.q[a] * e.q_AF;
-  }
-  if (e.b >= 0) {
-    const size_t b = static_cast<size_t>(e.b);
-    p_M = state.p[b] + state.R[b] * (e.p_BM - state.p_offset[b]);
-    q_M = state.q[b] * e.q_BM;
-  }
-  const Vec3 u = transpose_times(to_matrix(q_F), p_M - p_F);
-  const Vec3 r = log_rotation(conjugate(q_F) * q_M);
-  return {{u.x, u.y, u.z, r.x, r.y, r.z}};
-}
-
 void System::evaluate_element(size_t i, double h) {
   element_news[i] = 0;
   ZoneState& z = state.element[i];

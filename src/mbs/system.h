@@ -232,7 +232,6 @@ class System {
   void mark_search_due() { state.search_due = true; }
   /// Angle of a revolute joint from its frames, near `previous`.
   double calc_angle(const CompiledJoint&, double previous) const;
-  Six calc_deformation(const CompiledElement&) const;
   Mat3 rotation_of(int body) const { return body < 0 ? Mat3::identity() : state.R[static_cast<size_t>(body)]; }
   Pose pose_of(int body) const {
     return body < 0 ? Pose{} : Pose{state.p[static_cast<size_t>(body)], state.q[static_cast<size_t>(body)]};

@@ -282,8 +282,8 @@ void find_safe_bounds(const ZoneParameters& p, const std::vector<CompiledLaw>& l
 double raised(double x, double e) { return e == 1.5 ? x * std::sqrt(x) : std::pow(x, e); }
 
 constexpr double kTiny = 1e-300;
-constexpr double kMostDamage =
-    19;  // added flexibility over the elastic one: unloading keeps a twentieth of the stiffness
+/// Most flexibility that damage adds, over the elastic one: unloading keeps a twentieth of the stiffness.
+constexpr double kMostDamage = 19;
 
 /// The stiffness goes over to its share without a jump of the forces: the rest of the deformation becomes permanent.
 /// The stations of a two-station element share the change of rotation evenly, and its shear the change of displacement.
@@ -394,9 +394,7 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
   double force[6];   // elastic resultants at the marker
   double phi[2][2];  // inelastic rotation [plane][station], damage included
   double m[2][2];    // moment at the station [plane][station]
-  double stored_soft = 0;
   bool flowed = false;
-  double energy_trial = 0;
 
   force[0] = p.external_axial ? d.c[0] : k[0] * (d.c[0] - z.axial);
   force[3] = k[3] * (d.c[3] - z.twist);
@@ -441,8 +439,7 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
       for (int s = 0; s < n; ++s) e += 0.5 * z.station[s].soft[q] * m[q][s] * m[q][s];
     return e;
   };
-  stored_soft = soft_energy();
-  energy_trial = elastic_energy() + stored_soft;
+  const double energy_trial = elastic_energy() + soft_energy();
 
   BreakReason broke = BreakReason::None;
   if (n > 0) {
@@ -526,7 +523,6 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
         if (turn2 > 0) {
           flowed = true;
           if (turn2 > 1e-18 * length2) changed = true;  // the other station feels it
-          st.turned += std::sqrt(turn2);
           st.reached = std::max(st.reached, std::sqrt(length2));
         }
         if (st.reached >= station_limits.law().rupture_rotation) broke = BreakReason::Rotation;
@@ -543,7 +539,7 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
           m[q][s] = Plane::at(force[q == 0 ? 4 : 5], force[q == 0 ? 2 : 1], p.x[s], planes[q].sign);
           const double added = phi[q][s] - st.phi[q] - st.soft[q] * m[q][s];
           const double share = Limits(laws, p.law[s], z, time).law().damage_share;
-          if (share > 0 && added * m[q][s] > 0 && std::abs(m[q][s]) * (std::abs(phi[q][s]) + kTiny) > 0) {
+          if (share > 0 && added * m[q][s] > 0) {
             const double most =
                 std::min(share * std::abs(phi[q][s]) / std::abs(m[q][s]), kMostDamage / station_stiffness[q][s]);
             st.soft[q] = std::max(st.soft[q], std::min(most, st.soft[q] + share * added / m[q][s]));
@@ -613,7 +609,7 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
   }
 
   // A damper in series with a spring, both beside the elastic deformation (standard linear solid): no plastic flow is
-  // damped, nothing is at rest. The damper follows the mean of the step.
+  // damped, and at rest it carries nothing. The damper follows the mean of the step.
   double damper_energy = 0;
   for (int i = 0; i < 6; ++i) {
     const double e = k[i] > 0 ? force[i] / k[i] : 0;

@@ -56,7 +56,6 @@ struct StationState {
   double phi[2] = {0, 0};            // plastic rotations about y, z [rad]
   double soft[2] = {0, 0};           // added flexibility by damage [rad/(N·m)]
   double reached = 0;                // largest inelastic rotation so far [rad]
-  double turned = 0;                 // inelastic path length [rad]
   int k[2] = {0, 0}, j[2] = {0, 0};  // lookup hints
 };
 

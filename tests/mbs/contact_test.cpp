@@ -181,6 +181,33 @@ TEST(BodyContact, ImpactKeepsMomentum) {
   (void)s;
 }
 
+TEST(BodyContact, ABlowOnAPairLeftAloneGivesNoEnergyAway) {
+  // b rests 2 cm from a, so the pair is left alone for a while; c drives b into a within that time
+  Model m;
+  m.gravity = {};
+  m.contact.ground = false;
+  Body a = make_box("a", 50, {0.5, 0.5, 0.5}, {0, 0, 0}), b = make_box("b", 5, {0.2, 0.2, 0.2}, {0.72, 0, 0});
+  Body c = make_box("c", 50, {0.5, 0.5, 0.5}, {1.43, 0, 0});
+  c.v_WB = {-20, 0, 0};
+  add_body(m, a);
+  add_body(m, b);
+  add_body(m, c);
+  Energy e;
+  double momentum = 0, overlap = 0;
+  Options o = free_options(0.1, 1e-4);
+  o.on_frame = [&](const View& v) {
+    e = v.energy;
+    momentum = 0;
+    for (size_t i = 0; i < 3; ++i) momentum += v.mass[i] * v.v_WB[i].x;
+    overlap = std::max(overlap, 0.7 - (v.X_WB[1].p.x - v.X_WB[0].p.x));
+    EXPECT_LE(e.kinetic + e.contact, 0.5 * 50 * 400 * (1 + 1e-6)) << v.time;
+    EXPECT_GE(e.contact_loss, -1e-6 * 0.5 * 50 * 400) << v.time;
+  };
+  (void)run(m, o);
+  EXPECT_GT(overlap, 0.001);  // they did meet
+  EXPECT_NEAR(momentum, -1000, 1e-6);
+}
+
 TEST(BodyContact, CentralImpactHasItsRestitution) {
   Model m;
   m.gravity = {};
