@@ -21,11 +21,13 @@ inline constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
 /// Contact geometry fixed in a body.
 struct Shape {
-  enum class Kind { Box, Sphere };
+  enum class Kind { Box, Sphere, Hull, Plane };
   Kind kind = Kind::Box;
-  Pose X_BS;          // centre of the shape
-  Vec3 half;          // half edges of a box [m]
-  double radius = 0;  // of a sphere [m]
+  Pose X_BS;                   // frame S of the shape: centre of a box or sphere, surface of a plane
+  Vec3 half;                   // half edges of a box [m]
+  double radius = 0;           // of a sphere [m]
+  std::vector<Vec3> vertices;  // of a hull, in S; those inside the convex hull of the others count for nothing [m]
+  // A plane is the half-space z <= 0 of S; only fixed bodies have one.
 };
 
 struct Body {
@@ -94,11 +96,19 @@ struct ZoneElement {
   std::vector<Station> stations;  // none: elastic; at most two
 };
 
-/// Two bodies joined by an ideal joint. Frames F on the parent and M on the child coincide at the start; x of F points
-/// from the parent to the child where a member's axis matters, the axis of a revolute joint is Fz = Mz. The reaction is
-/// that of the parent on the child, in F: pulled apart, its x component is negative.
+/// Two bodies joined by an ideal joint between frame F on the parent and frame M on the child. What each kind holds
+/// must be closed at the start; what it leaves free may have any value:
+///   Fixed        F = M
+///   Revolute     same origin, Fz = Mz (the axis)
+///   Spherical    same origin
+///   Universal    same origin, Fx (first axis, of the parent) at right angles to My (second axis, of the child)
+///   Prismatic    same axes, origin of M on the axis Fz
+///   Cylindrical  Fz = Mz, origin of M on it
+///   Distance     the distance between the origins stays what it is at the start
+/// x of F points from the parent to the child where a member's axis matters (limits). The reaction is that of the
+/// parent on the child at the origin of M, in the axes of F: pulled apart, its x component is negative.
 struct Joint {
-  enum class Kind { Fixed, Revolute };
+  enum class Kind { Fixed, Revolute, Spherical, Universal, Prismatic, Cylindrical, Distance };
   Kind kind = Kind::Fixed;
   std::string name;
   BodyId parent, child;
@@ -107,7 +117,60 @@ struct Joint {
   double tension_limit = kUnlimited;   // pull along x of F [N]
   double shear_limit = kUnlimited;     // resultant across x of F [N]
   double moment_limit = kUnlimited;    // resultant of the constrained moments [N·m]
-  double rotation_limit = kUnlimited;  // |angle| of a revolute joint [rad]
+  double rotation_limit = kUnlimited;  // |angle| of a revolute or cylindrical joint [rad]
+};
+
+/// A scalar law of a spring or a damper: force against deformation, or against its rate. The force is what the element
+/// pulls with (tension, or a moment against the rotation), so that a stable spring rises.
+struct Characteristic {
+  enum class Kind { Linear, Polynomial, Table };
+  Kind kind = Kind::Linear;
+  double rate = 0;                   // Linear: slope [N/m, N·s/m, N·m/rad, N·m·s/rad]
+  std::vector<double> coefficients;  // Polynomial: c0 + c1 x + c2 x² + ...
+  std::vector<double> x, f;          // Table: x rising, at least two; linear between, constant beyond the ends
+};
+
+/// Spring and damper along the line between two points. Positive force pulls the points together.
+struct SpringDamper {
+  std::string name;
+  BodyId a, b;
+  Vec3 p_A, p_B;           // in the bodies' frames; in W for the ground
+  double free_length = 0;  // [m]
+  Characteristic spring;   // of length - free_length [m] -> [N]
+  Characteristic damper;   // of the rate of length [m/s] -> [N]
+  double tension_strength = kUnlimited, compression_strength = kUnlimited;  // the spring breaks above [N]
+};
+
+/// Torsion spring and damper about the axis Fz = Mz of a revolute or cylindrical joint; positive torque turns the child
+/// back towards smaller angles.
+struct RotationalSpring {
+  std::string name;
+  JointId joint;
+  double free_angle = 0;         // [rad]
+  Characteristic spring;         // of angle - free_angle [rad] -> [N·m]
+  Characteristic damper;         // of its rate [rad/s] -> [N·m]
+  double strength = kUnlimited;  // |spring torque| at which it breaks [N·m]
+};
+
+/// Six-component bushing between marker F on body a and M on body b: each component follows its own law. Translations
+/// are those of M's origin along the axes of F, rotations the components of the rotation vector from F to M in F.
+struct Bushing {
+  std::string name;
+  BodyId a, b;
+  Pose X_AF, X_BM;
+  Characteristic spring[6];  // x y z [m] -> [N], x y z [rad] -> [N·m]
+  Characteristic damper[6];  // of their rates
+  double strength[6] = {kUnlimited, kUnlimited, kUnlimited, kUnlimited, kUnlimited, kUnlimited};  // breaks above
+};
+
+/// Force and torque on a body, constant or following a table of time.
+struct Load {
+  std::string name;
+  BodyId body;
+  Vec3 p_B;                          // where the force acts, in the body's frame [m]
+  Vec3 force, torque;                // [N, N·m]
+  bool follows_body = false;         // components in the body's frame instead of W
+  std::vector<double> time, factor;  // both empty: 1 at all times; linear between, constant beyond the ends
 };
 
 /// Rotational force element of a revolute joint about its axis Fz = Mz: elastic with the moment_z limits of a law, the
@@ -133,6 +196,15 @@ struct Cable {
 /// Half-space of solid ground and how bodies touch. A pair's contact is a nonlinear spring whose rate follows from the
 /// masses: frequency `contact_frequency` [rad/s] with the pair's reduced mass.
 struct Contact {
+  /// Rules for two bodies (or a body and the ground) that differ from the general ones.
+  struct Pair {
+    BodyId a, b;          // b may be the ground
+    bool touches = true;  // false: they pass through each other
+    double friction = 0.6;
+    double restitution = 0.1;
+    double stiffness = 0;  // of a point; 0: from masses and contact_frequency [N/m]
+    double damping = -1;   // of a point, instead of restitution where >= 0 [N·s/m]
+  };
   Vec3 normal{0, 0, 1};  // of the ground's plane, unit length
   double offset = 0;     // the plane is dot(normal, p) = offset [m]
   double friction = 0.6;
@@ -142,6 +214,51 @@ struct Contact {
   double contact_frequency = 1500;  // [rad/s]
   bool ground = true;               // bodies touch the ground
   bool bodies = true;               // bodies touch each other
+  std::vector<Pair> pairs;
+};
+
+/// Something of the running system that an event can wait for or an output can ask for.
+struct Quantity {
+  enum class Kind {
+    Position,            // body: origin of its frame, in W [m]
+    Velocity,            // body: of its centre of mass, in W [m/s]
+    AngularVelocity,     // body, in W [rad/s]
+    Orientation,         // body: rotation vector of R_WB (outputs: quaternion) [rad]
+    JointForce,          // joint: reaction on the child, in F [N]
+    JointMoment,         // joint, in F [N·m]
+    JointAngle,          // revolute or cylindrical joint [rad]
+    JointDisplacement,   // prismatic or cylindrical joint, along Fz [m]
+    ElementTranslation,  // zone element: of M against F, in F [m]
+    ElementRotation,     // zone element [rad]
+    ElementForce,        // zone element: of a on b at the marker, in F [N]
+    ElementMoment,       // zone element [N·m]
+    BushingTranslation,  // bushing, as of a zone element
+    BushingRotation,
+    BushingForce,
+    BushingMoment,
+    SpringLength,   // spring-damper [m]
+    SpringForce,    // spring-damper, pull positive, damper included [N]
+    TorsionAngle,   // rotational spring: angle - free_angle [rad]
+    TorsionTorque,  // rotational spring, damper included [N·m]
+    CableForce      // cable [N]
+  };
+  Kind kind = Kind::Position;
+  int index = -1;  // of the body, joint, element ... in its list
+};
+
+/// An event that waits until a component of a quantity passes a limit.
+struct Trigger {
+  Quantity quantity;
+  int component = 0;   // 0 1 2: x y z (0 for a scalar); 3: magnitude
+  double limit = 0;    // unit of the quantity
+  bool rising = true;  // fires at the first step with value >= limit; false: value <= limit
+};
+
+/// What a run writes: one quantity at a rate.
+struct Output {
+  std::string name;
+  Quantity quantity;
+  double rate = 100;  // [1/s]
 };
 
 /// What an event does.
@@ -150,14 +267,20 @@ struct Action {
     RemoveElement,  // element
     SwitchLaw,      // element: the limits of all its stations go over to those of `law` within `ramp`
     ReleaseJoint,   // joint
-    ReplaceBody,  // body: mass, inertia and shapes of `replacement`; X_WB of it is its new centre of mass in the old B
-    ReleaseCable  // cable
+    ReplaceBody,   // body: mass, inertia and shapes of `replacement`; X_WB of it is its new centre of mass in the old B
+    ReleaseCable,  // cable
+    RemoveSpring,  // index: spring-damper
+    RemoveRotationalSpring,  // index
+    RemoveBushing,           // index
+    RemoveLoad,              // index; a load is there from the start
+    ApplyLoad                // index; makes a load that some event applies absent until then; its table starts then
   };
   Kind kind = Kind::RemoveElement;
   ElementId element;
   JointId joint;
   BodyId body;
   int cable = -1;
+  int index = -1;       // spring, rotational spring, bushing or load
   int rotational = -1;  // SwitchLaw: a rotational element instead of an element
   LawId law;
   double ramp = 0;             // [s]
@@ -166,8 +289,9 @@ struct Action {
 };
 
 struct Event {
-  double time = 0;  // [s]
+  double time = 0;  // when it fires, or from when on its trigger is looked at [s]
   std::string name;
+  std::vector<Trigger> triggers;  // empty: at the time; else once, when the first of them holds
   std::vector<Action> actions;
 };
 
@@ -183,8 +307,13 @@ struct Model {
   std::vector<RotationalElement> rotational_elements;
   std::vector<ZoneLaw> laws;
   std::vector<Cable> cables;
+  std::vector<SpringDamper> springs;
+  std::vector<RotationalSpring> rotational_springs;
+  std::vector<Bushing> bushings;
+  std::vector<Load> loads;
   Contact contact;
   std::vector<Event> events;  // any order; same times fire in this order
+  std::vector<Output> outputs;
 };
 
 BodyId add_body(Model&, Body);

@@ -43,8 +43,14 @@ struct View {
   std::vector<double> shortening;                   // plastic shortening, zone elements only [m]
   std::vector<Vec3> element_force, element_moment;  // of a on b at the marker, in F; zone elements only
   std::vector<Vec3> joint_force, joint_moment;      // reaction of the parent on the child, in F
+  std::vector<double> joint_angle;                  // of revolute and cylindrical joints, else 0 [rad]
+  std::vector<double> joint_displacement;           // of prismatic and cylindrical joints, else 0 [m]
   std::vector<bool> joint_released;
+  std::vector<Vec3> element_translation, element_rotation;  // deformation in F; zone elements only [m, rad]
   std::vector<double> cable_force;
+  std::vector<double> spring_length, spring_force;    // [m, N]
+  std::vector<double> torsion_angle, torsion_torque;  // of rotational springs [rad, N·m]
+  std::vector<Vec3> bushing_translation, bushing_rotation, bushing_force, bushing_moment;  // force of a on b, in F
   Vec3 ground_force;          // of the ground on everything: contact, elements, joints and cables tied to it [N]
   Vec3 contact_force_ground;  // the part by contact [N]
   int body_contacts = 0;      // touching points between bodies
@@ -60,12 +66,15 @@ struct Happening {
     ElementBroken,
     JointReleased,
     CableBroken,
+    SpringBroken,  // spring-damper
+    RotationalSpringBroken,
+    BushingBroken,
     GroundContact,
     BodyContact
   };
   Kind kind = Kind::EventFired;
   double time = 0;
-  int index = -1;      // event, element (zone elements, then rotational), joint, cable or body
+  int index = -1;      // event, element (zone elements, then rotational), joint, cable, spring, bushing or body
   int other = -1;      // second body of a BodyContact
   std::string reason;  // of a break: "tension", "crushing", "shear", "rotation", "torsion"
   double speed = 0;    // of a first contact, normal approach [m/s]
@@ -99,6 +108,7 @@ struct Summary {
   double equilibrium_residual = 0;  // largest unbalanced force over the weight
   double energy_error = 0;          // largest |residual| over the released potential energy
   double joint_drift = 0;           // largest violation of a joint [m, rad]
+  std::vector<std::string> notes;   // redundant constraints, singular positions: what was done about them
   double wall_time = 0;             // of the stepping [s]
 };
 
