@@ -328,10 +328,10 @@ bool System::find_equilibrium(std::string& message) {
     Vector r(n);
     for (size_t i = 0; i < assembly.free_bodies().size(); ++i) {
       const size_t b = static_cast<size_t>(assembly.free_bodies()[i]);
-      const Vec3 f = force[b] + state.body[b].mass * model.gravity;
+      const Vec3 f = force[b] + state.body[b].mass * model.gravity, t = torque[b];
       for (int k = 0; k < 3; ++k) {
         r[static_cast<Eigen::Index>(6 * i) + k] = f[k];
-        r[static_cast<Eigen::Index>(6 * i) + 3 + k] = torque[b][k];
+        r[static_cast<Eigen::Index>(6 * i) + 3 + k] = t[k];
       }
     }
     Vector penalised = r;

@@ -99,8 +99,8 @@ void System::build_clusters() {
 void System::solve_joints(double h) {
   State& s = state;
   const double impulse_time = s.first_kick ? 0.5 * h : h;
-  std::fill(joint_force.begin(), joint_force.end(), Vec3{});
-  std::fill(joint_torque.begin(), joint_torque.end(), Vec3{});
+  joint_force.fill({});
+  joint_torque.fill({});
   for (const JointCluster& cluster : clusters) {
     const size_t n = static_cast<size_t>(cluster.rows);
     std::vector<JointRow>& rows = joint_rows;

@@ -25,6 +25,11 @@ class Writer {
     (*this)(x.size());
     append(x.data(), x.size() * sizeof(T));
   }
+  template <class T>
+  void operator()(const LaneArray<T>& x) {
+    (*this)(x.size());
+    for (size_t i = 0; i < x.size(); ++i) (*this)(x[i]);
+  }
   std::vector<std::byte> bytes;
 
  private:
@@ -48,6 +53,18 @@ class Reader {
     if (size > (bytes_.size() - at_) / sizeof(T)) fail();
     x.resize(size);
     take(x.data(), size * sizeof(T));
+  }
+  template <class T>
+  void operator()(LaneArray<T>& x) {
+    size_t size = 0;
+    (*this)(size);
+    if (size > (bytes_.size() - at_) / sizeof(T)) fail();
+    x.resize(size);
+    for (size_t i = 0; i < size; ++i) {
+      T item;
+      (*this)(item);
+      x[i] = item;
+    }
   }
   bool is_at_end() const { return at_ == bytes_.size(); }
   [[noreturn]] static void fail() { throw InputError("E620", "these bytes are not a snapshot of this model"); }
@@ -83,7 +100,8 @@ constexpr std::uint64_t kMagic = 0x32534e41504f54ULL;  // "TOPANS2"
 
 /// What of the system's scratch the next step takes over, under the same names.
 struct Carried {
-  std::vector<Vec3> force, torque, contact_force, contact_torque, joint_force, joint_torque;
+  LaneArray<Vec3> force, torque, joint_force, joint_torque;
+  std::vector<Vec3> contact_force, contact_torque;
   std::vector<ElementForce> element_force;
   Vec3 ground_reaction, ground_contact;
   int body_contacts = 0;

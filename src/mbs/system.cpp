@@ -517,7 +517,10 @@ bool System::advance_step() {
   evaluate_forces(h);
   // one broken number anywhere reaches this sum within a step
   double sum = 0;
-  for (size_t b = 0; b < B; ++b) sum += s.p[b].x + s.p[b].y + s.p[b].z + s.v[b].x + s.v[b].y + s.v[b].z;
+  for (size_t b = 0; b < B; ++b) {
+    const Vec3 pv = s.p[b] + s.v[b];
+    sum += pv.x + pv.y + pv.z;
+  }
   return std::isfinite(sum);
 }
 

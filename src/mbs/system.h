@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mbs/boxes.h"
+#include "mbs/lane_array.h"
 #include "mbs/model.h"
 #include "mbs/solver.h"
 #include "mbs/zone.h"
@@ -96,10 +97,10 @@ struct State {
   size_t next_event = 0;
   // bodies (B)
   std::vector<BodyConstants> body;
-  std::vector<Vec3> p, v, L;  // place; velocity and angular momentum about the centre at the last half step
-  std::vector<Vec3> w;        // angular velocity at the last half step, in W
-  std::vector<Quat> q;
-  std::vector<Mat3> R;
+  LaneArray<Vec3> p, v, L;  // place; velocity and angular momentum about the centre at the last half step
+  LaneArray<Vec3> w;        // angular velocity at the last half step, in W
+  LaneArray<Quat> q;
+  LaneArray<Mat3> R;
   std::vector<Vec3> p_offset;  // of the present centre of mass in the frame of the model's body
   std::vector<CompiledShape> shapes;
   std::vector<GroundPoint> ground_points;
@@ -113,7 +114,7 @@ struct State {
   // contact pairs
   std::vector<PairState> pairs;
   std::vector<long> pair_apart_until;  // step before which the bodies of a pair cannot meet
-  std::vector<Vec3> p_at_search;
+  LaneArray<Vec3> p_at_search;
   std::vector<unsigned char> tied_to_ground;
   bool search_due = true;
   long last_search = 0;
@@ -179,10 +180,10 @@ class System {
   // scratch
   std::vector<ElementForce> element_force;
   std::vector<unsigned char> element_news;            // 1 has yielded now, 2 has broken now (E)
-  std::vector<Vec3> force, torque;                    // applied on bodies (B)
+  LaneArray<Vec3> force, torque;                      // applied on bodies (B)
   std::vector<Vec3> contact_force, contact_torque;    // the part by contact (B)
   std::vector<Vec3> friction_force, friction_torque;  // and of that by friction (B)
-  std::vector<Vec3> joint_force, joint_torque;        // of the joints on bodies, of the step before (B)
+  LaneArray<Vec3> joint_force, joint_torque;          // of the joints on bodies, of the step before (B)
   std::vector<Vec3> p_before;
   std::vector<Quat> q_before;
   std::vector<Mat3> R_before, world_inverse_inertia;  // of jointed bodies (B)
