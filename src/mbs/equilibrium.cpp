@@ -322,7 +322,7 @@ bool System::find_equilibrium(std::string& message) {
     state.element = virgin;
     state.rotational = virgin_rotational;
     ground_reaction = {};
-    evaluate_elements(0);
+    evaluate_elements_fully(0);
     evaluate_rotationals(0);
     evaluate_cables();
     Vector r(n);

@@ -1,12 +1,13 @@
 #pragma once
-/// Arrays of vectors, quaternions and matrices whose components can lie side by side with those of other samples:
-/// component c of item i of lane l is data[(i * D + c) * lanes + l]. With one lane they are plain arrays.
+/// Arrays of vectors, quaternions and matrices in blocks of W lanes, as the kernel reads them: component c of item i is
+/// at
+/// ((i >> shift) * D + c) * W + lane, where the lane is i modulo W in a run of its own (neighbouring items side by
+/// side) and that of the sample in a batch (shift 0: the same item of all samples side by side).
 
-#include <array>
 #include <cstddef>
 #include <type_traits>
-#include <vector>
 
+#include "base/aligned.h"
 #include "base/linalg.h"
 
 namespace topple::mbs {
@@ -14,10 +15,6 @@ namespace topple::mbs {
 /// Layout of T as D doubles in a row.
 template <class T>
 struct Components;
-template <>
-struct Components<double> {
-  static constexpr size_t D = 1;
-};
 template <>
 struct Components<Vec3> {
   static constexpr size_t D = 3;
@@ -31,6 +28,18 @@ struct Components<Mat3> {
   static constexpr size_t D = 9;
 };
 
+/// Where the items of an array lie.
+struct LaneLayout {
+  size_t W = 1;      // lanes of a block, a power of two
+  size_t shift = 0;  // log2 of the items in a block
+  size_t lane = 0;   // of the sample
+  size_t blocks(size_t items) const { return (items + (size_t{1} << shift) - 1) >> shift; }
+  /// Place of component c of item i.
+  size_t at(size_t i, size_t c, size_t D) const {
+    return ((i >> shift) * D + c) * W + (i & ((size_t{1} << shift) - 1)) + lane;
+  }
+};
+
 template <class T>
 class LaneArray {
  public:
@@ -40,12 +49,13 @@ class LaneArray {
   /// Stands for an item: reads as T, writes through.
   class Item {
    public:
-    Item(double* at, size_t lanes) : at_(at), lanes_(lanes) {}
+    Item(double* at, size_t W) : at_(at), W_(W) {}
     Item(const Item&) = default;
-    operator T() const { return load(at_, lanes_); }
+    operator T() const { return load(at_, W_); }
     const Item& operator=(const T& x) const {
-      const double* from = reinterpret_cast<const double*>(&x);
-      for (size_t c = 0; c < D; ++c) at_[c * lanes_] = from[c];
+      double c[D];
+      __builtin_memcpy(c, &x, sizeof x);
+      for (size_t i = 0; i < D; ++i) at_[i * W_] = c[i];
       return *this;
     }
     const Item& operator=(const Item& x) const { return *this = T(x); }
@@ -54,74 +64,62 @@ class LaneArray {
 
    private:
     double* at_;
-    size_t lanes_;
+    size_t W_;
   };
 
   LaneArray() = default;
   LaneArray(const LaneArray& other) { *this = other; }
-  LaneArray(LaneArray&& other) noexcept { *this = std::move(other); }
-  /// Takes the values, not the place: a copy has one lane.
+  LaneArray(LaneArray&& other) noexcept { *this = other; }
+  /// Takes the values; they stay where they are if the size is right, and get a plain layout otherwise.
   LaneArray& operator=(const LaneArray& other) {
     if (this == &other) return *this;
-    std::vector<double> values(other.size_ * D);
-    for (size_t i = 0; i < other.size_ * D; ++i) values[i] = other.data_[i * other.lanes_];
-    own(std::move(values), other.size_);
+    resize(other.size_);
+    for (size_t i = 0; i < size_; ++i) (*this)[i] = other[i];
     return *this;
   }
-  LaneArray& operator=(LaneArray&& other) noexcept {
-    if (this == &other) return *this;
-    const bool owns = other.data_ == other.own_.data();
-    own_ = std::move(other.own_);
-    data_ = owns ? own_.data() : other.data_;
-    size_ = other.size_, lanes_ = other.lanes_;
-    other.size_ = 0, other.data_ = nullptr;
-    return *this;
-  }
+  LaneArray& operator=(LaneArray&& other) noexcept { return *this = other; }
   ~LaneArray() = default;
 
   /// N items of its own.
-  void assign(size_t n, const T& x) {
-    std::vector<double> values(n * D);
-    own(std::move(values), n);
+  void assign(size_t n, const T& x, const LaneLayout& layout = {}) {
+    layout_ = layout;
+    size_ = n;
+    own_.assign(layout.blocks(n) * D * layout.W, 0);
+    data_ = own_.data();
     fill(x);
   }
   void resize(size_t n) {
     if (n != size_) assign(n, T{});
   }
-  /// One lane of a store of others; what was here is copied there.
-  void attach(double* first, size_t lanes) {
-    for (size_t i = 0; i < size_ * D; ++i) first[i * lanes] = data_[i * lanes_];
-    data_ = first, lanes_ = lanes;
+  /// Moves to a store of others.
+  void attach(double* store, const LaneLayout& layout) {
+    const LaneArray before(*this);
     own_ = {};
+    data_ = store;
+    layout_ = layout;
+    for (size_t i = 0; i < size_; ++i) (*this)[i] = before[i];
   }
   void fill(const T& x) {
     for (size_t i = 0; i < size_; ++i) (*this)[i] = x;
   }
 
-  T operator[](size_t i) const { return load(data_ + i * D * lanes_, lanes_); }
-  Item operator[](size_t i) { return {data_ + i * D * lanes_, lanes_}; }
+  T operator[](size_t i) const { return load(data_ + layout_.at(i, 0, D), layout_.W); }
+  Item operator[](size_t i) { return {data_ + layout_.at(i, 0, D), layout_.W}; }
   size_t size() const { return size_; }
   bool empty() const { return size_ == 0; }
-  size_t lanes() const { return lanes_; }
-  double* data() { return data_; }
-  const double* data() const { return data_; }
 
  private:
-  static T load(const double* at, size_t lanes) {
-    std::array<double, D> c;
-    for (size_t i = 0; i < D; ++i) c[i] = at[i * lanes];
+  static T load(const double* at, size_t W) {
+    double c[D];
+    for (size_t i = 0; i < D; ++i) c[i] = at[i * W];
     T x;
-    __builtin_memcpy(&x, c.data(), sizeof x);
+    __builtin_memcpy(&x, c, sizeof x);
     return x;
   }
-  void own(std::vector<double>&& values, size_t n) {
-    own_ = std::move(values);
-    data_ = own_.data();
-    size_ = n, lanes_ = 1;
-  }
-  std::vector<double> own_;
+  AlignedVector<double> own_;
   double* data_ = nullptr;
-  size_t size_ = 0, lanes_ = 1;
+  size_t size_ = 0;
+  LaneLayout layout_;
 };
 
 }  // namespace topple::mbs

@@ -92,7 +92,7 @@ void visit(Archive& ar, S& s, C& sys) {
       ar(s.friction_power), ar(s.total_at_start);
   ar(s.gravity_at_start), ar(s.largest_residual), ar(s.released), ar(s.largest_drift), ar(s.quiet_steps);
   ar(sys.force), ar(sys.torque), ar(sys.contact_force), ar(sys.contact_torque), ar(sys.joint_force),
-      ar(sys.joint_torque), ar(sys.element_force);
+      ar(sys.joint_torque), ar(sys.element_history);
   ar(sys.ground_reaction), ar(sys.ground_contact), ar(sys.body_contacts);
 }
 
@@ -102,7 +102,7 @@ constexpr std::uint64_t kMagic = 0x32534e41504f54ULL;  // "TOPANS2"
 struct Carried {
   LaneArray<Vec3> force, torque, joint_force, joint_torque;
   std::vector<Vec3> contact_force, contact_torque;
-  std::vector<ElementForce> element_force;
+  std::vector<double> element_history;
   Vec3 ground_reaction, ground_contact;
   int body_contacts = 0;
 };
@@ -120,6 +120,7 @@ std::vector<std::byte> write_snapshot(System& system) {
   w(kMagic);
   const std::string& identity = identity_of(system);
   w(std::vector<char>(identity.begin(), identity.end()));
+  system.save_elements();
   visit(w, system.state, system);
   return std::move(w.bytes);
 }
@@ -143,7 +144,7 @@ void read_snapshot(const std::vector<std::byte>& bytes, System& system) {
   system.contact_torque = std::move(carried.contact_torque);
   system.joint_force = std::move(carried.joint_force);
   system.joint_torque = std::move(carried.joint_torque);
-  system.element_force = std::move(carried.element_force);
+  system.restore_elements(carried.element_history);
   system.ground_reaction = carried.ground_reaction;
   system.ground_contact = carried.ground_contact;
   system.body_contacts = carried.body_contacts;

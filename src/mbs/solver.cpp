@@ -46,6 +46,7 @@ void System::evaluate_start() {
   state.gravity_at_start = 0;
   state.gravity_at_start = calc_energy().gravity;
   evaluate_forces(0);
+  pack_elements();
   state.total_at_start = 0;
   const Energy e = calc_energy();
   state.total_at_start = e.residual;

@@ -4,13 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "base/parallel.h"
-
 namespace topple::mbs {
 
 namespace {
-
-constexpr size_t kElementsForThreads = 2048;  // below, waking threads costs more than they save
 
 Mat3 world_tensor(const Mat3& R, const Mat3& in_body) { return R * in_body * transpose(R); }
 
@@ -50,8 +46,10 @@ void append_shapes(const Body& body, BodyConstants& c, std::vector<CompiledShape
 
 }  // namespace
 
-System::System(const Model& m, const Options& o) : model(m), options(o) {
+System::System(const Model& m, const Options& o, size_t width)
+    : model(m), options(o), own_lanes(std::make_unique<Lanes>()), lanes(own_lanes.get()) {
   check_model(model);
+  lanes->W = width > 0 ? width : kernel::lanes();
   compile();
   choose_step();
 }
@@ -61,12 +59,21 @@ void System::compile() {
   State& s = state;
   s = {};
   s.body.resize(B);
-  s.p.resize(B);
-  s.v.resize(B);
-  s.L.resize(B);
-  s.w.resize(B);
+  lanes->allocate_bodies(B);
+  const LaneLayout layout = lanes->body_layout(lane);
+  for (auto [array, store] : {std::pair{&s.p, &lanes->p},
+                              {&s.v, &lanes->v},
+                              {&s.L, &lanes->L},
+                              {&s.w, &lanes->w},
+                              {&force, &lanes->force},
+                              {&torque, &lanes->torque}}) {
+    array->resize(B);
+    array->attach(store->data(), layout);
+  }
   s.q.resize(B);
+  s.q.attach(lanes->q.data(), layout);
   s.R.resize(B);
+  s.R.attach(lanes->R.data(), layout);
   s.p_offset.assign(B, {});
   s.touched_ground.assign(B, 0);
   s.tied_to_ground.assign(B, 0);
@@ -166,10 +173,7 @@ void System::compile() {
     if (elements[e].a >= 0) incidence[static_cast<size_t>(elements[e].a)].push_back(static_cast<int>(2 * e));
     if (elements[e].b >= 0) incidence[static_cast<size_t>(elements[e].b)].push_back(static_cast<int>(2 * e + 1));
   }
-  element_force.assign(elements.size(), {});
-  element_news.assign(elements.size(), 0);
-  force.assign(B, {});
-  torque.assign(B, {});
+  lay_out_elements();
   contact_force.assign(B, {});
   contact_torque.assign(B, {});
   friction_force.assign(B, {});
@@ -179,6 +183,8 @@ void System::compile() {
   q_before.resize(B);
   R_before.resize(B);
   world_inverse_inertia.resize(B);
+  in_cluster.assign(B, 0);
+  for (size_t b = 0; b < B; ++b) pack_body(b);
   s.contact_count.assign(B, 0);
   s.gravity_at_start = calc_energy().gravity;
 }
@@ -192,6 +198,19 @@ void System::layout_shapes() {
   state.ground_points.resize(static_cast<size_t>(corner));
 }
 
+void System::pack_body(size_t b) {
+  Lanes& l = *lanes;
+  const LaneLayout layout = l.body_layout(lane);
+  const BodyConstants& c = state.body[b];
+  const auto put = [&](int f, double x) { l.constants[layout.at(b, static_cast<size_t>(f), kernel::kBodyFields)] = x; };
+  const Mat3& I = c.inverse_inertia;
+  const double inverse_inertia[6] = {I(0, 0), I(0, 1), I(0, 2), I(1, 1), I(1, 2), I(2, 2)};
+  put(kernel::kInverseMass, c.inverse_mass);
+  for (int i = 0; i < 6; ++i) put(kernel::kInverseInertia + i, inverse_inertia[i]);
+  put(kernel::kDrifts, fixed[b] || in_cluster[b] ? 0 : 1);
+  put(kernel::kFree, fixed[b] ? 0 : 1);
+}
+
 Mat3 System::calc_world_inverse_inertia(size_t b) const {
   return world_tensor(state.R[b], state.body[b].inverse_inertia);
 }
@@ -201,103 +220,6 @@ double System::calc_angle(const CompiledJoint& j, double previous) const {
   const double angle = std::atan2(dot(M.column(0), F.column(1)), dot(M.column(0), F.column(0)));
   constexpr double turn = 2 * 3.14159265358979323846;
   return angle + turn * std::round((previous - angle) / turn);
-}
-
-void System::evaluate_element(size_t i, double h) {
-  element_news[i] = 0;
-  ZoneState& z = state.element[i];
-  ElementForce& out = element_force[i];
-  if (!z.live) {
-    out = {};
-    return;
-  }
-  const CompiledElement& e = elements[i];
-  Vec3 p_F = e.p_AF, p_M = e.p_BM, origin_a, origin_b;
-  Quat q_F = e.q_AF, q_M = e.q_BM;
-  if (e.a >= 0) {
-    const size_t a = static_cast<size_t>(e.a);
-    origin_a = state.p[a];
-    p_F = origin_a + state.R[a] * (e.p_AF - state.p_offset[a]);
-    q_F = state.q[a] * e.q_AF;
-  }
-  if (e.b >= 0) {
-    const size_t b = static_cast<size_t>(e.b);
-    origin_b = state.p[b];
-    p_M = origin_b + state.R[b] * (e.p_BM - state.p_offset[b]);
-    q_M = state.q[b] * e.q_BM;
-  }
-  const Mat3 R_WF = to_matrix(q_F);
-  const Vec3 u = transpose_times(R_WF, p_M - p_F);
-  const Vec3 r = log_rotation(conjugate(q_F) * q_M);
-  const bool was_yielded = z.yielded;
-  const Six d{{u.x, u.y, u.z, r.x, r.y, r.z}};
-  if (ignores_limits) {
-    ZoneParameters elastic = e.zone;
-    elastic.stations = 0;
-    advance_zone(elastic, laws, d, state.time, h, z);
-  } else {
-    advance_zone(e.zone, laws, d, state.time, h, z);
-  }
-  const double* f = z.resultant.c;
-  // torque conjugate to the rate of the rotation vector (docs/theory/multibody.md, eq. 4)
-  const Vec3 m{f[3], f[4], f[5]};
-  const double angle2 = dot(r, r);
-  const double kappa =
-      angle2 < 1e-3
-          ? 1.0 / 12 + angle2 / 720 + angle2 * angle2 / 30240
-          : (1 / angle2 - (1 + std::cos(std::sqrt(angle2))) / (2 * std::sqrt(angle2) * std::sin(std::sqrt(angle2))));
-  const Vec3 rm = cross(r, m);
-  const Vec3 t_W = R_WF * (m + 0.5 * rm + kappa * cross(r, rm));
-  const Vec3 f_W = R_WF * Vec3{f[0], f[1], f[2]};
-  out.force = -f_W;
-  out.torque_b = -(cross(p_M - origin_b, f_W) + t_W);
-  out.torque_a = cross(p_M - origin_a, f_W) + t_W;
-  if (!z.live) out = {};
-  element_news[i] = static_cast<unsigned char>((z.yielded && !was_yielded ? 1 : 0) + (z.live ? 0 : 2));
-}
-
-void System::evaluate_elements(double h) {
-  // each element writes its own places only; sums and reports follow in order, so threads change no bit
-  if (options.threads > 1 && elements.size() >= kElementsForThreads) {
-    constexpr size_t chunk = 256;
-    (void)parallel_for((elements.size() + chunk - 1) / chunk, options.threads, [&](size_t c) {
-      for (size_t i = c * chunk; i < std::min(elements.size(), (c + 1) * chunk); ++i) evaluate_element(i, h);
-    });
-  } else {
-    for (size_t i = 0; i < elements.size(); ++i) evaluate_element(i, h);
-  }
-  for (size_t i = 0; i < elements.size(); ++i) {
-    if (element_news[i] == 0) continue;
-    if (element_news[i] & 1) say({Happening::Kind::ElementYielded, state.time, static_cast<int>(i), -1, {}, 0});
-    if (element_news[i] & 2) break_element(i, state.element[i].reason);
-  }
-  for (size_t b = 0; b < B; ++b) {
-    Vec3 f, t;
-    for (const int entry : incidence[b]) {
-      const ElementForce& e = element_force[static_cast<size_t>(entry / 2)];
-      if (entry % 2 == 0) {
-        f -= e.force;
-        t += e.torque_a;
-      } else {
-        f += e.force;
-        t += e.torque_b;
-      }
-    }
-    force[b] = f;
-    torque[b] = t;
-  }
-  for (size_t i = 0; i < elements.size(); ++i) {
-    const CompiledElement& e = elements[i];
-    const auto grounded = [&](int b) { return b < 0 || fixed[static_cast<size_t>(b)]; };
-    if (grounded(e.a)) ground_reaction += element_force[i].force;
-    if (grounded(e.b)) ground_reaction -= element_force[i].force;
-  }
-}
-
-void System::break_element(size_t e, BreakReason reason) {
-  static const char* const words[] = {"", "tension", "crushing", "shear", "rotation", "torsion", "removed"};
-  mark_search_due();
-  say({Happening::Kind::ElementBroken, state.time, static_cast<int>(e), -1, words[static_cast<int>(reason)], 0});
 }
 
 void System::evaluate_rotationals(double h) {
@@ -379,15 +301,19 @@ void System::fire_events() {
     for (const Action& a : event.actions) {
       switch (a.kind) {
         case Action::Kind::RemoveElement: {
-          ZoneState& z = state.element[static_cast<size_t>(a.element.index)];
+          const size_t e = static_cast<size_t>(a.element.index);
+          ZoneState& z = state.element[e];
           if (!z.live) break;
+          unpack_element(e);
           state.removed += z.energy + z.damper_energy;
           z.energy = z.damper_energy = 0;
           break_zone(z, BreakReason::Removed);
+          pack_element(e);
           mark_search_due();
           break;
         }
         case Action::Kind::SwitchLaw: {
+          if (a.rotational < 0) unpack_element(static_cast<size_t>(a.element.index));
           ZoneState& z = a.rotational >= 0 ? state.rotational[static_cast<size_t>(a.rotational)]
                                            : state.element[static_cast<size_t>(a.element.index)];
           if (z.next_law >= 0) z.base_law = z.next_law;
@@ -395,6 +321,7 @@ void System::fire_events() {
           z.ramp_begin = event.time;
           z.ramp = a.ramp;
           z.next_share = a.stiffness_share;
+          if (a.rotational < 0) pack_element(static_cast<size_t>(a.element.index));
           break;
         }
         case Action::Kind::ReleaseJoint:
@@ -431,6 +358,11 @@ void System::replace_body(size_t b, const Body& replacement) {
   s.p_offset[b] += moved;
   s.body[b] = constants_of(replacement);
   s.L[b] = world_tensor(s.R[b], replacement.inertia) * s.w[b];
+  pack_body(b);
+  for (const int entry : incidence[b]) {
+    unpack_element(static_cast<size_t>(entry / 2));
+    pack_element(static_cast<size_t>(entry / 2));
+  }
   // the old shapes stay in the list, unused
   append_shapes(replacement, s.body[b], s.shapes);
   layout_shapes();
@@ -456,7 +388,11 @@ void System::evaluate_forces(double h) {
   ground_contact = {};
   body_contacts = 0;
   fire_events();
-  evaluate_elements(h);
+  if (h > 0) {
+    evaluate_elements();
+  } else {
+    evaluate_elements_fully(0);
+  }
   evaluate_rotationals(h);
   evaluate_cables();
   if (model.contact.ground || model.contact.bodies) {
@@ -492,35 +428,32 @@ void System::drift(size_t b, double h, const Vec3& p0, const Quat& q0, const Mat
 bool System::advance_step() {
   State& s = state;
   const double h = step;
-  const double kick = s.first_kick ? 0.5 * h : h;
-  for (size_t b = 0; b < B; ++b) {
-    if (fixed[b]) continue;
-    s.v[b] += (kick * s.body[b].inverse_mass) * force[b] + kick * model.gravity;
-    s.L[b] += kick * torque[b];
+  if (clusters_due) {
+    build_clusters();
+    for (size_t b = 0; b < B; ++b) pack_body(b);
   }
-  if (clusters_due) build_clusters();
-  for (size_t b = 0; b < B; ++b) {
-    if (fixed[b]) continue;
-    if (!in_cluster[b]) {
-      drift(b, h, s.p[b], s.q[b], Mat3(s.R[b]));
-    } else {
+  Lanes& l = *lanes;
+  l.kick.assign(l.W, s.first_kick ? 0.5 * h : h);
+  l.h.assign(l.W, h);
+  l.gx.assign(l.W, model.gravity.x), l.gy.assign(l.W, model.gravity.y), l.gz.assign(l.W, model.gravity.z);
+  l.advance_bodies();
+  for (const std::uint32_t b : l.spins) drift(b, h, s.p[b], s.q[b], s.R[b]);
+  for (const JointCluster& cluster : clusters)
+    for (const int body : cluster.bodies) {
+      const size_t b = static_cast<size_t>(body);
       p_before[b] = s.p[b];
       q_before[b] = s.q[b];
       R_before[b] = s.R[b];
     }
-  }
   solve_joints(h);
   s.first_kick = false;
   ++s.step_index;
   s.time = static_cast<double>(s.step_index) * h;
   check_joints();
   evaluate_forces(h);
-  // one broken number anywhere reaches this sum within a step
+  // one broken number anywhere reaches this sum within a step or two
   double sum = 0;
-  for (size_t b = 0; b < B; ++b) {
-    const Vec3 pv = s.p[b] + s.v[b];
-    sum += pv.x + pv.y + pv.z;
-  }
+  for (const double x : l.sum) sum += x;
   return std::isfinite(sum);
 }
 
@@ -570,6 +503,7 @@ Energy System::calc_energy() const {
 }
 
 const View& System::calc_view() {
+  unpack_elements();
   View& v = view;
   const State& s = state;
   const size_t E = elements.size(), R = rotationals.size();
@@ -590,6 +524,8 @@ const View& System::calc_view() {
   v.shortening.resize(E);
   v.element_force.resize(E);
   v.element_moment.resize(E);
+  v.element_translation.resize(E);
+  v.element_rotation.resize(E);
   const auto fill = [&](size_t at, const ZoneParameters& p, const ZoneState& z) {
     v.element_state[at] = !z.live ? (z.reason == BreakReason::Removed ? ElementState::Removed : ElementState::Broken)
                           : is_softening(p, laws, s.time, z) ? ElementState::Softening
@@ -604,6 +540,8 @@ const View& System::calc_view() {
     v.shortening[i] = z.shortened;
     v.element_force[i] = -Vec3{z.resultant.c[0], z.resultant.c[1], z.resultant.c[2]};
     v.element_moment[i] = -Vec3{z.resultant.c[3], z.resultant.c[4], z.resultant.c[5]};
+    v.element_translation[i] = {z.deformation[0], z.deformation[1], z.deformation[2]};
+    v.element_rotation[i] = {z.deformation[3], z.deformation[4], z.deformation[5]};
   }
   for (size_t i = 0; i < R; ++i) fill(E + i, rotationals[i].zone, s.rotational[i]);
   v.joint_force.resize(joints.size());
@@ -621,7 +559,7 @@ const View& System::calc_view() {
   }
   v.cable_force.resize(s.cable.size());
   for (size_t i = 0; i < s.cable.size(); ++i) v.cable_force[i] = s.cable[i].force;
-  v.ground_force = ground_reaction + ground_contact + joints_on_ground;
+  v.ground_force = calc_element_reaction() + ground_reaction + ground_contact + joints_on_ground;
   v.contact_force_ground = ground_contact;
   v.body_contacts = body_contacts;
   v.energy = calc_energy();

@@ -3,11 +3,13 @@
 /// B bodies, E zone elements, R rotational elements, J joints, C cables, P contact pairs.
 
 #include <cstddef>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "mbs/boxes.h"
 #include "mbs/lane_array.h"
+#include "mbs/lanes.h"
 #include "mbs/model.h"
 #include "mbs/solver.h"
 #include "mbs/zone.h"
@@ -129,12 +131,6 @@ struct State {
   long quiet_steps = 0;
 };
 
-/// Forces of one evaluation; scratch, rebuilt at each step.
-struct ElementForce {
-  Vec3 force;               // on b at M, in W; on a the opposite
-  Vec3 torque_a, torque_b;  // about the centres of mass
-};
-
 /// One constraint: direction of a force on the child (opposite on the parent) and the torques on both.
 struct JointRow {
   Vec3 line, turn_child, turn_parent;
@@ -149,7 +145,8 @@ struct JointCluster {
 
 class System {
  public:
-  System(const Model& model, const Options& options);
+  /// `width` lanes in a block, 0: as many as the machine has.
+  System(const Model& model, const Options& options, size_t width = 0);
 
   const Model model;
   Options options;
@@ -177,9 +174,13 @@ class System {
   bool ignores_limits = false;  // elements stay elastic (equilibrium's first phase)
   bool started = false;         // forces at the start are there
 
+  // where bodies and elements lie for the kernel; of this run, or shared with the samples of a batch
+  std::unique_ptr<Lanes> own_lanes;
+  Lanes* lanes = nullptr;
+  size_t lane = 0;
+
   // scratch
-  std::vector<ElementForce> element_force;
-  std::vector<unsigned char> element_news;            // 1 has yielded now, 2 has broken now (E)
+  std::vector<double> element_history;
   LaneArray<Vec3> force, torque;                      // applied on bodies (B)
   std::vector<Vec3> contact_force, contact_torque;    // the part by contact (B)
   std::vector<Vec3> friction_force, friction_torque;  // and of that by friction (B)
@@ -211,8 +212,27 @@ class System {
   void evaluate_start();
   void start();
   void fire_events();
+  // elements (elements.cpp)
+  size_t slot_of(size_t element) const;
+  void clear_slot(size_t slot);
+  void kill_slot(size_t element);
+  /// Gives every live element a slot, in their order.
+  void lay_out_elements();
+  /// From the state of the zones to the slots, and back.
+  void pack_element(size_t element);
+  void unpack_element(size_t element);
+  void pack_elements();
+  void unpack_elements();
   void evaluate_element(size_t element, double h);
-  void evaluate_elements(double h);
+  void evaluate_outside(size_t slot);
+  void evaluate_elements_fully(double h);
+  void evaluate_elements();
+  void sum_element_forces();
+  Vec3 calc_element_reaction() const;
+  /// What the slots know and the zones do not, for snapshots.
+  void save_elements();
+  void restore_elements(const std::vector<double>& history);
+  void pack_body(size_t body);
   void evaluate_rotationals(double h);
   void evaluate_cables();
   void evaluate_ground_contact(double h);

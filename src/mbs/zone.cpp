@@ -217,10 +217,13 @@ double find_least_moment(const CompiledFamily& family, double from, double to, d
 
 void find_safe_bounds(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, const Limits& limits, double force,
                       ZoneState& z) {
+  const auto law_of = [&](int s) -> const CompiledLaw& {
+    return laws[static_cast<size_t>(z.base_law < 0 ? p.law[s] : z.base_law)];
+  };
   double reach = kUnlimited, reached = 0;
   for (int s = 0; s < p.stations; ++s) {
     reached = std::max(reached, z.station[s].reached);
-    for (const CompiledFamily& family : laws[static_cast<size_t>(p.law[s])].moment)
+    for (const CompiledFamily& family : law_of(s).moment)
       if (family.K > 0) reach = std::min(reach, 0.06 * (family.force.back() - family.force.front()));
   }
   const double whole = limits.integrity(z.shortened);
@@ -234,8 +237,8 @@ void find_safe_bounds(const ZoneParameters& p, const std::vector<CompiledLaw>& l
   for (int q = 0; q < 2; ++q) {
     z.safe_moment[q] = kUnlimited;
     for (int s = 0; s < p.stations; ++s)
-      z.safe_moment[q] = std::min(z.safe_moment[q], find_least_moment(laws[static_cast<size_t>(p.law[s])].moment[q],
-                                                                      from, to, z.station[s].reached));
+      z.safe_moment[q] =
+          std::min(z.safe_moment[q], find_least_moment(law_of(s).moment[q], from, to, z.station[s].reached));
     z.safe_shear[q] = limits.shear(q, z.slipped, -to);
     if (!(z.safe_moment[q] > 0 && z.safe_shear[q] > 0 && limits.torsion() > 0)) return;
   }
@@ -245,13 +248,13 @@ void find_safe_bounds(const ZoneParameters& p, const std::vector<CompiledLaw>& l
   }
   z.safe_torsion = 1 / limits.torsion();
   z.safe_exponent = kUnlimited;
-  for (int s = 0; s < p.stations; ++s)
-    z.safe_exponent = std::min(z.safe_exponent, laws[static_cast<size_t>(p.law[s])].biaxial_exponent);
+  for (int s = 0; s < p.stations; ++s) z.safe_exponent = std::min(z.safe_exponent, law_of(s).biaxial_exponent);
   // what the springs do not see, and how damage softens them: flexibilities add up
   double turned[2] = {0, 0}, shifted[2] = {0, 0};
   z.is_softened = false;
   for (int q = 0; q < 2; ++q) {
-    const double ks = p.stiffness[q == 0 ? 2 : 1], kb = p.stiffness[q == 0 ? 4 : 5], sign = q == 0 ? 1 : -1;
+    const double ks = z.share * p.stiffness[q == 0 ? 2 : 1], kb = z.share * p.stiffness[q == 0 ? 4 : 5];
+    const double sign = q == 0 ? 1 : -1;
     double c = 0, cx = 0, cxx = 0;
     for (int s = 0; s < p.stations; ++s) {
       turned[q] += z.station[s].phi[q];
@@ -329,11 +332,12 @@ namespace {
 
 /// The common case: a zone whose forces stay inside its safe bounds is a spring with a damper. False if it is not so.
 bool advance_inside_bounds(const ZoneParameters& p, const Six& d, double h, ZoneState& z) {
-  if (z.next_law >= 0 || z.safe_force[0] > z.safe_force[1] || !z.has_elastic || h <= 0) return false;
-  double u[6], e[6], f[6];  // deformation from the offset, its elastic part, resultant
+  if (!is_bounded(z, false) || h <= 0) return false;
+  double u[6], e[6], f[6], k[6];  // deformation from the offset, its elastic part, resultant, stiffness
   for (int i = 0; i < 6; ++i) {
+    k[i] = z.share * p.stiffness[i];
     u[i] = e[i] = d.c[i] - z.offset[i];
-    f[i] = p.stiffness[i] * e[i];
+    f[i] = k[i] * e[i];
   }
   if (p.external_axial) {
     u[0] = e[0] = 0;
@@ -344,8 +348,8 @@ bool advance_inside_bounds(const ZoneParameters& p, const Six& d, double h, Zone
       const int shear = q == 0 ? 2 : 1, bend = q == 0 ? 4 : 5;
       f[shear] = z.plane[q][0] * u[shear] + z.plane[q][1] * u[bend];
       f[bend] = z.plane[q][1] * u[shear] + z.plane[q][2] * u[bend];
-      e[shear] = p.stiffness[shear] > 0 ? f[shear] / p.stiffness[shear] : 0;
-      e[bend] = p.stiffness[bend] > 0 ? f[bend] / p.stiffness[bend] : 0;
+      e[shear] = k[shear] > 0 ? f[shear] / k[shear] : 0;
+      e[bend] = k[bend] > 0 ? f[bend] / k[bend] : 0;
     }
   }
   if (f[0] < z.safe_force[0] || f[0] > z.safe_force[1] || std::abs(f[3]) * z.safe_torsion > 1) return false;
@@ -360,7 +364,7 @@ bool advance_inside_bounds(const ZoneParameters& p, const Six& d, double h, Zone
   for (int i = 0; i < 6; ++i) {
     const double before = z.elastic[i], stretched = e[i] - before;
     const double flowed = z.flowed[i] + p.relaxation * (0.5 * (e[i] + before) - z.flowed[i]);
-    const double stretch = e[i] - flowed, damper = p.viscous * p.stiffness[i] * stretch;
+    const double stretch = e[i] - flowed, damper = p.viscous * k[i] * stretch;
     energy += 0.5 * f[i] * u[i];
     damper_energy += 0.5 * damper * stretch;
     const double mean = 0.5 * (damper + z.damper_force[i]);
@@ -386,7 +390,12 @@ bool advance_inside_bounds(const ZoneParameters& p, const Six& d, double h, Zone
 void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, const Six& d, double time, double h,
                   ZoneState& z) {
   if (advance_inside_bounds(p, d, h, z)) return;
-  if (z.next_share != z.share && time >= z.ramp_begin + z.ramp) soften(p, z);
+  if (z.next_law >= 0 && time >= z.ramp_begin + z.ramp) {
+    // the switch is done
+    if (z.next_share != z.share) soften(p, z);
+    z.base_law = z.next_law;
+    z.next_law = -1;
+  }
   double k[6];
   for (int i = 0; i < 6; ++i) k[i] = z.share * p.stiffness[i];
   const int n = p.stations;

@@ -99,6 +99,8 @@ struct ZoneState {
   double plane[2][3] = {{0, 0, 0}, {0, 0, 0}};  // stiffness of both bending planes with what damage softens:
                                                 // shear, coupling, bending
   bool is_softened = false;                     // planes differ from the element's own stiffness
+  // the ledger when the kernel took the element over [J]
+  double packed_damping = 0, packed_plastic = 0, packed_behind = 0;
 };
 
 /// Constants of a zone for evaluation.
@@ -118,6 +120,10 @@ struct ZoneParameters {
 ///   time  of the evaluation [s]; h  since the last one [s], 0 when there is none
 void advance_zone(const ZoneParameters&, const std::vector<CompiledLaw>&, const Six& deformation, double time, double h,
                   ZoneState&);
+/// Whether the zone is a spring with a damper for as long as its forces stay inside its safe bounds.
+inline bool is_bounded(const ZoneState& z, bool unlimited) {
+  return z.live && z.has_elastic && z.next_law < 0 && (unlimited || z.safe_force[0] <= z.safe_force[1]);
+}
 /// Ends a zone: what it stores is booked as dissipated.
 void break_zone(ZoneState&, BreakReason);
 

@@ -1,0 +1,356 @@
+/// Zone elements of a running system: their slots in the kernel's lanes, the full law for those outside their bounds,
+/// and the sums of their forces over the bodies (docs/theory/zones.md, multibody.md).
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/parallel.h"
+#include "mbs/system.h"
+
+namespace topple::mbs {
+
+namespace {
+
+using namespace kernel;
+
+constexpr size_t kBlocksForThreads = 256;  // below, waking threads costs more than they save
+constexpr size_t kChunk = 32;              // blocks a thread takes at once
+
+/// Spring behind the damper of a slot times the stiffness.
+double calc_rate(const Lanes& l, size_t slot, int i) { return l.field(slot, kViscous) * l.field(slot, kStiffness + i); }
+
+/// What the kernel may use of a biaxial exponent.
+double floor_exponent(double e) { return e >= 2 ? 2 : e >= 1.5 ? 1.5 : 1; }
+
+}  // namespace
+
+size_t System::slot_of(size_t e) const { return lanes->is_batch ? e * lanes->W + lane : lanes->slot_of[e]; }
+
+void System::clear_slot(size_t slot) {
+  Lanes& l = *lanes;
+  for (int f = 0; f < kSlotFields; ++f) l.field(slot, f) = 0;
+  l.field(slot, kMarkerA + 3) = l.field(slot, kMarkerB + 3) = 1;
+  l.field(slot, kLeastForce) = -kUnlimited;
+  l.field(slot, kMostForce) = l.field(slot, kMostTurn) = kUnlimited;
+  for (const int i : {0, 3, 4, 7}) l.field(slot, kSoft + i) = 1;
+  for (size_t f = 0; f < static_cast<size_t>(kForceFields); ++f) l.force_field(slot, f) = 0;
+}
+
+void System::kill_slot(size_t e) {
+  const size_t slot = slot_of(e);
+  if (slot == Lanes::kNoSlot || lanes->field(slot, kMostTurn) == kUnlimited) return;
+  clear_slot(slot);
+  --lanes->live[slot / lanes->W];
+  --lanes->live_elements;
+}
+
+void System::lay_out_elements() {
+  Lanes& l = *lanes;
+  const size_t E = elements.size(), W = l.W;
+  std::vector<double> moved, moved_forces;
+  std::vector<std::uint32_t> kept;
+  const bool first = l.slot_of.empty();
+  for (size_t e = 0; e < E; ++e) {
+    const std::uint32_t slot = first ? 0 : l.slot_of[e];
+    if (!first && (slot == Lanes::kNoSlot || l.field(slot, kMostTurn) == kUnlimited)) continue;
+    kept.push_back(static_cast<std::uint32_t>(e));
+    if (first) continue;
+    for (int f = 0; f < kSlotFields; ++f) moved.push_back(l.field(slot, f));
+    for (size_t f = 0; f < static_cast<size_t>(kForceFields); ++f) moved_forces.push_back(l.force_field(slot, f));
+  }
+  std::vector<unsigned char> soft(E, 0);
+  if (!first)
+    for (const std::uint32_t e : kept) soft[e] = l.softened[l.slot_of[e] / W];
+  l.allocate_elements(kept.size());
+  l.slot_of.assign(E, Lanes::kNoSlot);
+  const size_t slots = l.element_blocks * W;
+  l.element_of.assign(slots, Lanes::kNoSlot);
+  l.body_a.assign(slots, static_cast<std::uint32_t>(B));
+  l.body_b.assign(slots, static_cast<std::uint32_t>(B));
+  const auto body = [&](int b) { return b < 0 ? static_cast<std::uint32_t>(B) : static_cast<std::uint32_t>(b); };
+  for (size_t slot = 0; slot < slots; ++slot) {
+    clear_slot(slot);
+    if (slot >= kept.size()) continue;
+    const std::uint32_t e = kept[slot];
+    l.slot_of[e] = static_cast<std::uint32_t>(slot);
+    l.element_of[slot] = e;
+    l.body_a[slot] = body(elements[e].a);
+    l.body_b[slot] = body(elements[e].b);
+    ++l.live[slot / W];
+    l.softened[slot / W] |= soft[e];
+    if (first) {
+      l.field(slot, kMostTurn) = kLargestTurn;
+      continue;
+    }
+    for (int f = 0; f < kSlotFields; ++f) l.field(slot, f) = moved[slot * kSlotFields + static_cast<size_t>(f)];
+    for (size_t f = 0; f < static_cast<size_t>(kForceFields); ++f)
+      l.force_field(slot, f) = moved_forces[slot * kForceFields + f];
+  }
+  l.used_slots = l.live_elements = kept.size();
+  l.first_entry.assign(B + 1, 0);
+  l.entries.clear();
+  for (size_t b = 0; b < B; ++b) {
+    for (const int entry : incidence[b]) {
+      const std::uint32_t slot = l.slot_of[static_cast<size_t>(entry / 2)];
+      if (slot == Lanes::kNoSlot) continue;
+      const size_t at = slot / W * kForceFields * W + slot % W;
+      l.entries.push_back(static_cast<std::uint32_t>(2 * at) + static_cast<std::uint32_t>(entry % 2));
+    }
+    l.first_entry[b + 1] = static_cast<std::uint32_t>(l.entries.size());
+  }
+}
+
+void System::pack_element(size_t e) {
+  ZoneState& z = state.element[e];
+  if (!z.live) return kill_slot(e);
+  Lanes& l = *lanes;
+  const size_t slot = slot_of(e);
+  if (slot == Lanes::kNoSlot) return;
+  const CompiledElement& c = elements[e];
+  const auto put = [&](int f, double x) { l.field(slot, f) = x; };
+  const Vec3 pa = c.a >= 0 ? c.p_AF - state.p_offset[static_cast<size_t>(c.a)] : c.p_AF;
+  const Vec3 pb = c.b >= 0 ? c.p_BM - state.p_offset[static_cast<size_t>(c.b)] : c.p_BM;
+  for (int i = 0; i < 3; ++i) put(kMarkerA + i, pa[i]), put(kMarkerB + i, pb[i]);
+  const double qa[4] = {c.q_AF.w, c.q_AF.x, c.q_AF.y, c.q_AF.z}, qb[4] = {c.q_BM.w, c.q_BM.x, c.q_BM.y, c.q_BM.z};
+  for (int i = 0; i < 4; ++i) put(kMarkerA + 3 + i, qa[i]), put(kMarkerB + 3 + i, qb[i]);
+  for (int i = 0; i < 6; ++i) put(kStiffness + i, z.share * c.zone.stiffness[i]);
+  put(kViscous, c.zone.viscous);
+  put(kRelaxation, c.zone.relaxation);
+  put(kStation, c.zone.x[0]), put(kStation + 1, c.zone.x[c.zone.stations > 1 ? 1 : 0]);
+  put(kMostTurn, kLargestTurn);
+  const bool free = c.zone.stations == 0, bounded = is_bounded(z, free);
+  put(kLeastForce, !bounded ? 1 : free ? -kUnlimited : z.safe_force[0]);
+  put(kMostForce, !bounded ? -1 : free ? kUnlimited : z.safe_force[1]);
+  if (!bounded) return;
+  for (int i = 0; i < 2; ++i) {
+    put(kMomentScale + i, free ? 0 : z.safe_moment[i]);
+    put(kShearScale + i, free ? 0 : z.safe_shear[i]);
+  }
+  put(kTorsionScale, free ? 0 : z.safe_torsion);
+  put(kExponent, floor_exponent(z.safe_exponent));
+  for (int i = 0; i < 6; ++i) {
+    put(kOffset + i, z.offset[i]);
+    put(kStretch + i, z.deformation[i] - z.offset[i]);
+    put(kBehind + i, z.elastic[i] - z.flowed[i]);
+  }
+  put(kDamped, 0);
+  put(kBled, 0);
+  z.packed_damping = z.damping, z.packed_plastic = z.plastic, z.packed_behind = z.damper_energy;
+  for (int plane = 0; plane < 2; ++plane) {
+    const int shear = plane == 0 ? 2 : 1, bend = plane == 0 ? 4 : 5, at = kSoft + 4 * plane;
+    const double ks = l.field(slot, kStiffness + shear), kb = l.field(slot, kStiffness + bend);
+    const bool soft = z.is_softened;
+    put(at, soft && ks > 0 ? z.plane[plane][0] / ks : 1);
+    put(at + 1, soft && ks > 0 ? z.plane[plane][1] / ks : 0);
+    put(at + 2, soft && kb > 0 ? z.plane[plane][1] / kb : 0);
+    put(at + 3, soft && kb > 0 ? z.plane[plane][2] / kb : 1);
+  }
+  if (z.is_softened) l.softened[slot / l.W] = 1;
+}
+
+void System::unpack_element(size_t e) {
+  ZoneState& z = state.element[e];
+  const size_t slot = slot_of(e);
+  if (!z.live || slot == Lanes::kNoSlot) return;
+  const Lanes& l = *lanes;
+  if (l.field(slot, kLeastForce) > l.field(slot, kMostForce)) return;  // the full law has it
+  double u[6], stretch[6];
+  for (int i = 0; i < 6; ++i) u[i] = stretch[i] = l.field(slot, kStretch + i);
+  for (int plane = 0; plane < 2; ++plane) {
+    const int shear = plane == 0 ? 2 : 1, bend = plane == 0 ? 4 : 5, at = kSoft + 4 * plane;
+    stretch[shear] = l.field(slot, at) * u[shear] + l.field(slot, at + 1) * u[bend];
+    stretch[bend] = l.field(slot, at + 2) * u[shear] + l.field(slot, at + 3) * u[bend];
+  }
+  z.energy = z.damper_energy = 0;
+  for (int i = 0; i < 6; ++i) {
+    const double behind = l.field(slot, kBehind + i), k = l.field(slot, kStiffness + i), rate = calc_rate(l, slot, i);
+    z.elastic[i] = stretch[i];
+    z.elastic_force[i] = k * stretch[i];
+    z.damper_force[i] = rate * behind;
+    z.flowed[i] = stretch[i] - behind;
+    z.deformation[i] = u[i] + z.offset[i];
+    z.resultant.c[i] = z.elastic_force[i] + z.damper_force[i];
+    z.energy += 0.5 * z.elastic_force[i] * u[i];
+    z.damper_energy += 0.5 * rate * behind * behind;
+  }
+  z.normal_force = z.elastic_force[0];
+  z.damping = z.packed_damping + l.field(slot, kDamped) - (z.damper_energy - z.packed_behind);
+  z.plastic = z.packed_plastic + l.field(slot, kBled);
+}
+
+void System::unpack_elements() {
+  for (size_t e = 0; e < elements.size(); ++e) unpack_element(e);
+}
+
+void System::pack_elements() {
+  for (size_t e = 0; e < elements.size(); ++e) pack_element(e);
+}
+
+/// By the full law, from the state of the zone; the force goes to the slot.
+void System::evaluate_element(size_t i, double h) {
+  ZoneState& z = state.element[i];
+  const size_t slot = slot_of(i);
+  if (!z.live || slot == Lanes::kNoSlot) return;
+  const CompiledElement& e = elements[i];
+  Vec3 p_F = e.p_AF, p_M = e.p_BM, origin_a, origin_b;
+  Quat q_F = e.q_AF, q_M = e.q_BM;
+  if (e.a >= 0) {
+    const size_t a = static_cast<size_t>(e.a);
+    origin_a = state.p[a];
+    p_F = origin_a + state.R[a] * (e.p_AF - state.p_offset[a]);
+    q_F = state.q[a] * e.q_AF;
+  }
+  if (e.b >= 0) {
+    const size_t b = static_cast<size_t>(e.b);
+    origin_b = state.p[b];
+    p_M = origin_b + state.R[b] * (e.p_BM - state.p_offset[b]);
+    q_M = state.q[b] * e.q_BM;
+  }
+  const Mat3 R_WF = to_matrix(q_F);
+  const Vec3 u = transpose_times(R_WF, p_M - p_F);
+  const Vec3 r = log_rotation(conjugate(q_F) * q_M);
+  const bool was_yielded = z.yielded;
+  const Six d{{u.x, u.y, u.z, r.x, r.y, r.z}};
+  if (ignores_limits) {
+    ZoneParameters elastic = e.zone;
+    elastic.stations = 0;
+    advance_zone(elastic, laws, d, state.time, h, z);
+  } else {
+    advance_zone(e.zone, laws, d, state.time, h, z);
+  }
+  if (z.yielded && !was_yielded) say({Happening::Kind::ElementYielded, state.time, static_cast<int>(i), -1, {}, 0});
+  Vec3 on_a, torque_a, torque_b;
+  if (z.live) {
+    const double* f = z.resultant.c;
+    // torque conjugate to the rate of the rotation vector (docs/theory/multibody.md, eq. 4)
+    const Vec3 m{f[3], f[4], f[5]};
+    const double angle2 = dot(r, r);
+    const double kappa =
+        angle2 < 1e-3
+            ? 1.0 / 12 + angle2 / 720 + angle2 * angle2 / 30240
+            : (1 / angle2 - (1 + std::cos(std::sqrt(angle2))) / (2 * std::sqrt(angle2) * std::sin(std::sqrt(angle2))));
+    const Vec3 rm = cross(r, m);
+    const Vec3 turning = R_WF * (m + 0.5 * rm + kappa * cross(r, rm));
+    on_a = R_WF * Vec3{f[0], f[1], f[2]};
+    torque_a = cross(p_M - origin_a, on_a) + turning;
+    torque_b = cross(p_M - origin_b, on_a) + turning;
+  } else {
+    break_element(i, z.reason);
+  }
+  for (size_t k = 0; k < 3; ++k) {
+    lanes->force_field(slot, k) = on_a[static_cast<int>(k)];
+    lanes->force_field(slot, 3 + k) = torque_a[static_cast<int>(k)];
+    lanes->force_field(slot, 6 + k) = torque_b[static_cast<int>(k)];
+  }
+}
+
+void System::evaluate_outside(size_t slot) {
+  const size_t e = lanes->is_batch ? slot / lanes->W : lanes->element_of[slot];
+  unpack_element(e);
+  evaluate_element(e, step);
+  pack_element(e);
+}
+
+void System::evaluate_elements_fully(double h) {
+  for (size_t i = 0; i < elements.size(); ++i) evaluate_element(i, h);
+  sum_element_forces();
+}
+
+void System::evaluate_elements() {
+  Lanes& l = *lanes;
+  l.outside.clear();
+  if (options.threads > 1 && l.element_blocks >= kBlocksForThreads) {
+    // every block writes its own places only; reports follow in order, so threads change no bit
+    const size_t chunks = (l.element_blocks + kChunk - 1) / kChunk;
+    std::vector<std::vector<std::uint32_t>> beyond(chunks);
+    (void)parallel_for(chunks, options.threads, [&](size_t c) {
+      l.evaluate_elements(c * kChunk, std::min(l.element_blocks, (c + 1) * kChunk), beyond[c]);
+    });
+    for (const auto& list : beyond) l.outside.insert(l.outside.end(), list.begin(), list.end());
+  } else {
+    l.evaluate_elements(0, l.element_blocks, l.outside);
+  }
+  for (const std::uint32_t slot : l.outside) evaluate_outside(slot);
+  if (2 * l.live_elements < l.used_slots && l.used_slots > 4 * l.W) lay_out_elements();
+  sum_element_forces();
+}
+
+void System::sum_element_forces() {
+  const Lanes& l = *lanes;
+  const size_t W = l.W;
+  for (size_t b = 0; b < B; ++b) {
+    Vec3 f, t;
+    for (std::uint32_t i = l.first_entry[b]; i < l.first_entry[b + 1]; ++i) {
+      const double* from = l.element_forces.data() + l.entries[i] / 2;
+      const Vec3 on_a{from[0], from[W], from[2 * W]};
+      if (l.entries[i] % 2 == 0) {
+        f += on_a;
+        t += Vec3{from[3 * W], from[4 * W], from[5 * W]};
+      } else {
+        f -= on_a;
+        t -= Vec3{from[6 * W], from[7 * W], from[8 * W]};
+      }
+    }
+    force[b] = f;
+    torque[b] = t;
+  }
+}
+
+namespace {
+constexpr int kHistory[] = {kStretch,    kStretch + 1, kStretch + 2, kStretch + 3, kStretch + 4, kStretch + 5, kBehind,
+                            kBehind + 1, kBehind + 2,  kBehind + 3,  kBehind + 4,  kBehind + 5,  kDamped,      kBled};
+}
+
+void System::save_elements() {
+  unpack_elements();
+  element_history.clear();
+  for (size_t e = 0; e < elements.size(); ++e) {
+    const size_t slot = slot_of(e);
+    const bool has = slot != Lanes::kNoSlot;
+    for (const int f : kHistory) element_history.push_back(has ? lanes->field(slot, f) : 0);
+    for (size_t f = 0; f < static_cast<size_t>(kForceFields); ++f)
+      element_history.push_back(has ? lanes->force_field(slot, f) : 0);
+  }
+}
+
+void System::restore_elements(const std::vector<double>& history) {
+  lanes->slot_of.clear();
+  lay_out_elements();
+  auto next = history.begin();
+  for (size_t e = 0; e < elements.size(); ++e) {
+    ZoneState& z = state.element[e];
+    const double damping = z.packed_damping, plastic = z.packed_plastic, behind = z.packed_behind;
+    pack_element(e);
+    z.packed_damping = damping, z.packed_plastic = plastic, z.packed_behind = behind;
+    const size_t slot = slot_of(e);
+    for (const int f : kHistory) {
+      if (z.live) lanes->field(slot, f) = *next;
+      ++next;
+    }
+    for (size_t f = 0; f < static_cast<size_t>(kForceFields); ++f) {
+      if (z.live) lanes->force_field(slot, f) = *next;
+      ++next;
+    }
+  }
+}
+
+Vec3 System::calc_element_reaction() const {
+  Vec3 sum;
+  const auto grounded = [&](int b) { return b < 0 || fixed[static_cast<size_t>(b)]; };
+  for (size_t e = 0; e < elements.size(); ++e) {
+    const size_t slot = slot_of(e);
+    if (slot == Lanes::kNoSlot || !state.element[e].live) continue;
+    const Vec3 on_a{lanes->force_field(slot, 0), lanes->force_field(slot, 1), lanes->force_field(slot, 2)};
+    if (grounded(elements[e].a)) sum -= on_a;
+    if (grounded(elements[e].b)) sum += on_a;
+  }
+  return sum;
+}
+
+void System::break_element(size_t e, BreakReason reason) {
+  static const char* const words[] = {"", "tension", "crushing", "shear", "rotation", "torsion", "removed"};
+  mark_search_due();
+  say({Happening::Kind::ElementBroken, state.time, static_cast<int>(e), -1, words[static_cast<int>(reason)], 0});
+}
+
+}  // namespace topple::mbs

@@ -1,0 +1,472 @@
+// Compiled once for each instruction set (Highway's foreach_target).
+#include "mbs/kernel.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "mbs/kernel.cpp"
+// one wide target for each family of machines keeps the build short
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4 | HWY_AVX3_DL)
+#include "hwy/foreach_target.h"
+// after foreach_target
+#include "hwy/highway.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace topple::mbs::kernel {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+/// A number in every lane.
+template <class D>
+struct Num {
+  hn::Vec<D> v;
+};
+template <class D>
+HWY_INLINE Num<D> operator+(Num<D> a, Num<D> b) {
+  return {hn::Add(a.v, b.v)};
+}
+template <class D>
+HWY_INLINE Num<D> operator-(Num<D> a, Num<D> b) {
+  return {hn::Sub(a.v, b.v)};
+}
+template <class D>
+HWY_INLINE Num<D> operator*(Num<D> a, Num<D> b) {
+  return {hn::Mul(a.v, b.v)};
+}
+/// a b + c, a b - c, c - a b
+template <class D>
+HWY_INLINE Num<D> fma(Num<D> a, Num<D> b, Num<D> c) {
+  return {hn::MulAdd(a.v, b.v, c.v)};
+}
+template <class D>
+HWY_INLINE Num<D> fms(Num<D> a, Num<D> b, Num<D> c) {
+  return {hn::MulSub(a.v, b.v, c.v)};
+}
+template <class D>
+HWY_INLINE Num<D> fnma(Num<D> a, Num<D> b, Num<D> c) {
+  return {hn::NegMulAdd(a.v, b.v, c.v)};
+}
+template <class D>
+HWY_INLINE Num<D> num(double x) {
+  return {hn::Set(D(), x)};
+}
+
+template <class D>
+struct V3 {
+  Num<D> x, y, z;
+};
+template <class D>
+HWY_INLINE V3<D> operator+(const V3<D>& a, const V3<D>& b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+template <class D>
+HWY_INLINE V3<D> operator-(const V3<D>& a, const V3<D>& b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+template <class D>
+HWY_INLINE V3<D> operator*(Num<D> s, const V3<D>& a) {
+  return {s * a.x, s * a.y, s * a.z};
+}
+/// s a + b
+template <class D>
+HWY_INLINE V3<D> fma(Num<D> s, const V3<D>& a, const V3<D>& b) {
+  return {fma(s, a.x, b.x), fma(s, a.y, b.y), fma(s, a.z, b.z)};
+}
+template <class D>
+HWY_INLINE Num<D> dot(const V3<D>& a, const V3<D>& b) {
+  return fma(a.z, b.z, fma(a.y, b.y, a.x * b.x));
+}
+template <class D>
+HWY_INLINE V3<D> cross(const V3<D>& a, const V3<D>& b) {
+  return {fms(a.y, b.z, a.z * b.y), fms(a.z, b.x, a.x * b.z), fms(a.x, b.y, a.y * b.x)};
+}
+
+template <class D>
+struct Q4 {
+  Num<D> w, x, y, z;
+};
+template <class D>
+HWY_INLINE Q4<D> operator*(const Q4<D>& a, const Q4<D>& b) {
+  return {
+      fnma(a.z, b.z, fnma(a.y, b.y, fms(a.w, b.w, a.x * b.x))), fnma(a.z, b.y, fma(a.y, b.z, fma(a.x, b.w, a.w * b.x))),
+      fma(a.z, b.x, fma(a.y, b.w, fms(a.w, b.y, a.x * b.z))), fma(a.z, b.w, fnma(a.y, b.x, fma(a.x, b.y, a.w * b.z)))};
+}
+/// conj(a) b
+template <class D>
+HWY_INLINE Q4<D> conj_times(const Q4<D>& a, const Q4<D>& b) {
+  return {fma(a.z, b.z, fma(a.y, b.y, fma(a.x, b.x, a.w * b.w))),
+          fma(a.z, b.y, fnma(a.y, b.z, fms(a.w, b.x, a.x * b.w))),
+          fnma(a.z, b.x, fnma(a.y, b.w, fma(a.x, b.z, a.w * b.y))),
+          fnma(a.z, b.w, fma(a.y, b.x, fms(a.w, b.z, a.x * b.y)))};
+}
+template <class D>
+struct M33 {
+  V3<D> r0, r1, r2;  // rows
+};
+template <class D>
+HWY_INLINE M33<D> to_matrix(const Q4<D>& q) {
+  const Num<D> one = num<D>(1), x2 = q.x + q.x, y2 = q.y + q.y, z2 = q.z + q.z;
+  const Num<D> xx = q.x * x2, yy = q.y * y2, zz = q.z * z2, xy = q.x * y2, xz = q.x * z2, yz = q.y * z2;
+  const Num<D> wx = q.w * x2, wy = q.w * y2, wz = q.w * z2;
+  return {
+      {one - (yy + zz), xy - wz, xz + wy}, {xy + wz, one - (xx + zz), yz - wx}, {xz - wy, yz + wx, one - (xx + yy)}};
+}
+template <class D>
+HWY_INLINE V3<D> operator*(const M33<D>& a, const V3<D>& v) {
+  return {dot(a.r0, v), dot(a.r1, v), dot(a.r2, v)};
+}
+template <class D>
+HWY_INLINE V3<D> transpose_times(const M33<D>& a, const V3<D>& v) {
+  return fma(v.z, a.r2, fma(v.y, a.r1, v.x * a.r0));
+}
+/// p turned by q
+template <class D>
+HWY_INLINE V3<D> turn(const Q4<D>& q, const V3<D>& p) {
+  const V3<D> u{q.x, q.y, q.z};
+  const V3<D> c = cross(u, p), t = c + c;
+  return fma(q.w, t, p) + cross(u, t);
+}
+
+template <class D>
+HWY_INLINE Num<D> load(const double* HWY_RESTRICT block, int field) {
+  return {hn::Load(D(), block + static_cast<size_t>(field) * hn::Lanes(D()))};
+}
+template <class D>
+HWY_INLINE V3<D> load3(const double* HWY_RESTRICT block, int field) {
+  return {load<D>(block, field), load<D>(block, field + 1), load<D>(block, field + 2)};
+}
+template <class D>
+HWY_INLINE Q4<D> load4(const double* HWY_RESTRICT block, int field) {
+  return {load<D>(block, field), load<D>(block, field + 1), load<D>(block, field + 2), load<D>(block, field + 3)};
+}
+template <class D>
+HWY_INLINE void store(Num<D> x, double* HWY_RESTRICT block, int field) {
+  hn::Store(x.v, D(), block + static_cast<size_t>(field) * hn::Lanes(D()));
+}
+template <class D>
+HWY_INLINE void store3(const V3<D>& x, double* HWY_RESTRICT block, int field) {
+  store<D>(x.x, block, field), store<D>(x.y, block, field + 1), store<D>(x.z, block, field + 2);
+}
+template <class D, class M>
+HWY_INLINE void store_where(M mask, Num<D> x, double* HWY_RESTRICT block, int field) {
+  hn::BlendedStore(x.v, mask, D(), block + static_cast<size_t>(field) * hn::Lanes(D()));
+}
+
+/// Slots of the lanes that are set in a mask.
+template <class D, class M>
+HWY_INLINE void report(M mask, size_t block, std::vector<std::uint32_t>& out) {
+  const D d;
+  alignas(64) double flag[kMostLanes];
+  hn::Store(hn::IfThenElseZero(mask, hn::Set(d, 1.0)), d, flag);
+  const size_t W = hn::Lanes(d);
+  for (size_t l = 0; l < W; ++l)
+    if (flag[l] != 0) out.push_back(static_cast<std::uint32_t>(block * W + l));
+}
+
+/// Moves one block of bodies (docs/theory/multibody.md, eq. 1 to 3).
+template <class D>
+HWY_INLINE void advance_body_block(const BodyJob& job, size_t block, Num<D>& sum) {
+  const D d;
+  const size_t W = hn::Lanes(d);
+  double *p = job.p + 3 * W * block, *v = job.v + 3 * W * block, *L = job.L + 3 * W * block, *w = job.w + 3 * W * block,
+         *q = job.q + 4 * W * block, *R = job.R + 9 * W * block;
+  const double* c = job.constants + static_cast<size_t>(kBodyFields) * W * block;
+  const Num<D> kick = load<D>(job.kick, 0), h = load<D>(job.h, 0);
+  const Num<D> push = kick * load<D>(c, kInverseMass), pull = kick * load<D>(c, kFree);
+  const V3<D> gravity{load<D>(job.gx, 0), load<D>(job.gy, 0), load<D>(job.gz, 0)};
+  const V3<D> speed = fma(push, load3<D>(job.force + 3 * W * block, 0), fma(pull, gravity, load3<D>(v, 0)));
+  const V3<D> spin = fma(kick, load3<D>(job.torque + 3 * W * block, 0), load3<D>(L, 0));
+  store3<D>(speed, v, 0);
+  store3<D>(spin, L, 0);
+  const auto drifts = hn::Gt(load<D>(c, kDrifts).v, hn::Zero(d));
+
+  const V3<D> place = fma(h, speed, load3<D>(p, 0));
+  const V3<D> i0{load<D>(c, kInverseInertia), load<D>(c, kInverseInertia + 1), load<D>(c, kInverseInertia + 2)};
+  const M33<D> inverse_inertia{i0,
+                               {i0.y, load<D>(c, kInverseInertia + 3), load<D>(c, kInverseInertia + 4)},
+                               {i0.z, load<D>(c, kInverseInertia + 4), load<D>(c, kInverseInertia + 5)}};
+  const M33<D> R0{load3<D>(R, 0), load3<D>(R, 3), load3<D>(R, 6)};
+  // angular velocity in the middle of the step: the angular momentum is constant, the inertia turns with the body
+  const V3<D> w0 = R0 * (inverse_inertia * transpose_times(R0, spin));
+  const V3<D> bend = R0 * (inverse_inertia * transpose_times(R0, cross(w0, spin)));
+  const V3<D> turned = h * fma(num<D>(-0.5) * h, bend, w0);
+  const Num<D> half2 = num<D>(0.25) * dot(turned, turned);
+  // sin(a)/a and cos(a) of the half angle by series, exact to round-off up to a = 0.2
+  const auto fast = hn::And(drifts, hn::Not(hn::Le(half2.v, hn::Set(d, 0.04))));
+  Num<D> s = num<D>(-1.0 / 39916800), k = num<D>(-1.0 / 3628800);
+  s = fma(s, half2, num<D>(1.0 / 362880)), k = fma(k, half2, num<D>(1.0 / 40320));
+  s = fma(s, half2, num<D>(-1.0 / 5040)), k = fma(k, half2, num<D>(-1.0 / 720));
+  s = fma(s, half2, num<D>(1.0 / 120)), k = fma(k, half2, num<D>(1.0 / 24));
+  s = fma(s, half2, num<D>(-1.0 / 6)), k = fma(k, half2, num<D>(-0.5));
+  s = fma(s, half2, num<D>(1)), k = fma(k, half2, num<D>(1));
+  const Num<D> half_s = num<D>(0.5) * s;
+  const Q4<D> step{k, half_s * turned.x, half_s * turned.y, half_s * turned.z};
+  Q4<D> q1 = step * load4<D>(q, 0);
+  // one step of Newton's method for the length, which round-off alone has changed
+  const Num<D> length2 = fma(q1.z, q1.z, fma(q1.y, q1.y, fma(q1.x, q1.x, q1.w * q1.w)));
+  const Num<D> unit = fma(num<D>(-0.5), length2, num<D>(1.5));
+  q1 = {unit * q1.w, unit * q1.x, unit * q1.y, unit * q1.z};
+  const M33<D> R1 = to_matrix(q1);
+  const V3<D> w1 = R1 * (inverse_inertia * transpose_times(R1, spin));
+
+  const auto here = hn::AndNot(fast, drifts);
+  store_where<D>(here, place.x, p, 0), store_where<D>(here, place.y, p, 1), store_where<D>(here, place.z, p, 2);
+  store_where<D>(here, q1.w, q, 0), store_where<D>(here, q1.x, q, 1), store_where<D>(here, q1.y, q, 2),
+      store_where<D>(here, q1.z, q, 3);
+  const V3<D>* rows[3] = {&R1.r0, &R1.r1, &R1.r2};
+  for (int i = 0; i < 3; ++i)
+    store_where<D>(here, rows[i]->x, R, 3 * i), store_where<D>(here, rows[i]->y, R, 3 * i + 1),
+        store_where<D>(here, rows[i]->z, R, 3 * i + 2);
+  store_where<D>(here, w1.x, w, 0), store_where<D>(here, w1.y, w, 1), store_where<D>(here, w1.z, w, 2);
+  if (HWY_UNLIKELY(!hn::AllFalse(d, fast))) report<D>(fast, block, *job.spins);
+  sum = sum + (((place.x + place.y) + place.z) + ((speed.x + speed.y) + speed.z));
+}
+
+/// Polynomial of degree N - 1.
+template <class D, size_t N>
+HWY_INLINE Num<D> polynomial(const double (&c)[N], Num<D> x) {
+  Num<D> y = num<D>(c[N - 1]);
+  for (size_t i = N - 1; i-- > 0;) y = fma(y, x, num<D>(c[i]));
+  return y;
+}
+
+/// Rotation vector over the vector of its quaternion, 2 asin(s)/s, and the coefficient of eq. 4,
+/// 1/θ² - (1 + cos θ) / (2 θ sin θ), up to θ of 60 degrees. Each lane takes the series for small or large angles after
+/// its own s².
+template <class D>
+HWY_INLINE void turning(Num<D> s2, Num<D>& angle_over_sine, Num<D>& coefficient) {
+  const D d;
+  // Taylor, exact to round-off below s² = 1e-3
+  angle_over_sine = polynomial<D>({2, 1.0 / 3, 3.0 / 20, 5.0 / 56, 35.0 / 576, 63.0 / 1408}, s2);
+  coefficient = polynomial<D>({1.0 / 12, 1.0 / 720, 1.0 / 30240, 1.0 / 1209600, 1.0 / 47900160},
+                              angle_over_sine * angle_over_sine * s2);
+  const auto large = hn::Gt(s2.v, hn::Set(d, 1e-3));
+  if (HWY_LIKELY(hn::AllFalse(d, large))) return;
+  // fitted to 2e-17
+  const Num<D> x = polynomial<D>(
+      {2 * 1.0, 2 * 0.16666666666664942, 2 * 0.07500000000385201, 2 * 0.044642856805998936, 2 * 0.03038195969768514,
+       2 * 0.022371749733164054, 2 * 0.01735977964134998, 2 * 0.01388484282640208, 2 * 0.012170138592391726,
+       2 * 0.0065293020047365695, 2 * 0.019513468251252167, 2 * -0.016187392271599134, 2 * 0.03187962140081284},
+      s2);
+  const Num<D> y =
+      polynomial<D>({0.08333333333333333, 0.001388888888888962, 3.30687830673884e-05, 8.267195868407458e-07,
+                     2.0876720971038434e-08, 5.284884495807743e-10, 1.3308714828735463e-11, 3.793809199423887e-13},
+                    x * x * s2);
+  angle_over_sine = {hn::IfThenElse(large, x.v, angle_over_sine.v)};
+  coefficient = {hn::IfThenElse(large, y.v, coefficient.v)};
+}
+
+/// Places of the bodies of one block of elements, side by side.
+template <class D>
+struct Poses {
+  V3<D> p;
+  Q4<D> q;
+};
+
+/// Lane by lane from blocks of bodies.
+template <class D>
+HWY_INLINE void gather(const ElementJob& job, const std::uint32_t* HWY_RESTRICT bodies, double* HWY_RESTRICT room) {
+  const size_t W = hn::Lanes(D()), group = size_t{1} << job.body_shift;
+  for (size_t l = 0; l < W; ++l) {
+    const size_t block = bodies[l] >> job.body_shift, lane = bodies[l] & (group - 1);
+    const double *p = job.p + 3 * group * block + lane, *q = job.q + 4 * group * block + lane;
+    for (size_t c = 0; c < 3; ++c) room[c * W + l] = p[c * group];
+    for (size_t c = 0; c < 4; ++c) room[(3 + c) * W + l] = q[c * group];
+  }
+}
+
+/// Forces of one block of elements (docs/theory/zones.md, eq. 1 to 12, and multibody.md, eq. 4).
+template <class D>
+HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, const Poses<D>& A, const Poses<D>& B) {
+  using N = Num<D>;
+  const D d;
+  const size_t W = hn::Lanes(d);
+  double* HWY_RESTRICT slot = job.slots + static_cast<size_t>(kSlotFields) * W * block;
+  double* HWY_RESTRICT out = job.forces + static_cast<size_t>(kForceFields) * W * block;
+
+  const V3<D> lever_a = turn(A.q, load3<D>(slot, kMarkerA));
+  const V3<D> lever_b = turn(B.q, load3<D>(slot, kMarkerB));
+  const Q4<D> qF = A.q * load4<D>(slot, kMarkerA + 3), qM = B.q * load4<D>(slot, kMarkerB + 3);
+  const M33<D> F = to_matrix(qF);
+  const V3<D> apart = B.p - A.p;
+  const V3<D> t = transpose_times(F, (apart - lever_a) + lever_b);
+  const Q4<D> q = conj_times(qF, qM);
+  const V3<D> v{{hn::CopySign(q.x.v, hn::Xor(q.x.v, q.w.v))},
+                {hn::CopySign(q.y.v, hn::Xor(q.y.v, q.w.v))},
+                {hn::CopySign(q.z.v, hn::Xor(q.z.v, q.w.v))}};
+  const N s2 = dot(v, v);
+  N over_sine, coefficient;
+  turning<D>(s2, over_sine, coefficient);
+  const V3<D> r = over_sine * v;
+  auto outside = hn::Gt(s2.v, load<D>(slot, kMostTurn).v);
+
+  N u[6] = {t.x, t.y, t.z, r.x, r.y, r.z}, e[6], f[6], before[6];
+  for (int i = 0; i < 6; ++i) {
+    u[i] = u[i] - load<D>(slot, kOffset + i);
+    before[i] = load<D>(slot, kStretch + i);
+    e[i] = u[i];
+  }
+  N was[6] = {before[0], before[1], before[2], before[3], before[4], before[5]};
+  const bool softened = job.softened[block] != 0;
+  if (softened) {
+    for (int plane = 0; plane < 2; ++plane) {
+      const int shear = plane == 0 ? 2 : 1, bend = plane == 0 ? 4 : 5, at = kSoft + 4 * plane;
+      const N c00 = load<D>(slot, at), c01 = load<D>(slot, at + 1), c10 = load<D>(slot, at + 2),
+              c11 = load<D>(slot, at + 3);
+      e[shear] = fma(c00, u[shear], c01 * u[bend]);
+      e[bend] = fma(c10, u[shear], c11 * u[bend]);
+      before[shear] = fma(c00, was[shear], c01 * was[bend]);
+      before[bend] = fma(c10, was[shear], c11 * was[bend]);
+    }
+  }
+  N k[6];
+  for (int i = 0; i < 6; ++i) {
+    k[i] = load<D>(slot, kStiffness + i);
+    f[i] = k[i] * e[i];
+  }
+  // is every resultant inside the bounds for sure?
+  const N one = num<D>(1);
+  outside = hn::Or(outside, hn::Not(hn::And(hn::Ge(f[0].v, load<D>(slot, kLeastForce).v),
+                                            hn::Le(f[0].v, load<D>(slot, kMostForce).v))));
+  const N vy = f[1] * load<D>(slot, kShearScale), vz = f[2] * load<D>(slot, kShearScale + 1);
+  outside = hn::Or(outside, hn::Gt(fma(vy, vy, vz * vz).v, one.v));
+  outside = hn::Or(outside, hn::Gt((N{hn::Abs(f[3].v)} * load<D>(slot, kTorsionScale)).v, one.v));
+  const N exponent = load<D>(slot, kExponent);
+  const N scale_y = load<D>(slot, kMomentScale), scale_z = load<D>(slot, kMomentScale + 1);
+  for (int station = 0; station < 2; ++station) {
+    const N x = load<D>(slot, kStation + station);
+    const N my = N{hn::Abs(fma(x, f[2], f[4]).v)} * scale_y, mz = N{hn::Abs(fnma(x, f[1], f[5]).v)} * scale_z;
+    const auto linear = hn::Gt((my + mz).v, one.v);
+    if (HWY_LIKELY(hn::AllFalse(d, linear))) continue;
+    const auto is_square = hn::Ge(exponent.v, hn::Set(d, 2.0)), is_three_halves = hn::Ge(exponent.v, hn::Set(d, 1.5));
+    const auto raised = [&](N m) -> N {
+      return {hn::IfThenElse(is_square, (m * m).v, hn::IfThenElse(is_three_halves, hn::Mul(m.v, hn::Sqrt(m.v)), m.v))};
+    };
+    outside = hn::Or(outside, hn::Gt((raised(my) + raised(mz)).v, one.v));
+  }
+
+  // standard linear solid: the damper follows the mean of the step
+  const N viscous = load<D>(slot, kViscous), half = num<D>(0.5), keep = one - load<D>(slot, kRelaxation);
+  const N taken = fma(half, keep, half);
+  const auto inside = hn::Not(outside);
+  N g[6], work = num<D>(0), lost = num<D>(0);
+  for (int i = 0; i < 6; ++i) {
+    const N old = load<D>(slot, kBehind + i), stretched = e[i] - before[i];
+    const N behind = fma(taken, stretched, keep * old), rate = viscous * k[i];
+    const N twice_mean = rate * (behind + old);
+    work = fma(twice_mean, stretched, work);
+    if (softened) lost = fma(twice_mean, (u[i] - was[i]) - stretched, lost);
+    g[i] = fma(rate, behind, f[i]);
+    store_where<D>(inside, behind, slot, kBehind + i);
+    store_where<D>(inside, u[i], slot, kStretch + i);
+  }
+  store_where<D>(inside, fma(half, work, load<D>(slot, kDamped)), slot, kDamped);
+  if (softened) store_where<D>(inside, fma(half, lost, load<D>(slot, kBled)), slot, kBled);
+
+  // torque conjugate to the rate of the rotation vector
+  const V3<D> m{g[3], g[4], g[5]};
+  const V3<D> rm = cross(r, m);
+  const V3<D> turned = fma(coefficient, cross(r, rm), fma(half, rm, m));
+  const V3<D> force = F * V3<D>{g[0], g[1], g[2]}, torque = F * turned;
+  store3<D>(force, out, 0);
+  // M seen from both centres
+  store3<D>(cross(apart + lever_b, force) + torque, out, 3);
+  store3<D>(cross(lever_b, force) + torque, out, 6);
+  if (HWY_UNLIKELY(!hn::AllFalse(d, outside))) report<D>(outside, block, *job.outside);
+}
+
+template <class D>
+HWY_INLINE void evaluate_all(const ElementJob& job) {
+  const D d;
+  const size_t W = hn::Lanes(d);
+  alignas(64) double room[2][2][7 * kMostLanes];
+  size_t next = job.first;
+  const auto find_next = [&](size_t from) {
+    while (from < job.last && job.live[from] == 0) ++from;
+    return from;
+  };
+  const auto fetch = [&](size_t block, int place) {
+    gather<D>(job, job.a + block * W, room[place][0]);
+    gather<D>(job, job.b + block * W, room[place][1]);
+  };
+  next = find_next(next);
+  if (job.a != nullptr) {
+    // the poses of the next block are fetched while this one is computed
+    if (next < job.last) fetch(next, 0);
+    for (int place = 0; next < job.last; place = 1 - place) {
+      const size_t block = next;
+      next = find_next(block + 1);
+      if (next < job.last) fetch(next, 1 - place);
+      const double *ra = room[place][0], *rb = room[place][1];
+      evaluate_element_block<D>(job, block, {load3<D>(ra, 0), load4<D>(ra, 3)}, {load3<D>(rb, 0), load4<D>(rb, 3)});
+    }
+  } else {
+    for (; next < job.last; next = find_next(next + 1)) {
+      const size_t a = job.body_a[next], b = job.body_b[next];
+      evaluate_element_block<D>(job, next, {load3<D>(job.p + 3 * W * a, 0), load4<D>(job.q + 4 * W * a, 0)},
+                                {load3<D>(job.p + 3 * W * b, 0), load4<D>(job.q + 4 * W * b, 0)});
+    }
+  }
+}
+
+template <class D>
+HWY_INLINE void advance_all(const BodyJob& job) {
+  Num<D> sum = num<D>(0);
+  for (size_t block = 0; block < job.blocks; ++block) advance_body_block<D>(job, block, sum);
+  store<D>(sum, job.sum, 0);
+}
+
+using Wide = hn::ScalableTag<double>;
+using One = hn::CappedTag<double, 1>;
+
+size_t Lanes() { return hn::Lanes(Wide()); }
+const char* Name() { return hwy::TargetName(HWY_TARGET); }
+void AdvanceBodies(const BodyJob& job) { advance_all<Wide>(job); }
+void EvaluateElements(const ElementJob& job) { evaluate_all<Wide>(job); }
+void AdvanceBodiesSingly(const BodyJob& job) { advance_all<One>(job); }
+void EvaluateElementsSingly(const ElementJob& job) { evaluate_all<One>(job); }
+
+void SumForces(const SumJob& job) {
+  using D = Wide;
+  const size_t W = hn::Lanes(D());
+  for (size_t b = 0; b < job.bodies; ++b) {
+    V3<D> f{num<D>(0), num<D>(0), num<D>(0)}, t = f;
+    for (std::uint32_t i = job.first[b]; i < job.first[b + 1]; ++i) {
+      const double* from = job.forces + static_cast<size_t>(kForceFields) * W * (job.entries[i] / 2);
+      if (job.entries[i] % 2 == 0) {
+        f = f + load3<D>(from, 0);
+        t = t + load3<D>(from, 3);
+      } else {
+        f = f - load3<D>(from, 0);
+        t = t - load3<D>(from, 6);
+      }
+    }
+    store3<D>(f, job.force + 3 * W * b, 0);
+    store3<D>(t, job.torque + 3 * W * b, 0);
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace topple::mbs::kernel
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace topple::mbs::kernel {
+
+HWY_EXPORT(Lanes);
+HWY_EXPORT(Name);
+HWY_EXPORT(AdvanceBodies);
+HWY_EXPORT(EvaluateElements);
+HWY_EXPORT(AdvanceBodiesSingly);
+HWY_EXPORT(EvaluateElementsSingly);
+HWY_EXPORT(SumForces);
+
+size_t lanes() { return HWY_DYNAMIC_DISPATCH(Lanes)(); }
+std::string target_name() { return HWY_DYNAMIC_DISPATCH(Name)(); }
+void advance_bodies(const BodyJob& job) { HWY_DYNAMIC_DISPATCH(AdvanceBodies)(job); }
+void evaluate_elements(const ElementJob& job) { HWY_DYNAMIC_DISPATCH(EvaluateElements)(job); }
+void advance_bodies_singly(const BodyJob& job) { HWY_DYNAMIC_DISPATCH(AdvanceBodiesSingly)(job); }
+void evaluate_elements_singly(const ElementJob& job) { HWY_DYNAMIC_DISPATCH(EvaluateElementsSingly)(job); }
+void sum_forces(const SumJob& job) { HWY_DYNAMIC_DISPATCH(SumForces)(job); }
+
+}  // namespace topple::mbs::kernel
+#endif

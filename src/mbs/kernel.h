@@ -1,0 +1,100 @@
+#pragma once
+/// The arithmetic of a step, many at a time in SIMD lanes: bodies' motion and the forces of elements inside their safe
+/// bounds. Compiled for several instruction sets, the best one that the machine has is chosen at run time. Every lane
+/// does the same operations in the same order whatever is in the others, so its bits do not depend on them.
+/// W lanes make a block; field f of a block begins at block + f * W.
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace topple::mbs::kernel {
+
+/// Widest block, for those who need room before they know.
+inline constexpr size_t kMostLanes = 8;
+
+/// Fields of an element's slot. Geometry, stiffness, bounds, history.
+enum Slot : int {
+  kMarkerA = 0,        // p_AF, from the present centre of mass (3), q_AF (4)
+  kMarkerB = 7,        // p_BM (3), q_BM (4)
+  kStiffness = 14,     // x y z, about x y z (6)
+  kViscous = 20,       // stiffness behind the damper over the elastic one
+  kRelaxation = 21,    // share that the damper takes in a step
+  kStation = 22,       // x of both stations (2)
+  kLeastForce = 24,    // range of normal force; an empty range sends the element to the full law
+  kMostForce = 25,     //
+  kMomentScale = 26,   // about y, z (2)
+  kShearScale = 28,    // along y, z (2)
+  kTorsionScale = 30,  //
+  kExponent = 31,      // of the biaxial bound; used as 1, 1.5 or 2, whichever is next below
+  kMostTurn = 32,      // sin² of half the largest rotation that the series hold for; infinite for an empty slot
+  kOffset = 33,        // inelastic deformation at the marker (6)
+  kStretch = 39,       // deformation from the offset at the step before (6)
+  kBehind = 45,        // stretch of the springs behind the dampers (6)
+  kDamped = 51,        // work of the dampers so far
+  kBled = 52,          // the part of it on what damage softened
+  kSoft = 53,          // about y: elastic shear and rotation from both (2 x 2), about z (2 x 2)
+  kSlotFields = 61
+};
+inline constexpr double kLargestTurn = 0.25;  // kMostTurn of a live element: 60 degrees
+
+/// Fields of a body's constants.
+enum BodyField : int {
+  kInverseMass = 0,
+  kInverseInertia = 1,  // xx xy xz yy yz zz in B
+  kDrifts = 7,          // 1: moved here, 0: by the joints or not at all
+  kFree = 8,            // 1: gravity acts
+  kBodyFields = 9
+};
+
+/// Of an element: force on a (3; on b the opposite), torque on a (3), and the opposite of that on b (3); in W, about
+/// the centres of mass.
+inline constexpr int kForceFields = 9;
+
+/// One step of all bodies: kick by the forces, then drift of those that nobody else moves.
+struct BodyJob {
+  size_t blocks = 0;
+  double *p, *v, *L, *w, *q, *R;  // 3, 3, 3, 3, 4, 9 fields a block
+  const double *force, *torque;   // 3, 3
+  const double* constants;        // kBodyFields
+  // one value a lane; `shared` lanes: block after block is the same sample's bodies
+  const double *kick, *h;             // (W)
+  const double *gx, *gy, *gz;         // gravity (W)
+  double* sum;                        // of all places and speeds, finite as long as they are (W)
+  std::vector<std::uint32_t>* spins;  // slots that turn too fast for the series, left where they were
+};
+
+/// One evaluation of all elements.
+struct ElementJob {
+  size_t first = 0, last = 0;            // blocks
+  const unsigned char* live;             // per block: live lanes, 0 skips it
+  const unsigned char* softened;         // per block: some lane is softened by damage
+  double* slots;                         // kSlotFields a block
+  double* forces;                        // kForceFields a block
+  const std::uint32_t *a, *b;            // body slot of each lane (W a block); null: batch
+  const std::uint32_t *body_a, *body_b;  // batch: body of each block
+  const double *p, *q;                   // of the bodies
+  size_t body_shift = 0;                 // log2 of W when the lanes of a block of bodies are bodies
+  std::vector<std::uint32_t>* outside;   // slots that need the full law, untouched
+};
+
+/// Forces of the elements summed for each body, in the order of `entries`; batch only.
+struct SumJob {
+  size_t bodies = 0;
+  const std::uint32_t *first, *entries;  // 2 * block + side (side 1: body b)
+  const double* forces;
+  double *force, *torque;
+};
+
+size_t lanes();
+std::string target_name();
+void advance_bodies(const BodyJob&);
+void evaluate_elements(const ElementJob&);
+void sum_forces(const SumJob&);
+
+/// The same with one lane at a time in the same instruction set, for tests of the claim above.
+void advance_bodies_singly(const BodyJob&);
+void evaluate_elements_singly(const ElementJob&);
+
+}  // namespace topple::mbs::kernel

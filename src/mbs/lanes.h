@@ -1,0 +1,56 @@
+#pragma once
+/// What the kernel works on: bodies and elements in blocks of lanes, of one run or of a batch of samples.
+
+#include <cstdint>
+#include <vector>
+
+#include "base/aligned.h"
+#include "mbs/kernel.h"
+#include "mbs/lane_array.h"
+
+namespace topple::mbs {
+
+struct Lanes {
+  size_t W = 1;
+  bool is_batch = false;
+  size_t body_blocks = 0, element_blocks = 0;
+  // bodies, the ground behind the last one
+  AlignedVector<double> p, v, L, w, q, R, force, torque, constants;
+  // elements
+  AlignedVector<double> slots, element_forces;
+  std::vector<unsigned char> live, softened;  // lanes of each block
+  // one run: slots of elements (several may be gone), bodies of slots; elements meeting in each body
+  std::vector<std::uint32_t> slot_of, element_of, body_a, body_b;  // batch: bodies of each block
+  std::vector<std::uint32_t> first_entry, entries;                 // 2 * slot (batch: block) + side
+  size_t live_elements = 0, used_slots = 0;                        // one run
+  // one value a lane
+  AlignedVector<double> kick, h, gx, gy, gz, sum;
+  // reports of the kernel
+  std::vector<std::uint32_t> outside, spins;
+
+  static constexpr std::uint32_t kNoSlot = 0xffffffff;
+
+  LaneLayout body_layout(size_t lane) const;
+  /// Field f of a slot; a slot is block * W + lane.
+  double& field(size_t slot, int f) {
+    return slots[(slot / W * kernel::kSlotFields + static_cast<size_t>(f)) * W + slot % W];
+  }
+  double field(size_t slot, int f) const {
+    return slots[(slot / W * kernel::kSlotFields + static_cast<size_t>(f)) * W + slot % W];
+  }
+  double& force_field(size_t slot, size_t f) {
+    return element_forces[(slot / W * kernel::kForceFields + f) * W + slot % W];
+  }
+  double force_field(size_t slot, size_t f) const {
+    return element_forces[(slot / W * kernel::kForceFields + f) * W + slot % W];
+  }
+
+  void allocate_bodies(size_t bodies);
+  void allocate_elements(size_t elements);
+  /// Kicks all bodies and moves those that drift.
+  void advance_bodies();
+  /// Forces of the elements in blocks [first, last).
+  void evaluate_elements(size_t first, size_t last, std::vector<std::uint32_t>& beyond);
+};
+
+}  // namespace topple::mbs
