@@ -8,6 +8,13 @@ find_package(TBB REQUIRED)
 find_package(Threads REQUIRED)
 find_package(HDF5 REQUIRED COMPONENTS C)
 find_package(hwy REQUIRED)
+# Other engines behind the adapter; topple runs without them (docs/engines.md).
+find_package(Simbody QUIET)
+find_package(mujoco QUIET)
+if(TARGET mujoco::mujoco)
+  # Debian's package names a folder of headers (qhull) that it neither needs nor depends on
+  set_target_properties(mujoco::mujoco PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "")
+endif()
 if(TOPPLE_TESTS)
   find_package(GTest REQUIRED)
 endif()
