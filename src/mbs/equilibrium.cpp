@@ -114,8 +114,8 @@ class Assembly {
             cross(p_B - centre(c.b.index), d)};
   }
   /// Stiffness of all live elements: at rest, or that of fast motion, which the springs behind the dampers add to.
-  /// `share` of each element's own stiffness is left, 1 if empty.
-  Sparse make_stiffness(bool fast, const std::vector<double>& share = {}) const {
+  /// `share` of each element's own stiffness is left, 1 if empty; `force_scale` that of the forces, for springs.
+  Sparse make_stiffness(bool fast, const std::vector<double>& share = {}, double force_scale = 1) const {
     Triplets t;
     t.reserve(size_t{144} * 6 * s_.elements.size());
     for (size_t i = 0; i < s_.elements.size(); ++i) {
@@ -131,6 +131,8 @@ class Assembly {
                 (fast ? 1 + r.zone.viscous : 1) * r.zone.stiffness[5], t);
     for (size_t i = 0; i < s_.model.cables.size(); ++i)
       if (s_.state.cable[i].live) add_outer(cable_row(s_.model.cables[i]), s_.model.cables[i].stiffness, t);
+    for (const StiffRow& r : s_.calc_spring_stiffness(fast, force_scale))
+      add_outer({place(r.a), place(r.b), -r.row.line, -r.row.turn_a, r.row.line, r.row.turn_b}, r.stiffness, t);
     Sparse m(unknowns(), unknowns());
     m.setFromTriplets(t.begin(), t.end());
     return m;
@@ -225,7 +227,7 @@ void System::choose_step() {
   // a corner of a compact box is about seven times lighter than its body
   const double touching = contact ? std::sqrt(7.0) * model.contact.contact_frequency : 0;
   const double fastest = std::sqrt(highest_frequency * highest_frequency + touching * touching);
-  const double limit = fastest > 0 ? 2 / fastest : 1e-3 / options.step_safety;
+  const double limit = std::min(fastest > 0 ? 2 / fastest : 1e-3 / options.step_safety, calc_damper_limit(fastest));
   step = options.step > 0 ? options.step : options.step_safety * limit;
   const double relaxation = 1 - std::exp(-step * model.damping_frequency);
   for (CompiledElement& e : elements) e.zone.relaxation = relaxation;
@@ -257,6 +259,8 @@ bool System::find_equilibrium(std::string& message) {
   const auto join = [&](int a, int b) { root[static_cast<size_t>(find(node(a)))] = find(node(b)); };
   for (const CompiledElement& e : elements) join(e.a, e.b);
   for (const CompiledJoint& j : joints) join(j.parent, j.child);
+  for (const CompiledSpring& k : forces.springs) join(k.a, k.b);
+  for (const CompiledBushing& k : forces.bushings) join(k.a, k.b);
   for (const int b : assembly.free_bodies())
     if (find(b) != find(static_cast<int>(B))) {
       message = "body \"" + model.bodies[static_cast<size_t>(b)].name +
@@ -266,17 +270,21 @@ bool System::find_equilibrium(std::string& message) {
 
   double weight = 0;
   for (const int b : assembly.free_bodies()) weight += state.body[static_cast<size_t>(b)].mass * norm(model.gravity);
+  for (size_t i = 0; i < forces.loads.size(); ++i)
+    if (state.load[i].begin <= 0)
+      weight += norm(forces.loads[i].force) *
+                (forces.loads[i].is_constant ? 1 : std::abs(calc_force(forces.loads[i].factor, 0)));
   if (weight == 0) weight = 1;
 
   double largest = 1;
   {
-    const Sparse K = assembly.make_stiffness(false);
+    const Sparse K = assembly.make_stiffness(false, {}, weight);
     for (Eigen::Index i = 0; i < n; ++i) largest = std::max(largest, K.coeff(i, i));
   }
   const double penalty = 30 * largest;
   Eigen::SimplicialLDLT<Sparse> solver;
   const auto factorise = [&] {
-    Sparse K = assembly.make_stiffness(false);
+    Sparse K = assembly.make_stiffness(false, {}, weight);
     Triplets t;
     for (const CompiledJoint& j : joints) {
       KinematicRow rows[6];
@@ -325,6 +333,8 @@ bool System::find_equilibrium(std::string& message) {
     evaluate_elements_fully(0);
     evaluate_rotationals(0);
     evaluate_cables();
+    evaluate_springs(true);
+    evaluate_loads(true);
     Vector r(n);
     for (size_t i = 0; i < assembly.free_bodies().size(); ++i) {
       const size_t b = static_cast<size_t>(assembly.free_bodies()[i]);
@@ -400,6 +410,7 @@ bool System::find_equilibrium(std::string& message) {
     }
     return finish(false);
   }
+  if (find_overload(message)) return finish(false);
   for (auto* list : {&state.element, &state.rotational})
     for (ZoneState& z : *list) z.plastic = z.damping = 0;
   for (size_t b = 0; b < B; ++b) state.v[b] = state.w[b] = state.L[b] = {};

@@ -82,10 +82,11 @@ class Reader {
 /// Every member of the state and what the next step takes over from this one.
 template <class Archive, class S, class C>
 void visit(Archive& ar, S& s, C& sys) {
-  ar(s.step_index), ar(s.time), ar(s.first_kick), ar(s.next_event);
+  ar(s.step_index), ar(s.time), ar(s.first_kick), ar(s.next_event), ar(s.waiting);
   ar(s.body), ar(s.p), ar(s.v), ar(s.L), ar(s.w), ar(s.q), ar(s.R), ar(s.p_offset);
   ar(s.shapes), ar(s.ground_points), ar(s.touched_ground), ar(s.contact_count);
   ar(s.element), ar(s.rotational), ar(s.joint), ar(s.cable);
+  ar(s.spring), ar(s.torsion), ar(s.bushing), ar(s.load);
   ar(s.pairs), ar(s.pair_apart_until), ar(s.p_at_search), ar(s.tied_to_ground), ar(s.search_due), ar(s.last_search),
       ar(s.touched_pairs);
   ar(s.removed), ar(s.contact_energy), ar(s.stick_energy), ar(s.contact_work), ar(s.contact_power), ar(s.friction_work),

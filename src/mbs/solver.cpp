@@ -86,6 +86,7 @@ Summary run(const Model& model, const Options& options) {
   const long steps = static_cast<long>(std::ceil(options.duration / h - 1e-9));
   double last_event = 0;
   for (const Event& e : model.events) last_event = std::max(last_event, e.time);
+  const bool has_loads = !model.loads.empty();
   const long rest_steps = std::max(1L, static_cast<long>(options.rest_time / h));
   const double interval = std::max(options.frame_interval, h);
   const auto begin = std::chrono::steady_clock::now();
@@ -123,6 +124,7 @@ Summary run(const Model& model, const Options& options) {
       out.ending = Summary::Ending::Cancelled;
       break;
     }
+    if (has_loads) last_event = std::max(last_event, s.calc_last_load_change());
     if (options.rest_speed > 0 && s.state.time > last_event) {
       double fastest2 = 0, twice_kinetic = 0, mass = 0;
       for (size_t b = 0; b < s.B; ++b) {
@@ -148,7 +150,9 @@ Summary run(const Model& model, const Options& options) {
   out.energy_error = s.state.released > 0 ? s.state.largest_residual / s.state.released : 0;
   out.joint_drift = s.state.largest_drift;
   out.message = std::string(words_of(out.ending)) + " at " + std::to_string(out.time) + " s";
-  if (out.ending == Summary::Ending::Diverged) {
+  if (!s.trouble.empty()) {
+    out.message += ": " + s.trouble;
+  } else if (out.ending == Summary::Ending::Diverged) {
     for (size_t b = 0; b < s.B; ++b)
       if (!is_finite(s.state.p[b]) || !is_finite(s.state.v[b])) {
         out.message += ": the pose of body \"" + model.bodies[b].name + "\" is no longer finite";

@@ -14,7 +14,7 @@
 namespace topple::mbs {
 
 /// Energies since the start [J]. Balance: kinetic + gravity + elastic + contact + plastic + damping + friction
-/// + contact_loss + removed = the value at the start, up to `residual`.
+/// + contact_loss + removed - loads = the value at the start, up to `residual`.
 struct Energy {
   double kinetic = 0;
   double gravity = 0;       // potential, 0 at the start
@@ -25,8 +25,9 @@ struct Energy {
   double friction = 0;      // dissipated in contacts by sliding
   double contact_loss = 0;  // dissipated in contacts by impact
   double removed = 0;       // taken away with removed mass and released elements
+  double loads = 0;         // work that loads have done on the bodies
   double residual = 0;      // what the balance lacks: the integration error
-  double released = 0;      // potential energy set free so far, the reference of the residual
+  double released = 0;      // potential energy and work of loads set free so far, the reference of the residual
 };
 
 enum class ElementState : std::uint8_t { Elastic, Yielded, Softening, Broken, Removed };

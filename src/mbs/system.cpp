@@ -163,6 +163,8 @@ void System::compile() {
     s.cable[i].live = true;
   }
 
+  compile_forces();
+
   event_order.resize(model.events.size());
   for (size_t i = 0; i < event_order.size(); ++i) event_order[i] = i;
   std::stable_sort(event_order.begin(), event_order.end(),
@@ -293,53 +295,80 @@ void System::evaluate_cables() {
 }
 
 void System::fire_events() {
+  std::vector<int>& due = due_events;
+  due.clear();
   while (state.next_event < event_order.size()) {
     const size_t index = event_order[state.next_event];
-    const Event& event = model.events[index];
-    if (event.time > state.time + 1e-9 * step) break;
+    if (model.events[index].time > state.time + 1e-9 * step) break;
     ++state.next_event;
-    for (const Action& a : event.actions) {
-      switch (a.kind) {
-        case Action::Kind::RemoveElement: {
-          const size_t e = static_cast<size_t>(a.element.index);
-          ZoneState& z = state.element[e];
-          if (!z.live) break;
-          unpack_element(e);
-          state.removed += z.energy + z.damper_energy;
-          z.energy = z.damper_energy = 0;
-          break_zone(z, BreakReason::Removed);
-          pack_element(e);
-          mark_search_due();
-          break;
-        }
-        case Action::Kind::SwitchLaw: {
-          if (a.rotational < 0) unpack_element(static_cast<size_t>(a.element.index));
-          ZoneState& z = a.rotational >= 0 ? state.rotational[static_cast<size_t>(a.rotational)]
-                                           : state.element[static_cast<size_t>(a.element.index)];
-          if (z.next_law >= 0) z.base_law = z.next_law;
-          z.next_law = a.law.index;
-          z.ramp_begin = event.time;
-          z.ramp = a.ramp;
-          z.next_share = a.stiffness_share;
-          if (a.rotational < 0) pack_element(static_cast<size_t>(a.element.index));
-          break;
-        }
-        case Action::Kind::ReleaseJoint:
-          release_joint(static_cast<size_t>(a.joint.index), "released");
-          break;
-        case Action::Kind::ReplaceBody:
-          replace_body(static_cast<size_t>(a.body.index), a.replacement);
-          break;
-        case Action::Kind::ReleaseCable: {
-          CableState& c = state.cable[static_cast<size_t>(a.cable)];
-          state.removed += c.energy;
-          c.energy = c.force = 0;
-          c.live = false;
-          break;
-        }
+    (model.events[index].triggers.empty() ? due : state.waiting).push_back(static_cast<int>(index));
+  }
+  if (!state.waiting.empty()) find_triggered(due);
+  for (const int index : due) {
+    const Event& event = model.events[static_cast<size_t>(index)];
+    act(event);
+    say({Happening::Kind::EventFired, state.time, index, -1, event.name, 0});
+    state.quiet_steps = 0;
+  }
+}
+
+void System::act(const Event& event) {
+  const double time = event.triggers.empty() ? event.time : state.time;
+  for (const Action& a : event.actions) {
+    switch (a.kind) {
+      case Action::Kind::RemoveElement: {
+        const size_t e = static_cast<size_t>(a.element.index);
+        ZoneState& z = state.element[e];
+        if (!z.live) break;
+        unpack_element(e);
+        state.removed += z.energy + z.damper_energy;
+        z.energy = z.damper_energy = 0;
+        break_zone(z, BreakReason::Removed);
+        pack_element(e);
+        mark_search_due();
+        break;
       }
+      case Action::Kind::SwitchLaw: {
+        if (a.rotational < 0) unpack_element(static_cast<size_t>(a.element.index));
+        ZoneState& z = a.rotational >= 0 ? state.rotational[static_cast<size_t>(a.rotational)]
+                                         : state.element[static_cast<size_t>(a.element.index)];
+        if (z.next_law >= 0) z.base_law = z.next_law;
+        z.next_law = a.law.index;
+        z.ramp_begin = time;
+        z.ramp = a.ramp;
+        z.next_share = a.stiffness_share;
+        if (a.rotational < 0) pack_element(static_cast<size_t>(a.element.index));
+        break;
+      }
+      case Action::Kind::ReleaseJoint:
+        release_joint(static_cast<size_t>(a.joint.index), "released");
+        break;
+      case Action::Kind::ReplaceBody:
+        replace_body(static_cast<size_t>(a.body.index), a.replacement);
+        break;
+      case Action::Kind::ReleaseCable: {
+        CableState& c = state.cable[static_cast<size_t>(a.cable)];
+        state.removed += c.energy;
+        c.energy = c.force = 0;
+        c.live = false;
+        break;
+      }
+      case Action::Kind::RemoveSpring:
+        remove_spring(static_cast<size_t>(a.index));
+        break;
+      case Action::Kind::RemoveRotationalSpring:
+        remove_torsion(static_cast<size_t>(a.index));
+        break;
+      case Action::Kind::RemoveBushing:
+        remove_bushing(static_cast<size_t>(a.index));
+        break;
+      case Action::Kind::RemoveLoad:
+        remove_load(static_cast<size_t>(a.index), time);
+        break;
+      case Action::Kind::ApplyLoad:
+        apply_load(static_cast<size_t>(a.index), time);
+        break;
     }
-    say({Happening::Kind::EventFired, state.time, static_cast<int>(index), -1, event.name, 0});
   }
 }
 
@@ -387,6 +416,7 @@ void System::evaluate_forces(double h) {
   ground_reaction = {};
   ground_contact = {};
   body_contacts = 0;
+  keep_forces();
   fire_events();
   if (h > 0) {
     evaluate_elements();
@@ -395,6 +425,8 @@ void System::evaluate_forces(double h) {
   }
   evaluate_rotationals(h);
   evaluate_cables();
+  evaluate_springs(false);
+  evaluate_loads(false);
   if (model.contact.ground || model.contact.bodies) {
     std::fill(contact_force.begin(), contact_force.end(), Vec3{});
     std::fill(contact_torque.begin(), contact_torque.end(), Vec3{});
@@ -407,6 +439,7 @@ void System::evaluate_forces(double h) {
     add_contact_work(h);
     state.contact_count.swap(contact_count);
   }
+  evaluate_dampers();
 }
 
 void System::drift(size_t b, double h, const Vec3& p0, const Quat& q0, const Mat3& R0) {
@@ -454,7 +487,7 @@ bool System::advance_step() {
   // one broken number anywhere reaches this sum within a step or two
   double sum = 0;
   for (const double x : l.sum) sum += x;
-  return std::isfinite(sum);
+  return std::isfinite(sum) && trouble.empty();
 }
 
 Vec3 System::calc_velocity(size_t b) const {
@@ -491,14 +524,15 @@ Energy System::calc_energy() const {
     e.elastic += c.energy;
     e.plastic += c.plastic;
   }
+  add_energy_of_forces(e);
   e.contact = state.contact_energy + state.stick_energy;
   e.friction = -state.friction_work - state.stick_energy;
   // what contact took from the bodies and neither stores nor rubbed away
   e.contact_loss = -(state.contact_work - state.friction_work) - state.contact_energy;
   e.removed = state.removed;
   e.residual = e.kinetic + e.gravity + e.elastic + e.contact + e.plastic + e.damping + e.friction + e.contact_loss +
-               e.removed - state.total_at_start;
-  e.released = std::max(state.released, -e.gravity - e.removed);
+               e.removed - e.loads - state.total_at_start;
+  e.released = std::max(state.released, -e.gravity - e.removed + e.loads);
   return e;
 }
 
@@ -559,6 +593,7 @@ const View& System::calc_view() {
   }
   v.cable_force.resize(s.cable.size());
   for (size_t i = 0; i < s.cable.size(); ++i) v.cable_force[i] = s.cable[i].force;
+  view_forces(v);
   v.ground_force = calc_element_reaction() + ground_reaction + ground_contact + joints_on_ground;
   v.contact_force_ground = ground_contact;
   v.body_contacts = body_contacts;

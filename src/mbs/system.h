@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "mbs/boxes.h"
+#include "mbs/forces.h"
 #include "mbs/lane_array.h"
 #include "mbs/lanes.h"
 #include "mbs/model.h"
@@ -97,6 +98,7 @@ struct State {
   double time = 0;
   bool first_kick = true;
   size_t next_event = 0;
+  std::vector<int> waiting;  // events whose time has come and that wait for a trigger, in the order of the model
   // bodies (B)
   std::vector<BodyConstants> body;
   LaneArray<Vec3> p, v, L;  // place; velocity and angular momentum about the centre at the last half step
@@ -113,6 +115,9 @@ struct State {
   std::vector<ZoneState> rotational;
   std::vector<JointState> joint;
   std::vector<CableState> cable;
+  std::vector<SpringState> spring, torsion;  // spring-dampers, rotational springs
+  std::vector<BushingState> bushing;
+  std::vector<LoadState> load;
   // contact pairs
   std::vector<PairState> pairs;
   std::vector<long> pair_apart_until;  // step before which the bodies of a pair cannot meet
@@ -167,6 +172,7 @@ class System {
   std::vector<CompiledLaw> laws;
   std::vector<CompiledJoint> joints;
   std::vector<CompiledRotational> rotationals;
+  ForceElements forces;
   std::vector<size_t> event_order;
   std::vector<unsigned char> fixed;
   std::vector<std::vector<int>> incidence;  // elements of each body: 2 * element + side
@@ -196,6 +202,8 @@ class System {
   std::vector<double> joint_matrix, joint_rhs, joint_impulse;
   Vec3 ground_reaction, ground_contact;
   int body_contacts = 0;
+  std::string trouble;             // why the run cannot go on; empty: nothing
+  std::vector<int> due_events;     // of this step
   std::vector<int> contact_count;  // being counted (B)
   std::vector<Solid> solids;       // shapes in W, as of solid_step
   std::vector<long> solid_step;
@@ -212,6 +220,49 @@ class System {
   void evaluate_start();
   void start();
   void fire_events();
+  void act(const Event& event);
+  /// Adds the waiting events whose trigger holds to those due and takes them off the list (triggers.cpp).
+  void find_triggered(std::vector<int>& due);
+  double calc_component(const Quantity&, int component);
+  // springs, bushings, loads (forces.cpp, dampers.cpp, loads.cpp); at rest nothing breaks and no time passes
+  void compile_forces();
+  void compile_loads();
+  void evaluate_springs(bool at_rest);
+  void evaluate_bushing(size_t bushing, bool at_rest);
+  void evaluate_loads(bool at_rest);
+  /// Keeps the forces of the evaluation before for the bodies that dampers act on.
+  void keep_forces();
+  void evaluate_dampers();
+  void find_damper_bounds();
+  void add_damper(int a, int b, const ForceRow&, const CompiledCharacteristic& law, ComponentState&, double& damping);
+  /// Largest step that the dampers allow beside springs of a frequency [s]; infinite for bodies without joints.
+  double calc_damper_limit(double omega);
+  /// Gives up when a law has become too stiff for the step.
+  void watch_stiffness(int a, int b, const ForceRow&, double slope, const char* kind, const std::string& name);
+  double measure_spring(const CompiledSpring&, ForceRow&) const;
+  double measure_torsion(const CompiledTorsion&, ForceRow&) const;
+  FrameDeformation measure_bushing(size_t bushing) const;
+  FrameDeformation measure_frames(int a, int b, const Vec3& p_AF, const Quat& q_AF, const Vec3& p_BM,
+                                  const Quat& q_BM) const;
+  void find_bushing_rows(const CompiledBushing&, const FrameDeformation&, ForceRow rows[6]) const;
+  /// Stiffness of all live springs: the present tangent, or for the step the largest that is foreseen.
+  ///   force_scale  at which a law that starts flat is looked at for a stiffness in its stead [N, N·m]
+  std::vector<StiffRow> calc_spring_stiffness(bool fast, double force_scale) const;
+  /// Whether a spring or bushing carries more than its strength; then says which.
+  bool find_overload(std::string& message) const;
+  /// A force and a torque about the centre on a body; on the ground it counts as its reaction.
+  void load_body(int body, const Vec3& force, const Vec3& torque);
+  void pull(int a, int b, const ForceRow&, double f);
+  double calc_inverse_mass(int body, const Vec3& line, const Vec3& turn) const;
+  void remove_spring(size_t);
+  void remove_torsion(size_t);
+  void remove_bushing(size_t);
+  void apply_load(size_t, double time);
+  void remove_load(size_t, double time);
+  double calc_last_load_change() const;
+  void add_energy_of_forces(Energy&) const;
+  void view_forces(View&) const;
+  Vec3 calc_point(int body, const Vec3& p) const;
   // elements (elements.cpp)
   size_t slot_of(size_t element) const;
   void clear_slot(size_t slot);
@@ -254,6 +305,7 @@ class System {
   /// Angle of a revolute joint from its frames, near `previous`.
   double calc_angle(const CompiledJoint&, double previous) const;
   Mat3 rotation_of(int body) const { return body < 0 ? Mat3::identity() : state.R[static_cast<size_t>(body)]; }
+  Vec3 centre_of(int body) const { return body < 0 ? Vec3{} : state.p[static_cast<size_t>(body)]; }
   Pose pose_of(int body) const {
     return body < 0 ? Pose{} : Pose{state.p[static_cast<size_t>(body)], state.q[static_cast<size_t>(body)]};
   }

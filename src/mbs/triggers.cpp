@@ -1,0 +1,109 @@
+/// Events that wait for a limit. Places, lengths and angles are those of the present step; forces, moments and
+/// velocities those of the evaluation before, as joints are judged by their last reaction.
+
+#include <algorithm>
+#include <cmath>
+
+#include "mbs/system.h"
+
+namespace topple::mbs {
+
+namespace {
+
+double component_of(const Vec3& x, int component) { return component < 3 ? x[component] : norm(x); }
+double component_of(double x, int component) { return component < 3 ? x : std::abs(x); }
+
+}  // namespace
+
+double System::calc_component(const Quantity& q, int component) {
+  const size_t i = static_cast<size_t>(q.index);
+  const State& s = state;
+  switch (q.kind) {
+    case Quantity::Kind::Position:
+      return component_of(s.p[i] - s.R[i] * s.p_offset[i], component);
+    case Quantity::Kind::Velocity:
+      return component_of(calc_velocity(i), component);
+    case Quantity::Kind::AngularVelocity:
+      return component_of(calc_angular_velocity(i), component);
+    case Quantity::Kind::Orientation:
+      return component_of(log_rotation(s.q[i]), component);
+    case Quantity::Kind::JointForce:
+    case Quantity::Kind::JointMoment: {
+      const Mat3 F = rotation_of(joints[i].parent) * joints[i].R_PF;
+      return component_of(
+          transpose_times(F, q.kind == Quantity::Kind::JointForce ? s.joint[i].force : s.joint[i].moment), component);
+    }
+    case Quantity::Kind::JointAngle:
+      return component_of(calc_angle(joints[i], s.joint[i].angle), component);
+    case Quantity::Kind::JointDisplacement: {
+      const CompiledJoint& j = joints[i];
+      const Vec3 gap = calc_point(j.child, j.p_CM) - calc_point(j.parent, j.p_PF);
+      return component_of(dot((rotation_of(j.parent) * j.R_PF).column(2), gap), component);
+    }
+    case Quantity::Kind::ElementTranslation:
+    case Quantity::Kind::ElementRotation: {
+      const CompiledElement& e = elements[i];
+      const FrameDeformation d = measure_frames(e.a, e.b, e.p_AF, e.q_AF, e.p_BM, e.q_BM);
+      return component_of(q.kind == Quantity::Kind::ElementTranslation ? d.u : d.r, component);
+    }
+    case Quantity::Kind::ElementForce:
+    case Quantity::Kind::ElementMoment: {
+      unpack_element(i);
+      const double* f = s.element[i].resultant.c + (q.kind == Quantity::Kind::ElementForce ? 0 : 3);
+      return component_of(-Vec3{f[0], f[1], f[2]}, component);
+    }
+    case Quantity::Kind::BushingTranslation:
+      return component_of(measure_bushing(i).u, component);
+    case Quantity::Kind::BushingRotation:
+      return component_of(measure_bushing(i).r, component);
+    case Quantity::Kind::BushingForce:
+    case Quantity::Kind::BushingMoment: {
+      const ComponentState* c = s.bushing[i].component + (q.kind == Quantity::Kind::BushingForce ? 0 : 3);
+      const auto force_of = [&](int k) { return -c[k].spring - c[k].damper; };
+      return component_of(Vec3{force_of(0), force_of(1), force_of(2)}, component);
+    }
+    case Quantity::Kind::SpringLength: {
+      ForceRow row;
+      return component_of(measure_spring(forces.springs[i], row), component);
+    }
+    case Quantity::Kind::SpringForce:
+      return component_of(s.spring[i].component.spring + s.spring[i].component.damper, component);
+    case Quantity::Kind::TorsionAngle: {
+      ForceRow row;
+      return component_of(measure_torsion(forces.torsions[i], row) - forces.torsions[i].free_angle, component);
+    }
+    case Quantity::Kind::TorsionTorque:
+      return component_of(s.torsion[i].component.spring + s.torsion[i].component.damper, component);
+    case Quantity::Kind::CableForce:
+      return component_of(s.cable[i].force, component);
+  }
+  return 0;
+}
+
+void System::find_triggered(std::vector<int>& due) {
+  size_t kept = 0;
+  const size_t timed = due.size();
+  for (const int index : state.waiting) {
+    const Event& event = model.events[static_cast<size_t>(index)];
+    const bool holds = std::any_of(event.triggers.begin(), event.triggers.end(), [&](const Trigger& t) {
+      const double x = calc_component(t.quantity, t.component);
+      return t.rising ? x >= t.limit : x <= t.limit;
+    });
+    if (holds) {
+      due.push_back(index);
+    } else {
+      state.waiting[kept++] = index;
+    }
+  }
+  state.waiting.resize(kept);
+  if (due.size() == timed) return;
+  // what fires at the same time fires in the order of the model; a time event of within the step comes first
+  const auto time_of = [&](int index) {
+    const Event& e = model.events[static_cast<size_t>(index)];
+    return e.triggers.empty() ? std::min(e.time, state.time) : state.time;
+  };
+  std::sort(due.begin(), due.end(),
+            [&](int a, int b) { return time_of(a) != time_of(b) ? time_of(a) < time_of(b) : a < b; });
+}
+
+}  // namespace topple::mbs
