@@ -146,7 +146,7 @@ void System::evaluate_dampers() {
     }
     ComponentState& c = *d.state;
     const double q = half * d.bound, last = c.damper;
-    if (!find_rate(*d.law, q, rate + q * last, c.rate) && trouble.empty()) {
+    if (std::isfinite(rate) && !find_rate(*d.law, q, rate + q * last, c.rate) && trouble.empty()) {
       char words[160];
       std::snprintf(
           words, sizeof words,

@@ -227,8 +227,18 @@ void System::choose_step() {
   // a corner of a compact box is about seven times lighter than its body
   const double touching = contact ? std::sqrt(7.0) * model.contact.contact_frequency : 0;
   const double fastest = std::sqrt(highest_frequency * highest_frequency + touching * touching);
-  const double limit = std::min(fastest > 0 ? 2 / fastest : 1e-3 / options.step_safety, calc_damper_limit(fastest));
+  damper_limit = calc_damper_limit(fastest);
+  const double limit = std::min(fastest > 0 ? 2 / fastest : 1e-3 / options.step_safety, damper_limit);
   step = options.step > 0 ? options.step : options.step_safety * limit;
+  if (step > damper_limit) {
+    char note[240];
+    std::snprintf(
+        note, sizeof note,
+        "the step of %.3g s is longer than %.3g s, the limit of the dampers on jointed bodies beside springs of "
+        "%.4g rad/s: the motion may grow without bound",
+        step, damper_limit, fastest);
+    summary.notes.emplace_back(note);
+  }
   const double relaxation = 1 - std::exp(-step * model.damping_frequency);
   for (CompiledElement& e : elements) e.zone.relaxation = relaxation;
   for (CompiledRotational& r : rotationals) r.zone.relaxation = relaxation;

@@ -359,7 +359,8 @@ std::vector<StiffRow> System::calc_spring_stiffness(bool fast, double force_scal
     if (c.is_zero) return 0.0;
     if (fast) {
       if (c.has_bound_slope) return std::max(tangent, find_steepest(c, x, x));
-      const Reach r = find_reach(c, x, kinetic, strength);
+      // four times the energy: with few steps to a swing the scheme reaches further than the motion
+      const Reach r = find_reach(c, x, 4 * kinetic, strength);
       return std::max(tangent, find_steepest(c, r.from, r.to));
     }
     // where a law is flat its chord leads to where it carries something

@@ -153,6 +153,7 @@ Summary run(const Model& model, const Options& options) {
   if (!s.trouble.empty()) {
     out.message += ": " + s.trouble;
   } else if (out.ending == Summary::Ending::Diverged) {
+    if (s.step > s.damper_limit) out.message += "; " + out.notes.front();
     for (size_t b = 0; b < s.B; ++b)
       if (!is_finite(s.state.p[b]) || !is_finite(s.state.v[b])) {
         out.message += ": the pose of body \"" + model.bodies[b].name + "\" is no longer finite";

@@ -159,6 +159,7 @@ class System {
 
   double step = 0;
   double highest_frequency = 0;
+  double damper_limit = kUnlimited;  // of the step, by dampers on jointed bodies [s]
 
   bool find_equilibrium(std::string& message);
   bool advance_step();
