@@ -1,236 +1,166 @@
 #include "mbs/model_json.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <nlohmann/json.hpp>
+#include <map>
+#include <utility>
 
 #include "base/error.h"
+#include "mbs/json_document.h"
+#include "mbs/model_check.h"
+#include "mbs/model_words.h"
+#include "mbs/quantity.h"
 
 namespace topple::mbs {
 
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Node = JsonNode;
 
-constexpr const char* kFormat = "topple-mbs";
-constexpr int kVersion = 1;
+constexpr size_t kMostComplaints = 50;
 
-// --- out
-// ---------------------------------------------------------------------------------------------------------------
-
-Json json_of(const Vec3& v) { return Json::array({v.x, v.y, v.z}); }
-Json json_of(const Quat& q) { return Json::array({q.w, q.x, q.y, q.z}); }
-Json json_of(const Pose& X) { return {{"p", json_of(X.p)}, {"q", json_of(X.q)}}; }
-Json json_of(const Mat3& m) { return Json::array({json_of(m.row(0)), json_of(m.row(1)), json_of(m.row(2))}); }
-Json json_of(const Curve& c) { return {{"x", c.x}, {"f", c.f}}; }
-/// JSON knows no infinity: an unlimited value is left out.
-void put(Json& j, const char* key, double value) {
-  if (!std::isinf(value)) j[key] = value;
+const std::vector<std::string>& keys_of(const std::string& object) {
+  for (const KeyList& l : model_json_keys())
+    if (l.object == object) return l.keys;
+  throw std::logic_error("model_json: no keys of " + object);
 }
 
-Json json_of(const Shape& s) {
-  if (s.kind == Shape::Kind::Sphere) return {{"sphere", s.radius}, {"X_BS", json_of(s.X_BS)}};
-  return {{"box", json_of(s.half)}, {"X_BS", json_of(s.X_BS)}};
-}
-
-Json json_of(const Body& b) {
-  Json j{{"name", b.name}};
-  j["mass"] = b.mass;
-  j["inertia"] = json_of(b.inertia);
-  j["X_WB"] = json_of(b.X_WB);
-  j["v_WB"] = json_of(b.v_WB);
-  j["w_WB"] = json_of(b.w_WB);
-  if (b.fixed) j["fixed"] = true;
-  j["shapes"] = Json::array();
-  for (const Shape& s : b.shapes) j["shapes"].push_back(json_of(s));
-  return j;
-}
-
-Json json_of(const MomentFamily& m) {
-  return {{"normal_force", m.normal_force},
-          {"plastic_rotation", m.plastic_rotation},
-          {"positive", m.positive},
-          {"negative", m.negative}};
-}
-
-Json json_of(const ZoneLaw& l) {
-  Json j{{"name", l.name}};
-  if (!l.moment_y.normal_force.empty()) j["moment_y"] = json_of(l.moment_y);
-  if (!l.moment_z.normal_force.empty()) j["moment_z"] = json_of(l.moment_z);
-  j["biaxial_exponent"] = l.biaxial_exponent;
-  j["damage_share"] = l.damage_share;
-  put(j, "rupture_rotation", l.rupture_rotation);
-  if (!l.compression.x.empty()) j["compression"] = json_of(l.compression);
-  if (!l.tension.x.empty()) j["tension"] = json_of(l.tension);
-  put(j, "crush_length", l.crush_length);
-  put(j, "rupture_elongation", l.rupture_elongation);
-  put(j, "shear_y", l.shear_y);
-  put(j, "shear_z", l.shear_z);
-  put(j, "shear_friction", l.shear_friction);
-  put(j, "slip_softening", l.slip_softening);
-  put(j, "slip_rupture", l.slip_rupture);
-  put(j, "torsion", l.torsion);
-  put(j, "twist_rupture", l.twist_rupture);
-  return j;
-}
-
-const char* word_of(Action::Kind k) {
-  switch (k) {
-    case Action::Kind::RemoveElement:
-      return "remove_element";
-    case Action::Kind::SwitchLaw:
-      return "switch_law";
-    case Action::Kind::ReleaseJoint:
-      return "release_joint";
-    case Action::Kind::ReplaceBody:
-      return "replace_body";
-    case Action::Kind::ReleaseCable:
-      return "release_cable";
-  }
-  return "";
-}
-
-// --- in
-// ----------------------------------------------------------------------------------------------------------------
-
-/// A JSON value with the path that leads to it, for messages.
-class Node {
- public:
-  Node(const Json& json, std::string path, const std::string& file)
-      : json_(&json), path_(std::move(path)), file_(&file) {}
-
-  [[noreturn]] void fail(const std::string& what) const {
-    Diagnostic d;
-    d.code = "E610";
-    d.where.file = *file_;
-    d.message = (path_.empty() ? std::string("the file") : path_) + ": " + what;
-    throw InputError(std::vector<Diagnostic>{d});
-  }
-  bool has(const char* key) const { return json_->is_object() && json_->contains(key); }
-  Node operator[](const char* key) const {
-    if (!json_->is_object()) fail("must be an object");
-    const auto it = json_->find(key);
-    if (it == json_->end()) fail(std::string("needs \"") + key + "\"");
-    return {*it, path_.empty() ? key : path_ + "." + key, *file_};
-  }
-  std::vector<Node> items() const {
-    if (!json_->is_array()) fail("must be a list");
-    std::vector<Node> out;
-    for (size_t i = 0; i < json_->size(); ++i)
-      out.emplace_back((*json_)[i], path_ + "[" + std::to_string(i) + "]", *file_);
-    return out;
-  }
-  double number() const {
-    if (!json_->is_number()) fail("must be a number");
-    const double x = json_->get<double>();
-    if (!std::isfinite(x)) fail("is not finite");
-    return x;
-  }
-  int integer() const {
-    if (!json_->is_number_integer()) fail("must be a whole number");
-    if (json_->is_number_unsigned() && json_->get<std::uint64_t>() > 100'000'000) fail("is out of range");
-    const auto x = json_->get<std::int64_t>();
-    if (x < -1 || x > 100'000'000) fail("is out of range: " + std::to_string(x));
-    return static_cast<int>(x);
-  }
-  bool flag() const {
-    if (!json_->is_boolean()) fail("must be true or false");
-    return json_->get<bool>();
-  }
-  std::string text() const {
-    if (!json_->is_string()) fail("must be a string");
-    return json_->get<std::string>();
-  }
-  std::vector<double> numbers() const {
-    std::vector<double> out;
-    for (const Node& n : items()) out.push_back(n.number());
-    return out;
-  }
-  Vec3 vec3() const {
-    const auto n = numbers();
-    if (n.size() != 3) fail("needs three numbers");
-    return {n[0], n[1], n[2]};
-  }
-  Quat quat() const {
-    const auto n = numbers();
-    if (n.size() != 4) fail("needs four numbers, w x y z");
-    return {n[0], n[1], n[2], n[3]};
-  }
-  Pose pose() const { return {(*this)["p"].vec3(), (*this)["q"].quat()}; }
-  Mat3 mat3() const {
-    const auto rows = items();
-    if (rows.size() != 3) fail("needs three rows");
-    Mat3 m;
-    for (int i = 0; i < 3; ++i) {
-      const Vec3 r = rows[static_cast<size_t>(i)].vec3();
-      for (int j = 0; j < 3; ++j) m(i, j) = r[j];
-    }
-    return m;
-  }
-  /// Keys beyond those known are typing errors.
-  void only(const std::vector<std::string>& known) const {
-    if (!json_->is_object()) fail("must be an object");
-    for (const auto& [key, value] : json_->items())
-      if (std::find(known.begin(), known.end(), key) == known.end()) {
-        const std::string near = nearest_name(key, known);
-        fail("unknown key \"" + key + "\"" + (near.empty() ? "" : "; did you mean \"" + near + "\"?"));
-      }
-  }
-
- private:
-  const Json* json_;
-  std::string path_;
-  const std::string* file_;
+/// The items of one list by their names.
+struct Names {
+  const char* what = "";  // "body"
+  const char* many = "";  // "bodies"
+  int count = 0;
+  std::map<std::string, std::vector<int>> places;
 };
+
+Names names_of(const Node& root, const char* list, const char* what) {
+  Names names{what, list, 0, {}};
+  if (!root.has(list) || !root[list].is_list()) return names;
+  for (const Node& n : root[list].items()) {
+    if (n.has("name") && n["name"].is_text()) names.places[n["name"].text()].push_back(names.count);
+    ++names.count;
+  }
+  names.places.erase("");
+  return names;
+}
 
 void read(const Node& n, const char* key, double& to) {
   if (n.has(key)) to = n[key].number();
 }
+void read(const Node& n, const char* key, bool& to) {
+  if (n.has(key)) to = n[key].flag();
+}
+void read(const Node& n, const char* key, std::string& to) {
+  if (n.has(key)) to = n[key].text();
+}
+void read(const Node& n, const char* key, Vec3& to) {
+  if (n.has(key)) to = n[key].vec3();
+}
+
+/// Two alternatives of which just one must be given.
+bool has_first(const Node& n, const char* first, const char* second) {
+  if (n.has(first) && n.has(second)) n.fail(fmt::format("give \"{}\" or \"{}\", not both", first, second));
+  if (!n.has(first) && !n.has(second)) n.fail(fmt::format("needs \"{}\" or \"{}\"", first, second));
+  return n.has(first);
+}
+
+void refuse_keys(const Node& n, std::initializer_list<const char*> keys, const char* beside) {
+  for (const char* key : keys)
+    if (n.has(key)) n.fail_at(key, fmt::format("\"{}\" does not go with \"{}\"", key, beside));
+}
+
+/// Directions in W are of use with a place in W only.
+void demand_at(const Node& n) {
+  for (const char* key : {"axis", "axes", "x"})
+    if (n.has(key)) n.fail_at(key, fmt::format("\"{}\" needs \"at\", the place in W", key));
+}
+
+Characteristic characteristic_from(const Node& n) {
+  Characteristic c;
+  if (n.is_number()) {
+    c.rate = n.number();
+    return c;
+  }
+  if (!n.is_object()) n.fail("must be a number (linear), {\"polynomial\": [...]} or {\"table\": {...}}");
+  n.only(keys_of("characteristic"));
+  if (has_first(n, "polynomial", "table")) {
+    c.kind = Characteristic::Kind::Polynomial;
+    c.coefficients = n["polynomial"].numbers();
+  } else {
+    const Node t = n["table"];
+    t.only(keys_of("table"));
+    c.kind = Characteristic::Kind::Table;
+    c.x = t["x"].numbers();
+    c.f = t["f"].numbers();
+  }
+  return c;
+}
+
+void read(const Node& n, const char* key, Characteristic& to) {
+  if (n.has(key)) to = characteristic_from(n[key]);
+}
+
+Shape shape_from(const Node& n) {
+  n.only(keys_of("shape"));
+  Shape s;
+  int given = 0;
+  for (const char* key : {"box", "sphere", "hull", "plane"}) given += n.has(key);
+  if (given != 1) n.fail("needs just one of \"box\", \"sphere\", \"hull\", \"plane\"");
+  if (n.has("box")) s.half = n["box"].vec3();
+  if (n.has("sphere")) {
+    s.kind = Shape::Kind::Sphere;
+    s.radius = n["sphere"].number();
+  }
+  if (n.has("hull")) {
+    s.kind = Shape::Kind::Hull;
+    for (const Node& v : n["hull"].items()) s.vertices.push_back(v.vec3());
+  }
+  if (n.has("plane")) {
+    s.kind = Shape::Kind::Plane;
+    if (!n["plane"].flag()) n["plane"].fail("must be true; its place is X_BS");
+  }
+  if (n.has("X_BS")) s.X_BS = n["X_BS"].pose();
+  return s;
+}
+
+Mat3 inertia_from(const Node& n) {
+  if (n.is_list() && !n.items().empty() && n.items().front().is_number()) return Mat3::diagonal(n.vec3());
+  return n.mat3();
+}
 
 Body body_from(const Node& n) {
-  n.only({"name", "mass", "inertia", "X_WB", "v_WB", "w_WB", "fixed", "shapes"});
+  n.only(keys_of("body"));
   Body b;
   b.name = n["name"].text();
-  b.mass = n["mass"].number();
-  b.inertia = n["inertia"].mat3();
+  read(n, "fixed", b.fixed);
+  // what never moves needs no mass
+  if (!b.fixed || n.has("mass")) b.mass = n["mass"].number();
+  if (!b.fixed || n.has("inertia")) b.inertia = inertia_from(n["inertia"]);
   b.X_WB = n["X_WB"].pose();
-  if (n.has("v_WB")) b.v_WB = n["v_WB"].vec3();
-  if (n.has("w_WB")) b.w_WB = n["w_WB"].vec3();
-  if (n.has("fixed")) b.fixed = n["fixed"].flag();
+  read(n, "v_WB", b.v_WB);
+  read(n, "w_WB", b.w_WB);
   if (n.has("shapes"))
-    for (const Node& s : n["shapes"].items()) {
-      s.only({"box", "sphere", "X_BS"});
-      Shape shape;
-      if (s.has("sphere")) {
-        shape.kind = Shape::Kind::Sphere;
-        shape.radius = s["sphere"].number();
-      } else {
-        shape.half = s["box"].vec3();
-      }
-      if (s.has("X_BS")) shape.X_BS = s["X_BS"].pose();
-      b.shapes.push_back(shape);
-    }
+    for (const Node& s : n["shapes"].items()) b.shapes.push_back(shape_from(s));
   return b;
 }
 
 MomentFamily family_from(const Node& n) {
-  n.only({"normal_force", "plastic_rotation", "positive", "negative"});
+  n.only(keys_of("family"));
   return {n["normal_force"].numbers(), n["plastic_rotation"].numbers(), n["positive"].numbers(),
           n["negative"].numbers()};
 }
 
 Curve curve_from(const Node& n) {
-  n.only({"x", "f"});
+  n.only(keys_of("curve"));
   return {n["x"].numbers(), n["f"].numbers()};
 }
 
 ZoneLaw law_from(const Node& n) {
-  n.only({"name", "moment_y", "moment_z", "biaxial_exponent", "damage_share", "rupture_rotation", "compression",
-          "tension", "crush_length", "rupture_elongation", "shear_y", "shear_z", "shear_friction", "slip_softening",
-          "slip_rupture", "torsion", "twist_rupture"});
+  n.only(keys_of("law"));
   ZoneLaw l;
-  if (n.has("name")) l.name = n["name"].text();
+  read(n, "name", l.name);
   if (n.has("moment_y")) l.moment_y = family_from(n["moment_y"]);
   if (n.has("moment_z")) l.moment_z = family_from(n["moment_z"]);
   if (n.has("compression")) l.compression = curve_from(n["compression"]);
@@ -250,268 +180,631 @@ ZoneLaw law_from(const Node& n) {
   return l;
 }
 
-Event event_from(const Node& n) {
-  n.only({"time", "name", "actions"});
-  Event e;
-  e.time = n["time"].number();
-  if (n.has("name")) e.name = n["name"].text();
-  for (const Node& a : n["actions"].items()) {
-    a.only({"do", "element", "rotational", "joint", "body", "cable", "law", "ramp", "stiffness_share", "replacement"});
-    Action action;
-    const std::string word = a["do"].text();
-    if (word == word_of(Action::Kind::RemoveElement)) {
-      action.kind = Action::Kind::RemoveElement;
-      action.element = {a["element"].integer()};
-    } else if (word == word_of(Action::Kind::SwitchLaw)) {
-      action.kind = Action::Kind::SwitchLaw;
-      if (a.has("rotational")) {
-        action.rotational = a["rotational"].integer();
-        if (action.rotational < 0) a["rotational"].fail("must not be negative");
-      } else {
-        action.element = {a["element"].integer()};
-      }
-      action.law = {a["law"].integer()};
-      read(a, "ramp", action.ramp);
-      read(a, "stiffness_share", action.stiffness_share);
-    } else if (word == word_of(Action::Kind::ReleaseJoint)) {
-      action.kind = Action::Kind::ReleaseJoint;
-      action.joint = {a["joint"].integer()};
-    } else if (word == word_of(Action::Kind::ReplaceBody)) {
-      action.kind = Action::Kind::ReplaceBody;
-      action.body = {a["body"].integer()};
-      action.replacement = body_from(a["replacement"]);
-    } else if (word == word_of(Action::Kind::ReleaseCable)) {
-      action.kind = Action::Kind::ReleaseCable;
-      action.cable = a["cable"].integer();
-    } else {
-      a["do"].fail("does not know \"" + word + "\"");
-    }
-    e.actions.push_back(std::move(action));
+/// Orthonormal axes of which z is as given; x as near to `x` as that allows, or to an axis of W.
+Mat3 axes_about(const Vec3& z, const Vec3& x_wanted) {
+  const Vec3 across = x_wanted - dot(x_wanted, z) * z;
+  const Vec3 x = (1 / norm(across)) * across;
+  return Mat3::from_columns(x, cross(z, x), z);
+}
+
+/// An axis of W that is far from a direction: x, but y where the direction is nearer to x than 45 degrees.
+Vec3 far_axis(const Vec3& direction) { return std::abs(direction.x) < 0.7 ? Vec3{1, 0, 0} : Vec3{0, 1, 0}; }
+
+/// Axes that "axis" (z) and "x" describe in W; those of W where they say nothing.
+Mat3 axes_from(const Node& n) {
+  if (!n.has("axis") && !n.has("x")) return Mat3::identity();
+  if (!n.has("axis")) {
+    const Vec3 x = n["x"].direction();
+    // z is W's as far as x allows, or y where x stands upright
+    const Vec3 up = std::abs(x.z) < 0.7 ? Vec3{0, 0, 1} : Vec3{0, 1, 0};
+    const Vec3 across = up - dot(up, x) * x;
+    const Vec3 z = (1 / norm(across)) * across;
+    return Mat3::from_columns(x, cross(z, x), z);
   }
+  const Vec3 z = n["axis"].direction();
+  if (!n.has("x")) return axes_about(z, far_axis(z));
+  const Vec3 x = n["x"].direction();
+  if (norm(cross(z, x)) < 1e-3) n["x"].fail("is parallel to \"axis\"");
+  return axes_about(z, x);
+}
+
+class Reader {
+ public:
+  Reader(const std::string& text, const std::string& name) : document_(text, name), root_(document_.root()) {}
+
+  Model read_model(RunSettings* run);
+
+ private:
+  /// Keeps the complaint and goes on, up to a number of them.
+  template <class F>
+  void attempt(F&& f) {
+    try {
+      f();
+    } catch (const InputError& e) {
+      found_.insert(found_.end(), e.diagnostics().begin(), e.diagnostics().end());
+      if (found_.size() >= kMostComplaints) throw InputError(std::move(found_));
+    }
+  }
+  /// Reads a list; an item that is wrong leaves its place to a default one.
+  template <class T, class F>
+  void each(const char* key, std::vector<T>& list, F&& read_item) {
+    if (!root_.has(key)) return;
+    attempt([&] {
+      for (const Node& n : root_[key].items()) {
+        T item;
+        attempt([&] { item = read_item(n); });
+        list.push_back(std::move(item));
+      }
+    });
+  }
+
+  int refer(const Node& n, const Names& names, int low = 0) const;
+  BodyId body(const Node& n, bool may_be_ground) const;
+  Pose pose_of(BodyId id) const {
+    return id.is_valid() && static_cast<size_t>(id.index) < model_.bodies.size()
+               ? model_.bodies[static_cast<size_t>(id.index)].X_WB
+               : Pose{};
+  }
+  Vec3 point_in(BodyId id, const Vec3& p_W) const { return inverse(pose_of(id)) * p_W; }
+  Pose frame_in(BodyId id, const Pose& X_W) const { return inverse(pose_of(id)) * X_W; }
+  void read_points(const Node& n, BodyId a, BodyId b, Vec3& p_A, Vec3& p_B) const;
+  void read_frames(const Node& n, BodyId a, BodyId b, const char* key_a, const char* key_b, Pose& X_AF,
+                   Pose& X_BM) const;
+  void place_joint(const Node& n, Joint& j) const;
+  Quantity quantity_from(const Node& n) const;
+  Trigger trigger_from(const Node& n) const;
+  Action action_from(const Node& n) const;
+
+  Joint joint_from(const Node& n) const;
+  ZoneElement element_from(const Node& n) const;
+  RotationalElement rotational_element_from(const Node& n) const;
+  Cable cable_from(const Node& n) const;
+  SpringDamper spring_from(const Node& n) const;
+  RotationalSpring rotational_spring_from(const Node& n) const;
+  Bushing bushing_from(const Node& n) const;
+  Load load_from(const Node& n) const;
+  void read_contact(const Node& n, Contact& c) const;
+  Event event_from(const Node& n) const;
+  Output output_from(const Node& n) const;
+  RunSettings run_from(const Node& n) const;
+
+  JsonDocument document_;
+  Node root_;
+  Names bodies_, joints_, elements_, rotational_elements_, laws_, cables_, springs_, rotational_springs_, bushings_,
+      loads_;
+  Model model_;
+  std::vector<Diagnostic> found_;
+};
+
+/// An item by its place in the list or by its name.
+int Reader::refer(const Node& n, const Names& names, int low) const {
+  if (!n.is_text()) {
+    if (!n.is_number())
+      n.fail(fmt::format("must be the name of a {0} or its place in \"{1}\"", names.what, names.many));
+    const int i = n.integer(low);
+    if (i >= names.count)
+      n.fail(fmt::format("is out of range: there are {}, counted from 0", names.count),
+             fmt::format("the list is \"{}\"", names.many));
+    return i;
+  }
+  const std::string name = n.text();
+  const auto it = names.places.find(name);
+  if (it == names.places.end()) {
+    std::vector<std::string> known;
+    for (const auto& [word, places] : names.places) known.push_back(word);
+    if (low < 0 && &names == &bodies_) known.push_back("ground");
+    const std::string near = nearest_name(name, known);
+    n.fail(fmt::format("there is no {} \"{}\"{}", names.what, name,
+                       near.empty() ? "" : fmt::format("; did you mean \"{}\"?", near)));
+  }
+  if (it->second.size() > 1)
+    n.fail(fmt::format("\"{}\" is ambiguous: {} items of \"{}\" have this name, the first at {} and {}", name,
+                       it->second.size(), names.many, it->second[0], it->second[1]),
+           "give them names of their own, or refer to the place in the list");
+  return it->second.front();
+}
+
+BodyId Reader::body(const Node& n, bool may_be_ground) const {
+  if (n.is_text() && n.text() == "ground") {
+    if (bodies_.places.contains("ground"))
+      n.fail("\"ground\" is ambiguous: a body has this name, too", "give the body another name; the ground is -1");
+    if (!may_be_ground) n.fail("must be a body, not the ground");
+    return kGround;
+  }
+  if (n.is_number() && !may_be_ground && n.integer(-1) < 0) n.fail("must be a body, not the ground");
+  return {refer(n, bodies_, may_be_ground ? -1 : 0)};
+}
+
+void Reader::read_points(const Node& n, BodyId a, BodyId b, Vec3& p_A, Vec3& p_B) const {
+  if (n.has("points")) {
+    refuse_keys(n, {"p_A", "p_B"}, "points");
+    const auto points = n["points"].items();
+    if (points.size() != 2) n["points"].fail("needs two points, [[x, y, z], [x, y, z]]");
+    p_A = point_in(a, points[0].vec3());
+    p_B = point_in(b, points[1].vec3());
+    return;
+  }
+  if (!n.has("p_A") && !n.has("p_B")) n.fail("needs \"p_A\" and \"p_B\", or \"points\"");
+  p_A = n["p_A"].vec3();
+  p_B = n["p_B"].vec3();
+}
+
+void Reader::read_frames(const Node& n, BodyId a, BodyId b, const char* key_a, const char* key_b, Pose& X_AF,
+                         Pose& X_BM) const {
+  if (n.has("at")) {
+    refuse_keys(n, {key_a, key_b}, "at");
+    const Pose X_WF{n["at"].vec3(), to_quat(axes_from(n))};
+    X_AF = frame_in(a, X_WF);
+    X_BM = frame_in(b, X_WF);
+    return;
+  }
+  demand_at(n);
+  if (!n.has(key_a) && !n.has(key_b)) n.fail(fmt::format("needs \"{}\" and \"{}\", or \"at\"", key_a, key_b));
+  X_AF = n[key_a].pose();
+  X_BM = n[key_b].pose();
+}
+
+void Reader::place_joint(const Node& n, Joint& j) const {
+  using Kind = Joint::Kind;
+  const std::string& word = kJointWords[static_cast<size_t>(j.kind)];
+  if (n.has("points")) {
+    if (j.kind != Kind::Distance) n.fail_at("points", "\"points\" is for distance joints, this one is " + word);
+    refuse_keys(n, {"X_PF", "X_CM", "at", "axis", "axes", "x"}, "points");
+    const auto points = n["points"].items();
+    if (points.size() != 2) n["points"].fail("needs two points, [[x, y, z], [x, y, z]]");
+    const Vec3 first = points[0].vec3(), second = points[1].vec3(), line = second - first;
+    const double length = norm(line);
+    if (!(length > 0) || !std::isfinite(length)) n["points"].fail("are no distance apart");
+    const Vec3 x = (1 / length) * line;
+    const Mat3 about_x = axes_about(x, far_axis(x));
+    const Quat q_W = to_quat(Mat3::from_columns(about_x.column(2), about_x.column(0), about_x.column(1)));
+    j.X_PF = frame_in(j.parent, {first, q_W});
+    j.X_CM = frame_in(j.child, {second, q_W});
+    return;
+  }
+  if (n.has("at")) {
+    refuse_keys(n, {"X_PF", "X_CM"}, "at");
+    if (j.kind == Kind::Distance) n.fail_at("at", "a distance joint needs \"points\" (or X_PF and X_CM)");
+    const bool has_axis = j.kind == Kind::Revolute || j.kind == Kind::Prismatic || j.kind == Kind::Cylindrical;
+    if (has_axis && !n.has("axis")) n.fail("needs \"axis\", a direction in W");
+    const bool limited = n.has("tension_limit") || n.has("shear_limit");
+    Quat q_W;
+    if (j.kind == Kind::Universal) {
+      refuse_keys(n, {"axis", "x"}, "axes");
+      const auto axes = n["axes"].items();
+      if (axes.size() != 2) n["axes"].fail("needs two directions in W: of the parent, of the child");
+      const Vec3 first = axes[0].direction(), second = axes[1].direction();
+      if (!(std::abs(dot(first, second)) < 1e-9))
+        n["axes"].fail(fmt::format("must be at right angles; they are at {:.9g} degrees",
+                                   std::acos(std::clamp(dot(first, second), -1.0, 1.0)) * 180 / M_PI));
+      q_W = to_quat(axes_about((1 / norm(cross(first, second))) * cross(first, second), first));
+    } else {
+      if (n.has("axes")) n.fail_at("axes", "\"axes\" is for universal joints, this one is " + word);
+      if (limited && !n.has("x")) n.fail("tension_limit and shear_limit need \"x\", the direction in W of the pull");
+      q_W = to_quat(axes_from(n));
+    }
+    j.X_PF = frame_in(j.parent, {n["at"].vec3(), q_W});
+    j.X_CM = frame_in(j.child, {n["at"].vec3(), q_W});
+    return;
+  }
+  demand_at(n);
+  if (!n.has("X_PF") && !n.has("X_CM")) n.fail("needs \"at\", or \"X_PF\" and \"X_CM\"");
+  j.X_PF = n["X_PF"].pose();
+  j.X_CM = n["X_CM"].pose();
+}
+
+Joint Reader::joint_from(const Node& n) const {
+  n.only(keys_of("joint"));
+  Joint j;
+  j.kind = static_cast<Joint::Kind>(n["kind"].word(kJointWords));
+  read(n, "name", j.name);
+  j.parent = body(n["parent"], true);
+  j.child = body(n["child"], true);
+  read(n, "tension_limit", j.tension_limit);
+  read(n, "shear_limit", j.shear_limit);
+  read(n, "moment_limit", j.moment_limit);
+  read(n, "rotation_limit", j.rotation_limit);
+  place_joint(n, j);
+  return j;
+}
+
+ZoneElement Reader::element_from(const Node& n) const {
+  n.only(keys_of("element"));
+  ZoneElement e;
+  read(n, "name", e.name);
+  e.a = body(n["a"], true);
+  e.b = body(n["b"], true);
+  read_frames(n, e.a, e.b, "X_AF", "X_BM", e.X_AF, e.X_BM);
+  e.translational_stiffness = n["translational_stiffness"].vec3();
+  e.rotational_stiffness = n["rotational_stiffness"].vec3();
+  read(n, "damping_ratio", e.damping_ratio);
+  if (n.has("stations"))
+    for (const Node& s : n["stations"].items()) {
+      s.only(keys_of("station"));
+      e.stations.push_back({s["x"].number(), {refer(s["law"], laws_)}});
+    }
   return e;
+}
+
+RotationalElement Reader::rotational_element_from(const Node& n) const {
+  n.only(keys_of("rotational_element"));
+  RotationalElement r;
+  read(n, "name", r.name);
+  r.joint = {refer(n["joint"], joints_)};
+  r.stiffness = n["stiffness"].number();
+  read(n, "damping_ratio", r.damping_ratio);
+  if (n.has("law")) r.law = {refer(n["law"], laws_, -1)};
+  return r;
+}
+
+Cable Reader::cable_from(const Node& n) const {
+  n.only(keys_of("cable"));
+  Cable c;
+  read(n, "name", c.name);
+  c.a = body(n["a"], true);
+  c.b = body(n["b"], true);
+  read_points(n, c.a, c.b, c.p_A, c.p_B);
+  c.stiffness = n["stiffness"].number();
+  read(n, "pretension", c.pretension);
+  read(n, "strength", c.strength);
+  return c;
+}
+
+SpringDamper Reader::spring_from(const Node& n) const {
+  n.only(keys_of("spring"));
+  SpringDamper s;
+  read(n, "name", s.name);
+  s.a = body(n["a"], true);
+  s.b = body(n["b"], true);
+  read_points(n, s.a, s.b, s.p_A, s.p_B);
+  s.free_length = norm(pose_of(s.b) * s.p_B - pose_of(s.a) * s.p_A);
+  read(n, "free_length", s.free_length);
+  read(n, "spring", s.spring);
+  read(n, "damper", s.damper);
+  read(n, "tension_strength", s.tension_strength);
+  read(n, "compression_strength", s.compression_strength);
+  return s;
+}
+
+RotationalSpring Reader::rotational_spring_from(const Node& n) const {
+  n.only(keys_of("rotational_spring"));
+  RotationalSpring s;
+  read(n, "name", s.name);
+  s.joint = {refer(n["joint"], joints_)};
+  read(n, "free_angle", s.free_angle);
+  read(n, "spring", s.spring);
+  read(n, "damper", s.damper);
+  read(n, "strength", s.strength);
+  return s;
+}
+
+Bushing Reader::bushing_from(const Node& n) const {
+  n.only(keys_of("bushing"));
+  Bushing b;
+  read(n, "name", b.name);
+  b.a = body(n["a"], true);
+  b.b = body(n["b"], true);
+  read_frames(n, b.a, b.b, "X_AF", "X_BM", b.X_AF, b.X_BM);
+  const auto six = [&n](const char* key) {
+    auto items = n[key].items();
+    if (items.size() != 6) n[key].fail("needs six items: along x y z, about x y z");
+    return items;
+  };
+  for (const auto& [key, list] : {std::pair{"spring", b.spring}, std::pair{"damper", b.damper}}) {
+    if (!n.has(key)) continue;
+    const auto items = six(key);
+    for (size_t k = 0; k < 6; ++k) list[k] = characteristic_from(items[k]);
+  }
+  if (n.has("strength")) {
+    const auto items = six("strength");
+    for (size_t k = 0; k < 6; ++k)
+      if (!items[k].is_null()) b.strength[k] = items[k].number();
+  }
+  return b;
+}
+
+Load Reader::load_from(const Node& n) const {
+  n.only(keys_of("load"));
+  Load l;
+  read(n, "name", l.name);
+  l.body = body(n["body"], false);
+  if (n.has("at")) {
+    refuse_keys(n, {"p_B"}, "at");
+    l.p_B = point_in(l.body, n["at"].vec3());
+  }
+  read(n, "p_B", l.p_B);
+  if (!n.has("force") && !n.has("torque")) n.fail("needs \"force\", \"torque\" or both");
+  read(n, "force", l.force);
+  read(n, "torque", l.torque);
+  read(n, "follows_body", l.follows_body);
+  if (n.has("table")) {
+    const Node t = n["table"];
+    t.only(keys_of("load_table"));
+    l.time = t["time"].numbers();
+    l.factor = t["factor"].numbers();
+    if (l.time.empty()) t["time"].fail("is empty");
+  }
+  return l;
+}
+
+void Reader::read_contact(const Node& n, Contact& c) const {
+  n.only(keys_of("contact"));
+  read(n, "normal", c.normal);
+  read(n, "offset", c.offset);
+  read(n, "friction", c.friction);
+  read(n, "restitution", c.restitution);
+  read(n, "body_friction", c.body_friction);
+  read(n, "body_restitution", c.body_restitution);
+  read(n, "contact_frequency", c.contact_frequency);
+  read(n, "ground", c.ground);
+  read(n, "bodies", c.bodies);
+  if (!n.has("pairs")) return;
+  for (const Node& p : n["pairs"].items()) {
+    p.only(keys_of("pair"));
+    Contact::Pair pair;
+    pair.a = body(p["a"], false);
+    pair.b = body(p["b"], true);
+    const bool ground = pair.b == kGround;
+    pair.friction = ground ? c.friction : c.body_friction;
+    pair.restitution = ground ? c.restitution : c.body_restitution;
+    read(p, "touches", pair.touches);
+    read(p, "friction", pair.friction);
+    if (p.has("restitution")) refuse_keys(p, {"damping"}, "restitution");
+    read(p, "restitution", pair.restitution);
+    read(p, "stiffness", pair.stiffness);
+    if (p.has("damping")) {
+      pair.damping = p["damping"].number();
+      if (pair.damping < 0) p["damping"].fail("must not be negative");
+    }
+    c.pairs.push_back(pair);
+  }
+}
+
+/// The one key that names an item, and the word for what is asked of it.
+Quantity Reader::quantity_from(const Node& n) const {
+  const std::pair<const char*, const Names*> items[] = {
+      {"body", &bodies_},      {"joint", &joints_},   {"element", &elements_},
+      {"bushing", &bushings_}, {"spring", &springs_}, {"rotational_spring", &rotational_springs_},
+      {"cable", &cables_}};
+  const char* item = nullptr;
+  Quantity q;
+  for (const auto& [key, names] : items) {
+    if (!n.has(key)) continue;
+    if (item) n.fail(fmt::format("names a {} and a {}", item, key));
+    item = key;
+    q.index = names == &bodies_ ? body(n[key], false).index : refer(n[key], *names);
+  }
+  if (!item) n.fail("needs a body, joint, element, bushing, spring, rotational_spring or cable");
+  std::vector<std::string> words;
+  std::vector<Quantity::Kind> kinds;
+  for (int k = 0; k < kQuantityKinds; ++k) {
+    const auto kind = static_cast<Quantity::Kind>(k);
+    if (std::string_view(traits_of(kind).item) != item) continue;
+    words.push_back(traits_of(kind).word);
+    kinds.push_back(kind);
+  }
+  q.kind = kinds[static_cast<size_t>(n["quantity"].word(words))];
+  return q;
+}
+
+Trigger Reader::trigger_from(const Node& n) const {
+  n.only(keys_of("trigger"));
+  Trigger t;
+  t.quantity = quantity_from(n);
+  if (traits_of(t.quantity.kind).components == 1) {
+    if (n.has("component") && n["component"].word(kComponentWords) != 3)
+      n["component"].fail("this quantity has one number only; \"magnitude\" takes its sign away");
+    t.component = n.has("component") ? 3 : 0;
+  } else {
+    t.component = n["component"].word(kComponentWords);
+  }
+  t.rising = has_first(n, "rises_to", "falls_to");
+  t.limit = n[t.rising ? "rises_to" : "falls_to"].number();
+  return t;
+}
+
+Output Reader::output_from(const Node& n) const {
+  n.only(keys_of("output"));
+  Output o;
+  o.name = n["name"].text();
+  o.quantity = quantity_from(n);
+  read(n, "rate", o.rate);
+  return o;
+}
+
+Action Reader::action_from(const Node& n) const {
+  using Kind = Action::Kind;
+  Action a;
+  n.only(keys_of("action"));
+  a.kind = static_cast<Kind>(n["do"].word(kActionWords));
+  const auto only = [&](std::vector<std::string> keys) {
+    keys.push_back("do");
+    for (const std::string& key : keys_of("action"))
+      if (n.has(key.c_str()) && std::find(keys.begin(), keys.end(), key) == keys.end())
+        n.fail_at(key, fmt::format("\"{}\" does not go with \"{}\"", key, n["do"].text()));
+  };
+  switch (a.kind) {
+    case Kind::RemoveElement:
+      only({"element"});
+      a.element = {refer(n["element"], elements_)};
+      break;
+    case Kind::SwitchLaw:
+      only({"element", "rotational", "law", "ramp", "stiffness_share"});
+      if (has_first(n, "element", "rotational")) {
+        a.element = {refer(n["element"], elements_)};
+      } else {
+        a.rotational = refer(n["rotational"], rotational_elements_);
+      }
+      a.law = {refer(n["law"], laws_)};
+      read(n, "ramp", a.ramp);
+      read(n, "stiffness_share", a.stiffness_share);
+      break;
+    case Kind::ReleaseJoint:
+      only({"joint"});
+      a.joint = {refer(n["joint"], joints_)};
+      break;
+    case Kind::ReplaceBody:
+      only({"body", "replacement"});
+      a.body = body(n["body"], false);
+      a.replacement = body_from(n["replacement"]);
+      break;
+    case Kind::ReleaseCable:
+      only({"cable"});
+      a.cable = refer(n["cable"], cables_);
+      break;
+    case Kind::RemoveSpring:
+      only({"spring"});
+      a.index = refer(n["spring"], springs_);
+      break;
+    case Kind::RemoveRotationalSpring:
+      only({"rotational_spring"});
+      a.index = refer(n["rotational_spring"], rotational_springs_);
+      break;
+    case Kind::RemoveBushing:
+      only({"bushing"});
+      a.index = refer(n["bushing"], bushings_);
+      break;
+    case Kind::RemoveLoad:
+    case Kind::ApplyLoad:
+      only({"load"});
+      a.index = refer(n["load"], loads_);
+      break;
+  }
+  return a;
+}
+
+Event Reader::event_from(const Node& n) const {
+  n.only(keys_of("event"));
+  Event e;
+  if (!n.has("time") && !n.has("when")) n.fail("needs \"time\" or \"when\"");
+  read(n, "time", e.time);
+  read(n, "name", e.name);
+  if (n.has("when")) {
+    for (const Node& t : n["when"].items()) e.triggers.push_back(trigger_from(t));
+    if (e.triggers.empty()) n["when"].fail("is empty: name at least one limit, or give \"time\" alone");
+  }
+  for (const Node& a : n["actions"].items()) e.actions.push_back(action_from(a));
+  return e;
+}
+
+RunSettings Reader::run_from(const Node& n) const {
+  n.only(keys_of("run"));
+  RunSettings r;
+  if (n.has("duration")) r.duration = n["duration"].positive();
+  if (n.has("step")) r.step = n["step"].positive();
+  if (n.has("frame_interval")) r.frame_interval = n["frame_interval"].positive();
+  if (n.has("equilibrium")) r.equilibrium = n["equilibrium"].flag();
+  if (n.has("rest_speed")) {
+    r.rest_speed = n["rest_speed"].number();
+    if (*r.rest_speed < 0) n["rest_speed"].fail("must not be negative");
+  }
+  return r;
+}
+
+Model Reader::read_model(RunSettings* run) {
+  Model& m = model_;
+  attempt([&] { root_.only(keys_of("model")); });
+  if (root_["format"].text() != kModelFormat) root_["format"].fail(std::string("must be \"") + kModelFormat + "\"");
+  const int version = root_["version"].integer(1);
+  if (version > kModelVersion)
+    root_["version"].fail(fmt::format("is {}; this program reads versions 1 to {}", version, kModelVersion));
+  bodies_ = names_of(root_, "bodies", "body");
+  joints_ = names_of(root_, "joints", "joint");
+  elements_ = names_of(root_, "elements", "element");
+  rotational_elements_ = names_of(root_, "rotational_elements", "rotational element");
+  laws_ = names_of(root_, "laws", "law");
+  cables_ = names_of(root_, "cables", "cable");
+  springs_ = names_of(root_, "springs", "spring");
+  rotational_springs_ = names_of(root_, "rotational_springs", "rotational spring");
+  bushings_ = names_of(root_, "bushings", "bushing");
+  loads_ = names_of(root_, "loads", "load");
+  attempt([&] { read(root_, "name", m.name); });
+  attempt([&] { read(root_, "gravity", m.gravity); });
+  attempt([&] { read(root_, "damping_frequency", m.damping_frequency); });
+  if (root_.has("run"))
+    attempt([&] {
+      const RunSettings settings = run_from(root_["run"]);
+      if (run) *run = settings;
+    });
+  attempt([&] { static_cast<void>(root_["bodies"]); });
+  // the others' places are worked out from the bodies' poses
+  each("bodies", m.bodies, [](const Node& n) { return body_from(n); });
+  each("joints", m.joints, [this](const Node& n) { return joint_from(n); });
+  each("elements", m.elements, [this](const Node& n) { return element_from(n); });
+  each("rotational_elements", m.rotational_elements, [this](const Node& n) { return rotational_element_from(n); });
+  each("laws", m.laws, [](const Node& n) { return law_from(n); });
+  each("cables", m.cables, [this](const Node& n) { return cable_from(n); });
+  each("springs", m.springs, [this](const Node& n) { return spring_from(n); });
+  each("rotational_springs", m.rotational_springs, [this](const Node& n) { return rotational_spring_from(n); });
+  each("bushings", m.bushings, [this](const Node& n) { return bushing_from(n); });
+  each("loads", m.loads, [this](const Node& n) { return load_from(n); });
+  if (root_.has("contact")) attempt([&] { read_contact(root_["contact"], m.contact); });
+  each("events", m.events, [this](const Node& n) { return event_from(n); });
+  each("outputs", m.outputs, [this](const Node& n) { return output_from(n); });
+  if (!found_.empty()) throw InputError(std::move(found_));
+  for (const Complaint& c : find_complaints(m)) {
+    found_.push_back(document_.make_diagnostic("E601", c.path, c.message()));
+    if (found_.size() >= kMostComplaints) break;
+  }
+  if (!found_.empty()) throw InputError(std::move(found_));
+  return std::move(m);
 }
 
 }  // namespace
 
-std::string to_json(const Model& m) {
-  Json j{{"format", kFormat}, {"version", kVersion}, {"name", m.name}};
-  j["gravity"] = json_of(m.gravity);
-  j["damping_frequency"] = m.damping_frequency;
-  j["bodies"] = Json::array();
-  for (const Body& b : m.bodies) j["bodies"].push_back(json_of(b));
-  j["joints"] = Json::array();
-  for (const Joint& x : m.joints) {
-    Json o{{"kind", x.kind == Joint::Kind::Fixed ? "fixed" : "revolute"}, {"name", x.name}};
-    o["parent"] = x.parent.index;
-    o["child"] = x.child.index;
-    o["X_PF"] = json_of(x.X_PF);
-    o["X_CM"] = json_of(x.X_CM);
-    put(o, "tension_limit", x.tension_limit);
-    put(o, "shear_limit", x.shear_limit);
-    put(o, "moment_limit", x.moment_limit);
-    put(o, "rotation_limit", x.rotation_limit);
-    j["joints"].push_back(std::move(o));
-  }
-  j["elements"] = Json::array();
-  for (const ZoneElement& e : m.elements) {
-    Json o{{"name", e.name}};
-    o["a"] = e.a.index;
-    o["b"] = e.b.index;
-    o["X_AF"] = json_of(e.X_AF);
-    o["X_BM"] = json_of(e.X_BM);
-    o["translational_stiffness"] = json_of(e.translational_stiffness);
-    o["rotational_stiffness"] = json_of(e.rotational_stiffness);
-    o["damping_ratio"] = e.damping_ratio;
-    o["stations"] = Json::array();
-    for (const Station& s : e.stations) o["stations"].push_back({{"x", s.x}, {"law", s.law.index}});
-    j["elements"].push_back(std::move(o));
-  }
-  j["rotational_elements"] = Json::array();
-  for (const RotationalElement& r : m.rotational_elements)
-    j["rotational_elements"].push_back({{"name", r.name},
-                                        {"joint", r.joint.index},
-                                        {"stiffness", r.stiffness},
-                                        {"damping_ratio", r.damping_ratio},
-                                        {"law", r.law.index}});
-  j["laws"] = Json::array();
-  for (const ZoneLaw& l : m.laws) j["laws"].push_back(json_of(l));
-  j["cables"] = Json::array();
-  for (const Cable& c : m.cables) {
-    Json o{{"name", c.name},
-           {"a", c.a.index},
-           {"b", c.b.index},
-           {"p_A", json_of(c.p_A)},
-           {"p_B", json_of(c.p_B)},
-           {"stiffness", c.stiffness},
-           {"pretension", c.pretension}};
-    put(o, "strength", c.strength);
-    j["cables"].push_back(std::move(o));
-  }
-  const Contact& c = m.contact;
-  j["contact"] = {{"normal", json_of(c.normal)},
-                  {"offset", c.offset},
-                  {"friction", c.friction},
-                  {"restitution", c.restitution},
-                  {"body_friction", c.body_friction},
-                  {"body_restitution", c.body_restitution},
-                  {"contact_frequency", c.contact_frequency},
-                  {"ground", c.ground},
-                  {"bodies", c.bodies}};
-  j["events"] = Json::array();
-  for (const Event& e : m.events) {
-    Json o{{"time", e.time}, {"name", e.name}, {"actions", Json::array()}};
-    for (const Action& a : e.actions) {
-      Json x{{"do", word_of(a.kind)}};
-      switch (a.kind) {
-        case Action::Kind::RemoveElement:
-          x["element"] = a.element.index;
-          break;
-        case Action::Kind::SwitchLaw:
-          if (a.rotational >= 0) {
-            x["rotational"] = a.rotational;
-          } else {
-            x["element"] = a.element.index;
-          }
-          x["law"] = a.law.index;
-          x["ramp"] = a.ramp;
-          x["stiffness_share"] = a.stiffness_share;
-          break;
-        case Action::Kind::ReleaseJoint:
-          x["joint"] = a.joint.index;
-          break;
-        case Action::Kind::ReplaceBody:
-          x["body"] = a.body.index;
-          x["replacement"] = json_of(a.replacement);
-          break;
-        case Action::Kind::ReleaseCable:
-          x["cable"] = a.cable;
-          break;
-      }
-      o["actions"].push_back(std::move(x));
-    }
-    j["events"].push_back(std::move(o));
-  }
-  return j.dump(1) + "\n";
+const std::vector<KeyList>& model_json_keys() {
+  static const std::vector<KeyList> lists = {
+      {"model",
+       {"format", "version", "name", "run", "gravity", "damping_frequency", "bodies", "joints", "elements",
+        "rotational_elements", "laws", "cables", "springs", "rotational_springs", "bushings", "loads", "contact",
+        "events", "outputs"}},
+      {"run", {"duration", "step", "frame_interval", "equilibrium", "rest_speed"}},
+      {"pose", {"p", "q", "axis", "angle"}},
+      {"shape", {"box", "sphere", "hull", "plane", "X_BS"}},
+      {"body", {"name", "mass", "inertia", "X_WB", "v_WB", "w_WB", "fixed", "shapes"}},
+      {"joint",
+       {"kind", "name", "parent", "child", "X_PF", "X_CM", "at", "axis", "axes", "x", "points", "tension_limit",
+        "shear_limit", "moment_limit", "rotation_limit"}},
+      {"element",
+       {"name", "a", "b", "X_AF", "X_BM", "at", "axis", "x", "translational_stiffness", "rotational_stiffness",
+        "damping_ratio", "stations"}},
+      {"station", {"x", "law"}},
+      {"rotational_element", {"name", "joint", "stiffness", "damping_ratio", "law"}},
+      {"curve", {"x", "f"}},
+      {"family", {"normal_force", "plastic_rotation", "positive", "negative"}},
+      {"law",
+       {"name", "moment_y", "moment_z", "biaxial_exponent", "damage_share", "rupture_rotation", "compression",
+        "tension", "crush_length", "rupture_elongation", "shear_y", "shear_z", "shear_friction", "slip_softening",
+        "slip_rupture", "torsion", "twist_rupture"}},
+      {"cable", {"name", "a", "b", "p_A", "p_B", "points", "stiffness", "pretension", "strength"}},
+      {"characteristic", {"polynomial", "table"}},
+      {"table", {"x", "f"}},
+      {"spring",
+       {"name", "a", "b", "p_A", "p_B", "points", "free_length", "spring", "damper", "tension_strength",
+        "compression_strength"}},
+      {"rotational_spring", {"name", "joint", "free_angle", "spring", "damper", "strength"}},
+      {"bushing", {"name", "a", "b", "X_AF", "X_BM", "at", "axis", "x", "spring", "damper", "strength"}},
+      {"load", {"name", "body", "p_B", "at", "force", "torque", "follows_body", "table"}},
+      {"load_table", {"time", "factor"}},
+      {"contact",
+       {"normal", "offset", "friction", "restitution", "body_friction", "body_restitution", "contact_frequency",
+        "ground", "bodies", "pairs"}},
+      {"pair", {"a", "b", "touches", "friction", "restitution", "stiffness", "damping"}},
+      {"trigger",
+       {"body", "joint", "element", "bushing", "spring", "rotational_spring", "cable", "quantity", "component",
+        "rises_to", "falls_to"}},
+      {"output",
+       {"name", "body", "joint", "element", "bushing", "spring", "rotational_spring", "cable", "quantity", "rate"}},
+      {"action",
+       {"do", "element", "rotational", "joint", "body", "cable", "spring", "rotational_spring", "bushing", "load",
+        "law", "ramp", "stiffness_share", "replacement"}},
+      {"event", {"time", "name", "when", "actions"}},
+  };
+  return lists;
 }
 
-Model model_from_json(const std::string& text, const std::string& name) {
-  Json json;
-  try {
-    json = Json::parse(text);
-  } catch (const nlohmann::json::parse_error& e) {
-    // line and column of the byte where reading stopped
-    Diagnostic d;
-    d.code = "E611";
-    d.where.file = name;
-    d.where.line = d.where.column = 1;
-    const size_t stop = std::min(text.size(), e.byte > 0 ? e.byte - 1 : 0);
-    for (size_t i = 0; i < stop; ++i) {
-      if (text[i] == '\n') {
-        ++d.where.line;
-        d.where.column = 1;
-      } else if ((static_cast<unsigned char>(text[i]) & 0xC0) != 0x80) {
-        ++d.where.column;
-      }
-    }
-    d.message = "this is not JSON";
-    d.help = "a multibody model is a JSON object with \"format\": \"topple-mbs\"";
-    throw InputError(std::vector<Diagnostic>{d});
-  }
-  const Node root(json, "", name);
-  root.only({"format", "version", "name", "gravity", "damping_frequency", "bodies", "joints", "elements",
-             "rotational_elements", "laws", "cables", "contact", "events"});
-  if (root["format"].text() != kFormat) root["format"].fail(std::string("must be \"") + kFormat + "\"");
-  if (root["version"].integer() != kVersion) root["version"].fail("must be " + std::to_string(kVersion));
-  Model m;
-  if (root.has("name")) m.name = root["name"].text();
-  if (root.has("gravity")) m.gravity = root["gravity"].vec3();
-  read(root, "damping_frequency", m.damping_frequency);
-  for (const Node& n : root["bodies"].items()) m.bodies.push_back(body_from(n));
-  if (root.has("joints"))
-    for (const Node& n : root["joints"].items()) {
-      n.only({"kind", "name", "parent", "child", "X_PF", "X_CM", "tension_limit", "shear_limit", "moment_limit",
-              "rotation_limit"});
-      Joint j;
-      const std::string kind = n["kind"].text();
-      if (kind != "fixed" && kind != "revolute") n["kind"].fail("must be \"fixed\" or \"revolute\"");
-      j.kind = kind == "fixed" ? Joint::Kind::Fixed : Joint::Kind::Revolute;
-      if (n.has("name")) j.name = n["name"].text();
-      j.parent = {n["parent"].integer()};
-      j.child = {n["child"].integer()};
-      j.X_PF = n["X_PF"].pose();
-      j.X_CM = n["X_CM"].pose();
-      read(n, "tension_limit", j.tension_limit);
-      read(n, "shear_limit", j.shear_limit);
-      read(n, "moment_limit", j.moment_limit);
-      read(n, "rotation_limit", j.rotation_limit);
-      m.joints.push_back(j);
-    }
-  if (root.has("elements"))
-    for (const Node& n : root["elements"].items()) {
-      n.only({"name", "a", "b", "X_AF", "X_BM", "translational_stiffness", "rotational_stiffness", "damping_ratio",
-              "stations"});
-      ZoneElement e;
-      if (n.has("name")) e.name = n["name"].text();
-      e.a = {n["a"].integer()};
-      e.b = {n["b"].integer()};
-      e.X_AF = n["X_AF"].pose();
-      e.X_BM = n["X_BM"].pose();
-      e.translational_stiffness = n["translational_stiffness"].vec3();
-      e.rotational_stiffness = n["rotational_stiffness"].vec3();
-      read(n, "damping_ratio", e.damping_ratio);
-      if (n.has("stations"))
-        for (const Node& s : n["stations"].items()) {
-          s.only({"x", "law"});
-          e.stations.push_back({s["x"].number(), {s["law"].integer()}});
-        }
-      m.elements.push_back(std::move(e));
-    }
-  if (root.has("rotational_elements"))
-    for (const Node& n : root["rotational_elements"].items()) {
-      n.only({"name", "joint", "stiffness", "damping_ratio", "law"});
-      RotationalElement r;
-      if (n.has("name")) r.name = n["name"].text();
-      r.joint = {n["joint"].integer()};
-      r.stiffness = n["stiffness"].number();
-      read(n, "damping_ratio", r.damping_ratio);
-      if (n.has("law")) r.law = {n["law"].integer()};
-      m.rotational_elements.push_back(std::move(r));
-    }
-  if (root.has("laws"))
-    for (const Node& n : root["laws"].items()) m.laws.push_back(law_from(n));
-  if (root.has("cables"))
-    for (const Node& n : root["cables"].items()) {
-      n.only({"name", "a", "b", "p_A", "p_B", "stiffness", "pretension", "strength"});
-      Cable c;
-      if (n.has("name")) c.name = n["name"].text();
-      c.a = {n["a"].integer()};
-      c.b = {n["b"].integer()};
-      c.p_A = n["p_A"].vec3();
-      c.p_B = n["p_B"].vec3();
-      c.stiffness = n["stiffness"].number();
-      read(n, "pretension", c.pretension);
-      read(n, "strength", c.strength);
-      m.cables.push_back(std::move(c));
-    }
-  if (root.has("contact")) {
-    const Node n = root["contact"];
-    n.only({"normal", "offset", "friction", "restitution", "body_friction", "body_restitution", "contact_frequency",
-            "ground", "bodies"});
-    Contact& c = m.contact;
-    if (n.has("normal")) c.normal = n["normal"].vec3();
-    read(n, "offset", c.offset);
-    read(n, "friction", c.friction);
-    read(n, "restitution", c.restitution);
-    read(n, "body_friction", c.body_friction);
-    read(n, "body_restitution", c.body_restitution);
-    read(n, "contact_frequency", c.contact_frequency);
-    if (n.has("ground")) c.ground = n["ground"].flag();
-    if (n.has("bodies")) c.bodies = n["bodies"].flag();
-  }
-  if (root.has("events"))
-    for (const Node& n : root["events"].items()) m.events.push_back(event_from(n));
-  check_model(m);
-  return m;
+Model model_from_json(const std::string& text, const std::string& name, RunSettings* run) {
+  return Reader(text, name).read_model(run);
 }
 
 }  // namespace topple::mbs

@@ -1,0 +1,21 @@
+#pragma once
+/// What is wrong with a model, each complaint with its path as in the JSON file.
+
+#include <string>
+#include <vector>
+
+#include "mbs/model.h"
+
+namespace topple::mbs {
+
+struct Complaint {
+  std::string path;  // "joints[3].X_PF"
+  std::string name;  // of the item; may be empty
+  std::string what;
+  std::string message() const { return path + (name.empty() ? "" : " \"" + name + "\"") + ": " + what; }
+};
+
+/// Empty if the model can be run.
+std::vector<Complaint> find_complaints(const Model&);
+
+}  // namespace topple::mbs
