@@ -34,7 +34,10 @@ const char* words_of(mbs::Summary::Ending e) {
 }  // namespace
 
 Course::Course(const mbs::Model& model, const mbs::Options& options)
-    : model_(model), options_(options), forces_(model, [this](const mbs::Happening& h) { say(h); }) {
+    : model_(model),
+      options_(options),
+      forces_(model, [this](const mbs::Happening& h) { say(h); }),
+      sampler_(options.samplings) {
   const size_t J = model.joints.size();
   for (const mbs::Body& b : model.bodies) body_.push_back({b.mass, {}, b.inertia});
   joint_live_.assign(J, 1);
@@ -115,14 +118,13 @@ bool Course::start(double step) {
 
 double Course::next_stop() const {
   double stop = options_.duration;
-  stop = std::min(stop, static_cast<double>(frame_) * options_.frame_interval);
+  stop = std::min({stop, static_cast<double>(frame_) * options_.frame_interval, sampler_.next()});
   if (next_event_ < timed_.size()) stop = std::min(stop, std::max(time_, model_.events[timed_[next_event_]].time));
   return stop;
 }
 
 bool Course::is_frame_due() const {
-  const double early = step_ > 0 ? 0.5 * step_ : 1e-12 * (1 + time_);
-  return time_ >= static_cast<double>(frame_) * std::max(options_.frame_interval, step_) - early;
+  return time_ >= static_cast<double>(frame_) * std::max(options_.frame_interval, step_) - calc_early();
 }
 
 Course::Verdict Course::accept(double time, const Motion& motion, const Work& work, const Touch& touch,
@@ -138,7 +140,8 @@ Course::Verdict Course::accept(double time, const Motion& motion, const Work& wo
       fail("the motion of body \"" + model_.bodies[b].name + "\" is no longer finite");
       return Verdict::Stop;
     }
-  if (needs_reactions_ || is_frame_due()) reactions_ = find_reactions();
+  const bool is_sampled = sampler_.is_due(time_, calc_early());
+  if (needs_reactions_ || is_frame_due() || is_sampled) reactions_ = find_reactions();
   bool jumped = false;
   measure_joints();
   if (is_started_) {
@@ -151,6 +154,7 @@ Course::Verdict Course::accept(double time, const Motion& motion, const Work& wo
     jumped |= forces_.advance(time, motion_, in_F);
   }
   is_started_ = true;
+  if (is_sampled) sampler_.take(calc_view(), calc_early());
   if (is_frame_due()) {
     show();
     while (is_frame_due()) ++frame_;

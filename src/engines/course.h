@@ -10,6 +10,7 @@
 #include "engines/forces.h"
 #include "engines/joint_frames.h"
 #include "mbs/model.h"
+#include "mbs/sampler.h"
 #include "mbs/solver.h"
 
 namespace topple::engines {
@@ -53,7 +54,7 @@ class Course {
   /// False if there is no equilibrium; the summary says so. The engine then builds its system and accepts time 0.
   ///   step  that the engine takes; 0: variable [s]
   bool start(double step);
-  /// The next instant at which a state is wanted: a frame, an event or the end [s].
+  /// The next instant at which a state is wanted: a frame, a sample, an event or the end [s].
   double next_stop() const;
   /// A state that the engine has accepted; the first one at time 0. `find_reactions` is called if they are needed.
   Verdict accept(double time, const Motion&, const Work&, const Touch&,
@@ -89,6 +90,7 @@ class Course {
   void measure_joints();
   bool is_at_rest();
   bool is_frame_due() const;
+  double calc_early() const { return step_ > 0 ? 0.5 * step_ : 1e-12 * (1 + time_); }
   void show();
   const mbs::View& calc_view();
   Vec3 calc_velocity_of_centre(size_t body) const;
@@ -99,6 +101,7 @@ class Course {
   const mbs::Model& model_;
   const mbs::Options& options_;
   Forces forces_;
+  mbs::Sampler sampler_;
   mbs::Summary summary_;
   mbs::View view_;
   Motion motion_;

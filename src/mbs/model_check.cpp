@@ -523,7 +523,7 @@ void Checker::check_outputs() {
     if (const char* fault = fault_of_file_name(o.name)) fail(p, "name", fault);
     if (!names.insert(o.name).second) fail(p, "name", "another output has this name");
     quantity(p, o.quantity);
-    positive(p, "rate", o.rate);
+    if (!(o.rate > 0 && o.rate <= 1e6)) fail(p, "rate", fmt::format("must be > 0 and at most 1e6, is {:g}", o.rate));
   }
 }
 

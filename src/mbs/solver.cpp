@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "mbs/sampler.h"
 #include "mbs/snapshot.h"
 #include "mbs/system.h"
 
@@ -106,14 +107,17 @@ Summary run(const Model& model, const Options& options) {
     s.state.released = v.energy.released;
     if (options.on_frame) options.on_frame(v);
   };
+  Sampler sampler(options.samplings);
   show();
   ++frame;
+  if (sampler.is_due(s.state.time, 0.5 * h)) sampler.take(s.calc_view(), 0.5 * h);
   out.ending = Summary::Ending::TimeLimit;
   while (s.state.step_index < steps) {
     if (!s.advance_step()) {
       out.ending = Summary::Ending::Diverged;
       break;
     }
+    if (sampler.is_due(s.state.time, 0.5 * h)) sampler.take(s.calc_view(), 0.5 * h);
     const bool due = s.state.time >= static_cast<double>(frame) * interval - 0.5 * h;
     if (due) {
       show();

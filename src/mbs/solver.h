@@ -81,6 +81,12 @@ struct Happening {
   double speed = 0;    // of a first contact, normal approach [m/s]
 };
 
+/// Who wants to look at the running system at a rate of its own. The course of the run does not depend on it.
+struct Sampling {
+  double interval = 0.01;  // > 0; the first at time 0, then at the step nearest to each instant [s]
+  std::function<void(const View&)> on_sample;
+};
+
 struct Options {
   double duration = 1;  // [s]
   double step = 0;      // 0: step_safety times the limit of the stiffest mode
@@ -94,6 +100,7 @@ struct Options {
   int threads = 1;         // used from 2,048 zone elements on; results do not depend on it
   std::function<void(const View&)> on_frame;
   std::function<void(const Happening&)> on_happening;
+  std::vector<Sampling> samplings;
   Progress progress;
 };
 

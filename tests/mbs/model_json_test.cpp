@@ -97,7 +97,7 @@ TEST(ModelJson, PlacesEveryComplaint) {
   EXPECT_THAT(all, HasSubstr("8:39 outputs[0].quantity: does not know \"postion\"; did you mean \"position\"?"));
   // what only the check of the whole model finds is placed as well
   EXPECT_THAT(complaints("\"outputs\": [{\"name\": \"x\", \"body\": 0, \"quantity\": \"position\",\n \"rate\": 0}]"),
-              HasSubstr("6:2 outputs[0].rate \"x\": must be > 0, is 0"));
+              HasSubstr("6:2 outputs[0].rate \"x\": must be > 0 and at most 1e6, is 0"));
 }
 
 TEST(ModelJson, PlacesMistakesBehindOtherLetters) {
