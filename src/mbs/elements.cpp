@@ -14,6 +14,7 @@ namespace {
 using namespace kernel;
 
 constexpr size_t kBlocksForThreads = 256;  // below, waking threads costs more than they save
+constexpr double kNearBounds = 0.9;        // of the safe bounds
 constexpr size_t kChunk = 32;              // blocks a thread takes at once
 
 /// Spring behind the damper of a slot times the stiffness.
@@ -47,7 +48,7 @@ void System::kill_slot(size_t e) {
 void System::lay_out_elements() {
   Lanes& l = *lanes;
   const size_t E = elements.size(), W = l.W;
-  std::vector<double> moved, moved_forces;
+  std::vector<double> moved;
   std::vector<std::uint32_t> kept;
   const bool first = l.slot_of.empty();
   for (size_t e = 0; e < E; ++e) {
@@ -55,8 +56,7 @@ void System::lay_out_elements() {
     if (!first && (slot == Lanes::kNoSlot || l.field(slot, kMostTurn) == kUnlimited)) continue;
     kept.push_back(static_cast<std::uint32_t>(e));
     if (first) continue;
-    for (int f = 0; f < kSlotFields; ++f) moved.push_back(l.field(slot, f));
-    for (size_t f = 0; f < static_cast<size_t>(kForceFields); ++f) moved_forces.push_back(l.force_field(slot, f));
+    save_slot(slot, moved);
   }
   std::vector<unsigned char> soft(E, 0);
   if (!first)
@@ -67,6 +67,7 @@ void System::lay_out_elements() {
   l.element_of.assign(slots, Lanes::kNoSlot);
   l.body_a.assign(slots, static_cast<std::uint32_t>(B));
   l.body_b.assign(slots, static_cast<std::uint32_t>(B));
+  const double* next = moved.data();
   const auto body = [&](int b) { return b < 0 ? static_cast<std::uint32_t>(B) : static_cast<std::uint32_t>(b); };
   for (size_t slot = 0; slot < slots; ++slot) {
     clear_slot(slot);
@@ -82,9 +83,7 @@ void System::lay_out_elements() {
       l.field(slot, kMostTurn) = kLargestTurn;
       continue;
     }
-    for (int f = 0; f < kSlotFields; ++f) l.field(slot, f) = moved[slot * kSlotFields + static_cast<size_t>(f)];
-    for (size_t f = 0; f < static_cast<size_t>(kForceFields); ++f)
-      l.force_field(slot, f) = moved_forces[slot * kForceFields + f];
+    next = restore_slot(slot, next);
   }
   l.used_slots = l.live_elements = kept.size();
   l.first_entry.assign(B + 1, 0);
@@ -118,19 +117,34 @@ void System::pack_element(size_t e) {
   put(kRelaxation, c.zone.relaxation);
   put(kStation, c.zone.x[0]), put(kStation + 1, c.zone.x[c.zone.stations > 1 ? 1 : 0]);
   put(kMostTurn, kLargestTurn);
-  const bool free = c.zone.stations == 0, bounded = is_bounded(z, free);
+  put(kTorsionScale, 0);
+  put(kFlows, 0);
+  const bool free = c.zone.stations == 0;
+  double fields[kFlowFields];
+  // near its bounds a zone is better served by the law itself
+  const bool flows = !free && (!is_bounded(z, false) || calc_bound_utilisation(c.zone, z) > kNearBounds) &&
+                     write_flow(c.zone, laws, z, state.time, fields);
+  const bool bounded = !flows && is_bounded(z, free);
   put(kLeastForce, !bounded ? 1 : free ? -kUnlimited : z.safe_force[0]);
   put(kMostForce, !bounded ? -1 : free ? kUnlimited : z.safe_force[1]);
-  if (!bounded) return;
-  for (int i = 0; i < 2; ++i) {
-    put(kMomentScale + i, free ? 0 : z.safe_moment[i]);
-    put(kShearScale + i, free ? 0 : z.safe_shear[i]);
+  if (!bounded && !flows) return;
+  if (flows) {
+    for (int f = 0; f < kFlowFields; ++f) l.flow(slot, f) = fields[f];
+    put(kFlows, 1);
+    z.safe_force[0] = 1, z.safe_force[1] = -1;  // void as soon as it flows
+    const double torsion = laws[static_cast<size_t>(z.base_law < 0 ? c.zone.law[0] : z.base_law)].torsion;
+    put(kTorsionScale, 1 / torsion);
+  } else {
+    for (int i = 0; i < 2; ++i) {
+      put(kMomentScale + i, free ? 0 : z.safe_moment[i]);
+      put(kShearScale + i, free ? 0 : z.safe_shear[i]);
+    }
+    put(kTorsionScale, free ? 0 : z.safe_torsion);
+    put(kExponent, floor_exponent(z.safe_exponent));
   }
-  put(kTorsionScale, free ? 0 : z.safe_torsion);
-  put(kExponent, floor_exponent(z.safe_exponent));
   for (int i = 0; i < 6; ++i) {
-    put(kOffset + i, z.offset[i]);
-    put(kStretch + i, z.deformation[i] - z.offset[i]);
+    put(kOffset + i, flows ? 0 : z.offset[i]);
+    put(kStretch + i, flows ? z.elastic[i] : z.deformation[i] - z.offset[i]);
     put(kBehind + i, z.elastic[i] - z.flowed[i]);
   }
   put(kDamped, 0);
@@ -139,13 +153,13 @@ void System::pack_element(size_t e) {
   for (int plane = 0; plane < 2; ++plane) {
     const int shear = plane == 0 ? 2 : 1, bend = plane == 0 ? 4 : 5, at = kSoft + 4 * plane;
     const double ks = l.field(slot, kStiffness + shear), kb = l.field(slot, kStiffness + bend);
-    const bool soft = z.is_softened;
+    const bool soft = !flows && z.is_softened;
     put(at, soft && ks > 0 ? z.plane[plane][0] / ks : 1);
     put(at + 1, soft && ks > 0 ? z.plane[plane][1] / ks : 0);
     put(at + 2, soft && kb > 0 ? z.plane[plane][1] / kb : 0);
     put(at + 3, soft && kb > 0 ? z.plane[plane][2] / kb : 1);
   }
-  if (z.is_softened) l.softened[slot / l.W] = 1;
+  if (!flows && z.is_softened) l.softened[slot / l.W] = 1;
 }
 
 void System::unpack_element(size_t e) {
@@ -153,14 +167,16 @@ void System::unpack_element(size_t e) {
   const size_t slot = slot_of(e);
   if (!z.live || slot == Lanes::kNoSlot) return;
   const Lanes& l = *lanes;
-  if (l.field(slot, kLeastForce) > l.field(slot, kMostForce)) return;  // the full law has it
+  const bool flows = l.field(slot, kFlows) > 0;
+  if (!flows && l.field(slot, kLeastForce) > l.field(slot, kMostForce)) return;  // the full law has it
   double u[6], stretch[6];
   for (int i = 0; i < 6; ++i) u[i] = stretch[i] = l.field(slot, kStretch + i);
-  for (int plane = 0; plane < 2; ++plane) {
-    const int shear = plane == 0 ? 2 : 1, bend = plane == 0 ? 4 : 5, at = kSoft + 4 * plane;
-    stretch[shear] = l.field(slot, at) * u[shear] + l.field(slot, at + 1) * u[bend];
-    stretch[bend] = l.field(slot, at + 2) * u[shear] + l.field(slot, at + 3) * u[bend];
-  }
+  if (!flows)
+    for (int plane = 0; plane < 2; ++plane) {
+      const int shear = plane == 0 ? 2 : 1, bend = plane == 0 ? 4 : 5, at = kSoft + 4 * plane;
+      stretch[shear] = l.field(slot, at) * u[shear] + l.field(slot, at + 1) * u[bend];
+      stretch[bend] = l.field(slot, at + 2) * u[shear] + l.field(slot, at + 3) * u[bend];
+    }
   z.energy = z.damper_energy = 0;
   for (int i = 0; i < 6; ++i) {
     const double behind = l.field(slot, kBehind + i), k = l.field(slot, kStiffness + i), rate = calc_rate(l, slot, i);
@@ -168,7 +184,7 @@ void System::unpack_element(size_t e) {
     z.elastic_force[i] = k * stretch[i];
     z.damper_force[i] = rate * behind;
     z.flowed[i] = stretch[i] - behind;
-    z.deformation[i] = u[i] + z.offset[i];
+    z.deformation[i] = flows ? l.flow(slot, kBefore + i) : u[i] + z.offset[i];
     z.resultant.c[i] = z.elastic_force[i] + z.damper_force[i];
     z.energy += 0.5 * z.elastic_force[i] * u[i];
     z.damper_energy += 0.5 * rate * behind * behind;
@@ -176,6 +192,17 @@ void System::unpack_element(size_t e) {
   z.normal_force = z.elastic_force[0];
   z.damping = z.packed_damping + l.field(slot, kDamped) - (z.damper_energy - z.packed_behind);
   z.plastic = z.packed_plastic + l.field(slot, kBled);
+  if (!flows) return;
+  z.energy = l.flow(slot, kStored);
+  z.plastic += l.flow(slot, kPlastic);
+  for (int s = 0; s < elements[e].zone.stations; ++s) {
+    const int at = kStations + s * kStationFields;
+    for (int q = 0; q < 2; ++q) {
+      z.station[s].phi[q] = l.flow(slot, at + kPhi + q);
+      z.station[s].soft[q] = l.flow(slot, at + kSoftness + q);
+    }
+    z.station[s].reached = l.flow(slot, at + kReached);
+  }
 }
 
 void System::unpack_elements() {
@@ -296,41 +323,40 @@ void System::sum_element_forces() {
   }
 }
 
-namespace {
-constexpr int kHistory[] = {kStretch,    kStretch + 1, kStretch + 2, kStretch + 3, kStretch + 4, kStretch + 5, kBehind,
-                            kBehind + 1, kBehind + 2,  kBehind + 3,  kBehind + 4,  kBehind + 5,  kDamped,      kBled};
+void System::save_slot(size_t slot, std::vector<double>& to) const {
+  for (int f = 0; f < kSlotFields; ++f) to.push_back(lanes->field(slot, f));
+  for (size_t f = 0; f < static_cast<size_t>(kForceFields); ++f) to.push_back(lanes->force_field(slot, f));
+  if (lanes->field(slot, kFlows) > 0)
+    for (int f = 0; f < kFlowFields; ++f) to.push_back(lanes->flow(slot, f));
+}
+
+const double* System::restore_slot(size_t slot, const double* from) {
+  for (int f = 0; f < kSlotFields; ++f) lanes->field(slot, f) = *from++;
+  for (size_t f = 0; f < static_cast<size_t>(kForceFields); ++f) lanes->force_field(slot, f) = *from++;
+  if (lanes->field(slot, kFlows) > 0)
+    for (int f = 0; f < kFlowFields; ++f) lanes->flow(slot, f) = *from++;
+  return from;
 }
 
 void System::save_elements() {
   unpack_elements();
   element_history.clear();
-  for (size_t e = 0; e < elements.size(); ++e) {
-    const size_t slot = slot_of(e);
-    const bool has = slot != Lanes::kNoSlot;
-    for (const int f : kHistory) element_history.push_back(has ? lanes->field(slot, f) : 0);
-    for (size_t f = 0; f < static_cast<size_t>(kForceFields); ++f)
-      element_history.push_back(has ? lanes->force_field(slot, f) : 0);
-  }
+  for (size_t e = 0; e < elements.size(); ++e)
+    if (state.element[e].live) save_slot(slot_of(e), element_history);
 }
 
 void System::restore_elements(const std::vector<double>& history) {
   lanes->slot_of.clear();
   lay_out_elements();
-  auto next = history.begin();
+  const double* next = history.data();
   for (size_t e = 0; e < elements.size(); ++e) {
-    ZoneState& z = state.element[e];
-    const double damping = z.packed_damping, plastic = z.packed_plastic, behind = z.packed_behind;
-    pack_element(e);
-    z.packed_damping = damping, z.packed_plastic = plastic, z.packed_behind = behind;
+    if (!state.element[e].live) {
+      kill_slot(e);
+      continue;
+    }
     const size_t slot = slot_of(e);
-    for (const int f : kHistory) {
-      if (z.live) lanes->field(slot, f) = *next;
-      ++next;
-    }
-    for (size_t f = 0; f < static_cast<size_t>(kForceFields); ++f) {
-      if (z.live) lanes->force_field(slot, f) = *next;
-      ++next;
-    }
+    next = restore_slot(slot, next);
+    if (state.element[e].is_softened) lanes->softened[slot / lanes->W] = 1;
   }
 }
 

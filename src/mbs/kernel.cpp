@@ -148,7 +148,13 @@ HWY_INLINE void store3(const V3<D>& x, double* HWY_RESTRICT block, int field) {
 }
 template <class D, class M>
 HWY_INLINE void store_where(M mask, Num<D> x, double* HWY_RESTRICT block, int field) {
-  hn::BlendedStore(x.v, mask, D(), block + static_cast<size_t>(field) * hn::Lanes(D()));
+  double* at = block + static_cast<size_t>(field) * hn::Lanes(D());
+  if constexpr (hn::MaxLanes(D()) == 1) {
+    // masked stores may take the bits beyond a narrow vector for lanes
+    hn::Store(hn::IfThenElse(mask, x.v, hn::Load(D(), at)), D(), at);
+  } else {
+    hn::BlendedStore(x.v, mask, D(), at);
+  }
 }
 
 /// Slots of the lanes that are set in a mask.
@@ -274,12 +280,229 @@ HWY_INLINE void gather(const ElementJob& job, const std::uint32_t* HWY_RESTRICT 
   }
 }
 
+template <class D>
+HWY_INLINE Num<D> operator/(Num<D> a, Num<D> b) {
+  return {hn::Div(a.v, b.v)};
+}
+template <class D>
+HWY_INLINE Num<D> abs(Num<D> a) {
+  return {hn::Abs(a.v)};
+}
+template <class D, class M>
+HWY_INLINE Num<D> select(M mask, Num<D> yes, Num<D> no) {
+  return {hn::IfThenElse(mask, yes.v, no.v)};
+}
+
+/// a^(-2/3) of 1 <= a <= kMostOver by Newton's method on a² y³ = 1.
+constexpr double kMostOver = 4;
+template <class D>
+HWY_INLINE Num<D> inverse_root(Num<D> a) {
+  const Num<D> a2 = a * a, third = num<D>(1.0 / 3), four_thirds = num<D>(4.0 / 3);
+  Num<D> y = num<D>(1) / fma(num<D>(2.0 / 3), a, third);
+  for (int i = 0; i < 6; ++i) {
+    const Num<D> y2 = y * y;
+    y = y * fnma(third * a2, y2 * y, four_thirds);
+  }
+  return y;
+}
+
+/// A bending plane of a zone: about y with shear along z (sign +1), or about z with shear along y (sign -1).
+template <class D>
+struct BendingPlane {
+  Num<D> shear_stiffness, bending_stiffness;
+  Num<D> stiffness[2], cross;  // of the stations against their own rotation and the other's
+  Num<D> lever[2];             // sign times x
+  Num<D> shift, rotation;      // deformations
+  Num<D> phi[2], soft[2], m[2];
+
+  HWY_INLINE Num<D> shear() const { return shear_stiffness * fnma(lever[1], phi[1], fnma(lever[0], phi[0], shift)); }
+  HWY_INLINE Num<D> moment() const { return bending_stiffness * ((rotation - phi[0]) - phi[1]); }
+  HWY_INLINE void measure() {
+    const Num<D> v = shear(), b = moment();
+    m[0] = fma(lever[0], v, b);
+    m[1] = fma(lever[1], v, b);
+  }
+};
+
+/// The law of a zone that flows in bending (docs/theory/zones.md, eq. 1 to 8). Sets the elastic resultants f; gives the
+/// lanes among `wanted` for which that is the whole truth and moves their history; the others keep theirs.
+template <class D, class M>
+HWY_INLINE M flow_in_bending(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], Num<D> torsion_scale,
+                             const Num<D> k[6], const Num<D> d[6], const Num<D> e_before[6], Num<D> f[6]) {
+  using N = Num<D>;
+  const D tag;
+  const N zero = num<D>(0), one = num<D>(1), half = num<D>(0.5);
+  M good = wanted;
+  const auto demand = [&](M condition) { good = hn::And(good, condition); };
+
+  f[0] = k[0] * (d[0] - load<D>(flow, kAxial));
+  f[3] = k[3] * (d[3] - load<D>(flow, kTwist));
+  demand(hn::Ge(f[0].v, load<D>(flow, kFlowLeast).v));
+  demand(hn::Le(f[0].v, load<D>(flow, kFlowMost).v));
+  demand(hn::Le((abs(f[3]) * torsion_scale).v, one.v));
+
+  BendingPlane<D> plane[2];
+  for (int q = 0; q < 2; ++q) {
+    BendingPlane<D>& P = plane[q];
+    const int shear = q == 0 ? 2 : 1, bend = q == 0 ? 4 : 5;
+    P.shear_stiffness = k[shear], P.bending_stiffness = k[bend];
+    P.shift = d[shear] - load<D>(flow, kSlip + shear - 1);
+    P.rotation = d[bend];
+    for (int s = 0; s < 2; ++s) {
+      P.lever[s] = q == 0 ? x[s] : zero - x[s];
+      P.stiffness[s] = fma(x[s] * x[s], k[shear], k[bend]);
+      P.phi[s] = load<D>(flow, kStations + s * kStationFields + kPhi + q);
+      P.soft[s] = load<D>(flow, kStations + s * kStationFields + kSoftness + q);
+    }
+    P.cross = fma(x[0] * x[1], k[shear], k[bend]);
+    // damage adds flexibility at the stations: (1 + S C) m = m0
+    P.measure();
+    const N s11 = fma(P.stiffness[0], P.soft[0], one), s22 = fma(P.stiffness[1], P.soft[1], one);
+    const N s12 = P.cross * P.soft[1], s21 = P.cross * P.soft[0];
+    const N scale = one / fms(s11, s22, s12 * s21);
+    const N m0 = fms(P.m[0], s22, P.m[1] * s12) * scale, m1 = fms(P.m[1], s11, P.m[0] * s21) * scale;
+    P.phi[0] = fma(P.soft[0], m0, P.phi[0]);
+    P.phi[1] = fma(P.soft[1], m1, P.phi[1]);
+    P.m[0] = m0, P.m[1] = m1;
+  }
+
+  // (|My|/Ly)^1.5 + (|Mz|/Lz)^1.5 of a station
+  const auto calc_demand = [&](int s) -> N {
+    N sum = zero;
+    for (int q = 0; q < 2; ++q) {
+      const int cell = kStations + s * kStationFields + kCell + q * kCellFields;
+      const N t = (f[0] - load<D>(flow, cell + kCellForce)) * load<D>(flow, cell + kCellForce + 1);
+      const N r = (load<D>(flow, kStations + s * kStationFields + kReached) - load<D>(flow, cell + kCellRotation)) *
+                  load<D>(flow, cell + kCellRotation + 1);
+      demand(
+          hn::And(hn::And(hn::Ge(t.v, zero.v), hn::Le(t.v, one.v)), hn::And(hn::Ge(r.v, zero.v), hn::Le(r.v, one.v))));
+      const auto positive = hn::Ge(plane[q].m[s].v, zero.v);
+      N corner[4];
+      for (int c = 0; c < 4; ++c)
+        corner[c] = select(positive, load<D>(flow, cell + kCellPositive + c), load<D>(flow, cell + kCellNegative + c));
+      const N low = fma(t, corner[2] - corner[0], corner[0]), high = fma(t, corner[3] - corner[1], corner[1]);
+      const N limit = fma(r, high - low, low);
+      demand(hn::Gt(limit.v, zero.v));
+      const N ratio = abs(plane[q].m[s]) / limit;
+      sum = sum + ratio * N{hn::Sqrt(ratio.v)};
+    }
+    return sum;
+  };
+  N over[2] = {calc_demand(0), calc_demand(1)};
+  M out[2] = {hn::Gt(over[0].v, one.v), hn::Gt(over[1].v, one.v)};
+  N scale[2];
+  N by[2][2] = {{zero, zero}, {zero, zero}};  // further inelastic rotation [plane][station]
+  M flowed = hn::And(good, hn::Or(out[0], out[1]));
+  if (!hn::AllFalse(tag, flowed)) {
+    for (int s = 0; s < 2; ++s) {
+      demand(hn::Or(hn::Not(out[s]), hn::Le(over[s].v, hn::Set(tag, kMostOver))));
+      scale[s] = select(out[s], inverse_root<D>(over[s]), one);
+    }
+    // one station alone
+    N target[2][2];
+    for (int q = 0; q < 2; ++q)
+      for (int s = 0; s < 2; ++s) target[q][s] = plane[q].m[s] * scale[s];
+    const M alone[2] = {hn::AndNot(out[1], out[0]), hn::AndNot(out[0], out[1])};
+    N trial[2][2];
+    for (int q = 0; q < 2; ++q) {
+      BendingPlane<D>& P = plane[q];
+      for (int s = 0; s < 2; ++s) {
+        trial[q][s] = P.m[s];
+        const N turn = (P.m[s] - target[q][s]) / P.stiffness[s];
+        by[q][s] = select(hn::And(alone[s], hn::Gt(P.stiffness[s].v, zero.v)), turn, zero);
+      }
+      const N m0 = P.m[0], m1 = P.m[1];
+      P.m[0] = fnma(P.cross, by[q][1], select(alone[0], target[q][0], m0));
+      P.m[1] = fnma(P.cross, by[q][0], select(alone[1], target[q][1], m1));
+    }
+    // which may push the other one out
+    M both = hn::And(out[0], out[1]);
+    for (int s = 0; s < 2; ++s) {
+      const N again = calc_demand(s);
+      const M pushed = hn::And(alone[1 - s], hn::Gt(again.v, one.v));
+      if (HWY_LIKELY(hn::AllFalse(tag, pushed))) continue;
+      demand(hn::Or(hn::Not(pushed), hn::Le(again.v, hn::Set(tag, kMostOver))));
+      const N back = inverse_root<D>(again);
+      for (int q = 0; q < 2; ++q) target[q][s] = select(pushed, plane[q].m[s] * back, target[q][s]);
+      both = hn::Or(both, pushed);
+    }
+    if (!hn::AllFalse(tag, both)) {
+      N work[2] = {zero, zero};
+      for (int q = 0; q < 2; ++q) {
+        const BendingPlane<D>& P = plane[q];
+        const N determinant = fms(P.stiffness[0], P.stiffness[1], P.cross * P.cross);
+        demand(hn::Or(hn::Not(both), hn::Gt(determinant.v, (num<D>(1e-9) * P.stiffness[0] * P.stiffness[1]).v)));
+        const N over0 = trial[q][0] - target[q][0], over1 = trial[q][1] - target[q][1];
+        const N by0 = fms(P.stiffness[1], over0, P.cross * over1) / determinant;
+        const N by1 = fms(P.stiffness[0], over1, P.cross * over0) / determinant;
+        work[0] = fma(target[q][0], by0, work[0]);
+        work[1] = fma(target[q][1], by1, work[1]);
+        by[q][0] = select(both, by0, by[q][0]);
+        by[q][1] = select(both, by1, by[q][1]);
+      }
+      demand(hn::Or(hn::Not(both), hn::And(hn::Ge(work[0].v, zero.v), hn::Ge(work[1].v, zero.v))));
+    }
+  }
+  for (int q = 0; q < 2; ++q) {
+    BendingPlane<D>& P = plane[q];
+    for (int s = 0; s < 2; ++s) P.phi[s] = P.phi[s] + by[q][s];
+    P.measure();
+    f[q == 0 ? 2 : 1] = P.shear();
+    f[q == 0 ? 4 : 5] = P.moment();
+  }
+  // shear: the rest of the limits holds, or the full law is asked
+  const N pressed = load<D>(flow, kShearFriction) * N{hn::Max(zero.v, (zero - f[0]).v)};
+  const N vy = f[1] / (load<D>(flow, kShearOwn) + pressed), vz = f[2] / (load<D>(flow, kShearOwn + 1) + pressed);
+  demand(hn::Le(fma(vy, vy, vz * vz).v, one.v));
+  N reached[2];
+  for (int s = 0; s < 2; ++s) {
+    const N turned = fma(plane[0].phi[s], plane[0].phi[s], plane[1].phi[s] * plane[1].phi[s]);
+    const N so_far = load<D>(flow, kStations + s * kStationFields + kReached);
+    const M moves = hn::Or(hn::Ne(by[0][s].v, zero.v), hn::Ne(by[1][s].v, zero.v));
+    reached[s] = select(moves, N{hn::Max(so_far.v, hn::Sqrt(turned.v))}, so_far);
+    demand(hn::Lt(reached[s].v, load<D>(flow, kStations + s * kStationFields + kRupture).v));
+  }
+  const N idle = select(flowed, zero, load<D>(flow, kIdle) + one);
+  demand(hn::Lt(idle.v, hn::Set(tag, kLongestIdle)));
+
+  // what is new of the inelastic rotation: a plastic part and added flexibility
+  flowed = hn::And(good, flowed);
+  N stored = zero;
+  for (int i = 0; i < 6; ++i) stored = fma(f[i] * load<D>(flow, kFlexibility + i), f[i], stored);
+  for (int q = 0; q < 2; ++q)
+    for (int s = 0; s < 2; ++s) {
+      const BendingPlane<D>& P = plane[q];
+      const int at = kStations + s * kStationFields;
+      const N m = P.m[s], plastic = load<D>(flow, at + kPhi + q), share = load<D>(flow, at + kShare);
+      const N added = fnma(P.soft[s], m, P.phi[s] - plastic);
+      const M damages = hn::And(flowed, hn::And(hn::Gt(share.v, zero.v), hn::Gt((added * m).v, zero.v)));
+      const N top = {hn::Min((share * abs(P.phi[s]) / abs(m)).v, (num<D>(kMostDamage) / P.stiffness[s]).v)};
+      const N grown = fma(share, added / m, P.soft[s]);
+      const N soft = select(damages, N{hn::Max(P.soft[s].v, hn::Min(top.v, grown.v))}, P.soft[s]);
+      store_where<D>(flowed, soft, flow, at + kSoftness + q);
+      store_where<D>(flowed, fnma(soft, m, P.phi[s]), flow, at + kPhi + q);
+      stored = fma(soft * m, m, stored);
+    }
+  stored = half * stored;
+  N work = zero;
+  for (int i = 0; i < 6; ++i) {
+    work = fma(fma(k[i], e_before[i], f[i]), d[i] - load<D>(flow, kBefore + i), work);
+    store_where<D>(good, d[i], flow, kBefore + i);
+  }
+  const N lost = fms(half, work, stored - load<D>(flow, kStored));
+  store_where<D>(flowed, load<D>(flow, kPlastic) + lost, flow, kPlastic);
+  store_where<D>(good, stored, flow, kStored);
+  store_where<D>(good, idle, flow, kIdle);
+  for (int s = 0; s < 2; ++s) store_where<D>(good, reached[s], flow, kStations + s * kStationFields + kReached);
+  return good;
+}
+
 /// Forces of one block of elements (docs/theory/zones.md, eq. 1 to 12, and multibody.md, eq. 4).
 template <class D>
 HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, const Poses<D>& A, const Poses<D>& B) {
   using N = Num<D>;
-  const D d;
-  const size_t W = hn::Lanes(d);
+  const D tag;
+  const size_t W = hn::Lanes(tag);
   double* HWY_RESTRICT slot = job.slots + static_cast<size_t>(kSlotFields) * W * block;
   double* HWY_RESTRICT out = job.forces + static_cast<size_t>(kForceFields) * W * block;
 
@@ -297,15 +520,16 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
   N over_sine, coefficient;
   turning<D>(s2, over_sine, coefficient);
   const V3<D> r = over_sine * v;
-  auto outside = hn::Gt(s2.v, load<D>(slot, kMostTurn).v);
+  const auto too_far = hn::Gt(s2.v, load<D>(slot, kMostTurn).v);
+  auto outside = too_far;
 
-  N u[6] = {t.x, t.y, t.z, r.x, r.y, r.z}, e[6], f[6], before[6];
+  const N d[6] = {t.x, t.y, t.z, r.x, r.y, r.z};
+  N u[6], e[6], f[6], k[6], was[6], before[6];
   for (int i = 0; i < 6; ++i) {
-    u[i] = u[i] - load<D>(slot, kOffset + i);
-    before[i] = load<D>(slot, kStretch + i);
-    e[i] = u[i];
+    u[i] = d[i] - load<D>(slot, kOffset + i);
+    was[i] = load<D>(slot, kStretch + i);
+    e[i] = u[i], before[i] = was[i];
   }
-  N was[6] = {before[0], before[1], before[2], before[3], before[4], before[5]};
   const bool softened = job.softened[block] != 0;
   if (softened) {
     for (int plane = 0; plane < 2; ++plane) {
@@ -318,49 +542,76 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
       before[bend] = fma(c10, was[shear], c11 * was[bend]);
     }
   }
-  N k[6];
   for (int i = 0; i < 6; ++i) {
     k[i] = load<D>(slot, kStiffness + i);
     f[i] = k[i] * e[i];
   }
   // is every resultant inside the bounds for sure?
-  const N one = num<D>(1);
+  const N one = num<D>(1), zero = num<D>(0);
   outside = hn::Or(outside, hn::Not(hn::And(hn::Ge(f[0].v, load<D>(slot, kLeastForce).v),
                                             hn::Le(f[0].v, load<D>(slot, kMostForce).v))));
   const N vy = f[1] * load<D>(slot, kShearScale), vz = f[2] * load<D>(slot, kShearScale + 1);
   outside = hn::Or(outside, hn::Gt(fma(vy, vy, vz * vz).v, one.v));
-  outside = hn::Or(outside, hn::Gt((N{hn::Abs(f[3].v)} * load<D>(slot, kTorsionScale)).v, one.v));
+  const N torsion_scale = load<D>(slot, kTorsionScale);
+  outside = hn::Or(outside, hn::Gt((abs(f[3]) * torsion_scale).v, one.v));
   const N exponent = load<D>(slot, kExponent);
   const N scale_y = load<D>(slot, kMomentScale), scale_z = load<D>(slot, kMomentScale + 1);
+  const N x[2] = {load<D>(slot, kStation), load<D>(slot, kStation + 1)};
   for (int station = 0; station < 2; ++station) {
-    const N x = load<D>(slot, kStation + station);
-    const N my = N{hn::Abs(fma(x, f[2], f[4]).v)} * scale_y, mz = N{hn::Abs(fnma(x, f[1], f[5]).v)} * scale_z;
+    const N my = abs(fma(x[station], f[2], f[4])) * scale_y, mz = abs(fnma(x[station], f[1], f[5])) * scale_z;
     const auto linear = hn::Gt((my + mz).v, one.v);
-    if (HWY_LIKELY(hn::AllFalse(d, linear))) continue;
-    const auto is_square = hn::Ge(exponent.v, hn::Set(d, 2.0)), is_three_halves = hn::Ge(exponent.v, hn::Set(d, 1.5));
+    if (HWY_LIKELY(hn::AllFalse(tag, linear))) continue;
+    const auto is_square = hn::Ge(exponent.v, hn::Set(tag, 2.0)),
+               is_three_halves = hn::Ge(exponent.v, hn::Set(tag, 1.5));
     const auto raised = [&](N m) -> N {
-      return {hn::IfThenElse(is_square, (m * m).v, hn::IfThenElse(is_three_halves, hn::Mul(m.v, hn::Sqrt(m.v)), m.v))};
+      return select(is_square, m * m, select(is_three_halves, m * N{hn::Sqrt(m.v)}, m));
     };
     outside = hn::Or(outside, hn::Gt((raised(my) + raised(mz)).v, one.v));
+  }
+  // what the damper does on the part of the deformation that is not elastic
+  N slid[6] = {zero, zero, zero, zero, zero, zero};
+  bool books_slid = softened;
+  if (HWY_UNLIKELY(!hn::AllFalse(tag, outside))) {
+    const auto flows = hn::AndNot(too_far, hn::And(outside, hn::Gt(load<D>(slot, kFlows).v, zero.v)));
+    if (softened)
+      for (int i = 0; i < 6; ++i) slid[i] = (u[i] - was[i]) - (e[i] - before[i]);
+    if (!hn::AllFalse(tag, flows)) {
+      double* HWY_RESTRICT flow = job.flows + static_cast<size_t>(kFlowFields) * W * block;
+      N f_flow[6], d_before[6];
+      for (int i = 0; i < 6; ++i) d_before[i] = load<D>(flow, kBefore + i);
+      const auto good = flow_in_bending<D>(flows, flow, x, torsion_scale, k, d, was, f_flow);
+      for (int i = 0; i < 6; ++i) {
+        f[i] = select(good, f_flow[i], f[i]);
+        const N stretch = f_flow[i] * load<D>(flow, kFlexibility + i);
+        e[i] = select(good, stretch, e[i]);
+        u[i] = select(good, stretch, u[i]);
+        before[i] = select(good, was[i], before[i]);
+        slid[i] = select(good, (d[i] - d_before[i]) - (stretch - was[i]), slid[i]);
+      }
+      books_slid = true;
+      outside = hn::AndNot(good, outside);
+    }
+  } else if (softened) {
+    for (int i = 0; i < 6; ++i) slid[i] = (u[i] - was[i]) - (e[i] - before[i]);
   }
 
   // standard linear solid: the damper follows the mean of the step
   const N viscous = load<D>(slot, kViscous), half = num<D>(0.5), keep = one - load<D>(slot, kRelaxation);
   const N taken = fma(half, keep, half);
   const auto inside = hn::Not(outside);
-  N g[6], work = num<D>(0), lost = num<D>(0);
+  N g[6], work = zero, lost = zero;
   for (int i = 0; i < 6; ++i) {
     const N old = load<D>(slot, kBehind + i), stretched = e[i] - before[i];
     const N behind = fma(taken, stretched, keep * old), rate = viscous * k[i];
     const N twice_mean = rate * (behind + old);
     work = fma(twice_mean, stretched, work);
-    if (softened) lost = fma(twice_mean, (u[i] - was[i]) - stretched, lost);
+    if (books_slid) lost = fma(twice_mean, slid[i], lost);
     g[i] = fma(rate, behind, f[i]);
     store_where<D>(inside, behind, slot, kBehind + i);
     store_where<D>(inside, u[i], slot, kStretch + i);
   }
   store_where<D>(inside, fma(half, work, load<D>(slot, kDamped)), slot, kDamped);
-  if (softened) store_where<D>(inside, fma(half, lost, load<D>(slot, kBled)), slot, kBled);
+  if (books_slid) store_where<D>(inside, fma(half, lost, load<D>(slot, kBled)), slot, kBled);
 
   // torque conjugate to the rate of the rotation vector
   const V3<D> m{g[3], g[4], g[5]};
@@ -371,7 +622,7 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
   // M seen from both centres
   store3<D>(cross(apart + lever_b, force) + torque, out, 3);
   store3<D>(cross(lever_b, force) + torque, out, 6);
-  if (HWY_UNLIKELY(!hn::AllFalse(d, outside))) report<D>(outside, block, *job.outside);
+  if (HWY_UNLIKELY(!hn::AllFalse(tag, outside))) report<D>(outside, block, *job.outside);
 }
 
 template <class D>

@@ -35,9 +35,47 @@ enum Slot : int {
   kDamped = 51,        // work of the dampers so far
   kBled = 52,          // the part of it on what damage softened
   kSoft = 53,          // about y: elastic shear and rotation from both (2 x 2), about z (2 x 2)
-  kSlotFields = 61
+  kFlows = 61,         // 1: the law of flowing zones below governs instead of the bounds
+  kSlotFields = 62
 };
 inline constexpr double kLargestTurn = 0.25;  // kMostTurn of a live element: 60 degrees
+
+/// Fields of the slot of a zone that may flow in bending; everything else is inside its limits, or the full law is
+/// asked.
+enum Flow : int {
+  kAxial = 0,          // plastic elongation
+  kSlip = 1,           // along y, z (2)
+  kTwist = 3,          //
+  kFlowLeast = 4,      // range of normal force in which neither end of the axial law is reached
+  kFlowMost = 5,       //
+  kShearOwn = 6,       // limits without normal force, along y, z (2)
+  kShearFriction = 8,  //
+  kFlexibility = 9,    // one over the stiffness, 0 for none (6)
+  kBefore = 15,        // deformation at the step before (6)
+  kStored = 21,        // elastic energy at the step before
+  kPlastic = 22,       // dissipated since the slot was written
+  kIdle = 23,          // steps without flow
+  kStations = 24,      // both stations, kStationFields each
+  kStationFields = 31,
+  kFlowFields = kStations + 2 * kStationFields
+};
+/// Fields of a station: inelastic rotations, damage, and the cell of the moment family about each axis.
+enum FlowStation : int {
+  kPhi = 0,       // plastic rotation about y, z (2)
+  kSoftness = 2,  // flexibility added by damage about y, z (2)
+  kReached = 4,   //
+  kShare = 5,     // of damage
+  kRupture = 6,   // rotation
+  kCell = 7,      // about y, about z: kCellFields each
+  kCellFields = 12
+};
+/// Fields of a cell: its lowest normal force and one over its width, the same of the rotation, and the limits for
+/// positive and for negative moments at its corners: (force, rotation) low low, low high, high low, high high.
+enum FlowCell : int { kCellForce = 0, kCellRotation = 2, kCellPositive = 4, kCellNegative = 8 };
+/// Steps without flow after which the full law is asked for bounds.
+inline constexpr double kLongestIdle = 20;
+/// Most flexibility that damage adds, over the elastic one: unloading keeps a twentieth of the stiffness.
+inline constexpr double kMostDamage = 19;
 
 /// Fields of a body's constants.
 enum BodyField : int {
@@ -71,6 +109,7 @@ struct ElementJob {
   const unsigned char* live;             // per block: live lanes, 0 skips it
   const unsigned char* softened;         // per block: some lane is softened by damage
   double* slots;                         // kSlotFields a block
+  double* flows;                         // kFlowFields a block
   double* forces;                        // kForceFields a block
   const std::uint32_t *a, *b;            // body slot of each lane (W a block); null: batch
   const std::uint32_t *body_a, *body_b;  // batch: body of each block

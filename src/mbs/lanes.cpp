@@ -35,6 +35,7 @@ void Lanes::allocate_bodies(size_t bodies) {
 void Lanes::allocate_elements(size_t elements) {
   element_blocks = is_batch ? elements : (elements + W - 1) / W;
   slots.assign(element_blocks * kernel::kSlotFields * W, 0);
+  flows.assign(element_blocks * kernel::kFlowFields * W, 0);
   element_forces.assign(element_blocks * kernel::kForceFields * W, 0);
   live.assign(element_blocks, 0);
   softened.assign(element_blocks, 0);
@@ -56,7 +57,7 @@ void Lanes::evaluate_elements(size_t first, size_t last, std::vector<std::uint32
   kernel::ElementJob job;
   job.first = first, job.last = last;
   job.live = live.data(), job.softened = softened.data();
-  job.slots = slots.data(), job.forces = element_forces.data();
+  job.slots = slots.data(), job.flows = flows.data(), job.forces = element_forces.data();
   job.a = is_batch ? nullptr : body_a.data(), job.b = is_batch ? nullptr : body_b.data();
   job.body_a = body_a.data(), job.body_b = body_b.data();
   job.p = p.data(), job.q = q.data();

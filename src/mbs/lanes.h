@@ -17,7 +17,7 @@ struct Lanes {
   // bodies, the ground behind the last one
   AlignedVector<double> p, v, L, w, q, R, force, torque, constants;
   // elements
-  AlignedVector<double> slots, element_forces;
+  AlignedVector<double> slots, flows, element_forces;
   std::vector<unsigned char> live, softened;  // lanes of each block
   // one run: slots of elements (several may be gone), bodies of slots; elements meeting in each body
   std::vector<std::uint32_t> slot_of, element_of, body_a, body_b;  // batch: bodies of each block
@@ -43,6 +43,14 @@ struct Lanes {
   }
   double force_field(size_t slot, size_t f) const {
     return element_forces[(slot / W * kernel::kForceFields + f) * W + slot % W];
+  }
+
+  /// Field f of a slot's flow.
+  double& flow(size_t slot, int f) {
+    return flows[(slot / W * kernel::kFlowFields + static_cast<size_t>(f)) * W + slot % W];
+  }
+  double flow(size_t slot, int f) const {
+    return flows[(slot / W * kernel::kFlowFields + static_cast<size_t>(f)) * W + slot % W];
   }
 
   void allocate_bodies(size_t bodies);

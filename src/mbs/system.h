@@ -281,7 +281,9 @@ class System {
   void evaluate_elements();
   void sum_element_forces();
   Vec3 calc_element_reaction() const;
-  /// What the slots know and the zones do not, for snapshots.
+  void save_slot(size_t slot, std::vector<double>& to) const;
+  const double* restore_slot(size_t slot, const double* from);
+  /// The slots of all live elements, for snapshots.
   void save_elements();
   void restore_elements(const std::vector<double>& history);
   void pack_body(size_t body);

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <functional>
 
+#include "mbs/kernel.h"
+
 namespace topple::mbs {
 
 namespace {
@@ -82,7 +84,7 @@ double calc_curve(const CompiledCurve& curve, double x) {
   if (curve.x.empty()) return kUnlimited;
   if (x <= curve.x.front()) return curve.f.front();
   if (x >= curve.x.back()) return curve.f.back();
-  const size_t i = static_cast<size_t>(find_interval(curve.x, x, 0));
+  const size_t i = static_cast<size_t>(std::upper_bound(curve.x.begin(), curve.x.end(), x) - curve.x.begin()) - 1;
   const double t = (x - curve.x[i]) / (curve.x[i + 1] - curve.x[i]);
   return curve.f[i] + t * (curve.f[i + 1] - curve.f[i]);
 }
@@ -109,7 +111,8 @@ double calc_compression_capacity(const CompiledFamily& family, double rotation) 
   if (family.K == 0) return kUnlimited;
   const size_t last = static_cast<size_t>(family.J) - 1;
   if (rotation >= family.rotation[last]) return family.capacity[last];
-  const size_t i = static_cast<size_t>(find_interval(family.rotation, rotation, 0));
+  const auto above = std::upper_bound(family.rotation.begin(), family.rotation.end(), rotation);
+  const size_t i = static_cast<size_t>(above - family.rotation.begin()) - 1;
   const double t = (rotation - family.rotation[i]) / (family.rotation[i + 1] - family.rotation[i]);
   return family.capacity[i] + t * (family.capacity[i + 1] - family.capacity[i]);
 }
@@ -283,10 +286,11 @@ void find_safe_bounds(const ZoneParameters& p, const std::vector<CompiledLaw>& l
 
 /// x to the power e, quickly for the exponent that is usual.
 double raised(double x, double e) { return e == 1.5 ? x * std::sqrt(x) : std::pow(x, e); }
+/// and its inverse.
+double root_of(double x, double e) { return e == 1.5 ? std::cbrt(x * x) : std::pow(x, 1 / e); }
 
 constexpr double kTiny = 1e-300;
-/// Most flexibility that damage adds, over the elastic one: unloading keeps a twentieth of the stiffness.
-constexpr double kMostDamage = 19;
+using kernel::kMostDamage;
 
 /// The stiffness goes over to its share without a jump of the forces: the rest of the deformation becomes permanent.
 /// The stations of a two-station element share the change of rotation evenly, and its shear the change of displacement.
@@ -382,6 +386,30 @@ bool advance_inside_bounds(const ZoneParameters& p, const Six& d, double h, Zone
   z.damper_energy = damper_energy;
   z.energy = energy;
   z.normal_force = f[0];
+  return true;
+}
+
+}  // namespace
+
+namespace {
+
+/// Shares of both moments that (|My|/Ly)^p + (|Mz|/Lz)^p = 1 leaves; false if they are inside.
+bool find_return(double my, double mz, const MomentLimit& ly, const MomentLimit& lz, double exponent, double scale[2]) {
+  const double limit_y = my >= 0 ? ly.positive : ly.negative, limit_z = mz >= 0 ? lz.positive : lz.negative;
+  const double ay = std::abs(my), az = std::abs(mz);
+  if (ay <= 0.5 * limit_y && az <= 0.5 * limit_z) return false;  // p >= 1: inside for sure
+  const double ry = limit_y > 0 ? ay / limit_y : (ay > 0 ? kUnlimited : 0);
+  const double rz = limit_z > 0 ? az / limit_z : (az > 0 ? kUnlimited : 0);
+  if (std::isinf(ry) || std::isinf(rz)) {
+    scale[0] = std::isinf(ry) ? 0 : std::min(1.0, 1 / std::max(ry, kTiny));
+    scale[1] = std::isinf(rz) ? 0 : std::min(1.0, 1 / std::max(rz, kTiny));
+    return true;
+  }
+  // the larger ratio taken out of the power, so that an uniaxial state keeps its limit to round-off
+  const double big = std::max(ry, rz), small = std::min(ry, rz);
+  const double r = small > 1e-9 * big ? big * root_of(1 + raised(small / big, exponent), exponent) : big;
+  if (r <= 1) return false;
+  scale[0] = scale[1] = 1 / r;
   return true;
 }
 
@@ -489,54 +517,97 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
     if (z.elongated >= limits.law().rupture_elongation) broke = BreakReason::Tension;
 
     // bending at the stations: radial return on (|My|/Ly)^p + (|Mz|/Lz)^p = 1
-    const int sweeps = n == 1 ? 1 : 12;
-    for (int sweep = 0; sweep < sweeps; ++sweep) {
-      bool changed = false;
-      for (int s = 0; s < n; ++s) {
-        const Limits station_limits(laws, p.law[s], z, time);
-        StationState& st = z.station[s];
-        for (int q = 0; q < 2; ++q)
-          m[q][s] = Plane::at(planes[q].moment(phi[q], n), planes[q].shear(p.x, phi[q], n), p.x[s], planes[q].sign);
-        // what is left of the section carries both the force and the moment
-        const double axial = integrity > 0 ? force[0] / integrity : 0;
-        const MomentLimit ly = station_limits.moment(0, axial, st), lz = station_limits.moment(1, axial, st);
-        const double limit_y = integrity * (m[0][s] >= 0 ? ly.positive : ly.negative);
-        const double limit_z = integrity * (m[1][s] >= 0 ? lz.positive : lz.negative);
-        const double ay = std::abs(m[0][s]), az = std::abs(m[1][s]);
-        if (ay <= 0.5 * limit_y && az <= 0.5 * limit_z) continue;  // p >= 1: inside for sure
-        const double ry = limit_y > 0 ? ay / limit_y : (ay > 0 ? kUnlimited : 0);
-        const double rz = limit_z > 0 ? az / limit_z : (az > 0 ? kUnlimited : 0);
-        const double e = station_limits.law().biaxial_exponent;
-        double scale_y = 1, scale_z = 1;
-        if (std::isinf(ry) || std::isinf(rz)) {
-          scale_y = std::isinf(ry) ? 0 : std::min(1.0, 1 / std::max(ry, kTiny));
-          scale_z = std::isinf(rz) ? 0 : std::min(1.0, 1 / std::max(rz, kTiny));
-        } else {
-          if (raised(ry, e) + raised(rz, e) <= 1) continue;
-          // the larger ratio taken out of the power, so that an uniaxial state keeps its limit to round-off
-          const double big = std::max(ry, rz), small = std::min(ry, rz);
-          const double r = small > 1e-9 * big ? big * std::pow(1 + raised(small / big, e), 1 / e) : big;
-          if (r <= 1) continue;
-          scale_y = scale_z = 1 / r;
-        }
-        const double scale[2] = {scale_y, scale_z};
-        double length2 = 0, turn2 = 0;
-        for (int q = 0; q < 2; ++q) {
-          const double target = m[q][s] * scale[q];
-          const double turn = station_stiffness[q][s] > 0 ? (m[q][s] - target) / station_stiffness[q][s] : 0;
-          phi[q][s] += turn;
-          m[q][s] = target;
-          length2 += phi[q][s] * phi[q][s];
-          turn2 += turn * turn;
-        }
-        if (turn2 > 0) {
-          flowed = true;
-          if (turn2 > 1e-18 * length2) changed = true;  // the other station feels it
-          st.reached = std::max(st.reached, std::sqrt(length2));
-        }
-        if (st.reached >= station_limits.law().rupture_rotation) broke = BreakReason::Rotation;
+    const Limits station_limits[2] = {limits, n > 1 ? Limits(laws, p.law[1], z, time) : limits};
+    // what is left of the section carries both the force and the moment
+    const double axial = integrity > 0 ? force[0] / integrity : 0;
+    MomentLimit most[2][2];  // [plane][station]
+    for (int s = 0; s < n; ++s)
+      for (int q = 0; q < 2; ++q) {
+        most[q][s] = station_limits[s].moment(q, axial, z.station[s]);
+        most[q][s].positive *= integrity;
+        most[q][s].negative *= integrity;
       }
-      if (!changed) break;
+    const auto measure = [&](int s) {
+      for (int q = 0; q < 2; ++q)
+        m[q][s] = Plane::at(planes[q].moment(phi[q], n), planes[q].shear(p.x, phi[q], n), p.x[s], planes[q].sign);
+    };
+    // share of the station's moments that its limits allow; true if that is not all
+    const auto is_outside = [&](int s, double scale[2]) {
+      return find_return(m[0][s], m[1][s], most[0][s], most[1][s], station_limits[s].law().biaxial_exponent, scale);
+    };
+    bool turned[2] = {false, false};
+    const auto turn = [&](int s, const double scale[2]) {
+      bool far = false;  // enough for the other station to feel it
+      for (int q = 0; q < 2; ++q) {
+        const double by = station_stiffness[q][s] > 0 ? m[q][s] * (1 - scale[q]) / station_stiffness[q][s] : 0;
+        phi[q][s] += by;
+        m[q][s] *= scale[q];
+        if (by != 0) turned[s] = true;
+        far = far || std::abs(by) > 1e-9 * std::abs(phi[q][s]);
+      }
+      return far;
+    };
+    double scale[2][2];  // [station][plane]
+    bool outside[2] = {false, false};
+    for (int s = 0; s < n; ++s) {
+      measure(s);
+      outside[s] = is_outside(s, scale[s]);
+    }
+    if (n == 1) {
+      if (outside[0]) (void)turn(0, scale[0]);
+    } else if (outside[0] || outside[1]) {
+      double trial[2][2];  // moments and rotations before either station turns
+      double before[2][2];
+      for (int q = 0; q < 2; ++q)
+        for (int s = 0; s < 2; ++s) trial[q][s] = m[q][s], before[q][s] = phi[q][s];
+      if (outside[0] != outside[1]) {
+        const int one = outside[0] ? 0 : 1, other = 1 - one;
+        if (turn(one, scale[one])) {
+          measure(other);
+          outside[other] = is_outside(other, scale[other]);
+        }
+      }
+      if (outside[0] && outside[1]) {
+        // both at once: two by two in each plane
+        double target[2][2], by[2][2];
+        bool good = true;
+        for (int q = 0; q < 2 && good; ++q) {
+          const double s12 = planes[q].bending_stiffness + p.x[0] * p.x[1] * planes[q].shear_stiffness;
+          const double s11 = station_stiffness[q][0], s22 = station_stiffness[q][1];
+          const double determinant = s11 * s22 - s12 * s12;
+          good = determinant > 1e-9 * s11 * s22;
+          for (int s = 0; s < 2; ++s) target[q][s] = turned[s] ? trial[q][s] * scale[s][q] : m[q][s] * scale[s][q];
+          const double over0 = trial[q][0] - target[q][0], over1 = trial[q][1] - target[q][1];
+          by[q][0] = (s22 * over0 - s12 * over1) / determinant;
+          by[q][1] = (s11 * over1 - s12 * over0) / determinant;
+        }
+        for (int s = 0; s < 2 && good; ++s) good = target[0][s] * by[0][s] + target[1][s] * by[1][s] >= 0;
+        if (good) {
+          for (int q = 0; q < 2; ++q)
+            for (int s = 0; s < 2; ++s) {
+              phi[q][s] = before[q][s] + by[q][s];
+              turned[s] = turned[s] || by[q][s] != 0;
+            }
+        } else {
+          // in turns
+          for (int sweep = 0; sweep < 12; ++sweep) {
+            bool changed = false;
+            for (int s = 0; s < 2; ++s) {
+              measure(s);
+              if (is_outside(s, scale[s]) && turn(s, scale[s])) changed = true;
+            }
+            if (!changed) break;
+          }
+        }
+      }
+    }
+    for (int s = 0; s < n; ++s) {
+      StationState& st = z.station[s];
+      if (turned[s]) {
+        flowed = true;
+        st.reached = std::max(st.reached, std::sqrt(phi[0][s] * phi[0][s] + phi[1][s] * phi[1][s]));
+      }
+      if (st.reached >= station_limits[s].law().rupture_rotation) broke = BreakReason::Rotation;
     }
     if (flowed) {
       // split what is new of the inelastic rotation into a plastic part and added flexibility
@@ -547,11 +618,11 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
           StationState& st = z.station[s];
           m[q][s] = Plane::at(force[q == 0 ? 4 : 5], force[q == 0 ? 2 : 1], p.x[s], planes[q].sign);
           const double added = phi[q][s] - st.phi[q] - st.soft[q] * m[q][s];
-          const double share = Limits(laws, p.law[s], z, time).law().damage_share;
+          const double share = station_limits[s].law().damage_share;
           if (share > 0 && added * m[q][s] > 0) {
-            const double most =
+            const double top =
                 std::min(share * std::abs(phi[q][s]) / std::abs(m[q][s]), kMostDamage / station_stiffness[q][s]);
-            st.soft[q] = std::max(st.soft[q], std::min(most, st.soft[q] + share * added / m[q][s]));
+            st.soft[q] = std::max(st.soft[q], std::min(top, st.soft[q] + share * added / m[q][s]));
           }
           st.phi[q] = phi[q][s] - st.soft[q] * m[q][s];
         }
@@ -643,6 +714,82 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
   z.damping -= damper_energy - z.damper_energy;
   z.damper_energy = damper_energy;
   z.has_elastic = true;
+}
+
+double calc_bound_utilisation(const ZoneParameters& p, const ZoneState& z) {
+  if (p.stations == 0) return 0;
+  const double* f = z.elastic_force;
+  const double vy = f[1] * z.safe_shear[0], vz = f[2] * z.safe_shear[1];
+  double u = std::max(std::abs(f[3]) * z.safe_torsion, std::sqrt(vy * vy + vz * vz));
+  for (int s = 0; s < p.stations; ++s) {
+    const double my = std::abs(f[4] + p.x[s] * f[2]) * z.safe_moment[0];
+    const double mz = std::abs(f[5] - p.x[s] * f[1]) * z.safe_moment[1];
+    u = std::max(u, my + mz);
+  }
+  return u;
+}
+
+bool write_flow(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, const ZoneState& z, double time,
+                double* out) {
+  using namespace kernel;
+  constexpr double unlimited = 1e300;
+  if (!z.live || !z.has_elastic || z.next_law >= 0 || p.stations == 0 || p.external_axial) return false;
+  const Limits limits(laws, p.law[0], z, time);
+  if (limits.integrity(z.shortened) != 1) return false;
+  std::fill(out, out + kFlowFields, 0.0);
+  out[kAxial] = z.axial, out[kSlip] = z.slip[0], out[kSlip + 1] = z.slip[1], out[kTwist] = z.twist;
+  double far = 0;  // no cell reaches beyond this rotation
+  for (int s = 0; s < 2; ++s) {
+    double* station = out + kStations + s * kStationFields;
+    station[kRupture] = kUnlimited;
+    const CompiledLaw* law = nullptr;
+    if (s < p.stations) {
+      law = &laws[static_cast<size_t>(z.base_law < 0 ? p.law[s] : z.base_law)];
+      if (law->biaxial_exponent != 1.5) return false;
+      for (int q = 0; q < 2; ++q)
+        station[kPhi + q] = z.station[s].phi[q], station[kSoftness + q] = z.station[s].soft[q];
+      station[kReached] = z.station[s].reached;
+      station[kShare] = law->damage_share;
+      station[kRupture] = law->rupture_rotation;
+      far = std::max(far, z.station[s].reached);
+    }
+    for (int q = 0; q < 2; ++q) {
+      double* cell = station + kCell + q * kCellFields;
+      const CompiledFamily* family = law != nullptr ? &law->moment[q] : nullptr;
+      if (family == nullptr || family->K == 0) {
+        std::fill(cell + kCellPositive, cell + kCellFields, unlimited);
+        continue;
+      }
+      const double force = z.normal_force, reached = z.station[s].reached;
+      if (!(force > family->force.front() && force < family->force.back())) return false;
+      const size_t k = static_cast<size_t>(find_interval(family->force, force, 0));
+      cell[kCellForce] = family->force[k];
+      cell[kCellForce + 1] = 1 / (family->force[k + 1] - family->force[k]);
+      size_t j[2] = {family->rotation.size() - 1, family->rotation.size() - 1};
+      cell[kCellRotation] = reached;
+      if (reached < family->rotation.back()) {
+        j[0] = static_cast<size_t>(find_interval(family->rotation, reached, 0)), j[1] = j[0] + 1;
+        cell[kCellRotation] = family->rotation[j[0]];
+        cell[kCellRotation + 1] = 1 / (family->rotation[j[1]] - family->rotation[j[0]]);
+        far = std::max(far, family->rotation[j[1]]);
+      }
+      for (size_t c = 0; c < 4; ++c) {
+        const double* limit = &family->limit[2 * ((k + c / 2) * static_cast<size_t>(family->J) + j[c % 2])];
+        cell[static_cast<size_t>(kCellPositive) + c] = limit[0];
+        cell[static_cast<size_t>(kCellNegative) + c] = limit[1];
+      }
+    }
+  }
+  out[kFlowLeast] = -limits.compression(far, z.shortened, 1);
+  out[kFlowMost] = limits.tension(z.elongated);
+  for (int axis = 0; axis < 2; ++axis) out[kShearOwn + axis] = limits.shear(axis, z.slipped, 0);
+  out[kShearFriction] = limits.law().shear_friction;
+  for (int i = 0; i < 6; ++i) {
+    out[kFlexibility + i] = p.stiffness[i] > 0 ? 1 / (z.share * p.stiffness[i]) : 0;
+    out[kBefore + i] = z.deformation[i];
+  }
+  out[kStored] = z.energy;
+  return true;
 }
 
 double calc_utilisation(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, double time,
