@@ -117,7 +117,27 @@ std::string make_findings(const Record& r) {
   return table.str();
 }
 
+std::string make_output(const Output& o) {
+  const std::size_t columns = o.columns.size();
+  if (o.value.size() != o.time.size() * columns) throw std::logic_error("record: output " + o.name + " does not fit");
+  Table table;
+  table.text("time [s]");
+  for (const std::string& column : o.columns) table.text(with_unit(column, o.unit));
+  table.end_line();
+  for (std::size_t t = 0; t < o.time.size(); ++t) {
+    table.number(o.time[t]);
+    for (std::size_t c = 0; c < columns; ++c) table.number(o.value[t * columns + c]);
+    table.end_line();
+  }
+  return table.str();
+}
+
 }  // namespace
+
+void write_output_csv(const Record& record, const std::string& folder) {
+  for (const Output& o : record.outputs)
+    replace_file(std::filesystem::path(folder) / "outputs" / (o.name + ".csv"), make_output(o));
+}
 
 void write_csv(const Record& record, const std::string& folder) {
   const std::filesystem::path where(folder);

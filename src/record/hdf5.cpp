@@ -4,7 +4,9 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <iterator>
 #include <mutex>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -230,6 +232,11 @@ class Writer {
     column(name, rows, project, about);
   }
 
+  void group_text(const std::string& group, const std::string& name, const std::string& text) {
+    const Handle id(H5Gopen2(file_, group.c_str(), H5P_DEFAULT), H5Gclose, group);
+    put_text_attribute(id, name, text);
+  }
+
  private:
   static Handle make_file() {
     const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "file");
@@ -330,6 +337,35 @@ class Reader {
     if (set.shape.empty()) damaged(name + " is not a list");
     rows.resize(static_cast<std::size_t>(set.shape[0]));
     fill(name, set, rows, project);
+  }
+
+  /// Names of the groups in a group, none if it is not there.
+  std::vector<std::string> groups_in(const std::string& group) {
+    if (H5Lexists(file_, group.c_str(), H5P_DEFAULT) <= 0) return {};
+    const Handle id(H5Gopen2(file_, group.c_str(), H5P_DEFAULT), H5Gclose, group);
+    H5G_info_t info;
+    demand(H5Gget_info(id, &info), group);
+    std::vector<std::string> names;
+    for (hsize_t i = 0; i < info.nlinks; ++i) {
+      std::string name(256, '\0');
+      const ssize_t size =
+          H5Lget_name_by_idx(id, ".", H5_INDEX_NAME, H5_ITER_INC, i, name.data(), name.size(), H5P_DEFAULT);
+      if (size <= 0 || static_cast<std::size_t>(size) >= name.size()) throw LibraryError{group};
+      names.push_back(name.substr(0, static_cast<std::size_t>(size)));
+    }
+    return names;
+  }
+  std::string group_text(const std::string& group, const std::string& name) {
+    const Handle id(H5Gopen2(file_, group.c_str(), H5P_DEFAULT), H5Gclose, group);
+    return text_attribute(id, name);
+  }
+  /// Numbers of a dataset whose first length is `rows`.
+  template <class Number>
+  void rows_of(const std::string& name, std::vector<Number>& values, std::size_t rows, std::size_t columns) {
+    const Set set = open_set(name);
+    const Shape shape = columns == 1 ? Shape{rows} : Shape{rows, columns};
+    if (set.shape != shape) damaged(name + " has another shape than the table it belongs to");
+    read_numbers(name, set, values);
   }
 
   [[noreturn]] void damaged(const std::string& what) const {
@@ -563,6 +599,45 @@ void transfer(Archive& a, Record& r, Flat& flat) {
   a.scalar("ending/text", r.ending_text, {});
 }
 
+constexpr const char* kOutputs = "outputs";
+
+/// A group for each output, named by it.
+void write_outputs(Writer& w, Record& r) {
+  for (Output& o : r.outputs) {
+    if (o.name.empty() || o.name == "." || o.name.find('/') != std::string::npos)
+      throw std::logic_error("record: an output cannot be called \"" + o.name + "\"");
+    const std::string group = std::string(kOutputs) + "/" + o.name;
+    const std::size_t rows = o.time.size(), columns = o.columns.size();
+    w.block(group + "/time", o.time, {rows}, {.unit = "s"});
+    w.block(group + "/value", o.value, columns == 1 ? Shape{rows} : Shape{rows, columns},
+            {.unit = o.unit, .frame = o.frame});
+    std::string names;
+    for (const std::string& c : o.columns) names += (names.empty() ? "" : " ") + c;
+    w.group_text(group, "quantity", o.quantity);
+    w.group_text(group, "unit", o.unit);
+    w.group_text(group, "frame", o.frame);
+    w.group_text(group, "columns", names);
+  }
+}
+
+void read_outputs(Reader& reader, Record& r) {
+  for (const std::string& name : reader.groups_in(kOutputs)) {
+    const std::string group = std::string(kOutputs) + "/" + name;
+    Output o;
+    o.name = name;
+    o.quantity = reader.group_text(group, "quantity");
+    o.unit = reader.group_text(group, "unit");
+    o.frame = reader.group_text(group, "frame");
+    std::istringstream columns(reader.group_text(group, "columns"));
+    o.columns = {std::istream_iterator<std::string>(columns), {}};
+    reader.first_column(group + "/time", o.time, std::identity{}, {});
+    reader.rows_of(group + "/value", o.value, o.time.size(), o.columns.size());
+    for (std::size_t i = 1; i < o.time.size(); ++i)
+      if (!(o.time[i] > o.time[i - 1])) reader.damaged(group + "/time does not rise");
+    r.outputs.push_back(std::move(o));
+  }
+}
+
 /// What the shapes of the datasets do not show.
 void check_contents(const Reader& reader, const Record& r) {
   for (std::size_t i = 1; i < r.time.size(); ++i)
@@ -593,6 +668,7 @@ void write_hdf5(const Record& record, const std::string& path) {
     const Session session;
     Writer writer;
     transfer(writer, r, flat);
+    write_outputs(writer, r);
     bytes = writer.bytes();
   } catch (const LibraryError& error) {
     throw std::runtime_error("cannot write " + path + ": the HDF5 library refuses " + error.subject);
@@ -615,6 +691,7 @@ Record read_hdf5(const std::string& path) {
       const auto begin = flat.series.begin() + static_cast<std::ptrdiff_t>(i * r.time.size());
       r.series[i].value.assign(begin, begin + static_cast<std::ptrdiff_t>(r.time.size()));
     }
+    read_outputs(reader, r);
     check_contents(reader, r);
   } catch (const LibraryError& error) {
     throw InputError("E702", path + " is not a complete topple record (looking for \"" + error.subject + "\")",

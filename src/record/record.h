@@ -53,6 +53,16 @@ struct Series {
   std::vector<double> value;  // (S)
 };
 
+/// A quantity that a multibody model asked for, sampled at a rate of its own. T samples, C columns.
+struct Output {
+  std::string name;                  // unique; also that of its file
+  std::string quantity;              // for people: "position of body link1"
+  std::string unit, frame;           // SI; "world", or "F" of the joint or element
+  std::vector<std::string> columns;  // "x", "y", "z", or one word          (C)
+  std::vector<double> time;          // strictly rising [s]                 (T)
+  std::vector<double> value;         // NaN: the engine does not say        (T x C)
+};
+
 enum class Status { Info, Good, Warning, Bad };
 /// "info", "good", "warning", "bad": the words in files.
 std::string_view name_of(Status);
@@ -109,6 +119,7 @@ struct Record {
   std::vector<std::uint8_t> zone_state;  // ZoneState                       (S x Z)
   std::vector<float> zone_utilisation;   // demand over capacity            (S x Z)
   std::vector<Series> series;
+  std::vector<Output> outputs;  // read back in the order of their names
   std::vector<Event> events;
   std::vector<Finding> findings;
   std::vector<std::string> not_modelled;
@@ -123,6 +134,8 @@ void write_hdf5(const Record&, const std::string& path);
 Record read_hdf5(const std::string& path);
 /// Writes series.csv, events.csv, bodies.csv and findings.csv into a folder.
 void write_csv(const Record&, const std::string& folder);
+/// Writes outputs/NAME.csv of each output into a folder.
+void write_output_csv(const Record&, const std::string& folder);
 /// The record as the JSON that the report page reads (docs/record.md, "Report data"). Poses are base64 of little-endian
 /// float32.
 std::string to_report_json(const Record&);

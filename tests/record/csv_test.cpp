@@ -125,6 +125,18 @@ TEST_F(Csv, FindingsNameTheirStatusAndLeaveNoNumberEmpty) {
   EXPECT_THAT(table[2], ElementsAre("reach", "Debris", "Reach", "", "", "", "bad"));
 }
 
+TEST_F(Csv, EachOutputIsATableOfItsOwn) {
+  write_output_csv(make_sample(), folder_ / "run");
+  EXPECT_EQ(read_file(folder_ / "run/outputs/reaction [top].csv"),
+            "time [s],x [N],y [N],z [N]\r\n0,1,-0,\r\n0.25,inf,5,6\r\n");
+  EXPECT_EQ(read_file(folder_ / "run/outputs/empty.csv"), "time [s],force [N]\r\n");
+  EXPECT_EQ(read_file(folder_ / "run/outputs/tilt.csv"), "time [s],w [1],x [1],y [1],z [1]\r\n0,1,0,0,0\r\n");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_ / "run/outputs"), {}), 4);
+  Record wrong = make_sample();
+  wrong.outputs[1].time.push_back(1);
+  EXPECT_THROW(write_output_csv(wrong, folder_), std::logic_error);
+}
+
 TEST_F(Csv, AnEmptyRecordGivesHeadingsAlone) {
   write_csv({}, folder_);
   for (const auto* name : {"series.csv", "events.csv", "bodies.csv", "findings.csv"})

@@ -102,6 +102,16 @@ void expect_same(const Record& a, const Record& b) {
     EXPECT_EQ(a.series[i].group, b.series[i].group);
     EXPECT_TRUE(same(a.series[i].value, b.series[i].value));
   }
+  ASSERT_EQ(a.outputs.size(), b.outputs.size());
+  for (std::size_t i = 0; i < a.outputs.size(); ++i) {
+    EXPECT_EQ(a.outputs[i].name, b.outputs[i].name);
+    EXPECT_EQ(a.outputs[i].quantity, b.outputs[i].quantity);
+    EXPECT_EQ(a.outputs[i].unit, b.outputs[i].unit);
+    EXPECT_EQ(a.outputs[i].frame, b.outputs[i].frame);
+    EXPECT_EQ(a.outputs[i].columns, b.outputs[i].columns);
+    EXPECT_TRUE(same(a.outputs[i].time, b.outputs[i].time)) << i;
+    EXPECT_TRUE(same(a.outputs[i].value, b.outputs[i].value)) << i;
+  }
   ASSERT_EQ(a.events.size(), b.events.size());
   for (std::size_t i = 0; i < a.events.size(); ++i) {
     EXPECT_TRUE(same(a.events[i].time, b.events[i].time));
@@ -220,6 +230,12 @@ TEST_F(Hdf5, NamesUnitsAndFrames) {
   EXPECT_EQ(attribute("frames/position", "frame"), "world");
   EXPECT_EQ(attribute("shapes/centre", "frame"), "body");
   EXPECT_EQ(attribute("bodies/mass", "unit"), "kg");
+  EXPECT_EQ(attribute("outputs/tilt", "quantity"), "orientation of body größe");
+  EXPECT_EQ(attribute("outputs/tilt", "columns"), "w x y z");
+  EXPECT_EQ(attribute("outputs/reaction [top]", "unit"), "N");
+  EXPECT_EQ(attribute("outputs/reaction [top]", "frame"), "F");
+  EXPECT_EQ(attribute("outputs/reaction [top]/value", "frame"), "F");
+  EXPECT_EQ(attribute("outputs/y long/time", "unit"), "s");
   const hid_t set = H5Dopen2(file, "frames/position", H5P_DEFAULT), space = H5Dget_space(set);
   hsize_t shape[3] = {};
   ASSERT_EQ(H5Sget_simple_extent_ndims(space), 3);
@@ -300,6 +316,7 @@ TEST_F(Hdf5, RefusesContradictions) {
   EXPECT_TRUE(refused_after("shapes/body", H5T_NATIVE_INT, std::vector{2, 1, 2, 4}));
   EXPECT_TRUE(refused_after("shapes/body", H5T_NATIVE_INT, std::vector{-1, 1, 2, 4}));
   EXPECT_TRUE(refused_after("findings/status", H5T_NATIVE_UINT8, std::vector<std::uint8_t>{0, 4, 0}));
+  EXPECT_TRUE(refused_after("outputs/reaction [top]/time", H5T_NATIVE_DOUBLE, std::vector<double>{1, 1}));
   EXPECT_TRUE(refused_after("frames/time", H5T_NATIVE_DOUBLE, std::vector<double>(700, 1)));
   EXPECT_TRUE(refused_after("frames/zone_state", H5T_NATIVE_UINT8, std::vector<std::uint8_t>(2100, 5)));
 }
@@ -312,6 +329,31 @@ TEST_F(Hdf5, RefusesATableOfUnequalColumns) {
   const hid_t space = H5Screate_simple(1, &four, nullptr);
   H5Dclose(H5Dcreate2(file, "bodies/mass", H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
   H5Sclose(space);
+  H5Fclose(file);
+  EXPECT_EQ(code_of_reading("record.h5"), "E704");
+}
+
+TEST_F(Hdf5, ReadsRecordsWithoutOutputs) {
+  write_hdf5(make_sample(), path("record.h5"));
+  const hid_t file = H5Fopen(path("record.h5").c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  H5Ldelete(file, "outputs", H5P_DEFAULT);
+  H5Fclose(file);
+  Record expected = make_sample();
+  expected.outputs.clear();
+  expect_same(read_hdf5(path("record.h5")), expected);
+}
+
+TEST_F(Hdf5, RefusesOutputsThatDoNotFit) {
+  Record wrong = make_sample();
+  wrong.outputs[1].value.pop_back();
+  EXPECT_THROW(write_hdf5(wrong, path("record.h5")), std::logic_error);
+  wrong = make_sample();
+  wrong.outputs[1].name = "a/b";
+  EXPECT_THROW(write_hdf5(wrong, path("record.h5")), std::logic_error);
+  write_hdf5(make_sample(), path("record.h5"));
+  const hid_t file = H5Fopen(path("record.h5").c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  H5Ldelete(file, "outputs/reaction [top]/time", H5P_DEFAULT);
+  H5Lcopy(file, "outputs/tilt/time", file, "outputs/reaction [top]/time", H5P_DEFAULT, H5P_DEFAULT);
   H5Fclose(file);
   EXPECT_EQ(code_of_reading("record.h5"), "E704");
 }

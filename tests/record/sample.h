@@ -71,6 +71,20 @@ inline Record make_sample() {
     r.series[0].value.push_back(std::sqrt(static_cast<double>(s)));
     r.series[1].value.push_back(s == 3 ? std::nan("") : -1e300 / static_cast<double>(s + 1));
   }
+  r.outputs = {{"empty", "force of cable c", "N", "", {"force"}, {}, {}},
+               {"reaction [top]",
+                "force of joint \"top\"",
+                "N",
+                "F",
+                {"x", "y", "z"},
+                {0, 0.25},
+                {1, -0.0, std::nan(""), inf, 5, 6}},
+               {"tilt", "orientation of body größe", "1", "world", {"w", "x", "y", "z"}, {0}, {1, 0, 0, 0}},
+               {"y long", "length of spring s", "m", "", {"length"}, {}, {}}};
+  for (std::size_t i = 0; i < 2000; ++i) {
+    r.outputs[3].time.push_back(static_cast<double>(i) / 3);
+    r.outputs[3].value.push_back(std::sqrt(static_cast<double>(i)));
+  }
   r.events = {{0.0, "stage", "1", "Stage 1 fires."},
               {1.0 / 3, "rupture", "C-A0-0/foot", "The zone \"foot\" breaks,\nits bars rupture."},
               {inf, "rest", "", ""}};
