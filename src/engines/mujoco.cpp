@@ -1,8 +1,458 @@
 #include "engines/mujoco.h"
 
+#ifndef TOPPLE_WITH_MUJOCO
+
 namespace topple::engines {
 
 std::string mujoco_version() { return {}; }
 std::unique_ptr<Engine> make_mujoco_engine() { return nullptr; }
 
 }  // namespace topple::engines
+
+#else
+
+#include <mujoco/mujoco.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <mutex>
+#include <stdexcept>
+#include <vector>
+
+#include "engines/articulation.h"
+#include "engines/course.h"
+#include "engines/mjcf.h"
+#include "engines/requirements.h"
+
+namespace topple::engines {
+
+namespace {
+
+constexpr int kGroundBit = 1, kBodyBit = 2;
+
+/// MuJoCo's handlers of errors and warnings are the process's; these act for threads that are inside a run alone. Its
+/// own would end the process, or write to a file.
+thread_local bool is_inside = false;
+thread_local std::string last_warning;
+
+void on_error(const char* message) {
+  if (is_inside) throw std::runtime_error(std::string("MuJoCo: ") + message);
+  std::fprintf(stderr, "MuJoCo: %s\n", message);
+  std::abort();
+}
+
+void on_warning(const char* message) { last_warning = message; }
+
+struct Inside {
+  Inside() {
+    static std::once_flag once;
+    std::call_once(once, [] {
+      mju_user_error = on_error;
+      mju_user_warning = on_warning;
+    });
+    is_inside = true;
+    last_warning.clear();
+  }
+  ~Inside() { is_inside = false; }
+  Inside(const Inside&) = delete;
+  Inside& operator=(const Inside&) = delete;
+};
+
+struct Delete {
+  void operator()(mjModel* m) const { mj_deleteModel(m); }
+  void operator()(mjData* d) const { mj_deleteData(d); }
+};
+
+std::unique_ptr<mjModel, Delete> load(const std::string& text) {
+  static std::mutex mutex;  // the library keeps the last model it has read
+  const std::lock_guard<std::mutex> lock(mutex);
+  const auto vfs = std::make_unique<mjVFS>();
+  mj_defaultVFS(vfs.get());
+  if (mj_makeEmptyFileVFS(vfs.get(), "model.xml", static_cast<int>(text.size())) != 0)
+    throw std::runtime_error("MuJoCo: no memory for the model's text");
+  std::memcpy(vfs->filedata[mj_findFileVFS(vfs.get(), "model.xml")], text.data(), text.size());
+  char error[1000] = "";
+  std::unique_ptr<mjModel, Delete> m(mj_loadXML("model.xml", vfs.get(), error, sizeof error));
+  mj_deleteVFS(vfs.get());
+  mj_freeLastXML();
+  if (!m) throw std::runtime_error(std::string("MuJoCo does not take the model: ") + error);
+  return m;
+}
+
+Vec3 to_vec3(const mjtNum* v) { return {v[0], v[1], v[2]}; }
+
+/// A model as MuJoCo's, for one set of live joints and masses.
+class Built {
+ public:
+  Built(const Course& course, double step)
+      : course_(course), model_(course.model()), articulation_(make_articulation(model_, course.joint_live())) {
+    const Ties ties = find_present_ties();
+    const Mjcf mjcf = make_mjcf(course, articulation_, ties, step);
+    m_ = load(mjcf.text);
+    d_.reset(mj_makeData(m_.get()));
+    if (!d_) throw std::runtime_error("MuJoCo: no memory for the state");
+    motion_ = course.motion();
+    body_.assign(model_.bodies.size(), -1);
+    for (const Branch& b : articulation_.branches)
+      body_[static_cast<size_t>(b.body)] = find(mjOBJ_BODY, "b" + std::to_string(b.body));
+    reaction_at_.assign(model_.joints.size(), {});
+    for (const Branch& b : articulation_.branches) {
+      set_speed(b);
+      if (b.joint >= 0) reaction_at_[static_cast<size_t>(b.joint)] = {body_[static_cast<size_t>(b.body)], b.reversed};
+    }
+    for (size_t i = 0; i < articulation_.loops.size(); ++i) {
+      const mbs::Joint& j = model_.joints[static_cast<size_t>(articulation_.loops[i])];
+      if (mjcf.twin_of_loop[i] < 0) continue;
+      const bool reversed = is_ground(model_, j.child.index);
+      const Branch b{reversed ? j.parent.index : j.child.index, reversed ? j.child.index : j.parent.index,
+                     articulation_.loops[i], reversed};
+      set_speed(b);
+      reaction_at_[static_cast<size_t>(b.joint)] = {find(mjOBJ_BODY, "t" + std::to_string(mjcf.twin_of_loop[i])),
+                                                    reversed};
+    }
+    touches_ = can_touch_ground(model_) || can_touch_bodies(model_);
+    has_ties_ = touches_ && (!model_.elements.empty() || !model_.joints.empty());
+    update_ties();
+    if (!touches_) {
+      const size_t nq = static_cast<size_t>(m_->nq), nv = static_cast<size_t>(m_->nv);
+      q_.resize(nq);
+      v_.resize(nv);
+      for (auto& k : v_stage_) k.resize(nv);
+      for (auto& k : a_stage_) k.resize(nv);
+      mean_.resize(nv);
+    }
+    look();
+  }
+
+  const Motion& motion() const { return motion_; }
+  const Work& work() const { return work_; }
+  const Touch& touch() const { return touch_; }
+  bool touches() const { return touches_; }
+
+  /// One step of size h from `time`, positions and velocities known (look()). Empty, or why it failed.
+  std::string advance(double time, double h) {
+    if (touches_) {
+      push(time);
+      const Power before = power(time);
+      mj_step2(m_.get(), d_.get());
+      read_contacts();
+      look();
+      const Power after = power(time + h);
+      work_.damping += 0.5 * h * (before.damping + after.damping);
+      work_.loads += 0.5 * h * (before.loads + after.loads);
+    } else {
+      advance_runge_kutta(time, h);
+    }
+    return find_failure();
+  }
+
+  Reactions find_reactions(double time) {
+    push(time);
+    mj_forwardSkip(m_.get(), d_.get(), mjSTAGE_VEL, 1);
+    mj_rnePostConstraint(m_.get(), d_.get());
+    const size_t J = model_.joints.size();
+    Reactions r{std::vector<Vec3>(J), std::vector<Vec3>(J)};
+    for (size_t i = 0; i < J; ++i) {
+      const auto [body, reversed] = reaction_at_[i];
+      const mbs::Joint& j = model_.joints[i];
+      if (body < 0 || !course_.joint_live()[i]) continue;
+      const mjtNum* at_centre = d_->cfrc_int + 6 * body;
+      const Vec3 c = to_vec3(d_->subtree_com + 3 * m_->body_rootid[body]);
+      const Vec3 p = place_of(j.child, j.X_CM.p);
+      const Vec3 force = to_vec3(at_centre + 3), moment = to_vec3(at_centre) - cross(p - c, force);
+      r.force[i] = reversed ? -force : force;
+      r.moment[i] = reversed ? -moment : moment;
+    }
+    for (const int loop : articulation_.loops) {
+      const size_t i = static_cast<size_t>(loop);
+      const mbs::Joint& j = model_.joints[i];
+      if (j.kind != mbs::Joint::Kind::Distance) continue;
+      const int equality = find(mjOBJ_EQUALITY, "e" + std::to_string(loop));
+      for (int row = 0; row < d_->nefc; ++row) {
+        if (d_->efc_type[row] != mjCNSTR_EQUALITY || d_->efc_id[row] != equality) continue;
+        const Vec3 apart = place_of(j.child, j.X_CM.p) - place_of(j.parent, j.X_PF.p);
+        r.force[i] = (d_->efc_force[row] / norm(apart)) * apart;
+      }
+    }
+    return r;
+  }
+
+  /// Contacts that are possible now.
+  void update_ties() {
+    if (!touches_) return;
+    const Ties ties = find_present_ties();
+    const bool ground = model_.contact.ground, bodies = model_.contact.bodies;
+    for (size_t b = 0; b < model_.bodies.size(); ++b)
+      for (size_t i = 0; i < model_.bodies[b].shapes.size(); ++i) {
+        const int g = find(mjOBJ_GEOM, "g" + std::to_string(b) + "." + std::to_string(i));
+        const bool fixed = model_.bodies[b].fixed;
+        m_->geom_contype[g] = bodies ? kBodyBit : 0;
+        m_->geom_conaffinity[g] =
+            fixed ? 0 : (bodies ? kBodyBit : 0) | (ground && !ties.is_grounded[b] ? kGroundBit : 0);
+      }
+    // the list is sorted and stays so: a pair that may touch again is replaced by the one before it
+    for (int e = 0; e < m_->nexclude; ++e) {
+      const int signature = m_->exclude_signature[e];
+      const auto model_body = [&](int id) { return std::atoi(mj_id2name(m_.get(), mjOBJ_BODY, id) + 1); };
+      if (signature == 0) continue;
+      const int x = model_body(signature >> 16), y = model_body(signature & 0xFFFF);
+      if (!std::binary_search(ties.pairs.begin(), ties.pairs.end(), std::pair(std::min(x, y), std::max(x, y))))
+        m_->exclude_signature[e] = e > 0 ? m_->exclude_signature[e - 1] : 0;
+    }
+  }
+
+ private:
+  int find(int type, const std::string& name) const {
+    const int id = mj_name2id(m_.get(), type, name.c_str());
+    if (id < 0) throw std::runtime_error("MuJoCo's model has no \"" + name + "\"");
+    return id;
+  }
+
+  Ties find_present_ties() const {
+    std::vector<unsigned char> live(model_.elements.size());
+    for (size_t e = 0; e < live.size(); ++e) live[e] = course_.forces().is_live(e);
+    return find_ties(model_, live, course_.joint_live());
+  }
+
+  Vec3 place_of(mbs::BodyId id, const Vec3& p) const {
+    return id == mbs::kGround ? p : motion_.X_WB[static_cast<size_t>(id.index)] * p;
+  }
+
+  /// Speeds of the joints of a branch, those of a twin too, from the motion at the start.
+  void set_speed(const Branch& b) {
+    const size_t body = static_cast<size_t>(b.body);
+    const Vec3 w = motion_.w_WB[body], v = motion_.v_WB[body];
+    const Mat3 R = to_matrix(motion_.X_WB[body].q);
+    const auto put = [&](int joint, const Vec3& x) {
+      for (int k = 0; k < 3; ++k) d_->qvel[m_->jnt_dofadr[joint] + k] = x[k];
+    };
+    if (b.joint < 0) {
+      const int free = find(mjOBJ_JOINT, "f" + std::to_string(b.body));
+      put(free, v);
+      const Vec3 in_body = transpose_times(R, w);
+      for (int k = 0; k < 3; ++k) d_->qvel[m_->jnt_dofadr[free] + 3 + k] = in_body[k];
+      return;
+    }
+    const mbs::Joint& j = model_.joints[static_cast<size_t>(b.joint)];
+    const Vec3 p = place_of(b.reversed ? j.parent : j.child, b.reversed ? j.X_PF.p : j.X_CM.p);
+    Vec3 w_rel = w, v_rel = v + cross(w, p - motion_.X_WB[body].p);
+    if (!is_ground(model_, b.inboard)) {
+      const size_t in = static_cast<size_t>(b.inboard);
+      w_rel -= motion_.w_WB[in];
+      v_rel -= motion_.v_WB[in] + cross(motion_.w_WB[in], p - motion_.X_WB[in].p);
+    }
+    const std::string name = "j" + std::to_string(b.joint) + ".";
+    const auto axis = [&](int joint) { return R * to_vec3(m_->jnt_axis + 3 * joint); };
+    for (const char* number : {"0", "1"}) {
+      const int joint = mj_name2id(m_.get(), mjOBJ_JOINT, (name + number).c_str());
+      if (joint < 0) break;
+      if (m_->jnt_type[joint] == mjJNT_BALL)
+        put(joint, transpose_times(R, w_rel));
+      else
+        d_->qvel[m_->jnt_dofadr[joint]] = dot(axis(joint), m_->jnt_type[joint] == mjJNT_SLIDE ? v_rel : w_rel);
+    }
+  }
+
+  /// Positions and velocities of the bodies at MuJoCo's coordinates.
+  void look() {
+    mj_step1(m_.get(), d_.get());
+    read();
+  }
+  void read() {
+    for (const Branch& b : articulation_.branches) {
+      const size_t i = static_cast<size_t>(b.body);
+      const int id = body_[i];
+      const mjtNum* q = d_->xquat + 4 * id;
+      motion_.X_WB[i] = {to_vec3(d_->xpos + 3 * id), {q[0], q[1], q[2], q[3]}};
+      mjtNum v[6];
+      mj_objectVelocity(m_.get(), d_.get(), mjOBJ_XBODY, id, v, 0);
+      motion_.w_WB[i] = to_vec3(v);
+      motion_.v_WB[i] = to_vec3(v + 3);
+    }
+  }
+
+  /// Forces of the elements at the motion.
+  void push(double time) {
+    course_.forces().calc(time, motion_, wrench_);
+    for (const Branch& b : articulation_.branches) {
+      const size_t i = static_cast<size_t>(b.body);
+      const int id = body_[i];
+      const Wrench& w = wrench_[i];
+      const Vec3 torque = w.torque - cross(to_vec3(d_->xipos + 3 * id) - motion_.X_WB[i].p, w.force);
+      for (int k = 0; k < 3; ++k) {
+        d_->xfrc_applied[6 * id + k] = w.force[k];
+        d_->xfrc_applied[6 * id + 3 + k] = torque[k];
+      }
+    }
+  }
+  Power power(double time) const {
+    return course_.forces().has_power() ? course_.forces().calc_power(time, motion_) : Power{};
+  }
+
+  /// The classical method of fourth order as mj_step does it, but with the forces of each stage.
+  void advance_runge_kutta(double time, double h) {
+    static constexpr double kWhen[4] = {0, 0.5, 0.5, 1}, kWeight[4] = {1.0 / 6, 1.0 / 3, 1.0 / 3, 1.0 / 6};
+    const int nv = m_->nv;
+    mju_copy(q_.data(), d_->qpos, m_->nq);
+    mju_copy(v_.data(), d_->qvel, nv);
+    const auto go = [&](const std::vector<mjtNum>& speed, double time_of) {
+      mju_copy(d_->qpos, q_.data(), m_->nq);
+      mj_integratePos(m_.get(), d_->qpos, speed.data(), time_of);
+    };
+    for (size_t s = 0; s < 4; ++s) {
+      if (s > 0) {
+        go(v_stage_[s - 1], kWhen[s] * h);
+        mju_addScl(d_->qvel, v_.data(), a_stage_[s - 1].data(), kWhen[s] * h, nv);
+        mj_fwdPosition(m_.get(), d_.get());
+        mj_fwdVelocity(m_.get(), d_.get());
+        read();
+      }
+      push(time + kWhen[s] * h);
+      const Power p = power(time + kWhen[s] * h);
+      work_.damping += kWeight[s] * h * p.damping;
+      work_.loads += kWeight[s] * h * p.loads;
+      mj_forwardSkip(m_.get(), d_.get(), mjSTAGE_VEL, 1);
+      mju_copy(v_stage_[s].data(), d_->qvel, nv);
+      mju_copy(a_stage_[s].data(), d_->qacc, nv);
+    }
+    mju_zero(mean_.data(), nv);
+    for (size_t s = 0; s < 4; ++s) mju_addToScl(mean_.data(), v_stage_[s].data(), kWeight[s], nv);
+    go(mean_, h);
+    mju_copy(d_->qvel, v_.data(), nv);
+    for (size_t s = 0; s < 4; ++s) mju_addToScl(d_->qvel, a_stage_[s].data(), kWeight[s] * h, nv);
+    look();
+  }
+
+  void read_contacts() {
+    touch_ = {};
+    for (int i = 0; i < d_->ncon; ++i) {
+      const mjContact& c = d_->contact[i];
+      if (c.efc_address < 0) continue;
+      const int a = m_->body_weldid[m_->geom_bodyid[c.geom1]], b = m_->body_weldid[m_->geom_bodyid[c.geom2]];
+      if (a != 0 && b != 0) {
+        ++touch_.body_contacts;
+        continue;
+      }
+      mjtNum f[6], world[3];
+      mj_contactForce(m_.get(), d_.get(), i, f);
+      mju_rotVecMatT(world, f, c.frame);  // on the second geom
+      touch_.on_ground += (b == 0 ? 1 : -1) * to_vec3(world);
+    }
+  }
+
+  /// MuJoCo resets the state by itself when numbers get bad, and leaves out what its lists cannot hold.
+  std::string find_failure() const {
+    static constexpr struct {
+      int kind;
+      const char* what;
+    } bad[] = {{mjWARN_BADQPOS, "a coordinate"}, {mjWARN_BADQVEL, "a velocity"}, {mjWARN_BADQACC, "an acceleration"}};
+    for (const auto& b : bad)
+      if (d_->warning[b.kind].number > 0)
+        return "MuJoCo found " + std::string(b.what) + " that is not finite or beyond 1e10, number " +
+               std::to_string(d_->warning[b.kind].lastinfo) + ", and reset its state";
+    if (d_->warning[mjWARN_CONTACTFULL].number > 0) return "MuJoCo's list of contacts is full";
+    if (d_->warning[mjWARN_CNSTRFULL].number > 0) return "MuJoCo's list of constraints is full";
+    for (int i = 0; i < m_->nv; ++i)
+      if (!std::isfinite(d_->qvel[i])) return "velocity number " + std::to_string(i) + " is no longer finite";
+    return {};
+  }
+
+  struct Place {
+    int body = -1;
+    bool reversed = false;
+  };
+
+  const Course& course_;
+  const mbs::Model& model_;
+  Articulation articulation_;
+  std::unique_ptr<mjModel, Delete> m_;
+  std::unique_ptr<mjData, Delete> d_;
+  std::vector<int> body_;           // MuJoCo's, of each body; -1: fixed (B)
+  std::vector<Place> reaction_at_;  // MuJoCo's body that a joint moves (J)
+  Motion motion_;
+  Work work_;
+  Touch touch_;
+  bool touches_ = false, has_ties_ = false;
+  std::vector<Wrench> wrench_;
+  std::vector<mjtNum> q_, v_, v_stage_[4], a_stage_[4], mean_;
+};
+
+class MujocoEngine : public Engine {
+ public:
+  std::string name() const override { return "mujoco"; }
+  std::string version() const override { return mujoco_version(); }
+
+  std::vector<Unsupported> find_unsupported(const mbs::Model& model, const mbs::Options& options) const override {
+    std::vector<Unsupported> out = find_impossible_inertias(model);
+    for (Unsupported& u : find_opening_joints(model, options)) out.push_back(std::move(u));
+    for (size_t i = 0; i < model.contact.pairs.size(); ++i)
+      out.push_back({"contact.pairs[" + std::to_string(i) + "]", "rules of its own for a pair of bodies"});
+    const bool touches = can_touch_ground(model) || can_touch_bodies(model);
+    for (size_t i = 0; i < model.events.size() && touches; ++i)
+      for (const mbs::Action& a : model.events[i].actions)
+        if (a.kind == mbs::Action::Kind::ReplaceBody)
+          out.push_back({place_of("events", i, model.events[i].name), "the replacement of a body that may touch"});
+    return out;
+  }
+
+ protected:
+  mbs::Summary solve(const mbs::Model& model, const mbs::Options& options) const override {
+    Course course(model, options);
+    const Inside inside;
+    double step = options.step;
+    if (!(step > 0)) {
+      mbs::Options o = options;
+      o.on_frame = {};
+      o.on_happening = {};
+      step = mbs::Simulation(model, o).step();
+    }
+    if (!course.start(step)) return course.finish(0);
+    long steps = 0;
+    try {
+      Work before;
+      while (!course.is_over()) run_as_built(course, before, steps);
+    } catch (const std::exception& e) { course.fail(e.what()); }
+    return course.finish(steps);
+  }
+
+ private:
+  /// Until the end or until the model must be built anew.
+  static void run_as_built(Course& course, Work& before, long& steps) {
+    using Verdict = Course::Verdict;
+    const double h = course.step();
+    Built built(course, h);
+    if (built.touches()) course.note("contact is MuJoCo's own: soft, with friction and restitution like topple's");
+    const auto accept = [&] {
+      const double time = static_cast<double>(steps) * h;
+      return course.accept(time, built.motion(),
+                           {before.damping + built.work().damping, before.loads + built.work().loads}, built.touch(),
+                           [&] { return built.find_reactions(time); });
+    };
+    Verdict verdict = steps == 0 ? accept() : Verdict::GoOn;
+    while (verdict == Verdict::GoOn || verdict == Verdict::ForcesJumped) {
+      if (verdict == Verdict::ForcesJumped) built.update_ties();
+      const std::string failure = built.advance(static_cast<double>(steps) * h, h);
+      ++steps;
+      if (!failure.empty()) return course.fail(failure);
+      verdict = accept();
+    }
+    before = {before.damping + built.work().damping, before.loads + built.work().loads};
+  }
+};
+
+}  // namespace
+
+std::string mujoco_version() {
+  const int v = mj_version();  // 222 for 2.2.2
+  return std::to_string(v / 100) + "." + std::to_string(v / 10 % 10) + "." + std::to_string(v % 10);
+}
+
+std::unique_ptr<Engine> make_mujoco_engine() { return std::make_unique<MujocoEngine>(); }
+
+}  // namespace topple::engines
+
+#endif
