@@ -56,6 +56,8 @@ void System::find_pairs() {
   };
   for (size_t e = 0; e < elements.size(); ++e)
     if (s.element[e].live) link(elements[e].a, elements[e].b);
+  for (size_t i = 0; i < forces.bushings.size(); ++i)
+    if (s.bushing[i].live) link(forces.bushings[i].a, forces.bushings[i].b);
   for (size_t j = 0; j < joints.size(); ++j)
     if (s.joint[j].live) link(joints[j].parent, joints[j].child);
   std::vector<int> first(B + 1, 0), held(links.size());

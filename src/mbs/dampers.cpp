@@ -1,5 +1,5 @@
 /// Dampers of springs and bushings, taken with the velocity at the time of the positions and implicitly enough that
-/// they do not bound the step (docs/theory/multibody.md, eq. 13 to 15).
+/// they do not bound the step (docs/theory/multibody.md, eq. F3 to F5).
 
 #include <algorithm>
 #include <cmath>
@@ -45,7 +45,7 @@ bool find_rate(const CompiledCharacteristic& c, double q, double s, double& r) {
   return false;
 }
 
-/// Largest step for a damper on jointed bodies beside springs of the frequency omega (eq. 15).
+/// Largest step for a damper on jointed bodies beside springs of the frequency omega (eq. F5).
 ///   rate  of the damper: coefficient times inverse mass [1/s]
 double find_jointed_limit(double omega, double rate) {
   const auto is_stable = [&](double h) {

@@ -154,7 +154,7 @@ TEST(DampedOscillatorPhysics, DampingCostsNoStep) {
 
 TEST(DampedOscillatorPhysics, DampersOnJointsKeepTheAutomaticStepStable) {
   // a row of hinged bars with springs and dampers at the hinges; the joints' reactions are those of the step before,
-  // which bounds the step (docs/theory/multibody.md, eq. 15)
+  // which bounds the step (docs/theory/multibody.md, eq. F5)
   double before = kUnlimited;
   for (const double share : {0.0, 1e-2, 1.0}) {
     Model m;
