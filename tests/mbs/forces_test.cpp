@@ -184,6 +184,39 @@ TEST(DampedOscillatorPhysics, DampersOnJointsKeepTheAutomaticStepStable) {
   }
 }
 
+TEST(DampedOscillatorPhysics, DampersOnJointsHaveOrderTwo) {
+  // a bar let go from the horizontal with a damper that nearly stops it
+  Model m;
+  m.contact.ground = m.contact.bodies = false;
+  Body bar = make_box("bar", 1, {1, 0.05, 0.05}, {1, 0, 0});
+  bar.w_WB = {0, -0.5, 0};
+  bar.v_WB = {0, 0, 0.5};
+  add_body(m, bar);
+  Joint j;
+  j.kind = Joint::Kind::Revolute;
+  j.parent = kGround;
+  j.child = {0};
+  j.X_PF.q = j.X_CM.q = to_quat(Mat3::from_columns({1, 0, 0}, {0, 0, -1}, {0, 1, 0}));
+  j.X_CM.p = {-1, 0, 0};
+  RotationalSpring r;
+  r.joint = add_joint(m, j);
+  r.spring = linear(10);
+  r.damper = linear(20);
+  m.rotational_springs.push_back(r);
+  double angle[3], residual[3];
+  for (int i = 0; i < 3; ++i) {
+    Options o = options_of(1, 2e-3 / (1 << i));
+    residual[i] = 0;
+    o.on_frame = [&](const View& v) {
+      angle[i] = v.torsion_angle[0];
+      residual[i] = std::max(residual[i], std::abs(v.energy.residual));
+    };
+    (void)run(m, o);
+  }
+  EXPECT_NEAR(std::log2((angle[0] - angle[1]) / (angle[1] - angle[2])), 2, 0.15);
+  EXPECT_NEAR(std::log2(residual[1] / residual[2]), 2, 0.15);
+}
+
 TEST(DampedOscillatorPhysics, AStepTooLargeForDampersOnJointsIsSaid) {
   Model m = make_oscillator(1, 0, 0, linear(0));
   m.springs.clear();
