@@ -132,8 +132,6 @@ void System::pack_element(size_t e) {
     for (int f = 0; f < kFlowFields; ++f) l.flow(slot, f) = fields[f];
     put(kFlows, 1);
     z.safe_force[0] = 1, z.safe_force[1] = -1;  // void as soon as it flows
-    const double torsion = laws[static_cast<size_t>(z.base_law < 0 ? c.zone.law[0] : z.base_law)].torsion;
-    put(kTorsionScale, 1 / torsion);
   } else {
     for (int i = 0; i < 2; ++i) {
       put(kMomentScale + i, free ? 0 : z.safe_moment[i]);
@@ -195,6 +193,10 @@ void System::unpack_element(size_t e) {
   if (!flows) return;
   z.energy = l.flow(slot, kStored);
   z.plastic += l.flow(slot, kPlastic);
+  for (int i = 0; i < 2; ++i) z.slip[i] = l.flow(slot, kSlip + i);
+  z.slipped = l.flow(slot, kSlipped);
+  z.twist = l.flow(slot, kTwist);
+  z.twisted = l.flow(slot, kTwisted);
   for (int s = 0; s < elements[e].zone.stations; ++s) {
     const int at = kStations + s * kStationFields;
     for (int q = 0; q < 2; ++q) {

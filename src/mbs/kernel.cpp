@@ -324,29 +324,30 @@ struct BendingPlane {
   }
 };
 
-/// The law of a zone that flows in bending (docs/theory/zones.md, eq. 1 to 8). Sets the elastic resultants f; gives the
-/// lanes among `wanted` for which that is the whole truth and moves their history; the others keep theirs.
+/// The law of a zone that flows in bending, shear or torsion (docs/theory/zones.md, eq. 1 to 9). Sets the elastic
+/// resultants f; gives the lanes among `wanted` for which that is the whole truth and moves their history; the others
+/// keep theirs.
 template <class D, class M>
-HWY_INLINE M flow_in_bending(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], Num<D> torsion_scale,
-                             const Num<D> k[6], const Num<D> d[6], const Num<D> e_before[6], Num<D> f[6]) {
+HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], const Num<D> k[6], const Num<D> d[6],
+                       const Num<D> e_before[6], Num<D> f[6]) {
   using N = Num<D>;
   const D tag;
-  const N zero = num<D>(0), one = num<D>(1), half = num<D>(0.5);
+  const N zero = num<D>(0), one = num<D>(1), half = num<D>(0.5), tiny = num<D>(1e-290);
   M good = wanted;
   const auto demand = [&](M condition) { good = hn::And(good, condition); };
 
+  const N slip[2] = {load<D>(flow, kSlip), load<D>(flow, kSlip + 1)}, twist = load<D>(flow, kTwist);
   f[0] = k[0] * (d[0] - load<D>(flow, kAxial));
-  f[3] = k[3] * (d[3] - load<D>(flow, kTwist));
+  f[3] = k[3] * (d[3] - twist);
   demand(hn::Ge(f[0].v, load<D>(flow, kFlowLeast).v));
   demand(hn::Le(f[0].v, load<D>(flow, kFlowMost).v));
-  demand(hn::Le((abs(f[3]) * torsion_scale).v, one.v));
 
   BendingPlane<D> plane[2];
   for (int q = 0; q < 2; ++q) {
     BendingPlane<D>& P = plane[q];
     const int shear = q == 0 ? 2 : 1, bend = q == 0 ? 4 : 5;
     P.shear_stiffness = k[shear], P.bending_stiffness = k[bend];
-    P.shift = d[shear] - load<D>(flow, kSlip + shear - 1);
+    P.shift = d[shear] - slip[shear - 1];
     P.rotation = d[bend];
     for (int s = 0; s < 2; ++s) {
       P.lever[s] = q == 0 ? x[s] : zero - x[s];
@@ -366,9 +367,14 @@ HWY_INLINE M flow_in_bending(M wanted, double* HWY_RESTRICT flow, const Num<D> x
     P.m[0] = m0, P.m[1] = m1;
   }
 
-  // (|My|/Ly)^1.5 + (|Mz|/Lz)^1.5 of a station
-  const auto calc_demand = [&](int s) -> N {
-    N sum = zero;
+  // (|My|/Ly)^1.5 + (|Mz|/Lz)^1.5 of a station; an axis without any limit left stands apart
+  struct Demand {
+    N sum;
+    M out, none[2];
+  };
+  const auto calc_demand = [&](int s) {
+    Demand to{zero, hn::FirstN(tag, 0), {hn::FirstN(tag, 0), hn::FirstN(tag, 0)}};
+    M moves = to.out;
     for (int q = 0; q < 2; ++q) {
       const int cell = kStations + s * kStationFields + kCell + q * kCellFields;
       const N t = (f[0] - load<D>(flow, cell + kCellForce)) * load<D>(flow, cell + kCellForce + 1);
@@ -381,33 +387,33 @@ HWY_INLINE M flow_in_bending(M wanted, double* HWY_RESTRICT flow, const Num<D> x
       for (int c = 0; c < 4; ++c)
         corner[c] = select(positive, load<D>(flow, cell + kCellPositive + c), load<D>(flow, cell + kCellNegative + c));
       const N low = fma(t, corner[2] - corner[0], corner[0]), high = fma(t, corner[3] - corner[1], corner[1]);
-      const N limit = fma(r, high - low, low);
-      demand(hn::Gt(limit.v, zero.v));
-      const N ratio = abs(plane[q].m[s]) / limit;
-      sum = sum + ratio * N{hn::Sqrt(ratio.v)};
+      const N limit = fma(r, high - low, low), size = abs(plane[q].m[s]);
+      to.none[q] = hn::Le(limit.v, zero.v);
+      const N ratio = select(to.none[q], zero, size / N{hn::Max(limit.v, tiny.v)});
+      to.sum = to.sum + ratio * N{hn::Sqrt(ratio.v)};
+      moves = hn::Or(moves, hn::And(to.none[q], hn::Gt(size.v, zero.v)));
     }
-    return sum;
+    to.out = hn::Or(moves, hn::Gt(to.sum.v, one.v));
+    return to;
   };
-  N over[2] = {calc_demand(0), calc_demand(1)};
-  M out[2] = {hn::Gt(over[0].v, one.v), hn::Gt(over[1].v, one.v)};
-  N scale[2];
+  const auto calc_scale = [&](const Demand& at, N scale[2]) {
+    demand(hn::Or(hn::Not(at.out), hn::Le(at.sum.v, hn::Set(tag, kMostOver))));
+    const N common = select(hn::Gt(at.sum.v, one.v), inverse_root<D>(at.sum), one);
+    for (int q = 0; q < 2; ++q) scale[q] = select(at.none[q], zero, common);
+  };
+  const Demand at[2] = {calc_demand(0), calc_demand(1)};
   N by[2][2] = {{zero, zero}, {zero, zero}};  // further inelastic rotation [plane][station]
-  M flowed = hn::And(good, hn::Or(out[0], out[1]));
-  if (!hn::AllFalse(tag, flowed)) {
-    for (int s = 0; s < 2; ++s) {
-      demand(hn::Or(hn::Not(out[s]), hn::Le(over[s].v, hn::Set(tag, kMostOver))));
-      scale[s] = select(out[s], inverse_root<D>(over[s]), one);
-    }
+  const M bends = hn::And(good, hn::Or(at[0].out, at[1].out));
+  if (!hn::AllFalse(tag, bends)) {
+    N scale[2][2], target[2][2], trial[2][2];
+    for (int s = 0; s < 2; ++s) calc_scale(at[s], scale[s]);
     // one station alone
-    N target[2][2];
-    for (int q = 0; q < 2; ++q)
-      for (int s = 0; s < 2; ++s) target[q][s] = plane[q].m[s] * scale[s];
-    const M alone[2] = {hn::AndNot(out[1], out[0]), hn::AndNot(out[0], out[1])};
-    N trial[2][2];
+    const M alone[2] = {hn::AndNot(at[1].out, at[0].out), hn::AndNot(at[0].out, at[1].out)};
     for (int q = 0; q < 2; ++q) {
       BendingPlane<D>& P = plane[q];
       for (int s = 0; s < 2; ++s) {
         trial[q][s] = P.m[s];
+        target[q][s] = P.m[s] * scale[s][q];
         const N turn = (P.m[s] - target[q][s]) / P.stiffness[s];
         by[q][s] = select(hn::And(alone[s], hn::Gt(P.stiffness[s].v, zero.v)), turn, zero);
       }
@@ -416,14 +422,16 @@ HWY_INLINE M flow_in_bending(M wanted, double* HWY_RESTRICT flow, const Num<D> x
       P.m[1] = fnma(P.cross, by[q][0], select(alone[1], target[q][1], m1));
     }
     // which may push the other one out
-    M both = hn::And(out[0], out[1]);
+    M both = hn::And(at[0].out, at[1].out);
     for (int s = 0; s < 2; ++s) {
-      const N again = calc_demand(s);
-      const M pushed = hn::And(alone[1 - s], hn::Gt(again.v, one.v));
+      const Demand again = calc_demand(s);
+      const M pushed = hn::And(alone[1 - s], again.out);
       if (HWY_LIKELY(hn::AllFalse(tag, pushed))) continue;
-      demand(hn::Or(hn::Not(pushed), hn::Le(again.v, hn::Set(tag, kMostOver))));
-      const N back = inverse_root<D>(again);
-      for (int q = 0; q < 2; ++q) target[q][s] = select(pushed, plane[q].m[s] * back, target[q][s]);
+      N back[2];
+      const M so_far = good;
+      calc_scale(again, back);
+      good = hn::Or(good, hn::AndNot(pushed, so_far));
+      for (int q = 0; q < 2; ++q) target[q][s] = select(pushed, plane[q].m[s] * back[q], target[q][s]);
       both = hn::Or(both, pushed);
     }
     if (!hn::AllFalse(tag, both)) {
@@ -450,10 +458,6 @@ HWY_INLINE M flow_in_bending(M wanted, double* HWY_RESTRICT flow, const Num<D> x
     f[q == 0 ? 2 : 1] = P.shear();
     f[q == 0 ? 4 : 5] = P.moment();
   }
-  // shear: the rest of the limits holds, or the full law is asked
-  const N pressed = load<D>(flow, kShearFriction) * N{hn::Max(zero.v, (zero - f[0]).v)};
-  const N vy = f[1] / (load<D>(flow, kShearOwn) + pressed), vz = f[2] / (load<D>(flow, kShearOwn + 1) + pressed);
-  demand(hn::Le(fma(vy, vy, vz * vz).v, one.v));
   N reached[2];
   for (int s = 0; s < 2; ++s) {
     const N turned = fma(plane[0].phi[s], plane[0].phi[s], plane[1].phi[s] * plane[1].phi[s]);
@@ -462,26 +466,68 @@ HWY_INLINE M flow_in_bending(M wanted, double* HWY_RESTRICT flow, const Num<D> x
     reached[s] = select(moves, N{hn::Max(so_far.v, hn::Sqrt(turned.v))}, so_far);
     demand(hn::Lt(reached[s].v, load<D>(flow, kStations + s * kStationFields + kRupture).v));
   }
+  // what is new of the inelastic rotation: a plastic part and added flexibility
+  N plastic[2][2], soft[2][2];  // [plane][station]
+  for (int q = 0; q < 2; ++q)
+    for (int s = 0; s < 2; ++s) {
+      const BendingPlane<D>& P = plane[q];
+      const int station = kStations + s * kStationFields;
+      const N m = P.m[s], share = load<D>(flow, station + kShare);
+      const N added = fnma(P.soft[s], m, P.phi[s] - load<D>(flow, station + kPhi + q));
+      const M damages = hn::And(bends, hn::And(hn::Gt(share.v, zero.v), hn::Gt((added * m).v, zero.v)));
+      const N top = {hn::Min((share * abs(P.phi[s]) / abs(m)).v, (num<D>(kMostDamage) / P.stiffness[s]).v)};
+      const N grown = fma(share, added / m, P.soft[s]);
+      soft[q][s] = select(damages, N{hn::Max(P.soft[s].v, hn::Min(top.v, grown.v))}, P.soft[s]);
+      plastic[q][s] = fnma(soft[q][s], m, P.phi[s]);
+    }
+
+  // shear
+  const N pressed = load<D>(flow, kShearFriction) * N{hn::Max(zero.v, (zero - f[0]).v)};
+  N slipped = load<D>(flow, kSlipped);
+  const N left = {hn::Max(zero.v, fnma(slipped, load<D>(flow, kSlipSoftening), one).v)};
+  const N vy = f[1] / N{hn::Max(fma(load<D>(flow, kShearOwn), left, pressed).v, tiny.v)};
+  const N vz = f[2] / N{hn::Max(fma(load<D>(flow, kShearOwn + 1), left, pressed).v, tiny.v)};
+  const N over2 = fma(vy, vy, vz * vz);
+  const M slides = hn::And(good, hn::Gt(over2.v, one.v));
+  N slid[2] = {zero, zero};
+  if (!hn::AllFalse(tag, slides)) {
+    const N holds = select(slides, one / N{hn::Sqrt(over2.v)}, one);
+    for (int a = 0; a < 2; ++a) {
+      const N held = f[1 + a] * holds;
+      slid[a] = select(slides, (f[1 + a] - held) * load<D>(flow, kFlexibility + 1 + a), zero);
+      f[1 + a] = held;
+    }
+    slipped = select(slides, slipped + N{hn::Sqrt(fma(slid[0], slid[0], slid[1] * slid[1]).v)}, slipped);
+    demand(hn::Lt(slipped.v, load<D>(flow, kSlipRupture).v));
+    for (int q = 0; q < 2; ++q)
+      for (int s = 0; s < 2; ++s)
+        plane[q].m[s] = select(slides, fma(plane[q].lever[s], f[q == 0 ? 2 : 1], f[q == 0 ? 4 : 5]), plane[q].m[s]);
+  }
+  // torsion
+  const N torsion = load<D>(flow, kTorsion);
+  const M twists = hn::And(good, hn::Gt(abs(f[3]).v, torsion.v));
+  N twisted = load<D>(flow, kTwisted), over = zero;
+  if (!hn::AllFalse(tag, twists)) {
+    const N held = {hn::CopySign(torsion.v, f[3].v)};
+    over = select(twists, (f[3] - held) * load<D>(flow, kFlexibility + 3), zero);
+    f[3] = select(twists, held, f[3]);
+    twisted = twisted + abs(over);
+    demand(hn::Lt(twisted.v, load<D>(flow, kTwistRupture).v));
+  }
+
+  M flowed = hn::Or(bends, hn::Or(slides, twists));
   const N idle = select(flowed, zero, load<D>(flow, kIdle) + one);
   demand(hn::Lt(idle.v, hn::Set(tag, kLongestIdle)));
-
-  // what is new of the inelastic rotation: a plastic part and added flexibility
   flowed = hn::And(good, flowed);
+  const M turned = hn::And(good, bends);
   N stored = zero;
   for (int i = 0; i < 6; ++i) stored = fma(f[i] * load<D>(flow, kFlexibility + i), f[i], stored);
   for (int q = 0; q < 2; ++q)
     for (int s = 0; s < 2; ++s) {
-      const BendingPlane<D>& P = plane[q];
-      const int at = kStations + s * kStationFields;
-      const N m = P.m[s], plastic = load<D>(flow, at + kPhi + q), share = load<D>(flow, at + kShare);
-      const N added = fnma(P.soft[s], m, P.phi[s] - plastic);
-      const M damages = hn::And(flowed, hn::And(hn::Gt(share.v, zero.v), hn::Gt((added * m).v, zero.v)));
-      const N top = {hn::Min((share * abs(P.phi[s]) / abs(m)).v, (num<D>(kMostDamage) / P.stiffness[s]).v)};
-      const N grown = fma(share, added / m, P.soft[s]);
-      const N soft = select(damages, N{hn::Max(P.soft[s].v, hn::Min(top.v, grown.v))}, P.soft[s]);
-      store_where<D>(flowed, soft, flow, at + kSoftness + q);
-      store_where<D>(flowed, fnma(soft, m, P.phi[s]), flow, at + kPhi + q);
-      stored = fma(soft * m, m, stored);
+      const int station = kStations + s * kStationFields;
+      store_where<D>(turned, soft[q][s], flow, station + kSoftness + q);
+      store_where<D>(turned, plastic[q][s], flow, station + kPhi + q);
+      stored = fma(soft[q][s] * plane[q].m[s], plane[q].m[s], stored);
     }
   stored = half * stored;
   N work = zero;
@@ -491,6 +537,11 @@ HWY_INLINE M flow_in_bending(M wanted, double* HWY_RESTRICT flow, const Num<D> x
   }
   const N lost = fms(half, work, stored - load<D>(flow, kStored));
   store_where<D>(flowed, load<D>(flow, kPlastic) + lost, flow, kPlastic);
+  store_where<D>(flowed, slip[0] + slid[0], flow, kSlip);
+  store_where<D>(flowed, slip[1] + slid[1], flow, kSlip + 1);
+  store_where<D>(flowed, slipped, flow, kSlipped);
+  store_where<D>(flowed, twist + over, flow, kTwist);
+  store_where<D>(flowed, twisted, flow, kTwisted);
   store_where<D>(good, stored, flow, kStored);
   store_where<D>(good, idle, flow, kIdle);
   for (int s = 0; s < 2; ++s) store_where<D>(good, reached[s], flow, kStations + s * kStationFields + kReached);
@@ -579,7 +630,7 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
       double* HWY_RESTRICT flow = job.flows + static_cast<size_t>(kFlowFields) * W * block;
       N f_flow[6], d_before[6];
       for (int i = 0; i < 6; ++i) d_before[i] = load<D>(flow, kBefore + i);
-      const auto good = flow_in_bending<D>(flows, flow, x, torsion_scale, k, d, was, f_flow);
+      const auto good = flow_zone<D>(flows, flow, x, k, d, was, f_flow);
       for (int i = 0; i < 6; ++i) {
         f[i] = select(good, f_flow[i], f[i]);
         const N stretch = f_flow[i] * load<D>(flow, kFlexibility + i);

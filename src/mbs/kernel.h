@@ -40,22 +40,27 @@ enum Slot : int {
 };
 inline constexpr double kLargestTurn = 0.25;  // kMostTurn of a live element: 60 degrees
 
-/// Fields of the slot of a zone that may flow in bending; everything else is inside its limits, or the full law is
-/// asked.
+/// Fields of the slot of a zone that may flow in bending, shear and torsion; for axial flow the full law is asked.
 enum Flow : int {
-  kAxial = 0,          // plastic elongation
-  kSlip = 1,           // along y, z (2)
-  kTwist = 3,          //
-  kFlowLeast = 4,      // range of normal force in which neither end of the axial law is reached
-  kFlowMost = 5,       //
-  kShearOwn = 6,       // limits without normal force, along y, z (2)
-  kShearFriction = 8,  //
-  kFlexibility = 9,    // one over the stiffness, 0 for none (6)
-  kBefore = 15,        // deformation at the step before (6)
-  kStored = 21,        // elastic energy at the step before
-  kPlastic = 22,       // dissipated since the slot was written
-  kIdle = 23,          // steps without flow
-  kStations = 24,      // both stations, kStationFields each
+  kAxial = 0,           // plastic elongation
+  kSlip = 1,            // along y, z (2)
+  kTwist = 3,           //
+  kFlowLeast = 4,       // range of normal force in which neither end of the axial law is reached
+  kFlowMost = 5,        //
+  kShearOwn = 6,        // limits without normal force and slip, along y, z (2)
+  kShearFriction = 8,   //
+  kSlipped = 9,         // so far
+  kSlipSoftening = 10,  // one over the slip at which nothing of the own limits is left
+  kSlipRupture = 11,    //
+  kTwisted = 12,        // so far
+  kTwistRupture = 13,   //
+  kTorsion = 14,        // limit
+  kFlexibility = 15,    // one over the stiffness, 0 for none (6)
+  kBefore = 21,         // deformation at the step before (6)
+  kStored = 27,         // elastic energy at the step before
+  kPlastic = 28,        // dissipated since the slot was written
+  kIdle = 29,           // steps without flow
+  kStations = 30,       // both stations, kStationFields each
   kStationFields = 31,
   kFlowFields = kStations + 2 * kStationFields
 };

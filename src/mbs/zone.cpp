@@ -735,7 +735,9 @@ bool write_flow(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, c
   constexpr double unlimited = 1e300;
   if (!z.live || !z.has_elastic || z.next_law >= 0 || p.stations == 0 || p.external_axial) return false;
   const Limits limits(laws, p.law[0], z, time);
-  if (limits.integrity(z.shortened) != 1) return false;
+  // what is left of a crushed section carries both force and moment
+  const double whole = limits.integrity(z.shortened);
+  if (!(whole > 0)) return false;
   std::fill(out, out + kFlowFields, 0.0);
   out[kAxial] = z.axial, out[kSlip] = z.slip[0], out[kSlip + 1] = z.slip[1], out[kTwist] = z.twist;
   double far = 0;  // no cell reaches beyond this rotation
@@ -760,11 +762,11 @@ bool write_flow(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, c
         std::fill(cell + kCellPositive, cell + kCellFields, unlimited);
         continue;
       }
-      const double force = z.normal_force, reached = z.station[s].reached;
+      const double force = z.normal_force / whole, reached = z.station[s].reached;
       if (!(force > family->force.front() && force < family->force.back())) return false;
       const size_t k = static_cast<size_t>(find_interval(family->force, force, 0));
-      cell[kCellForce] = family->force[k];
-      cell[kCellForce + 1] = 1 / (family->force[k + 1] - family->force[k]);
+      cell[kCellForce] = whole * family->force[k];
+      cell[kCellForce + 1] = 1 / (whole * (family->force[k + 1] - family->force[k]));
       size_t j[2] = {family->rotation.size() - 1, family->rotation.size() - 1};
       cell[kCellRotation] = reached;
       if (reached < family->rotation.back()) {
@@ -775,15 +777,23 @@ bool write_flow(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, c
       }
       for (size_t c = 0; c < 4; ++c) {
         const double* limit = &family->limit[2 * ((k + c / 2) * static_cast<size_t>(family->J) + j[c % 2])];
-        cell[static_cast<size_t>(kCellPositive) + c] = limit[0];
-        cell[static_cast<size_t>(kCellNegative) + c] = limit[1];
+        cell[static_cast<size_t>(kCellPositive) + c] = whole * limit[0];
+        cell[static_cast<size_t>(kCellNegative) + c] = whole * limit[1];
       }
     }
   }
-  out[kFlowLeast] = -limits.compression(far, z.shortened, 1);
+  const CompiledLaw& law = limits.law();
+  out[kFlowLeast] = -limits.compression(far, z.shortened, whole);
   out[kFlowMost] = limits.tension(z.elongated);
-  for (int axis = 0; axis < 2; ++axis) out[kShearOwn + axis] = limits.shear(axis, z.slipped, 0);
-  out[kShearFriction] = limits.law().shear_friction;
+  for (int axis = 0; axis < 2; ++axis)
+    out[kShearOwn + axis] = law.slip_softening > 0 ? std::min(law.shear[axis], unlimited) : 0;
+  out[kShearFriction] = law.shear_friction;
+  out[kSlipped] = z.slipped;
+  out[kSlipSoftening] = law.slip_softening > 0 ? 1 / law.slip_softening : 0;
+  out[kSlipRupture] = law.slip_rupture;
+  out[kTwisted] = z.twisted;
+  out[kTwistRupture] = law.twist_rupture;
+  out[kTorsion] = law.torsion;
   for (int i = 0; i < 6; ++i) {
     out[kFlexibility + i] = p.stiffness[i] > 0 ? 1 / (z.share * p.stiffness[i]) : 0;
     out[kBefore + i] = z.deformation[i];
