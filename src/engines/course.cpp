@@ -33,6 +33,18 @@ const char* words_of(mbs::Summary::Ending e) {
 
 }  // namespace
 
+mbs::Options make_silent(mbs::Options options) {
+  options.on_frame = {};
+  options.on_happening = {};
+  options.samplings.clear();
+  options.progress.report = {};
+  return options;
+}
+
+double choose_step(const mbs::Model& model, const mbs::Options& options) {
+  return options.step > 0 ? options.step : mbs::Simulation(model, make_silent(options)).step();
+}
+
 Course::Course(const mbs::Model& model, const mbs::Options& options)
     : model_(model),
       options_(options),
@@ -70,10 +82,7 @@ bool Course::find_start() {
   motion_.v_WB.assign(B, {});
   motion_.w_WB.assign(B, {});
   if (options_.equilibrium) {
-    mbs::Options o = options_;
-    o.on_frame = {};
-    o.on_happening = {};
-    mbs::Simulation native(model_, o);
+    mbs::Simulation native(model_, make_silent(options_));
     if (!native.find_equilibrium(summary_.message)) {
       summary_.ending = mbs::Summary::Ending::NoEquilibrium;
       return false;

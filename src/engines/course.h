@@ -38,6 +38,11 @@ struct Touch {
   int body_contacts = 0;
 };
 
+/// The options without those who watch the run.
+mbs::Options make_silent(mbs::Options);
+/// The step that the native engine takes: that of the options, or the one it chooses [s].
+double choose_step(const mbs::Model&, const mbs::Options&);
+
 class Course {
  public:
   enum class Verdict {

@@ -403,14 +403,7 @@ class MujocoEngine : public Engine {
   mbs::Summary solve(const mbs::Model& model, const mbs::Options& options) const override {
     Course course(model, options);
     const Inside inside;
-    double step = options.step;
-    if (!(step > 0)) {
-      mbs::Options o = options;
-      o.on_frame = {};
-      o.on_happening = {};
-      step = mbs::Simulation(model, o).step();
-    }
-    if (!course.start(step)) return course.finish(0);
+    if (!course.start(choose_step(model, options))) return course.finish(0);
     long steps = 0;
     try {
       Work before;

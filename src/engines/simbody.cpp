@@ -238,12 +238,7 @@ class SimbodyEngine : public Engine {
     if (!course.start(settings.step)) return course.finish(0);
     long steps = 0;
     try {
-      if (settings.step == 0 && has_history(model)) {
-        mbs::Options o = options;
-        o.on_frame = {};
-        o.on_happening = {};
-        settings.longest_step = options.step > 0 ? options.step : mbs::Simulation(model, o).step();
-      }
+      if (settings.step == 0 && has_history(model)) settings.longest_step = choose_step(model, options);
       Work before;
       bool is_first = true;
       while (!course.is_over()) run_as_built(course, settings, is_first, before, steps);
