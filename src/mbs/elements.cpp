@@ -27,20 +27,10 @@ double floor_exponent(double e) { return e >= 2 ? 2 : e >= 1.5 ? 1.5 : 1; }
 
 size_t System::slot_of(size_t e) const { return lanes->is_batch ? e * lanes->W + lane : lanes->slot_of[e]; }
 
-void System::clear_slot(size_t slot) {
-  Lanes& l = *lanes;
-  for (int f = 0; f < kSlotFields; ++f) l.field(slot, f) = 0;
-  l.field(slot, kMarkerA + 3) = l.field(slot, kMarkerB + 3) = 1;
-  l.field(slot, kLeastForce) = -kUnlimited;
-  l.field(slot, kMostForce) = l.field(slot, kMostTurn) = kUnlimited;
-  for (const int i : {0, 3, 4, 7}) l.field(slot, kSoft + i) = 1;
-  for (size_t f = 0; f < static_cast<size_t>(kForceFields); ++f) l.force_field(slot, f) = 0;
-}
-
 void System::kill_slot(size_t e) {
   const size_t slot = slot_of(e);
   if (slot == Lanes::kNoSlot || lanes->field(slot, kMostTurn) == kUnlimited) return;
-  clear_slot(slot);
+  lanes->clear_slot(slot);
   --lanes->live[slot / lanes->W];
   --lanes->live_elements;
 }
@@ -70,7 +60,7 @@ void System::lay_out_elements() {
   const double* next = moved.data();
   const auto body = [&](int b) { return b < 0 ? static_cast<std::uint32_t>(B) : static_cast<std::uint32_t>(b); };
   for (size_t slot = 0; slot < slots; ++slot) {
-    clear_slot(slot);
+    l.clear_slot(slot);
     if (slot >= kept.size()) continue;
     const std::uint32_t e = kept[slot];
     l.slot_of[e] = static_cast<std::uint32_t>(slot);
@@ -359,6 +349,34 @@ void System::restore_elements(const std::vector<double>& history) {
     const size_t slot = slot_of(e);
     next = restore_slot(slot, next);
     if (state.element[e].is_softened) lanes->softened[slot / lanes->W] = 1;
+  }
+}
+
+void System::join_batch(Lanes& batch, size_t to) {
+  std::vector<double> moved;
+  for (size_t e = 0; e < elements.size(); ++e)
+    if (state.element[e].live) save_slot(slot_of(e), moved);
+  const LaneLayout layout = batch.body_layout(to);
+  const std::unique_ptr<Lanes> before = std::move(own_lanes);  // keeps what the arrays are copied from
+  for (auto [array, store] : {std::pair{&state.p, &batch.p},
+                              {&state.v, &batch.v},
+                              {&state.L, &batch.L},
+                              {&state.w, &batch.w},
+                              {&force, &batch.force},
+                              {&torque, &batch.torque}})
+    array->attach(store->data(), layout);
+  state.q.attach(batch.q.data(), layout);
+  state.R.attach(batch.R.data(), layout);
+  lanes = &batch;
+  lane = to;
+  for (size_t b = 0; b < B; ++b) pack_body(b);
+  const double* next = moved.data();
+  for (size_t e = 0; e < elements.size(); ++e) {
+    if (!state.element[e].live) continue;
+    const size_t slot = slot_of(e);
+    next = restore_slot(slot, next);
+    ++batch.live[e];
+    if (state.element[e].is_softened) batch.softened[e] = 1;
   }
 }
 

@@ -717,18 +717,8 @@ HWY_INLINE void advance_all(const BodyJob& job) {
   store<D>(sum, job.sum, 0);
 }
 
-using Wide = hn::ScalableTag<double>;
-using One = hn::CappedTag<double, 1>;
-
-size_t Lanes() { return hn::Lanes(Wide()); }
-const char* Name() { return hwy::TargetName(HWY_TARGET); }
-void AdvanceBodies(const BodyJob& job) { advance_all<Wide>(job); }
-void EvaluateElements(const ElementJob& job) { evaluate_all<Wide>(job); }
-void AdvanceBodiesSingly(const BodyJob& job) { advance_all<One>(job); }
-void EvaluateElementsSingly(const ElementJob& job) { evaluate_all<One>(job); }
-
-void SumForces(const SumJob& job) {
-  using D = Wide;
+template <class D>
+HWY_INLINE void sum_all(const SumJob& job) {
   const size_t W = hn::Lanes(D());
   for (size_t b = 0; b < job.bodies; ++b) {
     V3<D> f{num<D>(0), num<D>(0), num<D>(0)}, t = f;
@@ -747,6 +737,18 @@ void SumForces(const SumJob& job) {
   }
 }
 
+using Wide = hn::ScalableTag<double>;
+using One = hn::CappedTag<double, 1>;
+
+size_t Lanes() { return hn::Lanes(Wide()); }
+const char* Name() { return hwy::TargetName(HWY_TARGET); }
+void AdvanceBodies(const BodyJob& job) { advance_all<Wide>(job); }
+void EvaluateElements(const ElementJob& job) { evaluate_all<Wide>(job); }
+void AdvanceBodiesSingly(const BodyJob& job) { advance_all<One>(job); }
+void EvaluateElementsSingly(const ElementJob& job) { evaluate_all<One>(job); }
+void SumForces(const SumJob& job) { sum_all<Wide>(job); }
+void SumForcesSingly(const SumJob& job) { sum_all<One>(job); }
+
 }  // namespace HWY_NAMESPACE
 }  // namespace topple::mbs::kernel
 HWY_AFTER_NAMESPACE();
@@ -761,6 +763,7 @@ HWY_EXPORT(EvaluateElements);
 HWY_EXPORT(AdvanceBodiesSingly);
 HWY_EXPORT(EvaluateElementsSingly);
 HWY_EXPORT(SumForces);
+HWY_EXPORT(SumForcesSingly);
 
 size_t lanes() { return HWY_DYNAMIC_DISPATCH(Lanes)(); }
 std::string target_name() { return HWY_DYNAMIC_DISPATCH(Name)(); }
@@ -769,6 +772,7 @@ void evaluate_elements(const ElementJob& job) { HWY_DYNAMIC_DISPATCH(EvaluateEle
 void advance_bodies_singly(const BodyJob& job) { HWY_DYNAMIC_DISPATCH(AdvanceBodiesSingly)(job); }
 void evaluate_elements_singly(const ElementJob& job) { HWY_DYNAMIC_DISPATCH(EvaluateElementsSingly)(job); }
 void sum_forces(const SumJob& job) { HWY_DYNAMIC_DISPATCH(SumForces)(job); }
+void sum_forces_singly(const SumJob& job) { HWY_DYNAMIC_DISPATCH(SumForcesSingly)(job); }
 
 }  // namespace topple::mbs::kernel
 #endif

@@ -140,5 +140,6 @@ void sum_forces(const SumJob&);
 /// The same with one lane at a time in the same instruction set, for tests of the claim above.
 void advance_bodies_singly(const BodyJob&);
 void evaluate_elements_singly(const ElementJob&);
+void sum_forces_singly(const SumJob&);
 
 }  // namespace topple::mbs::kernel

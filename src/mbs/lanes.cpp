@@ -1,5 +1,7 @@
 #include "mbs/lanes.h"
 
+#include <limits>
+
 namespace topple::mbs {
 
 namespace {
@@ -41,6 +43,17 @@ void Lanes::allocate_elements(size_t elements) {
   softened.assign(element_blocks, 0);
 }
 
+void Lanes::clear_slot(size_t slot) {
+  using namespace kernel;
+  constexpr double unlimited = std::numeric_limits<double>::infinity();
+  for (int f = 0; f < kSlotFields; ++f) field(slot, f) = 0;
+  field(slot, kMarkerA + 3) = field(slot, kMarkerB + 3) = 1;
+  field(slot, kLeastForce) = -unlimited;
+  field(slot, kMostForce) = field(slot, kMostTurn) = unlimited;
+  for (const int i : {0, 3, 4, 7}) field(slot, kSoft + i) = 1;
+  for (size_t f = 0; f < static_cast<size_t>(kForceFields); ++f) force_field(slot, f) = 0;
+}
+
 void Lanes::advance_bodies() {
   spins.clear();
   const kernel::BodyJob job{body_blocks, p.data(),     v.data(),      L.data(),         w.data(),    q.data(),
@@ -67,6 +80,16 @@ void Lanes::evaluate_elements(size_t first, size_t last, std::vector<std::uint32
     kernel::evaluate_elements(job);
   } else {
     kernel::evaluate_elements_singly(job);
+  }
+}
+
+void Lanes::sum_forces() {
+  const kernel::SumJob job{first_entry.size() - 1, first_entry.data(), entries.data(),
+                           element_forces.data(),  force.data(),       torque.data()};
+  if (W == kernel::lanes()) {
+    kernel::sum_forces(job);
+  } else {
+    kernel::sum_forces_singly(job);
   }
 }
 

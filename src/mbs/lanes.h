@@ -55,10 +55,14 @@ struct Lanes {
 
   void allocate_bodies(size_t bodies);
   void allocate_elements(size_t elements);
+  /// Nothing in it: no force, and never a report.
+  void clear_slot(size_t slot);
   /// Kicks all bodies and moves those that drift.
   void advance_bodies();
   /// Forces of the elements in blocks [first, last).
   void evaluate_elements(size_t first, size_t last, std::vector<std::uint32_t>& beyond);
+  /// Forces of the elements on every body; batch only.
+  void sum_forces();
 };
 
 }  // namespace topple::mbs

@@ -412,17 +412,21 @@ void System::replace_body(size_t b, const Body& replacement) {
   s.pair_apart_until.resize(kept);
 }
 
-void System::evaluate_forces(double h) {
+void System::evaluate_forces() {
+  begin_forces();
+  evaluate_elements_fully(0);
+  finish_forces(0);
+}
+
+void System::begin_forces() {
   ground_reaction = {};
   ground_contact = {};
   body_contacts = 0;
   keep_forces();
   fire_events();
-  if (h > 0) {
-    evaluate_elements();
-  } else {
-    evaluate_elements_fully(0);
-  }
+}
+
+void System::finish_forces(double h) {
   evaluate_rotationals(h);
   evaluate_cables();
   evaluate_springs(false);
@@ -458,19 +462,22 @@ void System::drift(size_t b, double h, const Vec3& p0, const Quat& q0, const Mat
   s.w[b] = s.R[b] * (inverse_inertia * transpose_times(s.R[b], L));
 }
 
-bool System::advance_step() {
-  State& s = state;
-  const double h = step;
+void System::prepare_step() {
   if (clusters_due) {
     build_clusters();
     for (size_t b = 0; b < B; ++b) pack_body(b);
   }
-  Lanes& l = *lanes;
-  l.kick.assign(l.W, s.first_kick ? 0.5 * h : h);
-  l.h.assign(l.W, h);
-  l.gx.assign(l.W, model.gravity.x), l.gy.assign(l.W, model.gravity.y), l.gz.assign(l.W, model.gravity.z);
-  l.advance_bodies();
-  for (const std::uint32_t b : l.spins) drift(b, h, s.p[b], s.q[b], s.R[b]);
+  // one run fills all lanes, a sample of a batch its own
+  const size_t first = lanes->is_batch ? lane : 0, last = lanes->is_batch ? lane + 1 : lanes->W;
+  for (size_t i = first; i < last; ++i) {
+    lanes->kick[i] = state.first_kick ? 0.5 * step : step;
+    lanes->h[i] = step;
+    lanes->gx[i] = model.gravity.x, lanes->gy[i] = model.gravity.y, lanes->gz[i] = model.gravity.z;
+  }
+}
+
+void System::finish_motion() {
+  State& s = state;
   for (const JointCluster& cluster : clusters)
     for (const int body : cluster.bodies) {
       const size_t b = static_cast<size_t>(body);
@@ -478,16 +485,61 @@ bool System::advance_step() {
       q_before[b] = s.q[b];
       R_before[b] = s.R[b];
     }
-  solve_joints(h);
+  solve_joints(step);
   s.first_kick = false;
   ++s.step_index;
-  s.time = static_cast<double>(s.step_index) * h;
+  s.time = static_cast<double>(s.step_index) * step;
   check_joints();
-  evaluate_forces(h);
+}
+
+bool System::is_finite() const {
   // one broken number anywhere reaches this sum within a step or two
   double sum = 0;
-  for (const double x : l.sum) sum += x;
-  return std::isfinite(sum) && trouble.empty();
+  if (lanes->is_batch) {
+    sum = lanes->sum[lane];
+  } else {
+    for (const double x : lanes->sum) sum += x;
+  }
+  return std::isfinite(sum);
+}
+
+void advance_together(Lanes& lanes, std::span<System* const> systems) {
+  const auto each = [&](auto&& what) {
+    for (System* s : systems)
+      if (s != nullptr) what(*s);
+  };
+  // lanes without a sample stand still
+  if (lanes.is_batch)
+    for (AlignedVector<double>* x : {&lanes.kick, &lanes.h, &lanes.gx, &lanes.gy, &lanes.gz})
+      std::fill(x->begin(), x->end(), 0);
+  each([](System& s) { s.prepare_step(); });
+  lanes.advance_bodies();
+  for (const std::uint32_t slot : lanes.spins) {
+    System* s = systems[lanes.is_batch ? slot % lanes.W : 0];
+    if (s == nullptr) continue;
+    const size_t b = lanes.is_batch ? slot / lanes.W : slot;
+    s->drift(b, s->step, s->state.p[b], s->state.q[b], s->state.R[b]);
+  }
+  each([](System& s) {
+    s.finish_motion();
+    s.begin_forces();
+  });
+  lanes.outside.clear();
+  if (!lanes.is_batch) {
+    systems.front()->evaluate_elements();
+  } else {
+    lanes.evaluate_elements(0, lanes.element_blocks, lanes.outside);
+    for (const std::uint32_t slot : lanes.outside)
+      if (System* s = systems[slot % lanes.W]) s->evaluate_outside(slot);
+    lanes.sum_forces();
+  }
+  each([](System& s) { s.finish_forces(s.step); });
+}
+
+bool System::advance_step() {
+  System* const self = this;
+  advance_together(*lanes, {&self, 1});
+  return is_finite() && trouble.empty();
 }
 
 Vec3 System::calc_velocity(size_t b) const {

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -163,7 +164,16 @@ class System {
 
   bool find_equilibrium(std::string& message);
   bool advance_step();
-  void evaluate_forces(double h);
+  /// Forces where the bodies are, nothing having moved.
+  void evaluate_forces();
+  // a step in parts, the kernel's work between them: advance_together()
+  void prepare_step();
+  void finish_motion();
+  void begin_forces();
+  void finish_forces(double h);
+  bool is_finite() const;
+  /// Goes over to a lane of a batch.
+  void join_batch(Lanes& batch, size_t lane);
   const View& calc_view();
   Summary summary;
 
@@ -266,7 +276,6 @@ class System {
   Vec3 calc_point(int body, const Vec3& p) const;
   // elements (elements.cpp)
   size_t slot_of(size_t element) const;
-  void clear_slot(size_t slot);
   void kill_slot(size_t element);
   /// Gives every live element a slot, in their order.
   void lay_out_elements();
@@ -318,5 +327,8 @@ class System {
   Vec3 calc_angular_velocity(size_t body) const;
   Mat3 calc_world_inverse_inertia(size_t body) const;
 };
+
+/// One step of all systems that share lanes: one run of its own, or samples of a batch (null where a lane is idle).
+void advance_together(Lanes&, std::span<System* const> systems);
 
 }  // namespace topple::mbs

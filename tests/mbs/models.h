@@ -2,6 +2,9 @@
 /// Small multibody models with known answers.
 
 #include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <string>
 
 #include "mbs/model.h"
 #include "mbs/solver.h"
@@ -73,6 +76,71 @@ inline ZoneLaw plastic_hinge(double moment) {
   law.moment_z.positive = {moment, moment, moment, moment};
   law.moment_z.negative = law.moment_z.positive;
   return law;
+}
+
+/// A tower of boxes on weak zones that comes down: yielding, breaking, ground and body contact, a joint that is
+/// released.
+inline Model make_tower() {
+  Model m;
+  ZoneLaw law = plastic_hinge(2e4);
+  law.rupture_rotation = 0.05;
+  law.compression = {{0, 0.02, 0.3}, {4e5, 2e5, 2e5}};
+  law.crush_length = 0.2;
+  law.shear_y = law.shear_z = 1e5;
+  law.slip_rupture = 0.1;
+  law.slip_softening = 0.05;
+  const LawId id = add_law(m, law);
+  BodyId below = kGround;
+  for (int i = 0; i < 6; ++i) {
+    const BodyId b =
+        add_body(m, make_box("b" + std::to_string(i), 4000, {0.5, 0.4, 0.5}, {0.02 * i, 0.01 * i, 0.6 + 1.1 * i}));
+    ZoneElement e;
+    e.name = "z" + std::to_string(i);
+    e.a = below;
+    e.b = b;
+    e.X_AF = {below == kGround ? Vec3{0, 0, 0.05} : Vec3{0.02, 0.01, 0.55}, upright()};
+    e.X_BM = {{0, 0, -0.55}, upright()};
+    if (below == kGround) e.X_AF.p = {0, 0, 0.05};
+    e.translational_stiffness = {4e8, 1e8, 1e8};
+    e.rotational_stiffness = {2e7, 2e7, 2e7};
+    e.stations = {{0, id}};
+    add_element(m, e);
+    below = b;
+  }
+  const BodyId flag = add_body(m, make_box("flag", 500, {0.2, 0.2, 0.2}, {0.8, 0.05, 6.1}));
+  Joint j;
+  j.name = "arm";
+  j.parent = below;
+  j.child = flag;
+  j.X_PF.p = Vec3{0.6, 0.05, 6.1} - m.bodies[5].X_WB.p;
+  j.X_CM.p = {-0.2, 0, 0};
+  j.shear_limit = 3e4;
+  add_joint(m, j);
+  Event e;
+  e.time = 0.1;
+  e.name = "cut";
+  Action a;
+  a.kind = Action::Kind::RemoveElement;
+  a.element = {0};
+  e.actions.push_back(a);
+  m.events.push_back(e);
+  return m;
+}
+
+/// Of places and energies.
+inline std::uint64_t hash_of(const View& v) {
+  std::uint64_t h = 1469598103934665603ULL;
+  const auto add = [&](double x) {
+    std::uint64_t bits;
+    std::memcpy(&bits, &x, sizeof bits);
+    h = (h ^ bits) * 1099511628211ULL;
+  };
+  for (const Pose& X : v.X_WB) {
+    for (const double x : {X.p.x, X.p.y, X.p.z, X.q.w, X.q.x, X.q.y, X.q.z}) add(x);
+  }
+  add(v.energy.residual);
+  add(v.energy.friction);
+  return h;
 }
 
 }  // namespace topple::mbs::test

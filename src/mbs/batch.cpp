@@ -1,0 +1,132 @@
+#include "mbs/batch.h"
+
+#include <algorithm>
+#include <atomic>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "mbs/course.h"
+
+namespace topple::mbs {
+
+namespace {
+
+/// Throws InputError if a variation did more than change numbers.
+void check_build(const Model& base, const Model& varied, size_t sample) {
+  const auto fail = [&](const std::string& what) {
+    throw InputError("E602", "variation " + std::to_string(sample) + " changes " + what,
+                     "variations change numbers; bodies, joints and elements stay");
+  };
+  if (varied.bodies.size() != base.bodies.size()) fail("the number of bodies");
+  if (varied.joints.size() != base.joints.size()) fail("the number of joints");
+  if (varied.elements.size() != base.elements.size()) fail("the number of elements");
+  for (size_t i = 0; i < base.elements.size(); ++i)
+    if (varied.elements[i].a != base.elements[i].a || varied.elements[i].b != base.elements[i].b)
+      fail("the bodies of elements[" + std::to_string(i) + "]");
+}
+
+/// Lanes for W samples of one build.
+Lanes make_batch(const System& build, size_t W) {
+  Lanes l;
+  l.W = W;
+  l.is_batch = true;
+  l.allocate_bodies(build.B);
+  l.allocate_elements(build.elements.size());
+  const auto body = [&](int b) { return static_cast<std::uint32_t>(b < 0 ? static_cast<int>(build.B) : b); };
+  for (const CompiledElement& e : build.elements) {
+    l.body_a.push_back(body(e.a));
+    l.body_b.push_back(body(e.b));
+  }
+  l.first_entry.assign(1, 0);
+  for (size_t b = 0; b < build.B; ++b) {
+    for (const int entry : build.incidence[b]) l.entries.push_back(static_cast<std::uint32_t>(entry));
+    l.first_entry.push_back(static_cast<std::uint32_t>(l.entries.size()));
+  }
+  for (size_t slot = 0; slot < l.element_blocks * W; ++slot) l.clear_slot(slot);
+  return l;
+}
+
+/// Runs the samples [first, last), one in each lane.
+void run_lanes(const Model& model, const std::vector<Variation>& variations, const BatchOptions& options, size_t first,
+               size_t last, std::vector<Summary>& out, const std::function<void()>& done) {
+  struct Sample {
+    std::optional<System> system;
+    std::optional<Course> course;
+  };
+  const size_t W = kernel::lanes();
+  std::vector<Sample> samples(last - first);
+  std::vector<System*> active(W, nullptr);
+  const auto end = [&](size_t i) {
+    out[first + i] = samples[i].course->finish();
+    active[i] = nullptr;
+    if (options.on_end) options.on_end(first + i, out[first + i]);
+    done();
+  };
+  std::optional<Lanes> lanes;
+  for (size_t i = 0; i < samples.size(); ++i) {
+    Model varied = model;
+    if (variations[first + i]) variations[first + i](varied);
+    check_build(model, varied, first + i);
+    Options run = options.run;
+    run.threads = 1;
+    run.samplings.clear();
+    run.on_frame = nullptr;
+    run.on_happening = nullptr;
+    run.progress = {};
+    run.progress.cancel = options.progress.cancel;
+    if (options.on_frame) run.on_frame = [&options, sample = first + i](const View& v) { options.on_frame(sample, v); };
+    if (options.on_happening)
+      run.on_happening = [&options, sample = first + i](const Happening& h) { options.on_happening(sample, h); };
+    samples[i].system.emplace(varied, run);
+    System& s = *samples[i].system;
+    samples[i].course.emplace(s);
+    if (!samples[i].course->begin()) {
+      end(i);
+      continue;
+    }
+    if (!lanes) lanes = make_batch(s, W);
+    s.join_batch(*lanes, i);
+    active[i] = &s;
+  }
+  const auto is_running = [](const System* s) { return s != nullptr; };
+  while (std::any_of(active.begin(), active.end(), is_running)) {
+    advance_together(*lanes, active);
+    for (size_t i = 0; i < samples.size(); ++i)
+      if (active[i] != nullptr && !samples[i].course->follow()) end(i);
+  }
+}
+
+}  // namespace
+
+std::vector<Summary> run_batch(const Model& model, const std::vector<Variation>& variations,
+                               const BatchOptions& options) {
+  check_model(model);
+  std::vector<Summary> out(variations.size());
+  const size_t W = kernel::lanes(), batches = (variations.size() + W - 1) / W;
+  std::mutex mutex;
+  size_t finished = 0;
+  const auto done = [&] {
+    const std::lock_guard<std::mutex> lock(mutex);
+    ++finished;
+    if (options.progress.report)
+      options.progress.report(static_cast<double>(finished), static_cast<double>(variations.size()));
+  };
+  const bool complete = parallel_for(
+      batches, options.threads,
+      [&](size_t batch) {
+        run_lanes(model, variations, options, batch * W, std::min(variations.size(), (batch + 1) * W), out, done);
+      },
+      options.progress.cancel);
+  if (!complete)
+    for (Summary& s : out)
+      if (s.message.empty()) {
+        s.ending = Summary::Ending::Cancelled;
+        s.message = "cancelled before it began";
+      }
+  return out;
+}
+
+}  // namespace topple::mbs

@@ -1,0 +1,132 @@
+#include "mbs/course.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace topple::mbs {
+
+namespace {
+
+const char* words_of(Summary::Ending e) {
+  switch (e) {
+    case Summary::Ending::TimeLimit:
+      return "stopped by the time limit";
+    case Summary::Ending::AtRest:
+      return "came to rest";
+    case Summary::Ending::Cancelled:
+      return "cancelled";
+    case Summary::Ending::NoEquilibrium:
+      return "no dead-load equilibrium";
+    case Summary::Ending::Diverged:
+      return "diverged";
+  }
+  return "";
+}
+
+}  // namespace
+
+Course::Course(System& s)
+    : s_(s), sampler_(s.options.samplings), softened_(s.elements.size() + s.rotationals.size(), false) {
+  interval_ = std::max(s.options.frame_interval, s.step);
+  for (const Event& e : s.model.events) last_event_ = std::max(last_event_, e.time);
+}
+
+bool Course::begin() {
+  Summary& out = s_.summary;
+  begin_ = std::chrono::steady_clock::now();
+  if (s_.options.equilibrium && !s_.find_equilibrium(out.message)) {
+    out.ending = Summary::Ending::NoEquilibrium;
+    return false;
+  }
+  s_.start();
+  begin_ = std::chrono::steady_clock::now();
+  show();
+  ++frame_;
+  const double slack = 0.5 * s_.step;
+  if (sampler_.is_due(s_.state.time, slack)) sampler_.take(s_.calc_view(), slack);
+  out.ending = Summary::Ending::TimeLimit;
+  return s_.state.time < s_.options.duration - 1e-9 * s_.step;
+}
+
+void Course::show() {
+  if (shown_ == s_.state.time) return;
+  shown_ = s_.state.time;
+  const View& v = s_.calc_view();
+  for (size_t i = 0; i < softened_.size(); ++i)
+    if (!softened_[i] && v.element_state[i] == ElementState::Softening) {
+      softened_[i] = true;
+      s_.say({Happening::Kind::ElementSoftening, s_.state.time, static_cast<int>(i), -1, {}, 0});
+    }
+  s_.state.largest_residual = std::max(s_.state.largest_residual, std::abs(v.energy.residual));
+  s_.state.released = v.energy.released;
+  if (s_.options.on_frame) s_.options.on_frame(v);
+}
+
+bool Course::is_at_rest() {
+  State& state = s_.state;
+  if (s_.options.rest_speed <= 0 || state.time <= last_event_) return false;
+  double fastest2 = 0, twice_kinetic = 0, mass = 0;
+  for (size_t b = 0; b < s_.B; ++b) {
+    if (s_.fixed[b]) continue;
+    const Vec3 v = state.v[b], w = state.w[b];
+    fastest2 = std::max(fastest2, dot(v, v));
+    twice_kinetic += state.body[b].mass * dot(v, v) + dot(w, state.L[b]);
+    mass += state.body[b].mass;
+  }
+  const double limit2 = s_.options.rest_speed * s_.options.rest_speed;
+  const bool quiet = twice_kinetic < limit2 * mass && fastest2 < 625 * limit2;
+  state.quiet_steps = quiet ? state.quiet_steps + 1 : 0;
+  return state.quiet_steps >= std::max(1L, static_cast<long>(s_.options.rest_time / s_.step));
+}
+
+bool Course::follow() {
+  Summary& out = s_.summary;
+  const Options& options = s_.options;
+  const double time = s_.state.time, slack = 0.5 * s_.step;
+  if (!s_.is_finite() || !s_.trouble.empty()) {
+    out.ending = Summary::Ending::Diverged;
+    return false;
+  }
+  if (sampler_.is_due(time, slack)) sampler_.take(s_.calc_view(), slack);
+  if (time >= static_cast<double>(frame_) * interval_ - slack) {
+    show();
+    while (time >= static_cast<double>(frame_) * interval_ - slack) ++frame_;
+    if (options.progress.report) options.progress.report(time, options.duration);
+  }
+  if (options.progress.is_cancelled()) {
+    out.ending = Summary::Ending::Cancelled;
+    return false;
+  }
+  if (!s_.model.loads.empty()) last_event_ = std::max(last_event_, s_.calc_last_load_change());
+  if (is_at_rest()) {
+    out.ending = Summary::Ending::AtRest;
+    show();
+    return false;
+  }
+  return time < options.duration - 1e-9 * s_.step;
+}
+
+Summary Course::finish() {
+  Summary& out = s_.summary;
+  if (out.ending == Summary::Ending::NoEquilibrium) return out;
+  const State& state = s_.state;
+  out.wall_time = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+  out.time = state.time;
+  out.steps = state.step_index;
+  out.energy_error = state.released > 0 ? state.largest_residual / state.released : 0;
+  out.joint_drift = state.largest_drift;
+  out.message = std::string(words_of(out.ending)) + " at " + std::to_string(out.time) + " s";
+  if (!s_.trouble.empty()) {
+    out.message += ": " + s_.trouble;
+  } else if (out.ending == Summary::Ending::Diverged) {
+    if (s_.step > s_.damper_limit) out.message += "; " + out.notes.front();
+    for (size_t b = 0; b < s_.B; ++b)
+      if (!topple::is_finite(Vec3(state.p[b])) || !topple::is_finite(Vec3(state.v[b]))) {
+        out.message += ": the pose of body \"" + s_.model.bodies[b].name + "\" is no longer finite";
+        break;
+      }
+  }
+  return out;
+}
+
+}  // namespace topple::mbs

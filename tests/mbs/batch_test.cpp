@@ -1,0 +1,125 @@
+// Samples in lanes give the bits of runs alone.
+
+#include "mbs/batch.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <map>
+#include <mutex>
+
+#include "base/error.h"
+#include "models.h"
+
+namespace topple::mbs {
+namespace {
+
+/// Thirteen towers that differ in masses, limits, the time of the cut and so in their steps and fates.
+std::vector<Variation> make_variations() {
+  std::vector<Variation> out;
+  for (int i = 0; i < 13; ++i)
+    out.push_back([i](Model& m) {
+      for (size_t b = 0; b < m.bodies.size(); ++b) {
+        const double f = 1 + 0.02 * i + 0.003 * static_cast<double>(b);
+        m.bodies[b].mass *= f;
+        m.bodies[b].inertia = f * m.bodies[b].inertia;
+      }
+      for (double& x : m.laws[0].moment_z.positive) x *= 1 + 0.1 * i;
+      m.events[0].time = 0.05 + 0.01 * (i % 3);
+      if (i == 4) m.events.clear();  // stands
+      if (i == 7) m.gravity.z = -3;
+    });
+  return out;
+}
+
+Options make_options() {
+  Options o;
+  o.duration = 0.8;
+  o.frame_interval = 0.05;
+  o.equilibrium = false;
+  return o;
+}
+
+TEST(Batch, SampleHasTheBitsOfItsRunAlone) {
+  const Model base = test::make_tower();
+  const std::vector<Variation> variations = make_variations();
+  std::vector<std::vector<std::uint64_t>> alone(variations.size());
+  std::vector<int> happenings(variations.size(), 0);
+  std::vector<Summary> ends;
+  for (size_t i = 0; i < variations.size(); ++i) {
+    Model m = base;
+    variations[i](m);
+    Options o = make_options();
+    o.on_frame = [&](const View& v) { alone[i].push_back(test::hash_of(v)); };
+    o.on_happening = [&](const Happening&) { ++happenings[i]; };
+    ends.push_back(run(m, o));
+  }
+  EXPECT_NE(alone[0].back(), alone[1].back());
+  EXPECT_GT(happenings[0], 5);
+  for (const int threads : {1, 3}) {
+    // in their order, and turned round so that every sample has another lane and other neighbours
+    for (const bool turned : {false, true}) {
+      std::vector<Variation> order = variations;
+      if (turned) std::reverse(order.begin(), order.end());
+      const auto sample_of = [&](size_t i) { return turned ? order.size() - 1 - i : i; };
+      std::vector<std::vector<std::uint64_t>> together(order.size());
+      std::vector<int> said(order.size(), 0);
+      BatchOptions o;
+      o.run = make_options();
+      o.threads = threads;
+      o.on_frame = [&](size_t i, const View& v) { together[sample_of(i)].push_back(test::hash_of(v)); };
+      o.on_happening = [&](size_t i, const Happening&) { ++said[sample_of(i)]; };
+      const std::vector<Summary> out = run_batch(base, order, o);
+      ASSERT_EQ(out.size(), ends.size());
+      for (size_t i = 0; i < ends.size(); ++i) {
+        const Summary &a = ends[sample_of(i)], &b = out[i];
+        EXPECT_EQ(a.ending, b.ending) << b.message;
+        EXPECT_EQ(a.steps, b.steps);
+        EXPECT_EQ(a.time, b.time);
+        EXPECT_EQ(a.energy_error, b.energy_error);
+        EXPECT_EQ(a.joint_drift, b.joint_drift);
+      }
+      EXPECT_EQ(together, alone) << threads << " threads, turned " << turned;
+      EXPECT_EQ(said, happenings);
+    }
+  }
+}
+
+TEST(Batch, SampleThatEndsEarlyDisturbsNoOther) {
+  const Model base = test::make_tower();
+  std::vector<Variation> variations(3);
+  variations[1] = [](Model& m) { m.gravity = {0, 0, -9.81e200}; };  // not for long
+  std::vector<std::uint64_t> last(3);
+  BatchOptions o;
+  o.run = make_options();
+  o.on_frame = [&](size_t i, const View& v) { last[i] = test::hash_of(v); };
+  const std::vector<Summary> out = run_batch(base, variations, o);
+  EXPECT_EQ(out[0].ending, Summary::Ending::TimeLimit);
+  EXPECT_EQ(out[1].ending, Summary::Ending::Diverged) << out[1].message;
+  EXPECT_EQ(out[2].ending, Summary::Ending::TimeLimit);
+  EXPECT_EQ(last[0], last[2]);
+}
+
+TEST(Batch, RefusesAnotherBuild) {
+  const Model base = test::make_tower();
+  EXPECT_THROW(run_batch(base, {[](Model& m) { m.elements.pop_back(); }}, {}), InputError);
+  EXPECT_THROW(run_batch(base, {[](Model& m) { m.elements[2].a = {4}; }}, {}), InputError);
+  EXPECT_THROW(run_batch(base, {[](Model& m) { m.bodies[0].mass = -1; }}, {}), InputError);
+}
+
+TEST(Batch, ReportsProgressAndCanBeCancelled) {
+  const Model base = test::make_tower();
+  std::atomic<bool> cancel = false;
+  double done = 0;
+  BatchOptions o;
+  o.run = make_options();
+  o.progress.cancel = &cancel;
+  o.progress.report = [&](double finished, double) { done = finished; };
+  o.on_end = [&](size_t, const Summary&) { cancel = true; };
+  const std::vector<Summary> out = run_batch(base, std::vector<Variation>(20), o);
+  EXPECT_GE(done, 1);
+  EXPECT_EQ(out[19].ending, Summary::Ending::Cancelled);
+}
+
+}  // namespace
+}  // namespace topple::mbs
