@@ -19,6 +19,7 @@ std::variant<Arguments, int> parse_arguments(int argc, char** argv) {
   topple run storehouse.toml -o out                simulate; findings, out/record.h5, out/report.html
   topple run storehouse.toml -o out --json         the same for programs (docs/run.md)
   topple mbs run out/model.json -o again           run a multibody model on its own
+  topple mbs compare out/model.json                the same model on other engines (docs/engines.md)
   topple report out/record.h5 -o report.html       make the page from a record
 
 Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterion of the plan is violated.)");
@@ -57,7 +58,29 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   CLI::App* mbs_run = mbs->add_subcommand("run", "Run a multibody model on its own.");
   mbs_run->add_option("model", a.input, "multibody model (JSON)")->required();
   mbs_run->add_option("--frame-rate", a.frame_rate, "poses kept, such as \"60 Hz\"");
+  CLI::Option* with = mbs_run->add_flag_callback(
+      "--equilibrium", [&a] { a.equilibrium = true; },
+      "begin with the equilibrium under dead load, whatever the file says");
+  mbs_run
+      ->add_flag_callback(
+          "--no-equilibrium", [&a] { a.equilibrium = false; }, "begin with the poses and velocities of the file")
+      ->excludes(with);
   add_run_options(mbs_run);
+
+  CLI::App* mbs_compare = mbs->add_subcommand("compare", "Run a multibody model on several engines and compare.");
+  mbs_compare->add_option("model", a.input, "multibody model (JSON)")->required();
+  mbs_compare->add_option("--engines", a.engines,
+                          "names between commas, such as native,simbody,mujoco; all if left out");
+  mbs_compare->add_option("-o,--output", a.output, "folder for compare.csv and compare.svg");
+  mbs_compare->add_option("--duration", a.duration, "simulated time, such as \"10 s\"");
+  mbs_compare->add_option("--step", a.step, "fixed step of all engines, such as \"0.1 ms\"");
+  mbs_compare->add_option("--accuracy", a.accuracy,
+                          "relative, of engines that control their errors; 1e-9 without --step");
+  mbs_compare->add_option("--frames", a.frames, "instants that are compared (100)")->check(CLI::Range(1, 1000000));
+  mbs_compare->add_flag("--bodies", a.bodies, "also list every body");
+  mbs_compare->add_flag("--skip-unsupported", a.skip_unsupported,
+                        "go on without engines that cannot express the model");
+  mbs_compare->add_flag("--json", a.json, "one JSON object on standard output");
 
   CLI::App* report = app.add_subcommand("report", "Make the self-contained page from a record.");
   report->add_option("record", a.input, "record (HDF5)")->required();
@@ -88,6 +111,7 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   if (run->parsed()) a.verb = Verb::Run;
   if (rules->parsed()) a.verb = Verb::Rules;
   if (mbs_run->parsed()) a.verb = Verb::MbsRun;
+  if (mbs_compare->parsed()) a.verb = Verb::MbsCompare;
   if (report->parsed()) a.verb = Verb::Report;
   if (version->parsed()) a.verb = Verb::Version;
   return a;

@@ -1,21 +1,26 @@
 #pragma once
 /// What the user typed, understood.
 
+#include <optional>
 #include <string>
 #include <variant>
 
 namespace topple::apps {
 
 struct Arguments {
-  enum class Verb { None, New, Check, Run, Rules, MbsRun, Report, Version };
+  enum class Verb { None, New, Check, Run, Rules, MbsRun, MbsCompare, Report, Version };
   Verb verb = Verb::None;
   std::string input;      // plan, model, record, or the file to write
   std::string output;     // folder or file
   std::string knowledge;  // file of rules, empty: built in
   std::string engine = "native";
+  std::string engines;                     // names between commas, empty: all
+  std::string accuracy;                    // relative, as typed
   std::string duration, step, frame_rate;  // quantities as typed; empty: the plan's
-  int threads = 1;
+  std::optional<bool> equilibrium;         // of a bare model; none: as its file says
+  int threads = 1, frames = 0;
   bool json = false, csv = false, no_report = false, report = false, verbose = false;
+  bool bodies = false, skip_unsupported = false;
 };
 
 /// Exit codes of every verb.

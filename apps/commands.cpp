@@ -16,6 +16,7 @@
 #include "mbs/model_json.h"
 #include "product/plan.h"
 #include "record/record.h"
+#include "results.h"
 #include "terminal.h"
 
 namespace topple::apps {
@@ -49,8 +50,6 @@ json to_json(const Diagnostic& d) {
           {"help", d.help}};
 }
 
-std::string dump(const json& j) { return j.dump(2, ' ', false, json::error_handler_t::replace); }
-
 /// Complaints on standard error, the number of errors.
 int print_diagnostics(const std::vector<Diagnostic>& list, const std::string& text) {
   int errors = 0;
@@ -63,7 +62,10 @@ int print_diagnostics(const std::vector<Diagnostic>& list, const std::string& te
 
 std::string count_words(int n, const char* what) { return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s"); }
 
-/// All complaints of an InputError, and the JSON object if that was asked for.
+}  // namespace
+
+std::string dump(const json& j) { return j.dump(2, ' ', false, json::error_handler_t::replace); }
+
 int refuse(const InputError& e, const std::vector<Diagnostic>& warnings, const std::string& text, bool as_json) {
   std::vector<Diagnostic> all = e.diagnostics();
   all.insert(all.end(), warnings.begin(), warnings.end());
@@ -76,6 +78,8 @@ int refuse(const InputError& e, const std::vector<Diagnostic>& warnings, const s
   }
   return kBadInput;
 }
+
+namespace {
 
 /// A quantity from the command line; a bare number counts in the SI unit.
 double read_quantity(const std::string& text, Dimension dimension, const char* option) {
@@ -91,6 +95,8 @@ double read_quantity(const std::string& text, Dimension dimension, const char* o
   return *q.value;
 }
 
+}  // namespace
+
 collapse::RunOptions make_options(const Arguments& a) {
   collapse::RunOptions o;
   o.duration = read_quantity(a.duration, Dimension::Time, "--duration");
@@ -101,6 +107,8 @@ collapse::RunOptions make_options(const Arguments& a) {
   o.program_version = TOPPLE_VERSION;
   return o;
 }
+
+namespace {
 
 collapse::Knowledge load_knowledge(const Arguments& a) {
   return a.knowledge.empty() ? collapse::default_knowledge()
@@ -121,16 +129,16 @@ constexpr const char* kNoBundle =
     "The report page is not built, so there is no report.html (run `npm ci && npm run build` in web/, then `topple "
     "report`).";
 
+}  // namespace
+
 void make_folder(const std::string& path) {
   std::error_code failure;
   fs::create_directories(path, failure);
   if (failure) throw std::runtime_error(path + ": the folder cannot be made: " + failure.message());
 }
 
-/// Files of a finished record. `failed_report` is set when a report was asked for and could not be made.
-std::vector<std::pair<std::string, std::string>> write_files(const record::Record& r, const Arguments& a,
-                                                             bool& failed_report) {
-  std::vector<std::pair<std::string, std::string>> files;
+Files write_files(const record::Record& r, const Arguments& a, bool& failed_report) {
+  Files files;
   const auto in = [&a](const char* name) { return (fs::path(a.output) / name).string(); };
   record::write_hdf5(r, in("record.h5"));
   files.emplace_back("record", in("record.h5"));
@@ -151,13 +159,16 @@ std::vector<std::pair<std::string, std::string>> write_files(const record::Recor
   return files;
 }
 
+namespace {
+
 /// A finding that makes the exit code 3.
 bool is_violated(const record::Finding& f) {
   return f.status == record::Status::Bad && (f.id.rfind("criterion.", 0) == 0 || f.id.rfind("clearance.", 0) == 0);
 }
 
-json summary_json(const record::Record& r, const std::vector<std::pair<std::string, std::string>>& files,
-                  int exit_code) {
+}  // namespace
+
+json summary_json(const record::Record& r, const Files& files, int exit_code) {
   json out;
   out["title"] = r.provenance.title;
   out["exit_code"] = exit_code;
@@ -197,8 +208,9 @@ int exit_code_of(const record::Record& r, bool failed_report) {
   return collapse::violates_criteria(r) ? kCriterionViolated : kOk;
 }
 
-int close_run(const record::Record& r, const Arguments& a, std::FILE* out,
-              std::vector<std::pair<std::string, std::string>> files) {
+namespace {
+
+int close_run(const record::Record& r, const Arguments& a, std::FILE* out, Files files) {
   bool failed_report = false;
   for (auto& f : write_files(r, a, failed_report)) files.push_back(std::move(f));
   const int code = exit_code_of(r, failed_report);
@@ -257,13 +269,13 @@ int run_plan_file(const Arguments& a, const std::atomic<bool>& cancel) {
     make_folder(a.output);
     ProgressLine progress;
     EventPrinter events(out, a.verbose, progress);
-    std::vector<std::pair<std::string, std::string>> files;
+    Files files;
     collapse::RunCallbacks callbacks;
     callbacks.on_model = [&](const mbs::Model& model, const collapse::ModelMap& map, const record::Counts& counts) {
       std::fprintf(out, "%s\n", plan.title.c_str());
       print_counts(out, counts, map.mass);
       const std::string path = (fs::path(a.output) / "model.json").string();
-      replace_file(path, mbs::to_json(model));
+      replace_file(path, mbs::to_json(model, collapse::settings_of(plan, knowledge, options)));
       files.emplace_back("model", path);
     };
     callbacks.on_event = [&](const record::Event& e) { events.print(e); };
@@ -273,28 +285,6 @@ int run_plan_file(const Arguments& a, const std::atomic<bool>& cancel) {
     progress.clear();
     return close_run(r, a, out, std::move(files));
   } catch (const InputError& e) { return refuse(e, warnings, text, a.json); }
-}
-
-int run_model_file(const Arguments& a, const std::atomic<bool>& cancel) {
-  std::FILE* out = a.json ? stderr : stdout;
-  try {
-    const collapse::RunOptions options = make_options(a);
-    const mbs::Model model = mbs::model_from_json(read_file(a.input), a.input);
-    make_folder(a.output);
-    ProgressLine progress;
-    EventPrinter events(out, a.verbose, progress);
-    collapse::RunCallbacks callbacks;
-    callbacks.on_model = [&](const mbs::Model& m, const collapse::ModelMap& map, const record::Counts& counts) {
-      std::fprintf(out, "%s\n", m.name.c_str());
-      print_counts(out, counts, map.mass);
-    };
-    callbacks.on_event = [&](const record::Event& e) { events.print(e); };
-    callbacks.progress.report = [&](double done, double whole) { progress.show(done, whole); };
-    callbacks.progress.cancel = &cancel;
-    const record::Record r = collapse::run_model(model, options, callbacks);
-    progress.clear();
-    return close_run(r, a, out, {});
-  } catch (const InputError& e) { return refuse(e, {}, {}, a.json); }
 }
 
 int show_rules(const Arguments& a) {

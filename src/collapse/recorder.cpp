@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <set>
 
 #include "base/unit.h"
@@ -261,7 +262,8 @@ void Recorder::add_happening(const mbs::Happening& h) {
     case Kind::EventFired: {
       const mbs::Event& event = model_.events[static_cast<size_t>(h.index)];
       if (map_.events.empty()) {
-        add_event({h.time, "charge", event.name, fmt::format("{} at {:.3f} s", event.name, h.time)});
+        const std::string name = event.name.empty() ? fmt::format("event {}", h.index) : event.name;
+        add_event({h.time, "charge", name, fmt::format("{} at {:.3f} s", name, h.time)});
         break;
       }
       const EventEntry& entry = map_.events[static_cast<size_t>(h.index)];
@@ -318,6 +320,21 @@ void Recorder::add_happening(const mbs::Happening& h) {
       add_event({h.time, "cable", name, fmt::format("cable {} breaks", name)});
       break;
     }
+    case Kind::SpringBroken: {
+      const std::string name = model_.springs[static_cast<size_t>(h.index)].name;
+      add_event({h.time, "rupture", name, fmt::format("spring {} breaks ({})", name, h.reason)});
+      break;
+    }
+    case Kind::RotationalSpringBroken: {
+      const std::string name = model_.rotational_springs[static_cast<size_t>(h.index)].name;
+      add_event({h.time, "rupture", name, fmt::format("rotational spring {} breaks", name)});
+      break;
+    }
+    case Kind::BushingBroken: {
+      const std::string name = model_.bushings[static_cast<size_t>(h.index)].name;
+      add_event({h.time, "rupture", name, fmt::format("bushing {} breaks ({})", name, h.reason)});
+      break;
+    }
     case Kind::GroundContact: {
       const bool upper = map_.bodies[static_cast<size_t>(h.index)].is_upper;
       if (upper && !std::isfinite(touchdown_)) {
@@ -341,6 +358,53 @@ void Recorder::finish() {
                    [](const record::Event& a, const record::Event& b) { return a.time < b.time; });
 }
 
+namespace {
+
+/// The box that stands for a shape where it is shown; none for a half-space.
+std::optional<record::BoxShape> box_of(const mbs::Shape& s) {
+  switch (s.kind) {
+    case mbs::Shape::Kind::Box:
+      return record::BoxShape{s.X_BS, s.half, "concrete"};
+    case mbs::Shape::Kind::Sphere:
+      return record::BoxShape{s.X_BS, {s.radius, s.radius, s.radius}, "concrete"};
+    case mbs::Shape::Kind::Hull: {
+      Vec3 low = s.vertices.front(), high = low;
+      for (const Vec3& v : s.vertices)
+        for (int k = 0; k < 3; ++k) {
+          low[k] = std::min(low[k], v[k]);
+          high[k] = std::max(high[k], v[k]);
+        }
+      return record::BoxShape{{s.X_BS * (0.5 * (low + high)), s.X_BS.q}, 0.5 * (high - low), "concrete"};
+    }
+    case mbs::Shape::Kind::Plane:
+      break;
+  }
+  return std::nullopt;
+}
+
+const char* words_of(mbs::Joint::Kind kind) {
+  using Kind = mbs::Joint::Kind;
+  switch (kind) {
+    case Kind::Fixed:
+      return "rigid joint";
+    case Kind::Revolute:
+      return "revolute joint";
+    case Kind::Spherical:
+      return "spherical joint";
+    case Kind::Universal:
+      return "universal joint";
+    case Kind::Prismatic:
+      return "prismatic joint";
+    case Kind::Cylindrical:
+      return "cylindrical joint";
+    case Kind::Distance:
+      return "distance joint";
+  }
+  return "";
+}
+
+}  // namespace
+
 ModelMap describe_model(const mbs::Model& model) {
   ModelMap map;
   std::set<std::string> names;
@@ -356,8 +420,7 @@ ModelMap describe_model(const mbs::Model& model) {
     entry.kind = "body";
     entry.is_upper = !body.fixed;
     for (const mbs::Shape& s : body.shapes) {
-      const double r = s.radius;
-      entry.shapes.push_back({s.X_BS, s.kind == mbs::Shape::Kind::Box ? s.half : Vec3{r, r, r}, "concrete"});
+      if (const auto box = box_of(s)) entry.shapes.push_back(*box);
     }
     map.mass += body.mass;
     if (!body.fixed) map.moving_mass += body.mass;
@@ -369,8 +432,7 @@ ModelMap describe_model(const mbs::Model& model) {
   for (const mbs::ZoneElement& e : model.elements)
     map.elements.push_back({e.name, "", "six-component element", e.a.index, e.b.index, place(e.a, e.X_AF)});
   for (const mbs::Joint& j : model.joints)
-    map.joints.push_back({j.name, "", j.kind == mbs::Joint::Kind::Fixed ? "rigid joint" : "revolute joint",
-                          j.parent.index, j.child.index, place(j.parent, j.X_PF)});
+    map.joints.push_back({j.name, "", words_of(j.kind), j.parent.index, j.child.index, place(j.parent, j.X_PF)});
   for (const mbs::RotationalElement& r : model.rotational_elements) {
     ZoneEntry z = map.joints[static_cast<size_t>(r.joint.index)];
     z.name = r.name;

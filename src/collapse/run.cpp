@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <limits>
 
 #include "base/hash.h"
 #include "base/unit.h"
@@ -13,6 +14,7 @@
 #include "collapse/findings.h"
 #include "collapse/recorder.h"
 #include "engines/engine.h"
+#include "mbs/quantity.h"
 
 namespace topple::collapse {
 
@@ -32,7 +34,7 @@ std::string machine_words() {
   return uname(&u) == 0 ? fmt::format("{} {}", u.sysname, u.machine) : "unknown";
 }
 
-void fill_ending(const mbs::Summary& s, record::Record& record) {
+void fill_ending(const mbs::Summary& s, const char* when, record::Record& record) {
   using Ending = mbs::Summary::Ending;
   switch (s.ending) {
     case Ending::AtRest:
@@ -49,7 +51,7 @@ void fill_ending(const mbs::Summary& s, record::Record& record) {
       break;
     case Ending::NoEquilibrium:
       record.ending = "failed";
-      record.ending_text = "There is no equilibrium under dead load before the first charge: " + s.message + ".";
+      record.ending_text = fmt::format("There is no equilibrium under dead load{}: {}.", when, s.message);
       break;
     case Ending::Diverged:
       record.ending = "failed";
@@ -137,10 +139,79 @@ void fill_provenance(const RunOptions& options, const engines::Engine& engine, r
   r.provenance.threads = options.threads;
 }
 
-void finish(const mbs::Summary& summary, Recorder& recorder, record::Record& r) {
+/// The name of the item, or its place where it has none.
+std::string item_of(const mbs::Model& m, const mbs::Quantity& q) {
+  const std::string item = mbs::traits_of(q.kind).item;
+  const size_t i = static_cast<size_t>(q.index);
+  const std::string& name = item == "body"      ? m.bodies[i].name
+                            : item == "joint"   ? m.joints[i].name
+                            : item == "element" ? m.elements[i].name
+                            : item == "bushing" ? m.bushings[i].name
+                            : item == "spring"  ? m.springs[i].name
+                            : item == "cable"   ? m.cables[i].name
+                                                : m.rotational_springs[i].name;
+  return fmt::format("{} {}", item, name.empty() ? fmt::format("number {}", i) : name);
+}
+
+/// One table in the record for each output, and who fills it while the model runs.
+std::vector<mbs::Sampling> make_samplings(const mbs::Model& model, record::Record& r) {
+  std::vector<mbs::Sampling> samplings;
+  for (const mbs::Output& o : model.outputs) {
+    const mbs::QuantityTraits& t = mbs::traits_of(o.quantity.kind);
+    r.outputs.push_back({o.name,
+                         fmt::format("{} of {}", t.word, item_of(model, o.quantity)),
+                         t.unit,
+                         t.frame,
+                         mbs::column_names(o.quantity.kind),
+                         {},
+                         {}});
+  }
+  for (size_t i = 0; i < model.outputs.size(); ++i)
+    samplings.push_back({1 / model.outputs[i].rate, [&r, i, quantity = model.outputs[i].quantity](const mbs::View& v) {
+                           record::Output& out = r.outputs[i];
+                           out.time.push_back(v.time);
+                           for (const double x : mbs::calc_quantity(quantity, v)) out.value.push_back(x);
+                         }});
+  return samplings;
+}
+
+/// What the engine says about its own numbers.
+void add_checks(const mbs::Model& model, const mbs::Summary& s, bool equilibrium, const Knowledge& k,
+                record::Record& r) {
+  using record::Status;
+  const auto add = [&r](const std::string& id, const char* title, const std::string& text, double value,
+                        const char* unit, Status status) {
+    r.findings.push_back({id, id.rfind("note.", 0) == 0 ? "Notes" : "Verification", title, text, value, unit, status});
+  };
+  if (equilibrium)
+    add("verification.equilibrium", "Equilibrium under dead load",
+        fmt::format("After {} iterations the largest unbalanced force is {:.1e} of the weight.",
+                    s.equilibrium_iterations, s.equilibrium_residual),
+        s.equilibrium_residual, "1",
+        s.ending == mbs::Summary::Ending::NoEquilibrium                 ? Status::Bad
+        : s.equilibrium_residual <= k.verification_equilibrium_residual ? Status::Good
+                                                                        : Status::Warning);
+  if (s.ending != mbs::Summary::Ending::NoEquilibrium) {
+    add("verification.energy", "Energy balance",
+        fmt::format("The largest error is {:.1e} of the released potential energy.", s.energy_error), s.energy_error,
+        "1", s.energy_error <= k.verification_energy_error ? Status::Good : Status::Warning);
+    add("verification.step", "Time step",
+        fmt::format("{:.3g} ms in {} steps; the fastest mode has {:.0f} rad/s.", s.step * 1e3, s.steps,
+                    s.highest_frequency),
+        s.step, "s", Status::Info);
+    if (!model.joints.empty())
+      add("verification.joints", "Joints", fmt::format("They drift by at most {:.1e} m or rad.", s.joint_drift),
+          s.joint_drift, "1", s.joint_drift <= 1e-8 ? Status::Good : Status::Warning);
+  }
+  for (size_t i = 0; i < s.notes.size(); ++i)
+    add(fmt::format("note.{}", i + 1), "Note", s.notes[i], std::numeric_limits<double>::quiet_NaN(), "", Status::Info);
+}
+
+/// `when` the equilibrium is that of the start.
+void finish(const mbs::Summary& summary, const char* when, Recorder& recorder, record::Record& r) {
   r.provenance.step = summary.step;
   r.provenance.wall_time = summary.wall_time;
-  fill_ending(summary, r);
+  fill_ending(summary, when, r);
   const bool failed = r.ending == "failed";
   recorder.add_event({summary.time, failed ? "failure" : "rest", r.ending, r.ending_text});
   recorder.finish();
@@ -151,9 +222,12 @@ void finish(const mbs::Summary& summary, Recorder& recorder, record::Record& r) 
 record::Counts count(const mbs::Model& model) {
   record::Counts c;
   c.bodies = static_cast<int>(model.bodies.size());
-  for (const mbs::Joint& j : model.joints)
-    ++(j.kind == mbs::Joint::Kind::Revolute ? c.revolute_joints : c.rigid_joints);
-  c.force_elements = static_cast<int>(model.elements.size() + model.rotational_elements.size());
+  for (const mbs::Joint& j : model.joints) {
+    c.revolute_joints += j.kind == mbs::Joint::Kind::Revolute;
+    c.rigid_joints += j.kind == mbs::Joint::Kind::Fixed;
+  }
+  c.force_elements = static_cast<int>(model.elements.size() + model.rotational_elements.size() + model.springs.size() +
+                                      model.rotational_springs.size() + model.bushings.size());
   c.cables = static_cast<int>(model.cables.size());
   for (const mbs::Body& b : model.bodies)
     if (!b.fixed) c.mass += b.mass;
@@ -187,9 +261,21 @@ record::Record run_plan(const product::Plan& plan, const Knowledge& k, const Run
   const mbs::Summary summary =
       engine->run(model, make_options(options, plan.analysis.duration, plan.analysis.step, plan.analysis.frame_rate, k,
                                       recorder, callbacks.progress));
-  finish(summary, recorder, r);
+  finish(summary, " before the first charge", recorder, r);
   add_findings(plan, model, map, k, recorder, summary, r);
+  if (callbacks.on_summary) callbacks.on_summary(summary);
   return r;
+}
+
+mbs::RunSettings settings_of(const product::Plan& plan, const Knowledge& k, const RunOptions& options) {
+  mbs::RunSettings s;
+  s.duration = options.duration > 0 ? options.duration : plan.analysis.duration;
+  s.step = options.step > 0 ? options.step : plan.analysis.step;
+  const double rate = options.frame_rate > 0 ? options.frame_rate : plan.analysis.frame_rate;
+  s.frame_interval = 1 / (rate > 0 ? rate : 60);
+  s.equilibrium = true;
+  s.rest_speed = k.rest_speed;
+  return s;
 }
 
 record::Record run_model(const mbs::Model& model, const RunOptions& options, const RunCallbacks& callbacks) {
@@ -203,8 +289,14 @@ record::Record run_model(const mbs::Model& model, const RunOptions& options, con
   r.provenance.title = model.name;
   fill_provenance(options, *engine, r);
   Recorder recorder(model, map, k, r, callbacks);
-  const mbs::Summary summary = engine->run(model, make_options(options, 10, 0, 60, k, recorder, callbacks.progress));
-  finish(summary, recorder, r);
+  mbs::Options o = make_options(options, 10, 0, 60, k, recorder, callbacks.progress);
+  o.equilibrium = options.equilibrium;
+  o.rest_speed = options.rest_speed.value_or(k.rest_speed);
+  o.samplings = make_samplings(model, r);
+  const mbs::Summary summary = engine->run(model, o);
+  finish(summary, "", recorder, r);
+  add_checks(model, summary, options.equilibrium, k, r);
+  if (callbacks.on_summary) callbacks.on_summary(summary);
   return r;
 }
 

@@ -2,11 +2,13 @@
 /// From a plan to a record: model, equilibrium, run, findings.
 
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "base/progress.h"
 #include "collapse/knowledge.h"
 #include "collapse/manager.h"
+#include "mbs/model_json.h"
 #include "mbs/solver.h"
 #include "product/plan.h"
 #include "record/record.h"
@@ -20,11 +22,15 @@ struct RunOptions {
   int threads = 1;
   std::string engine = "native";
   std::string program_version;  // for the record
+  // of bare models alone
+  bool equilibrium = true;           // false: from the poses and velocities of the model
+  std::optional<double> rest_speed;  // 0: do not stop at rest; none: that of the rules [m/s]
 };
 
 struct RunCallbacks {
   std::function<void(const mbs::Model&, const ModelMap&, const record::Counts&)> on_model;  // before the equilibrium
   std::function<void(const record::Event&)> on_event;                                       // as it happens
+  std::function<void(const mbs::Summary&)> on_summary;                                      // of the engine, at the end
   Progress progress;  // done and whole in simulated seconds
 };
 
@@ -32,7 +38,11 @@ struct RunCallbacks {
 /// "time_limit", "cancelled" or "failed", and the findings say which criteria are violated.
 record::Record run_plan(const product::Plan&, const Knowledge&, const RunOptions&, const RunCallbacks&);
 
-/// Runs a bare multibody model: poses, energies and events, without findings about a building.
+/// What run_model needs to run the plan's model to the same poses.
+mbs::RunSettings settings_of(const product::Plan&, const Knowledge&, const RunOptions&);
+
+/// Runs a bare multibody model: poses, energies, events, the outputs it asks for and checks of the numbers, without
+/// findings about a building.
 record::Record run_model(const mbs::Model&, const RunOptions&, const RunCallbacks&);
 
 /// Whether a finding says that the plan's criteria or clearances are not met.

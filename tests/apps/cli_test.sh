@@ -109,9 +109,37 @@ json)
 mbs)
   expect 0 "$topple" run "$plan" -o a --no-report
   expect 0 "$topple" mbs run a/model.json -o b --csv --no-report --duration 0.8s; exists b/record.h5
+  has out "Bodies"; has out "Equilibrium"; has out "Energy error"; has out "Stopped by the time limit of 0.80 s"
+  # the file says how its plan was run
+  expect 0 "$topple" mbs run a/model.json -o b2 --csv --no-report
+  expect 0 "$topple" run "$plan" -o a2 --csv --no-report
+  [ "$(cut -d, -f1 b2/series.csv)" = "$(cut -d, -f1 a2/series.csv)" ] || { echo "other frames than the plan's"; failures=$((failures + 1)); }
   expect 2 "$topple" mbs run missing.json -o c
   echo '{"bodies": 3}' >wrong.json; expect 2 "$topple" mbs run wrong.json -o c
   head -c 1000 a/model.json >cut.json; expect 2 "$topple" mbs run cut.json -o c
+  [ ! -e c ] || { echo "a folder was made for a wrong model"; failures=$((failures + 1)); }
+  # outputs
+  pendulum=$source/examples/mbs/double_pendulum.json
+  expect 0 "$topple" mbs run "$pendulum" -o d --no-report
+  has out "2 revolute"; has out "Wrote d/outputs/lower_position.csv"
+  has d/outputs/lower_position.csv "time [s],x [m],y [m],z [m]"
+  has d/outputs/top_reaction.csv "time [s],x [N],y [N],z [N]"
+  [ "$(wc -l <d/outputs/lower_position.csv)" -eq 202 ] || { echo "not 201 samples"; failures=$((failures + 1)); }
+  [ "$(wc -l <d/outputs/top_reaction.csv)" -eq 402 ] || { echo "not 401 samples"; failures=$((failures + 1)); }
+  [ -z "$(find d -name '*.part')" ] || { echo "half files"; failures=$((failures + 1)); }
+  expect 0 "$topple" mbs run "$pendulum" -o d --no-report --json --duration 0.1
+  is_json out; has out '"joint_drift"'; has out '"samples": 11'; has out '"file": "d/outputs/lower_position.csv"'
+  # options go before the file
+  expect 1 "$topple" mbs run "$pendulum" -o e --no-report --equilibrium; has out "no equilibrium"; has out "--no-equilibrium"
+  has e/outputs/lower_position.csv "time [s]"
+  expect 2 "$topple" mbs run "$pendulum" -o e --equilibrium --no-equilibrium
+  expect 0 "$topple" mbs run "$pendulum" -o f --no-report --step "1 ms" --duration 0.5s; has out "0.5 s in 500 steps of 1 ms"
+  # a mistake is shown where it stands
+  sed 's/"child": "lower"/"child": "lwoer"/' "$pendulum" >typo.json
+  expect 2 "$topple" mbs run typo.json -o g
+  has err 'typo.json:15:'; has err 'there is no body "lwoer"; did you mean "lower"?'; has err '^^^'; has err "1 error. Nothing was run."
+  expect 2 "$topple" mbs run typo.json -o g --json; is_json out; has out '"line": 15'
+  [ ! -e g ] || { echo "a folder was made for a wrong model"; failures=$((failures + 1)); }
   ;;
 report)
   expect 0 "$topple" run "$plan" -o a --no-report

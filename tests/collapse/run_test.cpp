@@ -116,6 +116,30 @@ TEST(RunReplay, TheModelFileRunsAgainToTheSamePoses) {
     for (size_t i = 0; i < 3 * B; ++i) ASSERT_EQ(a.position[s * 3 * A + i], b.position[s * 3 * B + i]);
 }
 
+TEST(RunReplay, TheModelFileSaysHowItsPlanWasRun) {
+  const product::Plan plan = read(house(charge("C-A*-0", "0.05 s"), "0.5 s"));
+  const Knowledge& k = default_knowledge();
+  RunOptions options;
+  options.frame_rate = 25;
+  std::string file;
+  RunCallbacks callbacks;
+  callbacks.on_model = [&](const mbs::Model& m, const ModelMap&, const record::Counts&) {
+    file = mbs::to_json(m, settings_of(plan, k, options));
+  };
+  const record::Record a = run_plan(plan, k, options, callbacks);
+  mbs::RunSettings s;
+  const mbs::Model m = mbs::model_from_json(file, "model.json", &s);
+  EXPECT_EQ(s.duration, 0.5);
+  EXPECT_EQ(s.equilibrium, true);
+  EXPECT_EQ(s.rest_speed, k.rest_speed);
+  RunOptions again;
+  again.duration = s.duration;
+  again.step = s.step;
+  again.frame_rate = 1 / s.frame_interval;
+  const record::Record b = run_model(m, again, {});
+  EXPECT_EQ(a.time, b.time);
+}
+
 TEST(RunReplay, ThreadsDoNotChangeTheResult) {
   const product::Plan plan = read(house(charge("C-A*-0", "0.05 s"), "0.6 s"));
   std::vector<float> first;

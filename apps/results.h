@@ -1,0 +1,35 @@
+#pragma once
+/// What the verbs that run something have in common: options, complaints, files, the JSON object, the exit code.
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "arguments.h"
+#include "base/error.h"
+#include "collapse/run.h"
+#include "record/record.h"
+
+namespace topple::apps {
+
+/// What was written: what it is, and its path.
+using Files = std::vector<std::pair<std::string, std::string>>;
+
+/// All complaints of an InputError, and the JSON object if that was asked for; `text` is the input.
+int refuse(const InputError&, const std::vector<Diagnostic>& warnings, const std::string& text, bool as_json);
+
+/// Throws InputError for quantities that cannot be read.
+collapse::RunOptions make_options(const Arguments&);
+
+/// Throws std::runtime_error with the path.
+void make_folder(const std::string& path);
+
+/// Files of a finished record. `failed_report` is set when a report was asked for and could not be made.
+Files write_files(const record::Record&, const Arguments&, bool& failed_report);
+
+nlohmann::ordered_json summary_json(const record::Record&, const Files&, int exit_code);
+std::string dump(const nlohmann::ordered_json&);
+int exit_code_of(const record::Record&, bool failed_report);
+
+}  // namespace topple::apps

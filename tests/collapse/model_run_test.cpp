@@ -1,0 +1,139 @@
+// Bare multibody models: the examples, what they write, and what a plan's model file keeps of its plan.
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "base/file.h"
+#include "collapse/run.h"
+#include "mbs/model_json.h"
+
+namespace topple::collapse {
+namespace {
+
+constexpr double kGravity = 9.81;
+
+struct Example {
+  mbs::Model model;
+  record::Record record;
+  mbs::Summary summary;
+};
+
+Example run_example(const std::string& name, double step = 0) {
+  const std::string path = std::string(TOPPLE_SOURCE_DIR) + "/examples/mbs/" + name;
+  mbs::RunSettings settings;
+  Example e;
+  e.model = mbs::model_from_json(read_file(path), path, &settings);
+  RunOptions o;
+  o.duration = settings.duration;
+  o.step = step > 0 ? step : settings.step;
+  o.equilibrium = settings.equilibrium.value_or(true);
+  o.rest_speed = settings.rest_speed.value_or(0);
+  RunCallbacks callbacks;
+  callbacks.on_summary = [&](const mbs::Summary& s) { e.summary = s; };
+  e.record = run_model(e.model, o, callbacks);
+  return e;
+}
+
+const record::Output& output_of(const Example& e, const std::string& name) {
+  for (const record::Output& o : e.record.outputs)
+    if (o.name == name) return o;
+  throw std::runtime_error("no output " + name);
+}
+
+/// Angles below the x axis of two rods of 1 m and 2 kg, 1 kg, turning about y, as those of the example; y = (a, b, a',
+/// b'). From Lagrange's equations, with inertias about the centres as in the file.
+std::array<double, 4> rate_of(const std::array<double, 4>& y) {
+  const double m1 = 2, m2 = 1, c = 0.5, L = 1, I1 = 0.1667, I2 = 0.0833;
+  const double m11 = I1 + m1 * c * c + m2 * L * L, m22 = I2 + m2 * c * c, m12 = m2 * L * c * std::cos(y[0] - y[1]);
+  const double s = m2 * L * c * std::sin(y[0] - y[1]);
+  const double f1 = (m1 * c + m2 * L) * kGravity * std::cos(y[0]) - s * y[3] * y[3];
+  const double f2 = m2 * c * kGravity * std::cos(y[1]) + s * y[2] * y[2];
+  const double det = m11 * m22 - m12 * m12;
+  return {y[2], y[3], (m22 * f1 - m12 * f2) / det, (m11 * f2 - m12 * f1) / det};
+}
+
+std::array<double, 4> swing(double time) {
+  std::array<double, 4> y{0, 0, 0, 0};
+  const int n = static_cast<int>(std::lround(time * 20000));
+  const double h = n > 0 ? time / n : 0;
+  const auto moved = [](std::array<double, 4> a, const std::array<double, 4>& k, double f) {
+    for (size_t i = 0; i < 4; ++i) a[i] += f * k[i];
+    return a;
+  };
+  for (int i = 0; i < n; ++i) {
+    const auto k1 = rate_of(y), k2 = rate_of(moved(y, k1, h / 2)), k3 = rate_of(moved(y, k2, h / 2)),
+               k4 = rate_of(moved(y, k3, h));
+    for (size_t k = 0; k < 4; ++k) y[k] += h / 6 * (k1[k] + 2 * k2[k] + 2 * k3[k] + k4[k]);
+  }
+  return y;
+}
+
+TEST(ModelRunPhysics, TheDoublePendulumSwingsAsLagrangeSays) {
+  double error[2];
+  for (int i = 0; i < 2; ++i) {
+    const Example e = run_example("double_pendulum.json", i == 0 ? 4e-4 : 2e-4);
+    EXPECT_EQ(e.record.ending, "time_limit");
+    EXPECT_LT(e.summary.joint_drift, 1e-8);
+    const record::Output& p = output_of(e, "lower_position");
+    ASSERT_EQ(p.time.size(), 201u);
+    error[i] = 0;
+    for (size_t t = 0; t < p.time.size(); t += 20) {
+      const auto y = swing(p.time[t]);
+      error[i] = std::max(error[i], std::hypot(p.value[3 * t] - std::cos(y[0]) - 0.5 * std::cos(y[1]),
+                                               p.value[3 * t + 2] + std::sin(y[0]) + 0.5 * std::sin(y[1])));
+      EXPECT_NEAR(p.value[3 * t + 1], 0, 1e-12);
+    }
+  }
+  EXPECT_LT(error[1], 2e-5);
+  EXPECT_NEAR(error[0] / error[1], 4, 0.2) << "second order";
+  const Example e = run_example("double_pendulum.json");
+  const record::Output& q = output_of(e, "lower_orientation");
+  ASSERT_EQ(q.value.size(), 4 * 101u);
+  const auto y = swing(q.time.back());
+  const double b = std::remainder(2 * std::atan2(q.value[4 * 100 + 2], q.value[4 * 100]) - y[1], 2 * 3.14159265358979);
+  EXPECT_NEAR(b, 0, 1e-4);
+  EXPECT_EQ(output_of(e, "top_reaction").quantity, "force of joint top");
+  EXPECT_EQ(output_of(e, "top_reaction").time.size(), 401u);
+}
+
+TEST(ModelRun, SaysWhatTheEngineSaysOfItsNumbers) {
+  const Example e = run_example("double_pendulum.json");
+  std::string ids;
+  for (const record::Finding& f : e.record.findings) ids += f.id + " ";
+  EXPECT_EQ(ids, "verification.energy verification.step verification.joints ");
+  EXPECT_EQ(e.record.findings[0].value, e.summary.energy_error);
+  EXPECT_EQ(e.record.findings[0].status, record::Status::Good);
+}
+
+TEST(ModelRun, ShowsHullsAsTheirBoxesAndNoPlanes) {
+  mbs::Model m;
+  m.contact.ground = m.contact.bodies = false;
+  mbs::Body hull;
+  hull.name = "hull";
+  hull.shapes.resize(1);
+  hull.shapes[0].kind = mbs::Shape::Kind::Hull;
+  hull.shapes[0].vertices = {{0, 0, 0}, {2, 0, 0}, {0, 4, 0}, {0, 0, 6}};
+  hull.shapes[0].X_BS = {{1, 0, 0}, exp_rotation({0, 0, std::acos(0.0)})};
+  mbs::Body ground;
+  ground.name = "slope";
+  ground.fixed = true;
+  ground.shapes.resize(1);
+  ground.shapes[0].kind = mbs::Shape::Kind::Plane;
+  m.bodies = {hull, ground};
+  RunOptions o;
+  o.duration = 0.01;
+  o.step = 0.001;
+  o.equilibrium = false;
+  const record::Record r = run_model(m, o, {});
+  ASSERT_EQ(r.bodies[0].shapes.size(), 1u);
+  EXPECT_EQ(r.bodies[0].shapes[0].half, (Vec3{1, 2, 3}));
+  EXPECT_LT(norm(r.bodies[0].shapes[0].X_BS.p - Vec3{1 - 2, 1, 3}), 1e-15);
+  EXPECT_TRUE(r.bodies[1].shapes.empty());
+}
+
+}  // namespace
+}  // namespace topple::collapse
