@@ -124,7 +124,8 @@ Comparison compare(const mbs::Model& model, mbs::Options options, const std::vec
 }
 
 std::string to_csv(const mbs::Model& model, const Comparison& c) {
-  std::string out = "engine,time [s],position [m],body of position,orientation [rad],body of orientation,height [m]\r\n";
+  std::string out =
+      "engine,time [s],position [m],body of position,orientation [rad],body of orientation,height [m]\r\n";
   const auto name_of = [&](int body) {
     return body < 0 ? std::string() : quoted(model.bodies[static_cast<size_t>(body)].name);
   };
@@ -182,7 +183,8 @@ std::string to_svg(const mbs::Model& model, const Comparison& c) {
     for (size_t i = 0; i < r.time.size(); ++i)
       if (r.position_at[i] > 0 && std::isfinite(r.position_at[i]))
         points += fmt::format("{:.1f},{:.1f} ", x_of(r.time[i]), y_of(std::max(r.position_at[i], 1e-16)));
-    out += fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.5\"/>\n", points, colour);
+    out += fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.5\"{}/>\n", points, colour,
+                       number == 0 ? "" : fmt::format(" stroke-dasharray=\"{} 4\"", 4 * number));
     out += fmt::format("<text x=\"{:g}\" y=\"{:g}\" fill=\"{}\">{}</text>\n", width - right + 12,
                        top + 12 + 18 * number, colour, escaped(r.name));
     ++number;

@@ -365,8 +365,10 @@ mbs::Energy Course::calc_energy() const {
   e.elastic = in.elastic;
   e.plastic = in.plastic;
   e.damping = in.damping + work_.damping;
+  e.contact_loss = -work_.contact;
   e.removed = removed_ + in.removed;
-  e.residual = e.kinetic + e.gravity + e.elastic + e.plastic + e.damping + e.removed - work_.loads - total_at_start_;
+  e.residual = e.kinetic + e.gravity + e.elastic + e.plastic + e.damping + e.contact_loss + e.removed - work_.loads -
+               total_at_start_;
   e.released = std::max(released_, -e.gravity - e.removed);
   return e;
 }

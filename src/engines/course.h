@@ -29,7 +29,9 @@ struct Reactions {
 
 /// What the engine has integrated since the start [J].
 struct Work {
-  double damping = 0, loads = 0;
+  double damping = 0;  // taken by dampers
+  double loads = 0;    // given by loads
+  double contact = 0;  // of contacts on the bodies: what they store and dissipate, with the minus sign
 };
 
 /// Contact at an accepted state, for the view.

@@ -73,8 +73,9 @@ class Forces {
   bool needs_joint_forces() const { return !rotational_.empty(); }
   /// Whether dampers outside zones or loads take part in the balance of energy.
   bool has_power() const { return has_power_; }
-  /// Whether an element is still there (E).
+  /// Whether an element, a bushing is still there.
   bool is_live(size_t element) const { return zone_[element].state.live; }
+  bool is_bushing_live(size_t bushing) const { return bushing_[bushing].live; }
   /// Whether calc() depends on velocities.
   bool depends_on_velocity() const { return depends_on_velocity_; }
 

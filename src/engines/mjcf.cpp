@@ -122,8 +122,9 @@ class Writer {
     }
     const size_t rows = 3 * points + 12 * articulation_.loops.size() + 10;
     const size_t nv = 6 * (moving + articulation_.loops.size());
-    add(fmt::format("<size nconmax=\"{}\" njmax=\"{}\" nstack=\"{}\"/>", points + 10, rows,
-                    3 * nv * nv + 200 * (nv + rows) + 1000000));
+    // Newton's method needs some matrices of nv x nv where there are constraints
+    const size_t stack = (rows > 10 ? 8 * nv * nv : 0) + 400 * (nv + rows) + 100000;
+    add(fmt::format("<size nconmax=\"{}\" njmax=\"{}\" nstack=\"{}\"/>", points + 10, rows, stack));
   }
 
   void add_meshes() {
@@ -278,8 +279,7 @@ double find_damping_ratio(double restitution) {
   return high;
 }
 
-Ties find_ties(const mbs::Model& model, const std::vector<unsigned char>& element_live,
-               const std::vector<unsigned char>& joint_live) {
+Ties find_ties(const mbs::Model& model, const Forces& forces, const std::vector<unsigned char>& joint_live) {
   const size_t B = model.bodies.size();
   Ties ties;
   ties.is_grounded.assign(B, 0);
@@ -293,7 +293,9 @@ Ties find_ties(const mbs::Model& model, const std::vector<unsigned char>& elemen
     if (is_ground(model, b) && a >= 0) ties.is_grounded[static_cast<size_t>(a)] = 1;
   };
   for (size_t e = 0; e < model.elements.size(); ++e)
-    if (element_live[e]) link(model.elements[e].a.index, model.elements[e].b.index);
+    if (forces.is_live(e)) link(model.elements[e].a.index, model.elements[e].b.index);
+  for (size_t i = 0; i < model.bushings.size(); ++i)
+    if (forces.is_bushing_live(i)) link(model.bushings[i].a.index, model.bushings[i].b.index);
   for (size_t j = 0; j < model.joints.size(); ++j)
     if (joint_live[j]) link(model.joints[j].parent.index, model.joints[j].child.index);
   const auto add = [&](int a, int b) {

@@ -115,16 +115,13 @@ class Built {
                                                     reversed};
     }
     touches_ = can_touch_ground(model_) || can_touch_bodies(model_);
-    has_ties_ = touches_ && (!model_.elements.empty() || !model_.joints.empty());
     update_ties();
-    if (!touches_) {
-      const size_t nq = static_cast<size_t>(m_->nq), nv = static_cast<size_t>(m_->nv);
-      q_.resize(nq);
-      v_.resize(nv);
-      for (auto& k : v_stage_) k.resize(nv);
-      for (auto& k : a_stage_) k.resize(nv);
-      mean_.resize(nv);
-    }
+    const size_t nv = static_cast<size_t>(m_->nv);
+    q_.resize(static_cast<size_t>(m_->nq));
+    v_.resize(nv);
+    for (auto& k : v_stage_) k.resize(nv);
+    for (auto& k : a_stage_) k.resize(nv);
+    mean_.resize(nv);
     look();
   }
 
@@ -138,8 +135,11 @@ class Built {
     if (touches_) {
       push(time);
       const Power before = power(time);
+      mju_copy(v_.data(), d_->qvel, m_->nv);
       mj_step2(m_.get(), d_.get());
       read_contacts();
+      mju_addTo(v_.data(), d_->qvel, m_->nv);
+      work_.contact += 0.5 * h * mju_dot(v_.data(), d_->qfrc_constraint, m_->nv);
       look();
       const Power after = power(time + h);
       work_.damping += 0.5 * h * (before.damping + after.damping);
@@ -212,11 +212,7 @@ class Built {
     return id;
   }
 
-  Ties find_present_ties() const {
-    std::vector<unsigned char> live(model_.elements.size());
-    for (size_t e = 0; e < live.size(); ++e) live[e] = course_.forces().is_live(e);
-    return find_ties(model_, live, course_.joint_live());
-  }
+  Ties find_present_ties() const { return find_ties(model_, course_.forces(), course_.joint_live()); }
 
   Vec3 place_of(mbs::BodyId id, const Vec3& p) const {
     return id == mbs::kGround ? p : motion_.X_WB[static_cast<size_t>(id.index)] * p;
@@ -282,6 +278,16 @@ class Built {
       const size_t i = static_cast<size_t>(b.body);
       const int id = body_[i];
       const Wrench& w = wrench_[i];
+      if (b.joint < 0) {
+        // at the free joint itself: MuJoCo brings Cartesian forces there through a row for each body, full length
+        const Vec3 in_body = transpose_times(to_matrix(motion_.X_WB[i].q), w.torque);
+        mjtNum* at = d_->qfrc_applied + m_->body_dofadr[id];
+        for (int k = 0; k < 3; ++k) {
+          at[k] = w.force[k];
+          at[3 + k] = in_body[k];
+        }
+        continue;
+      }
       const Vec3 torque = w.torque - cross(to_vec3(d_->xipos + 3 * id) - motion_.X_WB[i].p, w.force);
       for (int k = 0; k < 3; ++k) {
         d_->xfrc_applied[6 * id + k] = w.force[k];
@@ -376,10 +382,12 @@ class Built {
   Motion motion_;
   Work work_;
   Touch touch_;
-  bool touches_ = false, has_ties_ = false;
+  bool touches_ = false;
   std::vector<Wrench> wrench_;
   std::vector<mjtNum> q_, v_, v_stage_[4], a_stage_[4], mean_;
 };
+
+Work sum(const Work& a, const Work& b) { return {a.damping + b.damping, a.loads + b.loads, a.contact + b.contact}; }
 
 class MujocoEngine : public Engine {
  public:
@@ -421,8 +429,7 @@ class MujocoEngine : public Engine {
     if (built.touches()) course.note("contact is MuJoCo's own: soft, with friction and restitution like topple's");
     const auto accept = [&] {
       const double time = static_cast<double>(steps) * h;
-      return course.accept(time, built.motion(),
-                           {before.damping + built.work().damping, before.loads + built.work().loads}, built.touch(),
+      return course.accept(time, built.motion(), sum(before, built.work()), built.touch(),
                            [&] { return built.find_reactions(time); });
     };
     Verdict verdict = steps == 0 ? accept() : Verdict::GoOn;
@@ -433,7 +440,7 @@ class MujocoEngine : public Engine {
       if (!failure.empty()) return course.fail(failure);
       verdict = accept();
     }
-    before = {before.damping + built.work().damping, before.loads + built.work().loads};
+    before = sum(before, built.work());
   }
 };
 

@@ -255,7 +255,7 @@ class SimbodyEngine : public Engine {
     simbody::System& system = built.system();
     const auto accept = [&] {
       const std::array<double, 2> work = system.work();
-      return course.accept(system.time(), built.motion(), {before.damping + work[0], before.loads + work[1]}, {},
+      return course.accept(system.time(), built.motion(), {before.damping + work[0], before.loads + work[1], 0}, {},
                            [&] { return built.find_reactions(); });
     };
     Verdict verdict = is_first ? accept() : Verdict::GoOn;
@@ -267,7 +267,7 @@ class SimbodyEngine : public Engine {
       verdict = accept();
     }
     const std::array<double, 2> work = system.work();
-    before = {before.damping + work[0], before.loads + work[1]};
+    before = {before.damping + work[0], before.loads + work[1], 0};
   }
 
   Accuracy accuracy_;

@@ -1,0 +1,310 @@
+// The native engine and the others on the same models: force elements, loads, events. The integrators differ (leapfrog
+// of second order; Runge-Kutta of fourth), as do the coordinates and all code but the law of a zone.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "cases.h"
+#include "engines/compare.h"
+
+namespace topple::engines {
+namespace {
+
+using Kind = mbs::Joint::Kind;
+
+constexpr double kStep = 1e-4;  // [s]
+
+class EnginesAlikeReference : public testing::TestWithParam<std::string> {
+ protected:
+  EngineRun compare_with_native(const mbs::Model& model, double duration, double step = kStep,
+                                bool equilibrium = false) {
+    std::vector<std::unique_ptr<Engine>> list;
+    list.push_back(make_engine("native"));
+    list.push_back(make_engine(GetParam(), {1e-9}));
+    mbs::Options o = test::make_options(duration, duration / 20, step);
+    o.equilibrium = equilibrium;
+    Comparison c = compare(model, o, list);
+    EXPECT_EQ(c.runs[0].summary.ending, mbs::Summary::Ending::TimeLimit) << c.runs[0].summary.message;
+    EXPECT_EQ(c.runs[1].summary.ending, mbs::Summary::Ending::TimeLimit) << c.runs[1].summary.message;
+    EXPECT_EQ(c.runs[1].time.size(), 21U);
+    EXPECT_EQ(c.runs[0].broken, c.runs[1].broken);
+    return c.runs[1];
+  }
+  /// Errors of the native engine fall with the square of the step; at 0.1 ms they are this large. [m, rad]
+  void expect_alike(const mbs::Model& model, double duration, double tolerance) {
+    const EngineRun r = compare_with_native(model, duration);
+    EXPECT_LT(r.position.value, tolerance);
+    EXPECT_LT(r.orientation.value, tolerance);
+    EXPECT_LT(r.summary.energy_error, 1e-5);
+  }
+};
+
+#define NEEDS_ENGINE() TOPPLE_NEEDS_ENGINE(GetParam())
+
+mbs::BodyId add_brick(mbs::Model& m, const std::string& name, const Vec3& p) {
+  return mbs::add_body(m, test::make_body(name, 10, {0.5, 0.8, 1.1}, p));
+}
+
+TEST_P(EnginesAlikeReference, SpringsOfAllLaws) {
+  NEEDS_ENGINE();
+  mbs::Model m = test::make_empty({0, 0, -9.81});
+  const auto a = add_brick(m, "a", {0, 0, 0}), b = add_brick(m, "b", {1, 0.2, 0.1});
+  mbs::SpringDamper s;
+  s.a = mbs::kGround;
+  s.b = a;
+  s.p_A = {0, 0, 2};
+  s.p_B = {0.2, 0.1, 0.3};
+  s.free_length = 1.5;
+  s.spring.rate = 400;
+  s.damper.kind = mbs::Characteristic::Kind::Table;
+  s.damper.x = {-1, 0, 1};
+  s.damper.f = {-5, 0, 20};
+  m.springs.push_back(s);
+  s.a = a;
+  s.b = b;
+  s.p_A = {0.3, 0, 0};
+  s.p_B = {-0.3, 0, 0.1};
+  s.free_length = 0.5;
+  s.spring.kind = mbs::Characteristic::Kind::Polynomial;
+  s.spring.coefficients = {5, 300, 100, 50};
+  s.damper = {};
+  s.damper.rate = 4;
+  m.springs.push_back(s);
+  expect_alike(m, 2, 1e-6);
+}
+
+TEST_P(EnginesAlikeReference, Bushing) {
+  NEEDS_ENGINE();
+  mbs::Model m = test::make_empty({0, 0, -9.81});
+  const auto a = add_brick(m, "a", {0, 0, 0});
+  m.bodies[0].w_WB = {0.5, -0.3, 0.8};
+  mbs::Bushing b;
+  b.a = mbs::kGround;
+  b.b = a;
+  b.X_AF.q = exp_rotation({0.2, 0.5, -0.3});
+  b.X_BM = {{0.1, -0.2, 0.3}, exp_rotation({-0.4, 0.1, 0.6})};
+  for (int i = 0; i < 6; ++i) {
+    b.spring[i].rate = i < 3 ? 2000 + 300 * i : 60 + 10 * i;
+    b.damper[i].rate = i < 3 ? 20 : 1;
+  }
+  m.bushings.push_back(b);
+  expect_alike(m, 2, 3e-6);
+}
+
+TEST_P(EnginesAlikeReference, CantileverOfBushings) {
+  NEEDS_ENGINE();
+  // bars of 1 m joined by bushings of a steel tube's stiffness, let go
+  mbs::Model m = test::make_empty({0, 0, -9.81});
+  mbs::BodyId before = mbs::kGround;
+  for (int i = 0; i < 4; ++i) {
+    const auto bar = mbs::add_body(m, test::make_body("bar", 20, {0.1, 1.7, 1.7}, {i + 0.5, 0, 0}));
+    mbs::Bushing b;
+    b.a = before;
+    b.b = bar;
+    b.X_AF.p = i == 0 ? Vec3{} : Vec3{0.5, 0, 0};
+    b.X_BM.p = {-0.5, 0, 0};
+    const double rate[6] = {4e6, 1e6, 1e6, 2e4, 4e4, 4e4};
+    for (int k = 0; k < 6; ++k) {
+      b.spring[k].rate = rate[k];
+      b.damper[k].rate = 1e-3 * rate[k];
+    }
+    m.bushings.push_back(b);
+    before = bar;
+  }
+  expect_alike(m, 1, 5e-7);
+}
+
+TEST_P(EnginesAlikeReference, ElasticElementsWithTheirDamping) {
+  NEEDS_ENGINE();
+  mbs::Model m = test::make_empty({0, 0, -9.81});
+  mbs::BodyId before = mbs::kGround;
+  for (int i = 0; i < 3; ++i) {
+    const auto block = add_brick(m, "block", {i + 0.5, 0, 0});
+    mbs::ZoneElement e;
+    e.a = before;
+    e.b = block;
+    e.X_AF.p = i == 0 ? Vec3{} : Vec3{0.5, 0, 0};
+    e.X_BM.p = {-0.5, 0, 0};
+    e.translational_stiffness = {4e5, 2e5, 2e5};
+    e.rotational_stiffness = {3e3, 5e3, 5e3};
+    e.damping_ratio = 0.05;
+    mbs::add_element(m, e);
+    before = block;
+  }
+  expect_alike(m, 1, 3e-7);
+}
+
+/// A beam held by one element that yields at `moment`.
+mbs::Model make_hinged_block(double moment) {
+  mbs::Model m = test::make_empty({0, 0, -9.81});
+  const auto block = add_brick(m, "block", {0.5, 0, 0});
+  mbs::ZoneLaw law;
+  law.moment_y.normal_force = {-1e9, 1e9};
+  law.moment_y.plastic_rotation = {0, 10};
+  law.moment_y.positive = law.moment_y.negative = {moment, moment, moment, moment};
+  mbs::ZoneElement e;
+  e.a = mbs::kGround;
+  e.b = block;
+  e.X_BM.p = {-0.5, 0, 0};
+  e.translational_stiffness = {4e5, 2e5, 2e5};
+  e.rotational_stiffness = {3e3, 5e3, 5e3};
+  e.stations = {{0, mbs::add_law(m, law)}};
+  mbs::add_element(m, e);
+  return m;
+}
+
+TEST_P(EnginesAlikeReference, YieldingZone) {
+  NEEDS_ENGINE();
+  // 49 N·m of dead load against 30 N·m: the block turns down while the zone flows
+  const EngineRun r = compare_with_native(make_hinged_block(30), 0.8);
+  EXPECT_LT(r.position.value, 5e-7);
+  EXPECT_LT(r.summary.energy_error, 1e-6);
+}
+
+TEST_P(EnginesAlikeReference, RupturingZone) {
+  NEEDS_ENGINE();
+  mbs::Model m = make_hinged_block(30);
+  m.laws[0].rupture_rotation = 0.3;
+  const EngineRun r = compare_with_native(m, 0.8);
+  EXPECT_EQ(r.broken, 1);
+  EXPECT_LT(r.position.value, 5e-4);  // half a step, 0.05 ms, at 3 m/s and what follows
+}
+
+TEST_P(EnginesAlikeReference, CableThatGoesSlackAndBreaks) {
+  NEEDS_ENGINE();
+  mbs::Model m = test::make_empty({0, 0, -9.81});
+  const auto a = add_brick(m, "a", {0, 0, 0});
+  m.bodies[0].v_WB = {0, 0, 3};
+  mbs::Cable c;
+  c.a = mbs::kGround;
+  c.b = a;
+  c.p_A = {0.3, 0, 0.5};
+  c.p_B = {0.1, 0, 0.2};
+  c.stiffness = 2e4;
+  c.pretension = 50;
+  m.cables.push_back(c);
+  expect_alike(m, 0.8, 5e-6);  // the slope of the force jumps where the cable gets taut
+  m.cables[0].strength = 300;
+  const EngineRun r = compare_with_native(m, 0.8);
+  EXPECT_EQ(r.broken, 1);
+  EXPECT_LT(r.position.value, 1e-3);  // some tenths of 300 N for 0.1 ms, and half a second of flight after it
+}
+
+TEST_P(EnginesAlikeReference, LoadsInBothFrames) {
+  NEEDS_ENGINE();
+  mbs::Model m = test::make_empty({0, 0, -9.81});
+  const auto a = add_brick(m, "a", {0, 0, 0});
+  mbs::Load l;
+  l.body = a;
+  l.p_B = {0.2, 0.1, 0};
+  l.force = {10, 20, 120};
+  l.torque = {1, -2, 0.5};
+  l.follows_body = true;
+  m.loads.push_back(l);
+  l.follows_body = false;
+  l.force = {-30, 0, 10};
+  l.time = {0, 0.5, 1};
+  l.factor = {0, 1, -1};
+  m.loads.push_back(l);
+  expect_alike(m, 1.5, 2e-6);
+}
+
+TEST_P(EnginesAlikeReference, RotationalElementsAndSprings) {
+  NEEDS_ENGINE();
+  mbs::Model m = test::make_bar(Kind::Revolute, test::z_along_y());
+  m.joints[0].X_PF.q = test::z_along_y() * exp_rotation({0, 0, 0.3});  // an angle at the start
+  mbs::RotationalSpring s;
+  s.joint = {0};
+  s.free_angle = 0.2;
+  s.spring.rate = 15;
+  s.damper.rate = 0.5;
+  m.rotational_springs.push_back(s);
+  mbs::RotationalElement e;
+  e.joint = {0};
+  e.stiffness = 20;
+  m.rotational_elements.push_back(e);
+  expect_alike(m, 2, 3e-7);
+}
+
+TEST_P(EnginesAlikeReference, EventsAndReleases) {
+  NEEDS_ENGINE();
+  mbs::Model m = test::make_bar(Kind::Revolute, test::z_along_y());
+  mbs::add_body(m, test::make_body("tail", 1, {0.04, 0.1, 0.1}, {6, 0, 0}));
+  mbs::add_joint(m, test::make_joint(m, Kind::Fixed, {0}, {1}, {{4, 0, 0}, {}}));
+  mbs::SpringDamper s;
+  s.a = mbs::kGround;
+  s.b = {1};
+  s.p_A = {6, 0, 3};
+  s.free_length = 2.9;
+  s.spring.rate = 50;
+  m.springs.push_back(s);
+  mbs::Load l;
+  l.body = {1};
+  l.force = {0, 5, 0};
+  l.time = {0, 0.2};
+  l.factor = {1, 0};
+  m.loads.push_back(l);
+  const auto add = [&](double time, mbs::Action a) {
+    mbs::Event e;
+    e.time = time;
+    e.actions = {a};
+    m.events.push_back(e);
+  };
+  mbs::Action a;
+  a.kind = mbs::Action::Kind::RemoveSpring;
+  a.index = 0;
+  add(0.3, a);
+  a = {};
+  a.kind = mbs::Action::Kind::ReplaceBody;
+  a.body = {0};
+  a.replacement = test::make_body("bar", 0.5, {0.02, 0.06, 0.06}, {0.3, 0, 0.1});
+  add(0.5, a);
+  a = {};
+  a.kind = mbs::Action::Kind::ReleaseJoint;
+  a.joint = {1};
+  add(0.7, a);
+  a = {};
+  a.kind = mbs::Action::Kind::ApplyLoad;
+  a.index = 0;
+  add(0.8, a);
+  a = {};
+  a.kind = mbs::Action::Kind::ReleaseJoint;
+  a.joint = {0};
+  mbs::Event low;
+  mbs::Trigger t;
+  t.quantity = {mbs::Quantity::Kind::Position, 0};
+  t.component = 2;
+  t.limit = -1.8;
+  t.rising = false;
+  low.time = 0.9;
+  low.triggers = {t};
+  low.actions = {a};
+  m.events.push_back(low);
+  const EngineRun r = compare_with_native(m, 1.4);
+  EXPECT_EQ(r.broken, 2);
+  EXPECT_LT(r.position.value, 1e-3);  // the trigger is seen at steps, 0.1 ms at some m/s
+}
+
+TEST_P(EnginesAlikeReference, JointThatIsPulledApart) {
+  NEEDS_ENGINE();
+  mbs::Model m = test::make_bar(Kind::Revolute, test::z_along_y());
+  m.joints[0].shear_limit = 20;  // grows from 0.24 N as the bar swings down
+  const EngineRun r = compare_with_native(m, 1.5);
+  EXPECT_EQ(r.broken, 1);
+  EXPECT_LT(r.position.value, 2e-3);  // a step of 0.1 ms under g, and a second of free flight after it
+}
+
+TEST_P(EnginesAlikeReference, StandsInTheEquilibrium) {
+  NEEDS_ENGINE();
+  mbs::Model m = make_hinged_block(100);
+  const EngineRun r = compare_with_native(m, 1, kStep, true);
+  EXPECT_LT(r.position.value, 1e-9);
+}
+
+INSTANTIATE_TEST_SUITE_P(Each, EnginesAlikeReference, testing::Values("simbody", "mujoco"),
+                         [](const testing::TestParamInfo<std::string>& subject) { return subject.param; });
+
+}  // namespace
+}  // namespace topple::engines
