@@ -28,10 +28,11 @@ double calc_restitution(double ratio) {
                    : std::exp(-2 * ratio * std::acosh(ratio) / std::sqrt(ratio * ratio - 1));
 }
 
-/// Direct spring and damper of MuJoCo's contact, per unit of mass.
-std::string contact_of(double frequency, double restitution, double friction) {
+/// Direct spring and damper of MuJoCo's contact, per unit of mass; the damper takes no more in a step than all speed.
+std::string contact_of(double frequency, double restitution, double friction, double step) {
   return fmt::format("solref=\"{:.17g} {:.17g}\" solimp=\"0.99 0.99 0.001\" friction=\"{:.17g} 0 0\"",
-                     -frequency * frequency, -2 * find_damping_ratio(restitution) * frequency, friction);
+                     -frequency * frequency, -std::min(2 * find_damping_ratio(restitution) * frequency, 1 / step),
+                     friction);
 }
 
 class Writer {
@@ -77,7 +78,7 @@ class Writer {
     add_sizes();
     // bits of the geoms are set when the model is there
     add("<default><geom contype=\"0\" conaffinity=\"0\" condim=\"3\" " +
-        contact_of(c.contact_frequency, c.body_restitution, c.body_friction) + "/></default>");
+        contact_of(c.contact_frequency, c.body_restitution, c.body_friction, step) + "/></default>");
     add_meshes();
     add("<worldbody>");
     if (can_touch_ground(model_)) {
@@ -87,7 +88,7 @@ class Writer {
       R = Mat3::from_columns(cross(y, z), y, z);
       add(fmt::format("<geom name=\"ground\" type=\"plane\" size=\"0 0 1\" contype=\"{}\" priority=\"1\" {} {}/>",
                       kGroundBit, text_of(Pose{c.offset * z, to_quat(R)}),
-                      contact_of(c.contact_frequency, c.restitution, c.friction)));
+                      contact_of(c.contact_frequency, c.restitution, c.friction, step)));
     }
     for (size_t b = 0; b < model_.bodies.size(); ++b)
       if (model_.bodies[b].fixed && !model_.bodies[b].shapes.empty()) {
@@ -270,6 +271,7 @@ class Writer {
 }  // namespace
 
 double find_damping_ratio(double restitution) {
+  if (!(restitution > 1e-6)) return 500;  // 1 / (4 ζ²) is left
   double low = 0, high = 1;
   while (calc_restitution(high) > restitution) high *= 2;
   for (int i = 0; i < 200 && high - low > 1e-15 * high; ++i) {
@@ -298,6 +300,13 @@ Ties find_ties(const mbs::Model& model, const Forces& forces, const std::vector<
     if (forces.is_bushing_live(i)) link(model.bushings[i].a.index, model.bushings[i].b.index);
   for (size_t j = 0; j < model.joints.size(); ++j)
     if (joint_live[j]) link(model.joints[j].parent.index, model.joints[j].child.index);
+  for (const mbs::Contact::Pair& p : model.contact.pairs) {
+    if (p.touches) continue;
+    if (p.b == mbs::kGround)
+      ties.is_grounded[static_cast<size_t>(p.a.index)] = 1;
+    else
+      ties.pairs.emplace_back(std::min(p.a.index, p.b.index), std::max(p.a.index, p.b.index));
+  }
   const auto add = [&](int a, int b) {
     if (a < b && !(is_ground(model, a) && is_ground(model, b))) ties.pairs.emplace_back(a, b);
   };

@@ -13,7 +13,8 @@
 namespace topple::engines {
 
 /// Bodies that do not touch each other because of what holds them: joined by a live element, bushing or joint, or
-/// joined to the same third body; and bodies held by the ground, which do not touch it.
+/// joined to the same third body, or a pair that the contact says does not touch; and bodies held by the ground, which
+/// do not touch it.
 struct Ties {
   std::vector<std::pair<int, int>> pairs;  // a < b, not both fixed, rising
   std::vector<unsigned char> is_grounded;  // (B)

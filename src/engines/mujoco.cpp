@@ -398,7 +398,8 @@ class MujocoEngine : public Engine {
     std::vector<Unsupported> out = find_impossible_inertias(model);
     for (Unsupported& u : find_opening_joints(model, options)) out.push_back(std::move(u));
     for (size_t i = 0; i < model.contact.pairs.size(); ++i)
-      out.push_back({"contact.pairs[" + std::to_string(i) + "]", "rules of its own for a pair of bodies"});
+      if (model.contact.pairs[i].touches)
+        out.push_back({"contact.pairs[" + std::to_string(i) + "]", "rules of its own for a pair of bodies"});
     const bool touches = can_touch_ground(model) || can_touch_bodies(model);
     for (size_t i = 0; i < model.events.size() && touches; ++i)
       for (const mbs::Action& a : model.events[i].actions)

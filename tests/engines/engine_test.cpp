@@ -2,30 +2,187 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
+#include "ballistic.h"
 #include "base/error.h"
+#include "cases.h"
+#include "engines/compare.h"
 
 namespace topple::engines {
 namespace {
 
-TEST(Engine, NativeRunsAFallingBody) {
-  mbs::Model model;
-  mbs::Body body;
-  body.name = "stone";
-  body.X_WB.p = {0, 0, 100};
-  mbs::add_body(model, body);
-  mbs::Options o;
-  o.duration = 1;
-  o.step = 1e-3;
-  o.equilibrium = false;
-  double z = 0;
-  o.on_frame = [&](const mbs::View& v) { z = v.X_WB[0].p.z; };
-  const auto engine = make_engine("native");
-  EXPECT_EQ(engine->name(), "native");
-  EXPECT_EQ(engine->run(model, o).ending, mbs::Summary::Ending::TimeLimit);
-  EXPECT_NEAR(z, 100 - 0.5 * 9.81, 0.02);  // the last frame may lie a step before the end
+using test::make_options;
+using Kind = mbs::Joint::Kind;
+
+mbs::Model make_stone() {
+  mbs::Model m = test::make_empty({0, 0, -9.81});
+  mbs::Body b = test::make_body("stone", 2, {1, 1, 1}, {0, 0, 100});
+  b.v_WB = {3, 0, 1};
+  b.w_WB = {0, 0.5, 0};
+  mbs::add_body(m, b);
+  return m;
 }
 
-TEST(Engine, UnknownNamesAreRefused) { EXPECT_THROW(make_engine("adams"), InputError); }
+/// All that an error says.
+std::string message_of(const std::function<void()>& f) {
+  try {
+    f();
+  } catch (const InputError& e) { return e.what(); }
+  return {};
+}
+
+TEST(Engine, NativeRunsAFallingBody) {
+  const auto c = test::run(*make_engine("native"), make_stone(), make_options(1, 0.5, 1e-3));
+  EXPECT_EQ(c.summary.ending, mbs::Summary::Ending::TimeLimit);
+  ASSERT_EQ(c.frames.size(), 3U);
+  EXPECT_NEAR(c.frames[2].X_WB[0].p.z, 100 + 1 - 0.5 * 9.81, 1e-9);
+}
+
+TEST(Engine, UnknownNamesAreRefusedWithAGuess) {
+  const std::string message = message_of([] { make_engine("simbodi"); });
+  EXPECT_NE(message.find("there is no engine \"simbodi\""), std::string::npos);
+  EXPECT_NE(message.find("did you mean \"simbody\"?"), std::string::npos);
+  EXPECT_NE(message.find("native, simbody, mujoco"), std::string::npos);
+}
+
+TEST(Engine, ThoseNotBuiltInNameTheirPackage) {
+  for (const EngineInfo& e : list_engines()) {
+    if (e.is_available()) {
+      EXPECT_EQ(make_engine(e.name)->version(), e.version);
+      continue;
+    }
+    const std::string message = message_of([&] { make_engine(e.name); });
+    EXPECT_NE(message.find(e.package), std::string::npos) << message;
+  }
+}
+
+TEST(Engine, TheSmallestOneComparesWithTheNative) {
+  std::vector<std::unique_ptr<Engine>> list;
+  list.push_back(make_engine("native"));
+  list.push_back(std::make_unique<example::BallisticEngine>());
+  const Comparison c = compare(make_stone(), make_options(2, 0.1, 1e-3), list);
+  ASSERT_EQ(c.runs.size(), 2U);
+  EXPECT_EQ(c.runs[1].time.size(), 21U);
+  EXPECT_LT(c.runs[1].position.value, 1e-10);  // round-off
+  EXPECT_LT(c.runs[1].orientation.value, 1e-10);
+  EXPECT_LT(c.runs[1].summary.energy_error, 1e-12);
+}
+
+TEST(Engine, TheSmallestOneNamesWhatItCannotExpress) {
+  mbs::Model m = make_stone();
+  mbs::add_joint(m, test::make_joint(m, Kind::Spherical, mbs::kGround, {0}, {}));
+  m.joints[0].name = "ball";
+  const example::BallisticEngine engine;
+  const std::string message = message_of([&] { (void)engine.run(m, make_options(1, 0.1)); });
+  EXPECT_NE(message.find("joints[0] \"ball\": engine \"ballistic\" cannot express joints"), std::string::npos)
+      << message;
+}
+
+/// What an engine says about a model, one line each.
+std::string unsupported_by(const std::string& engine, const mbs::Model& model, bool equilibrium = false) {
+  mbs::Options o = make_options(1, 0.1);
+  o.equilibrium = equilibrium;
+  std::string text;
+  for (const Unsupported& u : make_engine(engine)->find_unsupported(model, o)) text += u.place + ": " + u.what + "\n";
+  return text;
+}
+
+class Unexpressed : public testing::TestWithParam<std::string> {
+ protected:
+  void SetUp() override { TOPPLE_NEEDS_ENGINE(GetParam()); }
+  /// The engine names the place and refuses to run.
+  void expect_named(const mbs::Model& model, const std::string& place, const std::string& what) {
+    const std::string text = unsupported_by(GetParam(), model);
+    EXPECT_EQ(text.find(place + ": " + what), 0U) << "\"" << text << "\"";
+    const std::string message =
+        message_of([&] { (void)make_engine(GetParam())->run(model, make_options(0.01, 0.01)); });
+    EXPECT_NE(message.find(place), std::string::npos) << message;
+    EXPECT_EQ(unsupported_by("native", model), "");
+  }
+};
+
+TEST_P(Unexpressed, InertiasThatNoMassHas) {
+  mbs::Model m = make_stone();
+  m.bodies[0].inertia = Mat3::diagonal({0.2, 0.2, 0.5});
+  expect_named(m, "bodies[0] \"stone\".inertia", "an inertia with a principal moment larger than");
+}
+
+TEST_P(Unexpressed, InertiasThatNoReplacementHas) {
+  mbs::Model m = make_stone();
+  mbs::Event e;
+  e.name = "strip";
+  mbs::Action a;
+  a.kind = mbs::Action::Kind::ReplaceBody;
+  a.body = {0};
+  a.replacement = test::make_body("half", 1, {0.1, 0.1, 0.3}, {});
+  e.actions = {a};
+  m.events.push_back(e);
+  expect_named(m, "events[0] \"strip\".replacement.inertia", "an inertia");
+}
+
+TEST_P(Unexpressed, VelocitiesThatOpenAJoint) {
+  mbs::Model m = make_stone();
+  mbs::add_joint(m, test::make_joint(m, Kind::Revolute, mbs::kGround, {0}, {{0, 0, 100}, {}}));
+  expect_named(m, "joints[0] \"j0\"", "velocities at the start that open a joint");
+  EXPECT_EQ(unsupported_by(GetParam(), m, true), "") << "the equilibrium has none";
+  m.bodies[0].v_WB = {};
+  m.bodies[0].w_WB = {0, 0, 4};
+  EXPECT_EQ(unsupported_by(GetParam(), m), "") << "about the axis";
+}
+
+INSTANTIATE_TEST_SUITE_P(Each, Unexpressed, testing::Values("simbody", "mujoco"),
+                         [](const testing::TestParamInfo<std::string>& engine) { return engine.param; });
+
+/// A cube of 1 m half a metre above the ground, and another beside it.
+mbs::Model make_cubes() {
+  mbs::Model m = test::make_empty({0, 0, -9.81});
+  for (int i = 0; i < 2; ++i) {
+    mbs::Body b = test::make_body("cube", 10, {1.7, 1.7, 1.7}, {2.0 * i, 0, 1});
+    mbs::Shape s;
+    s.half = {0.5, 0.5, 0.5};
+    b.shapes.push_back(s);
+    mbs::add_body(m, b);
+  }
+  m.contact.ground = m.contact.bodies = true;
+  return m;
+}
+
+TEST(UnexpressedBySimbody, ContactBetweenBodies) {
+  TOPPLE_NEEDS_ENGINE("simbody");
+  mbs::Model m = make_cubes();
+  EXPECT_NE(unsupported_by("simbody", m).find("contact.bodies: contact between bodies"), std::string::npos);
+  m.contact.bodies = m.contact.ground = false;
+  EXPECT_EQ(unsupported_by("simbody", m), "");
+}
+
+TEST(UnexpressedByMujoco, RulesOfPairs) {
+  TOPPLE_NEEDS_ENGINE("mujoco");
+  mbs::Model m = make_cubes();
+  EXPECT_EQ(unsupported_by("mujoco", m), "");
+  mbs::Contact::Pair p;
+  p.a = {0};
+  p.b = {1};
+  p.touches = false;
+  m.contact.pairs.push_back(p);
+  EXPECT_EQ(unsupported_by("mujoco", m), "") << "pairs that do not touch are expressed";
+  p.touches = true;
+  m.contact.pairs.push_back(p);
+  EXPECT_EQ(unsupported_by("mujoco", m), "contact.pairs[1]: rules of its own for a pair of bodies\n");
+}
+
+TEST(UnexpressedByMujoco, ReplacedBodiesThatTouch) {
+  TOPPLE_NEEDS_ENGINE("mujoco");
+  mbs::Model m = make_cubes();
+  mbs::Event e;
+  mbs::Action a;
+  a.kind = mbs::Action::Kind::ReplaceBody;
+  a.body = {0};
+  a.replacement = test::make_body("half", 1, {0.1, 0.1, 0.1}, {});
+  e.actions = {a};
+  m.events.push_back(e);
+  EXPECT_EQ(unsupported_by("mujoco", m), "events[0]: the replacement of a body that may touch\n");
+}
 
 }  // namespace
 }  // namespace topple::engines
