@@ -115,6 +115,7 @@ class Built {
                                                     reversed};
     }
     touches_ = can_touch_ground(model_) || can_touch_bodies(model_);
+    read_excluded(ties);
     update_ties();
     const size_t nv = static_cast<size_t>(m_->nv);
     q_.resize(static_cast<size_t>(m_->nq));
@@ -195,14 +196,9 @@ class Built {
             fixed ? 0 : (bodies ? kBodyBit : 0) | (ground && !ties.is_grounded[b] ? kGroundBit : 0);
       }
     // the list is sorted and stays so: a pair that may touch again is replaced by the one before it
-    for (int e = 0; e < m_->nexclude; ++e) {
-      const int signature = m_->exclude_signature[e];
-      const auto model_body = [&](int id) { return std::atoi(mj_id2name(m_.get(), mjOBJ_BODY, id) + 1); };
-      if (signature == 0) continue;
-      const int x = model_body(signature >> 16), y = model_body(signature & 0xFFFF);
-      if (!std::binary_search(ties.pairs.begin(), ties.pairs.end(), std::pair(std::min(x, y), std::max(x, y))))
+    for (size_t e = 0; e < excluded_.size(); ++e)
+      if (!std::binary_search(ties.pairs.begin(), ties.pairs.end(), excluded_[e]))
         m_->exclude_signature[e] = e > 0 ? m_->exclude_signature[e - 1] : 0;
-    }
   }
 
  private:
@@ -213,6 +209,24 @@ class Built {
   }
 
   Ties find_present_ties() const { return find_ties(model_, course_.forces(), course_.joint_live()); }
+
+  /// The pairs behind MuJoCo's sorted list of bodies that do not touch: (first + 1) << 16 | (second + 1).
+  void read_excluded(const Ties& ties) {
+    std::vector<std::pair<int, std::pair<int, int> > > known;
+    for (const auto& pair : ties.pairs) {
+      const int a = mj_name2id(m_.get(), mjOBJ_BODY, ("b" + std::to_string(pair.first)).c_str());
+      const int b = mj_name2id(m_.get(), mjOBJ_BODY, ("b" + std::to_string(pair.second)).c_str());
+      if (a >= 0 && b >= 0) known.emplace_back((std::min(a, b) + 1) << 16 | (std::max(a, b) + 1), pair);
+    }
+    std::sort(known.begin(), known.end());
+    for (int e = 0; e < m_->nexclude; ++e) {
+      const auto at =
+          std::lower_bound(known.begin(), known.end(), std::pair(m_->exclude_signature[e], std::pair(-1, -1)));
+      if (at == known.end() || at->first != m_->exclude_signature[e])
+        throw std::runtime_error("MuJoCo's list of bodies that do not touch is not as expected");
+      excluded_.push_back(at->second);
+    }
+  }
 
   Vec3 place_of(mbs::BodyId id, const Vec3& p) const {
     return id == mbs::kGround ? p : motion_.X_WB[static_cast<size_t>(id.index)] * p;
@@ -377,8 +391,9 @@ class Built {
   Articulation articulation_;
   std::unique_ptr<mjModel, Delete> m_;
   std::unique_ptr<mjData, Delete> d_;
-  std::vector<int> body_;           // MuJoCo's, of each body; -1: fixed (B)
-  std::vector<Place> reaction_at_;  // MuJoCo's body that a joint moves (J)
+  std::vector<int> body_;                       // MuJoCo's, of each body; -1: fixed (B)
+  std::vector<Place> reaction_at_;              // MuJoCo's body that a joint moves (J)
+  std::vector<std::pair<int, int> > excluded_;  // bodies of the model, in the order of MuJoCo's list
   Motion motion_;
   Work work_;
   Touch touch_;
