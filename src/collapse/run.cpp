@@ -293,7 +293,11 @@ record::Record run_model(const mbs::Model& model, const RunOptions& options, con
   o.equilibrium = options.equilibrium;
   o.rest_speed = options.rest_speed.value_or(k.rest_speed);
   o.samplings = make_samplings(model, r);
-  const mbs::Summary summary = engine->run(model, o);
+  mbs::Summary summary = engine->run(model, o);
+  for (const mbs::Output& out : model.outputs)
+    if (summary.step > 0 && out.rate * summary.step > 1.000001)
+      summary.notes.push_back(fmt::format("output \"{}\" asks for {:g} samples a second, the steps give {:.4g}",
+                                          out.name, out.rate, 1 / summary.step));
   finish(summary, "", recorder, r);
   add_checks(model, summary, options.equilibrium, k, r);
   if (callbacks.on_summary) callbacks.on_summary(summary);

@@ -109,6 +109,16 @@ TEST(ModelRun, SaysWhatTheEngineSaysOfItsNumbers) {
   EXPECT_EQ(e.record.findings[0].status, record::Status::Good);
 }
 
+TEST(ModelRun, NotesOutputsThatAskForMoreThanThereIs) {
+  const Example fine = run_example("double_pendulum.json", 5e-3);
+  EXPECT_TRUE(fine.summary.notes.empty()) << fine.summary.notes.front();
+  const Example coarse = run_example("double_pendulum.json", 8e-3);
+  ASSERT_EQ(coarse.summary.notes.size(), 1u);
+  EXPECT_EQ(coarse.summary.notes[0], "output \"top_reaction\" asks for 200 samples a second, the steps give 125");
+  EXPECT_EQ(output_of(coarse, "top_reaction").time.size(), 251u);
+  EXPECT_EQ(coarse.record.findings.back().id, "note.1");
+}
+
 TEST(ModelRun, ShowsHullsAsTheirBoxesAndNoPlanes) {
   mbs::Model m;
   m.contact.ground = m.contact.bodies = false;
