@@ -265,7 +265,7 @@ void Course::release(size_t j, const char* reason) {
   if (!joint_live_[j]) return;
   joint_live_[j] = 0;
   must_rebuild_ = true;
-  forces_.release_joint(j);
+  forces_.release_joint(j, time_);
   say({mbs::Happening::Kind::JointReleased, time_, static_cast<int>(j), -1, reason, 0});
 }
 
@@ -365,11 +365,12 @@ mbs::Energy Course::calc_energy() const {
   e.elastic = in.elastic;
   e.plastic = in.plastic;
   e.damping = in.damping + work_.damping;
+  e.loads = work_.loads;
   e.contact_loss = -work_.contact;
   e.removed = removed_ + in.removed;
-  e.residual = e.kinetic + e.gravity + e.elastic + e.plastic + e.damping + e.contact_loss + e.removed - work_.loads -
+  e.residual = e.kinetic + e.gravity + e.elastic + e.plastic + e.damping + e.contact_loss + e.removed - e.loads -
                total_at_start_;
-  e.released = std::max(released_, -e.gravity - e.removed);
+  e.released = std::max(released_, -e.gravity - e.removed + e.loads);
   return e;
 }
 

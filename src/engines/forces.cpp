@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "engines/articulation.h"
 #include "engines/joint_frames.h"
@@ -38,8 +39,16 @@ mbs::ZoneLaw make_lasting(mbs::ZoneLaw law) {
 /// Coefficient of r x (r x .) in the rate of a rotation vector (docs/theory/multibody.md, eq. 4).
 double calc_kappa(double angle2) {
   if (angle2 < 1e-3) return 1.0 / 12 + angle2 / 720 + angle2 * angle2 / 30240;
-  const double angle = std::sqrt(angle2);
-  return 1 / angle2 - (1 + std::cos(angle)) / (2 * angle * std::sin(angle));
+  const double half = 0.5 * std::sqrt(angle2);
+  return (1 - half / std::tan(half)) / angle2;
+}
+
+/// Of the vectors of one rotation the one nearest to another.
+Vec3 find_nearest_rotation(const Vec3& r, const Vec3& near) {
+  const double angle = norm(r);
+  if (!(angle > 0)) return r;
+  const double along = dot(r, near) / angle;
+  return (angle + 2 * std::numbers::pi * std::round((along - angle) / (2 * std::numbers::pi))) / angle * r;
 }
 
 bool is_same(const Motion& a, const Motion& b) { return a.X_WB == b.X_WB && a.v_WB == b.v_WB && a.w_WB == b.w_WB; }
@@ -120,7 +129,7 @@ Forces::Forces(const mbs::Model& model, Say say) : model_(model), say_(std::move
   load_.resize(model.loads.size());
   for (const mbs::Event& event : model.events)
     for (const mbs::Action& a : event.actions)
-      if (a.kind == mbs::Action::Kind::ApplyLoad) load_[static_cast<size_t>(a.index)].active = false;
+      if (a.kind == mbs::Action::Kind::ApplyLoad) load_[static_cast<size_t>(a.index)].has_begun = false;
   for (const auto& s : model.springs) depends_on_velocity_ |= !is_nothing(s.damper);
   for (const auto& s : model.rotational_springs) depends_on_velocity_ |= !is_nothing(s.damper);
   for (const auto& b : model.bushings)
@@ -142,13 +151,14 @@ Vec3 Forces::velocity_at(const Motion& m, mbs::BodyId id, const Vec3& p_W) const
   return m.v_WB[b] + cross(m.w_WB[b], p_W - m.X_WB[b].p);
 }
 
-Forces::Six Forces::calc_six(const Motion& m, mbs::BodyId a, const Pose& X_AF, mbs::BodyId b, const Pose& X_BM) const {
+Forces::Six Forces::calc_six(const Motion& m, mbs::BodyId a, const Pose& X_AF, mbs::BodyId b, const Pose& X_BM,
+                             const Vec3& near) const {
   const Pose X_WF = pose_of(m, a) * X_AF, X_WM = pose_of(m, b) * X_BM;
   Six s;
   s.R_WF = to_matrix(X_WF.q);
   s.p_M = X_WM.p;
   const Vec3 u = transpose_times(s.R_WF, X_WM.p - X_WF.p);
-  s.r = log_rotation(conjugate(X_WF.q) * X_WM.q);
+  s.r = find_nearest_rotation(log_rotation(conjugate(X_WF.q) * X_WM.q), near);
   const Vec3 w_A = a == mbs::kGround ? Vec3{} : m.w_WB[static_cast<size_t>(a.index)];
   const Vec3 w_B = b == mbs::kGround ? Vec3{} : m.w_WB[static_cast<size_t>(b.index)];
   const Vec3 w = transpose_times(s.R_WF, w_B - w_A);
@@ -247,7 +257,7 @@ void Forces::calc(double time, const Motion& motion, std::vector<Wrench>& on) co
   for (size_t i = 0; i < zone_.size(); ++i) {
     if (!zone_[i].state.live) continue;
     const mbs::ZoneElement& e = model_.elements[i];
-    const Six s = calc_six(motion, e.a, e.X_AF, e.b, e.X_BM);
+    const Six s = calc_six(motion, e.a, e.X_AF, e.b, e.X_BM, {});
     mbs::ZoneParameters p = zone_[i].parameters;
     prepare(p, time - accepted_);
     mbs::ZoneState trial = zone_[i].state;
@@ -311,14 +321,14 @@ void Forces::push_others(double time, const Motion& motion, std::vector<Wrench>&
   for (size_t i = 0; i < bushing_.size(); ++i) {
     if (!bushing_[i].live) continue;
     const mbs::Bushing& b = model_.bushings[i];
-    const Six s = calc_six(motion, b.a, b.X_AF, b.b, b.X_BM);
+    const Six s = calc_six(motion, b.a, b.X_AF, b.b, b.X_BM, bushing_[i].turn);
     double f[6];
     for (int k = 0; k < 6; ++k)
       f[k] = calc_characteristic(b.spring[k], s.deformation.c[k]) + calc_characteristic(b.damper[k], s.rate.c[k]);
     push_six(motion, b.a, b.b, s, f, on);
   }
   for (size_t i = 0; i < load_.size(); ++i) {
-    if (!load_[i].active) continue;
+    if (!load_[i].has_begun || load_[i].is_over) continue;
     const mbs::Load& l = model_.loads[i];
     if (is_ground(model_, l.body.index)) continue;
     const double factor = factor_of(i, time);
@@ -348,11 +358,11 @@ Power Forces::calc_power(double time, const Motion& motion) const {
   for (size_t i = 0; i < bushing_.size(); ++i) {
     if (!bushing_[i].live) continue;
     const mbs::Bushing& b = model_.bushings[i];
-    const Six s = calc_six(motion, b.a, b.X_AF, b.b, b.X_BM);
+    const Six s = calc_six(motion, b.a, b.X_AF, b.b, b.X_BM, bushing_[i].turn);
     for (int k = 0; k < 6; ++k) p.damping += calc_characteristic(b.damper[k], s.rate.c[k]) * s.rate.c[k];
   }
   for (size_t i = 0; i < load_.size(); ++i) {
-    if (!load_[i].active) continue;
+    if (!load_[i].has_begun || load_[i].is_over) continue;
     const mbs::Load& l = model_.loads[i];
     if (is_ground(model_, l.body.index)) continue;
     const Pose X = pose_of(motion, l.body);
@@ -382,7 +392,7 @@ bool Forces::advance(double time, const Motion& motion, const std::vector<Vec3>&
     Zone& z = zone_[i];
     if (!z.state.live) continue;
     const mbs::ZoneElement& e = model_.elements[i];
-    const Six s = calc_six(motion, e.a, e.X_AF, e.b, e.X_BM);
+    const Six s = calc_six(motion, e.a, e.X_AF, e.b, e.X_BM, {});
     const bool was_yielded = z.state.yielded;
     prepare(z.parameters, h);
     mbs::advance_zone(z.parameters, laws_, s.deformation, time, h, z.state);
@@ -443,7 +453,7 @@ bool Forces::break_others(double time, const Motion& motion) {
     if (force > s.tension_strength)
       fail(spring_[i], Kind::SpringBroken, i, "tension");
     else if (-force > s.compression_strength)
-      fail(spring_[i], Kind::SpringBroken, i, "crushing");
+      fail(spring_[i], Kind::SpringBroken, i, "compression");
   }
   for (size_t i = 0; i < torsion_.size(); ++i) {
     if (!torsion_[i].live) continue;
@@ -458,14 +468,19 @@ bool Forces::break_others(double time, const Motion& motion) {
     if (!bushing_[i].live) continue;
     static const char* const words[] = {"tension", "shear", "shear", "torsion", "rotation", "rotation"};
     const mbs::Bushing& b = model_.bushings[i];
-    const Six s = calc_six(motion, b.a, b.X_AF, b.b, b.X_BM);
+    const Six s = calc_six(motion, b.a, b.X_AF, b.b, b.X_BM, bushing_[i].turn);
     bushing_[i].stored = 0;
+    bushing_[i].turn = s.r;
     int weak = -1;
+    bool pulled = true;
     for (int k = 0; k < 6; ++k) {
       bushing_[i].stored += calc_potential(b.spring[k], s.deformation.c[k]);
-      if (weak < 0 && std::abs(calc_characteristic(b.spring[k], s.deformation.c[k])) > b.strength[k]) weak = k;
+      const double force = calc_characteristic(b.spring[k], s.deformation.c[k]);
+      if (weak >= 0 || !(std::abs(force) > b.strength[k])) continue;
+      weak = k;
+      pulled = force > 0;
     }
-    if (weak >= 0) fail(bushing_[i], Kind::BushingBroken, i, words[weak]);
+    if (weak >= 0) fail(bushing_[i], Kind::BushingBroken, i, weak == 0 && !pulled ? "compression" : words[weak]);
   }
   return jumped;
 }
@@ -492,13 +507,18 @@ void Forces::switch_law(const mbs::Action& a, double time) {
   z.next_share = a.stiffness_share;
 }
 
-void Forces::release_joint(size_t j) {
+void Forces::release_joint(size_t j, double time) {
   is_cached_ = false;
   for (size_t i = 0; i < rotational_.size(); ++i)
     if (model_.rotational_elements[i].joint.index == static_cast<int>(j) && rotational_[i].state.live)
       mbs::break_zone(rotational_[i].state, mbs::BreakReason::Removed);
-  for (size_t i = 0; i < torsion_.size(); ++i)
-    if (model_.rotational_springs[i].joint.index == static_cast<int>(j)) remove_rotational_spring(i);
+  for (size_t i = 0; i < torsion_.size(); ++i) {
+    if (model_.rotational_springs[i].joint.index != static_cast<int>(j) || !torsion_[i].live) continue;
+    plastic_ += torsion_[i].stored;
+    torsion_[i].stored = 0;
+    torsion_[i].live = false;
+    say_({mbs::Happening::Kind::RotationalSpringBroken, time, static_cast<int>(i), -1, "released", 0});
+  }
 }
 
 namespace {
@@ -517,8 +537,14 @@ void Forces::release_cable(size_t i) { is_cached_ = false, take_away(rope_[i], r
 void Forces::remove_spring(size_t i) { is_cached_ = false, take_away(spring_[i], removed_); }
 void Forces::remove_rotational_spring(size_t i) { is_cached_ = false, take_away(torsion_[i], removed_); }
 void Forces::remove_bushing(size_t i) { is_cached_ = false, take_away(bushing_[i], removed_); }
-void Forces::remove_load(size_t i) { is_cached_ = false, load_[i].active = false; }
-void Forces::apply_load(size_t i, double time) { is_cached_ = false, load_[i] = {true, time}; }
+void Forces::remove_load(size_t i) {
+  is_cached_ = false;
+  load_[i].is_over = true;  // also if an event would apply it later
+}
+void Forces::apply_load(size_t i, double time) {
+  is_cached_ = false;
+  if (!load_[i].has_begun) load_[i] = {true, load_[i].is_over, time};
+}
 
 // --- what is seen
 
@@ -533,7 +559,7 @@ ElementEnergy Forces::calc_energy() const {
       e.damping += z.state.damping;
     }
   for (const Spring& s : spring_) e.elastic += s.stored;
-  for (const Spring& s : bushing_) e.elastic += s.stored;
+  for (const Held& s : bushing_) e.elastic += s.stored;
   for (const Torsion& s : torsion_) e.elastic += s.stored;
   for (const Rope& s : rope_) e.elastic += s.stored;
   return e;
@@ -564,7 +590,7 @@ void Forces::fill(double time, const Motion& motion, mbs::View& v) const {
   for (size_t i = 0; i < E; ++i) {
     const mbs::ZoneElement& e = model_.elements[i];
     fill_zone(i, time, zone_[i], v);
-    const Six s = calc_six(motion, e.a, e.X_AF, e.b, e.X_BM);
+    const Six s = calc_six(motion, e.a, e.X_AF, e.b, e.X_BM, {});
     v.shortening[i] = zone_[i].state.shortened;
     v.element_force[i] = -three(zone_[i].state.resultant.c);
     v.element_moment[i] = -three(zone_[i].state.resultant.c + 3);
@@ -607,7 +633,7 @@ void Forces::fill(double time, const Motion& motion, mbs::View& v) const {
   v.bushing_moment.resize(N);
   for (size_t i = 0; i < N; ++i) {
     const mbs::Bushing& b = model_.bushings[i];
-    const Six s = calc_six(motion, b.a, b.X_AF, b.b, b.X_BM);
+    const Six s = calc_six(motion, b.a, b.X_AF, b.b, b.X_BM, bushing_[i].turn);
     double f[6] = {0, 0, 0, 0, 0, 0};
     for (int k = 0; k < 6 && bushing_[i].live; ++k)
       f[k] = -calc_characteristic(b.spring[k], s.deformation.c[k]) - calc_characteristic(b.damper[k], s.rate.c[k]);

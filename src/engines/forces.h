@@ -57,7 +57,7 @@ class Forces {
   // Events; they count from the next evaluation on.
   void remove_element(size_t);
   void switch_law(const mbs::Action&, double time);
-  void release_joint(size_t);
+  void release_joint(size_t, double time);
   void release_cable(size_t);
   void remove_spring(size_t);
   void remove_rotational_spring(size_t);
@@ -96,9 +96,12 @@ class Forces {
   struct Rope : Spring {
     double rest_length = 0;
   };
+  struct Held : Spring {
+    Vec3 turn;  // rotation vector at the last accepted state; it may pass π [rad]
+  };
   struct Applied {
-    bool active = true;
-    double begin = 0;
+    bool has_begun = true, is_over = false;
+    double begin = 0;  // [s]
   };
   struct Six {
     mbs::Six deformation, rate;
@@ -110,7 +113,7 @@ class Forces {
   void prepare(mbs::ZoneParameters&, double h) const;
   Pose pose_of(const Motion&, mbs::BodyId) const;
   Vec3 velocity_at(const Motion&, mbs::BodyId, const Vec3& p_W) const;
-  Six calc_six(const Motion&, mbs::BodyId a, const Pose& X_AF, mbs::BodyId b, const Pose& X_BM) const;
+  Six calc_six(const Motion&, mbs::BodyId a, const Pose& X_AF, mbs::BodyId b, const Pose& X_BM, const Vec3& near) const;
   double angle_of(const Motion&, mbs::JointId, double previous) const;
   Vec3 axis_of(const Motion&, mbs::JointId) const;
   double angle_rate_of(const Motion&, mbs::JointId) const;
@@ -128,7 +131,8 @@ class Forces {
   Say say_;
   std::vector<mbs::CompiledLaw> laws_, lasting_laws_;  // as they are; without rupture, for trial states
   std::vector<Zone> zone_, rotational_;
-  std::vector<Spring> spring_, bushing_;
+  std::vector<Spring> spring_;
+  std::vector<Held> bushing_;
   std::vector<Torsion> torsion_;
   std::vector<Rope> rope_;
   std::vector<Applied> load_;

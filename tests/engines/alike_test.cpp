@@ -93,6 +93,19 @@ TEST_P(EnginesAlikeReference, Bushing) {
   expect_alike(m, 2, 3e-6);
 }
 
+TEST_P(EnginesAlikeReference, BushingTurnedBeyondHalfATurn) {
+  NEEDS_ENGINE();
+  mbs::Model m = test::make_empty({});
+  const auto a = add_brick(m, "a", {0, 0, 0});
+  m.bodies[0].w_WB = {0.3, 0.2, 12};
+  mbs::Bushing b;
+  b.a = mbs::kGround;
+  b.b = a;
+  for (int i = 0; i < 6; ++i) b.spring[i].rate = i < 3 ? 2000 : 8;
+  m.bushings.push_back(b);
+  expect_alike(m, 0.9, 1e-5);  // to 4.4 rad and back
+}
+
 TEST_P(EnginesAlikeReference, CantileverOfBushings) {
   NEEDS_ENGINE();
   // bars of 1 m joined by bushings of a steel tube's stiffness, let go
