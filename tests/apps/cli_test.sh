@@ -44,7 +44,7 @@ usage)
 readme)
   # every command in the shell blocks of these pages exists
   commands=0
-  for page in README.md docs/getting-started.md docs/run.md docs/mbs-model.md; do
+  for page in README.md docs/getting-started.md docs/run.md docs/mbs-model.md docs/engines.md; do
     while read -r word verb rest; do
       case $word in
       script/*) [ -x "$source/$word" ] || { echo "$page shows $word, which cannot be called"; failures=$((failures + 1)); } ;;
@@ -140,6 +140,31 @@ mbs)
   has err 'typo.json:15:'; has err 'there is no body "lwoer"; did you mean "lower"?'; has err '^^^'; has err "1 error. Nothing was run."
   expect 2 "$topple" mbs run typo.json -o g --json; is_json out; has out '"line": 15'
   [ ! -e g ] || { echo "a folder was made for a wrong model"; failures=$((failures + 1)); }
+  ;;
+compare)
+  model=$source/examples/mbs/double_pendulum.json
+  expect 0 "$topple" mbs compare "$model" --engines native --duration 0.2s -o a
+  has out "native"; has out "ending"; has out "Wrote a/compare.csv"
+  expect 2 "$topple" mbs compare "$model" --engines nativ; has err 'did you mean "native"?'
+  expect 2 "$topple" mbs compare "$model" --engines native,native; has err "twice"
+  expect 2 "$topple" mbs compare missing.json
+  expect 2 "$topple" mbs compare "$model" --step "3 apples"; has err "--step"
+  expect 0 "$topple" mbs compare "$model" --duration 0.2s --frames 10 --json; is_json out; has out '"energy_error"'
+  for engine in simbody mujoco; do
+    if ! "$topple" mbs compare "$model" --engines $engine --duration 0.01s >out 2>err; then
+      has err "is not built in"; has err "lib$engine-dev"
+      continue
+    fi
+    expect 0 "$topple" mbs compare "$model" --engines native,$engine --duration 0.5s --frames 20 --bodies -o b
+    has out "position [m]"; has out "lower"; exists b/compare.csv; exists b/compare.svg
+    [ "$(grep -c "^$engine," b/compare.csv)" -eq 21 ] || { echo "not 21 instants"; failures=$((failures + 1)); }
+    # contact between bodies that have rules of their own
+    falling=$source/examples/mbs/falling_boxes.json
+    expect 2 "$topple" mbs compare "$falling" --engines native,$engine --duration 0.01s
+    has err "$engine cannot express"; has err "contact."; has err "--skip-unsupported"
+    expect 0 "$topple" mbs compare "$falling" --engines native,$engine --duration 0.01s --skip-unsupported
+    has out "not run"
+  done
   ;;
 report)
   expect 0 "$topple" run "$plan" -o a --no-report

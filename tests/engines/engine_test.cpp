@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <fstream>
 
 #include "ballistic.h"
 #include "base/error.h"
@@ -67,6 +68,31 @@ TEST(Engine, TheSmallestOneComparesWithTheNative) {
   EXPECT_LT(c.runs[1].position.value, 1e-10);  // round-off
   EXPECT_LT(c.runs[1].orientation.value, 1e-10);
   EXPECT_LT(c.runs[1].summary.energy_error, 1e-12);
+}
+
+/// Lines without comments and blanks around them.
+std::vector<std::string> code_lines(std::istream& in, bool inside_blocks) {
+  std::vector<std::string> lines;
+  bool inside = !inside_blocks;
+  for (std::string line; std::getline(in, line);) {
+    if (inside_blocks && line.starts_with("```")) {
+      inside = line == "```cpp";
+      continue;
+    }
+    line = line.substr(0, line.find("//"));
+    const size_t begin = line.find_first_not_of(' '), end = line.find_last_not_of(' ');
+    if (inside && begin != std::string::npos) lines.push_back(line.substr(begin, end - begin + 1));
+  }
+  return lines;
+}
+
+TEST(Engine, TheDocumentShowsTheSmallestOneAsItIs) {
+  std::ifstream page(std::string(TOPPLE_SOURCE_DIR) + "/docs/engines.md");
+  std::ifstream code(std::string(TOPPLE_SOURCE_DIR) + "/tests/engines/ballistic.h");
+  const auto shown = code_lines(page, true), is = code_lines(code, false);
+  ASSERT_GT(shown.size(), 15U);
+  for (const std::string& line : shown)
+    if (line != "...") { EXPECT_NE(std::find(is.begin(), is.end(), line), is.end()) << line; }
 }
 
 TEST(Engine, TheSmallestOneNamesWhatItCannotExpress) {
