@@ -1,12 +1,14 @@
-/// 255 boxes and 660 linear-brittle connections: equilibrium apart, then 1.7 s of collapse.
+/// 255 boxes and 660 linear-brittle connections: equilibrium apart, then 1.7 s of collapse; one run, and an ensemble.
 
 #include <benchmark/benchmark.h>
 
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "cpu_time.h"
 #include "frame.h"
+#include "mbs/batch.h"
 #include "mbs/solver.h"
 
 namespace topple::bench {
@@ -14,42 +16,84 @@ namespace {
 
 constexpr double kDuration = 1.7;  // [s]
 
-/// The collapse alone, from the equilibrium on; argument: step in microseconds, 0 for the engine's own choice.
-void frame255(benchmark::State& state) {
-  const mbs::Model model = make_frame();
+/// The collapse alone, from the equilibrium on.
+///   step     in microseconds, 0 for the engine's own choice
+///   contact  bodies touch each other too, not the ground alone
+void collapse(benchmark::State& state, double step, bool contact) {
+  mbs::Model model = make_frame();
+  model.contact.bodies = contact;
   mbs::Options options;
-  options.step = 1e-6 * static_cast<double>(state.range(0));
+  options.step = 1e-6 * step;
   int broken = 0;
   options.on_happening = [&](const mbs::Happening& h) { broken += h.kind == mbs::Happening::Kind::ElementBroken; };
   mbs::Simulation simulation(model, options);
   std::string message;
   if (!simulation.find_equilibrium(message)) return state.SkipWithError(message.c_str());
   const auto start = simulation.snapshot();
-  const double h = simulation.step();
-  const long steps = std::lround(std::ceil(kDuration / h));
-  double total = 0;
+  double total = 0, steps = 0;
   for (auto _ : state) {
     broken = 0;
     simulation.restore(start);
     const double begin = cpu_time();
-    for (long i = 0; i < steps; ++i)
+    while (simulation.time() < kDuration) {
       if (!simulation.advance_step()) return state.SkipWithError("the state is no longer finite");
+      ++steps;
+    }
     const double spent = cpu_time() - begin;
     total += spent;
     state.SetIterationTime(spent);
   }
   const mbs::View& v = simulation.calc_view();
-  const double n = static_cast<double>(state.iterations()) * static_cast<double>(steps);
-  state.counters["steps"] = static_cast<double>(steps);
-  state.counters["h_us"] = 1e6 * h;
-  state.counters["step_us"] = 1e6 * total / n;
-  state.counters["connection_ns"] = 1e9 * total / (n * static_cast<double>(model.elements.size()));
-  state.counters["real_time_factor"] = kDuration * static_cast<double>(state.iterations()) / total;
+  const double runs = static_cast<double>(state.iterations());
+  state.counters["steps"] = steps / runs;
+  state.counters["h_us"] = 1e6 * kDuration * runs / steps;
+  state.counters["step_us"] = 1e6 * total / steps;
+  state.counters["connection_ns"] = 1e9 * total / (steps * static_cast<double>(model.elements.size()));
+  state.counters["real_time_factor"] = kDuration * runs / total;
   state.counters["broken"] = broken;
   state.counters["body_contacts"] = v.body_contacts;
   state.counters["energy_error_pct"] = 100 * std::abs(v.energy.residual) / v.energy.released;
 }
+void frame255(benchmark::State& state) { collapse(state, static_cast<double>(state.range(0)), false); }
 BENCHMARK(frame255)->Arg(0)->Arg(100)->Unit(benchmark::kMillisecond)->UseManualTime();
+void frame255_contact(benchmark::State& state) { collapse(state, static_cast<double>(state.range(0)), true); }
+BENCHMARK(frame255_contact)->Arg(0)->Unit(benchmark::kMillisecond)->UseManualTime();
+
+/// An ensemble of the frame with connections of varied strength, one thread; ground contact. Compiling and equilibrium
+/// of every sample are in the time.
+void frame255_ensemble(benchmark::State& state) {
+  mbs::Model model = make_frame();
+  model.contact.bodies = false;
+  const size_t count = static_cast<size_t>(state.range(0));
+  std::vector<mbs::Variation> variations;
+  for (size_t i = 0; i < count; ++i)
+    variations.push_back([i](mbs::Model& m) {
+      for (mbs::ZoneLaw& law : m.laws) {
+        const double f = 0.9 + 0.2 * static_cast<double>((7 * i) % 16) / 16;
+        for (mbs::Curve* c : {&law.tension, &law.compression})
+          for (double& x : c->f) x *= f;
+        for (mbs::MomentFamily* family : {&law.moment_y, &law.moment_z})
+          for (std::vector<double>* limits : {&family->positive, &family->negative})
+            for (double& x : *limits) x *= f;
+        law.shear_y *= f, law.shear_z *= f, law.torsion *= f;
+      }
+    });
+  mbs::BatchOptions options;
+  options.run.duration = kDuration;
+  options.run.frame_interval = kDuration;
+  double total = 0;
+  for (auto _ : state) {
+    const double begin = cpu_time();
+    const std::vector<mbs::Summary> ends = mbs::run_batch(model, variations, options);
+    for (const mbs::Summary& end : ends)
+      if (end.ending != mbs::Summary::Ending::TimeLimit) return state.SkipWithError(end.message.c_str());
+    const double spent = cpu_time() - begin;
+    total += spent;
+    state.SetIterationTime(spent);
+  }
+  state.counters["samples_per_second"] = static_cast<double>(count * state.iterations()) / total;
+}
+BENCHMARK(frame255_ensemble)->Arg(16)->Unit(benchmark::kMillisecond)->UseManualTime();
 
 /// Compiling the model with its choice of step, and the dead-load equilibrium.
 void frame255_compile(benchmark::State& state) {

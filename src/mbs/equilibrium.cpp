@@ -36,9 +36,26 @@ void add_outer(const KinematicRow& r, double k, Triplets& out) {
       for (int m = 0; m < 6; ++m)
         for (int n = 0; n < 6; ++n) {
           const double value = k * part[i][m / 3][m % 3] * part[j][n / 3][n % 3];
-          if (value != 0) out.emplace_back(6 * body[i] + m, 6 * body[j] + n, value);
+          out.emplace_back(6 * body[i] + m, 6 * body[j] + n, value);  // zeros too: the pattern never changes
         }
     }
+}
+
+/// The same of six rows between the same bodies.
+void add_outers(const KinematicRow rows[6], const double k[6], Triplets& out) {
+  double sum[12][12] = {};
+  for (int r = 0; r < 6; ++r) {
+    const Vec3* part[4] = {&rows[r].va, &rows[r].wa, &rows[r].vb, &rows[r].wb};
+    double x[12];
+    for (int i = 0; i < 12; ++i) x[i] = (*part[i / 3])[i % 3];
+    for (int i = 0; i < 12; ++i)
+      for (int j = 0; j < 12; ++j) sum[i][j] += k[r] * x[i] * x[j];
+  }
+  const int body[2] = {rows[0].a, rows[0].b};
+  for (int i = 0; i < 12; ++i)
+    for (int j = 0; j < 12; ++j)
+      if (body[i / 6] >= 0 && body[j / 6] >= 0)
+        out.emplace_back(6 * body[i / 6] + i % 6, 6 * body[j / 6] + j % 6, sum[i][j]);
 }
 
 }  // namespace
@@ -117,14 +134,16 @@ class Assembly {
   /// `share` of each element's own stiffness is left, 1 if empty; `force_scale` that of the forces, for springs.
   Sparse make_stiffness(bool fast, const std::vector<double>& share = {}, double force_scale = 1) const {
     Triplets t;
-    t.reserve(size_t{144} * 6 * s_.elements.size());
+    t.reserve(size_t{144} * s_.elements.size());
     for (size_t i = 0; i < s_.elements.size(); ++i) {
       if (!s_.state.element[i].live) continue;
       const CompiledElement& e = s_.elements[i];
       const double factor = (fast ? 1 + e.zone.viscous : 1) * (share.empty() ? 1 : share[i]);
       KinematicRow rows[6];
       element_rows(e, rows);
-      for (int k = 0; k < 6; ++k) add_outer(rows[k], factor * e.zone.stiffness[k], t);
+      double stiffness[6];
+      for (int k = 0; k < 6; ++k) stiffness[k] = factor * s_.state.element[i].share * e.zone.stiffness[k];
+      add_outers(rows, stiffness, t);
     }
     for (const CompiledRotational& r : s_.rotationals)
       add_outer(rotational_row(s_.joints[static_cast<size_t>(r.joint)]),
@@ -293,6 +312,7 @@ bool System::find_equilibrium(std::string& message) {
   }
   const double penalty = 30 * largest;
   Eigen::SimplicialLDLT<Sparse> solver;
+  bool analysed = false;  // the pattern stays what it is
   const auto factorise = [&] {
     Sparse K = assembly.make_stiffness(false, {}, weight);
     Triplets t;
@@ -305,7 +325,9 @@ bool System::find_equilibrium(std::string& message) {
     Sparse P(n, n);
     P.setFromTriplets(t.begin(), t.end());
     K += P;
-    solver.compute(K);
+    if (!analysed) solver.analyzePattern(K);
+    analysed = true;
+    solver.factorize(K);
     if (solver.info() != Eigen::Success) {
       message = "the stiffness matrix of the dead-load equilibrium could not be factorised: the model is a mechanism";
       return false;
@@ -335,7 +357,10 @@ bool System::find_equilibrium(std::string& message) {
   double unbalanced = 0, gap_left = 0, best = 1e300;
   int idle = 0;
   constexpr int most = 400;
-  constexpr int fresh = 12;  // iterations with a stiffness of their own; then the last one serves
+  constexpr int fresh = 12;       // most iterations with a stiffness of their own; then the last one serves
+  constexpr double quick = 0.03;  // of the unbalanced force is left after an iteration with a stiffness that still fits
+  int factorised = 0;
+  double last_unbalanced = 0;
   for (int round = 0; round <= most; ++round) {
     state.element = virgin;
     state.rotational = virgin_rotational;
@@ -396,7 +421,11 @@ bool System::find_equilibrium(std::string& message) {
     best = std::min(best, unbalanced);
     if (round == most || (idle > 10 && unbalanced < good_enough)) break;
     state.element = virgin;
-    if (round < fresh && !factorise()) return finish(false);
+    if (round == 0 || (factorised < fresh && unbalanced > quick * last_unbalanced)) {
+      ++factorised;
+      if (!factorise()) return finish(false);
+    }
+    last_unbalanced = unbalanced;
     const Vector d = solver.solve(penalised);
     for (size_t i = 0; i < assembly.free_bodies().size(); ++i) {
       const size_t b = static_cast<size_t>(assembly.free_bodies()[i]);
