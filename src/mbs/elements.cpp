@@ -33,6 +33,7 @@ void System::kill_slot(size_t e) {
   lanes->clear_slot(slot);
   --lanes->live[slot / lanes->W];
   --lanes->live_elements;
+  --state.live_elements;
 }
 
 void System::lay_out_elements() {
@@ -338,6 +339,7 @@ void System::save_elements() {
 }
 
 void System::restore_elements(const std::vector<double>& history) {
+  const size_t live = state.live_elements;
   lanes->slot_of.clear();
   lay_out_elements();
   const double* next = history.data();
@@ -350,6 +352,7 @@ void System::restore_elements(const std::vector<double>& history) {
     next = restore_slot(slot, next);
     if (state.element[e].is_softened) lanes->softened[slot / lanes->W] = 1;
   }
+  state.live_elements = live;
 }
 
 void System::join_batch(Lanes& batch, size_t to) {

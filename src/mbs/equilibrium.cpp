@@ -1,7 +1,8 @@
 /// Dead-load equilibrium by Newton's method with the elastic stiffness, joints by the augmented Lagrangian; and the
-/// stiffest mode by power iteration (docs/theory/multibody.md, eq. 8 to 10). The one place of the module that sees
+/// stiffest mode by Lanczos' method (docs/theory/multibody.md, eq. 8 to 10). The one place of the module that sees
 /// sparse matrices.
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Sparse>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
@@ -27,7 +28,6 @@ struct KinematicRow {
 };
 
 void add_outer(const KinematicRow& r, double k, Triplets& out) {
-  if (k == 0) return;
   const int body[2] = {r.a, r.b};
   const Vec3 part[2][2] = {{r.va, r.wa}, {r.vb, r.wb}};
   for (int i = 0; i < 2; ++i)
@@ -131,14 +131,14 @@ class Assembly {
             cross(p_B - centre(c.b.index), d)};
   }
   /// Stiffness of all live elements: at rest, or that of fast motion, which the springs behind the dampers add to.
-  /// `share` of each element's own stiffness is left, 1 if empty; `force_scale` that of the forces, for springs.
-  Sparse make_stiffness(bool fast, const std::vector<double>& share = {}, double force_scale = 1) const {
+  /// `force_scale` is that of the forces, for springs.
+  Sparse make_stiffness(bool fast, double force_scale = 1) const {
     Triplets t;
     t.reserve(size_t{144} * s_.elements.size());
     for (size_t i = 0; i < s_.elements.size(); ++i) {
       if (!s_.state.element[i].live) continue;
       const CompiledElement& e = s_.elements[i];
-      const double factor = (fast ? 1 + e.zone.viscous : 1) * (share.empty() ? 1 : share[i]);
+      const double factor = fast ? 1 + e.zone.viscous : 1;
       KinematicRow rows[6];
       element_rows(e, rows);
       double stiffness[6];
@@ -168,87 +168,124 @@ class Assembly {
   std::vector<int> place_, free_;
 };
 
-void System::choose_step() {
+/// Largest eigenvalue of M⁻¹ K by Lanczos' method in the inner product of M.
+///   accelerate  x -> M⁻¹ x; weigh  x -> M x
+template <class Accelerate, class Weigh>
+double find_largest_eigenvalue(const Sparse& K, Accelerate&& accelerate, Weigh&& weigh) {
+  const Eigen::Index n = K.rows();
+  constexpr int most = 80;
+  Vector x(n), before = Vector::Zero(n);
+  // a start that no mode is orthogonal to by symmetry
+  std::uint64_t seed = 88172645463325252ULL;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    seed ^= seed << 13, seed ^= seed >> 7, seed ^= seed << 17;
+    x[i] = static_cast<double>(seed >> 11) * 0x1p-53 - 0.5;
+  }
+  std::vector<double> diagonal, beside;
+  double found = 0, norm2 = x.dot(weigh(x));
+  for (int round = 0; round < most && norm2 > 0; ++round) {
+    const double norm = std::sqrt(norm2);
+    if (round > 0) beside.push_back(norm);
+    x /= norm;
+    const Vector f = K * x;
+    diagonal.push_back(x.dot(f));
+    Vector next = accelerate(f);
+    next -= diagonal.back() * x;
+    if (round > 0) next -= norm * before;
+    before = x;
+    x = next;
+    norm2 = x.dot(weigh(x));
+    const bool exhausted = !(norm2 > 1e-20 * diagonal.back() * diagonal.back());
+    if (round % 4 != 3 && round + 1 != n && !exhausted) continue;
+    Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver;
+    solver.computeFromTridiagonal(Eigen::Map<const Vector>(diagonal.data(), static_cast<Eigen::Index>(diagonal.size())),
+                                  Eigen::Map<const Vector>(beside.data(), static_cast<Eigen::Index>(beside.size())),
+                                  Eigen::EigenvaluesOnly);
+    const double largest = solver.eigenvalues().maxCoeff();
+    // it only grows, and quickly
+    if (exhausted || round + 1 == n || (round > 12 && largest - found < 1e-4 * largest)) return largest;
+    found = largest;
+  }
+  return found;
+}
+
+double System::find_highest_frequency() const {
   const Assembly assembly(*this);
   const int n = assembly.unknowns();
-  const auto find_highest = [&](const std::vector<double>& inverse_mass, const std::vector<Mat3>& inverse_inertia,
-                                const Sparse& K) {
-    const auto accelerate = [&](const Vector& f) {
-      Vector a(n);
-      for (size_t i = 0; i < assembly.free_bodies().size(); ++i) {
-        const size_t b = static_cast<size_t>(assembly.free_bodies()[i]);
-        const Eigen::Index at = static_cast<Eigen::Index>(6 * i);
-        for (int k = 0; k < 3; ++k) a[at + k] = inverse_mass[b] * f[at + k];
-        const Vec3 w = inverse_inertia[b] * Vec3{f[at + 3], f[at + 4], f[at + 5]};
-        for (int k = 0; k < 3; ++k) a[at + 3 + k] = w[k];
-      }
-      return a;
-    };
-    Vector x(n);
-    // a start that no mode is orthogonal to by symmetry
-    std::uint64_t seed = 88172645463325252ULL;
-    for (Eigen::Index i = 0; i < n; ++i) {
-      seed ^= seed << 13, seed ^= seed >> 7, seed ^= seed << 17;
-      x[i] = static_cast<double>(seed >> 11) * 0x1p-53 - 0.5;
-    }
-    // Rayleigh quotient x K M⁻¹ K x / x K x, which only grows
-    double frequency = 0, before = 0;
-    for (int round = 0; round < 2000; ++round) {
-      const Vector f = K * x;
-      const Vector a = accelerate(f);
-      const double xKx = x.dot(f);
-      if (!(xKx > 0)) break;
-      const double omega2 = a.dot(f) / xKx;
-      frequency = std::sqrt(omega2);
-      x = a / a.norm();
-      if (round > 20 && std::abs(omega2 - before) < 1e-6 * omega2) break;
-      before = omega2;
-    }
-    return frequency;
-  };
-  double elastic = 0;
-  if (n > 0) {
-    std::vector<double> inverse_mass(B, 0);
-    std::vector<Mat3> inverse_inertia(B);
-    for (const int b : assembly.free_bodies()) {
-      inverse_mass[static_cast<size_t>(b)] = state.body[static_cast<size_t>(b)].inverse_mass;
-      inverse_inertia[static_cast<size_t>(b)] = calc_world_inverse_inertia(static_cast<size_t>(b));
-    }
-    elastic = find_highest(inverse_mass, inverse_inertia, assembly.make_stiffness(true));
-    // and after the events, which make bodies lighter and elements softer
-    std::vector<double> share(elements.size(), 1);
-    std::vector<double> soft_from(elements.size(), kUnlimited);  // when an element has its share only
-    bool changes = false;
-    for (const Event& event : model.events)
-      for (const Action& a : event.actions) {
-        if (!a.element.is_valid()) continue;
-        const size_t e = static_cast<size_t>(a.element.index);
-        if (a.kind == Action::Kind::SwitchLaw) share[e] = a.stiffness_share, soft_from[e] = event.time + a.ramp;
-        if (a.kind == Action::Kind::RemoveElement) share[e] = 0, soft_from[e] = event.time;
-      }
-    for (const Event& event : model.events)
-      for (const Action& a : event.actions) {
-        if (a.kind != Action::Kind::ReplaceBody) continue;
-        changes = true;
-        const size_t b = static_cast<size_t>(a.body.index);
-        // what still holds the lighter body at full stiffness counts in full
-        for (const int entry : incidence[b])
-          if (const size_t e = static_cast<size_t>(entry / 2); soft_from[e] > event.time) share[e] = 1;
-        if (fixed[b] || 1 / a.replacement.mass < inverse_mass[b]) continue;
-        inverse_mass[b] = 1 / a.replacement.mass;
-        inverse_inertia[b] = state.R[b] * inverse(a.replacement.inertia) * transpose(state.R[b]);
-      }
-    if (changes)
-      elastic = std::max(elastic, find_highest(inverse_mass, inverse_inertia, assembly.make_stiffness(true, share)));
+  if (n == 0) return 0;
+  std::vector<Mat3> inertia(assembly.free_bodies().size()), inverse_inertia(inertia.size());
+  for (size_t i = 0; i < inertia.size(); ++i) {
+    const size_t b = static_cast<size_t>(assembly.free_bodies()[i]);
+    const Mat3 R = state.R[b];
+    inertia[i] = R * state.body[b].inertia * transpose(R);
+    inverse_inertia[i] = R * state.body[b].inverse_inertia * transpose(R);
   }
-  highest_frequency = 1.01 * elastic;  // the iteration stops a little below
+  const auto scale = [&](const Vector& x, bool inverse) {
+    Vector y(n);
+    for (size_t i = 0; i < inertia.size(); ++i) {
+      const BodyConstants& body = state.body[static_cast<size_t>(assembly.free_bodies()[i])];
+      const double m = inverse ? body.inverse_mass : body.mass;
+      const Eigen::Index at = static_cast<Eigen::Index>(6 * i);
+      for (int k = 0; k < 3; ++k) y[at + k] = m * x[at + k];
+      const Vec3 w = (inverse ? inverse_inertia[i] : inertia[i]) * Vec3{x[at + 3], x[at + 4], x[at + 5]};
+      for (int k = 0; k < 3; ++k) y[at + 3 + k] = w[k];
+    }
+    return y;
+  };
+  const double omega2 = find_largest_eigenvalue(
+      assembly.make_stiffness(true), [&](const Vector& x) { return scale(x, true); },
+      [&](const Vector& x) { return scale(x, false); });
+  return 1.01 * std::sqrt(std::max(0.0, omega2));  // the iteration stops a little below
+}
+
+double System::calc_step_limit() const {
   const bool contact = model.contact.ground || model.contact.bodies;
   // a corner of a compact box is about seven times lighter than its body
   const double touching = contact ? std::sqrt(7.0) * model.contact.contact_frequency : 0;
   const double fastest = std::sqrt(highest_frequency * highest_frequency + touching * touching);
+  return fastest > 0 ? 2 / fastest : 1e-3 / options.step_safety;
+}
+
+void System::set_step(double h) {
+  if (h == step) return;
+  state.time_base = state.time;
+  state.index_base = state.step_index;
+  state.step = h;
+  adopt_step();
+  // counted in steps of the old length
+  std::fill(state.pair_apart_until.begin(), state.pair_apart_until.end(), 0);
+}
+
+void System::adopt_step() {
+  step = state.step;
+  summary.shortest_step = summary.shortest_step > 0 ? std::min(summary.shortest_step, step) : step;
+  const double relaxation = 1 - std::exp(-step * model.damping_frequency);
+  for (CompiledRotational& r : rotationals) r.zone.relaxation = relaxation;
+  for (size_t e = 0; e < elements.size(); ++e) {
+    elements[e].zone.relaxation = relaxation;
+    const size_t slot = slot_of(e);
+    if (slot != Lanes::kNoSlot) lanes->field(slot, kernel::kRelaxation) = relaxation;
+  }
+}
+
+void System::review_step() {
+  std::vector<double>& due = state.review_times;
+  const bool is_due = std::any_of(due.begin(), due.end(), [&](double t) { return t <= state.time; });
+  if (!is_due && 4 * state.live_elements >= 3 * state.live_at_review) return;
+  due.erase(std::remove_if(due.begin(), due.end(), [&](double t) { return t <= state.time; }), due.end());
+  state.live_at_review = state.live_elements;
+  if (options.step > 0) return;
+  highest_frequency = find_highest_frequency();
+  summary.highest_frequency = std::max(summary.highest_frequency, highest_frequency);
+  set_step(options.step_safety * std::min(calc_step_limit(), damper_limit));
+}
+
+void System::choose_step() {
+  highest_frequency = find_highest_frequency();
+  const double fastest = 2 / calc_step_limit();
   damper_limit = calc_damper_limit(fastest);
-  const double limit = std::min(fastest > 0 ? 2 / fastest : 1e-3 / options.step_safety, damper_limit);
-  step = options.step > 0 ? options.step : options.step_safety * limit;
+  state.live_elements = state.live_at_review = elements.size();
+  set_step(options.step > 0 ? options.step : options.step_safety * std::min(calc_step_limit(), damper_limit));
   if (step > damper_limit) {
     char note[240];
     std::snprintf(
@@ -258,9 +295,6 @@ void System::choose_step() {
         step, damper_limit, fastest);
     summary.notes.emplace_back(note);
   }
-  const double relaxation = 1 - std::exp(-step * model.damping_frequency);
-  for (CompiledElement& e : elements) e.zone.relaxation = relaxation;
-  for (CompiledRotational& r : rotationals) r.zone.relaxation = relaxation;
   summary.step = step;
   summary.highest_frequency = highest_frequency;
 }
@@ -307,14 +341,14 @@ bool System::find_equilibrium(std::string& message) {
 
   double largest = 1;
   {
-    const Sparse K = assembly.make_stiffness(false, {}, weight);
+    const Sparse K = assembly.make_stiffness(false, weight);
     for (Eigen::Index i = 0; i < n; ++i) largest = std::max(largest, K.coeff(i, i));
   }
   const double penalty = 30 * largest;
   Eigen::SimplicialLDLT<Sparse> solver;
   bool analysed = false;  // the pattern stays what it is
   const auto factorise = [&] {
-    Sparse K = assembly.make_stiffness(false, {}, weight);
+    Sparse K = assembly.make_stiffness(false, weight);
     Triplets t;
     for (const CompiledJoint& j : joints) {
       KinematicRow rows[6];

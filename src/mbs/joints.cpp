@@ -98,7 +98,7 @@ void System::build_clusters() {
 
 void System::solve_joints(double h) {
   State& s = state;
-  const double impulse_time = s.first_kick ? 0.5 * h : h;
+  const double impulse_time = kick_time();
   joint_force.fill({});
   joint_torque.fill({});
   for (const JointCluster& cluster : clusters) {

@@ -82,7 +82,8 @@ class Reader {
 /// Every member of the state and what the next step takes over from this one.
 template <class Archive, class S, class C>
 void visit(Archive& ar, S& s, C& sys) {
-  ar(s.step_index), ar(s.time), ar(s.first_kick), ar(s.next_event), ar(s.waiting);
+  ar(s.step_index), ar(s.time), ar(s.step), ar(s.time_base), ar(s.index_base), ar(s.last_kick), ar(s.review_times),
+      ar(s.live_elements), ar(s.live_at_review), ar(s.first_kick), ar(s.next_event), ar(s.waiting);
   ar(s.body), ar(s.p), ar(s.v), ar(s.L), ar(s.w), ar(s.q), ar(s.R), ar(s.p_offset);
   ar(s.shapes), ar(s.ground_points), ar(s.touched_ground), ar(s.contact_count);
   ar(s.element), ar(s.rotational), ar(s.joint), ar(s.cable);
@@ -110,7 +111,8 @@ struct Carried {
 
 /// A fingerprint of the model and the step.
 const std::string& identity_of(System& system) {
-  if (system.identity.empty()) system.identity = calc_sha256(to_json(system.model) + std::to_string(system.step));
+  if (system.identity.empty())
+    system.identity = calc_sha256(to_json(system.model) + std::to_string(system.summary.step));
   return system.identity;
 }
 
@@ -145,6 +147,7 @@ void read_snapshot(const std::vector<std::byte>& bytes, System& system) {
   system.contact_torque = std::move(carried.contact_torque);
   system.joint_force = std::move(carried.joint_force);
   system.joint_torque = std::move(carried.joint_torque);
+  system.adopt_step();
   system.restore_elements(carried.element_history);
   system.ground_reaction = carried.ground_reaction;
   system.ground_contact = carried.ground_contact;

@@ -107,11 +107,12 @@ struct Options {
 struct Summary {
   enum class Ending { TimeLimit, AtRest, Cancelled, NoEquilibrium, Diverged };
   Ending ending = Ending::TimeLimit;
-  std::string message;  // a sentence with numbers
-  double time = 0;      // reached [s]
-  double step = 0;      // [s]
+  std::string message;       // a sentence with numbers
+  double time = 0;           // reached [s]
+  double step = 0;           // at the start [s]
+  double shortest_step = 0;  // on the way; the step follows the live model unless Options::step is set [s]
   long steps = 0;
-  double highest_frequency = 0;  // of the elastic system at the start [rad/s]
+  double highest_frequency = 0;  // largest of the elastic system on the way [rad/s]
   int equilibrium_iterations = 0;
   double equilibrium_residual = 0;  // largest unbalanced force over the weight
   double energy_error = 0;          // largest |residual| over the released potential energy

@@ -307,6 +307,7 @@ void System::fire_events() {
   for (const int index : due) {
     const Event& event = model.events[static_cast<size_t>(index)];
     act(event);
+    state.review_times.push_back(state.time);
     say({Happening::Kind::EventFired, state.time, index, -1, event.name, 0});
     state.quiet_steps = 0;
   }
@@ -337,6 +338,7 @@ void System::act(const Event& event) {
         z.ramp_begin = time;
         z.ramp = a.ramp;
         z.next_share = a.stiffness_share;
+        state.review_times.push_back(time + a.ramp);
         if (a.rotational < 0) pack_element(static_cast<size_t>(a.element.index));
         break;
       }
@@ -463,6 +465,7 @@ void System::drift(size_t b, double h, const Vec3& p0, const Quat& q0, const Mat
 }
 
 void System::prepare_step() {
+  review_step();
   if (clusters_due) {
     build_clusters();
     for (size_t b = 0; b < B; ++b) pack_body(b);
@@ -470,7 +473,7 @@ void System::prepare_step() {
   // one run fills all lanes, a sample of a batch its own
   const size_t first = lanes->is_batch ? lane : 0, last = lanes->is_batch ? lane + 1 : lanes->W;
   for (size_t i = first; i < last; ++i) {
-    lanes->kick[i] = state.first_kick ? 0.5 * step : step;
+    lanes->kick[i] = kick_time();
     lanes->h[i] = step;
     lanes->gx[i] = model.gravity.x, lanes->gy[i] = model.gravity.y, lanes->gz[i] = model.gravity.z;
   }
@@ -488,7 +491,8 @@ void System::finish_motion() {
   solve_joints(step);
   s.first_kick = false;
   ++s.step_index;
-  s.time = static_cast<double>(s.step_index) * step;
+  s.last_kick = step;
+  s.time = s.time_base + static_cast<double>(s.step_index - s.index_base) * step;
   check_joints();
 }
 

@@ -98,6 +98,13 @@ struct State {
   long step_index = 0;
   double time = 0;
   bool first_kick = true;
+  // the step follows the live model
+  double step = 0;       // [s]
+  double time_base = 0;  // when it was set [s]
+  long index_base = 0;   // and at which step
+  double last_kick = 0;  // step of the kick before [s]
+  std::vector<double> review_times;
+  size_t live_elements = 0, live_at_review = 0;
   size_t next_event = 0;
   std::vector<int> waiting;  // events whose time has come and that wait for a trigger, in the order of the model
   // bodies (B)
@@ -226,7 +233,18 @@ class System {
 
   // parts, one file each
   void compile();
+  /// Of the elastic system as it is now, with what the dampers add [rad/s].
+  double find_highest_frequency() const;
+  /// Longest stable step for the highest frequency and contact [s].
+  double calc_step_limit() const;
   void choose_step();
+  /// After events, and when a quarter of the elements is gone: a step for the model as it is now.
+  void review_step();
+  void set_step(double h);
+  /// What follows from the step of the state.
+  void adopt_step();
+  /// Time over which the forces act before the next motion [s].
+  double kick_time() const { return state.first_kick ? 0.5 * step : 0.5 * (state.last_kick + step); }
   /// Forces at the start, and the ledger set to zero there.
   void evaluate_start();
   void start();
