@@ -238,7 +238,7 @@ class Writer {
 
   void add_loops(double step) {
     if (articulation_.loops.empty()) return;
-    // as stiff as MuJoCo recommends for the step: critically damped, time constant of two steps
+    // as hard as MuJoCo recommends for the step: critically damped, time constant of two steps
     const std::string hard = fmt::format("solref=\"{:.17g} 1\" solimp=\"0.9999 0.9999 0.001\"", 2 * step);
     std::string equality, tendon;
     for (size_t i = 0; i < articulation_.loops.size(); ++i) {

@@ -91,6 +91,7 @@ class Built {
   Built(const Course& course, double step)
       : course_(course), model_(course.model()), articulation_(make_articulation(model_, course.joint_live())) {
     const Ties ties = find_present_ties();
+    touches_ = can_touch_ground(model_) || can_touch_bodies(model_);
     const Mjcf mjcf = make_mjcf(course, articulation_, ties, step);
     m_ = load(mjcf.text);
     d_.reset(mj_makeData(m_.get()));
@@ -114,7 +115,6 @@ class Built {
       reaction_at_[static_cast<size_t>(b.joint)] = {find(mjOBJ_BODY, "t" + std::to_string(mjcf.twin_of_loop[i])),
                                                     reversed};
     }
-    touches_ = can_touch_ground(model_) || can_touch_bodies(model_);
     read_excluded(ties);
     update_ties();
     const size_t nv = static_cast<size_t>(m_->nv);
@@ -157,27 +157,16 @@ class Built {
     mj_rnePostConstraint(m_.get(), d_.get());
     const size_t J = model_.joints.size();
     Reactions r{std::vector<Vec3>(J), std::vector<Vec3>(J)};
+    for (size_t i = 0; i < articulation_.loops.size(); ++i) correct_for_loop(i, r);
     for (size_t i = 0; i < J; ++i) {
       const auto [body, reversed] = reaction_at_[i];
-      const mbs::Joint& j = model_.joints[i];
       if (body < 0 || !course_.joint_live()[i]) continue;
       const mjtNum* at_centre = d_->cfrc_int + 6 * body;
       const Vec3 c = to_vec3(d_->subtree_com + 3 * m_->body_rootid[body]);
-      const Vec3 p = place_of(j.child, j.X_CM.p);
+      const Vec3 p = place_of(model_.joints[i].child, model_.joints[i].X_CM.p);
       const Vec3 force = to_vec3(at_centre + 3), moment = to_vec3(at_centre) - cross(p - c, force);
       r.force[i] = reversed ? -force : force;
       r.moment[i] = reversed ? -moment : moment;
-    }
-    for (const int loop : articulation_.loops) {
-      const size_t i = static_cast<size_t>(loop);
-      const mbs::Joint& j = model_.joints[i];
-      if (j.kind != mbs::Joint::Kind::Distance) continue;
-      const int equality = find(mjOBJ_EQUALITY, "e" + std::to_string(loop));
-      for (int row = 0; row < d_->nefc; ++row) {
-        if (d_->efc_type[row] != mjCNSTR_EQUALITY || d_->efc_id[row] != equality) continue;
-        const Vec3 apart = place_of(j.child, j.X_CM.p) - place_of(j.parent, j.X_PF.p);
-        r.force[i] = (d_->efc_force[row] / norm(apart)) * apart;
-      }
     }
     return r;
   }
@@ -225,6 +214,42 @@ class Built {
       if (at == known.end() || at->first != m_->exclude_signature[e])
         throw std::runtime_error("MuJoCo's list of bodies that do not touch is not as expected");
       excluded_.push_back(at->second);
+    }
+  }
+
+  /// What MuJoCo's sum of forces along the tree lacks: tendons, and half of what it takes a weld's rotational rows for.
+  void correct_for_loop(size_t number, Reactions& r) {
+    const size_t index = static_cast<size_t>(articulation_.loops[number]);
+    const mbs::Joint& j = model_.joints[index];
+    const int equality = find(mjOBJ_EQUALITY, "e" + std::to_string(index));
+    int row = 0;
+    while (row < d_->nefc && !(d_->efc_type[row] == mjCNSTR_EQUALITY && d_->efc_id[row] == equality)) ++row;
+    if (row == d_->nefc) return;
+    const mjtNum* f = d_->efc_force + row;
+    if (j.kind == mbs::Joint::Kind::Distance) {
+      const Vec3 p_F = place_of(j.parent, j.X_PF.p), p_M = place_of(j.child, j.X_CM.p);
+      r.force[index] = (f[0] / norm(p_M - p_F)) * (p_M - p_F);
+      add_external(mujoco_body(j.child), r.force[index], p_M, {});
+      add_external(mujoco_body(j.parent), -r.force[index], p_F, {});
+      return;
+    }
+    const int twin = reaction_at_[index].body, body = mujoco_body(reaction_at_[index].reversed ? j.parent : j.child);
+    const mjtNum* q = d_->xquat + 4 * body;
+    const Vec3 taken = to_vec3(f + 3), torque = 0.5 * (to_matrix({q[0], q[1], q[2], q[3]}) * taken);
+    add_external(body, {}, {}, torque - taken);
+    add_external(twin, {}, {}, taken - torque);
+  }
+  int mujoco_body(mbs::BodyId id) const {
+    return is_ground(model_, id.index) ? 0 : body_[static_cast<size_t>(id.index)];
+  }
+  /// A further force at a point p on a body, and a torque, in the sums along the tree.
+  void add_external(int body, const Vec3& force, const Vec3& p, const Vec3& torque) {
+    for (int b = body; b > 0; b = m_->body_parentid[b]) {
+      const Vec3 moment = torque + cross(p - to_vec3(d_->subtree_com + 3 * m_->body_rootid[b]), force);
+      for (int k = 0; k < 3; ++k) {
+        d_->cfrc_int[6 * b + k] -= moment[k];
+        d_->cfrc_int[6 * b + 3 + k] -= force[k];
+      }
     }
   }
 
