@@ -105,7 +105,7 @@ bool Course::find_start() {
 
 bool Course::start(double step) {
   step_ = step;
-  summary_.step = step;
+  summary_.step = summary_.shortest_step = step;
   if (!find_start()) {
     is_over_ = true;
     return false;

@@ -159,18 +159,24 @@ Forces::Six Forces::calc_six(const Motion& m, mbs::BodyId a, const Pose& X_AF, m
   s.p_M = X_WM.p;
   const Vec3 u = transpose_times(s.R_WF, X_WM.p - X_WF.p);
   s.r = find_nearest_rotation(log_rotation(conjugate(X_WF.q) * X_WM.q), near);
-  const Vec3 w_A = a == mbs::kGround ? Vec3{} : m.w_WB[static_cast<size_t>(a.index)];
-  const Vec3 w_B = b == mbs::kGround ? Vec3{} : m.w_WB[static_cast<size_t>(b.index)];
-  const Vec3 w = transpose_times(s.R_WF, w_B - w_A);
-  const Vec3 u_rate = transpose_times(s.R_WF, velocity_at(m, b, X_WM.p) - velocity_at(m, a, X_WM.p));
-  const Vec3 r_rate = w - 0.5 * cross(s.r, w) + calc_kappa(dot(s.r, s.r)) * cross(s.r, cross(s.r, w));
   for (int i = 0; i < 3; ++i) {
     s.deformation.c[i] = u[i];
     s.deformation.c[3 + i] = s.r[i];
-    s.rate.c[i] = u_rate[i];
-    s.rate.c[3 + i] = r_rate[i];
   }
   return s;
+}
+
+mbs::Six Forces::calc_rates(const Motion& m, mbs::BodyId a, mbs::BodyId b, const Six& s) const {
+  const auto spin = [&](mbs::BodyId id) { return id == mbs::kGround ? Vec3{} : m.w_WB[static_cast<size_t>(id.index)]; };
+  const Vec3 w = transpose_times(s.R_WF, spin(b) - spin(a));
+  const Vec3 u = transpose_times(s.R_WF, velocity_at(m, b, s.p_M) - velocity_at(m, a, s.p_M));
+  const Vec3 r = w - 0.5 * cross(s.r, w) + calc_kappa(dot(s.r, s.r)) * cross(s.r, cross(s.r, w));
+  mbs::Six rate;
+  for (int i = 0; i < 3; ++i) {
+    rate.c[i] = u[i];
+    rate.c[3 + i] = r[i];
+  }
+  return rate;
 }
 
 double Forces::angle_of(const Motion& m, mbs::JointId id, double previous) const {
@@ -322,9 +328,10 @@ void Forces::push_others(double time, const Motion& motion, std::vector<Wrench>&
     if (!bushing_[i].live) continue;
     const mbs::Bushing& b = model_.bushings[i];
     const Six s = calc_six(motion, b.a, b.X_AF, b.b, b.X_BM, bushing_[i].turn);
+    const mbs::Six rate = calc_rates(motion, b.a, b.b, s);
     double f[6];
     for (int k = 0; k < 6; ++k)
-      f[k] = calc_characteristic(b.spring[k], s.deformation.c[k]) + calc_characteristic(b.damper[k], s.rate.c[k]);
+      f[k] = calc_characteristic(b.spring[k], s.deformation.c[k]) + calc_characteristic(b.damper[k], rate.c[k]);
     push_six(motion, b.a, b.b, s, f, on);
   }
   for (size_t i = 0; i < load_.size(); ++i) {
@@ -359,7 +366,8 @@ Power Forces::calc_power(double time, const Motion& motion) const {
     if (!bushing_[i].live) continue;
     const mbs::Bushing& b = model_.bushings[i];
     const Six s = calc_six(motion, b.a, b.X_AF, b.b, b.X_BM, bushing_[i].turn);
-    for (int k = 0; k < 6; ++k) p.damping += calc_characteristic(b.damper[k], s.rate.c[k]) * s.rate.c[k];
+    const mbs::Six rate = calc_rates(motion, b.a, b.b, s);
+    for (int k = 0; k < 6; ++k) p.damping += calc_characteristic(b.damper[k], rate.c[k]) * rate.c[k];
   }
   for (size_t i = 0; i < load_.size(); ++i) {
     if (!load_[i].has_begun || load_[i].is_over) continue;
@@ -634,9 +642,10 @@ void Forces::fill(double time, const Motion& motion, mbs::View& v) const {
   for (size_t i = 0; i < N; ++i) {
     const mbs::Bushing& b = model_.bushings[i];
     const Six s = calc_six(motion, b.a, b.X_AF, b.b, b.X_BM, bushing_[i].turn);
+    const mbs::Six rate = calc_rates(motion, b.a, b.b, s);
     double f[6] = {0, 0, 0, 0, 0, 0};
     for (int k = 0; k < 6 && bushing_[i].live; ++k)
-      f[k] = -calc_characteristic(b.spring[k], s.deformation.c[k]) - calc_characteristic(b.damper[k], s.rate.c[k]);
+      f[k] = -calc_characteristic(b.spring[k], s.deformation.c[k]) - calc_characteristic(b.damper[k], rate.c[k]);
     v.bushing_translation[i] = three(s.deformation.c);
     v.bushing_rotation[i] = three(s.deformation.c + 3);
     v.bushing_force[i] = three(f);

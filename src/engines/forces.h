@@ -104,7 +104,7 @@ class Forces {
     double begin = 0;  // [s]
   };
   struct Six {
-    mbs::Six deformation, rate;
+    mbs::Six deformation;
     Vec3 p_M;
     Mat3 R_WF;
     Vec3 r;
@@ -114,6 +114,7 @@ class Forces {
   Pose pose_of(const Motion&, mbs::BodyId) const;
   Vec3 velocity_at(const Motion&, mbs::BodyId, const Vec3& p_W) const;
   Six calc_six(const Motion&, mbs::BodyId a, const Pose& X_AF, mbs::BodyId b, const Pose& X_BM, const Vec3& near) const;
+  mbs::Six calc_rates(const Motion&, mbs::BodyId a, mbs::BodyId b, const Six&) const;
   double angle_of(const Motion&, mbs::JointId, double previous) const;
   Vec3 axis_of(const Motion&, mbs::JointId) const;
   double angle_rate_of(const Motion&, mbs::JointId) const;
