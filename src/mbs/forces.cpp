@@ -213,11 +213,27 @@ double System::calc_inverse_mass(int body, const Vec3& line, const Vec3& turn) c
   return state.body[b].inverse_mass * dot(line, line) + dot(turn, calc_world_inverse_inertia(b) * turn);
 }
 
+double System::calc_row_rate(int a, int b, const ForceRow& row) const {
+  double rate = 0;
+  const auto add = [&](int body, double sign, const Vec3& turn) {
+    if (body < 0 || fixed[static_cast<size_t>(body)]) return;
+    rate += sign * (dot(row.line, state.v[static_cast<size_t>(body)]) + dot(turn, state.w[static_cast<size_t>(body)]));
+  };
+  add(a, -1, row.turn_a);
+  add(b, 1, row.turn_b);
+  return rate;
+}
+
 void System::watch_stiffness(int a, int b, const ForceRow& row, double slope, const char* kind,
                              const std::string& name) {
   const double omega2 =
       slope * (calc_inverse_mass(a, row.line, row.turn_a) + calc_inverse_mass(b, row.line, row.turn_b));
-  if (!(omega2 * step * step > 4) || !trouble.empty()) return;
+  const double h2 = omega2 * step * step;
+  if (options.step <= 0) {
+    if (h2 > 4 * options.step_safety * options.step_safety) state.review_times.push_back(state.time);
+    return;
+  }
+  if (!(h2 > 4) || !trouble.empty()) return;
   char words[200];
   std::snprintf(words, sizeof words,
                 " has stiffened to %.4g N/m or N·m/rad: it needs a step below %.3g s, and the step is %.3g s", slope,
@@ -346,21 +362,17 @@ std::vector<StiffRow> System::calc_spring_stiffness(bool fast, double force_scal
   const auto add = [&](int a, int b, const ForceRow& row, double k) {
     if (k != 0) out.push_back({a, b, row, k});
   };
-  // what the bodies' motion at the start can stretch a law by
-  double kinetic = 0;
-  if (fast)
-    for (size_t b = 0; b < B; ++b) {
-      if (fixed[b]) continue;
-      const Vec3 v = state.v[b];
-      kinetic += 0.5 * state.body[b].mass * dot(v, v) + 0.5 * dot(state.w[b], state.L[b]);
-    }
-  const auto stiffness_of = [&](const CompiledCharacteristic& c, double x, double strength) {
+  const auto stiffness_of = [&](const CompiledCharacteristic& c, double x, double strength, int a, int b,
+                                const ForceRow& row) {
     const double tangent = std::max(0.0, calc_slope(c, x));
     if (c.is_zero) return 0.0;
     if (fast) {
       if (c.has_bound_slope) return std::max(tangent, find_steepest(c, x, x));
-      // four times the energy: with few steps to a swing the scheme reaches further than the motion
-      const Reach r = find_reach(c, x, 4 * kinetic, strength);
+      // where the motion that its bodies have can stretch it to; four times the energy: with few steps to a swing the
+      // scheme reaches further, and what else moves may help
+      const double inverse = calc_inverse_mass(a, row.line, row.turn_a) + calc_inverse_mass(b, row.line, row.turn_b);
+      const double rate = calc_row_rate(a, b, row);
+      const Reach r = find_reach(c, x, inverse > 0 ? 2 * rate * rate / inverse : 0, strength);
       return std::max(tangent, find_steepest(c, r.from, r.to));
     }
     // where a law is flat its chord leads to where it carries something
@@ -373,7 +385,7 @@ std::vector<StiffRow> System::calc_spring_stiffness(bool fast, double force_scal
     const CompiledSpring& k = forces.springs[i];
     ForceRow row;
     const double length = measure_spring(k, row), x = length - k.free_length;
-    const double stiff = stiffness_of(k.spring, x, std::max(k.tension_strength, k.compression_strength));
+    const double stiff = stiffness_of(k.spring, x, std::max(k.tension_strength, k.compression_strength), k.a, k.b, row);
     // a tight spring also holds its points sideways; one of no length is the same in all directions
     const double across = length > 0 ? calc_force(k.spring, x) / length : k.free_length == 0 ? stiff : 0;
     Vec3 line = row.line;
@@ -397,7 +409,7 @@ std::vector<StiffRow> System::calc_spring_stiffness(bool fast, double force_scal
     const CompiledJoint& j = joints[static_cast<size_t>(k.joint)];
     ForceRow row;
     const double x = measure_torsion(k, row) - k.free_angle;
-    add(j.parent, j.child, row, stiffness_of(k.spring, x, k.strength));
+    add(j.parent, j.child, row, stiffness_of(k.spring, x, k.strength, j.parent, j.child, row));
   }
   for (size_t i = 0; i < forces.bushings.size(); ++i) {
     if (!state.bushing[i].live) continue;
@@ -406,7 +418,8 @@ std::vector<StiffRow> System::calc_spring_stiffness(bool fast, double force_scal
     ForceRow rows[6];
     find_bushing_rows(k, d, rows);
     const double x[6] = {d.u.x, d.u.y, d.u.z, d.r.x, d.r.y, d.r.z};
-    for (int c = 0; c < 6; ++c) add(k.a, k.b, rows[c], stiffness_of(k.spring[c], x[c], k.strength[c]));
+    for (int c = 0; c < 6; ++c)
+      add(k.a, k.b, rows[c], stiffness_of(k.spring[c], x[c], k.strength[c], k.a, k.b, rows[c]));
   }
   return out;
 }

@@ -82,7 +82,9 @@ struct BushingState {
 
 struct LoadState {
   double begin = kUnlimited, end = kUnlimited;  // of its presence [s]
-  double until = 0;                             // time up to which the bodies have had its impulse [s]
+  double from = 0, until = 0;                   // what the last kick was to give the impulse of [s]
+  double factor = 0, kick = 0;                  // its share of the force, and how long it was to last [s]
+  double last_kick = 0;                         // State::last_kick then [s]
   Vec3 point;                                   // of the evaluation before, in W
   Quat q;                                       // of the body then
   Vec3 force, torque;                           // of the evaluation before, in W

@@ -31,35 +31,54 @@ void System::compile_loads() {
 void System::apply_load(size_t i, double time) {
   LoadState& l = state.load[i];
   if (l.begin != kUnlimited) return;
-  l.begin = l.until = time;
+  l.begin = l.from = l.until = time;
 }
 
 void System::remove_load(size_t i, double time) {
   LoadState& l = state.load[i];
-  if (l.begin == kUnlimited) l.begin = l.until = time;  // an event that would apply it comes too late
+  if (l.begin == kUnlimited) l.begin = l.from = l.until = time;  // an event that would apply it comes too late
   l.end = std::min(l.end, time);
 }
 
+double System::find_load_factor(const CompiledLoad& k, LoadState& l) const {
+  // integral of the factor, which runs either way
+  const auto impulse = [&](double from, double to) {
+    if (to == from) return 0.0;
+    return (to - from) * (k.is_constant ? 1 : calc_mean(k.factor, from - l.begin, to - l.begin));
+  };
+  if (l.begin == kUnlimited) return 0;
+  double owed = 0;
+  const double kick = 0.5 * (l.last_kick + state.last_kick);  // how long the last one was
+  if (state.step_index > 0 && l.kick > 0 && std::abs(kick - l.kick) > 1e-9 * l.kick) {
+    // the step has changed after the forces were taken
+    if (l.until != l.end) l.until = std::min(state.time - 0.5 * state.last_kick, l.end);
+    owed = impulse(l.from, l.until) - l.factor * kick;
+  }
+  // the impulse up to half a step from now that the body has not had yet; less than nothing for a load that an event of
+  // this step ended before the last step's impulse did
+  l.from = l.until;
+  l.until = std::min(state.time + 0.5 * step, l.end);
+  l.kick = kick_time();
+  l.last_kick = state.last_kick;
+  const double share = (l.until - l.from) / l.kick;
+  if (owed == 0 && std::abs(share - 1) < 1e-9) {
+    // times are known to round-off
+    l.factor = k.is_constant ? 1 : calc_mean(k.factor, l.from - l.begin, l.until - l.begin);
+  } else {
+    l.factor = (owed + impulse(l.from, l.until)) / l.kick;
+  }
+  return l.factor;
+}
+
 void System::evaluate_loads(bool at_rest) {
-  const double half = 0.5 * step;
   for (size_t i = 0; i < forces.loads.size(); ++i) {
     const CompiledLoad& k = forces.loads[i];
     LoadState& l = state.load[i];
     const bool moves = k.body >= 0 && !fixed[static_cast<size_t>(k.body)];
     const size_t b = static_cast<size_t>(k.body);
     const Vec3 point = calc_point(k.body, k.p_B);
-    double factor = 0;
-    if (at_rest) {
-      factor = l.begin > 0 ? 0 : k.is_constant ? 1 : calc_force(k.factor, 0);
-    } else if (l.begin != kUnlimited && l.until != l.end) {
-      // the impulse up to half a step from now that the body has not had yet; less than nothing for a load that an
-      // event of this step ended before the last step's impulse did
-      const double to = std::min(state.time + half, l.end);
-      double share = (to - l.until) / (state.first_kick ? half : step);
-      if (std::abs(share - 1) < 1e-9) share = 1;  // times are known to round-off
-      if (share != 0) factor = share * (k.is_constant ? 1 : calc_mean(k.factor, l.until - l.begin, to - l.begin));
-      l.until = to;
-    }
+    const double at_start = l.begin > 0 ? 0 : k.is_constant ? 1 : calc_force(k.factor, 0);
+    const double factor = at_rest ? at_start : find_load_factor(k, l);
     const Mat3 R = k.follows_body ? rotation_of(k.body) : Mat3::identity();
     const Vec3 f = factor * (R * k.force), t = factor * (R * k.torque);
     if (moves && !at_rest) {

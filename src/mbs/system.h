@@ -259,6 +259,8 @@ class System {
   void evaluate_springs(bool at_rest);
   void evaluate_bushing(size_t bushing, bool at_rest);
   void evaluate_loads(bool at_rest);
+  /// Share of a load's force in the next kick.
+  double find_load_factor(const CompiledLoad&, LoadState&) const;
   /// Keeps the forces of the evaluation before for the bodies that dampers act on.
   void keep_forces();
   void evaluate_dampers();
@@ -266,7 +268,7 @@ class System {
   void add_damper(int a, int b, const ForceRow&, const CompiledCharacteristic& law, ComponentState&, double& damping);
   /// Largest step that the dampers allow beside springs of a frequency [s]; infinite for bodies without joints.
   double calc_damper_limit(double omega);
-  /// Gives up when a law has become too stiff for the step.
+  /// A law that has become too stiff for the step makes it shorter, or ends the run if the step is set.
   void watch_stiffness(int a, int b, const ForceRow&, double slope, const char* kind, const std::string& name);
   double measure_spring(const CompiledSpring&, ForceRow&) const;
   double measure_torsion(const CompiledTorsion&, ForceRow&) const;
@@ -283,6 +285,8 @@ class System {
   void load_body(int body, const Vec3& force, const Vec3& torque);
   void pull(int a, int b, const ForceRow&, double f);
   double calc_inverse_mass(int body, const Vec3& line, const Vec3& turn) const;
+  /// Rate of a row with the velocities of the last half step.
+  double calc_row_rate(int a, int b, const ForceRow&) const;
   void remove_spring(size_t);
   void remove_torsion(size_t);
   void remove_bushing(size_t);

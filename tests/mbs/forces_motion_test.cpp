@@ -228,6 +228,44 @@ TEST(LoadPhysics, BeginsAndEndsAtTheTimesOfItsEvents) {
   }
 }
 
+TEST(LoadPhysics, GivesItsImpulseWhateverTheStepDoes) {
+  // stiff company beside the mass bounds the step until an event lets it go, in the middle of a table and of a load
+  // that comes at the same time
+  Load l;
+  l.force = {10, 0, 0};
+  l.time = {0.1, 0.25, 0.4, 0.55};
+  l.factor = {0, 3, -1, 0};
+  Model m = make_loaded(l);
+  m.loads.push_back(m.loads[0]);
+  m.loads[1].time = m.loads[1].factor = {};
+  add_body(m, make_box("company", 1, {0.1, 0.1, 0.1}, {0, 5, 0}));
+  for (const double stiffness : {1e6, 1e4}) {
+    Bushing k;
+    k.a = kGround;
+    k.b = {1};
+    k.X_AF.p = {0, 5, 0};
+    for (int c = 0; c < 6; ++c) k.spring[c].rate = stiffness;
+    m.bushings.push_back(k);
+  }
+  Event both = event_of(Action::Kind::RemoveBushing, 0.3003);
+  both.actions.push_back(event_of(Action::Kind::ApplyLoad, 0).actions[0]);
+  both.actions[1].index = 1;
+  m.events = {both, event_of(Action::Kind::RemoveLoad, 0.6)};
+  m.events[1].actions[0].index = 1;
+  Options o = options_of(0.8, 0);
+  o.frame_interval = 0.01;
+  double least = kUnlimited, most = 0, before = 0;
+  Simulation s(m, o);
+  while (s.time() < 0.8) {
+    before = s.time();
+    ASSERT_TRUE(s.advance_step());
+    least = std::min(least, s.time() - before);
+    most = std::max(most, s.time() - before);
+  }
+  EXPECT_GT(most, 5 * least);
+  EXPECT_NEAR(s.calc_view().v_WB[0].x, (10 * 0.15 * (1.5 + 1 - 0.5) + 10 * (0.6 - 0.3003)) / 4, 1e-12);
+}
+
 TEST(LoadPhysics, StartsItsTableWhenApplied) {
   Load l;
   l.force = {8, 0, 0};
