@@ -1,7 +1,9 @@
 #include "frame.h"
 
+#include <array>
 #include <cmath>
 #include <string>
+#include <vector>
 
 namespace topple::bench {
 
@@ -10,8 +12,8 @@ namespace {
 using namespace mbs;
 
 constexpr double kBay = 5, kDepth = 6, kStorey = 3.4, kGap = 0.8;  // [m]
-constexpr int kBays = 8, kStoreys = 5;
-constexpr double kMass = 1.9e6;  // of the whole frame [kg]
+constexpr int kStoreys = 5;
+constexpr double kMass = 1.9e6 / 8;  // of a bay [kg]
 
 /// Axes of a connection: x along the given unit vector, the other two along W's axes.
 Quat along(const Vec3& x) {
@@ -73,14 +75,16 @@ void connect(Model& m, BodyId a, BodyId b, const Vec3& at, const Vec3& axis, dou
 
 }  // namespace
 
-Model make_frame() {
+Model make_frame(int bays) {
   Model m;
   m.name = "frame255";
   const LawId column_law = add_law(m, make_brittle("column", 9e6, 1.5e6, 1.2e6, 0.7e6, 0.5e6));
   const LawId beam_law = add_law(m, make_brittle("beam", 4e6, 1.0e6, 0.8e6, 0.6e6, 0.3e6));
   const LawId slab_law = add_law(m, make_brittle("slab", 4e6, 0.8e6, 0.5e6, 0.15e6, 0.15e6));
   const Vec3 x{1, 0, 0}, y{0, 1, 0}, z{0, 0, 1};
-  BodyId below[kBays + 1][2];
+  using Row = std::vector<std::array<BodyId, 2>>;
+  const size_t ends = static_cast<size_t>(bays) + 1;
+  Row below(ends);
   for (auto& pair : below) pair[0] = pair[1] = kGround;
   Event cut;
   cut.name = "front row";
@@ -88,8 +92,8 @@ Model make_frame() {
   for (int s = 0; s < kStoreys; ++s) {
     const double floor = s * kStorey, foot = s == 0 ? kGap : floor, head = floor + kStorey;
     const std::string tag = std::to_string(s) + "-";
-    BodyId column[kBays + 1][2];
-    for (int i = 0; i <= kBays; ++i)
+    Row column(ends);
+    for (int i = 0; i <= bays; ++i)
       for (int k = 0; k < 2; ++k) {
         column[i][k] = add_box(m, "C" + tag + std::to_string(i) + std::to_string(k), {0.25, 0.25, (head - foot) / 2},
                                {i * kBay, k * kDepth, (head + foot) / 2});
@@ -102,8 +106,9 @@ Model make_frame() {
         }
       }
     const double level = head - 0.3;
-    BodyId long_beam[kBays][2], cross_beam[kBays + 1];
-    for (int i = 0; i < kBays; ++i)
+    Row long_beam(ends);
+    std::vector<BodyId> cross_beam(ends);
+    for (int i = 0; i < bays; ++i)
       for (int k = 0; k < 2; ++k) {
         long_beam[i][k] = add_box(m, "L" + tag + std::to_string(i) + std::to_string(k), {kBay / 2 - 0.25, 0.15, 0.3},
                                   {(i + 0.5) * kBay, k * kDepth, level});
@@ -111,13 +116,13 @@ Model make_frame() {
         connect(m, long_beam[i][k], column[i + 1][k], {(i + 1) * kBay - 0.25, k * kDepth, level}, x, 1e9, 3e8, 8e7,
                 beam_law);
       }
-    for (int i = 0; i <= kBays; ++i) {
+    for (int i = 0; i <= bays; ++i) {
       cross_beam[i] =
           add_box(m, "Q" + tag + std::to_string(i), {0.15, kDepth / 2 - 0.25, 0.3}, {i * kBay, kDepth / 2, level});
       connect(m, column[i][0], cross_beam[i], {i * kBay, 0.25, level}, y, 1e9, 3e8, 8e7, beam_law);
       connect(m, cross_beam[i], column[i][1], {i * kBay, kDepth - 0.25, level}, y, 1e9, 3e8, 8e7, beam_law);
     }
-    for (int i = 0; i < kBays; ++i) {
+    for (int i = 0; i < bays; ++i) {
       // slabs lie between the beams, their tops flush
       const double half_x = kBay / 2 - 0.15, half_y = kDepth / 2 - 0.15, up = head - 0.15;
       const double cx = (i + 0.5) * kBay, cy = kDepth / 2;
@@ -129,7 +134,7 @@ Model make_frame() {
         connect(m, slab, long_beam[i][1], {cx + t * half_x, cy + half_y, up}, y, 8e8, 3e8, 3e7, slab_law);
       }
     }
-    for (int i = 0; i <= kBays; ++i)
+    for (int i = 0; i <= bays; ++i)
       for (int k = 0; k < 2; ++k) below[i][k] = column[i][k];
   }
   m.events.push_back(cut);
@@ -137,7 +142,7 @@ Model make_frame() {
   double volume = 0;
   for (const Body& b : m.bodies) volume += b.mass;
   for (Body& b : m.bodies) {
-    b.mass *= kMass / volume;
+    b.mass *= bays * kMass / volume;
     const Vec3 h = b.shapes[0].half;
     b.inertia = (b.mass / 3) * Mat3::diagonal({h.y * h.y + h.z * h.z, h.x * h.x + h.z * h.z, h.x * h.x + h.y * h.y});
   }

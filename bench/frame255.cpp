@@ -2,6 +2,7 @@
 
 #include <benchmark/benchmark.h>
 
+#include <chrono>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -94,6 +95,40 @@ void frame255_ensemble(benchmark::State& state) {
   state.counters["samples_per_second"] = static_cast<double>(count * state.iterations()) / total;
 }
 BENCHMARK(frame255_ensemble)->Arg(16)->Unit(benchmark::kMillisecond)->UseManualTime();
+
+/// Cost of a body and step as the frame grows; the first 0.1 s, ground contact, one thread and two.
+void frame_growing(benchmark::State& state) {
+  mbs::Model model = make_frame(static_cast<int>(state.range(0)));
+  model.contact.bodies = false;
+  mbs::Options options;
+  options.threads = static_cast<int>(state.range(1));
+  mbs::Simulation simulation(model, options);
+  std::string message;
+  if (!simulation.find_equilibrium(message)) return state.SkipWithError(message.c_str());
+  const auto start = simulation.snapshot();
+  double total = 0, steps = 0;
+  for (auto _ : state) {
+    simulation.restore(start);
+    const auto begin = std::chrono::steady_clock::now();
+    while (simulation.time() < 0.1) {
+      if (!simulation.advance_step()) return state.SkipWithError("the state is no longer finite");
+      ++steps;
+    }
+    const double spent = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    total += spent;
+    state.SetIterationTime(spent);
+  }
+  state.counters["bodies"] = static_cast<double>(model.bodies.size());
+  state.counters["connections"] = static_cast<double>(model.elements.size());
+  state.counters["body_ns"] = 1e9 * total / (steps * static_cast<double>(model.bodies.size()));
+}
+BENCHMARK(frame_growing)
+    ->Args({8, 1})
+    ->Args({42, 1})
+    ->Args({333, 1})
+    ->Args({333, 2})
+    ->Unit(benchmark::kMillisecond)
+    ->UseManualTime();
 
 /// Compiling the model with its choice of step, and the dead-load equilibrium.
 void frame255_compile(benchmark::State& state) {

@@ -268,16 +268,22 @@ struct Poses {
   Q4<D> q;
 };
 
-/// Lane by lane from blocks of bodies.
+/// From blocks of bodies; `bodies` one a lane.
 template <class D>
-HWY_INLINE void gather(const ElementJob& job, const std::uint32_t* HWY_RESTRICT bodies, double* HWY_RESTRICT room) {
-  const size_t W = hn::Lanes(D()), group = size_t{1} << job.body_shift;
-  for (size_t l = 0; l < W; ++l) {
-    const size_t block = bodies[l] >> job.body_shift, lane = bodies[l] & (group - 1);
-    const double *p = job.p + 3 * group * block + lane, *q = job.q + 4 * group * block + lane;
-    for (size_t c = 0; c < 3; ++c) room[c * W + l] = p[c * group];
-    for (size_t c = 0; c < 4; ++c) room[(3 + c) * W + l] = q[c * group];
-  }
+HWY_INLINE Poses<D> gather(const ElementJob& job, const std::uint32_t* HWY_RESTRICT bodies) {
+  const hn::RebindToSigned<D> di;
+  const hn::Rebind<std::uint32_t, D> du;
+  const size_t group = size_t{1} << job.body_shift;
+  const auto body = hn::BitCast(di, hn::PromoteTo(hn::RebindToUnsigned<D>(), hn::LoadU(du, bodies)));
+  const auto lane = hn::And(body, hn::Set(di, static_cast<std::int64_t>(group - 1)));
+  const auto first = hn::Sub(body, lane);  // block times group
+  const auto at_p = hn::Add(hn::Add(first, hn::Add(first, first)), lane);
+  const auto at_q = hn::Add(hn::Add(hn::Add(first, first), hn::Add(first, first)), lane);
+  const auto take = [&](const double* from, size_t field, auto at) -> Num<D> {
+    return {hn::GatherIndex(D(), from + field * group, at)};
+  };
+  return {{take(job.p, 0, at_p), take(job.p, 1, at_p), take(job.p, 2, at_p)},
+          {take(job.q, 0, at_q), take(job.q, 1, at_q), take(job.q, 2, at_q), take(job.q, 3, at_q)}};
 }
 
 template <class D>
@@ -680,27 +686,14 @@ template <class D>
 HWY_INLINE void evaluate_all(const ElementJob& job) {
   const D d;
   const size_t W = hn::Lanes(d);
-  alignas(64) double room[2][2][7 * kMostLanes];
-  size_t next = job.first;
   const auto find_next = [&](size_t from) {
     while (from < job.last && job.live[from] == 0) ++from;
     return from;
   };
-  const auto fetch = [&](size_t block, int place) {
-    gather<D>(job, job.a + block * W, room[place][0]);
-    gather<D>(job, job.b + block * W, room[place][1]);
-  };
-  next = find_next(next);
+  size_t next = find_next(job.first);
   if (job.a != nullptr) {
-    // the poses of the next block are fetched while this one is computed
-    if (next < job.last) fetch(next, 0);
-    for (int place = 0; next < job.last; place = 1 - place) {
-      const size_t block = next;
-      next = find_next(block + 1);
-      if (next < job.last) fetch(next, 1 - place);
-      const double *ra = room[place][0], *rb = room[place][1];
-      evaluate_element_block<D>(job, block, {load3<D>(ra, 0), load4<D>(ra, 3)}, {load3<D>(rb, 0), load4<D>(rb, 3)});
-    }
+    for (; next < job.last; next = find_next(next + 1))
+      evaluate_element_block<D>(job, next, gather<D>(job, job.a + next * W), gather<D>(job, job.b + next * W));
   } else {
     for (; next < job.last; next = find_next(next + 1)) {
       const size_t a = job.body_a[next], b = job.body_b[next];
