@@ -91,6 +91,7 @@ void run_lanes(const Model& model, const std::vector<Variation>& variations, con
     s.join_batch(*lanes, i);
     active[i] = &s;
   }
+  if (lanes) lanes->share_constants();
   const auto is_running = [](const System* s) { return s != nullptr; };
   while (std::any_of(active.begin(), active.end(), is_running)) {
     advance_together(*lanes, active);

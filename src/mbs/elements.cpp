@@ -71,11 +71,12 @@ void System::lay_out_elements() {
     ++l.live[slot / W];
     l.softened[slot / W] |= soft[e];
     if (first) {
-      l.field(slot, kMostTurn) = kLargestTurn;
+      l.set(slot, kMostTurn, kLargestTurn);
       continue;
     }
     next = restore_slot(slot, next);
   }
+  if (!first) l.share_constants();
   l.used_slots = l.live_elements = kept.size();
   l.first_entry.assign(B + 1, 0);
   l.entries.clear();
@@ -97,7 +98,7 @@ void System::pack_element(size_t e) {
   const size_t slot = slot_of(e);
   if (slot == Lanes::kNoSlot) return;
   const CompiledElement& c = elements[e];
-  const auto put = [&](int f, double x) { l.field(slot, f) = x; };
+  const auto put = [&](int f, double x) { l.set(slot, f, x); };
   const Vec3 pa = c.a >= 0 ? c.p_AF - state.p_offset[static_cast<size_t>(c.a)] : c.p_AF;
   const Vec3 pb = c.b >= 0 ? c.p_BM - state.p_offset[static_cast<size_t>(c.b)] : c.p_BM;
   for (int i = 0; i < 3; ++i) put(kMarkerA + i, pa[i]), put(kMarkerB + i, pb[i]);
@@ -204,6 +205,7 @@ void System::unpack_elements() {
 
 void System::pack_elements() {
   for (size_t e = 0; e < elements.size(); ++e) pack_element(e);
+  lanes->share_constants();
 }
 
 /// By the full law, from the state of the zone; the force goes to the slot.
@@ -324,7 +326,7 @@ void System::save_slot(size_t slot, std::vector<double>& to) const {
 }
 
 const double* System::restore_slot(size_t slot, const double* from) {
-  for (int f = 0; f < kSlotFields; ++f) lanes->field(slot, f) = *from++;
+  for (int f = 0; f < kSlotFields; ++f) lanes->set(slot, f, *from++);
   for (size_t f = 0; f < static_cast<size_t>(kForceFields); ++f) lanes->force_field(slot, f) = *from++;
   if (lanes->field(slot, kFlows) > 0)
     for (int f = 0; f < kFlowFields; ++f) lanes->flow(slot, f) = *from++;
@@ -353,6 +355,7 @@ void System::restore_elements(const std::vector<double>& history) {
     if (state.element[e].is_softened) lanes->softened[slot / lanes->W] = 1;
   }
   state.live_elements = live;
+  lanes->share_constants();
 }
 
 void System::join_batch(Lanes& batch, size_t to) {

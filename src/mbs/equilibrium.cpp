@@ -264,7 +264,7 @@ void System::adopt_step() {
   for (size_t e = 0; e < elements.size(); ++e) {
     elements[e].zone.relaxation = relaxation;
     const size_t slot = slot_of(e);
-    if (slot != Lanes::kNoSlot) lanes->field(slot, kernel::kRelaxation) = relaxation;
+    if (slot != Lanes::kNoSlot) lanes->set(slot, kernel::kRelaxation, relaxation);
   }
 }
 

@@ -560,12 +560,22 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
   using N = Num<D>;
   const D tag;
   const size_t W = hn::Lanes(tag);
-  double* HWY_RESTRICT slot = job.slots + static_cast<size_t>(kSlotFields) * W * block;
+  double* HWY_RESTRICT state = job.states + static_cast<size_t>(kStateFields) * W * block;
+  const std::uint32_t* HWY_RESTRICT constants = job.constants + static_cast<size_t>(kConstants) * block;
+  const auto constant = [&](int field) -> N {
+    return {hn::Load(tag, job.pool + size_t{constants[field - kStateFields]} * W)};
+  };
+  const auto constant3 = [&](int field) -> V3<D> {
+    return {constant(field), constant(field + 1), constant(field + 2)};
+  };
+  const auto constant4 = [&](int field) -> Q4<D> {
+    return {constant(field), constant(field + 1), constant(field + 2), constant(field + 3)};
+  };
   double* HWY_RESTRICT out = job.forces + static_cast<size_t>(kForceFields) * W * block;
 
-  const V3<D> lever_a = turn(A.q, load3<D>(slot, kMarkerA));
-  const V3<D> lever_b = turn(B.q, load3<D>(slot, kMarkerB));
-  const Q4<D> qF = A.q * load4<D>(slot, kMarkerA + 3), qM = B.q * load4<D>(slot, kMarkerB + 3);
+  const V3<D> lever_a = turn(A.q, constant3(kMarkerA));
+  const V3<D> lever_b = turn(B.q, constant3(kMarkerB));
+  const Q4<D> qF = A.q * constant4(kMarkerA + 3), qM = B.q * constant4(kMarkerB + 3);
   const M33<D> F = to_matrix(qF);
   const V3<D> apart = B.p - A.p;
   const V3<D> t = transpose_times(F, (apart - lever_a) + lever_b);
@@ -577,22 +587,21 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
   N over_sine, coefficient;
   turning<D>(s2, over_sine, coefficient);
   const V3<D> r = over_sine * v;
-  const auto too_far = hn::Gt(s2.v, load<D>(slot, kMostTurn).v);
+  const auto too_far = hn::Gt(s2.v, constant(kMostTurn).v);
   auto outside = too_far;
 
   const N d[6] = {t.x, t.y, t.z, r.x, r.y, r.z};
   N u[6], e[6], f[6], k[6], was[6], before[6];
   for (int i = 0; i < 6; ++i) {
-    u[i] = d[i] - load<D>(slot, kOffset + i);
-    was[i] = load<D>(slot, kStretch + i);
+    u[i] = d[i] - constant(kOffset + i);
+    was[i] = load<D>(state, kStretch + i);
     e[i] = u[i], before[i] = was[i];
   }
   const bool softened = job.softened[block] != 0;
   if (softened) {
     for (int plane = 0; plane < 2; ++plane) {
       const int shear = plane == 0 ? 2 : 1, bend = plane == 0 ? 4 : 5, at = kSoft + 4 * plane;
-      const N c00 = load<D>(slot, at), c01 = load<D>(slot, at + 1), c10 = load<D>(slot, at + 2),
-              c11 = load<D>(slot, at + 3);
+      const N c00 = constant(at), c01 = constant(at + 1), c10 = constant(at + 2), c11 = constant(at + 3);
       e[shear] = fma(c00, u[shear], c01 * u[bend]);
       e[bend] = fma(c10, u[shear], c11 * u[bend]);
       before[shear] = fma(c00, was[shear], c01 * was[bend]);
@@ -600,20 +609,20 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
     }
   }
   for (int i = 0; i < 6; ++i) {
-    k[i] = load<D>(slot, kStiffness + i);
+    k[i] = constant(kStiffness + i);
     f[i] = k[i] * e[i];
   }
   // is every resultant inside the bounds for sure?
   const N one = num<D>(1), zero = num<D>(0);
-  outside = hn::Or(outside, hn::Not(hn::And(hn::Ge(f[0].v, load<D>(slot, kLeastForce).v),
-                                            hn::Le(f[0].v, load<D>(slot, kMostForce).v))));
-  const N vy = f[1] * load<D>(slot, kShearScale), vz = f[2] * load<D>(slot, kShearScale + 1);
+  outside = hn::Or(outside,
+                   hn::Not(hn::And(hn::Ge(f[0].v, constant(kLeastForce).v), hn::Le(f[0].v, constant(kMostForce).v))));
+  const N vy = f[1] * constant(kShearScale), vz = f[2] * constant(kShearScale + 1);
   outside = hn::Or(outside, hn::Gt(fma(vy, vy, vz * vz).v, one.v));
-  const N torsion_scale = load<D>(slot, kTorsionScale);
+  const N torsion_scale = constant(kTorsionScale);
   outside = hn::Or(outside, hn::Gt((abs(f[3]) * torsion_scale).v, one.v));
-  const N exponent = load<D>(slot, kExponent);
-  const N scale_y = load<D>(slot, kMomentScale), scale_z = load<D>(slot, kMomentScale + 1);
-  const N x[2] = {load<D>(slot, kStation), load<D>(slot, kStation + 1)};
+  const N exponent = constant(kExponent);
+  const N scale_y = constant(kMomentScale), scale_z = constant(kMomentScale + 1);
+  const N x[2] = {constant(kStation), constant(kStation + 1)};
   for (int station = 0; station < 2; ++station) {
     const N my = abs(fma(x[station], f[2], f[4])) * scale_y, mz = abs(fnma(x[station], f[1], f[5])) * scale_z;
     const auto linear = hn::Gt((my + mz).v, one.v);
@@ -629,7 +638,7 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
   N slid[6] = {zero, zero, zero, zero, zero, zero};
   bool books_slid = softened;
   if (HWY_UNLIKELY(!hn::AllFalse(tag, outside))) {
-    const auto flows = hn::AndNot(too_far, hn::And(outside, hn::Gt(load<D>(slot, kFlows).v, zero.v)));
+    const auto flows = hn::AndNot(too_far, hn::And(outside, hn::Gt(constant(kFlows).v, zero.v)));
     if (softened)
       for (int i = 0; i < 6; ++i) slid[i] = (u[i] - was[i]) - (e[i] - before[i]);
     if (!hn::AllFalse(tag, flows)) {
@@ -653,22 +662,22 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
   }
 
   // standard linear solid: the damper follows the mean of the step
-  const N viscous = load<D>(slot, kViscous), half = num<D>(0.5), keep = one - load<D>(slot, kRelaxation);
+  const N viscous = constant(kViscous), half = num<D>(0.5), keep = one - constant(kRelaxation);
   const N taken = fma(half, keep, half);
   const auto inside = hn::Not(outside);
   N g[6], work = zero, lost = zero;
   for (int i = 0; i < 6; ++i) {
-    const N old = load<D>(slot, kBehind + i), stretched = e[i] - before[i];
+    const N old = load<D>(state, kBehind + i), stretched = e[i] - before[i];
     const N behind = fma(taken, stretched, keep * old), rate = viscous * k[i];
     const N twice_mean = rate * (behind + old);
     work = fma(twice_mean, stretched, work);
     if (books_slid) lost = fma(twice_mean, slid[i], lost);
     g[i] = fma(rate, behind, f[i]);
-    store_where<D>(inside, behind, slot, kBehind + i);
-    store_where<D>(inside, u[i], slot, kStretch + i);
+    store_where<D>(inside, behind, state, kBehind + i);
+    store_where<D>(inside, u[i], state, kStretch + i);
   }
-  store_where<D>(inside, fma(half, work, load<D>(slot, kDamped)), slot, kDamped);
-  if (books_slid) store_where<D>(inside, fma(half, lost, load<D>(slot, kBled)), slot, kBled);
+  store_where<D>(inside, fma(half, work, load<D>(state, kDamped)), state, kDamped);
+  if (books_slid) store_where<D>(inside, fma(half, lost, load<D>(state, kBled)), state, kBled);
 
   // torque conjugate to the rate of the rotation vector
   const V3<D> m{g[3], g[4], g[5]};

@@ -14,29 +14,32 @@ namespace topple::mbs::kernel {
 /// Widest block, for those who need room before they know.
 inline constexpr size_t kMostLanes = 8;
 
-/// Fields of an element's slot. Geometry, stiffness, bounds, history.
+/// Fields of an element's slot: what changes in every step, then what seldom does. The latter lie in a pool of lane
+/// vectors that blocks share where they are equal, so that large models and batches move less memory.
 enum Slot : int {
-  kMarkerA = 0,        // p_AF, from the present centre of mass (3), q_AF (4)
-  kMarkerB = 7,        // p_BM (3), q_BM (4)
-  kStiffness = 14,     // x y z, about x y z (6)
-  kViscous = 20,       // stiffness behind the damper over the elastic one
-  kRelaxation = 21,    // share that the damper takes in a step
-  kStation = 22,       // x of both stations (2)
-  kLeastForce = 24,    // range of normal force; an empty range sends the element to the full law
-  kMostForce = 25,     //
-  kMomentScale = 26,   // about y, z (2)
-  kShearScale = 28,    // along y, z (2)
-  kTorsionScale = 30,  //
-  kExponent = 31,      // of the biaxial bound; used as 1, 1.5 or 2, whichever is next below
-  kMostTurn = 32,      // sin² of half the largest rotation that the series hold for; infinite for an empty slot
-  kOffset = 33,        // inelastic deformation at the marker (6)
-  kStretch = 39,       // deformation from the offset at the step before (6)
-  kBehind = 45,        // stretch of the springs behind the dampers (6)
-  kDamped = 51,        // work of the dampers so far
-  kBled = 52,          // the part of it on what damage softened
-  kSoft = 53,          // about y: elastic shear and rotation from both (2 x 2), about z (2 x 2)
-  kFlows = 61,         // 1: the law of flowing zones below governs instead of the bounds
-  kSlotFields = 62
+  kStretch = 0,  // deformation from the offset at the step before (6)
+  kBehind = 6,   // stretch of the springs behind the dampers (6)
+  kDamped = 12,  // work of the dampers so far
+  kBled = 13,    // the part of it on what damage softened
+  kStateFields = 14,
+  kMarkerA = kStateFields,  // p_AF, from the present centre of mass (3), q_AF (4)
+  kMarkerB = 21,            // p_BM (3), q_BM (4)
+  kStiffness = 28,          // x y z, about x y z (6)
+  kViscous = 34,            // stiffness behind the damper over the elastic one
+  kRelaxation = 35,         // share of its spring's stretch that a damper takes in a step
+  kStation = 36,            // x of both stations (2)
+  kLeastForce = 38,         // range of normal force; an empty range sends the element to the full law
+  kMostForce = 39,          //
+  kMomentScale = 40,        // about y, z (2)
+  kShearScale = 42,         // along y, z (2)
+  kTorsionScale = 44,       //
+  kExponent = 45,           // of the biaxial bound; used as 1, 1.5 or 2, whichever is next below
+  kMostTurn = 46,           // sin² of half the largest rotation that the series hold for; infinite for an empty slot
+  kOffset = 47,             // inelastic deformation at the marker (6)
+  kSoft = 53,               // about y: elastic shear and rotation from both (2 x 2), about z (2 x 2)
+  kFlows = 61,              // 1: the law of flowing zones below governs instead of the bounds
+  kSlotFields = 62,
+  kConstants = kSlotFields - kStateFields
 };
 inline constexpr double kLargestTurn = 0.25;  // kMostTurn of a live element: 60 degrees
 
@@ -113,7 +116,9 @@ struct ElementJob {
   size_t first = 0, last = 0;            // blocks
   const unsigned char* live;             // per block: live lanes, 0 skips it
   const unsigned char* softened;         // per block: some lane is softened by damage
-  double* slots;                         // kSlotFields a block
+  double* states;                        // kStateFields a block
+  const double* pool;                    // vectors of W
+  const std::uint32_t* constants;        // which of the pool, kConstants a block
   double* flows;                         // kFlowFields a block
   double* forces;                        // kForceFields a block
   const std::uint32_t *a, *b;            // body slot of each lane (W a block); null: batch

@@ -1,6 +1,9 @@
 #include "mbs/lanes.h"
 
+#include <algorithm>
 #include <limits>
+#include <string_view>
+#include <unordered_map>
 
 namespace topple::mbs {
 
@@ -24,7 +27,7 @@ void Lanes::allocate_bodies(size_t bodies) {
   for (AlignedVector<double>* x : {&p, &v, &L, &w, &force, &torque}) x->assign(body_blocks * 3 * W, 0);
   q.assign(body_blocks * 4 * W, 0);
   R.assign(body_blocks * 9 * W, 0);
-  constants.assign(body_blocks * kernel::kBodyFields * W, 0);
+  body_constants.assign(body_blocks * kernel::kBodyFields * W, 0);
   // idle lanes and the ground keep a valid orientation
   for (size_t block = 0; block < body_blocks; ++block)
     for (size_t l = 0; l < W; ++l) {
@@ -36,7 +39,11 @@ void Lanes::allocate_bodies(size_t bodies) {
 
 void Lanes::allocate_elements(size_t elements) {
   element_blocks = is_batch ? elements : (elements + W - 1) / W;
-  slots.assign(element_blocks * kernel::kSlotFields * W, 0);
+  states.assign(element_blocks * kernel::kStateFields * W, 0);
+  // one vector of zeros for all to begin with
+  pool.assign(W, 0);
+  constants.assign(element_blocks * kernel::kConstants, 0);
+  uses.assign(1, static_cast<std::uint32_t>(constants.size()));
   flows.assign(element_blocks * kernel::kFlowFields * W, 0);
   element_forces.assign(element_blocks * kernel::kForceFields * W, 0);
   live.assign(element_blocks, 0);
@@ -46,18 +53,61 @@ void Lanes::allocate_elements(size_t elements) {
 void Lanes::clear_slot(size_t slot) {
   using namespace kernel;
   constexpr double unlimited = std::numeric_limits<double>::infinity();
-  for (int f = 0; f < kSlotFields; ++f) field(slot, f) = 0;
-  field(slot, kMarkerA + 3) = field(slot, kMarkerB + 3) = 1;
-  field(slot, kLeastForce) = -unlimited;
-  field(slot, kMostForce) = field(slot, kMostTurn) = unlimited;
-  for (const int i : {0, 3, 4, 7}) field(slot, kSoft + i) = 1;
+  for (int f = 0; f < kSlotFields; ++f) {
+    const bool is_one =
+        f == kMarkerA + 3 || f == kMarkerB + 3 || f == kSoft || f == kSoft + 3 || f == kSoft + 4 || f == kSoft + 7;
+    const bool is_unlimited = f == kMostForce || f == kMostTurn;
+    set(slot, f, is_one ? 1 : is_unlimited ? unlimited : f == kLeastForce ? -unlimited : 0);
+  }
   for (size_t f = 0; f < static_cast<size_t>(kForceFields); ++f) force_field(slot, f) = 0;
+}
+
+void Lanes::set(size_t slot, int f, double x) {
+  if (f < kernel::kStateFields) {
+    states[state_at(slot, f)] = x;
+    return;
+  }
+  std::uint32_t& entry = constants[constant_at(slot, f)];
+  if (pool[size_t{entry} * W + slot % W] == x) return;
+  if (uses[entry] > 1) {
+    // a vector of its own
+    --uses[entry];
+    const size_t from = size_t{entry} * W;
+    entry = static_cast<std::uint32_t>(uses.size());
+    uses.push_back(1);
+    pool.resize(pool.size() + W);
+    std::copy_n(pool.begin() + static_cast<std::ptrdiff_t>(from), W, pool.end() - static_cast<std::ptrdiff_t>(W));
+  }
+  pool[size_t{entry} * W + slot % W] = x;
+}
+
+void Lanes::share_constants() {
+  AlignedVector<double> merged;
+  std::vector<std::uint32_t> counts, moved(uses.size(), kNoSlot);
+  std::unordered_map<std::string_view, std::uint32_t> known;  // by the bytes of the old pool
+  const size_t size = W * sizeof(double);
+  for (std::uint32_t& entry : constants) {
+    if (moved[entry] == kNoSlot) {
+      const double* from = pool.data() + size_t{entry} * W;
+      const auto [it, is_new] = known.emplace(std::string_view(reinterpret_cast<const char*>(from), size),
+                                              static_cast<std::uint32_t>(counts.size()));
+      if (is_new) {
+        merged.insert(merged.end(), from, from + W);
+        counts.push_back(0);
+      }
+      moved[entry] = it->second;
+    }
+    entry = moved[entry];
+    ++counts[entry];
+  }
+  pool = std::move(merged);
+  uses = std::move(counts);
 }
 
 void Lanes::advance_bodies() {
   spins.clear();
   const kernel::BodyJob job{body_blocks, p.data(),     v.data(),      L.data(),         w.data(),    q.data(),
-                            R.data(),    force.data(), torque.data(), constants.data(), kick.data(), h.data(),
+                            R.data(),    force.data(), torque.data(), body_constants.data(), kick.data(), h.data(),
                             gx.data(),   gy.data(),    gz.data(),     sum.data(),       &spins};
   if (W == kernel::lanes()) {
     kernel::advance_bodies(job);
@@ -70,7 +120,8 @@ void Lanes::evaluate_elements(size_t first, size_t last, std::vector<std::uint32
   kernel::ElementJob job;
   job.first = first, job.last = last;
   job.live = live.data(), job.softened = softened.data();
-  job.slots = slots.data(), job.flows = flows.data(), job.forces = element_forces.data();
+  job.states = states.data(), job.pool = pool.data(), job.constants = constants.data(), job.flows = flows.data(),
+  job.forces = element_forces.data();
   job.a = is_batch ? nullptr : body_a.data(), job.b = is_batch ? nullptr : body_b.data();
   job.body_a = body_a.data(), job.body_b = body_b.data();
   job.p = p.data(), job.q = q.data();

@@ -15,9 +15,12 @@ struct Lanes {
   bool is_batch = false;
   size_t body_blocks = 0, element_blocks = 0;
   // bodies, the ground behind the last one
-  AlignedVector<double> p, v, L, w, q, R, force, torque, constants;
+  AlignedVector<double> p, v, L, w, q, R, force, torque, body_constants;
   // elements
-  AlignedVector<double> slots, flows, element_forces;
+  AlignedVector<double> states, flows, element_forces;
+  AlignedVector<double> pool;                 // lane vectors of constants, shared by blocks
+  std::vector<std::uint32_t> constants;       // of each block, in the pool (kConstants)
+  std::vector<std::uint32_t> uses;            // of each vector of the pool
   std::vector<unsigned char> live, softened;  // lanes of each block
   // one run: slots of elements (several may be gone), bodies of slots; elements meeting in each body
   std::vector<std::uint32_t> slot_of, element_of, body_a, body_b;  // batch: bodies of each block
@@ -32,12 +35,13 @@ struct Lanes {
 
   LaneLayout body_layout(size_t lane) const;
   /// Field f of a slot; a slot is block * W + lane.
-  double& field(size_t slot, int f) {
-    return slots[(slot / W * kernel::kSlotFields + static_cast<size_t>(f)) * W + slot % W];
-  }
   double field(size_t slot, int f) const {
-    return slots[(slot / W * kernel::kSlotFields + static_cast<size_t>(f)) * W + slot % W];
+    return f < kernel::kStateFields ? states[state_at(slot, f)]
+                                    : pool[size_t{constants[constant_at(slot, f)]} * W + slot % W];
   }
+  void set(size_t slot, int f, double x);
+  /// Lets blocks share what is equal in all lanes.
+  void share_constants();
   double& force_field(size_t slot, size_t f) {
     return element_forces[(slot / W * kernel::kForceFields + f) * W + slot % W];
   }
@@ -63,6 +67,14 @@ struct Lanes {
   void evaluate_elements(size_t first, size_t last, std::vector<std::uint32_t>& beyond);
   /// Forces of the elements on every body; batch only.
   void sum_forces();
+
+ private:
+  size_t state_at(size_t slot, int f) const {
+    return (slot / W * kernel::kStateFields + static_cast<size_t>(f)) * W + slot % W;
+  }
+  size_t constant_at(size_t slot, int f) const {
+    return slot / W * kernel::kConstants + static_cast<size_t>(f - kernel::kStateFields);
+  }
 };
 
 }  // namespace topple::mbs
