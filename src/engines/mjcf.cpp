@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "engines/ground.h"
 #include "engines/requirements.h"
 
 namespace topple::engines {
@@ -20,13 +20,6 @@ constexpr int kGroundBit = 1, kBodyBit = 2;
 std::string text_of(const Vec3& v) { return fmt::format("{:.17g} {:.17g} {:.17g}", v.x, v.y, v.z); }
 std::string text_of(const Quat& q) { return fmt::format("{:.17g} {:.17g} {:.17g} {:.17g}", q.w, q.x, q.y, q.z); }
 std::string text_of(const Pose& X) { return fmt::format("pos=\"{}\" quat=\"{}\"", text_of(X.p), text_of(X.q)); }
-
-/// Loss of speed for a damping ratio, see find_damping_ratio.
-double calc_restitution(double ratio) {
-  if (std::abs(ratio - 1) < 1e-6) return std::exp(-2);
-  return ratio < 1 ? std::exp(-2 * ratio * std::acos(ratio) / std::sqrt(1 - ratio * ratio))
-                   : std::exp(-2 * ratio * std::acosh(ratio) / std::sqrt(ratio * ratio - 1));
-}
 
 /// Direct spring and damper of MuJoCo's contact, per unit of mass; the damper takes no more in a step than all speed.
 std::string contact_of(double frequency, double restitution, double friction, double step) {
@@ -269,56 +262,6 @@ class Writer {
 };
 
 }  // namespace
-
-double find_damping_ratio(double restitution) {
-  if (!(restitution > 1e-6)) return 500;  // 1 / (4 ζ²) is left
-  double low = 0, high = 1;
-  while (calc_restitution(high) > restitution) high *= 2;
-  for (int i = 0; i < 200 && high - low > 1e-15 * high; ++i) {
-    const double middle = 0.5 * (low + high);
-    (calc_restitution(middle) > restitution ? low : high) = middle;
-  }
-  return high;
-}
-
-Ties find_ties(const mbs::Model& model, const Forces& forces, const std::vector<unsigned char>& joint_live) {
-  const size_t B = model.bodies.size();
-  Ties ties;
-  ties.is_grounded.assign(B, 0);
-  std::vector<std::vector<int>> held(B);  // by whom, fixed bodies included
-  const auto link = [&](int a, int b) {
-    if (a >= 0 && b >= 0) {
-      held[static_cast<size_t>(a)].push_back(b);
-      held[static_cast<size_t>(b)].push_back(a);
-    }
-    if (is_ground(model, a) && b >= 0) ties.is_grounded[static_cast<size_t>(b)] = 1;
-    if (is_ground(model, b) && a >= 0) ties.is_grounded[static_cast<size_t>(a)] = 1;
-  };
-  for (size_t e = 0; e < model.elements.size(); ++e)
-    if (forces.is_live(e)) link(model.elements[e].a.index, model.elements[e].b.index);
-  for (size_t i = 0; i < model.bushings.size(); ++i)
-    if (forces.is_bushing_live(i)) link(model.bushings[i].a.index, model.bushings[i].b.index);
-  for (size_t j = 0; j < model.joints.size(); ++j)
-    if (joint_live[j]) link(model.joints[j].parent.index, model.joints[j].child.index);
-  for (const mbs::Contact::Pair& p : model.contact.pairs) {
-    if (p.touches) continue;
-    if (p.b == mbs::kGround)
-      ties.is_grounded[static_cast<size_t>(p.a.index)] = 1;
-    else
-      ties.pairs.emplace_back(std::min(p.a.index, p.b.index), std::max(p.a.index, p.b.index));
-  }
-  const auto add = [&](int a, int b) {
-    if (a < b && !(is_ground(model, a) && is_ground(model, b))) ties.pairs.emplace_back(a, b);
-  };
-  for (size_t a = 0; a < B; ++a)
-    for (const int n : held[a]) {
-      add(static_cast<int>(a), n);
-      for (const int m : held[static_cast<size_t>(n)]) add(static_cast<int>(a), m);
-    }
-  std::sort(ties.pairs.begin(), ties.pairs.end());
-  ties.pairs.erase(std::unique(ties.pairs.begin(), ties.pairs.end()), ties.pairs.end());
-  return ties;
-}
 
 Mjcf make_mjcf(const Course& course, const Articulation& articulation, const Ties& ties, double step) {
   return Writer(course, articulation, ties).write(step);

@@ -3,28 +3,14 @@
 /// what.
 
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "engines/articulation.h"
 #include "engines/course.h"
+#include "engines/ties.h"
 #include "mbs/model.h"
 
 namespace topple::engines {
-
-/// Bodies that do not touch each other because of what holds them: joined by a live element, bushing or joint, or
-/// joined to the same third body, or a pair that the contact says does not touch; and bodies held by the ground, which
-/// do not touch it.
-struct Ties {
-  std::vector<std::pair<int, int>> pairs;  // a < b, not both fixed, rising
-  std::vector<unsigned char> is_grounded;  // (B)
-};
-///   joint_live  joints that are there (J); elements and bushings as the forces have them
-Ties find_ties(const mbs::Model&, const Forces&, const std::vector<unsigned char>& joint_live);
-
-/// Damping over critical damping of a spring that gives back the share e of the speed with which it was hit, if it
-/// cannot pull: e = exp(-2 ζ acos ζ / √(1 - ζ²)), and its continuation above 1. For e in (0, 1].
-double find_damping_ratio(double restitution);
 
 struct Mjcf {
   std::string text;

@@ -18,14 +18,17 @@ std::unique_ptr<Engine> make_simbody_engine(const Accuracy&) { return nullptr; }
 
 #include "engines/articulation.h"
 #include "engines/course.h"
+#include "engines/ground.h"
 #include "engines/requirements.h"
 #include "engines/simbody_system.h"
+#include "engines/ties.h"
 
 namespace topple::engines {
 
 namespace {
 
 constexpr double kDefaultAccuracy = 1e-9;
+constexpr double kFixedStepAccuracy = 1e-5;  // Verlet's method iterates velocities to a tenth of it
 
 simbody::Three to_three(const Vec3& v) { return {v.x, v.y, v.z}; }
 Vec3 to_vec3(const simbody::Three& v) { return {v[0], v[1], v[2]}; }
@@ -67,8 +70,9 @@ simbody::Kind to_kind(mbs::Joint::Kind kind) {
 /// A model in Simbody's terms, for one set of live joints and masses.
 class Built {
  public:
-  Built(const Course& course, const simbody::Settings& settings)
+  Built(const Course& course, const Ground& ground, const simbody::Settings& settings)
       : course_(course),
+        ground_(ground),
         model_(course.model()),
         articulation_(make_articulation(model_, course.joint_live())),
         mobilizer_(model_.bodies.size(), -1),
@@ -76,17 +80,22 @@ class Built {
     const simbody::Description description = describe();
     const Forces& forces = course.forces();
     simbody::PowerFunction power;
-    if (forces.has_power())
-      power = [this, &forces](double time, const std::vector<simbody::BodyMotion>& m) -> std::array<double, 2> {
+    if (forces.has_power() || ground.is_there())
+      power = [this, &forces](double time, const std::vector<simbody::BodyMotion>& m) -> simbody::Three {
         read(m);
         const Power p = forces.calc_power(time, motion_);
-        return {p.damping, p.loads};
+        double contact = 0;
+        wrench_.assign(model_.bodies.size(), {});
+        ground_.calc(motion_, course_.bodies(), wrench_, contact);
+        return {p.damping, p.loads, contact};
       };
     system_ = std::make_unique<simbody::System>(
         description,
         [this, &forces](double time, const std::vector<simbody::BodyMotion>& m, std::vector<simbody::Wrench>& on) {
           read(m);
           forces.calc(time, motion_, wrench_);
+          double power_of_contact = 0;
+          ground_.calc(motion_, course_.bodies(), wrench_, power_of_contact);
           on.resize(m.size());
           for (size_t i = 0; i < on.size(); ++i) {
             const Wrench& w = wrench_[static_cast<size_t>(articulation_.branches[i].body)];
@@ -108,6 +117,12 @@ class Built {
   const Motion& motion() {
     read(system_->motion());
     return motion_;
+  }
+
+  Touch calc_touch() {
+    double power = 0;
+    wrench_.assign(model_.bodies.size(), {});
+    return {-ground_.calc(motion(), course_.bodies(), wrench_, power), 0};
   }
 
   Reactions find_reactions() {
@@ -190,6 +205,7 @@ class Built {
   }
 
   const Course& course_;
+  const Ground& ground_;
   const mbs::Model& model_;
   Articulation articulation_;
   std::vector<int> mobilizer_;  // of each body (B)
@@ -198,8 +214,10 @@ class Built {
   std::unique_ptr<simbody::System> system_;
 };
 
-/// Whether anything depends on what happened at accepted states, so that these must not lie far apart.
+/// Whether anything depends on what happened at accepted states or comes suddenly, so that these must not lie far
+/// apart.
 bool has_history(const mbs::Model& m) {
+  if (can_touch_ground(m)) return true;
   const auto breaks = [](const auto& list, auto strength) {
     return std::any_of(list.begin(), list.end(), [&](const auto& x) { return strength(x) < mbs::kUnlimited; });
   };
@@ -224,8 +242,14 @@ class SimbodyEngine : public Engine {
   std::vector<Unsupported> find_unsupported(const mbs::Model& model, const mbs::Options& options) const override {
     std::vector<Unsupported> out = find_impossible_inertias(model);
     for (Unsupported& u : find_opening_joints(model, options)) out.push_back(std::move(u));
-    if (can_touch_ground(model)) out.push_back({"contact.ground", "contact with the ground"});
     if (can_touch_bodies(model)) out.push_back({"contact.bodies", "contact between bodies"});
+    for (size_t i = 0; i < model.contact.pairs.size() && can_touch_ground(model); ++i)
+      if (model.contact.pairs[i].touches && model.contact.pairs[i].b == mbs::kGround)
+        out.push_back({"contact.pairs[" + std::to_string(i) + "]", "rules of its own for a body on the ground"});
+    for (size_t i = 0; i < model.events.size() && can_touch_ground(model); ++i)
+      for (const mbs::Action& a : model.events[i].actions)
+        if (a.kind == mbs::Action::Kind::ReplaceBody)
+          out.push_back({place_of("events", i, model.events[i].name), "the replacement of a body that may touch"});
     return out;
   }
 
@@ -233,31 +257,49 @@ class SimbodyEngine : public Engine {
   mbs::Summary solve(const mbs::Model& model, const mbs::Options& options) const override {
     Course course(model, options);
     simbody::Settings settings;
-    settings.accuracy = accuracy_.relative > 0 ? accuracy_.relative : kDefaultAccuracy;
     if (options.step > 0 && !(accuracy_.relative > 0)) settings.step = options.step;
+    settings.accuracy = accuracy_.relative > 0 ? accuracy_.relative
+                        : settings.step > 0    ? kFixedStepAccuracy
+                                               : kDefaultAccuracy;
     if (!course.start(settings.step)) return course.finish(0);
     long steps = 0;
     try {
       if (settings.step == 0 && has_history(model)) settings.longest_step = choose_step(model, options);
+      Ground ground(model);
+      if (ground.is_there()) {
+        ground.advance(course.motion(), find_ties(model, course.forces(), course.joint_live()).is_grounded);
+        course.note("contact with the ground is of springs and dampers at corners, not the native engine's");
+      }
       Work before;
       bool is_first = true;
-      while (!course.is_over()) run_as_built(course, settings, is_first, before, steps);
+      while (!course.is_over()) run_as_built(course, ground, settings, is_first, before, steps);
     } catch (const std::exception& e) { course.fail(e.what()); }
     return course.finish(steps);
   }
 
  private:
   /// Until the end or until the system must be built anew.
-  static void run_as_built(Course& course, const simbody::Settings& settings, bool& is_first, Work& before,
-                           long& steps) {
+  static void run_as_built(Course& course, Ground& ground, const simbody::Settings& settings, bool& is_first,
+                           Work& before, long& steps) {
     using Verdict = Course::Verdict;
-    Built built(course, settings);
+    Built built(course, ground, settings);
     simbody::System& system = built.system();
-    const auto accept = [&] {
-      const std::array<double, 2> work = system.work();
-      return course.accept(system.time(), built.motion(), {before.damping + work[0], before.loads + work[1], 0}, {},
-                           [&] { return built.find_reactions(); });
+    std::vector<unsigned char> is_held;
+    const auto find_held = [&] {
+      if (ground.is_there()) is_held = find_ties(course.model(), course.forces(), course.joint_live()).is_grounded;
     };
+    const auto sum = [&](const simbody::Three& w) {
+      return Work{before.damping + w[0], before.loads + w[1], before.contact + w[2]};
+    };
+    const auto accept = [&] {
+      const Touch touch = ground.is_there() ? built.calc_touch() : Touch{};
+      const Verdict v = course.accept(system.time(), built.motion(), sum(system.work()), touch,
+                                      [&] { return built.find_reactions(); });
+      if (v != Verdict::GoOn) find_held();
+      if (ground.is_there()) ground.advance(built.motion(), is_held);
+      return v;
+    };
+    find_held();
     Verdict verdict = is_first ? accept() : Verdict::GoOn;
     is_first = false;
     while (verdict == Verdict::GoOn || verdict == Verdict::ForcesJumped) {
@@ -266,8 +308,7 @@ class SimbodyEngine : public Engine {
       ++steps;
       verdict = accept();
     }
-    const std::array<double, 2> work = system.work();
-    before = {before.damping + work[0], before.loads + work[1], 0};
+    before = sum(system.work());
   }
 
   Accuracy accuracy_;

@@ -64,20 +64,21 @@ class OutsideForces : public SimTK::Force::Custom::Implementation {
   SimTK::Real calcPotentialEnergy(const SimTK::State&) const override { return 0; }
   bool dependsOnlyOnPositions() const override { return false; }
   void realizeTopology(SimTK::State& s) const override {
-    if (power_) first_ = subsystem_.allocateZ(s, SimTK::Vector(2, 0.0));
+    if (power_) first_ = subsystem_.allocateZ(s, SimTK::Vector(3, 0.0));
   }
   void realizeAcceleration(const SimTK::State& s) const override {
     if (!power_) return;
     read_motion(matter_, bodies_, s, motion_);
-    const std::array<double, 2> p = power_(s.getTime(), motion_);
+    const Three p = power_(s.getTime(), motion_);
     SimTK::Vector& rate = subsystem_.updZDot(s);
     rate[first_] = p[0];
     rate[first_ + 1] = p[1];
+    rate[first_ + 2] = p[2];
   }
-  std::array<double, 2> work_of(const SimTK::State& s) const {
-    if (!power_) return {0, 0};
+  Three work_of(const SimTK::State& s) const {
+    if (!power_) return {0, 0, 0};
     const SimTK::Vector& z = subsystem_.getZ(s);
-    return {z[first_], z[first_ + 1]};
+    return {z[first_], z[first_ + 1], z[first_ + 2]};
   }
 
  private:
@@ -272,9 +273,7 @@ void System::invalidate_forces() {
   inside_->integrator->getAdvancedState().invalidateAllCacheAtOrAbove(SimTK::Stage::Dynamics);
 }
 
-std::array<double, 2> System::work() const {
-  return inside_->outside->work_of(inside_->integrator->getAdvancedState());
-}
+Three System::work() const { return inside_->outside->work_of(inside_->integrator->getAdvancedState()); }
 
 void System::find_reactions(std::vector<Wrench>& mobilizers, std::vector<Wrench>& closures) const {
   const Inside& in = *inside_;

@@ -56,9 +56,9 @@ struct Description {
   std::vector<Closure> closures;
 };
 
-/// Forces at a state, and what they spend: damping and the work of loads [W].
+/// Forces at a state, and their powers [W].
 using ForceFunction = std::function<void(double time, const std::vector<BodyMotion>&, std::vector<Wrench>& on_body)>;
-using PowerFunction = std::function<std::array<double, 2>(double time, const std::vector<BodyMotion>&)>;
+using PowerFunction = std::function<Three(double time, const std::vector<BodyMotion>&)>;
 
 struct Settings {
   double step = 0;          // Verlet's method in fixed steps; 0: Runge-Kutta-Merson with error control [s]
@@ -84,7 +84,7 @@ class System {
   /// Forces have jumped: to be evaluated anew.
   void invalidate_forces();
   /// Integrals of the powers since start() [J].
-  std::array<double, 2> work() const;
+  Three work() const;
   /// Of the mobilizers on the outboard bodies, at the origins of their joint frames, and of the closures on the
   /// children, at the origins of theirs.
   void find_reactions(std::vector<Wrench>& mobilizers, std::vector<Wrench>& closures) const;

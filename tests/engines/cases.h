@@ -59,6 +59,32 @@ inline mbs::Model make_bar(mbs::Joint::Kind kind, const Quat& axes) {
   return m;
 }
 
+inline mbs::BodyId add_box(mbs::Model& m, const std::string& name, double mass, const Vec3& half, const Vec3& p) {
+  const double c = mass / 3;
+  mbs::Body b = make_body(name, mass,
+                          {c * (half.y * half.y + half.z * half.z), c * (half.x * half.x + half.z * half.z),
+                           c * (half.x * half.x + half.y * half.y)},
+                          p);
+  mbs::Shape s;
+  s.half = half;
+  b.shapes.push_back(s);
+  return mbs::add_body(m, b);
+}
+
+/// A ball of 0.1 m over the ground.
+inline mbs::Model make_ball(double height, double restitution) {
+  mbs::Model m = make_empty({0, 0, -9.81});
+  mbs::Body b = make_body("ball", 1, {0.004, 0.004, 0.004}, {0, 0, height + 0.1});
+  mbs::Shape s;
+  s.kind = mbs::Shape::Kind::Sphere;
+  s.radius = 0.1;
+  b.shapes.push_back(s);
+  mbs::add_body(m, b);
+  m.contact.ground = true;
+  m.contact.restitution = restitution;
+  return m;
+}
+
 /// Rows of time, x, y, z.
 inline std::vector<std::array<double, 4>> read_adams(const std::string& name) {
   std::ifstream in(std::string(TOPPLE_SOURCE_DIR) + "/tests/data/adams/" + name);

@@ -6,55 +6,13 @@
 #include <cmath>
 
 #include "cases.h"
-#include "engines/mjcf.h"
 
 namespace topple::engines {
 namespace {
 
+using test::add_box;
+using test::make_ball;
 using test::make_options;
-
-mbs::BodyId add_box(mbs::Model& m, const std::string& name, double mass, const Vec3& half, const Vec3& p) {
-  const double c = mass / 3;
-  mbs::Body b = test::make_body(name, mass,
-                                {c * (half.y * half.y + half.z * half.z), c * (half.x * half.x + half.z * half.z),
-                                 c * (half.x * half.x + half.y * half.y)},
-                                p);
-  mbs::Shape s;
-  s.half = half;
-  b.shapes.push_back(s);
-  return mbs::add_body(m, b);
-}
-
-/// A ball of 0.1 m over the ground.
-mbs::Model make_ball(double height, double restitution) {
-  mbs::Model m = test::make_empty({0, 0, -9.81});
-  mbs::Body b = test::make_body("ball", 1, {0.004, 0.004, 0.004}, {0, 0, height + 0.1});
-  mbs::Shape s;
-  s.kind = mbs::Shape::Kind::Sphere;
-  s.radius = 0.1;
-  b.shapes.push_back(s);
-  mbs::add_body(m, b);
-  m.contact.ground = true;
-  m.contact.restitution = restitution;
-  return m;
-}
-
-TEST(Mujoco, DampingRatioGivesTheRestitutionItIsFor) {
-  // a mass hits a spring and damper that can only push, in small steps
-  for (const double wanted : {0.05, 0.135, 0.3, 0.5, 0.9}) {
-    const double ratio = find_damping_ratio(wanted), h = 1e-5;
-    double x = 0, v = 1;
-    double force = 0;
-    do {  // frequency 1
-      force = x + 2 * ratio * v;
-      v -= h * force;
-      x += h * v;
-    } while (force > 0);
-    EXPECT_NEAR(-v, wanted, 1e-4 * (1 + ratio)) << wanted;
-  }
-  EXPECT_NEAR(find_damping_ratio(std::exp(-2)), 1, 1e-6);
-  EXPECT_LT(find_damping_ratio(1), 1e-12);
-}
 
 TEST(MujocoPhysics, ABallBouncesAsHighAsItsRestitution) {
   TOPPLE_NEEDS_ENGINE("mujoco");

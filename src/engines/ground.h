@@ -1,0 +1,47 @@
+#pragma once
+/// Contact with the ground for engines that have none of their own: springs and dampers at the corners of boxes, the
+/// vertices of hulls and the lowest points of spheres, friction as a damper below Coulomb's limit. Not the native
+/// engine's law, which belongs to its steps; the restitution of a point is the same. docs/engines.md.
+
+#include <vector>
+
+#include "engines/forces.h"
+
+namespace topple::engines {
+
+struct BodyNow;
+
+class Ground {
+ public:
+  /// The model must outlive it.
+  explicit Ground(const mbs::Model&);
+
+  bool is_there() const { return !point_.empty(); }
+  /// Adds the forces at a trial state and their power on the bodies [W]; returns the force of the ground on them [N].
+  Vec3 calc(const Motion&, const std::vector<BodyNow>&, std::vector<Wrench>& on_body, double& power) const;
+  /// Accepts a state. Overlap that a point has when its body is let go, or at the start, is allowed for as long as it
+  /// lasts and only shrinks.
+  ///   is_held  bodies that something holds to the ground: they do not touch it (B)
+  void advance(const Motion&, const std::vector<unsigned char>& is_held);
+
+ private:
+  struct Point {
+    int body = 0;
+    Vec3 p;             // in B [m]
+    double radius = 0;  // of a sphere about it [m]
+    bool is_active = false;
+    double born = 0;  // overlap that is allowed [m]
+  };
+  double calc_overlap(const Point&, const Motion&) const;
+
+  const mbs::Model& model_;
+  std::vector<Point> point_;
+  std::vector<double> reach_;  // of a body's points from the origin of B [m] (B)
+  double damping_ratio_ = 0;
+};
+
+/// Damping over critical damping of a spring that gives back the share e of the speed with which it was hit, if it
+/// cannot pull: e = exp(-2 ζ acos ζ / √(1 - ζ²)), and its continuation above 1. For e in [0, 1]; at most 500.
+double find_damping_ratio(double restitution);
+
+}  // namespace topple::engines
