@@ -11,6 +11,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "mbs/joint_rows.h"
 #include "mbs/system.h"
 
 namespace topple::mbs {
@@ -92,28 +93,12 @@ class Assembly {
   }
   /// Constraint rows of a joint, and how far each is from closed.
   int joint_rows(const CompiledJoint& j, KinematicRow rows[6], double gap[6]) const {
-    const Mat3 F = s_.rotation_of(j.parent) * j.R_PF, M = s_.rotation_of(j.child) * j.R_CM;
-    const Vec3 p_F = point(j.parent, j.p_PF), p_M = point(j.child, j.p_CM);
-    for (int i = 0; i < 3; ++i) {
-      Vec3 e;
-      e[i] = 1;
-      rows[i] = {
-          place(j.parent), place(j.child), -e, -cross(p_F - centre(j.parent), e), e, cross(p_M - centre(j.child), e)};
-      gap[i] = (p_M - p_F)[i];
-    }
-    for (int i = 3; i < j.rows; ++i) {
-      Vec3 axis;
-      if (j.kind == Joint::Kind::Fixed) {
-        axis[i - 3] = 1;
-        const Vec3 r =
-            0.5 * (cross(F.column(0), M.column(0)) + cross(F.column(1), M.column(1)) + cross(F.column(2), M.column(2)));
-        gap[i] = r[i - 3];
-      } else {
-        axis = cross(M.column(2), F.column(i - 3));
-        gap[i] = dot(M.column(2), F.column(i - 3));
-      }
-      rows[i] = {place(j.parent), place(j.child), {}, -axis, {}, axis};
-    }
+    const JointFrames f = calc_joint_frames(s_.state, j);
+    JointRow held[6];
+    calc_joint_gaps(j, f, gap);
+    calc_joint_rows(j, f, held);
+    for (int i = 0; i < j.rows; ++i)
+      rows[i] = {place(j.parent), place(j.child), -held[i].line, held[i].turn_parent, held[i].line, held[i].turn_child};
     return j.rows;
   }
   KinematicRow rotational_row(const CompiledJoint& j) const {
@@ -399,6 +384,7 @@ bool System::find_equilibrium(std::string& message) {
     state.element = virgin;
     state.rotational = virgin_rotational;
     ground_reaction = {};
+    update_angles();
     evaluate_elements_fully(0);
     evaluate_rotationals(0);
     evaluate_cables();
@@ -435,7 +421,7 @@ bool System::find_equilibrium(std::string& message) {
         load(penalised, wanted - penalty * gap[i]);
         multiplier[j][static_cast<size_t>(i)] = wanted;
         js.force += wanted * row.vb;
-        if (i >= 3) js.moment += wanted * row.wb;
+        if (i >= joints[j].lines) js.moment += wanted * row.wb;
       }
     }
     unbalanced = r.lpNorm<Eigen::Infinity>() / weight;

@@ -156,7 +156,7 @@ double System::measure_torsion(const CompiledTorsion& c, ForceRow& row) const {
   const CompiledJoint& j = joints[static_cast<size_t>(c.joint)];
   const Vec3 axis = (rotation_of(j.parent) * j.R_PF).column(2);
   row = {{}, axis, axis};
-  return calc_angle(j, state.joint[static_cast<size_t>(c.joint)].angle);
+  return state.joint[static_cast<size_t>(c.joint)].angle;
 }
 
 FrameDeformation System::measure_frames(int a, int b, const Vec3& p_AF, const Quat& q_AF, const Vec3& p_BM,

@@ -1,14 +1,18 @@
-/// Ideal joints: impulses at the joints' own directions that bring each joint together at the end of the step
-/// (docs/theory/multibody.md, eq. 5 to 7). Joints that share moving bodies are solved together, densely.
+/// Ideal joints in the step: impulses along the joints' own rows that bring each joint together at the end of the step
+/// (docs/theory/multibody.md, eq. 5 and 6). Joints that share moving bodies form a cluster and are solved together.
 
 #include <algorithm>
 #include <cmath>
 
+#include "mbs/joint_rows.h"
 #include "mbs/system.h"
 
 namespace topple::mbs {
 
 namespace {
+
+constexpr double kSuspicious = 1e-8;  // pivot over diagonal that asks for a look at the geometry
+constexpr int kMostRounds = 12;
 
 int other_root(std::vector<int>& parent, int x) {
   while (parent[static_cast<size_t>(x)] != x) {
@@ -18,47 +22,162 @@ int other_root(std::vector<int>& parent, int x) {
   return x;
 }
 
-struct Frames {
-  Vec3 p_F, p_M, lever_parent, lever_child;
-  Mat3 F, M;
-};
+/// A cluster's length, tolerance and the layout of its matrix, joints put in the order of elimination.
+void lay_out(System& s, JointCluster& c) {
+  const auto moving = [&](int b) { return b >= 0 && !s.fixed[static_cast<size_t>(b)]; };
+  std::vector<std::vector<int>> at(s.B);
+  const auto gather = [&] {
+    for (const int b : c.bodies) at[static_cast<size_t>(b)].clear();
+    for (size_t i = 0; i < c.joints.size(); ++i) {
+      const CompiledJoint& j = s.joints[static_cast<size_t>(c.joints[i])];
+      for (const int b : {j.parent, j.child})
+        if (moving(b)) at[static_cast<size_t>(b)].push_back(static_cast<int>(i));
+    }
+  };
+  const auto links = [&] {
+    std::vector<std::pair<int, int>> pairs;
+    for (const int b : c.bodies) {
+      const std::vector<int>& list = at[static_cast<size_t>(b)];
+      for (size_t i = 0; i < list.size(); ++i)
+        for (size_t k = 0; k < i; ++k) pairs.push_back({list[k], list[i]});
+    }
+    return pairs;
+  };
+  gather();
+  std::vector<int> ordered;
+  for (const int place : find_elimination_order(static_cast<int>(c.joints.size()), links()))
+    ordered.push_back(c.joints[static_cast<size_t>(place)]);
+  c.joints = std::move(ordered);
+  gather();
+  std::vector<int> sizes;
+  for (const int index : c.joints) sizes.push_back(s.joints[static_cast<size_t>(index)].rows);
+  c.matrix.analyse(sizes, links());
+  c.geometry = c.matrix;
 
-Frames frames_of(const State& s, const CompiledJoint& j) {
-  Frames f;
-  f.p_F = j.p_PF;
-  f.p_M = j.p_CM;
-  if (j.parent >= 0) {
-    const size_t b = static_cast<size_t>(j.parent);
-    f.lever_parent = s.R[b] * (j.p_PF - s.p_offset[b]);
-    f.p_F = s.p[b] + f.lever_parent;
-    f.F = s.R[b] * j.R_PF;
-  } else {
-    f.F = j.R_PF;
+  c.first_meeting.clear();
+  c.meetings.clear();
+  double sum = 0, extent = 0;
+  for (const int b : c.bodies) {
+    const size_t body = static_cast<size_t>(b);
+    const BodyConstants& k = s.state.body[body];
+    const double gyration2 = 0.5 * k.inverse_mass * (k.inertia(0, 0) + k.inertia(1, 1) + k.inertia(2, 2));
+    c.first_meeting.push_back(static_cast<int>(c.meetings.size()));
+    for (const int place : at[body]) {
+      const CompiledJoint& j = s.joints[static_cast<size_t>(c.joints[static_cast<size_t>(place)])];
+      const bool is_child = j.child == b;
+      const Vec3 lever = (is_child ? j.p_CM : j.p_PF) - s.state.p_offset[body];
+      sum += gyration2 + dot(lever, lever);
+      extent = std::max(extent, norm(s.model.bodies[body].X_WB.p) + norm(lever));
+      c.meetings.push_back({place, is_child});
+    }
   }
-  if (j.child >= 0) {
-    const size_t b = static_cast<size_t>(j.child);
-    f.lever_child = s.R[b] * (j.p_CM - s.p_offset[b]);
-    f.p_M = s.p[b] + f.lever_child;
-    f.M = s.R[b] * j.R_CM;
-  } else {
-    f.M = j.R_CM;
-  }
-  return f;
+  c.first_meeting.push_back(static_cast<int>(c.meetings.size()));
+  c.length = std::sqrt(sum / static_cast<double>(c.meetings.size()));
+  c.tolerance = std::max(1e-12 * c.length, 0x1p-46 * extent);  // 2^-46: some roundings of places this far out
 }
 
-/// How far the joint is from closed: j.rows values, lengths and angles.
-void violation(const CompiledJoint& j, const Frames& f, double* out) {
-  const Vec3 gap = f.p_M - f.p_F;
-  out[0] = gap.x, out[1] = gap.y, out[2] = gap.z;
-  if (j.kind == Joint::Kind::Fixed) {
-    // rotation vector between the frames from the skew part: exact to third order, and only small angles occur
-    const Vec3 r = 0.5 * (cross(f.F.column(0), f.M.column(0)) + cross(f.F.column(1), f.M.column(1)) +
-                          cross(f.F.column(2), f.M.column(2)));
-    out[3] = r.x, out[4] = r.y, out[5] = r.z;
-  } else {
-    out[3] = dot(f.M.column(2), f.F.column(0));
-    out[4] = dot(f.M.column(2), f.F.column(1));
+Vec3 turn_of(const JointRow& row, bool child) { return child ? row.turn_child : row.turn_parent; }
+
+/// J K Jᵀ of a cluster's rows, K the inverse masses and inertias of its bodies.
+template <class InverseMass, class InverseInertia>
+void fill_matrix(const System& s, const JointCluster& c, BlockCholesky& matrix, InverseMass inverse_mass,
+                 InverseInertia inverse_inertia) {
+  matrix.clear();
+  for (size_t k = 0; k < c.bodies.size(); ++k) {
+    const size_t b = static_cast<size_t>(c.bodies[k]);
+    const Mat3& W = inverse_inertia(b);
+    const double both = inverse_mass(b);
+    for (int y = c.first_meeting[k]; y < c.first_meeting[k + 1]; ++y) {
+      const JointCluster::Meeting my = c.meetings[static_cast<size_t>(y)];
+      const CompiledJoint& jy = s.joints[static_cast<size_t>(c.joints[static_cast<size_t>(my.place)])];
+      const JointRow* rows_y = &s.joint_rows[static_cast<size_t>(matrix.first_row(my.place))];
+      Vec3 turned[6];
+      for (int n = 0; n < jy.rows; ++n) turned[n] = W * turn_of(rows_y[n], my.is_child);
+      for (int x = y; x < c.first_meeting[k + 1]; ++x) {
+        const JointCluster::Meeting mx = c.meetings[static_cast<size_t>(x)];
+        const CompiledJoint& jx = s.joints[static_cast<size_t>(c.joints[static_cast<size_t>(mx.place)])];
+        const JointRow* rows_x = &s.joint_rows[static_cast<size_t>(matrix.first_row(mx.place))];
+        const double w = mx.is_child == my.is_child ? both : -both;
+        double* A = matrix.block(mx.place, my.place);
+        for (int m = 0; m < jx.rows; ++m) {
+          const Vec3 turn = turn_of(rows_x[m], mx.is_child);
+          for (int n = 0; n < (x == y ? m + 1 : jy.rows); ++n) {
+            double sum = dot(turn, turned[n]);
+            if (m < jx.lines && n < jy.lines) sum += w * dot(rows_x[m].line, rows_y[n].line);
+            A[m * jy.rows + n] += sum;
+          }
+        }
+      }
+    }
   }
+}
+
+/// Rows that repeat others for good are remembered with the joints.
+void read_repeating(const System& s, JointCluster& c) {
+  c.repeating.clear();
+  for (size_t i = 0; i < c.joints.size(); ++i)
+    for (int r = 0; r < 6; ++r)
+      if (s.state.joint[static_cast<size_t>(c.joints[i])].repeating >> r & 1)
+        c.repeating.push_back(c.matrix.first_row(static_cast<int>(i)) + r);
+}
+
+void write_repeating(System& s, const JointCluster& c) {
+  size_t next = 0;
+  for (size_t i = 0; i < c.joints.size(); ++i) {
+    JointState& js = s.state.joint[static_cast<size_t>(c.joints[i])];
+    js.is_examined = true;
+    js.repeating = 0;
+    const int first = c.matrix.first_row(static_cast<int>(i));
+    const int rows = s.joints[static_cast<size_t>(c.joints[i])].rows;
+    for (; next < c.repeating.size() && c.repeating[next] < first + rows; ++next)
+      js.repeating = static_cast<unsigned char>(js.repeating | 1 << (c.repeating[next] - first));
+  }
+}
+
+/// Which rows depend on others now, whatever the masses.
+std::vector<int> examine(const System& s, const JointCluster& c) {
+  const size_t n = static_cast<size_t>(c.matrix.rows()), width = 6 * c.bodies.size();
+  std::vector<double> matrix(n * width, 0);
+  for (size_t k = 0; k < c.bodies.size(); ++k)
+    for (int y = c.first_meeting[k]; y < c.first_meeting[k + 1]; ++y) {
+      const JointCluster::Meeting m = c.meetings[static_cast<size_t>(y)];
+      const size_t first = static_cast<size_t>(c.matrix.first_row(m.place));
+      const int rows = s.joints[static_cast<size_t>(c.joints[static_cast<size_t>(m.place)])].rows;
+      for (size_t r = first; r < first + static_cast<size_t>(rows); ++r) {
+        const Vec3 line = m.is_child ? s.joint_rows[r].line : -s.joint_rows[r].line;
+        const Vec3 turn = 1 / c.length * turn_of(s.joint_rows[r], m.is_child);
+        for (int i = 0; i < 3; ++i) {
+          matrix[r * width + 6 * k + static_cast<size_t>(i)] = line[i];
+          matrix[r * width + 6 * k + 3 + static_cast<size_t>(i)] = turn[i];
+        }
+      }
+    }
+  return find_dependent_rows(static_cast<int>(n), static_cast<int>(width), matrix, std::sqrt(kDependent));
+}
+
+/// Largest motion that a unit vector of the null space of the geometry's matrix makes: 0 if its rows do depend.
+double find_independence(const System& s, const JointCluster& c) {
+  const std::vector<double>& null = c.geometry.null_space();
+  const size_t n = static_cast<size_t>(c.matrix.rows());
+  double most2 = 0;
+  for (size_t v = 0; v < null.size(); v += n) {
+    double sum2 = 0;
+    for (size_t k = 0; k < c.bodies.size(); ++k) {
+      Vec3 line, turn;
+      for (int y = c.first_meeting[k]; y < c.first_meeting[k + 1]; ++y) {
+        const JointCluster::Meeting m = c.meetings[static_cast<size_t>(y)];
+        const size_t first = static_cast<size_t>(c.matrix.first_row(m.place));
+        const int rows = s.joints[static_cast<size_t>(c.joints[static_cast<size_t>(m.place)])].rows;
+        for (size_t r = first; r < first + static_cast<size_t>(rows); ++r) {
+          line += (m.is_child ? null[v + r] : -null[v + r]) * s.joint_rows[r].line;
+          turn += null[v + r] / c.length * turn_of(s.joint_rows[r], m.is_child);
+        }
+      }
+      sum2 += dot(line, line) + dot(turn, turn);
+    }
+    most2 = std::max(most2, sum2);
+  }
+  return std::sqrt(most2);
 }
 
 }  // namespace
@@ -68,6 +187,9 @@ void System::build_clusters() {
   in_cluster.assign(B, 0);
   joint_force.resize(B);
   joint_torque.resize(B);
+  joint_sums_due = true;
+  joint_spin.assign(B, {});
+  for (std::vector<Vec3>* x : {&v_before, &L_before, &w_before}) x->resize(B);
   std::vector<int> root(B);
   for (size_t b = 0; b < B; ++b) root[b] = static_cast<int>(b);
   const auto moving = [&](int b) { return b >= 0 && !fixed[static_cast<size_t>(b)]; };
@@ -75,6 +197,7 @@ void System::build_clusters() {
     if (state.joint[j].live && moving(joints[j].parent) && moving(joints[j].child))
       root[static_cast<size_t>(other_root(root, joints[j].parent))] = other_root(root, joints[j].child);
   std::vector<int> cluster_of(B, -1);
+  size_t most_rows = 0;
   for (size_t j = 0; j < joints.size(); ++j) {
     if (!state.joint[j].live) continue;
     const int any = moving(joints[j].child) ? joints[j].child : joints[j].parent;
@@ -86,198 +209,312 @@ void System::build_clusters() {
     }
     JointCluster& cluster = clusters[static_cast<size_t>(c)];
     cluster.joints.push_back(static_cast<int>(j));
-    cluster.rows += joints[j].rows;
     for (const int b : {joints[j].parent, joints[j].child})
       if (moving(b) && !in_cluster[static_cast<size_t>(b)]) {
         in_cluster[static_cast<size_t>(b)] = 1;
         cluster.bodies.push_back(b);
       }
   }
+  for (JointCluster& c : clusters) {
+    lay_out(*this, c);
+    most_rows = std::max(most_rows, static_cast<size_t>(c.matrix.rows()));
+  }
+  joint_rows.resize(most_rows);
+  for (std::vector<double>* x : {&joint_gaps, &joint_rhs, &joint_impulse, &joint_linear, &joint_answer, &joint_change})
+    x->resize(most_rows);
   clusters_due = false;
 }
 
-void System::solve_joints(double h) {
+void System::read_cluster(JointCluster& c, double tolerance) {
+  for (size_t i = 0; i < c.joints.size(); ++i) {
+    const CompiledJoint& j = joints[static_cast<size_t>(c.joints[i])];
+    const size_t at = static_cast<size_t>(c.matrix.first_row(static_cast<int>(i)));
+    const JointFrames f = calc_joint_frames(state, j);
+    calc_joint_gaps(j, f, &joint_gaps[at]);
+    calc_joint_rows(j, f, &joint_rows[at]);
+    for (size_t r = at + static_cast<size_t>(j.lines); r < at + static_cast<size_t>(j.rows); ++r) {
+      joint_gaps[r] *= c.length;
+      joint_rows[r].turn_child *= c.length;
+      joint_rows[r].turn_parent *= c.length;
+    }
+  }
+  for (const int b : c.bodies)
+    world_inverse_inertia[static_cast<size_t>(b)] = calc_world_inverse_inertia(static_cast<size_t>(b));
+  const auto by_mass = [&] {
+    fill_matrix(
+        *this, c, c.matrix, [&](size_t b) { return state.body[b].inverse_mass; },
+        [&](size_t b) -> const Mat3& { return world_inverse_inertia[b]; });
+  };
+  const auto by_geometry = [&] {
+    // whether rows depend on others is a matter of geometry; small masses and inertias would blur it
+    const Mat3 turn = 1 / (c.length * c.length) * Mat3::identity();
+    fill_matrix(
+        *this, c, c.geometry, [](size_t) { return 1.0; }, [&](size_t) -> const Mat3& { return turn; });
+  };
+  const bool is_examined = state.joint[static_cast<size_t>(c.joints[0])].is_examined;
+  if (is_examined) read_repeating(*this, c);
+  if ((!is_examined || c.repeating.empty()) && tolerance <= kDependent) {
+    by_mass();
+    if (c.matrix.factorise(kSuspicious)) {
+      c.dependent = 0;
+      if (!is_examined) write_repeating(*this, c);
+      return;
+    }
+  }
+  if (!is_examined) {
+    c.repeating = examine(*this, c);
+    write_repeating(*this, c);
+  }
+  by_geometry();
+  c.dependent = c.geometry.factorise_dependent(tolerance, c.repeating);
+  if (is_examined && !c.repeating.empty() && tolerance <= kDependent &&
+      find_independence(*this, c) > std::sqrt(kDependent)) {
+    // no longer so, as after a start in a singular position
+    c.repeating = examine(*this, c);
+    write_repeating(*this, c);
+    by_geometry();
+    c.dependent = c.geometry.factorise_dependent(tolerance, c.repeating);
+  }
+  // keep to the rows that repeat others most clearly
+  if (tolerance <= kDependent && c.dependent == static_cast<int>(c.repeating.size())) {
+    const std::vector<int> chosen = c.geometry.choose_dependent();
+    if (chosen != c.repeating) {
+      c.repeating = chosen;
+      write_repeating(*this, c);
+      by_geometry();
+      c.dependent = c.geometry.factorise_dependent(tolerance, c.repeating);
+    }
+  }
+  by_mass();
+  c.matrix.factorise_like(c.geometry);
+}
+
+/// Spins in the middle of the step if there were no joints, and from them the right-hand side whose impulses close the
+/// joints to second order.
+void System::predict_cluster(const JointCluster& c, double h) {
+  const State& s = state;
+  const auto moving = [&](int b) { return b >= 0 && !fixed[static_cast<size_t>(b)]; };
+  for (const int body : c.bodies) {
+    const size_t b = static_cast<size_t>(body);
+    const Mat3& W = world_inverse_inertia[b];
+    const Vec3 w0 = W * s.L[b];
+    joint_spin[b] = w0 - (0.5 * h) * (W * cross(w0, s.L[b]));
+  }
+  for (size_t i = 0; i < c.joints.size(); ++i) {
+    const CompiledJoint& j = joints[static_cast<size_t>(c.joints[i])];
+    const size_t at = static_cast<size_t>(c.matrix.first_row(static_cast<int>(i)));
+    JointMotion now, before;
+    if (moving(j.child)) {
+      const size_t b = static_cast<size_t>(j.child);
+      now.v_child = before.v_child = s.v[b];
+      now.w_child = joint_spin[b], before.w_child = s.w[b];
+    }
+    if (moving(j.parent)) {
+      const size_t b = static_cast<size_t>(j.parent);
+      now.v_parent = before.v_parent = s.v[b];
+      now.w_parent = joint_spin[b], before.w_parent = s.w[b];
+    }
+    double bias[6];
+    calc_joint_bias(j, calc_joint_frames(s, j), before, bias);
+    for (int r = 0; r < j.rows; ++r) {
+      const size_t at_r = at + static_cast<size_t>(r);
+      const JointRow& row = joint_rows[at_r];
+      const double rate = dot(row.line, now.v_child - now.v_parent) + dot(row.turn_child, now.w_child) +
+                          dot(row.turn_parent, now.w_parent);
+      joint_rhs[at_r] = -(rate + joint_gaps[at_r] / h + 0.5 * h * (r < j.lines ? 1 : c.length) * bias[r]);
+    }
+  }
+}
+
+void System::apply_impulses(const JointCluster& c, const std::vector<double>& impulse) {
   State& s = state;
-  const double impulse_time = kick_time();
-  joint_force.fill({});
-  joint_torque.fill({});
-  for (const JointCluster& cluster : clusters) {
-    const size_t n = static_cast<size_t>(cluster.rows);
-    std::vector<JointRow>& rows = joint_rows;
-    rows.resize(n);
-    std::vector<double>&A = joint_matrix, &rhs = joint_rhs, &total = joint_impulse;
-    A.assign(n * n, 0);
-    rhs.assign(n, 0);
-    total.assign(n, 0);
-    // rows at the beginning of the step
-    size_t at = 0;
-    for (const int index : cluster.joints) {
-      const CompiledJoint& j = joints[static_cast<size_t>(index)];
-      const Frames f = frames_of(s, j);
-      violation(j, f, &rhs[at]);
-      for (int i = 0; i < 3; ++i) {
-        Vec3 e;
-        e[i] = 1;
-        rows[at + static_cast<size_t>(i)] = {e, cross(f.lever_child, e), -cross(f.lever_parent, e)};
-      }
-      if (j.kind == Joint::Kind::Fixed) {
-        for (int i = 0; i < 3; ++i) {
-          Vec3 e;
-          e[i] = 1;
-          rows[at + 3 + static_cast<size_t>(i)] = {{}, e, -e};
-        }
-      } else {
-        for (int i = 0; i < 2; ++i) {
-          const Vec3 a = cross(f.M.column(2), f.F.column(i));
-          rows[at + 3 + static_cast<size_t>(i)] = {{}, a, -a};
-        }
-      }
-      at += static_cast<size_t>(j.rows);
+  const auto moving = [&](int b) { return b >= 0 && !fixed[static_cast<size_t>(b)]; };
+  for (size_t i = 0; i < c.joints.size(); ++i) {
+    const CompiledJoint& j = joints[static_cast<size_t>(c.joints[i])];
+    const size_t at = static_cast<size_t>(c.matrix.first_row(static_cast<int>(i)));
+    Vec3 line, turn_child, turn_parent;
+    for (size_t r = at; r < at + static_cast<size_t>(j.rows); ++r) {
+      line += impulse[r] * joint_rows[r].line;
+      turn_child += impulse[r] * joint_rows[r].turn_child;
+      turn_parent += impulse[r] * joint_rows[r].turn_parent;
     }
-    for (const int b : cluster.bodies)
-      world_inverse_inertia[static_cast<size_t>(b)] = calc_world_inverse_inertia(static_cast<size_t>(b));
-    // A = J M^-1 J^T, joint by joint where they share a moving body
-    size_t at_i = 0;
-    for (const int index_i : cluster.joints) {
-      const CompiledJoint& ji = joints[static_cast<size_t>(index_i)];
-      size_t at_k = 0;
-      for (const int index_k : cluster.joints) {
-        if (at_k > at_i) break;  // the lower triangle is enough
-        const CompiledJoint& jk = joints[static_cast<size_t>(index_k)];
-        for (const int side_i : {0, 1}) {
-          const int b = side_i == 0 ? ji.parent : ji.child;
-          if (b < 0 || fixed[static_cast<size_t>(b)]) continue;
-          for (const int side_k : {0, 1}) {
-            if (b != (side_k == 0 ? jk.parent : jk.child)) continue;
-            const Mat3& W = world_inverse_inertia[static_cast<size_t>(b)];
-            const double w = s.body[static_cast<size_t>(b)].inverse_mass * (side_i == side_k ? 1 : -1);
-            for (int c = 0; c < jk.rows; ++c) {
-              const JointRow& rc = rows[at_k + static_cast<size_t>(c)];
-              const Vec3 Wt = W * (side_k == 0 ? rc.turn_parent : rc.turn_child);
-              for (int r = at_k == at_i ? c : 0; r < ji.rows; ++r) {
-                const JointRow& rr = rows[at_i + static_cast<size_t>(r)];
-                A[(at_i + static_cast<size_t>(r)) * n + at_k + static_cast<size_t>(c)] +=
-                    w * dot(rr.line, rc.line) + dot(side_i == 0 ? rr.turn_parent : rr.turn_child, Wt);
-              }
-            }
-          }
-        }
-        at_k += static_cast<size_t>(jk.rows);
-      }
-      at_i += static_cast<size_t>(ji.rows);
+    if (moving(j.child)) {
+      const size_t b = static_cast<size_t>(j.child);
+      s.v[b] += s.body[b].inverse_mass * line;
+      s.L[b] += turn_child;
     }
-    // Cholesky; a direction that the others already hold gets no impulse of its own
-    for (size_t k = 0; k < n; ++k) {
-      const double diagonal = A[k * n + k];
-      double pivot = diagonal;
-      for (size_t i = 0; i < k; ++i) pivot -= A[k * n + i] * A[k * n + i];
-      const bool redundant = pivot <= 1e-11 * diagonal;
-      const double root = redundant ? 0 : std::sqrt(pivot);
-      A[k * n + k] = root;
-      for (size_t r = k + 1; r < n; ++r) {
-        double sum = A[r * n + k];
-        for (size_t i = 0; i < k; ++i) sum -= A[r * n + i] * A[k * n + i];
-        A[r * n + k] = redundant ? 0 : sum / root;
-      }
+    if (moving(j.parent)) {
+      const size_t b = static_cast<size_t>(j.parent);
+      s.v[b] -= s.body[b].inverse_mass * line;
+      s.L[b] += turn_parent;
     }
-    const auto solve = [&](std::vector<double>& x) {
+  }
+}
+
+/// Moves the bodies to the end of the step; the velocities that would close what is open there, in joint_rhs. Returns
+/// the widest gap of any row.
+double System::find_gaps(const JointCluster& c, double h) {
+  for (const int body : c.bodies) {
+    const size_t b = static_cast<size_t>(body);
+    drift(b, h, p_before[b], q_before[b], R_before[b]);
+  }
+  double open = 0;
+  for (size_t i = 0; i < c.joints.size(); ++i) {
+    const CompiledJoint& j = joints[static_cast<size_t>(c.joints[i])];
+    const size_t at = static_cast<size_t>(c.matrix.first_row(static_cast<int>(i)));
+    double gaps[6];
+    calc_joint_gaps(j, calc_joint_frames(state, j), gaps);
+    for (int r = 0; r < j.rows; ++r) {
+      open = std::max(open, std::abs(gaps[r]));
+      joint_rhs[at + static_cast<size_t>(r)] = -gaps[r] * (r < j.lines ? 1 : c.length) / h;
+    }
+  }
+  if (c.dependent > 0) c.matrix.project(joint_rhs.data());
+  return open;
+}
+
+bool System::close_cluster(JointCluster& c, double h, bool from_before) {
+  const size_t n = static_cast<size_t>(c.matrix.rows());
+  predict_cluster(c, h);
+  c.matrix.solve(joint_rhs.data());
+  for (size_t i = 0; i < c.joints.size(); ++i) {
+    const size_t joint = static_cast<size_t>(c.joints[i]);
+    const size_t at = static_cast<size_t>(c.matrix.first_row(static_cast<int>(i)));
+    for (int r = 0; r < joints[joint].rows; ++r) {
+      const size_t row = at + static_cast<size_t>(r);
+      joint_linear[row] = joint_rhs[row];
+      if (from_before) joint_rhs[row] += state.joint[joint].curvature[r];
+      joint_impulse[row] = joint_rhs[row];
+    }
+  }
+  for (int round = 0; round < kMostRounds; ++round) {
+    apply_impulses(c, joint_rhs);
+    c.open = find_gaps(c, h);
+    double left = 0;
+    for (size_t r = 0; r < n; ++r) left = std::max(left, std::abs(joint_rhs[r]));
+    if (left * h < c.tolerance) return true;
+    if (!std::isfinite(left)) return false;
+    c.matrix.solve(joint_rhs.data());
+    // where one direction answers otherwise than the matrix says, as it does near singular positions, a secant finds it
+    double above = 0, below = 0;
+    if (round > 0) {
       for (size_t r = 0; r < n; ++r) {
-        double sum = x[r];
-        for (size_t i = 0; i < r; ++i) sum -= A[r * n + i] * x[i];
-        x[r] = A[r * n + r] > 0 ? sum / A[r * n + r] : 0;
-      }
-      for (size_t r = n; r-- > 0;) {
-        double sum = x[r];
-        for (size_t i = r + 1; i < n; ++i) sum -= A[i * n + r] * x[i];
-        x[r] = A[r * n + r] > 0 ? sum / A[r * n + r] : 0;
-      }
-    };
-    const auto apply = [&](const std::vector<double>& impulse) {
-      size_t row = 0;
-      for (const int index : cluster.joints) {
-        const CompiledJoint& j = joints[static_cast<size_t>(index)];
-        Vec3 line, turn_child, turn_parent;
-        for (int r = 0; r < j.rows; ++r, ++row) {
-          line += impulse[row] * rows[row].line;
-          turn_child += impulse[row] * rows[row].turn_child;
-          turn_parent += impulse[row] * rows[row].turn_parent;
-        }
-        if (j.child >= 0 && !fixed[static_cast<size_t>(j.child)]) {
-          const size_t b = static_cast<size_t>(j.child);
-          s.v[b] += s.body[b].inverse_mass * line;
-          s.L[b] += turn_child;
-        }
-        if (j.parent >= 0 && !fixed[static_cast<size_t>(j.parent)]) {
-          const size_t b = static_cast<size_t>(j.parent);
-          s.v[b] -= s.body[b].inverse_mass * line;
-          s.L[b] += turn_parent;
-        }
-      }
-    };
-    // first: velocities that close the joints to first order, spins taken at the present orientation
-    at = 0;
-    for (const int index : cluster.joints) {
-      const CompiledJoint& j = joints[static_cast<size_t>(index)];
-      Vec3 vc, wc, vp, wp;
-      if (j.child >= 0) {
-        const size_t b = static_cast<size_t>(j.child);
-        vc = s.v[b];
-        wc = world_inverse_inertia[b] * s.L[b];
-      }
-      if (j.parent >= 0) {
-        const size_t b = static_cast<size_t>(j.parent);
-        vp = s.v[b];
-        wp = world_inverse_inertia[b] * s.L[b];
-      }
-      for (int r = 0; r < j.rows; ++r, ++at) {
-        const JointRow& row = rows[at];
-        rhs[at] = -(dot(row.line, vc - vp) + dot(row.turn_child, wc) + dot(row.turn_parent, wp) + rhs[at] / h);
+        const double change = joint_rhs[r] - joint_answer[r];
+        above += change * joint_rhs[r], below += change * change;
       }
     }
-    double drift_left = 0;
-    for (int round = 0; round < 6; ++round) {
-      solve(rhs);
-      for (size_t r = 0; r < n; ++r) total[r] += rhs[r];
-      apply(rhs);
-      for (const int b : cluster.bodies)
-        drift(static_cast<size_t>(b), h, p_before[static_cast<size_t>(b)], q_before[static_cast<size_t>(b)],
-              R_before[static_cast<size_t>(b)]);
-      at = 0;
-      drift_left = 0;
-      for (const int index : cluster.joints) {
-        const CompiledJoint& j = joints[static_cast<size_t>(index)];
-        violation(j, frames_of(s, j), &rhs[at]);
-        for (int r = 0; r < j.rows; ++r, ++at) {
-          drift_left = std::max(drift_left, std::abs(rhs[at]));
-          rhs[at] = -rhs[at] / h;
-        }
-      }
-      if (drift_left < 1e-11) break;
+    const double share = below > 0 ? above / below : 0;
+    for (size_t r = 0; r < n; ++r) {
+      const double answer = joint_rhs[r];
+      joint_rhs[r] -= share * (joint_change[r] + answer - joint_answer[r]);
+      joint_answer[r] = answer;
+      joint_change[r] = joint_rhs[r];
+      joint_impulse[r] += joint_rhs[r];
     }
-    s.largest_drift = std::max(s.largest_drift, drift_left);
-    // reactions
-    at = 0;
-    for (const int index : cluster.joints) {
-      const CompiledJoint& j = joints[static_cast<size_t>(index)];
-      JointState& js = s.joint[static_cast<size_t>(index)];
-      js.force = js.moment = {};
-      Vec3 turn_parent, turn_child;
-      for (int r = 0; r < j.rows; ++r, ++at) {
-        const double f = total[at] / impulse_time;
-        js.force += f * rows[at].line;
-        if (r >= 3) js.moment += f * rows[at].turn_child;
-        turn_child += f * rows[at].turn_child;
-        turn_parent += f * rows[at].turn_parent;
-      }
-      if (j.child >= 0) {
-        joint_force[static_cast<size_t>(j.child)] += js.force;
-        joint_torque[static_cast<size_t>(j.child)] += turn_child;
-      }
-      if (j.parent >= 0) {
-        joint_force[static_cast<size_t>(j.parent)] -= js.force;
-        joint_torque[static_cast<size_t>(j.parent)] += turn_parent;
-      }
+  }
+  return false;
+}
+
+void System::solve_cluster(JointCluster& c, double h) {
+  State& s = state;
+  double turn = 0;  // largest in a step
+  for (const int body : c.bodies) {
+    const size_t b = static_cast<size_t>(body);
+    p_before[b] = s.p[b], q_before[b] = s.q[b], R_before[b] = s.R[b];
+    v_before[b] = s.v[b], L_before[b] = s.L[b], w_before[b] = s.w[b];
+    turn = std::max(turn, h * norm(w_before[b]));
+  }
+  const auto restore = [&] {
+    for (const int body : c.bodies) {
+      const size_t b = static_cast<size_t>(body);
+      s.p[b] = p_before[b], s.q[b] = q_before[b], s.R[b] = R_before[b];
+      s.v[b] = v_before[b], s.L[b] = L_before[b], s.w[b] = w_before[b];
     }
+  };
+  read_cluster(c, kDependent);
+  const int usual = c.dependent;
+  note_dependence(c, usual);
+  const bool regular = close_cluster(c, h, true);
+  bool closed = regular;
+  // a direction that comes and goes within the step, at a singular position, is left out of it
+  for (double share = 0; share < 10 && !closed; share = share == 0 ? 0.5 : 2 * share) {
+    restore();
+    read_cluster(c, std::max(kDependent, share * share * turn * turn));
+    closed = close_cluster(c, h, false);
+  }
+  if (!regular) note_dependence(c, usual);
+  if (!closed) note_open(c);
+  s.largest_drift = std::max(s.largest_drift, c.open);
+  // reactions
+  const double per_time = 1 / kick_time();
+  const auto moving = [&](int b) { return b >= 0 && !fixed[static_cast<size_t>(b)]; };
+  for (const int b : c.bodies) joint_force[static_cast<size_t>(b)] = joint_torque[static_cast<size_t>(b)] = Vec3{};
+  for (size_t i = 0; i < c.joints.size(); ++i) {
+    const size_t joint = static_cast<size_t>(c.joints[i]);
+    const CompiledJoint& j = joints[joint];
+    JointState& js = s.joint[joint];
+    const size_t at = static_cast<size_t>(c.matrix.first_row(static_cast<int>(i)));
+    js.force = js.moment = {};
+    Vec3 turn_child, turn_parent;
+    for (int r = 0; r < j.rows; ++r) {
+      const size_t row = at + static_cast<size_t>(r);
+      const double f = per_time * joint_impulse[row];
+      js.force += f * joint_rows[row].line;
+      if (r >= j.lines) js.moment += f * joint_rows[row].turn_child;
+      turn_child += f * joint_rows[row].turn_child;
+      turn_parent += f * joint_rows[row].turn_parent;
+      js.curvature[r] = regular ? joint_impulse[row] - joint_linear[row] : 0;
+    }
+    if (moving(j.child)) {
+      joint_force[static_cast<size_t>(j.child)] += js.force;
+      joint_torque[static_cast<size_t>(j.child)] += turn_child;
+    }
+    if (moving(j.parent)) {
+      joint_force[static_cast<size_t>(j.parent)] -= js.force;
+      joint_torque[static_cast<size_t>(j.parent)] += turn_parent;
+    }
+    if (j.kind == Joint::Kind::Revolute || j.kind == Joint::Kind::Cylindrical) {
+      const JointFrames f = calc_joint_frames(s, j);
+      update_angle(joint, f.F, f.M);
+    }
+  }
+}
+
+void System::solve_joints(double h) {
+  if (joint_sums_due) {
+    // of bodies that joints have let go
+    joint_force.fill({});
+    joint_torque.fill({});
+    joint_sums_due = false;
+  }
+  for (JointCluster& c : clusters) solve_cluster(c, h);
+}
+
+void System::update_angle(size_t joint, const Mat3& F, const Mat3& M) {
+  if (joints[joint].kind != Joint::Kind::Revolute && joints[joint].kind != Joint::Kind::Cylindrical) return;
+  JointState& js = state.joint[joint];
+  const double cosine = dot(M.column(0), F.column(0)), sine = dot(M.column(0), F.column(1));
+  const double turned = sine * js.known_cosine - cosine * js.known_sine;  // sine of the angle since then
+  constexpr double near = 1.0 / 32;
+  if (std::abs(turned) < near && cosine * js.known_cosine + sine * js.known_sine > 0) {
+    // arc sine; the first term left out is 1e-19
+    const double t2 = turned * turned;
+    js.angle =
+        js.known_angle +
+        turned * (1 + t2 * (1.0 / 6 + t2 * (3.0 / 40 + t2 * (15.0 / 336 + t2 * (105.0 / 3456 + t2 * 945.0 / 42240)))));
+    return;
+  }
+  constexpr double turn = 2 * 3.14159265358979323846;
+  const double angle = std::atan2(sine, cosine);
+  js.angle = angle + turn * std::round((js.angle - angle) / turn);
+  js.known_angle = js.angle, js.known_cosine = cosine, js.known_sine = sine;
+}
+
+void System::update_angles() {
+  for (size_t i = 0; i < joints.size(); ++i) {
+    if (!state.joint[i].live) continue;
+    const CompiledJoint& j = joints[i];
+    update_angle(i, rotation_of(j.parent) * j.R_PF, rotation_of(j.child) * j.R_CM);
   }
 }
 
@@ -286,7 +523,6 @@ void System::check_joints() {
     const CompiledJoint& j = joints[i];
     JointState& js = state.joint[i];
     if (!js.live) continue;
-    if (j.kind == Joint::Kind::Revolute && j.rotational < 0) js.angle = calc_angle(j, js.angle);
     const Mat3 F = rotation_of(j.parent) * j.R_PF;
     const double along = dot(F.column(0), js.force);
     const double across2 = dot(js.force, js.force) - along * along;
@@ -296,7 +532,9 @@ void System::check_joints() {
       release_joint(i, "shear");
     } else if (dot(js.moment, js.moment) > j.moment_limit * j.moment_limit) {
       release_joint(i, "moment");
-    } else if (std::abs(js.angle) > j.rotation_limit) {
+    } else if (std::abs(js.angle) > j.rotation_limit &&
+               (j.rotational < 0 || state.rotational[static_cast<size_t>(j.rotational)].live)) {
+      // a joint whose rotational element has broken turns freely
       release_joint(i, "rotation");
     }
   }
@@ -307,6 +545,7 @@ void System::release_joint(size_t i, const char* reason) {
   if (!js.live) return;
   js.live = false;
   js.force = js.moment = {};
+  for (JointState& other : state.joint) other.is_examined = false;
   if (const int r = joints[i].rotational; r >= 0 && state.rotational[static_cast<size_t>(r)].live)
     break_zone(state.rotational[static_cast<size_t>(r)], BreakReason::Removed);
   clusters_due = true;

@@ -44,6 +44,7 @@ void System::evaluate_start() {
   joint_force.assign(B, {});
   joint_torque.assign(B, {});
   clusters_due = true;
+  close_joints();
   state.gravity_at_start = 0;
   state.gravity_at_start = calc_energy().gravity;
   evaluate_forces();

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "mbs/joint_rows.h"
+
 namespace topple::mbs {
 
 namespace {
@@ -127,7 +129,10 @@ void System::compile() {
     c.p_CM = j.X_CM.p;
     c.R_PF = to_matrix(normalized(j.X_PF.q));
     c.R_CM = to_matrix(normalized(j.X_CM.q));
-    c.rows = j.kind == Joint::Kind::Fixed ? 6 : 5;
+    if (j.kind == Joint::Kind::Distance) c.length = norm(pose_of(c.child) * c.p_CM - pose_of(c.parent) * c.p_PF);
+    const RowCount count = row_count(j.kind);
+    c.lines = count.lines;
+    c.rows = count.lines + count.rotations;
     c.tension_limit = j.tension_limit;
     c.shear_limit = j.shear_limit;
     c.moment_limit = j.moment_limit;
@@ -135,8 +140,7 @@ void System::compile() {
     joints.push_back(c);
   }
   s.joint.resize(joints.size());
-  for (size_t j = 0; j < joints.size(); ++j)
-    if (joints[j].kind == Joint::Kind::Revolute) s.joint[j].angle = calc_angle(joints[j], 0);
+  update_angles();
 
   for (const RotationalElement& r : model.rotational_elements) {
     CompiledRotational c;
@@ -185,6 +189,8 @@ void System::compile() {
   q_before.resize(B);
   R_before.resize(B);
   world_inverse_inertia.resize(B);
+  body_reaction.assign(B, {});
+  body_reaction_turn.assign(B, {});
   in_cluster.assign(B, 0);
   for (size_t b = 0; b < B; ++b) pack_body(b);
   s.contact_count.assign(B, 0);
@@ -217,23 +223,15 @@ Mat3 System::calc_world_inverse_inertia(size_t b) const {
   return world_tensor(state.R[b], state.body[b].inverse_inertia);
 }
 
-double System::calc_angle(const CompiledJoint& j, double previous) const {
-  const Mat3 F = rotation_of(j.parent) * j.R_PF, M = rotation_of(j.child) * j.R_CM;
-  const double angle = std::atan2(dot(M.column(0), F.column(1)), dot(M.column(0), F.column(0)));
-  constexpr double turn = 2 * 3.14159265358979323846;
-  return angle + turn * std::round((previous - angle) / turn);
-}
-
 void System::evaluate_rotationals(double h) {
   for (size_t i = 0; i < rotationals.size(); ++i) {
     ZoneState& z = state.rotational[i];
     if (!z.live) continue;
     const CompiledRotational& c = rotationals[i];
     const CompiledJoint& j = joints[static_cast<size_t>(c.joint)];
-    JointState& js = state.joint[static_cast<size_t>(c.joint)];
+    const JointState& js = state.joint[static_cast<size_t>(c.joint)];
     const Mat3 F = rotation_of(j.parent) * j.R_PF;
     const Vec3 axis = F.column(2);
-    js.angle = calc_angle(j, js.angle);
     const bool was_yielded = z.yielded;
     Six d;
     d.c[0] = -dot(F.column(0), js.force);
@@ -387,6 +385,7 @@ void System::replace_body(size_t b, const Body& replacement) {
   s.v[b] += cross(s.w[b], s.R[b] * moved);
   s.p[b] += s.R[b] * moved;
   s.p_offset[b] += moved;
+  clusters_due = true;  // levers and masses have changed
   s.body[b] = constants_of(replacement);
   s.L[b] = world_tensor(s.R[b], replacement.inertia) * s.w[b];
   pack_body(b);
@@ -481,13 +480,6 @@ void System::prepare_step() {
 
 void System::finish_motion() {
   State& s = state;
-  for (const JointCluster& cluster : clusters)
-    for (const int body : cluster.bodies) {
-      const size_t b = static_cast<size_t>(body);
-      p_before[b] = s.p[b];
-      q_before[b] = s.q[b];
-      R_before[b] = s.R[b];
-    }
   solve_joints(step);
   s.first_kick = false;
   ++s.step_index;
@@ -546,16 +538,20 @@ bool System::advance_step() {
   return is_finite() && trouble.empty();
 }
 
-Vec3 System::calc_velocity(size_t b) const {
+Vec3 System::calc_velocity(size_t b) const { return calc_velocity(b, joint_force[b]); }
+
+Vec3 System::calc_velocity(size_t b, const Vec3& from_joints) const {
   if (fixed[b] || state.first_kick) return state.v[b];
-  const Vec3 a = state.body[b].inverse_mass * (force[b] + joint_force[b]) + model.gravity;
+  const Vec3 a = state.body[b].inverse_mass * (force[b] + from_joints) + model.gravity;
   return state.v[b] + (0.5 * step) * a;
 }
 
-Vec3 System::calc_angular_velocity(size_t b) const {
+Vec3 System::calc_angular_velocity(size_t b) const { return calc_angular_velocity(b, joint_torque[b]); }
+
+Vec3 System::calc_angular_velocity(size_t b, const Vec3& from_joints) const {
   if (fixed[b]) return {};
   if (state.first_kick) return state.w[b];
-  const Vec3 L = state.L[b] + (0.5 * step) * (torque[b] + joint_torque[b]);
+  const Vec3 L = state.L[b] + (0.5 * step) * (torque[b] + from_joints);
   return state.R[b] * (state.body[b].inverse_inertia * transpose_times(state.R[b], L));
 }
 
@@ -565,7 +561,7 @@ Energy System::calc_energy() const {
     if (fixed[b]) continue;
     const BodyConstants& c = state.body[b];
     // both half steps' velocities give the kinetic energy between them
-    const Vec3 v = calc_velocity(b), w = calc_angular_velocity(b);
+    const Vec3 v = calc_velocity(b, body_reaction[b]), w = calc_angular_velocity(b, body_reaction_turn[b]);
     e.kinetic += 0.5 * c.mass * dot(v, v) + 0.5 * dot(w, state.R[b] * (c.inertia * transpose_times(state.R[b], w)));
     e.gravity -= c.mass * dot(model.gravity, state.p[b]);
   }
@@ -594,6 +590,7 @@ Energy System::calc_energy() const {
 
 const View& System::calc_view() {
   unpack_elements();
+  calc_reactions();
   View& v = view;
   const State& s = state;
   const size_t E = elements.size(), R = rotationals.size();
@@ -604,8 +601,8 @@ const View& System::calc_view() {
   v.mass.resize(B);
   for (size_t b = 0; b < B; ++b) {
     v.X_WB[b] = {s.p[b] - s.R[b] * s.p_offset[b], s.q[b]};
-    v.v_WB[b] = calc_velocity(b);
-    v.w_WB[b] = calc_angular_velocity(b);
+    v.v_WB[b] = calc_velocity(b, body_reaction[b]);
+    v.w_WB[b] = calc_angular_velocity(b, body_reaction_turn[b]);
     v.mass[b] = s.body[b].mass;
   }
   v.element_state.resize(E + R);
@@ -637,15 +634,20 @@ const View& System::calc_view() {
   v.joint_force.resize(joints.size());
   v.joint_moment.resize(joints.size());
   v.joint_released.resize(joints.size());
+  v.joint_angle.resize(joints.size());
+  v.joint_displacement.resize(joints.size());
   Vec3 joints_on_ground;
   for (size_t j = 0; j < joints.size(); ++j) {
     const CompiledJoint& c = joints[j];
     const Mat3 F = rotation_of(c.parent) * c.R_PF;
-    v.joint_force[j] = transpose_times(F, s.joint[j].force);
-    v.joint_moment[j] = transpose_times(F, s.joint[j].moment);
+    v.joint_force[j] = transpose_times(F, reaction_force[j]);
+    v.joint_moment[j] = transpose_times(F, reaction_moment[j]);
     v.joint_released[j] = !s.joint[j].live;
-    if (c.parent < 0 || fixed[static_cast<size_t>(c.parent)]) joints_on_ground += s.joint[j].force;
-    if (c.child < 0 || fixed[static_cast<size_t>(c.child)]) joints_on_ground -= s.joint[j].force;
+    v.joint_angle[j] = s.joint[j].angle;
+    const bool slides = c.kind == Joint::Kind::Prismatic || c.kind == Joint::Kind::Cylindrical;
+    v.joint_displacement[j] = slides ? dot(F.column(2), calc_joint_frames(s, c).gap) : 0;
+    if (c.parent < 0 || fixed[static_cast<size_t>(c.parent)]) joints_on_ground += reaction_force[j];
+    if (c.child < 0 || fixed[static_cast<size_t>(c.child)]) joints_on_ground -= reaction_force[j];
   }
   v.cable_force.resize(s.cable.size());
   for (size_t i = 0; i < s.cable.size(); ++i) v.cable_force[i] = s.cable[i].force;

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "mbs/block_cholesky.h"
 #include "mbs/boxes.h"
 #include "mbs/forces.h"
 #include "mbs/lane_array.h"
@@ -71,7 +72,8 @@ struct CompiledJoint {
   int parent = -1, child = -1;
   Vec3 p_PF, p_CM;
   Mat3 R_PF, R_CM;
-  int rows = 6;
+  int lines = 3, rows = 6;  // lines of action, and with the rotations
+  double length = 0;        // between the origins, of a distance joint [m]
   double tension_limit, shear_limit, moment_limit, rotation_limit;
   int rotational = -1;  // element about its axis
 };
@@ -85,7 +87,12 @@ struct CompiledRotational {
 struct JointState {
   bool live = true;
   Vec3 force, moment;  // reaction on the child at the joint, in W [N, N·m]
-  double angle = 0;    // of a revolute joint, continuous [rad]
+  double angle = 0;    // of a revolute or cylindrical joint, continuous [rad]
+  // the angle is followed from here as long as it is near: no arc tangent at each step
+  double known_angle = 0, known_cosine = 1, known_sine = 0;
+  unsigned char repeating = 0;  // rows that repeat those of other joints, bit r for row r
+  bool is_examined = false;     // repeating is known
+  double curvature[6] = {};  // the part of the last impulse that the linear step does not know [N·s, N·m·s over length]
 };
 
 struct CableState {
@@ -149,11 +156,27 @@ struct JointRow {
   Vec3 line, turn_child, turn_parent;
 };
 
-/// One list of joints that share moving bodies, solved together.
+/// Pivot over diagonal of a row that repeats others, geometry alone: it stands at 1e-6 of what they hold.
+inline constexpr double kDependent = 1e-12;
+
+/// One list of joints that share moving bodies, solved together. Rotations count with the length: their rows are
+/// multiplied by it, so that all rows are lengths.
 struct JointCluster {
-  std::vector<int> joints;
-  std::vector<int> bodies;  // moving ones
-  int rows = 0;
+  /// A joint at a moving body: place in `joints`, and on which side the body is.
+  struct Meeting {
+    int place = 0;
+    bool is_child = false;
+  };
+  std::vector<int> joints;            // in the order of elimination
+  std::vector<int> bodies;            // moving ones
+  std::vector<int> first_meeting;     // of each body, and one more
+  std::vector<Meeting> meetings;      // by body, places rising
+  double length = 1, tolerance = 0;   // [m]
+  std::vector<int> repeating;         // rows that repeat others for good
+  int dependent = 0;                  // rows that do so now
+  double open = 0;                    // widest gap [m, rad]
+  BlockCholesky matrix;               // J M⁻¹ Jᵀ
+  BlockCholesky geometry;             // J Jᵀ, where rows may depend on others
 };
 
 class System {
@@ -215,9 +238,15 @@ class System {
   std::vector<unsigned char> in_cluster;              // (B)
   std::vector<JointCluster> clusters;
   bool clusters_due = true;
+  std::vector<std::pair<int, int>> joint_notes;  // first joint and situation of those made
+  bool joint_sums_due = true;  // those of bodies without joints are to be cleared
   std::string identity;  // of the model, for snapshots
   std::vector<JointRow> joint_rows;
-  std::vector<double> joint_matrix, joint_rhs, joint_impulse;
+  std::vector<double> joint_gaps, joint_rhs, joint_impulse, joint_linear, joint_answer, joint_change;
+  std::vector<Vec3> v_before, L_before, w_before;  // of jointed bodies (B)
+  std::vector<Vec3> joint_spin;                         // of jointed bodies in the middle of the step (B)
+  std::vector<Vec3> reaction_force, reaction_moment;    // at the time of the positions, of a view, in W (J)
+  std::vector<Vec3> body_reaction, body_reaction_turn;  // their sums on bodies (B)
   Vec3 ground_reaction, ground_contact;
   int body_contacts = 0;
   std::string trouble;             // why the run cannot go on; empty: nothing
@@ -329,15 +358,34 @@ class System {
   /// Moves a body from its pose at the beginning of the step to the end of it.
   void drift(size_t body, double h, const Vec3& p0, const Quat& q0, const Mat3& R0);
   void build_clusters();
+  /// Reads the joints of a cluster at the present poses: rows, gaps, matrix and its factor; rows below the tolerance
+  /// count as dependent.
+  void read_cluster(JointCluster&, double tolerance);
+  void predict_cluster(const JointCluster&, double h);
+  void apply_impulses(const JointCluster&, const std::vector<double>& impulse);
+  double find_gaps(const JointCluster&, double h);
+  bool close_cluster(JointCluster&, double h, bool from_before);
+  void solve_cluster(JointCluster&, double h);
   void solve_joints(double h);
   void check_joints();
+  /// Closes the joints and makes the velocities agree with them, before the first step.
+  void close_joints();
+  /// Reactions at the time of the positions, from the accelerations.
+  void calc_reactions();
+  void update_angle(size_t joint, const Mat3& F, const Mat3& M);
+  void update_angles();
+  /// Tells once for each cluster that rows repeat others, that more do for a while than `usual`, or that a step did not
+  /// close all joints.
+  void note_dependence(const JointCluster&, int usual);
+  void note_open(const JointCluster&);
+  void note_speed(const JointCluster&, double speed);
+  /// True the first time for a cluster and a situation.
+  bool note_once(const JointCluster&, int situation);
   void break_element(size_t e, BreakReason reason);
   void release_joint(size_t j, const char* reason);
   void replace_body(size_t b, const Body& replacement);
   void layout_shapes();
   void mark_search_due() { state.search_due = true; }
-  /// Angle of a revolute joint from its frames, near `previous`.
-  double calc_angle(const CompiledJoint&, double previous) const;
   Mat3 rotation_of(int body) const { return body < 0 ? Mat3::identity() : state.R[static_cast<size_t>(body)]; }
   Vec3 centre_of(int body) const { return body < 0 ? Vec3{} : state.p[static_cast<size_t>(body)]; }
   Pose pose_of(int body) const {
@@ -347,6 +395,9 @@ class System {
   /// Velocities at the time of the positions, half a step after the stored ones.
   Vec3 calc_velocity(size_t body) const;
   Vec3 calc_angular_velocity(size_t body) const;
+  /// With these forces of the joints instead of those of the step before.
+  Vec3 calc_velocity(size_t body, const Vec3& from_joints) const;
+  Vec3 calc_angular_velocity(size_t body, const Vec3& from_joints) const;
   Mat3 calc_world_inverse_inertia(size_t body) const;
 };
 

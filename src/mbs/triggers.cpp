@@ -34,7 +34,7 @@ double System::calc_component(const Quantity& q, int component) {
           transpose_times(F, q.kind == Quantity::Kind::JointForce ? s.joint[i].force : s.joint[i].moment), component);
     }
     case Quantity::Kind::JointAngle:
-      return component_of(calc_angle(joints[i], s.joint[i].angle), component);
+      return component_of(s.joint[i].angle, component);
     case Quantity::Kind::JointDisplacement: {
       const CompiledJoint& j = joints[i];
       const Vec3 gap = calc_point(j.child, j.p_CM) - calc_point(j.parent, j.p_PF);
