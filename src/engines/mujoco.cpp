@@ -15,6 +15,7 @@ std::unique_ptr<Engine> make_mujoco_engine() { return nullptr; }
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -84,6 +85,12 @@ std::unique_ptr<mjModel, Delete> load(const std::string& text) {
 }
 
 Vec3 to_vec3(const mjtNum* v) { return {v[0], v[1], v[2]}; }
+
+/// Row `index` of an array whose rows are `width` wide.
+template <class Number>
+Number* row_of(Number* array, int width, int index) {
+  return array + static_cast<std::ptrdiff_t>(width) * index;
+}
 
 /// A model as MuJoCo's, for one set of live joints and masses.
 class Built {
@@ -161,8 +168,8 @@ class Built {
     for (size_t i = 0; i < J; ++i) {
       const auto [body, reversed] = reaction_at_[i];
       if (body < 0 || !course_.joint_live()[i]) continue;
-      const mjtNum* at_centre = d_->cfrc_int + 6 * body;
-      const Vec3 c = to_vec3(d_->subtree_com + 3 * m_->body_rootid[body]);
+      const mjtNum* at_centre = row_of(d_->cfrc_int, 6, body);
+      const Vec3 c = to_vec3(row_of(d_->subtree_com, 3, m_->body_rootid[body]));
       const Vec3 p = place_of(model_.joints[i].child, model_.joints[i].X_CM.p);
       const Vec3 force = to_vec3(at_centre + 3), moment = to_vec3(at_centre) - cross(p - c, force);
       r.force[i] = reversed ? -force : force;
@@ -234,7 +241,7 @@ class Built {
       return;
     }
     const int twin = reaction_at_[index].body, body = mujoco_body(reaction_at_[index].reversed ? j.parent : j.child);
-    const mjtNum* q = d_->xquat + 4 * body;
+    const mjtNum* q = row_of(d_->xquat, 4, body);
     const Vec3 taken = to_vec3(f + 3), torque = 0.5 * (to_matrix({q[0], q[1], q[2], q[3]}) * taken);
     add_external(body, {}, {}, torque - taken);
     add_external(twin, {}, {}, taken - torque);
@@ -245,7 +252,7 @@ class Built {
   /// A further force at a point p on a body, and a torque, in the sums along the tree.
   void add_external(int body, const Vec3& force, const Vec3& p, const Vec3& torque) {
     for (int b = body; b > 0; b = m_->body_parentid[b]) {
-      const Vec3 moment = torque + cross(p - to_vec3(d_->subtree_com + 3 * m_->body_rootid[b]), force);
+      const Vec3 moment = torque + cross(p - to_vec3(row_of(d_->subtree_com, 3, m_->body_rootid[b])), force);
       for (int k = 0; k < 3; ++k) {
         d_->cfrc_int[6 * b + k] -= moment[k];
         d_->cfrc_int[6 * b + 3 + k] -= force[k];
@@ -281,7 +288,7 @@ class Built {
       v_rel -= motion_.v_WB[in] + cross(motion_.w_WB[in], p - motion_.X_WB[in].p);
     }
     const std::string name = "j" + std::to_string(b.joint) + ".";
-    const auto axis = [&](int joint) { return R * to_vec3(m_->jnt_axis + 3 * joint); };
+    const auto axis = [&](int joint) { return R * to_vec3(row_of(m_->jnt_axis, 3, joint)); };
     for (const char* number : {"0", "1"}) {
       const int joint = mj_name2id(m_.get(), mjOBJ_JOINT, (name + number).c_str());
       if (joint < 0) break;
@@ -301,8 +308,8 @@ class Built {
     for (const Branch& b : articulation_.branches) {
       const size_t i = static_cast<size_t>(b.body);
       const int id = body_[i];
-      const mjtNum* q = d_->xquat + 4 * id;
-      motion_.X_WB[i] = {to_vec3(d_->xpos + 3 * id), {q[0], q[1], q[2], q[3]}};
+      const mjtNum* q = row_of(d_->xquat, 4, id);
+      motion_.X_WB[i] = {to_vec3(row_of(d_->xpos, 3, id)), {q[0], q[1], q[2], q[3]}};
       mjtNum v[6];
       mj_objectVelocity(m_.get(), d_.get(), mjOBJ_XBODY, id, v, 0);
       motion_.w_WB[i] = to_vec3(v);
@@ -327,7 +334,7 @@ class Built {
         }
         continue;
       }
-      const Vec3 torque = w.torque - cross(to_vec3(d_->xipos + 3 * id) - motion_.X_WB[i].p, w.force);
+      const Vec3 torque = w.torque - cross(to_vec3(row_of(d_->xipos, 3, id)) - motion_.X_WB[i].p, w.force);
       for (int k = 0; k < 3; ++k) {
         d_->xfrc_applied[6 * id + k] = w.force[k];
         d_->xfrc_applied[6 * id + 3 + k] = torque[k];

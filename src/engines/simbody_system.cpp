@@ -201,12 +201,12 @@ void System::Inside::add(const Closure& c) {
 System::System(const Description& d, ForceFunction force, PowerFunction power, const Settings& settings)
     : inside_(std::make_unique<Inside>(d)) {
   Inside& in = *inside_;
-  SimTK::Force::UniformGravity(in.forces, in.matter, to_simbody(d.gravity));
+  const SimTK::Force::UniformGravity gravity(in.forces, in.matter, to_simbody(d.gravity));
   in.bodies.reserve(d.mobilizers.size());  // others keep a reference
   for (const Mobilizer& m : d.mobilizers) in.add(m);
   for (const Closure& c : d.closures) in.add(c);
   in.outside = new OutsideForces(std::move(force), std::move(power), in.matter, in.forces, in.bodies);
-  SimTK::Force::Custom(in.forces, in.outside);  // owns it now
+  const SimTK::Force::Custom outside(in.forces, in.outside);  // owns it now
   in.system.realizeTopology();
   if (settings.step > 0) {
     in.integrator = std::make_unique<SimTK::VerletIntegrator>(in.system, settings.step);
