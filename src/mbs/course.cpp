@@ -119,7 +119,6 @@ Summary Course::finish() {
   if (!s_.trouble.empty()) {
     out.message += ": " + s_.trouble;
   } else if (out.ending == Summary::Ending::Diverged) {
-    if (s_.step > s_.damper_limit) out.message += "; " + out.notes.front();
     for (size_t b = 0; b < s_.B; ++b)
       if (!topple::is_finite(Vec3(state.p[b])) || !topple::is_finite(Vec3(state.v[b]))) {
         out.message += ": the pose of body \"" + s_.model.bodies[b].name + "\" is no longer finite";

@@ -1,5 +1,5 @@
 /// Dampers of springs and bushings, taken with the velocity at the time of the positions and implicitly enough that
-/// they do not bound the step (docs/theory/multibody.md, eq. F3 to F5).
+/// they do not bound the step (docs/theory/multibody.md, eq. F3 and F4).
 
 #include <algorithm>
 #include <cmath>
@@ -45,94 +45,63 @@ bool find_rate(const CompiledCharacteristic& c, double q, double s, double& r) {
   return false;
 }
 
-/// Largest step for a damper on jointed bodies beside springs of the frequency omega (eq. F5).
-///   rate  of the damper: coefficient times inverse mass [1/s]
-double find_jointed_limit(double omega, double rate) {
-  const auto is_stable = [&](double h) {
-    const double z = h * rate, share = z / (1 + 0.5 * z), stiff = h * h * omega * omega;
-    return stiff * (1 + 0.5 * share) < 4 - 2 * share;
-  };
-  double low = 0, high = 2 / omega;
-  for (int i = 0; i < 60; ++i) {
-    const double h = 0.5 * (low + high);
-    (is_stable(h) ? low : high) = h;
-  }
-  return low;
-}
-
 }  // namespace
 
 void System::find_damper_bounds() {
   std::vector<DamperRow>& rows = forces.damper_rows;
   std::vector<DampedBody>& bodies = forces.damped;
   for (DampedBody& d : bodies) {
-    d.rows.clear();
+    d.sides.clear();
     d.inverse_inertia = calc_world_inverse_inertia(static_cast<size_t>(d.body));
   }
+  const auto add = [&](int place, size_t row, const Vec3& turn) {
+    if (place < 0) return 0.0;
+    DampedBody& d = bodies[static_cast<size_t>(place)];
+    const Vec3 spin = d.inverse_inertia * turn;
+    d.sides.push_back({static_cast<int>(row), turn, spin});
+    const Vec3& line = rows[row].row.line;
+    return state.body[static_cast<size_t>(d.body)].inverse_mass * dot(line, line) + dot(turn, spin);
+  };
   for (size_t i = 0; i < rows.size(); ++i) {
     DamperRow& d = rows[i];
-    d.own = calc_inverse_mass(d.a, d.row.line, d.row.turn_a) + calc_inverse_mass(d.b, d.row.line, d.row.turn_b);
-    d.bound = d.own;
-    if (d.place_a >= 0) bodies[static_cast<size_t>(d.place_a)].rows.push_back(static_cast<int>(2 * i));
-    if (d.place_b >= 0) bodies[static_cast<size_t>(d.place_b)].rows.push_back(static_cast<int>(2 * i + 1));
+    d.own = add(d.place_a, i, d.row.turn_a) + add(d.place_b, i, d.row.turn_b);
+    d.root = std::sqrt(d.own);
+    d.coupled = 0;
   }
   // neighbours couple rows: the sums of their magnitudes, each scaled by both rows' own, bound the matrix from above
   for (const DampedBody& body : bodies) {
     const double inverse_mass = state.body[static_cast<size_t>(body.body)].inverse_mass;
-    for (size_t m = 0; m < body.rows.size(); ++m) {
-      DamperRow& i = rows[static_cast<size_t>(body.rows[m] / 2)];
-      const Vec3& turn_i = body.rows[m] % 2 == 0 ? i.row.turn_a : i.row.turn_b;
-      const Vec3 spin = body.inverse_inertia * turn_i;
+    for (size_t m = 0; m < body.sides.size(); ++m) {
+      DamperRow& i = rows[static_cast<size_t>(body.sides[m].row)];
+      if (!(i.root > 0)) continue;
+      const Vec3 line = inverse_mass * i.row.line, spin = body.sides[m].spin;
+      const double inverse_root = 1 / i.root;
+      double sum = 0;
       for (size_t n = 0; n < m; ++n) {
-        DamperRow& k = rows[static_cast<size_t>(body.rows[n] / 2)];
-        if (&i == &k || !(i.own > 0) || !(k.own > 0)) continue;
-        const Vec3& turn_k = body.rows[n] % 2 == 0 ? k.row.turn_a : k.row.turn_b;
-        const double coupling = std::abs(inverse_mass * dot(i.row.line, k.row.line) + dot(turn_k, spin));
-        i.bound += coupling * std::sqrt(i.own / k.own);
-        k.bound += coupling * std::sqrt(k.own / i.own);
+        DamperRow& k = rows[static_cast<size_t>(body.sides[n].row)];
+        const double coupling = std::abs(dot(line, k.row.line) + dot(body.sides[n].turn, spin));
+        k.coupled += coupling * inverse_root;
+        sum += k.root > 0 ? coupling / k.root : 0;
       }
+      i.coupled += sum;
     }
   }
-}
-
-void System::keep_forces() {
-  for (DampedBody& d : forces.damped) {
-    d.force_before = force[static_cast<size_t>(d.body)];
-    d.torque_before = torque[static_cast<size_t>(d.body)];
-  }
+  for (DamperRow& d : rows) d.bound = d.own + d.root * d.coupled;
 }
 
 void System::evaluate_dampers() {
   std::vector<DamperRow>& rows = forces.damper_rows;
   if (rows.empty()) return;
-  if (clusters_due) {
-    build_clusters();
-    clusters_due = true;  // the next step does it with all that follows from it
-  }
   find_damper_bounds();
   const double half = 0.5 * step;
   // velocities at the time of the positions, the last pulls of the dampers standing for the present ones
+  for (const DamperRow& d : rows) pull(d.a, d.b, d.row, d.state->damper);
+  if (forces.damps_jointed) calc_reactions();
   for (DampedBody& d : forces.damped) {
     const size_t b = static_cast<size_t>(d.body);
-    Vec3 f = force[b], t = torque[b];
-    if (in_cluster[b]) {
-      // the reactions of joints are known for the step before only: so are the other forces taken
-      f = t = {};
-      if (!state.first_kick) {
-        f = d.force_before + joint_force[b];
-        t = d.torque_before + joint_torque[b];
-      }
-    } else {
-      for (const int entry : d.rows) {
-        const DamperRow& r = rows[static_cast<size_t>(entry / 2)];
-        const double last = entry % 2 == 0 ? r.state->damper : -r.state->damper;
-        f += last * r.row.line;
-        t += last * (entry % 2 == 0 ? r.row.turn_a : r.row.turn_b);
-      }
-    }
-    const bool has_no_past = in_cluster[b] && state.first_kick;
-    d.velocity = state.v[b] + (half * state.body[b].inverse_mass) * f + (has_no_past ? 0 : half) * model.gravity;
-    d.spin = d.inverse_inertia * (state.L[b] + half * t);
+    d.velocity =
+        state.v[b] + (half * state.body[b].inverse_mass) * (force[b] + body_reaction[b]) + half * model.gravity;
+    d.spin = d.inverse_inertia * (state.L[b] + half * (torque[b] + body_reaction_turn[b]));
   }
   for (DamperRow& d : rows) {
     double rate = 0;
@@ -145,8 +114,9 @@ void System::evaluate_dampers() {
       rate -= dot(d.row.line, a.velocity) + dot(d.row.turn_a, a.spin);
     }
     ComponentState& c = *d.state;
-    const double q = half * d.bound, last = c.damper;
-    if (std::isfinite(rate) && !find_rate(*d.law, q, rate + q * last, c.rate) && trouble.empty()) {
+    const double q = half * d.bound;
+    d.last = c.damper;
+    if (std::isfinite(rate) && !find_rate(*d.law, q, rate + q * d.last, c.rate) && trouble.empty()) {
       char words[160];
       std::snprintf(
           words, sizeof words,
@@ -155,39 +125,39 @@ void System::evaluate_dampers() {
       trouble = words;
     }
     c.damper = calc_force(*d.law, c.rate);
-    *d.damping += 0.5 * (last + c.damper) * (c.deformation - c.before);
+    *d.damping += 0.5 * (d.last + c.damper) * (c.deformation - c.before);
   }
-  for (const DamperRow& d : rows) pull(d.a, d.b, d.row, d.state->damper);
+  for (const DamperRow& d : rows) pull(d.a, d.b, d.row, d.state->damper - d.last);
 }
 
-double System::calc_damper_limit(double omega) {
-  double limit = kUnlimited;
-  if (forces.damped.empty()) return limit;
+void System::note_fast_dampers() {
+  if (forces.damped.empty()) return;
   const auto springs = state.spring, torsions = state.torsion;
   const auto bushings = state.bushing;
   evaluate_springs(true);
   find_damper_bounds();
-  std::vector<unsigned char> jointed(B, 0);
-  for (const CompiledJoint& j : joints)
-    for (const int b : {j.parent, j.child})
-      if (b >= 0) jointed[static_cast<size_t>(b)] = 1;
-  const auto is_jointed = [&](int b) { return b >= 0 && jointed[static_cast<size_t>(b)]; };
-  double fastest = 0;
+  constexpr double tolerable = 100;  // steps
+  double most = tolerable;
+  const DamperRow* fastest = nullptr;
   for (const DamperRow& d : forces.damper_rows) {
-    // of a polynomial the slope at rest: what it grows to is not known beforehand
-    const double rate = find_steepest(*d.law, 0, 0) * d.bound;
-    fastest = std::max(fastest, rate);
-    if (omega > 0 && rate > 0 && (is_jointed(d.a) || is_jointed(d.b)))
-      limit = std::min(limit, find_jointed_limit(omega, rate));
+    // of a polynomial the slope at rest: what it grows to is not known beforehand; a row alone is implicit
+    const double lag = step * find_steepest(*d.law, 0, 0) * (d.bound - d.own);
+    if (lag > most) most = lag, fastest = &d;
   }
-  forces.fastest_damper = fastest;
+  if (fastest) {
+    char words[160];
+    std::snprintf(
+        words, sizeof words,
+        " is faster than the step of %.3g s can follow beside its neighbours: its pull may lag by some %.0f steps",
+        step, most);
+    summary.notes.push_back("the damper of \"" + *fastest->name + "\"" + words);
+  }
   state.spring = springs;
   state.torsion = torsions;
   state.bushing = bushings;
   forces.damper_rows.clear();
   for (size_t b = 0; b < B; ++b) force[b] = torque[b] = Vec3{};
   ground_reaction = {};
-  return limit;
 }
 
 }  // namespace topple::mbs

@@ -262,24 +262,14 @@ void System::review_step() {
   if (options.step > 0) return;
   highest_frequency = find_highest_frequency();
   summary.highest_frequency = std::max(summary.highest_frequency, highest_frequency);
-  set_step(options.step_safety * std::min(calc_step_limit(), damper_limit));
+  set_step(options.step_safety * calc_step_limit());
 }
 
 void System::choose_step() {
   highest_frequency = find_highest_frequency();
-  const double fastest = 2 / calc_step_limit();
-  damper_limit = calc_damper_limit(fastest);
   state.live_elements = state.live_at_review = elements.size();
-  set_step(options.step > 0 ? options.step : options.step_safety * std::min(calc_step_limit(), damper_limit));
-  if (step > damper_limit) {
-    char note[240];
-    std::snprintf(
-        note, sizeof note,
-        "the step of %.3g s is longer than %.3g s, the limit of the dampers on jointed bodies beside springs of "
-        "%.4g rad/s: the motion may grow without bound",
-        step, damper_limit, fastest);
-    summary.notes.emplace_back(note);
-  }
+  set_step(options.step > 0 ? options.step : options.step_safety * calc_step_limit());
+  note_fast_dampers();
   summary.step = step;
   summary.highest_frequency = highest_frequency;
 }

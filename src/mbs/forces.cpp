@@ -134,6 +134,9 @@ void System::compile_forces() {
       add(joints[static_cast<size_t>(c.joint)].parent), add(joints[static_cast<size_t>(c.joint)].child);
   for (const CompiledBushing& c : forces.bushings)
     if (c.is_damped) add(c.a), add(c.b);
+  for (const CompiledJoint& j : joints)
+    for (const int b : {j.parent, j.child})
+      if (b >= 0 && forces.damped_place[static_cast<size_t>(b)] >= 0) forces.damps_jointed = true;
 }
 
 Vec3 System::calc_point(int body, const Vec3& p) const {
@@ -242,7 +245,7 @@ void System::watch_stiffness(int a, int b, const ForceRow& row, double slope, co
 }
 
 void System::add_damper(int a, int b, const ForceRow& row, const CompiledCharacteristic& law, ComponentState& c,
-                        double& damping) {
+                        double& damping, const std::string& name) {
   if (law.is_zero) return;
   DamperRow d;
   d.row = row;
@@ -254,6 +257,7 @@ void System::add_damper(int a, int b, const ForceRow& row, const CompiledCharact
   d.law = &law;
   d.state = &c;
   d.damping = &damping;
+  d.name = &name;
   forces.damper_rows.push_back(d);
 }
 
@@ -278,7 +282,7 @@ void System::evaluate_springs(bool at_rest) {
     pull(k.a, k.b, row, f);
     if (!k.spring.has_bound_slope && !at_rest)
       watch_stiffness(k.a, k.b, row, calc_slope(k.spring, x), "spring", model.springs[i].name);
-    add_damper(k.a, k.b, row, k.damper, s.component, s.damping);
+    add_damper(k.a, k.b, row, k.damper, s.component, s.damping, model.springs[i].name);
   }
   for (size_t i = 0; i < forces.torsions.size(); ++i) {
     SpringState& s = state.torsion[i];
@@ -305,7 +309,7 @@ void System::evaluate_springs(bool at_rest) {
     if (!k.spring.has_bound_slope && !at_rest)
       watch_stiffness(j.parent, j.child, row, calc_slope(k.spring, x), "rotational spring",
                       model.rotational_springs[i].name);
-    add_damper(j.parent, j.child, row, k.damper, s.component, s.damping);
+    add_damper(j.parent, j.child, row, k.damper, s.component, s.damping, model.rotational_springs[i].name);
   }
   for (size_t i = 0; i < forces.bushings.size(); ++i)
     if (state.bushing[i].live) evaluate_bushing(i, at_rest);
@@ -353,7 +357,7 @@ void System::evaluate_bushing(size_t i, bool at_rest) {
   for (int c = 0; c < 6; ++c) {
     if (!k.spring[c].has_bound_slope && !at_rest)
       watch_stiffness(k.a, k.b, rows[c], calc_slope(k.spring[c], x[c]), "bushing", model.bushings[i].name);
-    add_damper(k.a, k.b, rows[c], k.damper[c], s.component[c], s.damping);
+    add_damper(k.a, k.b, rows[c], k.damper[c], s.component[c], s.damping, model.bushings[i].name);
   }
 }
 

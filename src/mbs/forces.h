@@ -1,8 +1,9 @@
 #pragma once
 /// General force elements at work: springs and dampers between points, about joint axes and in six components, and
-/// loads (docs/theory/multibody.md, eq. F1 to F6). Constants and states; the functions are members of System in
+/// loads (docs/theory/multibody.md, eq. F1 to F5). Constants and states; the functions are members of System in
 /// forces.cpp, dampers.cpp and loads.cpp.
 
+#include <string>
 #include <vector>
 
 #include "base/linalg.h"
@@ -97,18 +98,24 @@ struct DamperRow {
   int a = -1, b = -1;              // bodies, -1 for those that do not move
   int place_a = -1, place_b = -1;  // among the damped bodies
   const CompiledCharacteristic* law = nullptr;
+  const std::string* name = nullptr;  // of the element
   ComponentState* state = nullptr;
   double* damping = nullptr;
-  double own = 0, bound = 0;  // inverse mass along the row: its own, and a bound with all neighbours
+  double last = 0;  // pull of the step before
+  // inverse mass along the row: its own and that's root, what neighbours add over their roots, a bound with all of them
+  double own = 0, root = 0, coupled = 0, bound = 0;
 };
 
 /// One body that dampers act on; scratch.
 struct DampedBody {
   int body = -1;
-  Vec3 force_before, torque_before;  // without joints, of the evaluation before
-  Mat3 inverse_inertia;              // in W
-  Vec3 velocity, spin;               // at the time of the positions, in W
-  std::vector<int> rows;             // 2 * row + side
+  Mat3 inverse_inertia;  // in W
+  Vec3 velocity, spin;   // at the time of the positions, in W
+  struct Side {
+    int row = 0;
+    Vec3 turn, spin;  // of the row on this body, and what it makes of it
+  };
+  std::vector<Side> sides;
 };
 
 /// A spring's stiffness along a row, for the matrices of equilibrium.cpp.
@@ -127,7 +134,7 @@ struct ForceElements {
   std::vector<DampedBody> damped;      // empty: no dampers
   std::vector<int> damped_place;       // of each body, -1: none (B); empty without dampers
   std::vector<DamperRow> damper_rows;  // of this evaluation
-  double fastest_damper = 0;           // largest coefficient over mass at the start [1/s]
+  bool damps_jointed = false;          // some of these bodies have joints
 };
 
 }  // namespace topple::mbs

@@ -210,7 +210,9 @@ void System::pack_body(size_t b) {
   Lanes& l = *lanes;
   const LaneLayout layout = l.body_layout(lane);
   const BodyConstants& c = state.body[b];
-  const auto put = [&](int f, double x) { l.body_constants[layout.at(b, static_cast<size_t>(f), kernel::kBodyFields)] = x; };
+  const auto put = [&](int f, double x) {
+    l.body_constants[layout.at(b, static_cast<size_t>(f), kernel::kBodyFields)] = x;
+  };
   const Mat3& I = c.inverse_inertia;
   const double inverse_inertia[6] = {I(0, 0), I(0, 1), I(0, 2), I(1, 1), I(1, 2), I(2, 2)};
   put(kernel::kInverseMass, c.inverse_mass);
@@ -423,7 +425,6 @@ void System::begin_forces() {
   ground_reaction = {};
   ground_contact = {};
   body_contacts = 0;
-  keep_forces();
   fire_events();
 }
 

@@ -167,16 +167,16 @@ struct JointCluster {
     int place = 0;
     bool is_child = false;
   };
-  std::vector<int> joints;            // in the order of elimination
-  std::vector<int> bodies;            // moving ones
-  std::vector<int> first_meeting;     // of each body, and one more
-  std::vector<Meeting> meetings;      // by body, places rising
-  double length = 1, tolerance = 0;   // [m]
-  std::vector<int> repeating;         // rows that repeat others for good
-  int dependent = 0;                  // rows that do so now
-  double open = 0;                    // widest gap [m, rad]
-  BlockCholesky matrix;               // J M⁻¹ Jᵀ
-  BlockCholesky geometry;             // J Jᵀ, where rows may depend on others
+  std::vector<int> joints;           // in the order of elimination
+  std::vector<int> bodies;           // moving ones
+  std::vector<int> first_meeting;    // of each body, and one more
+  std::vector<Meeting> meetings;     // by body, places rising
+  double length = 1, tolerance = 0;  // [m]
+  std::vector<int> repeating;        // rows that repeat others for good
+  int dependent = 0;                 // rows that do so now
+  double open = 0;                   // widest gap [m, rad]
+  BlockCholesky matrix;              // J M⁻¹ Jᵀ
+  BlockCholesky geometry;            // J Jᵀ, where rows may depend on others
 };
 
 class System {
@@ -190,7 +190,6 @@ class System {
 
   double step = 0;
   double highest_frequency = 0;
-  double damper_limit = kUnlimited;  // of the step, by dampers on jointed bodies [s]
 
   bool find_equilibrium(std::string& message);
   bool advance_step();
@@ -239,11 +238,11 @@ class System {
   std::vector<JointCluster> clusters;
   bool clusters_due = true;
   std::vector<std::pair<int, int>> joint_notes;  // first joint and situation of those made
-  bool joint_sums_due = true;  // those of bodies without joints are to be cleared
-  std::string identity;  // of the model, for snapshots
+  bool joint_sums_due = true;                    // those of bodies without joints are to be cleared
+  std::string identity;                          // of the model, for snapshots
   std::vector<JointRow> joint_rows;
   std::vector<double> joint_gaps, joint_rhs, joint_impulse, joint_linear, joint_answer, joint_change;
-  std::vector<Vec3> v_before, L_before, w_before;  // of jointed bodies (B)
+  std::vector<Vec3> v_before, L_before, w_before;       // of jointed bodies (B)
   std::vector<Vec3> joint_spin;                         // of jointed bodies in the middle of the step (B)
   std::vector<Vec3> reaction_force, reaction_moment;    // at the time of the positions, of a view, in W (J)
   std::vector<Vec3> body_reaction, body_reaction_turn;  // their sums on bodies (B)
@@ -290,13 +289,12 @@ class System {
   void evaluate_loads(bool at_rest);
   /// Share of a load's force in the next kick.
   double find_load_factor(const CompiledLoad&, LoadState&) const;
-  /// Keeps the forces of the evaluation before for the bodies that dampers act on.
-  void keep_forces();
   void evaluate_dampers();
   void find_damper_bounds();
-  void add_damper(int a, int b, const ForceRow&, const CompiledCharacteristic& law, ComponentState&, double& damping);
-  /// Largest step that the dampers allow beside springs of a frequency [s]; infinite for bodies without joints.
-  double calc_damper_limit(double omega);
+  void add_damper(int a, int b, const ForceRow&, const CompiledCharacteristic& law, ComponentState&, double& damping,
+                  const std::string& name);
+  /// Notes the damper that lags most behind the step, if one does by much.
+  void note_fast_dampers();
   /// A law that has become too stiff for the step makes it shorter, or ends the run if the step is set.
   void watch_stiffness(int a, int b, const ForceRow&, double slope, const char* kind, const std::string& name);
   double measure_spring(const CompiledSpring&, ForceRow&) const;

@@ -152,11 +152,10 @@ TEST(DampedOscillatorPhysics, DampingCostsNoStep) {
   }
 }
 
-TEST(DampedOscillatorPhysics, DampersOnJointsKeepTheAutomaticStepStable) {
-  // a row of hinged bars with springs and dampers at the hinges; the joints' reactions are those of the step before,
-  // which bounds the step (docs/theory/multibody.md, eq. F5)
-  double before = kUnlimited;
-  for (const double share : {0.0, 1e-2, 1.0}) {
+TEST(DampedOscillatorPhysics, DampersOnJointsCostNoStep) {
+  // a row of hinged bars with springs and dampers at the hinges
+  double undamped_step = 0;
+  for (const double share : {0.0, 1e-2, 1.0, 100.0}) {
     Model m;
     m.contact.ground = m.contact.bodies = false;
     BodyId parent = kGround;
@@ -178,9 +177,10 @@ TEST(DampedOscillatorPhysics, DampersOnJointsKeepTheAutomaticStepStable) {
     }
     const Summary s = run(m, options_of(1, 0));
     EXPECT_EQ(s.ending, Summary::Ending::TimeLimit) << s.message;
-    EXPECT_LT(s.energy_error, 1e-4) << share;  // measured 5e-5 at 0.85 of the limit, without dampers
-    EXPECT_LT(s.step, before);
-    before = s.step;
+    EXPECT_LT(s.energy_error, 3e-4) << share;  // measured 5e-5 without dampers, 1.5e-4 with, at 0.85 of the limit
+    if (share == 0) undamped_step = s.step;
+    EXPECT_EQ(s.step, undamped_step);
+    EXPECT_EQ(s.notes.size(), share < 1 ? 0U : 1U) << share;
   }
 }
 
@@ -215,30 +215,6 @@ TEST(DampedOscillatorPhysics, DampersOnJointsHaveOrderTwo) {
   }
   EXPECT_NEAR(std::log2((angle[0] - angle[1]) / (angle[1] - angle[2])), 2, 0.15);
   EXPECT_NEAR(std::log2(residual[1] / residual[2]), 2, 0.15);
-}
-
-TEST(DampedOscillatorPhysics, AStepTooLargeForDampersOnJointsIsSaid) {
-  Model m = make_oscillator(1, 0, 0, linear(0));
-  m.springs.clear();
-  m.gravity = {0, 0, -9.81};
-  Joint j;
-  j.kind = Joint::Kind::Revolute;
-  j.parent = kGround;
-  j.child = {0};
-  j.X_PF.q = j.X_CM.q = to_quat(Mat3::from_columns({1, 0, 0}, {0, 0, -1}, {0, 1, 0}));
-  j.X_CM.p = {-2, 0, 0};
-  RotationalSpring r;
-  r.name = "brake";
-  r.joint = add_joint(m, j);
-  r.spring = linear(1e5);
-  r.damper = linear(1e5);
-  m.rotational_springs.push_back(r);
-  Options o = options_of(0.1, 0);
-  EXPECT_TRUE(run(m, o).notes.empty());
-  o.step = 0.01;
-  const Summary s = run(m, o);
-  ASSERT_EQ(s.notes.size(), 1U);
-  EXPECT_NE(s.notes[0].find("dampers"), std::string::npos) << s.notes[0];
 }
 
 TEST(SpringChainReference, FrequenciesAreThoseOfTheFixedFreeChain) {
