@@ -4,6 +4,7 @@
 #include <cstring>
 #include <vector>
 
+#include "mbs/batch.h"
 #include "models.h"
 
 namespace topple::mbs {
@@ -164,6 +165,31 @@ TEST(ForcesReplay, GoesOnWithTheSameBitsFromAnyStep) {
   }
 }
 
+TEST(ForcesReplay, GoesOnWithTheSameBitsWhileTheStepFollowsTheModel) {
+  Model m = make_everything();
+  m.contact.contact_frequency = 50;  // so that springs bound the step
+  Options o;
+  o.equilibrium = false;
+  Simulation whole(m, o), other(m, o);
+  std::vector<std::vector<std::byte>> kept;
+  constexpr size_t steps = 800, every = 100;
+  double least = 1, most = 0;
+  for (size_t i = 0; i < steps; ++i) {
+    if (i % every == 0) kept.push_back(whole.snapshot());
+    const double before = whole.time();
+    ASSERT_TRUE(whole.advance_step()) << i;
+    least = std::min(least, whole.time() - before);
+    most = std::max(most, whole.time() - before);
+  }
+  EXPECT_GT(most, 1.001 * least);
+  const std::uint64_t end = hash_of(whole.calc_view());
+  for (size_t k = 0; k < kept.size(); ++k) {
+    other.restore(kept[k]);
+    for (size_t i = every * k; i < steps; ++i) ASSERT_TRUE(other.advance_step());
+    EXPECT_EQ(hash_of(other.calc_view()), end) << "snapshot " << k;
+  }
+}
+
 TEST(ForcesReplay, GivesTheSameBitsAfterTheEquilibrium) {
   Model m = make_everything();
   m.events.resize(2);
@@ -176,6 +202,34 @@ TEST(ForcesReplay, GivesTheSameBitsAfterTheEquilibrium) {
     ASSERT_EQ(s.ending, Summary::Ending::TimeLimit) << s.message;
   }
   EXPECT_EQ(h[0], h[1]);
+}
+
+TEST(ForcesReplay, GivesTheSameBitsInABatch) {
+  const auto variation = [](int i) {
+    return [i](Model& m) {
+      m.loads[0].force.x *= 1 + 0.1 * i;
+      m.springs[2].tension_strength *= 1 + 0.2 * i;
+      m.bushings[0].damper[4].rate *= 1 + i;
+    };
+  };
+  constexpr int samples = 5;
+  BatchOptions b;
+  b.run.equilibrium = false;
+  b.run.duration = 0.6;
+  std::vector<std::uint64_t> together(samples, 0), alone(samples, 0);
+  b.on_frame = [&](size_t i, const View& v) { together[i] = 31 * together[i] + hash_of(v); };
+  std::vector<Variation> variations;
+  for (int i = 0; i < samples; ++i) variations.push_back(variation(i));
+  (void)run_batch(make_everything(), variations, b);
+  for (int i = 0; i < samples; ++i) {
+    Model m = make_everything();
+    variation(i)(m);
+    Options o = b.run;
+    o.on_frame = [&](const View& v) { alone[i] = 31 * alone[i] + hash_of(v); };
+    (void)run(m, o);
+    EXPECT_EQ(alone[i], together[i]) << i;
+  }
+  EXPECT_NE(alone[0], alone[1]);
 }
 
 }  // namespace
