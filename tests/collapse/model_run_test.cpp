@@ -100,6 +100,71 @@ TEST(ModelRunPhysics, TheDoublePendulumSwingsAsLagrangeSays) {
   EXPECT_EQ(output_of(e, "top_reaction").time.size(), 401u);
 }
 
+/// The slider-crank of the example with one coordinate, the crank's angle from upright towards the piston: crank of
+/// 0.3 m, rod of 0.5 m, piston at 0.4 m at the start.
+struct SliderCrank {
+  static double tabulated(double x, const std::vector<double>& at, const std::vector<double>& f) {
+    if (x <= at.front()) return f.front();
+    for (size_t i = 1; i < at.size(); ++i)
+      if (x < at[i]) return f[i - 1] + (f[i] - f[i - 1]) * (x - at[i - 1]) / (at[i] - at[i - 1]);
+    return f.back();
+  }
+  static double stroke(double a) {
+    const double c = 0.3 * std::cos(a);
+    return 0.3 * std::sin(a) + std::sqrt(0.25 - c * c) - 0.4;
+  }
+  static double stroke_rate(double a) {  // with the angle
+    const double s = 0.3 * std::sin(a), c = 0.3 * std::cos(a);
+    return c + c * s / std::sqrt(0.25 - c * c);
+  }
+  static double inertia(double a) {
+    const double s = 0.3 * std::sin(a), c = 0.3 * std::cos(a), x = stroke_rate(a);
+    const double rod_turn = s / std::sqrt(0.25 - c * c);
+    return 0.0225 + 3 * 0.15 * 0.15 + 2 * 0.25 * ((c + x) * (c + x) + s * s) + 0.0417 * rod_turn * rod_turn + 4 * x * x;
+  }
+  /// Of the cushion on the ground, along the guide [N].
+  static double cushion(double a, double rate) {
+    return tabulated(stroke(a), {-0.2, 0, 0.2, 0.4}, {-10, 0, 10, 200}) + 5 * stroke_rate(a) * rate;
+  }
+  static double acceleration(double t, double a, double rate) {
+    const double torque = 8 * tabulated(t, {0, 0.1, 0.6, 0.8}, {0, 1, 1, 0});
+    const double weight = kGravity * 0.5 * (3 + 2) * 0.3 * std::sin(a), d = 1e-5;
+    const double slope = (inertia(a + d) - inertia(a - d)) / (2 * d);
+    return (torque + weight - cushion(a, rate) * stroke_rate(a) - 0.5 * slope * rate * rate) / inertia(a);
+  }
+};
+
+TEST(ModelRunPhysics, TheSliderCrankTurnsAsLagrangeSays) {
+  using S = SliderCrank;
+  const Example e = run_example("slider_crank.json");
+  EXPECT_EQ(e.record.ending, "time_limit");
+  EXPECT_LT(e.summary.joint_drift, 1e-8);
+  EXPECT_LT(e.summary.energy_error, 1e-5);
+  ASSERT_EQ(e.summary.notes.size(), 1u);
+  EXPECT_NE(e.summary.notes[0].find("1 constraint of 18"), std::string::npos) << e.summary.notes[0];
+  const record::Output &angle = output_of(e, "crank_angle"), &stroke = output_of(e, "stroke"),
+                       &cushion = output_of(e, "cushion_force"), &thrust = output_of(e, "side_thrust");
+  ASSERT_EQ(angle.time.size(), 201u);
+  double a = 0, v = 0, t = 0, largest = 0;
+  const double h = 5e-5;
+  for (size_t i = 0; i < angle.time.size(); ++i) {
+    for (; t < angle.time[i] - h / 2; t += h) {
+      const double k1 = S::acceleration(t, a, v), v2 = v + h / 2 * k1,
+                   k2 = S::acceleration(t + h / 2, a + h / 2 * v, v2), v3 = v + h / 2 * k2,
+                   k3 = S::acceleration(t + h / 2, a + h / 2 * v2, v3), v4 = v + h * k3,
+                   k4 = S::acceleration(t + h, a + h * v3, v4);
+      a += h / 6 * (v + 2 * v2 + 2 * v3 + v4);
+      v += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
+    }
+    largest = std::max(largest, std::abs(a));
+    EXPECT_NEAR(angle.value[i], a, 2e-6) << angle.time[i];
+    EXPECT_NEAR(stroke.value[i], S::stroke(angle.value[i]), 1e-10) << angle.time[i];
+    EXPECT_NEAR(cushion.value[3 * i], -S::cushion(a, v), 1e-3) << angle.time[i];
+    EXPECT_NEAR(thrust.value[3 * i], 0, 1e-9) << "x of F is y of W";
+  }
+  EXPECT_GT(largest, 0.9);
+}
+
 TEST(ModelRun, SaysWhatTheEngineSaysOfItsNumbers) {
   const Example e = run_example("double_pendulum.json");
   std::string ids;
