@@ -23,6 +23,12 @@ class Overlaps {
       }
     }
   }
+  /// Length of the product of edges whose overlap, when there is none, is not scaled by it; of faces 1.
+  double length(int axis) const {
+    if (axis < 6) return 1;
+    const double c = c_[(axis - 6) / 3][(axis - 6) % 3];
+    return std::sqrt(1 - c * c);
+  }
   double operator()(int axis) const {
     if (axis < 3) return a_[axis] + b_.x * m_[axis][0] + b_.y * m_[axis][1] + b_.z * m_[axis][2] - std::abs(t_[axis]);
     if (axis < 6) {
@@ -65,52 +71,45 @@ int clip(const Vec3* in, int count, const Vec3& n, double offset, Vec3* out) {
   return kept;
 }
 
-/// Face of `reference` with outward normal n (number `face`) against the facing side of `other`.
-void face_points(const Solid& reference, int face, const Vec3& n, const Solid& other, bool flipped, BoxContact& out) {
-  // the side of the other box that looks most against n
+/// Number of the face pair of a box that looks most along n.
+int find_side(const Solid& box, const Vec3& n, double& along) {
   int side = 0;
-  double most = 0;
+  along = 0;
   for (int i = 0; i < 3; ++i) {
-    const double d = dot(other.R.column(i), n);
-    if (std::abs(d) > std::abs(most)) most = d, side = i;
+    const double d = dot(box.R.column(i), n);
+    if (std::abs(d) > std::abs(along)) along = d, side = i;
   }
-  const Vec3 centre = other.p - std::copysign(other.half[side], most) * other.R.column(side);
-  const int u = (side + 1) % 3, v = (side + 2) % 3;
-  const Vec3 du = other.half[u] * other.R.column(u), dv = other.half[v] * other.R.column(v);
-  Vec3 polygon[16] = {centre + du + dv, centre - du + dv, centre - du - dv, centre + du - dv}, cut[16];
+  return side;
+}
+
+/// The corners of the area, seen along n, in which the faces of both boxes that look at each other overlap.
+void overlap_points(const Solid& a, const Solid& b, const Vec3& n, BoxContact& out) {
+  double along_a, along_b;
+  const int side_a = find_side(a, n, along_a), side_b = find_side(b, n, along_b);
+  const Vec3 n_a = std::copysign(1.0, along_a) * a.R.column(side_a);
+  const Vec3 p_a = a.p + a.half[side_a] * n_a;
+  const Vec3 p_b = b.p - std::copysign(b.half[side_b], along_b) * b.R.column(side_b);
+  const int u = (side_b + 1) % 3, v = (side_b + 2) % 3;
+  const Vec3 du = b.half[u] * b.R.column(u), dv = b.half[v] * b.R.column(v);
+  Vec3 polygon[16] = {p_b + du + dv, p_b - du + dv, p_b - du - dv, p_b + du - dv}, cut[16];
   int count = 4;
   for (int k = 1; k <= 2; ++k) {
-    const int axis = (face + k) % 3;
-    const Vec3 t = reference.R.column(axis);
-    const double at = dot(t, reference.p), half = reference.half[axis];
+    const int along = (side_a + k) % 3, across = (side_a + 3 - k) % 3;
+    const Vec3 t = cross(n, a.R.column(along));
+    const double at = dot(t, p_a), half = std::abs(a.half[across] * dot(t, a.R.column(across)));
     count = clip(polygon, count, t, at + half, cut);
     count = clip(cut, count, -t, -at + half, polygon);
   }
-  const double surface = dot(n, reference.p) + reference.half[face];
-  out.normal = flipped ? -n : n;
-  for (int i = 0; i < count && out.count < 8; ++i) {
-    const double depth = surface - dot(n, polygon[i]);
+  double length[8], perimeter = 0;  // of the edges that begin at each corner
+  for (int i = 0; i < count; ++i) perimeter += length[i] = norm(polygon[(i + 1) % count] - polygon[i]);
+  out.normal = n;
+  for (int i = 0; i < count; ++i) {
+    const double depth = dot(n_a, p_a - polygon[i]) / std::abs(along_a);
     if (depth <= 0) continue;
     out.p[out.count] = polygon[i] + (0.5 * depth) * n;
+    out.weight[out.count] = perimeter > 0 ? 2 * (length[(i + count - 1) % count] + length[i]) / perimeter : 1;
     out.depth[out.count++] = depth;
   }
-}
-
-void edge_point(const Solid& a, const Solid& b, int i, const Vec3& n, double depth, BoxContact& out) {
-  const int ea = (i - 6) / 3, eb = (i - 6) % 3;
-  Vec3 pa = a.p, pb = b.p;
-  for (int k = 0; k < 3; ++k) {
-    if (k != ea) pa += std::copysign(a.half[k], dot(a.R.column(k), n)) * a.R.column(k);
-    if (k != eb) pb -= std::copysign(b.half[k], dot(b.R.column(k), n)) * b.R.column(k);
-  }
-  const Vec3 u = a.R.column(ea), v = b.R.column(eb), w = pb - pa;
-  const double uv = dot(u, v), denominator = 1 - uv * uv;
-  if (denominator < 1e-9) return;
-  const double s = (dot(u, w) - uv * dot(v, w)) / denominator, t = (uv * dot(u, w) - dot(v, w)) / denominator;
-  out.normal = n;
-  out.p[0] = 0.5 * (pa + s * u + pb + t * v);
-  out.depth[0] = depth;
-  out.count = 1;
 }
 
 /// Gap along the face that separated two boxes last time, negative if it does no more or was no face.
@@ -132,14 +131,19 @@ void box_box(const Solid& a, const Solid& b, int& axis, BoxContact& out) {
     return;
   }
   const Overlaps overlap_along(a, b);
-  if (axis >= 6 && overlap_along(axis) <= 0) return;
+  if (axis >= 6) {
+    if (const double overlap = overlap_along(axis); overlap <= 0) {
+      out.gap = -overlap / overlap_along.length(axis);
+      return;
+    }
+  }
   double least = std::numeric_limits<double>::infinity();
   int best = -1;
   for (int i = 0; i < 15; ++i) {
     const double overlap = overlap_along(i);
     if (overlap <= 0) {
       axis = i;
-      if (i < 6) out.gap = -overlap;
+      out.gap = -overlap / overlap_along.length(i);
       return;
     }
     // faces are preferred to edges, and the first to the second, unless clearly deeper: the choice stays steady
@@ -151,13 +155,7 @@ void box_box(const Solid& a, const Solid& b, int& axis, BoxContact& out) {
   if (best < 0) return;
   Vec3 normal = axis_of(a, b, best);
   if (dot(normal, b.p - a.p) < 0) normal = -normal;
-  if (best < 3) {
-    face_points(a, best, normal, b, false, out);
-  } else if (best < 6) {
-    face_points(b, best - 3, -normal, a, true, out);
-  } else {
-    edge_point(a, b, best, normal, least, out);
-  }
+  overlap_points(a, b, normal, out);
 }
 
 void sphere_box(const Solid& sphere, const Solid& box, bool flipped, BoxContact& out) {
@@ -181,13 +179,17 @@ void sphere_box(const Solid& sphere, const Solid& box, bool flipped, BoxContact&
     const Vec3 d = nearest - local;
     const double distance = norm(d);
     depth = sphere.radius - distance;
-    if (depth <= 0) return;
+    if (depth <= 0) {
+      out.gap = -depth;
+      return;
+    }
     n = (1 / distance) * d;
   }
   const Vec3 n_W = box.R * n;
   out.normal = flipped ? -n_W : n_W;
   out.p[0] = box.p + box.R * nearest;
   out.depth[0] = depth;
+  out.weight[0] = 1;
   out.count = 1;
 }
 
@@ -202,10 +204,14 @@ void find_contact(const Solid& a, const Solid& b, int& axis, BoxContact& out) {
   if (box_a) return sphere_box(b, a, true, out);
   const Vec3 d = b.p - a.p;
   const double distance = norm(d), depth = a.radius + b.radius - distance;
-  if (depth <= 0) return;
+  if (depth <= 0) {
+    out.gap = -depth;
+    return;
+  }
   out.normal = distance > 0 ? (1 / distance) * d : Vec3{0, 0, 1};
   out.p[0] = a.p + (a.radius - 0.5 * depth) * out.normal;
   out.depth[0] = depth;
+  out.weight[0] = 1;
   out.count = 1;
 }
 

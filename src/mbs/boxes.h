@@ -21,7 +21,11 @@ struct BoxContact {
   Vec3 normal;      // unit, from the first to the second
   Vec3 p[8];        // in W, halfway between the surfaces [m]
   double depth[8];  // > 0 [m]
-  double gap = 0;   // without points: the solids are at least this far apart [m]
+  /// Share of each point in the stiffness: half of the length of the edges that meet there over that of all edges of
+  /// the polygon in which the faces overlap, times 4, so that a corner of a box has 1 and no point is lost or won by a
+  /// jump.
+  double weight[8];
+  double gap = 0;  // without points: the solids are at least this far apart [m]
 };
 
 /// Finds the touching points of two overlapping solids; none when they are apart. `axis` remembers the separating axis

@@ -22,6 +22,8 @@ using Sparse = Eigen::SparseMatrix<double>;
 using Triplets = std::vector<Eigen::Triplet<double>>;
 using Vector = Eigen::VectorXd;
 
+constexpr double kContactAngle = 0.18;  // of a contact's swing in a step, at most [rad]
+
 /// A row of a kinematic matrix: how fast one deformation grows with the velocities of two bodies.
 struct KinematicRow {
   int a = -1, b = -1;  // place among the free bodies, -1 for held ones
@@ -224,11 +226,17 @@ double System::find_highest_frequency() const {
 }
 
 double System::calc_step_limit() const {
-  const bool contact = model.contact.ground || model.contact.bodies;
-  // a corner of a compact box is about seven times lighter than its body
-  const double touching = contact ? std::sqrt(7.0) * model.contact.contact_frequency : 0;
+  // a flat box on four corners rocks with the square root of 12 times what one of them would give its mass
+  const double touching = std::sqrt(12.0) * calc_contact_frequency();
   const double fastest = std::sqrt(highest_frequency * highest_frequency + touching * touching);
   return fastest > 0 ? 2 / fastest : 1e-3 / options.step_safety;
+}
+
+double System::calc_own_step() const {
+  const double step_of_limit = options.step_safety * calc_step_limit();
+  // steps in which bodies meet or part shall not change their energy much (docs/theory/contact.md)
+  const double corner = calc_contact_frequency();
+  return corner > 0 ? std::min(step_of_limit, kContactAngle / corner) : step_of_limit;
 }
 
 void System::set_step(double h) {
@@ -237,8 +245,6 @@ void System::set_step(double h) {
   state.index_base = state.step_index;
   state.step = h;
   adopt_step();
-  // counted in steps of the old length
-  std::fill(state.pair_apart_until.begin(), state.pair_apart_until.end(), 0);
 }
 
 void System::adopt_step() {
@@ -262,13 +268,13 @@ void System::review_step() {
   if (options.step > 0) return;
   highest_frequency = find_highest_frequency();
   summary.highest_frequency = std::max(summary.highest_frequency, highest_frequency);
-  set_step(options.step_safety * calc_step_limit());
+  set_step(calc_own_step());
 }
 
 void System::choose_step() {
   highest_frequency = find_highest_frequency();
   state.live_elements = state.live_at_review = elements.size();
-  set_step(options.step > 0 ? options.step : options.step_safety * calc_step_limit());
+  set_step(options.step > 0 ? options.step : calc_own_step());
   note_fast_dampers();
   summary.step = step;
   summary.highest_frequency = highest_frequency;

@@ -85,16 +85,15 @@ void visit(Archive& ar, S& s, C& sys) {
   ar(s.step_index), ar(s.time), ar(s.step), ar(s.time_base), ar(s.index_base), ar(s.last_kick), ar(s.review_times),
       ar(s.live_elements), ar(s.live_at_review), ar(s.first_kick), ar(s.next_event), ar(s.waiting);
   ar(s.body), ar(s.p), ar(s.v), ar(s.L), ar(s.w), ar(s.q), ar(s.R), ar(s.p_offset);
-  ar(s.shapes), ar(s.ground_points), ar(s.touched_ground), ar(s.contact_count);
+  ar(s.shapes), ar(s.ground_points), ar(s.touched_ground);
   ar(s.element), ar(s.rotational), ar(s.joint), ar(s.cable);
   ar(s.spring), ar(s.torsion), ar(s.bushing), ar(s.load);
-  ar(s.pairs), ar(s.pair_apart_until), ar(s.p_at_search), ar(s.tied_to_ground), ar(s.search_due), ar(s.last_search),
+  ar(s.pairs), ar(s.pair_due), ar(s.travel), ar(s.tied_to_ground), ar(s.search_due), ar(s.last_search),
       ar(s.touched_pairs);
-  ar(s.removed), ar(s.contact_energy), ar(s.stick_energy), ar(s.contact_work), ar(s.contact_power), ar(s.friction_work),
-      ar(s.friction_power), ar(s.total_at_start);
+  ar(s.removed), ar(s.contact_energy), ar(s.stick_energy), ar(s.contact_loss), ar(s.contact_loss_power),
+      ar(s.friction_work), ar(s.friction_power), ar(s.total_at_start);
   ar(s.gravity_at_start), ar(s.largest_residual), ar(s.released), ar(s.largest_drift), ar(s.quiet_steps);
-  ar(sys.force), ar(sys.torque), ar(sys.contact_force), ar(sys.contact_torque), ar(sys.joint_force),
-      ar(sys.joint_torque), ar(sys.element_history);
+  ar(sys.force), ar(sys.torque), ar(sys.joint_force), ar(sys.joint_torque), ar(sys.element_history);
   ar(sys.ground_reaction), ar(sys.ground_contact), ar(sys.body_contacts);
 }
 
@@ -103,7 +102,6 @@ constexpr std::uint64_t kMagic = 0x32534e41504f54ULL;  // "TOPANS2"
 /// What of the system's scratch the next step takes over, under the same names.
 struct Carried {
   LaneArray<Vec3> force, torque, joint_force, joint_torque;
-  std::vector<Vec3> contact_force, contact_torque;
   std::vector<double> element_history;
   Vec3 ground_reaction, ground_contact;
   int body_contacts = 0;
@@ -143,8 +141,6 @@ void read_snapshot(const std::vector<std::byte>& bytes, System& system) {
   system.state = std::move(state);
   system.force = std::move(carried.force);
   system.torque = std::move(carried.torque);
-  system.contact_force = std::move(carried.contact_force);
-  system.contact_torque = std::move(carried.contact_torque);
   system.joint_force = std::move(carried.joint_force);
   system.joint_torque = std::move(carried.joint_torque);
   system.adopt_step();

@@ -42,7 +42,7 @@ void append_shapes(const Body& body, BodyConstants& c, std::vector<CompiledShape
   c.first_shape = static_cast<int>(shapes.size());
   c.shapes = static_cast<int>(body.shapes.size());
   for (const Shape& s : body.shapes)
-    shapes.push_back({s.kind, s.X_BS.p, to_matrix(s.X_BS.q), s.half, s.radius, 0, false});
+    shapes.push_back({s.kind, s.X_BS.p, to_matrix(s.X_BS.q), s.half, s.radius, 0, false, false, {}});
   c.radius = calc_radius(shapes, c.first_shape, c.shapes);
 }
 
@@ -180,11 +180,7 @@ void System::compile() {
     if (elements[e].b >= 0) incidence[static_cast<size_t>(elements[e].b)].push_back(static_cast<int>(2 * e + 1));
   }
   lay_out_elements();
-  contact_force.assign(B, {});
-  contact_torque.assign(B, {});
-  friction_force.assign(B, {});
-  friction_torque.assign(B, {});
-  contact_count.assign(B, 0);
+  compile_contact();
   p_before.resize(B);
   q_before.resize(B);
   R_before.resize(B);
@@ -193,7 +189,6 @@ void System::compile() {
   body_reaction_turn.assign(B, {});
   in_cluster.assign(B, 0);
   for (size_t b = 0; b < B; ++b) pack_body(b);
-  s.contact_count.assign(B, 0);
   s.gravity_at_start = calc_energy().gravity;
 }
 
@@ -400,19 +395,7 @@ void System::replace_body(size_t b, const Body& replacement) {
   layout_shapes();
   s.removed += before - energy();
   mark_search_due();
-  // contact pairs name shapes by their index within the body, which may be others now
-  size_t kept = 0;
-  for (size_t i = 0; i < s.pairs.size(); ++i) {
-    if (s.pairs[i].a == static_cast<int>(b) || s.pairs[i].b == static_cast<int>(b)) {
-      s.contact_energy -= s.pairs[i].energy;
-      s.stick_energy -= s.pairs[i].stick_energy;
-      continue;
-    }
-    s.pairs[kept] = s.pairs[i];
-    s.pair_apart_until[kept++] = s.pair_apart_until[i];
-  }
-  s.pairs.resize(kept);
-  s.pair_apart_until.resize(kept);
+  drop_pairs_of(b);
 }
 
 void System::evaluate_forces() {
@@ -433,18 +416,7 @@ void System::finish_forces(double h) {
   evaluate_cables();
   evaluate_springs(false);
   evaluate_loads(false);
-  if (model.contact.ground || model.contact.bodies) {
-    std::fill(contact_force.begin(), contact_force.end(), Vec3{});
-    std::fill(contact_torque.begin(), contact_torque.end(), Vec3{});
-    std::fill(friction_force.begin(), friction_force.end(), Vec3{});
-    std::fill(friction_torque.begin(), friction_torque.end(), Vec3{});
-    std::fill(contact_count.begin(), contact_count.end(), 0);
-    if (state.search_due) find_pairs();
-    if (model.contact.ground) evaluate_ground_contact(h);
-    if (model.contact.bodies) evaluate_body_contact(h);
-    add_contact_work(h);
-    state.contact_count.swap(contact_count);
-  }
+  if (model.contact.ground || model.contact.bodies) evaluate_contact(h);
   evaluate_dampers();
 }
 
@@ -580,8 +552,7 @@ Energy System::calc_energy() const {
   add_energy_of_forces(e);
   e.contact = state.contact_energy + state.stick_energy;
   e.friction = -state.friction_work - state.stick_energy;
-  // what contact took from the bodies and neither stores nor rubbed away
-  e.contact_loss = -(state.contact_work - state.friction_work) - state.contact_energy;
+  e.contact_loss = state.contact_loss;
   e.removed = state.removed;
   e.residual = e.kinetic + e.gravity + e.elastic + e.contact + e.plastic + e.damping + e.friction + e.contact_loss +
                e.removed - e.loads - state.total_at_start;

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "mbs/block_cholesky.h"
-#include "mbs/boxes.h"
+#include "mbs/contact.h"
 #include "mbs/forces.h"
 #include "mbs/lane_array.h"
 #include "mbs/lanes.h"
@@ -25,39 +25,6 @@ struct BodyConstants {
   Mat3 inertia, inverse_inertia;    // in B
   double radius = 0;                // of the sphere about the centre of mass that holds all shapes [m]
   int first_shape = 0, shapes = 0;  // into State::shapes
-};
-
-/// Contact shape in its body's frame.
-struct CompiledShape {
-  Shape::Kind kind = Shape::Kind::Box;
-  Vec3 p_BS;
-  Mat3 R_BS;
-  Vec3 half;
-  double radius = 0;
-  int first_corner = 0;   // into State::ground_points: 8 of a box, 1 of a sphere
-  bool is_clear = false;  // no point touches the ground or remembers that it did
-};
-
-/// A corner's contact with the ground.
-struct GroundPoint {
-  double born = 0;      // penetration allowed because it was there when contact became possible [m]
-  bool active = false;  // contact is possible
-  bool touching = false;
-  Vec3 stick;        // tangential displacement of the friction spring [m]
-  double depth = 0;  // of the step before [m]
-};
-
-/// Two bodies near each other.
-struct PairState {
-  int a = -1, b = -1;            // bodies, a < b
-  int shape_a = 0, shape_b = 0;  // indices within the bodies
-  double born = 0;
-  bool seen = false;  // born is set
-  bool touching = false;
-  int axis = 0;       // separating axis of the step before
-  double energy = 0;  // stored [J]
-  double stick_energy = 0;
-  Vec3 stick;  // tangential displacement of the friction spring, of a against b [m]
 };
 
 struct CompiledElement {
@@ -124,7 +91,6 @@ struct State {
   std::vector<CompiledShape> shapes;
   std::vector<GroundPoint> ground_points;
   std::vector<unsigned char> touched_ground;
-  std::vector<int> contact_count;  // touching points of each body in the step before (B)
   // connections
   std::vector<ZoneState> element;
   std::vector<ZoneState> rotational;
@@ -135,16 +101,16 @@ struct State {
   std::vector<LoadState> load;
   // contact pairs
   std::vector<PairState> pairs;
-  std::vector<long> pair_apart_until;  // step before which the bodies of a pair cannot meet
-  LaneArray<Vec3> p_at_search;
+  std::vector<double> pair_due;  // way of both bodies before which those of a pair cannot meet [m]
+  std::vector<double> travel;    // way of each body's farthest point since the last search, at most (B) [m]
   std::vector<unsigned char> tied_to_ground;
   bool search_due = true;
-  long last_search = 0;
+  long last_search = -1;            // step
   std::vector<long> touched_pairs;  // a * B + b, sorted
   // ledger [J]
   double removed = 0, contact_energy = 0, stick_energy = 0;
-  double contact_work = 0, contact_power = 0;    // of all contact forces on the bodies [J, W]
-  double friction_work = 0, friction_power = 0;  // the part by friction
+  double contact_loss = 0, contact_loss_power = 0;  // by the dashpots of contacts [J, W]
+  double friction_work = 0, friction_power = 0;     // of the friction forces on the bodies [J, W]
   double total_at_start = 0;
   double gravity_at_start = 0, largest_residual = 0, released = 0;
   double largest_drift = 0;
@@ -214,6 +180,9 @@ class System {
   std::vector<CompiledRotational> rotationals;
   ForceElements forces;
   std::vector<size_t> event_order;
+  std::vector<ContactLaw> contact_laws;  // of the ground, of bodies, and of each of Contact::pairs
+  std::vector<int> ground_law;           // of each body, into contact_laws (B)
+  std::vector<PairRule> pair_rules;      // sorted
   std::vector<unsigned char> fixed;
   std::vector<std::vector<int>> incidence;  // elements of each body: 2 * element + side
 
@@ -227,10 +196,8 @@ class System {
 
   // scratch
   std::vector<double> element_history;
-  LaneArray<Vec3> force, torque;                      // applied on bodies (B)
-  std::vector<Vec3> contact_force, contact_torque;    // the part by contact (B)
-  std::vector<Vec3> friction_force, friction_torque;  // and of that by friction (B)
-  LaneArray<Vec3> joint_force, joint_torque;          // of the joints on bodies, of the step before (B)
+  LaneArray<Vec3> force, torque;              // applied on bodies (B)
+  LaneArray<Vec3> joint_force, joint_torque;  // of the joints on bodies, of the step before (B)
   std::vector<Vec3> p_before;
   std::vector<Quat> q_before;
   std::vector<Mat3> R_before, world_inverse_inertia;  // of jointed bodies (B)
@@ -248,10 +215,10 @@ class System {
   std::vector<Vec3> body_reaction, body_reaction_turn;  // their sums on bodies (B)
   Vec3 ground_reaction, ground_contact;
   int body_contacts = 0;
-  std::string trouble;             // why the run cannot go on; empty: nothing
-  std::vector<int> due_events;     // of this step
-  std::vector<int> contact_count;  // being counted (B)
-  std::vector<Solid> solids;       // shapes in W, as of solid_step
+  std::string trouble;          // why the run cannot go on; empty: nothing
+  std::vector<int> due_events;  // of this step
+  ContactScratch contact;
+  std::vector<Solid> solids;  // shapes in W, as of solid_step
   std::vector<long> solid_step;
   View view;
 
@@ -265,6 +232,8 @@ class System {
   double find_highest_frequency() const;
   /// Longest stable step for the highest frequency and contact [s].
   double calc_step_limit() const;
+  /// The engine's own, without Options::step [s].
+  double calc_own_step() const;
   void choose_step();
   /// After events, and when a quarter of the elements is gone: a step for the model as it is now.
   void review_step();
@@ -347,12 +316,25 @@ class System {
   void pack_body(size_t body);
   void evaluate_rotationals(double h);
   void evaluate_cables();
-  void evaluate_ground_contact(double h);
-  void evaluate_body_contact(double h);
+  void evaluate_contact(double h);
+  void compile_contact();
+  /// Of a body on one point at the mean rate, the highest of all laws [rad/s].
+  double calc_contact_frequency() const;
+  /// Counts the ways of bodies since the last search, and searches anew where they ask for it.
+  void add_travel(double h);
+  /// Bodies whose shapes are near each other, and who is tied to the ground.
   void find_pairs();
-  /// A contact force on a body at a lever from its centre.
-  void push(size_t body, const Vec3& lever, const Vec3& normal, const Vec3& friction);
-  void add_contact_work(double h);
+  void drop_pairs_of(size_t b);
+  /// Law of two bodies, into contact_laws.
+  int find_pair_law(int a, int b) const;
+  void find_ground_points();
+  void find_pair_points();
+  void add_contact_point(const Vec3& ra, const Vec3& rb, double depth, double stiffness);
+  /// Makes the points from `first` on a group.
+  void add_contact_group(size_t a, size_t b, const Vec3& n, size_t first, const ContactLaw&, double stiffness, Stick&,
+                         bool fresh);
+  /// Forces at the points found, on the bodies and in the ledger.
+  void resolve_contacts(double h);
   /// Moves a body from its pose at the beginning of the step to the end of it.
   void drift(size_t body, double h, const Vec3& p0, const Quat& q0, const Mat3& R0);
   void build_clusters();

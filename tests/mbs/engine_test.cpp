@@ -7,6 +7,7 @@
 #include <functional>
 
 #include "base/error.h"
+#include "mbs/contact_law.h"
 #include "mbs/model_json.h"
 #include "mbs/zone.h"
 #include "models.h"
@@ -399,28 +400,28 @@ TEST(ContactPhysics, FourSlabsComeToRestOnEachOther) {
   };
   const Summary s = run(make_stack(), o);
   EXPECT_EQ(s.ending, Summary::Ending::AtRest) << s.message;
-  // a resting contact's spring has e² times the rate of the approach: four corners of m ω² on the ground, in all half
-  // of that m ω² between two slabs
-  const double rate = 0.01 * 9000 * 1500 * 1500;
-  double drop = 0, penetration = 4 * 9000 * kGravity / (4 * rate);
+  // a resting contact's spring has the mean of the rates of approach and parting (docs/theory/contact.md): four corners
+  // of m ω² on the ground, of half of that between two slabs
+  const double rate = make_contact_law(0.1, 0).mean * 4 * 9000 * 1500 * 1500;
+  double drop = 0, penetration = 4 * 9000 * kGravity / rate;
   for (int i = 0; i < 4; ++i) {
     const Vec3& p = X[static_cast<size_t>(i)].p;
-    if (i > 0) penetration += (4 - i) * 9000 * kGravity / (0.5 * rate);
-    EXPECT_NEAR(p.z, 0.075 + 0.15 * i - penetration, 2e-4);  // still swinging at the speed called rest
+    if (i > 0) penetration += 2 * (4 - i) * 9000 * kGravity / rate;
+    EXPECT_NEAR(p.z, 0.075 + 0.15 * i - penetration, 1e-8);
     EXPECT_LT(std::hypot(p.x, p.y), 1e-3);
     drop += 0.095 + 0.17 * i - p.z;
   }
   // all of it falls straight down: impacts take the energy, sliding next to nothing
   EXPECT_NEAR(-e.gravity, 9000 * kGravity * drop, 1e-9 * e.released);
-  EXPECT_EQ(least_loss, 0);  // never gave back more than it took
-  EXPECT_NEAR(e.contact_loss + e.contact, -e.gravity, 1e-3 * e.released);
+  EXPECT_EQ(least_loss, 0);                                                // never gave back more than it took
+  EXPECT_NEAR(e.contact_loss + e.contact, -e.gravity, 5e-3 * e.released);  // error of the impacts at this step
   EXPECT_GE(e.friction, 0);
   EXPECT_LT(e.friction, 0.01 * e.released);
-  EXPECT_LT(s.energy_error, 0.02);
+  EXPECT_LT(s.energy_error, 5e-3);
 }
 
 TEST(Frames, RiseStrictlyInTimeToTheLast) {
-  for (const double interval : {1e-5, 1.0 / 60, 0.3}) {
+  for (const double interval : {1e-5, 1.0 / 60, 0.1}) {
     for (const double rest_speed : {0.0, 0.05}) {
       Options o;
       o.equilibrium = false;

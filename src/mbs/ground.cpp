@@ -1,0 +1,76 @@
+/// Touching points of bodies and the ground (docs/theory/contact.md).
+
+#include <algorithm>
+#include <cmath>
+
+#include "mbs/system.h"
+
+namespace topple::mbs {
+
+void System::find_ground_points() {
+  State& s = state;
+  const State& now = state;
+  const Contact& c = model.contact;
+  const Vec3 n = c.normal;
+  for (size_t b = 0; b < B; ++b) {
+    const BodyConstants& body = s.body[b];
+    if (fixed[b] || body.shapes == 0) continue;
+    const ContactLaw& law = contact_laws[static_cast<size_t>(ground_law[b])];
+    const bool possible = !s.tied_to_ground[b] && law.touches;
+    // far above the ground nothing is remembered but that contact is possible
+    const Vec3 p = now.p[b];
+    const double above = dot(n, p) - c.offset - body.radius;
+    if (above > 0.05 && possible) continue;
+    const double stiffness = law.stiffness > 0 ? law.stiffness : body.mass * c.contact_frequency * c.contact_frequency;
+    const Mat3 R_WB = now.R[b];
+    for (int i = body.first_shape; i < body.first_shape + body.shapes; ++i) {
+      CompiledShape& shape = s.shapes[static_cast<size_t>(i)];
+      const bool box = shape.kind == Shape::Kind::Box;
+      const Vec3 centre = R_WB * shape.p_BS;
+      const Mat3 R = box ? R_WB * shape.R_BS : Mat3{};
+      if (possible && shape.is_clear) {
+        // all its points are known not to touch: they do not as long as it stays above the ground
+        const Vec3 down = box ? transpose_times(R, n) : Vec3{};
+        const double reach =
+            box ? std::abs(down.x) * shape.half.x + std::abs(down.y) * shape.half.y + std::abs(down.z) * shape.half.z
+                : shape.radius;
+        if (dot(n, p + centre) - c.offset > reach) continue;
+      }
+      shape.is_clear = possible;
+      const size_t first = contact.point.size();
+      for (int corner = 0; corner < (box ? 8 : 1); ++corner) {
+        GroundPoint& g = s.ground_points[static_cast<size_t>(shape.first_corner + corner)];
+        if (!possible) {
+          g = {};
+          continue;
+        }
+        const Vec3 r = box ? centre + R * Vec3{corner & 1 ? shape.half.x : -shape.half.x,
+                                               corner & 2 ? shape.half.y : -shape.half.y,
+                                               corner & 4 ? shape.half.z : -shape.half.z}
+                           : centre - shape.radius * n;
+        const double penetration = c.offset - dot(n, p + r);
+        if (!g.active) {
+          g.active = true;
+          g.born = std::max(0.0, penetration);
+        }
+        g.born = std::max(0.0, std::min(g.born, penetration));
+        const double depth = penetration - g.born;
+        if (g.born > 0 || depth > 0) shape.is_clear = false;
+        if (depth > 0) add_contact_point(r, {}, depth, stiffness);
+      }
+      if (contact.point.size() == first) {
+        shape.is_touching = false;
+        continue;
+      }
+      if (!shape.is_touching && !s.touched_ground[b]) {
+        s.touched_ground[b] = 1;
+        const double approach = -dot(n, now.v[b] + cross(now.w[b], contact.point[first].ra));
+        say({Happening::Kind::GroundContact, s.time, static_cast<int>(b), -1, {}, std::max(0.0, approach)});
+      }
+      add_contact_group(b, B, -n, first, law, stiffness, shape.stick, !shape.is_touching);
+      shape.is_touching = true;
+    }
+  }
+}
+
+}  // namespace topple::mbs
