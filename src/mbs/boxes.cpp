@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "mbs/polyhedra.h"
+
 namespace topple::mbs {
 
 namespace {
@@ -198,7 +200,15 @@ void sphere_box(const Solid& sphere, const Solid& box, bool flipped, BoxContact&
 void find_contact(const Solid& a, const Solid& b, int& axis, BoxContact& out) {
   out.count = 0;
   out.gap = 0;
-  const bool box_a = a.kind == Shape::Kind::Box, box_b = b.kind == Shape::Kind::Box;
+  const auto is = [](const Solid& s, Shape::Kind kind) { return s.kind == kind; };
+  if (is(a, Shape::Kind::Plane)) return plane_solid(a, b, false, out);
+  if (is(b, Shape::Kind::Plane)) return plane_solid(b, a, true, out);
+  if (is(a, Shape::Kind::Hull) || is(b, Shape::Kind::Hull)) {
+    if (is(a, Shape::Kind::Sphere)) return sphere_hull(a, b, false, out);
+    if (is(b, Shape::Kind::Sphere)) return sphere_hull(b, a, true, out);
+    return hull_hull(a, b, axis, out);
+  }
+  const bool box_a = is(a, Shape::Kind::Box), box_b = is(b, Shape::Kind::Box);
   if (box_a && box_b) return box_box(a, b, axis, out);
   if (box_b) return sphere_box(a, b, false, out);
   if (box_a) return sphere_box(b, a, true, out);

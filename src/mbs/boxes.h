@@ -5,14 +5,17 @@
 
 namespace topple::mbs {
 
-/// A box or sphere in W.
+struct Hull;
+
+/// A contact shape in W.
 struct Solid {
   Shape::Kind kind = Shape::Kind::Box;
-  Vec3 p;     // centre
-  Mat3 R;     // axes of a box
+  Vec3 p;     // origin of its frame: centre of a box or sphere, on the surface of a plane
+  Mat3 R;     // axes of its frame
   Vec3 half;  // half edges [m]
   double radius = 0;
-  double reach = 0;  // radius of the sphere around it [m]
+  double reach = 0;            // radius of the sphere around p that holds it [m]
+  const Hull* hull = nullptr;  // of a polyhedron, and of boxes in models that have polyhedra
 };
 
 /// Touching points of two solids, at most eight, all with the same normal.
@@ -29,7 +32,7 @@ struct BoxContact {
 };
 
 /// Finds the touching points of two overlapping solids; none when they are apart. `axis` remembers the separating axis
-/// (0 to 14) of the last call and only saves time.
+/// of the last call (0 to 14 of boxes, more of polyhedra) and only saves time.
 void find_contact(const Solid& a, const Solid& b, int& axis, BoxContact& out);
 
 }  // namespace topple::mbs

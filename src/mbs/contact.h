@@ -23,7 +23,9 @@ struct CompiledShape {
   Mat3 R_BS;
   Vec3 half;
   double radius = 0;
-  int first_corner = 0;      // into State::ground_points: 8 of a box, 1 of a sphere
+  double reach = 0;          // radius of the sphere around p_BS that holds it, infinite for a plane [m]
+  int hull = -1;             // into System::hulls
+  int first_corner = 0;      // into State::ground_points: 8 of a box, 1 of a sphere, the vertices of a polyhedron
   bool is_clear = false;     // no point touches the ground or remembers that it did
   bool is_touching = false;  // the ground
   Stick stick;               // to the ground

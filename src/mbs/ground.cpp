@@ -25,20 +25,20 @@ void System::find_ground_points() {
     const Mat3 R_WB = now.R[b];
     for (int i = body.first_shape; i < body.first_shape + body.shapes; ++i) {
       CompiledShape& shape = s.shapes[static_cast<size_t>(i)];
-      const bool box = shape.kind == Shape::Kind::Box;
+      const bool box = shape.kind == Shape::Kind::Box, hull = shape.kind == Shape::Kind::Hull;
       const Vec3 centre = R_WB * shape.p_BS;
-      const Mat3 R = box ? R_WB * shape.R_BS : Mat3{};
+      const Mat3 R = box || hull ? R_WB * shape.R_BS : Mat3{};
       if (possible && shape.is_clear) {
         // all its points are known not to touch: they do not as long as it stays above the ground
         const Vec3 down = box ? transpose_times(R, n) : Vec3{};
         const double reach =
             box ? std::abs(down.x) * shape.half.x + std::abs(down.y) * shape.half.y + std::abs(down.z) * shape.half.z
-                : shape.radius;
+                : shape.reach;
         if (dot(n, p + centre) - c.offset > reach) continue;
       }
       shape.is_clear = possible;
       const size_t first = contact.point.size();
-      for (int corner = 0; corner < (box ? 8 : 1); ++corner) {
+      for (int corner = 0; corner < count_corners(shape); ++corner) {
         GroundPoint& g = s.ground_points[static_cast<size_t>(shape.first_corner + corner)];
         if (!possible) {
           g = {};
@@ -47,6 +47,8 @@ void System::find_ground_points() {
         const Vec3 r = box ? centre + R * Vec3{corner & 1 ? shape.half.x : -shape.half.x,
                                                corner & 2 ? shape.half.y : -shape.half.y,
                                                corner & 4 ? shape.half.z : -shape.half.z}
+                       : hull
+                           ? centre + R * hulls[static_cast<size_t>(shape.hull)].vertices[static_cast<size_t>(corner)]
                            : centre - shape.radius * n;
         const double penetration = c.offset - dot(n, p + r);
         if (!g.active) {

@@ -5,9 +5,9 @@
 #define HWY_TARGET_INCLUDE "mbs/kernel.cpp"
 // one wide target for each family of machines keeps the build short
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4 | HWY_AVX3_DL)
-#include "hwy/foreach_target.h"
+#include <hwy/foreach_target.h>
 // after foreach_target
-#include "hwy/highway.h"
+#include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
 namespace topple::mbs::kernel {

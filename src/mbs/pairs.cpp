@@ -63,7 +63,7 @@ void System::find_pairs() {
       for (int i = 0; i < s.body[b].shapes; ++i) {
         const CompiledShape& shape = s.shapes[static_cast<size_t>(s.body[b].first_shape + i)];
         const Vec3 c = s.p[b] + s.R[b] * shape.p_BS;
-        Vec3 reach{shape.radius, shape.radius, shape.radius};
+        Vec3 reach{shape.reach, shape.reach, shape.reach};
         if (shape.kind == Shape::Kind::Box) {
           const Mat3 R = s.R[b] * shape.R_BS;
           for (int k = 0; k < 3; ++k)
@@ -75,9 +75,11 @@ void System::find_pairs() {
       }
     // sweep along the axis on which the shapes spread most
     Vec3 mean, spread;
-    for (const Item& it : items) mean += (0.5 / static_cast<double>(items.size())) * (it.low + it.high);
+    const auto is_bounded = [](const Item& it) { return topple::is_finite(it.low); };  // planes are not
     for (const Item& it : items)
-      for (int k = 0; k < 3; ++k) spread[k] += std::pow(0.5 * (it.low[k] + it.high[k]) - mean[k], 2);
+      if (is_bounded(it)) mean += (0.5 / static_cast<double>(items.size())) * (it.low + it.high);
+    for (const Item& it : items)
+      for (int k = 0; k < 3 && is_bounded(it); ++k) spread[k] += std::pow(0.5 * (it.low[k] + it.high[k]) - mean[k], 2);
     const int axis = spread.x >= spread.y && spread.x >= spread.z ? 0 : spread.y >= spread.z ? 1 : 2;
     std::vector<std::pair<double, int>> order(items.size());
     for (size_t i = 0; i < items.size(); ++i) order[i] = {items[i].low[axis], static_cast<int>(i)};
@@ -173,9 +175,13 @@ void System::find_pair_points() {
       solid_step[i] = s.step_index;
       const CompiledShape& c_shape = s.shapes[i];
       const Mat3 R = now.R[body];
-      solids[i] = {c_shape.kind,     now.p[body] + R * c_shape.p_BS,
-                   R * c_shape.R_BS, c_shape.half,
-                   c_shape.radius,   c_shape.kind == Shape::Kind::Box ? norm(c_shape.half) : c_shape.radius};
+      solids[i] = {c_shape.kind,
+                   now.p[body] + R * c_shape.p_BS,
+                   R * c_shape.R_BS,
+                   c_shape.half,
+                   c_shape.radius,
+                   c_shape.reach,
+                   c_shape.hull >= 0 ? &hulls[static_cast<size_t>(c_shape.hull)] : nullptr};
     }
     return solids[i];
   };

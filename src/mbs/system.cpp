@@ -12,16 +12,6 @@ namespace {
 
 Mat3 world_tensor(const Mat3& R, const Mat3& in_body) { return R * in_body * transpose(R); }
 
-/// Reach of a body's shapes from its centre.
-double calc_radius(const std::vector<CompiledShape>& shapes, int first, int count) {
-  double r = 0;
-  for (int i = first; i < first + count; ++i) {
-    const CompiledShape& s = shapes[static_cast<size_t>(i)];
-    r = std::max(r, norm(s.p_BS) + (s.kind == Shape::Kind::Box ? norm(s.half) : s.radius));
-  }
-  return r;
-}
-
 BodyConstants constants_of(const Body& body) {
   BodyConstants c;
   c.mass = body.mass;
@@ -36,15 +26,6 @@ BodyConstants constants_of(const Body& body) {
 /// Spring behind the damper over the elastic spring, so that the loss at the damping frequency is that of the ratio:
 /// loss factor 2ζ = (r/2) / (1 + r/2).
 double viscous_share(double damping_ratio) { return 4 * damping_ratio / (1 - 2 * damping_ratio); }
-
-/// Appends a body's shapes in its frame.
-void append_shapes(const Body& body, BodyConstants& c, std::vector<CompiledShape>& shapes) {
-  c.first_shape = static_cast<int>(shapes.size());
-  c.shapes = static_cast<int>(body.shapes.size());
-  for (const Shape& s : body.shapes)
-    shapes.push_back({s.kind, s.X_BS.p, to_matrix(s.X_BS.q), s.half, s.radius, 0, false, false, {}});
-  c.radius = calc_radius(shapes, c.first_shape, c.shapes);
-}
 
 }  // namespace
 
@@ -80,10 +61,11 @@ void System::compile() {
   s.touched_ground.assign(B, 0);
   s.tied_to_ground.assign(B, 0);
   fixed.resize(B);
+  compile_hulls();
   for (size_t b = 0; b < B; ++b) {
     const Body& body = model.bodies[b];
     s.body[b] = constants_of(body);
-    append_shapes(body, s.body[b], s.shapes);
+    append_shapes(body, s.body[b]);
     fixed[b] = body.fixed;
     s.p[b] = body.X_WB.p;
     s.q[b] = normalized(body.X_WB.q);
@@ -192,11 +174,74 @@ void System::compile() {
   s.gravity_at_start = calc_energy().gravity;
 }
 
+void System::compile_hulls() {
+  std::vector<const Body*> bodies;
+  for (const Body& b : model.bodies) bodies.push_back(&b);
+  for (const Event& event : model.events)
+    for (const Action& a : event.actions)
+      if (a.kind == Action::Kind::ReplaceBody) bodies.push_back(&a.replacement);
+  bool any = false;
+  for (const Body* body : bodies)
+    for (const Shape& s : body->shapes) any = any || s.kind == Shape::Kind::Hull;
+  if (!any) return;
+  // boxes that may meet polyhedra are some
+  for (const Body* body : bodies)
+    for (const Shape& s : body->shapes) {
+      if ((s.kind != Shape::Kind::Hull && s.kind != Shape::Kind::Box) || find_hull(s) >= 0) continue;
+      hulls.push_back(s.kind == Shape::Kind::Hull ? make_hull(s.vertices) : make_box_hull(s.half));
+      hull_shapes.push_back(s);
+    }
+}
+
+int System::find_hull(const Shape& s) const {
+  for (size_t i = 0; i < hull_shapes.size(); ++i) {
+    const Shape& known = hull_shapes[i];
+    if (known.kind != s.kind) continue;
+    if (s.kind == Shape::Kind::Hull ? known.vertices == s.vertices : known.half == s.half) return static_cast<int>(i);
+  }
+  return -1;
+}
+
+void System::append_shapes(const Body& body, BodyConstants& c) {
+  c.first_shape = static_cast<int>(state.shapes.size());
+  c.shapes = static_cast<int>(body.shapes.size());
+  c.radius = 0;
+  for (const Shape& s : body.shapes) {
+    CompiledShape compiled;
+    compiled.kind = s.kind;
+    compiled.p_BS = s.X_BS.p;
+    compiled.R_BS = to_matrix(s.X_BS.q);
+    compiled.half = s.half;
+    compiled.radius = s.kind == Shape::Kind::Sphere ? s.radius : 0;
+    compiled.hull = find_hull(s);
+    compiled.reach = s.kind == Shape::Kind::Box      ? norm(s.half)
+                     : s.kind == Shape::Kind::Sphere ? s.radius
+                     : s.kind == Shape::Kind::Hull   ? hulls[static_cast<size_t>(compiled.hull)].reach
+                                                     : kUnlimited;
+    c.radius = std::max(c.radius, norm(s.X_BS.p) + compiled.reach);
+    state.shapes.push_back(compiled);
+  }
+}
+
+int System::count_corners(const CompiledShape& shape) const {
+  switch (shape.kind) {
+    case Shape::Kind::Box:
+      return 8;
+    case Shape::Kind::Sphere:
+      return 1;
+    case Shape::Kind::Hull:
+      return static_cast<int>(hulls[static_cast<size_t>(shape.hull)].vertices.size());
+    case Shape::Kind::Plane:
+      break;
+  }
+  return 0;
+}
+
 void System::layout_shapes() {
   int corner = 0;
   for (CompiledShape& shape : state.shapes) {
     shape.first_corner = corner;
-    corner += shape.kind == Shape::Kind::Box ? 8 : 1;
+    corner += count_corners(shape);
   }
   state.ground_points.resize(static_cast<size_t>(corner));
 }
@@ -391,7 +436,7 @@ void System::replace_body(size_t b, const Body& replacement) {
     pack_element(static_cast<size_t>(entry / 2));
   }
   // the old shapes stay in the list, unused
-  append_shapes(replacement, s.body[b], s.shapes);
+  append_shapes(replacement, s.body[b]);
   layout_shapes();
   s.removed += before - energy();
   mark_search_due();

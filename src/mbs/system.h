@@ -11,6 +11,7 @@
 #include "mbs/block_cholesky.h"
 #include "mbs/contact.h"
 #include "mbs/forces.h"
+#include "mbs/hull.h"
 #include "mbs/lane_array.h"
 #include "mbs/lanes.h"
 #include "mbs/model.h"
@@ -179,6 +180,8 @@ class System {
   std::vector<CompiledJoint> joints;
   std::vector<CompiledRotational> rotationals;
   ForceElements forces;
+  std::vector<Hull> hulls;
+  std::vector<Shape> hull_shapes;  // what each was made of
   std::vector<size_t> event_order;
   std::vector<ContactLaw> contact_laws;  // of the ground, of bodies, and of each of Contact::pairs
   std::vector<int> ground_law;           // of each body, into contact_laws (B)
@@ -364,6 +367,12 @@ class System {
   void break_element(size_t e, BreakReason reason);
   void release_joint(size_t j, const char* reason);
   void replace_body(size_t b, const Body& replacement);
+  /// Polyhedra of the model and of what events put in place of bodies.
+  void compile_hulls();
+  int find_hull(const Shape&) const;
+  /// Appends a body's shapes in its frame.
+  void append_shapes(const Body&, BodyConstants&);
+  int count_corners(const CompiledShape&) const;
   void layout_shapes();
   void mark_search_due() { state.search_due = true; }
   Mat3 rotation_of(int body) const { return body < 0 ? Mat3::identity() : state.R[static_cast<size_t>(body)]; }

@@ -1,0 +1,34 @@
+#pragma once
+/// Convex polyhedra as contact shapes.
+
+#include <array>
+#include <vector>
+
+#include "base/linalg.h"
+
+namespace topple::mbs {
+
+/// A convex polyhedron in the frame S of its shape.
+struct Hull {
+  struct Face {
+    Vec3 normal;            // outward, unit
+    double offset = 0;      // dot(normal, p) on the face [m]
+    std::vector<int> loop;  // vertices, counter-clockwise seen from outside
+  };
+  std::vector<Vec3> vertices;  // [m]
+  std::vector<Face> faces;
+  std::vector<std::array<int, 2>> edges;  // vertices
+  std::vector<Vec3> directions;           // of the edges, unit, parallel ones once
+  std::vector<int> direction_of;          // of each edge
+  double reach = 0;                       // largest distance of a vertex from the origin of S [m]
+};
+
+/// Most corners of one face.
+inline constexpr int kMostFaceCorners = 32;
+
+/// The convex hull of points; coplanar triangles are one face. Throws InputError if they lie in a plane, are fewer
+/// than four, or a face has more than kMostFaceCorners corners.
+Hull make_hull(const std::vector<Vec3>& points);
+Hull make_box_hull(const Vec3& half);
+
+}  // namespace topple::mbs

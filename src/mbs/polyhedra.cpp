@@ -1,0 +1,267 @@
+#include "mbs/polyhedra.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace topple::mbs {
+
+namespace {
+
+constexpr int kMostCorners = 2 * kMostFaceCorners;  // of two faces' overlap
+constexpr int kMostPoints = 8;
+
+/// Largest dot(n, vertex) of a polyhedron about its own centre; n in W.
+double find_support(const Solid& s, const Vec3& n) {
+  const Vec3 local = transpose_times(s.R, n);
+  double most = -std::numeric_limits<double>::infinity();
+  for (const Vec3& v : s.hull->vertices) most = std::max(most, dot(local, v));
+  return most;
+}
+
+/// A direction along which two polyhedra may be apart.
+struct Axis {
+  Vec3 n;          // unit, from the first to the second
+  double overlap;  // negative when apart [m]
+  int number;
+};
+
+/// Overlap along the normal of a face of `own`; `sign` -1 if own is the second solid.
+Axis look_along_face(const Solid& own, const Solid& other, size_t face, double sign, int number) {
+  const Hull::Face& f = own.hull->faces[face];
+  const Vec3 n = own.R * f.normal;
+  const double overlap = f.offset + find_support(other, -n) - dot(n, other.p - own.p);
+  return {sign * n, overlap, number};
+}
+
+/// Overlap along the product of two edges' directions; infinite where they are parallel.
+Axis look_along_edges(const Solid& a, const Solid& b, size_t i, size_t j, int number) {
+  const Vec3 product = cross(a.R * a.hull->directions[i], b.R * b.hull->directions[j]);
+  const double length = norm(product);
+  if (length < 1e-6) return {{}, std::numeric_limits<double>::infinity(), number};
+  const Vec3 n = (1 / length) * product, d = b.p - a.p;
+  const double one = find_support(a, n) + find_support(b, -n) - dot(n, d);
+  const double two = find_support(a, -n) + find_support(b, n) + dot(n, d);
+  return one <= two ? Axis{n, one, number} : Axis{-n, two, number};
+}
+
+/// Cuts a polygon by the half-space dot(n, p) <= offset.
+int clip(const Vec3* in, int count, const Vec3& n, double offset, Vec3* out) {
+  int kept = 0;
+  for (int i = 0; i < count; ++i) {
+    const Vec3 &p = in[i], &q = in[(i + 1) % count];
+    const double dp = dot(n, p) - offset, dq = dot(n, q) - offset;
+    if (dp <= 0) out[kept++] = p;
+    if ((dp < 0 && dq > 0) || (dp > 0 && dq < 0)) out[kept++] = p + (dp / (dp - dq)) * (q - p);
+  }
+  return kept;
+}
+
+/// The face that looks most along n (in W).
+const Hull::Face& find_face(const Solid& s, const Vec3& n) {
+  const Vec3 local = transpose_times(s.R, n);
+  const auto& faces = s.hull->faces;
+  return *std::max_element(faces.begin(), faces.end(), [&](const Hull::Face& x, const Hull::Face& y) {
+    return dot(x.normal, local) < dot(y.normal, local);
+  });
+}
+
+/// The corners of the area, seen along n, in which the faces of both solids that look at each other overlap; those with
+/// the shortest edges go first where there are too many.
+void overlap_points(const Solid& a, const Solid& b, const Vec3& n, BoxContact& out) {
+  const Hull::Face &face_a = find_face(a, n), &face_b = find_face(b, -n);
+  const Vec3 n_a = a.R * face_a.normal;
+  const double along = dot(n_a, n);
+  if (along < 1e-6) return;
+  Vec3 polygon[kMostCorners], cut[kMostCorners];
+  int count = 0;
+  for (const int i : face_b.loop) polygon[count++] = b.p + b.R * b.hull->vertices[static_cast<size_t>(i)];
+  const int corners = static_cast<int>(face_a.loop.size());
+  for (int i = 0; i < corners && count > 0; ++i) {
+    const Vec3 p = a.p + a.R * a.hull->vertices[static_cast<size_t>(face_a.loop[static_cast<size_t>(i)])];
+    const Vec3 q =
+        a.p + a.R * a.hull->vertices[static_cast<size_t>(face_a.loop[static_cast<size_t>((i + 1) % corners)])];
+    const Vec3 outward = cross(q - p, n);
+    count = clip(polygon, count, outward, dot(outward, p), cut);
+    std::copy(cut, cut + count, polygon);
+  }
+  double length[kMostCorners];  // of the edges that begin at each corner
+  const auto measure = [&] {
+    double perimeter = 0;
+    for (int i = 0; i < count; ++i) perimeter += length[i] = norm(polygon[(i + 1) % count] - polygon[i]);
+    return perimeter;
+  };
+  double perimeter = measure();
+  while (count > kMostPoints) {
+    int least = 0;
+    for (int i = 1; i < count; ++i)
+      if (length[i] + length[(i + count - 1) % count] < length[least] + length[(least + count - 1) % count]) least = i;
+    std::copy(polygon + least + 1, polygon + count, polygon + least);
+    --count;
+    perimeter = measure();
+  }
+  const double surface = face_a.offset + dot(n_a, a.p);
+  for (int i = 0; i < count; ++i) {
+    const double depth = (surface - dot(n_a, polygon[i])) / along;
+    if (depth <= 0) continue;
+    out.p[out.count] = polygon[i] + (0.5 * depth) * n;
+    out.weight[out.count] = perimeter > 0 ? 2 * (length[(i + count - 1) % count] + length[i]) / perimeter : 1;
+    out.depth[out.count++] = depth;
+  }
+}
+
+/// Where the supporting edges of both come closest.
+void edge_point(const Solid& a, const Solid& b, size_t i, size_t j, const Axis& axis, BoxContact& out) {
+  const auto find_edge = [](const Solid& s, size_t direction, const Vec3& n) {
+    const Vec3 local = transpose_times(s.R, n);
+    size_t best = 0;
+    double most = -std::numeric_limits<double>::infinity();
+    for (size_t e = 0; e < s.hull->edges.size(); ++e) {
+      if (s.hull->direction_of[e] != static_cast<int>(direction)) continue;
+      const double at = dot(local, s.hull->vertices[static_cast<size_t>(s.hull->edges[e][0])]) +
+                        dot(local, s.hull->vertices[static_cast<size_t>(s.hull->edges[e][1])]);
+      if (at > most) most = at, best = e;
+    }
+    return s.hull->edges[best];
+  };
+  const auto place = [](const Solid& s, int v) { return s.p + s.R * s.hull->vertices[static_cast<size_t>(v)]; };
+  const auto ea = find_edge(a, i, axis.n), eb = find_edge(b, j, -axis.n);
+  const Vec3 pa = place(a, ea[0]), u = place(a, ea[1]) - pa, pb = place(b, eb[0]), v = place(b, eb[1]) - pb,
+             w = pb - pa;
+  const double uu = dot(u, u), vv = dot(v, v), uv = dot(u, v), denominator = uu * vv - uv * uv;
+  const double s = std::clamp((dot(u, w) * vv - uv * dot(v, w)) / denominator, 0.0, 1.0);
+  const double t = std::clamp((uv * dot(u, w) - uu * dot(v, w)) / denominator, 0.0, 1.0);
+  out.p[0] = 0.5 * (pa + s * u + pb + t * v);
+  out.depth[0] = axis.overlap;
+  out.weight[0] = 1;
+  out.count = 1;
+}
+
+}  // namespace
+
+void hull_hull(const Solid& a, const Solid& b, int& remembered, BoxContact& out) {
+  out.count = 0;
+  out.gap = 0;
+  const size_t faces_a = a.hull->faces.size(), faces_b = b.hull->faces.size(), edges_b = b.hull->directions.size();
+  const size_t edges = a.hull->directions.size() * edges_b;
+  const size_t axes = faces_a + faces_b + edges;
+  const auto look = [&](size_t i) {
+    const int number = static_cast<int>(i);
+    if (i < faces_a) return look_along_face(a, b, i, 1, number);
+    if (i < faces_a + faces_b) return look_along_face(b, a, i - faces_a, -1, number);
+    const size_t e = i - faces_a - faces_b;
+    return look_along_edges(a, b, e / edges_b, e % edges_b, number);
+  };
+  const auto is_apart = [&](const Axis& axis) {
+    if (axis.overlap > 0) return false;
+    remembered = axis.number;
+    out.gap = -axis.overlap;
+    return true;
+  };
+  if (remembered >= 0 && static_cast<size_t>(remembered) < axes && is_apart(look(static_cast<size_t>(remembered))))
+    return;
+  Axis best{{}, std::numeric_limits<double>::infinity(), -1};
+  for (size_t i = 0; i < axes; ++i) {
+    const Axis axis = look(i);
+    if (is_apart(axis)) return;
+    // faces are preferred to edges, and those of the first, unless clearly deeper: the choice stays steady
+    const double preference = i < faces_a ? 1.0 : i < faces_a + faces_b ? 0.98 : 0.95;
+    if (axis.overlap < preference * best.overlap - (i < faces_a ? 0 : 1e-9)) best = axis;
+  }
+  if (best.number < 0) return;
+  out.normal = best.n;
+  const size_t number = static_cast<size_t>(best.number);
+  if (number < faces_a + faces_b) {
+    overlap_points(a, b, best.n, out);
+  } else {
+    const size_t e = number - faces_a - faces_b;
+    edge_point(a, b, e / edges_b, e % edges_b, best, out);
+  }
+}
+
+void sphere_hull(const Solid& sphere, const Solid& solid, bool flipped, BoxContact& out) {
+  out.count = 0;
+  out.gap = 0;
+  const Hull& hull = *solid.hull;
+  const Vec3 c = transpose_times(solid.R, sphere.p - solid.p);
+  const Hull::Face* outermost = nullptr;
+  double height = -std::numeric_limits<double>::infinity();
+  for (const Hull::Face& f : hull.faces)
+    if (const double s = dot(f.normal, c) - f.offset; s > height) height = s, outermost = &f;
+  if (height >= sphere.radius) {
+    out.gap = height - sphere.radius;
+    return;
+  }
+  Vec3 nearest = c - height * outermost->normal, n = outermost->normal;  // n from the hull to the sphere
+  double distance = height;
+  if (height > 0) {
+    // nearest point of the surface: inside a face seen from outside, or on an edge
+    double least = std::numeric_limits<double>::infinity();
+    const auto take = [&](const Vec3& p) {
+      if (const double d = norm(c - p); d < least) least = d, nearest = p;
+    };
+    for (const Hull::Face& f : hull.faces) {
+      const double s = dot(f.normal, c) - f.offset;
+      if (s <= 0) continue;
+      const Vec3 p = c - s * f.normal;
+      bool inside = true;
+      for (size_t i = 0; i < f.loop.size(); ++i) {
+        const Vec3 &v = hull.vertices[static_cast<size_t>(f.loop[i])],
+                   &w = hull.vertices[static_cast<size_t>(f.loop[(i + 1) % f.loop.size()])];
+        if (dot(cross(w - v, f.normal), p - v) <= 0) continue;
+        inside = false;
+        take(v + std::clamp(dot(p - v, w - v) / dot(w - v, w - v), 0.0, 1.0) * (w - v));
+      }
+      if (inside) take(p);
+    }
+    distance = least;
+    if (distance >= sphere.radius) {
+      out.gap = distance - sphere.radius;
+      return;
+    }
+    n = (1 / distance) * (c - nearest);
+  }
+  const Vec3 n_W = solid.R * n;
+  out.normal = flipped ? n_W : -n_W;
+  out.depth[0] = sphere.radius - distance;
+  out.p[0] = solid.p + solid.R * nearest - (0.5 * out.depth[0]) * n_W;
+  out.weight[0] = 1;
+  out.count = 1;
+}
+
+void plane_solid(const Solid& plane, const Solid& other, bool flipped, BoxContact& out) {
+  out.count = 0;
+  const Vec3 n = plane.R.column(2);
+  out.normal = flipped ? -n : n;
+  double lowest = std::numeric_limits<double>::infinity();
+  const auto take = [&](const Vec3& p) {
+    const double height = dot(n, p - plane.p);
+    lowest = std::min(lowest, height);
+    if (height >= 0) return;
+    int at = out.count;
+    if (at == kMostPoints) {
+      // the deepest ones count
+      at = 0;
+      for (int i = 1; i < kMostPoints; ++i)
+        if (out.depth[i] < out.depth[at]) at = i;
+      if (-height <= out.depth[at]) return;
+    } else {
+      ++out.count;
+    }
+    out.p[at] = p - (0.5 * height) * n;
+    out.depth[at] = -height;
+    out.weight[at] = 1;
+  };
+  if (other.kind == Shape::Kind::Sphere) {
+    take(other.p - other.radius * n);
+  } else if (other.kind == Shape::Kind::Box) {
+    for (int i = 0; i < 8; ++i)
+      take(other.p + other.R * Vec3{i & 1 ? other.half.x : -other.half.x, i & 2 ? other.half.y : -other.half.y,
+                                    i & 4 ? other.half.z : -other.half.z});
+  } else {
+    for (const Vec3& v : other.hull->vertices) take(other.p + other.R * v);
+  }
+  out.gap = std::max(0.0, lowest);
+}
+
+}  // namespace topple::mbs

@@ -1,0 +1,137 @@
+// Polyhedra and planes in motion.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "models.h"
+
+namespace topple::mbs {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+Shape make_shape(Shape::Kind kind) {
+  Shape s;
+  s.kind = kind;
+  return s;
+}
+
+/// The corners of a box as a polyhedron.
+Shape make_hull_box(const Vec3& half) {
+  Shape s = make_shape(Shape::Kind::Hull);
+  for (int i = 0; i < 8; ++i)
+    s.vertices.push_back({i & 1 ? half.x : -half.x, i & 2 ? half.y : -half.y, i & 4 ? half.z : -half.z});
+  return s;
+}
+
+Options options_for(double duration) {
+  Options o;
+  o.duration = duration;
+  o.equilibrium = false;
+  o.frame_interval = 0.01;
+  return o;
+}
+
+TEST(HullPhysics, SlidesDownAPlaneAsABoxDoes) {
+  // a plane shape of 30 degrees, friction 0.3: a = g (sin 30 - 0.3 cos 30)
+  const double slope = kPi / 6, expected = 9.81 * (std::sin(slope) - 0.3 * std::cos(slope));
+  for (const bool hull : {false, true}) {
+    Model m;
+    m.contact.ground = false;
+    m.contact.body_friction = 0.3;
+    m.contact.contact_frequency = 2000;
+    Body plane;
+    plane.name = "slope";
+    plane.fixed = true;
+    plane.X_WB.q = exp_rotation({0, slope, 0});
+    plane.shapes = {make_shape(Shape::Kind::Plane)};
+    add_body(m, plane);
+    const Vec3 half{0.5, 0.5, 0.1};
+    Body b = test::make_box("block", 100, half, to_matrix(plane.X_WB.q) * Vec3{0, 0, 0.1});
+    b.X_WB.q = plane.X_WB.q;
+    if (hull) b.shapes = {make_hull_box(half)};
+    add_body(m, b);
+    Vec3 v;
+    Options o = options_for(1);
+    o.on_frame = [&](const View& view) { v = view.v_WB[1]; };
+    const Summary s = run(m, o);
+    EXPECT_NEAR(norm(v), expected * s.time, 1e-2 * expected) << hull;  // it settles within the first centimetre
+    EXPECT_LT(v.z, 0);
+    EXPECT_LT(s.energy_error, 1e-3);
+  }
+}
+
+TEST(HullPhysics, HoldsAStackOfWedgesAndBoxes) {
+  // roof-shaped pieces upside down in each other, a box below, a tetrahedron on top
+  Model m;
+  m.contact.friction = m.contact.body_friction = 0.8;
+  m.contact.contact_frequency = 600;
+  add_body(m, test::make_box("box", 1000, {1, 1, 0.25}, {0, 0, 0.25}));
+  const auto make_prism = [](const std::string& name, bool upright, double z) {
+    Body b = test::make_box(name, 500, {1, 1, 0.25}, {0, 0, z});
+    Shape s = make_shape(Shape::Kind::Hull);
+    for (const double y : {-1.0, 1.0})
+      for (const double x : {-1.0, 1.0}) {
+        s.vertices.push_back({upright ? x : 0.6 * x, y, -0.25});
+        s.vertices.push_back({upright ? 0.6 * x : x, y, 0.25});
+      }
+    b.shapes = {s};
+    return b;
+  };
+  add_body(m, make_prism("foot", true, 0.75));
+  add_body(m, make_prism("head", false, 1.25));
+  std::vector<Vec3> start, end;
+  double fastest = 0;
+  Options o = options_for(5);
+  o.on_frame = [&](const View& view) {
+    end.clear();
+    fastest = 0;
+    for (size_t b = 0; b < view.X_WB.size(); ++b) {
+      end.push_back(view.X_WB[b].p);
+      fastest = std::max(fastest, norm(view.v_WB[b]));
+    }
+    if (start.empty()) start = end;
+  };
+  const Summary s = run(m, o);
+  EXPECT_EQ(s.ending, Summary::Ending::TimeLimit);
+  // it sinks by the contacts' own springs alone: 2000 kg on four corners of 1000 kg (600 rad/s)²
+  for (size_t b = 0; b < end.size(); ++b) EXPECT_LT(norm(end[b] - start[b]), 2e-3) << b;
+  EXPECT_LT(fastest, 1e-3);
+}
+
+TEST(HullPhysics, BouncesLikeABoxAndLandsOnItsCorners) {
+  // the same drop with a box and with the polyhedron of its corners, on the ground and on a plane shape
+  std::vector<double> heights;
+  for (const int variant : {0, 1, 2}) {
+    Model m;
+    m.contact.restitution = m.contact.body_restitution = 0.5;
+    m.contact.friction = m.contact.body_friction = 0.4;
+    m.contact.contact_frequency = 1000;
+    if (variant == 2) {
+      m.contact.ground = false;
+      Body plane;
+      plane.name = "floor";
+      plane.fixed = true;
+      plane.shapes = {make_shape(Shape::Kind::Plane)};
+      add_body(m, plane);
+    }
+    const Vec3 half{0.4, 0.3, 0.2};
+    Body b = test::make_box("block", 100, half, {0, 0, 2});
+    b.X_WB.q = exp_rotation({0.3, 0.2, 0.1});
+    if (variant > 0) b.shapes = {make_hull_box(half)};
+    add_body(m, b);
+    Options o = options_for(0.75);
+    double z = 0;
+    o.on_frame = [&](const View& view) { z = view.X_WB.back().p.z; };
+    const Summary s = run(m, o);
+    EXPECT_LT(s.energy_error, 1e-2);
+    heights.push_back(z);
+  }
+  EXPECT_NEAR(heights[1], heights[0], 1e-6);
+  // a plane shape is stiffer by nothing, but its contacts are those of bodies
+  EXPECT_NEAR(heights[2], heights[0], 2e-2);
+}
+
+}  // namespace
+}  // namespace topple::mbs
