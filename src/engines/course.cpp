@@ -51,7 +51,7 @@ Course::Course(const mbs::Model& model, const mbs::Options& options)
       forces_(model, [this](const mbs::Happening& h) { say(h); }),
       sampler_(options.samplings) {
   const size_t J = model.joints.size();
-  for (const mbs::Body& b : model.bodies) body_.push_back({b.mass, {}, b.inertia});
+  for (const mbs::Body& b : model.bodies) body_.push_back({b.mass, {}, b.inertia, b.shapes, 0});
   joint_live_.assign(J, 1);
   angle_.assign(J, 0);
   distance_.assign(J, 0);
@@ -333,6 +333,9 @@ void Course::replace_body(size_t b, const mbs::Body& replacement) {
   body_[b].mass = replacement.mass;
   body_[b].inertia = replacement.inertia;
   body_[b].p_BBcm += replacement.X_WB.p;
+  body_[b].shapes = replacement.shapes;
+  for (mbs::Shape& s : body_[b].shapes) s.X_BS.p += body_[b].p_BBcm;
+  ++body_[b].replaced;
   removed_ += before - calc_kinetic(b) - calc_gravity(b);
   must_rebuild_ = true;
 }

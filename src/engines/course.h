@@ -15,11 +15,13 @@
 
 namespace topple::engines {
 
-/// A body's mass properties now; they change when an event replaces the body.
+/// What a body is now; it changes when an event replaces the body.
 struct BodyNow {
-  double mass = 0;  // [kg]
-  Vec3 p_BBcm;      // centre of mass in the model's frame B [m]
-  Mat3 inertia;     // about the centre of mass, axes of B [kg·m²]
+  double mass = 0;                 // [kg]
+  Vec3 p_BBcm;                     // centre of mass in the model's frame B [m]
+  Mat3 inertia;                    // about the centre of mass, axes of B [kg·m²]
+  std::vector<mbs::Shape> shapes;  // in the model's frame B
+  int replaced = 0;                // how often
 };
 
 /// Of the parents on the children at the origins of M, in W (J). Empty: the engine knows none.

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "engines/course.h"
+#include "engines/requirements.h"
 
 namespace topple::engines {
 
@@ -29,16 +30,25 @@ double find_damping_ratio(double restitution) {
   return high;
 }
 
-Ground::Ground(const mbs::Model& model) : model_(model), reach_(model.bodies.size(), 0) {
-  if (!model.contact.ground) return;
+Ground::Ground(const mbs::Model& model, const std::vector<BodyNow>& bodies)
+    : model_(model), body_(model.bodies.size()), is_there_(can_touch_ground(model)) {
+  if (!is_there_) return;
   damping_ratio_ = find_damping_ratio(model.contact.restitution);
-  for (size_t b = 0; b < model.bodies.size(); ++b) {
-    if (model.bodies[b].fixed) continue;
+  update_shapes(bodies);
+}
+
+void Ground::update_shapes(const std::vector<BodyNow>& bodies) {
+  if (!is_there_) return;
+  for (size_t b = 0; b < bodies.size(); ++b) {
+    Body& body = body_[b];
+    if (model_.bodies[b].fixed || body.replaced == bodies[b].replaced) continue;
+    body = {};
+    body.replaced = bodies[b].replaced;
     const auto add = [&](const Vec3& p, double radius) {
-      point_.push_back({static_cast<int>(b), p, radius});
-      reach_[b] = std::max(reach_[b], norm(p) + radius);
+      body.points.push_back({p, radius});
+      body.reach = std::max(body.reach, norm(p) + radius);
     };
-    for (const mbs::Shape& s : model.bodies[b].shapes) {
+    for (const mbs::Shape& s : bodies[b].shapes) {
       using Kind = mbs::Shape::Kind;
       if (s.kind == Kind::Sphere) add(s.X_BS.p, s.radius);
       if (s.kind == Kind::Hull)
@@ -51,56 +61,54 @@ Ground::Ground(const mbs::Model& model) : model_(model), reach_(model.bodies.siz
   }
 }
 
-double Ground::calc_overlap(const Point& point, const Motion& m) const {
+double Ground::calc_overlap(const Point& point, const Pose& X_WB) const {
   const mbs::Contact& c = model_.contact;
-  return c.offset + point.radius - dot(c.normal, m.X_WB[static_cast<size_t>(point.body)] * point.p);
+  return c.offset + point.radius - dot(c.normal, X_WB * point.p);
 }
 
 Vec3 Ground::calc(const Motion& m, const std::vector<BodyNow>& bodies, std::vector<Wrench>& on, double& power) const {
   const mbs::Contact& c = model_.contact;
   const Vec3 n = c.normal;
+  const double frequency = c.contact_frequency;
   Vec3 total;
-  int far = -1;  // the body that is known to be above the ground
-  for (const Point& point : point_) {
-    if (!point.is_active || point.body == far) continue;
-    const size_t b = static_cast<size_t>(point.body);
-    if (dot(n, m.X_WB[b].p) - c.offset > reach_[b]) {
-      far = point.body;
-      continue;
+  for (size_t b = 0; b < body_.size(); ++b) {
+    if (body_[b].points.empty() || dot(n, m.X_WB[b].p) - c.offset > body_[b].reach) continue;
+    const Mat3 R = to_matrix(m.X_WB[b].q), inverse_inertia = inverse(bodies[b].inertia);
+    for (const Point& point : body_[b].points) {
+      if (!point.is_active) continue;
+      const double depth = calc_overlap(point, m.X_WB[b]) - point.born;
+      if (!(depth > 0)) continue;
+      const Vec3 r = R * point.p - point.radius * n, v = m.v_WB[b] + cross(m.w_WB[b], r);
+      const double approach = -dot(n, v);
+      // mass that the point feels: spring and damper go with it, so that frequency and restitution are the model's
+      const Vec3 lever = transpose_times(R, cross(r - R * bodies[b].p_BBcm, n));
+      const double mass = 1 / (1 / bodies[b].mass + dot(lever, inverse_inertia * lever));
+      const double normal = mass * frequency * (frequency * depth + 2 * damping_ratio_ * approach);
+      if (!(normal > 0)) continue;
+      const Vec3 slide = v + approach * n;
+      const double speed = norm(slide);
+      const double drag = speed > 0 ? std::min(c.friction * normal / speed, mass * frequency) : 0;
+      const Vec3 force = normal * n - drag * slide;
+      on[b].force += force;
+      on[b].torque += cross(r, force);
+      power += dot(force, v);
+      total += force;
     }
-    const double depth = calc_overlap(point, m) - point.born;
-    if (!(depth > 0)) continue;
-    const Mat3 R = to_matrix(m.X_WB[b].q);
-    const Vec3 r = R * point.p - point.radius * n, v = m.v_WB[b] + cross(m.w_WB[b], r);
-    const double approach = -dot(n, v);
-    // mass that the point feels: k and c go with it, so that frequency and restitution are those of the model
-    const Vec3 lever = transpose_times(R, cross(r - R * bodies[b].p_BBcm, n));
-    const double mass = 1 / (1 / bodies[b].mass + dot(lever, inverse(bodies[b].inertia) * lever));
-    const double frequency = c.contact_frequency;
-    const double normal = mass * frequency * (frequency * depth + 2 * damping_ratio_ * approach);
-    if (!(normal > 0)) continue;
-    const Vec3 slide = v + approach * n;
-    const double speed = norm(slide);
-    const double drag = speed > 0 ? std::min(c.friction * normal / speed, mass * frequency) : 0;
-    const Vec3 force = normal * n - drag * slide;
-    on[b].force += force;
-    on[b].torque += cross(r, force);
-    power += dot(force, v);
-    total += force;
   }
   return total;
 }
 
 void Ground::advance(const Motion& m, const std::vector<unsigned char>& is_held) {
-  for (Point& point : point_) {
-    if (is_held[static_cast<size_t>(point.body)]) {
-      point.is_active = false;
-      continue;
+  for (size_t b = 0; b < body_.size(); ++b)
+    for (Point& point : body_[b].points) {
+      if (is_held[b]) {
+        point.is_active = false;
+        continue;
+      }
+      const double overlap = std::max(0.0, calc_overlap(point, m.X_WB[b]));
+      point.born = point.is_active ? std::min(point.born, overlap) : overlap;
+      point.is_active = true;
     }
-    const double overlap = std::max(0.0, calc_overlap(point, m));
-    point.born = point.is_active ? std::min(point.born, overlap) : overlap;
-    point.is_active = true;
-  }
 }
 
 }  // namespace topple::engines

@@ -14,9 +14,11 @@ struct BodyNow;
 class Ground {
  public:
   /// The model must outlive it.
-  explicit Ground(const mbs::Model&);
+  Ground(const mbs::Model&, const std::vector<BodyNow>&);
 
-  bool is_there() const { return !point_.empty(); }
+  bool is_there() const { return is_there_; }
+  /// Takes over the shapes of bodies that have been replaced.
+  void update_shapes(const std::vector<BodyNow>&);
   /// Adds the forces at a trial state and their power on the bodies [W]; returns the force of the ground on them [N].
   Vec3 calc(const Motion&, const std::vector<BodyNow>&, std::vector<Wrench>& on_body, double& power) const;
   /// Accepts a state. Overlap that a point has when its body is let go, or at the start, is allowed for as long as it
@@ -26,17 +28,21 @@ class Ground {
 
  private:
   struct Point {
-    int body = 0;
     Vec3 p;             // in B [m]
     double radius = 0;  // of a sphere about it [m]
     bool is_active = false;
     double born = 0;  // overlap that is allowed [m]
   };
-  double calc_overlap(const Point&, const Motion&) const;
+  struct Body {
+    std::vector<Point> points;
+    double reach = 0;  // of them from the origin of B [m]
+    int replaced = -1;
+  };
+  double calc_overlap(const Point&, const Pose& X_WB) const;
 
   const mbs::Model& model_;
-  std::vector<Point> point_;
-  std::vector<double> reach_;  // of a body's points from the origin of B [m] (B)
+  std::vector<Body> body_;  // (B)
+  bool is_there_ = false;
   double damping_ratio_ = 0;
 };
 

@@ -107,12 +107,15 @@ class Writer {
  private:
   void add(const std::string& line) { out_.text += line + "\n"; }
 
+  const std::vector<mbs::Shape>& shapes_of(size_t b) const { return course_.bodies()[b].shapes; }
+
   void add_sizes() {
     const bool touches = can_touch_ground(model_) || can_touch_bodies(model_);
     size_t points = 0, moving = 0;
-    for (const mbs::Body& b : model_.bodies) {
-      moving += !b.fixed;
-      if (touches && !b.fixed) points += 8 * b.shapes.size();
+    for (size_t b = 0; b < model_.bodies.size(); ++b) {
+      if (model_.bodies[b].fixed) continue;
+      ++moving;
+      if (touches) points += 8 * shapes_of(b).size();
     }
     const size_t rows = 3 * points + 12 * articulation_.loops.size() + 10;
     const size_t nv = 6 * (moving + articulation_.loops.size());
@@ -124,8 +127,8 @@ class Writer {
   void add_meshes() {
     std::string list;
     for (size_t b = 0; b < model_.bodies.size(); ++b)
-      for (size_t i = 0; i < model_.bodies[b].shapes.size(); ++i) {
-        const mbs::Shape& s = model_.bodies[b].shapes[i];
+      for (size_t i = 0; i < shapes_of(b).size(); ++i) {
+        const mbs::Shape& s = shapes_of(b)[i];
         if (s.kind != mbs::Shape::Kind::Hull) continue;
         list += fmt::format("<mesh name=\"m{}.{}\" vertex=\"", b, i);
         for (const Vec3& v : s.vertices) list += text_of(v) + " ";
@@ -135,8 +138,8 @@ class Writer {
   }
 
   void add_geoms(size_t b) {
-    for (size_t i = 0; i < model_.bodies[b].shapes.size(); ++i) {
-      const mbs::Shape& s = model_.bodies[b].shapes[i];
+    for (size_t i = 0; i < shapes_of(b).size(); ++i) {
+      const mbs::Shape& s = shapes_of(b)[i];
       std::string shape;
       switch (s.kind) {
         case mbs::Shape::Kind::Box:

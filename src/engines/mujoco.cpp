@@ -20,6 +20,7 @@ std::unique_ptr<Engine> make_mujoco_engine() { return nullptr; }
 #include <cstdlib>
 #include <cstring>
 #include <exception>
+#include <map>
 #include <mutex>
 #include <stdexcept>
 #include <vector>
@@ -92,11 +93,47 @@ Number* row_of(Number* array, int width, int index) {
   return array + static_cast<std::ptrdiff_t>(width) * index;
 }
 
+using Pair = std::pair<int, int>;  // of shapes, by numbers that do not change
+
+/// Overlap that two shapes have when they may touch for the first time is allowed: it carries no force, shrinks as they
+/// part and never grows again.
+class Overlaps {
+ public:
+  /// Pairs may touch that could not.
+  void expect_new() { is_new_ = true; }
+  /// The pairs that overlap now, and by how much [m].
+  void update(const std::map<Pair, double>& now) {
+    for (auto at = allowed_.begin(); at != allowed_.end();) {
+      const auto found = now.find(at->first);
+      if (found == now.end()) {
+        at = allowed_.erase(at);
+        continue;
+      }
+      at->second = std::min(at->second, found->second);
+      ++at;
+    }
+    // those that overlapped before touch already, and others begin from nothing
+    for (const auto& [pair, depth] : now) allowed_.emplace(pair, is_new_ ? depth : 0);
+    is_new_ = false;
+  }
+  double allowed(const Pair& p) const {
+    const auto at = allowed_.find(p);
+    return at == allowed_.end() ? 0 : at->second;
+  }
+
+ private:
+  std::map<Pair, double> allowed_;  // of all pairs that overlap [m]
+  bool is_new_ = true;
+};
+
 /// A model as MuJoCo's, for one set of live joints and masses.
 class Built {
  public:
-  Built(const Course& course, double step)
-      : course_(course), model_(course.model()), articulation_(make_articulation(model_, course.joint_live())) {
+  Built(const Course& course, Overlaps& overlaps, double step)
+      : course_(course),
+        overlaps_(overlaps),
+        model_(course.model()),
+        articulation_(make_articulation(model_, course.joint_live())) {
     const Ties ties = find_present_ties();
     touches_ = can_touch_ground(model_) || can_touch_bodies(model_);
     const Mjcf mjcf = make_mjcf(course, articulation_, ties, step);
@@ -123,6 +160,7 @@ class Built {
                                                     reversed};
     }
     read_excluded(ties);
+    read_shapes();
     update_ties();
     const size_t nv = static_cast<size_t>(m_->nv);
     q_.resize(static_cast<size_t>(m_->nq));
@@ -181,10 +219,11 @@ class Built {
   /// Contacts that are possible now.
   void update_ties() {
     if (!touches_) return;
+    overlaps_.expect_new();
     const Ties ties = find_present_ties();
     const bool ground = model_.contact.ground, bodies = model_.contact.bodies;
     for (size_t b = 0; b < model_.bodies.size(); ++b)
-      for (size_t i = 0; i < model_.bodies[b].shapes.size(); ++i) {
+      for (size_t i = 0; i < course_.bodies()[b].shapes.size(); ++i) {
         const int g = find(mjOBJ_GEOM, "g" + std::to_string(b) + "." + std::to_string(i));
         const bool fixed = model_.bodies[b].fixed;
         m_->geom_contype[g] = bodies ? kBodyBit : 0;
@@ -205,6 +244,17 @@ class Built {
   }
 
   Ties find_present_ties() const { return find_ties(model_, course_.forces(), course_.joint_live()); }
+
+  /// Numbers of shapes: 4096 for each body, and a new set for each time that it was replaced.
+  void read_shapes() {
+    shape_of_.assign(static_cast<size_t>(m_->ngeom), -1);
+    for (size_t b = 0; b < model_.bodies.size(); ++b)
+      for (size_t i = 0; i < course_.bodies()[b].shapes.size(); ++i) {
+        const int g = find(mjOBJ_GEOM, "g" + std::to_string(b) + "." + std::to_string(i));
+        shape_of_[static_cast<size_t>(g)] =
+            static_cast<int>(4096 * b + (512 * static_cast<size_t>(course_.bodies()[b].replaced) + i) % 4096);
+      }
+  }
 
   /// The pairs behind MuJoCo's sorted list of bodies that do not touch: (first + 1) << 16 | (second + 1).
   void read_excluded(const Ties& ties) {
@@ -301,8 +351,44 @@ class Built {
 
   /// Positions and velocities of the bodies at MuJoCo's coordinates.
   void look() {
-    mj_step1(m_.get(), d_.get());
+    if (!touches_) {
+      mj_step1(m_.get(), d_.get());
+      return read();
+    }
+    // the parts of mj_step1, with a look at the contacts before constraints are made of them
+    mj_checkPos(m_.get(), d_.get());
+    mj_checkVel(m_.get(), d_.get());
+    mj_kinematics(m_.get(), d_.get());
+    mj_comPos(m_.get(), d_.get());
+    mj_tendon(m_.get(), d_.get());
+    mj_crb(m_.get(), d_.get());
+    mj_factorM(m_.get(), d_.get());
+    mj_collision(m_.get(), d_.get());
+    forgive_overlaps();
+    mj_makeConstraint(m_.get(), d_.get());
+    mj_transmission(m_.get(), d_.get());
+    mj_projectConstraint(m_.get(), d_.get());
+    mj_fwdVelocity(m_.get(), d_.get());
     read();
+  }
+
+  void forgive_overlaps() {
+    std::map<Pair, double> deepest;
+    for (int i = 0; i < d_->ncon; ++i) {
+      const mjContact& c = d_->contact[i];
+      double& depth = deepest[pair_of(c)];
+      depth = std::max(depth, -c.dist);
+    }
+    overlaps_.update(deepest);
+    for (int i = 0; i < d_->ncon; ++i) {
+      mjContact& c = d_->contact[i];
+      c.dist += overlaps_.allowed(pair_of(c));
+      if (c.dist >= c.includemargin) c.exclude = 1;
+    }
+  }
+  Pair pair_of(const mjContact& c) const {
+    const int a = shape_of_[static_cast<size_t>(c.geom1)], b = shape_of_[static_cast<size_t>(c.geom2)];
+    return {std::min(a, b), std::max(a, b)};
   }
   void read() {
     for (const Branch& b : articulation_.branches) {
@@ -419,6 +505,7 @@ class Built {
   };
 
   const Course& course_;
+  Overlaps& overlaps_;
   const mbs::Model& model_;
   Articulation articulation_;
   std::unique_ptr<mjModel, Delete> m_;
@@ -430,6 +517,7 @@ class Built {
   Work work_;
   Touch touch_;
   bool touches_ = false;
+  std::vector<int> shape_of_;  // number of the shape behind each geom; -1: the ground
   std::vector<Wrench> wrench_;
   std::vector<mjtNum> q_, v_, v_stage_[4], a_stage_[4], mean_;
 };
@@ -447,11 +535,6 @@ class MujocoEngine : public Engine {
     for (size_t i = 0; i < model.contact.pairs.size(); ++i)
       if (model.contact.pairs[i].touches)
         out.push_back({"contact.pairs[" + std::to_string(i) + "]", "rules of its own for a pair of bodies"});
-    const bool touches = can_touch_ground(model) || can_touch_bodies(model);
-    for (size_t i = 0; i < model.events.size() && touches; ++i)
-      for (const mbs::Action& a : model.events[i].actions)
-        if (a.kind == mbs::Action::Kind::ReplaceBody)
-          out.push_back({place_of("events", i, model.events[i].name), "the replacement of a body that may touch"});
     return out;
   }
 
@@ -463,17 +546,18 @@ class MujocoEngine : public Engine {
     long steps = 0;
     try {
       Work before;
-      while (!course.is_over()) run_as_built(course, before, steps);
+      Overlaps overlaps;
+      while (!course.is_over()) run_as_built(course, overlaps, before, steps);
     } catch (const std::exception& e) { course.fail(e.what()); }
     return course.finish(steps);
   }
 
  private:
   /// Until the end or until the model must be built anew.
-  static void run_as_built(Course& course, Work& before, long& steps) {
+  static void run_as_built(Course& course, Overlaps& overlaps, Work& before, long& steps) {
     using Verdict = Course::Verdict;
     const double h = course.step();
-    Built built(course, h);
+    Built built(course, overlaps, h);
     if (built.touches()) course.note("contact is MuJoCo's own: soft, with friction and restitution like topple's");
     const auto accept = [&] {
       const double time = static_cast<double>(steps) * h;

@@ -64,20 +64,35 @@ std::vector<Unsupported> find_opening_joints(const mbs::Model& model, const mbs:
   return out;
 }
 
+namespace {
+
+/// Whether a body has a shape, now or after an event.
+bool can_have_shape(const mbs::Model& model, size_t b) {
+  if (!model.bodies[b].shapes.empty()) return true;
+  for (const mbs::Event& e : model.events)
+    for (const mbs::Action& a : e.actions)
+      if (a.kind == mbs::Action::Kind::ReplaceBody && a.body.index == static_cast<int>(b) &&
+          !a.replacement.shapes.empty())
+        return true;
+  return false;
+}
+
+}  // namespace
+
 bool can_touch_ground(const mbs::Model& model) {
   if (!model.contact.ground) return false;
-  for (const mbs::Body& b : model.bodies)
-    if (!b.fixed && !b.shapes.empty()) return true;
+  for (size_t b = 0; b < model.bodies.size(); ++b)
+    if (!model.bodies[b].fixed && can_have_shape(model, b)) return true;
   return false;
 }
 
 bool can_touch_bodies(const mbs::Model& model) {
   if (!model.contact.bodies) return false;
   size_t moving = 0, all = 0;
-  for (const mbs::Body& b : model.bodies) {
-    if (b.shapes.empty()) continue;
+  for (size_t b = 0; b < model.bodies.size(); ++b) {
+    if (!can_have_shape(model, b)) continue;
     ++all;
-    moving += !b.fixed;
+    moving += !model.bodies[b].fixed;
   }
   return moving > 0 && all > 1;
 }

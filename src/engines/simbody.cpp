@@ -246,10 +246,6 @@ class SimbodyEngine : public Engine {
     for (size_t i = 0; i < model.contact.pairs.size() && can_touch_ground(model); ++i)
       if (model.contact.pairs[i].touches && model.contact.pairs[i].b == mbs::kGround)
         out.push_back({"contact.pairs[" + std::to_string(i) + "]", "rules of its own for a body on the ground"});
-    for (size_t i = 0; i < model.events.size() && can_touch_ground(model); ++i)
-      for (const mbs::Action& a : model.events[i].actions)
-        if (a.kind == mbs::Action::Kind::ReplaceBody)
-          out.push_back({place_of("events", i, model.events[i].name), "the replacement of a body that may touch"});
     return out;
   }
 
@@ -265,7 +261,7 @@ class SimbodyEngine : public Engine {
     long steps = 0;
     try {
       if (settings.step == 0 && has_history(model)) settings.longest_step = choose_step(model, options);
-      Ground ground(model);
+      Ground ground(model, course.bodies());
       if (ground.is_there()) {
         ground.advance(course.motion(), find_ties(model, course.forces(), course.joint_live()).is_grounded);
         course.note("contact with the ground is of springs and dampers at corners, not the native engine's");
@@ -296,6 +292,7 @@ class SimbodyEngine : public Engine {
       const Verdict v = course.accept(system.time(), built.motion(), sum(system.work()), touch,
                                       [&] { return built.find_reactions(); });
       if (v != Verdict::GoOn) find_held();
+      if (v == Verdict::Rebuild) ground.update_shapes(course.bodies());
       if (ground.is_there()) ground.advance(built.motion(), is_held);
       return v;
     };

@@ -197,18 +197,5 @@ TEST(UnexpressedByMujoco, RulesOfPairs) {
   EXPECT_EQ(unsupported_by("mujoco", m), "contact.pairs[1]: rules of its own for a pair of bodies\n");
 }
 
-TEST(UnexpressedByMujoco, ReplacedBodiesThatTouch) {
-  TOPPLE_NEEDS_ENGINE("mujoco");
-  mbs::Model m = make_cubes();
-  mbs::Event e;
-  mbs::Action a;
-  a.kind = mbs::Action::Kind::ReplaceBody;
-  a.body = {0};
-  a.replacement = test::make_body("half", 1, {0.1, 0.1, 0.1}, {});
-  e.actions = {a};
-  m.events.push_back(e);
-  EXPECT_EQ(unsupported_by("mujoco", m), "events[0]: the replacement of a body that may touch\n");
-}
-
 }  // namespace
 }  // namespace topple::engines

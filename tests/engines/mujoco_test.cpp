@@ -90,6 +90,60 @@ TEST(MujocoPhysics, WhatTouchesFollowsWhatBreaks) {
   EXPECT_NEAR(c.frames[6].X_WB[1].p.z, 1.1, 1e-3);
 }
 
+TEST(MujocoPhysics, WhatBreaksElsewhereDoesNotMakeRestingBodiesSink) {
+  TOPPLE_NEEDS_ENGINE("mujoco");
+  mbs::Model m = test::make_empty({0, 0, -9.81});
+  m.contact.ground = m.contact.bodies = true;
+  add_box(m, "lower", 10, {0.5, 0.5, 0.5}, {0, 0, 0.5});
+  add_box(m, "upper", 10, {0.4, 0.4, 0.5}, {0, 0, 1.5});
+  const auto far = add_box(m, "far", 10, {0.5, 0.5, 0.5}, {5, 0, 3});
+  for (int i = 0; i < 40; ++i) {
+    mbs::ZoneElement e;
+    e.a = mbs::kGround;
+    e.b = far;
+    e.X_AF.p = {5, 0, 3};
+    e.translational_stiffness = {1e5, 1e5, 1e5};
+    mbs::Event cut;
+    cut.time = 0.3 + 0.01 * i;
+    mbs::Action a;
+    a.kind = i % 2 ? mbs::Action::Kind::ReplaceBody : mbs::Action::Kind::RemoveElement;
+    a.element = mbs::add_element(m, e);
+    a.body = far;
+    a.replacement = m.bodies[2];
+    a.replacement.X_WB = {};
+    cut.actions = {a};
+    m.events.push_back(cut);
+  }
+  const auto c = test::run(*make_engine("mujoco"), m, make_options(0.8, 0.1, 1e-4));
+  ASSERT_EQ(c.frames.size(), 9U) << c.summary.message;
+  EXPECT_NEAR(c.frames[8].X_WB[0].p.z, c.frames[2].X_WB[0].p.z, 2e-6);
+  EXPECT_NEAR(c.frames[8].X_WB[1].p.z, c.frames[2].X_WB[1].p.z, 2e-6);
+}
+
+TEST(MujocoPhysics, OverlapOfWhatIsLetGoIsForgiven) {
+  TOPPLE_NEEDS_ENGINE("mujoco");
+  mbs::Model m = test::make_empty({});
+  m.contact.bodies = true;
+  const auto a = add_box(m, "a", 10, {0.5, 0.5, 0.5}, {0, 0, 0}), b = add_box(m, "b", 10, {0.5, 0.5, 0.5}, {0.9, 0, 0});
+  mbs::ZoneElement e;
+  e.a = a;
+  e.b = b;
+  e.X_AF.p = {0.45, 0, 0};
+  e.X_BM.p = {-0.45, 0, 0};
+  e.translational_stiffness = {1e6, 1e6, 1e6};
+  mbs::add_element(m, e);
+  mbs::Event cut;
+  cut.time = 0.1;
+  mbs::Action remove;
+  remove.kind = mbs::Action::Kind::RemoveElement;
+  remove.element = {0};
+  cut.actions = {remove};
+  m.events.push_back(cut);
+  const auto c = test::run(*make_engine("mujoco"), m, make_options(0.5, 0.1, 1e-4));
+  ASSERT_EQ(c.frames.size(), 6U) << c.summary.message;
+  EXPECT_NEAR(c.frames[5].X_WB[1].p.x - c.frames[5].X_WB[0].p.x, 0.9, 1e-9);
+}
+
 TEST(Mujoco, BadNumbersEndTheRunInsteadOfResettingIt) {
   TOPPLE_NEEDS_ENGINE("mujoco");
   mbs::Model m = test::make_empty({});
