@@ -742,14 +742,14 @@ HWY_INLINE void sum_all(const SumJob& job) {
 using Wide = hn::ScalableTag<double>;
 using One = hn::CappedTag<double, 1>;
 
-size_t Lanes() { return hn::Lanes(Wide()); }
-const char* Name() { return hwy::TargetName(HWY_TARGET); }
-void AdvanceBodies(const BodyJob& job) { advance_all<Wide>(job); }
-void EvaluateElements(const ElementJob& job) { evaluate_all<Wide>(job); }
-void AdvanceBodiesSingly(const BodyJob& job) { advance_all<One>(job); }
-void EvaluateElementsSingly(const ElementJob& job) { evaluate_all<One>(job); }
-void SumForces(const SumJob& job) { sum_all<Wide>(job); }
-void SumForcesSingly(const SumJob& job) { sum_all<One>(job); }
+size_t lanes_here() { return hn::Lanes(Wide()); }
+const char* name_here() { return hwy::TargetName(HWY_TARGET); }
+void advance_bodies_here(const BodyJob& job) { advance_all<Wide>(job); }
+void evaluate_elements_here(const ElementJob& job) { evaluate_all<Wide>(job); }
+void advance_bodies_singly_here(const BodyJob& job) { advance_all<One>(job); }
+void evaluate_elements_singly_here(const ElementJob& job) { evaluate_all<One>(job); }
+void sum_forces_here(const SumJob& job) { sum_all<Wide>(job); }
+void sum_forces_singly_here(const SumJob& job) { sum_all<One>(job); }
 
 }  // namespace HWY_NAMESPACE
 }  // namespace topple::mbs::kernel
@@ -758,23 +758,23 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace topple::mbs::kernel {
 
-HWY_EXPORT(Lanes);
-HWY_EXPORT(Name);
-HWY_EXPORT(AdvanceBodies);
-HWY_EXPORT(EvaluateElements);
-HWY_EXPORT(AdvanceBodiesSingly);
-HWY_EXPORT(EvaluateElementsSingly);
-HWY_EXPORT(SumForces);
-HWY_EXPORT(SumForcesSingly);
+HWY_EXPORT(lanes_here);
+HWY_EXPORT(name_here);
+HWY_EXPORT(advance_bodies_here);
+HWY_EXPORT(evaluate_elements_here);
+HWY_EXPORT(advance_bodies_singly_here);
+HWY_EXPORT(evaluate_elements_singly_here);
+HWY_EXPORT(sum_forces_here);
+HWY_EXPORT(sum_forces_singly_here);
 
-size_t lanes() { return HWY_DYNAMIC_DISPATCH(Lanes)(); }
-std::string target_name() { return HWY_DYNAMIC_DISPATCH(Name)(); }
-void advance_bodies(const BodyJob& job) { HWY_DYNAMIC_DISPATCH(AdvanceBodies)(job); }
-void evaluate_elements(const ElementJob& job) { HWY_DYNAMIC_DISPATCH(EvaluateElements)(job); }
-void advance_bodies_singly(const BodyJob& job) { HWY_DYNAMIC_DISPATCH(AdvanceBodiesSingly)(job); }
-void evaluate_elements_singly(const ElementJob& job) { HWY_DYNAMIC_DISPATCH(EvaluateElementsSingly)(job); }
-void sum_forces(const SumJob& job) { HWY_DYNAMIC_DISPATCH(SumForces)(job); }
-void sum_forces_singly(const SumJob& job) { HWY_DYNAMIC_DISPATCH(SumForcesSingly)(job); }
+size_t lanes() { return HWY_DYNAMIC_DISPATCH(lanes_here)(); }
+std::string target_name() { return HWY_DYNAMIC_DISPATCH(name_here)(); }
+void advance_bodies(const BodyJob& job) { HWY_DYNAMIC_DISPATCH(advance_bodies_here)(job); }
+void evaluate_elements(const ElementJob& job) { HWY_DYNAMIC_DISPATCH(evaluate_elements_here)(job); }
+void advance_bodies_singly(const BodyJob& job) { HWY_DYNAMIC_DISPATCH(advance_bodies_singly_here)(job); }
+void evaluate_elements_singly(const ElementJob& job) { HWY_DYNAMIC_DISPATCH(evaluate_elements_singly_here)(job); }
+void sum_forces(const SumJob& job) { HWY_DYNAMIC_DISPATCH(sum_forces_here)(job); }
+void sum_forces_singly(const SumJob& job) { HWY_DYNAMIC_DISPATCH(sum_forces_singly_here)(job); }
 
 }  // namespace topple::mbs::kernel
 #endif

@@ -14,6 +14,9 @@ namespace topple::mbs::kernel {
 /// Widest block, for those who need room before they know.
 inline constexpr size_t kMostLanes = 8;
 
+// Field numbers are constants, and named so.
+// NOLINTBEGIN(readability-identifier-naming)
+
 /// Fields of an element's slot: what changes in every step, then what seldom does. The latter lie in a pool of lane
 /// vectors that blocks share where they are equal, so that large models and batches move less memory.
 enum Slot : int {
@@ -93,6 +96,7 @@ enum BodyField : int {
   kFree = 8,            // 1: gravity acts
   kBodyFields = 9
 };
+// NOLINTEND(readability-identifier-naming)
 
 /// Of an element: force on a (3; on b the opposite), torque on a (3), and the opposite of that on b (3); in W, about
 /// the centres of mass.
