@@ -20,6 +20,7 @@ std::variant<Arguments, int> parse_arguments(int argc, char** argv) {
   topple run storehouse.toml -o out --json         the same for programs (docs/run.md)
   topple mbs run out/model.json -o again           run a multibody model on its own
   topple mbs compare out/model.json                the same model on other engines (docs/engines.md)
+  topple mbs verify                                the engine against known answers (docs/verification.md)
   topple report out/record.h5 -o report.html       make the page from a record
 
 Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterion of the plan is violated.)");
@@ -82,6 +83,11 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
                         "go on without engines that cannot express the model");
   mbs_compare->add_flag("--json", a.json, "one JSON object on standard output");
 
+  CLI::App* mbs_verify = mbs->add_subcommand("verify", "Check an engine against models whose answers are known.");
+  mbs_verify->add_option("--engine", a.engine, "program that solves the multibody models");
+  mbs_verify->add_option("--markdown", a.markdown, "page to write (docs/verification.md is one)");
+  mbs_verify->add_option("--json", a.json_file, "the same for programs: file to write");
+
   CLI::App* report = app.add_subcommand("report", "Make the self-contained page from a record.");
   report->add_option("record", a.input, "record (HDF5)")->required();
   report->add_option("-o,--output", a.output, "page to write")->required();
@@ -112,6 +118,7 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   if (rules->parsed()) a.verb = Verb::Rules;
   if (mbs_run->parsed()) a.verb = Verb::MbsRun;
   if (mbs_compare->parsed()) a.verb = Verb::MbsCompare;
+  if (mbs_verify->parsed()) a.verb = Verb::MbsVerify;
   if (report->parsed()) a.verb = Verb::Report;
   if (version->parsed()) a.verb = Verb::Version;
   return a;

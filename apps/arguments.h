@@ -8,12 +8,13 @@
 namespace topple::apps {
 
 struct Arguments {
-  enum class Verb { None, New, Check, Run, Rules, MbsRun, MbsCompare, Report, Version };
+  enum class Verb { None, New, Check, Run, Rules, MbsRun, MbsCompare, MbsVerify, Report, Version };
   Verb verb = Verb::None;
   std::string input;      // plan, model, record, or the file to write
   std::string output;     // folder or file
   std::string knowledge;  // file of rules, empty: built in
   std::string engine = "native";
+  std::string markdown, json_file;         // files to write, empty: none
   std::string engines;                     // names between commas, empty: all
   std::string accuracy;                    // relative, as typed
   std::string duration, step, frame_rate;  // quantities as typed; empty: the plan's

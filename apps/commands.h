@@ -13,6 +13,7 @@ int run_plan_file(const Arguments&, const std::atomic<bool>& cancel);
 int show_rules(const Arguments&);
 int run_model_file(const Arguments&, const std::atomic<bool>& cancel);
 int compare_engines(const Arguments&, const std::atomic<bool>& cancel);
+int verify_engine(const Arguments&, const std::atomic<bool>& cancel);
 int write_report_file(const Arguments&);
 
 }  // namespace topple::apps

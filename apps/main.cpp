@@ -32,6 +32,8 @@ int dispatch(const topple::apps::Arguments& a) {
       return topple::apps::run_model_file(a, cancel);
     case Arguments::Verb::MbsCompare:
       return topple::apps::compare_engines(a, cancel);
+    case Arguments::Verb::MbsVerify:
+      return topple::apps::verify_engine(a, cancel);
     case Arguments::Verb::Report:
       return topple::apps::write_report_file(a);
     case Arguments::Verb::Version:
