@@ -58,7 +58,10 @@ class LaneArray {
       for (size_t i = 0; i < D; ++i) at_[i * W_] = c[i];
       return *this;
     }
-    const Item& operator=(const Item& x) const { return *this = T(x); }
+    // through a copy, so that x may be *this
+    const Item& operator=(const Item& x) const {  // NOLINT(bugprone-unhandled-self-assignment)
+      return *this = T(x);
+    }
     const Item& operator+=(const T& x) const { return *this = T(*this) + x; }
     const Item& operator-=(const T& x) const { return *this = T(*this) - x; }
 

@@ -742,7 +742,7 @@ bool write_flow(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, c
   out[kAxial] = z.axial, out[kSlip] = z.slip[0], out[kSlip + 1] = z.slip[1], out[kTwist] = z.twist;
   double far = 0;  // no cell reaches beyond this rotation
   for (int s = 0; s < 2; ++s) {
-    double* station = out + kStations + s * kStationFields;
+    double* station = &out[kStations + s * kStationFields];
     station[kRupture] = kUnlimited;
     const CompiledLaw* law = nullptr;
     if (s < p.stations) {
@@ -756,7 +756,7 @@ bool write_flow(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, c
       far = std::max(far, z.station[s].reached);
     }
     for (int q = 0; q < 2; ++q) {
-      double* cell = station + kCell + q * kCellFields;
+      double* cell = &station[kCell + q * kCellFields];
       const CompiledFamily* family = law != nullptr ? &law->moment[q] : nullptr;
       if (family == nullptr || family->K == 0) {
         std::fill(cell + kCellPositive, cell + kCellFields, unlimited);
