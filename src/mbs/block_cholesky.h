@@ -1,6 +1,7 @@
 #pragma once
 /// Symmetric positive semidefinite matrices of small blocks, as joints that share bodies make them: sparse Cholesky
-/// factors, and the least-squares solution of least norm where rows depend on others (docs/theory/multibody.md, eq. 7a).
+/// factors, and the least-squares solution of least norm where rows depend on others (docs/theory/multibody.md, eq.
+/// 7a).
 
 #include <cstddef>
 #include <utility>

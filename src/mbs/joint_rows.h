@@ -1,6 +1,6 @@
 #pragma once
-/// What each kind of joint holds: constraint rows, gaps and their second derivatives (docs/theory/multibody.md, "Ideal joints").
-/// Shared by the step, the equilibrium and the reactions of a view. Lines come first, rotations after them.
+/// What each kind of joint holds: constraint rows, gaps and their second derivatives (docs/theory/multibody.md, "Ideal
+/// joints"). Shared by the step, the equilibrium and the reactions of a view. Lines come first, rotations after them.
 
 #include "mbs/system.h"
 

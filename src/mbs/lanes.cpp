@@ -106,9 +106,10 @@ void Lanes::share_constants() {
 
 void Lanes::advance_bodies() {
   spins.clear();
-  const kernel::BodyJob job{body_blocks, p.data(),     v.data(),      L.data(),         w.data(),    q.data(),
-                            R.data(),    force.data(), torque.data(), body_constants.data(), kick.data(), h.data(),
-                            gx.data(),   gy.data(),    gz.data(),     sum.data(),       &spins};
+  const kernel::BodyJob job{body_blocks, p.data(), v.data(),     L.data(),      w.data(),
+                            q.data(),    R.data(), force.data(), torque.data(), body_constants.data(),
+                            kick.data(), h.data(), gx.data(),    gy.data(),     gz.data(),
+                            sum.data(),  &spins};
   if (W == kernel::lanes()) {
     kernel::advance_bodies(job);
   } else {
