@@ -18,16 +18,17 @@ struct Solid {
   const Hull* hull = nullptr;  // of a polyhedron, and of boxes in models that have polyhedra
 };
 
-/// Touching points of two solids, at most eight, all with the same normal.
+/// Touching points of two solids, all with the same normal; of two boxes at most eight.
 struct BoxContact {
+  static constexpr int kMostPoints = 32;
   int count = 0;
-  Vec3 normal;      // unit, from the first to the second
-  Vec3 p[8];        // in W, halfway between the surfaces [m]
-  double depth[8];  // > 0 [m]
+  Vec3 normal;                // unit, from the first to the second
+  Vec3 p[kMostPoints];        // in W, halfway between the surfaces [m]
+  double depth[kMostPoints];  // > 0 [m]
   /// Share of each point in the stiffness: half of the length of the edges that meet there over that of all edges of
   /// the polygon in which the faces overlap, times 4, so that a corner of a box has 1 and no point is lost or won by a
   /// jump.
-  double weight[8];
+  double weight[kMostPoints];
   double gap = 0;  // without points: the solids are at least this far apart [m]
 };
 

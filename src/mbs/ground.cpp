@@ -58,7 +58,9 @@ void System::find_ground_points() {
         g.born = std::max(0.0, std::min(g.born, penetration));
         const double depth = penetration - g.born;
         if (g.born > 0 || depth > 0) shape.is_clear = false;
-        if (depth > 0) add_contact_point(r, {}, depth, stiffness);
+        if (depth <= 0) continue;
+        const double weight = hull ? hulls[static_cast<size_t>(shape.hull)].weights[static_cast<size_t>(corner)] : 1;
+        add_contact_point(r, {}, depth, weight * stiffness);
       }
       if (contact.point.size() == first) {
         shape.is_touching = false;

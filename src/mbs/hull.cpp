@@ -39,6 +39,20 @@ void complete(Hull& hull) {
     };
     std::sort(face.loop.begin(), face.loop.end(), [&](int i, int j) { return angle(i) < angle(j); });
   }
+  // half of the edges that meet at a vertex over all of the face's, times 4: a face stands on 4 in all
+  hull.weights.assign(hull.vertices.size(), 4);
+  for (const Hull::Face& face : hull.faces) {
+    const size_t n = face.loop.size();
+    std::vector<double> length(n);
+    double perimeter = 0;
+    for (size_t i = 0; i < n; ++i)
+      perimeter += length[i] = norm(hull.vertices[static_cast<size_t>(face.loop[(i + 1) % n])] -
+                                    hull.vertices[static_cast<size_t>(face.loop[i])]);
+    for (size_t i = 0; i < n; ++i) {
+      double& weight = hull.weights[static_cast<size_t>(face.loop[i])];
+      weight = std::min(weight, 2 * (length[(i + n - 1) % n] + length[i]) / perimeter);
+    }
+  }
   std::map<std::array<int, 2>, bool> known;
   for (const Hull::Face& face : hull.faces)
     for (size_t i = 0; i < face.loop.size(); ++i) {

@@ -15,7 +15,8 @@ struct Hull {
     double offset = 0;      // dot(normal, p) on the face [m]
     std::vector<int> loop;  // vertices, counter-clockwise seen from outside
   };
-  std::vector<Vec3> vertices;  // [m]
+  std::vector<Vec3> vertices;   // [m]
+  std::vector<double> weights;  // share of each vertex in the stiffness on a plane: of its faces the least, as of a box
   std::vector<Face> faces;
   std::vector<std::array<int, 2>> edges;  // vertices
   std::vector<Vec3> directions;           // of the edges, unit, parallel ones once

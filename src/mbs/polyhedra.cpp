@@ -9,7 +9,7 @@ namespace topple::mbs {
 namespace {
 
 constexpr int kMostCorners = 2 * kMostFaceCorners;  // of two faces' overlap
-constexpr int kMostPoints = 8;
+constexpr int kMostPoints = BoxContact::kMostPoints;
 
 /// Largest dot(n, vertex) of a polyhedron about its own centre; n in W.
 double find_support(const Solid& s, const Vec3& n) {
@@ -110,33 +110,6 @@ void overlap_points(const Solid& a, const Solid& b, const Vec3& n, BoxContact& o
   }
 }
 
-/// Where the supporting edges of both come closest.
-void edge_point(const Solid& a, const Solid& b, size_t i, size_t j, const Axis& axis, BoxContact& out) {
-  const auto find_edge = [](const Solid& s, size_t direction, const Vec3& n) {
-    const Vec3 local = transpose_times(s.R, n);
-    size_t best = 0;
-    double most = -std::numeric_limits<double>::infinity();
-    for (size_t e = 0; e < s.hull->edges.size(); ++e) {
-      if (s.hull->direction_of[e] != static_cast<int>(direction)) continue;
-      const double at = dot(local, s.hull->vertices[static_cast<size_t>(s.hull->edges[e][0])]) +
-                        dot(local, s.hull->vertices[static_cast<size_t>(s.hull->edges[e][1])]);
-      if (at > most) most = at, best = e;
-    }
-    return s.hull->edges[best];
-  };
-  const auto place = [](const Solid& s, int v) { return s.p + s.R * s.hull->vertices[static_cast<size_t>(v)]; };
-  const auto ea = find_edge(a, i, axis.n), eb = find_edge(b, j, -axis.n);
-  const Vec3 pa = place(a, ea[0]), u = place(a, ea[1]) - pa, pb = place(b, eb[0]), v = place(b, eb[1]) - pb,
-             w = pb - pa;
-  const double uu = dot(u, u), vv = dot(v, v), uv = dot(u, v), denominator = uu * vv - uv * uv;
-  const double s = std::clamp((dot(u, w) * vv - uv * dot(v, w)) / denominator, 0.0, 1.0);
-  const double t = std::clamp((uv * dot(u, w) - uu * dot(v, w)) / denominator, 0.0, 1.0);
-  out.p[0] = 0.5 * (pa + s * u + pb + t * v);
-  out.depth[0] = axis.overlap;
-  out.weight[0] = 1;
-  out.count = 1;
-}
-
 }  // namespace
 
 void hull_hull(const Solid& a, const Solid& b, int& remembered, BoxContact& out) {
@@ -170,13 +143,8 @@ void hull_hull(const Solid& a, const Solid& b, int& remembered, BoxContact& out)
   }
   if (best.number < 0) return;
   out.normal = best.n;
-  const size_t number = static_cast<size_t>(best.number);
-  if (number < faces_a + faces_b) {
-    overlap_points(a, b, best.n, out);
-  } else {
-    const size_t e = number - faces_a - faces_b;
-    edge_point(a, b, e / edges_b, e % edges_b, best, out);
-  }
+  // edges that cross are corners of the overlap of the faces beside them
+  overlap_points(a, b, best.n, out);
 }
 
 void sphere_hull(const Solid& sphere, const Solid& solid, bool flipped, BoxContact& out) {
@@ -234,7 +202,7 @@ void plane_solid(const Solid& plane, const Solid& other, bool flipped, BoxContac
   const Vec3 n = plane.R.column(2);
   out.normal = flipped ? -n : n;
   double lowest = std::numeric_limits<double>::infinity();
-  const auto take = [&](const Vec3& p) {
+  const auto take = [&](const Vec3& p, double weight) {
     const double height = dot(n, p - plane.p);
     lowest = std::min(lowest, height);
     if (height >= 0) return;
@@ -250,16 +218,18 @@ void plane_solid(const Solid& plane, const Solid& other, bool flipped, BoxContac
     }
     out.p[at] = p - (0.5 * height) * n;
     out.depth[at] = -height;
-    out.weight[at] = 1;
+    out.weight[at] = weight;
   };
   if (other.kind == Shape::Kind::Sphere) {
-    take(other.p - other.radius * n);
+    take(other.p - other.radius * n, 1);
   } else if (other.kind == Shape::Kind::Box) {
     for (int i = 0; i < 8; ++i)
       take(other.p + other.R * Vec3{i & 1 ? other.half.x : -other.half.x, i & 2 ? other.half.y : -other.half.y,
-                                    i & 4 ? other.half.z : -other.half.z});
+                                    i & 4 ? other.half.z : -other.half.z},
+           1);
   } else {
-    for (const Vec3& v : other.hull->vertices) take(other.p + other.R * v);
+    for (size_t i = 0; i < other.hull->vertices.size(); ++i)
+      take(other.p + other.R * other.hull->vertices[i], other.hull->weights[i]);
   }
   out.gap = std::max(0.0, lowest);
 }

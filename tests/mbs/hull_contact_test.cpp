@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "mbs/contact_law.h"
 #include "models.h"
 
 namespace topple::mbs {
@@ -131,6 +132,34 @@ TEST(HullPhysics, BouncesLikeABoxAndLandsOnItsCorners) {
   EXPECT_NEAR(heights[1], heights[0], 1e-6);
   // a plane shape is stiffer by nothing, but its contacts are those of bodies
   EXPECT_NEAR(heights[2], heights[0], 2e-2);
+}
+
+TEST(HullPhysics, StandsOnAFaceOfManyCornersAsABoxOnFour) {
+  // a drum of 20 corners sinks in by g / (4 mean ω²), and so does it on a plane shape and on a box
+  const double mean = make_contact_law(0.1, 0).mean;
+  Shape drum = make_shape(Shape::Kind::Hull);
+  for (int i = 0; i < 20; ++i)
+    for (const double z : {-0.3, 0.3})
+      drum.vertices.push_back({0.5 * std::cos(kPi * i / 10), 0.5 * std::sin(kPi * i / 10), z});
+  for (const int variant : {0, 1, 2}) {
+    Model m;
+    m.contact.ground = variant == 0;
+    Body floor = test::make_box("floor", 1, {2, 2, 0.5}, {0, 0, -0.5});
+    floor.fixed = true;
+    if (variant == 1) {
+      floor.X_WB.p = {};
+      floor.shapes = {make_shape(Shape::Kind::Plane)};
+    }
+    if (variant > 0) add_body(m, floor);
+    Body b = test::make_box("drum", 200, {0.45, 0.45, 0.3}, {0, 0, 0.3});
+    b.shapes = {drum};
+    add_body(m, b);
+    double z = 0;
+    Options o = options_for(1);
+    o.on_frame = [&](const View& view) { z = view.X_WB.back().p.z; };
+    (void)run(m, o);
+    EXPECT_NEAR(z, 0.3 - 9.81 / (4 * mean * 1500 * 1500), 1e-9) << variant;
+  }
 }
 
 }  // namespace
