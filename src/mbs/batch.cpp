@@ -26,6 +26,11 @@ void check_build(const Model& base, const Model& varied, size_t sample) {
   for (size_t i = 0; i < base.elements.size(); ++i)
     if (varied.elements[i].a != base.elements[i].a || varied.elements[i].b != base.elements[i].b)
       fail("the bodies of elements[" + std::to_string(i) + "]");
+  for (size_t i = 0; i < base.joints.size(); ++i) {
+    const Joint &a = base.joints[i], &b = varied.joints[i];
+    if (a.kind != b.kind) fail("the kind of joints[" + std::to_string(i) + "]");
+    if (a.parent != b.parent || a.child != b.child) fail("the bodies of joints[" + std::to_string(i) + "]");
+  }
 }
 
 /// Lanes for W samples of one build.

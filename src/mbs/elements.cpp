@@ -369,12 +369,15 @@ void System::join_batch(Lanes& batch, size_t to) {
                               {&state.L, &batch.L},
                               {&state.w, &batch.w},
                               {&force, &batch.force},
-                              {&torque, &batch.torque}})
+                              {&torque, &batch.torque},
+                              {&joint_force, &batch.joint_force},
+                              {&joint_torque, &batch.joint_torque}})
     array->attach(store->data(), layout);
   state.q.attach(batch.q.data(), layout);
   state.R.attach(batch.R.data(), layout);
   lanes = &batch;
   lane = to;
+  clusters_due = true;
   for (size_t b = 0; b < B; ++b) pack_body(b);
   const double* next = moved.data();
   for (size_t e = 0; e < elements.size(); ++e) {

@@ -185,8 +185,6 @@ double find_independence(const System& s, const JointCluster& c) {
 void System::build_clusters() {
   clusters.clear();
   in_cluster.assign(B, 0);
-  joint_force.resize(B);
-  joint_torque.resize(B);
   joint_sums_due = true;
   joint_spin.assign(B, {});
   for (std::vector<Vec3>* x : {&v_before, &L_before, &w_before}) x->resize(B);
@@ -219,6 +217,7 @@ void System::build_clusters() {
     lay_out(*this, c);
     most_rows = std::max(most_rows, static_cast<size_t>(c.matrix.rows()));
   }
+  pack_pairs();
   joint_rows.resize(most_rows);
   for (std::vector<double>* x : {&joint_gaps, &joint_rhs, &joint_impulse, &joint_linear, &joint_answer, &joint_change})
     x->resize(most_rows);
@@ -383,7 +382,7 @@ bool System::close_cluster(JointCluster& c, double h, bool from_before) {
     for (int r = 0; r < joints[joint].rows; ++r) {
       const size_t row = at + static_cast<size_t>(r);
       joint_linear[row] = joint_rhs[row];
-      if (from_before) joint_rhs[row] += state.joint[joint].curvature[r];
+      if (from_before) joint_rhs[row] += state.joint[joint].curvature[r] / (r < joints[joint].lines ? 1 : c.length);
       joint_impulse[row] = joint_rhs[row];
     }
   }
@@ -463,7 +462,7 @@ void System::solve_cluster(JointCluster& c, double h) {
       if (r >= j.lines) js.moment += f * joint_rows[row].turn_child;
       turn_child += f * joint_rows[row].turn_child;
       turn_parent += f * joint_rows[row].turn_parent;
-      js.curvature[r] = regular ? joint_impulse[row] - joint_linear[row] : 0;
+      js.curvature[r] = regular ? (joint_impulse[row] - joint_linear[row]) * (r < j.lines ? 1 : c.length) : 0;
     }
     if (moving(j.child)) {
       joint_force[static_cast<size_t>(j.child)] += js.force;
@@ -481,19 +480,18 @@ void System::solve_cluster(JointCluster& c, double h) {
 }
 
 void System::solve_joints(double h) {
-  if (joint_sums_due) {
-    // of bodies that joints have let go
-    joint_force.fill({});
-    joint_torque.fill({});
-    joint_sums_due = false;
-  }
-  for (JointCluster& c : clusters) solve_cluster(c, h);
+  take_pairs(h);
+  for (JointCluster& c : clusters)
+    if (!c.is_pair) solve_cluster(c, h);
 }
 
 void System::update_angle(size_t joint, const Mat3& F, const Mat3& M) {
   if (joints[joint].kind != Joint::Kind::Revolute && joints[joint].kind != Joint::Kind::Cylindrical) return;
+  update_angle(joint, dot(M.column(0), F.column(0)), dot(M.column(0), F.column(1)));
+}
+
+void System::update_angle(size_t joint, double cosine, double sine) {
   JointState& js = state.joint[joint];
-  const double cosine = dot(M.column(0), F.column(0)), sine = dot(M.column(0), F.column(1));
   const double turned = sine * js.known_cosine - cosine * js.known_sine;  // sine of the angle since then
   constexpr double near = 1.0 / 32;
   if (std::abs(turned) < near && cosine * js.known_cosine + sine * js.known_sine > 0) {
@@ -523,6 +521,7 @@ void System::check_joints() {
     const CompiledJoint& j = joints[i];
     JointState& js = state.joint[i];
     if (!js.live) continue;
+    if (pair_slot[i] != Lanes::kNoSlot && !joint_over[i] && !(std::abs(js.angle) > j.rotation_limit)) continue;
     const Mat3 F = rotation_of(j.parent) * j.R_PF;
     const double along = dot(F.column(0), js.force);
     const double across2 = dot(js.force, js.force) - along * along;
@@ -545,7 +544,11 @@ void System::release_joint(size_t i, const char* reason) {
   if (!js.live) return;
   js.live = false;
   js.force = js.moment = {};
-  for (JointState& other : state.joint) other.is_examined = false;
+  for (JointState& other : state.joint) {
+    // of what they are joined to now nothing is known
+    other.is_examined = false;
+    std::fill(std::begin(other.curvature), std::end(other.curvature), 0.0);
+  }
   if (const int r = joints[i].rotational; r >= 0 && state.rotational[static_cast<size_t>(r)].live)
     break_zone(state.rotational[static_cast<size_t>(r)], BreakReason::Removed);
   clusters_due = true;

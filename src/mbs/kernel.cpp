@@ -9,164 +9,13 @@
 // after foreach_target
 #include <hwy/highway.h>
 
+#include "mbs/lane_math.inc"
+
 HWY_BEFORE_NAMESPACE();
 namespace topple::mbs::kernel {
 namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
-
-/// A number in every lane.
-template <class D>
-struct Num {
-  hn::Vec<D> v;
-};
-template <class D>
-HWY_INLINE Num<D> operator+(Num<D> a, Num<D> b) {
-  return {hn::Add(a.v, b.v)};
-}
-template <class D>
-HWY_INLINE Num<D> operator-(Num<D> a, Num<D> b) {
-  return {hn::Sub(a.v, b.v)};
-}
-template <class D>
-HWY_INLINE Num<D> operator*(Num<D> a, Num<D> b) {
-  return {hn::Mul(a.v, b.v)};
-}
-/// a b + c, a b - c, c - a b
-template <class D>
-HWY_INLINE Num<D> fma(Num<D> a, Num<D> b, Num<D> c) {
-  return {hn::MulAdd(a.v, b.v, c.v)};
-}
-template <class D>
-HWY_INLINE Num<D> fms(Num<D> a, Num<D> b, Num<D> c) {
-  return {hn::MulSub(a.v, b.v, c.v)};
-}
-template <class D>
-HWY_INLINE Num<D> fnma(Num<D> a, Num<D> b, Num<D> c) {
-  return {hn::NegMulAdd(a.v, b.v, c.v)};
-}
-template <class D>
-HWY_INLINE Num<D> num(double x) {
-  return {hn::Set(D(), x)};
-}
-
-template <class D>
-struct V3 {
-  Num<D> x, y, z;
-};
-template <class D>
-HWY_INLINE V3<D> operator+(const V3<D>& a, const V3<D>& b) {
-  return {a.x + b.x, a.y + b.y, a.z + b.z};
-}
-template <class D>
-HWY_INLINE V3<D> operator-(const V3<D>& a, const V3<D>& b) {
-  return {a.x - b.x, a.y - b.y, a.z - b.z};
-}
-template <class D>
-HWY_INLINE V3<D> operator*(Num<D> s, const V3<D>& a) {
-  return {s * a.x, s * a.y, s * a.z};
-}
-/// s a + b
-template <class D>
-HWY_INLINE V3<D> fma(Num<D> s, const V3<D>& a, const V3<D>& b) {
-  return {fma(s, a.x, b.x), fma(s, a.y, b.y), fma(s, a.z, b.z)};
-}
-template <class D>
-HWY_INLINE Num<D> dot(const V3<D>& a, const V3<D>& b) {
-  return fma(a.z, b.z, fma(a.y, b.y, a.x * b.x));
-}
-template <class D>
-HWY_INLINE V3<D> cross(const V3<D>& a, const V3<D>& b) {
-  return {fms(a.y, b.z, a.z * b.y), fms(a.z, b.x, a.x * b.z), fms(a.x, b.y, a.y * b.x)};
-}
-
-template <class D>
-struct Q4 {
-  Num<D> w, x, y, z;
-};
-template <class D>
-HWY_INLINE Q4<D> operator*(const Q4<D>& a, const Q4<D>& b) {
-  return {
-      fnma(a.z, b.z, fnma(a.y, b.y, fms(a.w, b.w, a.x * b.x))), fnma(a.z, b.y, fma(a.y, b.z, fma(a.x, b.w, a.w * b.x))),
-      fma(a.z, b.x, fma(a.y, b.w, fms(a.w, b.y, a.x * b.z))), fma(a.z, b.w, fnma(a.y, b.x, fma(a.x, b.y, a.w * b.z)))};
-}
-/// conj(a) b
-template <class D>
-HWY_INLINE Q4<D> conj_times(const Q4<D>& a, const Q4<D>& b) {
-  return {fma(a.z, b.z, fma(a.y, b.y, fma(a.x, b.x, a.w * b.w))),
-          fma(a.z, b.y, fnma(a.y, b.z, fms(a.w, b.x, a.x * b.w))),
-          fnma(a.z, b.x, fnma(a.y, b.w, fma(a.x, b.z, a.w * b.y))),
-          fnma(a.z, b.w, fma(a.y, b.x, fms(a.w, b.z, a.x * b.y)))};
-}
-template <class D>
-struct M33 {
-  V3<D> r0, r1, r2;  // rows
-};
-template <class D>
-HWY_INLINE M33<D> to_matrix(const Q4<D>& q) {
-  const Num<D> one = num<D>(1), x2 = q.x + q.x, y2 = q.y + q.y, z2 = q.z + q.z;
-  const Num<D> xx = q.x * x2, yy = q.y * y2, zz = q.z * z2, xy = q.x * y2, xz = q.x * z2, yz = q.y * z2;
-  const Num<D> wx = q.w * x2, wy = q.w * y2, wz = q.w * z2;
-  return {
-      {one - (yy + zz), xy - wz, xz + wy}, {xy + wz, one - (xx + zz), yz - wx}, {xz - wy, yz + wx, one - (xx + yy)}};
-}
-template <class D>
-HWY_INLINE V3<D> operator*(const M33<D>& a, const V3<D>& v) {
-  return {dot(a.r0, v), dot(a.r1, v), dot(a.r2, v)};
-}
-template <class D>
-HWY_INLINE V3<D> transpose_times(const M33<D>& a, const V3<D>& v) {
-  return fma(v.z, a.r2, fma(v.y, a.r1, v.x * a.r0));
-}
-/// p turned by q
-template <class D>
-HWY_INLINE V3<D> turn(const Q4<D>& q, const V3<D>& p) {
-  const V3<D> u{q.x, q.y, q.z};
-  const V3<D> c = cross(u, p), t = c + c;
-  return fma(q.w, t, p) + cross(u, t);
-}
-
-template <class D>
-HWY_INLINE Num<D> load(const double* HWY_RESTRICT block, int field) {
-  return {hn::Load(D(), block + static_cast<size_t>(field) * hn::Lanes(D()))};
-}
-template <class D>
-HWY_INLINE V3<D> load3(const double* HWY_RESTRICT block, int field) {
-  return {load<D>(block, field), load<D>(block, field + 1), load<D>(block, field + 2)};
-}
-template <class D>
-HWY_INLINE Q4<D> load4(const double* HWY_RESTRICT block, int field) {
-  return {load<D>(block, field), load<D>(block, field + 1), load<D>(block, field + 2), load<D>(block, field + 3)};
-}
-template <class D>
-HWY_INLINE void store(Num<D> x, double* HWY_RESTRICT block, int field) {
-  hn::Store(x.v, D(), block + static_cast<size_t>(field) * hn::Lanes(D()));
-}
-template <class D>
-HWY_INLINE void store3(const V3<D>& x, double* HWY_RESTRICT block, int field) {
-  store<D>(x.x, block, field), store<D>(x.y, block, field + 1), store<D>(x.z, block, field + 2);
-}
-template <class D, class M>
-HWY_INLINE void store_where(M mask, Num<D> x, double* HWY_RESTRICT block, int field) {
-  double* at = block + static_cast<size_t>(field) * hn::Lanes(D());
-  if constexpr (hn::MaxLanes(D()) == 1) {
-    // masked stores may take the bits beyond a narrow vector for lanes
-    hn::Store(hn::IfThenElse(mask, x.v, hn::Load(D(), at)), D(), at);
-  } else {
-    hn::BlendedStore(x.v, mask, D(), at);
-  }
-}
-
-/// Slots of the lanes that are set in a mask.
-template <class D, class M>
-HWY_INLINE void report(M mask, size_t block, std::vector<std::uint32_t>& out) {
-  const D d;
-  alignas(64) double flag[kMostLanes];
-  hn::Store(hn::IfThenElseZero(mask, hn::Set(d, 1.0)), d, flag);
-  const size_t W = hn::Lanes(d);
-  for (size_t l = 0; l < W; ++l)
-    if (flag[l] != 0) out.push_back(static_cast<std::uint32_t>(block * W + l));
-}
 
 /// Moves one block of bodies (docs/theory/multibody.md, eq. 1 to 3).
 template <class D>
@@ -196,21 +45,8 @@ HWY_INLINE void advance_body_block(const BodyJob& job, size_t block, Num<D>& sum
   const V3<D> bend = R0 * (inverse_inertia * transpose_times(R0, cross(w0, spin)));
   const V3<D> turned = h * fma(num<D>(-0.5) * h, bend, w0);
   const Num<D> half2 = num<D>(0.25) * dot(turned, turned);
-  // sin(a)/a and cos(a) of the half angle by series, exact to round-off up to a = 0.2
-  const auto fast = hn::And(drifts, hn::Not(hn::Le(half2.v, hn::Set(d, 0.04))));
-  Num<D> s = num<D>(-1.0 / 39916800), k = num<D>(-1.0 / 3628800);
-  s = fma(s, half2, num<D>(1.0 / 362880)), k = fma(k, half2, num<D>(1.0 / 40320));
-  s = fma(s, half2, num<D>(-1.0 / 5040)), k = fma(k, half2, num<D>(-1.0 / 720));
-  s = fma(s, half2, num<D>(1.0 / 120)), k = fma(k, half2, num<D>(1.0 / 24));
-  s = fma(s, half2, num<D>(-1.0 / 6)), k = fma(k, half2, num<D>(-0.5));
-  s = fma(s, half2, num<D>(1)), k = fma(k, half2, num<D>(1));
-  const Num<D> half_s = num<D>(0.5) * s;
-  const Q4<D> step{k, half_s * turned.x, half_s * turned.y, half_s * turned.z};
-  Q4<D> q1 = step * load4<D>(q, 0);
-  // one step of Newton's method for the length, which round-off alone has changed
-  const Num<D> length2 = fma(q1.z, q1.z, fma(q1.y, q1.y, fma(q1.x, q1.x, q1.w * q1.w)));
-  const Num<D> unit = fma(num<D>(-0.5), length2, num<D>(1.5));
-  q1 = {unit * q1.w, unit * q1.x, unit * q1.y, unit * q1.z};
+  const auto fast = hn::And(drifts, hn::Not(hn::Le(half2.v, hn::Set(d, kMostHalf2))));
+  const Q4<D> q1 = normalize(exp_rotation(turned, half2) * load4<D>(q, 0));
   const M33<D> R1 = to_matrix(q1);
   const V3<D> w1 = R1 * (inverse_inertia * transpose_times(R1, spin));
 
@@ -225,14 +61,6 @@ HWY_INLINE void advance_body_block(const BodyJob& job, size_t block, Num<D>& sum
   store_where<D>(here, w1.x, w, 0), store_where<D>(here, w1.y, w, 1), store_where<D>(here, w1.z, w, 2);
   if (HWY_UNLIKELY(!hn::AllFalse(d, fast))) report<D>(fast, block, *job.spins);
   sum = sum + (((place.x + place.y) + place.z) + ((speed.x + speed.y) + speed.z));
-}
-
-/// Polynomial of degree N - 1.
-template <class D, size_t N>
-HWY_INLINE Num<D> polynomial(const double (&c)[N], Num<D> x) {
-  Num<D> y = num<D>(c[N - 1]);
-  for (size_t i = N - 1; i-- > 0;) y = fma(y, x, num<D>(c[i]));
-  return y;
 }
 
 /// Rotation vector over the vector of its quaternion, 2 asin(s)/s, and the coefficient of eq. 4,
@@ -284,19 +112,6 @@ HWY_INLINE Poses<D> gather(const ElementJob& job, const std::uint32_t* HWY_RESTR
   };
   return {{take(job.p, 0, at_p), take(job.p, 1, at_p), take(job.p, 2, at_p)},
           {take(job.q, 0, at_q), take(job.q, 1, at_q), take(job.q, 2, at_q), take(job.q, 3, at_q)}};
-}
-
-template <class D>
-HWY_INLINE Num<D> operator/(Num<D> a, Num<D> b) {
-  return {hn::Div(a.v, b.v)};
-}
-template <class D>
-HWY_INLINE Num<D> abs(Num<D> a) {
-  return {hn::Abs(a.v)};
-}
-template <class D, class M>
-HWY_INLINE Num<D> select(M mask, Num<D> yes, Num<D> no) {
-  return {hn::IfThenElse(mask, yes.v, no.v)};
 }
 
 /// a^(-2/3) of 1 <= a <= kMostOver by Newton's method on a² y³ = 1.

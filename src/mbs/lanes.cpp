@@ -24,7 +24,8 @@ LaneLayout Lanes::body_layout(size_t lane) const {
 void Lanes::allocate_bodies(size_t bodies) {
   const size_t items = bodies + 1;  // the ground
   body_blocks = body_layout(0).blocks(items);
-  for (AlignedVector<double>* x : {&p, &v, &L, &w, &force, &torque}) x->assign(body_blocks * 3 * W, 0);
+  for (AlignedVector<double>* x : {&p, &v, &L, &w, &force, &torque, &joint_force, &joint_torque})
+    x->assign(body_blocks * 3 * W, 0);
   q.assign(body_blocks * 4 * W, 0);
   R.assign(body_blocks * 9 * W, 0);
   body_constants.assign(body_blocks * kernel::kBodyFields * W, 0);
@@ -102,6 +103,60 @@ void Lanes::share_constants() {
   }
   pool = std::move(merged);
   uses = std::move(counts);
+}
+
+void Lanes::allocate_pairs(size_t blocks) {
+  pairs = {};
+  pairs.blocks = blocks;
+  pairs.kind.assign(blocks, kernel::PairKind::None);
+  pairs.straight.assign(blocks, 0);
+  const size_t last = body_blocks * W - 1;  // no body, or the ground
+  for (std::vector<std::uint32_t>* x : {&pairs.parent, &pairs.child})
+    x->assign(blocks * W, static_cast<std::uint32_t>(last));
+  pairs.joint.assign(blocks * W, kNoSlot);
+  pairs.constants.assign(blocks * kernel::kPairConstants * W, 0);
+  pairs.states.assign(blocks * kernel::kPairStates * W, 0);
+}
+
+void Lanes::find_straight_pairs() {
+  const auto is_straight = [&](const std::uint32_t* slots) {
+    for (size_t l = 0; l < W; ++l)
+      if (slots[l] != slots[0] + l) return false;
+    return slots[0] % W == 0;
+  };
+  for (size_t block = 0; block < pairs.blocks; ++block)
+    pairs.straight[block] = static_cast<unsigned char>((is_straight(&pairs.parent[block * W]) ? 1 : 0) +
+                                                       (is_straight(&pairs.child[block * W]) ? 2 : 0));
+}
+
+void Lanes::close_pairs() {
+  pairs.unfit.clear();
+  pairs.over.clear();
+  if (pairs.blocks == 0) return;
+  const kernel::PairJob job{pairs.blocks,
+                            pairs.kind.data(),
+                            pairs.straight.data(),
+                            pairs.parent.data(),
+                            pairs.child.data(),
+                            pairs.constants.data(),
+                            pairs.states.data(),
+                            p.data(),
+                            v.data(),
+                            L.data(),
+                            w.data(),
+                            q.data(),
+                            R.data(),
+                            joint_force.data(),
+                            joint_torque.data(),
+                            kick.data(),
+                            h.data(),
+                            &pairs.unfit,
+                            &pairs.over};
+  if (W == kernel::lanes()) {
+    kernel::close_pairs(job);
+  } else {
+    kernel::close_pairs_singly(job);
+  }
 }
 
 void Lanes::advance_bodies() {

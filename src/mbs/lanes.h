@@ -5,17 +5,30 @@
 #include <vector>
 
 #include "base/aligned.h"
+#include "mbs/joint_kernel.h"
 #include "mbs/kernel.h"
 #include "mbs/lane_array.h"
 
 namespace topple::mbs {
+
+/// Joints that share no moving body with others. A run packs them by kind; in a batch block j is joint j.
+struct Pairs {
+  size_t blocks = 0;
+  std::vector<kernel::PairKind> kind;        // of each block
+  std::vector<unsigned char> straight;       // as of the job
+  std::vector<std::uint32_t> parent, child;  // slots of bodies (W a block)
+  std::vector<std::uint32_t> joint;          // of each slot
+  AlignedVector<double> constants, states;
+  std::vector<std::uint32_t> unfit, over;  // reports of the kernel
+};
 
 struct Lanes {
   size_t W = 1;
   bool is_batch = false;
   size_t body_blocks = 0, element_blocks = 0;
   // bodies, the ground behind the last one
-  AlignedVector<double> p, v, L, w, q, R, force, torque, body_constants;
+  AlignedVector<double> p, v, L, w, q, R, force, torque, joint_force, joint_torque, body_constants;
+  Pairs pairs;
   // elements
   AlignedVector<double> states, flows, element_forces;
   AlignedVector<double> pool;                 // lane vectors of constants, shared by blocks
@@ -63,6 +76,18 @@ struct Lanes {
   void clear_slot(size_t slot);
   /// Kicks all bodies and moves those that drift.
   void advance_bodies();
+  /// Empty blocks of joints, whose lanes stand on the ground.
+  void allocate_pairs(size_t blocks);
+  double& pair_constant(size_t slot, int f) {
+    return pairs.constants[(slot / W * kernel::kPairConstants + static_cast<size_t>(f)) * W + slot % W];
+  }
+  double& pair_state(size_t slot, int f) {
+    return pairs.states[(slot / W * kernel::kPairStates + static_cast<size_t>(f)) * W + slot % W];
+  }
+  /// Whether the bodies of blocks lie side by side.
+  void find_straight_pairs();
+  /// Moves the bodies of all pairs.
+  void close_pairs();
   /// Forces of the elements in blocks [first, last).
   void evaluate_elements(size_t first, size_t last, std::vector<std::uint32_t>& beyond);
   /// Forces of the elements on every body; batch only.

@@ -41,8 +41,8 @@ void System::start() {
 
 void System::evaluate_start() {
   started = true;
-  joint_force.assign(B, {});
-  joint_torque.assign(B, {});
+  joint_force.fill({});
+  joint_torque.fill({});
   clusters_due = true;
   close_joints();
   state.gravity_at_start = 0;

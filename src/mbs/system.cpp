@@ -49,7 +49,9 @@ void System::compile() {
                               {&s.L, &lanes->L},
                               {&s.w, &lanes->w},
                               {&force, &lanes->force},
-                              {&torque, &lanes->torque}}) {
+                              {&torque, &lanes->torque},
+                              {&joint_force, &lanes->joint_force},
+                              {&joint_torque, &lanes->joint_torque}}) {
     array->resize(B);
     array->attach(store->data(), layout);
   }
@@ -272,11 +274,11 @@ void System::evaluate_rotationals(double h) {
     const CompiledRotational& c = rotationals[i];
     const CompiledJoint& j = joints[static_cast<size_t>(c.joint)];
     const JointState& js = state.joint[static_cast<size_t>(c.joint)];
-    const Mat3 F = rotation_of(j.parent) * j.R_PF;
-    const Vec3 axis = F.column(2);
+    const Mat3 R = rotation_of(j.parent);
+    const Vec3 axis = R * j.R_PF.column(2);
     const bool was_yielded = z.yielded;
     Six d;
-    d.c[0] = -dot(F.column(0), js.force);
+    d.c[0] = -dot(R * j.R_PF.column(0), js.force);
     d.c[5] = js.angle;
     if (ignores_limits) {
       ZoneParameters elastic = c.zone;
@@ -487,6 +489,12 @@ void System::prepare_step() {
     build_clusters();
     for (size_t b = 0; b < B; ++b) pack_body(b);
   }
+  if (joint_sums_due) {
+    // bodies that joints have let go
+    joint_force.fill({});
+    joint_torque.fill({});
+    joint_sums_due = false;
+  }
   // one run fills all lanes, a sample of a batch its own
   const size_t first = lanes->is_batch ? lane : 0, last = lanes->is_batch ? lane + 1 : lanes->W;
   for (size_t i = first; i < last; ++i) {
@@ -534,6 +542,7 @@ void advance_together(Lanes& lanes, std::span<System* const> systems) {
     const size_t b = lanes.is_batch ? slot / lanes.W : slot;
     s->drift(b, s->step, s->state.p[b], s->state.q[b], s->state.R[b]);
   }
+  lanes.close_pairs();
   each([](System& s) {
     s.finish_motion();
     s.begin_forces();

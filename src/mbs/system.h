@@ -60,7 +60,7 @@ struct JointState {
   double known_angle = 0, known_cosine = 1, known_sine = 0;
   unsigned char repeating = 0;  // rows that repeat those of other joints, bit r for row r
   bool is_examined = false;     // repeating is known
-  double curvature[6] = {};  // the part of the last impulse that the linear step does not know [N·s, N·m·s over length]
+  double curvature[6] = {};     // the part of the last impulse that the linear step does not know [N·s, N·m·s]
 };
 
 struct CableState {
@@ -141,6 +141,7 @@ struct JointCluster {
   double length = 1, tolerance = 0;  // [m]
   std::vector<int> repeating;        // rows that repeat others for good
   int dependent = 0;                 // rows that do so now
+  bool is_pair = false;              // one joint, moved by the kernel
   double open = 0;                   // widest gap [m, rad]
   BlockCholesky matrix;              // J M⁻¹ Jᵀ
   BlockCholesky geometry;            // J Jᵀ, where rows may depend on others
@@ -208,6 +209,9 @@ class System {
   std::vector<JointCluster> clusters;
   bool clusters_due = true;
   std::vector<std::pair<int, int>> joint_notes;  // first joint and situation of those made
+  std::vector<std::uint32_t> pair_slot;          // of each joint (J)
+  std::vector<int> paired;                       // joints that have one
+  std::vector<unsigned char> joint_over;         // passes a limit, of those (J)
   bool joint_sums_due = true;                    // those of bodies without joints are to be cleared
   std::string identity;                          // of the model, for snapshots
   std::vector<JointRow> joint_rows;
@@ -350,12 +354,17 @@ class System {
   bool close_cluster(JointCluster&, double h, bool from_before);
   void solve_cluster(JointCluster&, double h);
   void solve_joints(double h);
+  /// Gives joints that share no moving body with others to the kernel, and takes what it made of them.
+  void pack_pairs();
+  void pack_pair(size_t joint, const JointCluster&);
+  void take_pairs(double h);
   void check_joints();
   /// Closes the joints and makes the velocities agree with them, before the first step.
   void close_joints();
   /// Reactions at the time of the positions, from the accelerations.
   void calc_reactions();
   void update_angle(size_t joint, const Mat3& F, const Mat3& M);
+  void update_angle(size_t joint, double cosine, double sine);
   void update_angles();
   /// Tells once for each cluster that rows repeat others, that more do for a while than `usual`, or that a step did not
   /// close all joints.
