@@ -165,6 +165,41 @@ TEST(ModelRunPhysics, TheSliderCrankTurnsAsLagrangeSays) {
   EXPECT_GT(largest, 0.9);
 }
 
+TEST(ModelRunPhysics, TheBoxesFollowTheRulesOfTheirPairs) {
+  const Example e = run_example("falling_boxes.json");
+  EXPECT_EQ(e.record.ending, "time_limit");
+  EXPECT_LT(e.summary.energy_error, 1e-3);
+  const Vec3 up{std::sin(0.2), 0, std::cos(0.2)}, down{std::cos(0.2), 0, -std::sin(0.2)};
+  const auto place = [&e](const std::string& name, size_t t) {
+    const record::Output& o = output_of(e, name);
+    return Vec3{o.value[3 * t], o.value[3 * t + 1], o.value[3 * t + 2]};
+  };
+  const size_t samples = output_of(e, "steel").time.size();
+  ASSERT_EQ(samples, 76u);
+  double rubber_after = 0, lowest = 1, nearest = 9;
+  bool has_touched = false;
+  for (size_t t = 0; t < samples; ++t) {
+    for (const char* box : {"steel", "rubber"}) lowest = std::min(lowest, dot(up, place(box, t)) - 0.25);
+    nearest = std::min(nearest, norm(place("ghost", t) - place("steel", t)));
+    const double height = dot(up, place("rubber", t)) - 0.25;
+    if (height < 0.06) has_touched = true;
+    if (has_touched) rubber_after = std::max(rubber_after, height);
+  }
+  // steel of 800 kg falls from 0.9 m: a spring of its mass at 1500 rad/s yields v / 1500
+  EXPECT_GT(lowest, -1.5 * std::sqrt(2 * kGravity * 0.9) / 1500) << "a box sinks into the slope";
+  EXPECT_GT(rubber_after, 0.2) << "rubber bounces";
+  EXPECT_LT(nearest, 0.25) << "the ghost falls through the steel";
+  EXPECT_NEAR(dot(up, place("ghost", samples - 1)), 0.25, 0.01) << "and lies on the slope";
+  // the wedge slides: friction 0.1 on a slope of tan 0.2 rad
+  const record::Output& wedge = output_of(e, "wedge_speed");
+  const size_t last = samples - 1, earlier = samples - 21;
+  const double gain =
+      dot(down, Vec3{wedge.value[3 * last], wedge.value[3 * last + 1], wedge.value[3 * last + 2]}) -
+      dot(down, Vec3{wedge.value[3 * earlier], wedge.value[3 * earlier + 1], wedge.value[3 * earlier + 2]});
+  const double a = kGravity * (std::sin(0.2) - 0.1 * std::cos(0.2));
+  EXPECT_NEAR(gain / (wedge.time[last] - wedge.time[earlier]), a, 0.05 * a);
+}
+
 TEST(ModelRun, SaysWhatTheEngineSaysOfItsNumbers) {
   const Example e = run_example("double_pendulum.json");
   std::string ids;

@@ -271,5 +271,18 @@ TEST(ModelPage, EveryExampleIsRead) {
   EXPECT_GE(parts, 4);
 }
 
+TEST(ModelExamples, AreReadAndFollowTheSchema) {
+  int files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(root + "examples/mbs")) {
+    if (entry.path().extension() != ".json") continue;
+    ++files;
+    const std::string text = read_file(entry.path());
+    EXPECT_EQ(schema().fault(Json::parse(text)), "") << entry.path();
+    const Outcome o = try_text(text);
+    EXPECT_TRUE(o.accepted) << entry.path() << (o.complaints.empty() ? "" : o.complaints[0].message);
+  }
+  EXPECT_GE(files, 3);
+}
+
 }  // namespace
 }  // namespace topple::mbs
