@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <compare>
+#include <cstdint>
 #include <span>
+#include <tuple>
 #include <utility>
 
 #include "mbs/system.h"
@@ -15,6 +18,16 @@ namespace {
 constexpr double kSearchMargin = 0.2;   // [m]; shapes nearer than this are watched
 constexpr double kSearchTravel = 0.09;  // [m]; less than half the margin
 constexpr long kSearchPause = 80;       // steps between searches that breaks ask for
+
+/// Two bodies and their shapes, in the order of the list of pairs.
+struct PairKey {
+  std::uint64_t bodies, shapes;
+  friend auto operator<=>(const PairKey&, const PairKey&) = default;
+};
+PairKey key_of(int a, int b, int shape_a, int shape_b) {
+  const auto two = [](int x, int y) { return (static_cast<std::uint64_t>(x) << 32) | static_cast<std::uint64_t>(y); };
+  return {two(a, b), two(shape_a, shape_b)};
+}
 
 }  // namespace
 
@@ -81,11 +94,20 @@ void System::find_pairs() {
     for (const Item& it : items)
       for (int k = 0; k < 3 && is_bounded(it); ++k) spread[k] += std::pow(0.5 * (it.low[k] + it.high[k]) - mean[k], 2);
     const int axis = spread.x >= spread.y && spread.x >= spread.z ? 0 : spread.y >= spread.z ? 1 : 2;
-    std::vector<std::pair<double, int>> order(items.size());
-    for (size_t i = 0; i < items.size(); ++i) order[i] = {items[i].low[axis], static_cast<int>(i)};
-    std::sort(order.begin(), order.end());
-    using Key = std::array<int, 4>;  // bodies, shapes
-    std::vector<Key> found;
+    std::sort(items.begin(), items.end(), [&](const Item& x, const Item& y) {
+      const double a = x.low[axis], b = y.low[axis];
+      return std::tie(a, x.body, x.shape) < std::tie(b, y.body, y.shape);
+    });
+    // the other two axes lie in rows of their own, so that the sweep compares many at a time
+    const int other[2] = {(axis + 1) % 3, (axis + 2) % 3};
+    std::vector<double> begins(items.size()), low[2], high[2];
+    for (int k = 0; k < 2; ++k) low[k].resize(items.size()), high[k].resize(items.size());
+    for (size_t i = 0; i < items.size(); ++i) {
+      begins[i] = items[i].low[axis];
+      for (int k = 0; k < 2; ++k) low[k][i] = items[i].low[other[k]], high[k][i] = items[i].high[other[k]];
+    }
+    std::vector<unsigned char> meets(items.size());
+    std::vector<PairKey> found;
     // joined, or joined to the same third body: the joint or element between them governs
     std::vector<int> near(B, -1);  // the last body that the body is near to in this sense
     const auto mark_near = [&](int a) {
@@ -95,20 +117,27 @@ void System::find_pairs() {
         for (const int m : holders(n)) near[static_cast<size_t>(m)] = a;
       }
     };
-    for (size_t i = 0; i < order.size(); ++i) {
-      const Item& x = items[static_cast<size_t>(order[i].second)];
-      mark_near(x.body);
-      for (size_t k = i + 1; k < order.size() && order[k].first <= x.high[axis]; ++k) {
-        const Item& y = items[static_cast<size_t>(order[k].second)];
+    for (size_t i = 0; i < items.size(); ++i) {
+      const Item& x = items[i];
+      const size_t end = static_cast<size_t>(
+          std::upper_bound(begins.begin() + static_cast<std::ptrdiff_t>(i), begins.end(), x.high[axis]) -
+          begins.begin());
+      const double x0 = x.low[other[0]], x1 = x.high[other[0]], y0 = x.low[other[1]], y1 = x.high[other[1]];
+      for (size_t k = i + 1; k < end; ++k)
+        meets[k] =
+            static_cast<unsigned char>((low[0][k] <= x1) & (high[0][k] >= x0) & (low[1][k] <= y1) & (high[1][k] >= y0));
+      bool marked = false;
+      for (size_t k = i + 1; k < end; ++k) {
+        if (meets[k] == 0) continue;
+        const Item& y = items[k];
         if (x.body == y.body) continue;
-        if (x.low.x > y.high.x || y.low.x > x.high.x || x.low.y > y.high.y || y.low.y > x.high.y ||
-            x.low.z > y.high.z || y.low.z > x.high.z)
-          continue;
-        if (near[static_cast<size_t>(y.body)] == x.body) continue;
         if (fixed[static_cast<size_t>(x.body)] && fixed[static_cast<size_t>(y.body)]) continue;
+        if (!marked) mark_near(x.body);
+        marked = true;
+        if (near[static_cast<size_t>(y.body)] == x.body) continue;
         if (!contact_laws[static_cast<size_t>(find_pair_law(x.body, y.body))].touches) continue;
-        found.push_back(x.body < y.body ? Key{x.body, y.body, x.shape, y.shape}
-                                        : Key{y.body, x.body, y.shape, x.shape});
+        found.push_back(x.body < y.body ? key_of(x.body, y.body, x.shape, y.shape)
+                                        : key_of(y.body, x.body, y.shape, x.shape));
       }
     }
     std::sort(found.begin(), found.end());
@@ -116,10 +145,11 @@ void System::find_pairs() {
     std::vector<PairState> pairs(found.size());
     std::vector<double> due(found.size(), 0);
     size_t old = 0;
-    const auto key = [](const PairState& p) { return Key{p.a, p.b, p.shape_a, p.shape_b}; };
+    const auto key = [](const PairState& p) { return key_of(p.a, p.b, p.shape_a, p.shape_b); };
     for (size_t i = 0; i < found.size(); ++i) {
       PairState& p = pairs[i];
-      p.a = found[i][0], p.b = found[i][1], p.shape_a = found[i][2], p.shape_b = found[i][3];
+      p.a = static_cast<int>(found[i].bodies >> 32), p.b = static_cast<int>(found[i].bodies & 0xffffffff);
+      p.shape_a = static_cast<int>(found[i].shapes >> 32), p.shape_b = static_cast<int>(found[i].shapes & 0xffffffff);
       while (old < s.pairs.size() && key(s.pairs[old]) < found[i]) ++old;
       if (old < s.pairs.size() && key(s.pairs[old]) == found[i]) {
         p = s.pairs[old];
