@@ -103,7 +103,7 @@ void overlap_points(const Solid& a, const Solid& b, const Vec3& n, BoxContact& o
     count = clip(cut, count, -t, -at + half, polygon);
   }
   double length[8], perimeter = 0;  // of the edges that begin at each corner
-  for (int i = 0; i < count; ++i) perimeter += length[i] = norm(polygon[(i + 1) % count] - polygon[i]);
+  for (int i = 0; i < count; ++i) perimeter += length[i] = norm(cross(n, polygon[(i + 1) % count] - polygon[i]));
   out.normal = n;
   for (int i = 0; i < count; ++i) {
     const double depth = dot(n_a, p_a - polygon[i]) / std::abs(along_a);

@@ -88,7 +88,7 @@ void overlap_points(const Solid& a, const Solid& b, const Vec3& n, BoxContact& o
   double length[kMostCorners];  // of the edges that begin at each corner
   const auto measure = [&] {
     double perimeter = 0;
-    for (int i = 0; i < count; ++i) perimeter += length[i] = norm(polygon[(i + 1) % count] - polygon[i]);
+    for (int i = 0; i < count; ++i) perimeter += length[i] = norm(cross(n, polygon[(i + 1) % count] - polygon[i]));
     return perimeter;
   };
   double perimeter = measure();
