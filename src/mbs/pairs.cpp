@@ -171,7 +171,7 @@ void System::add_travel(double h) {
   const State& now = state;
   s.travel.resize(B);
   double most = 0;
-  for (size_t b = 0; b < B; ++b) {
+  for (size_t b = 0; b < B && model.contact.bodies; ++b) {
     if (fixed[b]) continue;
     // the drift before this evaluation was by the speeds of half a step ago
     s.travel[b] += h * (norm(now.v[b]) + norm(now.w[b]) * s.body[b].radius);
