@@ -114,6 +114,8 @@ void overlap_points(const Solid& a, const Solid& b, const Vec3& n, BoxContact& o
   }
 }
 
+constexpr double kSameDirection = 0.97;  // cosine; 14 degrees
+
 /// Gap along the face that separated two boxes last time, negative if it does no more or was no face.
 double find_face_gap(const Solid& a, const Solid& b, int axis) {
   if (axis >= 6) return -1;
@@ -139,10 +141,10 @@ void box_box(const Solid& a, const Solid& b, int& axis, BoxContact& out) {
       return;
     }
   }
-  double least = std::numeric_limits<double>::infinity();
+  double overlaps[15], least = std::numeric_limits<double>::infinity();
   int best = -1;
   for (int i = 0; i < 15; ++i) {
-    const double overlap = overlap_along(i);
+    const double overlap = overlaps[i] = overlap_along(i);
     if (overlap <= 0) {
       axis = i;
       out.gap = -overlap / overlap_along.length(i);
@@ -158,6 +160,13 @@ void box_box(const Solid& a, const Solid& b, int& axis, BoxContact& out) {
   Vec3 normal = axis_of(a, b, best);
   if (dot(normal, b.p - a.p) < 0) normal = -normal;
   overlap_points(a, b, normal, out);
+  axis = best;
+  if (best >= 6) return;
+  // axes near the normal find the same points
+  double other = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 15; ++i)
+    if (overlaps[i] < other && std::abs(dot(axis_of(a, b, i), normal)) < kSameDirection) other = overlaps[i];
+  out.spare = std::max(0.0, 0.5 * (other - least));
 }
 
 void sphere_box(const Solid& sphere, const Solid& box, bool flipped, BoxContact& out) {
@@ -197,9 +206,18 @@ void sphere_box(const Solid& sphere, const Solid& box, bool flipped, BoxContact&
 
 }  // namespace
 
+bool find_contact_along(const Solid& a, const Solid& b, int axis, BoxContact& out) {
+  out.count = 0;
+  if (a.kind != Shape::Kind::Box || b.kind != Shape::Kind::Box || axis >= 6) return false;
+  Vec3 normal = axis_of(a, b, axis);
+  if (dot(normal, b.p - a.p) < 0) normal = -normal;
+  overlap_points(a, b, normal, out);
+  return out.count > 0;
+}
+
 void find_contact(const Solid& a, const Solid& b, int& axis, BoxContact& out) {
   out.count = 0;
-  out.gap = 0;
+  out.gap = out.spare = 0;
   const auto is = [](const Solid& s, Shape::Kind kind) { return s.kind == kind; };
   if (is(a, Shape::Kind::Plane)) return plane_solid(a, b, false, out);
   if (is(b, Shape::Kind::Plane)) return plane_solid(b, a, true, out);

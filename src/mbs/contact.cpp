@@ -134,7 +134,7 @@ void System::add_contact_point(const Vec3& ra, const Vec3& rb, double depth, dou
 }
 
 void System::add_contact_group(size_t a, size_t b, const Vec3& n, size_t first, const ContactLaw& law, double stiffness,
-                               Stick& stick, bool fresh) {
+                               StickRange& sticks) {
   for (const size_t i : {a, b}) {
     ContactBody& c = contact.body[i];
     if (c.groups++ > 0 || i == B) continue;
@@ -147,9 +147,22 @@ void System::add_contact_group(size_t a, size_t b, const Vec3& n, size_t first, 
     c.inverse_mass = s.body[i].inverse_mass;
     c.inverse_inertia = calc_world_inverse_inertia(i);
   }
-  if (fresh) stick = {};
-  contact.group.push_back({static_cast<int>(a), static_cast<int>(b), static_cast<int>(first),
-                           static_cast<int>(contact.point.size() - first), n, &law, &stick, stiffness, fresh});
+  const size_t count = contact.point.size() - first;
+  for (ContactPoint& p : std::span(contact.point).subspan(first)) {
+    double least = kUnlimited;
+    for (int i = sticks.first; i < sticks.first + sticks.count; ++i) {
+      const Stick& stick = state.sticks[static_cast<size_t>(i)];
+      const Vec3 d = stick.at - p.ra;
+      if (const double distance2 = dot(d, d); distance2 < least) {
+        least = distance2;
+        p.slip = stick.slip;
+        p.is_fresh = false;
+      }
+    }
+  }
+  sticks = {static_cast<int>(first), static_cast<int>(count)};
+  contact.group.push_back(
+      {static_cast<int>(a), static_cast<int>(b), static_cast<int>(first), static_cast<int>(count), n, &law, stiffness});
 }
 
 void System::resolve_contacts(double h) {
@@ -230,51 +243,39 @@ void System::resolve_contacts(double h) {
     sum.push(A, Bb);
   });
 
-  // the friction spring of a group carries the sliding of its points, weighted with their normal forces
-  each_group([&](ContactGroup& g, auto points, ContactBody& A, ContactBody& Bb) {
-    Stick& stick = *g.stick;
-    double total = 0;
-    Vec3 slide, centre;
+  // friction springs, which share the load as the normal forces do
+  each_group([&](const ContactGroup& g, auto points, ContactBody& A, ContactBody& Bb) {
+    double total = 0, energy = 0;
     for (ContactPoint& p : points) {
       const Vec3 v = point_speed(p, A, Bb);
       p.slide = v - dot(g.n, v) * g.n;
-      p.held = {};
       total += p.normal;
-      centre += p.normal * p.ra;
-      slide += p.normal * p.slide;
     }
-    if (!(total > 0)) {
-      stick = {};
-      for (ContactPoint& p : points) p.friction = {};
-      return;
-    }
-    if (!g.fresh) {
-      stick.slip += (h / total) * slide;
-      stick.twist += h * dot(g.n, A.w - Bb.w);
-    }
-    stick.slip -= dot(g.n, stick.slip) * g.n;
-    centre *= 1 / total;
-    const double rate = kStickStiffness * g.law->mean * g.stiffness;
-    double spread2 = 0;
+    const double stiffness = kStickStiffness * g.law->mean * g.stiffness, most = g.law->friction * total / stiffness;
+    const double rate = total > 0 ? stiffness / total : 0;
     Wrench sum;
     for (ContactPoint& p : points) {
-      const Vec3 from_centre = p.ra - centre;
-      spread2 += p.normal * dot(from_centre, from_centre);
-      p.held = (-rate * p.normal / total) * (stick.slip + stick.twist * cross(g.n, from_centre));
-      limit(p.held, g.law->friction * p.normal);
+      if (!p.is_fresh) p.slip += h * p.slide;
+      p.slip -= dot(g.n, p.slip) * g.n;
+      limit(p.slip, most);  // it follows where friction can hold no more
+      p.held = (-rate * p.normal) * p.slip;
+      energy += p.normal * dot(p.slip, p.slip);
       sum.add(p, p.held);
     }
     sum.push(A, Bb);
-    g.held = 0.5 * rate * (dot(stick.slip, stick.slip) + stick.twist * stick.twist * spread2 / total);
+    s.stick_energy += 0.5 * rate * energy;
   });
   update_speeds();
 
   // what else friction takes to stop the sliding, within its limit
-  each_group([&](ContactGroup& g, auto points, ContactBody& A, ContactBody& Bb) {
+  each_group([&](const ContactGroup& g, auto points, ContactBody& A, ContactBody& Bb) {
     Wrench all;
     double power = 0, total = 0, impedance = 0;
     for (const ContactPoint& p : points) total += p.normal, impedance += p.impedance;
-    if (!(total > 0)) return;
+    if (!(total > 0)) {
+      for (ContactPoint& p : points) p.friction = {};
+      return;
+    }
     // shared out as the normal forces are, so that all points pass their limits together
     const double rate = 2 * kSlideZeta * impedance / total;
     for (ContactPoint& p : points) {
@@ -286,22 +287,12 @@ void System::resolve_contacts(double h) {
     }
     const Damper damper(power > 0 ? h * all.calc_mobility(A, Bb) / power : 0);
     Wrench sum;
-    double wanted = 0, had = 0;
     for (ContactPoint& p : points) {
       p.friction = p.held - (damper.share * rate * p.normal) * (p.slide + damper.at * p.friction);
-      wanted += norm(p.friction);
-      had += limit(p.friction, g.law->friction * p.normal);
+      limit(p.friction, g.law->friction * p.normal);
       sum.add(p, p.friction - p.held);
     }
     sum.push(A, Bb);
-    // the spring follows where the limit is passed
-    if (had < wanted) {
-      const double share = had / wanted;
-      g.stick->slip *= share;
-      g.stick->twist *= share;
-      g.held *= share * share;
-    }
-    s.stick_energy += g.held;
   });
   update_speeds();
 
@@ -332,6 +323,8 @@ void System::resolve_contacts(double h) {
     }
   }
   ground_contact -= contact.body[B].force;
+  s.sticks.resize(contact.point.size());
+  for (size_t i = 0; i < contact.point.size(); ++i) s.sticks[i] = {contact.point[i].ra, contact.point[i].slip};
 }
 
 }  // namespace topple::mbs

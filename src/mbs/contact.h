@@ -2,6 +2,7 @@
 /// What contact remembers from step to step, and the points of one step (docs/theory/contact.md).
 
 #include <compare>
+#include <cstdint>
 #include <vector>
 
 #include "mbs/boxes.h"
@@ -10,10 +11,15 @@
 
 namespace topple::mbs {
 
-/// Displacement of a friction spring, of the first body against the second.
+/// A friction spring at a touching point, as the step before left it.
 struct Stick {
-  Vec3 slip;         // [m]
-  double twist = 0;  // about the normal [rad]
+  Vec3 at;    // from the first body's mass centre [m]
+  Vec3 slip;  // of the first body against the second [m]
+};
+
+/// Those of a pair, or of a shape on the ground.
+struct StickRange {
+  int first = 0, count = 0;  // in State::sticks
 };
 
 /// Contact shape in its body's frame.
@@ -28,7 +34,7 @@ struct CompiledShape {
   int first_corner = 0;      // into State::ground_points: 8 of a box, 1 of a sphere, the vertices of a polyhedron
   bool is_clear = false;     // no point touches the ground or remembers that it did
   bool is_touching = false;  // the ground
-  Stick stick;               // to the ground
+  StickRange sticks;         // to the ground
 };
 
 /// A corner's contact with the ground.
@@ -37,17 +43,24 @@ struct GroundPoint {
   bool active = false;  // contact is possible
 };
 
-/// Two bodies near each other.
+/// Two shapes near each other, in an order that does not depend on the bodies' numbers.
 struct PairState {
-  int a = -1, b = -1;            // bodies, a < b
-  int shape_a = 0, shape_b = 0;  // indices within the bodies
+  int a = -1, b = -1;            // bodies
+  int shape_a = 0, shape_b = 0;  // into State::shapes
   int law = 0;                   // into System::contact_laws
-  int axis = 0;                  // separating axis of the last look
+  int axis = 0;                  // that separated or decided at the last look
+  double axis_way = 0;           // way of both bodies up to which it decides [m]
   double allowed = 0;            // penetration without force [m]
   double depth = 0;              // of the deepest point beyond it at the last look, or minus the gap [m]
   double way = 0;                // State::travel of both bodies then [m]
   bool touching = false;
-  Stick stick;
+  StickRange sticks;
+};
+
+/// When a pair is to be looked at again.
+struct PairDue {
+  double way = 0;  // of both bodies, before which they cannot meet [m]
+  int a = 0, b = 0;
 };
 
 /// Two bodies with rules of their own, a < b.
@@ -79,21 +92,40 @@ struct ContactPoint {
   double rate = 0;       // of the dashpot [N·s/m]
   double normal = 0;     // normal force [N]
   double dashpot = 0;    // its part by the dashpot [N]
-  Vec3 held;             // force of the friction spring on a [N]
+  bool is_fresh = true;  // not touched in the step before
+  Vec3 slip;             // displacement of the friction spring [m]
+  Vec3 held;             // its force on a [N]
   Vec3 slide;            // speed of a against b across the normal
   Vec3 friction;         // on a [N]
 };
 
-/// Points of a pair of shapes, or of one on the ground, with a common normal and friction spring.
+/// Points of a pair of shapes, or of one on the ground, with a common normal.
 struct ContactGroup {
   int a = 0, b = 0;  // bodies; B stands for the ground
   int first = 0, count = 0;
   Vec3 n;  // from a to b
   const ContactLaw* law = nullptr;
-  Stick* stick = nullptr;
   double stiffness = 0;  // k of one corner of a box [N/m]
-  bool fresh = false;    // not touched in the step before
-  double held = 0;       // energy of the friction spring [J]
+};
+
+/// A shape in the search: the box around it and what surely touches nothing farther.
+struct ShapeBounds {
+  double low[3], high[3];
+  int body = 0, shape = 0;       // shape: into State::shapes
+  int first_slab = 0, last = 0;  // slabs that it reaches into
+};
+
+/// Who may be near whom; scratch of the search.
+struct PairSearch {
+  bool has_links = false;
+  std::vector<int> first_link, link;  // bodies that each body is tied to
+  std::vector<ShapeBounds> bounds;    // by place
+  std::vector<int> first_in_slab, in_slab, unbounded, near;
+  std::vector<double> extents;
+  std::vector<std::uint64_t> found;  // ranks of both shapes
+  std::vector<int> first_old, old;   // old pairs of each shape
+  std::vector<PairState> pairs;
+  std::vector<PairDue> due;
 };
 
 /// The contacts of one step; scratch.
@@ -102,6 +134,7 @@ struct ContactScratch {
   std::vector<int> touched;       // bodies in groups
   std::vector<ContactPoint> point;
   std::vector<ContactGroup> group;
+  PairSearch search;
 };
 
 }  // namespace topple::mbs

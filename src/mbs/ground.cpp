@@ -64,6 +64,7 @@ void System::find_ground_points() {
       }
       if (contact.point.size() == first) {
         shape.is_touching = false;
+        shape.sticks = {};
         continue;
       }
       if (!shape.is_touching && !s.touched_ground[b]) {
@@ -71,7 +72,7 @@ void System::find_ground_points() {
         const double approach = -dot(n, now.v[b] + cross(now.w[b], contact.point[first].ra));
         say({Happening::Kind::GroundContact, s.time, static_cast<int>(b), -1, {}, std::max(0.0, approach)});
       }
-      add_contact_group(b, B, -n, first, law, stiffness, shape.stick, !shape.is_touching);
+      add_contact_group(b, B, -n, first, law, stiffness, shape.sticks);
       shape.is_touching = true;
     }
   }

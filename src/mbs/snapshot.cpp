@@ -88,8 +88,8 @@ void visit(Archive& ar, S& s, C& sys) {
   ar(s.shapes), ar(s.ground_points), ar(s.touched_ground);
   ar(s.element), ar(s.rotational), ar(s.joint), ar(s.cable);
   ar(s.spring), ar(s.torsion), ar(s.bushing), ar(s.load);
-  ar(s.pairs), ar(s.pair_due), ar(s.travel), ar(s.tied_to_ground), ar(s.search_due), ar(s.last_search),
-      ar(s.touched_pairs);
+  ar(s.pairs), ar(s.pair_due), ar(s.travel), ar(s.search_velocity), ar(s.sticks), ar(s.tied_to_ground),
+      ar(s.search_due), ar(s.last_search), ar(s.touched_pairs);
   ar(s.removed), ar(s.contact_energy), ar(s.stick_energy), ar(s.contact_loss), ar(s.contact_loss_power),
       ar(s.friction_work), ar(s.friction_power), ar(s.total_at_start);
   ar(s.gravity_at_start), ar(s.largest_residual), ar(s.released), ar(s.largest_drift), ar(s.quiet_steps);
@@ -150,6 +150,7 @@ void read_snapshot(const std::vector<std::byte>& bytes, System& system) {
   system.body_contacts = carried.body_contacts;
   system.clusters_due = true;
   system.solid_step.clear();
+  system.contact.search.has_links = false;
   system.started = true;
 }
 

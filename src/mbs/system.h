@@ -102,11 +102,14 @@ struct State {
   std::vector<LoadState> load;
   // contact pairs
   std::vector<PairState> pairs;
-  std::vector<double> pair_due;  // way of both bodies before which those of a pair cannot meet [m]
-  std::vector<double> travel;    // way of each body's farthest point since the last search, at most (B) [m]
+  std::vector<PairDue> pair_due;
+  std::vector<double>
+      travel;            // way of each body's farthest point since the last search, at most, as seen from ... (B) [m]
+  Vec3 search_velocity;  // ... a frame that moves so [m/s]
   std::vector<unsigned char> tied_to_ground;
   bool search_due = true;
   long last_search = -1;            // step
+  std::vector<Stick> sticks;        // of all touching points
   std::vector<long> touched_pairs;  // a * B + b, sorted
   // ledger [J]
   double removed = 0, contact_energy = 0, stick_energy = 0;
@@ -331,15 +334,19 @@ class System {
   void add_travel(double h);
   /// Bodies whose shapes are near each other, and who is tied to the ground.
   void find_pairs();
+  void find_links();
+  void find_bounds();
+  void choose_search_velocity();
   void drop_pairs_of(size_t b);
   /// Law of two bodies, into contact_laws.
   int find_pair_law(int a, int b) const;
   void find_ground_points();
   void find_pair_points();
   void add_contact_point(const Vec3& ra, const Vec3& rb, double depth, double stiffness);
-  /// Makes the points from `first` on a group.
-  void add_contact_group(size_t a, size_t b, const Vec3& n, size_t first, const ContactLaw&, double stiffness, Stick&,
-                         bool fresh);
+  /// Makes the points from `first` on a group. Each takes over the friction spring of the nearest one of the step
+  /// before.
+  void add_contact_group(size_t a, size_t b, const Vec3& n, size_t first, const ContactLaw&, double stiffness,
+                         StickRange&);
   /// Forces at the points found, on the bodies and in the ledger.
   void resolve_contacts(double h);
   /// Moves a body from its pose at the beginning of the step to the end of it.

@@ -1,0 +1,272 @@
+/// Which shapes are near each other (docs/theory/contact.md).
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include "mbs/system.h"
+
+namespace topple::mbs {
+
+namespace {
+
+constexpr double kSearchMargin = 0.2;   // [m]; shapes nearer than this are watched
+constexpr double kSearchTravel = 0.09;  // [m]; less than half the margin
+constexpr long kSearchPause = 80;       // steps between searches that breaks ask for
+
+}  // namespace
+
+void System::add_travel(double h) {
+  State& s = state;
+  const State& now = state;
+  s.travel.resize(B);
+  double most = 0;
+  for (size_t b = 0; b < B && model.contact.bodies; ++b) {
+    // the drift before this evaluation was by the speeds of half a step ago
+    const Vec3 v = now.v[b] - s.search_velocity;
+    const double turn = fixed[b] ? 0 : norm(now.w[b]) * s.body[b].radius;
+    s.travel[b] += h * (norm(v) + turn);
+    most = std::max(most, s.travel[b]);
+  }
+  if (most > kSearchTravel || (s.search_due && (s.last_search < 0 || s.step_index - s.last_search >= kSearchPause)))
+    find_pairs();
+}
+
+void System::find_links() {
+  State& s = state;
+  PairSearch& search = contact.search;
+  search.has_links = true;
+  std::fill(s.tied_to_ground.begin(), s.tied_to_ground.end(), 0);
+  const auto grounded = [&](int x) { return x < 0 || fixed[static_cast<size_t>(x)]; };
+  const auto each_link = [&](auto&& f) {
+    for (size_t e = 0; e < elements.size(); ++e)
+      if (s.element[e].live) f(elements[e].a, elements[e].b);
+    for (size_t i = 0; i < forces.bushings.size(); ++i)
+      if (s.bushing[i].live) f(forces.bushings[i].a, forces.bushings[i].b);
+    for (size_t j = 0; j < joints.size(); ++j)
+      if (s.joint[j].live) f(joints[j].parent, joints[j].child);
+  };
+  search.first_link.assign(B + 2, 0);
+  each_link([&](int a, int b) {
+    if (grounded(a) && b >= 0) s.tied_to_ground[static_cast<size_t>(b)] = 1;
+    if (grounded(b) && a >= 0) s.tied_to_ground[static_cast<size_t>(a)] = 1;
+    if (a < 0 || b < 0) return;
+    ++search.first_link[static_cast<size_t>(a) + 2];
+    ++search.first_link[static_cast<size_t>(b) + 2];
+  });
+  for (size_t b = 2; b < B + 2; ++b) search.first_link[b] += search.first_link[b - 1];
+  search.link.resize(static_cast<size_t>(search.first_link[B + 1]));
+  each_link([&](int a, int b) {
+    if (a < 0 || b < 0) return;
+    search.link[static_cast<size_t>(search.first_link[static_cast<size_t>(a) + 1]++)] = b;
+    search.link[static_cast<size_t>(search.first_link[static_cast<size_t>(b) + 1]++)] = a;
+  });
+}
+
+/// Boxes around the shapes, grown by half the margin, sorted by place: that of the lower ends, the axis along which the
+/// shapes reach farthest first.
+void System::find_bounds() {
+  const State& s = state;
+  PairSearch& search = contact.search;
+  search.bounds.clear();
+  Vec3 least{kUnlimited, kUnlimited, kUnlimited}, most = -least;
+  for (size_t b = 0; b < B; ++b) {
+    const BodyConstants& body = s.body[b];
+    if (body.shapes == 0) continue;
+    const Vec3 p = s.p[b];
+    const Mat3 R_WB = s.R[b];
+    for (int i = body.first_shape; i < body.first_shape + body.shapes; ++i) {
+      const CompiledShape& shape = s.shapes[static_cast<size_t>(i)];
+      const Vec3 c = p + R_WB * shape.p_BS;
+      Vec3 reach{shape.reach, shape.reach, shape.reach};
+      if (shape.kind == Shape::Kind::Box) {
+        const Mat3 R = R_WB * shape.R_BS;
+        for (int k = 0; k < 3; ++k)
+          reach[k] =
+              std::abs(R(k, 0)) * shape.half.x + std::abs(R(k, 1)) * shape.half.y + std::abs(R(k, 2)) * shape.half.z;
+      }
+      ShapeBounds& x = search.bounds.emplace_back();
+      x.body = static_cast<int>(b);
+      x.shape = i;
+      for (int k = 0; k < 3; ++k) {
+        x.low[k] = c[k] - reach[k] - 0.5 * kSearchMargin;
+        x.high[k] = c[k] + reach[k] + 0.5 * kSearchMargin;
+      }
+      if (shape.kind == Shape::Kind::Plane) continue;
+      for (int k = 0; k < 3; ++k) least[k] = std::min(least[k], c[k]), most[k] = std::max(most[k], c[k]);
+    }
+  }
+  const Vec3 spread = most - least;
+  const int first = spread.x >= spread.y && spread.x >= spread.z ? 0 : spread.y >= spread.z ? 1 : 2;
+  const int second = (first + 1) % 3, third = (first + 2) % 3;
+  for (ShapeBounds& x : search.bounds) {
+    const ShapeBounds y = x;
+    const int axes[3] = {first, spread[second] >= spread[third] ? second : third,
+                         spread[second] >= spread[third] ? third : second};
+    for (int k = 0; k < 3; ++k) x.low[k] = y.low[axes[k]], x.high[k] = y.high[axes[k]];
+  }
+  std::sort(search.bounds.begin(), search.bounds.end(), [](const ShapeBounds& x, const ShapeBounds& y) {
+    for (int k = 0; k < 3; ++k)
+      if (x.low[k] != y.low[k]) return x.low[k] < y.low[k];
+    return x.shape < y.shape;
+  });
+}
+
+void System::find_pairs() {
+  State& s = state;
+  PairSearch& search = contact.search;
+  if (s.search_due || !search.has_links) find_links();
+  s.search_due = false;
+  s.last_search = s.step_index;
+  s.travel.resize(B);
+  if (!model.contact.bodies) {
+    std::fill(s.travel.begin(), s.travel.end(), 0);
+    return;
+  }
+  find_bounds();
+  const std::vector<ShapeBounds>& bounds = search.bounds;
+  const size_t n = bounds.size();
+
+  // slabs across the second axis, twice as wide as most shapes, so that each meets few others along the first
+  search.unbounded.clear();
+  search.extents.clear();
+  double least = kUnlimited, most = -kUnlimited;
+  for (size_t i = 0; i < n; ++i) {
+    if (!std::isfinite(bounds[i].low[0])) {
+      search.unbounded.push_back(static_cast<int>(i));
+      continue;
+    }
+    search.extents.push_back(bounds[i].high[1] - bounds[i].low[1]);
+    least = std::min(least, bounds[i].low[1]), most = std::max(most, bounds[i].high[1]);
+  }
+  size_t slabs = 1;
+  double per_width = 0;
+  if (!search.extents.empty()) {
+    const auto middle = search.extents.begin() + static_cast<std::ptrdiff_t>(search.extents.size() / 2);
+    std::nth_element(search.extents.begin(), middle, search.extents.end());
+    const double width = std::max(2 * *middle, (most - least) / static_cast<double>(4 * n));
+    per_width = 1 / width;
+    slabs = static_cast<size_t>((most - least) * per_width) + 1;
+  }
+  search.first_in_slab.assign(slabs + 2, 0);
+  for (ShapeBounds& x : search.bounds) {
+    if (!std::isfinite(x.low[0])) continue;
+    x.first_slab = static_cast<int>((x.low[1] - least) * per_width);
+    x.last = static_cast<int>((x.high[1] - least) * per_width);
+    for (int k = x.first_slab; k <= x.last; ++k) ++search.first_in_slab[static_cast<size_t>(k) + 2];
+  }
+  for (size_t k = 2; k < slabs + 2; ++k) search.first_in_slab[k] += search.first_in_slab[k - 1];
+  search.in_slab.resize(static_cast<size_t>(search.first_in_slab[slabs + 1]));
+  for (size_t i = 0; i < n; ++i) {
+    const ShapeBounds& x = bounds[i];
+    if (!std::isfinite(x.low[0])) continue;
+    for (int k = x.first_slab; k <= x.last; ++k)
+      search.in_slab[static_cast<size_t>(search.first_in_slab[static_cast<size_t>(k) + 1]++)] = static_cast<int>(i);
+  }
+
+  // joined, or joined to the same third body: the joint or element between them governs
+  search.near.assign(B, -1);  // the last body that the body is near to in this sense
+  const auto holders = [&](int b) {
+    const size_t i = static_cast<size_t>(b);
+    return std::span<const int>(search.link.data() + search.first_link[i],
+                                static_cast<size_t>(search.first_link[i + 1] - search.first_link[i]));
+  };
+  const auto are_near = [&](int a, int b) {
+    std::vector<int>& near = search.near;
+    if (near[static_cast<size_t>(a)] != a) {
+      near[static_cast<size_t>(a)] = a;
+      for (const int i : holders(a)) {
+        near[static_cast<size_t>(i)] = a;
+        for (const int j : holders(i)) near[static_cast<size_t>(j)] = a;
+      }
+    }
+    return near[static_cast<size_t>(b)] == a;
+  };
+  search.found.clear();
+  const auto look = [&](size_t i, size_t j) {
+    const ShapeBounds &x = bounds[i], &y = bounds[j];
+    if (x.body == y.body || (fixed[static_cast<size_t>(x.body)] && fixed[static_cast<size_t>(y.body)])) return;
+    if (are_near(x.body, y.body) || !contact_laws[static_cast<size_t>(find_pair_law(x.body, y.body))].touches) return;
+    search.found.push_back(static_cast<std::uint64_t>(std::min(i, j)) << 32 | std::max(i, j));
+  };
+  for (size_t k = 0; k < slabs; ++k) {
+    const std::span<const int> slab(search.in_slab.data() + search.first_in_slab[k],
+                                    static_cast<size_t>(search.first_in_slab[k + 1] - search.first_in_slab[k]));
+    for (size_t i = 0; i < slab.size(); ++i) {
+      const ShapeBounds& x = bounds[static_cast<size_t>(slab[i])];
+      for (size_t j = i + 1; j < slab.size(); ++j) {
+        const ShapeBounds& y = bounds[static_cast<size_t>(slab[j])];
+        if (y.low[0] > x.high[0]) break;
+        if (x.low[1] > y.high[1] || y.low[1] > x.high[1] || x.low[2] > y.high[2] || y.low[2] > x.high[2]) continue;
+        // in the first slab that both reach into
+        if (std::max(x.first_slab, y.first_slab) != static_cast<int>(k)) continue;
+        look(static_cast<size_t>(slab[i]), static_cast<size_t>(slab[j]));
+      }
+    }
+  }
+  for (const int u : search.unbounded)
+    for (size_t i = 0; i < n; ++i)
+      if (std::isfinite(bounds[i].low[0])) look(static_cast<size_t>(u), i);
+  std::sort(search.found.begin(), search.found.end());
+
+  // keep what old pairs remember
+  search.first_old.assign(s.shapes.size() + 2, 0);
+  const auto lower = [](int a, int b) { return static_cast<size_t>(std::min(a, b)); };
+  for (const PairState& p : s.pairs) ++search.first_old[lower(p.shape_a, p.shape_b) + 2];
+  for (size_t i = 2; i < search.first_old.size(); ++i) search.first_old[i] += search.first_old[i - 1];
+  search.old.resize(s.pairs.size());
+  for (size_t i = 0; i < s.pairs.size(); ++i)
+    search.old[static_cast<size_t>(search.first_old[lower(s.pairs[i].shape_a, s.pairs[i].shape_b) + 1]++)] =
+        static_cast<int>(i);
+  search.pairs.clear();
+  search.pairs.reserve(search.found.size());
+  std::vector<PairDue>& due = search.due;
+  due.clear();
+  for (const std::uint64_t key : search.found) {
+    const ShapeBounds &x = bounds[key >> 32], &y = bounds[key & 0xffffffffU];
+    const size_t first = lower(x.shape, y.shape);
+    int known = -1;
+    for (int i = search.first_old[first]; i < search.first_old[first + 1] && known < 0; ++i) {
+      const PairState& p = s.pairs[static_cast<size_t>(search.old[static_cast<size_t>(i)])];
+      if (std::max(p.shape_a, p.shape_b) == std::max(x.shape, y.shape)) known = search.old[static_cast<size_t>(i)];
+    }
+    PairState& p = search.pairs.emplace_back();
+    PairDue& d = due.emplace_back();
+    if (known >= 0) {
+      p = s.pairs[static_cast<size_t>(known)];
+      d = s.pair_due[static_cast<size_t>(known)];
+      const double way = s.travel[static_cast<size_t>(p.a)] + s.travel[static_cast<size_t>(p.b)];
+      p.way -= way;
+      p.axis_way -= way;
+      d.way -= way;
+    } else {
+      p.a = d.a = x.body, p.b = d.b = y.body;
+      p.shape_a = x.shape, p.shape_b = y.shape;
+      p.law = find_pair_law(p.a, p.b);
+    }
+  }
+  s.pairs.swap(search.pairs);
+  s.pair_due.swap(due);
+  std::fill(s.travel.begin(), s.travel.end(), 0);
+  choose_search_velocity();
+}
+
+/// Any frame serves that is the same for all bodies; in that of their mean motion they stay near their places longest.
+/// The sum is one of integers, so that the order of bodies does not count.
+void System::choose_search_velocity() {
+  State& s = state;
+  const State& now = state;
+  constexpr double scale = 1 << 20;
+  std::int64_t sum[3] = {0, 0, 0}, count = 0;
+  for (size_t b = 0; b < B; ++b) {
+    if (s.body[b].shapes == 0) continue;
+    const Vec3 v = now.v[b];
+    if (!(norm(v) < 1e4)) continue;  // thrown out of all bounds
+    for (int k = 0; k < 3; ++k) sum[k] += std::llround(scale * v[k]);
+    ++count;
+  }
+  if (count == 0) return;
+  for (int k = 0; k < 3; ++k) s.search_velocity[k] = static_cast<double>(sum[k]) / (scale * static_cast<double>(count));
+}
+
+}  // namespace topple::mbs
