@@ -35,6 +35,7 @@ Steel make_steel(const SteelInput& in) {
   s.hardening = (in.fu - in.fy) / (in.eps_u - s.eps_y);
   s.buckling_stress = s.eps_star = s.eps_residual = infinity;
   s.stress_star = s.fy;
+  s.slope_star = s.hardening;
   if (in.diameter <= 0 || in.free_length <= 0) return s;
   const double slenderness = in.free_length / in.diameter;
   if (slenderness <= 5) return s;
@@ -46,6 +47,7 @@ Steel make_steel(const SteelInput& in) {
   s.residual = std::min(0.2 * in.fy, s.buckling_stress);
   const double unbuckled = in.fy + s.hardening * (s.eps_star - s.eps_y);
   s.stress_star = std::max(s.residual, std::min({unbuckled, s.fu, s.buckling_stress}) * (1.1 - 0.016 * scaled));
+  s.slope_star = (s.stress_star - s.fy) / (s.eps_star - s.eps_y);
   s.eps_residual = s.eps_star + (s.stress_star - s.residual) / (0.02 * in.Es);
   return s;
 }

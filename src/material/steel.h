@@ -20,6 +20,7 @@ struct Steel {
   double buckling_stress = 0;  // cap of the compressive stress, Euler and Johnson; infinite if held [Pa]
   double eps_star = 0;         // compressive strain from which buckling is seen; infinite if held
   double stress_star = 0;      // stress there
+  double slope_star = 0;       // from (ε_y, f_y) to (ε*, σ*); the hardening where bars are held [Pa]
   double eps_residual = 0;     // strain from which the residual is left
   double residual = 0;         // stress left when buckled, 0.2 f_y at most [Pa]
 };
@@ -50,7 +51,7 @@ inline SteelResponse calc_envelope(const Steel& s, double eps) {
     // Dhakal & Maekawa: linear to (ε*, σ*), then down to the residual.
     double limit, slope;
     if (e <= s.eps_star) {
-      slope = (s.stress_star - s.fy) / (s.eps_star - s.eps_y);
+      slope = s.slope_star;
       limit = s.fy + slope * (e - s.eps_y);
     } else if (e < s.eps_residual) {
       slope = -0.02 * s.Es;

@@ -81,6 +81,18 @@ TEST(Steel, SlenderBarsBuckle) {
   EXPECT_FALSE(std::isfinite(make_steel(in).buckling_stress));
 }
 
+TEST(Steel, HeldBarsHardenInCompressionAsInTension) {
+  SteelInput in = make_input();
+  in.diameter = 0.02, in.free_length = 0.08;  // s / d = 4
+  const Steel s = make_steel(in);
+  for (double e : {1e-3, 2.1e-3, 0.01, 0.05, 0.08})
+    EXPECT_NEAR(-calc_envelope(s, -e).stress, calc_envelope(s, e).stress, 1e-9 * s.fu) << e;
+  EXPECT_NEAR(-calc_envelope(s, -0.2).stress, s.fu, 1e-9 * s.fu);
+  SteelState state;
+  for (double e = 0; e > -0.06; e -= 1e-4)
+    EXPECT_NEAR(advance(s, state, e).stress, calc_envelope(s, e).stress, 1e-9 * s.fu) << e;
+}
+
 TEST(Steel, RefusesNonsense) {
   SteelInput in = make_input();
   in.fu = 400 * MPa;
