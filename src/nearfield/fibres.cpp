@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "nearfield/section_kernel.h"
 
 namespace topple::nearfield {
 
@@ -110,34 +111,37 @@ Fibres make_fibres(const ZoneInput& in, Axis axis) {
   return out;
 }
 
+bool has_concrete(const Fibres& f) { return !f.at.empty() && f.core_area[f.at.size() / 2] > 0; }
+
 Resultants calc_resultants(const Fibres& f, double eps_0, double kappa) {
   Resultants r;
+  const auto add = [&](double at, double force, double stiffness) {
+    r.N += force, r.M += force * at;
+    r.dN += stiffness, r.dM += stiffness * at, r.dM_kappa += stiffness * at * at;
+  };
   const size_t layers = f.at.size();
   for (size_t i = 0; i < layers; ++i) {
     const double eps = eps_0 + kappa * f.at[i];
-    double force = 0, tangent = 0;
     if (f.core_area[i] > 0) {
       const material::Response a = material::calc_envelope(f.core, eps);
-      force = f.core_area[i] * a.stress, tangent = f.core_area[i] * a.tangent;
+      add(f.at[i], f.core_area[i] * a.stress, f.core_area[i] * a.tangent);
     }
     if (f.cover_area[i] > 0) {
       const material::Response a = material::calc_envelope(f.cover, eps);
-      force += f.cover_area[i] * a.stress, tangent += f.cover_area[i] * a.tangent;
+      add(f.at[i], f.cover_area[i] * a.stress, f.cover_area[i] * a.tangent);
     }
-    r.N += force, r.M += force * f.at[i], r.dN += tangent;
   }
   const size_t rows = f.bar_at.size();
-  const bool has_concrete = layers > 0 && f.core_area[layers / 2] > 0;
+  const bool displaces = has_concrete(f);
   for (size_t i = 0; i < rows; ++i) {
     const double eps = eps_0 + kappa * f.bar_at[i];
     const material::SteelResponse s = material::calc_envelope(f.bar_law[i], eps);
     double stress = s.stress, tangent = s.tangent;
-    if (has_concrete) {  // the bar stands where the layers have counted concrete
+    if (displaces) {  // the bar stands where the layers have counted concrete
       const material::Response a = material::calc_envelope(f.core, eps);
       stress -= a.stress, tangent -= a.tangent;
     }
-    const double force = f.bar_area[i] * stress;
-    r.N += force, r.M += force * f.bar_at[i], r.dN += f.bar_area[i] * tangent;
+    add(f.bar_at[i], f.bar_area[i] * stress, f.bar_area[i] * tangent);
   }
   return r;
 }
@@ -157,7 +161,7 @@ struct Search {
 };
 
 /// The search of find_equilibrium, also giving the resultants there.
-bool find(const Fibres& f, const Search& search, double kappa, double& eps_0, Resultants& at) {
+bool find(const PackedSection& f, const Search& search, double kappa, double& eps_0, Resultants& at) {
   constexpr double largest_strain = 0.6, largest_step = 2e-3;
   double e = eps_0;
   Resultants r = calc_resultants(f, e, kappa);
@@ -214,11 +218,12 @@ bool find(const Fibres& f, const Search& search, double kappa, double& eps_0, Re
 
 bool find_equilibrium(const Fibres& f, double N, double kappa, double& eps_0) {
   Resultants r;
-  return find(f, {N, 1e-9 * calc_force_scale(f)}, kappa, eps_0, r);
+  return find(pack_section(f), {N, 1e-9 * calc_force_scale(f)}, kappa, eps_0, r);
 }
 
 Peak find_crushing(const Fibres& f) {
-  const auto force = [&](double e) { return -calc_resultants(f, -e, 0).N; };
+  const PackedSection packed = pack_section(f);
+  const auto force = [&](double e) { return -calc_resultants(packed, -e, 0).N; };
   double best = 0, best_strain = 0;
   double e = 1e-5;
   constexpr double ratio = 1.15;
@@ -246,9 +251,10 @@ March march_curvature(const Fibres& f, double N, int direction, const std::vecto
   March out;
   out.moment.assign(kappa.size(), 0.0);
   const Search search{N, 1e-7 * calc_force_scale(f)};
+  const PackedSection packed = pack_section(f);
   double eps_0 = 0;
   Resultants r;
-  if (!find(f, search, 0, eps_0, r)) return out;
+  if (!find(packed, search, 0, eps_0, r)) return out;
 
   // An unsymmetric section bends under N alone: start where M = 0.
   double origin = 0;
@@ -258,7 +264,7 @@ March march_curvature(const Fibres& f, double N, int direction, const std::vecto
     for (int i = 0; i < 40; ++i) {
       Resultants r1;
       double e1 = eps_0;
-      if (!find(f, search, k1, e1, r1)) return out;
+      if (!find(packed, search, k1, e1, r1)) return out;
       eps_0 = e1, origin = k1, r = r1;
       if (std::abs(r1.M) <= 1e-9 * moment_scale) break;
       const double slope = (r1.M - M0) / (k1 - k0);
@@ -280,7 +286,7 @@ March march_curvature(const Fibres& f, double N, int direction, const std::vecto
     const double k = origin + direction * kappa[j], step = kappa[j] - kappa[j - 1];
     // Warm start along the last slope while the branch is far from its end.
     double e = r.dN > 0 ? previous_eps + previous_slope * step : previous_eps;
-    if (!find(f, search, k, e, r)) break;
+    if (!find(packed, search, k, e, r)) break;
     out.moment[j] = std::max(0.0, direction * r.M);
     out.last = static_cast<int>(j);
     if (!yielded && yields(e, k)) {

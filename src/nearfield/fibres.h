@@ -22,7 +22,12 @@ struct Fibres {
 struct Resultants {
   double N = 0, M = 0;  // [N], [N·m], M = ∫ σ · at dA
   double dN = 0;        // ∂N/∂ε0 [N]
+  double dM = 0;        // ∂M/∂ε0 = ∂N/∂κ [N·m]
+  double dM_kappa = 0;  // ∂M/∂κ [N·m²]
 };
+
+/// Whether there are layers of concrete (bars then take their place in it).
+bool has_concrete(const Fibres&);
 
 enum class Axis { Y, Z };
 

@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/unit.h"
 #include "nearfield/fibres.h"
+#include "nearfield/section_kernel.h"
 #include "nearfield/zone.h"
 
 namespace topple::nearfield {
@@ -106,7 +107,8 @@ bool is_symmetric(const Fibres& f) {
 
 /// Force against plastic shortening, from 0.75 of the peak through the peak to what buckled bars leave.
 AxialCurve make_compression(const Fibres& f, const Peak& peak, double EA, double length) {
-  const auto force = [&](double e) { return std::max(0.0, -calc_resultants(f, -e, 0).N); };
+  const PackedSection packed = pack_section(f);
+  const auto force = [&](double e) { return std::max(0.0, -calc_resultants(packed, -e, 0).N); };
   double low = 0, high = peak.strain;
   for (int i = 0; i < 50; ++i) {
     const double e = 0.5 * (low + high);
