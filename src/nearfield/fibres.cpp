@@ -162,7 +162,7 @@ struct Search {
 
 /// The search of find_equilibrium, also giving the resultants there.
 bool find(const PackedSection& f, const Search& search, double kappa, double& eps_0, Resultants& at) {
-  constexpr double largest_strain = 0.6, largest_step = 2e-3;
+  constexpr double largest_strain = 0.6, largest_step = 2e-3, closest_step = 5e-5;
   double e = eps_0;
   Resultants r = calc_resultants(f, e, kappa);
   double residual = r.N - search.N;
@@ -172,6 +172,22 @@ bool find(const PackedSection& f, const Search& search, double kappa, double& ep
     return true;
   };
   if (done()) return accept();
+  // Close to equilibrium on a stable branch Newton's method is there in two steps.
+  if (r.dN > 0) {
+    double near = e, left = residual;
+    Resultants there = r;
+    for (int i = 0; i < 3; ++i) {
+      const double step = -left / there.dN;
+      if (std::abs(step) > closest_step) break;
+      near += step;
+      there = calc_resultants(f, near, kappa);
+      const double before = left;
+      left = there.N - search.N;
+      if (!(there.dN > 0) || std::abs(left) > 0.5 * std::abs(before)) break;
+      e = near, r = there, residual = left;
+      if (done()) return accept();
+    }
+  }
   // Too much internal tension: the section shortens; too little: it lengthens. A bracket is found on the way.
   const double direction = residual > 0 ? -1 : 1;
   const auto crossed = [&] { return residual * direction > 0; };
@@ -281,11 +297,13 @@ March march_curvature(const Fibres& f, double N, int direction, const std::vecto
     return e - std::abs(k) * f.half_depth < -f.cover.eps_c1;
   };
   bool yielded = false;
-  double previous_eps = eps_0, previous_slope = 0;
+  double previous_eps = eps_0, previous_slope = 0, previous_step = 1;
   for (size_t j = 1; j < kappa.size(); ++j) {
     const double k = origin + direction * kappa[j], step = kappa[j] - kappa[j - 1];
-    // Warm start along the last slope while the branch is far from its end.
-    double e = r.dN > 0 ? previous_eps + previous_slope * step : previous_eps;
+    // Warm start along the tangent and its last change while the branch is far from its end.
+    const double slope = r.dN > 0 ? -r.dM / r.dN : 0, ahead = direction * step;
+    double e = previous_eps;
+    if (r.dN > 0) e += ahead * (slope + (j > 1 ? 0.5 * ahead * (slope - previous_slope) / previous_step : 0));
     if (!find(packed, search, k, e, r)) break;
     out.moment[j] = std::max(0.0, direction * r.M);
     out.last = static_cast<int>(j);
@@ -301,7 +319,7 @@ March march_curvature(const Fibres& f, double N, int direction, const std::vecto
       out.yield_kappa = kappa[j - 1] + high * step;
       out.yield_moment = out.moment[j - 1] + high * (out.moment[j] - out.moment[j - 1]);
     }
-    previous_slope = (e - previous_eps) / step;
+    previous_slope = slope, previous_step = ahead;
     previous_eps = e;
   }
   const double peak = *std::max_element(out.moment.begin(), out.moment.end());
