@@ -9,6 +9,7 @@ find_package(Threads REQUIRED)
 find_package(HDF5 REQUIRED COMPONENTS C)
 find_package(hwy REQUIRED)
 find_package(Qhull REQUIRED)
+find_package(Boost REQUIRED COMPONENTS headers)  # no library of it
 # Other engines behind the adapter; topple runs without them (docs/engines.md).
 find_package(Simbody QUIET)
 find_package(mujoco QUIET)

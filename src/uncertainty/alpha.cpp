@@ -1,0 +1,403 @@
+#include "uncertainty/alpha.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <memory>
+#include <set>
+
+#include "base/error.h"
+#include "uncertainty/local_search.h"
+
+namespace topple::uncertainty {
+namespace {
+
+constexpr double infinite = std::numeric_limits<double>::infinity();
+constexpr int any_class = -2;
+
+std::vector<double> check_levels(std::vector<double> levels) {
+  for (const double a : levels)
+    if (!(a >= 0 && a <= 1)) throw InputError("E807", fmt::format("level alpha = {}; levels lie between 0 and 1", a));
+  levels.push_back(0);
+  levels.push_back(1);
+  std::sort(levels.begin(), levels.end());
+  levels.erase(std::unique(levels.begin(), levels.end()), levels.end());
+  return levels;
+}
+
+/// Number of the levels whose cut holds a sample: they are the first ones, because cuts are nested.
+int count_levels(const Space& space, const std::vector<double>& levels, const std::vector<Box>& boxes, const Point& x) {
+  int count = 0;
+  while (count < static_cast<int>(levels.size()) && is_in_cut(space, boxes[count], levels[count], x)) ++count;
+  return count;
+}
+
+/// What is looked for: the least value of sign * output in the cut of a level, among one class or all.
+struct Goal {
+  int output = 0;
+  int level = 0;
+  double sign = 1;
+  int outcome = any_class;
+};
+
+struct Candidate {
+  double value = infinite;
+  int sample = -1;
+};
+
+/// The state of one optimisation.
+class Optimisation {
+ public:
+  Optimisation(const Space& space, Asker& asker, const AlphaOptions& options)
+      : space_(space), asker_(asker), options_(options), levels_(check_levels(options.levels)) {
+    for (const double a : levels_) regions_.push_back(make_region(space, a));
+    for (const auto& r : regions_) boxes_.push_back(r.box);
+  }
+
+  AlphaResult run() {
+    explore();
+    for (int wave = 0; wave < 3 && asker_.can_go_on(); ++wave) search(wave);
+    recheck();
+    AlphaResult result = collect();
+    result.ending = asker_.is_cancelled() ? Ending::Cancelled : unfinished_ ? Ending::LimitReached : Ending::Complete;
+    return result;
+  }
+
+ private:
+  void ask(const std::vector<Point>& points) {
+    const auto indices = asker_.ask(points);
+    unfinished_ = unfinished_ || std::count(indices.begin(), indices.end(), -1) > 0;
+    note_new();
+    if (options_.watch) options_.watch(collect(), asker_.archive());
+  }
+
+  /// Keeps for every sample in how many levels it lies.
+  void note_new() {
+    const auto& samples = asker_.archive().samples();
+    for (std::size_t i = depth_.size(); i < samples.size(); ++i)
+      depth_.push_back(count_levels(space_, levels_, boxes_, samples[i].x));
+  }
+
+  void explore() {
+    std::vector<Point> points = {calc_centre(space_)};
+    const auto add = [&](Point x, const Region& r) {
+      if (!space_.has_interaction() || r.contains(x)) points.push_back(std::move(x));
+    };
+    for (const auto& r : regions_)
+      for (const int i : r.axes)
+        for (const double end : {r.box.lower[i], r.box.upper[i]}) {
+          Point x = calc_centre(space_);
+          x[i] = end;
+          add(std::move(x), r);
+        }
+    for (const auto& r : regions_)
+      if (!r.axes.empty() && static_cast<int>(r.axes.size()) <= options_.corner_inputs)
+        for (auto& x : make_corners(r.box)) add(std::move(x), r);
+    // spread points: a sequence over the inputs that have a width, continued from level to level
+    const auto& axes = regions_.front().axes;
+    const int n = static_cast<int>(axes.size());
+    std::vector<Point> spread;
+    int first = 1;
+    for (std::size_t k = 0; n > 0 && k < regions_.size(); ++k) {
+      if (k > 0 && regions_[k].axes.empty()) continue;
+      const int given = k == 0 ? options_.space_points : options_.inner_points;
+      const int count = given > 0 ? given : (k == 0 ? 80 : 20) * n;
+      for (const auto& u : make_sobol_points(n, first, count, options_.seed)) {
+        Point fractions(space_.inputs.size(), 0.0);
+        for (int i = 0; i < n; ++i) fractions[axes[i]] = u[i];
+        Point x = place_in(regions_[k].box, fractions);
+        if (!space_.has_interaction() || regions_[k].contains(x)) spread.push_back(std::move(x));
+      }
+      first += count;
+    }
+    space_points_.assign(levels_.size(), 0);
+    points.insert(points.end(), spread.begin(), spread.end());
+    ask(points);
+    for (const auto& x : spread)
+      if (asker_.archive().find(x) >= 0)
+        for (int k = 0; k < count_levels(space_, levels_, boxes_, x); ++k) ++space_points_[k];
+  }
+
+  double value_of(const Goal& goal, int sample) const {
+    if (sample < 0) return infinite;
+    const Result& r = asker_.archive()[sample].result;
+    if (r.state != Result::State::Done || (goal.outcome != any_class && r.outcome != goal.outcome)) return infinite;
+    return goal.sign * r.values[goal.output];
+  }
+
+  Candidate find_best(const Goal& goal) const {
+    Candidate best;
+    for (int i = 0; i < static_cast<int>(depth_.size()); ++i)
+      if (depth_[i] > goal.level)
+        if (const double v = value_of(goal, i); v < best.value) best = {v, i};
+    return best;
+  }
+
+  /// The best samples of the cut that keep a distance from each other.
+  std::vector<Candidate> find_starts(const Goal& goal, int count) const {
+    std::vector<Candidate> all;
+    for (int i = 0; i < static_cast<int>(depth_.size()); ++i)
+      if (depth_[i] > goal.level)
+        if (const double v = value_of(goal, i); v < infinite) all.push_back({v, i});
+    std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.value < b.value; });
+    std::vector<Candidate> starts;
+    const Region& r = regions_[goal.level];
+    for (const auto& c : all) {
+      if (static_cast<int>(starts.size()) == count) break;
+      const bool apart = std::all_of(starts.begin(), starts.end(), [&](const Candidate& s) {
+        double distance = 0;
+        for (const int i : r.axes)
+          distance = std::max(distance, std::abs(asker_.archive()[s.sample].x[i] - asker_.archive()[c.sample].x[i]) /
+                                            (r.box.upper[i] - r.box.lower[i]));
+        return distance > 0.2;
+      });
+      if (apart) starts.push_back(c);
+    }
+    return starts;
+  }
+
+  /// Width of an output over all samples.
+  double width_of(int output) const {
+    double low = infinite, high = -infinite;
+    for (const auto& s : asker_.archive().samples())
+      if (s.result.state == Result::State::Done) {
+        low = std::min(low, s.result.values[output]);
+        high = std::max(high, s.result.values[output]);
+      }
+    return high > low ? high - low : 0;
+  }
+
+  std::vector<Goal> make_goals(bool of_classes) const {
+    std::vector<Goal> goals;
+    std::set<int> classes = {any_class};
+    if (of_classes) {
+      classes.clear();
+      for (const auto& s : asker_.archive().samples())
+        if (s.result.state == Result::State::Done) classes.insert(s.result.outcome);
+      if (classes.size() < 2) return goals;
+    }
+    for (const int c : classes)
+      for (int level = 0; level < static_cast<int>(levels_.size()); ++level)
+        for (int output = 0; output < asker_.outputs(); ++output)
+          for (const double sign : {1.0, -1.0})
+            if (std::count(options_.passive_outputs.begin(), options_.passive_outputs.end(), output) == 0)
+              goals.push_back({output, level, sign, c});
+    return goals;
+  }
+
+  struct Running {
+    Goal goal;
+    std::unique_ptr<LocalSearch> search;
+  };
+
+  std::unique_ptr<LocalSearch> make_model_search(const Goal& goal, const Candidate& start, double radius) {
+    ModelSearch::Options o;
+    o.radius = radius;
+    o.tolerance = options_.tolerance * width_of(goal.output);
+    o.seed = options_.seed + ++searches_;
+    return std::make_unique<ModelSearch>(regions_[goal.level], asker_.archive()[start.sample].x, start.value, o);
+  }
+
+  std::unique_ptr<LocalSearch> make_evolution(const Goal& goal, const Candidate& start) {
+    EvolutionSearch::Options o;
+    o.seed = options_.seed + ++searches_;
+    return std::make_unique<EvolutionSearch>(regions_[goal.level], asker_.archive()[start.sample].x, start.value, o);
+  }
+
+  /// All searches side by side: each batch holds what every one of them asks next.
+  void advance(std::vector<Running>& all) {
+    while (asker_.can_go_on()) {
+      std::vector<Point> points;
+      for (const auto& r : all)
+        if (!r.search->is_done()) points.insert(points.end(), r.search->pending().begin(), r.search->pending().end());
+      if (points.empty()) break;
+      ask(points);
+      for (auto& r : all) {
+        if (r.search->is_done()) continue;
+        std::vector<double> values;
+        for (const auto& x : r.search->pending()) values.push_back(value_of(r.goal, asker_.archive().find(x)));
+        r.search->tell(values);
+      }
+    }
+    for (const auto& r : all) {
+      if (!r.search->is_done()) unfinished_ = true;
+      if (r.search->is_converged()) converged_.insert({key_of(r.goal), asker_.archive().find(r.search->best())});
+    }
+    all.clear();
+  }
+
+  using Key = std::vector<int>;
+  static Key key_of(const Goal& g) { return {g.output, g.level, g.sign > 0, g.outcome}; }
+
+  /// Wave 0: from the best sample of every cut. Wave 1: dispersed starts and evolution. Wave 2: within each class.
+  void search(int wave) {
+    std::vector<Running> all;
+    if (wave == 2 && !options_.search_classes) return;
+    for (const Goal& goal : make_goals(wave == 2)) {
+      if (regions_[goal.level].axes.empty()) continue;
+      if (wave == 1) {
+        const auto starts = find_starts(goal, options_.starts);
+        for (std::size_t k = 1; k < starts.size(); ++k) all.push_back({goal, make_model_search(goal, starts[k], 0.1)});
+        for (int k = 0; k < std::min<int>(options_.evolutions, static_cast<int>(starts.size())); ++k)
+          all.push_back({goal, make_evolution(goal, starts[k])});
+      } else if (const Candidate best = find_best(goal); best.sample >= 0) {
+        all.push_back({goal, make_model_search(goal, best, 0.1)});
+      }
+    }
+    advance(all);
+  }
+
+  /// Every sample against every cut: a best one that no search ended at is a new start, until nothing changes.
+  void recheck() {
+    std::set<std::pair<Key, int>> tried;
+    while (asker_.can_go_on()) {
+      std::vector<Running> all;
+      for (const bool of_classes : {false, true}) {
+        if (of_classes && !options_.search_classes) continue;
+        for (const Goal& goal : make_goals(of_classes)) {
+          if (regions_[goal.level].axes.empty()) continue;
+          const Candidate best = find_best(goal);
+          if (best.sample < 0 || converged_.contains({key_of(goal), best.sample})) continue;
+          if (!tried.insert({key_of(goal), best.sample}).second) continue;
+          all.push_back({goal, make_model_search(goal, best, 0.05)});
+        }
+      }
+      if (all.empty()) break;
+      ++rechecks_;
+      advance(all);
+    }
+  }
+
+  AlphaResult collect() const {
+    AlphaResult result = read_archive(space_, asker_.archive(), levels_, space_points_);
+    const auto mark = [this](std::vector<OutputBounds>& outputs, int outcome) {
+      for (int o = 0; o < static_cast<int>(outputs.size()); ++o)
+        for (int k = 0; k < static_cast<int>(levels_.size()); ++k) {
+          auto& b = outputs[o].levels[k];
+          const bool point = regions_[k].axes.empty();
+          b.lower.converged =
+              b.lower.sample >= 0 && (point || converged_.contains({{o, k, 1, outcome}, b.lower.sample}));
+          b.upper.converged =
+              b.upper.sample >= 0 && (point || converged_.contains({{o, k, 0, outcome}, b.upper.sample}));
+        }
+    };
+    mark(result.outputs, any_class);
+    for (auto& c : result.classes) mark(c.outputs, result.classes.size() == 1 ? any_class : c.outcome);
+    result.run = asker_.run();
+    result.batches = asker_.batches();
+    result.searches = static_cast<int>(searches_);
+    result.rechecks = rechecks_;
+    return result;
+  }
+
+  const Space& space_;
+  Asker& asker_;
+  const AlphaOptions& options_;
+  std::vector<double> levels_;
+  std::vector<Region> regions_;
+  std::vector<Box> boxes_;
+  std::vector<int> depth_;         // per sample: in how many levels it lies
+  std::vector<int> space_points_;  // per level
+  std::set<std::pair<Key, int>> converged_;
+  std::uint64_t searches_ = 0;
+  int rechecks_ = 0;
+  bool unfinished_ = false;
+};
+
+OutputBounds make_empty_bounds(const std::vector<double>& levels) {
+  OutputBounds b;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const double a : levels) b.levels.push_back({a, {nan, -1, false}, {nan, -1, false}});
+  return b;
+}
+
+}  // namespace
+
+double calc_miss_probability(const Coverage& c, double v) { return std::pow(1 - v, c.space_points); }
+
+std::string to_text(Ending e) {
+  switch (e) {
+    case Ending::Complete:
+      return "complete";
+    case Ending::LimitReached:
+      return "limit of evaluations reached";
+    case Ending::Cancelled:
+      return "cancelled";
+  }
+  return {};
+}
+
+AlphaResult read_archive(const Space& space, const Archive& archive, const std::vector<double>& given,
+                         const std::vector<int>& space_points) {
+  const std::vector<double> levels = check_levels(given);
+  std::vector<Box> boxes;
+  for (const double a : levels) boxes.push_back(make_box(space, a));
+  AlphaResult result;
+  for (std::size_t k = 0; k < levels.size(); ++k)
+    result.coverage.push_back({levels[k], 0, k < space_points.size() ? space_points[k] : 0});
+  std::map<int, ClassBounds> classes;
+  const auto take = [](Bound& bound, double value, int sample, bool lower) {
+    if (bound.sample < 0 || (lower ? value < bound.value : value > bound.value)) bound = {value, sample, false};
+  };
+  for (int i = 0; i < static_cast<int>(archive.size()); ++i) {
+    const Sample& s = archive[i];
+    const int depth = count_levels(space, levels, boxes, s.x);
+    if (depth == 0) continue;
+    ClassBounds& c = classes[outcome_of(s.result)];
+    c.outcome = outcome_of(s.result);
+    ++c.count;
+    if (const double mu = calc_membership(space, s.x); mu > c.possibility || c.sample < 0)
+      c.possibility = mu, c.sample = i;
+    for (int k = 0; k < depth; ++k) ++result.coverage[k].samples;
+    const std::size_t outputs = s.result.values.size();
+    if (result.outputs.size() < outputs) result.outputs.assign(outputs, make_empty_bounds(levels));
+    if (c.outputs.size() < outputs) c.outputs.assign(outputs, make_empty_bounds(levels));
+    for (std::size_t o = 0; o < outputs; ++o)
+      for (int k = 0; k < depth; ++k)
+        for (auto* bounds : {&result.outputs[o].levels[k], &c.outputs[o].levels[k]}) {
+          take(bounds->lower, s.result.values[o], i, true);
+          take(bounds->upper, s.result.values[o], i, false);
+        }
+  }
+  for (auto& [outcome, c] : classes) result.classes.push_back(std::move(c));
+  result.failed = archive.count_failed();
+  return result;
+}
+
+AlphaResult optimise(const Space& space, Asker& asker, const AlphaOptions& options) {
+  check_space(space);
+  return Optimisation(space, asker, options).run();
+}
+
+AlphaResult optimise(const Space& space, const Evaluate& evaluate, const AlphaOptions& options,
+                     const Progress& progress) {
+  Asker asker(evaluate, progress, options.earlier, options.limit);
+  AlphaResult result = optimise(space, asker, options);
+  result.archive = asker.archive();
+  return result;
+}
+
+AlphaResult optimise(const std::vector<FuzzyNumber>& inputs, const Evaluate& evaluate, const AlphaOptions& options,
+                     const Progress& progress) {
+  return optimise(Space{inputs, {}, {}}, evaluate, options, progress);
+}
+
+FuzzyNumber make_number(const OutputBounds& bounds) {
+  std::vector<AlphaCut> cuts;
+  for (const auto& level : bounds.levels) {
+    if (level.lower.sample < 0) throw InputError("E805", fmt::format("no run gave a value at alpha = {}", level.alpha));
+    cuts.push_back({level.alpha, level.lower.value, level.upper.value});
+  }
+  return FuzzyNumber(std::move(cuts));
+}
+
+FuzzyNumber make_number(const AlphaResult& result, int output) {
+  if (output < 0 || output >= static_cast<int>(result.outputs.size()))
+    throw InputError("E805", fmt::format("there is no output {} among {}", output, result.outputs.size()));
+  return make_number(result.outputs[output]);
+}
+
+}  // namespace topple::uncertainty

@@ -1,0 +1,308 @@
+#include "uncertainty/local_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace topple::uncertainty {
+namespace {
+
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
+/// The point between `from`, which lies in the region, and `to` that is nearest to `to` and still inside.
+Point pull_inside(const Region& region, const Point& from, Point to) {
+  to = clip(region.box, std::move(to));
+  if (!region.space->has_interaction() || region.contains(to)) return to;
+  Point inside = from;
+  for (int k = 0; k < 40; ++k) {
+    Point middle(to.size());
+    for (std::size_t i = 0; i < to.size(); ++i) middle[i] = 0.5 * (inside[i] + to[i]);
+    (region.contains(middle) ? inside : to) = std::move(middle);
+  }
+  return inside;
+}
+
+}  // namespace
+
+Region make_region(const Space& space, double alpha) {
+  Region r{&space, alpha, make_box(space, alpha), calc_scale(space), {}};
+  for (int i = 0; i < space.size(); ++i)
+    if (r.box.upper[i] > r.box.lower[i]) r.axes.push_back(i);
+  return r;
+}
+
+ModelSearch::ModelSearch(Region region, Point start, double value, const Options& options)
+    : LocalSearch(std::move(start), value),
+      region_(std::move(region)),
+      options_(options),
+      random_(options.seed),
+      radius_(options.radius),
+      trust_(4 * options.radius) {
+  for (const int i : region_.axes) {
+    Axis axis;
+    axis.input = i;
+    axes_.push_back(axis);
+  }
+  converged_ = axes_.empty();
+  ask_star();
+}
+
+Point ModelSearch::moved(const std::vector<double>& step) const {
+  Point x = best_;
+  for (std::size_t k = 0; k < axes_.size(); ++k) x[axes_[k].input] += step[k];
+  return clip(region_.box, std::move(x));
+}
+
+void ModelSearch::ask_star() {
+  pending_.clear();
+  pairs_.clear();
+  trying_ = false;
+  if (axes_.empty() || iteration_ >= options_.iterations) return;
+  const auto add = [this](const Point& x) {
+    pending_.push_back(x);
+    return static_cast<int>(pending_.size()) - 1;
+  };
+  for (auto& axis : axes_) {
+    const int i = axis.input;
+    const double centre = best_[i], h = radius_ * region_.scale[i];
+    // an end of the cut is a place of its own: a star point near it moves onto it
+    const auto reach = [&](double offset) {
+      for (int halving = 0; halving < 12; ++halving, offset *= 0.5) {
+        Point x = best_;
+        x[i] = std::clamp(centre + offset, region_.box.lower[i], region_.box.upper[i]);
+        if (std::abs(x[i] - centre) < 0.2 * std::abs(offset)) return 0.0;
+        if (!region_.space->has_interaction() || region_.contains(x)) return x[i] - centre;
+      }
+      return 0.0;
+    };
+    axis.a = reach(-h), axis.b = reach(h);
+    if (axis.a == 0 && axis.b != 0) axis.a = 0.5 * axis.b;
+    if (axis.b == 0 && axis.a != 0) axis.b = 0.5 * axis.a;
+    axis.at_a = axis.at_b = -1;
+    for (const bool first : {true, false}) {
+      const double offset = first ? axis.a : axis.b;
+      if (offset == 0) continue;
+      Point x = best_;
+      x[i] = std::clamp(centre + offset, region_.box.lower[i], region_.box.upper[i]);
+      if (region_.space->has_interaction() && !region_.contains(x)) continue;
+      (first ? axis.at_a : axis.at_b) = add(x);
+    }
+  }
+  for (std::size_t i = 0; i < axes_.size(); ++i)
+    for (std::size_t j = i + 1; j < axes_.size(); ++j) {
+      const Axis &p = axes_[i], &q = axes_[j];
+      if (!p.free || !q.free) continue;
+      Pair pair;
+      pair.i = static_cast<int>(i), pair.j = static_cast<int>(j);
+      pair.at_i = p.at_b >= 0 ? p.at_b : p.at_a, pair.di = p.at_b >= 0 ? p.b : p.a;
+      pair.at_j = q.at_b >= 0 ? q.at_b : q.at_a, pair.dj = q.at_b >= 0 ? q.b : q.a;
+      if (pair.at_i < 0 || pair.at_j < 0) continue;
+      Point x = pending_[pair.at_i];
+      x[q.input] = pending_[pair.at_j][q.input];
+      if (region_.space->has_interaction() && !region_.contains(x)) continue;
+      pair.at = add(x);
+      pairs_.push_back(pair);
+    }
+  // a place that interaction closes on all sides
+  if (pending_.empty()) radius_ = 0;
+}
+
+double ModelSearch::calc_model(const std::vector<double>& s) const {
+  const std::size_t n = axes_.size();
+  double m = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    double row = 0;
+    for (std::size_t j = 0; j < n; ++j) row += hessian_[i * n + j] * s[j];
+    m += s[i] * (axes_[i].slope + 0.5 * row);
+  }
+  return m;
+}
+
+/// Minimum of the model in the trust region and the cut, axis by axis until it rests.
+std::vector<double> ModelSearch::find_step(bool mixed) const {
+  const std::size_t n = axes_.size();
+  std::vector<double> s(n, 0.0);
+  for (int sweep = 0; sweep < 200; ++sweep) {
+    double largest = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      const int k = axes_[i].input;
+      const double reach = trust_ * region_.scale[k];
+      const double low = std::max(-reach, region_.box.lower[k] - best_[k]);
+      const double high = std::min(reach, region_.box.upper[k] - best_[k]);
+      double slope = axes_[i].slope;
+      if (mixed)
+        for (std::size_t j = 0; j < n; ++j)
+          if (j != i) slope += hessian_[i * n + j] * s[j];
+      const double curvature = hessian_[i * n + i];
+      const auto value = [&](double t) { return t * (slope + 0.5 * curvature * t); };
+      double t = value(low) < value(high) ? low : high;
+      if (curvature > 0) t = std::clamp(-slope / curvature, low, high);
+      if (value(t) >= value(std::clamp(0.0, low, high))) t = std::clamp(0.0, low, high);
+      if (value(t) < value(s[i])) {
+        largest = std::max(largest, std::abs(t - s[i]) / region_.scale[k]);
+        s[i] = t;
+      }
+    }
+    if (largest < 1e-12) break;
+  }
+  return s;
+}
+
+/// Improves a step on the model under the true constraints, which cost no runs: a (1+1) evolution.
+void ModelSearch::find_allowed_step(std::vector<double>& step) {
+  std::vector<double> best(axes_.size(), 0.0);
+  const Point pulled = pull_inside(region_, best_, moved(step));
+  for (std::size_t k = 0; k < axes_.size(); ++k) best[k] = pulled[axes_[k].input] - best_[axes_[k].input];
+  double value = calc_model(best), width = trust_;
+  if (value > 0) std::fill(best.begin(), best.end(), 0.0), value = 0;
+  for (int trial = 0; trial < 4000 && width > 1e-9; ++trial) {
+    std::vector<double> s = best;
+    for (std::size_t k = 0; k < s.size(); ++k) {
+      const double reach = trust_ * region_.scale[axes_[k].input];
+      s[k] = std::clamp(s[k] + width * region_.scale[axes_[k].input] * random_.next(-1, 1), -reach, reach);
+    }
+    const Point x = moved(s);
+    for (std::size_t k = 0; k < s.size(); ++k) s[k] = x[axes_[k].input] - best_[axes_[k].input];
+    if (const double m = calc_model(s); m < value && region_.contains(x)) {
+      best = s, value = m, width *= 1.5;
+    } else {
+      width *= 0.93;
+    }
+    if (width < 1e-9 && trial < 3000) width = 0.1 * trust_;
+  }
+  step = best;
+}
+
+void ModelSearch::ask_trials(std::span<const double> values) {
+  const std::size_t n = axes_.size();
+  next_ = best_, next_value_ = value_;
+  for (std::size_t k = 0; k < values.size(); ++k)
+    if (values[k] < next_value_) next_ = pending_[k], next_value_ = values[k];
+  hessian_.assign(n * n, 0.0);
+  std::vector<double> together(n, 0.0);
+  for (std::size_t i = 0; i < n; ++i) {
+    Axis& axis = axes_[i];
+    axis.slope = axis.curvature = 0;
+    const double fa = axis.at_a >= 0 ? values[axis.at_a] : infinite;
+    const double fb = axis.at_b >= 0 ? values[axis.at_b] : infinite;
+    const bool has_a = std::isfinite(fa), has_b = std::isfinite(fb);
+    if (has_a && has_b) {
+      axis.curvature = 2 * ((fb - value_) / axis.b - (fa - value_) / axis.a) / (axis.b - axis.a);
+      axis.slope = (fb - value_) / axis.b - 0.5 * axis.curvature * axis.b;
+    } else if (has_a || has_b) {
+      axis.slope = has_a ? (fa - value_) / axis.a : (fb - value_) / axis.b;
+    }
+    hessian_[i * n + i] = axis.curvature;
+    if (fa < value_ || fb < value_) together[i] = fa < fb ? axis.a : axis.b;
+    const int k = axis.input;
+    axis.free =
+        !((best_[k] == region_.box.lower[k] && axis.slope > 0) || (best_[k] == region_.box.upper[k] && axis.slope < 0));
+  }
+  for (const auto& p : pairs_) {
+    const double mixed = values[p.at] - values[p.at_i] - values[p.at_j] + value_;
+    if (std::isfinite(mixed)) hessian_[p.i * n + p.j] = hessian_[p.j * n + p.i] = mixed / (p.di * p.dj);
+  }
+  const std::vector<double> whole = find_step(true), apart = find_step(false);
+  std::vector<std::vector<double>> steps;
+  if (region_.space->has_interaction()) {
+    std::vector<double> allowed = whole;
+    find_allowed_step(allowed);
+    promised_ = -calc_model(allowed);
+    steps.push_back(allowed);
+  } else {
+    promised_ = -calc_model(whole);
+  }
+  steps.push_back(whole);
+  const bool settled = promised_ <= options_.tolerance && next_value_ >= value_ - options_.tolerance;
+  pending_.clear();
+  trying_ = true;
+  if (!settled) {
+    steps.push_back(apart);
+    steps.push_back(together);
+    for (const double part : {0.5, 0.25, 0.0625}) {
+      steps.push_back(whole);
+      for (double& s : steps.back()) s *= part;
+    }
+  }
+  for (const auto& s : steps) {
+    Point x = pull_inside(region_, best_, moved(s));
+    if (x != best_ && std::find(pending_.begin(), pending_.end(), x) == pending_.end())
+      pending_.push_back(std::move(x));
+  }
+  if (settled && promised_ <= 0) pending_.clear();
+  if (pending_.empty()) finish_iteration({});
+}
+
+void ModelSearch::finish_iteration(std::span<const double> values) {
+  for (std::size_t k = 0; k < values.size(); ++k)
+    if (values[k] < next_value_) next_ = pending_[k], next_value_ = values[k];
+  ++iteration_;
+  const double gained = value_ - next_value_;
+  double length = 0;
+  for (const int i : region_.axes) length = std::max(length, std::abs(next_[i] - best_[i]) / region_.scale[i]);
+  best_ = next_, value_ = next_value_;
+  const bool any_free = std::any_of(axes_.begin(), axes_.end(), [](const Axis& a) { return a.free; });
+  const bool small = promised_ <= options_.tolerance && gained <= options_.tolerance;
+  if ((small && radius_ <= (any_free ? 0.01 : 0.03)) || radius_ < options_.smallest) {
+    converged_ = true;
+    pending_.clear();
+    return;
+  }
+  const bool good = gained > 0 && gained >= 0.5 * promised_;
+  if (good && length >= 0.99 * trust_) {
+    trust_ *= 2;
+  } else {
+    radius_ = gained <= options_.tolerance ? 0.25 * radius_ : std::min(radius_, std::max(length, 0.25 * radius_));
+    trust_ = good ? std::max(2 * length, 2 * radius_) : std::max(0.5 * length, 2 * radius_);
+  }
+  ask_star();
+}
+
+void ModelSearch::tell(std::span<const double> values) {
+  if (trying_)
+    finish_iteration(values);
+  else
+    ask_trials(values);
+}
+
+EvolutionSearch::EvolutionSearch(Region region, Point start, double value, const Options& options)
+    : LocalSearch(std::move(start), value),
+      region_(std::move(region)),
+      options_(options),
+      random_(options.seed),
+      width_(options.width) {
+  ask();
+}
+
+void EvolutionSearch::ask() {
+  pending_.clear();
+  if (width_ < options_.smallest || region_.axes.empty()) {
+    converged_ = true;
+    return;
+  }
+  if (generation_++ >= options_.generations) return;
+  const double share = std::max(0.5, 1.0 / static_cast<double>(region_.axes.size()));
+  for (int k = 0; k < options_.children; ++k) {
+    Point x = best_;
+    for (const int i : region_.axes) {
+      const double step = width_ * (region_.box.upper[i] - region_.box.lower[i]) * random_.next(-1, 1);
+      if (random_.next() < share) x[i] += step;
+    }
+    x = pull_inside(region_, best_, std::move(x));
+    if (x != best_) pending_.push_back(std::move(x));
+  }
+}
+
+void EvolutionSearch::tell(std::span<const double> values) {
+  const auto least = std::min_element(values.begin(), values.end());
+  if (least != values.end() && *least < value_) {
+    value_ = *least;
+    best_ = pending_[least - values.begin()];
+    width_ = std::min(1.2 * width_, options_.width);
+  } else {
+    width_ *= 0.6;
+  }
+  do { ask(); } while (pending_.empty() && !converged_ && generation_ < options_.generations);
+}
+
+}  // namespace topple::uncertainty

@@ -1,0 +1,120 @@
+#pragma once
+/// Local searches that ask for points and are told their values, so that many of them advance side by side and every
+/// batch for the model is wide (docs/theory/uncertainty.md, section 3).
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "uncertainty/random.h"
+#include "uncertainty/space.h"
+
+namespace topple::uncertainty {
+
+/// Where a search may go: the cut at alpha of a space that outlives it.
+struct Region {
+  const Space* space = nullptr;
+  double alpha = 0;
+  Box box;
+  std::vector<double> scale;  // widths of the supports
+  std::vector<int> axes;      // inputs whose cut has a width
+
+  bool contains(const Point& x) const { return is_in_cut(*space, box, alpha, x); }
+};
+Region make_region(const Space&, double alpha);
+
+/// Looks for a minimum from a start. Protocol: evaluate `pending()`, call `tell` with the values (infinite where the
+/// point must not count), until `is_done()`.
+class LocalSearch {
+ public:
+  virtual ~LocalSearch() = default;
+  const std::vector<Point>& pending() const { return pending_; }
+  virtual void tell(std::span<const double> values) = 0;
+  bool is_done() const { return pending_.empty(); }
+  /// Whether it ended because nothing better is near, and not because it ran out of steps.
+  bool is_converged() const { return converged_; }
+  const Point& best() const { return best_; }
+  double value() const { return value_; }
+
+ protected:
+  LocalSearch(Point start, double value) : best_(std::move(start)), value_(value) {}
+  std::vector<Point> pending_;
+  Point best_;
+  double value_;
+  bool converged_ = false;
+};
+
+/// Newton steps on a quadratic model inside the cut: slopes and curvatures from a star of points around the best one,
+/// mixed curvatures from points between the free axes; several step lengths are tried at once. The star shrinks until
+/// the model promises less than the tolerance.
+class ModelSearch : public LocalSearch {
+ public:
+  struct Options {
+    double radius = 0.1;      // of the first star, as a part of the support's width
+    double tolerance = 1e-8;  // of the value, absolute; decides when it has converged
+    double smallest = 1e-5;   // radius at which it ends anyway
+    int iterations = 60;      // at most
+    std::uint64_t seed = 1;   // for the subproblem under constraints
+  };
+  ModelSearch(Region region, Point start, double value, const Options& options);
+  void tell(std::span<const double> values) override;
+
+ private:
+  struct Axis {
+    int input = 0;
+    double a = 0, b = 0;       // offsets of the star's two points, 0: none
+    int at_a = -1, at_b = -1;  // among the pending points
+    double slope = 0, curvature = 0;
+    bool free = false;
+  };
+  struct Pair {
+    int i = 0, j = 0;                   // axes
+    double di = 0, dj = 0;              // offsets
+    int at = -1, at_i = -1, at_j = -1;  // pending points of both and of each
+  };
+  Point moved(const std::vector<double>& step) const;
+  double calc_model(const std::vector<double>& step) const;
+  std::vector<double> find_step(bool mixed) const;
+  void find_allowed_step(std::vector<double>& step);
+  void ask_star();
+  void ask_trials(std::span<const double> values);
+  void finish_iteration(std::span<const double> values);
+
+  Region region_;
+  Options options_;
+  Random random_;
+  std::vector<Axis> axes_;
+  std::vector<Pair> pairs_;
+  std::vector<double> hessian_;  // axes x axes
+  double radius_, trust_;
+  double promised_ = 0;
+  int iteration_ = 0;
+  bool trying_ = false;
+  Point next_;  // best of this iteration
+  double next_value_ = 0;
+};
+
+/// A modified evolution strategy: children in a box around the parent, which moves to the best of them and grows after
+/// a success and shrinks after a failure. For values without slopes.
+class EvolutionSearch : public LocalSearch {
+ public:
+  struct Options {
+    int children = 8;        // per generation
+    int generations = 20;    // at most
+    double width = 0.35;     // half width of the first box, as a part of the cut
+    double smallest = 0.02;  // half width at which it ends
+    std::uint64_t seed = 1;
+  };
+  EvolutionSearch(Region region, Point start, double value, const Options& options);
+  void tell(std::span<const double> values) override;
+
+ private:
+  void ask();
+  Region region_;
+  Options options_;
+  Random random_;
+  double width_;
+  int generation_ = 0;
+};
+
+}  // namespace topple::uncertainty

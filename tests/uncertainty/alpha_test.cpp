@@ -1,0 +1,301 @@
+#include "uncertainty/alpha.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <limits>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "reference_cases.h"
+
+namespace topple::uncertainty {
+namespace {
+
+class AlphaReference : public testing::TestWithParam<std::uint64_t> {};
+
+TEST_P(AlphaReference, BoundsAreExactWithFewEvaluations) {
+  for (const auto& c : cases::make_all()) {
+    AlphaOptions options;
+    options.seed = GetParam();
+    const AlphaResult r = optimise(c.inputs, c.model, options, {});
+    EXPECT_LE(r.archive.size(), 10000u) << c.name;
+    EXPECT_EQ(r.ending, Ending::Complete) << c.name;
+    ASSERT_EQ(r.outputs.size(), c.outputs.size());
+    for (std::size_t o = 0; o < c.outputs.size(); ++o) {
+      const auto& want = c.outputs[o].at;
+      // the reference numbers carry six decimals
+      const double tolerance = c.tolerance * (want[0][1] - want[0][0]) + 6e-7;
+      for (int k = 0; k < 4; ++k) {
+        EXPECT_NEAR(r.outputs[o].levels[k].lower.value, want[k][0], tolerance) << c.name << " level " << k;
+        EXPECT_NEAR(r.outputs[o].levels[k].upper.value, want[k][1], tolerance) << c.name << " level " << k;
+        EXPECT_TRUE(r.outputs[o].levels[k].lower.converged) << c.name;
+        EXPECT_TRUE(r.outputs[o].levels[k].upper.converged) << c.name;
+      }
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, AlphaReference, testing::Values(1, 2, 3, 4, 5, 6, 7, 8));
+
+// The paper's equation (1) on its Table 1: full interaction keeps the tensile strength a function of f_c.
+TEST(InteractionReference, TensileStrengthFollowsFromConcrete) {
+  const Space space{{make_triangular(10, 25, 45)}, {}, {}};
+  const Evaluate model = with_derived(space, {[](const Point& x) { return cases::calc_fct(x[0]); }},
+                                      make_evaluate_values([](const Point& x) {
+                                        return std::vector{x[1], x[0] / x[1]};
+                                      }));
+  const AlphaResult r = optimise(space, model, {}, {});
+  const FuzzyNumber fct = make_number(r, 0);
+  EXPECT_NEAR(fct.support().left, 0.478793, 6e-7);
+  EXPECT_NEAR(fct.centre(), 1.994163, 6e-7);
+  EXPECT_NEAR(fct.support().right, 3.349108, 6e-7);
+  EXPECT_NEAR(fct.cut(0.5).left, 1.352936, 6e-7);
+  EXPECT_NEAR(fct.cut(0.5).right, 2.714588, 6e-7);
+  EXPECT_NEAR(r.outputs[1].levels[0].upper.value, 20.885841, 1e-5) << "not 93.99, which ignores the interaction";
+}
+
+TEST(Interaction, RefusesASupportOutsideTheFormula) {
+  const Space space{{make_triangular(7, 25, 45)}, {}, {}};  // f_c below 8 N/mm² has no f_ct
+  const auto model = make_evaluate_values([](const Point& x) { return std::vector{x[1]}; });
+  EXPECT_THROW(with_derived(space, {[](const Point& x) { return cases::calc_fct(x[0]); }}, model), InputError);
+}
+
+TEST(Interaction, ConstraintCutsTheInputs) {
+  // x + y on the disc of radius 1: ±√2; on the square it would be ±2
+  const FuzzyNumber f = make_triangular(-1, 0, 1);
+  const Space disc{{f, f}, {[](const Point& x) { return x[0] * x[0] + x[1] * x[1] - 1; }}, {}};
+  const auto sum = make_evaluate_values([](const Point& x) { return std::vector{x[0] + x[1]}; });
+  const AlphaResult r = optimise(disc, sum, {}, {});
+  EXPECT_NEAR(r.outputs[0].levels[0].lower.value, -std::sqrt(2.0), 1e-4 * 2 * std::sqrt(2.0));
+  EXPECT_NEAR(r.outputs[0].levels[0].upper.value, std::sqrt(2.0), 1e-4 * 2 * std::sqrt(2.0));
+  EXPECT_NEAR(r.outputs[0].levels[2].upper.value, 1, 1e-6) << "at alpha 0.5 the corner (0.5, 0.5) lies in the disc";
+  for (const auto& s : r.archive.samples()) EXPECT_LE(s.x[0] * s.x[0] + s.x[1] * s.x[1], 1);
+}
+
+TEST(Interaction, JointMembershipCutsTheInputs) {
+  // a cone: the cut at alpha is a disc of radius 1 - alpha
+  const FuzzyNumber f = make_triangular(-1, 0, 1);
+  const Space cone{{f, f}, {}, [](const Point& x) { return 1 - std::hypot(x[0], x[1]); }};
+  const auto sum = make_evaluate_values([](const Point& x) { return std::vector{x[0] + x[1]}; });
+  const AlphaResult r = optimise(cone, sum, {}, {});
+  for (const auto& level : r.outputs[0].levels)
+    EXPECT_NEAR(level.upper.value, std::sqrt(2.0) * (1 - level.alpha), 1e-4 * 2 * std::sqrt(2.0)) << level.alpha;
+}
+
+TEST(Interaction, RefusesACentreThatIsImpossible) {
+  const FuzzyNumber f = make_triangular(-1, 0, 1);
+  const auto model = make_evaluate_values([](const Point& x) { return x; });
+  EXPECT_THROW(optimise(Space{{f}, {[](const Point&) { return 1.0; }}, {}}, model, {}, {}), InputError);
+  EXPECT_THROW(optimise(Space{{f}, {}, [](const Point&) { return 0.5; }}, model, {}, {}), InputError);
+  EXPECT_THROW(optimise(Space{}, model, {}, {}), InputError);
+}
+
+TEST(Alpha, CutsAreNested) {
+  const cases::Case c = cases::make_all()[2];
+  AlphaOptions options;
+  options.levels = {0.1, 0.9, 0.35, 0.35};
+  options.limit = 700;  // too few: nested all the same
+  const AlphaResult r = optimise(c.inputs, c.model, options, {});
+  EXPECT_EQ(r.ending, Ending::LimitReached);
+  EXPECT_EQ(r.archive.size(), 700u);
+  ASSERT_EQ(r.outputs[0].levels.size(), 5u) << "0 and 1 are added, doubles are dropped";
+  EXPECT_NO_THROW(make_number(r, 0));
+}
+
+TEST(Alpha, CountsFailedRunsAndKeepsThemOutOfNumbers) {
+  const FuzzyNumber f = make_triangular(0, 1, 2);
+  const Evaluate model = make_evaluate([](const Point& x) {
+    Result r;
+    r.state = Result::State::Done;
+    r.values = {x[0] + x[1]};
+    if (x[0] > 1.5) r.state = Result::State::Failed, r.text = "did not converge";
+    if (x[1] < 0.25) r.values[0] = std::numeric_limits<double>::quiet_NaN();
+    return r;
+  });
+  const AlphaResult r = optimise({f, f}, model, {}, {});
+  int failed = 0;
+  for (const auto& s : r.archive.samples()) {
+    const bool bad = s.x[0] > 1.5 || s.x[1] < 0.25;
+    EXPECT_EQ(s.result.state == Result::State::Failed, bad);
+    if (bad) { EXPECT_FALSE(s.result.text.empty()); }
+    failed += bad;
+  }
+  EXPECT_GT(failed, 0);
+  EXPECT_EQ(r.failed, failed);
+  ASSERT_EQ(r.classes.size(), 2u);
+  EXPECT_EQ(r.classes[0].outcome, failed_outcome);
+  EXPECT_EQ(r.classes[0].count, failed);
+  EXPECT_EQ(r.classes[0].count + r.classes[1].count, static_cast<int>(r.archive.size()));
+  // the least sum that runs: x = 0, y at the edge 0.25; the largest: x at the edge 1.5, y = 2
+  EXPECT_NEAR(r.outputs[0].levels[0].lower.value, 0.25, 1e-4 * 4);
+  EXPECT_NEAR(r.outputs[0].levels[0].upper.value, 3.5, 1e-4 * 4);
+}
+
+TEST(Alpha, SaysWhenNothingRan) {
+  const Evaluate model = make_evaluate([](const Point&) {
+    Result r;
+    r.state = Result::State::Failed;
+    return r;
+  });
+  const AlphaResult r = optimise({make_triangular(0, 1, 2)}, model, {}, {});
+  EXPECT_EQ(r.failed, static_cast<int>(r.archive.size()));
+  EXPECT_TRUE(r.outputs.empty());
+  EXPECT_THROW(make_number(r, 0), InputError);
+}
+
+TEST(Alpha, FindsAnIslandOfHalfAPerCent) {
+  // a plain slope; inside a ball of 0.5 % of the volume a class of its own with a far larger value
+  const FuzzyNumber f = make_triangular(-1, 0.1, 1);
+  const double radius = std::cbrt(0.005 * 8 * 3 / (4 * cases::pi));
+  const Point at = {-0.55, 0.4, -0.3};
+  const Evaluate model = make_evaluate([&](const Point& x) {
+    double d2 = 0;
+    for (int i = 0; i < 3; ++i) d2 += (x[i] - at[i]) * (x[i] - at[i]);
+    Result r;
+    r.state = Result::State::Done;
+    const bool inside = d2 < radius * radius;
+    r.outcome = inside ? 1 : 0;
+    r.values = {inside ? 10 - d2 : x[0]};
+    return r;
+  });
+  AlphaOptions options;
+  // missed with a probability of 1 % at most: N = ln 0.01 / ln 0.995
+  options.space_points = 919;
+  for (options.seed = 1; options.seed <= 10; ++options.seed) {
+    const AlphaResult r = optimise({f, f, f}, model, options, {});
+    EXPECT_LE(calc_miss_probability(r.coverage[0], 0.005), 0.01);
+    ASSERT_EQ(r.classes.size(), 2u) << "seed " << options.seed;
+    EXPECT_NEAR(r.outputs[0].levels[0].upper.value, 10, 1e-4 * 11) << "seed " << options.seed;
+    EXPECT_NEAR(r.outputs[0].levels[0].lower.value, -1, 1e-12);
+  }
+}
+
+TEST(Alpha, KeepsOneNumberForEachClass) {
+  const AlphaResult r = optimise(cases::make_jump_inputs(), make_evaluate(cases::calc_jump), {}, {});
+  ASSERT_EQ(r.classes.size(), 2u);
+  const auto& stands = r.classes[0].outputs[0].levels[0];
+  const auto& jumped = r.classes[1].outputs[0].levels[0];
+  const double width = 31.6 + 14.64;
+  EXPECT_NEAR(stands.lower.value, 0, 1e-3 * width) << "an inner estimate: nothing beyond the jump counts";
+  EXPECT_GE(stands.lower.value, 0);
+  EXPECT_NEAR(stands.upper.value, 31.6, 1e-12);
+  EXPECT_NEAR(jumped.lower.value, -14.64, 1e-12);
+  EXPECT_NEAR(jumped.upper.value, -10, 1e-3 * width);
+  EXPECT_LT(jumped.upper.value, -10);
+}
+
+TEST(Alpha, SearchesAllOutputsInOneArchive) {
+  const cases::Case c = cases::make_all()[5];
+  const AlphaResult both = optimise(c.inputs, c.model, {}, {});
+  const auto first =
+      make_evaluate_values([](const Point& x) { return std::vector{std::exp(-x[0] * 1.7) * std::cos(x[1] * 1.7)}; });
+  const auto second =
+      make_evaluate_values([](const Point& x) { return std::vector{std::exp(-x[0] * 4) * std::cos(x[1] * 4)}; });
+  const auto alone =
+      optimise(c.inputs, first, {}, {}).archive.size() + optimise(c.inputs, second, {}, {}).archive.size();
+  EXPECT_LT(both.archive.size(), alone);
+}
+
+TEST(Alpha, BatchesAreWide) {
+  const cases::Case c = cases::make_all()[2];
+  const AlphaResult r = optimise(c.inputs, c.model, {}, {});
+  EXPECT_GE(static_cast<double>(r.run) / r.batches, 32) << "points a call of the model";
+}
+
+TEST(Alpha, RefusesBadLevelsAndOutputs) {
+  const auto model = make_evaluate_values([](const Point& x) { return x; });
+  AlphaOptions options;
+  options.levels = {0, 1.5};
+  EXPECT_THROW(optimise({make_triangular(0, 1, 2)}, model, options, {}), InputError);
+  const auto changing = make_evaluate_values([](const Point& x) { return std::vector<double>(x[0] > 1 ? 2 : 1, 0.0); });
+  EXPECT_THROW(optimise({make_triangular(0, 1, 2)}, changing, {}, {}), InputError);
+}
+
+// ---- the same bits
+
+void expect_same(const AlphaResult& a, const AlphaResult& b) {
+  ASSERT_EQ(a.archive.size(), b.archive.size());
+  for (int i = 0; i < static_cast<int>(a.archive.size()); ++i) {
+    ASSERT_EQ(a.archive[i].x, b.archive[i].x) << i;
+    ASSERT_EQ(a.archive[i].result.values, b.archive[i].result.values) << i;
+  }
+  ASSERT_EQ(a.outputs.size(), b.outputs.size());
+  for (std::size_t o = 0; o < a.outputs.size(); ++o)
+    for (std::size_t k = 0; k < a.outputs[o].levels.size(); ++k) {
+      EXPECT_EQ(a.outputs[o].levels[k].lower.value, b.outputs[o].levels[k].lower.value);
+      EXPECT_EQ(a.outputs[o].levels[k].upper.value, b.outputs[o].levels[k].upper.value);
+      EXPECT_EQ(a.outputs[o].levels[k].lower.converged, b.outputs[o].levels[k].lower.converged);
+    }
+}
+
+TEST(AlphaReplay, SameBitsForOneSeedAndAnyThreads) {
+  for (const auto& c : {cases::make_all()[2], cases::make_all()[4]}) {
+    const AlphaResult once = optimise(c.inputs, c.model, {}, {});
+    for (const int threads : {1, 2, 4}) {
+      const Evaluate spread = [&](std::span<const Point> batch, std::span<Result> out) {
+        ASSERT_TRUE(parallel_for(batch.size(), threads,
+                                 [&](std::size_t i) { c.model(batch.subspan(i, 1), out.subspan(i, 1)); }));
+      };
+      expect_same(once, optimise(c.inputs, spread, {}, {}));
+    }
+    AlphaOptions other;
+    other.seed = 99;
+    EXPECT_NE(optimise(c.inputs, c.model, other, {}).archive.samples().back().x, once.archive.samples().back().x);
+  }
+}
+
+TEST(AlphaReplay, ResumedEqualsUninterrupted) {
+  for (const auto& c : {cases::make_all()[2], cases::make_all()[4]}) {
+    const AlphaResult whole = optimise(c.inputs, c.model, {}, {});
+    for (const int batches : {0, 1, 3, 7}) {
+      // stops in the middle of a batch, as an interrupted study does
+      std::atomic<bool> cancel = false;
+      Progress progress;
+      progress.cancel = &cancel;
+      int calls = 0;
+      const Evaluate stopping = [&](std::span<const Point> batch, std::span<Result> out) {
+        const bool stop = calls++ == batches;
+        const std::size_t count = stop ? batch.size() / 2 : batch.size();
+        c.model(batch.subspan(batch.size() - count), out.subspan(batch.size() - count));
+        if (stop) cancel = true;
+      };
+      const AlphaResult part = optimise(c.inputs, stopping, {}, progress);
+      EXPECT_EQ(part.ending, Ending::Cancelled);
+      EXPECT_LT(part.archive.size(), whole.archive.size());
+      AlphaOptions options;
+      options.earlier = &part.archive;
+      const AlphaResult resumed = optimise(c.inputs, c.model, options, {});
+      EXPECT_EQ(resumed.ending, Ending::Complete);
+      EXPECT_EQ(resumed.run + part.run, whole.run) << "nothing is run twice";
+      expect_same(whole, resumed);
+    }
+  }
+}
+
+TEST(Alpha, ReportsBoundsSoFar) {
+  const cases::Case c = cases::make_all()[2];
+  AlphaOptions options;
+  std::vector<double> upper;
+  std::size_t seen = 0;
+  options.watch = [&](const AlphaResult& so_far, const Archive& archive) {
+    upper.push_back(so_far.outputs[0].levels[0].upper.value);
+    EXPECT_GE(archive.size(), seen);
+    seen = archive.size();
+  };
+  double done = 0;
+  Progress progress;
+  progress.report = [&](double d, double whole) {
+    done = d;
+    EXPECT_EQ(whole, options.limit);
+  };
+  const AlphaResult r = optimise(c.inputs, c.model, options, progress);
+  ASSERT_GT(upper.size(), 3u);
+  EXPECT_TRUE(std::is_sorted(upper.begin(), upper.end()));
+  EXPECT_EQ(upper.back(), r.outputs[0].levels[0].upper.value);
+  EXPECT_EQ(done, static_cast<double>(r.archive.size()));
+}
+
+}  // namespace
+}  // namespace topple::uncertainty
