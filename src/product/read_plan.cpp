@@ -48,14 +48,14 @@ Plan read_plan(const std::string& text, const std::string& name, std::vector<Dia
   return plan;
 }
 
-Plan read_plan_file(const std::string& path, std::vector<Diagnostic>& warnings, std::string& text_out) {
+std::string read_input(const std::string& path, const std::string& what) {
   namespace fs = std::filesystem;
   const auto fail = [&](const char* code, const std::string& message, const std::string& help = {}) {
     throw InputError(std::vector<Diagnostic>{{Severity::Error, code, {path, 0, 0}, 1, message, help}});
   };
-  text_out.clear();
   std::error_code status;
-  if (fs::is_directory(path, status)) fail("E106", "is a folder; a plan file is wanted", "give the path of plan.toml");
+  if (fs::is_directory(path, status))
+    fail("E106", "is a folder; a " + what + " file is wanted", "give a path of a TOML file");
   std::ifstream file(path, std::ios::binary);
   if (!file) fail("E106", "cannot be read: " + std::generic_category().message(errno ? errno : ENOENT));
   // not by the file's size: a pipe or a device has none
@@ -63,9 +63,15 @@ Plan read_plan_file(const std::string& path, std::vector<Diagnostic>& warnings, 
   char block[1 << 16];
   while (file.read(block, sizeof block) || file.gcount() > 0) {
     bytes.append(block, static_cast<size_t>(file.gcount()));
-    if (bytes.size() > largest_file) fail("E107", "the plan is larger than 8 MB", "a plan describes one building");
+    if (bytes.size() > largest_file) fail("E107", "the " + what + " is larger than 8 MB");
   }
   if (file.bad()) fail("E106", "cannot be read to its end");
+  return bytes;
+}
+
+Plan read_plan_file(const std::string& path, std::vector<Diagnostic>& warnings, std::string& text_out) {
+  text_out.clear();
+  const std::string bytes = read_input(path, "plan");
   text_out = bytes.starts_with("\xEF\xBB\xBF") ? bytes.substr(3) : bytes;
   return read_plan(bytes, path, warnings);
 }

@@ -27,6 +27,9 @@ struct Reading {
   std::vector<Place> section_places, panel_places;
 };
 
+/// The bytes of a file of at most 8 MB; `what` it should be stands in the complaints. Throws InputError E106, E107.
+std::string read_input(const std::string& path, const std::string& what);
+
 void read_materials(Reading&, TableReader& root);
 void read_sections(Reading&, TableReader& root);
 void read_panels(Reading&, TableReader& root);
