@@ -290,6 +290,11 @@ March march_curvature(const Fibres& f, double N, int direction, const std::vecto
     }
   }
 
+  out.origin = origin;
+  out.eps_0.reserve(kappa.size());
+  out.eps_0.push_back(eps_0);
+  out.last = 0;
+
   // First yield: steel in tension, or the compressive strain of the peak at the edge.
   const auto yields = [&](double e, double k) {
     for (size_t i = 0; i < f.bar_at.size(); ++i)
@@ -307,6 +312,7 @@ March march_curvature(const Fibres& f, double N, int direction, const std::vecto
     if (!find(packed, search, k, e, r)) break;
     out.moment[j] = std::max(0.0, direction * r.M);
     out.last = static_cast<int>(j);
+    out.eps_0.push_back(e);
     if (!yielded && yields(e, k)) {
       // Bisection between the last two points, the strain taken linearly.
       double low = 0, high = 1;

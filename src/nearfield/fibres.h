@@ -46,6 +46,8 @@ struct March {
   std::vector<double> moment;  // magnitude for each of the given curvatures (from the one at M = 0), 0 after the loss
   int last = -1;               // index of the last curvature that could be carried, -1: none
   double yield_kappa = 0, yield_moment = 0;
+  double origin = 0;          // curvature at M = 0; curvatures count from it, in the direction of the march [1/m]
+  std::vector<double> eps_0;  // mean strain at each curvature held (last + 1)
 };
 /// `kappa` rises from 0; direction +1 or -1.
 March march_curvature(const Fibres&, double N, int direction, const std::vector<double>& kappa);
