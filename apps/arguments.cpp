@@ -22,6 +22,7 @@ std::variant<Arguments, int> parse_arguments(int argc, char** argv) {
   topple mbs compare out/model.json                the same model on other engines (docs/engines.md)
   topple mbs verify                                the engine against known answers (docs/verification.md)
   topple report out/record.h5 -o report.html       make the page from a record
+  topple rcc section.toml -o out/rcc               resistance curves of a zone of a section (docs/rcc.md)
 
 Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterion of the plan is violated.)");
 
@@ -92,6 +93,21 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   report->add_option("record", a.input, "record (HDF5)")->required();
   report->add_option("-o,--output", a.output, "page to write")->required();
 
+  CLI::App* rcc = app.add_subcommand("rcc", "Compute the resistance curves of a zone of a section, or of a member.");
+  rcc->add_option("file", a.input, "section (TOML), or a plan with --member")->required();
+  rcc->add_option("-o,--output", a.output, "folder for curves, page and pictures; it is made if missing");
+  rcc->add_option("--normal-force", a.normal_forces,
+                  "such as \"3.7 MN\", compression positive; may be given more than once")
+      ->type_size(1)
+      ->allow_extra_args(false);
+  CLI::Option* member = rcc->add_option("--member", a.member, "column or beam of the plan, such as C-D1-0");
+  rcc->add_option("--zone", a.zone, "end of the member: foot (start) or top (end)")
+      ->check(CLI::IsMember({"foot", "top", "start", "end"}))
+      ->needs(member);
+  rcc->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones");
+  rcc->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
+  rcc->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
+
   CLI::App* version = app.add_subcommand("version", "Show the version.");
 
   if (argc > 1 && argv[1][0] != '-') {
@@ -120,6 +136,7 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   if (mbs_compare->parsed()) a.verb = Verb::MbsCompare;
   if (mbs_verify->parsed()) a.verb = Verb::MbsVerify;
   if (report->parsed()) a.verb = Verb::Report;
+  if (rcc->parsed()) a.verb = Verb::Rcc;
   if (version->parsed()) a.verb = Verb::Version;
   return a;
 }

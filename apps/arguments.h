@@ -4,11 +4,12 @@
 #include <optional>
 #include <string>
 #include <variant>
+#include <vector>
 
 namespace topple::apps {
 
 struct Arguments {
-  enum class Verb { None, New, Check, Run, Rules, MbsRun, MbsCompare, MbsVerify, Report, Version };
+  enum class Verb { None, New, Check, Run, Rules, MbsRun, MbsCompare, MbsVerify, Report, Rcc, Version };
   Verb verb = Verb::None;
   std::string input;      // plan, model, record, or the file to write
   std::string output;     // folder or file
@@ -18,6 +19,8 @@ struct Arguments {
   std::string engines;                     // names between commas, empty: all
   std::string accuracy;                    // relative, as typed
   std::string duration, step, frame_rate;  // quantities as typed; empty: the plan's
+  std::vector<std::string> normal_forces;  // as typed
+  std::string member, zone = "foot";       // of a plan
   std::optional<bool> equilibrium;         // of a bare model; none: as its file says
   int threads = 1, frames = 0;
   bool json = false, csv = false, no_report = false, report = false, verbose = false;

@@ -108,12 +108,12 @@ collapse::RunOptions make_options(const Arguments& a) {
   return o;
 }
 
-namespace {
-
 collapse::Knowledge load_knowledge(const Arguments& a) {
   return a.knowledge.empty() ? collapse::default_knowledge()
                              : collapse::read_knowledge(read_file(a.knowledge), a.knowledge);
 }
+
+namespace {
 
 /// The built page: beside an installed program, or in the source tree.
 std::optional<std::string> find_bundle() {

@@ -8,6 +8,7 @@
 
 #include "arguments.h"
 #include "base/error.h"
+#include "collapse/knowledge.h"
 #include "collapse/run.h"
 #include "record/record.h"
 
@@ -18,6 +19,9 @@ using Files = std::vector<std::pair<std::string, std::string>>;
 
 /// All complaints of an InputError, and the JSON object if that was asked for; `text` is the input.
 int refuse(const InputError&, const std::vector<Diagnostic>& warnings, const std::string& text, bool as_json);
+
+/// The built-in rules, or those of --knowledge.
+collapse::Knowledge load_knowledge(const Arguments&);
 
 /// Throws InputError for quantities that cannot be read.
 collapse::RunOptions make_options(const Arguments&);

@@ -44,7 +44,7 @@ usage)
 readme)
   # every command in the shell blocks of these pages exists
   commands=0
-  for page in README.md docs/getting-started.md docs/run.md docs/mbs-model.md docs/engines.md; do
+  for page in README.md docs/getting-started.md docs/run.md docs/mbs-model.md docs/engines.md docs/rcc.md; do
     while read -r word verb rest; do
       case $word in
       script/*) [ -x "$source/$word" ] || { echo "$page shows $word, which cannot be called"; failures=$((failures + 1)); } ;;
@@ -188,6 +188,34 @@ cancel)
   wait $pid; code=$?
   [ $code -eq 1 ] || { echo "exit code $code after an interrupt"; head out err; failures=$((failures + 1)); }
   exists a/record.h5; has out "Cancelled at"
+  ;;
+rcc)
+  zone=$source/examples/rcc/zone_I.toml
+  expect 0 "$topple" rcc "$zone"; has out "zone of 0.5 m"; has out "residual"; has out "crushes at"
+  expect 0 "$topple" rcc "$zone" --normal-force "3.7 MN" --normal-force 0 -o a/b; has out "3.700"; has out "Wrote a/b/rcc.json"
+  for f in points.csv curves.csv interaction.csv axial.csv states.csv rcc.json; do exists a/b/$f; done
+  is_json a/b/rcc.json
+  expect 0 "$topple" rcc "$zone" --normal-force "3.7 MN" --normal-force 0 --json; is_json out; has err "residual"
+  cmp out a/b/rcc.json || failures=$((failures + 1))
+  expect 0 "$topple" rcc "$zone" --normal-force "20 MN"; has out "cannot be carried: the section crushes at 8.91 MN"
+  expect 0 "$topple" rcc "$zone" --normal-force "-9 MN"; has out "cannot be carried: the section tears at 3.2 MN"
+  expect 2 "$topple" rcc "$zone" --normal-force "3 apples"; has err "--normal-force"; has err "units: N, kN, MN"
+  expect 2 "$topple" rcc "$zone" --zone top; expect 2 "$topple" rcc "$zone" --zone middle --member C-A1-0
+  # mistakes stand at their places
+  sed 's/^eps_u/esp_u/' "$zone" >wrong.toml; expect 2 "$topple" rcc wrong.toml -o none
+  has err 'wrong.toml:16:1: error E203: steel.core: unknown key "esp_u"'; has err 'did you mean "eps_u"?'; has err "Nothing was run."
+  sed 's/^length = .*/length = "3 m"/' "$zone" >long.toml; expect 2 "$topple" rcc long.toml -o none
+  has err "long.toml:29:10: error E611: zone: length"
+  expect 2 "$topple" rcc wrong.toml --json; is_json out; has out '"line": 16'
+  expect 2 "$topple" rcc missing.toml; expect 2 "$topple" rcc .; : >empty.toml; expect 2 "$topple" rcc empty.toml
+  [ ! -e none ] || { echo "a folder was made for a wrong section"; failures=$((failures + 1)); }
+  # a member of a plan
+  expect 2 "$topple" rcc "$plan"; has err "this is a plan"; has err "--member"
+  building=$source/examples/weida/plan.toml
+  expect 0 "$topple" rcc "$building" --member C-D1-0; has out "C-D1-0, foot"; has out "Dead load of"; has out "from the equilibrium"
+  expect 0 "$topple" rcc "$building" --member B-A1B1-2 --zone end --normal-force "0 MN"; has out "B-A1B1-2, end"
+  expect 2 "$topple" rcc "$building" --member C-D1; has err 'did you mean "C-D1-0"?'
+  expect 2 "$topple" rcc "$building" --member S-A1B2-0; has err "neither a column nor a beam"
   ;;
 *) echo "no case $case_name"; failures=1 ;;
 esac

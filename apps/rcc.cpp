@@ -1,0 +1,213 @@
+/// `topple rcc`: resistance curves of a zone of a section, or of a member of a plan.
+
+#include "nearfield/rcc.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "base/file.h"
+#include "base/hash.h"
+#include "base/unit.h"
+#include "collapse/member_zone.h"
+#include "commands.h"
+#include "product/section_file.h"
+#include "rcc_report.h"
+#include "record/rcc_report.h"
+#include "results.h"
+#include "terminal.h"
+
+namespace topple::apps {
+
+namespace fs = std::filesystem;
+using json = nlohmann::ordered_json;
+
+namespace {
+
+/// What is computed, from either kind of file.
+struct Task {
+  nearfield::ZoneInput zone;
+  std::vector<double> normal_forces;  // tension positive; none: to be chosen [N]
+  std::string title, name;            // of the file, of the zone
+  std::vector<std::string> notes;
+  SourcePosition where_length;  // of the zone's length, none for a member of a plan
+};
+
+nearfield::ZoneInput to_zone(const product::SectionFile& f) {
+  nearfield::ZoneInput in;
+  in.section = f.section, in.concrete = f.concrete, in.steel = f.steel;
+  in.length = f.length;
+  in.cut_bars = f.cut_bars, in.cut_concrete = f.cut_concrete;
+  in.concrete_loss = f.concrete_loss, in.cover_lost = f.cover_lost;
+  return in;
+}
+
+Task read_section_task(const Arguments& a, std::vector<Diagnostic>& warnings, std::string& text) {
+  const product::SectionFile f = product::read_section_file(a.input, warnings, text);
+  Task task;
+  task.zone = to_zone(f);
+  task.normal_forces = f.normal_forces;
+  task.title = f.title;
+  task.name = f.section.name;
+  task.where_length = f.where_length;
+  const double longest = nearfield::calc_largest_zone_length(f.concrete);
+  if (!(f.length < longest))
+    throw InputError(std::vector<Diagnostic>{
+        {Severity::Error, "E611", f.where_length, 1,
+         fmt::format(
+             "zone: length: {:.4g} m is too long for this concrete: it would give back more than its crushing or "
+             "fracture energy",
+             f.length),
+         fmt::format("allowed: below {:.4g} m; without [zone] it is one depth of the section", longest)}});
+  return task;
+}
+
+Task read_member_task(const Arguments& a, std::vector<Diagnostic>& warnings, std::string& text) {
+  const product::Plan plan = product::read_plan_file(a.input, warnings, text);
+  const int index = plan.find_member(a.member);
+  if (index < 0) {
+    std::vector<std::string> names;
+    for (const product::Member& m : plan.members) names.push_back(m.name);
+    std::string near = nearest_name(a.member, names);
+    for (const std::string& name : names)
+      if (near.empty() && name.starts_with(a.member)) near = name;
+    throw InputError("E302", fmt::format("--member: there is no member \"{}\" in {}", a.member, a.input),
+                     near.empty() ? "names look like C-A1-0 and B-A1A2-0 (docs/plan.md)"
+                                  : fmt::format("did you mean \"{}\"?", near));
+  }
+  const bool at_end = a.zone == "top" || a.zone == "end";
+  const collapse::MemberZone m = collapse::find_member_zone(plan, load_knowledge(a), index, at_end, a.threads);
+  Task task;
+  task.zone = m.input;
+  task.title = plan.title;
+  task.name = m.name;
+  task.normal_forces = {m.normal_force};
+  task.notes.push_back(
+      m.is_estimate
+          ? fmt::format("Dead load of {:.4g} MN, by summing up weights: there is no equilibrium ({}).",
+                        -m.normal_force / unit::MN, m.message)
+          : fmt::format("Dead load of {:.4g} MN from the equilibrium of the building before the first charge.",
+                        -m.normal_force / unit::MN));
+  return task;
+}
+
+/// Forces of the command line, tension positive; a bare number counts in newtons.
+std::vector<double> read_forces(const std::vector<std::string>& typed) {
+  std::vector<double> out;
+  for (const std::string& text : typed) {
+    Quantity q = parse_quantity(text, Dimension::Force);
+    if (!q.value) {
+      const Quantity bare = parse_quantity(text, Dimension::Number);
+      if (bare.value) q = bare;
+    }
+    if (!q.value)
+      throw InputError("E801", fmt::format("--normal-force \"{}\": {}", text, q.problem),
+                       "units: " + units_of(Dimension::Force));
+    out.push_back(-*q.value);
+  }
+  return out;
+}
+
+std::string cell(double value, double scale, int digits) {
+  return std::isfinite(value) ? fmt::format("{:.{}f}", value / scale, digits) : "-";
+}
+
+bool is_same(const record::RccCurve& a, const record::RccCurve& b) {
+  return a.route == b.route && a.normal_force == b.normal_force && a.moment == b.moment && a.rotation == b.rotation;
+}
+
+/// One line for each curve; equal ones share it.
+void print_table(std::FILE* out, const record::RccReport& r) {
+  std::fprintf(out, "\n  %-8s %-12s %8s  %9s  %15s  %15s  %15s  %15s\n", "route", "about", "N", "EI eff", "yield",
+               "peak", "ultimate", "residual");
+  std::fprintf(out, "  %-8s %-12s %8s  %9s  %15s  %15s  %15s  %15s\n", "", "", "MN", "MNm2", "mrad    kNm",
+               "mrad    kNm", "mrad    kNm", "mrad    kNm");
+  std::vector<bool> printed(r.curves.size(), false);
+  for (size_t i = 0; i < r.curves.size(); ++i) {
+    if (printed[i]) continue;
+    const record::RccCurve& c = r.curves[i];
+    std::string about;
+    for (size_t k = i; k < r.curves.size(); ++k) {
+      const record::RccCurve& other = r.curves[k];
+      const bool is_twin = k > i && other.axis == c.axis && other.direction == c.direction;
+      if (is_twin || printed[k] || !is_same(c, other)) continue;
+      printed[k] = true;
+      about += fmt::format("{}{}{}", about.empty() ? "" : " ", other.direction < 0 ? '-' : '+', other.axis);
+    }
+    const auto point = [](const record::RccPoint& p) {
+      return fmt::format("{:>7} {:>7}", cell(p.rotation, 1e-3, 2), cell(p.moment, unit::kNm, 1));
+    };
+    const std::string N = cell(c.normal_force, unit::MN, 3);
+    if (c.rotation.empty()) {
+      std::fprintf(out, "  %-8s %-12s %8s  %s\n", c.route.c_str(), about.c_str(), N.c_str(), c.ending.c_str());
+      continue;
+    }
+    std::fprintf(out, "  %-8s %-12s %8s  %9s  %s  %s  %s  %s\n", c.route.c_str(), about.c_str(), N.c_str(),
+                 cell(c.stiffness_effective, 1e6, 2).c_str(), point(c.yield).c_str(), point(c.peak).c_str(),
+                 point(c.ultimate).c_str(), point(c.residual).c_str());
+  }
+  std::fprintf(out, "\n  Without bending it crushes at %.3f MN and tears at %.3f MN. Compression is positive.\n",
+               r.crushing_force / unit::MN, r.rupture_force / unit::MN);
+}
+
+Files write_rcc_files(const record::RccReport& r, const std::string& folder) {
+  make_folder(folder);
+  Files files;
+  const auto write = [&](const char* what, const char* name, const std::string& bytes) {
+    const std::string path = (fs::path(folder) / name).string();
+    replace_file(path, bytes);
+    files.emplace_back(what, path);
+  };
+  write("points", "points.csv", record::points_csv(r));
+  write("curves", "curves.csv", record::curves_csv(r));
+  write("interaction", "interaction.csv", record::interaction_csv(r));
+  write("axial", "axial.csv", record::axial_csv(r));
+  write("states", "states.csv", record::states_csv(r));
+  write("json", "rcc.json", record::to_json(r) + "\n");
+  return files;
+}
+
+}  // namespace
+
+int compute_rcc(const Arguments& a, const std::atomic<bool>&) {
+  std::FILE* out = a.json ? stderr : stdout;
+  std::vector<Diagnostic> warnings;
+  std::string text;
+  try {
+    const std::vector<double> typed = read_forces(a.normal_forces);
+    Task task = a.member.empty() ? read_section_task(a, warnings, text) : read_member_task(a, warnings, text);
+    for (const Diagnostic& d : warnings) std::fputs(render(d, text, has_colour(stderr)).c_str(), stderr);
+    const nearfield::Rcc rcc = nearfield::make_rcc(task.zone);
+    if (!typed.empty()) {
+      task.normal_forces = typed;
+    } else if (task.normal_forces.empty()) {
+      task.normal_forces = choose_forces(rcc);
+    } else if (!a.member.empty()) {
+      const double dead_load = task.normal_forces.front(), apart = 0.03 * rcc.y_pos.normal_force.front();
+      for (const double N : choose_forces(rcc))
+        if (std::abs(N - dead_load) > -apart) task.normal_forces.push_back(N);
+    }
+    record::RccReport report = make_rcc_report(task.zone, rcc, task.normal_forces);
+    report.title = task.title;
+    report.source = a.input;
+    report.sha256 = calc_sha256(text);
+    report.program_version = TOPPLE_VERSION;
+    report.zone = fmt::format("{}, zone of {:.3g} m", task.name, task.zone.length);
+    report.notes.insert(report.notes.begin(), task.notes.begin(), task.notes.end());
+
+    std::fprintf(out, "%s: %s\n", report.title.c_str(), report.zone.c_str());
+    for (const std::string& note : report.notes) std::fprintf(out, "  %s\n", note.c_str());
+    print_table(out, report);
+    Files files;
+    if (!a.output.empty()) files = write_rcc_files(report, a.output);
+    for (const auto& [what, path] : files) std::fprintf(out, "Wrote %s\n", path.c_str());
+    if (a.json) std::printf("%s\n", record::to_json(report).c_str());
+    return kOk;
+  } catch (const InputError& e) { return refuse(e, warnings, text, a.json); }
+}
+
+}  // namespace topple::apps
