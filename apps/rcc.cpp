@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -116,8 +117,15 @@ std::string cell(double value, double scale, int digits) {
   return std::isfinite(value) ? fmt::format("{:.{}f}", value / scale, digits) : "-";
 }
 
+/// Equal but for round-off.
 bool is_same(const record::RccCurve& a, const record::RccCurve& b) {
-  return a.route == b.route && a.normal_force == b.normal_force && a.moment == b.moment && a.rotation == b.rotation;
+  if (a.route != b.route || a.normal_force != b.normal_force || a.rotation.size() != b.rotation.size()) return false;
+  const double scale = a.moment.empty() ? 0 : *std::max_element(a.moment.begin(), a.moment.end());
+  for (size_t j = 0; j < a.rotation.size(); ++j)
+    if (std::abs(a.rotation[j] - b.rotation[j]) > 1e-6 * a.rotation[j] ||
+        std::abs(a.moment[j] - b.moment[j]) > 1e-6 * scale)
+      return false;
+  return true;
 }
 
 /// One line for each curve; equal ones share it.
