@@ -30,6 +30,9 @@ struct SolidConcrete {
   double alpha_flow = 0;  // dilatancy in the potential √(3 J2) + α I1
   double slope = 0;       // d f_cc / d σ_lateral
   double floor = 0;
+  // Of the compressive curve, at the peak and where a fifth of the strength is lost: plastic strain, effective stress
+  // over E_c, and the strain between the two.
+  double plastic_peak = 0, plastic_tail = 0, effective_peak = 0, effective_tail = 0, tail = 0;
 };
 
 /// Throws InputError: a value out of range, what make_concrete refuses, or strengths for which the surfaces overlap.
@@ -42,8 +45,9 @@ struct SolidConcreteState {
   double tension = 0;               // largest equivalent uniaxial tensile strain
   double confinement = 0;           // all-round pressure at the end of the last step [Pa]
   double crack = 0;                 // largest principal crack strain now
-  double compression_step = 0;      // growth in the last step, for IMPL-EX
-  double tension_step = 0;
+  // Growth in the last step, for IMPL-EX.
+  std::array<double, 6> plastic_step{};
+  double compression_step = 0, tension_step = 0;
 };
 
 /// stress = secant · (strain - plastic). Matrices are row-major.
