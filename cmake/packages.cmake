@@ -10,6 +10,12 @@ find_package(HDF5 REQUIRED COMPONENTS C)
 find_package(hwy REQUIRED)
 find_package(Qhull REQUIRED)
 find_package(Boost REQUIRED COMPONENTS headers)  # no library of it
+# CHOLMOD; Debian's package has no file for CMake
+find_path(CHOLMOD_INCLUDE cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
+find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
+add_library(SuiteSparse::cholmod UNKNOWN IMPORTED)
+set_target_properties(SuiteSparse::cholmod PROPERTIES IMPORTED_LOCATION ${CHOLMOD_LIBRARY}
+                                                      INTERFACE_INCLUDE_DIRECTORIES ${CHOLMOD_INCLUDE})
 # Other engines behind the adapter; topple runs without them (docs/engines.md).
 find_package(Simbody QUIET)
 find_package(mujoco QUIET)
