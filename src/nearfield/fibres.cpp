@@ -68,6 +68,16 @@ double calc_tie_stress(const ZoneInput& in) {
   return in_plane * along * std::min(ratio_y, ratio_z) * in.steel.fy;
 }
 
+material::Steel make_bar(const ZoneInput& in, double diameter) {
+  material::SteelInput steel;
+  steel.fy = in.steel.fy, steel.fu = in.steel.fu, steel.Es = in.steel.Es, steel.eps_u = in.steel.eps_u;
+  // Without ties, or with the cover gone, bars are free over the whole zone at most.
+  const double spacing = in.section.tie_spacing;
+  steel.free_length = spacing > 0 && in.section.tie_diameter > 0 ? std::min(spacing, in.length) : in.length;
+  steel.diameter = diameter;
+  return material::make_steel(steel);
+}
+
 Fibres make_fibres(const ZoneInput& in, Axis axis) {
   const Frame f = make_frame(in, axis);
   Fibres out;
@@ -88,11 +98,6 @@ Fibres make_fibres(const ZoneInput& in, Axis axis) {
     add_layers(out, core_layers, -0.5 * f.depth, 0.5 * f.depth, 0, cover_kept * f.breadth);
   }
 
-  material::SteelInput steel;
-  steel.fy = in.steel.fy, steel.fu = in.steel.fu, steel.Es = in.steel.Es, steel.eps_u = in.steel.eps_u;
-  // Without ties, or with the cover gone, bars are free over the whole zone at most.
-  const double spacing = in.section.tie_spacing;
-  steel.free_length = spacing > 0 && in.section.tie_diameter > 0 ? std::min(spacing, in.length) : in.length;
   std::vector<double> diameters;
   const double bars_kept = left_over(in.cut_bars);
   for (const product::Bar& bar : in.section.bars) {
@@ -100,15 +105,120 @@ Fibres make_fibres(const ZoneInput& in, Axis axis) {
     size_t row = 0;
     while (row < out.bar_at.size() && !(std::abs(out.bar_at[row] - at) < 1e-9 && diameters[row] == bar.diameter)) ++row;
     if (row == out.bar_at.size()) {
-      steel.diameter = bar.diameter;
       out.bar_at.push_back(at);
       out.bar_area.push_back(0);
-      out.bar_law.push_back(material::make_steel(steel));
+      out.bar_law.push_back(make_bar(in, bar.diameter));
       diameters.push_back(bar.diameter);
     }
     out.bar_area[row] += bars_kept * bar.area;
   }
   return out;
+}
+
+namespace {
+
+struct Point {
+  double at = 0, across = 0;
+};
+
+/// Area and centroid of what a convex polygon has between `from` and `to` along `at`.
+struct Strip {
+  double area = 0, across = 0;
+};
+Strip cut_strip(std::vector<Point> polygon, double from, double to) {
+  for (const double side : {1.0, -1.0}) {  // keep at >= from, then at <= to
+    const double limit = side > 0 ? from : to;
+    std::vector<Point> kept;
+    for (size_t i = 0; i < polygon.size(); ++i) {
+      const Point &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+      const double da = side * (a.at - limit), db = side * (b.at - limit);
+      if (da >= 0) kept.push_back(a);
+      if ((da > 0 && db < 0) || (da < 0 && db > 0)) {
+        const double s = da / (da - db);
+        kept.push_back({a.at + s * (b.at - a.at), a.across + s * (b.across - a.across)});
+      }
+    }
+    polygon = std::move(kept);
+  }
+  double area = 0, moment = 0;
+  for (size_t i = 0; i < polygon.size(); ++i) {
+    const Point &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+    const double cross = a.at * b.across - b.at * a.across;
+    area += 0.5 * cross, moment += cross * (a.across + b.across) / 6;
+  }
+  if (std::abs(area) < 1e-12) return {};
+  return {std::abs(area), moment / area};
+}
+
+}  // namespace
+
+Fibres make_fibres(const ZoneInput& in, double angle) {
+  // Materials and losses are those of bending about y; bars come one by one.
+  Fibres out = make_fibres(in, Axis::Y);
+  const Frame f = make_frame(in, Axis::Y);
+  const double c = std::cos(angle), s = std::sin(angle);
+  const auto place = [&](double y, double z) { return Point{z * c - y * s, -z * s - y * c}; };
+  const auto corners = [&](double breadth, double depth) {
+    std::vector<Point> p;
+    for (const auto& [i, j] : {std::pair{-1, -1}, {1, -1}, {1, 1}, {-1, 1}})
+      p.push_back(place(0.5 * i * breadth, 0.5 * j * depth));
+    return p;
+  };
+  const auto extent = [](const std::vector<Point>& p) {
+    double most = 0;
+    for (const Point& q : p) most = std::max(most, q.at);
+    return most;
+  };
+  const bool has_core = f.core_depth > 0 && f.core_breadth > 0;
+  const std::vector<Point> whole = corners(f.breadth, f.depth);
+  const std::vector<Point> core = has_core ? corners(f.core_breadth, f.core_depth) : std::vector<Point>{};
+  const double outer = extent(whole), inner = has_core ? extent(core) : outer;
+  const double kept = in.concrete_loss >= 1 ? 0 : left_over(in.cut_concrete);
+  const double cover_kept = in.cover_lost ? 0 : kept;
+  out.half_depth = outer;
+  for (auto* v : {&out.at, &out.core_area, &out.cover_area}) v->clear();
+  const auto add_strips = [&](int count, double from, double to) {
+    const double t = (to - from) / count;
+    for (int i = 0; i < count; ++i) {
+      const double a = from + i * t, b = from + (i + 1) * t;
+      const Strip w = cut_strip(whole, a, b), k = has_core ? cut_strip(core, a, b) : Strip{};
+      const double beside = w.area - k.area;
+      out.at.push_back(0.5 * (a + b));
+      out.core_area.push_back(kept * k.area), out.core_across.push_back(k.across);
+      out.cover_area.push_back(beside > 1e-12 ? cover_kept * beside : 0);
+      out.cover_across.push_back(beside > 1e-12 ? (w.area * w.across - k.area * k.across) / beside : 0);
+    }
+  };
+  constexpr int core_layers = 32, cover_layers = 4;
+  if (has_core) add_strips(cover_layers, -outer, -inner);
+  add_strips(core_layers, -inner, inner);
+  if (has_core) add_strips(cover_layers, inner, outer);
+
+  out.bar_at.clear(), out.bar_area.clear(), out.bar_law.clear();
+  for (const product::Bar& bar : in.section.bars) {
+    const Point p = place(bar.y, bar.z);
+    out.bar_at.push_back(p.at), out.bar_across.push_back(p.across);
+    out.bar_area.push_back(left_over(in.cut_bars) * bar.area);
+    out.bar_law.push_back(make_bar(in, bar.diameter));
+  }
+  return out;
+}
+
+double calc_cross_moment(const Fibres& f, double eps_0, double kappa) {
+  double M = 0;
+  for (size_t i = 0; i < f.at.size(); ++i) {
+    const double eps = eps_0 + kappa * f.at[i];
+    if (f.core_area[i] > 0) M += f.core_area[i] * f.core_across[i] * material::calc_envelope(f.core, eps).stress;
+    if (f.cover_area[i] > 0) M += f.cover_area[i] * f.cover_across[i] * material::calc_envelope(f.cover, eps).stress;
+  }
+  const bool displaces = has_concrete(f);
+  for (size_t i = 0; i < f.bar_at.size(); ++i) {
+    const double eps = eps_0 + kappa * f.bar_at[i];
+    double stress = material::calc_envelope(f.bar_law[i], eps).stress;
+    if (displaces) stress -= material::calc_envelope(f.core, eps).stress;
+    M += f.bar_area[i] * f.bar_across[i] * stress;
+  }
+  return M;
 }
 
 bool has_concrete(const Fibres& f) { return !f.at.empty() && f.core_area[f.at.size() / 2] > 0; }

@@ -16,6 +16,9 @@ struct Fibres {
   std::vector<material::Steel> bar_law;           // (R)
   material::Concrete core, cover;
   double half_depth = 0;  // [m]
+  // Places along the axis of bending, of a section at an angle only: of the layers' core and cover [m] (L), bars [m]
+  // (R)
+  std::vector<double> core_across, cover_across, bar_across;
 };
 
 /// Stress resultants of a plane of strains.
@@ -33,6 +36,12 @@ enum class Axis { Y, Z };
 
 /// The section after preparation; the concrete is what is left in `concrete`. Throws InputError.
 Fibres make_fibres(const ZoneInput&, Axis);
+
+/// The same for bending about an axis in the section at `angle` from y towards z: `at` = z cos - y sin, in strips along
+/// the axis. Angle 0 bends about y; π/2 about z, where a positive curvature pulls at -y. Throws InputError.
+Fibres make_fibres(const ZoneInput&, double angle);
+/// Moment about the axis at a right angle to the bending axis, ∫ σ across dA, of a section at an angle [N·m].
+double calc_cross_moment(const Fibres&, double eps_0, double kappa);
 
 /// Resultants at the mean strain ε0 and the curvature κ.
 Resultants calc_resultants(const Fibres&, double eps_0, double kappa);
@@ -60,6 +69,8 @@ Peak find_crushing(const Fibres&);
 
 /// Concrete of the zone after losses, before regularisation. The factor of the strength lies in (0, 1].
 material::ConcreteInput make_concrete_input(const ZoneInput&);
+/// Law of a bar of the zone, free between its ties. Throws InputError.
+material::Steel make_bar(const ZoneInput&, double diameter);
 /// Effective lateral stress of the ties on the core, docs/theory/rcc.md (5) to (7).
 double calc_tie_stress(const ZoneInput&);
 

@@ -6,6 +6,8 @@
 
 #include "base/error.h"
 #include "base/unit.h"
+#include "nearfield/biaxial.h"
+#include "nearfield/family.h"
 #include "nearfield/fibres.h"
 #include "nearfield/section_kernel.h"
 #include "nearfield/zone.h"
@@ -18,78 +20,6 @@ constexpr double pi = 3.14159265358979323846;
 
 double calc_bar_force(const ZoneInput& in, double stress) {
   return (1 - in.cut_bars) * in.section.steel_area() * stress;
-}
-
-/// Rotations from a fraction of cracking to beyond rupture, densest around yield.
-std::vector<double> make_rotations(const ZoneInput& in, double depth, const material::Concrete& concrete) {
-  const double per_strain = in.length / depth;
-  const double eps_y = in.steel.fy / in.steel.Es;
-  const double yield = 1.7 * eps_y * per_strain, crack = 2 * concrete.eps_ct * per_strain;
-  const double first = crack > 0 ? std::min(0.5 * crack, 0.1 * yield) : 0.05 * yield;
-  const double last = std::min(1.0, std::max(5 * in.steel.eps_u * per_strain, 12 * yield));
-  std::vector<double> out{0};
-  const auto extend = [&](double from, double to, double ratio) {
-    if (to <= from) return;
-    const int n = std::max(1, static_cast<int>(std::ceil(std::log(to / from) / std::log(ratio))));
-    for (int i = 1; i <= n; ++i) out.push_back(from * std::pow(to / from, static_cast<double>(i) / n));
-  };
-  out.push_back(first);
-  extend(first, 0.4 * yield, 1.4);
-  extend(out.back(), 6 * yield, 1.15);
-  extend(out.back(), last, 1.18);
-  return out;
-}
-
-/// Normal forces from crushing to rupture of the bars.
-std::vector<double> make_forces(double crushing, double rupture) {
-  std::vector<double> out;
-  for (double share : {1.0, 0.97, 0.9, 0.8, 0.7, 0.6, 0.5, 0.45, 0.4, 0.35, 0.3, 0.2, 0.1})
-    out.push_back(-share * crushing);
-  for (double share : {0.0, 0.4, 0.75, 1.0}) out.push_back(share * rupture);
-  return out;
-}
-
-MomentFamily make_family(const Fibres& fibres, int direction, const std::vector<double>& force,
-                         const std::vector<double>& rotation, double length) {
-  const size_t K = force.size();
-  std::vector<double> kappa(rotation);
-  for (double& k : kappa) k /= length;
-  std::vector<March> marches;
-  marches.reserve(K);
-  int last = 1;
-  for (size_t k = 0; k < K; ++k) {
-    if (k == 0 || k + 1 == K) {
-      marches.emplace_back();
-      marches.back().moment.assign(kappa.size(), 0.0);
-    } else {
-      marches.push_back(march_curvature(fibres, force[k], direction, kappa));
-    }
-    last = std::max(last, marches.back().last);
-  }
-  // The last column is zero: broken.
-  const size_t J = std::min(kappa.size(), static_cast<size_t>(last) + 2);
-  MomentFamily out;
-  out.normal_force = force;
-  out.rotation.assign(rotation.begin(), rotation.begin() + static_cast<std::ptrdiff_t>(J));
-  out.moment.reserve(K * J);
-  for (const March& march : marches) {
-    out.moment.insert(out.moment.end(), march.moment.begin(), march.moment.begin() + static_cast<std::ptrdiff_t>(J));
-    out.moment.back() = 0;
-    out.yield_rotation.push_back(march.yield_kappa * length);
-    out.yield_moment.push_back(march.yield_moment);
-  }
-  // Rows without moment borrow the rotation of the nearest row that has one.
-  for (size_t k = 0; k < K; ++k) {
-    if (out.yield_rotation[k] > 0) continue;
-    for (size_t d = 1; d < K && !(out.yield_rotation[k] > 0); ++d) {
-      if (k + d < K && marches[k + d].yield_kappa > 0)
-        out.yield_rotation[k] = marches[k + d].yield_kappa * length;
-      else if (k >= d && marches[k - d].yield_kappa > 0)
-        out.yield_rotation[k] = marches[k - d].yield_kappa * length;
-    }
-    if (!(out.yield_rotation[k] > 0)) out.yield_rotation[k] = rotation[1];
-  }
-  return out;
 }
 
 bool is_symmetric(const Fibres& f) {
@@ -280,8 +210,7 @@ Rcc make_rcc(const ZoneInput& in) {
   const Peak peak = find_crushing(about_y);
   out.compression = make_compression(about_y, peak, out.EA, in.length);
   out.tension = make_tension(in, about_y.cover, area);
-  const double rupture = std::max({calc_bar_force(in, in.steel.fu), area * about_y.cover.fct, 1e-6 * peak.force});
-  const std::vector<double> force = make_forces(peak.force, rupture);
+  const std::vector<double> force = make_forces(peak.force, calc_rupture_force(in, area, about_y.cover, peak.force));
 
   const auto rotation_y = make_rotations(in, in.section.height, about_y.cover);
   const auto rotation_z = make_rotations(in, in.section.width, about_z.cover);
@@ -297,6 +226,7 @@ Rcc make_rcc(const ZoneInput& in) {
     out.z_neg = is_symmetric(about_z) ? out.z_pos : make_family(about_z, 1, force, rotation_z, in.length);
   }
   add_shear(in, out);
+  out.biaxial_exponent = calc_biaxial_exponent(in, out);
   out.damage_share = 1 - about_y.core.b_c;
   return out;
 }

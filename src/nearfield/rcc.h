@@ -51,6 +51,7 @@ struct Rcc {
   double shear_y = 0, shear_z = 0;  // shear capacity without normal force [N]
   double shear_friction = 0;        // further capacity per newton of compression [-]
   double torsion = 0;               // torsional capacity [N·m]
+  double biaxial_exponent = 1.5;    // p of (M_y / M_y,max)^p + (M_z / M_z,max)^p = 1, 1 to 4
   double damage_share = 0;  // share of the inelastic rotation that is damage (stiffness lost), not plastic: 1 - b
 
   /// Effective flexural stiffness yield_moment / (yield_rotation / length) at the normal force N.
