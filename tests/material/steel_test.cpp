@@ -60,6 +60,27 @@ TEST(Steel, ClosedLoopDissipates) {
   EXPECT_NEAR(work, 3 * 2 * s.fy * range, 2e-3 * work);  // step size
 }
 
+TEST(Steel, NeverGivesBackEnergyInCycles) {
+  SteelInput in = make_input();
+  in.diameter = 0.016;
+  for (const double free_length : {0.0, 0.1, 0.16, 0.3}) {
+    in.free_length = free_length;
+    const Steel s = make_steel(in);
+    SteelState state;
+    double work = 0, least = 0, e0 = 0, s0 = 0, greatest = 0;
+    for (int i = 0; i <= 200000; ++i) {
+      const double e = 3e-7 * i * std::sin(i * 3e-4) - 5e-8 * i;
+      const double stress = advance(s, state, e).stress;
+      ASSERT_LE(std::abs(stress), s.fu * (1 + 1e-9) + s.fy) << e;  // kinematic hardening shifts the range
+      work += 0.5 * (stress + s0) * (e - e0);
+      e0 = e, s0 = stress;
+      least = std::min(least, work), greatest = std::max(greatest, work);
+    }
+    EXPECT_GE(least, -1e-6 * greatest) << free_length;  // trapezoidal rule
+    EXPECT_GT(greatest, 5 * s.fy * 0.05) << free_length;
+  }
+}
+
 TEST(Steel, SlenderBarsBuckle) {
   // Johnson meets Euler at half the yield stress.
   const double pi = 3.14159265358979, limit = std::sqrt(2 * pi * pi * 200e3 / 420) * 0.032 / 4;
