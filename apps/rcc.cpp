@@ -18,6 +18,8 @@
 #include "commands.h"
 #include "product/section_file.h"
 #include "rcc_report.h"
+#include "record/rcc_figures.h"
+#include "record/rcc_page.h"
 #include "record/rcc_report.h"
 #include "results.h"
 #include "terminal.h"
@@ -117,35 +119,14 @@ std::string cell(double value, double scale, int digits) {
   return std::isfinite(value) ? fmt::format("{:.{}f}", value / scale, digits) : "-";
 }
 
-/// Equal but for round-off.
-bool is_same(const record::RccCurve& a, const record::RccCurve& b) {
-  if (a.route != b.route || a.normal_force != b.normal_force || a.rotation.size() != b.rotation.size()) return false;
-  const double scale = a.moment.empty() ? 0 : *std::max_element(a.moment.begin(), a.moment.end());
-  for (size_t j = 0; j < a.rotation.size(); ++j)
-    if (std::abs(a.rotation[j] - b.rotation[j]) > 1e-6 * a.rotation[j] ||
-        std::abs(a.moment[j] - b.moment[j]) > 1e-6 * scale)
-      return false;
-  return true;
-}
-
 /// One line for each curve; equal ones share it.
 void print_table(std::FILE* out, const record::RccReport& r) {
   std::fprintf(out, "\n  %-8s %-12s %8s  %9s  %15s  %15s  %15s  %15s\n", "route", "about", "N", "EI eff", "yield",
                "peak", "ultimate", "residual");
   std::fprintf(out, "  %-8s %-12s %8s  %9s  %15s  %15s  %15s  %15s\n", "", "", "MN", "MNm2", "mrad    kNm",
                "mrad    kNm", "mrad    kNm", "mrad    kNm");
-  std::vector<bool> printed(r.curves.size(), false);
-  for (size_t i = 0; i < r.curves.size(); ++i) {
-    if (printed[i]) continue;
-    const record::RccCurve& c = r.curves[i];
-    std::string about;
-    for (size_t k = i; k < r.curves.size(); ++k) {
-      const record::RccCurve& other = r.curves[k];
-      const bool is_twin = k > i && other.axis == c.axis && other.direction == c.direction;
-      if (is_twin || printed[k] || !is_same(c, other)) continue;
-      printed[k] = true;
-      about += fmt::format("{}{}{}", about.empty() ? "" : " ", other.direction < 0 ? '-' : '+', other.axis);
-    }
+  for (const auto& [curve, about] : record::group_curves(r)) {
+    const record::RccCurve& c = *curve;
     const auto point = [](const record::RccPoint& p) {
       return fmt::format("{:>7} {:>7}", cell(p.rotation, 1e-3, 2), cell(p.moment, unit::kNm, 1));
     };
@@ -176,6 +157,11 @@ Files write_rcc_files(const record::RccReport& r, const std::string& folder) {
   write("axial", "axial.csv", record::axial_csv(r));
   write("states", "states.csv", record::states_csv(r));
   write("json", "rcc.json", record::to_json(r) + "\n");
+  const std::vector<record::Figure> figures = record::make_figures(r);
+  write("page", "rcc.html", record::to_page(r, figures));
+  constexpr double pixels_per_point = 2;
+  for (const record::Figure& f : figures)
+    write(f.id.c_str(), (f.id + ".png").c_str(), record::to_png(f.drawing, pixels_per_point));
   return files;
 }
 

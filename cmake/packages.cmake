@@ -9,6 +9,8 @@ find_package(Threads REQUIRED)
 find_package(HDF5 REQUIRED COMPONENTS C)
 find_package(hwy REQUIRED)
 find_package(Qhull REQUIRED)
+find_package(PkgConfig REQUIRED)
+pkg_check_modules(CAIRO REQUIRED IMPORTED_TARGET cairo)
 find_package(Boost REQUIRED COMPONENTS headers)  # no library of it
 # CHOLMOD; Debian's package has no file for CMake
 find_path(CHOLMOD_INCLUDE cholmod.h PATH_SUFFIXES suitesparse REQUIRED)

@@ -146,7 +146,7 @@ Interaction make_interaction(const Fibres& fibres, Axis axis, int direction, con
                              int count) {
   Interaction out;
   const int side = side_of(axis, direction);
-  std::vector<double> kappa(family.rotation);
+  std::vector<double> kappa = refine_rotations(family, 4);
   for (double& k : kappa) k /= length;
   const double low = family.normal_force.front(), high = family.normal_force.back();
   for (int i = 0; i < count; ++i) {

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -82,7 +83,36 @@ json to_json(const RccState& s) {
   return j;
 }
 
+bool is_same(const RccCurve& a, const RccCurve& b) {
+  if (a.route != b.route || a.normal_force != b.normal_force || a.rotation.size() != b.rotation.size()) return false;
+  const double scale = a.moment.empty() ? 0 : *std::max_element(a.moment.begin(), a.moment.end());
+  for (size_t j = 0; j < a.rotation.size(); ++j)
+    if (std::abs(a.rotation[j] - b.rotation[j]) > 1e-6 * a.rotation[j] ||
+        std::abs(a.moment[j] - b.moment[j]) > 1e-6 * scale)
+      return false;
+  return true;
+}
+
 }  // namespace
+
+std::vector<RccGroup> group_curves(const RccReport& r) {
+  std::vector<RccGroup> out;
+  std::vector<bool> done(r.curves.size(), false);
+  for (size_t i = 0; i < r.curves.size(); ++i) {
+    if (done[i]) continue;
+    const RccCurve& c = r.curves[i];
+    out.push_back({&c, {}});
+    for (size_t k = i; k < r.curves.size(); ++k) {
+      const RccCurve& other = r.curves[k];
+      const bool is_twin = k > i && other.axis == c.axis && other.direction == c.direction;
+      if (is_twin || done[k] || !is_same(c, other)) continue;
+      done[k] = true;
+      out.back().about +=
+          fmt::format("{}{}{}", out.back().about.empty() ? "" : " ", sign_of(other.direction), other.axis);
+    }
+  }
+  return out;
+}
 
 std::string to_json(const RccReport& r) {
   json j;

@@ -85,6 +85,13 @@ struct RccReport {
   std::vector<std::string> notes, not_modelled;
 };
 
+/// Curves of one route and normal force that are equal but for round-off stand together, as "+y -y".
+struct RccGroup {
+  const RccCurve* curve = nullptr;  // the first of them, in the report
+  std::string about;
+};
+std::vector<RccGroup> group_curves(const RccReport&);
+
 /// The report as JSON in SI; bytes depend on the input alone.
 std::string to_json(const RccReport&);
 /// One table (RFC 4180) each, with units in the first line.

@@ -194,7 +194,8 @@ rcc)
   expect 0 "$topple" rcc "$zone"; has out "zone of 0.5 m"; has out "residual"; has out "crushes at"
   expect 0 "$topple" rcc "$zone" --normal-force "3.7 MN" --normal-force 0 -o a/b; has out "3.700"; has out "Wrote a/b/rcc.json"
   for f in points.csv curves.csv interaction.csv axial.csv states.csv rcc.json; do exists a/b/$f; done
-  is_json a/b/rcc.json
+  for f in rcc.html moment_y.png moment_z.png interaction_y.png axial.png section_y_pos_1.png; do exists a/b/$f; done
+  is_json a/b/rcc.json; lacks a/b/rcc.html "http"; has a/b/rcc.html "Not modelled"
   expect 0 "$topple" rcc "$zone" --normal-force "3.7 MN" --normal-force 0 --json; is_json out; has err "residual"
   cmp out a/b/rcc.json || failures=$((failures + 1))
   expect 0 "$topple" rcc "$zone" --normal-force "20 MN"; has out "cannot be carried: the section crushes at 8.91 MN"

@@ -1,0 +1,132 @@
+// The files of `topple rcc` against the library that they come from.
+
+#include "nearfield/rcc.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "base/file.h"
+#include "product/section_file.h"
+
+namespace topple {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::string section = TOPPLE_SOURCE_DIR "/examples/rcc/zone_I.toml";
+
+fs::path run(const std::string& name, const std::string& more) {
+  const fs::path folder = fs::path(testing::TempDir()) / "topple_rcc" / name;
+  fs::remove_all(folder);
+  const std::string command =
+      std::string(TOPPLE_PROGRAM) + " rcc " + section + " " + more + " -o " + folder.string() + " >/dev/null";
+  EXPECT_EQ(std::system(command.c_str()), 0) << command;
+  return folder;
+}
+
+nearfield::Rcc make_expected() {
+  std::vector<Diagnostic> warnings;
+  std::string text;
+  const product::SectionFile f = product::read_section_file(section, warnings, text);
+  nearfield::ZoneInput in;
+  in.section = f.section, in.concrete = f.concrete, in.steel = f.steel, in.length = f.length;
+  return nearfield::make_rcc(in);
+}
+
+TEST(RccCommand, FamiliesAreThoseOfMakeRcc) {
+  const nearfield::Rcc rcc = make_expected();
+  const auto j = nlohmann::json::parse(read_file((run("families", "") / "rcc.json").string()));
+  const nearfield::MomentFamily* expected[] = {&rcc.y_pos, &rcc.y_neg, &rcc.z_pos, &rcc.z_neg};
+  ASSERT_EQ(j["families"].size(), 4u);
+  for (size_t i = 0; i < 4; ++i) {
+    const auto& f = j["families"][i];
+    const size_t K = expected[i]->normal_force.size(), J = expected[i]->rotation.size();
+    EXPECT_EQ(f["rotation"].get<std::vector<double>>(), expected[i]->rotation);
+    const auto moment = f["moment"].get<std::vector<double>>();
+    ASSERT_EQ(moment.size(), K * J);
+    for (size_t k = 0; k < K; ++k) {
+      EXPECT_EQ(f["normal_force"][k].get<double>(), -expected[i]->normal_force[K - 1 - k]) << "compression is positive";
+      for (size_t n = 0; n < J; ++n) EXPECT_EQ(moment[k * J + n], expected[i]->moment[(K - 1 - k) * J + n]);
+    }
+  }
+  EXPECT_EQ(j["stiffness"]["EA"].get<double>(), rcc.EA);
+  EXPECT_EQ(j["capacity"]["crushing"].get<double>(), -rcc.y_pos.normal_force.front());
+}
+
+TEST(RccCommand, CurvesPassThroughTheFamily) {
+  // N = 0 is a level of the family; beyond 0.03 rad the section leaps between branches (tests/nearfield)
+  const auto j = nlohmann::json::parse(read_file((run("curves", "--normal-force 0") / "rcc.json").string()));
+  const auto& family = j["families"][0];
+  const auto rotation = family["rotation"].get<std::vector<double>>();
+  size_t k = 0;
+  while (family["normal_force"][k].get<double>() != 0) ++k;
+  const auto curve_rotation = j["curves"][0]["rotation"].get<std::vector<double>>();
+  const auto curve_moment = j["curves"][0]["moment"].get<std::vector<double>>();
+  int compared = 0;
+  for (size_t n = 0; n < rotation.size() && rotation[n] < 0.03; ++n)
+    for (size_t i = 0; i < curve_rotation.size(); ++i) {
+      if (curve_rotation[i] != rotation[n]) continue;
+      EXPECT_NEAR(curve_moment[i], family["moment"][k * rotation.size() + n].get<double>(), 1e-5 * 533e3);
+      ++compared;
+    }
+  EXPECT_GT(compared, 20);
+}
+
+TEST(RccCommand, TablesHoldTheNumbersOfTheJson) {
+  const fs::path folder = run("tables", "--normal-force \"3.7 MN\" --normal-force \"1 MN\"");
+  const auto j = nlohmann::json::parse(read_file((folder / "rcc.json").string()));
+  std::istringstream lines(read_file((folder / "curves.csv").string()));
+  std::string line;
+  std::getline(lines, line);
+  EXPECT_EQ(line, "route,axis,direction,normal force [N],rotation [rad],moment [N·m]\r");
+  ASSERT_EQ(j["curves"].size(), 8u);
+  EXPECT_EQ(j["curves"][0]["normal_force"].get<double>(), 3.7e6);
+  for (const auto& c : j["curves"])
+    for (size_t i = 0; i < c["rotation"].size(); ++i) {
+      ASSERT_TRUE(std::getline(lines, line));
+      std::vector<std::string> cells;
+      std::istringstream in(line);
+      for (std::string cell; std::getline(in, cell, ',');) cells.push_back(cell);
+      ASSERT_EQ(cells.size(), 6u);
+      EXPECT_EQ(cells[1], c["axis"].get<std::string>());
+      EXPECT_EQ(std::stod(cells[3]), c["normal_force"].get<double>());
+      EXPECT_EQ(std::stod(cells[4]), c["rotation"][i].get<double>());
+      EXPECT_EQ(std::stod(cells[5]), c["moment"][i].get<double>());
+    }
+  EXPECT_FALSE(std::getline(lines, line));
+}
+
+TEST(RccCommand, PicturesArePngsOfTheStatedSize) {
+  const fs::path folder = run("pictures", "--normal-force \"1 MN\"");
+  int pictures = 0;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.path().extension() != ".png") continue;
+    ++pictures;
+    const std::string bytes = read_file(entry.path().string());
+    ASSERT_EQ(bytes.substr(0, 8), std::string("\x89PNG\r\n\x1a\n", 8)) << entry.path();
+    const auto size = [&](size_t at) {
+      int v = 0;
+      for (size_t i = 0; i < 4; ++i) v = v * 256 + static_cast<unsigned char>(bytes[at + i]);
+      return v;
+    };
+    const bool is_section = entry.path().filename().string().rfind("section", 0) == 0;
+    EXPECT_EQ(size(16), is_section ? 1920 : 1800) << entry.path();
+    EXPECT_EQ(size(20), is_section ? 1600 : 1000) << entry.path();
+  }
+  EXPECT_GE(pictures, 8);
+}
+
+TEST(RccCommand, SameInputGivesTheSameBytes) {
+  const fs::path a = run("once", "--normal-force \"2 MN\""), b = run("twice", "--normal-force \"2 MN\" --threads 2");
+  for (const char* name : {"rcc.json", "rcc.html", "states.csv", "moment_y.png"})
+    EXPECT_EQ(read_file((a / name).string()), read_file((b / name).string())) << name;
+}
+
+}  // namespace
+}  // namespace topple
