@@ -199,11 +199,13 @@ struct Ductility {
 Ductility calc_ductility(const SolidConcrete& c, double confinement) {
   Ductility x;
   if (!(confinement > 0) || !(c.plastic_peak > 0)) return x;
-  const double share = confinement / c.law.fc, gain = 1 + c.slope * share, elastic = gain - 2 * c.nu * share;
-  const double peak = c.law.eps_c1 * gain * gain;
-  x.before = (peak - c.effective_peak * elastic) / c.plastic_peak;
-  const double later = std::max(0.0, 0.2 * share - (peak - c.law.eps_c1));
-  x.after = std::max(1.0, (c.tail + later - c.effective_tail * elastic) / c.plastic_tail);
+  // Under constant pressure the effective stresses are 1 + (slope - 2 ν) pressure / S times Q.
+  const double share = confinement / c.law.fc, gain = 1 + c.slope * share, per_share = c.slope - 2 * c.nu;
+  const double at_peak = c.effective_peak * (1 + per_share * share);
+  const double at_tail = (c.effective_peak + c.effective_tail) * (1 + per_share * share / 0.8);
+  const double peak = c.law.eps_c1 * gain * gain, later = std::max(0.0, 0.2 * share - (peak - c.law.eps_c1));
+  x.before = (peak - at_peak) / c.plastic_peak;
+  x.after = std::max(1.0, (c.tail + later - (at_tail - at_peak)) / c.plastic_tail);
   return x;
 }
 
@@ -278,9 +280,10 @@ void calc_residual(ReturnMap& m) {
 
 int count_unknowns(const ReturnMap& m) { return m.crushing && !m.frozen ? 4 : 3; }
 
+/// Sum of the residuals' magnitudes; not a number as soon as one of them is not.
 double calc_size(const ReturnMap& m) {
   double size = 0;
-  for (int i = 0; i < count_unknowns(m); ++i) size = std::max(size, std::abs(m.residual[i]));
+  for (int i = 0; i < count_unknowns(m); ++i) size += std::abs(m.residual[i]);
   return size;
 }
 
@@ -372,6 +375,12 @@ Voigt subtract(const Voigt& a, const Voigt& b) {
   return out;
 }
 
+bool is_finite(const Voigt& v) {
+  double sum = 0;
+  for (double x : v) sum += std::abs(x);
+  return std::isfinite(sum);
+}
+
 double calc_largest(const Vector& v) { return std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])}); }
 
 /// Where the curve falls so steeply that the surface first moves away from the returning stress, Newton's method finds
@@ -386,24 +395,24 @@ int find_bracketed(ReturnMap& m, double tolerance) {
     iterations += std::abs(n);
     return n > 0 ? m.residual[3] : std::nan("");
   };
-  double low = m.kappa_old, at_low = look(low), high = low, at_high = at_low;
+  double low = m.kappa_old, high = low, at_high = look(low);
   while (at_high > 0 && high < 1e3 * m.kappa_old) {
-    low = high, at_low = at_high;
+    low = high;
     high *= 1.05;
     at_high = look(high);
   }
-  for (int i = 0; i < 200 && at_high <= 0 && std::abs(m.residual[3]) > tolerance; ++i) {
-    // Regula falsi, every third time halves.
-    const double share = i % 3 == 2 ? 0.5 : at_low / (at_low - at_high), middle = low + share * (high - low);
-    if (!(middle > low && middle < high)) break;
-    const double at = look(middle);
-    if (at > 0)
-      low = middle, at_low = at;
-    else
-      high = middle, at_high = at;
+  if (!(at_high <= 0)) {
+    m.frozen = false;
+    return -iterations;
   }
+  for (int i = 0; i < 30 && high - low > 1e-9 * high; ++i) {
+    const double middle = 0.5 * (low + high), at = look(middle);
+    (at > 0 ? low : high) = middle;
+  }
+  look(low);
   m.frozen = false;
-  return is_solved(m, tolerance) ? iterations : -iterations;
+  const int polish = find_root(m, tolerance);
+  return polish > 0 ? iterations + polish : -iterations + polish;
 }
 
 /// True if the point is surely elastic: no need for principal directions. `stress` is the effective stress.
@@ -586,7 +595,13 @@ SolidUpdate advance(const SolidConcrete& c, const SolidConcreteState& old, const
   const double limit = std::max(old.tension, c.law.eps_ct);
   SolidUpdate update;
   const Hardening start = calc_hardening(c.law, kappa_old);
-  Voigt trial;
+  Voigt trial{};
+  if (!is_finite(elastic)) {
+    update.converged = false;
+    update.response = make_elastic_response(c, trial, start.integrity);
+    now = old;
+    return update;
+  }
   if (is_elastic(c, elastic, limit, start, trial)) {
     update.response = make_elastic_response(c, trial, start.integrity);
     now = old;
@@ -619,6 +634,7 @@ SolidUpdate advance(const SolidConcrete& c, const SolidConcreteState& old, const
   update.response = make_response(m, principal.axis, m.hardening.integrity, m.hardening.integrity_rate, 0);
 
   now = old;
+  if (!converged) return update;
   now.plastic_step = {};
   if (m.crushing) {
     for (int i = 0; i < 3; ++i) {
@@ -644,6 +660,11 @@ SolidUpdate calc_implex(const SolidConcrete& c, const SolidConcreteState& old, c
   const double limit = std::max(old.tension, c.law.eps_ct) + step_ratio * old.tension_step;
   SolidUpdate update;
   const Hardening start = calc_hardening(c.law, kappa);
+  if (!is_finite(elastic)) {
+    update.converged = false;
+    update.response = make_elastic_response(c, {}, start.integrity);
+    return update;
+  }
   if (is_elastic(c, elastic, limit, start, trial)) {
     update.response = make_elastic_response(c, trial, start.integrity);
     return update;
