@@ -84,4 +84,21 @@ MomentFamily make_family(const Fibres& fibres, int direction, const std::vector<
   return out;
 }
 
+double interpolate_EI(const MomentFamily& f, double N, double length) {
+  const size_t K = f.normal_force.size();
+  const auto EI = [&](size_t k) {
+    // Rows without moment take the stiffness of the next row inside.
+    size_t i = k;
+    while (i + 1 < K && i < K / 2 && !(f.yield_moment[i] > 0)) ++i;
+    while (i > 0 && i >= K / 2 && !(f.yield_moment[i] > 0)) --i;
+    return f.yield_moment[i] / f.yield_rotation[i] * length;
+  };
+  if (N <= f.normal_force.front()) return EI(0);
+  if (N >= f.normal_force.back()) return EI(K - 1);
+  const size_t k =
+      static_cast<size_t>(std::upper_bound(f.normal_force.begin(), f.normal_force.end(), N) - f.normal_force.begin());
+  const double s = (N - f.normal_force[k - 1]) / (f.normal_force[k] - f.normal_force[k - 1]);
+  return (1 - s) * EI(k - 1) + s * EI(k);
+}
+
 }  // namespace topple::nearfield

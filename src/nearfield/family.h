@@ -24,4 +24,7 @@ double calc_rupture_force(const ZoneInput&, double concrete_area, const material
 MomentFamily make_family(const Fibres&, int direction, const std::vector<double>& force,
                          const std::vector<double>& rotation, double length);
 
+/// Effective stiffness yield_moment / (yield_rotation / length) at the normal force N [N·m²].
+double interpolate_EI(const MomentFamily&, double N, double length);
+
 }  // namespace topple::nearfield

@@ -6,10 +6,10 @@
 
 #include "base/error.h"
 #include "base/unit.h"
+#include "nearfield/axial.h"
 #include "nearfield/biaxial.h"
 #include "nearfield/family.h"
 #include "nearfield/fibres.h"
-#include "nearfield/section_kernel.h"
 #include "nearfield/zone.h"
 
 namespace topple::nearfield {
@@ -33,56 +33,6 @@ bool is_symmetric(const Fibres& f) {
     if (std::abs(here - mirrored) > 1e-9 * here) return false;
   }
   return true;
-}
-
-/// Force against plastic shortening, from 0.75 of the peak through the peak to what buckled bars leave.
-AxialCurve make_compression(const Fibres& f, const Peak& peak, double EA, double length) {
-  const PackedSection packed = pack_section(f);
-  const auto force = [&](double e) { return std::max(0.0, -calc_resultants(packed, -e, 0).N); };
-  double low = 0, high = peak.strain;
-  for (int i = 0; i < 50; ++i) {
-    const double e = 0.5 * (low + high);
-    (force(e) < 0.75 * peak.force ? low : high) = e;
-  }
-  AxialCurve out;
-  const double start = high, offset = start - force(start) / EA;
-  const auto add = [&](double e) {
-    const double F = force(e), u = length * (e - F / EA - offset);
-    if (!out.displacement.empty() && u <= out.displacement.back() * (1 + 1e-12) + 1e-12 * length) return;
-    out.displacement.push_back(out.displacement.empty() ? 0 : u);
-    out.force.push_back(F);
-  };
-  for (int i = 0; i <= 5; ++i) add(start + (peak.strain - start) * i / 5.0);
-  constexpr int points = 28;
-  double x = 0.15 * peak.strain;
-  const double ratio = std::pow(std::max(1.01, (1 - peak.strain) / x), 1.0 / (points - 1));
-  for (int i = 0; i < points; ++i, x *= ratio) add(std::min(1.0, peak.strain + x));
-  return out;
-}
-
-/// Bars yield, harden and break; a section with few bars starts with its tensile strength and opens one crack.
-AxialCurve make_tension(const ZoneInput& in, const material::Concrete& concrete, double area) {
-  const double yield = calc_bar_force(in, in.steel.fy), rupture = calc_bar_force(in, in.steel.fu);
-  const double cracking = area * concrete.fct;
-  const double eps_pu = in.steel.eps_u - in.steel.fu / in.steel.Es;
-  const double broken = in.length * std::max(eps_pu, 1e-4);
-  AxialCurve out;
-  const auto add = [&](double u) {
-    const double bars = u <= broken ? yield + (rupture - yield) * u / broken : 0;
-    const double crack = area * material::calc_tension(concrete, concrete.eps_ct + u / in.length).stress;
-    out.displacement.push_back(u);
-    out.force.push_back(std::max(bars, crack));
-  };
-  add(0);
-  if (cracking > yield) {
-    const double opened = std::min(concrete.eps_tu * in.length, 0.9 * broken);
-    for (double share : {0.05, 0.1, 0.2, 0.35, 0.6, 1.0}) add(share * opened);
-  }
-  for (double share : {0.25, 0.5, 0.75, 1.0})
-    if (share * broken > out.displacement.back()) add(share * broken);
-  out.displacement.push_back(1.001 * broken);
-  out.force.push_back(0);
-  return out;
 }
 
 /// Shear and torsion, docs/theory/rcc.md (12) to (16).
@@ -128,23 +78,6 @@ void add_shear(const ZoneInput& in, Rcc& out) {
   out.GA = 5.0 / 6 * G * kept * s.area();
   out.GJ = 0.2 * G * kept * saint_venant;
   if (kept <= 0) out.GA = out.GJ = 0;
-}
-
-double interpolate_EI(const MomentFamily& f, double N, double length) {
-  const size_t K = f.normal_force.size();
-  const auto EI = [&](size_t k) {
-    // Rows without moment take the stiffness of the next row inside.
-    size_t i = k;
-    while (i + 1 < K && i < K / 2 && !(f.yield_moment[i] > 0)) ++i;
-    while (i > 0 && i >= K / 2 && !(f.yield_moment[i] > 0)) --i;
-    return f.yield_moment[i] / f.yield_rotation[i] * length;
-  };
-  if (N <= f.normal_force.front()) return EI(0);
-  if (N >= f.normal_force.back()) return EI(K - 1);
-  const size_t k =
-      static_cast<size_t>(std::upper_bound(f.normal_force.begin(), f.normal_force.end(), N) - f.normal_force.begin());
-  const double s = (N - f.normal_force[k - 1]) / (f.normal_force[k] - f.normal_force[k - 1]);
-  return (1 - s) * EI(k - 1) + s * EI(k);
 }
 
 }  // namespace
@@ -209,7 +142,9 @@ Rcc make_rcc(const ZoneInput& in) {
 
   const Peak peak = find_crushing(about_y);
   out.compression = make_compression(about_y, peak, out.EA, in.length);
-  out.tension = make_tension(in, about_y.cover, area);
+  const TensionBars bars{calc_bar_force(in, in.steel.fy), calc_bar_force(in, in.steel.fu),
+                         in.steel.eps_u - in.steel.fu / in.steel.Es};
+  out.tension = make_tension(bars, about_y.cover, area, in.length);
   const std::vector<double> force = make_forces(peak.force, calc_rupture_force(in, area, about_y.cover, peak.force));
 
   const auto rotation_y = make_rotations(in, in.section.height, about_y.cover);

@@ -80,7 +80,7 @@ ResidualCage make_residual_cage(const ZoneInput&, double destroyed_length, doubl
 /// Slab or wall zone per metre of hinge line; unreinforced panels have only their tensile strength.
 struct PanelRcc {
   double moment_pos = 0, moment_neg = 0;              // yield moments, bottom and top reinforcement [N·m/m]
-  double ultimate_rotation = 0;                       // rupture of the bars [rad]
+  double ultimate_rotation = 0;                       // rupture of the bars; crushing is in make_shell_rcc [rad]
   double tension = 0, compression = 0;                // membrane capacities [N/m]
   double shear_in_plane = 0, shear_out_of_plane = 0;  // [N/m]
   double EA = 0;                                      // membrane stiffness times length [N/m]
