@@ -55,10 +55,15 @@ void read_zone(const Reading& reading, TableReader& root, SectionFile& out) {
 
 SectionFile read_section_file_text(const std::string& text, const std::string& name,
                                    std::vector<Diagnostic>& warnings) {
+  const std::string bytes = without_mark(text);
+  SectionFile out = read_section_document(parse_document(bytes, name), name, warnings);
+  out.text = bytes;
+  return out;
+}
+
+SectionFile read_section_document(const Node& document, const std::string& name, std::vector<Diagnostic>& warnings) {
   SectionFile out;
   out.path = name;
-  out.text = without_mark(text);
-  const Node document = parse_document(out.text, name);
   Complaints complaints(name);
   for (const char* key : {"grid", "storeys", "columns"})
     if (const Entry* entry = document.find(key)) {

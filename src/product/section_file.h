@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "product/document.h"
 #include "product/plan.h"
 
 namespace topple::product {
@@ -29,6 +30,8 @@ struct SectionFile {
 
 /// Reads and checks a section file. Every complaint is collected; throws InputError if one of them is an error.
 SectionFile read_section_file_text(const std::string& text, const std::string& name, std::vector<Diagnostic>& warnings);
+/// The same from a parsed text, without its bytes.
+SectionFile read_section_document(const Node&, const std::string& name, std::vector<Diagnostic>& warnings);
 /// Reads a file. `text_out` receives its bytes, also on error.
 SectionFile read_section_file(const std::string& path, std::vector<Diagnostic>& warnings, std::string& text_out);
 
