@@ -102,7 +102,7 @@ TEST(FuzzyFile, ComplainsAtThePlaceOfTheMistake) {
       {"concrete.fc = \"25 N/mm2\"", "E202", "a table is wanted", 1, 15},
       {"concrete.fc = { }", "E207", "exactly one", 1, 10},
       {"concrete.fc = { triangular = [\"10 N/mm2\", \"25 N/mm2\", \"45 N/mm2\"], colour = 1 }", "E203", "colour", 1,
-       71},
+       68},
       {"concrete.Ec = { triangular = [\"0.5 GPa\", \"30 GPa\", \"45 GPa\"] }", "E205", "Ec", 1, 10},
       {"concrete.fc = { triangular = [\"7 N/mm2\", \"25 N/mm2\", \"45 N/mm2\"] }\nconcrete.fct = { formula = "
        "\"1.4 * ((fc - 8)/10)^(2/3)\" }",
