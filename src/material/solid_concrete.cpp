@@ -540,6 +540,71 @@ SolidResponse make_response(const ReturnMap& m, const Matrix& axis, double integ
   return out;
 }
 
+/// The new history, and the response if it is `wanted`.
+SolidUpdate advance_history(const SolidConcrete& c, const SolidConcreteState& old, const Voigt& strain,
+                            SolidConcreteState& now, bool wanted) {
+  const Voigt elastic = subtract(strain, old.plastic);
+  const double kappa_old = std::max(old.compression, c.law.eps_linear);
+  const double limit = std::max(old.tension, c.law.eps_ct);
+  SolidUpdate update;
+  const Hardening start = calc_hardening(c.law, kappa_old);
+  Voigt trial{};
+  if (!is_finite(elastic)) {
+    update.converged = false;
+    update.response = make_elastic_response(c, trial, start.integrity);
+    now = old;
+    return update;
+  }
+  if (is_elastic(c, elastic, limit, start, trial)) {
+    if (wanted) update.response = make_elastic_response(c, trial, start.integrity);
+    now = old;
+    now.plastic_step = {};
+    now.compression_step = now.tension_step = now.crack = 0;
+    now.confinement = start.integrity * calc_pressure(trial);
+    return update;
+  }
+  const Principal principal = find_principal(elastic);
+  ReturnMap m = make_return_map(c, principal.value, limit, kappa_old, start, true);
+  const double tolerance = 1e-13 * (calc_largest(principal.value) + c.law.eps_linear);
+
+  int iterations = solve_cracks(m, tolerance);
+  bool converged = iterations > 0;
+  update.iterations = std::abs(iterations) - 1;
+  if (calc_surface(c, m.stress.value, m.start.effective) > 1e-13 * m.start.effective) {
+    m.crushing = true;
+    m.ductility = calc_ductility(c, old.confinement);
+    const Vector before = m.u;
+    iterations = find_root(m, tolerance);
+    if (iterations < 0) {
+      update.iterations -= iterations;
+      m.u = before;
+      iterations = find_bracketed(m, tolerance);
+    }
+    converged = iterations > 0;
+    update.iterations += std::abs(iterations);
+  }
+  update.converged = converged;
+  if (wanted) update.response = make_response(m, principal.axis, m.hardening.integrity, m.hardening.integrity_rate, 0);
+
+  now = old;
+  if (!converged) return update;
+  now.plastic_step = {};
+  if (m.crushing) {
+    for (int i = 0; i < 3; ++i) {
+      const Voigt n = make_dyad(principal.axis[i]);
+      for (int a = 0; a < 6; ++a) now.plastic_step[a] += (a < 3 ? 1 : 2) * m.multiplier * m.flow[i] * n[a];
+    }
+    for (int a = 0; a < 6; ++a) now.plastic[a] = old.plastic[a] + now.plastic_step[a];
+    now.compression = m.kappa;
+  }
+  now.compression_step = m.kappa - kappa_old;
+  if (m.stress.cracking) now.tension = m.u[0];
+  now.tension_step = m.stress.cracking ? m.u[0] - limit : 0;
+  now.crack = std::max(0.0, m.u[0] - m.stress.value[0] / c.law.Ec);
+  now.confinement = std::max(0.0, -m.hardening.integrity * m.stress.value[0]);
+  return update;
+}
+
 }  // namespace
 
 SolidConcrete make_solid_concrete(const SolidConcreteInput& in) {
@@ -590,65 +655,15 @@ SolidConcrete make_solid_concrete(const SolidConcreteInput& in) {
 
 SolidUpdate advance(const SolidConcrete& c, const SolidConcreteState& old, const std::array<double, 6>& strain,
                     SolidConcreteState& now) {
-  const Voigt elastic = subtract(strain, old.plastic);
-  const double kappa_old = std::max(old.compression, c.law.eps_linear);
-  const double limit = std::max(old.tension, c.law.eps_ct);
-  SolidUpdate update;
-  const Hardening start = calc_hardening(c.law, kappa_old);
-  Voigt trial{};
-  if (!is_finite(elastic)) {
-    update.converged = false;
-    update.response = make_elastic_response(c, trial, start.integrity);
-    now = old;
-    return update;
-  }
-  if (is_elastic(c, elastic, limit, start, trial)) {
-    update.response = make_elastic_response(c, trial, start.integrity);
-    now = old;
-    now.plastic_step = {};
-    now.compression_step = now.tension_step = now.crack = 0;
-    now.confinement = start.integrity * calc_pressure(trial);
-    return update;
-  }
-  const Principal principal = find_principal(elastic);
-  ReturnMap m = make_return_map(c, principal.value, limit, kappa_old, start, true);
-  const double tolerance = 1e-13 * (calc_largest(principal.value) + c.law.eps_linear);
+  return advance_history(c, old, strain, now, true);
+}
 
-  int iterations = solve_cracks(m, tolerance);
-  bool converged = iterations > 0;
-  update.iterations = std::abs(iterations) - 1;
-  if (calc_surface(c, m.stress.value, m.start.effective) > 1e-13 * m.start.effective) {
-    m.crushing = true;
-    m.ductility = calc_ductility(c, old.confinement);
-    const Vector before = m.u;
-    iterations = find_root(m, tolerance);
-    if (iterations < 0) {
-      update.iterations -= iterations;
-      m.u = before;
-      iterations = find_bracketed(m, tolerance);
-    }
-    converged = iterations > 0;
-    update.iterations += std::abs(iterations);
-  }
-  update.converged = converged;
-  update.response = make_response(m, principal.axis, m.hardening.integrity, m.hardening.integrity_rate, 0);
-
-  now = old;
-  if (!converged) return update;
-  now.plastic_step = {};
-  if (m.crushing) {
-    for (int i = 0; i < 3; ++i) {
-      const Voigt n = make_dyad(principal.axis[i]);
-      for (int a = 0; a < 6; ++a) now.plastic_step[a] += (a < 3 ? 1 : 2) * m.multiplier * m.flow[i] * n[a];
-    }
-    for (int a = 0; a < 6; ++a) now.plastic[a] = old.plastic[a] + now.plastic_step[a];
-    now.compression = m.kappa;
-  }
-  now.compression_step = m.kappa - kappa_old;
-  if (m.stress.cracking) now.tension = m.u[0];
-  now.tension_step = m.stress.cracking ? m.u[0] - limit : 0;
-  now.crack = std::max(0.0, m.u[0] - m.stress.value[0] / c.law.Ec);
-  now.confinement = std::max(0.0, -m.hardening.integrity * m.stress.value[0]);
+SolidUpdate advance_implex(const SolidConcrete& c, const SolidConcreteState& old, const std::array<double, 6>& strain,
+                           double step_ratio, SolidConcreteState& now) {
+  SolidUpdate update = calc_implex(c, old, strain, step_ratio);
+  const SolidUpdate history = advance_history(c, old, strain, now, false);
+  update.converged = update.converged && history.converged;
+  update.iterations += history.iterations;
   return update;
 }
 

@@ -68,12 +68,16 @@ struct SolidUpdate {
 SolidUpdate advance(const SolidConcrete&, const SolidConcreteState& old, const std::array<double, 6>& strain,
                     SolidConcreteState& now);
 
-/// IMPL-EX (Oliver, Huespe & Cante 2008): the stress with the history extrapolated from the last step, step_ratio = new
-/// step / last step. The tangent is consistent, symmetric and positive definite down to the floor, so that Newton's
-/// method with a symmetric factorisation converges; the error falls with the step. Follow it with `advance` at the
-/// converged strain to get the next state.
+/// IMPL-EX (Oliver, Huespe & Cante 2008), for structures that soften: the stress with the history extrapolated from the
+/// last step, step_ratio = new step / last step; 0 where the loading turns round. The tangent is consistent, symmetric
+/// and positive definite down to the floor, so that Newton's method with a symmetric factorisation converges in two or
+/// three iterations; the error falls with the step. Follow it with `advance` at the converged strain for the next
+/// state.
 SolidUpdate calc_implex(const SolidConcrete&, const SolidConcreteState& old, const std::array<double, 6>& strain,
                         double step_ratio = 1);
+/// Both at once: the response of calc_implex with the history of advance.
+SolidUpdate advance_implex(const SolidConcrete&, const SolidConcreteState& old, const std::array<double, 6>& strain,
+                           double step_ratio, SolidConcreteState& now);
 
 /// Opening of the widest crack at a point now: crack strain times length [m].
 double calc_crack_width(const SolidConcrete&, const SolidConcreteState&);
