@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/unit.h"
+#include "cpu_time.h"
 #include "nearfield/fibres.h"
 #include "nearfield/section_kernel.h"
 
@@ -75,8 +76,17 @@ void walk(benchmark::State& state, const Calc& calc) {
   }
 }
 void rcc_section(benchmark::State& state) {
-  const PackedSection f = pack_section(make_fibres(make_column(), Axis::Y));
+  const Fibres plain = make_fibres(make_column(), Axis::Y);
+  const PackedSection f = pack_section(plain);
   walk(state, [&](double e) { return calc_resultants(f, e, 0.02); });
+  // the plain laws in the same run
+  const auto time = [](const auto& calc) {
+    const double begin = cpu_time();
+    for (int i = 0; i < 200000; ++i) benchmark::DoNotOptimize(calc(-1e-3 + 1e-8 * i));
+    return cpu_time() - begin;
+  };
+  const double lanes = time([&](double e) { return calc_resultants(f, e, 0.02); });
+  state.counters["times_plain"] = time([&](double e) { return calc_resultants(plain, e, 0.02); }) / lanes;
 }
 BENCHMARK(rcc_section);
 void rcc_section_singly(benchmark::State& state) {

@@ -116,8 +116,7 @@ ColumnEnvelope push_column(const ColumnInput& asked) {
 
   constexpr int slices = 80;
   const double dx = L / slices;
-  std::vector<double> w(slices + 1, 0.0), fresh(w);
-  double yield_drift = 0;
+  double yield_drift = 0, F = 0;
   for (int j = 1; j <= march.last; ++j) {
     const size_t i = static_cast<size_t>(j);
     const double M = march.moment[i];
@@ -134,32 +133,46 @@ ColumnEnvelope push_column(const ColumnInput& asked) {
       const double strain = march.eps_0[i] + (march.origin + kappa[i]) * outermost;
       slip = elastic * std::clamp(in.zone.steel.Es * strain, 0.0, in.zone.steel.fy) * bar / (8 * bond);
     }
-    bool settled = false;
-    double F = 0;
-    for (int iteration = 0; iteration < 200 && !settled; ++iteration) {
-      F = (M - P * w[slices]) / L;
-      const double sliding = F / GA;
-      double slope = slip, k0 = branch.calc_kappa(M);
-      fresh[0] = 0;
+    // The deflection is integrated from the foot up; what the moment misses at the top by is linear in F but for
+    // cracking.
+    const auto deflect = [&](double push) {
+      const double sliding = push / GA;
+      double slope = slip, w = 0, k0 = branch.calc_kappa(M);
       for (int n = 1; n <= slices; ++n) {
-        const size_t a = static_cast<size_t>(n);
-        const double x = n * dx, k1 = branch.calc_kappa(M - F * x - P * w[a]);
-        // trapezium of curvature, slope in the middle of a slice, the plastic rotation in the hinge's middle
-        const double middle = slope + (3 * k0 + k1) / 8 * dx;
-        const double turned = std::clamp((x - 0.5 * hinge) / dx, 0.0, 1.0);
-        fresh[a] = fresh[a - 1] + (middle + sliding + plastic * turned) * dx;
+        const double x = n * dx, turned = plastic * std::clamp((x - 0.5 * hinge) / dx, 0.0, 1.0);
+        const double ahead = w + (slope + 0.5 * k0 * dx + turned + sliding) * dx;
+        const double k1 = branch.calc_kappa(M - push * x - P * ahead);
+        // trapezium of curvature, the plastic rotation in the hinge's middle
+        w += (slope + (2 * k0 + k1) / 6 * dx + turned + sliding) * dx;
         slope += 0.5 * (k0 + k1) * dx, k0 = k1;
       }
-      settled = std::abs(fresh[slices] - w[slices]) <= 1e-9 * L;
-      w = fresh;
+      return w;
+    };
+    // Secants from the last force on.
+    double w = deflect(F), miss = M - F * L - P * w, before = F, missed = miss;
+    F += miss / L;
+    bool settled = false;
+    for (int iteration = 0; iteration < 60 && !settled; ++iteration) {
+      w = deflect(F), miss = M - F * L - P * w;
+      settled = std::abs(miss) <= 1e-9 * M;
+      if (settled || miss == missed) break;
+      const double next = F - miss * (F - before) / (miss - missed);
+      before = F, missed = miss, F = next;
     }
-    out.converged = out.converged && settled;
-    p.drift = w[slices] / L, p.force = (M - P * w[slices]) / L;
+    if (!settled) {
+      out.converged = false;
+      break;
+    }
+    p.drift = w / L, p.force = F;
     p.slip = slip * L, p.shear = p.force / GA * L;
     if (kappa[i] <= march.yield_kappa) yield_drift = p.drift;
     p.shear_limit = calc_shear_limit(in, yield_drift > 0 ? p.drift / yield_drift : 1);
     if (out.shear_from < 0 && p.force > p.shear_limit) out.shear_from = p.drift;
     out.largest_force = std::max(out.largest_force, p.force);
+    if (out.points.empty() && !(p.force > 0 && p.drift > 0)) {
+      out.ending = ColumnEnding::Buckles;
+      break;
+    }
     out.points.push_back(p);
     if (p.drift >= in.largest_drift) break;
     if (j == march.last && march.last + 1 < static_cast<int>(kappa.size())) out.ending = ColumnEnding::LostCompression;

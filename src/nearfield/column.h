@@ -32,7 +32,8 @@ struct ColumnPoint {
   double shear_limit = 0;  // Sezen & Moehle, at the displacement ductility reached [N]
 };
 
-enum class ColumnEnding { ReachedDrift, LostCompression, LostMoment };
+/// Buckles: without a push already, as the load is above Euler's for the column as it deforms.
+enum class ColumnEnding { ReachedDrift, LostCompression, LostMoment, Buckles };
 
 struct ColumnEnvelope {
   std::vector<ColumnPoint> points;  // drift need not rise where the column snaps back

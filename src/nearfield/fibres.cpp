@@ -71,7 +71,7 @@ double calc_tie_stress(const ZoneInput& in) {
 material::Steel make_bar(const ZoneInput& in, double diameter) {
   material::SteelInput steel;
   steel.fy = in.steel.fy, steel.fu = in.steel.fu, steel.Es = in.steel.Es, steel.eps_u = in.steel.eps_u;
-  // Without ties, or with the cover gone, bars are free over the whole zone at most.
+  // Without ties bars are free over the whole zone.
   const double spacing = in.section.tie_spacing;
   steel.free_length = spacing > 0 && in.section.tie_diameter > 0 ? std::min(spacing, in.length) : in.length;
   steel.diameter = diameter;

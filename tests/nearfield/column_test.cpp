@@ -136,6 +136,24 @@ TEST(ColumnPhysics, ElasticColumnFollowsTheClosedForm) {
   }
 }
 
+TEST(ColumnPhysics, SlenderColumnBucklesAtEulersLoad) {
+  ColumnInput in = make_column(specimens[1]);
+  in.zone.concrete.fc = 3000 * MPa, in.zone.concrete.fct = 3000 * MPa, in.zone.concrete.eps_c1 = 0.5;
+  in.zone.concrete.Gf = in.zone.concrete.Gcl = 1e12;
+  in.zone.steel.fy = in.zone.steel.fu = 5000 * MPa;
+  in.bars_slip = false, in.height = 8, in.largest_drift = 0.002;
+  const double euler = 2.467401 * make_rcc(in.zone).EI_y / (in.height * in.height);
+  // Bars displace concrete: 0.2 % as above.
+  in.compression = 0.99 * euler;
+  const ColumnEnvelope below = push_column(in);
+  EXPECT_EQ(below.ending, ColumnEnding::ReachedDrift);
+  EXPECT_GT(below.largest_force, 0);
+  in.compression = 1.01 * euler;
+  const ColumnEnvelope above = push_column(in);
+  EXPECT_EQ(above.ending, ColumnEnding::Buckles);
+  EXPECT_TRUE(above.points.empty());
+}
+
 TEST(Column, SlipSoftensBeforeYieldOnly) {
   ColumnInput in = make_column(specimens[0]);
   const ColumnEnvelope slips = push_column(in);
