@@ -104,6 +104,12 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   rcc->add_option("--zone", a.zone, "end of the member: foot (start) or top (end)")
       ->check(CLI::IsMember({"foot", "top", "start", "end"}))
       ->needs(member);
+  CLI::Option* fuzzy = rcc->add_option("--fuzzy", a.fuzzy, "file of fuzzy inputs (TOML): also fuzzy curves");
+  fuzzy->excludes(member);
+  rcc->add_option("--axis", a.axis, "of the fuzzy curves: y or z")->check(CLI::IsMember({"y", "z"}))->needs(fuzzy);
+  rcc->add_option("--direction", a.direction, "of the fuzzy curves: + or -")
+      ->check(CLI::IsMember({"+", "-"}))
+      ->needs(fuzzy);
   rcc->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones");
   rcc->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
   rcc->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");

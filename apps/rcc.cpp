@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,7 @@
 #include "collapse/member_zone.h"
 #include "commands.h"
 #include "product/section_file.h"
+#include "rcc_fuzzy.h"
 #include "rcc_report.h"
 #include "record/rcc_figures.h"
 #include "record/rcc_page.h"
@@ -37,7 +39,7 @@ struct Task {
   std::vector<double> normal_forces;  // tension positive; none: to be chosen [N]
   std::string title, name;            // of the file, of the zone
   std::vector<std::string> notes;
-  SourcePosition where_length;  // of the zone's length, none for a member of a plan
+  product::SectionFile file;  // of a section file
 };
 
 nearfield::ZoneInput to_zone(const product::SectionFile& f) {
@@ -56,7 +58,7 @@ Task read_section_task(const Arguments& a, std::vector<Diagnostic>& warnings, st
   task.normal_forces = f.normal_forces;
   task.title = f.title;
   task.name = f.section.name;
-  task.where_length = f.where_length;
+  task.file = f;
   const double longest = nearfield::calc_largest_zone_length(f.concrete);
   if (!(f.length < longest))
     throw InputError(std::vector<Diagnostic>{
@@ -143,13 +145,24 @@ void print_table(std::FILE* out, const record::RccReport& r) {
                r.crushing_force / unit::MN, r.rupture_force / unit::MN);
 }
 
-Files write_rcc_files(const record::RccReport& r, const std::string& folder) {
-  make_folder(folder);
+/// Puts files into a folder and remembers them.
+struct Writer {
+  std::string folder;
   Files files;
-  const auto write = [&](const char* what, const char* name, const std::string& bytes) {
+  void write(const std::string& what, const std::string& name, const std::string& bytes) {
     const std::string path = (fs::path(folder) / name).string();
     replace_file(path, bytes);
     files.emplace_back(what, path);
+  }
+  void write_pictures(const std::vector<record::Figure>& figures) {
+    constexpr double pixels_per_point = 2;
+    for (const record::Figure& f : figures) write(f.id, f.id + ".png", record::to_png(f.drawing, pixels_per_point));
+  }
+};
+
+void write_rcc_files(const record::RccReport& r, Writer& out) {
+  const auto write = [&out](const char* what, const char* name, const std::string& bytes) {
+    out.write(what, name, bytes);
   };
   write("points", "points.csv", record::points_csv(r));
   write("curves", "curves.csv", record::curves_csv(r));
@@ -159,21 +172,71 @@ Files write_rcc_files(const record::RccReport& r, const std::string& folder) {
   write("json", "rcc.json", record::to_json(r) + "\n");
   const std::vector<record::Figure> figures = record::make_figures(r);
   write("page", "rcc.html", record::to_page(r, figures));
-  constexpr double pixels_per_point = 2;
-  for (const record::Figure& f : figures)
-    write(f.id.c_str(), (f.id + ".png").c_str(), record::to_png(f.drawing, pixels_per_point));
-  return files;
+  out.write_pictures(figures);
+}
+
+void write_fuzzy_files(const record::RccFuzzyReport& r, Writer& out) {
+  out.write("fan", "fan.csv", record::fan_csv(r));
+  out.write("samples", "samples.csv", record::samples_csv(r));
+  out.write("originals", "originals.csv", record::originals_csv(r));
+  out.write("fuzzy_json", "fuzzy.json", record::to_json(r) + "\n");
+  const std::vector<record::Figure> figures = record::make_figures(r);
+  out.write("fuzzy_page", "fuzzy.html", record::to_page(r, figures));
+  out.write_pictures(figures);
+}
+
+void print_fuzzy(std::FILE* out, const record::RccFuzzyReport& r) {
+  const int width = find_width(out);
+  for (const record::RccFan& f : r.fans) {
+    std::fprintf(out, "\n  N = %.4g MN, %zu runs\n", f.normal_force / unit::MN, f.originals.size());
+    for (const std::string& s : record::describe_switch(r, f)) std::fprintf(out, "    %s\n", wrap(s, width, 4).c_str());
+    for (const record::RccOrdinate& o : f.ordinates) {
+      std::string line = fmt::format("    {:<18}", o.name);
+      for (const record::RccInterval& i : o.cuts)
+        line += fmt::format("  {:g}: {:.0f} to {:.0f}", i.alpha, i.left / unit::kNm, i.right / unit::kNm);
+      std::fprintf(out, "%s kNm\n", line.c_str());
+    }
+    if (f.failed > 0) std::fprintf(out, "    %d runs failed; first: %s\n", f.failed, wrap(f.failure, width, 4).c_str());
+    std::fprintf(out, "    %s\n", wrap(f.ending, width, 4).c_str());
+  }
+}
+
+/// The fuzzy report, or nothing if it was cancelled.
+std::optional<record::RccFuzzyReport> compute_fuzzy(const Arguments& a, const product::FuzzyFile& fuzzy,
+                                                    const Task& task, const record::RccReport& crisp,
+                                                    const std::atomic<bool>& cancel) {
+  FuzzyTask f;
+  f.normal_forces = task.normal_forces;
+  f.axis = a.axis[0], f.direction = a.direction == "-" ? -1 : 1;
+  f.threads = a.threads;
+  ProgressLine progress;
+  auto r = make_fuzzy_report(task.file, fuzzy, f, cancel, [&](const std::string& words) { progress.say(words); });
+  progress.clear();
+  if (!r) return r;
+  r->title = fuzzy.title, r->zone = crisp.zone;
+  r->source = crisp.source, r->sha256 = crisp.sha256;
+  r->inputs_source = fuzzy.path, r->inputs_sha256 = calc_sha256(fuzzy.text);
+  r->program_version = crisp.program_version;
+  r->section = crisp.inputs, r->not_modelled = crisp.not_modelled;
+  return r;
 }
 
 }  // namespace
 
-int compute_rcc(const Arguments& a, const std::atomic<bool>&) {
+int compute_rcc(const Arguments& a, const std::atomic<bool>& cancel) {
   std::FILE* out = a.json ? stderr : stdout;
   std::vector<Diagnostic> warnings;
   std::string text;
   try {
     const std::vector<double> typed = read_forces(a.normal_forces);
     Task task = a.member.empty() ? read_section_task(a, warnings, text) : read_member_task(a, warnings, text);
+    std::optional<product::FuzzyFile> fuzzy;
+    if (!a.fuzzy.empty()) {
+      std::string section_text;
+      std::swap(section_text, text);
+      fuzzy = product::read_fuzzy_file(a.fuzzy, task.file, warnings, text);  // complaints show its lines
+      std::swap(section_text, text);
+    }
     for (const Diagnostic& d : warnings) std::fputs(render(d, text, has_colour(stderr)).c_str(), stderr);
     const nearfield::Rcc rcc = nearfield::make_rcc(task.zone);
     if (!typed.empty()) {
@@ -196,10 +259,23 @@ int compute_rcc(const Arguments& a, const std::atomic<bool>&) {
     std::fprintf(out, "%s: %s\n", report.title.c_str(), report.zone.c_str());
     for (const std::string& note : report.notes) std::fprintf(out, "  %s\n", note.c_str());
     print_table(out, report);
-    Files files;
-    if (!a.output.empty()) files = write_rcc_files(report, a.output);
-    for (const auto& [what, path] : files) std::fprintf(out, "Wrote %s\n", path.c_str());
-    if (a.json) std::printf("%s\n", record::to_json(report).c_str());
+    std::optional<record::RccFuzzyReport> fans;
+    if (fuzzy) {
+      fans = compute_fuzzy(a, *fuzzy, task, report, cancel);
+      if (!fans) {
+        std::fprintf(stderr, "Cancelled. Nothing was written.\n");
+        return kRunFailed;
+      }
+      print_fuzzy(out, *fans);
+    }
+    if (!a.output.empty()) {
+      make_folder(a.output);
+      Writer writer{a.output, {}};
+      write_rcc_files(report, writer);
+      if (fans) write_fuzzy_files(*fans, writer);
+      for (const auto& [what, path] : writer.files) std::fprintf(out, "Wrote %s\n", path.c_str());
+    }
+    if (a.json) std::printf("%s\n", (fans ? record::to_json(*fans) : record::to_json(report)).c_str());
     return kOk;
   } catch (const InputError& e) { return refuse(e, warnings, text, a.json); }
 }

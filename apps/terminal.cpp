@@ -55,20 +55,45 @@ std::string ProgressLine::words(double done, double whole, double elapsed) {
                      left);
 }
 
-void ProgressLine::show(double done, double whole) {
+bool ProgressLine::is_due() {
   const Clock::time_point now = Clock::now();
-  const double since = std::chrono::duration<double>(now - last_).count();
-  if (since < (is_terminal_ ? 0.1 : 5.0)) return;
+  if (std::chrono::duration<double>(now - last_).count() < (is_terminal_ ? 0.1 : 5.0)) return false;
   last_ = now;
-  const std::string text = words(done, whole, std::chrono::duration<double>(now - start_).count());
+  return true;
+}
+
+void ProgressLine::show_bar(double share, const std::string& text) {
   if (!is_terminal_) {
     std::fprintf(stderr, "%s\n", text.c_str());
     return;
   }
   constexpr int width = 24;
-  const int full = std::clamp(static_cast<int>(width * done / whole), 0, width);
+  const int full = std::clamp(static_cast<int>(width * share), 0, width);
   std::fprintf(stderr, "\r\x1b[K[%s%s] %s", std::string(static_cast<size_t>(full), '=').c_str(),
                std::string(static_cast<size_t>(width - full), ' ').c_str(), text.c_str());
+  std::fflush(stderr);
+  is_shown_ = true;
+}
+
+void ProgressLine::show(double done, double whole) {
+  if (is_due()) show_bar(done / whole, words(done, whole, std::chrono::duration<double>(last_ - start_).count()));
+}
+
+void ProgressLine::show_work(const std::string& what, double done, double whole) {
+  if (!is_due() || !(whole > 0)) return;
+  const double elapsed = std::chrono::duration<double>(last_ - start_).count();
+  const double left = done > 0 ? elapsed * (whole - done) / done : 0;
+  show_bar(done / whole, fmt::format("{}: {:.0f} %{}", what, 100 * done / whole,
+                                     done > 0 ? fmt::format(", about {:.0f} s left", left) : std::string()));
+}
+
+void ProgressLine::say(const std::string& text) {
+  if (!is_due()) return;
+  if (!is_terminal_) {
+    std::fprintf(stderr, "%s\n", text.c_str());
+    return;
+  }
+  std::fprintf(stderr, "\r\x1b[K%s", text.c_str());
   std::fflush(stderr);
   is_shown_ = true;
 }

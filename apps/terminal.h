@@ -26,6 +26,10 @@ class ProgressLine {
  public:
   ProgressLine();
   void show(double done, double whole);
+  /// Words of one's own, for work that has no simulated time.
+  void say(const std::string& words);
+  /// Done and whole amount of work, with what is left.
+  void show_work(const std::string& what, double done, double whole);
   /// Takes the line away, so that something else can be written.
   void clear();
   /// Words of the line: simulated time, real-time factor and what is left.
@@ -33,6 +37,8 @@ class ProgressLine {
 
  private:
   using Clock = std::chrono::steady_clock;
+  bool is_due();
+  void show_bar(double share, const std::string& words);
   bool is_terminal_ = false, is_shown_ = false;
   Clock::time_point start_, last_;
 };

@@ -143,7 +143,7 @@ std::string to_svg(const Drawing& d) {
         if (s.anchor != 0) more += fmt::format(R"( text-anchor="{}")", s.anchor == 1 ? "end" : "middle");
         if (s.turn != 0)
           more += fmt::format(R"-( transform="rotate({} {} {})")-", number(s.turn), number(at.x), number(at.y));
-              if (s.bold) more += R"( font-weight="650")";
+        if (s.bold) more += R"( font-weight="650")";
         out += fmt::format(R"(<text class="{}" x="{}" y="{}" font-size="{}"{}>{}</text>)", classes_of(s), number(at.x),
                            number(at.y), number(s.size), more, escape_html(s.text));
         break;

@@ -155,7 +155,7 @@ Drawing draw(const Plot& p) {
     if (!b.name.empty())
       entries.push_back({b.name, [&d, &b](Dot at) {
                            d.area({{at.x, at.y - 6}, {at.x + 26, at.y - 6}, {at.x + 26, at.y + 6}, {at.x, at.y + 6}},
-                                  b.ink, b.opacity, Ink::Quiet);
+                                  b.ink, b.legend_opacity > 0 ? b.legend_opacity : b.opacity, Ink::Quiet);
                          }});
   for (const PlotLine& l : p.lines)
     if (!l.name.empty())
@@ -170,7 +170,11 @@ Drawing draw(const Plot& p) {
     if (m.name.empty() || !is_shown(m) || std::find(mark_names.begin(), mark_names.end(), m.name) != mark_names.end())
       continue;
     mark_names.push_back(m.name);
-    entries.push_back({m.name, [&d, &m](Dot at) { draw_mark(d, m.mark, {at.x + 13, at.y}, Ink::Text); }});
+    const bool is_one_ink = std::all_of(p.marks.begin(), p.marks.end(), [&m](const PlotMark& other) {
+      return other.name != m.name || other.ink == m.ink;
+    });
+    const Ink ink = is_one_ink ? m.ink : Ink::Text;
+    entries.push_back({m.name, [&d, &m, ink](Dot at) { draw_mark(d, m.mark, {at.x + 13, at.y}, ink); }});
   }
   size_t longest = p.legend_title.size();
   for (const Entry& e : entries) longest = std::max(longest, e.name.size() + 5);

@@ -22,6 +22,7 @@ struct PlotBand {
   std::vector<double> x, low, high;
   Ink ink = Ink::Series0;
   double opacity = 0.2;
+  double legend_opacity = 0;  // of its sign; 0: the same
 };
 
 enum class Mark { Circle, Square, Triangle, Cross };

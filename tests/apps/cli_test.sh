@@ -191,7 +191,7 @@ cancel)
   ;;
 rcc)
   zone=$source/examples/rcc/zone_I.toml
-  expect 0 "$topple" rcc "$zone"; has out "zone of 0.5 m"; has out "residual"; has out "crushes at"
+  expect 0 "$topple" rcc "$zone"; has out "zone of 0.39 m"; has out "residual"; has out "crushes at"
   expect 0 "$topple" rcc "$zone" --normal-force "3.7 MN" --normal-force 0 -o a/b; has out "3.700"; has out "Wrote a/b/rcc.json"
   for f in points.csv curves.csv interaction.csv axial.csv states.csv rcc.json; do exists a/b/$f; done
   for f in rcc.html moment_y.png moment_z.png interaction_y.png axial.png section_y_pos_1.png; do exists a/b/$f; done
@@ -206,10 +206,31 @@ rcc)
   sed 's/^eps_u/esp_u/' "$zone" >wrong.toml; expect 2 "$topple" rcc wrong.toml -o none
   has err 'wrong.toml:16:1: error E203: steel.core: unknown key "esp_u"'; has err 'did you mean "eps_u"?'; has err "Nothing was run."
   sed 's/^length = .*/length = "3 m"/' "$zone" >long.toml; expect 2 "$topple" rcc long.toml -o none
-  has err "long.toml:29:10: error E611: zone: length"
+  has err "long.toml:30:10: error E611: zone: length"
   expect 2 "$topple" rcc wrong.toml --json; is_json out; has out '"line": 16'
   expect 2 "$topple" rcc missing.toml; expect 2 "$topple" rcc .; : >empty.toml; expect 2 "$topple" rcc empty.toml
   [ ! -e none ] || { echo "a folder was made for a wrong section"; failures=$((failures + 1)); }
+  # fuzzy inputs
+  inputs=$source/examples/rcc/zone_I_fuzzy.toml
+  { cat "$inputs"; printf '[search]\nlevels = [0, 0.5, 1]\nsamples = 500\n'; } >fuzzy.toml
+  expect 0 "$topple" rcc "$zone" --normal-force "3.7 MN" --fuzzy fuzzy.toml -o f1
+  has out "it is crushed by the force alone"; has out "limit of runs"
+  for f in fan.csv samples.csv originals.csv fuzzy.json fuzzy.html fan_1.png switch_1.png crushing.png inputs.png rcc.html; do exists f1/$f; done
+  is_json f1/fuzzy.json; lacks f1/fuzzy.html "http"; has f1/fuzzy.html "Possibilities are found among the runs"
+  expect 0 "$topple" rcc "$zone" --normal-force "3.7 MN" --fuzzy fuzzy.toml -o f2 --threads 2
+  for f in fan.csv samples.csv originals.csv fuzzy.json fuzzy.html fan_1.png; do cmp f1/$f f2/$f || failures=$((failures + 1)); done
+  expect 0 "$topple" rcc "$zone" --normal-force "3.7 MN" --fuzzy fuzzy.toml --axis z --direction - --json; is_json out; has out '"direction": "-"'
+  sed 's/(fc - 8)/(fx - 8)/' "$inputs" >wrong.toml
+  expect 2 "$topple" rcc "$zone" --fuzzy wrong.toml -o none; has err 'wrong.toml:11:28: error E208'; has err 'there is no value "fx"'
+  sed 's/\["10 N/["7 N/' "$inputs" >weak.toml
+  expect 2 "$topple" rcc "$zone" --fuzzy weak.toml -o none; has err "weak.toml:9:1: error E205: concrete.fc: fc = 7 N/mm2 is not possible"
+  expect 2 "$topple" rcc "$zone" --axis z; expect 2 "$topple" rcc "$zone" --fuzzy missing.toml
+  # an interrupt leaves nothing
+  "$topple" rcc "$zone" --fuzzy "$inputs" -o cut >out 2>err &
+  pid=$!; sleep 0.4; kill -INT $pid; wait $pid; code=$?
+  [ $code -eq 1 ] || { echo "exit code $code after an interrupt"; cat out err; failures=$((failures + 1)); }
+  has err "Cancelled. Nothing was written."; [ ! -e cut ] || { echo "a folder after an interrupt"; failures=$((failures + 1)); }
+  [ ! -e none ] || { echo "a folder was made for wrong inputs"; failures=$((failures + 1)); }
   # a member of a plan
   expect 2 "$topple" rcc "$plan"; has err "this is a plan"; has err "--member"
   building=$source/examples/weida/plan.toml

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -12,6 +13,8 @@
 #include <vector>
 
 #include "base/file.h"
+#include "nearfield/fibres.h"
+#include "product/fuzzy_file.h"
 #include "product/section_file.h"
 
 namespace topple {
@@ -120,6 +123,91 @@ TEST(RccCommand, PicturesArePngsOfTheStatedSize) {
     EXPECT_EQ(size(20), is_section ? 1600 : 1000) << entry.path();
   }
   EXPECT_GE(pictures, 8);
+}
+
+std::vector<std::vector<std::string>> read_table(const fs::path& path) {
+  std::vector<std::vector<std::string>> rows;
+  std::istringstream lines(read_file(path.string()));
+  for (std::string line; std::getline(lines, line);) {
+    rows.emplace_back();
+    std::istringstream in(line);
+    for (std::string cell; std::getline(in, cell, ',');) rows.back().push_back(cell);
+  }
+  return rows;
+}
+
+TEST(RccFuzzyCommand, FanIsNestedAndHoldsItsOriginals) {
+  const fs::path inputs = fs::path(testing::TempDir()) / "topple_rcc_inputs.toml";
+  const std::string table_1 = read_file(TOPPLE_SOURCE_DIR "/examples/rcc/zone_I_fuzzy.toml");
+  replace_file(inputs.string(), table_1 + "[search]\nlevels = [0, 0.5, 1]\nsamples = 600\n");
+  const fs::path folder = run("fuzzy", "--normal-force \"2.9 MN\" --fuzzy " + inputs.string());
+  const auto j = nlohmann::json::parse(read_file((folder / "fuzzy.json").string()));
+  const auto& fan = j["fans"][0];
+  const size_t J = fan["rotation"].size();
+  ASSERT_EQ(fan["levels"].size(), 3u);
+  for (size_t l = 1; l < 3; ++l)
+    for (size_t i = 0; i < J; ++i) {
+      EXPECT_LE(fan["levels"][l - 1]["lower"][i].get<double>(), fan["levels"][l]["lower"][i].get<double>());
+      EXPECT_GE(fan["levels"][l - 1]["upper"][i].get<double>(), fan["levels"][l]["upper"][i].get<double>());
+    }
+  EXPECT_EQ(fan["levels"][2]["lower"], fan["core"]) << "the inputs' cores are points";
+  ASSERT_GT(fan["originals"].size(), 20u);
+  for (const auto& original : fan["originals"])
+    for (const auto& level : fan["levels"]) {
+      if (original["membership"].get<double>() < level["alpha"].get<double>()) continue;
+      for (size_t i = 0; i < J; ++i) {
+        EXPECT_GE(original["moment"][i].get<double>(), level["lower"][i].get<double>());
+        EXPECT_LE(original["moment"][i].get<double>(), level["upper"][i].get<double>());
+      }
+    }
+  EXPECT_EQ(read_table(folder / "samples.csv").size(), 1u + fan["runs"].get<size_t>());
+  EXPECT_EQ(read_table(folder / "fan.csv").size(), 1u + 3 * J);
+}
+
+TEST(RccFuzzyCommand, EveryOriginalIsTheCurveOfItsInputs) {
+  const fs::path inputs = fs::path(testing::TempDir()) / "topple_rcc_inputs.toml";
+  const std::string table_1 = read_file(TOPPLE_SOURCE_DIR "/examples/rcc/zone_I_fuzzy.toml");
+  replace_file(inputs.string(), table_1 + "[search]\nlevels = [0, 1]\nsamples = 300\n");
+  const fs::path folder = run("originals", "--normal-force \"2.9 MN\" --fuzzy " + inputs.string());
+  const auto j = nlohmann::json::parse(read_file((folder / "fuzzy.json").string()));
+  std::vector<Diagnostic> warnings;
+  std::string text;
+  const product::SectionFile file = product::read_section_file(section, warnings, text);
+  const product::FuzzyFile fuzzy = product::read_fuzzy_file(inputs.string(), file, warnings, text);
+  const auto& fan = j["fans"][0];
+  const auto rotation = fan["rotation"].get<std::vector<double>>();
+  int compared = 0;
+  for (const auto& original : fan["originals"]) {
+    std::vector<double> point;
+    for (const product::FuzzyValue& v : fuzzy.inputs) point.push_back(original["values"][v.path].get<double>());
+    const product::SectionFile s = product::make_sample(file, fuzzy, point);
+    nearfield::ZoneInput in;
+    in.section = s.section, in.concrete = s.concrete, in.steel = s.steel;
+    in.length = std::min(s.length, 0.9 * nearfield::calc_largest_zone_length(s.concrete));
+    std::vector<double> kappa(rotation);
+    for (double& k : kappa) k /= in.length;
+    const auto march = nearfield::march_curvature(nearfield::make_fibres(in, nearfield::Axis::Y), -2.9e6, 1, kappa);
+    EXPECT_EQ(original["moment"].get<std::vector<double>>(), march.moment);
+    EXPECT_EQ(original["values"]["concrete.fct"].get<double>(), s.concrete.fct);
+    ++compared;
+  }
+  EXPECT_GT(compared, 10);
+}
+
+TEST(RccFuzzyCommand, CrushingForceHasTheEndsOfTableOne) {
+  // left values of Table 1 crush at about 3.2 MN, core values at 8.9 MN (docs/weida.md)
+  const fs::path inputs = fs::path(testing::TempDir()) / "topple_rcc_inputs.toml";
+  const std::string table_1 = read_file(TOPPLE_SOURCE_DIR "/examples/rcc/zone_I_fuzzy.toml");
+  replace_file(inputs.string(), table_1 + "[search]\nlevels = [0, 1]\nsamples = 300\n");
+  const fs::path folder = run("crushing", "--normal-force \"3.7 MN\" --fuzzy " + inputs.string());
+  const auto j = nlohmann::json::parse(read_file((folder / "fuzzy.json").string()));
+  const auto& cuts = j["crushing_force"];
+  EXPECT_NEAR(cuts.front()["left"].get<double>(), 3.27e6, 0.02e6);
+  EXPECT_NEAR(cuts.back()["left"].get<double>(), 8.91e6, 0.01e6);
+  EXPECT_EQ(cuts.back()["left"], cuts.back()["right"]);
+  const double possibility = j["fans"][0]["crushing_possibility"].get<double>();
+  EXPECT_GT(possibility, 0.05) << "3.7 MN lies above the left end";
+  EXPECT_LT(possibility, 0.15);
 }
 
 TEST(RccCommand, SameInputGivesTheSameBytes) {
