@@ -445,8 +445,8 @@ SolidResponse make_elastic_response(const SolidConcrete& c, const Voigt& stress,
   for (int a = 0; a < 6; ++a) out.stress[a] = integrity * stress[a];
   out.tangent.fill(0);
   const double G = 0.5 * integrity * c.law.Ec / (1 + c.nu), lambda = 2 * G * c.nu / (1 - 2 * c.nu);
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) out.tangent[6 * i + j] = lambda;
+  for (size_t i = 0; i < 3; ++i) {
+    for (size_t j = 0; j < 3; ++j) out.tangent[6 * i + j] = lambda;
     out.tangent[7 * i] += 2 * G;
     out.tangent[7 * (i + 3)] = G;
   }
