@@ -167,6 +167,7 @@ void write_rcc_files(const record::RccReport& r, Writer& out) {
   write("points", "points.csv", record::points_csv(r));
   write("curves", "curves.csv", record::curves_csv(r));
   write("interaction", "interaction.csv", record::interaction_csv(r));
+  write("biaxial", "biaxial.csv", record::biaxial_csv(r));
   write("axial", "axial.csv", record::axial_csv(r));
   write("states", "states.csv", record::states_csv(r));
   write("json", "rcc.json", record::to_json(r) + "\n");

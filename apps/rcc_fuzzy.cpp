@@ -271,6 +271,7 @@ std::optional<record::RccFuzzyReport> make_fuzzy_report(const product::SectionFi
     if (result.ending == uncertainty::Ending::Cancelled) return std::nullopt;
     record::RccFan fan = make_fan(file, space, result, N, rotation, searched);
     fan.crushing_possibility = calc_possibility_below(r.crushing, -N);
+    fan.outcomes[Crushed].possibility = std::max(fan.outcomes[Crushed].possibility, fan.crushing_possibility);
     r.fans.push_back(std::move(fan));
   }
   // shortest zone of all runs

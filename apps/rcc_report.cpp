@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/unit.h"
+#include "nearfield/biaxial.h"
 #include "nearfield/moment_curve.h"
 
 namespace topple::apps {
@@ -84,6 +85,30 @@ record::RccState make_state(const nearfield::ZoneInput& in, const nearfield::Fib
   for (const auto& b : state.bars)
     out.bars.push_back({b.y, b.z, b.diameter, b.strain, b.stress, nearfield::name_of(b.condition)});
   return out;
+}
+
+/// One line for each normal force, from bending about y to bending about z.
+void add_biaxial(const nearfield::ZoneInput& in, const std::vector<double>& normal_forces, record::RccReport& r) {
+  constexpr double pi = 3.14159265358979323846;
+  constexpr int skews = 12;
+  std::vector<double> skew;
+  for (int i = 1; i < skews; ++i) skew.push_back(0.5 * pi * i / skews);
+  std::vector<nearfield::BiaxialPoint> all;
+  for (const double N : normal_forces) {
+    double peak_y = 0, peak_z = 0;
+    for (const record::RccCurve& c : r.curves)
+      if (c.normal_force == -N && c.direction > 0 && std::isfinite(c.peak.moment))
+        (c.axis == 'y' ? peak_y : peak_z) = c.peak.moment;
+    if (!(peak_y > 0) || !(peak_z > 0)) continue;
+    record::RccBiaxial line{-N, {peak_y}, {0}};
+    for (const nearfield::BiaxialPoint& p : nearfield::calc_biaxial_points(in, skew, {-N / r.crushing_force})) {
+      line.moment_y.push_back(p.y * peak_y), line.moment_z.push_back(p.z * peak_z);
+      all.push_back(p);
+    }
+    line.moment_y.push_back(0), line.moment_z.push_back(peak_z);
+    r.biaxial.push_back(std::move(line));
+  }
+  r.biaxial_exponent = nearfield::fit_biaxial(all).exponent;
 }
 
 /// Both axial curves as one, with the elastic part that make_rcc takes out.
@@ -189,6 +214,7 @@ record::RccReport make_rcc_report(const nearfield::ZoneInput& in, const nearfiel
         if (std::isfinite(point->rotation)) r.states.push_back(make_state(in, *b.fibres, curve, name, *point));
     }
   }
+  add_biaxial(in, normal_forces, r);
   r.axial.push_back(make_axial(rcc));
   if (is_same(rcc.y_pos, rcc.y_neg) && is_same(rcc.z_pos, rcc.z_neg))
     r.notes.push_back("The section is symmetric: both directions of each axis give the same curve.");
@@ -196,8 +222,7 @@ record::RccReport make_rcc_report(const nearfield::ZoneInput& in, const nearfiel
       "Slip of bars and their anchorage beyond the zone: bond is perfect.",
       "Shear deformation, and loss of shear strength with rotation; shear and torsion are limits of their own.",
       "Stresses follow the envelopes: fibres that unload while the rotation rises are taken as never loaded.",
-      "Creep, shrinkage, corrosion, rate of loading and heat.",
-      "Bending about both axes at once; the building's model lets both moments interact by a power law."};
+      "Creep, shrinkage, corrosion, rate of loading and heat."};
   return r;
 }
 

@@ -216,6 +216,37 @@ void add_interaction(const RccReport& r, char axis, std::vector<Figure>& out) {
   out.push_back(std::move(f));
 }
 
+void add_biaxial(const RccReport& r, std::vector<Figure>& out) {
+  Plot p;
+  p.title = "Bending about both axes: largest moments";
+  p.x_title = "moment about y [kNm]", p.y_title = "moment about z [kNm]";
+  p.legend_title = "normal force N";
+  p.width = 720, p.height = 560;
+  Figure f;
+  f.table.heads = {"N [MN]", "My [kNm]", "Mz [kNm]"};
+  for (size_t k = 0; k < r.biaxial.size(); ++k) {
+    const RccBiaxial& b = r.biaxial[k];
+    PlotLine line;
+    line.name = force_text(b.normal_force), line.ink = series_ink(k), line.dash = dashes[k % dashes.size()];
+    for (size_t j = 0; j < b.moment_y.size(); ++j) {
+      line.x.push_back(b.moment_y[j] / unit::kNm), line.y.push_back(b.moment_z[j] / unit::kNm);
+      f.table.rows.push_back(
+          {shown(b.normal_force, unit::MN), shown(b.moment_y[j], unit::kNm), shown(b.moment_z[j], unit::kNm)});
+    }
+    if (!line.x.empty()) p.lines.push_back(std::move(line));
+  }
+  if (p.lines.empty()) return;
+  f.id = "biaxial";
+  f.heading = "Bending about both axes";
+  f.caption = fmt::format(
+      "Largest moments while the zone turns about an oblique axis, positive directions. A building's model joins both "
+      "by "
+      "(My/My,max)^p + (Mz/Mz,max)^p = 1; these points are met best by p = {}.",
+      shown(r.biaxial_exponent, 1, 3));
+  f.drawing = draw(p);
+  out.push_back(std::move(f));
+}
+
 void add_axial(const RccReport& r, std::vector<Figure>& out) {
   double crush = 0;
   for (const RccAxial& a : r.axial)
@@ -305,6 +336,7 @@ std::vector<Figure> make_figures(const RccReport& r) {
     add_moments(r, axis, out);
     add_interaction(r, axis, out);
   }
+  add_biaxial(r, out);
   add_axial(r, out);
   for (const char axis : {'y', 'z'}) {
     add_states(r, axis, 1, out);

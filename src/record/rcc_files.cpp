@@ -145,6 +145,12 @@ std::string to_json(const RccReport& r) {
     one["peak_moment"] = numbers(i.peak_moment);
     j["interaction"].push_back(std::move(one));
   }
+  j["biaxial"] = json::array();
+  for (const RccBiaxial& b : r.biaxial)
+    j["biaxial"].push_back({{"normal_force", number(b.normal_force)},
+                            {"moment_y", numbers(b.moment_y)},
+                            {"moment_z", numbers(b.moment_z)}});
+  j["biaxial_exponent"] = number(r.biaxial_exponent);
   j["axial"] = json::array();
   for (const RccAxial& a : r.axial)
     j["axial"].push_back(
@@ -196,6 +202,15 @@ std::string interaction_csv(const RccReport& r) {
     for (size_t k = 0; k < i.normal_force.size(); ++k)
       out += fmt::format("{},{},{},{},{},{}{}", i.route, i.axis, sign_of(i.direction), digits(i.normal_force[k]),
                          digits(i.yield_moment[k]), digits(i.peak_moment[k]), line_end);
+  return out;
+}
+
+std::string biaxial_csv(const RccReport& r) {
+  std::string out = "normal force [N],largest moment about y [N·m],largest moment about z [N·m]";
+  out += line_end;
+  for (const RccBiaxial& b : r.biaxial)
+    for (size_t k = 0; k < b.moment_y.size(); ++k)
+      out += fmt::format("{},{},{}{}", digits(b.normal_force), digits(b.moment_y[k]), digits(b.moment_z[k]), line_end);
   return out;
 }
 

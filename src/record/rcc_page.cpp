@@ -34,6 +34,7 @@ summary{cursor:pointer;color:var(--accent)}
 :focus-visible{outline:2px solid var(--accent);outline-offset:1px}
 dl{display:grid;grid-template-columns:max-content 1fr;gap:2px 16px;margin:0}
 dt{color:var(--ink-quiet)}dd{margin:0;overflow-wrap:anywhere}
+.wide{margin:8px 0}
 ul{margin:4px 0;padding-left:20px}
 nav a{color:var(--accent);margin-right:14px}
 @media print{

@@ -37,6 +37,13 @@ struct RccInteraction {
   std::vector<double> yield_moment, peak_moment;  // [N·m] (K)
 };
 
+/// Largest moments about y and z when the zone turns about an oblique axis, positive directions, from bending about y
+/// alone to bending about z alone. P points.
+struct RccBiaxial {
+  double normal_force = 0;                 // [N]
+  std::vector<double> moment_y, moment_z;  // [N·m] (P)
+};
+
 /// Force against the zone's shortening, elongation negative; no bending.
 struct RccAxial {
   std::string route = "layered";
@@ -76,6 +83,8 @@ struct RccReport {
   std::vector<KeyValue> inputs;
   std::vector<RccCurve> curves;
   std::vector<RccInteraction> interactions;
+  std::vector<RccBiaxial> biaxial;
+  double biaxial_exponent = 0;  // of the power law that a building's model uses, fitted to these points
   std::vector<RccAxial> axial;
   std::vector<RccState> states;
   std::vector<RccFamily> families;
@@ -98,6 +107,7 @@ std::string to_json(const RccReport&);
 std::string points_csv(const RccReport&);
 std::string curves_csv(const RccReport&);
 std::string interaction_csv(const RccReport&);
+std::string biaxial_csv(const RccReport&);
 std::string axial_csv(const RccReport&);
 std::string states_csv(const RccReport&);
 

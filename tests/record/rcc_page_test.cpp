@@ -37,6 +37,8 @@ RccReport sample_report() {
   none.normal_force = 9e6;
   none.ending = "cannot be carried";
   r.curves.push_back(none);
+  r.biaxial.push_back({1e6, {6e5, 4e5, 0}, {0, 4e5, 6e5}});
+  r.biaxial_exponent = 1.71;
   r.axial.push_back({"layered", {-0.01, 0, 0.001, 0.01}, {-1e6, 0, 5e6, 2e6}});
   RccState s;
   s.point = "peak", s.normal_force = 1e6, s.rotation = 0.006, s.moment = 6e5, s.eps_0 = -2e-4, s.curvature = 0.012;
@@ -76,7 +78,8 @@ std::vector<std::vector<std::string>> parse_csv(const std::string& text) {
 
 TEST(RccFiles, TablesHoldWhatTheReportHolds) {
   const RccReport r = sample_report();
-  for (const std::string& text : {points_csv(r), curves_csv(r), interaction_csv(r), axial_csv(r), states_csv(r)}) {
+  for (const std::string& text :
+       {points_csv(r), curves_csv(r), interaction_csv(r), biaxial_csv(r), axial_csv(r), states_csv(r)}) {
     const auto rows = parse_csv(text);
     for (const auto& row : rows) EXPECT_EQ(row.size(), rows[0].size()) << text.substr(0, 60);
   }
@@ -124,7 +127,7 @@ TEST(RccPage, StandsAloneAndSaysEverything) {
     EXPECT_EQ(page.find(outside), std::string::npos) << outside;
   for (const char* text : {"Column &lt;1&gt; &amp; co", "zone of 0.5 m", "A note &lt;b&gt;.", "Slip &amp; more.",
                            "9.9.9", "section.toml", "Not modelled", "cannot be carried", "residual", "crushing",
-                           "@media print", "prefers-color-scheme:dark", "Table of values", "25 N/mm2"})
+                           "@media print", "prefers-color-scheme:dark", "Table of values", "25 N/mm2", "p = 1.71"})
     EXPECT_NE(page.find(text), std::string::npos) << text;
   EXPECT_NE(page.find(r.sha256), std::string::npos);
   EXPECT_EQ(page.find("<1>"), std::string::npos) << "a title cannot make tags";
