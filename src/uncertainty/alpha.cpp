@@ -59,8 +59,23 @@ class Optimisation {
 
   AlphaResult run() {
     explore();
-    for (int wave = 0; wave < 3 && asker_.can_go_on(); ++wave) search(wave);
-    recheck();
+    search_from_best(false);
+    const int limit = asker_.limit();
+    if (options_.search_classes && !make_goals(true).empty()) asker_.set_limit(limit - asker_.rest() / 7);
+    for (int idle = 0; asker_.can_go_on() && idle < options_.patience;) {
+      const std::vector<double> before = calc_bounds();
+      if (rounds_ > 0) spread(0.25);
+      scan();
+      search_dispersed();
+      recheck(false);
+      idle = has_gained(before) ? 0 : idle + 1;
+      ++rounds_;
+    }
+    asker_.set_limit(limit);
+    if (options_.search_classes) {
+      search_from_best(true);
+      recheck(true);
+    }
     AlphaResult result = collect();
     result.ending = asker_.is_cancelled() ? Ending::Cancelled : unfinished_ ? Ending::LimitReached : Ending::Complete;
     return result;
@@ -96,29 +111,54 @@ class Optimisation {
     for (const auto& r : regions_)
       if (!r.axes.empty() && static_cast<int>(r.axes.size()) <= options_.corner_inputs)
         for (auto& x : make_corners(r.box)) add(std::move(x), r);
-    // spread points: a sequence over the inputs that have a width, continued from level to level
+    ask(points);
+    space_points_.assign(levels_.size(), 0);
+    spread(1);
+  }
+
+  /// Spread points, `share` of the first time's number: a sequence over the inputs that have a width, continued.
+  void spread(double share) {
+    std::vector<Point> points;
     const auto& axes = regions_.front().axes;
     const int n = static_cast<int>(axes.size());
-    std::vector<Point> spread;
-    int first = 1;
     for (std::size_t k = 0; n > 0 && k < regions_.size(); ++k) {
       if (k > 0 && regions_[k].axes.empty()) continue;
       const int given = k == 0 ? options_.space_points : options_.inner_points;
-      const int count = given > 0 ? given : (k == 0 ? 80 : 20) * n;
-      for (const auto& u : make_sobol_points(n, first, count, options_.seed)) {
+      const int count = static_cast<int>(std::ceil(share * (given > 0 ? given : (k == 0 ? 80 : 20) * n)));
+      for (const auto& u : make_sobol_points(n, next_spread_, count, options_.seed)) {
         Point fractions(space_.inputs.size(), 0.0);
         for (int i = 0; i < n; ++i) fractions[axes[i]] = u[i];
         Point x = place_in(regions_[k].box, fractions);
-        if (!space_.has_interaction() || regions_[k].contains(x)) spread.push_back(std::move(x));
+        if (!space_.has_interaction() || regions_[k].contains(x)) points.push_back(std::move(x));
       }
-      first += count;
+      next_spread_ += count;
     }
-    space_points_.assign(levels_.size(), 0);
-    points.insert(points.end(), spread.begin(), spread.end());
     ask(points);
-    for (const auto& x : spread)
+    for (const auto& x : points)
       if (asker_.archive().find(x) >= 0)
         for (int k = 0; k < count_levels(space_, levels_, boxes_, x); ++k) ++space_points_[k];
+  }
+
+  /// Along every axis from the best sample of each goal: the ends of the cut and places between. Finds other basins of
+  /// mappings whose inputs act on their own.
+  void scan() {
+    std::vector<Point> points;
+    Random random(options_.seed + 7919 * (rounds_ + 1));
+    std::set<std::pair<int, int>> done;  // sample and level
+    for (const Goal& goal : make_goals(false)) {
+      const Candidate best = find_best(goal);
+      if (best.sample < 0 || !done.insert({best.sample, goal.level}).second) continue;
+      const Region& r = regions_[goal.level];
+      for (const int i : r.axes)
+        for (int k = -1; k < 3; ++k) {
+          Point x = asker_.archive()[best.sample].x;
+          const double t = k < 0 ? 0 : k == 2 ? 1 : 0.5 * (k + random.next());
+          x[i] = r.box.lower[i] + t * (r.box.upper[i] - r.box.lower[i]);
+          x = clip(r.box, std::move(x));
+          if (!space_.has_interaction() || r.contains(x)) points.push_back(std::move(x));
+        }
+    }
+    ask(points);
   }
 
   double value_of(const Goal& goal, int sample) const {
@@ -136,8 +176,8 @@ class Optimisation {
     return best;
   }
 
-  /// The best samples of the cut that keep a distance from each other.
-  std::vector<Candidate> find_starts(const Goal& goal, int count) const {
+  /// The best samples of the cut that keep a distance from each other and from where searches for this goal began.
+  std::vector<Candidate> find_starts(const Goal& goal, int count) {
     std::vector<Candidate> all;
     for (int i = 0; i < static_cast<int>(depth_.size()); ++i)
       if (depth_[i] > goal.level)
@@ -145,18 +185,37 @@ class Optimisation {
     std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.value < b.value; });
     std::vector<Candidate> starts;
     const Region& r = regions_[goal.level];
+    auto& used = starts_[key_of(goal)];
+    const double least = 0.2 * std::pow(0.7, rounds_);
     for (const auto& c : all) {
       if (static_cast<int>(starts.size()) == count) break;
-      const bool apart = std::all_of(starts.begin(), starts.end(), [&](const Candidate& s) {
+      const bool apart = std::all_of(used.begin(), used.end(), [&](int other) {
         double distance = 0;
         for (const int i : r.axes)
-          distance = std::max(distance, std::abs(asker_.archive()[s.sample].x[i] - asker_.archive()[c.sample].x[i]) /
+          distance = std::max(distance, std::abs(asker_.archive()[other].x[i] - asker_.archive()[c.sample].x[i]) /
                                             (r.box.upper[i] - r.box.lower[i]));
-        return distance > 0.2;
+        return distance > least;
       });
-      if (apart) starts.push_back(c);
+      if (!apart) continue;
+      starts.push_back(c);
+      used.push_back(c.sample);
     }
     return starts;
+  }
+
+  /// Best values of all goals, classes apart.
+  std::vector<double> calc_bounds() const {
+    std::vector<double> values;
+    for (const Goal& goal : make_goals(false)) values.push_back(find_best(goal).value);
+    return values;
+  }
+  bool has_gained(const std::vector<double>& before) const {
+    const std::vector<Goal> goals = make_goals(false);
+    const std::vector<double> now = calc_bounds();
+    if (now.size() != before.size()) return true;
+    for (std::size_t k = 0; k < now.size(); ++k)
+      if (now[k] < before[k] - 1e-5 * width_of(goals[k].output)) return true;
+    return false;
   }
 
   /// Width of an output over all samples.
@@ -224,7 +283,9 @@ class Optimisation {
     }
     for (const auto& r : all) {
       if (!r.search->is_done()) unfinished_ = true;
-      if (r.search->is_converged()) converged_.insert({key_of(r.goal), asker_.archive().find(r.search->best())});
+      if (!r.search->is_converged()) continue;
+      double& end = ends_.try_emplace(key_of(r.goal), infinite).first->second;
+      end = std::min(end, r.search->value());
     }
     all.clear();
   }
@@ -232,38 +293,46 @@ class Optimisation {
   using Key = std::vector<int>;
   static Key key_of(const Goal& g) { return {g.output, g.level, g.sign > 0, g.outcome}; }
 
-  /// Wave 0: from the best sample of every cut. Wave 1: dispersed starts and evolution. Wave 2: within each class.
-  void search(int wave) {
+  /// Whether a search for this goal has converged at a value that is as good as the best one.
+  bool is_converged(const Goal& goal, const Candidate& best) const {
+    const auto end = ends_.find(key_of(goal));
+    return end != ends_.end() && end->second <= best.value + 2 * options_.tolerance * width_of(goal.output);
+  }
+
+  void search_from_best(bool of_classes) {
     std::vector<Running> all;
-    if (wave == 2 && !options_.search_classes) return;
-    for (const Goal& goal : make_goals(wave == 2)) {
+    for (const Goal& goal : make_goals(of_classes)) {
+      const Candidate best = find_best(goal);
+      if (regions_[goal.level].axes.empty() || best.sample < 0) continue;
+      if (!of_classes) starts_[key_of(goal)].push_back(best.sample);
+      all.push_back({goal, make_model_search(goal, best, 0.1)});
+    }
+    advance(all);
+  }
+
+  /// Model searches from other good places; in the first round evolution from the best.
+  void search_dispersed() {
+    std::vector<Running> all;
+    for (const Goal& goal : make_goals(false)) {
       if (regions_[goal.level].axes.empty()) continue;
-      if (wave == 1) {
-        const auto starts = find_starts(goal, options_.starts);
-        for (std::size_t k = 1; k < starts.size(); ++k) all.push_back({goal, make_model_search(goal, starts[k], 0.1)});
-        for (int k = 0; k < std::min<int>(options_.evolutions, static_cast<int>(starts.size())); ++k)
-          all.push_back({goal, make_evolution(goal, starts[k])});
-      } else if (const Candidate best = find_best(goal); best.sample >= 0) {
-        all.push_back({goal, make_model_search(goal, best, 0.1)});
-      }
+      for (const auto& start : find_starts(goal, options_.starts))
+        all.push_back({goal, make_model_search(goal, start, 0.1)});
+      if (const Candidate best = find_best(goal); best.sample >= 0 && rounds_ == 0)
+        for (int k = 0; k < options_.evolutions; ++k) all.push_back({goal, make_evolution(goal, best)});
     }
     advance(all);
   }
 
   /// Every sample against every cut: a best one that no search ended at is a new start, until nothing changes.
-  void recheck() {
+  void recheck(bool of_classes) {
     std::set<std::pair<Key, int>> tried;
     while (asker_.can_go_on()) {
       std::vector<Running> all;
-      for (const bool of_classes : {false, true}) {
-        if (of_classes && !options_.search_classes) continue;
-        for (const Goal& goal : make_goals(of_classes)) {
-          if (regions_[goal.level].axes.empty()) continue;
-          const Candidate best = find_best(goal);
-          if (best.sample < 0 || converged_.contains({key_of(goal), best.sample})) continue;
-          if (!tried.insert({key_of(goal), best.sample}).second) continue;
-          all.push_back({goal, make_model_search(goal, best, 0.05)});
-        }
+      for (const Goal& goal : make_goals(of_classes)) {
+        const Candidate best = find_best(goal);
+        if (regions_[goal.level].axes.empty() || best.sample < 0 || is_converged(goal, best)) continue;
+        if (!tried.insert({key_of(goal), best.sample}).second) continue;
+        all.push_back({goal, make_model_search(goal, best, 0.05)});
       }
       if (all.empty()) break;
       ++rechecks_;
@@ -278,10 +347,8 @@ class Optimisation {
         for (int k = 0; k < static_cast<int>(levels_.size()); ++k) {
           auto& b = outputs[o].levels[k];
           const bool point = regions_[k].axes.empty();
-          b.lower.converged =
-              b.lower.sample >= 0 && (point || converged_.contains({{o, k, 1, outcome}, b.lower.sample}));
-          b.upper.converged =
-              b.upper.sample >= 0 && (point || converged_.contains({{o, k, 0, outcome}, b.upper.sample}));
+          b.lower.converged = b.lower.sample >= 0 && (point || is_converged({o, k, 1, outcome}, {b.lower.value}));
+          b.upper.converged = b.upper.sample >= 0 && (point || is_converged({o, k, -1, outcome}, {-b.upper.value}));
         }
     };
     mark(result.outputs, any_class);
@@ -289,6 +356,7 @@ class Optimisation {
     result.run = asker_.run();
     result.batches = asker_.batches();
     result.searches = static_cast<int>(searches_);
+    result.rounds = rounds_;
     result.rechecks = rechecks_;
     return result;
   }
@@ -299,11 +367,13 @@ class Optimisation {
   std::vector<double> levels_;
   std::vector<Region> regions_;
   std::vector<Box> boxes_;
-  std::vector<int> depth_;         // per sample: in how many levels it lies
-  std::vector<int> space_points_;  // per level
-  std::set<std::pair<Key, int>> converged_;
+  std::vector<int> depth_;                  // per sample: in how many levels it lies
+  std::vector<int> space_points_;           // per level
+  std::map<Key, double> ends_;              // best value at which a search converged
+  std::map<Key, std::vector<int>> starts_;  // samples from which dispersed searches began
+  int next_spread_ = 1;
   std::uint64_t searches_ = 0;
-  int rechecks_ = 0;
+  int rechecks_ = 0, rounds_ = 0;
   bool unfinished_ = false;
 };
 

@@ -72,7 +72,8 @@ struct AlphaResult {
   int failed = 0;    // runs that failed
   int batches = 0;   // calls of the model
   int searches = 0;  // local searches
-  int rechecks = 0;  // rounds until nothing changed
+  int rounds = 0;    // of spread points and dispersed searches
+  int rechecks = 0;  // of best samples at which no search had ended
 };
 
 struct AlphaOptions {
@@ -85,11 +86,14 @@ struct AlphaOptions {
   int space_points = 0, inner_points = 0;
   /// Largest number of fuzzy inputs for which all corners of every cut are run.
   int corner_inputs = 8;
-  /// Dispersed starts of model searches per bound.
+  /// Dispersed starts of model searches per bound and round.
   int starts = 2;
-  /// Evolution searches per bound.
+  /// Evolution searches per bound, in the first round.
   int evolutions = 1;
-  /// Own searches for the bounds of each outcome class; without them these are read off the archive.
+  /// Further rounds of spread points and searches from other places go on until so many in a row gained nothing.
+  int patience = 3;
+  /// Own searches for the bounds of each outcome class, for which a seventh of the limit is kept; without them these
+  /// bounds are read off the archive.
   bool search_classes = true;
   /// A search has converged when less than this part of the output's width is left to gain.
   double tolerance = 1e-8;

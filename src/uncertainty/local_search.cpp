@@ -276,11 +276,7 @@ EvolutionSearch::EvolutionSearch(Region region, Point start, double value, const
 
 void EvolutionSearch::ask() {
   pending_.clear();
-  if (width_ < options_.smallest || region_.axes.empty()) {
-    converged_ = true;
-    return;
-  }
-  if (generation_++ >= options_.generations) return;
+  if (width_ < options_.smallest || region_.axes.empty() || generation_++ >= options_.generations) return;
   const double share = std::max(0.5, 1.0 / static_cast<double>(region_.axes.size()));
   for (int k = 0; k < options_.children; ++k) {
     Point x = best_;
@@ -302,7 +298,7 @@ void EvolutionSearch::tell(std::span<const double> values) {
   } else {
     width_ *= 0.6;
   }
-  do { ask(); } while (pending_.empty() && !converged_ && generation_ < options_.generations);
+  ask();
 }
 
 }  // namespace topple::uncertainty

@@ -31,7 +31,7 @@ class LocalSearch {
   const std::vector<Point>& pending() const { return pending_; }
   virtual void tell(std::span<const double> values) = 0;
   bool is_done() const { return pending_.empty(); }
-  /// Whether it ended because nothing better is near, and not because it ran out of steps.
+  /// Whether it ended because its model shows nothing better near; never for one without a model.
   bool is_converged() const { return converged_; }
   const Point& best() const { return best_; }
   double value() const { return value_; }
