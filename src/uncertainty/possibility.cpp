@@ -1,0 +1,377 @@
+#include "uncertainty/possibility.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "uncertainty/random.h"
+
+namespace topple::uncertainty {
+namespace {
+
+/// A place by its distance t = 1 - α from the core and its position w in [-1, 1]^n in the box of that cut. With
+/// max |w_i| = 1 the membership is 1 - t.
+struct Ray {
+  Point w;
+};
+
+Point calc_place(const Space& space, const Ray& ray, double t) {
+  const Box box = make_box(space, std::clamp(1 - t, 0.0, 1.0));
+  Point x(ray.w.size());
+  for (std::size_t i = 0; i < x.size(); ++i)
+    x[i] = ray.w[i] <= -1  ? box.lower[i]
+           : ray.w[i] >= 1 ? box.upper[i]
+                           : box.lower[i] + 0.5 * (ray.w[i] + 1) * (box.upper[i] - box.lower[i]);
+  return clip(box, std::move(x));
+}
+
+Ray find_ray(const Space& space, const Point& x, double t) {
+  const Box box = make_box(space, std::clamp(1 - t, 0.0, 1.0));
+  Ray ray{Point(x.size(), 0.0)};
+  for (std::size_t i = 0; i < x.size(); ++i)
+    if (const double width = box.upper[i] - box.lower[i]; width > 0)
+      ray.w[i] = std::clamp(2 * (x[i] - box.lower[i]) / width - 1, -1.0, 1.0);
+  return ray;
+}
+
+/// Scaled so that the largest coordinate is 1 in size.
+Ray to_surface(Ray ray) {
+  double largest = 0;
+  for (const double w : ray.w) largest = std::max(largest, std::abs(w));
+  if (largest > 0)
+    for (double& w : ray.w) w /= largest;
+  return ray;
+}
+
+/// A bisection on one ray between a place of the class and, nearer to the core, one of another class.
+struct Bracket {
+  Ray ray;
+  double in = 1, out = 0;
+  bool found = true;  // whether `in` is known to be of the class
+};
+
+/// Solves the square system in place by elimination with pivots; false if singular.
+bool solve(std::vector<Point>& A, Point& b) {
+  const std::size_t n = b.size();
+  for (std::size_t k = 0; k < n; ++k) {
+    std::size_t pivot = k;
+    for (std::size_t i = k + 1; i < n; ++i)
+      if (std::abs(A[i][k]) > std::abs(A[pivot][k])) pivot = i;
+    if (std::abs(A[pivot][k]) < 1e-14) return false;
+    std::swap(A[k], A[pivot]);
+    std::swap(b[k], b[pivot]);
+    for (std::size_t i = k + 1; i < n; ++i) {
+      const double f = A[i][k] / A[k][k];
+      for (std::size_t j = k; j < n; ++j) A[i][j] -= f * A[k][j];
+      b[i] -= f * b[k];
+    }
+  }
+  for (std::size_t k = n; k-- > 0;) {
+    for (std::size_t j = k + 1; j < n; ++j) b[k] -= A[k][j] * b[j];
+    b[k] /= A[k][k];
+  }
+  return true;
+}
+
+/// The search for one class; every step names points for the common batch and then reads the archive.
+class Climb {
+ public:
+  Climb(const Space& space, int outcome, const PossibilityOptions& options)
+      : space_(space), outcome_(outcome), options_(options), random_(options.seed + 31 * (outcome + 2)) {
+    for (int i = 0; i < space.size(); ++i)
+      if (space.inputs[i].width() > 0) axes_.push_back(i);
+  }
+
+  bool is_done() const { return stage_ == Stage::Done; }
+  Possibility result(const Archive& archive) const {
+    Possibility p{outcome_, best_, resolution_, sample_, 0, converged_};
+    for (const auto& s : archive.samples()) p.above += calc_membership(space_, s.x) > best_;
+    return p;
+  }
+
+  /// Points to be run for the next step; none if there is nothing left to do.
+  std::vector<Point> ask(const Archive& archive) {
+    refresh(archive);
+    for (;;) {
+      std::vector<Point> points;
+      switch (stage_) {
+        case Stage::Start:
+          begin();
+          break;
+        case Stage::Bisect:
+          points = ask_section();
+          break;
+        case Stage::Slide:
+          points = ask_around();
+          break;
+        case Stage::Try:
+          points = ask_candidates();
+          break;
+        case Stage::Look:
+          points = ask_look();
+          break;
+        case Stage::Done:
+          return {};
+      }
+      if (!points.empty()) return points;
+    }
+  }
+
+  /// After the points were run.
+  void tell(const Archive& archive) {
+    const double before = best_;
+    refresh(archive);
+    switch (stage_) {
+      case Stage::Bisect:
+        if (narrow(archive)) {
+          resolution_ = brackets_[0].in - brackets_[0].out;
+          stage_ = axes_.size() > 1 ? Stage::Slide : Stage::Look;
+        }
+        break;
+      case Stage::Slide:
+        if (narrow(archive)) stage_ = Stage::Try;
+        break;
+      case Stage::Try:
+        stage_ = best_ > before + options_.tolerance ? Stage::Start : Stage::Look;
+        break;
+      case Stage::Look:
+        if (best_ > before) {
+          stage_ = Stage::Start;
+        } else {
+          converged_ = true;
+          stage_ = Stage::Done;
+        }
+        break;
+      case Stage::Start:
+      case Stage::Done:
+        break;
+    }
+  }
+
+ private:
+  enum class Stage { Start, Bisect, Slide, Try, Look, Done };
+
+  bool is_ours(const Archive& archive, const Point& x) const {
+    const int i = archive.find(x);
+    return i >= 0 && outcome_of(archive[i].result) == outcome_;
+  }
+
+  void refresh(const Archive& archive) {
+    for (; seen_ < static_cast<int>(archive.size()); ++seen_) {
+      if (outcome_of(archive[seen_].result) != outcome_) continue;
+      const double mu = calc_membership(space_, archive[seen_].x);
+      if (mu > best_ || sample_ < 0) best_ = mu, sample_ = seen_, best_x_ = archive[seen_].x;
+    }
+  }
+
+  void begin() {
+    if (best_ >= 1 || axes_.empty() || sample_ < 0 || round_++ >= options_.rounds) {
+      converged_ = best_ >= 1;
+      stage_ = Stage::Done;
+      return;
+    }
+    const double t = 1 - best_;
+    brackets_ = {{find_ray(space_, best_x_, t), t, 0, true}};
+    stage_ = Stage::Bisect;
+  }
+
+  static constexpr int sections = 8;
+  double at_section(const Bracket& b, int k) const { return b.out + (b.in - b.out) * k / sections; }
+  double width() const { return stage_ == Stage::Slide ? 0.1 * slide_ * (1 - best_) : 0.5 * options_.tolerance; }
+
+  std::vector<Point> ask_section() {
+    std::vector<Point> points;
+    for (const auto& b : brackets_) {
+      if (b.in - b.out <= width()) continue;
+      for (int k = b.out == 0 ? 0 : 1; k <= (b.out == 0 ? sections : sections - 1); ++k)
+        add(points, calc_place(space_, b.ray, at_section(b, k)));
+    }
+    if (points.empty()) {
+      if (stage_ == Stage::Slide) {
+        stage_ = Stage::Try;
+      } else {
+        resolution_ = brackets_[0].in - brackets_[0].out;
+        stage_ = axes_.size() > 1 ? Stage::Slide : Stage::Look;
+      }
+    }
+    return points;
+  }
+
+  /// Keeps of each bracket the section in which the class begins, seen from the core. True when all are narrow.
+  bool narrow(const Archive& archive) {
+    bool all = true;
+    for (auto& b : brackets_) {
+      if (b.in - b.out <= width()) continue;
+      const Bracket old = b;
+      int k = old.out == 0 ? 0 : 1;
+      while (k < sections && !is_ours(archive, calc_place(space_, b.ray, at_section(old, k)))) ++k;
+      if (old.out == 0 && k == sections) b.found = is_ours(archive, calc_place(space_, b.ray, old.in));
+      b.in = at_section(old, k);
+      b.out = k == 0 || !b.found ? b.in : at_section(old, k - 1);
+      all = all && b.in - b.out <= width();
+    }
+    return all;
+  }
+
+  /// Boundary places on rays around the best one: first where the class begins on each.
+  std::vector<Point> ask_around() {
+    if (!around_) {
+      around_ = true;
+      const double t = 1 - best_;
+      const Ray centre = to_surface(find_ray(space_, best_x_, t));
+      brackets_.clear();
+      for (const int i : axes_) {
+        Ray r = centre;
+        // inwards from an end, so that the ray stays different
+        r.w[i] += r.w[i] > 0 ? -slide_ : slide_;
+        brackets_.push_back({to_surface(r), std::min(1.0, 1.5 * t), 0, true});
+      }
+    }
+    auto points = ask_section();
+    if (points.empty()) around_ = false;
+    return points;
+  }
+
+  /// The plane through the boundary places tells in which corner the smallest cut touches it.
+  std::vector<Point> ask_candidates() {
+    around_ = false;
+    const double t = 1 - best_;
+    const std::size_t n = axes_.size();
+    std::vector<Point> A;
+    Point slope(n, 1.0);
+    for (const auto& b : brackets_) {
+      if (!b.found) continue;
+      A.emplace_back();
+      for (const int i : axes_) A.back().push_back(b.in * b.ray.w[i]);
+    }
+    const Ray here = to_surface(find_ray(space_, best_x_, t));
+    std::vector<Ray> rays;
+    if (A.size() == n && solve(A, slope)) {
+      double largest = 0;
+      for (const double a : slope) largest = std::max(largest, std::abs(a));
+      for (const double part : {1e-3, 0.1, 0.3, 1.0}) {
+        Ray corner = here;
+        for (std::size_t k = 0; k < n; ++k) corner.w[axes_[k]] = std::clamp(slope[k] / (part * largest), -1.0, 1.0);
+        rays.push_back(to_surface(corner));
+        // and part of the way
+        for (const double way : {0.5, 0.1}) {
+          Ray r = here;
+          for (const int i : axes_) r.w[i] += way * (corner.w[i] - r.w[i]);
+          rays.push_back(to_surface(r));
+        }
+      }
+    }
+    std::vector<Point> points;
+    for (const auto& r : rays)
+      for (const double part : {0.5, 0.75, 0.9, 0.97, 0.99}) add(points, calc_place(space_, r, part * t));
+    if (points.empty()) stage_ = Stage::Look;
+    return points;
+  }
+
+  /// Above what was found: corners and axes of the cut that would be the next better one, places spread in it, places
+  /// near the best one.
+  std::vector<Point> ask_look() {
+    slide_ = std::max(0.25 * slide_, 0.01);
+    const double t = std::max(1 - best_ - options_.tolerance, 0.0);
+    const int n = static_cast<int>(axes_.size());
+    std::vector<Point> points;
+    const auto add_ray = [&](const Ray& r, double at) { add(points, calc_place(space_, r, at)); };
+    Ray ray{Point(space_.inputs.size(), 0.0)};
+    for (std::size_t k = 0; n <= 8 && k < std::size_t{1} << n; ++k) {
+      for (int i = 0; i < n; ++i) ray.w[axes_[i]] = k >> i & 1 ? 1 : -1;
+      add_ray(ray, t);
+    }
+    for (int i = 0; i < n; ++i)
+      for (const double end : {-1.0, 1.0}) {
+        ray.w.assign(ray.w.size(), 0.0);
+        ray.w[axes_[i]] = end;
+        add_ray(ray, t);
+      }
+    for (const auto& u : make_sobol_points(n, 1 + 20 * n * round_, 20 * n, options_.seed)) {
+      for (int i = 0; i < n; ++i) ray.w[axes_[i]] = 2 * u[i] - 1;
+      add_ray(ray, t);
+    }
+    const Ray here = to_surface(find_ray(space_, best_x_, 1 - best_));
+    for (const double reach : {0.5, 0.2, 0.05, 0.01})
+      for (int k = 0; k < 8; ++k) {
+        Ray r = here;
+        for (const int i : axes_) r.w[i] = std::clamp(r.w[i] + reach * random_.next(-1, 1), -1.0, 1.0);
+        // a free axis changed, the surface kept: the nearest better cut
+        add_ray(k % 2 == 0 ? to_surface(r) : r, t);
+      }
+    if (points.empty()) converged_ = true, stage_ = Stage::Done;
+    return points;
+  }
+
+  void add(std::vector<Point>& points, Point x) const {
+    if (!space_.has_interaction() || calc_membership(space_, x) > 0) points.push_back(std::move(x));
+  }
+
+  const Space& space_;
+  int outcome_;
+  const PossibilityOptions& options_;
+  Random random_;
+  std::vector<int> axes_;
+  Stage stage_ = Stage::Start;
+  std::vector<Bracket> brackets_;
+  Point best_x_;
+  double best_ = 0, resolution_ = 0, slide_ = 0.25;
+  int sample_ = -1, seen_ = 0, round_ = 0;
+  bool around_ = false, converged_ = false;
+};
+
+}  // namespace
+
+PossibilityResult find_possibilities(const Space& space, Asker& asker, const PossibilityOptions& options) {
+  check_space(space);
+  if (asker.asked() == 0) asker.ask({calc_centre(space)});
+  std::map<int, Climb> climbs;
+  int seen = 0;
+  const auto note_classes = [&] {
+    for (; seen < asker.asked(); ++seen) {
+      const int c = outcome_of(asker.archive()[seen].result);
+      climbs.try_emplace(c, space, c, options);
+    }
+  };
+  note_classes();
+  PossibilityResult result;
+  for (;;) {
+    std::vector<Point> points;
+    std::vector<Climb*> asking;
+    for (auto& [c, climb] : climbs) {
+      const auto more = climb.ask(asker.archive());
+      if (more.empty()) continue;
+      asking.push_back(&climb);
+      points.insert(points.end(), more.begin(), more.end());
+    }
+    if (asking.empty()) break;
+    if (!asker.can_go_on()) {
+      result.ending = asker.is_cancelled() ? Ending::Cancelled : Ending::LimitReached;
+      break;
+    }
+    asker.ask(points);
+    for (auto* climb : asking) climb->tell(asker.archive());
+    note_classes();
+  }
+  for (auto& [c, climb] : climbs) {
+    climb.ask(asker.archive());  // takes notice of the last points
+    result.classes.push_back(climb.result(asker.archive()));
+  }
+  return result;
+}
+
+double calc_possibility_of(const PossibilityResult& r, const std::vector<int>& outcomes) {
+  double most = 0;
+  for (const auto& p : r.classes)
+    if (std::find(outcomes.begin(), outcomes.end(), p.outcome) != outcomes.end()) most = std::max(most, p.possibility);
+  return most;
+}
+
+double calc_necessity(const PossibilityResult& r, int outcome) {
+  double most = 0;
+  for (const auto& p : r.classes)
+    if (p.outcome != outcome) most = std::max(most, p.possibility);
+  return 1 - most;
+}
+
+}  // namespace topple::uncertainty

@@ -1,0 +1,42 @@
+#pragma once
+/// How possible each outcome class is: Π_c = sup { μ(x) : class(x) = c } (docs/theory/uncertainty.md, section 4).
+
+#include <cstdint>
+#include <vector>
+
+#include "uncertainty/alpha.h"
+
+namespace topple::uncertainty {
+
+struct Possibility {
+  int outcome = 0;         // failed_outcome for failed runs
+  double possibility = 0;  // μ of a run of this class: an inner estimate
+  double resolution = 0;   // towards the core on the last ray, the next run of another class lies so much higher in μ
+  int sample = -1;         // the run that has it, in the archive
+  int above = 0;  // runs with a larger μ, all of other classes: an island of the volume fraction v of that cut
+                  // is missed by so many spread points with a probability of (1-v)^above
+  bool converged = false;
+};
+
+struct PossibilityOptions {
+  double tolerance = 1e-4;  // of μ
+  int rounds = 30;          // of bisecting, sliding and looking around, per class at most
+  std::uint64_t seed = 1;
+};
+
+struct PossibilityResult {
+  std::vector<Possibility> classes;  // by outcome, rising; all that the archive holds in the end
+  Ending ending = Ending::Complete;
+};
+
+/// Starts from the archive's best samples of each class: bisects towards the core, slides along the boundary of the
+/// class, looks around above what was found, until nothing higher is seen. Needs an archive that holds points
+/// (`optimise`).
+PossibilityResult find_possibilities(const Space&, Asker&, const PossibilityOptions&);
+
+/// 1 - the largest possibility of any other class.
+double calc_necessity(const PossibilityResult&, int outcome);
+/// The largest possibility among several classes ("any collapse"); 0 for none.
+double calc_possibility_of(const PossibilityResult&, const std::vector<int>& outcomes);
+
+}  // namespace topple::uncertainty

@@ -1,0 +1,140 @@
+#include "uncertainty/possibility.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "reference_cases.h"
+
+namespace topple::uncertainty {
+namespace {
+
+struct Found {
+  AlphaResult bounds;
+  PossibilityResult possibilities;
+  int asked = 0;
+};
+
+Found find(const Space& space, const Evaluate& model, std::uint64_t seed = 1, const PossibilityOptions& given = {}) {
+  const Progress progress;
+  Asker asker(model, progress);
+  AlphaOptions options;
+  options.seed = seed;
+  PossibilityOptions own = given;
+  own.seed = seed;
+  Found f;
+  f.bounds = optimise(space, asker, options);
+  f.possibilities = find_possibilities(space, asker, own);
+  f.asked = asker.asked();
+  return f;
+}
+
+Evaluate make_classes(std::function<int(const Point&)> outcome) {
+  return make_evaluate([outcome](const Point& x) {
+    Result r;
+    r.outcome = outcome(x);
+    r.state = r.outcome == failed_outcome ? Result::State::Failed : Result::State::Done;
+    r.values = {x[0]};
+    return r;
+  });
+}
+
+// x1 x2 / 100 < 8 is possible to .456598936: both inputs at the left ends of that cut.
+TEST(PossibilityReference, OfTheJump) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const Found f = find(Space{cases::make_jump_inputs(), {}, {}}, make_evaluate(cases::calc_jump), seed);
+    ASSERT_EQ(f.possibilities.classes.size(), 2u);
+    EXPECT_EQ(f.possibilities.classes[0].possibility, 1);
+    const Possibility& p = f.possibilities.classes[1];
+    EXPECT_NEAR(p.possibility, .456598936, 1e-3);
+    EXPECT_LE(p.possibility, .456598936 + 1e-9) << "a run has it, so it is never too high";
+    EXPECT_TRUE(p.converged);
+    EXPECT_NEAR(calc_necessity(f.possibilities, 0), 1 - .456598936, 1e-3);
+    EXPECT_EQ(calc_necessity(f.possibilities, 1), 0);
+    EXPECT_LE(f.asked, 10000);
+  }
+}
+
+// A plane a·v >= b in n symmetric triangles is touched first by the corner of the cut at t = b / Σ|a_i|.
+TEST(PossibilityPhysics, OfAHalfSpaceHasAClosedForm) {
+  for (const int n : {1, 2, 3, 5, 8}) {
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      Point a;
+      double sum = 0;
+      for (int i = 0; i < n; ++i) a.push_back(std::cos(2.0 * i + static_cast<double>(seed))), sum += std::abs(a[i]);
+      const double b = 0.43 * sum;
+      const Space space{std::vector<FuzzyNumber>(n, make_triangular(-1, 0, 1)), {}, {}};
+      const Found f = find(space, make_classes([&](const Point& x) {
+                             double s = 0;
+                             for (int i = 0; i < n; ++i) s += a[i] * x[i];
+                             return s >= b ? 7 : 2;
+                           }),
+                           seed);
+      ASSERT_EQ(f.possibilities.classes.size(), 2u);
+      EXPECT_EQ(f.possibilities.classes[1].outcome, 7);
+      EXPECT_NEAR(f.possibilities.classes[1].possibility, 0.57, 1e-3) << n << " inputs";
+    }
+  }
+}
+
+// A ball around a point off all axes and corners: its highest μ is at the place of the ball that is nearest to the core
+// in the largest norm; here along the first axis.
+TEST(PossibilityPhysics, OfABall) {
+  const Space space{std::vector<FuzzyNumber>(3, make_triangular(-1, 0, 1)), {}, {}};
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const Found f = find(space, make_classes([](const Point& x) {
+                           const double d = std::hypot(x[0] - 0.7, x[1] + 0.2, x[2] - 0.1);
+                           return d < 0.25 ? 1 : 0;
+                         }),
+                         seed);
+    ASSERT_EQ(f.possibilities.classes.size(), 2u);
+    EXPECT_NEAR(f.possibilities.classes[1].possibility, 1 - 0.45, 1e-3) << "seed " << seed;
+  }
+}
+
+// ... and where the surface is curved: |x - c| <= r with c = (0.6, 0.5): the cut's corner (t, t) with
+// (0.6 - t)² + (0.5 - t)² = r².
+TEST(PossibilityPhysics, OfADiscAtACorner) {
+  const Space space{std::vector<FuzzyNumber>(2, make_triangular(-1, 0, 1)), {}, {}};
+  const double r = 0.3, t = 0.55 - std::sqrt(0.55 * 0.55 - (0.36 + 0.25 - r * r) / 2);
+  const Found f =
+      find(space, make_classes([&](const Point& x) { return std::hypot(x[0] - 0.6, x[1] - 0.5) <= r ? 1 : 0; }));
+  EXPECT_NEAR(f.possibilities.classes[1].possibility, 1 - t, 1e-3);
+}
+
+TEST(Possibility, CountsFailedRunsAsAClass) {
+  const Space space{std::vector<FuzzyNumber>(2, make_triangular(0, 1, 2)), {}, {}};
+  const Found f = find(space, make_classes([](const Point& x) {
+                         if (x[0] > 1.6) return failed_outcome;
+                         return x[1] < 0.3 ? 1 : 0;
+                       }));
+  ASSERT_EQ(f.possibilities.classes.size(), 3u);
+  EXPECT_EQ(f.possibilities.classes[0].outcome, failed_outcome);
+  EXPECT_NEAR(f.possibilities.classes[0].possibility, 0.4, 1e-3);
+  EXPECT_EQ(f.possibilities.classes[1].possibility, 1);
+  EXPECT_NEAR(f.possibilities.classes[2].possibility, 0.3, 1e-3);
+  EXPECT_NEAR(calc_possibility_of(f.possibilities, {failed_outcome, 1}), 0.4, 1e-3);
+  EXPECT_EQ(calc_possibility_of(f.possibilities, {}), 0);
+}
+
+TEST(Possibility, OfTrapezoidsWhoseCoreHoldsTwoClasses) {
+  const Space space{{make_trapezoidal(0, 1, 2, 3)}, {}, {}};
+  const Found f = find(space, make_classes([](const Point& x) { return x[0] > 1.7 ? 1 : 0; }));
+  EXPECT_EQ(f.possibilities.classes[0].possibility, 1);
+  EXPECT_EQ(f.possibilities.classes[1].possibility, 1);
+  EXPECT_EQ(calc_necessity(f.possibilities, 0), 0);
+}
+
+TEST(Possibility, RespectsInteraction) {
+  // x + y <= 1 keeps the pair out of the corner: the class x + y > 0.9 is touched at (0.45, 0.45) all the same,
+  // the class x > 0.8 needs y <= 0.2 and is possible to 0.2
+  const FuzzyNumber f = make_triangular(-1, 0, 1);
+  const Space space{{f, f}, {[](const Point& x) { return x[0] + x[1] - 1; }}, {}};
+  const Found a = find(space, make_classes([](const Point& x) { return x[0] + x[1] > 0.9 ? 1 : 0; }));
+  EXPECT_NEAR(a.possibilities.classes[1].possibility, 0.55, 1e-3);
+  const Found b = find(space, make_classes([](const Point& x) { return x[0] > 0.8 ? 1 : 0; }));
+  EXPECT_NEAR(b.possibilities.classes[1].possibility, 0.2, 1e-3);
+}
+
+}  // namespace
+}  // namespace topple::uncertainty
