@@ -1,0 +1,254 @@
+#include "uncertainty/design.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "base/error.h"
+#include "uncertainty/box_growth.h"
+#include "uncertainty/measures.h"
+
+namespace topple::uncertainty {
+namespace {
+
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
+void check_options(const DesignOptions& o) {
+  const auto demand = [](bool good, const char* text) {
+    if (!good) throw InputError("E809", fmt::format("cluster design: {}", text));
+  };
+  demand(o.k_max >= 2, "k_max is at least 2");
+  demand(o.cluster_points >= 10, "cluster_points is at least 10");
+  demand(o.edge > 0 && o.edge < 0.5, "edge lies between 0 and 0.5");
+  demand(o.fresh >= 1, "fresh is at least 1");
+  demand(o.confidence > 0 && o.confidence < 1, "confidence lies between 0 and 1");
+}
+
+class Design {
+ public:
+  Design(const Space& space, Asker& asker, const Requirement& requirement, const DesignOptions& options)
+      : space_(space), asker_(asker), requirement_(requirement), options_(options), support_(make_box(space, 0)) {
+    for (int i = 0; i < space.size(); ++i)
+      if (support_.upper[i] > support_.lower[i]) axes_.push_back(i);
+  }
+
+  DesignResult run() {
+    spread();
+    const std::vector<int> good = find_samples(true), bad = find_samples(false);
+    result_.permissible_samples = thin(good), result_.forbidden_samples = thin(bad);
+    result_.permissible_groups = group(result_.permissible_samples);
+    result_.forbidden_groups = group(result_.forbidden_samples);
+    std::vector<int> centres;
+    for (const int c : result_.permissible_groups.centre) centres.push_back(result_.permissible_samples[c]);
+    for (std::size_t g = 0; g < centres.size(); ++g) grow(static_cast<int>(g), centres[g]);
+    rank();
+    for (int i = 0; i < asker_.asked(); ++i) {
+      const double m = margin_of(i);
+      ++(m == -infinite ? result_.failed : m >= 0 ? result_.permissible : result_.forbidden);
+    }
+    result_.ending = asker_.is_cancelled() ? Ending::Cancelled
+                     : asker_.rest() == 0  ? Ending::LimitReached
+                                           : Ending::Complete;
+    return std::move(result_);
+  }
+
+ private:
+  /// The requirement at a sample, -infinite where the run failed.
+  double margin_of(int sample) {
+    while (static_cast<int>(margins_.size()) <= sample) {
+      const Result& r = asker_.archive()[static_cast<int>(margins_.size())].result;
+      const double m = r.state == Result::State::Done ? requirement_(r) : -infinite;
+      margins_.push_back(std::isnan(m) ? -infinite : m);
+    }
+    return margins_[sample];
+  }
+  bool is_good(int sample) { return sample >= 0 && margin_of(sample) >= 0; }
+
+  std::vector<int> find_samples(bool good) {
+    std::vector<int> found;
+    for (int i = 0; i < asker_.asked(); ++i)
+      if (support_.contains(asker_.archive()[i].x) && is_good(i) == good) found.push_back(i);
+    return found;
+  }
+
+  void spread() {
+    const int n = static_cast<int>(axes_.size());
+    const int count = options_.space_points > 0 ? options_.space_points : 200 * n;
+    std::vector<Point> points;
+    if (n == 0) points.push_back(calc_centre(space_));
+    for (const auto& u : make_sobol_points(n, 1, count, options_.seed + 1)) {
+      Point fractions(space_.inputs.size(), 0.0);
+      for (int i = 0; i < n; ++i) fractions[axes_[i]] = u[i];
+      Point x = place_in(support_, fractions);
+      if (is_allowed(space_, x)) points.push_back(std::move(x));
+    }
+    int done = 0, good = 0;
+    for (const int i : asker_.ask(points)) {
+      done += i >= 0;
+      good += is_good(i);
+    }
+    if (done > 0) {
+      const double p = result_.fraction = static_cast<double>(good) / done;
+      result_.fraction_error = std::sqrt(p * (1 - p) / done);
+    }
+  }
+
+  /// At most `cluster_points` of them, evenly picked.
+  std::vector<int> thin(const std::vector<int>& all) const {
+    const std::size_t limit = static_cast<std::size_t>(options_.cluster_points);
+    if (all.size() <= limit) return all;
+    std::vector<int> some;
+    for (std::size_t k = 0; k < limit; ++k) some.push_back(all[k * all.size() / limit]);
+    return some;
+  }
+
+  Grouping group(const std::vector<int>& samples) const {
+    std::vector<Point> points;
+    for (const int s : samples) {
+      Point u;
+      for (const int i : axes_)
+        u.push_back((asker_.archive()[s].x[i] - support_.lower[i]) / (support_.upper[i] - support_.lower[i]));
+      points.push_back(std::move(u));
+    }
+    return find_groups(points, options_.clustering, options_.k_max);
+  }
+
+  std::vector<Verdict> judge(const std::vector<Point>& points) {
+    std::vector<Verdict> verdicts;
+    for (const int i : asker_.ask(points))
+      verdicts.push_back(i < 0 ? Verdict::NotRun : is_good(i) ? Verdict::Permissible : Verdict::Violating);
+    return verdicts;
+  }
+
+  void grow(int g, int centre) {
+    PermissibleBox b;
+    b.group = g, b.centre = centre;
+    const Point middle = asker_.archive()[centre].x;
+    BoxGrowth growth(
+        support_, middle, [this](const std::vector<Point>& points) { return judge(points); },
+        [this](const Point& x) { return is_allowed(space_, x); },
+        {options_.edge, options_.smallest, options_.rounds,
+         options_.seed + 104729 * static_cast<std::uint64_t>(g + 1)});
+    for (int seen = 0; !b.kept;) {
+      for (; seen < asker_.asked(); ++seen)
+        if (support_.contains(asker_.archive()[seen].x) && !is_good(seen))
+          growth.add_violating(asker_.archive()[seen].x);
+      const bool grown = growth.grow();
+      b.box = growth.box();
+      b.volume = growth.calc_part();
+      if (!grown) break;
+      ++b.tries;
+      const auto fresh = growth.make_random_points(options_.fresh);
+      if (!growth.check(fresh)) {
+        if (!asker_.can_go_on()) break;
+        continue;
+      }
+      b.fresh = static_cast<int>(fresh.size());
+      b.inputs.clear();
+      for (int i = 0; i < space_.size(); ++i)
+        b.inputs.push_back(make_triangular(b.box.lower[i], middle[i], b.box.upper[i]));
+      rerun(b);
+      b.kept = !has_violation(b.box) && !asker_.is_cancelled();
+      if (!asker_.can_go_on()) break;
+    }
+    if (is_known(b.box)) return;
+    if (b.fresh > 0) b.violating = 1 - std::pow((1 - options_.confidence) / b.tries, 1.0 / b.fresh);
+    boxes_.push_back(std::move(b));
+  }
+
+  /// Whether another group gave the same box.
+  bool is_known(const Box& box) const {
+    return std::any_of(boxes_.begin(), boxes_.end(), [&](const PermissibleBox& other) {
+      for (const int i : axes_) {
+        const double near = options_.edge * (support_.upper[i] - support_.lower[i]);
+        if (std::abs(other.box.lower[i] - box.lower[i]) > near || std::abs(other.box.upper[i] - box.upper[i]) > near)
+          return false;
+      }
+      return true;
+    });
+  }
+
+  bool has_violation(const Box& box) {
+    for (int i = 0; i < asker_.asked(); ++i)
+      if (box.contains(asker_.archive()[i].x) && !is_good(i)) return true;
+    return false;
+  }
+
+  /// The box as fuzzy input.
+  void rerun(PermissibleBox& b) {
+    Space inner{b.inputs, space_.constraints, {}};
+    AlphaOptions o;
+    o.levels = options_.levels;
+    o.seed = options_.seed;
+    o.patience = 1;
+    o.search_classes = false;
+    const int limit = asker_.limit();
+    asker_.set_limit(std::min(limit, asker_.asked() + options_.rerun_limit));
+    b.outputs = optimise(inner, asker_, o).outputs;
+    asker_.set_limit(limit);
+  }
+
+  void rank() {
+    double low = infinite, high = -infinite;
+    std::vector<double> least, most;  // of each output over all runs
+    for (int i = 0; i < asker_.asked(); ++i) {
+      const double m = margin_of(i);
+      if (m == -infinite) continue;
+      low = std::min(low, m), high = std::max(high, m);
+      const auto& values = asker_.archive()[i].result.values;
+      least.resize(values.size(), infinite), most.resize(values.size(), -infinite);
+      for (std::size_t o = 0; o < values.size(); ++o)
+        least[o] = std::min(least[o], values[o]), most[o] = std::max(most[o], values[o]);
+    }
+    for (auto& b : boxes_) {
+      double nearest = infinite;
+      for (int i = 0; i < asker_.asked(); ++i)
+        if (b.box.contains(asker_.archive()[i].x)) ++b.samples, nearest = std::min(nearest, margin_of(i));
+      b.distance = high > low && nearest < infinite ? std::max(nearest, 0.0) / (high - low) : 0;
+      const std::size_t o = static_cast<std::size_t>(options_.ranking_output);
+      if (!b.kept || o >= b.outputs.size()) continue;
+      std::vector<double> entropies;
+      for (const int i : axes_) entropies.push_back(calc_entropy(b.inputs[i], support_.upper[i] - support_.lower[i]));
+      const double reference = most[o] > least[o] ? most[o] - least[o] : 1;
+      b.robustness = calc_robustness(entropies, calc_entropy(make_number(b.outputs[o]), reference));
+    }
+    // places by robustness and by distance are added; the larger volume decides a tie
+    const auto place = [this](const PermissibleBox& b, double PermissibleBox::*what) {
+      return std::count_if(boxes_.begin(), boxes_.end(), [&](const auto& o) { return o.kept && o.*what > b.*what; });
+    };
+    std::vector<std::pair<long, std::size_t>> order;
+    for (std::size_t k = 0; k < boxes_.size(); ++k)
+      order.emplace_back(place(boxes_[k], &PermissibleBox::robustness) + place(boxes_[k], &PermissibleBox::distance),
+                         k);
+    std::stable_sort(order.begin(), order.end(), [this](const auto& a, const auto& b) {
+      const auto &p = boxes_[a.second], &q = boxes_[b.second];
+      if (p.kept != q.kept) return p.kept;
+      return a.first != b.first ? a.first < b.first : p.volume > q.volume;
+    });
+    for (const auto& [places, k] : order) result_.boxes.push_back(std::move(boxes_[k]));
+  }
+
+  const Space& space_;
+  Asker& asker_;
+  const Requirement& requirement_;
+  const DesignOptions& options_;
+  Box support_;
+  std::vector<int> axes_;
+  std::vector<double> margins_;
+  std::vector<PermissibleBox> boxes_;
+  DesignResult result_;
+};
+
+}  // namespace
+
+DesignResult find_permissible_boxes(const Space& space, Asker& asker, const Requirement& requirement,
+                                    const DesignOptions& options) {
+  check_space(space);
+  check_options(options);
+  return Design(space, asker, requirement, options).run();
+}
+
+}  // namespace topple::uncertainty

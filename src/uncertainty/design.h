@@ -1,0 +1,63 @@
+#pragma once
+/// Fuzzy cluster design: which boxes of inputs keep a requirement (docs/theory/uncertainty.md, section 7).
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "uncertainty/alpha.h"
+#include "uncertainty/cluster.h"
+
+namespace topple::uncertainty {
+
+/// What a run must keep: at least 0 is permissible. Its size is the distance to the constraint (for a class alone: 1
+/// and -1). Not asked for failed runs, which are never permissible.
+using Requirement = std::function<double(const Result&)>;
+
+struct DesignOptions {
+  Clustering clustering = Clustering::Medoids;
+  int k_max = 6;
+  int space_points = 0;      // spread over the support beside what the archive holds; 0: 200 per input
+  int cluster_points = 500;  // of each set that are grouped; the others count for the boxes alone
+  double edge = 5e-3;        // how near a box may come to a violating run, part of the support's width
+  double smallest = 1e-3;    // boxes below this part of the support's volume are not kept
+  int rounds = 300;          // of growing and checking a box, at most
+  int fresh = 149;           // new random points that must all pass
+  double confidence = 0.95;  // of the stated bound
+  int ranking_output = 0;    // whose robustness ranks the boxes
+  int rerun_limit = 2000;    // points of the fuzzy analysis of one box, at most
+  std::vector<double> levels = {0, 0.25, 0.5, 0.75, 1};
+  std::uint64_t seed = 1;
+};
+
+/// A box of inputs, inside which no run violated the requirement.
+struct PermissibleBox {
+  Box box;
+  int group = 0;                    // of the permissible samples
+  int centre = -1;                  // sample in the middle of the group: the core
+  std::vector<FuzzyNumber> inputs;  // triangles: support = box, core = centre
+  double volume = 0;                // part of the support's volume
+  int samples = 0;                  // runs inside, all permissible
+  int fresh = 0;                    // independent random points that passed, last time
+  int tries = 0;                    // how often so many were tried, violations before the last included
+  double violating = 1;   // with the confidence, at most this part of the box violates: 1 - (β/tries)^(1/fresh)
+  double distance = 0;    // least requirement inside over its range in all runs; 0 without a range
+  double robustness = 0;  // entropies of the inputs over that of the ranking output
+  std::vector<OutputBounds> outputs;  // of the fuzzy analysis on these inputs
+  bool kept = false;                  // verified, large enough, and no violation in the fuzzy analysis
+};
+
+struct DesignResult {
+  std::vector<PermissibleBox> boxes;               // ranked, those not kept behind
+  int permissible = 0, forbidden = 0, failed = 0;  // samples
+  double fraction = 0;                             // permissible part of the support, from the spread points
+  double fraction_error = 0;                       // its standard error for independent points; spread points do better
+  Grouping permissible_groups, forbidden_groups;
+  std::vector<int> permissible_samples, forbidden_samples;  // that were grouped, as samples of the archive
+  Ending ending = Ending::Complete;
+};
+
+/// Uses and fills the asker's archive. Throws InputError E804 (space), E809 (options out of range).
+DesignResult find_permissible_boxes(const Space&, Asker&, const Requirement&, const DesignOptions&);
+
+}  // namespace topple::uncertainty

@@ -1,0 +1,199 @@
+#include "uncertainty/design.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "reference_cases.h"
+#include "uncertainty/random.h"
+
+namespace topple::uncertainty {
+namespace {
+
+struct Found {
+  DesignResult design;
+  Archive archive;
+};
+
+Found find(const Space& space, const Evaluate& model, const Requirement& requirement, const DesignOptions& options,
+           int limit = 20000) {
+  const Progress progress;
+  Asker asker(model, progress, nullptr, limit);
+  Found f;
+  f.design = find_permissible_boxes(space, asker, requirement, options);
+  f.archive = asker.archive();
+  return f;
+}
+
+/// Outcome 0 where `is_good`, else 1.
+Evaluate make_model(std::function<bool(const Point&)> is_good) {
+  return make_evaluate([is_good](const Point& x) {
+    Result r;
+    r.state = Result::State::Done;
+    r.outcome = is_good(x) ? 0 : 1;
+    r.values = {x[0]};
+    return r;
+  });
+}
+
+const Requirement outcome_0 = [](const Result& r) { return r.outcome == 0 ? 1.0 : -1.0; };
+
+// x1 x2 / 100 >= 8: permissible on .879201442 of the support; the largest box from the upper corner reaches to
+// (20.225996, 39.553059) and has the area 1200.224726.
+TEST(DesignReference, BoxesOfTheJump) {
+  for (const auto kind : {Clustering::Medoids, Clustering::FuzzyMeans})
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      DesignOptions options;
+      options.clustering = kind;
+      options.seed = seed;
+      options.edge = 1e-3;
+      const Found f = find(
+          Space{cases::make_jump_inputs(), {}, {}}, make_evaluate(cases::calc_jump),
+          [](const Result& r) { return r.outcome == 0 ? r.values[0] : -1; }, options);
+      ASSERT_FALSE(f.design.boxes.empty());
+      double largest = 0;
+      Point corner;
+      for (const auto& b : f.design.boxes) {
+        EXPECT_TRUE(b.kept);
+        EXPECT_GE(b.box.lower[0] * b.box.lower[1], 800) << "the whole box is permissible";
+        EXPECT_EQ(b.box.upper, (Point{45, 88}));
+        EXPECT_EQ(b.inputs[0].support().left, b.box.lower[0]);
+        EXPECT_EQ(b.inputs[1].centre(), f.archive[b.centre].x[1]);
+        EXPECT_EQ(b.fresh, 149);
+        EXPECT_NEAR(b.violating, 1 - std::pow(0.05 / b.tries, 1.0 / 149), 1e-12);
+        if (calc_volume(b.box) > largest) largest = calc_volume(b.box), corner = b.box.lower;
+      }
+      EXPECT_LE(largest, 1200.224726);
+      EXPECT_NEAR(largest, 1200.224726, 2e-3 * 1200) << "twice the edge";
+      EXPECT_NEAR(corner[0], 20.225996, 0.5) << "flat along the boundary";
+      EXPECT_NEAR(corner[1], 39.553059, 1.0);
+    }
+}
+
+TEST(DesignReference, PermissiblePartOfTheJump) {
+  DesignOptions options;
+  options.space_points = 16000;
+  options.rounds = 1;
+  const Found f =
+      find(Space{cases::make_jump_inputs(), {}, {}}, make_evaluate(cases::calc_jump), outcome_0, options, 30000);
+  EXPECT_NEAR(f.design.fraction, .879201442, 1e-3) << "below half the standard error of independent points";
+  EXPECT_NEAR(f.design.fraction_error, std::sqrt(.8792 * .1208 / 16000), 1e-5);
+  EXPECT_EQ(f.design.permissible + f.design.forbidden + f.design.failed, static_cast<int>(f.archive.size()));
+}
+
+// Σ of the products' logarithms is symmetric: the largest box of Π x_i >= c from the corner (1 ... 1) is a cube.
+TEST(DesignPhysics, LargestBoxOfAProductIsACube) {
+  for (const int n : {3, 5}) {
+    const double c = std::pow(0.6, n) * 0.3, side = 1 - std::pow(c, 1.0 / n);
+    DesignOptions options;
+    options.k_max = 2;
+    const Found f =
+        find(Space{std::vector<FuzzyNumber>(n, make_triangular(0, .6, 1)), {}, {}}, make_model([&](const Point& x) {
+               double p = 1;
+               for (const double v : x) p *= v;
+               return p >= c;
+             }),
+             outcome_0, options, 30000);
+    double largest = 0;
+    for (const auto& b : f.design.boxes) {
+      if (!b.kept) continue;
+      double p = 1;
+      for (const double v : b.box.lower) p *= v;
+      EXPECT_GE(p, c);
+      largest = std::max(largest, b.volume);
+    }
+    EXPECT_LE(largest, std::pow(side, n));
+    EXPECT_GE(largest, 0.93 * std::pow(side, n)) << n << " inputs";
+  }
+}
+
+TEST(Design, LeavesForbiddenIslandsAndFailuresOut) {
+  // two permissible fields, a wall between them with a gap that is too small, an island, a corner that fails
+  const auto is_forbidden = [](const Point& x) {
+    return std::abs(x[0] - 0.5) < 0.06 || std::hypot(x[0] - 0.2, x[1] - 0.25) < 0.08;
+  };
+  const Evaluate model = make_evaluate([&](const Point& x) {
+    Result r;
+    r.state = x[0] + x[1] > 1.7 ? Result::State::Failed : Result::State::Done;
+    r.outcome = is_forbidden(x) ? 1 : 0;
+    r.values = {x[0] + 2 * x[1]};
+    return r;
+  });
+  const FuzzyNumber f = make_triangular(0, 0.3, 1);
+  DesignOptions options;
+  const Found found = find(Space{{f, f}, {}, {}}, model, outcome_0, options);
+  EXPECT_GT(found.design.failed, 0);
+  int left = 0, right = 0;
+  Random random(5);
+  for (const auto& b : found.design.boxes) {
+    if (!b.kept) continue;
+    (b.box.upper[0] < 0.5 ? left : right) += 1;
+    EXPECT_GT(b.volume, 0.05);
+    int violating = 0;
+    for (int k = 0; k < 20000; ++k) {
+      const Point x = {random.next(b.box.lower[0], b.box.upper[0]), random.next(b.box.lower[1], b.box.upper[1])};
+      violating += is_forbidden(x) || x[0] + x[1] > 1.7;
+    }
+    EXPECT_LE(violating, b.violating * 20000) << "the stated bound";
+  }
+  EXPECT_GE(left, 1);
+  EXPECT_GE(right, 1);
+}
+
+TEST(Design, RanksKeptBoxesFirst) {
+  const Found f = find(Space{cases::make_jump_inputs(), {}, {}}, make_evaluate(cases::calc_jump), outcome_0, {});
+  ASSERT_FALSE(f.design.boxes.empty());
+  EXPECT_TRUE(std::is_partitioned(f.design.boxes.begin(), f.design.boxes.end(), [](const auto& b) { return b.kept; }));
+  for (const auto& b : f.design.boxes) {
+    if (!b.kept) continue;
+    EXPECT_GT(b.robustness, 0);
+    EXPECT_GT(b.samples, b.fresh);
+    ASSERT_EQ(b.outputs.size(), 1u);
+    // the fuzzy analysis on the box: its output is monotone, so its corners bound it
+    const auto value = [](const Point& x) { return x[0] * x[1] / 100 - 8; };
+    EXPECT_NEAR(b.outputs[0].levels[0].lower.value, value(b.box.lower), 1e-9);
+    EXPECT_NEAR(b.outputs[0].levels[0].upper.value, value(b.box.upper), 1e-9);
+  }
+}
+
+TEST(Design, SaysWhenNothingIsPermissible) {
+  const Found f = find(Space{cases::make_jump_inputs(), {}, {}}, make_evaluate(cases::calc_jump),
+                       [](const Result&) { return -1.0; }, {});
+  EXPECT_TRUE(f.design.boxes.empty());
+  EXPECT_EQ(f.design.fraction, 0);
+  EXPECT_EQ(f.design.permissible, 0);
+}
+
+TEST(Design, EverythingPermissibleIsOneBox) {
+  const Found f = find(Space{cases::make_jump_inputs(), {}, {}}, make_evaluate(cases::calc_jump),
+                       [](const Result&) { return 1.0; }, {});
+  ASSERT_EQ(f.design.boxes.size(), 1u) << "the same box of all groups is kept once";
+  EXPECT_EQ(f.design.boxes[0].volume, 1);
+  EXPECT_TRUE(f.design.boxes[0].kept);
+}
+
+TEST(DesignReplay, SameBits) {
+  DesignOptions options;
+  const auto run = [&] {
+    return find(Space{cases::make_jump_inputs(), {}, {}}, make_evaluate(cases::calc_jump), outcome_0, options);
+  };
+  const Found a = run(), b = run();
+  ASSERT_EQ(a.archive.size(), b.archive.size());
+  ASSERT_EQ(a.design.boxes.size(), b.design.boxes.size());
+  for (std::size_t k = 0; k < a.design.boxes.size(); ++k) {
+    EXPECT_EQ(a.design.boxes[k].box.lower, b.design.boxes[k].box.lower);
+    EXPECT_EQ(a.design.boxes[k].robustness, b.design.boxes[k].robustness);
+  }
+}
+
+TEST(Design, RefusesBadOptions) {
+  DesignOptions options;
+  options.confidence = 1;
+  EXPECT_THROW(find(Space{cases::make_jump_inputs(), {}, {}}, make_evaluate(cases::calc_jump), outcome_0, options),
+               InputError);
+}
+
+}  // namespace
+}  // namespace topple::uncertainty
