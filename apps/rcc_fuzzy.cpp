@@ -158,18 +158,10 @@ record::RccFan make_fan(const product::FuzzyFile& file, const uncertainty::Space
   }
   fan.core = std::max(0, archive.find(uncertainty::calc_centre(space)));
   fill_levels(result, fan);
-  double largest = 0;
-  for (const double m : fan.levels.front().high) largest = std::max(largest, m);
   fan.ordinates.push_back({"largest moment", -1, to_cuts(result.outputs[0])});
   for (size_t k = 0; k < searched.size(); ++k) {
     const double phi = rotation[searched[k]];
     fan.ordinates.push_back({fmt::format("M at {:.3g} mrad", phi / 1e-3), phi, to_cuts(result.outputs[k + 1])});
-    for (size_t l = 0; l < fan.levels.size(); ++l) {
-      const record::RccInterval& cut = fan.ordinates.back().cuts[l];
-      const double gap = std::max(std::abs(cut.left - fan.levels[l].low[searched[k]]),
-                                  std::abs(cut.right - fan.levels[l].high[searched[k]]));
-      if (largest > 0) fan.search_gap = std::max(fan.search_gap, gap / largest);
-    }
   }
   for (int outcome = 0; outcome < 4; ++outcome) {
     record::RccOutcome o{outcome_words[outcome], 0, 0, -1};

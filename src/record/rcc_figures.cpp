@@ -305,6 +305,25 @@ void add_states(const RccReport& r, char axis, int direction, std::vector<Figure
   }
 }
 
+void add_solid_states(const RccReport& r, std::vector<Figure>& out) {
+  const std::vector<double> forces = collect(r.solid_states, [](const RccSolidState& s) { return s.normal_force; });
+  for (size_t k = 0; k < forces.size(); ++k) {
+    std::vector<const RccSolidState*> states;
+    for (const RccSolidState& s : r.solid_states)
+      if (s.normal_force == forces[k]) states.push_back(&s);
+    Figure f;
+    f.id = fmt::format("solid_{}", k + 1);
+    f.heading = "The zone on the solid route";
+    f.caption = fmt::format(
+        "N = {}: stresses of the concrete in a cut and cracks and crushing seen from the side (the worst across the "
+        "breadth), at the rotations of yield, peak and ultimate of the layered route.",
+        force_text(forces[k]));
+    f.drawing = draw_solid_states(r, states);
+    f.table = make_solid_table(states);
+    out.push_back(std::move(f));
+  }
+}
+
 bool has_other_direction(const RccReport& r, char axis) {
   for (const RccCurve& a : r.curves)
     for (const RccCurve& b : r.curves) {
@@ -338,6 +357,7 @@ std::vector<Figure> make_figures(const RccReport& r) {
   }
   add_biaxial(r, out);
   add_axial(r, out);
+  add_solid_states(r, out);
   for (const char axis : {'y', 'z'}) {
     add_states(r, axis, 1, out);
     if (has_other_direction(r, axis)) add_states(r, axis, -1, out);

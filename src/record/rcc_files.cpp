@@ -87,7 +87,7 @@ bool is_same(const RccCurve& a, const RccCurve& b) {
   if (a.route != b.route || a.normal_force != b.normal_force || a.rotation.size() != b.rotation.size()) return false;
   const double scale = a.moment.empty() ? 0 : *std::max_element(a.moment.begin(), a.moment.end());
   for (size_t j = 0; j < a.rotation.size(); ++j)
-    if (std::abs(a.rotation[j] - b.rotation[j]) > 1e-6 * a.rotation[j] ||
+    if (std::abs(a.rotation[j] - b.rotation[j]) > 1e-6 * std::abs(a.rotation[j]) ||
         std::abs(a.moment[j] - b.moment[j]) > 1e-6 * scale)
       return false;
   return true;
@@ -157,6 +157,17 @@ std::string to_json(const RccReport& r) {
         {{"route", a.route}, {"shortening", numbers(a.shortening)}, {"normal_force", numbers(a.normal_force)}});
   j["states"] = json::array();
   for (const RccState& s : r.states) j["states"].push_back(to_json(s));
+  j["solid_states"] = json::array();
+  for (const RccSolidState& s : r.solid_states) {
+    json one = head_of("solid", s.axis, s.direction);
+    one["normal_force"] = number(s.normal_force);
+    one["rotation"] = number(s.rotation);
+    one["moment"] = number(s.moment);
+    one["cut_at"] = number(s.cut_at);
+    one["cut_normal_force"] = number(s.cut_normal_force);
+    j["solid_states"].push_back(std::move(one));
+  }
+  j["solid_notes"] = r.solid_notes;
   j["families"] = json::array();
   for (const RccFamily& f : r.families)
     j["families"].push_back({{"axis", std::string(1, f.axis)},
@@ -240,6 +251,30 @@ std::string states_csv(const RccReport& r) {
     for (const RccState::Bar& b : s.bars)
       out += fmt::format("{},bar,,,{},{},{},{},{}{}", head, digits(b.y), digits(b.z), digits(b.strain),
                          digits(b.stress), b.condition, line_end);
+  }
+  return out;
+}
+
+std::string solid_states_csv(const RccReport& r) {
+  std::string out =
+      "axis,direction,normal force [N],rotation [rad],part,x from [m],x to [m],y from [m],y to [m],z from [m],z to "
+      "[m],stress [N/m2],strain [-],crack width [m],strength lost [-]";
+  out += line_end;
+  for (const RccSolidState& s : r.solid_states) {
+    const std::string head =
+        fmt::format("{},{},{},{}", s.axis, sign_of(s.direction), digits(s.normal_force), digits(s.rotation));
+    for (const RccSolidState::CutCell& c : s.cut)
+      out += fmt::format("{},cut,{},{},{},{},{},{},{},,,{}", head, digits(s.cut_at), digits(s.cut_at), digits(c.y_from),
+                         digits(c.y_to), digits(c.z_from), digits(c.z_to), digits(c.stress), line_end);
+    for (const RccSolidState::Bar& b : s.bars)
+      out += fmt::format("{},bar,{},{},{},{},{},{},{},{},,{}", head, digits(s.cut_at), digits(s.cut_at), digits(b.y),
+                         digits(b.y), digits(b.z), digits(b.z), digits(b.stress), digits(b.strain), line_end);
+    for (const RccSolidState::SideCell& c : s.side) {
+      const std::string place = s.axis == 'y' ? fmt::format(",,{},{}", digits(c.a_from), digits(c.a_to))
+                                              : fmt::format("{},{},,", digits(c.a_from), digits(c.a_to));
+      out += fmt::format("{},side,{},{},{},,,{},{}{}", head, digits(c.x_from), digits(c.x_to), place,
+                         digits(c.crack_width), digits(c.crushing), line_end);
+    }
   }
   return out;
 }

@@ -55,7 +55,6 @@ json to_json(const RccFuzzyReport& r, const RccFan& f) {
   j["runs"] = f.originals.size();
   j["failed"] = f.failed;
   j["ending"] = f.ending;
-  j["search_gap"] = number(f.search_gap);
   j["originals"] = json::array();
   for (const RccOriginal& o : f.originals) {
     if (!o.is_drawn) continue;
@@ -438,11 +437,10 @@ std::string to_page(const RccFuzzyReport& r, const std::vector<Figure>& figures)
   out += figures_html(figures);
   out += "<h2>Bounds that were searched for</h2>\n<section>" + ordinates_html(r);
   for (const RccFan& f : r.fans)
-    out += fmt::format(
-        "<p class=\"quiet\">N = {}: {} runs, {} failed{}. {} The fan over all runs differs from these "
-        "bounds by at most {} of the largest moment; between them it is an inner estimate.</p>\n",
-        force_text(f.normal_force), f.originals.size(), f.failed,
-        f.failure.empty() ? "" : " (" + escape_html(f.failure) + ")", escape_html(f.ending), shown(f.search_gap, 1, 2));
+    out += fmt::format("<p class=\"quiet\">N = {}: {} runs, {} failed{}. {}</p>\n", force_text(f.normal_force),
+                       f.originals.size(), f.failed, f.failure.empty() ? "" : " (" + escape_html(f.failure) + ")",
+                       escape_html(f.ending));
+  out += "<p class=\"quiet\">Between these rotations the fan is made of all runs and is an inner estimate.</p>\n";
   out += "</section>\n";
   out += inputs_html(r.section);
   out += list_html("Not modelled", r.not_modelled);

@@ -64,7 +64,6 @@ struct RccFan {
   double crushing_possibility = 0;     // that the section cannot carry the force at all
   int failed = 0;
   std::string failure, ending;  // of the first failed run; of the search
-  double search_gap = 0;        // largest distance of the fan from a searched ordinate, over the largest moment
 };
 
 struct RccFuzzyReport {

@@ -167,6 +167,7 @@ std::string to_page(const RccReport& r, const std::vector<Figure>& figures) {
   for (const std::string& note : r.notes) out += fmt::format("<p>{}</p>\n", escape_html(note));
   out += "<h2>Stiffness and resistance</h2>\n<section>" + points_table(r) + capacities(r) + "</section>\n";
   out += figures_html(figures);
+  out += list_html("The solid route's runs", r.solid_notes);
   out += inputs_html(r.inputs);
   out += list_html("Not modelled", r.not_modelled);
   out += provenance_html(r.source, r.sha256, r.program_version);

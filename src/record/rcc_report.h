@@ -69,6 +69,31 @@ struct RccState {
   std::vector<Bar> bars;
 };
 
+/// The zone on the solid route at one rotation.
+struct RccSolidState {
+  char axis = 'y';
+  int direction = 1;
+  double normal_force = 0, rotation = 0, moment = 0;
+  double cut_at = 0;            // place of the cut along the zone [m]
+  double cut_normal_force = 0;  // integrated over the cut [N]
+  struct CutCell {
+    double y_from = 0, y_to = 0, z_from = 0, z_to = 0;  // [m]
+    double stress = 0;                                  // [Pa]
+  };
+  struct Bar {
+    double y = 0, z = 0, stress = 0, strain = 0;
+  };
+  /// Seen along the axis of bending; the worst across the breadth. a is z for bending about y, y for bending about z.
+  struct SideCell {
+    double x_from = 0, x_to = 0, a_from = 0, a_to = 0;  // [m]
+    double crack_width = 0;                             // [m]
+    double crushing = 0;                                // share of the strength lost
+  };
+  std::vector<CutCell> cut;
+  std::vector<Bar> bars;
+  std::vector<SideCell> side;
+};
+
 /// The family of make_rcc as it goes into the multibody system.
 struct RccFamily {
   char axis = 'y';
@@ -87,6 +112,9 @@ struct RccReport {
   double biaxial_exponent = 0;  // of the power law that a building's model uses, fitted to these points
   std::vector<RccAxial> axial;
   std::vector<RccState> states;
+  std::vector<RccSolidState> solid_states;
+  std::vector<std::string> solid_notes;
+  double fc = 0, fct = 0;  // scales of the solid route's pictures [Pa]
   std::vector<RccFamily> families;
   double EA = 0, EI_y = 0, EI_z = 0, GA = 0, GJ = 0;                 // [N], [N·m²], [N], [N·m²]
   double shear_y = 0, shear_z = 0, shear_friction = 0, torsion = 0;  // [N], [N], [-], [N·m]
@@ -110,5 +138,7 @@ std::string interaction_csv(const RccReport&);
 std::string biaxial_csv(const RccReport&);
 std::string axial_csv(const RccReport&);
 std::string states_csv(const RccReport&);
+/// Cells of the cut, bars and cells seen from the side, of every state of the solid route.
+std::string solid_states_csv(const RccReport&);
 
 }  // namespace topple::record
