@@ -143,36 +143,6 @@ CrackLine make_crack_line(const Concrete& c, double limit) {
   return line;
 }
 
-/// Effective principal stresses and what they depend on.
-struct Stresses {
-  Vector value, rate;     // σ_i and ∂σ_i/∂u_i
-  Vector widening{};      // ∂σ_i/∂u_0 through the widest crack, i > 0
-  bool cracking = false;  // the widest crack grows
-};
-
-/// Stress of each direction from its equivalent uniaxial strain. `line` is of the history; if the crack may grow and
-/// does, the others follow the line that it drags along.
-Stresses calc_stresses(const Concrete& c, const Vector& u, const CrackLine& history, bool may_grow) {
-  Stresses s;
-  CrackLine line = history;
-  s.cracking = may_grow && u[0] > history.limit;
-  if (s.cracking) line = make_crack_line(c, u[0]);
-  for (int i = 0; i < 3; ++i) {
-    if (u[i] <= 0) {
-      s.value[i] = c.Ec * u[i], s.rate[i] = c.Ec;
-    } else if (i == 0 && s.cracking) {
-      const Response r = calc_tension(c, u[0]);
-      s.value[0] = r.stress, s.rate[0] = r.tangent;
-    } else if (u[i] <= line.zero) {
-      s.value[i] = 0, s.rate[i] = 0;
-    } else {
-      s.value[i] = line.slope * (u[i] - line.zero), s.rate[i] = line.slope;
-      if (s.cracking) s.widening[i] = line.slope_rate * (u[i] - line.zero) - line.slope * line.zero_rate;
-    }
-  }
-  return s;
-}
-
 /// The compressive curve in effective stresses, equations (21) and (26).
 struct Hardening {
   double plastic, plastic_rate;      // P(κ)
@@ -189,6 +159,83 @@ Hardening calc_hardening(const Concrete& c, double kappa) {
   h.integrity = s.stress / h.effective;
   h.integrity_rate = (s.tangent - h.integrity * h.effective_rate) / h.effective;
   return h;
+}
+
+double calc_mises(const Vector& s) {
+  const double a = s[0] - s[1], b = s[1] - s[2], d = s[2] - s[0];
+  return std::sqrt(0.5 * (a * a + b * b + d * d));
+}
+
+/// Effective principal stresses and what they depend on.
+struct Stresses {
+  Vector value{};
+  Matrix rate{};          // ∂σ_i/∂u_k
+  Vector by_kappa{};      // ∂σ_i/∂κ, through the crack that compression across it lets grow
+  bool cracking = false;  // the widest crack grows
+  double tension = 0;     // its equivalent strain u_m
+  // What compresses across an open crack: share of S(κ = peak) in effective stress, and by σ_i.
+  double across = 0;
+  Vector across_rate{};
+  double loss = 0, loss_rate = 0;  // of compressive strength by the crack's opening, 1/β - 1 of equation (32), by u_0
+};
+
+/// Compression beside cracks, equation (31): √(3 J2) + α I1 of the compressive part over (1 - α) f_c.
+void find_compression_across(const SolidConcrete& c, Stresses& s) {
+  Vector n;
+  for (int i = 0; i < 3; ++i) n[i] = std::min(s.value[i], 0.0);
+  const double q = calc_mises(n), sum = n[0] + n[1] + n[2];
+  if (!(q > 0)) return;
+  const double scale = 1 / ((1 - c.alpha) * c.law.fc);
+  s.across = (q + c.alpha * sum) * scale;
+  for (int i = 0; i < 3; ++i) s.across_rate[i] = s.value[i] < 0 ? (1.5 * (n[i] - sum / 3) / q + c.alpha) * scale : 0;
+}
+
+/// Stress of each direction from its equivalent uniaxial strain. `history` is the line of the cracks so far; if the
+/// widest may grow and does, the others follow the line that it drags along.
+Stresses calc_stresses(const SolidConcrete& solid, const Vector& u, const CrackLine& history, bool may_grow,
+                       const Hardening& h) {
+  const Concrete& c = solid.law;
+  Stresses s;
+  for (int i = 0; i < 3; ++i)
+    if (u[i] <= 0) s.value[i] = c.Ec * u[i], s.rate[i][i] = c.Ec;
+  s.tension = history.limit;
+  if (u[0] <= 0) return s;
+  if (u[2] < 0) find_compression_across(solid, s);
+  // Share of the tensile strength that the compression across leaves.
+  const double plain = 1 / h.integrity - solid.tension_loss * s.across;
+  const double left = std::min(1.0, plain);
+  CrackLine line = history;
+  s.cracking = may_grow && u[0] > left * history.limit;
+  if (s.cracking) {
+    s.tension = u[0] / left;
+    line = make_crack_line(c, s.tension);
+  }
+  const bool weakened = s.cracking && left < 1;
+  Vector left_rate{};
+  double left_by_kappa = 0;
+  if (weakened) {
+    for (int k = 0; k < 3; ++k) left_rate[k] = -solid.tension_loss * s.across_rate[k] * s.rate[k][k];
+    left_by_kappa = -h.integrity_rate / (h.integrity * h.integrity);
+  }
+  const double by_left = -s.tension / left;  // ∂u_m/∂left
+  for (int i = 0; i < 3; ++i) {
+    if (u[i] <= 0) continue;
+    if (i == 0 && s.cracking && !weakened) {
+      const Response r = calc_tension(c, u[0]);
+      s.value[0] = r.stress, s.rate[0][0] = r.tangent;
+    } else if (u[i] > line.zero) {
+      s.value[i] = line.slope * (u[i] - line.zero), s.rate[i][i] += line.slope;
+      if (!s.cracking) continue;
+      const double widening = line.slope_rate * (u[i] - line.zero) - line.slope * line.zero_rate;  // ∂σ_i/∂u_m
+      s.rate[i][0] += widening / left;
+      for (int k = 0; k < 3; ++k) s.rate[i][k] += widening * by_left * left_rate[k];
+      s.by_kappa[i] = widening * by_left * left_by_kappa;
+    }
+  }
+  s.loss_rate = solid.softening / c.eps_c1;
+  s.loss = solid.softening_foot + s.loss_rate * u[0] - 1;
+  if (!(s.across > 0 && s.loss > 0)) s.loss = s.loss_rate = 0;
+  return s;
 }
 
 /// Plastic strain per plastic strain of the unconfined curve, before and after the peak, equations (28) and (29).
@@ -243,15 +290,11 @@ ReturnMap make_return_map(const SolidConcrete& c, const Vector& trial, double te
   return m;
 }
 
-double calc_mises(const Vector& s) {
-  const double a = s[0] - s[1], b = s[1] - s[2], d = s[2] - s[0];
-  return std::sqrt(0.5 * (a * a + b * b + d * d));
-}
-
-/// (√(3 J2) + α I1 - γ<-σ_max>) - (1 - α) Q, equation (22).
-double calc_surface(const SolidConcrete& c, const Vector& s, double effective) {
-  return calc_mises(s) + c.alpha * (s[0] + s[1] + s[2]) + c.gamma * std::min(0.0, std::max({s[0], s[1], s[2]})) -
-         (1 - c.alpha) * effective;
+/// (√(3 J2) + α I1 - γ<-σ_max>) - (1 - α) Q, equation (22), and what an open crack adds, (32).
+double calc_surface(const SolidConcrete& c, const Stresses& stress, double effective) {
+  const Vector& s = stress.value;
+  return calc_mises(s) + c.alpha * (s[0] + s[1] + s[2]) + c.gamma * std::min(0.0, std::max({s[0], s[1], s[2]})) +
+         (1 - c.alpha) * (c.law.fc * stress.loss * stress.across - effective);
 }
 
 double calc_unconfined_plastic(const ReturnMap& m, const Hardening& h, bool beyond) {
@@ -262,12 +305,12 @@ double calc_unconfined_plastic(const ReturnMap& m, const Hardening& h, bool beyo
 /// Residuals at m.u and m.kappa, in strains.
 void calc_residual(ReturnMap& m) {
   const double E = m.c.law.Ec;
-  m.stress = calc_stresses(m.c.law, m.u, m.history, m.may_grow);
+  if (m.crushing) m.hardening = calc_hardening(m.c.law, m.kappa);
+  m.stress = calc_stresses(m.c, m.u, m.history, m.may_grow, m.hardening);
   const Vector& s = m.stress.value;
   const double sum = s[0] + s[1] + s[2];
   for (int i = 0; i < 3; ++i) m.residual[i] = m.u[i] - m.trial[i] - m.c.nu / E * (sum - s[i]);
   if (!m.crushing) return;
-  m.hardening = calc_hardening(m.c.law, m.kappa);
   m.multiplier = calc_unconfined_plastic(m, m.hardening, m.kappa > m.c.law.eps_c1) -
                  calc_unconfined_plastic(m, m.start, m.kappa_old > m.c.law.eps_c1);
   const double q = calc_mises(s), scale = 1 / (1 - m.c.alpha_flow), mean = sum / 3;
@@ -275,7 +318,7 @@ void calc_residual(ReturnMap& m) {
     m.flow[i] = q > 0 ? (1.5 * (s[i] - mean) / q + m.c.alpha_flow) * scale : 0;
     m.residual[i] += m.multiplier * m.flow[i];
   }
-  m.residual[3] = calc_surface(m.c, s, m.hardening.effective) / E;
+  m.residual[3] = calc_surface(m.c, m.stress, m.hardening.effective) / E;
 }
 
 int count_unknowns(const ReturnMap& m) { return m.crushing && !m.frozen ? 4 : 3; }
@@ -295,17 +338,9 @@ bool is_solved(const ReturnMap& m, double tolerance) {
   return calc_size(m) <= tolerance;
 }
 
-/// ∂σ_j/∂u_k, rows j.
-Matrix calc_stress_rates(const Stresses& s) {
-  Matrix rate{};
-  for (int j = 0; j < 3; ++j) rate[j][j] = s.rate[j];
-  for (int j = 1; j < 3; ++j) rate[j][0] += s.widening[j];
-  return rate;
-}
-
 void calc_jacobian(const ReturnMap& m, double (&J)[4][4]) {
   const double E = m.c.law.Ec;
-  const Matrix rate = calc_stress_rates(m.stress);
+  const Matrix& rate = m.stress.rate;
   Matrix d{};  // ∂residual_i/∂σ_j
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) d[i][j] = i == j ? 0 : -m.c.nu / E;
@@ -318,14 +353,21 @@ void calc_jacobian(const ReturnMap& m, double (&J)[4][4]) {
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) d[i][j] += f * ((i == j ? 1 : 0) - 1.0 / 3 - gradient[i] * gradient[j] / 1.5);
     const double x = calc_stretch(m);
+    const Vector& by = m.stress.by_kappa;
     for (int i = 0; i < 3; ++i) {
-      J[i][3] = x * m.hardening.plastic_rate * m.flow[i];
+      J[i][3] = x * m.hardening.plastic_rate * m.flow[i] + d[i][0] * by[0] + d[i][1] * by[1] + d[i][2] * by[2];
       gradient[i] += m.c.alpha;
     }
     if (s[0] < 0) gradient[0] += m.c.gamma;
+    // An open crack's share of the surface.
+    const double loss = m.stress.loss, weight = (1 - m.c.alpha) * m.c.law.fc, across = weight * m.stress.across;
+    for (int i = 0; i < 3; ++i) gradient[i] += weight * loss * m.stress.across_rate[i];
     for (int k = 0; k < 3; ++k)
       J[3][k] = (gradient[0] * rate[0][k] + gradient[1] * rate[1][k] + gradient[2] * rate[2][k]) / E;
-    J[3][3] = -(1 - m.c.alpha) * m.hardening.effective_rate / E;
+    J[3][0] += across * m.stress.loss_rate / E;
+    J[3][3] = (gradient[0] * by[0] + gradient[1] * by[1] + gradient[2] * by[2] -
+               (1 - m.c.alpha) * m.hardening.effective_rate) /
+              E;
   }
   for (int i = 0; i < 3; ++i)
     for (int k = 0; k < 3; ++k)
@@ -428,8 +470,11 @@ bool is_elastic(const SolidConcrete& c, const Voigt& elastic, double tension, co
   const double q = std::sqrt(0.5 * (a * a + b * b + d * d) +
                              3 * (stress[3] * stress[3] + stress[4] * stress[4] + stress[5] * stress[5]));
   const double largest = sum / 3 + 2 * q / 3;  // at least the largest principal stress
-  const double limit = tension > c.law.eps_ct ? 0 : c.law.fct;
-  return largest <= limit && q + c.alpha * sum + c.gamma * std::min(0.0, largest) <= (1 - c.alpha) * h.effective;
+  const double cone = q + c.alpha * sum;
+  double limit = 0;
+  if (tension <= c.law.eps_ct)
+    limit = c.law.fct * std::min(1.0, 1 / h.integrity - c.tension_loss * cone / ((1 - c.alpha) * c.law.fc));
+  return largest <= std::max(limit, 0.0) && cone + c.gamma * std::min(0.0, largest) <= (1 - c.alpha) * h.effective;
 }
 
 /// All-round pressure: the least compressive principal stress.
@@ -494,15 +539,15 @@ SolidResponse make_response(const ReturnMap& m, const Matrix& axis, double integ
   double J[4][4], x[4][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 0}};
   ReturnMap at = m;
   if (tangent_floor > 0)
-    for (double& rate : at.stress.rate) rate = std::max(rate, tangent_floor * E);
+    for (int i = 0; i < 3; ++i) at.stress.rate[i][i] = std::max(at.stress.rate[i][i], tangent_floor * E);
   calc_jacobian(at, J);
   Matrix A{};
   if (solve(J, x, n, 3)) {
-    const Matrix rate = calc_stress_rates(at.stress);
+    const Matrix& rate = at.stress.rate;
     for (int j = 0; j < 3; ++j)
       for (int k = 0; k < 3; ++k)
         A[j][k] = integrity * (rate[j][0] * x[0][k] + rate[j][1] * x[1][k] + rate[j][2] * x[2][k]) +
-                  (m.crushing ? integrity_rate * s[j] * x[3][k] : 0);
+                  (m.crushing ? (integrity_rate * s[j] + integrity * m.stress.by_kappa[j]) * x[3][k] : 0);
   }
   const double near = 1e-7 * calc_largest(m.trial);
   const bool same01 = m.trial[0] - m.trial[1] <= near, same12 = m.trial[1] - m.trial[2] <= near;
@@ -570,7 +615,7 @@ SolidUpdate advance_history(const SolidConcrete& c, const SolidConcreteState& ol
   int iterations = solve_cracks(m, tolerance);
   bool converged = iterations > 0;
   update.iterations = std::abs(iterations) - 1;
-  if (calc_surface(c, m.stress.value, m.start.effective) > 1e-13 * m.start.effective) {
+  if (calc_surface(c, m.stress, m.start.effective) > 1e-13 * m.start.effective) {
     m.crushing = true;
     m.ductility = calc_ductility(c, old.confinement);
     const Vector before = m.u;
@@ -598,8 +643,8 @@ SolidUpdate advance_history(const SolidConcrete& c, const SolidConcreteState& ol
     now.compression = m.kappa;
   }
   now.compression_step = m.kappa - kappa_old;
-  if (m.stress.cracking) now.tension = m.u[0];
-  now.tension_step = m.stress.cracking ? m.u[0] - limit : 0;
+  if (m.stress.cracking) now.tension = m.stress.tension;
+  now.tension_step = m.stress.cracking ? m.stress.tension - limit : 0;
   now.crack = std::max(0.0, m.u[0] - m.stress.value[0] / c.law.Ec);
   now.confinement = std::max(0.0, -m.hardening.integrity * m.stress.value[0]);
   return update;
@@ -627,8 +672,14 @@ SolidConcrete make_solid_concrete(const SolidConcreteInput& in) {
   if (!(in.uniaxial.b_c <= 0.95))
     refuse("b_c = " + show(in.uniaxial.b_c) + " must not exceed 0.95",
            "crushed concrete that only yields has no effective stress left");
+  if (!(in.tension_loss >= 0 && in.tension_loss <= 0.95))
+    refuse("tension_loss = " + show(in.tension_loss) + " must lie between 0 and 0.95");
+  if (!(in.crack_softening >= 0 && in.crack_softening <= 10))
+    refuse("crack_softening = " + show(in.crack_softening) + " must lie between 0 and 10");
   c.nu = in.nu;
   c.floor = in.stiffness_floor;
+  c.tension_loss = in.tension_loss;
+  c.softening = in.crack_softening;
   c.alpha = (in.biaxial_ratio - 1) / (2 * in.biaxial_ratio - 1);
   const double plain = 1 + 3 * c.alpha / (1 - c.alpha);
   c.slope = in.confinement_slope > 0 ? in.confinement_slope : plain;

@@ -18,6 +18,8 @@ struct SolidConcreteInput {
   double biaxial_ratio = 1.16;     // f_b / f_c
   double confinement_slope = 4.1;  // d f_cc / d σ_lateral (Richart); 0: plain Drucker–Prager, which gives 1.41
   double dilatancy = 0.2;          // α_p of the plastic potential √(2 J2) + α_p I1 (Lee & Fenves)
+  double tension_loss = 0.8;       // of f_ct, under compression at f_c across (Kupfer); 0: none
+  double crack_softening = 0.34;   // of compression along open cracks (Vecchio & Collins), equation (32); 0: none
   double stiffness_floor = 1e-4;   // least stiffness in `secant` and in IMPL-EX tangents, share of E_c; no stress
 };
 
@@ -29,6 +31,7 @@ struct SolidConcrete {
   double gamma = 0;       // part of the all-round pressure in the strength, equation (23)
   double alpha_flow = 0;  // dilatancy in the potential √(3 J2) + α I1
   double slope = 0;       // d f_cc / d σ_lateral
+  double tension_loss = 0, softening = 0, softening_foot = 0.8;  // equations (31) and (32)
   double floor = 0;
   // Of the compressive curve, at the peak and where a fifth of the strength is lost: plastic strain, effective stress
   // over E_c, and the strain between the two.
