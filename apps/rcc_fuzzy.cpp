@@ -10,6 +10,8 @@
 #include "base/unit.h"
 #include "nearfield/moment_curve.h"
 #include "uncertainty/alpha.h"
+#include "uncertainty/fan.h"
+#include "uncertainty/possibility.h"
 
 namespace topple::apps {
 
@@ -95,24 +97,6 @@ std::vector<record::RccInterval> to_cuts(const uncertainty::OutputBounds& bounds
   return out;
 }
 
-/// The fan over all runs: least and largest ordinate among those of at least the level's membership.
-void fill_levels(const uncertainty::AlphaResult& result, record::RccFan& fan) {
-  for (const uncertainty::Coverage& c : result.coverage) {
-    record::RccFan::Level level;
-    level.alpha = c.alpha;
-    level.low.assign(fan.rotation.size(), std::numeric_limits<double>::infinity());
-    level.high.assign(fan.rotation.size(), -std::numeric_limits<double>::infinity());
-    for (const record::RccOriginal& o : fan.originals) {
-      if (o.moment.empty() || o.membership < c.alpha * (1 - 1e-12)) continue;
-      for (size_t j = 0; j < fan.rotation.size(); ++j) {
-        level.low[j] = std::min(level.low[j], o.moment[j]);
-        level.high[j] = std::max(level.high[j], o.moment[j]);
-      }
-    }
-    fan.levels.push_back(std::move(level));
-  }
-}
-
 /// Runs to be drawn: those that hold a bound, and the first ones that fill the space.
 void choose_drawn(const uncertainty::AlphaResult& result, record::RccFan& fan) {
   constexpr size_t most = 60, spread = 24;
@@ -131,12 +115,13 @@ void choose_drawn(const uncertainty::AlphaResult& result, record::RccFan& fan) {
 }
 
 record::RccFan make_fan(const product::FuzzyFile& file, const uncertainty::Space& space,
-                        const uncertainty::AlphaResult& result, double N, const std::vector<double>& rotation,
-                        const std::vector<size_t>& searched) {
+                        const uncertainty::Archive& archive, const std::vector<double>& levels,
+                        const uncertainty::PossibilityResult& possibilities, double N,
+                        const std::vector<double>& rotation, const std::vector<size_t>& searched) {
   record::RccFan fan;
   fan.normal_force = -N;
   fan.rotation = rotation;
-  const uncertainty::Archive& archive = result.archive;
+  const uncertainty::AlphaResult result = uncertainty::read_archive(space, archive, levels);
   for (size_t i = 0; i < archive.size(); ++i) {
     const uncertainty::Sample& s = archive.samples()[i];
     record::RccOriginal o;
@@ -157,7 +142,8 @@ record::RccFan make_fan(const product::FuzzyFile& file, const uncertainty::Space
     fan.originals.push_back(std::move(o));
   }
   fan.core = std::max(0, archive.find(uncertainty::calc_centre(space)));
-  fill_levels(result, fan);
+  for (uncertainty::FanLevel& l : uncertainty::calc_fan(space, archive, levels))
+    fan.levels.push_back({l.alpha, std::move(l.lower), std::move(l.upper)});
   fan.ordinates.push_back({"largest moment", -1, to_cuts(result.outputs[0])});
   for (size_t k = 0; k < searched.size(); ++k) {
     const double phi = rotation[searched[k]];
@@ -166,12 +152,11 @@ record::RccFan make_fan(const product::FuzzyFile& file, const uncertainty::Space
   for (int outcome = 0; outcome < 4; ++outcome) {
     record::RccOutcome o{outcome_words[outcome], 0, 0, -1};
     for (const uncertainty::ClassBounds& c : result.classes)
-      if (c.outcome == outcome) o.count = c.count, o.possibility = c.possibility, o.sample = c.sample;
+      if (c.outcome == outcome) o.count = c.count;
+    for (const uncertainty::Possibility& p : possibilities.classes)
+      if (p.outcome == outcome) o.possibility = p.possibility, o.sample = p.sample;
     fan.outcomes.push_back(std::move(o));
   }
-  fan.ending = result.ending == uncertainty::Ending::LimitReached
-                   ? "The search ended at its limit of runs; bounds may lie inside of the true ones."
-                   : "The search found nothing better.";
   choose_drawn(result, fan);
   return fan;
 }
@@ -242,26 +227,34 @@ std::optional<record::RccFuzzyReport> make_fuzzy_report(const product::SectionFi
       searched.push_back(static_cast<size_t>(
           std::lower_bound(rotation.begin(), rotation.end(), share * last * (1 - 1e-9)) - rotation.begin()));
     options.watch = watched(fmt::format("N = {:.4g} MN", -N / unit::MN));
-    const uncertainty::AlphaResult result =
-        uncertainty::optimise(space, model.make([&](const nearfield::ZoneInput& in) {
-          const nearfield::Fibres fibres = nearfield::make_fibres(in, axis);
-          std::vector<double> kappa(rotation);
-          for (double& k : kappa) k /= in.length;
-          const nearfield::March march = nearfield::march_curvature(fibres, N, side, kappa);
-          Result out;
-          out.state = Result::State::Done;
-          out.trajectory = march.moment;
-          out.values.push_back(*std::max_element(march.moment.begin(), march.moment.end()));
-          for (const size_t j : searched) out.values.push_back(march.moment[j]);
-          out.outcome = march.last < 0                                       ? Crushed
-                        : static_cast<size_t>(march.last) + 1 < kappa.size() ? LosesForce
-                        : march.moment.back() <= 0                           ? LosesMoment
-                                                                             : Carries;
-          return out;
-        }),
-                              options, progress);
-    if (result.ending == uncertainty::Ending::Cancelled) return std::nullopt;
-    record::RccFan fan = make_fan(file, space, result, N, rotation, searched);
+    uncertainty::Asker asker(model.make([&](const nearfield::ZoneInput& in) {
+      const nearfield::Fibres fibres = nearfield::make_fibres(in, axis);
+      std::vector<double> kappa(rotation);
+      for (double& k : kappa) k /= in.length;
+      const nearfield::March march = nearfield::march_curvature(fibres, N, side, kappa);
+      Result out;
+      out.state = Result::State::Done;
+      out.trajectory = march.moment;
+      out.values.push_back(*std::max_element(march.moment.begin(), march.moment.end()));
+      for (const size_t j : searched) out.values.push_back(march.moment[j]);
+      out.outcome = march.last < 0                                       ? Crushed
+                    : static_cast<size_t>(march.last) + 1 < kappa.size() ? LosesForce
+                    : march.moment.back() <= 0                           ? LosesMoment
+                                                                         : Carries;
+      return out;
+    }),
+                             progress, nullptr, options.limit);
+    const uncertainty::AlphaResult searched_for = uncertainty::optimise(space, asker, options);
+    const uncertainty::PossibilityResult possibilities =
+        uncertainty::find_possibilities(space, asker, {1e-4, 30, options.seed});
+    if (asker.is_cancelled()) return std::nullopt;
+    std::vector<double> levels;
+    for (const uncertainty::Coverage& c : searched_for.coverage) levels.push_back(c.alpha);
+    record::RccFan fan = make_fan(file, space, asker.archive(), levels, possibilities, N, rotation, searched);
+    fan.ending = searched_for.ending == uncertainty::Ending::LimitReached ||
+                         possibilities.ending == uncertainty::Ending::LimitReached
+                     ? "The search ended at its limit of runs; bounds may lie inside of the true ones."
+                     : "The search found nothing better.";
     fan.crushing_possibility = calc_possibility_below(r.crushing, -N);
     fan.outcomes[Crushed].possibility = std::max(fan.outcomes[Crushed].possibility, fan.crushing_possibility);
     r.fans.push_back(std::move(fan));

@@ -330,7 +330,7 @@ std::vector<std::string> describe_switch(const RccFuzzyReport& r, const RccFan& 
     out.push_back("No set of inputs lets the force crush it without rotation.");
   }
   for (const RccOutcome& o : f.outcomes)
-    if (o.name.rfind("loses", 0) == 0 && o.count > 0 && o.sample >= 0)
+    if (o.name.rfind("loses", 0) == 0 && o.possibility > 0 && o.sample >= 0)
       out.push_back(fmt::format("To the possibility {} it {}, most possibly at {}.", possibility_text(o.possibility),
                                 o.name, values_text(r, f.originals[static_cast<size_t>(o.sample)])));
   return out;
@@ -433,7 +433,7 @@ std::string to_page(const RccFuzzyReport& r, const std::vector<Figure>& figures)
     out += "</p>\n";
   }
   out += outcomes_html(r) +
-         "<p class=\"quiet\">Possibilities are found among the runs, so they are lower bounds.</p></section>\n";
+         "<p class=\"quiet\">Possibilities are searched for among the runs, so they are lower bounds.</p></section>\n";
   out += figures_html(figures);
   out += "<h2>Bounds that were searched for</h2>\n<section>" + ordinates_html(r);
   for (const RccFan& f : r.fans)

@@ -216,7 +216,7 @@ rcc)
   expect 0 "$topple" rcc "$zone" --normal-force "3.7 MN" --fuzzy fuzzy.toml -o f1
   has out "it is crushed by the force alone"; has out "limit of runs"
   for f in fan.csv samples.csv originals.csv fuzzy.json fuzzy.html fan_1.png switch_1.png crushing.png inputs.png rcc.html; do exists f1/$f; done
-  is_json f1/fuzzy.json; lacks f1/fuzzy.html "http"; has f1/fuzzy.html "Possibilities are found among the runs"
+  is_json f1/fuzzy.json; lacks f1/fuzzy.html "http"; has f1/fuzzy.html "Possibilities are searched for among the runs"
   expect 0 "$topple" rcc "$zone" --normal-force "3.7 MN" --fuzzy fuzzy.toml -o f2 --threads 2
   for f in fan.csv samples.csv originals.csv fuzzy.json fuzzy.html fan_1.png; do cmp f1/$f f2/$f || failures=$((failures + 1)); done
   expect 0 "$topple" rcc "$zone" --normal-force "3.7 MN" --fuzzy fuzzy.toml --axis z --direction - --json; is_json out; has out '"direction": "-"'
