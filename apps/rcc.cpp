@@ -133,7 +133,7 @@ void print_table(std::FILE* out, const record::RccReport& r) {
       return fmt::format("{:>7} {:>7}", cell(p.rotation, 1e-3, 2), cell(p.moment, unit::kNm, 1));
     };
     const std::string N = cell(c.normal_force, unit::MN, 3);
-    if (c.rotation.empty()) {
+    if (!std::isfinite(c.peak.moment)) {
       std::fprintf(out, "  %-8s %-12s %8s  %s\n", c.route.c_str(), about.c_str(), N.c_str(), c.ending.c_str());
       continue;
     }

@@ -65,7 +65,7 @@ std::string points_table(const RccReport& r) {
     const std::string head = fmt::format("<tr><td>{}{}</td><td>{}</td>", about, two_routes ? ", " + c.route : "",
                                          cell(c.normal_force, unit::MN));
     endings += fmt::format("{}<td class=\"words\">{}</td></tr>\n", head, escape_html(c.ending));
-    if (c.rotation.empty()) continue;
+    if (!std::isfinite(c.peak.moment)) continue;
     out += head;
     out += fmt::format("<td>{}</td><td>{}</td>", cell(c.stiffness_uncracked, 1e6),
                        c.stiffness_effective > 0 ? cell(c.stiffness_effective, 1e6) : "-");

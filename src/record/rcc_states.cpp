@@ -13,7 +13,7 @@ namespace topple::record {
 
 namespace {
 
-constexpr double row_height = 236, picture = 172, head = 40, left = 44;
+constexpr double row_height = 236, largest_depth = 172, largest_breadth = 280, head = 40, left = 44;
 
 struct Condition {
   const char* name;
@@ -48,13 +48,14 @@ struct Profile {
   double x = 0, width = 0, top = 0;
   double low = 0, high = 1;  // of the values shown
   double depth = 0;          // of the section [m]
+  double picture = 0;        // its height in the picture
   double place_x(double v) const { return x + (v - low) / (high - low) * width; }
   double place_y(double a) const { return top + (0.5 - a / depth) * picture; }
 };
 
-Profile make_profile(Drawing& d, double x, double width, double top, double depth, double low, double high,
-                     const std::string& title) {
-  Profile p{x, width, top, low, high, depth};
+Profile make_profile(Drawing& d, double x, double width, double top, double depth, double picture, double low,
+                     double high, const std::string& title) {
+  Profile p{x, width, top, low, high, depth, picture};
   const double air = 0.06 * (high - low);
   p.low = low - air, p.high = high + air;
   d.text({x + 0.5 * width, top - 8}, title, Ink::Quiet, 12, 0.5);
@@ -69,9 +70,9 @@ Profile make_profile(Drawing& d, double x, double width, double top, double dept
   return p;
 }
 
-void draw_section(Drawing& d, const RccReport& r, const RccState& s, double x, double top, double depth) {
+void draw_section(Drawing& d, const RccReport& r, const RccState& s, double x, double top, double depth, double scale) {
   const bool about_y = s.axis == 'y';
-  const double breadth = about_y ? r.width : r.height, scale = picture / depth;
+  const double breadth = about_y ? r.width : r.height, picture = depth * scale;
   const double half = 0.5 * breadth * scale, middle = x;
   const auto y_of = [&](double a) { return top + (0.5 - a / depth) * picture; };
   const auto fill = [&](double from, double to, double y1, double y2, const std::string& condition) {
@@ -139,7 +140,8 @@ Drawing draw_states(const RccReport& r, const std::vector<const RccState*>& stat
   d.text({left, 22}, d.title, Ink::Text, 15, 0, true);
   const double depth = first.axis == 'y' ? r.height : r.width;
   const double breadth = first.axis == 'y' ? r.width : r.height;
-  const double section_width = std::min(picture * breadth / depth, 260.0);
+  const double scale = std::min(largest_depth / depth, largest_breadth / breadth);
+  const double picture = depth * scale, section_width = breadth * scale;
 
   double y = head;
   for (const RccState* s : states) {
@@ -148,7 +150,7 @@ Drawing draw_states(const RccReport& r, const std::vector<const RccState*>& stat
                        shown(s->moment, unit::kNm), shown(s->eps_0, 1e-3, 3)),
            Ink::Text, 13, 0, true);
     const double top = y + 42;
-    draw_section(d, r, *s, left + 0.5 * section_width, top, depth);
+    draw_section(d, r, *s, left + 0.5 * section_width, top, depth, scale);
     d.text({left - 8, top + 5}, fmt::format("+{}", along), Ink::Quiet, 11, 1);
     d.text({left - 8, top + picture}, fmt::format("-{}", along), Ink::Quiet, 11, 1);
     Limits strain, concrete, steel;
@@ -159,11 +161,11 @@ Drawing draw_states(const RccReport& r, const std::vector<const RccState*>& stat
     }
     for (const RccState::Bar& b : s->bars) strain.add(b.strain / 1e-3), steel.add(b.stress / unit::MPa);
     const double x0 = left + section_width + 36, gap = 26, width = (d.width - 18 - x0 - 2 * gap) / 3;
-    const Profile ps = make_profile(d, x0, width, top, depth, strain.low, strain.high, "strain [‰]");
-    const Profile pc =
-        make_profile(d, x0 + width + gap, width, top, depth, concrete.low, concrete.high, "stress of concrete [N/mm²]");
-    const Profile pb =
-        make_profile(d, x0 + 2 * (width + gap), width, top, depth, steel.low, steel.high, "stress of bars [N/mm²]");
+    const Profile ps = make_profile(d, x0, width, top, depth, picture, strain.low, strain.high, "strain [‰]");
+    const Profile pc = make_profile(d, x0 + width + gap, width, top, depth, picture, concrete.low, concrete.high,
+                                    "stress of concrete [N/mm²]");
+    const Profile pb = make_profile(d, x0 + 2 * (width + gap), width, top, depth, picture, steel.low, steel.high,
+                                    "stress of bars [N/mm²]");
     std::vector<Dot> line, core, cover;
     for (const RccState::Layer& l : s->layers) {
       const double a = 0.5 * (l.from + l.to);

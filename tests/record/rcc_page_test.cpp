@@ -151,6 +151,28 @@ TEST(RccPage, HasEveryPlotOnceWithItsTable) {
     EXPECT_TRUE(ids.count(id)) << id;
 }
 
+TEST(RccPage, PicturesHoldSectionsOfAnyShape) {
+  for (const auto& [width, height] : {std::pair{0.3, 1.5}, {1.5, 0.3}, {5.0, 0.2}}) {
+    RccReport r = sample_report();
+    r.width = width, r.height = height;
+    for (const char axis : {'y', 'z'}) {
+      r.states[0].axis = axis;
+      const double depth = axis == 'y' ? height : width, breadth = axis == 'y' ? width : height;
+      r.states[0].layers = {
+          {-0.5 * depth, 0.5 * depth, 0.8 * breadth, 0.2 * breadth, 1e-3, 0, 0, "cracked", "cracked"}};
+      r.states[0].bars = {{0.45 * width, 0.45 * height, 0.02, 1e-3, 2e8, "elastic"}};
+      for (const Figure& f : make_figures(r))
+        for (const Shape& s : f.drawing.shapes)
+          for (const Dot& at : s.dots) {
+            EXPECT_GE(at.x, 0) << f.id;
+            EXPECT_LE(at.x, f.drawing.width) << f.id;
+            EXPECT_GE(at.y, 0) << f.id;
+            EXPECT_LE(at.y, f.drawing.height) << f.id;
+          }
+    }
+  }
+}
+
 TEST(RccPage, NumbersForPeopleKeepTheirDigits) {
   EXPECT_EQ(shown(498512.3, 1e3), "498.5");
   EXPECT_EQ(shown(0.0024789, 1e-3), "2.479");
