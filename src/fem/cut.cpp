@@ -102,7 +102,7 @@ Cut make_cut(const System& system, const Response& response, const Plane& plane)
     Vec3 first_moment;
     for (size_t i = 0; i < corners.size(); ++i) {
       const Vec3 &b = corners[i], &c = corners[(i + 1) % corners.size()];
-      const double area = 0.5 * norm(cross(b - centre, c - centre));
+      const double area = 0.5 * mesh.hexes[e].fill * norm(cross(b - centre, c - centre));
       if (!(area > 0)) continue;
       for (const Vec3& at : {0.5 * (centre + b), 0.5 * (b + c), 0.5 * (c + centre)}) {
         const Voigt stress = interpolate(response.stress[e], find_natural(nodes, at));

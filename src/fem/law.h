@@ -16,6 +16,7 @@ struct PointResponse {
   Voigt stress{};     // [Pa]
   Matrix6 tangent{};  // dσ/dε of the algorithm, not always symmetric or positive [Pa]
   Matrix6 secant{};   // symmetric, positive [Pa]
+  bool converged = true;
 };
 
 /// A law is constant; its history lives in `size` doubles for each point, zero at the start unless begin() says more.
@@ -25,8 +26,18 @@ class SolidLaw {
   /// Numbers of history at one point.
   virtual int size() const = 0;
   virtual void begin(double* state) const { std::memset(state, 0, sizeof(double) * static_cast<size_t>(size())); }
-  /// From the last accepted history and the total strain to the new history and the response; no other effect.
-  virtual PointResponse advance(const double* old, const Voigt& strain, double* now) const = 0;
+  /// From the last accepted history and the total strain to the response and the new history; no other effect.
+  ///   step_ratio  this step over the last one, for laws that extrapolate their history (IMPL-EX); such a law leaves
+  ///   the
+  ///               new history to finish()
+  virtual PointResponse advance(const double* old, const Voigt& strain, double step_ratio, double* now) const = 0;
+  /// Whether advance() extrapolates.
+  virtual bool extrapolates() const { return false; }
+  /// The new history of an extrapolating law at an accepted strain, and the stress that goes with it. False: none
+  /// found.
+  virtual bool finish(const double* /*old*/, const Voigt& /*strain*/, double* /*now*/, Voigt& /*stress*/) const {
+    return true;
+  }
   /// Poisson number of assumed strains, see make_hex_shape.
   virtual double lateral() const = 0;
 };
@@ -40,7 +51,7 @@ class WrappedLaw final : public SolidLaw {
   }
   int size() const override { return static_cast<int>((sizeof(State) + sizeof(double) - 1) / sizeof(double)); }
   void begin(double* state) const override { std::memcpy(state, &start_, sizeof(State)); }
-  PointResponse advance(const double* old, const Voigt& strain, double* now) const override {
+  PointResponse advance(const double* old, const Voigt& strain, double /*step_ratio*/, double* now) const override {
     State before, after;
     std::memcpy(static_cast<void*>(&before), old, sizeof(State));
     after = before;

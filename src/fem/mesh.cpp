@@ -19,7 +19,8 @@ Mesh make_grid(const std::vector<double>& x, const std::vector<double>& y, const
       for (int i = 0; i + 1 < nx; ++i)
         mesh.hexes.push_back({{at(i, j, k), at(i + 1, j, k), at(i + 1, j + 1, k), at(i, j + 1, k), at(i, j, k + 1),
                                at(i + 1, j, k + 1), at(i + 1, j + 1, k + 1), at(i, j + 1, k + 1)},
-                              0});
+                              0,
+                              1.0});
   return mesh;
 }
 
@@ -34,6 +35,8 @@ void check_mesh(const Mesh& mesh) {
         complain("hexahedron " + std::to_string(e) + " has a node that does not exist");
       at[i] = mesh.nodes[static_cast<size_t>(mesh.hexes[e].node[i])];
     }
+    if (!(mesh.hexes[e].fill > 0 && mesh.hexes[e].fill <= 1))
+      complain("hexahedron " + std::to_string(e) + " must be filled by more than 0 and at most 1");
     if (!(calc_smallest_jacobian(at) > 0))
       complain("hexahedron " + std::to_string(e) + " is turned inside out or flat at one of its integration points");
   }

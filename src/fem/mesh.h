@@ -11,7 +11,8 @@ namespace topple::fem {
 /// Corners in the order (-,-,-) (+,-,-) (+,+,-) (-,+,-) and the same four at ζ = +1.
 struct Hex {
   std::array<int, 8> node{};
-  int law = 0;  // index into Model::solids
+  int law = 0;      // index into Model::solids
+  double fill = 1;  // share of the volume that is there, 0..1: bars take their place in it
 };
 
 struct Truss {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 namespace topple::fem {
 
@@ -46,7 +47,7 @@ struct Memory {
 Solver::Solver(const System& system)
     : system_(&system), state_(system.begin()), cholesky_(system.pattern()), K_(system.pattern()) {
   State now;
-  response_ = system.evaluate(state_, state_.q, now, nullptr, {}, 1);
+  response_ = system.evaluate(state_, state_.q, now, nullptr, {});
   for (int c = 0; c < system.controls(); ++c) last_.controls.push_back({false, 0});
 }
 
@@ -72,12 +73,21 @@ StepSummary Solver::step(const Loading& loading, const SolveOptions& options) {
       external[first + c] += d.value;
   }
 
+  // This step over the last one.
+  double moved = 0, matched = 0;
+  for (size_t i = first; i < n; ++i) {
+    const double before = i - first < increment_drive_.size() ? increment_drive_[i - first] : 0;
+    const double wanted = loading.controls[i - first].value - last_.controls[i - first].value;
+    moved += before * before / (length[i] * length[i]), matched += before * wanted / (length[i] * length[i]);
+  }
+  const double step_ratio = !increment_.empty() && moved > 0 && matched > 0 ? matched / moved : 0;
+
   State now;
   Response response;
   double share = options.secant_share;
   const auto evaluate = [&](const std::vector<double>& q, bool stiff) {
     const auto start = Clock::now();
-    response = sys.evaluate(state_, q, now, stiff ? &K_ : nullptr, {true, share}, options.threads);
+    response = sys.evaluate(state_, q, now, stiff ? &K_ : nullptr, {share, step_ratio, options.threads});
     out.element_time += seconds_since(start);
   };
   std::vector<double> r(n);
@@ -123,19 +133,12 @@ StepSummary Solver::step(const Loading& loading, const SolveOptions& options) {
     return x;
   };
 
+  const bool again = options.extrapolate && step_ratio > 0;
   // Begin: the last increment again, or the linear answer.
   std::vector<double> q = state_.q;
-  double moved = 0, matched = 0;
-  for (size_t i = first; i < n; ++i) {
-    const double before = i - first < increment_drive_.size() ? increment_drive_[i - first] : 0;
-    const double wanted = loading.controls[i - first].value - last_.controls[i - first].value;
-    moved += before * before / (length[i] * length[i]), matched += before * wanted / (length[i] * length[i]);
-  }
-  const bool again = options.extrapolate && !increment_.empty() && moved > 0 && matched > 0;
   bool fresh = false;
   if (again) {
-    const double s = matched / moved;
-    for (size_t i = 0; i < n; ++i) q[i] += s * increment_[i];
+    for (size_t i = 0; i < n; ++i) q[i] += step_ratio * increment_[i];
     for (size_t i = first; i < n; ++i)
       if (held[i]) q[i] = loading.controls[i - first].value;
   } else {
@@ -156,7 +159,7 @@ StepSummary Solver::step(const Loading& loading, const SolveOptions& options) {
   int since = assembled ? options.refresh : 0;
   for (out.iterations = 1;; ++out.iterations) {
     if (!std::isfinite(out.residual)) return out;
-    if (out.residual <= options.tolerance) break;
+    if (out.residual <= options.tolerance && response.converged) break;
     if (out.iterations > options.iterations) return out;
     if (since >= options.refresh) {
       if (!assembled) evaluate(q, true);
@@ -195,6 +198,14 @@ StepSummary Solver::step(const Loading& loading, const SolveOptions& options) {
     if (options.memory > 0) memory.add(static_cast<size_t>(options.memory), q, q_before, r, r_before);
   }
 
+  if (sys.extrapolates()) {
+    const auto start = Clock::now();
+    const double off = sys.finish(state_, response, now, options.threads);
+    out.element_time += seconds_since(start);
+    out.lag = off < 0 ? std::numeric_limits<double>::infinity() : off / std::max(response.scale, 1e-300);
+    if (!(out.lag <= options.largest_lag)) return out;
+  }
+  if (sys.model().smooth) sys.model().smooth(sys, now);
   out.converged = true;
   // Work of this step.
   for (size_t i = 0; i < n; ++i) {
@@ -265,8 +276,10 @@ MarchSummary march(Solver& solver, const Loading& target, const MarchOptions& op
         out.ending = "ended at " + describe(to);
         return out;
       }
-      if (s.iterations <= options.solve.iterations / 4) step = std::min(options.largest, 1.5 * step);
-      if (s.iterations > options.solve.iterations / 2) step *= 0.7;
+      out.largest_lag = std::max(out.largest_lag, s.lag);
+      const bool easy = s.iterations <= options.solve.iterations / 4 && s.lag <= 0.4 * options.solve.largest_lag;
+      if (easy) step = std::min(options.largest, 1.5 * step);
+      if (s.iterations > options.solve.iterations / 2 || s.lag > 0.8 * options.solve.largest_lag) step *= 0.7;
       step = std::max(step, options.smallest);
     } else {
       ++out.failed;
@@ -274,6 +287,8 @@ MarchSummary march(Solver& solver, const Loading& target, const MarchOptions& op
       if (step < options.smallest) {
         out.ending =
             fmt::format("did not converge at {}, last residual {:.2g} of the element forces", describe(to), s.residual);
+        if (s.lag > options.solve.largest_lag)
+          out.ending += fmt::format(", extrapolated history off by {:.2g} of them", s.lag);
         return out;
       }
     }

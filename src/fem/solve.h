@@ -30,7 +30,9 @@ struct SolveOptions {
   int refresh = 1;          // iterations between two factorisations
   int memory = 0;           // secants remembered (Anderson's mixing); 0: plain Newton with line search
   bool extrapolate = true;  // begin a step with the last increment
-  int threads = 1;          // of the loop over elements, 0: all of the machine
+  double largest_lag =
+      0.02;         // of laws that extrapolate: error of their forces over Response::scale that a step may have
+  int threads = 1;  // of the loop over elements, 0: all of the machine
 };
 
 /// How a step ended.
@@ -38,6 +40,7 @@ struct StepSummary {
   bool converged = false;
   int iterations = 0, factorisations = 0;
   double residual = 0;                                       // last, over Response::scale
+  double lag = 0;                                            // error of extrapolation, over Response::scale
   double element_time = 0, factor_time = 0, solve_time = 0;  // [s]
 };
 
@@ -78,8 +81,9 @@ struct MarchOptions {
 };
 struct MarchSummary {
   bool complete = false, cancelled = false;
-  double reached = 0;   // part of the way
-  double residual = 0;  // last
+  double reached = 0;      // part of the way
+  double residual = 0;     // last
+  double largest_lag = 0;  // of an accepted step
   int steps = 0, iterations = 0, failed = 0, factorisations = 0;
   double element_time = 0, factor_time = 0, solve_time = 0;  // [s]
   std::string ending;  // "complete", "cancelled at ...", "did not converge at ..., last residual ..."

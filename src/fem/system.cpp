@@ -157,8 +157,55 @@ std::vector<Vec3> System::calc_displacements(const std::vector<double>& q) const
   return u;
 }
 
-const std::array<double, kPoints>& System::volumes(int hex) const {
-  return shapes_[static_cast<size_t>(shape_of_[static_cast<size_t>(hex)])].volume;
+std::array<double, kPoints> System::volumes(int hex) const {
+  std::array<double, kPoints> v = shapes_[static_cast<size_t>(shape_of_[static_cast<size_t>(hex)])].volume;
+  for (double& w : v) w *= model_.mesh.hexes[static_cast<size_t>(hex)].fill;
+  return v;
+}
+
+bool System::extrapolates() const {
+  return std::any_of(model_.solids.begin(), model_.solids.end(), [](const auto& law) { return law->extrapolates(); });
+}
+
+double System::finish(const State& old, const Response& response, State& now, int threads) const {
+  const Mesh& mesh = model_.mesh;
+  const size_t E = mesh.hexes.size();
+  std::vector<std::array<double, 24>> off(E);
+  std::vector<char> failed(E, 0);
+  const size_t chunks = (E + kChunk - 1) / kChunk;
+  // never cancelled within
+  (void)parallel_for(chunks, threads, [&](size_t c) {
+    for (size_t e = c * kChunk; e < std::min(E, (c + 1) * kChunk); ++e) {
+      const Hex& hex = mesh.hexes[e];
+      const SolidLaw& law = *model_.solids[static_cast<size_t>(hex.law)];
+      off[e].fill(0);
+      if (!law.extrapolates()) continue;
+      const HexShape& shape = shapes_[static_cast<size_t>(shape_of_[e])];
+      Eigen::Map<Eigen::Matrix<double, 24, 1>> f(off[e].data());
+      for (size_t p = 0; p < kPoints; ++p) {
+        const size_t at = history_of_[e] + p * static_cast<size_t>(law.size());
+        Voigt stress;
+        if (!law.finish(old.solids.data() + at, response.strain[e][p], now.solids.data() + at, stress)) failed[e] = 1;
+        Eigen::Matrix<double, 6, 1> d;
+        for (int k = 0; k < 6; ++k)
+          d(k) = stress[static_cast<size_t>(k)] - response.stress[e][p][static_cast<size_t>(k)];
+        f.noalias() += Eigen::Map<const Strains>(shape.B[p].data()).transpose() * (hex.fill * shape.volume[p] * d);
+      }
+    }
+  });
+  if (std::any_of(failed.begin(), failed.end(), [](char f) { return f != 0; })) return -1;
+  std::vector<double> sum(static_cast<size_t>(unknowns_), 0.0);
+  for (size_t e = 0; e < E; ++e) {
+    const Map& map = maps_[e];
+    const size_t n = map.unknown.size();
+    for (size_t r = 0; r < 24; ++r)
+      for (size_t c = 0; c < n; ++c)
+        if (map.T.empty() ? c == r : map.T[r * n + c] != 0)
+          sum[static_cast<size_t>(map.unknown[c])] += (map.T.empty() ? 1 : map.T[r * n + c]) * off[e][r];
+  }
+  double squares = 0;
+  for (size_t i = 0; i < sum.size(); ++i) squares += sum[i] * sum[i] / (length_[i] * length_[i]);
+  return std::sqrt(squares);
 }
 
 const double* System::history(const State& s, int hex, int point) const {
@@ -167,8 +214,12 @@ const double* System::history(const State& s, int hex, int point) const {
   return s.solids.data() + history_of_[e] + static_cast<size_t>(point * law.size());
 }
 
+double* System::history(State& s, int hex, int point) const {
+  return const_cast<double*>(history(static_cast<const State&>(s), hex, point));
+}
+
 Response System::evaluate(const State& old, const std::vector<double>& q, State& now, SparseMatrix* K,
-                          StiffnessChoice choice, int threads) const {
+                          const Look& look) const {
   const Mesh& mesh = model_.mesh;
   const size_t E = mesh.hexes.size(), T = mesh.bars.size();
   const std::vector<Vec3> u = calc_displacements(q);
@@ -179,8 +230,9 @@ Response System::evaluate(const State& old, const std::vector<double>& q, State&
   now.q = q;
   now.solids.resize(history_size_);
   now.bars = old.bars;
-  const bool stiff = K != nullptr && choice.wanted;
+  const bool stiff = K != nullptr;
   std::vector<std::array<double, 24>> forces(E);
+  std::vector<char> failed(E, 0);
   std::vector<double> lower;  // element stiffness in its own unknowns, as Map::entry
   std::vector<size_t> first(E + 1, 0);
   if (stiff) {
@@ -204,15 +256,17 @@ Response System::evaluate(const State& old, const std::vector<double>& q, State&
       Eigen::Map<Eigen::Matrix<double, 6, 1>> strain(out.strain[e][p].data());
       strain.noalias() = B * d;
       const size_t at = history_of_[e] + p * size;
-      const PointResponse r = law.advance(old.solids.data() + at, out.strain[e][p], now.solids.data() + at);
+      const PointResponse r =
+          law.advance(old.solids.data() + at, out.strain[e][p], look.step_ratio, now.solids.data() + at);
+      if (!r.converged) failed[e] = 1;
       out.stress[e][p] = r.stress;
-      const double w = shape.volume[p];
+      const double w = hex.fill * shape.volume[p];
       const Eigen::Map<const Eigen::Matrix<double, 6, 1>> stress(r.stress.data());
       f.noalias() += B.transpose() * (w * stress);
       if (!stiff) continue;
       const Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>> tangent(r.tangent.data()),
           secant(r.secant.data());
-      const double share = choice.secant_share;
+      const double share = look.secant_share;
       Eigen::Matrix<double, 6, 6> C = w * share * secant;
       if (share < 1) C += 0.5 * w * (1 - share) * (tangent + tangent.transpose());
       const Strains CB = C * B;
@@ -236,7 +290,7 @@ Response System::evaluate(const State& old, const std::vector<double>& q, State&
   };
   const size_t chunks = (E + kChunk - 1) / kChunk;
   // never cancelled within
-  (void)parallel_for(chunks, threads, [&](size_t c) {
+  (void)parallel_for(chunks, look.threads, [&](size_t c) {
     for (size_t e = c * kChunk; e < std::min(E, (c + 1) * kChunk); ++e) look_at(e);
   });
 
@@ -254,6 +308,7 @@ Response System::evaluate(const State& old, const std::vector<double>& q, State&
   };
   for (size_t e = 0; e < E; ++e) {
     add_force(maps_[e], forces[e].data(), 24);
+    if (failed[e]) out.converged = false;
     if (!stiff) continue;
     const double* from = lower.data() + first[e];
     for (const int entry : maps_[e].entry) K->value[static_cast<size_t>(entry)] += *from++;
@@ -285,8 +340,8 @@ Response System::evaluate(const State& old, const std::vector<double>& q, State&
     // The secant of a bar from its stress-free strain; no less than what keeps the matrix positive.
     const double elastic = strain - now.bars[t].plastic;
     const double secant = r.stress != 0 && elastic * r.stress > 0 ? r.stress / elastic : steel.Es;
-    const double E_t = std::max(1e-6 * steel.Es, choice.secant_share * (now.bars[t].ruptured ? 0 : secant) +
-                                                     (1 - choice.secant_share) * r.tangent);
+    const double E_t = std::max(
+        1e-6 * steel.Es, look.secant_share * (now.bars[t].ruptured ? 0 : secant) + (1 - look.secant_share) * r.tangent);
     Eigen::Matrix<double, 6, 1> v;
     v << -along.x, -along.y, -along.z, along.x, along.y, along.z;
     add_stiffness(maps_[E + t], bar.area * E_t / length * v * v.transpose());

@@ -2,6 +2,7 @@
 /// A model of finite elements and its equations: which displacements are unknown, forces and stiffness of all elements.
 /// docs/theory/fem.md (7) to (10).
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <vector>
@@ -26,6 +27,9 @@ struct Spring {
   double stiffness = 0;  // [N/m]
 };
 
+class System;
+struct State;
+
 /// What is given. A nodal displacement (3 * node + axis) that stands in `links` is the sum of its links, fixed if there
 /// are none; all others are free. Controls are displacements or rotations of masters, such as a rigid end section.
 struct Model {
@@ -35,6 +39,8 @@ struct Model {
   std::map<int, std::vector<Link>> links;
   std::vector<double> control_length;  // 1 for a displacement, a length for a rotation: makes residuals comparable [m]
   std::vector<Spring> springs;
+  /// Called with the histories of an accepted step, for laws whose points look at each other; may be empty.
+  std::function<void(const System&, State&)> smooth;
   std::vector<double> load;  // forces on nodal displacements at load factor 1, empty: none [N] (3 nodes)
 };
 
@@ -51,13 +57,16 @@ struct Response {
   std::vector<std::array<Voigt, kPoints>> stress;  // (E) [Pa]
   std::vector<std::array<Voigt, kPoints>> strain;  // (E)
   std::vector<double> bar_stress, bar_strain;      // (T) [Pa]
+  bool converged = true;                           // every law found its stress
   double scale = 0;                                // root of the sum of squares of all element forces [N]
 };
 
-/// Which stiffness is assembled: share 0 is the symmetric part of the tangent, 1 the secant, between them a blend.
-struct StiffnessChoice {
-  bool wanted = true;
-  double secant_share = 0;
+/// How elements are looked at.
+struct Look {
+  double secant_share =
+      0;                  // of the stiffness; 0: the symmetric part of the tangent, 1: the secant, between them a blend
+  double step_ratio = 1;  // see SolidLaw::advance
+  int threads = 1;        // 0: all of the machine
 };
 
 class System {
@@ -79,13 +88,18 @@ class System {
   std::vector<Vec3> calc_displacements(const std::vector<double>& q) const;
   /// Forces, stresses and the new history at displacements `q`, from the history in `old`; `K`, if asked for, gets the
   /// stiffness. The same bits at any number of threads.
-  Response evaluate(const State& old, const std::vector<double>& q, State& now, SparseMatrix* K, StiffnessChoice,
-                    int threads) const;
-  /// Volumes of the integration points of an element [m³].
-  const std::array<double, kPoints>& volumes(int hex) const;
+  Response evaluate(const State& old, const std::vector<double>& q, State& now, SparseMatrix* K, const Look&) const;
+  /// Histories of laws that extrapolate, at accepted strains. Returns the largest force [N] on any unknown by which the
+  /// extrapolated stresses were off, as root of the sum of squares; negative: a law found no history.
+  double finish(const State& old, const Response&, State& now, int threads) const;
+  /// Whether any law extrapolates.
+  bool extrapolates() const;
+  /// Volumes of the integration points of an element, what is there of them [m³].
+  std::array<double, kPoints> volumes(int hex) const;
   double bar_length(int bar) const { return bar_length_[static_cast<size_t>(bar)]; }
   /// History of a point.
-  const double* history(const State& s, int hex, int point) const;
+  const double* history(const State&, int hex, int point) const;
+  double* history(State&, int hex, int point) const;
 
  private:
   struct Share {
