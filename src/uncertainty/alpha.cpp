@@ -76,6 +76,7 @@ class Optimisation {
       search_from_best(true);
       recheck(true);
     }
+    show(true);
     AlphaResult result = collect();
     result.ending = asker_.is_cancelled() ? Ending::Cancelled : unfinished_ ? Ending::LimitReached : Ending::Complete;
     return result;
@@ -86,7 +87,14 @@ class Optimisation {
     const auto indices = asker_.ask(points);
     unfinished_ = unfinished_ || std::count(indices.begin(), indices.end(), -1) > 0;
     note_new();
-    if (options_.watch) options_.watch(collect(), asker_.archive());
+    show(false);
+  }
+
+  /// Tells the watcher, each time that the archive has grown by a tenth: collecting costs a pass over it.
+  void show(bool last) {
+    if (!options_.watch || (!last && asker_.asked() < shown_ + std::max(8, shown_ / 10))) return;
+    shown_ = asker_.asked();
+    options_.watch(collect(), asker_.archive());
   }
 
   /// Keeps for every sample in how many levels it lies.
@@ -214,7 +222,7 @@ class Optimisation {
     const std::vector<double> now = calc_bounds();
     if (now.size() != before.size()) return true;
     for (std::size_t k = 0; k < now.size(); ++k)
-      if (now[k] < before[k] - 1e-5 * width_of(goals[k].output)) return true;
+      if (now[k] < before[k] - 1e-4 * width_of(goals[k].output)) return true;
     return false;
   }
 
@@ -373,7 +381,7 @@ class Optimisation {
   std::map<Key, std::vector<int>> starts_;  // samples from which dispersed searches began
   int next_spread_ = 1;
   std::uint64_t searches_ = 0;
-  int rechecks_ = 0, rounds_ = 0;
+  int rechecks_ = 0, rounds_ = 0, shown_ = 0;
   bool unfinished_ = false;
 };
 

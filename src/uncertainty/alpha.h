@@ -90,7 +90,8 @@ struct AlphaOptions {
   int starts = 2;
   /// Evolution searches per bound, in the first round.
   int evolutions = 1;
-  /// Further rounds of spread points and searches from other places go on until so many in a row gained nothing.
+  /// Further rounds of spread points and searches from other places go on until so many in a row gained less than 1e-4
+  /// of an output's width.
   int patience = 3;
   /// Own searches for the bounds of each outcome class, for which a seventh of the limit is kept; without them these
   /// bounds are read off the archive.
@@ -102,7 +103,8 @@ struct AlphaOptions {
   std::uint64_t seed = 1;
   /// Samples of an interrupted or earlier analysis: a point found there is not run again. Outlives the call.
   const Archive* earlier = nullptr;
-  /// Called between batches with what is known so far; `archive` is the one being filled, the result's own is empty.
+  /// Called between batches, whenever a tenth more is known, and at the end, with what is known so far; `archive` is
+  /// the one being filled, the result's own is empty.
   std::function<void(const AlphaResult& so_far, const Archive& archive)> watch;
 };
 

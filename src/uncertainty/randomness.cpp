@@ -1,0 +1,178 @@
+#include "uncertainty/randomness.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include "base/error.h"
+#include "uncertainty/random.h"
+#include "uncertainty/space.h"
+
+namespace topple::uncertainty {
+namespace {
+
+/// Output of the runs that did not fail.
+std::vector<double> pick(std::span<const Result> runs, int output) {
+  std::vector<double> values;
+  for (const auto& r : runs)
+    if (r.state == Result::State::Done) values.push_back(r.values.at(static_cast<std::size_t>(output)));
+  return values;
+}
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+double calc_mean(const std::vector<double>& v) {
+  if (v.empty()) return nan;
+  double sum = 0;
+  for (const double x : v) sum += x;
+  return sum / static_cast<double>(v.size());
+}
+
+}  // namespace
+
+double calc_normal_quantile(double u) {
+  if (!(u > 0 && u < 1))
+    return u == 0 ? -std::numeric_limits<double>::infinity() : u == 1 ? std::numeric_limits<double>::infinity() : nan;
+  // the tail below 1/2, by Newton's method on ln Φ, whose slope never vanishes
+  const double p = std::min(u, 1 - u);
+  double x = -std::sqrt(std::max(-2 * std::log(2 * p), 0.0)) * 0.9;
+  for (int k = 0; k < 60; ++k) {
+    const double cdf = 0.5 * std::erfc(-x / std::numbers::sqrt2);
+    const double density = std::exp(-0.5 * x * x) / std::sqrt(2 * std::numbers::pi);
+    const double step = cdf / density * std::log(cdf / p);
+    x -= step;
+    if (std::abs(step) < 1e-15 * std::max(1.0, std::abs(x))) break;
+  }
+  return u < 0.5 ? x : -x;
+}
+
+Quantile make_normal() {
+  return [](double u, std::span<const double> p) { return p[0] + p[1] * calc_normal_quantile(u); };
+}
+
+Quantile make_lognormal() {
+  return [](double u, std::span<const double> p) {
+    const double variance = std::log1p((p[1] / p[0]) * (p[1] / p[0]));
+    return p[0] * std::exp(-0.5 * variance + std::sqrt(variance) * calc_normal_quantile(u));
+  };
+}
+
+Quantile make_uniform() {
+  return [](double u, std::span<const double> p) { return p[0] + u * (p[1] - p[0]); };
+}
+
+Quantile make_gumbel() {
+  return [](double u, std::span<const double> p) {
+    const double scale = p[1] * std::sqrt(6.0) / std::numbers::pi;
+    return p[0] - scale * (std::numbers::egamma + std::log(-std::log(u)));
+  };
+}
+
+Statistic make_probability(int outcome) {
+  return [outcome](std::span<const Result> runs) {
+    const auto count =
+        std::count_if(runs.begin(), runs.end(), [&](const Result& r) { return outcome_of(r) == outcome; });
+    return static_cast<double>(count) / static_cast<double>(runs.size());
+  };
+}
+
+Statistic make_exceedance(int output, double limit) {
+  return [=](std::span<const Result> runs) {
+    const auto values = pick(runs, output);
+    if (values.empty()) return nan;
+    const auto count = std::count_if(values.begin(), values.end(), [&](double v) { return v > limit; });
+    return static_cast<double>(count) / static_cast<double>(values.size());
+  };
+}
+
+Statistic make_mean(int output) {
+  return [=](std::span<const Result> runs) { return calc_mean(pick(runs, output)); };
+}
+
+Statistic make_deviation(int output) {
+  return [=](std::span<const Result> runs) {
+    const auto values = pick(runs, output);
+    if (values.size() < 2) return nan;
+    const double mean = calc_mean(values);
+    double sum = 0;
+    for (const double v : values) sum += (v - mean) * (v - mean);
+    return std::sqrt(sum / static_cast<double>(values.size() - 1));
+  };
+}
+
+Statistic make_empirical_quantile(int output, double q) {
+  return [=](std::span<const Result> runs) {
+    auto values = pick(runs, output);
+    if (values.empty()) return nan;
+    std::sort(values.begin(), values.end());
+    const double place = std::ceil(q * static_cast<double>(values.size())) - 1;
+    return values[static_cast<std::size_t>(std::clamp(place, 0.0, static_cast<double>(values.size() - 1)))];
+  };
+}
+
+Evaluate with_monte_carlo(int outer_size, std::vector<RandomVariable> variables, Evaluate model,
+                          std::vector<Statistic> statistics, const MonteCarloOptions& options) {
+  if (options.samples < 1) throw InputError("E810", fmt::format("Monte Carlo: {} samples", options.samples));
+  if (variables.empty()) throw InputError("E810", "Monte Carlo: there is no random variable");
+  for (const auto& v : variables)
+    for (const int p : v.parameters)
+      if (p < 0 || p >= outer_size)
+        throw InputError("E810", fmt::format("Monte Carlo: parameter {} of {} outer coordinates", p, outer_size));
+  const int m = static_cast<int>(variables.size());
+  std::vector<Point> numbers;
+  if (options.spread) {
+    numbers = make_sobol_points(m, 1, options.samples, options.seed);
+  } else {
+    Random random(options.seed);
+    numbers.assign(options.samples, Point(m));
+    for (auto& u : numbers)
+      for (double& v : u) v = random.next();
+  }
+  // the open interval: quantiles at 0 are not finite
+  for (auto& u : numbers)
+    for (double& v : u) v = std::max(v, 0x1p-54);
+  return [=, variables = std::move(variables), model = std::move(model), statistics = std::move(statistics),
+          numbers = std::move(numbers)](std::span<const Point> batch, std::span<Result> out) {
+    const std::size_t each = numbers.size();
+    const std::size_t sets = std::max<std::size_t>(1, static_cast<std::size_t>(std::max(options.batch, 1)) / each);
+    for (std::size_t first = 0; first < batch.size(); first += sets) {
+      const std::size_t last = std::min(first + sets, batch.size());
+      std::vector<Point> inner;
+      for (std::size_t k = first; k < last; ++k)
+        for (const auto& u : numbers) {
+          Point x = batch[k];
+          for (int v = 0; v < m; ++v) {
+            std::vector<double> parameters;
+            for (const int p : variables[v].parameters) parameters.push_back(batch[k][p]);
+            x.push_back(variables[v].quantile(u[v], parameters));
+          }
+          inner.push_back(std::move(x));
+        }
+      std::vector<Result> results(inner.size());
+      model(inner, results);
+      for (std::size_t k = first; k < last; ++k) {
+        const std::span<const Result> runs(results.data() + (k - first) * each, each);
+        const auto is = [&](Result::State s) {
+          return std::count_if(runs.begin(), runs.end(), [s](const Result& r) { return r.state == s; });
+        };
+        out[k] = {};
+        if (is(Result::State::NotRun) > 0) continue;
+        const auto failed = is(Result::State::Failed);
+        if (failed == static_cast<long>(each)) {
+          out[k].state = Result::State::Failed;
+          out[k].text = "every inner run failed: " + runs[0].text;
+          continue;
+        }
+        out[k].state = Result::State::Done;
+        for (const auto& s : statistics) out[k].values.push_back(s(runs));
+        out[k].values.push_back(static_cast<double>(failed) / static_cast<double>(each));
+      }
+    }
+  };
+}
+
+}  // namespace topple::uncertainty

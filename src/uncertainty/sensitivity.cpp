@@ -1,0 +1,170 @@
+#include "uncertainty/sensitivity.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "base/error.h"
+#include "uncertainty/measures.h"
+
+namespace topple::uncertainty {
+namespace {
+
+/// Values of one quantity over the design: rows of A, B, and A with one column from B.
+struct Columns {
+  std::vector<double> a, b;
+  std::vector<std::vector<double>> mixed;  // per input
+};
+
+/// Indices from the rows [first, last).
+void calc_indices(const Columns& c, std::size_t first, std::size_t last, std::vector<double>& one,
+                  std::vector<double>& total) {
+  double mean = 0, square = 0;
+  const double count = static_cast<double>(last - first);
+  for (std::size_t k = first; k < last; ++k) mean += c.a[k] + c.b[k];
+  mean /= 2 * count;
+  for (std::size_t k = first; k < last; ++k)
+    square += (c.a[k] - mean) * (c.a[k] - mean) + (c.b[k] - mean) * (c.b[k] - mean);
+  const double variance = square / (2 * count);
+  one.assign(c.mixed.size(), 0.0);
+  total.assign(c.mixed.size(), 0.0);
+  if (!(variance > 0)) return;
+  for (std::size_t i = 0; i < c.mixed.size(); ++i) {
+    double u = 0, t = 0;
+    for (std::size_t k = first; k < last; ++k) {
+      u += (c.b[k] - mean) * (c.mixed[i][k] - c.a[k]);
+      t += (c.a[k] - c.mixed[i][k]) * (c.a[k] - c.mixed[i][k]);
+    }
+    one[i] = u / count / variance;
+    total[i] = 0.5 * t / count / variance;
+  }
+}
+
+std::vector<Driver> calc_drivers(const Columns& c) {
+  constexpr std::size_t blocks = 8;
+  std::vector<Driver> drivers(c.mixed.size());
+  std::vector<double> one, total;
+  if (c.a.size() < 2) return drivers;
+  calc_indices(c, 0, c.a.size(), one, total);
+  for (std::size_t i = 0; i < drivers.size(); ++i) drivers[i].first = one[i], drivers[i].total = total[i];
+  if (c.a.size() < 2 * blocks) return drivers;
+  std::vector<std::vector<double>> ones, totals;
+  for (std::size_t b = 0; b < blocks; ++b) {
+    calc_indices(c, b * c.a.size() / blocks, (b + 1) * c.a.size() / blocks, one, total);
+    ones.push_back(one), totals.push_back(total);
+  }
+  const auto error = [&](const std::vector<std::vector<double>>& of_block, std::size_t i) {
+    double mean = 0, sum = 0;
+    for (const auto& b : of_block) mean += b[i] / blocks;
+    for (const auto& b : of_block) sum += (b[i] - mean) * (b[i] - mean);
+    return std::sqrt(sum / (blocks - 1) / blocks);
+  };
+  for (std::size_t i = 0; i < drivers.size(); ++i)
+    drivers[i].first_error = error(ones, i), drivers[i].total_error = error(totals, i);
+  return drivers;
+}
+
+}  // namespace
+
+Sensitivity find_drivers(const Space& space, Asker& asker, const SensitivityOptions& options) {
+  check_space(space);
+  if (space.has_interaction())
+    throw InputError("E811", "sensitivity: indices need inputs that vary on their own; there is interaction",
+                     "use the effect of knowing each input instead");
+  if (options.rows < 16) throw InputError("E811", fmt::format("sensitivity: {} rows; at least 16", options.rows));
+  const std::size_t n = space.inputs.size();
+  const Box box = make_box(space, options.alpha);
+  std::vector<Point> points;
+  for (const auto& u : make_sobol_points(static_cast<int>(2 * n), 1, options.rows, options.seed + 2)) {
+    const Point a = place_in(box, Point(u.begin(), u.begin() + static_cast<long>(n)));
+    const Point b = place_in(box, Point(u.begin() + static_cast<long>(n), u.end()));
+    points.push_back(a);
+    points.push_back(b);
+    for (std::size_t i = 0; i < n; ++i) {
+      points.push_back(a);
+      points.back()[i] = b[i];
+    }
+  }
+  const auto indices = asker.ask(points);
+  Sensitivity s;
+  // rows that ran, and those in which nothing failed
+  std::vector<std::size_t> ran, clean;
+  std::set<int> outcomes;
+  for (std::size_t row = 0; row < static_cast<std::size_t>(options.rows); ++row) {
+    bool all = true, done = true;
+    for (std::size_t k = 0; k < n + 2; ++k) {
+      const int i = indices[row * (n + 2) + k];
+      all = all && i >= 0;
+      if (i < 0) break;
+      done = done && asker.archive()[i].result.state == Result::State::Done;
+      outcomes.insert(outcome_of(asker.archive()[i].result));
+    }
+    if (!all) continue;
+    ran.push_back(row);
+    if (done) clean.push_back(row);
+  }
+  s.rows = static_cast<int>(ran.size());
+  s.rows_used = static_cast<int>(clean.size());
+  const auto collect = [&](const std::vector<std::size_t>& rows, const auto& value) {
+    Columns c;
+    c.mixed.resize(n);
+    for (const std::size_t row : rows) {
+      const auto at = [&](std::size_t k) { return value(asker.archive()[indices[row * (n + 2) + k]].result); };
+      c.a.push_back(at(0));
+      c.b.push_back(at(1));
+      for (std::size_t i = 0; i < n; ++i) c.mixed[i].push_back(at(2 + i));
+    }
+    return c;
+  };
+  if (!clean.empty())
+    for (int o = 0; o < asker.outputs(); ++o)
+      s.outputs.push_back(calc_drivers(collect(clean, [o](const Result& r) { return r.values[o]; })));
+  for (const int outcome : outcomes) {
+    const Columns c = collect(ran, [outcome](const Result& r) { return outcome_of(r) == outcome ? 1.0 : 0.0; });
+    OutcomeDrivers d;
+    d.outcome = outcome;
+    for (std::size_t k = 0; k < c.a.size(); ++k) d.share += (c.a[k] + c.b[k]) / (2.0 * static_cast<double>(c.a.size()));
+    d.inputs = calc_drivers(c);
+    s.outcomes.push_back(std::move(d));
+  }
+  return s;
+}
+
+std::vector<Fixed> find_effects_of_knowing(const Space& space, Asker& asker, const AlphaResult& all,
+                                           const AlphaOptions& options, int limit) {
+  check_space(space);
+  std::vector<Fixed> effects;
+  const int whole_limit = asker.limit();
+  for (int i = 0; i < space.size() && !asker.is_cancelled(); ++i) {
+    Space known = space;
+    known.inputs[i] = FuzzyNumber(space.inputs[i].centre());
+    asker.set_limit(std::min(whole_limit, asker.asked() + limit));
+    AlphaOptions o = options;
+    o.patience = 1;
+    o.search_classes = false;
+    o.watch = nullptr;
+    const AlphaResult r = optimise(known, asker, o);
+    Fixed f;
+    f.input = i;
+    for (std::size_t k = 0; k < all.outputs.size(); ++k) {
+      const bool has = k < r.outputs.size() && all.outputs[k].levels[0].lower.sample >= 0;
+      const FuzzyNumber before = has ? make_number(all.outputs[k]) : FuzzyNumber();
+      const FuzzyNumber after = has ? make_number(r.outputs[k]) : FuzzyNumber();
+      const double entropy = calc_entropy(before);
+      f.width.push_back(before.width() > 0 ? after.width() / before.width() : 0);
+      f.entropy.push_back(entropy > 0 ? calc_entropy(after) / entropy : 0);
+    }
+    PossibilityOptions p;
+    p.seed = options.seed;
+    for (auto& c : find_possibilities(known, asker, p).classes)
+      if (c.possibility > 0) f.classes.push_back(c);
+    effects.push_back(std::move(f));
+  }
+  asker.set_limit(whole_limit);
+  return effects;
+}
+
+}  // namespace topple::uncertainty

@@ -1,0 +1,117 @@
+#include "uncertainty/sensitivity.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "base/error.h"
+#include "reference_cases.h"
+
+namespace topple::uncertainty {
+namespace {
+
+// Ishigami & Homma (1990), a = 7, b = 0.1, uniform on [-π, π]: closed forms of the variances.
+TEST(SensitivityReference, IndicesOfIshigami) {
+  const double a = 7, b = 0.1, p4 = std::pow(cases::pi, 4), p8 = p4 * p4;
+  const double v1 = 0.5 * std::pow(1 + b * p4 / 5, 2), v2 = a * a / 8, v13 = b * b * p8 * (1.0 / 18 - 1.0 / 50);
+  const double v = v1 + v2 + v13;
+  const double first[] = {v1 / v, v2 / v, 0}, total[] = {(v1 + v13) / v, v2 / v, v13 / v};
+  const cases::Case c = cases::make_all()[2];
+  const Progress progress;
+  Asker asker(c.model, progress, nullptr, 100000);
+  SensitivityOptions options;
+  options.rows = 4096;
+  const Sensitivity s = find_drivers(Space{c.inputs, {}, {}}, asker, options);
+  EXPECT_EQ(asker.asked(), 4096 * 5);
+  EXPECT_EQ(s.rows_used, 4096);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_NEAR(s.outputs[0][i].first, first[i], 0.01) << i;
+    EXPECT_NEAR(s.outputs[0][i].total, total[i], 0.01) << i;
+    EXPECT_LT(s.outputs[0][i].first_error, 0.05);
+    EXPECT_GT(s.outputs[0][i].total_error, 0);
+  }
+}
+
+// The outcome x1 > 1/2 or x2 > 3/4 of independent uniform inputs; x3 does nothing.
+TEST(SensitivityPhysics, DriversOfAnOutcomeHaveClosedForms) {
+  const Evaluate model = make_evaluate([](const Point& x) {
+    Result r;
+    r.state = Result::State::Done;
+    r.outcome = x[0] > 0.5 || x[1] > 0.75 ? 3 : 1;
+    r.values = {5.0};
+    return r;
+  });
+  const Progress progress;
+  Asker asker(model, progress, nullptr, 100000);
+  const Space space{std::vector<FuzzyNumber>(3, make_triangular(0, 0.3, 1)), {}, {}};
+  SensitivityOptions options;
+  options.rows = 4096;
+  const Sensitivity s = find_drivers(space, asker, options);
+  ASSERT_EQ(s.outcomes.size(), 2u);
+  EXPECT_EQ(s.outcomes[1].outcome, 3);
+  const double p = 1 - 0.5 * 0.75, v = p * (1 - p);
+  EXPECT_NEAR(s.outcomes[1].share, p, 0.01);
+  // E[I|x1] is 1 or 1/4, E[I|x2] is 1 or 1/2; total: the mean variance given the others
+  const double want[3][2] = {{0.25 * 0.75 * 0.75 / v, 0.75 * 0.25 / v}, {0.1875 * 0.25 / v, 0.5 * 0.1875 / v}, {0, 0}};
+  for (int i = 0; i < 3; ++i)
+    for (const auto& o : s.outcomes) {
+      EXPECT_NEAR(o.inputs[i].first, want[i][0], 0.02) << i;
+      EXPECT_NEAR(o.inputs[i].total, want[i][1], 0.02) << i;
+    }
+  EXPECT_EQ(s.outcomes[0].inputs[2].total, 0) << "exactly: nothing changes with x3";
+  EXPECT_EQ(s.outputs[0][0].total, 0) << "an output that does not vary has no driver";
+}
+
+TEST(Sensitivity, LeavesRowsWithFailedRunsOut) {
+  const Evaluate model = make_evaluate([](const Point& x) {
+    Result r;
+    r.state = x[0] > 0.9 ? Result::State::Failed : Result::State::Done;
+    r.values = {x[0] + 0 * x[1]};
+    return r;
+  });
+  const Progress progress;
+  Asker asker(model, progress, nullptr, 100000);
+  const Sensitivity s = find_drivers(Space{std::vector<FuzzyNumber>(2, make_triangular(0, 0.3, 1)), {}, {}}, asker, {});
+  EXPECT_EQ(s.rows, 512);
+  EXPECT_NEAR(s.rows_used, 512 * 0.81, 15);
+  ASSERT_EQ(s.outcomes.size(), 2u);
+  EXPECT_EQ(s.outcomes[0].outcome, failed_outcome);
+  EXPECT_NEAR(s.outcomes[0].share, 0.1, 0.01);
+  EXPECT_NEAR(s.outcomes[0].inputs[0].total, 1, 0.1);
+  EXPECT_NEAR(s.outputs[0][0].total, 1, 0.1);
+  EXPECT_EQ(s.outputs[0][1].total, 0);
+}
+
+TEST(Sensitivity, KnowingAnInputNarrowsTheResult) {
+  // y = 3 a + b: widths 6 and 2 of 8; outcome 1 for a > 1.5, which is possible to 0.5 unless a is known
+  const Evaluate model = make_evaluate([](const Point& x) {
+    Result r;
+    r.state = Result::State::Done;
+    r.outcome = x[0] > 1.5 ? 1 : 0;
+    r.values = {3 * x[0] + x[1]};
+    return r;
+  });
+  const Space space{{make_triangular(0, 1, 2), make_triangular(0, 1, 2)}, {}, {}};
+  const Progress progress;
+  Asker asker(model, progress, nullptr, 100000);
+  const AlphaResult all = optimise(space, asker, {});
+  const auto effects = find_effects_of_knowing(space, asker, all, {}, 3000);
+  ASSERT_EQ(effects.size(), 2u);
+  EXPECT_NEAR(effects[0].width[0], 0.25, 1e-9);
+  EXPECT_NEAR(effects[0].entropy[0], 0.25, 1e-9);
+  EXPECT_NEAR(effects[1].width[0], 0.75, 1e-9);
+  ASSERT_EQ(effects[0].classes.size(), 1u) << "with a known nothing but outcome 0 is possible";
+  ASSERT_EQ(effects[1].classes.size(), 2u);
+  EXPECT_NEAR(effects[1].classes[1].possibility, 0.5, 1e-3);
+}
+
+TEST(Sensitivity, RefusesInteraction) {
+  const FuzzyNumber f = make_triangular(-1, 0, 1);
+  const Space disc{{f, f}, {[](const Point& x) { return x[0] * x[0] + x[1] * x[1] - 1; }}, {}};
+  const Progress progress;
+  Asker asker(make_evaluate_values([](const Point& x) { return x; }), progress);
+  EXPECT_THROW(find_drivers(disc, asker, {}), InputError);
+}
+
+}  // namespace
+}  // namespace topple::uncertainty
