@@ -116,9 +116,15 @@ class Optimisation {
           x[i] = end;
           add(std::move(x), r);
         }
-    for (const auto& r : regions_)
-      if (!r.axes.empty() && static_cast<int>(r.axes.size()) <= options_.corner_inputs)
-        for (auto& x : make_corners(r.box)) add(std::move(x), r);
+    // a small limit must leave something for the searches
+    std::size_t corners = 0;
+    for (const auto& r : regions_) {
+      const int n = static_cast<int>(r.axes.size());
+      if (n == 0 || n > std::min(options_.corner_inputs, 20)) continue;
+      corners += std::size_t{1} << n;
+      if (corners > static_cast<std::size_t>(asker_.limit()) / 3) break;
+      for (auto& x : make_corners(r.box)) add(std::move(x), r);
+    }
     ask(points);
     space_points_.assign(levels_.size(), 0);
     spread(1);
@@ -129,10 +135,15 @@ class Optimisation {
     std::vector<Point> points;
     const auto& axes = regions_.front().axes;
     const int n = static_cast<int>(axes.size());
-    for (std::size_t k = 0; n > 0 && k < regions_.size(); ++k) {
-      if (k > 0 && regions_[k].axes.empty()) continue;
+    const auto wanted = [&](std::size_t k) {
       const int given = k == 0 ? options_.space_points : options_.inner_points;
-      const int count = static_cast<int>(std::ceil(share * (given > 0 ? given : (k == 0 ? 80 : 20) * n)));
+      return k > 0 && regions_[k].axes.empty() ? 0 : given > 0 ? given : (k == 0 ? 80 : 20) * n;
+    };
+    double whole = 0;
+    for (std::size_t k = 0; k < regions_.size(); ++k) whole += wanted(k);
+    share *= std::min(1.0, asker_.limit() / 3.0 / std::max(whole, 1.0));
+    for (std::size_t k = 0; n > 0 && k < regions_.size(); ++k) {
+      const int count = static_cast<int>(std::ceil(share * wanted(k)));
       for (const auto& u : make_sobol_points(n, next_spread_, count, options_.seed)) {
         Point fractions(space_.inputs.size(), 0.0);
         for (int i = 0; i < n; ++i) fractions[axes[i]] = u[i];
@@ -174,6 +185,10 @@ class Optimisation {
     const Result& r = asker_.archive()[sample].result;
     if (r.state != Result::State::Done || (goal.outcome != any_class && r.outcome != goal.outcome)) return infinite;
     return goal.sign * r.values[goal.output];
+  }
+
+  Told tell_of(const Goal& goal, int sample) const {
+    return {value_of(goal, sample), sample < 0 ? failed_outcome : outcome_of(asker_.archive()[sample].result)};
   }
 
   Candidate find_best(const Goal& goal) const {
@@ -260,18 +275,21 @@ class Optimisation {
     std::unique_ptr<LocalSearch> search;
   };
 
-  std::unique_ptr<LocalSearch> make_model_search(const Goal& goal, const Candidate& start, double radius) {
+  std::unique_ptr<LocalSearch> make_model_search(const Goal& goal, const Candidate& start, double radius, int probes) {
     ModelSearch::Options o;
     o.radius = radius;
+    o.probes = probes;
     o.tolerance = options_.tolerance * width_of(goal.output);
     o.seed = options_.seed + ++searches_;
-    return std::make_unique<ModelSearch>(regions_[goal.level], asker_.archive()[start.sample].x, start.value, o);
+    return std::make_unique<ModelSearch>(regions_[goal.level], asker_.archive()[start.sample].x,
+                                         tell_of(goal, start.sample), o);
   }
 
   std::unique_ptr<LocalSearch> make_evolution(const Goal& goal, const Candidate& start) {
     EvolutionSearch::Options o;
     o.seed = options_.seed + ++searches_;
-    return std::make_unique<EvolutionSearch>(regions_[goal.level], asker_.archive()[start.sample].x, start.value, o);
+    return std::make_unique<EvolutionSearch>(regions_[goal.level], asker_.archive()[start.sample].x,
+                                             tell_of(goal, start.sample), o);
   }
 
   /// All searches side by side: each batch holds what every one of them asks next.
@@ -284,9 +302,9 @@ class Optimisation {
       ask(points);
       for (auto& r : all) {
         if (r.search->is_done()) continue;
-        std::vector<double> values;
-        for (const auto& x : r.search->pending()) values.push_back(value_of(r.goal, asker_.archive().find(x)));
-        r.search->tell(values);
+        std::vector<Told> told;
+        for (const auto& x : r.search->pending()) told.push_back(tell_of(r.goal, asker_.archive().find(x)));
+        r.search->tell(told);
       }
     }
     for (const auto& r : all) {
@@ -313,7 +331,7 @@ class Optimisation {
       const Candidate best = find_best(goal);
       if (regions_[goal.level].axes.empty() || best.sample < 0) continue;
       if (!of_classes) starts_[key_of(goal)].push_back(best.sample);
-      all.push_back({goal, make_model_search(goal, best, 0.1)});
+      all.push_back({goal, make_model_search(goal, best, 0.1, of_classes ? 3 : 8)});
     }
     advance(all);
   }
@@ -324,7 +342,7 @@ class Optimisation {
     for (const Goal& goal : make_goals(false)) {
       if (regions_[goal.level].axes.empty()) continue;
       for (const auto& start : find_starts(goal, options_.starts))
-        all.push_back({goal, make_model_search(goal, start, 0.1)});
+        all.push_back({goal, make_model_search(goal, start, 0.1, 1)});
       if (const Candidate best = find_best(goal); best.sample >= 0 && rounds_ == 0)
         for (int k = 0; k < options_.evolutions; ++k) all.push_back({goal, make_evolution(goal, best)});
     }
@@ -340,7 +358,7 @@ class Optimisation {
         const Candidate best = find_best(goal);
         if (regions_[goal.level].axes.empty() || best.sample < 0 || is_converged(goal, best)) continue;
         if (!tried.insert({key_of(goal), best.sample}).second) continue;
-        all.push_back({goal, make_model_search(goal, best, 0.05)});
+        all.push_back({goal, make_model_search(goal, best, 0.05, of_classes ? 3 : 8)});
       }
       if (all.empty()) break;
       ++rechecks_;
@@ -395,6 +413,15 @@ OutputBounds make_empty_bounds(const std::vector<double>& levels) {
 }  // namespace
 
 double calc_miss_probability(const Coverage& c, double v) { return std::pow(1 - v, c.space_points); }
+
+AlphaOptions make_thrifty_options() {
+  AlphaOptions o;
+  o.starts = 1;
+  o.evolutions = 0;
+  o.patience = 1;
+  o.search_classes = false;
+  return o;
+}
 
 std::string to_text(Ending e) {
   switch (e) {

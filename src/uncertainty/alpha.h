@@ -82,7 +82,7 @@ struct AlphaOptions {
   /// Different points at most, those of `earlier` included, so that a repetition ends at the same point.
   int limit = 10000;
   /// Sobol points in the support and added in each inner cut. 0: 80 and 20 per input that has a width (measured on nine
-  /// problems, docs/decisions/0018-fuzzy-analysis.md).
+  /// problems, docs/decisions/0018-fuzzy-analysis.md). At most a third of the limit; the same for corners.
   int space_points = 0, inner_points = 0;
   /// Largest number of fuzzy inputs for which all corners of every cut are run.
   int corner_inputs = 8;
@@ -107,6 +107,10 @@ struct AlphaOptions {
   /// the one being filled, the result's own is empty.
   std::function<void(const AlphaResult& so_far, const Archive& archive)> watch;
 };
+
+/// For models whose runs are dear: about a third of the runs of the default, at a larger risk of missing a remote
+/// basin.
+AlphaOptions make_thrifty_options();
 
 /// Bounds of every output at every level. The same bits for the same seed, whatever the number of threads of the model,
 /// and with or without `earlier`. Cancellation (`progress.cancel`) ends it between batches with the bounds so far.

@@ -31,8 +31,8 @@ Region make_region(const Space& space, double alpha) {
   return r;
 }
 
-ModelSearch::ModelSearch(Region region, Point start, double value, const Options& options)
-    : LocalSearch(std::move(start), value),
+ModelSearch::ModelSearch(Region region, Point start, const Told& at_start, const Options& options)
+    : LocalSearch(std::move(start), at_start),
       region_(std::move(region)),
       options_(options),
       random_(options.seed),
@@ -56,7 +56,9 @@ Point ModelSearch::moved(const std::vector<double>& step) const {
 void ModelSearch::ask_star() {
   pending_.clear();
   pairs_.clear();
-  trying_ = false;
+  stage_ = Stage::Star;
+  wall_.reset();
+  next_ = best_, next_value_ = value_, next_outcome_ = outcome_;
   if (axes_.empty() || iteration_ >= options_.iterations) return;
   const auto add = [this](const Point& x) {
     pending_.push_back(x);
@@ -118,8 +120,8 @@ double ModelSearch::calc_model(const std::vector<double>& s) const {
   return m;
 }
 
-/// Minimum of the model in the trust region and the cut, axis by axis until it rests.
-std::vector<double> ModelSearch::find_step(bool mixed) const {
+/// Minimum of the model in the trust region and the cut, axis by axis until it rests; pushed away from the wall.
+std::vector<double> ModelSearch::find_step(bool mixed, double push) const {
   const std::size_t n = axes_.size();
   std::vector<double> s(n, 0.0);
   for (int sweep = 0; sweep < 200; ++sweep) {
@@ -130,6 +132,7 @@ std::vector<double> ModelSearch::find_step(bool mixed) const {
       const double low = std::max(-reach, region_.box.lower[k] - best_[k]);
       const double high = std::min(reach, region_.box.upper[k] - best_[k]);
       double slope = axes_[i].slope;
+      if (push > 0) slope += push * wall_->normal()[i] / region_.scale[k];
       if (mixed)
         for (std::size_t j = 0; j < n; ++j)
           if (j != i) slope += hessian_[i * n + j] * s[j];
@@ -173,18 +176,28 @@ void ModelSearch::find_allowed_step(std::vector<double>& step) {
   step = best;
 }
 
-void ModelSearch::ask_trials(std::span<const double> values) {
+/// Keeps the best point of this iteration, and places of other outcomes that are worse.
+void ModelSearch::note(std::span<const Told> told) {
+  for (std::size_t k = 0; k < told.size(); ++k) {
+    if (told[k].value < next_value_) {
+      next_ = pending_[k], next_value_ = told[k].value, next_outcome_ = told[k].outcome;
+    } else if (told[k].outcome != outcome_ && told[k].value >= value_) {
+      walls_.push_back(pending_[k]);
+      if (walls_.size() > 200) walls_.erase(walls_.begin());
+    }
+  }
+}
+
+/// Slopes and curvatures of this side of any wall.
+void ModelSearch::read_star(std::span<const Told> told) {
   const std::size_t n = axes_.size();
-  next_ = best_, next_value_ = value_;
-  for (std::size_t k = 0; k < values.size(); ++k)
-    if (values[k] < next_value_) next_ = pending_[k], next_value_ = values[k];
+  const auto value_at = [&](int k) { return k >= 0 && told[k].outcome == outcome_ ? told[k].value : infinite; };
   hessian_.assign(n * n, 0.0);
-  std::vector<double> together(n, 0.0);
+  together_.assign(n, 0.0);
   for (std::size_t i = 0; i < n; ++i) {
     Axis& axis = axes_[i];
     axis.slope = axis.curvature = 0;
-    const double fa = axis.at_a >= 0 ? values[axis.at_a] : infinite;
-    const double fb = axis.at_b >= 0 ? values[axis.at_b] : infinite;
+    const double fa = value_at(axis.at_a), fb = value_at(axis.at_b);
     const bool has_a = std::isfinite(fa), has_b = std::isfinite(fb);
     if (has_a && has_b) {
       axis.curvature = 2 * ((fb - value_) / axis.b - (fa - value_) / axis.a) / (axis.b - axis.a);
@@ -193,18 +206,83 @@ void ModelSearch::ask_trials(std::span<const double> values) {
       axis.slope = has_a ? (fa - value_) / axis.a : (fb - value_) / axis.b;
     }
     hessian_[i * n + i] = axis.curvature;
-    if (fa < value_ || fb < value_) together[i] = fa < fb ? axis.a : axis.b;
+    if (fa < value_ || fb < value_) together_[i] = fa < fb ? axis.a : axis.b;
     const int k = axis.input;
     axis.free =
         !((best_[k] == region_.box.lower[k] && axis.slope > 0) || (best_[k] == region_.box.upper[k] && axis.slope < 0));
   }
   for (const auto& p : pairs_) {
-    const double mixed = values[p.at] - values[p.at_i] - values[p.at_j] + value_;
+    const double mixed = value_at(p.at) - value_at(p.at_i) - value_at(p.at_j) + value_;
     if (std::isfinite(mixed)) hessian_[p.i * n + p.j] = hessian_[p.j * n + p.i] = mixed / (p.di * p.dj);
   }
-  const std::vector<double> whole = find_step(true), apart = find_step(false);
+}
+
+/// Whether trials met another outcome that is worse, and what the model promised did not come.
+bool ModelSearch::is_blocked(std::span<const Told> told) const {
+  if (wall_ || probes_ >= options_.probes || next_outcome_ != outcome_ || value_ - next_value_ >= 0.5 * promised_)
+    return false;
+  return std::any_of(told.begin(), told.end(),
+                     [this](const Told& t) { return t.outcome != outcome_ && t.value >= value_; });
+}
+
+/// Starts to locate the boundary of the other outcome at its nearest place.
+bool ModelSearch::ask_probe() {
+  const Point* nearest = nullptr;
+  double least = infinite;
+  for (const auto& w : walls_) {
+    double distance = 0;
+    for (const int i : region_.axes) distance = std::max(distance, std::abs(w[i] - best_[i]) / region_.scale[i]);
+    if (distance < least) least = distance, nearest = &w;
+  }
+  if (nearest == nullptr || axes_.size() < 2) return false;
+  ++probes_;
+  wall_.emplace(region_.box, region_.scale, region_.axes, best_, *nearest, radius_);
+  pending_ = wall_->pending();
+  stage_ = Stage::Probe;
+  return !pending_.empty();
+}
+
+/// Minimum of the model that keeps a distance from the wall: the push that just does it, between the two steps that it
+/// jumps between.
+std::vector<double> ModelSearch::find_walled_step(double distance) const {
+  const auto distance_of = [&](const std::vector<double>& s) {
+    Point x = best_;
+    for (std::size_t k = 0; k < axes_.size(); ++k) x[axes_[k].input] += s[k];
+    return wall_->calc_distance(x);
+  };
+  std::vector<double> near = find_step(true), far = near;
+  if (distance_of(near) >= distance) return near;
+  double low = 0, high = 0;
+  for (const auto& axis : axes_) high = std::max(high, std::abs(axis.slope) * region_.scale[axis.input]);
+  high = std::max(high, options_.tolerance);
+  int doubling = 0;
+  for (; doubling < 60 && distance_of(far) < distance; ++doubling)
+    low = doubling > 0 ? high : 0, high *= 2, far = find_step(true, high);
+  if (distance_of(far) < distance) return std::vector<double>(axes_.size(), 0.0);
+  for (int k = 0; k < 50; ++k) {
+    const double middle = 0.5 * (low + high);
+    const auto s = find_step(true, middle);
+    if (distance_of(s) < distance)
+      low = middle, near = s;
+    else
+      high = middle, far = s;
+  }
+  const double a = distance_of(near), b = distance_of(far);
+  const double t = b > a ? (distance - a) / (b - a) : 1;
+  for (std::size_t k = 0; k < far.size(); ++k) far[k] = near[k] + t * (far[k] - near[k]);
+  return far;
+}
+
+void ModelSearch::ask_trials() {
+  stage_ = Stage::Trial;
+  pending_.clear();
+  std::vector<double> whole = find_step(true);
   std::vector<std::vector<double>> steps;
-  if (region_.space->has_interaction()) {
+  if (wall_ && wall_->found()) {
+    // as near to the wall as its curvature lets
+    for (const double part : {0.3, 0.1, 0.03, 0.01, 0.0}) steps.push_back(find_walled_step(part * radius_));
+    promised_ = -calc_model(steps.back());
+  } else if (region_.space->has_interaction()) {
     std::vector<double> allowed = whole;
     find_allowed_step(allowed);
     promised_ = -calc_model(allowed);
@@ -214,11 +292,9 @@ void ModelSearch::ask_trials(std::span<const double> values) {
   }
   steps.push_back(whole);
   const bool settled = promised_ <= options_.tolerance && next_value_ >= value_ - options_.tolerance;
-  pending_.clear();
-  trying_ = true;
   if (!settled) {
-    steps.push_back(apart);
-    steps.push_back(together);
+    steps.push_back(find_step(false));
+    steps.push_back(together_);
     for (const double part : {0.5, 0.25, 0.0625}) {
       steps.push_back(whole);
       for (double& s : steps.back()) s *= part;
@@ -230,19 +306,21 @@ void ModelSearch::ask_trials(std::span<const double> values) {
       pending_.push_back(std::move(x));
   }
   if (settled && promised_ <= 0) pending_.clear();
-  if (pending_.empty()) finish_iteration({});
+  if (pending_.empty()) finish_iteration();
 }
 
-void ModelSearch::finish_iteration(std::span<const double> values) {
-  for (std::size_t k = 0; k < values.size(); ++k)
-    if (values[k] < next_value_) next_ = pending_[k], next_value_ = values[k];
+void ModelSearch::finish_iteration() {
   ++iteration_;
   const double gained = value_ - next_value_;
   double length = 0;
   for (const int i : region_.axes) length = std::max(length, std::abs(next_[i] - best_[i]) / region_.scale[i]);
-  best_ = next_, value_ = next_value_;
+  if (next_outcome_ != outcome_) walls_.clear();
+  best_ = next_, value_ = next_value_, outcome_ = next_outcome_;
+  const bool walled = wall_ && wall_->found();
   const bool any_free = std::any_of(axes_.begin(), axes_.end(), [](const Axis& a) { return a.free; });
-  const bool small = promised_ <= options_.tolerance && gained <= options_.tolerance;
+  // a plane is no more than the boundary's tangent
+  const double tolerance = walled ? 1000 * options_.tolerance : options_.tolerance;
+  const bool small = promised_ <= tolerance && gained <= tolerance;
   if ((small && radius_ <= (any_free ? 0.01 : 0.03)) || radius_ < options_.smallest) {
     converged_ = true;
     pending_.clear();
@@ -252,21 +330,35 @@ void ModelSearch::finish_iteration(std::span<const double> values) {
   if (good && length >= 0.99 * trust_) {
     trust_ *= 2;
   } else {
-    radius_ = gained <= options_.tolerance ? 0.25 * radius_ : std::min(radius_, std::max(length, 0.25 * radius_));
+    radius_ = gained <= tolerance ? 0.25 * radius_ : std::min(radius_, std::max(length, 0.25 * radius_));
     trust_ = good ? std::max(2 * length, 2 * radius_) : std::max(0.5 * length, 2 * radius_);
   }
   ask_star();
 }
 
-void ModelSearch::tell(std::span<const double> values) {
-  if (trying_)
-    finish_iteration(values);
-  else
-    ask_trials(values);
+void ModelSearch::tell(std::span<const Told> told) {
+  note(told);
+  switch (stage_) {
+    case Stage::Star:
+      read_star(told);
+      ask_trials();
+      break;
+    case Stage::Probe: {
+      std::vector<bool> inside;
+      for (const auto& t : told) inside.push_back(t.outcome == outcome_);
+      wall_->tell(inside);
+      pending_ = wall_->pending();
+      if (pending_.empty()) ask_trials();
+      break;
+    }
+    case Stage::Trial:
+      if (!is_blocked(told) || !ask_probe()) finish_iteration();
+      break;
+  }
 }
 
-EvolutionSearch::EvolutionSearch(Region region, Point start, double value, const Options& options)
-    : LocalSearch(std::move(start), value),
+EvolutionSearch::EvolutionSearch(Region region, Point start, const Told& at_start, const Options& options)
+    : LocalSearch(std::move(start), at_start),
       region_(std::move(region)),
       options_(options),
       random_(options.seed),
@@ -289,11 +381,13 @@ void EvolutionSearch::ask() {
   }
 }
 
-void EvolutionSearch::tell(std::span<const double> values) {
-  const auto least = std::min_element(values.begin(), values.end());
-  if (least != values.end() && *least < value_) {
-    value_ = *least;
-    best_ = pending_[least - values.begin()];
+void EvolutionSearch::tell(std::span<const Told> told) {
+  const auto least =
+      std::min_element(told.begin(), told.end(), [](const Told& a, const Told& b) { return a.value < b.value; });
+  if (least != told.end() && least->value < value_) {
+    value_ = least->value;
+    outcome_ = least->outcome;
+    best_ = pending_[least - told.begin()];
     width_ = std::min(1.2 * width_, options_.width);
   } else {
     width_ *= 0.6;

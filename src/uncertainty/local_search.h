@@ -3,11 +3,13 @@
 /// batch for the model is wide (docs/theory/uncertainty.md, section 3).
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "uncertainty/random.h"
 #include "uncertainty/space.h"
+#include "uncertainty/wall.h"
 
 namespace topple::uncertainty {
 
@@ -23,13 +25,19 @@ struct Region {
 };
 Region make_region(const Space&, double alpha);
 
-/// Looks for a minimum from a start. Protocol: evaluate `pending()`, call `tell` with the values (infinite where the
-/// point must not count), until `is_done()`.
+/// What a search is told of a point.
+struct Told {
+  double value = 0;  // infinite where the point must not count
+  int outcome = 0;   // class of what happened there: the value may jump between classes
+};
+
+/// Looks for a minimum from a start. Protocol: evaluate `pending()`, call `tell` with what came out, in
+/// the same order, until `is_done()`.
 class LocalSearch {
  public:
   virtual ~LocalSearch() = default;
   const std::vector<Point>& pending() const { return pending_; }
-  virtual void tell(std::span<const double> values) = 0;
+  virtual void tell(std::span<const Told> told) = 0;
   bool is_done() const { return pending_.empty(); }
   /// Whether it ended because its model shows nothing better near; never for one without a model.
   bool is_converged() const { return converged_; }
@@ -37,16 +45,19 @@ class LocalSearch {
   double value() const { return value_; }
 
  protected:
-  LocalSearch(Point start, double value) : best_(std::move(start)), value_(value) {}
+  LocalSearch(Point start, const Told& at_start)
+      : best_(std::move(start)), value_(at_start.value), outcome_(at_start.outcome) {}
   std::vector<Point> pending_;
   Point best_;
   double value_;
+  int outcome_;  // class of the best point
   bool converged_ = false;
 };
 
 /// Newton steps on a quadratic model inside the cut: slopes and curvatures from a star of points around the best one,
 /// mixed curvatures from points between the free axes; several step lengths are tried at once. The star shrinks until
-/// the model promises less than the tolerance.
+/// the model promises less than the tolerance. Where another outcome begins, its boundary is located as a plane and the
+/// step is kept on this side of it, unless the values beyond are better.
 class ModelSearch : public LocalSearch {
  public:
   struct Options {
@@ -54,10 +65,11 @@ class ModelSearch : public LocalSearch {
     double tolerance = 1e-8;  // of the value, absolute; decides when it has converged
     double smallest = 1e-5;   // radius at which it ends anyway
     int iterations = 60;      // at most
+    int probes = 8;           // of the boundary of another outcome, at most
     std::uint64_t seed = 1;   // for the subproblem under constraints
   };
-  ModelSearch(Region region, Point start, double value, const Options& options);
-  void tell(std::span<const double> values) override;
+  ModelSearch(Region region, Point start, const Told& at_start, const Options& options);
+  void tell(std::span<const Told> told) override;
 
  private:
   struct Axis {
@@ -74,24 +86,33 @@ class ModelSearch : public LocalSearch {
   };
   Point moved(const std::vector<double>& step) const;
   double calc_model(const std::vector<double>& step) const;
-  std::vector<double> find_step(bool mixed) const;
+  std::vector<double> find_step(bool mixed, double push = 0) const;
+  std::vector<double> find_walled_step(double distance) const;
+  void note(std::span<const Told> told);
+  bool is_blocked(std::span<const Told> told) const;
+  bool ask_probe();
   void find_allowed_step(std::vector<double>& step);
   void ask_star();
-  void ask_trials(std::span<const double> values);
-  void finish_iteration(std::span<const double> values);
+  void read_star(std::span<const Told> told);
+  void ask_trials();
+  void finish_iteration();
 
   Region region_;
   Options options_;
   Random random_;
   std::vector<Axis> axes_;
   std::vector<Pair> pairs_;
-  std::vector<double> hessian_;  // axes x axes
+  std::vector<double> together_;  // sum of the star's gains  (axes)
+  std::vector<double> hessian_;   // axes x axes
   double radius_, trust_;
   double promised_ = 0;
-  int iteration_ = 0;
-  bool trying_ = false;
+  int iteration_ = 0, probes_ = 0;
+  enum class Stage { Star, Probe, Trial } stage_ = Stage::Star;
+  std::vector<Point> walls_;  // places of other outcomes, latest last
+  std::optional<WallProbe> wall_;
   Point next_;  // best of this iteration
   double next_value_ = 0;
+  int next_outcome_ = 0;
 };
 
 /// A modified evolution strategy: children in a box around the parent, which moves to the best of them and grows after
@@ -105,8 +126,8 @@ class EvolutionSearch : public LocalSearch {
     double smallest = 0.02;  // half width at which it ends
     std::uint64_t seed = 1;
   };
-  EvolutionSearch(Region region, Point start, double value, const Options& options);
-  void tell(std::span<const double> values) override;
+  EvolutionSearch(Region region, Point start, const Told& at_start, const Options& options);
+  void tell(std::span<const Told> told) override;
 
  private:
   void ask();

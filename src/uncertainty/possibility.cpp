@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "uncertainty/linear.h"
 #include "uncertainty/random.h"
 
 namespace topple::uncertainty {
@@ -49,29 +50,6 @@ struct Bracket {
   double in = 1, out = 0;
   bool found = true;  // whether `in` is known to be of the class
 };
-
-/// Solves the square system in place by elimination with pivots; false if singular.
-bool solve(std::vector<Point>& A, Point& b) {
-  const std::size_t n = b.size();
-  for (std::size_t k = 0; k < n; ++k) {
-    std::size_t pivot = k;
-    for (std::size_t i = k + 1; i < n; ++i)
-      if (std::abs(A[i][k]) > std::abs(A[pivot][k])) pivot = i;
-    if (std::abs(A[pivot][k]) < 1e-14) return false;
-    std::swap(A[k], A[pivot]);
-    std::swap(b[k], b[pivot]);
-    for (std::size_t i = k + 1; i < n; ++i) {
-      const double f = A[i][k] / A[k][k];
-      for (std::size_t j = k; j < n; ++j) A[i][j] -= f * A[k][j];
-      b[i] -= f * b[k];
-    }
-  }
-  for (std::size_t k = n; k-- > 0;) {
-    for (std::size_t j = k + 1; j < n; ++j) b[k] -= A[k][j] * b[j];
-    b[k] /= A[k][k];
-  }
-  return true;
-}
 
 /// The search for one class; every step names points for the common batch and then reads the archive.
 class Climb {

@@ -186,6 +186,50 @@ TEST(Alpha, KeepsOneNumberForEachClass) {
   EXPECT_LT(jumped.upper.value, -10);
 }
 
+// Extremes that lie where another outcome begins, inside the cut: on a plane and on a sphere, in closed form.
+TEST(AlphaPhysics, BoundsAtAJumpAreSharp) {
+  const auto with_jump = [](auto f, auto beyond) {
+    return make_evaluate([=](const Point& x) {
+      Result r;
+      r.state = Result::State::Done;
+      r.outcome = beyond(x) > 0 ? 1 : 0;
+      r.values = {f(x) - 5 * r.outcome};
+      return r;
+    });
+  };
+  const auto plane = with_jump(
+      [](const Point& x) {
+        double s = 0;
+        for (const double v : x) s -= (v - 0.7) * (v - 0.7);
+        return s;
+      },
+      [](const Point& x) { return x[0] + x[1] + x[2] + x[3] + x[4] - 2; });
+  const auto sphere = with_jump([](const Point& x) { return x[0] + 0.5 * x[1] + 0.2 * x[2]; },
+                                [](const Point& x) { return x[0] * x[0] + x[1] * x[1] + x[2] * x[2] - 0.5; });
+  for (std::uint64_t seed = 1; seed <= 4; ++seed)
+    for (const bool thrifty : {false, true}) {
+      AlphaOptions options = thrifty ? make_thrifty_options() : AlphaOptions{};
+      options.seed = seed;
+      const FuzzyNumber f = make_triangular(0, 0.3, 1);
+      const AlphaResult a = optimise(std::vector<FuzzyNumber>(5, f), plane, options, {});
+      const auto& wide = a.outputs[0].levels[0];
+      EXPECT_NEAR(wide.upper.value, -0.45, 1e-4 * (wide.upper.value - wide.lower.value)) << "at (0.4 ... 0.4)";
+      const AlphaResult b = optimise(std::vector<FuzzyNumber>(3, f), sphere, options, {});
+      EXPECT_NEAR(b.outputs[0].levels[0].upper.value, std::sqrt(0.5 * 1.29), 1e-4 * 5);
+      EXPECT_LE(a.archive.size(), 10000u);
+    }
+}
+
+TEST(Alpha, LeavesSomeOfASmallLimitForTheSearches) {
+  const cases::Case c = cases::make_all()[3];
+  AlphaOptions options;
+  options.limit = 400;
+  const AlphaResult r = optimise(c.inputs, c.model, options, {});
+  EXPECT_EQ(r.archive.size(), 400u);
+  EXPECT_GT(r.searches, 0);
+  EXPECT_LE(r.coverage[0].space_points, 140);
+}
+
 TEST(Alpha, SearchesAllOutputsInOneArchive) {
   const cases::Case c = cases::make_all()[5];
   const AlphaResult both = optimise(c.inputs, c.model, {}, {});

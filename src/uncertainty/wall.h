@@ -1,0 +1,51 @@
+#pragma once
+/// Where another outcome begins: the boundary near a point as a plane, from runs on both sides
+/// (docs/theory/uncertainty.md, section 3).
+
+#include <vector>
+
+#include "uncertainty/mapping.h"
+#include "uncertainty/space.h"
+
+namespace topple::uncertainty {
+
+/// Asks for points and is told which of them are of the inside's class, like a LocalSearch.
+class WallProbe {
+ public:
+  /// `inside` and `outside` are known; lengths are measured in parts of `scale`, one per input; `axes` may vary.
+  WallProbe(const Box& box, std::vector<double> scale, std::vector<int> axes, Point inside, Point outside,
+            double radius);
+  const std::vector<Point>& pending() const { return pending_; }
+  void tell(const std::vector<bool>& is_inside);
+  bool is_done() const { return pending_.empty(); }
+  /// Whether a plane was found.
+  bool found() const { return !normal_.empty(); }
+  /// Unit vector out of the inside, one per axis.
+  const std::vector<double>& normal() const { return normal_; }
+  /// Distance of a point from the plane, positive inside.
+  double calc_distance(const Point&) const;
+
+ private:
+  struct Ray {
+    Point to;
+    double in = 0, out = 1;
+    bool crosses = true;
+  };
+  Point blend(const Point& to, double t) const;
+  void ask_sections();
+  void fit();
+
+  Box box_;
+  std::vector<double> scale_;
+  std::vector<int> axes_;
+  Point anchor_, outside_;
+  std::vector<double> direction_;
+  double radius_;
+  std::vector<Ray> rays_;
+  std::vector<Point> pending_;
+  std::vector<double> normal_;
+  double offset_ = 0;
+  int round_ = -1;  // -1: looking for an anchor
+};
+
+}  // namespace topple::uncertainty
