@@ -136,5 +136,41 @@ TEST(Possibility, RespectsInteraction) {
   EXPECT_NEAR(b.possibilities.classes[1].possibility, 0.2, 1e-3);
 }
 
+TEST(PossibilityReplay, ResumedEqualsUninterrupted) {
+  const Space space{cases::make_jump_inputs(), {}, {}};
+  const Progress progress;
+  const auto run = [&](Asker& asker) {
+    optimise(space, asker, make_thrifty_options());
+    return find_possibilities(space, asker, {});
+  };
+  Asker whole(make_evaluate(cases::calc_jump), progress);
+  const PossibilityResult want = run(whole);
+  // an archive that ends somewhere in the second analysis, as a stored study does
+  for (const int kept : {300, whole.asked() - 100}) {
+    Archive part;
+    for (int i = 0; i < kept; ++i) part.add(whole.archive()[i]);
+    Asker resumed(make_evaluate(cases::calc_jump), progress, &part);
+    const PossibilityResult got = run(resumed);
+    EXPECT_EQ(resumed.run(), whole.asked() - kept) << "nothing is run twice";
+    ASSERT_EQ(got.classes.size(), want.classes.size());
+    for (std::size_t k = 0; k < got.classes.size(); ++k) {
+      EXPECT_EQ(got.classes[k].possibility, want.classes[k].possibility);
+      EXPECT_EQ(got.classes[k].resolution, want.classes[k].resolution);
+      EXPECT_EQ(got.classes[k].sample, want.classes[k].sample);
+    }
+  }
+}
+
+TEST(Possibility, StopsAtTheLimitAndSaysSo) {
+  const Space space{cases::make_jump_inputs(), {}, {}};
+  const Progress progress;
+  Asker asker(make_evaluate(cases::calc_jump), progress, nullptr, 520);
+  optimise(space, asker, make_thrifty_options());
+  const PossibilityResult r = find_possibilities(space, asker, {});
+  EXPECT_EQ(r.ending, Ending::LimitReached);
+  EXPECT_LE(asker.asked(), 520);
+  for (const auto& c : r.classes) EXPECT_EQ(c.converged, c.possibility == 1);
+}
+
 }  // namespace
 }  // namespace topple::uncertainty
