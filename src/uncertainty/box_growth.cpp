@@ -138,7 +138,7 @@ bool BoxGrowth::is_clear(const Box& box) const {
 /// The largest box that the known violations leave, again and again, until its check points pass. Few inputs only: the
 /// violations must hem it in.
 bool BoxGrowth::grow_from_outside() {
-  const int last = axes_.size() <= 2 ? options_.rounds : round_ + 3;
+  const int last = axes_.size() <= 2 ? options_.rounds : round_ + 2;
   while (round_ < std::min(last, options_.rounds) && !stopped_) {
     box_ = find_largest_box(outer_, front_, options_.edge, round_ % 16 == 0 ? 8 : 2,
                             options_.seed + static_cast<std::uint64_t>(round_));
@@ -149,7 +149,7 @@ bool BoxGrowth::grow_from_outside() {
   return false;
 }
 
-/// Shrinks the box towards the seed until its corners pass.
+/// Shrinks the box towards the seed until its critical corners pass.
 bool BoxGrowth::settle() {
   const Box whole = box_;
   const Point& seed = front_.seed();
@@ -161,26 +161,33 @@ bool BoxGrowth::settle() {
     }
     return b;
   };
+  // whose corners fail at full size is followed on its way in; the others are looked at again at the end
+  std::vector<Point> points = make_check_points(whole);
+  auto verdicts = judge_(points);
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    stopped_ = stopped_ || verdicts[k] == Verdict::NotRun;
+    if (verdicts[k] == Verdict::Violating) note_critical(points[k]), front_.add(points[k]);
+  }
   double low = 0, high = 1;
   for (int level = 0; level < 2 && !stopped_; ++level) {
-    std::vector<Point> points;
+    points.clear();
     std::vector<std::size_t> end;
     for (int s = 1; s <= sections; ++s) {
-      for (auto& x : make_check_points(shrunk(low + (high - low) * s / sections))) points.push_back(std::move(x));
+      for (auto& x : make_corners_of(shrunk(low + (high - low) * s / sections), critical_))
+        points.push_back(std::move(x));
       end.push_back(points.size());
     }
-    const auto verdicts = judge_(points);
+    verdicts = judge_(points);
+    std::size_t k = 0;
     int good = 0;
-    for (std::size_t k = 0; good < sections && k <= end[good]; ++k) {
-      if (k == end[good]) {
-        ++good;
-        if (good == sections) break;
-      }
-      stopped_ = stopped_ || verdicts[k] == Verdict::NotRun;
-      if (verdicts[k] != Verdict::Permissible) break;
+    for (; good < sections; ++good) {
+      while (k < end[good] && verdicts[k] == Verdict::Permissible) ++k;
+      if (k < end[good]) break;
     }
-    for (std::size_t k = 0; k < points.size(); ++k)
-      if (verdicts[k] == Verdict::Violating) note_critical(points[k]), front_.add(points[k]);
+    for (k = 0; k < points.size(); ++k) {
+      stopped_ = stopped_ || verdicts[k] == Verdict::NotRun;
+      if (verdicts[k] == Verdict::Violating) front_.add(points[k]);
+    }
     const double width = high - low;
     high = low + width * std::min(good + 1, sections) / sections;
     low += width * good / sections;
@@ -192,7 +199,8 @@ bool BoxGrowth::settle() {
 }
 
 /// Moves faces out, alone or while another one moves in a little, as long as the volume grows and no violation is met.
-/// First only the corners are run in whose direction something has violated before, then all check points.
+/// Only the corners are run in whose direction something has violated before; all check points when nothing moves any
+/// more.
 bool BoxGrowth::improve(double step) {
   const int n = static_cast<int>(axes_.size());
   const Point& seed = front_.seed();
@@ -257,17 +265,25 @@ bool BoxGrowth::improve(double step) {
         if (!is_clear(moves[m].box) ||
             !std::all_of(verdicts.begin() + begin[m - first], verdicts.begin() + begin[m - first + 1], is_permissible))
           continue;
-        const auto checks = make_check_points(moves[m].box);
-        const auto all = judge_(checks);
-        for (std::size_t k = 0; k < checks.size(); ++k)
-          if (all[k] == Verdict::Violating) note_critical(checks[k]), front_.add(checks[k]);
-        if (!std::all_of(all.begin(), all.end(), is_permissible)) continue;
         box_ = moves[m].box;
         moved = true;
       }
       first = last;
     }
-    if (!moved) step *= 0.5;
+    if (moved) continue;
+    // the others now and then: what fails there is cut off, and becomes critical
+    const auto checks = make_check_points(box_);
+    const auto verdicts = judge_(checks);
+    bool pass = true;
+    for (std::size_t k = 0; k < checks.size(); ++k) {
+      stopped_ = stopped_ || verdicts[k] == Verdict::NotRun;
+      pass = pass && verdicts[k] == Verdict::Permissible;
+      if (verdicts[k] == Verdict::Violating) note_critical(checks[k]), front_.add(checks[k]);
+    }
+    if (pass)
+      step *= 0.5;
+    else if (!is_clear(box_))
+      box_ = find_largest_box(box_, front_, options_.edge, 2, options_.seed + static_cast<std::uint64_t>(round_));
   }
   return !stopped_;
 }

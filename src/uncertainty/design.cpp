@@ -180,11 +180,9 @@ class Design {
   /// The box as fuzzy input.
   void rerun(PermissibleBox& b) {
     Space inner{b.inputs, space_.constraints, {}};
-    AlphaOptions o;
+    AlphaOptions o = make_thrifty_options();
     o.levels = options_.levels;
     o.seed = options_.seed;
-    o.patience = 1;
-    o.search_classes = false;
     const int limit = asker_.limit();
     asker_.set_limit(std::min(limit, asker_.asked() + options_.rerun_limit));
     b.outputs = optimise(inner, asker_, o).outputs;
