@@ -106,10 +106,14 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
       ->needs(member);
   CLI::Option* fuzzy = rcc->add_option("--fuzzy", a.fuzzy, "file of fuzzy inputs (TOML): also fuzzy curves");
   fuzzy->excludes(member);
-  rcc->add_option("--axis", a.axis, "of the fuzzy curves: y or z")->check(CLI::IsMember({"y", "z"}))->needs(fuzzy);
-  rcc->add_option("--direction", a.direction, "of the fuzzy curves: + or -")
-      ->check(CLI::IsMember({"+", "-"}))
-      ->needs(fuzzy);
+  rcc->add_option("--route", a.route, "layered (default), solid (finite elements, minutes), or both")
+      ->check(CLI::IsMember({"layered", "solid", "both"}));
+  rcc->add_option("--axis", a.axis, "of fuzzy curves and of the solid route: y (default) or z")
+      ->check(CLI::IsMember({"y", "z"}));
+  rcc->add_option("--direction", a.direction, "of fuzzy curves and of the solid route: + (default) or -")
+      ->check(CLI::IsMember({"+", "-"}));
+  rcc->add_option("--rotation", a.rotation, "largest rotation of the solid route, such as \"0.02 rad\"");
+  rcc->add_option("--element-size", a.element_size, "largest edge of an element of the solid route, such as \"5 cm\"");
   rcc->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones");
   rcc->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
   rcc->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");

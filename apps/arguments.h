@@ -15,14 +15,16 @@ struct Arguments {
   std::string output;     // folder or file
   std::string knowledge;  // file of rules, empty: built in
   std::string engine = "native";
-  std::string markdown, json_file;          // files to write, empty: none
-  std::string engines;                      // names between commas, empty: all
-  std::string accuracy;                     // relative, as typed
-  std::string duration, step, frame_rate;   // quantities as typed; empty: the plan's
-  std::vector<std::string> normal_forces;   // as typed
-  std::string member, zone = "foot";        // of a plan
-  std::string fuzzy;                        // file of fuzzy inputs, empty: none
-  std::string axis = "y", direction = "+";  // of fuzzy curves
+  std::string markdown, json_file;         // files to write, empty: none
+  std::string engines;                     // names between commas, empty: all
+  std::string accuracy;                    // relative, as typed
+  std::string duration, step, frame_rate;  // quantities as typed; empty: the plan's
+  std::vector<std::string> normal_forces;  // as typed
+  std::string member, zone = "foot";       // of a plan
+  std::string fuzzy;                       // file of fuzzy inputs, empty: none
+  std::string route = "layered";
+  std::string axis = "y", direction = "+";  // of fuzzy curves and of the solid route
+  std::string rotation, element_size;       // of the solid route, as typed
   std::optional<bool> equilibrium;          // of a bare model; none: as its file says
   int threads = 1, frames = 0;
   bool json = false, csv = false, no_report = false, report = false, verbose = false;

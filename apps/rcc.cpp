@@ -20,6 +20,7 @@
 #include "product/section_file.h"
 #include "rcc_fuzzy.h"
 #include "rcc_report.h"
+#include "rcc_solid.h"
 #include "record/rcc_figures.h"
 #include "record/rcc_page.h"
 #include "record/rcc_report.h"
@@ -117,6 +118,16 @@ std::vector<double> read_forces(const std::vector<std::string>& typed) {
   return out;
 }
 
+/// A positive quantity of the command line; 0 if it was not given.
+double read_positive(const std::string& text, Dimension dimension, const char* option) {
+  if (text.empty()) return 0;
+  const Quantity q = parse_quantity(text, dimension);
+  if (!q.value || !(*q.value > 0))
+    throw InputError("E801", fmt::format("{} \"{}\": {}", option, text, q.value ? "must be > 0" : q.problem),
+                     "units: " + units_of(dimension));
+  return *q.value;
+}
+
 std::string cell(double value, double scale, int digits) {
   return std::isfinite(value) ? fmt::format("{:.{}f}", value / scale, digits) : "-";
 }
@@ -170,6 +181,7 @@ void write_rcc_files(const record::RccReport& r, Writer& out) {
   write("biaxial", "biaxial.csv", record::biaxial_csv(r));
   write("axial", "axial.csv", record::axial_csv(r));
   write("states", "states.csv", record::states_csv(r));
+  if (!r.solid_states.empty()) write("solid_states", "solid_states.csv", record::solid_states_csv(r));
   write("json", "rcc.json", record::to_json(r) + "\n");
   const std::vector<record::Figure> figures = record::make_figures(r);
   write("page", "rcc.html", record::to_page(r, figures));
@@ -202,6 +214,28 @@ void print_fuzzy(std::FILE* out, const record::RccFuzzyReport& r) {
   }
 }
 
+/// Adds the solid route; what failed, or nothing if it was cancelled.
+std::optional<std::vector<std::string>> compute_solid(const Arguments& a, const Task& task, record::RccReport& report,
+                                                      const std::atomic<bool>& cancel) {
+  SolidTask s;
+  s.normal_forces = task.normal_forces;
+  s.axis = a.axis[0], s.direction = a.direction == "-" ? -1 : 1;
+  s.largest_rotation = read_positive(a.rotation, Dimension::Angle, "--rotation");
+  s.element_size = read_positive(a.element_size, Dimension::Length, "--element-size");
+  s.threads = a.threads;
+  ProgressLine progress;
+  const SolidOutcome outcome = add_solid_route(
+      task.zone, s, report, cancel,
+      [&](const std::string& what, double done, double whole) { progress.show_work(what, done, whole); });
+  progress.clear();
+  if (outcome.cancelled) return std::nullopt;
+  if (a.route == "solid") {
+    std::erase_if(report.curves, [](const record::RccCurve& c) { return c.route == "layered"; });
+    report.states.clear(), report.interactions.clear(), report.biaxial.clear(), report.axial.clear();
+  }
+  return outcome.failures;
+}
+
 /// The fuzzy report, or nothing if it was cancelled.
 std::optional<record::RccFuzzyReport> compute_fuzzy(const Arguments& a, const product::FuzzyFile& fuzzy,
                                                     const Task& task, const record::RccReport& crisp,
@@ -222,6 +256,11 @@ std::optional<record::RccFuzzyReport> compute_fuzzy(const Arguments& a, const pr
   return r;
 }
 
+int say_cancelled() {
+  std::fprintf(stderr, "Cancelled. Nothing was written.\n");
+  return kRunFailed;
+}
+
 }  // namespace
 
 int compute_rcc(const Arguments& a, const std::atomic<bool>& cancel) {
@@ -230,6 +269,8 @@ int compute_rcc(const Arguments& a, const std::atomic<bool>& cancel) {
   std::string text;
   try {
     const std::vector<double> typed = read_forces(a.normal_forces);
+    read_positive(a.rotation, Dimension::Angle, "--rotation");  // before any work
+    read_positive(a.element_size, Dimension::Length, "--element-size");
     Task task = a.member.empty() ? read_section_task(a, warnings, text) : read_member_task(a, warnings, text);
     std::optional<product::FuzzyFile> fuzzy;
     if (!a.fuzzy.empty()) {
@@ -257,16 +298,19 @@ int compute_rcc(const Arguments& a, const std::atomic<bool>& cancel) {
     report.zone = fmt::format("{}, zone of {:.3g} m", task.name, task.zone.length);
     report.notes.insert(report.notes.begin(), task.notes.begin(), task.notes.end());
 
+    std::vector<std::string> failures;
+    if (a.route != "layered") {
+      const auto outcome = compute_solid(a, task, report, cancel);
+      if (!outcome) return say_cancelled();
+      failures = *outcome;
+    }
     std::fprintf(out, "%s: %s\n", report.title.c_str(), report.zone.c_str());
     for (const std::string& note : report.notes) std::fprintf(out, "  %s\n", note.c_str());
     print_table(out, report);
     std::optional<record::RccFuzzyReport> fans;
     if (fuzzy) {
       fans = compute_fuzzy(a, *fuzzy, task, report, cancel);
-      if (!fans) {
-        std::fprintf(stderr, "Cancelled. Nothing was written.\n");
-        return kRunFailed;
-      }
+      if (!fans) return say_cancelled();
       print_fuzzy(out, *fans);
     }
     if (!a.output.empty()) {
@@ -277,7 +321,8 @@ int compute_rcc(const Arguments& a, const std::atomic<bool>& cancel) {
       for (const auto& [what, path] : writer.files) std::fprintf(out, "Wrote %s\n", path.c_str());
     }
     if (a.json) std::printf("%s\n", (fans ? record::to_json(*fans) : record::to_json(report)).c_str());
-    return kOk;
+    for (const std::string& failure : failures) std::fprintf(stderr, "topple: %s\n", failure.c_str());
+    return failures.empty() ? kOk : kRunFailed;
   } catch (const InputError& e) { return refuse(e, warnings, text, a.json); }
 }
 

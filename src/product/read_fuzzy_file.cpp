@@ -339,11 +339,11 @@ void Reader::try_samples(std::vector<Diagnostic>& warnings) {
     for (size_t i = 0; i < n; ++i) {
       const auto& corners = out.inputs[i].corners;
       point.push_back(corner >> i & 1U ? corners.back().first : corners.front().first);
-      words += (i ? ", " : "") + text_of(out.inputs[i], point.back());
+      words.append(i ? ", " : "").append(text_of(out.inputs[i], point.back()));
     }
     const std::string why = refusal(point);
     if (why.empty()) continue;
-    if (refused++ == 0) example = words + ": " + why;
+    if (refused++ == 0) example = words.append(": ").append(why);
   }
   if (refused == 0) return;
   Complaints more(out.path);

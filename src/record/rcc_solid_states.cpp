@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "base/unit.h"
 #include "record/rcc_states.h"
@@ -27,8 +28,7 @@ constexpr Bin crushes[] = {{0.05, Ink::Crushing, 0.4, "5 % of strength lost"},
                            {0.3, Ink::Crushing, 1, "30 %"},
                            {0.8, Ink::Crushed, 1, "80 %"}};
 
-template <size_t n>
-const Bin* find_bin(const Bin (&bins)[n], double value) {
+const Bin* find_bin(std::span<const Bin> bins, double value) {
   const Bin* found = nullptr;
   for (const Bin& b : bins)
     if (value >= b.from) found = &b;

@@ -210,6 +210,20 @@ rcc)
   expect 2 "$topple" rcc wrong.toml --json; is_json out; has out '"line": 16'
   expect 2 "$topple" rcc missing.toml; expect 2 "$topple" rcc .; : >empty.toml; expect 2 "$topple" rcc empty.toml
   [ ! -e none ] || { echo "a folder was made for a wrong section"; failures=$((failures + 1)); }
+  # the solid route
+  coarse=(--element-size "15 cm" --rotation "0.003 rad")
+  expect 0 "$topple" rcc "$zone" --normal-force "1 MN" --route solid "${coarse[@]}" -o s1
+  has out "solid    +y"; lacks out "layered"; for f in solid_states.csv solid_1.png rcc.html moment_y.png; do exists s1/$f; done
+  expect 0 "$topple" rcc "$zone" --normal-force "1 MN" --route both "${coarse[@]}" --axis z --threads 2 -o s2; has out "solid    +z"; has out "layered"
+  expect 1 "$topple" rcc "$zone" --normal-force "9.5 MN" --route both "${coarse[@]}"
+  has err "topple: solid route, N = 9.5 MN: did not converge at"; has err "last residual"; has out "cannot be carried"
+  expect 2 "$topple" rcc "$zone" --route both --rotation "3 m"; has err "--rotation"
+  expect 2 "$topple" rcc "$zone" --route both --element-size "-1 cm"; has err "--element-size"
+  expect 2 "$topple" rcc "$zone" --route liquid
+  "$topple" rcc "$zone" --normal-force "1 MN" --route solid --element-size "4 cm" -o cut >out 2>err &
+  pid=$!; sleep 1; kill -INT $pid; wait $pid; code=$?
+  [ $code -eq 1 ] || { echo "exit code $code after an interrupt"; cat out err; failures=$((failures + 1)); }
+  has err "Cancelled. Nothing was written."; [ ! -e cut ] || { echo "a folder after an interrupt"; failures=$((failures + 1)); }
   # fuzzy inputs
   inputs=$source/examples/rcc/zone_I_fuzzy.toml
   { cat "$inputs"; printf '[search]\nlevels = [0, 0.5, 1]\nsamples = 500\n'; } >fuzzy.toml
@@ -224,7 +238,7 @@ rcc)
   expect 2 "$topple" rcc "$zone" --fuzzy wrong.toml -o none; has err 'wrong.toml:11:28: error E208'; has err 'there is no value "fx"'
   sed 's/\["10 N/["7 N/' "$inputs" >weak.toml
   expect 2 "$topple" rcc "$zone" --fuzzy weak.toml -o none; has err "weak.toml:9:1: error E205: concrete.fc: fc = 7 N/mm2 is not possible"
-  expect 2 "$topple" rcc "$zone" --axis z; expect 2 "$topple" rcc "$zone" --fuzzy missing.toml
+  expect 2 "$topple" rcc "$zone" --axis x; expect 2 "$topple" rcc "$zone" --fuzzy missing.toml
   # an interrupt leaves nothing
   "$topple" rcc "$zone" --fuzzy "$inputs" -o cut >out 2>err &
   pid=$!; sleep 0.4; kill -INT $pid; wait $pid; code=$?

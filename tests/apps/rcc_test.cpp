@@ -14,6 +14,7 @@
 
 #include "base/file.h"
 #include "nearfield/fibres.h"
+#include "nearfield/solid.h"
 #include "product/fuzzy_file.h"
 #include "product/section_file.h"
 
@@ -135,6 +136,36 @@ std::vector<std::vector<std::string>> read_table(const fs::path& path) {
     for (std::string cell; std::getline(in, cell, ',');) rows.back().push_back(cell);
   }
   return rows;
+}
+
+TEST(RccSolidCommand, BothRoutesStandInOneReport) {
+  const fs::path folder =
+      run("solid", "--normal-force \"1 MN\" --route both --element-size \"15 cm\" --rotation \"0.004 rad\"");
+  const auto j = nlohmann::json::parse(read_file((folder / "rcc.json").string()));
+  ASSERT_EQ(j["curves"].size(), 5u) << "four layered ones, one solid";
+  const auto& solid = j["curves"][4];
+  EXPECT_EQ(solid["route"], "solid");
+  std::vector<Diagnostic> warnings;
+  std::string text;
+  const product::SectionFile f = product::read_section_file(section, warnings, text);
+  nearfield::ZoneInput in;
+  in.section = f.section, in.concrete = f.concrete, in.steel = f.steel, in.length = f.length;
+  nearfield::SolidOptions options;
+  options.element_size = 0.15, options.largest_rotation = 0.004;
+  const nearfield::SolidMarch march = nearfield::march_solid(in, -1e6, 0, 1, options, {});
+  const auto rotation = solid["rotation"].get<std::vector<double>>(),
+             moment = solid["moment"].get<std::vector<double>>();
+  ASSERT_EQ(rotation.size(), march.rotation.size());
+  for (size_t i = 0; i < rotation.size(); ++i) {
+    EXPECT_EQ(rotation[i], march.rotation[i]);
+    EXPECT_EQ(moment[i], std::max(0.0, march.moment[i]));
+  }
+  // the cut is integrated from the stresses of the elements; it balances the force to the residual of the steps
+  ASSERT_GE(j["solid_states"].size(), 1u);
+  for (const auto& state : j["solid_states"]) EXPECT_NEAR(state["cut_normal_force"].get<double>(), 1e6, 0.02e6);
+  const std::string page = read_file((folder / "rcc.html").string());
+  for (const char* text_of_page : {"1 MN, layered", "1 MN, solid", "degrees of freedom", "The zone on the solid route"})
+    EXPECT_NE(page.find(text_of_page), std::string::npos) << text_of_page;
 }
 
 TEST(RccFuzzyCommand, FanIsNestedAndHoldsItsOriginals) {
