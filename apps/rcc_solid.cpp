@@ -139,6 +139,7 @@ SolidOutcome add_solid_route(const nearfield::ZoneInput& in, const SolidTask& ta
     if (layered)
       for (const record::RccPoint& p : {layered->yield, layered->peak, layered->ultimate})
         if (p.rotation <= options.largest_rotation) options.pictures.push_back(p.rotation);
+    if (options.pictures.empty()) options.pictures.push_back(0.999 * options.largest_rotation);
     Progress progress;
     progress.cancel = &cancel;
     progress.report = [&](double done, double whole) {

@@ -211,7 +211,7 @@ rcc)
   expect 2 "$topple" rcc missing.toml; expect 2 "$topple" rcc .; : >empty.toml; expect 2 "$topple" rcc empty.toml
   [ ! -e none ] || { echo "a folder was made for a wrong section"; failures=$((failures + 1)); }
   # the solid route
-  coarse=(--element-size "15 cm" --rotation "0.003 rad")
+  coarse=(--element-size "15 cm" --rotation "0.002 rad")
   expect 0 "$topple" rcc "$zone" --normal-force "1 MN" --route solid "${coarse[@]}" -o s1
   has out "solid    +y"; lacks out "layered"; for f in solid_states.csv solid_1.png rcc.html moment_y.png; do exists s1/$f; done
   expect 0 "$topple" rcc "$zone" --normal-force "1 MN" --route both "${coarse[@]}" --axis z --threads 2 -o s2; has out "solid    +z"; has out "layered"

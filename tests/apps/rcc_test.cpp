@@ -140,7 +140,7 @@ std::vector<std::vector<std::string>> read_table(const fs::path& path) {
 
 TEST(RccSolidCommand, BothRoutesStandInOneReport) {
   const fs::path folder =
-      run("solid", "--normal-force \"1 MN\" --route both --element-size \"15 cm\" --rotation \"0.004 rad\"");
+      run("solid", "--normal-force \"1 MN\" --route both --element-size \"15 cm\" --rotation \"0.002 rad\"");
   const auto j = nlohmann::json::parse(read_file((folder / "rcc.json").string()));
   ASSERT_EQ(j["curves"].size(), 5u) << "four layered ones, one solid";
   const auto& solid = j["curves"][4];
@@ -151,7 +151,7 @@ TEST(RccSolidCommand, BothRoutesStandInOneReport) {
   nearfield::ZoneInput in;
   in.section = f.section, in.concrete = f.concrete, in.steel = f.steel, in.length = f.length;
   nearfield::SolidOptions options;
-  options.element_size = 0.15, options.largest_rotation = 0.004;
+  options.element_size = 0.15, options.largest_rotation = 0.002;
   const nearfield::SolidMarch march = nearfield::march_solid(in, -1e6, 0, 1, options, {});
   const auto rotation = solid["rotation"].get<std::vector<double>>(),
              moment = solid["moment"].get<std::vector<double>>();
