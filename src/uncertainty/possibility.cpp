@@ -115,6 +115,8 @@ class Climb {
       case Stage::Look:
         if (best_ > before) {
           stage_ = Stage::Start;
+        } else if (slide_ > 0.02 && axes_.size() > 1) {
+          stage_ = Stage::Slide;  // once more, nearer
         } else {
           converged_ = true;
           stage_ = Stage::Done;
@@ -241,7 +243,7 @@ class Climb {
     }
     std::vector<Point> points;
     for (const auto& r : rays)
-      for (const double part : {0.5, 0.75, 0.9, 0.97, 0.99}) add(points, calc_place(space_, r, part * t));
+      for (const double part : {0.5, 0.8, 0.93, 0.98, 0.995, 0.999}) add(points, calc_place(space_, r, part * t));
     if (points.empty()) stage_ = Stage::Look;
     return points;
   }

@@ -17,8 +17,9 @@ struct Found {
 
 Found find(const Space& space, const Evaluate& model, std::uint64_t seed = 1, const PossibilityOptions& given = {}) {
   const Progress progress;
-  Asker asker(model, progress);
+  Asker asker(model, progress, nullptr, 20000);
   AlphaOptions options;
+  options.patience = 1;
   options.seed = seed;
   PossibilityOptions own = given;
   own.seed = seed;
@@ -26,6 +27,7 @@ Found find(const Space& space, const Evaluate& model, std::uint64_t seed = 1, co
   f.bounds = optimise(space, asker, options);
   f.possibilities = find_possibilities(space, asker, own);
   f.asked = asker.asked();
+  EXPECT_EQ(f.possibilities.ending, Ending::Complete);
   return f;
 }
 
