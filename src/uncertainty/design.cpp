@@ -21,7 +21,7 @@ void check_options(const DesignOptions& o) {
     if (!good) throw InputError("E809", fmt::format("cluster design: {}", text));
   };
   demand(o.k_max >= 2, "k_max is at least 2");
-  demand(o.cluster_points >= 10, "cluster_points is at least 10");
+  demand(o.cluster_points >= 10 && o.cluster_points <= 5000, "cluster_points lies between 10 and 5000");
   demand(o.edge > 0 && o.edge < 0.5, "edge lies between 0 and 0.5");
   demand(o.fresh >= 1, "fresh is at least 1");
   demand(o.confidence > 0 && o.confidence < 1, "confidence lies between 0 and 1");
