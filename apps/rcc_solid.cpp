@@ -46,6 +46,13 @@ record::RccCurve to_curve(const nearfield::SolidMarch& march, const SolidTask& t
   if (march.rotation.size() < 2) return c;
   c.rotation = march.rotation, c.moment = march.moment;
   for (double& m : c.moment) m = std::max(0.0, m);
+  c.end = {c.rotation.back(), c.moment.back()};
+  const double largest = *std::max_element(c.moment.begin(), c.moment.end());
+  constexpr double falls = 0.97;  // of the largest moment: from there on it counts as a peak
+  if (!march.complete && c.moment.back() > falls * largest) {
+    c.ending += fmt::format("; largest moment up to there {:.4g} kNm", largest / unit::kNm);
+    return c;
+  }
   const nearfield::CurvePoint yield = find_yield(c.rotation, c.moment);
   const nearfield::CurvePoints p = nearfield::find_points(c.rotation, c.moment, yield);
   c.yield = to_record(p.yield), c.peak = to_record(p.peak);
@@ -53,7 +60,6 @@ record::RccCurve to_curve(const nearfield::SolidMarch& march, const SolidTask& t
   const bool fell = c.moment.back() <= 0.8 * p.peak.moment;
   if (march.complete || fell) c.ultimate = to_record(p.ultimate);
   if (march.complete || p.residual.rotation >= 2 * p.ultimate.rotation) c.residual = to_record(p.residual);
-  c.end = {c.rotation.back(), c.moment.back()};
   if (yield.rotation > 0) c.stiffness_effective = yield.moment / yield.rotation * length;
   return c;
 }

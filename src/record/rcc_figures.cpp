@@ -127,8 +127,8 @@ void add_moments(const RccReport& r, char axis, std::vector<Figure>& out) {
   double whole = 0, beginning = 0;
   for (const RccCurve& c : r.curves) {
     if (c.axis != axis || c.rotation.empty()) continue;
-    if (std::isfinite(c.residual.rotation))
-      whole = std::max(whole, std::min(c.end.rotation, 1.05 * c.residual.rotation));
+    const double last = std::isfinite(c.residual.rotation) ? 1.05 * c.residual.rotation : c.end.rotation;
+    whole = std::max(whole, std::min(c.end.rotation, last));
     if (std::isfinite(c.peak.rotation)) beginning = std::max(beginning, 1.3 * c.peak.rotation);
   }
   if (!(whole > 0)) return;
@@ -143,7 +143,7 @@ void add_moments(const RccReport& r, char axis, std::vector<Figure>& out) {
   f.drawing = draw(make_moment_plot(r, axis, whole, true));
   f.table = make_moment_table(r, axis, whole);
   out.push_back(std::move(f));
-  if (!(beginning < 0.8 * whole)) return;
+  if (!(beginning > 0 && beginning < 0.8 * whole)) return;
   Figure g;
   g.id = fmt::format("moment_{}_beginning", axis);
   g.heading = heading;
