@@ -303,8 +303,14 @@ class Optimisation {
       for (auto& r : all) {
         if (r.search->is_done()) continue;
         std::vector<Told> told;
-        for (const auto& x : r.search->pending()) told.push_back(tell_of(r.goal, asker_.archive().find(x)));
-        r.search->tell(told);
+        bool complete = true;
+        for (const auto& x : r.search->pending()) {
+          const int i = asker_.archive().find(x);
+          complete = complete && i >= 0;
+          told.push_back(tell_of(r.goal, i));
+        }
+        // a search that was cut off by the limit or a cancellation must not conclude from what is missing
+        if (complete) r.search->tell(told);
       }
     }
     for (const auto& r : all) {

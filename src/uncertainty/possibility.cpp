@@ -67,6 +67,15 @@ class Climb {
     return p;
   }
 
+  /// Takes notice of new samples.
+  void refresh(const Archive& archive) {
+    for (; seen_ < static_cast<int>(archive.size()); ++seen_) {
+      if (outcome_of(archive[seen_].result) != outcome_) continue;
+      const double mu = calc_membership(space_, archive[seen_].x);
+      if (mu > best_ || sample_ < 0) best_ = mu, sample_ = seen_, best_x_ = archive[seen_].x;
+    }
+  }
+
   /// Points to be run for the next step; none if there is nothing left to do.
   std::vector<Point> ask(const Archive& archive) {
     refresh(archive);
@@ -134,14 +143,6 @@ class Climb {
   bool is_ours(const Archive& archive, const Point& x) const {
     const int i = archive.find(x);
     return i >= 0 && outcome_of(archive[i].result) == outcome_;
-  }
-
-  void refresh(const Archive& archive) {
-    for (; seen_ < static_cast<int>(archive.size()); ++seen_) {
-      if (outcome_of(archive[seen_].result) != outcome_) continue;
-      const double mu = calc_membership(space_, archive[seen_].x);
-      if (mu > best_ || sample_ < 0) best_ = mu, sample_ = seen_, best_x_ = archive[seen_].x;
-    }
   }
 
   void begin() {
@@ -325,16 +326,16 @@ PossibilityResult find_possibilities(const Space& space, Asker& asker, const Pos
       points.insert(points.end(), more.begin(), more.end());
     }
     if (asking.empty()) break;
-    if (!asker.can_go_on()) {
+    const auto indices = asker.ask(points);
+    if (std::count(indices.begin(), indices.end(), -1) > 0) {
       result.ending = asker.is_cancelled() ? Ending::Cancelled : Ending::LimitReached;
       break;
     }
-    asker.ask(points);
     for (auto* climb : asking) climb->tell(asker.archive());
     note_classes();
   }
   for (auto& [c, climb] : climbs) {
-    climb.ask(asker.archive());  // takes notice of the last points
+    climb.refresh(asker.archive());
     result.classes.push_back(climb.result(asker.archive()));
   }
   return result;
