@@ -175,7 +175,7 @@ std::optional<record::RccFuzzyReport> make_fuzzy_report(const product::SectionFi
   progress.cancel = &cancel;
   uncertainty::AlphaOptions options;
   if (!file.levels.empty()) options.levels = file.levels;
-  constexpr int most_runs = 40000;
+  constexpr int most_runs = 100000;
   options.limit = file.limit > 0 ? file.limit : most_runs;
   options.seed = file.seed;
   const auto watched = [&](const std::string& what) {
