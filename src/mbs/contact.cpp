@@ -1,5 +1,5 @@
 /// Forces at touching points (docs/theory/contact.md): springs first, then dashpots, then friction. Each stage sees the
-/// speeds that the ones before it leave, and within a stage no point sees another, so the order of points does not
+/// speeds that the ones before it leave, and within a stage no group sees another, so the order of groups does not
 /// count.
 
 #include "mbs/contact.h"
@@ -8,6 +8,7 @@
 #include <cmath>
 #include <span>
 
+#include "mbs/contact_kernel.h"
 #include "mbs/system.h"
 
 namespace topple::mbs {
@@ -15,57 +16,11 @@ namespace topple::mbs {
 namespace {
 
 constexpr double kStickStiffness = 1.2;  // of the mean normal stiffness of a corner
-constexpr double kSlideZeta = 100;       // friction below its limit is a dashpot of this share
 
-/// How much of its explicit force a dashpot has that would slow its own motion at the rate ρ, and the time within the
-/// step whose speed it sees: at small h ρ the middle, at large the end.
-struct Damper {
-  double at, share;
-  explicit Damper(double g) : at((1 + g) / (2 + g)), share(1 / (1 + at * g)) {}
-};
-
-/// Sum of forces at the points of a group, and what it does.
-struct Wrench {
-  Vec3 force, torque_a, torque_b;  // on a; on b the opposite, torques about the mass centres
-
-  void add(const ContactPoint& p, const Vec3& f) {
-    force += f;
-    torque_a += cross(p.ra, f);
-    torque_b += cross(p.rb, f);
-  }
-  void add_normal(const ContactPoint& p, double f) {
-    torque_a -= f * p.la;
-    torque_b -= f * p.lb;
-  }
-  /// The force times the speed that it makes, the groups of a body sharing its mass.
-  double calc_mobility(const ContactBody& a, const ContactBody& b) const {
-    return a.groups * (a.inverse_mass * dot(force, force) + dot(torque_a, a.inverse_inertia * torque_a)) +
-           b.groups * (b.inverse_mass * dot(force, force) + dot(torque_b, b.inverse_inertia * torque_b));
-  }
-  void push(ContactBody& a, ContactBody& b) const {
-    a.force += force;
-    a.torque += torque_a;
-    b.force -= force;
-    b.torque -= torque_b;
-  }
-};
-
-/// Of a against b, half a step ago.
-Vec3 point_speed(const ContactPoint& p, const ContactBody& a, const ContactBody& b) {
-  return a.v + cross(a.w, p.ra) - b.v - cross(b.w, p.rb);
-}
-
-/// What the forces known so far add to it within the step.
-Vec3 point_change(const ContactPoint& p, const ContactBody& a, const ContactBody& b) {
-  return a.dv + cross(a.dw, p.ra) - b.dv - cross(b.dw, p.rb);
-}
-
-/// Shortens a vector to `most`; gives its length then.
-double limit(Vec3& f, double most) {
-  const double size = norm(f);
-  if (size <= most) return size;
-  f *= most / size;
-  return most;
+/// Component of a vector in a block of lanes.
+Vec3 read3(const double* slot, int field, size_t W) {
+  const double* at = slot + static_cast<size_t>(field) * W;
+  return {at[0], at[W], at[2 * W]};
 }
 
 }  // namespace
@@ -86,7 +41,7 @@ void System::compile_contact() {
     }
   }
   std::sort(pair_rules.begin(), pair_rules.end());
-  contact.body.assign(B + 1, {});
+  contact.place.assign(B + 1, -1);
 }
 
 double System::calc_contact_frequency() const {
@@ -114,45 +69,55 @@ int System::find_pair_law(int a, int b) const {
 }
 
 void System::evaluate_contact(double h) {
-  for (const int b : contact.touched) contact.body[static_cast<size_t>(b)].groups = 0;
-  contact.touched.clear();
+  for (const ContactForces& c : contact.on)
+    if (c.body >= 0) contact.place[static_cast<size_t>(c.body)] = -1;
+  contact.on.assign(1, {});
+  contact.touched.assign(kernel::kTouchedFields, 0);
   contact.point.clear();
   contact.group.clear();
-  contact.body[B].force = {};
-  contact.body[B].groups = 0;
   add_travel(h);
   if (model.contact.ground) find_ground_points();
   if (model.contact.bodies) find_pair_points();
   resolve_contacts(h);
 }
 
-void System::add_contact_point(const Vec3& ra, const Vec3& rb, double depth, double stiffness) {
+void System::add_contact_point(const Vec3& at, double depth, double stiffness) {
   ContactPoint& p = contact.point.emplace_back();
-  p.ra = ra, p.rb = rb;
+  p.at = at;
   p.depth = depth;
   p.stiffness = stiffness;
 }
 
+int System::touch(size_t b) {
+  if (b == B || fixed[b]) return 0;
+  int& place = contact.place[b];
+  if (place < 0) {
+    place = static_cast<int>(contact.on.size());
+    contact.on.emplace_back().body = static_cast<int>(b);
+    const size_t at = contact.touched.size();
+    contact.touched.resize(at + kernel::kTouchedFields);
+    double* c = contact.touched.data() + at;
+    const State& s = state;
+    const Vec3 v = s.v[b], w = s.w[b];
+    const Mat3 I = calc_world_inverse_inertia(b);
+    const double known[] = {
+        v.x,     v.y,     v.z,     w.x,     w.y,     w.z,     0, 0, 0, 0, 0, 0, s.body[b].inverse_mass,
+        I(0, 0), I(0, 1), I(0, 2), I(1, 1), I(1, 2), I(2, 2), 0};
+    static_assert(std::size(known) == kernel::kTouchedFields);
+    std::copy(std::begin(known), std::end(known), c);
+  }
+  contact.touched[static_cast<size_t>(place) * kernel::kTouchedFields + kernel::kGroups] += 1;
+  return place;
+}
+
 void System::add_contact_group(size_t a, size_t b, const Vec3& n, size_t first, const ContactLaw& law, double stiffness,
                                StickRange& sticks) {
-  for (const size_t i : {a, b}) {
-    ContactBody& c = contact.body[i];
-    if (c.groups++ > 0 || i == B) continue;
-    c.force = c.torque = c.dv = c.dw = {};
-    contact.touched.push_back(static_cast<int>(i));
-    if (fixed[i]) continue;
-    const State& s = state;
-    c.v = s.v[i];
-    c.w = s.w[i];
-    c.inverse_mass = s.body[i].inverse_mass;
-    c.inverse_inertia = calc_world_inverse_inertia(i);
-  }
   const size_t count = contact.point.size() - first;
   for (ContactPoint& p : std::span(contact.point).subspan(first)) {
     double least = kUnlimited;
     for (int i = sticks.first; i < sticks.first + sticks.count; ++i) {
       const Stick& stick = state.sticks[static_cast<size_t>(i)];
-      const Vec3 d = stick.at - p.ra;
+      const Vec3 d = stick.at - p.at;
       if (const double distance2 = dot(d, d); distance2 < least) {
         least = distance2;
         p.slip = stick.slip;
@@ -161,170 +126,164 @@ void System::add_contact_group(size_t a, size_t b, const Vec3& n, size_t first, 
     }
   }
   sticks = {static_cast<int>(first), static_cast<int>(count)};
-  contact.group.push_back(
-      {static_cast<int>(a), static_cast<int>(b), static_cast<int>(first), static_cast<int>(count), n, &law, stiffness});
+  ContactGroup& g = contact.group.emplace_back();
+  g.a = touch(a), g.b = touch(b);
+  g.first = sticks.first, g.count = sticks.count;
+  g.n = n;
+  const State& s = state;
+  if (b != B) g.apart = s.p[a] - s.p[b];
+  g.law = &law;
+  g.stiffness = stiffness;
+}
+
+void System::fill_contact_blocks() {
+  const size_t W = kernel::lanes(), groups = contact.group.size(), blocks = (groups + W - 1) / W;
+  // by rising count, in order within a count
+  std::vector<std::uint32_t>& next = contact.by_count;
+  next.assign(BoxContact::kMostPoints + 2, 0);
+  const auto key = [&](const ContactGroup& g) {
+    return static_cast<size_t>(std::min(g.count, BoxContact::kMostPoints));
+  };
+  for (const ContactGroup& g : contact.group) ++next[key(g) + 1];
+  for (size_t i = 1; i < next.size(); ++i) next[i] += next[i - 1];
+  contact.rows.assign(blocks + 1, 0);
+  for (ContactGroup& g : contact.group) {
+    g.slot = next[key(g)]++;
+    std::uint32_t& most = contact.rows[g.slot / W + 1];
+    most = std::max(most, static_cast<std::uint32_t>(g.count));
+  }
+  for (size_t i = 0; i < blocks; ++i) contact.rows[i + 1] += contact.rows[i];
+  contact.a.assign(blocks * W, 0);
+  contact.b.assign(blocks * W, 0);
+  contact.groups.resize(blocks * W * kernel::kGroupFields);
+  contact.points.assign(contact.rows[blocks] * W * kernel::kPointFields, 0);
+  for (size_t slot = groups; slot < blocks * W; ++slot)
+    for (size_t f = 0; f < kernel::kGroupFields; ++f)
+      contact.groups[(slot / W * kernel::kGroupFields + f) * W + slot % W] = 0;
+  for (const ContactGroup& g : contact.group) {
+    const size_t block = g.slot / W, place = g.slot % W;
+    contact.a[g.slot] = static_cast<std::uint32_t>(g.a);
+    contact.b[g.slot] = static_cast<std::uint32_t>(g.b);
+    const ContactLaw& law = *g.law;
+    const double known[] = {g.n.x,
+                            g.n.y,
+                            g.n.z,
+                            g.apart.x,
+                            g.apart.y,
+                            g.apart.z,
+                            law.mean,
+                            law.band,
+                            law.most,
+                            law.zeta,
+                            law.damping,
+                            law.friction,
+                            kStickStiffness * law.mean * g.stiffness};
+    static_assert(std::size(known) == kernel::kStick + 1);
+    double* to = contact.groups.data() + block * kernel::kGroupFields * W + place;
+    for (const double x : known) *to = x, to += W;
+    for (int i = 0; i < g.count; ++i) {
+      const ContactPoint& p = contact.point[static_cast<size_t>(g.first + i)];
+      const double fields[] = {
+          p.at.x, p.at.y, p.at.z, p.depth, p.stiffness, p.slip.x, p.slip.y, p.slip.z, p.is_fresh ? 1.0 : 0.0};
+      static_assert(std::size(fields) == kernel::kFresh + 1);
+      double* at =
+          contact.points.data() + (contact.rows[block] + static_cast<size_t>(i)) * kernel::kPointFields * W + place;
+      for (const double x : fields) *at = x, at += W;
+    }
+  }
 }
 
 void System::resolve_contacts(double h) {
   State& s = state;
   s.contact_energy = s.stick_energy = 0;
-  const auto each_group = [&](auto&& f) {
-    for (ContactGroup& g : contact.group)
-      f(g, std::span(contact.point).subspan(static_cast<size_t>(g.first), static_cast<size_t>(g.count)),
-        contact.body[static_cast<size_t>(g.a)], contact.body[static_cast<size_t>(g.b)]);
-  };
-  // what all forces known so far add to the speeds within the step
-  const auto update_speeds = [&] {
-    for (const int i : contact.touched) {
-      const size_t b = static_cast<size_t>(i);
-      if (fixed[b]) continue;
-      ContactBody& c = contact.body[b];
-      c.dv = h * (c.inverse_mass * (force[b] + joint_force[b] + c.force) + model.gravity);
-      c.dw = h * (c.inverse_inertia * (torque[b] + joint_torque[b] + c.torque));
-    }
-  };
-
-  // springs
-  each_group([&](const ContactGroup& g, auto points, ContactBody& A, ContactBody& Bb) {
-    const ContactLaw& law = *g.law;
-    const Vec3 v = A.v - Bb.v;
-    const double inverse_mass = A.inverse_mass + Bb.inverse_mass;
-    double energy = 0;
-    Wrench sum;
-    for (ContactPoint& p : points) {
-      p.la = cross(p.ra, g.n), p.lb = cross(p.rb, g.n);
-      const double w = inverse_mass + dot(p.la, A.inverse_inertia * p.la) + dot(p.lb, Bb.inverse_inertia * p.lb);
-      p.impedance = std::sqrt(p.stiffness / w);
-      p.speed = dot(g.n, v) + dot(p.la, A.w) - dot(p.lb, Bb.w);
-      p.full = p.stiffness * p.depth;
-      energy += p.full * p.depth;
-      // of a step in which the surfaces meet or part, only a share is in touch
-      const double way = h * std::abs(p.speed);
-      if (way > p.depth) p.full *= 0.5 * (1 + p.depth / way);
-      p.rate = 2 * law.zeta * p.impedance;
-      if (law.damping >= 0) {
-        // begins with a jump: for half a step, and the share of the one before
-        p.rate = way > p.depth && p.speed > 0 ? (0.5 + p.depth / way) * law.damping : law.damping;
-      }
-      p.normal = law.mean * p.full;
-      sum.add_normal(p, p.normal);
-      sum.force -= p.normal * g.n;
-    }
-    sum.push(A, Bb);
-    s.contact_energy += 0.5 * law.mean * energy;
-  });
-  update_speeds();
-
-  // dashpots
-  each_group([&](const ContactGroup& g, auto points, ContactBody& A, ContactBody& Bb) {
-    const ContactLaw& law = *g.law;
-    const Vec3 dv = A.dv - Bb.dv;
-    Wrench all;
-    double power = 0, force_sum = 0;
-    for (ContactPoint& p : points) {
-      p.change = dot(g.n, dv) + dot(p.la, A.dw) - dot(p.lb, Bb.dw);
-      p.dashpot = p.rate * (p.speed + p.change);
-      power += p.dashpot * (p.speed + p.change);
-      all.add_normal(p, p.dashpot);
-      force_sum += p.dashpot;
-    }
-    all.force = -force_sum * g.n;
-    const Damper damper(power > 0 ? h * all.calc_mobility(A, Bb) / power : 0);
-    Wrench sum;
-    force_sum = 0;
-    for (ContactPoint& p : points) {
-      p.dashpot =
-          std::clamp(damper.share * p.rate * (p.speed + damper.at * p.change), -law.band * p.full, law.most * p.full);
-      p.normal += p.dashpot;
-      force_sum += p.dashpot;
-      sum.add_normal(p, p.dashpot);
-    }
-    sum.force = -force_sum * g.n;
-    sum.push(A, Bb);
-  });
-
-  // friction springs, which share the load as the normal forces do
-  each_group([&](const ContactGroup& g, auto points, ContactBody& A, ContactBody& Bb) {
-    double total = 0, energy = 0;
-    for (ContactPoint& p : points) {
-      const Vec3 v = point_speed(p, A, Bb);
-      p.slide = v - dot(g.n, v) * g.n;
-      total += p.normal;
-    }
-    const double stiffness = kStickStiffness * g.law->mean * g.stiffness, most = g.law->friction * total / stiffness;
-    const double rate = total > 0 ? stiffness / total : 0;
-    Wrench sum;
-    for (ContactPoint& p : points) {
-      if (!p.is_fresh) p.slip += h * p.slide;
-      p.slip -= dot(g.n, p.slip) * g.n;
-      limit(p.slip, most);  // it follows where friction can hold no more
-      p.held = (-rate * p.normal) * p.slip;
-      energy += p.normal * dot(p.slip, p.slip);
-      sum.add(p, p.held);
-    }
-    sum.push(A, Bb);
-    s.stick_energy += 0.5 * rate * energy;
-  });
-  update_speeds();
-
-  // what else friction takes to stop the sliding, within its limit
-  each_group([&](const ContactGroup& g, auto points, ContactBody& A, ContactBody& Bb) {
-    Wrench all;
-    double power = 0, total = 0, impedance = 0;
-    for (const ContactPoint& p : points) total += p.normal, impedance += p.impedance;
-    if (!(total > 0)) {
-      for (ContactPoint& p : points) p.friction = {};
-      return;
-    }
-    // shared out as the normal forces are, so that all points pass their limits together
-    const double rate = 2 * kSlideZeta * impedance / total;
-    for (ContactPoint& p : points) {
-      const Vec3 dv = point_change(p, A, Bb);
-      p.friction = dv - dot(g.n, dv) * g.n;
-      const Vec3 v = p.slide + p.friction, f = (-rate * p.normal) * v;
-      power -= dot(f, v);
-      all.add(p, f);
-    }
-    const Damper damper(power > 0 ? h * all.calc_mobility(A, Bb) / power : 0);
-    Wrench sum;
-    for (ContactPoint& p : points) {
-      p.friction = p.held - (damper.share * rate * p.normal) * (p.slide + damper.at * p.friction);
-      limit(p.friction, g.law->friction * p.normal);
-      sum.add(p, p.friction - p.held);
-    }
-    sum.push(A, Bb);
-  });
-  update_speeds();
-
-  // forces do their work over the half steps before and after
   double loss = 0, loss_after = 0, friction = 0, friction_after = 0;
-  each_group([&](const ContactGroup& g, auto points, ContactBody& A, ContactBody& Bb) {
-    for (ContactPoint& p : points) {
-      const Vec3 change = point_change(p, A, Bb);
-      loss += p.dashpot * p.speed;
-      loss_after += p.dashpot * (p.speed + dot(g.n, change));
-      friction += dot(p.friction, p.slide);
-      friction_after += dot(p.friction, p.slide + change);
+  if (!contact.group.empty()) {
+    fill_contact_blocks();
+    const size_t W = kernel::lanes();
+    kernel::ContactJob job;
+    job.blocks = contact.rows.size() - 1;
+    job.rows = contact.rows.data();
+    job.a = contact.a.data(), job.b = contact.b.data();
+    job.bodies = contact.touched.data();
+    job.groups = contact.groups.data();
+    job.points = contact.points.data();
+    job.h = h;
+    const auto slot_of_group = [&](const ContactGroup& g) {
+      return contact.groups.data() + g.slot / W * kernel::kGroupFields * W + g.slot % W;
+    };
+    // adds the wrenches of all groups to their bodies
+    const auto push = [&](int field, Vec3 ContactForces::*push_of, Vec3 ContactForces::*turn_of) {
+      for (const ContactGroup& g : contact.group) {
+        const double* slot = slot_of_group(g);
+        const Vec3 f = read3(slot, field, W), t = read3(slot, field + 3, W);
+        ContactForces &a = contact.on[static_cast<size_t>(g.a)], &b = contact.on[static_cast<size_t>(g.b)];
+        a.*push_of += f, a.*turn_of += t;
+        b.*push_of -= f, b.*turn_of -= t + cross(g.apart, f);
+      }
+    };
+    // what all forces known so far add to the speeds within the step
+    const auto update_speeds = [&] {
+      for (size_t i = 1; i < contact.on.size(); ++i) {
+        const ContactForces& c = contact.on[i];
+        const size_t b = static_cast<size_t>(c.body);
+        double* x = contact.touched.data() + i * kernel::kTouchedFields;
+        const Vec3 dv =
+            h * (x[kernel::kTouchedMass] * (force[b] + joint_force[b] + (c.press + c.damp + c.rub)) + model.gravity);
+        const Vec3 t = h * (torque[b] + joint_torque[b] + (c.press_turn + c.damp_turn + c.rub_turn));
+        const double* I = x + kernel::kTouchedInertia;
+        double* change = x + kernel::kChange;
+        change[0] = dv.x, change[1] = dv.y, change[2] = dv.z;
+        change[3] = I[0] * t.x + I[1] * t.y + I[2] * t.z;
+        change[4] = I[1] * t.x + I[3] * t.y + I[4] * t.z;
+        change[5] = I[2] * t.x + I[4] * t.y + I[5] * t.z;
+      }
+    };
+    kernel::press_contacts(job);
+    push(kernel::kPress, &ContactForces::press, &ContactForces::press_turn);
+    update_speeds();
+    kernel::damp_contacts(job);
+    push(kernel::kDamp, &ContactForces::damp, &ContactForces::damp_turn);
+    push(kernel::kRub, &ContactForces::rub, &ContactForces::rub_turn);
+    update_speeds();
+    kernel::rub_contacts(job);
+    for (ContactForces& c : contact.on) c.rub = c.rub_turn = {};
+    push(kernel::kRub, &ContactForces::rub, &ContactForces::rub_turn);
+    update_speeds();
+
+    for (const ContactGroup& g : contact.group) {
+      const double* slot = slot_of_group(g);
+      s.contact_energy += slot[kernel::kPressEnergy * W];
+      s.stick_energy += slot[kernel::kStickEnergy * W];
     }
-  });
+    // forces do their work over the half steps before and after
+    for (size_t i = 1; i < contact.on.size(); ++i) {
+      const ContactForces& c = contact.on[i];
+      const size_t b = static_cast<size_t>(c.body);
+      const double* x = contact.touched.data() + i * kernel::kTouchedFields;
+      const Vec3 v = read3(x, kernel::kSpeed, 1), w = read3(x, kernel::kSpeed + 3, 1);
+      const Vec3 v1 = v + read3(x, kernel::kChange, 1), w1 = w + read3(x, kernel::kChange + 3, 1);
+      loss -= dot(c.damp, v) + dot(c.damp_turn, w);
+      loss_after -= dot(c.damp, v1) + dot(c.damp_turn, w1);
+      friction += dot(c.rub, v) + dot(c.rub_turn, w);
+      friction_after += dot(c.rub, v1) + dot(c.rub_turn, w1);
+      force[b] += c.press + c.damp + c.rub;
+      torque[b] += c.press_turn + c.damp_turn + c.rub_turn;
+    }
+    const ContactForces& still = contact.on[0];
+    ground_contact -= still.press + still.damp + still.rub;
+  }
   s.contact_loss += 0.5 * h * (s.contact_loss_power + loss);
   s.friction_work += 0.5 * h * (s.friction_power + friction);
   s.contact_loss_power = loss_after;
   s.friction_power = friction_after;
-
-  for (const int i : contact.touched) {
-    const size_t b = static_cast<size_t>(i);
-    const ContactBody& c = contact.body[b];
-    if (fixed[b]) {
-      ground_contact -= c.force;
-    } else {
-      force[b] += c.force;
-      torque[b] += c.torque;
-    }
-  }
-  ground_contact -= contact.body[B].force;
   s.sticks.resize(contact.point.size());
-  for (size_t i = 0; i < contact.point.size(); ++i) s.sticks[i] = {contact.point[i].ra, contact.point[i].slip};
+  const size_t W = kernel::lanes();
+  for (const ContactGroup& g : contact.group)
+    for (int i = 0; i < g.count; ++i) {
+      const size_t point = static_cast<size_t>(g.first + i), row = contact.rows[g.slot / W] + static_cast<size_t>(i);
+      const double* at = contact.points.data() + row * kernel::kPointFields * W + g.slot % W;
+      s.sticks[point] = {contact.point[point].at, read3(at, kernel::kSpringSlip, W)};
+    }
 }
 
 }  // namespace topple::mbs

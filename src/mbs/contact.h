@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/aligned.h"
 #include "mbs/boxes.h"
 #include "mbs/contact_law.h"
 #include "mbs/model.h"
@@ -69,43 +70,30 @@ struct PairRule {
   friend auto operator<=>(const PairRule&, const PairRule&) = default;
 };
 
-/// A body as the contacts of one step see it. The ground and fixed bodies neither move nor give way.
-struct ContactBody {
-  Vec3 v, w;    // half a step ago
-  Vec3 dv, dw;  // what the forces known so far add within the step
-  Vec3 force, torque;
-  double inverse_mass = 0;
-  Mat3 inverse_inertia;  // in W
-  int groups = 0;
-};
-
-/// A point at which two bodies touch, or one and the ground.
+/// A point at which two bodies touch, or one and the ground, as it is found.
 struct ContactPoint {
-  Vec3 ra, rb;           // from the mass centres [m]
-  Vec3 la, lb;           // levers of the normal force
+  Vec3 at;               // from the first body's mass centre [m]
   double depth = 0;      // [m]
   double stiffness = 0;  // k [N/m]
-  double full = 0;       // k δ [N]
-  double speed = 0;      // of approach, half a step ago [m/s]
-  double change = 0;     // what the forces known so far add to it within the step
-  double impedance = 0;  // sqrt(k m) with the mass m felt along the normal [N·s/m]
-  double rate = 0;       // of the dashpot [N·s/m]
-  double normal = 0;     // normal force [N]
-  double dashpot = 0;    // its part by the dashpot [N]
-  bool is_fresh = true;  // not touched in the step before
   Vec3 slip;             // displacement of the friction spring [m]
-  Vec3 held;             // its force on a [N]
-  Vec3 slide;            // speed of a against b across the normal
-  Vec3 friction;         // on a [N]
+  bool is_fresh = true;  // not touched in the step before
 };
 
 /// Points of a pair of shapes, or of one on the ground, with a common normal.
 struct ContactGroup {
-  int a = 0, b = 0;  // bodies; B stands for the ground
+  int a = 0, b = 0;  // into the touched bodies
   int first = 0, count = 0;
-  Vec3 n;  // from a to b
+  Vec3 n;      // from a to b
+  Vec3 apart;  // from b's mass centre to a's, 0 on the ground [m]
   const ContactLaw* law = nullptr;
-  double stiffness = 0;  // k of one corner of a box [N/m]
+  double stiffness = 0;    // k of one corner of a box [N/m]
+  std::uint32_t slot = 0;  // in the kernel's blocks
+};
+
+/// Forces of contact on a body and torques about its mass centre: by the springs, the dashpots and friction.
+struct ContactForces {
+  int body = -1;
+  Vec3 press, press_turn, damp, damp_turn, rub, rub_turn;
 };
 
 /// A shape in the search: the box around it and what surely touches nothing farther.
@@ -128,12 +116,16 @@ struct PairSearch {
   std::vector<PairDue> due;
 };
 
-/// The contacts of one step; scratch.
+/// The contacts of one step; scratch. T touched bodies; the first stands for the ground and all fixed ones.
 struct ContactScratch {
-  std::vector<ContactBody> body;  // (B + 1), the last is the ground
-  std::vector<int> touched;       // bodies in groups
+  std::vector<int> place;         // of each body among those touched, -1: is not (B + 1, the last is the ground)
+  std::vector<ContactForces> on;  // (T)
+  AlignedVector<double> touched;  // as the kernel sees them (T)
   std::vector<ContactPoint> point;
   std::vector<ContactGroup> group;
+  // the kernel's blocks, groups of like counts of points together
+  std::vector<std::uint32_t> rows, a, b, by_count;
+  AlignedVector<double> groups, points;
   PairSearch search;
 };
 

@@ -60,7 +60,7 @@ void System::find_ground_points() {
         if (g.born > 0 || depth > 0) shape.is_clear = false;
         if (depth <= 0) continue;
         const double weight = hull ? hulls[static_cast<size_t>(shape.hull)].weights[static_cast<size_t>(corner)] : 1;
-        add_contact_point(r, {}, depth, weight * stiffness);
+        add_contact_point(r, depth, weight * stiffness);
       }
       if (contact.point.size() == first) {
         shape.is_touching = false;
@@ -69,7 +69,7 @@ void System::find_ground_points() {
       }
       if (!shape.is_touching && !s.touched_ground[b]) {
         s.touched_ground[b] = 1;
-        const double approach = -dot(n, now.v[b] + cross(now.w[b], contact.point[first].ra));
+        const double approach = -dot(n, now.v[b] + cross(now.w[b], contact.point[first].at));
         say({Happening::Kind::GroundContact, s.time, static_cast<int>(b), -1, {}, std::max(0.0, approach)});
       }
       add_contact_group(b, B, -n, first, law, stiffness, shape.sticks);

@@ -105,7 +105,7 @@ void System::find_pair_points() {
     const size_t first = contact.point.size();
     for (int i = 0; i < points.count; ++i) {
       const double depth = points.depth[i] - pair.allowed;
-      if (depth > 0) add_contact_point(points.p[i] - p_a, points.p[i] - p_b, depth, points.weight[i] * stiffness);
+      if (depth > 0) add_contact_point(points.p[i] - p_a, depth, points.weight[i] * stiffness);
     }
     body_contacts += static_cast<int>(contact.point.size() - first);
     add_contact_group(a, b, points.normal, first, law, stiffness, pair.sticks);

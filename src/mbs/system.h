@@ -342,11 +342,15 @@ class System {
   int find_pair_law(int a, int b) const;
   void find_ground_points();
   void find_pair_points();
-  void add_contact_point(const Vec3& ra, const Vec3& rb, double depth, double stiffness);
+  void add_contact_point(const Vec3& at, double depth, double stiffness);
+  /// Counts a group of a body; its place among those touched.
+  int touch(size_t body);
   /// Makes the points from `first` on a group. Each takes over the friction spring of the nearest one of the step
   /// before.
   void add_contact_group(size_t a, size_t b, const Vec3& n, size_t first, const ContactLaw&, double stiffness,
                          StickRange&);
+  /// Gives every group found a slot of the kernel.
+  void fill_contact_blocks();
   /// Forces at the points found, on the bodies and in the ledger.
   void resolve_contacts(double h);
   /// Moves a body from its pose at the beginning of the step to the end of it.

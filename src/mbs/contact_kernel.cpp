@@ -1,0 +1,313 @@
+// Compiled once for each instruction set (Highway's foreach_target).
+#include "mbs/contact_kernel.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "mbs/contact_kernel.cpp"
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4 | HWY_AVX3_DL)
+#include <hwy/foreach_target.h>
+// after foreach_target
+#include <hwy/highway.h>
+
+#include "mbs/lane_math.inc"
+
+HWY_BEFORE_NAMESPACE();
+namespace topple::mbs::kernel {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+constexpr double kSlideZeta = 100;  // friction below its limit is a dashpot of this share
+
+template <class D>
+HWY_INLINE V3<D> zeros() {
+  return {num<D>(0), num<D>(0), num<D>(0)};
+}
+
+/// Reads fields of the bodies of a block.
+template <class D>
+struct Reader {
+  const double* HWY_RESTRICT bodies;
+  hn::Vec<hn::RebindToSigned<D>> at;
+
+  HWY_INLINE Reader(const double* from, const std::uint32_t* indices) : bodies(from) {
+    const hn::RebindToSigned<D> di;
+    const hn::Rebind<std::uint32_t, D> du;
+    at = hn::Mul(hn::BitCast(di, hn::PromoteTo(hn::RebindToUnsigned<D>(), hn::LoadU(du, indices))),
+                 hn::Set(di, kTouchedFields));
+  }
+  HWY_INLINE Num<D> operator()(int field) const { return {hn::GatherIndex(D(), bodies + field, at)}; }
+  HWY_INLINE V3<D> three(int field) const { return {(*this)(field), (*this)(field + 1), (*this)(field + 2)}; }
+};
+
+/// Symmetric matrix times vector; its six fields begin at `field`.
+template <class D>
+HWY_INLINE V3<D> times(const double* HWY_RESTRICT group, int field, const V3<D>& v) {
+  const Num<D> xy = load<D>(group, field + 1), xz = load<D>(group, field + 2), yz = load<D>(group, field + 4);
+  return {fma(xz, v.z, fma(xy, v.y, load<D>(group, field) * v.x)),
+          fma(yz, v.z, fma(load<D>(group, field + 3), v.y, xy * v.x)),
+          fma(load<D>(group, field + 5), v.z, fma(yz, v.y, xz * v.x))};
+}
+
+/// Of a against b at a's centre.
+template <class D>
+struct Motion {
+  V3<D> v, w;
+};
+template <class D>
+HWY_INLINE Motion<D> calc_motion(const Reader<D>& A, const Reader<D>& B, const V3<D>& apart, int field) {
+  const V3<D> wb = B.three(field + 3);
+  return {(A.three(field) - B.three(field)) - cross(wb, apart), A.three(field + 3) - wb};
+}
+
+/// The force times the speed that it makes, the groups of a body sharing its mass.
+template <class D>
+HWY_INLINE Num<D> calc_mobility(const double* HWY_RESTRICT g, const V3<D>& apart, const V3<D>& force,
+                                const V3<D>& torque) {
+  const V3<D> torque_b = torque + cross(apart, force);
+  const Num<D> f2 = dot(force, force);
+  return fma(load<D>(g, kGroupsA), fma(load<D>(g, kMassA), f2, dot(torque, times<D>(g, kInertiaA, torque))),
+             load<D>(g, kGroupsB) * fma(load<D>(g, kMassB), f2, dot(torque_b, times<D>(g, kInertiaB, torque_b))));
+}
+
+/// How much of its explicit force a dashpot has that would slow its own motion at the rate g / h, and the time within
+/// the step whose speed it sees: at small g the middle, at large the end.
+template <class D>
+struct Damper {
+  Num<D> at, share;
+  HWY_INLINE Damper(Num<D> h, Num<D> mobility, Num<D> power) {
+    const D d;
+    const Num<D> one = num<D>(1);
+    const auto acts = hn::Gt(power.v, hn::Zero(d));
+    const Num<D> g = select(acts, h * mobility / select(acts, power, one), num<D>(0));
+    at = (one + g) / (num<D>(2) + g);
+    share = one / fma(at, g, one);
+  }
+};
+
+template <class D>
+HWY_INLINE V3<D> across(const V3<D>& n, const V3<D>& v) {
+  return fma(num<D>(0) - dot(n, v), n, v);
+}
+
+/// Shortens a vector to `most`; gives the square of its length then.
+template <class D>
+HWY_INLINE Num<D> limit(V3<D>& f, Num<D> most) {
+  const Num<D> size2 = dot(f, f), most2 = most * most;
+  const auto over = hn::Gt(size2.v, most2.v);
+  const Num<D> scale = select(over, most / Num<D>{hn::Sqrt(size2.v)}, num<D>(1));
+  f = scale * f;
+  return select(over, most2, size2);
+}
+
+template <class D>
+HWY_INLINE void press_block(const ContactJob& job, size_t block) {
+  const D d;
+  const size_t W = hn::Lanes(d);
+  double* g = job.groups + block * kGroupFields * W;
+  const Reader<D> A(job.bodies, job.a + block * W), B(job.bodies, job.b + block * W);
+  const V3<D> n = load3<D>(g, kNormal), apart = load3<D>(g, kApart);
+  const Motion<D> m = calc_motion(A, B, apart, kSpeed);
+  store3<D>(m.v, g, kMotion), store3<D>(m.w, g, kMotion + 3);
+  store<D>(A(kTouchedMass), g, kMassA), store<D>(B(kTouchedMass), g, kMassB);
+  store<D>(A(kGroups), g, kGroupsA), store<D>(B(kGroups), g, kGroupsB);
+  for (int i = 0; i < 6; ++i) {
+    store<D>(A(kTouchedInertia + i), g, kInertiaA + i);
+    store<D>(B(kTouchedInertia + i), g, kInertiaB + i);
+  }
+  const Num<D> zero = num<D>(0), half = num<D>(0.5), h = num<D>(job.h), along = dot(n, m.v);
+  const Num<D> inverse_mass = load<D>(g, kMassA) + load<D>(g, kMassB), mean = load<D>(g, kMean),
+               damping = load<D>(g, kDamping), twice_zeta = num<D>(2) * load<D>(g, kZeta);
+  const V3<D> to_b = cross(apart, n);
+  const auto plain = hn::Ge(damping.v, hn::Zero(d));
+  Num<D> energy = zero, impedance = zero, total = zero;
+  V3<D> torque = zeros<D>();
+  for (size_t row = job.rows[block]; row < job.rows[block + 1]; ++row) {
+    double* p = job.points + row * kPointFields * W;
+    const Num<D> k = load<D>(p, kPointStiffness), depth = load<D>(p, kDepth);
+    const auto here = hn::Gt(k.v, hn::Zero(d));
+    const V3<D> la = cross(load3<D>(p, kPlace), n), lb = la + to_b;
+    const Num<D> w = (inverse_mass + dot(la, times<D>(g, kInertiaA, la))) + dot(lb, times<D>(g, kInertiaB, lb));
+    const Num<D> z = select(here, Num<D>{hn::Sqrt((k / w).v)}, zero);
+    impedance = impedance + z;
+    const Num<D> speed = along + dot(la, m.w), way = h * abs(speed);
+    Num<D> full = k * depth;
+    energy = fma(full, depth, energy);
+    // of a step in which the surfaces meet or part, only a share is in touch
+    const auto passes = hn::Gt(way.v, depth.v);
+    const Num<D> share = depth / select(passes, way, num<D>(1));
+    full = select(passes, full * fma(half, share, half), full);
+    Num<D> rate = twice_zeta * z;
+    if (HWY_UNLIKELY(!hn::AllFalse(d, plain))) {
+      // a plain dashpot begins with a jump: for half a step, and the share of the one before
+      const auto meets = hn::And(passes, hn::Gt(speed.v, hn::Zero(d)));
+      const Num<D> steady = select(meets, (half + share) * damping, damping);
+      rate = select(hn::And(plain, here), steady, rate);
+    }
+    const Num<D> force = mean * full;
+    total = total + force;
+    torque = fma(zero - force, la, torque);
+    store<D>(speed, p, kApproach), store<D>(full, p, kFull), store<D>(rate, p, kRate), store<D>(force, p, kNormalForce);
+  }
+  store<D>(impedance, g, kImpedance);
+  store3<D>((zero - total) * n, g, kPress), store3<D>(torque, g, kPress + 3);
+  store<D>(half * mean * energy, g, kPressEnergy);
+}
+
+template <class D>
+HWY_INLINE void damp_block(const ContactJob& job, size_t block) {
+  const D d;
+  const size_t W = hn::Lanes(d);
+  double* g = job.groups + block * kGroupFields * W;
+  const Reader<D> A(job.bodies, job.a + block * W), B(job.bodies, job.b + block * W);
+  const V3<D> n = load3<D>(g, kNormal), apart = load3<D>(g, kApart);
+  const Motion<D> change = calc_motion(A, B, apart, kChange);
+  const Num<D> zero = num<D>(0), h = num<D>(job.h), along = dot(n, change.v);
+  const size_t first = job.rows[block], last = job.rows[block + 1];
+  const auto point = [&](size_t row) { return job.points + row * kPointFields * W; };
+
+  Num<D> power = zero, sum = zero;
+  V3<D> torque = zeros<D>();
+  for (size_t row = first; row < last; ++row) {
+    const double* p = point(row);
+    const V3<D> la = cross(load3<D>(p, kPlace), n);
+    const Num<D> v = load<D>(p, kApproach) + (along + dot(la, change.w)), f = load<D>(p, kRate) * v;
+    power = fma(f, v, power);
+    sum = sum + f;
+    torque = fma(zero - f, la, torque);
+  }
+  const Damper<D> damper(h, calc_mobility<D>(g, apart, (zero - sum) * n, torque), power);
+  const Num<D> band = zero - load<D>(g, kBand), most = load<D>(g, kMost);
+  Num<D> total = zero;
+  sum = zero, torque = zeros<D>();
+  for (size_t row = first; row < last; ++row) {
+    double* p = point(row);
+    const V3<D> la = cross(load3<D>(p, kPlace), n);
+    const Num<D> v = fma(damper.at, along + dot(la, change.w), load<D>(p, kApproach)), full = load<D>(p, kFull);
+    const Num<D> free = damper.share * load<D>(p, kRate) * v;
+    // the upper end may be infinite, where nothing is pressed too
+    const Num<D> top = select(hn::Gt(full.v, hn::Zero(d)), most * full, zero);
+    const Num<D> f = {hn::Min(hn::Max(free.v, (band * full).v), top.v)};
+    const Num<D> force = load<D>(p, kNormalForce) + f;
+    store<D>(force, p, kNormalForce);
+    total = total + force;
+    sum = sum + f;
+    torque = fma(zero - f, la, torque);
+  }
+  store<D>(total, g, kTotal);
+  store3<D>((zero - sum) * n, g, kDamp), store3<D>(torque, g, kDamp + 3);
+
+  // friction springs share the load as the normal forces do
+  const V3<D> v = load3<D>(g, kMotion), w = load3<D>(g, kMotion + 3);
+  const auto loaded = hn::Gt(total.v, hn::Zero(d));
+  const Num<D> stiffness = load<D>(g, kStick), one = num<D>(1);
+  const Num<D> longest = load<D>(g, kFriction) * total / select(hn::Gt(stiffness.v, hn::Zero(d)), stiffness, one);
+  const Num<D> rate = select(loaded, stiffness / select(loaded, total, one), zero);
+  V3<D> rub = zeros<D>(), rub_torque = rub;
+  Num<D> energy = zero;
+  for (size_t row = first; row < last; ++row) {
+    double* p = point(row);
+    const V3<D> r = load3<D>(p, kPlace), slide = across(n, v + cross(w, r));
+    store3<D>(slide, p, kSlide);
+    V3<D> slip = across(n, fma(h * (one - load<D>(p, kFresh)), slide, load3<D>(p, kSpringSlip)));
+    const Num<D> size2 = limit(slip, longest);  // it follows where friction can hold no more
+    store3<D>(slip, p, kSpringSlip);
+    const Num<D> normal = load<D>(p, kNormalForce);
+    const V3<D> held = (zero - rate * normal) * slip;
+    energy = fma(normal, size2, energy);
+    rub = rub + held;
+    rub_torque = rub_torque + cross(r, held);
+  }
+  store3<D>(rub, g, kRub), store3<D>(rub_torque, g, kRub + 3);
+  store<D>(num<D>(0.5) * rate * energy, g, kStickEnergy);
+}
+
+template <class D>
+HWY_INLINE void rub_block(const ContactJob& job, size_t block) {
+  const D d;
+  const size_t W = hn::Lanes(d);
+  double* g = job.groups + block * kGroupFields * W;
+  const Reader<D> A(job.bodies, job.a + block * W), B(job.bodies, job.b + block * W);
+  const V3<D> n = load3<D>(g, kNormal), apart = load3<D>(g, kApart);
+  const Motion<D> change = calc_motion(A, B, apart, kChange);
+  const Num<D> zero = num<D>(0), one = num<D>(1), h = num<D>(job.h), total = load<D>(g, kTotal);
+  const size_t first = job.rows[block], last = job.rows[block + 1];
+  const auto point = [&](size_t row) { return job.points + row * kPointFields * W; };
+  // shared out as the normal forces are, so that all points pass their limits together
+  const auto loaded = hn::Gt(total.v, hn::Zero(d));
+  const Num<D> per_total = select(loaded, one / select(loaded, total, one), zero);
+  const Num<D> rate = num<D>(2 * kSlideZeta) * load<D>(g, kImpedance) * per_total;
+  const Num<D> stick = load<D>(g, kStick) * per_total;
+
+  Num<D> power = zero;
+  V3<D> force = zeros<D>(), torque = force;
+  for (size_t row = first; row < last; ++row) {
+    const double* p = point(row);
+    const V3<D> r = load3<D>(p, kPlace);
+    const V3<D> v = load3<D>(p, kSlide) + across(n, change.v + cross(change.w, r));
+    const V3<D> f = (zero - rate * load<D>(p, kNormalForce)) * v;
+    power = power - dot(f, v);
+    force = force + f;
+    torque = torque + cross(r, f);
+  }
+  const Damper<D> damper(h, calc_mobility<D>(g, apart, force, torque), power);
+  const Num<D> friction = load<D>(g, kFriction), slowed = damper.share * rate;
+  force = zeros<D>(), torque = force;
+  for (size_t row = first; row < last; ++row) {
+    const double* p = point(row);
+    const V3<D> r = load3<D>(p, kPlace);
+    const V3<D> v = fma(damper.at, across(n, change.v + cross(change.w, r)), load3<D>(p, kSlide));
+    const Num<D> normal = load<D>(p, kNormalForce);
+    const V3<D> held = (zero - stick * normal) * load3<D>(p, kSpringSlip);
+    V3<D> f = fma(zero - slowed * normal, v, held);
+    limit(f, friction * normal);
+    force = force + f;
+    torque = torque + cross(r, f);
+  }
+  store3<D>(force, g, kRub), store3<D>(torque, g, kRub + 3);
+}
+
+using Wide = hn::ScalableTag<double>;
+using One = hn::CappedTag<double, 1>;
+
+template <class D>
+HWY_INLINE void press_all(const ContactJob& job) {
+  for (size_t block = 0; block < job.blocks; ++block) press_block<D>(job, block);
+}
+template <class D>
+HWY_INLINE void damp_all(const ContactJob& job) {
+  for (size_t block = 0; block < job.blocks; ++block) damp_block<D>(job, block);
+}
+template <class D>
+HWY_INLINE void rub_all(const ContactJob& job) {
+  for (size_t block = 0; block < job.blocks; ++block) rub_block<D>(job, block);
+}
+void press_contacts_here(const ContactJob& job) { press_all<Wide>(job); }
+void damp_contacts_here(const ContactJob& job) { damp_all<Wide>(job); }
+void rub_contacts_here(const ContactJob& job) { rub_all<Wide>(job); }
+void press_contacts_singly_here(const ContactJob& job) { press_all<One>(job); }
+void damp_contacts_singly_here(const ContactJob& job) { damp_all<One>(job); }
+void rub_contacts_singly_here(const ContactJob& job) { rub_all<One>(job); }
+
+}  // namespace HWY_NAMESPACE
+}  // namespace topple::mbs::kernel
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace topple::mbs::kernel {
+
+HWY_EXPORT(press_contacts_here);
+HWY_EXPORT(damp_contacts_here);
+HWY_EXPORT(rub_contacts_here);
+HWY_EXPORT(press_contacts_singly_here);
+HWY_EXPORT(damp_contacts_singly_here);
+HWY_EXPORT(rub_contacts_singly_here);
+
+void press_contacts(const ContactJob& job) { HWY_DYNAMIC_DISPATCH(press_contacts_here)(job); }
+void damp_contacts(const ContactJob& job) { HWY_DYNAMIC_DISPATCH(damp_contacts_here)(job); }
+void rub_contacts(const ContactJob& job) { HWY_DYNAMIC_DISPATCH(rub_contacts_here)(job); }
+void press_contacts_singly(const ContactJob& job) { HWY_DYNAMIC_DISPATCH(press_contacts_singly_here)(job); }
+void damp_contacts_singly(const ContactJob& job) { HWY_DYNAMIC_DISPATCH(damp_contacts_singly_here)(job); }
+void rub_contacts_singly(const ContactJob& job) { HWY_DYNAMIC_DISPATCH(rub_contacts_singly_here)(job); }
+
+}  // namespace topple::mbs::kernel
+#endif

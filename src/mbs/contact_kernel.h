@@ -1,0 +1,92 @@
+#pragma once
+/// Forces at touching points (docs/theory/contact.md), a group in each SIMD lane. Same promises as kernel.h: a lane's
+/// bits do not depend on the others. A step calls press, damp and rub in turn, and brings the bodies up to date between
+/// them.
+
+#include <cstddef>
+#include <cstdint>
+
+#include "mbs/kernel.h"
+
+namespace topple::mbs::kernel {
+
+// Field numbers are constants, and named so.
+// NOLINTBEGIN(readability-identifier-naming)
+
+/// Fields of a touched body, one body after the other.
+enum Touched : int {
+  kSpeed = 0,            // v, w half a step ago (6)
+  kChange = 6,           // what the forces known so far add to them within the step (6)
+  kTouchedMass = 12,     // one over it
+  kTouchedInertia = 13,  // inverse inertia in W: xx xy xz yy yz zz
+  kGroups = 19,          // that the body has
+  kTouchedFields = 20
+};
+
+/// Fields of a group: what is given, what press leaves to the others, and the answers.
+enum Group : int {
+  kNormal = 0,     // from a to b (3)
+  kApart = 3,      // from b's mass centre to a's (3)
+  kMean = 6,       // of the law, as ContactLaw
+  kBand = 7,       //
+  kMost = 8,       //
+  kZeta = 9,       //
+  kDamping = 10,   //
+  kFriction = 11,  //
+  kStick = 12,     // stiffness of the friction spring [N/m]
+  kMotion = 13,    // motion of a against b at a's centre (6)
+  kMassA = 19,
+  kInertiaA = 20,
+  kGroupsA = 26,
+  kMassB = 27,
+  kInertiaB = 28,
+  kGroupsB = 34,    // of the bodies
+  kImpedance = 35,  // sum over the points [N·s/m]
+  kTotal = 36,      // normal force of all points [N]
+  kPress = 37,      // wrench on a about its centre, by the springs (6)
+  kDamp = 43,       // by the dashpots (6)
+  kRub = 49,        // by friction: damp gives its springs' part, rub adds the rest (6)
+  kPressEnergy = 55,
+  kStickEnergy = 56,
+  kGroupFields = 57
+};
+
+/// Fields of a point; a place without a point has no stiffness.
+enum Point : int {
+  kPlace = 0,           // from a's mass centre (3) [m]
+  kDepth = 3,           // [m]
+  kPointStiffness = 4,  // [N/m]
+  kSpringSlip = 5,      // displacement of the friction spring (3) [m]
+  kFresh = 8,           // 1: did not touch in the step before
+  kApproach = 9,        // speed of approach, half a step ago
+  kFull = 10,           // spring force at the rate k [N]
+  kRate = 11,           // of the dashpot [N·s/m]
+  kNormalForce = 12,    // normal force [N]
+  kSlide = 13,          // speed across the normal (3)
+  kPointFields = 16
+};
+// NOLINTEND(readability-identifier-naming)
+
+struct ContactJob {
+  size_t blocks = 0;
+  const std::uint32_t* rows;   // block i has the points in rows[i] to rows[i + 1], W in each
+  const std::uint32_t *a, *b;  // bodies of the groups (W a block)
+  const double* bodies;        // kTouchedFields each
+  double* groups;              // kGroupFields a block
+  double* points;              // kPointFields a row
+  double h = 0;
+};
+
+/// Springs: speeds, forces and the wrench of all.
+void press_contacts(const ContactJob&);
+/// Dashpots with the speeds that the springs leave, and friction springs.
+void damp_contacts(const ContactJob&);
+/// What else friction takes to stop the sliding, within its limit.
+void rub_contacts(const ContactJob&);
+
+/// The same with one lane at a time in the same instruction set.
+void press_contacts_singly(const ContactJob&);
+void damp_contacts_singly(const ContactJob&);
+void rub_contacts_singly(const ContactJob&);
+
+}  // namespace topple::mbs::kernel
