@@ -29,15 +29,15 @@ struct BoxContact {
   /// the polygon in which the faces overlap, times 4, so that a corner of a box has 1 and no point is lost or won by a
   /// jump.
   double weight[kMostPoints];
-  double gap = 0;    // without points: the solids are at least this far apart [m]
-  double spare = 0;  // with points: how far both may move before another axis decides [m]
+  double gap = 0;  // without points: the solids are at least this far apart [m]
 };
 
-/// Finds the touching points of two overlapping solids; none when they are apart. `axis` remembers the separating axis
-/// of the last call (0 to 14 of boxes, more of polyhedra) and only saves time.
+/// Finds the touching points of two overlapping solids; none when they are apart. `axis` remembers the axis that
+/// separated two polyhedra at the last call and only saves time.
 void find_contact(const Solid& a, const Solid& b, int& axis, BoxContact& out);
 
-/// The same for two boxes along a face that is known to decide; false if it no longer does.
-bool find_contact_along(const Solid& a, const Solid& b, int axis, BoxContact& out);
+/// A box for the kernel of boxes, and what it found, in slots of blocks of W lanes.
+void write_box(const Solid& box, double* slot, size_t W);
+void read_box_contact(const double* slot, size_t W, BoxContact& out);
 
 }  // namespace topple::mbs

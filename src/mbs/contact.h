@@ -33,6 +33,7 @@ struct CompiledShape {
   double reach = 0;          // radius of the sphere around p_BS that holds it, infinite for a plane [m]
   int hull = -1;             // into System::hulls
   int first_corner = 0;      // into State::ground_points: 8 of a box, 1 of a sphere, the vertices of a polyhedron
+  bool is_straight = false;  // its axes are those of the body
   bool is_clear = false;     // no point touches the ground or remembers that it did
   bool is_touching = false;  // the ground
   StickRange sticks;         // to the ground
@@ -44,24 +45,23 @@ struct GroundPoint {
   bool active = false;  // contact is possible
 };
 
-/// Two shapes near each other, in an order that does not depend on the bodies' numbers.
-struct PairState {
+/// Two shapes near each other, in an order that does not depend on the bodies' numbers, and when to look at them again.
+struct PairDue {
+  double way = 0;                // of both bodies, before which they cannot meet [m]
   int a = -1, b = -1;            // bodies
   int shape_a = 0, shape_b = 0;  // into State::shapes
-  int law = 0;                   // into System::contact_laws
-  int axis = 0;                  // that separated or decided at the last look
-  double axis_way = 0;           // way of both bodies up to which it decides [m]
-  double allowed = 0;            // penetration without force [m]
-  double depth = 0;              // of the deepest point beyond it at the last look, or minus the gap [m]
-  double way = 0;                // State::travel of both bodies then [m]
+  bool are_boxes = false;
   bool touching = false;
-  StickRange sticks;
 };
 
-/// When a pair is to be looked at again.
-struct PairDue {
-  double way = 0;  // of both bodies, before which they cannot meet [m]
-  int a = 0, b = 0;
+/// What else is remembered of them.
+struct PairState {
+  int law = 0;         // into System::contact_laws
+  int axis = 0;        // that separated two polyhedra at the last look
+  double allowed = 0;  // penetration without force [m]
+  double depth = 0;    // of the deepest point beyond it at the last look, or minus the gap [m]
+  double way = 0;      // State::travel of both bodies then [m]
+  StickRange sticks;
 };
 
 /// Two bodies with rules of their own, a < b.
@@ -108,12 +108,21 @@ struct PairSearch {
   bool has_links = false;
   std::vector<int> first_link, link;  // bodies that each body is tied to
   std::vector<ShapeBounds> bounds;    // by place
-  std::vector<int> first_in_slab, in_slab, unbounded, near;
-  std::vector<double> extents;
+  std::vector<int> first_in_slab, in_slab, unbounded, near, hits;
+  std::vector<ShapeBounds> here;  // of one slab
+  std::vector<double> extents, ways;
   std::vector<std::uint64_t> found;  // ranks of both shapes
   std::vector<int> first_old, old;   // old pairs of each shape
   std::vector<PairState> pairs;
   std::vector<PairDue> due;
+  std::vector<double> clock;
+};
+
+/// A pair that is due.
+struct PairLook {
+  size_t pair = 0;  // into State::pairs
+  double way = 0;   // of both bodies [m]
+  size_t slot = 0;  // two boxes: in the kernel's blocks
 };
 
 /// The contacts of one step; scratch. T touched bodies; the first stands for the ground and all fixed ones.
@@ -126,6 +135,8 @@ struct ContactScratch {
   // the kernel's blocks, groups of like counts of points together
   std::vector<std::uint32_t> rows, a, b, by_count;
   AlignedVector<double> groups, points;
+  std::vector<PairLook> looks;
+  AlignedVector<double> boxes_a, boxes_b, box_answers;  // the kernel's blocks of pairs of boxes
   PairSearch search;
 };
 

@@ -27,7 +27,7 @@ void System::find_ground_points() {
       CompiledShape& shape = s.shapes[static_cast<size_t>(i)];
       const bool box = shape.kind == Shape::Kind::Box, hull = shape.kind == Shape::Kind::Hull;
       const Vec3 centre = R_WB * shape.p_BS;
-      const Mat3 R = box || hull ? R_WB * shape.R_BS : Mat3{};
+      const Mat3 R = !(box || hull) ? Mat3{} : shape.is_straight ? R_WB : R_WB * shape.R_BS;
       if (possible && shape.is_clear) {
         // all its points are known not to touch: they do not as long as it stays above the ground
         const Vec3 down = box ? transpose_times(R, n) : Vec3{};

@@ -3,25 +3,23 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mbs/box_kernel.h"
 #include "mbs/system.h"
 
 namespace topple::mbs {
 
-namespace {
-
-constexpr double kMostSpare = 0.05;  // [m]; an axis is looked for anew at least so often
-
-}  // namespace
-
 void System::drop_pairs_of(size_t b) {
+  State& s = state;
   size_t kept = 0;
-  for (size_t i = 0; i < state.pairs.size(); ++i) {
-    if (state.pairs[i].a == static_cast<int>(b) || state.pairs[i].b == static_cast<int>(b)) continue;
-    state.pairs[kept] = state.pairs[i];
-    state.pair_due[kept++] = state.pair_due[i];
+  for (size_t i = 0; i < s.pairs.size(); ++i) {
+    if (s.pair_due[i].a == static_cast<int>(b) || s.pair_due[i].b == static_cast<int>(b)) continue;
+    s.pairs[kept] = s.pairs[i];
+    s.pair_clock[kept] = s.pair_clock[i];
+    s.pair_due[kept++] = s.pair_due[i];
   }
-  state.pairs.resize(kept);
-  state.pair_due.resize(kept);
+  s.pairs.resize(kept);
+  s.pair_clock.resize(kept);
+  s.pair_due.resize(kept);
 }
 
 void System::find_pair_points() {
@@ -39,7 +37,7 @@ void System::find_pair_points() {
       const Mat3 R = now.R[body];
       solids[i] = {c_shape.kind,
                    now.p[body] + R * c_shape.p_BS,
-                   R * c_shape.R_BS,
+                   c_shape.is_straight ? R : R * c_shape.R_BS,
                    c_shape.half,
                    c_shape.radius,
                    c_shape.reach,
@@ -47,21 +45,60 @@ void System::find_pair_points() {
     }
     return solids[i];
   };
+  // those that are due; two boxes go to the kernel, those that touched side by side
+  const size_t W = kernel::lanes();
+  std::vector<PairLook>& looks = contact.looks;
+  looks.clear();
+  size_t boxes[2] = {0, 0};  // that did not touch, that did
+  for (size_t i = 0; i < s.pairs.size(); ++i) {
+    if (s.pair_clock[i] > s.clock) continue;
+    const PairDue& due = s.pair_due[i];
+    const double way = s.travel[static_cast<size_t>(due.a)] + s.travel[static_cast<size_t>(due.b)];
+    if (way < due.way) {
+      s.pair_clock[i] = s.clock + 0.5 * (due.way - way);
+      continue;
+    }
+    PairLook& look = looks.emplace_back();
+    look.pair = i;
+    look.way = way;
+    if (due.are_boxes) look.slot = boxes[due.touching ? 1 : 0]++;
+  }
+  const size_t first_touching = (boxes[0] + W - 1) / W * W, blocks = first_touching / W + (boxes[1] + W - 1) / W;
+  contact.boxes_a.resize(blocks * W * kernel::kBoxFields);
+  contact.boxes_b.resize(blocks * W * kernel::kBoxFields);
+  contact.box_answers.resize(blocks * W * kernel::kBoxAnswerFields);
+  const auto slot_of = [&](AlignedVector<double>& of, size_t slot, size_t fields) {
+    return of.data() + slot / W * fields * W + slot % W;
+  };
+  const auto write = [&](size_t slot, const Solid& A, const Solid& Bb) {
+    write_box(A, slot_of(contact.boxes_a, slot, kernel::kBoxFields), W);
+    write_box(Bb, slot_of(contact.boxes_b, slot, kernel::kBoxFields), W);
+  };
+  for (PairLook& look : looks) {
+    const PairDue& due = s.pair_due[look.pair];
+    if (!due.are_boxes) continue;
+    if (due.touching) look.slot += first_touching;
+    write(look.slot, solid_of(static_cast<size_t>(due.a), due.shape_a),
+          solid_of(static_cast<size_t>(due.b), due.shape_b));
+  }
+  for (size_t slot = boxes[0]; slot < first_touching; ++slot) write(slot, {}, {});
+  for (size_t slot = first_touching + boxes[1]; slot < blocks * W; ++slot) write(slot, {}, {});
+  kernel::find_box_contacts({blocks, contact.boxes_a.data(), contact.boxes_b.data(), contact.box_answers.data()});
+
   BoxContact points;
-  for (size_t number_of_pair = 0; number_of_pair < s.pairs.size(); ++number_of_pair) {
-    const PairDue& due = s.pair_due[number_of_pair];
+  for (const PairLook& look : looks) {
+    const double way = look.way;
+    PairState& pair = s.pairs[look.pair];
+    PairDue& due = s.pair_due[look.pair];
     const size_t a = static_cast<size_t>(due.a), b = static_cast<size_t>(due.b);
-    const double way = s.travel[a] + s.travel[b];
-    if (way < due.way) continue;
-    PairState& pair = s.pairs[number_of_pair];
-    const Solid &A = solid_of(a, pair.shape_a), &Bb = solid_of(b, pair.shape_b);
-    const double reach = A.reach + Bb.reach;
     points.count = 0;
-    const bool decided = pair.touching && way < pair.axis_way && find_contact_along(A, Bb, pair.axis, points);
-    if (!decided) {
+    if (due.are_boxes) {
+      read_box_contact(slot_of(contact.box_answers, look.slot, kernel::kBoxAnswerFields), W, points);
+    } else {
+      const Solid &A = solid_of(a, due.shape_a), &Bb = solid_of(b, due.shape_b);
+      const double reach = A.reach + Bb.reach;
       if (const double distance2 = dot(Bb.p - A.p, Bb.p - A.p); distance2 < reach * reach) {
         find_contact(A, Bb, pair.axis, points);
-        pair.axis_way = way + std::min(points.spare, kMostSpare);
       } else {
         points.gap = std::sqrt(distance2) - reach;
       }
@@ -71,8 +108,8 @@ void System::find_pair_points() {
     const double possible = pair.depth + way - pair.way;
     pair.way = way;
     if (points.count == 0) {
-      s.pair_due[number_of_pair].way = way + points.gap;
-      pair.touching = false;
+      due.way = way + points.gap;
+      due.touching = false;
       pair.sticks = {};
       pair.allowed = 0;
       pair.depth = -points.gap;
@@ -83,7 +120,7 @@ void System::find_pair_points() {
     pair.allowed = std::max(std::min(pair.allowed, deepest), deepest - std::max(0.0, possible));
     pair.depth = deepest - pair.allowed;
     if (pair.depth <= 0) {
-      pair.touching = false;
+      due.touching = false;
       pair.sticks = {};
       continue;
     }
@@ -92,8 +129,8 @@ void System::find_pair_points() {
                                                : c.contact_frequency * c.contact_frequency /
                                                      (s.body[a].inverse_mass + s.body[b].inverse_mass);
     const Vec3 p_a = now.p[a], p_b = now.p[b];
-    if (!pair.touching) {
-      const int low = std::min(pair.a, pair.b), high = std::max(pair.a, pair.b);
+    if (!due.touching) {
+      const int low = std::min(due.a, due.b), high = std::max(due.a, due.b);
       const long number = static_cast<long>(low) * static_cast<long>(B) + high;
       const auto at = std::lower_bound(s.touched_pairs.begin(), s.touched_pairs.end(), number);
       if (at == s.touched_pairs.end() || *at != number) {
@@ -109,7 +146,7 @@ void System::find_pair_points() {
     }
     body_contacts += static_cast<int>(contact.point.size() - first);
     add_contact_group(a, b, points.normal, first, law, stiffness, pair.sticks);
-    pair.touching = true;
+    due.touching = true;
   }
 }
 

@@ -10,9 +10,10 @@ namespace topple::mbs {
 
 namespace {
 
-constexpr double kSearchMargin = 0.2;   // [m]; shapes nearer than this are watched
-constexpr double kSearchTravel = 0.09;  // [m]; less than half the margin
-constexpr long kSearchPause = 80;       // steps between searches that breaks ask for
+constexpr double kLeastAllowance = 0.05;  // [m]; way of a body until the next search
+constexpr double kAllowedTime = 0.05;     // [s]; more for fast bodies
+constexpr double kMostAllowance = 1;      // [m]
+constexpr long kSearchPause = 80;         // steps between searches that breaks ask for
 
 }  // namespace
 
@@ -20,16 +21,20 @@ void System::add_travel(double h) {
   State& s = state;
   const State& now = state;
   s.travel.resize(B);
+  s.allowance.resize(B);
+  bool is_far = false;
   double most = 0;
   for (size_t b = 0; b < B && model.contact.bodies; ++b) {
     // the drift before this evaluation was by the speeds of half a step ago
     const Vec3 v = now.v[b] - s.search_velocity;
     const double turn = fixed[b] ? 0 : norm(now.w[b]) * s.body[b].radius;
-    s.travel[b] += h * (norm(v) + turn);
-    most = std::max(most, s.travel[b]);
+    const double way = h * (norm(v) + turn);
+    most = std::max(most, way);
+    s.travel[b] += way;
+    is_far = is_far || s.travel[b] > s.allowance[b];
   }
-  if (most > kSearchTravel || (s.search_due && (s.last_search < 0 || s.step_index - s.last_search >= kSearchPause)))
-    find_pairs();
+  s.clock += most;
+  if (is_far || (s.search_due && (s.last_search < 0 || s.step_index - s.last_search >= kSearchPause))) find_pairs();
 }
 
 void System::find_links() {
@@ -63,10 +68,11 @@ void System::find_links() {
   });
 }
 
-/// Boxes around the shapes, grown by half the margin, sorted by place: that of the lower ends, the axis along which the
-/// shapes reach farthest first.
+/// Boxes around the shapes, grown by the way their bodies may make until the next search, sorted by place: that of the
+/// lower ends, the axis along which the shapes reach farthest first.
 void System::find_bounds() {
-  const State& s = state;
+  State& s = state;
+  const State& now = state;
   PairSearch& search = contact.search;
   search.bounds.clear();
   Vec3 least{kUnlimited, kUnlimited, kUnlimited}, most = -least;
@@ -75,12 +81,15 @@ void System::find_bounds() {
     if (body.shapes == 0) continue;
     const Vec3 p = s.p[b];
     const Mat3 R_WB = s.R[b];
+    const double turn = fixed[b] ? 0 : norm(now.w[b]) * body.radius;
+    const double speed = norm(now.v[b] - s.search_velocity) + turn;
+    const double margin = s.allowance[b] = std::min(kLeastAllowance + kAllowedTime * speed, kMostAllowance);
     for (int i = body.first_shape; i < body.first_shape + body.shapes; ++i) {
       const CompiledShape& shape = s.shapes[static_cast<size_t>(i)];
       const Vec3 c = p + R_WB * shape.p_BS;
       Vec3 reach{shape.reach, shape.reach, shape.reach};
       if (shape.kind == Shape::Kind::Box) {
-        const Mat3 R = R_WB * shape.R_BS;
+        const Mat3 R = shape.is_straight ? R_WB : R_WB * shape.R_BS;
         for (int k = 0; k < 3; ++k)
           reach[k] =
               std::abs(R(k, 0)) * shape.half.x + std::abs(R(k, 1)) * shape.half.y + std::abs(R(k, 2)) * shape.half.z;
@@ -89,8 +98,8 @@ void System::find_bounds() {
       x.body = static_cast<int>(b);
       x.shape = i;
       for (int k = 0; k < 3; ++k) {
-        x.low[k] = c[k] - reach[k] - 0.5 * kSearchMargin;
-        x.high[k] = c[k] + reach[k] + 0.5 * kSearchMargin;
+        x.low[k] = c[k] - reach[k] - margin;
+        x.high[k] = c[k] + reach[k] + margin;
       }
       if (shape.kind == Shape::Kind::Plane) continue;
       for (int k = 0; k < 3; ++k) least[k] = std::min(least[k], c[k]), most[k] = std::max(most[k], c[k]);
@@ -123,6 +132,10 @@ void System::find_pairs() {
     std::fill(s.travel.begin(), s.travel.end(), 0);
     return;
   }
+  // pairs remember their ways as seen so far; what follows is as seen from a new frame
+  const std::vector<double>& ways = search.ways = s.travel;
+  std::fill(s.travel.begin(), s.travel.end(), 0);
+  choose_search_velocity();
   find_bounds();
   const std::vector<ShapeBounds>& bounds = search.bounds;
   const size_t n = bounds.size();
@@ -192,16 +205,23 @@ void System::find_pairs() {
   for (size_t k = 0; k < slabs; ++k) {
     const std::span<const int> slab(search.in_slab.data() + search.first_in_slab[k],
                                     static_cast<size_t>(search.first_in_slab[k + 1] - search.first_in_slab[k]));
+    search.here.clear();
+    for (const int i : slab) search.here.push_back(bounds[static_cast<size_t>(i)]);
+    search.hits.resize(slab.size());
     for (size_t i = 0; i < slab.size(); ++i) {
-      const ShapeBounds& x = bounds[static_cast<size_t>(slab[i])];
-      for (size_t j = i + 1; j < slab.size(); ++j) {
-        const ShapeBounds& y = bounds[static_cast<size_t>(slab[j])];
-        if (y.low[0] > x.high[0]) break;
-        if (x.low[1] > y.high[1] || y.low[1] > x.high[1] || x.low[2] > y.high[2] || y.low[2] > x.high[2]) continue;
+      const ShapeBounds& x = search.here[i];
+      // no branch depends on what is compared
+      size_t hits = 0;
+      for (size_t j = i + 1; j < slab.size() && search.here[j].low[0] <= x.high[0]; ++j) {
+        const ShapeBounds& y = search.here[j];
         // in the first slab that both reach into
-        if (std::max(x.first_slab, y.first_slab) != static_cast<int>(k)) continue;
-        look(static_cast<size_t>(slab[i]), static_cast<size_t>(slab[j]));
+        const bool hit = (x.low[1] <= y.high[1]) & (y.low[1] <= x.high[1]) & (x.low[2] <= y.high[2]) &
+                         (y.low[2] <= x.high[2]) & (std::max(x.first_slab, y.first_slab) == static_cast<int>(k));
+        search.hits[hits] = static_cast<int>(j);
+        hits += hit;
       }
+      for (size_t j = 0; j < hits; ++j)
+        look(static_cast<size_t>(slab[i]), static_cast<size_t>(slab[static_cast<size_t>(search.hits[j])]));
     }
   }
   for (const int u : search.unbounded)
@@ -212,22 +232,23 @@ void System::find_pairs() {
   // keep what old pairs remember
   search.first_old.assign(s.shapes.size() + 2, 0);
   const auto lower = [](int a, int b) { return static_cast<size_t>(std::min(a, b)); };
-  for (const PairState& p : s.pairs) ++search.first_old[lower(p.shape_a, p.shape_b) + 2];
+  for (const PairDue& p : s.pair_due) ++search.first_old[lower(p.shape_a, p.shape_b) + 2];
   for (size_t i = 2; i < search.first_old.size(); ++i) search.first_old[i] += search.first_old[i - 1];
   search.old.resize(s.pairs.size());
   for (size_t i = 0; i < s.pairs.size(); ++i)
-    search.old[static_cast<size_t>(search.first_old[lower(s.pairs[i].shape_a, s.pairs[i].shape_b) + 1]++)] =
+    search.old[static_cast<size_t>(search.first_old[lower(s.pair_due[i].shape_a, s.pair_due[i].shape_b) + 1]++)] =
         static_cast<int>(i);
   search.pairs.clear();
   search.pairs.reserve(search.found.size());
   std::vector<PairDue>& due = search.due;
   due.clear();
+  search.clock.clear();
   for (const std::uint64_t key : search.found) {
     const ShapeBounds &x = bounds[key >> 32], &y = bounds[key & 0xffffffffU];
     const size_t first = lower(x.shape, y.shape);
     int known = -1;
     for (int i = search.first_old[first]; i < search.first_old[first + 1] && known < 0; ++i) {
-      const PairState& p = s.pairs[static_cast<size_t>(search.old[static_cast<size_t>(i)])];
+      const PairDue& p = s.pair_due[static_cast<size_t>(search.old[static_cast<size_t>(i)])];
       if (std::max(p.shape_a, p.shape_b) == std::max(x.shape, y.shape)) known = search.old[static_cast<size_t>(i)];
     }
     PairState& p = search.pairs.emplace_back();
@@ -235,20 +256,21 @@ void System::find_pairs() {
     if (known >= 0) {
       p = s.pairs[static_cast<size_t>(known)];
       d = s.pair_due[static_cast<size_t>(known)];
-      const double way = s.travel[static_cast<size_t>(p.a)] + s.travel[static_cast<size_t>(p.b)];
+      const double way = ways[static_cast<size_t>(d.a)] + ways[static_cast<size_t>(d.b)];
       p.way -= way;
-      p.axis_way -= way;
       d.way -= way;
     } else {
-      p.a = d.a = x.body, p.b = d.b = y.body;
-      p.shape_a = x.shape, p.shape_b = y.shape;
-      p.law = find_pair_law(p.a, p.b);
+      d.a = x.body, d.b = y.body;
+      d.shape_a = x.shape, d.shape_b = y.shape;
+      const auto is_box = [&](int i) { return s.shapes[static_cast<size_t>(i)].kind == Shape::Kind::Box; };
+      d.are_boxes = is_box(x.shape) && is_box(y.shape);
+      p.law = find_pair_law(d.a, d.b);
     }
+    search.clock.push_back(s.clock + 0.5 * d.way);
   }
   s.pairs.swap(search.pairs);
   s.pair_due.swap(due);
-  std::fill(s.travel.begin(), s.travel.end(), 0);
-  choose_search_velocity();
+  s.pair_clock.swap(search.clock);
 }
 
 /// Any frame serves that is the same for all bodies; in that of their mean motion they stay near their places longest.

@@ -213,6 +213,7 @@ void System::append_shapes(const Body& body, BodyConstants& c) {
     compiled.kind = s.kind;
     compiled.p_BS = s.X_BS.p;
     compiled.R_BS = to_matrix(s.X_BS.q);
+    compiled.is_straight = compiled.R_BS.m[0][0] == 1 && compiled.R_BS.m[1][1] == 1 && compiled.R_BS.m[2][2] == 1;
     compiled.half = s.half;
     compiled.radius = s.kind == Shape::Kind::Sphere ? s.radius : 0;
     compiled.hull = find_hull(s);

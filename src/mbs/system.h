@@ -103,9 +103,12 @@ struct State {
   // contact pairs
   std::vector<PairState> pairs;
   std::vector<PairDue> pair_due;
+  std::vector<double> pair_clock;  // no pair is due before `clock` comes to it (P) [m]
+  double clock = 0;                // the ways of the fastest bodies, added up [m]
   std::vector<double>
       travel;            // way of each body's farthest point since the last search, at most, as seen from ... (B) [m]
   Vec3 search_velocity;  // ... a frame that moves so [m/s]
+  std::vector<double> allowance;  // the way at which a body asks for a new search (B) [m]
   std::vector<unsigned char> tied_to_ground;
   bool search_due = true;
   long last_search = -1;            // step
