@@ -110,12 +110,13 @@ struct PairSearch {
   std::vector<ShapeBounds> bounds;    // by place
   std::vector<int> first_in_slab, in_slab, unbounded, near, hits;
   std::vector<ShapeBounds> here;  // of one slab
-  std::vector<double> extents, ways;
+  std::vector<double> extents, ways, speeds;
   std::vector<std::uint64_t> found;  // ranks of both shapes
   std::vector<int> first_old, old;   // old pairs of each shape
   std::vector<PairState> pairs;
   std::vector<PairDue> due;
   std::vector<double> clock;
+  std::vector<unsigned char> fast;
 };
 
 /// A pair that is due.
@@ -135,6 +136,7 @@ struct ContactScratch {
   // the kernel's blocks, groups of like counts of points together
   std::vector<std::uint32_t> rows, a, b, by_count;
   AlignedVector<double> groups, points;
+  std::vector<std::uint32_t> candidates;  // pairs that may be due
   std::vector<PairLook> looks;
   AlignedVector<double> boxes_a, boxes_b, box_answers;  // the kernel's blocks of pairs of boxes
   PairSearch search;

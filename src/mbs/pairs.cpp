@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "mbs/box_kernel.h"
 #include "mbs/system.h"
@@ -15,10 +16,12 @@ void System::drop_pairs_of(size_t b) {
     if (s.pair_due[i].a == static_cast<int>(b) || s.pair_due[i].b == static_cast<int>(b)) continue;
     s.pairs[kept] = s.pairs[i];
     s.pair_clock[kept] = s.pair_clock[i];
+    s.pair_fast[kept] = s.pair_fast[i];
     s.pair_due[kept++] = s.pair_due[i];
   }
   s.pairs.resize(kept);
   s.pair_clock.resize(kept);
+  s.pair_fast.resize(kept);
   s.pair_due.resize(kept);
 }
 
@@ -50,14 +53,18 @@ void System::find_pair_points() {
   std::vector<PairLook>& looks = contact.looks;
   looks.clear();
   size_t boxes[2] = {0, 0};  // that did not touch, that did
+  // no branch depends on what is compared
+  contact.candidates.resize(s.pairs.size());
+  size_t candidates = 0;
   for (size_t i = 0; i < s.pairs.size(); ++i) {
-    if (s.pair_clock[i] > s.clock) continue;
+    contact.candidates[candidates] = static_cast<std::uint32_t>(i);
+    candidates += s.pair_clock[i] <= s.clock[s.pair_fast[i]];
+  }
+  for (const size_t i : std::span(contact.candidates).first(candidates)) {
     const PairDue& due = s.pair_due[i];
     const double way = s.travel[static_cast<size_t>(due.a)] + s.travel[static_cast<size_t>(due.b)];
-    if (way < due.way) {
-      s.pair_clock[i] = s.clock + 0.5 * (due.way - way);
-      continue;
-    }
+    s.pair_clock[i] = s.clock[s.pair_fast[i]] + 0.5 * (due.way - way);
+    if (way < due.way) continue;
     PairLook& look = looks.emplace_back();
     look.pair = i;
     look.way = way;

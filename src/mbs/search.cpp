@@ -11,8 +11,9 @@ namespace topple::mbs {
 namespace {
 
 constexpr double kLeastAllowance = 0.05;  // [m]; way of a body until the next search
-constexpr double kAllowedTime = 0.05;     // [s]; more for fast bodies
-constexpr double kMostAllowance = 1;      // [m]
+constexpr double kAllowedTime = 0.025;    // [s]; more for fast bodies
+constexpr double kMostAllowance = 0.4;    // [m]
+constexpr double kSlowShare = 0.8;        // of the bodies
 constexpr long kSearchPause = 80;         // steps between searches that breaks ask for
 
 }  // namespace
@@ -22,18 +23,21 @@ void System::add_travel(double h) {
   const State& now = state;
   s.travel.resize(B);
   s.allowance.resize(B);
+  s.is_fast.resize(B);
   bool is_far = false;
-  double most = 0;
+  double most[2] = {0, 0};
   for (size_t b = 0; b < B && model.contact.bodies; ++b) {
     // the drift before this evaluation was by the speeds of half a step ago
     const Vec3 v = now.v[b] - s.search_velocity;
     const double turn = fixed[b] ? 0 : norm(now.w[b]) * s.body[b].radius;
     const double way = h * (norm(v) + turn);
-    most = std::max(most, way);
+    double& longest = most[s.is_fast[b]];
+    longest = std::max(longest, way);
     s.travel[b] += way;
     is_far = is_far || s.travel[b] > s.allowance[b];
   }
-  s.clock += most;
+  s.clock[0] += most[0];
+  s.clock[1] += std::max(most[0], most[1]);
   if (is_far || (s.search_due && (s.last_search < 0 || s.step_index - s.last_search >= kSearchPause))) find_pairs();
 }
 
@@ -68,11 +72,25 @@ void System::find_links() {
   });
 }
 
+/// Speeds of the bodies' farthest points, as the ways are counted, and which are the fastest.
+void System::find_fast_bodies() {
+  State& s = state;
+  const State& now = state;
+  std::vector<double>&speeds = contact.search.speeds, &sorted = contact.search.extents;
+  speeds.resize(B);
+  for (size_t b = 0; b < B; ++b)
+    speeds[b] = norm(now.v[b] - s.search_velocity) + (fixed[b] ? 0 : norm(now.w[b]) * s.body[b].radius);
+  sorted = speeds;
+  const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(kSlowShare * static_cast<double>(B));
+  if (at == sorted.end()) return;
+  std::nth_element(sorted.begin(), at, sorted.end());
+  for (size_t b = 0; b < B; ++b) s.is_fast[b] = speeds[b] > *at;
+}
+
 /// Boxes around the shapes, grown by the way their bodies may make until the next search, sorted by place: that of the
 /// lower ends, the axis along which the shapes reach farthest first.
 void System::find_bounds() {
   State& s = state;
-  const State& now = state;
   PairSearch& search = contact.search;
   search.bounds.clear();
   Vec3 least{kUnlimited, kUnlimited, kUnlimited}, most = -least;
@@ -81,9 +99,7 @@ void System::find_bounds() {
     if (body.shapes == 0) continue;
     const Vec3 p = s.p[b];
     const Mat3 R_WB = s.R[b];
-    const double turn = fixed[b] ? 0 : norm(now.w[b]) * body.radius;
-    const double speed = norm(now.v[b] - s.search_velocity) + turn;
-    const double margin = s.allowance[b] = std::min(kLeastAllowance + kAllowedTime * speed, kMostAllowance);
+    const double margin = s.allowance[b] = std::min(kLeastAllowance + kAllowedTime * search.speeds[b], kMostAllowance);
     for (int i = body.first_shape; i < body.first_shape + body.shapes; ++i) {
       const CompiledShape& shape = s.shapes[static_cast<size_t>(i)];
       const Vec3 c = p + R_WB * shape.p_BS;
@@ -128,6 +144,7 @@ void System::find_pairs() {
   s.search_due = false;
   s.last_search = s.step_index;
   s.travel.resize(B);
+  s.is_fast.resize(B);
   if (!model.contact.bodies) {
     std::fill(s.travel.begin(), s.travel.end(), 0);
     return;
@@ -136,6 +153,7 @@ void System::find_pairs() {
   const std::vector<double>& ways = search.ways = s.travel;
   std::fill(s.travel.begin(), s.travel.end(), 0);
   choose_search_velocity();
+  find_fast_bodies();
   find_bounds();
   const std::vector<ShapeBounds>& bounds = search.bounds;
   const size_t n = bounds.size();
@@ -243,6 +261,7 @@ void System::find_pairs() {
   std::vector<PairDue>& due = search.due;
   due.clear();
   search.clock.clear();
+  search.fast.clear();
   for (const std::uint64_t key : search.found) {
     const ShapeBounds &x = bounds[key >> 32], &y = bounds[key & 0xffffffffU];
     const size_t first = lower(x.shape, y.shape);
@@ -266,11 +285,13 @@ void System::find_pairs() {
       d.are_boxes = is_box(x.shape) && is_box(y.shape);
       p.law = find_pair_law(d.a, d.b);
     }
-    search.clock.push_back(s.clock + 0.5 * d.way);
+    search.fast.push_back(s.is_fast[static_cast<size_t>(d.a)] | s.is_fast[static_cast<size_t>(d.b)]);
+    search.clock.push_back(s.clock[search.fast.back()] + 0.5 * d.way);
   }
   s.pairs.swap(search.pairs);
   s.pair_due.swap(due);
   s.pair_clock.swap(search.clock);
+  s.pair_fast.swap(search.fast);
 }
 
 /// Any frame serves that is the same for all bodies; in that of their mean motion they stay near their places longest.

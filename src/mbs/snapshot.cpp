@@ -88,8 +88,9 @@ void visit(Archive& ar, S& s, C& sys) {
   ar(s.shapes), ar(s.ground_points), ar(s.touched_ground);
   ar(s.element), ar(s.rotational), ar(s.joint), ar(s.cable);
   ar(s.spring), ar(s.torsion), ar(s.bushing), ar(s.load);
-  ar(s.pairs), ar(s.pair_due), ar(s.pair_clock), ar(s.clock), ar(s.travel), ar(s.search_velocity), ar(s.allowance),
-      ar(s.sticks), ar(s.tied_to_ground), ar(s.search_due), ar(s.last_search), ar(s.touched_pairs);
+  ar(s.pairs), ar(s.pair_due), ar(s.pair_clock), ar(s.pair_fast), ar(s.clock), ar(s.is_fast), ar(s.travel),
+      ar(s.search_velocity), ar(s.allowance), ar(s.sticks), ar(s.tied_to_ground), ar(s.search_due), ar(s.last_search),
+      ar(s.touched_pairs);
   ar(s.removed), ar(s.contact_energy), ar(s.stick_energy), ar(s.contact_loss), ar(s.contact_loss_power),
       ar(s.friction_work), ar(s.friction_power), ar(s.total_at_start);
   ar(s.gravity_at_start), ar(s.largest_residual), ar(s.released), ar(s.largest_drift), ar(s.quiet_steps);

@@ -103,8 +103,10 @@ struct State {
   // contact pairs
   std::vector<PairState> pairs;
   std::vector<PairDue> pair_due;
-  std::vector<double> pair_clock;  // no pair is due before `clock` comes to it (P) [m]
-  double clock = 0;                // the ways of the fastest bodies, added up [m]
+  std::vector<double> pair_clock;        // no pair is due before its clock comes to this (P) [m]
+  std::vector<unsigned char> pair_fast;  // that is the second clock (P)
+  double clock[2] = {0, 0};              // ways of the fastest slow body and of the fastest body, added up [m]
+  std::vector<unsigned char> is_fast;    // whether a body counts for the second clock only (B)
   std::vector<double>
       travel;            // way of each body's farthest point since the last search, at most, as seen from ... (B) [m]
   Vec3 search_velocity;  // ... a frame that moves so [m/s]
@@ -338,6 +340,7 @@ class System {
   /// Bodies whose shapes are near each other, and who is tied to the ground.
   void find_pairs();
   void find_links();
+  void find_fast_bodies();
   void find_bounds();
   void choose_search_velocity();
   void drop_pairs_of(size_t b);
