@@ -15,6 +15,7 @@ namespace topple::mbs {
 
 namespace {
 
+constexpr int kMostContactInterval = 4;
 constexpr double kStickStiffness = 1.2;  // of the mean normal stiffness of a corner
 
 /// Component of a vector in a block of lanes.
@@ -68,17 +69,45 @@ int System::find_pair_law(int a, int b) const {
   return at != pair_rules.end() && at->a == wanted.a && at->b == wanted.b ? at->law : 1;
 }
 
+int System::calc_contact_interval() const {
+  if (options.contact_interval > 0) return options.contact_interval;
+  const double frequency = calc_contact_frequency();
+  if (options.step > 0 || frequency <= 0) return 1;
+  return std::clamp(static_cast<int>(kContactAngle / (frequency * step)), 1, kMostContactInterval);
+}
+
 void System::evaluate_contact(double h) {
-  for (const ContactForces& c : contact.on)
-    if (c.body >= 0) contact.place[static_cast<size_t>(c.body)] = -1;
-  contact.on.assign(1, {});
-  contact.touched.assign(kernel::kTouchedFields, 0);
-  contact.point.clear();
-  contact.group.clear();
   add_travel(h);
+  Touching& t = state.touching;
+  const bool follows = h > 0 && t.steps > 0 && t.steps < contact_interval;
+  if (!follows) {
+    find_contacts();
+    t.steps = 0;
+  }
+  resolve_contacts(h, follows);
+  ++t.steps;
+}
+
+void System::find_contacts() {
+  Touching& t = state.touching;
+  const size_t W = kernel::lanes();
+  // friction springs as they are now
+  contact.sticks.clear();
+  for (const ContactGroup& g : t.group)
+    for (int i = 0; i < g.count; ++i) {
+      const size_t row = t.rows[g.slot / W] + static_cast<size_t>(i);
+      const double* at = t.points.data() + row * kernel::kPointFields * W + g.slot % W;
+      contact.sticks.push_back({read3(at, kernel::kPlace, W), read3(at, kernel::kSpringSlip, W)});
+    }
+  contact.place.assign(B, -1);
+  t.body.assign(1, static_cast<int>(B));
+  contact.groups.assign(1, 0);
+  contact.point.clear();
+  t.group.clear();
+  body_contacts = 0;
   if (model.contact.ground) find_ground_points();
   if (model.contact.bodies) find_pair_points();
-  resolve_contacts(h);
+  fill_contact_blocks();
 }
 
 void System::add_contact_point(const Vec3& at, double depth, double stiffness) {
@@ -92,31 +121,21 @@ int System::touch(size_t b) {
   if (b == B || fixed[b]) return 0;
   int& place = contact.place[b];
   if (place < 0) {
-    place = static_cast<int>(contact.on.size());
-    contact.on.emplace_back().body = static_cast<int>(b);
-    const size_t at = contact.touched.size();
-    contact.touched.resize(at + kernel::kTouchedFields);
-    double* c = contact.touched.data() + at;
-    const State& s = state;
-    const Vec3 v = s.v[b], w = s.w[b];
-    const Mat3 I = calc_world_inverse_inertia(b);
-    const double known[] = {
-        v.x,     v.y,     v.z,     w.x,     w.y,     w.z,     0, 0, 0, 0, 0, 0, s.body[b].inverse_mass,
-        I(0, 0), I(0, 1), I(0, 2), I(1, 1), I(1, 2), I(2, 2), 0};
-    static_assert(std::size(known) == kernel::kTouchedFields);
-    std::copy(std::begin(known), std::end(known), c);
+    place = static_cast<int>(state.touching.body.size());
+    state.touching.body.push_back(static_cast<int>(b));
+    contact.groups.push_back(0);
   }
-  contact.touched[static_cast<size_t>(place) * kernel::kTouchedFields + kernel::kGroups] += 1;
+  ++contact.groups[static_cast<size_t>(place)];
   return place;
 }
 
-void System::add_contact_group(size_t a, size_t b, const Vec3& n, size_t first, const ContactLaw& law, double stiffness,
+void System::add_contact_group(size_t a, size_t b, const Vec3& n, size_t first, int law, double stiffness,
                                StickRange& sticks) {
   const size_t count = contact.point.size() - first;
   for (ContactPoint& p : std::span(contact.point).subspan(first)) {
     double least = kUnlimited;
     for (int i = sticks.first; i < sticks.first + sticks.count; ++i) {
-      const Stick& stick = state.sticks[static_cast<size_t>(i)];
+      const Stick& stick = contact.sticks[static_cast<size_t>(i)];
       const Vec3 d = stick.at - p.at;
       if (const double distance2 = dot(d, d); distance2 < least) {
         least = distance2;
@@ -126,45 +145,50 @@ void System::add_contact_group(size_t a, size_t b, const Vec3& n, size_t first, 
     }
   }
   sticks = {static_cast<int>(first), static_cast<int>(count)};
-  ContactGroup& g = contact.group.emplace_back();
+  ContactGroup& g = state.touching.group.emplace_back();
   g.a = touch(a), g.b = touch(b);
   g.first = sticks.first, g.count = sticks.count;
   g.n = n;
   const State& s = state;
   if (b != B) g.apart = s.p[a] - s.p[b];
-  g.law = &law;
+  g.law = law;
   g.stiffness = stiffness;
 }
 
 void System::fill_contact_blocks() {
-  const size_t W = kernel::lanes(), groups = contact.group.size(), blocks = (groups + W - 1) / W;
+  Touching& t = state.touching;
+  const size_t W = kernel::lanes(), groups = t.group.size(), blocks = (groups + W - 1) / W;
   // by rising count, in order within a count
   std::vector<std::uint32_t>& next = contact.by_count;
   next.assign(BoxContact::kMostPoints + 2, 0);
   const auto key = [&](const ContactGroup& g) {
     return static_cast<size_t>(std::min(g.count, BoxContact::kMostPoints));
   };
-  for (const ContactGroup& g : contact.group) ++next[key(g) + 1];
+  for (const ContactGroup& g : t.group) ++next[key(g) + 1];
   for (size_t i = 1; i < next.size(); ++i) next[i] += next[i - 1];
-  contact.rows.assign(blocks + 1, 0);
-  for (ContactGroup& g : contact.group) {
+  t.rows.assign(blocks + 1, 0);
+  for (ContactGroup& g : t.group) {
     g.slot = next[key(g)]++;
-    std::uint32_t& most = contact.rows[g.slot / W + 1];
+    std::uint32_t& most = t.rows[g.slot / W + 1];
     most = std::max(most, static_cast<std::uint32_t>(g.count));
   }
-  for (size_t i = 0; i < blocks; ++i) contact.rows[i + 1] += contact.rows[i];
-  contact.a.assign(blocks * W, 0);
-  contact.b.assign(blocks * W, 0);
-  contact.groups.resize(blocks * W * kernel::kGroupFields);
-  contact.points.assign(contact.rows[blocks] * W * kernel::kPointFields, 0);
+  for (size_t i = 0; i < blocks; ++i) t.rows[i + 1] += t.rows[i];
+  t.a.assign(blocks * W, 0);
+  t.b.assign(blocks * W, 0);
+  t.groups.resize(blocks * W * kernel::kGroupFields);
+  t.points.assign(t.rows[blocks] * W * kernel::kPointFields, 0);
   for (size_t slot = groups; slot < blocks * W; ++slot)
     for (size_t f = 0; f < kernel::kGroupFields; ++f)
-      contact.groups[(slot / W * kernel::kGroupFields + f) * W + slot % W] = 0;
-  for (const ContactGroup& g : contact.group) {
+      t.groups[(slot / W * kernel::kGroupFields + f) * W + slot % W] = 0;
+  const auto place_of = [&](int body) {
+    const size_t i = static_cast<size_t>(body);
+    return static_cast<std::uint32_t>(i / W * kernel::kTouchedFields * W + i % W);
+  };
+  for (const ContactGroup& g : t.group) {
     const size_t block = g.slot / W, place = g.slot % W;
-    contact.a[g.slot] = static_cast<std::uint32_t>(g.a);
-    contact.b[g.slot] = static_cast<std::uint32_t>(g.b);
-    const ContactLaw& law = *g.law;
+    t.a[g.slot] = place_of(g.a);
+    t.b[g.slot] = place_of(g.b);
+    const ContactLaw& law = contact_laws[static_cast<size_t>(g.law)];
     const double known[] = {g.n.x,
                             g.n.y,
                             g.n.z,
@@ -179,111 +203,121 @@ void System::fill_contact_blocks() {
                             law.friction,
                             kStickStiffness * law.mean * g.stiffness};
     static_assert(std::size(known) == kernel::kStick + 1);
-    double* to = contact.groups.data() + block * kernel::kGroupFields * W + place;
+    double* to = t.groups.data() + block * kernel::kGroupFields * W + place;
     for (const double x : known) *to = x, to += W;
     for (int i = 0; i < g.count; ++i) {
       const ContactPoint& p = contact.point[static_cast<size_t>(g.first + i)];
       const double fields[] = {
           p.at.x, p.at.y, p.at.z, p.depth, p.stiffness, p.slip.x, p.slip.y, p.slip.z, p.is_fresh ? 1.0 : 0.0};
       static_assert(std::size(fields) == kernel::kFresh + 1);
-      double* at =
-          contact.points.data() + (contact.rows[block] + static_cast<size_t>(i)) * kernel::kPointFields * W + place;
+      double* at = t.points.data() + (t.rows[block] + static_cast<size_t>(i)) * kernel::kPointFields * W + place;
       for (const double x : fields) *at = x, at += W;
     }
   }
+  // groups of each body; the kernel reads the rest
+  const size_t touched = (t.body.size() + W - 1) / W;
+  t.share.assign(touched * W, 0);
+  for (size_t i = 0; i < contact.groups.size(); ++i) t.share[i] = contact.groups[i];
 }
 
-void System::resolve_contacts(double h) {
+void System::resolve_contacts(double h, bool follows) {
   State& s = state;
+  Touching& t = s.touching;
   s.contact_energy = s.stick_energy = 0;
   double loss = 0, loss_after = 0, friction = 0, friction_after = 0;
-  if (!contact.group.empty()) {
-    fill_contact_blocks();
-    const size_t W = kernel::lanes();
+  if (!t.group.empty()) {
+    const size_t W = kernel::lanes(), blocks = (t.body.size() + W - 1) / W;
+    const LaneLayout layout = lanes->body_layout(lane);
+    contact.vectors.assign(blocks * W, static_cast<std::uint32_t>(layout.at(B, 0, 3)));
+    contact.tensors.assign(blocks * W, static_cast<std::uint32_t>(layout.at(B, 0, 9)));
+    contact.touched.resize(blocks * W * kernel::kTouchedFields);
+    for (size_t i = 0; i < t.body.size(); ++i) {
+      const size_t b = static_cast<size_t>(t.body[i]);
+      contact.vectors[i] = static_cast<std::uint32_t>(layout.at(b, 0, 3));
+      contact.tensors[i] = static_cast<std::uint32_t>(layout.at(b, 0, 9));
+    }
+    const auto field_of = [&](size_t body, int field) -> double& {
+      return contact.touched[(body / W * kernel::kTouchedFields + static_cast<size_t>(field)) * W + body % W];
+    };
+    for (size_t i = 0; i < t.share.size(); ++i) field_of(i, kernel::kGroups) = t.share[i];
+    kernel::TouchJob bodies;
+    bodies.blocks = blocks;
+    bodies.vectors = contact.vectors.data(), bodies.tensors = contact.tensors.data();
+    bodies.stride = layout.W;
+    bodies.v = lanes->v.data(), bodies.w = lanes->w.data(), bodies.R = lanes->R.data();
+    bodies.constants = lanes->body_constants.data();
+    bodies.force = lanes->force.data(), bodies.torque = lanes->torque.data();
+    bodies.joint_force = lanes->joint_force.data(), bodies.joint_torque = lanes->joint_torque.data();
+    bodies.touched = contact.touched.data();
+    bodies.h = h;
+    for (int i = 0; i < 3; ++i) bodies.gravity[i] = model.gravity[i];
     kernel::ContactJob job;
-    job.blocks = contact.rows.size() - 1;
-    job.rows = contact.rows.data();
-    job.a = contact.a.data(), job.b = contact.b.data();
-    job.bodies = contact.touched.data();
-    job.groups = contact.groups.data();
-    job.points = contact.points.data();
+    job.blocks = t.rows.size() - 1;
+    job.rows = t.rows.data();
+    job.a = t.a.data(), job.b = t.b.data();
+    job.touched = contact.touched.data();
+    job.groups = t.groups.data();
+    job.points = t.points.data();
     job.h = h;
+    job.follows = follows;
+    job.longest = contact_interval;
     const auto slot_of_group = [&](const ContactGroup& g) {
-      return contact.groups.data() + g.slot / W * kernel::kGroupFields * W + g.slot % W;
+      return t.groups.data() + g.slot / W * kernel::kGroupFields * W + g.slot % W;
     };
     // adds the wrenches of all groups to their bodies
-    const auto push = [&](int field, Vec3 ContactForces::*push_of, Vec3 ContactForces::*turn_of) {
-      for (const ContactGroup& g : contact.group) {
-        const double* slot = slot_of_group(g);
-        const Vec3 f = read3(slot, field, W), t = read3(slot, field + 3, W);
-        ContactForces &a = contact.on[static_cast<size_t>(g.a)], &b = contact.on[static_cast<size_t>(g.b)];
-        a.*push_of += f, a.*turn_of += t;
-        b.*push_of -= f, b.*turn_of -= t + cross(g.apart, f);
-      }
+    const auto push = [&](const ContactGroup& g, const double* slot, int field, int sum) {
+      const Vec3 f = read3(slot, field, W), turn = read3(slot, field + 3, W);
+      double *a = contact.touched.data() + t.a[g.slot] + static_cast<size_t>(sum) * W,
+             *b = contact.touched.data() + t.b[g.slot] + static_cast<size_t>(sum) * W;
+      const Vec3 turn_b = turn + cross(read3(slot, kernel::kApart, W), f);
+      a[0] += f.x, a[W] += f.y, a[2 * W] += f.z, a[3 * W] += turn.x, a[4 * W] += turn.y, a[5 * W] += turn.z;
+      b[0] -= f.x, b[W] -= f.y, b[2 * W] -= f.z, b[3 * W] -= turn_b.x, b[4 * W] -= turn_b.y, b[5 * W] -= turn_b.z;
     };
-    // what all forces known so far add to the speeds within the step
-    const auto update_speeds = [&] {
-      for (size_t i = 1; i < contact.on.size(); ++i) {
-        const ContactForces& c = contact.on[i];
-        const size_t b = static_cast<size_t>(c.body);
-        double* x = contact.touched.data() + i * kernel::kTouchedFields;
-        const Vec3 dv =
-            h * (x[kernel::kTouchedMass] * (force[b] + joint_force[b] + (c.press + c.damp + c.rub)) + model.gravity);
-        const Vec3 t = h * (torque[b] + joint_torque[b] + (c.press_turn + c.damp_turn + c.rub_turn));
-        const double* I = x + kernel::kTouchedInertia;
-        double* change = x + kernel::kChange;
-        change[0] = dv.x, change[1] = dv.y, change[2] = dv.z;
-        change[3] = I[0] * t.x + I[1] * t.y + I[2] * t.z;
-        change[4] = I[1] * t.x + I[3] * t.y + I[4] * t.z;
-        change[5] = I[2] * t.x + I[4] * t.y + I[5] * t.z;
-      }
-    };
+    kernel::read_touched(bodies);
     kernel::press_contacts(job);
-    push(kernel::kPress, &ContactForces::press, &ContactForces::press_turn);
-    update_speeds();
+    for (const ContactGroup& g : t.group) push(g, slot_of_group(g), kernel::kPress, kernel::kPressSum);
+    kernel::update_touched(bodies);
     kernel::damp_contacts(job);
-    push(kernel::kDamp, &ContactForces::damp, &ContactForces::damp_turn);
-    push(kernel::kRub, &ContactForces::rub, &ContactForces::rub_turn);
-    update_speeds();
-    kernel::rub_contacts(job);
-    for (ContactForces& c : contact.on) c.rub = c.rub_turn = {};
-    push(kernel::kRub, &ContactForces::rub, &ContactForces::rub_turn);
-    update_speeds();
-
-    for (const ContactGroup& g : contact.group) {
+    for (const ContactGroup& g : t.group) {
       const double* slot = slot_of_group(g);
+      push(g, slot, kernel::kDamp, kernel::kDampSum);
+      push(g, slot, kernel::kRub, kernel::kRubSum);
       s.contact_energy += slot[kernel::kPressEnergy * W];
       s.stick_energy += slot[kernel::kStickEnergy * W];
     }
+    kernel::update_touched(bodies);
+    kernel::rub_contacts(job);
+    for (size_t i = 0; i < blocks * W; ++i)
+      for (int f = 0; f < 6; ++f) field_of(i, kernel::kRubSum + f) = 0;
+    for (const ContactGroup& g : t.group) push(g, slot_of_group(g), kernel::kRub, kernel::kRubSum);
+    kernel::update_touched(bodies);
+
     // forces do their work over the half steps before and after
-    for (size_t i = 1; i < contact.on.size(); ++i) {
-      const ContactForces& c = contact.on[i];
-      const size_t b = static_cast<size_t>(c.body);
-      const double* x = contact.touched.data() + i * kernel::kTouchedFields;
-      const Vec3 v = read3(x, kernel::kSpeed, 1), w = read3(x, kernel::kSpeed + 3, 1);
-      const Vec3 v1 = v + read3(x, kernel::kChange, 1), w1 = w + read3(x, kernel::kChange + 3, 1);
-      loss -= dot(c.damp, v) + dot(c.damp_turn, w);
-      loss_after -= dot(c.damp, v1) + dot(c.damp_turn, w1);
-      friction += dot(c.rub, v) + dot(c.rub_turn, w);
-      friction_after += dot(c.rub, v1) + dot(c.rub_turn, w1);
-      force[b] += c.press + c.damp + c.rub;
-      torque[b] += c.press_turn + c.damp_turn + c.rub_turn;
+    for (size_t i = 0; i < t.body.size(); ++i) {
+      const auto three = [&](int field) {
+        return Vec3{field_of(i, field), field_of(i, field + 1), field_of(i, field + 2)};
+      };
+      const Vec3 press = three(kernel::kPressSum), damp = three(kernel::kDampSum), rub = three(kernel::kRubSum);
+      if (i == 0) {
+        ground_contact -= press + damp + rub;
+        continue;
+      }
+      const Vec3 damp_turn = three(kernel::kDampSum + 3), rub_turn = three(kernel::kRubSum + 3);
+      const Vec3 v = three(kernel::kSpeed), w = three(kernel::kSpeed + 3);
+      const Vec3 v1 = v + three(kernel::kChange), w1 = w + three(kernel::kChange + 3);
+      loss -= dot(damp, v) + dot(damp_turn, w);
+      loss_after -= dot(damp, v1) + dot(damp_turn, w1);
+      friction += dot(rub, v) + dot(rub_turn, w);
+      friction_after += dot(rub, v1) + dot(rub_turn, w1);
+      const size_t b = static_cast<size_t>(t.body[i]);
+      force[b] += press + damp + rub;
+      torque[b] += three(kernel::kPressSum + 3) + damp_turn + rub_turn;
     }
-    const ContactForces& still = contact.on[0];
-    ground_contact -= still.press + still.damp + still.rub;
   }
   s.contact_loss += 0.5 * h * (s.contact_loss_power + loss);
   s.friction_work += 0.5 * h * (s.friction_power + friction);
   s.contact_loss_power = loss_after;
   s.friction_power = friction_after;
-  s.sticks.resize(contact.point.size());
-  const size_t W = kernel::lanes();
-  for (const ContactGroup& g : contact.group)
-    for (int i = 0; i < g.count; ++i) {
-      const size_t point = static_cast<size_t>(g.first + i), row = contact.rows[g.slot / W] + static_cast<size_t>(i);
-      const double* at = contact.points.data() + row * kernel::kPointFields * W + g.slot % W;
-      s.sticks[point] = {contact.point[point].at, read3(at, kernel::kSpringSlip, W)};
-    }
 }
 
 }  // namespace topple::mbs

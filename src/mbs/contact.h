@@ -12,6 +12,8 @@
 
 namespace topple::mbs {
 
+inline constexpr double kContactAngle = 0.18;  // of a contact's swing in a step or between looks, at most [rad]
+
 /// A friction spring at a touching point, as the step before left it.
 struct Stick {
   Vec3 at;    // from the first body's mass centre [m]
@@ -20,7 +22,7 @@ struct Stick {
 
 /// Those of a pair, or of a shape on the ground.
 struct StickRange {
-  int first = 0, count = 0;  // in State::sticks
+  int first = 0, count = 0;  // in ContactScratch::sticks
 };
 
 /// Contact shape in its body's frame.
@@ -83,17 +85,11 @@ struct ContactPoint {
 struct ContactGroup {
   int a = 0, b = 0;  // into the touched bodies
   int first = 0, count = 0;
-  Vec3 n;      // from a to b
-  Vec3 apart;  // from b's mass centre to a's, 0 on the ground [m]
-  const ContactLaw* law = nullptr;
+  Vec3 n;                  // from a to b
+  Vec3 apart;              // from b's mass centre to a's, 0 on the ground [m]
+  int law = 0;             // into System::contact_laws
   double stiffness = 0;    // k of one corner of a box [N/m]
   std::uint32_t slot = 0;  // in the kernel's blocks
-};
-
-/// Forces of contact on a body and torques about its mass centre: by the springs, the dashpots and friction.
-struct ContactForces {
-  int body = -1;
-  Vec3 press, press_turn, damp, damp_turn, rub, rub_turn;
 };
 
 /// A shape in the search: the box around it and what surely touches nothing farther.
@@ -126,16 +122,26 @@ struct PairLook {
   size_t slot = 0;  // two boxes: in the kernel's blocks
 };
 
-/// The contacts of one step; scratch. T touched bodies; the first stands for the ground and all fixed ones.
-struct ContactScratch {
-  std::vector<int> place;         // of each body among those touched, -1: is not (B + 1, the last is the ground)
-  std::vector<ContactForces> on;  // (T)
-  AlignedVector<double> touched;  // as the kernel sees them (T)
-  std::vector<ContactPoint> point;
+/// What touches, as the last look found it. T touched bodies; the first stands for the ground and all fixed ones.
+struct Touching {
+  int steps = 0;          // since then
+  std::vector<int> body;  // B for the ground (T)
   std::vector<ContactGroup> group;
   // the kernel's blocks, groups of like counts of points together
-  std::vector<std::uint32_t> rows, a, b, by_count;
+  std::vector<std::uint32_t> rows, a, b;
   AlignedVector<double> groups, points;
+  std::vector<double> share;  // groups of each body, filled up to blocks (T)
+};
+
+/// Scratch of contacts.
+struct ContactScratch {
+  std::vector<int> place;                       // of each body among those touched, -1: is not (B)
+  std::vector<int> groups;                      // of each touched body
+  AlignedVector<double> touched;                // as the kernel sees them
+  std::vector<std::uint32_t> vectors, tensors;  // places of what belongs to them
+  std::vector<ContactPoint> point;
+  std::vector<Stick> sticks;  // of all points of the step before
+  std::vector<std::uint32_t> by_count;
   std::vector<std::uint32_t> candidates;  // pairs that may be due
   std::vector<PairLook> looks;
   AlignedVector<double> boxes_a, boxes_b, box_answers;  // the kernel's blocks of pairs of boxes

@@ -23,21 +23,74 @@ HWY_INLINE V3<D> zeros() {
   return {num<D>(0), num<D>(0), num<D>(0)};
 }
 
-/// Reads fields of the bodies of a block.
+/// Reads fields of scattered bodies, `stride` between them.
 template <class D>
 struct Reader {
-  const double* HWY_RESTRICT bodies;
+  const double* HWY_RESTRICT from;
   hn::Vec<hn::RebindToSigned<D>> at;
+  size_t stride;
 
-  HWY_INLINE Reader(const double* from, const std::uint32_t* indices) : bodies(from) {
+  HWY_INLINE Reader(const double* start, const std::uint32_t* indices, size_t between) : from(start), stride(between) {
     const hn::RebindToSigned<D> di;
     const hn::Rebind<std::uint32_t, D> du;
-    at = hn::Mul(hn::BitCast(di, hn::PromoteTo(hn::RebindToUnsigned<D>(), hn::LoadU(du, indices))),
-                 hn::Set(di, kTouchedFields));
+    at = hn::BitCast(di, hn::PromoteTo(hn::RebindToUnsigned<D>(), hn::LoadU(du, indices)));
   }
-  HWY_INLINE Num<D> operator()(int field) const { return {hn::GatherIndex(D(), bodies + field, at)}; }
+  HWY_INLINE Num<D> operator()(int field) const {
+    return {hn::GatherIndex(D(), from + static_cast<size_t>(field) * stride, at)};
+  }
   HWY_INLINE V3<D> three(int field) const { return {(*this)(field), (*this)(field + 1), (*this)(field + 2)}; }
 };
+
+template <class D>
+HWY_INLINE void read_block(const TouchJob& job, size_t block) {
+  const size_t W = hn::Lanes(D());
+  double* to = job.touched + block * kTouchedFields * W;
+  const auto vectors = [&](const double* from) {
+    return Reader<D>(from, job.vectors + block * W, job.stride).three(0);
+  };
+  store3<D>(vectors(job.v), to, kSpeed);
+  store3<D>(vectors(job.w), to, kSpeed + 3);
+  const Reader<D> R(job.R, job.tensors + block * W, job.stride), c(job.constants, job.tensors + block * W, job.stride);
+  static_assert(kBodyFields == 9, "constants lie as matrices do");
+  store<D>(c(kInverseMass), to, kTouchedMass);
+  // R I Rᵀ
+  const Num<D> xx = c(kInverseInertia), xy = c(kInverseInertia + 1), xz = c(kInverseInertia + 2),
+               yy = c(kInverseInertia + 3), yz = c(kInverseInertia + 4), zz = c(kInverseInertia + 5);
+  const V3<D> r[3] = {R.three(0), R.three(3), R.three(6)};
+  int field = kTouchedInertia;
+  for (int i = 0; i < 3; ++i) {
+    const V3<D> x{fma(xz, r[i].z, fma(xy, r[i].y, xx * r[i].x)), fma(yz, r[i].z, fma(yy, r[i].y, xy * r[i].x)),
+                  fma(zz, r[i].z, fma(yz, r[i].y, xz * r[i].x))};
+    for (int j = i; j < 3; ++j) store<D>(dot(r[j], x), to, field++);
+  }
+  for (int i = 0; i < 6; ++i) store<D>(num<D>(0), to, kChange + i);
+  for (int i = kPressSum; i < kTouchedFields; ++i) store<D>(num<D>(0), to, i);
+}
+
+template <class D>
+HWY_INLINE void update_block(const TouchJob& job, size_t block) {
+  const size_t W = hn::Lanes(D());
+  double* t = job.touched + block * kTouchedFields * W;
+  const auto vectors = [&](const double* from) {
+    return Reader<D>(from, job.vectors + block * W, job.stride).three(0);
+  };
+  const Num<D> h = num<D>(job.h), m = load<D>(t, kTouchedMass);
+  const V3<D> gravity{num<D>(job.gravity[0]), num<D>(job.gravity[1]), num<D>(job.gravity[2])};
+  const V3<D> force = (vectors(job.force) + vectors(job.joint_force)) +
+                      ((load3<D>(t, kPressSum) + load3<D>(t, kDampSum)) + load3<D>(t, kRubSum));
+  const V3<D> torque = (vectors(job.torque) + vectors(job.joint_torque)) +
+                       ((load3<D>(t, kPressSum + 3) + load3<D>(t, kDampSum + 3)) + load3<D>(t, kRubSum + 3));
+  // what does not move has no gravity
+  const Num<D> free = select(hn::Gt(m.v, hn::Zero(D())), h, num<D>(0));
+  store3<D>(fma(free, gravity, (h * m) * force), t, kChange);
+  const Num<D> xy = load<D>(t, kTouchedInertia + 1), xz = load<D>(t, kTouchedInertia + 2),
+               yz = load<D>(t, kTouchedInertia + 4);
+  const V3<D> x = h * torque;
+  store3<D>({fma(xz, x.z, fma(xy, x.y, load<D>(t, kTouchedInertia) * x.x)),
+             fma(yz, x.z, fma(load<D>(t, kTouchedInertia + 3), x.y, xy * x.x)),
+             fma(load<D>(t, kTouchedInertia + 5), x.z, fma(yz, x.y, xz * x.x))},
+            t, kChange + 3);
+}
 
 /// Symmetric matrix times vector; its six fields begin at `field`.
 template <class D>
@@ -104,8 +157,16 @@ HWY_INLINE void press_block(const ContactJob& job, size_t block) {
   const D d;
   const size_t W = hn::Lanes(d);
   double* g = job.groups + block * kGroupFields * W;
-  const Reader<D> A(job.bodies, job.a + block * W), B(job.bodies, job.b + block * W);
-  const V3<D> n = load3<D>(g, kNormal), apart = load3<D>(g, kApart);
+  const Reader<D> A(job.touched, job.a + block * W, W), B(job.touched, job.b + block * W, W);
+  const V3<D> n = load3<D>(g, kNormal);
+  V3<D> apart = load3<D>(g, kApart);
+  const Num<D> h = num<D>(job.h);
+  V3<D> turned = zeros<D>();  // of a in the step
+  if (job.follows) {
+    apart = fma(h, A.three(kSpeed) - B.three(kSpeed), apart);
+    store3<D>(apart, g, kApart);
+    turned = h * A.three(kSpeed + 3);
+  }
   const Motion<D> m = calc_motion(A, B, apart, kSpeed);
   store3<D>(m.v, g, kMotion), store3<D>(m.w, g, kMotion + 3);
   store<D>(A(kTouchedMass), g, kMassA), store<D>(B(kTouchedMass), g, kMassB);
@@ -114,7 +175,7 @@ HWY_INLINE void press_block(const ContactJob& job, size_t block) {
     store<D>(A(kTouchedInertia + i), g, kInertiaA + i);
     store<D>(B(kTouchedInertia + i), g, kInertiaB + i);
   }
-  const Num<D> zero = num<D>(0), half = num<D>(0.5), h = num<D>(job.h), along = dot(n, m.v);
+  const Num<D> zero = num<D>(0), half = num<D>(0.5), one = num<D>(1), along = dot(n, m.v);
   const Num<D> inverse_mass = load<D>(g, kMassA) + load<D>(g, kMassB), mean = load<D>(g, kMean),
                damping = load<D>(g, kDamping), twice_zeta = num<D>(2) * load<D>(g, kZeta);
   const V3<D> to_b = cross(apart, n);
@@ -123,24 +184,35 @@ HWY_INLINE void press_block(const ContactJob& job, size_t block) {
   V3<D> torque = zeros<D>();
   for (size_t row = job.rows[block]; row < job.rows[block + 1]; ++row) {
     double* p = job.points + row * kPointFields * W;
-    const Num<D> k = load<D>(p, kPointStiffness), depth = load<D>(p, kDepth);
-    const auto here = hn::Gt(k.v, hn::Zero(d));
-    const V3<D> la = cross(load3<D>(p, kPlace), n), lb = la + to_b;
+    V3<D> place = load3<D>(p, kPlace);
+    if (job.follows) {
+      place = place + cross(turned, place);
+      store3<D>(place, p, kPlace);
+    }
+    const V3<D> la = cross(place, n), lb = la + to_b;
+    const Num<D> k = load<D>(p, kPointStiffness), speed = along + dot(la, m.w), way = h * abs(speed);
+    Num<D> depth = load<D>(p, kDepth);
+    if (job.follows) {
+      depth = fma(h, speed, depth);
+      store<D>(depth, p, kDepth);
+    }
+    const auto here = hn::And(hn::Gt(k.v, hn::Zero(d)), hn::Gt(depth.v, hn::Zero(d)));
+    depth = select(here, depth, zero);
     const Num<D> w = (inverse_mass + dot(la, times<D>(g, kInertiaA, la))) + dot(lb, times<D>(g, kInertiaB, lb));
     const Num<D> z = select(here, Num<D>{hn::Sqrt((k / w).v)}, zero);
     impedance = impedance + z;
-    const Num<D> speed = along + dot(la, m.w), way = h * abs(speed);
     Num<D> full = k * depth;
     energy = fma(full, depth, energy);
-    // of a step in which the surfaces meet or part, only a share is in touch
-    const auto passes = hn::Gt(way.v, depth.v);
-    const Num<D> share = depth / select(passes, way, num<D>(1));
-    full = select(passes, full * fma(half, share, half), full);
+    // of a step in which the surfaces meet or part, only a share is in touch; they may have met before they were seen
+    const auto passes = hn::Gt(way.v, depth.v), meets = hn::Gt(speed.v, hn::Zero(d));
+    const Num<D> share = depth / select(hn::Gt(way.v, hn::Zero(d)), way, one);
+    const auto was_late =
+        hn::And(hn::And(meets, hn::Gt(load<D>(p, kFresh).v, hn::Zero(d))), hn::Le(share.v, hn::Set(d, job.longest)));
+    full = select(hn::Or(passes, was_late), full * fma(half, share, half), full);
     Num<D> rate = twice_zeta * z;
     if (HWY_UNLIKELY(!hn::AllFalse(d, plain))) {
       // a plain dashpot begins with a jump: for half a step, and the share of the one before
-      const auto meets = hn::And(passes, hn::Gt(speed.v, hn::Zero(d)));
-      const Num<D> steady = select(meets, (half + share) * damping, damping);
+      const Num<D> steady = select(hn::And(passes, meets), (half + share) * damping, damping);
       rate = select(hn::And(plain, here), steady, rate);
     }
     const Num<D> force = mean * full;
@@ -158,7 +230,7 @@ HWY_INLINE void damp_block(const ContactJob& job, size_t block) {
   const D d;
   const size_t W = hn::Lanes(d);
   double* g = job.groups + block * kGroupFields * W;
-  const Reader<D> A(job.bodies, job.a + block * W), B(job.bodies, job.b + block * W);
+  const Reader<D> A(job.touched, job.a + block * W, W), B(job.touched, job.b + block * W, W);
   const V3<D> n = load3<D>(g, kNormal), apart = load3<D>(g, kApart);
   const Motion<D> change = calc_motion(A, B, apart, kChange);
   const Num<D> zero = num<D>(0), h = num<D>(job.h), along = dot(n, change.v);
@@ -211,6 +283,7 @@ HWY_INLINE void damp_block(const ContactJob& job, size_t block) {
     V3<D> slip = across(n, fma(h * (one - load<D>(p, kFresh)), slide, load3<D>(p, kSpringSlip)));
     const Num<D> size2 = limit(slip, longest);  // it follows where friction can hold no more
     store3<D>(slip, p, kSpringSlip);
+    store<D>(zero, p, kFresh);
     const Num<D> normal = load<D>(p, kNormalForce);
     const V3<D> held = (zero - rate * normal) * slip;
     energy = fma(normal, size2, energy);
@@ -226,7 +299,7 @@ HWY_INLINE void rub_block(const ContactJob& job, size_t block) {
   const D d;
   const size_t W = hn::Lanes(d);
   double* g = job.groups + block * kGroupFields * W;
-  const Reader<D> A(job.bodies, job.a + block * W), B(job.bodies, job.b + block * W);
+  const Reader<D> A(job.touched, job.a + block * W, W), B(job.touched, job.b + block * W, W);
   const V3<D> n = load3<D>(g, kNormal), apart = load3<D>(g, kApart);
   const Motion<D> change = calc_motion(A, B, apart, kChange);
   const Num<D> zero = num<D>(0), one = num<D>(1), h = num<D>(job.h), total = load<D>(g, kTotal);
@@ -270,6 +343,14 @@ using Wide = hn::ScalableTag<double>;
 using One = hn::CappedTag<double, 1>;
 
 template <class D>
+HWY_INLINE void read_all(const TouchJob& job) {
+  for (size_t block = 0; block < job.blocks; ++block) read_block<D>(job, block);
+}
+template <class D>
+HWY_INLINE void update_all(const TouchJob& job) {
+  for (size_t block = 0; block < job.blocks; ++block) update_block<D>(job, block);
+}
+template <class D>
 HWY_INLINE void press_all(const ContactJob& job) {
   for (size_t block = 0; block < job.blocks; ++block) press_block<D>(job, block);
 }
@@ -281,6 +362,10 @@ template <class D>
 HWY_INLINE void rub_all(const ContactJob& job) {
   for (size_t block = 0; block < job.blocks; ++block) rub_block<D>(job, block);
 }
+void read_touched_here(const TouchJob& job) { read_all<Wide>(job); }
+void update_touched_here(const TouchJob& job) { update_all<Wide>(job); }
+void read_touched_singly_here(const TouchJob& job) { read_all<One>(job); }
+void update_touched_singly_here(const TouchJob& job) { update_all<One>(job); }
 void press_contacts_here(const ContactJob& job) { press_all<Wide>(job); }
 void damp_contacts_here(const ContactJob& job) { damp_all<Wide>(job); }
 void rub_contacts_here(const ContactJob& job) { rub_all<Wide>(job); }
@@ -295,6 +380,10 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace topple::mbs::kernel {
 
+HWY_EXPORT(read_touched_here);
+HWY_EXPORT(update_touched_here);
+HWY_EXPORT(read_touched_singly_here);
+HWY_EXPORT(update_touched_singly_here);
 HWY_EXPORT(press_contacts_here);
 HWY_EXPORT(damp_contacts_here);
 HWY_EXPORT(rub_contacts_here);
@@ -302,6 +391,10 @@ HWY_EXPORT(press_contacts_singly_here);
 HWY_EXPORT(damp_contacts_singly_here);
 HWY_EXPORT(rub_contacts_singly_here);
 
+void read_touched(const TouchJob& job) { HWY_DYNAMIC_DISPATCH(read_touched_here)(job); }
+void update_touched(const TouchJob& job) { HWY_DYNAMIC_DISPATCH(update_touched_here)(job); }
+void read_touched_singly(const TouchJob& job) { HWY_DYNAMIC_DISPATCH(read_touched_singly_here)(job); }
+void update_touched_singly(const TouchJob& job) { HWY_DYNAMIC_DISPATCH(update_touched_singly_here)(job); }
 void press_contacts(const ContactJob& job) { HWY_DYNAMIC_DISPATCH(press_contacts_here)(job); }
 void damp_contacts(const ContactJob& job) { HWY_DYNAMIC_DISPATCH(damp_contacts_here)(job); }
 void rub_contacts(const ContactJob& job) { HWY_DYNAMIC_DISPATCH(rub_contacts_here)(job); }

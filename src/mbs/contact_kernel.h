@@ -13,14 +13,17 @@ namespace topple::mbs::kernel {
 // Field numbers are constants, and named so.
 // NOLINTBEGIN(readability-identifier-naming)
 
-/// Fields of a touched body, one body after the other.
+/// Fields of a touched body, in blocks of lanes as bodies are.
 enum Touched : int {
   kSpeed = 0,            // v, w half a step ago (6)
   kChange = 6,           // what the forces known so far add to them within the step (6)
   kTouchedMass = 12,     // one over it
   kTouchedInertia = 13,  // inverse inertia in W: xx xy xz yy yz zz
   kGroups = 19,          // that the body has
-  kTouchedFields = 20
+  kPressSum = 20,        // force and torque of all groups: by the springs (6)
+  kDampSum = 26,         // by the dashpots (6)
+  kRubSum = 32,          // by friction (6)
+  kTouchedFields = 38
 };
 
 /// Fields of a group: what is given, what press leaves to the others, and the answers.
@@ -67,14 +70,33 @@ enum Point : int {
 };
 // NOLINTEND(readability-identifier-naming)
 
+/// Bodies of a run, seen from the touched ones.
+struct TouchJob {
+  size_t blocks = 0;                       // of touched bodies
+  const std::uint32_t *vectors, *tensors;  // of each, where its vectors and its matrices and constants begin
+  size_t stride = 1;                       // between their components
+  const double *v, *w, *R, *constants;
+  const double *force, *torque, *joint_force, *joint_torque;
+  double* touched;
+  double h = 0;
+  double gravity[3] = {0, 0, 0};
+};
+
+/// Speeds and inertia; nothing pushes yet.
+void read_touched(const TouchJob&);
+/// What all forces known so far add to the speeds within the step.
+void update_touched(const TouchJob&);
+
 struct ContactJob {
   size_t blocks = 0;
   const std::uint32_t* rows;   // block i has the points in rows[i] to rows[i + 1], W in each
-  const std::uint32_t *a, *b;  // bodies of the groups (W a block)
-  const double* bodies;        // kTouchedFields each
+  const std::uint32_t *a, *b;  // where the fields of the groups' bodies begin (W a block)
+  const double* touched;       // bodies
   double* groups;              // kGroupFields a block
   double* points;              // kPointFields a row
   double h = 0;
+  bool follows = false;  // the points are those of the step before, moved with the bodies
+  double longest = 1;    // steps since points were looked for before
 };
 
 /// Springs: speeds, forces and the wrench of all.
@@ -85,6 +107,8 @@ void damp_contacts(const ContactJob&);
 void rub_contacts(const ContactJob&);
 
 /// The same with one lane at a time in the same instruction set.
+void read_touched_singly(const TouchJob&);
+void update_touched_singly(const TouchJob&);
 void press_contacts_singly(const ContactJob&);
 void damp_contacts_singly(const ContactJob&);
 void rub_contacts_singly(const ContactJob&);

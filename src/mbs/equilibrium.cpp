@@ -22,8 +22,6 @@ using Sparse = Eigen::SparseMatrix<double>;
 using Triplets = std::vector<Eigen::Triplet<double>>;
 using Vector = Eigen::VectorXd;
 
-constexpr double kContactAngle = 0.18;  // of a contact's swing in a step, at most [rad]
-
 /// A row of a kinematic matrix: how fast one deformation grows with the velocities of two bodies.
 struct KinematicRow {
   int a = -1, b = -1;  // place among the free bodies, -1 for held ones
@@ -249,6 +247,7 @@ void System::set_step(double h) {
 
 void System::adopt_step() {
   step = state.step;
+  contact_interval = calc_contact_interval();
   summary.shortest_step = summary.shortest_step > 0 ? std::min(summary.shortest_step, step) : step;
   const double relaxation = 1 - std::exp(-step * model.damping_frequency);
   for (CompiledRotational& r : rotationals) r.zone.relaxation = relaxation;

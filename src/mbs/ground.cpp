@@ -72,7 +72,7 @@ void System::find_ground_points() {
         const double approach = -dot(n, now.v[b] + cross(now.w[b], contact.point[first].at));
         say({Happening::Kind::GroundContact, s.time, static_cast<int>(b), -1, {}, std::max(0.0, approach)});
       }
-      add_contact_group(b, B, -n, first, law, stiffness, shape.sticks);
+      add_contact_group(b, B, -n, first, ground_law[b], stiffness, shape.sticks);
       shape.is_touching = true;
     }
   }

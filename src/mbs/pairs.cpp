@@ -152,7 +152,7 @@ void System::find_pair_points() {
       if (depth > 0) add_contact_point(points.p[i] - p_a, depth, points.weight[i] * stiffness);
     }
     body_contacts += static_cast<int>(contact.point.size() - first);
-    add_contact_group(a, b, points.normal, first, law, stiffness, pair.sticks);
+    add_contact_group(a, b, points.normal, first, pair.law, stiffness, pair.sticks);
     due.touching = true;
   }
 }

@@ -19,8 +19,8 @@ class Writer {
     static_assert(std::is_trivially_copyable_v<T>);
     append(&x, sizeof x);
   }
-  template <class T>
-  void operator()(const std::vector<T>& x) {
+  template <class T, class A>
+  void operator()(const std::vector<T, A>& x) {
     static_assert(std::is_trivially_copyable_v<T>);
     (*this)(x.size());
     append(x.data(), x.size() * sizeof(T));
@@ -46,8 +46,8 @@ class Reader {
   void operator()(T& x) {
     take(&x, sizeof x);
   }
-  template <class T>
-  void operator()(std::vector<T>& x) {
+  template <class T, class A>
+  void operator()(std::vector<T, A>& x) {
     size_t size = 0;
     (*this)(size);
     if (size > (bytes_.size() - at_) / sizeof(T)) fail();
@@ -89,8 +89,10 @@ void visit(Archive& ar, S& s, C& sys) {
   ar(s.element), ar(s.rotational), ar(s.joint), ar(s.cable);
   ar(s.spring), ar(s.torsion), ar(s.bushing), ar(s.load);
   ar(s.pairs), ar(s.pair_due), ar(s.pair_clock), ar(s.pair_fast), ar(s.clock), ar(s.is_fast), ar(s.travel),
-      ar(s.search_velocity), ar(s.allowance), ar(s.sticks), ar(s.tied_to_ground), ar(s.search_due), ar(s.last_search),
+      ar(s.search_velocity), ar(s.allowance), ar(s.tied_to_ground), ar(s.search_due), ar(s.last_search),
       ar(s.touched_pairs);
+  ar(s.touching.steps), ar(s.touching.body), ar(s.touching.group), ar(s.touching.rows), ar(s.touching.a),
+      ar(s.touching.b), ar(s.touching.groups), ar(s.touching.points), ar(s.touching.share);
   ar(s.removed), ar(s.contact_energy), ar(s.stick_energy), ar(s.contact_loss), ar(s.contact_loss_power),
       ar(s.friction_work), ar(s.friction_power), ar(s.total_at_start);
   ar(s.gravity_at_start), ar(s.largest_residual), ar(s.released), ar(s.largest_drift), ar(s.quiet_steps);

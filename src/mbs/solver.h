@@ -91,6 +91,9 @@ struct Options {
   double duration = 1;  // [s]
   double step = 0;      // 0: step_safety times the limit of the stiffest mode
   double step_safety = 0.85;
+  /// Steps from one look for touching points to the next; between them the points move with their bodies. 0: as many as
+  /// a contact allows, at most 4, in steps of the engine's own choice, and 1 in others.
+  int contact_interval = 0;
   double frame_interval = 1.0 / 60;  // of on_frame [s]; whole steps, the nearest at or after each instant
   bool equilibrium = true;           // start from the dead-load equilibrium; false: from the poses of the model
   /// Stop when, after the last event and for rest_time, the speed that stands for the kinetic energy per mass is below

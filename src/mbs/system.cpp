@@ -444,6 +444,7 @@ void System::replace_body(size_t b, const Body& replacement) {
   s.removed += before - energy();
   mark_search_due();
   drop_pairs_of(b);
+  s.touching.steps = 0;  // its points are others now
 }
 
 void System::evaluate_forces() {
@@ -455,7 +456,6 @@ void System::evaluate_forces() {
 void System::begin_forces() {
   ground_reaction = {};
   ground_contact = {};
-  body_contacts = 0;
   fire_events();
 }
 

@@ -113,8 +113,8 @@ struct State {
   std::vector<double> allowance;  // the way at which a body asks for a new search (B) [m]
   std::vector<unsigned char> tied_to_ground;
   bool search_due = true;
-  long last_search = -1;            // step
-  std::vector<Stick> sticks;        // of all touching points
+  long last_search = -1;  // step
+  Touching touching;
   std::vector<long> touched_pairs;  // a * B + b, sorted
   // ledger [J]
   double removed = 0, contact_energy = 0, stick_energy = 0;
@@ -230,6 +230,7 @@ class System {
   std::vector<Vec3> body_reaction, body_reaction_turn;  // their sums on bodies (B)
   Vec3 ground_reaction, ground_contact;
   int body_contacts = 0;
+  int contact_interval = 1;     // steps from one look for touching points to the next
   std::string trouble;          // why the run cannot go on; empty: nothing
   std::vector<int> due_events;  // of this step
   ContactScratch contact;
@@ -353,12 +354,15 @@ class System {
   int touch(size_t body);
   /// Makes the points from `first` on a group. Each takes over the friction spring of the nearest one of the step
   /// before.
-  void add_contact_group(size_t a, size_t b, const Vec3& n, size_t first, const ContactLaw&, double stiffness,
-                         StickRange&);
+  void add_contact_group(size_t a, size_t b, const Vec3& n, size_t first, int law, double stiffness, StickRange&);
   /// Gives every group found a slot of the kernel.
   void fill_contact_blocks();
+  /// Steps from one look for touching points to the next.
+  int calc_contact_interval() const;
+  /// Finds the touching points; between looks they move with their bodies.
+  void find_contacts();
   /// Forces at the points found, on the bodies and in the ledger.
-  void resolve_contacts(double h);
+  void resolve_contacts(double h, bool follows);
   /// Moves a body from its pose at the beginning of the step to the end of it.
   void drift(size_t body, double h, const Vec3& p0, const Quat& q0, const Mat3& R0);
   void build_clusters();
