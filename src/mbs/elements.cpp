@@ -91,7 +91,7 @@ void System::lay_out_elements() {
   }
 }
 
-void System::pack_element(size_t e) {
+void System::pack_element(size_t e, bool has_moved) {
   ZoneState& z = state.element[e];
   if (!z.live) return kill_slot(e);
   Lanes& l = *lanes;
@@ -99,11 +99,13 @@ void System::pack_element(size_t e) {
   if (slot == Lanes::kNoSlot) return;
   const CompiledElement& c = elements[e];
   const auto put = [&](int f, double x) { l.set(slot, f, x); };
-  const Vec3 pa = c.a >= 0 ? c.p_AF - state.p_offset[static_cast<size_t>(c.a)] : c.p_AF;
-  const Vec3 pb = c.b >= 0 ? c.p_BM - state.p_offset[static_cast<size_t>(c.b)] : c.p_BM;
-  for (int i = 0; i < 3; ++i) put(kMarkerA + i, pa[i]), put(kMarkerB + i, pb[i]);
-  const double qa[4] = {c.q_AF.w, c.q_AF.x, c.q_AF.y, c.q_AF.z}, qb[4] = {c.q_BM.w, c.q_BM.x, c.q_BM.y, c.q_BM.z};
-  for (int i = 0; i < 4; ++i) put(kMarkerA + 3 + i, qa[i]), put(kMarkerB + 3 + i, qb[i]);
+  if (has_moved) {
+    const Vec3 pa = c.a >= 0 ? c.p_AF - state.p_offset[static_cast<size_t>(c.a)] : c.p_AF;
+    const Vec3 pb = c.b >= 0 ? c.p_BM - state.p_offset[static_cast<size_t>(c.b)] : c.p_BM;
+    for (int i = 0; i < 3; ++i) put(kMarkerA + i, pa[i]), put(kMarkerB + i, pb[i]);
+    const double qa[4] = {c.q_AF.w, c.q_AF.x, c.q_AF.y, c.q_AF.z}, qb[4] = {c.q_BM.w, c.q_BM.x, c.q_BM.y, c.q_BM.z};
+    for (int i = 0; i < 4; ++i) put(kMarkerA + 3 + i, qa[i]), put(kMarkerB + 3 + i, qb[i]);
+  }
   for (int i = 0; i < 6; ++i) put(kStiffness + i, z.share * c.zone.stiffness[i]);
   put(kViscous, c.zone.viscous);
   put(kRelaxation, c.zone.relaxation);
@@ -270,7 +272,7 @@ void System::evaluate_outside(size_t slot) {
   const size_t e = lanes->is_batch ? slot / lanes->W : lanes->element_of[slot];
   unpack_element(e);
   evaluate_element(e, step);
-  pack_element(e);
+  pack_element(e, false);
 }
 
 void System::evaluate_elements_fully(double h) {

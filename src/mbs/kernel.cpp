@@ -198,16 +198,23 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
     M moves = to.out;
     for (int q = 0; q < 2; ++q) {
       const int cell = kStations + s * kStationFields + kCell + q * kCellFields;
-      const N t = (f[0] - load<D>(flow, cell + kCellForce)) * load<D>(flow, cell + kCellForce + 1);
+      const N above = f[0] - load<D>(flow, cell + kCellForce);
+      const auto upper = hn::Ge(above.v, zero.v);
+      const N t =
+          abs(above * select(upper, load<D>(flow, cell + kCellForce + 2), load<D>(flow, cell + kCellForce + 1)));
       const N r = (load<D>(flow, kStations + s * kStationFields + kReached) - load<D>(flow, cell + kCellRotation)) *
                   load<D>(flow, cell + kCellRotation + 1);
-      demand(
-          hn::And(hn::And(hn::Ge(t.v, zero.v), hn::Le(t.v, one.v)), hn::And(hn::Ge(r.v, zero.v), hn::Le(r.v, one.v))));
+      demand(hn::And(hn::Le(t.v, one.v), hn::And(hn::Ge(r.v, zero.v), hn::Le(r.v, one.v))));
       const auto positive = hn::Ge(plane[q].m[s].v, zero.v);
-      N corner[4];
-      for (int c = 0; c < 4; ++c)
-        corner[c] = select(positive, load<D>(flow, cell + kCellPositive + c), load<D>(flow, cell + kCellNegative + c));
-      const N low = fma(t, corner[2] - corner[0], corner[0]), high = fma(t, corner[3] - corner[1], corner[1]);
+      const auto corner = [&](int force, int rotation) {
+        const int at = cell + 2 * force + rotation;
+        return select(positive, load<D>(flow, at + kCellPositive), load<D>(flow, at + kCellNegative));
+      };
+      const auto along_force = [&](int rotation) {
+        const N middle = corner(1, rotation);
+        return fma(t, select(upper, corner(2, rotation), corner(0, rotation)) - middle, middle);
+      };
+      const N low = along_force(0), high = along_force(1);
       const N limit = fma(r, high - low, low), size = abs(plane[q].m[s]);
       to.none[q] = hn::Le(limit.v, zero.v);
       const N ratio = select(to.none[q], zero, size / N{hn::Max(limit.v, tiny.v)});

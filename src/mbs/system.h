@@ -314,7 +314,8 @@ class System {
   /// Gives every live element a slot, in their order.
   void lay_out_elements();
   /// From the state of the zones to the slots, and back.
-  void pack_element(size_t element);
+  /// Markers and constants are written only if they may have changed.
+  void pack_element(size_t element, bool has_moved = true);
   void unpack_element(size_t element);
   void pack_elements();
   void unpack_elements();

@@ -764,9 +764,16 @@ bool write_flow(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, c
       }
       const double force = z.normal_force / whole, reached = z.station[s].reached;
       if (!(force > family->force.front() && force < family->force.back())) return false;
-      const size_t k = static_cast<size_t>(find_interval(family->force, force, 0));
-      cell[kCellForce] = whole * family->force[k];
-      cell[kCellForce + 1] = 1 / (whole * (family->force[k + 1] - family->force[k]));
+      // the interval that the force is in and the nearer one beside it
+      const std::vector<double>& forces = family->force;
+      const size_t k = static_cast<size_t>(find_interval(forces, force, 0)), last = forces.size() - 1;
+      const bool is_low = force - forces[k] < forces[k + 1] - force;
+      const size_t middle = (is_low && k > 0) || k + 1 == last ? k : k + 1;
+      const size_t row[3] = {middle > 0 ? middle - 1 : middle, middle, std::min(middle + 1, last)};
+      cell[kCellForce] = whole * forces[middle];
+      // no width: nothing but the full law beyond
+      cell[kCellForce + 1] = row[0] < middle ? 1 / (whole * (forces[middle] - forces[row[0]])) : unlimited;
+      cell[kCellForce + 2] = row[2] > middle ? 1 / (whole * (forces[row[2]] - forces[middle])) : unlimited;
       size_t j[2] = {family->rotation.size() - 1, family->rotation.size() - 1};
       cell[kCellRotation] = reached;
       if (reached < family->rotation.back()) {
@@ -775,8 +782,8 @@ bool write_flow(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, c
         cell[kCellRotation + 1] = 1 / (family->rotation[j[1]] - family->rotation[j[0]]);
         far = std::max(far, family->rotation[j[1]]);
       }
-      for (size_t c = 0; c < 4; ++c) {
-        const double* limit = &family->limit[2 * ((k + c / 2) * static_cast<size_t>(family->J) + j[c % 2])];
+      for (size_t c = 0; c < 6; ++c) {
+        const double* limit = &family->limit[2 * (row[c / 2] * static_cast<size_t>(family->J) + j[c % 2])];
         cell[static_cast<size_t>(kCellPositive) + c] = whole * limit[0];
         cell[static_cast<size_t>(kCellNegative) + c] = whole * limit[1];
       }
