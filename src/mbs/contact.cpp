@@ -15,7 +15,8 @@ namespace topple::mbs {
 
 namespace {
 
-constexpr int kMostContactInterval = 4;
+constexpr int kMostContactInterval = 2;
+constexpr double kLookAngle = 0.11;      // of a contact's swing from one look for points to the next, at most [rad]
 constexpr double kStickStiffness = 1.2;  // of the mean normal stiffness of a corner
 
 /// Component of a vector in a block of lanes.
@@ -73,18 +74,19 @@ int System::calc_contact_interval() const {
   if (options.contact_interval > 0) return options.contact_interval;
   const double frequency = calc_contact_frequency();
   if (options.step > 0 || frequency <= 0) return 1;
-  return std::clamp(static_cast<int>(kContactAngle / (frequency * step)), 1, kMostContactInterval);
+  return std::clamp(static_cast<int>(kLookAngle / (frequency * step)), 1, kMostContactInterval);
 }
 
 void System::evaluate_contact(double h) {
   add_travel(h);
   Touching& t = state.touching;
   const bool follows = h > 0 && t.steps > 0 && t.steps < contact_interval;
+  const int passed = t.steps;
   if (!follows) {
     find_contacts();
     t.steps = 0;
   }
-  resolve_contacts(h, follows);
+  resolve_contacts(h, follows, passed);
   ++t.steps;
 }
 
@@ -220,7 +222,7 @@ void System::fill_contact_blocks() {
   for (size_t i = 0; i < contact.groups.size(); ++i) t.share[i] = contact.groups[i];
 }
 
-void System::resolve_contacts(double h, bool follows) {
+void System::resolve_contacts(double h, bool follows, int passed) {
   State& s = state;
   Touching& t = s.touching;
   s.contact_energy = s.stick_energy = 0;
@@ -260,7 +262,7 @@ void System::resolve_contacts(double h, bool follows) {
     job.points = t.points.data();
     job.h = h;
     job.follows = follows;
-    job.longest = contact_interval;
+    job.longest = follows ? 1 : std::max(1, passed);
     const auto slot_of_group = [&](const ContactGroup& g) {
       return t.groups.data() + g.slot / W * kernel::kGroupFields * W + g.slot % W;
     };

@@ -206,8 +206,7 @@ HWY_INLINE void press_block(const ContactJob& job, size_t block) {
     // of a step in which the surfaces meet or part, only a share is in touch; they may have met before they were seen
     const auto passes = hn::Gt(way.v, depth.v), meets = hn::Gt(speed.v, hn::Zero(d));
     const Num<D> share = depth / select(hn::Gt(way.v, hn::Zero(d)), way, one);
-    const auto was_late =
-        hn::And(hn::And(meets, hn::Gt(load<D>(p, kFresh).v, hn::Zero(d))), hn::Le(share.v, hn::Set(d, job.longest)));
+    const auto was_late = hn::And(meets, hn::Le(share.v, hn::Set(d, job.longest)));
     full = select(hn::Or(passes, was_late), full * fma(half, share, half), full);
     Num<D> rate = twice_zeta * z;
     if (HWY_UNLIKELY(!hn::AllFalse(d, plain))) {

@@ -18,6 +18,8 @@ namespace topple::mbs {
 
 namespace {
 
+constexpr double kContactAngle = 0.18;  // of a contact's swing in a step, at most [rad]
+
 using Sparse = Eigen::SparseMatrix<double>;
 using Triplets = std::vector<Eigen::Triplet<double>>;
 using Vector = Eigen::VectorXd;

@@ -91,8 +91,8 @@ struct Options {
   double duration = 1;  // [s]
   double step = 0;      // 0: step_safety times the limit of the stiffest mode
   double step_safety = 0.85;
-  /// Steps from one look for touching points to the next; between them the points move with their bodies. 0: as many as
-  /// a contact allows, at most 4, in steps of the engine's own choice, and 1 in others.
+  /// Steps from one look for touching points to the next; between them the points move with their bodies. 0: 2 where a
+  /// contact swings slowly enough and the step is the engine's own, else 1.
   int contact_interval = 0;
   double frame_interval = 1.0 / 60;  // of on_frame [s]; whole steps, the nearest at or after each instant
   bool equilibrium = true;           // start from the dead-load equilibrium; false: from the poses of the model

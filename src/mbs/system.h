@@ -363,7 +363,7 @@ class System {
   /// Finds the touching points; between looks they move with their bodies.
   void find_contacts();
   /// Forces at the points found, on the bodies and in the ledger.
-  void resolve_contacts(double h, bool follows);
+  void resolve_contacts(double h, bool follows, int passed);
   /// Moves a body from its pose at the beginning of the step to the end of it.
   void drift(size_t body, double h, const Vec3& p0, const Quat& q0, const Mat3& R0);
   void build_clusters();
