@@ -16,7 +16,7 @@ namespace topple::mbs {
 namespace {
 
 constexpr int kMostContactInterval = 2;
-constexpr double kLookAngle = 0.11;      // of a contact's swing from one look for points to the next, at most [rad]
+constexpr double kLookAngle = 0.12;      // of a contact's swing from one look for points to the next, at most [rad]
 constexpr double kStickStiffness = 1.2;  // of the mean normal stiffness of a corner
 
 /// Component of a vector in a block of lanes.

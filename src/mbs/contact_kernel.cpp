@@ -42,6 +42,21 @@ struct Reader {
 };
 
 template <class D>
+HWY_INLINE void find_all_lows(const LowJob& job) {
+  const size_t W = hn::Lanes(D());
+  const V3<D> n{load<D>(job.nx, 0), load<D>(job.ny, 0), load<D>(job.nz, 0)};
+  const Num<D> offset = load<D>(job.offset, 0);
+  for (size_t block = 0; block < job.blocks; ++block) {
+    const double *R = job.R + 9 * W * block, *bounds = job.bounds + 6 * W * block;
+    const V3<D> down = transpose_times(M33<D>{load3<D>(R, 0), load3<D>(R, 3), load3<D>(R, 6)}, n);
+    const Num<D> reach =
+        fma(abs(down.z), load<D>(bounds, 5), fma(abs(down.y), load<D>(bounds, 4), abs(down.x) * load<D>(bounds, 3)));
+    const Num<D> centre = dot(n, load3<D>(job.p + 3 * W * block, 0)) + dot(down, load3<D>(bounds, 0));
+    store<D>((centre - offset) - reach, job.low + W * block, 0);
+  }
+}
+
+template <class D>
 HWY_INLINE void read_block(const TouchJob& job, size_t block) {
   const size_t W = hn::Lanes(D());
   double* to = job.touched + block * kTouchedFields * W;
@@ -361,6 +376,8 @@ template <class D>
 HWY_INLINE void rub_all(const ContactJob& job) {
   for (size_t block = 0; block < job.blocks; ++block) rub_block<D>(job, block);
 }
+void find_lows_here(const LowJob& job) { find_all_lows<Wide>(job); }
+void find_lows_singly_here(const LowJob& job) { find_all_lows<One>(job); }
 void read_touched_here(const TouchJob& job) { read_all<Wide>(job); }
 void update_touched_here(const TouchJob& job) { update_all<Wide>(job); }
 void read_touched_singly_here(const TouchJob& job) { read_all<One>(job); }
@@ -379,6 +396,8 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace topple::mbs::kernel {
 
+HWY_EXPORT(find_lows_here);
+HWY_EXPORT(find_lows_singly_here);
 HWY_EXPORT(read_touched_here);
 HWY_EXPORT(update_touched_here);
 HWY_EXPORT(read_touched_singly_here);
@@ -390,6 +409,8 @@ HWY_EXPORT(press_contacts_singly_here);
 HWY_EXPORT(damp_contacts_singly_here);
 HWY_EXPORT(rub_contacts_singly_here);
 
+void find_lows(const LowJob& job) { HWY_DYNAMIC_DISPATCH(find_lows_here)(job); }
+void find_lows_singly(const LowJob& job) { HWY_DYNAMIC_DISPATCH(find_lows_singly_here)(job); }
 void read_touched(const TouchJob& job) { HWY_DYNAMIC_DISPATCH(read_touched_here)(job); }
 void update_touched(const TouchJob& job) { HWY_DYNAMIC_DISPATCH(update_touched_here)(job); }
 void read_touched_singly(const TouchJob& job) { HWY_DYNAMIC_DISPATCH(read_touched_singly_here)(job); }

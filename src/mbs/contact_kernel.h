@@ -70,6 +70,17 @@ enum Point : int {
 };
 // NOLINTEND(readability-identifier-naming)
 
+/// How low bodies reach: the box around their shapes over the plane n·p = offset, a value of each lane.
+struct LowJob {
+  size_t blocks = 0;                    // of bodies
+  const double *p, *R;                  // 3, 9 fields a block
+  const double* bounds;                 // the box in B: centre (3), half edges (3) a block
+  const double *nx, *ny, *nz, *offset;  // (W)
+  double* low;                          // above the plane, at least (W a block) [m]
+};
+void find_lows(const LowJob&);
+void find_lows_singly(const LowJob&);
+
 /// Bodies of a run, seen from the touched ones.
 struct TouchJob {
   size_t blocks = 0;                       // of touched bodies

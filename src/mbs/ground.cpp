@@ -12,15 +12,28 @@ void System::find_ground_points() {
   const State& now = state;
   const Contact& c = model.contact;
   const Vec3 n = c.normal;
+  const LaneLayout layout = lanes->body_layout(lane);
   for (size_t b = 0; b < B; ++b) {
+    if (s.ground_clear[b] && lanes->low[layout.at(b, 0, 1)] > 0) continue;
     const BodyConstants& body = s.body[b];
+    s.ground_clear[b] = 1;
     if (fixed[b] || body.shapes == 0) continue;
     const ContactLaw& law = contact_laws[static_cast<size_t>(ground_law[b])];
     const bool possible = !s.tied_to_ground[b] && law.touches;
     // far above the ground nothing is remembered but that contact is possible
     const Vec3 p = now.p[b];
     const double above = dot(n, p) - c.offset - body.radius;
-    if (above > 0.05 && possible) continue;
+    if (above > 0.05 && possible) {
+      for (int i = body.first_shape; i < body.first_shape + body.shapes; ++i) {
+        CompiledShape& shape = s.shapes[static_cast<size_t>(i)];
+        for (int corner = 0; corner < count_corners(shape); ++corner)
+          s.ground_points[static_cast<size_t>(shape.first_corner + corner)] = {0, true};
+        shape.is_clear = true;
+        shape.is_touching = false;
+        shape.sticks = {};
+      }
+      continue;
+    }
     const double stiffness = law.stiffness > 0 ? law.stiffness : body.mass * c.contact_frequency * c.contact_frequency;
     const Mat3 R_WB = now.R[b];
     for (int i = body.first_shape; i < body.first_shape + body.shapes; ++i) {
@@ -37,6 +50,7 @@ void System::find_ground_points() {
         if (dot(n, p + centre) - c.offset > reach) continue;
       }
       shape.is_clear = possible;
+      if (!possible) s.ground_clear[b] = 0;
       const size_t first = contact.point.size();
       for (int corner = 0; corner < count_corners(shape); ++corner) {
         GroundPoint& g = s.ground_points[static_cast<size_t>(shape.first_corner + corner)];
@@ -57,7 +71,7 @@ void System::find_ground_points() {
         }
         g.born = std::max(0.0, std::min(g.born, penetration));
         const double depth = penetration - g.born;
-        if (g.born > 0 || depth > 0) shape.is_clear = false;
+        if (g.born > 0 || depth > 0) shape.is_clear = false, s.ground_clear[b] = 0;
         if (depth <= 0) continue;
         const double weight = hull ? hulls[static_cast<size_t>(shape.hull)].weights[static_cast<size_t>(corner)] : 1;
         add_contact_point(r, depth, weight * stiffness);

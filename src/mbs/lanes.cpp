@@ -5,6 +5,8 @@
 #include <string_view>
 #include <unordered_map>
 
+#include "mbs/contact_kernel.h"
+
 namespace topple::mbs {
 
 namespace {
@@ -29,13 +31,15 @@ void Lanes::allocate_bodies(size_t bodies) {
   q.assign(body_blocks * 4 * W, 0);
   R.assign(body_blocks * 9 * W, 0);
   body_constants.assign(body_blocks * kernel::kBodyFields * W, 0);
+  bounds.assign(body_blocks * 6 * W, 0);
+  low.assign(body_blocks * W, 0);
   // idle lanes and the ground keep a valid orientation
   for (size_t block = 0; block < body_blocks; ++block)
     for (size_t l = 0; l < W; ++l) {
       q[block * 4 * W + l] = 1;
       for (size_t i = 0; i < 3; ++i) R[(block * 9 + 4 * i) * W + l] = 1;
     }
-  for (AlignedVector<double>* x : {&kick, &h, &gx, &gy, &gz, &sum}) x->assign(W, 0);
+  for (AlignedVector<double>* x : {&kick, &h, &gx, &gy, &gz, &sum, &nx, &ny, &nz, &offset}) x->assign(W, 0);
 }
 
 void Lanes::allocate_elements(size_t elements) {
@@ -169,6 +173,16 @@ void Lanes::advance_bodies() {
     kernel::advance_bodies(job);
   } else {
     kernel::advance_bodies_singly(job);
+  }
+}
+
+void Lanes::find_lows() {
+  const kernel::LowJob job{body_blocks, p.data(),  R.data(),      bounds.data(), nx.data(),
+                           ny.data(),   nz.data(), offset.data(), low.data()};
+  if (W == kernel::lanes()) {
+    kernel::find_lows(job);
+  } else {
+    kernel::find_lows_singly(job);
   }
 }
 

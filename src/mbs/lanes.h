@@ -28,6 +28,7 @@ struct Lanes {
   size_t body_blocks = 0, element_blocks = 0;
   // bodies, the ground behind the last one
   AlignedVector<double> p, v, L, w, q, R, force, torque, joint_force, joint_torque, body_constants;
+  AlignedVector<double> bounds, low;  // boxes around the shapes in B, and how low they reach (kernel::LowJob)
   Pairs pairs;
   // elements
   AlignedVector<double> states, flows, element_forces;
@@ -41,6 +42,7 @@ struct Lanes {
   size_t live_elements = 0, used_slots = 0;                        // one run
   // one value a lane
   AlignedVector<double> kick, h, gx, gy, gz, sum;
+  AlignedVector<double> nx, ny, nz, offset;  // of the ground
   // reports of the kernel
   std::vector<std::uint32_t> outside, spins;
 
@@ -88,6 +90,8 @@ struct Lanes {
   void find_straight_pairs();
   /// Moves the bodies of all pairs.
   void close_pairs();
+  /// How low bodies reach above the ground.
+  void find_lows();
   /// Forces of the elements in blocks [first, last).
   void evaluate_elements(size_t first, size_t last, std::vector<std::uint32_t>& beyond);
   /// Forces of the elements on every body; batch only.

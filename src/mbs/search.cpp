@@ -46,6 +46,7 @@ void System::find_links() {
   PairSearch& search = contact.search;
   search.has_links = true;
   std::fill(s.tied_to_ground.begin(), s.tied_to_ground.end(), 0);
+  std::fill(s.ground_clear.begin(), s.ground_clear.end(), 0);
   const auto grounded = [&](int x) { return x < 0 || fixed[static_cast<size_t>(x)]; };
   const auto each_link = [&](auto&& f) {
     for (size_t e = 0; e < elements.size(); ++e)

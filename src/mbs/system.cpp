@@ -62,6 +62,7 @@ void System::compile() {
   s.p_offset.assign(B, {});
   s.touched_ground.assign(B, 0);
   s.tied_to_ground.assign(B, 0);
+  s.ground_clear.assign(B, 0);
   fixed.resize(B);
   compile_hulls();
   for (size_t b = 0; b < B; ++b) {
@@ -262,6 +263,24 @@ void System::pack_body(size_t b) {
   for (int i = 0; i < 6; ++i) put(kernel::kInverseInertia + i, inverse_inertia[i]);
   put(kernel::kDrifts, fixed[b] || in_cluster[b] ? 0 : 1);
   put(kernel::kFree, fixed[b] ? 0 : 1);
+  // the box around its shapes
+  Vec3 least{kUnlimited, kUnlimited, kUnlimited}, most = -least;
+  for (int i = c.first_shape; i < c.first_shape + c.shapes; ++i) {
+    const CompiledShape& shape = state.shapes[static_cast<size_t>(i)];
+    for (int k = 0; k < 3; ++k) {
+      double reach = shape.reach;
+      if (shape.kind == Shape::Kind::Box) {
+        reach = 0;
+        for (int j = 0; j < 3; ++j) reach += std::abs(shape.R_BS(k, j)) * shape.half[j];
+      }
+      least[k] = std::min(least[k], shape.p_BS[k] - reach), most[k] = std::max(most[k], shape.p_BS[k] + reach);
+    }
+  }
+  if (c.shapes == 0) least = most = {};
+  const Vec3 centre = 0.5 * (least + most), half = 0.5 * (most - least);
+  const double box[6] = {centre.x, centre.y, centre.z, half.x, half.y, half.z};
+  // a plane, which only fixed bodies have, has no such box
+  for (size_t f = 0; f < 6; ++f) l.bounds[layout.at(b, f, 6)] = std::isfinite(box[f]) ? box[f] : 0;
 }
 
 Mat3 System::calc_world_inverse_inertia(size_t b) const {
@@ -445,6 +464,7 @@ void System::replace_body(size_t b, const Body& replacement) {
   mark_search_due();
   drop_pairs_of(b);
   s.touching.steps = 0;  // its points are others now
+  s.ground_clear[b] = 0;
 }
 
 void System::evaluate_forces() {
@@ -502,6 +522,8 @@ void System::prepare_step() {
     lanes->kick[i] = kick_time();
     lanes->h[i] = step;
     lanes->gx[i] = model.gravity.x, lanes->gy[i] = model.gravity.y, lanes->gz[i] = model.gravity.z;
+    const Contact& c = model.contact;
+    lanes->nx[i] = c.normal.x, lanes->ny[i] = c.normal.y, lanes->nz[i] = c.normal.z, lanes->offset[i] = c.offset;
   }
 }
 
@@ -549,6 +571,7 @@ void advance_together(Lanes& lanes, std::span<System* const> systems) {
     s.begin_forces();
   });
   lanes.outside.clear();
+  lanes.find_lows();
   if (!lanes.is_batch) {
     systems.front()->evaluate_elements();
   } else {

@@ -92,6 +92,7 @@ struct State {
   std::vector<CompiledShape> shapes;
   std::vector<GroundPoint> ground_points;
   std::vector<unsigned char> touched_ground;
+  std::vector<unsigned char> ground_clear;  // no point touches the ground or remembers that it did (B)
   // connections
   std::vector<ZoneState> element;
   std::vector<ZoneState> rotational;
