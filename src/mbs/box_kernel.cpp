@@ -17,6 +17,7 @@ namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 constexpr double kParallel = 1e-12;  // square of the sine below which edges count as parallel
+constexpr double kAlong = 1e30;      // one over a difference that counts as none
 constexpr double kWider = 1 + 1e-12, kNarrower = 1 - 1e-12;
 
 template <class D>
@@ -69,12 +70,24 @@ struct Part {
   Mask<D> begins_at_x, ends_at_x;  // which limit decides
   Mask<D> is_left;
 };
+/// Where an edge comes in over the limits -half and half of a coordinate, and where it goes out. An edge along them is
+/// in as a whole or not at all.
+template <class D>
+HWY_INLINE void cross_limits(Num<D> p, Num<D> per_step, Num<D> half, Num<D>& in, Num<D>& out) {
+  const D d;
+  const Num<D> zero = num<D>(0), two = num<D>(2), before = num<D>(-1);
+  const Num<D> a = (zero - half - p) * per_step, b = (half - p) * per_step;
+  const auto along = hn::Ge(hn::Abs(per_step.v), hn::Set(d, kAlong)), within = hn::Le(hn::Abs(p.v), half.v);
+  in = select(along, select(within, before, two), minimum(a, b));
+  out = select(along, select(within, two, before), maximum(a, b));
+}
+
 template <class D>
 HWY_INLINE Part<D> cut(Num<D> px, Num<D> py, Num<D> per_x, Num<D> per_y, Num<D> half_x, Num<D> half_y) {
   const Num<D> zero = num<D>(0), one = num<D>(1);
-  const Num<D> x0 = (zero - half_x - px) * per_x, x1 = (half_x - px) * per_x;
-  const Num<D> y0 = (zero - half_y - py) * per_y, y1 = (half_y - py) * per_y;
-  const Num<D> in_x = minimum(x0, x1), out_x = maximum(x0, x1), in_y = minimum(y0, y1), out_y = maximum(y0, y1);
+  Num<D> in_x, out_x, in_y, out_y;
+  cross_limits(px, per_x, half_x, in_x, out_x);
+  cross_limits(py, per_y, half_y, in_y, out_y);
   Part<D> out;
   out.begins_at_x = hn::Ge(in_x.v, in_y.v);
   out.ends_at_x = hn::Le(out_x.v, out_y.v);
@@ -89,8 +102,8 @@ HWY_INLINE Part<D> cut(Num<D> px, Num<D> py, Num<D> per_x, Num<D> per_y, Num<D> 
 template <class D>
 HWY_INLINE Num<D> inverse(Num<D> x) {
   const D d;
-  const auto tiny = hn::Lt(hn::Abs(x.v), hn::Set(d, 1e-30));
-  return num<D>(1) / select(tiny, Num<D>{hn::CopySign(hn::Set(d, 1e-30), x.v)}, x);
+  const auto tiny = hn::Lt(hn::Abs(x.v), hn::Set(d, 1 / kAlong));
+  return num<D>(1) / select(tiny, Num<D>{hn::CopySign(hn::Set(d, 1 / kAlong), x.v)}, x);
 }
 
 template <class D>

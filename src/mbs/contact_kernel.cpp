@@ -380,14 +380,9 @@ void find_lows_here(const LowJob& job) { find_all_lows<Wide>(job); }
 void find_lows_singly_here(const LowJob& job) { find_all_lows<One>(job); }
 void read_touched_here(const TouchJob& job) { read_all<Wide>(job); }
 void update_touched_here(const TouchJob& job) { update_all<Wide>(job); }
-void read_touched_singly_here(const TouchJob& job) { read_all<One>(job); }
-void update_touched_singly_here(const TouchJob& job) { update_all<One>(job); }
 void press_contacts_here(const ContactJob& job) { press_all<Wide>(job); }
 void damp_contacts_here(const ContactJob& job) { damp_all<Wide>(job); }
 void rub_contacts_here(const ContactJob& job) { rub_all<Wide>(job); }
-void press_contacts_singly_here(const ContactJob& job) { press_all<One>(job); }
-void damp_contacts_singly_here(const ContactJob& job) { damp_all<One>(job); }
-void rub_contacts_singly_here(const ContactJob& job) { rub_all<One>(job); }
 
 }  // namespace HWY_NAMESPACE
 }  // namespace topple::mbs::kernel
@@ -400,27 +395,17 @@ HWY_EXPORT(find_lows_here);
 HWY_EXPORT(find_lows_singly_here);
 HWY_EXPORT(read_touched_here);
 HWY_EXPORT(update_touched_here);
-HWY_EXPORT(read_touched_singly_here);
-HWY_EXPORT(update_touched_singly_here);
 HWY_EXPORT(press_contacts_here);
 HWY_EXPORT(damp_contacts_here);
 HWY_EXPORT(rub_contacts_here);
-HWY_EXPORT(press_contacts_singly_here);
-HWY_EXPORT(damp_contacts_singly_here);
-HWY_EXPORT(rub_contacts_singly_here);
 
 void find_lows(const LowJob& job) { HWY_DYNAMIC_DISPATCH(find_lows_here)(job); }
 void find_lows_singly(const LowJob& job) { HWY_DYNAMIC_DISPATCH(find_lows_singly_here)(job); }
 void read_touched(const TouchJob& job) { HWY_DYNAMIC_DISPATCH(read_touched_here)(job); }
 void update_touched(const TouchJob& job) { HWY_DYNAMIC_DISPATCH(update_touched_here)(job); }
-void read_touched_singly(const TouchJob& job) { HWY_DYNAMIC_DISPATCH(read_touched_singly_here)(job); }
-void update_touched_singly(const TouchJob& job) { HWY_DYNAMIC_DISPATCH(update_touched_singly_here)(job); }
 void press_contacts(const ContactJob& job) { HWY_DYNAMIC_DISPATCH(press_contacts_here)(job); }
 void damp_contacts(const ContactJob& job) { HWY_DYNAMIC_DISPATCH(damp_contacts_here)(job); }
 void rub_contacts(const ContactJob& job) { HWY_DYNAMIC_DISPATCH(rub_contacts_here)(job); }
-void press_contacts_singly(const ContactJob& job) { HWY_DYNAMIC_DISPATCH(press_contacts_singly_here)(job); }
-void damp_contacts_singly(const ContactJob& job) { HWY_DYNAMIC_DISPATCH(damp_contacts_singly_here)(job); }
-void rub_contacts_singly(const ContactJob& job) { HWY_DYNAMIC_DISPATCH(rub_contacts_singly_here)(job); }
 
 }  // namespace topple::mbs::kernel
 #endif

@@ -117,11 +117,4 @@ void damp_contacts(const ContactJob&);
 /// What else friction takes to stop the sliding, within its limit.
 void rub_contacts(const ContactJob&);
 
-/// The same with one lane at a time in the same instruction set.
-void read_touched_singly(const TouchJob&);
-void update_touched_singly(const TouchJob&);
-void press_contacts_singly(const ContactJob&);
-void damp_contacts_singly(const ContactJob&);
-void rub_contacts_singly(const ContactJob&);
-
 }  // namespace topple::mbs::kernel

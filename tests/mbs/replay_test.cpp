@@ -31,6 +31,26 @@ TEST(SnapshotReplay, GoesOnWithTheSameBitsFromAnyStep) {
   }
 }
 
+TEST(SnapshotReplay, GoesOnBetweenTwoLooksForTouchingPoints) {
+  Options o;
+  o.equilibrium = false;
+  o.contact_interval = 3;
+  const Model m = make_tower();
+  Simulation whole(m, o), other(m, o);
+  std::vector<std::vector<std::byte>> kept;
+  for (int i = 0; i < 6000; ++i) {
+    if (i >= 4000 && i < 4003) kept.push_back(whole.snapshot());
+    ASSERT_TRUE(whole.advance_step());
+  }
+  const std::uint64_t end = hash_of(whole.calc_view());
+  ASSERT_GT(whole.calc_view().energy.friction, 0);  // contact took part
+  for (size_t k = 0; k < kept.size(); ++k) {
+    other.restore(kept[k]);
+    for (size_t i = 4000 + k; i < 6000; ++i) ASSERT_TRUE(other.advance_step());
+    EXPECT_EQ(hash_of(other.calc_view()), end) << "snapshot " << k;
+  }
+}
+
 TEST(SnapshotReplay, RefusesForeignBytes) {
   const Model m = make_tower();
   Simulation s(m, {});
