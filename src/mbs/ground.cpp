@@ -41,30 +41,33 @@ void System::find_ground_points() {
       const bool box = shape.kind == Shape::Kind::Box, hull = shape.kind == Shape::Kind::Hull;
       const Vec3 centre = R_WB * shape.p_BS;
       const Mat3 R = !(box || hull) ? Mat3{} : shape.is_straight ? R_WB : R_WB * shape.R_BS;
+      // how far the plane lies above the shape's centre, and out of it in the shape's axes
+      const double above_centre = c.offset - dot(n, p + centre);
+      const Vec3 down = box || hull ? transpose_times(R, n) : Vec3{};
       if (possible && shape.is_clear) {
         // all its points are known not to touch: they do not as long as it stays above the ground
-        const Vec3 down = box ? transpose_times(R, n) : Vec3{};
         const double reach =
             box ? std::abs(down.x) * shape.half.x + std::abs(down.y) * shape.half.y + std::abs(down.z) * shape.half.z
                 : shape.reach;
-        if (dot(n, p + centre) - c.offset > reach) continue;
+        if (-above_centre > reach) continue;
       }
       shape.is_clear = possible;
       if (!possible) s.ground_clear[b] = 0;
       const size_t first = contact.point.size();
-      for (int corner = 0; corner < count_corners(shape); ++corner) {
+      const Hull* polyhedron = hull ? &hulls[static_cast<size_t>(shape.hull)] : nullptr;
+      const int corners = count_corners(shape);
+      for (int corner = 0; corner < corners; ++corner) {
         GroundPoint& g = s.ground_points[static_cast<size_t>(shape.first_corner + corner)];
         if (!possible) {
           g = {};
           continue;
         }
-        const Vec3 r = box ? centre + R * Vec3{corner & 1 ? shape.half.x : -shape.half.x,
-                                               corner & 2 ? shape.half.y : -shape.half.y,
-                                               corner & 4 ? shape.half.z : -shape.half.z}
-                       : hull
-                           ? centre + R * hulls[static_cast<size_t>(shape.hull)].vertices[static_cast<size_t>(corner)]
-                           : centre - shape.radius * n;
-        const double penetration = c.offset - dot(n, p + r);
+        const Vec3 local =
+            box ? Vec3{corner & 1 ? shape.half.x : -shape.half.x, corner & 2 ? shape.half.y : -shape.half.y,
+                       corner & 4 ? shape.half.z : -shape.half.z}
+            : hull ? polyhedron->vertices[static_cast<size_t>(corner)]
+                   : Vec3{};
+        const double penetration = above_centre - dot(down, local) + shape.radius;
         if (!g.active) {
           g.active = true;
           g.born = std::max(0.0, penetration);
@@ -73,8 +76,8 @@ void System::find_ground_points() {
         const double depth = penetration - g.born;
         if (g.born > 0 || depth > 0) shape.is_clear = false, s.ground_clear[b] = 0;
         if (depth <= 0) continue;
-        const double weight = hull ? hulls[static_cast<size_t>(shape.hull)].weights[static_cast<size_t>(corner)] : 1;
-        add_contact_point(r, depth, weight * stiffness);
+        const Vec3 at = box || hull ? centre + R * local : centre - shape.radius * n;
+        add_contact_point(at, depth, hull ? polyhedron->weights[static_cast<size_t>(corner)] * stiffness : stiffness);
       }
       if (contact.point.size() == first) {
         shape.is_touching = false;
