@@ -56,7 +56,7 @@ void storehouse(benchmark::State& state) {
   mbs::Options options;
   options.duration = kStage + kDuration;
   if (getenv("CI")) options.contact_interval = atoi(getenv("CI"));
-  if (getenv("HS")) options.step = 1e-6*atof(getenv("HS"));
+  if (getenv("HS")) options.step = 1e-6 * atof(getenv("HS"));
   if (getenv("DUR")) options.duration = atof(getenv("DUR"));
   options.frame_interval = 0.1;  // both instants are frames; seldom, so that frames cost nothing
   double begin = 0, total = 0;
