@@ -253,6 +253,7 @@ MarchSummary march(Solver& solver, const Loading& target, const MarchOptions& op
   }
   solver.restart(from);
   double step = options.first;
+  SolveOptions allowed = options.solve;
   while (out.reached < 1) {
     if (progress.is_cancelled()) {
       out.cancelled = true;
@@ -264,7 +265,7 @@ MarchSummary march(Solver& solver, const Loading& target, const MarchOptions& op
     loading.load_factor += to * (target.load_factor - from.load_factor);
     for (size_t c = 0; c < loading.controls.size(); ++c)
       loading.controls[c].value += to * (target.controls[c].value - from.controls[c].value);
-    const StepSummary s = solver.step(loading, options.solve);
+    const StepSummary s = solver.step(loading, allowed);
     out.iterations += s.iterations, out.factorisations += s.factorisations;
     out.element_time += s.element_time, out.factor_time += s.factor_time, out.solve_time += s.solve_time;
     out.residual = s.residual;
@@ -281,10 +282,15 @@ MarchSummary march(Solver& solver, const Loading& target, const MarchOptions& op
       if (easy) step = std::min(options.largest, 1.5 * step);
       if (s.iterations > options.solve.iterations / 2 || s.lag > 0.8 * options.solve.largest_lag) step *= 0.7;
       step = std::max(step, options.smallest);
+      if (s.lag <= options.solve.largest_lag) allowed.largest_lag = options.solve.largest_lag;
     } else {
       ++out.failed;
       step *= 0.4;
-      if (step < options.smallest) {
+      if (step < options.smallest && s.residual <= options.solve.tolerance && allowed.largest_lag < options.jump_lag) {
+        // A jump of the structure: no shorter step makes the extrapolation better.
+        allowed.largest_lag = options.jump_lag;
+        step = options.smallest;
+      } else if (step < options.smallest) {
         out.ending =
             fmt::format("did not converge at {}, last residual {:.2g} of the element forces", describe(to), s.residual);
         if (s.lag > options.solve.largest_lag)

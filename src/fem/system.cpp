@@ -79,8 +79,6 @@ System::System(Model model) : model_(std::move(model)) {
     for (const Link& l : links)
       if (l.control < 0 || l.control >= count) complain("a link follows a control that does not exist");
   }
-  for (const Spring& s : model_.springs)
-    if (s.a < 0 || s.a >= nodal || s.b < 0 || s.b >= nodal || s.a == s.b) complain("a spring has no two ends");
 
   of_nodal_.resize(static_cast<size_t>(nodal));
   const int free = nodal - static_cast<int>(model_.links.size());
@@ -126,7 +124,6 @@ System::System(Model model) : model_(std::move(model)) {
     bar_length_.push_back(
         norm(mesh.nodes[static_cast<size_t>(t.node[1])] - mesh.nodes[static_cast<size_t>(t.node[0])]));
   }
-  for (const Spring& s : model_.springs) maps_.push_back(make_map({s.a, s.b}));
 
   std::vector<std::vector<int>> groups;
   for (const Map& m : maps_) groups.push_back(m.unknown);
@@ -345,16 +342,6 @@ Response System::evaluate(const State& old, const std::vector<double>& q, State&
     Eigen::Matrix<double, 6, 1> v;
     v << -along.x, -along.y, -along.z, along.x, along.y, along.z;
     add_stiffness(maps_[E + t], bar.area * E_t / length * v * v.transpose());
-  }
-  for (size_t s = 0; s < model_.springs.size(); ++s) {
-    const Spring& spring = model_.springs[s];
-    const auto of = [&](int d) { return u[static_cast<size_t>(d / 3)][d % 3]; };
-    const double F = spring.stiffness * (of(spring.b) - of(spring.a)), f[2] = {-F, F};
-    add_force(maps_[E + T + s], f, 2);
-    if (!stiff) continue;
-    Eigen::Matrix2d S;
-    S << spring.stiffness, -spring.stiffness, -spring.stiffness, spring.stiffness;
-    add_stiffness(maps_[E + T + s], S);
   }
   out.scale = std::sqrt(out.scale);
   return out;

@@ -21,12 +21,6 @@ struct Link {
   double factor = 1;  // displacement per unit of the control: 1, or a lever arm [m]
 };
 
-/// A linear spring between two nodal displacements; a negative stiffness -P/l carries the P-Δ effect of a column.
-struct Spring {
-  int a = 0, b = 0;      // nodal displacements, 3 * node + axis
-  double stiffness = 0;  // [N/m]
-};
-
 class System;
 struct State;
 
@@ -38,7 +32,6 @@ struct Model {
   std::vector<material::Steel> steels;
   std::map<int, std::vector<Link>> links;
   std::vector<double> control_length;  // 1 for a displacement, a length for a rotation: makes residuals comparable [m]
-  std::vector<Spring> springs;
   /// Called with the histories of an accepted step, for laws whose points look at each other; may be empty.
   std::function<void(const System&, State&)> smooth;
   std::vector<double> load;  // forces on nodal displacements at load factor 1, empty: none [N] (3 nodes)
@@ -122,7 +115,7 @@ class System {
   std::vector<size_t> history_of_;  // first number of an element's history (E)
   size_t history_size_ = 0;
   std::vector<double> bar_length_;
-  std::vector<Map> maps_;  // hexahedra, then bars, then springs
+  std::vector<Map> maps_;  // hexahedra, then bars
   SparseMatrix pattern_;
 };
 

@@ -73,6 +73,7 @@ struct Problem {
   int driven = 0, axial = 0, cross = -1;  // controls
   double sign = 1;                        // of the driven control
   double scale = 1;                       // control's displacement for a rotation of 1
+  double spring = 0;                      // on the driven control: the P-Δ effect
   double cut_at = 0;
   double fy = 0, eps_c1 = 0,
          edge = 0;  // of first yield: steel, concrete, distance of the compressed edge over the length
@@ -97,7 +98,8 @@ SolidMarch run(const Problem& problem, fem::Loading loading, double N, const Sol
   const auto record = [&] {
     const double rotation = problem.sign * solver.control(problem.driven) / problem.scale - origin;
     out.rotation.push_back(rotation);
-    out.moment.push_back(problem.sign * solver.control_force(problem.driven));
+    out.moment.push_back(problem.sign *
+                         (solver.control_force(problem.driven) + problem.spring * solver.control(problem.driven)));
     out.cross_moment.push_back(problem.cross >= 0 ? solver.control_force(problem.cross) : 0);
     out.elongation.push_back(solver.control(problem.axial));
     for (size_t i = 0; i < taken.size(); ++i) {
@@ -154,7 +156,7 @@ SolidMarch run(const Problem& problem, fem::Loading loading, double N, const Sol
     const double step = 1.0 / options.steps;
     march_options.first = std::min(step, 2e-5 / std::abs(to - from));
     march_options.largest = step;
-    march_options.smallest = std::min(1e-3 * step, march_options.first);
+    march_options.smallest = std::min(1e-2 * step, march_options.first);
     Progress part;
     part.cancel = progress.cancel;
     if (progress.report)
@@ -338,12 +340,7 @@ SolidMarch march_cantilever(const CantileverInput& in, const SolidOptions& optio
     for (int d = 0; d < 3; ++d) model.links[3 * b + d] = {};
   for (const int a : problem.mesh.anchors)
     for (int d = 0; d < 3; ++d) model.links[3 * a + d] = {};
-  if (in.N != 0)
-    for (int i = 0; i < last; ++i) {
-      const int a = problem.mesh.node(i, ny / 2, nz / 2), b = problem.mesh.node(i + 1, ny / 2, nz / 2);
-      const double length = problem.mesh.x[static_cast<size_t>(i) + 1] - problem.mesh.x[static_cast<size_t>(i)];
-      model.springs.push_back({3 * a + 2, 3 * b + 2, in.N / length});
-    }
+  problem.spring = in.N / in.length;
   problem.axial = 1, problem.driven = 0, problem.sign = 1, problem.scale = in.length, problem.fy = zone.steel.fy;
   problem.cut_at = find_middle(problem.mesh.x, 0);
   problem.name = "drift";
