@@ -15,85 +15,195 @@ namespace {
 /// Limit moment against plastic rotation at one normal force.
 struct Row {
   std::vector<double> rotation, moment;
-  double at(double phi) const {
-    if (phi <= rotation.front()) return moment.front();
-    if (phi >= rotation.back()) return moment.back();
-    const size_t i = static_cast<size_t>(std::upper_bound(rotation.begin(), rotation.end(), phi) - rotation.begin());
-    const double s = (phi - rotation[i - 1]) / (rotation[i] - rotation[i - 1]);
-    return moment[i - 1] + s * (moment[i] - moment[i - 1]);
-  }
+  double largest() const { return *std::max_element(moment.begin(), moment.end()); }
 };
 
-/// One row of a family with the elastic rotation taken out. The elastic part is that of the member's element, or of the
-/// row's own secant to first yield where that is softer, so that the plastic rotation begins at first yield.
-Row make_row(const nearfield::MomentFamily& family, size_t k, double EI, double length) {
-  const size_t J = family.rotation.size();
-  const double* M = &family.moment[k * J];
-  const double yield_moment = family.yield_moment[k], yield_rotation = family.yield_rotation[k];
-  double stiffness = EI / length;
-  if (yield_moment > 0 && yield_rotation > 0) stiffness = std::min(stiffness, yield_moment / yield_rotation);
+/// Moments of a row at rotations that rise, constant beyond its ends.
+std::vector<double> sample(const Row& row, const std::vector<double>& rotation) {
+  std::vector<double> out;
+  out.reserve(rotation.size());
+  size_t i = 1;
+  for (const double phi : rotation) {
+    while (i < row.rotation.size() && row.rotation[i] < phi) ++i;
+    if (i >= row.rotation.size() || phi <= row.rotation.front()) {
+      out.push_back(phi <= row.rotation.front() ? row.moment.front() : row.moment.back());
+      continue;
+    }
+    const double s = (phi - row.rotation[i - 1]) / (row.rotation[i] - row.rotation[i - 1]);
+    out.push_back(row.moment[i - 1] + s * (row.moment[i] - row.moment[i - 1]));
+  }
+  return out;
+}
+
+/// All rotations of some rows below `last`, rising, and `last`.
+std::vector<double> merge_rotations(const std::vector<const Row*>& rows, double last) {
+  std::vector<double> all{0};
+  for (const Row* r : rows)
+    for (const double x : r->rotation)
+      if (x < last) all.push_back(x);
+  std::sort(all.begin(), all.end());
+  const double close = 1e-6 * last;
+  all.erase(std::unique(all.begin(), all.end(), [close](double a, double b) { return b - a < close; }), all.end());
+  if (last - all.back() < close && all.size() > 1) all.pop_back();
+  all.push_back(last);
+  return all;
+}
+
+/// The row of a family at a normal force with the rotation of the element's spring taken out: what is left adds up with
+/// the element to the family again. Plastic rotation begins at first yield at the earliest: where the row is softer
+/// than the element, it turns under the yield moment to where the row yields.
+Row make_row(const nearfield::MomentFamily& family, double N, double EI, double length) {
+  const size_t J = family.rotation.size(), K = family.normal_force.size();
+  const size_t k = std::clamp<size_t>(
+      static_cast<size_t>(std::upper_bound(family.normal_force.begin(), family.normal_force.end(), N) -
+                          family.normal_force.begin()),
+      1, K - 1);
+  const double share = (N - family.normal_force[k - 1]) / (family.normal_force[k] - family.normal_force[k - 1]);
+  const auto mix = [&](const std::vector<double>& v, size_t below, size_t above) {
+    return share <= 0 ? v[below] : share >= 1 ? v[above] : (1 - share) * v[below] + share * v[above];
+  };
+  std::vector<double> M(J);
+  for (size_t j = 0; j < J; ++j) M[j] = mix(family.moment, (k - 1) * J + j, k * J + j);
+  const double yield_moment = mix(family.yield_moment, k - 1, k), yield_rotation = mix(family.yield_rotation, k - 1, k);
+  const double stiffness = EI / length, plastic_at_yield = yield_rotation - yield_moment / stiffness;
   const auto plastic = [&](size_t j) { return family.rotation[j] - M[j] / stiffness; };
+  Row row;
+  const auto add = [&row](double rotation, double moment) {
+    if (!row.rotation.empty() && !(rotation > row.rotation.back() + 1e-9)) return;
+    row.rotation.push_back(rotation);
+    row.moment.push_back(moment);
+  };
   size_t last_elastic = 0;
   for (size_t j = 1; j < J; ++j)
     if (plastic(j) <= 0) last_elastic = j;
-  Row row;
-  double start = M[last_elastic];
-  if (last_elastic + 1 < J) {
-    const double p0 = plastic(last_elastic), p1 = plastic(last_elastic + 1);
-    if (p0 < 0 && p1 > 0) start += (M[last_elastic + 1] - M[last_elastic]) * -p0 / (p1 - p0);
+  if (plastic_at_yield > 0 && yield_moment > 0) {
+    add(0, yield_moment);
+    add(plastic_at_yield, yield_moment);
+    while (last_elastic + 1 < J && family.rotation[last_elastic + 1] <= yield_rotation) ++last_elastic;
+  } else {
+    double start = M[last_elastic];
+    if (last_elastic + 1 < J) {
+      const double p0 = plastic(last_elastic), p1 = plastic(last_elastic + 1);
+      if (p0 < 0 && p1 > 0) start += (M[last_elastic + 1] - M[last_elastic]) * -p0 / (p1 - p0);
+    }
+    add(0, std::max(start, yield_moment));
   }
-  row.rotation.push_back(0);
-  row.moment.push_back(std::max(start, yield_moment));
-  for (size_t j = last_elastic + 1; j < J; ++j) {
-    const double p = plastic(j);
-    if (p <= row.rotation.back() + 1e-9) continue;
-    row.rotation.push_back(p);
-    row.moment.push_back(M[j]);
-  }
+  for (size_t j = last_elastic + 1; j < J; ++j) add(plastic(j), M[j]);
   return row;
 }
 
-/// Value at a normal force between rows; 0 outside.
-double interpolate(const std::vector<double>& force, const std::vector<Row>& rows, double N, double phi) {
-  if (N < force.front() || N > force.back()) return 0;
-  const size_t k = std::clamp<size_t>(
-      static_cast<size_t>(std::upper_bound(force.begin(), force.end(), N) - force.begin()), 1, force.size() - 1);
-  const double s = (N - force[k - 1]) / (force[k] - force[k - 1]);
-  return (1 - s) * rows[k - 1].at(phi) + s * rows[k].at(phi);
+/// Rows at the forces of a family, and between them wherever the mean of two neighbours departs by more than
+/// `tolerance` of the largest moment from the row between them: the family's curves are mixed at equal rotation, the
+/// law's at equal plastic rotation.
+std::map<double, Row> make_rows(const nearfield::MomentFamily& family, double EI, double length, double tolerance) {
+  std::map<double, Row> rows;
+  for (const double N : family.normal_force) rows.emplace(N, make_row(family, N, EI, length));
+  const auto departs = [tolerance](const Row& a, const Row& b, const Row& middle) {
+    const double most = tolerance * middle.largest();
+    const double last = std::max({a.rotation.back(), b.rotation.back(), middle.rotation.back()});
+    const std::vector<double> at = merge_rotations({&a, &b, &middle}, last);
+    const std::vector<double> m = sample(middle, at), from = sample(a, at), to = sample(b, at);
+    for (size_t j = 0; j < at.size(); ++j)
+      if (std::abs(0.5 * (from[j] + to[j]) - m[j]) > most) return true;
+    return false;
+  };
+  const auto refine = [&](const auto& self, double from, double to, int depth) -> void {
+    if (depth == 0) return;
+    const double N = 0.5 * (from + to);
+    Row middle = make_row(family, N, EI, length);
+    if (!departs(rows.at(from), rows.at(to), middle)) return;
+    rows.emplace(N, std::move(middle));
+    self(self, from, N, depth - 1);
+    self(self, N, to, depth - 1);
+  };
+  // Not beside the first and the last row, which have no moment.
+  for (size_t k = 2; k + 1 < family.normal_force.size(); ++k)
+    refine(refine, family.normal_force[k - 1], family.normal_force[k], 2);
+  return rows;
 }
 
-/// Rotation at which the last of the rows ends.
-double find_end(const std::vector<Row>& positive, const std::vector<Row>& negative) {
-  double end = 0;
-  for (const auto* rows : {&positive, &negative})
-    for (const Row& r : *rows) end = std::max(end, r.rotation.back());
-  return end;
+/// Moments at a normal force between rows, at rotations that rise; 0 outside.
+std::vector<double> sample(const std::map<double, Row>& rows, double N, const std::vector<double>& rotation) {
+  if (N < rows.begin()->first || N > rows.rbegin()->first) return std::vector<double>(rotation.size(), 0.0);
+  const auto above = rows.lower_bound(N);
+  std::vector<double> out = sample(above->second, rotation);
+  if (above->first == N) return out;
+  const auto below = std::prev(above);
+  const double s = (N - below->first) / (above->first - below->first);
+  const std::vector<double> other = sample(below->second, rotation);
+  for (size_t j = 0; j < out.size(); ++j) out[j] = (1 - s) * other[j] + s * out[j];
+  return out;
 }
 
-/// Rows of both directions on one grid of rotations up to the largest one, densest near yield.
+/// Rotations between which no row departs from its chord by more than `tolerance` of its largest moment, from 0 to
+/// `last`: every interval is cut where a row departs most (Ramer, Douglas & Peucker, all rows at once).
+std::vector<double> find_rotations(const std::vector<const Row*>& rows, double last, double tolerance) {
+  const std::vector<double> all = merge_rotations(rows, last);
+  // Rows as shares of their largest moment.
+  std::vector<std::vector<double>> value;
+  for (const Row* r : rows) {
+    const double most = r->largest();
+    if (!(most > 0)) continue;
+    value.push_back(sample(*r, all));
+    for (double& v : value.back()) v /= most;
+  }
+  std::vector<char> kept(all.size(), 0);
+  kept.front() = kept.back() = 1;
+  std::vector<std::pair<size_t, size_t>> open{{0, all.size() - 1}};
+  while (!open.empty()) {
+    const auto [a, b] = open.back();
+    open.pop_back();
+    double worst = tolerance;
+    size_t where = 0;
+    for (const std::vector<double>& v : value) {
+      const double slope = (v[b] - v[a]) / (all[b] - all[a]);
+      for (size_t j = a + 1; j < b; ++j)
+        if (const double off = std::abs(v[j] - v[a] - slope * (all[j] - all[a])); off > worst) worst = off, where = j;
+    }
+    if (where == 0) continue;
+    kept[where] = 1;
+    open.emplace_back(a, where);
+    open.emplace_back(where, b);
+  }
+  std::vector<double> out;
+  for (size_t j = 0; j < all.size(); ++j)
+    if (kept[j]) out.push_back(all[j]);
+  return out;
+}
+
+/// Rows of both directions on one grid of forces and one of rotations, up to the largest one.
 mbs::MomentFamily make_family(const nearfield::MomentFamily& positive, const nearfield::MomentFamily& negative,
                               double EI, double length, double largest) {
-  constexpr int points = 40;
-  constexpr double ratio = 1.15;
+  // Of a row's largest moment, between rotations and between forces.
+  constexpr double between_rotations = 0.0075, between_forces = 0.015;
+  const bool same = positive.moment == negative.moment && positive.normal_force == negative.normal_force;
+  const std::map<double, Row> pos = make_rows(positive, EI, length, between_forces);
+  const std::map<double, Row> neg = same ? pos : make_rows(negative, EI, length, between_forces);
   mbs::MomentFamily out;
-  std::vector<Row> pos, neg;
-  for (size_t k = 0; k < positive.normal_force.size(); ++k) pos.push_back(make_row(positive, k, EI, length));
-  for (size_t k = 0; k < negative.normal_force.size(); ++k) neg.push_back(make_row(negative, k, EI, length));
-  const double last = std::clamp(find_end(pos, neg), 1e-3, largest);
-  for (int j = 0; j < points; ++j)
-    out.plastic_rotation.push_back(last * (std::pow(ratio, j) - 1) / (std::pow(ratio, points - 1) - 1));
-  out.normal_force = positive.normal_force;
-  out.normal_force.insert(out.normal_force.end(), negative.normal_force.begin(), negative.normal_force.end());
+  std::vector<const Row*> rows;
+  double end = 0;
+  for (const auto* some : {&pos, &neg}) {
+    if (same && some == &neg) continue;
+    for (const auto& [N, row] : *some) {
+      rows.push_back(&row);
+      end = std::max(end, row.rotation.back());
+      out.normal_force.push_back(N);
+    }
+  }
+  out.plastic_rotation = find_rotations(rows, std::clamp(end, 1e-3, largest), between_rotations);
   std::sort(out.normal_force.begin(), out.normal_force.end());
   const double span = out.normal_force.back() - out.normal_force.front();
   out.normal_force.erase(std::unique(out.normal_force.begin(), out.normal_force.end(),
                                      [span](double a, double b) { return b - a < 1e-9 * span; }),
                          out.normal_force.end());
-  for (double N : out.normal_force)
-    for (double phi : out.plastic_rotation) {
-      out.positive.push_back(std::max(0.0, interpolate(positive.normal_force, pos, N, phi)));
-      out.negative.push_back(std::max(0.0, interpolate(negative.normal_force, neg, N, phi)));
-    }
+  const auto append = [](std::vector<double>& to, const std::vector<double>& from) {
+    for (const double m : from) to.push_back(std::max(0.0, m));
+  };
+  for (const double N : out.normal_force) {
+    append(out.positive, sample(pos, N, out.plastic_rotation));
+    if (!same) append(out.negative, sample(neg, N, out.plastic_rotation));
+  }
+  if (same) out.negative = out.positive;
   return out;
 }
 

@@ -34,7 +34,7 @@ class ZoneLibrary {
 };
 
 /// Law of a zone whose element carries the elasticity of the member with the bending stiffnesses EI [N·m²]: what an
-/// elastic zone of the same length would turn is taken out of the rotations.
+/// elastic zone of the same length would turn is taken out of the rotations, docs/theory/manager.md (1).
 mbs::ZoneLaw make_zone_law(const nearfield::Rcc&, double EI_y, double EI_z, const std::string& name, const Knowledge&);
 
 /// Law of the bars that a charge leaves; nothing at all if there are none.
