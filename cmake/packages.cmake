@@ -12,6 +12,8 @@ find_package(Qhull REQUIRED)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(CAIRO REQUIRED IMPORTED_TARGET cairo)
 find_package(Boost REQUIRED COMPONENTS headers)  # no library of it
+find_package(SQLite3 REQUIRED)
+find_package(PostgreSQL QUIET)  # studies on many machines; without it they run on one (docs/decisions/0027-study-store.md)
 # CHOLMOD; Debian's package has no file for CMake
 find_path(CHOLMOD_INCLUDE cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
 find_library(CHOLMOD_LIBRARY cholmod REQUIRED)

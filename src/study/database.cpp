@@ -1,0 +1,32 @@
+#include "study/database.h"
+
+#include <algorithm>
+
+#include "base/error.h"
+
+namespace topple::study {
+
+bool is_server(const std::string& address) {
+  return address.starts_with("postgresql://") || address.starts_with("postgres://");
+}
+
+std::string hide_password(const std::string& address) {
+  if (!is_server(address)) return address;
+  const std::size_t host = address.find("//") + 2;
+  const std::size_t end = std::min(address.find_first_of("/?", host), address.size());
+  const std::size_t at = address.rfind('@', end);
+  const std::size_t colon = address.find(':', host);
+  if (at == std::string::npos || at < host || colon == std::string::npos || colon > at) return address;
+  return address.substr(0, colon) + address.substr(at);
+}
+
+std::unique_ptr<Database> open_database(const std::string& address) {
+  if (!is_server(address)) return open_sqlite(address);
+#ifdef TOPPLE_POSTGRESQL
+  return open_postgresql(address);
+#else
+  throw InputError("E821", "this topple was built without PostgreSQL", "install libpq-dev and build it again");
+#endif
+}
+
+}  // namespace topple::study

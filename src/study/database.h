@@ -1,0 +1,58 @@
+#pragma once
+/// The little that a study needs of a database: statements with parameters, rows of text, transactions. Two kinds:
+/// a SQLite file and a PostgreSQL server. One connection belongs to one thread.
+
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace topple::study {
+
+using Value = std::optional<std::string>;  // empty: NULL
+using Row = std::vector<Value>;
+using Rows = std::vector<Row>;
+
+/// The server does not answer, or broke the connection: what was under way may or may not be committed.
+struct ConnectionLost : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+/// The transaction was rolled back because of others; it may be tried again.
+struct TryAgain : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// Where the dialects differ.
+struct Dialect {
+  std::string now;          // seconds since 1970 by the database's clock
+  std::string begin;        // starts a transaction that will write
+  std::string skip_locked;  // behind a SELECT whose rows are to be changed
+  std::string number;       // type of a column that counts rows
+  std::string real;         // type of a double
+  std::string listed;       // of texts of the JSON array $1: "hash IN (...)" takes it
+  std::string pairs;        // rows (a, b) of the JSON array $1 of pairs, in its order
+};
+
+class Database {
+ public:
+  virtual ~Database() = default;
+  /// Runs one statement; parameters are $1, $2, ... as text. Throws ConnectionLost, TryAgain, std::runtime_error.
+  virtual Rows run(const std::string& sql, const std::vector<Value>& parameters = {}) = 0;
+  virtual const Dialect& dialect() const = 0;
+  /// Connects anew, if it can be lost. Throws ConnectionLost.
+  virtual void reconnect() = 0;
+};
+
+/// Whether an address is that of a server ("postgresql://..." or "postgres://...") rather than a file.
+bool is_server(const std::string& address);
+/// The address without its password, for people to read.
+std::string hide_password(const std::string& address);
+
+/// Connects. Throws InputError E820 if the file cannot be opened, E821 if this program was built without PostgreSQL;
+/// ConnectionLost if the server does not answer.
+std::unique_ptr<Database> open_database(const std::string& address);
+std::unique_ptr<Database> open_sqlite(const std::string& path);
+std::unique_ptr<Database> open_postgresql(const std::string& url);
+
+}  // namespace topple::study

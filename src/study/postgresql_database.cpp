@@ -1,0 +1,111 @@
+#ifdef TOPPLE_POSTGRESQL
+
+#include <fmt/format.h>
+#include <libpq-fe.h>
+
+#include <unordered_map>
+
+#include "study/database.h"
+
+namespace topple::study {
+namespace {
+
+struct Clear {
+  void operator()(PGresult* r) const { PQclear(r); }
+};
+using Answered = std::unique_ptr<PGresult, Clear>;
+
+std::string trim(std::string text) {
+  while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
+  return text;
+}
+
+class PostgresqlDatabase final : public Database {
+ public:
+  explicit PostgresqlDatabase(std::string url) : url_(std::move(url)) {
+    dialect_.now = "extract(epoch FROM clock_timestamp())::double precision";
+    dialect_.begin = "BEGIN";
+    dialect_.skip_locked = "FOR UPDATE SKIP LOCKED";
+    dialect_.number = "bigserial PRIMARY KEY";
+    dialect_.real = "double precision";
+    dialect_.listed = "(SELECT json_array_elements_text($1::json))";
+    dialect_.pairs = "(SELECT e->>0 AS a, e->>1 AS b FROM json_array_elements($1::json) AS e)";
+    connect();
+  }
+  ~PostgresqlDatabase() override { PQfinish(db_); }
+  PostgresqlDatabase(const PostgresqlDatabase&) = delete;
+  PostgresqlDatabase& operator=(const PostgresqlDatabase&) = delete;
+
+  Rows run(const std::string& sql, const std::vector<Value>& parameters = {}) override {
+    if (!db_) throw ConnectionLost("not connected");
+    std::vector<const char*> values;
+    for (const Value& v : parameters) values.push_back(v ? v->c_str() : nullptr);
+    const int count = static_cast<int>(values.size());
+    const auto [known, is_new] = statements_.try_emplace(sql, fmt::format("s{}", statements_.size()));
+    if (is_new) {
+      const Answered prepared(PQprepare(db_, known->second.c_str(), sql.c_str(), count, nullptr));
+      if (PQresultStatus(prepared.get()) != PGRES_COMMAND_OK) {
+        statements_.erase(known);
+        fail(prepared.get());
+      }
+    }
+    const Answered r(PQexecPrepared(db_, known->second.c_str(), count, values.data(), nullptr, nullptr, 0));
+    const ExecStatusType status = PQresultStatus(r.get());
+    if (status != PGRES_COMMAND_OK && status != PGRES_TUPLES_OK) fail(r.get());
+    Rows rows(static_cast<std::size_t>(PQntuples(r.get())));
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      for (int k = 0; k < PQnfields(r.get()); ++k) {
+        const int row = static_cast<int>(i);
+        if (PQgetisnull(r.get(), row, k))
+          rows[i].emplace_back();
+        else
+          rows[i].emplace_back(std::string(PQgetvalue(r.get(), row, k), PQgetlength(r.get(), row, k)));
+      }
+    return rows;
+  }
+
+  const Dialect& dialect() const override { return dialect_; }
+  void reconnect() override { connect(); }
+
+ private:
+  void connect() {
+    PQfinish(db_);
+    statements_.clear();
+    const char* keywords[] = {"dbname", "application_name", "connect_timeout", "client_encoding", nullptr};
+    const char* values[] = {url_.c_str(), "topple", "10", "UTF8", nullptr};
+    db_ = PQconnectdbParams(keywords, values, 1);
+    if (PQstatus(db_) == CONNECTION_OK) {
+      PQsetNoticeProcessor(
+          db_, [](void*, const char*) {}, nullptr);  // "exists already"
+      return;
+    }
+    const std::string why = trim(PQerrorMessage(db_));
+    PQfinish(db_);
+    db_ = nullptr;
+    throw ConnectionLost(why);
+  }
+
+  [[noreturn]] void fail(const PGresult* r) {
+    const std::string why = trim(PQerrorMessage(db_));
+    const char* found = PQresultErrorField(r, PG_DIAG_SQLSTATE);
+    const std::string state = found ? found : "";
+    // 57P0x: the server stops or starts; 08: the connection
+    if (PQstatus(db_) != CONNECTION_OK || state.starts_with("57P") || state.starts_with("08"))
+      throw ConnectionLost(why);
+    if (state.starts_with("40")) throw TryAgain(why);
+    throw std::runtime_error("PostgreSQL: " + why);
+  }
+
+  std::string url_;
+  PGconn* db_ = nullptr;
+  std::unordered_map<std::string, std::string> statements_;
+  Dialect dialect_;
+};
+
+}  // namespace
+
+std::unique_ptr<Database> open_postgresql(const std::string& url) { return std::make_unique<PostgresqlDatabase>(url); }
+
+}  // namespace topple::study
+
+#endif

@@ -1,0 +1,388 @@
+#include "study/store.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "base/hash.h"
+
+namespace topple::study {
+namespace {
+
+using json = nlohmann::ordered_json;
+using Clock = std::chrono::steady_clock;
+
+json to_json(double x) {
+  if (std::isfinite(x)) return x;
+  if (std::isnan(x)) return nullptr;
+  return x > 0 ? "inf" : "-inf";
+}
+double to_number(const json& j) {
+  if (j.is_number()) return j.get<double>();
+  if (j.is_null()) return std::numeric_limits<double>::quiet_NaN();
+  const double infinite = std::numeric_limits<double>::infinity();
+  return j.get<std::string>() == "inf" ? infinite : -infinite;
+}
+
+/// Texts from elsewhere may hold bytes that are no UTF-8, which a database refuses.
+std::string to_clean(const std::string& text) {
+  std::string clean = json(text).dump(-1, ' ', false, json::error_handler_t::replace);
+  clean = json::parse(clean).get<std::string>();
+  std::erase(clean, '\0');
+  return clean;
+}
+
+std::string outputs_text(const Answer& a) {
+  json j = json::object();
+  for (const auto& [name, value] : a.outputs) j[name] = to_json(value);
+  return j.dump();
+}
+
+/// From the columns status, outcome, outputs, trajectory, message, seconds.
+Answer read_answer(const Row& row, std::size_t first) {
+  Answer a;
+  a.kind = *row[first] == "done" ? Answer::Kind::Done : Answer::Kind::Failed;
+  a.outcome = row[first + 1].value_or("");
+  const json outputs = json::parse(row[first + 2].value_or("{}"));
+  for (const auto& [name, value] : outputs.items()) a.outputs.emplace_back(name, to_number(value));
+  a.trajectory = to_numbers(row[first + 3].value_or("[]"));
+  a.text = row[first + 4].value_or("");
+  a.seconds = std::stod(row[first + 5].value_or("0"));
+  return a;
+}
+
+void insert_result(Database& db, const Job& job, const std::string& worker, const Answer& a) {
+  const std::vector<Value> values = {job.hash,
+                                     job.model,
+                                     a.kind == Answer::Kind::Done ? "done" : "failed",
+                                     to_clean(a.outcome),
+                                     outputs_text(a),
+                                     to_text(a.trajectory),
+                                     to_clean(a.text),
+                                     std::to_string(job.attempt),
+                                     worker,
+                                     fmt::format("{}", a.seconds)};
+  db.run(fmt::format("INSERT INTO result(hash, model, status, outcome, outputs, trajectory, message, attempt, worker, "
+                     "seconds, finished) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, {}) "
+                     "ON CONFLICT (hash) DO NOTHING",
+                     db.dialect().now),
+         values);
+}
+
+void make_schema(Database& db) {
+  const Dialect& d = db.dialect();
+  for (const std::string& sql : {
+           std::string("CREATE TABLE IF NOT EXISTS model(hash text PRIMARY KEY, definition text NOT NULL)"),
+           std::string(
+               "CREATE TABLE IF NOT EXISTS study(name text PRIMARY KEY, model text NOT NULL, definition text NOT "
+               "NULL, state text NOT NULL, summary text NOT NULL)"),
+           fmt::format("CREATE TABLE IF NOT EXISTS job(number {}, hash text NOT NULL UNIQUE, model text NOT NULL, "
+                       "inputs text NOT NULL, state text NOT NULL, attempt integer NOT NULL DEFAULT 0, lease_until {}, "
+                       "worker text, message text)",
+                       d.number, d.real),
+           fmt::format(
+               "CREATE TABLE IF NOT EXISTS result(hash text PRIMARY KEY, model text NOT NULL, status text NOT "
+               "NULL, outcome text NOT NULL, outputs text NOT NULL, trajectory text NOT NULL, message text NOT "
+               "NULL, attempt integer NOT NULL, worker text NOT NULL, seconds {} NOT NULL, finished {} NOT NULL)",
+               d.real, d.real),
+           std::string("CREATE INDEX IF NOT EXISTS job_open ON job(number) WHERE state IN ('waiting', 'running')"),
+           std::string("CREATE INDEX IF NOT EXISTS job_refused ON job(model) WHERE state = 'refused'"),
+       })
+    db.run(sql);
+}
+
+std::unique_ptr<Database> open_patiently(const std::string& address, const std::atomic<bool>* cancel, double patience) {
+  const auto start = Clock::now();
+  for (;;) try {
+      return open_database(address);
+    } catch (const ConnectionLost&) {
+      if ((cancel && cancel->load()) || std::chrono::duration<double>(Clock::now() - start).count() > patience) throw;
+      std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    }
+}
+
+}  // namespace
+
+std::string calc_job_hash(const std::string& model, const Point& x) {
+  std::string bytes = model;
+  for (const double v : x) {
+    const auto bits = std::bit_cast<std::uint64_t>(v == 0 ? 0.0 : v);
+    for (int k = 0; k < 64; k += 8) bytes += static_cast<char>(bits >> k & 255U);
+  }
+  return calc_sha256(bytes);
+}
+
+std::string to_text(const std::vector<double>& numbers) {
+  json j = json::array();
+  for (const double x : numbers) j.push_back(to_json(x));
+  return j.dump();
+}
+
+std::vector<double> to_numbers(const std::string& text) {
+  std::vector<double> numbers;
+  for (const json& j : json::parse(text)) numbers.push_back(to_number(j));
+  return numbers;
+}
+
+/// A transaction, repeated from its start when others or a lost connection ended it.
+template <class F>
+auto Store::transact(F work, bool writes) {
+  const auto start = Clock::now();
+  for (bool again = false;; again = true) {
+    try {
+      db_->run(writes ? db_->dialect().begin : "BEGIN");
+      auto result = work(again);
+      db_->run("COMMIT");
+      return result;
+    } catch (const TryAgain&) {
+      try {
+        db_->run("ROLLBACK");
+      } catch (const std::exception&) {
+        // it is rolled back already
+      }
+      if (std::chrono::duration<double>(Clock::now() - start).count() > patience_) throw;
+    } catch (const ConnectionLost&) {
+      for (;;) {
+        if ((cancel_ && cancel_->load()) || std::chrono::duration<double>(Clock::now() - start).count() > patience_)
+          throw;
+        try {
+          db_->reconnect();
+          break;
+        } catch (const ConnectionLost&) { std::this_thread::sleep_for(std::chrono::milliseconds(200)); }
+      }
+    } catch (...) {
+      try {
+        db_->run("ROLLBACK");
+      } catch (const std::exception&) {
+        // the first error is the one to tell
+      }
+      throw;
+    }
+  }
+}
+
+Store::Store(const std::string& address, const std::atomic<bool>* cancel, double patience)
+    : db_(open_patiently(address, cancel, patience)), cancel_(cancel), patience_(patience) {
+  transact([&](bool) {
+    if (is_server(address)) db_->run("SELECT pg_advisory_xact_lock(7086719)");  // two may create at once
+    make_schema(*db_);
+    return 0;
+  });
+}
+
+void Store::put_model(const std::string& hash, const std::string& definition) {
+  transact([&](bool) {
+    db_->run(
+        "INSERT INTO model(hash, definition) VALUES ($1, $2) ON CONFLICT (hash) DO UPDATE SET definition = "
+        "excluded.definition",
+        {hash, definition});
+    return 0;
+  });
+}
+
+std::optional<std::string> Store::find_model(const std::string& hash) {
+  return transact(
+      [&](bool) {
+        const Rows rows = db_->run("SELECT definition FROM model WHERE hash = $1", {hash});
+        return rows.empty() ? std::nullopt : rows[0][0];
+      },
+      false);
+}
+
+void Store::put_study(const StudyRow& s) {
+  transact([&](bool) {
+    db_->run(
+        "INSERT INTO study(name, model, definition, state, summary) VALUES ($1, $2, $3, $4, $5) ON CONFLICT (name) DO "
+        "UPDATE SET model = excluded.model, definition = excluded.definition, state = excluded.state, summary = "
+        "excluded.summary",
+        {s.name, s.model, s.definition, s.state, s.summary});
+    return 0;
+  });
+}
+
+std::vector<StudyRow> Store::list_studies() {
+  return transact(
+      [&](bool) {
+        std::vector<StudyRow> studies;
+        for (const Row& r : db_->run("SELECT name, model, definition, state, summary FROM study ORDER BY name"))
+          studies.push_back({*r[0], *r[1], *r[2], *r[3], *r[4]});
+        return studies;
+      },
+      false);
+}
+
+std::optional<StudyRow> Store::find_study(const std::string& name) {
+  for (StudyRow& s : list_studies())
+    if (s.name == name) return std::move(s);
+  return std::nullopt;
+}
+
+void Store::add_jobs(const std::string& model, const std::vector<std::pair<std::string, Point>>& jobs) {
+  constexpr std::size_t most = 1000;  // in one statement
+  for (std::size_t first = 0; first < jobs.size(); first += most) {
+    json pairs = json::array();
+    for (std::size_t i = first; i < std::min(first + most, jobs.size()); ++i)
+      pairs.push_back({jobs[i].first, to_text(jobs[i].second)});
+    transact([&](bool) {
+      db_->run(fmt::format("INSERT INTO job(hash, model, inputs, state) SELECT a, $2, b, 'waiting' FROM {} AS p WHERE "
+                           "true ON CONFLICT (hash) DO NOTHING",
+                           db_->dialect().pairs),
+               {pairs.dump(), model});
+      return 0;
+    });
+  }
+}
+
+std::vector<Job> Store::claim(const std::string& worker, int count, double lease) {
+  const Dialect& d = db_->dialect();
+  Rows rows = transact([&](bool again) {
+    if (again) {
+      // the transaction that was lost may have been committed
+      Rows held = db_->run(
+          "SELECT number, hash, model, inputs, attempt FROM job WHERE state = 'running' AND worker = $1", {worker});
+      if (!held.empty()) return held;
+    }
+    return db_->run(
+        fmt::format("WITH chosen AS MATERIALIZED (SELECT number FROM job WHERE state IN ('waiting', 'running') AND "
+                    "(state = 'waiting' OR lease_until < {0}) AND attempt < {1} ORDER BY number LIMIT {2} {3}) "
+                    "UPDATE job SET state = 'running', attempt = attempt + 1, worker = $1, lease_until = {0} + {4} "
+                    "WHERE number IN (SELECT number FROM chosen) RETURNING number, hash, model, inputs, attempt",
+                    d.now, most_attempts, count, d.skip_locked, lease),
+        {worker});
+  });
+  std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return std::stoll(*a[0]) < std::stoll(*b[0]); });
+  std::vector<Job> jobs;
+  for (const Row& r : rows) jobs.push_back({*r[1], *r[2], to_numbers(*r[3]), std::stoi(*r[4])});
+  return jobs;
+}
+
+void Store::renew(const std::vector<std::string>& workers, double lease) {
+  const Dialect& d = db_->dialect();
+  transact([&](bool) {
+    db_->run(fmt::format("UPDATE job SET lease_until = {} + {} WHERE state = 'running' AND worker IN {}", d.now, lease,
+                         d.listed),
+             {json(workers).dump()});
+    return 0;
+  });
+}
+
+bool Store::finish(const Job& job, const std::string& worker, const Answer& answer) {
+  using Kind = Answer::Kind;
+  const bool is_lost = answer.kind == Kind::Crashed && job.attempt < most_attempts;
+  const bool is_result =
+      answer.kind == Kind::Done || answer.kind == Kind::Failed || (answer.kind == Kind::Crashed && !is_lost);
+  std::string state = answer.kind == Kind::Done ? "done" : is_result ? "failed" : "waiting";
+  if (answer.kind == Kind::Refused) state = "refused";
+  const int attempt = answer.kind == Kind::Cancelled ? job.attempt - 1 : job.attempt;
+  return transact([&](bool) {
+    const bool is_ours =
+        !db_->run(
+                "UPDATE job SET state = $1, attempt = $2, message = $3, lease_until = NULL WHERE hash = "
+                "$4 AND state = 'running' AND worker = $5 AND attempt = $6 RETURNING hash",
+                {state, std::to_string(attempt), to_clean(answer.text), job.hash, worker, std::to_string(job.attempt)})
+             .empty();
+    if (is_ours && is_result) insert_result(*db_, job, worker, answer);
+    return is_ours;
+  });
+}
+
+int Store::quarantine() {
+  const Dialect& d = db_->dialect();
+  return transact([&](bool) {
+    const Rows rows = db_->run(
+        fmt::format("WITH chosen AS MATERIALIZED (SELECT number FROM job WHERE state IN ('waiting', 'running') AND "
+                    "(state = 'waiting' OR lease_until < {0}) AND attempt >= {1} ORDER BY number LIMIT 1000 {2}) "
+                    "UPDATE job SET state = 'failed' WHERE number IN (SELECT number FROM chosen) "
+                    "RETURNING hash, model, attempt, worker",
+                    d.now, most_attempts, d.skip_locked));
+    for (const Row& r : rows) {
+      Answer a;
+      a.kind = Answer::Kind::Failed;
+      a.text = fmt::format("its worker vanished {} times", *r[2]);
+      insert_result(*db_, {*r[0], *r[1], {}, std::stoi(*r[2])}, r[3].value_or(""), a);
+    }
+    return static_cast<int>(rows.size());
+  });
+}
+
+std::vector<StoredResult> Store::find_results(const std::vector<std::string>& hashes) {
+  return transact(
+      [&](bool) {
+        std::vector<StoredResult> results;
+        for (const Row& r : db_->run(fmt::format("SELECT hash, status, outcome, outputs, trajectory, message, seconds "
+                                                 "FROM result WHERE hash IN {}",
+                                                 db_->dialect().listed),
+                                     {json(hashes).dump()}))
+          results.push_back({*r[0], {}, read_answer(r, 1)});
+        return results;
+      },
+      false);
+}
+
+std::vector<StoredResult> Store::load_results(const std::string& model) {
+  return transact(
+      [&](bool) {
+        std::vector<StoredResult> results;
+        for (const Row& r :
+             db_->run("SELECT j.hash, j.inputs, r.status, r.outcome, r.outputs, r.trajectory, r.message, "
+                      "r.seconds FROM job j JOIN result r ON r.hash = j.hash WHERE j.model = $1 ORDER BY "
+                      "j.number",
+                      {model}))
+          results.push_back({*r[0], to_numbers(*r[1]), read_answer(r, 2)});
+        return results;
+      },
+      false);
+}
+
+Counts Store::count(const std::string& model) {
+  return transact(
+      [&](bool) {
+        Counts c;
+        for (const Row& r : db_->run("SELECT state, count(*) FROM job WHERE model = $1 GROUP BY state", {model})) {
+          const long n = std::stol(*r[1]);
+          if (*r[0] == "waiting" || *r[0] == "refused") c.waiting += n;
+          if (*r[0] == "running") c.running = n;
+          if (*r[0] == "done") c.done = n;
+          if (*r[0] == "failed") c.failed = n;
+        }
+        return c;
+      },
+      false);
+}
+
+std::optional<std::string> Store::find_refusal(const std::string& model) {
+  return transact(
+      [&](bool) {
+        const Rows rows =
+            db_->run("SELECT message FROM job WHERE model = $1 AND state = 'refused' ORDER BY number LIMIT 1", {model});
+        return rows.empty() ? std::nullopt : std::optional<std::string>(rows[0][0].value_or(""));
+      },
+      false);
+}
+
+void Store::forget_refusals(const std::string& model) {
+  transact([&](bool) {
+    db_->run("UPDATE job SET state = 'waiting', attempt = 0 WHERE model = $1 AND state = 'refused'", {model});
+    return 0;
+  });
+}
+
+int Store::rerun_failed(const std::string& model) {
+  return transact([&](bool) {
+    db_->run("DELETE FROM result WHERE model = $1 AND status = 'failed'", {model});
+    return static_cast<int>(
+        db_->run("UPDATE job SET state = 'waiting', attempt = 0, worker = NULL, message = NULL WHERE "
+                 "model = $1 AND state = 'failed' RETURNING hash",
+                 {model})
+            .size());
+  });
+}
+
+}  // namespace topple::study

@@ -1,0 +1,98 @@
+#pragma once
+/// The queue and the results of studies, in a SQLite file or a PostgreSQL database of the same schema
+/// (docs/decisions/0027-study-store.md). Any number of processes may work on it and die at any moment: a job is held by
+/// a lease on the database's clock, and each has exactly one result.
+
+#include <atomic>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "study/database.h"
+#include "study/model.h"
+
+namespace topple::study {
+
+/// Attempts after which a job counts as failed.
+inline constexpr int most_attempts = 3;
+
+struct Job {
+  std::string hash, model;
+  Point inputs;
+  int attempt = 0;  // this one, from 1
+};
+
+struct StoredResult {
+  std::string hash;
+  Point inputs;  // only from `load_results`
+  Answer answer;
+};
+
+struct StudyRow {
+  std::string name;        // unique in the store
+  std::string model;       // hash
+  std::string definition;  // JSON: inputs, levels, seed, options, version
+  std::string state;       // "open" or "finished"
+  std::string summary;     // JSON, empty until finished
+};
+
+struct Counts {
+  long waiting = 0, running = 0, done = 0, failed = 0;
+};
+
+/// A name of a point under a model: the same for the same bits.
+std::string calc_job_hash(const std::string& model, const Point&);
+
+/// Numbers as a JSON array, back with the same bits (but for the payload of NaN).
+std::string to_text(const std::vector<double>&);
+std::vector<double> to_numbers(const std::string&);
+
+/// One connection; belongs to one thread. Operations wait for a server that is away, up to `patience`, and are repeated
+/// where that is safe; then they throw ConnectionLost.
+class Store {
+ public:
+  /// Creates what is missing. Throws InputError E820, E821.
+  explicit Store(const std::string& address, const std::atomic<bool>* cancel = nullptr, double patience = 300);
+
+  void put_model(const std::string& hash, const std::string& definition);
+  std::optional<std::string> find_model(const std::string& hash);
+  /// Adds a study, or replaces that of the same name.
+  void put_study(const StudyRow&);
+  std::optional<StudyRow> find_study(const std::string& name);
+  std::vector<StudyRow> list_studies();
+
+  /// Jobs that are there already stay as they are.
+  void add_jobs(const std::string& model, const std::vector<std::pair<std::string, Point>>& jobs);
+  /// Takes up to `count` jobs that wait, or whose lease has run out, oldest first; raises their attempt before anything
+  /// is run. `worker` holds nothing else.
+  std::vector<Job> claim(const std::string& worker, int count, double lease);
+  /// Leases of all jobs that these workers still hold.
+  void renew(const std::vector<std::string>& workers, double lease);
+  /// Writes a result if the job is still the worker's; false if it has lost it. Crashed: the job waits again, or failed
+  /// after its last attempt. Refused: the job stops until `forget_refusals`. Cancelled: it waits again, not counted.
+  bool finish(const Job&, const std::string& worker, const Answer&);
+  /// Jobs whose workers vanished too often become failed results. Returns how many.
+  int quarantine();
+
+  std::vector<StoredResult> find_results(const std::vector<std::string>& hashes);
+  /// All results of a model, in the order in which the jobs were added.
+  std::vector<StoredResult> load_results(const std::string& model);
+  Counts count(const std::string& model);
+  /// What was said of a refused job of the model.
+  std::optional<std::string> find_refusal(const std::string& model);
+  void forget_refusals(const std::string& model);
+  /// Failed results are taken out and their jobs wait again. Returns how many.
+  int rerun_failed(const std::string& model);
+
+ private:
+  template <class F>
+  auto transact(F work, bool writes = true);
+
+  std::unique_ptr<Database> db_;
+  const std::atomic<bool>* cancel_;
+  double patience_;
+};
+
+}  // namespace topple::study

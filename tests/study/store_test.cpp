@@ -1,0 +1,245 @@
+#include "study/store.h"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <set>
+#include <thread>
+
+#include "base/error.h"
+#include "server.h"
+
+namespace topple::study {
+namespace {
+
+using Kind = Answer::Kind;
+
+/// The same claims of both kinds of store.
+class Stores : public testing::TestWithParam<const char*> {
+ protected:
+  static void SetUpTestSuite() { server_ = Server::make().release(); }
+  static void TearDownTestSuite() {
+    delete server_;
+    server_ = nullptr;
+  }
+  void SetUp() override {
+    if (std::string(GetParam()) == "SQLite") {
+      address = folder / "study.sqlite";
+      return;
+    }
+    if (!server_) GTEST_SKIP() << "PostgreSQL is not installed";
+    address = server_->url();
+    open_database(address)->run("DROP TABLE IF EXISTS model, study, job, result");
+  }
+  /// Numbers of jobs that are `state`.
+  static Answer done(double value) { return {Kind::Done, {{"z", value}}, "falls", {}, "", 0.5}; }
+
+  Folder folder;
+  std::string address;
+  inline static Server* server_ = nullptr;
+};
+
+TEST_P(Stores, KeepEveryBitOfANumber) {
+  Store store(address);
+  const double tiny = std::numeric_limits<double>::denorm_min(), third = 1.0 / 3;
+  const double nan = std::numeric_limits<double>::quiet_NaN(), infinite = std::numeric_limits<double>::infinity();
+  store.add_jobs("m", {{"h", {third, -tiny, 1e300}}});
+  const std::vector<Job> jobs = store.claim("w", 1, 60);
+  ASSERT_EQ(jobs.size(), 1u);
+  EXPECT_EQ(jobs[0].inputs, (Point{third, -tiny, 1e300}));
+  Answer a = done(std::nextafter(0.1, 1));
+  a.outputs.emplace_back("-0 \"ü\"", -0.0);
+  a.trajectory = {third, infinite, -infinite, nan, 5e-324};
+  a.outcome = "vertical 'collapse'";
+  EXPECT_TRUE(store.finish(jobs[0], "w", a));
+  const std::vector<StoredResult> found = store.find_results({"h", "unknown"});
+  ASSERT_EQ(found.size(), 1u);
+  const Answer& b = found[0].answer;
+  EXPECT_EQ(b.outcome, a.outcome);
+  EXPECT_EQ(b.outputs, a.outputs);
+  EXPECT_TRUE(std::signbit(b.outputs[1].second));
+  ASSERT_EQ(b.trajectory.size(), 5u);
+  for (const int i : {0, 1, 2, 4}) EXPECT_EQ(b.trajectory[i], a.trajectory[i]);
+  EXPECT_TRUE(std::isnan(b.trajectory[3]));
+  EXPECT_EQ(b.seconds, 0.5);
+}
+
+TEST_P(Stores, GiveAJobToOneWorkerOnly) {
+  Store store(address);
+  store.add_jobs("m", {{"a", {1}}, {"b", {2}}, {"a", {1}}});
+  store.add_jobs("m", {{"b", {2}}, {"c", {3}}});
+  Store other(address);
+  const std::vector<Job> first = store.claim("w1", 2, 60), second = other.claim("w2", 2, 60);
+  ASSERT_EQ(first.size(), 2u);
+  EXPECT_EQ(first[0].hash, "a");
+  EXPECT_EQ(first[1].hash, "b");
+  ASSERT_EQ(second.size(), 1u);
+  EXPECT_EQ(second[0].hash, "c");
+  EXPECT_EQ(second[0].attempt, 1);
+  EXPECT_TRUE(other.claim("w3", 1, 60).empty());
+  EXPECT_EQ(store.count("m").running, 3);
+}
+
+TEST_P(Stores, TakeAnExpiredLeaseAndRefuseItsFormerOwner) {
+  Store store(address);
+  store.add_jobs("m", {{"a", {1}}});
+  const Job slow = store.claim("slow", 1, 0).at(0);
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  const Job quick = store.claim("quick", 1, 60).at(0);
+  EXPECT_EQ(quick.attempt, 2);
+  store.renew({"slow"}, 60);
+  EXPECT_FALSE(store.finish(slow, "slow", done(1)));
+  EXPECT_TRUE(store.finish(quick, "quick", done(2)));
+  EXPECT_FALSE(store.finish(quick, "quick", done(3))) << "a second time";
+  EXPECT_EQ(store.find_results({"a"}).at(0).answer.outputs[0].second, 2);
+}
+
+TEST_P(Stores, KeepALeaseThatIsRenewed) {
+  Store store(address);
+  store.add_jobs("m", {{"a", {1}}});
+  store.claim("w", 1, 0);
+  store.renew({"w", "other"}, 60);
+  EXPECT_TRUE(store.claim("x", 1, 60).empty());
+}
+
+TEST_P(Stores, PutAsideWhatCrashesThreeTimes) {
+  Store store(address);
+  store.add_jobs("m", {{"a", {1}}, {"b", {1}}});
+  for (int attempt = 1; attempt <= most_attempts; ++attempt) {
+    const Job job = store.claim("w", 1, 60).at(0);
+    EXPECT_EQ(job.hash, "a");
+    EXPECT_EQ(job.attempt, attempt);
+    EXPECT_TRUE(store.find_results({"a"}).empty());
+    EXPECT_TRUE(store.finish(job, "w", {Kind::Crashed, {}, "", {}, "signal 11", 0}));
+  }
+  EXPECT_EQ(store.find_results({"a"}).at(0).answer.kind, Kind::Failed);
+  EXPECT_EQ(store.find_results({"a"}).at(0).answer.text, "signal 11");
+  // workers that vanish
+  for (int attempt = 1; attempt <= most_attempts; ++attempt) {
+    EXPECT_EQ(store.claim("gone", 1, 0).at(0).hash, "b");
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  EXPECT_TRUE(store.claim("w", 1, 60).empty());
+  EXPECT_EQ(store.quarantine(), 1);
+  EXPECT_EQ(store.quarantine(), 0);
+  EXPECT_EQ(store.find_results({"b"}).at(0).answer.text, "its worker vanished 3 times");
+  EXPECT_EQ(store.count("m").failed, 2);
+  // a second chance
+  EXPECT_EQ(store.rerun_failed("m"), 2);
+  EXPECT_TRUE(store.find_results({"a", "b"}).empty());
+  EXPECT_EQ(store.claim("w", 5, 60).size(), 2u);
+}
+
+TEST_P(Stores, CountNoAttemptForACancelledRun) {
+  Store store(address);
+  store.add_jobs("m", {{"a", {1}}});
+  for (int i = 0; i < 5; ++i) {
+    const Job job = store.claim("w", 1, 60).at(0);
+    EXPECT_EQ(job.attempt, 1);
+    EXPECT_TRUE(store.finish(job, "w", {}));
+  }
+  EXPECT_EQ(store.count("m").waiting, 1);
+}
+
+TEST_P(Stores, HoldARefusedJobUntilItIsForgotten) {
+  Store store(address);
+  store.add_jobs("m", {{"a", {1}}});
+  EXPECT_TRUE(store.finish(store.claim("w", 1, 60).at(0), "w", {Kind::Refused, {}, "", {}, "line 3", 0}));
+  EXPECT_EQ(store.find_refusal("m"), "line 3");
+  EXPECT_EQ(store.find_refusal("other"), std::nullopt);
+  EXPECT_TRUE(store.claim("w", 1, 60).empty());
+  store.forget_refusals("m");
+  EXPECT_EQ(store.claim("w", 1, 60).at(0).attempt, 1);
+}
+
+TEST_P(Stores, RememberStudiesAndModels) {
+  Store store(address);
+  store.put_model("m", "{}");
+  store.put_model("m", "{\"timeout\": 3}");
+  EXPECT_EQ(store.find_model("m"), "{\"timeout\": 3}");
+  EXPECT_EQ(store.find_model("n"), std::nullopt);
+  store.put_study({"s", "m", "{}", "open", ""});
+  store.put_study({"s", "m", "{}", "finished", "{}"});
+  EXPECT_EQ(store.list_studies().size(), 1u);
+  EXPECT_EQ(Store(address).find_study("s")->state, "finished");
+  EXPECT_FALSE(store.find_study("t"));
+}
+
+TEST_P(Stores, FinishEveryJobOnceAmongManyWorkers) {
+  constexpr int count = 300, threads = 6;
+  {
+    Store store(address);
+    std::vector<std::pair<std::string, Point>> jobs;
+    for (int i = 0; i < count; ++i) jobs.emplace_back(calc_job_hash("m", {1.0 * i}), Point{1.0 * i});
+    store.add_jobs("m", jobs);
+  }
+  std::vector<std::thread> workers;
+  std::atomic<int> finished = 0, claimed = 0;
+  for (int t = 0; t < threads; ++t)
+    workers.emplace_back([&, t] {
+      Store store(address);
+      const std::string name = "w" + std::to_string(t);
+      for (;;) {
+        const std::vector<Job> jobs = store.claim(name, 1 + t % 3, 60);
+        if (jobs.empty()) return;
+        for (const Job& job : jobs) ++claimed, finished += store.finish(job, name, done(job.inputs[0]));
+      }
+    });
+  for (std::thread& w : workers) w.join();
+  EXPECT_EQ(claimed, count);
+  EXPECT_EQ(finished, count);
+  Store store(address);
+  const std::vector<StoredResult> results = store.load_results("m");
+  ASSERT_EQ(results.size(), static_cast<std::size_t>(count));
+  for (int i = 0; i < count; ++i) {
+    EXPECT_EQ(results[i].inputs, Point{1.0 * i}) << "in the order in which they were added";
+    EXPECT_EQ(results[i].answer.outputs[0].second, i);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Both, Stores, testing::Values("SQLite", "PostgreSQL"),
+                         [](const auto& kind) { return std::string(kind.param); });
+
+TEST(Store, NamesAJobByTheBitsOfItsPoint) {
+  EXPECT_EQ(calc_job_hash("m", {0.0}), calc_job_hash("m", {-0.0}));
+  EXPECT_NE(calc_job_hash("m", {1.0}), calc_job_hash("m", {std::nextafter(1.0, 2)}));
+  EXPECT_NE(calc_job_hash("m", {1.0}), calc_job_hash("n", {1.0}));
+}
+
+TEST(Store, HidesPasswords) {
+  EXPECT_EQ(hide_password("postgresql://me:secret@host:5432/db"), "postgresql://me@host:5432/db");
+  EXPECT_EQ(hide_password("postgresql://host:5432/db?a=b@c"), "postgresql://host:5432/db?a=b@c");
+  EXPECT_EQ(hide_password("folder/a:b@c"), "folder/a:b@c");
+}
+
+TEST(Store, RefusesAFileThatIsNone) {
+  const Folder folder;
+  std::ofstream(folder / "notes.txt") << std::string(5000, 'x');
+  EXPECT_THROW(Store(folder / "notes.txt"), InputError);
+  EXPECT_THROW(Store(folder / "missing/study.sqlite"), InputError);
+}
+
+TEST(Store, SurvivesAServerThatIsKilled) {
+  const auto server = Server::make();
+  if (!server) GTEST_SKIP() << "PostgreSQL is not installed";
+  Store store(server->url());
+  store.add_jobs("m", {{"a", {1}}, {"b", {2}}});
+  const Job a = store.claim("w", 1, 600).at(0);
+  server->stop(SIGKILL);
+  std::thread later([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    server->start();
+  });
+  EXPECT_TRUE(store.finish(a, "w", {Kind::Done, {{"z", 1}}, "", {}, "", 0}));
+  later.join();
+  server->stop(SIGQUIT);
+  server->start();
+  EXPECT_EQ(store.find_results({"a"}).size(), 1u);
+  EXPECT_EQ(store.claim("w", 5, 600).at(0).hash, "b");
+}
+
+}  // namespace
+}  // namespace topple::study
