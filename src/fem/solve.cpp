@@ -293,7 +293,9 @@ MarchSummary march(Solver& solver, const Loading& target, const MarchOptions& op
       } else if (step < options.smallest) {
         out.ending =
             fmt::format("did not converge at {}, last residual {:.2g} of the element forces", describe(to), s.residual);
-        if (s.lag > options.solve.largest_lag)
+        if (std::isinf(s.lag))
+          out.ending += ", a point of the solid found no stress";
+        else if (s.lag > options.solve.largest_lag)
           out.ending += fmt::format(", extrapolated history off by {:.2g} of them", s.lag);
         return out;
       }

@@ -79,7 +79,7 @@ struct MarchOptions {
   SolveOptions solve;
   double first = 0.05, smallest = 1e-4, largest = 0.1;  // parts of the way
   double jump_lag =
-      0.05;  // lag allowed where steps got shortest: the structure jumps, as when a cover or a bar gives way
+      0.1;  // lag allowed where steps got shortest: the structure jumps, as when a cover or a bar gives way
 };
 struct MarchSummary {
   bool complete = false, cancelled = false;

@@ -36,7 +36,7 @@ constexpr Specimen specimens[] = {
     {"Atalay 9", 305, 1676, 33.3, 363, 563, 801, 2, 22, 32, 9.5, 76, 2, 78.9, {42, 54, 73, 64, 54}},
     {"Saatcioglu U3", 350, 1000, 34.8, 430, 1.55 * 430, 600, 3, 25, 22.5, 10, 75, 2, 271, {155, 170, 232, 260, 266}},
 };
-constexpr double drifts[] = {0.0025, 0.005, 0.01, 0.02, 0.03};
+constexpr double drifts[] = {0.0025, 0.005, 0.01, 0.02};
 
 CantileverInput make_cantilever(const Specimen& s) {
   CantileverInput out;
@@ -77,13 +77,14 @@ TEST(SolidColumnSlow, PeerColumnsReachTheirMeasuredForces) {
   double sum = 0, squares = 0, n = 0;
   for (const Specimen& s : specimens) {
     SolidOptions options;
-    options.element_size = s.side * mm / 6, options.largest_rotation = 0.03, options.steps = 100, options.threads = 0;
+    options.element_size = s.side * mm / 6, options.largest_rotation = 0.02, options.steps = 80, options.threads = 0;
+    options.largest_lag = 0.01;
     const SolidMarch m = march_cantilever(make_cantilever(s), options, {});
-    // U3 loses its struts between inclined cracks at 0.96 % and 272 kN; the others go beyond 2.5 %.
+    // U3 loses its struts between inclined cracks at 0.96 % and 272 kN; the others reach the end.
     EXPECT_GT(m.rotation.back(), 0.009) << s.name << ": " << m.ending;
     const double largest = *std::max_element(m.moment.begin(), m.moment.end()), ratio = largest / (s.F_max * kN);
     std::printf("  %-15s", s.name);
-    for (size_t k = 0; k < 5; ++k) std::printf(" %4.0f/%3.0f", value_at(m, drifts[k]) / kN, s.envelope[k]);
+    for (size_t k = 0; k < 4; ++k) std::printf(" %4.0f/%3.0f", value_at(m, drifts[k]) / kN, s.envelope[k]);
     std::printf("  largest %5.1f/%5.1f %.3f; %d unknowns, %d steps, lag %.3f, %s\n", largest / kN, s.F_max, ratio,
                 m.degrees_of_freedom, m.steps, m.largest_lag, m.ending.c_str());
     sum += ratio, squares += ratio * ratio, ++n;
