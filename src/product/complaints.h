@@ -5,9 +5,19 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/unit.h"
 #include "product/document.h"
 
 namespace topple::product {
+
+/// A quantity that a reader asked for: `node` as it stands in the plan, or `key` of `table` which is left out.
+struct AskedQuantity {
+  const Node* node = nullptr;
+  const Node* table = nullptr;
+  std::string key;
+  Dimension dimension = Dimension::Number;
+  double value = 0;  // as read, or what it is when it is left out; NaN: not known here
+};
 
 class Complaints {
  public:
@@ -23,6 +33,9 @@ class Complaints {
   const std::vector<Diagnostic>& all() const { return all_; }
   /// In the order of the file.
   void sort();
+
+  /// Where readers note every quantity they ask for; nullptr: nowhere.
+  std::vector<AskedQuantity>* asked = nullptr;
 
  private:
   void add(Severity, const char* code, Place, std::string message, std::string help);

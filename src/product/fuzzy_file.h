@@ -2,36 +2,15 @@
 /// A file of fuzzy inputs for a section file: which of its values are fuzzy, which follow from others by a formula
 /// (docs/rcc.md). What the numbers mean for an analysis is the caller's.
 
-#include <cstdint>
 #include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "product/document.h"
-#include "product/expression.h"
+#include "product/fuzzy_values.h"
 #include "product/section_file.h"
 
 namespace topple::product {
-
-/// One fuzzy value: corners (x, μ) of its membership function in SI, x rising, μ from 0 up to 1 and down to 0.
-struct FuzzyValue {
-  std::string path;    // "concrete.fc"
-  std::string name;    // "fc", in formulas
-  std::string symbol;  // unit for people, "N/mm2"
-  double unit = 1;     // SI value of one of that unit
-  std::vector<std::pair<double, double>> corners;
-  SourcePosition where;
-};
-
-/// One value that follows from others.
-struct DerivedValue {
-  std::string path, name, symbol;
-  double unit = 1;
-  std::string text;  // the formula
-  Expression expression;
-  SourcePosition where;
-};
 
 /// Where a value of the section file is replaced.
 struct ValuePlace {
@@ -40,13 +19,10 @@ struct ValuePlace {
 };
 
 /// Fuzzy inputs bound to a section. Formulas count in N and mm: N/mm2, mm, mm2, N/mm, N.
-struct FuzzyFile {
+struct FuzzyFile : FuzzySearch {
   std::string title, path, text;
   std::vector<FuzzyValue> inputs;
   std::vector<DerivedValue> derived;
-  std::vector<double> levels;  // given ones of the analysis; empty: left to the program
-  int limit = 0;               // of samples; 0: left to the program
-  std::uint64_t seed = 1;
   std::vector<ValuePlace> places;    // of the inputs, then of the derived values
   std::vector<double> formula_unit;  // SI value of one unit in formulas: inputs, derived, then crisp values
   std::vector<double> crisp;         // other values of the section that formulas may use, in formula units

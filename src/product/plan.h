@@ -12,6 +12,7 @@
 
 #include "base/error.h"
 #include "base/linalg.h"
+#include "product/fuzzy_plan.h"
 
 namespace topple::product {
 
@@ -191,6 +192,7 @@ struct Plan {
   std::vector<Neighbour> neighbours;
   Criteria criteria;
   Analysis analysis;
+  FuzzyPlan fuzzy;  // empty unless the plan has [fuzzy]; its other values are the plan's own
 
   /// Height of the top of storey s above the ground [m].
   double level(int storey) const {

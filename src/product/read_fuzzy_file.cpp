@@ -2,17 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "product/fuzzy_file.h"
+#include "product/read_fuzzy_values.h"
 #include "product/reading.h"
 
 namespace topple::product {
 
 namespace {
-
-constexpr int most_inputs = 20, most_corner_inputs = 10, most_samples = 1000000;
-constexpr size_t most_corners = 50, most_levels = 50;
 
 /// A value of a section file that may be fuzzy.
 struct Target {
@@ -49,41 +46,6 @@ constexpr Target targets[] = {
      [](const SectionFile& f) { return f.concrete_loss; }},
 };
 
-const char* si_name(Dimension d) {
-  switch (d) {
-    case Dimension::Stress:
-      return "Pa";
-    case Dimension::Length:
-      return "m";
-    case Dimension::Area:
-      return "m2";
-    case Dimension::EnergyPerArea:
-      return "J/m2";
-    default:
-      return "";
-  }
-}
-
-/// Units of formulas, N and mm, and those that people read in results.
-struct Units {
-  double formula = 1, shown = 1;
-  const char* symbol = "";
-};
-Units units_of_target(Dimension d) {
-  switch (d) {
-    case Dimension::Stress:
-      return {unit::MPa, unit::MPa, "N/mm2"};
-    case Dimension::Length:
-      return {unit::mm, unit::cm, "cm"};
-    case Dimension::Area:
-      return {unit::mm2, unit::cm2, "cm2"};
-    case Dimension::EnergyPerArea:
-      return {1e3, 1e3, "N/mm"};
-    default:
-      return {};
-  }
-}
-
 const Target* find_target(const std::string& path) {
   for (const Target& t : targets)
     if (path == t.path) return &t;
@@ -98,9 +60,7 @@ struct Reader {
 
   void read_group(TableReader& root, const std::string& group);
   void read_value(const Entry&, const std::string& path);
-  void read_corners(TableReader&, const Target&, FuzzyValue&);
   bool find_place(const Target&, Place, ValuePlace&);
-  void read_search(TableReader& root);
   void parse_formulas();
   void try_samples(std::vector<Diagnostic>& warnings);
 };
@@ -131,59 +91,8 @@ bool Reader::find_place(const Target& t, Place where, ValuePlace& place) {
       node = &entry->value;
     }
   }
-  place = {keys, si_name(t.dimension)};
+  place = {keys, fuzzy_units(t.dimension).si};
   return true;
-}
-
-void Reader::read_corners(TableReader& table, const Target& t, FuzzyValue& value) {
-  constexpr Range anything{-1e12, 1e12};
-  const auto number = [&](const Node& node, const char* key) {
-    return read_quantity(node, table.label() + ": " + key, t.dimension, anything, complaints);
-  };
-  const int errors_before = complaints.error_count();
-  Place where = table.place();
-  for (const auto& [key, count] : {std::pair{"triangular", 3U}, {"trapezoidal", 4U}}) {
-    const Node* list = table.find(key);
-    if (!list) continue;
-    where = list->place;
-    if (list->kind != Node::Kind::Array || list->items.size() != count) {
-      table.error("E202", list->place, fmt::format("{}: a list of {} values is wanted", key, count),
-                  count == 3 ? "left end, core and right end" : "left end, core from, core to and right end");
-      return;
-    }
-    for (size_t i = 0; i < count; ++i)
-      value.corners.emplace_back(number(list->items[i], key), i == 0 || i + 1 == count ? 0 : 1);
-  }
-  if (const Node* list = table.find("polygonal")) {
-    where = list->place;
-    if (list->kind != Node::Kind::Array || list->items.size() < 3 || list->items.size() > most_corners) {
-      table.error("E202", list->place, "polygonal: a list of 3 to 50 corners is wanted",
-                  "each a pair of the value and its membership, from 0 up to 1 and down to 0");
-      return;
-    }
-    for (const Node& item : list->items) {
-      if (item.kind != Node::Kind::Array || item.items.size() != 2) {
-        table.error("E202", item.place, "polygonal: a pair of a value and its membership is wanted");
-        return;
-      }
-      value.corners.emplace_back(number(item.items[0], "polygonal"),
-                                 read_quantity(item.items[1], table.label() + ": polygonal: membership",
-                                               Dimension::Number, fraction, complaints));
-    }
-  }
-  if (complaints.error_count() != errors_before) return;
-  bool rises = true, is_hill = true, has_top = false, falls = false;
-  for (size_t i = 0; i < value.corners.size(); ++i) {
-    const auto& [x, mu] = value.corners[i];
-    has_top = has_top || mu == 1;
-    if (i == 0) continue;
-    rises = rises && x >= value.corners[i - 1].first;
-    if (mu < value.corners[i - 1].second) falls = true;
-    if (falls && mu > value.corners[i - 1].second) is_hill = false;
-  }
-  if (!rises) table.error("E207", where, "the values must rise from left to right");
-  if (!has_top || !is_hill || value.corners.front().second != 0 || value.corners.back().second != 0)
-    table.error("E207", where, "the membership must go from 0 up to 1 and down to 0");
 }
 
 void Reader::read_value(const Entry& entry, const std::string& path) {
@@ -197,36 +106,32 @@ void Reader::read_value(const Entry& entry, const std::string& path) {
   }
   if (entry.value.kind != Node::Kind::Table) {
     complaints.error("E202", entry.value.place, path + ": is " + name_of(entry.value.kind) + "; a table is wanted",
-                     "{ triangular = [left, core, right] }, trapezoidal, polygonal, or { formula = \"...\" }");
+                     fuzzy_help);
     return;
   }
   TableReader table(entry.value, path, complaints);
-  int ways = 0;
-  for (const char* key : {"triangular", "trapezoidal", "polygonal", "formula"}) ways += table.has(key);
+  const std::string way = find_fuzzy_way(table, entry.place);
   ValuePlace place;
   const bool has_place = find_place(*t, entry.place, place);
-  const Units units = units_of_target(t->dimension);
-  if (ways == 1 && table.has("formula")) {
+  const FuzzyUnits units = fuzzy_units(t->dimension);
+  if (way == "formula") {
     DerivedValue d;
     d.path = path, d.name = t->name, d.symbol = units.symbol, d.unit = units.shown;
     d.where = complaints.position(entry.place);
     d.text = table.text("formula");
     formula_nodes.push_back(table.find("formula"));
     out.derived.push_back(std::move(d));
-  } else if (ways == 1) {
+  } else if (!way.empty()) {
     FuzzyValue v;
     v.path = path, v.name = t->name, v.symbol = units.symbol, v.unit = units.shown;
     v.where = complaints.position(entry.place);
-    read_corners(table, *t, v);
+    read_corners(table, t->dimension, v);
     // inputs stand before derived values
     if (has_place) out.places.insert(out.places.begin() + static_cast<std::ptrdiff_t>(out.inputs.size()), place);
     out.inputs.push_back(std::move(v));
   }
-  if (ways == 1 && table.has("formula") && has_place) out.places.push_back(place);
-  table.finish();
-  if (ways != 1)
-    complaints.error("E207", entry.place,
-                     path + ": exactly one of triangular, trapezoidal, polygonal, formula is wanted");
+  if (way == "formula" && has_place) out.places.push_back(place);
+  if (!way.empty()) table.finish();
 }
 
 void Reader::read_group(TableReader& root, const std::string& group) {
@@ -242,30 +147,10 @@ void Reader::read_group(TableReader& root, const std::string& group) {
   }
 }
 
-void Reader::read_search(TableReader& root) {
-  const Node* node = root.table("search");
-  if (!node) return;
-  TableReader table(*node, "search", complaints);
-  if (const Node* list = table.find("levels")) {
-    if (list->kind != Node::Kind::Array || list->items.empty() || list->items.size() > most_levels) {
-      table.error("E202", list->place, "levels: a list of 1 to 50 numbers is wanted", "such as [0, 0.5, 1]");
-    } else {
-      for (const Node& item : list->items)
-        out.levels.push_back(read_quantity(item, "search: levels", Dimension::Number, fraction, complaints));
-    }
-  }
-  out.limit = static_cast<int>(table.find_integer("samples", 10, most_samples).value_or(0));
-  out.seed =
-      static_cast<std::uint64_t>(table.find_integer("seed", 0, std::numeric_limits<std::int64_t>::max()).value_or(1));
-  table.finish();
-}
-
 /// Formulas may use fuzzy inputs and the other values of the section.
 void Reader::parse_formulas() {
   std::vector<std::string> names;
-  const auto formula_unit = [&](const std::string& path) {
-    return units_of_target(find_target(path)->dimension).formula;
-  };
+  const auto formula_unit = [&](const std::string& path) { return fuzzy_units(find_target(path)->dimension).formula; };
   for (const FuzzyValue& v : out.inputs) names.push_back(v.name), out.formula_unit.push_back(formula_unit(v.path));
   for (const DerivedValue& d : out.derived) out.formula_unit.push_back(formula_unit(d.path));
   for (const Target& t : targets) {
@@ -279,34 +164,15 @@ void Reader::parse_formulas() {
   for (size_t i = 0; i < out.derived.size(); ++i) {
     DerivedValue& d = out.derived[i];
     if (d.text.empty()) continue;
-    ExpressionFault fault;
-    d.expression = Expression::parse(d.text, names, fault);
-    if (fault.message.empty()) continue;
-    Place place = formula_nodes[i]->place;
-    place.column += 1 + static_cast<int>(fault.offset);  // behind the quotation mark
-    complaints.error("E208", place, d.path + ": formula: " + fault.message, fault.help);
+    d.expression = read_formula(*formula_nodes[i], d.path, names, complaints);
   }
-}
-
-/// A value in the words of the file.
-std::string text_of(const FuzzyValue& v, double x) {
-  return fmt::format("{} = {:.6g}{}{}", v.name, x / v.unit, v.symbol.empty() ? "" : " ", v.symbol);
 }
 
 /// The centre and each end alone must give a section; corners that do not are told, since their samples will fail.
 void Reader::try_samples(std::vector<Diagnostic>& warnings) {
   const size_t n = out.inputs.size();
   std::vector<double> centre;
-  for (const FuzzyValue& v : out.inputs) {
-    double left = 0, right = 0;
-    bool has_left = false;
-    for (const auto& [x, mu] : v.corners) {
-      if (mu != 1) continue;
-      if (!has_left) left = x, has_left = true;
-      right = x;
-    }
-    centre.push_back(0.5 * (left + right));
-  }
+  for (const FuzzyValue& v : out.inputs) centre.push_back(0.5 * (core_of(v).first + core_of(v).second));
   const auto refusal = [&](const std::vector<double>& point) -> std::string {
     const std::vector<double> derived = calc_derived(out, point);
     for (size_t i = 0; i < derived.size(); ++i)
@@ -407,13 +273,13 @@ FuzzyFile read_fuzzy_text(const std::string& text, const std::string& name, cons
   out.title = root.text("title", section.title);
   Reader reader{section, out, complaints, {}};
   for (const char* group : {"concrete", "steel", "section", "zone"}) reader.read_group(root, group);
-  reader.read_search(root);
+  static_cast<FuzzySearch&>(out) = read_search(root);
   root.finish();
   if (complaints.error_count() == 0 && out.inputs.empty())
     complaints.error("E201", document.place, "nothing is fuzzy",
                      "add a line such as concrete.fc = { triangular = [\"10 N/mm2\", \"25 N/mm2\", \"45 N/mm2\"] }");
-  if (out.inputs.size() > most_inputs)
-    complaints.error("E209", document.place, fmt::format("more than {} fuzzy inputs", most_inputs));
+  if (out.inputs.size() > most_fuzzy_inputs)
+    complaints.error("E209", document.place, fmt::format("more than {} fuzzy inputs", most_fuzzy_inputs));
   if (complaints.error_count() == 0) reader.parse_formulas();
   if (complaints.error_count() == 0) reader.try_samples(warnings);
   complaints.sort();

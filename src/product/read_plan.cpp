@@ -14,17 +14,12 @@ constexpr std::uintmax_t largest_file = 8u << 20;
 
 }  // namespace
 
-Plan read_plan(const std::string& text, const std::string& name, std::vector<Diagnostic>& warnings) {
-  constexpr const char* byte_order_mark = "\xEF\xBB\xBF";
+Plan read_plan_document(const Node& document, const std::string& name, Complaints& complaints, bool is_sample) {
   Plan plan;
   plan.path = name;
-  plan.text = text.starts_with(byte_order_mark) ? text.substr(3) : text;
-  if (text.size() > largest_file)
-    throw InputError(std::vector<Diagnostic>{
-        {Severity::Error, "E107", {name, 1, 1}, 1, "the plan is larger than 8 MB", "a plan describes one building"}});
-  const Node document = parse_document(plan.text, name);
-
-  Complaints complaints(name);
+  std::vector<AskedQuantity> asked;
+  const bool is_fuzzy = !is_sample && document.find("fuzzy");
+  if (is_fuzzy) complaints.asked = &asked;
   Reading reading{plan, complaints, {}, {}, {}, {}, {}, false, true, {}, {}, {}, {}};
   TableReader root(document, "", complaints);
   plan.title = root.text("title", "untitled");
@@ -40,8 +35,27 @@ Plan read_plan(const std::string& text, const std::string& name, std::vector<Dia
   read_stages(reading, root);
   read_cables(reading, root);
   read_criteria(reading, root);
+  complaints.asked = nullptr;
+  if (is_sample) {
+    root.find("fuzzy");
+  } else {
+    read_fuzzy(reading, root, document, asked, complaints.error_count() == 0);
+  }
   root.finish();
+  return plan;
+}
 
+Plan read_plan(const std::string& text, const std::string& name, std::vector<Diagnostic>& warnings) {
+  constexpr const char* byte_order_mark = "\xEF\xBB\xBF";
+  if (text.size() > largest_file)
+    throw InputError(std::vector<Diagnostic>{
+        {Severity::Error, "E107", {name, 1, 1}, 1, "the plan is larger than 8 MB", "a plan describes one building"}});
+  std::string bytes = text.starts_with(byte_order_mark) ? text.substr(3) : text;
+  const Node document = parse_document(bytes, name);
+  Complaints complaints(name);
+  Plan plan = read_plan_document(document, name, complaints, false);
+  plan.text = std::move(bytes);
+  if (complaints.error_count() == 0) try_samples(plan, document, complaints);
   complaints.sort();
   if (complaints.error_count() > 0) throw InputError(complaints.all());
   warnings.insert(warnings.end(), complaints.all().begin(), complaints.all().end());

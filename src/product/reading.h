@@ -44,6 +44,14 @@ void read_stages(Reading&, TableReader& root);
 void read_cables(Reading&, TableReader& root);
 void read_criteria(Reading&, TableReader& root);
 void read_analysis(Reading&, TableReader& root);
+/// [fuzzy], whose paths lead to the quantities that were asked for before. `is_whole`: all of them could be read, so
+/// that an unknown path is the path's own fault.
+void read_fuzzy(Reading&, TableReader& root, const Node& document, const std::vector<AskedQuantity>& asked,
+                bool is_whole);
+/// Tries the middle, the ends and the corners of the fuzzy values: the middle and each end alone must give a plan.
+void try_samples(const Plan&, const Node& document, Complaints&);
+/// A plan from a document; the text of the plan is left empty. Without [fuzzy] if `is_sample`.
+Plan read_plan_document(const Node& document, const std::string& name, Complaints&, bool is_sample);
 
 /// Index of a named thing; -1 after a complaint, or without one if the name is empty.
 int find_named(const std::map<std::string, int>& known, const TableReader&, const std::string& key,

@@ -97,8 +97,11 @@ std::string describe(const Range& range, Dimension dimension) {
   return "between " + number_text(range.low / size) + " and " + high;
 }
 
-double read_quantity(const Node& node, const std::string& label, Dimension dimension, Range range,
-                     Complaints& complaints) {
+namespace {
+
+/// NaN after a complaint.
+double read_value(const Node& node, const std::string& label, Dimension dimension, Range range,
+                  Complaints& complaints) {
   double value = nan;
   std::string written;
   if (node.kind == Node::Kind::String) {
@@ -136,6 +139,15 @@ double read_quantity(const Node& node, const std::string& label, Dimension dimen
   return value;
 }
 
+}  // namespace
+
+double read_quantity(const Node& node, const std::string& label, Dimension dimension, Range range,
+                     Complaints& complaints) {
+  const double value = read_value(node, label, dimension, range, complaints);
+  if (complaints.asked) complaints.asked->push_back({&node, nullptr, {}, dimension, value});
+  return value;
+}
+
 TableReader::TableReader(const Node& node, std::string label, Complaints& complaints)
     : node_(node), label_(std::move(label)), complaints_(complaints), is_table_(node.kind == Node::Kind::Table) {
   if (!is_table_) complaints_.error("E202", node.place, label_ + ": is " + name_of(node.kind) + "; a table is wanted");
@@ -170,13 +182,16 @@ double TableReader::quantity(const std::string& key, Dimension dimension, Range 
 }
 
 double TableReader::quantity(const std::string& key, Dimension dimension, Range range, double fallback) {
-  return find_quantity(key, dimension, range).value_or(fallback);
+  const double value = find_quantity(key, dimension, range).value_or(fallback);
+  if (complaints_.asked && !has(key)) complaints_.asked->back().value = fallback;
+  return value;
 }
 
 std::optional<double> TableReader::find_quantity(const std::string& key, Dimension dimension, Range range) {
   const Node* node = find(key);
-  if (!node) return std::nullopt;
-  return read_quantity(*node, label_ + ": " + key, dimension, range, complaints_);
+  if (node) return read_quantity(*node, label_ + ": " + key, dimension, range, complaints_);
+  if (complaints_.asked) complaints_.asked->push_back({nullptr, &node_, key, dimension, nan});
+  return std::nullopt;
 }
 
 std::string TableReader::text(const std::string& key) {

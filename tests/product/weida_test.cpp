@@ -87,7 +87,9 @@ TEST_P(Weida, LosesThreeRowsInTwoStages) {
   EXPECT_EQ(plan.criteria.stands_between_stages, true);
 }
 
-INSTANTIATE_TEST_SUITE_P(Plans, Weida, testing::Values("plan.toml", "plan-equal-bays.toml", "plan-left-values.toml"));
+INSTANTIATE_TEST_SUITE_P(Plans, Weida,
+                         testing::Values("plan.toml", "plan-equal-bays.toml", "plan-left-values.toml",
+                                         "plan-fuzzy.toml"));
 
 TEST(WeidaCore, HasTheCoreValuesOfTable1) {
   const Plan plan = read_example("plan.toml");

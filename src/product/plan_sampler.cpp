@@ -1,0 +1,148 @@
+#include "product/plan_sampler.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "product/read_fuzzy_values.h"
+#include "product/reading.h"
+
+namespace topple::product {
+
+namespace {
+
+constexpr int most_corner_members = 200000;  // members that are read for all corners together
+
+/// The value at a place, made if only its key is missing.
+void set_value(Node& document, const DocumentPath& place, const std::string& text) {
+  Node* node = &document;
+  for (const DocumentStep& step : place) {
+    if (step.item >= 0) {
+      node = &node->items[static_cast<size_t>(step.item)];
+      continue;
+    }
+    auto entry =
+        std::find_if(node->entries.begin(), node->entries.end(), [&](const Entry& e) { return e.key == step.key; });
+    if (entry == node->entries.end()) {
+      Entry added{step.key, node->place, {}};
+      added.value.place = node->place;
+      entry = node->entries.insert(entry, std::move(added));
+    }
+    node = &entry->value;
+  }
+  node->kind = Node::Kind::String;
+  node->text = text;
+}
+
+Plan read_sample(const FuzzyPlan& fuzzy, const Node& document, const std::string& path, std::span<const double> point) {
+  Node changed = document;
+  const auto put = [&](size_t i, double value) {
+    const std::string text = fmt::format("{:.17g} {}", value, fuzzy.si[i]);
+    for (const DocumentPath& place : fuzzy.places[i]) set_value(changed, place, text);
+  };
+  for (size_t i = 0; i < fuzzy.inputs.size(); ++i) put(i, point[i]);
+  const std::vector<double> derived = calc_derived(fuzzy, point);
+  for (size_t i = 0; i < derived.size(); ++i) {
+    if (!std::isfinite(derived[i]))
+      throw InputError("E207", fuzzy.derived[i].path + ": the formula has no value", fuzzy.derived[i].text);
+    put(fuzzy.inputs.size() + i, derived[i]);
+  }
+  Complaints complaints(path);
+  Plan plan = read_plan_document(changed, path, complaints, true);
+  if (complaints.error_count() > 0) {
+    complaints.sort();
+    std::vector<Diagnostic> errors;
+    for (const Diagnostic& d : complaints.all())
+      if (d.severity == Severity::Error) errors.push_back(d);
+    throw InputError(errors);
+  }
+  return plan;
+}
+
+}  // namespace
+
+std::vector<double> calc_derived(const FuzzyPlan& f, std::span<const double> point) {
+  std::vector<double> out, values;
+  for (size_t i = 0; i < f.derived.size(); ++i) {
+    values.clear();
+    for (const FuzzyOperand& o : f.operands[i])
+      values.push_back((o.input >= 0 ? point[static_cast<size_t>(o.input)] : o.value) / o.unit);
+    out.push_back(f.derived[i].expression.evaluate(values) * f.derived_unit[i]);
+  }
+  return out;
+}
+
+std::vector<double> calc_centre(const FuzzyPlan& f) {
+  std::vector<double> centre;
+  for (const FuzzyValue& v : f.inputs) centre.push_back(0.5 * (core_of(v).first + core_of(v).second));
+  return centre;
+}
+
+PlanSampler make_sampler(const Plan& plan) {
+  PlanSampler s{plan.fuzzy, plan.path, plan.text, parse_document(plan.text, plan.path)};
+  std::erase_if(s.document.entries, [](const Entry& e) { return e.key == "fuzzy"; });
+  return s;
+}
+
+Plan make_sample(const PlanSampler& s, std::span<const double> point) {
+  Plan plan = read_sample(s.fuzzy, s.document, s.path, point);
+  plan.text = s.text;
+  return plan;
+}
+
+void try_samples(const Plan& plan, const Node& document, Complaints& complaints) {
+  const FuzzyPlan& fuzzy = plan.fuzzy;
+  if (fuzzy.is_empty()) return;
+  const size_t n = fuzzy.inputs.size();
+  const std::vector<double> centre = calc_centre(fuzzy);
+  const auto refusal = [&](const std::vector<double>& point) -> std::string {
+    try {
+      read_sample(fuzzy, document, plan.path, point);
+      return {};
+    } catch (const InputError& e) { return e.diagnostics().front().message; }
+  };
+  const auto place_of = [](const FuzzyValue& v) {
+    return Place{v.where.line, v.where.column, static_cast<int>(v.name.size())};
+  };
+  if (const std::string why = refusal(centre); !why.empty()) {
+    const SourcePosition& where = n > 0 ? fuzzy.inputs[0].where : fuzzy.derived[0].where;
+    complaints.error("E207", {where.line, where.column, 1},
+                     "fuzzy: the plan is refused in the middle of the fuzzy values: " + why);
+    return;
+  }
+  for (size_t i = 0; i < n; ++i) {
+    const FuzzyValue& v = fuzzy.inputs[i];
+    for (const double end : {v.corners.front().first, v.corners.back().first}) {
+      std::vector<double> point = centre;
+      point[i] = end;
+      const std::string why = refusal(point);
+      if (why.empty()) continue;
+      complaints.error("E205", place_of(v),
+                       fmt::format("fuzzy: {}: {} is not possible: {}", v.path, text_of(v, end), why));
+      break;
+    }
+  }
+  if (complaints.error_count() > 0 || n > most_corner_inputs || plan.members.size() << n > most_corner_members) return;
+  int refused = 0;
+  std::string example;
+  for (unsigned corner = 0; corner < 1U << n; ++corner) {
+    std::vector<double> point;
+    std::string words;
+    for (size_t i = 0; i < n; ++i) {
+      const auto& corners = fuzzy.inputs[i].corners;
+      point.push_back(corner >> i & 1U ? corners.back().first : corners.front().first);
+      words.append(i ? ", " : "").append(text_of(fuzzy.inputs[i], point.back()));
+    }
+    const std::string why = refusal(point);
+    if (why.empty()) continue;
+    if (refused++ == 0) example = words.append(": ").append(why);
+  }
+  if (refused == 0) return;
+  complaints.warn("W507", place_of(fuzzy.inputs[0]),
+                  fmt::format("fuzzy: {} of {} corners of the fuzzy values are no plan; samples there count as failed",
+                              refused, 1U << n),
+                  "first: " + example);
+}
+
+}  // namespace topple::product

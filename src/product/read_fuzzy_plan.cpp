@@ -1,0 +1,352 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <unordered_map>
+
+#include "product/read_fuzzy_values.h"
+#include "product/reading.h"
+
+namespace topple::product {
+
+namespace {
+
+constexpr double accepted_difference = 1e-3;  // between a value of the plan and the core
+
+/// A quantity of the plan and the ways to write its path.
+struct Target {
+  std::vector<std::vector<std::string>> words;  // for each step the words that lead there: a number, a name
+  DocumentPath place;
+  Dimension dimension = Dimension::Number;
+  double value = 0;
+  size_t owner = 0;  // steps up to what the value belongs to: concrete.NAME, stage.N.charge.M, site
+};
+
+std::string join(const std::vector<std::string>& words, const char* between) {
+  return fmt::format("{}", fmt::join(words, between));
+}
+
+/// With the first word of each step; keys that are not bare stand in quotes.
+std::string path_of(const Target& t) {
+  std::string path;
+  for (const auto& w : t.words) {
+    const std::string& word = w.front();
+    const bool is_bare = !word.empty() && std::all_of(word.begin(), word.end(), [](unsigned char c) {
+      return std::isalnum(c) || c == '-' || c == '_';
+    });
+    path += (path.empty() ? "" : ".") + (is_bare ? word : '"' + word + '"');
+  }
+  return path;
+}
+
+/// "ties_diameter" for section.NAME.ties.diameter.
+std::string name_of(const Target& t) {
+  std::vector<std::string> words;
+  for (size_t i = t.owner; i < t.words.size(); ++i) words.push_back(t.words[i].front());
+  return join(words, "_");
+}
+
+bool has_named_tables(const std::string& group) {
+  return group == "concrete" || group == "steel" || group == "section" || group == "slab" || group == "wall";
+}
+
+/// All quantities that readers asked for, with their paths.
+class TargetFinder {
+ public:
+  TargetFinder(const Node& document, const std::vector<AskedQuantity>& asked) {
+    for (const AskedQuantity& a : asked) asked_[a.node ? a.node : a.table].push_back(&a);
+    visit(document);
+  }
+  std::vector<Target> targets;
+
+ private:
+  void add(const AskedQuantity& a) {
+    Target t{words_, place_, a.dimension, a.value, 1};
+    if (!words_.empty() && has_named_tables(words_[0].front())) t.owner = 2;
+    for (size_t i = 0; i + 1 < place_.size(); ++i)
+      if (place_[i].item >= 0) t.owner = std::max(t.owner, i + 1);
+    targets.push_back(std::move(t));
+  }
+  void visit(const Node& node) {
+    if (const auto here = asked_.find(&node); here != asked_.end()) {
+      for (const AskedQuantity* a : here->second) {
+        if (!a->node) words_.push_back({a->key}), place_.push_back({a->key, -1});
+        add(*a);
+        if (!a->node) words_.pop_back(), place_.pop_back();
+      }
+    }
+    for (const Entry& e : node.entries) {
+      if (place_.empty() && e.key == "fuzzy") continue;
+      words_.push_back({e.key}), place_.push_back({e.key, -1});
+      visit(e.value);
+      words_.pop_back(), place_.pop_back();
+    }
+    for (size_t i = 0; i < node.items.size(); ++i) {
+      std::vector<std::string> words{std::to_string(i + 1)};
+      if (const Entry* name = node.items[i].find("name")) words.push_back(name->value.text);
+      words_.push_back(std::move(words)), place_.push_back({{}, static_cast<int>(i)});
+      visit(node.items[i]);
+      words_.pop_back(), place_.pop_back();
+    }
+  }
+
+  std::unordered_map<const Node*, std::vector<const AskedQuantity*>> asked_;
+  std::vector<std::vector<std::string>> words_;
+  DocumentPath place_;
+};
+
+bool is_match(const std::string& word, const std::vector<std::string>& words) {
+  return std::any_of(words.begin(), words.end(), [&](const std::string& w) { return matches(word, w); });
+}
+
+/// Whether the path leads to the target, or, if it is shorter, towards it.
+bool leads_to(const std::vector<std::string>& path, const Target& t) {
+  if (path.size() > t.words.size()) return false;
+  for (size_t i = 0; i < path.size(); ++i)
+    if (!is_match(path[i], t.words[i])) return false;
+  return true;
+}
+
+struct FuzzyReader {
+  FuzzyPlan& out;
+  Complaints& complaints;
+  std::vector<Target> targets;
+  bool is_whole;
+
+  struct Formula {
+    const Node* node;
+    size_t target;
+  };
+  std::vector<Formula> formulas;     // of the derived values
+  std::vector<size_t> first_target;  // of the inputs
+  std::vector<bool> has_own_name;    // of the inputs
+  std::vector<std::pair<size_t, SourcePosition>> taken;
+  std::vector<std::vector<DocumentPath>> derived_places;
+  std::vector<std::string> derived_si;
+
+  void read_entry(const Entry&, std::vector<std::string>& path);
+  void read_leaf(const Entry&, const std::vector<std::string>& path, const std::vector<size_t>& found);
+  bool take(size_t target, Place where, const std::string& path);
+  void name_inputs();
+  void parse_formula(size_t i);
+  void compare();
+};
+
+void FuzzyReader::read_entry(const Entry& entry, std::vector<std::string>& path) {
+  path.push_back(entry.key);
+  std::vector<size_t> found;
+  bool leads_on = false;
+  for (size_t i = 0; i < targets.size(); ++i) {
+    if (!leads_to(path, targets[i])) continue;
+    if (path.size() == targets[i].words.size()) found.push_back(i);
+    leads_on = leads_on || path.size() < targets[i].words.size();
+  }
+  const bool is_table = entry.value.kind == Node::Kind::Table;
+  const bool says_how = is_table && std::any_of(std::begin(fuzzy_ways), std::end(fuzzy_ways),
+                                                [&](const char* way) { return entry.value.find(way) != nullptr; });
+  if (!found.empty() || says_how) {
+    read_leaf(entry, path, found);
+  } else if (is_table && (leads_on || !is_whole)) {
+    if (entry.value.entries.empty())
+      complaints.error("E201", entry.place, "fuzzy: " + join(path, ".") + ": is an empty table", fuzzy_help);
+    for (const Entry& inner : entry.value.entries) read_entry(inner, path);
+  } else if (is_whole) {
+    std::vector<std::string> known;
+    for (const Target& t : targets) known.push_back(path_of(t));
+    complaints.error("E203", entry.place, "fuzzy: " + quoted(join(path, ".")) + " is no value of this plan",
+                     did_you_mean(join(path, "."), known, "known here: " + list_of(known)));
+  }
+  path.pop_back();
+}
+
+/// A value may be fuzzy once.
+bool FuzzyReader::take(size_t target, Place where, const std::string& path) {
+  for (const auto& [t, position] : taken) {
+    if (t != target) continue;
+    complaints.error("E207", where, "fuzzy: " + path + ": " + path_of(targets[t]) + " is given a second time",
+                     fmt::format("first on line {}", position.line));
+    return false;
+  }
+  taken.emplace_back(target, complaints.position(where));
+  return true;
+}
+
+void FuzzyReader::read_leaf(const Entry& entry, const std::vector<std::string>& path,
+                            const std::vector<size_t>& found) {
+  const std::string words = join(path, ".");
+  if (found.empty()) {
+    if (!is_whole) return;
+    std::vector<std::string> known;
+    for (const Target& t : targets) known.push_back(path_of(t));
+    complaints.error("E203", entry.place, "fuzzy: " + quoted(words) + " is no value of this plan that can be fuzzy",
+                     did_you_mean(words, known, "quantities of the plan can be, words and whole numbers cannot"));
+    return;
+  }
+  if (entry.value.kind != Node::Kind::Table) {
+    complaints.error("E202", entry.value.place,
+                     "fuzzy: " + words + ": is " + name_of(entry.value.kind) + "; a table is wanted", fuzzy_help);
+    return;
+  }
+  TableReader table(entry.value, "fuzzy: " + words, complaints);
+  const std::string way = find_fuzzy_way(table, entry.place);
+  if (way.empty()) return;
+  const Target& first = targets[found.front()];
+  for (const size_t i : found) {
+    if (!take(i, entry.place, words)) return;
+    if (targets[i].dimension != first.dimension) {
+      table.error("E207", entry.place, path_of(first) + " and " + path_of(targets[i]) + " have different units");
+      return;
+    }
+  }
+  const FuzzyUnits units = fuzzy_units(first.dimension);
+  if (way == "formula") {
+    const std::string text = table.text("formula");
+    table.finish();
+    if (text.empty()) return;
+    for (const size_t i : found) {
+      DerivedValue d;
+      d.path = path_of(targets[i]), d.name = name_of(targets[i]), d.symbol = units.symbol, d.unit = units.shown;
+      d.text = text, d.where = complaints.position(entry.place);
+      out.derived.push_back(std::move(d));
+      out.derived_unit.push_back(units.formula);
+      derived_places.push_back({targets[i].place});
+      derived_si.emplace_back(units.si);
+      formulas.push_back({table.find("formula"), i});
+    }
+    return;
+  }
+  FuzzyValue v;
+  v.path = words, v.symbol = units.symbol, v.unit = units.shown;
+  v.where = complaints.position(entry.place);
+  const bool is_named = table.has("name");
+  v.name = is_named ? table.text("name") : name_of(first);
+  const auto is_word = [](unsigned char c) { return std::isalnum(c) || c == '_'; };
+  if (is_named && (v.name.empty() || std::isdigit(static_cast<unsigned char>(v.name[0])) ||
+                   !std::all_of(v.name.begin(), v.name.end(), is_word)))
+    table.error("E208", table.place_of("name"), "name: " + quoted(v.name) + " cannot be a name in formulas",
+                "letters, digits and _, a letter first");
+  read_corners(table, first.dimension, v);
+  table.finish();
+  out.inputs.push_back(std::move(v));
+  out.places.emplace_back();
+  for (const size_t i : found) out.places.back().push_back(targets[i].place);
+  out.si.emplace_back(units.si);
+  first_target.push_back(found.front());
+  has_own_name.push_back(is_named);
+}
+
+/// Names are unique: what shares its name with another is called by its path, with _ between its words.
+void FuzzyReader::name_inputs() {
+  std::vector<std::string> names;
+  for (const FuzzyValue& v : out.inputs) names.push_back(v.name);
+  for (size_t i = 0; i < names.size(); ++i) {
+    if (std::count(names.begin(), names.end(), names[i]) < 2) continue;
+    if (has_own_name[i]) {
+      complaints.error("E102", {out.inputs[i].where.line, out.inputs[i].where.column, 1},
+                       "fuzzy: " + out.inputs[i].path + ": the name " + quoted(names[i]) + " is given twice");
+    } else {
+      std::string& name = out.inputs[i].name = path_of(targets[first_target[i]]);
+      for (char& c : name)
+        if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+    }
+  }
+}
+
+/// A formula sees the values that stand beside its own, and all fuzzy values by their names.
+void FuzzyReader::parse_formula(size_t i) {
+  const Target& own = targets[formulas[i].target];
+  std::vector<std::string> names;
+  std::vector<FuzzyOperand> operands;
+  const auto add = [&](const std::string& name, const FuzzyOperand& o) {
+    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name), operands.push_back(o);
+  };
+  const auto is_beside = [&](const Target& t) {
+    if (t.owner != own.owner) return false;
+    for (size_t k = 0; k < own.owner; ++k)
+      if (t.place[k].key != own.place[k].key || t.place[k].item != own.place[k].item) return false;
+    return true;
+  };
+  const auto is_at = [](const DocumentPath& a, const DocumentPath& b) {
+    return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                      [](const DocumentStep& x, const DocumentStep& y) { return x.key == y.key && x.item == y.item; });
+  };
+  for (const Target& t : targets) {
+    if (!is_beside(t)) continue;
+    const auto has = [&](const std::vector<DocumentPath>& places) {
+      return std::any_of(places.begin(), places.end(), [&](const DocumentPath& p) { return is_at(p, t.place); });
+    };
+    const double unit = fuzzy_units(t.dimension).formula;
+    int input = -1;
+    for (size_t k = 0; k < out.inputs.size(); ++k)
+      if (has(out.places[k])) input = static_cast<int>(k);
+    if (input < 0 && (std::isnan(t.value) || std::any_of(derived_places.begin(), derived_places.end(), has))) continue;
+    add(name_of(t), {input, t.value, unit});
+  }
+  for (size_t k = 0; k < out.inputs.size(); ++k)
+    add(out.inputs[k].name, {static_cast<int>(k), 0, fuzzy_units(targets[first_target[k]].dimension).formula});
+  out.derived[i].expression = read_formula(*formulas[i].node, "fuzzy: " + out.derived[i].path, names, complaints);
+  out.operands.push_back(std::move(operands));
+}
+
+/// The plan as it stands is a run of its own; the analysis has its own middle. Both should be the same building.
+void FuzzyReader::compare() {
+  const auto differs = [](double a, double b) {
+    return std::abs(a - b) > accepted_difference * std::max(std::abs(a), std::abs(b));
+  };
+  const std::string help = "topple run takes the plan's value, a study its fuzzy values";
+  for (size_t i = 0; i < out.inputs.size(); ++i) {
+    const FuzzyValue& v = out.inputs[i];
+    const auto [left, right] = core_of(v);
+    for (const auto& [t, where] : taken) {
+      const double x = targets[t].value;
+      if (where.line != v.where.line || where.column != v.where.column || std::isnan(x)) continue;
+      if ((x < left && differs(x, left)) || (x > right && differs(x, right)))
+        complaints.warn("W508", {where.line, where.column, 1},
+                        fmt::format("fuzzy: {}: the plan says {}, outside the core of the fuzzy value",
+                                    path_of(targets[t]), text_of(v, x)),
+                        help);
+    }
+  }
+  const std::vector<double> derived = calc_derived(out, calc_centre(out));
+  for (size_t i = 0; i < derived.size(); ++i) {
+    const DerivedValue& d = out.derived[i];
+    const double x = targets[formulas[i].target].value;
+    if (std::isnan(x) || !std::isfinite(derived[i]) || !differs(x, derived[i])) continue;
+    complaints.warn("W508", {d.where.line, d.where.column, 1},
+                    fmt::format("fuzzy: {}: the plan says {:.6g} {}, the formula gives {:.6g} at the core", d.path,
+                                x / d.unit, d.symbol, derived[i] / d.unit),
+                    help);
+  }
+}
+
+}  // namespace
+
+void read_fuzzy(Reading& reading, TableReader& root, const Node& document, const std::vector<AskedQuantity>& asked,
+                bool is_whole) {
+  const Node* node = root.table("fuzzy");
+  if (!node) return;
+  Complaints& complaints = reading.complaints;
+  FuzzyPlan& out = reading.plan.fuzzy;
+  const int errors_before = complaints.error_count();
+  TableReader table(*node, "fuzzy", complaints);
+  out.search = read_search(table);
+  FuzzyReader reader{out, complaints, TargetFinder(document, asked).targets, is_whole, {}, {}, {}, {}, {}, {}};
+  std::vector<std::string> path;
+  for (const Entry& entry : node->entries)
+    if (entry.key != "search") reader.read_entry(entry, path);
+  if (complaints.error_count() > errors_before || !is_whole) return;
+  if (out.inputs.empty())
+    complaints.error(
+        "E201", node->place, "fuzzy: nothing is fuzzy",
+        "add a line such as concrete.NAME.fc = { triangular = [\"10 N/mm2\", \"25 N/mm2\", \"45 N/mm2\"] }");
+  if (out.inputs.size() > most_fuzzy_inputs)
+    complaints.error("E209", node->place, fmt::format("fuzzy: more than {} fuzzy values", most_fuzzy_inputs));
+  reader.name_inputs();
+  for (size_t i = 0; i < out.derived.size(); ++i) reader.parse_formula(i);
+  out.places.insert(out.places.end(), reader.derived_places.begin(), reader.derived_places.end());
+  out.si.insert(out.si.end(), reader.derived_si.begin(), reader.derived_si.end());
+  if (complaints.error_count() == errors_before) reader.compare();
+}
+
+}  // namespace topple::product
