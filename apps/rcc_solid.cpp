@@ -40,9 +40,10 @@ record::RccCurve to_curve(const nearfield::SolidMarch& march, const SolidTask& t
   record::RccCurve c;
   c.route = "solid", c.axis = task.axis, c.direction = task.direction, c.normal_force = -N;
   c.stiffness_uncracked = EI;
-  c.ending = march.complete
-                 ? fmt::format("computed up to {:.3g} rad", march.rotation.empty() ? 0 : march.rotation.back())
-                 : march.ending;
+  c.ending = march.ending;
+  if (march.complete && !march.rotation.empty())
+    c.ending = march.moment.back() > 0 ? fmt::format("computed up to {:.3g} rad", march.rotation.back())
+                                       : fmt::format("no moment is left beyond {:.4g} rad", march.rotation.back());
   if (march.rotation.size() < 2) return c;
   c.rotation = march.rotation, c.moment = march.moment;
   for (double& m : c.moment) m = std::max(0.0, m);
