@@ -436,9 +436,9 @@ bool System::find_equilibrium(std::string& message) {
     // round-off ends the improvement of very stiff models earlier
     idle = unbalanced < 0.5 * best ? 0 : idle + 1;
     best = std::min(best, unbalanced);
-    if (round == most || (idle > 10 && unbalanced < good_enough)) break;
+    if (round == most || (idle > 2 && unbalanced < good_enough)) break;
     state.element = virgin;
-    if (round == 0 || (factorised < fresh && unbalanced > quick * last_unbalanced)) {
+    if (round == 0 || (factorised < fresh && unbalanced > good_enough && unbalanced > quick * last_unbalanced)) {
       ++factorised;
       if (!factorise()) return finish(false);
     }
