@@ -240,6 +240,18 @@ void Store::add_jobs(const std::string& model, const std::vector<std::pair<std::
   }
 }
 
+void Store::add_impossible(const std::string& model, const std::vector<StoredResult>& results) {
+  transact([&](bool) {
+    for (const StoredResult& r : results) {
+      db_->run(
+          "INSERT INTO job(hash, model, inputs, state) VALUES ($1, $2, $3, 'impossible') ON CONFLICT (hash) DO NOTHING",
+          {r.hash, model, to_text(r.inputs)});
+      insert_result(*db_, {r.hash, model, {}, 0}, "", r.answer);
+    }
+    return 0;
+  });
+}
+
 std::vector<Job> Store::claim(const std::string& worker, int count, double lease) {
   const Dialect& d = db_->dialect();
   Rows rows = transact([&](bool again) {
@@ -271,6 +283,17 @@ void Store::renew(const std::vector<std::string>& workers, double lease) {
              {json(workers).dump()});
     return 0;
   });
+}
+
+std::vector<std::string> Store::list_workers() {
+  return transact(
+      [&](bool) {
+        std::vector<std::string> names;
+        for (const Row& r : db_->run("SELECT DISTINCT worker FROM job WHERE state = 'running'"))
+          if (r[0]) names.push_back(*r[0]);
+        return names;
+      },
+      false);
 }
 
 bool Store::finish(const Job& job, const std::string& worker, const Answer& answer) {
@@ -350,9 +373,17 @@ Counts Store::count(const std::string& model) {
           if (*r[0] == "waiting" || *r[0] == "refused") c.waiting += n;
           if (*r[0] == "running") c.running = n;
           if (*r[0] == "done") c.done = n;
-          if (*r[0] == "failed") c.failed = n;
+          if (*r[0] == "failed" || *r[0] == "impossible") c.failed += n;
         }
         return c;
+      },
+      false);
+}
+
+long Store::count_running(const std::string& model) {
+  return transact(
+      [&](bool) {
+        return std::stol(*db_->run("SELECT count(*) FROM job WHERE state = 'running' AND model = $1", {model})[0][0]);
       },
       false);
 }
@@ -376,7 +407,7 @@ void Store::forget_refusals(const std::string& model) {
 
 int Store::rerun_failed(const std::string& model) {
   return transact([&](bool) {
-    db_->run("DELETE FROM result WHERE model = $1 AND status = 'failed'", {model});
+    db_->run("DELETE FROM result WHERE hash IN (SELECT hash FROM job WHERE model = $1 AND state = 'failed')", {model});
     return static_cast<int>(
         db_->run("UPDATE job SET state = 'waiting', attempt = 0, worker = NULL, message = NULL WHERE "
                  "model = $1 AND state = 'failed' RETURNING hash",

@@ -65,11 +65,15 @@ class Store {
 
   /// Jobs that are there already stay as they are.
   void add_jobs(const std::string& model, const std::vector<std::pair<std::string, Point>>& jobs);
+  /// Points that no model is asked for, with their (failed) results; `rerun_failed` leaves them alone.
+  void add_impossible(const std::string& model, const std::vector<StoredResult>&);
   /// Takes up to `count` jobs that wait, or whose lease has run out, oldest first; raises their attempt before anything
   /// is run. `worker` holds nothing else.
   std::vector<Job> claim(const std::string& worker, int count, double lease);
   /// Leases of all jobs that these workers still hold.
   void renew(const std::vector<std::string>& workers, double lease);
+  /// Who holds jobs.
+  std::vector<std::string> list_workers();
   /// Writes a result if the job is still the worker's; false if it has lost it. Crashed: the job waits again, or failed
   /// after its last attempt. Refused: the job stops until `forget_refusals`. Cancelled: it waits again, not counted.
   bool finish(const Job&, const std::string& worker, const Answer&);
@@ -80,6 +84,8 @@ class Store {
   /// All results of a model, in the order in which the jobs were added.
   std::vector<StoredResult> load_results(const std::string& model);
   Counts count(const std::string& model);
+  /// Jobs that run, quick at any size.
+  long count_running(const std::string& model);
   /// What was said of a refused job of the model.
   std::optional<std::string> find_refusal(const std::string& model);
   void forget_refusals(const std::string& model);

@@ -1,0 +1,238 @@
+#include "study/evaluator.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "study/process.h"
+
+namespace topple::study {
+namespace {
+
+using json = nlohmann::ordered_json;
+using Clock = std::chrono::steady_clock;
+
+/// Characters before the byte `offset`.
+int count_characters(const std::string& text, std::size_t offset) {
+  int count = 0;
+  for (std::size_t i = 0; i < std::min(offset, text.size()); ++i) count += (text[i] & 0xC0) != 0x80;
+  return count;
+}
+
+/// Where a member stands in the line, for the caret.
+std::size_t find_member(const std::string& line, const std::string& name) {
+  const std::size_t found = line.find(json(name).dump(-1, ' ', false, json::error_handler_t::replace));
+  return found == std::string::npos ? 0 : found;
+}
+
+struct Reader {
+  const std::string& line;
+  const std::string& command;
+
+  Answer refuse(std::size_t offset, std::string message, std::string help = {}) const {
+    Refusal r;
+    r.diagnostic = {Severity::Error,
+                    "E824",
+                    {fmt::format("answer of \"{}\"", command), 1, 1 + count_characters(line, offset)},
+                    1,
+                    std::move(message),
+                    std::move(help)};
+    r.line = line.substr(0, 1000);
+    Answer a;
+    a.kind = Answer::Kind::Refused;
+    a.text = write_refusal(r);
+    return a;
+  }
+
+  Answer read(int& id) const {
+    json j;
+    try {
+      j = json::parse(line);
+    } catch (const json::parse_error& e) {
+      return refuse(e.byte > 0 ? e.byte - 1 : 0, "this is not JSON",
+                    "each line of its output must be one JSON object; other words belong on standard error");
+    }
+    const char* form = "an answer looks like {\"outputs\": {\"z\": 1.5}, \"outcome\": \"stands\"}";
+    if (!j.is_object()) return refuse(0, "a JSON object is wanted", form);
+    if (j.contains("id")) {
+      if (!j["id"].is_number_integer()) return refuse(find_member(line, "id"), "id: the number of the point is wanted");
+      id = j["id"].get<int>();
+    }
+    Answer a;
+    a.kind = Answer::Kind::Done;
+    if (j.contains("failed") && !(j["failed"].is_boolean() && !j["failed"].get<bool>())) {
+      a.kind = Answer::Kind::Failed;
+      a.text = j["failed"].is_string() ? j["failed"].get<std::string>() : "the evaluator says so";
+      return a;
+    }
+    if (j.contains("outcome")) {
+      const json& o = j["outcome"];
+      if (o.is_string())
+        a.outcome = o.get<std::string>();
+      else if (o.is_number_integer() || o.is_boolean())
+        a.outcome = o.dump();
+      else
+        return refuse(find_member(line, "outcome"), "outcome: a text is wanted");
+    }
+    if (j.contains("trajectory")) {
+      if (!j["trajectory"].is_array()) return refuse(find_member(line, "trajectory"), "trajectory: a list is wanted");
+      for (const json& v : j["trajectory"]) {
+        if (!v.is_number() && !v.is_null())
+          return refuse(find_member(line, "trajectory"), "trajectory: numbers are wanted");
+        a.trajectory.push_back(v.is_null() ? std::nan("") : v.get<double>());
+      }
+    }
+    const bool is_nested = j.contains("outputs");
+    if (is_nested && !j["outputs"].is_object())
+      return refuse(find_member(line, "outputs"), "outputs: an object is wanted", form);
+    const json& outputs = is_nested ? j["outputs"] : j;
+    for (const auto& [name, v] : outputs.items()) {
+      if (!is_nested && (name == "id" || name == "outcome" || name == "trajectory" || name == "failed")) continue;
+      if (!v.is_number() && !v.is_null()) return refuse(find_member(line, name), name + ": a number is wanted", form);
+      const double x = v.is_null() ? std::nan("") : v.get<double>();
+      if (!std::isfinite(x)) {
+        a.kind = Answer::Kind::Failed;
+        a.text = name + " is not finite";
+      }
+      a.outputs.emplace_back(name, x);
+    }
+    if (a.outputs.empty() && a.outcome.empty()) return refuse(0, "there are neither outputs nor an outcome", form);
+    if (a.kind == Answer::Kind::Failed) a.outputs.clear();
+    return a;
+  }
+};
+
+/// One running command and what it is asked.
+class Evaluator {
+ public:
+  explicit Evaluator(const std::string& definition) {
+    const json j = json::parse(definition);
+    for (const json& name : j.at("inputs")) names_.push_back(name.get<std::string>());
+    command_ = j.at("identity").at("command").get<std::string>();
+    const json settings = j.value("settings", json::object());
+    timeout_ = settings.value("timeout", 0.0);
+    is_one_shot_ = settings.value("one_shot", false);
+  }
+
+  void run(std::span<const Point> points, const std::function<void(std::size_t, Answer)>& give,
+           const std::atomic<bool>& cancel) {
+    std::vector<bool> is_answered(points.size(), false);
+    bool is_fresh = prepare();
+    std::string request;
+    for (std::size_t i = 0; i < points.size(); ++i) request += write_request(static_cast<int>(i), names_, points[i]);
+    process_.send(request, is_one_shot_);
+    std::size_t open = points.size(), next = 0;
+    auto last = Clock::now();
+    const auto give_open = [&](Answer::Kind kind, const std::string& text) {
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        if (is_answered[i]) continue;
+        Answer a;
+        a.kind = kind;
+        a.text = text;
+        a.seconds = std::chrono::duration<double>(Clock::now() - last).count();
+        give(i, a);
+      }
+    };
+    while (open > 0) {
+      std::string line;
+      const Process::Event event = process_.next_line(line, timeout_, cancel);
+      if (event == Process::Event::Cancelled) {
+        process_.end();
+        return;
+      }
+      if (event == Process::Event::TimeOut) {
+        process_.end();
+        // among several nobody knows which one hangs; they will be asked one by one
+        give_open(points.size() == 1 ? Answer::Kind::Failed : Answer::Kind::Crashed,
+                  fmt::format("no answer within {} s", timeout_));
+        return;
+      }
+      if (event == Process::Event::Closed) {
+        const std::string ending = process_.find_ending();
+        if (!is_fresh && open == points.size()) {
+          // it ended after its last answer: programs may answer one point each
+          is_fresh = prepare();
+          process_.send(request, is_one_shot_);
+          continue;
+        }
+        give_open(Answer::Kind::Crashed,
+                  "the evaluator ended without an answer" + (ending.empty() ? "" : ": " + ending));
+        return;
+      }
+      if (line.find_first_not_of(" \t") == std::string::npos) continue;
+      while (next < points.size() && is_answered[next]) ++next;
+      int id = static_cast<int>(next);
+      Answer a = read_answer_line(line, command_, id);
+      if (id < 0 || id >= static_cast<int>(points.size()) || is_answered[static_cast<std::size_t>(id)]) {
+        const Reader reader{line, command_};
+        a = reader.refuse(find_member(line, "id"), fmt::format("id: there is no open point {}", id),
+                          "give back the id of the point");
+        id = static_cast<int>(next);
+      }
+      const auto now = Clock::now();
+      a.seconds = std::chrono::duration<double>(now - last).count();
+      last = now;
+      const bool is_refused = a.kind == Answer::Kind::Refused;
+      is_answered[static_cast<std::size_t>(id)] = true;
+      --open;
+      give(static_cast<std::size_t>(id), std::move(a));
+      if (is_refused) {
+        process_.end();
+        return;
+      }
+    }
+    if (is_one_shot_) process_.end();
+  }
+
+ private:
+  /// Whether a new process was started.
+  bool prepare() {
+    if (process_.is_running() && !is_one_shot_) return false;
+    process_.start(command_);
+    return true;
+  }
+
+  std::vector<std::string> names_;
+  std::string command_;
+  double timeout_ = 0;
+  bool is_one_shot_ = false;
+  Process process_;
+};
+
+}  // namespace
+
+std::string write_request(int id, const std::vector<std::string>& names, const Point& x) {
+  json inputs = json::object();
+  for (std::size_t i = 0; i < names.size(); ++i) inputs[names[i]] = x.at(i);
+  return json{{"id", id}, {"inputs", inputs}}.dump() + "\n";
+}
+
+Answer read_answer_line(const std::string& line, const std::string& command, int& id) {
+  return Reader{line, command}.read(id);
+}
+
+std::string write_refusal(const Refusal& r) {
+  const Diagnostic& d = r.diagnostic;
+  return json{{"file", d.where.file}, {"column", d.where.column}, {"code", d.code},
+              {"message", d.message}, {"help", d.help},           {"line", r.line}}
+      .dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+Refusal read_refusal(const std::string& text) {
+  const json j = json::parse(text);
+  Refusal r;
+  r.diagnostic = {Severity::Error, j.at("code"), {j.at("file"), 1, j.at("column")}, 1, j.at("message"), j.at("help")};
+  r.line = j.at("line");
+  return r;
+}
+
+Runner make_evaluator(const std::string& definition) {
+  const auto evaluator = std::make_shared<Evaluator>(definition);
+  return [evaluator](std::span<const Point> points, const std::function<void(std::size_t, Answer)>& give,
+                     const std::atomic<bool>& cancel) { evaluator->run(points, give, cancel); };
+}
+
+}  // namespace topple::study

@@ -1,0 +1,337 @@
+#include "study/inputs_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "product/expression.h"
+#include "product/table_reader.h"
+
+namespace topple::study {
+namespace {
+
+using product::Complaints;
+using product::Entry;
+using product::Expression;
+using product::Node;
+using product::Place;
+using product::TableReader;
+using uncertainty::FuzzyNumber;
+
+constexpr std::size_t most_inputs = 50, most_corners = 1000, most_levels = 50;
+constexpr int most_samples = 100000000;
+
+struct Reader {
+  Problem& out;
+  Complaints& complaints;
+  std::vector<std::string> names;       // inputs, then formulas that were read
+  std::vector<Expression> formulas;     // each may use inputs and the formulas before it
+  std::vector<Expression> differences;  // left and right sides of constraints, in pairs
+  std::vector<bool> is_at_least;        // per constraint
+  std::vector<Place> constraint_places;
+  std::optional<Expression> joint;
+  Place joint_place;
+
+  /// Numbers of a list, or nothing after a complaint.
+  std::optional<std::vector<double>> read_numbers(const Node& node, const std::string& label, std::size_t count) {
+    if (node.kind != Node::Kind::Array || (count > 0 && node.items.size() != count)) {
+      complaints.error("E202", node.place, fmt::format("{}: a list of {} numbers is wanted", label, count));
+      return std::nullopt;
+    }
+    std::vector<double> numbers;
+    for (const Node& item : node.items) {
+      if ((item.kind != Node::Kind::Integer && item.kind != Node::Kind::Float) || !std::isfinite(item.number)) {
+        complaints.error("E202", item.place, label + ": a finite number without a unit is wanted",
+                         "give the unit beside it: unit = \"N/mm2\"");
+        return std::nullopt;
+      }
+      numbers.push_back(item.number);
+    }
+    return numbers;
+  }
+
+  /// Lists of `count` numbers each.
+  std::optional<std::vector<std::vector<double>>> read_rows(const Node& node, const std::string& label,
+                                                            std::size_t count, const char* what) {
+    if (node.kind != Node::Kind::Array || node.items.empty() || node.items.size() > most_corners) {
+      complaints.error("E202", node.place, fmt::format("{}: a list of {} is wanted", label, what));
+      return std::nullopt;
+    }
+    std::vector<std::vector<double>> rows;
+    for (const Node& item : node.items) {
+      const auto row = read_numbers(item, label, count);
+      if (!row) return std::nullopt;
+      rows.push_back(*row);
+    }
+    return rows;
+  }
+
+  bool check_name(const std::string& name, Place place) {
+    const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; };
+    const bool is_name = !name.empty() && is_letter(name[0]) && std::all_of(name.begin(), name.end(), [&](char c) {
+      return is_letter(c) || (c >= '0' && c <= '9');
+    });
+    if (!is_name)
+      complaints.error("E203", place, product::quoted(name) + " is no name of an input",
+                       "a letter, then letters, digits and _");
+    if (std::find(names.begin(), names.end(), name) != names.end()) {
+      complaints.error("E203", place, product::quoted(name) + " is an input already");
+      return false;
+    }
+    return is_name;
+  }
+
+  std::optional<FuzzyNumber> read_number(TableReader& table) {
+    const Node* given = nullptr;
+    std::string way;
+    for (const char* key : {"triangular", "trapezoidal", "polygonal", "cuts", "value"})
+      if (const Node* node = table.find(key)) {
+        if (given) {
+          table.error("E207", node->place, fmt::format("{} and {}: one of them is wanted", way, key));
+          return std::nullopt;
+        }
+        given = node;
+        way = key;
+      }
+    const std::string label = table.label() + ": " + way;
+    if (!given) {
+      table.error("E207", table.place(),
+                  table.label() + ": one of triangular, trapezoidal, polygonal, cuts, value is wanted",
+                  "such as { triangular = [10, 25, 45] }");
+      return std::nullopt;
+    }
+    try {
+      if (way == "triangular") {
+        if (const auto v = read_numbers(*given, label, 3))
+          return uncertainty::make_triangular((*v)[0], (*v)[1], (*v)[2]);
+      } else if (way == "trapezoidal") {
+        if (const auto v = read_numbers(*given, label, 4))
+          return uncertainty::make_trapezoidal((*v)[0], (*v)[1], (*v)[2], (*v)[3]);
+      } else if (way == "polygonal") {
+        std::vector<std::pair<double, double>> corners;
+        if (const auto rows = read_rows(*given, label, 2, "pairs [value, membership]")) {
+          for (const auto& r : *rows) corners.emplace_back(r[0], r[1]);
+          return uncertainty::make_polygonal(corners);
+        }
+      } else if (way == "cuts") {
+        std::vector<uncertainty::AlphaCut> cuts;
+        if (const auto rows = read_rows(*given, label, 3, "triples [alpha, left, right]")) {
+          for (const auto& r : *rows) cuts.push_back({r[0], r[1], r[2]});
+          return FuzzyNumber(std::move(cuts));
+        }
+      } else {
+        Node list;
+        list.kind = Node::Kind::Array;
+        list.place = given->place;
+        list.items = {*given};
+        if (const auto v = read_numbers(list, label, 1)) return FuzzyNumber((*v)[0]);
+      }
+    } catch (const InputError& e) { table.error("E207", given->place, label + ": " + e.diagnostics().front().message); }
+    return std::nullopt;
+  }
+
+  void read_inputs(TableReader& root) {
+    const Node* node = root.table("inputs");
+    if (!node || node->entries.empty()) {
+      root.missing("inputs", "add a table [inputs] with a line such as fc = { triangular = [10, 25, 45] }");
+      return;
+    }
+    if (node->entries.size() > most_inputs)
+      complaints.error("E209", node->place, fmt::format("more than {} fuzzy inputs", most_inputs));
+    for (const Entry& entry : node->entries) {
+      check_name(entry.key, entry.place);
+      TableReader table(entry.value, "inputs." + entry.key, complaints);
+      if (!table.is_table()) continue;
+      if (auto number = read_number(table)) {
+        out.space.inputs.push_back(*number);
+        out.inputs.push_back({entry.key, table.text("unit", ""), 1});
+        names.push_back(entry.key);
+      } else {
+        table.text("unit", "");
+      }
+      table.finish();
+    }
+  }
+
+  std::optional<Expression> parse(const Node& node, const std::string& label, const std::string& text,
+                                  std::size_t offset) {
+    ExpressionOrFault r = parse_text(text);
+    if (r.fault.message.empty()) return r.expression;
+    Place place = node.place;
+    place.column += 1 + static_cast<int>(offset + r.fault.offset);  // behind the quotation mark
+    complaints.error("E208", place, label + ": " + r.fault.message, r.fault.help);
+    return std::nullopt;
+  }
+  struct ExpressionOrFault {
+    Expression expression;
+    product::ExpressionFault fault;
+  };
+  ExpressionOrFault parse_text(const std::string& text) {
+    ExpressionOrFault r;
+    r.expression = Expression::parse(text, names, r.fault);
+    return r;
+  }
+
+  void read_formulas(TableReader& root) {
+    const Node* node = root.table("derived");
+    if (!node) return;
+    for (const Entry& entry : node->entries) {
+      if (!check_name(entry.key, entry.place)) continue;
+      const std::string label = "derived." + entry.key;
+      const Node* text = &entry.value;
+      std::string unit;
+      std::optional<TableReader> table;
+      if (entry.value.kind == Node::Kind::Table) {
+        table.emplace(entry.value, label, complaints);
+        text = table->find("formula");
+        unit = table->text("unit", "");
+        table->finish();
+      }
+      if (!text || text->kind != Node::Kind::String) {
+        complaints.error("E202", entry.value.place, label + ": a formula is wanted", "such as \"1.4 * fc^(2/3)\"");
+        continue;
+      }
+      if (auto e = parse(*text, label, text->text, 0)) {
+        formulas.push_back(*e);
+        names.push_back(entry.key);
+        out.derived.push_back({entry.key, unit, 1});
+      }
+    }
+  }
+
+  void read_interaction(TableReader& root) {
+    const Node* node = root.table("interaction");
+    if (!node) return;
+    TableReader table(*node, "interaction", complaints);
+    if (const Node* list = table.find("constraints")) {
+      if (list->kind != Node::Kind::Array) {
+        table.error("E202", list->place, "constraints: a list of texts is wanted", "such as [\"x1 + x2 <= 3\"]");
+      } else {
+        for (const Node& item : list->items) read_constraint(item);
+      }
+    }
+    if (const Node* text = table.find("membership")) {
+      joint_place = text->place;
+      if (text->kind != Node::Kind::String)
+        table.error("E202", text->place, "membership: a formula is wanted");
+      else
+        joint = parse(*text, "membership", text->text, 0);
+    }
+    table.finish();
+  }
+
+  void read_constraint(const Node& item) {
+    const std::size_t sign = item.kind == Node::Kind::String ? item.text.find_first_of("<>") : std::string::npos;
+    if (sign == std::string::npos || sign + 1 >= item.text.size() || item.text[sign + 1] != '=') {
+      complaints.error("E202", item.place, "constraints: a text with <= or >= is wanted", "such as \"x1 + x2 <= 3\"");
+      return;
+    }
+    const auto left = parse(item, "constraint", item.text.substr(0, sign), 0);
+    const auto right = parse(item, "constraint", item.text.substr(sign + 2), sign + 2);
+    if (!left || !right) return;
+    differences.push_back(*left);
+    differences.push_back(*right);
+    is_at_least.push_back(item.text[sign] == '>');
+    constraint_places.push_back(item.place);
+  }
+
+  void read_search(TableReader& root) {
+    const Node* node = root.table("search");
+    if (!node) return;
+    TableReader table(*node, "search", complaints);
+    if (const Node* list = table.find("levels")) {
+      if (list->kind != Node::Kind::Array || list->items.empty() || list->items.size() > most_levels) {
+        table.error("E202", list->place, "levels: a list of 1 to 50 numbers is wanted", "such as [0, 0.5, 1]");
+      } else if (const auto levels = read_numbers(*list, "levels", 0)) {
+        for (const double a : *levels)
+          if (!(a >= 0 && a <= 1))
+            table.error("E205", list->place, fmt::format("levels: {} is not between 0 and 1", a));
+        out.levels = *levels;
+      }
+    }
+    out.limit = static_cast<int>(table.find_integer("samples", 10, most_samples).value_or(0));
+    out.seed =
+        static_cast<std::uint64_t>(table.find_integer("seed", 0, std::numeric_limits<std::int64_t>::max()).value_or(1));
+    table.finish();
+  }
+
+  /// Gives the problem its functions, and tries them at the middle.
+  void finish() {
+    if (!formulas.empty())
+      out.calc_derived = [formulas = formulas](const Point& x) {
+        std::vector<double> values = x, derived;
+        for (const Expression& f : formulas) {
+          derived.push_back(f.evaluate(values));
+          values.push_back(derived.back());
+        }
+        return derived;
+      };
+    const auto complete = [calc = out.calc_derived](const Point& x) {
+      std::vector<double> values = x;
+      if (calc)
+        for (const double v : calc(x)) values.push_back(v);
+      return values;
+    };
+    for (std::size_t i = 0; i < is_at_least.size(); ++i)
+      out.space.constraints.emplace_back([complete, left = differences[2 * i], right = differences[2 * i + 1],
+                                          turn = is_at_least[i] ? -1.0 : 1.0](const Point& x) {
+        const std::vector<double> values = complete(x);
+        const double g = turn * (left.evaluate(values) - right.evaluate(values));
+        return std::isnan(g) ? std::numeric_limits<double>::infinity() : g;
+      });
+    if (joint)
+      out.space.joint = [complete, formula = *joint](const Point& x) {
+        const double mu = formula.evaluate(complete(x));
+        return std::isnan(mu) ? 0.0 : std::clamp(mu, 0.0, 1.0);
+      };
+    const Point centre = uncertainty::calc_centre(out.space);
+    const std::vector<double> values = complete(centre);
+    for (std::size_t i = 0; i < out.derived.size(); ++i)
+      if (!std::isfinite(values[centre.size() + i]))
+        complaints.error("E207", {}, out.derived[i].name + ": the formula has no value in the middle of the inputs");
+    for (std::size_t i = 0; i < out.space.constraints.size(); ++i)
+      if (out.space.constraints[i](centre) > 0)
+        complaints.error("E207", constraint_places[i], "the middle of the inputs breaks this constraint");
+    if (joint && joint->evaluate(values) != 1)
+      complaints.error("E207", joint_place,
+                       fmt::format("membership: {} in the middle of the inputs; 1 is wanted", joint->evaluate(values)),
+                       "a joint membership lies between 0 and 1");
+  }
+};
+
+}  // namespace
+
+Problem read_inputs_text(const std::string& text, const std::string& name) {
+  Problem out;
+  const Node document = product::parse_document(text, name);
+  Complaints complaints(name);
+  TableReader root(document, "", complaints);
+  Reader reader{out, complaints, {}, {}, {}, {}, {}, {}, {}};
+  out.title = root.text("title", "");
+  reader.read_inputs(root);
+  if (complaints.error_count() == 0) {
+    reader.read_formulas(root);
+    reader.read_interaction(root);
+  } else {
+    root.table("derived"), root.table("interaction");
+  }
+  reader.read_search(root);
+  root.finish();
+  if (complaints.error_count() == 0) reader.finish();
+  complaints.sort();
+  if (complaints.error_count() > 0) throw InputError(complaints.all());
+  return out;
+}
+
+void set_evaluator(Problem& p, const std::string& command, double timeout, bool is_one_shot) {
+  p.kind = "evaluator";
+  p.identity = nlohmann::ordered_json{{"command", command}}.dump();
+  p.settings = nlohmann::ordered_json{{"timeout", timeout}, {"one_shot", is_one_shot}}.dump();
+}
+
+}  // namespace topple::study

@@ -1,0 +1,398 @@
+#include "study/manager.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <unordered_map>
+
+#include "base/error.h"
+#include "study/evaluator.h"
+
+namespace topple::study {
+namespace {
+
+using json = nlohmann::ordered_json;
+using Clock = std::chrono::steady_clock;
+using uncertainty::Result;
+
+/// Names of outputs and outcomes, numbered in the order in which the analysis meets them: the same in every repetition.
+class Names {
+ public:
+  /// Throws InputError E823.
+  Result translate(const Answer& a) {
+    Result r;
+    r.text = a.text;
+    if (a.kind != Answer::Kind::Done) {
+      r.state = Result::State::Failed;
+      return r;
+    }
+    r.state = Result::State::Done;
+    if (!has_outputs_) {
+      for (const auto& [name, value] : a.outputs) outputs.push_back(name);
+      has_outputs_ = true;
+    }
+    const auto complain = [this, &a] {
+      std::string before, now;
+      for (const std::string& name : outputs) before += (before.empty() ? "" : ", ") + name;
+      for (const auto& [name, value] : a.outputs) now += (now.empty() ? "" : ", ") + name;
+      throw InputError("E823", fmt::format("the model gave the outputs {} at one point and {} at another",
+                                           before.empty() ? "none" : before, now.empty() ? "none" : now));
+    };
+    if (a.outputs.size() != outputs.size()) complain();
+    for (std::size_t i = 0; i < outputs.size(); ++i) {
+      const auto found =
+          a.outputs[i].first == outputs[i]
+              ? a.outputs.begin() + static_cast<std::ptrdiff_t>(i)
+              : std::find_if(a.outputs.begin(), a.outputs.end(), [&](const auto& o) { return o.first == outputs[i]; });
+      if (found == a.outputs.end()) complain();
+      r.values.push_back(found->second);
+    }
+    const auto [place, is_new] = numbers_.try_emplace(a.outcome, static_cast<int>(outcomes.size()));
+    if (is_new) outcomes.push_back(a.outcome);
+    r.outcome = place->second;
+    r.trajectory = a.trajectory;
+    return r;
+  }
+
+  std::vector<std::string> outputs, outcomes;
+
+ private:
+  std::map<std::string, int> numbers_;
+  bool has_outputs_ = false;
+};
+
+Point complete(const Problem& p, const Point& x) {
+  Point all = x;
+  if (p.calc_derived)
+    for (const double v : p.calc_derived(x)) all.push_back(v);
+  return all;
+}
+
+/// The formula that has no value at a point, or empty.
+std::string find_fault(const Problem& p, const Point& all) {
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (!std::isfinite(all[i]))
+      return i < p.inputs.size() ? "an input is not finite"
+                                 : p.derived.at(i - p.inputs.size()).name + ": the formula has no value there";
+  return {};
+}
+
+/// All that is needed to read the study again.
+std::string make_study_definition(const Problem& p, const StudyOptions& options) {
+  return json{{"kind", p.kind},
+              {"file", options.source_name},
+              {"text", options.source},
+              {"identity", json::parse(p.identity)},
+              {"settings", json::parse(p.settings)},
+              {"levels", make_alpha_options(p).levels},
+              {"limit", make_alpha_options(p).limit},
+              {"seed", p.seed}}
+      .dump();
+}
+
+std::vector<std::string> list_failures(const uncertainty::Archive& archive) {
+  std::map<std::string, int> counts;
+  for (const auto& s : archive.samples())
+    if (s.result.state == Result::State::Failed) ++counts[s.result.text];
+  std::vector<std::pair<std::string, int>> sorted(counts.begin(), counts.end());
+  std::stable_sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+  std::vector<std::string> lines;
+  for (const auto& [text, count] : sorted) lines.push_back(fmt::format("{} x {}", count, text));
+  return lines;
+}
+
+/// Answers batches out of the store, with the help of workers.
+class Manager {
+ public:
+  Manager(const Problem& problem, const RunnerFactories& factories, const StudyOptions& options,
+          const Progress& progress, const std::function<void(const StudyState&)>& watch)
+      : problem_(problem),
+        progress_(progress),
+        watch_(watch),
+        model_(calc_model_hash(problem)),
+        store_(options.store, progress.cancel, options.pool.patience) {
+    const auto there = store_.find_study(options.name);
+    if (there && there->model != model_)
+      throw InputError(
+          "E822", fmt::format("{} holds a study of another model or of other inputs", hide_password(options.store)),
+          "choose another folder or name, or delete it");
+    store_.put_model(model_, make_model_definition(problem));
+    row_ = {options.name, model_, make_study_definition(problem, options), "open", ""};
+    store_.put_study(row_);
+    release_dead_workers(store_);
+    store_.forget_refusals(model_);
+    if (options.rerun_failed) store_.rerun_failed(model_);
+    for (StoredResult& r : store_.load_results(model_)) known_.emplace(std::move(r.hash), std::move(r.answer));
+    pool_ = std::make_unique<Pool>(options.store, factories, options.pool);
+  }
+
+  void evaluate(std::span<const Point> batch, std::span<Result> out) {
+    std::vector<std::string> hashes(batch.size()), open;
+    std::vector<std::pair<std::string, Point>> jobs;
+    std::vector<StoredResult> impossible;  // without a run
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      Point all = complete(problem_, batch[i]);
+      if (const std::string fault = find_fault(problem_, all); !fault.empty()) {
+        hashes[i] = calc_job_hash(model_, all);
+        if (known_.contains(hashes[i])) continue;
+        Answer a;
+        a.kind = Answer::Kind::Failed;
+        a.text = fault;
+        known_.emplace(hashes[i], a);
+        impossible.push_back({hashes[i], std::move(all), std::move(a)});
+        continue;
+      }
+      hashes[i] = calc_job_hash(model_, all);
+      if (known_.contains(hashes[i])) continue;
+      open.push_back(hashes[i]);
+      jobs.emplace_back(hashes[i], std::move(all));
+    }
+    if (!impossible.empty()) store_.add_impossible(model_, impossible);
+    if (!jobs.empty()) {
+      store_.add_jobs(model_, jobs);
+      pool_->wake();
+      wait_for(open);
+    }
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      const auto found = known_.find(hashes[i]);
+      if (found == known_.end()) continue;  // cancelled: not run
+      out[i] = names_.translate(found->second);
+      ++asked_;
+      failed_ += out[i].state == Result::State::Failed;
+    }
+    open_ = 0;
+    show(false);
+  }
+
+  StudyResult run() {
+    uncertainty::AlphaOptions options = make_alpha_options(problem_);
+    limit_ = options.limit;
+    options.watch = [this](const uncertainty::AlphaResult& so_far, const uncertainty::Archive&) {
+      result_.alpha = so_far;
+      result_.outputs = names_.outputs;
+      result_.outcomes = names_.outcomes;
+      show(false);
+    };
+    Progress quiet;
+    quiet.cancel = progress_.cancel;
+    // a tenth of the runs is kept for the boundaries of outcomes
+    uncertainty::Asker asker([this](auto batch, auto out) { evaluate(batch, out); }, quiet, nullptr,
+                             limit_ - limit_ / 10);
+    StudyResult r;
+    r.alpha = uncertainty::optimise(problem_.space, asker, options);
+    r.ending = r.alpha.ending;
+    if (!asker.is_cancelled() && r.alpha.classes.size() > 1) {
+      asker.set_limit(limit_);
+      uncertainty::PossibilityOptions p;
+      p.seed = problem_.seed;
+      r.possibilities = uncertainty::find_possibilities(problem_.space, asker, p);
+      if (r.ending == uncertainty::Ending::Complete) r.ending = r.possibilities.ending;
+      // further runs may have moved bounds
+      std::vector<int> space_points;
+      for (const auto& c : r.alpha.coverage) space_points.push_back(c.space_points);
+      const std::vector<double> levels = options.levels;
+      uncertainty::AlphaResult again = uncertainty::read_archive(problem_.space, asker.archive(), levels, space_points);
+      keep_marks(r.alpha, again);
+      r.alpha = std::move(again);
+    }
+    r.alpha.archive = asker.archive();
+    r.alpha.ending = r.ending;
+    r.outputs = names_.outputs;
+    r.outcomes = names_.outcomes;
+    r.failures = list_failures(r.alpha.archive);
+    r.is_finished = !asker.is_cancelled();
+    pool_.reset();
+    if (r.is_finished) {
+      row_.state = "finished";
+      json order = json::array();
+      for (const auto& s : r.alpha.archive.samples()) order.push_back(calc_job_hash(model_, complete(problem_, s.x)));
+      row_.summary = json{{"ending", uncertainty::to_text(r.ending)},
+                          {"outputs", r.outputs},
+                          {"outcomes", r.outcomes},
+                          {"order", order},
+                          {"marks", make_marks(r)}}
+                         .dump();
+      store_.put_study(row_);
+    }
+    result_ = r;
+    show(true);
+    return r;
+  }
+
+ private:
+  /// Where a better value has turned up, no search has converged.
+  static void keep_marks(const uncertainty::AlphaResult& from, uncertainty::AlphaResult& to) {
+    const auto keep = [](const std::vector<uncertainty::OutputBounds>& a, std::vector<uncertainty::OutputBounds>& b) {
+      for (std::size_t o = 0; o < std::min(a.size(), b.size()); ++o)
+        for (std::size_t k = 0; k < std::min(a[o].levels.size(), b[o].levels.size()); ++k) {
+          const auto &x = a[o].levels[k], &y = b[o].levels[k];
+          b[o].levels[k].lower.converged = x.lower.converged && x.lower.value == y.lower.value;
+          b[o].levels[k].upper.converged = x.upper.converged && x.upper.value == y.upper.value;
+        }
+    };
+    keep(from.outputs, to.outputs);
+    for (auto& c : to.classes)
+      for (const auto& d : from.classes)
+        if (c.outcome == d.outcome) keep(d.outputs, c.outputs);
+    to.run = from.run, to.batches = from.batches, to.searches = from.searches;
+    to.rounds = from.rounds, to.rechecks = from.rechecks;
+  }
+
+  /// What cannot be read off the samples.
+  static json make_marks(const StudyResult& r) {
+    json marks = json::object();
+    json bounds = json::array(), coverage = json::array(), classes = json::array();
+    for (const auto& o : r.alpha.outputs)
+      for (const auto& l : o.levels) bounds.push_back({l.lower.converged, l.upper.converged});
+    for (const auto& c : r.alpha.coverage) coverage.push_back(c.space_points);
+    for (const auto& p : r.possibilities.classes)
+      classes.push_back(
+          {{"outcome", p.outcome}, {"resolution", p.resolution}, {"above", p.above}, {"converged", p.converged}});
+    marks["converged"] = bounds;
+    marks["space_points"] = coverage;
+    marks["classes"] = classes;
+    return marks;
+  }
+
+  void wait_for(std::vector<std::string>& open) {
+    open_ = static_cast<long>(open.size());
+    auto looked = Clock::now();
+    double pause = 0.01;
+    for (;;) {
+      pool_->check();
+      std::vector<StoredResult> found = store_.find_results(open);
+      for (StoredResult& r : found) known_.emplace(std::move(r.hash), std::move(r.answer));
+      if (!found.empty()) {
+        std::erase_if(open, [this](const std::string& hash) { return known_.contains(hash); });
+        run_here_ += static_cast<long>(found.size());
+        open_ = static_cast<long>(open.size());
+        pause = 0.01;
+      }
+      show(false);
+      if (open.empty()) return;
+      if (progress_.is_cancelled()) {
+        pool_->stop();
+        return;
+      }
+      if (std::chrono::duration<double>(Clock::now() - looked).count() > 0.2) {
+        looked = Clock::now();
+        if (const auto refusal = store_.find_refusal(model_)) {
+          pool_->stop();
+          const Refusal r = read_refusal(*refusal);
+          throw InputError({r.diagnostic});
+        }
+        store_.quarantine();
+        running_ = store_.count_running(model_);
+      }
+      pool_->wait_for_news(pause);
+      // many results at once cost less than each on its own
+      pause = std::min(1.5 * pause, 0.25);
+    }
+  }
+
+  void show(bool is_last) {
+    if (!watch_) return;
+    const auto now = Clock::now();
+    if (!is_last && std::chrono::duration<double>(now - shown_).count() < 0.2) return;
+    shown_ = now;
+    StudyState s;
+    s.done = asked_, s.failed = failed_, s.open = open_, s.running = std::min(running_, open_);
+    s.run_here = run_here_, s.limit = limit_;
+    s.seconds = std::chrono::duration<double>(now - start_).count();
+    s.so_far = result_.outputs.empty() && result_.outcomes.empty() ? nullptr : &result_;
+    watch_(s);
+  }
+
+  const Problem& problem_;
+  const Progress& progress_;
+  const std::function<void(const StudyState&)>& watch_;
+  std::string model_;
+  Store store_;
+  StudyRow row_;
+  std::unordered_map<std::string, Answer> known_;  // by hash
+  std::unique_ptr<Pool> pool_;
+  Names names_;
+  StudyResult result_;  // so far
+  long asked_ = 0, failed_ = 0, open_ = 0, running_ = 0, run_here_ = 0;
+  int limit_ = 0;
+  Clock::time_point start_ = Clock::now(), shown_ = start_;
+};
+
+}  // namespace
+
+uncertainty::AlphaOptions make_alpha_options(const Problem& p) {
+  uncertainty::AlphaOptions options;
+  if (!p.levels.empty()) options.levels = p.levels;
+  if (p.limit > 0) options.limit = p.limit;
+  options.seed = p.seed;
+  return options;
+}
+
+StudyResult run_study(const Problem& problem, const RunnerFactories& factories, const StudyOptions& options,
+                      const Progress& progress, const std::function<void(const StudyState&)>& watch) {
+  uncertainty::check_space(problem.space);
+  return Manager(problem, factories, options, progress, watch).run();
+}
+
+StudyResult read_study(const Problem& problem, Store& store, const StudyRow& row) {
+  std::vector<StoredResult> results = store.load_results(row.model);
+  StudyResult r;
+  r.is_finished = row.state == "finished";
+  const json summary = json::parse(row.summary.empty() ? "{}" : row.summary);
+  // in the order in which the analysis met them, if that is known
+  if (summary.contains("order")) {
+    std::unordered_map<std::string, std::size_t> place;
+    for (const json& hash : summary["order"]) place.emplace(hash.get<std::string>(), place.size());
+    std::erase_if(results, [&](const StoredResult& s) { return !place.contains(s.hash); });
+    std::sort(results.begin(), results.end(),
+              [&](const StoredResult& a, const StoredResult& b) { return place.at(a.hash) < place.at(b.hash); });
+  }
+  Names names;
+  const std::size_t n = problem.inputs.size();
+  for (const StoredResult& s : results) {
+    Point x(s.inputs.begin(), s.inputs.begin() + static_cast<std::ptrdiff_t>(std::min(n, s.inputs.size())));
+    r.alpha.archive.add({std::move(x), names.translate(s.answer)});
+  }
+  const uncertainty::Archive archive = r.alpha.archive;
+  const json marks = summary.value("marks", json::object());
+  r.alpha = uncertainty::read_archive(problem.space, archive, make_alpha_options(problem).levels,
+                                      marks.value("space_points", std::vector<int>()));
+  r.alpha.archive = archive;
+  r.outputs = names.outputs;
+  r.outcomes = names.outcomes;
+  r.failures = list_failures(archive);
+  if (marks.contains("converged")) {
+    const json& bounds = marks["converged"];
+    std::size_t k = 0;
+    for (auto& o : r.alpha.outputs)
+      for (auto& l : o.levels) {
+        if (k >= bounds.size()) break;
+        l.lower.converged = bounds[k][0];
+        l.upper.converged = bounds[k][1];
+        ++k;
+      }
+  }
+  for (const auto& c : r.alpha.classes) {
+    uncertainty::Possibility p;
+    p.outcome = c.outcome, p.possibility = c.possibility, p.sample = c.sample;
+    for (const json& m : marks.value("classes", json::array()))
+      if (m.at("outcome") == c.outcome) {
+        p.resolution = m.at("resolution");
+        p.above = m.at("above");
+        p.converged = m.at("converged");
+      }
+    r.possibilities.classes.push_back(p);
+  }
+  if (r.is_finished) r.ending = uncertainty::Ending::Complete;
+  if (summary.value("ending", "") == uncertainty::to_text(uncertainty::Ending::LimitReached))
+    r.ending = uncertainty::Ending::LimitReached;
+  r.alpha.ending = r.ending;
+  return r;
+}
+
+}  // namespace topple::study

@@ -1,0 +1,60 @@
+#pragma once
+/// The fuzzy analysis of a problem over a store: it asks for points, workers answer them, nothing is asked twice. The
+/// analysis is deterministic, so one that was interrupted is repeated from its start with the answers that are there,
+/// and ends with the same bits.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "base/progress.h"
+#include "study/pool.h"
+#include "study/problem.h"
+#include "uncertainty/alpha.h"
+#include "uncertainty/possibility.h"
+
+namespace topple::study {
+
+struct StudyOptions {
+  std::string store;          // file or server
+  std::string name = "main";  // of the study in the store
+  std::string source;         // text of the file that the problem was read from, kept with the study
+  std::string source_name;
+  PoolOptions pool;  // own workers; no jobs: only those of other processes
+  bool rerun_failed = false;
+};
+
+/// Where a study is.
+struct StudyState {
+  long done = 0, failed = 0;                   // points answered, of those asked for so far; done includes failed
+  long running = 0, open = 0;                  // asked for, not answered; of them under way
+  long run_here = 0;                           // answers since this start
+  double seconds = 0;                          // since this start
+  int limit = 0;                               // of points
+  const struct StudyResult* so_far = nullptr;  // names and bounds; nullptr before the first
+};
+
+struct StudyResult {
+  std::vector<std::string> outputs;   // names
+  std::vector<std::string> outcomes;  // names of the classes 0, 1, ...
+  uncertainty::AlphaResult alpha;     // with all samples
+  uncertainty::PossibilityResult possibilities;
+  uncertainty::Ending ending = uncertainty::Ending::Cancelled;
+  std::vector<std::string> failures;  // why runs failed, each reason once, most frequent first
+  bool is_finished = false;
+};
+
+/// Runs the study, or goes on with it. Ends early when `progress.cancel` is set; the same call goes on later.
+///   watch  called from this thread a few times a second
+/// Throws InputError: E804, E807 (inputs), E822 (the store holds a study of another model under this name), E823 (other
+/// outputs at another point), E824 (an answer that cannot be understood); ConnectionLost.
+StudyResult run_study(const Problem&, const RunnerFactories&, const StudyOptions&, const Progress&,
+                      const std::function<void(const StudyState&)>& watch);
+
+/// What the store knows of a study, without a run. Bounds of a study that is under way are those so far.
+StudyResult read_study(const Problem&, Store&, const StudyRow&);
+
+/// Options of the analysis that follow from a problem.
+uncertainty::AlphaOptions make_alpha_options(const Problem&);
+
+}  // namespace topple::study

@@ -1,0 +1,69 @@
+#pragma once
+/// Threads that take jobs from a store, run them and write their results; and one that keeps their leases alive.
+
+#include <atomic>
+#include <condition_variable>
+#include <exception>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "study/store.h"
+
+namespace topple::study {
+
+struct PoolOptions {
+  int jobs = 1;           // at the same time
+  int batch = 1;          // points that a runner gets at once
+  double lease = 30;      // a job is given to another worker so long after a sign of life [s]
+  double patience = 300;  // with a server that is away [s]
+};
+
+class Pool {
+ public:
+  Pool(std::string address, const RunnerFactories&, const PoolOptions&);
+  /// Stops; jobs under way go back to the store, not counted as attempts.
+  ~Pool();
+  Pool(const Pool&) = delete;
+  Pool& operator=(const Pool&) = delete;
+
+  void stop();
+  /// There may be jobs.
+  void wake();
+  /// Until a job was finished here after the last call, or so long.
+  void wait_for_news(double seconds);
+  /// Throws what ended one of the threads.
+  void check();
+
+  int running() const { return running_; }
+  long finished() const { return finished_; }  // results written
+  long refused() const { return refused_; }    // results of jobs that others had taken over
+  /// Since a job was under way [s].
+  double calc_idle_time() const;
+
+ private:
+  void work(const std::string& name);
+  void keep_alive();
+  void sleep(double seconds);
+  void run_jobs(Store&, const std::string& name, std::vector<Job>, std::map<std::string, Runner>&);
+
+  std::string address_;
+  const RunnerFactories& factories_;
+  PoolOptions options_;
+  std::vector<std::string> names_;
+  std::atomic<bool> stop_ = false;
+  std::atomic<int> running_ = 0;
+  std::atomic<long> finished_ = 0, refused_ = 0;
+  std::atomic<double> last_work_ = 0;
+  mutable std::mutex mutex_;
+  std::condition_variable news_, wakes_;
+  long seen_ = 0, wake_count_ = 0;
+  std::exception_ptr failure_;
+  std::vector<std::thread> threads_;
+};
+
+/// Lets go of jobs whose worker was a process of this machine that is gone, without waiting for their leases.
+void release_dead_workers(Store&);
+
+}  // namespace topple::study

@@ -1,0 +1,168 @@
+#include "study/process.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <stdexcept>
+#include <utility>
+
+namespace topple::study {
+namespace {
+
+constexpr std::size_t most_said = 2000;  // of standard error that is kept
+
+void close_end(int& fd) {
+  if (fd >= 0) close(fd);
+  fd = -1;
+}
+
+}  // namespace
+
+void Process::start(const std::string& command) {
+  end();
+  int in[2] = {-1, -1}, out[2] = {-1, -1}, error[2] = {-1, -1};
+  const auto close_all = [&] {
+    for (int* pair : {in, out, error})
+      for (int k = 0; k < 2; ++k) close_end(pair[k]);
+  };
+  if (pipe2(in, O_CLOEXEC) != 0 || pipe2(out, O_CLOEXEC) != 0 || pipe2(error, O_CLOEXEC) != 0) {
+    close_all();
+    throw std::runtime_error(fmt::format("no pipe for the evaluator: {}", std::strerror(errno)));
+  }
+  // who writes to a program that has ended gets an error, not a signal
+  sigset_t broken;
+  sigemptyset(&broken);
+  sigaddset(&broken, SIGPIPE);
+  pthread_sigmask(SIG_BLOCK, &broken, nullptr);
+  const char* words[] = {"/bin/sh", "-c", command.c_str(), nullptr};
+  const pid_t parent = getpid(), pid = fork();
+  if (pid == 0) {
+    setpgid(0, 0);
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (getppid() != parent) _exit(126);
+    sigset_t none;
+    sigemptyset(&none);
+    sigprocmask(SIG_SETMASK, &none, nullptr);
+    if (dup2(in[0], 0) < 0 || dup2(out[1], 1) < 0 || dup2(error[1], 2) < 0) _exit(126);
+    execv(words[0], const_cast<char**>(words));
+    _exit(127);
+  }
+  if (pid < 0) {
+    const int why = errno;
+    close_all();
+    throw std::runtime_error(fmt::format("no process for the evaluator: {}", std::strerror(why)));
+  }
+  setpgid(pid, pid);  // whoever is first
+  pid_ = pid;
+  in_ = in[1], out_ = out[0], error_ = error[0];
+  close(in[0]), close(out[1]), close(error[1]);
+  for (const int fd : {in_, out_, error_}) fcntl(fd, F_SETFL, O_NONBLOCK);
+  to_write_.clear(), read_.clear(), said_.clear();
+  close_after_ = false;
+}
+
+void Process::end() {
+  if (pid_ <= 0) return;
+  kill(-pid_, SIGKILL);
+  kill(pid_, SIGKILL);
+  waitpid(pid_, nullptr, 0);
+  pid_ = 0;
+  close_end(in_), close_end(out_), close_end(error_);
+}
+
+void Process::send(const std::string& text, bool close) {
+  to_write_ += text;
+  close_after_ = close;
+}
+
+bool Process::take_line(std::string& line) {
+  const std::size_t end = read_.find('\n');
+  if (end == std::string::npos) return false;
+  line = read_.substr(0, end);
+  read_.erase(0, end + 1);
+  if (!line.empty() && line.back() == '\r') line.pop_back();
+  return true;
+}
+
+Process::Event Process::next_line(std::string& line, double seconds, const std::atomic<bool>& cancel) {
+  using Clock = std::chrono::steady_clock;
+  const auto start = Clock::now();
+  constexpr int look = 50;  // for a cancellation [ms]
+  for (;;) {
+    if (take_line(line)) return Event::Line;
+    if (out_ < 0) {
+      // a last line without its end
+      if (read_.empty()) return Event::Closed;
+      line = std::exchange(read_, {});
+      return Event::Line;
+    }
+    if (cancel.load(std::memory_order_relaxed)) return Event::Cancelled;
+    if (seconds > 0 && std::chrono::duration<double>(Clock::now() - start).count() > seconds) return Event::TimeOut;
+    if (in_ >= 0 && to_write_.empty() && close_after_) close_end(in_);
+    pollfd wanted[3] = {{out_, POLLIN, 0}, {error_, POLLIN, 0}, {to_write_.empty() ? -1 : in_, POLLOUT, 0}};
+    if (poll(wanted, 3, look) <= 0) continue;
+    char buffer[65536];
+    if (wanted[0].revents) {
+      const ssize_t n = read(out_, buffer, sizeof buffer);
+      if (n > 0) read_.append(buffer, static_cast<std::size_t>(n));
+      if (n == 0 || (n < 0 && errno != EAGAIN && errno != EINTR)) close_end(out_);
+    }
+    if (wanted[1].revents) {
+      const ssize_t n = read(error_, buffer, sizeof buffer);
+      if (n > 0) said_.append(buffer, static_cast<std::size_t>(n));
+      if (said_.size() > 2 * most_said) said_.erase(0, said_.size() - most_said);
+      if (n == 0 || (n < 0 && errno != EAGAIN && errno != EINTR)) close_end(error_);
+    }
+    if (wanted[2].revents) {
+      const ssize_t n = write(in_, to_write_.data(), to_write_.size());
+      if (n > 0) to_write_.erase(0, static_cast<std::size_t>(n));
+      if (n < 0 && errno != EAGAIN && errno != EINTR) {
+        close_end(in_);
+        to_write_.clear();
+      }
+    }
+  }
+}
+
+std::string Process::find_ending() {
+  if (pid_ <= 0) return {};
+  close_end(in_);
+  // it closed its output and should end; a child may hold standard error open
+  int status = 0;
+  bool has_ended = false;
+  for (int i = 0; i < 100 && !has_ended; ++i) {
+    has_ended = waitpid(pid_, &status, WNOHANG) == pid_;
+    if (!has_ended) usleep(10000);
+  }
+  char buffer[4096];
+  for (ssize_t n = 0; error_ >= 0 && (n = read(error_, buffer, sizeof buffer)) > 0;)
+    said_.append(buffer, static_cast<std::size_t>(n));
+  std::string words;
+  if (!has_ended) {
+    words = "it closed its output and went on";
+    end();
+  } else {
+    kill(-pid_, SIGKILL);  // what it started
+    pid_ = 0;
+    close_end(out_), close_end(error_);
+    if (WIFSIGNALED(status))
+      words = fmt::format("signal {} ({})", WTERMSIG(status), strsignal(WTERMSIG(status)));
+    else if (WEXITSTATUS(status) != 0)
+      words = fmt::format("exit code {}", WEXITSTATUS(status));
+  }
+  while (!said_.empty() && std::isspace(static_cast<unsigned char>(said_.back()))) said_.pop_back();
+  if (said_.size() > most_said) said_ = "..." + said_.substr(said_.size() - most_said);
+  if (!said_.empty()) words += (words.empty() ? "" : ": ") + said_;
+  return words;
+}
+
+}  // namespace topple::study

@@ -1,0 +1,151 @@
+#include "study/evaluator.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "server.h"
+
+namespace topple::study {
+namespace {
+
+using Kind = Answer::Kind;
+
+struct Model {
+  explicit Model(const std::string& command, double timeout = 20, bool one_shot = false)
+      : runner(make_evaluator(nlohmann::json{{"inputs", {"x", "y"}},
+                                             {"identity", {{"command", command}}},
+                                             {"settings", {{"timeout", timeout}, {"one_shot", one_shot}}}}
+                                  .dump())) {}
+  std::vector<Answer> ask(const std::vector<Point>& points) {
+    std::vector<Answer> answers(points.size());
+    runner(
+        points, [&](std::size_t i, Answer a) { answers.at(i) = std::move(a); }, cancel);
+    return answers;
+  }
+  Runner runner;
+  std::atomic<bool> cancel = false;
+};
+
+/// A shell that takes the numbers out of each line: x, y, id, and n, the lines so far.
+std::string shell(const std::string& body) {
+  return "n=0; number() { expr \"$line\" : \".*\\\"$1\\\":\\([-0-9.e+]*\\)\"; }; while read -r line; do n=$((n + 1)); "
+         "x=$(number x); y=$(number y); id=$(number id); " +
+         body + "; done";
+}
+
+TEST(Evaluator, WritesPointsThatReadBackToTheSameBits) {
+  const double third = 1.0 / 3;
+  const std::string line = write_request(7, {"x", "y \"z\""}, {third, -1e-300});
+  const auto j = nlohmann::json::parse(line);
+  EXPECT_EQ(j["id"], 7);
+  EXPECT_EQ(j["inputs"]["x"].get<double>(), third);
+  EXPECT_EQ(j["inputs"]["y \"z\""].get<double>(), -1e-300);
+  EXPECT_EQ(line.back(), '\n');
+}
+
+TEST(Evaluator, AnswersManyPointsFromOneProcess) {
+  Model m(shell(R"(echo "{\"outputs\":{\"x\":$x,\"y\":$y,\"line\":$n},\"outcome\":\"ok\"}")"));
+  for (int i = 1; i <= 3; ++i) {
+    const Answer a = m.ask({{1.0 / i, 0.25}}).at(0);
+    ASSERT_EQ(a.kind, Kind::Done) << a.text;
+    EXPECT_EQ(a.outputs[0].second, 1.0 / i) << "every bit";
+    EXPECT_EQ(a.outputs[1].second, 0.25);
+    EXPECT_EQ(a.outputs[2].second, i) << "lines that this process read";
+    EXPECT_EQ(a.outcome, "ok");
+  }
+}
+
+TEST(Evaluator, TakesAnswersOfABatchInAnyOrder) {
+  Model m(shell(R"(all="{\"id\":$id,\"z\":$x}
+$all"; [ $n -lt 3 ] || echo "$all")"));
+  const std::vector<Answer> answers = m.ask({{1, 0}, {2, 0}, {3, 0}});
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_EQ(answers[i].kind, Kind::Done) << answers[i].text;
+    EXPECT_EQ(answers[i].outputs[0].second, i + 1);
+  }
+}
+
+TEST(Evaluator, StartsProgramsAnewThatAnswerOnePointEach) {
+  Model m("read line; echo '{\"z\": 1}'");
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(m.ask({{1, 1}})[0].kind, Kind::Done);
+  Model to_the_end("cat >/dev/null; echo '{\"z\": 1}'", 20, true);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(to_the_end.ask({{1, 1}})[0].kind, Kind::Done);
+}
+
+TEST(Evaluator, TellsHowItCrashed) {
+  Model m("read line; echo 'no licence' >&2; exit 3");
+  for (int i = 0; i < 2; ++i) {
+    const Answer a = m.ask({{1, 1}})[0];
+    EXPECT_EQ(a.kind, Kind::Crashed);
+    EXPECT_NE(a.text.find("exit code 3: no licence"), std::string::npos) << a.text;
+  }
+  Model killed("read line; kill -SEGV $$");
+  EXPECT_NE(killed.ask({{1, 1}})[0].text.find("signal 11"), std::string::npos);
+  Model missing("/no/such/program");
+  EXPECT_EQ(missing.ask({{1, 1}})[0].kind, Kind::Crashed);
+  EXPECT_NE(missing.ask({{1, 1}})[0].text.find("not found"), std::string::npos);
+  Model recovers(shell(R"([ $x = 9.0 ] && exit 1; echo '{"z":1}')"));
+  EXPECT_EQ(recovers.ask({{1, 1}})[0].kind, Kind::Done);
+  EXPECT_EQ(recovers.ask({{9, 1}})[0].kind, Kind::Crashed);
+  EXPECT_EQ(recovers.ask({{1, 1}})[0].kind, Kind::Done);
+}
+
+TEST(Evaluator, GivesUpAfterItsTime) {
+  Model m("read line; sleep 100 & wait", 0.2);
+  const Answer a = m.ask({{1, 1}})[0];
+  EXPECT_EQ(a.kind, Kind::Failed);
+  EXPECT_EQ(a.text, "no answer within 0.2 s");
+  EXPECT_EQ(m.ask({{1, 1}, {2, 2}})[1].kind, Kind::Crashed) << "either may be to blame";
+}
+
+TEST(Evaluator, StopsWhenCancelled) {
+  Model m("read line; sleep 100");
+  std::thread later([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    m.cancel = true;
+  });
+  EXPECT_EQ(m.ask({{1, 1}})[0].kind, Kind::Cancelled);
+  later.join();
+}
+
+TEST(Evaluator, ReadsFormsOfAnswers) {
+  int id = 0;
+  const auto read = [&id](const std::string& line) { return read_answer_line(line, "model", id); };
+  EXPECT_EQ(read(R"({"a": 1, "b": 2.5, "id": 4})").outputs.size(), 2u);
+  EXPECT_EQ(id, 4);
+  EXPECT_EQ(read(R"({"outputs": {"a": 1}, "trajectory": [1, null, 3]})").trajectory.size(), 3u);
+  EXPECT_EQ(read(R"({"outcome": 2})").outcome, "2");
+  EXPECT_EQ(read(R"({"outcome": true, "outputs": {}})").outcome, "true");
+  EXPECT_EQ(read(R"({"failed": "no balance"})").text, "no balance");
+  EXPECT_EQ(read(R"({"failed": true})").kind, Kind::Failed);
+  EXPECT_EQ(read(R"({"failed": false, "z": 1})").kind, Kind::Done);
+  EXPECT_EQ(read(R"({"outputs": {"a": null}})").kind, Kind::Failed);
+  EXPECT_EQ(read(R"({"outputs": {"a": null}})").text, "a is not finite");
+}
+
+TEST(Evaluator, PointsAtWhatItCannotUnderstand) {
+  const auto read = [](const std::string& line) {
+    int id = 0;
+    const Answer a = read_answer_line(line, "model", id);
+    EXPECT_EQ(a.kind, Kind::Refused) << line;
+    return read_refusal(a.text);
+  };
+  const Refusal broken = read(R"({"ü": 1, oops})");
+  EXPECT_EQ(broken.diagnostic.code, "E824");
+  EXPECT_EQ(broken.diagnostic.where.column, 10);
+  EXPECT_EQ(broken.line, R"({"ü": 1, oops})");
+  EXPECT_NE(broken.diagnostic.where.file.find("model"), std::string::npos);
+  EXPECT_EQ(read(R"({"outputs": {"a": 1, "b": "tall"}})").diagnostic.where.column, 22);
+  EXPECT_EQ(read("3").diagnostic.message, "a JSON object is wanted");
+  EXPECT_EQ(read("{}").diagnostic.message, "there are neither outputs nor an outcome");
+  read(R"({"outcome": [1]})");
+  read(R"({"trajectory": 1, "z": 1})");
+  read(R"({"id": "a", "z": 1})");
+  read("\xff\xfe");
+  Model stranger("read line; echo '{\"id\": 5, \"z\": 1}'");
+  EXPECT_EQ(stranger.ask({{1, 1}})[0].kind, Kind::Refused);
+}
+
+}  // namespace
+}  // namespace topple::study

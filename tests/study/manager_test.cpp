@@ -1,0 +1,167 @@
+#include "study/manager.h"
+
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "server.h"
+#include "small_study.h"
+
+namespace topple::study {
+namespace {
+
+StudyOptions make_options(const std::string& store, int jobs = 2) {
+  StudyOptions o;
+  o.store = store;
+  o.pool.jobs = jobs;
+  o.pool.batch = 8;
+  return o;
+}
+
+StudyResult run(const Problem& p, const StudyOptions& o, const RunnerFactories& factories = make_small_factories()) {
+  return run_study(p, factories, o, {}, {});
+}
+
+TEST(StudyReference, FindsBoundsAndPossibilityOfTheJump) {
+  // the intervals of the jump without its failing corner, computed independently
+  const Folder folder;
+  Problem p = make_small_problem(10000);
+  p.limit = 10000;
+  RunnerFactories factories = {
+      {"small", [](const std::string&) -> Runner {
+         return [](auto points, const auto& give, const auto&) {
+           for (std::size_t i = 0; i < points.size(); ++i) {
+             const double R = points[i][0] * points[i][1] / 100;
+             give(i, {Answer::Kind::Done, {{"z", R - 8 - (R < 8 ? 10 : 0)}}, R < 8 ? "falls" : "stands", {}, "", 0});
+           }
+         };
+       }}};
+  const StudyResult r = run(p, make_options(folder / "s"), factories);
+  EXPECT_TRUE(r.is_finished);
+  const double expected[4][2] = {{-14.64, 31.6}, {-12.335, 24.8}, {.54, 18.6}, {3.985, 13}};
+  for (int k = 0; k < 4; ++k) {
+    EXPECT_NEAR(r.alpha.outputs[0].levels[k].lower.value, expected[k][0], 1e-4 * 46.24) << k;
+    EXPECT_NEAR(r.alpha.outputs[0].levels[k].upper.value, expected[k][1], 1e-4 * 46.24) << k;
+  }
+  ASSERT_EQ(r.outcomes, (std::vector<std::string>{"stands", "falls"}));
+  EXPECT_NEAR(r.possibilities.classes[1].possibility, .456598936, 1e-3);
+  EXPECT_EQ(r.possibilities.classes[0].possibility, 1);
+  EXPECT_LE(r.alpha.archive.size(), 10000u);
+}
+
+TEST(StudyReplay, IsTheSameForAnyNumberOfWorkersAndBatches) {
+  const Folder folder;
+  const Problem p = make_small_problem();
+  const std::string one = write_bits(run(p, make_options(folder / "a", 1)));
+  StudyOptions many = make_options(folder / "b", 4);
+  many.pool.batch = 3;
+  EXPECT_EQ(write_bits(run(p, many, make_small_factories(1e-4))), one);
+  EXPECT_NE(one.find("too strong"), std::string::npos);
+}
+
+TEST(StudyReplay, GoesOnWhereItWasInterrupted) {
+  const Folder folder;
+  const Problem p = make_small_problem();
+  const std::string whole = write_bits(run(p, make_options(folder / "a")));
+  const StudyOptions o = make_options(folder / "b");
+  std::atomic<long> runs = 0;
+  RunnerFactories factories = {{"small", [&runs](const std::string&) -> Runner {
+                                  return [&runs](auto points, const auto& give, const auto& cancel) {
+                                    for (std::size_t i = 0; i < points.size() && !cancel; ++i) {
+                                      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+                                      give(i, calc_small(points[i]));
+                                      ++runs;
+                                    }
+                                  };
+                                }}};
+  for (const int stop : {200, 300, 1 << 30}) {
+    std::atomic<bool> cancel = false;
+    Progress progress;
+    progress.cancel = &cancel;
+    const StudyResult r = run_study(p, factories, o, progress, [&](const StudyState& s) {
+      if (s.run_here > stop) cancel = true;
+    });
+    if (stop == 200) { EXPECT_LT(runs, 1000) << "it was interrupted"; }
+    EXPECT_EQ(r.is_finished, stop == 1 << 30);
+    if (r.is_finished) { EXPECT_EQ(write_bits(r), whole); }
+  }
+  Store store(folder / "b");
+  const Counts counts = store.count(calc_model_hash(p));
+  EXPECT_EQ(counts.done + counts.failed, runs) << "nothing was run twice";
+  EXPECT_EQ(counts.waiting + counts.running, 0);
+}
+
+TEST(StudyReplay, ReadsBackWhatItFound) {
+  const Folder folder;
+  const Problem p = make_small_problem();
+  const StudyResult r = run(p, make_options(folder / "a"));
+  Store store(folder / "a");
+  const StudyResult again = read_study(p, store, store.find_study("main").value());
+  EXPECT_EQ(write_bits(again), write_bits(r));
+  EXPECT_TRUE(again.is_finished);
+  EXPECT_EQ(again.ending, r.ending);
+  for (std::size_t k = 0; k < r.alpha.outputs[0].levels.size(); ++k)
+    EXPECT_EQ(again.alpha.outputs[0].levels[k].upper.converged, r.alpha.outputs[0].levels[k].upper.converged);
+}
+
+TEST(Study, RunsFailedOnesAgainWhenAsked) {
+  const Folder folder;
+  const Problem p = make_small_problem(300);
+  StudyOptions o = make_options(folder / "a");
+  const StudyResult r = run(p, o);
+  ASSERT_GT(r.alpha.failed, 0);
+  EXPECT_EQ(r.failures.at(0), std::to_string(r.alpha.failed) + " x too strong");
+  long again = 0;
+  const auto watch = [&](const StudyState& s) { again = s.run_here; };
+  run_study(p, make_small_factories(), o, {}, watch);
+  EXPECT_EQ(again, 0);
+  o.rerun_failed = true;
+  EXPECT_EQ(write_bits(run_study(p, make_small_factories(), o, {}, watch)), write_bits(r));
+  EXPECT_EQ(again, r.alpha.failed);
+}
+
+TEST(Study, KeepsPointsWithoutAFormulaAsFailed) {
+  const Folder folder;
+  Problem p = make_small_problem(300);
+  p.derived = {{"d", "", 1}};
+  p.calc_derived = [](const Point& x) { return std::vector{std::sqrt(40 - x[0])}; };
+  const StudyResult r = run(p, make_options(folder / "a"));
+  EXPECT_GT(r.alpha.failed, 0);
+  EXPECT_EQ(r.failures.at(0), std::to_string(r.alpha.failed) + " x d: the formula has no value there");
+  Store store(folder / "a");
+  EXPECT_EQ(write_bits(read_study(p, store, store.find_study("main").value())), write_bits(r));
+}
+
+TEST(Study, RefusesAnotherModelInItsPlace) {
+  const Folder folder;
+  Problem p = make_small_problem(100);
+  run(p, make_options(folder / "a"));
+  p.identity = R"({"command": "other"})";
+  EXPECT_THROW(run(p, make_options(folder / "a")), InputError);
+}
+
+TEST(Study, RefusesOutputsThatChange) {
+  const Folder folder;
+  RunnerFactories factories = {
+      {"small", [](const std::string&) -> Runner {
+         return [](auto points, const auto& give, const auto&) {
+           for (std::size_t i = 0; i < points.size(); ++i)
+             give(i, {Answer::Kind::Done, {{points[i][0] < 20 ? "a" : "b", 1}}, "", {}, "", 0});
+         };
+       }}};
+  try {
+    run(make_small_problem(100), make_options(folder / "a"), factories);
+    FAIL() << "accepted";
+  } catch (const InputError& e) { EXPECT_EQ(e.diagnostics().front().code, "E823"); }
+}
+
+TEST(Study, TellsWhatEndedAWorker) {
+  const Folder folder;
+  RunnerFactories factories = {{"small", [](const std::string&) -> Runner { throw std::runtime_error("no model"); }}};
+  EXPECT_THROW(run(make_small_problem(100), make_options(folder / "a"), factories), std::runtime_error);
+  // nothing is held by a worker that does not exist
+  Store store(folder / "a");
+  EXPECT_EQ(store.count(calc_model_hash(make_small_problem(100))).running, 0);
+}
+
+}  // namespace
+}  // namespace topple::study

@@ -1,0 +1,76 @@
+#pragma once
+/// A study with a jump and a failure, small enough for tests, and what two of them must have in common.
+
+#include <bit>
+#include <chrono>
+#include <cmath>
+#include <string>
+#include <thread>
+
+#include "study/manager.h"
+
+namespace topple::study {
+
+/// The reference case "jump" with a corner where the model fails: z = R - 8 - 10 [R < 8], R = x1 x2 / 100.
+inline Problem make_small_problem(int limit = 1500) {
+  Problem p;
+  p.kind = "small";
+  p.inputs = {{"x1", "", 1}, {"x2", "", 1}};
+  p.space.inputs = {uncertainty::make_triangular(10, 25, 45), uncertainty::make_triangular(33.6, 64, 88)};
+  p.limit = limit;
+  return p;
+}
+
+inline Answer calc_small(const Point& x) {
+  Answer a;
+  const double R = x[0] * x[1] / 100;
+  if (x[0] > 44 && x[1] > 86) {
+    a.kind = Answer::Kind::Failed;
+    a.text = "too strong";
+    return a;
+  }
+  a.kind = Answer::Kind::Done;
+  a.outcome = R < 8 ? "falls" : "stands";
+  a.outputs = {{"z", R - 8 - (R < 8 ? 10 : 0)}, {"root", std::sqrt(R)}};
+  return a;
+}
+
+/// Runs of the given length [s].
+inline RunnerFactories make_small_factories(double seconds = 0) {
+  return {{"small", [seconds](const std::string&) -> Runner {
+             return [seconds](std::span<const Point> points, const std::function<void(std::size_t, Answer)>& give,
+                              const std::atomic<bool>& cancel) {
+               for (std::size_t i = 0; i < points.size() && !cancel; ++i) {
+                 if (seconds > 0) std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+                 give(i, calc_small(points[i]));
+               }
+             };
+           }}};
+}
+
+/// Every bit that a study found.
+inline std::string write_bits(const StudyResult& r) {
+  std::string text;
+  const auto add = [&text](double x) { text += std::to_string(std::bit_cast<std::uint64_t>(x)) + " "; };
+  for (const std::string& name : r.outputs) text += name + " ";
+  for (const std::string& name : r.outcomes) text += name + " ";
+  const auto add_bounds = [&](const std::vector<uncertainty::OutputBounds>& outputs) {
+    for (const auto& o : outputs)
+      for (const auto& l : o.levels) add(l.alpha), add(l.lower.value), add(l.upper.value);
+    text += "\n";
+  };
+  add_bounds(r.alpha.outputs);
+  for (const auto& c : r.alpha.classes) {
+    text += std::to_string(c.outcome) + " " + std::to_string(c.count) + " ";
+    add(c.possibility), add_bounds(c.outputs);
+  }
+  for (const auto& p : r.possibilities.classes) add(p.possibility);
+  for (const auto& s : r.alpha.archive.samples()) {
+    for (const double x : s.x) add(x);
+    for (const double y : s.result.values) add(y);
+    text += s.result.text + "\n";
+  }
+  return text;
+}
+
+}  // namespace topple::study
