@@ -9,6 +9,7 @@
 
 #include "base/unit.h"
 #include "collapse/debris.h"
+#include "collapse/outcome.h"
 #include "collapse/rigid_block.h"
 
 namespace topple::collapse {
@@ -34,23 +35,7 @@ struct Context {
            double value = kNone, const std::string& unit = "", Status status = Status::Info) const {
     r.findings.push_back({id, heading, title, text, value, unit, status});
   }
-  /// First and last firing of each stage that fires at all.
-  struct StageTimes {
-    size_t stage;
-    double first, last;
-  };
-  std::vector<StageTimes> stage_times() const {
-    std::map<int, StageTimes> times;
-    for (const Firing& f : map.schedule) {
-      if (f.fails) continue;
-      const auto [it, is_new] = times.emplace(f.stage, StageTimes{static_cast<size_t>(f.stage), f.time, f.time});
-      it->second.first = std::min(it->second.first, f.time);
-      it->second.last = std::max(it->second.last, f.time);
-    }
-    std::vector<StageTimes> out;
-    for (const auto& [s, t] : times) out.push_back(t);
-    return out;
-  }
+  std::vector<StageTimes> stage_times() const { return find_stage_times(map); }
   std::string stage_name(size_t s) const { return plan.stages[s].name; }
   std::vector<PlacedBox> boxes_at(size_t frame, bool moving_only) const {
     std::vector<PlacedBox> boxes;
@@ -62,11 +47,7 @@ struct Context {
     }
     return boxes;
   }
-  Pose pose(size_t frame, size_t body) const {
-    const float* p = &r.position[3 * (frame * r.bodies.size() + body)];
-    const float* q = &r.orientation[4 * (frame * r.bodies.size() + body)];
-    return {{p[0], p[1], p[2]}, normalized(Quat{q[0], q[1], q[2], q[3]})};
-  }
+  Pose pose(size_t frame, size_t body) const { return pose_at(r, frame, body); }
 };
 
 /// "no zone has yielded", "1 zone has yielded", "2 zones have yielded".
@@ -78,35 +59,6 @@ std::string azimuth_words(double azimuth) {
   double degrees = azimuth / unit::deg;
   if (degrees < -0.5) degrees += 360;
   return fmt::format("{:.0f} deg", degrees);
-}
-
-Mechanism judge(const Context& c) {
-  MechanismInput in;
-  in.frames = c.recorder.block_frames();
-  in.touchdown = c.recorder.first_touchdown();
-  in.fall_direction = c.map.fall_direction;
-  in.is_direction_planned = c.map.is_direction_planned;
-  in.direction_tolerance = c.plan.criteria.azimuth_tolerance.value_or(0);
-  in.storey_height = c.map.ground_storey_height;
-  in.came_to_rest = c.summary.ending == mbs::Summary::Ending::AtRest;
-  double mass = 0, centre = 0, front = -1e30, rear = 1e30;
-  for (size_t b = 0; b < c.model.bodies.size(); ++b) {
-    if (!c.map.bodies[b].is_upper) continue;
-    const mbs::Body& body = c.model.bodies[b];
-    mass += body.mass;
-    centre += body.mass * dot(body.X_WB.p, in.fall_direction);
-    for (const record::BoxShape& s : c.map.bodies[b].shapes)
-      for (const Point2& p : calc_outline({body.X_WB * s.X_BS, s.half})) {
-        const double along = p[0] * in.fall_direction.x + p[1] * in.fall_direction.y;
-        front = std::max(front, along);
-        rear = std::min(rear, along);
-      }
-  }
-  if (mass > 0) {
-    in.front = front - centre / mass;
-    in.rear = centre / mass - rear;
-  }
-  return judge_mechanism(in, c.k);
 }
 
 void add_mechanism(const Context& c, const Mechanism& m) {
@@ -122,35 +74,29 @@ bool add_stability(const Context& c) {
   bool stood = true;
   const auto& block = c.recorder.block_frames();
   const auto& zones = c.recorder.zone_frames();
-  const auto frame_before = [&](double t) {
-    size_t i = 0;
-    while (i + 1 < block.size() && block[i + 1].time <= t + 1e-9) ++i;
-    return i;
-  };
   const auto describe = [&](const std::string& id, const std::string& title, size_t i, bool settled) {
     const ZoneFrame& z = zones[i];
     const bool has = z.zone >= 0 && z.utilisation > 0;
     const double margin = has ? 1 / z.utilisation : kNone;
-    const double away = norm(block[i].displacement);
-    const bool stands = away < c.k.stands_displacement && std::isfinite(away);
+    const bool is_standing = stands(block[i], c.k);
     std::string text = has ? fmt::format("Zone {} is nearest to its resistance and uses {:.0f} % of it (margin {:.2f})",
                                          c.r.zones[static_cast<size_t>(z.zone)].name, 100 * z.utilisation, margin)
                            : std::string("No zone is loaded");
     text += "; " + count_words(z.yielded, "no zone has yielded", "zone has yielded", "zones have yielded");
     if (settled)
-      text +=
-          fmt::format(", {}. The upper block has moved by {:.1f} cm and its fastest part moves at {:.3f} m/s",
-                      count_words(z.broken, "none is broken", "is broken", "are broken"), 100 * away, block[i].fastest);
-    text += stands ? "." : ": it does not stand.";
-    const Status status = !stands ? Status::Bad : z.yielded > 0 || z.broken > 0 ? Status::Warning : Status::Good;
+      text += fmt::format(", {}. The upper block has moved by {:.1f} cm and its fastest part moves at {:.3f} m/s",
+                          count_words(z.broken, "none is broken", "is broken", "are broken"),
+                          100 * norm(block[i].displacement), block[i].fastest);
+    text += is_standing ? "." : ": it does not stand.";
+    const Status status = !is_standing ? Status::Bad : z.yielded > 0 || z.broken > 0 ? Status::Warning : Status::Good;
     c.add(id, "Stability", title, text, margin, "1", status);
-    return stands;
+    return is_standing;
   };
   if (block.empty()) return true;
   describe("stability.start", "Before the first charge", 0, false);
   for (size_t s = 0; s + 1 < stages.size(); ++s) {
     if (stages[s + 1].first > block.back().time) break;
-    const size_t i = frame_before(stages[s + 1].first);
+    const size_t i = find_frame(block, stages[s + 1].first);
     stood &= describe(
         fmt::format("stability.stage_{}", s + 1),
         fmt::format("Between \"{}\" and \"{}\"", c.stage_name(stages[s].stage), c.stage_name(stages[s + 1].stage)), i,
@@ -159,13 +105,9 @@ bool add_stability(const Context& c) {
   return stood;
 }
 
-struct Reach {
-  double largest = 0;
-};
-
 Reach add_debris(const Context& c, const Mechanism& m) {
-  Reach reach;
   const size_t last = c.r.time.size() - 1;
+  const Reach reach = calc_reach(c.r, last);
   if (std::isnan(m.azimuth)) {
     c.add("azimuth", "Fall and debris", "Direction of fall",
           "The mass centre moved by less than half a metre to any side.", kNone, "rad");
@@ -178,48 +120,15 @@ Reach add_debris(const Context& c, const Mechanism& m) {
     c.add("azimuth", "Fall and debris", "Direction of fall", text + " (0 deg is +x, counter-clockwise).", m.azimuth,
           "rad");
   }
-  std::vector<Point2> corners;
-  const std::vector<PlacedBox> boxes = c.boxes_at(last, true);
-  for (const PlacedBox& b : boxes)
-    for (const Point2& p : calc_outline(b)) corners.push_back(p);
-  const Polygon hull = calc_hull(corners);
-  double low[2] = {1e30, 1e30}, high[2] = {-1e30, -1e30}, low0[2] = {1e30, 1e30}, high0[2] = {-1e30, -1e30};
-  for (const Point2& p : hull)
-    for (size_t i : {0UL, 1UL}) low[i] = std::min(low[i], p[i]), high[i] = std::max(high[i], p[i]);
-  for (const auto& p : c.r.building_outline)
-    for (size_t i : {0UL, 1UL}) low0[i] = std::min(low0[i], p[i]), high0[i] = std::max(high0[i], p[i]);
-  const double side[4] = {std::max(0.0, low0[0] - low[0]), std::max(0.0, high[0] - high0[0]),
-                          std::max(0.0, low0[1] - low[1]), std::max(0.0, high[1] - high0[1])};
-  reach.largest = *std::max_element(side, side + 4);
-  // a single piece may fly far: how far beyond the footprint each part lies, and which is the last
-  std::vector<std::pair<double, size_t>> ways;
-  double mass = 0;
-  for (size_t b = 0; b < c.r.bodies.size(); ++b) {
-    if (c.r.bodies[b].fixed) continue;
-    double way = 0;
-    const Pose X_WB = c.pose(last, b);
-    for (const record::BoxShape& s : c.r.bodies[b].shapes)
-      for (const Point2& p : calc_outline({X_WB * s.X_BS, s.half}))
-        for (size_t i : {0UL, 1UL}) way = std::max({way, low0[i] - p[i], p[i] - high0[i]});
-    ways.emplace_back(way, b);
-    mass += c.r.bodies[b].mass;
-  }
-  std::sort(ways.begin(), ways.end());
-  double within = 0, most = 0;
-  for (const auto& [way, b] : ways) {
-    most = way;
-    within += c.r.bodies[b].mass;
-    if (within >= 0.95 * mass) break;
-  }
   std::string text = fmt::format(
       "Beyond the footprint: {:.1f} m towards -x, {:.1f} m towards +x, {:.1f} m towards -y, {:.1f} m towards +y; the "
       "outline of all parts encloses {:.0f} m2.",
-      side[0], side[1], side[2], side[3], calc_area(hull));
-  if (!ways.empty() && reach.largest > 0)
-    text += fmt::format(" 95 % of the mass lies within {:.1f} m of it; the farthest part is {}.", most,
-                        c.r.bodies[ways.back().second].name);
+      reach.side[0], reach.side[1], reach.side[2], reach.side[3], reach.area);
+  if (reach.farthest >= 0 && reach.largest > 0)
+    text += fmt::format(" 95 % of the mass lies within {:.1f} m of it; the farthest part is {}.", reach.most_mass,
+                        c.r.bodies[static_cast<size_t>(reach.farthest)].name);
   c.add("debris.reach", "Fall and debris", "Reach of the debris", text, reach.largest, "m");
-  const Heap heap = calc_heap(boxes, 0.25);
+  const Heap heap = calc_heap(c.boxes_at(last, true), 0.25);
   c.add("debris.height", "Fall and debris", "Height of the hill",
         fmt::format("The highest point of all parts lies {:.1f} m above the ground.", heap.height), heap.height, "m");
   c.add("debris.volume", "Fall and debris", "Volume of the hill",
@@ -468,7 +377,7 @@ void add_findings(const product::Plan& plan, const mbs::Model& model, const Mode
     c.add("mechanism", "Mechanism", "No result", r.ending_text, kNone, "", Status::Bad);
     return;
   }
-  const Mechanism m = judge(c);
+  const Mechanism m = judge_run(plan, model, map, k, recorder, summary);
   add_mechanism(c, m);
   add_rigid_block(c);
   const bool stood = add_stability(c);

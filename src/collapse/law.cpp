@@ -139,26 +139,13 @@ std::vector<double> sample(const std::map<double, Row>& rows, double N, const st
 /// `last`: every interval is cut where a row departs most (Ramer, Douglas & Peucker, all rows at once).
 std::vector<double> find_rotations(const std::vector<const Row*>& rows, double last, double tolerance) {
   const std::vector<double> all = merge_rotations(rows, last);
-  // Rows as shares of their largest moment, and which of the rotations are their own: between these they are straight,
-  // so nowhere else a row departs most.
-  struct Share {
-    std::vector<double> value;
-    std::vector<size_t> own;
-  };
-  std::vector<Share> shares;
+  // Rows as shares of their largest moment.
+  std::vector<std::vector<double>> value;
   for (const Row* r : rows) {
     const double most = r->largest();
     if (!(most > 0)) continue;
-    Share& share = shares.emplace_back();
-    share.value = sample(*r, all);
-    for (double& v : share.value) v /= most;
-    size_t j = 0;
-    for (const double x : r->rotation) {
-      while (j + 1 < all.size() && all[j + 1] <= x) ++j;
-      if (share.own.empty() || share.own.back() != j) share.own.push_back(j);
-      // one that was merged with a later rotation
-      if (all[j] < x && j + 1 < all.size()) share.own.push_back(++j);
-    }
+    value.push_back(sample(*r, all));
+    for (double& v : value.back()) v /= most;
   }
   std::vector<char> kept(all.size(), 0);
   kept.front() = kept.back() = 1;
@@ -168,12 +155,10 @@ std::vector<double> find_rotations(const std::vector<const Row*>& rows, double l
     open.pop_back();
     double worst = tolerance;
     size_t where = 0;
-    for (const Share& share : shares) {
-      const std::vector<double>& v = share.value;
+    for (const std::vector<double>& v : value) {
       const double slope = (v[b] - v[a]) / (all[b] - all[a]);
-      for (auto j = std::upper_bound(share.own.begin(), share.own.end(), a); j != share.own.end() && *j < b; ++j)
-        if (const double off = std::abs(v[*j] - v[a] - slope * (all[*j] - all[a])); off > worst)
-          worst = off, where = *j;
+      for (size_t j = a + 1; j < b; ++j)
+        if (const double off = std::abs(v[j] - v[a] - slope * (all[j] - all[a])); off > worst) worst = off, where = j;
     }
     if (where == 0) continue;
     kept[where] = 1;

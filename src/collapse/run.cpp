@@ -10,8 +10,8 @@
 
 #include "base/hash.h"
 #include "base/unit.h"
-#include "collapse/debris.h"
 #include "collapse/findings.h"
+#include "collapse/outcome.h"
 #include "collapse/recorder.h"
 #include "engines/engine.h"
 #include "mbs/quantity.h"
@@ -107,11 +107,7 @@ void fill_plan_values(const product::Plan& plan, const ModelMap& map, record::Re
 }
 
 void fill_building(const product::Plan& plan, const mbs::Model& model, const ModelMap& map, record::Record& r) {
-  std::vector<Point2> corners;
-  for (size_t b = 0; b < model.bodies.size(); ++b)
-    for (const record::BoxShape& s : map.bodies[b].shapes)
-      for (const Point2& p : calc_outline({model.bodies[b].X_WB * s.X_BS, s.half})) corners.push_back(p);
-  r.building_outline = calc_hull(std::move(corners));
+  r.building_outline = calc_building_outline(model, map);
   for (const product::Neighbour& n : plan.neighbours) r.neighbours.push_back({n.name, n.footprint, n.is_utility});
 }
 

@@ -14,23 +14,28 @@ namespace topple::mbs {
 
 namespace {
 
-/// Throws InputError if a variation did more than change numbers.
-void check_build(const Model& base, const Model& varied, size_t sample) {
-  const auto fail = [&](const std::string& what) {
-    throw InputError("E602", "variation " + std::to_string(sample) + " changes " + what,
-                     "variations change numbers; bodies, joints and elements stay");
-  };
-  if (varied.bodies.size() != base.bodies.size()) fail("the number of bodies");
-  if (varied.joints.size() != base.joints.size()) fail("the number of joints");
-  if (varied.elements.size() != base.elements.size()) fail("the number of elements");
+/// What differs in the build; empty if nothing does.
+std::string find_difference(const Model& base, const Model& varied) {
+  if (varied.bodies.size() != base.bodies.size()) return "the number of bodies";
+  if (varied.joints.size() != base.joints.size()) return "the number of joints";
+  if (varied.elements.size() != base.elements.size()) return "the number of elements";
   for (size_t i = 0; i < base.elements.size(); ++i)
     if (varied.elements[i].a != base.elements[i].a || varied.elements[i].b != base.elements[i].b)
-      fail("the bodies of elements[" + std::to_string(i) + "]");
+      return "the bodies of elements[" + std::to_string(i) + "]";
   for (size_t i = 0; i < base.joints.size(); ++i) {
     const Joint &a = base.joints[i], &b = varied.joints[i];
-    if (a.kind != b.kind) fail("the kind of joints[" + std::to_string(i) + "]");
-    if (a.parent != b.parent || a.child != b.child) fail("the bodies of joints[" + std::to_string(i) + "]");
+    if (a.kind != b.kind) return "the kind of joints[" + std::to_string(i) + "]";
+    if (a.parent != b.parent || a.child != b.child) return "the bodies of joints[" + std::to_string(i) + "]";
   }
+  return {};
+}
+
+/// Throws InputError if a variation did more than change numbers.
+void check_build(const Model& base, const Model& varied, size_t sample) {
+  const std::string difference = find_difference(base, varied);
+  if (difference.empty()) return;
+  throw InputError("E602", "variation " + std::to_string(sample) + " changes " + difference,
+                   "variations change numbers; bodies, joints and elements stay");
 }
 
 /// Lanes for W samples of one build.
@@ -106,6 +111,8 @@ void run_lanes(const Model& model, const std::vector<Variation>& variations, con
 }
 
 }  // namespace
+
+bool is_same_build(const Model& a, const Model& b) { return find_difference(a, b).empty(); }
 
 std::vector<Summary> run_batch(const Model& model, const std::vector<Variation>& variations,
                                const BatchOptions& options) {

@@ -24,6 +24,9 @@ struct BatchOptions {
   Progress progress;  // samples done, samples
 };
 
+/// Whether both have as many bodies, joints and elements, which join the same bodies.
+bool is_same_build(const Model&, const Model&);
+
 /// Runs all variations; summary i belongs to variation i. A sample gives the same bits as run() of its model alone, in
 /// any lane of any batch on any thread; only wall_time is that of its batch. A sample that has no equilibrium or
 /// diverges ends as its summary says and disturbs no other. Throws InputError if a varied model is not valid or not of

@@ -1,0 +1,45 @@
+#pragma once
+/// Numbers of a finished run that findings and studies share.
+
+#include <array>
+#include <vector>
+
+#include "collapse/debris.h"
+#include "collapse/recorder.h"
+
+namespace topple::collapse {
+
+/// First and last firing of a stage.
+struct StageTimes {
+  size_t stage = 0;            // index into the plan's
+  double first = 0, last = 0;  // [s]
+};
+/// Of the stages that fire at all, rising.
+std::vector<StageTimes> find_stage_times(const ModelMap&);
+
+/// How it came down. There is at least one frame.
+Mechanism judge_run(const product::Plan&, const mbs::Model&, const ModelMap&, const Knowledge&, const Recorder&,
+                    const mbs::Summary&);
+
+/// Whether the upper block is where it was, to stands_displacement.
+bool stands(const BlockFrame&, const Knowledge&);
+/// The last frame not after a time.
+size_t find_frame(const std::vector<BlockFrame>&, double time);
+
+/// A body of a record in W at a frame.
+Pose pose_at(const record::Record&, size_t frame, size_t body);
+
+/// Outline of the model as it stands at the start, seen from above.
+Polygon calc_building_outline(const mbs::Model&, const ModelMap&);
+
+/// How far parts lie beyond the building's footprint (the box around its outline along W's axes).
+struct Reach {
+  std::array<double, 4> side{};  // towards -x, +x, -y, +y; 0: not beyond [m]
+  double largest = 0;            // of the sides [m]
+  double most_mass = 0;          // within which 95 % of the mass lie [m]
+  int farthest = -1;             // body, -1: no moving one
+  double area = 0;               // of the outline of all parts [m²]
+};
+Reach calc_reach(const record::Record&, size_t frame);
+
+}  // namespace topple::collapse

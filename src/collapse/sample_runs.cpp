@@ -1,0 +1,210 @@
+#include "collapse/sample_runs.h"
+
+#include <algorithm>
+#include <ctime>
+#include <exception>
+#include <memory>
+
+#include "collapse/manager.h"
+#include "collapse/recorder.h"
+#include "mbs/batch.h"
+#include "mbs/kernel.h"
+
+namespace topple::collapse {
+
+namespace {
+
+/// CPU time of this thread [s].
+double now() {
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+/// One plan on its way. Not moved: the recorder holds on to its parts.
+struct Sample {
+  Sample(const product::Plan& p, const Knowledge& k) : plan(p), model(make_model(p, k, map)) {
+    record.building_outline = calc_building_outline(model, map);
+    recorder = std::make_unique<Recorder>(model, map, k, record, callbacks);
+  }
+
+  const product::Plan& plan;
+  ModelMap map;
+  mbs::Model model;
+  record::Record record;
+  RunCallbacks callbacks;
+  std::unique_ptr<Recorder> recorder;
+  mbs::Summary summary;
+  // of a single run
+  double begun = 0, first_frame = 0, last_stage = 0, in_outputs = 0, in_outputs_standing = 0;
+};
+
+double calc_release(const product::Plan& plan) { return plan.stages.empty() ? 0 : plan.stages.back().time; }
+
+mbs::Options make_options(const product::Plan& plan, const Knowledge& k, const SampleRunOptions& in) {
+  mbs::Options o;
+  o.duration = calc_release(plan) + in.after;
+  o.step = plan.analysis.step;
+  o.frame_interval = 1 / (in.frame_rate > 0 ? in.frame_rate : plan.analysis.frame_rate);
+  o.rest_speed = k.rest_speed;
+  o.rest_time = k.rest_time;
+  o.threads = 1;
+  return o;
+}
+
+void run_single(Sample& s, const Knowledge& k, const SampleRunOptions& options, const std::atomic<bool>* cancel) {
+  mbs::Options o = make_options(s.plan, k, options);
+  o.progress.cancel = cancel;
+  const double release = calc_release(s.plan);
+  o.on_frame = [&s, release](const mbs::View& v) {
+    const double t = now();
+    if (s.first_frame == 0) s.first_frame = t;
+    s.recorder->add_frame(v);
+    const double spent = now() - t;
+    s.in_outputs += spent;
+    if (v.time <= release) s.last_stage = t + spent, s.in_outputs_standing = s.in_outputs;
+  };
+  o.on_happening = [&s](const mbs::Happening& h) { s.recorder->add_happening(h); };
+  s.begun = now();
+  s.summary = mbs::run(s.model, o);
+}
+
+/// All of one build and one kind of options.
+void run_together(const std::vector<Sample*>& samples, const Knowledge& k, const SampleRunOptions& options,
+                  const std::atomic<bool>* cancel) {
+  mbs::BatchOptions o;
+  o.run = make_options(samples.front()->plan, k, options);
+  o.progress.cancel = cancel;
+  o.on_frame = [&samples](size_t i, const mbs::View& v) {
+    const double t = now();
+    samples[i]->recorder->add_frame(v);
+    samples[i]->in_outputs += now() - t;
+  };
+  o.on_happening = [&samples](size_t i, const mbs::Happening& h) { samples[i]->recorder->add_happening(h); };
+  std::vector<mbs::Variation> variations;
+  for (const Sample* s : samples) variations.emplace_back([s](mbs::Model& m) { m = s->model; });
+  const std::vector<mbs::Summary> summaries = mbs::run_batch(samples.front()->model, variations, o);
+  for (size_t i = 0; i < samples.size(); ++i) samples[i]->summary = summaries[i];
+}
+
+bool can_share_lanes(const Sample& a, const Sample& b, const Knowledge& k, const SampleRunOptions& options) {
+  const mbs::Options x = make_options(a.plan, k, options), y = make_options(b.plan, k, options);
+  return x.duration == y.duration && x.step == y.step && x.frame_interval == y.frame_interval &&
+         mbs::is_same_build(a.model, b.model);
+}
+
+void fill(Sample& s, const Knowledge& k, SampleRun& out) {
+  using Ending = mbs::Summary::Ending;
+  s.recorder->finish();
+  if (s.summary.ending == Ending::Cancelled) return;
+  out.release = calc_release(s.plan);
+  if (s.summary.ending == Ending::NoEquilibrium || s.summary.ending == Ending::Diverged || s.record.time.empty()) {
+    out.state = SampleRun::State::Failed;
+    out.text = s.summary.ending == Ending::NoEquilibrium
+                   ? "there is no equilibrium under dead load before the first charge: " + s.summary.message
+                   : s.summary.message;
+    return;
+  }
+  out.state = SampleRun::State::Done;
+  const auto series = [&s](const char* id) -> const std::vector<double>& {
+    return std::find_if(s.record.series.begin(), s.record.series.end(),
+                        [id](const record::Series& x) { return x.id == id; })
+        ->value;
+  };
+  out.time = s.record.time;
+  out.tilt = series("tilt_angle");
+  out.mechanism = judge_run(s.plan, s.model, s.map, k, *s.recorder, s.summary);
+  const std::vector<BlockFrame>& block = s.recorder->block_frames();
+  const std::vector<StageTimes> stages = find_stage_times(s.map);
+  const size_t before = find_frame(block, stages.empty() ? out.time.back() : stages.back().first);
+  out.stood = stages.size() < 2 || stands(block[before], k);
+  out.utilisation = s.recorder->zone_frames()[before].utilisation;
+  out.touchdown = s.recorder->first_touchdown();
+  const std::vector<double>& kinetic = series("energy_kinetic");
+  out.touchdown_energy = out.touchdown <= out.time.back() ? s.recorder->kinetic_at(out.touchdown) : kinetic.back();
+  out.largest_energy = *std::max_element(kinetic.begin(), kinetic.end());
+  out.reach = calc_reach(s.record, out.time.size() - 1);
+}
+
+}  // namespace
+
+size_t count_lanes() { return mbs::kernel::lanes(); }
+
+std::vector<SampleRun> run_samples(std::span<const product::Plan> plans, const Knowledge& k,
+                                   const SampleRunOptions& options, const std::atomic<bool>* cancel,
+                                   SampleRunTimes* times) {
+  std::vector<SampleRun> out(plans.size());
+  SampleRunTimes spent;
+  const auto is_cancelled = [cancel] { return cancel && cancel->load(std::memory_order_relaxed); };
+  const auto fail = [&out](size_t i, const std::exception& e) {
+    const auto* input = dynamic_cast<const InputError*>(&e);
+    out[i].state = SampleRun::State::Failed;
+    out[i].text = input ? input->diagnostics().front().message : e.what();
+  };
+  const auto make = [&](size_t i) -> std::unique_ptr<Sample> {
+    const double begin = now();
+    std::unique_ptr<Sample> s;
+    try {
+      s = std::make_unique<Sample>(plans[i], k);
+    } catch (const std::exception& e) { fail(i, e); }
+    spent.models += now() - begin;
+    return s;
+  };
+  const auto finish = [&](size_t i, Sample& s) {
+    const double begin = now();
+    fill(s, k, out[i]);
+    spent.outputs += now() - begin + s.in_outputs;
+  };
+  const auto run_one = [&](size_t i, Sample& s) {
+    try {
+      run_single(s, k, options, cancel);
+    } catch (const std::exception& e) {
+      fail(i, e);
+      return;
+    }
+    const double end = now(), first = s.first_frame > 0 ? s.first_frame : end;
+    const double stage = s.last_stage > 0 ? s.last_stage : first;
+    spent.equilibria += first - s.begun;
+    spent.standing += stage - first - s.in_outputs_standing;
+    spent.falling += end - stage - (s.in_outputs - s.in_outputs_standing);
+    finish(i, s);
+  };
+  if (!options.lanes) {
+    for (size_t i = 0; i < plans.size() && !is_cancelled(); ++i)
+      if (const std::unique_ptr<Sample> s = make(i)) run_one(i, *s);
+  } else {
+    for (size_t first = 0; first < plans.size() && !is_cancelled(); first += count_lanes()) {
+      std::vector<std::unique_ptr<Sample>> samples;
+      for (size_t i = first; i < std::min(plans.size(), first + count_lanes()); ++i) samples.push_back(make(i));
+      std::vector<bool> done(samples.size(), false);
+      for (size_t i = 0; i < samples.size(); ++i) {
+        if (!samples[i] || done[i]) continue;
+        std::vector<Sample*> group;
+        std::vector<size_t> members;
+        for (size_t j = i; j < samples.size(); ++j) {
+          if (!samples[j] || done[j] || !can_share_lanes(*samples[i], *samples[j], k, options)) continue;
+          group.push_back(samples[j].get());
+          members.push_back(j);
+          done[j] = true;
+        }
+        if (group.size() == 1) {
+          run_one(first + i, *samples[i]);
+          continue;
+        }
+        const double begin = now();
+        try {
+          run_together(group, k, options, cancel);
+        } catch (const std::exception& e) {
+          for (const size_t j : members) fail(first + j, e);
+          continue;
+        }
+        spent.falling += now() - begin;
+        for (const size_t j : members) spent.falling -= samples[j]->in_outputs, finish(first + j, *samples[j]);
+      }
+    }
+  }
+  if (times) *times = spent;
+  return out;
+}
+
+}  // namespace topple::collapse
