@@ -120,7 +120,6 @@ SolidMarch run(const Problem& problem, fem::Loading loading, double N, const Sol
   fem::MarchOptions march_options;
   march_options.solve.threads = options.threads;
   march_options.solve.tolerance = 1e-4;
-  march_options.solve.extrapolate = false;  // pieces that have come off would drift on
   march_options.solve.largest_lag = options.largest_lag;
   // The normal force first.
   if (N != 0) {

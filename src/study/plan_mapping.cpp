@@ -1,0 +1,176 @@
+#include "study/plan_mapping.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <mutex>
+
+#include "base/parallel.h"
+#include "base/unit.h"
+#include "collapse/sample_runs.h"
+#include "product/plan_sampler.h"
+
+namespace topple::study {
+
+namespace {
+
+using uncertainty::Point;
+using uncertainty::Result;
+
+/// CPU time of this thread [s].
+double now() {
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+/// Between frames on a straight line; the first or last frame outside of them.
+double interpolate(const std::vector<double>& time, const std::vector<double>& value, double t) {
+  const auto after = std::lower_bound(time.begin(), time.end(), t);
+  if (after == time.begin()) return value.front();
+  if (after == time.end()) return value.back();
+  const size_t i = static_cast<size_t>(after - time.begin());
+  const double s = (t - time[i - 1]) / (time[i] - time[i - 1]);
+  return (1 - s) * value[i - 1] + s * value[i];
+}
+
+int find_outcome(const collapse::SampleRun& r) {
+  const std::vector<std::string>& names = plan_outcomes();
+  const std::string& name = r.stood ? r.mechanism.name : names.back();
+  return static_cast<int>(std::find(names.begin(), names.end(), name) - names.begin());
+}
+
+}  // namespace
+
+const std::vector<std::string>& plan_outcomes() {
+  static const std::vector<std::string> names{"topple", "vertical",    "partial",         "stands",
+                                              "fold",   "progressive", "wrong direction", "early"};
+  return names;
+}
+
+struct PlanMapping::Impl {
+  product::PlanSampler sampler;
+  collapse::Knowledge knowledge;
+  PlanMappingOptions options;
+  uncertainty::Space space;
+  std::vector<PlanQuantity> inputs, outputs;
+  std::vector<double> trajectory_times;
+
+  Result to_result(const collapse::SampleRun&) const;
+  void evaluate_chunk(std::span<const Point>, std::span<Result>, const std::atomic<bool>* cancel,
+                      PlanMappingTimes& spent) const;
+};
+
+PlanMapping::PlanMapping(const product::Plan& plan, const collapse::Knowledge& k, PlanMappingOptions options) {
+  if (plan.fuzzy.inputs.empty())
+    throw InputError("E201", plan.path + ": the plan has no fuzzy values", "add a table [fuzzy] (docs/plan.md)");
+  if (!(options.after > 0) || !(options.tilt_interval > 0) || !std::isfinite(options.after))
+    throw InputError("E205", "the time after the last stage and its interval must be above 0");
+  for (const double t : options.tilt_times)
+    if (!(t >= 0) || t > options.after)
+      throw InputError("E205",
+                       fmt::format("tilt at {:g} s: the runs end {:g} s after the last stage", t, options.after));
+  auto impl = std::make_unique<Impl>(Impl{product::make_sampler(plan), k, options, {}, {}, {}, {}});
+  for (const product::FuzzyValue& v : plan.fuzzy.inputs) {
+    impl->inputs.push_back({v.path, v.symbol, v.unit});
+    impl->space.inputs.push_back(uncertainty::make_polygonal(v.corners));
+  }
+  uncertainty::check_space(impl->space);
+  for (const double t : options.tilt_times) impl->outputs.push_back({fmt::format("tilt_{:g}", t), "deg", unit::deg});
+  for (const PlanQuantity& q : std::vector<PlanQuantity>{{"touchdown", "s", 1},
+                                                         {"touchdown_energy", "MJ", 1e6},
+                                                         {"largest_energy", "MJ", 1e6},
+                                                         {"reach_neg_x", "m", 1},
+                                                         {"reach_pos_x", "m", 1},
+                                                         {"reach_neg_y", "m", 1},
+                                                         {"reach_pos_y", "m", 1},
+                                                         {"reach_mass_95", "m", 1},
+                                                         {"rear_share", "%", 0.01},
+                                                         {"utilisation", "%", 0.01}})
+    impl->outputs.push_back(q);
+  const int steps = static_cast<int>(std::floor(options.after / options.tilt_interval + 1e-9));
+  for (int i = 0; i <= steps; ++i) impl->trajectory_times.push_back(i * options.tilt_interval);
+  impl_ = std::move(impl);
+}
+
+PlanMapping::~PlanMapping() = default;
+PlanMapping::PlanMapping(PlanMapping&&) noexcept = default;
+
+const uncertainty::Space& PlanMapping::space() const { return impl_->space; }
+const std::vector<PlanQuantity>& PlanMapping::inputs() const { return impl_->inputs; }
+const std::vector<PlanQuantity>& PlanMapping::outputs() const { return impl_->outputs; }
+const std::vector<double>& PlanMapping::trajectory_times() const { return impl_->trajectory_times; }
+
+Result PlanMapping::Impl::to_result(const collapse::SampleRun& r) const {
+  using State = collapse::SampleRun::State;
+  Result out;
+  if (r.state == State::Cancelled) return out;
+  out.state = r.state == State::Done ? Result::State::Done : Result::State::Failed;
+  out.text = r.text;
+  if (r.state == State::Failed) return out;
+  out.outcome = find_outcome(r);
+  for (const double t : options.tilt_times) out.values.push_back(interpolate(r.time, r.tilt, r.release + t));
+  const bool touched = r.touchdown <= r.release + options.after;
+  for (const double x :
+       {touched ? r.touchdown - r.release : options.after, r.touchdown_energy, r.largest_energy, r.reach.side[0],
+        r.reach.side[1], r.reach.side[2], r.reach.side[3], r.reach.most_mass, r.mechanism.rear_share, r.utilisation})
+    out.values.push_back(x);
+  for (const double t : trajectory_times) out.trajectory.push_back(interpolate(r.time, r.tilt, r.release + t));
+  const bool is_finite = std::all_of(out.values.begin(), out.values.end(), [](double x) { return std::isfinite(x); });
+  if (!is_finite) {
+    out.state = Result::State::Failed;
+    out.values.clear(), out.trajectory.clear();
+    out.text = "a result is not a finite number";
+  }
+  return out;
+}
+
+void PlanMapping::Impl::evaluate_chunk(std::span<const Point> points, std::span<Result> out,
+                                       const std::atomic<bool>* cancel, PlanMappingTimes& spent) const {
+  std::vector<product::Plan> plans;
+  std::vector<size_t> index;
+  const double begin = now();
+  for (size_t i = 0; i < points.size(); ++i) {
+    out[i] = {};
+    try {
+      plans.push_back(product::make_sample(sampler, points[i]));
+      index.push_back(i);
+    } catch (const InputError& e) {
+      out[i].state = Result::State::Failed;
+      out[i].text = e.diagnostics().front().message;
+    }
+  }
+  spent.plans += now() - begin;
+  collapse::SampleRunTimes times;
+  const std::vector<collapse::SampleRun> runs =
+      collapse::run_samples(plans, knowledge, {options.after, options.frame_rate, options.lanes}, cancel, &times);
+  for (size_t i = 0; i < runs.size(); ++i) out[index[i]] = to_result(runs[i]);
+  spent.models += times.models, spent.equilibria += times.equilibria, spent.standing += times.standing;
+  spent.falling += times.falling, spent.outputs += times.outputs;
+}
+
+void PlanMapping::evaluate(std::span<const Point> batch, std::span<Result> out, const std::atomic<bool>* cancel,
+                           PlanMappingTimes* times) const {
+  const size_t W = impl_->options.lanes ? collapse::count_lanes() : 1;
+  const size_t chunks = (batch.size() + W - 1) / W;
+  for (Result& r : out) r = {};
+  std::mutex mutex;
+  PlanMappingTimes sum;
+  // a chunk that was not begun stays NotRun
+  (void)parallel_for(
+      chunks, impl_->options.threads,
+      [&](size_t c) {
+        PlanMappingTimes spent;
+        const size_t first = c * W, count = std::min(W, batch.size() - first);
+        impl_->evaluate_chunk(batch.subspan(first, count), out.subspan(first, count), cancel, spent);
+        const std::lock_guard<std::mutex> lock(mutex);
+        sum.plans += spent.plans, sum.models += spent.models, sum.equilibria += spent.equilibria;
+        sum.standing += spent.standing, sum.falling += spent.falling, sum.outputs += spent.outputs;
+      },
+      cancel);
+  if (times) *times = sum;
+}
+
+}  // namespace topple::study

@@ -1,0 +1,74 @@
+#pragma once
+/// The mapping model of a plan with [fuzzy]: a sample of its values in, what the collapse does out.
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "collapse/knowledge.h"
+#include "product/plan.h"
+#include "uncertainty/space.h"
+
+namespace topple::study {
+
+struct PlanMappingOptions {
+  double after = 1.7;                           // simulated after the last stage's time [s]
+  std::vector<double> tilt_times{0.5, 1, 1.7};  // of outputs, after the last stage's time, at most `after` [s]
+  double tilt_interval = 0.1;                   // of the trajectory [s]
+  double frame_rate = 0;                        // at which runs are looked at; 0: the plan's [1/s]
+  bool lanes = false;                           // samples of one build in the lanes of one run (docs/scale.md)
+  int threads = 1;                              // 0: all of the machine
+};
+
+/// Where the processors' time of samples went, summed over threads [s].
+struct PlanMappingTimes {
+  double plans = 0;       // samples to plans
+  double models = 0;      // plans to models, with all resistance curves
+  double equilibria = 0;  // compiling, dead load
+  double standing = 0;    // steps before the last stage
+  double falling = 0;     // steps behind it
+  double outputs = 0;     // frames and what is read off them
+};
+
+/// A quantity of the mapping. Values are SI.
+struct PlanQuantity {
+  std::string name, symbol;  // unit for people
+  double unit = 1;           // SI value of one of it
+};
+
+/// Outcome classes: those of collapse::Mechanism, and "early" where the building does not stand until its last stage.
+const std::vector<std::string>& plan_outcomes();
+
+/// A plan, ready to be sampled. Constant: several threads may evaluate it.
+class PlanMapping {
+ public:
+  /// Throws InputError if the plan has no fuzzy values, or options outside their range.
+  PlanMapping(const product::Plan&, const collapse::Knowledge&, PlanMappingOptions);
+  ~PlanMapping();
+  PlanMapping(PlanMapping&&) noexcept;
+
+  const uncertainty::Space& space() const;
+  const std::vector<PlanQuantity>& inputs() const;
+  /// tilt_T towards the planned fall at each of tilt_times; touchdown: of the upper block's first part, after the last
+  /// stage's time, and `after` if there is none by then; energy in motion then (at the end without one) and at most;
+  /// reach of parts beyond the footprint to each side and of 95 % of the mass, at the end; rear_share: drop of the rear
+  /// edge over that of the front edge; utilisation: largest use of a zone's resistance before the last stage (the
+  /// margin is its inverse).
+  const std::vector<PlanQuantity>& outputs() const;
+  /// Times of the trajectory, which is the tilt, after the last stage's time [s].
+  const std::vector<double>& trajectory_times() const;
+
+  /// As uncertainty::Evaluate. A sample that is no plan, finds no equilibrium or diverges is Failed with its text;
+  /// after a cancellation the rest is NotRun. A point's result has the same bits alone, in any batch and on any thread.
+  void evaluate(std::span<const uncertainty::Point> batch, std::span<uncertainty::Result> out,
+                const std::atomic<bool>* cancel = nullptr, PlanMappingTimes* times = nullptr) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<const Impl> impl_;
+};
+
+}  // namespace topple::study

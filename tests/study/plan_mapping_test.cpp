@@ -1,0 +1,185 @@
+#include "study/plan_mapping.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <thread>
+
+#include "../product/plan_text.h"
+#include "base/unit.h"
+#include "collapse/run.h"
+#include "product/plan_sampler.h"
+
+namespace topple::study {
+namespace {
+
+using uncertainty::Point;
+using uncertainty::Result;
+
+/// A building of two bays that loses its front row, and its rear column soon after.
+product::Plan read_small(const std::string& fuzzy) {
+  std::string text = product::small_plan() + fuzzy;
+  text = product::replaced(text, "time = \"2 s\"", "time = \"0.1 s\"");
+  std::vector<Diagnostic> warnings;
+  return product::read_plan(text, "plan.toml", warnings);
+}
+
+constexpr const char* strengths = R"toml([fuzzy]
+concrete.C25.fc = { triangular = ["9 N/mm2", "25 N/mm2", "45 N/mm2"] }
+concrete.C25.fct = { formula = "1.4 * ((fc - 8) / 10)^(2/3)" }
+stage.1.charge.1.destroyed_length = { triangular = ["1 m", "1.2 m", "2 m"] }
+storeys.load = { triangular = ["1 kN/m2", "1 kN/m2", "60 kN/m2"] }
+)toml";
+
+PlanMappingOptions quick() {
+  PlanMappingOptions o;
+  o.after = 0.4;
+  o.tilt_times = {0.2, 0.4};
+  return o;
+}
+
+/// Ordinary samples, one that is of another build (no stump below the charge), one that is no plan, and one that finds
+/// no equilibrium.
+const std::vector<Point> points{{25e6, 1.2, 1e3}, {12e6, 1.1, 2e3}, {30e6, 2.0, 1e3}, {5e6, 1.2, 1e3},
+                                {9e6, 1.2, 60e3}, {40e6, 1.5, 3e3}, {20e6, 1.0, 1e3}};
+
+std::vector<Result> evaluate(const PlanMapping& m, const std::vector<Point>& batch) {
+  std::vector<Result> out(batch.size());
+  m.evaluate(batch, out);
+  return out;
+}
+
+void expect_same(const Result& a, const Result& b) {
+  EXPECT_EQ(a.state, b.state);
+  EXPECT_EQ(a.outcome, b.outcome);
+  EXPECT_EQ(a.values, b.values);
+  EXPECT_EQ(a.trajectory, b.trajectory);
+  EXPECT_EQ(a.text, b.text);
+}
+
+TEST(PlanMapping, SaysWhatGoesInAndComesOut) {
+  const PlanMapping m(read_small(strengths), collapse::default_knowledge(), quick());
+  ASSERT_EQ(m.inputs().size(), 3u);
+  EXPECT_EQ(m.inputs()[1].name, "stage.1.charge.1.destroyed_length");
+  EXPECT_EQ(m.inputs()[0].unit, unit::MPa);
+  EXPECT_EQ(m.space().inputs[0].cut(0.5).left, 17e6);
+  EXPECT_EQ(m.outputs()[1].name, "tilt_0.4");
+  EXPECT_THAT(m.trajectory_times(), testing::ElementsAre(0, 0.1, 0.2, testing::DoubleEq(0.3), 0.4));
+  const std::vector<Result> r = evaluate(m, {points[0]});
+  EXPECT_EQ(r[0].values.size(), m.outputs().size());
+  EXPECT_EQ(r[0].trajectory.size(), 5u);
+}
+
+TEST(PlanMapping, GivesTheSameBitsInAnyBatchOnAnyThread) {
+  const product::Plan plan = read_small(strengths);
+  const PlanMapping m(plan, collapse::default_knowledge(), quick());
+  const std::vector<Result> all = evaluate(m, points);
+  EXPECT_EQ(all[0].state, Result::State::Done) << all[0].text;
+  EXPECT_NE(all[0].values, all[1].values);
+  std::vector<Point> reversed(points.rbegin(), points.rend());
+  for (const int threads : {1, 3})
+    for (const bool lanes : {false, true}) {
+      SCOPED_TRACE(std::to_string(threads) + (lanes ? " threads in lanes" : " threads"));
+      PlanMappingOptions o = quick();
+      o.threads = threads, o.lanes = lanes;
+      const PlanMapping other(plan, collapse::default_knowledge(), o);
+      const std::vector<Result> again = evaluate(other, reversed);
+      for (size_t i = 0; i < points.size(); ++i) expect_same(all[i], again[points.size() - 1 - i]);
+      expect_same(all[2], evaluate(other, {points[2]})[0]);
+    }
+}
+
+TEST(PlanMapping, CountsWhatBreaksDownAsFailedRuns) {
+  const PlanMapping m(read_small(strengths), collapse::default_knowledge(), quick());
+  const std::vector<Result> r = evaluate(m, points);
+  EXPECT_EQ(r[3].state, Result::State::Failed);
+  EXPECT_THAT(r[3].text, testing::HasSubstr("fct: the formula has no value"));
+  EXPECT_EQ(r[4].state, Result::State::Failed);
+  EXPECT_THAT(r[4].text, testing::HasSubstr("no equilibrium under dead load"));
+  EXPECT_TRUE(r[4].values.empty());
+  for (const size_t i : {0, 1, 2, 5, 6}) EXPECT_EQ(r[i].state, Result::State::Done) << r[i].text;
+}
+
+TEST(PlanMapping, LeavesTheRestAfterACancellation) {
+  const PlanMapping m(read_small(strengths), collapse::default_knowledge(), quick());
+  std::atomic<bool> cancel = true;
+  std::vector<Result> out(points.size());
+  m.evaluate(points, out, &cancel);
+  for (const Result& r : out) EXPECT_EQ(r.state, Result::State::NotRun);
+  cancel = false;
+  const std::vector<Point> many(500, points[0]);
+  out.assign(many.size(), {});
+  std::thread other([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    cancel = true;
+  });
+  m.evaluate(many, out, &cancel);
+  other.join();
+  const Result whole = evaluate(m, {points[0]})[0];
+  size_t done = 0;
+  for (const Result& r : out) {
+    if (r.state == Result::State::NotRun) continue;
+    ++done;
+    expect_same(r, whole);
+  }
+  EXPECT_LT(done, many.size());
+}
+
+TEST(PlanMapping, AgreesWithARunOfThePlan) {
+  const product::Plan plan = read_small(strengths);
+  const PlanMapping m(plan, collapse::default_knowledge(), quick());
+  const Result mapped = evaluate(m, {points[1]})[0];
+  collapse::RunOptions o;
+  o.duration = 0.5;
+  const record::Record r = collapse::run_plan(product::make_sample(product::make_sampler(plan), points[1]),
+                                              collapse::default_knowledge(), o, {});
+  const auto finding = [&](const std::string& id) {
+    return *std::find_if(r.findings.begin(), r.findings.end(), [&](const record::Finding& f) { return f.id == id; });
+  };
+  const auto output = [&](const std::string& name) {
+    for (size_t i = 0; i < m.outputs().size(); ++i)
+      if (m.outputs()[i].name == name) return mapped.values[i];
+    ADD_FAILURE() << name;
+    return 0.0;
+  };
+  EXPECT_EQ(finding("mechanism").title, "Mechanism: " + plan_outcomes()[static_cast<size_t>(mapped.outcome)]);
+  EXPECT_EQ(std::max({output("reach_neg_x"), output("reach_pos_x"), output("reach_neg_y"), output("reach_pos_y")}),
+            finding("debris.reach").value);
+  EXPECT_DOUBLE_EQ(1 / output("utilisation"), finding("stability.stage_1").value);
+  EXPECT_NEAR(output("tilt_0.4"), r.series.front().value.back(), 1e-12);
+}
+
+TEST(PlanMapping, RefusesPlansWithoutFuzzyValues) {
+  EXPECT_THROW(PlanMapping(read_small(""), collapse::default_knowledge(), quick()), InputError);
+  PlanMappingOptions o = quick();
+  o.tilt_times = {0.5};
+  EXPECT_THROW(PlanMapping(read_small(strengths), collapse::default_knowledge(), o), InputError);
+}
+
+// docs/weida.md: core values and strong ones topple; left values in the ground columns come down in the first stage
+TEST(PlanMappingPhysics, StorehouseTopplesAtTheCoreAndFallsEarlyAtLeftValues) {
+  std::vector<Diagnostic> warnings;
+  std::string text;
+  const product::Plan plan =
+      product::read_plan_file(TOPPLE_SOURCE_DIR "/examples/weida/plan-fuzzy.toml", warnings, text);
+  PlanMappingOptions o;
+  o.threads = 0;
+  const PlanMapping m(plan, collapse::default_knowledge(), o);
+  const uncertainty::Box support = uncertainty::make_box(m.space(), 0);
+  const std::vector<Result> r = evaluate(m, {support.lower, uncertainty::calc_centre(m.space()), support.upper});
+  std::vector<std::string> classes;
+  for (const Result& x : r) {
+    ASSERT_EQ(x.state, Result::State::Done) << x.text;
+    classes.push_back(plan_outcomes()[static_cast<size_t>(x.outcome)]);
+  }
+  EXPECT_THAT(classes, testing::ElementsAre("early", "topple", "topple"));
+  const size_t tilt = 2;  // at 1.7 s
+  EXPECT_EQ(m.outputs()[tilt].name, "tilt_1.7");
+  EXPECT_GT(r[1].values[tilt], 10 * unit::deg) << "the block leans to the front and goes on";
+  EXPECT_EQ(r[1].trajectory.back(), r[1].values[tilt]);
+}
+
+}  // namespace
+}  // namespace topple::study
