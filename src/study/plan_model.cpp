@@ -1,0 +1,90 @@
+#include "study/plan_model.h"
+
+#include <chrono>
+#include <nlohmann/json.hpp>
+
+namespace topple::study {
+namespace {
+
+using json = nlohmann::ordered_json;
+
+collapse::Knowledge read_rules(const std::string& text) {
+  return text.empty() ? collapse::default_knowledge() : collapse::read_knowledge(text, "rules");
+}
+
+Answer to_answer(uncertainty::Result&& r, const PlanMapping& m) {
+  Answer a;
+  switch (r.state) {
+    case uncertainty::Result::State::NotRun:
+      a.kind = Answer::Kind::Cancelled;
+      break;
+    case uncertainty::Result::State::Failed:
+      a.kind = Answer::Kind::Failed;
+      a.text = std::move(r.text);
+      break;
+    case uncertainty::Result::State::Done:
+      a.kind = Answer::Kind::Done;
+      for (std::size_t i = 0; i < r.values.size(); ++i) a.outputs.emplace_back(m.outputs()[i].name, r.values[i]);
+      a.outcome = plan_outcomes()[static_cast<std::size_t>(r.outcome)];
+      a.trajectory = std::move(r.trajectory);
+      break;
+  }
+  return a;
+}
+
+}  // namespace
+
+Problem make_plan_problem(const product::Plan& plan, const PlanMappingOptions& options, const std::string& rules) {
+  const PlanMapping mapping(plan, read_rules(rules), options);
+  Problem p;
+  p.title = plan.title;
+  for (const PlanQuantity& q : mapping.inputs()) p.inputs.push_back({q.name, q.symbol, q.unit});
+  for (const product::DerivedValue& d : plan.fuzzy.derived) p.derived.push_back({d.path, d.symbol, d.unit});
+  p.space = mapping.space();
+  if (!p.derived.empty())
+    p.calc_derived = [fuzzy = plan.fuzzy](const Point& x) { return product::calc_derived(fuzzy, x); };
+  p.kind = "plan";
+  p.identity = json{{"plan", plan.text},
+                    {"rules", rules},
+                    {"after", options.after},
+                    {"tilt_times", options.tilt_times},
+                    {"tilt_interval", options.tilt_interval},
+                    {"frame_rate", options.frame_rate}}
+                   .dump();
+  p.settings = json{{"path", plan.path}}.dump();
+  p.levels = plan.fuzzy.search.levels;
+  p.limit = plan.fuzzy.search.limit;
+  p.seed = plan.fuzzy.search.seed;
+  return p;
+}
+
+Runner make_plan_runner(const std::string& definition) {
+  const json d = json::parse(definition);
+  const json& identity = d.at("identity");
+  PlanMappingOptions options;
+  options.after = identity.at("after");
+  options.tilt_times = identity.at("tilt_times").get<std::vector<double>>();
+  options.tilt_interval = identity.at("tilt_interval");
+  options.frame_rate = identity.at("frame_rate");
+  options.threads = 1;
+  std::vector<Diagnostic> warnings;
+  const product::Plan plan =
+      product::read_plan(identity.at("plan").get<std::string>(), d.at("settings").value("path", "plan"), warnings);
+  const auto mapping =
+      std::make_shared<const PlanMapping>(plan, read_rules(identity.at("rules").get<std::string>()), options);
+  return [mapping](std::span<const Point> points, const std::function<void(std::size_t, Answer)>& give,
+                   const std::atomic<bool>& cancel) {
+    const std::size_t n = mapping->inputs().size();
+    for (std::size_t i = 0; i < points.size() && !cancel.load(std::memory_order_relaxed); ++i) {
+      const auto begin = std::chrono::steady_clock::now();
+      const Point point(points[i].begin(), points[i].begin() + static_cast<std::ptrdiff_t>(n));
+      uncertainty::Result r;
+      mapping->evaluate({&point, 1}, {&r, 1}, &cancel);
+      Answer a = to_answer(std::move(r), *mapping);
+      a.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+      give(i, std::move(a));
+    }
+  };
+}
+
+}  // namespace topple::study

@@ -1,0 +1,80 @@
+#include "study/plan_model.h"
+
+#include <gmock/gmock.h>
+
+#include "small_fuzzy_plan.h"
+
+namespace topple::study {
+namespace {
+
+std::vector<Answer> run(const Runner& runner, const std::vector<Point>& points) {
+  std::vector<Answer> out(points.size());
+  const std::atomic<bool> cancel = false;
+  runner(
+      points, [&](std::size_t i, Answer a) { out[i] = std::move(a); }, cancel);
+  return out;
+}
+
+TEST(PlanModel, AnswersAsTheMappingDoes) {
+  const product::Plan plan = read_small(strengths);
+  const Problem problem = make_plan_problem(plan, quick());
+  ASSERT_EQ(problem.inputs.size(), 3u);
+  ASSERT_EQ(problem.derived.size(), 1u);
+  EXPECT_EQ(problem.inputs[0].name, "concrete.C25.fc");
+  EXPECT_EQ(problem.inputs[0].unit, "N/mm2");
+  EXPECT_EQ(problem.inputs[0].unit_value, 1e6);
+  EXPECT_EQ(problem.derived[0].name, "concrete.C25.fct");
+
+  const PlanMapping mapping(plan, collapse::default_knowledge(), quick());
+  std::vector<Point> points{{25e6, 1.2, 1e3}, {5e6, 1.2, 1e3}};
+  std::vector<uncertainty::Result> wanted(2);
+  mapping.evaluate(points, wanted);
+  EXPECT_NEAR(problem.calc_derived(points[0])[0], 1.994e6, 1e3);  // Table 1, to its digits
+  points[0].push_back(problem.calc_derived(points[0])[0]);
+  points[1].push_back(0);
+  const std::vector<Answer> found = run(make_plan_runner(make_model_definition(problem)), points);
+  ASSERT_EQ(found[0].kind, Answer::Kind::Done);
+  ASSERT_EQ(found[0].outputs.size(), wanted[0].values.size());
+  for (std::size_t i = 0; i < wanted[0].values.size(); ++i) {
+    EXPECT_EQ(found[0].outputs[i].first, mapping.outputs()[i].name);
+    EXPECT_EQ(found[0].outputs[i].second, wanted[0].values[i]);
+  }
+  EXPECT_EQ(found[0].trajectory, wanted[0].trajectory);
+  EXPECT_EQ(found[0].outcome, plan_outcomes()[static_cast<std::size_t>(wanted[0].outcome)]);
+  EXPECT_GT(found[0].seconds, 0);
+  EXPECT_EQ(found[1].kind, Answer::Kind::Failed);
+  EXPECT_EQ(found[1].text, wanted[1].text);
+}
+
+TEST(PlanModel, IsAnotherModelForAnotherPlanOrAnotherQuestion) {
+  const Problem a = make_plan_problem(read_small(strengths), quick());
+  PlanMappingOptions longer = quick();
+  longer.after = 0.5;
+  EXPECT_NE(calc_model_hash(a), calc_model_hash(make_plan_problem(read_small(strengths), longer)));
+  EXPECT_NE(calc_model_hash(a),
+            calc_model_hash(make_plan_problem(read_small(std::string(strengths) + "# x\n"), quick())));
+  PlanMappingOptions threads = quick();
+  threads.threads = 7;
+  EXPECT_EQ(calc_model_hash(a), calc_model_hash(make_plan_problem(read_small(strengths), threads)));
+}
+
+TEST(PlanModel, TakesTheAnalysisFromThePlan) {
+  const Problem p = make_plan_problem(
+      read_small(std::string(strengths) + "[fuzzy.search]\nlevels = [0, 0.5, 1]\nsamples = 500\nseed = 7\n"), quick());
+  EXPECT_THAT(p.levels, testing::ElementsAre(0, 0.5, 1));
+  EXPECT_EQ(p.limit, 500);
+  EXPECT_EQ(p.seed, 7u);
+}
+
+TEST(PlanModel, StopsAtACancellation) {
+  const Runner runner = make_plan_runner(make_model_definition(make_plan_problem(read_small(strengths), quick())));
+  const std::atomic<bool> cancel = true;
+  int given = 0;
+  const std::vector<Point> points{{25e6, 1.2, 1e3, 2e6}};
+  runner(
+      points, [&](std::size_t, const Answer&) { ++given; }, cancel);
+  EXPECT_EQ(given, 0);
+}
+
+}  // namespace
+}  // namespace topple::study
