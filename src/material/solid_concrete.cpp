@@ -166,6 +166,9 @@ double calc_mises(const Vector& s) {
   return std::sqrt(0.5 * (a * a + b * b + d * d));
 }
 
+/// Of 1/β in equation (32): a tenth of the strength is left along cracks of any width.
+constexpr double kMostLoss = 9;
+
 /// Effective principal stresses and what they depend on.
 struct Stresses {
   Vector value{};
@@ -234,6 +237,7 @@ Stresses calc_stresses(const SolidConcrete& solid, const Vector& u, const CrackL
   }
   s.loss_rate = solid.softening / c.eps_c1;
   s.loss = solid.softening_foot + s.loss_rate * u[0] - 1;
+  if (s.loss > kMostLoss) s.loss = kMostLoss, s.loss_rate = 0;
   if (!(s.across > 0 && s.loss > 0)) s.loss = s.loss_rate = 0;
   return s;
 }
