@@ -23,6 +23,9 @@ std::variant<Arguments, int> parse_arguments(int argc, char** argv) {
   topple mbs verify                                the engine against known answers (docs/verification.md)
   topple report out/record.h5 -o report.html       make the page from a record
   topple rcc section.toml -o out/rcc               resistance curves of a zone of a section (docs/rcc.md)
+  topple study inputs.toml --evaluator ./model -o out/study
+                                                   fuzzy analysis of any program (docs/study.md)
+  topple study show out/study                      what it found so far
 
 Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterion of the plan is violated.)");
 
@@ -118,6 +121,43 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   rcc->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
   rcc->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
 
+  StudyArguments& y = a.study;
+  const auto add_worker_options = [&](CLI::App* verb) {
+    verb->add_option_function<int>(
+            "--jobs", [&y](int n) { y.jobs = n, y.is_jobs_given = true; },
+            "runs at the same time here (default: as many as there are processors); 0: workers elsewhere do everything")
+        ->check(CLI::Range(0, 4096));
+    verb->add_option("--batch", y.batch, "points that one evaluator gets at once (1)")->check(CLI::Range(1, 100000));
+    verb->add_option("--lease", y.lease, "time without a sign of life after which a run is given to another (30 s)");
+  };
+  CLI::App* study = app.add_subcommand("study", "Fuzzy analysis: many runs, and what follows from them.");
+  study->add_option("file", a.input, "fuzzy inputs (TOML)");
+  study->add_option("-o,--output", a.output, "folder of the study; the same command again goes on with it");
+  study->add_option("--evaluator", y.evaluator,
+                    "command that is the model: reads points and writes answers as JSON lines (docs/study.md)");
+  study->add_option("--alpha", y.alpha, "levels between commas, such as 0,0.25,0.5,0.75,1");
+  study->add_option("--samples", y.samples, "runs at most")->check(CLI::Range(10, 100000000));
+  study->add_option("--seed", y.seed, "of spread points and searches")->check(CLI::NonNegativeNumber);
+  study->add_option("--timeout", y.timeout, "time for one answer, such as \"60 s\"; none if left out");
+  study->add_flag("--one-shot", y.one_shot, "start the command for every point and close its input behind it");
+  study->add_option("--store", y.store, "database on a server, postgresql://user@host/name; a file if left out");
+  study->add_option("--name", y.name, "of the study on the server; that of the folder if left out");
+  study->add_flag("--rerun-failed", y.rerun_failed, "run those again that failed");
+  study->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
+  add_worker_options(study);
+  CLI::App* study_show = study->add_subcommand("show", "Show what a study has found so far.");
+  CLI::App* study_export = study->add_subcommand("export", "Write what a study has found so far as CSV and JSON.");
+  for (CLI::App* verb : {study_show, study_export})
+    verb->add_option("folder", a.input, "folder of the study")->required();
+  study_show->add_flag("--json", a.json, "as a JSON object");
+  study_export->add_option("-o,--output", a.output, "folder for the files; the study's own if left out");
+
+  CLI::App* worker = app.add_subcommand("worker", "Work for studies: take runs, do them, write their results.");
+  worker->add_option("store", a.input, "folder of a study, or postgresql://user@host/name")->required();
+  worker->add_option("--idle", y.idle,
+                     "end after so long without work, such as \"10 min\"; else when no study is open");
+  add_worker_options(worker);
+
   CLI::App* version = app.add_subcommand("version", "Show the version.");
 
   if (argc > 1 && argv[1][0] != '-') {
@@ -147,6 +187,17 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   if (mbs_verify->parsed()) a.verb = Verb::MbsVerify;
   if (report->parsed()) a.verb = Verb::Report;
   if (rcc->parsed()) a.verb = Verb::Rcc;
+  if (study->parsed()) {
+    a.verb = Verb::Study;
+    if (study_show->parsed()) y.action = StudyArguments::Action::Show;
+    if (study_export->parsed()) y.action = StudyArguments::Action::Export;
+    if (y.action == StudyArguments::Action::Run && (a.input.empty() || a.output.empty())) {
+      std::cerr << "topple study: " << (a.input.empty() ? "a file of fuzzy inputs" : "--output") << " is required\n"
+                << "Run topple study --help for more information.\n";
+      return kBadInput;
+    }
+  }
+  if (worker->parsed()) a.verb = Verb::Worker;
   if (version->parsed()) a.verb = Verb::Version;
   return a;
 }

@@ -6,10 +6,12 @@
 #include <variant>
 #include <vector>
 
+#include "study_options.h"
+
 namespace topple::apps {
 
 struct Arguments {
-  enum class Verb { None, New, Check, Run, Rules, MbsRun, MbsCompare, MbsVerify, Report, Rcc, Version };
+  enum class Verb { None, New, Check, Run, Rules, MbsRun, MbsCompare, MbsVerify, Report, Rcc, Study, Worker, Version };
   Verb verb = Verb::None;
   std::string input;      // plan, model, record, or the file to write
   std::string output;     // folder or file
@@ -26,6 +28,7 @@ struct Arguments {
   std::string axis = "y", direction = "+";  // of fuzzy curves and of the solid route
   std::string rotation, element_size;       // of the solid route, as typed
   std::optional<bool> equilibrium;          // of a bare model; none: as its file says
+  StudyArguments study;
   int threads = 1, frames = 0;
   bool json = false, csv = false, no_report = false, report = false, verbose = false;
   bool bodies = false, skip_unsupported = false;

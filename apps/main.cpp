@@ -38,6 +38,10 @@ int dispatch(const topple::apps::Arguments& a) {
       return topple::apps::write_report_file(a);
     case Arguments::Verb::Rcc:
       return topple::apps::compute_rcc(a, cancel);
+    case Arguments::Verb::Study:
+      return topple::apps::run_study_command(a, cancel);
+    case Arguments::Verb::Worker:
+      return topple::apps::run_worker(a, cancel);
     case Arguments::Verb::Version:
       std::puts("topple " TOPPLE_VERSION);
       return topple::apps::kOk;

@@ -77,6 +77,8 @@ class PostgresqlDatabase final : public Database {
     if (PQstatus(db_) == CONNECTION_OK) {
       PQsetNoticeProcessor(
           db_, [](void*, const char*) {}, nullptr);  // "exists already"
+      // a process that is stopped within a transaction must not hold its rows
+      run("SET idle_in_transaction_session_timeout = 5000");
       return;
     }
     const std::string why = trim(PQerrorMessage(db_));

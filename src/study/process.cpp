@@ -154,8 +154,11 @@ std::string Process::find_ending() {
     kill(-pid_, SIGKILL);  // what it started
     pid_ = 0;
     close_end(out_), close_end(error_);
-    if (WIFSIGNALED(status))
-      words = fmt::format("signal {} ({})", WTERMSIG(status), strsignal(WTERMSIG(status)));
+    // a shell tells of a signal by its exit code
+    const bool is_shells = WIFEXITED(status) && WEXITSTATUS(status) > 128 && WEXITSTATUS(status) <= 128 + SIGSYS;
+    const int signal = WIFSIGNALED(status) ? WTERMSIG(status) : is_shells ? WEXITSTATUS(status) - 128 : 0;
+    if (signal > 0)
+      words = fmt::format("signal {} ({})", signal, strsignal(signal));
     else if (WEXITSTATUS(status) != 0)
       words = fmt::format("exit code {}", WEXITSTATUS(status));
   }

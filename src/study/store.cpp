@@ -98,6 +98,14 @@ void make_schema(Database& db) {
     db.run(sql);
 }
 
+void roll_back(Database& db) {
+  try {
+    db.run("ROLLBACK");
+  } catch (const std::exception&) {
+    // it is rolled back already; the error that led here is the one to tell
+  }
+}
+
 std::unique_ptr<Database> open_patiently(const std::string& address, const std::atomic<bool>* cancel, double patience) {
   const auto start = Clock::now();
   for (;;) try {
@@ -131,22 +139,19 @@ std::vector<double> to_numbers(const std::string& text) {
   return numbers;
 }
 
-/// A transaction, repeated from its start when others or a lost connection ended it.
+/// A transaction, repeated from its start when others or a lost connection ended it. One statement is a transaction of
+/// its own, which no process can hold open.
 template <class F>
-auto Store::transact(F work, bool writes) {
+auto Store::transact(F work, bool is_one_statement) {
   const auto start = Clock::now();
   for (bool again = false;; again = true) {
     try {
-      db_->run(writes ? db_->dialect().begin : "BEGIN");
+      if (!is_one_statement) db_->run(db_->dialect().begin);
       auto result = work(again);
-      db_->run("COMMIT");
+      if (!is_one_statement) db_->run("COMMIT");
       return result;
     } catch (const TryAgain&) {
-      try {
-        db_->run("ROLLBACK");
-      } catch (const std::exception&) {
-        // it is rolled back already
-      }
+      if (!is_one_statement) roll_back(*db_);
       if (std::chrono::duration<double>(Clock::now() - start).count() > patience_) throw;
     } catch (const ConnectionLost&) {
       for (;;) {
@@ -158,11 +163,7 @@ auto Store::transact(F work, bool writes) {
         } catch (const ConnectionLost&) { std::this_thread::sleep_for(std::chrono::milliseconds(200)); }
       }
     } catch (...) {
-      try {
-        db_->run("ROLLBACK");
-      } catch (const std::exception&) {
-        // the first error is the one to tell
-      }
+      if (!is_one_statement) roll_back(*db_);
       throw;
     }
   }
@@ -170,6 +171,11 @@ auto Store::transact(F work, bool writes) {
 
 Store::Store(const std::string& address, const std::atomic<bool>* cancel, double patience)
     : db_(open_patiently(address, cancel, patience)), cancel_(cancel), patience_(patience) {
+  // making what is there would wait for others, and let others wait
+  const char* find = is_server(address) ? "SELECT 1 WHERE to_regclass('job_refused') IS NOT NULL"
+                                        : "SELECT 1 FROM sqlite_master WHERE name = 'job_refused'";
+  const auto is_there = [&](bool) { return !db_->run(find).empty(); };
+  if (transact(is_there, true)) return;
   transact([&](bool) {
     if (is_server(address)) db_->run("SELECT pg_advisory_xact_lock(7086719)");  // two may create at once
     make_schema(*db_);
@@ -193,7 +199,7 @@ std::optional<std::string> Store::find_model(const std::string& hash) {
         const Rows rows = db_->run("SELECT definition FROM model WHERE hash = $1", {hash});
         return rows.empty() ? std::nullopt : rows[0][0];
       },
-      false);
+      true);
 }
 
 void Store::put_study(const StudyRow& s) {
@@ -215,7 +221,7 @@ std::vector<StudyRow> Store::list_studies() {
           studies.push_back({*r[0], *r[1], *r[2], *r[3], *r[4]});
         return studies;
       },
-      false);
+      true);
 }
 
 std::optional<StudyRow> Store::find_study(const std::string& name) {
@@ -230,13 +236,16 @@ void Store::add_jobs(const std::string& model, const std::vector<std::pair<std::
     json pairs = json::array();
     for (std::size_t i = first; i < std::min(first + most, jobs.size()); ++i)
       pairs.push_back({jobs[i].first, to_text(jobs[i].second)});
-    transact([&](bool) {
-      db_->run(fmt::format("INSERT INTO job(hash, model, inputs, state) SELECT a, $2, b, 'waiting' FROM {} AS p WHERE "
-                           "true ON CONFLICT (hash) DO NOTHING",
-                           db_->dialect().pairs),
-               {pairs.dump(), model});
-      return 0;
-    });
+    transact(
+        [&](bool) {
+          db_->run(
+              fmt::format("INSERT INTO job(hash, model, inputs, state) SELECT a, $2, b, 'waiting' FROM {} AS p WHERE "
+                          "true ON CONFLICT (hash) DO NOTHING",
+                          db_->dialect().pairs),
+              {pairs.dump(), model});
+          return 0;
+        },
+        true);
   }
 }
 
@@ -254,21 +263,23 @@ void Store::add_impossible(const std::string& model, const std::vector<StoredRes
 
 std::vector<Job> Store::claim(const std::string& worker, int count, double lease) {
   const Dialect& d = db_->dialect();
-  Rows rows = transact([&](bool again) {
-    if (again) {
-      // the transaction that was lost may have been committed
-      Rows held = db_->run(
-          "SELECT number, hash, model, inputs, attempt FROM job WHERE state = 'running' AND worker = $1", {worker});
-      if (!held.empty()) return held;
-    }
-    return db_->run(
-        fmt::format("WITH chosen AS MATERIALIZED (SELECT number FROM job WHERE state IN ('waiting', 'running') AND "
-                    "(state = 'waiting' OR lease_until < {0}) AND attempt < {1} ORDER BY number LIMIT {2} {3}) "
-                    "UPDATE job SET state = 'running', attempt = attempt + 1, worker = $1, lease_until = {0} + {4} "
-                    "WHERE number IN (SELECT number FROM chosen) RETURNING number, hash, model, inputs, attempt",
-                    d.now, most_attempts, count, d.skip_locked, lease),
-        {worker});
-  });
+  Rows rows = transact(
+      [&](bool again) {
+        if (again) {
+          // the transaction that was lost may have been committed
+          Rows held = db_->run(
+              "SELECT number, hash, model, inputs, attempt FROM job WHERE state = 'running' AND worker = $1", {worker});
+          if (!held.empty()) return held;
+        }
+        return db_->run(
+            fmt::format("WITH chosen AS MATERIALIZED (SELECT number FROM job WHERE state IN ('waiting', 'running') AND "
+                        "(state = 'waiting' OR lease_until < {0}) AND attempt < {1} ORDER BY number LIMIT {2} {3}) "
+                        "UPDATE job SET state = 'running', attempt = attempt + 1, worker = $1, lease_until = {0} + {4} "
+                        "WHERE number IN (SELECT number FROM chosen) RETURNING number, hash, model, inputs, attempt",
+                        d.now, most_attempts, count, d.skip_locked, lease),
+            {worker});
+      },
+      true);
   std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return std::stoll(*a[0]) < std::stoll(*b[0]); });
   std::vector<Job> jobs;
   for (const Row& r : rows) jobs.push_back({*r[1], *r[2], to_numbers(*r[3]), std::stoi(*r[4])});
@@ -277,12 +288,14 @@ std::vector<Job> Store::claim(const std::string& worker, int count, double lease
 
 void Store::renew(const std::vector<std::string>& workers, double lease) {
   const Dialect& d = db_->dialect();
-  transact([&](bool) {
-    db_->run(fmt::format("UPDATE job SET lease_until = {} + {} WHERE state = 'running' AND worker IN {}", d.now, lease,
-                         d.listed),
-             {json(workers).dump()});
-    return 0;
-  });
+  transact(
+      [&](bool) {
+        db_->run(fmt::format("UPDATE job SET lease_until = {} + {} WHERE state = 'running' AND worker IN {}", d.now,
+                             lease, d.listed),
+                 {json(workers).dump()});
+        return 0;
+      },
+      true);
 }
 
 std::vector<std::string> Store::list_workers() {
@@ -293,7 +306,7 @@ std::vector<std::string> Store::list_workers() {
           if (r[0]) names.push_back(*r[0]);
         return names;
       },
-      false);
+      true);
 }
 
 bool Store::finish(const Job& job, const std::string& worker, const Answer& answer) {
@@ -346,7 +359,7 @@ std::vector<StoredResult> Store::find_results(const std::vector<std::string>& ha
           results.push_back({*r[0], {}, read_answer(r, 1)});
         return results;
       },
-      false);
+      true);
 }
 
 std::vector<StoredResult> Store::load_results(const std::string& model) {
@@ -361,7 +374,7 @@ std::vector<StoredResult> Store::load_results(const std::string& model) {
           results.push_back({*r[0], to_numbers(*r[1]), read_answer(r, 2)});
         return results;
       },
-      false);
+      true);
 }
 
 Counts Store::count(const std::string& model) {
@@ -377,7 +390,7 @@ Counts Store::count(const std::string& model) {
         }
         return c;
       },
-      false);
+      true);
 }
 
 long Store::count_running(const std::string& model) {
@@ -385,7 +398,7 @@ long Store::count_running(const std::string& model) {
       [&](bool) {
         return std::stol(*db_->run("SELECT count(*) FROM job WHERE state = 'running' AND model = $1", {model})[0][0]);
       },
-      false);
+      true);
 }
 
 std::optional<std::string> Store::find_refusal(const std::string& model) {
@@ -395,7 +408,7 @@ std::optional<std::string> Store::find_refusal(const std::string& model) {
             db_->run("SELECT message FROM job WHERE model = $1 AND state = 'refused' ORDER BY number LIMIT 1", {model});
         return rows.empty() ? std::nullopt : std::optional<std::string>(rows[0][0].value_or(""));
       },
-      false);
+      true);
 }
 
 void Store::forget_refusals(const std::string& model) {

@@ -94,7 +94,7 @@ class Store {
 
  private:
   template <class F>
-  auto transact(F work, bool writes = true);
+  auto transact(F work, bool is_one_statement = false);
 
   std::unique_ptr<Database> db_;
   const std::atomic<bool>* cancel_;

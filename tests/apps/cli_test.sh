@@ -44,7 +44,7 @@ usage)
 readme)
   # every command in the shell blocks of these pages exists
   commands=0
-  for page in README.md docs/getting-started.md docs/run.md docs/mbs-model.md docs/engines.md docs/rcc.md; do
+  for page in README.md docs/getting-started.md docs/run.md docs/mbs-model.md docs/engines.md docs/rcc.md docs/study.md; do
     while read -r word verb rest; do
       case $word in
       script/*) [ -x "$source/$word" ] || { echo "$page shows $word, which cannot be called"; failures=$((failures + 1)); } ;;

@@ -222,6 +222,30 @@ TEST(Store, RefusesAFileThatIsNone) {
   EXPECT_THROW(Store(folder / "missing/study.sqlite"), InputError);
 }
 
+TEST(Store, IsNotHeldUpByATransactionThatStandsStill) {
+  const auto server = Server::make();
+  if (!server) GTEST_SKIP() << "PostgreSQL is not installed";
+  Store store(server->url());
+  store.add_jobs("m", {{"a", {1}}, {"b", {2}}});
+  const Job a = store.claim("stopped", 1, 0).at(0);
+  // as a process does that is stopped while it finishes
+  const auto stopped = open_database(server->url());
+  stopped->run("BEGIN");
+  stopped->run("UPDATE job SET state = 'done' WHERE hash = 'a'");
+  Store other(server->url());  // makes nothing that would wait
+  EXPECT_EQ(other.claim("w", 5, 60).at(0).hash, "b");
+  const auto start = std::chrono::steady_clock::now();
+  std::vector<Job> jobs;
+  while (jobs.empty() && std::chrono::steady_clock::now() - start < std::chrono::seconds(20)) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    jobs = other.claim("w2", 5, 60);
+  }
+  ASSERT_EQ(jobs.size(), 1u) << "the server ended that transaction";
+  EXPECT_EQ(jobs[0].hash, "a");
+  EXPECT_THROW(stopped->run("COMMIT"), ConnectionLost);
+  EXPECT_FALSE(store.finish(a, "stopped", {Kind::Done, {{"z", 1}}, "", {}, "", 0}));
+}
+
 TEST(Store, SurvivesAServerThatIsKilled) {
   const auto server = Server::make();
   if (!server) GTEST_SKIP() << "PostgreSQL is not installed";

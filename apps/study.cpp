@@ -1,0 +1,163 @@
+// topple study: a fuzzy analysis that survives interruption, and what it found.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "base/error.h"
+#include "commands.h"
+#include "results.h"
+#include "study/evaluator.h"
+#include "study/results.h"
+#include "study_model.h"
+#include "terminal.h"
+
+namespace topple::apps {
+
+namespace {
+
+using study::StudyResult;
+using study::StudyState;
+
+std::string words_of_time(double seconds) {
+  if (seconds < 100) return fmt::format("{:.0f} s", seconds);
+  if (seconds < 6000) return fmt::format("{:.0f} min", seconds / 60);
+  return fmt::format("{:.1f} h", seconds / 3600);
+}
+
+/// Done, running, failed, rate, what is left, bounds so far.
+std::string words_of(const StudyState& s) {
+  const double rate = s.seconds > 0 ? static_cast<double>(s.run_here) / s.seconds : 0;
+  std::string text = fmt::format("{} done, {} running, {} failed", s.done, s.running, s.failed);
+  if (s.run_here > 0) {
+    text += fmt::format(", {:.3g}/s", rate);
+    text += fmt::format(", at most {} left", words_of_time(static_cast<double>(std::max(0L, s.limit - s.done)) / rate));
+  }
+  if (!s.so_far) return text;
+  for (std::size_t i = 0; i < std::min<std::size_t>(2, s.so_far->alpha.outputs.size()); ++i) {
+    const auto& support = s.so_far->alpha.outputs[i].levels.front();
+    text += fmt::format("; {} {:.5g} to {:.5g}", s.so_far->outputs[i], support.lower.value, support.upper.value);
+  }
+  return text;
+}
+
+void print_result(std::FILE* out, const study::Problem& p, const StudyResult& r) {
+  if (!p.title.empty()) std::fprintf(out, "%s\n", p.title.c_str());
+  std::fprintf(out, "%zu runs, %d failed; %s\n", r.alpha.archive.size(), r.alpha.failed,
+               r.is_finished ? uncertainty::to_text(r.ending).c_str() : "not finished, bounds so far");
+  for (std::size_t i = 0; i < r.alpha.outputs.size() && i < r.outputs.size(); ++i) {
+    std::fprintf(out, "\n%s\n  alpha         lower          upper\n", r.outputs[i].c_str());
+    for (const auto& l : r.alpha.outputs[i].levels)
+      std::fprintf(out, "  %-6.4g %13.7g%s %13.7g%s\n", l.alpha, l.lower.value, l.lower.converged ? " " : "*",
+                   l.upper.value, l.upper.converged ? " " : "*");
+  }
+  bool is_open = false;
+  for (const auto& o : r.alpha.outputs)
+    for (const auto& l : o.levels) is_open = is_open || !l.lower.converged || !l.upper.converged;
+  if (is_open && r.is_finished) std::fprintf(out, "  * no search has converged there\n");
+  if (r.alpha.classes.size() > 1 || (!r.outcomes.empty() && !r.outcomes[0].empty())) {
+    std::fprintf(out, "\nOutcomes                     possibility  necessity    runs\n");
+    for (const auto& c : r.alpha.classes) {
+      double possibility = c.possibility;
+      for (const auto& found : r.possibilities.classes)
+        if (found.outcome == c.outcome) possibility = std::max(possibility, found.possibility);
+      const double necessity =
+          r.possibilities.classes.empty() ? 1 : uncertainty::calc_necessity(r.possibilities, c.outcome);
+      const std::string name = study::name_of_outcome(r, c.outcome);
+      std::fprintf(out, "  %-26s %11.5f %10.5f %7d\n", name.empty() ? "(no name)" : name.c_str(), possibility,
+                   necessity, c.count);
+    }
+  }
+  constexpr std::size_t most_reasons = 5;
+  if (!r.failures.empty()) std::fprintf(out, "\nFailed runs\n");
+  for (std::size_t i = 0; i < std::min(most_reasons, r.failures.size()); ++i)
+    std::fprintf(out, "  %s\n", wrap(r.failures[i], find_width(out), 2).c_str());
+  if (r.failures.size() > most_reasons)
+    std::fprintf(out, "  and %zu other reasons\n", r.failures.size() - most_reasons);
+}
+
+/// Complaints, with the line of a file or of an answer that they point into.
+int complain(const InputError& e, const std::string& text) {
+  for (const Diagnostic& d : e.diagnostics()) std::fputs(render(d, text, has_colour(stderr)).c_str(), stderr);
+  return kBadInput;
+}
+
+int start(const Arguments& a, const std::atomic<bool>& cancel) {
+  std::string text;
+  study::Problem problem;
+  StudyPlace place;
+  study::StudyOptions options;
+  try {
+    problem = read_problem(a, text);
+    options.pool = make_pool_options(a.study);
+    place = make_place(a);
+  } catch (const InputError& e) { return complain(e, text); }
+  options.store = place.store;
+  options.name = place.name;
+  options.source = text;
+  options.source_name = a.input;
+  options.rerun_failed = a.study.rerun_failed;
+  Progress progress;
+  progress.cancel = &cancel;
+  ProgressLine line;
+  StudyResult r;
+  try {
+    r = study::run_study(problem, make_factories(), options, progress,
+                         [&](const StudyState& s) { line.say(words_of(s)); });
+  } catch (const InputError& e) {
+    line.clear();
+    if (e.diagnostics().front().code != "E824") return complain(e, text);
+    study::Store store(place.store);
+    const auto refusal = store.find_refusal(study::calc_model_hash(problem));
+    complain(e, refusal ? study::read_refusal(*refusal).line : "");
+    std::fprintf(stderr,
+                 "The study stopped; what was run before is kept. Mend the evaluator and give the command again.\n");
+    return kBadInput;
+  } catch (const study::ConnectionLost& e) {
+    line.clear();
+    std::fprintf(stderr, "topple: the store is away: %s\nGive the same command again to go on.\n", e.what());
+    return kRunFailed;
+  }
+  line.clear();
+  const std::vector<std::string> files = study::write_results(a.output, problem, r);
+  if (a.json) std::fputs(study::write_results_json(problem, r).c_str(), stdout);
+  std::FILE* out = a.json ? stderr : stdout;
+  print_result(out, problem, r);
+  std::fprintf(out, "\n");
+  for (const std::string& path : files) std::fprintf(out, "wrote %s\n", path.c_str());
+  if (!r.is_finished) {
+    std::fprintf(stderr, "Interrupted. The same command goes on with the study.\n");
+    return kRunFailed;
+  }
+  return kOk;
+}
+
+}  // namespace
+
+int run_study_command(const Arguments& a, const std::atomic<bool>& cancel) {
+  if (a.study.action == StudyArguments::Action::Run) return start(a, cancel);
+  try {
+    const StudyPlace place = find_place(a.input);
+    study::Store store(place.store, &cancel, 10);
+    const std::optional<study::StudyRow> row = store.find_study(place.name);
+    if (!row) throw InputError("E820", fmt::format("there is no study in {}", study::hide_password(a.input)));
+    const study::Problem problem = read_problem(*row);
+    const StudyResult r = study::read_study(problem, store, *row);
+    if (a.study.action == StudyArguments::Action::Export) {
+      const std::string folder = a.output.empty() ? a.input : a.output;
+      make_folder(folder);
+      for (const std::string& path : study::write_results(folder, problem, r)) std::printf("wrote %s\n", path.c_str());
+    } else if (a.json) {
+      std::fputs(study::write_results_json(problem, r).c_str(), stdout);
+    } else {
+      print_result(stdout, problem, r);
+      const study::Counts c = store.count(row->model);
+      if (!r.is_finished) std::printf("\nwaiting %ld, running %ld\n", c.waiting, c.running);
+    }
+    return kOk;
+  } catch (const InputError& e) { return complain(e, ""); }
+}
+
+}  // namespace topple::apps

@@ -1,0 +1,142 @@
+#include "study_model.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "base/error.h"
+#include "base/file.h"
+#include "base/unit.h"
+#include "results.h"
+#include "study/evaluator.h"
+#include "study/inputs_file.h"
+
+namespace topple::apps {
+
+namespace fs = std::filesystem;
+using json = nlohmann::ordered_json;
+
+namespace {
+
+constexpr const char* store_file = "study.sqlite";
+constexpr const char* place_file = "study.json";  // instead of it, where the store is a server
+
+std::vector<double> read_levels(const std::string& text) {
+  std::vector<double> levels;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    double a = 0;
+    const auto [stop, fault] = std::from_chars(text.data() + begin, text.data() + end, a);
+    if (fault != std::errc() || stop != text.data() + end || !(a >= 0 && a <= 1))
+      throw InputError(
+          "E801",
+          fmt::format("--alpha \"{}\": \"{}\" is no number between 0 and 1", text, text.substr(begin, end - begin)),
+          "such as --alpha 0,0.25,0.5,0.75,1");
+    levels.push_back(a);
+    begin = end + 1;
+  }
+  return levels;
+}
+
+}  // namespace
+
+double read_seconds(const std::string& text, const char* option, double fallback) {
+  if (text.empty()) return fallback;
+  Quantity q = parse_quantity(text, Dimension::Time);
+  if (!q.value) {
+    const Quantity bare = parse_quantity(text, Dimension::Number);
+    if (bare.value) q = bare;
+  }
+  if (!q.value || !(*q.value > 0) || !std::isfinite(*q.value))
+    throw InputError("E801", fmt::format("{} \"{}\": {}", option, text, q.value ? "must be > 0" : q.problem),
+                     "units: " + units_of(Dimension::Time));
+  return *q.value;
+}
+
+StudyPlace make_place(const Arguments& a) {
+  make_folder(a.output);
+  const fs::path folder = a.output;
+  StudyPlace place;
+  if (a.study.store.empty()) {
+    // a folder that was begun on a server goes on there
+    if (fs::exists(folder / place_file)) return find_place(a.output);
+    if (!a.study.name.empty()) place.name = a.study.name;
+    place.store = (folder / store_file).string();
+    return place;
+  }
+  if (!study::is_server(a.study.store))
+    throw InputError("E820", fmt::format("--store \"{}\" is no server", a.study.store),
+                     "such as postgresql://user@host/database; without --store a file in the folder is used");
+  place.store = a.study.store;
+  place.name = a.study.name;
+  if (place.name.empty()) place.name = fs::absolute(folder).lexically_normal().filename().string();
+  if (place.name.empty()) place.name = fs::absolute(folder).lexically_normal().parent_path().filename().string();
+  const json written{{"store", study::hide_password(place.store)}, {"name", place.name}};
+  replace_file((folder / place_file).string(), written.dump(1) + "\n");
+  return place;
+}
+
+StudyPlace find_place(const std::string& where) {
+  if (study::is_server(where)) return {where, ""};
+  const fs::path folder = where;
+  if (fs::exists(folder / place_file)) {
+    try {
+      const json j = json::parse(read_file((folder / place_file).string()));
+      return {j.at("store").get<std::string>(), j.at("name").get<std::string>()};
+    } catch (const json::exception& e) {
+      throw InputError("E820", fmt::format("{} cannot be understood: {}", (folder / place_file).string(), e.what()));
+    }
+  }
+  if (fs::exists(folder / store_file)) return {(folder / store_file).string(), "main"};
+  throw InputError("E820", fmt::format("there is no study in {}", where),
+                   "name the folder that topple study got with -o");
+}
+
+study::RunnerFactories make_factories() { return {{"evaluator", study::make_evaluator}}; }
+
+study::Problem read_problem(const Arguments& a, std::string& text) {
+  const StudyArguments& y = a.study;
+  text = read_file(a.input);
+  if (text.starts_with("\xEF\xBB\xBF")) text = text.substr(3);
+  if (y.evaluator.empty())
+    throw InputError("E825", "a study needs a model: --evaluator \"command\"", "see docs/study.md");
+  study::Problem p = study::read_inputs_text(text, a.input);
+  study::set_evaluator(p, y.evaluator, read_seconds(y.timeout, "--timeout", 0), y.one_shot);
+  if (!y.alpha.empty()) p.levels = read_levels(y.alpha);
+  if (y.samples > 0) p.limit = y.samples;
+  if (y.seed >= 0) p.seed = static_cast<std::uint64_t>(y.seed);
+  return p;
+}
+
+study::Problem read_problem(const study::StudyRow& row) {
+  try {
+    const json d = json::parse(row.definition);
+    const std::string kind = d.at("kind");
+    if (kind != "evaluator") throw InputError("E820", fmt::format("this topple knows no studies of the kind {}", kind));
+    study::Problem p = study::read_inputs_text(d.at("text"), d.at("file"));
+    p.kind = kind;
+    p.identity = d.at("identity").dump();
+    p.settings = d.at("settings").dump();
+    p.levels = d.at("levels").get<std::vector<double>>();
+    p.limit = d.at("limit");
+    p.seed = d.at("seed");
+    return p;
+  } catch (const json::exception& e) {
+    throw InputError("E820", fmt::format("the study \"{}\" cannot be understood: {}", row.name, e.what()));
+  }
+}
+
+study::PoolOptions make_pool_options(const StudyArguments& y) {
+  study::PoolOptions o;
+  o.jobs = y.is_jobs_given ? y.jobs : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  o.batch = y.batch;
+  o.lease = read_seconds(y.lease, "--lease", o.lease);
+  return o;
+}
+
+}  // namespace topple::apps

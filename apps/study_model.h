@@ -1,0 +1,37 @@
+#pragma once
+/// Where a study lies and what it studies, from what was typed or from what lies in its store.
+
+#include <string>
+
+#include "arguments.h"
+#include "study/manager.h"
+#include "study/problem.h"
+#include "study/store.h"
+
+namespace topple::apps {
+
+/// Address of a store, and the name of the study in it.
+struct StudyPlace {
+  std::string store;
+  std::string name = "main";
+};
+
+/// For a new study, or one to go on with; makes the folder. Throws InputError E820.
+StudyPlace make_place(const Arguments&);
+/// Of a study that is there: its folder, or a server. Throws InputError E820.
+StudyPlace find_place(const std::string& folder_or_server);
+
+/// Kinds of models that this program can run.
+study::RunnerFactories make_factories();
+
+/// Reads the file that was typed. `text` is what was read.
+study::Problem read_problem(const Arguments&, std::string& text);
+/// The problem of a study in a store. Throws InputError E820.
+study::Problem read_problem(const study::StudyRow&);
+
+/// The workers that were asked for. Throws InputError E801.
+study::PoolOptions make_pool_options(const StudyArguments&);
+/// Seconds of a typed time; `fallback` if there is none.
+double read_seconds(const std::string& text, const char* option, double fallback);
+
+}  // namespace topple::apps

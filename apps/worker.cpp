@@ -1,0 +1,62 @@
+// topple worker: takes runs out of a store and does them, until no study is open.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+
+#include "base/error.h"
+#include "commands.h"
+#include "study/pool.h"
+#include "study_model.h"
+#include "terminal.h"
+
+namespace topple::apps {
+
+int run_worker(const Arguments& a, const std::atomic<bool>& cancel) {
+  StudyPlace place;
+  study::PoolOptions options;
+  double idle = 0;
+  try {
+    place = find_place(a.input);
+    options = make_pool_options(a.study);
+    options.jobs = std::max(1, options.jobs);
+    idle = read_seconds(a.study.idle, "--idle", 0);
+  } catch (const InputError& e) {
+    for (const Diagnostic& d : e.diagnostics()) std::fputs(render(d, "", has_colour(stderr)).c_str(), stderr);
+    return kBadInput;
+  }
+  try {
+    study::Store store(place.store, &cancel, options.patience);
+    const study::RunnerFactories factories = make_factories();
+    study::Pool pool(place.store, factories, options);
+    ProgressLine line;
+    std::string why = "interrupted; its runs went back to the store";
+    while (!cancel) {
+      pool.wait_for_news(0.5);
+      pool.check();
+      line.say(fmt::format("{} done, {} running", pool.finished(), pool.running()));
+      if (pool.running() > 0) continue;
+      if (idle > 0 && pool.calc_idle_time() > idle) {
+        why = "there was no work";
+        break;
+      }
+      const std::vector<study::StudyRow> studies = store.list_studies();
+      if (!studies.empty() &&
+          std::all_of(studies.begin(), studies.end(), [](const auto& s) { return s.state == "finished"; })) {
+        why = "every study is finished";
+        break;
+      }
+    }
+    pool.stop();
+    line.clear();
+    std::fprintf(stderr, "%ld runs done here%s; %s\n", pool.finished(),
+                 pool.refused() > 0 ? fmt::format(", {} came too late", pool.refused()).c_str() : "", why.c_str());
+    return kOk;
+  } catch (const study::ConnectionLost& e) {
+    std::fprintf(stderr, "topple: the store is away: %s\n", e.what());
+    return kRunFailed;
+  }
+}
+
+}  // namespace topple::apps

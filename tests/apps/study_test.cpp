@@ -1,0 +1,210 @@
+// topple study and topple worker as processes that are killed, stopped and started again.
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "../study/server.h"
+#include "../uncertainty/reference_cases.h"
+#include "study/database.h"
+
+namespace topple::study {
+namespace {
+
+namespace cases = uncertainty::cases;
+using json = nlohmann::json;
+
+std::string read(const std::string& path) {
+  std::ifstream in(path);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+/// A file of fuzzy inputs for a reference case.
+void write_inputs(const std::string& path, const std::vector<uncertainty::FuzzyNumber>& inputs) {
+  std::ofstream out(path);
+  out.precision(17);
+  out << "[inputs]\n";
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    out << "x" << i + 1 << " = { cuts = [";
+    for (const auto& c : inputs[i].cuts()) out << "[" << c.alpha << ", " << c.left << ", " << c.right << "], ";
+    out << "] }\n";
+  }
+}
+
+class StudyProgram : public testing::Test {
+ protected:
+  std::vector<std::string> study(const std::string& out, const std::string& model, std::vector<std::string> more = {}) {
+    std::vector<std::string> words = {TOPPLE_PROGRAM,
+                                      "study",
+                                      folder / "in.toml",
+                                      "-o",
+                                      folder / out,
+                                      "--evaluator",
+                                      std::string(TOPPLE_STUDY_MODEL) + " " + model};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  }
+  pid_t start(const std::vector<std::string>& words) {
+    started.push_back(spawn(words, folder / "log"));
+    return started.back();
+  }
+  /// Nothing outlives a test that failed.
+  void TearDown() override {
+    for (const pid_t pid : started)
+      if (waitpid(pid, nullptr, WNOHANG) == 0) kill(pid, SIGKILL), waitpid(pid, nullptr, 0);
+  }
+  int run(const std::vector<std::string>& words) { return wait_for(start(words)); }
+  /// Same bits in everything that is written.
+  void expect_same(const std::string& a, const std::string& b) {
+    for (const char* name : {"/results.json", "/membership.csv", "/outcomes.csv", "/samples.csv"}) {
+      ASSERT_FALSE(read(folder / a + name).empty()) << read(folder / "log");
+      EXPECT_EQ(read(folder / a + name), read(folder / b + name)) << name;
+    }
+  }
+  static long number(Database& db, const std::string& sql) { return std::stol(db.run(sql)[0][0].value()); }
+  static long results(Database& db) { return number(db, "SELECT count(*) FROM result"); }
+  /// Throws when it takes too long.
+  static void wait_until(const std::function<bool()>& is_so) {
+    const auto start = std::chrono::steady_clock::now();
+    while (!is_so()) {
+      if (std::chrono::steady_clock::now() - start > std::chrono::seconds(40))
+        throw std::runtime_error("it takes too long");
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+  }
+  void expect_one_result_each(Database& db) {
+    EXPECT_EQ(results(db), number(db, "SELECT count(*) FROM job"));
+    EXPECT_EQ(number(db, "SELECT count(DISTINCT r.hash) FROM result r JOIN job j ON j.hash = r.hash"), results(db));
+    EXPECT_EQ(number(db, "SELECT count(*) FROM job WHERE state NOT IN ('done', 'failed')"), 0);
+  }
+
+  Folder folder;
+  std::vector<pid_t> started;
+};
+
+class StudyReference : public StudyProgram, public testing::WithParamInterface<int> {};
+
+TEST_P(StudyReference, IsMetThroughAnEvaluator) {
+  const cases::Case c = cases::make_all().at(static_cast<std::size_t>(GetParam()));
+  write_inputs(folder / "in.toml", c.inputs);
+  ASSERT_EQ(run(study("out", "'" + c.name + "'", {"--batch", "50", "--samples", "10000"})), 0) << read(folder / "log");
+  const json r = json::parse(read(folder / "out/results.json"));
+  EXPECT_LE(r["runs"].get<int>(), 10000);
+  EXPECT_EQ(r["failed"], 0);
+  ASSERT_EQ(r["outputs"].size(), c.outputs.size());
+  for (std::size_t o = 0; o < c.outputs.size(); ++o) {
+    const auto& at = c.outputs[o].at;
+    // the references have six decimals
+    const double tolerance = std::max(c.tolerance * (at[0][1] - at[0][0]), 6e-7);
+    for (int k = 0; k < 4; ++k) {
+      const json& level = r["outputs"][o]["levels"][static_cast<std::size_t>(k)];
+      EXPECT_EQ(level["alpha"], 0.25 * k);
+      EXPECT_NEAR(level["lower"].get<double>(), at[k][0], tolerance) << c.name << " output " << o << " level " << k;
+      EXPECT_NEAR(level["upper"].get<double>(), at[k][1], tolerance) << c.name << " output " << o << " level " << k;
+    }
+  }
+  if (c.name == "jump") {
+    EXPECT_EQ(r["outcomes"][1]["name"], "falls");
+    EXPECT_NEAR(r["outcomes"][1]["possibility"].get<double>(), .456598936, 1e-3);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Cases, StudyReference, testing::Range(0, 8));
+
+TEST(StudyReferences, AreAllThere) { EXPECT_EQ(cases::make_all().size(), 8u); }
+
+using StudyFaults = StudyProgram;
+
+TEST_F(StudyFaults, LeaveAStudyOnAServerAsItWouldBe) {
+  const auto server = Server::make();
+  if (!server) GTEST_SKIP() << "PostgreSQL is not installed";
+  write_inputs(folder / "in.toml", cases::make_jump_inputs());
+  ASSERT_EQ(run(study("whole", "jump 0 crash", {"--samples", "800"})), 0) << read(folder / "log");
+  EXPECT_NE(read(folder / "whole/results.json").find("signal 6"), std::string::npos) << "a job crashes";
+
+  const auto manage = [&] {
+    return start(study("faulty", "jump 10 crash",
+                       {"--samples", "800", "--store", server->url(), "--jobs", "0", "--lease", "1 s"}));
+  };
+  const auto work = [&] { return start({TOPPLE_PROGRAM, "worker", server->url(), "--jobs", "1", "--lease", "1 s"}); };
+  pid_t manager = manage(), killed = work();
+  const pid_t stopped = work(), steady = work();
+  auto db = open_database(server->url());
+  wait_until([&] { return number(*db, "SELECT count(*) FROM pg_tables WHERE tablename = 'result'") == 1; });
+  wait_until([&] { return results(*db) > 60; });
+  // a worker that holds a job stops past its lease
+  const std::string held =
+      "SELECT count(*) FROM job WHERE state = 'running' AND worker LIKE '%:" + std::to_string(stopped) + ":%'";
+  wait_until([&] {
+    kill(stopped, SIGSTOP);
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    if (number(*db, held) == 1) return true;
+    kill(stopped, SIGCONT);
+    return false;
+  });
+  wait_until([&] { return results(*db) > 150; });
+  kill(killed, SIGKILL);
+  EXPECT_EQ(wait_for(killed), -SIGKILL);
+  killed = work();
+  wait_until([&] { return results(*db) > 250; });
+  kill(manager, SIGKILL);
+  EXPECT_EQ(wait_for(manager), -SIGKILL);
+  manager = manage();
+  const long before = results(*db);
+  server->stop(SIGKILL);
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  server->start();
+  db = open_database(server->url());
+  EXPECT_GE(results(*db), before) << "what was committed is there";
+  wait_until([&] { return results(*db) > 400; });
+  // its job has long been done by another
+  EXPECT_EQ(number(*db, held), 0);
+  kill(stopped, SIGCONT);
+
+  EXPECT_EQ(wait_for(manager), 0) << read(folder / "log");
+  for (const pid_t worker : {killed, stopped, steady}) EXPECT_EQ(wait_for(worker), 0) << "they end with the study";
+  expect_one_result_each(*db);
+  EXPECT_NE(read(folder / "log").find("came too late"), std::string::npos) << "the stopped worker was refused";
+  expect_same("whole", "faulty");
+}
+
+TEST_F(StudyFaults, LeaveAStudyInAFileAsItWouldBe) {
+  write_inputs(folder / "in.toml", cases::make_jump_inputs());
+  ASSERT_EQ(run(study("whole", "jump 0 crash", {"--samples", "600"})), 0) << read(folder / "log");
+  const auto words = study("faulty", "jump 10 crash", {"--samples", "600", "--jobs", "1", "--lease", "1 s"});
+  pid_t manager = start(words);
+  wait_until([&] { return std::filesystem::exists(folder / "faulty/study.sqlite"); });
+  const auto db = open_database(folder / "faulty/study.sqlite");
+  wait_until([&] { return number(*db, "SELECT count(*) FROM sqlite_master WHERE name = 'result'") == 1; });
+  wait_until([&] { return results(*db) > 40; });
+  pid_t worker = start({TOPPLE_PROGRAM, "worker", folder / "faulty", "--jobs", "1", "--lease", "1 s"});
+  wait_until([&] { return results(*db) > 120; });
+  kill(worker, SIGKILL);
+  wait_for(worker);
+  wait_until([&] { return results(*db) > 150; });
+  kill(manager, SIGKILL);
+  wait_for(manager);
+  EXPECT_EQ(run({TOPPLE_PROGRAM, "study", "show", folder / "faulty"}), 0);
+  EXPECT_NE(read(folder / "log").find("not finished"), std::string::npos);
+  manager = start(words);
+  wait_until([&] { return results(*db) > 250; });
+  kill(manager, SIGINT);
+  EXPECT_EQ(wait_for(manager), 1);
+  EXPECT_NE(read(folder / "log").find("The same command goes on"), std::string::npos);
+  EXPECT_EQ(number(*db, "SELECT count(*) FROM job WHERE state = 'running'"), 0) << "interrupted runs went back";
+  EXPECT_EQ(run(words), 0) << read(folder / "log");
+  expect_one_result_each(*db);
+  expect_same("whole", "faulty");
+  // and once more: nothing is left to do
+  const long count = results(*db);
+  EXPECT_EQ(run(words), 0);
+  EXPECT_EQ(results(*db), count);
+}
+
+}  // namespace
+}  // namespace topple::study
