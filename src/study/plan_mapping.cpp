@@ -80,6 +80,7 @@ PlanMapping::PlanMapping(const product::Plan& plan, const collapse::Knowledge& k
   uncertainty::check_space(impl->space);
   for (const double t : options.tilt_times) impl->outputs.push_back({fmt::format("tilt_{:g}", t), "deg", unit::deg});
   for (const PlanQuantity& q : std::vector<PlanQuantity>{{"touchdown", "s", 1},
+                                                         {"tilt_touchdown", "deg", unit::deg},
                                                          {"touchdown_energy", "MJ", 1e6},
                                                          {"largest_energy", "MJ", 1e6},
                                                          {"reach_neg_x", "m", 1},
@@ -113,9 +114,10 @@ Result PlanMapping::Impl::to_result(const collapse::SampleRun& r) const {
   out.outcome = find_outcome(r);
   for (const double t : options.tilt_times) out.values.push_back(interpolate(r.time, r.tilt, r.release + t));
   const bool touched = r.touchdown <= r.release + options.after;
-  for (const double x :
-       {touched ? r.touchdown - r.release : options.after, r.touchdown_energy, r.largest_energy, r.reach.side[0],
-        r.reach.side[1], r.reach.side[2], r.reach.side[3], r.reach.most_mass, r.mechanism.rear_share, r.utilisation})
+  for (const double x : {touched ? r.touchdown - r.release : options.after,
+                         interpolate(r.time, r.tilt, touched ? r.touchdown : r.time.back()), r.touchdown_energy,
+                         r.largest_energy, r.reach.side[0], r.reach.side[1], r.reach.side[2], r.reach.side[3],
+                         r.reach.most_mass, r.mechanism.rear_share, r.utilisation})
     out.values.push_back(x);
   for (const double t : trajectory_times) out.trajectory.push_back(interpolate(r.time, r.tilt, r.release + t));
   const bool is_finite = std::all_of(out.values.begin(), out.values.end(), [](double x) { return std::isfinite(x); });

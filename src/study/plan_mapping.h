@@ -19,8 +19,8 @@ struct PlanMappingOptions {
   std::vector<double> tilt_times{0.5, 1, 1.7};  // of outputs, after the last stage's time, at most `after` [s]
   double tilt_interval = 0.1;                   // of the trajectory [s]
   double frame_rate = 0;                        // at which runs are looked at; 0: the plan's [1/s]
-  bool lanes = false;                           // samples of one build in the lanes of one run (docs/scale.md)
-  int threads = 1;                              // 0: all of the machine
+  bool lanes = false;  // samples of one build in the lanes of one batch; slower than one by one (docs/plan-mapping.md)
+  int threads = 1;     // 0: all of the machine
 };
 
 /// Where the processors' time of samples went, summed over threads [s].
@@ -53,10 +53,10 @@ class PlanMapping {
   const uncertainty::Space& space() const;
   const std::vector<PlanQuantity>& inputs() const;
   /// tilt_T towards the planned fall at each of tilt_times; touchdown: of the upper block's first part, after the last
-  /// stage's time, and `after` if there is none by then; energy in motion then (at the end without one) and at most;
-  /// reach of parts beyond the footprint to each side and of 95 % of the mass, at the end; rear_share: drop of the rear
-  /// edge over that of the front edge; utilisation: largest use of a zone's resistance before the last stage (the
-  /// margin is its inverse).
+  /// stage's time, and `after` if there is none by then; tilt and energy in motion then (at the end without one) and at
+  /// most; reach of parts beyond the footprint to each side and of 95 % of the mass, at the end; rear_share: drop of
+  /// the rear edge over that of the front edge; utilisation: largest use of a zone's resistance before the last stage
+  /// (the margin is its inverse).
   const std::vector<PlanQuantity>& outputs() const;
   /// Times of the trajectory, which is the tilt, after the last stage's time [s].
   const std::vector<double>& trajectory_times() const;
