@@ -12,6 +12,7 @@
 #include "mbs/solver.h"
 #include "mbs/zone.h"
 #include "nearfield/column.h"
+#include "nearfield/solid.h"
 #include "plans.h"
 #include "product/section_file.h"
 
@@ -497,6 +498,30 @@ TEST(ZoneColumnPhysics, IsPushedThroughItsPeakAsTheNearFieldSays) {
       EXPECT_NEAR(push.at(drift), force, 0.08 * force) << drift;
     }
   }
+}
+
+// The same column as a solid on a rigid foot, concrete crushing together over the zone's length. Both routes of the
+// near field agree on the moment of a zone within 10 % (tests/nearfield/solid_test.cpp), so do the columns on the
+// force.
+TEST(ZoneColumnSlow, ReachesTheForceOfTheSolidColumn) {
+  const nearfield::ZoneInput in = make_zone_I();
+  const nearfield::Rcc rcc = nearfield::make_rcc(in);
+  const double height = 2, last_drift = 0.008;
+  const double P = -rcc.y_pos.normal_force[11];  // 0.2 of what crushes it
+  const double EI = rcc.calc_EI_effective_y(-P), GA = rcc.GA * EI / rcc.EI_y;
+  const Push push = push_pieces(rcc, height, P, EI, GA, last_drift);
+  nearfield::CantileverInput column;
+  column.zone = in, column.length = height, column.N = -P;
+  column.founded = column.bars_slip = false;
+  nearfield::SolidOptions options;
+  options.element_size = 0.1, options.largest_rotation = last_drift, options.crushing_length = rcc.length;
+  options.threads = 0;
+  const nearfield::SolidMarch march = nearfield::march_cantilever(column, options, {});
+  ASSERT_FALSE(march.moment.empty());
+  const double largest = *std::max_element(march.moment.begin(), march.moment.end());
+  ASSERT_LT(march.moment.back(), 0.98 * largest) << march.ending;  // its peak is passed
+  std::printf("  largest force: pieces %.1f kN, solid %.1f kN\n", push.largest / unit::kN, largest / unit::kN);
+  EXPECT_NEAR(push.largest, largest, 0.1 * largest);
 }
 
 }  // namespace
