@@ -50,9 +50,9 @@ std::vector<double> merge_rotations(const std::vector<const Row*>& rows, double 
 }
 
 /// The row of a family at a normal force with the rotation of the element's spring taken out: what is left adds up with
-/// the element to the family again. Plastic rotation begins at first yield at the earliest: where the row is softer
-/// than the element, it turns under the yield moment to where the row yields.
-Row make_row(const nearfield::MomentFamily& family, double N, double EI, double length) {
+/// the element to the family again. Plastic rotation that begins at first yield at the earliest: where the row is
+/// softer than the element, it turns under the yield moment to where the row yields.
+Row make_row(const nearfield::MomentFamily& family, double N, double EI, double length, PlasticFrom from) {
   const size_t J = family.rotation.size(), K = family.normal_force.size();
   const size_t k = std::clamp<size_t>(
       static_cast<size_t>(std::upper_bound(family.normal_force.begin(), family.normal_force.end(), N) -
@@ -76,7 +76,7 @@ Row make_row(const nearfield::MomentFamily& family, double N, double EI, double 
   size_t last_elastic = 0;
   for (size_t j = 1; j < J; ++j)
     if (plastic(j) <= 0) last_elastic = j;
-  if (plastic_at_yield > 0 && yield_moment > 0) {
+  if (from == PlasticFrom::Yield && plastic_at_yield > 0 && yield_moment > 0) {
     add(0, yield_moment);
     add(plastic_at_yield, yield_moment);
     while (last_elastic + 1 < J && family.rotation[last_elastic + 1] <= yield_rotation) ++last_elastic;
@@ -86,7 +86,9 @@ Row make_row(const nearfield::MomentFamily& family, double N, double EI, double 
       const double p0 = plastic(last_elastic), p1 = plastic(last_elastic + 1);
       if (p0 < 0 && p1 > 0) start += (M[last_elastic + 1] - M[last_elastic]) * -p0 / (p1 - p0);
     }
-    add(0, std::max(start, yield_moment));
+    // a limit of nothing would be a zone that no longer carries its normal force
+    if (start <= 0 && J > 1) start = M[1];
+    add(0, from == PlasticFrom::Yield ? std::max(start, yield_moment) : start);
   }
   for (size_t j = last_elastic + 1; j < J; ++j) add(plastic(j), M[j]);
   return row;
@@ -95,9 +97,10 @@ Row make_row(const nearfield::MomentFamily& family, double N, double EI, double 
 /// Rows at the forces of a family, and between them wherever the mean of two neighbours departs by more than
 /// `tolerance` of the largest moment from the row between them: the family's curves are mixed at equal rotation, the
 /// law's at equal plastic rotation.
-std::map<double, Row> make_rows(const nearfield::MomentFamily& family, double EI, double length, double tolerance) {
+std::map<double, Row> make_rows(const nearfield::MomentFamily& family, double EI, double length, PlasticFrom begin,
+                                double tolerance) {
   std::map<double, Row> rows;
-  for (const double N : family.normal_force) rows.emplace(N, make_row(family, N, EI, length));
+  for (const double N : family.normal_force) rows.emplace(N, make_row(family, N, EI, length, begin));
   const auto departs = [tolerance](const Row& a, const Row& b, const Row& middle) {
     const double most = tolerance * middle.largest();
     const double last = std::max({a.rotation.back(), b.rotation.back(), middle.rotation.back()});
@@ -110,7 +113,7 @@ std::map<double, Row> make_rows(const nearfield::MomentFamily& family, double EI
   const auto refine = [&](const auto& self, double from, double to, int depth) -> void {
     if (depth == 0) return;
     const double N = 0.5 * (from + to);
-    Row middle = make_row(family, N, EI, length);
+    Row middle = make_row(family, N, EI, length, begin);
     if (!departs(rows.at(from), rows.at(to), middle)) return;
     rows.emplace(N, std::move(middle));
     self(self, from, N, depth - 1);
@@ -173,12 +176,12 @@ std::vector<double> find_rotations(const std::vector<const Row*>& rows, double l
 
 /// Rows of both directions on one grid of forces and one of rotations, up to the largest one.
 mbs::MomentFamily make_family(const nearfield::MomentFamily& positive, const nearfield::MomentFamily& negative,
-                              double EI, double length, double largest) {
+                              double EI, double length, double largest, PlasticFrom begin) {
   // Of a row's largest moment, between rotations and between forces.
   constexpr double between_rotations = 0.0075, between_forces = 0.015;
   const bool same = positive.moment == negative.moment && positive.normal_force == negative.normal_force;
-  const std::map<double, Row> pos = make_rows(positive, EI, length, between_forces);
-  const std::map<double, Row> neg = same ? pos : make_rows(negative, EI, length, between_forces);
+  const std::map<double, Row> pos = make_rows(positive, EI, length, begin, between_forces);
+  const std::map<double, Row> neg = same ? pos : make_rows(negative, EI, length, begin, between_forces);
   mbs::MomentFamily out;
   std::vector<const Row*> rows;
   double end = 0;
@@ -274,11 +277,11 @@ void ZoneLibrary::compute(int threads) {
 }
 
 mbs::ZoneLaw make_zone_law(const nearfield::Rcc& rcc, double EI_y, double EI_z, const std::string& name,
-                           const Knowledge& k) {
+                           const Knowledge& k, PlasticFrom begin) {
   mbs::ZoneLaw law;
   law.name = name;
-  law.moment_y = make_family(rcc.y_pos, rcc.y_neg, EI_y, rcc.length, k.zone_rupture_rotation);
-  law.moment_z = make_family(rcc.z_pos, rcc.z_neg, EI_z, rcc.length, k.zone_rupture_rotation);
+  law.moment_y = make_family(rcc.y_pos, rcc.y_neg, EI_y, rcc.length, k.zone_rupture_rotation, begin);
+  law.moment_z = make_family(rcc.z_pos, rcc.z_neg, EI_z, rcc.length, k.zone_rupture_rotation, begin);
   law.biaxial_exponent = k.zone_biaxial_exponent;
   law.damage_share = rcc.damage_share;
   // the last rotation of a family is where nothing of the moment is left

@@ -33,9 +33,14 @@ class ZoneLibrary {
   std::vector<nearfield::Rcc> rccs_;
 };
 
+/// Where a zone's plastic rotation begins: at first yield, so that a building at rest does not yield, or where the
+/// curve leaves the element's line, so that an element with the stiffness of the uncracked section follows all of it.
+enum class PlasticFrom { Yield, Cracking };
+
 /// Law of a zone whose element carries the elasticity of the member with the bending stiffnesses EI [N·m²]: what an
 /// elastic zone of the same length would turn is taken out of the rotations, docs/theory/manager.md (1).
-mbs::ZoneLaw make_zone_law(const nearfield::Rcc&, double EI_y, double EI_z, const std::string& name, const Knowledge&);
+mbs::ZoneLaw make_zone_law(const nearfield::Rcc&, double EI_y, double EI_z, const std::string& name, const Knowledge&,
+                           PlasticFrom = PlasticFrom::Yield);
 
 /// Law of the bars that a charge leaves; nothing at all if there are none.
 mbs::ZoneLaw make_cage_law(const nearfield::ResidualCage&, double destroyed_length, const std::string& name,

@@ -93,8 +93,9 @@ struct Zone {
   mbs::ZoneParameters p;
   mbs::ZoneState z;
   int axis;  // 4: about y, 5: about z
-  Zone(const nearfield::Rcc& rcc, double EI_y, double EI_z, int about) : axis(about) {
-    laws = {mbs::compile_law(make_zone_law(rcc, EI_y, EI_z, "zone", default_knowledge()))};
+  Zone(const nearfield::Rcc& rcc, double EI_y, double EI_z, int about, PlasticFrom from = PlasticFrom::Yield)
+      : axis(about) {
+    laws = {mbs::compile_law(make_zone_law(rcc, EI_y, EI_z, "zone", default_knowledge(), from))};
     const double stiffness[6] = {rcc.EA, rcc.GA, rcc.GA, rcc.GJ, EI_y, EI_z};
     for (int i = 0; i < 6; ++i) p.stiffness[i] = stiffness[i] / rcc.length;
     p.stations = 1, p.law[0] = 0;
@@ -112,12 +113,14 @@ struct Zone {
 };
 
 /// Largest distance between zone and family over the peak, at one normal force.
-void expect_curve(const nearfield::Rcc& rcc, double EI_y, double EI_z, double N, int axis, int direction) {
+void expect_curve(const nearfield::Rcc& rcc, double EI_y, double EI_z, double N, int axis, int direction,
+                  PlasticFrom from = PlasticFrom::Yield) {
   const nearfield::MomentFamily& family =
       axis == 4 ? (direction > 0 ? rcc.y_pos : rcc.y_neg) : (direction > 0 ? rcc.z_pos : rcc.z_neg);
   const Reference reference{family};
-  Zone zone(rcc, EI_y, EI_z, axis);
-  const double peak = reference.find_peak(N), begin = reference.find_begin(N, zone.stiffness());
+  Zone zone(rcc, EI_y, EI_z, axis, from);
+  const double peak = reference.find_peak(N);
+  const double begin = from == PlasticFrom::Cracking ? 0 : reference.find_begin(N, zone.stiffness());
   const double end = std::min(reference.find_end(N), 0.9 * zone.laws[0].rupture_rotation);
   ASSERT_GT(end, begin);
   double worst = 0, at = 0;
@@ -138,6 +141,12 @@ TEST(ZoneCurve, IsTheFamilysAtEachNormalForce) {
   for (const double N : {1.0, 0.5, 0.0, -0.3, -0.86, -1.5, -2.0, -2.9, -3.4, -3.7, -4.2, -5.0, -6.0})
     for (const int axis : {4, 5}) expect_curve(rcc, EI_y, EI_z, N * MN, axis, +1);
   expect_curve(rcc, EI_y, EI_z, dead, 4, -1);
+}
+
+TEST(ZoneCurve, IsTheWholeFamilyWhereItFlowsFromCrackingOn) {
+  const nearfield::Rcc rcc = nearfield::make_rcc(make_zone_I());
+  for (const double N : {1.0, 0.5, 0.0, -0.3, -0.86, -1.5, -2.0, -2.9, -3.4, -3.7, -4.2, -5.0, -6.0})
+    for (const int axis : {4, 5}) expect_curve(rcc, rcc.EI_y, rcc.EI_z, N * MN, axis, +1, PlasticFrom::Cracking);
 }
 
 TEST(ZoneCurve, IsTheFamilysInBothDirectionsOfABeam) {
