@@ -32,6 +32,29 @@ Answer to_answer(uncertainty::Result&& r, const PlanMapping& m) {
   return a;
 }
 
+/// What make_plan_problem put into a definition.
+struct Definition {
+  product::Plan plan;
+  PlanMappingOptions options;
+  std::string rules;
+};
+
+Definition read_definition(const std::string& text) {
+  const json d = json::parse(text);
+  const json& identity = d.at("identity");
+  Definition out;
+  out.options.after = identity.at("after");
+  out.options.tilt_times = identity.at("tilt_times").get<std::vector<double>>();
+  out.options.tilt_interval = identity.at("tilt_interval");
+  out.options.frame_rate = identity.at("frame_rate");
+  out.options.threads = 1;
+  out.rules = identity.at("rules").get<std::string>();
+  std::vector<Diagnostic> warnings;
+  out.plan =
+      product::read_plan(identity.at("plan").get<std::string>(), d.at("settings").value("path", "plan"), warnings);
+  return out;
+}
+
 }  // namespace
 
 Problem make_plan_problem(const product::Plan& plan, const PlanMappingOptions& options, const std::string& rules) {
@@ -58,20 +81,14 @@ Problem make_plan_problem(const product::Plan& plan, const PlanMappingOptions& o
   return p;
 }
 
+Problem read_plan_problem(const std::string& definition) {
+  const Definition d = read_definition(definition);
+  return make_plan_problem(d.plan, d.options, d.rules);
+}
+
 Runner make_plan_runner(const std::string& definition) {
-  const json d = json::parse(definition);
-  const json& identity = d.at("identity");
-  PlanMappingOptions options;
-  options.after = identity.at("after");
-  options.tilt_times = identity.at("tilt_times").get<std::vector<double>>();
-  options.tilt_interval = identity.at("tilt_interval");
-  options.frame_rate = identity.at("frame_rate");
-  options.threads = 1;
-  std::vector<Diagnostic> warnings;
-  const product::Plan plan =
-      product::read_plan(identity.at("plan").get<std::string>(), d.at("settings").value("path", "plan"), warnings);
-  const auto mapping =
-      std::make_shared<const PlanMapping>(plan, read_rules(identity.at("rules").get<std::string>()), options);
+  const Definition d = read_definition(definition);
+  const auto mapping = std::make_shared<const PlanMapping>(d.plan, read_rules(d.rules), d.options);
   return [mapping](std::span<const Point> points, const std::function<void(std::size_t, Answer)>& give,
                    const std::atomic<bool>& cancel) {
     const std::size_t n = mapping->inputs().size();

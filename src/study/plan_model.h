@@ -15,6 +15,9 @@ namespace topple::study {
 /// Throws InputError as PlanMapping does.
 Problem make_plan_problem(const product::Plan&, const PlanMappingOptions&, const std::string& rules = {});
 
+/// The same problem again from what make_model_definition wrote of it.
+Problem read_plan_problem(const std::string& definition);
+
 /// Factory of the kind "plan". Of the definition: identity as make_plan_problem wrote it. Runs one point after the
 /// other in the calling thread.
 Runner make_plan_runner(const std::string& definition);

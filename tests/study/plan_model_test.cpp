@@ -58,6 +58,14 @@ TEST(PlanModel, IsAnotherModelForAnotherPlanOrAnotherQuestion) {
   EXPECT_EQ(calc_model_hash(a), calc_model_hash(make_plan_problem(read_small(strengths), threads)));
 }
 
+TEST(PlanModel, ComesBackFromItsDefinition) {
+  const Problem a = make_plan_problem(read_small(strengths), quick());
+  const Problem b = read_plan_problem(make_model_definition(a));
+  EXPECT_EQ(make_model_definition(a), make_model_definition(b));
+  EXPECT_EQ(a.title, b.title);
+  EXPECT_EQ(a.space.inputs[0].cuts(), b.space.inputs[0].cuts());
+}
+
 TEST(PlanModel, TakesTheAnalysisFromThePlan) {
   const Problem p = make_plan_problem(
       read_small(std::string(strengths) + "[fuzzy.search]\nlevels = [0, 0.5, 1]\nsamples = 500\nseed = 7\n"), quick());
