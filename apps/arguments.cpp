@@ -23,8 +23,9 @@ std::variant<Arguments, int> parse_arguments(int argc, char** argv) {
   topple mbs verify                                the engine against known answers (docs/verification.md)
   topple report out/record.h5 -o report.html       make the page from a record
   topple rcc section.toml -o out/rcc               resistance curves of a zone of a section (docs/rcc.md)
+  topple study plan.toml -o out/study              fuzzy analysis of a plan with [fuzzy] (docs/study.md)
   topple study inputs.toml --evaluator ./model -o out/study
-                                                   fuzzy analysis of any program (docs/study.md)
+                                                   the same of any program
   topple study show out/study                      what it found so far
 
 Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterion of the plan is violated.)");
@@ -131,7 +132,7 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
     verb->add_option("--lease", y.lease, "time without a sign of life after which a run is given to another (30 s)");
   };
   CLI::App* study = app.add_subcommand("study", "Fuzzy analysis: many runs, and what follows from them.");
-  study->add_option("file", a.input, "fuzzy inputs (TOML)");
+  study->add_option("file", a.input, "plan with [fuzzy], or fuzzy inputs of an evaluator (TOML)");
   study->add_option("-o,--output", a.output, "folder of the study; the same command again goes on with it");
   study->add_option("--evaluator", y.evaluator,
                     "command that is the model: reads points and writes answers as JSON lines (docs/study.md)");
@@ -143,6 +144,7 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   study->add_option("--store", y.store, "database on a server, postgresql://user@host/name; a file if left out");
   study->add_option("--name", y.name, "of the study on the server; that of the folder if left out");
   study->add_flag("--rerun-failed", y.rerun_failed, "run those again that failed");
+  study->add_option("--knowledge", a.knowledge, "of a plan: file of knowledge rules instead of the built-in ones");
   study->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
   add_worker_options(study);
   CLI::App* study_show = study->add_subcommand("show", "Show what a study has found so far.");
@@ -192,7 +194,8 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
     if (study_show->parsed()) y.action = StudyArguments::Action::Show;
     if (study_export->parsed()) y.action = StudyArguments::Action::Export;
     if (y.action == StudyArguments::Action::Run && (a.input.empty() || a.output.empty())) {
-      std::cerr << "topple study: " << (a.input.empty() ? "a file of fuzzy inputs" : "--output") << " is required\n"
+      std::cerr << "topple study: " << (a.input.empty() ? "a plan or a file of fuzzy inputs" : "--output")
+                << " is required\n"
                 << "Run topple study --help for more information.\n";
       return kBadInput;
     }

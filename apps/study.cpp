@@ -63,8 +63,7 @@ void print_result(std::FILE* out, const study::Problem& p, const StudyResult& r)
       double possibility = c.possibility;
       for (const auto& found : r.possibilities.classes)
         if (found.outcome == c.outcome) possibility = std::max(possibility, found.possibility);
-      const double necessity =
-          r.possibilities.classes.empty() ? 1 : uncertainty::calc_necessity(r.possibilities, c.outcome);
+      const double necessity = uncertainty::calc_necessity(r.possibilities, c.outcome);
       const std::string name = study::name_of_outcome(r, c.outcome);
       std::fprintf(out, "  %-26s %11.5f %10.5f %7d\n", name.empty() ? "(no name)" : name.c_str(), possibility,
                    necessity, c.count);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -15,6 +16,8 @@
 #include "results.h"
 #include "study/evaluator.h"
 #include "study/inputs_file.h"
+#include "study/plan_model.h"
+#include "terminal.h"
 
 namespace topple::apps {
 
@@ -97,16 +100,27 @@ StudyPlace find_place(const std::string& where) {
                    "name the folder that topple study got with -o");
 }
 
-study::RunnerFactories make_factories() { return {{"evaluator", study::make_evaluator}}; }
+study::RunnerFactories make_factories() {
+  return {{"evaluator", study::make_evaluator}, {"plan", study::make_plan_runner}};
+}
 
 study::Problem read_problem(const Arguments& a, std::string& text) {
   const StudyArguments& y = a.study;
-  text = read_file(a.input);
-  if (text.starts_with("\xEF\xBB\xBF")) text = text.substr(3);
-  if (y.evaluator.empty())
-    throw InputError("E825", "a study needs a model: --evaluator \"command\"", "see docs/study.md");
-  study::Problem p = study::read_inputs_text(text, a.input);
-  study::set_evaluator(p, y.evaluator, read_seconds(y.timeout, "--timeout", 0), y.one_shot);
+  study::Problem p;
+  if (y.evaluator.empty()) {
+    std::vector<Diagnostic> warnings;
+    const product::Plan plan = product::read_plan_file(a.input, warnings, text);
+    for (const Diagnostic& d : warnings) std::fputs(render(d, text, has_colour(stderr)).c_str(), stderr);
+    p = study::make_plan_problem(plan, {}, a.knowledge.empty() ? std::string() : read_file(a.knowledge));
+    json identity = json::parse(p.identity);
+    identity["topple"] = TOPPLE_VERSION;  // other programs give other answers
+    p.identity = identity.dump();
+  } else {
+    text = read_file(a.input);
+    if (text.starts_with("\xEF\xBB\xBF")) text = text.substr(3);
+    p = study::read_inputs_text(text, a.input);
+    study::set_evaluator(p, y.evaluator, read_seconds(y.timeout, "--timeout", 0), y.one_shot);
+  }
   if (!y.alpha.empty()) p.levels = read_levels(y.alpha);
   if (y.samples > 0) p.limit = y.samples;
   if (y.seed >= 0) p.seed = static_cast<std::uint64_t>(y.seed);
@@ -117,8 +131,22 @@ study::Problem read_problem(const study::StudyRow& row) {
   try {
     const json d = json::parse(row.definition);
     const std::string kind = d.at("kind");
-    if (kind != "evaluator") throw InputError("E820", fmt::format("this topple knows no studies of the kind {}", kind));
-    study::Problem p = study::read_inputs_text(d.at("text"), d.at("file"));
+    study::Problem p;
+    if (kind == "evaluator") {
+      p = study::read_inputs_text(d.at("text"), d.at("file"));
+    } else if (kind == "plan") {
+      const json& identity = d.at("identity");
+      study::PlanMappingOptions options;
+      options.after = identity.at("after");
+      options.tilt_times = identity.at("tilt_times").get<std::vector<double>>();
+      options.tilt_interval = identity.at("tilt_interval");
+      options.frame_rate = identity.at("frame_rate");
+      std::vector<Diagnostic> warnings;
+      p = study::make_plan_problem(product::read_plan(d.at("text"), d.at("file"), warnings), options,
+                                   identity.at("rules"));
+    } else {
+      throw InputError("E820", fmt::format("this topple knows no studies of the kind {}", kind));
+    }
     p.kind = kind;
     p.identity = d.at("identity").dump();
     p.settings = d.at("settings").dump();

@@ -25,13 +25,14 @@ struct TryAgain : std::runtime_error {
 
 /// Where the dialects differ.
 struct Dialect {
-  std::string now;          // seconds since 1970 by the database's clock
-  std::string begin;        // starts a transaction that will write
-  std::string skip_locked;  // behind a SELECT whose rows are to be changed
-  std::string number;       // type of a column that counts rows
-  std::string real;         // type of a double
-  std::string listed;       // of texts of the JSON array $1: "hash IN (...)" takes it
-  std::string pairs;        // rows (a, b) of the JSON array $1 of pairs, in its order
+  std::string now;             // seconds since 1970 by the database's clock
+  std::string begin;           // starts a transaction that will write
+  std::string skip_locked;     // behind a SELECT whose rows are to be changed
+  std::string number;          // type of a column that counts rows
+  std::string real;            // type of a double
+  std::string listed;          // of texts of the JSON array $1: "hash IN (...)" takes it
+  bool writes_within = false;  // WITH may hold statements that write
+  std::string pairs;           // rows (a, b) of the JSON array $1 of pairs, in its order
 };
 
 class Database {

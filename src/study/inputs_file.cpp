@@ -89,7 +89,7 @@ struct Reader {
   std::optional<FuzzyNumber> read_number(TableReader& table) {
     const Node* given = nullptr;
     std::string way;
-    for (const char* key : {"triangular", "trapezoidal", "polygonal", "cuts", "value"})
+    for (const char* key : {"triangular", "trapezoidal", "polygonal", "tabulated", "value"})
       if (const Node* node = table.find(key)) {
         if (given) {
           table.error("E207", node->place, fmt::format("{} and {}: one of them is wanted", way, key));
@@ -101,7 +101,7 @@ struct Reader {
     const std::string label = table.label() + ": " + way;
     if (!given) {
       table.error("E207", table.place(),
-                  table.label() + ": one of triangular, trapezoidal, polygonal, cuts, value is wanted",
+                  table.label() + ": one of triangular, trapezoidal, polygonal, tabulated, value is wanted",
                   "such as { triangular = [10, 25, 45] }");
       return std::nullopt;
     }
@@ -118,7 +118,7 @@ struct Reader {
           for (const auto& r : *rows) corners.emplace_back(r[0], r[1]);
           return uncertainty::make_polygonal(corners);
         }
-      } else if (way == "cuts") {
+      } else if (way == "tabulated") {
         std::vector<uncertainty::AlphaCut> cuts;
         if (const auto rows = read_rows(*given, label, 3, "triples [alpha, left, right]")) {
           for (const auto& r : *rows) cuts.push_back({r[0], r[1], r[2]});

@@ -106,6 +106,17 @@ std::vector<std::string> list_failures(const uncertainty::Archive& archive) {
   return lines;
 }
 
+/// What the samples alone tell.
+std::vector<uncertainty::Possibility> list_possibilities(const uncertainty::AlphaResult& r) {
+  std::vector<uncertainty::Possibility> list;
+  for (const auto& c : r.classes) {
+    uncertainty::Possibility p;
+    p.outcome = c.outcome, p.possibility = c.possibility, p.sample = c.sample;
+    list.push_back(p);
+  }
+  return list;
+}
+
 /// Answers batches out of the store, with the help of workers.
 class Manager {
  public:
@@ -202,6 +213,7 @@ class Manager {
     }
     r.alpha.archive = asker.archive();
     r.alpha.ending = r.ending;
+    if (r.possibilities.classes.empty()) r.possibilities.classes = list_possibilities(r.alpha);
     r.outputs = names_.outputs;
     r.outcomes = names_.outcomes;
     r.failures = list_failures(r.alpha.archive);
@@ -377,17 +389,14 @@ StudyResult read_study(const Problem& problem, Store& store, const StudyRow& row
         ++k;
       }
   }
-  for (const auto& c : r.alpha.classes) {
-    uncertainty::Possibility p;
-    p.outcome = c.outcome, p.possibility = c.possibility, p.sample = c.sample;
+  r.possibilities.classes = list_possibilities(r.alpha);
+  for (uncertainty::Possibility& p : r.possibilities.classes)
     for (const json& m : marks.value("classes", json::array()))
-      if (m.at("outcome") == c.outcome) {
+      if (m.at("outcome") == p.outcome) {
         p.resolution = m.at("resolution");
         p.above = m.at("above");
         p.converged = m.at("converged");
       }
-    r.possibilities.classes.push_back(p);
-  }
   if (r.is_finished) r.ending = uncertainty::Ending::Complete;
   if (summary.value("ending", "") == uncertainty::to_text(uncertainty::Ending::LimitReached))
     r.ending = uncertainty::Ending::LimitReached;

@@ -26,6 +26,7 @@ class PostgresqlDatabase final : public Database {
     dialect_.now = "extract(epoch FROM clock_timestamp())::double precision";
     dialect_.begin = "BEGIN";
     dialect_.skip_locked = "FOR UPDATE SKIP LOCKED";
+    dialect_.writes_within = true;
     dialect_.number = "bigserial PRIMARY KEY";
     dialect_.real = "double precision";
     dialect_.listed = "(SELECT json_array_elements_text($1::json))";

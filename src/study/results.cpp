@@ -27,11 +27,8 @@ std::string cell(const std::string& text) {
   return quoted + "\"";
 }
 
-double necessity_of(const StudyResult& r, int outcome) {
-  return r.possibilities.classes.empty() ? 1 : uncertainty::calc_necessity(r.possibilities, outcome);
-}
+double necessity_of(const StudyResult& r, int outcome) { return uncertainty::calc_necessity(r.possibilities, outcome); }
 
-/// Of a class; where only one was met, nothing was searched.
 double possibility_of(const StudyResult& r, const uncertainty::ClassBounds& c) {
   for (const auto& p : r.possibilities.classes)
     if (p.outcome == c.outcome) return std::max(p.possibility, c.possibility);

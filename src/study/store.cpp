@@ -58,22 +58,30 @@ Answer read_answer(const Row& row, std::size_t first) {
   return a;
 }
 
+constexpr const char* result_columns =
+    "hash, model, status, outcome, outputs, trajectory, message, attempt, worker, seconds, finished";
+
+/// Columns of a result but hash and model, and the last.
+std::vector<Value> make_values(const Job& job, const std::string& worker, const Answer& a) {
+  return {a.kind == Answer::Kind::Done ? "done" : "failed",
+          to_clean(a.outcome),
+          outputs_text(a),
+          to_text(a.trajectory),
+          to_clean(a.text),
+          std::to_string(job.attempt),
+          worker,
+          fmt::format("{}", a.seconds)};
+}
+
 void insert_result(Database& db, const Job& job, const std::string& worker, const Answer& a) {
-  const std::vector<Value> values = {job.hash,
-                                     job.model,
-                                     a.kind == Answer::Kind::Done ? "done" : "failed",
-                                     to_clean(a.outcome),
-                                     outputs_text(a),
-                                     to_text(a.trajectory),
-                                     to_clean(a.text),
-                                     std::to_string(job.attempt),
-                                     worker,
-                                     fmt::format("{}", a.seconds)};
-  db.run(fmt::format("INSERT INTO result(hash, model, status, outcome, outputs, trajectory, message, attempt, worker, "
-                     "seconds, finished) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, {}) "
-                     "ON CONFLICT (hash) DO NOTHING",
-                     db.dialect().now),
-         values);
+  std::vector<Value> values = make_values(job, worker, a);
+  values.push_back(job.hash);
+  values.push_back(job.model);
+  db.run(
+      fmt::format("INSERT INTO result({}) VALUES ($9, $10, $1, $2, $3, $4, $5, $6, $7, $8, {}) ON CONFLICT (hash) DO "
+                  "NOTHING",
+                  result_columns, db.dialect().now),
+      values);
 }
 
 void make_schema(Database& db) {
@@ -317,16 +325,27 @@ bool Store::finish(const Job& job, const std::string& worker, const Answer& answ
   std::string state = answer.kind == Kind::Done ? "done" : is_result ? "failed" : "waiting";
   if (answer.kind == Kind::Refused) state = "refused";
   const int attempt = answer.kind == Kind::Cancelled ? job.attempt - 1 : job.attempt;
-  return transact([&](bool) {
-    const bool is_ours =
-        !db_->run(
-                "UPDATE job SET state = $1, attempt = $2, message = $3, lease_until = NULL WHERE hash = "
-                "$4 AND state = 'running' AND worker = $5 AND attempt = $6 RETURNING hash",
-                {state, std::to_string(attempt), to_clean(answer.text), job.hash, worker, std::to_string(job.attempt)})
-             .empty();
-    if (is_ours && is_result) insert_result(*db_, job, worker, answer);
-    return is_ours;
-  });
+  const std::vector<Value> change = {state,  std::to_string(attempt),    to_clean(answer.text), job.hash,
+                                     worker, std::to_string(job.attempt)};
+  const std::string update =
+      "UPDATE job SET state = $1, attempt = $2, message = $3, lease_until = NULL WHERE hash = $4 AND state = 'running' "
+      "AND "
+      "worker = $5 AND attempt = $6 RETURNING hash, model";
+  if (!is_result) return transact([&](bool) { return !db_->run(update, change).empty(); }, true);
+  if (!db_->dialect().writes_within) {
+    return transact([&](bool) {
+      const bool is_ours = !db_->run(update, change).empty();
+      if (is_ours) insert_result(*db_, job, worker, answer);
+      return is_ours;
+    });
+  }
+  std::vector<Value> values = change;
+  for (Value& v : make_values(job, worker, answer)) values.push_back(std::move(v));
+  const std::string both = fmt::format(
+      "WITH mine AS ({}), kept AS (INSERT INTO result({}) SELECT hash, model, $7, $8, $9, $10, $11, $12::integer, $13, "
+      "$14::double precision, {} FROM mine ON CONFLICT (hash) DO NOTHING) SELECT hash FROM mine",
+      update, result_columns, db_->dialect().now);
+  return transact([&](bool) { return !db_->run(both, values).empty(); }, true);
 }
 
 int Store::quarantine() {

@@ -30,7 +30,7 @@ void write_inputs(const std::string& path, const std::vector<uncertainty::FuzzyN
   out.precision(17);
   out << "[inputs]\n";
   for (std::size_t i = 0; i < inputs.size(); ++i) {
-    out << "x" << i + 1 << " = { cuts = [";
+    out << "x" << i + 1 << " = { tabulated = [";
     for (const auto& c : inputs[i].cuts()) out << "[" << c.alpha << ", " << c.left << ", " << c.right << "], ";
     out << "] }\n";
   }

@@ -12,7 +12,7 @@ const char* const whole = R"toml(title = "Strength"
 fc = { triangular = [10, 25, 45], unit = "N/mm2" }
 a = { trapezoidal = [1, 2, 3, 4] }
 b = { polygonal = [[0, 0], [1, 0.5], [2, 1], [5, 0]] }
-c = { cuts = [[0, -1, 4], [0.5, 0, 1], [1, 0.5, 0.5]] }
+c = { tabulated = [[0, -1, 4], [0.5, 0, 1], [1, 0.5, 0.5]] }
 d = { value = 7 }
 [derived]
 fct = { formula = "1.4 * ((fc - 8) / 10)^(2/3)", unit = "N/mm2" }
