@@ -41,9 +41,7 @@ int run_worker(const Arguments& a, const std::atomic<bool>& cancel) {
         why = "there was no work";
         break;
       }
-      const std::vector<study::StudyRow> studies = store.list_studies();
-      if (!studies.empty() &&
-          std::all_of(studies.begin(), studies.end(), [](const auto& s) { return s.state == "finished"; })) {
+      if (const auto [all, open] = store.count_studies(); all > 0 && open == 0) {
         why = "every study is finished";
         break;
       }

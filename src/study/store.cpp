@@ -221,21 +221,24 @@ void Store::put_study(const StudyRow& s) {
   });
 }
 
-std::vector<StudyRow> Store::list_studies() {
+std::optional<StudyRow> Store::find_study(const std::string& name) {
   return transact(
-      [&](bool) {
-        std::vector<StudyRow> studies;
-        for (const Row& r : db_->run("SELECT name, model, definition, state, summary FROM study ORDER BY name"))
-          studies.push_back({*r[0], *r[1], *r[2], *r[3], *r[4]});
-        return studies;
+      [&](bool) -> std::optional<StudyRow> {
+        const Rows rows = db_->run("SELECT name, model, definition, state, summary FROM study WHERE name = $1", {name});
+        if (rows.empty()) return std::nullopt;
+        const Row& r = rows[0];
+        return StudyRow{*r[0], *r[1], *r[2], *r[3], *r[4]};
       },
       true);
 }
 
-std::optional<StudyRow> Store::find_study(const std::string& name) {
-  for (StudyRow& s : list_studies())
-    if (s.name == name) return std::move(s);
-  return std::nullopt;
+std::pair<long, long> Store::count_studies() {
+  return transact(
+      [&](bool) {
+        const Rows rows = db_->run("SELECT count(*), sum(CASE WHEN state = 'finished' THEN 0 ELSE 1 END) FROM study");
+        return std::pair(std::stol(*rows[0][0]), std::stol(rows[0][1].value_or("0")));
+      },
+      true);
 }
 
 void Store::add_jobs(const std::string& model, const std::vector<std::pair<std::string, Point>>& jobs) {

@@ -61,7 +61,8 @@ class Store {
   /// Adds a study, or replaces that of the same name.
   void put_study(const StudyRow&);
   std::optional<StudyRow> find_study(const std::string& name);
-  std::vector<StudyRow> list_studies();
+  /// Numbers of studies, and of those that are not finished.
+  std::pair<long, long> count_studies();
 
   /// Jobs that are there already stay as they are.
   void add_jobs(const std::string& model, const std::vector<std::pair<std::string, Point>>& jobs);

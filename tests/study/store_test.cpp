@@ -163,7 +163,9 @@ TEST_P(Stores, RememberStudiesAndModels) {
   EXPECT_EQ(store.find_model("n"), std::nullopt);
   store.put_study({"s", "m", "{}", "open", ""});
   store.put_study({"s", "m", "{}", "finished", "{}"});
-  EXPECT_EQ(store.list_studies().size(), 1u);
+  EXPECT_EQ(store.count_studies(), std::pair(1L, 0L));
+  store.put_study({"open", "m", "{}", "open", ""});
+  EXPECT_EQ(store.count_studies(), std::pair(2L, 1L));
   EXPECT_EQ(Store(address).find_study("s")->state, "finished");
   EXPECT_FALSE(store.find_study("t"));
 }
