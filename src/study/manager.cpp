@@ -117,6 +117,16 @@ std::vector<uncertainty::Possibility> list_possibilities(const uncertainty::Alph
   return list;
 }
 
+/// All bounds in a fixed order: of all runs, then of each class.
+template <class Alpha, class F>
+void for_each_level(Alpha& alpha, F work) {
+  for (auto& o : alpha.outputs)
+    for (auto& l : o.levels) work(l);
+  for (auto& c : alpha.classes)
+    for (auto& o : c.outputs)
+      for (auto& l : o.levels) work(l);
+}
+
 /// Answers batches out of the store, with the help of workers.
 class Manager {
  public:
@@ -259,8 +269,7 @@ class Manager {
   static json make_marks(const StudyResult& r) {
     json marks = json::object();
     json bounds = json::array(), coverage = json::array(), classes = json::array();
-    for (const auto& o : r.alpha.outputs)
-      for (const auto& l : o.levels) bounds.push_back({l.lower.converged, l.upper.converged});
+    for_each_level(r.alpha, [&](const auto& l) { bounds.push_back({l.lower.converged, l.upper.converged}); });
     for (const auto& c : r.alpha.coverage) coverage.push_back(c.space_points);
     for (const auto& p : r.possibilities.classes)
       classes.push_back(
@@ -381,13 +390,12 @@ StudyResult read_study(const Problem& problem, Store& store, const StudyRow& row
   if (marks.contains("converged")) {
     const json& bounds = marks["converged"];
     std::size_t k = 0;
-    for (auto& o : r.alpha.outputs)
-      for (auto& l : o.levels) {
-        if (k >= bounds.size()) break;
-        l.lower.converged = bounds[k][0];
-        l.upper.converged = bounds[k][1];
-        ++k;
-      }
+    for_each_level(r.alpha, [&](auto& l) {
+      if (k >= bounds.size()) return;
+      l.lower.converged = bounds[k][0];
+      l.upper.converged = bounds[k][1];
+      ++k;
+    });
   }
   r.possibilities.classes = list_possibilities(r.alpha);
   for (uncertainty::Possibility& p : r.possibilities.classes)

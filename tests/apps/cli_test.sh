@@ -41,6 +41,36 @@ usage)
   sed 's/"zone.rupture_rotation"/"zone.rupture_rotatoin"/' rules.json >wrong.json
   expect 2 "$topple" check "$plan" --knowledge wrong.json; has err 'did you mean "zone.rupture_rotation"'
   ;;
+study)
+  cat >in.toml <<'TEXT'
+title = "Sum"
+[inputs]
+a = { triangular = [1, 2, 4] }
+b = { triangular = [2, 3, 5], unit = "m" }
+TEXT
+  model='while read -r line; do number() { expr "$line" : ".*\"$1\":\([-0-9.e+]*\)"; }; echo "{\"z\": $(number a), \"outcome\": \"stands\"}"; done'
+  expect 0 "$topple" study in.toml --evaluator "$model" -o s --samples 100 --alpha 0.5; has out "0.5"; has out "1.5"; has out stands
+  for file in results.json membership.csv outcomes.csv samples.csv study.sqlite; do exists s/$file; done
+  is_json s/results.json; has s/membership.csv "z,,0,1,4,"; has s/samples.csv "b [m]"
+  expect 0 "$topple" study show s; has out "Sum"; has out "z"
+  expect 0 "$topple" study show s --json; is_json out
+  expect 0 "$topple" study export s -o tables; cmp s/samples.csv tables/samples.csv || failures=$((failures + 1))
+  cmp s/results.json tables/results.json || failures=$((failures + 1))
+  expect 0 "$topple" worker s; has err "every study is finished"
+  expect 2 "$topple" study in.toml --evaluator "other" -o s; has err "another model"
+  expect 2 "$topple" study in.toml --evaluator "while read -r l; do echo '{\"z\": 1, oops}'; done" -o wrong
+  has err "this is not JSON"; has err "^"; has err "oops"
+  expect 2 "$topple" study in.toml --evaluator "$model" -o a --alpha 0,2; has err "--alpha"
+  expect 2 "$topple" study in.toml --evaluator "$model" -o a --store mysql://x; has err "is no server"
+  expect 2 "$topple" study in.toml --evaluator "$model"; has err "--output"
+  expect 2 "$topple" study "$plan" -o a; has err "fuzzy"
+  expect 2 "$topple" study show nowhere; has err "there is no study"
+  expect 2 "$topple" worker nowhere; has err "there is no study"
+  sed 's/\[1, 2, 4\]/[1, 5, 4]/' in.toml >bad.toml
+  expect 2 "$topple" study bad.toml --evaluator "$model" -o a; has err "bad.toml:3"; has err "^"
+  # all runs fail: told, not hidden
+  expect 0 "$topple" study in.toml --evaluator "exit 3" -o f --samples 10; has out "exit code 3"; has out "failed"
+  ;;
 readme)
   # every command in the shell blocks of these pages exists
   commands=0
