@@ -186,7 +186,7 @@ class Manager {
       ++asked_;
       failed_ += out[i].state == Result::State::Failed;
     }
-    open_ = 0;
+    open_ = arrived_ = 0;
     show(false);
   }
 
@@ -291,6 +291,7 @@ class Manager {
       if (!found.empty()) {
         std::erase_if(open, [this](const std::string& hash) { return known_.contains(hash); });
         run_here_ += static_cast<long>(found.size());
+        arrived_ += static_cast<long>(found.size());
         open_ = static_cast<long>(open.size());
         pause = 0.01;
       }
@@ -322,7 +323,7 @@ class Manager {
     if (!is_last && std::chrono::duration<double>(now - shown_).count() < 0.2) return;
     shown_ = now;
     StudyState s;
-    s.done = asked_, s.failed = failed_, s.open = open_, s.running = std::min(running_, open_);
+    s.done = asked_ + arrived_, s.failed = failed_, s.open = open_, s.running = std::min(running_, open_);
     s.run_here = run_here_, s.limit = limit_;
     s.seconds = std::chrono::duration<double>(now - start_).count();
     s.so_far = result_.outputs.empty() && result_.outcomes.empty() ? nullptr : &result_;
@@ -340,6 +341,7 @@ class Manager {
   Names names_;
   StudyResult result_;  // so far
   long asked_ = 0, failed_ = 0, open_ = 0, running_ = 0, run_here_ = 0;
+  long arrived_ = 0;  // of the batch that is being run
   int limit_ = 0;
   Clock::time_point start_ = Clock::now(), shown_ = start_;
 };
