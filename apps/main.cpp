@@ -15,6 +15,7 @@ std::atomic<bool> cancel = false;
 extern "C" void on_interrupt(int) {
   cancel.store(true, std::memory_order_relaxed);
   std::signal(SIGINT, SIG_DFL);
+  std::signal(SIGTERM, SIG_DFL);
 }
 
 int dispatch(const topple::apps::Arguments& a) {
@@ -55,6 +56,7 @@ int dispatch(const topple::apps::Arguments& a) {
 
 int main(int argc, char** argv) {
   std::signal(SIGINT, on_interrupt);
+  std::signal(SIGTERM, on_interrupt);  // batch systems
   const auto arguments = topple::apps::parse_arguments(argc, argv);
   if (const int* code = std::get_if<int>(&arguments)) return *code;
   try {

@@ -149,7 +149,9 @@ class Manager {
     store_.forget_refusals(model_);
     if (options.rerun_failed) store_.rerun_failed(model_);
     for (StoredResult& r : store_.load_results(model_)) known_.emplace(std::move(r.hash), std::move(r.answer));
-    pool_ = std::make_unique<Pool>(options.store, factories, options.pool);
+    PoolOptions own = options.pool;
+    own.model = model_;  // programs of other studies may not be here
+    pool_ = std::make_unique<Pool>(options.store, factories, own);
   }
 
   void evaluate(std::span<const Point> batch, std::span<Result> out) {

@@ -86,7 +86,7 @@ void Pool::work(const std::string& name) {
         const std::lock_guard lock(mutex_);
         wakes = wake_count_;
       }
-      std::vector<Job> jobs = store.claim(name, options_.batch, options_.lease);
+      std::vector<Job> jobs = store.claim(name, options_.batch, options_.lease, options_.model);
       if (!jobs.empty()) {
         pause = 0.01;
         run_jobs(store, name, std::move(jobs), runners);

@@ -17,6 +17,7 @@ struct PoolOptions {
   int jobs = 1;           // at the same time
   int batch = 1;          // points that a runner gets at once
   double lease = 30;      // a job is given to another worker so long after a sign of life [s]
+  std::string model;      // the only one whose jobs are taken; empty: any
   double patience = 300;  // with a server that is away [s]
 };
 

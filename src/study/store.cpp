@@ -272,7 +272,7 @@ void Store::add_impossible(const std::string& model, const std::vector<StoredRes
   });
 }
 
-std::vector<Job> Store::claim(const std::string& worker, int count, double lease) {
+std::vector<Job> Store::claim(const std::string& worker, int count, double lease, const std::string& model) {
   const Dialect& d = db_->dialect();
   Rows rows = transact(
       [&](bool again) {
@@ -284,11 +284,11 @@ std::vector<Job> Store::claim(const std::string& worker, int count, double lease
         }
         return db_->run(
             fmt::format("WITH chosen AS MATERIALIZED (SELECT number FROM job WHERE state IN ('waiting', 'running') AND "
-                        "(state = 'waiting' OR lease_until < {0}) AND attempt < {1} ORDER BY number LIMIT {2} {3}) "
+                        "(state = 'waiting' OR lease_until < {0}) AND attempt < {1} {5} ORDER BY number LIMIT {2} {3}) "
                         "UPDATE job SET state = 'running', attempt = attempt + 1, worker = $1, lease_until = {0} + {4} "
                         "WHERE number IN (SELECT number FROM chosen) RETURNING number, hash, model, inputs, attempt",
-                        d.now, most_attempts, count, d.skip_locked, lease),
-            {worker});
+                        d.now, most_attempts, count, d.skip_locked, lease, model.empty() ? "" : "AND model = $2"),
+            model.empty() ? std::vector<Value>{worker} : std::vector<Value>{worker, model});
       },
       true);
   std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return std::stoll(*a[0]) < std::stoll(*b[0]); });

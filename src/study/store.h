@@ -70,7 +70,8 @@ class Store {
   void add_impossible(const std::string& model, const std::vector<StoredResult>&);
   /// Takes up to `count` jobs that wait, or whose lease has run out, oldest first; raises their attempt before anything
   /// is run. `worker` holds nothing else.
-  std::vector<Job> claim(const std::string& worker, int count, double lease);
+  ///   model  the only one that is wanted; empty: any
+  std::vector<Job> claim(const std::string& worker, int count, double lease, const std::string& model = {});
   /// Leases of all jobs that these workers still hold.
   void renew(const std::vector<std::string>& workers, double lease);
   /// Who holds jobs.

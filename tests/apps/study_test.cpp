@@ -72,7 +72,7 @@ class StudyProgram : public testing::Test {
   static void wait_until(const std::function<bool()>& is_so) {
     const auto start = std::chrono::steady_clock::now();
     while (!is_so()) {
-      if (std::chrono::steady_clock::now() - start > std::chrono::seconds(40))
+      if (std::chrono::steady_clock::now() - start > std::chrono::seconds(120))
         throw std::runtime_error("it takes too long");
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }

@@ -83,6 +83,15 @@ TEST_P(Stores, GiveAJobToOneWorkerOnly) {
   EXPECT_EQ(store.count("m").running, 3);
 }
 
+TEST_P(Stores, GiveJobsOfOneModelToThoseWhoWantNoOther) {
+  Store store(address);
+  store.add_jobs("m", {{"a", {1}}});
+  store.add_jobs("n", {{"b", {1}}});
+  EXPECT_EQ(store.claim("w", 5, 60, "n").at(0).hash, "b");
+  EXPECT_TRUE(store.claim("x", 5, 60, "n").empty());
+  EXPECT_EQ(store.claim("x", 5, 60).at(0).hash, "a");
+}
+
 TEST_P(Stores, TakeAnExpiredLeaseAndRefuseItsFormerOwner) {
   Store store(address);
   store.add_jobs("m", {{"a", {1}}});
