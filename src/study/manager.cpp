@@ -179,6 +179,7 @@ class Manager {
     if (!jobs.empty()) {
       store_.add_jobs(model_, jobs);
       pool_->wake();
+      arrived_ = static_cast<long>(batch.size() - jobs.size());  // were there before
       wait_for(open);
     }
     for (std::size_t i = 0; i < batch.size(); ++i) {
