@@ -80,7 +80,7 @@ int System::calc_contact_interval() const {
 void System::evaluate_contact(double h) {
   add_travel(h);
   Touching& t = state.touching;
-  const bool follows = h > 0 && t.steps > 0 && t.steps < contact_interval;
+  const bool follows = h > 0 && !is_look_due();
   const int passed = t.steps;
   if (!follows) {
     find_contacts();

@@ -356,33 +356,18 @@ HWY_INLINE void rub_block(const ContactJob& job, size_t block) {
 using Wide = hn::ScalableTag<double>;
 using One = hn::CappedTag<double, 1>;
 
-template <class D>
-HWY_INLINE void read_all(const TouchJob& job) {
-  for (size_t block = 0; block < job.blocks; ++block) read_block<D>(job, block);
-}
-template <class D>
-HWY_INLINE void update_all(const TouchJob& job) {
-  for (size_t block = 0; block < job.blocks; ++block) update_block<D>(job, block);
-}
-template <class D>
-HWY_INLINE void press_all(const ContactJob& job) {
-  for (size_t block = 0; block < job.blocks; ++block) press_block<D>(job, block);
-}
-template <class D>
-HWY_INLINE void damp_all(const ContactJob& job) {
-  for (size_t block = 0; block < job.blocks; ++block) damp_block<D>(job, block);
-}
-template <class D>
-HWY_INLINE void rub_all(const ContactJob& job) {
-  for (size_t block = 0; block < job.blocks; ++block) rub_block<D>(job, block);
+/// Wide lanes, block after block.
+template <class Job, class Work>
+HWY_INLINE void each_block(const Job& job, Work work) {
+  for (size_t block = 0; block < job.blocks; ++block) work(job, block);
 }
 void find_lows_here(const LowJob& job) { find_all_lows<Wide>(job); }
 void find_lows_singly_here(const LowJob& job) { find_all_lows<One>(job); }
-void read_touched_here(const TouchJob& job) { read_all<Wide>(job); }
-void update_touched_here(const TouchJob& job) { update_all<Wide>(job); }
-void press_contacts_here(const ContactJob& job) { press_all<Wide>(job); }
-void damp_contacts_here(const ContactJob& job) { damp_all<Wide>(job); }
-void rub_contacts_here(const ContactJob& job) { rub_all<Wide>(job); }
+void read_touched_here(const TouchJob& job) { each_block(job, read_block<Wide>); }
+void update_touched_here(const TouchJob& job) { each_block(job, update_block<Wide>); }
+void press_contacts_here(const ContactJob& job) { each_block(job, press_block<Wide>); }
+void damp_contacts_here(const ContactJob& job) { each_block(job, damp_block<Wide>); }
+void rub_contacts_here(const ContactJob& job) { each_block(job, rub_block<Wide>); }
 
 }  // namespace HWY_NAMESPACE
 }  // namespace topple::mbs::kernel

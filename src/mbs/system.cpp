@@ -571,7 +571,9 @@ void advance_together(Lanes& lanes, std::span<System* const> systems) {
     s.begin_forces();
   });
   lanes.outside.clear();
-  lanes.find_lows();
+  if (std::any_of(systems.begin(), systems.end(),
+                  [](const System* s) { return s != nullptr && s->model.contact.ground && s->is_look_due(); }))
+    lanes.find_lows();
   if (!lanes.is_batch) {
     systems.front()->evaluate_elements();
   } else {

@@ -361,6 +361,8 @@ class System {
   void fill_contact_blocks();
   /// Steps from one look for touching points to the next.
   int calc_contact_interval() const;
+  /// Whether the next evaluation looks for touching points, rather than moving those of the one before.
+  bool is_look_due() const { return state.touching.steps == 0 || state.touching.steps >= contact_interval; }
   /// Finds the touching points; between looks they move with their bodies.
   void find_contacts();
   /// Forces at the points found, on the bodies and in the ledger.
