@@ -73,11 +73,7 @@ std::vector<double> calc_derived(const FuzzyPlan& f, std::span<const double> poi
   return out;
 }
 
-std::vector<double> calc_centre(const FuzzyPlan& f) {
-  std::vector<double> centre;
-  for (const FuzzyValue& v : f.inputs) centre.push_back(0.5 * (core_of(v).first + core_of(v).second));
-  return centre;
-}
+std::vector<double> calc_centre(const FuzzyPlan& f) { return centre_of(f.inputs); }
 
 PlanSampler make_sampler(const Plan& plan) {
   PlanSampler s{plan.fuzzy, plan.path, plan.text, parse_document(plan.text, plan.path)};
@@ -111,38 +107,13 @@ void try_samples(const Plan& plan, const Node& document, Complaints& complaints)
                      "fuzzy: the plan is refused in the middle of the fuzzy values: " + why);
     return;
   }
-  for (size_t i = 0; i < n; ++i) {
-    const FuzzyValue& v = fuzzy.inputs[i];
-    for (const double end : {v.corners.front().first, v.corners.back().first}) {
-      std::vector<double> point = centre;
-      point[i] = end;
-      const std::string why = refusal(point);
-      if (why.empty()) continue;
-      complaints.error("E205", place_of(v),
-                       fmt::format("fuzzy: {}: {} is not possible: {}", v.path, text_of(v, end), why));
-      break;
-    }
-  }
+  try_ends(fuzzy.inputs, refusal, "fuzzy: ", place_of, complaints);
   if (complaints.error_count() > 0 || n > most_corner_inputs || plan.members.size() << n > most_corner_members) return;
-  int refused = 0;
-  std::string example;
-  for (unsigned corner = 0; corner < 1U << n; ++corner) {
-    std::vector<double> point;
-    std::string words;
-    for (size_t i = 0; i < n; ++i) {
-      const auto& corners = fuzzy.inputs[i].corners;
-      point.push_back(corner >> i & 1U ? corners.back().first : corners.front().first);
-      words.append(i ? ", " : "").append(text_of(fuzzy.inputs[i], point.back()));
-    }
-    const std::string why = refusal(point);
-    if (why.empty()) continue;
-    if (refused++ == 0) example = words.append(": ").append(why);
-  }
-  if (refused == 0) return;
+  const RefusedCorners corners = try_corners(fuzzy.inputs, refusal);
+  if (corners.count.empty()) return;
   complaints.warn("W507", place_of(fuzzy.inputs[0]),
-                  fmt::format("fuzzy: {} of {} corners of the fuzzy values are no plan; samples there count as failed",
-                              refused, 1U << n),
-                  "first: " + example);
+                  "fuzzy: " + corners.count + " of the fuzzy values are no plan; samples there count as failed",
+                  "first: " + corners.first);
 }
 
 }  // namespace topple::product

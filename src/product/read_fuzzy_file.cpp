@@ -171,8 +171,6 @@ void Reader::parse_formulas() {
 /// The centre and each end alone must give a section; corners that do not are told, since their samples will fail.
 void Reader::try_samples(std::vector<Diagnostic>& warnings) {
   const size_t n = out.inputs.size();
-  std::vector<double> centre;
-  for (const FuzzyValue& v : out.inputs) centre.push_back(0.5 * (core_of(v).first + core_of(v).second));
   const auto refusal = [&](const std::vector<double>& point) -> std::string {
     const std::vector<double> derived = calc_derived(out, point);
     for (size_t i = 0; i < derived.size(); ++i)
@@ -182,41 +180,18 @@ void Reader::try_samples(std::vector<Diagnostic>& warnings) {
       return {};
     } catch (const InputError& e) { return e.diagnostics().front().message; }
   };
-  if (const std::string why = refusal(centre); !why.empty())
+  if (const std::string why = refusal(centre_of(out.inputs)); !why.empty())
     complaints.error("E207", {}, "the section is refused in the middle of the fuzzy inputs: " + why);
-  for (size_t i = 0; i < n; ++i) {
-    const FuzzyValue& v = out.inputs[i];
-    for (const double end : {v.corners.front().first, v.corners.back().first}) {
-      std::vector<double> point = centre;
-      point[i] = end;
-      const std::string why = refusal(point);
-      if (why.empty()) continue;
-      complaints.error("E205", {v.where.line, v.where.column, static_cast<int>(v.path.size())},
-                       v.path + ": " + text_of(v, end) + " is not possible: " + why);
-      break;
-    }
-  }
+  const auto place_of = [](const FuzzyValue& v) {
+    return Place{v.where.line, v.where.column, static_cast<int>(v.path.size())};
+  };
+  try_ends(out.inputs, refusal, "", place_of, complaints);
   if (complaints.error_count() > 0 || n > most_corner_inputs) return;
-  int refused = 0;
-  std::string example;
-  for (unsigned corner = 0; corner < 1U << n; ++corner) {
-    std::vector<double> point;
-    std::string words;
-    for (size_t i = 0; i < n; ++i) {
-      const auto& corners = out.inputs[i].corners;
-      point.push_back(corner >> i & 1U ? corners.back().first : corners.front().first);
-      words.append(i ? ", " : "").append(text_of(out.inputs[i], point.back()));
-    }
-    const std::string why = refusal(point);
-    if (why.empty()) continue;
-    if (refused++ == 0) example = words.append(": ").append(why);
-  }
-  if (refused == 0) return;
+  const RefusedCorners corners = try_corners(out.inputs, refusal);
+  if (corners.count.empty()) return;
   Complaints more(out.path);
-  more.warn("W507", {},
-            fmt::format("{} of {} corners of the fuzzy inputs are no section; samples there count as failed", refused,
-                        1U << n),
-            "first: " + example);
+  more.warn("W507", {}, corners.count + " of the fuzzy inputs are no section; samples there count as failed",
+            "first: " + corners.first);
   warnings.insert(warnings.end(), more.all().begin(), more.all().end());
 }
 

@@ -10,7 +10,7 @@ namespace topple::product {
 
 namespace {
 
-constexpr int most_samples = 1000000;
+constexpr int most_samples = 100000000;
 constexpr size_t most_corners = 50, most_levels = 50, most_cuts = 25;
 constexpr Range anything{-1e12, 1e12};
 
@@ -160,6 +160,49 @@ void read_corners(TableReader& table, Dimension dimension, FuzzyValue& value) {
     value.corners.insert(value.corners.end(), right.rbegin(), right.rend());
   }
   if (table.complaints().error_count() == errors_before) check_corners(table, where, value);
+}
+
+std::vector<double> centre_of(const std::vector<FuzzyValue>& values) {
+  std::vector<double> centre;
+  for (const FuzzyValue& v : values) centre.push_back(0.5 * (core_of(v).first + core_of(v).second));
+  return centre;
+}
+
+void try_ends(const std::vector<FuzzyValue>& values, const FuzzyRefusal& refusal, const std::string& prefix,
+              const std::function<Place(const FuzzyValue&)>& place_of, Complaints& complaints) {
+  const std::vector<double> centre = centre_of(values);
+  for (size_t i = 0; i < values.size(); ++i) {
+    const FuzzyValue& v = values[i];
+    for (const double end : {v.corners.front().first, v.corners.back().first}) {
+      std::vector<double> point = centre;
+      point[i] = end;
+      const std::string why = refusal(point);
+      if (why.empty()) continue;
+      complaints.error("E205", place_of(v),
+                       fmt::format("{}{}: {} is not possible: {}", prefix, v.path, text_of(v, end), why));
+      break;
+    }
+  }
+}
+
+RefusedCorners try_corners(const std::vector<FuzzyValue>& values, const FuzzyRefusal& refusal) {
+  const unsigned corners = 1U << values.size();
+  RefusedCorners out;
+  int refused = 0;
+  for (unsigned corner = 0; corner < corners; ++corner) {
+    std::vector<double> point;
+    std::string words;
+    for (size_t i = 0; i < values.size(); ++i) {
+      const auto& hill = values[i].corners;
+      point.push_back(corner >> i & 1U ? hill.back().first : hill.front().first);
+      words.append(i ? ", " : "").append(text_of(values[i], point.back()));
+    }
+    const std::string why = refusal(point);
+    if (why.empty()) continue;
+    if (refused++ == 0) out.first = words.append(": ").append(why);
+  }
+  if (refused > 0) out.count = fmt::format("{} of {} corners", refused, corners);
+  return out;
 }
 
 FuzzySearch read_search(TableReader& parent) {

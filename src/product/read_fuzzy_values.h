@@ -1,6 +1,7 @@
 #pragma once
 /// Reading of fuzzy values, shared by plans and section files.
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,20 @@ inline constexpr const char* fuzzy_help =
 std::string find_fuzzy_way(const TableReader&, Place where);
 /// Corners out of any way but a formula; complains about values that are none.
 void read_corners(TableReader&, Dimension, FuzzyValue&);
+/// Why a point of fuzzy values gives no plan or section; empty: it gives one.
+using FuzzyRefusal = std::function<std::string(const std::vector<double>& point)>;
+/// The middle of each core.
+std::vector<double> centre_of(const std::vector<FuzzyValue>&);
+/// Complains of each value one of whose ends alone is refused.
+///   prefix    of the complaint
+///   place_of  where the value stands
+void try_ends(const std::vector<FuzzyValue>&, const FuzzyRefusal&, const std::string& prefix,
+              const std::function<Place(const FuzzyValue&)>& place_of, Complaints&);
+/// Corners of the support that are refused: "2 of 8 corners", and the first of them with its reason; empty: none.
+struct RefusedCorners {
+  std::string count, first;
+};
+RefusedCorners try_corners(const std::vector<FuzzyValue>&, const FuzzyRefusal&);
 /// The table [search].
 FuzzySearch read_search(TableReader& parent);
 /// Parses a formula at `node`; a fault becomes a complaint at its character.

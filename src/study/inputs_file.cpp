@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "product/expression.h"
+#include "product/read_fuzzy_values.h"
 #include "product/table_reader.h"
 
 namespace topple::study {
@@ -23,8 +24,7 @@ using product::Place;
 using product::TableReader;
 using uncertainty::FuzzyNumber;
 
-constexpr std::size_t most_inputs = 50, most_corners = 1000, most_levels = 50;
-constexpr int most_samples = 100000000;
+constexpr std::size_t most_inputs = 50, most_corners = 1000;
 
 struct Reader {
   Problem& out;
@@ -240,26 +240,6 @@ struct Reader {
     constraint_places.push_back(item.place);
   }
 
-  void read_search(TableReader& root) {
-    const Node* node = root.table("search");
-    if (!node) return;
-    TableReader table(*node, "search", complaints);
-    if (const Node* list = table.find("levels")) {
-      if (list->kind != Node::Kind::Array || list->items.empty() || list->items.size() > most_levels) {
-        table.error("E202", list->place, "levels: a list of 1 to 50 numbers is wanted", "such as [0, 0.5, 1]");
-      } else if (const auto levels = read_numbers(*list, "levels", 0)) {
-        for (const double a : *levels)
-          if (!(a >= 0 && a <= 1))
-            table.error("E205", list->place, fmt::format("levels: {} is not between 0 and 1", a));
-        out.levels = *levels;
-      }
-    }
-    out.limit = static_cast<int>(table.find_integer("samples", 10, most_samples).value_or(0));
-    out.seed =
-        static_cast<std::uint64_t>(table.find_integer("seed", 0, std::numeric_limits<std::int64_t>::max()).value_or(1));
-    table.finish();
-  }
-
   /// Gives the problem its functions, and tries them at the middle.
   void finish() {
     if (!formulas.empty())
@@ -320,7 +300,8 @@ Problem read_inputs_text(const std::string& text, const std::string& name) {
   } else {
     root.table("derived"), root.table("interaction");
   }
-  reader.read_search(root);
+  const product::FuzzySearch search = product::read_search(root);
+  out.levels = search.levels, out.limit = search.limit, out.seed = search.seed;
   root.finish();
   if (complaints.error_count() == 0) reader.finish();
   complaints.sort();
