@@ -1,9 +1,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "record/rcc_numbers.h"
 #include "record/rcc_report.h"
 
 namespace topple::record {
@@ -12,28 +12,12 @@ namespace {
 
 using json = nlohmann::ordered_json;
 
-constexpr const char* line_end = "\r\n";  // RFC 4180
-
-/// JSON has no NaN and no infinity.
-json number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
-
-json numbers(const std::vector<double>& values) {
-  json list = json::array();
-  for (const double value : values) list.push_back(number(value));
-  return list;
-}
-
-/// The shortest digits that give the same number back; not a number is an empty field.
-std::string digits(double value) { return std::isfinite(value) ? fmt::format("{}", value) : std::string(); }
-
 std::string quoted(const std::string& text) {
   if (text.find_first_of("\",\r\n") == std::string::npos) return text;
   std::string out = "\"";
   for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
   return out + '"';
 }
-
-const char* sign_of(int direction) { return direction < 0 ? "-" : "+"; }
 
 json to_json(const RccPoint& p) { return {{"rotation", number(p.rotation)}, {"moment", number(p.moment)}}; }
 

@@ -8,6 +8,7 @@
 
 #include "base/unit.h"
 #include "record/plot.h"
+#include "record/rcc_numbers.h"
 #include "record/rcc_page.h"
 
 namespace topple::record {
@@ -16,17 +17,7 @@ namespace {
 
 using json = nlohmann::ordered_json;
 
-constexpr const char* line_end = "\r\n";
 constexpr double mrad = 1e-3;
-
-json number(double v) { return std::isfinite(v) ? json(v) : json(nullptr); }
-json numbers(const std::vector<double>& list) {
-  json out = json::array();
-  for (const double v : list) out.push_back(number(v));
-  return out;
-}
-std::string digits(double v) { return std::isfinite(v) ? fmt::format("{}", v) : std::string(); }
-const char* sign_of(int direction) { return direction < 0 ? "-" : "+"; }
 
 json to_json(const RccInterval& i) {
   return {{"alpha", i.alpha}, {"left", number(i.left)}, {"right", number(i.right)}};
