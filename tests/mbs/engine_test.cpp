@@ -15,6 +15,7 @@
 namespace topple::mbs {
 namespace {
 
+using test::hash_of;
 using test::make_box;
 using testing::HasSubstr;
 
@@ -73,21 +74,6 @@ Column make_column() {
   c.top = add_element(c.model, upright_element("top", piece, {0, 0, 0.5}, block, {0, 0, -1}, 8e8));
   for (ZoneElement& e : c.model.elements) e.stations = {{0, c.strong}};
   return c;
-}
-
-std::uint64_t hash_of(const View& v) {
-  std::uint64_t h = 1469598103934665603ULL;
-  const auto add = [&](double x) {
-    std::uint64_t bits;
-    std::memcpy(&bits, &x, sizeof bits);
-    h = (h ^ bits) * 1099511628211ULL;
-  };
-  for (const Pose& X : v.X_WB)
-    for (const double x : {X.p.x, X.p.y, X.p.z, X.q.w, X.q.x, X.q.y, X.q.z}) add(x);
-  for (const Vec3& u : v.v_WB)
-    for (int i = 0; i < 3; ++i) add(u[i]);
-  add(v.energy.residual);
-  return h;
 }
 
 std::string complaint_of(const std::function<void()>& f) {

@@ -8,9 +8,12 @@
 #include "mbs/batch.h"
 #include "mbs/system.h"
 #include "mechanisms.h"
+#include "models.h"
 
 namespace topple::mbs {
 namespace {
+
+using test::hash_of;
 
 constexpr Joint::Kind kPaired[] = {Joint::Kind::Fixed, Joint::Kind::Spherical, Joint::Kind::Universal,
                                    Joint::Kind::Revolute};
@@ -154,22 +157,6 @@ TEST(JointKernel, LeavesWhatTurnsTooFastToTheGeneralSolver) {
     }
     EXPECT_LT(s.state.largest_drift, 1e-11);
   }
-}
-
-std::uint64_t hash_of(const View& v) {
-  std::uint64_t h = 1469598103934665603ULL;
-  const auto add = [&](double x) {
-    std::uint64_t bits;
-    std::memcpy(&bits, &x, sizeof bits);
-    h = (h ^ bits) * 1099511628211ULL;
-  };
-  for (const Pose& X : v.X_WB)
-    for (const double x : {X.p.x, X.p.y, X.p.z, X.q.w, X.q.x, X.q.y, X.q.z}) add(x);
-  for (const auto* list : {&v.joint_force, &v.joint_moment, &v.v_WB, &v.w_WB})
-    for (const Vec3& x : *list) add(x.x), add(x.y), add(x.z);
-  for (const double x : v.joint_angle) add(x);
-  add(v.energy.residual);
-  return h;
 }
 
 TEST(JointKernelReplay, SamplesOfABatchHaveTheBitsOfTheirRuns) {

@@ -138,6 +138,9 @@ inline std::uint64_t hash_of(const View& v) {
   for (const Pose& X : v.X_WB) {
     for (const double x : {X.p.x, X.p.y, X.p.z, X.q.w, X.q.x, X.q.y, X.q.z}) add(x);
   }
+  for (const auto* list : {&v.v_WB, &v.w_WB, &v.joint_force, &v.joint_moment})
+    for (const Vec3& x : *list) add(x.x), add(x.y), add(x.z);
+  for (const double x : v.joint_angle) add(x);
   add(v.energy.residual);
   add(v.energy.friction);
   return h;
