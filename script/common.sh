@@ -17,21 +17,21 @@ has_node() {
     node -e 'const [a, b] = process.versions.node.split(".").map(Number); process.exit(a > 18 || (a === 18 && b >= 13) ? 0 : 1)' >/dev/null 2>&1
 }
 
-# build_page demo|test: web/dist/report.html from the sources in web/; "test" also fetches what checks it
+# build_page demo|test: web/dist/*.html from the sources in web/; "test" also fetches what checks it
 build_page() {
   local want=$1 stamp=web/node_modules/.topple lock have page=web/dist/report.html options=(--no-audit --no-fund)
   lock="$(sha256sum <web/package-lock.json | cut -d' ' -f1) node $(node -p process.versions.modules)"
   have=$(cat "$stamp" 2>/dev/null || true)
   if [[ $have != "$lock test" && $have != "$lock $want" ]]; then
-    say "fetching the page's libraries (npm ci)"
+    say "fetching the pages' libraries (npm ci)"
     [[ $want == test ]] || options+=(--omit=dev)
     (cd web && npm ci "${options[@]}") ||
       fail "npm ci failed in web/" "it needs the npm registry that your .npmrc names"
     printf '%s' "$lock $want" >"$stamp"
   fi
   if [[ ! -s $page || -n $(find web/src web/build.mjs web/package.json web/package-lock.json -newer "$page" -print -quit) ]]; then
-    say "building the report page"
-    (cd web && npm run --silent build) || fail "the report page could not be built" "rm -rf web/node_modules and try again"
+    say "building the pages"
+    (cd web && npm run --silent build) || fail "the pages could not be built" "rm -rf web/node_modules and try again"
   fi
 }
 

@@ -1,21 +1,41 @@
-# The report page: its types, the page with made-up data in a browser, and the page of a short run.
+# The pages: their types, what needs no browser, and each page in a browser. A test file that hangs ends itself before
+# its TIMEOUT (web/test/harness.mjs).
 find_program(NPM npm)
-if(NOT NPM)
-  message(STATUS "npm not found: the report page is not tested")
+find_program(NODE node)
+if(NOT NPM OR NOT NODE)
+  message(STATUS "node or npm not found: the pages are not tested")
   return()
 endif()
 set(web ${CMAKE_SOURCE_DIR}/web)
 add_test(NAME web_check COMMAND ${NPM} run --silent check WORKING_DIRECTORY ${web})
-add_test(NAME web_page COMMAND ${NPM} test --silent WORKING_DIRECTORY ${web})
-set_tests_properties(web_check web_page PROPERTIES LABELS web TIMEOUT 300)
-set_tests_properties(web_page PROPERTIES RESOURCE_LOCK chromium)
+set_tests_properties(web_check PROPERTIES LABELS web TIMEOUT 300)
+
+# topple_web_test(NAME FILE [BROWSER] [LIMIT seconds] [FIXTURES names] [ENVIRONMENT NAME=VALUE ...])
+# Tests with a browser run one at a time.
+function(topple_web_test name file)
+  cmake_parse_arguments(ARG "BROWSER" "LIMIT" "FIXTURES;ENVIRONMENT" ${ARGN})
+  if(NOT ARG_LIMIT)
+    set(ARG_LIMIT 360)
+  endif()
+  math(EXPR timeout "${ARG_LIMIT} + 60")
+  add_test(NAME ${name} COMMAND ${NODE} --test test/${file} WORKING_DIRECTORY ${web})
+  set_tests_properties(${name} PROPERTIES LABELS web TIMEOUT ${timeout}
+                                          ENVIRONMENT "TOPPLE_WEB_LIMIT=${ARG_LIMIT};${ARG_ENVIRONMENT}")
+  if(ARG_BROWSER)
+    set_tests_properties(${name} PROPERTIES RESOURCE_LOCK chromium)
+  endif()
+  if(ARG_FIXTURES)
+    set_tests_properties(${name} PROPERTIES FIXTURES_REQUIRED "${ARG_FIXTURES}")
+  endif()
+endfunction()
+
+topple_web_test(web_data data.test.mjs)
+topple_web_test(web_harness harness.test.mjs)
+topple_web_test(web_report report.test.mjs BROWSER)
 
 if(TARGET topple)
   set(short_run ${CMAKE_CURRENT_BINARY_DIR}/short_run)
   add_test(NAME web_short_run COMMAND topple run ${CMAKE_CURRENT_SOURCE_DIR}/data/short.toml -o ${short_run})
   set_tests_properties(web_short_run PROPERTIES LABELS web FIXTURES_SETUP short_run TIMEOUT 120)
-  add_test(NAME web_report COMMAND ${NPM} test --silent WORKING_DIRECTORY ${web})
-  set_tests_properties(
-    web_report PROPERTIES LABELS web FIXTURES_REQUIRED short_run RESOURCE_LOCK chromium TIMEOUT 300
-                          ENVIRONMENT "TOPPLE_REPORT=${short_run}/report.html")
+  topple_web_test(web_report_run report.test.mjs BROWSER FIXTURES short_run ENVIRONMENT TOPPLE_REPORT=${short_run}/report.html)
 endif()

@@ -399,6 +399,19 @@ export class Scene {
     this.renderer.render(this.scene, this.camera);
   }
 
+  dispose(): void {
+    this.controls.dispose();
+    this.scene.traverse((object) => {
+      const { geometry, material } = object as Partial<THREE.Mesh>;
+      geometry?.dispose();
+      for (const one of Array.isArray(material) ? material : [material]) {
+        (one as THREE.SpriteMaterial | undefined)?.map?.dispose();
+        one?.dispose();
+      }
+    });
+    this.renderer.dispose();
+  }
+
   /// Pictures of the run at given times, on a light ground so that they print well.
   makeStills(times: readonly number[], width: number, height: number): string[] {
     const { time, selected, dark, colouring, zoneMarks } = this;

@@ -1,6 +1,8 @@
-import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { effect } from "@preact/signals";
+import { useMemo, useRef, useState } from "preact/hooks";
+import { NoWebGl } from "./no_webgl";
 import { Scene, type View } from "./scene";
+import { useSceneView } from "./scene_view";
 import { ZoneSign } from "./signs";
 import type { Colouring, State, ZoneMarks } from "./state";
 import { colourOfKind, rampCss, wordOfKind, zoneStates } from "./vocabulary";
@@ -73,49 +75,23 @@ function Legend(props: { state: State; gridStep: number }) {
 
 export function View3D(props: { state: State; onReady: (scene: Scene | undefined) => void; fitRef: { current: () => void } }) {
   const { state } = props;
-  const frameRef = useRef<HTMLDivElement>(null);
-  const canvasRef = useRef<HTMLCanvasElement>(null);
-  const sceneRef = useRef<Scene>();
-  const [problem, setProblem] = useState("");
   const [gridStep, setGridStep] = useState(0);
   const [hover, setHover] = useState<{ x: number; y: number; name: string }>();
-
-  useEffect(() => {
-    const canvas = canvasRef.current;
-    const frame = frameRef.current;
-    if (canvas === null || frame === null) return;
-    let scene: Scene;
-    try {
-      scene = new Scene(canvas, state.run, findZonesOfBodies(state.run));
-    } catch (error) {
-      setProblem(error instanceof Error ? error.message : String(error));
-      props.onReady(undefined);
-      return;
-    }
-    sceneRef.current = scene;
-    setGridStep(scene.gridStep);
-    props.fitRef.current = () => scene.fit();
-    let due = false;
-    scene.onChange = () => {
-      if (due) return;
-      due = true;
-      requestAnimationFrame(() => {
-        due = false;
-        scene.render();
-      });
-    };
-    const dark = matchMedia("(prefers-color-scheme: dark)");
-    const useTheme = (): void => scene.setDark(dark.matches);
-    dark.addEventListener("change", useTheme);
-    useTheme();
-    const resize = (): void => scene.resize(frame.clientWidth, frame.clientHeight);
-    resize();
-    scene.fit("oblique");
-    new ResizeObserver(resize).observe(frame);
-    effect(() => scene.setTime(state.time.value));
-    effect(() => scene.setLook(state.colouring.value, state.zoneMarks.value, state.selected.value));
-    props.onReady(scene);
-  }, []);
+  const { frameRef, canvasRef, sceneRef, problem } = useSceneView(
+    (canvas) => new Scene(canvas, state.run, findZonesOfBodies(state.run)),
+    (scene) => {
+      setGridStep(scene.gridStep);
+      props.fitRef.current = () => scene.fit();
+      scene.fit("oblique");
+      const stops = [
+        effect(() => scene.setTime(state.time.value)),
+        effect(() => scene.setLook(state.colouring.value, state.zoneMarks.value, state.selected.value)),
+      ];
+      props.onReady(scene);
+      return () => stops.forEach((stop) => stop());
+    },
+    () => props.onReady(undefined),
+  );
 
   // A click picks; a drag turns the view.
   const pressed = useRef<[number, number]>([0, 0]);
@@ -187,12 +163,7 @@ export function View3D(props: { state: State; onReady: (scene: Scene | undefined
           onPointerLeave={() => setHover(undefined)}
         />
         {problem !== "" && (
-          <div class="no-webgl" role="alert" data-test="no-webgl">
-            <p><strong>This browser shows no 3D picture (WebGL is not available).</strong></p>
-            <p>Findings, plots, events and tables on this page are complete. To see the playback, switch on hardware
-              acceleration or open the file in another browser.</p>
-            <p class="quiet">{problem}</p>
-          </div>
+          <NoWebGl problem={problem} />
         )}
         {problem === "" && empty && <p class="canvas-note">The record holds no frames: there is nothing to play.</p>}
         {hover !== undefined && (

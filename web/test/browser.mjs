@@ -3,6 +3,7 @@ import { mkdtemp, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { chromium } from "playwright-core";
+import { keep } from "./harness.mjs";
 
 const executablePath = process.env.TOPPLE_CHROMIUM ?? "/usr/bin/chromium";
 const quiet = [
@@ -12,10 +13,18 @@ const quiet = [
 const softwareGl = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
 const noGl = ["--disable-3d-apis"];
 
-/// Opens a page from disk. `problems` collects errors of the page and every request beyond the file itself.
-export async function openPage(path, { webgl = true, ...options } = {}) {
+/// Opens a page from disk, or from the address of a server. `problems` collects errors of the page and every request
+/// beyond the file or the server itself. The browser is closed after the file at the latest.
+export async function openPage(place, { webgl = true, ...options } = {}) {
+  const address = /^http:/.test(place) ? place : `file://${place}`;
+  const origin = /^http:\/\/[^/]*\//.exec(address)?.[0];
   const profile = await mkdtemp(join(tmpdir(), "topple-chromium-"));
-  const context = await chromium.launchPersistentContext(profile, {
+  let context;
+  const close = keep(async () => {
+    await context?.close();
+    await rm(profile, { recursive: true, force: true, maxRetries: 3 });
+  });
+  context = await chromium.launchPersistentContext(profile, {
     executablePath, headless: true, viewport: { width: 1440, height: 900 },
     args: [...quiet, ...(webgl ? softwareGl : noGl)], ...options,
   });
@@ -28,16 +37,12 @@ export async function openPage(path, { webgl = true, ...options } = {}) {
     void dialog.dismiss();
   });
   page.on("request", (request) => {
-    if (!/^(file|data|blob):/.test(request.url())) problems.push(`request: ${request.url()}`);
+    const url = request.url();
+    const ours = origin === undefined ? /^file:/.test(url) : url.startsWith(origin);
+    if (!ours && !/^(data|blob):/.test(url)) problems.push(`request: ${url}`);
   });
-  await page.goto(`file://${path}`);
-  await page.waitForSelector("html[data-ready=yes]", { timeout: 60000 });
-  return {
-    page,
-    problems,
-    async close() {
-      await context.close();
-      await rm(profile, { recursive: true, force: true });
-    },
-  };
+  page.setDefaultTimeout(60000);
+  await page.goto(address);
+  await page.waitForSelector("html[data-ready=yes]");
+  return { page, problems, close };
 }
