@@ -89,10 +89,14 @@ export interface Run {
   zones: Zone[];
   time: number[]; // (S)
   series: Series[];
-  position: Float32Array; // (S x B x 3)
-  orientation: Float32Array; // (S x B x 4), w x y z
-  zone_state: Uint8Array; // (S x Z)
-  zone_utilisation: Float32Array; // (S x Z)
+  frames: Frame[]; // (S)
+}
+
+/// What is kept of one moment.
+export interface Frame {
+  pose: Float32Array; // (B x 7): position x y z [m], orientation w x y z
+  utilisation: Float32Array; // (Z)
+  state: Uint8Array; // (Z)
 }
 
 export function decodeBytes(text: string): Uint8Array {
@@ -113,27 +117,37 @@ export function decodeFloats(text: string): Float32Array {
 
 /// Throws an Error with a sentence for people if the text is not the data of a run.
 export function readRun(text: string): Run {
-  // eslint-disable-next-line @typescript-eslint/no-explicit-any -- the one place where untyped data comes in
-  const raw = JSON.parse(text) as any;
+  return makeRun(JSON.parse(text));
+}
+
+/// The same from what JSON.parse gave.
+// eslint-disable-next-line @typescript-eslint/no-explicit-any -- the one place where untyped data comes in
+export function makeRun(raw: any): Run {
   if (raw === null || typeof raw !== "object" || raw.format !== "topple-report")
     throw new Error("This file does not hold the data of a run.");
   if (raw.version !== 1) throw new Error(`The data of this report has version ${raw.version}; this page reads version 1.`);
-  const run: Run = {
-    ...raw,
-    position: decodeFloats(raw.position),
-    orientation: decodeFloats(raw.orientation),
-    zone_state: decodeBytes(raw.zone_state),
-    zone_utilisation: decodeFloats(raw.zone_utilisation),
-  };
-  const S = run.time.length;
+  const { position, orientation, zone_state, zone_utilisation, ...rest } = raw;
+  const run: Run = { ...rest, frames: [] };
+  const S = run.time.length, B = run.bodies.length, Z = run.zones.length;
   const expect = (what: string, size: number, expected: number): void => {
     if (size !== expected) throw new Error(`The data of this report is damaged: ${what} has ${size} values, not ${expected}.`);
   };
-  expect("position", run.position.length, S * run.bodies.length * 3);
-  expect("orientation", run.orientation.length, S * run.bodies.length * 4);
-  expect("zone_state", run.zone_state.length, S * run.zones.length);
-  expect("zone_utilisation", run.zone_utilisation.length, S * run.zones.length);
+  const positions = decodeFloats(position), orientations = decodeFloats(orientation);
+  const states = decodeBytes(zone_state), utilisations = decodeFloats(zone_utilisation);
+  expect("position", positions.length, S * B * 3);
+  expect("orientation", orientations.length, S * B * 4);
+  expect("zone_state", states.length, S * Z);
+  expect("zone_utilisation", utilisations.length, S * Z);
   for (const series of run.series) expect(series.id, series.value.length, S);
+  for (let s = 0; s < S; ++s) {
+    const pose = new Float32Array(7 * B);
+    for (let b = 0; b < B; ++b) {
+      const i = s * B + b;
+      for (let k = 0; k < 3; ++k) pose[7 * b + k] = positions[3 * i + k] as number;
+      for (let k = 0; k < 4; ++k) pose[7 * b + 3 + k] = orientations[4 * i + k] as number;
+    }
+    run.frames.push({ pose, utilisation: utilisations.subarray(s * Z, (s + 1) * Z), state: states.subarray(s * Z, (s + 1) * Z) });
+  }
   return run;
 }
 
@@ -153,10 +167,10 @@ export function findFrame(time: readonly number[], t: number): { frame: number; 
   return { frame: low, fraction: (t - begin) / ((time[high] as number) - begin) };
 }
 
-/// out = the way from quaternion a (at index i of q) to b (at index j), at constant angular speed. w x y z.
-export function slerp(q: Float32Array, i: number, j: number, s: number, out: Quadruple): void {
-  const aw = q[i] as number, ax = q[i + 1] as number, ay = q[i + 2] as number, az = q[i + 3] as number;
-  let bw = q[j] as number, bx = q[j + 1] as number, by = q[j + 2] as number, bz = q[j + 3] as number;
+/// out = the way from the quaternion at index i of a to that at index j of b, at constant angular speed. w x y z.
+export function slerp(a: Float32Array, i: number, b: Float32Array, j: number, s: number, out: Quadruple): void {
+  const aw = a[i] as number, ax = a[i + 1] as number, ay = a[i + 2] as number, az = a[i + 3] as number;
+  let bw = b[j] as number, bx = b[j + 1] as number, by = b[j + 2] as number, bz = b[j + 3] as number;
   let cosine = aw * bw + ax * bx + ay * by + az * bz;
   if (cosine < 0) {
     cosine = -cosine;
@@ -174,16 +188,15 @@ export function slerp(q: Float32Array, i: number, j: number, s: number, out: Qua
   out[0] = w / length; out[1] = x / length; out[2] = y / length; out[3] = z / length;
 }
 
-/// Pose of one body at time t; false where the record holds no finite pose.
+/// Pose of one body on the way from frame `frame` to the next; false where the record holds no finite pose.
 export function calcPose(run: Run, body: number, frame: number, fraction: number, p: Triple, q: Quadruple): boolean {
-  const B = run.bodies.length;
-  const next = fraction > 0 ? frame + 1 : frame;
-  const i = 3 * (frame * B + body);
-  const j = 3 * (next * B + body);
+  const a = (run.frames[frame] as Frame).pose;
+  const b = fraction > 0 ? (run.frames[frame + 1] as Frame).pose : a;
+  const i = 7 * body;
   for (let k = 0; k < 3; ++k) {
-    const a = run.position[i + k] as number;
-    p[k] = a + fraction * ((run.position[j + k] as number) - a);
+    const begin = a[i + k] as number;
+    p[k] = begin + fraction * ((b[i + k] as number) - begin);
   }
-  slerp(run.orientation, 4 * (frame * B + body), 4 * (next * B + body), fraction, q);
+  slerp(a, i + 3, b, i + 3, fraction, q);
   return Number.isFinite(p[0] + p[1] + p[2] + q[0] + q[1] + q[2] + q[3]);
 }

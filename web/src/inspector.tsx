@@ -26,7 +26,6 @@ export function Inspector(props: { state: State }) {
   const placed = run.time.length > 0 && calcPose(run, index, frame, fraction, p, q) && calcPose(run, index, 0, 0, p0, q0);
   const moved = Math.hypot(p[0] - p0[0], p[1] - p0[1], p[2] - p0[2]);
   const zones = zonesOfBody[index] ?? [];
-  const Z = run.zones.length;
   const names = new Set([body.name, ...zones.map((z) => run.zones[z]?.name ?? "")]);
   const events = run.events.filter((e) => names.has(e.subject)).slice(0, 20);
 
@@ -57,13 +56,13 @@ export function Inspector(props: { state: State }) {
       {zones.map((z) => {
         const zone = run.zones[z];
         if (zone === undefined) return null;
-        const has = run.time.length > 0;
-        const utilisation = has ? (run.zone_utilisation[frame * Z + z] as number) : NaN;
+        const now = run.frames[frame];
+        const utilisation = now?.utilisation[z] ?? NaN;
         return (
           <div class="zone">
             <p class="zone-head">
               <strong>{zone.name}</strong>
-              {has && <ZoneStateWord state={run.zone_state[frame * Z + z] as number} />}
+              {now !== undefined && <ZoneStateWord state={now.state[z] as number} />}
             </p>
             <p class="quiet">{zone.subsystem}</p>
             <p class="zone-use">

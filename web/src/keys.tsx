@@ -25,7 +25,7 @@ export function listenToKeys(state: State, fit: () => void): void {
       ArrowLeft: () => (event.shiftKey ? state.stepEvent(-1) : state.stepFrame(-1)),
       ArrowRight: () => (event.shiftKey ? state.stepEvent(1) : state.stepFrame(1)),
       Home: () => state.pauseAt(state.begin),
-      End: () => state.pauseAt(state.end),
+      End: () => state.pauseAt(state.end.value),
       f: fit,
       F: fit,
       "?": () => (state.helpOpen.value = !state.helpOpen.value),

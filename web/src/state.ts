@@ -4,24 +4,38 @@ import type { Run } from "./data";
 import { findFrame } from "./data";
 import { wordsOfEvent } from "./vocabulary";
 
-export type Colouring = "kind" | "state" | "utilisation";
+export type Colouring = "kind" | "material" | "state" | "utilisation" | "speed";
 export type ZoneMarks = "damaged" | "all" | "none";
 
 export const speeds = [0.1, 0.25, 0.5, 1, 2, 4];
 export const reducedMotion = (): boolean => matchMedia("(prefers-reduced-motion: reduce)").matches;
 
-export function makeState(run: Run) {
+/// How the picture looks; the runs of one page share it.
+export function makeLook() {
+  return {
+    selected: signal(-1),
+    colouring: signal<Colouring>("kind"),
+    zoneMarks: signal<ZoneMarks>("damaged"),
+    helpOpen: signal(false),
+    speed: signal(1),
+  };
+}
+export type Look = ReturnType<typeof makeLook>;
+
+export function makeState(run: Run, look: Look = makeLook()) {
   const begin = run.time[0] ?? 0;
-  const end = run.time[run.time.length - 1] ?? 0;
+  /// Rises when frames, events or series have been added to the run.
+  const grown = signal(0);
+  const end = computed(() => (grown.value, run.time[run.time.length - 1] ?? 0));
   const time = signal(begin);
   const playing = signal(false);
   const hiddenKinds = signal<ReadonlySet<string>>(chooseHiddenKinds(run));
-  const frame = computed(() => findFrame(run.time, time.value).frame);
-  const inOrder = [...run.events].sort((a, b) => a.time - b.time);
-  const shownEvents = computed(() => inOrder.filter((e) => !hiddenKinds.value.has(e.kind)));
+  const frame = computed(() => (grown.value, findFrame(run.time, time.value).frame));
+  const inOrder = computed(() => (grown.value, [...run.events].sort((a, b) => a.time - b.time)));
+  const shownEvents = computed(() => inOrder.value.filter((e) => !hiddenKinds.value.has(e.kind)));
 
   const seek = (t: number): void => {
-    time.value = Math.min(end, Math.max(begin, t));
+    time.value = Math.min(end.peek(), Math.max(begin, t));
   };
   const pauseAt = (t: number): void => {
     playing.value = false;
@@ -34,19 +48,16 @@ export function makeState(run: Run) {
     end,
     time,
     frame,
+    grown,
     playing,
-    speed: signal(1),
-    selected: signal(-1),
-    colouring: signal<Colouring>("kind"),
-    zoneMarks: signal<ZoneMarks>("damaged"),
+    ...look,
     hiddenKinds,
     shownEvents,
-    helpOpen: signal(false),
     seek,
     pauseAt,
     togglePlay(): void {
       if (run.time.length < 2) return;
-      if (!playing.value && time.value >= end) seek(begin);
+      if (!playing.value && time.value >= end.value) seek(begin);
       playing.value = !playing.value;
     },
     stepFrame(direction: 1 | -1): void {
@@ -57,11 +68,11 @@ export function makeState(run: Run) {
     /// To the next moment at which a shown event happens; events of one moment count as one.
     stepEvent(direction: 1 | -1): void {
       const apart = 1e-6;
-      const times = shownEvents.value.map((e) => e.time).filter((t) => t >= begin && t <= end);
+      const times = shownEvents.value.map((e) => e.time).filter((t) => t >= begin && t <= end.value);
       const t = time.value;
       const ahead = direction > 0 ? times.filter((s) => s > t + apart) : times.filter((s) => s < t - apart);
       if (ahead.length > 0) pauseAt(direction > 0 ? Math.min(...ahead) : Math.max(...ahead));
-      else pauseAt(direction > 0 ? end : begin);
+      else pauseAt(direction > 0 ? end.value : begin);
     },
   };
 }
@@ -97,7 +108,7 @@ export function runClock(state: State): void {
       last = now;
       // A tab that slept does not leap.
       state.seek(state.time.value + Math.min(passed, 0.5) * state.speed.value);
-      if (state.time.value >= state.end) state.playing.value = false;
+      if (state.time.value >= state.end.value) state.playing.value = false;
     }
     requestAnimationFrame(tick);
   };

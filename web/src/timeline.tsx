@@ -14,10 +14,10 @@ interface Marker {
 
 /// Events so near to each other that their signs would touch share one.
 function makeMarkers(state: State): Marker[] {
-  const span = state.end - state.begin;
+  const span = state.end.value - state.begin;
   const markers: Marker[] = [];
   for (const event of state.shownEvents.value) {
-    if (event.time < state.begin || event.time > state.end) continue;
+    if (event.time < state.begin || event.time > state.end.value) continue;
     const at = span > 0 ? (event.time - state.begin) / span : 0;
     const lane = wordsOfEvent(event.kind).small ? 1 : 0;
     const near = markers.find((m) => m.lane === lane && m.kind === event.kind && at - m.at < 0.012);
@@ -104,7 +104,7 @@ function Slider(props: { state: State }) {
       aria-label="Time"
       aria-valuetext={formatTime(state.time.value)}
       min={state.begin}
-      max={state.end}
+      max={state.end.value}
       step="any"
       value={state.time.value}
       disabled={state.run.time.length < 2}
@@ -118,7 +118,7 @@ function Clock(props: { state: State }) {
   const frames = state.run.time.length;
   return (
     <span class="clock">
-      <strong data-test="time">{formatTime(state.time.value)}</strong> of {formatTime(state.end)}
+      <strong data-test="time">{formatTime(state.time.value)}</strong> of {formatTime(state.end.value)}
       <span class="quiet">
         {" "}
         · frame {frames === 0 ? 0 : state.frame.value + 1} of {frames}
@@ -150,7 +150,7 @@ export function Timeline(props: { state: State }) {
         />
         <IconButton icon="step" label="Next frame" keys="→" onClick={() => state.stepFrame(1)} />
         <IconButton icon="event" label="Next event" keys="Shift+→" onClick={() => state.stepEvent(1)} />
-        <IconButton icon="end" label="To the end" keys="End" onClick={() => state.pauseAt(state.end)} />
+        <IconButton icon="end" label="To the end" keys="End" onClick={() => state.pauseAt(state.end.value)} />
         <label>
           Speed{" "}
           <select value={String(state.speed.value)} onChange={(e) => (state.speed.value = Number(e.currentTarget.value))}>

@@ -5,8 +5,8 @@ import { Scene, type View } from "./scene";
 import { useSceneView } from "./scene_view";
 import { ZoneSign } from "./signs";
 import type { Colouring, State, ZoneMarks } from "./state";
-import { colourOfKind, rampCss, wordOfKind, zoneStates } from "./vocabulary";
-import { findParts, findZonesOfBodies } from "./zones";
+import { colourOfKind, colourOfMaterial, highestSpeed, rampCss, wordOfKind, zoneStates } from "./vocabulary";
+import { findMaterials, findParts } from "./zones";
 
 const views: [View, string, string][] = [
   ["oblique", "Oblique", "From the front left"],
@@ -15,10 +15,19 @@ const views: [View, string, string][] = [
   ["top", "Top", "From above"],
 ];
 
-function Legend(props: { state: State; gridStep: number }) {
+export const colourings: [Colouring, string][] = [
+  ["kind", "kind of member"],
+  ["material", "material"],
+  ["state", "state of its zones"],
+  ["utilisation", "utilisation"],
+  ["speed", "speed"],
+];
+
+export function Legend(props: { state: State; gridStep: number }) {
   const { state } = props;
   const { run } = state;
   const kinds = useMemo(() => findParts(run), [run]);
+  const materials = useMemo(() => findMaterials(run), [run]);
   const colouring = state.colouring.value;
   const marks = state.zoneMarks.value;
   const buildings = run.neighbours.some((n) => !n.is_utility);
@@ -32,6 +41,17 @@ function Legend(props: { state: State; gridStep: number }) {
               <i class="swatch" style={{ background: colourOfKind(kind, kinds) }} /> {wordOfKind(kind)}
             </span>
           ))}
+        {colouring === "material" &&
+          materials.map((name) => (
+            <span class="with-sign">
+              <i class="swatch" style={{ background: colourOfMaterial(name, materials) }} /> {name || "not given"}
+            </span>
+          ))}
+        {colouring === "speed" && (
+          <span class="with-sign">
+            speed 0 <i class="ramp" style={{ background: rampCss }} /> {highestSpeed} m/s and more
+          </span>
+        )}
         {colouring === "utilisation" && (
           <span class="with-sign">
             utilisation 0 <i class="ramp" style={{ background: rampCss }} /> 1 and more
@@ -78,7 +98,7 @@ export function View3D(props: { state: State; onReady: (scene: Scene | undefined
   const [gridStep, setGridStep] = useState(0);
   const [hover, setHover] = useState<{ x: number; y: number; name: string }>();
   const { frameRef, canvasRef, sceneRef, problem } = useSceneView(
-    (canvas) => new Scene(canvas, state.run, findZonesOfBodies(state.run)),
+    (canvas) => new Scene(canvas, state.run),
     (scene) => {
       setGridStep(scene.gridStep);
       props.fitRef.current = () => scene.fit();
@@ -121,9 +141,9 @@ export function View3D(props: { state: State; onReady: (scene: Scene | undefined
             value={state.colouring.value}
             onChange={(e) => (state.colouring.value = e.currentTarget.value as Colouring)}
           >
-            <option value="kind">kind of member</option>
-            <option value="state">state of its zones</option>
-            <option value="utilisation">utilisation</option>
+            {colourings.map(([value, word]) => (
+              <option value={value}>{word}</option>
+            ))}
           </select>
         </label>
         <label>
@@ -175,7 +195,7 @@ export function View3D(props: { state: State; onReady: (scene: Scene | undefined
   );
 }
 
-function MemberSearch(props: { state: State }) {
+export function MemberSearch(props: { state: State }) {
   const { state } = props;
   const choose = (name: string): void => {
     const body = state.run.bodies.findIndex((b) => b.name === name);

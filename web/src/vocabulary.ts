@@ -48,10 +48,20 @@ export function colourOfKind(kind: string, kinds: readonly string[]): string {
   return spareColours[Math.max(0, spare) % spareColours.length] as string;
 }
 
+const materialColours: Record<string, string> = { concrete: "#9aa5ae", masonry: "#b5653f", steel: "#3a5f8a", ground: "#8f8570" };
+export function colourOfMaterial(material: string, materials: readonly string[]): string {
+  const known = materialColours[material];
+  if (known !== undefined) return known;
+  const spare = materials.filter((m) => materialColours[m] === undefined).indexOf(material);
+  return ["#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442"][Math.max(0, spare) % 5] as string;
+}
+
 export function wordOfKind(kind: string): string {
   return kindWord[kind] ?? (kind === "" ? "Part" : kind.charAt(0).toUpperCase() + kind.slice(1));
 }
 
+/// End of the ramp of speeds: a fall from 11 m [m/s].
+export const highestSpeed = 15;
 /// Light to dark, so that it can be read with and without colour vision and in print.
 const ramp = ["#fbf8ea", "#fee6a8", "#fec44f", "#fe9929", "#d95f0e", "#993404", "#5c1f05"];
 export const rampCss = `linear-gradient(to right, ${ramp.join(", ")})`;

@@ -46,3 +46,10 @@ export function findParts(run: Run): string[] {
   const rank = (kind: string): number => (order.includes(kind) ? order.indexOf(kind) : order.length);
   return [...found].sort((a, b) => rank(a) - rank(b));
 }
+
+/// The materials of the shapes of a run, in the order of their first shape.
+export function findMaterials(run: Run): string[] {
+  const found = new Set<string>();
+  for (const body of run.bodies) for (const shape of body.shapes) found.add(shape.material);
+  return [...found];
+}

@@ -33,7 +33,7 @@ describe("data", () => {
     for (const sign of [1, -1]) {
       const q = new Float32Array([...turn(0.2), ...turn(1.8, sign)]);
       const out = [1, 0, 0, 0];
-      slerp(q, 0, 4, 0.25, out);
+      slerp(q, 0, q, 4, 0.25, out);
       // Float32 quaternions: 1e-6 is ten times their round-off.
       turn(0.6).forEach((value, k) => assert.ok(Math.abs(out[k] - value) < 1e-6));
     }
@@ -42,9 +42,8 @@ describe("data", () => {
   it("interpolates a pose between frames", () => {
     const run = readRun(JSON.stringify(makeSynthetic(10)));
     const p = [0, 0, 0], q = [1, 0, 0, 0];
-    const B = run.bodies.length;
     assert.ok(calcPose(run, 20, 6, 0.5, p, q));
-    const a = run.position[3 * (6 * B + 20)], b = run.position[3 * (7 * B + 20)];
+    const a = run.frames[6].pose[7 * 20], b = run.frames[7].pose[7 * 20];
     assert.ok(Math.abs(p[0] - (a + b) / 2) < 1e-9);
     assert.ok(Math.abs(Math.hypot(...q) - 1) < 1e-12);
   });

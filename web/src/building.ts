@@ -1,0 +1,390 @@
+/// The bodies of one run in a picture, at one time: boxes, signs of their zones, the chosen one.
+import * as THREE from "three";
+import type { Frame, Quadruple, Run, Triple } from "./data";
+import { calcPose, findFrame } from "./data";
+import type { Theme } from "./site";
+import type { Colouring, ZoneMarks } from "./state";
+import { colourOfKind, colourOfMaterial, colourOfUtilisation, highestSpeed, zoneStates } from "./vocabulary";
+import { findMaterials, findParts, findZonesOfBodies, partOfShape, type ZonesOfBody } from "./zones";
+
+const broken = 3; // index in zoneStates
+const outside = new THREE.Matrix4().makeScale(0, 0, 0);
+
+function makeMarkGeometry(shape: string): THREE.BufferGeometry {
+  switch (shape) {
+    case "triangle":
+      return new THREE.ConeGeometry(1.1, 1.7, 3).rotateX(Math.PI / 2);
+    case "diamond":
+      return new THREE.OctahedronGeometry(1.15);
+    case "cross": {
+      const box = new THREE.BoxGeometry(2.4, 0.6, 0.6);
+      return mergeGeometries([box.clone().rotateY(Math.PI / 4), box.clone().rotateY(-Math.PI / 4), box.clone().rotateZ(Math.PI / 2)]);
+    }
+    case "star":
+      return new THREE.TetrahedronGeometry(1.4);
+    default:
+      return new THREE.SphereGeometry(0.7, 10, 8);
+  }
+}
+
+function mergeGeometries(parts: THREE.BufferGeometry[]): THREE.BufferGeometry {
+  const positions: number[] = [];
+  for (const part of parts) positions.push(...part.toNonIndexed().getAttribute("position").array);
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.Float32BufferAttribute(positions, 3));
+  return geometry;
+}
+
+/// Lambert shading with dark edges, drawn in the fragment shader so that one call draws all boxes.
+function makeBoxMaterial(): THREE.MeshLambertMaterial {
+  const material = new THREE.MeshLambertMaterial();
+  material.onBeforeCompile = (shader) => {
+    shader.vertexShader = shader.vertexShader
+      .replace("#include <common>", "#include <common>\nvarying vec2 vFace;")
+      .replace("#include <begin_vertex>", "#include <begin_vertex>\nvFace = uv;");
+    shader.fragmentShader = shader.fragmentShader
+      .replace("#include <common>", "#include <common>\nvarying vec2 vFace;")
+      .replace(
+        "#include <color_fragment>",
+        `#include <color_fragment>
+        vec2 perPixel = max(fwidth(vFace), vec2(1e-6));
+        vec2 pixels = min(vFace, 1.0 - vFace) / perPixel;
+        float width = 1.0 / max(perPixel.x, perPixel.y);
+        float line = (1.0 - smoothstep(0.5, 1.3, min(pixels.x, pixels.y))) * clamp((width - 2.0) / 6.0, 0.0, 1.0);
+        diffuseColor.rgb *= 1.0 - 0.6 * line;`,
+      );
+  };
+  return material;
+}
+
+const rampSteps = 64;
+const linear = (css: string): [number, number, number] => {
+  const c = new THREE.Color(css);
+  return [c.r, c.g, c.b];
+};
+const ramp = Array.from({ length: rampSteps + 1 }, (_, i) => linear(colourOfUtilisation(i / rampSteps)));
+const rampAt = (s: number): [number, number, number] => ramp[Math.round(rampSteps * Math.min(1, Math.max(0, s || 0)))] as [number, number, number];
+const ofState = zoneStates.map((s, i) => linear(i === 0 ? "#dde2e6" : s.colour));
+const silent = linear("#c3c9cf"); // no zone speaks for this body
+const chosen = linear("#f5d033");
+
+export class Building {
+  readonly group = new THREE.Group();
+  readonly zonesOfBody: ZonesOfBody;
+  readonly bounds = new THREE.Box3();
+  /// What a fitted picture must show.
+  readonly fitPoints: THREE.Vector3[] = [];
+  readonly kinds: string[];
+  readonly materials: string[];
+  readonly markSize: number;
+  private readonly boxes: THREE.InstancedMesh<THREE.BufferGeometry, THREE.MeshLambertMaterial>;
+  private readonly bodyOfInstance: number[] = [];
+  private readonly colourOfPart: [number, number, number][] = [];
+  private readonly colourOfStuff: [number, number, number][] = [];
+  private readonly shapePose: THREE.Matrix4[] = [];
+  private readonly bodyPose: THREE.Matrix4[];
+  private readonly bodyColour: [number, number, number][];
+  private readonly hidden: Uint8Array; // (B)
+  private readonly marks: THREE.InstancedMesh<THREE.BufferGeometry, THREE.MeshBasicMaterial>[];
+  private readonly zonePlace: { body: number; local: THREE.Vector3 }[];
+  private readonly selection: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
+  private colouring: Colouring = "kind";
+  private zoneMarks: ZoneMarks = "damaged";
+  private selected = -1;
+  private time = 0;
+  private coloured = "";
+
+  constructor(private readonly run: Run) {
+    this.zonesOfBody = findZonesOfBodies(run);
+    this.kinds = findParts(run);
+    this.materials = findMaterials(run);
+    this.bodyPose = run.bodies.map(() => new THREE.Matrix4());
+    this.bodyColour = run.bodies.map(() => silent);
+    this.hidden = new Uint8Array(run.bodies.length);
+    this.boxes = this.makeBoxes();
+    this.group.add(this.boxes);
+    this.collectFitPoints();
+    this.markSize = Math.min(0.6, Math.max(0.15, this.height * 0.013));
+
+    this.zonePlace = run.zones.map((zone) => this.placeZone(zone.place, zone.body_a >= 0 ? zone.body_a : zone.body_b));
+    this.marks = zoneStates.map((state) => {
+      const mesh = new THREE.InstancedMesh(
+        makeMarkGeometry(state.shape),
+        new THREE.MeshBasicMaterial({ color: state.colour, depthTest: false, transparent: true, opacity: 0.95 }),
+        Math.max(1, run.zones.length),
+      );
+      mesh.count = 0;
+      mesh.frustumCulled = false;
+      mesh.renderOrder = 10;
+      this.group.add(mesh);
+      return mesh;
+    });
+
+    const edges = new THREE.EdgesGeometry(new THREE.BoxGeometry(1, 1, 1));
+    this.selection = new THREE.LineSegments(edges, new THREE.LineBasicMaterial({ depthTest: false }));
+    this.selection.renderOrder = 15;
+    this.selection.matrixAutoUpdate = false;
+    this.selection.visible = false;
+    this.group.add(this.selection);
+    this.setTime(run.time[0] ?? 0);
+  }
+
+  /// Of the building at the start [m].
+  get height(): number {
+    return Math.max(1, this.bounds.max.z);
+  }
+
+  private makeBoxes(): THREE.InstancedMesh<THREE.BufferGeometry, THREE.MeshLambertMaterial> {
+    this.run.bodies.forEach((body, index) => {
+      for (const shape of body.shapes) {
+        const [w, x, y, z] = shape.orientation;
+        this.bodyOfInstance.push(index);
+        this.colourOfPart.push(linear(colourOfKind(partOfShape(body, shape), this.kinds)));
+        this.colourOfStuff.push(linear(colourOfMaterial(shape.material, this.materials)));
+        this.shapePose.push(
+          new THREE.Matrix4().compose(
+            new THREE.Vector3(...shape.centre),
+            new THREE.Quaternion(x, y, z, w),
+            new THREE.Vector3(...shape.half).multiplyScalar(2),
+          ),
+        );
+      }
+    });
+    const count = this.shapePose.length;
+    const boxes = new THREE.InstancedMesh(new THREE.BoxGeometry(1, 1, 1), makeBoxMaterial(), Math.max(1, count));
+    boxes.count = count;
+    boxes.frustumCulled = false;
+    boxes.instanceMatrix.setUsage(THREE.DynamicDrawUsage);
+    boxes.instanceColor = new THREE.InstancedBufferAttribute(new Float32Array(3 * Math.max(1, count)), 3);
+    return boxes;
+  }
+
+  private placeZone(place: Triple, body: number): { body: number; local: THREE.Vector3 } {
+    const local = new THREE.Vector3(...place);
+    const p: Triple = [0, 0, 0];
+    const q: Quadruple = [1, 0, 0, 0];
+    if (body < 0 || this.run.time.length === 0 || !calcPose(this.run, body, 0, 0, p, q)) return { body: -1, local };
+    const turn = new THREE.Quaternion(q[1], q[2], q[3], q[0]).invert();
+    return { body, local: local.sub(new THREE.Vector3(...p)).applyQuaternion(turn) };
+  }
+
+  private readonly point = new THREE.Vector3();
+  private readonly turn = new THREE.Quaternion();
+  private readonly unit = new THREE.Vector3(1, 1, 1);
+  private readonly matrix = new THREE.Matrix4();
+  private readonly p: Triple = [0, 0, 0];
+  private readonly q: Quadruple = [1, 0, 0, 0];
+
+  private calcBodyPoses(t: number): void {
+    const { p, q } = this;
+    const { frame, fraction } = findFrame(this.run.time, t);
+    for (let b = 0; b < this.bodyPose.length; ++b) {
+      const pose = this.bodyPose[b] as THREE.Matrix4;
+      if (this.run.time.length === 0) pose.identity();
+      else if (calcPose(this.run, b, frame, fraction, p, q))
+        pose.compose(this.point.set(p[0], p[1], p[2]), this.turn.set(q[1], q[2], q[3], q[0]), this.unit);
+      else pose.copy(outside);
+    }
+  }
+
+  private isGround(body: number): boolean {
+    return this.run.bodies[body]?.shapes.some((s) => s.material === "ground") ?? true;
+  }
+
+  private calcCornersAt(t: number): THREE.Vector3[] {
+    const corners: THREE.Vector3[] = [];
+    if (this.run.time.length === 0) return corners;
+    this.calcBodyPoses(t);
+    this.shapePose.forEach((shape, i) => {
+      const body = this.bodyOfInstance[i] as number;
+      if (this.isGround(body)) return;
+      this.matrix.multiplyMatrices(this.bodyPose[body] as THREE.Matrix4, shape);
+      if (this.matrix.determinant() === 0) return;
+      for (let k = 0; k < 8; ++k)
+        corners.push(new THREE.Vector3((k & 1) - 0.5, ((k >> 1) & 1) - 0.5, ((k >> 2) & 1) - 0.5).applyMatrix4(this.matrix));
+    });
+    return corners;
+  }
+
+  /// The building all along the run so far and the neighbours near to it.
+  collectFitPoints(): void {
+    const { time } = this.run;
+    this.fitPoints.length = 0;
+    for (const s of time.length < 2 ? [0] : [0, 0.25, 0.5, 0.75, 1])
+      for (const corner of this.calcCornersAt(time[Math.round(s * (time.length - 1))] ?? 0)) {
+        corner.z = Math.max(corner.z, -2);
+        this.fitPoints.push(corner);
+      }
+    for (const [x, y] of this.run.building_outline) this.fitPoints.push(new THREE.Vector3(x, y, 0));
+    if (this.fitPoints.length === 0) this.fitPoints.push(new THREE.Vector3(-5, -5, 0), new THREE.Vector3(5, 5, 5));
+    this.bounds.setFromPoints(this.fitPoints);
+    const near = this.bounds.clone().expandByScalar(0.5 * this.bounds.getSize(new THREE.Vector3()).length());
+    for (const neighbour of this.run.neighbours) {
+      if (neighbour.is_utility) continue;
+      const corners = neighbour.footprint.map(([x, y]) => new THREE.Vector3(x, y, 0));
+      if (corners.every((c) => near.containsPoint(c))) this.fitPoints.push(...corners);
+    }
+    this.calcBodyPoses(this.time);
+  }
+
+  setTheme(theme: Theme, dark: boolean): void {
+    this.selection.material.color.set(theme.selection);
+    zoneStates.forEach((state, i) => this.marks[i]?.material.color.set((dark ? state.onDark : undefined) ?? state.colour));
+  }
+
+  setTime(t: number): void {
+    this.time = t;
+    this.calcBodyPoses(t);
+    for (let i = 0; i < this.shapePose.length; ++i) {
+      const body = this.bodyOfInstance[i] as number;
+      if (this.hidden[body] === 1) this.matrix.copy(outside);
+      else this.matrix.multiplyMatrices(this.bodyPose[body] as THREE.Matrix4, this.shapePose[i] as THREE.Matrix4);
+      this.boxes.setMatrixAt(i, this.matrix);
+    }
+    this.boxes.instanceMatrix.needsUpdate = true;
+    this.boxes.boundingSphere = null; // picking must not use that of another time
+    this.placeMarks();
+    this.colourBoxes();
+    this.placeSelection();
+  }
+
+  setLook(colouring: Colouring, zoneMarks: ZoneMarks, selected: number): void {
+    this.colouring = colouring;
+    this.zoneMarks = zoneMarks;
+    this.selected = selected;
+    this.placeMarks();
+    this.colourBoxes();
+    this.placeSelection();
+  }
+
+  /// Leaves out the bodies for which `isShown` is false.
+  setFilter(isShown: (body: number) => boolean): void {
+    for (let b = 0; b < this.hidden.length; ++b) this.hidden[b] = isShown(b) ? 0 : 1;
+    this.setTime(this.time);
+  }
+
+  /// Cuts off what lies behind the planes; an empty list ends that.
+  setSection(planes: THREE.Plane[]): void {
+    const { material } = this.boxes;
+    material.clippingPlanes = planes;
+    material.side = planes.length > 0 ? THREE.DoubleSide : THREE.FrontSide;
+    material.needsUpdate = true;
+    for (const mesh of this.marks) mesh.material.clippingPlanes = planes;
+  }
+
+  /// A run shown for comparison only: see-through and in one colour.
+  setGhost(colour: string): void {
+    const { material } = this.boxes;
+    material.transparent = true;
+    material.opacity = 0.35;
+    material.depthWrite = false;
+    this.ghost = linear(colour);
+    this.coloured = "";
+    this.colourBoxes();
+  }
+  private ghost: [number, number, number] | undefined;
+
+  private placeMarks(): void {
+    const { frame } = findFrame(this.run.time, this.time);
+    const now = this.run.frames[frame];
+    // A break is marked while it is fresh: later its parts lie apart, and marks would hide them.
+    const before = this.run.frames[findFrame(this.run.time, this.time - 0.4).frame];
+    for (const mesh of this.marks) mesh.count = 0;
+    if (this.zoneMarks !== "none" && now !== undefined && before !== undefined)
+      for (let z = 0; z < this.run.zones.length; ++z) {
+        const state = now.state[z] as number;
+        const mesh = this.marks[state];
+        if (mesh === undefined || (this.zoneMarks === "damaged" && (state === 0 || (state === broken && before.state[z] === broken)))) continue;
+        const { body, local } = this.zonePlace[z] as { body: number; local: THREE.Vector3 };
+        if (body >= 0 && this.hidden[body] === 1) continue;
+        this.point.copy(local);
+        if (body >= 0) this.point.applyMatrix4(this.bodyPose[body] as THREE.Matrix4);
+        const size = state === 0 ? 0.6 * this.markSize : this.markSize;
+        this.matrix.makeScale(size, size, size).setPosition(this.point);
+        mesh.setMatrixAt(mesh.count++, this.matrix);
+      }
+    for (const mesh of this.marks) {
+      mesh.instanceMatrix.needsUpdate = true;
+      mesh.visible = mesh.count > 0;
+    }
+  }
+
+  /// Centre of a body at the time shown; false where it has no pose or is left out.
+  findPlace(body: number, out: THREE.Vector3): boolean {
+    const pose = this.bodyPose[body];
+    if (pose === undefined || this.hidden[body] === 1 || pose.elements[15] !== 1 || pose.elements[0] + pose.elements[1] + pose.elements[2] === 0) return false;
+    out.setFromMatrixPosition(pose);
+    return true;
+  }
+
+  private calcSpeed(body: number, frame: number): number {
+    const later = frame === 0 ? 1 : frame;
+    const a = this.run.frames[later - 1]?.pose, b = this.run.frames[later]?.pose;
+    if (a === undefined || b === undefined) return 0;
+    const i = 7 * body;
+    const dt = (this.run.time[later] as number) - (this.run.time[later - 1] as number);
+    return Math.hypot((b[i] as number) - (a[i] as number), (b[i + 1] as number) - (a[i + 1] as number), (b[i + 2] as number) - (a[i + 2] as number)) / dt;
+  }
+
+  private calcColour(body: number, frame: number, now: Frame | undefined): [number, number, number] {
+    if (this.colouring === "speed") return rampAt(this.calcSpeed(body, frame) / highestSpeed);
+    const zones = this.zonesOfBody[body] ?? [];
+    if (zones.length === 0 || now === undefined) return silent;
+    if (this.colouring === "state") {
+      let worst = 0;
+      for (const z of zones) worst = Math.max(worst, now.state[z] ?? 0);
+      return ofState[worst] ?? silent;
+    }
+    let most = 0;
+    for (const z of zones) {
+      const u = now.utilisation[z] as number;
+      if (u > most) most = u;
+    }
+    return rampAt(most);
+  }
+
+  private colourBoxes(): void {
+    const { frame } = findFrame(this.run.time, this.time);
+    const byPart = this.colouring === "kind" || this.colouring === "material";
+    const wanted = `${this.colouring} ${this.selected} ${byPart ? 0 : frame} ${this.run.frames.length > 1}`;
+    if (wanted === this.coloured) return;
+    this.coloured = wanted;
+    const now = this.run.frames[frame];
+    if (!byPart && this.ghost === undefined)
+      for (let b = 0; b < this.bodyColour.length; ++b) this.bodyColour[b] = this.calcColour(b, frame, now);
+    const attribute = this.boxes.instanceColor as THREE.InstancedBufferAttribute;
+    const parts = this.colouring === "kind" ? this.colourOfPart : this.colourOfStuff;
+    for (let i = 0; i < this.bodyOfInstance.length; ++i) {
+      const body = this.bodyOfInstance[i] as number;
+      const [r, g, b] = this.ghost ?? (byPart ? (body === this.selected ? chosen : parts[i]) : this.bodyColour[body]) ?? silent;
+      attribute.setXYZ(i, r, g, b);
+    }
+    attribute.needsUpdate = true;
+  }
+
+  private placeSelection(): void {
+    const i = this.bodyOfInstance.indexOf(this.selected);
+    this.selection.visible = i >= 0 && this.hidden[this.selected] !== 1;
+    if (i < 0) return;
+    this.selection.matrix.multiplyMatrices(this.bodyPose[this.selected] as THREE.Matrix4, this.shapePose[i] as THREE.Matrix4);
+    this.selection.matrixWorldNeedsUpdate = true;
+  }
+
+  /// Body that a ray meets first, -1 if there is none. What a section cuts off is not met.
+  pick(ray: THREE.Raycaster): number {
+    const planes = this.boxes.material.clippingPlanes ?? [];
+    const hits = ray.intersectObject(this.boxes);
+    const hit = hits.find((h) => planes.every((plane) => plane.distanceToPoint(h.point) >= 0));
+    return hit?.instanceId === undefined ? -1 : (this.bodyOfInstance[hit.instanceId] ?? -1);
+  }
+
+  /// The boxes at the time shown, in the world; the ground is left out.
+  forEachBox(visit: (matrix: THREE.Matrix4, body: number) => void): void {
+    for (let i = 0; i < this.shapePose.length; ++i) {
+      const body = this.bodyOfInstance[i] as number;
+      if (this.isGround(body)) continue;
+      this.matrix.multiplyMatrices(this.bodyPose[body] as THREE.Matrix4, this.shapePose[i] as THREE.Matrix4);
+      visit(this.matrix, body);
+    }
+  }
+}

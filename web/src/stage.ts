@@ -1,0 +1,217 @@
+/// Camera, light and canvas: what every picture needs whatever stands in it. Draws only when asked to.
+import * as THREE from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import type { Triple } from "./data";
+import type { SceneLike } from "./scene_view";
+import { darkTheme, lightTheme, type Theme } from "./site";
+
+export type View = "oblique" | "front" | "side" | "top";
+const viewDirections: Record<View, Triple> = {
+  oblique: [-0.62, -1, 0.5],
+  side: [0, -1, 0.06],
+  front: [-1, 0, 0.06],
+  top: [0, -1e-3, 1],
+};
+export const fov = 32;
+
+/// A point of the canvas's height h is this large at the distance 1.
+export const calcPixel = (h: number): number => (2 * Math.tan((fov * Math.PI) / 360)) / Math.max(1, h);
+
+export interface StageOptions {
+  antialias: boolean;
+  /// Fewer pixels while pictures follow each other so slowly that motion stutters, all of them when it rests.
+  adaptive: boolean;
+}
+
+const slowest = 33; // between two pictures in motion [ms]
+const restAfter = 220; // [ms]
+
+export class Stage implements SceneLike {
+  onChange: () => void = () => undefined;
+  /// Told of a new size, theme or point of view.
+  onTheme: (theme: Theme, dark: boolean) => void = () => undefined;
+  onView: () => void = () => undefined;
+  readonly renderer: THREE.WebGLRenderer;
+  readonly scene = new THREE.Scene();
+  readonly camera = new THREE.PerspectiveCamera(fov, 1, 0.1, 1000);
+  readonly controls: OrbitControls;
+  width = 1;
+  height = 1;
+  dark = false;
+  private readonly fullRatio: number;
+  private ratio: number;
+  private lastRender = -Infinity;
+  private meanInterval = 16;
+  private restTimer: ReturnType<typeof setTimeout> | undefined;
+  /// What a fitted picture must show.
+  private fitPoints: readonly THREE.Vector3[] = [];
+  private readonly bounds = new THREE.Box3();
+  private readonly centre = new THREE.Vector3();
+
+  /// Throws if the browser offers no WebGL.
+  constructor(canvas: HTMLCanvasElement, private readonly options: StageOptions) {
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: options.antialias, powerPreference: "high-performance" });
+    this.fullRatio = Math.min(devicePixelRatio, 2);
+    this.ratio = this.fullRatio;
+    this.renderer.setPixelRatio(this.ratio);
+    const sun = new THREE.DirectionalLight("#ffffff", 1.9);
+    sun.position.set(-0.5, -1, 1.3);
+    this.scene.add(new THREE.HemisphereLight("#ffffff", "#a8a39b", 1.9), sun);
+    this.camera.up.set(0, 0, 1);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.enableDamping = false;
+    this.controls.maxPolarAngle = Math.PI * 0.55;
+    this.controls.addEventListener("change", () => {
+      this.onView();
+      this.onChange();
+    });
+  }
+
+  setDark(dark: boolean): void {
+    this.dark = dark;
+    const theme = dark ? darkTheme : lightTheme;
+    this.scene.background = new THREE.Color(theme.background);
+    this.onTheme(theme, dark);
+    this.onChange();
+  }
+
+  resize(width: number, height: number): void {
+    this.width = Math.max(1, width);
+    this.height = Math.max(1, height);
+    this.renderer.setSize(this.width, this.height, false);
+    this.useAspect(this.width, this.height);
+    this.onChange();
+  }
+
+  useAspect(width: number, height: number): void {
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.onView();
+  }
+
+  setFitPoints(points: readonly THREE.Vector3[]): void {
+    this.fitPoints = points;
+    this.bounds.setFromPoints(points as THREE.Vector3[]);
+    this.bounds.getCenter(this.centre);
+  }
+  get middle(): THREE.Vector3 {
+    return this.centre;
+  }
+
+  /// Looks at all of the fit points from one side, as near as the picture allows.
+  fit(view?: View | Triple): void {
+    const from =
+      view === undefined
+        ? this.camera.position.clone().sub(this.controls.target)
+        : new THREE.Vector3(...(typeof view === "string" ? viewDirections[view] : view));
+    if (this.fitPoints.length === 0) return;
+    from.normalize();
+    const right = new THREE.Vector3().crossVectors(this.camera.up, from).normalize();
+    const up = new THREE.Vector3().crossVectors(from, right);
+    const tall = Math.tan((fov * Math.PI) / 360) / 1.05;
+    const wide = tall * this.camera.aspect;
+    // A point at (x, y, z) along right, up and from is in the picture if |x - cx| <= (d - z) wide, and so for y: the
+    // largest of x / wide + z and of -x / wide + z give d and cx.
+    let east = -Infinity, west = -Infinity, north = -Infinity, south = -Infinity;
+    for (const point of this.fitPoints) {
+      const x = point.dot(right) / wide, y = point.dot(up) / tall, z = point.dot(from);
+      east = Math.max(east, z + x);
+      west = Math.max(west, z - x);
+      north = Math.max(north, z + y);
+      south = Math.max(south, z - y);
+    }
+    const d = Math.max((east + west) / 2, (north + south) / 2);
+    const depth = this.centre.dot(from);
+    const distance = Math.max(1, d - depth);
+    this.controls.target
+      .copy(right).multiplyScalar((wide * (east - west)) / 2)
+      .addScaledVector(up, (tall * (north - south)) / 2)
+      .addScaledVector(from, depth);
+    this.camera.position.copy(this.controls.target).addScaledVector(from, distance);
+    this.camera.near = distance / 100;
+    this.camera.far = distance * 12;
+    this.camera.updateProjectionMatrix();
+    this.controls.update();
+    this.onView();
+    this.onChange();
+  }
+
+  private readonly ray = new THREE.Raycaster();
+  /// The ray through a place of the canvas.
+  castRay(x: number, y: number): THREE.Raycaster {
+    this.camera.updateMatrixWorld();
+    this.ray.setFromCamera(new THREE.Vector2((2 * x) / this.width - 1, 1 - (2 * y) / this.height), this.camera);
+    return this.ray;
+  }
+
+  render(): void {
+    if (this.options.adaptive) this.adapt();
+    this.draw();
+  }
+
+  draw(): void {
+    this.camera.updateMatrixWorld();
+    this.renderer.render(this.scene, this.camera);
+  }
+
+  private adapt(): void {
+    const now = performance.now();
+    const interval = now - this.lastRender;
+    this.lastRender = now;
+    if (interval < restAfter) this.meanInterval += 0.25 * (interval - this.meanInterval);
+    else this.meanInterval = Math.min(this.meanInterval, slowest);
+    if (this.meanInterval > slowest && this.ratio > 0.3) this.setRatio(Math.max(0.3, 0.8 * this.ratio));
+    else if (this.meanInterval < 0.55 * slowest && this.ratio < this.fullRatio) this.setRatio(Math.min(this.fullRatio, 1.1 * this.ratio));
+    clearTimeout(this.restTimer);
+    if (this.ratio < this.fullRatio)
+      this.restTimer = setTimeout(() => {
+        // At rest: the whole picture once, and the ratio of motion again for the next one.
+        const ratio = this.ratio;
+        this.setRatio(this.fullRatio);
+        this.draw();
+        this.ratio = ratio;
+        this.atRest = true;
+      }, restAfter);
+    if (this.atRest) {
+      this.atRest = false;
+      this.setRatio(this.ratio);
+    }
+  }
+  private atRest = false;
+
+  private setRatio(ratio: number): void {
+    this.ratio = ratio;
+    this.renderer.setPixelRatio(ratio);
+    // three sets the size of the canvas from the ratio of the size it knows
+  }
+
+  /// The canvas with all its pixels, however fast the last pictures came. For a picture to keep.
+  drawFull(): HTMLCanvasElement {
+    const ratio = this.ratio;
+    this.setRatio(this.fullRatio);
+    this.draw();
+    this.ratio = ratio;
+    this.atRest = ratio !== this.fullRatio;
+    return this.renderer.domElement;
+  }
+
+  dispose(): void {
+    clearTimeout(this.restTimer);
+    this.controls.dispose();
+    disposeOf(this.scene);
+    this.renderer.dispose();
+  }
+}
+
+/// Frees what the graphics card holds of everything below `root`.
+export function disposeOf(root: THREE.Object3D): void {
+  root.traverse((object) => {
+    const { geometry, material } = object as Partial<THREE.Mesh>;
+    geometry?.dispose();
+    for (const one of Array.isArray(material) ? material : [material]) {
+      (one as THREE.SpriteMaterial | undefined)?.map?.dispose();
+      one?.dispose();
+    }
+    if (object instanceof THREE.InstancedMesh) object.dispose();
+  });
+}
