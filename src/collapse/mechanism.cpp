@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,42 +9,6 @@
 #include "base/unit.h"
 
 namespace topple::collapse {
-
-Quat fit_rotation(const std::vector<FitBody>& bodies) {
-  double mass = 0;
-  Vec3 before, after;
-  for (const FitBody& b : bodies) {
-    mass += b.mass;
-    before += b.mass * b.before.p;
-    after += b.mass * b.after.p;
-  }
-  if (!(mass > 0)) return {};
-  before *= 1 / mass;
-  after *= 1 / mass;
-  // B = ∫ x Xᵀ dm of the places now and before, from the mass centres; the sought R maximises tr(Rᵀ B)
-  Mat3 B;
-  for (const FitBody& b : bodies) {
-    const double half_trace = 0.5 * (b.inertia(0, 0) + b.inertia(1, 1) + b.inertia(2, 2));
-    const Mat3 second = half_trace * Mat3::identity() + -1.0 * b.inertia;
-    B = B + to_matrix(b.after.q) * second * transpose(to_matrix(b.before.q));
-    const Vec3 x = b.after.p - after, X = b.before.p - before;
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) B(i, j) += b.mass * x[i] * X[j];
-  }
-  // Davenport: the unit quaternion to the largest eigenvalue of this matrix
-  Eigen::Matrix4d K;
-  const Vec3 v{B(2, 1) - B(1, 2), B(0, 2) - B(2, 0), B(1, 0) - B(0, 1)};
-  const double trace = B(0, 0) + B(1, 1) + B(2, 2);
-  K(0, 0) = trace;
-  for (int i = 0; i < 3; ++i) {
-    K(0, i + 1) = K(i + 1, 0) = v[i];
-    for (int j = 0; j < 3; ++j) K(i + 1, j + 1) = B(i, j) + B(j, i) - (i == j ? trace : 0);
-  }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(K);
-  const Eigen::Vector4d q = solver.eigenvectors().col(3);
-  const double sign = q(0) < 0 ? -1 : 1;
-  return normalized(Quat{sign * q(0), sign * q(1), sign * q(2), sign * q(3)});
-}
 
 double calc_tilt(const Quat& q, const Vec3& fall_direction) {
   const Vec3 axis = cross({0, 0, 1}, fall_direction);

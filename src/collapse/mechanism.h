@@ -45,16 +45,6 @@ struct Mechanism {
   double azimuth = 0;     // in which the mass centre moved, NaN below half a metre [rad]
 };
 
-/// A body of a block, before and after.
-struct FitBody {
-  double mass = 0;
-  Mat3 inertia;  // about its mass centre, in its frame
-  Pose before, after;
-};
-/// Rotation that brings the mass of the bodies as they were nearest to where it is now, in the sense of least squares
-/// over all their mass, the displacement of the mass centre taken out.
-Quat fit_rotation(const std::vector<FitBody>&);
-
 /// Rotation about the axis that leans by a positive angle towards the direction [rad].
 double calc_tilt(const Quat& rotation, const Vec3& fall_direction);
 

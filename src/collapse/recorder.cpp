@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 
+#include "base/rotation_fit.h"
 #include "base/unit.h"
 
 namespace topple::collapse {

@@ -1,11 +1,9 @@
 #include "collapse/run.h"
 
 #include <fmt/format.h>
-#include <sys/utsname.h>
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <limits>
 
 #include "base/hash.h"
@@ -15,24 +13,11 @@
 #include "collapse/recorder.h"
 #include "engines/engine.h"
 #include "mbs/quantity.h"
+#include "record/provenance.h"
 
 namespace topple::collapse {
 
 namespace {
-
-std::string now_utc() {
-  const std::time_t now = std::time(nullptr);
-  std::tm utc{};
-  gmtime_r(&now, &utc);
-  char text[32];
-  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
-  return text;
-}
-
-std::string machine_words() {
-  utsname u{};
-  return uname(&u) == 0 ? fmt::format("{} {}", u.sysname, u.machine) : "unknown";
-}
 
 void fill_ending(const mbs::Summary& s, const char* when, record::Record& record) {
   using Ending = mbs::Summary::Ending;
@@ -130,8 +115,8 @@ mbs::Options make_options(const RunOptions& in, double duration, double step, do
 void fill_provenance(const RunOptions& options, const engines::Engine& engine, record::Record& r) {
   r.provenance.program_version = options.program_version;
   r.provenance.engine = engine.name();
-  r.provenance.machine = machine_words();
-  r.provenance.created = now_utc();
+  r.provenance.machine = record::machine_words();
+  r.provenance.created = record::now_utc();
   r.provenance.threads = options.threads;
 }
 

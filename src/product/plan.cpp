@@ -48,6 +48,20 @@ double calc_slab_beside(const Plan& plan, const Member& beam, bool is_lower_side
 
 }  // namespace
 
+const char* name_of(MemberKind kind) {
+  switch (kind) {
+    case MemberKind::Column:
+      return "column";
+    case MemberKind::Beam:
+      return "beam";
+    case MemberKind::Slab:
+      return "slab";
+    case MemberKind::Wall:
+      return "wall";
+  }
+  return "";
+}
+
 int Plan::find_member(const std::string& name) const {
   const auto it = std::find_if(members.begin(), members.end(), [&](const Member& m) { return m.name == name; });
   return it == members.end() ? -1 : static_cast<int>(it - members.begin());

@@ -77,6 +77,8 @@ struct Panel {
 };
 
 enum class MemberKind { Column, Beam, Slab, Wall };
+/// "column", "beam", "slab", "wall".
+const char* name_of(MemberKind);
 
 /// Hole in a wall: from its left end (as seen along start -> end) and above the floor.
 struct Opening {

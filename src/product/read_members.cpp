@@ -22,19 +22,7 @@ struct Builder {
   bool is_too_many = false;
 };
 
-const char* rule_key(MemberKind kind) {
-  switch (kind) {
-    case MemberKind::Column:
-      return "columns";
-    case MemberKind::Beam:
-      return "beams";
-    case MemberKind::Slab:
-      return "slabs";
-    case MemberKind::Wall:
-      return "walls";
-  }
-  return "";
-}
+std::string rule_key(MemberKind kind) { return std::string(name_of(kind)) + "s"; }
 
 std::string point_name(const Plan& plan, int row, int frame) {
   return plan.row_names[static_cast<size_t>(row)] + plan.frame_names[static_cast<size_t>(frame)];

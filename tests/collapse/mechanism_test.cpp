@@ -101,37 +101,6 @@ TEST(Mechanism, WithoutTouchdownTheLastFrameCounts) {
   EXPECT_THAT(m.text, testing::HasSubstr("still moving"));
 }
 
-TEST(BlockRotation, OfARigidMotionIsThatMotion) {
-  const Quat q = exp_rotation({0.3, -1.1, 0.4});
-  std::vector<FitBody> bodies;
-  for (int i = 0; i < 5; ++i) {
-    FitBody b;
-    b.mass = 1 + i;
-    b.inertia = Mat3::diagonal({1, 2, 2.5});
-    b.before = {{1.0 * i, 0.5 * i * i, -2.0 * (i % 3)}, exp_rotation({0.1 * i, 0, 0.2})};
-    b.after = Pose{{3, 4, 5}, q} * b.before;
-    bodies.push_back(b);
-  }
-  const Quat fit = fit_rotation(bodies);
-  // round-off of an eigenvalue problem
-  EXPECT_NEAR(norm(log_rotation(conjugate(q) * fit)), 0, 1e-12);
-  bodies.resize(1);  // one body alone turns as it turns
-  EXPECT_NEAR(norm(log_rotation(conjugate(q) * fit_rotation(bodies))), 0, 1e-12);
-}
-
-TEST(BlockRotation, HardlyFollowsASmallPartThatSpins) {
-  std::vector<FitBody> bodies;
-  for (double x : {-5.0, 5.0}) {
-    FitBody b;
-    b.mass = 100;
-    b.inertia = Mat3::diagonal({10, 10, 10});
-    b.before = b.after = {{x, 0, 0}, {}};
-    bodies.push_back(b);
-  }
-  bodies.push_back({1, Mat3::diagonal({0.1, 0.1, 0.1}), {{0, 0, 3}, {}}, {{0, 0, 3}, exp_rotation({0, 2, 0})}});
-  EXPECT_LT(norm(log_rotation(fit_rotation(bodies))), 1e-3);
-}
-
 TEST(Mechanism, TiltIsSignedTowardsTheDirection) {
   EXPECT_NEAR(calc_tilt(exp_rotation({0, -0.3, 0}), {-1, 0, 0}), 0.3, 1e-12);
   EXPECT_NEAR(calc_tilt(exp_rotation({0, -0.3, 0}), {1, 0, 0}), -0.3, 1e-12);
