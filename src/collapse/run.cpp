@@ -112,9 +112,9 @@ mbs::Options make_options(const RunOptions& in, double duration, double step, do
   return o;
 }
 
-void fill_provenance(const RunOptions& options, const engines::Engine& engine, record::Record& r) {
+void fill_provenance(const RunOptions& options, const std::string& engine, record::Record& r) {
   r.provenance.program_version = options.program_version;
-  r.provenance.engine = engine.name();
+  r.provenance.engine = engine;
   r.provenance.machine = record::machine_words();
   r.provenance.created = record::now_utc();
   r.provenance.threads = options.threads;
@@ -218,6 +218,13 @@ record::Counts count(const mbs::Model& model) {
 record::Record run_plan(const product::Plan& plan, const Knowledge& k, const RunOptions& options,
                         const RunCallbacks& callbacks) {
   const std::unique_ptr<engines::Engine> engine = engines::make_engine(options.engine);
+  return run_plan(
+      plan, k, options, callbacks, engine->name(),
+      [&engine](const mbs::Model& model, const ModelMap&, const mbs::Options& o) { return engine->run(model, o); });
+}
+
+record::Record run_plan(const product::Plan& plan, const Knowledge& k, const RunOptions& options,
+                        const RunCallbacks& callbacks, const std::string& engine, const Mover& move) {
   ModelMap map;
   const mbs::Model model = make_model(plan, k, map, options.threads);
   record::Record r;
@@ -228,7 +235,7 @@ record::Record run_plan(const product::Plan& plan, const Knowledge& k, const Run
   r.provenance.plan_text = plan.text;
   r.provenance.plan_sha256 = calc_sha256(plan.text);
   r.provenance.seed = plan.analysis.seed;
-  fill_provenance(options, *engine, r);
+  fill_provenance(options, engine, r);
   fill_plan_values(plan, map, r);
   fill_building(plan, model, map, r);
 
@@ -239,9 +246,9 @@ record::Record run_plan(const product::Plan& plan, const Knowledge& k, const Run
       const std::string& name = plan.members[static_cast<size_t>(c.member)].name;
       recorder.add_event({f.time, "charge", name, fmt::format("the charge of {} does not fire", name)});
     }
-  const mbs::Summary summary =
-      engine->run(model, make_options(options, plan.analysis.duration, plan.analysis.step, plan.analysis.frame_rate, k,
-                                      recorder, callbacks.progress));
+  const mbs::Summary summary = move(model, map,
+                                    make_options(options, plan.analysis.duration, plan.analysis.step,
+                                                 plan.analysis.frame_rate, k, recorder, callbacks.progress));
   finish(summary, " before the first charge", recorder, r);
   add_findings(plan, model, map, k, recorder, summary, r);
   if (callbacks.on_summary) callbacks.on_summary(summary);
@@ -268,7 +275,7 @@ record::Record run_model(const mbs::Model& model, const RunOptions& options, con
   r.counts = count(model);
   if (callbacks.on_model) callbacks.on_model(model, map, r.counts);
   r.provenance.title = model.name;
-  fill_provenance(options, *engine, r);
+  fill_provenance(options, engine->name(), r);
   Recorder recorder(model, map, k, r, callbacks);
   mbs::Options o = make_options(options, 10, 0, 60, k, recorder, callbacks.progress);
   o.equilibrium = options.equilibrium;

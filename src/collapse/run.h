@@ -38,6 +38,12 @@ struct RunCallbacks {
 /// "time_limit", "cancelled" or "failed", and the findings say which criteria are violated.
 record::Record run_plan(const product::Plan&, const Knowledge&, const RunOptions&, const RunCallbacks&);
 
+/// Who moves the plan's model and shows its frames: an engine, or another model of the same building.
+using Mover = std::function<mbs::Summary(const mbs::Model&, const ModelMap&, const mbs::Options&)>;
+/// The same with a mover instead of one of the engines; `engine` is its name in the record.
+record::Record run_plan(const product::Plan&, const Knowledge&, const RunOptions&, const RunCallbacks&,
+                        const std::string& engine, const Mover&);
+
 /// What run_model needs to run the plan's model to the same poses.
 mbs::RunSettings settings_of(const product::Plan&, const Knowledge&, const RunOptions&);
 
