@@ -22,6 +22,9 @@ std::variant<Arguments, int> parse_arguments(int argc, char** argv) {
   topple mbs compare out/model.json                the same model on other engines (docs/engines.md)
   topple mbs verify                                the engine against known answers (docs/verification.md)
   topple report out/record.h5 -o report.html       make the page from a record
+  topple export out/record.h5 --vtk -o out/vtk     for ParaView; --gltf, --csv, --json (docs/exports.md)
+  topple export out/model.json --adams -o out/model.adm
+                                                   for MSC.ADAMS
   topple rcc section.toml -o out/rcc               resistance curves of a zone of a section (docs/rcc.md)
   topple study plan.toml -o out/study              fuzzy analysis of a plan with [fuzzy] (docs/study.md)
   topple study inputs.toml --evaluator ./model -o out/study
@@ -96,6 +99,20 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   CLI::App* report = app.add_subcommand("report", "Make the self-contained page from a record.");
   report->add_option("record", a.input, "record (HDF5)")->required();
   report->add_option("-o,--output", a.output, "page to write")->required();
+
+  CLI::App* exports =
+      app.add_subcommand("export", "Write a record, or a multibody model, for other programs (docs/exports.md).");
+  exports->add_option("file", a.input, "record (HDF5); with --adams a multibody model (JSON)")->required();
+  exports->add_option("-o,--output", a.output, "folder for the files; with --adams the dataset to write (.adm)")
+      ->required();
+  CLI::Option* vtk = exports->add_flag("--vtk", a.vtk, "record.pvd and vtk/*.vtu, for ParaView");
+  CLI::Option* gltf = exports->add_flag("--gltf", a.gltf, "record.glb with animation, for Blender and browsers");
+  CLI::Option* csv = exports->add_flag("--csv", a.csv, "tables for spreadsheets");
+  CLI::Option* as_json = exports->add_flag("--json", a.json, "record.json, for scripts");
+  CLI::Option* rate =
+      exports->add_option("--frame-rate", a.frame_rate, "frames kept, such as \"10 Hz\"; all if left out");
+  CLI::Option* adams = exports->add_flag("--adams", a.adams, "dataset for MSC.ADAMS, and its commands (.acf)");
+  for (CLI::Option* other : {vtk, gltf, csv, as_json, rate}) adams->excludes(other);
 
   CLI::App* rcc = app.add_subcommand("rcc", "Compute the resistance curves of a zone of a section, or of a member.");
   rcc->add_option("file", a.input, "section (TOML), or a plan with --member")->required();
@@ -188,6 +205,14 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   if (mbs_compare->parsed()) a.verb = Verb::MbsCompare;
   if (mbs_verify->parsed()) a.verb = Verb::MbsVerify;
   if (report->parsed()) a.verb = Verb::Report;
+  if (exports->parsed()) {
+    a.verb = Verb::Export;
+    if (!(a.vtk || a.gltf || a.csv || a.json || a.adams)) {
+      std::cerr << "topple export: say what for: --vtk, --gltf, --csv, --json or --adams\n"
+                << "Run topple export --help for more information.\n";
+      return kBadInput;
+    }
+  }
   if (rcc->parsed()) a.verb = Verb::Rcc;
   if (study->parsed()) {
     a.verb = Verb::Study;

@@ -11,7 +11,22 @@
 namespace topple::apps {
 
 struct Arguments {
-  enum class Verb { None, New, Check, Run, Rules, MbsRun, MbsCompare, MbsVerify, Report, Rcc, Study, Worker, Version };
+  enum class Verb {
+    None,
+    New,
+    Check,
+    Run,
+    Rules,
+    MbsRun,
+    MbsCompare,
+    MbsVerify,
+    Report,
+    Export,
+    Rcc,
+    Study,
+    Worker,
+    Version
+  };
   Verb verb = Verb::None;
   std::string input;      // plan, model, record, or the file to write
   std::string output;     // folder or file
@@ -32,6 +47,7 @@ struct Arguments {
   int threads = 1, frames = 0;
   bool json = false, csv = false, no_report = false, report = false, verbose = false;
   bool bodies = false, skip_unsupported = false;
+  bool vtk = false, gltf = false, adams = false;  // formats of an export, beside csv and json
 };
 
 /// Exit codes of every verb.

@@ -79,9 +79,6 @@ int refuse(const InputError& e, const std::vector<Diagnostic>& warnings, const s
   return kBadInput;
 }
 
-namespace {
-
-/// A quantity from the command line; a bare number counts in the SI unit.
 double read_quantity(const std::string& text, Dimension dimension, const char* option) {
   if (text.empty()) return 0;
   Quantity q = parse_quantity(text, dimension);
@@ -94,8 +91,6 @@ double read_quantity(const std::string& text, Dimension dimension, const char* o
                      "units: " + units_of(dimension));
   return *q.value;
 }
-
-}  // namespace
 
 collapse::RunOptions make_options(const Arguments& a) {
   collapse::RunOptions o;

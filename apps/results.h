@@ -8,6 +8,7 @@
 
 #include "arguments.h"
 #include "base/error.h"
+#include "base/unit.h"
 #include "collapse/knowledge.h"
 #include "collapse/run.h"
 #include "record/record.h"
@@ -25,6 +26,10 @@ collapse::Knowledge load_knowledge(const Arguments&);
 
 /// Throws InputError for quantities that cannot be read.
 collapse::RunOptions make_options(const Arguments&);
+
+/// A quantity from the command line, greater than 0; a bare number counts in SI, an empty text is 0. Throws InputError
+/// (E801) that names the option.
+double read_quantity(const std::string& text, Dimension, const char* option);
 
 /// Throws std::runtime_error with the path.
 void make_folder(const std::string& path);

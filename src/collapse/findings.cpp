@@ -47,7 +47,7 @@ struct Context {
     }
     return boxes;
   }
-  Pose pose(size_t frame, size_t body) const { return pose_at(r, frame, body); }
+  Pose pose(size_t frame, size_t body) const { return record::pose_at(r, frame, body); }
 };
 
 /// "no zone has yielded", "1 zone has yielded", "2 zones have yielded".

@@ -60,12 +60,6 @@ size_t find_frame(const std::vector<BlockFrame>& block, double time) {
   return i;
 }
 
-Pose pose_at(const record::Record& r, size_t frame, size_t body) {
-  const float* p = &r.position[3 * (frame * r.bodies.size() + body)];
-  const float* q = &r.orientation[4 * (frame * r.bodies.size() + body)];
-  return {{p[0], p[1], p[2]}, normalized(Quat{q[0], q[1], q[2], q[3]})};
-}
-
 Polygon calc_building_outline(const mbs::Model& model, const ModelMap& map) {
   std::vector<Point2> corners;
   for (size_t b = 0; b < model.bodies.size(); ++b)
@@ -86,7 +80,7 @@ Reach calc_reach(const record::Record& r, size_t frame) {
   for (size_t b = 0; b < r.bodies.size(); ++b) {
     if (r.bodies[b].fixed) continue;
     double way = 0;
-    const Pose X_WB = pose_at(r, frame, b);
+    const Pose X_WB = record::pose_at(r, frame, b);
     for (const record::BoxShape& s : r.bodies[b].shapes)
       for (const Point2& p : calc_outline({X_WB * s.X_BS, s.half})) {
         corners.push_back(p);

@@ -26,9 +26,6 @@ bool stands(const BlockFrame&, const Knowledge&);
 /// The last frame not after a time.
 size_t find_frame(const std::vector<BlockFrame>&, double time);
 
-/// A body of a record in W at a frame.
-Pose pose_at(const record::Record&, size_t frame, size_t body);
-
 /// Outline of the model as it stands at the start, seen from above.
 Polygon calc_building_outline(const mbs::Model&, const ModelMap&);
 

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <stdexcept>
@@ -7,6 +8,7 @@
 #include <string_view>
 
 #include "base/file.h"
+#include "record/export.h"
 #include "record/record.h"
 
 namespace topple::record {
@@ -117,6 +119,38 @@ std::string make_findings(const Record& r) {
   return table.str();
 }
 
+std::string make_poses(const Record& r) {
+  const std::size_t bodies = r.bodies.size();
+  Table table;
+  for (const auto* name : {"time [s]", "body", "x [m]", "y [m]", "z [m]", "qw", "qx", "qy", "qz"}) table.text(name);
+  table.end_line();
+  for (std::size_t s = 0; s < r.time.size(); ++s)
+    for (std::size_t b = 0; b < bodies; ++b) {
+      table.number(r.time[s]).text(r.bodies[b].name);
+      for (std::size_t k = 0; k < 3; ++k) table.number(r.position[(s * bodies + b) * 3 + k]);
+      for (std::size_t k = 0; k < 4; ++k) table.number(r.orientation[(s * bodies + b) * 4 + k]);
+      table.end_line();
+    }
+  return table.str();
+}
+
+/// The zones at the first frame, then each whenever its state changes.
+std::string make_zones(const Record& r) {
+  static constexpr std::array<const char*, 5> words{"elastic", "yielded", "softening", "broken", "fired"};
+  const std::size_t zones = r.zones.size();
+  Table table;
+  for (const auto* name : {"time [s]", "zone", "member", "subsystem", "state", "utilisation"}) table.text(name);
+  table.end_line();
+  for (std::size_t s = 0; s < r.time.size(); ++s)
+    for (std::size_t z = 0; z < zones; ++z) {
+      const std::uint8_t state = r.zone_state[s * zones + z];
+      if (s > 0 && state == r.zone_state[(s - 1) * zones + z]) continue;
+      table.number(r.time[s]).text(r.zones[z].name).text(r.zones[z].member).text(r.zones[z].subsystem);
+      table.text(words.at(state)).number(r.zone_utilisation[s * zones + z]).end_line();
+    }
+  return table.str();
+}
+
 std::string make_output(const Output& o) {
   const std::size_t columns = o.columns.size();
   if (o.value.size() != o.time.size() * columns) throw std::logic_error("record: output " + o.name + " does not fit");
@@ -145,6 +179,19 @@ void write_csv(const Record& record, const std::string& folder) {
   replace_file(where / "events.csv", make_events(record));
   replace_file(where / "bodies.csv", make_bodies(record));
   replace_file(where / "findings.csv", make_findings(record));
+}
+
+std::vector<std::string> export_csv(const Record& record, const std::string& folder) {
+  write_csv(record, folder);
+  write_output_csv(record, folder);
+  const std::filesystem::path where(folder);
+  replace_file(where / "poses.csv", make_poses(record));
+  replace_file(where / "zones.csv", make_zones(record));
+  std::vector<std::string> paths;
+  for (const auto* name : {"series.csv", "events.csv", "bodies.csv", "findings.csv", "poses.csv", "zones.csv"})
+    paths.push_back((where / name).string());
+  for (const Output& o : record.outputs) paths.push_back((where / "outputs" / (o.name + ".csv")).string());
+  return paths;
 }
 
 }  // namespace topple::record

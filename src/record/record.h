@@ -128,6 +128,9 @@ struct Record {
   std::string ending_text;  // a sentence
 };
 
+/// A body in W at a frame.
+Pose pose_at(const Record&, std::size_t frame, std::size_t body);
+
 /// Writes one HDF5 file (beside, then renamed). Throws std::runtime_error with the path if it cannot.
 void write_hdf5(const Record&, const std::string& path);
 /// Reads it back; InputError for files that are not such a record.

@@ -74,7 +74,7 @@ TEXT
 readme)
   # every command in the shell blocks of these pages exists
   commands=0
-  for page in README.md docs/getting-started.md docs/run.md docs/mbs-model.md docs/engines.md docs/rcc.md docs/study.md; do
+  for page in README.md docs/getting-started.md docs/run.md docs/mbs-model.md docs/engines.md docs/rcc.md docs/study.md docs/exports.md; do
     while read -r word verb rest; do
       case $word in
       script/*) [ -x "$source/$word" ] || { echo "$page shows $word, which cannot be called"; failures=$((failures + 1)); } ;;
@@ -98,6 +98,18 @@ new)
   expect 2 "$topple" new plan.toml; has err "exists already"
   has plan.toml mine
   expect 1 "$topple" new /proc/nowhere/plan.toml
+  ;;
+export)
+  expect 0 "$topple" run "$plan" -o r --no-report
+  expect 0 "$topple" export r/record.h5 --csv --json --frame-rate "5 Hz" -o t; has out "Wrote t/series.csv and 5 more"
+  is_json t/record.json; exists t/poses.csv
+  expect 0 "$topple" export r/model.json --adams -o t/model.adm; exists t/model.adm; exists t/model.acf; has out "note: "
+  expect 2 "$topple" export r/record.h5 -o t; has err "say what for"
+  expect 2 "$topple" export r/record.h5 --csv --adams -o t
+  expect 2 "$topple" export r/record.h5 --csv --frame-rate "5 m" -o t; has err "--frame-rate"
+  expect 2 "$topple" export r/model.json --csv -o t; has err "E702"
+  expect 2 "$topple" export r/record.h5 --adams -o t/x.adm
+  expect 2 "$topple" export nowhere.h5 --csv -o t; has err "nowhere.h5"
   ;;
 check)
   expect 0 "$topple" check "$plan"; has out "no errors"

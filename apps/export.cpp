@@ -1,0 +1,54 @@
+#include "record/export.h"
+
+#include <cstdio>
+#include <filesystem>
+
+#include "base/file.h"
+#include "commands.h"
+#include "engines/adams.h"
+#include "mbs/model_json.h"
+#include "results.h"
+
+namespace topple::apps {
+
+namespace {
+
+int export_adams(const Arguments& a) {
+  const std::string text = read_file(a.input);
+  try {
+    mbs::RunSettings settings;
+    const mbs::Model model = mbs::model_from_json(text, a.input, &settings);
+    const engines::AdamsFiles files =
+        engines::to_adams(model, settings, std::filesystem::path(a.output).stem().string());
+    const std::string commands = std::filesystem::path(a.output).replace_extension(".acf").string();
+    replace_file(a.output, files.dataset);
+    replace_file(commands, files.commands);
+    std::printf("Wrote %s\nWrote %s\n", a.output.c_str(), commands.c_str());
+    for (const std::string& note : files.notes) std::printf("note: %s\n", note.c_str());
+    return kOk;
+  } catch (const InputError& e) { return refuse(e, {}, text, false); }
+}
+
+}  // namespace
+
+int export_file(const Arguments& a) {
+  if (a.adams) return export_adams(a);
+  try {
+    record::Record r = record::read_hdf5(a.input);
+    if (!a.frame_rate.empty())
+      r = record::keep_frames(r, 1 / read_quantity(a.frame_rate, Dimension::Frequency, "--frame-rate"));
+    make_folder(a.output);
+    const auto say = [](const std::vector<std::string>& paths) {
+      std::printf("Wrote %s", paths.front().c_str());
+      if (paths.size() > 1) std::printf(" and %zu more", paths.size() - 1);
+      std::printf("\n");
+    };
+    if (a.vtk) say(record::export_vtk(r, a.output));
+    if (a.gltf) say(record::export_gltf(r, a.output));
+    if (a.csv) say(record::export_csv(r, a.output));
+    if (a.json) say(record::export_json(r, a.output));
+    return kOk;
+  } catch (const InputError& e) { return refuse(e, {}, {}, false); }
+}
+
+}  // namespace topple::apps
