@@ -6,8 +6,11 @@ import { build } from "esbuild";
 
 const offline = { marker: "<!--TOPPLE-DATA-->", connect: "'none'", noscript: "This page shows its content with JavaScript, which is switched off in this browser." };
 
+const served = { connect: "'self'", noscript: "This page works with JavaScript, which is switched off in this browser." };
+
 const pages = [
   { name: "report", entry: "src/main.tsx", title: "topple report", ...offline },
+  { name: "steer", entry: "src/steer.tsx", title: "topple", ...served },
 ];
 
 const folder = import.meta.dirname ?? new URL(".", import.meta.url).pathname;
@@ -47,7 +50,7 @@ async function makePage({ name, entry, title, marker, connect, noscript }) {
   // Only this very script may run and nothing may be fetched from elsewhere, whatever the text of a plan holds.
   const digest = createHash("sha256").update(script).digest("base64");
   const values = {
-    policy: `default-src 'none'; script-src 'sha256-${digest}'; style-src 'unsafe-inline'; img-src data: blob:; connect-src ${connect}`,
+    policy: `default-src 'none'; script-src 'sha256-${digest}'; style-src 'unsafe-inline'; img-src data: blob:; media-src blob:; connect-src ${connect}`,
     title, noscript, script,
     style: text(".css"),
     data: marker ?? "",

@@ -216,6 +216,7 @@ export class Building {
         this.fitPoints.push(corner);
       }
     for (const [x, y] of this.run.building_outline) this.fitPoints.push(new THREE.Vector3(x, y, 0));
+    if (time.length === 1) this.expectFall();
     if (this.fitPoints.length === 0) this.fitPoints.push(new THREE.Vector3(-5, -5, 0), new THREE.Vector3(5, 5, 5));
     this.bounds.setFromPoints(this.fitPoints);
     const near = this.bounds.clone().expandByScalar(0.5 * this.bounds.getSize(new THREE.Vector3()).length());
@@ -225,6 +226,14 @@ export class Building {
       if (corners.every((c) => near.containsPoint(c))) this.fitPoints.push(...corners);
     }
     this.calcBodyPoses(this.time);
+  }
+
+  /// Of a collapse yet to come: it will reach as far as about half of the building's height.
+  private expectFall(): void {
+    const box = new THREE.Box3().setFromPoints(this.fitPoints);
+    const far = 0.55 * Math.max(0, box.max.z);
+    for (const x of [box.min.x - far, box.max.x + far])
+      for (const y of [box.min.y - 0.3 * far, box.max.y + 0.3 * far]) this.fitPoints.push(new THREE.Vector3(x, y, 0));
   }
 
   setTheme(theme: Theme, dark: boolean): void {
@@ -378,11 +387,17 @@ export class Building {
     return hit?.instanceId === undefined ? -1 : (this.bodyOfInstance[hit.instanceId] ?? -1);
   }
 
-  /// The boxes at the time shown, in the world; the ground is left out.
-  forEachBox(visit: (matrix: THREE.Matrix4, body: number) => void): void {
+  /// The boxes at the time shown, in the world, of bodies that have moved by more than `least` [m] and are now slower
+  /// than `slow` [m/s]; the ground is left out.
+  forEachLying(least: number, slow: number, visit: (matrix: THREE.Matrix4, body: number) => void): void {
+    const first = this.run.frames[0]?.pose;
+    if (first === undefined) return;
+    const { frame } = findFrame(this.run.time, this.time);
     for (let i = 0; i < this.shapePose.length; ++i) {
       const body = this.bodyOfInstance[i] as number;
-      if (this.isGround(body)) continue;
+      const e = (this.bodyPose[body] as THREE.Matrix4).elements;
+      const way = Math.hypot((e[12] as number) - (first[7 * body] as number), (e[13] as number) - (first[7 * body + 1] as number), (e[14] as number) - (first[7 * body + 2] as number));
+      if (!(way > least) || this.isGround(body) || this.calcSpeed(body, frame) > slow) continue;
       this.matrix.multiplyMatrices(this.bodyPose[body] as THREE.Matrix4, this.shapePose[i] as THREE.Matrix4);
       visit(this.matrix, body);
     }

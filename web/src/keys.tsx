@@ -11,37 +11,45 @@ const keys: [string, string][] = [
   ["?", "this list"],
 ];
 
-export function listenToKeys(state: State, fit: () => void): void {
+/// `find` gives what a key does, undefined if nothing.
+export function listen(find: (event: KeyboardEvent) => (() => void) | undefined): void {
   addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.altKey || event.metaKey) return;
+    if (event.altKey || event.metaKey) return;
     const target = event.target instanceof HTMLElement ? event.target : document.body;
     const isSlider = target instanceof HTMLInputElement && target.type === "range";
     if (!isSlider && event.key !== "Escape" && target.matches("input, select, textarea")) return;
     // What the keyboard has reached keeps its own keys.
     if (event.key === " " && target.matches("button:focus-visible, summary, .scroller")) return;
     if (target.matches(".scroller, pre") && ["Home", "End", "ArrowLeft", "ArrowRight"].includes(event.key)) return;
-    const actions: Record<string, () => void> = {
-      " ": () => state.togglePlay(),
-      ArrowLeft: () => (event.shiftKey ? state.stepEvent(-1) : state.stepFrame(-1)),
-      ArrowRight: () => (event.shiftKey ? state.stepEvent(1) : state.stepFrame(1)),
-      Home: () => state.pauseAt(state.begin),
-      End: () => state.pauseAt(state.end.value),
-      f: fit,
-      F: fit,
-      "?": () => (state.helpOpen.value = !state.helpOpen.value),
-      Escape: () => {
-        if (state.helpOpen.value) state.helpOpen.value = false;
-        else state.selected.value = -1;
-      },
-    };
-    const action = actions[event.key];
+    const action = find(event);
     if (action === undefined) return;
     event.preventDefault();
     action();
   });
 }
 
-export function Help(props: { state: State }) {
+export function listenToKeys(state: State, fit: () => void): void {
+  const actions: Record<string, (event: KeyboardEvent) => void> = {
+    " ": () => state.togglePlay(),
+    ArrowLeft: (event) => (event.shiftKey ? state.stepEvent(-1) : state.stepFrame(-1)),
+    ArrowRight: (event) => (event.shiftKey ? state.stepEvent(1) : state.stepFrame(1)),
+    Home: () => state.pauseAt(state.begin),
+    End: () => state.pauseAt(state.end.value),
+    f: fit,
+    F: fit,
+    "?": () => (state.helpOpen.value = !state.helpOpen.value),
+    Escape: () => {
+      if (state.helpOpen.value) state.helpOpen.value = false;
+      else state.selected.value = -1;
+    },
+  };
+  listen((event) => {
+    const action = event.ctrlKey ? undefined : actions[event.key];
+    return action === undefined ? undefined : () => action(event);
+  });
+}
+
+export function Help(props: { state: Pick<State, "helpOpen">; keys?: [string, string][]; text?: string }) {
   const { state } = props;
   const dialog = useRef<HTMLDialogElement>(null);
   const open = state.helpOpen.value;
@@ -56,7 +64,7 @@ export function Help(props: { state: State }) {
       <h2>Keys</h2>
       <table class="pairs">
         <tbody>
-          {keys.map(([key, meaning]) => (
+          {(props.keys ?? keys).map(([key, meaning]) => (
             <tr>
               <th scope="row"><kbd>{key}</kbd></th>
               <td>{meaning}</td>
@@ -64,6 +72,7 @@ export function Help(props: { state: State }) {
           ))}
         </tbody>
       </table>
+      {props.text !== undefined && <p>{props.text}</p>}
       <p>Mouse: drag turns, right drag (or Shift + drag) moves, wheel zooms, click picks a member. Click or drag in a plot
         sets the time. Where the system asks for reduced motion, playback goes on in still pictures, four a second.</p>
       <button type="button" onClick={() => (state.helpOpen.value = false)}>Close</button>

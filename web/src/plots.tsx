@@ -35,9 +35,9 @@ export function findCoherent(run: Run): number | undefined {
   return first < 0 ? undefined : first;
 }
 
-const cssColour = (name: string): string => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+export const cssColour = (name: string): string => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
-function axis(label: string, isTime: boolean): uPlot.Axis {
+export function axis(label: string, isTime: boolean): uPlot.Axis {
   return {
     stroke: () => cssColour("--text-quiet"),
     grid: { stroke: () => cssColour("--line-faint"), width: 1 },
@@ -53,23 +53,30 @@ function axis(label: string, isTime: boolean): uPlot.Axis {
   };
 }
 
-function PlotPanel(props: { state: State; group: Group }) {
+/// In the group's readable unit; an angle ends when its block falls apart.
+function calcValues(run: Run, group: Group): (number | null)[][] {
+  const coherent = group.id === "angle" ? findCoherent(run) : undefined;
+  return group.series.map((s) => s.value.map((v, i) => (v === null || i >= (coherent ?? Infinity) ? null : v * group.factor)));
+}
+
+export function PlotPanel(props: { state: State; group: Group; onSeek?: (time: number) => void; height?: number }) {
   const { state, group } = props;
   const { run } = state;
   const holder = useRef<HTMLDivElement>(null);
+  const height = props.height ?? 220;
+  void state.grownSlowly.value; // drawn again when frames were added
   const coherent = group.id === "angle" ? findCoherent(run) : undefined;
-  const values = group.series.map((s) => s.value.map((v, i) => (v === null || i >= (coherent ?? Infinity) ? null : v * group.factor)));
+  const values = calcValues(run, group);
 
   useEffect(() => {
     const element = holder.current;
     if (element === null) return;
     const cursorLine = document.createElement("div");
     cursorLine.className = "time-line";
-    const stages = run.events.filter((e) => e.kind === "stage");
     const plot = new uPlot(
       {
         width: Math.max(200, element.clientWidth),
-        height: 220,
+        height,
         padding: [10, 12, 0, 0],
         legend: { show: false },
         cursor: { drag: { x: false, y: false }, y: false, points: { size: 6 } },
@@ -82,7 +89,7 @@ function PlotPanel(props: { state: State; group: Group }) {
             stroke: () => cssColour(`--series-${i % seriesColours.length}`),
             width: 1.8,
             dash: dashOfSeries(i),
-            points: { show: run.time.length < 2 },
+            points: { show: () => run.time.length < 2 },
           })),
         ],
         hooks: {
@@ -92,7 +99,8 @@ function PlotPanel(props: { state: State; group: Group }) {
               ctx.save();
               ctx.strokeStyle = cssColour("--text-quiet");
               ctx.setLineDash([3, 3]);
-              for (const stage of stages) {
+              for (const stage of run.events) {
+                if (stage.kind !== "stage") continue;
                 const x = Math.round(u.valToPos(stage.time, "x", true)) + 0.5;
                 if (x < u.bbox.left || x > u.bbox.left + u.bbox.width) continue;
                 ctx.beginPath();
@@ -105,7 +113,7 @@ function PlotPanel(props: { state: State; group: Group }) {
           ],
         },
       },
-      [run.time, ...values],
+      [run.time, ...calcValues(run, group)],
       element,
     );
     plot.over.appendChild(cursorLine);
@@ -113,7 +121,7 @@ function PlotPanel(props: { state: State; group: Group }) {
       cursorLine.style.transform = `translateX(${plot.valToPos(state.time.value, "x") || 0}px)`;
     };
     const seek = (event: PointerEvent): void => {
-      if (event.buttons & 1) state.pauseAt(plot.posToVal(event.clientX - plot.over.getBoundingClientRect().left, "x"));
+      if (event.buttons & 1) (props.onSeek ?? state.pauseAt)(plot.posToVal(event.clientX - plot.over.getBoundingClientRect().left, "x"));
     };
     plot.over.addEventListener("pointerdown", (event) => {
       plot.over.setPointerCapture(event.pointerId);
@@ -121,28 +129,34 @@ function PlotPanel(props: { state: State; group: Group }) {
     });
     plot.over.addEventListener("pointermove", seek);
     const observer = new ResizeObserver(() => {
-      plot.setSize({ width: Math.max(200, element.clientWidth), height: 220 });
+      plot.setSize({ width: Math.max(200, element.clientWidth), height });
       placeLine();
     });
     observer.observe(element);
     // Two plots side by side on A4; the paper's layout comes too late for the observer.
     const beforePrint = (): void => plot.setSize({ width: 330, height: 200 });
-    const afterPrint = (): void => plot.setSize({ width: Math.max(200, element.clientWidth), height: 220 });
+    const afterPrint = (): void => plot.setSize({ width: Math.max(200, element.clientWidth), height });
     addEventListener("beforeprint", beforePrint);
     addEventListener("afterprint", afterPrint);
     const dark = matchMedia("(prefers-color-scheme: dark)");
     const redraw = (): void => plot.redraw();
     dark.addEventListener("change", redraw);
     const stop = effect(placeLine);
+    const stopGrowing = state.grownSlowly.subscribe((grown) => {
+      if (grown === 0) return;
+      plot.setData([run.time, ...calcValues(run, group)]);
+      placeLine();
+    });
     return () => {
       stop();
+      stopGrowing();
       observer.disconnect();
       removeEventListener("beforeprint", beforePrint);
       removeEventListener("afterprint", afterPrint);
       dark.removeEventListener("change", redraw);
       plot.destroy();
     };
-  }, []);
+  }, [state]);
 
   return (
     <section class="panel plot" aria-label={group.title} data-plot={group.id}>
@@ -159,7 +173,7 @@ function PlotPanel(props: { state: State; group: Group }) {
   );
 }
 
-function niceRange(low: number | null, high: number | null): [number, number] {
+export function niceRange(low: number | null, high: number | null): [number, number] {
   if (low === null || high === null || !Number.isFinite(low + high)) return [0, 1];
   const a = Math.min(0, low);
   const b = Math.max(0, high);
@@ -223,14 +237,14 @@ function DataTable(props: { state: State; group: Group; values: (number | null)[
   );
 }
 
-export function Plots(props: { state: State }) {
+export function Plots(props: { state: State; onSeek?: (time: number) => void; height?: number }) {
   const groups = makeGroups(props.state.run.series);
   if (groups.length === 0 || props.state.run.time.length === 0)
     return <section class="panel"><h2>Plots</h2><p class="quiet">The record holds no series.</p></section>;
   return (
     <div class={`plots ${groups.length === 1 ? "one" : ""}`}>
       {groups.map((group) => (
-        <PlotPanel state={props.state} group={group} />
+        <PlotPanel key={`${group.id} ${group.unit}`} {...props} group={group} />
       ))}
     </div>
   );

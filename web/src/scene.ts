@@ -3,12 +3,15 @@ import * as THREE from "three";
 import { Building } from "./building";
 import type { Run } from "./data";
 import type { SceneLike } from "./scene_view";
-import { Site } from "./site";
+import { Site, darkTheme, lightTheme } from "./site";
 import { Stage, disposeOf, fov, type StageOptions, type View } from "./stage";
 import type { Colouring, ZoneMarks } from "./state";
 import type { Triple } from "./data";
 
 export type { View } from "./stage";
+
+/// Of a run shown over another one.
+export const ghostColour = "#d55e00";
 
 export class Scene implements SceneLike {
   readonly stage: Stage;
@@ -50,6 +53,27 @@ export class Scene implements SceneLike {
     this.setLook(this.colouring, this.zoneMarks, this.selected);
   }
 
+  private companion: Building | undefined;
+  /// A second run beside the first one, or over it as a ghost; undefined ends that.
+  setCompanion(run: Run | undefined, beside: boolean): void {
+    if (this.companion !== undefined) {
+      this.stage.setPair(undefined);
+      this.stage.scene.remove(this.companion.group);
+      disposeOf(this.companion.group);
+      this.companion = undefined;
+    }
+    if (run !== undefined) {
+      this.companion = new Building(run);
+      this.companion.setTheme(this.stage.dark ? darkTheme : lightTheme, this.stage.dark);
+      this.stage.scene.add(this.companion.group);
+      if (beside) this.stage.setPair([this.building.group, this.companion.group]);
+      else this.companion.setGhost(ghostColour);
+      this.companion.setLook(this.colouring, beside ? this.zoneMarks : "none", -1);
+      this.companion.setTime(this.time);
+    }
+    this.onChange();
+  }
+
   get gridStep(): number {
     return this.site.gridStep;
   }
@@ -73,6 +97,7 @@ export class Scene implements SceneLike {
   setTime(t: number): void {
     this.time = t;
     this.building.setTime(t);
+    this.companion?.setTime(t);
     this.onChange();
   }
 

@@ -84,7 +84,7 @@ export class Stage implements SceneLike {
   }
 
   useAspect(width: number, height: number): void {
-    this.camera.aspect = width / height;
+    this.camera.aspect = (this.pair === undefined ? width : width / 2) / height;
     this.camera.updateProjectionMatrix();
     this.onView();
   }
@@ -136,22 +136,60 @@ export class Stage implements SceneLike {
     this.onChange();
   }
 
+  private held = false;
+  /// The same number of pixels until the returned function is called: a video cannot change its size.
+  holdRatio(ratio: number): () => void {
+    clearTimeout(this.restTimer);
+    this.held = true;
+    this.setRatio(ratio);
+    this.onChange();
+    return () => {
+      this.held = false;
+      this.setRatio(this.fullRatio);
+      this.onChange();
+    };
+  }
+
   private readonly ray = new THREE.Raycaster();
   /// The ray through a place of the canvas.
   castRay(x: number, y: number): THREE.Raycaster {
     this.camera.updateMatrixWorld();
-    this.ray.setFromCamera(new THREE.Vector2((2 * x) / this.width - 1, 1 - (2 * y) / this.height), this.camera);
+    const width = this.pair === undefined ? this.width : this.width / 2;
+    this.ray.setFromCamera(new THREE.Vector2((2 * (x % width)) / width - 1, 1 - (2 * y) / this.height), this.camera);
     return this.ray;
   }
 
+  private pair: [THREE.Object3D, THREE.Object3D] | undefined;
+  /// Two pictures beside each other from one point of view, each without the other's object. Undefined: one picture.
+  setPair(pair: [THREE.Object3D, THREE.Object3D] | undefined): void {
+    this.pair = pair;
+    this.useAspect(this.width, this.height);
+    this.onChange();
+  }
+
   render(): void {
-    if (this.options.adaptive) this.adapt();
+    if (this.options.adaptive && !this.held) this.adapt();
     this.draw();
   }
 
   draw(): void {
     this.camera.updateMatrixWorld();
-    this.renderer.render(this.scene, this.camera);
+    if (this.pair === undefined) {
+      this.renderer.render(this.scene, this.camera);
+      return;
+    }
+    const half = Math.floor(this.width / 2);
+    this.renderer.setScissorTest(true);
+    this.pair.forEach((shown, i) => {
+      for (const object of this.pair ?? []) object.visible = object === shown;
+      const x = i === 0 ? 0 : half + 1;
+      this.renderer.setViewport(x, 0, half - 1, this.height);
+      this.renderer.setScissor(x, 0, half - 1, this.height);
+      this.renderer.render(this.scene, this.camera);
+    });
+    for (const object of this.pair) object.visible = true;
+    this.renderer.setScissorTest(false);
+    this.renderer.setViewport(0, 0, this.width, this.height);
   }
 
   private adapt(): void {

@@ -27,11 +27,25 @@ export function makeState(run: Run, look: Look = makeLook()) {
   /// Rises when frames, events or series have been added to the run.
   const grown = signal(0);
   const end = computed(() => (grown.value, run.time[run.time.length - 1] ?? 0));
+  /// The time axis ends here, or at the last frame if that is later.
+  const limit = signal(0);
+  const span = computed(() => Math.max(limit.value, end.value));
+  /// Follows `grown` at most four times a second, for what is slow to draw.
+  const grownSlowly = signal(0);
+  let waiting = false;
+  grown.subscribe((value) => {
+    if (waiting || value === grownSlowly.peek()) return;
+    waiting = true;
+    setTimeout(() => {
+      waiting = false;
+      grownSlowly.value = grown.peek();
+    }, 250);
+  });
   const time = signal(begin);
   const playing = signal(false);
   const hiddenKinds = signal<ReadonlySet<string>>(chooseHiddenKinds(run));
   const frame = computed(() => (grown.value, findFrame(run.time, time.value).frame));
-  const inOrder = computed(() => (grown.value, [...run.events].sort((a, b) => a.time - b.time)));
+  const inOrder = computed(() => (grownSlowly.value, [...run.events].sort((a, b) => a.time - b.time)));
   const shownEvents = computed(() => inOrder.value.filter((e) => !hiddenKinds.value.has(e.kind)));
 
   const seek = (t: number): void => {
@@ -49,6 +63,9 @@ export function makeState(run: Run, look: Look = makeLook()) {
     time,
     frame,
     grown,
+    grownSlowly,
+    limit,
+    span,
     playing,
     ...look,
     hiddenKinds,

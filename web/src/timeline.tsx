@@ -14,10 +14,10 @@ interface Marker {
 
 /// Events so near to each other that their signs would touch share one.
 function makeMarkers(state: State): Marker[] {
-  const span = state.end.value - state.begin;
+  const span = state.span.value - state.begin;
   const markers: Marker[] = [];
   for (const event of state.shownEvents.value) {
-    if (event.time < state.begin || event.time > state.end.value) continue;
+    if (event.time < state.begin || event.time > state.span.value) continue;
     const at = span > 0 ? (event.time - state.begin) / span : 0;
     const lane = wordsOfEvent(event.kind).small ? 1 : 0;
     const near = markers.find((m) => m.lane === lane && m.kind === event.kind && at - m.at < 0.012);
@@ -33,11 +33,12 @@ function describe(marker: Marker): string[] {
   return lines;
 }
 
-function Markers(props: { state: State }) {
+export function Markers(props: { state: State; onSeek: (time: number) => void }) {
   const { state } = props;
   const [open, setOpen] = useState<Marker>();
   const events = state.shownEvents.value;
-  const markers = useMemo(() => makeMarkers(state), [events]);
+  const span = state.span.value;
+  const markers = useMemo(() => makeMarkers(state), [events, span]);
   return (
     <div class="markers">
       {markers.map((marker) => (
@@ -46,7 +47,7 @@ function Markers(props: { state: State }) {
           class={`marker lane-${marker.lane}`}
           style={{ left: `${100 * marker.at}%` }}
           aria-label={describe(marker).join("; ")}
-          onClick={() => state.pauseAt(marker.events[0]?.time ?? state.begin)}
+          onClick={() => props.onSeek(marker.events[0]?.time ?? state.begin)}
           onPointerEnter={() => setOpen(marker)}
           onPointerLeave={() => setOpen(undefined)}
           onFocus={() => setOpen(marker)}
@@ -67,6 +68,8 @@ function Markers(props: { state: State }) {
 }
 
 const icons = {
+  live: "M8 3a5 5 0 1 0 .01 0z",
+  record: "M8 3a5 5 0 1 0 .01 0z",
   begin: "M3 2h2v12H3zM14 2v12L5.5 8z",
   eventBack: "M8 2v12L1 8zM15 2v12L8 8z",
   stepBack: "M11 2v12L3 8zM12 2h1.6v12H12z",
@@ -77,7 +80,7 @@ const icons = {
   end: "M11 2h2v12h-2zM2 2v12l8.5-6z",
 };
 
-function IconButton(props: { icon: keyof typeof icons; label: string; keys: string; main?: boolean; test?: string; onClick: () => void }) {
+export function IconButton(props: { icon: keyof typeof icons; label: string; keys: string; main?: boolean; test?: string; onClick: () => void }) {
   return (
     <button
       type="button"
@@ -95,7 +98,7 @@ function IconButton(props: { icon: keyof typeof icons; label: string; keys: stri
 }
 
 // Slider and clock follow the time on their own, so that the rest stands still while playing.
-function Slider(props: { state: State }) {
+export function Slider(props: { state: State; onSeek: (time: number) => void }) {
   const { state } = props;
   return (
     <input
@@ -104,16 +107,16 @@ function Slider(props: { state: State }) {
       aria-label="Time"
       aria-valuetext={formatTime(state.time.value)}
       min={state.begin}
-      max={state.end.value}
+      max={state.span.value}
       step="any"
       value={state.time.value}
       disabled={state.run.time.length < 2}
-      onInput={(e) => state.pauseAt(e.currentTarget.valueAsNumber)}
+      onInput={(e) => props.onSeek(e.currentTarget.valueAsNumber)}
     />
   );
 }
 
-function Clock(props: { state: State }) {
+export function Clock(props: { state: State }) {
   const { state } = props;
   const frames = state.run.time.length;
   return (
@@ -133,8 +136,8 @@ export function Timeline(props: { state: State }) {
   return (
     <section class="panel timeline" aria-label="Timeline">
       <div class="track">
-        <Markers state={state} />
-        <Slider state={state} />
+        <Markers state={state} onSeek={state.pauseAt} />
+        <Slider state={state} onSeek={state.pauseAt} />
       </div>
       <div class="transport">
         <IconButton icon="begin" label="To the beginning" keys="Home" onClick={() => state.pauseAt(state.begin)} />

@@ -52,8 +52,9 @@ function makeBodies() {
   return bodies;
 }
 
-/// The data of a report. `frames_` frames over nine seconds.
-export function makeSynthetic(frameCount = 300) {
+/// The data of a report. `frameCount` frames over nine seconds; the second stage fires at `second`.
+export function makeSynthetic(frameCount = 300, second = 4) {
+  const late = second - 4;
   const bodies = makeBodies();
   const B = bodies.length;
   const zones = [];
@@ -80,11 +81,11 @@ export function makeSynthetic(frameCount = 300) {
   const orientation = new Float32Array(frameCount * B * 4);
   const zoneState = new Uint8Array(frameCount * Z);
   const zoneUtilisation = new Float32Array(frameCount * Z);
-  const touchdown = 6.6;
-  const angleAt = (t) => (t < 4 ? 0 : Math.min(1.52, 0.02 * (Math.cosh(1.72 * (t - 4)) - 1)));
+  const touchdown = 6.6 + late;
+  const angleAt = (t) => (t < second ? 0 : Math.min(1.52, 0.02 * (Math.cosh(1.72 * (t - second)) - 1)));
   const fallen = angleAt(touchdown);
   const isCharged = (body) => body.kind === "column" && body.storey === 0 && body.start[0] < rear;
-  const fires = (body) => (body.start[0] < 4 ? 0.5 : 4);
+  const fires = (body) => (body.start[0] < 4 ? 0.5 : second);
 
   time.forEach((t, i) => {
     const angle = Math.min(fallen, angleAt(t)) + (t > touchdown ? (1.52 - fallen) * (1 - Math.exp(-2 * (t - touchdown))) : 0);
@@ -122,10 +123,10 @@ export function makeSynthetic(frameCount = 300) {
       let use = 0.3 + 0.2 * noise(k);
       if (body !== undefined) {
         if (isCharged(body)) state = t >= fires(body) ? 4 : 0;
-        else if (body.storey === 0) state = t < 4.1 ? 0 : t < 5 ? 1 : t < 6 ? 2 : 3;
+        else if (body.storey === 0) state = t < 4.1 + late ? 0 : t < 5 + late ? 1 : t < 6 + late ? 2 : 3;
         else if (t > touchdown + noise(k)) state = noise(k + 1) < 0.5 ? 3 : 2;
         else if (body.kind === "beam" && t > 0.7 && body.start[0] < rear && noise(k) < 0.15) state = 1;
-        use = state === 0 ? use + (t > 4 ? 0.3 : 0) : 1 + 0.1 * state;
+        use = state === 0 ? use + (t > second ? 0.3 : 0) : 1 + 0.1 * state;
       }
       zoneState[i * Z + k] = state;
       zoneUtilisation[i * Z + k] = zone.member === "" ? NaN : use;
@@ -137,12 +138,12 @@ export function makeSynthetic(frameCount = 300) {
   const events = [
     { time: 0.5, kind: "stage", subject: "Stage 1", text: "Stage 1 fires: rows A and B." },
     ...bodies.filter(isCharged).map((b) => ({ time: fires(b), kind: "charge", subject: b.name, text: `The charge in ${b.name} fires.` })),
-    { time: 4, kind: "stage", subject: "Stage 2", text: "Stage 2 fires: row C." },
-    ...zones.filter((z) => z.body_a >= 0 && noise(z.body_a) < 0.3).map((z, i) => ({ time: 4.1 + 0.01 * i, kind: "yield", subject: z.name, text: `${z.name} yields.` })),
-    { time: 5.9, kind: "rupture", subject: "C-D1-0/foot", text: "The bars of C-D1-0/foot break." },
+    { time: second, kind: "stage", subject: "Stage 2", text: "Stage 2 fires: row C." },
+    ...zones.filter((z) => z.body_a >= 0 && noise(z.body_a) < 0.3).map((z, i) => ({ time: 4.1 + late + 0.01 * i, kind: "yield", subject: z.name, text: `${z.name} yields.` })),
+    { time: 5.9 + late, kind: "rupture", subject: "C-D1-0/foot", text: "The bars of C-D1-0/foot break." },
     { time: touchdown, kind: "touchdown", subject: "C-A1-6", text: "C-A1-6 touches the ground at 14.2 m/s." },
-    { time: 6.9, kind: "touchdown", subject: "C-A3-6", text: "C-A3-6 touches the ground at 12.1 m/s." },
-    { time: 8.7, kind: "rest", subject: "", text: "Nothing moves faster than 0.1 m/s." },
+    { time: 6.9 + late, kind: "touchdown", subject: "C-A3-6", text: "C-A3-6 touches the ground at 12.1 m/s." },
+    { time: 8.7 + late, kind: "rest", subject: "", text: "Nothing moves faster than 0.1 m/s." },
   ];
   return {
     format: "topple-report",
@@ -186,7 +187,7 @@ export function makeSynthetic(frameCount = 300) {
       { id: "energy_kinetic", title: "Kinetic", unit: "J", group: "energy", value: tilt.map((a, i) => 55e6 * a * a * (time[i] > touchdown ? Math.exp(-3 * (time[i] - touchdown)) : 1)) },
       { id: "energy_potential", title: "Potential", unit: "J", group: "energy", value: tilt.map((a) => -weight * 9 * (1 - Math.cos(a))) },
       { id: "energy_dissipated", title: "Dissipated", unit: "J", group: "energy", value: tilt.map((a, i) => (i === 0 ? null : 30e6 * Math.abs(a))) },
-      { id: "ground_force", title: "Ground force", unit: "N", group: "force", value: time.map((t) => weight * (1 - 0.3 * Math.exp(-((t - 5.6) ** 2) * 3) + 2.5 * Math.exp(-((t - touchdown) ** 2) * 60))) },
+      { id: "ground_force", title: "Ground force", unit: "N", group: "force", value: time.map((t) => weight * (1 - 0.3 * Math.exp(-((t - 5.6 - late) ** 2) * 3) + 2.5 * Math.exp(-((t - touchdown) ** 2) * 60))) },
       { id: "mass_centre_height", title: "Height of the centre of mass", unit: "m", group: "height", value: tilt.map((a) => 11 - 9 * (1 - Math.cos(a))) },
     ],
     position: base64OfFloats(position),

@@ -1,0 +1,482 @@
+/// What the steering page knows, and what it can ask for. Two clocks: the solver's frontier (`progress`) and the viewer's
+/// cursor (`view.state.time`); only run, pause and step move the first, nothing of the viewer does.
+import { batch, computed, effect, signal } from "@preact/signals";
+import type { Finding, RunEvent } from "./data";
+import { BranchRun } from "./steer_branch";
+import { CommandError, Connection, type ErrorObject, type Message } from "./steer_connection";
+import { decodeFrame } from "./steer_wire";
+import type { Branch, Comparison, FindingsSoFar, LogEntry, PlanCheck, Sample, Session, StateEvent, Study, ZoneWatch } from "./steer_wire";
+import { makeLook } from "./state";
+import { formatTime } from "./units";
+
+export type Tab = "plots" | "events" | "findings" | "compare" | "study" | "plan" | "log";
+export type Dialog =
+  | { kind: "delay"; charge?: number; stage?: number; time: number; title: string }
+  | { kind: "charge" | "pre_cut" | "cable"; member: string }
+  | { kind: "friction" }
+  | { kind: "branch" }
+  | { kind: "rename"; branch: number; name: string }
+  | { kind: "open" }
+  | { kind: "conflict"; text: string; disk: string; sha256: string };
+export interface Notice {
+  id: number;
+  status: "info" | "good" | "bad";
+  text: string;
+  help?: string;
+}
+
+export function makeSteerState(address: string) {
+  const look = makeLook();
+  const session = signal<Session | null>(null);
+  const progress = signal<StateEvent | null>(null);
+  const plan = signal({ text: "", path: "", sha256: "" });
+  const active = signal(0);
+  const view = signal<BranchRun | null>(null);
+  const following = signal(true);
+  const sessions = signal<Session[]>([]);
+  const log = signal<LogEntry[]>([]);
+  const findings = signal<FindingsSoFar | null>(null);
+  const studies = signal<Study[]>([]);
+  const samples = signal<ReadonlyMap<number, Sample[]>>(new Map());
+  const watchedStudy = signal(0);
+  const zone = signal<ZoneWatch | null>(null);
+  const comparison = signal<{ a: number; b: number; result: Comparison } | null>(null);
+  const tab = signal<Tab>("plots");
+  const tall = signal(false);
+  const dialog = signal<Dialog | null>(null);
+  const notices = signal<Notice[]>([]);
+  const hiddenStoreys = signal<ReadonlySet<number>>(new Set());
+  const section = signal<{ on: boolean; low: [number, number, number]; high: [number, number, number] }>({ on: false, low: [0, 0, 0], high: [1, 1, 1] });
+  const showDebris = signal(true);
+  const planCheck = signal<PlanCheck | null>(null);
+  const editedText = signal<string | null>(null); // null: as on the disk
+  const welcomed = signal(false); // the server has said what it has
+  const draws = signal(0); // rises when frames came in
+  const runs = new Map<number, BranchRun>();
+  let noticeId = 0;
+  let filling = false;
+
+  const notify = (status: Notice["status"], text: string, help?: string): void => {
+    const id = ++noticeId;
+    const others = notices.value.filter((n) => n.text !== text).slice(-3);
+    notices.value = [...others, { id, status, text, ...(help === undefined || help === "" ? {} : { help }) }];
+    if (status !== "bad") setTimeout(() => dismiss(id), 6000);
+  };
+  const dismiss = (id: number): void => {
+    notices.value = notices.value.filter((n) => n.id !== id);
+  };
+  const complain = (error: unknown): void => {
+    if (error instanceof CommandError) notify("bad", error.error.message, error.error.help);
+    else notify("bad", error instanceof Error ? error.message : String(error));
+  };
+
+  const connection = new Connection(address, { onMessage: receive, onFrame: takeFrame });
+  /// Does it and shows what went wrong; undefined then.
+  async function ask<R>(command: string, keys: Record<string, unknown> = {}): Promise<R | undefined> {
+    try {
+      return await connection.command<R>(command, keys);
+    } catch (error) {
+      complain(error);
+      return undefined;
+    }
+  }
+
+  const branches = computed(() => session.value?.branches ?? []);
+  const branch = computed(() => branches.value.find((b) => b.id === active.value));
+  const phase = computed(() => progress.value?.phase ?? session.value?.phase ?? "paused");
+  const frontier = computed(() => progress.value?.time ?? branch.value?.frontier ?? 0);
+  /// The end of the time axis: what the plan asks for, or how far the run came.
+  const span = computed(() => Math.max(branch.value?.duration ?? 0, frontier.value, view.value?.state.end.value ?? 0, 1e-3));
+  /// Where an edit would act.
+  const editTime = computed(() => (following.value ? frontier.value : (view.value?.state.time.value ?? 0)));
+
+  // Each run's time axis goes to the end of its plan.
+  effect(() => {
+    const run = view.value;
+    if (run !== null) run.state.limit.value = branch.value?.duration ?? 0;
+  });
+
+  function putBranch(one: Branch): void {
+    const now = session.value;
+    if (now === null) return;
+    const known = now.branches.some((b) => b.id === one.id);
+    session.value = { ...now, branches: known ? now.branches.map((b) => (b.id === one.id ? one : b)) : [...now.branches, one] };
+  }
+
+  function receive(message: Message): void {
+    batch(() => {
+      const other = message["session"] !== undefined && typeof message["session"] === "number" && message["session"] !== session.value?.id;
+      if (other && message.type !== "sessions") return;
+      switch (message.type) {
+        case "hello":
+          greet(message);
+          break;
+        case "resumed":
+          notify("good", "The connection is back. The run went on meanwhile.");
+          break;
+        case "state": {
+          const next = message as unknown as StateEvent;
+          const before = progress.value;
+          progress.value = next;
+          if (next.branch !== active.value && branches.value.some((b) => b.id === next.branch)) void show(next.branch);
+          if (before !== null && before.phase === "running" && next.phase !== "running") void readFindings();
+          break;
+        }
+        case "happenings":
+          runs.get(message["branch"] as number)?.addEvents(message["events"] as RunEvent[]);
+          draws.value += 1;
+          break;
+        case "branch":
+          putBranch(message["branch"] as Branch);
+          break;
+        case "log":
+          if (!log.value.some((e) => e.seq === (message["entry"] as LogEntry).seq)) log.value = [...log.value, message["entry"] as LogEntry];
+          break;
+        case "zone":
+          if (zone.value !== null && zone.value.zone === message["zone"])
+            zone.value = { ...zone.value, path: [...zone.value.path, ...(message["points"] as number[][])] };
+          break;
+        case "study":
+          putStudy(message["study"] as Study, (message["samples"] ?? []) as Sample[]);
+          break;
+        case "sessions":
+          sessions.value = message["sessions"] as Session[];
+          break;
+        case "plan_changed":
+          if (message["sha256"] !== plan.value.sha256) void readPlan();
+          break;
+        case "bye":
+          notify("bad", message["session"] === undefined ? `The server has ended: ${String(message["reason"])}` : `This session was closed: ${String(message["reason"])}`);
+          if (message["session"] !== undefined) leave();
+          break;
+      }
+    });
+  }
+
+  function leave(): void {
+    session.value = null;
+    view.value = null;
+    progress.value = null;
+    runs.clear();
+    dialog.value = null;
+  }
+
+  function greet(message: Message): void {
+    welcomed.value = true;
+    const next = (message["session"] ?? null) as Session | null;
+    if (Array.isArray(message["sessions"])) sessions.value = message["sessions"] as Session[];
+    const known = next !== null && session.value?.id === next.id;
+    const keep = remembered();
+    if (!known && session.value === null && keep !== undefined && next !== null && keep.session !== next.id) {
+      // After a reload: the session that was watched before.
+      connection.command("session.attach", { session: keep.session }).catch(() => undefined);
+    }
+    if (!known) runs.clear();
+    session.value = next;
+    if (next === null) {
+      leave();
+      return;
+    }
+    if (!sessions.value.some((s) => s.id === next.id)) sessions.value = [...sessions.value, next];
+    progress.value = null;
+    plan.value = message["plan"] as typeof plan.value;
+    active.value = next.active;
+    if (!known) {
+      comparison.value = null;
+      zone.value = null;
+      editedText.value = null;
+      planCheck.value = null;
+      hiddenStoreys.value = new Set();
+      look.selected.value = -1;
+    }
+    const run = runs.get(next.active) ?? new BranchRun(next.active, message["scene"], look);
+    runs.set(next.active, run);
+    useRun(run);
+    if (!known && keep?.session === next.id) {
+      following.value = keep.following;
+      if (!keep.following) wanted = keep.time;
+      tab.value = keep.tab;
+    }
+    void readFindings();
+    ask<{ entries: LogEntry[] }>("log").then((r) => r !== undefined && (log.value = r.entries));
+    ask<{ studies: Study[] }>("study.list").then((r) => r?.studies.forEach((s) => putStudy(s, [])));
+    ask<PlanCheck>("plan.check", { text: plan.value.text }).then((r) => r !== undefined && editedText.value === null && (planCheck.value = r));
+    fill();
+  }
+
+  /// A place in time to go to when its frames are there.
+  let wanted: number | undefined;
+
+  function useRun(run: BranchRun): void {
+    const before = view.value;
+    if (before === run) return;
+    before?.state.pauseAt(before.state.time.value);
+    const name = before?.run.bodies[look.selected.value]?.name;
+    if (before !== null) look.selected.value = name === undefined ? -1 : run.run.bodies.findIndex((b) => b.name === name);
+    view.value = run;
+    if (following.value) run.state.seek(Infinity);
+  }
+
+  /// Shows the branch that the server made active.
+  async function show(id: number): Promise<void> {
+    active.value = id;
+    let run = runs.get(id);
+    if (run === undefined) {
+      const answer = await ask<{ scene: unknown }>("scene", { branch: id });
+      if (answer === undefined) return;
+      run = runs.get(id) ?? new BranchRun(id, answer.scene, look);
+      runs.set(id, run);
+      const info = branches.value.find((b) => b.id === id);
+      const parent = info?.parent === null || info?.parent === undefined ? undefined : runs.get(info.parent);
+      if (parent !== undefined && info !== undefined) {
+        run.share(parent, info.first_frame);
+        run.flush();
+      }
+    }
+    if (active.value !== id) return;
+    const time = view.value?.state.time.value ?? 0;
+    useRun(run);
+    if (!following.value) run.state.seek(time);
+    void readFindings();
+    fill();
+  }
+
+  function takeFrame(bytes: ArrayBuffer): void {
+    try {
+      const frame = decodeFrame(bytes);
+      if (frame.session !== session.value?.id) return;
+      runs.get(frame.branch)?.add(frame);
+      draws.value += 1;
+    } catch (error) {
+      complain(error);
+    }
+  }
+
+  // Frames come faster than pictures: what came is shown once per picture.
+  let due = false;
+  effect(() => {
+    if (draws.value === 0 || due) return;
+    due = true;
+    requestAnimationFrame(() => {
+      due = false;
+      for (const run of runs.values()) run.flush();
+      const run = view.peek();
+      if (run === null) return;
+      if (following.peek()) run.state.seek(run.last);
+      else if (wanted !== undefined && run.last >= wanted) {
+        run.state.seek(wanted);
+        wanted = undefined;
+      }
+    });
+  });
+  // Playback that arrives at the end of what there is goes on with the run.
+  effect(() => {
+    const run = view.value;
+    if (run !== null && run.state.playing.value) following.value = false;
+  });
+
+  /// Asks for the frames that were dropped or are from before this page came, one stretch at a time.
+  function fill(): void {
+    if (filling || connection.status.value !== "open" || session.value === null) return;
+    const missing: { run: BranchRun; from: number; count: number; stride: number }[] = [];
+    for (const run of runs.values()) {
+      const info = branches.value.find((b) => b.id === run.id);
+      const isActive = run.id === active.value;
+      if (!isActive && run.id !== comparison.value?.a && run.id !== comparison.value?.b) continue;
+      let count = isActive && progress.value?.branch === run.id ? progress.value.frames : (info?.frames ?? 0);
+      // While it runs the last frames may still be on their way.
+      if (isActive && phase.value === "running") count -= 30;
+      const found = run.findMissing(count);
+      if (found !== undefined) missing.push({ run, ...found });
+    }
+    const next = missing[0];
+    if (next === undefined) return;
+    filling = true;
+    const before = next.run.rows.length;
+    connection
+      .command("frames", { branch: next.run.id, from: next.from, count: next.count, stride: next.stride })
+      .then(() => {
+        filling = false;
+        next.run.flush();
+        if (next.run.rows.length > before) setTimeout(fill, 0);
+      })
+      .catch((error: unknown) => {
+        filling = false;
+        if (!(error instanceof CommandError && ["lost", "E920"].includes(error.error.code))) complain(error);
+      });
+  }
+  setInterval(fill, 1000);
+
+  async function readFindings(): Promise<void> {
+    const id = active.value;
+    const result = await connection.command<FindingsSoFar>("findings", { branch: id }).catch(() => undefined);
+    if (result === undefined || active.value !== id) return;
+    findings.value = result;
+    const run = runs.get(id);
+    if (run === undefined) return;
+    run.run.findings = result.findings as Finding[];
+    run.run.not_modelled = result.not_modelled;
+    run.addEvents(result.events);
+    draws.value += 1;
+  }
+
+  async function readPlan(): Promise<void> {
+    const id = session.value?.id;
+    const response = await fetch(`api/sessions/${id}/plan`);
+    if (!response.ok) return;
+    const text = await response.text();
+    const bytes = new Uint8Array(await crypto.subtle.digest("SHA-256", new TextEncoder().encode(text)));
+    plan.value = { ...plan.value, text, sha256: [...bytes].map((b) => b.toString(16).padStart(2, "0")).join("") };
+  }
+
+  function putStudy(study: Study, fresh: Sample[]): void {
+    const known = studies.value.some((s) => s.id === study.id);
+    studies.value = known ? studies.value.map((s) => (s.id === study.id ? study : s)) : [...studies.value, study];
+    if (fresh.length > 0) {
+      const all = new Map((samples.value.get(study.id) ?? []).map((s) => [s.index, s]));
+      for (const one of fresh) all.set(one.index, one);
+      samples.value = new Map(samples.value).set(study.id, [...all.values()].sort((a, b) => a.index - b.index));
+    }
+  }
+
+  /// Sends an edit to act where the viewer looks.
+  async function edit(command: string, keys: Record<string, unknown>): Promise<boolean> {
+    const at = following.value ? undefined : view.value?.state.time.value;
+    try {
+      if (at !== undefined) await connection.command("rewind", { time: at });
+      else if (progress.value?.cursor !== null && progress.value?.cursor !== undefined && progress.value.cursor < frontier.value) await connection.command("live");
+      const result = await connection.command<{ branch: Branch | number; edit?: { text: string } }>(command, keys);
+      await arrive(result.branch, result.edit?.text);
+      return true;
+    } catch (error) {
+      complain(error);
+      return false;
+    }
+  }
+
+  async function arrive(made: Branch | number | undefined, text?: string): Promise<void> {
+    const id = typeof made === "object" ? made.id : made;
+    if (typeof made === "object") putBranch(made);
+    if (id === undefined) return;
+    const isNew = id !== active.value;
+    following.value = true;
+    if (isNew) await show(id);
+    const name = branches.value.find((b) => b.id === id)?.name ?? `branch ${id}`;
+    notify("good", `${text ?? "Done"}${isNew ? ` Now on branch “${name}”.` : ""}`);
+  }
+
+  const remembered = (): { session: number; time: number; following: boolean; tab: Tab } | undefined => {
+    try {
+      return JSON.parse(sessionStorage.getItem(`topple ${address}`) ?? "null") ?? undefined;
+    } catch {
+      return undefined;
+    }
+  };
+  const remember = (): void => {
+    if (session.value === null) return;
+    const keep = { session: session.value.id, time: view.value?.state.time.value ?? 0, following: following.value, tab: tab.value };
+    try {
+      sessionStorage.setItem(`topple ${address}`, JSON.stringify(keep));
+    } catch {
+      /* a browser without storage forgets */
+    }
+  };
+  addEventListener("pagehide", remember);
+
+  const runOrPause = async (): Promise<void> => {
+    if (phase.value === "running") await ask("pause");
+    else if (phase.value === "finished") notify("info", progress.value?.ending?.text ?? "This branch has ended.", "Look at it, or change something at an earlier moment: that makes a new branch.");
+    else if (phase.value !== "failed") {
+      following.value = true;
+      view.value?.state.seek(Infinity);
+      await ask("run");
+    }
+  };
+
+  return {
+    ...look,
+    connection, status: connection.status, ask, notify, dismiss, notices, welcomed,
+    session, sessions, branches, branch, active, view, plan, progress, phase, frontier, span, following, editTime, log, findings,
+    studies, samples, watchedStudy, zone, comparison, tab, tall, dialog, hiddenStoreys, section, showDebris, planCheck, editedText, draws,
+    edit, arrive, show, fill, runs,
+
+    runOrPause,
+    /// Space: what the viewer looks at, the run or what is recorded of it.
+    toggle(): void {
+      if (following.value) void runOrPause();
+      else view.value?.state.togglePlay();
+    },
+    goLive(): void {
+      view.value?.state.pauseAt(view.value.last);
+      following.value = true;
+    },
+    /// The viewer's cursor; the run is not touched.
+    look(time: number): void {
+      following.value = false;
+      view.value?.state.pauseAt(time);
+    },
+    stepFrame(direction: 1 | -1): void {
+      const run = view.value;
+      if (run === null) return;
+      if (following.value && direction > 0) {
+        if (phase.value === "paused") void ask("step", { frames: 1 });
+        return;
+      }
+      following.value = false;
+      run.state.stepFrame(direction);
+    },
+    stepEvent(direction: 1 | -1): void {
+      following.value = false;
+      view.value?.state.stepEvent(direction);
+    },
+    async makeBranch(name: string): Promise<void> {
+      const time = following.value ? undefined : view.value?.state.time.value;
+      const result = await ask<{ branch: Branch | number }>("branch", { name, ...(time === undefined ? {} : { time }) });
+      if (result !== undefined) await arrive(result.branch, `Branched at ${formatTime(time ?? frontier.value)}.`);
+    },
+    async switchTo(id: number): Promise<void> {
+      if (id === active.value) return;
+      if ((await ask("switch", { branch: id })) !== undefined) await show(id);
+    },
+    async undo(): Promise<void> {
+      const result = await ask<{ branch: Branch | number }>("undo");
+      if (result !== undefined) await arrive(result.branch, "The last edit was taken back.");
+    },
+    async watchZone(name: string | null): Promise<void> {
+      zone.value = null;
+      const result = await ask<ZoneWatch>("zone", { zone: name });
+      if (name !== null && result !== undefined) zone.value = { ...result, zone: name };
+    },
+    async compare(a: number, b: number): Promise<void> {
+      const result = await ask<Comparison>("compare", { a, b });
+      if (result === undefined) return;
+      for (const id of [a, b])
+        if (!runs.has(id)) {
+          const answer = await ask<{ scene: unknown }>("scene", { branch: id });
+          if (answer !== undefined) runs.set(id, new BranchRun(id, answer.scene, look));
+        }
+      comparison.value = { a, b, result };
+      tab.value = "compare";
+      fill();
+    },
+    async openSession(keys: Record<string, unknown>): Promise<ErrorObject | undefined> {
+      try {
+        await connection.command("session.open", keys);
+        dialog.value = null;
+        return undefined;
+      } catch (error) {
+        if (error instanceof CommandError) return error.error;
+        throw error;
+      }
+    },
+    async watchStudy(id: number): Promise<void> {
+      if (watchedStudy.value !== 0 && watchedStudy.value !== id) void ask("study.unwatch", { study: watchedStudy.value });
+      watchedStudy.value = id;
+      const result = await ask<{ study: Study; samples: Sample[] }>("study.watch", { study: id });
+      if (result !== undefined) putStudy(result.study, result.samples);
+    },
+    complain,
+    readPlan,
+  };
+}
+export type SteerState = ReturnType<typeof makeSteerState>;
