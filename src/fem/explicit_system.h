@@ -24,7 +24,6 @@ struct ExplicitOptions {
   int threads = 1;                   // 0: all of the machine
   double linear_viscosity = 0.06;    // bulk viscosity in compression, von Neumann & Richtmyer, Landshoff
   double quadratic_viscosity = 1.2;  //
-  double hourglass_floor = 0.05;     // of the yield stress: least limit of the stabilisation in plastic flow
   bool contact = true;               // between surfaces; the ground is always there
   double friction = 0.5;             // between surfaces and debris
   double contact_damping = 0.2;      // of critical, ground too; 0: elastic
@@ -135,10 +134,10 @@ class ExplicitSystem {
   const std::vector<DebrisParticle>& debris() const;  // never removed
 
   ExplicitEnergy calc_energy() const;
-  /// Elements, plastic work and stored energy by part; (largest part + 1).
+  /// By part; (largest part + 1).
   struct PartSummary {
     int alive = 0, removed = 0;
-    double plastic = 0, bulk_viscosity = 0;  // [J]
+    double plastic_strain = 0;  // mean over the elements left
     double largest_plastic_strain = 0;
   };
   std::vector<PartSummary> calc_parts() const;
@@ -172,8 +171,9 @@ class ExplicitSystem {
   const Timing& timing() const;
   std::string instruction_set() const;
 
+  struct Inside;  // for this module
+
  private:
-  struct Inside;
   std::unique_ptr<Inside> inside_;
 };
 

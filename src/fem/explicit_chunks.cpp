@@ -1,0 +1,157 @@
+#include "fem/explicit_chunks.h"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
+namespace topple::fem {
+
+namespace {
+
+/// Sorts elements so that any run of them is compact: halves along the longest side, whole chunks first.
+class Bisection {
+ public:
+  Bisection(const std::vector<Vec3>& centres, size_t chunk) : centres_(centres), chunk_(chunk) {}
+  void sort(int* first, int* last) const {
+    const size_t count = static_cast<size_t>(last - first);
+    if (count < 2) return;
+    Vec3 low{1e300, 1e300, 1e300}, high{-1e300, -1e300, -1e300};
+    for (const int* e = first; e != last; ++e)
+      for (int c = 0; c < 3; ++c) {
+        const double x = centres_[static_cast<size_t>(*e)][c];
+        low[c] = std::min(low[c], x), high[c] = std::max(high[c], x);
+      }
+    int axis = 0;
+    for (int c = 1; c < 3; ++c)
+      if (high[c] - low[c] > high[axis] - low[axis]) axis = c;
+    size_t half = count / 2;
+    if (count > chunk_) half = std::max<size_t>(1, (half + chunk_ / 2) / chunk_) * chunk_;
+    int* middle = first + half;
+    std::nth_element(first, middle, last, [&](int a, int b) {
+      const double xa = centres_[static_cast<size_t>(a)][axis], xb = centres_[static_cast<size_t>(b)][axis];
+      return xa < xb || (xa == xb && a < b);
+    });
+    sort(first, middle);
+    sort(middle, last);
+  }
+
+ private:
+  const std::vector<Vec3>& centres_;
+  size_t chunk_;
+};
+
+}  // namespace
+
+ExplicitChunks make_chunks(const ExplicitModel& model, size_t lanes, size_t elements_a_chunk) {
+  ExplicitChunks c;
+  c.W = lanes;
+  const size_t E = model.elements.size(), N = model.nodes.size();
+  std::vector<Vec3> centres(E);
+  for (size_t e = 0; e < E; ++e) {
+    for (const int n : model.elements[e].node) centres[e] += model.nodes[static_cast<size_t>(n)];
+  }
+  c.order.resize(E);
+  std::iota(c.order.begin(), c.order.end(), 0);
+  std::stable_sort(c.order.begin(), c.order.end(), [&](int a, int b) {
+    return model.elements[static_cast<size_t>(a)].material < model.elements[static_cast<size_t>(b)].material;
+  });
+  c.slot_of_element.resize(E);
+  const auto material_at = [&](size_t i) { return model.elements[static_cast<size_t>(c.order[i])].material; };
+  std::vector<std::pair<size_t, size_t>> ranges;  // of order, chunk after chunk
+  for (size_t first = 0; first < E;) {
+    size_t last = first;
+    while (last < E && material_at(last) == material_at(first)) ++last;
+    Bisection(centres, elements_a_chunk).sort(c.order.data() + first, c.order.data() + last);
+    for (size_t i = first; i < last; i += elements_a_chunk)
+      ranges.emplace_back(i, std::min(last, i + elements_a_chunk));
+    first = last;
+  }
+
+  // which nodes are one chunk's alone
+  constexpr std::uint32_t kNobody = std::numeric_limits<std::uint32_t>::max(), kSeveral = kNobody - 1;
+  std::vector<std::uint32_t> owner(N, kNobody);
+  for (size_t k = 0; k < ranges.size(); ++k)
+    for (size_t i = ranges[k].first; i < ranges[k].second; ++i)
+      for (const int n : model.elements[static_cast<size_t>(c.order[i])].node) {
+        std::uint32_t& o = owner[static_cast<size_t>(n)];
+        if (o == kNobody)
+          o = static_cast<std::uint32_t>(k);
+        else if (o != k)
+          o = kSeveral;
+      }
+  constexpr std::uint32_t kUnset = kNobody;
+  c.row_of_node.assign(N, kUnset);
+  const auto add_row = [&](int n) {
+    c.row_of_node[static_cast<size_t>(n)] = static_cast<std::uint32_t>(c.node_of_row.size());
+    c.node_of_row.push_back(n);
+  };
+  for (size_t k = 0; k < ranges.size(); ++k) {
+    ElementChunk chunk;
+    chunk.material = material_at(ranges[k].first);
+    chunk.first_row = c.node_of_row.size();
+    for (size_t i = ranges[k].first; i < ranges[k].second; ++i)
+      for (const int n : model.elements[static_cast<size_t>(c.order[i])].node)
+        if (owner[static_cast<size_t>(n)] == k && c.row_of_node[static_cast<size_t>(n)] == kUnset) add_row(n);
+    chunk.own = c.node_of_row.size() - chunk.first_row;
+    c.chunks.push_back(chunk);
+  }
+  c.first_shared_row = c.node_of_row.size();
+  for (const int e : c.order)
+    for (const int n : model.elements[static_cast<size_t>(e)].node)
+      if (c.row_of_node[static_cast<size_t>(n)] == kUnset) add_row(n);
+  for (size_t n = 0; n < N; ++n)
+    if (c.row_of_node[n] == kUnset) add_row(static_cast<int>(n));
+
+  // slots and the chunk's own numbers of nodes
+  std::vector<std::uint32_t> place(N, kUnset);
+  std::vector<std::uint32_t> count(N - c.first_shared_row + 1, 0);
+  for (size_t k = 0; k < ranges.size(); ++k) {
+    ElementChunk& chunk = c.chunks[k];
+    const size_t elements = ranges[k].second - ranges[k].first;
+    chunk.first_block = c.element_of_slot.size() / c.W;
+    chunk.blocks = (elements + c.W - 1) / c.W;
+    chunk.first_shared = c.shared_rows.size();
+    c.element_of_slot.resize((chunk.first_block + chunk.blocks) * c.W, -1);
+    c.corners.resize((chunk.first_block + chunk.blocks) * 8 * c.W);
+    for (size_t i = 0; i < elements; ++i)
+      for (const int n : model.elements[static_cast<size_t>(c.order[ranges[k].first + i])].node) {
+        std::uint32_t& at = place[static_cast<size_t>(n)];
+        const std::uint32_t row = c.row_of_node[static_cast<size_t>(n)];
+        if (at != kUnset) continue;
+        if (row < c.first_shared_row) {
+          at = row - static_cast<std::uint32_t>(chunk.first_row);
+        } else {
+          at = static_cast<std::uint32_t>(chunk.own + c.shared_rows.size() - chunk.first_shared);
+          c.shared_rows.push_back(row);
+          ++count[row - c.first_shared_row];
+        }
+      }
+    chunk.shared = c.shared_rows.size() - chunk.first_shared;
+    c.most_nodes = std::max(c.most_nodes, chunk.own + chunk.shared);
+    // neighbours go to different blocks' lanes, so that a block's forces meet few common nodes
+    for (size_t l = 0; l < c.W; ++l)
+      for (size_t b = 0; b < chunk.blocks; ++b) {
+        const size_t i = l * chunk.blocks + b, block = chunk.first_block + b;
+        const int e = c.order[ranges[k].first + (i < elements ? i : 0)];
+        if (i < elements) {
+          c.element_of_slot[block * c.W + l] = e;
+          c.slot_of_element[static_cast<size_t>(e)] = static_cast<std::uint32_t>(block * c.W + l);
+        }
+        for (size_t j = 0; j < 8; ++j)
+          c.corners[(block * 8 + j) * c.W + l] =
+              static_cast<std::uint16_t>(place[static_cast<size_t>(model.elements[static_cast<size_t>(e)].node[j])]);
+      }
+    for (size_t i = 0; i < elements; ++i)
+      for (const int n : model.elements[static_cast<size_t>(c.order[ranges[k].first + i])].node)
+        place[static_cast<size_t>(n)] = kUnset;
+  }
+  c.starts.assign(N - c.first_shared_row + 1, 0);
+  for (size_t i = 0; i + 1 < c.starts.size(); ++i) c.starts[i + 1] = c.starts[i] + count[i];
+  c.entries.resize(c.shared_rows.size());
+  std::vector<std::uint32_t> next(c.starts.begin(), c.starts.end() - 1);
+  for (size_t i = 0; i < c.shared_rows.size(); ++i)
+    c.entries[next[c.shared_rows[i] - c.first_shared_row]++] = static_cast<std::uint32_t>(i);
+  return c;
+}
+
+}  // namespace topple::fem

@@ -1,0 +1,38 @@
+#pragma once
+/// Elements in chunks that lie close together and fit the cache, nodes in the order of the chunks that own them. A
+/// chunk is the unit of work of a thread; nodes of several chunks get their forces summed in a fixed order.
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "fem/explicit_model.h"
+
+namespace topple::fem {
+
+struct ElementChunk {
+  int material = 0;
+  size_t first_block = 0, blocks = 0;   // of W slots
+  size_t first_row = 0, own = 0;        // rows of nodes that belong to no other chunk
+  size_t first_shared = 0, shared = 0;  // into shared_rows, and rows of shared forces
+};
+
+struct ExplicitChunks {
+  size_t W = 1;
+  std::vector<ElementChunk> chunks;
+  std::vector<std::uint32_t> slot_of_element;
+  std::vector<int> element_of_slot;  // -1: empty
+  std::vector<int> order;            // elements of chunk after chunk, neighbours close
+  std::vector<std::uint32_t> row_of_node;
+  std::vector<int> node_of_row;
+  std::vector<std::uint16_t> corners;          // places among the chunk's nodes, 8 x W a block
+  std::vector<std::uint32_t> shared_rows;      // of chunk after chunk
+  size_t first_shared_row = 0;                 // shared nodes, and those without elements, come last
+  std::vector<std::uint32_t> starts, entries;  // of shared nodes: their rows of shared forces
+  size_t most_nodes = 0;                       // of a chunk
+  size_t slots() const { return element_of_slot.size(); }
+};
+
+ExplicitChunks make_chunks(const ExplicitModel&, size_t lanes, size_t elements_a_chunk = 256);
+
+}  // namespace topple::fem

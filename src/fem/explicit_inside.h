@@ -1,0 +1,113 @@
+#pragma once
+/// What an ExplicitSystem is made of: the constant arrangement, and the state that a snapshot holds.
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "base/aligned.h"
+#include "fem/contact_search.h"
+#include "fem/explicit_chunks.h"
+#include "fem/explicit_kernel.h"
+#include "fem/explicit_system.h"
+
+namespace topple::fem {
+
+/// A point pressed on something rigid, with what its work is booked by.
+struct GroundTouch {
+  std::uint32_t row = 0;  // of a node, or number of a particle
+  std::int32_t ground = 0;
+  bool particle = false;
+  Vec3 normal_force, friction;
+  double stored = 0;  // in the spring [J]
+  Vec3 before;        // velocity half a step before
+};
+
+/// Work of contact so far, and what is in the springs now [J].
+struct ContactWork {
+  double normal = 0, friction = 0, stored = 0;
+};
+
+struct Particle {
+  Vec3 p, v, force;
+  Vec3 start;  // where its potential counts from
+  double mass = 0, radius = 0, full_radius = 0, stiffness = 0;
+  int element = 0;
+  std::uint8_t touched = 0;  // in this step
+};
+
+struct ExplicitState {
+  long long steps = 0;
+  bool begins = true;                   // speeds have been set: what they strained before does not count
+  AlignedVector<double> rows;           // kNodeFields a node
+  AlignedVector<double> elements;       // kElementFields x W a block
+  std::vector<unsigned char> live;      // lanes of a block
+  std::vector<std::uint8_t> flags;      // of rows
+  AlignedVector<double> pushes;         // 4 a row, zero where not flagged
+  std::vector<std::uint32_t> pushed;    // rows that contact has flagged
+  std::vector<std::uint32_t> grounded;  // rows below a ground
+  std::vector<std::uint16_t> uses;      // live elements of a row's node
+  std::array<double, 4> sums{};         // dissipated, see kernel::ChunkJob
+  std::vector<Particle> particles;
+  std::vector<GroundTouch> touches;
+  ContactWork ground_work, surface_work;
+  ContactState contact;
+  std::vector<Vec3> ground_forces;
+  std::vector<double> touchdowns;  // by part
+  double removed_internal = 0, removed_kinetic = 0, removed_gravity = 0;
+  std::vector<Removal> removals;
+};
+
+struct ExplicitSystem::Inside {
+  ExplicitModel model;
+  ExplicitOptions options;
+  ExplicitChunks chunks;
+  ContactSetup contact;
+  std::vector<kernel::Law> laws;
+  std::vector<std::array<std::uint32_t, 8>> rows_of_element;
+  std::vector<double> element_mass, element_volume;  // at the start
+  std::vector<int> first_part_of_row;                // lowest part at a node
+  AlignedVector<double> loads;                       // constant forces, 4 a row
+  std::vector<std::uint32_t> loaded;                 // rows with such
+  double h = 0, added_mass = 0;
+  int scaled_elements = 0, parts = 0;
+
+  ExplicitState s;
+  std::vector<Vec3> start;  // places from which potentials count (rows)
+  double start_energy = 0;
+  bool started = false;
+  // room for a step
+  AlignedVector<double> shared_forces;
+  std::vector<AlignedVector<double>> rooms;
+  std::vector<std::vector<std::uint32_t>> failed, grounded;
+  std::vector<std::array<double, 4>> chunk_sums;
+  Timing timing;
+  mutable std::vector<DebrisParticle> debris_view;
+
+  Inside(const ExplicitModel&, const ExplicitOptions&);
+  const double* row(const ExplicitState& state, int node) const {
+    return state.rows.data() + 8 * static_cast<size_t>(chunks.row_of_node[static_cast<size_t>(node)]);
+  }
+  double* element_block(ExplicitState& state, int element, size_t& lane) const;
+  const double* element_block(const ExplicitState& state, int element, size_t& lane) const;
+  std::array<Vec3, 8> corners(const ExplicitState&, int element) const;
+
+  kernel::StepJob make_step() const;
+  /// Internal forces and motion of all nodes; fills failed, grounded and chunk_sums.
+  void advance_nodes(const kernel::StepJob&, ExplicitState&);
+  void collect(ExplicitState&, bool moves_on);
+  /// One step of everything; `removes`: failed elements go.
+  void advance_step(ExplicitState&, bool removes);
+  void remove_element(ExplicitState&, int element, RemovalCause) const;
+  void add_debris(ExplicitState&, int element, const std::array<Vec3, 8>& v) const;
+  void press_grounds(ExplicitState&) const;
+  void book_grounds(ExplicitState&) const;
+  void move_particles(ExplicitState&) const;
+  void push(ExplicitState&, std::uint32_t row, const Vec3& force) const;
+  void clear_pushes(ExplicitState&) const;
+  /// Elastic energy of an element: in all, in what varies over it, in the corner mode [J].
+  std::array<double, 3> calc_elastic(const ExplicitState&, int element) const;
+  ExplicitEnergy calc_energy();
+};
+
+}  // namespace topple::fem

@@ -1,0 +1,111 @@
+#pragma once
+/// The arithmetic of explicit hexahedra, many at a time in SIMD lanes: strain, plasticity, stabilisation, forces, and
+/// the motion of nodes (docs/theory/explicit.md). Compiled for several instruction sets, chosen at run time. W lanes
+/// make a block; field f of a block begins at block + f * W.
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace topple::fem::kernel {
+
+// Field numbers are constants, and named so.
+// NOLINTBEGIN(readability-identifier-naming)
+
+/// Fields of an element. Amplitudes of stress over the element, in its own axes ξ η ζ, belong to the functions of which
+/// they are named: xx~ζ is the part of the normal stress along ξ that goes with ζ.
+enum ElementField : int {
+  kStress = 0,   // xx yy zz xy yz zx, in W [Pa]
+  kStrain = 6,   // equivalent plastic strain
+  kDamage = 7,   // 1: to be removed
+  kBending = 8,  // xx~ζ yy~ζ, xx~η zz~η, yy~ξ zz~ξ [Pa]
+  kTwist = 14,   // xy~ζ xz~η yz~ξ times 16 products of half edges [Pa m²]
+  kCorner = 17,  // xx~ηζ yy~ζξ zz~ξη [Pa]
+  kStateFields = 20,
+  kMass = 20,    // 0: removed [kg]
+  kLength = 21,  // of the element for bulk viscosity [m]
+  kElementFields = 22
+};
+
+/// Fields of a node's row.
+enum NodeField : int { kPlace = 0, kInverseMass = 3, kSpeed = 4, kNodeMass = 7, kNodeFields = 8 };
+
+/// Flags of a node.
+enum NodeFlag : std::uint8_t { kHoldX = 1, kHoldY = 2, kHoldZ = 4, kPushed = 8 };
+// NOLINTEND(readability-identifier-naming)
+
+inline constexpr int kMostYieldPoints = 8;
+inline constexpr int kMostGrounds = 4;
+
+/// A material's constants.
+struct Law {
+  double lambda = 0, mu = 0;                                              // [Pa]
+  double E = 0, nu = 0;                                                   //
+  double bending = 0;                                                     // E/(1-ν²) [Pa]
+  double bulk = 0;                                                        // [Pa]
+  double speed = 0;                                                       // of pressure waves [m/s]
+  int points = 0;                                                         // of the yield curve, 0: elastic
+  double at[kMostYieldPoints]{};                                          // plastic strain where a line begins
+  double tension[kMostYieldPoints]{}, tension_slope[kMostYieldPoints]{};  // value at strain 0 and slope of the line
+  double compression[kMostYieldPoints]{}, compression_slope[kMostYieldPoints]{};
+  double least_pressure = 0;                      // where the tensile yield stress counts [Pa]
+  double per_pressure = 0;                        // one over the range to where the compressive one does [1/Pa]
+  double cutoff = 0;                              // largest mean tension over the tensile yield stress
+  double tension_rate = 0, compression_rate = 0;  // damage for plastic strain
+};
+
+/// What is the same for all chunks of a step.
+struct StepJob {
+  double h = 0;                      // [s]
+  double past = 0;                   // h, or 0 in a first step: what the speeds have strained before it does not count
+  double keep = 1, kick = 0;         // v = keep v + kick (f/m) + fall
+  double fall[3] = {0, 0, 0};        // gravity times the step [m/s]
+  double linear = 0, quadratic = 0;  // bulk viscosity
+  bool removes = true;               // elements may fail
+  int grounds = 0;
+  double ground[kMostGrounds][4];  // n and n·p: below where n·x - n·p < 0
+};
+
+/// Elements of a chunk and the nodes they touch.
+struct ChunkJob {
+  const Law* law = nullptr;
+  size_t blocks = 0;
+  double* elements = nullptr;                   // kElementFields a block
+  const std::uint16_t* corners = nullptr;       // 8 a block of W lanes: place of the node among the chunk's
+  const unsigned char* live = nullptr;          // bits of the lanes of a block
+  size_t own = 0, shared = 0;                   // nodes: those of this chunk alone come first
+  double* own_nodes = nullptr;                  // kNodeFields each
+  const double* nodes = nullptr;                // rows of all nodes
+  const std::uint32_t* shared_nodes = nullptr;  // their rows
+  double* shared_forces = nullptr;              // 4 each, written
+  const std::uint8_t* own_flags = nullptr;      //
+  const double* own_pushes = nullptr;           // forces of flagged nodes, 4 each
+  double* room = nullptr;                       // 12 a node of the chunk
+  // written
+  double sums[4] = {0, 0, 0, 0};  // dissipated: mean, over the element, the corner mode in it, bulk viscosity [J]
+  std::vector<std::uint32_t>* failed = nullptr;    // 4 * slot + cause (1 tension, 2 compression, 3 degenerate)
+  std::vector<std::uint32_t>* grounded = nullptr;  // own nodes below some ground after the step
+};
+
+/// Nodes that several chunks share.
+struct SharedJob {
+  size_t first = 0, last = 0;              // nodes
+  double* nodes = nullptr;                 // rows of all nodes
+  size_t first_row = 0;                    // of node 0 of these
+  const std::uint32_t* starts = nullptr;   // of the entries of a node
+  const std::uint32_t* entries = nullptr;  // rows of forces, 4 doubles each
+  const double* forces = nullptr;
+  const std::uint8_t* flags = nullptr;  // of all nodes
+  const double* pushes = nullptr;       // of all nodes
+  std::vector<std::uint32_t>* grounded = nullptr;
+};
+
+size_t lanes();
+std::string target_name();
+/// Stresses and forces at the present places from the motion of the last half steps, then the motion of own nodes.
+void advance_chunk(const StepJob&, ChunkJob&);
+/// The same forces without motion or history, for inspection: forces of the chunk's nodes into `room`.
+void advance_shared(const StepJob&, const SharedJob&);
+
+}  // namespace topple::fem::kernel

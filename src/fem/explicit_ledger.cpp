@@ -1,0 +1,267 @@
+// Removal of elements, debris on the ground, and the balance of energy.
+#include <algorithm>
+#include <cmath>
+
+#include "fem/explicit_inside.h"
+#include "fem/segment_contact.h"
+
+namespace topple::fem {
+
+namespace {
+
+/// Penalty rate over mass and step squared; shares of the mass that dashpots of friction stop in a step.
+constexpr double kGroundRate = 0.2, kGroundGrip = 0.2;
+
+Vec3 vector_at(const double* r) { return {r[0], r[1], r[2]}; }
+
+}  // namespace
+
+void ExplicitSystem::Inside::press_grounds(ExplicitState& state) const {
+  state.touches.clear();
+  std::fill(state.ground_forces.begin(), state.ground_forces.end(), Vec3{});
+  const auto press = [&](std::uint32_t row, bool particle, const Vec3& p, const Vec3& v, double mass, double radius,
+                         double rate) {
+    Vec3 sum;
+    for (size_t i = 0; i < model.grounds.size(); ++i) {
+      const ExplicitGround& g = model.grounds[i];
+      const double depth = radius - dot(g.normal, p - g.point);
+      if (!(depth > 0)) continue;
+      const double c = 2 * options.contact_damping * std::sqrt(rate * mass), closing = -dot(g.normal, v);
+      const double normal = std::max(0.0, rate * depth + c * closing);
+      const Vec3 along = v + closing * g.normal;
+      const double slide = norm(along);
+      const double grip = std::min(g.friction * normal, kGroundGrip * mass / h * slide);
+      GroundTouch touch;
+      touch.row = row, touch.ground = static_cast<std::int32_t>(i), touch.particle = particle;
+      touch.normal_force = normal * g.normal;
+      touch.friction = slide > 0 ? (-grip / slide) * along : Vec3{};
+      touch.stored = 0.5 * rate * depth * depth;
+      touch.before = v;
+      state.touches.push_back(touch);
+      const Vec3 force = touch.normal_force + touch.friction;
+      state.ground_forces[i] += -force;
+      sum += force;
+    }
+    return sum;
+  };
+  for (const std::uint32_t row : state.grounded) {
+    const double* r = state.rows.data() + 8 * static_cast<size_t>(row);
+    const double mass = r[kernel::kNodeMass];
+    if (!(mass > 0)) continue;
+    const size_t before = state.touches.size();
+    const Vec3 force = press(row, false, vector_at(r), vector_at(r + 4), mass, 0, kGroundRate * mass / (h * h));
+    push(state, row, force);
+    if (state.touches.size() > before) {
+      double& first = state.touchdowns[static_cast<size_t>(first_part_of_row[row])];
+      if (first < 0) first = static_cast<double>(state.steps) * h;
+    }
+  }
+  for (size_t i = 0; i < state.particles.size(); ++i) {
+    Particle& q = state.particles[i];
+    q.force = q.mass * model.gravity;
+    q.touched = 0;
+    const size_t before = state.touches.size();
+    q.force += press(static_cast<std::uint32_t>(i), true, q.p, q.v, q.mass, q.radius, q.stiffness);
+    if (state.touches.size() > before) q.touched = 1;
+  }
+}
+
+void ExplicitSystem::Inside::book_grounds(ExplicitState& state) const {
+  state.ground_work.stored = 0;
+  for (const GroundTouch& t : state.touches) {
+    const Vec3 now =
+        t.particle ? state.particles[t.row].v : vector_at(state.rows.data() + 8 * static_cast<size_t>(t.row) + 4);
+    const Vec3 path = (0.5 * h) * (t.before + now);
+    state.ground_work.normal += dot(t.normal_force, path);
+    state.ground_work.friction += dot(t.friction, path);
+  }
+}
+
+void ExplicitSystem::Inside::move_particles(ExplicitState& state) const {
+  for (Particle& q : state.particles) {
+    q.v += (h / q.mass) * q.force;
+    q.p += h * q.v;
+    // room permitting it grows to its volume within a tenth of a second
+    if (q.touched == 0 && q.radius < q.full_radius)
+      q.radius = std::min(q.full_radius, q.radius + 10 * h * q.full_radius);
+  }
+}
+
+std::array<double, 3> ExplicitSystem::Inside::calc_elastic(const ExplicitState& state, int element) const {
+  size_t lane = 0;
+  const double* block = element_block(state, element, lane);
+  const size_t W = chunks.W;
+  const auto field = [&](int f) { return block[static_cast<size_t>(f) * W + lane]; };
+  if (!(field(kernel::kMass) > 0)) return {0, 0, 0};
+  const auto x = corners(state, element);
+  const double volume = calc_hex_volume(x);
+  const kernel::Law& law = laws[static_cast<size_t>(model.elements[static_cast<size_t>(element)].material)];
+  double square = 0, trace = 0;
+  for (int i = 0; i < 3; ++i) {
+    square += field(kernel::kStress + i) * field(kernel::kStress + i) +
+              2 * field(kernel::kStress + 3 + i) * field(kernel::kStress + 3 + i);
+    trace += field(kernel::kStress + i);
+  }
+  const double mean = ((1 + law.nu) * square - law.nu * trace * trace) / law.E;
+  double bending = 0;
+  for (int k = 0; k < 6; k += 2) {
+    const double a = field(kernel::kBending + k), b = field(kernel::kBending + k + 1);
+    bending += a * a + b * b - 2 * law.nu * a * b;
+  }
+  Vec3 axes[3];
+  for (size_t i = 0; i < 8; ++i) {
+    const double sign[3] = {i % 4 == 1 || i % 4 == 2 ? 1.0 : -1.0, i % 4 >= 2 ? 1.0 : -1.0, i >= 4 ? 1.0 : -1.0};
+    for (size_t k = 0; k < 3; ++k) axes[k] += sign[k] * x[i];
+  }
+  const double aa = dot(axes[0], axes[0]), bb = dot(axes[1], axes[1]), cc = dot(axes[2], axes[2]);
+  const double xy = field(kernel::kTwist), xz = field(kernel::kTwist + 1), yz = field(kernel::kTwist + 2);
+  const double twist = xy * xy / (aa * bb) + xz * xz / (aa * cc) + yz * yz / (bb * cc);
+  double corner = 0;
+  for (int i = 0; i < 3; ++i) corner += field(kernel::kCorner + i) * field(kernel::kCorner + i);
+  corner /= 9 * law.E;
+  const double varying = bending / (3 * law.E) + twist / (3 * law.mu) + corner;
+  return {0.5 * volume * (mean + varying), 0.5 * volume * varying, 0.5 * volume * corner};
+}
+
+void ExplicitSystem::Inside::add_debris(ExplicitState& state, int element, const std::array<Vec3, 8>& v) const {
+  const size_t e = static_cast<size_t>(element);
+  const auto x = corners(state, element);
+  const auto at = [](const std::array<Vec3, 8>& corner, double a, double b, double c) {
+    Vec3 sum;
+    for (size_t i = 0; i < 8; ++i) {
+      const double sa = i % 4 == 1 || i % 4 == 2 ? a : -a, sb = i % 4 >= 2 ? b : -b, sc = i >= 4 ? c : -c;
+      sum += (0.125 * (1 + sa) * (1 + sb) * (1 + sc)) * corner[i];
+    }
+    return sum;
+  };
+  // cells about as long as wide, at most 8
+  double length[3];
+  for (int k = 0; k < 3; ++k) length[k] = norm(at(x, k == 0, k == 1, k == 2) - at(x, -(k == 0), -(k == 1), -(k == 2)));
+  const double least = std::min({length[0], length[1], length[2]});
+  int cells[3] = {1, 1, 1};
+  for (int k = 0; k < 3; ++k) cells[k] = std::clamp(static_cast<int>(std::lround(length[k] / least)), 1, 4);
+  while (cells[0] * cells[1] * cells[2] > 8) --*std::max_element(cells, cells + 3);
+  const int count = cells[0] * cells[1] * cells[2];
+  const double volume = element_volume[e] / count, now = std::max(0.0, calc_hex_volume(x)) / count;
+  const double side = std::min({length[0] / cells[0], length[1] / cells[1], length[2] / cells[2], std::cbrt(now)});
+  Vec3 moved;
+  for (size_t i = 0; i < 8; ++i) moved += 0.125 * (x[i] - start[rows_of_element[e][i]]);
+  const kernel::Law& law = laws[static_cast<size_t>(model.elements[e].material)];
+  for (int i = 0; i < cells[0]; ++i)
+    for (int j = 0; j < cells[1]; ++j)
+      for (int k = 0; k < cells[2]; ++k) {
+        const double a = (2 * i + 1.0) / cells[0] - 1, b = (2 * j + 1.0) / cells[1] - 1,
+                     c = (2 * k + 1.0) / cells[2] - 1;
+        Particle q;
+        q.p = at(x, a, b, c), q.v = at(v, a, b, c);
+        q.start = q.p - moved;
+        q.mass = element_mass[e] / count;
+        q.full_radius = std::cbrt(3 * volume / (4 * M_PI));
+        q.radius = std::min(0.475 * side, q.full_radius);
+        // as stiff as a ball of the material between plates, as far as the step allows
+        q.stiffness = std::min(0.05 * q.mass / (h * h), law.E * q.radius);
+        q.element = element;
+        state.particles.push_back(q);
+      }
+}
+
+void ExplicitSystem::Inside::remove_element(ExplicitState& state, int element, RemovalCause cause) const {
+  const size_t e = static_cast<size_t>(element), W = chunks.W;
+  size_t lane = 0;
+  double* block = element_block(state, element, lane);
+  if (!(block[kernel::kMass * W + lane] > 0)) return;
+  Removal removal;
+  removal.time = static_cast<double>(state.steps) * h, removal.element = element, removal.cause = cause;
+  removal.mass = element_mass[e], removal.internal = calc_elastic(state, element)[0];
+  state.removals.push_back(removal);
+  state.removed_internal += removal.internal;
+
+  const double share = element_mass[e] / 8;
+  std::array<Vec3, 8> v;
+  for (size_t i = 0; i < 8; ++i) {
+    const double* r = state.rows.data() + 8 * static_cast<size_t>(rows_of_element[e][i]);
+    v[i] = vector_at(r + 4);
+    state.removed_kinetic += 0.5 * share * dot(v[i], v[i]);
+  }
+  if (cause != RemovalCause::Charge && options.debris) {
+    const size_t first = state.particles.size();
+    add_debris(state, element, v);
+    for (size_t i = first; i < state.particles.size(); ++i)
+      state.removed_kinetic -= 0.5 * state.particles[i].mass * dot(state.particles[i].v, state.particles[i].v);
+  } else {
+    for (const std::uint32_t row : rows_of_element[e])
+      state.removed_gravity -= share * dot(model.gravity, vector_at(state.rows.data() + 8 * size_t{row}) - start[row]);
+  }
+  block[kernel::kMass * W + lane] = 0;
+  for (int f = kernel::kStress; f < kernel::kStateFields; ++f)
+    if (f != kernel::kStrain && f != kernel::kDamage) block[static_cast<size_t>(f) * W + lane] = 0;
+  const std::uint32_t slot = chunks.slot_of_element[e];
+  state.live[slot / W] = static_cast<unsigned char>(state.live[slot / W] & ~(1U << (slot % W)));
+  for (const std::uint32_t row : rows_of_element[e]) {
+    double* r = state.rows.data() + 8 * static_cast<size_t>(row);
+    r[kernel::kNodeMass] -= share;
+    if (--state.uses[row] == 0) {
+      // what else hung at the node goes with it
+      const int node = chunks.node_of_row[row];
+      const double extra = model.extra_mass.empty() ? 0 : model.extra_mass[static_cast<size_t>(node)];
+      const Vec3 speed = vector_at(r + 4);
+      state.removed_kinetic += 0.5 * extra * dot(speed, speed);
+      state.removed_gravity -= extra * dot(model.gravity, vector_at(r) - start[row]);
+      r[kernel::kNodeMass] = 0;
+      for (int c = 4; c < 7; ++c) r[c] = 0;
+    }
+    r[kernel::kInverseMass] = r[kernel::kNodeMass] > 0 ? 1 / r[kernel::kNodeMass] : 0;
+  }
+  mark_changed(contact, state.contact, element);
+}
+
+ExplicitEnergy ExplicitSystem::Inside::calc_energy() {
+  // one step ahead on a copy gives stresses and contact at the present places, and speeds on both sides
+  ExplicitState ahead = s;
+  const Timing kept = timing;
+  advance_step(ahead, false);
+  timing = kept;
+  ExplicitEnergy energy;
+  for (size_t row = 0; row < start.size(); ++row) {
+    const double* r = s.rows.data() + 8 * row;
+    const double mass = r[kernel::kNodeMass];
+    if (!(mass > 0)) continue;
+    energy.kinetic += 0.5 * mass * dot(vector_at(r + 4), vector_at(ahead.rows.data() + 8 * row + 4));
+    energy.gravity -= mass * dot(model.gravity, vector_at(r) - start[row]);
+  }
+  for (const std::uint32_t row : loaded)
+    energy.loads +=
+        dot(vector_at(loads.data() + 4 * size_t{row}), vector_at(s.rows.data() + 8 * size_t{row}) - start[row]);
+  for (size_t i = 0; i < s.particles.size(); ++i) {
+    const Particle& q = s.particles[i];
+    energy.debris_kinetic += 0.5 * q.mass * dot(q.v, ahead.particles[i].v);
+    energy.gravity -= q.mass * dot(model.gravity, q.p - q.start);
+  }
+  for (size_t e = 0; e < element_mass.size(); ++e) {
+    const auto stored = calc_elastic(ahead, static_cast<int>(e));
+    energy.elastic += stored[0], energy.elastic_hourglass += stored[1], energy.corner_hourglass += stored[2];
+  }
+  energy.plastic = ahead.sums[0], energy.plastic_hourglass = ahead.sums[1], energy.plastic_corner = ahead.sums[2];
+  // viscous pressure acts half a step on either side of the present
+  energy.bulk_viscosity = 0.5 * (s.sums[3] + ahead.sums[3]);
+  // contact: work of the steps so far, and of half of this one
+  const auto book = [&](const ContactWork& so_far, double normal, double friction, double stored) {
+    energy.contact_elastic += stored;
+    energy.contact_damping += -(so_far.normal + 0.5 * h * normal) - stored;
+    energy.friction += -(so_far.friction + 0.5 * h * friction);
+  };
+  double normal = 0, friction = 0, stored = 0;
+  for (const GroundTouch& t : ahead.touches)
+    normal += dot(t.normal_force, t.before), friction += dot(t.friction, t.before), stored += t.stored;
+  book(s.ground_work, normal, friction, stored);
+  normal = friction = stored = 0;
+  for (const SurfaceTouch& t : ahead.contact.touches)
+    normal += dot(t.normal_force, t.before), friction += dot(t.friction, t.before), stored += t.stored;
+  book(s.surface_work, normal, friction, stored);
+  energy.removed_internal = s.removed_internal, energy.removed_kinetic = s.removed_kinetic;
+  energy.removed_gravity = s.removed_gravity;
+  energy.start = start_energy;
+  return energy;
+}
+
+}  // namespace topple::fem

@@ -1,0 +1,114 @@
+#include "fem/relaxation.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace topple::fem {
+
+RelaxationSummary relax_system(ExplicitSystem::Inside& in, const RelaxationOptions& options, const Progress& progress) {
+  ExplicitState& s = in.s;
+  const size_t N = in.start.size();
+  RelaxationSummary summary;
+
+  // masses with which every element has the same critical step
+  std::vector<double> fictitious(N, 0);
+  constexpr double kShare = 0.85;  // of the critical step
+  for (size_t e = 0; e < in.element_mass.size(); ++e) {
+    if (s.contact.gone.size() > e && s.contact.gone[e] != 0) continue;
+    const ExplicitMaterial& material = in.model.materials[static_cast<size_t>(in.model.elements[e].material)];
+    const auto x = in.corners(s, static_cast<int>(e));
+    const double volume = calc_hex_volume(x);
+    const double density = in.element_mass[e] / volume / material.density;
+    const double ratio = in.h / (kShare * calc_element_step(x, material, density));
+    for (const std::uint32_t row : in.rows_of_element[e]) fictitious[row] += in.element_mass[e] / 8 * ratio * ratio;
+  }
+  // the ground's springs go with real masses
+  for (size_t row = 0; row < N; ++row) {
+    const double* r = s.rows.data() + 8 * row;
+    const double mass = r[kernel::kNodeMass];
+    if (!(mass > 0)) continue;
+    for (const ExplicitGround& g : in.model.grounds)
+      if (dot(g.normal, Vec3{r[0], r[1], r[2]} - g.point) < 1e-2) fictitious[row] = std::max(fictitious[row], mass);
+  }
+  std::vector<std::uint32_t> live;
+  double load2 = 0;
+  const double g2 = dot(in.model.gravity, in.model.gravity);
+  for (size_t row = 0; row < N; ++row) {
+    double* r = s.rows.data() + 8 * row;
+    for (int c = 4; c < 7; ++c) r[c] = 0;
+    const double mass = r[kernel::kNodeMass];
+    if (!(mass > 0)) continue;
+    live.push_back(static_cast<std::uint32_t>(row));
+    r[kernel::kInverseMass] = 1 / fictitious[row];
+    load2 += mass * mass * g2;
+  }
+  for (const std::uint32_t row : in.loaded)
+    for (size_t c = 0; c < 3; ++c) load2 += std::pow(in.loads[4 * row + c], 2);
+
+  std::vector<Vec3> before(N), residual(N);
+  kernel::StepJob step = in.make_step();
+  step.removes = false, step.linear = step.quadratic = 0;
+  for (double& fall : step.fall) fall = 0;
+  double damping = 0.1 / in.h;
+  bool known = false;
+  const long long steps = s.steps;
+  for (; summary.steps < options.most_steps && !progress.is_cancelled(); ++summary.steps) {
+    const double ramp = std::min(1.0, (summary.steps + 1.0) / std::max(1, options.ramp));
+    in.clear_pushes(s);
+    in.press_grounds(s);
+    for (const std::uint32_t row : live) {
+      in.push(s, row, (ramp * s.rows[8 * size_t{row} + kernel::kNodeMass]) * in.model.gravity);
+      // nodal forces, which a push begins with, rise as well
+      for (int c = 0; c < 3; ++c)
+        s.pushes[4 * size_t{row} + static_cast<size_t>(c)] -=
+            (1 - ramp) * in.loads[4 * size_t{row} + static_cast<size_t>(c)];
+      const double* r = s.rows.data() + 8 * size_t{row};
+      before[row] = {r[4], r[5], r[6]};
+    }
+    const double half = 0.5 * damping * in.h;
+    step.keep = (1 - half) / (1 + half), step.kick = in.h / (1 + half);
+    in.advance_nodes(step, s);
+    s.grounded.clear();
+    for (const auto& rows : in.grounded) s.grounded.insert(s.grounded.end(), rows.begin(), rows.end());
+
+    // out of balance, and the lowest mode in the motion by its Rayleigh quotient
+    double out2 = 0, stiff = 0, moving = 0;
+    for (const std::uint32_t row : live) {
+      const double* r = s.rows.data() + 8 * size_t{row};
+      Vec3 f;
+      for (int c = 0; c < 3; ++c)
+        if ((s.flags[row] & (1 << c)) == 0) f[c] = (r[4 + c] - step.keep * before[row][c]) / (step.kick * r[3]);
+      out2 += dot(f, f);
+      if (known) stiff += dot(before[row], residual[row] - f), moving += dot(before[row], before[row]) / r[3];
+      residual[row] = f;
+    }
+    // while the load rises the residual does so with it: no quotient then
+    if (known && ramp >= 1 && moving > 0) {
+      const double square = std::max(0.0, stiff / (in.h * moving));
+      damping = std::clamp(2 * std::sqrt(square), 1e-4 / in.h, 1.5 / in.h);
+    }
+    known = true;
+    summary.residual = std::sqrt(out2 / load2);
+    if (ramp >= 1 && summary.residual < options.tolerance) {
+      summary.converged = true;
+      break;
+    }
+    if (progress.report && summary.steps % 100 == 0) progress.report(summary.steps, options.most_steps);
+  }
+  s.steps = steps;
+  in.clear_pushes(s);
+  for (const std::uint32_t row : live) {
+    double* r = s.rows.data() + 8 * size_t{row};
+    r[kernel::kInverseMass] = 1 / r[kernel::kNodeMass];
+    for (int c = 4; c < 7; ++c) r[c] = 0;
+    summary.settlement = std::max(summary.settlement, norm(Vec3{r[0], r[1], r[2]} - in.start[row]));
+  }
+  summary.text = fmt::format("dead load {} after {} steps: out of balance by {:.2g} of the load, settled by {:.3g} mm",
+                             summary.converged ? "in equilibrium" : "not in equilibrium", summary.steps,
+                             summary.residual, 1e3 * summary.settlement);
+  return summary;
+}
+
+}  // namespace topple::fem

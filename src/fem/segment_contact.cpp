@@ -1,0 +1,203 @@
+#include "fem/segment_contact.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "fem/explicit_inside.h"
+
+namespace topple::fem {
+
+namespace {
+
+/// Penalty rate over the mass felt and the step squared, and the share of that mass that a dashpot of friction stops in
+/// a step: a node takes part in up to ten touches.
+constexpr double kRate = 0.1, kGrip = 0.05;
+
+Vec3 vector_at(const double* r) { return {r[0], r[1], r[2]}; }
+
+struct Quad {
+  std::uint32_t rows[4];
+};
+Quad quad_of(const ContactSetup& setup, std::uint32_t face) {
+  Quad q{};
+  for (size_t k = 0; k < 4; ++k) q.rows[k] = setup.rows_of_element[face / 6][static_cast<size_t>(kFaces[face % 6][k])];
+  return q;
+}
+
+struct PointState {
+  Vec3 p, v;
+  double inverse_mass = 0, radius = 0;
+};
+PointState find_point(const ContactSetup& setup, const ExplicitState& s, const ContactPoint& point) {
+  PointState q;
+  if (point.kind == ContactPoint::Debris) {
+    const Particle& particle = s.particles[point.index];
+    return {particle.p, particle.v, 1 / particle.mass, particle.radius};
+  }
+  if (point.kind == ContactPoint::Node) {
+    const double* r = s.rows.data() + 8 * size_t{point.index};
+    return {vector_at(r), vector_at(r + 4), r[kernel::kInverseMass], 0};
+  }
+  const Quad quad = quad_of(setup, point.index);
+  for (const std::uint32_t row : quad.rows) {
+    const double* r = s.rows.data() + 8 * size_t{row};
+    q.p += 0.25 * vector_at(r), q.v += 0.25 * vector_at(r + 4);
+    q.inverse_mass += r[kernel::kInverseMass] / 16;
+  }
+  return q;
+}
+Vec3 speed_of(const ContactSetup& setup, const ExplicitState& s, const ContactPoint& point) {
+  return find_point(setup, s, point).v;
+}
+
+/// The place of a point on a quadrilateral: x(ξ, η) + height n = p with the normal n of its middle (eq. 22).
+struct Projection {
+  double weights[4];
+  Vec3 normal;  // from the face to the point
+  double height = 0;
+  bool inside = false;
+};
+Projection project(const Vec3& p, const Vec3 (&x)[4], bool clamps) {
+  Projection out;
+  const Vec3 c = 0.25 * (x[0] + x[1] + x[2] + x[3]), a = 0.25 * (x[1] + x[2] - x[0] - x[3]),
+             b = 0.25 * (x[2] + x[3] - x[0] - x[1]), d = 0.25 * (x[0] + x[2] - x[1] - x[3]);
+  const Vec3 n = cross(a, b);
+  out.normal = (1 / std::max(norm(n), 1e-300)) * n;
+  double xi = 0, eta = 0;
+  for (int i = 0; i < 4; ++i) {
+    const Vec3 t1 = a + eta * d, t2 = b + xi * d, r = p - (c + xi * a + eta * b + (xi * eta) * d);
+    const double area = dot(cross(t1, t2), out.normal);
+    if (!(std::abs(area) > 1e-300)) break;
+    const double dx = dot(cross(r, t2), out.normal) / area, dy = dot(cross(t1, r), out.normal) / area;
+    xi = std::clamp(xi + dx, -3.0, 3.0), eta = std::clamp(eta + dy, -3.0, 3.0);
+    if (std::abs(dx) + std::abs(dy) < 1e-12) break;
+  }
+  constexpr double kEdge = 1.001;  // faces that meet at an edge leave no gap
+  out.inside = std::abs(xi) <= kEdge && std::abs(eta) <= kEdge;
+  if (clamps) xi = std::clamp(xi, -1.0, 1.0), eta = std::clamp(eta, -1.0, 1.0);
+  out.weights[0] = 0.25 * (1 - xi) * (1 - eta), out.weights[1] = 0.25 * (1 + xi) * (1 - eta);
+  out.weights[2] = 0.25 * (1 + xi) * (1 + eta), out.weights[3] = 0.25 * (1 - xi) * (1 + eta);
+  const Vec3 r = p - (c + xi * a + eta * b + (xi * eta) * d);
+  out.height = dot(r, out.normal);
+  if (clamps && !out.inside) {
+    const double length = norm(r);
+    if (length > 0) out.normal = (1 / length) * r;
+    out.height = length;
+  }
+  return out;
+}
+
+/// Forces on the point for a depth and a relative velocity.
+void calc_forces(double depth, const Vec3& normal, const Vec3& v, double rate, double inverse_mass,
+                 const ExplicitOptions& options, double h, SurfaceTouch& touch) {
+  const double closing = -dot(normal, v);
+  const double push =
+      std::max(0.0, rate * depth + 2 * options.contact_damping * std::sqrt(rate / inverse_mass) * closing);
+  const Vec3 along = v + closing * normal;
+  const double slide = norm(along);
+  const double grip = std::min(options.friction * push, kGrip * slide / (inverse_mass * h));
+  touch.normal_force = push * normal;
+  touch.friction = slide > 0 ? (-grip / slide) * along : Vec3{};
+  touch.stored = 0.5 * rate * depth * depth;
+  touch.before = v;
+}
+
+}  // namespace
+
+void press_surfaces(const ContactSetup& setup, const ExplicitOptions& options, double h, ExplicitState& s,
+                    const std::function<void(std::uint32_t row, const Vec3&)>& push) {
+  ContactState& c = s.contact;
+  c.touches.clear();
+  for (const ContactPair& pair : c.pairs)
+    for (const ContactCandidate& candidate : pair.candidates) {
+      const bool debris = candidate.point.kind == ContactPoint::Debris;
+      if (!debris && !setup.enabled) continue;
+      if (c.gone[candidate.face / 6] != 0) continue;
+      if (candidate.point.kind == ContactPoint::Centre && c.gone[candidate.point.index / 6] != 0) continue;
+      const PointState q = find_point(setup, s, candidate.point);
+      if (!(q.inverse_mass > 0)) continue;
+      const Quad quad = quad_of(setup, candidate.face);
+      Vec3 x[4];
+      for (size_t k = 0; k < 4; ++k) x[k] = vector_at(s.rows.data() + 8 * size_t{quad.rows[k]});
+      // a look before the projection: above the middle by more than the face is uneven
+      const Vec3 middle = 0.25 * (x[0] + x[1] + x[2] + x[3]), n = cross(x[2] - x[0], x[3] - x[1]);
+      const double size = norm(n), above = dot(q.p - middle, n);
+      if (above > (q.radius + std::abs(dot(x[0] - middle, n)) / std::max(size, 1e-300)) * size) continue;
+      const Projection on = project(q.p, x, debris);
+      double share = 1;
+      if (!on.inside) {
+        if (!debris || above < 0) continue;
+        share = 0.5;  // two faces have the edge
+      }
+      const double depth = q.radius - on.height;
+      if (!(depth > 0)) continue;
+      Vec3 far;
+      for (const int corner : kFaces[(candidate.face % 6) ^ 1])
+        far += 0.25 * vector_at(s.rows.data() +
+                                8 * size_t{setup.rows_of_element[candidate.face / 6][static_cast<size_t>(corner)]});
+      if (-on.height * size > kFaceDepth * dot(n, middle - far)) continue;
+      double inverse = q.inverse_mass;
+      Vec3 v = q.v;
+      SurfaceTouch touch;
+      touch.point = candidate.point, touch.face = candidate.face;
+      for (size_t k = 0; k < 4; ++k) {
+        const double* r = s.rows.data() + 8 * size_t{quad.rows[k]};
+        touch.weights[k] = on.weights[k];
+        inverse += on.weights[k] * on.weights[k] * r[kernel::kInverseMass];
+        v -= on.weights[k] * vector_at(r + 4);
+      }
+      double rate = kRate / (h * h * inverse);
+      if (debris) {
+        Particle& particle = s.particles[candidate.point.index];
+        rate = std::min(rate, particle.stiffness);
+        particle.touched = 1;
+      }
+      calc_forces(depth, on.normal, v, share * rate, inverse, options, h, touch);
+      c.touches.push_back(touch);
+    }
+  for (const auto& pair : c.particle_pairs) {
+    Particle &a = s.particles[pair[0]], &b = s.particles[pair[1]];
+    const Vec3 d = a.p - b.p;
+    const double reach = a.radius + b.radius, square = dot(d, d);
+    if (square >= reach * reach || !(square > 0)) continue;
+    const double distance = std::sqrt(square);
+    SurfaceTouch touch;
+    touch.point = {ContactPoint::Debris, pair[0]}, touch.other = pair[1] + 1;
+    a.touched = b.touched = 1;
+    calc_forces(reach - distance, (1 / distance) * d, a.v - b.v, std::min(a.stiffness, b.stiffness),
+                1 / a.mass + 1 / b.mass, options, h, touch);
+    c.touches.push_back(touch);
+  }
+  for (const SurfaceTouch& touch : c.touches) {
+    const Vec3 force = touch.normal_force + touch.friction;
+    if (touch.point.kind == ContactPoint::Debris)
+      s.particles[touch.point.index].force += force;
+    else if (touch.point.kind == ContactPoint::Node)
+      push(touch.point.index, force);
+    else
+      for (const std::uint32_t row : quad_of(setup, touch.point.index).rows) push(row, 0.25 * force);
+    if (touch.other > 0) {
+      s.particles[touch.other - 1].force -= force;
+      continue;
+    }
+    const Quad quad = quad_of(setup, touch.face);
+    for (size_t k = 0; k < 4; ++k) push(quad.rows[k], -touch.weights[k] * force);
+  }
+}
+
+void book_surfaces(const ContactSetup& setup, double h, ExplicitState& s) {
+  for (const SurfaceTouch& touch : s.contact.touches) {
+    Vec3 now = speed_of(setup, s, touch.point);
+    if (touch.other > 0) {
+      now -= s.particles[touch.other - 1].v;
+    } else {
+      const Quad quad = quad_of(setup, touch.face);
+      for (size_t k = 0; k < 4; ++k) now -= touch.weights[k] * vector_at(s.rows.data() + 8 * size_t{quad.rows[k]} + 4);
+    }
+    const Vec3 path = (0.5 * h) * (touch.before + now);
+    s.surface_work.normal += dot(touch.normal_force, path);
+    s.surface_work.friction += dot(touch.friction, path);
+  }
+}
+
+}  // namespace topple::fem
