@@ -26,6 +26,7 @@ std::variant<Arguments, int> parse_arguments(int argc, char** argv) {
   topple export out/model.json --adams -o out/model.adm
                                                    for MSC.ADAMS
   topple rcc section.toml -o out/rcc               resistance curves of a zone of a section (docs/rcc.md)
+  topple compare out/record.h5 fe/record.h5 -o both  two runs of one building beside each other (docs/compare.md)
   topple study plan.toml -o out/study              fuzzy analysis of a plan with [fuzzy] (docs/study.md)
   topple study inputs.toml --evaluator ./model -o out/study
                                                    the same of any program
@@ -139,6 +140,15 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   rcc->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
   rcc->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
 
+  FeArguments& f = a.fe;
+  CLI::App* compare = app.add_subcommand("compare", "Compare two runs of one building: text, CSV, JSON and a page.");
+  compare->add_option("first", a.input, "record A (HDF5)")->required();
+  compare->add_option("second", f.second, "record B")->required();
+  compare->add_option("-o,--output", a.output, "folder for compare.txt, .csv, .json and .html; it is made if missing")
+      ->required();
+  compare->add_option("--photos", f.photos, "table \"time,file\" of photographs of the real event [s]");
+  compare->add_flag("--json", a.json, "print compare.json instead of the text");
+
   StudyArguments& y = a.study;
   const auto add_worker_options = [&](CLI::App* verb) {
     verb->add_option_function<int>(
@@ -214,6 +224,7 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
     }
   }
   if (rcc->parsed()) a.verb = Verb::Rcc;
+  if (compare->parsed()) a.verb = Verb::Compare;
   if (study->parsed()) {
     a.verb = Verb::Study;
     if (study_show->parsed()) y.action = StudyArguments::Action::Show;

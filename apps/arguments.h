@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "fe_options.h"
 #include "study_options.h"
 
 namespace topple::apps {
@@ -22,6 +23,7 @@ struct Arguments {
     MbsVerify,
     Report,
     Export,
+    Compare,
     Rcc,
     Study,
     Worker,
@@ -44,6 +46,7 @@ struct Arguments {
   std::string rotation, element_size;       // of the solid route, as typed
   std::optional<bool> equilibrium;          // of a bare model; none: as its file says
   StudyArguments study;
+  FeArguments fe;
   int threads = 1, frames = 0;
   bool json = false, csv = false, no_report = false, report = false, verbose = false;
   bool bodies = false, skip_unsupported = false;

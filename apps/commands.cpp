@@ -50,7 +50,8 @@ json to_json(const Diagnostic& d) {
           {"help", d.help}};
 }
 
-/// Complaints on standard error, the number of errors.
+}  // namespace
+
 int print_diagnostics(const std::vector<Diagnostic>& list, const std::string& text) {
   int errors = 0;
   for (const Diagnostic& d : list) {
@@ -59,6 +60,8 @@ int print_diagnostics(const std::vector<Diagnostic>& list, const std::string& te
   }
   return errors;
 }
+
+namespace {
 
 std::string count_words(int n, const char* what) { return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s"); }
 
@@ -108,17 +111,16 @@ collapse::Knowledge load_knowledge(const Arguments& a) {
                              : collapse::read_knowledge(read_file(a.knowledge), a.knowledge);
 }
 
-namespace {
-
-/// The built page: beside an installed program, or in the source tree.
-std::optional<std::string> find_bundle() {
+std::optional<std::string> find_bundle(const std::string& name) {
   std::error_code ignored;
   const fs::path program = fs::read_symlink("/proc/self/exe", ignored);
-  for (const fs::path& p :
-       {program.parent_path().parent_path() / "share" / "topple" / "report.html", fs::path(TOPPLE_REPORT_BUNDLE)})
-    if (fs::is_regular_file(p, ignored)) return read_file(p.string());
+  for (const fs::path& folder :
+       {program.parent_path().parent_path() / "share" / "topple", fs::path(TOPPLE_PAGE_FOLDER)})
+    if (fs::is_regular_file(folder / name, ignored)) return read_file((folder / name).string());
   return std::nullopt;
 }
+
+namespace {
 
 constexpr const char* kNoBundle =
     "The report page is not built, so there is no report.html (run `npm ci && npm run build` in web/, then `topple "
@@ -143,7 +145,7 @@ Files write_files(const record::Record& r, const Arguments& a, bool& failed_repo
       files.emplace_back(fs::path(name).stem().string(), in(name));
   }
   if (!a.no_report) {
-    if (const auto bundle = find_bundle()) {
+    if (const auto bundle = find_bundle("report.html")) {
       record::write_report(r, *bundle, in("report.html"));
       files.emplace_back("report", in("report.html"));
     } else {
@@ -203,8 +205,6 @@ int exit_code_of(const record::Record& r, bool failed_report) {
   return collapse::violates_criteria(r) ? kCriterionViolated : kOk;
 }
 
-namespace {
-
 int close_run(const record::Record& r, const Arguments& a, std::FILE* out, Files files) {
   bool failed_report = false;
   for (auto& f : write_files(r, a, failed_report)) files.push_back(std::move(f));
@@ -217,8 +217,6 @@ int close_run(const record::Record& r, const Arguments& a, std::FILE* out, Files
   if (a.json) std::printf("%s\n", dump(summary_json(r, files, code)).c_str());
   return code;
 }
-
-}  // namespace
 
 int write_template(const Arguments& a) {
   if (fs::exists(a.input)) {
@@ -301,7 +299,7 @@ int show_rules(const Arguments& a) {
 int write_report_file(const Arguments& a) {
   try {
     const record::Record r = record::read_hdf5(a.input);
-    const auto bundle = find_bundle();
+    const auto bundle = find_bundle("report.html");
     if (!bundle) {
       std::fprintf(stderr, "%s\n", kNoBundle);
       return kRunFailed;

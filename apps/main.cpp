@@ -43,6 +43,8 @@ int dispatch(const topple::apps::Arguments& a) {
       return topple::apps::compute_rcc(a, cancel);
     case Arguments::Verb::Study:
       return topple::apps::run_study_command(a, cancel);
+    case Arguments::Verb::Compare:
+      return topple::apps::compare_records(a);
     case Arguments::Verb::Worker:
       return topple::apps::run_worker(a, cancel);
     case Arguments::Verb::Version:

@@ -1,7 +1,9 @@
 #pragma once
 /// What the verbs that run something have in common: options, complaints, files, the JSON object, the exit code.
 
+#include <cstdio>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,6 +23,9 @@ using Files = std::vector<std::pair<std::string, std::string>>;
 /// All complaints of an InputError, and the JSON object if that was asked for; `text` is the input.
 int refuse(const InputError&, const std::vector<Diagnostic>& warnings, const std::string& text, bool as_json);
 
+/// Complaints on standard error; the number of errors among them. `text` is the input.
+int print_diagnostics(const std::vector<Diagnostic>&, const std::string& text);
+
 /// The built-in rules, or those of --knowledge.
 collapse::Knowledge load_knowledge(const Arguments&);
 
@@ -34,8 +39,14 @@ double read_quantity(const std::string& text, Dimension, const char* option);
 /// Throws std::runtime_error with the path.
 void make_folder(const std::string& path);
 
+/// A built page, such as "report.html": beside an installed program, or in the source tree.
+std::optional<std::string> find_bundle(const std::string& name);
+
 /// Files of a finished record. `failed_report` is set when a report was asked for and could not be made.
 Files write_files(const record::Record&, const Arguments&, bool& failed_report);
+
+/// Writes the files of a finished run, says what it found, and gives the exit code. `files` are there already.
+int close_run(const record::Record&, const Arguments&, std::FILE* out, Files files);
 
 nlohmann::ordered_json summary_json(const record::Record&, const Files&, int exit_code);
 std::string dump(const nlohmann::ordered_json&);

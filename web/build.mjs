@@ -11,6 +11,7 @@ const served = { connect: "'self'", noscript: "This page works with JavaScript, 
 const pages = [
   { name: "report", entry: "src/main.tsx", title: "topple report", ...offline },
   { name: "steer", entry: "src/steer.tsx", title: "topple", ...served },
+  { name: "compare", entry: "src/compare.tsx", title: "topple compare", ...offline },
 ];
 
 const folder = import.meta.dirname ?? new URL(".", import.meta.url).pathname;

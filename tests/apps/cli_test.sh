@@ -99,6 +99,17 @@ new)
   has plan.toml mine
   expect 1 "$topple" new /proc/nowhere/plan.toml
   ;;
+records)
+  expect 0 "$topple" run "$plan" -o r --no-report
+  expect 0 "$topple" compare r/record.h5 r/record.h5 -o c
+  has out "A  native (first)"; has out "Mass centres up to then: at most 0.00 m apart"; is_json c/compare.json
+  for f in compare.txt compare.csv; do exists c/$f; done
+  expect 0 "$topple" compare r/record.h5 r/record.h5 -o c --json; is_json out
+  printf '0.5,missing.png\n' >photos.csv
+  expect 2 "$topple" compare r/record.h5 r/record.h5 -o none --photos photos.csv; has err "photos.csv:1:1: error E681"
+  expect 2 "$topple" compare r/record.h5 missing.h5 -o none; expect 2 "$topple" compare r/record.h5 -o none
+  [ ! -e none ] || { echo "a folder was made for wrong records"; failures=$((failures + 1)); }
+  ;;
 export)
   expect 0 "$topple" run "$plan" -o r --no-report
   expect 0 "$topple" export r/record.h5 --csv --json --frame-rate "5 Hz" -o t; has out "Wrote t/series.csv and 5 more"

@@ -281,12 +281,12 @@ export class Building {
     for (const mesh of this.marks) mesh.material.clippingPlanes = planes;
   }
 
-  /// A run shown for comparison only: see-through and in one colour.
-  setGhost(colour: string): void {
+  /// A run shown for comparison only: in one colour, see-through unless `opacity` is 1.
+  setGhost(colour: string, opacity = 0.35): void {
     const { material } = this.boxes;
-    material.transparent = true;
-    material.opacity = 0.35;
-    material.depthWrite = false;
+    material.transparent = opacity < 1;
+    material.opacity = opacity;
+    material.depthWrite = opacity === 1;
     this.ghost = linear(colour);
     this.coloured = "";
     this.colourBoxes();

@@ -14,15 +14,15 @@ interface Group {
   series: Series[];
 }
 
-/// Series of one group and one unit share a plot.
-export function makeGroups(series: readonly Series[]): Group[] {
+/// Series of one group and one unit share a plot. `titles` go before the usual headings of groups.
+export function makeGroups(series: readonly Series[], titles: Record<string, string> = {}): Group[] {
   const groups: Group[] = [];
   for (const s of series) {
     const found = groups.find((g) => g.id === s.group && g.series[0]?.unit === s.unit);
     if (found !== undefined) found.series.push(s);
     else {
       const { unit, factor } = toReadable(s.unit);
-      groups.push({ id: s.group, title: groupWord[s.group] ?? s.title, unit, factor, series: [s] });
+      groups.push({ id: s.group, title: titles[s.group] ?? groupWord[s.group] ?? s.title, unit, factor, series: [s] });
     }
   }
   const rank = (g: Group): number => (groupOrder.includes(g.id) ? groupOrder.indexOf(g.id) : groupOrder.length);
@@ -237,8 +237,8 @@ function DataTable(props: { state: State; group: Group; values: (number | null)[
   );
 }
 
-export function Plots(props: { state: State; onSeek?: (time: number) => void; height?: number }) {
-  const groups = makeGroups(props.state.run.series);
+export function Plots(props: { state: State; onSeek?: (time: number) => void; height?: number; titles?: Record<string, string> }) {
+  const groups = makeGroups(props.state.run.series, props.titles);
   if (groups.length === 0 || props.state.run.time.length === 0)
     return <section class="panel"><h2>Plots</h2><p class="quiet">The record holds no series.</p></section>;
   return (

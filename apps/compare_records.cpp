@@ -1,0 +1,39 @@
+#include <cstdio>
+#include <filesystem>
+
+#include "base/error.h"
+#include "base/file.h"
+#include "commands.h"
+#include "record/compare.h"
+#include "results.h"
+
+namespace topple::apps {
+
+int compare_records(const Arguments& a) {
+  try {
+    const record::Record first = record::read_hdf5(a.input), second = record::read_hdf5(a.fe.second);
+    std::vector<record::Photo> photos;
+    if (!a.fe.photos.empty()) photos = record::read_photos(a.fe.photos);
+    const record::Comparison c = record::compare(first, second);
+    make_folder(a.output);
+    const auto in = [&a](const char* name) { return (std::filesystem::path(a.output) / name).string(); };
+    const std::string text = record::describe(c, first, second), data = record::to_json(c, first);
+    Files files{{"text", in("compare.txt")}, {"csv", in("compare.csv")}, {"json", in("compare.json")}};
+    replace_file(files[0].second, text);
+    replace_file(files[1].second, record::to_csv(c, first));
+    replace_file(files[2].second, data);
+    if (const auto bundle = find_bundle("compare.html")) {
+      record::write_compare_page(c, first, second, photos, *bundle, in("compare.html"));
+      files.emplace_back("page", in("compare.html"));
+    } else {
+      std::fprintf(stderr, "The page is not built, so there is no compare.html (npm ci && npm run build in web/).\n");
+    }
+    std::FILE* out = a.json ? stderr : stdout;
+    std::fprintf(out, "%s\n", text.c_str());
+    for (const auto& [what, path] : files) std::fprintf(out, "Wrote %s\n", path.c_str());
+    if (a.json) std::printf("%s\n", data.c_str());
+    return kOk;
+  } catch (const InputError& e) { return refuse(e, {}, {}, a.json); }
+}
+
+}  // namespace topple::apps

@@ -1,0 +1,16 @@
+#pragma once
+/// What was typed for topple fe and topple compare.
+
+#include <string>
+
+namespace topple::apps {
+
+struct FeArguments {
+  std::string size = "0.4 m";  // of elements
+  std::string scaled_step;     // empty: no mass scaling
+  std::string checkpoint_interval = "60 s";
+  std::string second, photos;  // of compare: the other record, and a table of pictures
+  bool mesh_only = false, skip_quiet = false, checkpoint = false, resume = false;
+};
+
+}  // namespace topple::apps

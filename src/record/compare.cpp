@@ -1,0 +1,271 @@
+#include "record/compare.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+#include "base/unit.h"
+
+namespace topple::record {
+
+namespace {
+
+using json = nlohmann::ordered_json;
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+/// Where an instant lies between two frames.
+struct Place {
+  size_t low = 0, high = 0;
+  double share = 0;  // of the later one
+};
+
+Place find_place(const std::vector<double>& time, double at) {
+  const auto it = std::lower_bound(time.begin(), time.end(), at);
+  if (it == time.end()) return {time.size() - 1, time.size() - 1, 0};
+  const size_t high = static_cast<size_t>(it - time.begin());
+  if (high == 0 || *it == at) return {high, high, 0};
+  return {high - 1, high, (at - time[high - 1]) / (time[high] - time[high - 1])};
+}
+
+Vec3 position_at(const Record& r, const Place& place, size_t body) {
+  const auto one = [&](size_t frame) {
+    const float* p = &r.position[3 * (frame * r.bodies.size() + body)];
+    return Vec3{p[0], p[1], p[2]};
+  };
+  return (1 - place.share) * one(place.low) + place.share * one(place.high);
+}
+
+double value_at(const std::vector<double>& values, const Place& place) {
+  return place.share == 0 ? values[place.low]
+                          : (1 - place.share) * values[place.low] + place.share * values[place.high];
+}
+
+bool moves(const BodyInfo& b) { return !b.fixed && b.kind != "debris"; }
+
+Vec3 calc_centre(const Record& r, const Place& place) {
+  Vec3 sum;
+  double mass = 0;
+  for (size_t b = 0; b < r.bodies.size(); ++b) {
+    if (!moves(r.bodies[b])) continue;
+    sum += r.bodies[b].mass * position_at(r, place, b);
+    mass += r.bodies[b].mass;
+  }
+  return mass > 0 ? (1 / mass) * sum : sum;
+}
+
+/// Of the finding of that id; NaN without one.
+double value_of(const Record& r, const std::string& id) {
+  for (const Finding& f : r.findings)
+    if (f.id == id) return f.value;
+  return kNone;
+}
+
+const SeriesPair* find_series(const Comparison& c, const std::string& id) {
+  for (const SeriesPair& s : c.series)
+    if (s.id == id) return &s;
+  return nullptr;
+}
+
+std::string seconds(double t) { return std::isfinite(t) ? fmt::format("{:.2f} s", t) : "never"; }
+
+json number(double v) { return std::isfinite(v) ? json(v) : json(nullptr); }
+
+json numbers(const std::vector<double>& values) {
+  json list = json::array();
+  for (const double v : values) list.push_back(number(v));
+  return list;
+}
+
+/// "native (multibody)" would be wrong for others: the engine's name, numbered where both are alike.
+void name_both(const Record& a, const Record& b, Comparison& c) {
+  c.name_a = a.provenance.engine.empty() ? "A" : a.provenance.engine;
+  c.name_b = b.provenance.engine.empty() ? "B" : b.provenance.engine;
+  if (c.name_a == c.name_b) c.name_a += " (first)", c.name_b += " (second)";
+}
+
+}  // namespace
+
+Comparison compare(const Record& a, const Record& b) {
+  Comparison c;
+  name_both(a, b, c);
+  if (!a.time.empty() && !b.time.empty())
+    for (const double t : a.time)
+      if (t >= b.time.front() && t <= b.time.back()) c.time.push_back(t);
+  if (c.time.empty()) throw InputError("E680", "the records have no time in common", "run both over the same time");
+  std::vector<Place> in_a, in_b;
+  for (const double t : c.time) in_a.push_back(find_place(a.time, t)), in_b.push_back(find_place(b.time, t));
+
+  for (const Series& s : a.series) {
+    const auto other = std::find_if(b.series.begin(), b.series.end(), [&](const Series& x) { return x.id == s.id; });
+    if (other == b.series.end() || other->unit != s.unit) continue;
+    SeriesPair pair{s.id, s.title, s.unit, s.group, {}, {}};
+    for (size_t i = 0; i < c.time.size(); ++i) {
+      pair.a.push_back(value_at(s.value, in_a[i]));
+      pair.b.push_back(value_at(other->value, in_b[i]));
+    }
+    c.series.push_back(std::move(pair));
+  }
+
+  std::map<std::string, size_t> names;
+  for (size_t i = 0; i < b.bodies.size(); ++i)
+    if (moves(b.bodies[i])) names[b.bodies[i].name] = i;
+  std::vector<std::pair<size_t, size_t>> matched;
+  size_t moving = 0;
+  double matched_mass = 0, mass = 0;
+  for (size_t i = 0; i < a.bodies.size(); ++i) {
+    if (!moves(a.bodies[i])) continue;
+    ++moving;
+    mass += a.bodies[i].mass;
+    const auto it = names.find(a.bodies[i].name);
+    if (it == names.end()) continue;
+    matched.emplace_back(i, it->second);
+    matched_mass += a.bodies[i].mass;
+  }
+  c.matched = static_cast<int>(matched.size());
+  c.points = matched.empty()
+                 ? "The records have no body in common; only the mass centres of all that moves are compared."
+                 : fmt::format(
+                       "{} of {} moving bodies of A, with {:.0f} % of its mass, have the same name in B ({} "
+                       "bodies); their frames' origins are compared, weighed by mass.",
+                       matched.size(), moving, mass > 0 ? 100 * matched_mass / mass : 0.0, names.size());
+  for (size_t i = 0; i < c.time.size(); ++i) {
+    double squares = 0, largest = matched.empty() ? kNone : 0;
+    int farthest = -1;
+    for (const auto& [in_first, in_second] : matched) {
+      const double d = norm(position_at(a, in_a[i], in_first) - position_at(b, in_b[i], in_second));
+      squares += a.bodies[in_first].mass * d * d;
+      if (d > largest) largest = d, farthest = static_cast<int>(in_first);
+    }
+    c.rms.push_back(matched_mass > 0 ? std::sqrt(squares / matched_mass) : kNone);
+    c.largest.push_back(largest);
+    c.farthest.push_back(farthest);
+    c.centre.push_back(norm(calc_centre(a, in_a[i]) - calc_centre(b, in_b[i])));
+  }
+
+  std::map<std::string, TouchdownPair> touched;
+  for (const auto& [record, is_first] : {std::pair{&a, true}, std::pair{&b, false}})
+    for (const Event& e : record->events) {
+      if (e.kind != "touchdown") continue;
+      TouchdownPair& t = touched.try_emplace(e.subject, TouchdownPair{e.subject, kNone, kNone}).first->second;
+      double& at = is_first ? t.a : t.b;
+      if (std::isnan(at)) at = e.time;
+    }
+  for (const auto& [name, t] : touched) c.touchdowns.push_back(t);
+  std::stable_sort(c.touchdowns.begin(), c.touchdowns.end(), [](const TouchdownPair& x, const TouchdownPair& y) {
+    return std::fmin(x.a, x.b) < std::fmin(y.a, y.b);
+  });
+  c.touchdown_a = value_of(a, "touchdown.first");
+  c.touchdown_b = value_of(b, "touchdown.first");
+  c.until = std::fmin(c.time.back(), std::fmin(c.touchdown_a, c.touchdown_b));
+  c.tilt_share = kNone;
+  const SeriesPair* tilt = find_series(c, "tilt_angle");
+  double scale = 0;
+  for (size_t i = 0; i < c.time.size() && c.time[i] <= c.until; ++i) {
+    c.centre_difference = std::max(c.centre_difference, c.centre[i]);
+    if (!tilt) continue;
+    const double d = std::abs(tilt->a[i] - tilt->b[i]);
+    if (d > c.tilt_difference) c.tilt_difference = d, c.tilt_time = c.time[i];
+    scale = std::max(std::abs(tilt->a[i]), std::abs(tilt->b[i]));
+  }
+  if (scale > 1e-4) c.tilt_share = c.tilt_difference / scale;
+  return c;
+}
+
+std::string describe(const Comparison& c, const Record& a, const Record& b) {
+  std::string out;
+  const auto line = [&out](const std::string& text) { out += text + "\n"; };
+  line(fmt::format("A  {}: {}, {} frames to {:.2f} s", c.name_a, a.provenance.title, a.time.size(), a.time.back()));
+  line(fmt::format("B  {}: {}, {} frames to {:.2f} s", c.name_b, b.provenance.title, b.time.size(), b.time.back()));
+  line(c.points);
+  line("");
+  line(fmt::format("First touchdown of the upper block: A {}, B {}{}.", seconds(c.touchdown_a), seconds(c.touchdown_b),
+                   std::isfinite(c.touchdown_a) && std::isfinite(c.touchdown_b)
+                       ? fmt::format(", difference {:+.3f} s", c.touchdown_b - c.touchdown_a)
+                       : std::string()));
+  line(fmt::format("Tilt up to {:.2f} s: largest difference {:.2f} deg at {:.2f} s{}.", c.until,
+                   c.tilt_difference / unit::deg, c.tilt_time,
+                   std::isfinite(c.tilt_share)
+                       ? fmt::format(", {:.0f} % of the larger tilt at the end of this time", 100 * c.tilt_share)
+                       : std::string()));
+  line(fmt::format("Mass centres up to then: at most {:.2f} m apart.", c.centre_difference));
+  // a dozen instants
+  const SeriesPair *tilt = find_series(c, "tilt_angle"), *force = find_series(c, "ground_force"),
+                   *kinetic = find_series(c, "energy_kinetic");
+  line("");
+  line("  time     tilt A   tilt B  kinetic A  kinetic B  ground A  ground B  apart (rms)  largest");
+  line("     s        deg      deg         MJ         MJ        MN        MN            m        m");
+  const auto at = [](const SeriesPair* s, bool first, size_t i, double scale) {
+    return s ? (first ? s->a[i] : s->b[i]) / scale : kNone;
+  };
+  const size_t rows = std::min<size_t>(12, c.time.size());
+  for (size_t k = 0; k < rows; ++k) {
+    const size_t i = rows > 1 ? k * (c.time.size() - 1) / (rows - 1) : 0;
+    line(fmt::format("{:6.2f} {:10.2f} {:8.2f} {:10.2f} {:10.2f} {:9.2f} {:9.2f} {:12.3f} {:8.2f}", c.time[i],
+                     at(tilt, true, i, unit::deg), at(tilt, false, i, unit::deg), at(kinetic, true, i, 1e6),
+                     at(kinetic, false, i, 1e6), at(force, true, i, 1e6), at(force, false, i, 1e6), c.rms[i],
+                     c.largest[i]));
+  }
+  if (!c.touchdowns.empty()) line(fmt::format("\nTouchdowns, the first of {}:", c.touchdowns.size()));
+  for (size_t i = 0; i < std::min<size_t>(10, c.touchdowns.size()); ++i)
+    line(fmt::format("  {:24} A {:>8}  B {:>8}", c.touchdowns[i].body, seconds(c.touchdowns[i].a),
+                     seconds(c.touchdowns[i].b)));
+  return out;
+}
+
+std::string to_csv(const Comparison& c, const Record& a) {
+  std::string out = "time [s]";
+  for (const SeriesPair& s : c.series) out += fmt::format(",{0} A [{1}],{0} B [{1}],{0} B - A [{1}]", s.id, s.unit);
+  out += ",distance rms [m],distance largest [m],farthest,distance of mass centres [m]\r\n";
+  const auto field = [](double v) { return std::isfinite(v) ? fmt::format(",{}", v) : std::string(","); };
+  for (size_t i = 0; i < c.time.size(); ++i) {
+    out += fmt::format("{}", c.time[i]);
+    for (const SeriesPair& s : c.series) out += field(s.a[i]) + field(s.b[i]) + field(s.b[i] - s.a[i]);
+    out += field(c.rms[i]) + field(c.largest[i]);
+    out += "," + (c.farthest[i] < 0 ? std::string() : a.bodies[static_cast<size_t>(c.farthest[i])].name);
+    out += field(c.centre[i]) + "\r\n";
+  }
+  return out;
+}
+
+std::string to_json(const Comparison& c, const Record& a) {
+  json j;
+  j["format"] = "topple-comparison";
+  j["version"] = 1;
+  j["names"] = {c.name_a, c.name_b};
+  j["points"] = c.points;
+  j["matched"] = c.matched;
+  j["touchdown"] = {number(c.touchdown_a), number(c.touchdown_b)};
+  j["until"] = number(c.until);
+  j["tilt_difference"] = number(c.tilt_difference);
+  j["tilt_time"] = number(c.tilt_time);
+  j["tilt_share"] = number(c.tilt_share);
+  j["centre_difference"] = number(c.centre_difference);
+  j["time"] = numbers(c.time);
+  j["series"] = json::array();
+  for (const SeriesPair& s : c.series)
+    j["series"].push_back({{"id", s.id},
+                           {"title", s.title},
+                           {"unit", s.unit},
+                           {"group", s.group},
+                           {"a", numbers(s.a)},
+                           {"b", numbers(s.b)}});
+  json farthest = json::array();
+  for (const int b : c.farthest)
+    farthest.push_back(b < 0 ? json(nullptr) : json(a.bodies[static_cast<size_t>(b)].name));
+  j["distance"] = {{"rms", numbers(c.rms)},
+                   {"largest", numbers(c.largest)},
+                   {"farthest", std::move(farthest)},
+                   {"centre", numbers(c.centre)}};
+  j["touchdowns"] = json::array();
+  for (const TouchdownPair& t : c.touchdowns)
+    j["touchdowns"].push_back({{"body", t.body}, {"a", number(t.a)}, {"b", number(t.b)}});
+  return j.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+}  // namespace topple::record

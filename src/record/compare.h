@@ -1,0 +1,66 @@
+#pragma once
+/// Two records of one building beside each other, e.g. of the multibody model and of finite elements (docs/compare.md).
+
+#include <string>
+#include <vector>
+
+#include "record/record.h"
+
+namespace topple::record {
+
+/// A series that both records have, at the same instants. T instants.
+struct SeriesPair {
+  std::string id, title, unit, group;
+  std::vector<double> a, b;  // (T)
+};
+
+/// When a body first touches the ground; NaN: never.
+struct TouchdownPair {
+  std::string body;
+  double a = 0, b = 0;  // [s]
+};
+
+struct Comparison {
+  std::string name_a, name_b;  // what moved the building: "native", "finite elements"
+  std::vector<double> time;    // frames of A within the time that both have [s]       (T)
+  std::vector<SeriesPair> series;
+  std::string points;                     // a sentence: what was compared by position
+  int matched = 0;                        // bodies of the same name in both
+  std::vector<double> rms;                // distance of the matched bodies, root of the mean square by mass [m] (T)
+  std::vector<double> largest;            // of the matched bodies [m] (T)
+  std::vector<int> farthest;              // which, index into A's bodies; -1: none (T)
+  std::vector<double> centre;             // distance of the mass centres of everything that moves [m] (T)
+  std::vector<TouchdownPair> touchdowns;  // bodies that touch the ground in either, in the order of time
+  // up to the earlier first touchdown of the upper block, or the end of the common time
+  double touchdown_a = 0, touchdown_b = 0;  // NaN: none [s]
+  double until = 0;                         // [s]
+  double tilt_difference = 0;               // largest |a - b| [rad]
+  double tilt_time = 0;                     // when [s]
+  double tilt_share = 0;                    // over the larger of both tilts at `until`; NaN: nothing tilts
+  double centre_difference = 0;             // largest distance of mass centres [m]
+};
+
+/// Throws InputError E680: records without a frame in common time.
+Comparison compare(const Record& a, const Record& b);
+
+/// Lines for people: touchdowns, tilt at instants, energies.
+std::string describe(const Comparison&, const Record& a, const Record& b);
+/// One line an instant: time, each series of A, of B and the difference, distances.
+std::string to_csv(const Comparison&, const Record& a);
+std::string to_json(const Comparison&, const Record& a);
+
+/// A picture of the real event.
+struct Photo {
+  double time = 0;  // of the plan [s]
+  std::string name;
+  std::string data;  // as a data: address
+};
+/// Table "time,file" with seconds and paths beside the table (JPEG, PNG or WebP); lines that begin with # and a heading
+/// are passed over. Throws InputError E681 with the line.
+std::vector<Photo> read_photos(const std::string& path);
+
+/// One self-contained page of both records; `bundle` is the built page with the marker.
+void write_compare_page(const Comparison&, const Record& a, const Record& b, const std::vector<Photo>&,
+                        const std::string& bundle, const std::string& path);
+
+}  // namespace topple::record

@@ -1,0 +1,13 @@
+#pragma once
+/// Self-contained pages: a built page with a marker, into which data go as JSON.
+
+#include <string>
+
+namespace topple::record {
+
+/// Writes a page (beside, then renamed). No text of the data can close or open a tag.
+///   data    JSON
+///   bundle  the built page, with the marker <!--TOPPLE-DATA--> once; throws std::runtime_error otherwise
+void write_page(const std::string& data, const std::string& bundle, const std::string& path);
+
+}  // namespace topple::record

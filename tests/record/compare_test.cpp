@@ -1,0 +1,173 @@
+#include "record/compare.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+#include "base/file.h"
+
+namespace topple::record {
+namespace {
+
+using testing::HasSubstr;
+
+/// Two bodies of 1 and 3 t that move along x by `speed`, from `offset` on; a tilt of 0.1 rad a second times `turn`.
+Record make_run(const std::string& engine, double interval, int frames, double speed, double offset, double turn) {
+  Record r;
+  r.provenance.engine = engine;
+  r.provenance.title = "House";
+  for (const auto& [name, mass] : {std::pair{"C-A1-0", 1e3}, std::pair{"S-A1B2-0", 3e3}}) {
+    BodyInfo b;
+    b.name = name;
+    b.mass = mass;
+    r.bodies.push_back(b);
+  }
+  r.series = {{"tilt_angle", "Tilt angle", "rad", "angle", {}}, {"own " + engine, "Own", "N", "force", {}}};
+  for (int i = 0; i < frames; ++i) {
+    const double t = interval * i;
+    r.time.push_back(t);
+    for (int b = 0; b < 2; ++b) {
+      for (const double x : {offset + speed * t + b, 2.0 * b, 3.0}) r.position.push_back(static_cast<float>(x));
+      for (const double q : {1.0, 0.0, 0.0, 0.0}) r.orientation.push_back(static_cast<float>(q));
+    }
+    r.series[0].value.push_back(0.1 * turn * t);
+    r.series[1].value.push_back(1);
+  }
+  return r;
+}
+
+/// Positions are stored as float32.
+constexpr double kSingle = 1e-6;
+
+TEST(Compare, FindsTheDistanceOfTheSameBodiesAtTheSameInstants) {
+  const Record a = make_run("native", 0.25, 9, 1, 0, 1), b = make_run("finite elements", 0.1, 31, 3, 0.5, 1);
+  const Comparison c = compare(a, b);
+  ASSERT_EQ(c.time.size(), 9u);
+  EXPECT_EQ(c.matched, 2);
+  for (size_t i = 0; i < c.time.size(); ++i) {
+    // both bodies are apart by what the speeds and the offset make
+    EXPECT_NEAR(c.rms[i], 0.5 + 2 * c.time[i], 8 * kSingle);
+    EXPECT_NEAR(c.largest[i], 0.5 + 2 * c.time[i], 8 * kSingle);
+    EXPECT_NEAR(c.centre[i], 0.5 + 2 * c.time[i], 8 * kSingle);
+  }
+}
+
+TEST(Compare, WeighsByMass) {
+  Record a = make_run("a", 0.25, 3, 0, 0, 1), b = a;
+  b.provenance.engine = "b";
+  for (size_t s = 0; s < 3; ++s) b.position[6 * s + 1] += 2;  // the light body, to the side
+  const Comparison c = compare(a, b);
+  EXPECT_NEAR(c.rms[1], std::sqrt(1.0 / 4 * 4), kSingle);
+  EXPECT_NEAR(c.largest[1], 2, kSingle);
+  EXPECT_EQ(c.farthest[1], 0);
+  EXPECT_NEAR(c.centre[1], 0.5, kSingle);
+}
+
+TEST(Compare, KeepsToTheTimeThatBothHave) {
+  const Comparison c = compare(make_run("a", 0.5, 11, 1, 0, 1), make_run("b", 0.5, 4, 1, 0, 1));
+  EXPECT_EQ(c.time.back(), 1.5);
+  Record late = make_run("b", 0.5, 4, 1, 0, 1);
+  for (double& t : late.time) t += 100;
+  EXPECT_THROW((void)compare(make_run("a", 0.5, 11, 1, 0, 1), late), InputError);
+}
+
+TEST(Compare, SetsSeriesOfBothBesideEachOtherBetweenFrames) {
+  const Comparison c = compare(make_run("a", 0.25, 9, 1, 0, 1), make_run("b", 0.1, 31, 1, 0, 0.8));
+  ASSERT_EQ(c.series.size(), 1u);  // the other series has no counterpart
+  for (size_t i = 0; i < c.time.size(); ++i) {
+    EXPECT_NEAR(c.series[0].a[i], 0.1 * c.time[i], 1e-15);
+    EXPECT_NEAR(c.series[0].b[i], 0.08 * c.time[i], 1e-15);  // straight, so that interpolation is exact
+  }
+}
+
+TEST(Compare, JudgesTheTiltUpToTheEarlierTouchdown) {
+  Record a = make_run("a", 0.25, 9, 1, 0, 1), b = make_run("b", 0.25, 9, 1, 0, 0.9);
+  a.findings.push_back({"touchdown.first", "", "", "", 1.5, "s", Status::Info});
+  b.findings.push_back({"touchdown.first", "", "", "", 1.75, "s", Status::Info});
+  const Comparison c = compare(a, b);
+  EXPECT_EQ(c.until, 1.5);
+  EXPECT_NEAR(c.tilt_difference, 0.01 * 1.5, 1e-15);
+  EXPECT_NEAR(c.tilt_share, 0.1, 1e-12);
+  EXPECT_THAT(describe(c, a, b), HasSubstr("A 1.50 s, B 1.75 s, difference +0.250 s"));
+}
+
+TEST(Compare, PairsTouchdownsByBody) {
+  Record a = make_run("a", 0.25, 9, 1, 0, 1), b = make_run("b", 0.25, 9, 1, 0, 1);
+  a.events = {{1.0, "touchdown", "S-A1B2-0", ""}, {1.2, "touchdown", "S-A1B2-0", ""}};
+  b.events = {{0.5, "touchdown", "C-A1-0", ""}, {1.1, "touchdown", "S-A1B2-0", ""}};
+  const Comparison c = compare(a, b);
+  ASSERT_EQ(c.touchdowns.size(), 2u);
+  EXPECT_EQ(c.touchdowns[0].body, "C-A1-0");
+  EXPECT_TRUE(std::isnan(c.touchdowns[0].a));
+  EXPECT_EQ(c.touchdowns[1].a, 1.0);
+  EXPECT_EQ(c.touchdowns[1].b, 1.1);
+}
+
+TEST(Compare, OfUnlikeBodiesKeepsToMassCentresAndSaysSo) {
+  Record a = make_run("a", 0.25, 3, 1, 0, 1), b = make_run("b", 0.25, 3, 1, 2, 1);
+  b.bodies[0].name = "piece 1", b.bodies[1].name = "piece 2";
+  const Comparison c = compare(a, b);
+  EXPECT_EQ(c.matched, 0);
+  EXPECT_THAT(c.points, HasSubstr("no body in common"));
+  EXPECT_TRUE(std::isnan(c.rms[0]));
+  EXPECT_NEAR(c.centre[2], 2, 4 * kSingle);
+}
+
+TEST(Compare, WritesTablesThatHoldTheNumbers) {
+  const Record a = make_run("a", 0.25, 3, 1, 0, 1);
+  Record b = make_run("a", 0.25, 3, 1, 0.5, 1);
+  b.series.pop_back();
+  const Comparison c = compare(a, b);
+  EXPECT_EQ(c.name_a, "a (first)");
+  const std::string csv = to_csv(c, a);
+  EXPECT_THAT(csv,
+              testing::StartsWith("time [s],tilt_angle A [rad],tilt_angle B [rad],tilt_angle B - A [rad],distance"));
+  EXPECT_THAT(csv, HasSubstr("\r\n0.25,0.025,0.025,0,0.5,0.5,C-A1-0,0.5\r\n"));
+  const auto j = nlohmann::json::parse(to_json(c, a));
+  EXPECT_EQ(j["format"], "topple-comparison");
+  EXPECT_EQ(j["series"][0]["b"][2], 0.05);
+  EXPECT_TRUE(j["touchdown"][0].is_null());
+}
+
+class Photos : public testing::Test {
+ protected:
+  Photos() : folder(testing::TempDir() + "topple_photos/") { std::filesystem::create_directories(folder); }
+  ~Photos() override { std::filesystem::remove_all(folder); }
+  std::string write(const std::string& name, const std::string& text) const {
+    replace_file(folder + name, text);
+    return folder + name;
+  }
+  std::string folder;
+};
+
+TEST_F(Photos, AreReadFromATableBesideThem) {
+  write("one.png", "\x89PNG\r\n");
+  write("two.jpg", "\xff\xd8\xff\xe0");
+  const auto photos = read_photos(write("table.csv", "time,file\n# the first\n0.5,one.png\r\n\n1.25, two.jpg\n"));
+  ASSERT_EQ(photos.size(), 2u);
+  EXPECT_EQ(photos[0].time, 0.5);
+  EXPECT_EQ(photos[0].data, "data:image/png;base64,iVBORw0K");
+  EXPECT_EQ(photos[1].name, "two.jpg");
+  EXPECT_THAT(photos[1].data, testing::StartsWith("data:image/jpeg;"));
+}
+
+TEST_F(Photos, ThatAreWrongAreRefusedWithTheirLine) {
+  write("text.png", "not a picture");
+  for (const char* line : {"1.25 one.png", "soon,one.png", "1,missing.png", "1,text.png"}) {
+    const std::string table = write("table.csv", std::string("time,file\n") + line + "\n");
+    try {
+      (void)read_photos(table);
+      FAIL() << line;
+    } catch (const InputError& e) {
+      EXPECT_EQ(e.diagnostics()[0].code, "E681");
+      EXPECT_EQ(e.diagnostics()[0].where.line, 2) << line;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace topple::record

@@ -1,0 +1,235 @@
+/// Two runs of one building beside each other: overlaid in two colours, with photographs, plots and differences.
+import "uplot/dist/uPlot.min.css";
+import "./style.css";
+import { effect, signal } from "@preact/signals";
+import { render } from "preact";
+import { Building } from "./building";
+import { readComparison, type Comparison, type Compared, type Photo } from "./compare_data";
+import { Help, listenToKeys } from "./keys";
+import { NoWebGl } from "./no_webgl";
+import { Plots } from "./plots";
+import { Scene } from "./scene";
+import { useSceneView } from "./scene_view";
+import { makeState, runClock, type State } from "./state";
+import { Timeline } from "./timeline";
+import { formatTime } from "./units";
+
+type Shown = "both" | "a" | "b";
+const colourOfA = "#b0483c";
+const colourOfB = "#3c8f4e";
+
+const shows: [Shown, string][] = [
+  ["both", "both"],
+  ["a", "A alone"],
+  ["b", "B alone"],
+];
+
+/// The picture of A with B in it.
+class OverlaidScene extends Scene {
+  private readonly other: Building;
+  private shown: Shown = "both";
+
+  constructor(canvas: HTMLCanvasElement, { a, b }: Compared) {
+    super(canvas, a);
+    this.other = new Building(b);
+    this.building.setGhost(colourOfA, 1);
+    this.other.setGhost(colourOfB, 0.5);
+    this.stage.scene.add(this.other.group);
+    this.stage.setFitPoints([...this.building.fitPoints, ...this.other.fitPoints]);
+    this.setLook("kind", "none", -1);
+    this.other.setLook("kind", "none", -1);
+    this.fit("side");
+  }
+
+  override setTime(t: number): void {
+    super.setTime(t);
+    this.other?.setTime(t);
+  }
+
+  show(shown: Shown): void {
+    this.shown = shown;
+    this.building.group.visible = this.shown !== "b";
+    this.other.group.visible = this.shown !== "a";
+    this.onChange();
+  }
+}
+
+function Overlay(props: { state: State; compared: Compared; fitRef: { current: () => void } }) {
+  const { state, compared } = props;
+  const { names } = compared.comparison;
+  const { frameRef, canvasRef, sceneRef, problem } = useSceneView(
+    (canvas) => new OverlaidScene(canvas, compared),
+    (scene) => {
+      props.fitRef.current = () => scene.fit();
+      const stops = [effect(() => scene.setTime(state.time.value)), effect(() => scene.show(shown.value))];
+      document.documentElement.dataset["ready"] = "yes";
+      return () => stops.forEach((stop) => stop());
+    },
+    () => (document.documentElement.dataset["ready"] = "yes"),
+  );
+  return (
+    <section class="panel view" aria-label="Both runs in three dimensions">
+      <div class="toolbar">
+        <span class="button-group" role="group" aria-label="What is shown">
+          {shows.map(([value, word]) => (
+            <button type="button" data-test={`show-${value}`} aria-pressed={shown.value === value} onClick={() => (shown.value = value)}>
+              {word}
+            </button>
+          ))}
+        </span>
+        <span class="spring" />
+        <span class="button-group" role="group" aria-label="Point of view">
+          {(["oblique", "side", "front", "top"] as const).map((view) => (
+            <button type="button" onClick={() => sceneRef.current?.fit(view)}>{view}</button>
+          ))}
+        </span>
+      </div>
+      <div class="canvas-frame" ref={frameRef}>
+        <canvas ref={canvasRef} data-test="canvas" role="img" aria-label="Both buildings at the time of the cursor" hidden={problem !== ""} />
+        {problem !== "" && <NoWebGl problem={problem} />}
+      </div>
+      <div class="legend">
+        <div class="legend-row">
+          {([[colourOfA, `A: ${names[0]}`], [colourOfB, `B: ${names[1]}`]] as const).map(([colour, word]) => (
+            <span class="with-sign"><i class="swatch" style={{ background: colour }} /> {word}</span>
+          ))}
+        </div>
+      </div>
+    </section>
+  );
+}
+const shown = signal<Shown>("both");
+
+/// The photograph nearest to the time of the cursor, and a row of all of them.
+function Photos(props: { state: State; photos: Photo[] }) {
+  const { state, photos } = props;
+  if (photos.length === 0) return null;
+  const t = state.time.value;
+  const nearest = photos.reduce((best, p) => (Math.abs(p.time - t) < Math.abs(best.time - t) ? p : best));
+  return (
+    <section class="panel photos" aria-label="Photographs">
+      <h2>The real event</h2>
+      <figure>
+        <img src={nearest.data} alt={`Photograph at ${formatTime(nearest.time)}`} data-test="photo" />
+        <figcaption>{nearest.name}, {formatTime(nearest.time)}; the cursor stands at {formatTime(t)}</figcaption>
+      </figure>
+      <div class="photo-row">
+        {photos.map((p) => (
+          <button type="button" title={p.name} aria-pressed={p === nearest} onClick={() => state.pauseAt(p.time)}>
+            <img src={p.data} alt="" loading="lazy" />
+            {formatTime(p.time)}
+          </button>
+        ))}
+      </div>
+    </section>
+  );
+}
+
+const degrees = (angle: number | null): string => (angle === null ? "–" : `${((angle * 180) / Math.PI).toFixed(2)}°`);
+const instant = (t: number | null): string => (t === null ? "never" : formatTime(t));
+
+function Summary(props: { comparison: Comparison }) {
+  const { comparison: c } = props;
+  const [a, b] = c.touchdown;
+  const rows: [string, string][] = [
+    ["First touchdown of the upper block", `A ${instant(a)}, B ${instant(b)}${a === null || b === null ? "" : `, difference ${(b - a).toFixed(3)} s`}`],
+    ["Largest difference of the tilt until then", `${degrees(c.tilt_difference)} at ${formatTime(c.tilt_time ?? 0)}${c.tilt_share === null ? "" : `, ${(100 * c.tilt_share).toFixed(0)} % of the larger tilt at the end of this time`}`],
+    ["Mass centres until then", c.centre_difference === null ? "–" : `at most ${c.centre_difference.toFixed(2)} m apart`],
+    ["Compared", c.points],
+  ];
+  return (
+    <section class="panel" aria-label="Differences">
+      <h2>Differences</h2>
+      <table class="pairs">
+        <tbody>
+          {rows.map(([key, value]) => (
+            <tr><th scope="row">{key}</th><td data-test={key === rows[0]?.[0] ? "touchdown" : undefined}>{value}</td></tr>
+          ))}
+        </tbody>
+      </table>
+    </section>
+  );
+}
+
+function Touchdowns(props: { state: State; comparison: Comparison }) {
+  const { state, comparison } = props;
+  if (comparison.touchdowns.length === 0) return null;
+  return (
+    <section class="panel" aria-label="Touchdowns">
+      <h2>Touchdowns</h2>
+      <div class="scroller" tabIndex={0} role="region" aria-label="Touchdowns">
+        <table>
+          <thead><tr><th scope="col">part</th><th scope="col">A [s]</th><th scope="col">B [s]</th><th scope="col">B − A [s]</th></tr></thead>
+          <tbody>
+            {comparison.touchdowns.slice(0, 300).map((t) => (
+              <tr onClick={() => state.pauseAt(Math.min(t.a ?? Infinity, t.b ?? Infinity))}>
+                <td>{t.body}</td>
+                <td>{t.a?.toFixed(2) ?? "never"}</td>
+                <td>{t.b?.toFixed(2) ?? "never"}</td>
+                <td>{t.a === null || t.b === null ? "" : (t.b - t.a).toFixed(2)}</td>
+              </tr>
+            ))}
+          </tbody>
+        </table>
+      </div>
+    </section>
+  );
+}
+
+function Page(props: { state: State; compared: Compared; titles: Record<string, string>; fitRef: { current: () => void } }) {
+  const { state, compared, titles, fitRef } = props;
+  const { names } = compared.comparison;
+  return (
+    <>
+      <header class="header">
+        <div class="title-row">
+          <h1>{compared.a.provenance.title || "Comparison"}</h1>
+          <p class="subtitle">A: {names[0]} · B: {names[1]}</p>
+        </div>
+      </header>
+      <main class="layout">
+        <div class="stage">
+          <Overlay state={state} compared={compared} fitRef={fitRef} />
+          <Timeline state={state} />
+          <Plots state={state} titles={titles} />
+        </div>
+        <div class="side">
+          <Summary comparison={compared.comparison} />
+          <Photos state={state} photos={compared.photos} />
+          <Touchdowns state={state} comparison={compared.comparison} />
+        </div>
+      </main>
+      <Help state={state} />
+    </>
+  );
+}
+
+function start(): void {
+  const root = document.getElementById("page") as HTMLElement;
+  let compared: Compared;
+  try {
+    compared = readComparison(document.getElementById("topple-data")?.textContent ?? "null");
+  } catch (error) {
+    render(
+      <main class="layout">
+        <section class="panel" role="alert" data-test="problem">
+          <h1>This comparison cannot be shown</h1>
+          <p>{error instanceof Error ? error.message : String(error)}</p>
+        </section>
+      </main>,
+      root,
+    );
+    document.documentElement.dataset["ready"] = "yes";
+    return;
+  }
+  document.title = `${compared.a.provenance.title || "Runs"} – topple compare`;
+  const { run, titles } = compared.plotted;
+  const state = makeState(run);
+  const fitRef = { current: (): void => undefined };
+  runClock(state);
+  listenToKeys(state, () => fitRef.current());
+  root.textContent = "";
+  render(<Page state={state} compared={compared} titles={titles} fitRef={fitRef} />, root);
+}
+
+start();
