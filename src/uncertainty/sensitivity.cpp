@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
+#include <numeric>
 #include <set>
 
 #include "base/error.h"
@@ -67,14 +69,146 @@ std::vector<Driver> calc_drivers(const Columns& c) {
   return drivers;
 }
 
+/// Share of a variance by one input: what is left inside bins of that input, of about as many samples as there are
+/// bins. The bin's mean takes 1/size of its variance if samples are independent, and almost nothing if they are spread
+/// evenly: the share is the middle of both cases, and half their distance is part of its error, beside the scatter over
+/// bins.
+Driver calc_share_by_bins(const std::vector<double>& x, const std::vector<double>& y) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::size_t count = x.size();
+  const std::size_t bins = static_cast<std::size_t>(std::sqrt(static_cast<double>(count)));
+  if (bins < 3) return {nan, nan, nan, nan};
+  Driver d{0, nan, 0, nan};
+  std::vector<std::size_t> order(count);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return x[a] < x[b]; });
+  double mean = 0, variance = 0;
+  for (const double v : y) mean += v / static_cast<double>(count);
+  for (const double v : y) variance += (v - mean) * (v - mean) / static_cast<double>(count - 1);
+  if (!(variance > 0)) return d;
+  struct Bin {
+    double weight, inside, whole;  // part of the samples; variance about the bin's mean and about that of all
+  };
+  std::vector<Bin> list;
+  double rest = 0, doubt = 0;
+  for (std::size_t b = 0; b < bins; ++b) {
+    const std::size_t first = b * count / bins, last = (b + 1) * count / bins;
+    const double size = static_cast<double>(last - first);
+    double middle = 0;
+    for (std::size_t k = first; k < last; ++k) middle += y[order[k]] / size;
+    Bin bin{size / static_cast<double>(count), 0, 0};
+    for (std::size_t k = first; k < last; ++k) {
+      const double v = y[order[k]];
+      bin.inside += (v - middle) * (v - middle) / size;
+      bin.whole += (v - mean) * (v - mean) / size;
+    }
+    const double independent = bin.inside * size / (size - 1);
+    doubt += 0.5 * bin.weight * (independent - bin.inside);
+    bin.inside = 0.5 * (bin.inside + independent);
+    rest += bin.weight * bin.inside;
+    list.push_back(bin);
+  }
+  d.first = 1 - rest / variance;
+  // inside - (1 - S) whole is 0 in the mean; its scatter over the bins is that of the share
+  double sum = 0;
+  for (const Bin& b : list) sum += std::pow(b.weight * (b.inside - (1 - d.first) * b.whole) / variance, 2);
+  const double many = static_cast<double>(bins);
+  d.first_error = std::hypot(std::sqrt(sum * many / (many - 1)), doubt / variance);
+  return d;
+}
+
 }  // namespace
 
-Sensitivity find_drivers(const Space& space, Asker& asker, const SensitivityOptions& options) {
+Sensitivity read_drivers(const Space& space, const Archive& archive, const std::vector<int>& samples) {
+  Sensitivity s;
+  const std::size_t n = space.inputs.size();
+  std::vector<int> done;
+  std::set<int> outcomes;
+  std::size_t outputs = 0;
+  for (const int i : samples) {
+    outcomes.insert(outcome_of(archive[i].result));
+    if (archive[i].result.state != Result::State::Done) continue;
+    done.push_back(i);
+    outputs = archive[i].result.values.size();
+  }
+  s.rows = static_cast<int>(samples.size());
+  s.rows_used = static_cast<int>(done.size());
+  const auto collect = [&](const std::vector<int>& list, const auto& value) {
+    std::vector<Driver> drivers;
+    std::vector<double> x(list.size()), y;
+    for (const int i : list) y.push_back(value(archive[i].result));
+    for (std::size_t k = 0; k < n; ++k) {
+      for (std::size_t j = 0; j < list.size(); ++j) x[j] = archive[list[j]].x[k];
+      const bool is_fuzzy = space.inputs[k].width() > 0;
+      drivers.push_back(is_fuzzy ? calc_share_by_bins(x, y) : Driver{});
+    }
+    return drivers;
+  };
+  for (std::size_t o = 0; o < outputs; ++o)
+    s.outputs.push_back(collect(done, [o](const Result& r) { return r.values[o]; }));
+  for (const int outcome : outcomes) {
+    OutcomeDrivers d;
+    d.outcome = outcome;
+    for (const int i : samples) d.share += outcome_of(archive[i].result) == outcome;
+    d.share /= static_cast<double>(samples.size());
+    d.inputs = collect(samples, [outcome](const Result& r) { return outcome_of(r) == outcome ? 1.0 : 0.0; });
+    s.outcomes.push_back(std::move(d));
+  }
+  return s;
+}
+
+std::vector<Rank> calc_ranks(const std::vector<Driver>& drivers) {
+  std::vector<Rank> ranks;
+  for (const Driver& d : drivers) {
+    Rank r{1, static_cast<int>(drivers.size())};
+    for (const Driver& other : drivers) {
+      const double apart = 2 * std::hypot(d.first_error, other.first_error);
+      r.best += other.first - d.first > apart;
+      r.worst -= d.first - other.first > apart;
+    }
+    ranks.push_back(r);
+  }
+  return ranks;
+}
+
+std::vector<Fixed> find_outcomes_of_knowing(const Space& space, Asker& asker, const PossibilityOptions& options,
+                                            int limit) {
   check_space(space);
-  if (space.has_interaction())
-    throw InputError("E811", "sensitivity: indices need inputs that vary on their own; there is interaction",
-                     "use the effect of knowing each input instead");
-  if (options.rows < 16) throw InputError("E811", fmt::format("sensitivity: {} rows; at least 16", options.rows));
+  std::vector<Fixed> effects;
+  const int whole_limit = asker.limit();
+  for (int i = 0; i < space.size() && !asker.is_cancelled(); ++i) {
+    const double core = space.inputs[i].centre();
+    Space known = space;
+    known.inputs[i] = FuzzyNumber(core);
+    asker.set_limit(std::min(whole_limit, asker.asked() + limit));
+    // of each class the samples that would be the most possible ones there
+    std::map<int, std::vector<std::pair<double, int>>> best;
+    for (int k = 0; k < asker.asked(); ++k) {
+      Point x = asker.archive()[k].x;
+      x[i] = core;
+      best[outcome_of(asker.archive()[k].result)].emplace_back(-calc_membership(known, x), k);
+    }
+    std::vector<Point> points = {calc_centre(known)};
+    const std::size_t each = std::max<std::size_t>(2, static_cast<std::size_t>(limit) / (4 * best.size() + 1));
+    for (auto& [outcome, list] : best) {
+      std::stable_sort(list.begin(), list.end());
+      for (std::size_t k = 0; k < std::min(each, list.size()); ++k) {
+        points.push_back(asker.archive()[list[k].second].x);
+        points.back()[i] = core;
+      }
+    }
+    asker.ask(points);
+    Fixed f;
+    f.input = i;
+    for (auto& c : find_possibilities(known, asker, options).classes)
+      if (c.possibility > 0) f.classes.push_back(c);
+    effects.push_back(std::move(f));
+  }
+  asker.set_limit(whole_limit);
+  return effects;
+}
+
+std::vector<Point> make_driver_points(const Space& space, const SensitivityOptions& options) {
   const std::size_t n = space.inputs.size();
   const Box box = make_box(space, options.alpha);
   std::vector<Point> points;
@@ -88,7 +222,17 @@ Sensitivity find_drivers(const Space& space, Asker& asker, const SensitivityOpti
       points.back()[i] = b[i];
     }
   }
-  const auto indices = asker.ask(points);
+  return points;
+}
+
+Sensitivity find_drivers(const Space& space, Asker& asker, const SensitivityOptions& options) {
+  check_space(space);
+  if (space.has_interaction())
+    throw InputError("E811", "sensitivity: indices need inputs that vary on their own; there is interaction",
+                     "use the effect of knowing each input instead");
+  if (options.rows < 16) throw InputError("E811", fmt::format("sensitivity: {} rows; at least 16", options.rows));
+  const std::size_t n = space.inputs.size();
+  const auto indices = asker.ask(make_driver_points(space, options));
   Sensitivity s;
   // rows that ran, and those in which nothing failed
   std::vector<std::size_t> ran, clean;

@@ -36,10 +36,26 @@ struct SensitivityOptions {
   std::uint64_t seed = 1;
 };
 
+/// The design: points of each row are A, B, and A with one input after the other from B; n + 2 in all.
+std::vector<Point> make_driver_points(const Space&, const SensitivityOptions&);
+
 /// Sobol's indices by the estimators of Saltelli and Jansen: rows * (n + 2) runs, kept in the archive. The space must
 /// have no interaction: throws InputError E811 if it has, or for fewer than 16 rows. Rows that could not be run are
 /// left out.
 Sensitivity find_drivers(const Space&, Asker&, const SensitivityOptions&);
+
+/// Shares of runs that are there, at independent or spread points of a box: from the order of one input's values, after
+/// Gamboa et al. (2022), section 9 of the theory. `first` only; `total` and its error are NaN, because they would need
+/// rows.
+///   samples  of the archive; those that failed count for outcomes alone
+Sensitivity read_drivers(const Space&, const Archive&, const std::vector<int>& samples);
+
+/// Where an input belongs among the others by its first share: places (from 1) that its error leaves open.
+struct Rank {
+  int best = 1, worst = 1;
+};
+/// Two inputs count as apart when their shares differ by more than two standard errors of the difference.
+std::vector<Rank> calc_ranks(const std::vector<Driver>&);
 
 /// What becomes of the results when one input is known: fixed at the middle of its core.
 struct Fixed {
@@ -53,5 +69,10 @@ struct Fixed {
 /// input fuzzy.
 std::vector<Fixed> find_effects_of_knowing(const Space&, Asker&, const AlphaResult& all, const AlphaOptions&,
                                            int limit);
+
+/// How possible each outcome is when one input is known (fixed at the middle of its core), without bounds of outputs:
+/// the best samples of each class are moved to that value, and the search of possibility.h goes on from there.
+/// At most `limit` further points per input; possibilities are inner estimates.
+std::vector<Fixed> find_outcomes_of_knowing(const Space&, Asker&, const PossibilityOptions&, int limit);
 
 }  // namespace topple::uncertainty

@@ -62,6 +62,39 @@ TEST(SensitivityPhysics, DriversOfAnOutcomeHaveClosedForms) {
   EXPECT_EQ(s.outputs[0][0].total, 0) << "an output that does not vary has no driver";
 }
 
+// The same function from spread runs alone. With N points in √N bins the share that a smooth function has inside a bin
+// is lost, about 1/√N of its own variance share (10 % for 100 points), beside the error that is told.
+TEST(SensitivityReference, SharesOfIshigamiFromSpreadRuns) {
+  const cases::Case c = cases::make_all()[2];
+  const Space space{c.inputs, {}, {}};
+  const double want[] = {0.313905, 0.442411, 0};
+  for (const int count : {100, 1000})
+    for (const std::uint64_t seed : {1, 2, 3, 4, 5}) {
+      const Progress progress;
+      Asker asker(c.model, progress, nullptr, 100000);
+      const Box box = make_box(space, 0);
+      std::vector<Point> points;
+      for (const auto& u : make_sobol_points(3, 1, count, seed)) points.push_back(place_in(box, u));
+      const Sensitivity s = read_drivers(space, asker.archive(), asker.ask(points));
+      EXPECT_EQ(s.rows, count);
+      for (int i = 0; i < 3; ++i) {
+        const Driver& d = s.outputs[0][i];
+        EXPECT_NEAR(d.first, want[i], 3 * d.first_error) << count << " " << seed;
+        EXPECT_LT(d.first_error, 2.0 / std::sqrt(count));
+        EXPECT_TRUE(std::isnan(d.total)) << "needs rows";
+      }
+    }
+}
+
+TEST(Sensitivity, KnowsNothingFromAHandfulOfRuns) {
+  const Space space{{make_triangular(0, 1, 2)}, {}, {}};
+  const Progress progress;
+  Asker asker(make_evaluate_values([](const Point& x) { return x; }), progress);
+  const auto samples = asker.ask({{0.1}, {0.5}, {0.9}, {1.5}});
+  EXPECT_TRUE(std::isnan(read_drivers(space, asker.archive(), samples).outputs[0][0].first));
+  EXPECT_TRUE(read_drivers(space, asker.archive(), {}).outputs.empty());
+}
+
 TEST(Sensitivity, LeavesRowsWithFailedRunsOut) {
   const Evaluate model = make_evaluate([](const Point& x) {
     Result r;
@@ -101,6 +134,28 @@ TEST(Sensitivity, KnowingAnInputNarrowsTheResult) {
   EXPECT_NEAR(effects[0].entropy[0], 0.25, 1e-9);
   EXPECT_NEAR(effects[1].width[0], 0.75, 1e-9);
   ASSERT_EQ(effects[0].classes.size(), 1u) << "with a known nothing but outcome 0 is possible";
+  ASSERT_EQ(effects[1].classes.size(), 2u);
+  EXPECT_NEAR(effects[1].classes[1].possibility, 0.5, 1e-3);
+}
+
+TEST(Sensitivity, OutcomesOfKnowingAnInputTakeFewRuns) {
+  // outcome 1 for a > 1.5, outcome 2 for a + b > 3.4: possible to 0.5 and 0.3; with b known to 0.5, and not at all
+  const Evaluate model = make_evaluate([](const Point& x) {
+    Result r;
+    r.state = Result::State::Done;
+    r.outcome = x[0] + x[1] > 3.4 ? 2 : x[0] > 1.5 ? 1 : 0;
+    r.values = {x[0]};
+    return r;
+  });
+  const Space space{{make_triangular(0, 1, 2), make_triangular(0, 1, 2)}, {}, {}};
+  const Progress progress;
+  Asker asker(model, progress, nullptr, 100000);
+  (void)optimise(space, asker, {});
+  const int before = asker.asked();
+  const auto effects = find_outcomes_of_knowing(space, asker, {}, 100);
+  EXPECT_LE(asker.asked(), before + 200);
+  ASSERT_EQ(effects.size(), 2u);
+  ASSERT_EQ(effects[0].classes.size(), 1u) << "with a known nothing but outcome 0";
   ASSERT_EQ(effects[1].classes.size(), 2u);
   EXPECT_NEAR(effects[1].classes[1].possibility, 0.5, 1e-3);
 }
