@@ -363,15 +363,21 @@ void add_verification(const Context& c) {
 
 }  // namespace
 
+const std::vector<std::string>& not_modelled() {
+  static const std::vector<std::string> list = {
+      "fragments thrown by the charges",
+      "air overpressure",
+      "dust",
+      "ground vibration (a screening needs the site's coefficients)",
+      "wind, and people's behaviour; no distance given here is a safe distance",
+      "cracking of slabs within a bay, of walls within a panel and of members between their end zones",
+      "infill and finishes beyond their weight"};
+  return list;
+}
+
 void add_findings(const product::Plan& plan, const mbs::Model& model, const ModelMap& map, const Knowledge& k,
                   const Recorder& recorder, const mbs::Summary& summary, record::Record& r) {
-  r.not_modelled = {"fragments thrown by the charges",
-                    "air overpressure",
-                    "dust",
-                    "ground vibration (a screening needs the site's coefficients)",
-                    "wind, and people's behaviour; no distance given here is a safe distance",
-                    "cracking of slabs within a bay, of walls within a panel and of members between their end zones",
-                    "infill and finishes beyond their weight"};
+  r.not_modelled = not_modelled();
   const Context c{plan, model, map, k, recorder, summary, r};
   if (r.time.empty()) {
     c.add("mechanism", "Mechanism", "No result", r.ending_text, kNone, "", Status::Bad);

@@ -1,9 +1,15 @@
 #pragma once
 /// What a run means for the planner: findings in the order in which they matter.
 
+#include <string>
+#include <vector>
+
 #include "collapse/recorder.h"
 
 namespace topple::collapse {
+
+/// What no run tells, for people.
+const std::vector<std::string>& not_modelled();
 
 /// Fills findings, not_modelled and the rigid block's series of a finished record.
 void add_findings(const product::Plan&, const mbs::Model&, const ModelMap&, const Knowledge&, const Recorder&,

@@ -94,7 +94,8 @@ Reach calc_reach(const record::Record& r, size_t frame) {
     mass += r.bodies[b].mass;
   }
   out.largest = *std::max_element(out.side.begin(), out.side.end());
-  out.area = calc_area(calc_hull(std::move(corners)));
+  out.outline = calc_hull(std::move(corners));
+  out.area = calc_area(out.outline);
   std::sort(ways.begin(), ways.end());
   double within = 0;
   for (const auto& [way, b] : ways) {

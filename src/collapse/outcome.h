@@ -35,7 +35,8 @@ struct Reach {
   double largest = 0;            // of the sides [m]
   double most_mass = 0;          // within which 95 % of the mass lie [m]
   int farthest = -1;             // body, -1: no moving one
-  double area = 0;               // of the outline of all parts [m²]
+  Polygon outline;               // around all parts, convex, counter-clockwise
+  double area = 0;               // of the outline [m²]
 };
 Reach calc_reach(const record::Record&, size_t frame);
 

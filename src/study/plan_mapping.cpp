@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <limits>
 #include <mutex>
+#include <numbers>
 
 #include "base/parallel.h"
 #include "base/unit.h"
@@ -68,6 +70,8 @@ PlanMapping::PlanMapping(const product::Plan& plan, const collapse::Knowledge& k
     throw InputError("E201", plan.path + ": the plan has no fuzzy values", "add a table [fuzzy] (docs/plan.md)");
   if (!(options.after > 0) || !(options.tilt_interval > 0) || !std::isfinite(options.after))
     throw InputError("E205", "the time after the last stage and its interval must be above 0");
+  if (options.directions < 3 || options.directions > 3600)
+    throw InputError("E205", fmt::format("{} directions of the debris outline: 3 to 3600", options.directions));
   for (const double t : options.tilt_times)
     if (!(t >= 0) || t > options.after)
       throw InputError("E205",
@@ -120,6 +124,13 @@ Result PlanMapping::Impl::to_result(const collapse::SampleRun& r) const {
                          r.reach.most_mass, r.mechanism.rear_share, r.utilisation})
     out.values.push_back(x);
   for (const double t : trajectory_times) out.trajectory.push_back(interpolate(r.time, r.tilt, r.release + t));
+  for (int k = 0; k < options.directions; ++k) {
+    const double angle = 2 * std::numbers::pi * k / options.directions;
+    double farthest = -std::numeric_limits<double>::infinity();
+    for (const collapse::Point2& p : r.reach.outline)
+      farthest = std::max(farthest, p[0] * std::cos(angle) + p[1] * std::sin(angle));
+    out.trajectory.push_back(std::isfinite(farthest) ? farthest : std::nan(""));
+  }
   const bool is_finite = std::all_of(out.values.begin(), out.values.end(), [](double x) { return std::isfinite(x); });
   if (!is_finite) {
     out.state = Result::State::Failed;

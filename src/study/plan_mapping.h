@@ -18,6 +18,7 @@ struct PlanMappingOptions {
   double after = 1.7;                           // simulated after the last stage's time [s]
   std::vector<double> tilt_times{0.5, 1, 1.7};  // of outputs, after the last stage's time, at most `after` [s]
   double tilt_interval = 0.1;                   // of the trajectory [s]
+  int directions = 24;                          // in which the debris outline is taken, from W's x counter-clockwise
   double frame_rate = 0;                        // at which runs are looked at; 0: the plan's [1/s]
   bool lanes = false;  // samples of one build in the lanes of one batch; slower than one by one (docs/plan-mapping.md)
   int threads = 1;     // 0: all of the machine
@@ -58,7 +59,8 @@ class PlanMapping {
   /// the rear edge over that of the front edge; utilisation: largest use of a zone's resistance before the last stage
   /// (the margin is its inverse).
   const std::vector<PlanQuantity>& outputs() const;
-  /// Times of the trajectory, which is the tilt, after the last stage's time [s].
+  /// The trajectory is the tilt at these times after the last stage's [s], then how far parts extend from W's origin
+  /// towards each of `directions` at the end [m].
   const std::vector<double>& trajectory_times() const;
 
   /// As uncertainty::Evaluate. A sample that is no plan, finds no equilibrium or diverges is Failed with its text;

@@ -1,7 +1,11 @@
 #include "study/plan_model.h"
 
+#include <algorithm>
 #include <chrono>
 #include <nlohmann/json.hpp>
+
+#include "base/unit.h"
+#include "collapse/findings.h"
 
 namespace topple::study {
 namespace {
@@ -47,12 +51,34 @@ Definition read_definition(const std::string& text) {
   out.options.tilt_times = identity.at("tilt_times").get<std::vector<double>>();
   out.options.tilt_interval = identity.at("tilt_interval");
   out.options.frame_rate = identity.at("frame_rate");
+  out.options.directions = identity.at("directions");
   out.options.threads = 1;
   out.rules = identity.at("rules").get<std::string>();
   std::vector<Diagnostic> warnings;
   out.plan =
       product::read_plan(identity.at("plan").get<std::string>(), d.at("settings").value("path", "plan"), warnings);
   return out;
+}
+
+/// Seen from above, as the plan has it: around columns, slabs and walls.
+Site make_site(const product::Plan& plan) {
+  Site site;
+  double low[2] = {1e30, 1e30}, high[2] = {-1e30, -1e30};
+  for (const product::Member& m : plan.members) {
+    const bool is_column = m.kind == product::MemberKind::Column && m.section >= 0;
+    const product::Section* s = is_column ? &plan.sections[static_cast<std::size_t>(m.section)] : nullptr;
+    const double half[2] = {s ? s->width / 2 : 0, s ? s->height / 2 : 0};
+    for (const Vec3& p : {m.start, m.end}) {
+      const double at[2] = {p.x, p.y};
+      for (int i = 0; i < 2; ++i) {
+        low[i] = std::min(low[i], at[i] - half[i]);
+        high[i] = std::max(high[i], at[i] + half[i]);
+      }
+    }
+  }
+  if (low[0] <= high[0]) site.footprint = {{low[0], low[1]}, {high[0], low[1]}, {high[0], high[1]}, {low[0], high[1]}};
+  for (const product::Neighbour& n : plan.neighbours) site.neighbours.push_back({n.name, n.footprint, n.is_utility});
+  return site;
 }
 
 }  // namespace
@@ -63,6 +89,14 @@ Problem make_plan_problem(const product::Plan& plan, const PlanMappingOptions& o
   p.title = plan.title;
   for (const PlanQuantity& q : mapping.inputs()) p.inputs.push_back({q.name, q.symbol, q.unit});
   for (const product::DerivedValue& d : plan.fuzzy.derived) p.derived.push_back({d.path, d.symbol, d.unit});
+  for (const PlanQuantity& q : mapping.outputs()) p.outputs.push_back({q.name, q.symbol, q.unit});
+  p.outcomes = plan_outcomes();
+  p.curves.push_back({"tilt", "deg", unit::deg, "time after the last stage", "s", mapping.trajectory_times(), false});
+  p.curves.push_back({"outline", "m", 1, "direction", "deg", {}, true});
+  for (int k = 0; k < options.directions; ++k) p.curves.back().at.push_back(360.0 * k / options.directions);
+  p.asked = plan.criteria.mechanism.value_or("");
+  p.site = make_site(plan);
+  p.not_modelled = collapse::not_modelled();
   p.space = mapping.space();
   if (!p.derived.empty())
     p.calc_derived = [fuzzy = plan.fuzzy](const Point& x) { return product::calc_derived(fuzzy, x); };
@@ -72,7 +106,8 @@ Problem make_plan_problem(const product::Plan& plan, const PlanMappingOptions& o
                     {"after", options.after},
                     {"tilt_times", options.tilt_times},
                     {"tilt_interval", options.tilt_interval},
-                    {"frame_rate", options.frame_rate}}
+                    {"frame_rate", options.frame_rate},
+                    {"directions", options.directions}}
                    .dump();
   p.settings = json{{"path", plan.path}}.dump();
   p.levels = plan.fuzzy.search.levels;

@@ -18,6 +18,12 @@ json make_identity(const Problem& p) {
 
 }  // namespace
 
+Quantity find_output(const Problem& p, const std::string& name) {
+  for (const Quantity& q : p.outputs)
+    if (q.name == name) return q;
+  return {name, "", 1};
+}
+
 std::string calc_model_hash(const Problem& p) { return calc_sha256(make_identity(p).dump()); }
 
 std::string make_model_definition(const Problem& p) {

@@ -2,6 +2,7 @@
 /// What is studied: fuzzy inputs, what follows from them, and which model answers. Made from a file of inputs
 /// (inputs_file.h) or from a plan with fuzzy values.
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -18,11 +19,34 @@ struct Quantity {
   double unit_value = 1;  // of one unit, in what points hold
 };
 
+/// What a part of each trajectory means.
+struct Curve {
+  std::string name, unit;
+  double unit_value = 1;
+  std::string over, over_unit;  // the grid's quantity
+  std::vector<double> at;       // grid, in `over_unit`; its size is that of the part
+  bool is_outline = false;      // how far a plan view extends from W's origin towards the direction `at` [deg]
+};
+
+/// The place seen from above, for pictures of what a plan's building leaves.
+struct Site {
+  struct Area {
+    std::string name;
+    std::vector<std::array<double, 2>> corners;  // counter-clockwise in W [m]
+    bool is_utility = false;
+  };
+  std::vector<std::array<double, 2>> footprint;  // of the building
+  std::vector<Area> neighbours;
+};
+
 struct Problem {
   std::string title;
   std::vector<Quantity> inputs;   // fuzzy; as many as space.inputs
   std::vector<Quantity> derived;  // follow from them
   uncertainty::Space space;
+  std::vector<Quantity> outputs;      // units of those that are known beforehand; others have none
+  std::vector<std::string> outcomes;  // that are known beforehand; empty: any
+  std::vector<Curve> curves;          // parts of trajectories, one behind the other; empty: one curve over 0, 1, 2, ...
   /// Values of `derived` for a point; may be empty. A value that is not finite makes a failed run.
   std::function<std::vector<double>(const Point&)> calc_derived;
   std::string kind = "evaluator";  // names the factory of the model
@@ -33,7 +57,16 @@ struct Problem {
   std::vector<double> levels;  // empty: the program's choice
   int limit = 0;               // runs at most; 0: the program's choice
   std::uint64_t seed = 1;
+  /// What boxes of inputs must keep, see permissible.h; empty: no boxes are looked for.
+  std::string permissible;
+  bool has_drivers = true;                // spend runs on them
+  std::string asked;                      // the outcome that is wanted; empty: none is named
+  Site site;                              // of a plan
+  std::vector<std::string> not_modelled;  // sentences
 };
+
+/// The output of that name, without a unit if it is not known beforehand.
+Quantity find_output(const Problem&, const std::string& name);
 
 /// Name of the model in a store.
 std::string calc_model_hash(const Problem&);

@@ -11,6 +11,7 @@
 #include "collapse/run.h"
 #include "product/plan_sampler.h"
 #include "small_fuzzy_plan.h"
+#include "study/plan_model.h"
 
 namespace topple::study {
 namespace {
@@ -47,7 +48,17 @@ TEST(PlanMapping, SaysWhatGoesInAndComesOut) {
   EXPECT_THAT(m.trajectory_times(), testing::ElementsAre(0, 0.1, 0.2, testing::DoubleEq(0.3), 0.4));
   const std::vector<Result> r = evaluate(m, {points[0]});
   EXPECT_EQ(r[0].values.size(), m.outputs().size());
-  EXPECT_EQ(r[0].trajectory.size(), 5u);
+  ASSERT_EQ(r[0].trajectory.size(), 5u + 24u);
+  // the outline towards -x and +x, and the reach beyond the footprint there
+  const std::vector<std::array<double, 2>> footprint = make_plan_problem(read_small(strengths), quick()).site.footprint;
+  const auto reach_of = [&](const char* name) {
+    for (size_t i = 0; i < m.outputs().size(); ++i)
+      if (m.outputs()[i].name == name) return r[0].values[i];
+    return -1.0;
+  };
+  EXPECT_GT(reach_of("reach_neg_x"), 0);
+  EXPECT_NEAR(r[0].trajectory[5 + 12] + footprint[0][0], reach_of("reach_neg_x"), 1e-6) << "poses are kept as floats";
+  EXPECT_NEAR(std::max(0.0, r[0].trajectory[5] - footprint[2][0]), reach_of("reach_pos_x"), 1e-6);
 }
 
 TEST(PlanMapping, GivesTheSameBitsInAnyBatchOnAnyThread) {
@@ -156,7 +167,7 @@ TEST(PlanMappingPhysics, StorehouseTopplesAtTheCoreAndFallsEarlyAtLeftValues) {
   const size_t tilt = 2;  // at 1.7 s
   EXPECT_EQ(m.outputs()[tilt].name, "tilt_1.7");
   EXPECT_GT(r[1].values[tilt], 10 * unit::deg) << "the block leans to the front and goes on";
-  EXPECT_EQ(r[1].trajectory.back(), r[1].values[tilt]);
+  EXPECT_EQ(r[1].trajectory[m.trajectory_times().size() - 1], r[1].values[tilt]);
 }
 
 }  // namespace
