@@ -166,6 +166,9 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   study->add_option("--alpha", y.alpha, "levels between commas, such as 0,0.25,0.5,0.75,1");
   study->add_option("--samples", y.samples, "runs at most")->check(CLI::Range(10, 100000000));
   study->add_option("--seed", y.seed, "of spread points and searches")->check(CLI::NonNegativeNumber);
+  study->add_option("--permissible", y.permissible,
+                    "look for boxes of inputs that keep this, such as \"topple, reach_pos_x <= 20\"");
+  study->add_flag("--no-drivers", y.no_drivers, "spend no runs on which input drives what");
   study->add_option("--timeout", y.timeout, "time for one answer, such as \"60 s\"; none if left out");
   study->add_flag("--one-shot", y.one_shot, "start the command for every point and close its input behind it");
   study->add_option("--store", y.store, "database on a server, postgresql://user@host/name; a file if left out");
@@ -175,7 +178,7 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   study->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
   add_worker_options(study);
   CLI::App* study_show = study->add_subcommand("show", "Show what a study has found so far.");
-  CLI::App* study_export = study->add_subcommand("export", "Write what a study has found so far as CSV and JSON.");
+  CLI::App* study_export = study->add_subcommand("export", "Write what a study has found so far: page, CSV and JSON.");
   for (CLI::App* verb : {study_show, study_export})
     verb->add_option("folder", a.input, "folder of the study")->required();
   study_show->add_flag("--json", a.json, "as a JSON object");

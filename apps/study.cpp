@@ -5,13 +5,19 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "commands.h"
+#include "record/page.h"
+#include "record/provenance.h"
 #include "results.h"
 #include "study/evaluator.h"
+#include "study/page.h"
 #include "study/results.h"
 #include "study_model.h"
+#include "study_text.h"
 #include "terminal.h"
 
 namespace topple::apps {
@@ -20,6 +26,10 @@ namespace {
 
 using study::StudyResult;
 using study::StudyState;
+
+constexpr const char* no_study_page =
+    "The page of studies is not built, so there is no study.html (run `npm ci && npm run build` in web/, then `topple "
+    "study export`).";
 
 std::string words_of_time(double seconds) {
   if (seconds < 100) return fmt::format("{:.0f} s", seconds);
@@ -43,38 +53,18 @@ std::string words_of(const StudyState& s) {
   return text;
 }
 
-void print_result(std::FILE* out, const study::Problem& p, const StudyResult& r) {
-  if (!p.title.empty()) std::fprintf(out, "%s\n", p.title.c_str());
-  std::fprintf(out, "%zu runs, %d failed; %s\n", r.alpha.archive.size(), r.alpha.failed,
-               r.is_finished ? uncertainty::to_text(r.ending).c_str() : "not finished, bounds so far");
-  for (std::size_t i = 0; i < r.alpha.outputs.size() && i < r.outputs.size(); ++i) {
-    std::fprintf(out, "\n%s\n  alpha         lower          upper\n", r.outputs[i].c_str());
-    for (const auto& l : r.alpha.outputs[i].levels)
-      std::fprintf(out, "  %-6.4g %13.7g%s %13.7g%s\n", l.alpha, l.lower.value, l.lower.converged ? " " : "*",
-                   l.upper.value, l.upper.converged ? " " : "*");
+/// Files of results and the page, into a folder; tells which. `source` is the file that was studied.
+void write_all(std::FILE* out, const std::string& folder, const study::Problem& p, const StudyResult& r,
+               const std::string& source, const std::string& source_name) {
+  for (const std::string& path : study::write_results(folder, p, r)) std::fprintf(out, "wrote %s\n", path.c_str());
+  const auto bundle = find_bundle("study.html");
+  if (!bundle) {
+    std::fprintf(stderr, "%s\n", no_study_page);
+    return;
   }
-  bool is_open = false;
-  for (const auto& o : r.alpha.outputs)
-    for (const auto& l : o.levels) is_open = is_open || !l.lower.converged || !l.upper.converged;
-  if (is_open && r.is_finished) std::fprintf(out, "  * no search has converged there\n");
-  if (r.alpha.classes.size() > 1 || (!r.outcomes.empty() && !r.outcomes[0].empty())) {
-    std::fprintf(out, "\nOutcomes                     possibility  necessity    runs\n");
-    for (const auto& c : r.alpha.classes) {
-      double possibility = c.possibility;
-      for (const auto& found : r.possibilities.classes)
-        if (found.outcome == c.outcome) possibility = std::max(possibility, found.possibility);
-      const double necessity = uncertainty::calc_necessity(r.possibilities, c.outcome);
-      const std::string name = study::name_of_outcome(r, c.outcome);
-      std::fprintf(out, "  %-26s %11.5f %10.5f %7d\n", name.empty() ? "(no name)" : name.c_str(), possibility,
-                   necessity, c.count);
-    }
-  }
-  constexpr std::size_t most_reasons = 5;
-  if (!r.failures.empty()) std::fprintf(out, "\nFailed runs\n");
-  for (std::size_t i = 0; i < std::min(most_reasons, r.failures.size()); ++i)
-    std::fprintf(out, "  %s\n", wrap(r.failures[i], find_width(out), 2).c_str());
-  if (r.failures.size() > most_reasons)
-    std::fprintf(out, "  and %zu other reasons\n", r.failures.size() - most_reasons);
+  const std::string path = (std::filesystem::path(folder) / "study.html").string();
+  record::write_page(study::to_page_json(p, r, {TOPPLE_VERSION, record::now_utc(), source, source_name}), *bundle, path);
+  std::fprintf(out, "wrote %s\n", path.c_str());
 }
 
 /// Complaints, with the line of a file or of an answer that they point into.
@@ -120,12 +110,11 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
     return kRunFailed;
   }
   line.clear();
-  const std::vector<std::string> files = study::write_results(a.output, problem, r);
   if (a.json) std::fputs(study::write_results_json(problem, r).c_str(), stdout);
   std::FILE* out = a.json ? stderr : stdout;
-  print_result(out, problem, r);
+  print_study(out, problem, r);
   std::fprintf(out, "\n");
-  for (const std::string& path : files) std::fprintf(out, "wrote %s\n", path.c_str());
+  write_all(out, a.output, problem, r, text, a.input);
   if (!r.is_finished) {
     std::fprintf(stderr, "Interrupted. The same command goes on with the study.\n");
     return kRunFailed;
@@ -147,11 +136,12 @@ int run_study_command(const Arguments& a, const std::atomic<bool>& cancel) {
     if (a.study.action == StudyArguments::Action::Export) {
       const std::string folder = a.output.empty() ? a.input : a.output;
       make_folder(folder);
-      for (const std::string& path : study::write_results(folder, problem, r)) std::printf("wrote %s\n", path.c_str());
+      const nlohmann::json definition = nlohmann::json::parse(row->definition);
+      write_all(stdout, folder, problem, r, definition.value("text", ""), definition.value("file", ""));
     } else if (a.json) {
       std::fputs(study::write_results_json(problem, r).c_str(), stdout);
     } else {
-      print_result(stdout, problem, r);
+      print_study(stdout, problem, r);
       const study::Counts c = store.count(row->model);
       if (!r.is_finished) std::printf("\nwaiting %ld, running %ld\n", c.waiting, c.running);
     }

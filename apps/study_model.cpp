@@ -16,6 +16,7 @@
 #include "results.h"
 #include "study/evaluator.h"
 #include "study/inputs_file.h"
+#include "study/permissible.h"
 #include "study/plan_model.h"
 #include "terminal.h"
 
@@ -121,6 +122,9 @@ study::Problem read_problem(const Arguments& a, std::string& text) {
     p = study::read_inputs_text(text, a.input);
     study::set_evaluator(p, y.evaluator, read_seconds(y.timeout, "--timeout", 0), y.one_shot);
   }
+  p.permissible = y.permissible;
+  p.has_drivers = !y.no_drivers;
+  if (!p.permissible.empty()) (void)study::read_permissible(p.permissible, p);  // complain before anything is run
   if (!y.alpha.empty()) p.levels = read_levels(y.alpha);
   if (y.samples > 0) p.limit = y.samples;
   if (y.seed >= 0) p.seed = static_cast<std::uint64_t>(y.seed);
@@ -136,14 +140,7 @@ study::Problem read_problem(const study::StudyRow& row) {
       p = study::read_inputs_text(d.at("text"), d.at("file"));
     } else if (kind == "plan") {
       const json& identity = d.at("identity");
-      study::PlanMappingOptions options;
-      options.after = identity.at("after");
-      options.tilt_times = identity.at("tilt_times").get<std::vector<double>>();
-      options.tilt_interval = identity.at("tilt_interval");
-      options.frame_rate = identity.at("frame_rate");
-      std::vector<Diagnostic> warnings;
-      p = study::make_plan_problem(product::read_plan(d.at("text"), d.at("file"), warnings), options,
-                                   identity.at("rules"));
+      p = study::read_plan_problem(json{{"identity", identity}, {"settings", {{"path", d.at("file")}}}}.dump());
     } else {
       throw InputError("E820", fmt::format("this topple knows no studies of the kind {}", kind));
     }
@@ -153,6 +150,8 @@ study::Problem read_problem(const study::StudyRow& row) {
     p.levels = d.at("levels").get<std::vector<double>>();
     p.limit = d.at("limit");
     p.seed = d.at("seed");
+    p.permissible = d.value("permissible", "");
+    p.has_drivers = d.value("drivers", true);
     return p;
   } catch (const json::exception& e) {
     throw InputError("E820", fmt::format("the study \"{}\" cannot be understood: {}", row.name, e.what()));

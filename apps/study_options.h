@@ -11,6 +11,8 @@ struct StudyArguments {
   std::string evaluator;             // command, empty: the file is a plan
   std::string alpha;                 // levels between commas, empty: the file's
   std::string store;                 // server, empty: a file in the folder
+  std::string permissible;           // what boxes of inputs must keep, empty: none are looked for
+  bool no_drivers = false;           // no runs for them
   std::string name;                  // of the study in a server, empty: that of the folder
   int samples = 0;                   // at most, 0: the file's
   long long seed = -1;               // -1: the file's

@@ -91,7 +91,9 @@ std::string make_study_definition(const Problem& p, const StudyOptions& options)
               {"settings", json::parse(p.settings)},
               {"levels", make_alpha_options(p).levels},
               {"limit", make_alpha_options(p).limit},
-              {"seed", p.seed}}
+              {"seed", p.seed},
+              {"permissible", p.permissible},
+              {"drivers", p.has_drivers}}
       .dump();
 }
 
@@ -115,6 +117,21 @@ std::vector<uncertainty::Possibility> list_possibilities(const uncertainty::Alph
     list.push_back(p);
   }
   return list;
+}
+
+/// Runs behind the search of possibilities may have found more.
+void raise_possibilities(StudyResult& r) {
+  for (const uncertainty::Possibility& seen : list_possibilities(r.alpha)) {
+    auto& known = r.possibilities.classes;
+    const auto found =
+        std::find_if(known.begin(), known.end(), [&](const auto& c) { return c.outcome == seen.outcome; });
+    if (found == known.end())
+      known.push_back(seen);
+    else if (seen.possibility > found->possibility)
+      *found = seen;
+  }
+  std::stable_sort(r.possibilities.classes.begin(), r.possibilities.classes.end(),
+                   [](const auto& a, const auto& b) { return a.outcome < b.outcome; });
 }
 
 /// All bounds in a fixed order: of all runs, then of each class.
@@ -204,18 +221,31 @@ class Manager {
     };
     Progress quiet;
     quiet.cancel = progress_.cancel;
-    // a tenth of the runs is kept for the boundaries of outcomes
-    uncertainty::Asker asker([this](auto batch, auto out) { evaluate(batch, out); }, quiet, nullptr,
-                             limit_ - limit_ / 10);
+    const Budget budget = calc_budget(problem_, limit_);
+    uncertainty::Asker asker([this](auto batch, auto out) { evaluate(batch, out); }, quiet, nullptr, budget.bounds);
     StudyResult r;
+    ask_for_drivers(problem_, budget, asker);
     r.alpha = uncertainty::optimise(problem_.space, asker, options);
     r.ending = r.alpha.ending;
+    bool has_more = false;
     if (!asker.is_cancelled() && r.alpha.classes.size() > 1) {
-      asker.set_limit(limit_);
+      asker.set_limit(budget.possibilities);
       uncertainty::PossibilityOptions p;
       p.seed = problem_.seed;
       r.possibilities = uncertainty::find_possibilities(problem_.space, asker, p);
       if (r.ending == uncertainty::Ending::Complete) r.ending = r.possibilities.ending;
+      if (!asker.is_cancelled() && budget.knowing > 0) {
+        asker.set_limit(budget.outcomes);
+        r.insights.knowing = uncertainty::find_outcomes_of_knowing(problem_.space, asker, p, budget.knowing);
+      }
+      has_more = true;
+    }
+    if (!asker.is_cancelled() && !problem_.permissible.empty()) {
+      asker.set_limit(budget.limit);
+      find_boxes(r.insights, problem_, budget, asker, options.levels, names_.outputs, names_.outcomes);
+      has_more = true;
+    }
+    if (has_more) {
       // further runs may have moved bounds
       std::vector<int> space_points;
       for (const auto& c : r.alpha.coverage) space_points.push_back(c.space_points);
@@ -223,7 +253,10 @@ class Manager {
       uncertainty::AlphaResult again = uncertainty::read_archive(problem_.space, asker.archive(), levels, space_points);
       keep_marks(r.alpha, again);
       r.alpha = std::move(again);
+      raise_possibilities(r);
     }
+    read_drivers(r.insights, problem_, budget, asker.archive());
+    r.spread = find_spread_samples(problem_, budget, asker.archive());
     r.alpha.archive = asker.archive();
     r.alpha.ending = r.ending;
     if (r.possibilities.classes.empty()) r.possibilities.classes = list_possibilities(r.alpha);
@@ -240,7 +273,8 @@ class Manager {
                           {"outputs", r.outputs},
                           {"outcomes", r.outcomes},
                           {"order", order},
-                          {"marks", make_marks(r)}}
+                          {"marks", make_marks(r)},
+                          {"insights", to_json(r.insights)}}
                          .dump();
       store_.put_study(row_);
     }
@@ -410,6 +444,10 @@ StudyResult read_study(const Problem& problem, Store& store, const StudyRow& row
         p.above = m.at("above");
         p.converged = m.at("converged");
       }
+  const Budget budget = calc_budget(problem, make_alpha_options(problem).limit);
+  if (summary.contains("insights")) read_json(r.insights, summary["insights"]);
+  read_drivers(r.insights, problem, budget, archive);
+  r.spread = find_spread_samples(problem, budget, archive);
   if (r.is_finished) r.ending = uncertainty::Ending::Complete;
   if (summary.value("ending", "") == uncertainty::to_text(uncertainty::Ending::LimitReached))
     r.ending = uncertainty::Ending::LimitReached;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/progress.h"
+#include "study/insights.h"
 #include "study/pool.h"
 #include "study/problem.h"
 #include "uncertainty/alpha.h"
@@ -40,6 +41,8 @@ struct StudyResult {
   uncertainty::AlphaResult alpha;     // with all samples
   uncertainty::PossibilityResult possibilities;
   uncertainty::Ending ending = uncertainty::Ending::Cancelled;
+  std::vector<int> spread;  // samples that lie over the support irrespective of results
+  Insights insights;
   std::vector<std::string> failures;  // why runs failed, each reason once, most frequent first
   bool is_finished = false;
 };

@@ -5,10 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/file.h"
+#include "study/fans.h"
+#include "study/permissible.h"
+#include "study/story.h"
 #include "uncertainty/measures.h"
 
 namespace topple::study {
@@ -29,21 +33,145 @@ std::string cell(const std::string& text) {
 
 double necessity_of(const StudyResult& r, int outcome) { return uncertainty::calc_necessity(r.possibilities, outcome); }
 
-double possibility_of(const StudyResult& r, const uncertainty::ClassBounds& c) {
-  for (const auto& p : r.possibilities.classes)
-    if (p.outcome == c.outcome) return std::max(p.possibility, c.possibility);
-  return c.possibility;
-}
-
-json bounds_json(const uncertainty::OutputBounds& bounds) {
+json bounds_json(const uncertainty::OutputBounds& bounds, double unit) {
   json levels = json::array();
   for (const auto& l : bounds.levels)
     levels.push_back({{"alpha", l.alpha},
-                      {"lower", l.lower.value},
-                      {"upper", l.upper.value},
+                      {"lower", l.lower.value / unit},
+                      {"upper", l.upper.value / unit},
                       {"samples", {l.lower.sample, l.upper.sample}},
                       {"converged", {l.lower.converged, l.upper.converged}}});
   return levels;
+}
+
+/// JSON has no NaN and no infinity.
+json number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
+
+double unit_of(const Problem& p, const std::string& output) { return find_output(p, output).unit_value; }
+
+std::string title_of(const Quantity& q) { return q.unit.empty() ? q.name : q.name + " [" + q.unit + "]"; }
+
+json outputs_json(const Problem& p, const std::vector<std::string>& names,
+                  const std::vector<uncertainty::OutputBounds>& bounds) {
+  json list = json::array();
+  for (std::size_t i = 0; i < bounds.size() && i < names.size(); ++i)
+    list.push_back({{"name", names[i]},
+                    {"unit", find_output(p, names[i]).unit},
+                    {"levels", bounds_json(bounds[i], unit_of(p, names[i]))}});
+  return list;
+}
+
+json driver_json(const uncertainty::Driver& d, const uncertainty::Rank& rank) {
+  return {{"first", number(d.first)},
+          {"first_error", number(d.first_error)},
+          {"total", number(d.total)},
+          {"total_error", number(d.total_error)},
+          {"places", {rank.best, rank.worst}}};
+}
+
+json drivers_json(const std::vector<uncertainty::Driver>& drivers) {
+  json list = json::array();
+  const std::vector<uncertainty::Rank> ranks = uncertainty::calc_ranks(drivers);
+  for (std::size_t i = 0; i < drivers.size(); ++i) list.push_back(driver_json(drivers[i], ranks[i]));
+  return list;
+}
+
+json insights_json(const Problem& p, const StudyResult& r) {
+  json out = json::object();
+  const Insights& in = r.insights;
+  json& drivers = out["drivers"];
+  drivers["from"] = in.source == Insights::Source::Design   ? "rows of Sobol's design"
+                    : in.source == Insights::Source::Spread ? "spread runs"
+                                                            : "nothing";
+  drivers["runs"] = in.source == Insights::Source::Design ? in.drivers.rows * (static_cast<int>(p.inputs.size()) + 2)
+                                                          : in.drivers.rows;
+  drivers["outputs"] = json::array();
+  drivers["outcomes"] = json::array();
+  if (in.source != Insights::Source::None) {
+    for (std::size_t o = 0; o < in.drivers.outputs.size() && o < r.outputs.size(); ++o)
+      drivers["outputs"].push_back({{"name", r.outputs[o]}, {"inputs", drivers_json(in.drivers.outputs[o])}});
+    for (const auto& c : in.drivers.outcomes)
+      drivers["outcomes"].push_back(
+          {{"name", name_of_outcome(r, c.outcome)}, {"share", c.share}, {"inputs", drivers_json(c.inputs)}});
+  }
+  out["known"] = json::array();
+  for (const uncertainty::Fixed& f : in.knowing) {
+    json classes = json::array();
+    for (const auto& c : r.alpha.classes) {
+      double degree = 0;
+      for (const auto& k : f.classes)
+        if (k.outcome == c.outcome) degree = k.possibility;
+      classes.push_back({{"name", name_of_outcome(r, c.outcome)}, {"possibility", degree}});
+    }
+    out["known"].push_back({{"input", p.inputs.at(static_cast<std::size_t>(f.input)).name}, {"outcomes", classes}});
+  }
+  out["boxes"] = nullptr;
+  if (!in.has_boxes) return out;
+  const uncertainty::DesignResult& d = in.boxes;
+  json& boxes = out["boxes"];
+  boxes = {{"requirement", p.permissible},
+           {"permissible_part", d.fraction},
+           {"permissible_part_error", d.fraction_error},
+           {"permissible_runs", d.permissible},
+           {"forbidden_runs", d.forbidden},
+           {"failed_runs", d.failed},
+           {"ending", uncertainty::to_text(d.ending)},
+           {"list", json::array()}};
+  for (const uncertainty::PermissibleBox& b : d.boxes) {
+    json inputs = json::array();
+    for (std::size_t i = 0; i < p.inputs.size(); ++i) {
+      const double unit = p.inputs[i].unit_value;
+      json one{{"name", p.inputs[i].name}, {"lower", b.box.lower[i] / unit}, {"upper", b.box.upper[i] / unit}};
+      one["core"] = b.centre >= 0 && static_cast<std::size_t>(b.centre) < r.alpha.archive.size()
+                        ? number(r.alpha.archive[b.centre].x[i] / unit)
+                        : json(nullptr);
+      inputs.push_back(one);
+    }
+    boxes["list"].push_back({{"kept", b.kept},
+                             {"guarantee", tell_guarantee(b)},
+                             {"inputs", inputs},
+                             {"volume", b.volume},
+                             {"runs", b.samples},
+                             {"fresh", b.fresh},
+                             {"tries", b.tries},
+                             {"violating", b.fresh > 0 ? json(b.violating) : json(nullptr)},
+                             {"distance", b.distance},
+                             {"robustness", number(b.robustness)},
+                             {"outputs", outputs_json(p, r.outputs, b.outputs)}});
+  }
+  return out;
+}
+
+json fans_json(const Problem& p, const StudyResult& r) {
+  json out{{"curves", json::array()}, {"fans", json::array()}, {"debris", json::array()}};
+  const std::vector<Curve> curves = list_curves(p, r.alpha.archive);
+  for (const Curve& c : curves)
+    out["curves"].push_back({{"name", c.name},
+                             {"unit", c.unit},
+                             {"over", c.over},
+                             {"over_unit", c.over_unit},
+                             {"at", c.at},
+                             {"is_outline", c.is_outline}});
+  for (const CurveFan& f : calc_fans(p, r)) {
+    const Curve& c = curves[static_cast<std::size_t>(f.curve)];
+    const std::string outcome = f.outcome == uncertainty::all_outcomes ? "" : name_of_outcome(r, f.outcome);
+    const bool is_all = f.outcome == uncertainty::all_outcomes;
+    json levels = json::array();
+    if (c.is_outline) {
+      for (const DebrisLevel& d : calc_debris(c, f))
+        levels.push_back({{"alpha", d.alpha}, {"runs", d.runs}, {"corners", d.corners}});
+      out["debris"].push_back({{"is_all", is_all}, {"outcome", outcome}, {"levels", levels}});
+      continue;
+    }
+    for (const auto& l : f.levels) {
+      json lower = json::array(), upper = json::array();
+      for (const double v : l.lower) lower.push_back(number(v / c.unit_value));
+      for (const double v : l.upper) upper.push_back(number(v / c.unit_value));
+      levels.push_back({{"alpha", l.alpha}, {"runs", l.curves}, {"lower", lower}, {"upper", upper}});
+    }
+    out["fans"].push_back({{"curve", c.name}, {"is_all", is_all}, {"outcome", outcome}, {"levels", levels}});
+  }
+  return out;
 }
 
 json quantities_json(const std::vector<Quantity>& list) {
@@ -60,11 +188,36 @@ std::string name_of_outcome(const StudyResult& r, int outcome) {
   return i < r.outcomes.size() ? r.outcomes[i] : fmt::format("{}", outcome);
 }
 
-std::string write_results_json(const Problem& p, const StudyResult& r) {
+double possibility_of(const StudyResult& r, const uncertainty::ClassBounds& c) {
+  for (const auto& p : r.possibilities.classes)
+    if (p.outcome == c.outcome) return std::max(p.possibility, c.possibility);
+  return c.possibility;
+}
+
+double calc_robustness_of(const Problem& p, const StudyResult& r, std::size_t output) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  std::vector<double> entropies;
+  for (const auto& f : p.space.inputs) {
+    if (!(f.width() > 0)) continue;
+    if (f.centre() == 0) return nan;
+    entropies.push_back(uncertainty::calc_entropy(f, std::abs(f.centre())));
+  }
+  try {
+    const uncertainty::FuzzyNumber y = uncertainty::make_number(r.alpha.outputs.at(output));
+    const double result = y.centre() == 0 ? nan : uncertainty::calc_entropy(y, std::abs(y.centre()));
+    return std::isfinite(result) ? uncertainty::calc_robustness(entropies, result) : nan;
+  } catch (const InputError&) { return nan; }
+}
+
+json make_results_json(const Problem& p, const StudyResult& r) {
   json out;
   out["title"] = p.title;
   out["state"] = r.is_finished ? "finished" : "open";
   out["ending"] = uncertainty::to_text(r.ending);
+  out["asked"] = p.asked;
+  out["verdict"] = json::array();
+  for (const Sentence& v : tell(p, r))
+    out["verdict"].push_back({{"id", v.id}, {"status", name_of(v.status)}, {"text", v.text}});
   out["runs"] = r.alpha.archive.size();
   out["failed"] = r.alpha.failed;
   out["seed"] = p.seed;
@@ -78,11 +231,16 @@ std::string write_results_json(const Problem& p, const StudyResult& r) {
   out["derived"] = quantities_json(p.derived);
   out["outputs"] = json::array();
   for (std::size_t i = 0; i < r.alpha.outputs.size() && i < r.outputs.size(); ++i) {
-    json o{{"name", r.outputs[i]}, {"levels", bounds_json(r.alpha.outputs[i])}};
+    const Quantity q = find_output(p, r.outputs[i]);
+    json o{{"name", q.name}, {"unit", q.unit}, {"levels", bounds_json(r.alpha.outputs[i], q.unit_value)}};
     try {
-      const uncertainty::FuzzyNumber number = uncertainty::make_number(r.alpha.outputs[i]);
-      o["centroid"] = uncertainty::calc_centroid(number);
-      o["entropy"] = uncertainty::calc_entropy(number);
+      const uncertainty::FuzzyNumber y = uncertainty::make_number(r.alpha.outputs[i]);
+      o["centroid"] = uncertainty::calc_centroid(y) / q.unit_value;
+      o["mean_of_midpoints"] = uncertainty::calc_mean_of_midpoints(y) / q.unit_value;
+      o["jain"] = uncertainty::calc_jain(y) / q.unit_value;
+      o["chen"] = uncertainty::calc_chen(y) / q.unit_value;
+      o["entropy"] = uncertainty::calc_entropy(y) / q.unit_value;
+      o["robustness"] = number(calc_robustness_of(p, r, i));
     } catch (const InputError&) {
       o["centroid"] = nullptr;  // a level without a value
     }
@@ -102,25 +260,32 @@ std::string write_results_json(const Problem& p, const StudyResult& r) {
         o["converged"] = found.converged;
         o["runs_above"] = found.above;
       }
-    o["outputs"] = json::array();
-    for (std::size_t i = 0; i < c.outputs.size() && i < r.outputs.size(); ++i)
-      o["outputs"].push_back({{"name", r.outputs[i]}, {"levels", bounds_json(c.outputs[i])}});
+    o["outputs"] = outputs_json(p, r.outputs, c.outputs);
     out["outcomes"].push_back(o);
   }
   out["coverage"] = json::array();
   for (const auto& c : r.alpha.coverage)
     out["coverage"].push_back({{"alpha", c.alpha}, {"samples", c.samples}, {"spread", c.space_points}});
   out["failures"] = r.failures;
-  return out.dump(1, ' ', false, json::error_handler_t::replace) + "\n";
+  out["notable"] = json::array();
+  for (const NotableRun& n : list_notable_runs(p, r)) out["notable"].push_back({{"sample", n.sample}, {"why", n.why}});
+  out.update(insights_json(p, r));
+  out.update(fans_json(p, r));
+  return out;
 }
 
-std::string write_membership_csv(const StudyResult& r) {
+std::string write_results_json(const Problem& p, const StudyResult& r) {
+  return make_results_json(p, r).dump(1, ' ', false, json::error_handler_t::replace) + "\n";
+}
+
+std::string write_membership_csv(const Problem& p, const StudyResult& r) {
   std::string text = "output,outcome,alpha,lower,upper,lower_converged,upper_converged\n";
   const auto add = [&](const std::vector<uncertainty::OutputBounds>& outputs, const std::string& outcome) {
     for (std::size_t i = 0; i < outputs.size() && i < r.outputs.size(); ++i)
       for (const auto& l : outputs[i].levels)
-        text += fmt::format("{},{},{},{},{},{:d},{:d}\n", cell(r.outputs[i]), cell(outcome), cell(l.alpha),
-                            cell(l.lower.value), cell(l.upper.value), l.lower.converged, l.upper.converged);
+        text += fmt::format("{},{},{},{},{},{:d},{:d}\n", cell(title_of(find_output(p, r.outputs[i]))), cell(outcome),
+                            cell(l.alpha), cell(l.lower.value / unit_of(p, r.outputs[i])),
+                            cell(l.upper.value / unit_of(p, r.outputs[i])), l.lower.converged, l.upper.converged);
   };
   add(r.alpha.outputs, "");
   if (r.alpha.classes.size() > 1)
@@ -139,9 +304,9 @@ std::string write_outcomes_csv(const StudyResult& r) {
 std::string write_samples_csv(const Problem& p, const StudyResult& r) {
   std::string text = "sample";
   for (const auto* list : {&p.inputs, &p.derived})
-    for (const Quantity& q : *list) text += "," + cell(q.unit.empty() ? q.name : q.name + " [" + q.unit + "]");
+    for (const Quantity& q : *list) text += "," + cell(title_of(q));
   text += ",membership,outcome";
-  for (const std::string& name : r.outputs) text += "," + cell(name);
+  for (const std::string& name : r.outputs) text += "," + cell(title_of(find_output(p, name)));
   text += ",failure\n";
   for (std::size_t i = 0; i < r.alpha.archive.size(); ++i) {
     const uncertainty::Sample& s = r.alpha.archive.samples()[i];
@@ -154,7 +319,7 @@ std::string write_samples_csv(const Problem& p, const StudyResult& r) {
     text += "," + cell(uncertainty::calc_membership(p.space, s.x)) + "," +
             cell(name_of_outcome(r, uncertainty::outcome_of(s.result)));
     for (std::size_t k = 0; k < r.outputs.size(); ++k)
-      text += "," + (k < s.result.values.size() ? cell(s.result.values[k]) : std::string());
+      text += "," + (k < s.result.values.size() ? cell(s.result.values[k] / unit_of(p, r.outputs[k])) : std::string());
     text += "," + cell(s.result.text) + "\n";
   }
   return text;
@@ -172,6 +337,90 @@ std::string write_trajectories_csv(const StudyResult& r) {
   return text;
 }
 
+std::string write_drivers_csv(const Problem& p, const StudyResult& r) {
+  const Insights& in = r.insights;
+  if (in.source == Insights::Source::None && in.knowing.empty()) return {};
+  std::string text =
+      "kind,name,input,first,first_error,total,total_error,best_place,worst_place,possibility,possibility_known\n";
+  const auto add = [&](const char* kind, const std::string& name, const std::vector<uncertainty::Driver>& drivers,
+                       const uncertainty::ClassBounds* c) {
+    const std::vector<uncertainty::Rank> ranks = uncertainty::calc_ranks(drivers);
+    for (std::size_t i = 0; i < p.inputs.size(); ++i) {
+      text += fmt::format("{},{},{}", kind, cell(name), cell(p.inputs[i].name));
+      if (i < drivers.size())
+        text += fmt::format(",{},{},{},{},{},{}", cell(drivers[i].first), cell(drivers[i].first_error),
+                            cell(drivers[i].total), cell(drivers[i].total_error), ranks[i].best, ranks[i].worst);
+      else
+        text += ",,,,,,";
+      text += c ? "," + cell(possibility_of(r, *c)) : ",";
+      std::string known;
+      for (const uncertainty::Fixed& f : in.knowing)
+        if (c && f.input == static_cast<int>(i)) {
+          known = "0";
+          for (const auto& k : f.classes)
+            if (k.outcome == c->outcome) known = cell(k.possibility);
+        }
+      text += "," + known + "\n";
+    }
+  };
+  if (in.source != Insights::Source::None)
+    for (std::size_t o = 0; o < in.drivers.outputs.size() && o < r.outputs.size(); ++o)
+      add("output", r.outputs[o], in.drivers.outputs[o], nullptr);
+  for (const auto& c : r.alpha.classes) {
+    std::vector<uncertainty::Driver> drivers;
+    for (const auto& d : in.drivers.outcomes)
+      if (d.outcome == c.outcome) drivers = d.inputs;
+    add("outcome", name_of_outcome(r, c.outcome), drivers, &c);
+  }
+  return text;
+}
+
+std::string write_boxes_csv(const Problem& p, const StudyResult& r) {
+  if (!r.insights.has_boxes) return {};
+  std::string text = "box,kept,input,lower,core,upper,volume,runs,fresh,tries,violating,distance,robustness\n";
+  for (std::size_t k = 0; k < r.insights.boxes.boxes.size(); ++k) {
+    const uncertainty::PermissibleBox& b = r.insights.boxes.boxes[k];
+    for (std::size_t i = 0; i < p.inputs.size(); ++i) {
+      const double unit = p.inputs[i].unit_value;
+      const bool has_core = b.centre >= 0 && static_cast<std::size_t>(b.centre) < r.alpha.archive.size();
+      text += fmt::format("{},{:d},{},{},{},{},{},{},{},{},{},{},{}\n", k + 1, b.kept, cell(title_of(p.inputs[i])),
+                          cell(b.box.lower[i] / unit), has_core ? cell(r.alpha.archive[b.centre].x[i] / unit) : "",
+                          cell(b.box.upper[i] / unit), cell(b.volume), b.samples, b.fresh, b.tries,
+                          b.fresh > 0 ? cell(b.violating) : "", cell(b.distance), cell(b.robustness));
+    }
+  }
+  return text;
+}
+
+std::string write_fans_csv(const Problem& p, const StudyResult& r) {
+  const std::vector<Curve> curves = list_curves(p, r.alpha.archive);
+  std::string text;
+  for (const CurveFan& f : calc_fans(p, r)) {
+    const Curve& c = curves[static_cast<std::size_t>(f.curve)];
+    const std::string name = title_of({c.name, c.unit, 1});
+    const std::string outcome = f.outcome == uncertainty::all_outcomes ? "" : name_of_outcome(r, f.outcome);
+    for (const auto& l : f.levels)
+      for (std::size_t t = 0; t < l.lower.size() && t < c.at.size(); ++t)
+        text += fmt::format("{},{},{},{},{},{}\n", cell(name), cell(outcome), cell(l.alpha), cell(c.at[t]),
+                            cell(l.lower[t] / c.unit_value), cell(l.upper[t] / c.unit_value));
+  }
+  return text.empty() ? text : "curve,outcome,alpha,at,lower,upper\n" + text;
+}
+
+std::string write_debris_csv(const Problem& p, const StudyResult& r) {
+  const std::vector<Curve> curves = list_curves(p, r.alpha.archive);
+  std::string text;
+  for (const CurveFan& f : calc_fans(p, r)) {
+    const Curve& c = curves[static_cast<std::size_t>(f.curve)];
+    if (!c.is_outline) continue;
+    const std::string outcome = f.outcome == uncertainty::all_outcomes ? "" : name_of_outcome(r, f.outcome);
+    for (const DebrisLevel& d : calc_debris(c, f))
+      for (const auto& corner : d.corners)
+        text += fmt::format("{},{},{},{}\n", cell(outcome), cell(d.alpha), cell(corner[0]), cell(corner[1]));
+  }
+  return text.empty() ? text : "outcome,alpha,x [m],y [m]\n" + text;
+}
+
 std::vector<std::string> write_results(const std::string& folder, const Problem& p, const StudyResult& r) {
   std::vector<std::string> paths;
   const auto write = [&](const char* name, const std::string& text) {
@@ -180,10 +429,14 @@ std::vector<std::string> write_results(const std::string& folder, const Problem&
     replace_file(paths.back(), text);
   };
   write("results.json", write_results_json(p, r));
-  write("membership.csv", write_membership_csv(r));
+  write("membership.csv", write_membership_csv(p, r));
   write("outcomes.csv", write_outcomes_csv(r));
   write("samples.csv", write_samples_csv(p, r));
   write("trajectories.csv", write_trajectories_csv(r));
+  write("drivers.csv", write_drivers_csv(p, r));
+  write("boxes.csv", write_boxes_csv(p, r));
+  write("fans.csv", write_fans_csv(p, r));
+  write("debris.csv", write_debris_csv(p, r));
   return paths;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 /// What a study found, as files: JSON for programs, CSV for spreadsheets (docs/study.md).
 
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -13,16 +14,33 @@ inline constexpr const char* failed_name = "failed";
 /// Name of an outcome class of a result; failed runs are one.
 std::string name_of_outcome(const StudyResult&, int outcome);
 
-/// Everything but the samples, in the units of the file that was read.
+/// Everything but the samples, in the units of the file that was read; outputs in those of Problem::outputs.
+nlohmann::ordered_json make_results_json(const Problem&, const StudyResult&);
 std::string write_results_json(const Problem&, const StudyResult&);
 /// Bounds of all outputs: output, outcome (empty: any), alpha, lower, upper, and whether searches converged there.
-std::string write_membership_csv(const StudyResult&);
+std::string write_membership_csv(const Problem&, const StudyResult&);
 /// Outcome classes: runs, possibility, necessity.
 std::string write_outcomes_csv(const StudyResult&);
 /// All runs: inputs, what follows from them, membership, outcome, outputs, why it failed.
 std::string write_samples_csv(const Problem&, const StudyResult&);
 /// Curves of runs, one row each: sample and ordinates; empty if the model gives none.
 std::string write_trajectories_csv(const StudyResult&);
+
+/// Which input drives what: output or outcome, input, shares with their standard errors, places, and the outcome's
+/// possibility with the input known. Empty if nothing is known of drivers.
+std::string write_drivers_csv(const Problem&, const StudyResult&);
+/// Permissible boxes, a row per box and input; empty if none were looked for.
+std::string write_boxes_csv(const Problem&, const StudyResult&);
+/// Envelopes of curves: curve, outcome (empty: any), alpha, place, lower, upper; empty without trajectories.
+std::string write_fans_csv(const Problem&, const StudyResult&);
+/// Outline of debris: outcome, alpha, corners in W; empty without one.
+std::string write_debris_csv(const Problem&, const StudyResult&);
+
+/// The largest possibility that is known of a class.
+double possibility_of(const StudyResult&, const uncertainty::ClassBounds&);
+/// Entropies of all inputs over that of an output, each part of the size of its core value (theory, equation (12)); NaN
+/// where one of them is 0 or the output has a level without value.
+double calc_robustness_of(const Problem&, const StudyResult&, std::size_t output);
 
 /// Writes all of them into a folder; returns the paths.
 std::vector<std::string> write_results(const std::string& folder, const Problem&, const StudyResult&);

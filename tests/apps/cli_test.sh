@@ -52,7 +52,8 @@ TEXT
   expect 0 "$topple" study in.toml --evaluator "$model" -o s --samples 100 --alpha 0.5; has out "0.5"; has out "1.5"; has out stands
   for file in results.json membership.csv outcomes.csv samples.csv study.sqlite; do exists s/$file; done
   is_json s/results.json; has s/membership.csv "z,,0,1,4,"; has s/samples.csv "b [m]"
-  expect 0 "$topple" study show s; has out "Sum"; has out "z"
+  has out 'outcome is "stands"'; has out "Drivers"; exists s/drivers.csv
+  expect 0 "$topple" study show s; has out "Sum"; has out "z"; has out "Runs to look at"
   expect 0 "$topple" study show s --json; is_json out
   expect 0 "$topple" study export s -o tables; cmp s/samples.csv tables/samples.csv || failures=$((failures + 1))
   cmp s/results.json tables/results.json || failures=$((failures + 1))
@@ -68,6 +69,16 @@ TEXT
   expect 2 "$topple" worker nowhere; has err "there is no study"
   sed 's/\[1, 2, 4\]/[1, 5, 4]/' in.toml >bad.toml
   expect 2 "$topple" study bad.toml --evaluator "$model" -o a; has err "bad.toml:3"; has err "^"
+  expect 2 "$topple" study in.toml --evaluator "$model" -o a --permissible "z << 3"; has err "a number is wanted"
+  expect 0 "$topple" study in.toml --evaluator "$model" -o b --samples 300 --permissible "stands, z <= 3" --no-drivers
+  has out "Permissible values"; has out "z <= 3"; has out "fresh random points"; lacks out "Drivers"; exists b/boxes.csv
+  expect 2 "$topple" study in.toml --evaluator "$model" -o b --samples 300 --permissible "falls"; has err "no run had the outcome"
+  # the page, where it is built
+  if [ -e "$source/web/dist/study.html" ]; then
+    exists tables/study.html; has tables/study.html topple-study; has tables/study.html "Sum"
+  else
+    has err "is not built"
+  fi
   # all runs fail: told, not hidden
   expect 0 "$topple" study in.toml --evaluator "exit 3" -o f --samples 10; has out "exit code 3"; has out "failed"
   ;;

@@ -1,0 +1,166 @@
+#include "study_text.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "study/results.h"
+#include "study/story.h"
+#include "terminal.h"
+
+namespace topple::apps {
+
+namespace {
+
+using study::Problem;
+using study::StudyResult;
+
+constexpr std::size_t most_columns = 3;  // of levels on a line
+
+void print_heading(std::FILE* out, const char* text) { std::fprintf(out, "\n%s\n", text); }
+
+void print_line(std::FILE* out, const std::string& text) {
+  std::fprintf(out, "  %s\n", wrap(text, find_width(out), 2).c_str());
+}
+
+void print_outcomes(std::FILE* out, const StudyResult& r) {
+  if (r.alpha.classes.size() < 2 && (r.outcomes.empty() || r.outcomes[0].empty())) return;
+  std::fprintf(out, "\nOutcomes                     possibility  necessity    runs\n");
+  for (const auto& c : r.alpha.classes) {
+    const std::string name = study::name_of_outcome(r, c.outcome);
+    std::fprintf(out, "  %-26s %11.5f %10.5f %7d\n", name.empty() ? "(no name)" : name.c_str(),
+                 study::possibility_of(r, c), uncertainty::calc_necessity(r.possibilities, c.outcome), c.count);
+  }
+}
+
+/// Some levels of each output; files hold all of them.
+void print_outputs(std::FILE* out, const Problem& p, const StudyResult& r) {
+  if (r.alpha.outputs.empty() || r.outputs.empty()) return;
+  const auto& levels = r.alpha.outputs.front().levels;
+  std::vector<std::size_t> shown;
+  for (std::size_t k = 0; k < most_columns && k < levels.size(); ++k)
+    shown.push_back(levels.size() <= most_columns ? k : k * (levels.size() - 1) / (most_columns - 1));
+  std::size_t width = 6;
+  const auto title = [&](std::size_t o) {
+    const study::Quantity q = study::find_output(p, r.outputs[o]);
+    return q.unit.empty() ? q.name : q.name + " [" + q.unit + "]";
+  };
+  for (std::size_t o = 0; o < r.outputs.size(); ++o) width = std::max(width, title(o).size());
+  std::string head = fmt::format("{:<{}}", "Output", width + 2);
+  for (const std::size_t k : shown) head += fmt::format("  {:^23}", fmt::format("alpha = {:.4g}", levels[k].alpha));
+  std::fprintf(out, "\n%s\n", head.c_str());
+  bool has_open = false;
+  for (std::size_t o = 0; o < r.alpha.outputs.size() && o < r.outputs.size(); ++o) {
+    const double unit = study::find_output(p, r.outputs[o]).unit_value;
+    std::string line = fmt::format("  {:<{}}", title(o), width);
+    for (const std::size_t k : shown) {
+      const auto& l = r.alpha.outputs[o].levels[k];
+      const auto bound = [unit](const uncertainty::Bound& b) {
+        return fmt::format("{:.5g}{}", b.value / unit, b.converged ? "" : "*");
+      };
+      line += fmt::format("  {:>10} to {:<9}", bound(l.lower), bound(l.upper));
+    }
+    for (const auto& l : r.alpha.outputs[o].levels) has_open = has_open || !l.lower.converged || !l.upper.converged;
+    std::fprintf(out, "%s\n", line.substr(0, line.find_last_not_of(' ') + 1).c_str());
+  }
+  if (has_open && r.is_finished) std::fprintf(out, "  * no search has converged there\n");
+}
+
+/// "fc 0.45 +- 0.08; not told apart from nothing: Ec, As".
+std::string words_of_drivers(const Problem& p, const std::vector<uncertainty::Driver>& drivers) {
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < drivers.size(); ++i)
+    if (p.space.inputs[i].width() > 0) order.push_back(i);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return drivers[a].first > drivers[b].first; });
+  std::string known, unknown;
+  for (const std::size_t i : order) {
+    const uncertainty::Driver& d = drivers[i];
+    if (study::is_share_known(d)) {
+      known +=
+          fmt::format("{}{} {:.2f} +- {:.2f}", known.empty() ? "" : ", ", p.inputs[i].name, d.first, d.first_error);
+      if (std::isfinite(d.total)) known += fmt::format(" (with others {:.2f})", d.total);
+    } else {
+      unknown += fmt::format("{}{}", unknown.empty() ? "" : ", ", p.inputs[i].name);
+    }
+  }
+  if (known.empty()) return "unknown: no share is larger than its error";
+  return unknown.empty() ? known : known + "; unknown: " + unknown;
+}
+
+void print_drivers(std::FILE* out, const Problem& p, const StudyResult& r) {
+  const study::Insights& in = r.insights;
+  if (in.source != study::Insights::Source::None) {
+    print_heading(out, "Drivers: part of the variance that an input explains alone, over the support");
+    for (const auto& c : in.drivers.outcomes)
+      if (in.drivers.outcomes.size() > 1)
+        print_line(out,
+                   fmt::format("outcome {}: {}", study::name_of_outcome(r, c.outcome), words_of_drivers(p, c.inputs)));
+    for (std::size_t o = 0; o < in.drivers.outputs.size() && o < r.outputs.size(); ++o)
+      print_line(out, fmt::format("{}: {}", r.outputs[o], words_of_drivers(p, in.drivers.outputs[o])));
+    print_line(out, in.source == study::Insights::Source::Design
+                        ? fmt::format("From {} rows of Sobol's design.", in.drivers.rows)
+                        : fmt::format("From {} spread runs.", in.drivers.rows));
+  }
+  if (in.knowing.empty()) return;
+  print_heading(out, "If an input were known to have its core value, possibilities would be (at least)");
+  for (const auto& f : in.knowing) {
+    std::string text = p.inputs[static_cast<std::size_t>(f.input)].name + ":";
+    for (const auto& c : r.alpha.classes) {
+      double degree = 0;
+      for (const auto& k : f.classes)
+        if (k.outcome == c.outcome) degree = k.possibility;
+      text += fmt::format(" {} {:.2f},", study::name_of_outcome(r, c.outcome), degree);
+    }
+    text.pop_back();
+    print_line(out, text);
+  }
+}
+
+void print_boxes(std::FILE* out, const Problem& p, const StudyResult& r) {
+  if (!r.insights.has_boxes) return;
+  const uncertainty::DesignResult& d = r.insights.boxes;
+  print_heading(out, "Permissible values");
+  print_line(out, fmt::format("asked: {}; kept by {:.1f} % of the support ({:.1f} % standard error)", p.permissible,
+                              100 * d.fraction, 100 * d.fraction_error));
+  if (d.boxes.empty()) print_line(out, "no box was found");
+  for (std::size_t k = 0; k < d.boxes.size(); ++k) {
+    const uncertainty::PermissibleBox& b = d.boxes[k];
+    std::string text = fmt::format("box {}, {:.2g} % of the support: ", k + 1, 100 * b.volume);
+    for (std::size_t i = 0; i < p.inputs.size(); ++i)
+      text += fmt::format("{}{} {:.4g} to {}", i ? ", " : "", p.inputs[i].name, b.box.lower[i] / p.inputs[i].unit_value,
+                          study::words_of_value(p.inputs[i], b.box.upper[i]));
+    print_line(out, text);
+    print_line(out, study::tell_guarantee(b));
+  }
+}
+
+}  // namespace
+
+void print_study(std::FILE* out, const Problem& p, const StudyResult& r) {
+  if (!p.title.empty()) std::fprintf(out, "%s\n", p.title.c_str());
+  std::fprintf(out, "%zu runs, %d failed; %s\n", r.alpha.archive.size(), r.alpha.failed,
+               r.is_finished ? uncertainty::to_text(r.ending).c_str() : "not finished, bounds so far");
+  const std::vector<study::Sentence> sentences = study::tell(p, r);
+  if (!sentences.empty()) std::fprintf(out, "\n");
+  for (const study::Sentence& s : sentences) print_line(out, s.text);
+  print_outcomes(out, r);
+  print_outputs(out, p, r);
+  print_drivers(out, p, r);
+  print_boxes(out, p, r);
+  const std::vector<study::NotableRun> notable = study::list_notable_runs(p, r);
+  if (!notable.empty()) print_heading(out, "Runs to look at (number in samples.csv)");
+  for (const study::NotableRun& n : notable)
+    print_line(out,
+               fmt::format("{:>5}  {}; {}", n.sample, n.why, study::words_of_point(p, r.alpha.archive[n.sample].x)));
+  constexpr std::size_t most_reasons = 5;
+  if (!r.failures.empty()) print_heading(out, "Failed runs");
+  for (std::size_t i = 0; i < std::min(most_reasons, r.failures.size()); ++i) print_line(out, r.failures[i]);
+  if (r.failures.size() > most_reasons)
+    std::fprintf(out, "  and %zu other reasons\n", r.failures.size() - most_reasons);
+}
+
+}  // namespace topple::apps

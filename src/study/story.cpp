@@ -1,0 +1,265 @@
+#include "study/story.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "study/results.h"
+#include "uncertainty/measures.h"
+
+namespace topple::study {
+namespace {
+
+using uncertainty::failed_outcome;
+using Status = Sentence::Status;
+
+/// What an outcome is in a sentence.
+std::string quoted(const std::string& name) { return name.empty() ? "the outcome without a name" : "\"" + name + "\""; }
+
+std::string percent(double part) { return fmt::format("{:.0f} %", 100 * part); }
+
+/// Class at the core; failed_outcome if that run failed, and nothing if it was not run.
+const uncertainty::Sample* find_core(const Problem& p, const uncertainty::Archive& archive) {
+  const int i = archive.find(uncertainty::calc_centre(p.space));
+  return i < 0 ? nullptr : &archive[i];
+}
+
+void tell_outcomes(const Problem& p, const StudyResult& r, std::vector<Sentence>& out) {
+  const uncertainty::Sample* core = find_core(p, r.alpha.archive);
+  std::vector<uncertainty::Possibility> classes = r.possibilities.classes;
+  std::stable_sort(classes.begin(), classes.end(),
+                   [](const auto& a, const auto& b) { return a.possibility > b.possibility; });
+  int named = 0;
+  for (const auto& c : classes) named += c.outcome != failed_outcome;
+  for (const auto& c : classes) {
+    if (c.outcome == failed_outcome) continue;
+    const std::string name = name_of_outcome(r, c.outcome);
+    const double necessity = uncertainty::calc_necessity(r.possibilities, c.outcome);
+    if (named == 1 && name.empty()) continue;  // the model tells no outcomes
+    Sentence s;
+    s.id = "outcome." + name;
+    s.text = fmt::format("{} is {}: possibility {}{:.2f}, necessity at most {:.2f}.", quoted(name),
+                         words_of_possibility(c.possibility), c.possibility >= 1 ? "" : "at least ", c.possibility,
+                         necessity);
+    if (c.sample >= 0 && core && uncertainty::outcome_of(core->result) != c.outcome)
+      s.text += fmt::format(" It takes no more than {}.", words_of_point(p, r.alpha.archive[c.sample].x));
+    if (!p.asked.empty())
+      s.status = name == p.asked ? Status::Good : c.possibility >= 0.5 ? Status::Bad : Status::Warning;
+    out.push_back(std::move(s));
+  }
+}
+
+void tell_splits(const Problem& p, const StudyResult& r, std::vector<Sentence>& out) {
+  const uncertainty::Sample* core = find_core(p, r.alpha.archive);
+  for (const Split& s : find_splits(p.space, r.alpha.archive, r.spread)) {
+    // the core's own class follows from the others
+    if (s.input < 0 || (core && uncertainty::outcome_of(core->result) == s.outcome)) continue;
+    const Quantity& q = p.inputs[static_cast<std::size_t>(s.input)];
+    const bool is_below = s.below > s.above;
+    const double more = std::max(s.below, s.above), less = std::min(s.below, s.above);
+    out.push_back({"split." + name_of_outcome(r, s.outcome),
+                   fmt::format("{} goes with {} {} {}: {} of the {} spread runs there, {} of the {} others.",
+                               quoted(name_of_outcome(r, s.outcome)), q.name, is_below ? "below" : "above",
+                               words_of_value(q, s.value), percent(more), is_below ? s.below_runs : s.above_runs,
+                               percent(less), is_below ? s.above_runs : s.below_runs),
+                   Status::Info});
+  }
+}
+
+}  // namespace
+
+std::string name_of(Status s) {
+  switch (s) {
+    case Status::Good:
+      return "good";
+    case Status::Warning:
+      return "warning";
+    case Status::Bad:
+      return "bad";
+    case Status::Info:
+      break;
+  }
+  return "info";
+}
+
+std::string tell_guarantee(const uncertainty::PermissibleBox& b) {
+  std::string text = fmt::format("No run violated the requirement in {} inside, {} of them at fresh random points",
+                                 b.samples, b.fresh);
+  if (b.fresh > 0)
+    text += fmt::format(": with a confidence of 95 % at most {:.1f} % of the box violates it", 100 * b.violating);
+  text += ". It is not proven, and smaller islands may exist.";
+  if (!b.kept)
+    text = b.samples == 0 || b.fresh == 0 ? "Not kept: there were too few runs to check it at fresh points."
+                                          : "Not kept: it is too small, or its check was not finished. " + text;
+  return text;
+}
+
+std::string words_of_possibility(double degree) {
+  if (degree >= 1) return "fully possible";
+  if (degree >= 0.75) return "very possible";
+  if (degree >= 0.5) return "well possible";
+  if (degree >= 0.25) return "possible";
+  if (degree > 0) return "hardly possible";
+  return "not found";
+}
+
+std::string words_of_value(const Quantity& q, double value) {
+  const std::string number = fmt::format("{:.4g}", value / q.unit_value);
+  return q.unit.empty() ? number : number + " " + q.unit;
+}
+
+std::string words_of_point(const Problem& p, const Point& x) {
+  std::string text;
+  for (std::size_t i = 0; i < p.inputs.size(); ++i) {
+    const uncertainty::FuzzyNumber& f = p.space.inputs[i];
+    const double away = std::max({x[i] - f.core().right, f.core().left - x[i], 0.0});
+    if (!(away > 0.01 * f.width())) continue;
+    text += fmt::format("{}{} {} (core {:.4g})", text.empty() ? "" : ", ", p.inputs[i].name,
+                        words_of_value(p.inputs[i], x[i]), f.centre() / p.inputs[i].unit_value);
+  }
+  return text.empty() ? "values within a hundredth of the core" : text;
+}
+
+std::vector<Split> find_splits(const uncertainty::Space& space, const uncertainty::Archive& archive,
+                               const std::vector<int>& spread) {
+  std::vector<Split> splits;
+  std::set<int> outcomes;
+  for (const int i : spread) outcomes.insert(uncertainty::outcome_of(archive[i].result));
+  if (outcomes.size() < 2) return splits;
+  const std::size_t count = spread.size(), least = std::max<std::size_t>(3, count / 10);
+  for (const int outcome : outcomes) {
+    Split best;
+    best.outcome = outcome;
+    for (int input = 0; input < space.size(); ++input) {
+      if (!(space.inputs[input].width() > 0)) continue;
+      std::vector<std::pair<double, bool>> runs;
+      for (const int i : spread)
+        runs.emplace_back(archive[i].x[static_cast<std::size_t>(input)],
+                          uncertainty::outcome_of(archive[i].result) == outcome);
+      std::stable_sort(runs.begin(), runs.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+      double all = 0, below = 0;
+      for (const auto& [x, is_in] : runs) all += is_in;
+      const double n = static_cast<double>(count), variance = all / n * (1 - all / n);
+      if (!(variance > 0)) continue;
+      for (std::size_t k = 1; k < count; ++k) {
+        below += runs[k - 1].second;
+        if (k < least || count - k < least || runs[k].first == runs[k - 1].first) continue;
+        const double low = static_cast<double>(k), high = n - low, a = below / low, b = (all - below) / high;
+        const double gain = low * high / (n * n) * (a - b) * (a - b) / variance;
+        if (gain > best.gain)
+          best = {outcome,
+                  input,
+                  0.5 * (runs[k - 1].first + runs[k].first),
+                  static_cast<int>(k),
+                  static_cast<int>(count - k),
+                  a,
+                  b,
+                  gain};
+      }
+    }
+    // a best of many thresholds explains a few percent by chance
+    constexpr double least_gain = 0.1;
+    if (best.gain < least_gain) best.input = -1;
+    splits.push_back(best);
+  }
+  return splits;
+}
+
+std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
+  std::vector<Sentence> out;
+  const auto add = [&out](std::string id, std::string text, Status status = Status::Info) {
+    out.push_back({std::move(id), std::move(text), status});
+  };
+  const std::size_t runs = r.alpha.archive.size();
+  if (runs == 0) {
+    add("verdict", "Nothing has been run so far.");
+    return out;
+  }
+  if (static_cast<std::size_t>(r.alpha.failed) == runs) {
+    add("verdict", fmt::format("All {} runs failed: nothing is known of this model.", runs), Status::Bad);
+    return out;
+  }
+  const uncertainty::Sample* core = find_core(p, r.alpha.archive);
+  const int at_core = core ? uncertainty::outcome_of(core->result) : failed_outcome;
+  int classes = 0;
+  for (const auto& c : r.alpha.classes) classes += c.outcome != failed_outcome;
+  const bool has_names = classes > 1 || (at_core != failed_outcome && !name_of_outcome(r, at_core).empty());
+  if (!core) {
+    add("verdict", "The core values have not been run yet.");
+  } else if (at_core == failed_outcome) {
+    add("verdict", "The run at the core values failed: " + core->result.text + ".", Status::Bad);
+  } else if (has_names) {
+    const std::string name = name_of_outcome(r, at_core);
+    double others = 0;
+    for (const auto& c : r.possibilities.classes)
+      if (c.outcome != at_core) others = std::max(others, c.possibility);
+    std::string text = fmt::format("With the core values the outcome is {}", quoted(name));
+    Status status = Status::Info;
+    if (!p.asked.empty()) {
+      text += name == p.asked ? ", as planned" : fmt::format(", not {} as planned", quoted(p.asked));
+      status = name == p.asked ? Status::Good : Status::Bad;
+    }
+    if (others > 0) {
+      text += fmt::format(
+          ". It is not certain: another outcome is {} (possibility at least {:.2f}), so its necessity "
+          "is at most {:.2f}.",
+          words_of_possibility(others), others, 1 - others);
+      if (status != Status::Bad) status = others >= 0.5 ? Status::Bad : Status::Warning;
+    } else {
+      const int of_search = r.alpha.coverage.empty() ? 0 : r.alpha.coverage.front().space_points;
+      const double spread = std::max({1, of_search, static_cast<int>(r.spread.size())});
+      text += fmt::format(
+          ". No other outcome was found in {} runs; an outcome that takes up {} of the inputs' support "
+          "would have been missed with a probability of 5 %.",
+          runs, percent(1 - std::pow(0.05, 1.0 / spread)));
+    }
+    add("verdict", std::move(text), status);
+  }
+  if (has_names && classes > 1) {
+    tell_outcomes(p, r, out);
+    tell_splits(p, r, out);
+  }
+  if (r.alpha.failed > 0) {
+    const auto found = std::find_if(r.possibilities.classes.begin(), r.possibilities.classes.end(),
+                                    [](const auto& c) { return c.outcome == failed_outcome; });
+    const double degree = found == r.possibilities.classes.end() ? 0 : found->possibility;
+    add("failed",
+        fmt::format(
+            "{} of {} runs failed; they are an outcome of their own, possible to at least {:.2f}. What would have "
+            "happened there is not known.",
+            r.alpha.failed, runs, degree),
+        Status::Warning);
+  }
+  if (!r.is_finished)
+    add("open", "The study is not finished: bounds and possibilities may still grow.", Status::Warning);
+  else if (r.ending == uncertainty::Ending::LimitReached)
+    add("limit",
+        "All runs that were allowed are used up before every search had converged: bounds may be wider and "
+        "possibilities "
+        "higher than shown.",
+        Status::Warning);
+  return out;
+}
+
+std::vector<NotableRun> list_notable_runs(const Problem& p, const StudyResult& r) {
+  std::vector<NotableRun> runs;
+  const uncertainty::Sample* core = find_core(p, r.alpha.archive);
+  for (const auto& c : r.possibilities.classes)
+    if (c.sample >= 0 && (!core || uncertainty::outcome_of(core->result) != c.outcome))
+      runs.push_back({c.sample, fmt::format("most possible run with the outcome {} ({:.2f})",
+                                            name_of_outcome(r, c.outcome), c.possibility)});
+  for (std::size_t o = 0; o < r.alpha.outputs.size() && o < r.outputs.size(); ++o) {
+    if (r.alpha.outputs[o].levels.empty()) continue;
+    const auto& support = r.alpha.outputs[o].levels.front();
+    const Quantity q = find_output(p, r.outputs[o]);
+    for (const auto& [bound, word] : {std::pair(&support.lower, "least"), std::pair(&support.upper, "largest")})
+      if (bound->sample >= 0)
+        runs.push_back({bound->sample, fmt::format("{} {}: {}", word, q.name, words_of_value(q, bound->value))});
+  }
+  return runs;
+}
+
+}  // namespace topple::study

@@ -1,0 +1,329 @@
+#include "study/insights.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "../uncertainty/reference_cases.h"
+#include "base/error.h"
+#include "server.h"
+#include "small_study.h"
+#include "study/fans.h"
+#include "study/page.h"
+#include "study/permissible.h"
+#include "study/results.h"
+#include "study/story.h"
+
+namespace topple::study {
+namespace {
+
+using json = nlohmann::json;
+using uncertainty::make_triangular;
+
+StudyResult run(const Problem& p, const Folder& folder, const char* name, const RunnerFactories& factories) {
+  StudyOptions o;
+  o.store = folder / name;
+  o.pool.jobs = 2;
+  o.pool.batch = 16;
+  return run_study(p, factories, o, {}, {});
+}
+
+RunnerFactories make_factories(const std::function<Answer(const Point&)>& model) {
+  return {{"small", [model](const std::string&) -> Runner {
+             return [model](auto points, const auto& give, const auto&) {
+               for (std::size_t i = 0; i < points.size(); ++i) give(i, model(points[i]));
+             };
+           }}};
+}
+
+Answer done(std::vector<std::pair<std::string, double>> outputs, const std::string& outcome,
+            std::vector<double> trajectory = {}) {
+  return {Answer::Kind::Done, std::move(outputs), outcome, std::move(trajectory), "", 0};
+}
+
+Problem make_problem(std::vector<uncertainty::FuzzyNumber> inputs, int limit) {
+  Problem p;
+  p.kind = "small";
+  for (std::size_t i = 0; i < inputs.size(); ++i) p.inputs.push_back({"x" + std::to_string(i + 1), "", 1});
+  p.space.inputs = std::move(inputs);
+  p.limit = limit;
+  return p;
+}
+
+/// The reference case "jump" without its failing corner.
+Answer calc_jump(const Point& x) {
+  const double R = x[0] * x[1] / 100;
+  return done({{"z", R - 8 - (R < 8 ? 10 : 0)}}, R < 8 ? "falls" : "stands", {0, R});
+}
+
+TEST(Budget, SharesRunsOutAndNeverPassesTheLimit) {
+  for (const int limit : {10, 100, 300, 3000, 10000})
+    for (const bool has_boxes : {false, true})
+      for (const bool has_drivers : {false, true}) {
+        Problem p = make_small_problem(limit);
+        p.permissible = has_boxes ? "stands" : "";
+        p.has_drivers = has_drivers;
+        const Budget b = calc_budget(p, limit);
+        EXPECT_LE(4 * b.rows + b.spread, b.bounds) << limit;
+        EXPECT_LE(b.bounds, b.possibilities);
+        EXPECT_EQ(b.possibilities + 2 * b.knowing, b.outcomes);
+        EXPECT_LE(b.outcomes, b.limit);
+        EXPECT_EQ(b.outcomes == b.limit, !has_boxes);
+        EXPECT_EQ(b.rows + b.spread + b.knowing > 0, has_drivers);
+        EXPECT_GT(b.bounds, limit / 4);
+      }
+}
+
+// Ishigami & Homma (1990), a = 7, b = 0.1: first shares 0.3139, 0.4424, 0 in closed form.
+TEST(InsightsReference, DriversOfIshigamiWithTheirErrors) {
+  const Folder folder;
+  Problem p = make_problem(uncertainty::cases::make_all()[2].inputs, 4000);
+  const RunnerFactories model = make_factories([](const Point& x) {
+    return done({{"y", std::sin(x[0]) + 7 * std::pow(std::sin(x[1]), 2) + 0.1 * std::pow(x[2], 4) * std::sin(x[0])}},
+                "");
+  });
+  const double want[] = {0.3139, 0.4424, 0};
+  for (const int limit : {4000, 400}) {
+    p.limit = limit;
+    const StudyResult r = run(p, folder, ("s" + std::to_string(limit)).c_str(), model);
+    EXPECT_EQ(r.insights.source, limit == 4000 ? Insights::Source::Design : Insights::Source::Spread);
+    ASSERT_EQ(r.insights.drivers.outputs.size(), 1u);
+    for (int i = 0; i < 3; ++i) {
+      const uncertainty::Driver& d = r.insights.drivers.outputs[0][i];
+      // three standard errors
+      EXPECT_NEAR(d.first, want[i], 3 * d.first_error) << limit << " input " << i;
+      EXPECT_LT(d.first_error, limit == 4000 ? 0.08 : 0.15);
+    }
+    EXPECT_FALSE(is_share_known(r.insights.drivers.outputs[0][2])) << "nothing is known of an input that does nothing";
+    EXPECT_EQ(std::isfinite(r.insights.drivers.outputs[0][0].total), limit == 4000);
+  }
+}
+
+// y = 3 a + b, uniform over equal supports: shares 0.9 and 0.1.
+TEST(InsightsPhysics, DriversOfASumHaveClosedForms) {
+  const Folder folder;
+  const Problem p = make_problem({make_triangular(0, 1, 2), make_triangular(0, 1, 2)}, 600);
+  const StudyResult r = run(p, folder, "s", make_factories([](const Point& x) {
+                              return done({{"y", 3 * x[0] + x[1]}}, x[0] > 1.5 ? "far" : "near");
+                            }));
+  const auto& d = r.insights.drivers.outputs.at(0);
+  EXPECT_NEAR(d[0].first, 0.9, 3 * d[0].first_error);
+  EXPECT_NEAR(d[1].first, 0.1, 3 * d[1].first_error);
+  const std::vector<uncertainty::Rank> ranks = uncertainty::calc_ranks(d);
+  EXPECT_EQ(ranks[0].best, 1);
+  EXPECT_EQ(ranks[0].worst, 1);
+  EXPECT_EQ(ranks[1].best, 2);
+  // "far" is possible to 0.5 unless a is known
+  ASSERT_EQ(r.insights.knowing.size(), 2u);
+  EXPECT_EQ(r.insights.knowing[0].classes.size(), 1u);
+  ASSERT_EQ(r.insights.knowing[1].classes.size(), 2u);
+  for (const uncertainty::Possibility& c : r.insights.knowing[1].classes)
+    EXPECT_NEAR(c.possibility, name_of_outcome(r, c.outcome) == "far" ? 0.5 : 1, 1e-3);
+  // the value that parts both outcomes
+  for (const Split& s : find_splits(p.space, r.alpha.archive, r.spread)) {
+    EXPECT_EQ(s.input, 0);
+    EXPECT_NEAR(s.value, 1.5, 2.0 / 50);  // gaps between spread values of one input
+    EXPECT_NEAR(s.gain, 1, 1e-12);
+  }
+}
+
+TEST(Ranks, LeavePlacesOpenWhereErrorsDo) {
+  const auto ranks = uncertainty::calc_ranks({{0.5, 0, 0.1, 0}, {0.4, 0, 0.1, 0}, {0.01, 0, 0.02, 0}});
+  EXPECT_EQ(ranks[0].best, 1);
+  EXPECT_EQ(ranks[0].worst, 2);
+  EXPECT_EQ(ranks[1].best, 1);
+  EXPECT_EQ(ranks[1].worst, 2);
+  EXPECT_EQ(ranks[2].best, 3);
+}
+
+TEST(Permissible, ReadsOutcomesAndLimits) {
+  Problem p = make_small_problem();
+  p.outputs = {{"tilt_1.7", "deg", 0.01}, {"reach", "m", 1}};
+  p.outcomes = {"topple", "wrong direction"};
+  const Permissible a = read_permissible(" topple , \"wrong direction\", reach<=20 m, tilt_1.7 > 3", p);
+  EXPECT_EQ(a.outcomes, (std::vector<std::string>{"topple", "wrong direction"}));
+  ASSERT_EQ(a.limits.size(), 2u);
+  EXPECT_TRUE(a.limits[0].is_most);
+  EXPECT_EQ(a.limits[0].value, 20);
+  EXPECT_FALSE(a.limits[1].is_most);
+  EXPECT_DOUBLE_EQ(a.limits[1].value, 0.03) << "in what results hold";
+  const auto g = make_requirement(a, {"reach", "tilt_1.7"}, {"stands", "topple"});
+  const auto margin = [&g](double reach, double tilt, int outcome) {
+    return g({uncertainty::Result::State::Done, {reach, tilt}, outcome, {}, ""});
+  };
+  EXPECT_DOUBLE_EQ(margin(15, 0.06, 1), 0.25);
+  EXPECT_LT(margin(21, 0.06, 1), 0);
+  EXPECT_LT(margin(15, 0.02, 1), 0);
+  EXPECT_EQ(margin(15, 0.06, 0), -1);
+}
+
+TEST(Permissible, ComplainsWithTheNamesThatAreThere) {
+  Problem p = make_small_problem();
+  p.outputs = {{"reach_pos_x", "m", 1}};
+  p.outcomes = {"topple", "vertical"};
+  const auto message_of = [&p](const std::string& text) -> std::string {
+    try {
+      (void)read_permissible(text, p);
+    } catch (const InputError& e) { return e.diagnostics().front().message + " | " + e.diagnostics().front().help; }
+    return "nothing";
+  };
+  EXPECT_NE(message_of("tople").find("did you mean \"topple\""), std::string::npos);
+  EXPECT_NE(message_of("reach_pos_y < 3").find("reach_pos_x"), std::string::npos);
+  EXPECT_NE(message_of("reach_pos_x < 3 km").find("shown in m"), std::string::npos);
+  EXPECT_NE(message_of("reach_pos_x < many").find("a number is wanted"), std::string::npos);
+  EXPECT_NE(message_of("topple,,").find("empty"), std::string::npos);
+  EXPECT_NE(message_of("\"topple").find("quote"), std::string::npos);
+  EXPECT_NE(message_of("< 3").find("output"), std::string::npos);
+  EXPECT_THROW(make_requirement(read_permissible("other", make_small_problem()), {"z"}, {"falls"}), InputError);
+}
+
+// Reference case "jump": permissible part of R >= 8 is .879201442, the largest box 1200.224726 of 35 x 54.4.
+TEST(InsightsReference, BoxOfTheJump) {
+  const Folder folder;
+  Problem p = make_problem(uncertainty::cases::make_jump_inputs(), 8000);
+  p.permissible = "stands";
+  const StudyResult r = run(p, folder, "s", make_factories(calc_jump));
+  ASSERT_TRUE(r.insights.has_boxes);
+  const uncertainty::DesignResult& d = r.insights.boxes;
+  EXPECT_NEAR(d.fraction, .879201442, 3 * d.fraction_error);
+  ASSERT_FALSE(d.boxes.empty());
+  const uncertainty::PermissibleBox& b = d.boxes.front();
+  ASSERT_TRUE(b.kept);
+  EXPECT_LE(b.volume, 1200.224726 / (35 * 54.4));
+  EXPECT_NEAR(b.volume, 1200.224726 / (35 * 54.4), 0.02) << "a margin of 0.5 % of each width on both axes";
+  EXPECT_GE(b.box.lower[0] * b.box.lower[1], 800);
+  EXPECT_EQ(b.fresh, 149);
+  EXPECT_NEAR(b.violating, 1 - std::pow(0.05 / b.tries, 1.0 / 149), 1e-12);
+  EXPECT_NE(tell_guarantee(b).find("not proven"), std::string::npos);
+}
+
+TEST(InsightsReplay, AreReadBackWithTheSameBits) {
+  const Folder folder;
+  Problem p = make_small_problem(2000);
+  p.permissible = "stands, root <= 5";
+  const StudyResult r = run(p, folder, "s", make_small_factories());
+  ASSERT_TRUE(r.insights.has_boxes);
+  Store store(folder / "s");
+  const StudyResult again = read_study(p, store, *store.find_study("main"));
+  EXPECT_EQ(write_results_json(p, again), write_results_json(p, r));
+  EXPECT_EQ(write_drivers_csv(p, again), write_drivers_csv(p, r));
+  EXPECT_EQ(write_boxes_csv(p, again), write_boxes_csv(p, r));
+  EXPECT_EQ(write_samples_csv(p, again), write_samples_csv(p, r));
+  EXPECT_EQ(to_page_json(p, again, {}), to_page_json(p, r, {}));
+}
+
+TEST(InsightsReplay, AreTheSameAfterAnInterruptionAmongTheBoxes) {
+  const Folder folder;
+  Problem p = make_small_problem(1500);
+  p.permissible = "stands";
+  const StudyResult whole = run(p, folder, "a", make_small_factories());
+  StudyOptions o;
+  o.store = folder / "b";
+  o.pool.batch = 8;
+  for (const long stop : {300L, 1200L, 100000L}) {
+    std::atomic<bool> cancel = false;
+    Progress progress;
+    progress.cancel = &cancel;
+    const StudyResult part = run_study(p, make_small_factories(2e-4), o, progress, [&](const StudyState& s) {
+      if (s.done >= stop) cancel = true;
+    });
+    if (stop == 100000L)
+      EXPECT_EQ(write_results_json(p, part), write_results_json(p, whole));
+    else
+      EXPECT_FALSE(part.is_finished);
+  }
+}
+
+TEST(Fans, PartTrajectoriesByCurveAndOutcome) {
+  const Folder folder;
+  Problem p = make_problem({make_triangular(0, 1, 2)}, 60);
+  p.curves = {{"tilt", "deg", 0.5, "time", "s", {0, 1}, false},
+              {"outline", "m", 1, "direction", "deg", {0, 90, 180, 270}, true}};
+  const StudyResult r = run(p, folder, "s", make_factories([](const Point& x) {
+                              const double a = x[0];
+                              return done({{"y", a}}, a > 1 ? "far" : "near", {a, 2 * a, a, 1, 1, 2});
+                            }));
+  const std::vector<CurveFan> fans = calc_fans(p, r);
+  ASSERT_EQ(fans.size(), 6u) << "two curves for all runs and two outcomes";
+  EXPECT_EQ(fans[0].levels.front().lower, (std::vector<double>{0, 0}));
+  EXPECT_EQ(fans[0].levels.front().upper, (std::vector<double>{2, 4}));
+  EXPECT_EQ(fans[0].levels.back().upper, (std::vector<double>{1, 2}));
+  // support of the outline at degree 0: 2 towards x, 1, 1 and 2
+  const std::vector<DebrisLevel> debris = calc_debris(p.curves[1], fans[1]);
+  ASSERT_EQ(debris.front().corners.size(), 4u);
+  double area = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const auto &a = debris.front().corners[i], &b = debris.front().corners[(i + 1) % 4];
+    area += 0.5 * (a[0] * b[1] - a[1] * b[0]);
+  }
+  EXPECT_NEAR(area, 9, 1e-9) << "3 x 3, counter-clockwise";
+  EXPECT_NE(write_fans_csv(p, r).find("tilt [deg],,0,1,0,8"), std::string::npos) << write_fans_csv(p, r).substr(0, 300);
+  EXPECT_NE(write_debris_csv(p, r).find("outcome,alpha,x [m],y [m]"), std::string::npos);
+}
+
+TEST(Story, SaysWhatIsPossibleAndWhatTurnsIt) {
+  const Folder folder;
+  Problem p = make_small_problem(2000);
+  p.asked = "stands";
+  const StudyResult r = run(p, folder, "s", make_small_factories());
+  std::map<std::string, Sentence> by_id;
+  for (const Sentence& s : tell(p, r)) by_id[s.id] = s;
+  EXPECT_NE(by_id["verdict"].text.find("\"stands\", as planned"), std::string::npos) << by_id["verdict"].text;
+  EXPECT_EQ(by_id["verdict"].status, Sentence::Status::Warning) << "another outcome is possible to less than a half";
+  EXPECT_NE(by_id["outcome.falls"].text.find("possibility at least 0.4"), std::string::npos);
+  EXPECT_NE(by_id["outcome.falls"].text.find("x1"), std::string::npos) << "the values that it takes";
+  EXPECT_NE(by_id["failed"].text.find("failed"), std::string::npos);
+  EXPECT_EQ(by_id["failed"].status, Sentence::Status::Warning);
+}
+
+TEST(Story, OfNothingOfFailuresAndOfOneOutcome) {
+  const Folder folder;
+  Problem p = make_problem({make_triangular(0, 1, 2)}, 40);
+  EXPECT_EQ(tell(p, {}).front().text, "Nothing has been run so far.");
+  const StudyResult failed =
+      run(p, folder, "f",
+          make_factories([](const Point&) { return Answer{Answer::Kind::Failed, {}, "", {}, "broke", 0}; }));
+  EXPECT_NE(tell(p, failed).front().text.find("All"), std::string::npos);
+  EXPECT_EQ(tell(p, failed).front().status, Sentence::Status::Bad);
+  for (const StudyResult& r : {StudyResult{}, failed}) {
+    EXPECT_FALSE(write_results_json(p, r).empty());
+    EXPECT_NO_THROW((void)to_page_json(p, r, {}));
+  }
+  const StudyResult one = run(p, folder, "o", make_factories([](const Point& x) {
+                                return done({{"y", x[0]}}, "stands");
+                              }));
+  const std::string text = tell(p, one).front().text;
+  EXPECT_NE(text.find("No other outcome was found"), std::string::npos) << text;
+  EXPECT_NE(text.find("5 %"), std::string::npos) << "and how large one may be";
+}
+
+TEST(StudyPage, ThinsRunsAndSaysWhichAreThere) {
+  const Folder folder;
+  Problem p = make_small_problem(1500);
+  p.title = "</script> \xff";
+  const StudyResult r = run(p, folder, "s", make_small_factories());
+  const json page = json::parse(to_page_json(p, r, {"0", "now", "text", "in.toml"}, 100));
+  EXPECT_EQ(page["runs"].get<std::size_t>(), r.alpha.archive.size());
+  const auto shown = page["run_table"]["sample"].get<std::vector<int>>();
+  EXPECT_GE(shown.size(), 100u);
+  EXPECT_LT(shown.size(), 120u);
+  for (const NotableRun& n : list_notable_runs(p, r))
+    EXPECT_NE(std::find(shown.begin(), shown.end(), n.sample), shown.end()) << n.why;
+  for (const char* key : {"inputs", "outputs", "membership", "outcome"})
+    EXPECT_EQ(page["run_table"][key].size(), shown.size());
+}
+
+TEST(Results, RobustnessComparesRelativeUncertainty) {
+  // y = 2 a of a triangle: as uncertain as its input; without a size where the core is 0
+  const Folder folder;
+  Problem p = make_problem({make_triangular(0.5, 1, 2)}, 200);
+  const StudyResult r = run(p, folder, "s", make_factories([](const Point& x) {
+                              return done({{"y", 2 * x[0]}, {"zero", x[0] - 1}}, "");
+                            }));
+  EXPECT_NEAR(calc_robustness_of(p, r, 0), 1, 1e-9);
+  EXPECT_TRUE(std::isnan(calc_robustness_of(p, r, 1)));
+}
+
+}  // namespace
+}  // namespace topple::study
