@@ -33,6 +33,7 @@ topple_web_test(web_data data.test.mjs)
 topple_web_test(web_harness harness.test.mjs)
 topple_web_test(web_report report.test.mjs BROWSER)
 topple_web_test(web_compare compare.test.mjs BROWSER)
+topple_web_test(web_study study.test.mjs BROWSER)
 
 if(TARGET topple)
   set(short_run ${CMAKE_CURRENT_BINARY_DIR}/short_run)

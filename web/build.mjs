@@ -12,6 +12,7 @@ const pages = [
   { name: "report", entry: "src/main.tsx", title: "topple report", ...offline },
   { name: "steer", entry: "src/steer.tsx", title: "topple", ...served },
   { name: "compare", entry: "src/compare.tsx", title: "topple compare", ...offline },
+  { name: "study", entry: "src/study/main.tsx", title: "topple study", ...offline },
 ];
 
 const folder = import.meta.dirname ?? new URL(".", import.meta.url).pathname;

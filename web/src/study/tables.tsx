@@ -1,0 +1,204 @@
+import { formatDate, formatNumber, prettify } from "../units";
+import { isKnown, titleOf, type Driver, type Study } from "./data";
+import type { State } from "./state";
+import { OutcomeName } from "./verdict";
+
+function Share(props: { driver: Driver | undefined }) {
+  const d = props.driver;
+  if (d === undefined || d.first === null || d.first_error === null) return <td class="share"><span class="quiet">unknown</span></td>;
+  if (!isKnown(d)) return <td class="share"><span class="quiet">unknown, below {formatNumber(Math.max(0, d.first) + 2 * d.first_error, 2)}</span></td>;
+  const percent = (v: number): string => `${Math.min(100, Math.max(0, 100 * v))}%`;
+  return (
+    <td class="share">
+      <span class="degree" aria-hidden="true"><i style={{ width: percent(d.first) }} /></span>
+      <span class="number">{d.first.toFixed(2)} ± {d.first_error.toFixed(2)}</span>
+      {d.total !== null && <span class="quiet"> with others {d.total.toFixed(2)}</span>}
+      <span class="quiet"> {d.places[0] === d.places[1] ? `place ${d.places[0]}` : `place ${d.places[0]} to ${d.places[1]}`}</span>
+    </td>
+  );
+}
+
+export function Drivers(props: { state: State }) {
+  const { study } = props.state;
+  const { drivers } = study;
+  const rows = [
+    ...(drivers.outcomes.length > 1 ? drivers.outcomes.map((o) => ({ name: `outcome ${o.name}`, inputs: o.inputs })) : []),
+    ...drivers.outputs.map((o) => ({ name: o.name, inputs: o.inputs })),
+  ];
+  return (
+    <section class="panel" aria-label="Drivers" data-test="drivers">
+      <h2>What drives what</h2>
+      {rows.length === 0 ? (
+        <p class="quiet">Not known: there are too few spread runs.</p>
+      ) : (
+        <>
+          <p class="quiet">
+            Part of the variance over the whole support that an input explains alone, with its standard error
+            {drivers.outputs.some((o) => o.inputs.some((d) => d.total !== null)) && ", and together with others"}. From {drivers.runs} runs ({drivers.from}). A share below its error is unknown.
+          </p>
+          <div class="scroller free" tabIndex={0} role="region" aria-label="Table of drivers">
+            <table class="drivers">
+              <thead>
+                <tr><th scope="col" />{study.inputs.map((q) => <th scope="col">{q.name}</th>)}</tr>
+              </thead>
+              <tbody>
+                {rows.map((row) => (
+                  <tr><th scope="row">{row.name}</th>{study.inputs.map((_, k) => <Share driver={row.inputs[k]} />)}</tr>
+                ))}
+              </tbody>
+            </table>
+          </div>
+        </>
+      )}
+      {study.known.length > 0 && (
+        <>
+          <h3>If one input were known</h3>
+          <p class="quiet">Possibility of each outcome with all inputs fuzzy, and with one of them fixed at the middle of its core. At least so much was found.</p>
+          <table>
+            <thead>
+              <tr><th scope="col">known</th>{study.outcomes.map((o, i) => <th scope="col"><OutcomeName study={study} index={i} /><span hidden>{o.name}</span></th>)}</tr>
+            </thead>
+            <tbody>
+              <tr><th scope="row">nothing</th>{study.outcomes.map((o) => <td>{formatNumber(o.possibility, 3)}</td>)}</tr>
+              {study.known.map((k) => (
+                <tr><th scope="row">{k.input}</th>{study.outcomes.map((o) => <td>{formatNumber(k.outcomes.find((c) => c.name === o.name)?.possibility ?? 0, 3)}</td>)}</tr>
+              ))}
+            </tbody>
+          </table>
+        </>
+      )}
+    </section>
+  );
+}
+
+export function Boxes(props: { state: State }) {
+  const { study } = props.state;
+  const { boxes } = study;
+  if (boxes === null) return null;
+  const width = 320;
+  return (
+    <section class="panel" aria-label="Permissible values" data-test="boxes">
+      <h2>Permissible values</h2>
+      <p>
+        Asked: <strong>{boxes.requirement}</strong>. It holds on {formatNumber(100 * boxes.permissible_part, 3)} % of the support
+        (± {formatNumber(100 * boxes.permissible_part_error, 2)} %).
+      </p>
+      {boxes.list.length === 0 && <p class="quiet">No box of inputs was found that keeps it.</p>}
+      {boxes.list.map((box, n) => (
+        <div class={`box ${box.kept ? "" : "not-kept"}`} data-box={n}>
+          <h3>Box {n + 1}{box.kept ? "" : " (not kept)"}, {formatNumber(100 * box.volume, 2)} % of the support</h3>
+          <table class="box-table">
+            <thead><tr><th scope="col">input</th><th scope="col">inside its support</th><th scope="col">from</th><th scope="col">core</th><th scope="col">to</th></tr></thead>
+            <tbody>
+              {box.inputs.map((q, k) => {
+                const cuts = study.inputs[k]?.cuts ?? [];
+                const low = cuts[0]?.[1] ?? q.lower, high = cuts[0]?.[2] ?? q.upper;
+                const at = (v: number): number => 6 + ((v - low) / (high - low || 1)) * (width - 12);
+                return (
+                  <tr>
+                    <th scope="row">{titleOf({ name: q.name, unit: study.inputs[k]?.unit ?? "" })}</th>
+                    <td>
+                      <svg class="range" viewBox={`0 0 ${width} 16`} aria-hidden="true">
+                        <line x1={6} x2={width - 6} y1={8} y2={8} />
+                        <rect x={at(q.lower)} y={3} width={Math.max(1, at(q.upper) - at(q.lower))} height={10} />
+                        {q.core !== null && <line class="core" x1={at(q.core)} x2={at(q.core)} y1={0} y2={16} />}
+                      </svg>
+                    </td>
+                    <td>{formatNumber(q.lower)}</td><td>{formatNumber(q.core)}</td><td>{formatNumber(q.upper)}</td>
+                  </tr>
+                );
+              })}
+            </tbody>
+          </table>
+          <p class="quiet">{box.guarantee}{box.kept && box.robustness !== null && ` Robustness ${formatNumber(box.robustness, 3)}; distance to the limits ${formatNumber(box.distance, 2)} of their range.`}</p>
+        </div>
+      ))}
+    </section>
+  );
+}
+
+export function Notable(props: { state: State }) {
+  const { state } = props;
+  const { study } = state;
+  if (study.notable.length === 0 && study.failures.length === 0) return null;
+  return (
+    <section class="panel" aria-label="Runs to look at">
+      <h2>Runs to look at</h2>
+      <ul class="notable">
+        {study.notable.map((n) => (
+          <li><button type="button" class="link" onClick={() => state.select(n.sample)}>run {n.sample}</button> {prettify(n.why)}</li>
+        ))}
+      </ul>
+      {study.failures.length > 0 && (
+        <>
+          <h3>Failed runs</h3>
+          <ul class="notable" data-test="failures">{study.failures.map((text) => <li>{text}</li>)}</ul>
+        </>
+      )}
+    </section>
+  );
+}
+
+export function Inputs(props: { study: Study }) {
+  const { study } = props;
+  return (
+    <section class="panel" aria-label="Fuzzy inputs">
+      <h2>Fuzzy inputs</h2>
+      <table>
+        <thead><tr><th scope="col">input</th><th scope="col">possible from</th><th scope="col">core</th><th scope="col">to</th></tr></thead>
+        <tbody>
+          {study.inputs.map((q) => {
+            const first = q.cuts[0], last = q.cuts[q.cuts.length - 1];
+            return (
+              <tr>
+                <th scope="row">{titleOf(q)}</th>
+                <td>{formatNumber(first?.[1])}</td>
+                <td>{last?.[1] === last?.[2] ? formatNumber(last?.[1]) : `${formatNumber(last?.[1])} to ${formatNumber(last?.[2])}`}</td>
+                <td>{formatNumber(first?.[2])}</td>
+              </tr>
+            );
+          })}
+          {study.derived.map((q) => <tr><th scope="row">{titleOf(q)}</th><td colSpan={3}>follows from others</td></tr>)}
+        </tbody>
+      </table>
+    </section>
+  );
+}
+
+export function NotModelled(props: { study: Study }) {
+  const { study } = props;
+  return (
+    <section class="panel not-modelled" aria-label="What is not modelled">
+      <h2>What is not modelled</h2>
+      {study.not_modelled.length === 0 ? <p class="quiet">The model names nothing.</p> : <ul>{study.not_modelled.map((text) => <li>{text}</li>)}</ul>}
+      <p class="quiet">Uncertainty of the model itself is none of the fuzzy inputs: bounds hold for this model and these inputs.</p>
+    </section>
+  );
+}
+
+export function Origin(props: { study: Study }) {
+  const { study } = props;
+  const { origin } = study;
+  const pairs: [string, string][] = [
+    ["Program", `topple ${origin.program_version}`],
+    ["Created", formatDate(origin.created) || "–"],
+    ["Model", origin.kind === "plan" ? "a plan" : origin.kind],
+    ["Name of the model in the store", origin.model],
+    ["File", origin.source_name || "–"],
+    ["Seed", String(study.seed)],
+    ["Runs", `${study.runs}, ${study.failed} failed`],
+    ...study.coverage.map((c): [string, string] => [`Runs that are possible to ${c.alpha}`, `${c.samples}, ${c.spread} of them spread`]),
+  ];
+  return (
+    <section class="panel details" aria-label="Where this comes from">
+      <h2>Where this comes from</h2>
+      <table class="pairs"><tbody>{pairs.map(([key, value]) => <tr><th scope="row">{key}</th><td>{value}</td></tr>)}</tbody></table>
+      {origin.source !== "" && (
+        <details>
+          <summary>Text of {origin.source_name || "the file"}</summary>
+          <pre class="plan-text" tabIndex={0}>{origin.source}</pre>
+        </details>
+      )}
+    </section>
+  );
+}

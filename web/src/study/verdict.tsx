@@ -1,0 +1,96 @@
+import { Sign, StatusSign, StatusWord } from "../signs";
+import { formatDate, formatNumber, prettify } from "../units";
+import type { Study } from "./data";
+import { lookOf, nameOf, type State } from "./state";
+
+export function Header(props: { study: Study }) {
+  const { study } = props;
+  const [verdict, ...rest] = study.verdict;
+  const level = study.state === "open" ? "under way" : study.ending;
+  return (
+    <header class="header">
+      <div class="title-row">
+        <h1>{study.title || "Untitled study"}</h1>
+        <p class="subtitle">
+          fuzzy study · topple {study.origin.program_version} · {formatDate(study.origin.created) || "date unknown"} · <span class="number" data-test="runs">{study.runs}</span> runs, {study.failed} failed, {level}
+        </p>
+      </div>
+      <div class="verdict-row one">
+        <section class={`verdict ${verdict?.status ?? "info"}`} aria-label="Verdict">
+          <StatusSign status={verdict?.status ?? "info"} size={30} />
+          <div>
+            <p class="verdict-title">Verdict <StatusWord status={verdict?.status ?? "info"} /></p>
+            <p class="verdict-text" data-test="verdict">{verdict === undefined ? "This study has no runs." : prettify(verdict.text)}</p>
+          </div>
+        </section>
+      </div>
+      {rest.length > 0 && (
+        <section class="panel sentences" aria-label="What the study says">
+          {rest.map((s) => (
+            <p data-sentence={s.id}>
+              <StatusSign status={s.status} size={15} /> {prettify(s.text)}
+            </p>
+          ))}
+        </section>
+      )}
+    </header>
+  );
+}
+
+/// Sign and name of an outcome.
+export function OutcomeName(props: { study: Study; index: number }) {
+  const outcome = props.study.outcomes[props.index];
+  if (outcome === undefined) return null;
+  const look = lookOf(props.study.outcomes, props.index);
+  return (
+    <span class="with-sign">
+      <Sign shape={look.shape} colour={look.colour} /> {nameOf(outcome)}
+    </span>
+  );
+}
+
+/// How possible and how necessary each outcome is.
+export function Outcomes(props: { state: State }) {
+  const { study } = props.state;
+  if (study.outcomes.length === 0) return null;
+  const wide = (part: number): string => `${(100 * Math.min(1, Math.max(0, part))).toFixed(1)}%`;
+  return (
+    <section class="panel" aria-label="Outcomes">
+      <h2>Outcomes</h2>
+      <table class="outcomes">
+        <thead>
+          <tr>
+            <th scope="col">outcome</th>
+            <th scope="col" class="wide">possibility, and in dark what is necessary</th>
+            <th scope="col">possibility</th>
+            <th scope="col">necessity</th>
+            <th scope="col">runs</th>
+          </tr>
+        </thead>
+        <tbody>
+          {study.outcomes.map((o, i) => (
+            <tr data-outcome={o.name}>
+              <th scope="row">
+                <OutcomeName study={study} index={i} />
+                {o.name !== "" && o.name === study.asked && <span class="quiet"> (planned)</span>}
+              </th>
+              <td>
+                <span class="degree" aria-hidden="true">
+                  <i style={{ width: wide(o.possibility), background: lookOf(study.outcomes, i).colour }} />
+                  <b style={{ width: wide(o.necessity) }} />
+                </span>
+              </td>
+              <td>{o.possibility >= 1 ? "1" : `≥ ${formatNumber(o.possibility, 3)}`}</td>
+              <td>{o.necessity <= 0 ? "0" : `≤ ${formatNumber(o.necessity, 3)}`}</td>
+              <td>{o.runs}</td>
+            </tr>
+          ))}
+        </tbody>
+      </table>
+      <p class="quiet plot-note">
+        Possibility is the highest degree at which inputs were found that lead to the outcome; it can only be higher. Necessity is what is left
+        for no other outcome. Numbers of runs are no probabilities: runs gather where something was looked for.
+      </p>
+    </section>
+  );
+}

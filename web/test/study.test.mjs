@@ -1,0 +1,275 @@
+// The built page of a study in a browser. TOPPLE_STUDY=FILE tests the page of a real study instead of the made-up one.
+import assert from "node:assert/strict";
+import { mkdir, readFile } from "node:fs/promises";
+import { resolve } from "node:path";
+import { fileURLToPath } from "node:url";
+import { openPage } from "./browser.mjs";
+import { before, describe, it } from "./harness.mjs";
+import { load } from "./load.mjs";
+import { makeEmptyStudy, makeFailedStudy, makePlainStudy, makeStudy, writeStudy } from "./study-data.mjs";
+import { hostile } from "./synthetic.mjs";
+
+const { prettify } = await load("units.ts");
+const { makeTicks, findRange } = await load("study/chart.tsx");
+const { readStudy } = await load("study/data.ts");
+const out = fileURLToPath(new URL("out/", import.meta.url));
+const given = process.env.TOPPLE_STUDY;
+const path = given === undefined ? `${out}study.html` : resolve(given);
+
+const dataOf = async (file) => JSON.parse(/id="topple-data">(.*?)<\/script>/s.exec(await readFile(file, "utf8"))[1]);
+
+/// Elements that stick out of the window to the right.
+const findOverflow = (page) =>
+  page.evaluate(() => {
+    const wide = document.documentElement.clientWidth + 1;
+    const isClipped = (e) => {
+      for (let p = e.parentElement; p !== null; p = p.parentElement)
+        if (["auto", "scroll", "hidden"].includes(getComputedStyle(p).overflowX)) return true;
+      return false;
+    };
+    return [...document.querySelectorAll("body *")]
+      .filter((e) => e.getBoundingClientRect().right > wide && !isClipped(e)).map((e) => `${e.tagName}.${e.className}`).slice(0, 5);
+  });
+
+describe("a study's parts", () => {
+  it("finds round numbers for axes", () => {
+    assert.deepEqual(makeTicks(0, 10, 5), [0, 2, 4, 6, 8, 10]);
+    assert.deepEqual(makeTicks(-5, 5, 4).map(Number), [-5, -2.5, 0, 2.5, 5]);
+    assert.deepEqual(makeTicks(3, 3), [3]);
+    const [low, high] = findRange([null, 5, 5]);
+    assert.ok(low < 5 && high > 5, "a range is never empty");
+    assert.deepEqual(findRange([]), [0, 1]);
+  });
+
+  it("refuses data that are damaged or of another kind", () => {
+    const study = makeStudy(10);
+    assert.equal(readStudy(JSON.stringify(study)).run_table.trajectories.length, 110);
+    const short = { ...study, run_table: { ...study.run_table, membership: [1] } };
+    assert.throws(() => readStudy(JSON.stringify(short)), /membership has 1 values, not 10/);
+    assert.throws(() => readStudy(JSON.stringify({ ...study, version: 9 })), /version 9/);
+    assert.throws(() => readStudy("{}"), /does not hold/);
+    assert.throws(() => readStudy("null"), /does not hold/);
+  });
+});
+
+describe("the page of a study", () => {
+  let page, problems, data;
+  before(async () => {
+    await mkdir(out, { recursive: true });
+    if (given === undefined) await writeStudy(makeStudy(), path);
+    data = await dataOf(path);
+    ({ page, problems } = await openPage(path));
+  });
+
+  it("says its verdict, and how possible each outcome is", async () => {
+    assert.equal(await page.textContent("[data-test=verdict]"), prettify(data.verdict[0].text));
+    for (const s of data.verdict.slice(1)) assert.ok((await page.textContent(".sentences")).includes(prettify(s.text)), s.id);
+    const rows = await page.$$eval(".outcomes tbody tr", (list) => list.map((e) => e.textContent));
+    assert.equal(rows.length, data.outcomes.length);
+    data.outcomes.forEach((o, i) => {
+      assert.ok(rows[i].includes(o.name) && rows[i].includes(String(o.runs)), o.name);
+      assert.ok(rows[i].includes(o.possibility >= 1 ? "1" : "≥"), o.name);
+    });
+    await page.screenshot({ path: `${out}study-start.png` });
+  });
+
+  it("draws a membership function for each output, with its table", async () => {
+    assert.equal(await page.locator("[data-membership]").count(), data.outputs.length);
+    for (let k = 0; k < Math.min(3, data.outputs.length); ++k) {
+      const plot = page.locator("[data-membership]").nth(k);
+      assert.ok((await plot.locator("path.whole").getAttribute("d")).length > 20);
+      await plot.locator("summary").click();
+      await plot.locator("tbody tr").first().waitFor();
+      const cells = await plot.locator("tbody tr").first().locator("td").allTextContents();
+      assert.equal(cells[0], "all runs");
+      const lower = data.outputs[k].levels[0].lower;
+      assert.ok(Math.abs(Number(cells[2].replace("−", "-")) - lower) <= 1e-3 * Math.abs(lower) + 1e-3, "four digits are shown");
+      await plot.locator("summary").click();
+    }
+  });
+
+  it("draws bands of each curve, for all runs and for one outcome", async () => {
+    for (const curve of data.curves.filter((c) => !c.is_outline)) {
+      const plot = page.locator(`[data-fan="${curve.name}"]`);
+      const fans = data.fans.filter((f) => f.curve === curve.name);
+      const drawn = fans[0].levels.filter((l) => l.runs > 0).length;
+      assert.equal(await plot.locator("path.band").count(), drawn);
+      const lines = await plot.locator("path.run-line").count();
+      assert.ok(lines > 0 && (await plot.textContent()).includes(String(lines)), "it says how many runs are drawn");
+      if (fans.length > 1) {
+        await plot.locator("select").selectOption(String(fans.length - 1));
+        const one = data.run_table.outcome.filter((o) => data.outcomes[o].name === fans[fans.length - 1].outcome).length;
+        await page.waitForFunction(([name, most]) => document.querySelectorAll(`[data-fan="${name}"] path.run-line`).length <= most, [curve.name, one]);
+      }
+      await plot.locator("input[type=checkbox]").uncheck();
+      await plot.locator("path.run-line").first().waitFor({ state: "detached" });
+    }
+  });
+
+  it("shows where parts may lie, and that this is no safe distance", async () => {
+    if (data.debris.length === 0) return;
+    const plan = page.locator("[data-test=debris]");
+    assert.equal(await plan.locator("path.debris").count(), data.debris[0].levels.length);
+    assert.match(await plan.textContent(), /no safe distance/);
+    await plan.locator("summary").click();
+    await plan.locator("tbody tr").first().waitFor();
+    assert.equal(await plan.locator("tbody tr").count(), data.debris[0].levels.length);
+    await plan.locator("summary").click();
+  });
+
+  it("names drivers with their errors, and says what is unknown", async () => {
+    const text = await page.textContent("[data-test=drivers]");
+    for (const o of data.drivers.outputs)
+      for (const d of o.inputs)
+        if (d.first !== null && d.first > d.first_error) assert.ok(text.includes(`${d.first.toFixed(2)} ± ${d.first_error.toFixed(2)}`), o.name);
+        else assert.ok(text.includes("unknown"));
+  });
+
+  it("shows permissible boxes with what is known of them", async () => {
+    if (data.boxes === null) return;
+    const text = await page.textContent("[data-test=boxes]");
+    assert.equal(await page.locator("[data-box]").count(), data.boxes.list.length);
+    for (const box of data.boxes.list) assert.ok(text.includes(box.guarantee));
+    assert.ok(text.includes(data.boxes.requirement));
+  });
+
+  it("chooses runs with a limit by the keyboard, and takes it away again", async () => {
+    const inside = async () => Number(/^(\d+) of/.exec(await page.textContent("[data-test=inside]"))[1]);
+    const all = data.run_table.sample.length;
+    assert.equal(await inside(), all);
+    await page.locator(".limits summary").click();
+    const values = data.run_table.inputs.map((x) => x[0]).sort((a, b) => a - b);
+    const middle = values[Math.floor(all / 2)];
+    const field = page.locator(".limits tbody tr").first().locator("input[type=text]").first();
+    await field.fill(String(middle));
+    await field.press("Enter");
+    const wanted = data.run_table.inputs.filter((x) => x[0] >= middle).length;
+    await page.waitForFunction((n) => document.querySelector("[data-test=inside]").textContent.startsWith(`${n} of`), wanted);
+    await page.locator("[data-test=clear]").click();
+    assert.equal(await inside(), all);
+    await page.locator(".limits summary").click();
+  });
+
+  it("chooses runs with a brush", async () => {
+    const grip = page.locator(".grip").first();
+    await grip.scrollIntoViewIfNeeded();
+    const box = await grip.boundingBox();
+    await page.mouse.move(box.x + 10, box.y + 2);
+    await page.mouse.down();
+    await page.mouse.move(box.x + 10, box.y + box.height / 2, { steps: 4 });
+    await page.mouse.up();
+    const [low, high] = [Math.min(...data.run_table.inputs.map((x) => x[0])), Math.max(...data.run_table.inputs.map((x) => x[0]))];
+    const upper = data.run_table.inputs.filter((x) => x[0] > low + 0.52 * (high - low)).length;
+    const lower = data.run_table.inputs.filter((x) => x[0] > low + 0.48 * (high - low)).length;
+    const inside = Number(/^(\d+) of/.exec(await page.textContent("[data-test=inside]"))[1]);
+    assert.ok(inside >= upper - lower / 10 && inside <= lower, `${inside} of ${upper} to ${lower}`);
+    await page.locator("[data-test=clear]").click();
+  });
+
+  it("shows one run with all its values, from a line and from the table", async () => {
+    const link = page.locator("[data-run]").first();
+    const sample = Number(await link.getAttribute("data-run"));
+    await link.focus();
+    await page.keyboard.press("Enter");
+    assert.match(await page.textContent("[data-test=run]"), new RegExp(`Run ${sample}:`));
+    assert.equal(await page.locator("[data-test=run] tbody tr").count(), data.inputs.length + data.derived.length + 1 + data.outputs.length);
+    const box = await page.locator("[data-test=coordinates]").boundingBox();
+    let found = false;
+    for (let k = 1; k < 30 && !found; ++k) {
+      await page.mouse.click(box.x + box.width * 0.45, box.y + 30 + (k * (box.height - 60)) / 30);
+      found = (await page.locator("[data-test=run]").count()) > 0;
+    }
+    assert.ok(found, "no click met a line");
+  });
+
+  it("hides an outcome", async () => {
+    if (data.outcomes.length < 2) return;
+    const index = data.outcomes.findIndex((o) => o.runs > 0);
+    await page.locator(".chip").nth(index).click();
+    const rest = data.run_table.outcome.filter((o) => o !== index).length;
+    await page.waitForFunction((n) => document.querySelector("[data-test=inside]").textContent.startsWith(`${n} of`), rest);
+    await page.locator(".chip").nth(index).click();
+  });
+
+  it("says what failed, what is not modelled and where it comes from", async () => {
+    const text = await page.textContent("main");
+    for (const reason of data.failures) assert.ok(text.includes(reason));
+    for (const one of data.not_modelled) assert.ok(text.includes(one));
+    for (const one of [data.origin.model, data.origin.program_version]) assert.ok(text.includes(one));
+  });
+
+  it("fits wide, narrow, dark and printed, and gives every control a name", async () => {
+    for (const [name, width] of [["wide", 1440], ["narrow", 900], ["phone", 420]]) {
+      await page.setViewportSize({ width, height: 900 });
+      await page.waitForTimeout(100);
+      assert.deepEqual(await findOverflow(page), [], name);
+      await page.screenshot({ path: `${out}study-${name}.png`, fullPage: true });
+    }
+    await page.setViewportSize({ width: 1440, height: 900 });
+    await page.emulateMedia({ colorScheme: "dark" });
+    await page.screenshot({ path: `${out}study-dark.png`, fullPage: true });
+    await page.emulateMedia({ colorScheme: "light" });
+    const nameless = await page.evaluate(() =>
+      [...document.querySelectorAll("button, input, select, summary, svg[role=img]")]
+        .filter((e) => !(e.getAttribute("aria-label") || e.textContent.trim() || e.closest("label")?.textContent.trim())).map((e) => e.outerHTML.slice(0, 80)),
+    );
+    assert.deepEqual(nameless, []);
+    const pdf = await page.pdf({ path: `${out}study.pdf`, preferCSSPageSize: true, printBackground: true });
+    assert.ok(pdf.length > 20000);
+  });
+
+  it("reports no error and asks the network for nothing", () => assert.deepEqual(problems, []));
+});
+
+describe("unusual studies", () => {
+  const open = async (name, data) => {
+    await mkdir(out, { recursive: true });
+    await writeStudy(data, `${out}${name}.html`);
+    const browser = await openPage(`${out}${name}.html`);
+    await browser.page.screenshot({ path: `${out}${name}.png`, fullPage: true });
+    return browser;
+  };
+
+  it("shows a study without a run", async () => {
+    const { page, problems, close } = await open("study-empty", makeEmptyStudy());
+    assert.equal(await page.textContent("h1"), "Untitled study");
+    assert.match(await page.textContent("[data-test=verdict]"), /Nothing has been run/);
+    assert.match(await page.textContent(".subtitle"), /under way/);
+    assert.deepEqual(problems, []);
+    await close();
+  });
+
+  it("shows a model with one outcome that has no name", async () => {
+    const { page, problems, close } = await open("study-plain", makePlainStudy());
+    assert.equal(await page.locator(".outcomes tbody tr").count(), 1);
+    assert.equal(await page.locator("[data-fan]").count(), 0);
+    assert.deepEqual(problems, []);
+    await close();
+  });
+
+  it("shows a study of which every run failed", async () => {
+    const { page, problems, close } = await open("study-failed", makeFailedStudy());
+    assert.match(await page.textContent("[data-test=verdict]"), /All 5 runs failed/);
+    assert.ok((await page.textContent("[data-test=failures]")).includes(hostile));
+    await page.locator("[data-run='0']").click();
+    assert.ok((await page.textContent("[data-test=run]")).includes(hostile));
+    assert.deepEqual(problems, []);
+    await close();
+  });
+
+  it("takes names and texts as text", async () => {
+    const { page, problems, close } = await open("study-hostile", { ...makeStudy(10), title: hostile });
+    assert.equal(await page.textContent("h1"), hostile);
+    assert.equal(await page.title(), `${hostile} – topple study`);
+    assert.equal(await page.locator("img[src=x]").count(), 0);
+    assert.deepEqual(problems, []);
+    await close();
+  });
+
+  it("says so when the data cannot be read", async () => {
+    const { page, problems, close } = await open("study-damaged", { ...makeStudy(3), version: 9 });
+    assert.match(await page.textContent("[data-test=problem]"), /version 9/);
+    assert.deepEqual(problems, []);
+    await close();
+  });
+});
