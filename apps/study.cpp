@@ -63,7 +63,8 @@ void write_all(std::FILE* out, const std::string& folder, const study::Problem& 
     return;
   }
   const std::string path = (std::filesystem::path(folder) / "study.html").string();
-  record::write_page(study::to_page_json(p, r, {TOPPLE_VERSION, record::now_utc(), source, source_name}), *bundle, path);
+  record::write_page(study::to_page_json(p, r, {TOPPLE_VERSION, record::now_utc(), source, source_name}), *bundle,
+                     path);
   std::fprintf(out, "wrote %s\n", path.c_str());
 }
 
