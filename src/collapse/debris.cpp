@@ -119,7 +119,10 @@ Heap calc_heap(const std::vector<PlacedBox>& boxes, double cell) {
         z = std::max(z, high);
       }
   }
-  for (const auto& [at, z] : top) heap.volume += z * cell * cell;
+  for (const auto& [at, z] : top) {
+    heap.volume += z * cell * cell;
+    heap.columns.push_back({at.first, at.second, z});
+  }
   return heap;
 }
 

@@ -2,6 +2,7 @@
 /// Plane geometry of what lies about after a collapse.
 
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "base/linalg.h"
@@ -29,6 +30,12 @@ Polygon calc_outline(const PlacedBox&);
 struct Heap {
   double height = 0;  // [m]
   double volume = 0;  // [m³]
+  /// A square of the ground under the heap: lower left corner in cells from the origin, height of the surface [m].
+  struct Column {
+    std::int64_t i = 0, j = 0;
+    double height = 0;
+  };
+  std::vector<Column> columns;  // rising by i, then j
 };
 /// Heights are sampled on a grid of `cell` [m]; the volume's error is of the order of the outline times the cell.
 Heap calc_heap(const std::vector<PlacedBox>&, double cell);

@@ -11,6 +11,7 @@
 #include "collapse/debris.h"
 #include "collapse/outcome.h"
 #include "collapse/rigid_block.h"
+#include "collapse/stability.h"
 
 namespace topple::collapse {
 
@@ -20,6 +21,9 @@ using record::Status;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr double kPi = 3.14159265358979323846;
+constexpr double kHeapCell = 0.25;  // [m]
+constexpr size_t kShownMargins = 5;
+constexpr size_t kShownTouchdowns = 5;
 
 /// Everything that the sections below share.
 struct Context {
@@ -76,6 +80,7 @@ bool add_stability(const Context& c) {
   const auto& zones = c.recorder.zone_frames();
   const auto describe = [&](const std::string& id, const std::string& title, size_t i, bool settled) {
     const ZoneFrame& z = zones[i];
+    const auto margins = find_margins(c.r, i);
     const bool has = z.zone >= 0 && z.utilisation > 0;
     const double margin = has ? 1 / z.utilisation : kNone;
     const bool is_standing = stands(block[i], c.k);
@@ -88,7 +93,21 @@ bool add_stability(const Context& c) {
                           count_words(z.broken, "none is broken", "is broken", "are broken"),
                           100 * norm(block[i].displacement), block[i].fastest);
     text += is_standing ? "." : ": it does not stand.";
-    const Status status = !is_standing ? Status::Bad : z.yielded > 0 || z.broken > 0 ? Status::Warning : Status::Good;
+    if (margins.size() > 1) {
+      text += " Lowest margins:";
+      for (size_t m = 0; m < std::min<size_t>(margins.size(), kShownMargins); ++m)
+        text += fmt::format("{} {} {:.2f}", m > 0 ? "," : "", margins[m].member, margins[m].margin);
+      text += fmt::format(" of {} members.", margins.size());
+    }
+    bool is_still = true;
+    if (settled && is_standing) {
+      is_still = block[i].fastest < c.k.rest_speed;
+      text +=
+          is_still ? " It stands still." : fmt::format(" It still sways (still: below {:.2f} m/s).", c.k.rest_speed);
+    }
+    const Status status = !is_standing                                 ? Status::Bad
+                          : z.yielded > 0 || z.broken > 0 || !is_still ? Status::Warning
+                                                                       : Status::Good;
     c.add(id, "Stability", title, text, margin, "1", status);
     return is_standing;
   };
@@ -127,12 +146,24 @@ Reach add_debris(const Context& c, const Mechanism& m) {
   if (reach.farthest >= 0 && reach.largest > 0)
     text += fmt::format(" 95 % of the mass lies within {:.1f} m of it; the farthest part is {}.", reach.most_mass,
                         c.r.bodies[static_cast<size_t>(reach.farthest)].name);
+  text += fmt::format(
+      " Towards each of these sides 95 % of the mass lies within {:.1f}, {:.1f}, {:.1f} and {:.1f} m of it.",
+      reach.side_most[0], reach.side_most[1], reach.side_most[2], reach.side_most[3]);
+  for (const double share : {0.5, 0.9})
+    text += fmt::format(" The outline of the nearest {:.0f} % of the mass encloses {:.0f} m2.", 100 * share,
+                        calc_area(calc_share_outline(c.r, last, share)));
   c.add("debris.reach", "Fall and debris", "Reach of the debris", text, reach.largest, "m");
-  const Heap heap = calc_heap(c.boxes_at(last, true), 0.25);
+  const std::vector<PlacedBox> boxes = c.boxes_at(last, true);
+  const Heap heap = calc_heap(boxes, kHeapCell);
+  double solid = 0;
+  for (const PlacedBox& box : boxes) solid += 8 * box.half.x * box.half.y * box.half.z;
   c.add("debris.height", "Fall and debris", "Height of the hill",
         fmt::format("The highest point of all parts lies {:.1f} m above the ground.", heap.height), heap.height, "m");
   c.add("debris.volume", "Fall and debris", "Volume of the hill",
-        fmt::format("Bulk volume under the upper surface of all parts: {:.0f} m3.", heap.volume), heap.volume, "m3");
+        fmt::format("Bulk volume under the upper surface of all parts: {:.0f} m3, hollows under parts that lie across "
+                    "others included. The parts themselves have {:.0f} m3: bulked by a factor of {:.1f}.",
+                    heap.volume, solid, solid > 0 ? heap.volume / solid : 0.0),
+        heap.volume, "m3");
   return reach;
 }
 
@@ -168,6 +199,58 @@ void add_clearances(const Context& c) {
   }
 }
 
+void add_vibration(const Context& c) {
+  const char* heading = "Ground vibration";
+  if (!c.plan.vibration) {
+    c.add("vibration", heading, "Ground vibration",
+          "Not given: a screening needs the site's attenuation law ([site.vibration]).", kNone, "");
+    return;
+  }
+  const product::VibrationLaw& law = *c.plan.vibration;
+  c.add(
+      "vibration", heading, "Screening, not a prediction",
+      fmt::format("v = {:g} mm/s (E / {:g} MJ)^{:g} (r / {:g} m)^-{:g}, between 1/{:g} and {:g} times that, with E the "
+                  "energy of touchdowns within {:g} s; source of these numbers: {}. What the ground really does is for "
+                  "measurements on site to show.",
+                  law.velocity / unit::mm, law.energy * 1e-6, law.energy_exponent, law.distance, law.distance_exponent,
+                  law.factor, law.factor, law.window, law.source),
+      kNone, "");
+  for (const product::Neighbour& n : c.plan.neighbours) {
+    const Shaking s = find_shaking(law, c.recorder.touchdowns(), n.footprint);
+    if (!(s.velocity > 0)) {
+      c.add("vibration." + n.name, heading, n.name, "Nothing touches the ground.", 0, "m/s");
+      continue;
+    }
+    const double low = s.velocity / law.factor, high = s.velocity * law.factor;
+    std::string text = fmt::format(
+        "Screening: {:.2g} to {:.2g} mm/s, {:.2g} in the middle, around {:.2f} s from touchdowns of {:.1f} MJ, most of "
+        "it "
+        "by {} at {:.0f} m",
+        low / unit::mm, high / unit::mm, s.velocity / unit::mm, s.time, s.energy * 1e-6,
+        c.r.bodies[static_cast<size_t>(s.body)].name, s.distance);
+    // limits over the frequencies in which the ground answers
+    double least = 0, most = 0;
+    if (n.vibration_limit > 0) {
+      least = most = n.vibration_limit;
+      text += fmt::format(". Limit of the plan: {:g} mm/s", least / unit::mm);
+    } else if (n.building_class != product::BuildingClass::Unknown) {
+      least = calc_vibration_limit(n.building_class, law.low_frequency);
+      most = calc_vibration_limit(n.building_class, law.high_frequency);
+      text += fmt::format(". Limit at the foundation between {:g} Hz and {:g} Hz: {:.3g} to {:.3g} mm/s ({}, {})",
+                          law.low_frequency, law.high_frequency, least / unit::mm, most / unit::mm, kVibrationSource,
+                          describe_vibration_limit(n.building_class));
+    }
+    Status status = Status::Info;
+    if (least > 0) {
+      status = high < least ? Status::Good : low > most ? Status::Bad : Status::Warning;
+      text += status == Status::Good  ? ": the band stays below it"
+              : status == Status::Bad ? ": the band lies above it"
+                                      : ": the band reaches it";
+    }
+    c.add("vibration." + n.name, heading, n.name, text + ".", high, "m/s", status);
+  }
+}
+
 void add_touchdown(const Context& c) {
   const double t = c.recorder.first_touchdown();
   if (!std::isfinite(t)) {
@@ -196,8 +279,24 @@ void add_touchdown(const Context& c) {
                     c.r.time.size() > 1 ? c.r.time[1] - c.r.time[0] : 0.0),
         c.recorder.largest_ground_force(), "N");
   }
-  c.add("vibration", "Touchdown", "Ground vibration",
-        "Not given: a screening needs the site's attenuation coefficients from the user.", kNone, "");
+  const std::vector<Touchdown>& all = c.recorder.touchdowns();
+  if (!all.empty()) {
+    std::vector<const Touchdown*> order;
+    double energy = 0, momentum = 0;
+    for (const Touchdown& d : all) order.push_back(&d), energy += d.energy, momentum += d.momentum;
+    std::stable_sort(order.begin(), order.end(),
+                     [](const Touchdown* a, const Touchdown* b) { return a->energy > b->energy; });
+    std::string text = fmt::format(
+        "{} parts touch the ground for the first time between {:.2f} s and {:.2f} s, with {:.1f} MJ and {:.2f} MN s "
+        "downwards in all (each part alone, as it touches). Largest:",
+        all.size(), all.front().time, all.back().time, energy * 1e-6, momentum * 1e-6);
+    for (size_t i = 0; i < std::min(order.size(), kShownTouchdowns); ++i)
+      text += fmt::format("{} {} at {:.2f} s at ({:.1f}, {:.1f}) m with {:.2f} MJ and {:.2f} MN s", i > 0 ? ";" : "",
+                          c.r.bodies[static_cast<size_t>(order[i]->body)].name, order[i]->time, order[i]->place[0],
+                          order[i]->place[1], order[i]->energy * 1e-6, order[i]->momentum * 1e-6);
+    c.add("touchdown.parts", "Touchdown", "Touchdown of the parts", text + ".", energy, "J");
+  }
+  add_vibration(c);
 }
 
 void add_rigid_block(const Context& c) {
@@ -368,7 +467,7 @@ const std::vector<std::string>& not_modelled() {
       "fragments thrown by the charges",
       "air overpressure",
       "dust",
-      "ground vibration (a screening needs the site's coefficients)",
+      "ground vibration as such (at most a screening with the site's own law)",
       "wind, and people's behaviour; no distance given here is a safe distance",
       "cracking of slabs within a bay, of walls within a panel and of members between their end zones",
       "infill and finishes beyond their weight"};

@@ -58,9 +58,16 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
       when, out.tilt / unit::deg, out.drop, 100 * out.rear_share, 100 * out.moved);
   const double height_left = in.frames.front().height > 0 ? last.height / in.frames.front().height : 1;
   const double final_tilt = norm(log_rotation(last.rotation));
-  if (out.moved < k.mechanism_stands_share) {
+  const double sunk = norm(last.displacement);
+  if (out.moved < k.mechanism_stands_share && !(sunk > k.stands_displacement)) {
     out.name = "stands";
     out.text = fmt::format("The building stands: {:.1f} % of its mass came down.", 100 * out.moved);
+  } else if (out.moved < k.mechanism_stands_share) {
+    out.name = "partial";
+    out.text = fmt::format(
+        "{}: the upper block has moved by {:.2f} m, {:.2f} m of it downwards, and leans by {:.1f} deg; that is all.",
+        in.came_to_rest ? "Aborted collapse: it has sunk and stands" : "It has begun to sink", sunk,
+        -last.displacement.z, final_tilt / unit::deg);
   } else if (out.moved < k.mechanism_partial_share) {
     out.name = "partial";
     out.text = fmt::format("Partial collapse: {}.", motion);

@@ -68,43 +68,89 @@ Polygon calc_building_outline(const mbs::Model& model, const ModelMap& map) {
   return calc_hull(std::move(corners));
 }
 
-Reach calc_reach(const record::Record& r, size_t frame) {
-  Reach out;
-  double low0[2] = {1e30, 1e30}, high0[2] = {-1e30, -1e30};
-  for (const auto& p : r.building_outline)
-    for (size_t i : {0UL, 1UL}) low0[i] = std::min(low0[i], p[i]), high0[i] = std::max(high0[i], p[i]);
-  // a single piece may fly far: how far beyond the footprint each part lies, and which is the last
-  std::vector<std::pair<double, size_t>> ways;
-  std::vector<Point2> corners;
+namespace {
+
+/// How far a part lies beyond the box around the footprint.
+struct PartReach {
+  size_t body = 0;
   double mass = 0;
+  std::array<double, 4> side{};  // 0: not beyond [m]
+  double way = 0;                // largest of them [m]
+  std::vector<Point2> corners;   // of its boxes, seen from above
+};
+std::vector<PartReach> find_part_reaches(const record::Record& r, size_t frame) {
+  double low[2] = {1e30, 1e30}, high[2] = {-1e30, -1e30};
+  for (const auto& p : r.building_outline)
+    for (size_t i : {0UL, 1UL}) low[i] = std::min(low[i], p[i]), high[i] = std::max(high[i], p[i]);
+  std::vector<PartReach> parts;
   for (size_t b = 0; b < r.bodies.size(); ++b) {
     if (r.bodies[b].fixed) continue;
-    double way = 0;
+    PartReach part;
+    part.body = b;
+    part.mass = r.bodies[b].mass;
     const Pose X_WB = record::pose_at(r, frame, b);
     for (const record::BoxShape& s : r.bodies[b].shapes)
       for (const Point2& p : calc_outline({X_WB * s.X_BS, s.half})) {
-        corners.push_back(p);
+        part.corners.push_back(p);
         for (size_t i : {0UL, 1UL}) {
-          out.side[2 * i] = std::max(out.side[2 * i], low0[i] - p[i]);
-          out.side[2 * i + 1] = std::max(out.side[2 * i + 1], p[i] - high0[i]);
-          way = std::max({way, low0[i] - p[i], p[i] - high0[i]});
+          part.side[2 * i] = std::max(part.side[2 * i], low[i] - p[i]);
+          part.side[2 * i + 1] = std::max(part.side[2 * i + 1], p[i] - high[i]);
         }
       }
-    ways.emplace_back(way, b);
-    mass += r.bodies[b].mass;
+    part.way = *std::max_element(part.side.begin(), part.side.end());
+    parts.push_back(std::move(part));
   }
+  std::stable_sort(parts.begin(), parts.end(), [](const PartReach& a, const PartReach& b) { return a.way < b.way; });
+  return parts;
+}
+
+/// Of values with their masses, the smallest within which a share of the mass lies.
+double find_within(std::vector<std::pair<double, double>> value_and_mass, double share) {
+  std::sort(value_and_mass.begin(), value_and_mass.end());
+  double mass = 0, within = 0;
+  for (const auto& [value, m] : value_and_mass) mass += m;
+  for (const auto& [value, m] : value_and_mass)
+    if ((within += m) >= share * mass) return value;
+  return 0;
+}
+
+}  // namespace
+
+Reach calc_reach(const record::Record& r, size_t frame) {
+  constexpr double most = 0.95;
+  Reach out;
+  // a single piece may fly far: how far beyond the footprint each part lies, and which is the last
+  const std::vector<PartReach> parts = find_part_reaches(r, frame);
+  std::vector<Point2> corners;
+  std::array<std::vector<std::pair<double, double>>, 4> sides;
+  std::vector<std::pair<double, double>> ways;
+  for (const PartReach& part : parts) {
+    corners.insert(corners.end(), part.corners.begin(), part.corners.end());
+    for (size_t i = 0; i < 4; ++i) {
+      out.side[i] = std::max(out.side[i], part.side[i]);
+      sides[i].emplace_back(part.side[i], part.mass);
+    }
+    ways.emplace_back(part.way, part.mass);
+  }
+  for (size_t i = 0; i < 4; ++i) out.side_most[i] = find_within(std::move(sides[i]), most);
   out.largest = *std::max_element(out.side.begin(), out.side.end());
+  out.most_mass = find_within(std::move(ways), most);
   out.outline = calc_hull(std::move(corners));
   out.area = calc_area(out.outline);
-  std::sort(ways.begin(), ways.end());
-  double within = 0;
-  for (const auto& [way, b] : ways) {
-    out.most_mass = way;
-    within += r.bodies[b].mass;
-    if (within >= 0.95 * mass) break;
-  }
-  if (!ways.empty()) out.farthest = static_cast<int>(ways.back().second);
+  if (!parts.empty()) out.farthest = static_cast<int>(parts.back().body);
   return out;
+}
+
+Polygon calc_share_outline(const record::Record& r, size_t frame, double share) {
+  const std::vector<PartReach> parts = find_part_reaches(r, frame);
+  double mass = 0, within = 0;
+  for (const PartReach& part : parts) mass += part.mass;
+  std::vector<Point2> corners;
+  for (const PartReach& part : parts) {
+    corners.insert(corners.end(), part.corners.begin(), part.corners.end());
+    if ((within += part.mass) >= share * mass) break;
+  }
+  return calc_hull(std::move(corners));
 }
 
 }  // namespace topple::collapse

@@ -31,13 +31,17 @@ Polygon calc_building_outline(const mbs::Model&, const ModelMap&);
 
 /// How far parts lie beyond the building's footprint (the box around its outline along W's axes).
 struct Reach {
-  std::array<double, 4> side{};  // towards -x, +x, -y, +y; 0: not beyond [m]
-  double largest = 0;            // of the sides [m]
-  double most_mass = 0;          // within which 95 % of the mass lie [m]
-  int farthest = -1;             // body, -1: no moving one
-  Polygon outline;               // around all parts, convex, counter-clockwise
-  double area = 0;               // of the outline [m²]
+  std::array<double, 4> side{};       // towards -x, +x, -y, +y; 0: not beyond [m]
+  std::array<double, 4> side_most{};  // the same, within which 95 % of the mass lie [m]
+  double largest = 0;                 // of the sides [m]
+  double most_mass = 0;               // within which 95 % of the mass lie [m]
+  int farthest = -1;                  // body, -1: no moving one
+  Polygon outline;                    // around all parts, convex, counter-clockwise
+  double area = 0;                    // of the outline [m²]
 };
 Reach calc_reach(const record::Record&, size_t frame);
+
+/// Convex outline of the moving parts that lie nearest to the footprint and hold at least `share` of the mass.
+Polygon calc_share_outline(const record::Record&, size_t frame, double share);
 
 }  // namespace topple::collapse

@@ -213,6 +213,10 @@ void Recorder::add_frame(const mbs::View& v) {
     }
   }
   zone_frames_.push_back(zf);
+  last_pose_ = v.X_WB;
+  last_v_ = v.v_WB;
+  last_w_ = v.w_WB;
+  last_mass_ = v.mass;
   shortening_ = v.shortening;
   rotation_ = v.rotation;
 
@@ -241,6 +245,24 @@ void Recorder::add_frame(const mbs::View& v) {
     largest_ground_force_ = ground_force;
     largest_ground_force_time_ = v.time;
   }
+}
+
+/// From the last frame on in free fall, which adds at most g times the frame's length to the speed.
+Touchdown Recorder::calc_touchdown(int body, double time, double speed) const {
+  Touchdown out;
+  out.time = time;
+  out.body = body;
+  out.speed = speed;
+  const size_t b = static_cast<size_t>(body);
+  if (b >= last_v_.size()) return out;
+  const double since = time - record_.time.back();
+  const Vec3 v = last_v_[b] + since * model_.gravity;
+  const Vec3 p = last_pose_[b].p + since * last_v_[b];
+  out.place = {p.x, p.y};
+  const Vec3 w_B = transpose_times(to_matrix(last_pose_[b].q), last_w_[b]);
+  out.energy = 0.5 * last_mass_[b] * dot(v, v) + 0.5 * dot(w_B, model_.bodies[b].inertia * w_B);
+  out.momentum = -last_mass_[b] * dot(v, model_.contact.normal);
+  return out;
 }
 
 double Recorder::kinetic_at(double time) const {
@@ -338,12 +360,14 @@ void Recorder::add_happening(const mbs::Happening& h) {
     }
     case Kind::GroundContact: {
       const bool upper = map_.bodies[static_cast<size_t>(h.index)].is_upper;
+      touchdowns_.push_back(calc_touchdown(h.index, h.time, h.speed));
       if (upper && !std::isfinite(touchdown_)) {
         touchdown_ = h.time;
         touchdown_body_ = body(h.index);
       }
       add_event({h.time, "touchdown", body(h.index),
-                 fmt::format("{} touches the ground at {:.1f} m/s", body(h.index), h.speed)});
+                 fmt::format("{} touches the ground at {:.1f} m/s ({:.2f} MJ, {:.2f} MN s)", body(h.index), h.speed,
+                             touchdowns_.back().energy * 1e-6, touchdowns_.back().momentum * 1e-6)});
       break;
     }
     case Kind::BodyContact:

@@ -8,6 +8,7 @@
 #include "collapse/manager.h"
 #include "collapse/mechanism.h"
 #include "collapse/run.h"
+#include "collapse/vibration.h"
 
 namespace topple::collapse {
 
@@ -34,6 +35,7 @@ class Recorder {
   const std::vector<ZoneFrame>& zone_frames() const { return zone_frames_; }
   double first_touchdown() const { return touchdown_; }  // of an upper body; NaN if none [s]
   std::string first_touchdown_body() const { return touchdown_body_; }
+  const std::vector<Touchdown>& touchdowns() const { return touchdowns_; }  // one of each moving part, as they happen
   double start_reaction_error() const { return reaction_error_; }  // |reaction - weight| / weight at the first frame
   double largest_ground_force() const { return largest_ground_force_; }
   double largest_ground_force_time() const { return largest_ground_force_time_; }
@@ -41,6 +43,7 @@ class Recorder {
 
  private:
   record::Series& series(size_t i) { return record_.series[i]; }
+  Touchdown calc_touchdown(int body, double time, double speed) const;
   BlockFrame calc_block(const mbs::View&) const;
   const ZoneEntry& entry_of(int element) const;
 
@@ -55,6 +58,10 @@ class Recorder {
   std::vector<double> shortening_, rotation_;
   std::vector<int> fixed_joints_;
   int stage_shown_ = -1;
+  std::vector<Pose> last_pose_;  // of the bodies at the last frame, for what happens after it
+  std::vector<Vec3> last_v_, last_w_;
+  std::vector<double> last_mass_;
+  std::vector<Touchdown> touchdowns_;
   double touchdown_ = std::numeric_limits<double>::quiet_NaN();
   std::string touchdown_body_;
   double reaction_error_ = 0, largest_ground_force_ = 0, largest_ground_force_time_ = 0;

@@ -145,12 +145,31 @@ struct Ground {
   double restitution = 0.1;
 };
 
+/// Lines of DIN 4150-3, Table 1.
+enum class BuildingClass { Unknown, Commercial, Residential, Sensitive };
+
+/// How the site shakes when something falls on it, from the user: v = velocity (E / energy)^energy_exponent
+/// (r / distance)^-distance_exponent, between v / factor and v * factor.
+struct VibrationLaw {
+  double velocity = 0;         // peak particle velocity at the foundation [m/s]
+  double energy = 0;           // of the touchdown that gives it [J]
+  double distance = 0;         // at which [m]
+  double energy_exponent = 0;  // > 0
+  double distance_exponent = 0;
+  double factor = 1;                             // >= 1
+  double low_frequency = 0, high_frequency = 0;  // between which the ground answers [Hz]
+  double window = 0.25;                          // touchdowns within it add up [s]
+  double least_distance = 1;                     // nearer ones count as if there [m]
+  std::string source;                            // where the numbers come from, in words
+};
+
 /// Something beside the building that must not be reached. Corners counter-clockwise in W's xy plane.
 struct Neighbour {
   std::string name;
   std::vector<std::array<double, 2>> footprint;  // [m]
   double clearance = 0;                          // least distance of debris that is asked for [m]
   double vibration_limit = 0;                    // peak particle velocity, 0: none given [m/s]
+  BuildingClass building_class = BuildingClass::Unknown;
   bool is_utility = false;
   SourcePosition where;
 };
@@ -192,6 +211,7 @@ struct Plan {
   std::vector<Cable> cables;
   Ground ground;
   std::vector<Neighbour> neighbours;
+  std::optional<VibrationLaw> vibration;
   Criteria criteria;
   Analysis analysis;
   FuzzyPlan fuzzy;  // empty unless the plan has [fuzzy]; its other values are the plan's own

@@ -82,6 +82,49 @@ std::vector<Point> read_footprint(TableReader& table) {
 
 }  // namespace
 
+namespace {
+
+/// Both ends of a range of frequencies.
+void read_frequencies(TableReader& table, VibrationLaw& law) {
+  const std::string help =
+      "the frequencies between which the ground answers, such as frequency = [\"5 Hz\", \"25 Hz\"]";
+  const Node* node = table.find("frequency");
+  if (!node) {
+    table.missing("frequency", help);
+    return;
+  }
+  if (node->kind != Node::Kind::Array || node->items.size() != 2) {
+    table.error("E202", node->place, "frequency: two frequencies are wanted", help);
+    return;
+  }
+  const std::string label = table.label() + ": frequency";
+  law.low_frequency = read_quantity(node->items[0], label, Dimension::Frequency, {1, 1000}, table.complaints());
+  law.high_frequency = read_quantity(node->items[1], label, Dimension::Frequency, {1, 1000}, table.complaints());
+  if (law.high_frequency < law.low_frequency)
+    table.error("E205", node->place, "frequency: the second one is below the first", help);
+}
+
+void read_vibration(Reading& reading, TableReader& site) {
+  const Node* node = site.table("vibration");
+  if (!node) return;
+  TableReader table(*node, "vibration", reading.complaints);
+  VibrationLaw law;
+  law.velocity = table.quantity("velocity", Dimension::Velocity, {0, 10, true});
+  law.energy = table.quantity("energy", Dimension::Energy, {0, 1e12, true});
+  law.distance = table.quantity("distance", Dimension::Length, {0, 1e4, true});
+  law.energy_exponent = table.quantity("energy_exponent", Dimension::Number, {0.1, 2});
+  law.distance_exponent = table.quantity("distance_exponent", Dimension::Number, {0, 5});
+  law.factor = table.quantity("factor", Dimension::Number, {1, 100});
+  law.window = table.quantity("window", Dimension::Time, {0, 60}, law.window);
+  law.least_distance = table.quantity("least_distance", Dimension::Length, {0, 1000, true}, law.least_distance);
+  law.source = table.text("source");
+  read_frequencies(table, law);
+  table.finish();
+  reading.plan.vibration = std::move(law);
+}
+
+}  // namespace
+
 void read_site(Reading& reading, TableReader& root) {
   const Node* node = root.table("site");
   if (!node) return;
@@ -103,12 +146,20 @@ void read_site(Reading& reading, TableReader& root) {
       n.footprint = read_footprint(table);
       n.clearance = table.quantity("clearance", Dimension::Length, {0, 1000}, 0);
       n.vibration_limit = table.quantity("vibration_limit", Dimension::Velocity, {0, 1, true}, 0);
+      if (!is_utility) {
+        const auto known = table.find_choice("building_class", {"commercial", "residential", "sensitive"});
+        if (known)
+          n.building_class = *known == "commercial"    ? BuildingClass::Commercial
+                             : *known == "residential" ? BuildingClass::Residential
+                                                       : BuildingClass::Sensitive;
+      }
       n.is_utility = is_utility;
       n.where = reading.complaints.position(tables[i]->place);
       table.finish();
       plan.neighbours.push_back(std::move(n));
     }
   }
+  read_vibration(reading, site);
   site.finish();
 }
 
