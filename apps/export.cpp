@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "base/file.h"
+#include "collapse/debris_tables.h"
 #include "commands.h"
 #include "engines/adams.h"
 #include "mbs/model_json.h"
@@ -45,7 +46,13 @@ int export_file(const Arguments& a) {
     };
     if (a.vtk) say(record::export_vtk(r, a.output));
     if (a.gltf) say(record::export_gltf(r, a.output));
-    if (a.csv) say(record::export_csv(r, a.output));
+    if (a.csv) {
+      say(record::export_csv(r, a.output));
+      constexpr double cell = 0.25;  // [m]
+      const std::filesystem::path where(a.output);
+      replace_file((where / "debris_heights.csv").string(), collapse::make_height_table(r, cell));
+      replace_file((where / "debris_outlines.csv").string(), collapse::make_outline_table(r));
+    }
     if (a.json) say(record::export_json(r, a.output));
     return kOk;
   } catch (const InputError& e) { return refuse(e, {}, {}, false); }

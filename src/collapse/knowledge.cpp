@@ -49,6 +49,7 @@ const std::map<std::string, Field>& fields() {
       {"mechanism.fold_share", &Knowledge::mechanism_fold_share},
       {"mechanism.fold_rotation", &Knowledge::mechanism_fold_rotation},
       {"mechanism.direction_tolerance", &Knowledge::mechanism_direction_tolerance},
+      {"mechanism.together_share", &Knowledge::mechanism_together_share},
       {"mechanism.aborted_rotation", &Knowledge::mechanism_aborted_rotation},
       {"verification.energy_error", &Knowledge::verification_energy_error},
       {"verification.equilibrium_residual", &Knowledge::verification_equilibrium_residual},

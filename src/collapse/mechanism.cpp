@@ -58,16 +58,21 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
       when, out.tilt / unit::deg, out.drop, 100 * out.rear_share, 100 * out.moved);
   const double height_left = in.frames.front().height > 0 ? last.height / in.frames.front().height : 1;
   const double final_tilt = norm(log_rotation(last.rotation));
+  // of the largest connected part of the upper block, not of pieces that came off
   const double sunk = norm(last.displacement);
-  if (out.moved < k.mechanism_stands_share && !(sunk > k.stands_displacement)) {
+  const bool has_sunk = sunk > k.stands_displacement && last.connected >= k.mechanism_coherent_share;
+  if (out.moved < k.mechanism_stands_share && !has_sunk) {
     out.name = "stands";
     out.text = fmt::format("The building stands: {:.1f} % of its mass came down.", 100 * out.moved);
-  } else if (out.moved < k.mechanism_stands_share) {
+  } else if (out.moved < k.mechanism_stands_share && !in.came_to_rest) {
+    out.name = "partial";
+    out.text = fmt::format("It has begun to sink: the upper block has moved by {:.2f} m.", sunk);
+  } else if (in.came_to_rest && has_sunk && final_tilt < k.mechanism_aborted_rotation && height_left > 0.5) {
     out.name = "partial";
     out.text = fmt::format(
-        "{}: the upper block has moved by {:.2f} m, {:.2f} m of it downwards, and leans by {:.1f} deg; that is all.",
-        in.came_to_rest ? "Aborted collapse: it has sunk and stands" : "It has begun to sink", sunk,
-        -last.displacement.z, final_tilt / unit::deg);
+        "Aborted collapse: the upper block has sunk by {:.2f} m and stands, leaning by {:.1f} deg, its mass centre at "
+        "{:.0f} % of its height.",
+        -last.displacement.z, final_tilt / unit::deg, 100 * height_left);
   } else if (out.moved < k.mechanism_partial_share) {
     out.name = "partial";
     out.text = fmt::format("Partial collapse: {}.", motion);
@@ -79,7 +84,7 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
     out.name = "fold";
     out.text = fmt::format("It folds: {:.0f} % of the upper mass turns forward, {:.0f} % backward; {}.",
                            100 * at->forward, 100 * at->backward, motion);
-  } else if (at->connected < k.mechanism_coherent_share) {
+  } else if (at->connected < k.mechanism_coherent_share && at->moved < k.mechanism_together_share) {
     out.name = "progressive";
     out.text = fmt::format("Progressive collapse: the largest connected part holds {:.0f} % of the upper mass; {}.",
                            100 * at->connected, motion);

@@ -1,5 +1,5 @@
 #pragma once
-/// How it came down: classes of collapse from the motion of the upper block (docs/theory/manager.md, section 6).
+/// How it came down: classes of collapse from the motion of the upper block (docs/theory/findings.md, section 1).
 
 #include <string>
 #include <vector>

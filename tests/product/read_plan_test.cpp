@@ -626,5 +626,30 @@ TEST(Documentation, ListsExactlyTheCodesThatAreUsed) {
   EXPECT_EQ(used, listed);
 }
 
+std::string with_vibration(const std::string& frequency) {
+  return replaced(small_plan(), "clearance = \"3 m\"\n",
+                  "clearance = \"3 m\"\nbuilding_class = \"residential\"\n[site.vibration]\nvelocity = \"2 mm/s\"\n"
+                  "energy = \"1 MJ\"\ndistance = \"10 m\"\nenergy_exponent = 0.5\ndistance_exponent = 1.5\nfactor = 2\n"
+                  "source = \"report 12\"\nfrequency = " +
+                      frequency + "\n");
+}
+
+TEST(ReadPlan, ReadsTheSitesVibrationLaw) {
+  std::vector<Diagnostic> warnings;
+  const Plan plan = read_plan(with_vibration("[\"5 Hz\", \"25 Hz\"]"), "plan.toml", warnings);
+  ASSERT_TRUE(plan.vibration.has_value());
+  EXPECT_DOUBLE_EQ(plan.vibration->velocity, 2e-3);
+  EXPECT_DOUBLE_EQ(plan.vibration->energy, 1e6);
+  EXPECT_EQ(plan.vibration->high_frequency, 25);
+  EXPECT_EQ(plan.vibration->window, 0.25);
+  EXPECT_EQ(plan.vibration->source, "report 12");
+  EXPECT_EQ(plan.neighbours.at(0).building_class, BuildingClass::Residential);
+}
+
+TEST(ReadPlan, RefusesFrequenciesThatAreNoRange) {
+  for (const char* wrong : {"[\"25 Hz\", \"5 Hz\"]", "[\"5 Hz\"]", "\"5 Hz\"", "[\"5 m\", \"6 m\"]"})
+    EXPECT_NE(rendered(complaints_about(with_vibration(wrong)), "").find("frequency"), std::string::npos) << wrong;
+}
+
 }  // namespace
 }  // namespace topple::product

@@ -1,0 +1,33 @@
+#include "collapse/debris_tables.h"
+
+#include <fmt/format.h>
+
+#include "collapse/outcome.h"
+
+namespace topple::collapse {
+
+std::string make_height_table(const record::Record& r, double cell) {
+  std::string out = "x [m],y [m],height [m]\r\n";
+  if (r.time.empty()) return out;
+  std::vector<PlacedBox> boxes;
+  for (size_t b = 0; b < r.bodies.size(); ++b) {
+    if (r.bodies[b].fixed) continue;
+    const Pose X_WB = record::pose_at(r, r.time.size() - 1, b);
+    for (const record::BoxShape& s : r.bodies[b].shapes) boxes.push_back({X_WB * s.X_BS, s.half});
+  }
+  for (const Heap::Column& c : calc_heap(boxes, cell).columns)
+    out += fmt::format("{},{},{}\r\n", (static_cast<double>(c.i) + 0.5) * cell, (static_cast<double>(c.j) + 0.5) * cell,
+                       c.height);
+  return out;
+}
+
+std::string make_outline_table(const record::Record& r) {
+  std::string out = "share,x [m],y [m]\r\n";
+  if (r.time.empty()) return out;
+  for (const double share : {0.5, 0.9, 0.95, 1.0})
+    for (const Point2& p : calc_share_outline(r, r.time.size() - 1, share))
+      out += fmt::format("{},{},{}\r\n", share, p[0], p[1]);
+  return out;
+}
+
+}  // namespace topple::collapse
