@@ -34,6 +34,7 @@ topple_web_test(web_harness harness.test.mjs)
 topple_web_test(web_report report.test.mjs BROWSER)
 topple_web_test(web_compare compare.test.mjs BROWSER)
 topple_web_test(web_study study.test.mjs BROWSER)
+topple_web_test(web_steer steer.test.mjs BROWSER LIMIT 600)
 
 if(TARGET topple)
   set(short_run ${CMAKE_CURRENT_BINARY_DIR}/short_run)

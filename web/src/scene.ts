@@ -66,7 +66,10 @@ export class Scene implements SceneLike {
       this.companion = new Building(run);
       this.companion.setTheme(this.stage.dark ? darkTheme : lightTheme, this.stage.dark);
       this.stage.scene.add(this.companion.group);
-      if (beside) this.stage.setPair([this.building.group, this.companion.group]);
+      if (beside) {
+        this.stage.setPair([this.building.group, this.companion.group]);
+        this.fit();
+      }
       else this.companion.setGhost(ghostColour);
       this.companion.setLook(this.colouring, beside ? this.zoneMarks : "none", -1);
       this.companion.setTime(this.time);

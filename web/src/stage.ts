@@ -24,6 +24,7 @@ export interface StageOptions {
 }
 
 const slowest = 33; // between two pictures in motion [ms]
+const leastRatio = 0.5; // fewer pixels than that and members cannot be told apart
 const restAfter = 220; // [ms]
 
 export class Stage implements SceneLike {
@@ -198,7 +199,7 @@ export class Stage implements SceneLike {
     this.lastRender = now;
     if (interval < restAfter) this.meanInterval += 0.25 * (interval - this.meanInterval);
     else this.meanInterval = Math.min(this.meanInterval, slowest);
-    if (this.meanInterval > slowest && this.ratio > 0.3) this.setRatio(Math.max(0.3, 0.8 * this.ratio));
+    if (this.meanInterval > slowest && this.ratio > leastRatio) this.setRatio(Math.max(leastRatio, 0.8 * this.ratio));
     else if (this.meanInterval < 0.55 * slowest && this.ratio < this.fullRatio) this.setRatio(Math.min(this.fullRatio, 1.1 * this.ratio));
     clearTimeout(this.restTimer);
     if (this.ratio < this.fullRatio)

@@ -22,7 +22,8 @@ function makeCurves(law: LawFamily | undefined, path: (number | null)[][], which
     for (let k = rotations.length - 1; k >= 0; --k) {
       const m = law.negative[row]?.[k];
       // A negative branch may be given as sizes.
-      if (m !== null && m !== undefined) points.push([-(rotations[k] as number) * turn, -Math.abs(m) / 1000]);
+      // Both signs begin at 0: a hair apart, so that a curve rises there instead of leaning.
+      if (m !== null && m !== undefined) points.push([-(rotations[k] as number) * turn - 1e-9, -Math.abs(m) / 1000]);
     }
     rotations.forEach((r, k) => {
       const m = law.positive[row]?.[k];

@@ -60,7 +60,7 @@ export function makeSteerState(address: string) {
     const id = ++noticeId;
     const others = notices.value.filter((n) => n.text !== text).slice(-3);
     notices.value = [...others, { id, status, text, ...(help === undefined || help === "" ? {} : { help }) }];
-    if (status !== "bad") setTimeout(() => dismiss(id), 6000);
+    setTimeout(() => dismiss(id), status === "bad" ? 20000 : 5000);
   };
   const dismiss = (id: number): void => {
     notices.value = notices.value.filter((n) => n.id !== id);
@@ -198,6 +198,7 @@ export function makeSteerState(address: string) {
       tab.value = keep.tab;
     }
     void readFindings();
+    ask<{ sessions: Session[] }>("session.list").then((r) => r !== undefined && (sessions.value = r.sessions));
     ask<{ entries: LogEntry[] }>("log").then((r) => r !== undefined && (log.value = r.entries));
     ask<{ studies: Study[] }>("study.list").then((r) => r?.studies.forEach((s) => putStudy(s, [])));
     ask<PlanCheck>("plan.check", { text: plan.value.text }).then((r) => r !== undefined && editedText.value === null && (planCheck.value = r));
@@ -306,10 +307,19 @@ export function makeSteerState(address: string) {
       });
   }
   setInterval(fill, 1000);
+  // The verdict so far, while there is news.
+  setInterval(() => {
+    if (phase.value === "running" && connection.status.value === "open") void readFindings();
+  }, 3000);
 
+  let reading = false;
   async function readFindings(): Promise<void> {
     const id = active.value;
+    if (reading || id === 0) return;
+    reading = true;
     const result = await connection.command<FindingsSoFar>("findings", { branch: id }).catch(() => undefined);
+    reading = false;
+    if (active.value !== id) return readFindings();
     if (result === undefined || active.value !== id) return;
     findings.value = result;
     const run = runs.get(id);

@@ -6,7 +6,7 @@ import { WebSocketServer } from "ws";
 import { keep } from "./harness.mjs";
 import { makeSynthetic } from "./synthetic.mjs";
 
-const frameCount = 270;
+const frameCount = 270; // of the made-up run
 const token = "0123456789abcdef0123456789abcdef";
 export const planText = `# A made-up plan
 title = "Storehouse of seven storeys"
@@ -27,10 +27,16 @@ const problem = (code, message, more = {}) => Object.assign(new Error(message), 
 
 /// The run that a branch would have if it were computed to its end.
 const courses = new Map();
+let makeData = (second) => makeSynthetic(frameCount, second);
+/// Another building for all servers of this process; `make` gives report data of 270 frames.
+export function useData(make) {
+  makeData = make;
+  courses.clear();
+}
 function makeCourse(second) {
   let course = courses.get(second);
   if (course !== undefined) return course;
-  const data = makeSynthetic(frameCount, second);
+  const data = makeData(second);
   const floats = (text) => {
     const bytes = Buffer.from(text, "base64");
     return new Float32Array(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length));
@@ -83,7 +89,7 @@ class Session {
     const charged = data.bodies.filter((b) => b.kind === "column" && b.storey === 0 && /^C-[ABC]/.test(b.name));
     const info = {
       id: this.branches.length + 1, name, parent: parent?.id ?? null, time: data.time[row], first_frame: row, duration: 12, ending: null,
-      charges: parent?.charges.map((c) => ({ ...c })) ?? charged.map((b, index) => ({
+      charges: parent?.charges.map((c) => ({ ...c, fired: !c.removed && c.time <= data.time[row] })) ?? charged.map((b, index) => ({
         index, stage: b.name[2] === "C" ? 1 : 0, member: b.name, position: 1.1, destroyed_length: 1.5, residual_bars: 0.1,
         time: b.name[2] === "C" ? 4 : 0.5, fired: false, fails: false, removed: false })),
       stages: parent?.stages.map((s) => ({ ...s })) ?? [{ index: 0, name: "Rows A and B", time: 0.5 }, { index: 1, name: "Row C", time: 4 }],
@@ -117,13 +123,13 @@ class Session {
     const { time } = makeCourse(b.own.second).data;
     this.tell("state", {
       phase: this.phase, branch: b.id, time: time[b.own.row], frames: b.own.row + 1, cursor: this.cursor, speed: this.speed,
-      real_time_factor: this.phase === "running" ? 1.7 : null, duration: 12, eta: this.phase === "running" ? (time[frameCount - 1] - time[b.own.row]) / 1.7 : null, ending: b.ending, progress: null,
+      real_time_factor: this.phase === "running" ? 1.7 : null, duration: 12, eta: this.phase === "running" ? (time[this.server.frames - 1] - time[b.own.row]) / 1.7 : null, ending: b.ending, progress: null,
     });
   }
   advance(rows) {
     const b = this.branch();
     const course = makeCourse(b.own.second);
-    const last = Math.min(frameCount - 1, b.own.row + rows);
+    const last = Math.min(this.server.frames - 1, b.own.row + rows);
     while (b.own.row < last) {
       b.own.row += 1;
       this.sendFrame(b, b.own.row, 1);
@@ -134,7 +140,7 @@ class Session {
     if (events.length > b.own.happened) this.tell("happenings", { branch: b.id, events: events.slice(b.own.happened) });
     b.own.happened = events.length;
     if (this.zone !== null) this.tell("zone", { branch: b.id, zone: this.zone, points: [this.zonePoint(now)] });
-    if (b.own.row === frameCount - 1) {
+    if (b.own.row === this.server.frames - 1) {
       this.phase = "finished";
       b.ending = { kind: this.server.endingKind, text: this.server.endingKind === "at_rest" ? "All parts are at rest at 9.00 s." : "The plan's duration of 9 s is over; 14 parts are still moving." };
       this.tell("branch", { branch: this.describeBranch(b) });
@@ -160,7 +166,7 @@ class Session {
     }
   }
   tick() {
-    if (this.phase === "running") this.advance(this.speed === null ? 4 : Math.max(1, Math.round(this.speed)));
+    if (this.phase === "running") this.advance(this.speed === null ? this.server.rate : Math.max(1, Math.round(this.speed)));
   }
   findings(b) {
     const { data } = makeCourse(b.own.second);
@@ -257,6 +263,8 @@ export class Standin {
   studies = [];
   endingKind = "at_rest";
   dropEvery = 0;
+  frames = frameCount;
+  rate = 4; // frames a tick
   refuse = false; // new connections
   resume = new Map();
 

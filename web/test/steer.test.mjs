@@ -1,0 +1,508 @@
+// The steering page in a browser, before a stand-in of the server: every control, every state.
+import assert from "node:assert/strict";
+import { mkdir } from "node:fs/promises";
+import { fileURLToPath } from "node:url";
+import { openPage } from "./browser.mjs";
+import { after, before, describe, it } from "./harness.mjs";
+import { Standin, planText } from "./standin.mjs";
+import { assertPng, assertWebm, findOverflow, makeDriver, takeDownload } from "./steer_helpers.mjs";
+
+const out = fileURLToPath(new URL("out/steer/", import.meta.url));
+const near = (a, b, tolerance) => assert.ok(Math.abs(a - b) <= tolerance, `${a}, not ${b}`);
+// Frames are 9 s / 269 apart: what is asked for is met up to one of them, and the clock shows milliseconds.
+const frame = 9 / 269 + 1e-3;
+
+describe("steering page", () => {
+  let server, browser, page, d;
+  const shot = (name) => page.screenshot({ path: `${out}${name}.png` });
+  before(async () => {
+    await mkdir(out, { recursive: true });
+    server = await new Standin().start();
+    server.rate = 1; // about real time
+    browser = await openPage(server.url);
+    page = browser.page;
+    d = makeDriver(page);
+  });
+  after(() => browser?.close());
+
+  it("shows the building before anything runs", async () => {
+    await d.until("phase", "Paused");
+    assert.equal(await d.branch(), "main");
+    assert.equal(await d.frontier(), 0);
+    await d.until("verdict", "The building stands");
+    await d.settle();
+    await shot("paused");
+    assert.ok((await d.countColours()) > 20, "the picture is empty");
+    assert.deepEqual(await findOverflow(page), []);
+  });
+
+  it("runs, follows, and pauses where it is", async () => {
+    await d.run();
+    await d.untilFrontier(1.5);
+    await shot("running");
+    await d.pause();
+    const frontier = await d.frontier();
+    await d.untilViewed(frontier);
+    assert.equal(await d.frontier(), frontier, "it went on after the pause");
+    assert.ok(frontier < 9);
+  });
+
+  it("steps one frame", async () => {
+    const begin = await d.frontier();
+    await d.click("step");
+    await page.waitForFunction((t) => parseFloat(document.querySelector("[data-test=frontier]").textContent) > t, begin);
+    near(await d.frontier(), begin + 9 / 269, 2e-3);
+  });
+
+  it("keeps the two clocks apart: scrubbing does not change the run", async () => {
+    const frontier = await d.frontier();
+    const log = server.sessions[0].log.length;
+    await d.scrub(0.4);
+    await d.untilViewed(0.4);
+    assert.equal(await d.frontier(), frontier);
+    assert.equal(await page.getAttribute("[data-test=live]", "aria-pressed"), "false");
+    assert.equal(server.sessions[0].log.length, log, "the viewer sent a command");
+    assert.equal(server.sessions[0].cursor, null);
+    await d.click("live");
+    await d.untilViewed(frontier);
+  });
+
+  it("does everything by keys", async () => {
+    const frontier = await d.frontier();
+    await page.locator("[data-test=canvas]").focus();
+    await page.keyboard.press("Home");
+    await d.untilViewed(0);
+    await page.keyboard.press("ArrowRight");
+    await d.untilViewed(9 / 269);
+    await page.keyboard.press("ArrowLeft");
+    await d.untilViewed(0);
+    await page.keyboard.press("Shift+ArrowRight");
+    await d.untilViewed(0.5);
+    await page.keyboard.press("Shift+ArrowLeft");
+    await d.untilViewed(0);
+    await page.keyboard.press("End");
+    await d.untilViewed(frontier);
+    await page.keyboard.press("Home");
+    await page.keyboard.press("Space");
+    await page.waitForFunction(() => parseFloat(document.querySelector("[data-test=time]").textContent) > 0.1);
+    await page.keyboard.press("Space");
+    assert.equal(await d.frontier(), frontier, "playing moved the run");
+    await page.keyboard.press("s");
+    await page.waitForSelector(".section-panel");
+    await page.keyboard.press("s");
+    await page.keyboard.press("l");
+    await d.untilViewed(frontier);
+    await page.keyboard.press("ArrowRight"); // at the frontier: computes a frame
+    await page.waitForFunction((t) => parseFloat(document.querySelector("[data-test=frontier]").textContent) > t, frontier);
+    await page.keyboard.press("Space");
+    await d.until("phase", "Running");
+    await page.keyboard.press("Space");
+    await d.until("phase", "Paused");
+    await page.keyboard.press("b");
+    await page.waitForSelector("dialog input[name=name]");
+    await page.keyboard.press("Escape");
+    await page.waitForSelector("dialog input[name=name]", { state: "detached" });
+    await page.keyboard.press("?");
+    await page.waitForSelector("dialog.help[aria-label=Keys]", { state: "visible" });
+    await shot("help");
+    await page.keyboard.press("Escape");
+    await page.waitForSelector("dialog.help[aria-label=Keys]", { state: "hidden" });
+  });
+
+  it("shows a member, its zones and the path on its curves", async () => {
+    const box = await page.locator("[data-test=canvas]").boundingBox();
+    let found = false;
+    for (let i = 0; i < 63 && !found; ++i) {
+      await page.mouse.click(box.x + (box.width * (1 + (i % 9))) / 10, box.y + (box.height * (1 + Math.floor(i / 9))) / 8);
+      found = (await page.locator("[data-test=inspector]").count()) > 0;
+    }
+    assert.ok(found, "no click met a member");
+    await page.fill("[data-test=member-search]", "C-D1-0");
+    assert.equal(await d.text("member-name"), "C-D1-0");
+    await page.locator("[data-test=watch-zone]").first().click();
+    await page.waitForSelector("[data-test=zone-plot] canvas");
+    await d.until("zone-plot", "elastic");
+    await shot("zone");
+    await page.locator("[data-test=zone-plot] summary").click();
+    assert.ok((await page.locator("[data-test=zone-plot] tbody tr").count()) > 20);
+    await page.locator("[data-test=zone-plot] summary").click();
+  });
+
+  it("colours, filters, cuts and turns the picture", async () => {
+    const seen = new Set();
+    for (const colouring of ["material", "state", "utilisation", "speed", "kind"]) {
+      await page.selectOption("[data-test=colouring]", colouring);
+      await d.settle();
+      seen.add((await page.locator("[data-test=canvas]").screenshot()).toString("base64"));
+    }
+    assert.ok(seen.size >= 4, `${seen.size} different pictures`);
+    const whole = await page.locator("[data-test=canvas]").screenshot();
+    await page.locator(".storeys input").first().uncheck();
+    await d.settle();
+    assert.notDeepEqual(await page.locator("[data-test=canvas]").screenshot(), whole, "the storey is still there");
+    await page.locator(".storeys input").first().check();
+    await d.click("section");
+    await page.locator(".section-row input").nth(1).evaluate((e) => ((e.value = "0.5"), e.dispatchEvent(new Event("input", { bubbles: true }))));
+    await d.settle();
+    await shot("section");
+    assert.notDeepEqual(await page.locator("[data-test=canvas]").screenshot(), whole, "nothing was cut");
+    await page.locator(".section-panel button").click();
+    await d.click("section");
+    await page.getByRole("button", { name: "Right", exact: true }).focus();
+    await page.keyboard.press("Enter");
+    await d.settle();
+    await shot("side");
+    await page.keyboard.press("Escape");
+    await page.keyboard.press("f");
+  });
+
+  it("changes the second stage's delay before it fires, on a branch of its own", async () => {
+    await d.scrub(1);
+    await d.click("delay-stage-1");
+    await page.waitForSelector("dialog input[name=time]");
+    await shot("dialog");
+    await d.submit({ time: "5,5" });
+    await d.untilBranch("what-if 1");
+    const branch = server.sessions[0].branch();
+    near(branch.time, 1, frame);
+    assert.equal(branch.stages[1].time, 5.5);
+    assert.equal(branch.parent, 1);
+    near(await d.frontier(), 1, frame);
+    await d.until("edits", "Row C fires at 5.5");
+    assert.equal(server.sessions[0].branch(1).stages[1].time, 4, "the past was changed");
+  });
+
+  it("says what is wrong with a value before it sends it", async () => {
+    await d.click("delay-stage-1");
+    await page.fill("dialog input[name=time]", "soon");
+    await page.click("dialog [data-test=submit]");
+    await page.waitForSelector("dialog [role=alert]");
+    assert.match(await page.textContent("dialog [role=alert]"), /“soon” is not a number/);
+    await page.keyboard.press("Escape");
+  });
+
+  it("adds and removes charges, cables and pre-cuts, fires now, changes friction", async () => {
+    const session = server.sessions[0];
+    const before = session.branch().charges.length;
+    await d.click("add-charge");
+    await d.submit({ member: "C-D1-0", position: "1.2" });
+    await d.until("edits", "A charge in C-D1-0");
+    const added = session.branch().charges[before];
+    near(added.position, 1.2, 1e-12);
+    near(added.residual_bars, 0.1, 1e-12);
+    await d.click("add-charge");
+    await d.submit({ member: "C-X9-0" });
+    await d.until("notice", "There is no member");
+    await shot("refused");
+    await page.locator("dialog").getByRole("button", { name: "Cancel" }).click();
+    await d.click("add-cable");
+    await d.submit({ member: "C-A1-2", pretension: "250" });
+    await page.waitForSelector("[data-test=remove-cable]");
+    assert.deepEqual([session.branch().cables[0].force, session.branch().cables[0].anchor], [250000, [-40, 10, 0]]);
+    await d.click("remove-cable");
+    await page.waitForSelector("[data-test=remove-cable]", { state: "detached" });
+    await d.click("add-cut");
+    await d.submit({ member: "C-D1-0", cut_bars: "40" });
+    await d.until("edits", "C-D1-0 is cut");
+    await d.click("friction");
+    await d.submit({ ground: "0.45" });
+    await d.until("edits", "Friction 0.45");
+    assert.equal(session.branch().friction.ground, 0.45);
+    await page.locator(".stage-row button[aria-expanded]").nth(1).click();
+    await page.locator("[data-test=fire]").first().click();
+    await d.until("edits", "fires now");
+    await page.locator("[data-test=remove-charge]").first().click();
+    await d.until("edits", "is taken out");
+    await shot("edits");
+  });
+
+  it("branches with a name, switches, renames, takes back", async () => {
+    await d.click("new-branch");
+    await d.submit({ name: "later" });
+    await d.untilBranch("later");
+    await page.getByRole("button", { name: "Rename later" }).click();
+    await d.submit({ name: "much later" });
+    await d.untilBranch("much later");
+    await page.locator("[data-test=branch]", { hasText: "main" }).click();
+    await d.untilBranch("main");
+    await page.locator("[data-test=branch]", { hasText: "what-if 1" }).first().click();
+    await d.untilBranch("what-if 1");
+    await page.keyboard.press("Control+z");
+    await d.untilBranch("main");
+    await d.tab("log");
+    for (const words of ["set delay", "add charge", "undo"]) await d.until("log", words);
+    await shot("log");
+    await d.tab("plots");
+  });
+
+  it("runs both branches to their ends and says how they ended", async () => {
+    server.rate = 8;
+    await d.run();
+    await d.until("banner", "At rest");
+    await shot("finished");
+    await page.locator("[data-test=branch]", { hasText: "what-if 1" }).first().click();
+    await d.untilBranch("what-if 1");
+    server.endingKind = "time_limit";
+    await d.run();
+    await d.until("banner", "Time limit reached");
+    await d.until("banner", "may still have been moving");
+    await shot("time-limit");
+  });
+
+  it("has every frame although a slow reader gets only some of them", async () => {
+    server.dropEvery = 3;
+    await page.locator("[data-test=branch]", { hasText: "much later" }).first().click();
+    await d.untilBranch("much later");
+    await d.run();
+    await d.until("phase", "Finished");
+    await page.waitForFunction(() => document.querySelector(".clock").textContent.includes("of 270"));
+    server.dropEvery = 0;
+  });
+
+  it("compares two branches: plots, tables, beside and over each other", async () => {
+    await page.locator("[data-test=branch]", { hasText: "main" }).click();
+    await d.untilBranch("main");
+    await page.locator(".branch-row", { hasText: "what-if 1" }).locator("[data-test=compare]").click();
+    await page.waitForSelector("[data-test=compare-panel] .plot canvas");
+    await d.until("compare-panel", "21.9");
+    await d.scrub(6.6);
+    await d.click("compare-beside");
+    await page.waitForSelector(".half-name.right");
+    await page.waitForFunction(() => [...globalThis.topple.runs.values()].every((r) => ![1, 2].includes(r.id) || r.rows.length === 270));
+    await d.settle();
+    await shot("beside");
+    const beside = await page.locator("[data-test=canvas]").screenshot();
+    await d.click("compare-over");
+    await d.settle();
+    await shot("over");
+    assert.notDeepEqual(await page.locator("[data-test=canvas]").screenshot(), beside);
+    await d.click("tall");
+    await shot("compare");
+    await d.click("tall");
+    await d.click("compare-off");
+  });
+
+  it("checks the plan's text as it is written, and goes to the line", async () => {
+    await d.click("check");
+    const text = await page.inputValue("[data-test=plan-text]");
+    assert.equal(text, planText);
+    await page.fill("[data-test=plan-text]", `${planText}dealy = "4 s"\n`);
+    await d.until("check-count", "1 error");
+    assert.ok(await page.locator("[data-test=apply]").isDisabled());
+    await page.locator("[data-test=diagnostic]").click();
+    const picked = await page.locator("[data-test=plan-text]").evaluate((e) => e.value.slice(e.selectionStart, e.selectionEnd));
+    assert.equal(picked, "dealy");
+    await shot("check-failed");
+    await page.fill("[data-test=plan-text]", 'title = "x"\n');
+    await page.waitForSelector("[data-test=dead-plan]");
+    await shot("dead-plan");
+  });
+
+  it("saves the text, and asks when the file has changed since", async () => {
+    const mine = planText.replace("500 ms", "600 ms");
+    await page.fill("[data-test=plan-text]", mine);
+    await d.until("check-count", "0 errors");
+    await d.click("save");
+    await d.until("notice", "Saved");
+    assert.equal(server.sessions[0].disk, mine);
+    server.sessions[0].disk = planText.replace("500 ms", "700 ms");
+    await page.fill("[data-test=plan-text]", mine.replace("600 ms", "650 ms"));
+    await d.click("save");
+    await page.waitForSelector("[data-test=conflict]");
+    await shot("conflict");
+    assert.ok(server.sessions[0].disk.includes("700 ms"), "it was overwritten");
+    await d.click("overwrite");
+    await d.until("notice", "Saved over");
+    assert.ok(server.sessions[0].disk.includes("650 ms"));
+    server.sessions[0].disk = planText;
+    await page.fill("[data-test=plan-text]", mine);
+    await d.click("save");
+    await page.waitForSelector("[data-test=conflict]");
+    await d.click("keep-disk");
+    await page.waitForFunction((t) => document.querySelector("[data-test=plan-text]").value === t, planText);
+    await page.fill("[data-test=plan-text]", mine);
+    await d.until("check-count", "0 errors");
+    await d.click("apply");
+    await page.waitForFunction(() => document.querySelector("[data-test=active-branch]").textContent.startsWith("plan "));
+    await page.getByRole("button", { name: "Discard" }).click();
+    await d.click("tall");
+  });
+
+  it("starts a study, watches it grow, and plays a run of it", async () => {
+    await d.tab("study");
+    await page.fill(".study .count", "40");
+    await d.click("study-start");
+    await page.waitForFunction(() => parseInt(document.querySelector("[data-test=study-state]")?.textContent.split(", ")[1] ?? "0") >= 5);
+    const early = await page.getAttribute(".membership svg", "aria-label");
+    await d.until("study-state", "finished, 40 of 40");
+    assert.notEqual(await page.getAttribute(".membership svg", "aria-label"), early, "the membership did not grow");
+    assert.ok((await page.locator(".fan polygon").count()) === 3);
+    await d.click("tall");
+    await shot("study");
+    await page.locator(".study summary").click();
+    await page.locator("[data-test=play-sample]").first().waitFor();
+    assert.equal(await page.locator("[data-test=play-sample]").count(), 40);
+    await page.locator(".study summary").click();
+    const canvas = page.locator("[data-test=parallel]");
+    await canvas.scrollIntoViewIfNeeded();
+    const box = await canvas.boundingBox();
+    await canvas.click({ position: { x: box.width * 0.3, y: box.height * 0.5 } });
+    await page.waitForFunction(() => document.querySelector("[data-test=active-branch]").textContent.startsWith("sample "));
+    await d.untilFrontier(0.5);
+    await d.pause();
+    await d.click("tall");
+    await d.tab("plots");
+  });
+
+  it("saves the picture and a video of the run", async () => {
+    await page.locator("[data-test=branch]", { hasText: "main" }).click();
+    await d.untilBranch("main");
+    await d.scrub(6);
+    await d.settle();
+    const png = await takeDownload(page, () => d.click("png"));
+    assertPng(png.bytes);
+    assert.match(png.name, /main\.png$/);
+    await page.selectOption("select[aria-label='Speed of the playback']", "4");
+    const webm = await takeDownload(page, () => d.click("webm"));
+    assertWebm(webm.bytes);
+    await d.settle();
+  });
+
+  it("opens the report of the branch", async () => {
+    const [popup] = await Promise.all([page.context().waitForEvent("page"), d.click("report")]);
+    await popup.waitForLoadState();
+    assert.match(popup.url(), /api\/sessions\/1\/branches\/1\/report\.html$/);
+    await popup.close();
+  });
+
+  it("survives a lost connection: the run goes on, the page comes back", async () => {
+    await page.locator("[data-test=branch]", { hasText: /^└ sample/ }).or(page.locator("[data-test=branch]", { hasText: "sample" })).first().click();
+    await page.waitForFunction(() => document.querySelector("[data-test=active-branch]").textContent.startsWith("sample "));
+    server.rate = 1;
+    await d.run();
+    server.refuse = true;
+    server.cut();
+    await d.until("banner", "No connection");
+    await shot("disconnected");
+    const seen = await d.frontier();
+    server.refuse = false;
+    await page.waitForFunction(() => !(document.querySelector("[data-test=banner]")?.textContent ?? "").includes("No connection"));
+    await d.untilFrontier(seen + 0.05);
+    await d.pause();
+  });
+
+  it("survives a reload", async () => {
+    await page.locator("[data-test=branch]", { hasText: "what-if 1" }).first().click();
+    await d.untilBranch("what-if 1");
+    await d.scrub(3);
+    await d.tab("events");
+    await page.reload();
+    await page.waitForSelector("html[data-ready=yes]");
+    await d.untilBranch("what-if 1");
+    await d.untilViewed(3);
+    assert.equal(await page.getAttribute("#tab-events", "aria-selected"), "true");
+    await d.tab("findings");
+    await shot("findings");
+    await d.tab("events");
+    await shot("events");
+    await d.tab("plots");
+  });
+
+  it("opens another plan beside, and goes back", async () => {
+    await page.selectOption("[data-test=sessions]", "open");
+    await page.waitForSelector("[data-test=open-plan] [data-test=open-template]");
+    await shot("open");
+    await page.setInputFiles("[data-test=import]", { name: "bad.toml", mimeType: "text/plain", buffer: Buffer.from("dealy = 1\n") });
+    await page.waitForSelector("[data-test=open-plan] [role=alert]");
+    assert.match(await page.textContent("[data-test=open-plan] [role=alert]"), /dealy/);
+    await shot("open-failed");
+    await page.locator("[data-test=open-template]").first().click();
+    await page.waitForFunction(() => document.querySelector("[data-test=sessions]").options.length === 3);
+    await d.untilBranch("main");
+    await page.waitForFunction(() => parseFloat(document.querySelector("[data-test=frontier]").textContent) === 0);
+    await page.selectOption("[data-test=sessions]", "1");
+    await d.untilBranch("what-if 1");
+  });
+
+  it("shows the last good state of a run that diverged", async () => {
+    const session = server.sessions[0];
+    session.branch().ending = { kind: "failed", text: "The step at 3.012 s did not converge; the largest residual is in C-D1-0/foot." };
+    session.phase = "failed";
+    session.tellState();
+    await d.until("banner", "The calculation diverged");
+    await page.getByRole("button", { name: "Show C-D1-0/foot" }).click();
+    assert.equal(await d.text("member-name"), "C-D1-0");
+    await shot("diverged");
+  });
+
+  it("fits wide, narrow and dark", async () => {
+    for (const [name, width, height] of [["large", 1920, 1080], ["small", 1100, 760], ["phone", 420, 800]]) {
+      await page.setViewportSize({ width, height });
+      await d.settle();
+      await page.screenshot({ path: `${out}${name}.png`, fullPage: name === "phone" });
+      assert.deepEqual(await findOverflow(page), [], name);
+    }
+    await page.setViewportSize({ width: 1440, height: 900 });
+    await page.emulateMedia({ colorScheme: "dark" });
+    await d.settle();
+    await shot("dark");
+    await page.emulateMedia({ colorScheme: "light" });
+  });
+
+  it("names every control and gives each plot a table", async () => {
+    await d.tab("plots");
+    const nameless = await page.evaluate(() =>
+      [...document.querySelectorAll("button, select, input, textarea, a[href]")]
+        .filter((e) => e.getClientRects().length > 0)
+        .filter((e) => (e.textContent.trim() || e.getAttribute("aria-label") || e.getAttribute("title") || e.closest("label")?.textContent.trim() || "") === "")
+        .map((e) => e.outerHTML.slice(0, 80)));
+    assert.deepEqual(nameless, []);
+    assert.equal(await page.locator(".plot").count(), await page.locator(".plot details.data-table").count());
+  });
+
+  it("reports no error and asks nobody but its server", () =>
+    // cutting the connection is meant to fail
+    assert.deepEqual(browser.problems.filter((p) => !/WebSocket/.test(p)), []));
+});
+
+describe("steering page with nothing open", () => {
+  it("offers plans and templates, and opens one", async () => {
+    const server = await new Standin().start({ empty: true });
+    const browser = await openPage(server.url);
+    const { page } = browser;
+    await page.waitForSelector("[data-test=open-path]");
+    await page.screenshot({ path: `${out}empty.png` });
+    assert.equal(await page.locator("[data-test=open-template]").count(), 2);
+    await page.locator("[data-test=open-path]").first().click();
+    const d = makeDriver(page);
+    await d.until("phase", "Paused");
+    assert.equal(await d.branch(), "main");
+    assert.deepEqual(browser.problems, []);
+    await browser.close();
+  });
+
+  it("says that a plan without charges will stand, and that a crisp plan has no study", async () => {
+    const server = await new Standin().start({ text: 'title = "crisp"\n' });
+    const browser = await openPage(server.url);
+    const d = makeDriver(browser.page);
+    await d.until("banner", "the building will stand");
+    await d.tab("study");
+    await d.until("no-fuzzy", "[fuzzy]");
+    await browser.page.screenshot({ path: `${out}stands.png` });
+    await browser.close();
+  });
+
+  it("works without WebGL and with reduced motion", async () => {
+    const server = await new Standin().start();
+    const browser = await openPage(server.url, { webgl: false, reducedMotion: "reduce" });
+    const d = makeDriver(browser.page);
+    await browser.page.waitForSelector("[data-test=no-webgl]");
+    await d.run();
+    await d.untilFrontier(0.8);
+    await d.pause();
+    await d.scrub(0.5);
+    await d.untilViewed(0.5);
+    assert.deepEqual(browser.problems.filter((p) => !/WebGL/i.test(p)), []);
+    await browser.close();
+  });
+});

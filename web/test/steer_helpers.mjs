@@ -1,0 +1,95 @@
+// What tests of the steering page ask of it, whichever server is behind.
+import assert from "node:assert/strict";
+
+export function makeDriver(page) {
+  const text = async (name) => (await page.textContent(`[data-test=${name}]`)).trim();
+  const seconds = (words) => parseFloat(words.replace("−", "-"));
+  return {
+    text,
+    click: (name) => page.click(`[data-test=${name}]`),
+    frontier: async () => seconds(await text("frontier")),
+    viewed: async () => seconds(await text("time")),
+    branch: () => text("active-branch"),
+    /// Waits for words in an element, whatever else it says.
+    until: (name, words) =>
+      page.waitForFunction(([n, w]) => [...document.querySelectorAll(`[data-test=${n}]`)].some((e) => e.textContent.includes(w)), [name, words]),
+    untilFrontier: (t) => page.waitForFunction((time) => parseFloat(document.querySelector("[data-test=frontier]")?.textContent ?? "0") >= time, t),
+    untilViewed: (t) => page.waitForFunction((time) => Math.abs(parseFloat(document.querySelector("[data-test=time]")?.textContent ?? "0") - time) < 2e-2, t),
+    untilBranch: (name) => page.waitForFunction((n) => document.querySelector("[data-test=active-branch]")?.textContent === n, name),
+    scrub: (time) =>
+      page.locator("[data-test=slider]").evaluate((slider, t) => {
+        slider.value = String(t);
+        slider.dispatchEvent(new Event("input", { bubbles: true }));
+      }, time),
+    /// Two pictures later everything that was asked for is drawn.
+    settle: async () => {
+      await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+      // and with all its pixels, when the picture rests
+      await page.waitForFunction(() => {
+        const canvas = document.querySelector("[data-test=canvas]");
+        return canvas === null || canvas.hidden || canvas.width >= Math.floor(canvas.clientWidth * devicePixelRatio);
+      });
+    },
+    async run() {
+      await page.click("[data-test=run]");
+      await page.waitForFunction(() => document.querySelector("[data-test=phase]").textContent.includes("Running"));
+    },
+    async pause() {
+      if ((await text("phase")).includes("Running")) await page.click("[data-test=run]");
+      await page.waitForFunction(() => !document.querySelector("[data-test=phase]").textContent.includes("Running"));
+    },
+    tab: (name) => page.click(`[data-test=tab-${name}]`),
+    async submit(values) {
+      for (const [name, value] of Object.entries(values)) await page.fill(`dialog input[name=${name}]`, String(value));
+      await page.click("dialog [data-test=submit]");
+    },
+    /// An empty picture has few colours.
+    async countColours() {
+      const shot = (await page.locator("[data-test=canvas]").screenshot()).toString("base64");
+      return page.evaluate(async (data) => {
+        const image = new Image();
+        image.src = `data:image/png;base64,${data}`;
+        await image.decode();
+        const small = document.createElement("canvas");
+        small.width = small.height = 120;
+        const ctx = small.getContext("2d", { willReadFrequently: true });
+        ctx.drawImage(image, 0, 0, 120, 120);
+        const bytes = ctx.getImageData(0, 0, 120, 120).data;
+        const found = new Set();
+        for (let i = 0; i < bytes.length; i += 4) found.add((bytes[i] >> 3) * 1024 + (bytes[i + 1] >> 3) * 32 + (bytes[i + 2] >> 3));
+        return found.size;
+      }, shot);
+    },
+  };
+}
+
+/// Bytes of a PNG or WebM that the page offers.
+export async function takeDownload(page, click) {
+  const [download] = await Promise.all([page.waitForEvent("download"), click()]);
+  const stream = await download.createReadStream();
+  const parts = [];
+  for await (const part of stream) parts.push(part);
+  return { name: download.suggestedFilename(), bytes: Buffer.concat(parts) };
+}
+
+export function assertPng(bytes) {
+  assert.equal(bytes.subarray(1, 4).toString("latin1"), "PNG");
+  const width = bytes.readUInt32BE(16), height = bytes.readUInt32BE(20);
+  assert.ok(width > 300 && height > 200, `${width} x ${height}`);
+  assert.ok(bytes.length > 10000, `${bytes.length} bytes are an empty picture`);
+}
+
+/// EBML begins with 1a 45 df a3; a second of moving pictures takes more than 20 kB.
+export function assertWebm(bytes) {
+  assert.equal(bytes.subarray(0, 4).toString("hex"), "1a45dfa3");
+  assert.ok(bytes.includes("V_VP8") || bytes.includes("V_VP9"), "no video in it");
+  assert.ok(bytes.length > 20000, `${bytes.length} bytes`);
+}
+
+/// No part of the page sticks out of the window, no button is cut off.
+export const findOverflow = (page) =>
+  page.evaluate(() =>
+    [...document.querySelectorAll("button, select, .panel, .banner, h2")]
+      .filter((e) => e.getClientRects().length > 0 && e.closest(".scroller, .tab-body, .tabs, .cube-holder, .markers") === null)
+      .filter((e) => e.getBoundingClientRect().right > innerWidth + 0.5)
+      .map((e) => `${e.className} ${e.textContent.slice(0, 20)}`));
