@@ -2,7 +2,7 @@
 import type { SteerState } from "./steer_state";
 import { Clock, IconButton, Markers, Slider } from "./timeline";
 import { speeds } from "./state";
-import { formatDuration, formatTime } from "./units";
+import { formatTime } from "./units";
 import type { BranchRun } from "./steer_branch";
 
 const solverSpeeds: [string, string][] = [["", "as fast as it can"], ["0.1", "0.1× real time"], ["0.25", "0.25×"], ["0.5", "0.5×"], ["1", "1×"], ["2", "2×"]];
@@ -31,12 +31,9 @@ function BranchLane(props: { s: SteerState }) {
 
 export function SolverClock(props: { s: SteerState }) {
   const { s } = props;
-  const p = s.progress.value;
   return (
     <span class="solver-clock">
       <span class="quiet">computed</span> <strong class="number" data-test="frontier">{formatTime(s.frontier.value)}</strong>
-      {p?.phase === "running" && p.real_time_factor !== null && <span class="number quiet"> · {p.real_time_factor.toFixed(2)}× real time</span>}
-      {p?.phase === "running" && p.eta !== null && <span class="number quiet"> · {formatDuration(p.eta)} to go</span>}
     </span>
   );
 }

@@ -166,7 +166,9 @@ class Session {
     }
   }
   tick() {
-    if (this.phase === "running") this.advance(this.speed === null ? this.server.rate : Math.max(1, Math.round(this.speed)));
+    if (this.phase !== "running") return;
+    const rows = this.speed === null ? this.server.rate : Math.max(1, Math.round(this.speed));
+    this.advance(Math.max(0, Math.min(rows, this.server.barrier - this.branch().own.row)));
   }
   findings(b) {
     const { data } = makeCourse(b.own.second);
@@ -265,6 +267,7 @@ export class Standin {
   dropEvery = 0;
   frames = frameCount;
   rate = 4; // frames a tick
+  barrier = Infinity; // a run goes no further than this row, but stays a running one
   refuse = false; // new connections
   resume = new Map();
 

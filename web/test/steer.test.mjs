@@ -19,6 +19,7 @@ describe("steering page", () => {
     await mkdir(out, { recursive: true });
     server = await new Standin().start();
     server.rate = 1; // about real time
+    server.barrier = 130; // 4.3 s: what is to be running must not end meanwhile
     browser = await openPage(server.url);
     page = browser.page;
     d = makeDriver(page);
@@ -114,6 +115,7 @@ describe("steering page", () => {
     let found = false;
     for (let i = 0; i < 63 && !found; ++i) {
       await page.mouse.click(box.x + (box.width * (1 + (i % 9))) / 10, box.y + (box.height * (1 + Math.floor(i / 9))) / 8);
+      await d.draw();
       found = (await page.locator("[data-test=inspector]").count()) > 0;
     }
     assert.ok(found, "no click met a member");
@@ -237,6 +239,7 @@ describe("steering page", () => {
 
   it("runs both branches to their ends and says how they ended", async () => {
     server.rate = 8;
+    server.barrier = Infinity;
     await d.run();
     await d.until("banner", "At rest");
     await shot("finished");
@@ -329,6 +332,7 @@ describe("steering page", () => {
   });
 
   it("starts a study, watches it grow, and plays a run of it", async () => {
+    server.barrier = 100;
     await d.tab("study");
     await page.fill(".study .count", "40");
     await d.click("study-start");
@@ -379,6 +383,7 @@ describe("steering page", () => {
     await page.locator("[data-test=branch]", { hasText: /^└ sample/ }).or(page.locator("[data-test=branch]", { hasText: "sample" })).first().click();
     await page.waitForFunction(() => document.querySelector("[data-test=active-branch]").textContent.startsWith("sample "));
     server.rate = 1;
+    server.barrier = 180;
     await d.run();
     server.refuse = true;
     server.cut();
@@ -387,8 +392,11 @@ describe("steering page", () => {
     const seen = await d.frontier();
     server.refuse = false;
     await page.waitForFunction(() => !(document.querySelector("[data-test=banner]")?.textContent ?? "").includes("No connection"));
-    await d.untilFrontier(seen + 0.05);
+    server.barrier = 200;
+    await d.untilFrontier(6); // row 179
+    assert.ok((await d.frontier()) > seen);
     await d.pause();
+    server.barrier = Infinity;
   });
 
   it("survives a reload", async () => {

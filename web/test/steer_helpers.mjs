@@ -4,6 +4,7 @@ import assert from "node:assert/strict";
 export function makeDriver(page) {
   const text = async (name) => (await page.textContent(`[data-test=${name}]`)).trim();
   const seconds = (words) => parseFloat(words.replace("−", "-"));
+  const draw = () => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
   return {
     text,
     click: (name) => page.click(`[data-test=${name}]`),
@@ -22,8 +23,9 @@ export function makeDriver(page) {
         slider.dispatchEvent(new Event("input", { bubbles: true }));
       }, time),
     /// Two pictures later everything that was asked for is drawn.
+    draw,
     settle: async () => {
-      await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+      await draw();
       // and with all its pixels, when the picture rests
       await page.waitForFunction(() => {
         const canvas = document.querySelector("[data-test=canvas]");
