@@ -35,24 +35,58 @@ function mergeGeometries(parts: THREE.BufferGeometry[]): THREE.BufferGeometry {
   return geometry;
 }
 
-/// Lambert shading with dark edges, drawn in the fragment shader so that one call draws all boxes.
-function makeBoxMaterial(): THREE.MeshLambertMaterial {
-  const material = new THREE.MeshLambertMaterial();
-  material.onBeforeCompile = (shader) => {
-    shader.vertexShader = shader.vertexShader
-      .replace("#include <common>", "#include <common>\nvarying vec2 vFace;")
-      .replace("#include <begin_vertex>", "#include <begin_vertex>\nvFace = uv;");
-    shader.fragmentShader = shader.fragmentShader
-      .replace("#include <common>", "#include <common>\nvarying vec2 vFace;")
-      .replace(
-        "#include <color_fragment>",
-        `#include <color_fragment>
+const sun = new THREE.Vector3(-0.5, -1, 1.3).normalize();
+const manyBoxes = 3000; // from here on edges are left out: they cost more than they show
+
+/// A box of eight corners. Each face is shaded by the corner that its two triangles end with (WebGL takes `flat` values
+/// from there), which carries the face's direction: a third of the vertices of a box with four for each face.
+function makeLeanBox(): THREE.BufferGeometry {
+  // corner k lies at x = k & 1, y = k >> 1 & 1, z = k >> 2 & 1; rows: direction, then the face's corners seen
+  // counter-clockwise from outside, the shading one first
+  const faces: [Triple, number[]][] = [
+    [[1, 0, 0], [1, 3, 7, 5]], [[-1, 0, 0], [0, 4, 6, 2]], [[0, 1, 0], [3, 2, 6, 7]],
+    [[0, -1, 0], [4, 0, 1, 5]], [[0, 0, 1], [7, 6, 4, 5]], [[0, 0, -1], [2, 3, 1, 0]],
+  ];
+  const position: number[] = [], normal = new Float32Array(24), index: number[] = [];
+  for (let k = 0; k < 8; ++k) position.push((k & 1) - 0.5, ((k >> 1) & 1) - 0.5, ((k >> 2) & 1) - 0.5);
+  for (const [direction, corners] of faces) {
+    const [a, b, c, d] = corners as [number, number, number, number];
+    normal.set(direction, 3 * a);
+    index.push(b, c, a, c, d, a);
+  }
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.Float32BufferAttribute(position, 3));
+  geometry.setAttribute("normal", new THREE.BufferAttribute(normal, 3));
+  geometry.setIndex(index);
+  return geometry;
+}
+
+/// Shading by the direction of each face, computed once a vertex, with dark edges drawn in the fragment shader: one
+/// draw call for all boxes, and as little as can be done for each pixel.
+function makeBoxMaterial(many: boolean): THREE.MeshBasicMaterial {
+  const material = new THREE.MeshBasicMaterial();
+  const varyings = many ? "flat varying float vShade;" : "varying vec2 vFace;\nvarying float vShade;";
+  const edges = `
         vec2 perPixel = max(fwidth(vFace), vec2(1e-6));
         vec2 pixels = min(vFace, 1.0 - vFace) / perPixel;
         float width = 1.0 / max(perPixel.x, perPixel.y);
         float line = (1.0 - smoothstep(0.5, 1.3, min(pixels.x, pixels.y))) * clamp((width - 2.0) / 6.0, 0.0, 1.0);
-        diffuseColor.rgb *= 1.0 - 0.6 * line;`,
+        diffuseColor.rgb *= 1.0 - 0.6 * line;`;
+  material.onBeforeCompile = (shader) => {
+    shader.vertexShader = shader.vertexShader
+      .replace("#include <common>", `#include <common>\n${varyings}`)
+      .replace(
+        "#include <begin_vertex>",
+        `#include <begin_vertex>
+        ${many ? "" : "vFace = uv;"}
+        // the columns of a box's matrix are its edges, so this is the direction of the face
+        vec3 face = normalize(mat3(instanceMatrix) * normal);
+        // light of the sky from above, and of a sun
+        vShade = 0.605 * (mix(0.37, 1.0, 0.5 * face.z + 0.5) + max(0.0, dot(face, vec3(${sun.x.toFixed(4)}, ${sun.y.toFixed(4)}, ${sun.z.toFixed(4)}))));`,
       );
+    shader.fragmentShader = shader.fragmentShader
+      .replace("#include <common>", `#include <common>\n${varyings}`)
+      .replace("#include <color_fragment>", `#include <color_fragment>\ndiffuseColor.rgb *= vShade;${many ? "" : edges}`);
   };
   return material;
 }
@@ -77,7 +111,7 @@ export class Building {
   readonly kinds: string[];
   readonly materials: string[];
   readonly markSize: number;
-  private readonly boxes: THREE.InstancedMesh<THREE.BufferGeometry, THREE.MeshLambertMaterial>;
+  private readonly boxes: THREE.InstancedMesh<THREE.BufferGeometry, THREE.MeshBasicMaterial>;
   private readonly bodyOfInstance: number[] = [];
   private readonly colourOfPart: [number, number, number][] = [];
   private readonly colourOfStuff: [number, number, number][] = [];
@@ -134,7 +168,7 @@ export class Building {
     return Math.max(1, this.bounds.max.z);
   }
 
-  private makeBoxes(): THREE.InstancedMesh<THREE.BufferGeometry, THREE.MeshLambertMaterial> {
+  private makeBoxes(): THREE.InstancedMesh<THREE.BufferGeometry, THREE.MeshBasicMaterial> {
     this.run.bodies.forEach((body, index) => {
       for (const shape of body.shapes) {
         const [w, x, y, z] = shape.orientation;
@@ -151,7 +185,8 @@ export class Building {
       }
     });
     const count = this.shapePose.length;
-    const boxes = new THREE.InstancedMesh(new THREE.BoxGeometry(1, 1, 1), makeBoxMaterial(), Math.max(1, count));
+    const many = count >= manyBoxes;
+    const boxes = new THREE.InstancedMesh(many ? makeLeanBox() : new THREE.BoxGeometry(1, 1, 1), makeBoxMaterial(many), Math.max(1, count));
     boxes.count = count;
     boxes.frustumCulled = false;
     boxes.instanceMatrix.setUsage(THREE.DynamicDrawUsage);

@@ -25,7 +25,7 @@ export interface StageOptions {
 
 const slowest = 33; // between two pictures in motion [ms]
 const leastRatio = 0.5; // fewer pixels than that and members cannot be told apart
-const restAfter = 220; // [ms]
+const restAfter = 220; // and at least three pictures [ms]
 
 export class Stage implements SceneLike {
   onChange: () => void = () => undefined;
@@ -55,9 +55,6 @@ export class Stage implements SceneLike {
     this.fullRatio = Math.min(devicePixelRatio, 2);
     this.ratio = this.fullRatio;
     this.renderer.setPixelRatio(this.ratio);
-    const sun = new THREE.DirectionalLight("#ffffff", 1.9);
-    sun.position.set(-0.5, -1, 1.3);
-    this.scene.add(new THREE.HemisphereLight("#ffffff", "#a8a39b", 1.9), sun);
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = false;
@@ -197,9 +194,10 @@ export class Stage implements SceneLike {
     const now = performance.now();
     const interval = now - this.lastRender;
     this.lastRender = now;
-    if (interval < restAfter) this.meanInterval += 0.25 * (interval - this.meanInterval);
-    else this.meanInterval = Math.min(this.meanInterval, slowest);
-    if (this.meanInterval > slowest && this.ratio > leastRatio) this.setRatio(Math.max(leastRatio, 0.8 * this.ratio));
+    // A picture that comes a second later begins another motion.
+    if (interval < 1000) this.meanInterval += 0.25 * (interval - this.meanInterval);
+    if (this.meanInterval > slowest && this.ratio > leastRatio)
+      this.setRatio(Math.max(leastRatio, this.ratio * Math.max(0.5, Math.sqrt(slowest / this.meanInterval))));
     else if (this.meanInterval < 0.55 * slowest && this.ratio < this.fullRatio) this.setRatio(Math.min(this.fullRatio, 1.1 * this.ratio));
     clearTimeout(this.restTimer);
     if (this.ratio < this.fullRatio)
@@ -210,7 +208,7 @@ export class Stage implements SceneLike {
         this.draw();
         this.ratio = ratio;
         this.atRest = true;
-      }, restAfter);
+      }, Math.max(restAfter, 3 * this.meanInterval));
     if (this.atRest) {
       this.atRest = false;
       this.setRatio(this.ratio);

@@ -9,6 +9,8 @@ import { findBody } from "./zones";
 export const contourLevels = [0.2, 1, 2, 4, 8];
 export const contourColours = ["#c2005f", "#56b4e9", "#2f8fc0", "#1b6ca8", "#0b3d66"];
 
+const margin = 5; // cells around the debris, more than closeGaps reaches
+
 /// Highest point, over each cell of a grid, of what lies elsewhere than it stood: moved by more than 1 m, slower than 2 m/s.
 export function calcHeights(building: Building, cell: number): { x0: number; y0: number; nx: number; ny: number; height: Float32Array } {
   const corner = new THREE.Vector3();
@@ -25,8 +27,8 @@ export function calcHeights(building: Building, cell: number): { x0: number; y0:
     }
   });
   if (boxes.length === 0) return { x0: 0, y0: 0, nx: 0, ny: 0, height: new Float32Array(0) };
-  x0 -= 2 * cell, y0 -= 2 * cell;
-  const nx = Math.min(600, Math.ceil((x1 - x0) / cell) + 3), ny = Math.min(600, Math.ceil((y1 - y0) / cell) + 3);
+  x0 -= margin * cell, y0 -= margin * cell;
+  const nx = Math.min(600, Math.ceil((x1 - x0) / cell) + margin + 1), ny = Math.min(600, Math.ceil((y1 - y0) / cell) + margin + 1);
   const height = new Float32Array(nx * ny);
   const matrix = new THREE.Matrix4(), inverse = new THREE.Matrix4();
   const a = new THREE.Vector3(), b = new THREE.Vector3();
@@ -58,6 +60,23 @@ export function calcHeights(building: Building, cell: number): { x0: number; y0:
       }
   }
   return { x0, y0, nx, ny, height };
+}
+
+/// Fills gaps narrower than twice `radius` cells: the highest of the neighbours, then the lowest of those. The outer line
+/// stays where it is.
+export function closeGaps(grid: { nx: number; ny: number; height: Float32Array }, radius: number): void {
+  const { nx, ny, height } = grid;
+  const pass = (from: Float32Array, step: number, count: number, lines: number, lineStep: number, pick: (a: number, b: number) => number): Float32Array => {
+    const to = new Float32Array(from.length);
+    for (let line = 0; line < lines; ++line)
+      for (let k = 0; k < count; ++k) {
+        let value = from[line * lineStep + k * step] as number;
+        for (let d = Math.max(0, k - radius); d <= Math.min(count - 1, k + radius); ++d) value = pick(value, from[line * lineStep + d * step] as number);
+        to[line * lineStep + k * step] = value;
+      }
+    return to;
+  };
+  for (const pick of [Math.max, Math.min] as const) height.set(pass(pass(height, 1, nx, ny, nx, pick), nx, ny, nx, 1, pick));
 }
 
 /// Pieces of the line at one height through a grid (marching squares): x y x y ...
@@ -99,6 +118,7 @@ export class DebrisLayer {
     const size = building.bounds.max.x - building.bounds.min.x + building.bounds.max.y - building.bounds.min.y;
     const cell = Math.max(0.4, size / 240);
     const grid = calcHeights(building, cell);
+    closeGaps(grid, Math.min(margin - 1, Math.ceil(1.2 / cell)));
     contourLevels.forEach((level, k) => {
       const flat = findContour(grid, cell, level);
       const points = new Float32Array((flat.length / 2) * 3);

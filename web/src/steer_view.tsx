@@ -102,9 +102,12 @@ export function SteerView(props: { s: SteerState; onReady: () => void }) {
       };
       let shown = s.view.peek() as BranchRun;
       let debrisDue: ReturnType<typeof setTimeout> | undefined;
+      let debrisCost = 0; // [ms]; at most a tenth of the time goes into it
       const drawDebris = (): void => {
         debrisDue = undefined;
+        const begin = performance.now();
         debris.update(scene.building);
+        debrisCost = performance.now() - begin;
         scene.onChange();
       };
       setGridStep(scene.gridStep);
@@ -125,7 +128,7 @@ export function SteerView(props: { s: SteerState; onReady: () => void }) {
           scene.setTime(time);
           happenings.update(view.run, scene.building, time, (s.branch.value?.charges ?? []).filter((c) => !c.removed && !c.fails && c.time > time));
           debris.group.visible = s.showDebris.value;
-          if (s.showDebris.value) debrisDue ??= setTimeout(drawDebris, 300);
+          if (s.showDebris.value) debrisDue ??= setTimeout(drawDebris, Math.max(300, 10 * debrisCost));
         }),
         effect(() => scene.setLook(s.colouring.value, s.zoneMarks.value, s.selected.value)),
         effect(() => {

@@ -138,3 +138,56 @@ describe("angles", () => {
     assert.equal(findCoherent({ series: [] }), undefined);
   });
 });
+
+describe("heights of debris", () => {
+  it("find the line at one height", async () => {
+    const { findContour, closeGaps } = await load("steer_layers.ts");
+    // a block of 3 x 2 cells, 2 m high, in a grid of 1 m: its line at 1 m lies half a cell outside the cells' middles
+    const grid = { x0: 0, y0: 0, nx: 8, ny: 7, height: new Float32Array(56) };
+    for (let j = 2; j < 4; ++j) for (let i = 2; i < 5; ++i) grid.height[8 * j + i] = 2;
+    const line = findContour(grid, 1, 1);
+    const xs = line.filter((_, k) => k % 2 === 0), ys = line.filter((_, k) => k % 2 === 1);
+    assert.deepEqual([Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)], [1.5, 4.5, 1.5, 3.5]);
+    // its length: four sides without the corners' halves, and four cut corners
+    let length = 0;
+    for (let k = 0; k < line.length; k += 4) length += Math.hypot(line[k] - line[k + 2], line[k + 1] - line[k + 3]);
+    assert.ok(Math.abs(length - (2 * (2 + 1) + 4 * Math.SQRT1_2)) < 1e-6);
+    assert.deepEqual(findContour(grid, 1, 3), []);
+    // a gap of one cell is filled, and nothing grows outwards
+    const gap = { nx: 9, ny: 9, height: new Float32Array(81) };
+    for (const i of [3, 5]) gap.height[9 * 4 + i] = 1;
+    closeGaps(gap, 1);
+    assert.deepEqual([...gap.height].map((v, k) => (v > 0 ? k - 36 : 0)).filter((k) => k !== 0), [3, 4, 5]);
+  });
+});
+
+describe("frames of the steering protocol", () => {
+  it("are read as they are written, and refused otherwise", async () => {
+    const { decodeFrame } = await load("steer_wire.ts");
+    const B = 2, Z = 3, V = 1;
+    const bytes = Buffer.alloc(48 + 28 * B + 4 * V + 5 * Z);
+    bytes.write("TPLF");
+    bytes.writeUInt16LE(1, 4);
+    bytes.writeUInt16LE(2, 6);
+    [7, 8, 9, 10].forEach((v, k) => bytes.writeUInt32LE(v, 8 + 4 * k));
+    bytes.writeDoubleLE(1.25, 24);
+    [B, Z, V].forEach((v, k) => bytes.writeUInt32LE(v, 32 + 4 * k));
+    for (let k = 0; k < 7 * B + V + Z; ++k) bytes.writeFloatLE(k + 0.5, 48 + 4 * k);
+    bytes.set([0, 3, 4], 48 + 4 * (7 * B + V + Z));
+    const view = (b) => b.buffer.slice(b.byteOffset, b.byteOffset + b.length);
+    const f = decodeFrame(view(bytes));
+    assert.deepEqual([f.session, f.branch, f.sequence, f.row, f.time, f.asked], [7, 8, 9, 10, 1.25, true]);
+    assert.deepEqual([[...f.pose].length, f.pose[13], [...f.series], [...f.utilisation], [...f.state]], [14, 13.5, [14.5], [15.5, 16.5, 17.5], [0, 3, 4]]);
+    assert.throws(() => decodeFrame(view(bytes.subarray(0, 60))), /length/);
+    assert.throws(() => decodeFrame(new ArrayBuffer(8)), /not a frame/);
+    bytes.writeUInt16LE(2, 4);
+    assert.throws(() => decodeFrame(view(bytes)), /version 2/);
+  });
+});
+
+describe("plan text", () => {
+  it("finds the place of a complaint", async () => {
+    const { findOffset } = await load("steer_plan.tsx");
+    assert.deepEqual([[1, 1], [2, 3], [3, 1], [9, 9]].map(([l, c]) => findOffset("ab\ncdef\ng", l, c)), [0, 5, 8, 9]);
+  });
+});

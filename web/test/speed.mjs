@@ -65,6 +65,7 @@ const turn = (async () => {
 })();
 show("turned", await watch(4000));
 turning = false;
+if (process.argv[3]) await page.screenshot({ path: process.argv[3] });
 await turn;
 await closeAll();
 process.exit(0);
