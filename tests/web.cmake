@@ -41,4 +41,12 @@ if(TARGET topple)
   add_test(NAME web_short_run COMMAND topple run ${CMAKE_CURRENT_SOURCE_DIR}/data/short.toml -o ${short_run})
   set_tests_properties(web_short_run PROPERTIES LABELS web FIXTURES_SETUP short_run TIMEOUT 120)
   topple_web_test(web_report_run report.test.mjs BROWSER FIXTURES short_run ENVIRONMENT TOPPLE_REPORT=${short_run}/report.html)
+  # a study of a model that is a program of its own
+  set(short_study ${CMAKE_CURRENT_BINARY_DIR}/short_study)
+  add_test(NAME web_short_study_clean COMMAND ${CMAKE_COMMAND} -E rm -rf ${short_study})
+  add_test(NAME web_short_study COMMAND topple study ${CMAKE_CURRENT_SOURCE_DIR}/data/jump.toml --evaluator "$<TARGET_FILE:study_model> jump"
+           --permissible "stands" --batch 50 -o ${short_study})
+  set_tests_properties(web_short_study_clean PROPERTIES LABELS web FIXTURES_SETUP short_study TIMEOUT 60)
+  set_tests_properties(web_short_study PROPERTIES LABELS web FIXTURES_SETUP short_study DEPENDS web_short_study_clean TIMEOUT 120)
+  topple_web_test(web_study_run study.test.mjs BROWSER FIXTURES short_study ENVIRONMENT TOPPLE_STUDY=${short_study}/study.html)
 endif()

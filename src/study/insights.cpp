@@ -159,8 +159,9 @@ void find_boxes(Insights& out, const Problem& p, const Budget& b, uncertainty::A
   uncertainty::DesignOptions o;
   o.space_points = std::min(200 * axes, std::max(1, runs / 4));
   o.fresh = std::clamp(runs / 12, 20, 149);
-  o.rerun_limit = std::min(2000, std::max(1, runs / 12));
-  o.k_max = runs < 1000 ? 3 : 6;
+  constexpr int least_rerun = 50;  // below, bounds would be those of a handful of points
+  o.rerun_limit = runs / 12 < least_rerun ? 0 : std::min(2000, runs / 12);
+  o.k_max = std::clamp(runs / 400, 2, 6);
   o.levels = levels;
   o.seed = p.seed;
   out.boxes = uncertainty::find_permissible_boxes(p.space, asker, requirement, o);

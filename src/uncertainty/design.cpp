@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "uncertainty/box_growth.h"
 #include "uncertainty/measures.h"
+#include "uncertainty/random.h"
 
 namespace topple::uncertainty {
 namespace {
@@ -43,7 +44,15 @@ class Design {
     result_.forbidden_groups = group(result_.forbidden_samples);
     std::vector<int> centres;
     for (const int c : result_.permissible_groups.centre) centres.push_back(result_.permissible_samples[c]);
-    for (std::size_t g = 0; g < centres.size(); ++g) grow(static_cast<int>(g), centres[g]);
+    const int n = static_cast<int>(axes_.size());
+    const int wanted = options_.growth_points > 0 ? options_.growth_points : 100 * n * n;
+    for (std::size_t g = 0; g < centres.size(); ++g) {
+      const int share = asker_.rest() / static_cast<int>(centres.size() - g);
+      if (share >= wanted)
+        grow(static_cast<int>(g), centres[g]);
+      else
+        choose(static_cast<int>(g), centres[g], share);
+    }
     rank();
     for (int i = 0; i < asker_.asked(); ++i) {
       const double m = margin_of(i);
@@ -150,13 +159,69 @@ class Design {
       b.inputs.clear();
       for (int i = 0; i < space_.size(); ++i)
         b.inputs.push_back(make_triangular(b.box.lower[i], middle[i], b.box.upper[i]));
-      rerun(b);
+      if (options_.rerun_limit > 0) rerun(b);
       b.kept = !has_violation(b.box) && !asker_.is_cancelled();
       if (!asker_.can_go_on()) break;
     }
     if (is_known(b.box)) return;
     if (b.fresh > 0) b.violating = 1 - std::pow((1 - options_.confidence) / b.tries, 1.0 / b.fresh);
     boxes_.push_back(std::move(b));
+  }
+
+  /// With few runs: the largest box that keeps out what is known to violate, tried at fresh points; what violates there
+  /// is kept out of the next one.
+  void choose(int g, int centre, int share) {
+    PermissibleBox b;
+    b.group = g, b.centre = centre;
+    const Point middle = asker_.archive()[centre].x;
+    const int limit = asker_.limit(), end = asker_.asked() + share;
+    asker_.set_limit(std::min(limit, end));
+    Random random(options_.seed + 104729 * static_cast<std::uint64_t>(g + 1));
+    Front front(middle);
+    for (int seen = 0; !b.kept && asker_.can_go_on();) {
+      for (; seen < asker_.asked(); ++seen)
+        if (support_.contains(asker_.archive()[seen].x) && !is_good(seen)) front.add(asker_.archive()[seen].x);
+      b.box = find_largest_box(support_, front, options_.edge, 4, options_.seed + static_cast<std::uint64_t>(b.tries));
+      b.volume = calc_part(b.box);
+      if (b.volume < options_.smallest || asker_.rest() < options_.fresh) break;
+      ++b.tries;
+      constexpr int at_once = 8;
+      int passed = 0;
+      bool good = true;
+      while (good && passed < options_.fresh) {
+        const auto verdicts = judge(make_random_points(b.box, std::min(at_once, options_.fresh - passed), random));
+        good = !verdicts.empty();
+        for (const Verdict v : verdicts) good = good && v == Verdict::Permissible;
+        passed += static_cast<int>(verdicts.size());
+      }
+      if (!good) continue;
+      b.fresh = passed;
+      b.inputs.clear();
+      for (int i = 0; i < space_.size(); ++i)
+        b.inputs.push_back(make_triangular(b.box.lower[i], middle[i], b.box.upper[i]));
+      if (options_.rerun_limit > 0) rerun(b);
+      b.kept = !has_violation(b.box) && !asker_.is_cancelled();
+    }
+    asker_.set_limit(limit);
+    if (is_known(b.box)) return;
+    if (b.fresh > 0) b.violating = 1 - std::pow((1 - options_.confidence) / b.tries, 1.0 / b.fresh);
+    boxes_.push_back(std::move(b));
+  }
+
+  double calc_part(const Box& box) const {
+    double part = 1;
+    for (const int i : axes_) part *= (box.upper[i] - box.lower[i]) / (support_.upper[i] - support_.lower[i]);
+    return part;
+  }
+
+  std::vector<Point> make_random_points(const Box& box, int count, Random& random) const {
+    std::vector<Point> points;
+    for (int attempt = 0; static_cast<int>(points.size()) < count && attempt < 1000 * count; ++attempt) {
+      Point x = box.lower;
+      for (const int i : axes_) x[i] = random.next(box.lower[i], box.upper[i]);
+      if (is_allowed(space_, x)) points.push_back(std::move(x));
+    }
+    return points;
   }
 
   /// Whether another group gave the same box.

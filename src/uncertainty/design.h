@@ -25,7 +25,9 @@ struct DesignOptions {
   int fresh = 149;           // new random points that must all pass
   double confidence = 0.95;  // of the stated bound
   int ranking_output = 0;    // whose robustness ranks the boxes
-  int rerun_limit = 2000;    // points of the fuzzy analysis of one box, at most
+  int rerun_limit = 2000;    // points of the fuzzy analysis of one box, at most; 0: none, and no robustness
+  int growth_points = 0;     // runs that a group must have for its box to be grown; with fewer the box comes from the
+                             // runs that are there and its trials alone; 0: 100 times the square of the inputs' number
   std::vector<double> levels = {0, 0.25, 0.5, 0.75, 1};
   std::uint64_t seed = 1;
 };

@@ -40,6 +40,40 @@ Evaluate make_model(std::function<bool(const Point&)> is_good) {
 
 const Requirement outcome_0 = [](const Result& r) { return r.outcome == 0 ? 1.0 : -1.0; };
 
+// The sum of four inputs between 0 and 1 stays below 2.3. With 300 runs a box must come with fewer trials than
+// growing takes; of ten seeds at most one may break a statement that holds with a confidence of 95 %.
+TEST(DesignPhysics, SaysLittleButTrueThingsFromFewRuns) {
+  const auto is_good = [](const Point& x) { return x[0] + x[1] + x[2] + x[3] < 2.3; };
+  const Space space{std::vector<FuzzyNumber>(4, make_triangular(0, 0.4, 1)), {}, {}};
+  int kept = 0, wrong = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    DesignOptions options;
+    options.space_points = 100;
+    options.fresh = 20;
+    options.rerun_limit = 0;
+    options.k_max = 2;
+    options.seed = seed;
+    const Found f = find(space, make_model(is_good), outcome_0, options, 300);
+    EXPECT_LE(f.archive.size(), 300u);
+    for (const auto& b : f.design.boxes) {
+      if (!b.kept) continue;
+      ++kept;
+      EXPECT_EQ(b.fresh, 20);
+      EXPECT_NEAR(b.violating, 1 - std::pow(0.05 / b.tries, 1.0 / 20), 1e-12);
+      Random random(99);
+      int bad = 0;
+      for (int k = 0; k < 20000; ++k) {
+        Point x;
+        for (int i = 0; i < 4; ++i) x.push_back(random.next(b.box.lower[i], b.box.upper[i]));
+        bad += !is_good(x);
+      }
+      wrong += bad > b.violating * 20000;
+    }
+  }
+  EXPECT_GE(kept, 10) << "a box for each seed";
+  EXPECT_LE(wrong, 1);
+}
+
 // x1 x2 / 100 >= 8: permissible on .879201442 of the support; the largest box from the upper corner reaches to
 // (20.225996, 39.553059) and has the area 1200.224726.
 TEST(DesignReference, BoxesOfTheJump) {

@@ -110,7 +110,7 @@ export function Boxes(props: { state: State }) {
               })}
             </tbody>
           </table>
-          <p class="quiet">{box.guarantee}{box.kept && box.robustness !== null && ` Robustness ${formatNumber(box.robustness, 3)}; distance to the limits ${formatNumber(box.distance, 2)} of their range.`}</p>
+          <p class="quiet">{box.guarantee}{box.kept && box.robustness !== null && box.robustness > 0 && ` Robustness ${formatNumber(box.robustness, 3)}; distance to the limits ${formatNumber(box.distance, 2)} of their range.`}</p>
         </div>
       ))}
     </section>
