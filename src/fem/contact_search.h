@@ -18,7 +18,7 @@ inline constexpr double kFaceDepth = 0.4;
 
 /// A point of the surface: a node, the centre of a face, or a particle.
 struct ContactPoint {
-  enum Kind : std::uint8_t { Node, Centre, Debris };
+  enum Kind : std::uint32_t { Node, Centre, Debris };
   Kind kind = Node;
   std::uint32_t index = 0;  // row of a node; 6 element + face; particle
   friend bool operator==(const ContactPoint&, const ContactPoint&) = default;
@@ -59,7 +59,7 @@ struct SurfaceTouch {
   std::uint32_t other = 0;  // particle + 1 where two touch, 0: a face
   double weights[4] = {0, 0, 0, 0};
   Vec3 normal_force, friction, before;
-  double stored = 0;
+  double stored = 0, depth = 0;
 };
 
 struct ContactState {

@@ -138,8 +138,8 @@ ExplicitChunks make_chunks(const ExplicitModel& model, size_t lanes, size_t elem
           c.slot_of_element[static_cast<size_t>(e)] = static_cast<std::uint32_t>(block * c.W + l);
         }
         for (size_t j = 0; j < 8; ++j)
-          c.corners[(block * 8 + j) * c.W + l] =
-              static_cast<std::uint16_t>(place[static_cast<size_t>(model.elements[static_cast<size_t>(e)].node[j])]);
+          c.corners[(block * 8 + j) * c.W + l] = static_cast<std::uint16_t>(
+              kernel::kRoomFields * place[static_cast<size_t>(model.elements[static_cast<size_t>(e)].node[j])]);
       }
     for (size_t i = 0; i < elements; ++i)
       for (const int n : model.elements[static_cast<size_t>(c.order[ranges[k].first + i])].node)

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "fem/explicit_kernel.h"
 #include "fem/explicit_model.h"
 
 namespace topple::fem {
@@ -25,7 +26,7 @@ struct ExplicitChunks {
   std::vector<int> order;            // elements of chunk after chunk, neighbours close
   std::vector<std::uint32_t> row_of_node;
   std::vector<int> node_of_row;
-  std::vector<std::uint16_t> corners;          // places among the chunk's nodes, 8 x W a block
+  std::vector<std::uint16_t> corners;          // kRoomFields times the places among the chunk's nodes, 8 x W a block
   std::vector<std::uint32_t> shared_rows;      // of chunk after chunk
   size_t first_shared_row = 0;                 // shared nodes, and those without elements, come last
   std::vector<std::uint32_t> starts, entries;  // of shared nodes: their rows of shared forces
@@ -33,6 +34,6 @@ struct ExplicitChunks {
   size_t slots() const { return element_of_slot.size(); }
 };
 
-ExplicitChunks make_chunks(const ExplicitModel&, size_t lanes, size_t elements_a_chunk = 256);
+ExplicitChunks make_chunks(const ExplicitModel&, size_t lanes, size_t elements_a_chunk = 512);
 
 }  // namespace topple::fem

@@ -147,7 +147,7 @@ ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
 
   shared_forces.assign(4 * std::max<size_t>(1, chunks.shared_rows.size()), 0);
   rooms.resize(std::min(kTasks, chunks.chunks.size()));
-  for (auto& room : rooms) room.assign(12 * chunks.most_nodes, 0);
+  for (auto& room : rooms) room.assign(kernel::kRoomFields * chunks.most_nodes, 0);
   failed.resize(chunks.chunks.size());
   chunk_sums.resize(chunks.chunks.size());
   grounded.resize(chunks.chunks.size() + kTasks);

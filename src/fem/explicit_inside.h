@@ -17,7 +17,7 @@ namespace topple::fem {
 struct GroundTouch {
   std::uint32_t row = 0;  // of a node, or number of a particle
   std::int32_t ground = 0;
-  bool particle = false;
+  std::uint32_t particle = 0, unused = 0;  // no gaps: a snapshot copies bytes
   Vec3 normal_force, friction;
   double stored = 0;  // in the spring [J]
   Vec3 before;        // velocity half a step before
@@ -33,7 +33,7 @@ struct Particle {
   Vec3 start;  // where its potential counts from
   double mass = 0, radius = 0, full_radius = 0, stiffness = 0;
   int element = 0;
-  std::uint8_t touched = 0;  // in this step
+  std::uint32_t touched = 0;  // in this step
 };
 
 struct ExplicitState {

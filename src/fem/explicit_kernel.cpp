@@ -1,6 +1,7 @@
 // Compiled once for each instruction set (Highway's foreach_target).
 #include "fem/explicit_kernel.h"
 
+#include <algorithm>
 #include <cstring>
 
 #undef HWY_TARGET_INCLUDE
@@ -9,6 +10,7 @@
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4 | HWY_AVX3_DL)
 #include <hwy/foreach_target.h>
 // after foreach_target
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
@@ -43,34 +45,32 @@ HWY_INLINE V3 fma(V s, const V3& a, const V3& b) { return {fma(s, a.x, b.x), fma
 
 #if HWY_TARGET == HWY_SCALAR
 HWY_INLINE V3 load_corner(const double* HWY_RESTRICT rows, const std::uint16_t* HWY_RESTRICT node) {
-  const double* at = rows + 8 * node[0];
+  const double* at = rows + node[0];
   return {num(at[0]), num(at[1]), num(at[2])};
 }
 HWY_INLINE void add_corner(const V3& f, double* HWY_RESTRICT rows, const std::uint16_t* HWY_RESTRICT node) {
-  double* at = rows + 4 * node[0];
+  double* at = rows + node[0];
   at[0] += hn::GetLane(f.x), at[1] += hn::GetLane(f.y), at[2] += hn::GetLane(f.z);
 }
 #else
 /// Pairs of doubles of every second lane's node, one a 128-bit block: lanes first, first + 2, ...
 template <class D2>
-HWY_INLINE hn::Vec<D2> load_pairs(D2 d, const double* HWY_RESTRICT at, const std::uint16_t* HWY_RESTRICT node,
-                                  size_t stride) {
+HWY_INLINE hn::Vec<D2> load_pairs(D2 d, const double* HWY_RESTRICT at, const std::uint16_t* HWY_RESTRICT node) {
   constexpr size_t kHere = hn::MaxLanes(D2());
   if constexpr (kHere == 2) {
-    return hn::Load(d, at + node[0] * stride);
+    return hn::Load(d, at + node[0]);
   } else {
     const hn::Half<D2> half;
-    const auto high = load_pairs(half, at, node + kHere / 2, stride);
-    return hn::Combine(d, high, load_pairs(half, at, node, stride));
+    const auto high = load_pairs(half, at, node + kHere / 2);
+    return hn::Combine(d, high, load_pairs(half, at, node));
   }
 }
 
 /// Component vectors of one corner of all lanes, from rows.
 HWY_INLINE V3 load_corner(const double* HWY_RESTRICT rows, const std::uint16_t* HWY_RESTRICT node) {
-  constexpr size_t kStride = 8;
   const D d;
-  const V xy0 = load_pairs(d, rows, node, kStride), xy1 = load_pairs(d, rows, node + 1, kStride);
-  const V z0 = load_pairs(d, rows + 2, node, kStride), z1 = load_pairs(d, rows + 2, node + 1, kStride);
+  const V xy0 = load_pairs(d, rows, node), xy1 = load_pairs(d, rows, node + 1);
+  const V z0 = load_pairs(d, rows + 2, node), z1 = load_pairs(d, rows + 2, node + 1);
   return {hn::InterleaveLower(d, xy0, xy1), hn::InterleaveUpper(d, xy0, xy1), hn::InterleaveLower(d, z0, z1)};
 }
 
@@ -81,13 +81,13 @@ HWY_INLINE void add_rows(D2 d, hn::Vec<D2> xy0, hn::Vec<D2> z0, hn::Vec<D2> xy1,
   constexpr size_t kHere = hn::MaxLanes(D2());
   const auto add_to = [&](hn::Vec<D2> f, double* at) HWY_ATTR { hn::Store(hn::Add(hn::Load(d, at), f), d, at); };
   if constexpr (kHere == 2) {
-    add_to(xy0, rows + 4 * node[0]), add_to(z0, rows + 4 * node[0] + 2);
-    add_to(xy1, rows + 4 * node[1]), add_to(z1, rows + 4 * node[1] + 2);
+    add_to(xy0, rows + node[0]), add_to(z0, rows + node[0] + 2);
+    add_to(xy1, rows + node[1]), add_to(z1, rows + node[1] + 2);
   } else if constexpr (kHere == 4) {
-    add_to(hn::ConcatLowerLower(d, z0, xy0), rows + 4 * node[0]);
-    add_to(hn::ConcatLowerLower(d, z1, xy1), rows + 4 * node[1]);
-    add_to(hn::ConcatUpperUpper(d, z0, xy0), rows + 4 * node[2]);
-    add_to(hn::ConcatUpperUpper(d, z1, xy1), rows + 4 * node[3]);
+    add_to(hn::ConcatLowerLower(d, z0, xy0), rows + node[0]);
+    add_to(hn::ConcatLowerLower(d, z1, xy1), rows + node[1]);
+    add_to(hn::ConcatUpperUpper(d, z0, xy0), rows + node[2]);
+    add_to(hn::ConcatUpperUpper(d, z1, xy1), rows + node[3]);
   } else {
     const hn::Half<D2> half;
     add_rows(half, hn::LowerHalf(half, xy0), hn::LowerHalf(half, z0), hn::LowerHalf(half, xy1), hn::LowerHalf(half, z1),
@@ -128,9 +128,7 @@ HWY_INLINE void spread(const Modes& m, V* HWY_RESTRICT n) {
 struct Modes3 {
   V3 a, b, c, d, e, f, g;
 };
-HWY_INLINE Modes3 load_modes(const double* HWY_RESTRICT rows, const std::uint16_t* HWY_RESTRICT corners) {
-  V3 n[8];
-  for (size_t i = 0; i < 8; ++i) n[i] = load_corner(rows, corners + i * kLanes);
+HWY_INLINE Modes3 transform(const V3* HWY_RESTRICT n) {
   const Modes x = transform(n[0].x, n[1].x, n[2].x, n[3].x, n[4].x, n[5].x, n[6].x, n[7].x);
   const Modes y = transform(n[0].y, n[1].y, n[2].y, n[3].y, n[4].y, n[5].y, n[6].y, n[7].y);
   const Modes z = transform(n[0].z, n[1].z, n[2].z, n[3].z, n[4].z, n[5].z, n[6].z, n[7].z);
@@ -202,8 +200,14 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
   double* HWY_RESTRICT element = job.elements + block * static_cast<size_t>(kElementFields) * kLanes;
   const V zero = hn::Zero(d);
 
-  const Modes3 x = load_modes(job.room, corners);
-  const Modes3 v = load_modes(job.room + kSpeed, corners);
+  // the next block's state on its way
+  for (size_t i = 0; i < kElementFields * kLanes; i += 8) hwy::Prefetch(element + kElementFields * kLanes + i);
+  V3 places[8], speeds[8];
+  for (size_t i = 0; i < 8; ++i) {
+    places[i] = load_corner(job.room, corners + i * kLanes);
+    speeds[i] = load_corner(job.room + kSpeed, corners + i * kLanes);
+  }
+  const Modes3 x = transform(places), v = transform(speeds);
   const Gradients g = differentiate(x);
   const V inverse = hn::Div(num(1), g.volume);
 
@@ -375,7 +379,9 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
     const V pressure =
         mul(mul(mul(num(64), mul(mass, inverse)), mul(length, closing)),
             fma(num(step.quadratic * step.quadratic), mul(length, closing), num(step.linear * law.speed)));
-    sums.viscous = fma(mul(pressure, closing), mul(num(step.h), volume), sums.viscous);
+    const V both = mul(num(-0.5), add(pressure, load_field(element, kViscous)));
+    store_field(pressure, element, kViscous);
+    sums.viscous = fma(mul(both, trace), volume, sums.viscous);
     sxx = sub(sxx, pressure), syy = sub(syy, pressure), szz = sub(szz, pressure);
   }
 
@@ -418,43 +424,78 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
   for (size_t i = 0; i < 8; ++i) add_corner({nx[i], ny[i], nz[i]}, forces, corners + i * kLanes);
 }
 
-/// Motion of one node; `force` has 4 entries. Returns whether it is below a ground.
-HWY_INLINE bool move_node(const StepJob& step, double* HWY_RESTRICT node, const double* HWY_RESTRICT force,
-                          std::uint8_t flags, const double* HWY_RESTRICT push) {
+/// Rows are read in vectors of up to four.
+using Row = hn::CappedTag<double, 4>;
+constexpr size_t kRowLanes = hn::MaxLanes(Row());
+
+/// Factors of a step for the entries of a row.
+struct Motion {
+  HWY_ALIGN double keep[4];  // of speeds
+  HWY_ALIGN double fall[4];  // added to speeds
+  HWY_ALIGN double drift[4];
+  double kick = 0;
+};
+HWY_INLINE Motion make_motion(const StepJob& step) {
+  Motion m{};
+  for (int c = 0; c < 3; ++c) m.keep[c] = step.keep, m.fall[c] = step.fall[c], m.drift[c] = step.h;
+  m.keep[3] = 1, m.kick = step.kick;
+  return m;
+}
+
+/// Motion of one node; `force` has 4 entries, the last 0. Returns whether it is below a ground.
+HWY_INLINE bool move_node(const StepJob& step, const Motion& motion, double* HWY_RESTRICT node,
+                          const double* HWY_RESTRICT force, std::uint8_t flags, const double* HWY_RESTRICT push) {
+  const Row d;
   const double inverse = node[kInverseMass];
+  if (HWY_UNLIKELY(!(inverse > 0))) return false;
+  const auto kick = hn::Set(d, motion.kick * inverse);
   double* v = node + kSpeed;
-  double f[3] = {force[0], force[1], force[2]};
-  if (HWY_UNLIKELY((flags & kPushed) != 0))
-    for (int c = 0; c < 3; ++c) f[c] += push[c];
-  const double kick = step.kick * inverse, falls = inverse > 0 ? 1 : 0;
-  for (int c = 0; c < 3; ++c) v[c] = step.keep * v[c] + kick * f[c] + falls * step.fall[c];
-  if (HWY_UNLIKELY((flags & (kHoldX | kHoldY | kHoldZ)) != 0))
-    for (int c = 0; c < 3; ++c)
-      if ((flags & (1 << c)) != 0) v[c] = 0;
-  for (int c = 0; c < 3; ++c) node[c] += step.h * v[c];
+  if (HWY_LIKELY(flags == 0)) {
+    for (size_t c = 0; c < 4; c += kRowLanes) {
+      const auto speed =
+          hn::MulAdd(kick, hn::Load(d, force + c),
+                     hn::MulAdd(hn::Load(d, motion.keep + c), hn::Load(d, v + c), hn::Load(d, motion.fall + c)));
+      hn::Store(speed, d, v + c);
+      hn::Store(hn::MulAdd(hn::Load(d, motion.drift + c), speed, hn::Load(d, node + c)), d, node + c);
+    }
+  } else {
+    const bool pushed = (flags & kPushed) != 0;
+    for (int c = 0; c < 3; ++c) {
+      const double f = pushed ? force[c] + push[c] : force[c];
+      v[c] = (flags & (1 << c)) != 0 ? 0 : motion.keep[c] * v[c] + motion.kick * inverse * f + motion.fall[c];
+      node[c] += step.h * v[c];
+    }
+  }
   bool below = false;
   for (int i = 0; i < step.grounds; ++i) {
     const double* n = step.ground[i];
     below = below || (n[0] * node[0] + n[1] * node[1] + n[2] * node[2] < n[3]);
   }
-  return below && inverse > 0;
+  return below;
 }
 
 void advance_chunk(const StepJob& step, ChunkJob& job) {
-  const size_t count = job.own + job.shared;
   double* HWY_RESTRICT rows = job.room;
-  double* HWY_RESTRICT forces = job.room + 8 * count;
+  double* HWY_RESTRICT forces = job.room + 8;
   // places in the middle of the last step
-  const double back = -0.5 * step.past;
+  const Row row;
+  HWY_ALIGN double back[4] = {-0.5 * step.past, -0.5 * step.past, -0.5 * step.past, 0};
   const auto copy = [&](const double* HWY_RESTRICT from, double* HWY_RESTRICT to) HWY_ATTR {
-    for (int c = 0; c < 3; ++c) to[c] = from[c] + back * from[4 + c];
-    to[3] = 0;
-    for (int c = 4; c < 8; ++c) to[c] = from[c];
+    for (size_t c = 0; c < 4; c += kRowLanes) {
+      const auto speed = hn::Load(row, from + kSpeed + c);
+      hn::Store(hn::MulAdd(hn::Load(row, back + c), speed, hn::Load(row, from + c)), row, to + c);
+      hn::Store(speed, row, to + kSpeed + c);
+      hn::Store(hn::Zero(row), row, to + 8 + c);
+    }
   };
-  for (size_t i = 0; i < job.own; ++i) copy(job.own_nodes + 8 * i, rows + 8 * i);
-  for (size_t i = 0; i < job.shared; ++i)
-    copy(job.nodes + 8 * static_cast<size_t>(job.shared_nodes[i]), rows + 8 * (job.own + i));
-  std::memset(forces, 0, 4 * count * sizeof(double));
+  constexpr size_t kAhead = 12;  // rows of other chunks, all over memory
+  for (size_t i = 0; i < std::min(kAhead, job.shared); ++i)
+    hwy::Prefetch(job.nodes + 8 * static_cast<size_t>(job.shared_nodes[i]));
+  for (size_t i = 0; i < job.own; ++i) copy(job.own_nodes + 8 * i, rows + kRoomFields * i);
+  for (size_t i = 0; i < job.shared; ++i) {
+    if (i + kAhead < job.shared) hwy::Prefetch(job.nodes + 8 * static_cast<size_t>(job.shared_nodes[i + kAhead]));
+    copy(job.nodes + 8 * static_cast<size_t>(job.shared_nodes[i]), rows + kRoomFields * (job.own + i));
+  }
 
   const D d;
   Sums sums{hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d)};
@@ -463,21 +504,25 @@ void advance_chunk(const StepJob& step, ChunkJob& job) {
   const V* vectors[4] = {&sums.mean, &sums.varying, &sums.corner, &sums.viscous};
   for (int i = 0; i < 4; ++i) job.sums[i] += hn::GetLane(hn::SumOfLanes(d, *vectors[i]));
 
+  const Motion motion = make_motion(step);
   for (size_t i = 0; i < job.own; ++i)
-    if (move_node(step, job.own_nodes + 8 * i, forces + 4 * i, job.own_flags[i], job.own_pushes + 4 * i))
+    if (move_node(step, motion, job.own_nodes + 8 * i, forces + kRoomFields * i, job.own_flags[i],
+                  job.own_pushes + 4 * i))
       job.grounded->push_back(static_cast<std::uint32_t>(i));
-  std::memcpy(job.shared_forces, forces + 4 * job.own, 4 * job.shared * sizeof(double));
+  for (size_t i = 0; i < job.shared; ++i)
+    std::memcpy(job.shared_forces + 4 * i, forces + kRoomFields * (job.own + i), 4 * sizeof(double));
 }
 
 void advance_shared(const StepJob& step, const SharedJob& job) {
+  const Motion motion = make_motion(step);
   for (size_t i = job.first; i < job.last; ++i) {
-    double f[4] = {0, 0, 0, 0};
+    HWY_ALIGN double f[4] = {0, 0, 0, 0};
     for (std::uint32_t k = job.starts[i]; k < job.starts[i + 1]; ++k) {
       const double* HWY_RESTRICT from = job.forces + 4 * static_cast<size_t>(job.entries[k]);
       for (int c = 0; c < 4; ++c) f[c] += from[c];
     }
     const size_t row = job.first_row + i;
-    if (move_node(step, job.nodes + 8 * row, f, job.flags[row], job.pushes + 4 * row))
+    if (move_node(step, motion, job.nodes + 8 * row, f, job.flags[row], job.pushes + 4 * row))
       job.grounded->push_back(static_cast<std::uint32_t>(row));
   }
 }

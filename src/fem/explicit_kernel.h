@@ -16,20 +16,24 @@ namespace topple::fem::kernel {
 /// Fields of an element. Amplitudes of stress over the element, in its own axes ξ η ζ, belong to the functions of which
 /// they are named: xx~ζ is the part of the normal stress along ξ that goes with ζ.
 enum ElementField : int {
-  kStress = 0,   // xx yy zz xy yz zx, in W [Pa]
-  kStrain = 6,   // equivalent plastic strain
-  kDamage = 7,   // 1: to be removed
-  kBending = 8,  // xx~ζ yy~ζ, xx~η zz~η, yy~ξ zz~ξ [Pa]
-  kTwist = 14,   // xy~ζ xz~η yz~ξ times 16 products of half edges [Pa m²]
-  kCorner = 17,  // xx~ηζ yy~ζξ zz~ξη [Pa]
-  kStateFields = 20,
-  kMass = 20,    // 0: removed [kg]
-  kLength = 21,  // of the element for bulk viscosity [m]
-  kElementFields = 22
+  kStress = 0,    // xx yy zz xy yz zx, in W [Pa]
+  kStrain = 6,    // equivalent plastic strain
+  kDamage = 7,    // 1: to be removed
+  kBending = 8,   // xx~ζ yy~ζ, xx~η zz~η, yy~ξ zz~ξ [Pa]
+  kTwist = 14,    // xy~ζ xz~η yz~ξ times 16 products of half edges [Pa m²]
+  kCorner = 17,   // xx~ηζ yy~ζξ zz~ξη [Pa]
+  kViscous = 20,  // pressure of bulk viscosity [Pa]
+  kStateFields = 21,
+  kMass = 21,    // 0: removed [kg]
+  kLength = 22,  // of the element for bulk viscosity [m]
+  kElementFields = 23
 };
 
 /// Fields of a node's row.
 enum NodeField : int { kPlace = 0, kInverseMass = 3, kSpeed = 4, kNodeMass = 7, kNodeFields = 8 };
+
+/// Fields of a node in the room of a chunk: place in the middle of the last step, speed, force; 4 each, the last 0.
+inline constexpr int kRoomFields = 12;
 
 /// Flags of a node.
 enum NodeFlag : std::uint8_t { kHoldX = 1, kHoldY = 2, kHoldZ = 4, kPushed = 8 };
@@ -72,7 +76,7 @@ struct ChunkJob {
   const Law* law = nullptr;
   size_t blocks = 0;
   double* elements = nullptr;                   // kElementFields a block
-  const std::uint16_t* corners = nullptr;       // 8 a block of W lanes: place of the node among the chunk's
+  const std::uint16_t* corners = nullptr;       // 8 a block of W lanes: kRoomFields times the node's place
   const unsigned char* live = nullptr;          // bits of the lanes of a block
   size_t own = 0, shared = 0;                   // nodes: those of this chunk alone come first
   double* own_nodes = nullptr;                  // kNodeFields each
@@ -81,7 +85,7 @@ struct ChunkJob {
   double* shared_forces = nullptr;              // 4 each, written
   const std::uint8_t* own_flags = nullptr;      //
   const double* own_pushes = nullptr;           // forces of flagged nodes, 4 each
-  double* room = nullptr;                       // 12 a node of the chunk
+  double* room = nullptr;                       // kRoomFields a node of the chunk
   // written
   double sums[4] = {0, 0, 0, 0};  // dissipated: mean, over the element, the corner mode in it, bulk viscosity [J]
   std::vector<std::uint32_t>* failed = nullptr;    // 4 * slot + cause (1 tension, 2 compression, 3 degenerate)

@@ -26,13 +26,14 @@ void ExplicitSystem::Inside::press_grounds(ExplicitState& state) const {
       const ExplicitGround& g = model.grounds[i];
       const double depth = radius - dot(g.normal, p - g.point);
       if (!(depth > 0)) continue;
-      const double c = 2 * options.contact_damping * std::sqrt(rate * mass), closing = -dot(g.normal, v);
+      const double damping = particle ? options.debris_damping : options.contact_damping;
+      const double c = 2 * damping * std::sqrt(rate * mass), closing = -dot(g.normal, v);
       const double normal = std::max(0.0, rate * depth + c * closing);
       const Vec3 along = v + closing * g.normal;
       const double slide = norm(along);
       const double grip = std::min(g.friction * normal, kGroundGrip * mass / h * slide);
       GroundTouch touch;
-      touch.row = row, touch.ground = static_cast<std::int32_t>(i), touch.particle = particle;
+      touch.row = row, touch.ground = static_cast<std::int32_t>(i), touch.particle = particle ? 1 : 0;
       touch.normal_force = normal * g.normal;
       touch.friction = slide > 0 ? (-grip / slide) * along : Vec3{};
       touch.stored = 0.5 * rate * depth * depth;
@@ -70,7 +71,7 @@ void ExplicitSystem::Inside::book_grounds(ExplicitState& state) const {
   state.ground_work.stored = 0;
   for (const GroundTouch& t : state.touches) {
     const Vec3 now =
-        t.particle ? state.particles[t.row].v : vector_at(state.rows.data() + 8 * static_cast<size_t>(t.row) + 4);
+        t.particle != 0 ? state.particles[t.row].v : vector_at(state.rows.data() + 8 * static_cast<size_t>(t.row) + 4);
     const Vec3 path = (0.5 * h) * (t.before + now);
     state.ground_work.normal += dot(t.normal_force, path);
     state.ground_work.friction += dot(t.friction, path);
@@ -159,7 +160,7 @@ void ExplicitSystem::Inside::add_debris(ExplicitState& state, int element, const
         q.full_radius = std::cbrt(3 * volume / (4 * M_PI));
         q.radius = std::min(0.475 * side, q.full_radius);
         // as stiff as a ball of the material between plates, as far as the step allows
-        q.stiffness = std::min(0.05 * q.mass / (h * h), law.E * q.radius);
+        q.stiffness = std::min(0.02 * q.mass / (h * h), law.E * q.radius);
         q.element = element;
         state.particles.push_back(q);
       }
@@ -242,8 +243,7 @@ ExplicitEnergy ExplicitSystem::Inside::calc_energy() {
     energy.elastic += stored[0], energy.elastic_hourglass += stored[1], energy.corner_hourglass += stored[2];
   }
   energy.plastic = ahead.sums[0], energy.plastic_hourglass = ahead.sums[1], energy.plastic_corner = ahead.sums[2];
-  // viscous pressure acts half a step on either side of the present
-  energy.bulk_viscosity = 0.5 * (s.sums[3] + ahead.sums[3]);
+  energy.bulk_viscosity = ahead.sums[3];
   // contact: work of the steps so far, and of half of this one
   const auto book = [&](const ContactWork& so_far, double normal, double friction, double stored) {
     energy.contact_elastic += stored;

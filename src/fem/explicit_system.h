@@ -26,7 +26,8 @@ struct ExplicitOptions {
   double quadratic_viscosity = 1.2;  //
   bool contact = true;               // between surfaces; the ground is always there
   double friction = 0.5;             // between surfaces and debris
-  double contact_damping = 0.2;      // of critical, ground too; 0: elastic
+  double contact_damping = 0.1;      // of critical, ground too; 0: elastic
+  double debris_damping = 0.5;       // the same where debris takes part: rubble does not bounce
   bool debris = true;                // what is crushed or torn stays as particles
   double search_margin = 0;          // reach of a contact search [m]; 0: an eighth of the smallest edge
 };
@@ -71,7 +72,7 @@ struct ExplicitEnergy {
   double residual() const { return sum() - start; }
 };
 
-enum class RemovalCause : std::uint8_t { Charge, Tension, Compression, Degenerate };
+enum class RemovalCause : std::uint32_t { Charge, Tension, Compression, Degenerate };
 struct Removal {
   double time = 0;  // [s]
   int element = 0;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "fem/explicit_inside.h"
 
@@ -11,7 +12,7 @@ namespace {
 
 /// Penalty rate over the mass felt and the step squared, and the share of that mass that a dashpot of friction stops in
 /// a step: a node takes part in up to ten touches.
-constexpr double kRate = 0.1, kGrip = 0.05;
+constexpr double kRate = 0.03, kGrip = 0.02;
 
 Vec3 vector_at(const double* r) { return {r[0], r[1], r[2]}; }
 
@@ -90,9 +91,10 @@ Projection project(const Vec3& p, const Vec3 (&x)[4], bool clamps) {
 /// Forces on the point for a depth and a relative velocity.
 void calc_forces(double depth, const Vec3& normal, const Vec3& v, double rate, double inverse_mass,
                  const ExplicitOptions& options, double h, SurfaceTouch& touch) {
+  const bool debris = touch.point.kind == ContactPoint::Debris;
+  const double damping = debris ? options.debris_damping : options.contact_damping;
   const double closing = -dot(normal, v);
-  const double push =
-      std::max(0.0, rate * depth + 2 * options.contact_damping * std::sqrt(rate / inverse_mass) * closing);
+  const double push = std::max(0.0, rate * depth + 2 * damping * std::sqrt(rate / inverse_mass) * closing);
   const Vec3 along = v + closing * normal;
   const double slide = norm(along);
   const double grip = std::min(options.friction * push, kGrip * slide / (inverse_mass * h));
@@ -100,6 +102,32 @@ void calc_forces(double depth, const Vec3& normal, const Vec3& v, double rate, d
   touch.friction = slide > 0 ? (-grip / slide) * along : Vec3{};
   touch.stored = 0.5 * rate * depth * depth;
   touch.before = v;
+  touch.depth = depth;
+}
+
+/// Whether a point behind a face of an element at some depth is behind its other outer faces too, and deeper there.
+bool is_nearest(const ContactSetup& setup, const ExplicitState& s, const Vec3& p, std::uint32_t face, double depth) {
+  const size_t e = face / 6;
+  for (std::uint32_t f = 0; f < 6; ++f) {
+    const int beside = setup.surface.neighbour[e][f];
+    if (f == face % 6 || (beside >= 0 && s.contact.gone[static_cast<size_t>(beside)] == 0)) continue;
+    const Quad quad = quad_of(setup, static_cast<std::uint32_t>(6 * e) + f);
+    Vec3 x[4];
+    for (size_t k = 0; k < 4; ++k) x[k] = vector_at(s.rows.data() + 8 * size_t{quad.rows[k]});
+    const Vec3 n = cross(x[2] - x[0], x[3] - x[1]);
+    if (-dot(p - 0.25 * (x[0] + x[1] + x[2] + x[3]), n) < depth * norm(n)) return false;
+  }
+  return true;
+}
+
+/// Of the touches of each point that of least depth, in the order of points.
+void keep_nearest(std::vector<SurfaceTouch>& touches) {
+  const auto key = [](const SurfaceTouch& t) { return std::tuple(t.point.kind, t.point.index, t.depth, t.face); };
+  std::sort(touches.begin(), touches.end(),
+            [&](const SurfaceTouch& a, const SurfaceTouch& b) { return key(a) < key(b); });
+  touches.erase(std::unique(touches.begin(), touches.end(),
+                            [](const SurfaceTouch& a, const SurfaceTouch& b) { return a.point == b.point; }),
+                touches.end());
 }
 
 }  // namespace
@@ -108,6 +136,7 @@ void press_surfaces(const ContactSetup& setup, const ExplicitOptions& options, d
                     const std::function<void(std::uint32_t row, const Vec3&)>& push) {
   ContactState& c = s.contact;
   c.touches.clear();
+  std::vector<SurfaceTouch> buried;
   for (const ContactPair& pair : c.pairs)
     for (const ContactCandidate& candidate : pair.candidates) {
       const bool debris = candidate.point.kind == ContactPoint::Debris;
@@ -136,6 +165,7 @@ void press_surfaces(const ContactSetup& setup, const ExplicitOptions& options, d
         far += 0.25 * vector_at(s.rows.data() +
                                 8 * size_t{setup.rows_of_element[candidate.face / 6][static_cast<size_t>(corner)]});
       if (-on.height * size > kFaceDepth * dot(n, middle - far)) continue;
+      if (on.height < 0 && !is_nearest(setup, s, q.p, candidate.face, -on.height)) continue;
       double inverse = q.inverse_mass;
       Vec3 v = q.v;
       SurfaceTouch touch;
@@ -153,8 +183,11 @@ void press_surfaces(const ContactSetup& setup, const ExplicitOptions& options, d
         particle.touched = 1;
       }
       calc_forces(depth, on.normal, v, share * rate, inverse, options, h, touch);
-      c.touches.push_back(touch);
+      // a point inside a body goes out by the nearest face alone
+      (on.height < 0 ? buried : c.touches).push_back(touch);
     }
+  keep_nearest(buried);
+  c.touches.insert(c.touches.end(), buried.begin(), buried.end());
   for (const auto& pair : c.particle_pairs) {
     Particle &a = s.particles[pair[0]], &b = s.particles[pair[1]];
     const Vec3 d = a.p - b.p;

@@ -134,8 +134,7 @@ TEST(ExplicitBarPhysics, EnergyClosesWithViscosityAndDamping) {
   const ExplicitEnergy energy = system.calc_energy();
   EXPECT_GT(energy.bulk_viscosity, 0);
   EXPECT_GT(energy.contact_damping, 0);
-  // viscous pressure is booked at the speeds before it, first order in the step: a front takes some 20 of them
-  EXPECT_LT(std::abs(energy.residual()), 1e-3 * energy.start);
+  EXPECT_LT(std::abs(energy.residual()), 1e-4 * energy.start);  // geometry of half a step ago
 }
 
 /// A cantilever of length 4, 0.2 x 0.2, along x.
