@@ -280,10 +280,15 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
   if (law.points > 0) {
     V strain = load_field(element, kStrain);
     Yield y;
-    if (hn::AllTrue(d, hn::Eq(strain, zero)))
-      y = {num(law.tension[0]), num(law.tension_slope[0]), num(law.compression[0]), num(law.compression_slope[0])};
-    else
+    V pure;  // bending that a section without normal force bears, over 1.5 elastic stresses (eq. 14)
+    if (hn::AllTrue(d, hn::Eq(strain, zero))) {
+      const double t = law.tension[0], c = law.compression[0];
+      y = {num(t), num(law.tension_slope[0]), num(c), num(law.compression_slope[0])};
+      pure = num(2 / 1.5 * t * c / (t + c));
+    } else {
       y = find_yield(law, strain);
+      pure = hn::Div(mul(num(2 / 1.5), mul(y.tension, y.compression)), add(y.tension, y.compression));
+    }
     V mean = mul(num(1.0 / 3), add(sxx, add(syy, szz)));
     const V dx = sub(sxx, mean), dy = sub(syy, mean), dz = sub(szz, mean);
     const V q2 =
@@ -299,20 +304,32 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
     const V t2 = fma(mul(s.twist[0], s.twist[0]), iab,
                      fma(mul(s.twist[1], s.twist[1]), iac, mul(mul(s.twist[2], s.twist[2]), ibc)));
     const V corner2 = fma(s.corner[0], s.corner[0], fma(s.corner[1], s.corner[1], mul(s.corner[2], s.corner[2])));
-    h2 = mul(num(1 / 2.25), fma(num(3), t2, fma(num(1.0 / 3), corner2, h2)));
+    h2 = fma(num(3), t2, fma(num(1.0 / 3), corner2, h2));
     const V top = mul(num(law.cutoff), y.tension), limit2 = mul(limit, limit);
-    const auto flows = hn::Gt(add(q2, h2), limit2), tears = hn::Gt(mean, top);
-    if (HWY_UNLIKELY(!hn::AllFalse(d, hn::And(live, hn::Or(flows, tears))))) {
-      // mean stress and what varies come back together (eq. 13, 14); where tension is weak, compression lets a section
-      // bear more bending
-      const V axial = hn::Min(y.tension, hn::Max(hn::Neg(y.compression), mul(num(3), mean)));
-      const V room = hn::Div(mul(add(y.compression, axial), sub(y.tension, axial)), mul(y.compression, y.tension));
-      h2 = hn::Div(h2, hn::Max(num(1), room));
-      const V q = hn::Sqrt(hn::Max(add(q2, h2), num(1e-300)));
+    // a bound of what eq. 14 says, without roots
+    const V bent2_limit2 = mul(h2, mul(pure, pure));
+    const auto may_flow = hn::Gt(mul(num(1.2886751345948130), fma(q2, limit2, bent2_limit2)), mul(limit2, limit2));
+    const auto tears = hn::Gt(mean, top);
+    if (HWY_UNLIKELY(!hn::AllFalse(d, hn::And(live, hn::Or(may_flow, tears))))) {
+      const V bent2 = hn::Div(bent2_limit2, limit2);
+      // mean stress and what varies come back together, the more so the more they are of one kind (eq. 13, 14)
+      const auto along = [&](const V3& u) HWY_ATTR {
+        return V3{fma(dx, u.x, fma(sxy, u.y, mul(szx, u.z))), fma(sxy, u.x, fma(dy, u.y, mul(syz, u.z))),
+                  fma(szx, u.x, fma(syz, u.y, mul(dz, u.z)))};
+      };
+      const V3 da = along(x.a), db = along(x.b), dc = along(x.c);
+      const V daa = mul(ia, dot(x.a, da)), dbb = mul(ib, dot(x.b, db)), dcc = mul(ic, dot(x.c, dc));
+      const V two = num(2);
+      const V k1 = fma(daa, s.bending[0], fma(dbb, s.bending[1], mul(two, mul(mul(iab, dot(x.a, db)), s.twist[0]))));
+      const V k2 = fma(daa, s.bending[2], fma(dcc, s.bending[3], mul(two, mul(mul(iac, dot(x.a, dc)), s.twist[1]))));
+      const V k3 = fma(dbb, s.bending[4], fma(dcc, s.bending[5], mul(two, mul(mul(ibc, dot(x.b, dc)), s.twist[2]))));
+      const V alike = mul(num(1.5), hn::Sqrt(fma(k1, k1, fma(k2, k2, mul(k3, k3)))));
+      const V common = hn::Div(mul(alike, pure), limit);
+      const V q = hn::Sqrt(hn::Max(fma(num(0.57735026918962576), common, add(q2, bent2)), num(1e-300)));
       const V slope = fma(sub(y.compression_slope, y.tension_slope), w, y.tension_slope);
       const V mu3 = num(3 * law.mu);
       const V flow = hn::Max(zero, hn::Div(sub(q, limit), add(mu3, slope)));
-      const V keep = hn::Div(fnma(mu3, flow, q), q);
+      const V keep = fnma(mu3, hn::Div(flow, hn::Max(q, num(1e-300))), num(1));
       const V part = mul(keep, sub(num(1), keep));
       const V opening = hn::Max(zero, hn::Div(sub(mean, top), num(law.bulk)));
       mean = hn::Min(mean, top);

@@ -56,7 +56,7 @@ ExplicitModel make_quarter_rod(double radius, double length, int n, int layers) 
 // length 21.3 to 21.7, radius 6.9 to 7.2 mm, plastic strain 2.5 to 3.2 (Taylor bar as collected in e.g. Zhu & Cescotto
 // 1995 and Bonet & Burton 1998; OpenRadioss with one-point elements 6 x 54: 21.55, 6.99).
 TEST(TaylorBarReference, HasThePublishedLengthAndRadius) {
-  ExplicitModel model = make_quarter_rod(3.2e-3, 32.4e-3, 3, 54);
+  ExplicitModel model = make_quarter_rod(3.2e-3, 32.4e-3, 4, 64);
   ExplicitMaterial copper = make_explicit_elastic(8930, 117e9, 0.35);
   copper.yield = {{0, 400e6, 400e6}, {10, 1400e6, 1400e6}};
   model.materials = {copper};
@@ -92,6 +92,44 @@ TEST(TaylorBarReference, HasThePublishedLengthAndRadius) {
   // the stabilisation takes little; the balance is off by the step's share of plastic flow, some 1e-4
   EXPECT_LT(energy.plastic_hourglass + energy.elastic_hourglass, 0.05 * energy.start);
   EXPECT_LT(std::abs(energy.residual()), 1e-3 * energy.start);
+}
+
+// A cantilever of length 2 and section 0.2 x 0.2 of ideal plastic material under a force at its end:
+// the full plastic moment σ_y b h²/4 is the most that the root bears. One element over the depth knows it by the limit
+// of its varying stresses, several by their mean stresses.
+TEST(ExplicitHingePhysics, ABeamYieldsAtItsPlasticMoment) {
+  for (const int across : {1, 2, 4}) {  // over the depth
+    ExplicitModel model;
+    ExplicitMaterial steel = make_explicit_elastic(7850, 30e9, 0);
+    steel.yield = {{0, 30e6, 30e6}};
+    model.materials = {steel};
+    model.gravity = {};
+    const int along = 10 * across;
+    add_brick(model, {0, 0, 0}, {2, 0.2, 0.2}, along, across, across);
+    for (const int n : find_nodes(model, [](const Vec3& p) { return p.x == 0; }))
+      model.supports.push_back({n, true, true, true});
+    const std::vector<int> tip = find_nodes(model, [](const Vec3& p) { return p.x == 2; });
+    ExplicitOptions options;
+    options.contact = false;
+    const double most = 30e6 * 0.2 * 0.04 / 4 / (2 - 0.1 / across);  // about the middle of the first element
+    const auto deflection = [&](double share) {
+      model.forces.clear();
+      for (const int n : tip) model.forces.push_back({n, {0, 0, -share * most / static_cast<double>(tip.size())}});
+      ExplicitSystem system(model, options);
+      RelaxationOptions relaxation;
+      relaxation.ramp = 2000, relaxation.most_steps = 6000 * across, relaxation.tolerance = 1e-3;
+      const RelaxationSummary summary = system.relax(relaxation);
+      return std::pair(summary.converged, -system.p(tip[0]).z);
+    };
+    // it stands below the plastic moment, with more than the elastic deflection, and not above
+    const auto [stands, below] = deflection(0.93);
+    EXPECT_TRUE(stands) << across;
+    const double elastic = 0.93 * most * 8 / (3 * 30e9 * std::pow(0.2, 4) / 12);
+    EXPECT_GT(below, elastic) << across;
+    const auto [stands_above, above] = deflection(1.10);
+    EXPECT_FALSE(stands_above) << across;
+    EXPECT_GT(above, 1.5 * below) << across;
+  }
 }
 
 }  // namespace
