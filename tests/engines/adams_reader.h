@@ -137,7 +137,7 @@ struct AdamsDataset {
 };
 
 /// Parts, markers, joints, linear bushings, gravity, and torsion springs and dampers.
-inline AdamsDataset read_adams(const std::string& text) {
+inline AdamsDataset read_dataset(const std::string& text) {
   AdamsDataset d;
   d.statements = read_statements(text);
   d.model.contact.ground = d.model.contact.bodies = false;

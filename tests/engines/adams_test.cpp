@@ -15,7 +15,7 @@ namespace {
 
 using mbs::Joint;
 using test::AdamsDataset;
-using test::read_adams;
+using test::read_dataset;
 using testing::HasSubstr;
 
 const std::string folder = std::string(TOPPLE_SOURCE_DIR) + "/tests/data/adams/";
@@ -62,7 +62,7 @@ class AdamsDatasetReference : public testing::TestWithParam<Case> {};
 TEST_P(AdamsDatasetReference, TheirDatasetMeansTheirMotionAndSoDoesOurs) {
   const auto [name, tolerance] = GetParam();
   const std::string places = std::string(name) + "_ADAMS_Pos.txt";
-  AdamsDataset theirs = read_adams(read_file(folder + "test_" + name + ".adm"));
+  AdamsDataset theirs = read_dataset(read_file(folder + "test_" + name + ".adm"));
   for (mbs::RotationalSpring& spring : theirs.model.rotational_springs) {
     // the dataset says 1 N·m/° and 0.05 N·m·s/°, its outputs are those of 200 N·m/rad and 10 N·m·s/rad (README.md
     // there)
@@ -75,7 +75,7 @@ TEST_P(AdamsDatasetReference, TheirDatasetMeansTheirMotionAndSoDoesOurs) {
   // written by us and read again
   const AdamsFiles files = to_adams(theirs.model, {}, "again");
   EXPECT_TRUE(files.notes.empty()) << files.notes.front();
-  EXPECT_LT(find_farthest(read_adams(files.dataset).model, places), tolerance);
+  EXPECT_LT(find_farthest(read_dataset(files.dataset).model, places), tolerance);
 }
 
 INSTANTIATE_TEST_SUITE_P(Cases, AdamsDatasetReference,
@@ -131,7 +131,7 @@ mbs::Model make_askew() {
 
 TEST(Adams, BodiesJointsAndElementsComeBackWhereTheyWere) {
   const mbs::Model m = make_askew();
-  const AdamsDataset d = read_adams(to_adams(m, {}, "x").dataset);
+  const AdamsDataset d = read_dataset(to_adams(m, {}, "x").dataset);
   ASSERT_EQ(d.model.bodies.size(), 1U);  // the fixed one belongs to the ground
   const mbs::Body &a = m.bodies[0], &b = d.model.bodies[0];
   EXPECT_EQ(b.mass, a.mass);
@@ -199,7 +199,7 @@ mbs::Model make_hinge() {
 }
 
 TEST(Adams, HingeFollowsItsFamilyOfCurves) {
-  const AdamsDataset d = read_adams(to_adams(make_hinge(), {}, "x").dataset);
+  const AdamsDataset d = read_dataset(to_adams(make_hinge(), {}, "x").dataset);
   const test::AdamsStatement* spline = nullptr;
   const test::AdamsStatement* force = nullptr;
   for (const auto& s : d.statements) {
@@ -250,7 +250,7 @@ TEST(Adams, NamesWhatItCannotSay) {
 }
 
 TEST(Adams, EveryMovingBodyTouchesTheGroundBelowIt) {
-  const AdamsDataset d = read_adams(to_adams(make_hinge(), {}, "x").dataset);
+  const AdamsDataset d = read_dataset(to_adams(make_hinge(), {}, "x").dataset);
   const test::AdamsStatement* contact = nullptr;
   std::map<int, const test::AdamsStatement*> graphics;
   for (const auto& s : d.statements) {
