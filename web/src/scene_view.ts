@@ -51,12 +51,11 @@ export function attachScene(scene: SceneLike, frame: HTMLElement): () => void {
 }
 
 /// `make` makes the scene (it throws where there is no WebGL), `use` connects it to signals and may return what ends
-/// that; `fail` hears why there is no picture. All are called once for each value of `key`.
+/// that; `fail` hears that there is no picture. All are called once.
 export function useSceneView<S extends SceneLike>(
   make: (canvas: HTMLCanvasElement) => S,
   use: (scene: S) => (() => void) | void,
   fail: () => void = () => undefined,
-  key: unknown = undefined,
 ): SceneView<S> {
   const frameRef = useRef<HTMLDivElement>(null);
   const canvasRef = useRef<HTMLCanvasElement>(null);
@@ -82,6 +81,6 @@ export function useSceneView<S extends SceneLike>(
       detach();
       sceneRef.current = undefined;
     };
-  }, [key]);
+  }, []);
   return { frameRef, canvasRef, sceneRef, problem };
 }

@@ -237,6 +237,7 @@ export class Stage implements SceneLike {
     this.controls.dispose();
     disposeOf(this.scene);
     this.renderer.dispose();
+    this.renderer.forceContextLoss(); // a browser keeps few of them
   }
 }
 

@@ -78,6 +78,8 @@ function Banner(props: { s: SteerState }) {
   if (s.status.value === "lost")
     return <div class="banner warning" role="status" data-test="banner"><strong>No connection.</strong> The run goes on without this page; reconnecting…</div>;
   if (s.status.value === "ended") return <div class="banner bad" role="alert" data-test="banner"><strong>The server has ended.</strong> Start <code>topple steer</code> again; what is shown here is the last state.</div>;
+  if (s.phase.value === "failed" && s.view.value === null)
+    return <div class="banner bad" role="alert" data-test="banner"><strong>This plan cannot be run as it is.</strong> {prettify(ending?.text ?? "")} Mend the text below; “Run as a new branch” tries again.</div>;
   if (s.phase.value === "failed") {
     const marked = /([A-Z]-[A-Z0-9]+-\d+(?:\/\w+)?)/.exec(ending?.text ?? "")?.[1];
     return (
@@ -229,6 +231,23 @@ function ready(): void {
 function Page(props: { s: SteerState }) {
   const { s } = props;
   const view = s.view.value;
+  if (s.session.value !== null && view === null) {
+    setTimeout(ready, 0);
+    const failed = s.phase.value === "failed";
+    return (
+      <div class="steer unbuilt">
+        <Header s={s} />
+        <div class="banners"><Banner s={s} /></div>
+        {failed ? (
+          <PlanEditor s={s} />
+        ) : (
+          <p class="pad" role="status">{phaseWord[s.phase.value]}… <progress max={1} {...(typeof s.progress.value?.progress === "number" ? { value: s.progress.value.progress } : {})} aria-label="Progress" /></p>
+        )}
+        <Notices s={s} />
+        <Dialogs s={s} />
+      </div>
+    );
+  }
   if (s.session.value === null || view === null) {
     if (s.welcomed.value) setTimeout(ready, 0);
     return (

@@ -59,6 +59,17 @@ function Pair(props: { s: SteerState; result: Comparison; series: Comparison["se
   );
 }
 
+/// Of bodies of both branches, the largest distance and when.
+function findFarthest(largest: Comparison["largest"]): { time: number; distance: number } | undefined {
+  if (largest === null) return undefined;
+  const times = [largest.time].flat(), distances = [largest.distance].flat();
+  let best = -1;
+  distances.forEach((d, k) => {
+    if (d !== null && (best < 0 || d > (distances[best] as number))) best = k;
+  });
+  return best < 0 ? undefined : { time: times[best] as number, distance: distances[best] as number };
+}
+
 const modes: [CompareView, string][] = [["off", "one"], ["beside", "side by side"], ["over", "one over the other"]];
 
 export function Compare(props: { s: SteerState }) {
@@ -73,6 +84,7 @@ export function Compare(props: { s: SteerState }) {
     setB(c.b);
   }, [c]);
   if (s.branches.value.length < 2) return <p class="quiet pad">There is one branch. An edit, or “Branch here”, makes another one to compare with.</p>;
+  const apart = findFarthest(c?.result.largest ?? null);
   const choose = (value: number, set: (id: number) => void, label: string) => (
     <label>
       {label}{" "}
@@ -100,7 +112,7 @@ export function Compare(props: { s: SteerState }) {
       </div>
       {c !== null && (
         <>
-          {c.result.largest !== null && <p class="pad">Farthest apart: {formatNumber(c.result.largest.distance, 3)} m at {formatTime(c.result.largest.time)}.</p>}
+          {apart !== undefined && <p class="pad">Farthest apart: {formatNumber(apart.distance, 3)} m at {formatTime(apart.time)}.</p>}
           <div class="plots wide-plots">
             {c.result.series.map((series) => <Pair key={`${c.a} ${c.b} ${series.id}`} s={s} result={c.result} series={series} names={[nameOf(c.a), nameOf(c.b)]} />)}
           </div>

@@ -112,7 +112,7 @@ export class Connection {
   }
 
   private receive(message: Message): void {
-    if (typeof message["seq"] === "number") this.seq = Math.max(message.type === "hello" ? 0 : this.seq, message["seq"]);
+    if (typeof message["seq"] === "number" && message.type !== "resumed") this.seq = Math.max(message.type === "hello" ? 0 : this.seq, message["seq"]);
     switch (message.type) {
       case "ack":
       case "error": {

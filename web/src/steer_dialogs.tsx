@@ -1,6 +1,7 @@
 /// Forms for what can be changed. Values carry their unit here and are SI on the wire.
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import type { ComponentChildren } from "preact";
+import { CommandError } from "./steer_connection";
 import type { Dialog, SteerState } from "./steer_state";
 import { formatTime } from "./units";
 import { OpenPlan } from "./steer_welcome";
@@ -16,7 +17,17 @@ interface Field {
   help?: string;
 }
 
-function Form(props: { s: SteerState; title: string; note?: ComponentChildren; fields: Field[]; action: string; onDone: (values: Record<string, number | string | undefined>) => Promise<boolean> | boolean }) {
+interface FormProps {
+  s: SteerState;
+  title: string;
+  note?: ComponentChildren;
+  fields: Field[];
+  action: string;
+  /// What it throws is shown in the form.
+  onDone: (values: Record<string, number | string | undefined>) => Promise<unknown>;
+}
+
+function Form(props: FormProps) {
   const { s } = props;
   const [values, setValues] = useState<Record<string, string>>(Object.fromEntries(props.fields.map((f) => [f.key, f.value])));
   const [problem, setProblem] = useState("");
@@ -37,7 +48,12 @@ function Form(props: { s: SteerState; title: string; note?: ComponentChildren; f
     }
     setProblem("");
     setBusy(true);
-    if (await props.onDone(out)) s.dialog.value = null;
+    try {
+      await props.onDone(out);
+      s.dialog.value = null;
+    } catch (error) {
+      setProblem(error instanceof CommandError ? `${error.error.message} ${error.error.help ?? ""}` : String(error));
+    }
     setBusy(false);
   };
   return (
@@ -92,7 +108,7 @@ function Content(props: { s: SteerState; dialog: Dialog }) {
       return (
         <Form s={s} title={dialog.title} note={note} action="Change"
           fields={[{ key: "time", label: "Fires at", unit: "s", value: String(Number(dialog.time.toFixed(6))), help: "time of the simulation" }]}
-          onDone={(v) => s.edit("set_delay", { ...(dialog.charge !== undefined ? { charge: dialog.charge } : { stage: dialog.stage }), time: v["time"] })} />
+          onDone={(v) => s.tryEdit("set_delay", { ...(dialog.charge !== undefined ? { charge: dialog.charge } : { stage: dialog.stage }), time: v["time"] })} />
       );
     case "charge":
       return (
@@ -105,7 +121,7 @@ function Content(props: { s: SteerState; dialog: Dialog }) {
             { key: "transition_damage", label: "Damage beside it", unit: "%", factor: 0.01, value: "20" },
             { key: "time", label: "Fires at", unit: "s", value: "", optional: true, help: "empty: now" },
           ]}
-          onDone={(v) => s.edit("add_charge", v)} />
+          onDone={(v) => s.tryEdit("add_charge", v)} />
       );
     case "pre_cut":
       return (
@@ -116,7 +132,7 @@ function Content(props: { s: SteerState; dialog: Dialog }) {
             { key: "cut_bars", label: "Bars cut", unit: "%", factor: 0.01, value: "50" },
             { key: "cut_concrete", label: "Section taken out", unit: "%", factor: 0.01, value: "30" },
           ]}
-          onDone={(v) => s.edit("add_pre_cut", v)} />
+          onDone={(v) => s.tryEdit("add_pre_cut", v)} />
       );
     case "cable":
       return (
@@ -131,7 +147,7 @@ function Content(props: { s: SteerState; dialog: Dialog }) {
             { key: "pretension", label: "Pretension", unit: "kN", factor: 1e3, value: "100" },
             { key: "strength", label: "Strength", unit: "kN", factor: 1e3, value: "", optional: true, help: "empty: it does not break" },
           ]}
-          onDone={({ x, y, z, ...v }) => s.edit("add_cable", { ...v, anchor: [x, y, z] })} />
+          onDone={({ x, y, z, ...v }) => s.tryEdit("add_cable", { ...v, anchor: [x, y, z] })} />
       );
     case "friction": {
       const now = s.branch.value?.friction;
@@ -141,7 +157,7 @@ function Content(props: { s: SteerState; dialog: Dialog }) {
             { key: "ground", label: "On the ground", unit: " ", value: String(now?.ground ?? 0.6) },
             { key: "bodies", label: "Between bodies", unit: " ", value: String(now?.bodies ?? 0.6) },
           ]}
-          onDone={(v) => s.edit("set_friction", v)} />
+          onDone={(v) => s.tryEdit("set_friction", v)} />
       );
     }
     case "branch":
@@ -149,12 +165,23 @@ function Content(props: { s: SteerState; dialog: Dialog }) {
         <Form s={s} title="Branch" action="Make it"
           note={<p class="quiet">A new branch from {formatTime(s.editTime.value)}. The one it parts from stays as it is.</p>}
           fields={[{ key: "name", label: "Name", value: `what-if ${s.branches.value.length}` }]}
-          onDone={async (v) => (await s.makeBranch(String(v["name"])), true)} />
+          onDone={(v) => s.makeBranch(String(v["name"]))} />
       );
     case "rename":
       return (
         <Form s={s} title="Rename the branch" action="Rename" fields={[{ key: "name", label: "Name", value: dialog.name }]}
-          onDone={async (v) => (await s.ask("rename", { branch: dialog.branch, name: v["name"] })) !== undefined} />
+          onDone={(v) => s.connection.command("rename", { branch: dialog.branch, name: v["name"] })} />
+      );
+    case "save":
+      return (
+        <Form s={s} title="Save the plan" action="Save" note={<p class="quiet">This plan has no file yet. It goes into the folder that the server was started for.</p>}
+          fields={[{ key: "path", label: "Name of the file", value: "plan.toml" }]}
+          onDone={async (v) => {
+            const r = await s.connection.command<{ sha256: string; path?: string }>("plan.save", { text: dialog.text, path: v["path"] });
+            s.plan.value = { text: dialog.text, sha256: r.sha256, path: r.path ?? String(v["path"]) };
+            s.editedText.value = null;
+            s.notify("good", `Saved ${v["path"]}.`);
+          }} />
       );
     case "conflict":
       return (

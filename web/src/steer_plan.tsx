@@ -63,6 +63,10 @@ export function PlanEditor(props: { s: SteerState }) {
     e.scrollTop = Math.max(0, (d.line - 4) * lineHeight);
   };
   const save = async (): Promise<void> => {
+    if (s.plan.value.path === "") {
+      s.dialog.value = { kind: "save", text };
+      return;
+    }
     try {
       const r = await s.connection.command<{ sha256: string }>("plan.save", { text, base_sha256: s.plan.value.sha256 });
       s.plan.value = { ...s.plan.value, text, sha256: r.sha256 };

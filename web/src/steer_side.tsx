@@ -207,7 +207,7 @@ function Verdict(props: { s: SteerState }) {
   const first = list.find((f) => f.id === "mechanism") ?? list[0];
   const others = list.filter((f) => f !== first && (f.status === "bad" || f.status === "warning" || f.id.startsWith("clearance.")));
   others.sort((a, b) => Number(b.status === "bad") - Number(a.status === "bad"));
-  const ending = s.progress.value?.ending ?? result?.ending;
+  const ending = s.progress.value?.ending ?? s.branch.value?.ending;
   return (
     <section class="verdict-panel" aria-label="Verdict" data-test="verdict-panel">
       <h2>Verdict {ending === null || ending === undefined ? <span class="quiet">so far</span> : null}</h2>

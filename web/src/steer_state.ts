@@ -17,6 +17,7 @@ export type Dialog =
   | { kind: "branch" }
   | { kind: "rename"; branch: number; name: string }
   | { kind: "open" }
+  | { kind: "save"; text: string }
   | { kind: "conflict"; text: string; disk: string; sha256: string };
 export interface Notice {
   id: number;
@@ -58,7 +59,7 @@ export function makeSteerState(address: string) {
 
   const notify = (status: Notice["status"], text: string, help?: string): void => {
     const id = ++noticeId;
-    const others = notices.value.filter((n) => n.text !== text).slice(-3);
+    const others = notices.value.filter((n) => n.text !== text).slice(-1);
     notices.value = [...others, { id, status, text, ...(help === undefined || help === "" ? {} : { help }) }];
     setTimeout(() => dismiss(id), status === "bad" ? 20000 : 5000);
   };
@@ -178,14 +179,20 @@ export function makeSteerState(address: string) {
       return;
     }
     if (!sessions.value.some((s) => s.id === next.id)) sessions.value = [...sessions.value, next];
-    progress.value = null;
+    progress.value = (message["state"] as StateEvent | null | undefined) ?? null;
     plan.value = message["plan"] as typeof plan.value;
+    if (next.diagnostics !== undefined && editedText.value === null) planCheck.value = { diagnostics: next.diagnostics, title: next.title, notes: [] };
+    if (next.active === null || message["scene"] === null || message["scene"] === undefined) {
+      // Not built yet, or it cannot be: another hello follows when it is.
+      view.value = null;
+      active.value = 0;
+      return;
+    }
     active.value = next.active;
     if (!known) {
       comparison.value = null;
       zone.value = null;
       editedText.value = null;
-      planCheck.value = null;
       hiddenStoreys.value = new Set();
       look.selected.value = -1;
     }
@@ -198,8 +205,9 @@ export function makeSteerState(address: string) {
       tab.value = keep.tab;
     }
     void readFindings();
+    if (zone.value !== null) void watchZone(zone.value.zone);
     ask<{ sessions: Session[] }>("session.list").then((r) => r !== undefined && (sessions.value = r.sessions));
-    ask<{ entries: LogEntry[] }>("log").then((r) => r !== undefined && (log.value = r.entries));
+    ask<{ entries: LogEntry[] }>("log").then((r) => r !== undefined && (log.value = r.entries.filter((e) => typeof e.seq === "number")));
     ask<{ studies: Study[] }>("study.list").then((r) => r?.studies.forEach((s) => putStudy(s, [])));
     ask<PlanCheck>("plan.check", { text: plan.value.text }).then((r) => r !== undefined && editedText.value === null && (planCheck.value = r));
     fill();
@@ -238,8 +246,19 @@ export function makeSteerState(address: string) {
     const time = view.value?.state.time.value ?? 0;
     useRun(run);
     if (!following.value) run.state.seek(time);
+    if (zone.value !== null) void watchZone(zone.value.zone);
     void readFindings();
     fill();
+  }
+
+  /// The path so far comes as an event, or in the answer.
+  async function watchZone(name: string | null): Promise<void> {
+    zone.value = name === null ? null : { zone: name, law: null, path: [] };
+    const result = await ask<Partial<ZoneWatch>>("zone", { zone: name });
+    const now = zone.value;
+    if (name === null || now === null || now.zone !== name) return;
+    if (result === undefined) zone.value = null;
+    else zone.value = { zone: name, law: result.law ?? null, path: result.path ?? now.path };
   }
 
   function takeFrame(bytes: ArrayBuffer): void {
@@ -349,20 +368,15 @@ export function makeSteerState(address: string) {
     }
   }
 
-  /// Sends an edit to act where the viewer looks.
-  async function edit(command: string, keys: Record<string, unknown>): Promise<boolean> {
+  /// Sends an edit to act where the viewer looks. Throws a CommandError if it cannot.
+  async function tryEdit(command: string, keys: Record<string, unknown>): Promise<void> {
     const at = following.value ? undefined : view.value?.state.time.value;
-    try {
-      if (at !== undefined) await connection.command("rewind", { time: at });
-      else if (progress.value?.cursor !== null && progress.value?.cursor !== undefined && progress.value.cursor < frontier.value) await connection.command("live");
-      const result = await connection.command<{ branch: Branch | number; edit?: { text: string } }>(command, keys);
-      await arrive(result.branch, result.edit?.text);
-      return true;
-    } catch (error) {
-      complain(error);
-      return false;
-    }
+    if (at !== undefined) await connection.command("rewind", { time: at });
+    else if (progress.value?.cursor !== null && progress.value?.cursor !== undefined && progress.value.cursor < frontier.value) await connection.command("live");
+    const result = await connection.command<{ branch: Branch | number; edit?: { text: string } }>(command, keys);
+    await arrive(result.branch, result.edit?.text);
   }
+  const edit = (command: string, keys: Record<string, unknown>): Promise<void> => tryEdit(command, keys).catch(complain);
 
   async function arrive(made: Branch | number | undefined, text?: string): Promise<void> {
     const id = typeof made === "object" ? made.id : made;
@@ -408,7 +422,7 @@ export function makeSteerState(address: string) {
     connection, status: connection.status, ask, notify, dismiss, notices, welcomed,
     session, sessions, branches, branch, active, view, plan, progress, phase, frontier, span, following, editTime, log, findings,
     studies, samples, watchedStudy, zone, comparison, tab, tall, dialog, hiddenStoreys, section, showDebris, planCheck, editedText, draws,
-    edit, arrive, show, fill, runs,
+    edit, tryEdit, arrive, show, fill, runs,
 
     runOrPause,
     /// Space: what the viewer looks at, the run or what is recorded of it.
@@ -441,8 +455,8 @@ export function makeSteerState(address: string) {
     },
     async makeBranch(name: string): Promise<void> {
       const time = following.value ? undefined : view.value?.state.time.value;
-      const result = await ask<{ branch: Branch | number }>("branch", { name, ...(time === undefined ? {} : { time }) });
-      if (result !== undefined) await arrive(result.branch, `Branched at ${formatTime(time ?? frontier.value)}.`);
+      const result = await connection.command<{ branch: Branch | number }>("branch", { name, ...(time === undefined ? {} : { time }) });
+      await arrive(result.branch, `Branched at ${formatTime(time ?? frontier.value)}.`);
     },
     async switchTo(id: number): Promise<void> {
       if (id === active.value) return;
@@ -452,11 +466,7 @@ export function makeSteerState(address: string) {
       const result = await ask<{ branch: Branch | number }>("undo");
       if (result !== undefined) await arrive(result.branch, "The last edit was taken back.");
     },
-    async watchZone(name: string | null): Promise<void> {
-      zone.value = null;
-      const result = await ask<ZoneWatch>("zone", { zone: name });
-      if (name !== null && result !== undefined) zone.value = { ...result, zone: name };
-    },
+    watchZone,
     async compare(a: number, b: number): Promise<void> {
       const result = await ask<Comparison>("compare", { a, b });
       if (result === undefined) return;
@@ -478,6 +488,22 @@ export function makeSteerState(address: string) {
         if (error instanceof CommandError) return error.error;
         throw error;
       }
+    },
+    /// Makes the branch of a study's run and lets it fall as soon as it stands.
+    async playSample(study: number, sample: number): Promise<void> {
+      const result = await ask<{ branch: Branch | number }>("study.play", { study, sample });
+      if (result === undefined) return;
+      await arrive(result.branch, `Playing sample ${sample}.`);
+      const id = active.value;
+      let stop = (): void => undefined;
+      let over = false;
+      stop = effect(() => {
+        const waits = active.value === id && (phase.value === "building" || phase.value === "equilibrium");
+        if (waits || over) return;
+        over = true;
+        if (active.value === id && phase.value === "paused") void ask("run");
+        queueMicrotask(() => stop());
+      });
     },
     async watchStudy(id: number): Promise<void> {
       if (watchedStudy.value !== 0 && watchedStudy.value !== id) void ask("study.unwatch", { study: watchedStudy.value });

@@ -4,7 +4,6 @@ import type { SteerState } from "./steer_state";
 import type { Bounds, Sample, Study } from "./steer_wire";
 import { formatDuration, formatNumber, formatTime, prettify, toReadable } from "./units";
 import { seriesColours } from "./vocabulary";
-import type { Branch } from "./steer_wire";
 
 /// One fuzzy output so far: membership over the value.
 function Membership(props: { bounds: Bounds; unit: string }) {
@@ -206,12 +205,7 @@ export function StudyPanel(props: { s: SteerState }) {
     const r = await s.ask<{ study: Study }>("study.start", { samples: Math.max(1, Math.round(Number(count)) || 300) });
     if (r !== undefined) await s.watchStudy(r.study.id);
   };
-  const play = async (index: number): Promise<void> => {
-    const r = await s.ask<{ branch: Branch | number }>("study.play", { study: s.watchedStudy.value, sample: index });
-    if (r === undefined) return;
-    await s.arrive(r.branch, `Playing sample ${index}.`);
-    if (s.phase.value === "paused") await s.runOrPause();
-  };
+  const play = (index: number): Promise<void> => s.playSample(s.watchedStudy.value, index);
   if (s.session.value?.fuzzy !== true)
     return <p class="quiet pad" data-test="no-fuzzy">The plan has no fuzzy values. Write a [fuzzy] table into it, and a study finds what they make possible.</p>;
   return (

@@ -17,7 +17,7 @@ function BranchRows(props: { s: SteerState; parent: number | null; depth: number
             <button type="button" class="plain grow" aria-current={b.id === s.active.value} data-test="branch" title={b.notes.map(prettify).join("\n")} onClick={() => void s.switchTo(b.id)}>
               {props.depth > 0 && <span aria-hidden="true">└ </span>}
               <strong>{b.name}</strong>
-              <span class="quiet">{b.parent === null ? "" : ` from ${formatTime(b.time)}`}{b.sample !== undefined && b.sample !== null ? `, sample ${b.sample}` : ""}</span>
+              <span class="quiet">{b.parent === null ? "" : ` from ${formatTime(b.time)}`}{b.sample !== undefined && b.sample !== null ? `, ${b.sample}` : ""}</span>
             </button>
             {s.branches.value.length > 1 && b.id !== s.active.value && (
               <button type="button" class="small" title={`Compare with ${s.branch.value?.name ?? "the active branch"}`} data-test="compare" onClick={() => void s.compare(s.active.value, b.id)}>
@@ -113,7 +113,7 @@ function Preparation(props: { s: SteerState; branch: Branch }) {
           {branch.cables.map((c) => (
             <li class="stage-row">
               <span class="grow">{c.name}{c.body === "" ? "" : ` to ${typeof c.body === "number" ? (s.view.value?.run.bodies[c.body]?.name ?? c.body) : c.body}`}</span>
-              <span class="number quiet">{c.force === null ? "–" : `${formatNumber(c.force / 1000, 3)} kN`}</span>
+              <span class="number quiet">{`${formatNumber((c.force ?? c.pretension ?? NaN) / 1000, 3)} kN`}</span>
               <button type="button" class="small" aria-label={`Let ${c.name} go`} title="Let it go" data-test="remove-cable" onClick={() => void s.edit("remove_cable", { cable: c.name })}>×</button>
             </li>
           ))}

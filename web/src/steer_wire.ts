@@ -28,6 +28,7 @@ export interface Cable {
   body: string | number;
   anchor: [number, number, number];
   force: number | null;
+  pretension?: number;
 }
 export interface Edit {
   kind: string;
@@ -53,18 +54,19 @@ export interface Branch {
   snapshots: number[];
   bodies: number;
   zones: number;
-  sample?: number | null;
+  sample?: string | null; // what was drawn, in words
 }
 export interface Session {
   id: number;
   title: string;
   path: string;
-  active: number;
+  active: number | null; // none while it is built
   cursor: number | null;
   speed: number | null;
   phase: Phase;
   branches: Branch[];
   fuzzy: boolean;
+  diagnostics?: Diagnostic[];
 }
 export interface Diagnostic {
   severity: string;
@@ -145,11 +147,12 @@ export interface ZoneWatch {
   /// time, N, My, Mz, ry, rz, utilisation, state
   path: (number | null)[][];
 }
+/// A list [time, N, My, Mz, ry, rz, utilisation, state] a moment.
 export interface Comparison {
   time: number[];
   series: { id: string; title: string; unit: string; group: string; a: (number | null)[]; b: (number | null)[] }[];
   bodies: { name: string; distance: number }[];
-  largest: { time: number; distance: number } | null;
+  largest: { time: number | number[]; distance: number | (number | null)[] } | null;
   findings: { id: string; title: string; a: string | null; b: string | null }[];
   edits?: unknown;
 }

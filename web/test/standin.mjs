@@ -78,7 +78,7 @@ function makeCourse(second) {
 
 class Session {
   constructor(server, id, text, path) {
-    Object.assign(this, { server, id, path, disk: text, text, phase: "paused", seq: 0, log: [], branches: [], cursor: null, speed: null, studies: [], zone: null });
+    Object.assign(this, { server, id, path, disk: text, text, phase: "paused", seq: 0, log: [], branches: [], cursor: null, speed: null, studies: [], zone: null, broken: [] });
     this.title = /title = "(.*)"/.exec(text)?.[1] ?? "untitled";
     this.fuzzy = !text.includes("crisp");
     this.active = this.addBranch("main", null, 0, 4).id;
@@ -111,7 +111,8 @@ class Session {
   }
   describe() {
     const { id, title, path, active, cursor, speed, phase, fuzzy } = this;
-    return { id, title, path, active, cursor, speed, phase, branches: this.branches.map((b) => this.describeBranch(b)), fuzzy };
+    const isBuilt = phase !== "building" && this.broken.length === 0;
+    return { id, title, path, active: isBuilt ? active : null, cursor, speed, phase, branches: isBuilt ? this.branches.map((b) => this.describeBranch(b)) : [], fuzzy, diagnostics: this.broken };
   }
   tell(type, keys) {
     this.seq += 1;
@@ -175,7 +176,7 @@ class Session {
     const now = data.time[b.own.row];
     const fell = now > 6;
     return {
-      ending: b.ending, events: data.events.filter((e) => e.time <= now), not_modelled: data.not_modelled, notes: b.notes,
+      ending: b.ending ?? { kind: "", text: "" }, events: data.events.filter((e) => e.time <= now), not_modelled: data.not_modelled, notes: b.notes,
       findings: fell ? data.findings : [{ id: "mechanism", heading: "Mechanism", title: "Mechanism", text: now < 4 ? "The building stands." : "The building leans by 3 deg and goes on.", value: null, unit: "", status: "info" }, data.findings[1]],
     };
   }
@@ -205,7 +206,7 @@ class Session {
     this.record(kind, from, command, own ? undefined : b);
     this.tell("branch", { branch: this.describeBranch(b) });
     this.tellState();
-    return { branch: this.describeBranch(b), edit: { kind, time, text } };
+    return { branch: b.id, edit: { kind, time, text } };
   }
 }
 
@@ -346,10 +347,19 @@ export class Standin {
     this.resume.set(client.token, { session });
     client.send({
       type: "hello", protocol: 1, program: "topple 0.1.0", resume: client.token, seq: session?.seq ?? 0, session: session?.describe() ?? null, sessions: this.sessions.map((s) => s.describe()),
-      scene: session === undefined ? null : makeCourse(session.branch().own.second).scene,
+      scene: session === undefined || session.describe().active === null ? null : makeCourse(session.branch().own.second).scene,
       plan: session === undefined ? { text: "", path: "", sha256: "" } : { text: session.disk, path: session.path, sha256: hash(session.disk) }, limits: {},
     });
-    session?.tellState();
+    if (session?.describe().active !== null) session?.tellState();
+  }
+  /// As while a plan is built; `end` is called with the complaints when it cannot be, with none when it can.
+  startBuilding(session) {
+    session.phase = "building";
+    return (complaints) => {
+      session.broken = complaints;
+      session.phase = complaints.length > 0 ? "failed" : "paused";
+      for (const client of this.clients) if (client.session === session) this.attach(client, session);
+    };
   }
 
   obey(client, message) {
@@ -433,7 +443,7 @@ export class Standin {
         s.active = now.parent;
         s.record("undo", now, {});
         s.tellState();
-        return { branch: s.describeBranch(s.branch()) };
+        return { branch: s.active };
       }
       case "branch": {
         const from = b();
@@ -443,7 +453,7 @@ export class Standin {
         s.record("branch", from, m, made);
         s.tell("branch", { branch: s.describeBranch(made) });
         s.tellState();
-        return { branch: s.describeBranch(made) };
+        return { branch: made.id };
       }
       case "rename": b().name = m.name; s.tell("branch", { branch: s.describeBranch(b()) }); return {};
       case "switch":
@@ -457,7 +467,7 @@ export class Standin {
         const [p, q] = [makeCourse(one.own.second).data, makeCourse(two.own.second).data];
         return {
           time: p.time.slice(0, rows), series: p.series.map((x, k) => ({ id: x.id, title: x.title, unit: x.unit, group: x.group, a: x.value.slice(0, rows), b: q.series[k].value.slice(0, rows) })),
-          bodies: p.bodies.slice(0, 10).map((x, k) => ({ name: x.name, distance: 8 - 0.7 * k })), largest: { time: p.time[rows - 1], distance: 8 },
+          bodies: p.bodies.slice(0, 10).map((x, k) => ({ name: x.name, distance: 8 - 0.7 * k })), largest: { time: p.time.slice(0, rows), distance: p.time.slice(0, rows).map((t) => (8 * t) / p.time[rows - 1]) },
           findings: [{ id: "reach", title: "Reach beyond the footprint", a: "23.4 m", b: "21.9 m" }], edits: [],
         };
       }
@@ -470,13 +480,14 @@ export class Standin {
       case "findings": return s.findings(b());
       case "zone":
         s.zone = m.zone;
-        return m.zone === null ? { zone: null, law: null, path: [] } : {
+        // the path so far comes as the first event
+        if (m.zone !== null) setTimeout(() => s.tell("zone", { branch: b().id, zone: m.zone, points: makeCourse(b().own.second).data.time.slice(0, b().own.row + 1).map((t) => s.zonePoint(t)) }), 5);
+        return m.zone === null ? { zone: null } : {
           zone: m.zone,
           law: Object.fromEntries(["moment_y", "moment_z"].map((key) => [key, {
             normal_force: [0, -8e5, -1.6e6], plastic_rotation: [0, 0.005, 0.02, 0.05, 0.1],
             positive: [2.2e5, 3e5, 3.4e5].map((x) => [x, 1.1 * x, 1.15 * x, 0.8 * x, 0.1 * x]), negative: [2.2e5, 3e5, 3.4e5].map((x) => [-x, -1.1 * x, -1.15 * x, -0.8 * x, -0.1 * x]),
           }])),
-          path: makeCourse(b().own.second).data.time.slice(0, b().own.row + 1).map((t) => s.zonePoint(t)),
         };
       case "log": return { entries: s.log };
       case "plan.check": return check(m.text);
@@ -490,7 +501,7 @@ export class Standin {
         s.record("plan.apply", b(), { name: m.name }, made);
         s.tell("branch", { branch: s.describeBranch(made) });
         s.tellState();
-        return { branch: s.describeBranch(made) };
+        return { branch: made.id };
       }
       case "plan.save":
         if (m.force !== true && m.base_sha256 !== hash(s.disk)) throw problem("E941", "The file has changed since.", { sha256: hash(s.disk), text: s.disk });
@@ -518,7 +529,7 @@ export class Standin {
         s.phase = "paused";
         s.tell("branch", { branch: s.describeBranch(made) });
         s.tellState();
-        return { branch: s.describeBranch(made) };
+        return { branch: made.id };
       }
       default: throw problem("E911", `“${command}” is not a command.`);
     }

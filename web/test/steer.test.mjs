@@ -194,7 +194,7 @@ describe("steering page", () => {
     near(added.residual_bars, 0.1, 1e-12);
     await d.click("add-charge");
     await d.submit({ member: "C-X9-0" });
-    await d.until("notice", "There is no member");
+    await page.waitForFunction(() => document.querySelector("dialog [role=alert]")?.textContent.includes("There is no member"));
     await shot("refused");
     await page.locator("dialog").getByRole("button", { name: "Cancel" }).click();
     await d.click("add-cable");
@@ -485,6 +485,26 @@ describe("steering page with nothing open", () => {
     const d = makeDriver(page);
     await d.until("phase", "Paused");
     assert.equal(await d.branch(), "main");
+    assert.deepEqual(browser.problems, []);
+    await browser.close();
+  });
+
+  it("shows that a plan is built, and what is wrong if it cannot be", async () => {
+    const server = await new Standin().start();
+    const end = server.startBuilding(server.sessions[0]);
+    const browser = await openPage(server.url);
+    const { page } = browser;
+    const d = makeDriver(page);
+    await d.until("phase", "Building");
+    await page.screenshot({ path: `${out}building.png` });
+    end([{ severity: "error", code: "E310", line: 8, column: 1, width: 4, message: "the columns of row A carry nothing", help: "" }]);
+    await d.until("banner", "cannot be run as it is");
+    await page.locator("[data-test=diagnostic]").click();
+    assert.equal(await page.locator("[data-test=plan-text]").evaluate((e) => e.value.slice(e.selectionStart, e.selectionEnd)), "name");
+    await page.screenshot({ path: `${out}unbuilt.png` });
+    end([]);
+    await d.until("phase", "Paused");
+    await page.waitForSelector("[data-test=canvas]");
     assert.deepEqual(browser.problems, []);
     await browser.close();
   });
