@@ -118,7 +118,8 @@ describe("steering page", () => {
       await d.draw();
       found = (await page.locator("[data-test=inspector]").count()) > 0;
     }
-    assert.ok(found, "no click met a member");
+    if (!found) await shot("no-member");
+    assert.ok(found, `no click met a member; in the middle stands ${await page.evaluate(([x, y]) => document.elementFromPoint(x, y)?.outerHTML.slice(0, 120), [box.x + box.width / 2, box.y + box.height / 2])}`);
     await page.fill("[data-test=member-search]", "C-D1-0");
     assert.equal(await d.text("member-name"), "C-D1-0");
     await page.locator("[data-test=watch-zone]").first().click();
@@ -126,7 +127,7 @@ describe("steering page", () => {
     await d.until("zone-plot", "elastic");
     await shot("zone");
     await page.locator("[data-test=zone-plot] summary").click();
-    assert.ok((await page.locator("[data-test=zone-plot] tbody tr").count()) > 20);
+    await page.waitForFunction(() => document.querySelectorAll("[data-test=zone-plot] tbody tr").length > 20);
     await page.locator("[data-test=zone-plot] summary").click();
   });
 
