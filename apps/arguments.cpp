@@ -26,6 +26,7 @@ std::variant<Arguments, int> parse_arguments(int argc, char** argv) {
   topple export out/model.json --adams -o out/model.adm
                                                    for MSC.ADAMS
   topple rcc section.toml -o out/rcc               resistance curves of a zone of a section (docs/rcc.md)
+  topple fe storehouse.toml --size "0.4 m" -o fe  the same building in finite elements (docs/fe.md)
   topple compare out/record.h5 fe/record.h5 -o both  two runs of one building beside each other (docs/compare.md)
   topple study plan.toml -o out/study              fuzzy analysis of a plan with [fuzzy] (docs/study.md)
   topple study inputs.toml --evaluator ./model -o out/study
@@ -103,8 +104,9 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
 
   CLI::App* exports =
       app.add_subcommand("export", "Write a record, or a multibody model, for other programs (docs/exports.md).");
-  exports->add_option("file", a.input, "record (HDF5); with --adams a multibody model (JSON)")->required();
-  exports->add_option("-o,--output", a.output, "folder for the files; with --adams the dataset to write (.adm)")
+  exports->add_option("file", a.input, "record (HDF5); with --adams a multibody model (JSON), with --lsdyna a plan")
+      ->required();
+  exports->add_option("-o,--output", a.output, "folder for the files; with --adams and --lsdyna the file to write")
       ->required();
   CLI::Option* vtk = exports->add_flag("--vtk", a.vtk, "record.pvd and vtk/*.vtu, for ParaView");
   CLI::Option* gltf = exports->add_flag("--gltf", a.gltf, "record.glb with animation, for Blender and browsers");
@@ -113,7 +115,13 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   CLI::Option* rate =
       exports->add_option("--frame-rate", a.frame_rate, "frames kept, such as \"10 Hz\"; all if left out");
   CLI::Option* adams = exports->add_flag("--adams", a.adams, "dataset for MSC.ADAMS, and its commands (.acf)");
-  for (CLI::Option* other : {vtk, gltf, csv, as_json, rate}) adams->excludes(other);
+  CLI::Option* lsdyna = exports->add_flag("--lsdyna", a.fe.lsdyna,
+                                          "keyword file (.k) of a plan's finite elements, for LS-DYNA and OpenRadioss");
+  exports->add_option("--size", a.fe.size, "edge of the elements of --lsdyna (0.4 m)")->needs(lsdyna);
+  exports->add_option("--until", a.duration, "time that --lsdyna asks for; the plan's duration if not given")
+      ->needs(lsdyna);
+  lsdyna->excludes(adams);
+  for (CLI::Option* other : {vtk, gltf, csv, as_json, rate}) adams->excludes(other), lsdyna->excludes(other);
 
   CLI::App* rcc = app.add_subcommand("rcc", "Compute the resistance curves of a zone of a section, or of a member.");
   rcc->add_option("file", a.input, "section (TOML), or a plan with --member")->required();
@@ -141,6 +149,26 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   rcc->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
 
   FeArguments& f = a.fe;
+  CLI::App* fe = app.add_subcommand("fe", "Simulate a plan with explicit finite elements, as a second opinion.");
+  fe->add_option("plan", a.input, "plan (TOML)")->required();
+  fe->add_option("-o,--output", a.output, "folder for the results; it is made if missing");
+  fe->add_option("--size", f.size, "edge of the elements (0.4 m); smaller ones cost more and shorten the step");
+  CLI::Option* mesh_only = fe->add_flag("--mesh-only", f.mesh_only, "only make the mesh and say what it is like");
+  fe->add_option("--scaled-step", f.scaled_step,
+                 "give mass to elements that do not bear this step, such as \"0.02 ms\"");
+  fe->add_flag("--skip-quiet", f.skip_quiet, "do not wait through the time in which nothing moves before a charge");
+  fe->add_option("--until", a.duration, "simulated time, such as \"6 s\"; the plan's duration if not given");
+  CLI::Option* checkpoint =
+      fe->add_flag("--checkpoint", f.checkpoint, "keep checkpoint.bin in the folder, to go on from with --resume");
+  fe->add_option("--checkpoint-interval", f.checkpoint_interval, "of the clock (60 s)")->needs(checkpoint);
+  fe->add_flag("--resume", f.resume, "go on from checkpoint.bin in the folder")->excludes(mesh_only);
+  fe->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
+  fe->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones");
+  fe->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
+  fe->add_flag("--csv", a.csv, "also write tables for spreadsheets");
+  fe->add_flag("--verbose", a.verbose, "show every event");
+  fe->add_flag("--no-report", a.no_report, "do not write report.html");
+
   CLI::App* compare = app.add_subcommand("compare", "Compare two runs of one building: text, CSV, JSON and a page.");
   compare->add_option("first", a.input, "record A (HDF5)")->required();
   compare->add_option("second", f.second, "record B")->required();
@@ -220,14 +248,21 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   if (report->parsed()) a.verb = Verb::Report;
   if (exports->parsed()) {
     a.verb = Verb::Export;
-    if (!(a.vtk || a.gltf || a.csv || a.json || a.adams)) {
-      std::cerr << "topple export: say what for: --vtk, --gltf, --csv, --json or --adams\n"
+    if (!(a.vtk || a.gltf || a.csv || a.json || a.adams || a.fe.lsdyna)) {
+      std::cerr << "topple export: say what for: --vtk, --gltf, --csv, --json, --adams or --lsdyna\n"
                 << "Run topple export --help for more information.\n";
       return kBadInput;
     }
   }
   if (rcc->parsed()) a.verb = Verb::Rcc;
   if (compare->parsed()) a.verb = Verb::Compare;
+  if (fe->parsed()) {
+    a.verb = Verb::Fe;
+    if (a.output.empty() && !f.mesh_only) {
+      std::cerr << "topple fe: --output is required\nRun topple fe --help for more information.\n";
+      return kBadInput;
+    }
+  }
   if (study->parsed()) {
     a.verb = Verb::Study;
     if (study_show->parsed()) y.action = StudyArguments::Action::Show;

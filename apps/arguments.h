@@ -24,6 +24,7 @@ struct Arguments {
     Report,
     Export,
     Compare,
+    Fe,
     Rcc,
     Study,
     Worker,

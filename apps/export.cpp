@@ -7,7 +7,9 @@
 #include "collapse/debris_tables.h"
 #include "commands.h"
 #include "engines/adams.h"
+#include "farfield/lsdyna.h"
 #include "mbs/model_json.h"
+#include "product/plan.h"
 #include "results.h"
 
 namespace topple::apps {
@@ -30,10 +32,33 @@ int export_adams(const Arguments& a) {
   } catch (const InputError& e) { return refuse(e, {}, text, false); }
 }
 
+/// The finite elements of a plan.
+int export_lsdyna(const Arguments& a) {
+  std::vector<Diagnostic> warnings;
+  std::string text;
+  try {
+    farfield::GridOptions grid;
+    grid.size = read_quantity(a.fe.size, Dimension::Length, "--size");
+    const double until = read_quantity(a.duration, Dimension::Time, "--until");
+    const product::Plan plan = product::read_plan_file(a.input, warnings, text);
+    print_diagnostics(warnings, text);
+    collapse::ModelMap map;
+    const mbs::Model model = collapse::make_model(plan, load_knowledge(a), map, a.threads);
+    const farfield::Whole whole = farfield::make_whole(plan, load_knowledge(a), grid, model, map);
+    replace_file(a.output, farfield::to_lsdyna(plan, whole, map, until > 0 ? until : plan.analysis.duration));
+    for (const std::string& line : farfield::describe(farfield::calc_mesh_report(plan, whole)))
+      std::printf("%s\n", line.c_str());
+    std::printf("Wrote %s\n", a.output.c_str());
+    for (const std::string& note : whole.notes) std::printf("note: %s\n", note.c_str());
+    return kOk;
+  } catch (const InputError& e) { return refuse(e, warnings, text, false); }
+}
+
 }  // namespace
 
 int export_file(const Arguments& a) {
   if (a.adams) return export_adams(a);
+  if (a.fe.lsdyna) return export_lsdyna(a);
   try {
     record::Record r = record::read_hdf5(a.input);
     if (!a.frame_rate.empty())

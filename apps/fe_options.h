@@ -11,6 +11,7 @@ struct FeArguments {
   std::string checkpoint_interval = "60 s";
   std::string second, photos;  // of compare: the other record, and a table of pictures
   bool mesh_only = false, skip_quiet = false, checkpoint = false, resume = false;
+  bool lsdyna = false;  // of export
 };
 
 }  // namespace topple::apps

@@ -45,6 +45,8 @@ int dispatch(const topple::apps::Arguments& a) {
       return topple::apps::run_study_command(a, cancel);
     case Arguments::Verb::Compare:
       return topple::apps::compare_records(a);
+    case Arguments::Verb::Fe:
+      return topple::apps::run_finite_elements(a, cancel);
     case Arguments::Verb::Worker:
       return topple::apps::run_worker(a, cancel);
     case Arguments::Verb::Version:

@@ -110,6 +110,28 @@ new)
   has plan.toml mine
   expect 1 "$topple" new /proc/nowhere/plan.toml
   ;;
+fe)
+  expect 0 "$topple" fe "$plan" --mesh-only --size "30 cm"; has out "553 elements"; has out "No face was moved"
+  expect 0 "$topple" fe "$plan" --mesh-only --json; is_json out; has out '"critical_step"'
+  expect 0 "$topple" fe "$plan" --size "40 cm" --until "300 ms" -o r; has out "Putting on the dead load"
+  has out "Rigid fragments"; has out "Wrote r/record.h5"; exists r/record.h5
+  expect 0 "$topple" run "$plan" --no-report -o m; expect 0 "$topple" compare m/record.h5 r/record.h5 -o c
+  has out "B  finite elements"; has out "10 of 10 moving bodies"
+  expect 2 "$topple" fe "$plan"; has err "--output is required"
+  expect 2 "$topple" fe "$plan" --size "4 apples" -o none; has err "--size"
+  expect 2 "$topple" fe "$plan" --resume -o none2; has err "checkpoint.bin"
+  expect 2 "$topple" fe missing.toml -o none; [ ! -e none ] || { echo "a folder for nothing"; failures=$((failures + 1)); }
+  # an interrupt leaves a record and a checkpoint from which it goes on
+  "$topple" fe "$plan" --size "20 cm" --checkpoint -o cut >out 2>err &
+  pid=$!; for _ in $(seq 600); do grep -q "stage 1" out && break; sleep 0.1; done
+  kill -INT $pid; wait $pid; code=$?
+  [ $code -eq 1 ] || { echo "exit code $code after an interrupt"; cat out err; failures=$((failures + 1)); }
+  has out "Cancelled at"; has out "--resume"; exists cut/checkpoint.bin; exists cut/record.h5
+  expect 2 "$topple" fe "$plan" --size "30 cm" --resume -o cut; has err "another plan, mesh, step or version"
+  # the keyword file
+  expect 0 "$topple" export "$plan" --lsdyna --size "40 cm" -o model.k; has out "Wrote model.k"
+  has model.k "*ELEMENT_SOLID"; has model.k "*MAT_PLASTICITY_COMPRESSION_TENSION"; has model.k "*END"
+  ;;
 records)
   expect 0 "$topple" run "$plan" -o r --no-report
   expect 0 "$topple" compare r/record.h5 r/record.h5 -o c

@@ -1,0 +1,99 @@
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <filesystem>
+
+#include "base/error.h"
+#include "commands.h"
+#include "farfield/run.h"
+#include "product/plan.h"
+#include "results.h"
+#include "terminal.h"
+
+namespace topple::apps {
+
+namespace fs = std::filesystem;
+using json = nlohmann::ordered_json;
+
+namespace {
+
+farfield::FeOptions make_fe_options(const Arguments& a) {
+  farfield::FeOptions o;
+  o.grid.size = read_quantity(a.fe.size, Dimension::Length, "--size");
+  o.scaled_step = read_quantity(a.fe.scaled_step, Dimension::Time, "--scaled-step");
+  o.skip_quiet = a.fe.skip_quiet;
+  o.resume = a.fe.resume;
+  o.checkpoint_interval = read_quantity(a.fe.checkpoint_interval, Dimension::Time, "--checkpoint-interval");
+  if (a.fe.checkpoint || a.fe.resume) o.checkpoint = (fs::path(a.output) / "checkpoint.bin").string();
+  return o;
+}
+
+void print_mesh(std::FILE* out, const farfield::MeshReport& report) {
+  for (const std::string& line : farfield::describe(report)) std::fprintf(out, "%s\n", line.c_str());
+}
+
+json to_json(const farfield::MeshReport& r) {
+  return {{"elements", r.mesh.elements},
+          {"nodes", r.mesh.nodes},
+          {"mass", r.mesh.mass},
+          {"mass_centre", {r.mesh.p_WBcm.x, r.mesh.p_WBcm.y, r.mesh.p_WBcm.z}},
+          {"smallest_edge", r.mesh.smallest_edge},
+          {"smallest_edge_member", r.smallest_edge_member},
+          {"largest_aspect", r.mesh.largest_aspect},
+          {"critical_step", r.mesh.critical_step},
+          {"critical_member", r.critical_member},
+          {"largest_shift", r.largest_shift},
+          {"shifted_member", r.shifted_member},
+          {"smallest_volume_share", r.smallest_fit},
+          {"largest_volume_share", r.largest_fit}};
+}
+
+}  // namespace
+
+int run_finite_elements(const Arguments& a, const std::atomic<bool>& cancel) {
+  std::vector<Diagnostic> warnings;
+  std::string text;
+  std::FILE* out = a.json ? stderr : stdout;
+  try {
+    const collapse::RunOptions options = make_options(a);
+    const farfield::FeOptions fe = make_fe_options(a);
+    const product::Plan plan = product::read_plan_file(a.input, warnings, text);
+    const collapse::Knowledge knowledge = load_knowledge(a);
+    print_diagnostics(warnings, text);
+    if (a.fe.mesh_only) {
+      const farfield::Whole whole = farfield::make_whole(plan, knowledge, fe.grid, a.threads);
+      const farfield::MeshReport report = farfield::calc_mesh_report(plan, whole);
+      print_mesh(out, report);
+      for (const std::string& note : whole.notes) std::fprintf(out, "%s\n", note.c_str());
+      if (a.json) std::printf("%s\n", dump({{"exit_code", kOk}, {"mesh", to_json(report)}}).c_str());
+      return kOk;
+    }
+    make_folder(a.output);
+    ProgressLine progress;
+    EventPrinter events(out, a.verbose, progress);
+    collapse::RunCallbacks callbacks;
+    callbacks.on_event = [&](const record::Event& e) { events.print(e); };
+    callbacks.progress.report = [&](double done, double whole) { progress.show(done, whole); };
+    callbacks.progress.cancel = &cancel;
+    farfield::FeCallbacks fe_callbacks;
+    fe_callbacks.on_mesh = [&](const farfield::Whole&, const farfield::MeshReport& report) {
+      std::fprintf(out, "%s\n", plan.title.c_str());
+      print_mesh(out, report);
+      if (!fe.resume) std::fprintf(out, "Putting on the dead load ...\n");
+      std::fflush(out);
+    };
+    fe_callbacks.on_relaxed = [&](const fem::RelaxationSummary& s) {
+      std::fprintf(out, "%s\n", s.text.c_str());
+      std::fflush(out);
+    };
+    const record::Record r = farfield::run_plan(plan, knowledge, options, fe, callbacks, fe_callbacks);
+    progress.clear();
+    const int code = close_run(r, a, out, {});
+    if (r.ending == "cancelled" && !fe.checkpoint.empty())
+      std::fprintf(out, "Go on with: topple fe %s --size \"%s\" -o %s --resume\n", a.input.c_str(), a.fe.size.c_str(),
+                   a.output.c_str());
+    return code;
+  } catch (const InputError& e) { return refuse(e, warnings, text, a.json); }
+}
+
+}  // namespace topple::apps

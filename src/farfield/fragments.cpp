@@ -1,0 +1,205 @@
+#include "farfield/fragments.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numeric>
+
+#include "base/unit.h"
+
+namespace topple::farfield {
+
+namespace {
+
+/// Pairs of elements that share a face.
+std::vector<std::pair<int, int>> find_neighbours(const fem::ExplicitModel& fe) {
+  constexpr size_t face[6][4] = {{0, 1, 2, 3}, {4, 5, 6, 7}, {0, 1, 5, 4}, {3, 2, 6, 7}, {0, 3, 7, 4}, {1, 2, 6, 5}};
+  std::vector<std::pair<std::array<int, 4>, int>> faces;
+  faces.reserve(6 * fe.elements.size());
+  for (size_t e = 0; e < fe.elements.size(); ++e)
+    for (const auto& f : face) {
+      std::array<int, 4> key;
+      for (size_t i = 0; i < 4; ++i) key[i] = fe.elements[e].node[f[i]];
+      std::sort(key.begin(), key.end());
+      faces.emplace_back(key, static_cast<int>(e));
+    }
+  std::sort(faces.begin(), faces.end());
+  std::vector<std::pair<int, int>> pairs;
+  for (size_t i = 0; i + 1 < faces.size(); ++i)
+    if (faces[i].first == faces[i + 1].first) pairs.emplace_back(faces[i].second, faces[i + 1].second);
+  return pairs;
+}
+
+int find_root(std::vector<int>& parent, int i) {
+  while (parent[static_cast<size_t>(i)] != i)
+    i = parent[static_cast<size_t>(i)] = parent[static_cast<size_t>(parent[static_cast<size_t>(i)])];
+  return i;
+}
+
+}  // namespace
+
+Fragments find_fragments(const product::Plan& plan, const Whole& whole, const fem::ExplicitSystem& system,
+                         const std::vector<record::ZoneInfo>& zones, double size) {
+  const fem::ExplicitModel& fe = whole.fe;
+  const size_t E = fe.elements.size();
+  Fragments out;
+  out.reach = 2 * size;
+  enum class State { Sound, Damaged, Charged };
+  std::vector<State> state(E, State::Sound);
+  for (size_t e = 0; e < E; ++e)
+    if (!system.is_alive(static_cast<int>(e)) || system.plastic_strain(static_cast<int>(e)) >= out.damaged_strain)
+      state[e] = State::Damaged;
+  for (const fem::Removal& r : system.removals())
+    if (r.cause == fem::RemovalCause::Charge) state[static_cast<size_t>(r.element)] = State::Charged;
+  std::vector<int> parent(E);
+  std::iota(parent.begin(), parent.end(), 0);
+  for (const auto& [a, b] : find_neighbours(fe)) {
+    if (state[static_cast<size_t>(a)] != state[static_cast<size_t>(b)]) continue;
+    // the smaller number leads, so that the order of pairs does not matter
+    const int ra = find_root(parent, a), rb = find_root(parent, b);
+    parent[static_cast<size_t>(std::max(ra, rb))] = std::min(ra, rb);
+  }
+  std::map<int, std::vector<int>> groups;
+  for (size_t e = 0; e < E; ++e)
+    if (state[e] != State::Charged) groups[find_root(parent, static_cast<int>(e))].push_back(static_cast<int>(e));
+
+  std::vector<double> volume(E);
+  double damaged_volume = 0, whole_mass = 0;
+  const auto mass_of = [&](int e) {
+    const fem::ExplicitElement& element = fe.elements[static_cast<size_t>(e)];
+    return volume[static_cast<size_t>(e)] * element.mass_factor *
+           fe.materials[static_cast<size_t>(element.material)].density;
+  };
+  for (size_t e = 0; e < E; ++e) {
+    std::array<Vec3, 8> p;
+    for (size_t i = 0; i < 8; ++i) p[i] = fe.nodes[static_cast<size_t>(fe.elements[e].node[i])];
+    volume[e] = fem::calc_hex_volume(p);
+    whole_mass += mass_of(static_cast<int>(e));
+    if (state[e] == State::Damaged) damaged_volume += volume[e];
+  }
+  std::map<int, int> body_elements;
+  for (const fem::ExplicitElement& e : fe.elements) ++body_elements[e.part];
+  for (const auto& [root, elements] : groups) {
+    if (state[static_cast<size_t>(root)] == State::Sound) {
+      Fragment f;
+      std::map<int, int> inside;
+      for (const int e : elements) {
+        const double m = mass_of(e);
+        f.mass += m;
+        f.p_W += m * whole.grid.cells[static_cast<size_t>(e)].centre;
+        ++inside[fe.elements[static_cast<size_t>(e)].part];
+      }
+      f.p_W *= 1 / f.mass;
+      f.elements = static_cast<int>(elements.size());
+      for (const auto& [body, n] : inside) f.bodies += 2 * n >= body_elements[body];
+      if (f.mass >= 1e-3 * whole_mass) out.fragments.push_back(f);
+      continue;
+    }
+    DamageZone z;
+    std::map<int, double> members;
+    double all = 0;
+    for (const int e : elements) {
+      const double v = volume[static_cast<size_t>(e)];
+      members[whole.grid.cells[static_cast<size_t>(e)].member] += v;
+      all += v;
+      z.p_W += v * whole.grid.cells[static_cast<size_t>(e)].centre;
+      z.gone += !system.is_alive(e);
+    }
+    z.p_W *= 1 / all;
+    z.elements = static_cast<int>(elements.size());
+    z.share = all / damaged_volume;
+    double most = 0;
+    for (const auto& [member, v] : members)
+      if (v > most) most = v, z.member = member;
+    const product::Member& m = plan.members[static_cast<size_t>(z.member)];
+    if (m.kind != product::MemberKind::Slab) {
+      const int axis = axis_of(m);
+      z.at = z.p_W[axis] - m.start[axis];
+      z.from = std::numeric_limits<double>::infinity(), z.to = -z.from;
+      for (const int e : elements) {
+        const double at = whole.grid.cells[static_cast<size_t>(e)].centre[axis] - m.start[axis];
+        z.from = std::min(z.from, at), z.to = std::max(z.to, at);
+      }
+    }
+    double least = std::numeric_limits<double>::infinity();
+    for (size_t i = 0; i < zones.size(); ++i) {
+      if (zones[i].member != m.name) continue;
+      const double d = norm(zones[i].p_W - z.p_W);
+      if (d < least) least = d, z.zone = static_cast<int>(i);
+    }
+    z.distance = least;
+    out.zones.push_back(z);
+  }
+  std::stable_sort(out.zones.begin(), out.zones.end(),
+                   [](const DamageZone& a, const DamageZone& b) { return a.share > b.share; });
+  std::stable_sort(out.fragments.begin(), out.fragments.end(),
+                   [](const Fragment& a, const Fragment& b) { return a.mass > b.mass; });
+  return out;
+}
+
+void add_fragment_findings(const product::Plan& plan, const Fragments& f, double when, record::Record& r) {
+  constexpr double none = std::numeric_limits<double>::quiet_NaN();
+  constexpr size_t most = 12;  // zones that get a line of their own
+  const auto add = [&r](const std::string& id, const std::string& title, const std::string& text, double value,
+                        const char* unit, record::Status status) {
+    r.findings.push_back({id, "Zones and fragments", title, text, value, unit, status});
+  };
+  if (f.zones.empty()) {
+    add("farfield.zones", "Zones of accumulated damage",
+        fmt::format("None at {:.2f} s: no element has {:.0f} % plastic strain.", when, 100 * f.damaged_strain), 0, "1",
+        record::Status::Info);
+  } else {
+    const auto is_expected = [&](const DamageZone& z) { return z.zone >= 0 && z.distance <= f.reach; };
+    const auto expected = std::count_if(f.zones.begin(), f.zones.end(), is_expected);
+    double share = 0;
+    for (const DamageZone& z : f.zones) share += is_expected(z) ? z.share : 0;
+    add("farfield.zones", "Zones of accumulated damage",
+        fmt::format("At {:.2f} s damage ({:.0f} % plastic strain and more) has gathered in {} zones; {} of them, with "
+                    "{:.0f} % of the damaged volume, lie within {:.1f} m of a zone of the multibody model.",
+                    when, 100 * f.damaged_strain, f.zones.size(), expected, 100 * share, f.reach),
+        share, "1", share >= 0.5 ? record::Status::Good : record::Status::Warning);
+  }
+  for (size_t i = 0; i < std::min(most, f.zones.size()); ++i) {
+    const DamageZone& z = f.zones[i];
+    const product::Member& m = plan.members[static_cast<size_t>(z.member)];
+    const std::string where = m.kind == product::MemberKind::Slab
+                                  ? fmt::format("({:.1f}, {:.1f}, {:.1f}) m", z.p_W.x, z.p_W.y, z.p_W.z)
+                                  : fmt::format("{:.2f} m from its start ({:.2f} to {:.2f} m)", z.at, z.from, z.to);
+    std::string text;
+    if (z.zone >= 0 && z.distance <= f.reach)
+      text = fmt::format("Zone expected at {}, found {} away, at {}", r.zones[static_cast<size_t>(z.zone)].name,
+                         fmt::format("{:.2f} m", z.distance), where);
+    else if (z.zone >= 0)
+      text = fmt::format(
+          "Found at {}; the nearest zone of the multibody model, {}, lies {:.2f} m away: a cut here would "
+          "follow the damage",
+          where, r.zones[static_cast<size_t>(z.zone)].name, z.distance);
+    else
+      text = fmt::format("Found at {}; the multibody model has no zone in this member", where);
+    add(fmt::format("farfield.zone.{}", i + 1), m.name,
+        fmt::format("{}; {} elements, {} gone, {:.0f} % of the damaged volume.", text, z.elements, z.gone,
+                    100 * z.share),
+        z.zone >= 0 ? z.distance : none, "m",
+        z.zone >= 0 && z.distance <= f.reach ? record::Status::Good : record::Status::Warning);
+  }
+  double mass = 0;
+  std::string list;
+  for (size_t i = 0; i < f.fragments.size(); ++i) {
+    mass += f.fragments[i].mass;
+    if (i < 5)
+      list += fmt::format("{}{:.1f} t ({} bodies of the multibody model)", i ? ", " : "", f.fragments[i].mass / unit::t,
+                          f.fragments[i].bodies);
+  }
+  add("farfield.fragments", "Rigid fragments",
+      f.fragments.empty()
+          ? std::string("None is left of a thousandth of the mass.")
+          : fmt::format("{} sound parts of a thousandth of the mass or more hold {:.1f} t: {}{}.", f.fragments.size(),
+                        mass / unit::t, list, f.fragments.size() > 5 ? ", and smaller ones" : ""),
+      static_cast<double>(f.fragments.size()), "1", record::Status::Info);
+}
+
+}  // namespace topple::farfield

@@ -1,0 +1,180 @@
+#include "farfield/motion.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/rotation_fit.h"
+
+namespace topple::farfield {
+
+namespace {
+
+/// Plastic strain from which a zone counts as yielded: that of bars at their yield stress, about f_y / E_s.
+constexpr double kYielded = 2e-3;
+
+}  // namespace
+
+double calc_utilisation(const fem::ExplicitMaterial& m, const std::array<double, 6>& s) {
+  if (m.yield.empty()) return 0;
+  const double mean = (s[0] + s[1] + s[2]) / 3;
+  const double a = s[0] - mean, b = s[1] - mean, c = s[2] - mean;
+  const double q = std::sqrt(1.5 * (a * a + b * b + c * c) + 3 * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5]));
+  const double t = m.yield.front().tension, f = m.yield.front().compression;
+  // from tension at mean t/3 to compression at mean -f/3
+  const double yield = t + (f - t) * (t / 3 - mean) / (t / 3 + f / 3);
+  return yield > 0 ? std::min(1.0, q / yield) : 1.0;
+}
+
+Motion::Motion(const Whole& whole, const mbs::Model& model, const collapse::ModelMap& map, double size)
+    : whole_(whole), model_(model) {
+  const fem::ExplicitModel& fe = whole.fe;
+  body_elements_.resize(model.bodies.size());
+  for (size_t e = 0; e < fe.elements.size(); ++e) {
+    const fem::ExplicitElement& element = fe.elements[e];
+    std::array<Vec3, 8> corners;
+    Vec3 centre;
+    for (size_t i = 0; i < 8; ++i) {
+      corners[i] = fe.nodes[static_cast<size_t>(element.node[i])];
+      centre += 0.125 * corners[i];
+    }
+    centre_.push_back(centre);
+    element_mass_.push_back(fem::calc_hex_volume(corners) *
+                            fe.materials[static_cast<size_t>(element.material)].density * element.mass_factor);
+    body_elements_[static_cast<size_t>(element.part)].push_back(static_cast<int>(e));
+    if (model.bodies[static_cast<size_t>(element.part)].fixed) fixed_weight_ += element_mass_.back() * norm(fe.gravity);
+  }
+  const auto gather = [&](const collapse::ZoneEntry& z) {
+    ZoneElements out;
+    for (const int b : {z.body_a, z.body_b}) {
+      if (b < 0) continue;
+      for (const int e : body_elements_[static_cast<size_t>(b)]) {
+        const Vec3 d = centre_[static_cast<size_t>(e)] - z.p_W;
+        if (std::max({std::abs(d.x), std::abs(d.y), std::abs(d.z)}) <= size) out.elements.push_back(e);
+      }
+    }
+    return out;
+  };
+  for (const auto* list : {&map.elements, &map.rotationals})
+    for (const collapse::ZoneEntry& z : *list) zones_.push_back(gather(z));
+  for (const collapse::ZoneEntry& z : map.joints) joints_.push_back(gather(z));
+}
+
+mbs::View Motion::calc_view(const fem::ExplicitSystem& system, double time) const {
+  const fem::ExplicitModel& fe = whole_.fe;
+  mbs::View v;
+  v.time = time;
+  const size_t B = model_.bodies.size();
+  std::vector<std::vector<const fem::DebrisParticle*>> debris(B);
+  for (const fem::DebrisParticle& d : system.debris())
+    debris[static_cast<size_t>(fe.elements[static_cast<size_t>(d.element)].part)].push_back(&d);
+  std::vector<FitPoint> points;
+  for (size_t b = 0; b < B; ++b) {
+    const Pose start = model_.bodies[b].X_WB;
+    points.clear();
+    Vec3 momentum;
+    double mass = 0;
+    for (const int e : body_elements_[b]) {
+      if (!system.is_alive(e)) continue;
+      const double share = 0.125 * element_mass_[static_cast<size_t>(e)];
+      for (const int n : fe.elements[static_cast<size_t>(e)].node) {
+        points.push_back({share, fe.nodes[static_cast<size_t>(n)], system.p(n)});
+        momentum += share * system.v(n);
+        mass += share;
+      }
+    }
+    Pose X = start;
+    Vec3 velocity, spin;
+    if (mass > 0) {
+      const PointFit fit = fit_points(points);
+      X = {fit.after + to_matrix(fit.rotation) * (start.p - fit.before), fit.rotation * start.q};
+      velocity = (1 / mass) * momentum;
+    } else if (!debris[b].empty()) {
+      Vec3 before, after;
+      double m = 0;
+      for (const fem::DebrisParticle* d : debris[b]) {
+        m += d->mass;
+        before += d->mass * centre_[static_cast<size_t>(d->element)];
+        after += d->mass * d->p;
+        velocity += d->mass * d->v;
+      }
+      X.p += (1 / m) * (after - before);
+      velocity *= 1 / m;
+    }
+    for (const fem::DebrisParticle* d : debris[b]) mass += d->mass;
+    v.X_WB.push_back(X);
+    v.v_WB.push_back(velocity);
+    v.w_WB.push_back(spin);
+    v.mass.push_back(mass);
+  }
+
+  const auto judge = [&](const ZoneElements& z, double& utilisation) {
+    size_t gone = 0;
+    double plastic = 0, limit = 0;
+    utilisation = 0;
+    for (const int e : z.elements) {
+      const fem::ExplicitMaterial& m = fe.materials[static_cast<size_t>(fe.elements[static_cast<size_t>(e)].material)];
+      if (!system.is_alive(e)) {
+        ++gone;
+        continue;
+      }
+      plastic = std::max(plastic, system.plastic_strain(e));
+      limit = std::max(limit, system.damage(e));
+      utilisation = std::max(utilisation, calc_utilisation(m, system.stress(e)));
+    }
+    if (gone > 0 && 2 * gone >= z.elements.size()) return mbs::ElementState::Broken;
+    if (gone > 0 || limit > 0.5) return mbs::ElementState::Softening;
+    return plastic > kYielded ? mbs::ElementState::Yielded : mbs::ElementState::Elastic;
+  };
+  for (const ZoneElements& z : zones_) {
+    double utilisation = 0;
+    v.element_state.push_back(judge(z, utilisation));
+    v.utilisation.push_back(utilisation);
+  }
+  for (const ZoneElements& z : joints_) {
+    double utilisation = 0;
+    v.joint_released.push_back(judge(z, utilisation) == mbs::ElementState::Broken);
+  }
+  v.rotation.assign(zones_.size(), 0);
+  v.shortening.assign(model_.elements.size(), 0);
+  v.joint_force.assign(joints_.size(), {});
+  v.joint_moment.assign(joints_.size(), {});
+
+  for (const double f : calc_foot_forces(system)) v.ground_force.z += f;
+  v.contact_force_ground = system.ground_force(0);
+  v.ground_force += v.contact_force_ground;
+  v.ground_force.z -= fixed_weight_;
+  v.body_contacts = system.contacts();
+  const fem::ExplicitEnergy e = system.calc_energy();
+  v.energy.kinetic = e.kinetic + e.debris_kinetic;
+  v.energy.gravity = e.gravity;
+  v.energy.elastic = e.elastic;
+  v.energy.contact = e.contact_elastic;
+  v.energy.plastic = e.plastic + e.plastic_hourglass;
+  v.energy.damping = e.bulk_viscosity;
+  v.energy.friction = e.friction;
+  v.energy.contact_loss = e.contact_damping;
+  v.energy.removed = e.removed_internal + e.removed_kinetic + e.removed_gravity;
+  v.energy.loads = e.loads;
+  v.energy.residual = e.residual();
+  v.energy.released = std::max(0.0, -(e.gravity + e.removed_gravity));
+  return v;
+}
+
+std::vector<double> Motion::calc_foot_forces(const fem::ExplicitSystem& system) const {
+  std::vector<double> forces;
+  for (const Foot& foot : whole_.feet) {
+    // what the elements press down, and the weight that is lumped at the held nodes
+    double force = -system.calc_resultant(foot.elements, foot.nodes, foot.p_W).force.z;
+    for (const int n : foot.nodes) force += system.node_mass(n) * norm(whole_.fe.gravity);
+    forces.push_back(force);
+  }
+  return forces;
+}
+
+double Motion::calc_speed(const mbs::View& v) const {
+  double mass = 0;
+  for (const double m : v.mass) mass += m;
+  return mass > 0 ? std::sqrt(2 * v.energy.kinetic / mass) : 0;
+}
+
+}  // namespace topple::farfield

@@ -1,0 +1,456 @@
+#include "farfield/run.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "base/hash.h"
+#include "base/unit.h"
+#include "farfield/checkpoint.h"
+#include "farfield/fragments.h"
+#include "farfield/motion.h"
+
+namespace topple::farfield {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using record::Status;
+
+/// A building swings about where it stands while its mean speed is below so many times rest.speed: 0.1 m/s, a swing of
+/// 3 cm at half a hertz.
+constexpr double kSwing = 5;
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+/// Moves the elements and shows them as the manager's bodies.
+class Course {
+ public:
+  Course(const product::Plan& plan, const collapse::Knowledge& k, const FeOptions& fe, const FeCallbacks& callbacks,
+         const collapse::RunOptions& run, const mbs::Model& model, const collapse::ModelMap& map,
+         const mbs::Options& options)
+      : plan_(plan),
+        k_(k),
+        fe_(fe),
+        options_(options),
+        model_(model),
+        map_(map),
+        whole_(make_whole(plan, k, fe.grid, model, map)),
+        mesh_(calc_mesh_report(plan, whole_)),
+        system_(whole_.fe, make_options(fe, run)),
+        motion_(whole_, model, map, fe.grid.size) {
+    if (callbacks.on_mesh) callbacks.on_mesh(whole_, mesh_);
+    key_ = calc_sha256(fmt::format("{}\n{} {} {} {} {} {}", plan.text, run.program_version, fe.grid.size,
+                                   fe.grid.snap_share, fe.scaled_step, fe.skip_quiet, options.frame_interval));
+    for (const collapse::Firing& f : map.schedule)
+      if (!f.fails) schedule_.push_back(f);
+    last_firing_ = schedule_.empty() ? 0 : schedule_.back().time;
+    state_.zone_state.assign(model.elements.size() + model.rotational_elements.size(), 0);
+    state_.has_touched.assign(model.bodies.size(), 0);
+    on_relaxed_ = callbacks.on_relaxed;
+  }
+
+  mbs::Summary run() {
+    start_ = Clock::now();
+    mbs::Summary s;
+    s.step = system_.step();
+    s.highest_frequency = 2 / mesh_.mesh.critical_step;
+    if (fe_.resume) {
+      std::vector<std::byte> bytes;
+      state_ = read_checkpoint(fe_.checkpoint, key_, bytes);
+      system_.read_snapshot(bytes);
+      for (const auto& entry : state_.shown) {
+        if (const mbs::View* v = std::get_if<mbs::View>(&entry)) options_.on_frame(*v);
+        if (const mbs::Happening* h = std::get_if<mbs::Happening>(&entry)) options_.on_happening(*h);
+      }
+    } else {
+      Progress settle;
+      settle.cancel = options_.progress.cancel;
+      state_.relaxation = system_.relax({}, settle);
+      if (on_relaxed_) on_relaxed_(state_.relaxation);
+      if (!state_.relaxation.converged) {
+        s.ending =
+            options_.progress.is_cancelled() ? mbs::Summary::Ending::Cancelled : mbs::Summary::Ending::NoEquilibrium;
+        s.message = state_.relaxation.text;
+      }
+    }
+    s.equilibrium_iterations = state_.relaxation.steps;
+    s.equilibrium_residual = state_.relaxation.residual;
+    if (state_.relaxation.converged) s.ending = advance();
+    s.time = time();
+    s.steps = static_cast<long>(system_.steps());
+    s.shortest_step = system_.step();
+    s.energy_error = state_.released > 0 ? state_.energy_error / state_.released : 0;
+    s.message = s.ending == mbs::Summary::Ending::Diverged ? "positions are no longer finite"
+                : message_.empty()                         ? s.message
+                                                           : message_;
+    s.wall_time = state_.wall_time + calc_seconds();
+    return s;
+  }
+
+  void add_findings(record::Record& r) const;
+
+ private:
+  static fem::ExplicitOptions make_options(const FeOptions& fe, const collapse::RunOptions& run) {
+    fem::ExplicitOptions o;
+    o.scaled_step = fe.scaled_step;
+    o.threads = run.threads;
+    return o;
+  }
+  double time() const { return system_.time() + state_.offset; }
+  double calc_seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+  double frame_time(long long frame) const { return static_cast<double>(frame) * options_.frame_interval; }
+
+  mbs::Summary::Ending advance() {
+    using Ending = mbs::Summary::Ending;
+    Clock::time_point kept = Clock::now();
+    Progress progress;
+    progress.cancel = options_.progress.cancel;
+    for (;;) {
+      const double frame = frame_time(state_.next_frame);
+      const bool has_firing = state_.next_firing < schedule_.size();
+      const double firing = has_firing ? schedule_[state_.next_firing].time : std::numeric_limits<double>::infinity();
+      const double until = std::min({frame, firing, options_.duration});
+      const double half_step = 0.5 * system_.step();
+      if (until > time() + half_step) {
+        switch (system_.advance(until - state_.offset, progress)) {
+          case fem::ExplicitEnding::ReachedTime:
+            break;
+          case fem::ExplicitEnding::Cancelled:
+            keep();
+            return Ending::Cancelled;
+          case fem::ExplicitEnding::Diverged:
+            return Ending::Diverged;
+        }
+      }
+      if (frame <= until) {
+        show_frame(frame);
+        ++state_.next_frame;
+        if (options_.progress.report) options_.progress.report(frame, options_.duration);
+      }
+      if (until >= options_.duration) return Ending::TimeLimit;
+      if (firing <= until) fire(schedule_[state_.next_firing++]);
+      if (is_at_rest()) return Ending::AtRest;
+      if (!skip_quiet()) return options_.progress.is_cancelled() ? Ending::Cancelled : Ending::NoEquilibrium;
+      const bool due = std::chrono::duration<double>(Clock::now() - kept).count() >= fe_.checkpoint_interval;
+      if (due) keep(), kept = Clock::now();
+    }
+  }
+
+  void keep() {
+    if (fe_.checkpoint.empty()) return;
+    RunState now = state_;
+    now.wall_time += calc_seconds();
+    write_checkpoint(fe_.checkpoint, key_, now, system_.write_snapshot());
+  }
+
+  void show(const mbs::Happening& h) {
+    options_.on_happening(h);
+    state_.shown.emplace_back(h);
+  }
+
+  void show_frame(double at) {
+    mbs::View v = motion_.calc_view(system_, at);
+    add_ledger(v.energy);
+    state_.energy_error = std::max(state_.energy_error, std::abs(v.energy.residual));
+    state_.released = std::max(state_.released, v.energy.released);
+    note_quiet(state_.quiet_since, motion_.calc_speed(v) < k_.rest_speed, at);
+    note_quiet(state_.swings_since, motion_.calc_speed(v) < kSwing * k_.rest_speed, at);
+    if (!state_.has_fragments && !state_.shown.empty()) look_at_fragments(false, at);
+    show_changes(v);
+    options_.on_frame(v);
+    state_.shown.emplace_back(std::move(v));
+    state_.foot_forces.push_back(motion_.calc_foot_forces(system_));
+  }
+
+  /// Touchdowns and changes of zones since the last frame.
+  void show_changes(const mbs::View& v) {
+    const std::vector<double>& touchdowns = system_.touchdowns();
+    std::vector<mbs::Happening> list;
+    for (size_t b = 0; b < model_.bodies.size() && b < touchdowns.size(); ++b) {
+      if (touchdowns[b] < 0 || state_.has_touched[b] || model_.bodies[b].fixed) continue;
+      state_.has_touched[b] = 1;
+      mbs::Happening h;
+      h.kind = mbs::Happening::Kind::GroundContact;
+      h.time = touchdowns[b] + state_.offset;
+      h.index = static_cast<int>(b);
+      h.speed = norm(v.v_WB[b]);
+      list.push_back(h);
+    }
+    std::stable_sort(list.begin(), list.end(),
+                     [](const mbs::Happening& a, const mbs::Happening& b) { return a.time < b.time; });
+    for (const mbs::Happening& h : list) show(h);
+    for (size_t z = 0; z < state_.zone_state.size(); ++z) {
+      const auto now = static_cast<unsigned char>(v.element_state[z]);
+      if (now <= state_.zone_state[z]) continue;
+      state_.zone_state[z] = now;
+      const bool is_rotational = z >= map_.elements.size();
+      const collapse::ZoneEntry& entry = is_rotational ? map_.rotationals[z - map_.elements.size()] : map_.elements[z];
+      if (entry.firing_time <= v.time) continue;  // the charge did that
+      mbs::Happening h;
+      h.time = v.time;
+      h.index = static_cast<int>(z);
+      switch (v.element_state[z]) {
+        case mbs::ElementState::Yielded:
+          h.kind = mbs::Happening::Kind::ElementYielded;
+          break;
+        case mbs::ElementState::Softening:
+          h.kind = mbs::Happening::Kind::ElementSoftening;
+          break;
+        default:
+          h.kind = mbs::Happening::Kind::ElementBroken;
+          h.reason = "removal of its elements";
+      }
+      show(h);
+    }
+  }
+
+  void fire(const collapse::Firing& f) {
+    for (const ChargeElements& c : whole_.charges)
+      if (c.stage == f.stage && c.charge == f.charge) system_.remove(c.elements);
+    state_.quiet_since = state_.swings_since = -1;
+    for (size_t e = 0; e < map_.events.size(); ++e) {
+      const collapse::EventEntry& entry = map_.events[e];
+      if (entry.stage != f.stage || entry.charge != f.charge || entry.is_aftermath) continue;
+      mbs::Happening h;
+      h.kind = mbs::Happening::Kind::EventFired;
+      h.time = f.time;
+      h.index = static_cast<int>(e);
+      show(h);
+    }
+  }
+
+  bool is_at_rest() const {
+    return state_.next_firing == schedule_.size() && state_.quiet_since >= 0 &&
+           time() - std::max(state_.quiet_since, last_firing_) >= k_.rest_time;
+  }
+
+  static void note_quiet(double& since, bool is_quiet, double at) {
+    if (!is_quiet) since = -1;
+    if (is_quiet && since < 0) since = at;
+  }
+
+  /// The elements' ledger begins anew when they are settled; the record's goes on.
+  void add_ledger(mbs::Energy& e) const {
+    const mbs::Energy& base = state_.ledger;
+    e.gravity += base.gravity;
+    e.plastic += base.plastic;
+    e.damping += base.damping;
+    e.friction += base.friction;
+    e.contact_loss += base.contact_loss;
+    e.removed += base.removed;
+    e.residual += base.residual;
+    e.released += base.released;
+  }
+  static double calc_sum(const mbs::Energy& e) {
+    return e.kinetic + e.gravity + e.elastic + e.contact + e.plastic + e.damping + e.friction + e.contact_loss +
+           e.removed;
+  }
+
+  /// What only swings about where it stands comes to rest in the wait before the next charge: it is settled without
+  /// motion, and the plan's clock put forward to two frames before the charge.
+  [[nodiscard]] bool skip_quiet() {
+    if (!fe_.skip_quiet || state_.next_firing == schedule_.size() || state_.swings_since < 0) return true;
+    if (time() - state_.swings_since < k_.rest_time) return true;
+    const long long to =
+        static_cast<long long>(std::floor(schedule_[state_.next_firing].time / options_.frame_interval)) - 2;
+    if (to <= state_.next_frame) return true;
+    mbs::Energy before = motion_.calc_view(system_, time()).energy;
+    add_ledger(before);
+    Progress settle;
+    settle.cancel = options_.progress.cancel;
+    const fem::RelaxationSummary relaxed = system_.relax({}, settle);
+    if (!relaxed.converged) {
+      message_ = relaxed.text;
+      return false;
+    }
+    state_.ledger = {};
+    const mbs::Energy after = motion_.calc_view(system_, time()).energy;
+    state_.ledger.gravity = before.gravity - after.gravity;
+    state_.ledger.plastic = before.plastic - after.plastic;
+    state_.ledger.friction = before.friction - after.friction;
+    state_.ledger.contact_loss = before.contact_loss - after.contact_loss;
+    state_.ledger.removed = before.removed - after.removed;
+    state_.ledger.residual = before.residual - after.residual;
+    state_.ledger.released = before.released - after.released;
+    // what swung has been damped
+    mbs::Energy now = after;
+    add_ledger(now);
+    state_.ledger.damping = calc_sum(before) - calc_sum(now);
+    const double jump = frame_time(to) - frame_time(state_.next_frame);
+    state_.skipped.push_back({time(), time() + jump, relaxed.settlement});
+    state_.offset += jump;
+    state_.next_frame = to;
+    state_.swings_since = state_.quiet_since = -1;
+    return true;
+  }
+
+  /// When the upper block first touches down, and again at the end if it never did.
+  void look_at_fragments(bool at_end, double at) {
+    const std::vector<double>& touchdowns = system_.touchdowns();
+    bool has_touched = false;
+    for (size_t b = 0; b < map_.bodies.size() && b < touchdowns.size(); ++b)
+      has_touched |= map_.bodies[b].is_upper && touchdowns[b] >= 0;
+    if (!has_touched && !at_end) return;
+    state_.has_fragments = true;
+    state_.fragments_time = at;
+    state_.fragments = find_fragments(plan_, whole_, system_, list_zones(), fe_.grid.size);
+  }
+
+  /// The manager's zones as they stand in the record.
+  std::vector<record::ZoneInfo> list_zones() const {
+    std::vector<record::ZoneInfo> zones;
+    const auto add = [&zones](const collapse::ZoneEntry& z) {
+      zones.push_back({z.name, z.member, z.subsystem, z.body_a, z.body_b, z.p_W});
+    };
+    for (const collapse::ZoneEntry& z : map_.elements) add(z);
+    for (const collapse::ZoneEntry& z : map_.rotationals) add(z);
+    return zones;
+  }
+
+ public:
+  void finish() {
+    if (!state_.has_fragments && !state_.shown.empty()) look_at_fragments(true, time());
+  }
+
+ private:
+  const product::Plan& plan_;
+  const collapse::Knowledge& k_;
+  const FeOptions& fe_;
+  const mbs::Options options_;
+  const mbs::Model& model_;
+  const collapse::ModelMap& map_;
+  Whole whole_;
+  MeshReport mesh_;
+  fem::ExplicitSystem system_;
+  Motion motion_;
+  std::string key_, message_;
+  std::vector<collapse::Firing> schedule_;
+  double last_firing_ = 0;
+  RunState state_;
+  Clock::time_point start_;
+  std::function<void(const fem::RelaxationSummary&)> on_relaxed_;
+};
+
+void Course::add_findings(record::Record& r) const {
+  const auto add = [&r](const std::string& id, const char* title, const std::string& text, double value,
+                        const char* unit, Status status) {
+    r.findings.push_back({id, "Finite elements", title, text, value, unit, status});
+  };
+  add_fragment_findings(plan_, state_.fragments, state_.fragments_time, r);
+  std::string text;
+  for (const std::string& line : describe(mesh_)) text += (text.empty() ? "" : " ") + line;
+  add("farfield.mesh", "Mesh", text, mesh_.mesh.elements, "1", Status::Info);
+  if (system_.added_mass() > 0)
+    add("farfield.scaled", "Mass scaling",
+        fmt::format("{} elements got {:.2f} t more mass ({:.2g} % of all), so that they bear a step of {:.4f} ms.",
+                    system_.scaled_elements(), system_.added_mass() / unit::t,
+                    100 * system_.added_mass() / mesh_.mesh.mass, 1e3 * fe_.scaled_step),
+        system_.added_mass(), "kg", Status::Info);
+  add("farfield.settling", "Dead load",
+      fmt::format("Put on without motion in {} steps: {:.1e} of the load is out of balance, the building settled by up "
+                  "to {:.1f} mm.",
+                  state_.relaxation.steps, state_.relaxation.residual, 1e3 * state_.relaxation.settlement),
+      state_.relaxation.residual, "1", state_.relaxation.converged ? Status::Good : Status::Bad);
+  const fem::ExplicitEnergy e = system_.calc_energy();
+  const double inner = e.elastic + e.plastic + e.plastic_hourglass + e.removed_internal;
+  const double corner = inner > 0 ? (e.corner_hourglass + e.plastic_corner) / inner : 0;
+  const double all = inner > 0 ? (e.elastic_hourglass + e.plastic_hourglass) / inner : 0;
+  add("farfield.hourglass", "Stabilisation of elements",
+      fmt::format(
+          "Modes that no beam theory knows hold {:.2g} % of the internal energy at the end (accepted: 5 %); all "
+          "that varies inside elements, which is bending too, {:.2g} %.",
+          100 * corner, 100 * all),
+      corner, "1", corner <= 0.05 ? Status::Good : Status::Warning);
+  int charged = 0, torn = 0, crushed = 0, degenerate = 0;
+  double mass = 0;
+  for (const fem::Removal& x : system_.removals()) {
+    charged += x.cause == fem::RemovalCause::Charge;
+    torn += x.cause == fem::RemovalCause::Tension;
+    crushed += x.cause == fem::RemovalCause::Compression;
+    degenerate += x.cause == fem::RemovalCause::Degenerate;
+    mass += x.mass;
+  }
+  add("farfield.removed", "Elements that went",
+      fmt::format("{} by charges, {} torn, {} crushed, {} out of shape; {:.1f} t in all. Of what was not charged {} "
+                  "pieces stay as debris.",
+                  charged, torn, crushed, degenerate, mass / unit::t, system_.debris().size()),
+      mass, "kg", Status::Info);
+  for (const auto& s : state_.skipped)
+    add(fmt::format("farfield.skipped.{}", &s - state_.skipped.data() + 1), "Wait passed over",
+        fmt::format("At {:.2f} s the building only swung about where it stands. It was settled without motion, and the "
+                    "clock was put forward to {:.2f} s; it stands within {:.1f} mm of where it was built.",
+                    s[0], s[1], 1e3 * s[2]),
+        s[1] - s[0], "s", Status::Info);
+  for (size_t i = 0; i < whole_.notes.size(); ++i)
+    add(fmt::format("farfield.note.{}", i + 1), "Left out", whole_.notes[i], kNone, "", Status::Warning);
+
+  for (record::Finding& f : r.findings)
+    if (f.id == "verification.step")
+      f.text = fmt::format("{:.4f} ms in {} steps; the worst element alone bears {:.4f} ms.", 1e3 * system_.step(),
+                           system_.steps(), 1e3 * mesh_.mesh.critical_step);
+  // rows of the grid that stand on the ground
+  for (size_t row = 0; row < plan_.row_names.size(); ++row) {
+    record::Series s{
+        "ground_force_row_" + plan_.row_names[row], "Load on row " + plan_.row_names[row], "N", "force", {}};
+    bool has = false;
+    for (const std::vector<double>& forces : state_.foot_forces) {
+      double sum = 0;
+      for (size_t f = 0; f < whole_.feet.size(); ++f) {
+        const product::Member& m = plan_.members[static_cast<size_t>(whole_.feet[f].member)];
+        if (m.kind != product::MemberKind::Column || m.row_a != static_cast<int>(row)) continue;
+        has = true;
+        sum += forces[f];
+      }
+      s.value.push_back(sum);
+    }
+    if (has && s.value.size() == r.time.size()) r.series.push_back(std::move(s));
+  }
+}
+
+/// The elements crack within bays and panels, which the multibody model does not; what they lack is something else.
+void say_what_is_not_modelled(record::Record& r) {
+  const std::string here =
+      "cracks that close again, slip and buckling of single bars (concrete and bars are one material), bars that a "
+      "charge leaves standing";
+  for (std::string& s : r.not_modelled)
+    if (s.rfind("cracking of slabs", 0) == 0) s = here;
+  std::string list;
+  for (const std::string& s : r.not_modelled) list += (list.empty() ? "" : "; ") + s;
+  for (record::Finding& f : r.findings)
+    if (f.id == "not_modelled") f.text = list + ".";
+}
+
+}  // namespace
+
+Whole make_whole(const product::Plan& plan, const collapse::Knowledge& k, const GridOptions& grid, int threads) {
+  collapse::ModelMap map;
+  const mbs::Model model = collapse::make_model(plan, k, map, threads);
+  return make_whole(plan, k, grid, model, map);
+}
+
+record::Record run_plan(const product::Plan& plan, const collapse::Knowledge& k, const collapse::RunOptions& run,
+                        const FeOptions& fe, const collapse::RunCallbacks& callbacks, const FeCallbacks& fe_callbacks) {
+  std::unique_ptr<Course> course;
+  // the manager's model must live as long as the course
+  mbs::Model model;
+  collapse::ModelMap map;
+  record::Record r =
+      collapse::run_plan(plan, k, run, callbacks, "finite elements",
+                         [&](const mbs::Model& m, const collapse::ModelMap& described, const mbs::Options& options) {
+                           model = m;
+                           map = described;
+                           course = std::make_unique<Course>(plan, k, fe, fe_callbacks, run, model, map, options);
+                           const mbs::Summary s = course->run();
+                           course->finish();
+                           return s;
+                         });
+  say_what_is_not_modelled(r);
+  if (course) course->add_findings(r);
+  return r;
+}
+
+}  // namespace topple::farfield

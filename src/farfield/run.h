@@ -1,0 +1,36 @@
+#pragma once
+/// A plan moved by explicit finite elements instead of the multibody system: the same record, the same findings.
+
+#include <functional>
+#include <string>
+
+#include "collapse/run.h"
+#include "farfield/whole.h"
+#include "fem/explicit_system.h"
+
+namespace topple::farfield {
+
+struct FeOptions {
+  GridOptions grid;
+  double scaled_step = 0;           // > 0: elements get mass until they bear this step [s]
+  bool skip_quiet = false;          // do not wait through the time in which nothing moves before a charge
+  std::string checkpoint;           // file to write now and then and when cancelled; empty: none
+  double checkpoint_interval = 60;  // of the clock [s]
+  bool resume = false;              // go on from the checkpoint
+};
+
+struct FeCallbacks {
+  std::function<void(const Whole&, const MeshReport&)> on_mesh;
+  std::function<void(const fem::RelaxationSummary&)> on_relaxed;
+};
+
+/// Runs a plan. The record holds the manager's bodies, moved by their elements; findings "farfield.*" say what only the
+/// elements know. Throws InputError like make_whole and read_checkpoint; everything else is in the record. The same
+/// bits at any number of threads and however often it was interrupted.
+record::Record run_plan(const product::Plan&, const collapse::Knowledge&, const collapse::RunOptions&, const FeOptions&,
+                        const collapse::RunCallbacks&, const FeCallbacks&);
+
+/// The manager's model of the plan and the building in finite elements, without running either.
+Whole make_whole(const product::Plan&, const collapse::Knowledge&, const GridOptions&, int threads);
+
+}  // namespace topple::farfield

@@ -1,0 +1,240 @@
+#include "farfield/whole.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <tuple>
+
+#include "base/unit.h"
+#include "farfield/mixture.h"
+
+namespace topple::farfield {
+
+namespace {
+
+/// Losses of a section somewhere along a member.
+struct Loss {
+  double concrete = 0, cut_bars = 0, cut_concrete = 0;
+  auto operator<=>(const Loss&) const = default;
+};
+
+/// Materials as they are asked for.
+class Materials {
+ public:
+  Materials(const product::Plan& plan, double length, std::vector<fem::ExplicitMaterial>& out)
+      : plan_(plan), length_(length), out_(out) {}
+
+  int of_section(int section, const Loss& loss) {
+    const auto [it, is_new] = sections_.emplace(std::make_tuple(section, loss), static_cast<int>(out_.size()));
+    if (!is_new) return it->second;
+    const product::Section& s = plan_.sections[static_cast<size_t>(section)];
+    nearfield::ZoneInput in;
+    in.section = s;
+    in.concrete = plan_.concretes[static_cast<size_t>(s.concrete)];
+    in.steel = plan_.steels[static_cast<size_t>(s.steel)];
+    in.length = length_;
+    in.concrete_loss = loss.concrete;
+    in.cut_bars = loss.cut_bars;
+    in.cut_concrete = loss.cut_concrete;
+    std::string name = s.name;
+    if (loss != Loss{}) name += "/weakened" + std::to_string(out_.size());
+    out_.push_back(make_section_material(in, name));
+    return it->second;
+  }
+  int of_panel(int panel) {
+    const auto [it, is_new] = panels_.emplace(panel, static_cast<int>(out_.size()));
+    if (is_new) out_.push_back(make_panel_material(plan_, plan_.panels[static_cast<size_t>(panel)], length_));
+    return it->second;
+  }
+
+ private:
+  const product::Plan& plan_;
+  double length_;
+  std::vector<fem::ExplicitMaterial>& out_;
+  std::map<std::tuple<int, Loss>, int> sections_;
+  std::map<int, int> panels_;
+};
+
+/// Distance from a box along W's axes as it stands at the start; negative inside.
+double calc_distance(const Vec3& p, const Vec3& centre, const Vec3& half) {
+  double outside = 0, inside = -std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 3; ++i) {
+    const double d = std::abs(p[i] - centre[i]) - half[i];
+    inside = std::max(inside, d);
+    if (d > 0) outside += d * d;
+  }
+  return inside > 0 ? std::sqrt(outside) : inside;
+}
+
+}  // namespace
+
+std::vector<int> find_bodies(const Grid& grid, const mbs::Model& model, const collapse::ModelMap& map) {
+  std::vector<int> bodies(grid.cells.size(), -1);
+  for (size_t c = 0; c < grid.cells.size(); ++c) {
+    double least = std::numeric_limits<double>::infinity();
+    for (size_t b = 0; b < map.bodies.size(); ++b)
+      for (const record::BoxShape& s : map.bodies[b].shapes) {
+        const Vec3 centre = model.bodies[b].X_WB * s.X_BS.p;
+        const double d = calc_distance(grid.cells[c].centre, centre, s.half);
+        if (d < least) least = d, bodies[c] = static_cast<int>(b);
+      }
+  }
+  return bodies;
+}
+
+Whole make_whole(const product::Plan& plan, const collapse::Knowledge& k, const GridOptions& options,
+                 const mbs::Model& model, const collapse::ModelMap& map) {
+  Whole whole;
+  whole.grid = make_grid(plan, options);
+  const Grid& grid = whole.grid;
+  fem::ExplicitModel& fe = whole.fe;
+  fe.nodes = grid.nodes;
+  fe.gravity = {0, 0, -plan.analysis.gravity};
+
+  // a charge's cells, and what its blast leaves beside them
+  const std::vector<DestroyedLength> destroyed = find_destroyed_lengths(plan);
+  std::vector<Loss> loss(grid.cells.size());
+  std::multimap<int, size_t> cells_of;
+  for (size_t c = 0; c < grid.cells.size(); ++c) cells_of.emplace(grid.cells[c].member, c);
+  for (const DestroyedLength& d : destroyed) {
+    const product::Member& m = plan.members[static_cast<size_t>(d.member)];
+    const product::Charge& charge = plan.stages[static_cast<size_t>(d.stage)].charges[static_cast<size_t>(d.charge)];
+    const product::Section& s = plan.sections[static_cast<size_t>(m.section)];
+    const double reach = k.charge_transition_reach * std::max(s.width, s.height);
+    ChargeElements taken{d.stage, d.charge, {}};
+    const auto [first, last] = cells_of.equal_range(d.member);
+    for (auto it = first; it != last; ++it) {
+      const double at = grid.cells[it->second].centre[d.axis];
+      if (at > d.from && at < d.to)
+        taken.elements.push_back(static_cast<int>(it->second));
+      else if (!charge.fails && at > d.from - reach && at < d.to + reach)
+        loss[it->second].concrete = std::max(loss[it->second].concrete, charge.transition_damage);
+    }
+    whole.charges.push_back(std::move(taken));
+  }
+  for (size_t i = 0; i < plan.members.size(); ++i) {
+    const product::Member& m = plan.members[i];
+    for (const product::Weakening& w : m.weakenings) {
+      const int axis = axis_of(m);
+      // the layer of cells nearest to the cut
+      double least = std::numeric_limits<double>::infinity();
+      const auto [first, last] = cells_of.equal_range(static_cast<int>(i));
+      const auto away = [&](size_t c) { return std::abs(grid.cells[c].centre[axis] - m.start[axis] - w.at); };
+      for (auto it = first; it != last; ++it) least = std::min(least, away(it->second));
+      for (auto it = first; it != last; ++it)
+        if (away(it->second) < least + 1e-6) {
+          Loss& l = loss[it->second];
+          l.cut_bars = std::max(l.cut_bars, w.cut_bars);
+          l.cut_concrete = std::max(l.cut_concrete, w.cut_concrete);
+        }
+    }
+  }
+
+  Materials materials(plan, options.size, fe.materials);
+  const std::vector<int> bodies = find_bodies(grid, model, map);
+  for (size_t c = 0; c < grid.cells.size(); ++c) {
+    const Cell& cell = grid.cells[c];
+    const product::Member& m = plan.members[static_cast<size_t>(cell.member)];
+    fem::ExplicitElement e;
+    e.node = cell.node;
+    e.material = m.section >= 0 ? materials.of_section(m.section, loss[c]) : materials.of_panel(m.panel);
+    e.part = bodies[c];
+    const MemberFit& fit = grid.fits[static_cast<size_t>(cell.member)];
+    e.mass_factor = calc_loaded_mass(plan, m) / (fit.volume * fe.materials[static_cast<size_t>(e.material)].density);
+    fe.elements.push_back(e);
+  }
+
+  // what stands on the ground is held there
+  std::map<int, Foot> feet;
+  std::vector<bool> is_held(fe.nodes.size(), false);
+  for (size_t c = 0; c < grid.cells.size(); ++c) {
+    const product::Member& m = plan.members[static_cast<size_t>(grid.cells[c].member)];
+    const bool stands = m.storey == 0 && (m.kind == product::MemberKind::Column || m.kind == product::MemberKind::Wall);
+    if (!stands) continue;
+    bool touches = false;
+    for (size_t i = 0; i < 4; ++i) {
+      const int n = grid.cells[c].node[i];
+      if (std::abs(fe.nodes[static_cast<size_t>(n)].z - m.start.z) > 1e-6) continue;
+      touches = true;
+      Foot& foot = feet[grid.cells[c].member];
+      if (std::find(foot.nodes.begin(), foot.nodes.end(), n) == foot.nodes.end()) foot.nodes.push_back(n);
+      if (!is_held[static_cast<size_t>(n)]) fe.supports.push_back({n, true, true, true});
+      is_held[static_cast<size_t>(n)] = true;
+    }
+    if (touches) feet[grid.cells[c].member].elements.push_back(static_cast<int>(c));
+  }
+  for (auto& [member, foot] : feet) {
+    foot.member = member;
+    for (const int n : foot.nodes)
+      foot.p_W += (1.0 / static_cast<double>(foot.nodes.size())) * fe.nodes[static_cast<size_t>(n)];
+    whole.feet.push_back(std::move(foot));
+  }
+  if (whole.feet.empty()) throw InputError("E673", "nothing stands on the ground", "columns or walls of storey 0 do");
+  fe.grounds.push_back({{0, 0, 0}, {0, 0, 1}, plan.ground.friction});
+
+  for (const product::Cable& cable : plan.cables)
+    whole.notes.push_back("Cable " + cable.name + " is left out: the finite elements have no cables.");
+  const bool has_residual = std::any_of(plan.stages.begin(), plan.stages.end(), [](const product::Stage& s) {
+    return std::any_of(s.charges.begin(), s.charges.end(),
+                       [](const product::Charge& c) { return c.residual_bars > 0; });
+  });
+  if (has_residual)
+    whole.notes.push_back("Bars that charges leave standing are left out: a destroyed length goes as a whole.");
+  return whole;
+}
+
+MeshReport calc_mesh_report(const product::Plan& plan, const Whole& whole) {
+  MeshReport r;
+  r.mesh = fem::calc_mesh_summary(whole.fe);
+  const auto member_of = [&](int element) {
+    if (element < 0) return std::string();
+    return plan.members[static_cast<size_t>(whole.grid.cells[static_cast<size_t>(element)].member)].name;
+  };
+  r.smallest_edge_member = member_of(r.mesh.smallest_edge_element);
+  r.critical_member = member_of(r.mesh.critical_element);
+  const auto note = [&r](double share, const std::string& name) {
+    if (share < r.smallest_fit) r.smallest_fit = share, r.smallest_member = name;
+    if (share > r.largest_fit) r.largest_fit = share, r.largest_member = name;
+  };
+  // beams and slabs take room from each other
+  std::map<int, MemberFit> floors;
+  for (size_t i = 0; i < plan.members.size(); ++i) {
+    const MemberFit& fit = whole.grid.fits[i];
+    if (fit.cells == 0) continue;
+    const product::Member& m = plan.members[i];
+    if (fit.shift > r.largest_shift) r.largest_shift = fit.shift, r.shifted_member = m.name;
+    if (m.kind == product::MemberKind::Beam || m.kind == product::MemberKind::Slab) {
+      floors[m.storey].volume += fit.volume;
+      floors[m.storey].plan_volume += fit.plan_volume;
+    } else {
+      note(fit.volume / fit.plan_volume, m.name);
+    }
+  }
+  for (const auto& [storey, fit] : floors)
+    note(fit.volume / fit.plan_volume, fmt::format("beams and slabs of storey {}", storey));
+  return r;
+}
+
+std::vector<std::string> describe(const MeshReport& r) {
+  std::vector<std::string> lines;
+  lines.push_back(
+      fmt::format("{} elements, {} nodes, {:.1f} t.", r.mesh.elements, r.mesh.nodes, r.mesh.mass / unit::t));
+  lines.push_back(
+      fmt::format("Smallest edge {:.0f} mm ({}), largest aspect ratio {:.1f}, critical step {:.4f} ms ({}).",
+                  1e3 * r.mesh.smallest_edge, r.smallest_edge_member, r.mesh.largest_aspect, 1e3 * r.mesh.critical_step,
+                  r.critical_member));
+  std::string fits = "Volumes: ";
+  fits += r.smallest_fit < 1 ? fmt::format("{:.1f} % ({})", 100 * r.smallest_fit, r.smallest_member) : "100 %";
+  fits += r.largest_fit > 1 ? fmt::format(" to {:.1f} % ({})", 100 * r.largest_fit, r.largest_member) : " to 100 %";
+  fits += " of the plan's; their masses are the plan's.";
+  lines.push_back(fits);
+  lines.push_back(r.largest_shift > 1e-6 ? fmt::format("Faces were moved by at most {:.0f} mm ({}).",
+                                                       1e3 * r.largest_shift, r.shifted_member)
+                                         : std::string("No face was moved."));
+  return lines;
+}
+
+}  // namespace topple::farfield
