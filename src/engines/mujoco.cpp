@@ -532,6 +532,7 @@ class MujocoEngine : public Engine {
   std::vector<Unsupported> find_unsupported(const mbs::Model& model, const mbs::Options& options) const override {
     std::vector<Unsupported> out = find_impossible_inertias(model);
     for (Unsupported& u : find_opening_joints(model, options)) out.push_back(std::move(u));
+    for (Unsupported& u : find_planes(model)) out.push_back(std::move(u));
     for (size_t i = 0; i < model.contact.pairs.size(); ++i)
       if (model.contact.pairs[i].touches)
         out.push_back({"contact.pairs[" + std::to_string(i) + "]", "rules of its own for a pair of bodies"});

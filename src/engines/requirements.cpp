@@ -35,6 +35,11 @@ std::vector<Unsupported> find_impossible_inertias(const mbs::Model& model) {
   return out;
 }
 
+std::vector<Unsupported> find_planes(const mbs::Model& model) {
+  if (!model.is_planar) return {};
+  return {{"is_planar", "bodies that keep to a plane"}};
+}
+
 std::vector<Unsupported> find_opening_joints(const mbs::Model& model, const mbs::Options& options) {
   std::vector<Unsupported> out;
   if (options.equilibrium) return out;

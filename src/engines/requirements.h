@@ -18,4 +18,7 @@ std::vector<Unsupported> find_opening_joints(const mbs::Model&, const mbs::Optio
 bool can_touch_ground(const mbs::Model&);
 bool can_touch_bodies(const mbs::Model&);
 
+/// Of engines without models that keep to a plane.
+std::vector<Unsupported> find_planes(const mbs::Model&);
+
 }  // namespace topple::engines

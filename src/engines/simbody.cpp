@@ -242,6 +242,7 @@ class SimbodyEngine : public Engine {
   std::vector<Unsupported> find_unsupported(const mbs::Model& model, const mbs::Options& options) const override {
     std::vector<Unsupported> out = find_impossible_inertias(model);
     for (Unsupported& u : find_opening_joints(model, options)) out.push_back(std::move(u));
+    for (Unsupported& u : find_planes(model)) out.push_back(std::move(u));
     if (can_touch_bodies(model)) out.push_back({"contact.bodies", "contact between bodies"});
     for (size_t i = 0; i < model.contact.pairs.size() && can_touch_ground(model); ++i)
       if (model.contact.pairs[i].touches && model.contact.pairs[i].b == mbs::kGround)

@@ -60,6 +60,36 @@ void Course::show() {
   s_.state.largest_residual = std::max(s_.state.largest_residual, std::abs(v.energy.residual));
   s_.state.released = v.energy.released;
   if (s_.options.on_frame) s_.options.on_frame(v);
+  if (s_.options.pass_speed > 0) watch(v);
+}
+
+void Course::watch(const View& v) {
+  double mass = 0;
+  for (size_t b = 0; b < s_.B; ++b)
+    if (!s_.fixed[b]) mass += v.mass[b];
+  const Options& o = s_.options;
+  const bool is_slow = 2 * v.energy.kinetic < o.pass_speed * o.pass_speed * mass;
+  const bool is_held = v.energy.plastic - plastic_then_ <= o.pass_share * v.energy.released;
+  if (!is_slow || !is_held) {
+    quiet_since_ = v.time;
+    plastic_then_ = v.energy.plastic;
+  }
+  is_quiet_ = v.time - quiet_since_ >= o.pass_time;
+}
+
+void Course::pass_quiet() {
+  State& s = s_.state;
+  if (!is_quiet_ || s.next_event >= s_.event_order.size() || !s.waiting.empty() || !s.review_times.empty() ||
+      !s_.model.loads.empty())
+    return;
+  const double next = s_.model.events[s_.event_order[s.next_event]].time;
+  const double steps = std::floor((next - s.time) / s_.step) - 1;
+  if (!(steps >= 1)) return;
+  s.time_base += steps * s_.step;
+  s.time = s.time_base + static_cast<double>(s.step_index - s.index_base) * s_.step;
+  is_quiet_ = false;
+  quiet_since_ = s.time;
+  show();
 }
 
 bool Course::is_at_rest() {
@@ -82,7 +112,8 @@ bool Course::is_at_rest() {
 bool Course::follow() {
   Summary& out = s_.summary;
   const Options& options = s_.options;
-  const double time = s_.state.time, slack = 0.5 * s_.step;
+  const double slack = 0.5 * s_.step;
+  double time = s_.state.time;
   if (!s_.is_finite() || !s_.trouble.empty()) {
     out.ending = Summary::Ending::Diverged;
     return false;
@@ -90,6 +121,8 @@ bool Course::follow() {
   if (sampler_.is_due(time, slack)) sampler_.take(s_.calc_view(), slack);
   if (time >= static_cast<double>(frame_) * interval_ - slack) {
     show();
+    pass_quiet();
+    time = s_.state.time;
     while (time >= static_cast<double>(frame_) * interval_ - slack) ++frame_;
     if (options.progress.report) options.progress.report(time, options.duration);
   }

@@ -22,12 +22,19 @@ class Course {
  private:
   void show();
   bool is_at_rest();
+  /// Looks at a frame for whether nothing happens any more.
+  void watch(const View&);
+  /// Goes on to the next event if nothing happens until then.
+  void pass_quiet();
 
   System& s_;
   Sampler sampler_;
   std::vector<bool> softened_;
   double last_event_ = 0, interval_ = 0, shown_ = -1;
   long frame_ = 0;
+  double quiet_since_ = 0;   // of the frames [s]
+  double plastic_then_ = 0;  // dissipated until then [J]
+  bool is_quiet_ = false;
   std::chrono::steady_clock::time_point begin_;
 };
 

@@ -30,22 +30,32 @@ struct KinematicRow {
   Vec3 va, wa, vb, wb;
 };
 
-void add_outer(const KinematicRow& r, double k, Triplets& out) {
+/// Which coordinate of a free body is which unknown: all six, or x, z and the turn about y.
+struct Unknowns {
+  explicit Unknowns(bool is_planar) : each(is_planar ? 3 : 6), stride(is_planar ? 2 : 1) {}
+  int each, stride;
+  int at(int place, int unknown) const { return each * place + unknown; }
+  /// Of the body's coordinates x y z, about x y z.
+  int coordinate(int unknown) const { return stride * unknown; }
+};
+
+void add_outer(const KinematicRow& r, double k, const Unknowns& u, Triplets& out) {
   const int body[2] = {r.a, r.b};
   const Vec3 part[2][2] = {{r.va, r.wa}, {r.vb, r.wb}};
   for (int i = 0; i < 2; ++i)
     for (int j = 0; j < 2; ++j) {
       if (body[i] < 0 || body[j] < 0) continue;
-      for (int m = 0; m < 6; ++m)
-        for (int n = 0; n < 6; ++n) {
-          const double value = k * part[i][m / 3][m % 3] * part[j][n / 3][n % 3];
-          out.emplace_back(6 * body[i] + m, 6 * body[j] + n, value);  // zeros too: the pattern never changes
+      for (int m = 0; m < u.each; ++m)
+        for (int n = 0; n < u.each; ++n) {
+          const int c = u.coordinate(m), d = u.coordinate(n);
+          const double value = k * part[i][c / 3][c % 3] * part[j][d / 3][d % 3];
+          out.emplace_back(u.at(body[i], m), u.at(body[j], n), value);  // zeros too: the pattern never changes
         }
     }
 }
 
 /// The same of six rows between the same bodies.
-void add_outers(const KinematicRow rows[6], const double k[6], Triplets& out) {
+void add_outers(const KinematicRow rows[6], const double k[6], const Unknowns& u, Triplets& out) {
   double sum[12][12] = {};
   for (int r = 0; r < 6; ++r) {
     const Vec3* part[4] = {&rows[r].va, &rows[r].wa, &rows[r].vb, &rows[r].wb};
@@ -55,10 +65,12 @@ void add_outers(const KinematicRow rows[6], const double k[6], Triplets& out) {
       for (int j = 0; j < 12; ++j) sum[i][j] += k[r] * x[i] * x[j];
   }
   const int body[2] = {rows[0].a, rows[0].b};
-  for (int i = 0; i < 12; ++i)
-    for (int j = 0; j < 12; ++j)
-      if (body[i / 6] >= 0 && body[j / 6] >= 0)
-        out.emplace_back(6 * body[i / 6] + i % 6, 6 * body[j / 6] + j % 6, sum[i][j]);
+  for (int i = 0; i < 2 * u.each; ++i)
+    for (int j = 0; j < 2 * u.each; ++j) {
+      const int a = i / u.each, b = j / u.each, m = i % u.each, n = j % u.each;
+      if (body[a] >= 0 && body[b] >= 0)
+        out.emplace_back(u.at(body[a], m), u.at(body[b], n), sum[6 * a + u.coordinate(m)][6 * b + u.coordinate(n)]);
+    }
 }
 
 }  // namespace
@@ -66,14 +78,15 @@ void add_outers(const KinematicRow rows[6], const double k[6], Triplets& out) {
 /// Assembles what both solvers below need.
 class Assembly {
  public:
-  explicit Assembly(const System& s) : s_(s), place_(s.B, -1) {
+  explicit Assembly(const System& s) : s_(s), unknowns_(s.model.is_planar), place_(s.B, -1) {
     for (size_t b = 0; b < s.B; ++b)
       if (!s.fixed[b]) {
         place_[b] = static_cast<int>(free_.size());
         free_.push_back(static_cast<int>(b));
       }
   }
-  int unknowns() const { return 6 * static_cast<int>(free_.size()); }
+  int count() const { return unknowns_.each * static_cast<int>(free_.size()); }
+  const Unknowns& unknowns() const { return unknowns_; }
   const std::vector<int>& free_bodies() const { return free_; }
   int place(int body) const { return body < 0 ? -1 : place_[static_cast<size_t>(body)]; }
 
@@ -130,16 +143,17 @@ class Assembly {
       element_rows(e, rows);
       double stiffness[6];
       for (int k = 0; k < 6; ++k) stiffness[k] = factor * s_.state.element[i].share * e.zone.stiffness[k];
-      add_outers(rows, stiffness, t);
+      add_outers(rows, stiffness, unknowns_, t);
     }
     for (const CompiledRotational& r : s_.rotationals)
       add_outer(rotational_row(s_.joints[static_cast<size_t>(r.joint)]),
-                (fast ? 1 + r.zone.viscous : 1) * r.zone.stiffness[5], t);
+                (fast ? 1 + r.zone.viscous : 1) * r.zone.stiffness[5], unknowns_, t);
     for (size_t i = 0; i < s_.model.cables.size(); ++i)
-      if (s_.state.cable[i].live) add_outer(cable_row(s_.model.cables[i]), s_.model.cables[i].stiffness, t);
+      if (s_.state.cable[i].live) add_outer(cable_row(s_.model.cables[i]), s_.model.cables[i].stiffness, unknowns_, t);
     for (const StiffRow& r : s_.calc_spring_stiffness(fast, force_scale))
-      add_outer({place(r.a), place(r.b), -r.row.line, -r.row.turn_a, r.row.line, r.row.turn_b}, r.stiffness, t);
-    Sparse m(unknowns(), unknowns());
+      add_outer({place(r.a), place(r.b), -r.row.line, -r.row.turn_a, r.row.line, r.row.turn_b}, r.stiffness, unknowns_,
+                t);
+    Sparse m(count(), count());
     m.setFromTriplets(t.begin(), t.end());
     return m;
   }
@@ -152,6 +166,7 @@ class Assembly {
     return s_.state.p[b] + s_.state.R[b] * (p - s_.state.p_offset[b]);
   }
   const System& s_;
+  Unknowns unknowns_;
   std::vector<int> place_, free_;
 };
 
@@ -198,8 +213,9 @@ double find_largest_eigenvalue(const Sparse& K, Accelerate&& accelerate, Weigh&&
 
 double System::find_highest_frequency() const {
   const Assembly assembly(*this);
-  const int n = assembly.unknowns();
+  const int n = assembly.count();
   if (n == 0) return 0;
+  const Unknowns& u = assembly.unknowns();
   std::vector<Mat3> inertia(assembly.free_bodies().size()), inverse_inertia(inertia.size());
   for (size_t i = 0; i < inertia.size(); ++i) {
     const size_t b = static_cast<size_t>(assembly.free_bodies()[i]);
@@ -212,10 +228,13 @@ double System::find_highest_frequency() const {
     for (size_t i = 0; i < inertia.size(); ++i) {
       const BodyConstants& body = state.body[static_cast<size_t>(assembly.free_bodies()[i])];
       const double m = inverse ? body.inverse_mass : body.mass;
-      const Eigen::Index at = static_cast<Eigen::Index>(6 * i);
-      for (int k = 0; k < 3; ++k) y[at + k] = m * x[at + k];
-      const Vec3 w = (inverse ? inverse_inertia[i] : inertia[i]) * Vec3{x[at + 3], x[at + 4], x[at + 5]};
-      for (int k = 0; k < 3; ++k) y[at + 3 + k] = w[k];
+      double in[6] = {};
+      for (int k = 0; k < u.each; ++k) in[u.coordinate(k)] = x[u.at(static_cast<int>(i), k)];
+      const Vec3 w = (inverse ? inverse_inertia[i] : inertia[i]) * Vec3{in[3], in[4], in[5]};
+      for (int k = 0; k < u.each; ++k) {
+        const int c = u.coordinate(k);
+        y[u.at(static_cast<int>(i), k)] = c < 3 ? m * in[c] : w[c - 3];
+      }
     }
     return y;
   };
@@ -283,8 +302,9 @@ void System::choose_step() {
 
 bool System::find_equilibrium(std::string& message) {
   const Assembly assembly(*this);
-  const int n = assembly.unknowns();
+  const int n = assembly.count();
   if (n == 0) return true;
+  const Unknowns& u = assembly.unknowns();
   const auto saved_report = std::exchange(options.on_happening, nullptr);
   const auto finish = [&](bool good) {
     options.on_happening = saved_report;
@@ -336,7 +356,7 @@ bool System::find_equilibrium(std::string& message) {
       KinematicRow rows[6];
       double gap[6];
       const int count = assembly.joint_rows(j, rows, gap);
-      for (int i = 0; i < count; ++i) add_outer(rows[i], penalty, t);
+      for (int i = 0; i < count; ++i) add_outer(rows[i], penalty, u, t);
     }
     Sparse P(n, n);
     P.setFromTriplets(t.begin(), t.end());
@@ -354,7 +374,7 @@ bool System::find_equilibrium(std::string& message) {
     if (least > 1e-13 * D.maxCoeff()) return true;
     const Eigen::Index unknown = solver.permutationPinv().indices()[worst];
     message = "body \"" +
-              model.bodies[static_cast<size_t>(assembly.free_bodies()[static_cast<size_t>(unknown / 6)])].name +
+              model.bodies[static_cast<size_t>(assembly.free_bodies()[static_cast<size_t>(unknown / u.each)])].name +
               "\" can move without resistance: the model is a mechanism and has no dead-load equilibrium";
     return false;
   };
@@ -376,7 +396,8 @@ bool System::find_equilibrium(std::string& message) {
   constexpr int fresh = 12;       // most iterations with a stiffness of their own; then the last one serves
   constexpr double quick = 0.03;  // of the unbalanced force is left after an iteration with a stiffness that still fits
   int factorised = 0;
-  double last_unbalanced = 0;
+  double last_unbalanced = 0, last_finite = 0;
+  bool has_diverged = false;
   for (int round = 0; round <= most; ++round) {
     state.element = virgin;
     state.rotational = virgin_rotational;
@@ -391,9 +412,9 @@ bool System::find_equilibrium(std::string& message) {
     for (size_t i = 0; i < assembly.free_bodies().size(); ++i) {
       const size_t b = static_cast<size_t>(assembly.free_bodies()[i]);
       const Vec3 f = force[b] + state.body[b].mass * model.gravity, t = torque[b];
-      for (int k = 0; k < 3; ++k) {
-        r[static_cast<Eigen::Index>(6 * i) + k] = f[k];
-        r[static_cast<Eigen::Index>(6 * i) + 3 + k] = t[k];
+      for (int k = 0; k < u.each; ++k) {
+        const int c = u.coordinate(k);
+        r[u.at(static_cast<int>(i), k)] = c < 3 ? f[c] : t[c - 3];
       }
     }
     Vector penalised = r;
@@ -409,9 +430,10 @@ bool System::find_equilibrium(std::string& message) {
         const double held = multiplier[j][static_cast<size_t>(i)], wanted = held - penalty * gap[i];
         gap_left = std::max(gap_left, std::abs(gap[i]));
         const auto load = [&](Vector& on, double f) {
-          for (int k = 0; k < 3; ++k) {
-            if (row.a >= 0) on[6 * row.a + k] += f * row.va[k], on[6 * row.a + 3 + k] += f * row.wa[k];
-            if (row.b >= 0) on[6 * row.b + k] += f * row.vb[k], on[6 * row.b + 3 + k] += f * row.wb[k];
+          for (int k = 0; k < u.each; ++k) {
+            const int c = u.coordinate(k);
+            if (row.a >= 0) on[u.at(row.a, k)] += f * (c < 3 ? row.va[c] : row.wa[c - 3]);
+            if (row.b >= 0) on[u.at(row.b, k)] += f * (c < 3 ? row.vb[c] : row.wb[c - 3]);
           }
         };
         load(r, wanted);
@@ -424,11 +446,16 @@ bool System::find_equilibrium(std::string& message) {
     unbalanced = r.lpNorm<Eigen::Infinity>() / weight;
     summary.equilibrium_iterations = round;
     summary.equilibrium_residual = unbalanced;
-    if (!std::isfinite(unbalanced)) break;
+    if (!std::isfinite(unbalanced)) {
+      summary.equilibrium_residual = unbalanced = last_finite;
+      has_diverged = true;
+      break;
+    }
+    last_finite = unbalanced;
     if (ignores_limits && ((unbalanced < 1e-6 && gap_left < 1e-6) || round == most / 2)) {
       for (size_t i = 0; i < elements.size(); ++i)
-        if (const double u = calc_utilisation(elements[i].zone, laws, 0, state.element[i]); u > most_load)
-          most_load = u, most_loaded = i;
+        if (const double used = calc_utilisation(elements[i].zone, laws, 0, state.element[i]); used > most_load)
+          most_load = used, most_loaded = i;
       ignores_limits = false;
       continue;
     }
@@ -446,17 +473,21 @@ bool System::find_equilibrium(std::string& message) {
     const Vector d = solver.solve(penalised);
     for (size_t i = 0; i < assembly.free_bodies().size(); ++i) {
       const size_t b = static_cast<size_t>(assembly.free_bodies()[i]);
-      const Eigen::Index at = static_cast<Eigen::Index>(6 * i);
-      state.p[b] += Vec3{d[at], d[at + 1], d[at + 2]};
-      state.q[b] = normalized(exp_rotation({d[at + 3], d[at + 4], d[at + 5]}) * state.q[b]);
+      Vec3 moved, turned;
+      for (int k = 0; k < u.each; ++k) {
+        const int c = u.coordinate(k);
+        (c < 3 ? moved[c] : turned[c - 3]) = d[u.at(static_cast<int>(i), k)];
+      }
+      state.p[b] += moved;
+      state.q[b] = normalized(exp_rotation(turned) * state.q[b]);
       state.R[b] = to_matrix(state.q[b]);
     }
   }
-  if (!(unbalanced < good_enough)) {
+  if (has_diverged || !(unbalanced < good_enough)) {
     char numbers[200];
     std::snprintf(numbers, sizeof numbers,
-                  "no dead-load equilibrium after %d iterations: the largest unbalanced force is %.2g of the weight",
-                  summary.equilibrium_iterations, unbalanced);
+                  "no dead-load equilibrium after %d iterations: the largest unbalanced force %s %.2g of the weight",
+                  summary.equilibrium_iterations, has_diverged ? "grew without bound and was last" : "is", unbalanced);
     message = numbers;
     if (most_load > 0) {
       std::snprintf(numbers, sizeof numbers,

@@ -301,6 +301,8 @@ struct Model {
   /// Where the damping of elements peaks; it falls with the distance from it in both directions (standard linear
   /// solid), so it costs the step nothing and resists no rigid motion [rad/s].
   double damping_frequency = 62.8;
+  /// Bodies keep to planes y = const of W and turn about y alone: a slice of something that is alike along y.
+  bool is_planar = false;
   std::vector<Body> bodies;
   std::vector<Joint> joints;
   std::vector<ZoneElement> elements;

@@ -721,6 +721,7 @@ Model Reader::read_model(RunSettings* run) {
   attempt([&] { read(root_, "name", m.name); });
   attempt([&] { read(root_, "gravity", m.gravity); });
   attempt([&] { read(root_, "damping_frequency", m.damping_frequency); });
+  attempt([&] { read(root_, "is_planar", m.is_planar); });
   if (root_.has("run"))
     attempt([&] {
       const RunSettings settings = run_from(root_["run"]);

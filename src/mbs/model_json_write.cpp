@@ -307,6 +307,7 @@ std::string to_json(const Model& m, const RunSettings& run) {
   if (!settings.empty()) j["run"] = std::move(settings);
   j["gravity"] = json_of(m.gravity);
   j["damping_frequency"] = m.damping_frequency;
+  if (m.is_planar) j["is_planar"] = true;
   j["bodies"] = list_of(m.bodies);
   j["joints"] = list_of(m.joints);
   j["elements"] = list_of(m.elements);

@@ -7,7 +7,7 @@ namespace topple::mbs {
 const std::vector<KeyList>& model_json_keys() {
   static const std::vector<KeyList> lists = {
       {"model",
-       {"format", "version", "name", "run", "gravity", "damping_frequency", "bodies", "joints", "elements",
+       {"format", "version", "name", "run", "gravity", "damping_frequency", "is_planar", "bodies", "joints", "elements",
         "rotational_elements", "laws", "cables", "springs", "rotational_springs", "bushings", "loads", "contact",
         "events", "outputs"}},
       {"run", {"duration", "step", "frame_interval", "equilibrium", "rest_speed"}},

@@ -100,7 +100,13 @@ struct Options {
   /// this and no centre of mass is faster than 25 times this; 0: never [m/s].
   double rest_speed = 0;
   double rest_time = 0.5;  // [s]
-  int threads = 1;         // used from 2,048 zone elements on; results do not depend on it
+  /// The run goes on at once to the last step before the next event, without the time between, when in all frames of
+  /// the last pass_time the speed that stands for the kinetic energy per mass was below this and zones have dissipated
+  /// less than pass_share of the released energy; 0: never. Not where loads follow the time [m/s].
+  double pass_speed = 0;
+  double pass_time = 0.25;   // [s]
+  double pass_share = 1e-4;  // [-]
+  int threads = 1;           // used from 2,048 zone elements on; results do not depend on it
   std::function<void(const View&)> on_frame;
   std::function<void(const Happening&)> on_happening;
   std::vector<Sampling> samplings;

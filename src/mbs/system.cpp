@@ -12,13 +12,19 @@ namespace {
 
 Mat3 world_tensor(const Mat3& R, const Mat3& in_body) { return R * in_body * transpose(R); }
 
-BodyConstants constants_of(const Body& body) {
+/// In a plane a body is so hard to turn out of it that it stays, yet no row of a joint is without mass.
+constexpr double kOutOfPlane = 1e6;
+
+BodyConstants constants_of(const Body& body, bool is_planar) {
   BodyConstants c;
   c.mass = body.mass;
   c.inertia = body.inertia;
+  if (is_planar)
+    c.inertia =
+        Mat3::diagonal({kOutOfPlane * body.inertia(0, 0), body.inertia(1, 1), kOutOfPlane * body.inertia(2, 2)});
   if (!body.fixed) {
     c.inverse_mass = 1 / body.mass;
-    c.inverse_inertia = inverse(body.inertia);
+    c.inverse_inertia = inverse(c.inertia);
   }
   return c;
 }
@@ -67,7 +73,7 @@ void System::compile() {
   compile_hulls();
   for (size_t b = 0; b < B; ++b) {
     const Body& body = model.bodies[b];
-    s.body[b] = constants_of(body);
+    s.body[b] = constants_of(body, model.is_planar);
     append_shapes(body, s.body[b]);
     fixed[b] = body.fixed;
     s.p[b] = body.X_WB.p;
@@ -76,7 +82,7 @@ void System::compile() {
     if (!body.fixed) {
       s.v[b] = body.v_WB;
       s.w[b] = body.w_WB;
-      s.L[b] = world_tensor(s.R[b], body.inertia) * body.w_WB;
+      s.L[b] = world_tensor(s.R[b], s.body[b].inertia) * body.w_WB;
     }
   }
   layout_shapes();
@@ -450,8 +456,8 @@ void System::replace_body(size_t b, const Body& replacement) {
   s.p[b] += s.R[b] * moved;
   s.p_offset[b] += moved;
   clusters_due = true;  // levers and masses have changed
-  s.body[b] = constants_of(replacement);
-  s.L[b] = world_tensor(s.R[b], replacement.inertia) * s.w[b];
+  s.body[b] = constants_of(replacement, model.is_planar);
+  s.L[b] = world_tensor(s.R[b], s.body[b].inertia) * s.w[b];
   pack_body(b);
   for (const int entry : incidence[b]) {
     unpack_element(static_cast<size_t>(entry / 2));
@@ -486,6 +492,11 @@ void System::finish_forces(double h) {
   evaluate_loads(false);
   if (model.contact.ground || model.contact.bodies) evaluate_contact(h);
   evaluate_dampers();
+  if (model.is_planar)
+    for (size_t b = 0; b < B; ++b) {
+      const Vec3 f = force[b];
+      force[b] = Vec3{f.x, 0, f.z};
+    }
 }
 
 void System::drift(size_t b, double h, const Vec3& p0, const Quat& q0, const Mat3& R0) {

@@ -1,0 +1,88 @@
+// The course of a run: time in which nothing happens.
+
+#include "mbs/course.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "models.h"
+
+namespace topple::mbs {
+namespace {
+
+using test::make_box;
+
+Options look(double duration, std::vector<View>& views, bool equilibrium = false) {
+  Options o;
+  o.duration = duration;
+  o.equilibrium = equilibrium;
+  o.on_frame = [&views](const View& v) { views.push_back(v); };
+  return o;
+}
+
+/// A box that hangs on an elastic element until an event lets it fall at 3 s.
+Model make_hanging() {
+  Model m;
+  m.contact.ground = m.contact.bodies = false;
+  const BodyId b = add_body(m, make_box("b", 1000, {0.5, 0.5, 0.5}, {0, 0, 10}));
+  ZoneElement e;
+  e.name = "hanger";
+  e.a = kGround, e.b = b;
+  e.X_AF.p = {0, 0, 10};
+  e.translational_stiffness = {1e7, 1e7, 1e7};
+  e.rotational_stiffness = {1e6, 1e6, 1e6};
+  const ElementId hanger = add_element(m, e);
+  Event cut;
+  cut.time = 3;
+  cut.name = "cut";
+  Action a;
+  a.kind = Action::Kind::RemoveElement;
+  a.element = hanger;
+  cut.actions.push_back(a);
+  m.events.push_back(cut);
+  return m;
+}
+
+TEST(PassQuietPhysics, GoesOnAtTheEventAsIfItHadWaited) {
+  Model m = make_hanging();
+  std::vector<View> waited, passed;
+  Options o = look(3.5, waited, true);
+  const Summary slow = run(m, o);
+  o = look(3.5, passed, true);
+  o.pass_speed = 1e-6;
+  const Summary fast = run(m, o);
+  EXPECT_GT(static_cast<double>(slow.steps - fast.steps) * slow.step, 2.6) << "of 3 s it looks at 0.25 s, by frames";
+  EXPECT_NEAR(fast.time, slow.time, 1e-9);
+  // at rest nothing changes while time passes; the whole steps left out sum up to round-off
+  EXPECT_NEAR(passed.back().X_WB[0].p.z, waited.back().X_WB[0].p.z, 1e-9);
+  EXPECT_NEAR(passed.back().X_WB[0].p.z, 10 - 0.5 * 9.81 * 0.25, 0.05) << "it has fallen for half a second";
+}
+
+TEST(PassQuiet, WaitsWhereSomethingMoves) {
+  Model m = make_hanging();
+  m.bodies[0].v_WB = {0, 0, 0.5};
+  m.elements[0].damping_ratio = 0;
+  std::vector<View> all, passed;
+  Options o = look(3.5, all);
+  const long steps = run(m, o).steps;
+  o = look(3.5, passed);
+  o.pass_speed = 0.05;  // below it for a thirtieth of each swing of 0.03 s, never for 0.25 s on end
+  EXPECT_EQ(run(m, o).steps, steps);
+}
+
+TEST(PassQuiet, WaitsForLoadsThatFollowTheTime) {
+  Model m = make_hanging();
+  Load l;
+  l.name = "weight", l.body = BodyId{0};
+  l.force = {0, 0, -1};
+  m.loads.push_back(l);
+  std::vector<View> views;
+  Options o = look(3.5, views, true);
+  const long steps = run(m, o).steps;
+  o.pass_speed = 1;
+  EXPECT_EQ(run(m, o).steps, steps);
+}
+
+}  // namespace
+}  // namespace topple::mbs

@@ -1,0 +1,95 @@
+// Models whose bodies keep to planes y = const.
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "mbs/model_json.h"
+#include "models.h"
+
+namespace topple::mbs {
+namespace {
+
+using test::make_box;
+
+Options look(double duration, std::vector<View>& views, bool equilibrium = false) {
+  Options o;
+  o.duration = duration;
+  o.equilibrium = equilibrium;
+  o.on_frame = [&views](const View& v) { views.push_back(v); };
+  return o;
+}
+
+TEST(PlanarPhysics, NothingLeavesItsPlane) {
+  Model m;
+  m.is_planar = true;
+  m.contact.ground = m.contact.bodies = false;
+  const BodyId b = add_body(m, make_box("b", 1000, {1, 0.5, 0.2}, {0, 3, 0}));
+  Load l;
+  l.name = "across", l.body = b;
+  l.p_B = {1, 0.5, 0.2};
+  l.force = {500, 2000, 100};
+  m.loads.push_back(l);
+  std::vector<View> views;
+  const Summary s = run(m, look(1, views));
+  ASSERT_EQ(s.ending, Summary::Ending::TimeLimit);
+  const View& v = views.back();
+  EXPECT_EQ(v.X_WB[0].p.y, 3);
+  EXPECT_EQ(v.v_WB[0].y, 0);
+  // 2000 N at 0.2 m, 500 N at 0.5 m and the like against a millionfold inertia: below 1e-5 rad/s; in space it is 5
+  EXPECT_LT(std::abs(v.w_WB[0].x), 1e-5);
+  EXPECT_LT(std::abs(v.w_WB[0].z), 1e-5);
+  // in its plane it moves as ever: half a t² of the force over the mass
+  EXPECT_NEAR(v.X_WB[0].p.x, 0.25, 1e-3) << "the kick and drift of the step";
+}
+
+TEST(PlanarPhysics, PendulumSwingsAsInSpace) {
+  Model m;
+  m.contact.ground = m.contact.bodies = false;
+  const BodyId b = add_body(m, make_box("rod", 10, {0.5, 0.05, 0.05}, {0.5, 0, 0}));
+  Joint j;
+  j.kind = Joint::Kind::Revolute;
+  j.name = "pin";
+  j.parent = kGround, j.child = b;
+  j.X_PF.q = j.X_CM.q = test::upright();  // z along W's y
+  j.X_CM.p = {-0.5, 0, 0};
+  add_joint(m, j);
+  std::vector<View> in_space, in_plane;
+  Options o = look(2, in_space);
+  o.step = 1e-3;
+  (void)run(m, o);
+  m.is_planar = true;
+  o = look(2, in_plane);
+  o.step = 1e-3;
+  const Summary s = run(m, o);
+  ASSERT_EQ(in_space.size(), in_plane.size());
+  // the same equations; only what round-off makes of them differs
+  for (size_t i = 0; i < in_space.size(); ++i)
+    EXPECT_LT(norm(in_space[i].X_WB[0].p - in_plane[i].X_WB[0].p), 1e-9) << in_space[i].time;
+  EXPECT_LT(s.joint_drift, 1e-8);
+}
+
+TEST(PlanarPhysics, EquilibriumIsThatOfThePlane) {
+  // a beam that bends downwards alone: in space and in the plane it is the same
+  test::Cantilever c = test::make_cantilever(8, 4, 0.3, 0.3, 30e9, 2500);
+  c.model.gravity = {0, 0, -9.81};
+  std::vector<View> in_space, in_plane;
+  ASSERT_EQ(run(c.model, look(1e-4, in_space, true)).ending, Summary::Ending::TimeLimit);
+  c.model.is_planar = true;
+  const Summary s = run(c.model, look(1e-4, in_plane, true));
+  ASSERT_EQ(s.ending, Summary::Ending::TimeLimit) << s.message;
+  const size_t tip = static_cast<size_t>(c.tip.index);
+  EXPECT_LT(in_space.front().X_WB[tip].p.z, -1e-3) << "it does bend";
+  EXPECT_NEAR(in_plane.front().X_WB[tip].p.z, in_space.front().X_WB[tip].p.z, 1e-9);
+}
+
+TEST(Planar, GoesThroughItsFile) {
+  Model m;
+  add_body(m, make_box("b", 1, {1, 1, 1}, {0, 0, 0}));
+  EXPECT_EQ(to_json(m, {}).find("is_planar"), std::string::npos) << "files of others stay as they were";
+  m.is_planar = true;
+  EXPECT_TRUE(model_from_json(to_json(m, {}), "model", nullptr).is_planar);
+}
+
+}  // namespace
+}  // namespace topple::mbs
