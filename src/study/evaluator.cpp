@@ -47,19 +47,43 @@ struct Reader {
     return a;
   }
 
+  /// The word that stands for a number that is none, where JSON breaks off.
+  std::string find_no_number(std::size_t at) const {
+    // the parser may stop within the word or behind its sign
+    const auto is_letter = [this](std::size_t i) { return std::isalpha(static_cast<unsigned char>(line[i])) != 0; };
+    std::size_t begin = std::min(at, line.size()), end = begin;
+    while (begin > 0 && is_letter(begin - 1)) --begin;
+    while (end < line.size() && is_letter(end)) ++end;
+    std::string word = line.substr(begin, end - begin), small = word;
+    for (char& c : small) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    for (const char* known : {"nan", "inf", "infinity"})
+      if (small == known) return word;
+    return {};
+  }
+
   Answer read(int& id) const {
     json j;
     try {
       j = json::parse(line);
     } catch (const json::parse_error& e) {
-      return refuse(e.byte > 0 ? e.byte - 1 : 0, "this is not JSON",
+      const std::size_t at = e.byte > 0 ? e.byte - 1 : 0;
+      if (const std::string word = find_no_number(at); !word.empty())
+        return refuse(at, word + " is no number in JSON",
+                      "give null where there is no value: the run counts as failed");
+      return refuse(at, "this is not JSON",
                     "each line of its output must be one JSON object; other words belong on standard error");
+    } catch (const json::out_of_range& e) {
+      return refuse(0, "a number is too large for 64 bits",
+                    "give null where there is no value: the run counts as failed");
     }
     const char* form = "an answer looks like {\"outputs\": {\"z\": 1.5}, \"outcome\": \"stands\"}";
     if (!j.is_object()) return refuse(0, "a JSON object is wanted", form);
     if (j.contains("id")) {
-      if (!j["id"].is_number_integer()) return refuse(find_member(line, "id"), "id: the number of the point is wanted");
-      id = j["id"].get<int>();
+      const json& number = j["id"];
+      // beyond int it would come to be another point's
+      if (!number.is_number_integer() || number.get<double>() < 0 || number.get<double>() > 1e9)
+        return refuse(find_member(line, "id"), "id: the number of the point is wanted");
+      id = number.get<int>();
     }
     Answer a;
     a.kind = Answer::Kind::Done;
@@ -121,9 +145,24 @@ class Evaluator {
            const std::atomic<bool>& cancel) {
     std::vector<bool> is_answered(points.size(), false);
     bool is_fresh = prepare();
+    // numbers go on while a process lives, so that no answer counts for a later point
     std::string request;
-    for (std::size_t i = 0; i < points.size(); ++i) request += write_request(static_cast<int>(i), names_, points[i]);
-    process_.send(request, is_one_shot_);
+    const auto send = [&] {
+      if (is_fresh || first_ > most_points) first_ = 0;
+      request.clear();
+      for (std::size_t i = 0; i < points.size(); ++i)
+        request += write_request(first_ + static_cast<int>(i), names_, points[i]);
+      process_.send(request, is_one_shot_);
+    };
+    if (!is_fresh)
+      if (std::string line; find_surplus(line)) {
+        const Reader reader{line, command_};
+        process_.end();
+        if (!points.empty())
+          give(0, reader.refuse(0, "this is an answer to no question", "answer each point once, in one line"));
+        return;
+      }
+    send();
     std::size_t open = points.size(), next = 0;
     auto last = Clock::now();
     const auto give_open = [&](Answer::Kind kind, const std::string& text) {
@@ -155,20 +194,30 @@ class Evaluator {
         if (!is_fresh && open == points.size()) {
           // it ended after its last answer: programs may answer one point each
           is_fresh = prepare();
-          process_.send(request, is_one_shot_);
+          send();
           continue;
         }
         give_open(Answer::Kind::Crashed,
                   "the evaluator ended without an answer" + (ending.empty() ? "" : ": " + ending));
         return;
       }
+      if (event == Process::Event::TooLong) {
+        const Reader reader{line, command_};
+        while (next < points.size() && is_answered[next]) ++next;
+        process_.end();
+        give(next, reader.refuse(0, fmt::format("a line without an end, {} MB so far", Process::longest_line >> 20),
+                                 "each answer is one line; the end of the line is missing"));
+        return;
+      }
       if (line.find_first_not_of(" \t") == std::string::npos) continue;
       while (next < points.size() && is_answered[next]) ++next;
-      int id = static_cast<int>(next);
+      int id = first_ + static_cast<int>(next);
       Answer a = read_answer_line(line, command_, id);
+      const int given = id;
+      id -= first_;
       if (id < 0 || id >= static_cast<int>(points.size()) || is_answered[static_cast<std::size_t>(id)]) {
         const Reader reader{line, command_};
-        a = reader.refuse(find_member(line, "id"), fmt::format("id: there is no open point {}", id),
+        a = reader.refuse(find_member(line, "id"), fmt::format("id: there is no open point {}", given),
                           "give back the id of the point");
         id = static_cast<int>(next);
       }
@@ -184,6 +233,7 @@ class Evaluator {
         return;
       }
     }
+    first_ += static_cast<int>(points.size());
     if (is_one_shot_) process_.end();
   }
 
@@ -195,7 +245,17 @@ class Evaluator {
     return true;
   }
 
+  /// A line that it has written although nothing was open.
+  bool find_surplus(std::string& line) {
+    process_.look();
+    while (process_.take_line(line))
+      if (line.find_first_not_of(" \t") != std::string::npos) return true;
+    return false;
+  }
+
+  static constexpr int most_points = 1'000'000'000 / 2;
   std::vector<std::string> names_;
+  int first_ = 0;  // number of the first point of a call
   std::string command_;
   double timeout_ = 0;
   bool is_one_shot_ = false;

@@ -67,6 +67,7 @@ void Process::start(const std::string& command) {
   close(in[0]), close(out[1]), close(error[1]);
   for (const int fd : {in_, out_, error_}) fcntl(fd, F_SETFL, O_NONBLOCK);
   to_write_.clear(), read_.clear(), said_.clear();
+  searched_ = 0;
   close_after_ = false;
 }
 
@@ -85,31 +86,44 @@ void Process::send(const std::string& text, bool close) {
 }
 
 bool Process::take_line(std::string& line) {
-  const std::size_t end = read_.find('\n');
+  const std::size_t end = read_.find('\n', searched_);
+  searched_ = read_.size();
   if (end == std::string::npos) return false;
   line = read_.substr(0, end);
   read_.erase(0, end + 1);
+  searched_ = 0;
   if (!line.empty() && line.back() == '\r') line.pop_back();
   return true;
+}
+
+void Process::look() {
+  char buffer[65536];
+  for (ssize_t n = 0; out_ >= 0 && read_.size() < longest_line && (n = read(out_, buffer, sizeof buffer)) > 0;)
+    read_.append(buffer, static_cast<std::size_t>(n));
 }
 
 Process::Event Process::next_line(std::string& line, double seconds, const std::atomic<bool>& cancel) {
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
-  constexpr int look = 50;  // for a cancellation [ms]
+  constexpr int patience = 50;  // for a cancellation [ms]
   for (;;) {
     if (take_line(line)) return Event::Line;
+    if (read_.size() > longest_line) {
+      line = read_.substr(0, 100);
+      return Event::TooLong;
+    }
     if (out_ < 0) {
       // a last line without its end
       if (read_.empty()) return Event::Closed;
       line = std::exchange(read_, {});
+      searched_ = 0;
       return Event::Line;
     }
     if (cancel.load(std::memory_order_relaxed)) return Event::Cancelled;
     if (seconds > 0 && std::chrono::duration<double>(Clock::now() - start).count() > seconds) return Event::TimeOut;
     if (in_ >= 0 && to_write_.empty() && close_after_) close_end(in_);
     pollfd wanted[3] = {{out_, POLLIN, 0}, {error_, POLLIN, 0}, {to_write_.empty() ? -1 : in_, POLLOUT, 0}};
-    if (poll(wanted, 3, look) <= 0) continue;
+    if (poll(wanted, 3, patience) <= 0) continue;
     char buffer[65536];
     if (wanted[0].revents) {
       const ssize_t n = read(out_, buffer, sizeof buffer);

@@ -147,5 +147,63 @@ TEST(Evaluator, PointsAtWhatItCannotUnderstand) {
   EXPECT_EQ(stranger.ask({{1, 1}})[0].kind, Kind::Refused);
 }
 
+TEST(Evaluator, RefusesWordsThatAreNoNumbers) {
+  for (const char* word : {"NaN", "nan", "-Infinity", "Infinity", "inf", "-inf"}) {
+    int id = 0;
+    const Answer a = read_answer_line(std::string("{\"outputs\": {\"z\": ") + word + "}}", "model", id);
+    ASSERT_EQ(a.kind, Kind::Refused) << word;
+    const Refusal r = read_refusal(a.text);
+    EXPECT_NE(r.diagnostic.message.find("is no number in JSON"), std::string::npos) << r.diagnostic.message;
+    EXPECT_NE(r.diagnostic.help.find("null"), std::string::npos);
+    EXPECT_GE(r.diagnostic.where.column, 19) << word;
+  }
+}
+
+TEST(Evaluator, RefusesNumbersBeyondItsRange) {
+  int id = 0;
+  for (const char* line : {R"({"z": 1e999})", R"({"id": 1e999, "z": 1})", R"({"id": 18446744073709551615, "z": 1})",
+                           R"({"id": 4294967296, "z": 1})", R"({"id": -1, "z": 1})"})
+    EXPECT_EQ(read_answer_line(line, "model", id).kind, Kind::Refused) << line;
+  EXPECT_EQ(id, 0);
+  EXPECT_EQ(read_answer_line(R"({"z": 1.7976931348623157e308})", "model", id).outputs[0].second,
+            1.7976931348623157e308);
+}
+
+TEST(Evaluator, NeverTakesADoubledAnswerForAnotherPoint) {
+  Model m(shell(R"(echo "{\"id\":$id,\"z\":$x}"; echo "{\"id\":$id,\"z\":$x}")"));
+  ASSERT_EQ(m.ask({{1, 0}})[0].kind, Kind::Done);
+  // the second line is there before the next point is asked for, or comes behind it
+  const Answer a = m.ask({{2, 0}})[0];
+  ASSERT_EQ(a.kind, Kind::Refused) << "not " << a.outputs[0].second;
+  Model twice(shell(R"(echo "{\"id\":$id,\"z\":$x}"; echo "{\"id\":$id,\"z\":$x}")"));
+  const std::vector<Answer> both = twice.ask({{1, 0}, {2, 0}});
+  EXPECT_EQ(both[0].kind, Kind::Done);
+  EXPECT_EQ(both[1].kind, Kind::Refused);
+}
+
+TEST(Evaluator, RefusesALineWithoutAnEnd) {
+  Model m("read line; yes | tr -d '\\n'");
+  const Answer a = m.ask({{1, 1}})[0];
+  ASSERT_EQ(a.kind, Kind::Refused);
+  const Refusal r = read_refusal(a.text);
+  EXPECT_NE(r.diagnostic.message.find("without an end"), std::string::npos) << r.diagnostic.message;
+  EXPECT_EQ(r.line, std::string(100, 'y'));
+}
+
+TEST(Evaluator, TellsWhenItClosedItsOutputAndWentOn) {
+  Model m("read line; exec >&-; sleep 100");
+  const Answer a = m.ask({{1, 1}})[0];
+  EXPECT_EQ(a.kind, Kind::Crashed);
+  EXPECT_NE(a.text.find("closed its output and went on"), std::string::npos) << a.text;
+}
+
+TEST(Evaluator, WritesToAProgramThatDoesNotRead) {
+  Model m("exec <&-; sleep 100", 0.5);
+  // more than a pipe holds
+  const std::vector<Answer> answers = m.ask(std::vector<Point>(5000, Point{1, 1}));
+  EXPECT_EQ(answers.front().kind, Kind::Crashed) << "several points: nobody knows which one hangs";
+  EXPECT_EQ(answers.back().kind, Kind::Crashed);
+}
+
 }  // namespace
 }  // namespace topple::study
