@@ -76,7 +76,11 @@ Box make_box(const Space& space, double alpha) {
 }
 
 bool is_in_cut(const Space& space, const Box& box, double alpha, const Point& x) {
-  return box.contains(x) && is_allowed(space, x) && (!space.joint || space.joint(x) >= alpha);
+  if (!box.contains(x) || !is_allowed(space, x)) return false;
+  if (!space.joint) return true;
+  // the cut at 0 is the support: nothing that is impossible
+  const double mu = space.joint(x);
+  return mu > 0 && mu >= alpha;
 }
 
 std::vector<Point> make_sobol_points(int n, int first, int count, std::uint64_t seed) {

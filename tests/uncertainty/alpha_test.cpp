@@ -84,6 +84,19 @@ TEST(Interaction, JointMembershipCutsTheInputs) {
     EXPECT_NEAR(level.upper.value, std::sqrt(2.0) * (1 - level.alpha), 1e-4 * 2 * std::sqrt(2.0)) << level.alpha;
 }
 
+TEST(Interaction, WhatIsImpossibleIsNotInTheSupport) {
+  // the same cone, cut off at 0 as memberships are: the support is the disc and not the square
+  const FuzzyNumber f = make_triangular(-1, 0, 1);
+  const Space cone{{f, f}, {}, [](const Point& x) { return std::max(0.0, 1 - std::hypot(x[0], x[1])); }};
+  EXPECT_FALSE(is_in_cut(cone, make_box(cone, 0), 0, {0.9, 0.9}));
+  EXPECT_TRUE(is_in_cut(cone, make_box(cone, 0), 0, {0.7, 0.7}));
+  const auto sum = make_evaluate_values([](const Point& x) { return std::vector{x[0] + x[1]}; });
+  const AlphaResult r = optimise(cone, sum, {}, {});
+  EXPECT_NEAR(r.outputs[0].levels[0].upper.value, std::sqrt(2.0), 1e-4 * 2 * std::sqrt(2.0));
+  EXPECT_NEAR(r.outputs[0].levels[0].lower.value, -std::sqrt(2.0), 1e-4 * 2 * std::sqrt(2.0));
+  for (const auto& s : r.archive.samples()) EXPECT_LT(std::hypot(s.x[0], s.x[1]), 1);
+}
+
 TEST(Interaction, RefusesACentreThatIsImpossible) {
   const FuzzyNumber f = make_triangular(-1, 0, 1);
   const auto model = make_evaluate_values([](const Point& x) { return x; });
