@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "collapse/assembly.h"
+#include "collapse/condense.h"
 #include "collapse/law.h"
 #include "collapse/manager.h"
 
@@ -41,9 +42,12 @@ struct Builder {
   const Knowledge& k;
   ModelMap& map;
   int threads;
+  const Condensation* condensation = nullptr;  // connects what stands for all; null: everything
+  const KnownCurves* known = nullptr;
+  KnownCurves* made = nullptr;  // takes the curves and laws that were made
 
-  Builder(const product::Plan& p, const Knowledge& knowledge, ModelMap& m, int t)
-      : plan(p), k(knowledge), map(m), threads(t) {}
+  Builder(const product::Plan& p, const Knowledge& knowledge, ModelMap& m, int t, const KnownCurves* curves = nullptr)
+      : plan(p), k(knowledge), map(m), threads(t), known(curves), library(curves) {}
   mbs::Model build();
 
   mbs::Model model;
@@ -59,7 +63,7 @@ struct Builder {
   std::map<int, double> lowest_charge;   // charged column -> centre of its lowest charge [m]
   std::map<GridPoint, double> core_low;  // underside of the joint in W [m]
   std::map<int, MemberZones> zones;      // columns and beams
-  std::map<std::tuple<int, double, double>, mbs::LawId> laws;
+  std::map<std::tuple<int, double, double, Bending>, mbs::LawId> laws;
   bool hinge_about_y = true;
 
   // bodies
@@ -87,18 +91,28 @@ struct Builder {
   void connect_y_beam(const GridPoint&, int member);
   void connect_slab(const GridPoint&, int member);
   void connect_wall(const GridPoint&, int member, bool along_x);
+  void join_wall(int member, const nearfield::PanelRcc&, const Vec3& base, double low, double high, double width,
+                 int floor);
   void connect_cables();
+  /// Whether a frame's members are connected; whether those to the next frame are.
+  bool has_frame(int frame) const;
+  bool has_link(int frame) const;
   struct Stiffness {
     double EA = 0, GA = 0, GJ = 0, EI_y = 0, EI_z = 0;
   };
   Stiffness calc_stiffness(const MemberZones&) const;
-  mbs::LawId law_of(int zone, const Stiffness&, const std::string& member);
+  mbs::ZoneLaw make_law(int zone, const Stiffness&, const std::string& name, Bending);
+  mbs::LawId law_of(int zone, const Stiffness&, const std::string& member, Bending = Bending::Both);
+  /// A condensed model stays in its plane, so that members of a frame bend about one axis alone.
+  Bending bending_of_column() const { return condensation ? Bending::Z : Bending::Both; }
+  Bending bending_of_x_beam() const { return condensation ? Bending::Y : Bending::Both; }
   /// Law of a rotational element: bending about the hinge axis is that about z of its frame.
   mbs::LawId hinge_law_of(int zone, const Stiffness&, const std::string& name);
   Pose frame_in(int body, const Vec3& p_W, const Mat3& R_WF) const;
   mbs::ElementId add_element(const std::string& name, int member, int a, int b, const Vec3& p_W, const Mat3& R_WF,
                              const Vec3& translational, const Vec3& rotational, std::vector<mbs::Station> stations);
-  std::vector<mbs::Station> order_stations(const MemberZones&, const Stiffness&, const std::string& member);
+  std::vector<mbs::Station> order_stations(const MemberZones&, const Stiffness&, const std::string& member,
+                                           Bending = Bending::Both);
 
   // events
   void add_events();
@@ -112,6 +126,8 @@ struct Builder {
   const product::Panel& panel_of(int i) const { return plan.panels[static_cast<size_t>(member(i).panel)]; }
   std::string material_of(const product::Panel& p) const { return p.concrete >= 0 ? "concrete" : "masonry"; }
   double kept_of(int panel_member) const;
+  /// A wall that is one body with the beam under it, in a condensed model.
+  bool is_cast_on_beam(int wall) const;
   void complain(int member, const std::string& what, const std::string& help = {});
 };
 

@@ -33,6 +33,8 @@ void Builder::add_events() {
     const product::Charge& c =
         plan.stages[static_cast<size_t>(firing.stage)].charges[static_cast<size_t>(firing.charge)];
     const Member& m = member(c.member);
+    // a beam between frames has no zones of its own in a condensed model and is refused before
+    if (!has_frame(m.frame_a)) continue;
     const MemberZones& z = zones[c.member];
     const int axis = m.kind == MemberKind::Column ? 2 : m.row_a != m.row_b ? 0 : 1;
     const double from = m.start[axis] + c.position - 0.5 * c.destroyed_length;

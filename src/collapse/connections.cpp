@@ -39,6 +39,7 @@ void Builder::estimate_normal_forces() {
   for (const auto& [at, body] : node_body) load[at] += g * assemblies[static_cast<size_t>(body)].mass();
   const auto share = [&](int index, const GridPoint& a, const GridPoint& b) {
     if (!own_body.count(index)) return;
+    if (is_cast_on_beam(index)) return;  // counted with the beam
     const double w = 0.5 * g * assemblies[static_cast<size_t>(own_body[index])].mass();
     if (load.count(a)) load[a] += w;
     if (load.count(b)) load[b] += w;
@@ -109,7 +110,28 @@ void Builder::request_zones() {
     }
   for (const auto* members : {&columns, &x_beams, &y_beams})
     for (const auto& [at, index] : *members)
-      for (int which : {0, 1}) request_station(index, which);
+      if (members == &y_beams ? has_link(at.frame) : has_frame(at.frame))
+        for (int which : {0, 1}) request_station(index, which);
+}
+
+bool Builder::has_frame(int frame) const {
+  if (!condensation) return true;
+  const int c = condensation->class_of[static_cast<size_t>(frame)];
+  return c >= 0 && condensation->frames[static_cast<size_t>(c)].front() == frame;
+}
+
+bool Builder::has_link(int frame) const {
+  if (!condensation) return true;
+  // the first one between two classes stands for all of them
+  const auto pair_of = [&](int f) {
+    const size_t i = static_cast<size_t>(f);
+    return std::minmax(condensation->class_of[i], condensation->class_of[i + 1]);
+  };
+  const std::pair<int, int> here = pair_of(frame);
+  if (here.first == here.second || here.first < 0) return false;
+  for (int f = 0; f < frame; ++f)
+    if (std::pair<int, int>(pair_of(f)) == here) return false;
+  return true;
 }
 
 Builder::Stiffness Builder::calc_stiffness(const MemberZones& z) const {
@@ -126,16 +148,30 @@ Builder::Stiffness Builder::calc_stiffness(const MemberZones& z) const {
   return s;
 }
 
-mbs::LawId Builder::law_of(int zone, const Stiffness& s, const std::string& name) {
-  const auto key = std::make_tuple(zone, s.EI_y, s.EI_z);
+mbs::ZoneLaw Builder::make_law(int zone, const Stiffness& s, const std::string& name, Bending bending) {
+  std::string key = library.key(zone);
+  append_bytes(key, s.EI_y), append_bytes(key, s.EI_z), append_bytes(key, static_cast<double>(bending));
+  if (known)
+    if (const auto found = known->laws.find(key); found != known->laws.end()) {
+      mbs::ZoneLaw law = found->second;
+      law.name = name;
+      return law;
+    }
+  mbs::ZoneLaw law = make_zone_law(library.rcc(zone), s.EI_y, s.EI_z, name, k, PlasticFrom::Yield, bending);
+  if (made) made->laws.emplace(std::move(key), law);
+  return law;
+}
+
+mbs::LawId Builder::law_of(int zone, const Stiffness& s, const std::string& name, Bending bending) {
+  const auto key = std::make_tuple(zone, s.EI_y, s.EI_z, bending);
   if (const auto it = laws.find(key); it != laws.end()) return it->second;
-  const mbs::LawId id = mbs::add_law(model, make_zone_law(library.rcc(zone), s.EI_y, s.EI_z, name, k));
+  const mbs::LawId id = mbs::add_law(model, make_law(zone, s, name, bending));
   laws[key] = id;
   return id;
 }
 
 mbs::LawId Builder::hinge_law_of(int zone, const Stiffness& s, const std::string& name) {
-  mbs::ZoneLaw law = make_zone_law(library.rcc(zone), s.EI_y, s.EI_z, name, k);
+  mbs::ZoneLaw law = make_law(zone, s, name, bending_of_column());
   if (!hinge_about_y) law.moment_z = law.moment_y;
   return mbs::add_law(model, law);
 }
@@ -166,13 +202,14 @@ mbs::ElementId Builder::add_element(const std::string& name, int index, int a, i
 }
 
 /// Both stations of a whole member, the weaker one first: its law also limits axial force, shear and torsion.
-std::vector<mbs::Station> Builder::order_stations(const MemberZones& z, const Stiffness& s, const std::string& name) {
+std::vector<mbs::Station> Builder::order_stations(const MemberZones& z, const Stiffness& s, const std::string& name,
+                                                  Bending bending) {
   const auto capacity = [this](const MemberStation& station) {
     const nearfield::Rcc& rcc = library.rcc(station.zone);
     return *std::max_element(rcc.compression.force.begin(), rcc.compression.force.end());
   };
-  std::vector<mbs::Station> out{{-0.5 * z.clear_length, law_of(z.station[0].zone, s, name)},
-                                {0.5 * z.clear_length, law_of(z.station[1].zone, s, name)}};
+  std::vector<mbs::Station> out{{-0.5 * z.clear_length, law_of(z.station[0].zone, s, name, bending)},
+                                {0.5 * z.clear_length, law_of(z.station[1].zone, s, name, bending)}};
   if (capacity(z.station[1]) < capacity(z.station[0])) std::swap(out[0], out[1]);
   return out;
 }
@@ -190,7 +227,7 @@ void Builder::connect_ground_column(const GridPoint& at, int index) {
   Vec3 rotational{s.GJ / L, 3 * s.EI_y / L, 3 * s.EI_z / L};
   rotational[hinge_about_y ? 2 : 1] *= 2;
   z.element[0] = add_element(m.name + "/foot", index, stump, shaft, foot, column_axes(), {s.EA / L, s.GA / L, s.GA / L},
-                             rotational, {{0, law_of(z.station[0].zone, s, m.name + "/foot")}})
+                             rotational, {{0, law_of(z.station[0].zone, s, m.name + "/foot", bending_of_column())}})
                      .index;
 
   mbs::Joint joint;
@@ -238,10 +275,11 @@ void Builder::connect_column(const GridPoint& at, int index) {
   const auto bending = [&](double EI) { return 12 * EI / (L * L * L) / (1 + 12 * EI / (s.GA * L * L)); };
   Vec3 middle = m.start;
   middle.z += 0.5 * L;
-  z.element[0] = z.element[1] = add_element(m.name, index, below, node_at(at), middle, column_axes(),
-                                            {s.EA / L, bending(s.EI_z), bending(s.EI_y)},
-                                            {s.GJ / L, s.EI_y / L, s.EI_z / L}, order_stations(z, s, m.name))
-                                    .index;
+  z.element[0] = z.element[1] =
+      add_element(m.name, index, below, node_at(at), middle, column_axes(),
+                  {s.EA / L, bending(s.EI_z), bending(s.EI_y)}, {s.GJ / L, s.EI_y / L, s.EI_z / L},
+                  order_stations(z, s, m.name, bending_of_column()))
+          .index;
 }
 
 void Builder::connect_x_beam(const GridPoint& at, int index) {
@@ -254,7 +292,8 @@ void Builder::connect_x_beam(const GridPoint& at, int index) {
   const Vec3 rotational{2 * s.GJ / L, 6 * s.EI_y / L, 6 * s.EI_z / L};
   // fixed-end moments of the weight it carries: at rest the ends are turned so that they pull at the top
   double mass = assemblies[static_cast<size_t>(body)].mass();
-  if (const int wall = find_at(x_walls, {at.row, at.frame, at.storey + 1}); wall >= 0 && own_body.count(wall))
+  if (const int wall = find_at(x_walls, {at.row, at.frame, at.storey + 1});
+      wall >= 0 && own_body.count(wall) && !is_cast_on_beam(wall))
     mass += assemblies[static_cast<size_t>(own_body.at(wall))].mass();
   const double turn = plan.analysis.gravity * mass * L / 12 / rotational.y;
   for (int end : {0, 1}) {
@@ -264,7 +303,7 @@ void Builder::connect_x_beam(const GridPoint& at, int index) {
     face.x += z.station[static_cast<size_t>(end)].at;
     z.element[end] =
         add_element(name, index, end == 0 ? node : body, end == 0 ? body : node, face, x_beam_axes(), translational,
-                    rotational, {{0, law_of(z.station[static_cast<size_t>(end)].zone, s, name)}})
+                    rotational, {{0, law_of(z.station[static_cast<size_t>(end)].zone, s, name, bending_of_x_beam())}})
             .index;
     mbs::ZoneElement& e = model.elements.back();
     e.X_BM.q = e.X_BM.q * exp_rotation({0, turn, 0});
@@ -339,6 +378,7 @@ void Builder::connect_wall(const GridPoint& at, int index, bool along_x) {
   const int axis = along_x ? 0 : 1;
   double low = 1e30, high = -1e30, open = 0;
   for (const Part& p : assemblies[static_cast<size_t>(body)].parts) {
+    if (p.member != index) continue;
     low = std::min(low, p.centre[axis] - p.half[axis]);
     high = std::max(high, p.centre[axis] + p.half[axis]);
   }
@@ -348,6 +388,29 @@ void Builder::connect_wall(const GridPoint& at, int index, bool along_x) {
   Vec3 base = m.start;
   base[axis] = 0.5 * (low + high);
 
+  if (floor != body) join_wall(index, rcc, base, low, high, width, floor);
+
+  const int beam = along_x ? find_at(x_beams, at) : -1;
+  if (beam < 0) return;
+  const double E_t = rcc.EA * kept;  // modulus times thickness
+  const double shear = k.wall_stiffness_share * E_t / 2.4 * width / height;
+  const double axial = k.wall_axial_share * E_t * width / height;
+  const double across = 3 * rcc.EI * width / (height * height * height);
+  Vec3 head = base;
+  head.z += height;
+  const double span = high - low;
+  add_element(m.name + "/head", index, body, own_body.at(beam), head, column_axes(), {axial, shear, across},
+              {across * span * span / 12, 3 * rcc.EI * width / height, axial * span * span / 12},
+              {{0, mbs::add_law(model, make_wall_law(rcc, width, height, kept, m.name + "/head", k))}});
+}
+
+/// The rigid joint at a wall's base.
+///   low, high  ends along the wall, width  net length at its head [m]; floor  body, -1: the ground
+void Builder::join_wall(int index, const nearfield::PanelRcc& rcc, const Vec3& base, double low, double high,
+                        double width, int floor) {
+  const Member& m = member(index);
+  const int body = own_body.at(index);
+  const double kept = kept_of(index), height = m.height;
   mbs::Joint joint;
   joint.kind = mbs::Joint::Kind::Fixed;
   joint.name = m.name + "/base";
@@ -372,19 +435,6 @@ void Builder::connect_wall(const GridPoint& at, int index, bool along_x) {
   entry.body_a = floor, entry.body_b = body, entry.p_W = base;
   map.joints.push_back(entry);
   mbs::add_joint(model, joint);
-
-  const int beam = along_x ? find_at(x_beams, at) : -1;
-  if (beam < 0) return;
-  const double E_t = rcc.EA * kept;  // modulus times thickness
-  const double shear = k.wall_stiffness_share * E_t / 2.4 * width / height;
-  const double axial = k.wall_axial_share * E_t * width / height;
-  const double across = 3 * rcc.EI * width / (height * height * height);
-  Vec3 head = base;
-  head.z += height;
-  const double span = high - low;
-  add_element(m.name + "/head", index, body, own_body.at(beam), head, column_axes(), {axial, shear, across},
-              {across * span * span / 12, 3 * rcc.EI * width / height, axial * span * span / 12},
-              {{0, mbs::add_law(model, make_wall_law(rcc, width, height, kept, m.name + "/head", k))}});
 }
 
 void Builder::connect_cables() {

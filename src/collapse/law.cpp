@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+#include <cstring>
 
 #include "base/error.h"
 #include "base/parallel.h"
@@ -246,46 +246,74 @@ double calc_zone_length(const product::Section& section, const product::Concrete
   return std::min({wanted, k.zone_length_at_most * clear_length, longest});
 }
 
+void append_bytes(std::string& to, double v) {
+  char bytes[sizeof v];
+  std::memcpy(bytes, &v, sizeof v);
+  to.append(bytes, sizeof v);
+}
+
 int ZoneLibrary::request(const nearfield::ZoneInput& in) {
   std::string key;
-  const auto put = [&key](double v) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%a,", v);
-    key += text;
-  };
+  const auto put = [&key](double v) { append_bytes(key, v); };
   const product::Section& s = in.section;
   for (double v : {s.width, s.height, s.cover, s.tie_diameter, s.tie_spacing}) put(v);
   put(s.tie_legs_y), put(s.tie_legs_z);
+  put(static_cast<double>(s.bars.size()));
   for (const product::Bar& b : s.bars) put(b.y), put(b.z), put(b.area), put(b.diameter);
-  key += '|';
   const product::Concrete& c = in.concrete;
   for (double v : {c.fc, c.fct, c.Ec, c.eps_c1, c.Gf, c.Gcl}) put(v);
   for (double v : {in.steel.fy, in.steel.fu, in.steel.Es, in.steel.eps_u}) put(v);
   for (double v : {in.length, in.cut_bars, in.cut_concrete, in.concrete_loss}) put(v);
   key += in.cover_lost ? 'c' : '-';
-  const auto [found, is_new] = known_.emplace(key, static_cast<int>(inputs_.size()));
-  if (is_new) inputs_.push_back(in);
+  const auto [found, is_new] = numbers_.emplace(std::move(key), static_cast<int>(inputs_.size()));
+  if (is_new) {
+    inputs_.push_back(in);
+    keys_.push_back(&found->first);
+  }
   return found->second;
 }
 
 void ZoneLibrary::compute(int threads) {
   const size_t done = rccs_.size();
   rccs_.resize(inputs_.size());
-  const bool finished = parallel_for(inputs_.size() - done, threads,
-                                     [&](size_t i) { rccs_[done + i] = nearfield::make_rcc(inputs_[done + i]); });
+  const bool finished = parallel_for(inputs_.size() - done, threads, [&](size_t i) {
+    const size_t zone = done + i;
+    if (known_)
+      if (const auto found = known_->zones.find(*keys_[zone]); found != known_->zones.end()) {
+        rccs_[zone] = found->second;
+        return;
+      }
+    rccs_[zone] = nearfield::make_rcc(inputs_[zone]);
+  });
   if (!finished) rccs_.resize(done);
 }
 
+void ZoneLibrary::collect(KnownCurves& to) const {
+  for (size_t i = 0; i < rccs_.size(); ++i) to.zones.emplace(*keys_[i], rccs_[i]);
+}
+
 mbs::ZoneLaw make_zone_law(const nearfield::Rcc& rcc, double EI_y, double EI_z, const std::string& name,
-                           const Knowledge& k, PlasticFrom begin) {
+                           const Knowledge& k, PlasticFrom begin, Bending bending) {
   mbs::ZoneLaw law;
   law.name = name;
-  law.moment_y = make_family(rcc.y_pos, rcc.y_neg, EI_y, rcc.length, k.zone_rupture_rotation, begin);
-  law.moment_z = make_family(rcc.z_pos, rcc.z_neg, EI_z, rcc.length, k.zone_rupture_rotation, begin);
+  const auto is_same = [](const nearfield::MomentFamily& a, const nearfield::MomentFamily& b) {
+    return a.normal_force == b.normal_force && a.rotation == b.rotation && a.moment == b.moment &&
+           a.yield_rotation == b.yield_rotation && a.yield_moment == b.yield_moment;
+  };
+  if (bending != Bending::Z)
+    law.moment_y = make_family(rcc.y_pos, rcc.y_neg, EI_y, rcc.length, k.zone_rupture_rotation, begin);
+  if (bending == Bending::Both && EI_y == EI_z && is_same(rcc.y_pos, rcc.z_pos) && is_same(rcc.y_neg, rcc.z_neg))
+    law.moment_z = law.moment_y;
+  else if (bending != Bending::Y)
+    law.moment_z = make_family(rcc.z_pos, rcc.z_neg, EI_z, rcc.length, k.zone_rupture_rotation, begin);
   law.biaxial_exponent = k.zone_biaxial_exponent;
   law.damage_share = rcc.damage_share;
   // the last rotation of a family is where nothing of the moment is left
-  law.rupture_rotation = std::max(law.moment_y.plastic_rotation.back(), law.moment_z.plastic_rotation.back());
+  for (const mbs::MomentFamily* f : {&law.moment_y, &law.moment_z})
+    if (!f->plastic_rotation.empty())
+      law.rupture_rotation = std::isfinite(law.rupture_rotation)
+                                 ? std::max(law.rupture_rotation, f->plastic_rotation.back())
+                                 : f->plastic_rotation.back();
   law.compression = make_curve(rcc.compression);
   law.tension = make_curve(rcc.tension);
   law.crush_length = rcc.length;

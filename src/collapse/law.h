@@ -16,9 +16,17 @@ namespace topple::collapse {
 double calc_zone_length(const product::Section&, const product::Concrete&, const product::Steel&, double depth,
                         double clear_length, const Knowledge&);
 
+/// Curves and laws by all the numbers that they follow from: what many models of one plan share.
+struct KnownCurves {
+  std::map<std::string, nearfield::Rcc> zones;
+  std::map<std::string, mbs::ZoneLaw> laws;
+};
+
 /// Computes each distinct zone once, on several threads.
 class ZoneLibrary {
  public:
+  /// `known` is looked at before a curve is made; may be null.
+  explicit ZoneLibrary(const KnownCurves* known = nullptr) : known_(known) {}
   /// Notes a zone; equal inputs give equal numbers.
   int request(const nearfield::ZoneInput&);
   /// Computes what was requested since the last call. Throws InputError.
@@ -26,21 +34,32 @@ class ZoneLibrary {
   const nearfield::Rcc& rcc(int zone) const { return rccs_[static_cast<size_t>(zone)]; }
   const nearfield::ZoneInput& input(int zone) const { return inputs_[static_cast<size_t>(zone)]; }
   size_t size() const { return inputs_.size(); }
+  void collect(KnownCurves&) const;
+  /// The numbers that a zone follows from.
+  const std::string& key(int zone) const { return *keys_[static_cast<size_t>(zone)]; }
 
  private:
-  std::map<std::string, int> known_;
+  const KnownCurves* known_;
+  std::map<std::string, int> numbers_;
+  std::vector<const std::string*> keys_;
   std::vector<nearfield::ZoneInput> inputs_;
   std::vector<nearfield::Rcc> rccs_;
 };
+
+/// Appends the bytes of a number.
+void append_bytes(std::string& to, double v);
 
 /// Where a zone's plastic rotation begins: at first yield, so that a building at rest does not yield, or where the
 /// curve leaves the element's line, so that an element with the stiffness of the uncracked section follows all of it.
 enum class PlasticFrom { Yield, Cracking };
 
+/// Axes whose bending a law resists; about the other one it is elastic.
+enum class Bending { Both, Y, Z };
+
 /// Law of a zone whose element carries the elasticity of the member with the bending stiffnesses EI [N·m²]: what an
 /// elastic zone of the same length would turn is taken out of the rotations, docs/theory/manager.md (1).
 mbs::ZoneLaw make_zone_law(const nearfield::Rcc&, double EI_y, double EI_z, const std::string& name, const Knowledge&,
-                           PlasticFrom = PlasticFrom::Yield);
+                           PlasticFrom = PlasticFrom::Yield, Bending = Bending::Both);
 
 /// Law of the bars that a charge leaves; nothing at all if there are none.
 mbs::ZoneLaw make_cage_law(const nearfield::ResidualCage&, double destroyed_length, const std::string& name,

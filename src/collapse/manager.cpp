@@ -329,6 +329,13 @@ void Builder::make_walls() {
                                                 material_of(panel_of(index)));
       const GridPoint floor{at.row, at.frame, at.storey - 1};
       const bool on_beam = along_x && at.storey > 0 && own_body.count(find_at(x_beams, floor));
+      if (on_beam && condensation) {
+        const int body = own_body.at(find_at(x_beams, floor));
+        own_body[index] = body;
+        std::vector<Part>& all = assemblies[static_cast<size_t>(body)].parts;
+        all.insert(all.end(), parts.begin(), parts.end());
+        continue;
+      }
       if (at.storey == 0 || on_beam) {
         own_body[index] = add_assembly({m.name, "wall", at.storey, false, std::move(parts)});
         continue;
@@ -342,6 +349,12 @@ void Builder::make_walls() {
       if (b < 0) b = a;
       put_on_nodes(parts, axis, 0.5 * (from + to), a, b);
     }
+}
+
+bool Builder::is_cast_on_beam(int index) const {
+  const auto wall = own_body.find(index);
+  if (wall == own_body.end()) return false;
+  return assemblies[static_cast<size_t>(wall->second)].kind == "beam" && member(index).kind == MemberKind::Wall;
 }
 
 void Builder::finish_bodies() {
@@ -390,12 +403,19 @@ mbs::Model Builder::build() {
   estimate_normal_forces();
   request_zones();
   library.compute(threads);
-  for (const auto& [at, index] : columns) at.storey == 0 ? connect_ground_column(at, index) : connect_column(at, index);
-  for (const auto& [at, index] : x_beams) connect_x_beam(at, index);
-  for (const auto& [at, index] : y_beams) connect_y_beam(at, index);
-  for (const auto& [at, index] : slabs) connect_slab(at, index);
-  for (const auto& [at, index] : x_walls) connect_wall(at, index, true);
-  for (const auto& [at, index] : y_walls) connect_wall(at, index, false);
+  if (made) library.collect(*made);
+  for (const auto& [at, index] : columns)
+    if (has_frame(at.frame)) at.storey == 0 ? connect_ground_column(at, index) : connect_column(at, index);
+  for (const auto& [at, index] : x_beams)
+    if (has_frame(at.frame)) connect_x_beam(at, index);
+  for (const auto& [at, index] : y_beams)
+    if (has_link(at.frame)) connect_y_beam(at, index);
+  for (const auto& [at, index] : slabs)
+    if (has_link(at.frame)) connect_slab(at, index);
+  for (const auto& [at, index] : x_walls)
+    if (has_frame(at.frame)) connect_wall(at, index, true);
+  for (const auto& [at, index] : y_walls)
+    if (has_link(at.frame)) connect_wall(at, index, false);
   connect_cables();
   add_events();
   stop_if_wrong();

@@ -23,7 +23,10 @@ double now() {
 
 /// One plan on its way. Not moved: the recorder holds on to its parts.
 struct Sample {
-  Sample(const product::Plan& p, const Knowledge& k) : plan(p), model(make_model(p, k, map)) {
+  Sample(const product::Plan& p, const Knowledge& k, const SampleRunOptions& o)
+      : plan(p),
+        model(o.condensation ? make_condensed_model(p, k, *o.condensation, o.condense, o.known, map)
+                             : make_model(p, k, map)) {
     record.building_outline = calc_building_outline(model, map);
     recorder = std::make_unique<Recorder>(model, map, k, record, callbacks);
   }
@@ -35,6 +38,7 @@ struct Sample {
   RunCallbacks callbacks;
   std::unique_ptr<Recorder> recorder;
   mbs::Summary summary;
+  bool is_over = false;  // fell before the last stage, and that is enough
   // of a single run
   double begun = 0, first_frame = 0, last_stage = 0, in_outputs = 0, in_outputs_standing = 0;
 };
@@ -45,28 +49,48 @@ mbs::Options make_options(const product::Plan& plan, const Knowledge& k, const S
   mbs::Options o;
   o.duration = calc_release(plan) + in.after;
   o.step = plan.analysis.step;
-  o.frame_interval = 1 / (in.frame_rate > 0 ? in.frame_rate : plan.analysis.frame_rate);
+  constexpr double condensed_rate = 20;  // numbers between frames lie on straight lines [1/s]
+  o.frame_interval = 1 / (in.frame_rate > 0 ? in.frame_rate
+                          : in.condensation ? condensed_rate
+                                            : plan.analysis.frame_rate);
   o.rest_speed = k.rest_speed;
   o.rest_time = k.rest_time;
   o.threads = 1;
+  if (in.condensation) o.pass_speed = in.pass_speed, o.pass_share = in.pass_share, o.contact_interval = 2;
   return o;
+}
+
+/// Takes a frame in. A condensed sample that has left its place before the last stage is over `early_after` behind its
+/// first touchdown: what the last stage would do to the heap is nobody's question.
+void add_frame(Sample& s, const Knowledge& k, const SampleRunOptions& options, const mbs::View& v) {
+  constexpr double early_after = 1;  // [s]
+  if (s.is_over) return;
+  s.recorder->add_frame(v);
+  if (!options.condensation || v.time >= calc_release(s.plan)) return;
+  const double touchdown = s.recorder->first_touchdown();
+  s.is_over = v.time >= touchdown + early_after && !stands(s.recorder->block_frames().back(), k);
 }
 
 void run_single(Sample& s, const Knowledge& k, const SampleRunOptions& options, const std::atomic<bool>* cancel) {
   mbs::Options o = make_options(s.plan, k, options);
-  o.progress.cancel = cancel;
+  std::atomic<bool> stop = false;
+  o.progress.cancel = options.condensation ? &stop : cancel;
   const double release = calc_release(s.plan);
-  o.on_frame = [&s, release](const mbs::View& v) {
+  o.on_frame = [&](const mbs::View& v) {
     const double t = now();
     if (s.first_frame == 0) s.first_frame = t;
-    s.recorder->add_frame(v);
+    add_frame(s, k, options, v);
+    if (s.is_over || (cancel && cancel->load(std::memory_order_relaxed))) stop = true;
     const double spent = now() - t;
     s.in_outputs += spent;
     if (v.time <= release) s.last_stage = t + spent, s.in_outputs_standing = s.in_outputs;
   };
-  o.on_happening = [&s](const mbs::Happening& h) { s.recorder->add_happening(h); };
+  o.on_happening = [&s](const mbs::Happening& h) {
+    if (!s.is_over) s.recorder->add_happening(h);
+  };
   s.begun = now();
   s.summary = mbs::run(s.model, o);
+  if (s.is_over) s.summary.ending = mbs::Summary::Ending::TimeLimit;
 }
 
 /// All of one build and one kind of options.
@@ -75,16 +99,21 @@ void run_together(const std::vector<Sample*>& samples, const Knowledge& k, const
   mbs::BatchOptions o;
   o.run = make_options(samples.front()->plan, k, options);
   o.progress.cancel = cancel;
-  o.on_frame = [&samples](size_t i, const mbs::View& v) {
+  o.on_frame = [&](size_t i, const mbs::View& v) {
     const double t = now();
-    samples[i]->recorder->add_frame(v);
+    add_frame(*samples[i], k, options, v);
     samples[i]->in_outputs += now() - t;
   };
-  o.on_happening = [&samples](size_t i, const mbs::Happening& h) { samples[i]->recorder->add_happening(h); };
+  o.on_happening = [&samples](size_t i, const mbs::Happening& h) {
+    if (!samples[i]->is_over) samples[i]->recorder->add_happening(h);
+  };
   std::vector<mbs::Variation> variations;
   for (const Sample* s : samples) variations.emplace_back([s](mbs::Model& m) { m = s->model; });
   const std::vector<mbs::Summary> summaries = mbs::run_batch(samples.front()->model, variations, o);
-  for (size_t i = 0; i < samples.size(); ++i) samples[i]->summary = summaries[i];
+  for (size_t i = 0; i < samples.size(); ++i) {
+    samples[i]->summary = summaries[i];
+    if (samples[i]->is_over) samples[i]->summary.ending = mbs::Summary::Ending::TimeLimit;
+  }
 }
 
 bool can_share_lanes(const Sample& a, const Sample& b, const Knowledge& k, const SampleRunOptions& options) {
@@ -145,7 +174,7 @@ std::vector<SampleRun> run_samples(std::span<const product::Plan> plans, const K
     const double begin = now();
     std::unique_ptr<Sample> s;
     try {
-      s = std::make_unique<Sample>(plans[i], k);
+      s = std::make_unique<Sample>(plans[i], k, options);
     } catch (const std::exception& e) { fail(i, e); }
     spent.models += now() - begin;
     return s;

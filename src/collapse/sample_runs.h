@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "collapse/condense.h"
 #include "collapse/knowledge.h"
 #include "collapse/mechanism.h"
 #include "collapse/outcome.h"
@@ -18,7 +19,11 @@ namespace topple::collapse {
 struct SampleRunOptions {
   double after = 1.7;     // simulated after the last stage's time; without stages from the start [s]
   double frame_rate = 0;  // 0: the plan's [1/s]
-  bool lanes = false;     // plans whose models are of one build run in the lanes of one batch; the same bits
+  const Condensation* condensation = nullptr;  // samples run condensed; null: whole
+  const KnownCurves* known = nullptr;          // of condensed ones; may be null
+  CondenseOptions condense;
+  double pass_speed = 0.1, pass_share = 2e-3;  // mbs::Options, of condensed samples
+  bool lanes = false;  // plans whose models are of one build run in the lanes of one batch; the same bits
 };
 
 /// Where the processor's time went [s].

@@ -59,7 +59,16 @@ struct PlanMapping::Impl {
   uncertainty::Space space;
   std::vector<PlanQuantity> inputs, outputs;
   std::vector<double> trajectory_times;
+  collapse::Condensation condensation;
+  collapse::KnownCurves known;
 
+  collapse::SampleRunOptions run_options() const {
+    collapse::SampleRunOptions o;
+    o.after = options.after, o.frame_rate = options.frame_rate, o.lanes = options.lanes;
+    if (options.condensed) o.condensation = &condensation, o.known = &known;
+    o.condense.highest_frequency = options.highest_frequency;
+    return o;
+  }
   Result to_result(const collapse::SampleRun&) const;
   void evaluate_chunk(std::span<const Point>, std::span<Result>, const std::atomic<bool>* cancel,
                       PlanMappingTimes& spent) const;
@@ -76,7 +85,7 @@ PlanMapping::PlanMapping(const product::Plan& plan, const collapse::Knowledge& k
     if (!(t >= 0) || t > options.after)
       throw InputError("E205",
                        fmt::format("tilt at {:g} s: the runs end {:g} s after the last stage", t, options.after));
-  auto impl = std::make_unique<Impl>(Impl{product::make_sampler(plan), k, options, {}, {}, {}, {}});
+  auto impl = std::make_unique<Impl>(Impl{product::make_sampler(plan), k, options, {}, {}, {}, {}, {}, {}});
   for (const product::FuzzyValue& v : plan.fuzzy.inputs) {
     impl->inputs.push_back({v.path, v.symbol, v.unit});
     impl->space.inputs.push_back(uncertainty::make_polygonal(v.corners));
@@ -95,6 +104,22 @@ PlanMapping::PlanMapping(const product::Plan& plan, const collapse::Knowledge& k
                                                          {"rear_share", "%", 0.01},
                                                          {"utilisation", "%", 0.01}})
     impl->outputs.push_back(q);
+  if (options.condensed) {
+    // values that a frame does not share with those like it show at a point off the middle
+    std::vector<double> off;
+    for (const uncertainty::FuzzyNumber& x : impl->space.inputs) {
+      const auto support = x.cut(0);
+      off.push_back(support.left +
+                    (0.37 + 0.01 * static_cast<double>(off.size() % 20)) * (support.right - support.left));
+    }
+    const product::Plan sample = product::make_sample(impl->sampler, off);
+    const product::Plan* both[] = {&plan, &sample};
+    impl->condensation = collapse::find_like_frames(both, k);
+    if (!impl->condensation.refusal.empty())
+      throw InputError("E206", "the plan cannot be condensed: " + impl->condensation.refusal,
+                       "run the study without --condensed");
+    impl->known = collapse::make_known_curves(plan, k, impl->condensation);
+  }
   const int steps = static_cast<int>(std::floor(options.after / options.tilt_interval + 1e-9));
   for (int i = 0; i <= steps; ++i) impl->trajectory_times.push_back(i * options.tilt_interval);
   impl_ = std::move(impl);
@@ -157,8 +182,7 @@ void PlanMapping::Impl::evaluate_chunk(std::span<const Point> points, std::span<
   }
   spent.plans += now() - begin;
   collapse::SampleRunTimes times;
-  const std::vector<collapse::SampleRun> runs =
-      collapse::run_samples(plans, knowledge, {options.after, options.frame_rate, options.lanes}, cancel, &times);
+  const std::vector<collapse::SampleRun> runs = collapse::run_samples(plans, knowledge, run_options(), cancel, &times);
   for (size_t i = 0; i < runs.size(); ++i) out[index[i]] = to_result(runs[i]);
   spent.models += times.models, spent.equilibria += times.equilibria, spent.standing += times.standing;
   spent.falling += times.falling, spent.outputs += times.outputs;

@@ -1,0 +1,444 @@
+#include "collapse/condense.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <tuple>
+
+#include "collapse/builder.h"
+
+namespace topple::collapse {
+
+namespace {
+
+using product::Member;
+using product::MemberKind;
+
+/// Lengths are alike to a micrometre.
+void append_length(std::string& to, double v) { append_bytes(to, std::round(1e6 * v)); }
+
+/// What a member is, without its place along y.
+std::string describe(const product::Plan& plan, size_t index) {
+  const Member& m = plan.members[index];
+  std::string key;
+  for (const int v : {static_cast<int>(m.kind), m.storey, m.row_a, m.row_b, m.section, m.panel, m.removed ? 1 : 0})
+    append_bytes(key, v);
+  for (const double v : {m.start.x, m.end.x, m.start.z, m.end.z, m.height, m.end.y - m.start.y}) append_length(key, v);
+  append_bytes(key, static_cast<double>(m.openings.size()));
+  for (const product::Opening& o : m.openings)
+    for (const double v : {o.left, o.sill, o.width, o.height}) append_length(key, v);
+  append_bytes(key, static_cast<double>(m.weakenings.size()));
+  for (const product::Weakening& w : m.weakenings)
+    for (const double v : {w.at, w.cut_bars, w.cut_concrete}) append_length(key, v);
+  for (size_t s = 0; s < plan.stages.size(); ++s)
+    for (const product::Charge& c : plan.stages[s].charges)
+      if (c.member == static_cast<int>(index))
+        for (const double v : {static_cast<double>(s), c.position, c.destroyed_length, c.residual_bars,
+                               c.transition_damage, c.delay, c.scatter, c.fails ? 1.0 : 0.0})
+          append_length(key, v);
+  return key;
+}
+
+/// What each frame is and carries; mirrored frames have the same text.
+std::vector<std::string> describe_frames(const product::Plan& plan) {
+  struct Parts {
+    std::vector<std::string> own, side[2];
+  };
+  std::vector<Parts> parts(plan.frame_names.size());
+  for (size_t i = 0; i < plan.members.size(); ++i) {
+    const Member& m = plan.members[i];
+    const size_t a = static_cast<size_t>(m.frame_a), b = static_cast<size_t>(m.frame_b);
+    if (a == b) {
+      parts[a].own.push_back(describe(plan, i));
+    } else {
+      parts[std::min(a, b)].side[1].push_back(describe(plan, i));
+      parts[std::max(a, b)].side[0].push_back(describe(plan, i));
+    }
+  }
+  const auto join = [](std::vector<std::string>& list) {
+    std::sort(list.begin(), list.end());
+    std::string all;
+    for (const std::string& s : list) {
+      append_bytes(all, static_cast<double>(s.size()));
+      all += s;
+    }
+    return all;
+  };
+  std::vector<std::string> out;
+  for (Parts& p : parts) {
+    std::vector<std::string> sides{join(p.side[0]), join(p.side[1])};
+    std::string text = join(p.own);
+    append_bytes(text, static_cast<double>(text.size()));
+    out.push_back(text + join(sides));
+  }
+  return out;
+}
+
+std::string find_refusal(const product::Plan& plan, const Knowledge& k) {
+  ModelMap map;
+  Builder builder(plan, k, map, 1);
+  builder.find_direction();
+  constexpr double along = 1e-3;  // [rad]
+  if (std::abs(map.fall_direction.y) > along) return "the fall is not along the frames";
+  if (!plan.cables.empty()) return "cables pull at single frames";
+  for (size_t i = 0; i < plan.members.size(); ++i) {
+    const Member& m = plan.members[i];
+    if (m.frame_a == m.frame_b || m.removed) continue;
+    if (m.kind == MemberKind::Wall && m.storey == 0)
+      return "wall " + m.name + " stands across the fall in the ground storey";
+    for (const product::Stage& s : plan.stages)
+      for (const product::Charge& c : s.charges)
+        if (c.member == static_cast<int>(i)) return "a charge lies on " + m.name + ", between two frames";
+  }
+  return {};
+}
+
+mbs::ZoneLaw scale(mbs::ZoneLaw law, double n) {
+  const auto all = [n](std::vector<double>& list) {
+    for (double& v : list) v *= n;
+  };
+  for (mbs::MomentFamily* f : {&law.moment_y, &law.moment_z}) all(f->normal_force), all(f->positive), all(f->negative);
+  all(law.compression.f), all(law.tension.f);
+  law.shear_y *= n, law.shear_z *= n, law.torsion *= n;
+  return law;
+}
+
+/// Goes from the bodies of all frames, of which one of each class is connected, to one frame a class.
+class Condenser {
+ public:
+  Condenser(Builder& b, const Condensation& c, mbs::Model& model)
+      : b_(b), c_(c), model_(model), key_(model.bodies.size()), frame_(key_.size(), -1), to_(key_.size(), -1) {}
+
+  void condense() {
+    find_keys();
+    condense_bodies();
+    condense_elements();
+    condense_joints();
+    condense_events();
+    model_.is_planar = true;
+  }
+
+ private:
+  using Key = std::tuple<int, int, int, int>;  // what it is, row, storey, class
+  enum What { kNode, kBeam, kWall, kShaft, kStump };
+
+  void find_keys() {
+    const auto note = [this](int body, What what, const GridPoint& at) {
+      frame_[static_cast<size_t>(body)] = at.frame;
+      key_[static_cast<size_t>(body)] = {what, at.row, at.storey, c_.class_of[static_cast<size_t>(at.frame)]};
+    };
+    for (const auto& [at, body] : b_.node_body) note(body, kNode, at);
+    for (const auto& [members, what] : {std::pair{&b_.x_beams, kBeam}, {&b_.x_walls, kWall}, {&b_.columns, kShaft}})
+      for (const auto& [at, index] : *members)
+        if (const auto body = b_.own_body.find(index); body != b_.own_body.end() && !b_.is_cast_on_beam(index))
+          note(body->second, what, at);
+    for (const auto& [at, index] : b_.columns)
+      if (const auto body = b_.stump_body.find(index); body != b_.stump_body.end() && at.storey == 0)
+        note(body->second, kStump, at);
+  }
+
+  void condense_bodies() {
+    std::map<Key, std::pair<double, Mat3>> sums;
+    for (size_t i = 0; i < key_.size(); ++i) {
+      auto& [mass, inertia] = sums[key_[i]];
+      mass += model_.bodies[i].mass;
+      inertia = inertia + model_.bodies[i].inertia;
+    }
+    std::map<Key, int> place;
+    std::vector<mbs::Body> bodies;
+    std::vector<BodyEntry> entries;
+    share_.assign(key_.size(), 1);
+    for (size_t i = 0; i < key_.size(); ++i) {
+      if (!b_.has_frame(frame_[i])) continue;
+      const auto& [mass, inertia] = sums[key_[i]];
+      mbs::Body body = model_.bodies[i];
+      share_[i] = mass / body.mass;
+      body.mass = mass;
+      body.inertia = inertia;
+      body.X_WB.p.y += calc_shift(frame_[i]);
+      merge_shapes(b_.assemblies[i], body);
+      place[key_[i]] = static_cast<int>(bodies.size());
+      bodies.push_back(std::move(body));
+      entries.push_back(b_.map.bodies[i]);
+    }
+    for (size_t i = 0; i < key_.size(); ++i) to_[i] = place.at(key_[i]);
+    model_.bodies = std::move(bodies);
+    b_.map.bodies = std::move(entries);
+  }
+
+  /// One box around all that a body carries in its plane, and one around each wall, windows filled: seen along y they
+  /// cover each other.
+  void merge_shapes(const Assembly& a, mbs::Body& body) const {
+    if (a.parts.size() != body.shapes.size()) return;
+    std::map<int, std::pair<Vec3, Vec3>> boxes;  // by wall, -1: the rest
+    for (size_t i = 0; i < a.parts.size(); ++i) {
+      const mbs::Shape& s = body.shapes[i];
+      const Vec3 low = s.X_BS.p - s.half, high = s.X_BS.p + s.half;
+      const int member = a.parts[i].member;
+      const auto [at, is_new] = boxes.try_emplace(b_.member(member).kind == MemberKind::Wall ? member : -1, low, high);
+      for (int k = 0; k < 3; ++k) {
+        at->second.first[k] = std::min(at->second.first[k], low[k]);
+        at->second.second[k] = std::max(at->second.second[k], high[k]);
+      }
+    }
+    body.shapes.clear();
+    for (const auto& [wall, box] : boxes) {
+      mbs::Shape s;
+      s.X_BS.p = 0.5 * (box.first + box.second);
+      s.half = 0.5 * (box.second - box.first);
+      body.shapes.push_back(s);
+    }
+  }
+
+  /// Slices of different classes lie apart, so that they do not touch.
+  double calc_shift(int frame) const {
+    const std::vector<double>& y = b_.plan.frame_offsets;
+    const double apart = y.back() - y.front() + 10;
+    return apart * c_.class_of[static_cast<size_t>(frame)];
+  }
+
+  mbs::BodyId body_of(mbs::BodyId id) const {
+    return id == mbs::kGround ? id : mbs::BodyId{to_[static_cast<size_t>(id.index)]};
+  }
+  int frame_of(mbs::BodyId id) const { return id == mbs::kGround ? -1 : frame_[static_cast<size_t>(id.index)]; }
+
+  /// How many connections of the building one of the model stands for.
+  double count(mbs::BodyId a, mbs::BodyId b) const {
+    const int f = frame_of(b), g = a == mbs::kGround ? f : frame_of(a);
+    const size_t c = static_cast<size_t>(c_.class_of[static_cast<size_t>(f)]);
+    if (f == g) return static_cast<double>(c_.frames[c].size());
+    double links = 0;
+    const auto pair_of = [this](size_t i) {
+      return std::pair<int, int>(std::minmax(c_.class_of[i], c_.class_of[i + 1]));
+    };
+    const auto here = pair_of(static_cast<size_t>(std::min(f, g)));
+    for (size_t i = 0; i + 1 < c_.class_of.size(); ++i)
+      if (pair_of(i) == here) ++links;
+    return links;
+  }
+
+  mbs::LawId law_of(mbs::LawId id, double n) {
+    if (!id.is_valid()) return id;
+    const auto [at, is_new] = laws_.emplace(std::pair{id.index, n}, static_cast<int>(scaled_.size()));
+    if (is_new) scaled_.push_back(scale(model_.laws[static_cast<size_t>(id.index)], n));
+    return mbs::LawId{at->second};
+  }
+
+  void condense_elements() {
+    for (size_t i = 0; i < model_.elements.size(); ++i) {
+      mbs::ZoneElement& e = model_.elements[i];
+      const double n = count(e.a, e.b);
+      element_count_.push_back(n);
+      const int f = frame_of(e.a), g = frame_of(e.b);
+      if (f < 0) e.X_AF.p.y += calc_slice_shift(g);
+      if (f >= 0 && f != g) {
+        // one marker moves along y to the other, as their slices did
+        const double shift_a = calc_slice_shift(f), shift_b = calc_slice_shift(g);
+        e.X_BM.p.y -= shift_b - shift_a;
+      }
+      e.a = body_of(e.a), e.b = body_of(e.b);
+      e.translational_stiffness = n * e.translational_stiffness;
+      e.rotational_stiffness = n * e.rotational_stiffness;
+      for (mbs::Station& s : e.stations) s.law = law_of(s.law, n);
+      ZoneEntry& entry = b_.map.elements[i];
+      entry.body_a = e.a.index, entry.body_b = e.b.index;
+    }
+  }
+
+  /// Of a body of a frame to where its class is.
+  double calc_slice_shift(int frame) const {
+    const int first = c_.frames[static_cast<size_t>(c_.class_of[static_cast<size_t>(frame)])].front();
+    const std::vector<double>& y = b_.plan.frame_offsets;
+    return calc_shift(frame) + y[static_cast<size_t>(first)] - y[static_cast<size_t>(frame)];
+  }
+
+  void condense_joints() {
+    std::vector<double> counts;
+    for (size_t i = 0; i < model_.joints.size(); ++i) {
+      mbs::Joint& j = model_.joints[i];
+      const double n = count(j.parent, j.child);
+      counts.push_back(n);
+      if (j.parent == mbs::kGround) j.X_PF.p.y += calc_slice_shift(frame_of(j.child));
+      j.parent = body_of(j.parent), j.child = body_of(j.child);
+      j.tension_limit *= n, j.shear_limit *= n, j.moment_limit *= n;
+      b_.map.joints[i].body_a = j.parent.index, b_.map.joints[i].body_b = j.child.index;
+    }
+    for (size_t i = 0; i < model_.rotational_elements.size(); ++i) {
+      mbs::RotationalElement& r = model_.rotational_elements[i];
+      const double n = counts[static_cast<size_t>(r.joint.index)];
+      rotational_count_.push_back(n);
+      r.stiffness *= n;
+      r.law = law_of(r.law, n);
+      ZoneEntry& entry = b_.map.rotationals[i];
+      entry.body_a = model_.joints[static_cast<size_t>(r.joint.index)].parent.index;
+      entry.body_b = model_.joints[static_cast<size_t>(r.joint.index)].child.index;
+      b_.map.ground_columns[i].element = r;
+    }
+  }
+
+  void condense_events() {
+    for (mbs::Event& e : model_.events)
+      for (mbs::Action& a : e.actions) {
+        if (a.kind == mbs::Action::Kind::SwitchLaw) {
+          a.law = law_of(a.law, a.rotational >= 0 ? rotational_count_[static_cast<size_t>(a.rotational)]
+                                                  : element_count_[static_cast<size_t>(a.element.index)]);
+        } else if (a.kind == mbs::Action::Kind::ReplaceBody) {
+          const double share = share_[static_cast<size_t>(a.body.index)];
+          a.replacement.mass *= share;
+          for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 3; ++j) a.replacement.inertia(i, j) *= share;
+          a.body = body_of(a.body);
+        }
+      }
+    model_.laws = std::move(scaled_);
+  }
+
+  Builder& b_;
+  const Condensation& c_;
+  mbs::Model& model_;
+  std::vector<Key> key_;         // of each body before
+  std::vector<int> frame_, to_;  // of each body before
+  std::vector<double> share_;    // mass of each body's class over its own
+  std::map<std::pair<int, double>, int> laws_;
+  std::vector<mbs::ZoneLaw> scaled_;
+  std::vector<double> element_count_, rotational_count_;
+};
+
+/// Stiffnesses along the frames and rotary inertias of a planar model so that few modes are above a frequency: twice
+/// the largest sum of stiffnesses at a body over its mass bounds the square of the highest one (Gershgorin's theorem).
+void limit_frequency(mbs::Model& model, double highest) {
+  const size_t B = model.bodies.size();
+  // what joints tie together moves together, but turns alone
+  std::vector<size_t> root(B);
+  for (size_t b = 0; b < B; ++b) root[b] = b;
+  const auto find = [&root](size_t b) {
+    while (root[b] != b) b = root[b] = root[root[b]];
+    return b;
+  };
+  for (const mbs::Joint& j : model.joints)
+    if (!(j.parent == mbs::kGround) && !model.bodies[static_cast<size_t>(j.parent.index)].fixed)
+      root[find(static_cast<size_t>(j.parent.index))] = find(static_cast<size_t>(j.child.index));
+  std::vector<double> mass(B, 0.0);
+  for (size_t b = 0; b < B; ++b) mass[find(b)] += model.bodies[b].mass;
+
+  /// Of an element along x and z of W and about y, at one of its ends.
+  struct End {
+    int body;
+    Vec3 lever;
+  };
+  const auto ends_of = [&model](const mbs::ZoneElement& e) {
+    return std::array<End, 2>{End{e.a.index, e.X_AF.p}, End{e.b.index, e.X_BM.p}};
+  };
+  const auto is_free = [&model](int b) { return b >= 0 && !model.bodies[static_cast<size_t>(b)].fixed; };
+  const auto axes_of = [&model](const mbs::ZoneElement& e) {
+    return e.a == mbs::kGround ? to_matrix(e.X_AF.q)
+                               : to_matrix(model.bodies[static_cast<size_t>(e.a.index)].X_WB.q * e.X_AF.q);
+  };
+  const auto along = [](const Mat3& R, const Vec3& k, int axis) {
+    double sum = 0;
+    for (int i = 0; i < 3; ++i) sum += R(axis, i) * R(axis, i) * k[i];
+    return sum;
+  };
+  const auto fast = [](const mbs::ZoneElement& e) { return 1 + 4 * e.damping_ratio / (1 - 2 * e.damping_ratio); };
+  const double most = 0.5 * highest * highest;  // of stiffnesses over a mass
+
+  // along the frames beams are far stiffer than anything else: the stiffest springs of a body are cut to one common
+  // stiffness; what bears loads or sways is softer than that and stays
+  std::vector<std::vector<double>> pull(B);  // of groups
+  for (const mbs::ZoneElement& e : model.elements)
+    for (const End& end : ends_of(e))
+      if (is_free(end.body))
+        pull[find(static_cast<size_t>(end.body))].push_back(fast(e) * along(axes_of(e), e.translational_stiffness, 0));
+  std::vector<double> cap(B, mbs::kUnlimited);
+  for (size_t b = 0; b < B; ++b) {
+    std::sort(pull[b].begin(), pull[b].end());
+    double left = most * mass[b];
+    for (size_t i = 0; i < pull[b].size(); ++i) {
+      const double each = left / static_cast<double>(pull[b].size() - i);
+      if (pull[b][i] > each) {
+        cap[b] = each;
+        break;
+      }
+      left -= pull[b][i];
+    }
+  }
+  for (mbs::ZoneElement& e : model.elements) {
+    const Mat3 R = axes_of(e);
+    for (int i = 0; i < 3; ++i)
+      for (const End& end : ends_of(e))
+        if (is_free(end.body) && R(0, i) * R(0, i) > 0.5)
+          e.translational_stiffness[i] =
+              std::min(e.translational_stiffness[i], cap[find(static_cast<size_t>(end.body))] / fast(e));
+  }
+  std::vector<double> turn(B, 0.0);
+  for (const mbs::ZoneElement& e : model.elements) {
+    const Mat3 R = axes_of(e);
+    const double kx = along(R, e.translational_stiffness, 0), kz = along(R, e.translational_stiffness, 2);
+    for (const End& end : ends_of(e))
+      if (is_free(end.body))
+        turn[static_cast<size_t>(end.body)] +=
+            fast(e) *
+            (along(R, e.rotational_stiffness, 1) + kx * end.lever.z * end.lever.z + kz * end.lever.x * end.lever.x);
+  }
+  for (const mbs::RotationalElement& r : model.rotational_elements) {
+    const mbs::Joint& j = model.joints[static_cast<size_t>(r.joint.index)];
+    for (const int b : {j.parent.index, j.child.index})
+      if (is_free(b))
+        turn[static_cast<size_t>(b)] += r.stiffness * (1 + 4 * r.damping_ratio / (1 - 2 * r.damping_ratio));
+  }
+  const auto raise = [&](mbs::Body& body, size_t b) {
+    body.inertia(1, 1) = std::max(body.inertia(1, 1), turn[b] / most);
+  };
+  for (size_t b = 0; b < B; ++b)
+    if (!model.bodies[b].fixed) raise(model.bodies[b], b);
+  for (mbs::Event& event : model.events)
+    for (mbs::Action& a : event.actions)
+      if (a.kind == mbs::Action::Kind::ReplaceBody) raise(a.replacement, static_cast<size_t>(a.body.index));
+}
+
+}  // namespace
+
+Condensation find_like_frames(std::span<const product::Plan* const> plans, const Knowledge& k) {
+  Condensation out;
+  std::vector<std::string> text;
+  for (const product::Plan* plan : plans) {
+    out.refusal = find_refusal(*plan, k);
+    if (!out.refusal.empty()) return out;
+    const std::vector<std::string> frames = describe_frames(*plan);
+    text.resize(frames.size());
+    for (size_t f = 0; f < frames.size(); ++f) text[f] += frames[f];
+  }
+  std::map<std::string, int> known;
+  for (size_t f = 0; f < text.size(); ++f) {
+    const auto [at, is_new] = known.emplace(text[f], static_cast<int>(out.frames.size()));
+    if (is_new) out.frames.emplace_back();
+    out.frames[static_cast<size_t>(at->second)].push_back(static_cast<int>(f));
+    out.class_of.push_back(at->second);
+  }
+  if (out.frames.size() == text.size()) out = {{}, {}, "no two frames are alike"};
+  return out;
+}
+
+KnownCurves make_known_curves(const product::Plan& plan, const Knowledge& k, const Condensation& c) {
+  KnownCurves out;
+  ModelMap map;
+  Builder builder(plan, k, map, 1);
+  builder.condensation = &c;
+  builder.made = &out;
+  (void)builder.build();
+  return out;
+}
+
+mbs::Model make_condensed_model(const product::Plan& plan, const Knowledge& k, const Condensation& c,
+                                const CondenseOptions& options, const KnownCurves* known, ModelMap& map) {
+  map = {};
+  Builder builder(plan, k, map, 1, known);
+  builder.condensation = &c;
+  mbs::Model model = builder.build();
+  Condenser(builder, c, model).condense();
+  if (options.highest_frequency > 0) limit_frequency(model, options.highest_frequency);
+  return model;
+}
+
+}  // namespace topple::collapse
