@@ -201,6 +201,12 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   study->add_flag("--one-shot", y.one_shot, "start the command for every point and close its input behind it");
   study->add_option("--store", y.store, "database on a server, postgresql://user@host/name; a file if left out");
   study->add_option("--name", y.name, "of the study on the server; that of the folder if left out");
+  CLI::Option* condensed =
+      study->add_flag("--condensed", y.condensed,
+                      "of a plan: run its like frames as one, at a tenth of the cost; whole runs confirm the bounds");
+  study->add_option("--confirm", y.confirm, "whole runs at the end of a condensed study at most")
+      ->check(CLI::Range(1, 1000000))
+      ->needs(condensed);
   study->add_flag("--rerun-failed", y.rerun_failed, "run those again that failed");
   study->add_option("--knowledge", a.knowledge, "of a plan: file of knowledge rules instead of the built-in ones");
   study->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");

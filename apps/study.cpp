@@ -40,7 +40,8 @@ std::string words_of_time(double seconds) {
 /// Done, running, failed, rate, what is left, bounds so far.
 std::string words_of(const StudyState& s) {
   const double rate = s.seconds > 0 ? static_cast<double>(s.run_here) / s.seconds : 0;
-  std::string text = fmt::format("{} done, {} running, {} failed", s.done, s.running, s.failed);
+  std::string text = fmt::format("{}{} done, {} running, {} failed",
+                                 s.is_confirming ? "confirming by whole runs: " : "", s.done, s.running, s.failed);
   if (s.run_here > 0) {
     text += fmt::format(", {:.3g}/s", rate);
     text += fmt::format(", at most {} left", words_of_time(static_cast<double>(std::max(0L, s.limit - s.done)) / rate));

@@ -112,11 +112,15 @@ study::Problem read_problem(const Arguments& a, std::string& text) {
     std::vector<Diagnostic> warnings;
     const product::Plan plan = product::read_plan_file(a.input, warnings, text);
     for (const Diagnostic& d : warnings) std::fputs(render(d, text, has_colour(stderr)).c_str(), stderr);
-    p = study::make_plan_problem(plan, {}, a.knowledge.empty() ? std::string() : read_file(a.knowledge));
+    study::PlanMappingOptions options;
+    options.condensed = y.condensed;
+    p = study::make_plan_problem(plan, options, a.knowledge.empty() ? std::string() : read_file(a.knowledge));
     json identity = json::parse(p.identity);
     identity["topple"] = TOPPLE_VERSION;  // other programs give other answers
-    p.identity = identity.dump();
+    study::set_plan_identity(p, identity.dump());
+    if (y.confirm > 0) p.confirm = y.confirm;
   } else {
+    if (y.condensed) throw InputError("E801", "--condensed: an evaluator is not condensed", "leave it out");
     text = read_file(a.input);
     if (text.starts_with("\xEF\xBB\xBF")) text = text.substr(3);
     p = study::read_inputs_text(text, a.input);
@@ -145,7 +149,8 @@ study::Problem read_problem(const study::StudyRow& row) {
       throw InputError("E820", fmt::format("this topple knows no studies of the kind {}", kind));
     }
     p.kind = kind;
-    p.identity = d.at("identity").dump();
+    study::set_plan_identity(p, d.at("identity").dump());
+    if (p.whole) p.confirm = d.at("confirm");
     p.settings = d.at("settings").dump();
     p.levels = d.at("levels").get<std::vector<double>>();
     p.limit = d.at("limit");

@@ -21,6 +21,8 @@ struct StudyArguments {
   int batch = 1;                     // points that an evaluator gets at once
   std::string timeout, lease, idle;  // as typed
   bool one_shot = false, rerun_failed = false;
+  bool condensed = false;  // of a plan: like frames as one
+  int confirm = -1;        // whole runs of a condensed study at most, -1: the program's choice
 };
 
 }  // namespace topple::apps

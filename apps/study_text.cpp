@@ -138,6 +138,34 @@ void print_boxes(std::FILE* out, const Problem& p, const StudyResult& r) {
   }
 }
 
+/// What whole runs say of a condensed study.
+void print_confirmation(std::FILE* out, const Problem& p, const StudyResult& r) {
+  const study::Confirmation& c = r.confirmation;
+  if (c.limit == 0) return;
+  using State = study::Confirmation::State;
+  const auto count = [&c](State s) {
+    return std::count_if(c.bounds.begin(), c.bounds.end(), [s](const auto& b) { return b.state == s; });
+  };
+  print_heading(out, fmt::format("Runs were condensed; {} whole runs beside them", c.runs.size()));
+  print_line(out, fmt::format("bounds: {} confirmed, {} exceeded, {} not reached, {} not run (at most {} whole runs)",
+                              count(State::Confirmed), count(State::Exceeded), count(State::NotReached),
+                              count(State::NotRun), c.limit));
+  for (const auto& o : c.outcomes)
+    print_line(out, fmt::format("{}, most possible run, whole: {}", study::name_of_outcome(r, o.outcome),
+                                o.state == State::NotRun      ? "not run"
+                                : o.state == State::Confirmed ? "the same"
+                                                              : study::name_of_outcome(r, o.whole)));
+  for (const auto& b : c.bounds) {
+    if (b.state != State::Exceeded && b.state != State::NotReached) continue;
+    const auto& level = r.alpha.outputs[static_cast<std::size_t>(b.output)].levels[static_cast<std::size_t>(b.level)];
+    const study::Quantity q = study::find_output(p, r.outputs[static_cast<std::size_t>(b.output)]);
+    print_line(out, fmt::format("{} at alpha {:g}, {} {:.4g}: {} by whole runs, {}", q.name, level.alpha,
+                                b.is_upper ? "upper" : "lower",
+                                (b.is_upper ? level.upper.value : level.lower.value) / q.unit_value,
+                                study::to_text(b.state), study::words_of_value(q, b.whole)));
+  }
+}
+
 }  // namespace
 
 void print_study(std::FILE* out, const Problem& p, const StudyResult& r) {
@@ -151,6 +179,7 @@ void print_study(std::FILE* out, const Problem& p, const StudyResult& r) {
   print_outputs(out, p, r);
   print_drivers(out, p, r);
   print_boxes(out, p, r);
+  print_confirmation(out, p, r);
   const std::vector<study::NotableRun> notable = study::list_notable_runs(p, r);
   if (!notable.empty()) print_heading(out, "Runs to look at (number in samples.csv)");
   for (const study::NotableRun& n : notable)

@@ -84,17 +84,18 @@ std::string find_fault(const Problem& p, const Point& all) {
 
 /// All that is needed to read the study again.
 std::string make_study_definition(const Problem& p, const StudyOptions& options) {
-  return json{{"kind", p.kind},
-              {"file", options.source_name},
-              {"text", options.source},
-              {"identity", json::parse(p.identity)},
-              {"settings", json::parse(p.settings)},
-              {"levels", make_alpha_options(p).levels},
-              {"limit", make_alpha_options(p).limit},
-              {"seed", p.seed},
-              {"permissible", p.permissible},
-              {"drivers", p.has_drivers}}
-      .dump();
+  json d{{"kind", p.kind},
+         {"file", options.source_name},
+         {"text", options.source},
+         {"identity", json::parse(p.identity)},
+         {"settings", json::parse(p.settings)},
+         {"levels", make_alpha_options(p).levels},
+         {"limit", make_alpha_options(p).limit},
+         {"seed", p.seed},
+         {"permissible", p.permissible},
+         {"drivers", p.has_drivers}};
+  if (p.whole) d["confirm"] = p.confirm;
+  return d.dump();
 }
 
 std::vector<std::string> list_failures(const uncertainty::Archive& archive) {
@@ -150,9 +151,13 @@ class Manager {
   Manager(const Problem& problem, const RunnerFactories& factories, const StudyOptions& options,
           const Progress& progress, const std::function<void(const StudyState&)>& watch)
       : problem_(problem),
+        asked_problem_(&problem),
+        factories_(factories),
+        options_(options),
         progress_(progress),
         watch_(watch),
         model_(calc_model_hash(problem)),
+        asked_model_(model_),
         store_(options.store, progress.cancel, options.pool.patience) {
     const auto there = store_.find_study(options.name);
     if (there && there->model != model_)
@@ -166,9 +171,7 @@ class Manager {
     store_.forget_refusals(model_);
     if (options.rerun_failed) store_.rerun_failed(model_);
     for (StoredResult& r : store_.load_results(model_)) known_.emplace(std::move(r.hash), std::move(r.answer));
-    PoolOptions own = options.pool;
-    own.model = model_;  // programs of other studies may not be here
-    pool_ = std::make_unique<Pool>(options.store, factories, own);
+    start_pool();
   }
 
   void evaluate(std::span<const Point> batch, std::span<Result> out) {
@@ -176,9 +179,9 @@ class Manager {
     std::vector<std::pair<std::string, Point>> jobs;
     std::vector<StoredResult> impossible;  // without a run
     for (std::size_t i = 0; i < batch.size(); ++i) {
-      Point all = complete(problem_, batch[i]);
-      if (const std::string fault = find_fault(problem_, all); !fault.empty()) {
-        hashes[i] = calc_job_hash(model_, all);
+      Point all = complete(*asked_problem_, batch[i]);
+      if (const std::string fault = find_fault(*asked_problem_, all); !fault.empty()) {
+        hashes[i] = calc_job_hash(asked_model_, all);
         if (known_.contains(hashes[i])) continue;
         Answer a;
         a.kind = Answer::Kind::Failed;
@@ -187,14 +190,14 @@ class Manager {
         impossible.push_back({hashes[i], std::move(all), std::move(a)});
         continue;
       }
-      hashes[i] = calc_job_hash(model_, all);
+      hashes[i] = calc_job_hash(asked_model_, all);
       if (known_.contains(hashes[i])) continue;
       open.push_back(hashes[i]);
       jobs.emplace_back(hashes[i], std::move(all));
     }
-    if (!impossible.empty()) store_.add_impossible(model_, impossible);
+    if (!impossible.empty()) store_.add_impossible(asked_model_, impossible);
     if (!jobs.empty()) {
-      store_.add_jobs(model_, jobs);
+      store_.add_jobs(asked_model_, jobs);
       pool_->wake();
       arrived_ = static_cast<long>(batch.size() - jobs.size());  // were there before
       wait_for(open);
@@ -264,6 +267,11 @@ class Manager {
     r.outcomes = names_.outcomes;
     r.failures = list_failures(r.alpha.archive);
     r.is_finished = !asker.is_cancelled();
+    if (r.is_finished && problem_.whole) {
+      result_ = r;
+      confirm(r);
+      r.is_finished = !progress_.is_cancelled();
+    }
     pool_.reset();
     if (r.is_finished) {
       row_.state = "finished";
@@ -284,6 +292,37 @@ class Manager {
   }
 
  private:
+  void start_pool() {
+    PoolOptions own = options_.pool;
+    own.model = asked_model_;  // programs of other studies may not be here
+    pool_ = std::make_unique<Pool>(options_.store, factories_, own);
+  }
+
+  /// Whole runs of what a condensed model found.
+  void confirm(StudyResult& r) {
+    asked_problem_ = problem_.whole.get();
+    asked_model_ = calc_model_hash(*asked_problem_);
+    store_.put_model(asked_model_, make_model_definition(*asked_problem_));
+    store_.forget_refusals(asked_model_);
+    if (options_.rerun_failed) store_.rerun_failed(asked_model_);
+    pool_.reset();
+    start_pool();
+    std::vector<Confirmation::Run> runs;
+    std::vector<Point> points;
+    for (const int sample : choose_confirmation(problem_.space, r.alpha, problem_.confirm)) {
+      runs.emplace_back().sample = sample;
+      points.push_back(r.alpha.archive[sample].x);
+    }
+    limit_ = static_cast<int>(asked_) + static_cast<int>(points.size());
+    is_confirming_ = true;
+    std::vector<Result> results(points.size());
+    evaluate(points, results);
+    is_confirming_ = false;
+    for (std::size_t i = 0; i < runs.size(); ++i) runs[i].whole = std::move(results[i]);
+    r.confirmation = judge_confirmation(problem_.space, r.alpha, std::move(runs), problem_.confirm);
+    r.outcomes = names_.outcomes;
+  }
+
   /// Where a better value has turned up, no search has converged.
   static void keep_marks(const uncertainty::AlphaResult& from, uncertainty::AlphaResult& to) {
     const auto keep = [](const std::vector<uncertainty::OutputBounds>& a, std::vector<uncertainty::OutputBounds>& b) {
@@ -340,13 +379,13 @@ class Manager {
       }
       if (std::chrono::duration<double>(Clock::now() - looked).count() > 0.2) {
         looked = Clock::now();
-        if (const auto refusal = store_.find_refusal(model_)) {
+        if (const auto refusal = store_.find_refusal(asked_model_)) {
           pool_->stop();
           const Refusal r = read_refusal(*refusal);
           throw InputError({r.diagnostic});
         }
         store_.quarantine();
-        running_ = store_.count_running(model_);
+        running_ = store_.count_running(asked_model_);
       }
       pool_->wait_for_news(pause);
       // many results at once cost less than each on its own
@@ -361,16 +400,19 @@ class Manager {
     shown_ = now;
     StudyState s;
     s.done = asked_ + arrived_, s.failed = failed_, s.open = open_, s.running = std::min(running_, open_);
-    s.run_here = run_here_, s.limit = limit_;
+    s.run_here = run_here_, s.limit = limit_, s.is_confirming = is_confirming_;
     s.seconds = std::chrono::duration<double>(now - start_).count();
     s.so_far = result_.outputs.empty() && result_.outcomes.empty() ? nullptr : &result_;
     watch_(s);
   }
 
   const Problem& problem_;
+  const Problem* asked_problem_;  // that of the condensed or of the whole model
+  const RunnerFactories& factories_;
+  const StudyOptions& options_;
   const Progress& progress_;
   const std::function<void(const StudyState&)>& watch_;
-  std::string model_;
+  std::string model_, asked_model_;
   Store store_;
   StudyRow row_;
   std::unordered_map<std::string, Answer> known_;  // by hash
@@ -380,6 +422,7 @@ class Manager {
   long asked_ = 0, failed_ = 0, open_ = 0, running_ = 0, run_here_ = 0;
   long arrived_ = 0;  // of the batch that is being run
   int limit_ = 0;
+  bool is_confirming_ = false;
   Clock::time_point start_ = Clock::now(), shown_ = start_;
 };
 
@@ -448,6 +491,22 @@ StudyResult read_study(const Problem& problem, Store& store, const StudyRow& row
   if (summary.contains("insights")) read_json(r.insights, summary["insights"]);
   read_drivers(r.insights, problem, budget, archive);
   r.spread = find_spread_samples(problem, budget, archive);
+  if (r.is_finished && problem.whole) {
+    const std::string whole = calc_model_hash(*problem.whole);
+    std::vector<Confirmation::Run> runs;
+    std::vector<std::string> hashes;
+    for (const int sample : choose_confirmation(problem.space, r.alpha, problem.confirm)) {
+      runs.emplace_back().sample = sample;
+      hashes.push_back(calc_job_hash(whole, complete(*problem.whole, r.alpha.archive[sample].x)));
+    }
+    std::unordered_map<std::string, Answer> answers;
+    for (StoredResult& s : store.find_results(hashes)) answers.emplace(std::move(s.hash), std::move(s.answer));
+    for (std::size_t i = 0; i < runs.size(); ++i)
+      if (const auto found = answers.find(hashes[i]); found != answers.end())
+        runs[i].whole = names.translate(found->second);
+    r.confirmation = judge_confirmation(problem.space, r.alpha, std::move(runs), problem.confirm);
+    r.outcomes = names.outcomes;
+  }
   if (r.is_finished) r.ending = uncertainty::Ending::Complete;
   if (summary.value("ending", "") == uncertainty::to_text(uncertainty::Ending::LimitReached))
     r.ending = uncertainty::Ending::LimitReached;

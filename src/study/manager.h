@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/progress.h"
+#include "study/confirmation.h"
 #include "study/insights.h"
 #include "study/pool.h"
 #include "study/problem.h"
@@ -32,6 +33,7 @@ struct StudyState {
   long run_here = 0;                           // answers since this start
   double seconds = 0;                          // since this start
   int limit = 0;                               // of points
+  bool is_confirming = false;                  // whole runs are under way
   const struct StudyResult* so_far = nullptr;  // names and bounds; nullptr before the first
 };
 
@@ -41,7 +43,8 @@ struct StudyResult {
   uncertainty::AlphaResult alpha;     // with all samples
   uncertainty::PossibilityResult possibilities;
   uncertainty::Ending ending = uncertainty::Ending::Cancelled;
-  std::vector<int> spread;  // samples that lie over the support irrespective of results
+  Confirmation confirmation;  // of a condensed model
+  std::vector<int> spread;    // samples that lie over the support irrespective of results
   Insights insights;
   std::vector<std::string> failures;  // why runs failed, each reason once, most frequent first
   bool is_finished = false;

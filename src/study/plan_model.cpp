@@ -52,6 +52,10 @@ Definition read_definition(const std::string& text) {
   out.options.tilt_interval = identity.at("tilt_interval");
   out.options.frame_rate = identity.at("frame_rate");
   out.options.directions = identity.at("directions");
+  if (identity.contains("condensed")) {
+    out.options.condensed = true;
+    out.options.highest_frequency = identity.at("condensed").at("highest_frequency");
+  }
   out.options.threads = 1;
   out.rules = identity.at("rules").get<std::string>();
   std::vector<Diagnostic> warnings;
@@ -110,10 +114,30 @@ Problem make_plan_problem(const product::Plan& plan, const PlanMappingOptions& o
                     {"directions", options.directions}}
                    .dump();
   p.settings = json{{"path", plan.path}}.dump();
+  if (options.condensed) {
+    PlanMappingOptions whole = options;
+    whole.condensed = false;
+    p.whole = std::make_shared<const Problem>(make_plan_problem(plan, whole, rules));
+    p.confirm = default_confirm;
+    p.not_modelled.push_back("Frames that are alike move as one, in their plane: nothing falls sideways.");
+    json identity = json::parse(p.identity);
+    identity["condensed"] = {{"highest_frequency", options.highest_frequency}};
+    set_plan_identity(p, identity.dump());
+  }
   p.levels = plan.fuzzy.search.levels;
   p.limit = plan.fuzzy.search.limit;
   p.seed = plan.fuzzy.search.seed;
   return p;
+}
+
+void set_plan_identity(Problem& p, const std::string& identity) {
+  p.identity = identity;
+  if (!p.whole) return;
+  json whole = json::parse(identity);
+  whole.erase("condensed");
+  Problem other = *p.whole;
+  other.identity = whole.dump();
+  p.whole = std::make_shared<const Problem>(std::move(other));
 }
 
 Problem read_plan_problem(const std::string& definition) {

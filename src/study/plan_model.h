@@ -10,10 +10,16 @@
 namespace topple::study {
 
 /// Points hold SI values of the fuzzy inputs; answers hold the outputs of PlanMapping in SI, the outcome class, and the
-/// tilt over the trajectory's times.
+/// tilt over the trajectory's times. A condensed one has the problem of whole runs beside it.
 ///   rules  text of a file of rules; empty: those built in
 /// Throws InputError as PlanMapping does.
 Problem make_plan_problem(const product::Plan&, const PlanMappingOptions&, const std::string& rules = {});
+
+/// Whole runs that confirm a condensed study, unless another number is asked for.
+inline constexpr int default_confirm = 60;
+
+/// Puts another identity into a problem of a plan, and what belongs to it into the problem of its whole model.
+void set_plan_identity(Problem&, const std::string& identity);
 
 /// The same problem again from what make_model_definition wrote of it.
 Problem read_plan_problem(const std::string& definition);

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -63,6 +64,9 @@ struct Problem {
   std::string asked;                      // the outcome that is wanted; empty: none is named
   Site site;                              // of a plan
   std::vector<std::string> not_modelled;  // sentences
+  /// The model that the one above stands for, at a fraction of its cost: a study ends with runs of it. Null: none.
+  std::shared_ptr<const Problem> whole;
+  int confirm = 0;  // whole runs at most; not part of the model
 };
 
 /// The output of that name, without a unit if it is not known beforehand.

@@ -142,6 +142,50 @@ json insights_json(const Problem& p, const StudyResult& r) {
   return out;
 }
 
+json confirmation_json(const Problem& p, const StudyResult& r) {
+  const Confirmation& c = r.confirmation;
+  json runs = json::array(), bounds = json::array(), outcomes = json::array();
+  const auto values = [&](const Result& result) {
+    json list = json::array();
+    for (std::size_t o = 0; o < result.values.size() && o < r.outputs.size(); ++o)
+      list.push_back(number(result.values[o] / unit_of(p, r.outputs[o])));
+    return list;
+  };
+  for (const Confirmation::Run& run : c.runs) {
+    const Result& condensed = r.alpha.archive[run.sample].result;
+    runs.push_back({{"sample", run.sample},
+                    {"membership", run.membership},
+                    {"outcome", name_of_outcome(r, uncertainty::outcome_of(condensed))},
+                    {"whole_outcome", run.whole.state == Result::State::NotRun
+                                          ? json(nullptr)
+                                          : json(name_of_outcome(r, uncertainty::outcome_of(run.whole)))},
+                    {"values", values(condensed)},
+                    {"whole_values", values(run.whole)}});
+  }
+  for (const Confirmation::Bound& b : c.bounds) {
+    const std::string& output = r.outputs[static_cast<std::size_t>(b.output)];
+    const auto& level = r.alpha.outputs[static_cast<std::size_t>(b.output)].levels[static_cast<std::size_t>(b.level)];
+    const double unit = unit_of(p, output);
+    bounds.push_back({{"output", output},
+                      {"alpha", level.alpha},
+                      {"side", b.is_upper ? "upper" : "lower"},
+                      {"condensed", number((b.is_upper ? level.upper.value : level.lower.value) / unit)},
+                      {"whole", number(b.whole / unit)},
+                      {"state", to_text(b.state)}});
+  }
+  for (const Confirmation::Outcome& o : c.outcomes)
+    outcomes.push_back(
+        {{"outcome", name_of_outcome(r, o.outcome)},
+         {"sample", o.sample},
+         {"whole", o.state == Confirmation::State::NotRun ? json(nullptr) : json(name_of_outcome(r, o.whole))},
+         {"state", to_text(o.state)}});
+  return {{"limit", c.limit},
+          {"tolerance", confirmation_tolerance},
+          {"runs", runs},
+          {"bounds", bounds},
+          {"outcomes", outcomes}};
+}
+
 json fans_json(const Problem& p, const StudyResult& r) {
   json out{{"curves", json::array()}, {"fans", json::array()}, {"debris", json::array()}};
   const std::vector<Curve> curves = list_curves(p, r.alpha.archive);
@@ -271,6 +315,7 @@ json make_results_json(const Problem& p, const StudyResult& r) {
   for (const NotableRun& n : list_notable_runs(p, r)) out["notable"].push_back({{"sample", n.sample}, {"why", n.why}});
   out.update(insights_json(p, r));
   out.update(fans_json(p, r));
+  if (r.confirmation.limit > 0) out["confirmation"] = confirmation_json(p, r);
   return out;
 }
 
@@ -421,6 +466,26 @@ std::string write_debris_csv(const Problem& p, const StudyResult& r) {
   return text.empty() ? text : "outcome,alpha,x [m],y [m]\n" + text;
 }
 
+std::string write_confirmation_csv(const Problem& p, const StudyResult& r) {
+  const Confirmation& c = r.confirmation;
+  if (c.limit == 0) return {};
+  std::string text = "output,outcome,alpha,side,condensed,whole,state\n";
+  for (const Confirmation::Bound& b : c.bounds) {
+    const std::string& output = r.outputs[static_cast<std::size_t>(b.output)];
+    const auto& level = r.alpha.outputs[static_cast<std::size_t>(b.output)].levels[static_cast<std::size_t>(b.level)];
+    const double unit = unit_of(p, output);
+    text +=
+        fmt::format("{},,{},{},{},{},{}\n", cell(title_of(find_output(p, output))), cell(level.alpha),
+                    b.is_upper ? "upper" : "lower", cell((b.is_upper ? level.upper.value : level.lower.value) / unit),
+                    cell(b.whole / unit), to_text(b.state));
+  }
+  for (const Confirmation::Outcome& o : c.outcomes)
+    text +=
+        fmt::format(",{},,,{},{},{}\n", cell(name_of_outcome(r, o.outcome)), cell(name_of_outcome(r, o.outcome)),
+                    o.state == Confirmation::State::NotRun ? "" : cell(name_of_outcome(r, o.whole)), to_text(o.state));
+  return text;
+}
+
 std::vector<std::string> write_results(const std::string& folder, const Problem& p, const StudyResult& r) {
   std::vector<std::string> paths;
   const auto write = [&](const char* name, const std::string& text) {
@@ -437,6 +502,7 @@ std::vector<std::string> write_results(const std::string& folder, const Problem&
   write("boxes.csv", write_boxes_csv(p, r));
   write("fans.csv", write_fans_csv(p, r));
   write("debris.csv", write_debris_csv(p, r));
+  write("confirmation.csv", write_confirmation_csv(p, r));
   return paths;
 }
 

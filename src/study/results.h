@@ -41,6 +41,8 @@ double possibility_of(const StudyResult&, const uncertainty::ClassBounds&);
 /// Entropies of all inputs over that of an output, each part of the size of its core value (theory, equation (12)); NaN
 /// where one of them is 0 or the output has a level without value.
 double calc_robustness_of(const Problem&, const StudyResult&, std::size_t output);
+/// What whole runs say of a condensed study's bounds and outcomes, one row each; empty without such runs.
+std::string write_confirmation_csv(const Problem&, const StudyResult&);
 
 /// Writes all of them into a folder; returns the paths.
 std::vector<std::string> write_results(const std::string& folder, const Problem&, const StudyResult&);

@@ -45,6 +45,20 @@ inline int wait_for(pid_t pid) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
 }
 
+/// A port of the loopback that nobody listens on.
+inline int find_port() {
+  const int s = socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in place{};
+  place.sin_family = AF_INET;
+  place.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof place;
+  if (bind(s, reinterpret_cast<sockaddr*>(&place), size) != 0 ||
+      getsockname(s, reinterpret_cast<sockaddr*>(&place), &size) != 0)
+    throw std::runtime_error("no free port");
+  close(s);
+  return ntohs(place.sin_port);
+}
+
 class Server {
  public:
   /// nullptr where PostgreSQL is not installed, or the build cannot reach one.
@@ -115,19 +129,6 @@ class Server {
     if (code != 0) throw std::runtime_error("initdb failed; see " + (folder_ / "log").string());
     start();
   }
-  static int find_port() {
-    const int s = socket(AF_INET, SOCK_STREAM, 0);
-    sockaddr_in place{};
-    place.sin_family = AF_INET;
-    place.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t size = sizeof place;
-    if (bind(s, reinterpret_cast<sockaddr*>(&place), size) != 0 ||
-        getsockname(s, reinterpret_cast<sockaddr*>(&place), &size) != 0)
-      throw std::runtime_error("no free port");
-    close(s);
-    return ntohs(place.sin_port);
-  }
-
   std::filesystem::path programs_, folder_;
   const passwd* user_ = nullptr;
   int port_ = 0;
