@@ -146,7 +146,7 @@ void print_confirmation(std::FILE* out, const Problem& p, const StudyResult& r) 
   const auto count = [&c](State s) {
     return std::count_if(c.bounds.begin(), c.bounds.end(), [s](const auto& b) { return b.state == s; });
   };
-  print_heading(out, fmt::format("Runs were condensed; {} whole runs beside them", c.runs.size()));
+  print_heading(out, fmt::format("Runs were condensed; {} whole runs beside them", c.runs.size()).c_str());
   print_line(out, fmt::format("bounds: {} confirmed, {} exceeded, {} not reached, {} not run (at most {} whole runs)",
                               count(State::Confirmed), count(State::Exceeded), count(State::NotReached),
                               count(State::NotRun), c.limit));

@@ -315,6 +315,7 @@ class Manager {
     }
     limit_ = static_cast<int>(asked_) + static_cast<int>(points.size());
     is_confirming_ = true;
+    show(true);
     std::vector<Result> results(points.size());
     evaluate(points, results);
     is_confirming_ = false;

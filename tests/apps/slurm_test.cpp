@@ -18,8 +18,8 @@ TEST_F(StudySlurm, IsTheSameAsOnOneMachineWhateverHappensToItsWorkers) {
   ASSERT_EQ(run(study("whole", "jump 0 crash", {"--samples", "600"})), 0) << read(folder / "log");
 
   // as docs/study.md shows it: the study here, an array of workers there
-  const pid_t manager = start(study(
-      "cluster", "jump 10 crash", {"--samples", "600", "--store", server->url(), "--jobs", "0", "--lease", "1 s"}));
+  const pid_t manager = start(study("cluster", "jump 10 crash",
+                                    {"--samples", "600", "--store", server->url(), "--jobs", "0", "--lease", "1 s"}));
   auto db = open_database(server->url());
   wait_until([&] { return number(*db, "SELECT count(*) FROM pg_tables WHERE tablename = 'result'") == 1; });
   const auto submit = [&](const std::string& array) {

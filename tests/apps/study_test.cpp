@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "../collapse/plans.h"
 #include "study_program.h"
 
 namespace topple::study {
@@ -128,6 +129,44 @@ TEST_F(StudyFaults, LeaveAStudyInAFileAsItWouldBe) {
   const long count = results(*db);
   EXPECT_EQ(run(words), 0);
   EXPECT_EQ(results(*db), count);
+}
+
+TEST_F(StudyFaults, LeaveACondensedStudyOfAPlanAsItWouldBe) {
+  std::ofstream(folder / "plan.toml") << collapse::house(
+      collapse::charge("C-A*-0") + collapse::charge("C-B*-0", "0.2 s") +
+      "[fuzzy]\nconcrete.C25.fc = { triangular = [\"15 N/mm2\", \"25 N/mm2\", \"45 N/mm2\"] }\n");
+  const auto words = [&](const std::string& out) {
+    return std::vector<std::string>{
+        TOPPLE_PROGRAM, "study", folder / "plan.toml", "-o",        folder / out, "--samples", "60", "--jobs", "1",
+        "--alpha",      "0,1",   "--condensed",        "--confirm", "10"};
+  };
+  ASSERT_EQ(run(words("whole")), 0) << read(folder / "log");
+  const json r = json::parse(read(folder / "whole/results.json"));
+  EXPECT_EQ(r["confirmation"]["runs"].size(), 10u);
+
+  // killed while it searches, later, and while whole runs confirm it
+  for (const long after : {5, 35, 63}) {
+    const pid_t manager = start(words("faulty"));
+    wait_until([&] { return std::filesystem::exists(folder / "faulty/study.sqlite"); });
+    const auto db = open_database(folder / "faulty/study.sqlite");
+    wait_until([&] { return number(*db, "SELECT count(*) FROM sqlite_master WHERE name = 'result'") == 1; });
+    wait_until([&] { return results(*db) > after; });
+    kill(manager, SIGKILL);
+    EXPECT_EQ(wait_for(manager), -SIGKILL);
+  }
+  EXPECT_EQ(run(words("faulty")), 0) << read(folder / "log");
+  const auto db = open_database(folder / "faulty/study.sqlite");
+  expect_one_result_each(*db);
+  expect_same("whole", "faulty");
+  EXPECT_EQ(read(folder / "whole/confirmation.csv"), read(folder / "faulty/confirmation.csv"));
+  EXPECT_EQ(read(folder / "whole/trajectories.csv"), read(folder / "faulty/trajectories.csv"));
+  // what was found says how, and a study of whole runs does not go on with it
+  EXPECT_EQ(run({TOPPLE_PROGRAM, "study", "show", folder / "faulty"}), 0);
+  EXPECT_NE(read(folder / "log").find("Runs were condensed; 10 whole runs beside them"), std::string::npos);
+  std::vector<std::string> other = words("faulty");
+  other.resize(other.size() - 3);
+  EXPECT_EQ(run(other), 2);
+  EXPECT_NE(read(folder / "log").find("E822"), std::string::npos);
 }
 
 }  // namespace
