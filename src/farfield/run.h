@@ -21,6 +21,7 @@ struct FeOptions {
 
 struct FeCallbacks {
   std::function<void(const Whole&, const MeshReport&)> on_mesh;
+  std::function<void(int steps)> on_settling;  // now and then while a load is put on without motion
   std::function<void(const fem::RelaxationSummary&)> on_relaxed;
 };
 
