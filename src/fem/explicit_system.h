@@ -39,10 +39,10 @@ struct RelaxationOptions {
 };
 struct RelaxationSummary {
   bool converged = false;
-  int steps = 0;
-  double residual = 0;    // out-of-balance over load
-  double settlement = 0;  // largest displacement [m]
-  std::string text;       // a sentence
+  int steps = 0, stops = 0;  // stops: peaks of the kinetic energy
+  double residual = 0;       // out-of-balance over load
+  double settlement = 0;     // largest displacement [m]
+  std::string text;          // a sentence
 };
 
 /// Energies since the start or the last relaxation [J]. Their sum (eq. 25 there) closes but for the error of the step.

@@ -47,12 +47,12 @@ RelaxationSummary relax_system(ExplicitSystem::Inside& in, const RelaxationOptio
   for (const std::uint32_t row : in.loaded)
     for (size_t c = 0; c < 3; ++c) load2 += std::pow(in.loads[4 * row + c], 2);
 
-  std::vector<Vec3> before(N), residual(N);
+  std::vector<Vec3> before(N);
   kernel::StepJob step = in.make_step();
   step.removes = false, step.linear = step.quadratic = 0;
   for (double& fall : step.fall) fall = 0;
-  double damping = 0.1 / in.h;
-  bool known = false;
+  double last_kinetic = 0;
+  bool rests = true;
   const long long steps = s.steps;
   for (; summary.steps < options.most_steps && !progress.is_cancelled(); ++summary.steps) {
     const double ramp = std::min(1.0, (summary.steps + 1.0) / std::max(1, options.ramp));
@@ -67,29 +67,36 @@ RelaxationSummary relax_system(ExplicitSystem::Inside& in, const RelaxationOptio
       const double* r = s.rows.data() + 8 * size_t{row};
       before[row] = {r[4], r[5], r[6]};
     }
-    const double half = 0.5 * damping * in.h;
-    step.keep = (1 - half) / (1 + half), step.kick = in.h / (1 + half);
+    // while loads rise, damped; then free from one peak of the kinetic energy to the next
+    const double half = ramp < 1 ? 0.05 : 0;
+    step.keep = (1 - half) / (1 + half),
+    step.kick = in.h / (1 + half) * (rests ? 0.5 : 1);  // leapfrog from rest begins with half a kick
+    rests = false;
     in.advance_nodes(step, s);
     s.grounded.clear();
     for (const auto& rows : in.grounded) s.grounded.insert(s.grounded.end(), rows.begin(), rows.end());
 
-    // out of balance, and the lowest mode in the motion by its Rayleigh quotient
-    double out2 = 0, stiff = 0, moving = 0;
+    double out2 = 0, kinetic = 0;
     for (const std::uint32_t row : live) {
       const double* r = s.rows.data() + 8 * size_t{row};
-      Vec3 f;
       for (int c = 0; c < 3; ++c)
-        if ((s.flags[row] & (1 << c)) == 0) f[c] = (r[4 + c] - step.keep * before[row][c]) / (step.kick * r[3]);
-      out2 += dot(f, f);
-      if (known) stiff += dot(before[row], residual[row] - f), moving += dot(before[row], before[row]) / r[3];
-      residual[row] = f;
+        if ((s.flags[row] & (1 << c)) == 0) {
+          const double f = (r[4 + c] - step.keep * before[row][c]) / (step.kick * r[3]);
+          out2 += f * f;
+          kinetic += r[4 + c] * r[4 + c] / r[3];
+        }
     }
-    // while the load rises the residual does so with it: no quotient then
-    if (known && ramp >= 1 && moving > 0) {
-      const double square = std::max(0.0, stiff / (in.h * moving));
-      damping = std::clamp(2 * std::sqrt(square), 1e-4 / in.h, 1.5 / in.h);
+    if (ramp >= 1 && kinetic < last_kinetic) {
+      // the mode that leads stands in its equilibrium: back to the places of the stresses, and stop
+      for (const std::uint32_t row : live) {
+        double* r = s.rows.data() + 8 * size_t{row};
+        for (int c = 0; c < 3; ++c) r[c] -= in.h * r[4 + c], r[4 + c] = 0;
+      }
+      kinetic = 0;
+      rests = true;
+      ++summary.stops;
     }
-    known = true;
+    last_kinetic = kinetic;
     summary.residual = std::sqrt(out2 / load2);
     if (ramp >= 1 && summary.residual < options.tolerance) {
       summary.converged = true;
