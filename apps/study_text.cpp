@@ -77,14 +77,14 @@ std::string words_of_drivers(const Problem& p, const std::vector<uncertainty::Dr
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return drivers[a].first > drivers[b].first; });
   std::string known, unknown;
+  const std::vector<std::string> names = study::make_short_names(p.inputs);
   for (const std::size_t i : order) {
     const uncertainty::Driver& d = drivers[i];
     if (study::is_share_known(d)) {
-      known +=
-          fmt::format("{}{} {:.2f} +- {:.2f}", known.empty() ? "" : ", ", p.inputs[i].name, d.first, d.first_error);
+      known += fmt::format("{}{} {:.2f} +- {:.2f}", known.empty() ? "" : ", ", names[i], d.first, d.first_error);
       if (std::isfinite(d.total)) known += fmt::format(" (with others {:.2f})", d.total);
     } else {
-      unknown += fmt::format("{}{}", unknown.empty() ? "" : ", ", p.inputs[i].name);
+      unknown += fmt::format("{}{}", unknown.empty() ? "" : ", ", names[i]);
     }
   }
   if (known.empty()) return "unknown: no share is larger than its error";
@@ -108,7 +108,7 @@ void print_drivers(std::FILE* out, const Problem& p, const StudyResult& r) {
   if (in.knowing.empty()) return;
   print_heading(out, "If an input were known to have its core value, possibilities would be (at least)");
   for (const auto& f : in.knowing) {
-    std::string text = p.inputs[static_cast<std::size_t>(f.input)].name + ":";
+    std::string text = study::make_short_names(p.inputs)[static_cast<std::size_t>(f.input)] + ":";
     for (const auto& c : r.alpha.classes) {
       double degree = 0;
       for (const auto& k : f.classes)
@@ -131,7 +131,8 @@ void print_boxes(std::FILE* out, const Problem& p, const StudyResult& r) {
     const uncertainty::PermissibleBox& b = d.boxes[k];
     std::string text = fmt::format("box {}, {:.2g} % of the support: ", k + 1, 100 * b.volume);
     for (std::size_t i = 0; i < p.inputs.size(); ++i)
-      text += fmt::format("{}{} {:.4g} to {}", i ? ", " : "", p.inputs[i].name, b.box.lower[i] / p.inputs[i].unit_value,
+      text += fmt::format("{}{} {} to {}", i ? ", " : "", study::make_short_names(p.inputs)[i],
+                          study::words_of_number(b.box.lower[i] / p.inputs[i].unit_value),
                           study::words_of_value(p.inputs[i], b.box.upper[i]));
     print_line(out, text);
     print_line(out, study::tell_guarantee(b));

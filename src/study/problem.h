@@ -72,6 +72,10 @@ struct Problem {
 /// The output of that name, without a unit if it is not known beforehand.
 Quantity find_output(const Problem&, const std::string& name);
 
+/// Names for sentences and narrow columns: what stands behind the last dot of a plan's path, with as much in front as
+/// tells them apart.
+std::vector<std::string> make_short_names(const std::vector<Quantity>&);
+
 /// Name of the model in a store.
 std::string calc_model_hash(const Problem&);
 /// What a RunnerFactory gets: {"kind", "inputs": [names, derived behind], "identity": {...}, "settings": {...}}.

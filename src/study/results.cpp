@@ -270,6 +270,7 @@ json make_results_json(const Problem& p, const StudyResult& r) {
     json cuts = json::array();
     const double unit = p.inputs[i].unit_value;
     for (const auto& c : p.space.inputs[i].cuts()) cuts.push_back({c.alpha, c.left / unit, c.right / unit});
+    out["inputs"][i]["label"] = make_short_names(p.inputs)[i];
     out["inputs"][i]["cuts"] = cuts;
   }
   out["derived"] = quantities_json(p.derived);

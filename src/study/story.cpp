@@ -54,18 +54,20 @@ void tell_outcomes(const Problem& p, const StudyResult& r, std::vector<Sentence>
 
 void tell_splits(const Problem& p, const StudyResult& r, std::vector<Sentence>& out) {
   const uncertainty::Sample* core = find_core(p, r.alpha.archive);
+  const std::vector<std::string> names = make_short_names(p.inputs);
   for (const Split& s : find_splits(p.space, r.alpha.archive, r.spread)) {
     // the core's own class follows from the others
     if (s.input < 0 || (core && uncertainty::outcome_of(core->result) == s.outcome)) continue;
     const Quantity& q = p.inputs[static_cast<std::size_t>(s.input)];
     const bool is_below = s.below > s.above;
     const double more = std::max(s.below, s.above), less = std::min(s.below, s.above);
-    out.push_back({"split." + name_of_outcome(r, s.outcome),
-                   fmt::format("{} goes with {} {} {}: {} of the {} spread runs there, {} of the {} others.",
-                               quoted(name_of_outcome(r, s.outcome)), q.name, is_below ? "below" : "above",
-                               words_of_value(q, s.value), percent(more), is_below ? s.below_runs : s.above_runs,
-                               percent(less), is_below ? s.above_runs : s.below_runs),
-                   Status::Info});
+    out.push_back(
+        {"split." + name_of_outcome(r, s.outcome),
+         fmt::format("{} goes with {} {} {}: {} of the {} spread runs there, {} of the {} others.",
+                     quoted(name_of_outcome(r, s.outcome)), names[static_cast<std::size_t>(s.input)],
+                     is_below ? "below" : "above", words_of_value(q, s.value), percent(more),
+                     is_below ? s.below_runs : s.above_runs, percent(less), is_below ? s.above_runs : s.below_runs),
+         Status::Info});
   }
 }
 
@@ -106,19 +108,29 @@ std::string words_of_possibility(double degree) {
   return "not found";
 }
 
+std::string words_of_number(double value) {
+  // four digits; no powers of ten for what people write without
+  if (std::abs(value) >= 1e4 && std::abs(value) < 1e7) {
+    const double unit = std::pow(10, std::floor(std::log10(std::abs(value))) - 3);
+    return fmt::format("{:.0f}", std::round(value / unit) * unit);
+  }
+  return fmt::format("{:.4g}", value);
+}
+
 std::string words_of_value(const Quantity& q, double value) {
-  const std::string number = fmt::format("{:.4g}", value / q.unit_value);
+  const std::string number = words_of_number(value / q.unit_value);
   return q.unit.empty() ? number : number + " " + q.unit;
 }
 
 std::string words_of_point(const Problem& p, const Point& x) {
   std::string text;
+  const std::vector<std::string> names = make_short_names(p.inputs);
   for (std::size_t i = 0; i < p.inputs.size(); ++i) {
     const uncertainty::FuzzyNumber& f = p.space.inputs[i];
     const double away = std::max({x[i] - f.core().right, f.core().left - x[i], 0.0});
     if (!(away > 0.01 * f.width())) continue;
-    text += fmt::format("{}{} {} (core {:.4g})", text.empty() ? "" : ", ", p.inputs[i].name,
-                        words_of_value(p.inputs[i], x[i]), f.centre() / p.inputs[i].unit_value);
+    text += fmt::format("{}{} {} (core {})", text.empty() ? "" : ", ", names[i], words_of_value(p.inputs[i], x[i]),
+                        words_of_number(f.centre() / p.inputs[i].unit_value));
   }
   return text.empty() ? "values within a hundredth of the core" : text;
 }

@@ -264,6 +264,15 @@ TEST(Fans, PartTrajectoriesByCurveAndOutcome) {
   EXPECT_NE(write_debris_csv(p, r).find("outcome,alpha,x [m],y [m]"), std::string::npos);
 }
 
+TEST(Story, UsesShortNamesAndRoundNumbers) {
+  EXPECT_EQ(make_short_names({{"concrete.a.fc", "", 1}, {"concrete.b.fc", "", 1}, {"fy", "", 1}, {"x.Ec", "", 1}}),
+            (std::vector<std::string>{"a.fc", "b.fc", "fy", "Ec"}));
+  EXPECT_EQ(make_short_names({{"a", "", 1}, {"a", "", 1}}), (std::vector<std::string>{"a", "a"}));
+  EXPECT_EQ(words_of_number(27187.4), "27190");
+  EXPECT_EQ(words_of_number(-3.14159), "-3.142");
+  EXPECT_EQ(words_of_number(2e8), "2e+08");
+}
+
 TEST(Story, SaysWhatIsPossibleAndWhatTurnsIt) {
   const Folder folder;
   Problem p = make_small_problem(2000);

@@ -15,8 +15,8 @@ const round = (v) => Number(v.toPrecision(7));
 /// A study of `count` runs over two inputs; the outcome jumps where fc is low, and the last run failed.
 export function makeStudy(count = 60) {
   const inputs = [
-    { name: "fc", unit: "N/mm2", cuts: [[0, 10, 45], [1, 25, 25]] },
-    { name: hostile, unit: "", cuts: [[0, 0, 2], [1, 1, 1]] },
+    { name: "fc", label: "fc", unit: "N/mm2", cuts: [[0, 10, 45], [1, 25, 25]] },
+    { name: hostile, label: hostile, unit: "", cuts: [[0, 0, 2], [1, 1, 1]] },
   ];
   const times = Array.from({ length: 11 }, (_, k) => 0.17 * k);
   const rows = Array.from({ length: count }, (_, r) => {

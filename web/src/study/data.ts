@@ -26,6 +26,7 @@ export interface Outcome {
 }
 export interface Input {
   name: string;
+  label: string; // short name
   unit: string;
   cuts: [number, number, number][]; // alpha, left, right
 }

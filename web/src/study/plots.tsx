@@ -221,7 +221,7 @@ export function DebrisPlan(props: { state: State }) {
           const corner = l.corners.reduce<Point | undefined>((best, p) => (best === undefined || p[1] > best[1] ? p : best), undefined);
           return corner === undefined ? null : <text class="level-text" x={x(corner[0]) + 26 * (i - debris.levels.length / 2)} y={y(corner[1]) - 3} text-anchor="middle">{l.alpha}</text>;
         })}
-        {study.site.neighbours.map((n) => n.footprint[0] !== undefined && <text class="level-text" x={x(n.footprint[0][0])} y={y(n.footprint[0][1]) - 4}>{n.name}</text>)}
+        {study.site.neighbours.map((n) => n.footprint[0] !== undefined && <text class="level-text" x={x(n.footprint[0][0])} y={y(n.footprint[0][1]) - 4} text-anchor={x(n.footprint[0][0]) > 0.7 * width ? "end" : "start"}>{n.name}</text>)}
       </svg>
       <p class="quiet plot-note">
         Seen from above; the strong line is the building. Outside the outline of a degree no part of any run that is possible to that degree lay at the end of its

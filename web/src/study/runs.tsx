@@ -264,7 +264,7 @@ export function Runs(props: { state: State }) {
                 <th scope="col">run</th>
                 <th scope="col">outcome</th>
                 <th scope="col">possibility</th>
-                {study.inputs.map((q) => <th scope="col">{titleOf(q)}</th>)}
+                {study.inputs.map((q) => <th scope="col">{titleOf({ name: q.label, unit: q.unit })}</th>)}
                 {study.outputs.slice(0, 3).map((q) => <th scope="col">{titleOf(q)}</th>)}
               </tr>
             </thead>

@@ -37,7 +37,7 @@ export function makeState(study: Study) {
   const table = study.run_table;
   const column = (rows: Maybe[][], k: number): Maybe[] => rows.map((row) => row[k] ?? null);
   const axes = [
-    ...study.inputs.map((q, k) => makeAxis(`input.${k}`, titleOf(q), column(table.inputs, k))),
+    ...study.inputs.map((q, k) => makeAxis(`input.${k}`, titleOf({ name: q.label, unit: q.unit }), column(table.inputs, k))),
     ...study.outputs.map((q, k) => makeAxis(`output.${k}`, titleOf(q), column(table.outputs, k))),
     makeAxis("membership", "possibility of the inputs", table.membership),
   ];

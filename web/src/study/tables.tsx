@@ -39,7 +39,7 @@ export function Drivers(props: { state: State }) {
           <div class="scroller free" tabIndex={0} role="region" aria-label="Table of drivers">
             <table class="drivers">
               <thead>
-                <tr><th scope="col" />{study.inputs.map((q) => <th scope="col">{q.name}</th>)}</tr>
+                <tr><th scope="col" />{study.inputs.map((q) => <th scope="col" title={q.name}>{q.label}</th>)}</tr>
               </thead>
               <tbody>
                 {rows.map((row) => (
