@@ -46,6 +46,7 @@ struct Box {
 struct Face {
   std::uint32_t number = 0;
   Vec3 centre, normal;
+  Vec3 along, across;  // ξ and η of a point from the middle by scalar products
   double radius = 0, depth = 0;
 };
 struct Point {
@@ -191,6 +192,9 @@ class Search {
         face.centre = 0.25 * (x[0] + x[1] + x[2] + x[3]);
         const Vec3 n = cross(x[2] - x[0], x[3] - x[1]);
         face.normal = (1 / std::max(norm(n), 1e-300)) * n;
+        const Vec3 a = 0.25 * (x[1] + x[2] - x[0] - x[3]), b = 0.25 * (x[2] + x[3] - x[0] - x[1]);
+        const double area = std::max(dot(cross(a, b), face.normal), 1e-300);
+        face.along = (1 / area) * cross(b, face.normal), face.across = (1 / area) * cross(face.normal, a);
         for (const Vec3& p : x) face.radius = std::max(face.radius, norm(p - face.centre)), skin.box.add(p, 0);
         face.depth = kFaceDepth * std::max(0.0, dot(face.normal, face.centre - far));
         skin.faces.push_back(face);
@@ -227,6 +231,11 @@ class Search {
         const double height = dot(d, face.normal), reach = face.radius + near;
         if (height > near || height < -(face.depth + setup_.margin) ||
             dot(d, d) > reach * reach + face.depth * face.depth)
+          continue;
+        // beside the face by more than the margin, or what an uneven one may hide
+        constexpr double kUneven = 0.1;
+        if (std::abs(dot(d, face.along)) > 1 + kUneven + near * norm(face.along) ||
+            std::abs(dot(d, face.across)) > 1 + kUneven + near * norm(face.across))
           continue;
         if (!are_joined(q.point, face.number)) found.push_back({q.point, face.number});
       }
