@@ -174,6 +174,7 @@ class Design {
     PermissibleBox b;
     b.group = g, b.centre = centre;
     const Point middle = asker_.archive()[centre].x;
+    b.box = {middle, middle};
     const int limit = asker_.limit(), end = asker_.asked() + share;
     asker_.set_limit(std::min(limit, end));
     Random random(options_.seed + 104729 * static_cast<std::uint64_t>(g + 1));

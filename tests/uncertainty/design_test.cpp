@@ -74,6 +74,19 @@ TEST(DesignPhysics, SaysLittleButTrueThingsFromFewRuns) {
   EXPECT_LE(wrong, 1);
 }
 
+TEST(Design, KeepsNoBoxWithoutRunsForIt) {
+  DesignOptions options;
+  options.space_points = 60;
+  const Found f = find(Space{std::vector<FuzzyNumber>(3, make_triangular(0, 0.4, 1)), {}, {}},
+                       make_model([](const Point& x) { return x[0] + x[1] < 1.3; }), outcome_0, options, 60);
+  EXPECT_EQ(f.archive.size(), 60u);
+  EXPECT_EQ(f.design.ending, Ending::LimitReached);
+  for (const auto& b : f.design.boxes) {
+    EXPECT_FALSE(b.kept);
+    EXPECT_EQ(b.box.lower.size(), 3u) << "a box all the same: its centre";
+  }
+}
+
 // x1 x2 / 100 >= 8: permissible on .879201442 of the support; the largest box from the upper corner reaches to
 // (20.225996, 39.553059) and has the area 1200.224726.
 TEST(DesignReference, BoxesOfTheJump) {
