@@ -58,7 +58,7 @@ export function makePlotted(comparison: Comparison, a: Run): Compared["plotted"]
   const rank = (id: string): number => (asked.includes(id) ? asked.indexOf(id) : asked.length);
   const wanted = comparison.series.filter((s) => asked.includes(s.id) || s.group === "energy" || s.group === "force");
   for (const s of wanted.sort((x, y) => rank(x.id) - rank(y.id))) {
-    titles[s.id] = s.group === "energy" ? `${s.title} energy`.replace("energy energy", "energy") : s.title;
+    titles[s.id] = s.group === "energy" ? `Energy: ${s.title.charAt(0).toLowerCase()}${s.title.slice(1)}` : s.title;
     series.push({ id: `${s.id} A`, title: `A ${nameA}`, unit: s.unit, group: s.id, value: s.a });
     series.push({ id: `${s.id} B`, title: `B ${nameB}`, unit: s.unit, group: s.id, value: s.b });
   }
