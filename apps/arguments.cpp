@@ -22,6 +22,7 @@ std::variant<Arguments, int> parse_arguments(int argc, char** argv) {
   topple mbs compare out/model.json                the same model on other engines (docs/engines.md)
   topple mbs verify                                the engine against known answers (docs/verification.md)
   topple report out/record.h5 -o report.html       make the page from a record
+  topple import building.ifc -o plan.toml          a plan with its gaps marked "?" (docs/imports.md)
   topple export out/record.h5 --vtk -o out/vtk     for ParaView; --gltf, --csv, --json (docs/exports.md)
   topple export out/model.json --adams -o out/model.adm
                                                    for MSC.ADAMS
@@ -122,6 +123,12 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
       ->needs(lsdyna);
   lsdyna->excludes(adams);
   for (CLI::Option* other : {vtk, gltf, csv, as_json, rate}) adams->excludes(other), lsdyna->excludes(other);
+
+  CLI::App* import = app.add_subcommand(
+      "import", "Make a plan with marked gaps from an IFC file, or a site from a DXF drawing (docs/imports.md).");
+  import->add_option("file", a.input, "building (.ifc) or site (.dxf)")->required();
+  import->add_option("-o,--output", a.output, "plan to write; an existing one is left alone")->required();
+  import->add_option("--unit", a.unit, "of a drawing's numbers, such as \"1 mm\", whatever its header says");
 
   CLI::App* rcc = app.add_subcommand("rcc", "Compute the resistance curves of a zone of a section, or of a member.");
   rcc->add_option("file", a.input, "section (TOML), or a plan with --member")->required();
@@ -260,6 +267,7 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
       return kBadInput;
     }
   }
+  if (import->parsed()) a.verb = Verb::Import;
   if (rcc->parsed()) a.verb = Verb::Rcc;
   if (compare->parsed()) a.verb = Verb::Compare;
   if (fe->parsed()) {

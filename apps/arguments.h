@@ -23,6 +23,7 @@ struct Arguments {
     MbsVerify,
     Report,
     Export,
+    Import,
     Compare,
     Fe,
     Rcc,
@@ -35,6 +36,7 @@ struct Arguments {
   std::string output;     // folder or file
   std::string knowledge;  // file of rules, empty: built in
   std::string engine = "native";
+  std::string unit;                        // of a drawing, as typed
   std::string markdown, json_file;         // files to write, empty: none
   std::string engines;                     // names between commas, empty: all
   std::string accuracy;                    // relative, as typed

@@ -39,6 +39,8 @@ int dispatch(const topple::apps::Arguments& a) {
       return topple::apps::write_report_file(a);
     case Arguments::Verb::Export:
       return topple::apps::export_file(a);
+    case Arguments::Verb::Import:
+      return topple::apps::import_file(a);
     case Arguments::Verb::Rcc:
       return topple::apps::compute_rcc(a, cancel);
     case Arguments::Verb::Study:

@@ -12,6 +12,15 @@ namespace {
 
 constexpr std::uintmax_t largest_file = 8u << 20;
 
+/// Every "?" is a place that somebody still has to fill in.
+void find_gaps(const Node& node, const std::string& path, Complaints& complaints) {
+  if (node.kind == Node::Kind::String && node.text == "?")
+    complaints.error("E211", node.place, path + ": is a gap", "write what it is; nothing is checked or run before");
+  for (size_t i = 0; i < node.items.size(); ++i)
+    find_gaps(node.items[i], path + "[" + std::to_string(i) + "]", complaints);
+  for (const Entry& e : node.entries) find_gaps(e.value, path.empty() ? e.key : path + "." + e.key, complaints);
+}
+
 }  // namespace
 
 Plan read_plan_document(const Node& document, const std::string& name, Complaints& complaints, bool is_sample) {
@@ -53,6 +62,11 @@ Plan read_plan(const std::string& text, const std::string& name, std::vector<Dia
   std::string bytes = text.starts_with(byte_order_mark) ? text.substr(3) : text;
   const Node document = parse_document(bytes, name);
   Complaints complaints(name);
+  find_gaps(document, "", complaints);
+  if (complaints.error_count() > 0) {
+    complaints.sort();
+    throw InputError(complaints.all());
+  }
   Plan plan = read_plan_document(document, name, complaints, false);
   plan.text = std::move(bytes);
   if (complaints.error_count() == 0) try_samples(plan, document, complaints);

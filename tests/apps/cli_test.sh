@@ -85,7 +85,7 @@ TEXT
 readme)
   # every command in the shell blocks of these pages exists
   commands=0
-  for page in README.md docs/getting-started.md docs/run.md docs/mbs-model.md docs/engines.md docs/rcc.md docs/study.md docs/exports.md; do
+  for page in README.md docs/getting-started.md docs/run.md docs/mbs-model.md docs/engines.md docs/rcc.md docs/study.md docs/exports.md docs/imports.md; do
     while read -r word verb rest; do
       case $word in
       script/*) [ -x "$source/$word" ] || { echo "$page shows $word, which cannot be called"; failures=$((failures + 1)); } ;;
@@ -142,6 +142,18 @@ records)
   expect 2 "$topple" compare r/record.h5 r/record.h5 -o none --photos photos.csv; has err "photos.csv:1:1: error E681"
   expect 2 "$topple" compare r/record.h5 missing.h5 -o none; expect 2 "$topple" compare r/record.h5 -o none
   [ ! -e none ] || { echo "a folder was made for wrong records"; failures=$((failures + 1)); }
+  ;;
+import)
+  printf '%s\n' 0 SECTION 2 ENTITIES 0 LWPOLYLINE 8 Houses 70 1 10 20 20 0 10 30 20 0 10 30 20 9 0 ENDSEC 0 EOF >site.dxf
+  expect 0 "$topple" import site.dxf -o site.toml; has site.toml "[[site.neighbour]]"; has out "1 gaps are marked"; has out "Guessed"
+  expect 2 "$topple" import site.dxf -o site.toml; has err "exists already"
+  expect 2 "$topple" import site.dxf -o other.toml --unit "1 s"; has err "--unit"
+  cat "$plan" site.toml >gaps.toml
+  expect 2 "$topple" check gaps.toml; has err "E211"; has err "site.neighbour[0].clearance"; has err "^"
+  expect 2 "$topple" run gaps.toml -o never; has err "E211"; [ ! -e never ] || failures=$((failures + 1))
+  expect 2 "$topple" import "$plan" -o x.toml; has err "neither"
+  echo hello >b.ifc; expect 2 "$topple" import b.ifc -o x.toml; has err "b.ifc:1"; has err "E111"
+  expect 2 "$topple" import nowhere.ifc -o x.toml
   ;;
 export)
   expect 0 "$topple" run "$plan" -o r --no-report

@@ -1,0 +1,51 @@
+#include "product/import.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdio>
+#include <filesystem>
+
+#include "base/file.h"
+#include "commands.h"
+#include "results.h"
+
+namespace topple::apps {
+
+namespace {
+
+void print_list(const char* heading, const std::vector<std::string>& list) {
+  if (list.empty()) return;
+  std::printf("\n%s\n", heading);
+  for (const std::string& s : list) std::printf("  %s\n", s.c_str());
+}
+
+}  // namespace
+
+int import_file(const Arguments& a) {
+  namespace fs = std::filesystem;
+  try {
+    const fs::path path(a.input);
+    std::string kind = path.extension().string();
+    std::transform(kind.begin(), kind.end(), kind.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    if (kind != ".ifc" && kind != ".dxf")
+      throw InputError("E114", a.input + " is neither .ifc nor .dxf", "give a building (IFC) or a site (DXF)");
+    if (fs::exists(a.output))
+      throw InputError("E802", a.output + " exists already and is left as it is", "choose another name");
+    const std::string text = read_file(a.input), name = path.filename().string();
+    const double unit = read_quantity(a.unit, Dimension::Length, "--unit");
+    const product::Import made = kind == ".ifc" ? product::make_plan_text(product::read_ifc(text, a.input), name)
+                                                : product::make_site_text(text, a.input, unit);
+    replace_file(a.output, made.text);
+    std::printf("Wrote %s\n", a.output.c_str());
+    print_list("Taken", made.report.taken);
+    print_list("Guessed; look at it", made.report.guessed);
+    print_list("Missing", made.report.missing);
+    int gaps = -1;  // the first line has one too
+    for (size_t at = 0; (at = made.text.find("\"?\"", at)) != std::string::npos; ++at) ++gaps;
+    std::printf("\n%d gaps are marked \"?\"; topple check names them.\n", gaps);
+    return kOk;
+  } catch (const InputError& e) { return refuse(e, {}, {}, false); }
+}
+
+}  // namespace topple::apps

@@ -1,0 +1,45 @@
+#pragma once
+/// Columns, beams, slabs, walls and bars of an IFC file as upright boxes: what an importer needs of the semantics.
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "base/linalg.h"
+#include "product/step_file.h"
+
+namespace topple::product {
+
+/// An element whose body is an extruded profile; world axes turned by IfcBuilding::angle about z.
+struct IfcElement {
+  std::string type;      // "IFCCOLUMN"
+  std::string name;      // as the file has it
+  std::string material;  // empty: none given
+  int id = 0;
+  bool has_box = false;  // false: its body is no extrusion of a profile that is understood
+  bool is_round = false;
+  Vec3 low, high;  // box [m]
+};
+
+struct IfcBar {
+  double diameter = 0;  // [m]
+  std::string grade;
+  bool is_main = true;  // not a tie or stirrup
+  bool has_place = false;
+  Vec3 place;    // of its start, in the same axes [m]
+  int host = 0;  // element that it is part of, 0: not said
+};
+
+struct IfcBuilding {
+  std::string schema, name;
+  double length_unit = 1;                               // [m]
+  double angle = 0;                                     // of the building's own axes against the file's x [rad]
+  std::vector<std::pair<std::string, double>> storeys;  // name, elevation [m], rising
+  std::vector<IfcElement> elements;
+  std::vector<IfcBar> bars;
+};
+
+/// Reads a file of IFC2X3 or IFC4. Throws InputError: E111 no STEP file, E112 another schema or no elements.
+IfcBuilding read_ifc(const std::string& text, const std::string& name);
+
+}  // namespace topple::product

@@ -1,0 +1,188 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+#include <regex>
+#include <sstream>
+
+#include "base/error.h"
+#include "product/import.h"
+
+namespace topple::product {
+
+namespace {
+
+/// A pair of lines of the file: group code and value.
+struct Pair {
+  int code = 0;
+  std::string value;
+};
+
+std::vector<Pair> read_pairs(const std::string& text, const std::string& name) {
+  std::vector<Pair> out;
+  std::istringstream in(text);
+  std::string code, value;
+  int line = 1;
+  const auto trimmed = [](std::string s) {
+    const size_t from = s.find_first_not_of(" \t\r"), to = s.find_last_not_of(" \t\r");
+    return from == std::string::npos ? std::string() : s.substr(from, to - from + 1);
+  };
+  for (; std::getline(in, code) && std::getline(in, value); line += 2) {
+    char* end = nullptr;
+    const std::string word = trimmed(code);
+    const long number = std::strtol(word.c_str(), &end, 10);
+    if (word.empty() || *end != '\0')
+      throw InputError(
+          std::vector<Diagnostic>{{Severity::Error,
+                                   "E113",
+                                   {name, line, 1},
+                                   1,
+                                   "is no DXF text: a group code is wanted, there is \"" + word.substr(0, 20) + "\"",
+                                   "save the drawing as DXF in ASCII"}});
+    out.push_back({static_cast<int>(number), trimmed(value)});
+  }
+  return out;
+}
+
+/// Metres of a unit of $INSUNITS; 0: not said.
+double unit_of(int code) {
+  switch (code) {
+    case 1:
+      return 0.0254;
+    case 2:
+      return 0.3048;
+    case 4:
+      return 1e-3;
+    case 5:
+      return 1e-2;
+    case 6:
+      return 1;
+    case 7:
+      return 1e3;
+    default:
+      return 0;
+  }
+}
+
+struct Outline {
+  std::string layer;
+  bool is_closed = false, has_arcs = false;
+  std::vector<std::array<double, 2>> corners;
+};
+
+std::vector<Outline> find_outlines(const std::vector<Pair>& pairs) {
+  std::vector<Outline> out;
+  std::string section;
+  bool in_polyline = false, in_vertex = false;
+  Outline now;
+  std::string entity;
+  const auto finish = [&] {
+    if (entity == "LWPOLYLINE" || entity == "POLYLINE") out.push_back(now);
+    now = {};
+    entity.clear();
+  };
+  for (size_t i = 0; i < pairs.size(); ++i) {
+    const Pair& p = pairs[i];
+    if (p.code == 0) {
+      if (in_polyline && (p.value == "VERTEX" || p.value == "SEQEND")) {
+        in_vertex = p.value == "VERTEX";
+        if (!in_vertex) {
+          finish();
+          in_polyline = false;
+        }
+        continue;
+      }
+      finish();
+      in_polyline = in_vertex = false;
+      if (section != "ENTITIES") {
+        if (p.value == "SECTION" && i + 1 < pairs.size()) section = pairs[i + 1].value;
+        continue;
+      }
+      if (p.value == "ENDSEC") section.clear();
+      entity = p.value;
+      in_polyline = p.value == "POLYLINE";
+      continue;
+    }
+    if (entity.empty()) continue;
+    const double x = std::atof(p.value.c_str());
+    const bool has_corner = entity == "LWPOLYLINE" || in_vertex;
+    if (p.code == 8 && !in_vertex) now.layer = p.value;
+    if (p.code == 70 && !in_vertex) now.is_closed = (std::atoi(p.value.c_str()) & 1) != 0;
+    if (p.code == 10 && has_corner) now.corners.push_back({x, 0});
+    if (p.code == 20 && has_corner && !now.corners.empty()) now.corners.back()[1] = x;
+    if (p.code == 42 && has_corner && x != 0) now.has_arcs = true;
+  }
+  return out;
+}
+
+}  // namespace
+
+Import make_site_text(const std::string& dxf, const std::string& file_name, double unit) {
+  const std::vector<Pair> pairs = read_pairs(dxf, file_name);
+  Import out;
+  if (unit <= 0) {
+    for (size_t i = 0; i + 1 < pairs.size(); ++i)
+      if (pairs[i].code == 9 && pairs[i].value == "$INSUNITS") unit = unit_of(std::atoi(pairs[i + 1].value.c_str()));
+    if (unit > 0) {
+      out.report.taken.push_back(fmt::format("the drawing's unit is {:g} m, from its header", unit));
+    } else {
+      unit = 1;
+      out.report.guessed.push_back("the drawing's numbers are metres: its header does not say");
+    }
+  }
+  static const std::regex utility(
+      "utilit|gas|water|wasser|power|strom|kabel|cable|sewer|kanal|pipe|leitung|fernw|telek", std::regex::icase);
+  std::map<std::string, int> count;
+  std::string neighbours, utilities;
+  int open = 0, arcs = 0, small = 0, taken = 0;
+  for (Outline& o : find_outlines(pairs)) {
+    if (o.corners.size() > 1 &&
+        std::hypot(o.corners.front()[0] - o.corners.back()[0], o.corners.front()[1] - o.corners.back()[1]) * unit <
+            1e-3) {
+      o.is_closed = true;
+      o.corners.pop_back();
+    }
+    if (!o.is_closed) {
+      ++open;
+      continue;
+    }
+    if (o.corners.size() < 3) {
+      ++small;
+      continue;
+    }
+    arcs += o.has_arcs;
+    std::string layer;
+    for (const char c : o.layer)
+      if (c != '"' && c != '\\' && static_cast<unsigned char>(c) >= 32) layer += c;
+    const bool is_utility = std::regex_search(layer, utility);
+    std::string& to = is_utility ? utilities : neighbours;
+    to += fmt::format("[[site.{}]]\nname = \"{} {}\"\nfootprint = [", is_utility ? "utility" : "neighbour",
+                      layer.empty() ? "outline" : layer, ++count[layer]);
+    for (size_t i = 0; i < o.corners.size(); ++i)
+      to += fmt::format("{}[\"{:.3f} m\", \"{:.3f} m\"]", i > 0 ? ", " : "", o.corners[i][0] * unit,
+                        o.corners[i][1] * unit);
+    to += "]\nclearance = \"?\"\n";
+    ++taken;
+  }
+  if (taken == 0)
+    throw InputError(std::vector<Diagnostic>{{Severity::Error,
+                                              "E113",
+                                              {file_name, 0, 0},
+                                              1,
+                                              "has no closed outlines",
+                                              "neighbours are closed LWPOLYLINE or POLYLINE entities"}});
+  out.report.taken.push_back(fmt::format("{} closed outlines", taken));
+  if (!utilities.empty()) out.report.guessed.push_back("outlines on layers named like pipes and cables are utilities");
+  if (open > 0) out.report.missing.push_back(fmt::format("{} open polylines are left out", open));
+  if (small > 0)
+    out.report.missing.push_back(fmt::format("{} outlines of fewer than three corners are left out", small));
+  if (arcs > 0) out.report.guessed.push_back(fmt::format("arcs of {} outlines became straight lines", arcs));
+  out.report.guessed.push_back("x and y of the drawing are those of the plan: its origin is row A, frame 1");
+  out.report.missing.push_back("the clearance that each of them asks for");
+  out.text = "# From " + file_name + ". Every \"?\" is a gap to fill.\n" + neighbours + utilities;
+  return out;
+}
+
+}  // namespace topple::product

@@ -1,0 +1,480 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <regex>
+#include <set>
+
+#include "base/unit.h"
+#include "product/import.h"
+
+namespace topple::product {
+
+namespace {
+
+constexpr double kLeastSpacing = 0.3;  // of grid lines [m]
+constexpr double kOff = 0.6;           // how far an element may lie off its place [m]
+
+/// Quotes and control characters of a foreign text do not belong into a plan.
+std::string clean(const std::string& text) {
+  std::string out;
+  for (const char c : text)
+    if (c != '"' && c != '\\' && static_cast<unsigned char>(c) >= 32) out += c;
+  return out.substr(0, 80);
+}
+
+/// Middles of groups of values that lie closer together than the spacing of grid lines.
+std::vector<double> find_lines(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  std::vector<double> lines;
+  for (size_t i = 0; i < values.size();) {
+    size_t k = i;
+    double sum = 0;
+    while (k < values.size() && values[k] - values[i] < kLeastSpacing) sum += values[k++];
+    lines.push_back(sum / static_cast<double>(k - i));
+    i = k;
+  }
+  return lines;
+}
+int nearest(const std::vector<double>& lines, double value) {
+  int best = 0;
+  for (size_t i = 1; i < lines.size(); ++i)
+    if (std::abs(lines[i] - value) < std::abs(lines[static_cast<size_t>(best)] - value)) best = static_cast<int>(i);
+  return best;
+}
+
+std::string letters(int i) {
+  std::string out;
+  for (int n = i; n >= 0; n = n / 26 - 1) out.insert(out.begin(), static_cast<char>('A' + n % 26));
+  return out;
+}
+std::string metres(double x) { return fmt::format("\"{:.3f} m\"", std::abs(x) < 5e-4 ? 0.0 : x); }
+std::string centimetres(double x) { return fmt::format("\"{:g} cm\"", std::round(x * 1000) / 10); }
+std::string millimetres(double x) { return fmt::format("\"{:g} mm\"", std::round(x * 1e4) / 10); }
+
+/// A name that a plan can use as a key.
+std::string key_of(const std::string& text) {
+  std::string out;
+  for (const char c : text) out += std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '_';
+  return out.substr(0, 40);
+}
+
+class Planner {
+ public:
+  Planner(const IfcBuilding& b, const std::string& file) : b_(b), file_(file) {}
+
+  Import make() {
+    find_grid();
+    place_columns();
+    place_beams();
+    place_slabs();
+    place_walls();
+    count_rest();
+    write();
+    return {std::move(text_), std::move(report_)};
+  }
+
+ private:
+  struct Group {
+    std::string concrete;
+    double width = 0, height = 0;  // or thickness
+    bool is_round = false;
+    std::vector<const IfcElement*> elements;
+    std::map<int, std::vector<std::string>> places;  // by storey
+  };
+
+  void taken(std::string s) { report_.taken.push_back(std::move(s)); }
+  void guessed(std::string s) { report_.guessed.push_back(std::move(s)); }
+  void missing(std::string s) { report_.missing.push_back(std::move(s)); }
+  void left_out(const IfcElement& e, const std::string& why) { ++left_out_[e.type.substr(3) + ": " + why]; }
+
+  std::vector<const IfcElement*> all(const std::string& type) {
+    std::vector<const IfcElement*> out;
+    for (const IfcElement& e : b_.elements) {
+      if (e.type != type) continue;
+      if (e.has_box) {
+        out.push_back(&e);
+      } else {
+        left_out(e, "its body is no extruded profile");
+      }
+    }
+    return out;
+  }
+
+  void find_grid() {
+    std::vector<double> xs, ys;
+    double bottom = 1e30, top = -1e30;
+    for (const IfcElement* e : all("IFCCOLUMN")) {
+      xs.push_back(0.5 * (e->low.x + e->high.x));
+      ys.push_back(0.5 * (e->low.y + e->high.y));
+      bottom = std::min(bottom, e->low.z);
+      top = std::max(top, e->high.z);
+    }
+    rows_ = find_lines(xs);
+    frames_ = find_lines(ys);
+    // floors: the storeys between the feet and the tops of columns
+    levels_.push_back(bottom);
+    for (const auto& [name, z] : b_.storeys)
+      if (z > levels_.back() + 1 && z < top - 1) levels_.push_back(z);
+    levels_.push_back(top);
+    taken(fmt::format("{} rows by {} frames and {} storeys, from the places of {} columns and {} storeys of the file",
+                      rows_.size(), frames_.size(), levels_.size() - 1, xs.size(), b_.storeys.size()));
+    if (std::abs(b_.angle) > 1e-4)
+      guessed(fmt::format("the building's own axes, turned by {:.1f} deg against the file's x, are those of the plan",
+                          b_.angle / unit::deg));
+    guessed("the ground lies at the feet of the lowest columns; check it against the terrain");
+  }
+  int storeys() const { return static_cast<int>(levels_.size()) - 1; }
+  std::string point(int row, int frame) const { return letters(row) + std::to_string(frame + 1); }
+
+  Group& group_of(std::vector<Group>& groups, const IfcElement& e, double width, double height) {
+    const std::string concrete = e.material.empty() ? "unknown" : e.material;
+    for (Group& g : groups)
+      if (g.concrete == concrete && std::abs(g.width - width) < 2e-3 && std::abs(g.height - height) < 2e-3) return g;
+    groups.push_back({concrete, width, height, e.is_round, {}, {}});
+    return groups.back();
+  }
+
+  void place_columns() {
+    int placed = 0;
+    for (const IfcElement* e : all("IFCCOLUMN")) {
+      double w = e->high.x - e->low.x, h = e->high.y - e->low.y;
+      if (e->is_round) w = h = std::sqrt(std::acos(-1.0) / 4) * w;
+      Group& g = group_of(columns_, *e, w, h);
+      g.is_round |= e->is_round;
+      bool any = false;
+      for (int s = 0; s < storeys(); ++s) {
+        const double low = levels_[static_cast<size_t>(s)], high = levels_[static_cast<size_t>(s) + 1];
+        if (std::min(e->high.z, high) - std::max(e->low.z, low) < 0.5 * (high - low)) continue;
+        g.places[s].push_back(
+            point(nearest(rows_, 0.5 * (e->low.x + e->high.x)), nearest(frames_, 0.5 * (e->low.y + e->high.y))));
+        any = true;
+      }
+      if (any) {
+        ++placed;
+        g.elements.push_back(e);
+      } else {
+        left_out(*e, "reaches over less than half of every storey");
+      }
+    }
+    taken(fmt::format("{} columns in {} sections", placed, columns_.size()));
+    for (const Group& g : columns_)
+      if (g.is_round)
+        guessed(fmt::format("round columns became square ones of the same area, {:.0f} cm wide", 100 * g.width));
+  }
+
+  /// Storey whose upper floor is nearest to a height; -1 if none is near.
+  int storey_below(double z) const {
+    for (int s = 0; s < storeys(); ++s)
+      if (std::abs(levels_[static_cast<size_t>(s) + 1] - z) < kOff) return s;
+    return -1;
+  }
+
+  /// Edges of the grid that an element runs along.
+  std::vector<std::string> edges_of(const IfcElement& e) const {
+    std::vector<std::string> out;
+    const double dx = e.high.x - e.low.x, dy = e.high.y - e.low.y;
+    const bool along_x = dx >= dy;
+    const std::vector<double>&lines = along_x ? rows_ : frames_, &across = along_x ? frames_ : rows_;
+    const int low_axis = along_x ? 0 : 1, mid_axis = 1 - low_axis;
+    const double middle = 0.5 * (e.low[mid_axis] + e.high[mid_axis]);
+    const int line = nearest(across, middle);
+    if (std::abs(across[static_cast<size_t>(line)] - middle) > kOff) return out;
+    for (size_t i = 0; i + 1 < lines.size(); ++i) {
+      const double covered = std::min(e.high[low_axis], lines[i + 1]) - std::max(e.low[low_axis], lines[i]);
+      if (covered < 0.6 * (lines[i + 1] - lines[i])) continue;
+      const int a = static_cast<int>(i);
+      out.push_back(along_x ? point(a, line) + point(a + 1, line) : point(line, a) + point(line, a + 1));
+    }
+    return out;
+  }
+
+  void place_beams() {
+    int placed = 0;
+    for (const IfcElement* e : all("IFCBEAM")) {
+      const double width = std::min(e->high.x - e->low.x, e->high.y - e->low.y), height = e->high.z - e->low.z;
+      const int s = storey_below(e->high.z);
+      const auto edges = edges_of(*e);
+      if (s < 0) {
+        left_out(*e, "its top is not level with a floor");
+      } else if (edges.empty()) {
+        left_out(*e, "does not run between columns of the grid");
+      } else {
+        Group& g = group_of(beams_, *e, width, height);
+        g.places[s].insert(g.places[s].end(), edges.begin(), edges.end());
+        g.elements.push_back(e);
+        ++placed;
+      }
+    }
+    if (placed > 0) taken(fmt::format("{} beams in {} sections", placed, beams_.size()));
+  }
+
+  void place_slabs() {
+    int placed = 0;
+    for (const IfcElement* e : all("IFCSLAB")) {
+      const int s = storey_below(e->high.z);
+      if (s < 0) {
+        left_out(*e, "is not level with a floor above a storey (a base slab lies on the ground)");
+        continue;
+      }
+      Group& g = group_of(slabs_, *e, e->high.z - e->low.z, 0);
+      bool any = false;
+      for (size_t i = 0; i + 1 < rows_.size(); ++i)
+        for (size_t k = 0; k + 1 < frames_.size(); ++k) {
+          const double x = 0.5 * (rows_[i] + rows_[i + 1]), y = 0.5 * (frames_[k] + frames_[k + 1]);
+          if (x < e->low.x || x > e->high.x || y < e->low.y || y > e->high.y) continue;
+          g.places[s].push_back(point(static_cast<int>(i), static_cast<int>(k)) +
+                                point(static_cast<int>(i) + 1, static_cast<int>(k) + 1));
+          any = true;
+        }
+      if (any) {
+        ++placed;
+        g.elements.push_back(e);
+      } else {
+        left_out(*e, "covers no cell of the grid");
+      }
+    }
+    if (placed > 0) {
+      taken(fmt::format("{} slabs in {} thicknesses", placed, slabs_.size()));
+      guessed(
+          "a slab covers every cell of the grid whose middle lies in the box around it: holes and cut corners are not "
+          "seen");
+    }
+  }
+
+  void place_walls() {
+    int placed = 0;
+    for (const IfcElement* e : all("IFCWALL")) {
+      const double thickness = std::min(e->high.x - e->low.x, e->high.y - e->low.y);
+      const auto edges = edges_of(*e);
+      Group& g = group_of(walls_, *e, thickness, 0);
+      bool any = false;
+      for (int s = 0; s < storeys() && !edges.empty(); ++s) {
+        const double low = levels_[static_cast<size_t>(s)], high = levels_[static_cast<size_t>(s) + 1];
+        if (std::min(e->high.z, high) - std::max(e->low.z, low) < 0.5 * (high - low)) continue;
+        g.places[s].insert(g.places[s].end(), edges.begin(), edges.end());
+        any = true;
+      }
+      if (any) {
+        ++placed;
+        g.elements.push_back(e);
+      } else {
+        left_out(*e, "does not stand between columns of the grid");
+      }
+    }
+    walls_.erase(std::remove_if(walls_.begin(), walls_.end(), [](const Group& g) { return g.places.empty(); }),
+                 walls_.end());
+    if (placed > 0) {
+      taken(fmt::format("{} walls in {} thicknesses", placed, walls_.size()));
+      missing("openings of walls: they are not read");
+    }
+  }
+
+  void count_rest() {
+    for (const IfcElement& e : b_.elements)
+      if (e.type != "IFCCOLUMN" && e.type != "IFCBEAM" && e.type != "IFCSLAB" && e.type != "IFCWALL")
+        left_out(e,
+                 e.type == "IFCFOOTING" || e.type == "IFCPILE" ? "foundations belong to the ground" : "is not taken");
+    for (const auto& [what, n] : left_out_) missing(fmt::format("{} x {}", n, what));
+  }
+
+  std::string concrete_key(const std::string& name) {
+    const std::string key = key_of(name);
+    concretes_[key] = name;
+    return key;
+  }
+
+  void write_list(const std::map<int, std::vector<std::string>>& places, const char* rule, const char* what,
+                  const std::string& name) {
+    for (const auto& [s, list] : places) {
+      std::set<std::string> unique(list.begin(), list.end());
+      std::string joined;
+      for (const std::string& p : unique) joined += (joined.empty() ? "\"" : ", \"") + p + "\"";
+      text_ += fmt::format("[[{}]]\n{} = \"{}\"\nstoreys = {}\nat = [{}]\n", rule, what, name, s, joined);
+    }
+  }
+
+  struct Bars {
+    int main = 0, top = 0, bottom = 0, ties = 0;
+    double diameter = 0, tie_diameter = 0;
+    std::string grade;
+  };
+  /// Bars of the first element of a group that has some.
+  Bars find_bars(const Group& g) const {
+    for (const IfcElement* e : g.elements) {
+      Bars out;
+      for (const IfcBar& bar : b_.bars) {
+        const bool inside = bar.has_place && bar.place.x > e->low.x - 0.05 && bar.place.x < e->high.x + 0.05 &&
+                            bar.place.y > e->low.y - 0.05 && bar.place.y < e->high.y + 0.05 &&
+                            bar.place.z > e->low.z - 0.3 && bar.place.z < e->high.z;
+        if (bar.host != 0 ? bar.host != e->id : !inside) continue;
+        if (!bar.is_main) {
+          ++out.ties;
+          out.tie_diameter = bar.diameter;
+          continue;
+        }
+        ++out.main;
+        (bar.place.z > 0.5 * (e->low.z + e->high.z) ? out.top : out.bottom) += 1;
+        out.diameter = bar.diameter;
+        out.grade = bar.grade;
+      }
+      if (out.main > 0) return out;
+    }
+    return {};
+  }
+
+  void write_section(const std::string& name, const Group& g, bool is_column) {
+    text_ += fmt::format("[section.{}]\nwidth = {}\nheight = {}\nconcrete = \"{}\"\nsteel = \"bars\"\ncover = \"?\"\n",
+                         name, centimetres(g.width), centimetres(g.height), concrete_key(g.concrete));
+    const Bars bars = find_bars(g);
+    if (bars.ties > 0 && bars.tie_diameter > 0) {
+      text_ += fmt::format("ties = {{ diameter = {}, spacing = \"?\" }}\n", millimetres(bars.tie_diameter));
+    } else {
+      text_ += "ties = { diameter = \"?\", spacing = \"?\" }\n";
+    }
+    missing(fmt::format("section {}: cover and spacing of ties{}", name, bars.ties > 0 ? "" : ", their diameter"));
+    if (!bars.grade.empty()) grade_ = bars.grade;
+    if (is_column) {
+      if (bars.main >= 4 && bars.main % 4 == 0) {
+        const int side = bars.main / 4 + 1;
+        text_ += fmt::format("bars = {{ count_y = {0}, count_z = {0}, diameter = {1} }}\n", side,
+                             millimetres(bars.diameter));
+        taken(fmt::format("section {}: {} bars of {:.0f} mm", name, bars.main, 1000 * bars.diameter));
+        guessed(fmt::format("section {}: its bars lie evenly on the four sides", name));
+      } else {
+        text_ += "bars = { count_y = \"?\", count_z = \"?\", diameter = \"?\" }\n";
+        missing(fmt::format("section {}: {}", name,
+                            bars.main > 0 ? fmt::format("how its {} bars lie", bars.main) : std::string("its bars")));
+      }
+    } else if (bars.top > 0 && bars.bottom > 0) {
+      text_ += fmt::format("top = \"{} x {:g} mm\"\nbottom = \"{} x {:g} mm\"\n", bars.top, 1000 * bars.diameter,
+                           bars.bottom, 1000 * bars.diameter);
+      taken(fmt::format("section {}: {} bars above, {} below, of {:.0f} mm", name, bars.top, bars.bottom,
+                        1000 * bars.diameter));
+    } else {
+      text_ += "top = \"?\"\nbottom = \"?\"\n";
+      missing(fmt::format("section {}: its bars", name));
+    }
+  }
+
+  void write_concretes(std::string& out) {
+    static const std::regex eurocode(R"((?:^|[^A-Za-z])L?C\s*([0-9]+)\s*/\s*([0-9]+))");
+    for (const auto& [key, name] : concretes_) {
+      std::smatch m;
+      out += fmt::format("[concrete.{}]  # \"{}\" in the file\n", key, clean(name));
+      if (std::regex_search(name, m, eurocode) && std::stod(m[1]) >= 8) {
+        const double fck = std::stod(m[1]);
+        out += fmt::format(
+            "# characteristic value of the class: the real strength is mostly higher, and a higher strength can be "
+            "the\n"
+            "# unsafe side (a column that was to crush holds); measure it, or make it fuzzy\nfc = \"{:g} N/mm2\"\n",
+            fck);
+        out += fmt::format("Ec = \"{:.1f} GPa\"  # 22 GPa ((fck + 8) / 10)^0.3\n", 22 * std::pow((fck + 8) / 10, 0.3));
+        taken(fmt::format("concrete {}: class {}, fc = {:g} N/mm2, its characteristic value", key, m[0].str(), fck));
+        guessed(
+            fmt::format("concrete {}: fc is the characteristic value of a class; the real strength is mostly higher, "
+                        "and that can be the unsafe side",
+                        key));
+        guessed(fmt::format("concrete {}: Ec from the class", key));
+      } else {
+        out += "fc = \"?\"\nEc = \"?\"\n";
+        missing(fmt::format("concrete {}: fc and Ec{}", key, name == "unknown" ? " (the file names no material)" : ""));
+      }
+    }
+  }
+
+  void write_steel(std::string& out) {
+    static const std::regex number(R"(([2-6][0-9]0))");
+    std::smatch m;
+    out += "[steel.bars]\n";
+    if (std::regex_search(grade_, m, number)) {
+      out += fmt::format("fy = \"{} N/mm2\"  # characteristic value of {}\n", m[1].str(), clean(grade_));
+      taken("steel: fy = " + m[1].str() + " N/mm2 from the grade " + clean(grade_));
+      missing("steel: fu and eps_u");
+    } else {
+      out += "fy = \"?\"\n";
+      missing("steel: fy, fu and eps_u");
+    }
+    out += "fu = \"?\"\neps_u = \"?\"\n";
+  }
+
+  static bool is_masonry(const std::string& name) {
+    static const std::regex words("brick|mason|mauer|ziegel|kalksand|klinker|metselwerk", std::regex::icase);
+    return std::regex_search(name, words);
+  }
+
+  void write() {
+    text_.clear();
+    std::string rules;
+    const auto name_of = [](const char* kind, const Group& g, bool panel) {
+      return panel ? fmt::format("{}_{:.0f}_{}", kind, 1000 * g.width, key_of(g.concrete))
+                   : fmt::format("{}_{:.0f}x{:.0f}_{}", kind, 1000 * g.width, 1000 * g.height, key_of(g.concrete));
+    };
+    std::string sections;
+    for (const Group& g : columns_) write_section(name_of("column", g, false), g, true);
+    for (const Group& g : beams_) write_section(name_of("beam", g, false), g, false);
+    for (const Group& g : slabs_) {
+      const std::string name = name_of("slab", g, true);
+      text_ += fmt::format(
+          "[slab.{}]\nthickness = {}\nconcrete = \"{}\"\nsteel = \"bars\"\nas_top = \"?\"\nas_bottom = \"?\"\n", name,
+          centimetres(g.width), concrete_key(g.concrete));
+      missing("slab " + name + ": its reinforcement");
+    }
+    for (const Group& g : walls_) {
+      const std::string name = name_of("wall", g, true);
+      text_ += fmt::format("[wall.{}]\nthickness = {}\n", name, centimetres(g.width));
+      if (is_masonry(g.concrete)) {
+        text_ += "density = \"?\"\nstrength = \"?\"\nmodulus = \"?\"\n";
+        missing("wall " + name + ": density, strength and modulus of the masonry");
+      } else {
+        text_ += fmt::format("concrete = \"{}\"\nsteel = \"bars\"\nas_faces = \"?\"\n", concrete_key(g.concrete));
+        missing("wall " + name + ": its reinforcement");
+      }
+    }
+    sections.swap(text_);
+    for (const Group& g : columns_) write_list(g.places, "columns", "section", name_of("column", g, false));
+    for (const Group& g : beams_) write_list(g.places, "beams", "section", name_of("beam", g, false));
+    for (const Group& g : slabs_) write_list(g.places, "slabs", "panel", name_of("slab", g, true));
+    for (const Group& g : walls_) write_list(g.places, "walls", "panel", name_of("wall", g, true));
+    rules.swap(text_);
+
+    std::string out = fmt::format(
+        "# From {} ({}). Every \"?\" is a gap: `topple check` names it, nothing runs before it is filled.\n"
+        "title = \"{}\"\n",
+        clean(file_), clean(b_.schema), b_.name.empty() ? clean(file_) : clean(b_.name));
+    write_concretes(out);
+    write_steel(out);
+    out += sections + "[grid]\nrows = { ";
+    for (size_t i = 0; i < rows_.size(); ++i)
+      out += fmt::format("{}{} = {}", i > 0 ? ", " : "", letters(static_cast<int>(i)), metres(rows_[i] - rows_[0]));
+    out += " }\nframes = { ";
+    for (size_t i = 0; i < frames_.size(); ++i)
+      out += fmt::format("{}{} = {}", i > 0 ? ", " : "", i + 1, metres(frames_[i] - frames_[0]));
+    out += " }\n[storeys]\nheights = [";
+    for (int s = 0; s < storeys(); ++s)
+      out += (s > 0 ? ", " : "") + metres(levels_[static_cast<size_t>(s) + 1] - levels_[static_cast<size_t>(s)]);
+    out += "]\nload = \"?\"  # what lies on the floors beside their own weight\n";
+    missing("storeys: the load on the floors");
+    out += rules + "[analysis]\nduration = \"10 s\"\n";
+    guessed("analysis: 10 s");
+    missing("charges: a plan without [[stage]] only asks whether the building stands");
+    text_ = std::move(out);
+  }
+
+  const IfcBuilding& b_;
+  std::string file_, text_, grade_;
+  ImportReport report_;
+  std::vector<double> rows_, frames_, levels_;
+  std::vector<Group> columns_, beams_, slabs_, walls_;
+  std::map<std::string, int> left_out_;
+  std::map<std::string, std::string> concretes_;
+};
+
+}  // namespace
+
+Import make_plan_text(const IfcBuilding& building, const std::string& file_name) {
+  return Planner(building, file_name).make();
+}
+
+}  // namespace topple::product

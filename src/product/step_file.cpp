@@ -1,0 +1,222 @@
+#include "product/step_file.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdint>
+#include <cstdlib>
+
+#include "base/error.h"
+
+namespace topple::product {
+
+namespace {
+
+constexpr int deepest = 64;
+
+void append_utf8(std::string& out, std::uint32_t c) {
+  if (c < 0x80) {
+    out += static_cast<char>(c);
+  } else if (c < 0x800) {
+    out += static_cast<char>(0xC0 | c >> 6);
+    out += static_cast<char>(0x80 | (c & 0x3F));
+  } else if (c < 0x10000) {
+    out += static_cast<char>(0xE0 | c >> 12);
+    out += static_cast<char>(0x80 | (c >> 6 & 0x3F));
+    out += static_cast<char>(0x80 | (c & 0x3F));
+  } else {
+    out += static_cast<char>(0xF0 | c >> 18);
+    out += static_cast<char>(0x80 | (c >> 12 & 0x3F));
+    out += static_cast<char>(0x80 | (c >> 6 & 0x3F));
+    out += static_cast<char>(0x80 | (c & 0x3F));
+  }
+}
+
+/// \X2\00E4\X0\, \X4\...\X0\, \X\E4, \S\d
+std::string decode(const std::string& raw) {
+  std::string out;
+  const auto hex = [&raw](size_t at, size_t digits) {
+    return static_cast<std::uint32_t>(std::strtoul(raw.substr(at, digits).c_str(), nullptr, 16));
+  };
+  for (size_t i = 0; i < raw.size();) {
+    const size_t width = raw.compare(i, 4, "\\X2\\") == 0 ? 4 : raw.compare(i, 4, "\\X4\\") == 0 ? 8 : 0;
+    if (width > 0) {
+      for (i += 4; i + width <= raw.size() && raw[i] != '\\'; i += width) append_utf8(out, hex(i, width));
+      i = std::min(raw.size(), raw.compare(i, 4, "\\X0\\") == 0 ? i + 4 : i + 1);
+    } else if (raw.compare(i, 3, "\\X\\") == 0 && i + 5 <= raw.size()) {
+      append_utf8(out, hex(i + 3, 2));
+      i += 5;
+    } else if (raw.compare(i, 3, "\\S\\") == 0 && i + 4 <= raw.size()) {
+      append_utf8(out, static_cast<unsigned char>(raw[i + 3]) + 128U);
+      i += 4;
+    } else {
+      out += raw[i++];
+    }
+  }
+  return out;
+}
+
+class Parser {
+ public:
+  Parser(const std::string& text, const std::string& name) : text_(text), name_(name) {}
+
+  StepFile read() {
+    StepFile file;
+    skip();
+    if (text_.compare(at_, 12, "ISO-10303-21") != 0) fail("is no STEP file: it does not begin with ISO-10303-21");
+    const size_t schema = text_.find("FILE_SCHEMA");
+    const size_t quote = schema == std::string::npos ? schema : text_.find('\'', schema);
+    if (quote != std::string::npos) file.schema = text_.substr(quote + 1, text_.find('\'', quote + 1) - quote - 1);
+    const size_t data = text_.find("DATA;");
+    if (data == std::string::npos) fail("has no DATA section");
+    at_ = data + 5;
+    for (skip(); at_ < text_.size() && text_[at_] == '#'; skip()) {
+      StepEntity e;
+      e.id = read_id();
+      skip();
+      expect('=');
+      skip();
+      e.type = read_name();
+      skip();
+      e.arguments = read_list(0);
+      skip();
+      expect(';');
+      const int id = e.id;
+      file.entities[id] = std::move(e);
+    }
+    if (text_.compare(at_, 6, "ENDSEC") != 0) fail("an entity such as #12=IFCCOLUMN(...); is wanted");
+    return file;
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& what) const {
+    const int line =
+        1 + static_cast<int>(std::count(
+                text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(std::min(at_, text_.size())), '\n'));
+    throw InputError(std::vector<Diagnostic>{
+        {Severity::Error, "E111", {name_, line, 0}, 1, what, "give an IFC file in STEP form (.ifc)"}});
+  }
+  void skip() {
+    while (at_ < text_.size()) {
+      if (std::isspace(static_cast<unsigned char>(text_[at_])) != 0) {
+        ++at_;
+      } else if (text_.compare(at_, 2, "/*") == 0) {
+        const size_t end = text_.find("*/", at_ + 2);
+        at_ = end == std::string::npos ? text_.size() : end + 2;
+      } else {
+        break;
+      }
+    }
+  }
+  char peek() const { return at_ < text_.size() ? text_[at_] : '\0'; }
+  void expect(char c) {
+    if (peek() != c) fail(std::string("\"") + c + "\" is wanted here");
+    ++at_;
+  }
+  int read_id() {
+    expect('#');
+    const size_t from = at_;
+    while (std::isdigit(static_cast<unsigned char>(peek())) != 0) ++at_;
+    if (at_ == from || at_ - from > 9) fail("a number is wanted behind #");
+    return std::atoi(text_.substr(from, at_ - from).c_str());
+  }
+  std::string read_name() {
+    std::string out;
+    while (std::isalnum(static_cast<unsigned char>(peek())) != 0 || peek() == '_')
+      out += static_cast<char>(std::toupper(static_cast<unsigned char>(text_[at_++])));
+    if (out.empty()) fail("the name of a type is wanted");
+    return out;
+  }
+  std::vector<StepValue> read_list(int depth) {
+    if (depth > deepest) fail("is nested too deeply");
+    expect('(');
+    std::vector<StepValue> items;
+    for (skip(); peek() != ')'; skip()) {
+      if (!items.empty()) expect(',');
+      items.push_back(read_value(depth));
+    }
+    ++at_;
+    return items;
+  }
+  StepValue read_value(int depth) {
+    StepValue v;
+    skip();
+    const char c = peek();
+    if (c == '$' || c == '*') {
+      ++at_;
+    } else if (c == '#') {
+      v.kind = StepValue::Kind::Reference;
+      v.number = read_id();
+    } else if (c == '\'') {
+      v.kind = StepValue::Kind::Text;
+      std::string raw;
+      for (++at_;; ++at_) {
+        if (at_ >= text_.size()) fail("a text has no end");
+        if (text_[at_] == '\'') {
+          if (at_ + 1 < text_.size() && text_[at_ + 1] == '\'') {
+            ++at_;
+          } else {
+            break;
+          }
+        }
+        raw += text_[at_];
+      }
+      ++at_;
+      v.text = decode(raw);
+    } else if (c == '.' &&
+               std::isalpha(static_cast<unsigned char>(at_ + 1 < text_.size() ? text_[at_ + 1] : ' ')) != 0) {
+      ++at_;
+      v.kind = StepValue::Kind::Word;
+      v.text = read_name();
+      expect('.');
+    } else if (c == '"') {  // bits
+      const size_t end = text_.find('"', at_ + 1);
+      if (end == std::string::npos) fail("bits have no end");
+      at_ = end + 1;
+    } else if (c == '(') {
+      v.kind = StepValue::Kind::List;
+      v.items = read_list(depth + 1);
+    } else if (std::isalpha(static_cast<unsigned char>(c)) != 0) {
+      read_name();
+      skip();
+      std::vector<StepValue> inner = read_list(depth + 1);
+      if (inner.size() == 1) return inner[0];
+      v.kind = StepValue::Kind::List;
+      v.items = std::move(inner);
+    } else {
+      const char* from = text_.c_str() + at_;
+      char* end = nullptr;
+      v.kind = StepValue::Kind::Number;
+      v.number = std::strtod(from, &end);
+      if (end == from) fail("a value is wanted here");
+      at_ += static_cast<size_t>(end - from);
+    }
+    return v;
+  }
+
+  const std::string& text_;
+  const std::string& name_;
+  size_t at_ = 0;
+};
+
+}  // namespace
+
+const StepValue& StepEntity::at(size_t i) const {
+  static const StepValue null;
+  return i < arguments.size() ? arguments[i] : null;
+}
+
+const StepEntity* StepFile::find(int id) const {
+  const auto at = entities.find(id);
+  return at == entities.end() ? nullptr : &at->second;
+}
+
+std::vector<const StepEntity*> StepFile::of_type(const std::string& type) const {
+  std::vector<const StepEntity*> out;
+  for (const auto& [id, e] : entities)
+    if (e.type == type) out.push_back(&e);
+  return out;
+}
+
+StepFile read_step(const std::string& text, const std::string& name) { return Parser(text, name).read(); }
+
+}  // namespace topple::product
