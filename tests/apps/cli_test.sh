@@ -149,7 +149,7 @@ import)
   expect 2 "$topple" import site.dxf -o site.toml; has err "exists already"
   expect 2 "$topple" import site.dxf -o other.toml --unit "1 s"; has err "--unit"
   cat "$plan" site.toml >gaps.toml
-  expect 2 "$topple" check gaps.toml; has err "E211"; has err "site.neighbour[0].clearance"; has err "^"
+  expect 2 "$topple" check gaps.toml; has err "E211"; has err "site.neighbour[1].clearance"; has err "^"
   expect 2 "$topple" run gaps.toml -o never; has err "E211"; [ ! -e never ] || failures=$((failures + 1))
   expect 2 "$topple" import "$plan" -o x.toml; has err "neither"
   echo hello >b.ifc; expect 2 "$topple" import b.ifc -o x.toml; has err "b.ifc:1"; has err "E111"
