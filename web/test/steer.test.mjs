@@ -5,7 +5,7 @@ import { fileURLToPath } from "node:url";
 import { openPage } from "./browser.mjs";
 import { after, before, describe, it } from "./harness.mjs";
 import { Standin, planText } from "./standin.mjs";
-import { assertPng, assertWebm, findOverflow, makeDriver, takeDownload } from "./steer_helpers.mjs";
+import { assertPng, assertWebm, findFaint, findOverflow, makeDriver, takeDownload } from "./steer_helpers.mjs";
 
 const out = fileURLToPath(new URL("out/steer/", import.meta.url));
 const near = (a, b, tolerance) => assert.ok(Math.abs(a - b) <= tolerance, `${a}, not ${b}`);
@@ -456,6 +456,18 @@ describe("steering page", () => {
     await d.settle();
     await shot("dark");
     await page.emulateMedia({ colorScheme: "light" });
+  });
+
+  it("has enough contrast, light and dark, in every tab", async () => {
+    for (const colorScheme of ["light", "dark"]) {
+      await page.emulateMedia({ colorScheme, reducedMotion: "reduce" });
+      for (const tab of ["plots", "events", "findings", "compare", "study", "plan", "log"]) {
+        await d.tab(tab);
+        await d.draw();
+        assert.deepEqual(await findFaint(page), [], `${colorScheme}, ${tab}`);
+      }
+    }
+    await page.emulateMedia({ colorScheme: "light", reducedMotion: "no-preference" });
   });
 
   it("names every control and gives each plot a table", async () => {

@@ -95,3 +95,37 @@ export const findOverflow = (page) =>
       .filter((e) => e.getClientRects().length > 0 && e.closest(".scroller, .tab-body, .tabs, .cube-holder, .markers") === null)
       .filter((e) => e.getBoundingClientRect().right > innerWidth + 0.5)
       .map((e) => `${e.className} ${e.textContent.slice(0, 20)}`));
+
+/// Texts whose contrast to their ground is below 4.5 (3 for large ones): WCAG 2.1, 1.4.3. What is switched off and what
+/// lies on pictures is left out.
+export const findFaint = (page) =>
+  page.evaluate(() => {
+    const parse = (text) => {
+      const n = text.match(/[\d.]+/g)?.map(Number) ?? [0, 0, 0];
+      return { rgb: n.slice(0, 3), alpha: n[3] ?? 1 };
+    };
+    const luminance = (rgb) => {
+      const [r, g, b] = rgb.map((v) => (v / 255 <= 0.04045 ? v / 255 / 12.92 : ((v / 255 + 0.055) / 1.055) ** 2.4));
+      return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+    };
+    const groundOf = (e) => {
+      for (let at = e; at !== null; at = at.parentElement) {
+        const c = parse(getComputedStyle(at).backgroundColor);
+        if (c.alpha > 0.99) return c.rgb;
+      }
+      return [255, 255, 255];
+    };
+    const faint = new Set();
+    const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+    while (walker.nextNode()) {
+      const e = walker.currentNode.parentElement;
+      if (walker.currentNode.textContent.trim() === "" || e.getClientRects().length === 0) continue;
+      if (e.closest("svg, script, style, noscript, :disabled, [aria-hidden=true], .chip[aria-pressed=false]") !== null) continue;
+      const style = getComputedStyle(e);
+      const [a, b] = [luminance(parse(style.color).rgb), luminance(groundOf(e))];
+      const ratio = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+      const size = parseFloat(style.fontSize), large = size >= 24 || (size >= 18.66 && Number(style.fontWeight) >= 700);
+      if (ratio < (large ? 3 : 4.5)) faint.add(`${ratio.toFixed(2)} ${style.color} on ${groundOf(e)}: ${e.className} ${walker.currentNode.textContent.trim().slice(0, 30)}`);
+    }
+    return [...faint];
+  });
