@@ -93,7 +93,10 @@ export class Scene implements SceneLike {
   resize(width: number, height: number): void {
     this.stage.resize(width, height);
   }
+  /// Looks at all of what is there now: a run may have grown.
   fit(view?: View | Triple): void {
+    this.building.collectFitPoints();
+    this.stage.setFitPoints(this.building.fitPoints);
     this.stage.fit(view);
   }
 

@@ -22,8 +22,8 @@ export function makeLook() {
 }
 export type Look = ReturnType<typeof makeLook>;
 
-export function makeState(run: Run, look: Look = makeLook()) {
-  const begin = run.time[0] ?? 0;
+/// `begin` is where the time axis begins, also where frames before the first one are still to come.
+export function makeState(run: Run, look: Look = makeLook(), begin = run.time[0] ?? 0) {
   /// Rises when frames, events or series have been added to the run.
   const grown = signal(0);
   const end = computed(() => (grown.value, run.time[run.time.length - 1] ?? 0));
@@ -103,7 +103,7 @@ export function showStage(): void {
 }
 
 /// A long list starts with what an engineer asks for first; nothing is hidden in a short one.
-function chooseHiddenKinds(run: Run): ReadonlySet<string> {
+export function chooseHiddenKinds(run: Run): ReadonlySet<string> {
   if (run.events.length <= 60) return new Set();
   const count = new Map<string, number>();
   for (const event of run.events) count.set(event.kind, (count.get(event.kind) ?? 0) + 1);

@@ -1,6 +1,6 @@
 /// The run of one branch as this page has it: frames arrive in any order, some are never sent.
 import { findFrame, makeRun, type Run, type RunEvent } from "./data";
-import { makeState, runClock, type Look, type State } from "./state";
+import { chooseHiddenKinds, makeState, runClock, type Look, type State } from "./state";
 import type { WireFrame } from "./steer_wire";
 
 const memory = 256e6; // of frames, then every second one is enough, ... [bytes]
@@ -12,13 +12,14 @@ export class BranchRun {
   readonly rows: number[] = [];
   private onlyScene: boolean;
   private dirty = false;
+  private readonly decided = new Set<string>();
 
   /// `scene` is report data with one frame.
   constructor(readonly id: number, scene: unknown, look: Look) {
     this.run = makeRun(scene);
     this.onlyScene = this.run.time.length > 0;
     if (this.onlyScene) this.rows.push(-1);
-    this.state = makeState(this.run, look);
+    this.state = makeState(this.run, look, 0);
     runClock(this.state);
   }
 
@@ -27,9 +28,14 @@ export class BranchRun {
     return 28 * this.run.bodies.length + 5 * this.run.zones.length + 4 * this.run.series.length;
   }
 
+  /// Whether a frame is of this model. An added charge brings debris, so a branch may get another one.
+  fits(frame: WireFrame): boolean {
+    return frame.pose.length === 7 * this.run.bodies.length && frame.state.length === this.run.zones.length;
+  }
+
   add(frame: WireFrame): void {
     const { run, rows } = this;
-    if (frame.pose.length !== 7 * run.bodies.length || frame.state.length !== run.zones.length) return;
+    if (!this.fits(frame)) return;
     if (this.onlyScene) {
       // The one frame of the scene stood in for the first real one.
       this.onlyScene = false;
@@ -76,6 +82,11 @@ export class BranchRun {
     if (fresh.length === 0) return;
     this.run.events.push(...fresh);
     this.dirty = true;
+    // Kinds that have become many are left out of the list, once: who asks for them again keeps them.
+    const many = [...chooseHiddenKinds(this.run)].filter((kind) => !this.decided.has(kind));
+    if (many.length === 0) return;
+    for (const kind of many) this.decided.add(kind);
+    this.state.hiddenKinds.value = new Set([...this.state.hiddenKinds.value, ...many]);
   }
 
   /// The first stretch of frames that this page should have and has not, of the `count` the server holds.

@@ -56,5 +56,7 @@ export async function saveWebm(s: SteerState): Promise<void> {
   await stopped;
   release();
   recording.value = false;
-  offer(new Blob(parts, { type: "video/webm" }), fileName(s, "webm"));
+  const video = new Blob(parts, { type: "video/webm" });
+  if (video.size === 0) s.notify("bad", "The browser recorded nothing.");
+  else offer(video, fileName(s, "webm"));
 }

@@ -2,6 +2,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import uPlot from "uplot";
 import { Inspector } from "./inspector";
+import type { Finding, Status } from "./data";
 import { axis, cssColour, niceRange } from "./plots";
 import { StatusSign, StatusWord } from "./signs";
 import type { SteerState } from "./steer_state";
@@ -72,6 +73,13 @@ export function ZonePlot(props: { s: SteerState; zone: ZoneWatch }) {
       }
       return out;
     };
+    // The curve for the normal force that is nearest to the present one stands out.
+    const nearest = (): number => {
+      const t = s.view.peek()?.state.time.value ?? Infinity;
+      const now = [...latest.current].reverse().find((p) => (p[0] as number) <= t + 1e-9)?.[1];
+      if (now === null || now === undefined || law === undefined) return -1;
+      return law.normal_force.reduce((best, f, k) => (Math.abs(f - now) < Math.abs((law.normal_force[best] as number) - now) ? k : best), 0);
+    };
     const plot = new uPlot(
       {
         width: Math.max(200, element.clientWidth), height: 190, padding: [8, 10, 0, 0],
@@ -90,7 +98,7 @@ export function ZonePlot(props: { s: SteerState; zone: ZoneWatch }) {
           } },
         },
         axes: [axis("rotation [°]", true), axis("[kNm]", false)],
-        series: [{}, ...names.map((label) => ({ label, stroke: () => cssColour("--text-quiet"), width: 1, spanGaps: true, points: { show: false } }))],
+        series: [{}, ...names.map((label, k) => ({ label, stroke: () => cssColour(k === nearest() ? "--series-0" : "--line"), width: 1.2, spanGaps: true, points: { show: false } }))],
         hooks: {
           draw: [
             (u) => {
@@ -148,7 +156,7 @@ export function ZonePlot(props: { s: SteerState; zone: ZoneWatch }) {
       <div ref={holder} />
       <p class="quiet">
         <i class="line-swatch" style={{ background: "var(--series-1)" }} /> path so far
-        {law !== undefined && <>, over the whole rotation · <i class="line-swatch" style={{ background: "var(--text-quiet)" }} /> curves over the plastic one, for N = {law.normal_force.map((f) => formatNumber(f / 1000, 3)).join(", ")} kN</>}
+        {law !== undefined && <>, over the whole rotation · <i class="line-swatch" style={{ background: "var(--line)" }} /> {law.normal_force.length} curves over the plastic one, for N from {formatNumber(Math.min(...law.normal_force) / 1000, 3)} to {formatNumber(Math.max(...law.normal_force) / 1000, 3)} kN (tension positive) · <i class="line-swatch" style={{ background: "var(--series-0)" }} /> that nearest to the present N</>}
         {zone.law === null && " · this zone has no curves of its own"}
       </p>
       {now !== undefined && (
@@ -207,28 +215,30 @@ function Verdict(props: { s: SteerState }) {
   const first = list.find((f) => f.id === "mechanism") ?? list[0];
   const others = list.filter((f) => f !== first && (f.status === "bad" || f.status === "warning" || f.id.startsWith("clearance.")));
   others.sort((a, b) => Number(b.status === "bad") - Number(a.status === "bad"));
-  const ending = s.progress.value?.ending ?? s.branch.value?.ending;
+  const ending = s.progress.value?.ending ?? s.branch.value?.ending ?? null;
+  // Before the end nothing is broken or kept yet: what is said so far is said without judging.
+  const statusOf = (f: Finding): Status => (ending === null ? "info" : f.status);
   return (
     <section class="verdict-panel" aria-label="Verdict" data-test="verdict-panel">
-      <h2>Verdict {ending === null || ending === undefined ? <span class="quiet">so far</span> : null}</h2>
-      {first === undefined ? (
+      <h2>Verdict {ending === null ? <span class="quiet">so far</span> : null}</h2>
+      {first === undefined || (ending === null && s.frontier.value < 1e-9) ? (
         <p class="quiet">Nothing yet: findings come as the run goes on.</p>
       ) : (
-        <div class={`verdict ${first.status}`}>
-          <StatusSign status={first.status} size={24} />
+        <div class={`verdict ${statusOf(first)}`}>
+          <StatusSign status={statusOf(first)} size={24} />
           <div>
-            <p class="verdict-title">{first.title} <StatusWord status={first.status} /></p>
+            <p class="verdict-title">{first.title} {ending !== null && <StatusWord status={first.status} />}</p>
             <p data-test="verdict">{prettify(first.text)}</p>
           </div>
         </div>
       )}
       {others.slice(0, 6).map((f) => (
         <div class="finding">
-          <StatusSign status={f.status} size={15} />
-          <div><p class="finding-title">{f.title} <StatusWord status={f.status} /></p><p>{prettify(f.text)}</p></div>
+          <StatusSign status={statusOf(f)} size={15} />
+          <div><p class="finding-title">{f.title} {ending !== null && <StatusWord status={f.status} />}</p><p>{prettify(f.text)}</p></div>
         </div>
       ))}
-      {ending !== null && ending !== undefined && <p class="ending-text" data-test="ending"><strong>{endingWord[ending.kind] ?? ending.kind}</strong>: {prettify(ending.text)}</p>}
+      {ending !== null && <p class="ending-text" data-test="ending"><strong>{endingWord[ending.kind] ?? ending.kind}</strong>: {prettify(ending.text)}</p>}
       {list.length > 0 && <button type="button" class="small" onClick={() => (s.tab.value = "findings")}>All {list.length} findings</button>}
     </section>
   );

@@ -265,12 +265,34 @@ export function makeSteerState(address: string) {
     try {
       const frame = decodeFrame(bytes);
       if (frame.session !== session.value?.id) return;
-      runs.get(frame.branch)?.add(frame);
+      const run = runs.get(frame.branch);
+      if (run === undefined) return;
+      if (run.fits(frame)) run.add(frame);
+      else void renew(run);
       draws.value += 1;
     } catch (error) {
       complain(error);
     }
   }
+
+  /// The branch has another model now: its scene and its frames are read again.
+  async function renew(old: BranchRun): Promise<void> {
+    if (renewing.has(old.id)) return;
+    renewing.add(old.id);
+    const answer = await ask<{ scene: unknown }>("scene", { branch: old.id });
+    renewing.delete(old.id);
+    if (answer === undefined || runs.get(old.id) !== old) return;
+    const run = new BranchRun(old.id, answer.scene, look);
+    run.addEvents(old.run.events);
+    runs.set(old.id, run);
+    const time = old.state.time.value;
+    if (view.value === old) {
+      useRun(run);
+      if (!following.value) wanted = time;
+    }
+    fill();
+  }
+  const renewing = new Set<number>();
 
   // Frames come faster than pictures: what came is shown once per picture.
   let due = false;
@@ -345,7 +367,9 @@ export function makeSteerState(address: string) {
     if (run === undefined) return;
     run.run.findings = result.findings as Finding[];
     run.run.not_modelled = result.not_modelled;
-    run.addEvents(result.events);
+    // A record of a run that goes on ends with the words "so far"; that is no event of it.
+    const ended = branches.value.find((b) => b.id === id)?.ending ?? progress.value?.ending ?? null;
+    run.addEvents(result.events.filter((e) => ended !== null || e.kind !== "rest"));
     draws.value += 1;
   }
 

@@ -39,7 +39,8 @@ function Membership(props: { bounds: Bounds; unit: string }) {
 function Fan(props: { fans: NonNullable<Study["fans"]> }) {
   const { fans } = props;
   const width = 520, height = 170, left = 44, bottom = 22;
-  const all = [...fans.low.flat(), ...fans.high.flat()].filter((v): v is number => v !== null);
+  // Behind the angles the rows may hold more, which is none of this picture.
+  const all = [...fans.low, ...fans.high].flatMap((row) => row.slice(0, fans.time.length)).filter((v): v is number => v !== null);
   if (all.length === 0 || fans.time.length < 2) return null;
   const turn = 180 / Math.PI;
   const least = Math.min(0, ...all) * turn, most = Math.max(0, ...all) * turn;
@@ -59,7 +60,7 @@ function Fan(props: { fans: NonNullable<Study["fans"]> }) {
   const order = fans.alpha.map((alpha, k) => ({ alpha, k })).sort((a, b) => a.alpha - b.alpha);
   return (
     <figure class="fan">
-      <figcaption>Tilt angle θ(t) [°]: bands of the levels {order.map((o) => formatNumber(o.alpha, 2)).join(", ")}</figcaption>
+      <figcaption>Tilt angle θ(t) [°] after the last stage: bands of the levels {order.map((o) => formatNumber(o.alpha, 2)).join(", ")}</figcaption>
       <svg viewBox={`0 0 ${width} ${height}`} role="img" aria-label="Fan of the tilt angle over time">
         {order.map(({ alpha, k }) => <polygon points={band(k)} fill="var(--series-0)" fill-opacity={0.18 + 0.2 * alpha} stroke="var(--series-0)" stroke-width="0.8" />)}
         <line x1={left} x2={left} y1="6" y2={height - bottom} stroke="var(--line)" />
@@ -202,8 +203,8 @@ export function StudyPanel(props: { s: SteerState }) {
   const study = list.find((k) => k.id === s.watchedStudy.value);
   const samples = s.samples.value.get(s.watchedStudy.value) ?? [];
   const start = async (): Promise<void> => {
-    const r = await s.ask<{ study: Study }>("study.start", { samples: Math.max(1, Math.round(Number(count)) || 300) });
-    if (r !== undefined) await s.watchStudy(r.study.id);
+    const r = await s.ask<{ study: number }>("study.start", { samples: Math.max(2, Math.round(Number(count)) || 300) });
+    if (r !== undefined) await s.watchStudy(r.study);
   };
   const play = (index: number): Promise<void> => s.playSample(s.watchedStudy.value, index);
   if (s.session.value?.fuzzy !== true)

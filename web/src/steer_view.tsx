@@ -86,11 +86,7 @@ export function SteerView(props: { s: SteerState; onReady: () => void }) {
     (canvas) => new Scene(canvas, (s.view.peek() as BranchRun).run, { antialias: false, adaptive: true }),
     (scene) => {
       picture.scene = scene;
-      picture.fit = () => {
-        scene.building.collectFitPoints();
-        scene.stage.setFitPoints(scene.building.fitPoints);
-        scene.fit();
-      };
+      picture.fit = () => scene.fit();
       const debris = new DebrisLayer();
       const happenings = new EventLayer();
       scene.stage.scene.add(debris.group, happenings.group);

@@ -512,7 +512,7 @@ export class Standin {
         const study = new Study(s, this.studies.length + 1, m.samples ?? 300);
         this.studies.push(study);
         s.record("study.start", b(), { samples: m.samples });
-        return { study: study.describe() };
+        return { study: study.id, state: study.describe() };
       }
       case "study.list": return { studies: this.studies.map((x) => x.describe()) };
       case "study.watch": {

@@ -30,7 +30,7 @@ describe("steering page", () => {
     await d.until("phase", "Paused");
     assert.equal(await d.branch(), "main");
     assert.equal(await d.frontier(), 0);
-    await d.until("verdict", "The building stands");
+    await d.until("verdict-panel", "Nothing yet");
     await d.settle();
     await shot("paused");
     assert.ok((await d.countColours()) > 20, "the picture is empty");
