@@ -25,10 +25,12 @@ const char* words_of(Summary::Ending e) {
 
 }  // namespace
 
-Course::Course(System& s)
-    : s_(s), sampler_(s.options.samplings), softened_(s.elements.size() + s.rotationals.size(), false) {
-  interval_ = std::max(s.options.frame_interval, s.step);
+Course::Course(System& s) : Course(s, {0, -1, std::vector<bool>(s.elements.size() + s.rotationals.size(), false)}) {}
+
+Course::Course(System& s, const CourseState& state) : s_(s), sampler_(s.options.samplings), now_(state) {
+  interval_ = std::max(s.options.frame_interval, s.summary.step);
   for (const Event& e : s.model.events) last_event_ = std::max(last_event_, e.time);
+  begin_ = std::chrono::steady_clock::now();
 }
 
 bool Course::begin() {
@@ -41,7 +43,7 @@ bool Course::begin() {
   s_.start();
   begin_ = std::chrono::steady_clock::now();
   show();
-  ++frame_;
+  ++now_.frame;
   const double slack = 0.5 * s_.step;
   if (sampler_.is_due(s_.state.time, slack)) sampler_.take(s_.calc_view(), slack);
   out.ending = Summary::Ending::TimeLimit;
@@ -49,12 +51,12 @@ bool Course::begin() {
 }
 
 void Course::show() {
-  if (shown_ == s_.state.time) return;
-  shown_ = s_.state.time;
+  if (now_.shown == s_.state.time) return;
+  now_.shown = s_.state.time;
   const View& v = s_.calc_view();
-  for (size_t i = 0; i < softened_.size(); ++i)
-    if (!softened_[i] && v.element_state[i] == ElementState::Softening) {
-      softened_[i] = true;
+  for (size_t i = 0; i < now_.softened.size(); ++i)
+    if (!now_.softened[i] && v.element_state[i] == ElementState::Softening) {
+      now_.softened[i] = true;
       s_.say({Happening::Kind::ElementSoftening, s_.state.time, static_cast<int>(i), -1, {}, 0});
     }
   s_.state.largest_residual = std::max(s_.state.largest_residual, std::abs(v.energy.residual));
@@ -119,11 +121,11 @@ bool Course::follow() {
     return false;
   }
   if (sampler_.is_due(time, slack)) sampler_.take(s_.calc_view(), slack);
-  if (time >= static_cast<double>(frame_) * interval_ - slack) {
+  if (time >= static_cast<double>(now_.frame) * interval_ - slack) {
     show();
     pass_quiet();
     time = s_.state.time;
-    while (time >= static_cast<double>(frame_) * interval_ - slack) ++frame_;
+    while (time >= static_cast<double>(now_.frame) * interval_ - slack) ++now_.frame;
     if (options.progress.report) options.progress.report(time, options.duration);
   }
   if (options.progress.is_cancelled()) {

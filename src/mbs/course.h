@@ -10,14 +10,24 @@
 
 namespace topple::mbs {
 
+/// What a run knows beside the state of its system.
+struct CourseState {
+  long frame = 0;              // the next one
+  double shown = -1;           // time of the last frame [s]
+  std::vector<bool> softened;  // elements of which it was told
+};
+
 class Course {
  public:
   explicit Course(System&);
+  /// Goes on in the middle of a run.
+  Course(System&, const CourseState&);
   /// The equilibrium if asked for, the forces at the start, and the first frame. False if the run ends here.
   bool begin();
   /// After a step of the system. False if the run has ended.
   bool follow();
   Summary finish();
+  const CourseState& state() const { return now_; }
 
  private:
   void show();
@@ -29,9 +39,8 @@ class Course {
 
   System& s_;
   Sampler sampler_;
-  std::vector<bool> softened_;
-  double last_event_ = 0, interval_ = 0, shown_ = -1;
-  long frame_ = 0;
+  CourseState now_;
+  double last_event_ = 0, interval_ = 0;
   double quiet_since_ = 0;   // of the frames [s]
   double plastic_then_ = 0;  // dissipated until then [J]
   bool is_quiet_ = false;

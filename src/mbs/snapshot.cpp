@@ -119,24 +119,14 @@ const std::string& identity_of(System& system) {
 
 }  // namespace
 
-std::vector<std::byte> write_snapshot(System& system) {
-  Writer w;
-  w(kMagic);
-  const std::string& identity = identity_of(system);
-  w(std::vector<char>(identity.begin(), identity.end()));
+namespace {
+
+void write_state(Writer& w, System& system) {
   system.save_elements();
   visit(w, system.state, system);
-  return std::move(w.bytes);
 }
 
-void read_snapshot(const std::vector<std::byte>& bytes, System& system) {
-  Reader r(bytes);
-  std::uint64_t magic = 0;
-  std::vector<char> identity;
-  r(magic);
-  if (magic != kMagic) Reader::fail();
-  r(identity);
-  if (std::string(identity.begin(), identity.end()) != identity_of(system)) Reader::fail();
+void read_state(Reader& r, System& system) {
   State state;
   Carried carried;
   visit(r, state, carried);
@@ -155,6 +145,39 @@ void read_snapshot(const std::vector<std::byte>& bytes, System& system) {
   system.solid_step.clear();
   system.contact.search.has_links = false;
   system.started = true;
+}
+
+}  // namespace
+
+std::vector<std::byte> write_state(System& system) {
+  Writer w;
+  write_state(w, system);
+  return std::move(w.bytes);
+}
+
+void read_state(const std::vector<std::byte>& bytes, System& system) {
+  Reader r(bytes);
+  read_state(r, system);
+}
+
+std::vector<std::byte> write_snapshot(System& system) {
+  Writer w;
+  w(kMagic);
+  const std::string& identity = identity_of(system);
+  w(std::vector<char>(identity.begin(), identity.end()));
+  write_state(w, system);
+  return std::move(w.bytes);
+}
+
+void read_snapshot(const std::vector<std::byte>& bytes, System& system) {
+  Reader r(bytes);
+  std::uint64_t magic = 0;
+  std::vector<char> identity;
+  r(magic);
+  if (magic != kMagic) Reader::fail();
+  r(identity);
+  if (std::string(identity.begin(), identity.end()) != identity_of(system)) Reader::fail();
+  read_state(r, system);
 }
 
 }  // namespace topple::mbs

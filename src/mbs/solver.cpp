@@ -6,16 +6,37 @@
 
 #include "mbs/course.h"
 #include "mbs/snapshot.h"
+#include "mbs/succession.h"
 #include "mbs/system.h"
 
 namespace topple::mbs {
 
 void SystemDeleter::operator()(System* s) const { delete s; }
 
+void SystemDeleter::operator()(Course* c) const { delete c; }
+
 Simulation::Simulation(const Model& model, const Options& options) : system_(new System(model, options)) {}
+Simulation::Simulation(const Model& model, const Options& options, const Moment& moment, bool is_successor)
+    : system_(new System(model, options)) {
+  go_on(moment, *system_, is_successor);
+  course_.reset(new Course(*system_, moment.course));
+}
 Simulation::~Simulation() = default;
 Simulation::Simulation(Simulation&&) noexcept = default;
 Simulation& Simulation::operator=(Simulation&&) noexcept = default;
+
+bool Simulation::begin() {
+  course_.reset(new Course(*system_));
+  return course_->begin();
+}
+bool Simulation::advance() {
+  (void)system_->advance_step();
+  return course_->follow();
+}
+Summary Simulation::finish() { return course_->finish(); }
+Moment Simulation::keep() const { return keep_moment(*system_, *course_); }
+long Simulation::steps() const { return system_->state.step_index; }
+double Simulation::next_time() const { return system_->state.time + system_->step; }
 
 bool Simulation::find_equilibrium(std::string& message) { return system_->find_equilibrium(message); }
 bool Simulation::advance_step() {

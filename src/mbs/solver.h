@@ -134,8 +134,11 @@ struct Summary {
 Summary run(const Model&, const Options&);
 
 class System;  // compiled model and state
+class Course;
+struct Moment;  // mbs/moment.h
 struct SystemDeleter {
   void operator()(System*) const;
+  void operator()(Course*) const;
 };
 
 /// A stepping handle for those who steer: run() is made of these.
@@ -143,9 +146,28 @@ class Simulation {
  public:
   /// Compiles the model. Throws InputError.
   Simulation(const Model&, const Options&);
+  /// Goes on from a moment of a run.
+  ///   is_successor  of another model, which this one succeeds: bodies, joints, elements, springs, bushings and loads
+  ///   are
+  ///                 the same; laws and cables may be added at the end; other laws of elements, friction, and events
+  ///                 that have not fired may have changed. Unchanged elements keep their state to the bit.
+  /// Throws InputError E625 if the model does not fit the moment.
+  Simulation(const Model&, const Options&, const Moment&, bool is_successor = false);
   ~Simulation();
   Simulation(Simulation&&) noexcept;
   Simulation& operator=(Simulation&&) noexcept;
+
+  /// A run with its frames, happenings and end, as run() makes it: the start; false if it ends here.
+  bool begin();
+  /// One step of that run; false if it has ended.
+  bool advance();
+  /// How it ended, or stands now.
+  Summary finish();
+  /// A place to go on from: the same bits follow.
+  Moment keep() const;
+  long steps() const;
+  /// Simulated time of the next step [s].
+  double next_time() const;
 
   /// Solves for the dead-load equilibrium; false with `message` if there is none.
   bool find_equilibrium(std::string& message);
@@ -161,6 +183,7 @@ class Simulation {
 
  private:
   std::unique_ptr<System, SystemDeleter> system_;
+  std::unique_ptr<Course, SystemDeleter> course_;  // of begin(), or of a moment
 };
 
 }  // namespace topple::mbs
