@@ -37,18 +37,9 @@ struct MemberZones {
   int rotational = -1;        // of station 1 of a ground column
 };
 
-struct Builder {
-  const product::Plan& plan;
-  const Knowledge& k;
-  ModelMap& map;
-  int threads;
-  const Condensation* condensation = nullptr;  // connects what stands for all; null: everything
-  const KnownCurves* known = nullptr;
-  KnownCurves* made = nullptr;  // takes the curves and laws that were made
-
-  Builder(const product::Plan& p, const Knowledge& knowledge, ModelMap& m, int t, const KnownCurves* curves = nullptr)
-      : plan(p), k(knowledge), map(m), threads(t), known(curves), library(curves) {}
-  mbs::Model build();
+/// What a builder knows so far; a copy of it can be built on.
+struct BuilderState {
+  explicit BuilderState(const KnownCurves* curves = nullptr) : library(curves) {}
 
   mbs::Model model;
   ZoneLibrary library;
@@ -65,6 +56,27 @@ struct Builder {
   std::map<int, MemberZones> zones;      // columns and beams
   std::map<std::tuple<int, double, double, Bending>, mbs::LawId> laws;
   bool hinge_about_y = true;
+  // of charges, which may be laid out anew while the model runs: laws are never taken out, so that their ids stay
+  std::map<std::tuple<int, double, double, double>, mbs::LawId> cage_laws;  // by element, length, bars and place
+  std::map<std::tuple<int, double, double, std::string>, mbs::LawId> hinge_laws;
+};
+
+struct Builder : BuilderState {
+  const product::Plan& plan;
+  const Knowledge& k;
+  ModelMap& map;
+  int threads;
+  const Condensation* condensation = nullptr;  // connects what stands for all; null: everything
+  const KnownCurves* known = nullptr;
+  KnownCurves* made = nullptr;  // takes the curves and laws that were made
+
+  Builder(const product::Plan& p, const Knowledge& knowledge, ModelMap& m, int t, const KnownCurves* curves = nullptr)
+      : BuilderState(curves), plan(p), k(knowledge), map(m), threads(t), known(curves) {}
+  /// Goes on from another one's state; plan and map must be those of it, or copies with additions.
+  Builder(BuilderState state, const product::Plan& p, const Knowledge& knowledge, ModelMap& m)
+      : BuilderState(std::move(state)), plan(p), k(knowledge), map(m), threads(1) {}
+  /// Everything but the events.
+  void build();
 
   // bodies
   void find_direction();
@@ -97,6 +109,7 @@ struct Builder {
   /// Whether a frame's members are connected; whether those to the next frame are.
   bool has_frame(int frame) const;
   bool has_link(int frame) const;
+  void connect_cable(const product::Cable&);
   struct Stiffness {
     double EA = 0, GA = 0, GJ = 0, EI_y = 0, EI_z = 0;
   };
@@ -115,7 +128,8 @@ struct Builder {
                                            Bending = Bending::Both);
 
   // events
-  void add_events();
+  /// Adds the events of charges to model and map, in order of the schedule.
+  void add_events(std::vector<Firing> schedule);
 
   const product::Member& member(int i) const { return plan.members[static_cast<size_t>(i)]; }
   const product::Section& section_of(int i) const { return plan.sections[static_cast<size_t>(member(i).section)]; }

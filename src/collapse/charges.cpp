@@ -18,8 +18,8 @@ constexpr double kLeastStiffnessShare = 1e-3;  // of a fired zone, so that its f
 using product::Member;
 using product::MemberKind;
 
-void Builder::add_events() {
-  map.schedule = make_schedule(plan, k);
+void Builder::add_events(std::vector<Firing> schedule) {
+  map.schedule = std::move(schedule);
   for (size_t s = 0; s < plan.stages.size(); ++s)
     map.stages.push_back("stage " + std::to_string(s + 1) + " \"" + plan.stages[s].name +
                          "\": " + std::to_string(plan.stages[s].charges.size()) + " charges");
@@ -37,7 +37,9 @@ void Builder::add_events() {
     if (!has_frame(m.frame_a)) continue;
     const MemberZones& z = zones[c.member];
     const int axis = m.kind == MemberKind::Column ? 2 : m.row_a != m.row_b ? 0 : 1;
-    const double from = m.start[axis] + c.position - 0.5 * c.destroyed_length;
+    double from = m.start[axis] + c.position - 0.5 * c.destroyed_length;
+    // a column that was not built with a stump leaves nothing below its charge
+    if (m.kind == MemberKind::Column && !lowest_charge.count(c.member)) from = m.start[axis];
     const double to = m.start[axis] + c.position + 0.5 * c.destroyed_length;
     int which = 0;
     if (m.kind == MemberKind::Beam && std::abs(c.position - z.station[1].at) < std::abs(c.position - z.station[0].at))
@@ -50,7 +52,7 @@ void Builder::add_events() {
     lighter.time = firing.time + k.charge_release_time;
     lighter.name = m.name + " thrown out";
     event.time = firing.time;
-    EventEntry entry{firing.stage, firing.charge, m.name, firing.time, 0};
+    EventEntry entry{firing.stage, firing.charge, m.name, firing.time, 0, false, {}};
 
     const int element = z.element[which];
     if (const auto it = residual.find(element); it == residual.end() || c.residual_bars < it->second) {
@@ -61,7 +63,10 @@ void Builder::add_events() {
       act.ramp = k.charge_release_time;
       const nearfield::ZoneInput& in = library.input(z.station[static_cast<size_t>(which)].zone);
       const nearfield::ResidualCage cage = make_residual_cage(in, c.destroyed_length, c.residual_bars);
-      act.law = mbs::add_law(model, make_cage_law(cage, c.destroyed_length, m.name + "/charge", k));
+      const auto key = std::make_tuple(element, c.destroyed_length, c.residual_bars, c.position);
+      if (!cage_laws.count(key))
+        cage_laws[key] = mbs::add_law(model, make_cage_law(cage, c.destroyed_length, m.name + "/charge", k));
+      act.law = cage_laws[key];
       // bars alone are as soft as they are long
       const double before = model.elements[static_cast<size_t>(element)].translational_stiffness.x;
       act.stiffness_share = std::clamp(cage.EA / (c.destroyed_length * before), kLeastStiffnessShare, 1.0);

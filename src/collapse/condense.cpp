@@ -426,7 +426,8 @@ KnownCurves make_known_curves(const product::Plan& plan, const Knowledge& k, con
   Builder builder(plan, k, map, 1);
   builder.condensation = &c;
   builder.made = &out;
-  (void)builder.build();
+  builder.build();
+  builder.add_events(make_schedule(plan, k));
   return out;
 }
 
@@ -435,7 +436,9 @@ mbs::Model make_condensed_model(const product::Plan& plan, const Knowledge& k, c
   map = {};
   Builder builder(plan, k, map, 1, known);
   builder.condensation = &c;
-  mbs::Model model = builder.build();
+  builder.build();
+  builder.add_events(make_schedule(plan, k));
+  mbs::Model model = std::move(builder.model);
   Condenser(builder, c, model).condense();
   if (options.highest_frequency > 0) limit_frequency(model, options.highest_frequency);
   return model;

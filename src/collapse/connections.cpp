@@ -171,9 +171,11 @@ mbs::LawId Builder::law_of(int zone, const Stiffness& s, const std::string& name
 }
 
 mbs::LawId Builder::hinge_law_of(int zone, const Stiffness& s, const std::string& name) {
+  const auto key = std::make_tuple(zone, s.EI_y, s.EI_z, name);
+  if (const auto it = hinge_laws.find(key); it != hinge_laws.end()) return it->second;
   mbs::ZoneLaw law = make_law(zone, s, name, bending_of_column());
   if (!hinge_about_y) law.moment_z = law.moment_y;
-  return mbs::add_law(model, law);
+  return hinge_laws[key] = mbs::add_law(model, law);
 }
 
 Pose Builder::frame_in(int body, const Vec3& p_W, const Mat3& R_WF) const {
@@ -438,47 +440,49 @@ void Builder::join_wall(int index, const nearfield::PanelRcc& rcc, const Vec3& b
 }
 
 void Builder::connect_cables() {
-  for (const product::Cable& c : plan.cables) {
-    const Member& m = member(c.member);
-    if (m.removed) {
-      complaints.push_back(
-          {Severity::Error, "E624", c.where, 1, "cable " + c.name + ": " + m.name + " was taken out", ""});
-      continue;
-    }
-    const GridPoint at{m.row_a, m.frame_a, m.storey};
-    const double length = norm(m.end - m.start), share = length > 0 ? c.position / length : 0;
-    const Vec3 p_W = m.start + share * (m.end - m.start);
-    int body = -1;
-    if (m.kind == MemberKind::Column) {
-      body = node_at(at);
-      if (at.storey == 0 && c.position < zones[c.member].clear_length) body = own_body.at(c.member);
-      if (stump_body.count(c.member) && c.position < lowest_charge[c.member]) body = stump_body[c.member];
-    } else if (own_body.count(c.member)) {
-      body = own_body.at(c.member);
-    } else if (m.kind == MemberKind::Beam || m.kind == MemberKind::Wall) {
-      const int floor = m.kind == MemberKind::Wall ? at.storey - 1 : at.storey;
-      const int a = node_at({m.row_a, m.frame_a, floor}), b = node_at({m.row_b, m.frame_b, floor});
-      body = share < 0.5 || b < 0 ? (a < 0 ? b : a) : b;
-    } else if (m.kind == MemberKind::Slab) {
-      const int frame = share < 0.5 ? m.frame_a : m.frame_b;
-      const int beam = find_at(x_beams, {m.row_a, frame, m.storey});
-      body = beam >= 0 ? own_body.at(beam) : node_at({share < 0.5 ? m.row_a : m.row_b, frame, m.storey});
-    }
-    if (body < 0) {
-      complaints.push_back({Severity::Error, "E624", c.where, 1, "cable " + c.name + ": nothing to tie it to", ""});
-      continue;
-    }
-    mbs::Cable cable;
-    cable.name = c.name;
-    cable.a = mbs::BodyId{body};
-    cable.b = mbs::kGround;
-    cable.p_A = p_W - model.bodies[static_cast<size_t>(body)].X_WB.p;
-    cable.p_B = c.anchor;
-    cable.stiffness = c.stiffness;
-    cable.pretension = c.pretension;
-    cable.strength = c.strength > 0 ? c.strength : mbs::kUnlimited;
-    model.cables.push_back(cable);
+  for (const product::Cable& c : plan.cables) connect_cable(c);
+}
+
+void Builder::connect_cable(const product::Cable& c) {
+  const Member& m = member(c.member);
+  if (m.removed) {
+    complaints.push_back(
+        {Severity::Error, "E624", c.where, 1, "cable " + c.name + ": " + m.name + " was taken out", ""});
+    return;
   }
+  const GridPoint at{m.row_a, m.frame_a, m.storey};
+  const double length = norm(m.end - m.start), share = length > 0 ? c.position / length : 0;
+  const Vec3 p_W = m.start + share * (m.end - m.start);
+  int body = -1;
+  if (m.kind == MemberKind::Column) {
+    body = node_at(at);
+    if (at.storey == 0 && c.position < zones[c.member].clear_length) body = own_body.at(c.member);
+    if (stump_body.count(c.member) && c.position < lowest_charge[c.member]) body = stump_body[c.member];
+  } else if (own_body.count(c.member)) {
+    body = own_body.at(c.member);
+  } else if (m.kind == MemberKind::Beam || m.kind == MemberKind::Wall) {
+    const int floor = m.kind == MemberKind::Wall ? at.storey - 1 : at.storey;
+    const int a = node_at({m.row_a, m.frame_a, floor}), b = node_at({m.row_b, m.frame_b, floor});
+    body = share < 0.5 || b < 0 ? (a < 0 ? b : a) : b;
+  } else if (m.kind == MemberKind::Slab) {
+    const int frame = share < 0.5 ? m.frame_a : m.frame_b;
+    const int beam = find_at(x_beams, {m.row_a, frame, m.storey});
+    body = beam >= 0 ? own_body.at(beam) : node_at({share < 0.5 ? m.row_a : m.row_b, frame, m.storey});
+  }
+  if (body < 0) {
+    complaints.push_back({Severity::Error, "E624", c.where, 1, "cable " + c.name + ": nothing to tie it to", ""});
+    return;
+  }
+  mbs::Cable cable;
+  cable.name = c.name;
+  cable.a = mbs::BodyId{body};
+  cable.b = mbs::kGround;
+  cable.p_A = p_W - model.bodies[static_cast<size_t>(body)].X_WB.p;
+  cable.p_B = c.anchor;
+  cable.stiffness = c.stiffness;
+  cable.pretension = c.pretension;
+  cable.strength = c.strength > 0 ? c.strength : mbs::kUnlimited;
+  model.cables.push_back(cable);
 }
 
 }  // namespace topple::collapse

@@ -373,7 +373,7 @@ void Builder::finish_bodies() {
   }
 }
 
-mbs::Model Builder::build() {
+void Builder::build() {
   const auto stop_if_wrong = [this] {
     if (!complaints.empty()) throw InputError(complaints);
   };
@@ -417,7 +417,6 @@ mbs::Model Builder::build() {
   for (const auto& [at, index] : y_walls)
     if (has_link(at.frame)) connect_wall(at, index, false);
   connect_cables();
-  add_events();
   stop_if_wrong();
   for (size_t s = 0; s < plan.storey_loads.size(); ++s) {
     const bool has_slab = std::any_of(slabs.begin(), slabs.end(),
@@ -428,12 +427,14 @@ mbs::Model Builder::build() {
   }
   if (!hinge_about_y && !y_walls.empty())
     map.notes.push_back("The fall is across the rows; walls in the rows count with their weight only.");
-  return std::move(model);
 }
 
 mbs::Model make_model(const product::Plan& plan, const Knowledge& knowledge, ModelMap& map, int threads) {
   map = {};
-  return Builder(plan, knowledge, map, threads).build();
+  Builder builder(plan, knowledge, map, threads);
+  builder.build();
+  builder.add_events(make_schedule(plan, knowledge));
+  return std::move(builder.model);
 }
 
 }  // namespace topple::collapse

@@ -37,6 +37,7 @@ struct EventEntry {
   double time = 0;            // [s]
   double debris_mass = 0;     // dropped from the model [kg]
   bool is_aftermath = false;  // the concrete leaving, after the charge itself
+  std::string note;           // of an event that is no charge: what is told of it
 };
 
 /// A length of a member that a charge destroys; it leaves the model when the charge fires.

@@ -15,7 +15,7 @@ MemberZone find_member_zone(const product::Plan& plan, const Knowledge& knowledg
   if (m.removed) throw InputError("E624", m.name + " is taken out in the preparation");
   ModelMap map;
   Builder builder(plan, knowledge, map, threads);
-  const mbs::Model model = builder.build();
+  builder.build();
   const MemberZones& zones = builder.zones.at(index);
   const size_t which = at_end ? 1 : 0;
   MemberZone out;
@@ -24,7 +24,7 @@ MemberZone find_member_zone(const product::Plan& plan, const Knowledge& knowledg
   out.normal_force = zones.normal_force;
   // a ground column's top is a joint; its foot has the same force and the shaft's weight
   const int element = zones.element[which] >= 0 ? zones.element[which] : zones.element[0];
-  mbs::Simulation simulation(model, {});
+  mbs::Simulation simulation(builder.model, {});
   out.is_estimate = element < 0 || !simulation.find_equilibrium(out.message);
   if (!out.is_estimate) out.normal_force = -simulation.calc_view().element_force[static_cast<size_t>(element)].x;
   return out;

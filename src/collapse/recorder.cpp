@@ -137,6 +137,81 @@ BlockFrame Recorder::calc_block(const mbs::View& v) const {
   return out;
 }
 
+void Recorder::put_pose(const Pose& X) {
+  for (double c : {X.p.x, X.p.y, X.p.z}) record_.position.push_back(static_cast<float>(c));
+  for (double c : {X.q.w, X.q.x, X.q.y, X.q.z}) record_.orientation.push_back(static_cast<float>(c));
+}
+
+Pose calc_debris_pose(const DebrisEntry& d, double gravity, double time) {
+  const double t = std::max(0.0, time - d.time);
+  Vec3 p = d.centre;
+  p.z = std::max(std::min(p.z, d.half.z), p.z - 0.5 * gravity * t * t);
+  return {p, {}};
+}
+
+void Recorder::put_debris(double time) {
+  for (const DebrisEntry& d : map_.debris) put_pose(calc_debris_pose(d, norm(model_.gravity), time));
+}
+
+void Recorder::look(const mbs::View& v) {
+  last_time_ = v.time;
+  last_pose_ = v.X_WB;
+  last_v_ = v.v_WB;
+  last_w_ = v.w_WB;
+  last_mass_ = v.mass;
+}
+
+void Recorder::follow(const Recorder& before, double until) {
+  start_ = before.start_;
+  reaction_error_ = before.reaction_error_;
+  for (const auto& told : before.stages_told_)
+    if (told.first <= until) stages_told_.push_back(told);
+  for (const double t : before.contacts_told_)
+    if (t <= until) contacts_told_.push_back(t);
+  if (before.last_time_ <= until) {
+    last_time_ = before.last_time_;
+    last_pose_ = before.last_pose_;
+    last_v_ = before.last_v_;
+    last_w_ = before.last_w_;
+    last_mass_ = before.last_mass_;
+  }
+  for (const Touchdown& t : before.touchdowns_)
+    if (t.time <= until) touchdowns_.push_back(t);
+  if (before.touchdown_ <= until) {
+    touchdown_ = before.touchdown_;
+    touchdown_body_ = before.touchdown_body_;
+  }
+}
+
+void Recorder::append(const Recorder& from, size_t frames, double until) {
+  stages_told_.clear();
+  contacts_told_.clear();
+  touchdowns_.clear();
+  follow(from, until);
+  const record::Record& r = from.record_;
+  const size_t B = model_.bodies.size(), stride = r.bodies.size(), Z = record_.zones.size();
+  for (size_t i = 0; i < frames; ++i) {
+    record_.time.push_back(r.time[i]);
+    const auto p = r.position.begin() + static_cast<std::ptrdiff_t>(3 * i * stride);
+    const auto q = r.orientation.begin() + static_cast<std::ptrdiff_t>(4 * i * stride);
+    record_.position.insert(record_.position.end(), p, p + static_cast<std::ptrdiff_t>(3 * B));
+    record_.orientation.insert(record_.orientation.end(), q, q + static_cast<std::ptrdiff_t>(4 * B));
+    put_debris(r.time[i]);
+    const double force = r.series[1].value[i];
+    if (force > largest_ground_force_) largest_ground_force_ = force, largest_ground_force_time_ = r.time[i];
+  }
+  const auto copy = [](auto& to, const auto& source, size_t n) {
+    to.insert(to.end(), source.begin(), source.begin() + static_cast<std::ptrdiff_t>(n));
+  };
+  copy(record_.zone_state, r.zone_state, frames * Z);
+  copy(record_.zone_utilisation, r.zone_utilisation, frames * Z);
+  for (size_t s = 0; s < record_.series.size(); ++s) copy(record_.series[s].value, r.series[s].value, frames);
+  copy(block_, from.block_, frames);
+  copy(zone_frames_, from.zone_frames_, frames);
+  for (const record::Event& e : r.events)
+    if (e.time <= until) record_.events.push_back(e);
+}
+
 void Recorder::add_frame(const mbs::View& v) {
   // an engine may show the last state twice
   if (!record_.time.empty() && v.time <= record_.time.back()) return;
@@ -149,18 +224,8 @@ void Recorder::add_frame(const mbs::View& v) {
     reaction_error_ = weight > 0 ? std::abs(norm(v.ground_force) - weight) / weight : 0;
   }
   record_.time.push_back(v.time);
-  const auto put = [this](const Pose& X) {
-    for (double c : {X.p.x, X.p.y, X.p.z}) record_.position.push_back(static_cast<float>(c));
-    for (double c : {X.q.w, X.q.x, X.q.y, X.q.z}) record_.orientation.push_back(static_cast<float>(c));
-  };
-  for (size_t b = 0; b < B; ++b) put(v.X_WB[b]);
-  for (const DebrisEntry& d : map_.debris) {
-    // falls freely onto the ground
-    const double t = std::max(0.0, v.time - d.time);
-    Vec3 p = d.centre;
-    p.z = std::max(std::min(p.z, d.half.z), p.z - 0.5 * norm(model_.gravity) * t * t);
-    put({p, {}});
-  }
+  for (size_t b = 0; b < B; ++b) put_pose(v.X_WB[b]);
+  put_debris(v.time);
 
   ZoneFrame zf;
   zf.time = v.time;
@@ -213,10 +278,7 @@ void Recorder::add_frame(const mbs::View& v) {
     }
   }
   zone_frames_.push_back(zf);
-  last_pose_ = v.X_WB;
-  last_v_ = v.v_WB;
-  last_w_ = v.w_WB;
-  last_mass_ = v.mass;
+  look(v);
   shortening_ = v.shortening;
   rotation_ = v.rotation;
 
@@ -255,7 +317,7 @@ Touchdown Recorder::calc_touchdown(int body, double time, double speed) const {
   out.speed = speed;
   const size_t b = static_cast<size_t>(body);
   if (b >= last_v_.size()) return out;
-  const double since = time - record_.time.back();
+  const double since = time - last_time_;
   const Vec3 v = last_v_[b] + since * model_.gravity;
   const Vec3 p = last_pose_[b].p + since * last_v_[b];
   out.place = {p.x, p.y};
@@ -291,8 +353,12 @@ void Recorder::add_happening(const mbs::Happening& h) {
       }
       const EventEntry& entry = map_.events[static_cast<size_t>(h.index)];
       if (entry.is_aftermath) break;
-      if (entry.stage > stage_shown_) {
-        stage_shown_ = entry.stage;
+      if (!entry.note.empty()) {
+        add_event({h.time, "edit", entry.member, entry.note});
+        break;
+      }
+      if (stages_told_.empty() || entry.stage > stages_told_.back().second) {
+        stages_told_.emplace_back(h.time, entry.stage);
         add_event({h.time, "stage", map_.stages[static_cast<size_t>(entry.stage)],
                    map_.stages[static_cast<size_t>(entry.stage)]});
       }
@@ -371,7 +437,8 @@ void Recorder::add_happening(const mbs::Happening& h) {
       break;
     }
     case Kind::BodyContact:
-      if (h.speed < kLeastSpeed || ++contacts_ > kMostContacts) break;
+      if (h.speed < kLeastSpeed || contacts_told_.size() >= kMostContacts) break;
+      contacts_told_.push_back(h.time);
       add_event({h.time, "contact", body(h.index),
                  fmt::format("{} hits {} at {:.1f} m/s", body(h.index), body(h.other), h.speed)});
       break;

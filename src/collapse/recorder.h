@@ -3,6 +3,7 @@
 
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "collapse/manager.h"
@@ -30,6 +31,14 @@ class Recorder {
   void add_event(record::Event);
   /// Series and events are complete after this.
   void finish();
+  /// Goes on where another recorder of the same bodies was at a time; its frames and events stay there.
+  void follow(const Recorder& before, double until);
+  /// Takes a view for the last frame, which it is not recorded as.
+  void look(const mbs::View&);
+  double last_time() const { return last_time_; }  // of the last frame [s]
+  /// Takes over the first frames of another recorder of the same bodies, and its events up to a time. Debris is that of
+  /// this one's map.
+  void append(const Recorder& from, size_t frames, double until);
 
   const std::vector<BlockFrame>& block_frames() const { return block_; }
   const std::vector<ZoneFrame>& zone_frames() const { return zone_frames_; }
@@ -45,6 +54,8 @@ class Recorder {
   record::Series& series(size_t i) { return record_.series[i]; }
   Touchdown calc_touchdown(int body, double time, double speed) const;
   BlockFrame calc_block(const mbs::View&) const;
+  void put_pose(const Pose&);
+  void put_debris(double time);
   const ZoneEntry& entry_of(int element) const;
 
   const mbs::Model& model_;
@@ -57,16 +68,20 @@ class Recorder {
   std::vector<ZoneFrame> zone_frames_;
   std::vector<double> shortening_, rotation_;
   std::vector<int> fixed_joints_;
-  int stage_shown_ = -1;
+  std::vector<std::pair<double, int>> stages_told_;  // when, which
   std::vector<Pose> last_pose_;  // of the bodies at the last frame, for what happens after it
   std::vector<Vec3> last_v_, last_w_;
   std::vector<double> last_mass_;
+  double last_time_ = 0;
   std::vector<Touchdown> touchdowns_;
   double touchdown_ = std::numeric_limits<double>::quiet_NaN();
   std::string touchdown_body_;
   double reaction_error_ = 0, largest_ground_force_ = 0, largest_ground_force_time_ = 0;
-  size_t contacts_ = 0;
+  std::vector<double> contacts_told_;  // when [s]
 };
+
+/// Where blasted concrete is: it falls freely onto the ground.
+Pose calc_debris_pose(const DebrisEntry&, double gravity, double time);
 
 /// Entries for a model that comes from a file.
 ModelMap describe_model(const mbs::Model&);

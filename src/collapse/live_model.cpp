@@ -1,0 +1,382 @@
+#include "collapse/live_model.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/error.h"
+#include "base/unit.h"
+
+namespace topple::collapse {
+
+using product::Member;
+using product::MemberKind;
+
+const char* word_of(Edit::Kind kind) {
+  switch (kind) {
+    case Edit::Kind::Fire:
+      return "fire";
+    case Edit::Kind::SetDelay:
+      return "set_delay";
+    case Edit::Kind::AddCharge:
+      return "add_charge";
+    case Edit::Kind::RemoveCharge:
+      return "remove_charge";
+    case Edit::Kind::AddPreCut:
+      return "add_pre_cut";
+    case Edit::Kind::AddCable:
+      return "add_cable";
+    case Edit::Kind::RemoveCable:
+      return "remove_cable";
+    case Edit::Kind::SetFriction:
+      return "set_friction";
+  }
+  return "";
+}
+
+namespace {
+
+[[noreturn]] void refuse_value(const std::string& what, const std::string& help = {}) {
+  throw InputError("E912", what, help);
+}
+
+void demand(bool holds, const std::string& what, const std::string& help = {}) {
+  if (!holds) refuse_value(what, help);
+}
+
+bool is_share(double x) { return x >= 0 && x <= 1; }
+
+/// A time with no more digits than it needs.
+std::string words_of_time(double t) { return fmt::format("{:.6g} s", t); }
+
+}  // namespace
+
+LiveModel::LiveModel(product::Plan plan, const Knowledge& k, int threads) : plan_(std::move(plan)), k_(&k) {
+  Builder builder(plan_, k, map_, threads);
+  builder.build();
+  built_ = std::move(static_cast<BuilderState&>(builder));
+  for (const mbs::Body& b : built_.model.bodies) shapes_.push_back(b.shapes);
+  for (const BodyEntry& b : map_.bodies) drawn_.push_back(b.shapes);
+  // places in the plan, not in time
+  for (size_t s = 0; s < plan_.stages.size(); ++s)
+    for (size_t c = 0; c < plan_.stages[s].charges.size(); ++c)
+      charges_.push_back({static_cast<int>(s), static_cast<int>(c), 0, plan_.stages[s].charges[c].fails});
+  for (const Firing& f : make_schedule(plan_, k))
+    for (LiveCharge& c : charges_)
+      if (c.stage == f.stage && c.index == f.charge) c.time = f.time;
+  lay_out_events();
+}
+
+LiveModel::LiveModel(const LiveModel&) = default;
+
+void LiveModel::lay_out_events() {
+  mbs::Model& model = built_.model;
+  model.events.clear();
+  map_.events.clear();
+  map_.debris.clear();
+  map_.stages.clear();
+  for (ZoneEntry& z : map_.elements) z.firing_time = std::numeric_limits<double>::infinity();
+  for (GroundColumn& g : map_.ground_columns) g.is_fired = false;
+  for (size_t b = 0; b < shapes_.size(); ++b) {
+    model.bodies[b].shapes = shapes_[b];
+    map_.bodies[b].shapes = drawn_[b];
+  }
+  std::vector<Firing> schedule;
+  for (const LiveCharge& c : charges_) schedule.push_back({c.stage, c.index, c.time, c.fails || c.is_removed});
+  std::stable_sort(schedule.begin(), schedule.end(), [](const Firing& a, const Firing& b) { return a.time < b.time; });
+  Builder builder(std::move(built_), plan_, *k_, map_);
+  builder.add_events(std::move(schedule));
+  built_ = std::move(static_cast<BuilderState&>(builder));
+  for (const Extra& e : extras_) {
+    built_.model.events.push_back(e.event);
+    map_.events.push_back(e.entry);
+  }
+}
+
+int LiveModel::law_of_zone(size_t zone) const {
+  const mbs::Model& m = built_.model;
+  if (zone < m.elements.size())
+    return m.elements[zone].stations.empty() ? -1 : m.elements[zone].stations.front().law.index;
+  zone -= m.elements.size();
+  return zone < m.rotational_elements.size() ? m.rotational_elements[zone].law.index : -1;
+}
+
+int LiveModel::member_named(const std::string& name) const {
+  const int i = plan_.find_member(name);
+  if (i >= 0) return i;
+  std::vector<std::string> known;
+  for (const Member& m : plan_.members) known.push_back(m.name);
+  const std::string near = nearest_name(name, known);
+  throw InputError("E920", "there is no member \"" + name + "\"", near.empty() ? "" : "did you mean \"" + near + "\"?");
+}
+
+LiveCharge& LiveModel::unfired(int charge, double time) {
+  if (charge < 0 || charge >= static_cast<int>(charges_.size()))
+    throw InputError("E920", fmt::format("there is no charge {}; there are {}", charge, charges_.size()));
+  LiveCharge& c = charges_[static_cast<size_t>(charge)];
+  if (c.is_removed) throw InputError("E931", "the charge on " + member_of(c) + " is taken out");
+  if (c.time <= time && !c.fails)
+    throw InputError("E931", fmt::format("the charge on {} has fired at {}", member_of(c), words_of_time(c.time)),
+                     "rewind to a time before that");
+  return c;
+}
+
+std::string LiveModel::apply(const Edit& e, double time, double next) {
+  std::string text;
+  switch (e.kind) {
+    case Edit::Kind::Fire:
+      text = fire(e, time, next);
+      break;
+    case Edit::Kind::SetDelay:
+      text = set_delay(e, time);
+      break;
+    case Edit::Kind::AddCharge:
+      text = add_charge(e, time, next);
+      break;
+    case Edit::Kind::RemoveCharge:
+      text = remove_charge(e, time);
+      break;
+    case Edit::Kind::AddPreCut:
+      text = add_pre_cut(e, time);
+      break;
+    case Edit::Kind::AddCable:
+      text = add_cable(e);
+      break;
+    case Edit::Kind::RemoveCable:
+      text = remove_cable(e, next);
+      break;
+    case Edit::Kind::SetFriction:
+      text = set_friction(e);
+      break;
+  }
+  lay_out_events();
+  return text;
+}
+
+std::string LiveModel::fire(const Edit& e, double time, double next) {
+  LiveCharge& c = unfired(e.charge, time);
+  c.time = next;
+  c.fails = false;
+  return fmt::format("{} fires now, at {}", member_of(c), words_of_time(next));
+}
+
+std::string LiveModel::set_delay(const Edit& e, double time) {
+  demand((e.charge >= 0) != (e.stage >= 0), "set_delay wants either a charge or a stage");
+  demand(e.delay.has_value() != e.time.has_value(), "set_delay wants either a delay or a time");
+  const auto check = [&](double t, const std::string& what) {
+    demand(std::isfinite(t) && t >= 0, what + " must be a number from 0 on");
+    demand(
+        t > time,
+        fmt::format("{} would have to fire at {}, and it is {} already", what, words_of_time(t), words_of_time(time)),
+        "fire it now, or rewind");
+  };
+  if (e.charge >= 0) {
+    LiveCharge& c = unfired(e.charge, time);
+    product::Stage& stage = plan_.stages[static_cast<size_t>(c.stage)];
+    product::Charge& charge = stage.charges[static_cast<size_t>(c.index)];
+    const double scatter = c.time - std::max(stage.time, stage.time + charge.delay);
+    const double t = e.time ? *e.time : std::max(stage.time, stage.time + *e.delay + scatter);
+    check(t, member_of(c));
+    const double before = c.time;
+    c.time = t;
+    charge.delay = e.time ? t - stage.time : *e.delay;
+    return fmt::format("{} fires at {} instead of {}", member_of(c), words_of_time(t), words_of_time(before));
+  }
+  if (e.stage >= static_cast<int>(plan_.stages.size()))
+    throw InputError("E920", fmt::format("there is no stage {}; there are {}", e.stage, plan_.stages.size()));
+  product::Stage& stage = plan_.stages[static_cast<size_t>(e.stage)];
+  const double first = plan_.stages.front().time;
+  const double t = e.time ? *e.time : first + *e.delay;
+  check(t, stage.name);
+  int moved = 0;
+  for (LiveCharge& c : charges_) {
+    if (c.stage != e.stage || c.is_removed || c.time <= time) continue;
+    c.time = std::max(t, t + (c.time - stage.time));
+    ++moved;
+  }
+  if (moved == 0) throw InputError("E931", stage.name + " has fired already", "rewind to a time before that");
+  const double before = stage.time;
+  stage.time = t;
+  return fmt::format("{} fires at {} instead of {}", stage.name, words_of_time(t), words_of_time(before));
+}
+
+std::string LiveModel::add_charge(const Edit& e, double time, double next) {
+  const int index = member_named(e.member);
+  const Member& m = plan_.members[static_cast<size_t>(index)];
+  const auto refuse = [&](const std::string& why, const std::string& help = {}) {
+    throw InputError("E932", m.name + ": " + why, help);
+  };
+  if (m.removed) refuse("was taken out before the first charge");
+  const bool is_column = m.kind == MemberKind::Column;
+  if (!is_column && m.kind != MemberKind::Beam) refuse("charges act on columns and beams only");
+  const MemberZones& z = built_.zones[index];
+  if (z.element[0] < 0) refuse("has no zone of its own");
+  demand(e.destroyed_length > 0, "destroyed_length must be > 0 m");
+  demand(is_share(e.residual_bars), "residual_bars must be 0 to 1");
+  demand(is_share(e.transition_damage), "transition_damage must be 0 to 1");
+  const double low = e.position - 0.5 * e.destroyed_length, high = e.position + 0.5 * e.destroyed_length;
+  const double from = z.clear_start, to = z.clear_start + z.clear_length;
+  demand(low >= from && high <= to,
+         fmt::format("{}: a charge at {:.3g} m that destroys {:.3g} m must lie between {:.3g} and {:.3g} m", m.name,
+                     e.position, e.destroyed_length, from, to));
+  if (const auto it = built_.lowest_charge.find(index);
+      is_column && it != built_.lowest_charge.end() && e.position < it->second)
+    throw InputError(
+        "E933",
+        fmt::format("{} stands on a stump up to {:.3g} m, which cannot be cut while it runs", m.name, it->second),
+        "write the charge into the plan and apply it");
+  const double t = e.time.value_or(next);
+  demand(t > time, "the charge would have to fire in the past");
+  size_t stage = 0;
+  if (plan_.stages.empty()) plan_.stages.push_back({"added", t, {}, {}});
+  for (size_t s = 0; s < plan_.stages.size(); ++s)
+    if (plan_.stages[s].time <= t) stage = s;
+  product::Charge c;
+  c.member = index;
+  c.position = e.position;
+  c.destroyed_length = e.destroyed_length;
+  c.residual_bars = e.residual_bars;
+  c.transition_damage = e.transition_damage;
+  c.delay = t - plan_.stages[stage].time;
+  plan_.stages[stage].charges.push_back(c);
+  charges_.push_back(
+      {static_cast<int>(stage), static_cast<int>(plan_.stages[stage].charges.size()) - 1, t, false, false, true});
+  Builder builder(std::move(built_), plan_, *k_, map_);
+  for (int which : {0, 1}) builder.request_station(index, which);
+  builder.library.compute(1);
+  built_ = std::move(static_cast<BuilderState&>(builder));
+  if (is_column && !built_.lowest_charge.count(index))
+    map_.notes.push_back(m.name + " was built without a charge: what lies below the added one leaves with it.");
+  return fmt::format("a charge on {} at {:.3g} m, destroying {:.3g} m, fires at {}", m.name, e.position,
+                     e.destroyed_length, words_of_time(t));
+}
+
+std::string LiveModel::remove_charge(const Edit& e, double time) {
+  LiveCharge& c = unfired(e.charge, time);
+  c.is_removed = true;
+  return fmt::format("the charge on {} at {} is taken out", member_of(c), words_of_time(c.time));
+}
+
+std::string LiveModel::add_pre_cut(const Edit& e, double time) {
+  const int index = member_named(e.member);
+  Member& m = plan_.members[static_cast<size_t>(index)];
+  const auto refuse = [&](const std::string& why) { throw InputError("E932", m.name + ": " + why); };
+  if (m.removed) refuse("was taken out before the first charge");
+  if (m.kind != MemberKind::Column && m.kind != MemberKind::Beam) refuse("pre-cuts weaken columns and beams only");
+  MemberZones& z = built_.zones[index];
+  if (z.element[0] < 0) refuse("has no zone of its own");
+  demand(is_share(e.cut_bars) && is_share(e.cut_concrete), "cut_bars and cut_concrete must be 0 to 1");
+  demand(e.cut_bars > 0 || e.cut_concrete > 0, "cut_bars or cut_concrete must be more than 0");
+  demand(e.cut_concrete < 1, "cut_concrete must be less than 1", "a charge takes out all of it");
+  const double length = norm(m.end - m.start);
+  demand(e.position >= 0 && e.position <= length, fmt::format("{}: at must be 0 to {:.3g} m", m.name, length));
+  const size_t which = std::abs(e.position - z.station[1].at) < std::abs(e.position - z.station[0].at) ? 1 : 0;
+  const int element = z.element[which];
+  if (element >= 0 && map_.elements[static_cast<size_t>(element)].firing_time <= time)
+    refuse("its charge has fired there");
+  for (const LiveCharge& c : charges_)
+    if (charge(c).member == index && c.time <= time && !c.fails && !c.is_removed)
+      refuse("its charge has fired already");
+  m.weakenings.push_back({e.position, e.cut_bars, e.cut_concrete});
+
+  Builder builder(std::move(built_), plan_, *k_, map_);
+  MemberZones& zones = builder.zones[index];
+  // a cut is local: the member keeps its stiffness
+  const Builder::Stiffness stiffness = builder.calc_stiffness(zones);
+  builder.request_station(index, static_cast<int>(which));
+  builder.library.compute(1);
+  const int zone = zones.station[which].zone;
+  if (element >= 0) {
+    mbs::ZoneElement& el = builder.model.elements[static_cast<size_t>(element)];
+    // limits about the axes that the member's own law has
+    const bool is_y_beam = m.kind == MemberKind::Beam && m.row_a == m.row_b;
+    const Bending bending = m.kind == MemberKind::Column ? builder.bending_of_column()
+                            : is_y_beam                  ? Bending::Both
+                                                         : builder.bending_of_x_beam();
+    const mbs::LawId law = builder.law_of(zone, stiffness, m.name + "/cut", bending);
+    size_t station = 0;
+    // of a whole member, the station on the cut's side
+    if (el.stations.size() == 2) station = (el.stations[0].x < 0) == (which == 0) ? 0 : 1;
+    el.stations[station].law = law;
+  } else {
+    builder.model.rotational_elements[static_cast<size_t>(z.rotational)].law =
+        builder.hinge_law_of(zone, stiffness, m.name + "/cut");
+  }
+  built_ = std::move(static_cast<BuilderState&>(builder));
+  return fmt::format("{} is cut at {:.3g} m: {:.3g} % of the bars, {:.3g} % of the concrete", m.name, e.position,
+                     100 * e.cut_bars, 100 * e.cut_concrete);
+}
+
+std::string LiveModel::add_cable(const Edit& e) {
+  const int index = member_named(e.member);
+  const Member& m = plan_.members[static_cast<size_t>(index)];
+  const double length = norm(m.end - m.start);
+  demand(e.position >= 0 && e.position <= length, fmt::format("{}: position must be 0 to {:.3g} m", m.name, length));
+  demand(e.stiffness > 0 && std::isfinite(e.stiffness), "stiffness must be > 0 N/m");
+  demand(e.pretension >= 0 && std::isfinite(e.pretension), "pretension must be >= 0 N");
+  demand(e.strength >= 0, "strength must be >= 0 N; 0: it never breaks");
+  demand(is_finite(e.anchor), "anchor must be three numbers");
+  product::Cable c;
+  c.name = fmt::format("added {}", plan_.cables.size() + 1);
+  c.member = index;
+  c.position = e.position;
+  c.anchor = e.anchor;
+  c.stiffness = e.stiffness;
+  c.pretension = e.pretension;
+  c.strength = e.strength;
+  plan_.cables.push_back(c);
+  Builder builder(std::move(built_), plan_, *k_, map_);
+  builder.connect_cable(plan_.cables.back());
+  built_ = std::move(static_cast<BuilderState&>(builder));
+  if (!built_.complaints.empty()) throw InputError("E932", built_.complaints.front().message);
+  return fmt::format("cable {} from {} pulls with {:.3g} kN", c.name, m.name, e.pretension / unit::kN);
+}
+
+std::string LiveModel::remove_cable(const Edit& e, double next) {
+  const std::vector<mbs::Cable>& cables = built_.model.cables;
+  for (size_t i = 0; i < cables.size(); ++i) {
+    if (cables[i].name != e.cable) continue;
+    if (std::count(cables_off_.begin(), cables_off_.end(), e.cable)) break;
+    cables_off_.push_back(e.cable);
+    Extra x;
+    x.event.time = next;
+    x.event.name = "cable " + e.cable + " let go";
+    mbs::Action act;
+    act.kind = mbs::Action::Kind::ReleaseCable;
+    act.cable = static_cast<int>(i);
+    x.event.actions.push_back(act);
+    x.entry.time = next;
+    x.entry.member = e.cable;
+    x.entry.note = "cable " + e.cable + " is let go";
+    extras_.push_back(x);
+    return x.entry.note;
+  }
+  std::vector<std::string> known;
+  for (const mbs::Cable& c : cables) known.push_back(c.name);
+  const std::string near = nearest_name(e.cable, known);
+  throw InputError("E920", "there is no cable \"" + e.cable + "\" that holds",
+                   near.empty() ? "" : "did you mean \"" + near + "\"?");
+}
+
+std::string LiveModel::set_friction(const Edit& e) {
+  demand(e.ground || e.bodies, "set_friction wants ground, bodies or both");
+  const auto check = [](const std::optional<double>& x, const char* what) {
+    if (x) demand(*x >= 0 && *x <= 2, std::string(what) + " must be 0 to 2");
+  };
+  check(e.ground, "ground"), check(e.bodies, "bodies");
+  mbs::Contact& c = built_.model.contact;
+  std::string text = "friction";
+  if (e.ground) {
+    c.friction = plan_.ground.friction = *e.ground;
+    text += fmt::format(" of the ground {:g}", *e.ground);
+  }
+  if (e.bodies) {
+    c.body_friction = *e.bodies;
+    text += fmt::format("{} of the parts {:g}", e.ground ? "," : "", *e.bodies);
+  }
+  return text;
+}
+
+}  // namespace topple::collapse

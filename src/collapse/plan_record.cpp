@@ -1,0 +1,166 @@
+#include "collapse/plan_record.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "base/hash.h"
+#include "base/unit.h"
+#include "collapse/findings.h"
+#include "collapse/outcome.h"
+#include "record/provenance.h"
+
+namespace topple::collapse {
+
+namespace {
+
+void fill_ending(const mbs::Summary& s, const char* when, record::Record& record) {
+  using Ending = mbs::Summary::Ending;
+  switch (s.ending) {
+    case Ending::AtRest:
+      record.ending = "at_rest";
+      record.ending_text = fmt::format("Everything came to rest at {:.2f} s.", s.time);
+      break;
+    case Ending::TimeLimit:
+      record.ending = "time_limit";
+      record.ending_text = fmt::format("Stopped by the time limit of {:.2f} s.", s.time);
+      break;
+    case Ending::Cancelled:
+      record.ending = "cancelled";
+      record.ending_text = fmt::format("Cancelled at {:.2f} s.", s.time);
+      break;
+    case Ending::NoEquilibrium:
+      record.ending = "failed";
+      record.ending_text = fmt::format("There is no equilibrium under dead load{}: {}.", when, s.message);
+      break;
+    case Ending::Diverged:
+      record.ending = "failed";
+      record.ending_text = fmt::format("The computation failed at {:.3f} s: {}.", s.time, s.message);
+      break;
+  }
+}
+
+void fill_plan_values(const product::Plan& plan, const ModelMap& map, record::Record& r) {
+  const auto add = [&r](const char* group, const std::string& key, const std::string& value) {
+    r.plan_values.push_back({group, key, value});
+  };
+  const auto joined = [](const std::vector<std::string>& names, const std::vector<double>& at) {
+    std::string out;
+    for (size_t i = 0; i < names.size(); ++i) out += fmt::format("{}{} at {:g} m", i ? ", " : "", names[i], at[i]);
+    return out;
+  };
+  add("Building", "Rows", joined(plan.row_names, plan.row_offsets));
+  add("Building", "Frames", joined(plan.frame_names, plan.frame_offsets));
+  add("Building", "Storeys", std::to_string(plan.storey_heights.size()));
+  if (!plan.storey_heights.empty())
+    add("Building", "Height", fmt::format("{:.2f} m", plan.level(static_cast<int>(plan.storey_heights.size()) - 1)));
+  add("Building", "Mass", fmt::format("{:.0f} t", calc_standing_mass(plan) / unit::t));
+  for (const product::Concrete& c : plan.concretes)
+    add("Materials", "Concrete " + c.name,
+        fmt::format("fc {:.3g} N/mm2, fct {:.3g} N/mm2, Ec {:.5g} N/mm2", c.fc / unit::MPa, c.fct / unit::MPa,
+                    c.Ec / unit::MPa));
+  for (const product::Steel& s : plan.steels)
+    add("Materials", "Steel " + s.name,
+        fmt::format("fy {:.4g} N/mm2, fu {:.4g} N/mm2, rupture at {:.3g} %", s.fy / unit::MPa, s.fu / unit::MPa,
+                    100 * s.eps_u));
+  for (const product::Section& s : plan.sections)
+    add("Sections", s.name,
+        fmt::format("{:.3g} x {:.3g} cm, bars {:.3g} cm2, ties {:.3g} mm every {:.3g} cm", s.width / unit::cm,
+                    s.height / unit::cm, s.steel_area() / unit::cm2, s.tie_diameter / unit::mm,
+                    s.tie_spacing / unit::cm));
+  for (const product::Stage& s : plan.stages) {
+    std::string members;
+    for (const product::Charge& c : s.charges)
+      members += (members.empty() ? "" : ", ") + plan.members[static_cast<size_t>(c.member)].name +
+                 (c.fails ? " (fails)" : "");
+    add("Blasting", fmt::format("{} at {:g} s", s.name, s.time), members);
+  }
+  for (const product::Cable& c : plan.cables)
+    add("Blasting", "Cable " + c.name,
+        fmt::format("on {}, pretension {:.0f} kN", plan.members[static_cast<size_t>(c.member)].name,
+                    c.pretension / unit::kN));
+  add("Site", "Friction and restitution", fmt::format("{:g}, {:g}", plan.ground.friction, plan.ground.restitution));
+  add("Planned fall", "Azimuth",
+      map.is_direction_planned
+          ? fmt::format("{:.0f} deg", std::atan2(map.fall_direction.y, map.fall_direction.x) / unit::deg)
+          : "not given");
+}
+
+void fill_building(const product::Plan& plan, const mbs::Model& model, const ModelMap& map, record::Record& r) {
+  r.building_outline = calc_building_outline(model, map);
+  for (const product::Neighbour& n : plan.neighbours) r.neighbours.push_back({n.name, n.footprint, n.is_utility});
+}
+
+}  // namespace
+
+mbs::Options make_mbs_options(const mbs::RunSettings& settings, const Knowledge& k, int threads,
+                              const Progress& progress) {
+  mbs::Options o;
+  o.duration = settings.duration;
+  o.step = settings.step;
+  o.frame_interval = settings.frame_interval;
+  o.rest_speed = k.rest_speed;
+  o.rest_time = k.rest_time;
+  o.threads = threads;
+  o.progress = progress;
+  return o;
+}
+
+void record_into(Recorder& recorder, mbs::Options& o) {
+  o.on_frame = [&recorder](const mbs::View& v) { recorder.add_frame(v); };
+  o.on_happening = [&recorder](const mbs::Happening& h) { recorder.add_happening(h); };
+}
+
+void fill_provenance(const RunOptions& options, const std::string& engine, record::Record& r) {
+  r.provenance.program_version = options.program_version;
+  r.provenance.engine = engine;
+  r.provenance.machine = record::machine_words();
+  r.provenance.created = record::now_utc();
+  r.provenance.threads = options.threads;
+}
+
+void fill_from_plan(const product::Plan& plan, const mbs::Model& model, const ModelMap& map, record::Record& r) {
+  r.counts = count(model);
+  r.provenance.title = plan.title;
+  r.provenance.plan_path = plan.path;
+  r.provenance.plan_text = plan.text;
+  r.provenance.plan_sha256 = calc_sha256(plan.text);
+  r.provenance.seed = plan.analysis.seed;
+  fill_plan_values(plan, map, r);
+  fill_building(plan, model, map, r);
+}
+
+void tell_failing_charges(const product::Plan& plan, const ModelMap& map, Recorder& recorder, double after) {
+  for (const Firing& f : map.schedule) {
+    if (!f.fails || f.time <= after) continue;
+    const product::Charge& c = plan.stages[static_cast<size_t>(f.stage)].charges[static_cast<size_t>(f.charge)];
+    const std::string& name = plan.members[static_cast<size_t>(c.member)].name;
+    recorder.add_event({f.time, "charge", name, fmt::format("the charge of {} does not fire", name)});
+  }
+}
+
+void end_record(const mbs::Summary& summary, const char* when, Recorder& recorder, record::Record& r) {
+  r.provenance.step = summary.step;
+  r.provenance.wall_time = summary.wall_time;
+  fill_ending(summary, when, r);
+  const bool failed = r.ending == "failed";
+  recorder.add_event({summary.time, failed ? "failure" : "rest", r.ending, r.ending_text});
+  recorder.finish();
+}
+
+record::Counts count(const mbs::Model& model) {
+  record::Counts c;
+  c.bodies = static_cast<int>(model.bodies.size());
+  for (const mbs::Joint& j : model.joints) {
+    c.revolute_joints += j.kind == mbs::Joint::Kind::Revolute;
+    c.rigid_joints += j.kind == mbs::Joint::Kind::Fixed;
+  }
+  c.force_elements = static_cast<int>(model.elements.size() + model.rotational_elements.size() + model.springs.size() +
+                                      model.rotational_springs.size() + model.bushings.size());
+  c.cables = static_cast<int>(model.cables.size());
+  for (const mbs::Body& b : model.bodies)
+    if (!b.fixed) c.mass += b.mass;
+  return c;
+}
+
+}  // namespace topple::collapse

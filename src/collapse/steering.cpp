@@ -1,0 +1,342 @@
+#include "collapse/steering.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <set>
+
+#include "base/error.h"
+#include "collapse/findings.h"
+#include "collapse/plan_record.h"
+
+namespace topple::collapse {
+
+namespace {
+
+constexpr size_t kLongestName = 80;
+constexpr double kAlways = std::numeric_limits<double>::infinity();
+
+}  // namespace
+
+size_t Branch::frames() const {
+  size_t n = 0;
+  for (size_t i = 0; i + 1 < pieces.size(); ++i) n += pieces[i].frames;
+  return n + run().record().time.size();
+}
+
+std::pair<const Piece*, size_t> Branch::find_frame(size_t frame) const {
+  for (const Piece& p : pieces) {
+    const size_t n = &p == &pieces.back() ? p.run->record().time.size() : p.frames;
+    if (frame < n) return {&p, frame};
+    frame -= n;
+  }
+  throw InputError("E920", "there is no such frame");
+}
+
+Steering::Steering(const Knowledge& k, SteeringOptions options, SteeringCallbacks callbacks)
+    : k_(k), options_(std::move(options)), callbacks_(std::move(callbacks)) {}
+
+Branch& Steering::branch(int id) const {
+  for (const auto& b : branches_)
+    if (b->id == id) return *b;
+  throw InputError("E920", fmt::format("there is no branch {}", id));
+}
+
+std::string Steering::free_name(const std::string& wanted) const {
+  if (branches_.size() >= options_.most_branches)
+    throw InputError("E905", fmt::format("there are {} branches, which is the limit", branches_.size()),
+                     "go on in a session of its own");
+  const auto is_taken = [this](const std::string& name) {
+    return std::any_of(branches_.begin(), branches_.end(), [&](const auto& b) { return b->name == name; });
+  };
+  if (!wanted.empty()) {
+    if (wanted.size() > kLongestName)
+      throw InputError("E912", fmt::format("a name has at most {} characters", kLongestName));
+    if (is_taken(wanted)) throw InputError("E912", "there is a branch \"" + wanted + "\" already");
+    return wanted;
+  }
+  for (int n = 1;; ++n)
+    if (const std::string name = fmt::format("what-if {}", n); !is_taken(name)) return name;
+}
+
+Branch& Steering::add_branch(Branch b) {
+  b.id = static_cast<int>(branches_.size()) + 1;
+  branches_.push_back(std::make_unique<Branch>(std::move(b)));
+  Branch& made = *branches_.back();
+  if (active_ > 0) active().run().rest();
+  active_ = made.id;
+  go_live();
+  watch(made);
+  if (callbacks_.on_branch) callbacks_.on_branch(made);
+  return made;
+}
+
+void Steering::watch(Branch& b) {
+  Branch* const branch = &b;
+  b.run().on_event = [this, branch](const record::Event& e) {
+    if (callbacks_.on_event) callbacks_.on_event(*branch, e);
+  };
+  b.run().on_frame = [this, branch] {
+    if (callbacks_.on_frame) callbacks_.on_frame(*branch, branch->frames() - 1);
+  };
+}
+
+Branch& Steering::add_root(const product::Plan& plan, const std::string& name) {
+  Branch b;
+  b.name = free_name(name);
+  const auto model = std::make_shared<const LiveModel>(plan, k_, options_.run.threads);
+  b.pieces.push_back({std::make_shared<LiveRun>(model, options_.run, options_.moment_interval), 0, 0, 0});
+  return add_branch(std::move(b));
+}
+
+bool Steering::begin(Branch& b) {
+  const bool good = b.run().begin();
+  if (callbacks_.on_branch) callbacks_.on_branch(b);
+  return good;
+}
+
+void Steering::switch_to(int id) {
+  Branch& b = branch(id);
+  if (id != active_) active().run().rest();
+  active_ = id;
+  go_live();
+  if (callbacks_.on_branch) callbacks_.on_branch(b);
+}
+
+void Steering::rename(int id, const std::string& name) {
+  Branch& b = branch(id);
+  if (name == b.name) return;
+  if (name.empty()) throw InputError("E912", "a name has at least one character");
+  b.name = free_name(name);
+  if (callbacks_.on_branch) callbacks_.on_branch(b);
+}
+
+bool Steering::advance() {
+  LiveRun& run = active().run();
+  const size_t kept = run.moments().size();
+  const bool goes_on = run.advance();
+  if (run.moments().size() != kept) thin_out();
+  return goes_on;
+}
+
+void Steering::advance_to(Branch& b, long step) {
+  if (!b.run().begin()) return;
+  while (b.steps() < step) {
+    const size_t kept = b.run().moments().size();
+    if (!b.run().advance()) break;
+    if (b.run().moments().size() != kept) thin_out();
+  }
+}
+
+std::size_t Steering::moment_bytes() const {
+  std::set<const LiveRun*> runs;
+  std::size_t sum = 0;
+  for (const auto& b : branches_)
+    for (const Piece& p : b->pieces)
+      if (runs.insert(p.run.get()).second) sum += p.run->moment_bytes();
+  return sum;
+}
+
+void Steering::thin_out() {
+  if (moment_bytes() <= options_.moment_bytes) return;
+  std::set<LiveRun*> runs;
+  for (const auto& b : branches_)
+    for (const Piece& p : b->pieces)
+      if (runs.insert(p.run.get()).second) p.run->thin_out();
+}
+
+std::vector<double> Steering::moments(const Branch& b) const {
+  std::vector<double> times;
+  for (const Piece& p : b.pieces)
+    for (const mbs::Moment& m : p.run->moments())
+      if (&p == &b.pieces.back() || m.steps <= p.step)
+        if (times.empty() || m.time > times.back()) times.push_back(m.time);
+  return times;
+}
+
+void Steering::rewind(double time) {
+  const Branch& b = active();
+  size_t lo = 0, hi = b.frames();  // the first later frame
+  while (lo < hi) {
+    const size_t middle = (lo + hi) / 2;
+    const auto [piece, i] = b.find_frame(middle);
+    if (piece->run->record().time[i] <= time)
+      lo = middle + 1;
+    else
+      hi = middle;
+  }
+  if (lo == 0) throw InputError("E920", fmt::format("branch \"{}\" has no frame at or before {:g} s", b.name, time));
+  rewind_to_frame(lo - 1);
+}
+
+void Steering::rewind_to_frame(size_t frame) {
+  (void)active().find_frame(frame);
+  cursor_ = {active_, false, frame};
+}
+
+double Steering::cursor_time() const {
+  const Branch& b = active();
+  if (cursor_.is_live) return b.frontier();
+  const auto [piece, i] = b.find_frame(cursor_.frame);
+  return piece->run->record().time[i];
+}
+
+long Steering::cursor_step() const {
+  const Branch& b = active();
+  if (cursor_.is_live) return b.steps();
+  const auto [piece, i] = b.find_frame(cursor_.frame);
+  return piece->run->frame_steps()[i];
+}
+
+std::vector<Piece> Steering::cut(const Branch& b, const Cursor& cursor) const {
+  std::vector<Piece> pieces;
+  if (cursor.is_live) {
+    pieces = b.pieces;
+    Piece& last = pieces.back();
+    last.frames = last.run->record().time.size();
+    last.step = last.run->steps();
+    last.time = last.run->time();
+    return pieces;
+  }
+  const auto [piece, i] = b.find_frame(cursor.frame);
+  for (const Piece& p : b.pieces) {
+    pieces.push_back(p);
+    if (&p != piece) continue;
+    pieces.back().frames = i + 1;
+    pieces.back().step = p.run->frame_steps()[i];
+    pieces.back().time = p.run->record().time[i];
+    return pieces;
+  }
+  return pieces;
+}
+
+std::shared_ptr<LiveRun> Steering::go_on(const std::vector<Piece>& pieces, std::shared_ptr<const LiveModel> model,
+                                         bool is_successor) const {
+  const Piece& last = pieces.back();
+  return std::make_shared<LiveRun>(std::move(model), options_.run, options_.moment_interval,
+                                   last.run->moment_at(last.step), is_successor, last.run->recorder());
+}
+
+Steering::Made Steering::edit(const Edit& e, const std::string& name, bool in_place) {
+  Branch& from = active();
+  if (!from.run().has_begun() || from.run().moments().empty())
+    throw InputError("E930", "the branch has no equilibrium to go on from");
+  const std::vector<Piece> base = cut(from, cursor_);
+  const Piece& last = base.back();
+  const bool stays = cursor_.is_live && (in_place || last.run->steps() == last.run->start_steps());
+  const std::string new_name = stays ? from.name : free_name(name);
+  if (base.size() >= options_.most_edits)
+    throw InputError("E905", fmt::format("the branch has {} edits, which is the limit", base.size()));
+
+  const mbs::Moment moment = last.run->moment_at(last.step);
+  auto model = std::make_shared<LiveModel>(last.run->model());
+  Made made;
+  made.text = model->apply(e, moment.time, moment.next_time);
+  made.time = moment.time;
+  made.step = moment.steps;
+  auto run = std::make_shared<LiveRun>(std::move(model), options_.run, options_.moment_interval, moment, true,
+                                       last.run->recorder());
+  const EditEntry entry{e, made.text, made.time, !stays, base};
+  std::vector<Piece> pieces = base;
+  pieces.push_back({run, 0, 0, 0});
+  if (stays) {
+    from.run().rest();
+    from.pieces = std::move(pieces);
+    from.edits.push_back(entry);
+    watch(from);
+    go_live();
+    made.branch = &from;
+  } else {
+    Branch b;
+    b.name = new_name;
+    b.parent = from.id;
+    b.time = made.time;
+    b.pieces = std::move(pieces);
+    for (size_t i = 0; i + 1 < b.pieces.size(); ++i) b.first_frame += b.pieces[i].frames;
+    b.edits.push_back(entry);
+    b.sample = from.sample;
+    made.branch = &add_branch(std::move(b));
+  }
+  run->tell({made.time, "edit", e.member.empty() ? e.cable : e.member, made.text});
+  if (stays && callbacks_.on_branch) callbacks_.on_branch(from);
+  return made;
+}
+
+Steering::Made Steering::fork(const std::string& name) {
+  Branch& from = active();
+  if (!from.run().has_begun() || from.run().moments().empty())
+    throw InputError("E930", "the branch has no equilibrium to go on from");
+  Branch b;
+  b.name = free_name(name);
+  b.parent = from.id;
+  b.pieces = cut(from, cursor_);
+  b.time = b.pieces.back().time;
+  for (const Piece& p : b.pieces) b.first_frame += p.frames;
+  b.sample = from.sample;
+  Made made;
+  made.time = b.time;
+  made.step = b.pieces.back().step;
+  b.pieces.push_back({go_on(b.pieces, b.pieces.back().run->model_pointer(), false), 0, 0, 0});
+  made.branch = &add_branch(std::move(b));
+  made.text = fmt::format("branch \"{}\"", made.branch->name);
+  return made;
+}
+
+Steering::Made Steering::undo() {
+  Branch& from = active();
+  if (from.edits.empty()) throw InputError("E934", "branch \"" + from.name + "\" has no edit to take back");
+  const EditEntry entry = from.edits.back();
+  const bool is_fresh = from.run().steps() == from.run().start_steps();
+  Made made;
+  made.text = "taken back: " + entry.text;
+  made.time = entry.time;
+  made.step = entry.before.back().step;
+  if (entry.made_branch) {
+    switch_to(from.parent);
+    made.branch = &active();
+    return made;
+  }
+  if (is_fresh && entry.before.back().run->steps() == entry.before.back().step) {
+    from.pieces = entry.before;
+    from.edits.pop_back();
+    go_live();
+    watch(from);
+    made.branch = &from;
+    if (callbacks_.on_branch) callbacks_.on_branch(from);
+    return made;
+  }
+  Branch b;
+  b.name = free_name({});
+  b.parent = from.id;
+  b.time = entry.time;
+  b.pieces = entry.before;
+  for (const Piece& p : b.pieces) b.first_frame += p.frames;
+  b.edits.assign(from.edits.begin(), from.edits.end() - 1);
+  b.sample = from.sample;
+  b.pieces.push_back({go_on(b.pieces, b.pieces.back().run->model_pointer(), false), 0, 0, 0});
+  made.branch = &add_branch(std::move(b));
+  return made;
+}
+
+record::Record Steering::make_record(const Branch& b) const {
+  const LiveRun& run = b.run();
+  const LiveModel& live = run.model();
+  record::Record r;
+  RunOptions options = options_.run;
+  fill_provenance(options, "native", r);
+  fill_from_plan(live.plan(), live.model(), live.map(), r);
+  const RunCallbacks nobody;
+  Recorder recorder(live.model(), live.map(), k_, r, nobody);
+  for (const Piece& p : b.pieces) {
+    const bool is_last = &p == &b.pieces.back();
+    recorder.append(p.run->recorder(), is_last ? p.run->record().time.size() : p.frames, is_last ? kAlways : p.time);
+  }
+  const mbs::Summary summary = run.summary();
+  end_record(summary, " before the first charge", recorder, r);
+  if (!run.has_ended()) r.ending_text = fmt::format("Computed up to {:.2f} s so far.", run.time());
+  if (!r.time.empty()) add_findings(live.plan(), live.model(), live.map(), k_, recorder, summary, r);
+  return r;
+}
+
+}  // namespace topple::collapse

@@ -1,0 +1,394 @@
+#include "collapse/steering.h"
+
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "collapse/action_log.h"
+#include "collapse/edit_json.h"
+#include "collapse/run.h"
+#include "plans.h"
+
+namespace topple::collapse {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Both columns of row A go at 0.2 s; the row of B at 0.6 s.
+product::Plan two_stages(const std::string& second = "0.6 s", const std::string& duration = "1 s") {
+  return read(house(charge("C-A*-0", "0.2 s") + charge("C-B*-0", second), duration));
+}
+
+SteeringOptions options() {
+  SteeringOptions o;
+  o.run.program_version = "test";
+  return o;
+}
+
+void advance_until(Steering& s, double time) {
+  while (s.active().frontier() < time && s.advance()) {}
+}
+
+Edit delay_of_stage(int stage, double time) {
+  Edit e;
+  e.kind = Edit::Kind::SetDelay;
+  e.stage = stage;
+  e.time = time;
+  return e;
+}
+
+void expect_same_motion(const record::Record& a, const record::Record& b) {
+  EXPECT_EQ(a.time, b.time);
+  EXPECT_EQ(a.position, b.position);
+  EXPECT_EQ(a.orientation, b.orientation);
+  EXPECT_EQ(a.zone_state, b.zone_state);
+  EXPECT_EQ(a.zone_utilisation, b.zone_utilisation);
+  ASSERT_EQ(a.series.size(), b.series.size());
+  for (size_t i = 0; i < a.series.size(); ++i) EXPECT_EQ(a.series[i].value, b.series[i].value) << a.series[i].id;
+}
+
+void expect_same_words(const record::Record& a, const record::Record& b) {
+  ASSERT_EQ(a.events.size(), b.events.size());
+  for (size_t i = 0; i < a.events.size(); ++i) {
+    EXPECT_EQ(a.events[i].time, b.events[i].time);
+    EXPECT_EQ(a.events[i].text, b.events[i].text);
+  }
+  ASSERT_EQ(a.findings.size(), b.findings.size());
+  for (size_t i = 0; i < a.findings.size(); ++i) EXPECT_EQ(a.findings[i].text, b.findings[i].text) << a.findings[i].id;
+  EXPECT_EQ(a.ending_text, b.ending_text);
+}
+
+double final_residual(const record::Record& r) {
+  double residual = 0, released = 0;
+  for (const record::Series& s : r.series) {
+    if (s.id == "energy_residual") residual = std::abs(s.value.back());
+    if (s.id == "energy_gravity") released = std::abs(s.value.back());
+  }
+  return residual / released;
+}
+
+TEST(SteeringReplay, WithoutAnEditIsTheRunOfThePlan) {
+  const product::Plan plan = two_stages();
+  RunOptions run;
+  run.program_version = "test";
+  const record::Record whole = run_plan(plan, default_knowledge(), run, {});
+  Steering s(default_knowledge(), options());
+  ASSERT_TRUE(s.begin(s.add_root(plan, "main")));
+  advance_until(s, 10);
+  const record::Record steered = s.make_record(s.active());
+  expect_same_motion(whole, steered);
+  expect_same_words(whole, steered);
+}
+
+TEST(SteeringReplay, ABranchWithoutAnEditGoesOnWithTheSameBits) {
+  Steering s(default_knowledge(), options());
+  ASSERT_TRUE(s.begin(s.add_root(two_stages(), "main")));
+  advance_until(s, 10);
+  const record::Record whole = s.make_record(s.active());
+  // between two kept moments
+  s.rewind(0.47);
+  const Steering::Made made = s.fork("again");
+  EXPECT_EQ(made.branch->parent, 1);
+  EXPECT_LE(made.time, 0.47);
+  EXPECT_EQ(made.branch->first_frame, made.branch->frames());
+  advance_until(s, 10);
+  const record::Record again = s.make_record(s.active());
+  expect_same_motion(whole, again);
+  expect_same_words(whole, again);
+}
+
+TEST(SteeringReplay, SwitchingToAndFroChangesNothing) {
+  Steering s(default_knowledge(), options());
+  ASSERT_TRUE(s.begin(s.add_root(two_stages(), "main")));
+  advance_until(s, 0.53);
+  s.fork("other");
+  advance_until(s, 0.8);
+  s.switch_to(1);
+  advance_until(s, 10);
+  Steering straight(default_knowledge(), options());
+  ASSERT_TRUE(straight.begin(straight.add_root(two_stages(), "main")));
+  advance_until(straight, 10);
+  expect_same_motion(straight.make_record(straight.active()), s.make_record(s.active()));
+}
+
+TEST(SteeringReplay, ThePastTakesAnEditAsTheFrontierDid) {
+  Steering late(default_knowledge(), options()), early(default_knowledge(), options());
+  for (Steering* s : {&late, &early}) ASSERT_TRUE(s->begin(s->add_root(two_stages(), "main")));
+  advance_until(late, 10);
+  late.rewind(0.4);
+  const long step = late.cursor_step();
+  early.advance_to(early.active(), step);
+  ASSERT_EQ(early.active().steps(), step);
+  for (Steering* s : {&late, &early}) {
+    const Steering::Made made = s->edit(delay_of_stage(1, 0.7));
+    EXPECT_EQ(made.branch->name, "what-if 1");
+    EXPECT_EQ(made.text, "Stage at 0.6 s fires at 0.7 s instead of 0.6 s");
+    EXPECT_EQ(s->active().id, 2);
+    advance_until(*s, 10);
+  }
+  const record::Record a = late.make_record(late.active()), b = early.make_record(early.active());
+  expect_same_motion(a, b);
+  expect_same_words(a, b);
+}
+
+TEST(Steering, AnEditAtTheStartGivesThePlanThatHasIt) {
+  Steering s(default_knowledge(), options());
+  ASSERT_TRUE(s.begin(s.add_root(two_stages(), "main")));
+  const Steering::Made made = s.edit(delay_of_stage(1, 0.5));
+  EXPECT_EQ(made.branch->id, 1) << "nothing had been computed: the branch takes it itself";
+  advance_until(s, 10);
+  Steering other(default_knowledge(), options());
+  ASSERT_TRUE(other.begin(other.add_root(two_stages("0.5 s"), "main")));
+  advance_until(other, 10);
+  const record::Record a = s.make_record(s.active()), b = other.make_record(other.active());
+  // an edit looks at the step anew, so the yardstick is what a step of another length does
+  SteeringOptions shorter = options();
+  shorter.run.step = 0.9 * b.provenance.step;
+  Steering finer(default_knowledge(), shorter);
+  ASSERT_TRUE(finer.begin(finer.add_root(two_stages("0.5 s"), "main")));
+  advance_until(finer, 10);
+  const record::Record c = finer.make_record(finer.active());
+  ASSERT_EQ(a.position.size(), b.position.size());
+  ASSERT_EQ(c.position.size(), b.position.size());
+  float by_edit = 0, by_step = 0;
+  for (size_t i = 0; i < a.position.size(); ++i) {
+    by_edit = std::max(by_edit, std::abs(a.position[i] - b.position[i]));
+    by_step = std::max(by_step, std::abs(c.position[i] - b.position[i]));
+  }
+  EXPECT_LE(by_edit, by_step);
+  // the charges fire when they would: the scatter of the firing times is the same stream
+  const auto& edited = s.active().run().model().charges();
+  const auto& planned = other.active().run().model().charges();
+  for (size_t i = 0; i < planned.size(); ++i) EXPECT_NEAR(edited[i].time, planned[i].time, 1e-15);
+}
+
+TEST(Steering, ThePastIsReadOnly) {
+  Steering s(default_knowledge(), options());
+  ASSERT_TRUE(s.begin(s.add_root(two_stages(), "main")));
+  advance_until(s, 0.8);
+  const record::Record before = s.make_record(s.branch(1));
+  s.rewind(0.4);
+  EXPECT_FALSE(s.cursor().is_live);
+  s.edit(delay_of_stage(1, 0.9), "later");
+  advance_until(s, 0.9);
+  expect_same_motion(before, s.make_record(s.branch(1)));
+  s.switch_to(1);
+  // both stages have fired at the frontier
+  EXPECT_THROW(s.edit(delay_of_stage(1, 0.95)), InputError);
+  EXPECT_EQ(s.branches().size(), 2U);
+}
+
+TEST(Steering, UndoComesBackToWhereTheEditWas) {
+  Steering s(default_knowledge(), options());
+  ASSERT_TRUE(s.begin(s.add_root(two_stages(), "main")));
+  EXPECT_THROW(s.undo(), InputError);
+  advance_until(s, 0.3);
+  // made a branch: back to the parent
+  s.edit(delay_of_stage(1, 0.9));
+  EXPECT_EQ(s.active().id, 2);
+  const double once = s.active().run().model().charges().back().time;
+  // on the fresh branch: as it was
+  s.edit(delay_of_stage(1, 0.8));
+  EXPECT_EQ(s.active().id, 2);
+  EXPECT_NEAR(s.active().run().model().charges().back().time, once - 0.1, 1e-15);
+  s.undo();
+  EXPECT_EQ(s.active().run().model().charges().back().time, once);
+  EXPECT_NEAR(s.active().run().model().plan().stages[1].time, 0.9, 1e-12);
+  s.undo();
+  EXPECT_EQ(s.active().id, 1);
+  // in place, and computed since: a branch without it
+  s.edit(delay_of_stage(1, 0.5), {}, true);
+  EXPECT_EQ(s.active().id, 1);
+  advance_until(s, 0.7);
+  s.undo();
+  EXPECT_EQ(s.active().id, 3);
+  advance_until(s, 10);
+  Steering straight(default_knowledge(), options());
+  ASSERT_TRUE(straight.begin(straight.add_root(two_stages(), "main")));
+  advance_until(straight, 10);
+  expect_same_motion(straight.make_record(straight.active()), s.make_record(s.active()));
+}
+
+TEST(Steering, ChargesFireNowAndCanBeTakenOut) {
+  Steering s(default_knowledge(), options());
+  ASSERT_TRUE(s.begin(s.add_root(two_stages("0.9 s"), "main")));
+  advance_until(s, 0.4);
+  const std::vector<LiveCharge> charges = s.active().run().model().charges();
+  ASSERT_EQ(charges.size(), 6U);
+  Edit e;
+  e.kind = Edit::Kind::Fire;
+  e.charge = 0;
+  EXPECT_THROW(s.edit(e), InputError) << "it has fired";
+  e.charge = 3;
+  const Steering::Made made = s.edit(e);
+  const double fired = s.active().run().model().charges()[3].time;
+  EXPECT_GT(fired, made.time);
+  EXPECT_LT(fired, made.time + 0.01);
+  Edit out;
+  out.kind = Edit::Kind::RemoveCharge;
+  out.charge = 4;
+  s.edit(out);
+  advance_until(s, 10);
+  const record::Record r = s.make_record(s.active());
+  int fired_4 = 0, fired_3 = 0;
+  for (const record::Event& event : r.events) {
+    fired_3 += event.kind == "charge" && event.subject == "C-B1-0";
+    fired_4 += event.kind == "charge" && event.subject == "C-B2-0" && event.text.find("thrown") != std::string::npos;
+  }
+  EXPECT_EQ(fired_3, 1);
+  EXPECT_EQ(fired_4, 0);
+  EXPECT_LT(final_residual(r), default_knowledge().verification_energy_error);
+}
+
+TEST(SteeringPhysics, EveryEditKeepsTheLedger) {
+  // the balance of energy holds through each edit as well as it does without one
+  Steering plain(default_knowledge(), options());
+  ASSERT_TRUE(plain.begin(plain.add_root(two_stages(), "main")));
+  advance_until(plain, 10);
+  const double without = final_residual(plain.make_record(plain.active()));
+  const char* const edits[] = {
+      R"({"command": "add_pre_cut", "member": "C-B1-0", "at": 2.4, "cut_bars": 0.5})",
+      R"({"command": "add_pre_cut", "member": "B-A1B1-1", "at": 0.3, "cut_bars": 0.5, "cut_concrete": 0.3})",
+      R"({"command": "add_cable", "member": "C-A2-1", "position": 1.5, "anchor": [-15, 4, 0], "stiffness": 2e6,
+          "pretension": 5e4})",
+      R"({"command": "set_friction", "ground": 0.2, "bodies": 0.3})",
+      R"({"command": "add_charge", "member": "C-B2-1", "position": 1, "destroyed_length": 0.6, "time": 0.7})",
+      R"({"command": "add_charge", "member": "B-A1B1-0", "position": 1, "destroyed_length": 0.5})"};
+  for (const char* text : edits) {
+    Steering s(default_knowledge(), options());
+    ASSERT_TRUE(s.begin(s.add_root(two_stages(), "main")));
+    advance_until(s, 0.3);
+    s.edit(read_edit(Json::parse(text)));
+    advance_until(s, 10);
+    const record::Record r = s.make_record(s.active());
+    EXPECT_LT(final_residual(r), 2 * without + 1e-4) << text;
+    EXPECT_NE(r.position, plain.make_record(plain.active()).position) << text;
+    EXPECT_TRUE(std::any_of(r.events.begin(), r.events.end(), [](const auto& e) { return e.kind == "edit"; })) << text;
+  }
+}
+
+TEST(Steering, ACableComesAndGoes) {
+  Steering s(default_knowledge(), options());
+  ASSERT_TRUE(s.begin(s.add_root(two_stages(), "main")));
+  s.edit(read_edit(Json::parse(R"({"command": "add_cable", "member": "C-A2-1", "position": 1.5,
+      "anchor": [-15, 4, 0], "stiffness": 2e6, "pretension": 5e4})")));
+  advance_until(s, 0.1);
+  Edit e;
+  e.kind = Edit::Kind::RemoveCable;
+  e.cable = "aded 1";
+  try {
+    s.edit(e);
+    FAIL();
+  } catch (const InputError& error) { EXPECT_EQ(error.diagnostics().front().help, "did you mean \"added 1\"?"); }
+  e.cable = "added 1";
+  s.edit(e);
+  EXPECT_THROW(s.edit(e), InputError) << "it is let go already";
+  advance_until(s, 10);
+  EXPECT_LT(final_residual(s.make_record(s.active())), default_knowledge().verification_energy_error);
+}
+
+TEST(Steering, RefusedEditsChangeNothing) {
+  Steering s(default_knowledge(), options());
+  ASSERT_TRUE(s.begin(s.add_root(two_stages(), "main")));
+  advance_until(s, 0.1);
+  const char* const wrong[] = {
+      R"({"command": "add_charge", "member": "C-B9-0", "position": 1, "destroyed_length": 0.6})",
+      R"({"command": "add_charge", "member": "S-A1B2-0", "position": 1, "destroyed_length": 0.6})",
+      R"({"command": "add_charge", "member": "C-B1-0", "position": 0.5, "destroyed_length": 0.4})",
+      R"({"command": "add_charge", "member": "C-B1-1", "position": 9, "destroyed_length": 0.4})",
+      R"({"command": "add_charge", "member": "C-B1-1", "position": 1, "destroyed_length": 0.4, "time": 0.05})",
+      R"({"command": "set_delay", "charge": 99, "time": 1})",
+      R"({"command": "set_delay", "charge": 0, "time": 0.01})",
+      R"({"command": "set_delay", "charge": 0})",
+      R"({"command": "add_pre_cut", "member": "C-B1-1", "at": 1, "cut_bars": 2})",
+      R"({"command": "add_cable", "member": "C-B1-1", "position": 1, "anchor": [0, 0, 0], "stiffness": 0})",
+      R"({"command": "set_friction", "ground": -1})",
+      R"({"command": "remove_cable", "cable": "none"})"};
+  for (const char* text : wrong) EXPECT_THROW(s.edit(read_edit(Json::parse(text))), InputError) << text;
+  EXPECT_EQ(s.branches().size(), 1U);
+  EXPECT_TRUE(s.active().edits.empty());
+  for (const char* text :
+       {R"({"command": "fire"})", R"({"command": "fire", "charge": "1"})", R"({"command": "fire", "charge": 1.5})",
+        R"({"command": "fire", "charge": 1, "chrage": 2})", R"({"command": "fire", "charge": 18446744073709551615})",
+        R"({"command": "set_delay", "charge": 0, "time": "1"})", R"({"command": 5})", R"({"command": "fly"})"})
+    EXPECT_THROW((void)read_edit(Json::parse(text)), InputError) << text;
+}
+
+TEST(Steering, LetsMomentsGoWhenTheyAreTooMany) {
+  SteeringOptions o = options();
+  o.moment_bytes = std::size_t{1} << 20;
+  o.moment_interval = 0.01;
+  Steering s(default_knowledge(), o);
+  ASSERT_TRUE(s.begin(s.add_root(two_stages(), "main")));
+  advance_until(s, 10);
+  EXPECT_LE(s.moment_bytes(), 2 * o.moment_bytes);
+  const std::vector<double> times = s.moments(s.active());
+  EXPECT_EQ(times.front(), 0);
+  // still exact anywhere
+  const record::Record whole = s.make_record(s.active());
+  s.rewind(0.77);
+  s.fork("again");
+  advance_until(s, 10);
+  expect_same_motion(whole, s.make_record(s.active()));
+}
+
+TEST(ActionLogReplay, GivesTheSameBits) {
+  const product::Plan plan = two_stages();
+  LoggedSteering logged(plan, default_knowledge(), options(), {}, "");
+  Steering& s = logged.steering();
+  ASSERT_TRUE(s.begin(s.active()));
+  advance_until(s, 0.5);
+  logged.note_reached();
+  s.rewind(0.25);
+  logged.perform(Json::parse(R"({"id": 4, "command": "set_delay", "stage": 1, "time": 0.45, "name": "sooner"})"));
+  advance_until(s, 0.6);
+  logged.perform(Json::parse(R"({"command": "set_friction", "ground": 0.3, "in_place": true})"));
+  advance_until(s, 0.8);
+  logged.note_reached();
+  logged.perform(Json::parse(R"({"command": "switch", "branch": 1})"));
+  logged.perform(Json::parse(R"({"command": "rename", "branch": 2, "name": "soon"})"));
+  advance_until(s, 10);
+  logged.note_reached();
+  logged.perform(Json{{"command", "plan.apply"}, {"text", two_stages("0.3 s", "0.5 s").text}, {"name", "new"}});
+  ASSERT_TRUE(s.begin(s.active()));
+  advance_until(s, 10);
+  logged.note_reached();
+
+  std::string log;
+  for (const std::string& line : logged.lines()) log += line + "\n";
+  const ReplayResult again = replay(log, "log", default_knowledge(), options(), {});
+  EXPECT_FALSE(again.was_cut);
+  EXPECT_EQ(again.actions, static_cast<long>(logged.lines().size()) - 1);
+  ASSERT_EQ(again.steering->steering().branches().size(), 3U);
+  for (int id : {1, 2, 3}) {
+    const record::Record a = s.make_record(s.branch(id));
+    const record::Record b = again.steering->steering().make_record(again.steering->steering().branch(id));
+    expect_same_motion(a, b);
+    expect_same_words(a, b);
+  }
+  EXPECT_EQ(again.steering->steering().branch(2).name, "soon");
+
+  // cut off in the middle of a line: up to the last whole one
+  const ReplayResult cut = replay(log.substr(0, log.rfind("\"command\"")), "log", default_knowledge(), options(), {});
+  EXPECT_TRUE(cut.was_cut);
+  EXPECT_EQ(cut.steering->steering().branches().size(), 2U);
+  expect_same_motion(s.make_record(s.branch(2)),
+                     cut.steering->steering().make_record(cut.steering->steering().branch(2)));
+}
+
+TEST(ActionLog, RefusesWhatIsNoLog) {
+  const auto code_of = [](const std::string& text) -> std::string {
+    try {
+      (void)replay(text, "log", default_knowledge(), options(), {});
+    } catch (const InputError& e) { return e.diagnostics().front().code; }
+    return "";
+  };
+  EXPECT_EQ(code_of(""), "E942");
+  EXPECT_EQ(code_of("{\"topple_log\": 1"), "E942");
+  EXPECT_EQ(code_of("[]\n"), "E942");
+  EXPECT_EQ(code_of("{}\n"), "E942");
+  EXPECT_EQ(code_of("{\"topple_log\": 1}\n"), "E942");
+  EXPECT_EQ(code_of("{\"topple_log\": 1, \"program\": \"topple 9\"}\n"), "E943");
+}
+
+}  // namespace
+}  // namespace topple::collapse
