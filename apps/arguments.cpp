@@ -33,6 +33,9 @@ std::variant<Arguments, int> parse_arguments(int argc, char** argv) {
   topple study inputs.toml --evaluator ./model -o out/study
                                                    the same of any program
   topple study show out/study                      what it found so far
+  topple steer storehouse.toml                     watch it come down, stop, change, go on (docs/steer.md)
+  topple replay steer/storehouse.steer.jsonl -o out/again
+                                                   do what was done there once more
 
 Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterion of the plan is violated.)");
 
@@ -193,6 +196,25 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
     verb->add_option("--batch", y.batch, "points that one evaluator gets at once (1)")->check(CLI::Range(1, 100000));
     verb->add_option("--lease", y.lease, "time without a sign of life after which a run is given to another (30 s)");
   };
+  CLI::App* steer = app.add_subcommand("steer", "Watch a plan come down, stop it, change it, go on.");
+  steer->add_option("plan", a.input, "plan (TOML); without one the page begins with templates");
+  steer->add_option("-o,--output", a.output, "folder of action logs and studies (steer)");
+  steer->add_option("--port", a.port, "port of 127.0.0.1; a free one if not given");
+  steer->add_flag("--no-open", a.no_open, "only print the address");
+  steer->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones");
+  steer->add_option("--threads", a.threads, "threads of the solver; results do not depend on it")
+      ->check(CLI::Range(1, 1024));
+
+  CLI::App* replay = app.add_subcommand("replay", "Do again what an action log of topple steer says.");
+  replay->add_option("log", a.input, "action log (JSON lines)")->required();
+  replay->add_option("-o,--output", a.output, "folder for the records of the branches")->required();
+  replay->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones");
+  replay->add_option("--threads", a.threads, "threads of the solver; results do not depend on it")
+      ->check(CLI::Range(1, 1024));
+  replay->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
+  replay->add_flag("--csv", a.csv, "also write tables for spreadsheets");
+  replay->add_flag("--no-report", a.no_report, "do not write report.html");
+
   CLI::App* study = app.add_subcommand("study", "Fuzzy analysis: many runs, and what follows from them.");
   study->add_option("file", a.input, "plan with [fuzzy], or fuzzy inputs of an evaluator (TOML)");
   study->add_option("-o,--output", a.output, "folder of the study; the same command again goes on with it");
@@ -289,6 +311,8 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
     }
   }
   if (worker->parsed()) a.verb = Verb::Worker;
+  if (steer->parsed()) a.verb = Verb::Steer;
+  if (replay->parsed()) a.verb = Verb::Replay;
   if (version->parsed()) a.verb = Verb::Version;
   return a;
 }

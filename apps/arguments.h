@@ -29,6 +29,8 @@ struct Arguments {
     Rcc,
     Study,
     Worker,
+    Steer,
+    Replay,
     Version
   };
   Verb verb = Verb::None;
@@ -51,6 +53,8 @@ struct Arguments {
   StudyArguments study;
   FeArguments fe;
   int threads = 1, frames = 0;
+  std::string port;      // of the steering server, empty: a free one
+  bool no_open = false;  // do not open the page
   bool json = false, csv = false, no_report = false, report = false, verbose = false;
   bool bodies = false, skip_unsupported = false;
   bool vtk = false, gltf = false, adams = false;  // formats of an export, beside csv and json

@@ -21,6 +21,8 @@ int compute_rcc(const Arguments&, const std::atomic<bool>& cancel);
 int run_study_command(const Arguments&, const std::atomic<bool>& cancel);
 int compare_records(const Arguments&);
 int run_finite_elements(const Arguments&, const std::atomic<bool>& cancel);
+int steer(const Arguments&, const std::atomic<bool>& cancel);
+int replay_log(const Arguments&, const std::atomic<bool>& cancel);
 int run_worker(const Arguments&, const std::atomic<bool>& cancel);
 
 }  // namespace topple::apps

@@ -49,6 +49,10 @@ int dispatch(const topple::apps::Arguments& a) {
       return topple::apps::compare_records(a);
     case Arguments::Verb::Fe:
       return topple::apps::run_finite_elements(a, cancel);
+    case Arguments::Verb::Steer:
+      return topple::apps::steer(a, cancel);
+    case Arguments::Verb::Replay:
+      return topple::apps::replay_log(a, cancel);
     case Arguments::Verb::Worker:
       return topple::apps::run_worker(a, cancel);
     case Arguments::Verb::Version:

@@ -69,7 +69,7 @@ class Recorder {
   std::vector<double> shortening_, rotation_;
   std::vector<int> fixed_joints_;
   std::vector<std::pair<double, int>> stages_told_;  // when, which
-  std::vector<Pose> last_pose_;  // of the bodies at the last frame, for what happens after it
+  std::vector<Pose> last_pose_;                      // of the bodies at the last frame, for what happens after it
   std::vector<Vec3> last_v_, last_w_;
   std::vector<double> last_mass_;
   double last_time_ = 0;

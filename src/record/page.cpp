@@ -25,17 +25,21 @@ std::string escape_for_html(const std::string& text) {
 
 }  // namespace
 
-void write_page(const std::string& data, const std::string& bundle, const std::string& path) {
+std::string make_page(const std::string& data, const std::string& bundle) {
   const std::size_t at = bundle.find(marker);
   if (at == std::string::npos || bundle.find(marker, at + 1) != std::string::npos)
-    throw std::runtime_error(path + ": the report page to fill must hold the marker " + std::string(marker) + " once");
+    throw std::runtime_error("the page to fill must hold the marker " + std::string(marker) + " once");
   const std::string_view page = bundle;
   std::string filled(page.substr(0, at));
   filled += R"(<script type="application/json" id="topple-data">)";
   filled += escape_for_html(data);
   filled += "</script>";
   filled += page.substr(at + marker.size());
-  replace_file(path, filled);
+  return filled;
+}
+
+void write_page(const std::string& data, const std::string& bundle, const std::string& path) {
+  replace_file(path, make_page(data, bundle));
 }
 
 }  // namespace topple::record

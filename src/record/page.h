@@ -5,9 +5,11 @@
 
 namespace topple::record {
 
-/// Writes a page (beside, then renamed). No text of the data can close or open a tag.
+/// The page with its data. No text of the data can close or open a tag.
 ///   data    JSON
 ///   bundle  the built page, with the marker <!--TOPPLE-DATA--> once; throws std::runtime_error otherwise
+std::string make_page(const std::string& data, const std::string& bundle);
+/// Writes a page (beside, then renamed).
 void write_page(const std::string& data, const std::string& bundle, const std::string& path);
 
 }  // namespace topple::record

@@ -85,7 +85,7 @@ TEXT
 readme)
   # every command in the shell blocks of these pages exists
   commands=0
-  for page in README.md docs/getting-started.md docs/run.md docs/mbs-model.md docs/engines.md docs/rcc.md docs/study.md docs/exports.md docs/imports.md; do
+  for page in README.md docs/getting-started.md docs/run.md docs/mbs-model.md docs/engines.md docs/rcc.md docs/study.md docs/exports.md docs/imports.md docs/steer.md; do
     while read -r word verb rest; do
       case $word in
       script/*) [ -x "$source/$word" ] || { echo "$page shows $word, which cannot be called"; failures=$((failures + 1)); } ;;
@@ -286,6 +286,27 @@ cancel)
   wait $pid; code=$?
   [ $code -eq 1 ] || { echo "exit code $code after an interrupt"; head out err; failures=$((failures + 1)); }
   exists a/record.h5; has out "Cancelled at"
+  ;;
+steer)
+  "$topple" new plan.toml >/dev/null
+  "$topple" steer plan.toml --no-open -o logs >out 2>err &
+  pid=$!
+  for _ in $(seq 600); do [ -s out ] && [ -s logs/plan.steer.jsonl ] && break; sleep 0.1; done
+  port=$(sed -n 's|http://127.0.0.1:\([0-9]*\)/.*|\1|p' out); token=$(sed -n 's|.*/\([0-9a-f]\{32\}\)/$|\1|p' out)
+  fetch() { exec 3<>"/dev/tcp/127.0.0.1/$port" && printf 'GET %s HTTP/1.1\r\nHost: %s\r\nConnection: close\r\n\r\n' "$1" "$2" >&3 && cat <&3; }
+  fetch "/$token/api/server" localhost >page; has page "200 OK"; has page '"protocol":1'
+  fetch "/$token/api/sessions/1/log" localhost >page; has page topple_log
+  fetch "/$token/api/server" example.org >page; has page "403"
+  fetch "/0/api/server" localhost >page; has page E901
+  kill -INT $pid
+  wait $pid; code=$?
+  [ $code -eq 0 ] || { echo "exit code $code after an interrupt"; cat out err; failures=$((failures + 1)); }
+  # killed in the middle of a line
+  printf '{"seq": 9, "action": "set_del' >>logs/plan.steer.jsonl
+  expect 0 "$topple" replay logs/plan.steer.jsonl -o again --no-report; has err "no end"; exists again/branch-1/record.h5
+  expect 2 "$topple" replay plan.toml -o again; has err E942
+  expect 2 "$topple" steer missing.toml --no-open
+  expect 2 "$topple" steer plan.toml --no-open --port 99999; has err "1 to 65535"
   ;;
 rcc)
   zone=$source/examples/rcc/zone_I.toml

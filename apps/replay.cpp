@@ -1,0 +1,73 @@
+// topple replay: an action log once more, without a server.
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+#include "base/file.h"
+#include "collapse/action_log.h"
+#include "commands.h"
+#include "product/plan_sampler.h"
+#include "results.h"
+#include "terminal.h"
+
+namespace topple::apps {
+
+int replay_log(const Arguments& a, const std::atomic<bool>& cancel) {
+  std::string text;
+  std::FILE* out = a.json ? stderr : stdout;
+  try {
+    text = read_file(a.input);
+    const collapse::Knowledge knowledge = load_knowledge(a);
+    collapse::SteeringOptions options;
+    options.run = make_options(a);
+    make_folder(a.output);
+    ProgressLine line;
+    Progress progress;
+    progress.cancel = &cancel;
+    progress.report = [&](double done, double whole) { line.show(done, whole); };
+    const collapse::ReplayResult r = collapse::replay(
+        text, a.input, knowledge, options,
+        [](const product::Plan& plan, const std::vector<double>& inputs) {
+          return product::make_sample(product::make_sampler(plan), inputs);
+        },
+        progress);
+    line.clear();
+    if (progress.is_cancelled()) {
+      std::fprintf(stderr, "Cancelled.\n");
+      return kRunFailed;
+    }
+    if (r.was_cut) std::fprintf(stderr, "The last line of the log has no end and is left out.\n");
+    nlohmann::ordered_json branches = nlohmann::ordered_json::array();
+    const collapse::Steering& s = r.steering->steering();
+    bool failed_report = false;
+    for (const auto& b : s.branches()) {
+      if (b->frames() == 0) continue;
+      Arguments place = a;
+      place.output = (std::filesystem::path(a.output) / fmt::format("branch-{}", b->id)).string();
+      make_folder(place.output);
+      const record::Record record = s.make_record(*b);
+      const Files files = write_files(record, place, failed_report);
+      branches.push_back({{"id", b->id},
+                          {"name", b->name},
+                          {"time", b->frontier()},
+                          {"steps", b->steps()},
+                          {"ending", record.ending}});
+      for (const auto& [what, path] : files) branches.back()["files"][what] = path;
+      std::fprintf(out, "Branch %d \"%s\" to %.3f s, %zu edits: %s\n", b->id, b->name.c_str(), b->frontier(),
+                   b->edits.size(), place.output.c_str());
+    }
+    std::fprintf(out, "%ld actions done again.\n", r.actions);
+    if (a.json)
+      std::printf("%s\n",
+                  dump(nlohmann::ordered_json{
+                           {"exit_code", kOk}, {"actions", r.actions}, {"was_cut", r.was_cut}, {"branches", branches}})
+                      .c_str());
+    return kOk;
+  } catch (const InputError& e) { return refuse(e, {}, text, a.json); }
+}
+
+}  // namespace topple::apps

@@ -1,0 +1,85 @@
+// topple steer: the server of the steering page.
+
+#include <fmt/format.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <thread>
+
+#include "base/error.h"
+#include "base/file.h"
+#include "commands.h"
+#include "results.h"
+#include "server/server.h"
+
+namespace topple::apps {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+std::uint16_t read_port(const std::string& text) {
+  if (text.empty()) return 0;
+  char* end = nullptr;
+  const long port = std::strtol(text.c_str(), &end, 10);
+  if (*end != '\0' || port < 1 || port > 65535)
+    throw InputError("E801", "--port \"" + text + "\" is no port", "1 to 65535; without --port a free one is taken");
+  return static_cast<std::uint16_t>(port);
+}
+
+/// Shows the page where there is a desktop; nothing happens elsewhere.
+void open_browser(const std::string& url) {
+  if (std::getenv("DISPLAY") == nullptr && std::getenv("WAYLAND_DISPLAY") == nullptr) return;
+  std::string program = "xdg-open", address = url;
+  char* arguments[] = {program.data(), address.data(), nullptr};
+  pid_t child = 0;
+  if (posix_spawnp(&child, "xdg-open", nullptr, nullptr, arguments, environ) == 0)
+    std::thread([child] { waitpid(child, nullptr, 0); }).detach();
+}
+
+}  // namespace
+
+int steer(const Arguments& a, const std::atomic<bool>& cancel) {
+  std::string text;
+  try {
+    const std::uint16_t port = read_port(a.port);
+    server::HubOptions options;
+    options.session.knowledge = load_knowledge(a);
+    if (!a.knowledge.empty()) options.session.rules = read_file(a.knowledge);
+    options.session.steering.run = make_options(a);
+    options.session.folder = fs::absolute(a.output.empty() ? "steer" : a.output).string();
+    const fs::path plan = a.input.empty() ? fs::path() : fs::absolute(a.input);
+    options.plans = (a.input.empty() ? fs::current_path() : plan.parent_path()).string();
+    for (const auto& [name, page] :
+         {std::pair{"steer.html", &options.page}, {"report.html", &options.report}, {"study.html", &options.study}})
+      if (auto bundle = find_bundle(name)) *page = std::move(*bundle);
+    if (options.page.empty())
+      std::fprintf(stderr,
+                   "The steering page is not built (run `npm ci && npm run build` in web/); the protocol is served all "
+                   "the same.\n");
+    server::SessionPlan first;
+    if (!a.input.empty()) {
+      text = read_file(plan.string());
+      first = {a.input, plan.string(), text};
+    }
+    server::Hub hub(std::move(options));
+    server::ServerOptions serving;
+    serving.port = port;
+    const server::Server server(hub, serving);
+    if (!a.input.empty()) hub.open(std::move(first));
+    std::printf("%s\n", server.url().c_str());
+    std::fflush(stdout);
+    std::fprintf(stderr,
+                 "Open this address; it works on this machine only and for this start only. Ctrl-C ends the server.\n");
+    if (!a.no_open) open_browser(server.url());
+    while (!cancel.load(std::memory_order_relaxed)) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    std::fprintf(stderr, "The server ends.\n");
+    return kOk;
+  } catch (const InputError& e) { return refuse(e, {}, text, false); }
+}
+
+}  // namespace topple::apps

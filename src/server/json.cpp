@@ -1,0 +1,164 @@
+#include "server/json.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace topple::server {
+
+using collapse::Branch;
+
+std::string dump(const Json& j) { return j.dump(-1, ' ', false, Json::error_handler_t::replace); }
+
+Json number(double x) { return std::isfinite(x) ? Json(x) : Json(nullptr); }
+
+Json numbers(const std::vector<double>& values) {
+  Json list = Json::array();
+  for (const double x : values) list.push_back(number(x));
+  return list;
+}
+
+Json describe_diagnostics(const std::vector<Diagnostic>& diagnostics) {
+  Json list = Json::array();
+  for (const Diagnostic& d : diagnostics)
+    list.push_back({{"severity", d.severity == Severity::Error ? "error" : "warning"},
+                    {"code", d.code},
+                    {"line", d.where.line},
+                    {"column", d.where.column},
+                    {"width", d.width},
+                    {"message", d.message},
+                    {"help", d.help}});
+  return list;
+}
+
+Json describe_error(const InputError& e) {
+  const Diagnostic& d = e.diagnostics().front();
+  return {{"code", d.code},
+          {"message", d.message},
+          {"help", d.help},
+          {"diagnostics", describe_diagnostics(e.diagnostics())}};
+}
+
+Json describe_event(const record::Event& e) {
+  return {{"time", number(e.time)}, {"kind", e.kind}, {"subject", e.subject}, {"text", e.text}};
+}
+
+Json describe_finding(const record::Finding& f) {
+  return {{"id", f.id},
+          {"heading", f.heading},
+          {"title", f.title},
+          {"text", f.text},
+          {"value", number(f.value)},
+          {"unit", f.unit},
+          {"status", record::name_of(f.status)}};
+}
+
+Json describe_branch(const collapse::Steering& s, const Branch& b, const std::string& plan_sha256) {
+  const collapse::LiveRun& run = b.run();
+  const collapse::LiveModel& live = run.model();
+  const product::Plan& plan = live.plan();
+  const double now = run.has_begun() ? run.time() : -1;
+  Json j{{"id", b.id}, {"name", b.name}};
+  j["parent"] = b.parent > 0 ? Json(b.parent) : Json(nullptr);
+  j["time"] = b.time;
+  j["frontier"] = run.time();
+  j["frames"] = b.frames();
+  j["first_frame"] = b.first_frame;
+  j["duration"] = plan.analysis.duration;
+  j["ending"] = nullptr;
+  if (run.has_ended()) {
+    using Ending = mbs::Summary::Ending;
+    const mbs::Summary summary = run.summary();
+    const char* kind = summary.ending == Ending::AtRest      ? "at_rest"
+                       : summary.ending == Ending::TimeLimit ? "time_limit"
+                                                             : "failed";
+    j["ending"] = {{"kind", kind}, {"text", summary.message}};
+  }
+  Json& charges = j["charges"] = Json::array();
+  for (std::size_t i = 0; i < live.charges().size(); ++i) {
+    const collapse::LiveCharge& c = live.charges()[i];
+    const product::Charge& p = live.charge(c);
+    charges.push_back({{"index", i},
+                       {"stage", c.stage},
+                       {"member", live.member_of(c)},
+                       {"position", p.position},
+                       {"destroyed_length", p.destroyed_length},
+                       {"residual_bars", p.residual_bars},
+                       {"time", c.time},
+                       {"fired", c.time <= now && !c.fails && !c.is_removed},
+                       {"fails", c.fails},
+                       {"removed", c.is_removed}});
+  }
+  Json& stages = j["stages"] = Json::array();
+  for (std::size_t i = 0; i < plan.stages.size(); ++i)
+    stages.push_back({{"index", i}, {"name", plan.stages[i].name}, {"time", plan.stages[i].time}});
+  Json& cables = j["cables"] = Json::array();
+  for (const mbs::Cable& c : live.model().cables)
+    cables.push_back({{"name", c.name},
+                      {"body", c.a.index},
+                      {"point", {c.p_A.x, c.p_A.y, c.p_A.z}},
+                      {"anchor", {c.p_B.x, c.p_B.y, c.p_B.z}},
+                      {"force", nullptr},
+                      {"pretension", c.pretension}});
+  j["friction"] = {{"ground", live.model().contact.friction}, {"bodies", live.model().contact.body_friction}};
+  Json& edits = j["edits"] = Json::array();
+  for (const collapse::EditEntry& e : b.edits)
+    edits.push_back({{"kind", collapse::word_of(e.edit.kind)}, {"time", e.time}, {"text", e.text}});
+  j["notes"] = live.map().notes;
+  j["snapshots"] = numbers(s.moments(b));
+  j["bodies"] = run.record().bodies.size();
+  j["zones"] = run.record().zones.size();
+  j["plan_sha256"] = plan_sha256;
+  j["sample"] = b.sample.empty() ? Json(nullptr) : Json(b.sample);
+  return j;
+}
+
+Json describe_scene(const record::Record& part, std::size_t frame) {
+  // everything but the other frames
+  record::Record one;
+  one.provenance = part.provenance;
+  one.counts = part.counts;
+  one.plan_values = part.plan_values;
+  one.bodies = part.bodies;
+  one.zones = part.zones;
+  one.neighbours = part.neighbours;
+  one.building_outline = part.building_outline;
+  for (const record::Series& s : part.series) one.series.push_back({s.id, s.title, s.unit, s.group, {}});
+  if (frame < part.time.size()) {
+    const auto keep = [frame](const auto& from, auto& to, std::size_t width) {
+      const auto begin = from.begin() + static_cast<std::ptrdiff_t>(frame * width);
+      to.assign(begin, begin + static_cast<std::ptrdiff_t>(width));
+    };
+    keep(part.time, one.time, 1);
+    keep(part.position, one.position, 3 * part.bodies.size());
+    keep(part.orientation, one.orientation, 4 * part.bodies.size());
+    keep(part.zone_state, one.zone_state, part.zones.size());
+    keep(part.zone_utilisation, one.zone_utilisation, part.zones.size());
+    for (std::size_t i = 0; i < part.series.size(); ++i) one.series[i].value = {part.series[i].value[frame]};
+  }
+  return Json::parse(record::to_report_json(one));
+}
+
+namespace {
+
+Json describe_family(const mbs::MomentFamily& f) {
+  const std::size_t J = f.plastic_rotation.size();
+  const auto rows = [J](const std::vector<double>& values) {
+    Json list = Json::array();
+    for (std::size_t k = 0; J > 0 && k < values.size() / J; ++k)
+      list.push_back(numbers({values.begin() + static_cast<std::ptrdiff_t>(k * J),
+                              values.begin() + static_cast<std::ptrdiff_t>((k + 1) * J)}));
+    return list;
+  };
+  return {{"normal_force", numbers(f.normal_force)},
+          {"plastic_rotation", numbers(f.plastic_rotation)},
+          {"positive", rows(f.positive)},
+          {"negative", rows(f.negative)}};
+}
+
+}  // namespace
+
+Json describe_law(const mbs::ZoneLaw& law) {
+  return {{"name", law.name}, {"moment_y", describe_family(law.moment_y)}, {"moment_z", describe_family(law.moment_z)}};
+}
+
+}  // namespace topple::server

@@ -1,0 +1,32 @@
+#pragma once
+/// The objects of the protocol as JSON (docs/protocol.md).
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "collapse/steering.h"
+
+namespace topple::server {
+
+using Json = nlohmann::ordered_json;
+
+/// Bytes that are not UTF-8 become U+FFFD.
+std::string dump(const Json&);
+/// null for NaN and infinities.
+Json number(double);
+Json numbers(const std::vector<double>&);
+
+/// {"code", "message", "help", "diagnostics"} of the first complaint, and all of them.
+Json describe_error(const InputError&);
+Json describe_diagnostics(const std::vector<Diagnostic>&);
+Json describe_event(const record::Event&);
+Json describe_finding(const record::Finding&);
+Json describe_branch(const collapse::Steering&, const collapse::Branch&, const std::string& plan_sha256);
+/// Report data with one frame of a branch, or none.
+Json describe_scene(const record::Record& part, std::size_t frame);
+/// Moment families of a zone's law.
+Json describe_law(const mbs::ZoneLaw&);
+
+}  // namespace topple::server

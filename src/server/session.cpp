@@ -1,0 +1,491 @@
+#include "server/session.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "base/file.h"
+#include "base/hash.h"
+#include "product/plan_sampler.h"
+
+namespace topple::server {
+
+using collapse::Branch;
+using collapse::Steering;
+
+namespace {
+
+constexpr std::size_t kMostEvents = 4096;
+constexpr double kFrameInterval = 1.0 / 60, kStateInterval = 0.1, kReachedInterval = 10, kLookInterval = 1;  // [s]
+
+double since(std::chrono::steady_clock::time_point t) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - t).count();
+}
+
+std::string free_log_path(const std::string& folder, const SessionPlan& plan) {
+  if (folder.empty()) return {};
+  std::string stem = plan.path.empty() ? "plan" : std::filesystem::path(plan.path).stem().string();
+  std::error_code ignored;
+  std::filesystem::create_directories(folder, ignored);
+  return (std::filesystem::path(folder) / (stem + ".steer.jsonl")).string();
+}
+
+}  // namespace
+
+Session::Session(int id, SessionPlan plan, const SessionSetting& setting)
+    : id_(id), plan_(std::move(plan)), setting_(setting) {
+  const auto now = Clock::now();
+  last_state_ = last_frame_ = last_reached_ = last_look_ = rate_start_ = speed_start_ = command_at_ = now;
+  file_sha256_ = calc_sha256(plan_.text);
+  brief_ = {{"id", id_}, {"title", plan_.title}, {"path", plan_.path}, {"phase", phase_word()}};
+  thread_ = std::thread([this] { work(); });
+}
+
+Session::~Session() {
+  {
+    const std::lock_guard lock(mutex_);
+    closing_ = true;
+  }
+  wakes_.notify_all();
+  thread_.join();
+}
+
+void Session::post(std::shared_ptr<Client> client, std::int64_t id, Json command) {
+  {
+    const std::lock_guard lock(mutex_);
+    tasks_.push_back({std::move(client), id, std::move(command), {}});
+  }
+  wakes_.notify_all();
+}
+
+Json Session::brief() const {
+  const std::lock_guard lock(mutex_);
+  return brief_;
+}
+
+void Session::ask(std::function<void(Session&)> call) {
+  {
+    const std::lock_guard lock(mutex_);
+    tasks_.push_back({nullptr, 0, {}, std::move(call)});
+  }
+  wakes_.notify_all();
+}
+
+std::vector<std::shared_ptr<Client>> Session::watchers() const {
+  const std::lock_guard lock(watch_mutex_);
+  std::vector<std::shared_ptr<Client>> list;
+  for (const auto& weak : clients_)
+    if (auto c = weak.lock()) list.push_back(std::move(c));
+  return list;
+}
+
+void Session::tell(Json event) {
+  std::vector<std::shared_ptr<Client>> list;
+  std::shared_ptr<const std::string> text;
+  {
+    const std::lock_guard lock(watch_mutex_);
+    Json whole{{"type", event["type"]}, {"session", id_}, {"seq", ++seq_}};
+    for (auto& [key, value] : event.items())
+      if (key != "type") whole[key] = std::move(value);
+    text = std::make_shared<const std::string>(dump(whole));
+    events_.emplace_back(seq_, text);
+    if (events_.size() > kMostEvents) events_.pop_front();
+    for (const auto& weak : clients_)
+      if (auto c = weak.lock()) list.push_back(std::move(c));
+  }
+  for (const auto& c : list) c->send(text);
+}
+
+void Session::tell_branch(const Branch& b) {
+  tell({{"type", "branch"},
+        {"branch", describe_branch(steering_->steering(), b, b.run().record().provenance.plan_sha256)}});
+}
+
+void Session::leave(const Client* client) {
+  const std::lock_guard lock(watch_mutex_);
+  std::erase_if(clients_, [client](const auto& weak) {
+    const auto c = weak.lock();
+    return !c || c.get() == client;
+  });
+}
+
+void Session::welcome(const std::shared_ptr<Client>& client, std::optional<long> after) {
+  leave(client.get());
+  client->session = id_;
+  const std::lock_guard lock(watch_mutex_);
+  const bool is_known =
+      after && *after <= seq_ && (events_.empty() ? *after == seq_ : *after >= events_.front().first - 1);
+  Json hello =
+      is_known ? Json{{"type", "resumed"}, {"session", id_}, {"seq", seq_}, {"from", *after}} : make_hello(*client);
+  client->send(std::make_shared<const std::string>(dump(hello)));
+  if (is_known)
+    for (const auto& [seq, text] : events_)
+      if (seq > *after) client->send(text);
+  clients_.push_back(client);
+}
+
+Json Session::make_hello(const Client& client) const {
+  Json hello{
+      {"type", "hello"},          {"protocol", 1}, {"program", "topple " + setting_.steering.run.program_version},
+      {"resume", client.token()}, {"seq", seq_},   {"session", describe()}};
+  hello["scene"] = nullptr;
+  hello["frame"] = nullptr;
+  if (steering_) {
+    const Branch& b = steering_->steering().active();
+    const std::size_t n = b.frames();
+    if (n > 0) {
+      const auto [piece, row] = b.find_frame(n - 1);
+      // right behind an edit there is no frame with its bodies yet: the frame before it follows as binary
+      const bool is_own = piece->run.get() == &b.run();
+      hello["scene"] = describe_scene(b.run().record(), is_own ? row : b.run().record().time.size());
+      hello["frame"] = n - 1;
+    } else {
+      hello["scene"] = describe_scene(b.run().record(), 0);
+    }
+  }
+  hello["plan"] = {{"text", plan_.text}, {"path", plan_.path}, {"sha256", calc_sha256(plan_.text)}};
+  hello["limits"] = {
+      {"message", 2 << 20}, {"frames", 4000}, {"frame_rate", 60}, {"snapshots", setting_.steering.moment_bytes}};
+  hello["state"] = last_state_told_;
+  return hello;
+}
+
+std::string Session::phase_word() const {
+  switch (phase_) {
+    case Phase::Building:
+      return "building";
+    case Phase::Equilibrium:
+      return "equilibrium";
+    case Phase::Paused:
+      return "paused";
+    case Phase::Running:
+      return "running";
+    case Phase::Finished:
+      return "finished";
+    case Phase::Failed:
+      return "failed";
+  }
+  return "";
+}
+
+Json Session::describe() const {
+  Json j{{"id", id_},
+         {"title", steering_ ? steering_->steering().active().run().model().plan().title : plan_.title},
+         {"path", plan_.path},
+         {"phase", phase_word()}};
+  j["active"] = steering_ ? Json(steering_->steering().active().id) : Json(nullptr);
+  j["cursor"] =
+      steering_ && !steering_->steering().cursor().is_live ? Json(steering_->steering().cursor_time()) : Json(nullptr);
+  j["speed"] = speed_ ? Json(*speed_) : Json(nullptr);
+  j["fuzzy"] = checked_plan_ && !checked_plan_->fuzzy.inputs.empty();
+  j["log"] = steering_ ? steering_->path() : "";
+  Json& branches = j["branches"] = Json::array();
+  if (steering_)
+    for (const auto& b : steering_->steering().branches())
+      branches.push_back(describe_branch(steering_->steering(), *b, b->run().record().provenance.plan_sha256));
+  j["diagnostics"] = describe_diagnostics(diagnostics_);
+  return j;
+}
+
+record::Record Session::make_record(int branch) const {
+  const Steering& s = core();
+  const Branch& b = branch > 0 ? s.branch(branch) : s.active();
+  if (b.frames() == 0) throw InputError("E930", "the branch has no frame yet");
+  return s.make_record(b);
+}
+
+std::vector<std::string> Session::log_lines() const {
+  return steering_ ? steering_->lines() : std::vector<std::string>{};
+}
+
+std::shared_ptr<FrameBody> Session::make_frame(const Branch& b, std::size_t frame) const {
+  const auto [piece, row] = b.find_frame(frame);
+  const record::Record& r = piece->run->record();
+  std::size_t bodies = r.bodies.size();
+  std::vector<Pose> debris;
+  if (piece->run.get() != &b.run()) {
+    // charges may have been added since: debris is that of the branch
+    const collapse::LiveModel& live = b.run().model();
+    bodies = live.model().bodies.size();
+    for (const collapse::DebrisEntry& d : live.map().debris)
+      debris.push_back(collapse::calc_debris_pose(d, norm(live.model().gravity), r.time[row]));
+  }
+  auto body = std::make_shared<FrameBody>(make_frame_body(r, row, bodies, debris));
+  body->session = static_cast<std::uint32_t>(id_);
+  body->branch = static_cast<std::uint32_t>(b.id);
+  body->frame = static_cast<std::uint32_t>(frame);
+  return body;
+}
+
+void Session::send_frame(const std::shared_ptr<const FrameBody>& body) {
+  for (const auto& c : watchers())
+    if (const auto o = c->outlet()) (void)o->offer(body, kLiveFrame);
+}
+
+void Session::publish_frame(bool is_due) {
+  if (!steering_) return;
+  const Branch& b = steering_->steering().active();
+  const std::size_t n = b.frames();
+  if (n == 0 || (frame_branch_ == b.id && frame_sent_ == n)) return;
+  if (!is_due && since(last_frame_) < kFrameInterval) return;
+  last_frame_ = Clock::now();
+  frame_sent_ = n;
+  frame_branch_ = b.id;
+  if (!watchers().empty()) send_frame(make_frame(b, n - 1));
+}
+
+void Session::publish_state(bool is_due) {
+  if (!is_due && since(last_state_) < kStateInterval) return;
+  Json s{{"type", "state"}, {"phase", phase_word()}};
+  double time = 0;
+  if (steering_) {
+    const Steering& core = steering_->steering();
+    const Branch& b = core.active();
+    const double duration = b.run().model().plan().analysis.duration;
+    time = b.frontier();
+    s["branch"] = b.id;
+    s["time"] = time;
+    s["frames"] = b.frames();
+    s["cursor"] = core.cursor().is_live ? Json(nullptr) : Json(core.cursor_time());
+    s["duration"] = duration;
+    const double wall = since(rate_start_);
+    if (wall > 0.5) {
+      rate_ = phase_ == Phase::Running && time > rate_time_ ? (time - rate_time_) / wall : 0;
+      rate_time_ = time;
+      rate_start_ = Clock::now();
+    }
+    s["real_time_factor"] = rate_;
+    s["eta"] = rate_ > 0 ? Json((duration - time) / rate_) : Json(nullptr);
+    s["ending"] = nullptr;
+    if (b.run().has_ended()) s["ending"] = describe_branch(core, b, "")["ending"];
+  } else {
+    for (const char* key : {"branch", "time", "frames", "cursor", "duration", "real_time_factor", "eta"})
+      s[key] = nullptr;
+    s["ending"] = nullptr;
+  }
+  if (!failure_.empty()) s["ending"] = {{"kind", failure_kind_}, {"text", failure_}};
+  s["speed"] = speed_ ? Json(*speed_) : Json(nullptr);
+  s["progress"] = nullptr;
+  last_state_ = Clock::now();
+  if (s == last_state_told_) return;
+  last_state_told_ = s;
+  {
+    const std::lock_guard lock(mutex_);
+    brief_["phase"] = phase_word();
+    if (steering_) brief_["title"] = steering_->steering().active().run().model().plan().title;
+  }
+  tell(std::move(s));
+}
+
+void Session::publish_zones() {
+  if (!steering_) return;
+  const Branch& b = steering_->steering().active();
+  for (const auto& c : watchers()) {
+    if (c->zone < 0 || c->zone_branch != b.id || c->zone_frame >= b.frames()) continue;
+    Json points = Json::array();
+    const auto zone = static_cast<std::size_t>(c->zone.load());
+    for (std::size_t f = c->zone_frame; f < b.frames(); ++f) {
+      const auto [piece, row] = b.find_frame(f);
+      const collapse::LiveRun& run = *piece->run;
+      const record::Record& r = run.record();
+      const std::size_t Z = r.zones.size(), E = run.model().model().elements.size();
+      if (zone >= Z) continue;
+      Json point{r.time[row]};
+      for (std::size_t i = 0; i < collapse::kZonePath; ++i)
+        point.push_back(zone < E && !run.zone_path().empty()
+                            ? number(run.zone_path()[(row * E + zone) * collapse::kZonePath + i])
+                            : Json(nullptr));
+      point.push_back(number(r.zone_utilisation[row * Z + zone]));
+      point.push_back(r.zone_state[row * Z + zone]);
+      points.push_back(std::move(point));
+    }
+    c->zone_frame = b.frames();
+    const Json event{{"type", "zone"},
+                     {"session", id_},
+                     {"branch", b.id},
+                     {"zone", b.run().record().zones[zone].name},
+                     {"points", points}};
+    c->send(std::make_shared<const std::string>(dump(event)));
+  }
+}
+
+void Session::look_at_file() {
+  if (plan_.path.empty() || since(last_look_) < kLookInterval) return;
+  last_look_ = Clock::now();
+  try {
+    const std::string sha = calc_sha256(read_file(plan_.path));
+    if (sha == file_sha256_) return;
+    file_sha256_ = sha;
+    tell({{"type", "plan_changed"}, {"sha256", sha}});
+  } catch (const std::exception&) {
+    // it may be under way to its place
+  }
+}
+
+void Session::build(const product::Plan& plan) {
+  collapse::SteeringCallbacks callbacks;
+  callbacks.on_branch = [this](const Branch& b) {
+    if (steering_) tell_branch(b);
+  };
+  callbacks.on_event = [this](const Branch& b, const record::Event& e) {
+    if (steering_) tell({{"type", "happenings"}, {"branch", b.id}, {"events", {describe_event(e)}}});
+  };
+  callbacks.on_frame = [this](const Branch&, std::size_t) { publish_frame(false); };
+  collapse::SamplePlan sample = [](const product::Plan& base, const std::vector<double>& inputs) {
+    return product::make_sample(product::make_sampler(base), inputs);
+  };
+  steering_ = std::make_unique<collapse::LoggedSteering>(plan, setting_.knowledge, setting_.steering, callbacks,
+                                                         free_log_path(setting_.folder, plan_), sample);
+  steering_->on_line = [this](const std::string& line) { tell({{"type", "log"}, {"entry", Json::parse(line)}}); };
+  begin_branch();
+}
+
+void Session::begin_branch() {
+  Branch& b = core().active();
+  phase_ = Phase::Equilibrium;
+  failure_.clear();
+  publish_state(true);
+  core().begin(b);
+  settle_phase();
+  publish_frame(true);
+  publish_state(true);
+}
+
+/// Paused, or what the active branch's end says.
+void Session::settle_phase() {
+  const collapse::LiveRun& run = core().active().run();
+  phase_ = Phase::Paused;
+  failure_.clear();
+  if (!run.has_ended()) return;
+  const mbs::Summary s = run.summary();
+  using Ending = mbs::Summary::Ending;
+  phase_ = Phase::Finished;
+  if (s.ending != Ending::NoEquilibrium && s.ending != Ending::Diverged) return;
+  phase_ = Phase::Failed;
+  failure_kind_ = s.ending == Ending::Diverged ? "diverged" : "no_equilibrium";
+  failure_ = s.message;
+}
+
+void Session::pause() {
+  until_.reset();
+  frames_left_ = steps_left_ = -1;
+  if (phase_ != Phase::Running) return;
+  settle_phase();
+  steering_->note_reached();
+  publish_frame(true);
+  publish_zones();
+  publish_state(true);
+}
+
+void Session::advance_chunk() {
+  Steering& s = core();
+  const auto begin = Clock::now();
+  while (phase_ == Phase::Running) {
+    const double time = s.active().frontier();
+    if (speed_) {
+      const double allowed = speed_time_ + *speed_ * since(speed_start_);
+      if (time > allowed) {
+        std::unique_lock lock(mutex_);
+        if (tasks_.empty() && !closing_)
+          wakes_.wait_for(lock, std::chrono::duration<double>(std::min(0.02, (time - allowed) / *speed_)));
+        return;
+      }
+    }
+    const std::size_t frames = s.active().frames();
+    const bool goes_on = s.advance();
+    const bool has_frame = s.active().frames() != frames;
+    if (has_frame && frames_left_ > 0) --frames_left_;
+    if (steps_left_ > 0) --steps_left_;
+    if (!goes_on || frames_left_ == 0 || steps_left_ == 0 || (until_ && s.active().frontier() >= *until_)) {
+      if (!goes_on) tell_branch(s.active());
+      pause();
+      return;
+    }
+    if (since(begin) >= setting_.chunk) break;
+  }
+  publish_frame(false);
+  publish_state(false);
+  if (since(last_reached_) >= kReachedInterval) {
+    last_reached_ = Clock::now();
+    steering_->note_reached();
+  }
+}
+
+void Session::work() {
+  try {
+    publish_state(true);
+    std::vector<Diagnostic> warnings;
+    checked_plan_ = product::read_plan(plan_.text, plan_.path.empty() ? plan_.title : plan_.path, warnings);
+    diagnostics_ = warnings;
+    build(*checked_plan_);
+  } catch (const InputError& e) {
+    steering_.reset();
+    phase_ = Phase::Failed;
+    failure_kind_ = "plan";
+    failure_ = e.diagnostics().front().message;
+    diagnostics_ = e.diagnostics();
+    publish_state(true);
+  } catch (const std::exception& e) {
+    steering_.reset();
+    phase_ = Phase::Failed;
+    failure_kind_ = "failed";
+    failure_ = e.what();
+    publish_state(true);
+  }
+  for (auto last_zones = Clock::now();;) {
+    std::deque<Task> tasks;
+    {
+      std::unique_lock lock(mutex_);
+      if (tasks_.empty() && !closing_ && phase_ != Phase::Running)
+        wakes_.wait_for(lock, std::chrono::duration<double>(kLookInterval));
+      if (closing_) break;
+      tasks.swap(tasks_);
+    }
+    for (Task& t : tasks) {
+      if (t.call) {
+        t.call(*this);
+        continue;
+      }
+      Json answer;
+      try {
+        answer = {{"type", "ack"}, {"id", t.id}, {"result", perform(*t.client, t.command)}};
+      } catch (const Conflict& e) {
+        answer = {{"type", "error"}, {"id", t.id}, {"error", describe_error(e)}};
+        answer["error"]["sha256"] = e.sha256;
+        answer["error"]["text"] = e.text;
+      } catch (const InputError& e) {
+        answer = {{"type", "error"}, {"id", t.id}, {"error", describe_error(e)}};
+      } catch (const std::exception& e) {
+        answer = {{"type", "error"},
+                  {"id", t.id},
+                  {"error", {{"code", "E940"}, {"message", e.what()}, {"help", ""}, {"diagnostics", Json::array()}}}};
+      }
+      t.client->answer(t.id, dump(answer));
+    }
+    try {
+      if (phase_ == Phase::Running) advance_chunk();
+    } catch (const std::exception& e) {
+      phase_ = Phase::Failed;
+      failure_kind_ = "failed";
+      failure_ = e.what();
+      publish_state(true);
+    }
+    if (since(last_zones) > kStateInterval) {
+      last_zones = Clock::now();
+      publish_zones();
+    }
+    look_at_file();
+  }
+  // how far it came, for the log
+  if (steering_) {
+    try {
+      steering_->note_reached();
+    } catch (const std::exception&) {
+      // the disk may be full; the session ends anyway
+    }
+  }
+}
+
+}  // namespace topple::server

@@ -1,0 +1,150 @@
+#pragma once
+/// One plan that is steered: a thread that computes and does commands in the order in which they come.
+
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "collapse/action_log.h"
+#include "server/client.h"
+#include "server/json.h"
+
+namespace topple::server {
+
+struct SessionPlan {
+  std::string title;  // where there is no file
+  std::string path;   // of the file; empty: none
+  std::string text;
+};
+
+struct SessionSetting {
+  collapse::Knowledge knowledge;
+  std::string rules;  // text they were read from; empty: built in
+  collapse::SteeringOptions steering;
+  std::string folder;    // of logs and studies
+  std::string plans;     // folder of plans
+  double chunk = 0.008;  // wall time from one look at the commands to the next [s]
+};
+
+/// The file of a plan is not the one that a text began from.
+class Conflict : public InputError {
+ public:
+  Conflict(std::vector<Diagnostic> d, std::string disk_sha256, std::string disk_text)
+      : InputError(std::move(d)), sha256(std::move(disk_sha256)), text(std::move(disk_text)) {}
+  std::string sha256, text;  // of the disk
+};
+
+class Session {
+ public:
+  Session(int id, SessionPlan, const SessionSetting&);
+  ~Session();
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  int id() const { return id_; }
+  const SessionSetting& setting() const { return setting_; }
+
+  /// A command of a client; it is answered.
+  void post(std::shared_ptr<Client>, std::int64_t id, Json command);
+  /// Runs in the session's thread.
+  void ask(std::function<void(Session&)>);
+
+  /// Begins to tell a client; hello, or what it missed after an event.
+  void welcome(const std::shared_ptr<Client>&, std::optional<long> after = std::nullopt);
+  void leave(const Client*);
+
+  /// {id, title, path, phase}; any thread.
+  Json brief() const;
+
+  // in the session's thread
+  Json describe() const;
+  const collapse::LoggedSteering* steering() const { return steering_.get(); }
+  const SessionPlan& plan() const { return plan_; }
+  /// The record of a branch so far, with findings; 0: the active one.
+  record::Record make_record(int branch) const;
+  std::vector<std::string> log_lines() const;
+  const product::Plan* find_plan() const { return checked_plan_ ? &*checked_plan_ : nullptr; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  enum class Phase { Building, Equilibrium, Paused, Running, Finished, Failed };
+
+  void work();
+  void build(const product::Plan&);
+  void begin_branch();
+  void advance_chunk();
+  void pause();
+  void settle_phase();
+  void publish_frame(bool is_due);
+  void publish_state(bool is_due);
+  void publish_zones();
+  void look_at_file();
+  void tell(Json event);  // to all, numbered
+  void tell_branch(const collapse::Branch&);
+  Json make_hello(const Client&) const;
+  std::vector<std::shared_ptr<Client>> watchers() const;
+  std::shared_ptr<FrameBody> make_frame(const collapse::Branch&, std::size_t frame) const;
+  void send_frame(const std::shared_ptr<const FrameBody>&);
+
+  /// The result of a command (session_commands.cpp). Throws InputError.
+  Json perform(Client&, const Json& command);
+  Json run_clock(const std::string& word, const Json& command);
+  Json compare(const Json& command) const;
+  Json send_frames(Client&, const Json& command) const;
+  Json watch_zone(Client&, const Json& command) const;
+  Json read_series(const Json& command) const;
+  Json save_plan(const Json& command);
+  Json change(const std::string& word, Json command);
+  collapse::Steering& core() const;
+  collapse::Branch& branch_of(const Json& command) const;
+  std::string phase_word() const;
+
+  int id_;
+  SessionPlan plan_;
+  SessionSetting setting_;
+  std::unique_ptr<collapse::LoggedSteering> steering_;
+  std::optional<product::Plan> checked_plan_;
+
+  // commands
+  struct Task {
+    std::shared_ptr<Client> client;
+    std::int64_t id = 0;
+    Json command;
+    std::function<void(Session&)> call;
+  };
+  mutable std::mutex mutex_;
+  std::condition_variable wakes_;
+  std::deque<Task> tasks_;
+  Json brief_;
+  bool closing_ = false;
+
+  // who looks; events kept for those who come back
+  mutable std::mutex watch_mutex_;
+  std::vector<std::weak_ptr<Client>> clients_;
+  std::deque<std::pair<long, std::shared_ptr<const std::string>>> events_;
+  long seq_ = 0;
+
+  // the clock
+  Phase phase_ = Phase::Building;
+  std::string failure_, failure_kind_;
+  std::vector<Diagnostic> diagnostics_;
+  std::optional<double> speed_, until_;
+  long frames_left_ = -1, steps_left_ = -1;
+  Clock::time_point speed_start_, last_state_, last_frame_, last_reached_, last_look_, rate_start_, command_at_;
+  double speed_time_ = 0, rate_time_ = 0, rate_ = 0;
+  std::size_t frame_sent_ = 0;
+  int frame_branch_ = 0;
+  Json last_state_told_;
+  std::string file_sha256_;
+
+  std::thread thread_;
+};
+
+}  // namespace topple::server

@@ -1,0 +1,424 @@
+/// The commands of a session (docs/protocol.md).
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "base/file.h"
+#include "base/hash.h"
+#include "collapse/edit_json.h"
+#include "server/session.h"
+
+namespace topple::server {
+
+using collapse::Branch;
+using collapse::check_keys;
+using collapse::read_flag;
+using collapse::read_integer;
+using collapse::read_number;
+using collapse::read_text;
+using collapse::Steering;
+
+namespace {
+
+constexpr int kMostIds = 1 << 30;
+constexpr std::size_t kMostFrames = 4000, kMostFrameBytes = std::size_t{32} << 20;
+
+bool has(const Json& command, const char* key) {
+  const auto it = command.find(key);
+  return it != command.end() && !it->is_null();
+}
+
+/// Value of a series of a branch at a time, between frames on a straight line.
+double value_at(const std::vector<double>& time, const std::vector<double>& value, double t) {
+  const auto after = std::lower_bound(time.begin(), time.end(), t);
+  if (after == time.begin()) return value.front();
+  if (after == time.end()) return value.back();
+  const auto i = static_cast<std::size_t>(after - time.begin());
+  const double s = (t - time[i - 1]) / (time[i] - time[i - 1]);
+  return (1 - s) * value[i - 1] + s * value[i];
+}
+
+std::size_t frame_at(const std::vector<double>& time, double t) {
+  const auto after = std::upper_bound(time.begin(), time.end(), t + 1e-9);
+  return after == time.begin() ? 0 : static_cast<std::size_t>(after - time.begin()) - 1;
+}
+
+std::vector<std::string> command_words() {
+  std::vector<std::string> words = collapse::edit_words();
+  for (const char* w :
+       {"run",         "pause",         "step",         "speed",          "rewind",        "live",        "undo",
+        "branch",      "rename",        "switch",       "compare",        "scene",         "frames",      "findings",
+        "series",      "zone",          "log",          "plan.apply",     "plan.save",     "plan.text",   "plan.check",
+        "ping",        "session.list",  "session.open", "session.attach", "session.close", "study.start", "study.list",
+        "study.watch", "study.unwatch", "study.cancel", "study.play"})
+    words.emplace_back(w);
+  return words;
+}
+
+}  // namespace
+
+Steering& Session::core() const {
+  if (!steering_)
+    throw InputError("E930", phase_ == Phase::Failed ? "the plan cannot be run as it is" : "the model is being built",
+                     phase_ == Phase::Failed ? "mend the plan's text and apply it" : "wait for the phase \"paused\"");
+  return steering_->steering();
+}
+
+Branch& Session::branch_of(const Json& command) const {
+  return has(command, "branch") ? core().branch(read_integer(command, "branch", 1, kMostIds)) : core().active();
+}
+
+Json Session::perform(Client& client, const Json& command) {
+  const std::string word = read_text(command, "command");
+  if (word == "run" || word == "pause" || word == "step" || word == "speed" || word == "rewind" || word == "live")
+    return run_clock(word, command);
+  if (word == "plan.apply" && !steering_) {
+    check_keys(command, {"text", "name"});
+    std::vector<Diagnostic> warnings;
+    const product::Plan plan = product::read_plan(read_text(command, "text"), plan_.path, warnings);
+    phase_ = Phase::Building;
+    publish_state(true);
+    try {
+      build(plan);
+    } catch (...) {
+      steering_.reset();
+      phase_ = Phase::Failed;
+      throw;
+    }
+    checked_plan_ = plan;
+    diagnostics_ = warnings;
+    for (const auto& c : watchers()) welcome(c);
+    return {{"branch", 1}};
+  }
+  if (collapse::LoggedSteering::is_action(word)) return change(word, command);
+  if (word == "scene") {
+    check_keys(command, {});
+    const Branch& b = branch_of(command);
+    return {{"scene",
+             describe_scene(b.run().record(), b.run().record().time.empty() ? 0 : b.run().record().time.size() - 1)}};
+  }
+  if (word == "frames") return send_frames(client, command);
+  if (word == "series") return read_series(command);
+  if (word == "compare") return compare(command);
+  if (word == "zone") return watch_zone(client, command);
+  if (word == "findings") {
+    check_keys(command, {});
+    const Branch& b = branch_of(command);
+    const record::Record r = make_record(b.id);
+    Json out{{"ending", {{"kind", r.ending}, {"text", r.ending_text}}}};
+    Json& findings = out["findings"] = Json::array();
+    for (const record::Finding& f : r.findings) findings.push_back(describe_finding(f));
+    Json& events = out["events"] = Json::array();
+    for (const record::Event& e : r.events) events.push_back(describe_event(e));
+    out["not_modelled"] = r.not_modelled;
+    out["notes"] = b.run().model().map().notes;
+    return out;
+  }
+  if (word == "log") {
+    check_keys(command, {"from"});
+    const std::vector<std::string> lines = log_lines();
+    const std::size_t from =
+        has(command, "from") ? static_cast<std::size_t>(read_integer(command, "from", 0, kMostIds)) : 0;
+    Json entries = Json::array();
+    for (std::size_t i = from; i < lines.size(); ++i) entries.push_back(Json::parse(lines[i]));
+    return {{"entries", std::move(entries)}};
+  }
+  if (word == "plan.text") {
+    check_keys(command, {});
+    if (!steering_) return {{"text", plan_.text}, {"sha256", calc_sha256(plan_.text)}, {"path", plan_.path}};
+    const product::Plan& p = branch_of(command).run().model().plan();
+    return {{"text", p.text}, {"sha256", calc_sha256(p.text)}, {"path", plan_.path}};
+  }
+  if (word == "plan.save") return save_plan(command);
+  const std::string near = nearest_name(word, command_words());
+  throw InputError("E911", "there is no command \"" + word + "\"",
+                   near.empty() ? "" : "did you mean \"" + near + "\"?");
+}
+
+Json Session::run_clock(const std::string& word, const Json& command) {
+  Steering& s = core();
+  if (has(command, "branch") && read_integer(command, "branch", 1, kMostIds) != s.active().id)
+    throw InputError("E930", "the clock is that of the active branch", "switch to the branch first");
+  const auto place = [&] {
+    Json out{{"time", s.cursor_time()}};
+    if (!s.cursor().is_live) out["frame"] = s.cursor().frame;
+    publish_state(true);
+    return out;
+  };
+  const auto start = [&] {
+    if (phase_ == Phase::Failed || !s.active().run().has_begun())
+      throw InputError("E930", "the branch cannot go on: " + failure_);
+    if (s.active().run().has_ended())
+      throw InputError("E930", "the branch has ended", "rewind, and branch or edit there");
+    speed_start_ = rate_start_ = Clock::now();
+    speed_time_ = rate_time_ = s.active().frontier();
+    phase_ = Phase::Running;
+    publish_state(true);
+  };
+  if (word == "run") {
+    check_keys(command, {"until"});
+    std::optional<double> until;
+    if (has(command, "until")) until = read_number(command, "until");
+    start();
+    until_ = until;
+    frames_left_ = steps_left_ = -1;
+    return Json::object();
+  }
+  if (word == "step") {
+    check_keys(command, {"frames", "steps"});
+    const int steps = has(command, "steps") ? read_integer(command, "steps", 1, 1000000) : -1;
+    const int frames = has(command, "frames") ? read_integer(command, "frames", 1, 100000) : steps > 0 ? -1 : 1;
+    start();
+    until_.reset();
+    frames_left_ = frames;
+    steps_left_ = steps;
+    return Json::object();
+  }
+  if (word == "pause") {
+    check_keys(command, {});
+    pause();
+    return {{"time", s.active().frontier()}};
+  }
+  if (word == "speed") {
+    check_keys(command, {"factor"});
+    speed_.reset();
+    if (has(command, "factor")) {
+      const double factor = read_number(command, "factor");
+      if (!(factor >= 1e-4 && factor <= 1e4)) throw InputError("E912", "\"factor\" must be 0.0001 to 10000, or null");
+      speed_ = factor;
+    }
+    speed_start_ = Clock::now();
+    speed_time_ = s.active().frontier();
+    publish_state(true);
+    return Json::object();
+  }
+  if (word == "rewind") {
+    check_keys(command, {"time", "frame"});
+    if (has(command, "time") == has(command, "frame"))
+      throw InputError("E912", "rewind wants either a time or a frame");
+    if (has(command, "time"))
+      s.rewind(read_number(command, "time"));
+    else
+      s.rewind_to_frame(static_cast<std::size_t>(read_integer(command, "frame", 0, kMostIds)));
+    return place();
+  }
+  check_keys(command, {});
+  s.go_live();
+  return place();
+}
+
+Json Session::change(const std::string& word, Json command) {
+  Steering& s = core();
+  const bool is_edit = collapse::is_edit(word);
+  if ((is_edit || word == "undo" || word == "branch") && has(command, "branch")) {
+    if (read_integer(command, "branch", 1, kMostIds) != s.active().id)
+      throw InputError("E930", "edits act on the active branch", "switch to the branch first");
+    command.erase("branch");
+  }
+  const bool was_running = phase_ == Phase::Running;
+  if (word == "branch" && has(command, "time")) s.rewind(read_number(command, "time"));
+  if (word == "switch" || word == "plan.apply" || word == "sample") pause();
+  if (word == "plan.apply") {
+    phase_ = Phase::Building;
+    publish_state(true);
+  }
+  const int before = s.active().id;
+  Steering::Made made;
+  try {
+    made = steering_->perform(command);
+  } catch (...) {
+    if (!was_running || word == "plan.apply") settle_phase();
+    if (was_running && word != "plan.apply") phase_ = Phase::Running;
+    publish_state(true);
+    throw;
+  }
+  if (word == "plan.apply" || word == "sample") {
+    begin_branch();
+  } else if (word != "rename") {
+    settle_phase();
+    if (was_running && word != "switch" && phase_ == Phase::Paused) phase_ = Phase::Running;
+    if (s.active().id != before) {
+      speed_start_ = rate_start_ = Clock::now();
+      speed_time_ = rate_time_ = s.active().frontier();
+      frames_left_ = steps_left_ = -1;
+    }
+    publish_frame(true);
+    publish_state(true);
+  }
+  Json out{{"branch", made.branch->id}};
+  if (is_edit) out["edit"] = {{"kind", word}, {"time", made.time}, {"text", made.text}};
+  return out;
+}
+
+Json Session::send_frames(Client& client, const Json& command) const {
+  check_keys(command, {"from", "count", "stride"});
+  const Branch& b = branch_of(command);
+  const auto from = static_cast<std::size_t>(read_integer(command, "from", 0, kMostIds));
+  const auto count = static_cast<std::size_t>(read_integer(command, "count", 1, static_cast<int>(kMostFrames)));
+  const auto stride = has(command, "stride") ? static_cast<std::size_t>(read_integer(command, "stride", 1, 100000)) : 1;
+  const auto outlet = client.outlet();
+  std::size_t sent = 0, bytes = 0;
+  for (std::size_t f = from; f < b.frames() && sent < count && outlet; f += stride) {
+    auto body = make_frame(b, f);
+    bytes += body->bytes.size();
+    const bool is_last = sent + 1 == count || f + stride >= b.frames() || bytes > kMostFrameBytes;
+    (void)outlet->offer(std::move(body), kAskedFrame | (is_last ? kLastFrame : 0U));
+    ++sent;
+    if (is_last) break;
+  }
+  return {{"count", sent}, {"next", from + sent * stride}};
+}
+
+Json Session::read_series(const Json& command) const {
+  check_keys(command, {"from"});
+  const Branch& b = branch_of(command);
+  const std::size_t from =
+      has(command, "from") ? static_cast<std::size_t>(read_integer(command, "from", 0, kMostIds)) : 0;
+  Json out{{"from", from}, {"time", Json::array()}, {"series", Json::array()}};
+  for (const record::Series& s : b.run().record().series)
+    out["series"].push_back({{"id", s.id}, {"value", Json::array()}});
+  for (std::size_t f = from; f < b.frames(); ++f) {
+    const auto [piece, row] = b.find_frame(f);
+    const record::Record& r = piece->run->record();
+    out["time"].push_back(r.time[row]);
+    for (std::size_t i = 0; i < r.series.size(); ++i)
+      out["series"][i]["value"].push_back(number(r.series[i].value[row]));
+  }
+  return out;
+}
+
+Json Session::compare(const Json& command) const {
+  check_keys(command, {"a", "b", "frames"});
+  const int n = has(command, "frames") ? read_integer(command, "frames", 2, 10000) : 200;
+  const int ids[2] = {read_integer(command, "a", 1, kMostIds), read_integer(command, "b", 1, kMostIds)};
+  record::Record r[2] = {make_record(ids[0]), make_record(ids[1])};
+  const double end = std::min(r[0].time.back(), r[1].time.back());
+  std::vector<double> times;
+  for (int i = 0; i < n; ++i) times.push_back(end * i / (n - 1));
+  Json out{{"a", ids[0]}, {"b", ids[1]}, {"time", numbers(times)}, {"series", Json::array()}};
+  for (std::size_t i = 0; i < r[0].series.size(); ++i) {
+    const record::Series& s = r[0].series[i];
+    Json entry{{"id", s.id}, {"title", s.title}, {"unit", s.unit}, {"group", s.group}};
+    for (int side : {0, 1}) {
+      Json& values = entry[side == 0 ? "a" : "b"] = Json::array();
+      for (const double t : times) values.push_back(number(value_at(r[side].time, r[side].series[i].value, t)));
+    }
+    out["series"].push_back(std::move(entry));
+  }
+  // bodies of both by name; debris follows no calculation
+  const auto place = [&](int side, std::size_t frame, std::size_t body) {
+    const float* p = &r[side].position[3 * (frame * r[side].bodies.size() + body)];
+    return Vec3{p[0], p[1], p[2]};
+  };
+  std::map<std::string, std::size_t> index;
+  for (std::size_t b = 0; b < r[1].bodies.size(); ++b) index[r[1].bodies[b].name] = b;
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;
+  for (std::size_t b = 0; b < r[0].bodies.size(); ++b)
+    if (const auto it = index.find(r[0].bodies[b].name); it != index.end() && r[0].bodies[b].kind != "debris")
+      pairs.emplace_back(b, it->second);
+  const auto distances = [&](double t) {
+    std::vector<std::pair<double, std::string>> list;
+    const std::size_t fa = frame_at(r[0].time, t), fb = frame_at(r[1].time, t);
+    for (const auto& [a, b] : pairs) list.emplace_back(norm(place(0, fa, a) - place(1, fb, b)), r[0].bodies[a].name);
+    return list;
+  };
+  Json& largest = out["largest"] = {{"time", times}, {"distance", Json::array()}};
+  for (const double t : times) {
+    double d = 0;
+    for (const auto& [distance, name] : distances(t)) d = std::max(d, distance);
+    largest["distance"].push_back(number(d));
+  }
+  auto last = distances(end);
+  std::stable_sort(last.begin(), last.end(), [](const auto& x, const auto& y) { return x.first > y.first; });
+  out["bodies"] = Json::array();
+  for (std::size_t i = 0; i < std::min<std::size_t>(10, last.size()); ++i)
+    out["bodies"].push_back({{"name", last[i].second}, {"distance", number(last[i].first)}});
+  out["findings"] = Json::array();
+  for (const record::Finding& f : r[0].findings) {
+    const auto it =
+        std::find_if(r[1].findings.begin(), r[1].findings.end(), [&](const auto& g) { return g.id == f.id; });
+    const std::string other = it == r[1].findings.end() ? "" : it->text;
+    if (other != f.text) out["findings"].push_back({{"id", f.id}, {"title", f.title}, {"a", f.text}, {"b", other}});
+  }
+  for (const record::Finding& f : r[1].findings)
+    if (std::none_of(r[0].findings.begin(), r[0].findings.end(), [&](const auto& g) { return g.id == f.id; }))
+      out["findings"].push_back({{"id", f.id}, {"title", f.title}, {"a", ""}, {"b", f.text}});
+  Json& edits = out["edits"] = {{"a", Json::array()}, {"b", Json::array()}};
+  for (int side : {0, 1})
+    for (const Branch* b = &core().branch(ids[side]);; b = &core().branch(b->parent)) {
+      for (auto e = b->edits.rbegin(); e != b->edits.rend(); ++e)
+        edits[side == 0 ? "a" : "b"].insert(edits[side == 0 ? "a" : "b"].begin(),
+                                            Json{{"time", e->time}, {"text", e->text}});
+      if (b->parent == 0) break;
+    }
+  return out;
+}
+
+Json Session::watch_zone(Client& client, const Json& command) const {
+  check_keys(command, {"zone"});
+  client.zone = -1;
+  if (!has(command, "zone")) return {{"zone", nullptr}};
+  const Branch& b = branch_of(command);
+  const std::string name = read_text(command, "zone");
+  const std::vector<record::ZoneInfo>& zones = b.run().record().zones;
+  const auto it = std::find_if(zones.begin(), zones.end(), [&](const record::ZoneInfo& z) { return z.name == name; });
+  if (it == zones.end()) throw InputError("E920", "there is no zone \"" + name + "\"");
+  const auto zone = static_cast<std::size_t>(it - zones.begin());
+  const collapse::LiveModel& live = b.run().model();
+  const int law = live.law_of_zone(zone);
+  Json out{{"zone", name}};
+  out["law"] = law < 0 ? Json(nullptr) : describe_law(live.model().laws[static_cast<std::size_t>(law)]);
+  out["member"] = it->member;
+  // the path so far comes as the first event
+  client.zone_branch = b.id;
+  client.zone_frame = 0;
+  client.zone = static_cast<int>(zone);
+  return out;
+}
+
+Json Session::save_plan(const Json& command) {
+  check_keys(command, {"text", "base_sha256", "force", "path"});
+  const std::string text = read_text(command, "text");
+  std::string path = plan_.path;
+  if (path.empty()) {
+    // a plan from a template or from the page gets a name in the folder
+    const std::string name = read_text(command, "path");
+    const bool is_plain = !name.empty() && name.size() <= 80 && name.ends_with(".toml") && name.front() != '.' &&
+                          std::all_of(name.begin(), name.end(), [](unsigned char c) {
+                            return std::isalnum(c) || c == '-' || c == '_' || c == '.' || c == ' ';
+                          });
+    if (!is_plain)
+      throw InputError("E912", "\"path\" must be the name of a file, such as mill.toml",
+                       "letters, digits, blanks, -, _ and .");
+    path = (std::filesystem::path(setting_.plans) / name).string();
+    if (std::filesystem::exists(path) && !read_flag(command, "force", false))
+      throw InputError("E941", name + " exists already", "give another name");
+  } else {
+    std::string disk;
+    try {
+      disk = read_file(path);
+    } catch (const std::exception&) {
+      // gone: it is written anew
+      disk.clear();
+    }
+    const std::string sha = calc_sha256(disk);
+    if (!disk.empty() && sha != read_text(command, "base_sha256", "") && !read_flag(command, "force", false)) {
+      Diagnostic d;
+      d.code = "E941";
+      d.message = std::filesystem::path(path).filename().string() + " has changed on the disk since";
+      d.help = "look at the difference; force writes over it";
+      throw Conflict({d}, sha, disk);
+    }
+  }
+  replace_file(path, text);
+  plan_.path = path;
+  plan_.text = text;
+  file_sha256_ = calc_sha256(text);
+  tell({{"type", "plan_changed"}, {"sha256", file_sha256_}});
+  return {{"sha256", file_sha256_}, {"path", path}};
+}
+
+}  // namespace topple::server

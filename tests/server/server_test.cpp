@@ -1,0 +1,531 @@
+#include "server/server.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "../collapse/plans.h"
+#include "../product/plan_text.h"
+#include "../study/small_fuzzy_plan.h"
+#include "base/file.h"
+#include "base/hash.h"
+#include "test_client.h"
+
+namespace topple::server {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string two_stages(const std::string& duration = "1 s") {
+  return collapse::house(collapse::charge("C-A*-0", "0.2 s") + collapse::charge("C-B*-0", "0.6 s"), duration);
+}
+
+std::string one_stage(const std::string& duration) {
+  return collapse::house(collapse::charge("C-A*-0", "0.1 s"), duration);
+}
+
+/// A server over a folder of its own.
+class ServerTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("topple-server-" + std::to_string(getpid()) + "-" +
+                                           ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_ / "plans");
+    plan_path_ = (folder_ / "plans" / "house.toml").string();
+  }
+  void TearDown() override {
+    server_.reset();
+    hub_.reset();
+    fs::remove_all(folder_);
+  }
+  void start(const std::string& text, ServerOptions serving = {}) {
+    replace_file(plan_path_, text);
+    HubOptions o;
+    o.session.knowledge = collapse::default_knowledge();
+    o.session.steering.run.program_version = "test";
+    o.session.folder = (folder_ / "out").string();
+    o.plans = (folder_ / "plans").string();
+    o.page = "<!doctype html><title>steer</title>";
+    o.report = "<html><!--TOPPLE-DATA--></html>";
+    hub_ = std::make_unique<Hub>(o);
+    server_ = std::make_unique<Server>(*hub_, serving);
+    hub_->open({"house.toml", plan_path_, text});
+  }
+  std::string at(const std::string& path) const { return "/" + server_->token() + path; }
+  std::uint16_t port() const { return server_->port(); }
+  /// A watcher that has heard hello and that the plan is ready.
+  std::unique_ptr<TestClient> watcher() {
+    auto c = std::make_unique<TestClient>(port());
+    EXPECT_TRUE(c->upgrade(server_->token()));
+    hello_ = c->wait_for_type("hello");
+    EXPECT_TRUE(hello_.is_object());
+    if (hello_["session"]["phase"] == "building" || hello_["session"]["phase"] == "equilibrium")
+      c->wait_for_phase("paused");
+    return c;
+  }
+
+  fs::path folder_;
+  std::string plan_path_;
+  std::unique_ptr<Hub> hub_;
+  std::unique_ptr<Server> server_;
+  TestJson hello_;
+};
+
+TEST_F(ServerTest, RefusesWhoDoesNotKnowTheToken) {
+  start(two_stages());
+  for (const std::string& path :
+       {std::string("/"), std::string("/api/server"), "/" + std::string(32, '0') + "/", at("x/api/server"),
+        "/" + server_->token().substr(1) + "/api/server", std::string("/ws")}) {
+    TestClient c(port());
+    const HttpAnswer a = c.get(path);
+    EXPECT_EQ(a.status, 403) << path;
+    EXPECT_EQ(a.json()["error"]["code"], "E901") << path;
+  }
+  TestClient c(port());
+  EXPECT_FALSE(c.upgrade(std::string(32, 'a')));
+}
+
+TEST_F(ServerTest, RefusesOtherHostsAndOrigins) {
+  start(two_stages());
+  for (const char* host : {"example.org", "127.0.0.1.example.org", "localhost.example.org:80", "127.0.0.1:80:80",
+                           "127.0.0.1:", "10.0.0.1", "[::1"}) {
+    TestClient c(port());
+    EXPECT_EQ(c.get(at("/api/server"), "", host).json()["error"]["code"], "E902") << host;
+  }
+  for (const char* host : {"localhost:1", "127.0.0.1", "[::1]:8080"}) {
+    TestClient c(port());
+    EXPECT_EQ(c.get(at("/api/server"), "", host).status, 200) << host << ": a tunnel has a port of its own";
+  }
+  TestClient none(port());
+  none.send_raw("GET " + at("/api/server") + " HTTP/1.1\r\n\r\n");
+  EXPECT_EQ(none.read_answer().status, 403);
+  TestClient two(port());
+  EXPECT_EQ(two.get(at("/api/server"), "Host: 127.0.0.1\r\n").status, 403);
+  for (const char* origin : {"null", "http://example.org", "https://127.0.0.1", "http://127.0.0.1:1"}) {
+    TestClient c(port()), w(port());
+    EXPECT_EQ(c.get(at("/api/server"), std::string("Origin: ") + origin + "\r\n").json()["error"]["code"], "E902")
+        << origin;
+    EXPECT_FALSE(w.upgrade(server_->token(), "", origin)) << origin;
+  }
+  TestClient own(port());
+  EXPECT_TRUE(own.upgrade(server_->token(), "", "http://" + own.host()));
+}
+
+TEST_F(ServerTest, AnswersRequestsThatAreWrong) {
+  start(two_stages());
+  const auto status = [&](const std::string& raw) {
+    TestClient c(port());
+    c.send_raw(raw);
+    return c.read_answer().status;
+  };
+  const std::string host = "Host: 127.0.0.1\r\n";
+  EXPECT_EQ(status("nonsense\r\n\r\n"), 400);
+  EXPECT_EQ(status("GET / HTTP/9.9\r\n" + host + "\r\n"), 400);
+  EXPECT_EQ(status("POST " + at("/api/server") + " HTTP/1.1\r\n" + host + "\r\n"), 405);
+  EXPECT_EQ(status("DELETE " + at("/api/server") + " HTTP/1.1\r\n" + host + "\r\n"), 405);
+  EXPECT_EQ(status("GET " + at("/api/server") + " HTTP/1.1\r\n" + host + "Content-Length: 5\r\n\r\nhello"), 413);
+  EXPECT_EQ(status("GET " + at("/api/server") + " HTTP/1.1\r\n" + host + "Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n"),
+            413);
+  EXPECT_EQ(status("GET " + at("/") + std::string(20000, 'a') + " HTTP/1.1\r\n" + host + "\r\n"), 431);
+  EXPECT_EQ(status("GET " + at("/api/server") + " HTTP/1.1\r\n" + host + "X: " + std::string(9000, 'a') + "\r\n\r\n"),
+            431);
+  EXPECT_EQ(status("GET " + at("/ws") + " HTTP/1.1\r\n" + host + "\r\n"), 426);
+  // one connection, several requests
+  TestClient c(port());
+  EXPECT_EQ(c.get(at("/api/server")).status, 200);
+  EXPECT_EQ(c.get(at("/api/templates")).status, 200);
+  const HttpAnswer head = c.get(at("/"), "", "", "HEAD");
+  EXPECT_EQ(head.status, 200);
+  EXPECT_NE(head.head.find("nosniff"), std::string::npos);
+}
+
+TEST_F(ServerTest, NoPathLeadsToFiles) {
+  start(two_stages());
+  std::ofstream(folder_ / "secret.toml") << "title = \"secret\"";
+  for (const char* path :
+       {"/../secret.toml", "/%2e%2e/secret.toml", "/api/../../secret.toml", "/house.toml",
+        "/api/sessions/1/../../plans", "/..\\secret.toml", "/api/sessions/1/branches/1/../../../x", "/api/sessions/-1",
+        "/api/sessions/1e9", "/api/sessions/99", "/api/sessions/1/branches/1/passwd", "/api", "//api/server", "/api/",
+        "/api/studies/1/results.json"}) {
+    TestClient c(port());
+    EXPECT_EQ(c.get(at(path)).status, 404) << path;
+  }
+  const auto c = watcher();
+  for (const char* path :
+       {"../secret.toml", "/etc/passwd", "./house.toml", "a/../../secret.toml", "house.toml/../../secret.toml", ""})
+    EXPECT_EQ(c->code("session.open", {{"path", path}}), "E904") << path;
+  fs::create_symlink(folder_ / "secret.toml", folder_ / "plans" / "link.toml");
+  EXPECT_EQ(c->code("session.open", {{"path", "link.toml"}}), "E904");
+  TestClient h(port());
+  const TestJson plans = h.get(at("/api/plans")).json();
+  ASSERT_EQ(plans["plans"].size(), 1U);
+  EXPECT_EQ(plans["plans"][0]["path"], "house.toml");
+  EXPECT_EQ(plans["plans"][0]["title"], "Test building");
+}
+
+TEST_F(ServerTest, SteersAPlanToItsEnd) {
+  start(two_stages());
+  const auto c = watcher();
+  TestClient http(port());
+  const TestJson session = http.get(at("/api/sessions/1")).json();
+  ASSERT_EQ(session["branches"].size(), 1U) << session;
+  EXPECT_EQ(session["branches"][0]["charges"].size(), 6U);
+  EXPECT_TRUE(c->result("run", {{"until", 0.3}}).empty());
+  const TestJson stopped =
+      c->wait_for([](const TestJson& j) { return j["type"] == "state" && j["phase"] == "paused" && j["time"] > 0.2; });
+  EXPECT_NEAR(stopped["time"].get<double>(), 0.3, 0.01);
+  EXPECT_FALSE(c->frames.empty());
+
+  // an edit in the past makes a branch there
+  const TestJson place = c->result("rewind", {{"time", 0.25}});
+  EXPECT_LE(place["time"], 0.25);
+  const TestJson edit = c->result("set_delay", {{"stage", 1}, {"time", 0.5}, {"name", "sooner"}});
+  EXPECT_EQ(edit["branch"], 2) << edit;
+  EXPECT_EQ(edit["edit"]["text"], "Stage at 0.6 s fires at 0.5 s instead of 0.6 s");
+  c->result("run");
+  const TestJson end = c->wait_for_phase("finished");
+  EXPECT_EQ(end["branch"], 2);
+  EXPECT_EQ(end["ending"]["kind"], "time_limit");
+
+  // both branches side by side, once the first has come as far
+  c->result("switch", {{"branch", 1}});
+  c->result("run");
+  c->forget();
+  c->wait_for_phase("finished");
+  const TestJson compared = c->result("compare", {{"a", 1}, {"b", 2}, {"frames", 50}});
+  ASSERT_EQ(compared["time"].size(), 50U) << compared;
+  EXPECT_GT(compared["bodies"][0]["distance"], 0);
+  EXPECT_EQ(compared["largest"]["distance"][0], 0);
+  EXPECT_EQ(compared["edits"]["b"].size(), 1U);
+
+  // undo of an edit that made its branch goes back to the parent
+  c->result("switch", {{"branch", 2}});
+  EXPECT_EQ(c->result("undo")["branch"], 1);
+  EXPECT_EQ(c->code("undo"), "E934");
+
+  // documents
+  const TestJson findings = http.get(at("/api/sessions/1/branches/2/findings")).json();
+  EXPECT_FALSE(findings["findings"].empty());
+  const TestJson record = http.get(at("/api/sessions/1/branches/2/record.json")).json();
+  EXPECT_EQ(record["format"], "topple-report");
+  EXPECT_NEAR(record["time"].back().get<double>(), compared["time"].back().get<double>(), 1e-3)
+      << "as far as both have come";
+  EXPECT_EQ(
+      http.get(at("/api/sessions/1/branches/2/report.html")).body.rfind("<html><script type=\"application/json\"", 0),
+      0U);
+  EXPECT_EQ(http.get(at("/api/sessions/1/branches/2/record.h5")).body.substr(1, 3), "HDF");
+  EXPECT_EQ(http.get(at("/api/sessions/1/branches/7/findings")).status, 404);
+  const TestJson series = c->result("series", {{"branch", 2}, {"from", 3}});
+  EXPECT_EQ(series["time"].size(), record["time"].size() - 3);
+
+  // the log gives the same bits
+  TestClient after(port());  // an error ends the connection
+  const std::string log = after.get(at("/api/sessions/1/log")).body;
+  EXPECT_EQ(log, read_file((folder_ / "out" / "house.steer.jsonl").string()));
+  collapse::SteeringOptions options;
+  options.run.program_version = "test";
+  const collapse::ReplayResult again = collapse::replay(log, "log", collapse::default_knowledge(), options, {});
+  const record::Record same = again.steering->steering().make_record(again.steering->steering().branch(2));
+  EXPECT_EQ(TestJson::parse(record::to_report_json(same))["position"], record["position"]);
+}
+
+TEST_F(ServerTest, FramesHoldWhatTheRecordHolds) {
+  start(one_stage("0.4 s"));
+  const auto c = watcher();
+  c->result("run");
+  c->wait_for_phase("finished");
+  TestClient http(port());
+  const TestJson record = http.get(at("/api/sessions/1/branches/1/record.json")).json();
+  const std::size_t B = record["bodies"].size(), Z = record["zones"].size(), V = hello_["scene"]["series"].size(),
+                    S = record["time"].size();
+  c->frames.clear();
+  EXPECT_EQ(c->result("frames", {{"branch", 1}, {"from", 0}, {"count", 4000}})["count"], S);
+  ASSERT_EQ(c->frames.size(), S);
+  for (std::size_t i = 0; i < S; ++i) {
+    const std::string& f = c->frames[i];
+    ASSERT_EQ(f.size(), 48 + 28 * B + 4 * V + 5 * Z);
+    EXPECT_EQ(f.substr(0, 4), "TPLF");
+    std::uint32_t frame = 0, bodies = 0;
+    std::uint16_t flags = 0;
+    double time = 0;
+    std::memcpy(&flags, &f[6], 2), std::memcpy(&frame, &f[20], 4), std::memcpy(&time, &f[24], 8),
+        std::memcpy(&bodies, &f[32], 4);
+    EXPECT_EQ(flags, i + 1 == S ? 6 : 2);
+    EXPECT_EQ(frame, i);
+    EXPECT_EQ(time, record["time"][i].get<double>());
+    EXPECT_EQ(bodies, B);
+    float tilt = 0;
+    std::memcpy(&tilt, &f[48 + 28 * B], 4);
+    EXPECT_EQ(tilt, record["series"][0]["value"][i].get<float>());
+  }
+  EXPECT_EQ(c->result("frames", {{"from", 1}, {"count", 3}, {"stride", 2}})["count"], 3);
+  EXPECT_EQ(c->result("frames", {{"from", 99999}, {"count", 3}})["count"], 0);
+}
+
+TEST_F(ServerTest, TellsAZonesPath) {
+  start(one_stage("0.4 s"));
+  const auto c = watcher();
+  const std::string zone = hello_["scene"]["zones"][0]["name"];
+  const TestJson watched = c->result("zone", {{"zone", zone}});
+  EXPECT_FALSE(watched["law"]["moment_z"]["plastic_rotation"].empty()) << watched;
+  c->result("run");
+  c->wait_for_phase("finished");
+  std::size_t points = 0;
+  while (points < 20) {
+    const TestJson e = c->wait_for_type("zone");
+    ASSERT_TRUE(e.is_object());
+    EXPECT_EQ(e["zone"], zone);
+    for (const TestJson& p : e["points"]) EXPECT_EQ(p.size(), 8U);
+    points += e["points"].size();
+  }
+  EXPECT_EQ(c->code("zone", {{"zone", "none"}}), "E920");
+}
+
+TEST_F(ServerTest, AnswersMessagesThatAreWrong) {
+  start(two_stages());
+  const auto c = watcher();
+  for (const char* text : {"", "nonsense", "[]", "5", "{}", R"({"command": "run"})", R"({"id": "1", "command": "run"})",
+                           R"({"id": -1, "command": "run"})", R"({"id": 1e300, "command": "run"})",
+                           R"({"id": 1.5, "command": "run"})", "\xc3\x28"}) {
+    ASSERT_TRUE(c->send_text(text)) << text;
+    if (std::string(text) == "\xc3\x28") break;  // text that is not UTF-8 ends the connection
+    const TestJson e = c->wait_for_type("error");
+    ASSERT_TRUE(e.is_object()) << text;
+    EXPECT_TRUE(e["id"].is_null()) << text;
+    EXPECT_EQ(e["error"]["code"], "E910") << text;
+  }
+  EXPECT_TRUE(c->is_cut_off());
+  const auto d = watcher();
+  EXPECT_EQ(d->code("rnu"), "E911");
+  EXPECT_EQ(d->command("paus")["error"]["help"], "did you mean \"pause\"?");
+  EXPECT_EQ(d->code("run", {{"untill", 3}}), "E912");
+  EXPECT_EQ(d->code("run", {{"until", "3"}}), "E912");
+  EXPECT_EQ(d->code("speed", {{"factor", 0}}), "E912");
+  EXPECT_EQ(d->code("rewind"), "E912");
+  EXPECT_EQ(d->code("switch", {{"branch", 7}}), "E920");
+  EXPECT_EQ(d->code("run", {{"session", 9}}), "E920");
+  EXPECT_EQ(d->code("fire", {{"charge", 99}}), "E920");
+  EXPECT_EQ(d->code("study.start"), "E950");
+  EXPECT_EQ(d->code("compare", {{"a", 1}, {"b", 9}}), "E920");
+  // what is no WebSocket any more
+  const auto large = watcher(), unmasked = watcher(), reserved = watcher(), binary = watcher();
+  large->send_frame(1, std::string((std::size_t{2} << 20) + 1, 'x'));
+  EXPECT_TRUE(large->is_cut_off());
+  unmasked->send_frame(1, "{}", false);
+  EXPECT_TRUE(unmasked->is_cut_off());
+  reserved->send_frame(11, "{}");
+  EXPECT_TRUE(reserved->is_cut_off());
+  binary->send_frame(2, "{\"id\": 1, \"command\": \"run\"}");
+  EXPECT_EQ(binary->wait_for_type("error")["error"]["code"], "E910");
+  EXPECT_TRUE(d->result("ping").contains("time")) << "the others go on";
+}
+
+TEST_F(ServerTest, DoesACommandOnce) {
+  start(two_stages());
+  const auto c = watcher();
+  const std::string text = R"({"id": 100, "command": "branch", "name": "once"})";
+  const auto is_answer = [](const TestJson& j) { return j["type"] == "ack" && j["id"] == 100; };
+  c->send_text(text);
+  EXPECT_EQ(c->wait_for(is_answer)["result"]["branch"], 2);
+  c->send_text(text);
+  EXPECT_EQ(c->wait_for(is_answer)["result"]["branch"], 2);
+  TestClient http(port());
+  EXPECT_EQ(http.get(at("/api/sessions/1")).json()["branches"].size(), 2U);
+}
+
+TEST_F(ServerTest, AClientComesBack) {
+  start(two_stages());
+  auto c = watcher();
+  const std::string resume = hello_["resume"];
+  c->result("branch", {{"name", "one"}});
+  const long seq = c->last_seq;
+  // it vanishes in the middle of a command
+  c->send_text(R"({"id": 50, "command": "branch", "name": "two"})");
+  c->close();
+  const auto other = watcher();
+  other->result("rename", {{"branch", 1}, {"name", "first"}});
+  TestClient back(port());
+  ASSERT_TRUE(back.upgrade(server_->token(), "?resume=" + resume + "&seq=" + std::to_string(seq)));
+  EXPECT_EQ(back.wait_for_type("resumed")["from"], seq);
+  const TestJson renamed =
+      back.wait_for([](const TestJson& j) { return j["type"] == "branch" && j["branch"]["name"] == "first"; });
+  EXPECT_GT(renamed["seq"], seq);
+  // it does not know whether that command was done: once more does it at most once
+  back.send_text(R"({"id": 50, "command": "branch", "name": "two"})");
+  EXPECT_EQ(back.wait_for([](const TestJson& j) { return j["type"] == "ack" && j["id"] == 50; })["result"]["branch"],
+            3);
+  for (const std::string& query : {std::string("?resume=") + std::string(32, '0') + "&seq=1",
+                                   "?resume=" + resume + "&seq=999999", std::string("?resume=&seq=x")}) {
+    TestClient strange(port());
+    ASSERT_TRUE(strange.upgrade(server_->token(), query));
+    EXPECT_TRUE(strange.wait_for_type("hello").is_object()) << query;
+  }
+}
+
+TEST_F(ServerTest, ASlowReaderLosesFramesAndNothingElse) {
+  start(two_stages("3 s"));
+  const auto slow = watcher(), quick = watcher();
+  // it asks for a lot, and reads nothing while the run goes to its end
+  quick->result("run");
+  ASSERT_TRUE(slow->send_text(R"({"id": 7, "command": "ping"})"));
+  quick->wait_for_phase("finished");
+  const TestJson last = quick->result("rename", {{"branch", 1}, {"name", "done"}});
+  EXPECT_FALSE(last.contains("refused"));
+  EXPECT_TRUE(slow->wait_for([](const TestJson& j) { return j["type"] == "ack" && j["id"] == 7; }).is_object());
+  slow->wait_for([](const TestJson& j) { return j["type"] == "branch" && j["branch"]["name"] == "done"; });
+  quick->wait_for([](const TestJson& j) { return j["type"] == "branch" && j["branch"]["name"] == "done"; });
+  // both heard the same events
+  const auto seqs = [](const TestClient& c) {
+    std::vector<long> list;
+    for (const TestJson& j : c.later())
+      if (j.contains("seq") && j["type"] != "hello") list.push_back(j["seq"]);
+    return list;
+  };
+  const std::vector<long> slow_seqs = seqs(*slow);
+  for (std::size_t i = 1; i < slow_seqs.size(); ++i) EXPECT_LT(slow_seqs[i - 1], slow_seqs[i]);
+  // every frame that it did get is whole, and the last one came
+  ASSERT_FALSE(slow->frames.empty());
+  for (const std::string& f : slow->frames) EXPECT_EQ(f.size(), slow->frames.front().size());
+}
+
+TEST_F(ServerTest, TwentyWatch) {
+  start(one_stage("0.5 s"));
+  std::vector<std::unique_ptr<TestClient>> all;
+  for (int i = 0; i < 20; ++i) all.push_back(watcher());
+  all[0]->result("run");
+  for (auto& c : all) {
+    const TestJson end = c->wait_for_phase("finished");
+    ASSERT_TRUE(end.is_object());
+    EXPECT_NEAR(end["time"].get<double>(), 0.5, 0.01);
+    EXPECT_FALSE(c->frames.empty());
+  }
+  // half of them vanish without a word
+  for (std::size_t i = 0; i < 10; ++i) all[i]->close();
+  EXPECT_EQ(all[15]->result("rename", {{"branch", 1}, {"name", "still here"}})["branch"], 1);
+}
+
+TEST_F(ServerTest, ManyConnectionsAreTurnedAway) {
+  ServerOptions few;
+  few.most_connections = 8;
+  few.request_timeout = 0.5;
+  start(two_stages(), few);
+  std::vector<std::unique_ptr<TestClient>> idle;
+  for (int i = 0; i < 8; ++i) {
+    idle.push_back(std::make_unique<TestClient>(port()));
+    EXPECT_EQ(idle.back()->get(at("/api/server")).status, 200);
+  }
+  TestClient late(port());
+  EXPECT_EQ(late.get(at("/api/server")).json()["error"]["code"], "E905");
+  // who says nothing is let go, and there is room again
+  for (auto& c : idle) EXPECT_EQ(c->read_answer().status, 0);
+  for (int i = 0; i < 600; ++i) {
+    TestClient again(port());
+    if (again.get(at("/api/server")).status == 200) return;
+    usleep(100000);
+  }
+  FAIL() << "no room was made";
+}
+
+TEST_F(ServerTest, SavesAPlanUnlessTheFileHasChanged) {
+  const std::string text = two_stages();
+  start(text);
+  const auto c = watcher();
+  const std::string mine = text + "# mine\n", theirs = text + "# theirs\n";
+  const std::string base = hello_["plan"]["sha256"];
+  EXPECT_EQ(base, calc_sha256(text));
+  EXPECT_EQ(c->result("plan.save", {{"text", mine}, {"base_sha256", base}})["sha256"], calc_sha256(mine));
+  EXPECT_EQ(read_file(plan_path_), mine);
+  replace_file(plan_path_, theirs);
+  EXPECT_EQ(c->wait_for([&](const TestJson& j) {
+               return j["type"] == "plan_changed" && j["sha256"] == calc_sha256(theirs);
+             }).is_object(),
+            true);
+  const TestJson conflict = c->command("plan.save", {{"text", mine}, {"base_sha256", calc_sha256(mine)}});
+  EXPECT_EQ(conflict["error"]["code"], "E941");
+  EXPECT_EQ(conflict["error"]["text"], theirs);
+  EXPECT_EQ(read_file(plan_path_), theirs);
+  EXPECT_TRUE(c->result("plan.save", {{"text", mine}, {"base_sha256", "x"}, {"force", true}}).contains("sha256"));
+  EXPECT_EQ(read_file(plan_path_), mine);
+}
+
+TEST_F(ServerTest, APlanWithErrorsIsMendedInThePage) {
+  start(two_stages() + "[analysys]\n");
+  auto c = std::make_unique<TestClient>(port());
+  ASSERT_TRUE(c->upgrade(server_->token()));
+  TestJson state = c->wait_for([](const TestJson& j) {
+    return (j["type"] == "state" || j["type"] == "hello") &&
+           j.value("phase", j.contains("session") && j["session"].is_object() ? j["session"]["phase"].get<std::string>()
+                                                                              : "") == "failed";
+  });
+  ASSERT_TRUE(state.is_object());
+  EXPECT_EQ(c->code("run"), "E930");
+  const TestJson checked = c->result("plan.check", {{"text", two_stages() + "[analysys]\n"}});
+  ASSERT_EQ(checked["diagnostics"].size(), 1U) << checked;
+  EXPECT_GT(checked["diagnostics"][0]["line"], 1);
+  EXPECT_NE(checked["diagnostics"][0]["help"].get<std::string>().find("analysis"), std::string::npos);
+  EXPECT_EQ(c->result("plan.check", {{"text", collapse::house()}})["removes_support"], false);
+  EXPECT_EQ(c->command("plan.apply", {{"text", "nonsense"}, {"name", "a"}})["type"], "error");
+  EXPECT_EQ(c->result("plan.apply", {{"text", one_stage("0.3 s")}, {"name", "a"}})["branch"], 1);
+  c->result("run");
+  EXPECT_TRUE(c->wait_for_phase("finished").is_object());
+  // another one beside it
+  EXPECT_EQ(c->result("plan.apply", {{"text", one_stage("0.2 s")}, {"name", "short"}})["branch"], 2);
+}
+
+TEST_F(ServerTest, SessionsComeAndGo) {
+  start(one_stage("0.3 s"));
+  const auto c = watcher();
+  const int second = c->result("session.open", {{"template", "frame"}})["session"];
+  EXPECT_EQ(second, 2);
+  const TestJson hello =
+      c->wait_for([&](const TestJson& j) { return j["type"] == "hello" && j["session"]["id"] == second; });
+  EXPECT_FALSE(hello["plan"]["text"].get<std::string>().empty());
+  EXPECT_EQ(c->result("session.list")["sessions"].size(), 2U);
+  // the first one still answers
+  EXPECT_EQ(c->result("rename", {{"session", 1}, {"branch", 1}, {"name", "old"}})["branch"], 1);
+  EXPECT_EQ(c->result("session.close", {{"session", 2}})["session"], 2);
+  EXPECT_EQ(c->code("run", {{"session", 2}}), "E920");
+  c->result("session.attach", {{"session", 1}});
+  c->wait_for([&](const TestJson& j) { return j["type"] == "hello" && j["session"]["id"] == 1; });
+  EXPECT_FALSE(c->result("run").contains("refused"));
+  EXPECT_TRUE(c->wait_for_phase("finished").is_object());
+  for (int i = 0; i < 7; ++i)
+    EXPECT_TRUE(c->result("session.open", {{"text", "title = 3"}, {"title", "x"}}).contains("session"));
+  EXPECT_EQ(c->code("session.open", {{"text", "title = 3"}}), "E905");
+}
+
+TEST_F(ServerTest, AStudyGrowsAndASampleIsPlayed) {
+  start(product::small_plan() + study::strengths);
+  const auto c = watcher();
+  const TestJson started = c->result("study.start", {{"samples", 12}});
+  ASSERT_EQ(started["study"], 1) << started;
+  std::size_t samples = 0;
+  TestJson study;
+  do {
+    const TestJson e = c->wait_for_type("study");
+    ASSERT_TRUE(e.is_object());
+    samples += e["samples"].size();
+    study = e["study"];
+  } while (study["state"] == "running");
+  EXPECT_EQ(study["state"], "finished") << study["text"];
+  EXPECT_EQ(samples, 12U);
+  EXPECT_FALSE(study["inputs"].empty());
+  EXPECT_FALSE(study["bounds"].empty());
+  EXPECT_FALSE(study["possibilities"].empty());
+  EXPECT_EQ(study["fans"]["alpha"].size(), study["fans"]["low"].size());
+  const TestJson watched = c->result("study.watch", {{"study", 1}});
+  EXPECT_EQ(watched["samples"].size(), 12U);
+  const TestJson played = c->result("study.play", {{"study", 1}, {"sample", 3}});
+  EXPECT_EQ(played["branch"], 2) << played;
+  EXPECT_EQ(c->code("study.play", {{"study", 1}, {"sample", 99}}), "E920");
+  c->result("run");
+  EXPECT_TRUE(c->wait_for_phase("finished").is_object());
+  TestClient http(port());
+  EXPECT_EQ(http.get(at("/api/studies/1/results.json")).status, 200);
+  EXPECT_EQ(http.get(at("/api/studies/1/study.html")).status, 404) << "that page is not built here";
+}
+
+}  // namespace
+}  // namespace topple::server
