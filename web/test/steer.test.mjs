@@ -535,6 +535,7 @@ describe("steering page with nothing open", () => {
 
   it("works without WebGL and with reduced motion", async () => {
     const server = await new Standin().start();
+    server.barrier = 60; // it must not end before it is paused
     const browser = await openPage(server.url, { webgl: false, reducedMotion: "reduce" });
     const d = makeDriver(browser.page);
     await browser.page.waitForSelector("[data-test=no-webgl]");
