@@ -122,7 +122,19 @@ bool can_share_lanes(const Sample& a, const Sample& b, const Knowledge& k, const
          mbs::is_same_build(a.model, b.model);
 }
 
-void fill(Sample& s, const Knowledge& k, SampleRun& out) {
+/// The debris of a slice over the whole length of the building: nothing falls sideways.
+void spread(Reach& reach, const product::Plan& plan) {
+  reach.side[2] = reach.side[3] = 0;
+  reach.largest = std::max(reach.side[0], reach.side[1]);
+  if (reach.outline.empty() || plan.frame_offsets.empty()) return;
+  double low = reach.outline.front()[0], high = low;
+  for (const Point2& p : reach.outline) low = std::min(low, p[0]), high = std::max(high, p[0]);
+  const double from = plan.frame_offsets.front(), to = plan.frame_offsets.back();
+  reach.outline = {{low, from}, {high, from}, {high, to}, {low, to}};
+  reach.area = calc_area(reach.outline);
+}
+
+void fill(Sample& s, const Knowledge& k, const SampleRunOptions& options, SampleRun& out) {
   using Ending = mbs::Summary::Ending;
   s.recorder->finish();
   if (s.summary.ending == Ending::Cancelled) return;
@@ -153,6 +165,7 @@ void fill(Sample& s, const Knowledge& k, SampleRun& out) {
   out.touchdown_energy = out.touchdown <= out.time.back() ? s.recorder->kinetic_at(out.touchdown) : kinetic.back();
   out.largest_energy = *std::max_element(kinetic.begin(), kinetic.end());
   out.reach = calc_reach(s.record, out.time.size() - 1);
+  if (options.condensation) spread(out.reach, s.plan);
 }
 
 }  // namespace
@@ -181,7 +194,7 @@ std::vector<SampleRun> run_samples(std::span<const product::Plan> plans, const K
   };
   const auto finish = [&](size_t i, Sample& s) {
     const double begin = now();
-    fill(s, k, out[i]);
+    fill(s, k, options, out[i]);
     spent.outputs += now() - begin + s.in_outputs;
   };
   const auto run_one = [&](size_t i, Sample& s) {
