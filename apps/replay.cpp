@@ -28,7 +28,9 @@ int replay_log(const Arguments& a, const std::atomic<bool>& cancel) {
     ProgressLine line;
     Progress progress;
     progress.cancel = &cancel;
-    progress.report = [&](double done, double whole) { line.show(done, whole); };
+    progress.report = [&](double done, double whole) {
+      line.say(fmt::format("{:.0f} % of the log done again", 100 * done / whole));
+    };
     const collapse::ReplayResult r = collapse::replay(
         text, a.input, knowledge, options,
         [](const product::Plan& plan, const std::vector<double>& inputs) {
