@@ -299,12 +299,16 @@ Json Session::compare(const Json& command) const {
   std::vector<double> times;
   for (int i = 0; i < n; ++i) times.push_back(end * i / (n - 1));
   Json out{{"a", ids[0]}, {"b", ids[1]}, {"time", numbers(times)}, {"series", Json::array()}};
-  for (std::size_t i = 0; i < r[0].series.size(); ++i) {
-    const record::Series& s = r[0].series[i];
+  // those that both have: a branch that has ended has more
+  for (const record::Series& s : r[0].series) {
+    const auto other =
+        std::find_if(r[1].series.begin(), r[1].series.end(), [&](const auto& o) { return o.id == s.id; });
+    if (other == r[1].series.end()) continue;
     Json entry{{"id", s.id}, {"title", s.title}, {"unit", s.unit}, {"group", s.group}};
     for (int side : {0, 1}) {
+      const std::vector<double>& series = side == 0 ? s.value : other->value;
       Json& values = entry[side == 0 ? "a" : "b"] = Json::array();
-      for (const double t : times) values.push_back(number(value_at(r[side].time, r[side].series[i].value, t)));
+      for (const double t : times) values.push_back(number(value_at(r[side].time, series, t)));
     }
     out["series"].push_back(std::move(entry));
   }

@@ -165,6 +165,36 @@ TEST_F(ServerTest, NoPathLeadsToFiles) {
   EXPECT_EQ(plans["plans"][0]["title"], "Test building");
 }
 
+TEST_F(ServerTest, ComparesABranchWithWhatItsParentLacks) {
+  start(two_stages());
+  const auto c = watcher();
+  const auto run_until = [&](double time) {
+    c->forget();
+    c->result("run", {{"until", time}});
+    c->wait_for(
+        [&](const TestJson& j) { return j["type"] == "state" && j["phase"] == "paused" && j["time"] > time - 0.05; });
+  };
+  run_until(0.3);
+  c->result("rewind", {{"time", 0.2}});
+  c->result("add_cable", {{"member", "C-A2-1"},
+                          {"position", 1.5},
+                          {"anchor", {-15, 4, 0}},
+                          {"stiffness", 2e6},
+                          {"pretension", 5e4},
+                          {"name", "pulled"}});
+  run_until(0.3);
+  c->result("add_charge", {{"member", "C-B2-1"}, {"position", 1}, {"destroyed_length", 0.6}, {"time", 0.35}});
+  run_until(0.5);
+  for (const auto& [a, b] : {std::pair{1, 2}, std::pair{2, 1}}) {
+    const TestJson compared = c->result("compare", {{"a", a}, {"b", b}, {"frames", 20}});
+    ASSERT_EQ(compared["time"].size(), 20U) << compared;
+    EXPECT_EQ(compared["largest"]["distance"][0], 0);
+    EXPECT_GT(compared["bodies"][0]["distance"], 0);
+    ASSERT_FALSE(compared["series"].empty());
+    for (const TestJson& s : compared["series"]) EXPECT_EQ(s["a"].size(), s["b"].size()) << s["id"];
+  }
+}
+
 TEST_F(ServerTest, SteersAPlanToItsEnd) {
   start(two_stages());
   const auto c = watcher();
