@@ -41,6 +41,9 @@ if(TARGET topple)
   add_test(NAME web_short_run COMMAND topple run ${CMAKE_CURRENT_SOURCE_DIR}/data/short.toml -o ${short_run})
   set_tests_properties(web_short_run PROPERTIES LABELS web FIXTURES_SETUP short_run TIMEOUT 120)
   topple_web_test(web_report_run report.test.mjs BROWSER FIXTURES short_run ENVIRONMENT TOPPLE_REPORT=${short_run}/report.html)
+  # the storehouse, steered for minutes
+  topple_web_test(web_steer_program steer_program.test.mjs BROWSER LIMIT 900 ENVIRONMENT TOPPLE=$<TARGET_FILE:topple>)
+  set_tests_properties(web_steer_program PROPERTIES LABELS "web;slow")
   # a study of a model that is a program of its own
   set(short_study ${CMAKE_CURRENT_BINARY_DIR}/short_study)
   add_test(NAME web_short_study_clean COMMAND ${CMAKE_COMMAND} -E rm -rf ${short_study})

@@ -138,8 +138,12 @@ void StudyTask::look(const study::StudyState* state) {
       Json sample{{"index", samples_.size()}, {"inputs", Json::array()}, {"outputs", Json::array()}};
       for (std::size_t i = 0; i < problem_.inputs.size(); ++i)
         sample["inputs"].push_back(number(s.x[i] / problem_.inputs[i].unit_value));
-      for (std::size_t i = 0; i < now_["outputs"].size(); ++i)
-        sample["outputs"].push_back(i < s.result.values.size() ? number(s.result.values[i]) : Json(nullptr));
+      for (std::size_t i = 0; i < now_["outputs"].size(); ++i) {
+        const std::string name = now_["outputs"][i]["name"];
+        sample["outputs"].push_back(i < s.result.values.size()
+                                        ? number(s.result.values[i] / study::find_output(problem_, name).unit_value)
+                                        : Json(nullptr));
+      }
       const bool ok = s.result.state == uncertainty::Result::State::Done;
       sample["outcome"] = ok ? study::name_of_outcome(r, s.result.outcome) : study::failed_name;
       sample["ok"] = ok;
@@ -151,9 +155,10 @@ void StudyTask::look(const study::StudyState* state) {
     Json bounds = Json::array();
     for (std::size_t i = 0; i < r.alpha.outputs.size() && i < r.outputs.size(); ++i) {
       Json b{{"output", r.outputs[i]}, {"alpha", Json::array()}, {"low", Json::array()}, {"high", Json::array()}};
+      const double unit = study::find_output(problem_, r.outputs[i]).unit_value;
       for (const auto& l : r.alpha.outputs[i].levels)
-        b["alpha"].push_back(l.alpha), b["low"].push_back(number(l.lower.value)),
-            b["high"].push_back(number(l.upper.value));
+        b["alpha"].push_back(l.alpha), b["low"].push_back(number(l.lower.value / unit)),
+            b["high"].push_back(number(l.upper.value / unit));
       bounds.push_back(std::move(b));
     }
     now_["bounds"] = std::move(bounds);

@@ -553,7 +553,15 @@ TEST_F(ServerTest, AStudyGrowsAndASampleIsPlayed) {
   c->result("run");
   EXPECT_TRUE(c->wait_for_phase("finished").is_object());
   TestClient http(port());
-  EXPECT_EQ(http.get(at("/api/studies/1/results.json")).status, 200);
+  const auto results = http.get(at("/api/studies/1/results.json"));
+  ASSERT_EQ(results.status, 200);
+  // in the units that are shown, like the results
+  const TestJson written = TestJson::parse(results.body)["outputs"];
+  ASSERT_EQ(written.size(), study["bounds"].size());
+  for (std::size_t i = 0; i < written.size(); ++i) {
+    EXPECT_EQ(study["outputs"][i]["unit"], written[i]["unit"]);
+    EXPECT_EQ(study["bounds"][i]["high"][0], written[i]["levels"][0]["upper"]) << written[i]["name"];
+  }
   EXPECT_EQ(http.get(at("/api/studies/1/study.html")).status, 404) << "that page is not built here";
 }
 
