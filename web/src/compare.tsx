@@ -2,7 +2,6 @@
 import "uplot/dist/uPlot.min.css";
 import "./style.css";
 import { effect, signal } from "@preact/signals";
-import { render } from "preact";
 import { Building } from "./building";
 import { readComparison, type Comparison, type Compared, type Photo } from "./compare_data";
 import { Help, listenToKeys } from "./keys";
@@ -13,6 +12,7 @@ import { useSceneView } from "./scene_view";
 import { makeState, runClock, type State } from "./state";
 import { Timeline } from "./timeline";
 import { formatTime } from "./units";
+import { startPage } from "./start";
 
 type Shown = "both" | "a" | "b";
 const colourOfA = "#b0483c";
@@ -204,32 +204,12 @@ function Page(props: { state: State; compared: Compared; titles: Record<string, 
   );
 }
 
-function start(): void {
-  const root = document.getElementById("page") as HTMLElement;
-  let compared: Compared;
-  try {
-    compared = readComparison(document.getElementById("topple-data")?.textContent ?? "null");
-  } catch (error) {
-    render(
-      <main class="layout">
-        <section class="panel" role="alert" data-test="problem">
-          <h1>This comparison cannot be shown</h1>
-          <p>{error instanceof Error ? error.message : String(error)}</p>
-        </section>
-      </main>,
-      root,
-    );
-    document.documentElement.dataset["ready"] = "yes";
-    return;
-  }
+startPage("comparison", readComparison, (compared) => {
   document.title = `${compared.a.provenance.title || "Runs"} – topple compare`;
   const { run, titles } = compared.plotted;
   const state = makeState(run);
   const fitRef = { current: (): void => undefined };
   runClock(state);
   listenToKeys(state, () => fitRef.current());
-  root.textContent = "";
-  render(<Page state={state} compared={compared} titles={titles} fitRef={fitRef} />, root);
-}
-
-start();
+  return <Page state={state} compared={compared} titles={titles} fitRef={fitRef} />;
+}, "drawn");

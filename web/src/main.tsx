@@ -1,13 +1,13 @@
 import "uplot/dist/uPlot.min.css";
 import "./style.css";
-import { render } from "preact";
 import { useState } from "preact/hooks";
-import { readRun, type Run } from "./data";
+import { readRun } from "./data";
 import { Findings, Header, NotModelled } from "./findings";
 import { Inspector } from "./inspector";
 import { Help, listenToKeys } from "./keys";
 import { Plots } from "./plots";
 import type { Scene } from "./scene";
+import { startPage } from "./start";
 import { makeState, runClock, type State } from "./state";
 import { Stills, chooseMoments, type Still } from "./stills";
 import { Details, Events, PlanValues } from "./tables";
@@ -61,31 +61,11 @@ function Page(props: { state: State; fitRef: { current: () => void } }) {
   );
 }
 
-function start(): void {
-  const root = document.getElementById("page") as HTMLElement;
-  let run: Run;
-  try {
-    run = readRun(document.getElementById("topple-data")?.textContent ?? "null");
-  } catch (error) {
-    render(
-      <main class="layout">
-        <section class="panel" role="alert" data-test="problem">
-          <h1>This report cannot be shown</h1>
-          <p>{error instanceof Error ? error.message : String(error)}</p>
-        </section>
-      </main>,
-      root,
-    );
-    document.documentElement.dataset["ready"] = "yes";
-    return;
-  }
+startPage("report", readRun, (run) => {
   document.title = `${run.provenance.title || "Run"} – topple report`;
   const state = makeState(run);
   const fitRef = { current: (): void => undefined };
   runClock(state);
   listenToKeys(state, () => fitRef.current());
-  root.textContent = "";
-  render(<Page state={state} fitRef={fitRef} />, root);
-}
-
-start();
+  return <Page state={state} fitRef={fitRef} />;
+}, "drawn");

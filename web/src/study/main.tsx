@@ -1,12 +1,12 @@
 import "../style.css";
 import "./study.css";
-import { render } from "preact";
 import { readStudy, type Study } from "./data";
 import { DebrisPlan, Fans, Memberships } from "./plots";
 import { Runs } from "./runs";
 import { makeState } from "./state";
 import { Boxes, Drivers, Inputs, NotModelled, Notable, Origin } from "./tables";
 import { Header, Outcomes } from "./verdict";
+import { startPage } from "../start";
 
 function Page(props: { study: Study }) {
   const state = makeState(props.study);
@@ -36,25 +36,7 @@ function Page(props: { study: Study }) {
   );
 }
 
-function start(): void {
-  const root = document.getElementById("page") as HTMLElement;
-  root.textContent = "";
-  try {
-    const study = readStudy(document.getElementById("topple-data")?.textContent ?? "null");
-    document.title = `${study.title || "Study"} – topple study`;
-    render(<Page study={study} />, root);
-  } catch (error) {
-    render(
-      <main class="study">
-        <section class="panel" role="alert" data-test="problem">
-          <h1>This study cannot be shown</h1>
-          <p>{error instanceof Error ? error.message : String(error)}</p>
-        </section>
-      </main>,
-      root,
-    );
-  }
-  document.documentElement.dataset["ready"] = "yes";
-}
-
-start();
+startPage("study", readStudy, (study) => {
+  document.title = `${study.title || "Study"} – topple study`;
+  return <Page study={study} />;
+}, "now");
