@@ -53,7 +53,10 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   };
 
   CLI::App* verb_new = app.add_subcommand("new", "Write a commented plan to begin with.");
-  verb_new->add_option("file", a.input, "file to write; an existing one is left alone")->required();
+  CLI::Option* new_file = verb_new->add_option("file", a.input, "file to write; an existing one is left alone");
+  verb_new->add_option("-o,--output", a.input, "the same")->excludes(new_file);
+  verb_new->add_option("--template", a.plan_template, "kind of structure, as --list shows them (frame)");
+  verb_new->add_flag("--list", a.list, "show the templates");
 
   CLI::App* check = app.add_subcommand("check", "Report everything that is wrong with a plan.");
   check->add_option("plan", a.input, "plan (TOML)")->required();
@@ -273,7 +276,13 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
     return code == 0 ? kOk : kBadInput;
   }
   using Verb = Arguments::Verb;
-  if (verb_new->parsed()) a.verb = Verb::New;
+  if (verb_new->parsed()) {
+    a.verb = Verb::New;
+    if (a.input.empty() && !a.list) {
+      std::cerr << "topple new: a file to write is required\nRun topple new --help for more information.\n";
+      return kBadInput;
+    }
+  }
   if (check->parsed()) a.verb = Verb::Check;
   if (run->parsed()) a.verb = Verb::Run;
   if (rules->parsed()) a.verb = Verb::Rules;

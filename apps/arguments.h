@@ -39,6 +39,8 @@ struct Arguments {
   std::string knowledge;  // file of rules, empty: built in
   std::string engine = "native";
   std::string unit;                        // of a drawing, as typed
+  std::string plan_template = "frame";     // of a new plan
+  bool list = false;                       // show the templates instead
   std::string markdown, json_file;         // files to write, empty: none
   std::string engines;                     // names between commas, empty: all
   std::string accuracy;                    // relative, as typed

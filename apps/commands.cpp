@@ -15,6 +15,7 @@
 #include "collapse/run.h"
 #include "mbs/model_json.h"
 #include "product/plan.h"
+#include "product/templates.h"
 #include "record/record.h"
 #include "results.h"
 #include "terminal.h"
@@ -219,11 +220,19 @@ int close_run(const record::Record& r, const Arguments& a, std::FILE* out, Files
 }
 
 int write_template(const Arguments& a) {
-  if (fs::exists(a.input)) {
-    std::fprintf(stderr, "%s exists already and is left as it is.\n", a.input.c_str());
-    return kBadInput;
+  if (a.list) {
+    for (const product::Template& t : product::templates())
+      std::printf("%-9s %s. %s\n", t.name.c_str(), t.title.c_str(), t.description.c_str());
+    return kOk;
   }
-  replace_file(a.input, product::plan_template());
+  try {
+    const product::Template& chosen = product::find_template(a.plan_template);
+    if (fs::exists(a.input)) {
+      std::fprintf(stderr, "%s exists already and is left as it is.\n", a.input.c_str());
+      return kBadInput;
+    }
+    replace_file(a.input, chosen.text);
+  } catch (const InputError& e) { return refuse(e, {}, {}, false); }
   std::printf("Wrote %s. Next: topple check %s\n", a.input.c_str(), a.input.c_str());
   return kOk;
 }

@@ -10,6 +10,7 @@
 #include "base/file.h"
 #include "base/hash.h"
 #include "collapse/edit_json.h"
+#include "product/templates.h"
 #include "record/page.h"
 #include "server/server.h"
 
@@ -183,7 +184,8 @@ Json Hub::list_plans() const {
 
 Json Hub::list_templates() {
   Json list = Json::array();
-  list.push_back({{"name", "frame"}, {"title", "A frame building with comments"}, {"text", product::plan_template()}});
+  for (const product::Template& t : product::templates())
+    list.push_back({{"name", t.name}, {"title", t.title}, {"description", t.description}, {"text", t.text}});
   return {{"templates", std::move(list)}};
 }
 
@@ -207,10 +209,8 @@ SessionPlan Hub::read_plan_of(const Json& command) const {
   }
   if (has(command, "template")) {
     const std::string name = read_text(command, "template");
-    const Json all = list_templates();
-    for (const Json& t : all["templates"])
-      if (t["name"] == name) return {t["title"], "", t["text"]};
-    throw InputError("E920", "there is no template \"" + name + "\"");
+    const product::Template& t = product::find_template(name);
+    return {t.title, "", t.text};
   }
   const std::string text = read_text(command, "text");
   if (text.size() > kMostText) throw InputError("E904", "the plan is too long");

@@ -109,6 +109,15 @@ new)
   expect 2 "$topple" new plan.toml; has err "exists already"
   has plan.toml mine
   expect 1 "$topple" new /proc/nowhere/plan.toml
+  expect 0 "$topple" new --list; has out "Frame building"
+  for name in $("$topple" new --list | cut -d' ' -f1); do
+    expect 0 "$topple" new --template "$name" -o "$name.toml"
+    cmp "$name.toml" "$source/examples/templates/$name.toml" || failures=$((failures + 1))
+    expect 0 "$topple" check "$name.toml"; has out "no errors, 0 warnings"
+  done
+  expect 2 "$topple" new --template fram -o none.toml; has err 'did you mean "frame"'
+  [ ! -e none.toml ] || { echo "a plan for nothing"; failures=$((failures + 1)); }
+  expect 2 "$topple" new --template frame; has err "a file to write is required"
   ;;
 fe)
   expect 0 "$topple" fe "$plan" --mesh-only --size "30 cm"; has out "553 elements"; has out "No face was moved"

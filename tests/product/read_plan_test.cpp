@@ -520,26 +520,6 @@ TEST(Mass, CountsEveryPieceOfConcreteOnce) {
   EXPECT_NEAR(mass("W-A1A2-0"), 1800 * 0.24 * ((4 - 0.5) * 2.4 - 1.2 * 2.1), 1e-9);
 }
 
-TEST(Template, PassesItsOwnCheckWithoutAWord) {
-  EXPECT_EQ(rendered(complaints_about(plan_template()), plan_template()), "");
-  const Plan plan = taken(plan_template());
-  EXPECT_EQ(plan.members.size(), 27u + 36u + 12u + 1u);
-  EXPECT_EQ(plan.stages.size(), 2u);
-}
-
-TEST(Template, ItsCommentedLinesAreLegalToo) {
-  // every "# key = value" and "# [[table]]" line switched on
-  std::string text, line;
-  std::istringstream lines(plan_template());
-  while (std::getline(lines, line)) {
-    const bool is_setting =
-        line.starts_with("# ") && (line.find(" = ") != std::string::npos || line.starts_with("# ["));
-    text += (is_setting ? line.substr(2) : line) + "\n";
-  }
-  EXPECT_NE(text, plan_template());
-  EXPECT_EQ(rendered(complaints_about(text), text), "");
-}
-
 // ------------------------------------------------------------------------------------------------ files and encodings
 
 class PlanFile : public testing::Test {
