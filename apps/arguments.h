@@ -31,6 +31,8 @@ struct Arguments {
     Worker,
     Steer,
     Replay,
+    Demo,
+    Doctor,
     Version
   };
   Verb verb = Verb::None;
@@ -38,6 +40,7 @@ struct Arguments {
   std::string output;     // folder or file
   std::string knowledge;  // file of rules, empty: built in
   std::string engine = "native";
+  std::string language = "en";             // of pages
   std::string unit;                        // of a drawing, as typed
   std::string plan_template = "frame";     // of a new plan
   bool list = false;                       // show the templates instead
@@ -57,6 +60,7 @@ struct Arguments {
   int threads = 1, frames = 0;
   std::string port;      // of the steering server, empty: a free one
   bool no_open = false;  // do not open the page
+  bool open = false;     // do (of verbs that do not by themselves)
   bool json = false, csv = false, no_report = false, report = false, verbose = false;
   bool bodies = false, skip_unsupported = false;
   bool vtk = false, gltf = false, adams = false;  // formats of an export, beside csv and json

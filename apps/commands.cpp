@@ -16,6 +16,7 @@
 #include "mbs/model_json.h"
 #include "product/plan.h"
 #include "product/templates.h"
+#include "record/page.h"
 #include "record/record.h"
 #include "results.h"
 #include "terminal.h"
@@ -147,7 +148,7 @@ Files write_files(const record::Record& r, const Arguments& a, bool& failed_repo
   }
   if (!a.no_report) {
     if (const auto bundle = find_bundle("report.html")) {
-      record::write_report(r, *bundle, in("report.html"));
+      record::write_page(record::to_report_json(r), *bundle, in("report.html"), a.language);
       files.emplace_back("report", in("report.html"));
     } else {
       std::fprintf(stderr, "%s\n", kNoBundle);
@@ -313,7 +314,7 @@ int write_report_file(const Arguments& a) {
       std::fprintf(stderr, "%s\n", kNoBundle);
       return kRunFailed;
     }
-    record::write_report(r, *bundle, a.output);
+    record::write_page(record::to_report_json(r), *bundle, a.output, a.language);
     std::printf("Wrote %s\n", a.output.c_str());
     return kOk;
   } catch (const InputError& e) { return refuse(e, {}, {}, false); }

@@ -24,5 +24,7 @@ int run_finite_elements(const Arguments&, const std::atomic<bool>& cancel);
 int steer(const Arguments&, const std::atomic<bool>& cancel);
 int replay_log(const Arguments&, const std::atomic<bool>& cancel);
 int run_worker(const Arguments&, const std::atomic<bool>& cancel);
+int run_demo(const Arguments&, const std::atomic<bool>& cancel);
+int examine(const Arguments&, const std::atomic<bool>& cancel);
 
 }  // namespace topple::apps

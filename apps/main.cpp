@@ -55,6 +55,10 @@ int dispatch(const topple::apps::Arguments& a) {
       return topple::apps::replay_log(a, cancel);
     case Arguments::Verb::Worker:
       return topple::apps::run_worker(a, cancel);
+    case Arguments::Verb::Demo:
+      return topple::apps::run_demo(a, cancel);
+    case Arguments::Verb::Doctor:
+      return topple::apps::examine(a, cancel);
     case Arguments::Verb::Version:
       std::puts("topple " TOPPLE_VERSION);
       return topple::apps::kOk;

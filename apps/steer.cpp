@@ -1,9 +1,6 @@
 // topple steer: the server of the steering page.
 
 #include <fmt/format.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <cstdio>
 #include <cstdlib>
@@ -12,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/file.h"
+#include "browser.h"
 #include "commands.h"
 #include "results.h"
 #include "server/server.h"
@@ -29,16 +27,6 @@ std::uint16_t read_port(const std::string& text) {
   if (*end != '\0' || port < 1 || port > 65535)
     throw InputError("E801", "--port \"" + text + "\" is no port", "1 to 65535; without --port a free one is taken");
   return static_cast<std::uint16_t>(port);
-}
-
-/// Shows the page where there is a desktop; nothing happens elsewhere.
-void open_browser(const std::string& url) {
-  if (std::getenv("DISPLAY") == nullptr && std::getenv("WAYLAND_DISPLAY") == nullptr) return;
-  std::string program = "xdg-open", address = url;
-  char* arguments[] = {program.data(), address.data(), nullptr};
-  pid_t child = 0;
-  if (posix_spawnp(&child, "xdg-open", nullptr, nullptr, arguments, environ) == 0)
-    std::thread([child] { waitpid(child, nullptr, 0); }).detach();
 }
 
 }  // namespace

@@ -56,7 +56,7 @@ std::string words_of(const StudyState& s) {
 
 /// Files of results and the page, into a folder; tells which. `source` is the file that was studied.
 void write_all(std::FILE* out, const std::string& folder, const study::Problem& p, const StudyResult& r,
-               const std::string& source, const std::string& source_name) {
+               const std::string& source, const std::string& source_name, const std::string& language) {
   for (const std::string& path : study::write_results(folder, p, r)) std::fprintf(out, "wrote %s\n", path.c_str());
   const auto bundle = find_bundle("study.html");
   if (!bundle) {
@@ -64,8 +64,8 @@ void write_all(std::FILE* out, const std::string& folder, const study::Problem& 
     return;
   }
   const std::string path = (std::filesystem::path(folder) / "study.html").string();
-  record::write_page(study::to_page_json(p, r, {TOPPLE_VERSION, record::now_utc(), source, source_name}), *bundle,
-                     path);
+  record::write_page(study::to_page_json(p, r, {TOPPLE_VERSION, record::now_utc(), source, source_name}), *bundle, path,
+                     language);
   std::fprintf(out, "wrote %s\n", path.c_str());
 }
 
@@ -116,7 +116,7 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
   std::FILE* out = a.json ? stderr : stdout;
   print_study(out, problem, r);
   std::fprintf(out, "\n");
-  write_all(out, a.output, problem, r, text, a.input);
+  write_all(out, a.output, problem, r, text, a.input, a.language);
   if (!r.is_finished) {
     std::fprintf(stderr, "Interrupted. The same command goes on with the study.\n");
     return kRunFailed;
@@ -139,7 +139,7 @@ int run_study_command(const Arguments& a, const std::atomic<bool>& cancel) {
       const std::string folder = a.output.empty() ? a.input : a.output;
       make_folder(folder);
       const nlohmann::json definition = nlohmann::json::parse(row->definition);
-      write_all(stdout, folder, problem, r, definition.value("text", ""), definition.value("file", ""));
+      write_all(stdout, folder, problem, r, definition.value("text", ""), definition.value("file", ""), a.language);
     } else if (a.json) {
       std::fputs(study::write_results_json(problem, r).c_str(), stdout);
     } else {

@@ -10,6 +10,7 @@ namespace topple::record {
 namespace {
 
 constexpr std::string_view marker = "<!--TOPPLE-DATA-->";
+constexpr std::string_view language_mark = "<html lang=\"en\">";  // the page chooses its words by it
 
 /// A "<" can only stand inside a JSON string; written as an escape, no text of a plan can close or open a tag.
 std::string escape_for_html(const std::string& text) {
@@ -25,7 +26,7 @@ std::string escape_for_html(const std::string& text) {
 
 }  // namespace
 
-std::string make_page(const std::string& data, const std::string& bundle) {
+std::string make_page(const std::string& data, const std::string& bundle, const std::string& language) {
   const std::size_t at = bundle.find(marker);
   if (at == std::string::npos || bundle.find(marker, at + 1) != std::string::npos)
     throw std::runtime_error("the page to fill must hold the marker " + std::string(marker) + " once");
@@ -35,11 +36,14 @@ std::string make_page(const std::string& data, const std::string& bundle) {
   filled += escape_for_html(data);
   filled += "</script>";
   filled += page.substr(at + marker.size());
+  if (const std::size_t tag = filled.find(language_mark); tag < at && language != "en")
+    filled.replace(tag, language_mark.size(), "<html lang=\"" + language + "\">");
   return filled;
 }
 
-void write_page(const std::string& data, const std::string& bundle, const std::string& path) {
-  replace_file(path, make_page(data, bundle));
+void write_page(const std::string& data, const std::string& bundle, const std::string& path,
+                const std::string& language) {
+  replace_file(path, make_page(data, bundle, language));
 }
 
 }  // namespace topple::record

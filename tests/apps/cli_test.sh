@@ -381,6 +381,109 @@ rcc)
   expect 2 "$topple" rcc "$building" --member C-D1; has err 'did you mean "C-D1-0"?'
   expect 2 "$topple" rcc "$building" --member S-A1B2-0; has err "neither a column nor a beam"
   ;;
+doctor)
+  expect 0 "$topple" doctor; has out "topple "; has out "Engines"; has out "native"; has out "Vector instructions"
+  has out "Pendulum"; has out "expected 2.36784195"; has out "checks are ok"; lacks out "FAILED"; lacks out $'\x1b'
+  expect 0 "$topple" doctor --json; is_json out
+  python3 - out <<'PY' || failures=$((failures + 1))
+import json, sys
+d = json.load(open(sys.argv[1]))
+assert d["exit_code"] == 0 and len(d["checks"]) >= 9, d
+for c in d["checks"]:
+    assert c["ok"] and c["numbers"], c
+    for n in c["numbers"]:
+        assert abs(n["got"] - n["expected"]) <= n["tolerance"], n
+assert sum(c["seconds"] for c in d["checks"]) > 0
+PY
+  # files cannot be written: the checks that need them fail, the others are done
+  expect 1 env TMPDIR="$work/nowhere" "$topple" doctor
+  has out "FAILED  Record written"; has out "FAILED  Study written"; has out "2 of"; has out "do not trust"; has out "ok      Pendulum"
+  expect 1 env TMPDIR="$work/nowhere" "$topple" doctor --json; is_json out; has out '"exit_code": 1'
+  ;;
+demo)
+  expect 2 "$topple" demo here; expect 1 "$topple" demo -o /proc/nowhere
+  "$topple" demo -o a >out 2>err; code=$?
+  [ $code -eq 0 ] || [ $code -eq 3 ] || { echo "exit code $code"; head out err; failures=$((failures + 1)); }
+  has out "Weida"; has out "Mechanism"; has out "What next"; has out "topple steer a/plan.toml"; exists a/record.h5
+  cmp a/plan.toml "$source/examples/weida/plan.toml" || failures=$((failures + 1))
+  [ ! -s "$source/web/dist/report.html" ] || { exists a/report.html; has out "open a/report.html"; }
+  echo "# mine" >>a/plan.toml
+  expect 2 "$topple" demo -o a; has err "is not the demo's plan any more"; has a/plan.toml "# mine"
+  ;;
+completion)
+  expect 0 "$topple" completion bash; cp out topple.bash; bash -n topple.bash || failures=$((failures + 1))
+  cat >ask.bash <<'SH'
+source "$1"
+# ask WORDS...: what is offered for the last word
+ask() { COMP_WORDS=("$@") COMP_CWORD=$(($# - 1)); COMPREPLY=(); _topple; printf '%s\n' "${COMPREPLY[@]}"; }
+SH
+  # offers "WORDS" WANTED...: all of these and nothing else if the first is "only"
+  offers() {
+    local words=$1 only=; shift
+    [ "$1" = only ] && { only=1; shift; }
+    bash -c 'source ask.bash topple.bash; shift; ask "$@"' _ topple.bash $words | sort >got
+    [ "${words: -1}" != " " ] || bash -c 'source ask.bash topple.bash; shift; ask "$@" ""' _ topple.bash $words | sort >got
+    for want in "$@"; do grep -qxF -- "$want" got || { echo "\"$words\" does not offer $want, but: $(tr '\n' ' ' <got)"; failures=$((failures + 1)); }; done
+    [ -z "$only" ] || [ "$(grep -c . got)" -eq $# ] || { echo "\"$words\" offers more: $(tr '\n' ' ' <got)"; failures=$((failures + 1)); }
+  }
+  mkdir folder; echo >plan.toml
+  offers "topple " run check doctor demo steer study
+  offers "topple ru" only run rules
+  offers "topple mbs " only run compare verify
+  offers "topple run --fr" only
+  offers "topple mbs run --fr" only --frame-rate
+  offers "topple run --j" only --json
+  offers "topple run pl" only plan.toml
+  offers "topple run plan.toml -o fo" only folder
+  offers "topple rcc plan.toml --zone " only foot top start end
+  offers "topple rcc plan.toml --zone = t" only top
+  offers "topple completion " only bash zsh fish
+  offers "topple study " show export plan.toml
+  offers "topple study show " plan.toml folder
+  expect 0 "$topple" completion zsh; cp out _topple
+  if command -v zsh >/dev/null; then
+    zsh -n _topple || failures=$((failures + 1))
+    zsh -f -c 'autoload -U compinit; compinit -D -u; source ./_topple; (( $+functions[_topple] )) && [[ $_comps[topple] == _topple ]]' ||
+      { echo "zsh does not take its script"; failures=$((failures + 1)); }
+  fi
+  expect 0 "$topple" completion fish; cp out topple.fish
+  if command -v fish >/dev/null; then
+    HOME=$work fish --no-execute topple.fish || failures=$((failures + 1))
+    HOME=$work fish -N -c 'source topple.fish; complete -C "topple mbs run --fr"; complete -C "topple rcc p --zone t"; complete -C "topple doc"' >got
+    has got "--frame-rate"; has got "top"; has got "doctor"; lacks got "verify"
+  fi
+  expect 2 "$topple" completion csh
+  ;;
+manual)
+  expect 0 "$topple" manual; cp out topple.1
+  if command -v man >/dev/null; then
+    MANWIDTH=100 man --warnings -l topple.1 >page 2>err || failures=$((failures + 1))
+    [ ! -s err ] || { cat err; failures=$((failures + 1)); }
+    has page "topple mbs run"; has page "EXIT STATUS"
+  fi
+  if command -v mandoc >/dev/null; then mandoc -T lint -W warning topple.1 >err || { cat err; failures=$((failures + 1)); }; fi
+  ;;
+examples)
+  # the examples of --help, in one folder: what takes seconds at most is run, the rest is read (arguments_test.cpp)
+  cp "$source/examples/rcc/zone_I.toml" section.toml
+  { cat "$source/examples/rcc/zone_I_fuzzy.toml"; printf '[search]\nlevels = [0, 1]\nsamples = 200\n'; } >fuzzy.toml
+  printf '%s\n' 0 SECTION 2 ENTITIES 0 LWPOLYLINE 8 Houses 70 1 10 20 20 0 10 30 20 0 10 30 20 9 0 ENDSEC 0 EOF >site.dxf
+  ran=0
+  run_examples() {
+    "$topple" "$@" --help | sed -n '/^Examples:/,$p' | grep '^  topple ' | sed 's/   .*//; s/^ *topple //' >lines || true
+    while read -r line; do
+      case $line in
+      *ifc* | *simbody* | *postgresql* | *evaluator* | "mbs compare model.json"* | "demo --open"* | *--open* | "fe plan.toml --size"* | *--resume* ) continue ;;
+      esac
+      eval "\"$topple\" $line" >said 2>complaints </dev/null; code=$?
+      [ $code -eq 0 ] || [ $code -eq 3 ] || { echo "exit code $code: topple $line"; head -5 said complaints; failures=$((failures + 1)); }
+      ran=$((ran + 1))
+    done <lines
+  }
+  for verb in new check run rules report export compare rcc "mbs run" "mbs compare" fe import completion manual version doctor; do run_examples $verb; done
+  [ $ran -ge 20 ] || { echo "only $ran examples ran"; failures=$((failures + 1)); }
+  exists model.adm; exists zone/rcc.json; exists both/compare.json
+  ;;
 *) echo "no case $case_name"; failures=1 ;;
 esac
 exit $((failures > 0))
