@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "base/error.h"
 #include "base/parallel.h"
@@ -18,21 +19,46 @@ struct Row {
   double largest() const { return *std::max_element(moment.begin(), moment.end()); }
 };
 
-/// Moments of a row at rotations that rise, constant beyond its ends.
+/// Moments of a row at rotations that are asked for in rising order, constant beyond its ends.
+class Reader {
+ public:
+  explicit Reader(const Row& row) : x_(row.rotation), m_(row.moment) {}
+  double operator()(double phi) {
+    while (i_ < x_.size() && x_[i_] < phi) ++i_;
+    if (phi <= x_.front()) return m_.front();
+    if (i_ >= x_.size()) return m_.back();
+    const double s = (phi - x_[i_ - 1]) / (x_[i_] - x_[i_ - 1]);
+    return m_[i_ - 1] + s * (m_[i_] - m_[i_ - 1]);
+  }
+  /// The row's own rotation that follows the one asked for last, infinite behind its end.
+  double find_next(double phi) const {
+    size_t i = i_;
+    while (i < x_.size() && x_[i] <= phi) ++i;
+    return i < x_.size() ? x_[i] : std::numeric_limits<double>::infinity();
+  }
+
+ private:
+  const std::vector<double>&x_, &m_;
+  size_t i_ = 0;
+};
+
+/// Moments of a row at rotations that rise.
 std::vector<double> sample(const Row& row, const std::vector<double>& rotation) {
   std::vector<double> out;
   out.reserve(rotation.size());
-  size_t i = 1;
-  for (const double phi : rotation) {
-    while (i < row.rotation.size() && row.rotation[i] < phi) ++i;
-    if (i >= row.rotation.size() || phi <= row.rotation.front()) {
-      out.push_back(phi <= row.rotation.front() ? row.moment.front() : row.moment.back());
-      continue;
-    }
-    const double s = (phi - row.rotation[i - 1]) / (row.rotation[i] - row.rotation[i - 1]);
-    out.push_back(row.moment[i - 1] + s * (row.moment[i] - row.moment[i - 1]));
-  }
+  Reader at(row);
+  for (const double phi : rotation) out.push_back(at(phi));
   return out;
+}
+
+/// Moment of a row, constant beyond its ends.
+double calc_moment(const Row& row, double phi) {
+  const std::vector<double>&x = row.rotation, &m = row.moment;
+  if (phi <= x.front()) return m.front();
+  const auto above = std::lower_bound(x.begin(), x.end(), phi);
+  if (above == x.end()) return m.back();
+  const size_t i = static_cast<size_t>(above - x.begin());
+  return m[i - 1] + (phi - x[i - 1]) / (x[i] - x[i - 1]) * (m[i] - m[i - 1]);
 }
 
 /// All rotations of some rows below `last`, rising, and `last`.
@@ -103,11 +129,11 @@ std::map<double, Row> make_rows(const nearfield::MomentFamily& family, double EI
   for (const double N : family.normal_force) rows.emplace(N, make_row(family, N, EI, length, begin));
   const auto departs = [tolerance](const Row& a, const Row& b, const Row& middle) {
     const double most = tolerance * middle.largest();
-    const double last = std::max({a.rotation.back(), b.rotation.back(), middle.rotation.back()});
-    const std::vector<double> at = merge_rotations({&a, &b, &middle}, last);
-    const std::vector<double> m = sample(middle, at), from = sample(a, at), to = sample(b, at);
-    for (size_t j = 0; j < at.size(); ++j)
-      if (std::abs(0.5 * (from[j] + to[j]) - m[j]) > most) return true;
+    Reader from(a), to(b), at(middle);
+    // all three are straight between their own rotations
+    for (double phi = 0; std::isfinite(phi);
+         phi = std::min({from.find_next(phi), to.find_next(phi), at.find_next(phi)}))
+      if (std::abs(0.5 * (from(phi) + to(phi)) - at(phi)) > most) return true;
     return false;
   };
   const auto refine = [&](const auto& self, double from, double to, int depth) -> void {
@@ -142,35 +168,65 @@ std::vector<double> sample(const std::map<double, Row>& rows, double N, const st
 /// `last`: every interval is cut where a row departs most (Ramer, Douglas & Peucker, all rows at once).
 std::vector<double> find_rotations(const std::vector<const Row*>& rows, double last, double tolerance) {
   const std::vector<double> all = merge_rotations(rows, last);
-  // Rows as shares of their largest moment.
-  std::vector<std::vector<double>> value;
+  // Rows as shares of their largest moment. Between its own rotations a row is straight, so it departs most from a
+  // chord beside one of them.
+  struct Bend {
+    size_t at;  // into all rotations
+    double rotation, share;
+  };
+  struct Shares {
+    const Row* row;
+    double most;
+    std::vector<Bend> bends;
+  };
+  std::vector<Shares> shares;
   for (const Row* r : rows) {
     const double most = r->largest();
     if (!(most > 0)) continue;
-    value.push_back(sample(*r, all));
-    for (double& v : value.back()) v /= most;
+    Shares& to = shares.emplace_back(Shares{r, most, {}});
+    Reader at(*r);
+    size_t j = 0, next = 0;
+    for (const double x : r->rotation) {
+      while (j + 1 < all.size() && all[j] < x) ++j;
+      for (size_t i = std::max(next, all[j] == x || j == 0 ? j : j - 1); i <= j; next = ++i)
+        to.bends.push_back({i, all[i], at(all[i]) / most});
+    }
   }
-  std::vector<char> kept(all.size(), 0);
-  kept.front() = kept.back() = 1;
-  std::vector<std::pair<size_t, size_t>> open{{0, all.size() - 1}};
+  // points that are kept, with the shares of all rows there
+  struct Point {
+    size_t at;
+    std::vector<double> share;
+  };
+  std::vector<Point> points;
+  const auto keep = [&](size_t at) {
+    Point& to = points.emplace_back(Point{at, {}});
+    for (const Shares& row : shares) to.share.push_back(calc_moment(*row.row, all[at]) / row.most);
+    return points.size() - 1;
+  };
+  const size_t first = keep(0), last_point = keep(all.size() - 1);
+  std::vector<std::pair<size_t, size_t>> open{{first, last_point}};
   while (!open.empty()) {
-    const auto [a, b] = open.back();
+    const auto [begin, end] = open.back();
     open.pop_back();
+    const size_t a = points[begin].at, b = points[end].at;
     double worst = tolerance;
     size_t where = 0;
-    for (const std::vector<double>& v : value) {
-      const double slope = (v[b] - v[a]) / (all[b] - all[a]);
-      for (size_t j = a + 1; j < b; ++j)
-        if (const double off = std::abs(v[j] - v[a] - slope * (all[j] - all[a])); off > worst) worst = off, where = j;
+    for (size_t r = 0; r < shares.size(); ++r) {
+      const double start = points[begin].share[r], slope = (points[end].share[r] - start) / (all[b] - all[a]);
+      auto bend = std::upper_bound(shares[r].bends.begin(), shares[r].bends.end(), a,
+                                   [](size_t at, const Bend& x) { return at < x.at; });
+      for (; bend != shares[r].bends.end() && bend->at < b; ++bend)
+        if (const double off = std::abs(bend->share - start - slope * (bend->rotation - all[a])); off > worst)
+          worst = off, where = bend->at;
     }
     if (where == 0) continue;
-    kept[where] = 1;
-    open.emplace_back(a, where);
-    open.emplace_back(where, b);
+    const size_t middle = keep(where);
+    open.emplace_back(begin, middle);
+    open.emplace_back(middle, end);
   }
   std::vector<double> out;
-  for (size_t j = 0; j < all.size(); ++j)
-    if (kept[j]) out.push_back(all[j]);
+  for (const Point& p : points) out.push_back(all[p.at]);
+  std::sort(out.begin(), out.end());
   return out;
 }
 
