@@ -14,7 +14,6 @@ namespace {
 using namespace kernel;
 
 constexpr size_t kBlocksForThreads = 256;  // below, waking threads costs more than they save
-constexpr double kNearBounds = 0.9;        // of the safe bounds
 constexpr size_t kChunk = 32;              // blocks a thread takes at once
 
 /// Spring behind the damper of a slot times the stiffness.
@@ -112,6 +111,7 @@ void System::pack_element(size_t e, bool has_moved) {
   put(kStation, c.zone.x[0]), put(kStation + 1, c.zone.x[c.zone.stations > 1 ? 1 : 0]);
   put(kMostTurn, kLargestTurn);
   put(kTorsionScale, 0);
+  const bool has_flow = l.field(slot, kFlows) > 0;  // its constants are there
   put(kFlows, 0);
   const bool free = c.zone.stations == 0;
   double fields[kFlowFields];
@@ -123,7 +123,22 @@ void System::pack_element(size_t e, bool has_moved) {
   put(kMostForce, !bounded ? -1 : free ? kUnlimited : z.safe_force[1]);
   if (!bounded && !flows) return;
   if (flows) {
-    for (int f = 0; f < kFlowFields; ++f) l.flow(slot, f) = fields[f];
+    const auto copy = [&](int from, int to) {
+      for (int f = from; f < to; ++f) l.flow(slot, f) = fields[f];
+    };
+    if (has_flow) {
+      copy(kAxial, kShearOwn), copy(kSlipped, kSlipped + 1), copy(kTwisted, kTwisted + 1), copy(kBefore, kStations);
+      for (int station = 0; station < c.zone.stations; ++station) {
+        const int at = kStations + station * kStationFields;
+        copy(at + kPhi, at + kCell);
+        const int law = z.base_law < 0 ? c.zone.law[station] : z.base_law;
+        for (int q = 0; q < 2; ++q)
+          if (laws[static_cast<size_t>(law)].moment[q].K > 0)
+            copy(at + kCell + q * kCellFields, at + kCell + (q + 1) * kCellFields);
+      }
+    } else {
+      copy(0, kFlowFields);
+    }
     put(kFlows, 1);
     z.safe_force[0] = 1, z.safe_force[1] = -1;  // void as soon as it flows
   } else {
@@ -271,7 +286,15 @@ void System::evaluate_element(size_t i, double h) {
 void System::evaluate_outside(size_t slot) {
   const size_t e = lanes->is_batch ? slot / lanes->W : lanes->element_of[slot];
   unpack_element(e);
+  const double axial = state.element[e].axial;
   evaluate_element(e, step);
+  if (state.element[e].live && state.element[e].axial != axial) {
+    // what flows axially will do so in the next step: the full law keeps it
+    lanes->set(slot, kFlows, 0);
+    lanes->set(slot, kLeastForce, 1);
+    lanes->set(slot, kMostForce, -1);
+    return;
+  }
   pack_element(e, false);
 }
 

@@ -114,18 +114,32 @@ HWY_INLINE Poses<D> gather(const ElementJob& job, const std::uint32_t* HWY_RESTR
           {take(job.q, 0, at_q), take(job.q, 1, at_q), take(job.q, 2, at_q), take(job.q, 3, at_q)}};
 }
 
-/// a^(-2/3) of 1 <= a <= kMostOver by Newton's method on a² y³ = 1.
-constexpr double kMostOver = 4;
+/// a^(-2/3) of 1 <= a <= kMostOver by Newton's method on a² y³ = 1, powers of 8 taken out.
+constexpr double kMostOver = 0x1p93;
 template <class D>
 HWY_INLINE Num<D> inverse_root(Num<D> a) {
-  const Num<D> a2 = a * a, third = num<D>(1.0 / 3), four_thirds = num<D>(4.0 / 3);
+  const D d;
+  const Num<D> third = num<D>(1.0 / 3), four_thirds = num<D>(4.0 / 3);
+  Num<D> scale = num<D>(1);
+  if (HWY_UNLIKELY(!hn::AllFalse(d, hn::Ge(a.v, hn::Set(d, 8.0))))) {
+    constexpr double powers[5][2] = {
+        {0x1p48, 0x1p-32}, {0x1p24, 0x1p-16}, {0x1p12, 0x1p-8}, {0x1p6, 0x1p-4}, {0x1p3, 0x1p-2}};
+    for (const auto& power : powers) {
+      const auto above = hn::Ge(a.v, hn::Set(d, power[0]));
+      a = select(above, num<D>(1 / power[0]) * a, a);
+      scale = select(above, num<D>(power[1]) * scale, scale);
+    }
+  }
+  const Num<D> a2 = a * a;
   Num<D> y = num<D>(1) / fma(num<D>(2.0 / 3), a, third);
   for (int i = 0; i < 6; ++i) {
     const Num<D> y2 = y * y;
     y = y * fnma(third * a2, y2 * y, four_thirds);
   }
-  return y;
+  return scale * y;
 }
+
+constexpr double kNear = 0.854;  // kNearBounds to the power of the biaxial bound
 
 /// A bending plane of a zone: about y with shear along z (sign +1), or about z with shear along y (sign -1).
 template <class D>
@@ -344,7 +358,9 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
   }
 
   M flowed = hn::Or(bends, hn::Or(slides, twists));
-  const N idle = select(flowed, zero, load<D>(flow, kIdle) + one);
+  // near its limits a zone would be sent back at once
+  const M near = hn::Or(hn::Ge(at[0].sum.v, hn::Set(tag, kNear)), hn::Ge(at[1].sum.v, hn::Set(tag, kNear)));
+  const N idle = select(hn::Or(flowed, near), zero, load<D>(flow, kIdle) + one);
   demand(hn::Lt(idle.v, hn::Set(tag, kLongestIdle)));
   flowed = hn::And(good, flowed);
   const M turned = hn::And(good, bends);

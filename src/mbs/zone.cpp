@@ -664,7 +664,24 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
     if (flowed || z.next_law >= 0) {
       z.safe_force[0] = 1, z.safe_force[1] = -1;
     } else if (!(force[0] >= z.safe_force[0] && force[0] <= z.safe_force[1])) {
-      find_safe_bounds(p, laws, limits, force[0], z);
+      // bounds are the least limits around this force: none that are far enough away can be found near the limits here
+      bool is_near = !p.external_axial;
+      for (int s = 0; s < n; ++s) is_near = is_near && station_limits[s].law().biaxial_exponent == 1.5;
+      if (is_near) {
+        double used = 0;
+        for (int s = 0; s < n; ++s) {
+          double sum = 0;
+          for (int q = 0; q < 2; ++q)
+            sum += std::abs(m[q][s]) / std::max(std::min(most[q][s].positive, most[q][s].negative), kTiny);
+          used = std::max(used, sum);
+        }
+        is_near = used > kNearBounds;
+      }
+      if (is_near) {
+        z.safe_force[0] = 1, z.safe_force[1] = -1;
+      } else {
+        find_safe_bounds(p, laws, limits, force[0], z);
+      }
     }
   }
 
@@ -790,6 +807,15 @@ bool write_flow(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, c
     }
   }
   const CompiledLaw& law = limits.law();
+  // where little compression is left at the end of the cell, it is asked again before
+  const double reached = std::max(z.station[0].reached, z.station[1].reached);
+  if (far > reached && limits.compression(far, z.shortened, whole) < limits.compression(reached, z.shortened, whole)) {
+    far = reached + 0.25 * (far - reached);
+    for (int s = 0; s < p.stations; ++s) {
+      double& rupture = out[kStations + s * kStationFields + kRupture];
+      rupture = std::min(rupture, far);
+    }
+  }
   out[kFlowLeast] = -limits.compression(far, z.shortened, whole);
   out[kFlowMost] = limits.tension(z.elongated);
   for (int axis = 0; axis < 2; ++axis)

@@ -124,6 +124,8 @@ void advance_zone(const ZoneParameters&, const std::vector<CompiledLaw>&, const 
 inline bool is_bounded(const ZoneState& z, bool unlimited) {
   return z.live && z.has_elastic && z.next_law < 0 && (unlimited || z.safe_force[0] <= z.safe_force[1]);
 }
+/// Share of its bounds from which on a zone is better served by the law itself.
+inline constexpr double kNearBounds = 0.9;
 /// Largest demand over the safe bounds of a bounded zone at its last evaluation, moments added; 0 without limits.
 double calc_bound_utilisation(const ZoneParameters&, const ZoneState&);
 /// Writes what the kernel needs to let a zone flow in bending, kernel::kFlowFields values; false if it cannot: a law on
