@@ -57,6 +57,19 @@ HWY_INLINE void find_all_lows(const LowJob& job) {
 }
 
 template <class D>
+HWY_INLINE void find_all_ways(const WayJob& job) {
+  const size_t W = hn::Lanes(D());
+  const V3<D> frame{load<D>(job.x, 0), load<D>(job.y, 0), load<D>(job.z, 0)};
+  const Num<D> h = load<D>(job.h, 0);
+  const auto norm = [](const V3<D>& x) -> Num<D> { return {hn::Sqrt(dot(x, x).v)}; };
+  for (size_t block = 0; block < job.blocks; ++block) {
+    const V3<D> v = load3<D>(job.v + 3 * W * block, 0), w = load3<D>(job.w + 3 * W * block, 0);
+    const V3<D> seen{v.x - frame.x, v.y - frame.y, v.z - frame.z};
+    store<D>(h * fma(norm(w), load<D>(job.reach + W * block, 0), norm(seen)), job.way + W * block, 0);
+  }
+}
+
+template <class D>
 HWY_INLINE void read_block(const TouchJob& job, size_t block) {
   const size_t W = hn::Lanes(D());
   double* to = job.touched + block * kTouchedFields * W;
@@ -363,6 +376,8 @@ HWY_INLINE void each_block(const Job& job, Work work) {
 }
 void find_lows_here(const LowJob& job) { find_all_lows<Wide>(job); }
 void find_lows_singly_here(const LowJob& job) { find_all_lows<One>(job); }
+void find_ways_here(const WayJob& job) { find_all_ways<Wide>(job); }
+void find_ways_singly_here(const WayJob& job) { find_all_ways<One>(job); }
 void read_touched_here(const TouchJob& job) { each_block(job, read_block<Wide>); }
 void update_touched_here(const TouchJob& job) { each_block(job, update_block<Wide>); }
 void press_contacts_here(const ContactJob& job) { each_block(job, press_block<Wide>); }
@@ -378,6 +393,8 @@ namespace topple::mbs::kernel {
 
 HWY_EXPORT(find_lows_here);
 HWY_EXPORT(find_lows_singly_here);
+HWY_EXPORT(find_ways_here);
+HWY_EXPORT(find_ways_singly_here);
 HWY_EXPORT(read_touched_here);
 HWY_EXPORT(update_touched_here);
 HWY_EXPORT(press_contacts_here);
@@ -386,6 +403,8 @@ HWY_EXPORT(rub_contacts_here);
 
 void find_lows(const LowJob& job) { HWY_DYNAMIC_DISPATCH(find_lows_here)(job); }
 void find_lows_singly(const LowJob& job) { HWY_DYNAMIC_DISPATCH(find_lows_singly_here)(job); }
+void find_ways(const WayJob& job) { HWY_DYNAMIC_DISPATCH(find_ways_here)(job); }
+void find_ways_singly(const WayJob& job) { HWY_DYNAMIC_DISPATCH(find_ways_singly_here)(job); }
 void read_touched(const TouchJob& job) { HWY_DYNAMIC_DISPATCH(read_touched_here)(job); }
 void update_touched(const TouchJob& job) { HWY_DYNAMIC_DISPATCH(update_touched_here)(job); }
 void press_contacts(const ContactJob& job) { HWY_DYNAMIC_DISPATCH(press_contacts_here)(job); }

@@ -81,6 +81,17 @@ struct LowJob {
 void find_lows(const LowJob&);
 void find_lows_singly(const LowJob&);
 
+/// How far the farthest points of bodies have come in a motion, at most, seen from a frame that moves.
+struct WayJob {
+  size_t blocks = 0;            // of bodies
+  const double *v, *w;          // 3, 3 fields a block
+  const double* reach;          // radius of the shapes about the centre of mass (W a block) [m]
+  const double *x, *y, *z, *h;  // the frame's velocity; the step (W)
+  double* way;                  // (W a block) [m]
+};
+void find_ways(const WayJob&);
+void find_ways_singly(const WayJob&);
+
 /// Bodies of a run, seen from the touched ones.
 struct TouchJob {
   size_t blocks = 0;                       // of touched bodies

@@ -97,16 +97,17 @@ void Course::pass_quiet() {
 bool Course::is_at_rest() {
   State& state = s_.state;
   if (s_.options.rest_speed <= 0 || state.time <= last_event_) return false;
-  double fastest2 = 0, twice_kinetic = 0, mass = 0;
-  for (size_t b = 0; b < s_.B; ++b) {
+  const double limit2 = s_.options.rest_speed * s_.options.rest_speed;
+  bool quiet = true;
+  double twice_kinetic = 0, mass = 0;
+  for (size_t b = 0; b < s_.B && quiet; ++b) {
     if (s_.fixed[b]) continue;
     const Vec3 v = state.v[b], w = state.w[b];
-    fastest2 = std::max(fastest2, dot(v, v));
+    quiet = dot(v, v) < 625 * limit2;
     twice_kinetic += state.body[b].mass * dot(v, v) + dot(w, state.L[b]);
     mass += state.body[b].mass;
   }
-  const double limit2 = s_.options.rest_speed * s_.options.rest_speed;
-  const bool quiet = twice_kinetic < limit2 * mass && fastest2 < 625 * limit2;
+  quiet = quiet && twice_kinetic < limit2 * mass;
   state.quiet_steps = quiet ? state.quiet_steps + 1 : 0;
   return state.quiet_steps >= std::max(1L, static_cast<long>(s_.options.rest_time / s_.step));
 }

@@ -33,13 +33,17 @@ void Lanes::allocate_bodies(size_t bodies) {
   body_constants.assign(body_blocks * kernel::kBodyFields * W, 0);
   bounds.assign(body_blocks * 6 * W, 0);
   low.assign(body_blocks * W, 0);
+  reach.assign(body_blocks * W, 0);
+  way.assign(body_blocks * W, 0);
   // idle lanes and the ground keep a valid orientation
   for (size_t block = 0; block < body_blocks; ++block)
     for (size_t l = 0; l < W; ++l) {
       q[block * 4 * W + l] = 1;
       for (size_t i = 0; i < 3; ++i) R[(block * 9 + 4 * i) * W + l] = 1;
     }
-  for (AlignedVector<double>* x : {&kick, &h, &gx, &gy, &gz, &sum, &nx, &ny, &nz, &offset}) x->assign(W, 0);
+  for (AlignedVector<double>* x :
+       {&kick, &h, &gx, &gy, &gz, &sum, &nx, &ny, &nz, &offset, &search_x, &search_y, &search_z})
+    x->assign(W, 0);
 }
 
 void Lanes::allocate_elements(size_t elements) {
@@ -183,6 +187,16 @@ void Lanes::find_lows() {
     kernel::find_lows(job);
   } else {
     kernel::find_lows_singly(job);
+  }
+}
+
+void Lanes::find_ways() {
+  const kernel::WayJob job{body_blocks,     v.data(),        w.data(), reach.data(), search_x.data(),
+                           search_y.data(), search_z.data(), h.data(), way.data()};
+  if (W == kernel::lanes()) {
+    kernel::find_ways(job);
+  } else {
+    kernel::find_ways_singly(job);
   }
 }
 

@@ -29,6 +29,7 @@ struct Lanes {
   // bodies, the ground behind the last one
   AlignedVector<double> p, v, L, w, q, R, force, torque, joint_force, joint_torque, body_constants;
   AlignedVector<double> bounds, low;  // boxes around the shapes in B, and how low they reach (kernel::LowJob)
+  AlignedVector<double> reach, way;   // radius of a body's shapes, and its farthest point's way in a step (WayJob)
   Pairs pairs;
   // elements
   AlignedVector<double> states, flows, element_forces;
@@ -42,7 +43,8 @@ struct Lanes {
   size_t live_elements = 0, used_slots = 0;                        // one run
   // one value a lane
   AlignedVector<double> kick, h, gx, gy, gz, sum;
-  AlignedVector<double> nx, ny, nz, offset;  // of the ground
+  AlignedVector<double> nx, ny, nz, offset;            // of the ground
+  AlignedVector<double> search_x, search_y, search_z;  // State::search_velocity
   // reports of the kernel
   std::vector<std::uint32_t> outside, spins;
 
@@ -92,6 +94,8 @@ struct Lanes {
   void close_pairs();
   /// How low bodies reach above the ground.
   void find_lows();
+  /// Ways of the bodies' farthest points in the last motion.
+  void find_ways();
   /// Forces of the elements in blocks [first, last).
   void evaluate_elements(size_t first, size_t last, std::vector<std::uint32_t>& beyond);
   /// Forces of the elements on every body; batch only.

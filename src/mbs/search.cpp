@@ -20,17 +20,15 @@ constexpr long kSearchPause = 80;         // steps between searches that breaks 
 
 void System::add_travel(double h) {
   State& s = state;
-  const State& now = state;
   s.travel.resize(B);
   s.allowance.resize(B);
   s.is_fast.resize(B);
   bool is_far = false;
   double most[2] = {0, 0};
+  const LaneLayout layout = lanes->body_layout(lane);
   for (size_t b = 0; b < B && model.contact.bodies; ++b) {
     // the drift before this evaluation was by the speeds of half a step ago
-    const Vec3 v = now.v[b] - s.search_velocity;
-    const double turn = fixed[b] ? 0 : norm(now.w[b]) * s.body[b].radius;
-    const double way = h * (norm(v) + turn);
+    const double way = h > 0 ? lanes->way[layout.at(b, 0, 1)] : 0;
     double& longest = most[s.is_fast[b]];
     longest = std::max(longest, way);
     s.travel[b] += way;

@@ -287,6 +287,7 @@ void System::pack_body(size_t b) {
   const double box[6] = {centre.x, centre.y, centre.z, half.x, half.y, half.z};
   // a plane, which only fixed bodies have, has no such box
   for (size_t f = 0; f < 6; ++f) l.bounds[layout.at(b, f, 6)] = std::isfinite(box[f]) ? box[f] : 0;
+  l.reach[layout.at(b, 0, 1)] = fixed[b] ? 0 : c.radius;
 }
 
 Mat3 System::calc_world_inverse_inertia(size_t b) const {
@@ -534,6 +535,8 @@ void System::prepare_step() {
     lanes->h[i] = step;
     lanes->gx[i] = model.gravity.x, lanes->gy[i] = model.gravity.y, lanes->gz[i] = model.gravity.z;
     const Contact& c = model.contact;
+    lanes->search_x[i] = state.search_velocity.x, lanes->search_y[i] = state.search_velocity.y,
+    lanes->search_z[i] = state.search_velocity.z;
     lanes->nx[i] = c.normal.x, lanes->ny[i] = c.normal.y, lanes->nz[i] = c.normal.z, lanes->offset[i] = c.offset;
   }
 }
@@ -585,6 +588,9 @@ void advance_together(Lanes& lanes, std::span<System* const> systems) {
   if (std::any_of(systems.begin(), systems.end(),
                   [](const System* s) { return s != nullptr && s->model.contact.ground && s->is_look_due(); }))
     lanes.find_lows();
+  if (std::any_of(systems.begin(), systems.end(),
+                  [](const System* s) { return s != nullptr && s->model.contact.bodies; }))
+    lanes.find_ways();
   if (!lanes.is_batch) {
     systems.front()->evaluate_elements();
   } else {
