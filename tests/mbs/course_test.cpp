@@ -7,19 +7,13 @@
 #include <vector>
 
 #include "models.h"
+#include "views.h"
 
 namespace topple::mbs {
 namespace {
 
+using test::look;
 using test::make_box;
-
-Options look(double duration, std::vector<View>& views, bool equilibrium = false) {
-  Options o;
-  o.duration = duration;
-  o.equilibrium = equilibrium;
-  o.on_frame = [&views](const View& v) { views.push_back(v); };
-  return o;
-}
 
 /// A box that hangs on an elastic element until an event lets it fall at 3 s.
 Model make_hanging() {

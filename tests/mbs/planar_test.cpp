@@ -6,19 +6,13 @@
 
 #include "mbs/model_json.h"
 #include "models.h"
+#include "views.h"
 
 namespace topple::mbs {
 namespace {
 
+using test::look;
 using test::make_box;
-
-Options look(double duration, std::vector<View>& views, bool equilibrium = false) {
-  Options o;
-  o.duration = duration;
-  o.equilibrium = equilibrium;
-  o.on_frame = [&views](const View& v) { views.push_back(v); };
-  return o;
-}
 
 TEST(PlanarPhysics, NothingLeavesItsPlane) {
   Model m;
