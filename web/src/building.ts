@@ -1,5 +1,6 @@
 /// The bodies of one run in a picture, at one time: boxes, signs of their zones, the chosen one.
 import * as THREE from "three";
+import { Boxes } from "./boxes";
 import type { Frame, Quadruple, Run, Triple } from "./data";
 import { calcPose, findFrame } from "./data";
 import type { Theme } from "./site";
@@ -35,62 +36,6 @@ function mergeGeometries(parts: THREE.BufferGeometry[]): THREE.BufferGeometry {
   return geometry;
 }
 
-const sun = new THREE.Vector3(-0.5, -1, 1.3).normalize();
-const manyBoxes = 3000; // from here on edges are left out: they cost more than they show
-
-/// A box of eight corners. Each face is shaded by the corner that its two triangles end with (WebGL takes `flat` values
-/// from there), which carries the face's direction: a third of the vertices of a box with four for each face.
-function makeLeanBox(): THREE.BufferGeometry {
-  // corner k lies at x = k & 1, y = k >> 1 & 1, z = k >> 2 & 1; rows: direction, then the face's corners seen
-  // counter-clockwise from outside, the shading one first
-  const faces: [Triple, number[]][] = [
-    [[1, 0, 0], [1, 3, 7, 5]], [[-1, 0, 0], [0, 4, 6, 2]], [[0, 1, 0], [3, 2, 6, 7]],
-    [[0, -1, 0], [4, 0, 1, 5]], [[0, 0, 1], [7, 6, 4, 5]], [[0, 0, -1], [2, 3, 1, 0]],
-  ];
-  const position: number[] = [], normal = new Float32Array(24), index: number[] = [];
-  for (let k = 0; k < 8; ++k) position.push((k & 1) - 0.5, ((k >> 1) & 1) - 0.5, ((k >> 2) & 1) - 0.5);
-  for (const [direction, corners] of faces) {
-    const [a, b, c, d] = corners as [number, number, number, number];
-    normal.set(direction, 3 * a);
-    index.push(b, c, a, c, d, a);
-  }
-  const geometry = new THREE.BufferGeometry();
-  geometry.setAttribute("position", new THREE.Float32BufferAttribute(position, 3));
-  geometry.setAttribute("normal", new THREE.BufferAttribute(normal, 3));
-  geometry.setIndex(index);
-  return geometry;
-}
-
-/// Shading by the direction of each face, computed once a vertex, with dark edges drawn in the fragment shader: one
-/// draw call for all boxes, and as little as can be done for each pixel.
-function makeBoxMaterial(many: boolean): THREE.MeshBasicMaterial {
-  const material = new THREE.MeshBasicMaterial();
-  const varyings = many ? "flat varying float vShade;" : "varying vec2 vFace;\nvarying float vShade;";
-  const edges = `
-        vec2 perPixel = max(fwidth(vFace), vec2(1e-6));
-        vec2 pixels = min(vFace, 1.0 - vFace) / perPixel;
-        float width = 1.0 / max(perPixel.x, perPixel.y);
-        float line = (1.0 - smoothstep(0.5, 1.3, min(pixels.x, pixels.y))) * clamp((width - 2.0) / 6.0, 0.0, 1.0);
-        diffuseColor.rgb *= 1.0 - 0.6 * line;`;
-  material.onBeforeCompile = (shader) => {
-    shader.vertexShader = shader.vertexShader
-      .replace("#include <common>", `#include <common>\n${varyings}`)
-      .replace(
-        "#include <begin_vertex>",
-        `#include <begin_vertex>
-        ${many ? "" : "vFace = uv;"}
-        // the columns of a box's matrix are its edges, so this is the direction of the face
-        vec3 face = normalize(mat3(instanceMatrix) * normal);
-        // light of the sky from above, and of a sun
-        vShade = 0.605 * (mix(0.37, 1.0, 0.5 * face.z + 0.5) + max(0.0, dot(face, vec3(${sun.x.toFixed(4)}, ${sun.y.toFixed(4)}, ${sun.z.toFixed(4)}))));`,
-      );
-    shader.fragmentShader = shader.fragmentShader
-      .replace("#include <common>", `#include <common>\n${varyings}`)
-      .replace("#include <color_fragment>", `#include <color_fragment>\ndiffuseColor.rgb *= vShade;${many ? "" : edges}`);
-  };
-  return material;
-}
-
 const rampSteps = 64;
 const linear = (css: string): [number, number, number] => {
   const c = new THREE.Color(css);
@@ -111,7 +56,7 @@ export class Building {
   readonly kinds: string[];
   readonly materials: string[];
   readonly markSize: number;
-  private readonly boxes: THREE.InstancedMesh<THREE.BufferGeometry, THREE.MeshBasicMaterial>;
+  private readonly boxes: Boxes;
   private readonly bodyOfInstance: number[] = [];
   private readonly colourOfPart: [number, number, number][] = [];
   private readonly colourOfStuff: [number, number, number][] = [];
@@ -136,7 +81,7 @@ export class Building {
     this.bodyColour = run.bodies.map(() => silent);
     this.hidden = new Uint8Array(run.bodies.length);
     this.boxes = this.makeBoxes();
-    this.group.add(this.boxes);
+    this.group.add(this.boxes.mesh);
     this.collectFitPoints();
     this.markSize = Math.min(0.6, Math.max(0.15, this.height * 0.013));
 
@@ -168,7 +113,7 @@ export class Building {
     return Math.max(1, this.bounds.max.z);
   }
 
-  private makeBoxes(): THREE.InstancedMesh<THREE.BufferGeometry, THREE.MeshBasicMaterial> {
+  private makeBoxes(): Boxes {
     this.run.bodies.forEach((body, index) => {
       for (const shape of body.shapes) {
         const [w, x, y, z] = shape.orientation;
@@ -184,14 +129,7 @@ export class Building {
         );
       }
     });
-    const count = this.shapePose.length;
-    const many = count >= manyBoxes;
-    const boxes = new THREE.InstancedMesh(many ? makeLeanBox() : new THREE.BoxGeometry(1, 1, 1), makeBoxMaterial(many), Math.max(1, count));
-    boxes.count = count;
-    boxes.frustumCulled = false;
-    boxes.instanceMatrix.setUsage(THREE.DynamicDrawUsage);
-    boxes.instanceColor = new THREE.InstancedBufferAttribute(new Float32Array(3 * Math.max(1, count)), 3);
-    return boxes;
+    return new Boxes(this.shapePose.length);
   }
 
   private placeZone(place: Triple, body: number): { body: number; local: THREE.Vector3 } {
@@ -283,12 +221,11 @@ export class Building {
       const body = this.bodyOfInstance[i] as number;
       if (this.hidden[body] === 1) this.matrix.copy(outside);
       else this.matrix.multiplyMatrices(this.bodyPose[body] as THREE.Matrix4, this.shapePose[i] as THREE.Matrix4);
-      this.boxes.setMatrixAt(i, this.matrix);
+      this.boxes.setMatrix(i, this.matrix);
     }
-    this.boxes.instanceMatrix.needsUpdate = true;
-    this.boxes.boundingSphere = null; // picking must not use that of another time
     this.placeMarks();
     this.colourBoxes();
+    this.boxes.commit();
     this.placeSelection();
   }
 
@@ -297,7 +234,7 @@ export class Building {
     this.zoneMarks = zoneMarks;
     this.selected = selected;
     this.placeMarks();
-    this.colourBoxes();
+    if (this.colourBoxes()) this.boxes.commit();
     this.placeSelection();
   }
 
@@ -309,7 +246,7 @@ export class Building {
 
   /// Cuts off what lies behind the planes; an empty list ends that.
   setSection(planes: THREE.Plane[]): void {
-    const { material } = this.boxes;
+    const { material } = this.boxes.mesh;
     material.clippingPlanes = planes;
     material.side = planes.length > 0 ? THREE.DoubleSide : THREE.FrontSide;
     material.needsUpdate = true;
@@ -318,13 +255,13 @@ export class Building {
 
   /// A run shown for comparison only: in one colour, see-through unless `opacity` is 1.
   setGhost(colour: string, opacity = 0.35): void {
-    const { material } = this.boxes;
+    const { material } = this.boxes.mesh;
     material.transparent = opacity < 1;
     material.opacity = opacity;
     material.depthWrite = opacity === 1;
     this.ghost = linear(colour);
     this.coloured = "";
-    this.colourBoxes();
+    if (this.colourBoxes()) this.boxes.commit();
   }
   private ghost: [number, number, number] | undefined;
 
@@ -387,23 +324,23 @@ export class Building {
     return rampAt(most);
   }
 
-  private colourBoxes(): void {
+  /// Whether there is a change to show.
+  private colourBoxes(): boolean {
     const { frame } = findFrame(this.run.time, this.time);
     const byPart = this.colouring === "kind" || this.colouring === "material";
     const wanted = `${this.colouring} ${this.selected} ${byPart ? 0 : frame} ${this.run.frames.length > 1}`;
-    if (wanted === this.coloured) return;
+    if (wanted === this.coloured) return false;
     this.coloured = wanted;
     const now = this.run.frames[frame];
     if (!byPart && this.ghost === undefined)
       for (let b = 0; b < this.bodyColour.length; ++b) this.bodyColour[b] = this.calcColour(b, frame, now);
-    const attribute = this.boxes.instanceColor as THREE.InstancedBufferAttribute;
     const parts = this.colouring === "kind" ? this.colourOfPart : this.colourOfStuff;
     for (let i = 0; i < this.bodyOfInstance.length; ++i) {
       const body = this.bodyOfInstance[i] as number;
       const [r, g, b] = this.ghost ?? (byPart ? (body === this.selected ? chosen : parts[i]) : this.bodyColour[body]) ?? silent;
-      attribute.setXYZ(i, r, g, b);
+      this.boxes.setColour(i, r, g, b);
     }
-    attribute.needsUpdate = true;
+    return true;
   }
 
   private placeSelection(): void {
@@ -416,10 +353,7 @@ export class Building {
 
   /// Body that a ray meets first, -1 if there is none. What a section cuts off is not met.
   pick(ray: THREE.Raycaster): number {
-    const planes = this.boxes.material.clippingPlanes ?? [];
-    const hits = ray.intersectObject(this.boxes);
-    const hit = hits.find((h) => planes.every((plane) => plane.distanceToPoint(h.point) >= 0));
-    return hit?.instanceId === undefined ? -1 : (this.bodyOfInstance[hit.instanceId] ?? -1);
+    return this.bodyOfInstance[this.boxes.pick(ray.ray, this.boxes.mesh.material.clippingPlanes ?? [])] ?? -1;
   }
 
   /// The boxes at the time shown, in the world, of bodies that have moved by more than `least` [m] and are now slower
