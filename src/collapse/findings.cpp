@@ -34,6 +34,7 @@ struct Context {
   const Recorder& recorder;
   const mbs::Summary& summary;
   record::Record& r;
+  bool is_under_way = false;
 
   void add(const std::string& id, const std::string& heading, const std::string& title, const std::string& text,
            double value = kNone, const std::string& unit = "", Status status = Status::Info) const {
@@ -69,7 +70,9 @@ void add_mechanism(const Context& c, const Mechanism& m) {
   Status status = Status::Info;
   if (m.name == "wrong direction") status = Status::Bad;
   if (c.plan.criteria.mechanism) status = *c.plan.criteria.mechanism == m.name ? Status::Good : Status::Bad;
-  c.add("mechanism", "Mechanism", "Mechanism: " + m.name, m.text, m.tilt, "rad", status);
+  if (c.is_under_way) status = Status::Info;
+  c.add("mechanism", "Mechanism", (c.is_under_way ? "Mechanism so far: " : "Mechanism: ") + m.name, m.text, m.tilt,
+        "rad", status);
 }
 
 bool add_stability(const Context& c) {
@@ -192,9 +195,10 @@ void add_clearances(const Context& c) {
     std::string text = fmt::format("The nearest part, {}, comes to {:.1f} m at {:.2f} s", who, least, when);
     if (least <= 0) text = fmt::format("{} lands on it at {:.2f} s", who, when);
     if (asked) text += fmt::format("; the limit is {:.1f} m", n.clearance);
-    const Status status = !asked                 ? (least > 0 ? Status::Info : Status::Warning)
-                          : least >= n.clearance ? Status::Good
-                                                 : Status::Bad;
+    const Status status = !asked                ? (least > 0 ? Status::Info : Status::Warning)
+                          : least < n.clearance ? Status::Bad
+                          : c.is_under_way      ? Status::Info
+                                                : Status::Good;
     c.add("clearance." + n.name, "Clearance", n.name, text + ".", least, "m", status);
   }
 }
@@ -246,6 +250,7 @@ void add_vibration(const Context& c) {
       text += status == Status::Good  ? ": the band stays below it"
               : status == Status::Bad ? ": the band lies above it"
                                       : ": the band reaches it";
+      if (c.is_under_way && status == Status::Good) status = Status::Info;
     }
     c.add("vibration." + n.name, heading, n.name, text + ".", high, "m/s", status);
   }
@@ -254,8 +259,10 @@ void add_vibration(const Context& c) {
 void add_touchdown(const Context& c) {
   const double t = c.recorder.first_touchdown();
   if (!std::isfinite(t)) {
-    c.add("touchdown.first", "Touchdown", "First touchdown", "No part of the upper block touched the ground.", kNone,
-          "s");
+    c.add("touchdown.first", "Touchdown", "First touchdown",
+          fmt::format("No part of the upper block {} the ground{}.", c.is_under_way ? "has touched" : "touched",
+                      c.is_under_way ? " so far" : ""),
+          kNone, "s");
   } else {
     const double kinetic = c.recorder.kinetic_at(t);
     c.add(
@@ -477,12 +484,13 @@ const std::vector<std::string>& not_modelled() {
 void add_findings(const product::Plan& plan, const mbs::Model& model, const ModelMap& map, const Knowledge& k,
                   const Recorder& recorder, const mbs::Summary& summary, record::Record& r) {
   r.not_modelled = not_modelled();
-  const Context c{plan, model, map, k, recorder, summary, r};
+  const bool is_under_way = r.ending == "under_way";
+  const Context c{plan, model, map, k, recorder, summary, r, is_under_way};
   if (r.time.empty()) {
     c.add("mechanism", "Mechanism", "No result", r.ending_text, kNone, "", Status::Bad);
     return;
   }
-  const Mechanism m = judge_run(plan, model, map, k, recorder, summary);
+  const Mechanism m = judge_run(plan, model, map, k, recorder, summary, is_under_way);
   add_mechanism(c, m);
   add_rigid_block(c);
   const bool stood = add_stability(c);

@@ -11,7 +11,8 @@ namespace topple::collapse {
 /// What no run tells, for people.
 const std::vector<std::string>& not_modelled();
 
-/// Fills findings, not_modelled and the rigid block's series of a finished record.
+/// Fills findings, not_modelled and the rigid block's series of a record. Where its ending is "under_way" they say how
+/// things stand so far, and nothing that may still change is called good or bad.
 void add_findings(const product::Plan&, const mbs::Model&, const ModelMap&, const Knowledge&, const Recorder&,
                   const mbs::Summary&, record::Record&);
 

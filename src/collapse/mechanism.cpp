@@ -51,11 +51,13 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
   off = std::remainder(off, 2 * pi);
 
   const std::string when = touched ? fmt::format("when the upper block first touches the ground, at {:.2f} s", out.time)
-                                   : fmt::format("at the end, {:.2f} s", out.time);
+                           : in.is_under_way ? fmt::format("so far, at {:.2f} s", out.time)
+                                             : fmt::format("at the end, {:.2f} s", out.time);
   const std::string motion = fmt::format(
       "{}, it leans by {:.1f} deg, its mass centre has come down by {:.2f} m, and its rear edge {:.0f} % as far as its "
-      "front edge. In the end {:.0f} % of the mass has come down",
-      when, out.tilt / unit::deg, out.drop, 100 * out.rear_share, 100 * out.moved);
+      "front edge. {} {:.0f} % of the mass has come down",
+      when, out.tilt / unit::deg, out.drop, 100 * out.rear_share, in.is_under_way ? "So far" : "In the end",
+      100 * out.moved);
   const double height_left = in.frames.front().height > 0 ? last.height / in.frames.front().height : 1;
   const double final_tilt = norm(log_rotation(last.rotation));
   // of the largest connected part of the upper block, not of pieces that came off
@@ -99,7 +101,10 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
     out.name = "topple";
     out.text = fmt::format("It topples: {}.", motion);
   }
-  if (out.name != "stands" && !in.came_to_rest) out.text += " Parts were still moving when the run ended.";
+  if (in.is_under_way)
+    out.text += fmt::format(" The run is under way: this is how it stands at {:.2f} s.", last.time);
+  else if (out.name != "stands" && !in.came_to_rest)
+    out.text += " Parts were still moving when the run ended.";
   return out;
 }
 

@@ -32,6 +32,7 @@ struct MechanismInput {
   double front = 0, rear = 0;      // reach of the upper block from its mass centre along and against the direction [m]
   double storey_height = 0;        // of the ground storey [m]
   bool came_to_rest = false;
+  bool is_under_way = false;  // the run goes on; for the words
 };
 
 struct Mechanism {

@@ -20,7 +20,7 @@ std::vector<StageTimes> find_stage_times(const ModelMap& map) {
 }
 
 Mechanism judge_run(const product::Plan& plan, const mbs::Model& model, const ModelMap& map, const Knowledge& k,
-                    const Recorder& recorder, const mbs::Summary& summary) {
+                    const Recorder& recorder, const mbs::Summary& summary, bool is_under_way) {
   MechanismInput in;
   in.frames = recorder.block_frames();
   in.touchdown = recorder.first_touchdown();
@@ -29,6 +29,7 @@ Mechanism judge_run(const product::Plan& plan, const mbs::Model& model, const Mo
   in.direction_tolerance = plan.criteria.azimuth_tolerance.value_or(0);
   in.storey_height = map.ground_storey_height;
   in.came_to_rest = summary.ending == mbs::Summary::Ending::AtRest;
+  in.is_under_way = is_under_way;
   double mass = 0, centre = 0, front = -1e30, rear = 1e30;
   for (size_t b = 0; b < model.bodies.size(); ++b) {
     if (!map.bodies[b].is_upper) continue;

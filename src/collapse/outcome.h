@@ -17,9 +17,9 @@ struct StageTimes {
 /// Of the stages that fire at all, rising.
 std::vector<StageTimes> find_stage_times(const ModelMap&);
 
-/// How it came down. There is at least one frame.
+/// How it came down, or how things stand in a run that goes on. There is at least one frame.
 Mechanism judge_run(const product::Plan&, const mbs::Model&, const ModelMap&, const Knowledge&, const Recorder&,
-                    const mbs::Summary&);
+                    const mbs::Summary&, bool is_under_way = false);
 
 /// Whether the upper block is where it was, to stands_displacement.
 bool stands(const BlockFrame&, const Knowledge&);

@@ -334,7 +334,10 @@ record::Record Steering::make_record(const Branch& b) const {
   }
   const mbs::Summary summary = run.summary();
   end_record(summary, " before the first charge", recorder, r);
-  if (!run.has_ended()) r.ending_text = fmt::format("Computed up to {:.2f} s so far.", run.time());
+  if (!run.has_ended()) {
+    r.ending = "under_way";
+    r.ending_text = fmt::format("The run is under way: computed up to {:.2f} s so far.", run.time());
+  }
   if (!r.time.empty()) add_findings(live.plan(), live.model(), live.map(), k_, recorder, summary, r);
   return r;
 }

@@ -124,7 +124,7 @@ struct Record {
   std::vector<Finding> findings;
   std::vector<std::string> not_modelled;
 
-  std::string ending;       // "at_rest", "time_limit", "cancelled", "failed"
+  std::string ending;       // "at_rest", "time_limit", "cancelled", "failed"; "under_way": it goes on
   std::string ending_text;  // a sentence
 };
 

@@ -621,6 +621,7 @@ void Hub::get(const std::string& path, std::function<void(Reply)> answer) {
       } catch (const std::exception& e) { answer(make_error_reply(500, "E940", e.what())); }
     });
   });
+                 {"time", number(record->time.empty() ? 0 : record->time.back())},
 }
 
 }  // namespace topple::server

@@ -108,7 +108,7 @@ Json Session::perform(Client& client, const Json& command) {
     check_keys(command, {});
     const Branch& b = branch_of(command);
     const record::Record r = make_record(b.id);
-    Json out{{"ending", {{"kind", r.ending}, {"text", r.ending_text}}}};
+    Json out{{"ending", {{"kind", r.ending}, {"text", r.ending_text}}}, {"time", number(b.frontier())}};
     Json& findings = out["findings"] = Json::array();
     for (const record::Finding& f : r.findings) findings.push_back(describe_finding(f));
     Json& events = out["events"] = Json::array();

@@ -2,13 +2,12 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import uPlot from "uplot";
 import { Inspector } from "./inspector";
-import type { Finding, Status } from "./data";
 import { axis, cssColour, niceRange } from "./plots";
 import { StatusSign, StatusWord } from "./signs";
 import type { SteerState } from "./steer_state";
 import type { LawFamily, ZoneWatch } from "./steer_wire";
 import { endingWord, zoneStates } from "./vocabulary";
-import { formatNumber, prettify } from "./units";
+import { formatNumber, formatTime, prettify } from "./units";
 import { findZonesOfBodies } from "./zones";
 
 type Axis = "y" | "z";
@@ -216,26 +215,24 @@ function Verdict(props: { s: SteerState }) {
   const others = list.filter((f) => f !== first && (f.status === "bad" || f.status === "warning" || f.id.startsWith("clearance.")));
   others.sort((a, b) => Number(b.status === "bad") - Number(a.status === "bad"));
   const ending = s.progress.value?.ending ?? s.branch.value?.ending ?? null;
-  // Before the end nothing is broken or kept yet: what is said so far is said without judging.
-  const statusOf = (f: Finding): Status => (ending === null ? "info" : f.status);
   return (
     <section class="verdict-panel" aria-label="Verdict" data-test="verdict-panel">
-      <h2>Verdict {ending === null ? <span class="quiet">so far</span> : null}</h2>
+      <h2>Verdict {ending === null ? <span class="quiet">so far, at {formatTime(s.frontier.value)}</span> : null}</h2>
       {first === undefined || (ending === null && s.frontier.value < 1e-9) ? (
         <p class="quiet">Nothing yet: findings come as the run goes on.</p>
       ) : (
-        <div class={`verdict ${statusOf(first)}`}>
-          <StatusSign status={statusOf(first)} size={24} />
+        <div class={`verdict ${first.status}`}>
+          <StatusSign status={first.status} size={24} />
           <div>
-            <p class="verdict-title">{first.title} {ending !== null && <StatusWord status={first.status} />}</p>
+            <p class="verdict-title">{first.title} <StatusWord status={first.status} /></p>
             <p data-test="verdict">{prettify(first.text)}</p>
           </div>
         </div>
       )}
       {others.slice(0, 6).map((f) => (
         <div class="finding">
-          <StatusSign status={statusOf(f)} size={15} />
-          <div><p class="finding-title">{f.title} {ending !== null && <StatusWord status={f.status} />}</p><p>{prettify(f.text)}</p></div>
+          <StatusSign status={f.status} size={15} />
+          <div><p class="finding-title">{f.title} <StatusWord status={f.status} /></p><p>{prettify(f.text)}</p></div>
         </div>
       ))}
       {ending !== null && <p class="ending-text" data-test="ending"><strong>{endingWord[ending.kind] ?? ending.kind}</strong>: {prettify(ending.text)}</p>}

@@ -163,6 +163,7 @@ export interface FindingsSoFar {
   not_modelled: string[];
   notes: string[];
 }
+  time?: number;
 
 export interface WireFrame extends Frame {
   session: number;

@@ -105,6 +105,7 @@ export const endingWord: Record<string, string> = {
   time_limit: "Time limit reached",
   cancelled: "Cancelled",
   failed: "Calculation failed",
+  under_way: "Under way",
 };
 
 /// Series of one plot.
