@@ -65,7 +65,10 @@ LiveModel::LiveModel(product::Plan plan, const Knowledge& k, int threads) : plan
       charges_.push_back({static_cast<int>(s), static_cast<int>(c), 0, plan_.stages[s].charges[c].fails});
   for (const Firing& f : make_schedule(plan_, k))
     for (LiveCharge& c : charges_)
-      if (c.stage == f.stage && c.index == f.charge) c.time = f.time;
+      if (c.stage == f.stage && c.index == f.charge) {
+        c.time = f.time;
+        c.offset = f.time - plan_.stages[static_cast<size_t>(c.stage)].time - charge(c).delay;
+      }
   lay_out_events();
 }
 
@@ -152,12 +155,14 @@ std::string LiveModel::apply(const Edit& e, double time, double next) {
       break;
   }
   lay_out_events();
+  applied_.push_back({e, text, time});
   return text;
 }
 
 std::string LiveModel::fire(const Edit& e, double time, double next) {
   LiveCharge& c = unfired(e.charge, time);
   c.time = next;
+  c.offset = 0;
   c.fails = false;
   return fmt::format("{} fires now, at {}", member_of(c), words_of_time(next));
 }
@@ -181,6 +186,7 @@ std::string LiveModel::set_delay(const Edit& e, double time) {
     check(t, member_of(c));
     const double before = c.time;
     c.time = t;
+    c.offset = e.time ? 0 : t - stage.time - *e.delay;
     charge.delay = e.time ? t - stage.time : *e.delay;
     return fmt::format("{} fires at {} instead of {}", member_of(c), words_of_time(t), words_of_time(before));
   }

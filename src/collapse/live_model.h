@@ -16,6 +16,7 @@ struct LiveCharge {
   double time = 0;           // when it fires [s]
   bool fails = false;        // as the plan says
   bool is_removed = false, is_added = false;
+  double offset = 0;  // of `time` against the stage's time and the charge's delay: the scatter [s]
 };
 
 class LiveModel {
@@ -36,6 +37,13 @@ class LiveModel {
   const std::string& member_of(const LiveCharge& c) const {
     return plan_.members[static_cast<size_t>(charge(c).member)].name;
   }
+  /// The edits, in their order.
+  struct Applied {
+    Edit edit;
+    std::string text;
+    double time = 0;  // [s]
+  };
+  const std::vector<Applied>& applied() const { return applied_; }
   /// Law that a zone of the map follows before it is fired: of an element, or of a rotational one behind them; -1:
   /// none.
   int law_of_zone(size_t zone) const;
@@ -73,6 +81,7 @@ class LiveModel {
     EventEntry entry;
   };
   std::vector<Extra> extras_;
+  std::vector<Applied> applied_;
 };
 
 }  // namespace topple::collapse

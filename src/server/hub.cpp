@@ -9,6 +9,7 @@
 
 #include "base/file.h"
 #include "base/hash.h"
+#include "collapse/branch_plan.h"
 #include "collapse/edit_json.h"
 #include "product/templates.h"
 #include "record/page.h"
@@ -431,23 +432,29 @@ void Hub::tell_study(int id, const Json& state, const Json& samples) {
 
 void Hub::start_study(const std::shared_ptr<Client>& client, std::int64_t id, const Json& command,
                       const std::shared_ptr<Session>& session) {
-  check_keys(command, {"samples", "seed"});
+  check_keys(command, {"samples", "seed", "edits"});
+  const bool with_edits = read_flag(command, "edits", true);
   StudySetting setting;
   setting.samples = has(command, "samples") ? read_integer(command, "samples", 2, 1000000) : 300;
   setting.seed = static_cast<std::uint64_t>(has(command, "seed") ? read_integer(command, "seed", 0, kMostIds) : 1);
   setting.jobs = options_.study_jobs;
   setting.rules = options_.session.rules;
   setting.version = options_.session.steering.run.program_version;
-  session->ask([this, client, id, setting](Session& s) {
-    // of the plan that the active branch began from
-    const product::Plan* found =
-        s.steering() != nullptr ? &s.steering()->steering().active().run().model().plan() : nullptr;
-    if (found == nullptr) {
+  session->ask([this, client, id, setting, with_edits](Session& s) {
+    if (s.steering() == nullptr) {
       client->answer(id, dump(make_error(id, describe_error(InputError("E930", "there is no plan that can be run")))));
       return;
     }
-    const std::string text = found->text, path = found->path;
-    run_errand([this, client, id, setting, text, path]() mutable {
+    // of the active branch: the plan it began from, with its edits
+    const collapse::LiveModel& live = s.steering()->steering().active().run().model();
+    collapse::BranchPlan branch;
+    if (with_edits)
+      branch = collapse::write_branch_plan(live);
+    else
+      branch.text = live.plan().text;
+    const std::string path = live.plan().path;
+    run_errand([this, client, id, setting, branch, path]() mutable {
+      const std::string& text = branch.text;
       try {
         std::vector<Diagnostic> warnings;
         const product::Plan plan = product::read_plan(text, path, warnings);
@@ -469,7 +476,10 @@ void Hub::start_study(const std::shared_ptr<Client>& client, std::int64_t id, co
           studies_[number] = study;
           study_watchers_[number].push_back(client);
         }
-        client->answer(id, dump(make_ack(id, {{"study", number}, {"state", study->describe()}})));
+        client->answer(id, dump(make_ack(id, {{"study", number},
+                                              {"taken", branch.taken},
+                                              {"left_out", branch.left_out},
+                                              {"state", study->describe()}})));
       } catch (const InputError& e) {
         client->answer(id, dump(make_error(id, describe_error(e))));
       } catch (const std::exception& e) {
@@ -611,6 +621,7 @@ void Hub::get(const std::string& path, std::function<void(Reply)> answer) {
           return answer({200, "application/x-hdf5", std::move(bytes), "record.h5"});
         }
         Json out{{"ending", {{"kind", record->ending}, {"text", record->ending_text}}},
+                 {"time", number(record->time.empty() ? 0 : record->time.back())},
                  {"findings", Json::array()},
                  {"events", Json::array()}};
         for (const record::Finding& f : record->findings) out["findings"].push_back(describe_finding(f));
@@ -621,7 +632,6 @@ void Hub::get(const std::string& path, std::function<void(Reply)> answer) {
       } catch (const std::exception& e) { answer(make_error_reply(500, "E940", e.what())); }
     });
   });
-                 {"time", number(record->time.empty() ? 0 : record->time.back())},
 }
 
 }  // namespace topple::server

@@ -1,8 +1,8 @@
 /// The plan's text with its complaints beside it; a click on one goes to its place.
-import { useEffect, useRef } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import { CommandError } from "./steer_connection";
 import type { SteerState } from "./steer_state";
-import type { Branch, Diagnostic, PlanCheck } from "./steer_wire";
+import type { Branch, BranchPlan, Diagnostic, PlanCheck } from "./steer_wire";
 import { prettify } from "./units";
 
 const lineHeight = 18;
@@ -37,6 +37,32 @@ export function findOffset(text: string, line: number, column: number): number {
   return Math.min(text.length, at + Math.max(0, column - 1));
 }
 
+/// The active branch's plan with its edits, asked for anew after each action.
+export function useBranchPlan(s: SteerState): BranchPlan | null {
+  const [plan, setPlan] = useState<BranchPlan | null>(null);
+  const branch = s.active.value;
+  const actions = s.log.value.filter((e) => e.action !== "reached").length;
+  useEffect(() => {
+    let over = false;
+    if (branch !== 0)
+      s.connection.command<BranchPlan>("plan.text", { branch, edits: true }).then((r) => over || setPlan(r)).catch(() => undefined);
+    return () => {
+      over = true;
+    };
+  }, [branch, actions]);
+  return plan;
+}
+
+export function EditList(props: { title: string; list: string[]; test: string }) {
+  if (props.list.length === 0) return null;
+  return (
+    <div data-test={props.test}>
+      <p>{props.title}</p>
+      <ul>{props.list.map((text) => <li>{prettify(text)}</li>)}</ul>
+    </div>
+  );
+}
+
 export function PlanEditor(props: { s: SteerState }) {
   const { s } = props;
   const area = useRef<HTMLTextAreaElement>(null);
@@ -44,6 +70,7 @@ export function PlanEditor(props: { s: SteerState }) {
   const text = s.editedText.value ?? s.plan.value.text;
   const check = s.planCheck.value;
   const changed = s.editedText.value !== null && s.editedText.value !== s.plan.value.text;
+  const branchPlan = useBranchPlan(s);
 
   useEffect(() => {
     const timer = setTimeout(() => {
@@ -99,6 +126,11 @@ export function PlanEditor(props: { s: SteerState }) {
         <span class={errors > 0 ? "bad-word" : "quiet"} data-test="check-count">✖ {errors} {errors === 1 ? "error" : "errors"}</span>
         <span class={warnings > 0 ? "warning-word" : "quiet"}>⚠ {warnings} {warnings === 1 ? "warning" : "warnings"}</span>
         <span class="spring" />
+        {branchPlan !== null && branchPlan.taken.length + branchPlan.left_out.length > 0 && (
+          <button type="button" disabled={changed || branchPlan.taken.length === 0} data-test="edits-text" title="Writes the edits of this branch into the text, to be looked at and saved" onClick={() => (s.editedText.value = branchPlan.text)}>
+            Edits of the branch as text
+          </button>
+        )}
         <button type="button" class="main-button" disabled={errors > 0} data-test="apply" title="Builds this text and runs it from time 0, as a branch of its own" onClick={() => void apply()}>Run as a new branch</button>
         <button type="button" disabled={!changed} data-test="save" onClick={() => void save()}>Save to the file</button>
         <button type="button" disabled={!changed} onClick={() => (s.editedText.value = null)}>Discard</button>
@@ -121,6 +153,7 @@ export function PlanEditor(props: { s: SteerState }) {
           <Diagnostics list={check?.diagnostics ?? []} onJump={jump} />
           {check !== null && check.diagnostics.length === 0 && <p class="quiet">No complaints.</p>}
           {check?.notes.map((n) => <p class="quiet">{prettify(n)}</p>)}
+          <EditList title="Edits of the branch that no plan can say:" list={branchPlan?.left_out ?? []} test="left-out" />
         </div>
       </div>
     </div>

@@ -1,5 +1,6 @@
 /// Fuzzy studies from the page: membership functions and fans that grow, runs in parallel coordinates, one to play.
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { EditList, useBranchPlan } from "./steer_plan";
 import type { SteerState } from "./steer_state";
 import type { Bounds, Sample, Study } from "./steer_wire";
 import { formatDuration, formatNumber, formatTime, prettify, toReadable } from "./units";
@@ -199,6 +200,7 @@ export function StudyPanel(props: { s: SteerState }) {
   const [count, setCount] = useState("300");
   const [chosen, setChosen] = useState(-1);
   const [table, setTable] = useState(false);
+  const branchPlan = useBranchPlan(s);
   const list = s.studies.value;
   const study = list.find((k) => k.id === s.watchedStudy.value);
   const samples = s.samples.value.get(s.watchedStudy.value) ?? [];
@@ -227,6 +229,13 @@ export function StudyPanel(props: { s: SteerState }) {
           </>
         )}
       </div>
+      {branchPlan !== null && branchPlan.taken.length + branchPlan.left_out.length > 0 && (
+        <details class="pad" open={branchPlan.left_out.length > 0} data-test="study-edits">
+          <summary>A study takes the plan of branch “{s.branch.value?.name}”: {branchPlan.taken.length} of {branchPlan.taken.length + branchPlan.left_out.length} edits are in it</summary>
+          <EditList title="In it, from the start:" list={branchPlan.taken} test="taken" />
+          <EditList title="Not in it:" list={branchPlan.left_out} test="left-out" />
+        </details>
+      )}
       {study === undefined ? (
         <p class="quiet pad">A study runs the plan at many points of its fuzzy values and tells what is possible. It goes on while you steer.</p>
       ) : (

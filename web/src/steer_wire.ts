@@ -86,6 +86,12 @@ export interface PlanCheck {
 }
 export interface StateEvent {
   phase: Phase;
+/// The plan of a branch as a text, and which of its edits are in it.
+export interface BranchPlan {
+  text: string;
+  taken: string[];
+  left_out: string[];
+}
   branch: number;
   time: number;
   frames: number;

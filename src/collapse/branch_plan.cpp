@@ -1,0 +1,132 @@
+#include "collapse/branch_plan.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "product/edited_text.h"
+
+namespace topple::collapse {
+
+namespace {
+
+using Kind = Edit::Kind;
+
+constexpr double kSame = 1e-9;  // [s]
+
+bool overlap(const product::Charge& a, const product::Charge& b) {
+  return a.member == b.member && std::abs(a.position - b.position) < 0.5 * (a.destroyed_length + b.destroyed_length);
+}
+
+/// The stages with the charges at the times at which they fire.
+std::vector<product::Stage> lay_out_stages(const LiveModel& live) {
+  const product::Plan& plan = live.plan();
+  std::vector<product::Stage> stages, earlier;
+  for (const product::Stage& s : plan.stages) {
+    stages.push_back(s);
+    stages.back().charges.clear();
+  }
+  const std::vector<LiveCharge>& charges = live.charges();
+  for (const LiveCharge& c : charges) {
+    if (c.is_removed && c.is_added) continue;
+    product::Charge charge = live.charge(c);
+    const bool is_replaced = c.is_removed && std::any_of(charges.begin(), charges.end(), [&](const LiveCharge& other) {
+                               return other.is_added && !other.is_removed && overlap(live.charge(other), charge);
+                             });
+    if (is_replaced) continue;
+    charge.fails = c.fails || c.is_removed;
+    if (c.is_added) charge.where = {};
+    const product::Stage& stage = plan.stages[static_cast<size_t>(c.stage)];
+    const double time = c.time - c.offset;  // without the scatter
+    const bool is_as_planned = charge.delay >= 0 && std::abs(time - stage.time - charge.delay) < kSame;
+    if (charge.fails || is_as_planned) {
+      charge.delay = std::max(0.0, charge.delay);
+      stages[static_cast<size_t>(c.stage)].charges.push_back(charge);
+    } else if (time > stage.time - kSame) {
+      charge.delay = std::max(0.0, time - stage.time);
+      stages[static_cast<size_t>(c.stage)].charges.push_back(charge);
+    } else {
+      // before its stage: in one of its own
+      charge.delay = 0;
+      charge.where = {};
+      const auto found = std::find_if(earlier.begin(), earlier.end(),
+                                      [&](const product::Stage& s) { return std::abs(s.time - time) < kSame; });
+      if (found == earlier.end())
+        earlier.push_back({stage.name + ", earlier", time, {charge}, {}});
+      else
+        found->charges.push_back(charge);
+    }
+  }
+  stages.insert(stages.end(), earlier.begin(), earlier.end());
+  std::erase_if(stages, [](const product::Stage& s) { return s.charges.empty(); });
+  std::stable_sort(stages.begin(), stages.end(),
+                   [](const product::Stage& a, const product::Stage& b) { return a.time < b.time; });
+  return stages;
+}
+
+}  // namespace
+
+BranchPlan write_branch_plan(const LiveModel& live) {
+  BranchPlan out;
+  out.text = live.plan().text;
+  product::PlanChanges changes;
+  bool changes_charges = false;
+  size_t cable = live.plan().cables.size();
+  for (const LiveModel::Applied& a : live.applied()) cable -= a.edit.kind == Kind::AddCable;
+  for (const LiveModel::Applied& a : live.applied()) {
+    const bool is_early = a.time <= 0;
+    const char* later = "acts from a moment of the run on, which a plan cannot say";
+    std::string why;
+    switch (a.edit.kind) {
+      case Kind::Fire:
+      case Kind::SetDelay:
+      case Kind::AddCharge:
+      case Kind::RemoveCharge:
+        changes_charges = true;
+        break;
+      case Kind::AddPreCut:
+        if (is_early)
+          changes.cuts.emplace_back(live.plan().find_member(a.edit.member),
+                                    product::Weakening{a.edit.position, a.edit.cut_bars, a.edit.cut_concrete});
+        else
+          why = later;
+        break;
+      case Kind::AddCable: {
+        const product::Cable& c = live.plan().cables[cable++];
+        if (!is_early)
+          why = later;
+        else if (!(c.strength > 0))
+          why = "a cable of a plan has a strength";
+        else
+          changes.cables.push_back(c);
+        break;
+      }
+      case Kind::RemoveCable:
+        why = later;
+        break;
+      case Kind::SetFriction:
+        if (!is_early)
+          why = later;
+        else if (live.model().contact.friction != live.model().contact.body_friction)
+          why = "a plan has one friction for the ground and the parts";
+        else
+          changes.friction = live.model().contact.friction;
+        break;
+    }
+    if (why.empty())
+      out.taken.push_back(a.text);
+    else
+      out.left_out.push_back(a.text + ": " + why);
+  }
+  if (out.taken.empty()) return out;
+  if (changes_charges) changes.stages = lay_out_stages(live);
+  try {
+    out.text = product::write_changes(live.plan(), changes);
+  } catch (const InputError& e) {
+    for (const std::string& text : out.taken) out.left_out.push_back(text + ": " + e.diagnostics().front().message);
+    out.taken.clear();
+  }
+  return out;
+}
+
+}  // namespace topple::collapse

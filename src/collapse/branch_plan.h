@@ -1,0 +1,22 @@
+#pragma once
+/// The plan of a branch as a text: the plan it began from with what a plan can say of its edits.
+
+#include <string>
+#include <vector>
+
+#include "collapse/live_model.h"
+
+namespace topple::collapse {
+
+struct BranchPlan {
+  std::string text;
+  std::vector<std::string> taken;     // edits that are in the text, in words
+  std::vector<std::string> left_out;  // and those that are not, with the reason
+};
+
+/// Times of charges, charges more and less are always in the text; pre-cuts, cables and friction if they were made at
+/// the very beginning: a plan knows no later moment for them. A charge that was taken out fails. Where the changed text
+/// would be no plan, all are left out. Firing times scatter anew.
+BranchPlan write_branch_plan(const LiveModel&);
+
+}  // namespace topple::collapse

@@ -1,0 +1,144 @@
+#include "collapse/branch_plan.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "collapse/action_log.h"
+#include "collapse/edit_json.h"
+#include "plans.h"
+
+namespace topple::collapse {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using testing::HasSubstr;
+
+const char* const later_part = "# the limits\n[criteria]\ndebris_reach = \"9 m\"\n";
+
+product::Plan staged(const std::string& more = "") {
+  return read("# first\n" +
+              house("# stages\n" + charge("C-A*-0", "0.2 s") + charge("C-B*-0", "0.6 s") + later_part + more));
+}
+
+/// Edits one after the other: texts of commands, each at a time.
+LiveModel edited(const product::Plan& plan, const std::vector<std::pair<double, std::string>>& edits) {
+  LiveModel live(plan, default_knowledge(), 1);
+  for (const auto& [time, text] : edits) (void)live.apply(read_edit(Json::parse(text)), time, time + 1e-3);
+  return live;
+}
+
+/// Members and firing times that both have, by member and position.
+void expect_same_firings(const LiveModel& a, const LiveModel& b, double scatter) {
+  std::vector<std::tuple<std::string, double, double>> lists[2];
+  for (const LiveModel* live : {&a, &b})
+    for (const LiveCharge& c : live->charges())
+      if (!c.is_removed && !c.fails)
+        lists[live == &b].emplace_back(live->member_of(c), live->charge(c).position, c.time);
+  for (auto& list : lists) std::sort(list.begin(), list.end());
+  ASSERT_EQ(lists[0].size(), lists[1].size());
+  for (size_t i = 0; i < lists[0].size(); ++i) {
+    EXPECT_EQ(std::get<0>(lists[0][i]), std::get<0>(lists[1][i]));
+    EXPECT_NEAR(std::get<1>(lists[0][i]), std::get<1>(lists[1][i]), 1e-12);
+    EXPECT_NEAR(std::get<2>(lists[0][i]), std::get<2>(lists[1][i]), scatter) << std::get<0>(lists[0][i]);
+  }
+}
+
+TEST(BranchPlan, WithoutEditsIsThePlan) {
+  const product::Plan plan = staged();
+  const BranchPlan b = write_branch_plan(edited(plan, {}));
+  EXPECT_EQ(b.text, plan.text);
+  EXPECT_TRUE(b.taken.empty() && b.left_out.empty());
+}
+
+TEST(BranchPlan, FiresWhatTheBranchFires) {
+  // both scatter by 1 ms and by three of them at most
+  constexpr double scatter = 7e-3;
+  const product::Plan plan = staged();
+  const std::vector<std::vector<std::pair<double, std::string>>> cases = {
+      {{0, R"({"command": "set_delay", "stage": 1, "time": 0.5})"}},
+      {{0.1, R"({"command": "set_delay", "charge": 4, "delay": 0.1})"}},
+      {{0.1, R"({"command": "set_delay", "charge": 4, "time": 0.15})"}},
+      {{0.3, R"({"command": "fire", "charge": 5})"}},
+      {{0.3, R"({"command": "remove_charge", "charge": 3})"}},
+      {{0.3, R"({"command": "add_charge", "member": "C-B2-1", "position": 1, "destroyed_length": 0.6, "time": 0.7})"}},
+      {{0.1, R"({"command": "remove_charge", "charge": 3})"},
+       {0.1, R"({"command": "add_charge", "member": "C-B1-0", "position": 1.2, "destroyed_length": 0.6})"},
+       {0.3, R"({"command": "fire", "charge": 4})"},
+       {0.35, R"({"command": "set_delay", "stage": 1, "time": 0.8})"}}};
+  for (const auto& edits : cases) {
+    const LiveModel live = edited(plan, edits);
+    const BranchPlan b = write_branch_plan(live);
+    EXPECT_EQ(b.taken.size(), edits.size()) << edits.front().second;
+    ASSERT_TRUE(b.left_out.empty()) << b.left_out.front();
+    EXPECT_THAT(b.text, HasSubstr("# first\n"));
+    EXPECT_THAT(b.text, HasSubstr("# stages\n"));
+    EXPECT_THAT(b.text, HasSubstr(later_part)) << "comments of the next table are its own";
+    expect_same_firings(live, LiveModel(read(b.text), default_knowledge(), 1), scatter);
+  }
+}
+
+TEST(BranchPlan, TakesWhatWasDoneBeforeTheFirstStepOnly) {
+  const product::Plan plan = staged();
+  const std::string cut = R"({"command": "add_pre_cut", "member": "C-B1-0", "at": 2.4, "cut_bars": 0.5})",
+                    cable = R"({"command": "add_cable", "member": "C-A2-1", "position": 1.5, "anchor": [-15, 4, 0],
+                               "stiffness": 2e6, "pretension": 5e4, "strength": 9e5})",
+                    friction = R"({"command": "set_friction", "ground": 0.3, "bodies": 0.3})";
+  const BranchPlan early = write_branch_plan(edited(plan, {{0, cut}, {0, cable}, {0, friction}}));
+  ASSERT_EQ(early.taken.size(), 3U) << early.left_out.front();
+  const product::Plan again = read(early.text);
+  EXPECT_EQ(again.ground.friction, 0.3);
+  ASSERT_EQ(again.cables.size(), 1U);
+  EXPECT_EQ(again.cables[0].anchor.x, -15);
+  EXPECT_EQ(again.cables[0].stiffness, 2e6);
+  EXPECT_EQ(again.members[static_cast<size_t>(again.find_member("C-B1-0"))].weakenings.at(0).cut_bars, 0.5);
+  const BranchPlan late = write_branch_plan(edited(plan, {{0.1, cut}, {0.1, cable}, {0.1, friction}}));
+  EXPECT_EQ(late.left_out.size(), 3U);
+  EXPECT_EQ(late.text, plan.text);
+  const BranchPlan two = write_branch_plan(edited(plan, {{0, R"({"command": "set_friction", "ground": 0.3})"},
+                                                         {0, R"({"command": "set_delay", "stage": 1, "time": 0.5})"}}));
+  EXPECT_EQ(two.taken.size(), 1U);
+  ASSERT_EQ(two.left_out.size(), 1U);
+  EXPECT_THAT(two.left_out[0], HasSubstr("one friction"));
+}
+
+TEST(BranchPlan, KeepsWhatFuzzyPathsName) {
+  const std::string fuzzy = "[fuzzy]\nstage.2.charge.1.delay = { triangular = [\"0 ms\", \"0 ms\", \"30 ms\"] }\n";
+  const product::Plan plan = staged(fuzzy);
+  const BranchPlan within =
+      write_branch_plan(edited(plan, {{0.1, R"({"command": "set_delay", "charge": 4, "delay": 0.1})"},
+                                      {0.1, R"({"command": "remove_charge", "charge": 3})"}}));
+  ASSERT_TRUE(within.left_out.empty()) << within.left_out.front();
+  // the group that stays as it was is still the first one
+  const product::Plan again = read(within.text);
+  ASSERT_EQ(again.fuzzy.inputs.size(), 1U);
+  EXPECT_EQ(again.stages[1].charges.front().delay, 0);
+  EXPECT_EQ(again.stages[1].charges.front().member, plan.find_member("C-B3-0"));
+  // a stage before it would change its number
+  const BranchPlan before = write_branch_plan(edited(plan, {{0.3, R"({"command": "fire", "charge": 4})"}}));
+  ASSERT_EQ(before.left_out.size(), 1U);
+  EXPECT_THAT(before.left_out[0], HasSubstr("[fuzzy]"));
+  EXPECT_EQ(before.text, plan.text);
+}
+
+TEST(BranchPlan, LeavesOutWhatWouldBeNoPlan) {
+  // a plan that says its stages in one line
+  std::string text = house(charge("C-A*-0", "0.2 s"));
+  const size_t begin = text.find("[[stage]]"), end = text.find("[analysis]");
+  text =
+      "stage = [{ time = \"0.2 s\", charge = [{ members = \"C-A*-0\", position = \"1 m\", destroyed_length = \"1 m\" "
+      "}] }]\n" +
+      text.substr(0, begin) + text.substr(end);
+  const BranchPlan b =
+      write_branch_plan(edited(read(text), {{0, R"({"command": "set_delay", "stage": 0, "time": 0.3})"}}));
+  ASSERT_EQ(b.left_out.size(), 1U);
+  EXPECT_EQ(b.text, text);
+  // all charges taken out: the building stands, which the check warns of only
+  std::vector<std::pair<double, std::string>> none;
+  for (int i = 0; i < 6; ++i)
+    none.emplace_back(0, R"({"command": "remove_charge", "charge": )" + std::to_string(i) + "}");
+  EXPECT_EQ(write_branch_plan(edited(staged(), none)).taken.size(), 6U);
+}
+
+}  // namespace
+}  // namespace topple::collapse
