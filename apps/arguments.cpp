@@ -243,6 +243,7 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   steer->add_option("-o,--output", a.output, "folder of action logs and studies (steer)")->type_name("FOLDER");
   steer->add_option("--port", a.port, "port of 127.0.0.1; a free one if not given");
   steer->add_flag("--no-open", a.no_open, "only print the address");
+  steer->add_flag("--continue", a.goes_on, "go on with the latest session of this plan, from its action log");
   steer->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")
       ->type_name("FILE");
   steer->add_option("--threads", a.threads, "threads of the solver; results do not depend on it")

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/file.h"
+#include "base/hash.h"
 #include "browser.h"
 #include "commands.h"
 #include "results.h"
@@ -27,6 +28,20 @@ std::uint16_t read_port(const std::string& text) {
   if (*end != '\0' || port < 1 || port > 65535)
     throw InputError("E801", "--port \"" + text + "\" is no port", "1 to 65535; without --port a free one is taken");
   return static_cast<std::uint16_t>(port);
+}
+
+/// Says whether there is an earlier session of a plan to go on with.
+void tell_of_earlier_session(const server::HubOptions& options, const server::SessionPlan& plan) {
+  const auto earlier =
+      collapse::find_earlier_log(server::log_path(options.session.folder, plan.path), calc_sha256(plan.text),
+                                 options.session.knowledge, options.session.steering.run);
+  if (earlier)
+    std::fprintf(stderr, "%s holds an earlier session of this plan (%ld actions, computed to %.3f s). %s\n",
+                 earlier->path.c_str(), earlier->actions, earlier->time,
+                 plan.goes_on ? "It goes on from there." : "The page offers to go on with it; so does --continue.");
+  else if (plan.goes_on)
+    std::fprintf(stderr, "There is no earlier session of this plan, as it is now, in %s: it begins anew.\n",
+                 options.session.folder.c_str());
 }
 
 }  // namespace
@@ -52,7 +67,8 @@ int steer(const Arguments& a, const std::atomic<bool>& cancel) {
     server::SessionPlan first;
     if (!a.input.empty()) {
       text = read_file(plan.string());
-      first = {a.input, plan.string(), text};
+      first = {a.input, plan.string(), text, a.goes_on};
+      tell_of_earlier_session(options, first);
     }
     server::Hub hub(std::move(options));
     server::ServerOptions serving;

@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -11,6 +13,7 @@
 #include <stdexcept>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "base/hash.h"
 #include "collapse/edit_json.h"
 #include "record/provenance.h"
@@ -33,6 +36,46 @@ std::string calc_rules_hash(const Knowledge& k) {
 product::Plan read_quietly(const std::string& text, const std::string& path) {
   std::vector<Diagnostic> warnings;
   return product::read_plan(text, path, warnings);
+}
+
+/// What a run depends on beside the plan, as the head of a log says it.
+Json describe_setting(const Knowledge& k, const RunOptions& run) {
+  return {{"rules_sha256", calc_rules_hash(k)},
+          {"frame_rate", run.frame_rate},
+          {"duration", run.duration},
+          {"step", run.step}};
+}
+
+/// Lines that have their end.
+std::vector<std::string> whole_lines(const std::string& text) {
+  std::vector<std::string> lines;
+  for (size_t at = 0, end = 0; (end = text.find('\n', at)) != std::string::npos; at = end + 1)
+    lines.push_back(text.substr(at, end - at));
+  return lines;
+}
+
+std::optional<LogSummary> summarise(const std::string& path, const std::string& plan_sha256, const Json& setting,
+                                    const std::string& program) {
+  LogSummary s;
+  s.path = path;
+  try {
+    const std::vector<std::string> lines = whole_lines(read_file(path));
+    if (lines.size() < 2) return std::nullopt;
+    const Json head = Json::parse(lines.front());
+    if (head.at("topple_log") != 1 || head.at("program") != program || head.at("plan_sha256") != plan_sha256)
+      return std::nullopt;
+    for (const auto& [key, value] : setting.items())
+      if (head.at(key) != value) return std::nullopt;
+    s.created = head.at("created");
+    for (size_t i = 1; i < lines.size(); ++i) {
+      const Json entry = Json::parse(lines[i]);
+      if (entry.at("action") != "reached") ++s.actions;
+      s.time = std::max(s.time, entry.at("time").get<double>());
+      if (entry.contains("made")) s.branches = std::max(s.branches, entry.at("made").get<int>());
+    }
+  } catch (const std::exception&) { return std::nullopt; }
+  if (s.actions == 0 && !(s.time > 0)) return std::nullopt;
+  return s;
 }
 
 int open_new(std::string& path) {
@@ -58,16 +101,13 @@ int open_new(std::string& path) {
 LoggedSteering::LoggedSteering(const product::Plan& plan, const Knowledge& k, SteeringOptions options,
                                SteeringCallbacks callbacks, const std::string& path, SamplePlan sample_plan)
     : k_(k), plan_(plan), sample_plan_(std::move(sample_plan)), path_(path) {
-  const Json header{{"topple_log", 1},
-                    {"program", "topple " + options.run.program_version},
-                    {"created", record::now_utc()},
-                    {"plan_path", plan.path},
-                    {"plan_sha256", calc_sha256(plan.text)},
-                    {"plan_text", plan.text},
-                    {"rules_sha256", calc_rules_hash(k)},
-                    {"frame_rate", options.run.frame_rate},
-                    {"duration", options.run.duration},
-                    {"step", options.run.step}};
+  Json header{{"topple_log", 1},
+              {"program", "topple " + options.run.program_version},
+              {"created", record::now_utc()},
+              {"plan_path", plan.path},
+              {"plan_sha256", calc_sha256(plan.text)},
+              {"plan_text", plan.text}};
+  header.update(describe_setting(k, options.run));
   steering_ = std::make_unique<Steering>(k, std::move(options), std::move(callbacks));
   steering_->add_root(plan, "main");
   if (!path_.empty()) file_ = open_new(path_);
@@ -161,10 +201,36 @@ void LoggedSteering::note_reached() {
   write({{"seq", ++seq_}, {"action", "reached"}, {"branch", b.id}, {"step", b.steps()}, {"time", b.frontier()}});
 }
 
+std::optional<LogSummary> find_earlier_log(const std::string& path, const std::string& plan_sha256, const Knowledge& k,
+                                           const RunOptions& run) {
+  namespace fs = std::filesystem;
+  const fs::path wanted(path);
+  const std::string stem = wanted.stem().string(), ending = wanted.extension().string();
+  const auto is_one = [&](const fs::path& p) {
+    const std::string name = p.stem().string();
+    if (p.extension() != ending || name.compare(0, stem.size(), stem) != 0) return false;
+    const std::string number = name.substr(stem.size());
+    return number.empty() ||
+           (number.size() > 1 && number[0] == '-' &&
+            std::all_of(number.begin() + 1, number.end(), [](unsigned char c) { return std::isdigit(c) != 0; }));
+  };
+  std::vector<std::pair<fs::file_time_type, std::string>> found;
+  std::error_code fault;
+  for (fs::directory_iterator it(wanted.parent_path(), fault), end; !fault && it != end; it.increment(fault)) {
+    std::error_code ignored;
+    if (is_one(it->path()) && it->is_regular_file(ignored))
+      found.emplace_back(it->last_write_time(ignored), it->path().string());
+  }
+  std::sort(found.rbegin(), found.rend());
+  for (const auto& [time, name] : found)
+    if (auto s = summarise(name, plan_sha256, describe_setting(k, run), "topple " + run.program_version)) return s;
+  return std::nullopt;
+}
+
 ReplayResult replay(const std::string& log, const std::string& name, const Knowledge& k, SteeringOptions options,
-                    const SamplePlan& sample_plan, const Progress& progress) {
+                    const SamplePlan& sample_plan, const Progress& progress, SteeringCallbacks callbacks,
+                    const std::string& path) {
   ReplayResult result;
-  size_t at = 0;
   int line = 0;
   const auto fail = [&](const std::string& code, const std::string& message, const std::string& help = {}) {
     Diagnostic d;
@@ -174,14 +240,15 @@ ReplayResult replay(const std::string& log, const std::string& name, const Knowl
     d.help = help;
     throw InputError({d});
   };
-  while (at < log.size()) {
-    const size_t end = log.find('\n', at);
-    if (end == std::string::npos) {
-      result.was_cut = true;
-      break;
-    }
-    const std::string text = log.substr(at, end - at);
-    at = end + 1;
+  const std::vector<std::string> lines = whole_lines(log);
+  result.was_cut = !log.empty() && log.back() != '\n';
+  // one step, and how far the log is done with it; false: no further
+  const auto advance = [&](Steering& s, double share) {
+    if (progress.report && s.active().steps() % 64 == 0)
+      progress.report(line - 1 + std::clamp(share, 0.0, 1.0), static_cast<double>(lines.size()));
+    return !progress.is_cancelled() && s.advance();
+  };
+  for (const std::string& text : lines) {
     ++line;
     const Json entry = Json::parse(text, nullptr, false);
     if (!entry.is_object()) fail("E942", "this line is not a JSON object", "an action log is written by topple steer");
@@ -201,7 +268,7 @@ ReplayResult replay(const std::string& log, const std::string& name, const Knowl
         options.run.duration = entry.at("duration");
         options.run.step = entry.at("step");
         result.steering = std::make_unique<LoggedSteering>(read_quietly(plan_text, entry.at("plan_path")), k, options,
-                                                           SteeringCallbacks{}, "", sample_plan);
+                                                           std::move(callbacks), path, sample_plan);
         continue;
       }
       Steering& s = result.steering->steering();
@@ -213,17 +280,21 @@ ReplayResult replay(const std::string& log, const std::string& name, const Knowl
       if (entry.contains("frame")) {
         // the cursor was in the past; nothing beyond its frame is needed
         const size_t frame = entry.at("frame");
-        while (b.frames() <= frame && s.advance())
-          if (progress.is_cancelled()) return result;
+        const double first = static_cast<double>(b.frames()), way = static_cast<double>(frame) + 1 - first;
+        while (b.frames() <= frame && advance(s, (static_cast<double>(b.frames()) - first) / way)) {}
+        if (progress.is_cancelled()) return result;
         s.rewind_to_frame(frame);
       } else {
-        while (b.steps() < step && s.advance())
-          if (progress.is_cancelled()) return result;
+        const double first = static_cast<double>(b.steps()), way = static_cast<double>(step) - first;
+        while (b.steps() < step && advance(s, (static_cast<double>(b.steps()) - first) / way)) {}
+        if (progress.is_cancelled()) return result;
         s.go_live();
       }
-      if (progress.report) progress.report(static_cast<double>(at), static_cast<double>(log.size()));
+      if (progress.report) progress.report(line, static_cast<double>(lines.size()));
       if (s.cursor_step() != step) fail("E943", fmt::format("branch {} does not come to step {} again", b.id, step));
-      if (action != "reached") {
+      if (action == "reached") {
+        result.steering->note_reached();
+      } else {
         const Steering::Made made = result.steering->perform(entry.at("command"));
         if (made.branch->id != entry.at("made").get<int>()) fail("E943", "the action makes another branch than it did");
       }

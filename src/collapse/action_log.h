@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -58,15 +59,29 @@ class LoggedSteering {
   std::map<int, long> reached_;  // step of each branch
 };
 
+/// What a log holds, without doing it again.
+struct LogSummary {
+  std::string path, created;
+  long actions = 0;  // beside how far branches were computed
+  int branches = 1;
+  double time = 0;  // farthest that one was computed [s]
+};
+
+/// The latest log beside `path` (its name, or one with a number behind it) of the same plan, program, rules and run
+/// options in which something was computed or changed; none if there is none. Files that are no logs are passed over.
+std::optional<LogSummary> find_earlier_log(const std::string& path, const std::string& plan_sha256, const Knowledge&,
+                                           const RunOptions&);
+
 struct ReplayResult {
   std::unique_ptr<LoggedSteering> steering;
   long actions = 0;
   bool was_cut = false;  // the last line had no end
 };
 
-/// Does a log again, up to its last whole line. Throws InputError: a text that is no log (E942), one of another program
-/// or other rules (E943).
+/// Does a log again, up to its last whole line, so that one can go on from there. Throws InputError: a text that is no
+/// log (E942), one of another program or other rules (E943).
+///   path  of the log of what is done again and of what follows; empty: none
 ReplayResult replay(const std::string& log, const std::string& name, const Knowledge&, SteeringOptions,
-                    const SamplePlan&, const Progress& = {});
+                    const SamplePlan&, const Progress& = {}, SteeringCallbacks = {}, const std::string& path = {});
 
 }  // namespace topple::collapse

@@ -8,6 +8,7 @@
 
 #include "base/file.h"
 #include "base/hash.h"
+#include "collapse/edit_json.h"
 #include "product/plan_sampler.h"
 
 namespace topple::server {
@@ -18,21 +19,23 @@ using collapse::Steering;
 namespace {
 
 constexpr std::size_t kMostEvents = 4096;
-constexpr double kFrameInterval = 1.0 / 60, kStateInterval = 0.1, kReachedInterval = 10, kLookInterval = 1;  // [s]
+constexpr double kFrameInterval = 1.0 / 60, kStateInterval = 0.1, kReachedInterval = 1, kLookInterval = 1;  // [s]
 
 double since(std::chrono::steady_clock::time_point t) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - t).count();
 }
 
-std::string free_log_path(const std::string& folder, const SessionPlan& plan) {
-  if (folder.empty()) return {};
-  std::string stem = plan.path.empty() ? "plan" : std::filesystem::path(plan.path).stem().string();
-  std::error_code ignored;
-  std::filesystem::create_directories(folder, ignored);
-  return (std::filesystem::path(folder) / (stem + ".steer.jsonl")).string();
+product::Plan make_sample_plan(const product::Plan& base, const std::vector<double>& inputs) {
+  return product::make_sample(product::make_sampler(base), inputs);
 }
 
 }  // namespace
+
+std::string log_path(const std::string& folder, const std::string& plan_path) {
+  if (folder.empty()) return {};
+  const std::string stem = plan_path.empty() ? "plan" : std::filesystem::path(plan_path).stem().string();
+  return (std::filesystem::path(folder) / (stem + ".steer.jsonl")).string();
+}
 
 Session::Session(int id, SessionPlan plan, const SessionSetting& setting)
     : id_(id), plan_(std::move(plan)), setting_(setting) {
@@ -181,6 +184,13 @@ Json Session::describe() const {
   j["speed"] = speed_ ? Json(*speed_) : Json(nullptr);
   j["fuzzy"] = checked_plan_ && !checked_plan_->fuzzy.inputs.empty();
   j["log"] = steering_ ? steering_->path() : "";
+  j["earlier"] = nullptr;
+  if (earlier_ && is_untouched())
+    j["earlier"] = {{"log", std::filesystem::path(earlier_->path).filename().string()},
+                    {"created", earlier_->created},
+                    {"actions", earlier_->actions},
+                    {"branches", earlier_->branches},
+                    {"time", earlier_->time}};
   Json& branches = j["branches"] = Json::array();
   if (steering_)
     for (const auto& b : steering_->steering().branches())
@@ -267,7 +277,7 @@ void Session::publish_state(bool is_due) {
   }
   if (!failure_.empty()) s["ending"] = {{"kind", failure_kind_}, {"text", failure_}};
   s["speed"] = speed_ ? Json(*speed_) : Json(nullptr);
-  s["progress"] = nullptr;
+  s["progress"] = progress_ ? Json(*progress_) : Json(nullptr);
   last_state_ = Clock::now();
   if (s == last_state_told_) return;
   last_state_told_ = s;
@@ -324,7 +334,7 @@ void Session::look_at_file() {
   }
 }
 
-void Session::build(const product::Plan& plan) {
+collapse::SteeringCallbacks Session::make_callbacks() {
   collapse::SteeringCallbacks callbacks;
   callbacks.on_branch = [this](const Branch& b) {
     if (steering_) tell_branch(b);
@@ -333,13 +343,73 @@ void Session::build(const product::Plan& plan) {
     if (steering_) tell({{"type", "happenings"}, {"branch", b.id}, {"events", {describe_event(e)}}});
   };
   callbacks.on_frame = [this](const Branch&, std::size_t) { publish_frame(false); };
-  collapse::SamplePlan sample = [](const product::Plan& base, const std::vector<double>& inputs) {
-    return product::make_sample(product::make_sampler(base), inputs);
-  };
-  steering_ = std::make_unique<collapse::LoggedSteering>(plan, setting_.knowledge, setting_.steering, callbacks,
-                                                         free_log_path(setting_.folder, plan_), sample);
+  return callbacks;
+}
+
+void Session::build(const product::Plan& plan) {
+  const std::string path = log_path(setting_.folder, plan_.path);
+  std::error_code ignored;
+  if (!path.empty()) std::filesystem::create_directories(setting_.folder, ignored);
+  if (!path.empty() && !earlier_)
+    earlier_ = collapse::find_earlier_log(path, calc_sha256(plan.text), setting_.knowledge, setting_.steering.run);
+  steering_ = std::make_unique<collapse::LoggedSteering>(plan, setting_.knowledge, setting_.steering, make_callbacks(),
+                                                         path, make_sample_plan);
   steering_->on_line = [this](const std::string& line) { tell({{"type", "log"}, {"entry", Json::parse(line)}}); };
   begin_branch();
+}
+
+bool Session::is_untouched() const {
+  return steering_ != nullptr && steering_->lines().size() == 1 && steering_->steering().active().steps() == 0;
+}
+
+void Session::build_from_log(const std::string& path) {
+  const std::string text = read_file(path);
+  Progress progress;
+  progress.cancel = &closing_;
+  progress.report = [this](double done, double whole) {
+    progress_ = whole > 0 ? done / whole : 0;
+    publish_state(false);
+  };
+  collapse::ReplayResult again;
+  try {
+    again =
+        collapse::replay(text, std::filesystem::path(path).filename().string(), setting_.knowledge, setting_.steering,
+                         make_sample_plan, progress, make_callbacks(), log_path(setting_.folder, plan_.path));
+  } catch (...) {
+    progress_.reset();
+    throw;
+  }
+  progress_.reset();
+  steering_ = std::move(again.steering);
+  steering_->steering().go_live();
+  steering_->on_line = [this](const std::string& line) { tell({{"type", "log"}, {"entry", Json::parse(line)}}); };
+  earlier_.reset();
+  begin_branch();
+}
+
+Json Session::go_on_from_log(const Json& command) {
+  collapse::check_keys(command, {});
+  (void)core();
+  if (!earlier_) throw InputError("E930", "there is no earlier session of this plan to go on with");
+  if (!is_untouched())
+    throw InputError("E930", "this session has begun already", "start again, and go on before anything else");
+  // the log that this session has begun holds nothing
+  const std::string own = steering_->path(), path = earlier_->path;
+  phase_ = Phase::Building;
+  steering_.reset();
+  std::error_code ignored;
+  if (!own.empty()) std::filesystem::remove(own, ignored);
+  publish_state(true);
+  try {
+    build_from_log(path);
+  } catch (...) {
+    earlier_.reset();
+    build(*checked_plan_);
+    for (const auto& c : watchers()) welcome(c);
+    throw;
+  }
+  for (const auto& c : watchers()) welcome(c);
+  return {{"branch", core().active().id}, {"time", core().active().frontier()}};
 }
 
 void Session::begin_branch() {
@@ -382,16 +452,12 @@ void Session::pause() {
 void Session::advance_chunk() {
   Steering& s = core();
   const auto begin = Clock::now();
+  double wait = 0;  // until the speed that is asked for allows the next step [s]
   while (phase_ == Phase::Running) {
-    const double time = s.active().frontier();
     if (speed_) {
       const double allowed = speed_time_ + *speed_ * since(speed_start_);
-      if (time > allowed) {
-        std::unique_lock lock(mutex_);
-        if (tasks_.empty() && !closing_)
-          wakes_.wait_for(lock, std::chrono::duration<double>(std::min(0.02, (time - allowed) / *speed_)));
-        return;
-      }
+      wait = (s.active().frontier() - allowed) / *speed_;
+      if (wait > 0) break;
     }
     const std::size_t frames = s.active().frames();
     const bool goes_on = s.advance();
@@ -411,6 +477,10 @@ void Session::advance_chunk() {
     last_reached_ = Clock::now();
     steering_->note_reached();
   }
+  if (wait > 0) {
+    std::unique_lock lock(mutex_);
+    if (tasks_.empty() && !closing_) wakes_.wait_for(lock, std::chrono::duration<double>(std::min(0.02, wait)));
+  }
 }
 
 void Session::work() {
@@ -420,6 +490,11 @@ void Session::work() {
     checked_plan_ = product::read_plan(plan_.text, plan_.path.empty() ? plan_.title : plan_.path, warnings);
     diagnostics_ = warnings;
     build(*checked_plan_);
+    if (plan_.goes_on && earlier_) {
+      try {
+        (void)go_on_from_log(Json::object());
+      } catch (const InputError& e) { diagnostics_.push_back(e.diagnostics().front()); }
+    }
   } catch (const InputError& e) {
     steering_.reset();
     phase_ = Phase::Failed;

@@ -22,6 +22,7 @@ struct SessionPlan {
   std::string title;  // where there is no file
   std::string path;   // of the file; empty: none
   std::string text;
+  bool goes_on = false;  // with the latest session of the same plan, if there is one
 };
 
 struct SessionSetting {
@@ -32,6 +33,10 @@ struct SessionSetting {
   std::string plans;     // folder of plans
   double chunk = 0.008;  // wall time from one look at the commands to the next [s]
 };
+
+/// Where the action log of a plan begins: its name in a folder; a free one with a number behind it is taken if it
+/// exists. Empty if `folder` is.
+std::string log_path(const std::string& folder, const std::string& plan_path);
 
 /// The file of a plan is not the one that a text began from.
 class Conflict : public InputError {
@@ -78,6 +83,13 @@ class Session {
 
   void work();
   void build(const product::Plan&);
+  /// Does an earlier session again and goes on from there. Throws InputError as collapse::replay; then there is no
+  /// model.
+  void build_from_log(const std::string& path);
+  collapse::SteeringCallbacks make_callbacks();
+  /// Nothing was computed or changed yet.
+  bool is_untouched() const;
+  Json go_on_from_log(const Json& command);
   void begin_branch();
   void advance_chunk();
   void pause();
@@ -111,6 +123,8 @@ class Session {
   SessionSetting setting_;
   std::unique_ptr<collapse::LoggedSteering> steering_;
   std::optional<product::Plan> checked_plan_;
+  std::optional<collapse::LogSummary> earlier_;  // session of the same plan
+  std::optional<double> progress_;               // of building, 0..1
 
   // commands
   struct Task {
@@ -123,7 +137,7 @@ class Session {
   std::condition_variable wakes_;
   std::deque<Task> tasks_;
   Json brief_;
-  bool closing_ = false;
+  std::atomic<bool> closing_ = false;
 
   // who looks; events kept for those who come back
   mutable std::mutex watch_mutex_;

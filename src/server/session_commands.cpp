@@ -8,6 +8,7 @@
 
 #include "base/file.h"
 #include "base/hash.h"
+#include "collapse/branch_plan.h"
 #include "collapse/edit_json.h"
 #include "server/session.h"
 
@@ -48,12 +49,39 @@ std::size_t frame_at(const std::vector<double>& time, double t) {
 
 std::vector<std::string> command_words() {
   std::vector<std::string> words = collapse::edit_words();
-  for (const char* w :
-       {"run",         "pause",         "step",         "speed",          "rewind",        "live",        "undo",
-        "branch",      "rename",        "switch",       "compare",        "scene",         "frames",      "findings",
-        "series",      "zone",          "log",          "plan.apply",     "plan.save",     "plan.text",   "plan.check",
-        "ping",        "session.list",  "session.open", "session.attach", "session.close", "study.start", "study.list",
-        "study.watch", "study.unwatch", "study.cancel", "study.play"})
+  for (const char* w : {"run",
+                        "pause",
+                        "step",
+                        "speed",
+                        "rewind",
+                        "live",
+                        "undo",
+                        "branch",
+                        "rename",
+                        "switch",
+                        "compare",
+                        "scene",
+                        "frames",
+                        "findings",
+                        "series",
+                        "zone",
+                        "log",
+                        "plan.apply",
+                        "plan.save",
+                        "plan.text",
+                        "plan.check",
+                        "ping",
+                        "session.list",
+                        "session.open",
+                        "session.attach",
+                        "session.close",
+                        "session.continue",
+                        "study.start",
+                        "study.list",
+                        "study.watch",
+                        "study.unwatch",
+                        "study.cancel",
+                        "study.play"})
     words.emplace_back(w);
   return words;
 }
@@ -93,6 +121,7 @@ Json Session::perform(Client& client, const Json& command) {
     for (const auto& c : watchers()) welcome(c);
     return {{"branch", 1}};
   }
+  if (word == "session.continue") return go_on_from_log(command);
   if (collapse::LoggedSteering::is_action(word)) return change(word, command);
   if (word == "scene") {
     check_keys(command, {});
@@ -127,10 +156,16 @@ Json Session::perform(Client& client, const Json& command) {
     return {{"entries", std::move(entries)}};
   }
   if (word == "plan.text") {
-    check_keys(command, {});
+    check_keys(command, {"edits"});
     if (!steering_) return {{"text", plan_.text}, {"sha256", calc_sha256(plan_.text)}, {"path", plan_.path}};
-    const product::Plan& p = branch_of(command).run().model().plan();
-    return {{"text", p.text}, {"sha256", calc_sha256(p.text)}, {"path", plan_.path}};
+    const collapse::LiveModel& live = branch_of(command).run().model();
+    collapse::BranchPlan plan{live.plan().text, {}, {}};
+    if (read_flag(command, "edits", false)) plan = collapse::write_branch_plan(live);
+    return {{"text", plan.text},
+            {"sha256", calc_sha256(plan.text)},
+            {"path", plan_.path},
+            {"taken", plan.taken},
+            {"left_out", plan.left_out}};
   }
   if (word == "plan.save") return save_plan(command);
   const std::string near = nearest_name(word, command_words());

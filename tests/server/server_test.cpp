@@ -49,6 +49,7 @@ class ServerTest : public ::testing::Test {
     o.plans = (folder_ / "plans").string();
     o.page = "<!doctype html><title>steer</title>";
     o.report = "<html><!--TOPPLE-DATA--></html>";
+    o.study = "<title>study</title><!--TOPPLE-DATA-->";
     hub_ = std::make_unique<Hub>(o);
     server_ = std::make_unique<Server>(*hub_, serving);
     hub_->open({"house.toml", plan_path_, text});
@@ -292,6 +293,25 @@ TEST_F(ServerTest, FramesHoldWhatTheRecordHolds) {
   }
   EXPECT_EQ(c->result("frames", {{"from", 1}, {"count", 3}, {"stride", 2}})["count"], 3);
   EXPECT_EQ(c->result("frames", {{"from", 99999}, {"count", 3}})["count"], 0);
+}
+
+TEST_F(ServerTest, ARunHeldToASpeedTellsHowFarItIs) {
+  start(one_stage("1 s"));
+  const auto c = watcher();
+  c->result("speed", {{"factor", 0.2}});
+  c->result("run");
+  double last = 0;
+  for (int told = 0; told < 4; ++told) {
+    const TestJson s = c->wait_for(
+        [&](const TestJson& j) { return j["type"] == "state" && j["phase"] == "running" && j["time"] > last; });
+    ASSERT_TRUE(s.is_object());
+    last = s["time"];
+  }
+  EXPECT_LT(last, 0.9);
+  // and the log hears of it while it goes on
+  EXPECT_TRUE(c->wait_for([](const TestJson& j) {
+                 return j["type"] == "log" && j["entry"]["action"] == "reached" && j["entry"]["time"] < 0.9;
+               }).is_object());
 }
 
 TEST_F(ServerTest, TellsAZonesPath) {
@@ -562,7 +582,33 @@ TEST_F(ServerTest, AStudyGrowsAndASampleIsPlayed) {
     EXPECT_EQ(study["outputs"][i]["unit"], written[i]["unit"]);
     EXPECT_EQ(study["bounds"][i]["high"][0], written[i]["levels"][0]["upper"]) << written[i]["name"];
   }
-  EXPECT_EQ(http.get(at("/api/studies/1/study.html")).status, 404) << "that page is not built here";
+  const HttpAnswer page = http.get(at("/api/studies/1/study.html"));
+  EXPECT_EQ(page.status, 200);
+  EXPECT_NE(page.head.find("text/html"), std::string::npos);
+  EXPECT_EQ(page.body.rfind("<title>study</title><script type=\"application/json\"", 0), 0U) << page.body.substr(0, 99);
+  EXPECT_NE(page.body.find("membership"), std::string::npos);
+}
+
+TEST_F(ServerTest, AStudyTakesTheEditsOfTheBranch) {
+  start(product::small_plan() + study::strengths);
+  const auto c = watcher();
+  EXPECT_EQ(c->result("plan.text", {{"edits", true}})["text"], read_file(plan_path_));
+  EXPECT_EQ(c->result("set_delay", {{"stage", 1}, {"time", 1.9}})["branch"], 1);
+  c->result("run", {{"until", 0.005}});
+  c->wait_for([](const TestJson& j) { return j["type"] == "state" && j["phase"] == "paused" && j["time"] > 0; });
+  c->result("set_friction", {{"ground", 0.31}, {"bodies", 0.31}, {"in_place", true}});
+  const TestJson plan = c->result("plan.text", {{"edits", true}});
+  EXPECT_EQ(plan["taken"].size(), 1U) << plan;
+  EXPECT_EQ(plan["left_out"].size(), 1U) << plan;
+  EXPECT_NE(plan["text"].get<std::string>().find("\"1.9 s\""), std::string::npos);
+  const TestJson with = c->result("study.start", {{"samples", 2}}),
+                 without = c->result("study.start", {{"samples", 2}, {"edits", false}});
+  EXPECT_EQ(with["taken"], plan["taken"]) << with;
+  EXPECT_EQ(with["left_out"], plan["left_out"]);
+  EXPECT_TRUE(without["taken"].empty());
+  EXPECT_NE(with["state"]["folder"], without["state"]["folder"]) << "another plan is another study";
+  c->result("study.cancel", {{"study", 1}});
+  c->result("study.cancel", {{"study", 2}});
 }
 
 }  // namespace

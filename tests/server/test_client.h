@@ -56,6 +56,7 @@ class TestClient {
     return socket_ >= 0;
   }
 
+  std::uint16_t port() const { return port_; }
   std::string host() const { return "127.0.0.1:" + std::to_string(port_); }
 
   HttpAnswer get(const std::string& path, const std::string& extra = {}, std::string host_text = {},

@@ -18,7 +18,7 @@ import { Tree } from "./steer_tree";
 import { SteerView, picture } from "./steer_view";
 import { OpenPlan } from "./steer_welcome";
 import { Events } from "./tables";
-import { formatDuration, formatTime, prettify } from "./units";
+import { formatDate, formatDuration, formatTime, prettify } from "./units";
 import { endingWord } from "./vocabulary";
 
 const phaseWord: Record<string, string> = {
@@ -110,6 +110,20 @@ function Banner(props: { s: SteerState }) {
   return null;
 }
 
+/// A session that ended before, maybe not by itself.
+function Earlier(props: { s: SteerState }) {
+  const { s } = props;
+  const earlier = s.earlier.value;
+  if (earlier === null) return null;
+  return (
+    <div class="banner info" role="status" data-test="earlier">
+      <strong>There is an earlier session of this plan</strong> ({earlier.log}, {formatDate(earlier.created)}): {earlier.actions} {earlier.actions === 1 ? "action" : "actions"}, {earlier.branches} {earlier.branches === 1 ? "branch" : "branches"}, computed to {formatTime(earlier.time)}.{" "}
+      <button type="button" class="small" data-test="continue" onClick={() => void s.ask("session.continue")}>Go on with it</button>{" "}
+      or begin anew with Run.
+    </div>
+  );
+}
+
 const tabs: [Tab, string][] = [
   ["plots", "Plots"], ["events", "Events"], ["findings", "Findings"], ["compare", "Compare"], ["study", "Study"], ["plan", "Plan text"], ["log", "Action log"],
 ];
@@ -126,7 +140,7 @@ function Log(props: { s: SteerState }) {
       <table class="text-table">
         <thead><tr><th scope="col">No.</th><th scope="col">Branch</th><th scope="col">At</th><th scope="col">Action</th><th scope="col">Values</th></tr></thead>
         <tbody>
-          {[...s.log.value].reverse().map((e) => {
+          {s.log.value.filter((e, k, all) => e.action !== "reached" || all[k + 1]?.action !== "reached").reverse().map((e) => {
             const { command: _, id: __, session: ___, branch: ____, ...values } = (e.command ?? {}) as Record<string, unknown>;
             return (
               <tr>
@@ -170,6 +184,9 @@ function Bottom(props: { s: SteerState }) {
       <div class="tab-body" role="tabpanel" aria-labelledby={`tab-${tab}`}>
         {tab === "plots" && <Plots key={view.id} state={view.state} onSeek={s.look} height={s.tall.value ? 220 : 130} />}
         {tab === "events" && <Events state={view.state} />}
+        {tab === "findings" && s.isUnderWay.value && (
+          <p class="banner info" data-test="so-far">The run is under way: findings as they stand at {formatTime(s.findings.value?.time ?? s.frontier.value)}. What may still change is not judged.</p>
+        )}
         {tab === "findings" && (
           <div class="finding-columns">
             <Findings run={{ ...view.run, findings: s.findings.value?.findings ?? [] }} />
@@ -265,7 +282,7 @@ function Page(props: { s: SteerState }) {
   return (
     <div class={`steer ${s.tall.value ? "tall" : ""}`}>
       <Header s={s} />
-      <div class="banners"><Banner s={s} /></div>
+      <div class="banners"><Banner s={s} /><Earlier s={s} /></div>
       <main class="steer-main">
         <Tree s={s} />
         <SteerView s={s} onReady={ready} />

@@ -88,6 +88,10 @@ export function makeSteerState(address: string) {
   const frontier = computed(() => progress.value?.time ?? branch.value?.frontier ?? 0);
   /// The end of the time axis: what the plan asks for, or how far the run came.
   const span = computed(() => Math.max(branch.value?.duration ?? 0, frontier.value, view.value?.state.end.value ?? 0, 1e-3));
+  /// Neither at its end nor failed: what is found so far may change.
+  const isUnderWay = computed(() => (progress.value?.ending ?? branch.value?.ending ?? null) === null);
+  /// An earlier session of this plan, as long as this one has not begun.
+  const earlier = computed(() => (frontier.value === 0 && log.value.length === 0 && branches.value.length === 1 && phase.value === "paused" ? (session.value?.earlier ?? null) : null));
   /// Where an edit would act.
   const editTime = computed(() => (following.value ? frontier.value : (view.value?.state.time.value ?? 0)));
 
@@ -444,7 +448,7 @@ export function makeSteerState(address: string) {
   return {
     ...look,
     connection, status: connection.status, ask, notify, dismiss, notices, welcomed,
-    session, sessions, branches, branch, active, view, plan, progress, phase, frontier, span, following, editTime, log, findings,
+    session, sessions, branches, branch, active, view, plan, progress, phase, frontier, span, following, editTime, isUnderWay, earlier, log, findings,
     studies, samples, watchedStudy, zone, comparison, tab, tall, dialog, hiddenStoreys, section, showDebris, planCheck, editedText, draws,
     edit, tryEdit, arrive, show, fill, runs,
 

@@ -67,6 +67,8 @@ export interface Session {
   branches: Branch[];
   fuzzy: boolean;
   diagnostics?: Diagnostic[];
+  /// A session of the same plan that one can go on with.
+  earlier?: { log: string; created: string; actions: number; branches: number; time: number } | null;
 }
 export interface Diagnostic {
   severity: string;
@@ -84,14 +86,14 @@ export interface PlanCheck {
   /// Whether anything in the plan takes away a support; false: a dead plan.
   removes_support?: boolean;
 }
-export interface StateEvent {
-  phase: Phase;
 /// The plan of a branch as a text, and which of its edits are in it.
 export interface BranchPlan {
   text: string;
   taken: string[];
   left_out: string[];
 }
+export interface StateEvent {
+  phase: Phase;
   branch: number;
   time: number;
   frames: number;
@@ -163,13 +165,13 @@ export interface Comparison {
   edits?: unknown;
 }
 export interface FindingsSoFar {
+  time?: number;
   ending: Ending | null;
   findings: Finding[];
   events: RunEvent[];
   not_modelled: string[];
   notes: string[];
 }
-  time?: number;
 
 export interface WireFrame extends Frame {
   session: number;
