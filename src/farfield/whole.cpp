@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "base/unit.h"
+#include "collapse/law.h"
 #include "farfield/mixture.h"
 
 namespace topple::farfield {
@@ -24,39 +25,102 @@ struct Loss {
 /// Materials as they are asked for.
 class Materials {
  public:
-  Materials(const product::Plan& plan, double length, std::vector<fem::ExplicitMaterial>& out)
-      : plan_(plan), length_(length), out_(out) {}
+  Materials(const product::Plan& plan, std::vector<fem::ExplicitMaterial>& out) : plan_(plan), out_(out) {}
 
-  int of_section(int section, const Loss& loss) {
-    const auto [it, is_new] = sections_.emplace(std::make_tuple(section, loss), static_cast<int>(out_.size()));
+  ///   zone, element  lengths of the zone that a member's damage gathers in, and of an element [m]
+  int of_section(int section, const Loss& loss, double zone, double element) {
+    const int grade = grade_of(zone / element);
+    const auto [it, is_new] =
+        sections_.emplace(std::make_tuple(section, loss, zone, grade), static_cast<int>(out_.size()));
     if (!is_new) return it->second;
     const product::Section& s = plan_.sections[static_cast<size_t>(section)];
     nearfield::ZoneInput in;
     in.section = s;
     in.concrete = plan_.concretes[static_cast<size_t>(s.concrete)];
     in.steel = plan_.steels[static_cast<size_t>(s.steel)];
-    in.length = length_;
+    in.length = zone;
     in.concrete_loss = loss.concrete;
     in.cut_bars = loss.cut_bars;
     in.cut_concrete = loss.cut_concrete;
-    std::string name = s.name;
-    if (loss != Loss{}) name += "/weakened" + std::to_string(out_.size());
-    out_.push_back(make_section_material(in, name));
+    std::string name = s.name + "/" + std::to_string(out_.size());
+    if (loss != Loss{}) name += "/weakened";
+    out_.push_back(make_section_material(in, zone / ratio_of(grade), name));
     return it->second;
   }
-  int of_panel(int panel) {
-    const auto [it, is_new] = panels_.emplace(panel, static_cast<int>(out_.size()));
-    if (is_new) out_.push_back(make_panel_material(plan_, plan_.panels[static_cast<size_t>(panel)], length_));
+  int of_panel(int panel, double zone, double element) {
+    const int grade = grade_of(zone / element);
+    const auto [it, is_new] = panels_.emplace(std::pair(panel, grade), static_cast<int>(out_.size()));
+    if (is_new) {
+      out_.push_back(
+          make_panel_material(plan_, plan_.panels[static_cast<size_t>(panel)], zone, zone / ratio_of(grade)));
+      out_.back().name += "/" + std::to_string(it->second);
+    }
     return it->second;
   }
 
  private:
+  // ratios within a seventh of each other share a law
+  static constexpr double kGrade = 4.0 / 3;
+  static int grade_of(double ratio) { return static_cast<int>(std::lround(std::log(ratio) / std::log(kGrade))); }
+  static double ratio_of(int grade) { return std::pow(kGrade, grade); }
+
   const product::Plan& plan_;
-  double length_;
   std::vector<fem::ExplicitMaterial>& out_;
-  std::map<std::tuple<int, Loss>, int> sections_;
-  std::map<int, int> panels_;
+  std::map<std::tuple<int, Loss, double, int>, int> sections_;
+  std::map<std::pair<int, int>, int> panels_;
 };
+
+/// Length of a cell along its member; of a slab or wall, which cracks in any direction, the edge of a square of its
+/// area in plane [m].
+double calc_cell_length(const Grid& grid, const Cell& cell, const product::Plan& plan, double volume) {
+  const product::Member& m = plan.members[static_cast<size_t>(cell.member)];
+  if (m.section < 0) return std::sqrt(volume / plan.panels[static_cast<size_t>(m.panel)].thickness);
+  const int axis = axis_of(m);
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const int n : cell.node) {
+    const double at = grid.nodes[static_cast<size_t>(n)][axis];
+    low = std::min(low, at), high = std::max(high, at);
+  }
+  return high - low;
+}
+
+/// Lengths of the zones in which damage of each member gathers: those of the manager's (members) [m].
+std::vector<double> calc_zone_lengths(const product::Plan& plan, const collapse::Knowledge& k,
+                                      const collapse::ModelMap& map) {
+  std::vector<double> out;
+  const auto section_of = [&](const product::Member& m) -> const product::Section& {
+    return plan.sections[static_cast<size_t>(m.section)];
+  };
+  for (const product::Member& m : plan.members) {
+    if (m.section < 0) {
+      out.push_back(k.slab_elongation_lengths * plan.panels[static_cast<size_t>(m.panel)].thickness);
+      continue;
+    }
+    // between the faces of what it meets
+    const product::Section& s = section_of(m);
+    const bool is_column = m.kind == product::MemberKind::Column;
+    double ends[2] = {0, 0};
+    for (const product::Member& other : plan.members) {
+      if (other.removed || other.section < 0 || other.storey != m.storey) continue;
+      const product::Section& o = section_of(other);
+      const auto meets = [](const product::Member& beam, int row, int frame) {
+        return (beam.row_a == row && beam.frame_a == frame) || (beam.row_b == row && beam.frame_b == frame);
+      };
+      if (is_column && other.kind == product::MemberKind::Beam && meets(other, m.row_a, m.frame_a))
+        ends[1] = std::max(ends[1], o.height);
+      if (!is_column && other.kind == product::MemberKind::Column)
+        for (int e = 0; e < 2; ++e)
+          if (other.row_a == (e == 0 ? m.row_a : m.row_b) && other.frame_a == (e == 0 ? m.frame_a : m.frame_b))
+            ends[e] = std::max(ends[e], 0.5 * (axis_of(m) == 0 ? o.width : o.height));
+    }
+    const double clear = std::max(norm(m.end - m.start) - ends[0] - ends[1], 0.1);
+    const bool bends_about_y = std::abs(map.hinge_axis.y) >= std::abs(map.hinge_axis.x);
+    out.push_back(collapse::calc_zone_length(s, plan.concretes[static_cast<size_t>(s.concrete)],
+                                             plan.steels[static_cast<size_t>(s.steel)],
+                                             is_column && bends_about_y ? s.width : s.height, clear, k));
+  }
+  return out;
+}
 
 /// Distance from a box along W's axes as it stands at the start; negative inside.
 double calc_distance(const Vec3& p, const Vec3& centre, const Vec3& half) {
@@ -133,14 +197,20 @@ Whole make_whole(const product::Plan& plan, const collapse::Knowledge& k, const 
     }
   }
 
-  Materials materials(plan, options.size, fe.materials);
+  Materials materials(plan, fe.materials);
+  const std::vector<double> zone_lengths = calc_zone_lengths(plan, k, map);
   const std::vector<int> bodies = find_bodies(grid, model, map);
   for (size_t c = 0; c < grid.cells.size(); ++c) {
     const Cell& cell = grid.cells[c];
     const product::Member& m = plan.members[static_cast<size_t>(cell.member)];
     fem::ExplicitElement e;
     e.node = cell.node;
-    e.material = m.section >= 0 ? materials.of_section(m.section, loss[c]) : materials.of_panel(m.panel);
+    std::array<Vec3, 8> corners;
+    for (size_t i = 0; i < 8; ++i) corners[i] = grid.nodes[static_cast<size_t>(cell.node[i])];
+    const double length = calc_cell_length(grid, cell, plan, fem::calc_hex_volume(corners));
+    const double zone = zone_lengths[static_cast<size_t>(cell.member)];
+    e.material = m.section >= 0 ? materials.of_section(m.section, loss[c], zone, length)
+                                : materials.of_panel(m.panel, zone, length);
     e.part = bodies[c];
     const MemberFit& fit = grid.fits[static_cast<size_t>(cell.member)];
     e.mass_factor = calc_loaded_mass(plan, m) / (fit.volume * fe.materials[static_cast<size_t>(e.material)].density);

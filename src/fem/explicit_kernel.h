@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "fem/explicit_model.h"
+
 namespace topple::fem::kernel {
 
 // Field numbers are constants, and named so.
@@ -39,7 +41,6 @@ inline constexpr int kRoomFields = 12;
 enum NodeFlag : std::uint8_t { kHoldX = 1, kHoldY = 2, kHoldZ = 4, kPushed = 8 };
 // NOLINTEND(readability-identifier-naming)
 
-inline constexpr int kMostYieldPoints = 8;
 inline constexpr int kMostGrounds = 4;
 
 /// A material's constants.

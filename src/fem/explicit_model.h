@@ -11,6 +11,8 @@
 
 namespace topple::fem {
 
+inline constexpr int kMostYieldPoints = 12;  // NOLINT(readability-identifier-naming)
+
 /// Uniaxial yield stresses at a plastic strain; in between and beyond, straight lines (the last value stays).
 struct YieldPoint {
   double strain = 0;       // equivalent plastic strain, the first 0, rising
@@ -25,7 +27,7 @@ struct ExplicitMaterial {
   double density = 0;  // [kg/m³]
   double E = 0;        // [Pa]
   double nu = 0;
-  std::vector<YieldPoint> yield;  // empty: elastic; at most 8
+  std::vector<YieldPoint> yield;  // empty: elastic; at most kMostYieldPoints
   /// Largest mean tension over the tensile yield stress; infinite: none.
   double tension_cutoff = std::numeric_limits<double>::infinity();
   /// Plastic strains at which an element goes, in pure tension and in pure compression; infinite: never.
