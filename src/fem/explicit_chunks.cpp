@@ -52,20 +52,10 @@ ExplicitChunks make_chunks(const ExplicitModel& model, size_t lanes, size_t elem
   }
   c.order.resize(E);
   std::iota(c.order.begin(), c.order.end(), 0);
-  std::stable_sort(c.order.begin(), c.order.end(), [&](int a, int b) {
-    return model.elements[static_cast<size_t>(a)].material < model.elements[static_cast<size_t>(b)].material;
-  });
   c.slot_of_element.resize(E);
-  const auto material_at = [&](size_t i) { return model.elements[static_cast<size_t>(c.order[i])].material; };
+  Bisection(centres, elements_a_chunk).sort(c.order.data(), c.order.data() + E);
   std::vector<std::pair<size_t, size_t>> ranges;  // of order, chunk after chunk
-  for (size_t first = 0; first < E;) {
-    size_t last = first;
-    while (last < E && material_at(last) == material_at(first)) ++last;
-    Bisection(centres, elements_a_chunk).sort(c.order.data() + first, c.order.data() + last);
-    for (size_t i = first; i < last; i += elements_a_chunk)
-      ranges.emplace_back(i, std::min(last, i + elements_a_chunk));
-    first = last;
-  }
+  for (size_t i = 0; i < E; i += elements_a_chunk) ranges.emplace_back(i, std::min(E, i + elements_a_chunk));
 
   // which nodes are one chunk's alone
   constexpr std::uint32_t kNobody = std::numeric_limits<std::uint32_t>::max(), kSeveral = kNobody - 1;
@@ -87,7 +77,6 @@ ExplicitChunks make_chunks(const ExplicitModel& model, size_t lanes, size_t elem
   };
   for (size_t k = 0; k < ranges.size(); ++k) {
     ElementChunk chunk;
-    chunk.material = material_at(ranges[k].first);
     chunk.first_row = c.node_of_row.size();
     for (size_t i = ranges[k].first; i < ranges[k].second; ++i)
       for (const int n : model.elements[static_cast<size_t>(c.order[i])].node)
@@ -109,10 +98,7 @@ ExplicitChunks make_chunks(const ExplicitModel& model, size_t lanes, size_t elem
     ElementChunk& chunk = c.chunks[k];
     const size_t elements = ranges[k].second - ranges[k].first;
     chunk.first_block = c.element_of_slot.size() / c.W;
-    chunk.blocks = (elements + c.W - 1) / c.W;
     chunk.first_shared = c.shared_rows.size();
-    c.element_of_slot.resize((chunk.first_block + chunk.blocks) * c.W, -1);
-    c.corners.resize((chunk.first_block + chunk.blocks) * 8 * c.W);
     for (size_t i = 0; i < elements; ++i)
       for (const int n : model.elements[static_cast<size_t>(c.order[ranges[k].first + i])].node) {
         std::uint32_t& at = place[static_cast<size_t>(n)];
@@ -128,19 +114,33 @@ ExplicitChunks make_chunks(const ExplicitModel& model, size_t lanes, size_t elem
       }
     chunk.shared = c.shared_rows.size() - chunk.first_shared;
     c.most_nodes = std::max(c.most_nodes, chunk.own + chunk.shared);
-    // neighbours go to different blocks' lanes, so that a block's forces meet few common nodes
-    for (size_t l = 0; l < c.W; ++l)
-      for (size_t b = 0; b < chunk.blocks; ++b) {
-        const size_t i = l * chunk.blocks + b, block = chunk.first_block + b;
-        const int e = c.order[ranges[k].first + (i < elements ? i : 0)];
-        if (i < elements) {
-          c.element_of_slot[block * c.W + l] = e;
-          c.slot_of_element[static_cast<size_t>(e)] = static_cast<std::uint32_t>(block * c.W + l);
+    // blocks of one material; neighbours go to different blocks' lanes, so that a block's forces meet few common nodes
+    std::vector<int> sorted(c.order.begin() + static_cast<std::ptrdiff_t>(ranges[k].first),
+                            c.order.begin() + static_cast<std::ptrdiff_t>(ranges[k].second));
+    const auto material_of = [&](int e) { return model.elements[static_cast<size_t>(e)].material; };
+    std::stable_sort(sorted.begin(), sorted.end(), [&](int a, int b) { return material_of(a) < material_of(b); });
+    for (size_t first = 0; first < elements;) {
+      size_t last = first;
+      while (last < elements && material_of(sorted[last]) == material_of(sorted[first])) ++last;
+      const size_t first_block = c.material_of_block.size(), blocks = (last - first + c.W - 1) / c.W;
+      c.material_of_block.resize(first_block + blocks, static_cast<std::uint16_t>(material_of(sorted[first])));
+      c.element_of_slot.resize((first_block + blocks) * c.W, -1);
+      c.corners.resize((first_block + blocks) * 8 * c.W);
+      for (size_t l = 0; l < c.W; ++l)
+        for (size_t b = 0; b < blocks; ++b) {
+          const size_t i = first + l * blocks + b, block = first_block + b;
+          const int e = sorted[i < last ? i : first];
+          if (i < last) {
+            c.element_of_slot[block * c.W + l] = e;
+            c.slot_of_element[static_cast<size_t>(e)] = static_cast<std::uint32_t>(block * c.W + l);
+          }
+          for (size_t j = 0; j < 8; ++j)
+            c.corners[(block * 8 + j) * c.W + l] = static_cast<std::uint16_t>(
+                kernel::kRoomFields * place[static_cast<size_t>(model.elements[static_cast<size_t>(e)].node[j])]);
         }
-        for (size_t j = 0; j < 8; ++j)
-          c.corners[(block * 8 + j) * c.W + l] = static_cast<std::uint16_t>(
-              kernel::kRoomFields * place[static_cast<size_t>(model.elements[static_cast<size_t>(e)].node[j])]);
-      }
+      first = last;
+    }
+    chunk.blocks = c.material_of_block.size() - chunk.first_block;
     for (size_t i = 0; i < elements; ++i)
       for (const int n : model.elements[static_cast<size_t>(c.order[ranges[k].first + i])].node)
         place[static_cast<size_t>(n)] = kUnset;

@@ -12,8 +12,7 @@
 namespace topple::fem {
 
 struct ElementChunk {
-  int material = 0;
-  size_t first_block = 0, blocks = 0;   // of W slots
+  size_t first_block = 0, blocks = 0;   // of W slots, each of one material
   size_t first_row = 0, own = 0;        // rows of nodes that belong to no other chunk
   size_t first_shared = 0, shared = 0;  // into shared_rows, and rows of shared forces
 };
@@ -23,7 +22,8 @@ struct ExplicitChunks {
   std::vector<ElementChunk> chunks;
   std::vector<std::uint32_t> slot_of_element;
   std::vector<int> element_of_slot;  // -1: empty
-  std::vector<int> order;            // elements of chunk after chunk, neighbours close
+  std::vector<std::uint16_t> material_of_block;
+  std::vector<int> order;  // elements of chunk after chunk, neighbours close
   std::vector<std::uint32_t> row_of_node;
   std::vector<int> node_of_row;
   std::vector<std::uint16_t> corners;          // kRoomFields times the places among the chunk's nodes, 8 x W a block

@@ -194,7 +194,7 @@ void ExplicitSystem::Inside::advance_nodes(const kernel::StepJob& step, Explicit
     for (size_t i = count * task / tasks; i < count * (task + 1) / tasks; ++i) {
       const ElementChunk& chunk = chunks.chunks[i];
       kernel::ChunkJob job;
-      job.law = &laws[static_cast<size_t>(chunk.material)];
+      job.laws = laws.data(), job.law_of_block = chunks.material_of_block.data() + chunk.first_block;
       job.blocks = chunk.blocks;
       job.elements = state.elements.data() + chunk.first_block * W * kernel::kElementFields;
       job.corners = chunks.corners.data() + chunk.first_block * 8 * W;

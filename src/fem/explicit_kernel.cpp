@@ -195,7 +195,7 @@ struct Amplitudes {
 HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t block, double* HWY_RESTRICT forces,
                               Sums& sums) {
   const D d;
-  const Law& law = *job.law;
+  const Law& law = job.laws[job.law_of_block[block]];
   const std::uint16_t* HWY_RESTRICT corners = job.corners + block * 8 * kLanes;
   double* HWY_RESTRICT element = job.elements + block * static_cast<size_t>(kElementFields) * kLanes;
   const V zero = hn::Zero(d);

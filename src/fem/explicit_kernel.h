@@ -74,7 +74,8 @@ struct StepJob {
 
 /// Elements of a chunk and the nodes they touch.
 struct ChunkJob {
-  const Law* law = nullptr;
+  const Law* laws = nullptr;                    // of all materials
+  const std::uint16_t* law_of_block = nullptr;  // into them
   size_t blocks = 0;
   double* elements = nullptr;                   // kElementFields a block
   const std::uint16_t* corners = nullptr;       // 8 a block of W lanes: kRoomFields times the node's place
