@@ -142,7 +142,7 @@ ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
       }
     }
   double edge = options.search_margin;
-  if (!(edge > 0)) edge = calc_mesh_summary(model).smallest_edge / 8;
+  if (!(edge > 0)) edge = calc_mesh_summary(model).smallest_edge / 3;
   contact = make_contact_setup(model, chunks, edge, options.contact);
 
   shared_forces.assign(4 * std::max<size_t>(1, chunks.shared_rows.size()), 0);

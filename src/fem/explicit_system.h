@@ -29,7 +29,7 @@ struct ExplicitOptions {
   double contact_damping = 0.1;      // of critical, ground too; 0: elastic
   double debris_damping = 0.5;       // the same where debris takes part: rubble does not bounce
   bool debris = true;                // what is crushed or torn stays as particles
-  double search_margin = 0;          // reach of a contact search [m]; 0: an eighth of the smallest edge
+  double search_margin = 0;          // reach of a contact search [m]; 0: a third of the smallest edge
 };
 
 struct RelaxationOptions {

@@ -194,7 +194,15 @@ TEST(ExplicitDebrisPhysics, RubbleBetweenBlockAndGroundCarriesLoadAndKeepsVolume
     for (size_t e = 0; e < model.elements.size(); ++e)
       if (system.is_alive(static_cast<int>(e)))
         for (const int n : model.elements[e].node) lowest = std::min(lowest, system.p(n).z);
-    EXPECT_NEAR(-system.ground_force(0).z, weight, 0.1 * weight) << debris;
+    // it still rocks a little: the mean over half a second
+    double force = 0;
+    constexpr int samples = 200;
+    const double from = system.time();
+    for (int i = 1; i <= samples; ++i) {
+      ASSERT_EQ(system.advance(from + 0.5 * i / samples), ExplicitEnding::ReachedTime);
+      force -= system.ground_force(0).z / samples;
+    }
+    EXPECT_NEAR(force, weight, 0.1 * weight) << debris;
     EXPECT_LT(std::abs(energy.residual()), 0.02 * (energy.start + energy.plastic)) << debris;
     if (!debris) {
       EXPECT_LT(lowest, 0.01);
