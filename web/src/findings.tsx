@@ -17,7 +17,8 @@ export function Header(props: { run: Run }) {
       <div class="title-row">
         <h1>{provenance.title || "Untitled plan"}</h1>
         <p class="subtitle">
-          topple {provenance.program_version} · {formatDate(provenance.created) || "date unknown"}
+          {`topple ${provenance.program_version} · `}
+          {formatDate(provenance.created) || "date unknown"}
           {provenance.wall_time === null ? "" : ` · computed in ${formatDuration(provenance.wall_time)}`}
         </p>
       </div>
@@ -72,11 +73,26 @@ function Summary(props: { run: Run }) {
   );
 }
 
-/// The findings in the given order; neighbours with one heading stand together.
+export function FindingRow(props: { finding: Finding; heading: string }) {
+  const { finding } = props;
+  return (
+    <div class="finding" data-finding={finding.id} id={`finding-${finding.id}`}>
+      <StatusSign status={finding.status} />
+      <div>
+        {finding.title !== props.heading && <p class="finding-title">{finding.title}</p>}
+        <p>{prettify(finding.text)}</p>
+      </div>
+      <StatusWord status={finding.status} />
+    </div>
+  );
+}
+
+/// The findings in the given order, without those about the calculation itself; neighbours with one heading stand together.
 export function Findings(props: { run: Run }) {
   const groups: { heading: string; findings: Finding[] }[] = [];
   for (const finding of props.run.findings) {
     if (finding.id === "not_modelled" && props.run.not_modelled.length > 0) continue; // has a panel of its own
+    if (finding.id.startsWith("verification.")) continue; // so has verification
     const last = groups[groups.length - 1];
     if (last !== undefined && last.heading === finding.heading) last.findings.push(finding);
     else groups.push({ heading: finding.heading, findings: [finding] });
@@ -89,14 +105,7 @@ export function Findings(props: { run: Run }) {
         <div class="finding-group">
           <h3>{group.heading}</h3>
           {group.findings.map((finding) => (
-            <div class="finding" data-finding={finding.id} id={`finding-${finding.id}`}>
-              <StatusSign status={finding.status} />
-              <div>
-                {finding.title !== group.heading && <p class="finding-title">{finding.title}</p>}
-                <p>{prettify(finding.text)}</p>
-              </div>
-              <StatusWord status={finding.status} />
-            </div>
+            <FindingRow finding={finding} heading={group.heading} />
           ))}
         </div>
       ))}

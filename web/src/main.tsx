@@ -4,7 +4,9 @@ import { useState } from "preact/hooks";
 import { readRun } from "./data";
 import { Findings, Header, NotModelled } from "./findings";
 import { Inspector } from "./inspector";
+import { Assumptions, Conditions, FuzzyNote, Glossary, SitePlan, Verification } from "./handover";
 import { Help, listenToKeys } from "./keys";
+import { localiseRun } from "./localise";
 import { Plots } from "./plots";
 import type { Scene } from "./scene";
 import { startPage } from "./start";
@@ -12,6 +14,7 @@ import { makeState, runClock, type State } from "./state";
 import { Stills, chooseMoments, type Still } from "./stills";
 import { Details, Events, PlanValues } from "./tables";
 import { Timeline } from "./timeline";
+import { say, translateElements } from "./translate";
 import { View3D } from "./view3d";
 
 const stillSize = { width: 560, height: 400 };
@@ -41,18 +44,24 @@ function Page(props: { state: State; fitRef: { current: () => void } }) {
           <View3D state={state} onReady={onReady} fitRef={fitRef} />
           <Timeline state={state} />
           <Stills state={state} stills={stills} />
+          <Conditions run={run} />
           <Plots state={state} />
         </div>
         <div class="side">
           <Inspector state={state} />
           <Findings run={run} />
           <NotModelled run={run} />
+          <Verification run={run} />
         </div>
         <div class="below">
           <div class="tables">
             <Events state={state} />
             <PlanValues run={run} />
             <Details run={run} />
+            <SitePlan run={run} />
+            <Assumptions />
+            <FuzzyNote />
+            <Glossary />
           </div>
         </div>
       </main>
@@ -61,8 +70,9 @@ function Page(props: { state: State; fitRef: { current: () => void } }) {
   );
 }
 
-startPage("report", readRun, (run) => {
-  document.title = `${run.provenance.title || "Run"} – topple report`;
+translateElements();
+startPage("report", (text) => localiseRun(readRun(text)), (run) => {
+  document.title = `${run.provenance.title || say("Run")} – ${say("topple report")}`;
   const state = makeState(run);
   const fitRef = { current: (): void => undefined };
   runClock(state);

@@ -3,6 +3,7 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import uPlot from "uplot";
 import type { Run, Series } from "./data";
 import type { State } from "./state";
+import { say } from "./translate";
 import { formatNumber, formatTime, formatValue, toReadable } from "./units";
 import { dashOfSeries, groupOrder, groupWord, seriesColours } from "./vocabulary";
 
@@ -44,12 +45,12 @@ export function axis(label: string, isTime: boolean): uPlot.Axis {
     ticks: { stroke: () => cssColour("--line-faint"), width: 1, size: 4 },
     font: "12px system-ui, sans-serif",
     labelFont: "12px system-ui, sans-serif",
-    label,
+    label: say(label),
     labelSize: isTime ? 18 : 20,
     labelGap: 0,
     size: isTime ? 28 : 50,
     gap: 4,
-    values: (_, splits) => splits.map((v) => String(Number(v.toPrecision(6))).replace("-", "−")),
+    values: (_, splits) => splits.map((v) => String(Number(v.toPrecision(6))).replace("-", "−")).map(say),
   };
 }
 

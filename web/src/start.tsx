@@ -13,7 +13,7 @@ export function startPage<T>(what: string, read: (text: string) => T, show: (dat
     render(
       <main class="layout">
         <section class="panel" role="alert" data-test="problem">
-          <h1>This {what} cannot be shown</h1>
+          <h1>{`This ${what} cannot be shown`}</h1>
           <p>{error instanceof Error ? error.message : String(error)}</p>
         </section>
       </main>,

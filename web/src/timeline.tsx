@@ -2,6 +2,7 @@ import { useMemo, useState } from "preact/hooks";
 import type { RunEvent } from "./data";
 import { EventSign } from "./signs";
 import { speeds, type State } from "./state";
+import { say } from "./translate";
 import { formatTime } from "./units";
 import { wordsOfEvent } from "./vocabulary";
 
@@ -29,7 +30,7 @@ function makeMarkers(state: State): Marker[] {
 
 function describe(marker: Marker): string[] {
   const lines = marker.events.slice(0, 8).map((e) => `${formatTime(e.time)}  ${e.text || wordsOfEvent(e.kind).word}`);
-  if (marker.events.length > 8) lines.push(`and ${marker.events.length - 8} more`);
+  if (marker.events.length > 8) lines.push(say(`and ${marker.events.length - 8} more`));
   return lines;
 }
 

@@ -1,0 +1,197 @@
+/// What the report hands over beside the findings: when they would not hold, the site from above, assumptions,
+/// verification, what fuzzy values do, and the words it uses.
+import { calcPose, type Finding, type Point, type Quadruple, type Run, type Triple } from "./data";
+import { FindingRow, findVerdict } from "./findings";
+import { makeScale, makeTicks, tickText } from "./study/chart";
+import { formatNumber } from "./units";
+
+const percent = (part: number): string => String(Math.max(1, Math.round(100 * part)));
+
+/// What would have to be otherwise for the findings not to hold, the nearest first.
+export function listConditions(run: Run): string[] {
+  const out: string[] = [];
+  const verdict = findVerdict(run);
+  const broken = run.findings.filter((f) => f.status === "bad" && f !== verdict && /^(criterion|clearance|stability)\./.test(f.id));
+  for (const f of broken) out.push(`It fails already: ${f.title}.`);
+  const charges = run.events.filter((e) => e.kind === "charge").length;
+  if (charges > 0) out.push(`One of the ${charges} charges does not fire, or not when the plan says.`);
+  const margins = run.findings.filter((f) => f.id.startsWith("stability.") && f.value !== null && f.value > 1 && f.status !== "bad");
+  margins.sort((a, b) => (a.value as number) - (b.value as number));
+  for (const f of margins.slice(0, 3)) out.push(`${f.title}: the most loaded zone resists ${percent(1 - 1 / (f.value as number))} % less than the plan says.`);
+  const near = run.findings.filter((f) => f.id.startsWith("clearance.") && f.value !== null && f.value > 0 && f.status !== "bad");
+  near.sort((a, b) => (a.value as number) - (b.value as number));
+  for (const f of near.slice(0, 3)) out.push(`${f.title}: parts come ${formatNumber(f.value, 2)} m farther than in this run; they then reach it.`);
+  out.push("Strengths, bars, weights or friction are not those of the plan. What other values do, a fuzzy study of the plan shows.");
+  return out;
+}
+
+export function Conditions(props: { run: Run }) {
+  return (
+    <section class="panel conditions" aria-label="When this fails" data-test="conditions">
+      <h2>This fails if</h2>
+      <ul>{listConditions(props.run).map((text) => <li>{text}</li>)}</ul>
+    </section>
+  );
+}
+
+/// Convex hull, counter-clockwise.
+export function calcHull(points: readonly Point[]): Point[] {
+  const sorted = [...points].sort((a, b) => a[0] - b[0] || a[1] - b[1]);
+  const half = (list: readonly Point[]): Point[] => {
+    const chain: Point[] = [];
+    for (const p of list) {
+      for (;;) {
+        const a = chain[chain.length - 2], b = chain[chain.length - 1];
+        if (a === undefined || b === undefined || (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) > 0) break;
+        chain.pop();
+      }
+      chain.push(p);
+    }
+    return chain.slice(0, -1);
+  };
+  return sorted.length < 3 ? sorted : [...half(sorted), ...half(sorted.reverse())];
+}
+
+const rotate = (q: Quadruple, v: Triple): Triple => {
+  const [w, x, y, z] = q;
+  const t: Triple = [2 * (y * v[2] - z * v[1]), 2 * (z * v[0] - x * v[2]), 2 * (x * v[1] - y * v[0])];
+  return [v[0] + w * t[0] + y * t[2] - z * t[1], v[1] + w * t[1] + z * t[0] - x * t[2], v[2] + w * t[2] + x * t[1] - y * t[0]];
+};
+
+/// Outlines from above of all moving parts at the last frame.
+export function findFallenParts(run: Run): Point[][] {
+  const out: Point[][] = [];
+  const frame = run.time.length - 1;
+  if (frame < 0) return out;
+  const p: Triple = [0, 0, 0];
+  const q: Quadruple = [1, 0, 0, 0];
+  run.bodies.forEach((body, b) => {
+    if (body.fixed || !calcPose(run, b, frame, 0, p, q)) return;
+    for (const shape of body.shapes) {
+      const corners: Point[] = [];
+      for (let k = 0; k < 8; ++k) {
+        const local = rotate(shape.orientation, shape.half.map((h, i) => ((k >> i) & 1 ? h : -h)) as Triple);
+        const placed = rotate(q, local.map((v, i) => v + (shape.centre[i] as number)) as Triple);
+        corners.push([p[0] + placed[0], p[1] + placed[1]]);
+      }
+      out.push(calcHull(corners));
+    }
+  });
+  return out;
+}
+
+export function SitePlan(props: { run: Run }) {
+  const { run } = props;
+  const parts = findFallenParts(run);
+  const points = [...run.building_outline, ...run.neighbours.flatMap((n) => n.footprint), ...parts.flat()].filter((p) => Number.isFinite(p[0] + p[1]));
+  if (points.length === 0) return null;
+  const lows = [0, 1].map((k) => points.reduce((least, p) => Math.min(least, p[k] as number), Infinity)) as [number, number];
+  const highs = [0, 1].map((k) => points.reduce((most, p) => Math.max(most, p[k] as number), -Infinity)) as [number, number];
+  const width = 640, most = 460, margin = 34;
+  const spans = [Math.max(1, highs[0] - lows[0]), Math.max(1, highs[1] - lows[1])] as const;
+  const factor = Math.min((width - 2 * margin) / spans[0], (most - 2 * margin) / spans[1]);
+  const height = factor * spans[1] + 2 * margin;
+  const left = (width - factor * spans[0]) / 2;
+  const x = makeScale(lows[0], lows[0] + spans[0], left, left + factor * spans[0]).to;
+  const y = makeScale(lows[1], lows[1] + spans[1], height - margin, margin).to;
+  const path = (corners: readonly Point[]): string => (corners.length < 2 ? "" : `M${corners.map((c) => `${x(c[0]).toFixed(1)} ${y(c[1]).toFixed(1)}`).join("L")}Z`);
+  return (
+    <section class="panel site-plan-panel" aria-label="Site plan" data-test="site-plan">
+      <h2>The site from above</h2>
+      <svg class="chart site-plan" viewBox={`0 0 ${width} ${height.toFixed(0)}`} role="img" aria-label="Site plan: building, neighbours, and where all parts lie at the end">
+        <g class="grid">
+          {makeTicks(lows[0], highs[0], 8).map((t) => (
+            <>
+              <line x1={x(t)} x2={x(t)} y1={margin} y2={height - margin} />
+              <text x={x(t)} y={height - margin + 16} text-anchor="middle">{tickText(t)}</text>
+            </>
+          ))}
+          {makeTicks(lows[1], highs[1], 6).map((t) => (
+            <>
+              <line x1={left} x2={width - left} y1={y(t)} y2={y(t)} />
+              <text x={left - 5} y={y(t) + 4} text-anchor="end">{tickText(t)}</text>
+            </>
+          ))}
+          <text class="axis-title" x={width - left} y={height - 3} text-anchor="end">x [m]</text>
+          <text class="axis-title" x={left - 28} y={margin - 12}>y [m]</text>
+        </g>
+        <path class="fallen" d={parts.map(path).join("")} />
+        {run.neighbours.map((n) => (
+          <path class={n.is_utility ? "utility-area" : "neighbour-area"} d={path(n.footprint)}><title>{n.name}</title></path>
+        ))}
+        <path class="footprint" d={path(run.building_outline)} />
+        {run.neighbours.map((n) => {
+          const corner = n.footprint[0];
+          return corner === undefined ? null : <text class="level-text" x={x(corner[0])} y={y(corner[1]) - 4} text-anchor={x(corner[0]) > 0.7 * width ? "end" : "start"}>{n.name}</text>;
+        })}
+      </svg>
+      <p class="quiet plot-note">Strong line: the building before the first charge. Grey: all parts at the end of the run. No distance on this plan is a safe distance.</p>
+    </section>
+  );
+}
+
+const assumptions = [
+  "The ground is rigid and level; soil and foundations do not give.",
+  "Parts between zones are rigid; they bend, crush, shear and tear in their zones, by the curves of their sections.",
+  "Concrete, bars and sections are those of the plan; no decay, no changes that it does not name.",
+  "A charge destroys its length at once and leaves the share of bars that the plan gives.",
+  "The building stands in equilibrium under dead load before the first charge; live load is what the plan gives.",
+  "Parts touch each other and the ground with the plan's friction and restitution.",
+];
+
+export function Assumptions() {
+  return (
+    <section class="panel assumptions" aria-label="Assumptions">
+      <h2>Assumptions</h2>
+      <ul>{assumptions.map((text) => <li>{text}</li>)}</ul>
+    </section>
+  );
+}
+
+export const isVerification = (f: Finding): boolean => f.id.startsWith("verification.");
+
+export function Verification(props: { run: Run }) {
+  const findings = props.run.findings.filter(isVerification);
+  if (findings.length === 0) return null;
+  return (
+    <section class="panel verification" aria-label="Verification">
+      <h2>Verification</h2>
+      {findings.map((finding) => <FindingRow finding={finding} heading="Verification" />)}
+      <p class="quiet plot-note">Halving the step (topple run --step), the finite elements (topple fe) and other engines (topple mbs compare) are further checks.</p>
+    </section>
+  );
+}
+
+export function FuzzyNote() {
+  return (
+    <section class="panel fuzzy-note" aria-label="Fuzzy results">
+      <h2>Fuzzy results</h2>
+      <p>This is one run with one value of everything. How possible other outcomes are, and between which bounds each finding lies, is in the
+        page of a study (topple study), if there is one.</p>
+    </section>
+  );
+}
+
+const glossary: [string, string][] = [
+  ["Zone", "a short length of a member in which it bends, is crushed, sheared or torn; everything between zones stays rigid"],
+  ["Margin", "resistance over demand; 1 means that nothing is left"],
+  ["Utilisation", "demand over resistance"],
+  ["Yielding", "a zone deforms for good, at nearly constant moment"],
+  ["Softening", "a zone loses resistance while it deforms"],
+  ["Upper block", "all that stands above the blasted storey"],
+  ["Toppling", "the block turns over its front edge and falls to one side"],
+  ["Telescoping", "the building comes down vertically into itself"],
+  ["Hill", "what all parts lie in at the end; its bulk volume holds the hollows too"],
+  ["Screening", "an estimate with the site's own law that shows where to measure; no prediction"],
+  ["Rigid body, force element", "what the model is made of: parts that keep their shape, and what resists between them"],
+  ["Record", "the file of the run (record.h5), from which this page was made"],
+];
+
+export function Glossary() {
+  return (
+    <section class="panel glossary" aria-label="Glossary">
+      <h2>Glossary</h2>
+      <dl>{glossary.map(([term, meaning]) => <div><dt>{term}</dt><dd>{meaning}</dd></div>)}</dl>
+    </section>
+  );
+}

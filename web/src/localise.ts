@@ -1,0 +1,23 @@
+/// Data of pages in the reader's language: what the program wrote in sentences. Names that people gave stay.
+import type { Run } from "./data";
+import { language, say } from "./translate";
+
+export function localiseRun(run: Run): Run {
+  if (language === "en") return run;
+  const names = new Set([...run.neighbours.map((n) => n.name)]);
+  for (const f of run.findings) {
+    f.heading = say(f.heading);
+    if (!names.has(f.title)) f.title = say(f.title);
+    f.text = say(f.text);
+  }
+  for (const e of run.events) if (e.kind !== "stage") e.text = say(e.text);
+  for (const s of run.series) s.title = say(s.title);
+  for (const v of run.plan_values) {
+    if (v.group !== "Sections") v.key = say(v.key);
+    v.group = say(v.group), v.value = say(v.value);
+  }
+  for (const z of run.zones) z.subsystem = say(z.subsystem);
+  run.not_modelled = run.not_modelled.map(say);
+  run.ending.text = say(run.ending.text);
+  return run;
+}
