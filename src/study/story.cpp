@@ -13,8 +13,8 @@
 namespace topple::study {
 namespace {
 
+using record::Status;
 using uncertainty::failed_outcome;
-using Status = Sentence::Status;
 
 /// What an outcome is in a sentence.
 std::string quoted(const std::string& name) { return name.empty() ? "the outcome without a name" : "\"" + name + "\""; }
@@ -72,20 +72,6 @@ void tell_splits(const Problem& p, const StudyResult& r, std::vector<Sentence>& 
 }
 
 }  // namespace
-
-std::string name_of(Status s) {
-  switch (s) {
-    case Status::Good:
-      return "good";
-    case Status::Warning:
-      return "warning";
-    case Status::Bad:
-      return "bad";
-    case Status::Info:
-      break;
-  }
-  return "info";
-}
 
 std::string tell_guarantee(const uncertainty::PermissibleBox& b) {
   std::string text = fmt::format("No run violated the requirement in {} inside, {} of them at fresh random points",

@@ -4,19 +4,16 @@
 #include <string>
 #include <vector>
 
+#include "record/record.h"
 #include "study/manager.h"
 
 namespace topple::study {
 
 struct Sentence {
-  enum class Status { Info, Good, Warning, Bad };  // as findings of a record
-  std::string id;                                  // stable: "verdict", "outcome.NAME", "split.NAME", "failed", ...
+  std::string id;  // stable: "verdict", "outcome.NAME", "split.NAME", "failed", ...
   std::string text;
-  Status status = Status::Info;
+  record::Status status = record::Status::Info;
 };
-
-/// "info", "good", "warning", "bad".
-std::string name_of(Sentence::Status);
 
 /// Of how much weight a degree is: "fully possible", ...
 std::string words_of_possibility(double degree);

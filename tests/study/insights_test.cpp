@@ -281,11 +281,11 @@ TEST(Story, SaysWhatIsPossibleAndWhatTurnsIt) {
   std::map<std::string, Sentence> by_id;
   for (const Sentence& s : tell(p, r)) by_id[s.id] = s;
   EXPECT_NE(by_id["verdict"].text.find("\"stands\", as planned"), std::string::npos) << by_id["verdict"].text;
-  EXPECT_EQ(by_id["verdict"].status, Sentence::Status::Warning) << "another outcome is possible to less than a half";
+  EXPECT_EQ(by_id["verdict"].status, record::Status::Warning) << "another outcome is possible to less than a half";
   EXPECT_NE(by_id["outcome.falls"].text.find("possibility at least 0.4"), std::string::npos);
   EXPECT_NE(by_id["outcome.falls"].text.find("x1"), std::string::npos) << "the values that it takes";
   EXPECT_NE(by_id["failed"].text.find("failed"), std::string::npos);
-  EXPECT_EQ(by_id["failed"].status, Sentence::Status::Warning);
+  EXPECT_EQ(by_id["failed"].status, record::Status::Warning);
 }
 
 TEST(Story, OfNothingOfFailuresAndOfOneOutcome) {
@@ -296,7 +296,7 @@ TEST(Story, OfNothingOfFailuresAndOfOneOutcome) {
       run(p, folder, "f",
           make_factories([](const Point&) { return Answer{Answer::Kind::Failed, {}, "", {}, "broke", 0}; }));
   EXPECT_NE(tell(p, failed).front().text.find("All"), std::string::npos);
-  EXPECT_EQ(tell(p, failed).front().status, Sentence::Status::Bad);
+  EXPECT_EQ(tell(p, failed).front().status, record::Status::Bad);
   for (const StudyResult& r : {StudyResult{}, failed}) {
     EXPECT_FALSE(write_results_json(p, r).empty());
     EXPECT_NO_THROW((void)to_page_json(p, r, {}));
