@@ -861,7 +861,7 @@ double calc_utilisation(const ZoneParameters& p, const std::vector<CompiledLaw>&
     const double ry = ratio(std::abs(my), integrity * (my >= 0 ? ly.positive : ly.negative));
     const double rz = ratio(std::abs(mz), integrity * (mz >= 0 ? lz.positive : lz.negative));
     const double e = station_limits.law().biaxial_exponent;
-    u = std::max(u, std::pow(std::pow(ry, e) + std::pow(rz, e), 1 / e));
+    u = std::max(u, root_of(raised(ry, e) + raised(rz, e), e));
   }
   const double vy = ratio(std::abs(force[1]), limits.shear(0, z.slipped, -force[0]));
   const double vz = ratio(std::abs(force[2]), limits.shear(1, z.slipped, -force[0]));

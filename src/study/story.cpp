@@ -7,6 +7,8 @@
 #include <map>
 #include <set>
 
+#include "base/error.h"
+#include "study/permissible.h"
 #include "study/results.h"
 #include "uncertainty/measures.h"
 
@@ -69,6 +71,48 @@ void tell_splits(const Problem& p, const StudyResult& r, std::vector<Sentence>& 
                      is_below ? s.below_runs : s.above_runs, percent(less), is_below ? s.above_runs : s.below_runs),
          Status::Info});
   }
+}
+
+/// How possible it is that a requirement on outcomes and numbers is broken: what the runs show, failed ones among them.
+void tell_requirement(const Problem& p, const StudyResult& r, std::vector<Sentence>& out) {
+  if (p.permissible.empty()) return;
+  uncertainty::Requirement requirement;
+  try {
+    requirement = make_requirement(read_permissible(p.permissible, p), r.outputs, r.outcomes);
+  } catch (const InputError&) {
+    return;  // no run had what it asks for, which the search for boxes says
+  }
+  using State = uncertainty::Result::State;
+  const auto is_kept = [&](const uncertainty::Result& x) { return x.state == State::Done && requirement(x) >= 0; };
+  double broken = 0;
+  const uncertainty::Sample* worst = nullptr;
+  for (const uncertainty::Sample& s : r.alpha.archive.samples()) {
+    if (s.result.state == State::NotRun || is_kept(s.result)) continue;
+    const double degree = uncertainty::calc_membership(p.space, s.x);
+    if (degree > broken) broken = degree, worst = &s;
+  }
+  Sentence s;
+  s.id = "requirement";
+  const uncertainty::Sample* core = find_core(p, r.alpha.archive);
+  if (core && !is_kept(core->result)) {
+    s.text = fmt::format("The core values break the requirement {}.", p.permissible);
+    s.status = Status::Bad;
+  } else {
+    if (core) s.text = fmt::format("The core values keep the requirement {}. ", p.permissible);
+    if (worst) {
+      s.text += fmt::format(
+          "Breaking {} is {}: possibility at least {:.2f}, so the necessity of keeping it is at most {:.2f}. It takes "
+          "no "
+          "more than {}.",
+          core ? "it" : "the requirement " + p.permissible, words_of_possibility(broken), broken, 1 - broken,
+          words_of_point(p, worst->x));
+      s.status = broken >= 0.5 ? Status::Bad : Status::Warning;
+    } else {
+      s.text += fmt::format("None of {} runs broke it.", r.alpha.archive.size());
+      s.status = Status::Good;
+    }
+  }
+  out.push_back(std::move(s));
 }
 
 }  // namespace
@@ -216,6 +260,7 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
     }
     add("verdict", std::move(text), status);
   }
+  tell_requirement(p, r, out);
   if (has_names && classes > 1) {
     tell_outcomes(p, r, out);
     tell_splits(p, r, out);

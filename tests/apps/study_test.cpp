@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "../collapse/plans.h"
@@ -42,6 +43,41 @@ TEST_P(StudyReference, IsMetThroughAnEvaluator) {
 INSTANTIATE_TEST_SUITE_P(Cases, StudyReference, testing::Range(0, 8));
 
 TEST(StudyReferences, AreAllThere) { EXPECT_EQ(cases::make_all().size(), 8u); }
+
+using StudyReferenceBoxes = StudyProgram;
+
+// Reference case "jump": the permissible part of R = x1 x2 / 100 >= 8 is .879201442 of the support, its largest box has
+// the corner (20.225996, 39.553059) and the area 1200.224726 of 35 x 54.4. As an outcome, and as a limit of a number.
+TEST_F(StudyReferenceBoxes, OfAnEvaluatorComeNearTheLargest) {
+  write_inputs(folder / "in.toml", cases::make_jump_inputs());
+  const double whole = 35 * 54.4;
+  // z = R - 8, less 10 where R < 8
+  for (const std::string requirement : {"stands", "z0 >= 0"}) {
+    const std::string out = requirement.substr(0, 2);
+    ASSERT_EQ(run(study(out, "jump", {"--batch", "50", "--samples", "8000", "--permissible", requirement})), 0)
+        << read(folder / "log");
+    const json r = json::parse(read(folder / out + "/results.json"));
+    EXPECT_LE(r["runs"].get<int>(), 8000);
+    const json& boxes = r["boxes"];
+    EXPECT_EQ(boxes["requirement"], requirement);
+    EXPECT_NEAR(boxes["permissible_part"].get<double>(), .879201442, 3 * boxes["permissible_part_error"].get<double>());
+    ASSERT_FALSE(boxes["list"].empty());
+    const json& best = boxes["list"][0];
+    EXPECT_TRUE(best["kept"].get<bool>());
+    const auto side = [&](int input, const char* end) {
+      return best["inputs"][static_cast<std::size_t>(input)][end].get<double>();
+    };
+    EXPECT_GE(side(0, "lower") * side(1, "lower"), 800) << "every point of the box is permissible";
+    const double area = (side(0, "upper") - side(0, "lower")) * (side(1, "upper") - side(1, "lower"));
+    EXPECT_LE(area, 1200.224726);
+    // a margin of 0.5 % of each width on both axes
+    EXPECT_NEAR(area / whole, 1200.224726 / whole, 0.02) << requirement;
+    EXPECT_NEAR(best["volume"].get<double>(), area / whole, 1e-9);
+    // a row for each input and box, below the names
+    const std::string csv = read(folder / out + "/boxes.csv");
+    EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 2 * static_cast<long>(boxes["list"].size()));
+  }
+}
 
 using StudyFaults = StudyProgram;
 

@@ -288,6 +288,30 @@ TEST(Story, SaysWhatIsPossibleAndWhatTurnsIt) {
   EXPECT_EQ(by_id["failed"].status, record::Status::Warning);
 }
 
+TEST(Story, WeighsARequirementOnNumbers) {
+  const Folder folder;
+  Problem p = make_problem(uncertainty::cases::make_jump_inputs(), 2000);
+  const auto find = [](const std::vector<Sentence>& all) {
+    return *std::find_if(all.begin(), all.end(), [](const Sentence& s) { return s.id == "requirement"; });
+  };
+  // z = R - 8, less 10 where R < 8: it is below 0 to the degree of R < 8, .456598936
+  p.permissible = "z >= 0";
+  const Sentence some = find(tell(p, run(p, folder, "a", make_factories(calc_jump))));
+  EXPECT_EQ(some.status, record::Status::Warning);
+  EXPECT_NE(some.text.find("keep the requirement z >= 0. Breaking it is possible: possibility at least 0.4"),
+            std::string::npos)
+      << some.text;
+  // R = 16 at the core, so that z = 8
+  p.permissible = "z > 9";
+  const Sentence broken = find(tell(p, run(p, folder, "b", make_factories(calc_jump))));
+  EXPECT_EQ(broken.status, record::Status::Bad);
+  EXPECT_NE(broken.text.find("break the requirement z > 9"), std::string::npos) << broken.text;
+  p.permissible = "z <= 40";
+  const Sentence none = find(tell(p, run(p, folder, "c", make_factories(calc_jump))));
+  EXPECT_EQ(none.status, record::Status::Good);
+  EXPECT_NE(none.text.find("runs broke it"), std::string::npos) << none.text;
+}
+
 TEST(Story, OfNothingOfFailuresAndOfOneOutcome) {
   const Folder folder;
   Problem p = make_problem({make_triangular(0, 1, 2)}, 40);
