@@ -6,8 +6,10 @@
 namespace topple::collapse {
 
 Part make_part(const Vec3& low, const Vec3& high, double mass, int member, const std::string& material) {
-  return {0.5 * (low + high), 0.5 * (high - low), mass, member, material};
+  return {0.5 * (low + high), 0.5 * (high - low), mass, member, material, 0, true};
 }
+
+Quat turn_of(const Part& p) { return exp_rotation({0, 0, p.turn}); }
 
 mbs::Body make_body(const Assembly& assembly, const Knowledge& k) {
   mbs::Body body;
@@ -23,18 +25,26 @@ mbs::Body make_body(const Assembly& assembly, const Knowledge& k) {
   Mat3 I;
   for (const Part& p : assembly.parts) {
     const Vec3 h = p.half, d = p.centre - body.X_WB.p;
-    I = I + Mat3::diagonal({p.mass * ((h.y * h.y + h.z * h.z) / 3 + d.y * d.y + d.z * d.z),
-                            p.mass * ((h.z * h.z + h.x * h.x) / 3 + d.z * d.z + d.x * d.x),
-                            p.mass * ((h.x * h.x + h.y * h.y) / 3 + d.x * d.x + d.y * d.y)});
-    I(0, 1) -= p.mass * d.x * d.y, I(1, 2) -= p.mass * d.y * d.z, I(0, 2) -= p.mass * d.x * d.z;
+    double xx = h.x * h.x, yy = h.y * h.y, xy = 0;  // three times the mean squares about the box's middle
+    if (p.turn != 0) {
+      const double c = std::cos(p.turn), s = std::sin(p.turn);
+      xy = (xx - yy) * c * s;
+      const double turned = xx * c * c + yy * s * s;
+      yy = xx * s * s + yy * c * c, xx = turned;
+    }
+    I = I + Mat3::diagonal({p.mass * ((yy + h.z * h.z) / 3 + d.y * d.y + d.z * d.z),
+                            p.mass * ((h.z * h.z + xx) / 3 + d.z * d.z + d.x * d.x),
+                            p.mass * ((xx + yy) / 3 + d.x * d.x + d.y * d.y)});
+    I(0, 1) -= p.mass * (xy / 3 + d.x * d.y), I(1, 2) -= p.mass * d.y * d.z, I(0, 2) -= p.mass * d.x * d.z;
   }
   I(1, 0) = I(0, 1), I(2, 1) = I(1, 2), I(2, 0) = I(0, 2);
   const double least = body.mass * k.body_least_radius_of_gyration * k.body_least_radius_of_gyration;
   for (int i = 0; i < 3; ++i) I(i, i) = std::max(I(i, i), least);
   body.inertia = I;
   for (const Part& p : assembly.parts) {
+    if (!p.is_solid) continue;
     mbs::Shape shape;
-    shape.X_BS.p = p.centre - body.X_WB.p;
+    shape.X_BS = {p.centre - body.X_WB.p, turn_of(p)};
     for (int i = 0; i < 3; ++i) shape.half[i] = p.half[i] - std::min(k.contact_gap, 0.4 * p.half[i]);
     body.shapes.push_back(shape);
   }
@@ -44,8 +54,9 @@ mbs::Body make_body(const Assembly& assembly, const Knowledge& k) {
 std::vector<record::BoxShape> make_shapes(const Assembly& assembly, const Vec3& p_WB) {
   std::vector<record::BoxShape> shapes;
   for (const Part& p : assembly.parts) {
+    if (!p.is_solid) continue;
     record::BoxShape s;
-    s.X_BS.p = p.centre - p_WB;
+    s.X_BS = {p.centre - p_WB, turn_of(p)};
     s.half = p.half;
     s.material = p.material;
     shapes.push_back(s);
@@ -53,7 +64,8 @@ std::vector<record::BoxShape> make_shapes(const Assembly& assembly, const Vec3& 
   return shapes;
 }
 
-std::vector<Part> cut_member(Assembly& assembly, int member, int axis, double from, double to) {
+std::vector<Part> cut_member(Assembly& assembly, int member, int axis, double from, double to,
+                             const std::function<bool(const Part&)>& applies) {
   constexpr double sliver = 0.01;  // [m]; shorter pieces go with the cut
   std::vector<Part> kept, removed;
   const auto piece_of = [axis](const Part& p, double low, double high) {
@@ -66,7 +78,7 @@ std::vector<Part> cut_member(Assembly& assembly, int member, int axis, double fr
   for (const Part& p : assembly.parts) {
     const double low = p.centre[axis] - p.half[axis], high = p.centre[axis] + p.half[axis];
     double a = std::max(low, from), b = std::min(high, to);
-    if (p.member != member || !(b > a)) {
+    if (p.member != member || !(b > a) || (applies && !applies(p))) {
       kept.push_back(p);
       continue;
     }

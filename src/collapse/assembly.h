@@ -1,6 +1,7 @@
 #pragma once
 /// Rigid parts of the building: boxes along W's axes with their masses, before and after pieces are cut out.
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -11,12 +12,14 @@
 
 namespace topple::collapse {
 
-/// Box of a member, edges along W's axes at the start.
+/// Box of a member, edges along W's axes at the start, but for a turn about z.
 struct Part {
   Vec3 centre, half;  // in W [m]
   double mass = 0;    // [kg]
   int member = -1;    // index into Plan::members
   std::string material = "concrete";
+  double turn = 0;       // about W's z [rad]
+  bool is_solid = true;  // false: weight only, nothing that touches or is drawn
 };
 
 /// Parts that form one rigid body.
@@ -43,7 +46,9 @@ std::vector<record::BoxShape> make_shapes(const Assembly&, const Vec3& p_WB);
 
 /// Takes the length [from, to] along W's axis `axis` (0..2) out of the parts of a member and returns what was taken. A
 /// hundredth of a metre is left of a body that would vanish.
-std::vector<Part> cut_member(Assembly&, int member, int axis, double from, double to);
+///   applies  which of the member's parts; none given: all
+std::vector<Part> cut_member(Assembly&, int member, int axis, double from, double to,
+                             const std::function<bool(const Part&)>& applies = {});
 
 /// Boxes of a wall around its openings. `mass` is shared by volume.
 ///   along_x  whether the wall runs along x; clear_a, clear_b  from the axis to the faces of the columns at its ends

@@ -11,6 +11,7 @@
 #include "collapse/condense.h"
 #include "collapse/law.h"
 #include "collapse/manager.h"
+#include "nearfield/ring.h"
 
 namespace topple::collapse {
 
@@ -37,6 +38,28 @@ struct MemberZones {
   int rotational = -1;        // of station 1 of a ground column
 };
 
+/// Sectors of a shaft that hold together at a level, about their own centroid.
+struct ShaftElement {
+  nearfield::RingInput ring;        // angles from the shaft's azimuth
+  nearfield::RingProperties whole;  // of it
+  int stage = -1, charge = -1;      // that destroys it; -1: it stays
+  int element = -1;                 // in the model
+};
+
+/// A level at which a shaft may break.
+struct ShaftJoint {
+  double at = 0;               // above the foot [m]
+  double length = 0;           // of the shaft whose elasticity it has [m]
+  double height = 0;           // of a mouth or cut, 0: neither [m]
+  int below = -1, above = -1;  // assemblies, -1: the ground
+  std::vector<ShaftElement> elements;
+};
+
+struct ShaftModel {
+  double azimuth = 0;              // of local y, towards the first mouth or the planned fall [rad]
+  std::vector<ShaftJoint> joints;  // rising
+};
+
 /// What a builder knows so far; a copy of it can be built on.
 struct BuilderState {
   explicit BuilderState(const KnownCurves* curves = nullptr) : library(curves) {}
@@ -55,6 +78,7 @@ struct BuilderState {
   std::map<GridPoint, double> core_low;  // underside of the joint in W [m]
   std::map<int, MemberZones> zones;      // columns and beams
   std::map<std::tuple<int, double, double, Bending>, mbs::LawId> laws;
+  std::map<int, ShaftModel> shafts;  // by member
   bool hinge_about_y = true;
   // of charges, which may be laid out anew while the model runs: laws are never taken out, so that their ids stay
   std::map<std::tuple<int, double, double, double>, mbs::LawId> cage_laws;  // by element, length, bars and place
@@ -86,6 +110,7 @@ struct Builder : BuilderState {
   void make_beams();
   void make_slabs();
   void make_walls();
+  void make_shaft(int member);
   void finish_bodies();
   Vec3 half_of_node(const GridPoint&) const;
   int node_at(const GridPoint&) const;
@@ -105,6 +130,7 @@ struct Builder : BuilderState {
   void connect_wall(const GridPoint&, int member, bool along_x);
   void join_wall(int member, const nearfield::PanelRcc&, const Vec3& base, double low, double high, double width,
                  int floor);
+  void connect_shaft(int member);
   void connect_cables();
   /// Whether a frame's members are connected; whether those to the next frame are.
   bool has_frame(int frame) const;
@@ -130,6 +156,8 @@ struct Builder : BuilderState {
   // events
   /// Adds the events of charges to model and map, in order of the schedule.
   void add_events(std::vector<Firing> schedule);
+  /// Takes resistance away from the sector of a shaft: limits now, what is left of nothing when the ramp is over.
+  void fire_shaft(const Firing&, mbs::Event& event, mbs::Event& lighter);
 
   const product::Member& member(int i) const { return plan.members[static_cast<size_t>(i)]; }
   const product::Section& section_of(int i) const { return plan.sections[static_cast<size_t>(member(i).section)]; }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <set>
 
 #include "base/error.h"
@@ -11,6 +12,7 @@ namespace topple::collapse {
 
 namespace {
 
+constexpr double kPi = 3.14159265358979323846;
 constexpr double kLeastStiffnessShare = 1e-3;  // of a fired zone, so that its forces die out smoothly
 
 }  // namespace
@@ -35,8 +37,10 @@ void Builder::add_events(std::vector<Firing> schedule) {
     const Member& m = member(c.member);
     // a beam between frames has no zones of its own in a condensed model and is refused before
     if (!has_frame(m.frame_a)) continue;
+    const bool is_shaft = m.kind == MemberKind::Shaft;
+    if (is_shaft && !shafts.count(c.member)) continue;
     const MemberZones& z = zones[c.member];
-    const int axis = m.kind == MemberKind::Column ? 2 : m.row_a != m.row_b ? 0 : 1;
+    const int axis = m.kind == MemberKind::Column || is_shaft ? 2 : m.row_a != m.row_b ? 0 : 1;
     double from = m.start[axis] + c.position - 0.5 * c.destroyed_length;
     // a column that was not built with a stump leaves nothing below its charge
     if (m.kind == MemberKind::Column && !lowest_charge.count(c.member)) from = m.start[axis];
@@ -55,7 +59,14 @@ void Builder::add_events(std::vector<Firing> schedule) {
     EventEntry entry{firing.stage, firing.charge, m.name, firing.time, 0, false, {}};
 
     const int element = z.element[which];
-    if (const auto it = residual.find(element); it == residual.end() || c.residual_bars < it->second) {
+    std::function<bool(const Part&)> applies;
+    if (is_shaft) {
+      fire_shaft(firing, event, lighter);
+      applies = [&c, &m](const Part& p) {
+        const double at = std::atan2(p.centre.y - m.start.y, p.centre.x - m.start.x);
+        return p.is_solid && std::abs(std::remainder(at - c.azimuth, 2 * kPi)) < 0.5 * c.opening;
+      };
+    } else if (const auto it = residual.find(element); it == residual.end() || c.residual_bars < it->second) {
       residual[element] = c.residual_bars;
       mbs::Action act;
       act.kind = mbs::Action::Kind::SwitchLaw;
@@ -79,15 +90,16 @@ void Builder::add_events(std::vector<Firing> schedule) {
     std::set<int> touched;
     for (size_t b = 0; b < current.size(); ++b)
       for (const Part& p : current[b].parts)
-        if (p.member == c.member && p.centre[axis] + p.half[axis] > from && p.centre[axis] - p.half[axis] < to)
+        if (p.member == c.member && (!applies || applies(p)) && p.centre[axis] + p.half[axis] > from &&
+            p.centre[axis] - p.half[axis] < to)
           touched.insert(static_cast<int>(b));
     for (const int b : touched) {
       Assembly& a = current[static_cast<size_t>(b)];
-      const std::vector<Part> removed = cut_member(a, c.member, axis, from, to);
+      const std::vector<Part> removed = cut_member(a, c.member, axis, from, to, applies);
       if (removed.empty()) continue;
       for (const Part& p : removed) {
         entry.debris_mass += p.mass;
-        map.debris.push_back({m.name, m.storey, p.mass, p.centre, p.half, firing.time});
+        map.debris.push_back({m.name, m.storey, p.mass, p.centre, p.half, firing.time, p.turn});
       }
       mbs::Body replacement = make_body(a, k);
       const Vec3 p_WB = replacement.X_WB.p;
@@ -112,6 +124,7 @@ void Builder::add_events(std::vector<Firing> schedule) {
 
     // transition zones
     for (int other : {0, 1}) {
+      if (is_shaft) break;
       const MemberStation& station = z.station[static_cast<size_t>(other)];
       if (other == which || station.damaged < 0) continue;
       if (z.element[other] >= 0 && z.element[other] != element) {

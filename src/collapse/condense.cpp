@@ -84,6 +84,7 @@ std::string find_refusal(const product::Plan& plan, const Knowledge& k) {
   if (!plan.cables.empty()) return "cables pull at single frames";
   for (size_t i = 0; i < plan.members.size(); ++i) {
     const Member& m = plan.members[i];
+    if (m.kind == MemberKind::Shaft && !m.removed) return m.name + " is a shaft";
     if (m.frame_a == m.frame_b || m.removed) continue;
     if (m.kind == MemberKind::Wall && m.storey == 0)
       return "wall " + m.name + " stands across the fall in the ground storey";

@@ -454,7 +454,10 @@ void Builder::connect_cable(const product::Cable& c) {
   const double length = norm(m.end - m.start), share = length > 0 ? c.position / length : 0;
   const Vec3 p_W = m.start + share * (m.end - m.start);
   int body = -1;
-  if (m.kind == MemberKind::Column) {
+  if (m.kind == MemberKind::Shaft) {
+    for (const ShaftJoint& joint : shafts[c.member].joints)
+      if (joint.at <= c.position) body = joint.above;
+  } else if (m.kind == MemberKind::Column) {
     body = node_at(at);
     if (at.storey == 0 && c.position < zones[c.member].clear_length) body = own_body.at(c.member);
     if (stump_body.count(c.member) && c.position < lowest_charge[c.member]) body = stump_body[c.member];

@@ -45,6 +45,7 @@ const std::map<std::string, Field>& fields() {
       {"mechanism.stands_share", &Knowledge::mechanism_stands_share},
       {"mechanism.partial_share", &Knowledge::mechanism_partial_share},
       {"mechanism.topple_rear_share", &Knowledge::mechanism_topple_rear_share},
+      {"mechanism.topple_rotation", &Knowledge::mechanism_topple_rotation},
       {"mechanism.coherent_share", &Knowledge::mechanism_coherent_share},
       {"mechanism.fold_share", &Knowledge::mechanism_fold_share},
       {"mechanism.fold_rotation", &Knowledge::mechanism_fold_rotation},

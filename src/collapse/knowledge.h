@@ -26,6 +26,7 @@ struct Knowledge {
   double rest_speed, rest_time;
   double stands_displacement;
   double mechanism_moved_displacement, mechanism_stands_share, mechanism_partial_share, mechanism_topple_rear_share;
+  double mechanism_topple_rotation;
   double mechanism_coherent_share, mechanism_fold_share, mechanism_fold_rotation, mechanism_direction_tolerance;
   double mechanism_together_share, mechanism_aborted_rotation;
   double verification_energy_error, verification_equilibrium_residual;

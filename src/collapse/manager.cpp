@@ -49,6 +49,9 @@ void Builder::find_direction() {
     azimuth = *plan.criteria.azimuth;
     map.is_direction_planned = true;
   } else {
+    for (const product::Stage& s : plan.stages)
+      for (const product::Charge& c : s.charges)
+        if (member(c.member).kind == MemberKind::Shaft && c.opening < 6.283 && !c.fails) azimuth = c.azimuth;
     // away from the ground columns that keep standing, along the grid
     Vec3 all, standing;
     int n_all = 0, n_standing = 0;
@@ -93,6 +96,8 @@ void Builder::index_members() {
       case MemberKind::Wall:
         into = rows != 0 ? &x_walls : &y_walls;
         break;
+      case MemberKind::Shaft:
+        continue;
     }
     const bool fits = m.kind == MemberKind::Column ? rows == 0 && frames == 0
                       : m.kind == MemberKind::Slab ? rows == 1 && frames == 1
@@ -113,7 +118,7 @@ void Builder::index_members() {
     for (const product::Charge& c : stage.charges) {
       const Member& m = member(c.member);
       if (m.removed) complain(c.member, "has a charge but was taken out before");
-      if (m.kind != MemberKind::Column && m.kind != MemberKind::Beam)
+      if (m.kind != MemberKind::Column && m.kind != MemberKind::Beam && m.kind != MemberKind::Shaft)
         complain(c.member, "charges act on columns and beams only",
                  "walls and slabs can be taken out in [preparation]");
       if (m.kind != MemberKind::Column) continue;
@@ -395,6 +400,8 @@ void Builder::build() {
   stop_if_wrong();
   make_slabs();
   make_walls();
+  for (size_t i = 0; i < plan.members.size(); ++i)
+    if (plan.members[i].kind == MemberKind::Shaft && !plan.members[i].removed) make_shaft(static_cast<int>(i));
   stop_if_wrong();
   finish_bodies();
   stop_if_wrong();
@@ -416,6 +423,7 @@ void Builder::build() {
     if (has_frame(at.frame)) connect_wall(at, index, true);
   for (const auto& [at, index] : y_walls)
     if (has_link(at.frame)) connect_wall(at, index, false);
+  for (auto& [index, shaft] : shafts) connect_shaft(index);
   connect_cables();
   stop_if_wrong();
   for (size_t s = 0; s < plan.storey_loads.size(); ++s) {

@@ -45,8 +45,9 @@ struct DebrisEntry {
   std::string member;
   int storey = 0;
   double mass = 0;    // [kg]
-  Vec3 centre, half;  // box along W's axes before that [m]
+  Vec3 centre, half;  // box before that, along W's axes but for ... [m]
   double time = 0;    // [s]
+  double turn = 0;    // ... its turn about W's z [rad]
 };
 
 /// A ground-storey column as a hinge for the block above it.

@@ -90,7 +90,7 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
     out.name = "progressive";
     out.text = fmt::format("Progressive collapse: the largest connected part holds {:.0f} % of the upper mass; {}.",
                            100 * at->connected, motion);
-  } else if (out.rear_share >= k.mechanism_topple_rear_share) {
+  } else if (out.rear_share >= k.mechanism_topple_rear_share && out.tilt < k.mechanism_topple_rotation) {
     out.name = "vertical";
     out.text = fmt::format("It comes down vertically (telescoping): {}.", motion);
   } else if (std::abs(off) > (in.direction_tolerance > 0 ? in.direction_tolerance : k.mechanism_direction_tolerance) &&

@@ -49,7 +49,7 @@ Recorder::Recorder(const mbs::Model& model, const ModelMap& map, const Knowledge
     info.kind = "debris";
     info.storey = map.debris[d].storey;
     info.mass = map.debris[d].mass;
-    info.shapes.push_back({{}, map.debris[d].half, "concrete"});
+    info.shapes.push_back({{{}, exp_rotation({0, 0, map.debris[d].turn})}, map.debris[d].half, "concrete"});
     record.bodies.push_back(std::move(info));
   }
   for (const auto* list : {&map.elements, &map.rotationals})

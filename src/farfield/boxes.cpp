@@ -64,6 +64,10 @@ std::vector<Box> make_boxes(const product::Plan& plan) {
           boxes.push_back({p.centre - p.half, p.centre + p.half, index, 3, {}});
         break;
       }
+      case MemberKind::Shaft:
+        throw InputError(std::vector<Diagnostic>{{Severity::Error, "E675", m.where, 1,
+                                                  m.name + ": shafts are not modelled in finite elements",
+                                                  "topple run shows its collapse"}});
     }
   }
   // an edge that lies inside a beam or a column, or where another box of its kind goes on, needs no line

@@ -7,6 +7,8 @@ namespace topple::product {
 
 namespace {
 
+constexpr double pi = 3.14159265358979323846;
+
 auto key_of(const Member& m) { return std::make_tuple(m.kind, m.storey, m.row_a, m.frame_a, m.row_b, m.frame_b); }
 
 /// read_plan sorts the members, so that a neighbour is found by halving.
@@ -58,6 +60,8 @@ const char* name_of(MemberKind kind) {
       return "slab";
     case MemberKind::Wall:
       return "wall";
+    case MemberKind::Shaft:
+      return "shaft";
   }
   return "";
 }
@@ -95,8 +99,25 @@ double calc_mass(const Plan& plan, const Member& m) {
       const Panel& p = panel_of(plan, m);
       return p.density * p.thickness * std::max(0.0, area);
     }
+    case MemberKind::Shaft:
+      return calc_shaft_mass(plan, plan.shafts[static_cast<size_t>(m.shaft)], norm(m.end - m.start), 0, 1);
   }
   return 0;
+}
+
+double calc_shaft_mass(const Plan& plan, const Shaft& s, double height, double from, double to) {
+  const double density = s.concrete < 0 ? s.density : plan.concretes[static_cast<size_t>(s.concrete)].density;
+  // areas are quadratic along the axis: Simpson's rule is exact
+  const auto per_length = [&](double share) {
+    const double outer = s.outer(share), inner = outer - s.thickness(share), bare = inner - s.lining_thickness;
+    return density * pi * (outer * outer - inner * inner) + s.lining_density * pi * (inner * inner - bare * bare);
+  };
+  double mass = (to - from) * height / 6 * (per_length(from) + 4 * per_length(0.5 * (from + to)) + per_length(to));
+  for (const Shaft::Load& load : s.loads) {
+    const double at = load.at / height;
+    if (at >= from && (at < to || (to >= 1 && at <= to))) mass += load.mass;
+  }
+  return mass;
 }
 
 }  // namespace topple::product

@@ -76,9 +76,37 @@ struct Panel {
   double cover = 0;                  // [m]
 };
 
-enum class MemberKind { Column, Beam, Slab, Wall };
-/// "column", "beam", "slab", "wall".
+enum class MemberKind { Column, Beam, Slab, Wall, Shaft };
+/// "column", "beam", "slab", "wall", "shaft".
 const char* name_of(MemberKind);
+
+/// Upright shaft of rings (chimney, tower): outer diameter and thickness change linearly from the foot to the top.
+struct Shaft {
+  double diameter_foot = 0, diameter_top = 0;    // outer [m]
+  double thickness_foot = 0, thickness_top = 0;  // [m]
+  int concrete = -1;                  // index, or -1 for masonry (then density, strength and modulus below count)
+  int steel = -1;                     // index, or -1 when unreinforced
+  double density = 0;                 // [kg/m³]
+  double strength = 0;                // compressive strength [Pa]
+  double modulus = 0;                 // [Pa]
+  double as_outer = 0, as_inner = 0;  // upright bars per metre of each face's circumference [m²/m]
+  double bar_diameter = 0;            // of the upright bars [m]
+  double hoop_diameter = 0, hoop_spacing = 0;  // 0: none [m]
+  double cover = 0;                            // of the upright bars [m]
+  double lining_thickness = 0;                 // inside the shell, weight only [m]
+  double lining_density = 0;                   // [kg/m³]
+  /// Mass that the shaft carries at a height, weight only: platforms, tanks.
+  struct Load {
+    double at = 0;    // above the foot [m]
+    double mass = 0;  // [kg]
+  };
+  std::vector<Load> loads;
+  double joint_spacing = 0;  // between places where it may break; 0: chosen [m]
+
+  /// Outer radius and thickness at a share of the height, 0 at the foot.
+  double outer(double share) const { return 0.5 * (diameter_foot + share * (diameter_top - diameter_foot)); }
+  double thickness(double share) const { return thickness_foot + share * (thickness_top - thickness_foot); }
+};
 
 /// Hole in a wall: from its left end (as seen along start -> end) and above the floor.
 struct Opening {
@@ -90,10 +118,15 @@ struct Weakening {
   double at = 0;            // distance from the member's start [m]
   double cut_bars = 0;      // fraction of bars cut, 0..1
   double cut_concrete = 0;  // fraction of the section's area taken out, 0..1
+  // shafts only: the sector that the fractions count in
+  double azimuth = 0;  // of its middle in W, 0 = +x, counter-clockwise [rad]
+  double opening = 0;  // its angle, 2 pi: all around [rad]
+  double height = 0;   // [m]
 };
 
 /// Names: C-A1-0 column at row A, frame 1, storey 0. B-A1A2-3 beam from A1 to A2 under the floor above storey 3.
-/// S-A1B2-3 slab with corners A1 and B2 above storey 3. W-A1A2-0 wall from A1 to A2 in storey 0.
+/// S-A1B2-3 slab with corners A1 and B2 above storey 3. W-A1A2-0 wall from A1 to A2 in storey 0. Shafts have the
+/// plan's names and stand off the grid.
 struct Member {
   std::string name;
   MemberKind kind = MemberKind::Column;
@@ -104,6 +137,7 @@ struct Member {
   double height = 0;  // walls: clear height [m]
   int section = -1;   // columns, beams: index into Plan::sections
   int panel = -1;     // slabs, walls: index into Plan::panels
+  int shaft = -1;     // shafts: index into Plan::shafts; start and end are foot and top
   std::vector<Opening> openings;
   std::vector<Weakening> weakenings;
   bool removed = false;  // taken out before the first charge
@@ -119,6 +153,9 @@ struct Charge {
   double delay = 0;              // after the stage's time [s]
   double scatter = 0;            // standard deviation of the firing time [s]
   bool fails = false;            // what if it does not fire
+  // shafts only: the sector that is destroyed
+  double azimuth = 0;  // of its middle in W, 0 = +x, counter-clockwise [rad]
+  double opening = 0;  // its angle, 2 pi: all around [rad]
   SourcePosition where;
 };
 
@@ -200,6 +237,7 @@ struct Plan {
   std::vector<Steel> steels;
   std::vector<Section> sections;
   std::vector<Panel> panels;
+  std::vector<Shaft> shafts;
   std::vector<std::string> row_names;    // along x
   std::vector<double> row_offsets;       // x of each row [m]
   std::vector<std::string> frame_names;  // along y
@@ -233,11 +271,10 @@ Plan read_plan(const std::string& text, const std::string& name, std::vector<Dia
 /// error.
 Plan read_plan_file(const std::string& path, std::vector<Diagnostic>& warnings, std::string& text_out);
 
-/// The commented template that `topple new` writes; it passes `topple check`.
-std::string plan_template();
-
 /// Mass of a member's own material without openings [kg]; pieces that members share are counted once (docs/plan.md).
 /// The plan's members must be in the order of read_plan.
 double calc_mass(const Plan&, const Member&);
+/// Mass of a shaft between two shares of its height, with its lining and what it carries there [kg].
+double calc_shaft_mass(const Plan&, const Shaft&, double height, double from, double to);
 
 }  // namespace topple::product

@@ -9,6 +9,7 @@ namespace topple::product {
 
 namespace {
 
+constexpr double pi = 3.14159265358979323846;
 constexpr size_t most_stages = 1000;
 constexpr size_t most_charges = 20000;  // over all stages
 constexpr const char* no_support = "nothing removes a support; the building will stand";
@@ -34,6 +35,8 @@ ChargeTable read_charge(TableReader& table) {
   c.charge.destroyed_length = table.quantity("destroyed_length", Dimension::Length, {0, 100, true});
   c.charge.residual_bars = table.quantity("residual_bars", Dimension::Number, fraction, 0);
   c.charge.transition_damage = table.quantity("transition_damage", Dimension::Number, fraction, 0);
+  const Sector sector = read_sector(table);
+  c.charge.azimuth = sector.azimuth, c.charge.opening = sector.opening;
   c.charge.delay = table.quantity("delay", Dimension::Time, {0, 600}, 0);
   c.charge.scatter = table.quantity("scatter", Dimension::Time, {0, 1}, 0);
   c.charge.fails = table.find_flag("fails").value_or(false);
@@ -53,12 +56,13 @@ class Blasting {
       const Member& m = reading_.plan.members[static_cast<size_t>(index)];
       Charge charge = from.charge;
       charge.member = index;
-      if (m.kind != MemberKind::Column && m.kind != MemberKind::Beam) {
+      if (m.kind != MemberKind::Column && m.kind != MemberKind::Beam && m.kind != MemberKind::Shaft) {
         if (!std::exchange(is_misplaced, true))
           table.error("E307", table.place_of("members"), m.name + " is neither a column nor a beam",
                       "charges fire in columns and beams; take walls out under [preparation]");
         continue;
       }
+      if (!is_misplaced && !check_sector(table, m)) is_misplaced = true;
       if (m.removed && !std::exchange(is_removed, true))
         table.error("E403", table.place_of("members"), m.name + " is taken out in the preparation",
                     "leave it out here, or keep it standing");
@@ -68,17 +72,28 @@ class Blasting {
         table.error("E405", table.place_of("position"),
                     "the destroyed length, " + in_metres(low) + " to " + in_metres(high) + ", reaches out of " + m.name,
                     "it is " + in_metres(calc_length(m)) + " long; position is the middle of the destroyed length");
-      for (const auto& [other_low, other_high] : fired_[static_cast<size_t>(index)])
-        if (low < other_high - slack && other_low < high - slack && !std::exchange(is_overlapping, true))
-          table.error("E404", table.place_of("members"), m.name + " has another charge on the same length",
-                      "leave one of them out, or move them apart");
-      fired_[static_cast<size_t>(index)].push_back({low, high});
+      for (const Fired& other : fired_[static_cast<size_t>(index)]) {
+        if (!(low < other.high - slack && other.low < high - slack) || is_overlapping) continue;
+        const double apart = std::abs(std::remainder(other.azimuth - charge.azimuth, 2 * pi));
+        if (m.kind == MemberKind::Shaft && apart >= 0.5 * (other.opening + charge.opening) - 1e-9) {
+          if (std::abs(low - other.low) < slack && std::abs(high - other.high) < slack) continue;
+          is_overlapping = true;
+          table.error("E404", table.place_of("position"),
+                      m.name + " has another charge beside this one, not at the same height",
+                      "charges of one mouth have the same position and destroyed_length");
+          continue;
+        }
+        is_overlapping = true;
+        table.error("E404", table.place_of("members"), m.name + " has another charge on the same length",
+                    "leave one of them out, or move them apart");
+      }
+      fired_[static_cast<size_t>(index)].push_back({low, high, charge.azimuth, charge.opening});
       if (++count_ > most_charges) {
         if (count_ == most_charges + 1)
           table.error("E209", from.place, "more than " + std::to_string(most_charges) + " charges");
         return;
       }
-      if (m.kind == MemberKind::Column) (charge.fails ? failing_columns_ : fired_columns_) += 1;
+      if (m.kind != MemberKind::Beam) (charge.fails ? failing_columns_ : fired_columns_) += 1;
       stage.charges.push_back(std::move(charge));
     }
   }
@@ -88,8 +103,11 @@ class Blasting {
   int failing_columns() const { return failing_columns_; }
 
  private:
+  struct Fired {
+    double low = 0, high = 0, azimuth = 0, opening = 0;
+  };
   Reading& reading_;
-  std::vector<std::vector<std::pair<double, double>>> fired_;  // destroyed lengths of each member
+  std::vector<std::vector<Fired>> fired_;  // destroyed lengths of each member
   size_t count_ = 0;
   int fired_columns_ = 0, failing_columns_ = 0;
 };
@@ -208,7 +226,7 @@ void read_cables(Reading& reading, TableReader& root) {
       } else if (found.size() == 1) {
         const Member& m = reading.plan.members[static_cast<size_t>(found[0])];
         c.member = found[0];
-        if (m.kind != MemberKind::Column && m.kind != MemberKind::Beam) {
+        if (m.kind != MemberKind::Column && m.kind != MemberKind::Beam && m.kind != MemberKind::Shaft) {
           table.error("E307", table.place_of("member"), m.name + " is neither a column nor a beam");
         } else if (m.removed) {
           table.error("E403", table.place_of("member"), m.name + " is taken out in the preparation");

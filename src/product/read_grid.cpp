@@ -107,6 +107,10 @@ bool read_storeys(Reading& reading, TableReader& root) {
 
 void read_grid(Reading& reading, TableReader& root) {
   Plan& plan = reading.plan;
+  if (root.has("shafts") && !root.has("grid") && !root.has("storeys")) {
+    reading.has_grid = true;  // nothing stands on one
+    return;
+  }
   bool has_lines = false;
   const Node* node = root.table("grid");
   if (node) {

@@ -263,18 +263,18 @@ int find_named(const std::map<std::string, int>& known, const TableReader& table
 }
 
 void read_materials(Reading& reading, TableReader& root) {
-  for (const Entry* entry : named_tables(root, "concrete", true)) {
+  for (const Entry* entry : named_tables(root, "concrete", !root.has("shafts"))) {
     reading.concretes[entry->key] = static_cast<int>(reading.plan.concretes.size());
     reading.plan.concretes.push_back(read_concrete(*entry, reading.complaints));
   }
-  for (const Entry* entry : named_tables(root, "steel", true)) {
+  for (const Entry* entry : named_tables(root, "steel", !root.has("shafts"))) {
     reading.steels[entry->key] = static_cast<int>(reading.plan.steels.size());
     reading.plan.steels.push_back(read_steel(*entry, reading.complaints));
   }
 }
 
 void read_sections(Reading& reading, TableReader& root) {
-  for (const Entry* entry : named_tables(root, "section", true)) {
+  for (const Entry* entry : named_tables(root, "section", !root.has("shafts"))) {
     reading.sections[entry->key] = static_cast<int>(reading.plan.sections.size());
     reading.plan.sections.push_back(read_section(reading, *entry));
     reading.section_places.push_back(entry->place);

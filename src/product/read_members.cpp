@@ -380,6 +380,30 @@ bool matches(const std::string& pattern, const std::string& name) {
   return p == pattern.size();
 }
 
+Sector read_sector(TableReader& table) {
+  constexpr double whole = 360 * unit::deg;
+  Sector s;
+  s.azimuth = table.quantity("azimuth", Dimension::Angle, {-whole, whole}, 0);
+  s.opening = table.quantity("opening", Dimension::Angle, {1 * unit::deg, whole}, whole);
+  return s;
+}
+
+bool check_sector(const TableReader& table, const Member& m) {
+  const bool is_shaft = m.kind == MemberKind::Shaft;
+  for (const char* key : {"azimuth", "opening", "height"})
+    if (!is_shaft && table.has(key)) {
+      table.error("E307", table.place_of(key), std::string(key) + ": " + m.name + " is no shaft",
+                  "only shafts have sectors");
+      return false;
+    }
+  if (is_shaft && table.has("opening") != table.has("azimuth")) {
+    table.missing(table.has("opening") ? "azimuth" : "opening",
+                  "a sector of a shaft has azimuth = \"180 deg\" and opening = \"200 deg\"; neither: all around");
+    return false;
+  }
+  return true;
+}
+
 double calc_length(const Member& m) { return norm(m.end - m.start); }
 
 std::vector<int> find_members(const Reading& reading, const TableReader& table, const std::string& key,
@@ -419,7 +443,7 @@ void read_members(Reading& reading, TableReader& root) {
     }
     for (size_t i = 0; i < nodes.size(); ++i) apply_rule(builder, kind, *nodes[i], key + "[" + std::to_string(i) + "]");
   }
-  if (!has_rules) root.missing("columns", "add [[columns]] with a section");
+  if (!has_rules && !root.has("shafts")) root.missing("columns", "add [[columns]] with a section");
 
   Plan& plan = reading.plan;
   const auto publish = [&] {
@@ -458,14 +482,23 @@ void read_preparation(Reading& reading, TableReader& root) {
     Weakening w;
     w.at = weaken.quantity("at", Dimension::Length, {0, 1000});
     w.cut_bars = weaken.quantity("cut_bars", Dimension::Number, fraction, 0);
-    w.cut_concrete = weaken.quantity("cut_concrete", Dimension::Number, {0, 0.95}, 0);
+    w.cut_concrete = weaken.quantity("cut_concrete", Dimension::Number, fraction, 0);
+    const Sector sector = read_sector(weaken);
+    w.azimuth = sector.azimuth, w.opening = sector.opening;
+    w.height = weaken.quantity("height", Dimension::Length, {0, 100, true}, 0.2);
     weaken.finish();
     if (!reading.has_grid) continue;
     for (const int index : find_members(reading, weaken, "members", words)) {
       Member& m = plan.members[static_cast<size_t>(index)];
-      if (m.kind != MemberKind::Column && m.kind != MemberKind::Beam) {
+      if (m.kind != MemberKind::Column && m.kind != MemberKind::Beam && m.kind != MemberKind::Shaft) {
         weaken.error("E307", weaken.place_of("members"), m.name + " is neither a column nor a beam",
                      "slabs and walls can be taken out under removed");
+        break;
+      }
+      if (!check_sector(weaken, m)) break;
+      if (m.kind != MemberKind::Shaft && w.cut_concrete > 0.95) {
+        weaken.error("E205", weaken.place_of("cut_concrete"), "cut_concrete: at most 0.95 of " + m.name,
+                     "what is taken out whole stands under removed");
         break;
       }
       if (m.removed) {

@@ -39,6 +39,7 @@ Plan read_plan_document(const Node& document, const std::string& name, Complaint
   read_grid(reading, root);
   check_neighbours(reading);
   read_members(reading, root);
+  read_shafts(reading, root);
   read_preparation(reading, root);
   read_analysis(reading, root);
   read_stages(reading, root);

@@ -165,7 +165,7 @@ void read_site(Reading& reading, TableReader& root) {
 
 void check_neighbours(Reading& reading) {
   const Plan& plan = reading.plan;
-  if (!reading.has_grid) return;
+  if (!reading.has_grid || plan.row_offsets.empty()) return;
   const double x0 = plan.row_offsets.front(), x1 = plan.row_offsets.back();
   const double y0 = plan.frame_offsets.front(), y1 = plan.frame_offsets.back();
   const Point middle{(x0 + x1) / 2, (y0 + y1) / 2};

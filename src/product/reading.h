@@ -37,6 +37,8 @@ void read_site(Reading&, TableReader& root);
 void read_grid(Reading&, TableReader& root);
 /// Warns of neighbours that stand where the building stands.
 void check_neighbours(Reading&);
+/// Shafts, which stand off the grid: behind the other members.
+void read_shafts(Reading&, TableReader& root);
 /// Columns, beams, slabs, walls, overrides; checks that nothing hangs in the air.
 void read_members(Reading&, TableReader& root);
 void read_preparation(Reading&, TableReader& root);
@@ -61,5 +63,13 @@ int find_named(const std::map<std::string, int>& known, const TableReader&, cons
 std::vector<int> find_members(const Reading&, const TableReader&, const std::string& key, const std::vector<Word>&);
 
 double calc_length(const Member&);
+
+/// Part of a shaft's circumference: `azimuth` and `opening`, all around if neither is given.
+struct Sector {
+  double azimuth = 0, opening = 0;  // of its middle, its angle [rad]
+};
+Sector read_sector(TableReader&);
+/// Whether the member may have the sector that the table gives; complains.
+bool check_sector(const TableReader&, const Member&);
 
 }  // namespace topple::product

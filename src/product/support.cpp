@@ -38,6 +38,8 @@ Carriers collect(const std::vector<Draft>& drafts) {
       case MemberKind::Slab:
         c.slabs.insert(edge);
         break;
+      case MemberKind::Shaft:
+        break;
     }
   }
   return c;
@@ -156,6 +158,8 @@ void check_support(const Plan& plan, const std::vector<Draft>& drafts, Complaint
             !(stands_below(carriers, below_a) && stands_below(carriers, below_b)))
           hanging.add(draft, "hangs in the air: no beam, slab or wall below",
                       "add what carries it, or leave the wall out with except");
+        break;
+      case MemberKind::Shaft:
         break;
     }
   }

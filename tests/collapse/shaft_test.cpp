@@ -1,0 +1,278 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/unit.h"
+#include "collapse/manager.h"
+#include "collapse/run.h"
+#include "mbs/solver.h"
+#include "plans.h"
+
+namespace topple::collapse {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+std::string tower(const std::string& shaft, const std::string& more, const std::string& duration) {
+  return "[concrete.C]\nfc = \"25 N/mm2\"\nEc = \"30 GPa\"\n[steel.S]\nfy = \"420 N/mm2\"\nfu = \"500 N/mm2\"\n"
+         "eps_u = 0.08\n[[shafts]]\nname = \"tower\"\nconcrete = \"C\"\nsteel = \"S\"\n" +
+         shaft + more + analysis(duration);
+}
+
+const std::string slender = "height = \"40 m\"\ndiameter = \"3 m\"\nthickness = \"20 cm\"\n";
+const std::string strong = "as_outer = \"40 cm2/m\"\nas_inner = \"40 cm2/m\"\nbar_diameter = \"25 mm\"\n";
+
+std::string mouth(const std::string& height, const std::string& opening, const std::string& more = "") {
+  return "[[stage]]\ntime = \"0.2 s\"\n[[stage.charge]]\nmembers = \"tower\"\nposition = \"2.5 m\"\n"
+         "destroyed_length = \"" +
+         height + "\"\nazimuth = \"180 deg\"\nopening = \"" + opening + "\"\n" + more;
+}
+
+struct Built {
+  product::Plan plan;
+  ModelMap map;
+  mbs::Model model;
+  explicit Built(const std::string& text) : plan(read(text)), model(make_model(plan, default_knowledge(), map)) {}
+  double mass() const { return product::calc_mass(plan, plan.members.front()); }
+};
+
+/// Body that stands for the whole shaft: mass, mass centre, inertia about W's y through it.
+struct Whole {
+  double mass = 0, inertia = 0;
+  Vec3 centre;
+};
+Whole gather(const mbs::Model& model) {
+  Whole w;
+  for (const mbs::Body& b : model.bodies)
+    if (!b.fixed) w.mass += b.mass, w.centre += b.mass * b.X_WB.p;
+  w.centre *= 1 / w.mass;
+  for (const mbs::Body& b : model.bodies) {
+    if (b.fixed) continue;
+    const Vec3 d = b.X_WB.p - w.centre;
+    w.inertia += b.inertia(1, 1) + b.mass * (d.x * d.x + d.z * d.z);
+  }
+  return w;
+}
+
+TEST(Shaft, ItsBodiesHaveTheMassCentreAndInertiaOfTheRing) {
+  const Built b(tower(slender + "as_outer = \"6 cm2/m\"\n", "", "1 s"));
+  const double ro = 1.5, ri = 1.3, H = 40, mass = 2500 * kPi * (ro * ro - ri * ri) * H;
+  const Whole w = gather(b.model);
+  EXPECT_NEAR(b.mass(), mass, 1e-9 * mass);
+  EXPECT_NEAR(w.mass, mass, 1e-9 * mass);
+  EXPECT_NEAR(w.centre.z, 20, 1e-9);
+  EXPECT_NEAR(w.inertia, mass * ((ro * ro + ri * ri) / 4 + H * H / 12), 1e-4 * w.inertia);  // staves are boxes
+  double about_axis = 0;
+  for (const mbs::Body& x : b.model.bodies) about_axis += x.inertia(2, 2);
+  EXPECT_NEAR(about_axis, mass * (ro * ro + ri * ri) / 2, 1e-6 * about_axis);
+}
+
+TEST(Shaft, ATaperedOneHasTheMassOfItsCone) {
+  const Built b(
+      tower("height = \"60 m\"\ndiameter = \"5 m\"\ndiameter_top = \"3 m\"\nthickness = \"40 cm\"\n"
+            "thickness_top = \"20 cm\"\nlining = { thickness = \"12 cm\", density = \"1800 kg/m3\" }\n"
+            "load = [{ at = \"58 m\", weight = \"98.1 kN\" }]\n",
+            "", "1 s"));
+  double mass = 10000 * 9.81 / unit::gravity, moment = mass * 58;
+  const int n = 20000;
+  for (int i = 0; i < n; ++i) {
+    const double s = (i + 0.5) / n, ro = 2.5 - s, t = 0.4 - 0.2 * s, ri = ro - t, rl = ri - 0.12;
+    const double m = 60.0 / n * kPi * (2500 * (ro * ro - ri * ri) + 1800 * (ri * ri - rl * rl));
+    mass += m, moment += m * 60 * s;
+  }
+  const Whole w = gather(b.model);
+  EXPECT_NEAR(w.mass, mass, 1e-7 * mass);
+  EXPECT_NEAR(w.centre.z, moment / mass, 0.003 * w.centre.z);  // the pieces' own taper, (h / 12)² / 12
+}
+
+TEST(ShaftPhysics, TheFootBearsItsWeightEvenly) {
+  Built b(tower(slender + "as_outer = \"6 cm2/m\"\n", "", "1 s"));
+  mbs::Simulation s(b.model, {});
+  std::string message;
+  ASSERT_TRUE(s.find_equilibrium(message)) << message;
+  const mbs::View& v = s.calc_view();
+  const double area = kPi * (1.5 * 1.5 - 1.3 * 1.3);
+  ASSERT_EQ(b.map.elements.front().p_W, (Vec3{0, 0, 0}));
+  EXPECT_NEAR(std::abs(v.element_force.front().x) / area, 2500 * 9.81 * 40, 1.0);  // rho g h [Pa]
+  EXPECT_NEAR(norm(v.element_moment.front()), 0, 1e-6 * 2500 * 9.81 * 40 * area);
+}
+
+TEST(ShaftPhysics, SectorsShareTheWeightAsTheyShareTheRing) {
+  Built b(tower(slender + "as_outer = \"6 cm2/m\"\n", mouth("2 m", "200 deg"), "1 s"));
+  mbs::Simulation s(b.model, {});
+  std::string message;
+  ASSERT_TRUE(s.find_equilibrium(message)) << message;
+  const mbs::View& v = s.calc_view();
+  const double above = b.mass() * 37.5 / 40 * 9.81;
+  double sum = 0;
+  for (size_t e : {0UL, 1UL}) sum += std::abs(v.element_force[e].x);
+  EXPECT_NEAR(sum, above, 1e-6 * above);
+  const bool first_is_mouth = b.map.elements[0].name.find("mouth") != std::string::npos;
+  EXPECT_NEAR(std::abs(v.element_force[first_is_mouth ? 0 : 1].x) / above, 200.0 / 360, 0.01);
+  // nothing turns before the charge: the sectors' moments and their forces about the axis cancel
+  double tilt = 0;
+  for (const Pose& X : v.X_WB) tilt = std::max(tilt, norm(log_rotation(X.q)));
+  EXPECT_LT(tilt, 1e-5);
+}
+
+/// The rotation of the shaft towards the mouth over the time, from the frames of a run.
+struct Fall {
+  std::vector<double> time, angle, rate;
+  std::vector<std::vector<double>> moment;  // of each element about its z axis
+};
+Fall fall(const mbs::Model& model, double duration, double interval) {
+  Fall f;
+  mbs::Options o;
+  o.duration = duration, o.frame_interval = interval;
+  o.on_frame = [&](const mbs::View& v) {
+    f.time.push_back(v.time);
+    const size_t top = v.X_WB.size() - 1;
+    f.angle.push_back(-log_rotation(v.X_WB[top].q).y);
+    f.rate.push_back(-v.w_WB[top].y);
+    std::vector<double> m;
+    for (const Vec3& e : v.element_moment) m.push_back(e.z);
+    f.moment.push_back(std::move(m));
+  };
+  const mbs::Summary s = mbs::run(model, o);
+  EXPECT_LT(s.energy_error, 0.01) << s.message;
+  return f;
+}
+
+TEST(ShaftPhysics, ItFallsAsARigidBodyAboutItsHinge) {
+  // one piece above a high mouth that leaves a third of a thin ring without bars
+  Built b(tower("height = \"40 m\"\ndiameter = \"3 m\"\nthickness = \"20 cm\"\njoint_spacing = \"500 m\"\n",
+                mouth("4 m", "240 deg"), "6 s"));
+  const Fall f = fall(b.model, 6, 0.01);
+  const Whole w = gather(b.model);
+  ASSERT_GT(f.angle.back(), 0.5) << "it does not fall";
+  // from 0.1 rad on, when the hinge is broken, about the lips of the mouth: theta'' = m g r sin(theta + theta_0) / I
+  size_t from = 0;
+  while (f.angle[from] < 0.1) ++from;
+  const double lip = -1.4 * std::cos(kPi / 3);  // of the rear sector's ends, along the fall: behind the axis
+  const double height = w.centre.z - 2.5, ahead = -lip;
+  const double r2 = height * height + ahead * ahead, lean = std::atan2(ahead, height);
+  const double I = w.inertia + w.mass * r2, rate = w.mass * 9.81 * std::sqrt(r2) / I;
+  double angle = f.angle[from], speed = f.rate[from], t = f.time[from];
+  double worst = 0;
+  for (size_t i = from; i < f.angle.size() && f.angle[i] < 0.7; ++i) {
+    while (t < f.time[i] - 1e-9) {
+      const double h = 1e-4;
+      const double half = speed + 0.5 * h * rate * std::sin(angle + lean);
+      angle += h * half;
+      speed = half + 0.5 * h * rate * std::sin(angle + lean);
+      t += h;
+    }
+    worst = std::max(worst, std::abs(angle - f.angle[i]));
+  }
+  EXPECT_LT(worst, 0.03);  // rad; the lips are crushed a little
+}
+
+TEST(ShaftPhysics, TheMomentInTheFallingShaftIsLargestAtAThirdOfItsHeight) {
+  Built b(tower(slender + strong + "joint_spacing = \"2.5 m\"\n", mouth("4 m", "270 deg"), "8 s"));
+  const Fall f = fall(b.model, 8, 0.005);
+  ASSERT_GT(f.angle.back(), 0.5) << "it does not fall";
+  // A rod that turns about a pivot b behind its axis: what gravity and its acceleration leave across the axis,
+  //   q = mu (g sin a + b a'^2 - s a''),   a'' = g (L/2 sin a + b cos a) / (L^2/3 + b^2 + k^2)
+  // bends it at x = s/L by M = m L ((g sin a + b a'^2) (1-x)^2 / 2 - L a'' (x (1-x)^2 / 2 + (1-x)^3 / 3)), less the
+  // rotary inertia of what is above. With b = k = 0 it is m g L sin a x (1-x)^2 / 4.
+  const double L = 37.5, m = b.mass() * L / 40, pivot = 1.4 * std::cos(kPi / 4), k2 = (1.5 * 1.5 + 1.3 * 1.3) / 4;
+  double largest = 0, where = 0, worst = 0, most = 0;
+  for (size_t e = 0; e < b.map.elements.size(); ++e) {
+    const double x = (b.map.elements[e].p_W.z - 2.5) / L;
+    if (x < 0.02) continue;
+    double sum = 0, expected = 0, classical = 0;
+    int n = 0;
+    for (size_t i = 0; i < f.time.size(); ++i) {
+      if (f.angle[i] < 0.25 || f.angle[i] > 0.65) continue;
+      const double a = f.angle[i], s = std::sin(a), y = 1 - x;
+      const double turn = 9.81 * (L / 2 * s + pivot * std::cos(a)) / (L * L / 3 + pivot * pivot + k2);
+      sum += f.moment[i][e];
+      expected -= m * L *
+                  ((9.81 * s + pivot * f.rate[i] * f.rate[i]) * y * y / 2 - L * turn * (x * y * y / 2 + y * y * y / 3) -
+                   turn * k2 / L * y);
+      // without the moment that the pivot's place gives
+      const double foot = m * 9.81 * pivot * std::cos(a);
+      classical += f.moment[i][e] - foot * y * y * (1 + x / 2);
+      ++n;
+    }
+    worst = std::max(worst, std::abs(sum - expected) / n), most = std::max(most, std::abs(expected) / n);
+    if (classical / n > largest) largest = classical / n, where = x;
+  }
+  EXPECT_LT(worst, 0.1 * most);  // the shaft swings a little while it falls
+  EXPECT_NEAR(where, 1.0 / 3, 0.1);
+}
+
+TEST(ShaftPhysics, AWeakShaftBreaksAroundThereAndAStrongOneDoesNot) {
+  const auto broken = [](const std::string& bars) {
+    Built b(tower("height = \"60 m\"\ndiameter = \"3 m\"\nthickness = \"20 cm\"\njoint_spacing = \"4 m\"\n" + bars,
+                  mouth("2 m", "230 deg"), "10 s"));
+    std::vector<double> heights;
+    mbs::Options o;
+    o.duration = 7.8;  // before it lands
+    double angle = 0;
+    o.on_frame = [&](const mbs::View& v) { angle = -log_rotation(v.X_WB.back().q).y; };
+    o.on_happening = [&](const mbs::Happening& h) {
+      if (h.kind == mbs::Happening::Kind::ElementBroken && angle < 1.0 &&
+          b.map.elements[static_cast<size_t>(h.index)].p_W.z > 3)
+        heights.push_back(b.map.elements[static_cast<size_t>(h.index)].p_W.z);
+    };
+    const mbs::Summary s = mbs::run(b.model, o);
+    EXPECT_LT(s.energy_error, 0.02) << s.message;
+    EXPECT_GT(angle, 0.5);
+    return heights;
+  };
+  const std::vector<double> weak = broken("as_outer = \"1 cm2/m\"\nbar_diameter = \"10 mm\"\n");
+  ASSERT_FALSE(weak.empty());
+  EXPECT_GT(weak.front(), 2.5 + 0.15 * 57.5);
+  EXPECT_LT(weak.front(), 2.5 + 0.7 * 57.5);
+  EXPECT_TRUE(broken(strong).empty());
+}
+
+TEST(ShaftPhysics, ItFallsWhereItsMouthPointsAndReachesItsHeight) {
+  const std::string text =
+      tower(slender + "as_outer = \"6 cm2/m\"\n",
+            "[[stage]]\ntime = \"0.2 s\"\n[[stage.charge]]\nmembers = \"tower\"\nposition = \"2 m\"\n"
+            "destroyed_length = \"1.5 m\"\nazimuth = \"50 deg\"\nopening = \"220 deg\"\n",
+            "10 s");
+  const record::Record r = run_plan(read(text), default_knowledge(), {}, {});
+  const auto finding = [&](const std::string& id) {
+    const auto it = std::find_if(r.findings.begin(), r.findings.end(), [&](const auto& f) { return f.id == id; });
+    EXPECT_NE(it, r.findings.end()) << id;
+    return *it;
+  };
+  EXPECT_EQ(finding("mechanism").title, "Mechanism: topple") << finding("mechanism").text;
+  EXPECT_NEAR(finding("azimuth").value / unit::deg, 50, 5);
+  // single rings at the top tumble on, since rigid ones do not flatten
+  double mass = 0, within = 0, farthest = 0;
+  for (size_t b = 0; b < r.bodies.size(); ++b) {
+    if (r.bodies[b].fixed) continue;
+    const Vec3 p = record::pose_at(r, r.time.size() - 1, b).p;
+    const double way = p.x * std::cos(50 * unit::deg) + p.y * std::sin(50 * unit::deg);
+    mass += r.bodies[b].mass;
+    if (way < 1.1 * 40) within += r.bodies[b].mass;
+    farthest = std::max(farthest, way);
+  }
+  EXPECT_GT(farthest, 0.8 * 40);
+  EXPECT_GT(within / mass, 0.65);
+}
+
+TEST(ShaftPhysics, ASmallMouthLeavesItStanding) {
+  const record::Record r = run_plan(read(tower(slender + "as_outer = \"6 cm2/m\"\n", mouth("1 m", "90 deg"), "2 s")),
+                                    default_knowledge(), {}, {});
+  for (const record::Finding& f : r.findings)
+    if (f.id == "mechanism") { EXPECT_EQ(f.title, "Mechanism: stands") << f.text; }
+}
+
+TEST(Shaft, WhatIsNotModelledSaysSo) {
+  const std::string near_each_other =
+      mouth("2 m", "200 deg") +
+      "[[stage]]\ntime = \"0.3 s\"\n[[stage.charge]]\nmembers = \"tower\"\nposition = \"4.6 m\"\n"
+      "destroyed_length = \"2 m\"\nazimuth = \"0 deg\"\nopening = \"200 deg\"\n";
+  ModelMap map;
+  EXPECT_THROW(make_model(read(tower(slender, near_each_other, "1 s")), default_knowledge(), map), InputError);
+}
+
+}  // namespace
+}  // namespace topple::collapse
