@@ -1,6 +1,6 @@
 # Embeds examples/templates/NAME.toml as generated/product/template_texts.h.
 set(texts "")
-foreach(name frame)
+foreach(name frame wall hall silo chimney tower)
   set(file ${PROJECT_SOURCE_DIR}/examples/templates/${name}.toml)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${file})
   file(READ ${file} text)

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "base/error.h"
-#include "product/plan.h"
 #include "product/template_texts.h"
 
 namespace topple::product {
@@ -16,6 +15,11 @@ struct Words {
 
 constexpr Words words[] = {
     {"frame", "Frame building", "Reinforced concrete frames of three storeys, toppled to the front by two stages."},
+    {"wall", "Wall building", "Large panels under five floors, toppled to the front by two stages."},
+    {"hall", "Industrial hall", "Girders on two rows of columns, tilted about the rear row."},
+    {"silo", "Silo on columns", "A box of reinforced concrete on nine columns, toppled over its rear row."},
+    {"chimney", "Chimney", "60 m of reinforced concrete with a lining, felled over a notch with slits at its ends."},
+    {"tower", "Water tower", "A shaft with a tank on top, felled over a notch that opens in two steps."},
 };
 
 std::vector<Template> make_templates() {
@@ -47,7 +51,5 @@ const Template& find_template(const std::string& name) {
   throw InputError("E920", "there is no template \"" + name + "\"",
                    (near.empty() ? "" : "did you mean \"" + near + "\"? ") + std::string("there are: ") + list);
 }
-
-std::string plan_template() { return templates().front().text; }
 
 }  // namespace topple::product
