@@ -38,6 +38,12 @@ export function findCoherent(run: Run): number | undefined {
 
 export const cssColour = (name: string): string => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
+/// What a plot is, for those who do not see it.
+export function namePlot(plot: uPlot, title: string): void {
+  plot.ctx.canvas.setAttribute("role", "img");
+  plot.ctx.canvas.setAttribute("aria-label", `${title}: the table of values says the same`);
+}
+
 export function axis(label: string, isTime: boolean): uPlot.Axis {
   return {
     stroke: () => cssColour("--text-quiet"),
@@ -117,6 +123,7 @@ export function PlotPanel(props: { state: State; group: Group; onSeek?: (time: n
       [run.time, ...calcValues(run, group)],
       element,
     );
+    namePlot(plot, group.title);
     plot.over.appendChild(cursorLine);
     const placeLine = (): void => {
       cursorLine.style.transform = `translateX(${plot.valToPos(state.time.value, "x") || 0}px)`;

@@ -1,7 +1,7 @@
 /// Two branches: their series in one plot each, where they are farthest apart, what their findings say.
 import { useEffect, useRef, useState } from "preact/hooks";
 import uPlot from "uplot";
-import { axis, cssColour, niceRange } from "./plots";
+import { axis, cssColour, namePlot, niceRange } from "./plots";
 import type { SteerState } from "./steer_state";
 import type { Comparison } from "./steer_wire";
 import { compareView, type CompareView } from "./steer_view";
@@ -30,6 +30,7 @@ function Pair(props: { s: SteerState; result: Comparison; series: Comparison["se
       [result.time, scale(series.a), scale(series.b)],
       element,
     );
+    namePlot(plot, series.title);
     plot.over.addEventListener("pointerdown", (e) => s.look(plot.posToVal(e.clientX - plot.over.getBoundingClientRect().left, "x")));
     const observer = new ResizeObserver(() => plot.setSize({ width: Math.max(200, element.clientWidth), height: 150 }));
     observer.observe(element);

@@ -2,7 +2,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import uPlot from "uplot";
 import { Inspector } from "./inspector";
-import { axis, cssColour, niceRange } from "./plots";
+import { axis, cssColour, namePlot, niceRange } from "./plots";
 import { StatusSign, StatusWord } from "./signs";
 import type { SteerState } from "./steer_state";
 import type { LawFamily, ZoneWatch } from "./steer_wire";
@@ -126,6 +126,7 @@ export function ZonePlot(props: { s: SteerState; zone: ZoneWatch }) {
       data.length > 1 ? data : [data[0] as number[]],
       element,
     );
+    namePlot(plot, `Bending moment over rotation of ${zone.zone}`);
     plotRef.current = plot;
     const observer = new ResizeObserver(() => plot.setSize({ width: Math.max(200, element.clientWidth), height: 190 }));
     observer.observe(element);
@@ -250,6 +251,7 @@ export function Side(props: { s: SteerState }) {
     <aside class="steer-side" aria-label="Member and verdict">
       {nobody && <Verdict s={s} />}
       {nobody && s.zone.value === null && <p class="quiet hint">Click a member in the picture, or name one above it, to see its zones, resistance curves and state.</p>}
+      {!nobody && <h2 class="visually-hidden">Member</h2>}
       {!nobody && <ZoneButtons s={s} />}
       {s.zone.value !== null && <ZonePlot s={s} zone={s.zone.value} />}
       {!nobody && <Inspector state={view.state} />}

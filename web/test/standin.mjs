@@ -78,7 +78,7 @@ function makeCourse(second) {
 
 class Session {
   constructor(server, id, text, path) {
-    Object.assign(this, { server, id, path, disk: text, text, phase: "paused", seq: 0, log: [], branches: [], cursor: null, speed: null, studies: [], zone: null, broken: [] });
+    Object.assign(this, { server, id, path, disk: text, text, phase: "paused", seq: 0, log: [], branches: [], cursor: null, speed: null, studies: [], zone: null, broken: [], earlier: null });
     this.title = /title = "(.*)"/.exec(text)?.[1] ?? "untitled";
     this.fuzzy = !text.includes("crisp");
     this.active = this.addBranch("main", null, 0, 4).id;
@@ -110,9 +110,9 @@ class Session {
     return { ...b, frontier: makeCourse(b.own.second).data.time[b.own.row], frames: b.own.row + 1 };
   }
   describe() {
-    const { id, title, path, active, cursor, speed, phase, fuzzy } = this;
+    const { id, title, path, active, cursor, speed, phase, fuzzy, earlier } = this;
     const isBuilt = phase !== "building" && this.broken.length === 0;
-    return { id, title, path, active: isBuilt ? active : null, cursor, speed, phase, branches: isBuilt ? this.branches.map((b) => this.describeBranch(b)) : [], fuzzy, diagnostics: this.broken };
+    return { id, title, path, active: isBuilt ? active : null, cursor, speed, phase, branches: isBuilt ? this.branches.map((b) => this.describeBranch(b)) : [], fuzzy, earlier, diagnostics: this.broken };
   }
   tell(type, keys) {
     this.seq += 1;
@@ -217,6 +217,7 @@ function check(text) {
     const before = text.slice(0, at).split("\n");
     diagnostics.push({ severity: "error", code: "E203", line: before.length, column: before[before.length - 1].length + 1, width: 5, message: 'unknown key "dealy"', help: 'did you mean "delay"?' });
   }
+  if (text.includes("= \"?\"")) diagnostics.push({ severity: "error", code: "E211", line: 2, column: 9, width: 3, message: "title: a gap", help: "fill it in" });
   if (text.includes("title = \"\"")) diagnostics.push({ severity: "warning", code: "W101", line: 2, column: 1, width: 5, message: "the title is empty", help: "" });
   return { diagnostics, title: /title = "(.*)"/.exec(text)?.[1] ?? "", notes: [], removes_support: text.includes("[[stage]]") };
 }
@@ -314,7 +315,7 @@ export class Standin {
     const json = (value) => send("application/json", JSON.stringify(value));
     const session = this.sessions[Number(/^\/api\/sessions\/(\d+)/.exec(path)?.[1]) - 1];
     if (path === "/") return send("text/html; charset=utf-8", await this.page);
-    if (path === "/api/templates") return json({ templates: [{ name: "frame", title: "Frame of three storeys", text: planText }, { name: "chimney", title: "Chimney of 40 m", text: planText }] });
+    if (path === "/api/templates") return json({ templates: [{ name: "frame", title: "Frame of three storeys", text: planText }, { name: "chimney", title: "Chimney of 40 m", description: "A chimney that falls to one side", text: planText }], demo: { title: "Storehouse in Weida, 1998" } });
     if (path === "/api/plans") return json({ folder: "/plans", plans: [{ path: "storehouse.toml", title: "Storehouse of seven storeys" }, { path: "silo.toml", title: "Silo" }] });
     if (path === "/api/sessions") return json({ sessions: this.sessions.map((s) => s.describe()) });
     if (session !== undefined && path.endsWith("/plan")) return send("text/plain; charset=utf-8", session.disk);
@@ -380,6 +381,13 @@ export class Standin {
       case "session.open": {
         const text = m.text ?? planText;
         const { diagnostics } = check(text);
+        if (text.includes("= \"?\"")) {
+          // opened all the same, to be filled
+          const session = this.open(text, m.title);
+          Object.assign(session, { phase: "failed", broken: diagnostics });
+          setTimeout(() => this.attach(client, session), 5);
+          return { session: session.id };
+        }
         if (diagnostics.some((d) => d.severity === "error")) throw problem("E203", "The plan has 1 error. Nothing was run.", { diagnostics });
         const session = this.open(text, m.path ?? m.title ?? `${m.template}.toml`);
         setTimeout(() => {
@@ -395,6 +403,10 @@ export class Standin {
         return { session: session.describe() };
       }
     }
+    if (command === "plan.import")
+      return m.name.endsWith(".ifc")
+        ? { text: '# from a building\ntitle = "?"\n', taken: ["42 columns, 80 beams"], guessed: ["concrete C25 from its name"], missing: ["bars of all sections"] }
+        : { text: '[[site.neighbour]]\nname = "House"\n', taken: ["1 outline"], guessed: [], missing: [] };
     if (s === undefined) throw problem("E920", "No session is open.");
     const b = () => s.branch(m.branch);
     switch (command) {
@@ -490,6 +502,15 @@ export class Standin {
           }])),
         };
       case "log": return { entries: s.log };
+      case "session.continue": {
+        const made = s.addBranch("what-if 1", b(), 0, 4);
+        made.own.row = s.rowAt({ own: { row: 269, second: 4 } }, s.earlier.time);
+        s.active = made.id;
+        s.earlier = null;
+        setTimeout(() => this.attach(client, s), 5);
+        return { branch: made.id, time: 3 };
+      }
+      case "plan.text": return { text: `${s.text}# edited\n`, sha256: "", path: s.path, taken: ["Row C fires at 5.5 s."], left_out: ["C-D1-0 is cut: acts from a moment of the run on, which no plan can say"] };
       case "plan.check": return check(m.text);
       case "plan.apply": {
         const result = check(m.text);

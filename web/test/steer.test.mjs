@@ -5,16 +5,31 @@ import { fileURLToPath } from "node:url";
 import { openPage } from "./browser.mjs";
 import { after, before, describe, it } from "./harness.mjs";
 import { Standin, planText } from "./standin.mjs";
-import { assertPng, assertWebm, findFaint, findOverflow, makeDriver, takeDownload } from "./steer_helpers.mjs";
+import { assertPng, assertWebm, findAccessFaults, findFaint, findOverflow, findUnreached, makeDriver, takeDownload } from "./steer_helpers.mjs";
 
 const out = fileURLToPath(new URL("out/steer/", import.meta.url));
 const near = (a, b, tolerance) => assert.ok(Math.abs(a - b) <= tolerance, `${a}, not ${b}`);
 // Frames are 9 s / 269 apart: what is asked for is met up to one of them, and the clock shows milliseconds.
 const frame = 9 / 269 + 1e-3;
 
+/// A picture of a state, which must be one for everybody: names, roles, contrast in light and dark. What is found is
+/// told at the end, so that it does not end the story.
+const faults = [];
+async function look(page, name) {
+  await page.screenshot({ path: `${out}${name}.png` });
+  const note = (found, where) => faults.push(...found.map((fault) => `${where}: ${fault}`));
+  note(await findAccessFaults(page), name);
+  for (const colorScheme of ["dark", "light"]) {
+    await page.emulateMedia({ colorScheme });
+    // colours change over a moment
+    await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(Promise.all(document.getAnimations().map((a) => a.finished.catch(() => undefined))))))));
+    note(await findFaint(page), `${name}, ${colorScheme}`);
+  }
+}
+
 describe("steering page", () => {
   let server, browser, page, d;
-  const shot = (name) => page.screenshot({ path: `${out}${name}.png` });
+  const shot = (name) => look(page, name);
   before(async () => {
     await mkdir(out, { recursive: true });
     server = await new Standin().start();
@@ -46,6 +61,10 @@ describe("steering page", () => {
     await d.untilViewed(frontier);
     assert.equal(await d.frontier(), frontier, "it went on after the pause");
     assert.ok(frontier < 9);
+    await d.tab("findings");
+    await d.until("so-far", "under way");
+    await shot("under-way");
+    await d.tab("plots");
   });
 
   it("steps one frame", async () => {
@@ -329,12 +348,17 @@ describe("steering page", () => {
     await d.click("apply");
     await page.waitForFunction(() => document.querySelector("[data-test=active-branch]").textContent.startsWith("plan "));
     await page.getByRole("button", { name: "Discard" }).click();
+    await d.click("edits-text");
+    assert.match(await page.inputValue("[data-test=plan-text]"), /# edited/);
+    await page.getByRole("button", { name: "Discard" }).click();
     await d.click("tall");
   });
 
   it("starts a study, watches it grow, and plays a run of it", async () => {
     server.barrier = 100;
     await d.tab("study");
+    await d.until("study-edits", "1 of 2 edits");
+    await d.until("left-out", "no plan can say");
     await page.fill(".study .count", "40");
     await d.click("study-start");
     await page.waitForFunction(() => parseInt(document.querySelector("[data-test=study-state]")?.textContent.split(", ")[1] ?? "0") >= 5);
@@ -344,10 +368,10 @@ describe("steering page", () => {
     assert.ok((await page.locator(".fan polygon").count()) === 3);
     await d.click("tall");
     await shot("study");
-    await page.locator(".study summary").click();
+    await page.locator(".study-body summary").click();
     await page.locator("[data-test=play-sample]").first().waitFor();
     assert.equal(await page.locator("[data-test=play-sample]").count(), 40);
-    await page.locator(".study summary").click();
+    await page.locator(".study-body summary").click();
     const canvas = page.locator("[data-test=parallel]");
     await canvas.scrollIntoViewIfNeeded();
     const box = await canvas.boundingBox();
@@ -470,15 +494,22 @@ describe("steering page", () => {
     await page.emulateMedia({ colorScheme: "light", reducedMotion: "no-preference" });
   });
 
-  it("names every control and gives each plot a table", async () => {
+  it("can be reached by Tab everywhere, and shows where the keyboard is", async () => {
+    for (const tab of ["plots", "study", "plan"]) {
+      await d.tab(tab);
+      await d.draw();
+      assert.deepEqual(await findUnreached(page), [], tab);
+      assert.deepEqual(await findAccessFaults(page), [], tab);
+    }
+    await page.keyboard.press("Escape");
+  });
+
+  it("stands still where the system asks for it", async () => {
+    await page.emulateMedia({ reducedMotion: "reduce" });
     await d.tab("plots");
-    const nameless = await page.evaluate(() =>
-      [...document.querySelectorAll("button, select, input, textarea, a[href]")]
-        .filter((e) => e.getClientRects().length > 0)
-        .filter((e) => (e.textContent.trim() || e.getAttribute("aria-label") || e.getAttribute("title") || e.closest("label")?.textContent.trim() || "") === "")
-        .map((e) => e.outerHTML.slice(0, 80)));
-    assert.deepEqual(nameless, []);
-    assert.equal(await page.locator(".plot").count(), await page.locator(".plot details.data-table").count());
+    await d.draw();
+    assert.deepEqual(await page.evaluate(() => document.getAnimations().map((a) => a.effect?.target?.className ?? "?")), []);
+    await page.emulateMedia({ reducedMotion: "no-preference" });
   });
 
   it("reports no error and asks nobody but its server", () =>
@@ -492,13 +523,57 @@ describe("steering page with nothing open", () => {
     const browser = await openPage(server.url);
     const { page } = browser;
     await page.waitForSelector("[data-test=open-path]");
-    await page.screenshot({ path: `${out}empty.png` });
+    await look(page, "empty");
     assert.equal(await page.locator("[data-test=open-template]").count(), 2);
+    assert.deepEqual(await findUnreached(page), []);
     await page.locator("[data-test=open-path]").first().click();
     const d = makeDriver(page);
     await d.until("phase", "Paused");
     assert.equal(await d.branch(), "main");
     assert.deepEqual(browser.problems, []);
+    await browser.close();
+  });
+
+  it("opens the demo, live", async () => {
+    const server = await new Standin().start({ empty: true });
+    const browser = await openPage(server.url);
+    await browser.page.locator("[data-test=open-demo]").click();
+    const d = makeDriver(browser.page);
+    await d.until("phase", "Paused");
+    await d.run();
+    await d.untilFrontier(0.2);
+    await browser.close();
+  });
+
+  it("makes a plan with gaps of a building from another program, and takes a site into a plan", async () => {
+    const server = await new Standin().start({ empty: true });
+    const browser = await openPage(server.url);
+    const { page } = browser;
+    const file = (name) => ({ name, mimeType: "application/octet-stream", buffer: Buffer.from("ISO-10303-21;") });
+    await page.setInputFiles("[data-test=import]", file("mill.ifc"));
+    await page.waitForSelector("[data-test=imported]");
+    for (const words of ["42 columns", "C25", "gaps"]) await page.waitForFunction((w) => document.querySelector("[data-test=imported]").textContent.includes(w), words);
+    const d = makeDriver(page);
+    await d.until("check-count", "1 error");
+    await look(page, "imported");
+    await page.setInputFiles("[data-test=import-site]", file("site.dxf"));
+    await page.waitForFunction(() => document.querySelector("[data-test=plan-text]").value.includes("[[site.neighbour]]"));
+    await browser.close();
+  });
+
+  it("offers to go on with an earlier session of the plan", async () => {
+    const server = await new Standin().start();
+    server.sessions[0].earlier = { log: "storehouse.steer.jsonl", created: "2026-01-31T12:00:00Z", actions: 2, branches: 2, time: 3 };
+    const browser = await openPage(server.url);
+    const { page } = browser;
+    const d = makeDriver(page);
+    await d.until("earlier", "2 actions, 2 branches, computed to 3.000 s");
+    await look(page, "earlier");
+    await d.click("continue");
+    await d.untilBranch("what-if 1");
+    await d.untilFrontier(2.9);
+    assert.equal(await page.locator("[data-test=earlier]").count(), 0);
+    await d.run();
     await browser.close();
   });
 
@@ -509,12 +584,12 @@ describe("steering page with nothing open", () => {
     const { page } = browser;
     const d = makeDriver(page);
     await d.until("phase", "Building");
-    await page.screenshot({ path: `${out}building.png` });
+    await look(page, "building");
     end([{ severity: "error", code: "E310", line: 8, column: 1, width: 4, message: "the columns of row A carry nothing", help: "" }]);
     await d.until("banner", "cannot be run as it is");
     await page.locator("[data-test=diagnostic]").click();
     assert.equal(await page.locator("[data-test=plan-text]").evaluate((e) => e.value.slice(e.selectionStart, e.selectionEnd)), "name");
-    await page.screenshot({ path: `${out}unbuilt.png` });
+    await look(page, "unbuilt");
     end([]);
     await d.until("phase", "Paused");
     await page.waitForSelector("[data-test=canvas]");
@@ -529,7 +604,7 @@ describe("steering page with nothing open", () => {
     await d.until("banner", "the building will stand");
     await d.tab("study");
     await d.until("no-fuzzy", "[fuzzy]");
-    await browser.page.screenshot({ path: `${out}stands.png` });
+    await look(browser.page, "stands");
     await browser.close();
   });
 
@@ -547,4 +622,8 @@ describe("steering page with nothing open", () => {
     assert.deepEqual(browser.problems.filter((p) => !/WebGL/i.test(p)), []);
     await browser.close();
   });
+});
+
+describe("each state of the steering page", () => {
+  it("has names, roles and contrast for everybody", () => assert.deepEqual(faults, []));
 });

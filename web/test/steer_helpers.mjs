@@ -96,6 +96,97 @@ export const findOverflow = (page) =>
       .filter((e) => e.getBoundingClientRect().right > innerWidth + 0.5)
       .map((e) => `${e.className} ${e.textContent.slice(0, 20)}`));
 
+/// What a reader with a keyboard, a screen reader or weak eyes would stumble over: WCAG 2.1, 1.1.1, 1.3.1, 1.4.11, 2.1.1,
+/// 2.4.6, 4.1.1, 4.1.2.
+export const findAccessFaults = (page) =>
+  page.evaluate(() => {
+    const faults = [];
+    const isSeen = (e) => e.getClientRects().length > 0 && getComputedStyle(e).visibility !== "hidden";
+    const all = (selector) => [...document.querySelectorAll(selector)].filter(isSeen);
+    const short = (e) => e.outerHTML.slice(0, 90);
+    const textOf = (ids) => ids.split(" ").map((id) => document.getElementById(id)?.textContent ?? "").join(" ");
+    const nameOf = (e) =>
+      [e.getAttribute("aria-label"), textOf(e.getAttribute("aria-labelledby") ?? ""), e.closest("label")?.textContent, e.id === "" ? "" : document.querySelector(`label[for="${e.id}"]`)?.textContent,
+        e.matches("input, select, textarea") ? "" : e.textContent, e.getAttribute("title")].map((t) => (t ?? "").trim()).find((t) => t !== "") ?? "";
+    for (const e of all("button, select, input, textarea, a[href], canvas, progress, summary, dialog[open], [role=img], [role=region], [role=group], [role=tab], [role=tabpanel], nav, aside"))
+      if (nameOf(e) === "" && e.closest("[aria-hidden=true]") === null) faults.push(`no name: ${short(e)}`);
+    const ids = all("[id]").map((e) => e.id);
+    for (const id of new Set(ids.filter((id, k) => ids.indexOf(id) !== k))) faults.push(`id twice: ${id}`);
+    for (const e of all("[aria-labelledby], [aria-controls], [aria-describedby]"))
+      for (const key of ["aria-labelledby", "aria-controls", "aria-describedby"])
+        for (const id of (e.getAttribute(key) ?? "").split(" ").filter((x) => x !== "")) if (document.getElementById(id) === null) faults.push(`${key} leads nowhere: ${short(e)}`);
+    for (const e of all("[role=tab]")) {
+      if (e.closest("[role=tablist]") === null) faults.push(`a tab outside a tablist: ${short(e)}`);
+      if (!["true", "false"].includes(e.getAttribute("aria-selected") ?? "")) faults.push(`a tab that says not whether it is chosen: ${short(e)}`);
+    }
+    if (all("[role=tab]").length > 0 && all("[role=tab][aria-selected=true]").length !== 1) faults.push("not one tab is chosen");
+    if (all("main").length !== 1) faults.push(`${all("main").length} main parts`);
+    if (document.querySelectorAll("h1").length !== 1) faults.push(`${document.querySelectorAll("h1").length} headings of the first level`);
+    let level = 1;
+    for (const e of all("h1, h2, h3, h4")) {
+      const here = Number(e.tagName[1]);
+      if (here > level + 1) faults.push(`a heading of level ${here} below level ${level}: ${e.textContent.slice(0, 40)}`);
+      level = here;
+    }
+    for (const e of all("th")) if (!e.hasAttribute("scope") && e.textContent.trim() !== "") faults.push(`a head of a table without scope: ${short(e)}`);
+    for (const e of all("[tabindex]")) if (Number(e.getAttribute("tabindex")) > 0) faults.push(`an order of its own: ${short(e)}`);
+    if (all(".plot").length !== all(".plot details.data-table").length) faults.push("a plot without a table");
+    if (document.documentElement.lang === "") faults.push("no language");
+    // edges of fields against what is around them
+    const parse = (text) => (text.match(/[\d.]+/g) ?? []).map(Number);
+    const luminance = (rgb) => {
+      const [r, g, b] = rgb.map((v) => (v / 255 <= 0.04045 ? v / 255 / 12.92 : ((v / 255 + 0.055) / 1.055) ** 2.4));
+      return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+    };
+    const groundOf = (e) => {
+      for (let at = e; at !== null; at = at.parentElement) {
+        const c = parse(getComputedStyle(at).backgroundColor);
+        if ((c[3] ?? 1) > 0.99) return c.slice(0, 3);
+      }
+      return [255, 255, 255];
+    };
+    for (const e of all("input:not([type=checkbox]):not([type=range]):not([type=file]), select, textarea")) {
+      if (e.matches(":disabled")) continue;
+      const style = getComputedStyle(e);
+      const around = luminance(groundOf(e.parentElement)), inside = luminance(groundOf(e));
+      const ratio = (a, b) => (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+      const edge = parseFloat(style.borderTopWidth) > 0 ? luminance(parse(style.borderTopColor).slice(0, 3)) : around;
+      if (Math.max(ratio(edge, around), ratio(inside, around)) < 3) faults.push(`an edge of ${Math.max(ratio(edge, around), ratio(inside, around)).toFixed(2)}: ${short(e)}`);
+    }
+    return faults;
+  });
+
+/// Controls that Tab does not come to, and those that do not show that it has.
+export async function findUnreached(page) {
+  const wanted = await page.evaluate(() => {
+    let n = 0;
+    for (const e of document.querySelectorAll("button, select, input, textarea, a[href], summary")) {
+      const seen = e.getClientRects().length > 0 && getComputedStyle(e).visibility !== "hidden" && !e.matches(":disabled") && e.closest("[inert]") === null;
+      if (seen) e.dataset.order = String(n++);
+    }
+    document.activeElement?.blur();
+    return n;
+  });
+  const unmarked = await page.evaluate(() => ((globalThis.reached_ = new Set()), (globalThis.plain_ = new Set()), 0));
+  for (let k = unmarked; k < wanted + 40; ++k) {
+    await page.keyboard.press("Tab");
+    const over = await page.evaluate(() => {
+      const e = document.activeElement;
+      if (e === null || e === document.body) return false; // behind the last one; the first one follows
+      if (globalThis.reached_.has(e)) return true;
+      globalThis.reached_.add(e);
+      const rings = [e, e.parentElement].map((x) => getComputedStyle(x));
+      if (!rings.some((s) => (s.outlineStyle !== "none" && parseFloat(s.outlineWidth) > 0) || s.boxShadow !== "none")) globalThis.plain_.add(e);
+      return false;
+    });
+    if (over && k > 3) break;
+  }
+  return page.evaluate(() => [
+    ...[...document.querySelectorAll("[data-order]")].filter((e) => !globalThis.reached_.has(e)).map((e) => `not reached: ${e.outerHTML.slice(0, 90)}`),
+    ...[...globalThis.plain_].map((e) => `does not show the focus: ${e.outerHTML.slice(0, 90)}`),
+  ]);
+}
+
 /// Texts whose contrast to their ground is below 4.5 (3 for large ones): WCAG 2.1, 1.4.3. What is switched off and what
 /// lies on pictures is left out.
 export const findFaint = (page) =>
