@@ -1,5 +1,7 @@
 // Measures how many pictures a second the steering page shows: node test/speed.mjs [bodies]. Not a test: a number of
-// this machine at this moment. The run plays, then stands while the picture is turned.
+// this machine at this moment. The run plays, then stands while the picture is turned. Beside the time between pictures
+// stands the processor time of the browser's processes, which other work on the machine does not change much.
+import { readFileSync, readdirSync } from "node:fs";
 import { openPage } from "./browser.mjs";
 import { closeAll } from "./harness.mjs";
 import { Standin, useData } from "./standin.mjs";
@@ -36,9 +38,25 @@ const server = new Standin();
 server.rate = 1;
 server.frames = data.time.length;
 await server.start();
+const before = new Set(readdirSync("/proc"));
 const { page } = await openPage(server.url);
-const watch = (milliseconds) =>
-  page.evaluate(async (limit) => {
+/// Processor time of the browser's processes of a kind so far [ms].
+function readTime(kind) {
+  let sum = 0;
+  for (const id of readdirSync("/proc").filter((name) => /^\d+$/.test(name) && !before.has(name))) {
+    try {
+      if (!readFileSync(`/proc/${id}/cmdline`, "latin1").includes(`--type=${kind}`)) continue;
+      const fields = readFileSync(`/proc/${id}/stat`, "latin1").split(") ")[1].split(" ");
+      sum += 10 * (Number(fields[11]) + Number(fields[12]));
+    } catch {
+      continue; // it has ended
+    }
+  }
+  return sum;
+}
+const watch = async (milliseconds) => {
+  const begin = [readTime("gpu-process"), readTime("renderer")];
+  const result = await page.evaluate(async (limit) => {
     const gaps = [];
     let last = performance.now();
     const end = last + limit;
@@ -52,7 +70,9 @@ const watch = (milliseconds) =>
     const canvas = document.querySelector("[data-test=canvas]");
     return { pictures: gaps.length, mean: gaps.reduce((a, b) => a + b) / gaps.length, median: gaps[gaps.length >> 1], p95: gaps[Math.floor(gaps.length * 0.95)], pixels: `${canvas.width} x ${canvas.height}` };
   }, milliseconds);
-const show = (words, r) => console.log(`${data.bodies.length} bodies, ${words}: mean ${r.mean.toFixed(1)} ms, median ${r.median.toFixed(1)} ms, 95 % ${r.p95.toFixed(1)} ms between pictures of ${r.pixels}`);
+  return { ...result, draw: (readTime("gpu-process") - begin[0]) / result.pictures, script: (readTime("renderer") - begin[1]) / result.pictures };
+};
+const show = (words, r) => console.log(`${data.bodies.length} bodies, ${words}: mean ${r.mean.toFixed(1)} ms, median ${r.median.toFixed(1)} ms, 95 % ${r.p95.toFixed(1)} ms between pictures of ${r.pixels}; processor time a picture: drawing ${r.draw.toFixed(0)} ms, page ${r.script.toFixed(0)} ms`);
 await page.click("[data-test=run]");
 show("running", await watch(4000));
 await page.waitForFunction(() => !document.querySelector("[data-test=phase]").textContent.includes("Running"), undefined, { timeout: 60000 }).catch(() => page.click("[data-test=run]"));

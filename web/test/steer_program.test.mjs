@@ -1,11 +1,11 @@
 // The steering page before the real `topple steer` (TOPPLE names the program), on the storehouse.
 import assert from "node:assert/strict";
-import { spawn } from "node:child_process";
 import { copyFile, mkdir, readFile, rm, writeFile } from "node:fs/promises";
 import { fileURLToPath } from "node:url";
 import { openPage } from "./browser.mjs";
-import { after, before, describe, it, keep } from "./harness.mjs";
+import { after, before, describe, it } from "./harness.mjs";
 import { assertPng, assertWebm, makeDriver, takeDownload } from "./steer_helpers.mjs";
+import { startServer } from "./steer_server.mjs";
 
 const out = fileURLToPath(new URL("out/steer_program/", import.meta.url));
 const root = fileURLToPath(new URL("../../", import.meta.url));
@@ -13,34 +13,6 @@ const program = process.env.TOPPLE;
 if (program === undefined) {
   console.log("TOPPLE names no program: nothing is steered");
   process.exit(0);
-}
-
-/// Starts `topple steer` and waits for its address. A program that ends or says nothing is an error with its output.
-async function startServer(plan) {
-  const child = spawn(program, ["steer", plan, "--no-open"], { cwd: out, stdio: ["ignore", "pipe", "pipe"] });
-  let output = "";
-  let ended = false;
-  const end = new Promise((done) => child.on("close", () => ((ended = true), done())));
-  const close = keep(async () => {
-    child.kill("SIGTERM");
-    const hard = setTimeout(() => child.kill("SIGKILL"), 5000);
-    await end;
-    clearTimeout(hard);
-  });
-  process.on("exit", () => child.kill("SIGKILL"));
-  const url = await new Promise((done, fail) => {
-    const timer = setTimeout(() => fail(new Error(`${program} steer printed no address within 60 s:\n${output}`)), 60000);
-    const look = (text) => {
-      output += text;
-      const found = /http:\/\/127\.0\.0\.1:\d+\/[0-9a-f]{32}\//.exec(output)?.[0];
-      if (found !== undefined) done((clearTimeout(timer), found));
-    };
-    child.stdout.on("data", look);
-    child.stderr.on("data", look);
-    child.on("error", (error) => fail((clearTimeout(timer), new Error(`${program}: ${error.message}`))));
-    void end.then(() => fail((clearTimeout(timer), new Error(`${program} steer ended:\n${output}`))));
-  });
-  return { url, close, output: () => output, ended: () => ended };
 }
 
 describe("steering the storehouse", { timeout: 240000 }, () => {
@@ -53,7 +25,7 @@ describe("steering the storehouse", { timeout: 240000 }, () => {
     const short = await readFile(`${root}tests/data/short.toml`, "utf8");
     const fuzzy = '\n[fuzzy]\nsite.friction = { trapezoidal = [0.4, 0.6, 0.6, 0.8] }\nconcrete.C25.fc = { triangular = ["20 N/mm2", "25 N/mm2", "30 N/mm2"] }\n';
     await writeFile(`${out}fuzzy.toml`, short.replace('title = "Short run"', 'title = "Short run, fuzzy"') + fuzzy);
-    server = await startServer("plan.toml");
+    server = await startServer(program, "plan.toml", out);
     browser = await openPage(server.url, { acceptDownloads: true });
     page = browser.page;
     d = makeDriver(page);
@@ -205,7 +177,7 @@ describe("steering the storehouse", { timeout: 240000 }, () => {
     await page.waitForFunction(() => parseInt(document.querySelector("[data-test=study-state]")?.textContent.split(", ")[1] ?? "0") >= 3, undefined, { timeout: 200000 });
     await d.click("tall");
     await shot("study");
-    await page.locator(".study summary").click();
+    await page.locator(".study-body summary").click();
     await page.locator("[data-test=play-sample]").first().click();
     await page.waitForFunction(() => document.querySelector("[data-test=active-branch]").textContent !== "main");
     await d.untilFrontier(0.1);
