@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <thread>
 
+#include "apps/demo_plan.h"
 #include "base/error.h"
 #include "base/file.h"
 #include "base/hash.h"
@@ -60,6 +61,7 @@ int steer(const Arguments& a, const std::atomic<bool>& cancel) {
     for (const auto& [name, page] :
          {std::pair{"steer.html", &options.page}, {"report.html", &options.report}, {"study.html", &options.study}})
       if (auto bundle = find_bundle(name)) *page = std::move(*bundle);
+    options.demo = {"Storehouse in Weida, 1998", "", kDemoPlan};
     if (options.page.empty())
       std::fprintf(stderr,
                    "The steering page is not built (run `npm ci && npm run build` in web/); the protocol is served all "

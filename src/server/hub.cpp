@@ -11,6 +11,7 @@
 #include "base/hash.h"
 #include "collapse/branch_plan.h"
 #include "collapse/edit_json.h"
+#include "product/import.h"
 #include "product/templates.h"
 #include "record/page.h"
 #include "server/server.h"
@@ -183,15 +184,21 @@ Json Hub::list_plans() const {
   return {{"folder", options_.plans}, {"plans", std::move(list)}};
 }
 
-Json Hub::list_templates() {
+Json Hub::list_templates() const {
   Json list = Json::array();
   for (const product::Template& t : product::templates())
     list.push_back({{"name", t.name}, {"title", t.title}, {"description", t.description}, {"text", t.text}});
-  return {{"templates", std::move(list)}};
+  Json all{{"templates", std::move(list)}, {"demo", nullptr}};
+  if (!options_.demo.text.empty()) all["demo"] = {{"title", options_.demo.title}};
+  return all;
 }
 
 SessionPlan Hub::read_plan_of(const Json& command) const {
-  check_keys(command, {"path", "text", "title", "template"});
+  check_keys(command, {"path", "text", "title", "template", "demo"});
+  if (read_flag(command, "demo", false)) {
+    if (options_.demo.text.empty()) throw InputError("E920", "there is no demo here");
+    return options_.demo;
+  }
   if (has(command, "path")) {
     const std::string name = read_text(command, "path");
     const fs::path relative(name);
@@ -303,6 +310,7 @@ void Hub::receive(const std::shared_ptr<Client>& client, const std::string& text
       client->answer(id, dump(make_ack(id, std::move(*result))));
       return;
     }
+    if (word == "plan.import") return import_plan(client, id, command);
     const int number = has(command, "session") ? read_integer(command, "session", 1, kMostIds) : client->session.load();
     const auto session = find_session(number);
     if (!session)
@@ -343,6 +351,32 @@ void Hub::receive(const std::shared_ptr<Client>& client, const std::string& text
   } catch (const std::exception& e) {
     client->answer(id, dump(make_error(id, describe_error(InputError("E940", e.what())))));
   }
+}
+
+void Hub::import_plan(const std::shared_ptr<Client>& client, std::int64_t id, const Json& command) {
+  check_keys(command, {"name", "text", "unit"});
+  const std::string name = read_text(command, "name"), text = read_text(command, "text");
+  const double unit = has(command, "unit") ? collapse::read_number(command, "unit") : 0;
+  if (!(unit >= 0)) throw InputError("E912", "\"unit\" must be > 0 m, or left out");
+  std::string kind = fs::path(name).extension().string();
+  std::transform(kind.begin(), kind.end(), kind.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (kind != ".ifc" && kind != ".dxf")
+    throw InputError("E114", name + " is neither .ifc nor .dxf", "give a building (IFC) or a site (DXF)");
+  run_errand([client, id, name, text, unit, is_building = kind == ".ifc"] {
+    try {
+      const product::Import made = is_building ? product::make_plan_text(product::read_ifc(text, name), name)
+                                               : product::make_site_text(text, name, unit);
+      client->answer(id, dump(make_ack(id, {{"text", made.text},
+                                            {"taken", made.report.taken},
+                                            {"guessed", made.report.guessed},
+                                            {"missing", made.report.missing}})));
+    } catch (const InputError& e) {
+      client->answer(id, dump(make_error(id, describe_error(e))));
+    } catch (const std::exception& e) {
+      client->answer(id, dump(make_error(id, describe_error(InputError("E904", e.what())))));
+    }
+  });
 }
 
 std::optional<Json> Hub::perform(const std::shared_ptr<Client>& client, const std::string& word, const Json& command) {

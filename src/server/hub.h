@@ -23,6 +23,7 @@ struct HubOptions {
   std::string page;    // the steering page; empty: not built
   std::string report;  // the report page to fill; empty: not built
   std::string study;   // the page of studies to fill; empty: not built
+  SessionPlan demo;    // to show what there is; without text: none
   std::size_t most_sessions = 8;
   int study_jobs = 1;
 };
@@ -65,7 +66,9 @@ class Hub {
   std::shared_ptr<StudyTask> find_study(int id) const;
   Json list_sessions() const;
   Json list_plans() const;
-  static Json list_templates();
+  Json list_templates() const;
+  /// A building (IFC) or a site (DXF) as text of a plan; answered from elsewhere.
+  void import_plan(const std::shared_ptr<Client>&, std::int64_t id, const Json& command);
   SessionPlan read_plan_of(const Json& command) const;
   void tell_sessions();
   void tell_study(int study, const Json& state, const Json& samples);

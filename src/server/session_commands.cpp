@@ -49,39 +49,15 @@ std::size_t frame_at(const std::vector<double>& time, double t) {
 
 std::vector<std::string> command_words() {
   std::vector<std::string> words = collapse::edit_words();
-  for (const char* w : {"run",
-                        "pause",
-                        "step",
-                        "speed",
-                        "rewind",
-                        "live",
-                        "undo",
-                        "branch",
-                        "rename",
-                        "switch",
-                        "compare",
-                        "scene",
-                        "frames",
-                        "findings",
-                        "series",
-                        "zone",
-                        "log",
-                        "plan.apply",
-                        "plan.save",
-                        "plan.text",
-                        "plan.check",
-                        "ping",
-                        "session.list",
-                        "session.open",
-                        "session.attach",
-                        "session.close",
-                        "session.continue",
-                        "study.start",
-                        "study.list",
-                        "study.watch",
-                        "study.unwatch",
-                        "study.cancel",
-                        "study.play"})
+  for (const char* w : {"run",          "pause",          "step",          "speed",
+                        "rewind",       "live",           "undo",          "branch",
+                        "rename",       "switch",         "compare",       "scene",
+                        "frames",       "findings",       "series",        "zone",
+                        "log",          "plan.apply",     "plan.save",     "plan.text",
+                        "plan.check",   "plan.import",    "ping",          "session.list",
+                        "session.open", "session.attach", "session.close", "session.continue",
+                        "study.start",  "study.list",     "study.watch",   "study.unwatch",
+                        "study.cancel", "study.play"})
     words.emplace_back(w);
   return words;
 }

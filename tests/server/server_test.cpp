@@ -49,6 +49,7 @@ class ServerTest : public ::testing::Test {
     o.plans = (folder_ / "plans").string();
     o.page = "<!doctype html><title>steer</title>";
     o.report = "<html><!--TOPPLE-DATA--></html>";
+    o.demo = {"A house", "", one_stage("0.3 s")};
     o.study = "<title>study</title><!--TOPPLE-DATA-->";
     hub_ = std::make_unique<Hub>(o);
     server_ = std::make_unique<Server>(*hub_, serving);
@@ -544,6 +545,30 @@ TEST_F(ServerTest, SessionsComeAndGo) {
   for (int i = 0; i < 7; ++i)
     EXPECT_TRUE(c->result("session.open", {{"text", "title = 3"}, {"title", "x"}}).contains("session"));
   EXPECT_EQ(c->code("session.open", {{"text", "title = 3"}}), "E905");
+}
+
+TEST_F(ServerTest, ImportsAndShowsADemoWithNothingOpen) {
+  start(one_stage("0.3 s"));
+  const auto c = watcher();
+  c->result("session.close");
+  const std::string square =
+      "0\nSECTION\n2\nENTITIES\n0\nLWPOLYLINE\n8\nHOUSE\n90\n4\n70\n1\n10\n20\n20\n0\n10\n30\n20\n0\n10\n30\n20\n10\n10"
+      "\n"
+      "20\n20\n10\n0\nENDSEC\n0\nEOF\n";
+  const TestJson site = c->result("plan.import", {{"name", "site.dxf"}, {"text", square}, {"unit", 1}});
+  EXPECT_NE(site["text"].get<std::string>().find("[[site.neighbour]]"), std::string::npos) << site;
+  EXPECT_FALSE(site["taken"].empty());
+  EXPECT_EQ(c->code("plan.import", {{"name", "site.txt"}, {"text", square}}), "E114");
+  EXPECT_EQ(c->code("plan.import", {{"name", "b.ifc"}, {"text", "nonsense"}})[0], 'E');
+  EXPECT_EQ(c->code("plan.import", {{"name", "site.dxf"}, {"text", square}, {"unit", -1}}), "E912");
+  TestClient http(port());
+  const TestJson templates = http.get(at("/api/templates")).json();
+  EXPECT_GE(templates["templates"].size(), 1U);
+  EXPECT_EQ(templates["demo"]["title"], "A house");
+  c->forget();
+  EXPECT_EQ(c->result("session.open", {{"demo", true}})["session"], 2);
+  EXPECT_FALSE(c->result("run").contains("refused"));
+  EXPECT_TRUE(c->wait_for_phase("finished").is_object());
 }
 
 TEST_F(ServerTest, AStudyGrowsAndASampleIsPlayed) {

@@ -32,6 +32,7 @@ function Header(props: { s: SteerState }) {
   const p = s.progress.value;
   const phase = s.phase.value;
   const check = s.planCheck.value;
+  const isBuilt = s.view.value !== null;
   const base = session === null ? "" : `api/sessions/${session.id}/branches/${s.active.value}/`;
   return (
     <header class="steer-header">
@@ -50,7 +51,7 @@ function Header(props: { s: SteerState }) {
         </select>
       </label>
       <h1 class="visually-hidden">{session?.title || session?.path || "topple"}</h1>
-      <span class={`phase ${phase}`} data-test="phase"><span aria-hidden="true">{phaseSign[phase]} </span>{phaseWord[phase]}</span>
+      <span class={`phase ${phase}`} data-test="phase"><span aria-hidden="true">{phaseSign[phase]} </span>{phase === "failed" && !isBuilt ? "Cannot be run" : phaseWord[phase]}</span>
       <span class="number" data-test="header-time">{formatTime(s.frontier.value)}</span>
       {phase === "running" && p?.real_time_factor !== null && p !== null && <span class="number quiet">{p.real_time_factor.toFixed(2)}× real time{p.eta === null ? "" : `, ${formatDuration(p.eta)} to go`}</span>}
       {p !== null && (phase === "building" || phase === "equilibrium") && <progress max={1} {...(typeof p.progress === "number" ? { value: p.progress } : {})} aria-label="Progress" />}
@@ -59,10 +60,12 @@ function Header(props: { s: SteerState }) {
       <button type="button" data-test="check" title="The plan's text and what is wrong with it" onClick={() => ((s.tab.value = "plan"), (s.tall.value = true))}>
         Check <span class={countOf(check, "error") > 0 ? "bad-word" : ""}>{countOf(check, "error")} ✖</span> <span class={countOf(check, "warning") > 0 ? "warning-word" : ""}>{countOf(check, "warning")} ⚠</span>
       </button>
+      {isBuilt && <>
       <a class="button" href={`${base}report.html`} target="_blank" rel="noopener" data-test="report" title="The report of this branch so far, one file">Report</a>
       <a class="button" href={`${base}record.h5`} download data-test="record" title="The record of this branch so far">Record</a>
       <button type="button" data-test="png" title="The picture as a file" onClick={() => savePng(s)}>PNG</button>
       <button type="button" data-test="webm" aria-pressed={recording.value} title="Plays the branch and records the picture" onClick={() => void saveWebm(s)}>{recording.value ? "Stop recording" : "Video"}</button>
+      </>}
       {session !== null && s.sessions.value.length > 1 && (
         <button type="button" title="Close this session; its log stays on the disk" onClick={() => void s.ask("session.close", { session: session.id })}>Close</button>
       )}
@@ -256,9 +259,9 @@ function Page(props: { s: SteerState }) {
         <Header s={s} />
         <div class="banners"><Banner s={s} /></div>
         {failed ? (
-          <PlanEditor s={s} />
+          <main><PlanEditor s={s} /></main>
         ) : (
-          <p class="pad" role="status">{phaseWord[s.phase.value]}… <progress max={1} {...(typeof s.progress.value?.progress === "number" ? { value: s.progress.value.progress } : {})} aria-label="Progress" /></p>
+          <main class="pad"><p role="status">{phaseWord[s.phase.value]}… <progress max={1} {...(typeof s.progress.value?.progress === "number" ? { value: s.progress.value.progress } : {})} aria-label="Progress" /></p></main>
         )}
         <Notices s={s} />
         <Dialogs s={s} />

@@ -63,6 +63,20 @@ export function EditList(props: { title: string; list: string[]; test: string })
   );
 }
 
+/// What became of a file of another program.
+function Imported(props: { s: SteerState }) {
+  const made = props.s.imported.value;
+  if (made === null) return null;
+  return (
+    <section data-test="imported" aria-label={`From ${made.name}`}>
+      <div class="inspector-head"><h2>From {made.name}</h2><button type="button" class="small" aria-label="Put this list away" onClick={() => (props.s.imported.value = null)}>×</button></div>
+      <EditList title="Missing: gaps are marked “?”." list={made.missing} test="missing" />
+      <EditList title="Guessed; look at it:" list={made.guessed} test="guessed" />
+      <EditList title="Taken:" list={made.taken} test="taken" />
+    </section>
+  );
+}
+
 export function PlanEditor(props: { s: SteerState }) {
   const { s } = props;
   const area = useRef<HTMLTextAreaElement>(null);
@@ -105,6 +119,15 @@ export function PlanEditor(props: { s: SteerState }) {
       else s.complain(error);
     }
   };
+  const addSite = async (file: File | undefined): Promise<void> => {
+    if (file === undefined) return;
+    try {
+      const more = await s.importFile(file);
+      s.editedText.value = `${text}${text.endsWith("\n") ? "" : "\n"}\n${more}`;
+    } catch (error) {
+      s.complain(error);
+    }
+  };
   const apply = async (): Promise<void> => {
     try {
       const r = await s.connection.command<{ branch: Branch | number }>("plan.apply", { text, name: `plan ${s.branches.value.length}` });
@@ -126,6 +149,10 @@ export function PlanEditor(props: { s: SteerState }) {
         <span class={errors > 0 ? "bad-word" : "quiet"} data-test="check-count">✖ {errors} {errors === 1 ? "error" : "errors"}</span>
         <span class={warnings > 0 ? "warning-word" : "quiet"}>⚠ {warnings} {warnings === 1 ? "warning" : "warnings"}</span>
         <span class="spring" />
+        <label class="button file-button" title="Neighbours and utilities out of a drawing, behind the text">
+          Add a site (DXF)…
+          <input type="file" accept=".dxf" data-test="import-site" onChange={(e) => void addSite(e.currentTarget.files?.[0])} />
+        </label>
         {branchPlan !== null && branchPlan.taken.length + branchPlan.left_out.length > 0 && (
           <button type="button" disabled={changed || branchPlan.taken.length === 0} data-test="edits-text" title="Writes the edits of this branch into the text, to be looked at and saved" onClick={() => (s.editedText.value = branchPlan.text)}>
             Edits of the branch as text
@@ -150,6 +177,7 @@ export function PlanEditor(props: { s: SteerState }) {
           }}
         />
         <div class="editor-side">
+          <Imported s={s} />
           <Diagnostics list={check?.diagnostics ?? []} onJump={jump} />
           {check !== null && check.diagnostics.length === 0 && <p class="quiet">No complaints.</p>}
           {check?.notes.map((n) => <p class="quiet">{prettify(n)}</p>)}

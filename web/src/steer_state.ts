@@ -5,7 +5,7 @@ import type { Finding, RunEvent } from "./data";
 import { BranchRun } from "./steer_branch";
 import { CommandError, Connection, type ErrorObject, type Message } from "./steer_connection";
 import { decodeFrame } from "./steer_wire";
-import type { Branch, Comparison, FindingsSoFar, LogEntry, PlanCheck, Sample, Session, StateEvent, Study, ZoneWatch } from "./steer_wire";
+import type { Branch, Comparison, FindingsSoFar, ImportedPlan, LogEntry, PlanCheck, Sample, Session, StateEvent, Study, ZoneWatch } from "./steer_wire";
 import { makeLook } from "./state";
 import { formatTime } from "./units";
 
@@ -51,6 +51,7 @@ export function makeSteerState(address: string) {
   const showDebris = signal(true);
   const planCheck = signal<PlanCheck | null>(null);
   const editedText = signal<string | null>(null); // null: as on the disk
+  const imported = signal<(ImportedPlan & { name: string }) | null>(null); // last one
   const welcomed = signal(false); // the server has said what it has
   const draws = signal(0); // rises when frames came in
   const runs = new Map<number, BranchRun>();
@@ -449,7 +450,7 @@ export function makeSteerState(address: string) {
     ...look,
     connection, status: connection.status, ask, notify, dismiss, notices, welcomed,
     session, sessions, branches, branch, active, view, plan, progress, phase, frontier, span, following, editTime, isUnderWay, earlier, log, findings,
-    studies, samples, watchedStudy, zone, comparison, tab, tall, dialog, hiddenStoreys, section, showDebris, planCheck, editedText, draws,
+    studies, samples, watchedStudy, zone, comparison, tab, tall, dialog, hiddenStoreys, section, showDebris, planCheck, editedText, imported, draws,
     edit, tryEdit, arrive, show, fill, runs,
 
     runOrPause,
@@ -516,6 +517,12 @@ export function makeSteerState(address: string) {
         if (error instanceof CommandError) return error.error;
         throw error;
       }
+    },
+    /// The text that a file of another program (IFC, DXF) gives. Throws a CommandError.
+    async importFile(file: File): Promise<string> {
+      const made = await connection.command<ImportedPlan>("plan.import", { name: file.name, text: await file.text() });
+      imported.value = { ...made, name: file.name };
+      return made.text;
     },
     /// Makes the branch of a study's run and lets it fall as soon as it stands.
     async playSample(study: number, sample: number): Promise<void> {

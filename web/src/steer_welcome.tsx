@@ -1,12 +1,13 @@
 /// Nothing open yet, or another plan to open beside: plans of the folder, templates, a text from elsewhere.
 import { useEffect, useState } from "preact/hooks";
+import { CommandError, type ErrorObject } from "./steer_connection";
 import { Diagnostics } from "./steer_plan";
-import type { ErrorObject } from "./steer_connection";
 import type { SteerState } from "./steer_state";
 
 interface Template {
   name: string;
   title: string;
+  description?: string;
   text: string;
 }
 
@@ -14,6 +15,7 @@ export function OpenPlan(props: { s: SteerState; onCancel?: () => void }) {
   const { s } = props;
   const [plans, setPlans] = useState<{ folder: string; plans: { path: string; title: string }[] }>();
   const [templates, setTemplates] = useState<Template[]>();
+  const [demo, setDemo] = useState<{ title: string } | null>(null);
   const [problem, setProblem] = useState<ErrorObject>();
   const [busy, setBusy] = useState(false);
   useEffect(() => {
@@ -23,7 +25,10 @@ export function OpenPlan(props: { s: SteerState; onCancel?: () => void }) {
       else throw new Error(`${path}: ${response.status}`);
     };
     read("api/plans", setPlans).catch(s.complain);
-    read<{ templates: Template[] }>("api/templates", (r) => setTemplates(r.templates)).catch(s.complain);
+    read<{ templates: Template[]; demo?: { title: string } | null }>("api/templates", (r) => {
+      setTemplates(r.templates);
+      setDemo(r.demo ?? null);
+    }).catch(s.complain);
   }, []);
   const open = async (keys: Record<string, unknown>): Promise<void> => {
     setBusy(true);
@@ -31,7 +36,17 @@ export function OpenPlan(props: { s: SteerState; onCancel?: () => void }) {
     setBusy(false);
   };
   const take = async (file: File | undefined): Promise<void> => {
-    if (file !== undefined) await open({ text: await file.text(), title: file.name });
+    if (file === undefined) return;
+    setProblem(undefined);
+    if (!/\.ifc$/i.test(file.name)) return open({ text: await file.text(), title: file.name });
+    setBusy(true);
+    try {
+      await open({ text: await s.importFile(file), title: file.name });
+    } catch (error) {
+      if (!(error instanceof CommandError)) throw error;
+      setProblem(error.error);
+    }
+    setBusy(false);
   };
   return (
     <div class="open-plan" data-test="open-plan">
@@ -59,7 +74,7 @@ export function OpenPlan(props: { s: SteerState; onCancel?: () => void }) {
           {templates?.map((t) => (
             <button type="button" class="choice" disabled={busy} data-test="open-template" onClick={() => void open({ template: t.name })}>
               <strong>{t.title || t.name}</strong>
-              <span class="quiet">{t.name}</span>
+              <span class="quiet">{t.description ?? t.name}</span>
             </button>
           ))}
           {templates?.length === 0 && <p class="quiet">None.</p>}
@@ -68,9 +83,15 @@ export function OpenPlan(props: { s: SteerState; onCancel?: () => void }) {
           <h3>From elsewhere</h3>
           <label class="choice">
             <strong>Import a plan</strong>
-            <span class="quiet">A .toml file from this computer; it is read, not moved</span>
-            <input type="file" accept=".toml,text/plain" data-test="import" onChange={(e) => void take(e.currentTarget.files?.[0])} />
+            <span class="quiet">A .toml file from this computer, or a building as .ifc, whose gaps are then to be filled; it is read, not moved</span>
+            <input type="file" accept=".toml,.ifc,text/plain" disabled={busy} data-test="import" onChange={(e) => void take(e.currentTarget.files?.[0])} />
           </label>
+          {demo !== null && (
+            <button type="button" class="choice" disabled={busy} data-test="open-demo" onClick={() => void open({ demo: true })}>
+              <strong>Demo: {demo.title}</strong>
+              <span class="quiet">A real building, ready to run: press Run, and change what you like</span>
+            </button>
+          )}
         </section>
       </div>
       {busy && <p role="status">Building…</p>}

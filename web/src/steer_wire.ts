@@ -92,6 +92,13 @@ export interface BranchPlan {
   taken: string[];
   left_out: string[];
 }
+/// A plan, or a part of one, out of the file of another program, and what became of that.
+export interface ImportedPlan {
+  text: string;
+  taken: string[];
+  guessed: string[];
+  missing: string[];
+}
 export interface StateEvent {
   phase: Phase;
   branch: number;
