@@ -73,6 +73,20 @@ export function makeStudy(count = 60) {
         { kept: false, guarantee: "Not kept: there were too few runs.", inputs: [{ name: "fc", lower: 20, upper: 21, core: null }, { name: hostile, lower: 0.3, upper: 0.4, core: null }], volume: 0.001, runs: 2, fresh: 0, tries: 0, violating: null, distance: 0, robustness: null, outputs: [] },
       ],
     },
+    confirmation: {
+      limit: 4, tolerance: 0.05,
+      runs: [
+        { sample: 0, membership: 1, outcome: "topple", whole_outcome: "topple", values: [], whole_values: [] },
+        { sample: 1, membership: 0.4, outcome: "vertical", whole_outcome: "topple", values: [], whole_values: [] },
+        { sample: 2, membership: 0, outcome: "topple", whole_outcome: null, values: [], whole_values: [] },
+      ],
+      bounds: [
+        { output: "tilt_1.7", alpha: 0, side: "lower", condensed: -3, whole: -3.1, state: "confirmed" },
+        { output: "tilt_1.7", alpha: 0, side: "upper", condensed: 12, whole: 14, state: "exceeded" },
+        { output: hostile, alpha: 1, side: "upper", condensed: 4, whole: null, state: "not run" },
+      ],
+      outcomes: [{ outcome: "topple", sample: 0, whole: "topple", state: "confirmed" }, { outcome: "vertical", sample: 1, whole: "topple", state: "not reached" }],
+    },
     curves: [
       { name: "tilt", unit: "deg", over: "time after the last stage", over_unit: "s", at: times, is_outline: false },
       { name: "outline", unit: "m", over: "direction", over_unit: "deg", at: [0, 90, 180, 270], is_outline: true },

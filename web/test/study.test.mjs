@@ -125,6 +125,18 @@ describe("the page of a study", () => {
         else assert.ok(text.includes("unknown"));
   });
 
+  it("shows what whole runs make of condensed ones", async () => {
+    const c = data.confirmation;
+    assert.equal(await page.locator("[data-test=confirmation]").count(), c === undefined ? 0 : 1);
+    if (c === undefined) return;
+    const text = (await page.textContent("[data-test=confirmation]")).replace(/\s+/g, " ");
+    const run = c.runs.filter((r) => r.whole_outcome !== null);
+    assert.ok(text.includes(`${run.length} of them were run whole beside it; ${run.filter((r) => r.outcome === r.whole_outcome).length} had the same outcome`), text);
+    for (const state of ["confirmed", "exceeded", "not reached"])
+      assert.ok(text.includes(`${c.bounds.filter((b) => b.state === state).length} ${state}`), text);
+    assert.equal(await page.locator("[data-test=confirmation] details tbody tr").count(), c.bounds.length);
+  });
+
   it("shows permissible boxes with what is known of them", async () => {
     if (data.boxes === null) return;
     const text = await page.textContent("[data-test=boxes]");

@@ -77,6 +77,14 @@ export interface RunTable {
   points: number; // of the curves that are no outlines, one behind the other
   trajectories: Float32Array; // (R x points)
 }
+/// What whole runs make of a condensed study's bounds and outcomes.
+export interface Confirmation {
+  limit: number;
+  tolerance: number; // of an output's width
+  runs: { sample: number; membership: number; outcome: string; whole_outcome: string | null }[];
+  bounds: { output: string; alpha: number; side: "lower" | "upper"; condensed: Maybe; whole: Maybe; state: string }[];
+  outcomes: { outcome: string; sample: number; whole: string | null; state: string }[];
+}
 export interface Study {
   title: string;
   state: "open" | "finished";
@@ -101,6 +109,7 @@ export interface Study {
   };
   known: { input: string; outcomes: { name: string; possibility: number }[] }[];
   boxes: { requirement: string; permissible_part: number; permissible_part_error: number; list: Box[] } | null;
+  confirmation?: Confirmation; // of a condensed study
   curves: Curve[];
   fans: Fan[];
   debris: Debris[];

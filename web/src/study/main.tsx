@@ -4,7 +4,7 @@ import { readStudy, type Study } from "./data";
 import { DebrisPlan, Fans, Memberships } from "./plots";
 import { Runs } from "./runs";
 import { makeState } from "./state";
-import { Boxes, Drivers, Inputs, NotModelled, Notable, Origin } from "./tables";
+import { Boxes, Confirmed, Drivers, Inputs, NotModelled, Notable, Origin } from "./tables";
 import { Header, Outcomes } from "./verdict";
 import { startPage } from "../start";
 
@@ -23,6 +23,7 @@ function Page(props: { study: Study }) {
           <DebrisPlan state={state} />
         </div>
         <Memberships state={state} />
+        <Confirmed state={state} />
         <Drivers state={state} />
         <Boxes state={state} />
         <Runs state={state} />

@@ -117,6 +117,57 @@ export function Boxes(props: { state: State }) {
   );
 }
 
+export function Confirmed(props: { state: State }) {
+  const { state } = props;
+  const { study } = state;
+  const c = study.confirmation;
+  if (c === undefined) return null;
+  const states = [...new Set(["confirmed", "exceeded", "not reached", ...c.bounds.map((b) => b.state)])];
+  const alike = c.runs.filter((r) => r.whole_outcome === r.outcome).length, run = c.runs.filter((r) => r.whole_outcome !== null).length;
+  return (
+    <section class="panel" aria-label="Confirmation by whole runs" data-test="confirmation">
+      <h2>Condensed runs beside whole ones</h2>
+      <p>
+        Runs were condensed: like frames of the building moved as one. {run} of them were run whole beside it; {alike} had the same outcome.
+        Of {c.bounds.length} bounds {states.map((s, i) => `${i === 0 ? "" : ", "}${c.bounds.filter((b) => b.state === s).length} ${s}`).join("")}.
+      </p>
+      <p class="quiet">
+        Confirmed: whole runs in the cut come within {formatNumber(100 * c.tolerance, 2)} % of the output's width of the bound. Exceeded: one lies farther
+        out, the bound is too narrow. Not reached: none comes so far, the bound may be too wide. Not run: the limit of {c.limit} whole runs left it out.
+      </p>
+      <table>
+        <thead><tr><th scope="col">outcome</th><th scope="col">most possible run</th><th scope="col">whole</th><th scope="col" /></tr></thead>
+        <tbody>
+          {c.outcomes.map((o) => (
+            <tr>
+              <th scope="row">{o.outcome}</th>
+              <td><button type="button" class="link" onClick={() => state.select(o.sample)}>run {o.sample}</button></td>
+              <td>{o.whole ?? "–"}</td><td>{o.state}</td>
+            </tr>
+          ))}
+        </tbody>
+      </table>
+      <details>
+        <summary>Table of bounds</summary>
+        <div class="scroller free" tabIndex={0} role="region" aria-label="Table of confirmed bounds">
+          <table>
+            <thead><tr><th scope="col">output</th><th scope="col">degree</th><th scope="col">bound</th><th scope="col">condensed</th><th scope="col">whole</th><th scope="col" /></tr></thead>
+            <tbody>
+              {c.bounds.map((b) => (
+                <tr>
+                  <th scope="row">{titleOf({ name: b.output, unit: study.outputs.find((o) => o.name === b.output)?.unit ?? "" })}</th>
+                  <td>{formatNumber(b.alpha)}</td><td>{b.side}</td><td>{formatNumber(b.condensed)}</td>
+                  <td>{b.state === "not run" ? "–" : formatNumber(b.whole)}</td><td>{b.state}</td>
+                </tr>
+              ))}
+            </tbody>
+          </table>
+        </div>
+      </details>
+    </section>
+  );
+}
+
 export function Notable(props: { state: State }) {
   const { state } = props;
   const { study } = state;
