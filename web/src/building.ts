@@ -73,7 +73,7 @@ export class Building {
   private time = 0;
   private coloured = "";
 
-  constructor(private readonly run: Run) {
+  constructor(private run: Run) {
     this.zonesOfBody = findZonesOfBodies(run);
     this.kinds = findParts(run);
     this.materials = findMaterials(run);
@@ -207,6 +207,14 @@ export class Building {
     const far = 0.55 * Math.max(0, box.max.z);
     for (const x of [box.min.x - far, box.max.x + far])
       for (const y of [box.min.y - 0.3 * far, box.max.y + 0.3 * far]) this.fitPoints.push(new THREE.Vector3(x, y, 0));
+  }
+
+  /// Shows another run of the same bodies and zones; false if it is of others.
+  useRun(run: Run): boolean {
+    if (run.bodies !== this.run.bodies || run.zones !== this.run.zones) return false;
+    this.run = run;
+    this.coloured = "";
+    return true;
   }
 
   setTheme(theme: Theme, dark: boolean): void {

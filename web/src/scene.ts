@@ -37,6 +37,10 @@ export class Scene implements SceneLike {
 
   /// Puts another run in place of the one shown. The point of view stays.
   setRun(run: Run): void {
+    if (this.building?.useRun(run) === true) {
+      this.setLook(this.colouring, this.zoneMarks, this.selected);
+      return;
+    }
     for (const old of [this.building?.group, this.site?.group])
       if (old !== undefined) {
         this.stage.scene.remove(old);

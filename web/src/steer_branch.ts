@@ -14,9 +14,15 @@ export class BranchRun {
   private dirty = false;
   private readonly decided = new Set<string>();
 
-  /// `scene` is report data with one frame.
-  constructor(readonly id: number, scene: unknown, look: Look) {
-    this.run = makeRun(scene);
+  /// A branch that parts from another one and has the same bodies and zones.
+  static part(id: number, parent: BranchRun, look: Look): BranchRun {
+    const { run } = parent;
+    return new BranchRun(id, { ...run, time: [], frames: [], events: [], findings: [], series: run.series.map((series) => ({ ...series, value: [] })) }, look, true);
+  }
+
+  /// `scene` is report data with one frame, or a run without one.
+  constructor(readonly id: number, scene: unknown, look: Look, isRun = false) {
+    this.run = isRun ? (scene as Run) : makeRun(scene);
     this.onlyScene = this.run.time.length > 0;
     if (this.onlyScene) this.rows.push(-1);
     this.state = makeState(this.run, look, 0);

@@ -231,10 +231,25 @@ export function makeSteerState(address: string) {
     if (following.value) run.state.seek(Infinity);
   }
 
+  /// The run of a new branch whose picture is that of its parent: most edits move no box. Undefined if that is not known.
+  function partFromParent(id: number): BranchRun | undefined {
+    const info = branches.value.find((b) => b.id === id);
+    const parent = info?.parent === null || info?.parent === undefined ? undefined : runs.get(info.parent);
+    if (info === undefined || parent === undefined || info.bodies !== parent.run.bodies.length || info.zones !== parent.run.zones.length) return undefined;
+    if (!info.edits.every((e) => ["set_friction", "set_delay", "add_cable", "remove_cable", "add_pre_cut"].includes(e.kind))) return undefined;
+    const run = BranchRun.part(id, parent, look);
+    run.share(parent, info.first_frame);
+    if (run.run.time.length === 0) return undefined;
+    run.addEvents(parent.run.events.filter((e) => e.time <= info.time));
+    run.flush();
+    runs.set(id, run);
+    return run;
+  }
+
   /// Shows the branch that the server made active.
   async function show(id: number): Promise<void> {
     active.value = id;
-    let run = runs.get(id);
+    let run = runs.get(id) ?? partFromParent(id);
     if (run === undefined) {
       const answer = await ask<{ scene: unknown }>("scene", { branch: id });
       if (answer === undefined) return;
