@@ -484,6 +484,9 @@ const std::vector<std::string>& not_modelled() {
 void add_findings(const product::Plan& plan, const mbs::Model& model, const ModelMap& map, const Knowledge& k,
                   const Recorder& recorder, const mbs::Summary& summary, record::Record& r) {
   r.not_modelled = not_modelled();
+  if (!plan.shafts.empty())
+    r.not_modelled.emplace_back(
+        "rings that flatten as they land: single pieces of a shaft may roll and tumble farther than real ones");
   const bool is_under_way = r.ending == "under_way";
   const Context c{plan, model, map, k, recorder, summary, r, is_under_way};
   if (r.time.empty()) {

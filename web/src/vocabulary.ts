@@ -28,6 +28,7 @@ export const kindWord: Record<string, string> = {
   wall: "Wall",
   node: "Joint block",
   stump: "Stump",
+  shaft: "Shaft",
   debris: "Blasted concrete",
 };
 const kindColours: Record<string, string> = {
@@ -37,6 +38,7 @@ const kindColours: Record<string, string> = {
   wall: "#d9b98c",
   node: "#8b97a3",
   stump: "#8a5a3c",
+  shaft: "#009e73",
   debris: "#c2452d",
 };
 const spareColours = ["#009e73", "#cc79a7", "#8c6bb1", "#b3a100"];

@@ -148,6 +148,9 @@ export const german: readonly (readonly [string, string])[] = [
   ["removed", "entfernt"],
   ["reaction", "Auflagerkraft"],
   ["The floor load above storey {} is left out: there is no slab to carry it.", "Die Deckenlast über Geschoss {} bleibt weg: Keine Decke trägt sie."],
+  ["The mouth of {} at {:.1f} m leaves {:.0f} deg of the ring. The weight of {:.2f} MN above it turns with {:.2f} MNm about the centroid of what is left, {:.2f} m behind the axis, which resists with {:.2f} MNm at most: it {}.", "Das Sprengmaul von {} bei {} m lässt {} deg des Rings stehen. Das Gewicht von {} MN darüber dreht mit {} MNm um den Schwerpunkt des Rests, {} m hinter der Achse; der Rest widersteht höchstens mit {} MNm: {}."],
+  ["turns over", "Er kippt"],
+  ["does not turn over by its weight alone", "Er kippt nicht allein durch sein Gewicht"],
   ["The fall is across the rows; walls in the rows count with their weight only.", "Es fällt quer zu den Reihen; Wände in den Reihen zählen nur mit ihrem Gewicht."],
   // criteria
   ["Criteria", "Vorgaben"],
@@ -176,6 +179,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["ground vibration as such (at most a screening with the site's own law)", "Erschütterungen selbst (höchstens eine Abschätzung mit dem Gesetz des Standorts)"],
   ["wind, and people's behaviour; no distance given here is a safe distance", "Wind und das Verhalten von Menschen; keine Entfernung auf dieser Seite ist ein Sicherheitsabstand"],
   ["cracking of slabs within a bay, of walls within a panel and of members between their end zones", "Risse in Decken innerhalb eines Feldes, in Wänden innerhalb einer Scheibe und in Bauteilen zwischen ihren Endzonen"],
+  ["rings that flatten as they land: single pieces of a shaft may roll and tumble farther than real ones", "Ringe, die beim Aufschlag flach werden: Einzelne Stücke eines Schafts können weiter rollen als wirkliche"],
   ["infill and finishes beyond their weight", "Ausfachung und Ausbau über ihr Gewicht hinaus"],
   // values of the plan
   ["Building", "Gebäude"],
@@ -314,6 +318,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["Wall", "Wand"],
   ["Joint block", "Knotenblock"],
   ["Stump", "Stumpf"],
+  ["Shaft", "Schaft"],
   ["Blasted concrete", "Gesprengter Beton"],
   ["Part", "Teil"],
   ["concrete", "Beton"],
