@@ -140,7 +140,7 @@ mbs::View Motion::calc_view(const fem::ExplicitSystem& system, double time) cons
   v.joint_moment.assign(joints_.size(), {});
 
   for (const double f : calc_foot_forces(system)) v.ground_force.z += f;
-  v.contact_force_ground = system.ground_force(0);
+  v.contact_force_ground = -system.ground_force(0);
   v.ground_force += v.contact_force_ground;
   v.ground_force.z -= fixed_weight_;
   v.body_contacts = system.contacts();

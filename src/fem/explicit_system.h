@@ -142,7 +142,7 @@ class ExplicitSystem {
     double largest_plastic_strain = 0;
   };
   std::vector<PartSummary> calc_parts() const;
-  /// Force of a ground on everything that touches it, at the last step [N].
+  /// Force on a ground of everything that touches it, at the last step; downwards where it carries [N].
   Vec3 ground_force(int ground) const;
   /// The same by its touching nodes: whether a node pressed on any ground at the last step.
   bool touches_ground(int node) const;

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <filesystem>
@@ -131,6 +132,16 @@ TEST(FarfieldPhysics, FallsFreelyOnceNothingHoldsIt) {
   // the beam swings by its dead-load deflection, below a millimetre at either end of the parabola
   EXPECT_NEAR(fall, -9.81 * span * span / 4, 4e-3);
   EXPECT_LT(height.back(), height.front());
+}
+
+TEST(FarfieldPhysics, IsPushedUpByTheGroundOnWhichItFalls) {
+  const record::Record r = run(with_duration(dropped(), "900 ms"), coarse());
+  double weight = 0;
+  for (const record::BodyInfo& body : r.bodies) weight += body.mass * 9.81;
+  const std::vector<double>& force = series(r, "ground_force");
+  // an impact: more than the weight, and never a pull of more than the stumps that swing at their feet
+  EXPECT_GT(*std::max_element(force.begin(), force.end()), weight);
+  EXPECT_GT(*std::min_element(force.begin(), force.end()), -0.5 * weight);
 }
 
 TEST(FarfieldPhysics, FallsAsTheMultibodyModelDoes) {
