@@ -100,7 +100,7 @@ int open_new(std::string& path) {
 
 LoggedSteering::LoggedSteering(const product::Plan& plan, const Knowledge& k, SteeringOptions options,
                                SteeringCallbacks callbacks, const std::string& path, SamplePlan sample_plan)
-    : k_(k), plan_(plan), sample_plan_(std::move(sample_plan)), path_(path) {
+    : plan_(plan), sample_plan_(std::move(sample_plan)), path_(path) {
   Json header{{"topple_log", 1},
               {"program", "topple " + options.run.program_version},
               {"created", record::now_utc()},
@@ -228,7 +228,7 @@ std::optional<LogSummary> find_earlier_log(const std::string& path, const std::s
 }
 
 ReplayResult replay(const std::string& log, const std::string& name, const Knowledge& k, SteeringOptions options,
-                    const SamplePlan& sample_plan, const Progress& progress, SteeringCallbacks callbacks,
+                    const SamplePlan& sample_plan, const Progress& progress, const SteeringCallbacks& callbacks,
                     const std::string& path) {
   ReplayResult result;
   int line = 0;
@@ -268,7 +268,7 @@ ReplayResult replay(const std::string& log, const std::string& name, const Knowl
         options.run.duration = entry.at("duration");
         options.run.step = entry.at("step");
         result.steering = std::make_unique<LoggedSteering>(read_quietly(plan_text, entry.at("plan_path")), k, options,
-                                                           std::move(callbacks), path, sample_plan);
+                                                           callbacks, path, sample_plan);
         continue;
       }
       Steering& s = result.steering->steering();

@@ -48,7 +48,6 @@ class LoggedSteering {
  private:
   void write(const nlohmann::ordered_json&);
 
-  const Knowledge& k_;
   product::Plan plan_;
   std::unique_ptr<Steering> steering_;
   SamplePlan sample_plan_;
@@ -82,6 +81,7 @@ struct ReplayResult {
 /// log (E942), one of another program or other rules (E943).
 ///   path  of the log of what is done again and of what follows; empty: none
 ReplayResult replay(const std::string& log, const std::string& name, const Knowledge&, SteeringOptions,
-                    const SamplePlan&, const Progress& = {}, SteeringCallbacks = {}, const std::string& path = {});
+                    const SamplePlan&, const Progress& = {}, const SteeringCallbacks& = {},
+                    const std::string& path = {});
 
 }  // namespace topple::collapse

@@ -616,7 +616,7 @@ void Hub::get(const std::string& path, std::function<void(Reply)> answer) {
     });
   const auto branch = n == 6 && parts[3] == "branches" ? read_id(parts[4]) : std::nullopt;
   if (!branch) return answer(make_nothing("there is nothing at " + path));
-  const std::string what = parts[5];
+  const std::string& what = parts[5];
   if (what == "plan")
     return in_session([b = *branch](Session& s) {
       if (s.steering() == nullptr) throw InputError("E930", "the model is being built");
