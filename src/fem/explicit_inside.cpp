@@ -125,7 +125,7 @@ ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
   }
   for (const NodalForce& f : model.forces) {
     const std::uint32_t row = chunks.row_of_node[static_cast<size_t>(f.node)];
-    for (int c = 0; c < 3; ++c) loads[4 * row + static_cast<size_t>(c)] += f.force[c];
+    for (int c = 0; c < 3; ++c) loads[4 * size_t{row} + static_cast<size_t>(c)] += f.force[c];
     loaded.push_back(row);
   }
   std::sort(loaded.begin(), loaded.end());
@@ -242,16 +242,16 @@ void ExplicitSystem::Inside::advance_nodes(const kernel::StepJob& step, Explicit
 void ExplicitSystem::Inside::push(ExplicitState& state, std::uint32_t row, const Vec3& force) const {
   if ((state.flags[row] & kernel::kPushed) == 0) {
     state.flags[row] |= kernel::kPushed;
-    for (size_t c = 0; c < 3; ++c) state.pushes[4 * row + c] = loads[4 * row + c];
+    for (size_t c = 0; c < 3; ++c) state.pushes[4 * size_t{row} + c] = loads[4 * size_t{row} + c];
     state.pushed.push_back(row);
   }
-  for (int c = 0; c < 3; ++c) state.pushes[4 * row + static_cast<size_t>(c)] += force[c];
+  for (int c = 0; c < 3; ++c) state.pushes[4 * size_t{row} + static_cast<size_t>(c)] += force[c];
 }
 
 void ExplicitSystem::Inside::clear_pushes(ExplicitState& state) const {
   for (const std::uint32_t row : state.pushed) {
     state.flags[row] = static_cast<std::uint8_t>(state.flags[row] & ~kernel::kPushed);
-    for (size_t c = 0; c < 3; ++c) state.pushes[4 * row + c] = 0;
+    for (size_t c = 0; c < 3; ++c) state.pushes[4 * size_t{row} + c] = 0;
   }
   state.pushed.clear();
   for (const std::uint32_t row : loaded)
