@@ -7,6 +7,7 @@
 
 #include "collapse/manager.h"
 #include "collapse/recorder.h"
+#include "collapse/vibration.h"
 #include "mbs/batch.h"
 #include "mbs/kernel.h"
 
@@ -165,7 +166,12 @@ void fill(Sample& s, const Knowledge& k, const SampleRunOptions& options, Sample
   out.touchdown_energy = out.touchdown <= out.time.back() ? s.recorder->kinetic_at(out.touchdown) : kinetic.back();
   out.largest_energy = *std::max_element(kinetic.begin(), kinetic.end());
   out.reach = calc_reach(s.record, out.time.size() - 1);
-  if (options.condensation) spread(out.reach, s.plan);
+  if (options.condensation) {
+    spread(out.reach, s.plan);
+  } else if (s.plan.vibration) {
+    for (const product::Neighbour& n : s.plan.neighbours)
+      out.shaking.push_back(find_shaking(*s.plan.vibration, s.recorder->touchdowns(), n.footprint).velocity);
+  }
 }
 
 }  // namespace

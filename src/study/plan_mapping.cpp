@@ -52,6 +52,29 @@ const std::vector<std::string>& plan_outcomes() {
   return names;
 }
 
+bool has_screening(const product::Plan& plan, const PlanMappingOptions& o) {
+  return o.vibration && !o.condensed && plan.vibration && !plan.neighbours.empty();
+}
+
+std::string name_of_screening(const product::Plan& plan, size_t neighbour) {
+  const auto slug = [&plan](size_t i) {
+    std::string out;
+    for (const char c : plan.neighbours[i].name) {
+      const bool is_plain = (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9');
+      if (is_plain || (c >= 'A' && c <= 'Z'))
+        out += is_plain ? c : static_cast<char>(c - 'A' + 'a');
+      else if (!out.empty() && out.back() != '_')
+        out += '_';
+    }
+    while (!out.empty() && out.back() == '_') out.pop_back();
+    return out;
+  };
+  const std::string own = slug(neighbour);
+  bool is_unique = !own.empty();
+  for (size_t i = 0; i < plan.neighbours.size(); ++i) is_unique = is_unique && (i == neighbour || slug(i) != own);
+  return "vibration_" + (is_unique ? own : fmt::format("{}{}{}", own, own.empty() ? "" : "_", neighbour + 1));
+}
+
 struct PlanMapping::Impl {
   product::PlanSampler sampler;
   collapse::Knowledge knowledge;
@@ -61,6 +84,7 @@ struct PlanMapping::Impl {
   std::vector<double> trajectory_times;
   collapse::Condensation condensation;
   collapse::KnownCurves known;
+  double vibration_factor = 0;  // of the band's upper end; 0: no screening
 
   collapse::SampleRunOptions run_options() const {
     collapse::SampleRunOptions o;
@@ -85,7 +109,7 @@ PlanMapping::PlanMapping(const product::Plan& plan, const collapse::Knowledge& k
     if (!(t >= 0) || t > options.after)
       throw InputError("E205",
                        fmt::format("tilt at {:g} s: the runs end {:g} s after the last stage", t, options.after));
-  auto impl = std::make_unique<Impl>(Impl{product::make_sampler(plan), k, options, {}, {}, {}, {}, {}, {}});
+  auto impl = std::make_unique<Impl>(Impl{product::make_sampler(plan), k, options, {}, {}, {}, {}, {}, {}, 0});
   for (const product::FuzzyValue& v : plan.fuzzy.inputs) {
     impl->inputs.push_back({v.path, v.symbol, v.unit});
     impl->space.inputs.push_back(uncertainty::make_polygonal(v.corners));
@@ -104,6 +128,11 @@ PlanMapping::PlanMapping(const product::Plan& plan, const collapse::Knowledge& k
                                                          {"rear_share", "%", 0.01},
                                                          {"utilisation", "%", 0.01}})
     impl->outputs.push_back(q);
+  if (has_screening(plan, options)) {
+    impl->vibration_factor = plan.vibration->factor;
+    for (size_t n = 0; n < plan.neighbours.size(); ++n)
+      impl->outputs.push_back({name_of_screening(plan, n), "mm/s", unit::mm});
+  }
   if (options.condensed) {
     // values that a frame does not share with those like it show at a point off the middle
     std::vector<double> off;
@@ -148,6 +177,8 @@ Result PlanMapping::Impl::to_result(const collapse::SampleRun& r) const {
                          r.largest_energy, r.reach.side[0], r.reach.side[1], r.reach.side[2], r.reach.side[3],
                          r.reach.most_mass, r.mechanism.rear_share, r.utilisation})
     out.values.push_back(x);
+  if (vibration_factor > 0)
+    for (const double v : r.shaking) out.values.push_back(vibration_factor * v);
   for (const double t : trajectory_times) out.trajectory.push_back(interpolate(r.time, r.tilt, r.release + t));
   for (int k = 0; k < options.directions; ++k) {
     const double angle = 2 * std::numbers::pi * k / options.directions;

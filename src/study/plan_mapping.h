@@ -24,7 +24,14 @@ struct PlanMappingOptions {
   double highest_frequency = 2000;              // of condensed models [rad/s]
   bool lanes = false;  // samples of one build in the lanes of one batch; slower than one by one (docs/plan-mapping.md)
   int threads = 1;     // 0: all of the machine
+  /// Screening of ground vibration at each neighbour, where the plan has the site's law; not of condensed runs.
+  bool vibration = true;
 };
+
+/// Whether runs of the plan tell a screening of ground vibration.
+bool has_screening(const product::Plan&, const PlanMappingOptions&);
+/// Output with the upper end of the screening band at a neighbour: "vibration_workshop" of "Workshop".
+std::string name_of_screening(const product::Plan&, size_t neighbour);
 
 /// Where the processors' time of samples went, summed over threads [s].
 struct PlanMappingTimes {
@@ -59,7 +66,8 @@ class PlanMapping {
   /// stage's time, and `after` if there is none by then; tilt and energy in motion then (at the end without one) and at
   /// most; reach of parts beyond the footprint to each side and of 95 % of the mass, at the end; rear_share: drop of
   /// the rear edge over that of the front edge; utilisation: largest use of a zone's resistance before the last stage
-  /// (the margin is its inverse).
+  /// (the margin is its inverse); vibration_NAME: upper end of the screening band at a neighbour by what has touched
+  /// down at the end of the run.
   const std::vector<PlanQuantity>& outputs() const;
   /// The trajectory is the tilt at these times after the last stage's [s], then how far parts extend from W's origin
   /// towards each of `directions` at the end [m].

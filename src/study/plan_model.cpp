@@ -6,6 +6,7 @@
 
 #include "base/unit.h"
 #include "collapse/findings.h"
+#include "collapse/vibration.h"
 
 namespace topple::study {
 namespace {
@@ -56,6 +57,7 @@ Definition read_definition(const std::string& text) {
     out.options.condensed = true;
     out.options.highest_frequency = identity.at("condensed").at("highest_frequency");
   }
+  out.options.vibration = identity.value("vibration", false);
   out.options.threads = 1;
   out.rules = identity.at("rules").get<std::string>();
   std::vector<Diagnostic> warnings;
@@ -85,9 +87,33 @@ Site make_site(const product::Plan& plan) {
   return site;
 }
 
+/// Limits of ground vibration at the neighbours' foundations, over the frequencies in which the ground answers.
+std::vector<Limit> list_limits(const product::Plan& plan) {
+  std::vector<Limit> out;
+  for (std::size_t i = 0; i < plan.neighbours.size(); ++i) {
+    const product::Neighbour& n = plan.neighbours[i];
+    Limit limit{name_of_screening(plan, i), n.name, 0, 0, ""};
+    if (n.vibration_limit > 0) {
+      limit.least = limit.most = n.vibration_limit;
+      limit.source = "of the plan";
+    } else if (n.building_class != product::BuildingClass::Unknown) {
+      limit.least = collapse::calc_vibration_limit(n.building_class, plan.vibration->low_frequency);
+      limit.most = collapse::calc_vibration_limit(n.building_class, plan.vibration->high_frequency);
+      limit.source = collapse::kVibrationSource;
+    }
+    if (limit.least > 0) out.push_back(std::move(limit));
+  }
+  return out;
+}
+
+constexpr double screening_after = 6;  // runs of a plan with a screening, after the last stage [s]
+
 }  // namespace
 
-Problem make_plan_problem(const product::Plan& plan, const PlanMappingOptions& options, const std::string& rules) {
+Problem make_plan_problem(const product::Plan& plan, const PlanMappingOptions& given, const std::string& rules) {
+  PlanMappingOptions options = given;
+  // what shakes the ground comes down after the block has touched it
+  if (has_screening(plan, options)) options.after = std::max(options.after, screening_after);
   const PlanMapping mapping(plan, read_rules(rules), options);
   Problem p;
   p.title = plan.title;
@@ -114,9 +140,15 @@ Problem make_plan_problem(const product::Plan& plan, const PlanMappingOptions& o
                     {"directions", options.directions}}
                    .dump();
   p.settings = json{{"path", plan.path}}.dump();
+  if (has_screening(plan, options)) {
+    json identity = json::parse(p.identity);
+    identity["vibration"] = true;
+    p.identity = identity.dump();
+    p.limits = list_limits(plan);
+  }
   if (options.condensed) {
     PlanMappingOptions whole = options;
-    whole.condensed = false;
+    whole.condensed = whole.vibration = false;
     p.whole = std::make_shared<const Problem>(make_plan_problem(plan, whole, rules));
     p.confirm = default_confirm;
     p.not_modelled.push_back("Frames that are alike move as one, in their plane: nothing falls sideways.");

@@ -40,6 +40,14 @@ struct Site {
   std::vector<Area> neighbours;
 };
 
+/// What an output should stay below, for sentences.
+struct Limit {
+  std::string output;          // its name
+  std::string place;           // for people: a neighbour
+  double least = 0, most = 0;  // the limit, or the range in which it lies, in what outputs hold
+  std::string source;          // of the limit
+};
+
 struct Problem {
   std::string title;
   std::vector<Quantity> inputs;   // fuzzy; as many as space.inputs
@@ -63,6 +71,7 @@ struct Problem {
   bool has_drivers = true;                // spend runs on them
   std::string asked;                      // the outcome that is wanted; empty: none is named
   Site site;                              // of a plan
+  std::vector<Limit> limits;              // of a plan
   std::vector<std::string> not_modelled;  // sentences
   /// The model that the one above stands for, at a fraction of its cost: a study ends with runs of it. Null: none.
   std::shared_ptr<const Problem> whole;

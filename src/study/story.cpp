@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <set>
 
@@ -50,6 +51,44 @@ void tell_outcomes(const Problem& p, const StudyResult& r, std::vector<Sentence>
       s.text += fmt::format(" It takes no more than {}.", words_of_point(p, r.alpha.archive[c.sample].x));
     if (!p.asked.empty())
       s.status = name == p.asked ? Status::Good : c.possibility >= 0.5 ? Status::Bad : Status::Warning;
+    out.push_back(std::move(s));
+  }
+}
+
+/// How possible it is that an output reaches its limit: the most possible run that does.
+void tell_limits(const Problem& p, const StudyResult& r, std::vector<Sentence>& out) {
+  for (const Limit& limit : p.limits) {
+    const auto at = std::find(r.outputs.begin(), r.outputs.end(), limit.output);
+    if (at == r.outputs.end()) continue;
+    const auto index = static_cast<std::size_t>(at - r.outputs.begin());
+    const Quantity q = find_output(p, limit.output);
+    double possibility = 0, low = std::numeric_limits<double>::infinity(), high = 0;
+    int runs = 0;
+    for (int i = 0; i < static_cast<int>(r.alpha.archive.size()); ++i) {
+      const uncertainty::Sample& s = r.alpha.archive[i];
+      if (index >= s.result.values.size()) continue;
+      const double value = s.result.values[index], degree = uncertainty::calc_membership(p.space, s.x);
+      if (!(degree >= 0) || !std::isfinite(value)) continue;
+      ++runs;
+      low = std::min(low, value), high = std::max(high, value);
+      if (value >= limit.least) possibility = std::max(possibility, degree);
+    }
+    if (runs == 0) continue;
+    Sentence s;
+    s.id = "limit." + limit.output;
+    s.text = fmt::format(
+        "Screening of ground vibration at {}: the upper end of the band lies between {} and {} over {} runs; limit "
+        "{}{} "
+        "({}). ",
+        quoted(limit.place), words_of_number(low / q.unit_value), words_of_value(q, high), runs,
+        words_of_value(q, limit.least),
+        limit.most > limit.least ? fmt::format(" to {}, by frequency", words_of_value(q, limit.most)) : "",
+        limit.source);
+    s.text += possibility > 0 ? fmt::format("It is {} that the band reaches the limit: possibility at least {:.2f}.",
+                                            words_of_possibility(possibility), possibility)
+                              : std::string("No run reaches the limit.");
+    s.text += " This is a screening, no prediction.";
+    s.status = possibility >= 0.5 ? Status::Bad : possibility > 0 ? Status::Warning : Status::Good;
     out.push_back(std::move(s));
   }
 }
@@ -265,6 +304,7 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
     tell_outcomes(p, r, out);
     tell_splits(p, r, out);
   }
+  tell_limits(p, r, out);
   if (r.alpha.failed > 0) {
     const auto found = std::find_if(r.possibilities.classes.begin(), r.possibilities.classes.end(),
                                     [](const auto& c) { return c.outcome == failed_outcome; });

@@ -360,5 +360,32 @@ TEST(Results, RobustnessComparesRelativeUncertainty) {
   EXPECT_TRUE(std::isnan(calc_robustness_of(p, r, 1)));
 }
 
+TEST(Story, TellsHowPossibleItIsThatALimitIsReached) {
+  // y = x1 over the triangle (0, 2, 10): the limit at 6 lies on its right branch at 0.5, at 12 outside
+  const Folder folder;
+  Problem p = make_problem({make_triangular(0, 2, 10)}, 300);
+  p.outputs = {{"y", "mm/s", 1e-3}};
+  p.limits = {{"y", "House", 6, 8, "a table"}, {"y", "Works", 12, 12, "of the plan"}, {"z", "Nobody", 1, 1, ""}};
+  const StudyResult r = run(p, folder, "limits", make_factories([](const Point& x) {
+                              return done({{"y", x[0]}}, "falls");
+                            }));
+  std::vector<Sentence> told;
+  for (const Sentence& s : tell(p, r))
+    if (s.id == "limit.y") told.push_back(s);
+  ASSERT_EQ(told.size(), 2u);
+  EXPECT_NE(told[0].text.find("\"House\": the upper end of the band lies between 0 and 10000 mm/s"), std::string::npos)
+      << told[0].text;
+  EXPECT_NE(told[0].text.find("limit 6000 mm/s to 8000 mm/s, by frequency (a table)"), std::string::npos)
+      << told[0].text;
+  const size_t at = told[0].text.find("possibility at least ");
+  ASSERT_NE(at, std::string::npos) << told[0].text;
+  const double possibility = std::stod(told[0].text.substr(at + 21));
+  EXPECT_LE(possibility, 0.5 + 1e-9);  // the exact degree; runs find it from below, printed with two digits
+  EXPECT_GT(possibility, 0.4);
+  EXPECT_NE(told[0].status, record::Status::Good);
+  EXPECT_NE(told[1].text.find("No run reaches the limit."), std::string::npos);
+  EXPECT_EQ(told[1].status, record::Status::Good);
+}
+
 }  // namespace
 }  // namespace topple::study

@@ -141,6 +141,64 @@ TEST(PlanMapping, AgreesWithARunOfThePlan) {
   EXPECT_NEAR(output("tilt_0.4"), r.series.front().value.back(), 1e-12);
 }
 
+constexpr const char* site_law = R"toml(
+[site.vibration]
+velocity = "4 mm/s"
+energy = "1 MJ"
+distance = "20 m"
+energy_exponent = 0.5
+distance_exponent = 1
+factor = 2
+frequency = ["5 Hz", "25 Hz"]
+source = "made up"
+)toml";
+
+/// The small plan beside a house of a class, with the site's law.
+product::Plan read_shaken() {
+  std::string text = product::small_plan() + strengths + site_law;
+  text = product::replaced(text, "time = \"2 s\"", "time = \"0.1 s\"");
+  text = product::replaced(text, "clearance = \"3 m\"", "clearance = \"3 m\"\nbuilding_class = \"residential\"");
+  std::vector<Diagnostic> warnings;
+  return product::read_plan(text, "plan.toml", warnings);
+}
+
+TEST(PlanMapping, ScreensTheGroundVibrationAsARunDoes) {
+  const product::Plan plan = read_shaken();
+  PlanMappingOptions options = quick();
+  options.after = 1.4;
+  const PlanMapping m(plan, collapse::default_knowledge(), options);
+  ASSERT_EQ(m.outputs().back().name, "vibration_house");
+  EXPECT_EQ(m.outputs().back().symbol, "mm/s");
+  const Result mapped = evaluate(m, {points[1]})[0];
+  collapse::RunOptions o;
+  o.duration = 1.5;
+  const record::Record r = collapse::run_plan(product::make_sample(product::make_sampler(plan), points[1]),
+                                              collapse::default_knowledge(), o, {});
+  const auto found = std::find_if(r.findings.begin(), r.findings.end(),
+                                  [](const record::Finding& f) { return f.id == "vibration.House"; });
+  ASSERT_NE(found, r.findings.end());
+  EXPECT_GT(found->value, 0);
+  EXPECT_NEAR(mapped.values.back(), found->value, 1e-12);  // the upper end of the band; the same touchdowns
+  // nothing of it in plans without the law, and where it is not wanted
+  options.vibration = false;
+  for (const PlanQuantity& q : PlanMapping(plan, collapse::default_knowledge(), options).outputs())
+    EXPECT_EQ(q.name.rfind("vibration", 0), std::string::npos);
+  for (const PlanQuantity& q : PlanMapping(read_small(strengths), collapse::default_knowledge(), quick()).outputs())
+    EXPECT_EQ(q.name.rfind("vibration", 0), std::string::npos);
+}
+
+TEST(PlanMapping, NamesScreeningsApart) {
+  product::Plan plan;
+  for (const char* name : {"Gas main", "House 7", "gas-main", "H\xc3\xa4user", "??"}) {
+    product::Neighbour n;
+    n.name = name;
+    plan.neighbours.push_back(n);
+  }
+  const char* wanted[] = {"vibration_gas_main_1", "vibration_house_7", "vibration_gas_main_3", "vibration_h_user",
+                          "vibration_5"};
+  for (size_t i = 0; i < 5; ++i) EXPECT_EQ(name_of_screening(plan, i), wanted[i]);
+}
+
 TEST(PlanMapping, RefusesPlansWithoutFuzzyValues) {
   EXPECT_THROW(PlanMapping(read_small(""), collapse::default_knowledge(), quick()), InputError);
   PlanMappingOptions o = quick();

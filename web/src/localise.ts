@@ -1,5 +1,6 @@
 /// Data of pages in the reader's language: what the program wrote in sentences. Names that people gave stay.
 import type { Run } from "./data";
+import type { Study } from "./study/data";
 import { language, say } from "./translate";
 
 export function localiseRun(run: Run): Run {
@@ -20,4 +21,17 @@ export function localiseRun(run: Run): Run {
   run.not_modelled = run.not_modelled.map(say);
   run.ending.text = say(run.ending.text);
   return run;
+}
+
+export function localiseStudy(study: Study): Study {
+  if (language === "en") return study;
+  for (const sentence of study.verdict) sentence.text = say(sentence.text);
+  for (const run of study.notable) run.why = say(run.why);
+  for (const box of study.boxes?.list ?? []) box.guarantee = say(box.guarantee);
+  for (const curve of study.curves) curve.over = say(curve.over);
+  study.ending = say(study.ending);
+  study.drivers.from = say(study.drivers.from);
+  study.not_modelled = study.not_modelled.map(say);
+  study.failures = study.failures.map(say);
+  return study;
 }

@@ -18,7 +18,7 @@ interface Sentence {
   weight: number; // letters that are fixed
 }
 
-const number = "-?(?:\\d[\\d\\u202f]*(?:\\.\\d+)?(?:e[+-]?\\d+)?|nan|inf)";
+const number = "[-−]?(?:\\d[\\d\\u202f]*(?:\\.\\d+)?(?:e[+-]?\\d+)?|nan|inf)";
 const escape = (text: string): string => text.replace(/[.*+?^${}()|[\]\\]/g, "\\$&");
 
 function makeSentence([english, translated]: readonly [string, string]): Sentence {

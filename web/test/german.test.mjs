@@ -57,7 +57,7 @@ describe("the German table", () => {
     // sentences are put together at their signs
     // put together from words that depend on the run
     const made = ["No part of the upper block has touched the ground so far.", "No part of the upper block touched the ground."];
-    const pieces = (english) => (made.includes(english) ? ["No part of the upper block"] : fragments(english)).flatMap((part) => part.split(/[;:,.()]+ ?/)).filter((part) => /[A-Za-z]{3}/.test(part)).map((part) => part.trim());
+    const pieces = (english) => (made.includes(english) ? ["No part of the upper block"] : fragments(english.replace(/ \[[^\]]*\]$/, ""))).flatMap((part) => part.split(/[;:,.()]+ ?/)).filter((part) => /[A-Za-z]{3}/.test(part)).map((part) => part.trim());
     const stale = german.map(([english]) => english).filter((english) => !pieces(english).every((part) => corpus.includes(part)));
     assert.deepEqual(stale, []);
   });
@@ -81,6 +81,8 @@ describe("the German table", () => {
     for (const text of ["topple 0.1.0", "2026-11-20", "record.h5", "C20.5x"]) assert.equal(commas(text), text);
     assert.equal(translate("It topples: at the end, 5.00 s, it leans by 1.5 deg, its mass centre has come down by 0.10 m, and its rear edge 3 % as far as its front edge. In the end 90 % of the mass has come down. Parts were still moving when the run ended."),
       "Es kippt: Am Ende, bei 5,00 s, neigt er sich um 1,5 deg, sein Schwerpunkt ist um 0,10 m gefallen und seine hintere Kante um 3 % so weit wie seine vordere. Am Ende sind 90 % der Masse heruntergekommen. Als die Rechnung endete, bewegten sich noch Teile.");
+    assert.match(translate("It topples: when the upper block first touches the ground, at 1.23 s, it leans by 15.7 deg, its mass centre has come down by 1.47 m, and its rear edge 2 % as far as its front edge. In the end 100 % of the mass has come down. Parts were still moving when the run ended."),
+      /^Es kippt: Wenn der obere Block zuerst den Boden berührt, bei 1,23 s, neigt er sich .* herunter\w+\. Als die Rechnung endete/);
     assert.equal(translate("Nobody ever says this."), undefined);
   });
 });
@@ -101,7 +103,7 @@ const collect = (page) =>
 
 if (given !== undefined)
   describe("the German page of a run", () => {
-    it("has no English left", async () => {
+    it("has no English left", { timeout: 240000 }, async () => {
       await mkdir(out, { recursive: true });
       const english = await readFile(given, "utf8");
       const path = `${out}de.html`;

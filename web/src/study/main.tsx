@@ -6,7 +6,9 @@ import { Runs } from "./runs";
 import { makeState } from "./state";
 import { Boxes, Confirmed, Drivers, Inputs, NotModelled, Notable, Origin } from "./tables";
 import { Header, Outcomes } from "./verdict";
+import { localiseStudy } from "../localise";
 import { startPage } from "../start";
+import { say, translateElements } from "../translate";
 
 function Page(props: { study: Study }) {
   const state = makeState(props.study);
@@ -37,7 +39,8 @@ function Page(props: { study: Study }) {
   );
 }
 
-startPage("study", readStudy, (study) => {
-  document.title = `${study.title || "Study"} – topple study`;
+translateElements();
+startPage("study", (text) => localiseStudy(readStudy(text)), (study) => {
+  document.title = `${study.title || say("Study")} – ${say("topple study")}`;
   return <Page study={study} />;
 }, "now");
