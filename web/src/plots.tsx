@@ -41,7 +41,7 @@ export const cssColour = (name: string): string => getComputedStyle(document.doc
 /// What a plot is, for those who do not see it.
 export function namePlot(plot: uPlot, title: string): void {
   plot.ctx.canvas.setAttribute("role", "img");
-  plot.ctx.canvas.setAttribute("aria-label", `${title}: the table of values says the same`);
+  plot.ctx.canvas.setAttribute("aria-label", `${say(title)}: ${say("the table of values says the same")}`);
 }
 
 export function axis(label: string, isTime: boolean): uPlot.Axis {

@@ -408,6 +408,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["Plots", "Diagramme"],
   ["The record holds no series.", "Die Aufzeichnung enthält keine Reihen."],
   ["Table of values", "Wertetabelle"],
+  ["the table of values says the same", "Die Wertetabelle sagt dasselbe"],
   ["Values of {}", "Werte von {}"],
   ["Ends at", "Endet bei"],
   [", when less than half of the upper block holds together.", ", wenn weniger als die Hälfte des oberen Blocks zusammenhält."],
