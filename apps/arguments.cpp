@@ -122,6 +122,10 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   CLI::App* report = app.add_subcommand("report", "Make the self-contained page from a record.");
   report->add_option("record", a.input, "record (HDF5)")->type_name("FILE")->required();
   report->add_option("-o,--output", a.output, "page to write")->type_name("FILE")->required();
+  report->add_option("--study", a.study_results, "also tell what a fuzzy study found: its folder or its results.json")
+      ->type_name("PATH");
+  report->add_option("--compare", a.other_records, "also tell how other records differ, say one of topple fe")
+      ->type_name("FILE");
   add_language(report);
 
   CLI::App* exports =
@@ -341,7 +345,8 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   add_examples(rules, R"(  topple rules                             with their reasons
   topple rules --json > rules.json         to change one and run with --knowledge)");
   add_examples(report, R"(  topple report out/record.h5 -o report.html
-  topple report out/record.h5 -o bericht.html --language de)");
+  topple report out/record.h5 -o bericht.html --language de
+  topple report out/record.h5 -o report.html --study study --compare fe/record.h5)");
   add_examples(exports, R"(  topple export out/record.h5 --csv -o tables
   topple export out/record.h5 --vtk --frame-rate "10 Hz" -o vtk
   topple export out/record.h5 --gltf -o scene

@@ -41,6 +41,8 @@ struct Arguments {
   std::string knowledge;  // file of rules, empty: built in
   std::string engine = "native";
   std::string language = "en";             // of pages
+  std::string study_results;               // of a report, empty: none
+  std::vector<std::string> other_records;  // of a report
   std::string unit;                        // of a drawing, as typed
   std::string plan_template = "frame";     // of a new plan
   bool list = false;                       // show the templates instead

@@ -8,6 +8,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string_view>
 
 #include "base/error.h"
 #include "base/file.h"
@@ -16,8 +17,10 @@
 #include "mbs/model_json.h"
 #include "product/plan.h"
 #include "product/templates.h"
+#include "record/compare.h"
 #include "record/page.h"
 #include "record/record.h"
+#include "record/report.h"
 #include "results.h"
 #include "terminal.h"
 
@@ -306,15 +309,47 @@ int show_rules(const Arguments& a) {
   return kOk;
 }
 
+namespace {
+
+/// Of a study's results what a report tells: verdict, outcomes, bounds. Throws InputError E682.
+std::string read_study(std::string path) {
+  if (std::filesystem::is_directory(path)) path = (std::filesystem::path(path) / "results.json").string();
+  const json whole = json::parse(read_file(path), nullptr, false);
+  const auto refuse_file = [&path](const std::string& why) {
+    throw InputError("E682", fmt::format("{}: {}", path, why), "give the folder that topple study wrote");
+  };
+  if (!whole.is_object()) refuse_file("not the results of a study (no JSON object)");
+  json out;
+  for (const char* key : {"title", "runs", "failed", "verdict", "inputs", "outcomes", "outputs"}) {
+    if (!whole.contains(key)) refuse_file(fmt::format("not the results of a study (no \"{}\")", key));
+    out[key] = whole[key];
+  }
+  for (const char* key : {"verdict", "inputs", "outcomes", "outputs"})
+    for (json& entry : out[key]) {
+      if (!entry.is_object()) refuse_file(fmt::format("not the results of a study (\"{}\")", key));
+      if (std::string_view(key) == "outcomes") entry.erase("outputs");
+    }
+  return out.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+}  // namespace
+
 int write_report_file(const Arguments& a) {
   try {
     const record::Record r = record::read_hdf5(a.input);
+    record::ReportExtras extras;
+    if (!a.study_results.empty()) extras.study = read_study(a.study_results);
+    for (const std::string& path : a.other_records) {
+      const record::Record other = record::read_hdf5(path);
+      const record::Comparison c = record::compare(r, other);
+      extras.others.push_back({c.name_b, other.provenance.title, record::summarise(c)});
+    }
     const auto bundle = find_bundle("report.html");
     if (!bundle) {
       std::fprintf(stderr, "%s\n", kNoBundle);
       return kRunFailed;
     }
-    record::write_page(record::to_report_json(r), *bundle, a.output, a.language);
+    record::write_page(record::to_report_json(r, extras), *bundle, a.output, a.language);
     std::printf("Wrote %s\n", a.output.c_str());
     return kOk;
   } catch (const InputError& e) { return refuse(e, {}, {}, false); }

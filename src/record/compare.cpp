@@ -177,6 +177,20 @@ Comparison compare(const Record& a, const Record& b) {
   return c;
 }
 
+std::vector<std::string> summarise(const Comparison& c) {
+  return {
+      fmt::format("First touchdown of the upper block: A {}, B {}{}.", seconds(c.touchdown_a), seconds(c.touchdown_b),
+                  std::isfinite(c.touchdown_a) && std::isfinite(c.touchdown_b)
+                      ? fmt::format(", difference {:+.3f} s", c.touchdown_b - c.touchdown_a)
+                      : std::string()),
+      fmt::format("Tilt up to {:.2f} s: largest difference {:.2f} deg at {:.2f} s{}.", c.until,
+                  c.tilt_difference / unit::deg, c.tilt_time,
+                  std::isfinite(c.tilt_share)
+                      ? fmt::format(", {:.0f} % of the larger tilt at the end of this time", 100 * c.tilt_share)
+                      : std::string()),
+      fmt::format("Mass centres up to then: at most {:.2f} m apart.", c.centre_difference)};
+}
+
 std::string describe(const Comparison& c, const Record& a, const Record& b) {
   std::string out;
   const auto line = [&out](const std::string& text) { out += text + "\n"; };
@@ -184,16 +198,7 @@ std::string describe(const Comparison& c, const Record& a, const Record& b) {
   line(fmt::format("B  {}: {}, {} frames to {:.2f} s", c.name_b, b.provenance.title, b.time.size(), b.time.back()));
   line(c.points);
   line("");
-  line(fmt::format("First touchdown of the upper block: A {}, B {}{}.", seconds(c.touchdown_a), seconds(c.touchdown_b),
-                   std::isfinite(c.touchdown_a) && std::isfinite(c.touchdown_b)
-                       ? fmt::format(", difference {:+.3f} s", c.touchdown_b - c.touchdown_a)
-                       : std::string()));
-  line(fmt::format("Tilt up to {:.2f} s: largest difference {:.2f} deg at {:.2f} s{}.", c.until,
-                   c.tilt_difference / unit::deg, c.tilt_time,
-                   std::isfinite(c.tilt_share)
-                       ? fmt::format(", {:.0f} % of the larger tilt at the end of this time", 100 * c.tilt_share)
-                       : std::string()));
-  line(fmt::format("Mass centres up to then: at most {:.2f} m apart.", c.centre_difference));
+  for (const std::string& sentence : summarise(c)) line(sentence);
   // a dozen instants
   const SeriesPair *tilt = find_series(c, "tilt_angle"), *force = find_series(c, "ground_force"),
                    *kinetic = find_series(c, "energy_kinetic");

@@ -43,7 +43,9 @@ struct Comparison {
 /// Throws InputError E680: records without a frame in common time.
 Comparison compare(const Record& a, const Record& b);
 
-/// Lines for people: touchdowns, tilt at instants, energies.
+/// How they differ, in a sentence each: touchdown, tilt, mass centres.
+std::vector<std::string> summarise(const Comparison&);
+/// Lines for people: the summary, touchdowns, tilt at instants, energies.
 std::string describe(const Comparison&, const Record& a, const Record& b);
 /// One line an instant: time, each series of A, of B and the difference, distances.
 std::string to_csv(const Comparison&, const Record& a);

@@ -90,6 +90,18 @@ export interface Run {
   time: number[]; // (S)
   series: Series[];
   frames: Frame[]; // (S)
+  study?: StudySummary; // of the same building
+  others?: { engine: string; title: string; sentences: string[] }[]; // other computations of it; A is this run
+}
+
+/// What a fuzzy study found, as its results.json says it.
+export interface StudySummary {
+  title: string;
+  runs: number;
+  failed: number;
+  verdict: { id: string; status: Finding["status"]; text: string }[];
+  outcomes: { name: string; is_failure: boolean; runs: number; possibility: number; necessity: number }[];
+  outputs: { name: string; unit: string; levels: { alpha: number; lower: number | null; upper: number | null }[] }[];
 }
 
 /// What is kept of one moment.

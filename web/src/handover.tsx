@@ -1,9 +1,11 @@
 /// What the report hands over beside the findings: when they would not hold, the site from above, assumptions,
 /// verification, what fuzzy values do, and the words it uses.
-import { calcPose, type Finding, type Point, type Quadruple, type Run, type Triple } from "./data";
+import { calcPose, type Finding, type Point, type Quadruple, type Run, type StudySummary, type Triple } from "./data";
 import { FindingRow, findVerdict } from "./findings";
+import { StatusSign } from "./signs";
+import { unitWord } from "./study/data";
 import { makeScale, makeTicks, tickText } from "./study/chart";
-import { formatNumber } from "./units";
+import { formatNumber, prettify } from "./units";
 
 const percent = (part: number): string => String(Math.max(1, Math.round(100 * part)));
 
@@ -151,23 +153,66 @@ export function Assumptions() {
 export const isVerification = (f: Finding): boolean => f.id.startsWith("verification.");
 
 export function Verification(props: { run: Run }) {
-  const findings = props.run.findings.filter(isVerification);
-  if (findings.length === 0) return null;
+  const findings = props.run.findings.filter(isVerification), others = props.run.others ?? [];
+  if (findings.length + others.length === 0) return null;
   return (
     <section class="panel verification" aria-label="Verification">
       <h2>Verification</h2>
       {findings.map((finding) => <FindingRow finding={finding} heading="Verification" />)}
+      {others.map((other) => (
+        <div data-test="second-opinion">
+          <h3>Beside another computation</h3>
+          <p class="quiet"><span>A is this run, B is by</span> <span>{other.engine}</span>: <span>{other.title}</span></p>
+          <ul>{other.sentences.map((text) => <li>{prettify(text)}</li>)}</ul>
+        </div>
+      ))}
       <p class="quiet plot-note">Halving the step (topple run --step), the finite elements (topple fe) and other engines (topple mbs compare) are further checks.</p>
     </section>
   );
 }
 
-export function FuzzyNote() {
+/// What a study of the building found, or where to look for one.
+export function FuzzyResults(props: { study: StudySummary | undefined }) {
+  const { study } = props;
+  if (study !== undefined) return <StudyResults study={study} />;
   return (
     <section class="panel fuzzy-note" aria-label="Fuzzy results">
       <h2>Fuzzy results</h2>
       <p>This is one run with one value of everything. How possible other outcomes are, and between which bounds each finding lies, is in the
         page of a study (topple study), if there is one.</p>
+    </section>
+  );
+}
+
+const bound = (x: number | null): string => (x === null ? "–" : formatNumber(x, 3));
+
+function StudyResults(props: { study: StudySummary }) {
+  const { study } = props;
+  const level = (o: StudySummary["outputs"][number], i: number) => o.levels[i < 0 ? o.levels.length - 1 : i];
+  return (
+    <section class="panel fuzzy-results" aria-label="Fuzzy results" data-test="fuzzy-results">
+      <h2>Fuzzy results</h2>
+      <p class="quiet"><span>{study.title}</span>: <span class="number">{study.runs}</span> <span>runs</span>, <span class="number">{study.failed}</span> <span>failed</span></p>
+      {study.verdict.map((s) => <p data-sentence={s.id}><StatusSign status={s.status} size={15} /> {prettify(s.text)}</p>)}
+      <table>
+        <thead><tr><th>Outcome</th><th class="number">Possibility</th><th class="number">Necessity</th><th class="number">Runs</th></tr></thead>
+        <tbody>
+          {study.outcomes.map((o) => (
+            <tr><td>{o.is_failure ? "failed" : o.name}</td><td class="number">{formatNumber(o.possibility, 2)}</td><td class="number">{formatNumber(o.necessity, 2)}</td><td class="number">{o.runs}</td></tr>
+          ))}
+        </tbody>
+      </table>
+      <table>
+        <thead><tr><th>Result</th><th class="number">least possible</th><th class="number">greatest possible</th><th class="number">most possible</th></tr></thead>
+        <tbody>
+          {study.outputs.map((o) => {
+            const all = level(o, 0), core = level(o, -1);
+            if (all === undefined || core === undefined) return null;
+            const middle = core.lower === core.upper ? bound(core.lower) : `${bound(core.lower)} … ${bound(core.upper)}`;
+            return <tr><td><span>{o.name}</span> {o.unit === "" ? "" : `[${unitWord(o.unit)}]`}</td><td class="number">{bound(all.lower)}</td><td class="number">{bound(all.upper)}</td><td class="number">{middle}</td></tr>;
+          })}
+        </tbody>
+      </table>
     </section>
   );
 }

@@ -20,6 +20,9 @@ export function localiseRun(run: Run): Run {
   for (const z of run.zones) z.subsystem = say(z.subsystem);
   run.not_modelled = run.not_modelled.map(say);
   run.ending.text = say(run.ending.text);
+  for (const s of run.study?.verdict ?? []) s.text = say(s.text);
+  for (const o of run.study?.outcomes ?? []) o.name = say(o.name);
+  for (const o of run.others ?? []) o.engine = say(o.engine), o.sentences = o.sentences.map(say);
   return run;
 }
 

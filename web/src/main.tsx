@@ -4,7 +4,7 @@ import { useState } from "preact/hooks";
 import { readRun } from "./data";
 import { Findings, Header, NotModelled } from "./findings";
 import { Inspector } from "./inspector";
-import { Assumptions, Conditions, FuzzyNote, Glossary, SitePlan, Verification } from "./handover";
+import { Assumptions, Conditions, FuzzyResults, Glossary, SitePlan, Verification } from "./handover";
 import { Help, listenToKeys } from "./keys";
 import { localiseRun } from "./localise";
 import { Plots } from "./plots";
@@ -60,7 +60,7 @@ function Page(props: { state: State; fitRef: { current: () => void } }) {
             <Details run={run} />
             <SitePlan run={run} />
             <Assumptions />
-            <FuzzyNote />
+            <FuzzyResults study={run.study} />
             <Glossary />
           </div>
         </div>
