@@ -195,7 +195,7 @@ function StudyResults(props: { study: StudySummary }) {
       <p class="quiet"><span>{study.title}</span>: <span class="number">{study.runs}</span> <span>runs</span>, <span class="number">{study.failed}</span> <span>failed</span></p>
       {study.verdict.map((s) => <p data-sentence={s.id}><StatusSign status={s.status} size={15} /> {prettify(s.text)}</p>)}
       <table>
-        <thead><tr><th>Outcome</th><th class="number">Possibility</th><th class="number">Necessity</th><th class="number">Runs</th></tr></thead>
+        <thead><tr><th scope="col">Outcome</th><th scope="col" class="number">Possibility</th><th scope="col" class="number">Necessity</th><th scope="col" class="number">Runs</th></tr></thead>
         <tbody>
           {study.outcomes.map((o) => (
             <tr><td>{o.is_failure ? "failed" : o.name}</td><td class="number">{formatNumber(o.possibility, 2)}</td><td class="number">{formatNumber(o.necessity, 2)}</td><td class="number">{o.runs}</td></tr>
@@ -203,7 +203,7 @@ function StudyResults(props: { study: StudySummary }) {
         </tbody>
       </table>
       <table>
-        <thead><tr><th>Result</th><th class="number">least possible</th><th class="number">greatest possible</th><th class="number">most possible</th></tr></thead>
+        <thead><tr><th scope="col">Result</th><th scope="col" class="number">least possible</th><th scope="col" class="number">greatest possible</th><th scope="col" class="number">most possible</th></tr></thead>
         <tbody>
           {study.outputs.map((o) => {
             const all = level(o, 0), core = level(o, -1);

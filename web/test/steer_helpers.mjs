@@ -96,10 +96,33 @@ export const findOverflow = (page) =>
       .filter((e) => e.getBoundingClientRect().right > innerWidth + 0.5)
       .map((e) => `${e.className} ${e.textContent.slice(0, 20)}`));
 
+/// Contrast of colours after WCAG 2.1, for functions that run in the page.
+const putContrast = (page) =>
+  page.evaluate(() => {
+    const parse = (text) => {
+      const n = text.match(/[\d.]+/g)?.map(Number) ?? [0, 0, 0];
+      return { rgb: n.slice(0, 3), alpha: n[3] ?? 1 };
+    };
+    const luminance = (rgb) => {
+      const [r, g, b] = rgb.map((v) => (v / 255 <= 0.04045 ? v / 255 / 12.92 : ((v / 255 + 0.055) / 1.055) ** 2.4));
+      return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+    };
+    const groundOf = (e) => {
+      for (let at = e; at !== null; at = at.parentElement) {
+        const c = parse(getComputedStyle(at).backgroundColor);
+        if (c.alpha > 0.99) return c.rgb;
+      }
+      return [255, 255, 255];
+    };
+    const ratio = (a, b) => (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+    globalThis.contrast_ = { parse, luminance, groundOf, ratio };
+  });
+
 /// What a reader with a keyboard, a screen reader or weak eyes would stumble over: WCAG 2.1, 1.1.1, 1.3.1, 1.4.11, 2.1.1,
 /// 2.4.6, 4.1.1, 4.1.2.
-export const findAccessFaults = (page) =>
-  page.evaluate(() => {
+export async function findAccessFaults(page) {
+  await putContrast(page);
+  return page.evaluate(() => {
     const faults = [];
     const isSeen = (e) => e.getClientRects().length > 0 && getComputedStyle(e).visibility !== "hidden";
     const all = (selector) => [...document.querySelectorAll(selector)].filter(isSeen);
@@ -133,28 +156,17 @@ export const findAccessFaults = (page) =>
     if (all(".plot").length !== all(".plot details.data-table").length) faults.push("a plot without a table");
     if (document.documentElement.lang === "") faults.push("no language");
     // edges of fields against what is around them
-    const parse = (text) => (text.match(/[\d.]+/g) ?? []).map(Number);
-    const luminance = (rgb) => {
-      const [r, g, b] = rgb.map((v) => (v / 255 <= 0.04045 ? v / 255 / 12.92 : ((v / 255 + 0.055) / 1.055) ** 2.4));
-      return 0.2126 * r + 0.7152 * g + 0.0722 * b;
-    };
-    const groundOf = (e) => {
-      for (let at = e; at !== null; at = at.parentElement) {
-        const c = parse(getComputedStyle(at).backgroundColor);
-        if ((c[3] ?? 1) > 0.99) return c.slice(0, 3);
-      }
-      return [255, 255, 255];
-    };
+    const { parse, luminance, groundOf, ratio } = globalThis.contrast_;
     for (const e of all("input:not([type=checkbox]):not([type=range]):not([type=file]), select, textarea")) {
       if (e.matches(":disabled")) continue;
       const style = getComputedStyle(e);
       const around = luminance(groundOf(e.parentElement)), inside = luminance(groundOf(e));
-      const ratio = (a, b) => (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
-      const edge = parseFloat(style.borderTopWidth) > 0 ? luminance(parse(style.borderTopColor).slice(0, 3)) : around;
+      const edge = parseFloat(style.borderTopWidth) > 0 ? luminance(parse(style.borderTopColor).rgb) : around;
       if (Math.max(ratio(edge, around), ratio(inside, around)) < 3) faults.push(`an edge of ${Math.max(ratio(edge, around), ratio(inside, around)).toFixed(2)}: ${short(e)}`);
     }
     return faults;
   });
+}
 
 /// Controls that Tab does not come to, and those that do not show that it has.
 export async function findUnreached(page) {
@@ -167,8 +179,11 @@ export async function findUnreached(page) {
     document.activeElement?.blur();
     return n;
   });
-  const unmarked = await page.evaluate(() => ((globalThis.reached_ = new Set()), (globalThis.plain_ = new Set()), 0));
-  for (let k = unmarked; k < wanted + 40; ++k) {
+  await page.evaluate(() => {
+    globalThis.reached_ = new Set();
+    globalThis.plain_ = new Set();
+  });
+  for (let k = 0; k < wanted + 40; ++k) {
     await page.keyboard.press("Tab");
     const over = await page.evaluate(() => {
       const e = document.activeElement;
@@ -189,23 +204,10 @@ export async function findUnreached(page) {
 
 /// Texts whose contrast to their ground is below 4.5 (3 for large ones): WCAG 2.1, 1.4.3. What is switched off and what
 /// lies on pictures is left out.
-export const findFaint = (page) =>
-  page.evaluate(() => {
-    const parse = (text) => {
-      const n = text.match(/[\d.]+/g)?.map(Number) ?? [0, 0, 0];
-      return { rgb: n.slice(0, 3), alpha: n[3] ?? 1 };
-    };
-    const luminance = (rgb) => {
-      const [r, g, b] = rgb.map((v) => (v / 255 <= 0.04045 ? v / 255 / 12.92 : ((v / 255 + 0.055) / 1.055) ** 2.4));
-      return 0.2126 * r + 0.7152 * g + 0.0722 * b;
-    };
-    const groundOf = (e) => {
-      for (let at = e; at !== null; at = at.parentElement) {
-        const c = parse(getComputedStyle(at).backgroundColor);
-        if (c.alpha > 0.99) return c.rgb;
-      }
-      return [255, 255, 255];
-    };
+export async function findFaint(page) {
+  await putContrast(page);
+  return page.evaluate(() => {
+    const { parse, luminance, groundOf, ratio: ratioOf } = globalThis.contrast_;
     const faint = new Set();
     const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
     while (walker.nextNode()) {
@@ -213,10 +215,10 @@ export const findFaint = (page) =>
       if (walker.currentNode.textContent.trim() === "" || e.getClientRects().length === 0) continue;
       if (e.closest("svg, script, style, noscript, :disabled, [aria-hidden=true], .chip[aria-pressed=false]") !== null) continue;
       const style = getComputedStyle(e);
-      const [a, b] = [luminance(parse(style.color).rgb), luminance(groundOf(e))];
-      const ratio = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+      const ratio = ratioOf(luminance(parse(style.color).rgb), luminance(groundOf(e)));
       const size = parseFloat(style.fontSize), large = size >= 24 || (size >= 18.66 && Number(style.fontWeight) >= 700);
       if (ratio < (large ? 3 : 4.5)) faint.add(`${ratio.toFixed(2)} ${style.color} on ${groundOf(e)}: ${e.className} ${walker.currentNode.textContent.trim().slice(0, 30)}`);
     }
     return [...faint];
   });
+}
