@@ -1,5 +1,7 @@
 /// How far condensed samples are from whole ones: the fuzzy storehouse at points of a Sobol sequence, as CSV.
-///   topple_condensed_bench [points [seed [highest frequency]]]
+///   topple_condensed_bench [points=24] [seed=1] [frequency=2000] [step=1] [law=lanes|full] [pass=yes|no] [nudge=0]
+///                          [whole=yes|no]
+///   step   share of the engine's own step; pass  go over quiet times; nudge  share by which every value is moved
 /// The same seed gives the same points. Seeds 1 to 9 were used while the condensation was made, 11 and above only to
 /// measure it (docs/decisions/0034-condensed-samples.md).
 
@@ -26,27 +28,37 @@ void print_times(const char* name, const study::PlanMappingTimes& t, double n) {
              1e3 / n * t.outputs);
 }
 
-int compare(int count, std::uint64_t seed, double frequency, bool with_whole) {
+struct Settings {
+  int points = 24;
+  std::uint64_t seed = 1;
+  study::PlanMappingOptions mapping;
+  double nudge = 0;
+  bool with_whole = true;
+};
+
+int compare(const Settings& settings) {
   std::vector<Diagnostic> warnings;
   std::string text;
   const product::Plan plan = product::read_plan_file(TOPPLE_EXAMPLES "/weida/plan-fuzzy.toml", warnings, text);
-  study::PlanMappingOptions options;
+  study::PlanMappingOptions options = settings.mapping;
   options.threads = 0;
   const study::PlanMapping whole(plan, collapse::default_knowledge(), options);
   options.condensed = true;
-  options.highest_frequency = frequency;
   const study::PlanMapping condensed(plan, collapse::default_knowledge(), options);
   const uncertainty::Box support = uncertainty::make_box(whole.space(), 0);
   std::vector<uncertainty::Point> points;
-  for (const uncertainty::Point& p : uncertainty::make_sobol_points(whole.space().size(), 0, count, seed))
+  for (const uncertainty::Point& p :
+       uncertainty::make_sobol_points(whole.space().size(), 0, settings.points, settings.seed)) {
     points.push_back(uncertainty::place_in(support, p));
+    for (double& x : points.back()) x *= 1 + settings.nudge;
+  }
   std::vector<uncertainty::Result> a(points.size()), b(points.size());
   study::PlanMappingTimes spent_a, spent_b;
   condensed.evaluate(points, b, nullptr, &spent_b);
-  print_times("condensed", spent_b, count);
-  if (with_whole) {
+  print_times("condensed", spent_b, settings.points);
+  if (settings.with_whole) {
     whole.evaluate(points, a, nullptr, &spent_a);
-    print_times("whole", spent_a, count);
+    print_times("whole", spent_a, settings.points);
   }
   std::string header = "point";
   for (const auto& q : whole.inputs()) header += "," + q.name;
@@ -70,10 +82,34 @@ int compare(int count, std::uint64_t seed, double frequency, bool with_whole) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const int count = argc > 1 ? std::atoi(argv[1]) : 24;
-  const auto seed = static_cast<std::uint64_t>(argc > 2 ? std::atoi(argv[2]) : 1);
+  Settings settings;
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    const std::size_t at = word.find('=');
+    const std::string name = word.substr(0, at), value = at == std::string::npos ? "" : word.substr(at + 1);
+    if (name == "points") {
+      settings.points = std::atoi(value.c_str());
+    } else if (name == "seed") {
+      settings.seed = static_cast<std::uint64_t>(std::atoi(value.c_str()));
+    } else if (name == "frequency") {
+      settings.mapping.highest_frequency = std::atof(value.c_str());
+    } else if (name == "step") {
+      settings.mapping.step_share = std::atof(value.c_str());
+    } else if (name == "law") {
+      settings.mapping.full_law = value == "full";
+    } else if (name == "pass") {
+      settings.mapping.passes_quiet = value != "no";
+    } else if (name == "nudge") {
+      settings.nudge = std::atof(value.c_str());
+    } else if (name == "whole") {
+      settings.with_whole = value != "no";
+    } else {
+      fmt::print(stderr, "{}: not one of points, seed, frequency, step, law, pass, nudge, whole\n", word);
+      return 2;
+    }
+  }
   try {
-    return compare(count, seed, argc > 3 ? std::atof(argv[3]) : 1000, argc <= 4);
+    return compare(settings);
   } catch (const topple::InputError& e) {
     fmt::print(stderr, "{}\n", e.what());
     return 2;

@@ -50,6 +50,7 @@ mbs::Options make_options(const product::Plan& plan, const Knowledge& k, const S
   mbs::Options o;
   o.duration = calc_release(plan) + in.after;
   o.step = plan.analysis.step;
+  o.step_share = in.step_share, o.full_law = in.full_law;
   constexpr double condensed_rate = 20;  // numbers between frames lie on straight lines [1/s]
   o.frame_interval = 1 / (in.frame_rate > 0 ? in.frame_rate
                           : in.condensation ? condensed_rate

@@ -23,6 +23,8 @@ struct SampleRunOptions {
   const KnownCurves* known = nullptr;          // of condensed ones; may be null
   CondenseOptions condense;
   double pass_speed = 0.1, pass_share = 2e-3;  // mbs::Options, of condensed samples
+  double step_share = 1;                       // mbs::Options
+  bool full_law = false;                       // mbs::Options
   bool lanes = false;  // plans whose models are of one build run in the lanes of one batch; the same bits
 };
 

@@ -116,9 +116,10 @@ void System::pack_element(size_t e, bool has_moved) {
   const bool free = c.zone.stations == 0;
   double fields[kFlowFields];
   // near its bounds a zone is better served by the law itself
-  const bool flows = !free && (!is_bounded(z, false) || calc_bound_utilisation(c.zone, z) > kNearBounds) &&
+  const bool in_lanes = free || !options.full_law;
+  const bool flows = !free && in_lanes && (!is_bounded(z, false) || calc_bound_utilisation(c.zone, z) > kNearBounds) &&
                      write_flow(c.zone, laws, z, state.time, fields);
-  const bool bounded = !flows && is_bounded(z, free);
+  const bool bounded = !flows && in_lanes && is_bounded(z, free);
   put(kLeastForce, !bounded ? 1 : free ? -kUnlimited : z.safe_force[0]);
   put(kMostForce, !bounded ? -1 : free ? kUnlimited : z.safe_force[1]);
   if (!bounded && !flows) return;

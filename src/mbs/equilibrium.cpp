@@ -252,10 +252,10 @@ double System::calc_step_limit() const {
 }
 
 double System::calc_own_step() const {
-  const double step_of_limit = options.step_safety * calc_step_limit();
+  const double share = options.step_share, step_of_limit = share * options.step_safety * calc_step_limit();
   // steps in which bodies meet or part shall not change their energy much (docs/theory/contact.md)
   const double corner = calc_contact_frequency();
-  return corner > 0 ? std::min(step_of_limit, kContactAngle / corner) : step_of_limit;
+  return corner > 0 ? std::min(step_of_limit, share * kContactAngle / corner) : step_of_limit;
 }
 
 void System::set_step(double h) {

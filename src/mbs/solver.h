@@ -91,6 +91,9 @@ struct Options {
   double duration = 1;  // [s]
   double step = 0;      // 0: step_safety times the limit of the stiffest mode
   double step_safety = 0.85;
+  double step_share = 1;  // of the engine's own step, for studies of convergence; without effect on a set step
+  /// Every zone is asked by its full law at each step, none in lanes: slow, to check what lanes make of them.
+  bool full_law = false;
   /// Steps from one look for touching points to the next; between them the points move with their bodies. 0: 2 where a
   /// contact swings slowly enough and the step is the engine's own, else 1.
   int contact_interval = 0;

@@ -91,6 +91,8 @@ struct PlanMapping::Impl {
     o.after = options.after, o.frame_rate = options.frame_rate, o.lanes = options.lanes;
     if (options.condensed) o.condensation = &condensation, o.known = &known;
     o.condense.highest_frequency = options.highest_frequency;
+    if (!options.passes_quiet) o.pass_speed = 0;
+    o.step_share = options.step_share, o.full_law = options.full_law;
     return o;
   }
   Result to_result(const collapse::SampleRun&) const;

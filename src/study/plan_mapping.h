@@ -24,6 +24,9 @@ struct PlanMappingOptions {
   double highest_frequency = 2000;              // of condensed models [rad/s]
   bool lanes = false;  // samples of one build in the lanes of one batch; slower than one by one (docs/plan-mapping.md)
   int threads = 1;     // 0: all of the machine
+  double step_share = 1;     // of the engine's own step, for studies of convergence
+  bool passes_quiet = true;  // condensed runs go on at once to the next stage when nothing happens
+  bool full_law = false;     // no zone in lanes, to check them; slow
   /// Screening of ground vibration at each neighbour, where the plan has the site's law; not of condensed runs.
   bool vibration = true;
 };
