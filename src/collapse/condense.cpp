@@ -113,6 +113,7 @@ class Condenser {
 
   void condense() {
     find_keys();
+    find_offsets();
     condense_bodies();
     condense_elements();
     condense_joints();
@@ -139,6 +140,15 @@ class Condenser {
         note(body->second, kStump, at);
   }
 
+  /// How far each body's centre is beside the plane of its frame, into which it goes.
+  void find_offsets() {
+    offset_.assign(key_.size(), 0);
+    for (size_t i = 0; i < key_.size(); ++i)
+      if (frame_[i] >= 0)
+        offset_[i] = model_.bodies[i].X_WB.p.y - b_.plan.frame_offsets[static_cast<size_t>(frame_[i])];
+  }
+  double offset_of(mbs::BodyId id) const { return id == mbs::kGround ? 0 : offset_[static_cast<size_t>(id.index)]; }
+
   void condense_bodies() {
     std::map<Key, std::pair<double, Mat3>> sums;
     for (size_t i = 0; i < key_.size(); ++i) {
@@ -157,11 +167,13 @@ class Condenser {
       share_[i] = mass / body.mass;
       body.mass = mass;
       body.inertia = inertia;
-      body.X_WB.p.y += calc_shift(frame_[i]);
       merge_shapes(b_.assemblies[i], body);
+      for (mbs::Shape& s : body.shapes) s.X_BS.p.y += offset_[i];
+      body.X_WB.p.y += calc_shift(frame_[i]) - offset_[i];
       place[key_[i]] = static_cast<int>(bodies.size());
       bodies.push_back(std::move(body));
       entries.push_back(b_.map.bodies[i]);
+      for (record::BoxShape& s : entries.back().shapes) s.X_BS.p.y += offset_[i];
     }
     for (size_t i = 0; i < key_.size(); ++i) to_[i] = place.at(key_[i]);
     model_.bodies = std::move(bodies);
@@ -232,6 +244,7 @@ class Condenser {
       const double n = count(e.a, e.b);
       element_count_.push_back(n);
       const int f = frame_of(e.a), g = frame_of(e.b);
+      e.X_AF.p.y += offset_of(e.a), e.X_BM.p.y += offset_of(e.b);
       if (f < 0) e.X_AF.p.y += calc_slice_shift(g);
       if (f >= 0 && f != g) {
         // one marker moves along y to the other, as their slices did
@@ -260,6 +273,7 @@ class Condenser {
       mbs::Joint& j = model_.joints[i];
       const double n = count(j.parent, j.child);
       counts.push_back(n);
+      j.X_PF.p.y += offset_of(j.parent), j.X_CM.p.y += offset_of(j.child);
       if (j.parent == mbs::kGround) j.X_PF.p.y += calc_slice_shift(frame_of(j.child));
       j.parent = body_of(j.parent), j.child = body_of(j.child);
       j.tension_limit *= n, j.shear_limit *= n, j.moment_limit *= n;
@@ -285,10 +299,12 @@ class Condenser {
           a.law = law_of(a.law, a.rotational >= 0 ? rotational_count_[static_cast<size_t>(a.rotational)]
                                                   : element_count_[static_cast<size_t>(a.element.index)]);
         } else if (a.kind == mbs::Action::Kind::ReplaceBody) {
-          const double share = share_[static_cast<size_t>(a.body.index)];
+          const double share = share_[static_cast<size_t>(a.body.index)], moved = a.replacement.X_WB.p.y;
           a.replacement.mass *= share;
           for (int i = 0; i < 3; ++i)
             for (int j = 0; j < 3; ++j) a.replacement.inertia(i, j) *= share;
+          a.replacement.X_WB.p.y = 0;  // its centre stays in the plane, as the whole one's
+          for (mbs::Shape& s : a.replacement.shapes) s.X_BS.p.y += moved + offset_of(a.body);
           a.body = body_of(a.body);
         }
       }
@@ -301,6 +317,7 @@ class Condenser {
   std::vector<Key> key_;         // of each body before
   std::vector<int> frame_, to_;  // of each body before
   std::vector<double> share_;    // mass of each body's class over its own
+  std::vector<double> offset_;   // of each body before, along y from its frame [m]
   std::map<std::pair<int, double>, int> laws_;
   std::vector<mbs::ZoneLaw> scaled_;
   std::vector<double> element_count_, rotational_count_;

@@ -54,6 +54,15 @@ class Checker {
   void share(const Place& p, const char* key, double x, double low, double high) {
     if (!(x >= low && x <= high)) fail(p, key, fmt::format("must lie between {:g} and {:g}, is {:g}", low, high, x));
   }
+  /// Of a planar model: a joint off the plane of its body's centre would turn the body out of it.
+  void in_plane(const Place& p, const char* key, BodyId body, const Vec3& point) {
+    constexpr double most = 1e-6;  // [m]
+    if (body == kGround || body.index < 0 || static_cast<size_t>(body.index) >= m_.bodies.size()) return;
+    const double off = (to_matrix(m_.bodies[static_cast<size_t>(body.index)].X_WB.q) * point).y;
+    if (std::abs(off) > most)
+      fail(p, key,
+           fmt::format("lies {:g} m off the plane of the body's centre, in which a planar model's joints lie", off));
+  }
   void pose(const Place& p, const char* key, const Pose& X) {
     if (!is_finite(X.p)) fail(p, key, "is not finite");
     const double n = X.q.w * X.q.w + X.q.x * X.q.x + X.q.y * X.q.y + X.q.z * X.q.z;
@@ -288,6 +297,10 @@ void Checker::check_joints() {
       fail(p, "rotation_limit", "only revolute and cylindrical joints have an angle");
     if (j.moment_limit < kUnlimited && (j.kind == Kind::Spherical || j.kind == Kind::Distance))
       fail(p, "moment_limit", "this kind of joint holds no moment");
+    if (m_.is_planar) {
+      in_plane(p, "X_PF", j.parent, j.X_PF.p);
+      in_plane(p, "X_CM", j.child, j.X_CM.p);
+    }
   }
 }
 

@@ -495,8 +495,9 @@ void System::finish_forces(double h) {
   evaluate_dampers();
   if (model.is_planar)
     for (size_t b = 0; b < B; ++b) {
-      const Vec3 f = force[b];
+      const Vec3 f = force[b], t = torque[b];
       force[b] = Vec3{f.x, 0, f.z};
+      torque[b] = Vec3{0, t.y, 0};
     }
 }
 
