@@ -1,7 +1,8 @@
 /// How far condensed samples are from whole ones: the fuzzy storehouse at points of a Sobol sequence, as CSV.
-///   topple_condensed_bench [points=24] [seed=1] [frequency=2000] [step=1] [law=lanes|full] [pass=yes|no] [nudge=0]
-///                          [whole=yes|no]
-///   step   share of the engine's own step; pass  go over quiet times; nudge  share by which every value is moved
+///   topple_condensed_bench [points=24] [seed=1] [frequency=2000] [step=1] [law=cells|full] [lanes=no|yes]
+///                          [pass=yes|no] [nudge=0] [whole=yes|no]
+/// step: share of the engine's own; law: full for every zone at each step; lanes: one sample in each; pass: over quiet
+/// times; nudge: share by which every value is moved.
 /// The same seed gives the same points. Seeds 1 to 9 were used while the condensation was made, 11 and above only to
 /// measure it (docs/decisions/0034-condensed-samples.md).
 
@@ -97,6 +98,8 @@ int main(int argc, char** argv) {
       settings.mapping.step_share = std::atof(value.c_str());
     } else if (name == "law") {
       settings.mapping.full_law = value == "full";
+    } else if (name == "lanes") {
+      settings.mapping.lanes = value == "yes";
     } else if (name == "pass") {
       settings.mapping.passes_quiet = value != "no";
     } else if (name == "nudge") {
@@ -104,7 +107,7 @@ int main(int argc, char** argv) {
     } else if (name == "whole") {
       settings.with_whole = value != "no";
     } else {
-      fmt::print(stderr, "{}: not one of points, seed, frequency, step, law, pass, nudge, whole\n", word);
+      fmt::print(stderr, "{}: not one of points, seed, frequency, step, law, lanes, pass, nudge, whole\n", word);
       return 2;
     }
   }
