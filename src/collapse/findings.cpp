@@ -129,7 +129,7 @@ bool add_stability(const Context& c) {
 
 Reach add_debris(const Context& c, const Mechanism& m) {
   const size_t last = c.r.time.size() - 1;
-  const Reach reach = calc_reach(c.r, last);
+  Reach reach = calc_reach(c.r, last);
   if (std::isnan(m.azimuth)) {
     c.add("azimuth", "Fall and debris", "Direction of fall",
           "The mass centre moved by less than half a metre to any side.", kNone, "rad");

@@ -458,7 +458,7 @@ record::Record run_plan(const product::Plan& plan, const collapse::Knowledge& k,
                            model = m;
                            map = described;
                            course = std::make_unique<Course>(plan, k, fe, fe_callbacks, run, model, map, options);
-                           const mbs::Summary s = course->run();
+                           mbs::Summary s = course->run();
                            course->finish();
                            return s;
                          });

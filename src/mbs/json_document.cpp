@@ -342,7 +342,7 @@ bool JsonNode::flag() const {
 
 std::string JsonNode::text() const {
   if (!json_->is_string()) fail("must be a string");
-  const std::string x = json_->get<std::string>();
+  std::string x = json_->get<std::string>();
   for (const char c : x)
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) fail("holds a control character");
   return x;

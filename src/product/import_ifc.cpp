@@ -280,7 +280,7 @@ class Planner {
   }
 
   std::string concrete_key(const std::string& name) {
-    const std::string key = key_of(name);
+    std::string key = key_of(name);
     concretes_[key] = name;
     return key;
   }
