@@ -1,6 +1,7 @@
 /// Many boxes as one mesh whose corners are computed here: software renderers draw each instance of an instanced mesh as
 /// a mesh of its own, which costs more than the box, and so does a vertex shader that looks its box up.
 import * as THREE from "three";
+import { toScreen } from "./colour";
 import type { Triple } from "./data";
 
 const sun = new THREE.Vector3(-0.5, -1, 1.3).normalize();
@@ -74,7 +75,7 @@ function makeMaterial(many: boolean): THREE.MeshBasicMaterial {
         vec2 pixels = min(vFace, 1.0 - vFace) / perPixel;
         float width = 1.0 / max(perPixel.x, perPixel.y);
         float line = (1.0 - smoothstep(0.5, 1.3, min(pixels.x, pixels.y))) * clamp((width - 2.0) / 6.0, 0.0, 1.0);
-        diffuseColor.rgb *= 1.0 - 0.6 * line;`;
+        diffuseColor.rgb *= 1.0 - 0.34 * line;`;
   material.customProgramCacheKey = () => (many ? "lean boxes" : "boxes with edges");
   material.onBeforeCompile = (shader) => {
     shader.vertexShader = shader.vertexShader
@@ -122,7 +123,7 @@ export class Boxes {
     const position = this.mesh.geometry.getAttribute("position"), tint = this.mesh.geometry.getAttribute("tint");
     const p = position.array as Float32Array, t = tint.array as Uint16Array;
     const v = this.values, colours = this.colours;
-    const place = new Float64Array(24), light = new Float64Array(6);
+    const place = new Float64Array(24), shade = new Uint16Array(18);
     for (let box = 0; box < this.count; ++box) {
       const at = perBox * box;
       for (let k = 0; k < 8; ++k) {
@@ -137,18 +138,19 @@ export class Boxes {
         const x = v[at + axis] as number, y = v[at + 4 + axis] as number, z = v[at + 8 + axis] as number;
         const length = Math.sqrt(x * x + y * y + z * z) || 1;
         const lit = (x * sun.x + y * sun.y + z * sun.z) / length, up = z / length;
-        for (const sign of [1, -1])
-          light[2 * axis + (sign > 0 ? 0 : 1)] = 65535 * 0.605 * (0.685 + 0.315 * sign * up + Math.max(0, sign * lit));
+        for (let side = 0; side < 2; ++side) {
+          const sign = 1 - 2 * side, light = 0.605 * (0.685 + 0.315 * sign * up + Math.max(0, sign * lit));
+          for (let c = 0; c < 3; ++c) shade[6 * axis + 3 * side + c] = toScreen((colours[3 * box + c] as number) * light);
+        }
       }
-      const red = colours[3 * box] as number, green = colours[3 * box + 1] as number, blue = colours[3 * box + 2] as number;
       for (let k = 0, to = n * box; k < n; ++k, ++to) {
-        const from = 3 * (corner[k] as number), l = light[face[k] as number] as number;
+        const from = 3 * (corner[k] as number), f = 3 * (face[k] as number);
         p[3 * to] = place[from] as number;
         p[3 * to + 1] = place[from + 1] as number;
         p[3 * to + 2] = place[from + 2] as number;
-        t[4 * to] = Math.min(65535, red * l);
-        t[4 * to + 1] = Math.min(65535, green * l);
-        t[4 * to + 2] = Math.min(65535, blue * l);
+        t[4 * to] = shade[f] as number;
+        t[4 * to + 1] = shade[f + 1] as number;
+        t[4 * to + 2] = shade[f + 2] as number;
       }
     }
     position.needsUpdate = true;

@@ -1,6 +1,7 @@
 /// The bodies of one run in a picture, at one time: boxes, signs of their zones, the chosen one.
 import * as THREE from "three";
 import { Boxes } from "./boxes";
+import { linear } from "./colour";
 import type { Frame, Quadruple, Run, Triple } from "./data";
 import { calcPose, findFrame } from "./data";
 import type { Theme } from "./site";
@@ -37,10 +38,6 @@ function mergeGeometries(parts: THREE.BufferGeometry[]): THREE.BufferGeometry {
 }
 
 const rampSteps = 64;
-const linear = (css: string): [number, number, number] => {
-  const c = new THREE.Color(css);
-  return [c.r, c.g, c.b];
-};
 const ramp = Array.from({ length: rampSteps + 1 }, (_, i) => linear(colourOfUtilisation(i / rampSteps)));
 const rampAt = (s: number): [number, number, number] => ramp[Math.round(rampSteps * Math.min(1, Math.max(0, s || 0)))] as [number, number, number];
 const ofState = zoneStates.map((s, i) => linear(i === 0 ? "#dde2e6" : s.colour));

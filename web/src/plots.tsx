@@ -87,7 +87,7 @@ export function PlotPanel(props: { state: State; group: Group; onSeek?: (time: n
         padding: [10, 12, 0, 0],
         legend: { show: false },
         cursor: { drag: { x: false, y: false }, y: false, points: { size: 6 } },
-        scales: { x: { time: false }, y: { range: (_, low, high) => niceRange(low, high) } },
+        scales: { x: { time: false, range: (_, low, high) => (low === null ? [0, 1] : high > low ? [low, high] : [low, low + (state.limit.value || 1)]) }, y: { range: (_, low, high) => niceRange(low, high) } },
         axes: [axis("time [s]", true), axis(group.unit === "" ? "" : `[${group.unit}]`, false)],
         series: [
           {},
@@ -192,7 +192,7 @@ export function niceRange(low: number | null, high: number | null): [number, num
 
 function PlotLegend(props: { state: State; group: Group; values: (number | null)[][] }) {
   const { state, group, values } = props;
-  const frame = state.frame.value;
+  const frame = Math.min(state.frameSlowly.value, (values[0]?.length ?? 0) - 1); // frames may have come since
   return (
     <ul class="plot-legend">
       {group.series.map((s, i) => (

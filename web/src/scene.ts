@@ -125,7 +125,7 @@ export class Scene implements SceneLike {
   }
 
   render(): void {
-    this.site.placeLabels(this.stage.camera, this.stage.width, this.stage.middle);
+    this.site.placeLabels(this.stage.camera, this.stage.shownWidth, this.stage.middle);
     this.stage.render();
   }
 

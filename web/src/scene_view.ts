@@ -1,5 +1,6 @@
 /// A canvas with a scene in it: made once, drawn only on change, following size and theme, disposed of at the end.
 import { useEffect, useRef, useState } from "preact/hooks";
+import { drawNext } from "./schedule";
 
 export interface SceneLike {
   /// Called by the scene when a picture is due.
@@ -25,13 +26,10 @@ export interface SceneView<S extends SceneLike> {
 /// Draws the scene when it asks for it, at most once a frame of the screen, and follows the size of `frame` and the
 /// theme. Returns what ends all that.
 export function attachScene(scene: SceneLike, frame: HTMLElement): () => void {
-  let due = 0;
+  const render = (): void => scene.render();
+  let takeBack = (): void => undefined;
   scene.onChange = () => {
-    if (due !== 0) return;
-    due = requestAnimationFrame(() => {
-      due = 0;
-      scene.render();
-    });
+    takeBack = drawNext(render);
   };
   const dark = darkQuery();
   const useTheme = (): void => scene.setDark(dark.matches);
@@ -45,7 +43,7 @@ export function attachScene(scene: SceneLike, frame: HTMLElement): () => void {
     observer.disconnect();
     dark.removeEventListener("change", useTheme);
     scene.onChange = () => undefined;
-    cancelAnimationFrame(due);
+    takeBack();
     scene.dispose();
   };
 }

@@ -72,7 +72,6 @@ function makeLabel(text: string): THREE.Sprite {
   context.textBaseline = "middle";
   context.fillText(shown, 12, 21);
   const texture = new THREE.CanvasTexture(canvas);
-  texture.colorSpace = THREE.SRGBColorSpace;
   texture.minFilter = THREE.LinearFilter;
   texture.generateMipmaps = false;
   const material = new THREE.SpriteMaterial({ map: texture, sizeAttenuation: false, depthTest: false, transparent: true });

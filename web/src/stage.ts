@@ -1,7 +1,9 @@
 /// Camera, light and canvas: what every picture needs whatever stands in it. Draws only when asked to.
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { screenSpace } from "./colour";
 import type { Triple } from "./data";
+import { askedAt } from "./schedule";
 import type { SceneLike } from "./scene_view";
 import { darkTheme, lightTheme, type Theme } from "./site";
 
@@ -23,15 +25,21 @@ export interface StageOptions {
   adaptive: boolean;
 }
 
-const slowest = 33; // between two pictures in motion [ms]
+const wanted = 1000 / 60; // between two pictures in motion [ms]
+const slow = 1.15 * wanted, quick = 1.04 * wanted; // fewer pixels above the one, more below the other
 const leastRatio = 0.5; // fewer pixels than that and members cannot be told apart
 const restAfter = 220; // and at least three pictures [ms]
+const idle = 10; // a picture asked for that long after the last one was not kept waiting by it [ms]
+const settled = 6; // pictures after a change until their rate is known
+const firstWait = 1500, longestWait = 48000; // until more pixels are tried again [ms]
 
 export class Stage implements SceneLike {
   onChange: () => void = () => undefined;
   /// Told of a new size, theme or point of view.
   onTheme: (theme: Theme, dark: boolean) => void = () => undefined;
   onView: () => void = () => undefined;
+  /// Told the share of the screen's pixels along an edge that the picture in motion has.
+  onSharpness: (share: number) => void = () => undefined;
   readonly renderer: THREE.WebGLRenderer;
   readonly scene = new THREE.Scene();
   readonly camera = new THREE.PerspectiveCamera(fov, 1, 0.1, 1000);
@@ -42,7 +50,7 @@ export class Stage implements SceneLike {
   private readonly fullRatio: number;
   private ratio: number;
   private lastRender = -Infinity;
-  private meanInterval = 16;
+  private meanInterval = wanted;
   private restTimer: ReturnType<typeof setTimeout> | undefined;
   /// What a fitted picture must show.
   private fitPoints: readonly THREE.Vector3[] = [];
@@ -51,7 +59,11 @@ export class Stage implements SceneLike {
 
   /// Throws if the browser offers no WebGL.
   constructor(canvas: HTMLCanvasElement, private readonly options: StageOptions) {
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: options.antialias, powerPreference: "high-performance" });
+    // without alpha the page need not be mixed in below the picture
+    const context = canvas.getContext("webgl2", { alpha: false, antialias: options.antialias, powerPreference: "high-performance" });
+    if (context === null) throw new Error("This browser offers no WebGL 2.");
+    this.renderer = new THREE.WebGLRenderer({ canvas, context });
+    this.renderer.outputColorSpace = screenSpace;
     this.fullRatio = Math.min(devicePixelRatio, 2);
     this.ratio = this.fullRatio;
     this.renderer.setPixelRatio(this.ratio);
@@ -82,9 +94,15 @@ export class Stage implements SceneLike {
   }
 
   useAspect(width: number, height: number): void {
-    this.camera.aspect = (this.pair === undefined ? width : width / 2) / height;
+    this.camera.aspect = this.shareOf(width) / height;
     this.camera.updateProjectionMatrix();
     this.onView();
+  }
+
+  /// Of one picture: two beside each other have half the canvas each.
+  private readonly shareOf = (width: number): number => (this.pair === undefined ? width : width / 2);
+  get shownWidth(): number {
+    return this.shareOf(this.width);
   }
 
   setFitPoints(points: readonly THREE.Vector3[]): void {
@@ -168,6 +186,7 @@ export class Stage implements SceneLike {
   render(): void {
     if (this.options.adaptive && !this.held) this.adapt();
     this.draw();
+    this.lastDone = performance.now();
   }
 
   draw(): void {
@@ -194,11 +213,19 @@ export class Stage implements SceneLike {
     const now = performance.now();
     const interval = now - this.lastRender;
     this.lastRender = now;
-    // A picture that comes a second later begins another motion.
-    if (interval < 1000) this.meanInterval += 0.25 * (interval - this.meanInterval);
-    if (this.meanInterval > slowest && this.ratio > leastRatio)
-      this.setRatio(Math.max(leastRatio, this.ratio * Math.max(0.5, Math.sqrt(slowest / this.meanInterval))));
-    else if (this.meanInterval < 0.55 * slowest && this.ratio < this.fullRatio) this.setRatio(Math.min(this.fullRatio, 1.1 * this.ratio));
+    // A picture that comes a second later begins another motion; one that was asked for late shows nothing of how fast
+    // pictures can follow each other.
+    if (interval < 1000) this.meanInterval += 0.2 * ((askedAt() - this.lastDone < idle ? interval : Math.min(interval, wanted)) - this.meanInterval);
+    ++this.since;
+    if (this.meanInterval > slow && this.ratio > leastRatio && this.since >= settled) {
+      // More pixels were too many: the next try comes later.
+      if (now - this.triedAt < 1000) this.wait = Math.min(longestWait, 2 * this.wait);
+      this.nextTry = now + this.wait;
+      this.useRatio(Math.max(leastRatio, this.ratio * Math.max(0.6, Math.sqrt(wanted / this.meanInterval))));
+    } else if (this.meanInterval < quick && this.ratio < this.fullRatio && now > this.nextTry && this.since >= 2 * settled) {
+      this.triedAt = now;
+      this.useRatio(Math.min(this.fullRatio, 1.2 * this.ratio));
+    }
     clearTimeout(this.restTimer);
     if (this.ratio < this.fullRatio)
       this.restTimer = setTimeout(() => {
@@ -208,12 +235,23 @@ export class Stage implements SceneLike {
         this.draw();
         this.ratio = ratio;
         this.atRest = true;
+        this.onSharpness(1);
       }, Math.max(restAfter, 3 * this.meanInterval));
     if (this.atRest) {
       this.atRest = false;
       this.setRatio(this.ratio);
     }
+    this.onSharpness(this.ratio / this.fullRatio);
   }
+  private useRatio(ratio: number): void {
+    this.since = 0;
+    this.setRatio(ratio);
+  }
+  private lastDone = 0;
+  private since = 0; // pictures since the ratio changed
+  private triedAt = -Infinity; // when more pixels were tried
+  private nextTry = 0;
+  private wait = firstWait;
   private atRest = false;
 
   private setRatio(ratio: number): void {

@@ -1,7 +1,8 @@
 /// What the viewer looks at. The run itself never changes.
-import { computed, signal } from "@preact/signals";
+import { computed, signal, type ReadonlySignal } from "@preact/signals";
 import type { Run } from "./data";
 import { findFrame } from "./data";
+import { changeNext } from "./schedule";
 import { wordsOfEvent } from "./vocabulary";
 
 export type Colouring = "kind" | "material" | "state" | "utilisation" | "speed";
@@ -22,6 +23,21 @@ export function makeLook() {
 }
 export type Look = ReturnType<typeof makeLook>;
 
+/// Follows another signal, `wait` [ms] behind it at most.
+function followSlowly(from: ReadonlySignal<number>, wait: number): ReadonlySignal<number> {
+  const slow = signal(from.peek());
+  let waiting = false;
+  from.subscribe((value) => {
+    if (waiting || value === slow.peek()) return;
+    waiting = true;
+    setTimeout(() => {
+      waiting = false;
+      slow.value = from.peek();
+    }, wait);
+  });
+  return slow;
+}
+
 /// `begin` is where the time axis begins, also where frames before the first one are still to come.
 export function makeState(run: Run, look: Look = makeLook(), begin = run.time[0] ?? 0) {
   /// Rises when frames, events or series have been added to the run.
@@ -31,20 +47,13 @@ export function makeState(run: Run, look: Look = makeLook(), begin = run.time[0]
   const limit = signal(0);
   const span = computed(() => Math.max(limit.value, end.value));
   /// Follows `grown` at most four times a second, for what is slow to draw.
-  const grownSlowly = signal(0);
-  let waiting = false;
-  grown.subscribe((value) => {
-    if (waiting || value === grownSlowly.peek()) return;
-    waiting = true;
-    setTimeout(() => {
-      waiting = false;
-      grownSlowly.value = grown.peek();
-    }, 250);
-  });
+  const grownSlowly = followSlowly(grown, 250);
   const time = signal(begin);
   const playing = signal(false);
   const hiddenKinds = signal<ReadonlySet<string>>(chooseHiddenKinds(run));
   const frame = computed(() => (grown.value, findFrame(run.time, time.value).frame));
+  /// Follows `frame` at most ten times a second, for numbers to be read.
+  const frameSlowly = followSlowly(frame, 100);
   const inOrder = computed(() => (grownSlowly.value, [...run.events].sort((a, b) => a.time - b.time)));
   const shownEvents = computed(() => inOrder.value.filter((e) => !hiddenKinds.value.has(e.kind)));
 
@@ -62,6 +71,7 @@ export function makeState(run: Run, look: Look = makeLook(), begin = run.time[0]
     end,
     time,
     frame,
+    frameSlowly,
     grown,
     grownSlowly,
     limit,
@@ -127,12 +137,12 @@ export function runClock(state: State): void {
       state.seek(state.time.value + Math.min(passed, 0.5) * state.speed.value);
       if (state.time.value >= state.end.value) state.playing.value = false;
     }
-    requestAnimationFrame(tick);
+    changeNext(tick);
   };
   state.playing.subscribe((playing) => {
     if (!playing || running) return;
     running = true;
     last = performance.now();
-    requestAnimationFrame(tick);
+    changeNext(tick);
   });
 }

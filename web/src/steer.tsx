@@ -305,7 +305,7 @@ function start(): void {
   const address = new URL("ws", location.href);
   address.protocol = location.protocol === "https:" ? "wss:" : "ws:";
   const s = makeSteerState(address.href);
-  Object.assign(globalThis, { topple: s }); // for tests and for those who look into the page
+  Object.assign(globalThis, { topple: s, toppleView: picture }); // for tests and for those who look into the page
   listenToKeys(s);
   root.textContent = "";
   render(<Page s={s} />, root);

@@ -6,6 +6,7 @@ import { BranchRun } from "./steer_branch";
 import { CommandError, Connection, type ErrorObject, type Message } from "./steer_connection";
 import { decodeFrame } from "./steer_wire";
 import type { Branch, Comparison, FindingsSoFar, ImportedPlan, LogEntry, PlanCheck, Sample, Session, StateEvent, Study, ZoneWatch } from "./steer_wire";
+import { changeNext } from "./schedule";
 import { makeLook } from "./state";
 import { formatTime } from "./units";
 
@@ -248,6 +249,7 @@ export function makeSteerState(address: string) {
 
   /// Shows the branch that the server made active.
   async function show(id: number): Promise<void> {
+    if (active.value === id && view.value?.id === id) return;
     active.value = id;
     let run = runs.get(id) ?? partFromParent(id);
     if (run === undefined) {
@@ -267,7 +269,8 @@ export function makeSteerState(address: string) {
     useRun(run);
     if (!following.value) run.state.seek(time);
     if (zone.value !== null) void watchZone(zone.value.zone);
-    void readFindings();
+    // the solver judges between its steps: first the picture of the branch
+    setTimeout(() => void readFindings(), phase.value === "running" ? 500 : 0);
     fill();
   }
 
@@ -315,21 +318,18 @@ export function makeSteerState(address: string) {
   const renewing = new Set<number>();
 
   // Frames come faster than pictures: what came is shown once per picture.
-  let due = false;
+  const showWhatCame = (): void => {
+    for (const run of runs.values()) run.flush();
+    const run = view.peek();
+    if (run === null) return;
+    if (following.peek()) run.state.seek(run.last);
+    else if (wanted !== undefined && run.last >= wanted) {
+      run.state.seek(wanted);
+      wanted = undefined;
+    }
+  };
   effect(() => {
-    if (draws.value === 0 || due) return;
-    due = true;
-    requestAnimationFrame(() => {
-      due = false;
-      for (const run of runs.values()) run.flush();
-      const run = view.peek();
-      if (run === null) return;
-      if (following.peek()) run.state.seek(run.last);
-      else if (wanted !== undefined && run.last >= wanted) {
-        run.state.seek(wanted);
-        wanted = undefined;
-      }
-    });
+    if (draws.value > 0) changeNext(showWhatCame);
   });
   // Playback that arrives at the end of what there is goes on with the run.
   effect(() => {
@@ -368,9 +368,10 @@ export function makeSteerState(address: string) {
       });
   }
   setInterval(fill, 1000);
-  // The verdict so far, while there is news.
+  // The verdict so far, while there is news. The solver waits meanwhile: at most a twentieth of the time goes into it.
+  let judgedAt = 0, judging = 0; // [ms]
   setInterval(() => {
-    if (phase.value === "running" && connection.status.value === "open") void readFindings();
+    if (phase.value === "running" && connection.status.value === "open" && performance.now() - judgedAt > 20 * judging) void readFindings();
   }, 3000);
 
   let reading = false;
@@ -378,8 +379,11 @@ export function makeSteerState(address: string) {
     const id = active.value;
     if (reading || id === 0) return;
     reading = true;
+    const begin = performance.now();
     const result = await connection.command<FindingsSoFar>("findings", { branch: id }).catch(() => undefined);
     reading = false;
+    judgedAt = performance.now();
+    judging = judgedAt - begin;
     if (active.value !== id) return readFindings();
     if (result === undefined || active.value !== id) return;
     findings.value = result;

@@ -3,14 +3,13 @@ import { effect, signal } from "@preact/signals";
 import { useRef, useState } from "preact/hooks";
 import * as THREE from "three";
 import type { Triple } from "./data";
-import { NoWebGl } from "./no_webgl";
 import { Scene, ghostColour, type View } from "./scene";
+import { LookChoices, SceneCanvas } from "./scene_canvas";
 import { useSceneView } from "./scene_view";
 import { DebrisLayer, EventLayer, contourColours, contourLevels } from "./steer_layers";
 import type { SteerState } from "./steer_state";
 import type { BranchRun } from "./steer_branch";
-import type { Colouring, ZoneMarks } from "./state";
-import { Legend, MemberSearch, colourings } from "./view3d";
+import { Legend, MemberSearch } from "./view3d";
 
 export type CompareView = "off" | "beside" | "over";
 export const compareView = signal<CompareView>("off");
@@ -80,9 +79,9 @@ function SectionPanel(props: { s: SteerState }) {
 export function SteerView(props: { s: SteerState; onReady: () => void }) {
   const { s } = props;
   const [gridStep, setGridStep] = useState(0);
-  const [hover, setHover] = useState<{ x: number; y: number; name: string }>();
+  const [sharpness, setSharpness] = useState(1);
   const cubeRef = useRef<HTMLDivElement>(null);
-  const { frameRef, canvasRef, sceneRef, problem } = useSceneView(
+  const sceneView = useSceneView(
     (canvas) => new Scene(canvas, (s.view.peek() as BranchRun).run, { antialias: false, adaptive: true }),
     (scene) => {
       picture.scene = scene;
@@ -96,6 +95,7 @@ export function SteerView(props: { s: SteerState; onReady: () => void }) {
         scene.stage.camera.updateMatrixWorld();
         if (cubeRef.current !== null) turnCube(cubeRef.current, scene.stage.camera);
       };
+      scene.stage.onSharpness = (share) => setSharpness(Math.round(10 * share) / 10);
       let shown = s.view.peek() as BranchRun;
       let debrisDue: ReturnType<typeof setTimeout> | undefined;
       let debrisCost = 0; // [ms]; at most a tenth of the time goes into it
@@ -168,20 +168,8 @@ export function SteerView(props: { s: SteerState; onReady: () => void }) {
     props.onReady,
   );
 
+  const { sceneRef, problem } = sceneView;
   const view = s.view.value;
-  // A click picks; a drag turns the view.
-  const pressed = useRef<[number, number]>([0, 0]);
-  const pickAt = (event: PointerEvent): number => sceneRef.current?.pick(event.offsetX, event.offsetY) ?? -1;
-  const onPointerUp = (event: PointerEvent): void => {
-    const [x, y] = pressed.current;
-    if (event.button === 0 && Math.hypot(event.clientX - x, event.clientY - y) < 4) s.selected.value = pickAt(event);
-  };
-  const onPointerMove = (event: PointerEvent): void => {
-    const moving = s.phase.value === "running" && s.following.value;
-    const name = event.buttons !== 0 || event.pointerType === "touch" || moving ? undefined : view?.run.bodies[pickAt(event)]?.name;
-    if (name !== undefined) setHover({ x: event.offsetX, y: event.offsetY, name });
-    else if (hover !== undefined) setHover(undefined);
-  };
   const mode = compareView.value;
   const c = s.comparison.value;
   const nameOf = (id: number): string => s.branches.value.find((b) => b.id === id)?.name ?? "";
@@ -189,22 +177,7 @@ export function SteerView(props: { s: SteerState; onReady: () => void }) {
   return (
     <section class="view" aria-label="The building">
       <div class="toolbar">
-        <label>
-          Colour by{" "}
-          <select data-test="colouring" value={s.colouring.value} onChange={(e) => (s.colouring.value = e.currentTarget.value as Colouring)}>
-            {colourings.map(([value, word]) => (
-              <option value={value}>{word}</option>
-            ))}
-          </select>
-        </label>
-        <label>
-          Zones{" "}
-          <select value={s.zoneMarks.value} onChange={(e) => (s.zoneMarks.value = e.currentTarget.value as ZoneMarks)}>
-            <option value="damaged">damaged</option>
-            <option value="all">all</option>
-            <option value="none">none</option>
-          </select>
-        </label>
+        <LookChoices look={s} damaged="damaged" />
         {view !== null && <MemberSearch state={view.state} />}
         <span class="spring" />
         <label class="check" title="Outline and heights of what has fallen">
@@ -215,23 +188,14 @@ export function SteerView(props: { s: SteerState; onReady: () => void }) {
         </button>
         <button type="button" title="Fit to the window (F)" onClick={() => picture.fit()}>Fit</button>
       </div>
-      <div class="canvas-frame" ref={frameRef}>
-        <canvas
-          ref={canvasRef}
-          data-test="canvas"
-          tabIndex={0}
-          role="img"
-          aria-label="The building at the time of the view. Arrow keys step in time; the view cube turns it."
-          hidden={problem !== ""}
-          onPointerDown={(e) => {
-            pressed.current = [e.clientX, e.clientY];
-            setHover(undefined);
-          }}
-          onPointerUp={onPointerUp}
-          onPointerMove={onPointerMove}
-          onPointerLeave={() => setHover(undefined)}
-        />
-        {problem !== "" && <NoWebGl problem={problem} />}
+      <SceneCanvas
+        view={sceneView}
+        label="The building at the time of the view. Arrow keys step in time; the view cube turns it."
+        focusable
+        run={view?.run}
+        selected={s.selected}
+        isMoving={() => s.phase.value === "running" && s.following.value}
+      >
         {problem === "" && <ViewCube cubeRef={cubeRef} onFace={(face) => sceneRef.current?.fit(face)} />}
         <SectionPanel s={s} />
         {c !== null && mode === "beside" && view !== null && (
@@ -245,8 +209,8 @@ export function SteerView(props: { s: SteerState; onReady: () => void }) {
             {nameOf(view.id)}, over it <i class="swatch" style={{ background: ghostColour }} /> {nameOf(view.id === c.a ? c.b : c.a)}
           </span>
         )}
-        {hover !== undefined && <span class="hover-name" style={{ left: `${hover.x + 12}px`, top: `${hover.y + 12}px` }}>{hover.name}</span>}
-      </div>
+        {sharpness < 1 && <span class="sharpness" data-test="sharpness" title="So that pictures follow each other faster; at rest the picture has all its pixels">{Math.round(100 * sharpness)} % of the sharpness while it moves</span>}
+      </SceneCanvas>
       {problem === "" && view !== null && (
         <div class="legend-line">
           <Legend state={view.state} gridStep={gridStep} />

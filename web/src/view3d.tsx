@@ -1,10 +1,10 @@
 import { effect } from "@preact/signals";
-import { useMemo, useRef, useState } from "preact/hooks";
-import { NoWebGl } from "./no_webgl";
+import { useMemo, useState } from "preact/hooks";
 import { Scene, type View } from "./scene";
+import { LookChoices, SceneCanvas } from "./scene_canvas";
 import { useSceneView } from "./scene_view";
 import { ZoneSign } from "./signs";
-import type { Colouring, State, ZoneMarks } from "./state";
+import type { State } from "./state";
 import { colourOfKind, colourOfMaterial, highestSpeed, rampCss, wordOfKind, zoneStates } from "./vocabulary";
 import { findMaterials, findParts } from "./zones";
 
@@ -13,14 +13,6 @@ const views: [View, string, string][] = [
   ["side", "Side", "Along y"],
   ["front", "Front", "Along x"],
   ["top", "Top", "From above"],
-];
-
-export const colourings: [Colouring, string][] = [
-  ["kind", "kind of member"],
-  ["material", "material"],
-  ["state", "state of its zones"],
-  ["utilisation", "utilisation"],
-  ["speed", "speed"],
 ];
 
 export function Legend(props: { state: State; gridStep: number }) {
@@ -96,8 +88,7 @@ export function Legend(props: { state: State; gridStep: number }) {
 export function View3D(props: { state: State; onReady: (scene: Scene | undefined) => void; fitRef: { current: () => void } }) {
   const { state } = props;
   const [gridStep, setGridStep] = useState(0);
-  const [hover, setHover] = useState<{ x: number; y: number; name: string }>();
-  const { frameRef, canvasRef, sceneRef, problem } = useSceneView(
+  const view = useSceneView(
     (canvas) => new Scene(canvas, state.run),
     (scene) => {
       setGridStep(scene.gridStep);
@@ -113,52 +104,17 @@ export function View3D(props: { state: State; onReady: (scene: Scene | undefined
     () => props.onReady(undefined),
   );
 
-  // A click picks; a drag turns the view.
-  const pressed = useRef<[number, number]>([0, 0]);
-  const pickAt = (event: PointerEvent): number => sceneRef.current?.pick(event.offsetX, event.offsetY) ?? -1;
-  const onPointerUp = (event: PointerEvent): void => {
-    const [x, y] = pressed.current;
-    if (event.button === 0 && Math.hypot(event.clientX - x, event.clientY - y) < 4) state.selected.value = pickAt(event);
-  };
-  const onPointerMove = (event: PointerEvent): void => {
-    if (event.buttons !== 0 || event.pointerType === "touch" || state.playing.value) {
-      if (hover !== undefined) setHover(undefined);
-      return;
-    }
-    const name = state.run.bodies[pickAt(event)]?.name;
-    if (name !== undefined) setHover({ x: event.offsetX, y: event.offsetY, name });
-    else if (hover !== undefined) setHover(undefined);
-  };
-
+  const { sceneRef, problem } = view;
   const empty = state.run.time.length === 0 || state.run.bodies.length === 0;
   return (
     <section class="panel view" aria-label="Playback in three dimensions">
       <div class="toolbar">
-        <label>
-          Colour by{" "}
-          <select
-            data-test="colouring"
-            value={state.colouring.value}
-            onChange={(e) => (state.colouring.value = e.currentTarget.value as Colouring)}
-          >
-            {colourings.map(([value, word]) => (
-              <option value={value}>{word}</option>
-            ))}
-          </select>
-        </label>
-        <label>
-          Zones{" "}
-          <select value={state.zoneMarks.value} onChange={(e) => (state.zoneMarks.value = e.currentTarget.value as ZoneMarks)}>
-            <option value="damaged">damaged, new breaks</option>
-            <option value="all">all</option>
-            <option value="none">none</option>
-          </select>
-        </label>
+        <LookChoices look={state} />
         <MemberSearch state={state} />
         <span class="spring" />
         <span class="button-group" role="group" aria-label="Point of view">
-          {views.map(([view, word, title]) => (
-            <button type="button" title={title} onClick={() => sceneRef.current?.fit(view)}>
+          {views.map(([side, word, title]) => (
+            <button type="button" title={title} onClick={() => sceneRef.current?.fit(side)}>
               {word}
             </button>
           ))}
@@ -167,29 +123,9 @@ export function View3D(props: { state: State; onReady: (scene: Scene | undefined
           </button>
         </span>
       </div>
-      <div class="canvas-frame" ref={frameRef}>
-        <canvas
-          ref={canvasRef}
-          data-test="canvas"
-          role="img"
-          aria-label="The building at the time of the cursor"
-          hidden={problem !== ""}
-          onPointerDown={(e) => {
-            pressed.current = [e.clientX, e.clientY];
-            setHover(undefined);
-          }}
-          onPointerUp={onPointerUp}
-          onPointerMove={onPointerMove}
-          onPointerLeave={() => setHover(undefined)}
-        />
-        {problem !== "" && (
-          <NoWebGl problem={problem} />
-        )}
+      <SceneCanvas view={view} label="The building at the time of the cursor" run={state.run} selected={state.selected} isMoving={() => state.playing.value}>
         {problem === "" && empty && <p class="canvas-note">The record holds no frames: there is nothing to play.</p>}
-        {hover !== undefined && (
-          <span class="hover-name" style={{ left: `${hover.x + 12}px`, top: `${hover.y + 12}px` }}>{hover.name}</span>
-        )}
-      </div>
+      </SceneCanvas>
       {problem === "" && <Legend state={state} gridStep={gridStep} />}
     </section>
   );

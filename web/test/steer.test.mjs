@@ -178,6 +178,25 @@ describe("steering page", () => {
     await page.keyboard.press("f");
   });
 
+  it("takes fewer pixels while pictures come slowly, says so, and all of them at rest", async () => {
+    const widths = () => page.evaluate(() => {
+      const canvas = document.querySelector("[data-test=canvas]");
+      return canvas.width / (canvas.clientWidth * devicePixelRatio);
+    });
+    await page.evaluate(async () => {
+      const { stage } = globalThis.toppleView.scene;
+      for (let k = 0; k < 30; ++k) {
+        await new Promise((done) => requestAnimationFrame(done));
+        stage.onChange();
+        for (const end = performance.now() + 40; performance.now() < end; );
+      }
+    });
+    assert.ok((await widths()) < 0.8, `${await widths()} of the pixels along an edge`);
+    assert.match(await d.text("sharpness"), /^[5-8]0 %/);
+    await page.waitForSelector("[data-test=sharpness]", { state: "detached" });
+    await d.settle();
+  });
+
   it("changes the second stage's delay before it fires, on a branch of its own", async () => {
     await d.scrub(1);
     await d.click("delay-stage-1");
