@@ -3,6 +3,8 @@ import { findFrame, makeRun, type Run, type RunEvent } from "./data";
 import { chooseHiddenKinds, makeState, runClock, type Look, type State } from "./state";
 import type { WireFrame } from "./steer_wire";
 
+const keyOf = (e: RunEvent): string => `${e.time} ${e.kind} ${e.subject}`;
+const apart = 8; // frames between two holes of one stretch
 const memory = 256e6; // of frames, then every second one is enough, ... [bytes]
 
 export class BranchRun {
@@ -12,6 +14,8 @@ export class BranchRun {
   readonly rows: number[] = [];
   private onlyScene: boolean;
   private dirty = false;
+  private hasNews = false; // events
+  private readonly known = new Set<string>(); // events that are there
   private readonly decided = new Set<string>();
 
   /// A branch that parts from another one and has the same bodies and zones.
@@ -25,6 +29,7 @@ export class BranchRun {
     this.run = isRun ? (scene as Run) : makeRun(scene);
     this.onlyScene = this.run.time.length > 0;
     if (this.onlyScene) this.rows.push(-1);
+    for (const event of this.run.events) this.known.add(keyOf(event));
     this.state = makeState(this.run, look, 0);
     runClock(this.state);
   }
@@ -77,33 +82,40 @@ export class BranchRun {
   flush(): boolean {
     if (!this.dirty) return false;
     this.dirty = false;
+    if (this.hasNews) this.hideMany();
+    this.hasNews = false;
     this.state.grown.value += 1;
     return true;
   }
 
   addEvents(events: readonly RunEvent[]): void {
-    const key = (e: RunEvent): string => `${e.time} ${e.kind} ${e.subject}`;
-    const known = new Set(this.run.events.map(key));
-    const fresh = events.filter((e) => !known.has(key(e)));
-    if (fresh.length === 0) return;
-    this.run.events.push(...fresh);
-    this.dirty = true;
-    // Kinds that have become many are left out of the list, once: who asks for them again keeps them.
+    for (const event of events) {
+      const key = keyOf(event);
+      if (this.known.has(key)) continue;
+      this.known.add(key);
+      this.run.events.push(event);
+      this.dirty = this.hasNews = true;
+    }
+  }
+
+  /// Kinds of events that have become many are left out of the list, once: who asks for them again keeps them.
+  private hideMany(): void {
     const many = [...chooseHiddenKinds(this.run)].filter((kind) => !this.decided.has(kind));
     if (many.length === 0) return;
     for (const kind of many) this.decided.add(kind);
     this.state.hiddenKinds.value = new Set([...this.state.hiddenKinds.value, ...many]);
   }
 
-  /// The first stretch of frames that this page should have and has not, of the `count` the server holds.
+  /// The first stretch of frames that this page should have and has not, of the `count` the server holds. Holes near to
+  /// each other are one stretch: to have a few frames twice costs less than to ask for each.
   findMissing(count: number): { from: number; count: number; stride: number } | undefined {
     const stride = Math.max(1, Math.ceil((count * this.frameSize) / memory));
     const have = new Set(this.rows);
     for (let from = 0; from < count; from += stride) {
       if (have.has(from)) continue;
-      let to = from + stride;
-      while (to < count && !have.has(to) && (to - from) / stride < 200) to += stride;
-      return { from, count: Math.ceil((to - from) / stride), stride };
+      let last = from;
+      for (let to = from + stride; to < count && to - from < 200 * stride && to - last <= apart * stride; to += stride) if (!have.has(to)) last = to;
+      return { from, count: (last - from) / stride + 1, stride };
     }
     return undefined;
   }

@@ -10,6 +10,9 @@ const { findCoherent } = await load("plots.tsx");
 const { chooseMoments } = await load("stills.tsx");
 const { findZonesOfBodies, findBody, partOfShape } = await load("zones.ts");
 const { colourOfUtilisation } = await load("vocabulary.ts");
+const { BranchRun } = await load("steer_branch.ts");
+const { makeLook } = await load("state.ts");
+const { toScreen, linear } = await load("colour.ts");
 
 describe("data", () => {
   it("reads little-endian floats", () => {
@@ -189,5 +192,38 @@ describe("plan text", () => {
   it("finds the place of a complaint", async () => {
     const { findOffset } = await load("steer_plan.tsx");
     assert.deepEqual([[1, 1], [2, 3], [3, 1], [9, 9]].map(([l, c]) => findOffset("ab\ncdef\ng", l, c)), [0, 5, 8, 9]);
+  });
+});
+
+describe("what came of a branch", () => {
+  const frame = (row, time) => ({ session: 1, branch: 1, sequence: row, row, time, asked: false, pose: new Float32Array(0), series: new Float32Array(0), utilisation: new Float32Array(0), state: new Uint8Array(0) });
+  const make = () => new BranchRun(1, { ...readRun(JSON.stringify({ ...makeSynthetic(2) })), bodies: [], zones: [], series: [], time: [], frames: [], events: [] }, makeLook(), true);
+
+  it("asks for near holes together, and for far ones apart", () => {
+    const run = make();
+    for (let row = 0; row < 300; ++row) if (row % 3 !== 2 && (row < 60 || row > 200)) run.add(frame(row, row / 60));
+    for (let row = 60; row <= 200; ++row) run.add(frame(row, row / 60));
+    assert.deepEqual(run.findMissing(300), { from: 2, count: 58, stride: 1 }); // rows 2, 5, ... 59
+    for (let row = 0; row < 60; ++row) run.add(frame(row, row / 60));
+    assert.deepEqual(run.findMissing(300), { from: 203, count: 97, stride: 1 }); // 203, 206, ... 299
+    for (let row = 203; row < 300; ++row) run.add(frame(row, row / 60));
+    assert.equal(run.findMissing(300), undefined);
+    assert.equal(run.rows.length, 300);
+  });
+
+  it("takes an event once, however often it is told", () => {
+    const run = make();
+    const event = (time, subject) => ({ time, kind: "yield", subject, text: "" });
+    run.addEvents([event(1, "a"), event(1, "b")]);
+    run.addEvents([event(1, "a"), event(2, "a")]);
+    assert.deepEqual(run.run.events.map((e) => `${e.time}${e.subject}`), ["1a", "1b", "2a"]);
+  });
+});
+
+describe("colours of the picture", () => {
+  it("go to the screen as they are written", () => {
+    // the table has 4096 steps: half a step is at most 0.4 of 255 where the curve is steepest
+    for (const css of ["#000000", "#1f4e79", "#808080", "#d55e00", "#ffffff"])
+      linear(css).forEach((value, k) => assert.ok(Math.abs((toScreen(value) / 65535) * 255 - parseInt(css.slice(1 + 2 * k, 3 + 2 * k), 16)) < 0.5, css));
   });
 });
