@@ -12,8 +12,8 @@
 // after foreach_target
 #include <hwy/highway.h>
 
-#ifndef TOPPLE_NEARFIELD_SECTION_FIELDS_
-#define TOPPLE_NEARFIELD_SECTION_FIELDS_
+#ifndef TOPPLE_NEARFIELD_SECTION_FIELDS
+#define TOPPLE_NEARFIELD_SECTION_FIELDS
 namespace topple::nearfield::kernel {
 inline constexpr size_t kRow = 8;
 /// Fields of a row of steel.
