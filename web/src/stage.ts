@@ -29,7 +29,6 @@ const wanted = 1000 / 60; // between two pictures in motion [ms]
 const slow = 1.15 * wanted, quick = 1.04 * wanted; // fewer pixels above the one, more below the other
 const leastRatio = 0.5; // fewer pixels than that and members cannot be told apart
 const restAfter = 220; // and at least three pictures [ms]
-const idle = 10; // a picture asked for that long after the last one was not kept waiting by it [ms]
 const settled = 6; // pictures after a change until their rate is known
 const firstWait = 1500, longestWait = 48000; // until more pixels are tried again [ms]
 
@@ -213,9 +212,8 @@ export class Stage implements SceneLike {
     const now = performance.now();
     const interval = now - this.lastRender;
     this.lastRender = now;
-    // A picture that comes a second later begins another motion; one that was asked for late shows nothing of how fast
-    // pictures can follow each other.
-    if (interval < 1000) this.meanInterval += 0.2 * ((askedAt() - this.lastDone < idle ? interval : Math.min(interval, wanted)) - this.meanInterval);
+    // A picture that comes a second later begins another motion. Time in which none was asked for is not the renderer's.
+    if (interval < 1000) this.meanInterval += 0.2 * (interval - Math.max(0, askedAt() - this.lastDone) - this.meanInterval);
     ++this.since;
     if (this.meanInterval > slow && this.ratio > leastRatio && this.since >= settled) {
       // More pixels were too many: the next try comes later.
