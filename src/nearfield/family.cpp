@@ -70,6 +70,19 @@ MomentFamily make_family(const Fibres& fibres, int direction, const std::vector<
     out.yield_rotation.push_back(march.yield_kappa * length);
     out.yield_moment.push_back(march.yield_moment);
   }
+  out.elongation.reserve(K * J);
+  for (const March& march : marches) {
+    double slope = 0;
+    for (size_t j = 0; j < J; ++j) {
+      if (j == 0 || march.eps_0.empty()) {
+        out.elongation.push_back(0);
+        continue;
+      }
+      const double step = out.rotation[j] - out.rotation[j - 1];
+      if (j < march.eps_0.size()) slope = (march.eps_0[j] - march.eps_0[j - 1]) * length / step;
+      out.elongation.push_back(out.elongation.back() + slope * step);
+    }
+  }
   // Rows without moment borrow the rotation of the nearest row that has one.
   for (size_t k = 0; k < K; ++k) {
     if (out.yield_rotation[k] > 0) continue;

@@ -27,9 +27,11 @@ struct ZoneInput {
 /// moment or its equilibrium: the section can no longer carry that force. Rotations are measured from the state without
 /// moment. Positive about y: the end at larger x turns about +y, tension at +z. Positive about z: tension at -y.
 struct MomentFamily {
-  std::vector<double> normal_force;                  // rising [N] (K)
-  std::vector<double> rotation;                      // total rotation of the zone, rising from 0 [rad] (J)
-  std::vector<double> moment;                        // [N·m] (K x J), row k for normal_force[k]; >= 0
+  std::vector<double> normal_force;  // rising [N] (K)
+  std::vector<double> rotation;      // total rotation of the zone, rising from 0 [rad] (J)
+  std::vector<double> moment;        // [N·m] (K x J), row k for normal_force[k]; >= 0
+  std::vector<double> elongation;  // of the zone at the section's centre since the state without moment, at that force;
+                                   // goes on as before where the force is lost; none: not known [m] (K x J)
   std::vector<double> yield_rotation, yield_moment;  // per force (K), positive rotations; the first of: steel yields in
                                                      // tension, an edge reaches ε_c1, 0.75 of the peak
 };

@@ -252,7 +252,10 @@ Rcc make_ring_rcc(const RingInput& given) {
                     ? out.y_pos
                     : make_family(make_ring_fibres(in, Axis::Y, -1, p.y, p.z), -1, force, rotation_y, in.length);
   }
-  for (MomentFamily* f : {&out.y_pos, &out.y_neg, &out.z_pos, &out.z_neg}) keep_bearing(*f);
+  for (MomentFamily* f : {&out.y_pos, &out.y_neg, &out.z_pos, &out.z_neg}) {
+    keep_bearing(*f);
+    f->elongation.clear();  // not that of a band that moves back
+  }
   add_shear(in, p, out);
   out.biaxial_exponent = p.is_closed ? 2 : 1.5;
   out.damage_share = 1 - z_pos.core.b_c;

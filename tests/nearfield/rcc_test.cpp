@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/unit.h"
+#include "nearfield/family.h"
 #include "nearfield/fibres.h"
 
 namespace topple::nearfield {
@@ -67,6 +68,34 @@ Held march_at(const ZoneInput& in, double N, double rotation) {
   if (march.last > 0) out.rotation = kappa[static_cast<size_t>(march.last)] * in.length;
   out.moment = march.moment[static_cast<size_t>(std::lround(rotation / 2.5e-4))];
   return out;
+}
+
+// Concrete that is linear and does not pull: at the curvature κ the compressed depth is c = sqrt(2 |N| / (E b κ)), and
+// the centre is strained by κ (h/2 - c) once c < h.
+TEST(MomentFamily, LengthensAsASectionWithoutTension) {
+  ZoneInput in = make_core();
+  in.section.bars.clear();
+  in.section.cover = in.section.tie_diameter = 0;
+  in.concrete.fc = 300 * MPa, in.concrete.fct = 1, in.concrete.eps_c1 = 20e-3;
+  in.concrete.Gcl = 5e6, in.concrete.Gf = 1e-3, in.length = 0.1;
+  const Fibres f = make_fibres(in, Axis::Y);
+  const double h = 0.5, b = 0.5, E = in.concrete.Ec;
+  const double N = -2 * MN;
+  std::vector<double> rotation;
+  for (int i = 0; i <= 60; ++i) rotation.push_back(1e-5 * i);
+  const MomentFamily family = make_family(f, 1, {-30 * MN, N, -1 * MN, 0}, rotation, in.length);
+  const size_t J = family.rotation.size();
+  ASSERT_EQ(family.elongation.size(), 4 * J);
+  int compared = 0;
+  for (size_t j = 1; j + 1 < J; ++j) {
+    const double kappa = family.rotation[j] / in.length, c = std::sqrt(-2 * N / (E * b * kappa));
+    if (c > 0.9 * h || c < 0.2 * h) continue;
+    ++compared;
+    const double expected = in.length * (kappa * (0.5 * h - c) - N / (E * b * h));
+    // 40 layers: the edge of the crack is known to a fortieth of the depth
+    EXPECT_NEAR(family.elongation[J + j], expected, 0.01 * in.length * kappa * h) << j;
+  }
+  EXPECT_GT(compared, 10);
 }
 
 void expect_sound(const Rcc& r, const std::string& what) {
