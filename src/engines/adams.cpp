@@ -272,6 +272,7 @@ class Dataset {
     const bool has_law = e.law.index >= 0;
     if (has_law && !model_.laws[static_cast<size_t>(e.law.index)].moment_z.plastic_rotation.empty()) {
       losses_.add("a hinge gives back on unloading what it took: its moment follows the family of curves both ways");
+      if (e.axial_element.is_valid()) losses_.add("a hinge keeps its length as it turns");
       const int spline = spline_of(e);
       // the force that the parent pulls the child with, tension positive
       moment = fmt::format("AKISPL(AZ({},{}), -JOINT({},1,2,{}), {})", j.M, j.F, j.id, j.F, spline);

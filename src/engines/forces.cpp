@@ -415,12 +415,17 @@ bool Forces::advance(double time, const Motion& motion, const std::vector<Vec3>&
     if (!joint_force.empty()) z.axial_force = -joint_force[static_cast<size_t>(r.joint.index)].x;
     z.angle = angle_of(motion, r.joint, z.angle);
     const bool was_yielded = z.state.yielded;
+    const double elongated = z.state.axial;
     prepare(z.parameters, h);
     mbs::Six d;
     d.c[0] = z.axial_force;
     d.c[5] = z.angle;
     mbs::advance_zone(z.parameters, laws_, d, time, h, z.state);
     tell(z, was_yielded, zone_.size() + i);
+    if (r.axial_element.is_valid() && h > 0) {
+      Zone& along = zone_[static_cast<size_t>(r.axial_element.index)];
+      mbs::elongate_zone(along.parameters, z.state.axial - elongated, along.state);
+    }
     if (!z.state.live) continue;
     const Vec3 torque = z.state.resultant.c[5] * axis_of(motion, r.joint);
     twist(j.child, -torque, cached_);

@@ -116,7 +116,7 @@ void System::pack_element(size_t e, bool has_moved) {
   const bool free = c.zone.stations == 0;
   double fields[kFlowFields];
   // near its bounds a zone is better served by the law itself
-  const bool in_lanes = free || !options.full_law;
+  const bool in_lanes = (free || !options.full_law) && !z.is_adjusted;
   const bool flows = !free && in_lanes && (!is_bounded(z, false) || calc_bound_utilisation(c.zone, z) > kNearBounds) &&
                      write_flow(c.zone, laws, z, state.time, fields);
   const bool bounded = !flows && in_lanes && is_bounded(z, free);
@@ -203,6 +203,8 @@ void System::unpack_element(size_t e) {
   if (!flows) return;
   z.energy = l.flow(slot, kStored);
   z.plastic += l.flow(slot, kPlastic);
+  z.lifted += l.flow(slot, kAxial) - z.axial;
+  z.axial = l.flow(slot, kAxial);
   for (int i = 0; i < 2; ++i) z.slip[i] = l.flow(slot, kSlip + i);
   z.slipped = l.flow(slot, kSlipped);
   z.twist = l.flow(slot, kTwist);
@@ -284,12 +286,32 @@ void System::evaluate_element(size_t i, double h) {
   }
 }
 
+void System::elongate_element(size_t e, double by) {
+  ZoneState& z = state.element[e];
+  const size_t slot = slot_of(e);
+  if (!z.live || slot == Lanes::kNoSlot) return;
+  Lanes& l = *lanes;
+  if (l.field(slot, kFlows) > 0) {
+    const double k = l.field(slot, kStiffness), released = by * k * (l.field(slot, kStretch) - 0.5 * by);
+    l.flow(slot, kAxial) += by;
+    l.flow(slot, kStored) -= released;
+    l.flow(slot, kPlastic) += released;
+    z.is_adjusted = true;  // for the full law, if it takes over
+    return;
+  }
+  unpack_element(e);
+  elongate_zone(elements[e].zone, by, z);
+  // the full law books what the bodies feel of it
+  l.set(slot, kLeastForce, 1);
+  l.set(slot, kMostForce, -1);
+}
+
 void System::evaluate_outside(size_t slot) {
   const size_t e = lanes->is_batch ? slot / lanes->W : lanes->element_of[slot];
   unpack_element(e);
-  const double axial = state.element[e].axial;
+  const double axial = state.element[e].axial, lifted = state.element[e].lifted;
   evaluate_element(e, step);
-  if (state.element[e].live && state.element[e].axial != axial) {
+  if (state.element[e].live && state.element[e].axial != axial && state.element[e].lifted == lifted) {
     // what flows axially will do so in the next step: the full law keeps it
     lanes->set(slot, kFlows, 0);
     lanes->set(slot, kLeastForce, 1);

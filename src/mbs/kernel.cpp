@@ -323,6 +323,44 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
       plastic[q][s] = fnma(soft[q][s], m, P.phi[s]);
     }
 
+  // what turns further lengthens or shortens
+  N elongation = zero;
+  for (int s = 0; s < 2; ++s) {
+    const N so_far = load<D>(flow, kStations + s * kStationFields + kReached);
+    const M grows = hn::And(good, hn::Gt(reached[s].v, so_far.v));
+    if (hn::AllFalse(tag, grows)) continue;
+    N squares = zero, along = zero, bending = zero;
+    for (int q = 0; q < 2; ++q) {
+      const int cell = kStations + s * kStationFields + kCell + q * kCellFields;
+      const N above = f[0] - load<D>(flow, cell + kCellForce);
+      const auto upper = hn::Ge(above.v, zero.v);
+      const N t =
+          abs(above * select(upper, load<D>(flow, cell + kCellForce + 2), load<D>(flow, cell + kCellForce + 1)));
+      const auto positive = hn::Ge(plane[q].phi[s].v, zero.v);
+      const auto lift_at = [&](int force) {
+        return select(positive, load<D>(flow, cell + kCellLiftPositive + force),
+                      load<D>(flow, cell + kCellLiftNegative + force));
+      };
+      const N middle = lift_at(1);
+      const N lift = fma(t, select(upper, lift_at(2), lift_at(0)) - middle, middle);
+      const N square = plane[q].phi[s] * plane[q].phi[s];
+      squares = squares + square;
+      along = fma(square, lift, along);
+      bending = fma(plane[q].m[s], by[q][s], bending);
+    }
+    const N unbound = (reached[s] - so_far) * along / squares;
+    // the axial spring takes no more than bending brings
+    const N brought =
+        fnma(half, load<D>(flow, kStations + s * kStationFields + kShare), one) * N{hn::Max(zero.v, bending.v)};
+    const N pull = N{hn::CopySign(one.v, unbound.v)} * fnma(k[0], elongation, f[0]);
+    const N root = {hn::Sqrt(fma(num<D>(2) * k[0], brought, pull * pull).v)};
+    const N most =
+        select(hn::Lt(pull.v, zero.v), num<D>(2) * brought / (root - pull), (pull + root) / N{hn::Max(k[0].v, tiny.v)});
+    const N bound = {hn::CopySign(hn::Min(abs(unbound).v, most.v), unbound.v)};
+    elongation = elongation + select(grows, bound, zero);
+  }
+  f[0] = fnma(k[0], elongation, f[0]);
+
   // shear
   const N pressed = load<D>(flow, kShearFriction) * N{hn::Max(zero.v, (zero - f[0]).v)};
   N slipped = load<D>(flow, kSlipped);
@@ -380,7 +418,9 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
     store_where<D>(good, d[i], flow, kBefore + i);
   }
   const N lost = fms(half, work, stored - load<D>(flow, kStored));
-  store_where<D>(flowed, load<D>(flow, kPlastic) + lost, flow, kPlastic);
+  // nothing in an elastic step, unless the zone was lengthened from outside before it
+  store_where<D>(good, load<D>(flow, kPlastic) + lost, flow, kPlastic);
+  store_where<D>(flowed, load<D>(flow, kAxial) + elongation, flow, kAxial);
   store_where<D>(flowed, slip[0] + slid[0], flow, kSlip);
   store_where<D>(flowed, slip[1] + slid[1], flow, kSlip + 1);
   store_where<D>(flowed, slipped, flow, kSlipped);

@@ -67,7 +67,7 @@ enum Flow : int {
   kPlastic = 28,        // dissipated since the slot was written
   kIdle = 29,           // steps without flow
   kStations = 30,       // both stations, kStationFields each
-  kStationFields = 41,
+  kStationFields = 53,
   kFlowFields = kStations + 2 * kStationFields
 };
 /// Fields of a station: inelastic rotations, damage, and the cell of the moment family about each axis.
@@ -78,12 +78,20 @@ enum FlowStation : int {
   kShare = 5,     // of damage
   kRupture = 6,   // rotation
   kCell = 7,      // about y, about z: kCellFields each
-  kCellFields = 17
+  kCellFields = 23
 };
 /// Fields of a cell, which is two intervals of normal force and one of rotation: the middle force, one over the widths
 /// below and above it; the lowest rotation and one over the width; and the limits for positive and for negative moments
-/// at (force, rotation): low low, low high, middle low, middle high, high low, high high.
-enum FlowCell : int { kCellForce = 0, kCellRotation = 3, kCellPositive = 5, kCellNegative = 11 };
+/// at (force, rotation): low low, low high, middle low, middle high, high low, high high; then the elongation per
+/// rotation, for positive and for negative rotations, at the three forces.
+enum FlowCell : int {
+  kCellForce = 0,
+  kCellRotation = 3,
+  kCellPositive = 5,
+  kCellNegative = 11,
+  kCellLiftPositive = 17,
+  kCellLiftNegative = 20
+};
 /// Steps without flow after which the full law is asked for bounds.
 inline constexpr double kLongestIdle = 20;
 /// Most flexibility that damage adds, over the elastic one: unloading keeps a twentieth of the stiffness.

@@ -54,6 +54,8 @@ struct MomentFamily {
   std::vector<double> plastic_rotation;  // rising from 0 [rad] (J)
   std::vector<double> positive;          // limit for moments > 0 [N·m] (K x J)
   std::vector<double> negative;          // magnitude of the limit for moments < 0 [N·m] (K x J)
+  // plastic elongation along the axis that comes with plastic rotation > 0 and < 0; both or none [m] (K x J)
+  std::vector<double> elongation_positive, elongation_negative;
 };
 
 /// Limits of what a zone can transmit: an rcc in the form of the multibody system (docs/theory/zones.md).
@@ -181,6 +183,7 @@ struct RotationalElement {
   double stiffness = 0;         // [N·m/rad]
   double damping_ratio = 0.05;  // as of a zone element
   LawId law;                    // invalid: elastic
+  ElementId axial_element;      // takes the elongation that comes with this one's rotation; invalid: none
 };
 
 /// Tension-only cable between a point of a body and a point of another (or of the ground).

@@ -148,6 +148,15 @@ void Checker::family(const Place& p, const char* key, const MomentFamily& m) {
   if (!m.plastic_rotation.empty() && m.plastic_rotation.front() != 0) fail(in, "plastic_rotation", "must begin at 0");
   magnitudes(in, "positive", m.positive);
   magnitudes(in, "negative", m.negative);
+  const size_t along[2] = {m.elongation_positive.size(), m.elongation_negative.size()};
+  if ((along[0] > 0 || along[1] > 0) && (along[0] != n || along[1] != n))
+    fail(in, "", fmt::format("needs forces x rotations = {} elongations in each direction, or none", n));
+  for (const auto* list : {&m.elongation_positive, &m.elongation_negative})
+    for (const double u : *list)
+      if (!std::isfinite(u)) {
+        fail(in, list == &m.elongation_positive ? "elongation_positive" : "elongation_negative", "is not finite");
+        break;
+      }
 }
 
 void Checker::characteristic(const Place& p, const char* key, const Characteristic& c) {
@@ -316,6 +325,7 @@ void Checker::check_rotational_elements() {
         fail(p, "joint", "is not a revolute joint");
     }
     if (r.law.is_valid()) index(p, "law", r.law.index, m_.laws);
+    if (r.axial_element.is_valid()) index(p, "axial_element", r.axial_element.index, m_.elements);
     finite_not_negative(p, "stiffness", r.stiffness);
     share(p, "damping_ratio", r.damping_ratio, 0, 0.2);
   }

@@ -148,8 +148,15 @@ Body body_from(const Node& n) {
 
 MomentFamily family_from(const Node& n) {
   n.only(keys_of("family"));
-  return {n["normal_force"].numbers(), n["plastic_rotation"].numbers(), n["positive"].numbers(),
-          n["negative"].numbers()};
+  MomentFamily f{n["normal_force"].numbers(),
+                 n["plastic_rotation"].numbers(),
+                 n["positive"].numbers(),
+                 n["negative"].numbers(),
+                 {},
+                 {}};
+  if (n.has("elongation_positive")) f.elongation_positive = n["elongation_positive"].numbers();
+  if (n.has("elongation_negative")) f.elongation_negative = n["elongation_negative"].numbers();
+  return f;
 }
 
 Curve curve_from(const Node& n) {
@@ -434,6 +441,7 @@ RotationalElement Reader::rotational_element_from(const Node& n) const {
   r.stiffness = n["stiffness"].number();
   read(n, "damping_ratio", r.damping_ratio);
   if (n.has("law")) r.law = {refer(n["law"], laws_, -1)};
+  if (n.has("axial_element")) r.axial_element = {refer(n["axial_element"], elements_, -1)};
   return r;
 }
 

@@ -58,10 +58,15 @@ Json json_of(const Body& b) {
 }
 
 Json json_of(const MomentFamily& m) {
-  return {{"normal_force", m.normal_force},
-          {"plastic_rotation", m.plastic_rotation},
-          {"positive", m.positive},
-          {"negative", m.negative}};
+  Json j{{"normal_force", m.normal_force},
+         {"plastic_rotation", m.plastic_rotation},
+         {"positive", m.positive},
+         {"negative", m.negative}};
+  if (!m.elongation_positive.empty()) {
+    j["elongation_positive"] = m.elongation_positive;
+    j["elongation_negative"] = m.elongation_negative;
+  }
+  return j;
 }
 
 Json json_of(const ZoneLaw& l) {
@@ -125,11 +130,13 @@ Json json_of(const ZoneElement& e) {
 }
 
 Json json_of(const RotationalElement& r) {
-  return {{"name", r.name},
-          {"joint", r.joint.index},
-          {"stiffness", r.stiffness},
-          {"damping_ratio", r.damping_ratio},
-          {"law", r.law.index}};
+  Json j{{"name", r.name},
+         {"joint", r.joint.index},
+         {"stiffness", r.stiffness},
+         {"damping_ratio", r.damping_ratio},
+         {"law", r.law.index}};
+  if (r.axial_element.is_valid()) j["axial_element"] = r.axial_element.index;
+  return j;
 }
 
 Json json_of(const Cable& c) {

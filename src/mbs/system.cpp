@@ -142,6 +142,7 @@ void System::compile() {
     c.zone.stiffness[5] = r.stiffness;
     c.zone.external_axial = true;
     c.zone.viscous = viscous_share(r.damping_ratio);
+    c.axial_element = r.axial_element.index;
     if (r.law.is_valid()) {
       c.zone.stations = 1;
       c.zone.law[0] = r.law.index;
@@ -304,6 +305,7 @@ void System::evaluate_rotationals(double h) {
     const Mat3 R = rotation_of(j.parent);
     const Vec3 axis = R * j.R_PF.column(2);
     const bool was_yielded = z.yielded;
+    const double elongated = z.axial;
     Six d;
     d.c[0] = -dot(R * j.R_PF.column(0), js.force);
     d.c[5] = js.angle;
@@ -316,6 +318,8 @@ void System::evaluate_rotationals(double h) {
     }
     if (z.yielded && !was_yielded)
       say({Happening::Kind::ElementYielded, state.time, static_cast<int>(elements.size() + i), -1, {}, 0});
+    if (c.axial_element >= 0 && h > 0 && z.axial != elongated)
+      elongate_element(static_cast<size_t>(c.axial_element), z.axial - elongated);
     if (!z.live) {
       break_element(elements.size() + i, z.reason);
       continue;

@@ -49,6 +49,7 @@ struct CompiledJoint {
 /// Rotational element: a zone whose only elastic component is the rotation about z, its normal force the joint's.
 struct CompiledRotational {
   int joint = -1;
+  int axial_element = -1;  // that takes its elongation
   ZoneParameters zone;
 };
 
@@ -322,6 +323,8 @@ class System {
   void unpack_elements();
   void evaluate_element(size_t element, double h);
   void evaluate_outside(size_t slot);
+  /// As elongate_zone, wherever the element's state is.
+  void elongate_element(size_t e, double by);
   void evaluate_elements_fully(double h);
   void evaluate_elements();
   void sum_element_forces();

@@ -38,6 +38,16 @@ CompiledLaw compile_law(const ZoneLaw& law) {
       to.limit[2 * i + 1] = from.negative[i];
       largest = std::max({largest, from.positive[i], from.negative[i]});
     }
+    if (!from.elongation_positive.empty()) {
+      const size_t J = from.plastic_rotation.size();
+      to.lift.resize(to.limit.size());
+      for (size_t i = 0; i < from.positive.size(); ++i) {
+        const size_t j = std::min(i % J, J - 2), row = i - i % J;  // the last interval goes on
+        const double step = to.rotation[j + 1] - to.rotation[j];
+        to.lift[2 * i] = (from.elongation_positive[row + j + 1] - from.elongation_positive[row + j]) / step;
+        to.lift[2 * i + 1] = (from.elongation_negative[row + j + 1] - from.elongation_negative[row + j]) / step;
+      }
+    }
     // The capacity at a rotation is where the interpolated limit reaches zero on the side of compression.
     to.capacity.resize(static_cast<size_t>(to.J));
     for (int j = 0; j < to.J; ++j) {
@@ -56,6 +66,7 @@ CompiledLaw compile_law(const ZoneLaw& law) {
       to.capacity[static_cast<size_t>(j)] =
           std::min(to.capacity[static_cast<size_t>(j)], to.capacity[static_cast<size_t>(j) - 1]);
   }
+  c.elongates = !c.moment[0].lift.empty() || !c.moment[1].lift.empty();
   c.compression = {law.compression.x, law.compression.f};
   c.tension = {law.tension.x, law.tension.f};
   if (!law.compression.f.empty()) {
@@ -107,6 +118,18 @@ MomentLimit calc_moment_limit(const CompiledFamily& family, double normal_force,
   return {w00 * a[0] + w01 * a[2] + w10 * b[0] + w11 * b[2], w00 * a[1] + w01 * a[3] + w10 * b[1] + w11 * b[3]};
 }
 
+Lift calc_lift(const CompiledFamily& family, double normal_force, double rotation, int& k, int& j) {
+  if (family.lift.empty() || !(normal_force >= family.force.front() && normal_force <= family.force.back())) return {};
+  k = find_interval(family.force, normal_force, k);
+  j = find_interval(family.rotation, rotation, j);
+  const size_t K = static_cast<size_t>(k), width = static_cast<size_t>(family.J);
+  const size_t J = rotation < family.rotation.back() ? static_cast<size_t>(j) : width - 1;
+  const double t = (normal_force - family.force[K]) / (family.force[K + 1] - family.force[K]);
+  const double* a = &family.lift[2 * (K * width + J)];
+  const double* b = a + 2 * width;
+  return {(1 - t) * a[0] + t * b[0], (1 - t) * a[1] + t * b[1]};
+}
+
 double calc_compression_capacity(const CompiledFamily& family, double rotation) {
   if (family.K == 0) return kUnlimited;
   const size_t last = static_cast<size_t>(family.J) - 1;
@@ -142,11 +165,11 @@ class Limits {
     });
   }
   /// Largest compression after a rotation and a plastic shortening.
-  double compression(double rotation, double shortened, double share) const {
+  double compression(double rotation, double shortened, double integrity) const {
     return blend([&](const CompiledLaw& l) {
       return std::min(calc_curve(l.compression, shortened),
-                      share * std::min(calc_compression_capacity(l.moment[0], rotation),
-                                       calc_compression_capacity(l.moment[1], rotation)));
+                      (l.elongates ? 1 : integrity) * std::min(calc_compression_capacity(l.moment[0], rotation),
+                                                               calc_compression_capacity(l.moment[1], rotation)));
     });
   }
   MomentLimit moment(int axis, double normal_force, StationState& s) const {
@@ -155,6 +178,15 @@ class Limits {
     if (share_ > 0) {
       int k = 0, j = 0;
       b = calc_moment_limit(to_.get().moment[axis], normal_force, s.reached, k, j);
+    }
+    return {mix(a.positive, b.positive), mix(a.negative, b.negative)};
+  }
+  Lift lift(int axis, double normal_force, double rotation, StationState& s) const {
+    Lift a, b;
+    if (share_ < 1) a = calc_lift(from_.get().moment[axis], normal_force, rotation, s.k[axis], s.j[axis]);
+    if (share_ > 0) {
+      int k = 0, j = 0;
+      b = calc_lift(to_.get().moment[axis], normal_force, rotation, k, j);
     }
     return {mix(a.positive, b.positive), mix(a.negative, b.negative)};
   }
@@ -322,6 +354,18 @@ void soften(const ZoneParameters& p, ZoneState& z) {
 
 }  // namespace
 
+void elongate_zone(const ZoneParameters& p, double by, ZoneState& z) {
+  if (!z.live || by == 0) return;
+  z.axial += by;
+  z.lifted += by;
+  z.offset[0] += by;
+  z.is_adjusted = true;
+  if (!z.has_elastic) return;
+  const double released = by * (z.elastic_force[0] - 0.5 * z.share * p.stiffness[0] * by);
+  z.energy -= released;
+  z.plastic += released;
+}
+
 void break_zone(ZoneState& z, BreakReason reason) {
   z.live = false;
   z.reason = reason;
@@ -336,7 +380,7 @@ namespace {
 
 /// The common case: a zone whose forces stay inside its safe bounds is a spring with a damper. False if it is not so.
 bool advance_inside_bounds(const ZoneParameters& p, const Six& d, double h, ZoneState& z) {
-  if (!is_bounded(z, false) || h <= 0) return false;
+  if (!is_bounded(z, false) || h <= 0 || z.is_adjusted) return false;
   double u[6], e[6], f[6], k[6];  // deformation from the offset, its elastic part, resultant, stiffness
   for (int i = 0; i < 6; ++i) {
     k[i] = z.share * p.stiffness[i];
@@ -536,6 +580,7 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
       return find_return(m[0][s], m[1][s], most[0][s], most[1][s], station_limits[s].law().biaxial_exponent, scale);
     };
     bool turned[2] = {false, false};
+    const double phi_trial[2][2] = {{phi[0][0], n > 1 ? phi[0][1] : 0}, {phi[1][0], n > 1 ? phi[1][1] : 0}};
     const auto turn = [&](int s, const double scale[2]) {
       bool far = false;  // enough for the other station to feel it
       for (int q = 0; q < 2; ++q) {
@@ -601,11 +646,14 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
         }
       }
     }
+    double grown[2] = {0, 0};  // of the rotations reached
     for (int s = 0; s < n; ++s) {
       StationState& st = z.station[s];
       if (turned[s]) {
         flowed = true;
+        const double so_far = st.reached;
         st.reached = std::max(st.reached, std::sqrt(phi[0][s] * phi[0][s] + phi[1][s] * phi[1][s]));
+        grown[s] = st.reached - so_far;
       }
       if (st.reached >= station_limits[s].law().rupture_rotation) broke = BreakReason::Rotation;
     }
@@ -628,6 +676,32 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
         }
       }
     }
+
+    // what turns further lengthens or shortens
+    double elongation = 0;
+    const double axial_stiffness = p.external_axial ? 0 : k[0];
+    for (int s = 0; s < n; ++s) {
+      if (!(grown[s] > 0)) continue;
+      StationState& st = z.station[s];
+      double squares = 0, along = 0, bending = 0;
+      for (int q = 0; q < 2; ++q) {
+        const Lift lift = station_limits[s].lift(q, axial, st.reached - grown[s], st);
+        squares += phi[q][s] * phi[q][s];
+        along += phi[q][s] * phi[q][s] * (phi[q][s] >= 0 ? lift.positive : lift.negative);
+        bending += m[q][s] * (phi[q][s] - phi_trial[q][s]);
+      }
+      double by = grown[s] * along / squares;
+      // the axial spring takes no more than bending brings: |by| (½ k |by| - N') <= brought, N' pulling the way of by
+      const double brought = (1 - 0.5 * station_limits[s].law().damage_share) * std::max(0.0, bending);
+      const double pull = std::copysign(1.0, by) * (force[0] - axial_stiffness * elongation);
+      const double root = std::sqrt(pull * pull + 2 * axial_stiffness * brought);
+      const double bound = pull < 0 ? 2 * brought / (root - pull) : (pull + root) / std::max(axial_stiffness, kTiny);
+      by = std::copysign(std::min(std::abs(by), bound), by);
+      elongation += by;
+    }
+    z.axial += elongation;
+    z.lifted += elongation;
+    force[0] -= axial_stiffness * elongation;
 
     // shear
     {
@@ -689,13 +763,14 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
   const double energy = broken ? 0 : flowed ? elastic_energy() + soft_energy() : energy_trial;
   if (broken)
     for (double& f : force) f = 0;
-  if (flowed || broken) {
+  if (flowed || broken || z.is_adjusted) {
     // what was put in since the last evaluation and is not stored is gone; work by the trapezium, as the bodies feel it
     double work = 0;
     for (int i = p.external_axial ? 1 : 0; i < 6; ++i)
       work += 0.5 * (z.elastic_force[i] + force[i]) * (d.c[i] - z.deformation[i]);
     z.plastic += work - (energy - z.energy);
-    z.yielded = true;
+    z.yielded = z.yielded || flowed || broken;
+    z.is_adjusted = false;
   }
   z.energy = energy;
   z.normal_force = force[0];
@@ -776,7 +851,7 @@ bool write_flow(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, c
       double* cell = &station[kCell + q * kCellFields];
       const CompiledFamily* family = law != nullptr ? &law->moment[q] : nullptr;
       if (family == nullptr || family->K == 0) {
-        std::fill(cell + kCellPositive, cell + kCellFields, unlimited);
+        std::fill(cell + kCellPositive, cell + kCellLiftPositive, unlimited);
         continue;
       }
       const double force = z.normal_force / whole, reached = z.station[s].reached;
@@ -803,6 +878,11 @@ bool write_flow(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, c
         const double* limit = &family->limit[2 * (row[c / 2] * static_cast<size_t>(family->J) + j[c % 2])];
         cell[static_cast<size_t>(kCellPositive) + c] = whole * limit[0];
         cell[static_cast<size_t>(kCellNegative) + c] = whole * limit[1];
+      }
+      for (size_t c = 0; c < 3 && !family->lift.empty(); ++c) {
+        const double* lift = &family->lift[2 * (row[c] * static_cast<size_t>(family->J) + j[0])];
+        cell[static_cast<size_t>(kCellLiftPositive) + c] = lift[0];
+        cell[static_cast<size_t>(kCellLiftNegative) + c] = lift[1];
       }
     }
   }

@@ -16,6 +16,8 @@ struct CompiledFamily {
   std::vector<double> force;     // (K)
   std::vector<double> rotation;  // (J)
   std::vector<double> limit;     // positive and negative side by side (K x J x 2)
+  std::vector<double> lift;      // plastic elongation per growth of rotation, behind each rotation, positive and
+                                 // negative side by side; empty: none [m/rad] (K x J x 2)
   std::vector<double> capacity;  // compression beyond which no moment is left, per rotation (J)
 };
 
@@ -27,6 +29,7 @@ struct CompiledLaw {
   CompiledFamily moment[2];  // about y, about z
   CompiledCurve compression, tension;
   double peak_compression = 0, peak_shortening = 0;  // of the compression curve [N, m]
+  bool elongates = false;                            // some family has an elongation
   double biaxial_exponent = 1.5, damage_share = 0, rupture_rotation = 0, crush_length = 0, rupture_elongation = 0;
   double shear[2] = {0, 0}, shear_friction = 0, slip_softening = 0, slip_rupture = 0, torsion = 0, twist_rupture = 0;
 };
@@ -41,6 +44,11 @@ struct MomentLimit {
   double positive, negative;
 };
 MomentLimit calc_moment_limit(const CompiledFamily&, double normal_force, double rotation, int& k, int& j);
+/// Plastic elongation per growth of the rotation reached, for positive and for negative rotations [m/rad].
+struct Lift {
+  double positive = 0, negative = 0;
+};
+Lift calc_lift(const CompiledFamily&, double normal_force, double rotation, int& k, int& j);
 /// Compression that the zone can still carry at a plastic rotation [N], infinity if unlimited.
 double calc_compression_capacity(const CompiledFamily&, double rotation);
 
@@ -64,6 +72,7 @@ struct ZoneState {
   bool live = true;
   BreakReason reason = BreakReason::None;
   double axial = 0;                      // plastic elongation, signed [m]
+  double lifted = 0;                     // of it, what came with rotation [m]
   double shortened = 0, elongated = 0;   // accumulated [m]
   double slip[2] = {0, 0}, slipped = 0;  // [m]
   double twist = 0, twisted = 0;         // [rad]
@@ -87,6 +96,7 @@ struct ZoneState {
   double flowed[6] = {0, 0, 0, 0, 0, 0};         // of the dampers [m, rad]
   double damper_energy = 0;                      // stored behind the dampers [J]
   bool yielded = false;                          // has ever passed a limit
+  bool is_adjusted = false;                      // lengthened from outside since the last evaluation
   // Bounds within which no limit is passed whatever the combination, for normal forces in a range; renewed when the
   // force leaves the range, void (an empty range) after any inelastic step. With them goes the inelastic part of the
   // deformation at the marker: inside the bounds the zone is a spring from there.
@@ -131,6 +141,9 @@ double calc_bound_utilisation(const ZoneParameters&, const ZoneState&);
 /// Writes what the kernel needs to let a zone flow in bending, kernel::kFlowFields values; false if it cannot: a law on
 /// its way to another one, a crushed section, a force beyond the tables, an exponent other than 1.5, or no law at all.
 bool write_flow(const ZoneParameters&, const std::vector<CompiledLaw>&, const ZoneState&, double time, double* fields);
+/// Lengthens a live zone's plastic axial deformation from outside; what that takes from or adds to the elastic energy
+/// is booked as plastic work. The resultants follow at the next evaluation.
+void elongate_zone(const ZoneParameters&, double by, ZoneState&);
 /// Ends a zone: what it stores is booked as dissipated.
 void break_zone(ZoneState&, BreakReason);
 

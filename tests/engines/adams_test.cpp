@@ -165,7 +165,7 @@ mbs::Model make_hinge() {
   b.shapes = {s};
   add_body(m, b);
   mbs::ZoneLaw law;
-  law.moment_z = {{-2e6, 0}, {0, 0.01, 0.05}, {3e5, 4e5, 1e5, 1e5, 1.5e5, 0}, {2e5, 2e5, 1e5, 1e5, 1e5, 0}};
+  law.moment_z = {{-2e6, 0}, {0, 0.01, 0.05}, {3e5, 4e5, 1e5, 1e5, 1.5e5, 0}, {2e5, 2e5, 1e5, 1e5, 1e5, 0}, {}, {}};
   const mbs::LawId l = add_law(m, law);
   Joint j;
   j.kind = Joint::Kind::Revolute;
@@ -176,7 +176,7 @@ mbs::Model make_hinge() {
   j.X_CM = {{0, 0, -1}, {}};
   j.shear_limit = 1e5;
   const mbs::JointId id = add_joint(m, j);
-  m.rotational_elements.push_back({"C-A1-0/top", id, 1e8, 0.05, l});
+  m.rotational_elements.push_back({"C-A1-0/top", id, 1e8, 0.05, l, {}});
   mbs::ZoneElement e;
   e.name = "C-A1-0/foot";
   e.a = mbs::kGround;

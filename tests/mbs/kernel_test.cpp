@@ -23,6 +23,9 @@ ZoneLaw make_law(double strength) {
       const double s = k / 8.0, base = strength * 4 * 3e5 * (0.05 + s * (1 - s)) * (m == &law.moment_y ? 1 : 0.7);
       for (const double phi : m->plastic_rotation) m->positive.push_back(base * std::exp(-4 * phi));
       for (const double phi : m->plastic_rotation) m->negative.push_back(1.1 * base * std::exp(-3 * phi));
+      for (const double phi : m->plastic_rotation)
+        m->elongation_positive.push_back((0.3 * s - 0.1) * std::sin(9 * phi));
+      for (const double phi : m->plastic_rotation) m->elongation_negative.push_back((0.1 - 0.2 * s) * phi);
     }
   }
   law.damage_share = 0.4;

@@ -126,7 +126,8 @@ TEST(RotationalElement, LimitFollowsTheReactionOfItsJoint) {
   m.bodies[0].inertia = Mat3::diagonal({100.0 / 12, 100.0 / 12, 0.1});
   m.gravity = {0.5, 0, -9.81};
   ZoneLaw law;
-  law.moment_z = {{-981 * 2, 0, 981 * 2}, {0, 1}, {60, 60, 0, 0, 0, 0}, {60, 60, 0, 0, 0, 0}};  // 30 N·m under 981 N
+  law.moment_z = {{-981 * 2, 0, 981 * 2}, {0, 1}, {60, 60, 0, 0, 0, 0},
+                  {60, 60, 0, 0, 0, 0},   {},     {}};  // 30 N·m under 981 N
   RotationalElement r;
   r.joint = {0};
   r.stiffness = 1e6;

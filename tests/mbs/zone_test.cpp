@@ -155,6 +155,96 @@ TEST(Zone, WorkIsStoredOrDissipated) {
   }
 }
 
+/// make_law() that lengthens by 0.1 m/rad without force and shortens by 0.2 m/rad at -1 MN, half as much with negative
+/// rotations.
+ZoneLaw make_lifting_law(double times = 1) {
+  ZoneLaw law = make_law();
+  const double lift[4] = {-0.5 * times, -0.2 * times, 0.1 * times, 0.1 * times};
+  for (MomentFamily* m : {&law.moment_y, &law.moment_z})
+    for (size_t k = 0; k < 4; ++k)
+      for (const double phi : m->plastic_rotation) {
+        m->elongation_positive.push_back(lift[k] * phi);
+        m->elongation_negative.push_back(0.5 * lift[k] * phi);
+      }
+  return law;
+}
+
+/// Goes to a rotation about z under a given force.
+void turn_at(Walk& w, double N, double to, int n = 2000) {
+  const double from = w.before.c[5];
+  for (int i = 1; i <= n; ++i) w.go(deform(N / kStiff + w.z.axial, 0, from + (to - from) * i / n), 1);
+}
+
+TEST(Zone, ShortensOrLengthensAsItsRotationGrows) {
+  for (const double N : {0.0, -0.5e6, -1e6}) {
+    const double lift = 0.1 + 0.3 * N / 1e6;  // linear in the force between rows
+    Walk w(make_lifting_law());
+    turn_at(w, N, 0.02);
+    double reached = w.z.station[0].reached;
+    EXPECT_GT(reached, 0.017);
+    EXPECT_NEAR(w.z.axial, lift * reached, 1e-9);
+    EXPECT_EQ(w.z.shortened + w.z.elongated, 0);  // nothing of it is crushed or torn
+    // back and to as much on the other side it stays
+    const double kept = w.z.axial;
+    turn_at(w, N, -0.015);
+    EXPECT_EQ(w.z.axial, kept);
+    EXPECT_EQ(w.z.station[0].reached, reached);
+    // and goes on from there with the table of that side
+    turn_at(w, N, -0.03);
+    EXPECT_NEAR(w.z.axial, kept + 0.5 * lift * (w.z.station[0].reached - reached), 1e-9);
+    EXPECT_NEAR(w.z.energy + w.z.plastic, w.work, 1e-3 * w.work);
+  }
+}
+
+TEST(Zone, LengthensByBothStations) {
+  ZoneLaw law = make_lifting_law();
+  law.shear_y = law.shear_z = kUnlimited;
+  const double L = 3, EI = 3e7;
+  ZoneParameters p = make_parameters(2, L / 2);
+  p.stiffness[1] = p.stiffness[2] = 12 * EI / (L * L * L);
+  p.stiffness[4] = p.stiffness[5] = EI / L;
+  Walk w(law, p);
+  for (int i = 1; i <= 4000; ++i) w.go({{w.z.axial, 0.03 * i / 4000, 0, 0, 0, 0}}, 1);
+  // one turns forwards, one backwards
+  EXPECT_LT(w.z.station[0].phi[1] * w.z.station[1].phi[1], 0);
+  EXPECT_NEAR(w.z.axial, 0.1 * 1.5 * w.z.station[0].reached, 1e-3 * w.z.axial);
+}
+
+TEST(Zone, GivesNoEnergyThroughItsLength) {
+  // 2.5 m/rad would lift 0.9 MN with more work than the bending brings
+  for (const double share : {0.0, 0.4}) {
+    ZoneLaw law = make_lifting_law(-15);
+    law.damage_share = share;
+    Walk w(law);
+    w.go(deform(-0.9e6 / kStiff, 0, 0), 10);
+    double before = w.z.plastic, by = 0;
+    for (int i = 1; i <= 4000; ++i) {
+      const double axial = w.z.axial;
+      w.go(deform(-0.9e6 / kStiff + axial, 0.003 * i / 4000, 0.02 * i / 4000), 1);
+      // the force, changed by the elongation, is put back in the next step: its work is that of the elongation before
+      const double now = w.z.axial - axial;
+      const double lag = 0.9e6 * std::abs(now - by) + kStiff * (now * now + by * by);
+      EXPECT_GE(w.z.plastic, before - lag - 1e-9) << i;
+      before = w.z.plastic, by = w.z.axial - axial;
+    }
+    EXPECT_GT(w.z.axial, 1e-3);
+    EXPECT_NEAR(w.z.energy + w.z.plastic, w.work, 1e-3 * std::abs(w.work));
+  }
+}
+
+TEST(Zone, IsLengthenedFromOutsideWithoutLosingEnergy) {
+  Walk w;
+  const Six d{{-4e-3, 0.4e-3, -0.3e-3, 1e-4, 2e-4, -3e-4}};
+  w.go(d, 50);
+  const double force = w.z.resultant.c[0], stored = w.z.energy;
+  elongate_zone(w.p, -1e-3, w.z);
+  w.go(d, 1);
+  EXPECT_NEAR(w.z.resultant.c[0], force + 1e-3 * kStiff, 1e-6);
+  // the force fell from 0.4 to 0.3 MN on the way
+  EXPECT_NEAR(stored - w.z.energy, 0.35e6 * 1e-3, 1e-6 * stored);
+  EXPECT_NEAR(w.z.energy + w.z.plastic, w.work, 1e-12 * w.work);
+}
+
 TEST(Zone, CrushesDownItsCurveAndBreaksAtItsLength) {
   Walk w;
   w.go(deform(-0.002 - 2e6 / kStiff, 0, 0));
