@@ -262,6 +262,7 @@ void Builder::connect_ground_column(const GridPoint& at, int index) {
   hinge.stiffness = stiffness;
   hinge.damping_ratio = k.zone_damping_ratio;
   hinge.law = law_id;
+  hinge.axial_element = mbs::ElementId{z.element[0]};
   z.rotational = static_cast<int>(model.rotational_elements.size());
   model.rotational_elements.push_back(hinge);
   map.ground_columns.push_back({m.name, m.start, top, false, z.normal_force, hinge});

@@ -17,6 +17,7 @@ struct Rule {
 /// The rules' values under the names of their ids, `.` written as `_`.
 struct Knowledge {
   double zone_length_by_depth, zone_length_by_span, zone_length_by_bar, zone_length_at_most;
+  double zone_elongation_share;
   double zone_rupture_rotation, zone_slip_softening, zone_slip_rupture, zone_twist_rupture, zone_biaxial_exponent;
   double zone_damping_ratio;
   double slab_elongation_lengths, wall_stiffness_share, wall_axial_share, wall_crush_share;
@@ -34,7 +35,7 @@ struct Knowledge {
 };
 
 /// Reads a set of rules. InputError for text that is not such a set, and for rules that are missing, unknown, given
-/// twice or not positive numbers.
+/// twice or not positive numbers (`zone.elongation_share` may be 0).
 Knowledge read_knowledge(const std::string& text, const std::string& name);
 
 /// The rules that are built in.

@@ -13,16 +13,17 @@ namespace topple::collapse {
 
 namespace {
 
-/// Limit moment against plastic rotation at one normal force.
+/// Limit moment and plastic elongation against plastic rotation at one normal force.
 struct Row {
-  std::vector<double> rotation, moment;
+  std::vector<double> rotation, moment, elongation;
   double largest() const { return *std::max_element(moment.begin(), moment.end()); }
 };
 
-/// Moments of a row at rotations that are asked for in rising order, constant beyond its ends.
+/// Values of a row at rotations that are asked for in rising order, constant beyond its ends.
 class Reader {
  public:
-  explicit Reader(const Row& row) : x_(row.rotation), m_(row.moment) {}
+  explicit Reader(const Row& row, std::vector<double> Row::*values = &Row::moment)
+      : x_(row.rotation), m_(row.*values) {}
   double operator()(double phi) {
     while (i_ < x_.size() && x_[i_] < phi) ++i_;
     if (phi <= x_.front()) return m_.front();
@@ -42,11 +43,11 @@ class Reader {
   size_t i_ = 0;
 };
 
-/// Moments of a row at rotations that rise.
-std::vector<double> sample(const Row& row, const std::vector<double>& rotation) {
+/// Values of a row at rotations that rise.
+std::vector<double> sample(const Row& row, const std::vector<double>& rotation, std::vector<double> Row::*values) {
   std::vector<double> out;
   out.reserve(rotation.size());
-  Reader at(row);
+  Reader at(row, values);
   for (const double phi : rotation) out.push_back(at(phi));
   return out;
 }
@@ -93,18 +94,26 @@ Row make_row(const nearfield::MomentFamily& family, double N, double EI, double 
   const double yield_moment = mix(family.yield_moment, k - 1, k), yield_rotation = mix(family.yield_rotation, k - 1, k);
   const double stiffness = EI / length, plastic_at_yield = yield_rotation - yield_moment / stiffness;
   const auto plastic = [&](size_t j) { return family.rotation[j] - M[j] / stiffness; };
+  std::vector<double> u(J, 0.0);
+  if (!family.elongation.empty())
+    for (size_t j = 0; j < J; ++j) u[j] = mix(family.elongation, (k - 1) * J + j, k * J + j);
+  const Row whole{family.rotation, M, u};
+  const auto elongation_at = [&](double rotation) { return Reader(whole, &Row::elongation)(rotation); };
   Row row;
-  const auto add = [&row](double rotation, double moment) {
+  const auto add = [&row](double rotation, double moment, double elongation) {
     if (!row.rotation.empty() && !(rotation > row.rotation.back() + 1e-9)) return;
     row.rotation.push_back(rotation);
     row.moment.push_back(moment);
+    row.elongation.push_back(elongation);
   };
+  double u_begin = 0;  // where plastic rotation begins
   size_t last_elastic = 0;
   for (size_t j = 1; j < J; ++j)
     if (plastic(j) <= 0) last_elastic = j;
   if (from == PlasticFrom::Yield && plastic_at_yield > 0 && yield_moment > 0) {
-    add(0, yield_moment);
-    add(plastic_at_yield, yield_moment);
+    u_begin = elongation_at(yield_moment / stiffness);
+    add(0, yield_moment, 0);
+    add(plastic_at_yield, yield_moment, elongation_at(yield_rotation) - u_begin);
     while (last_elastic + 1 < J && family.rotation[last_elastic + 1] <= yield_rotation) ++last_elastic;
   } else {
     double start = M[last_elastic];
@@ -114,9 +123,10 @@ Row make_row(const nearfield::MomentFamily& family, double N, double EI, double 
     }
     // a limit of nothing would be a zone that no longer carries its normal force
     if (start <= 0 && J > 1) start = M[1];
-    add(0, from == PlasticFrom::Yield ? std::max(start, yield_moment) : start);
+    u_begin = elongation_at(start / stiffness);
+    add(0, from == PlasticFrom::Yield ? std::max(start, yield_moment) : start, 0);
   }
-  for (size_t j = last_elastic + 1; j < J; ++j) add(plastic(j), M[j]);
+  for (size_t j = last_elastic + 1; j < J; ++j) add(plastic(j), M[j], u[j] - u_begin);
   return row;
 }
 
@@ -151,15 +161,16 @@ std::map<double, Row> make_rows(const nearfield::MomentFamily& family, double EI
   return rows;
 }
 
-/// Moments at a normal force between rows, at rotations that rise; 0 outside.
-std::vector<double> sample(const std::map<double, Row>& rows, double N, const std::vector<double>& rotation) {
+/// Values at a normal force between rows, at rotations that rise; 0 outside.
+std::vector<double> sample(const std::map<double, Row>& rows, double N, const std::vector<double>& rotation,
+                           std::vector<double> Row::*values) {
   if (N < rows.begin()->first || N > rows.rbegin()->first) return std::vector<double>(rotation.size(), 0.0);
   const auto above = rows.lower_bound(N);
-  std::vector<double> out = sample(above->second, rotation);
+  std::vector<double> out = sample(above->second, rotation, values);
   if (above->first == N) return out;
   const auto below = std::prev(above);
   const double s = (N - below->first) / (above->first - below->first);
-  const std::vector<double> other = sample(below->second, rotation);
+  const std::vector<double> other = sample(below->second, rotation, values);
   for (size_t j = 0; j < out.size(); ++j) out[j] = (1 - s) * other[j] + s * out[j];
   return out;
 }
@@ -258,11 +269,18 @@ mbs::MomentFamily make_family(const nearfield::MomentFamily& positive, const nea
   const auto append = [](std::vector<double>& to, const std::vector<double>& from) {
     for (const double m : from) to.push_back(std::max(0.0, m));
   };
+  const bool elongates = !positive.elongation.empty() && !negative.elongation.empty();
+  const auto append_elongation = [&](std::vector<double>& to, const std::map<double, Row>& from, double N) {
+    const std::vector<double> u = sample(from, N, out.plastic_rotation, &Row::elongation);
+    to.insert(to.end(), u.begin(), u.end());
+  };
   for (const double N : out.normal_force) {
-    append(out.positive, sample(pos, N, out.plastic_rotation));
-    if (!same) append(out.negative, sample(neg, N, out.plastic_rotation));
+    append(out.positive, sample(pos, N, out.plastic_rotation, &Row::moment));
+    if (!same) append(out.negative, sample(neg, N, out.plastic_rotation, &Row::moment));
+    if (elongates) append_elongation(out.elongation_positive, pos, N);
+    if (elongates && !same) append_elongation(out.elongation_negative, neg, N);
   }
-  if (same) out.negative = out.positive;
+  if (same) out.negative = out.positive, out.elongation_negative = out.elongation_positive;
   return out;
 }
 
@@ -354,7 +372,7 @@ mbs::ZoneLaw make_zone_law(const nearfield::Rcc& rcc, double EI_y, double EI_z, 
   law.name = name;
   const auto is_same = [](const nearfield::MomentFamily& a, const nearfield::MomentFamily& b) {
     return a.normal_force == b.normal_force && a.rotation == b.rotation && a.moment == b.moment &&
-           a.yield_rotation == b.yield_rotation && a.yield_moment == b.yield_moment;
+           a.elongation == b.elongation && a.yield_rotation == b.yield_rotation && a.yield_moment == b.yield_moment;
   };
   if (bending != Bending::Z)
     law.moment_y = make_family(rcc.y_pos, rcc.y_neg, EI_y, rcc.length, k.zone_rupture_rotation, begin);
@@ -362,6 +380,11 @@ mbs::ZoneLaw make_zone_law(const nearfield::Rcc& rcc, double EI_y, double EI_z, 
     law.moment_z = law.moment_y;
   else if (bending != Bending::Y)
     law.moment_z = make_family(rcc.z_pos, rcc.z_neg, EI_z, rcc.length, k.zone_rupture_rotation, begin);
+  for (mbs::MomentFamily* f : {&law.moment_y, &law.moment_z})
+    for (std::vector<double>* u : {&f->elongation_positive, &f->elongation_negative}) {
+      if (k.zone_elongation_share == 0) u->clear();
+      for (double& v : *u) v *= k.zone_elongation_share;
+    }
   law.biaxial_exponent = k.zone_biaxial_exponent;
   law.damage_share = rcc.damage_share;
   // the last rotation of a family is where nothing of the moment is left

@@ -69,6 +69,25 @@ TEST(ZoneLaw, PlasticRotationBeginsAtFirstYieldOrLater) {
   }
 }
 
+TEST(ZoneLaw, LengthensByTheShareThatTheRuleGives) {
+  const nearfield::Rcc rcc = nearfield::make_rcc(column_zone());
+  const auto elongation = [&](double share) {
+    Knowledge k = default_knowledge();
+    k.zone_elongation_share = share;
+    return make_zone_law(rcc, rcc.calc_EI_effective_y(0), rcc.calc_EI_effective_z(0), "zone", k);
+  };
+  const mbs::ZoneLaw none = elongation(0), half = elongation(0.5), all = elongation(1);
+  EXPECT_TRUE(none.moment_y.elongation_positive.empty() && none.moment_z.elongation_negative.empty());
+  ASSERT_EQ(all.moment_y.elongation_positive.size(), all.moment_y.positive.size());
+  ASSERT_EQ(all.moment_y.elongation_negative.size(), all.moment_y.positive.size());
+  const size_t J = all.moment_y.plastic_rotation.size();
+  for (size_t i = 0; i < all.moment_y.positive.size(); ++i) {
+    EXPECT_EQ(half.moment_y.elongation_positive[i], 0.5 * all.moment_y.elongation_positive[i]);
+    if (i % J == 0) { EXPECT_EQ(all.moment_y.elongation_positive[i], 0); }
+  }
+  EXPECT_EQ(none.moment_y.positive, all.moment_y.positive);
+}
+
 TEST(ZoneLaw, PassesTheModelsCheck) {
   mbs::Model model;
   const nearfield::ZoneInput in = column_zone();

@@ -12,6 +12,7 @@
 #include "mbs/solver.h"
 #include "mbs/zone.h"
 #include "nearfield/column.h"
+#include "nearfield/history.h"
 #include "nearfield/solid.h"
 #include "plans.h"
 #include "product/section_file.h"
@@ -93,9 +94,10 @@ struct Zone {
   mbs::ZoneParameters p;
   mbs::ZoneState z;
   int axis;  // 4: about y, 5: about z
-  Zone(const nearfield::Rcc& rcc, double EI_y, double EI_z, int about, PlasticFrom from = PlasticFrom::Yield)
+  Zone(const nearfield::Rcc& rcc, double EI_y, double EI_z, int about, PlasticFrom from = PlasticFrom::Yield,
+       const Knowledge& knowledge = default_knowledge())
       : axis(about) {
-    laws = {mbs::compile_law(make_zone_law(rcc, EI_y, EI_z, "zone", default_knowledge(), from))};
+    laws = {mbs::compile_law(make_zone_law(rcc, EI_y, EI_z, "zone", knowledge, from))};
     const double stiffness[6] = {rcc.EA, rcc.GA, rcc.GA, rcc.GJ, EI_y, EI_z};
     for (int i = 0; i < 6; ++i) p.stiffness[i] = stiffness[i] / rcc.length;
     p.stations = 1, p.law[0] = 0;
@@ -105,12 +107,22 @@ struct Zone {
   /// False if it does not carry N.
   bool go(double N, double rotation) {
     mbs::Six d;
-    d.c[0] = N / p.stiffness[0] + z.axial;
+    const double axial = z.axial, flowed = z.shortened + z.elongated;
+    d.c[0] = N / p.stiffness[0] + axial;
     d.c[axis] = rotation;
     mbs::advance_zone(p, laws, d, 0, 0, z);
-    return z.live && std::abs(z.resultant.c[0] - N) < 1e-6 * MN;
+    // what the rotation of the step shortens takes from N at its end
+    const double taken = p.stiffness[0] * (z.axial - axial);
+    return z.live && z.shortened + z.elongated == flowed && std::abs(z.resultant.c[0] + taken - N) < 1e-6 * MN;
   }
 };
+
+/// Rules with which zones have all of the fibres' elongation.
+Knowledge elongating() {
+  Knowledge k = default_knowledge();
+  k.zone_elongation_share = 1;
+  return k;
+}
 
 /// Largest distance between zone and family over the peak, at one normal force.
 void expect_curve(const nearfield::Rcc& rcc, double EI_y, double EI_z, double N, int axis, int direction,
@@ -298,6 +310,116 @@ TEST(ZoneCurve, FollowsTheRuleThroughCyclesUnderAChangingForce) {
     }
     EXPECT_LT(worst, 0.02) << seed;
     EXPECT_GT(zone.z.plastic, 0);
+  }
+}
+
+/// A section with history on the way of a zone: curvatures times its length, elongation without the elastic part EA.
+struct History {
+  nearfield::FibreGrid grid;
+  nearfield::FibreState state;
+  nearfield::SectionForces forces;
+  double length, EA, eps_0 = 0, eps_begin = 0, N_begin = 0;
+  History(const nearfield::ZoneInput& in, const nearfield::Rcc& rcc, double N)
+      : grid(nearfield::make_fibre_grid(in, 24)),
+        state(nearfield::make_fibre_state(grid)),
+        length(in.length),
+        EA(rcc.EA),
+        N_begin(N) {
+    for (int i = 1; i <= 20; ++i) EXPECT_TRUE(go(N * i / 20, 0));
+    eps_begin = eps_0;
+  }
+  bool go(double N, double rotation) {
+    return nearfield::advance_section_at(grid, state, N, rotation / length, 0, eps_0, forces);
+  }
+  double elongation(double N) const { return length * (eps_0 - eps_begin) - (N - N_begin) * length / EA; }
+};
+
+// The zone's elongation against fibres that remember, on paths of one push under forces that stay or change.
+TEST(ZoneElongation, IsThatOfFibresOnOnePush) {
+  const nearfield::ZoneInput in = make_zone_I();
+  const nearfield::Rcc rcc = nearfield::make_rcc(in);
+  const double EI = rcc.calc_EI_effective_y(-0.86 * MN);
+  const struct {
+    double from, to, rotation;  // forces at the begin and at the end [MN]
+  } paths[] = {{0, 0, 0.03},       {-0.5, -0.5, 0.04}, {-1, -1, 0.04},    {-2, -2, 0.05},
+               {-2.6, -2.6, 0.06}, {-3, -3, 0.045},    {-1.4, -3, 0.045}, {-3, -1.4, 0.045}};
+  for (const auto& path : paths) {
+    Zone zone(rcc, EI, EI, 4, PlasticFrom::Yield, elongating());
+    History fibres(in, rcc, path.from * MN);
+    double worst = 0, largest = 0;
+    constexpr int n = 8000;
+    for (int i = 1; i <= n; ++i) {
+      const double rotation = path.rotation * i / n, N = (path.from + (path.to - path.from) * i / n) * MN;
+      ASSERT_TRUE(zone.go(N, rotation)) << N << " at " << rotation;
+      if (i % 20 != 0) continue;
+      ASSERT_TRUE(fibres.go(N, rotation));
+      worst = std::max(worst, std::abs(zone.z.axial - fibres.elongation(N)));
+      largest = std::max(largest, std::abs(fibres.elongation(N)));
+    }
+    std::printf("  %.1f to %.1f MN, %.3f rad: fibres %.2f mm, zone %.2f mm, largest difference %.2f of %.2f mm\n",
+                path.from, path.to, path.rotation, 1e3 * fibres.elongation(path.to * MN), 1e3 * zone.z.axial,
+                1e3 * worst, 1e3 * largest);
+    // Before first yield a zone has none of the 0.3 mm of cracking; where bars buckle between two of the family's
+    // forces its march, which takes unloading fibres as new, is off by as much again, and by a fifth under a force that
+    // falls.
+    EXPECT_LT(worst, 0.2 * largest + 0.8e-3);
+    EXPECT_GT(zone.z.plastic, 0);
+  }
+}
+
+// What it leaves when it is turned back under usual forces, and how far it is from the fibres then.
+TEST(ZoneElongation, StaysWhenTheRotationComesBack) {
+  const nearfield::ZoneInput in = make_zone_I();
+  const nearfield::Rcc rcc = nearfield::make_rcc(in);
+  const double EI = rcc.calc_EI_effective_y(-0.86 * MN);
+  for (const double N : {-0.5 * MN, -1 * MN}) {
+    Zone zone(rcc, EI, EI, 4, PlasticFrom::Yield, elongating());
+    History fibres(in, rcc, N);
+    const auto go = [&](double from, double to) {
+      for (int i = 1; i <= 4000; ++i) {
+        const double rotation = from + (to - from) * i / 4000;
+        ASSERT_TRUE(zone.go(N, rotation));
+        if (i % 20 == 0) { ASSERT_TRUE(fibres.go(N, rotation)); }
+      }
+    };
+    go(0, 0.03);
+    const double kept = zone.z.axial;
+    go(0.03, -0.02);
+    EXPECT_EQ(zone.z.axial, kept);
+    std::printf("  %.1f MN, forth to 0.03 and back to -0.02 rad: fibres %.2f mm, zone %.2f mm\n", N / MN,
+                1e3 * fibres.elongation(N), 1e3 * zone.z.axial);
+    EXPECT_NEAR(zone.z.axial, fibres.elongation(N), 2e-3);
+  }
+}
+
+// A hinge that has turned is pressed together at a held rotation: its compression against that of fibres.
+TEST(ZoneCrushing, OfATurnedHingeKeepsWhatFibresKeep) {
+  const nearfield::ZoneInput in = make_zone_I();
+  const nearfield::Rcc rcc = nearfield::make_rcc(in);
+  const double EI = rcc.calc_EI_effective_y(-0.86 * MN), N = -2.2 * MN;
+  for (const double rotation : {0.015, 0.024, 0.04}) {
+    Zone zone(rcc, EI, EI, 4, PlasticFrom::Yield, elongating());
+    History fibres(in, rcc, N);
+    for (int i = 1; i <= 4000; ++i) {
+      ASSERT_TRUE(zone.go(N, rotation * i / 4000));
+      if (i % 20 == 0) { ASSERT_TRUE(fibres.go(N, rotation * i / 4000)); }
+    }
+    mbs::Six d;
+    const double start = N / zone.p.stiffness[0] + zone.z.axial, eps_0 = fibres.eps_0;
+    double peak[2] = {0, 0};
+    for (int i = 1; i <= 1000; ++i) {
+      const double down = 1e-2 * i / 1000;
+      d.c[0] = start - down, d.c[4] = rotation;
+      mbs::advance_zone(zone.p, zone.laws, d, 0, 0, zone.z);
+      const double bears = -zone.z.resultant.c[0];
+      const double expected =
+          -nearfield::advance_section(fibres.grid, fibres.state, eps_0 - down / in.length, rotation / in.length, 0).N;
+      peak[0] = std::max(peak[0], bears), peak[1] = std::max(peak[1], expected);
+      // what buckled bars and crushed concrete bear; the moment that fibres bear beyond the family's end is left out
+      if (down > 4e-3) { ASSERT_NEAR(bears, expected, 0.15 * expected) << rotation << " after " << down; }
+    }
+    std::printf("  at %.3f rad: fibres bear at most %.2f MN, the zone %.2f MN\n", rotation, peak[1] / MN, peak[0] / MN);
+    EXPECT_NEAR(peak[0], peak[1], 0.25 * peak[1]) << rotation;
   }
 }
 
