@@ -296,11 +296,12 @@ std::vector<std::string> describe(const MeshReport& r) {
       fmt::format("Smallest edge {:.0f} mm ({}), largest aspect ratio {:.1f}, critical step {:.4f} ms ({}).",
                   1e3 * r.mesh.smallest_edge, r.smallest_edge_member, r.mesh.largest_aspect, 1e3 * r.mesh.critical_step,
                   r.critical_member));
-  std::string fits = "Volumes: ";
-  fits += r.smallest_fit < 1 ? fmt::format("{:.1f} % ({})", 100 * r.smallest_fit, r.smallest_member) : "100 %";
-  fits += r.largest_fit > 1 ? fmt::format(" to {:.1f} % ({})", 100 * r.largest_fit, r.largest_member) : " to 100 %";
-  fits += " of the plan's; their masses are the plan's.";
-  lines.push_back(fits);
+  const auto share = [](double fit, const std::string& member) {
+    return fit == 1 ? std::string("100 %") : fmt::format("{:.1f} % ({})", 100 * fit, member);
+  };
+  lines.push_back(fmt::format("Volumes: {} to {} of the plan's; their masses are the plan's.",
+                              share(std::min(1.0, r.smallest_fit), r.smallest_member),
+                              share(std::max(1.0, r.largest_fit), r.largest_member)));
   lines.push_back(r.largest_shift > 1e-6 ? fmt::format("Faces were moved by at most {:.0f} mm ({}).",
                                                        1e3 * r.largest_shift, r.shifted_member)
                                          : std::string("No face was moved."));

@@ -11,7 +11,7 @@ export function localiseRun(run: Run): Run {
     if (!names.has(f.title)) f.title = say(f.title);
     f.text = say(f.text);
   }
-  for (const e of run.events) if (e.kind !== "stage") e.text = say(e.text);
+  for (const e of run.events) e.text = say(e.text);
   for (const s of run.series) s.title = say(s.title);
   for (const v of run.plan_values) {
     if (v.group !== "Sections") v.key = say(v.key);

@@ -1,17 +1,21 @@
-// The German table: whole, used, and enough for what the program says. TOPPLE_REPORT=FILE also compares the German page of a
-// real run with the English one.
+// The German table: whole, used, and enough for what the program says. TOPPLE_REPORT=FILE, TOPPLE_STUDY=FILE compare
+// the German page of a real run or study with the English one, instead of that of a made-up study.
 import assert from "node:assert/strict";
 import { mkdir, readFile, readdir, writeFile } from "node:fs/promises";
 import { fileURLToPath } from "node:url";
 import { openPage } from "./browser.mjs";
 import { describe, it } from "./harness.mjs";
 import { load } from "./load.mjs";
+import { makeStudy, writeStudy } from "./study-data.mjs";
+import { hostile } from "./synthetic.mjs";
 
 const { german } = await load("words_de.ts");
 const { translate, commas } = await load("translate.ts");
+const { prettify } = await load("units.ts");
+const { titleOf, unitWord } = await load("study/data.ts");
 const root = fileURLToPath(new URL("../../", import.meta.url));
 const out = fileURLToPath(new URL("out/german/", import.meta.url));
-const given = process.env.TOPPLE_REPORT;
+const { TOPPLE_REPORT: run, TOPPLE_STUDY: study } = process.env;
 
 const places = (text) => text.match(/\{[^}]*\}/g) ?? [];
 /// The fixed words of a text.
@@ -51,28 +55,41 @@ describe("the German table", () => {
   });
 
   it("holds no text that nobody says any more", async () => {
-    const program = literalsOf(await readAll("src", /\.(cpp|h)$/)).join("\n").replace(/\{[^}]*\}/g, "{}");
+    const program = literalsOf(await readAll("src", /\.(cpp|h)$/)).map(normalise).join("\n").replace(/\{[^}]*\}/g, "{}");
     const pages = (await readAll("web/src", /^(?!words_de).*\.tsx?$/)).replace(/\s+/g, " ");
     const corpus = `${program.replace(/\s+/g, " ")}\n${pages}`;
     // sentences are put together at their signs
-    // put together from words that depend on the run
-    const made = ["No part of the upper block has touched the ground so far.", "No part of the upper block touched the ground."];
-    const pieces = (english) => (made.includes(english) ? ["No part of the upper block"] : fragments(english.replace(/ \[[^\]]*\]$/, ""))).flatMap((part) => part.split(/[;:,.()]+ ?/)).filter((part) => /[A-Za-z]{3}/.test(part)).map((part) => part.trim());
+    // put together from words that depend on the run: what all of them have
+    const made = [/^No part of the upper block/, /^Breaking/, /^no dead-load equilibrium after \S+ iterations: the largest unbalanced force/, /^dead load/];
+    const pieces = (english) => (made.some((start) => start.test(english)) ? fragments(made.map((start) => start.exec(english)?.[0] ?? "").join("")) : fragments(english.replace(/ \[[^\]]*\]$/, ""))).flatMap((part) => part.split(/[;:,.()]+ ?/)).filter((part) => /[A-Za-z]{3}/.test(part)).map((part) => part.trim());
     const stale = german.map(([english]) => english).filter((english) => !pieces(english).every((part) => corpus.includes(part)));
     assert.deepEqual(stale, []);
   });
 
-  it("knows every sentence of the findings, events and values that a run tells", async () => {
+  // how a text of the sources stands in the table
+  const normalise = (text) => text.replaceAll("\\n", " ").replace(/%[-+.\d]*l?[dsgfe]/g, "{}").replaceAll("%%", "%");
+
+  it("knows every sentence that findings, events, values, notes and studies tell", async () => {
     const table = german.map(([english]) => english.replace(/\{[^}]*\}/g, "{}").replace(/\s+/g, " ")).join("\n");
+    const tellers = {
+      collapse: ["findings", "mechanism", "recorder", "plan_record", "vibration", "shafts"],
+      farfield: ["run", "fragments", "whole", "motion"],
+      study: ["story", "plan_model"],
+      fem: ["relaxation"],
+      mbs: ["equilibrium"],
+    };
     const missing = [];
-    for (const file of ["findings", "mechanism", "recorder", "plan_record", "vibration"]) {
-      const text = await readFile(`${root}src/collapse/${file}.cpp`, "utf8");
-      for (const literal of literalsOf(text.replace(/\/\/.*/g, ""))) {
-        if (/\/|^\w+\.|_/.test(literal)) continue; // includes, ids, names of files
-        for (const part of fragments(literal))
-          if (part.split(" ").length >= 3 && !table.includes(part.replace(/^[;,:. )]+|[;,:. (]+$/g, ""))) missing.push(`${file}.cpp: ${part}`);
+    for (const [folder, files] of Object.entries(tellers))
+      for (const file of files) {
+        const text = await readFile(`${root}src/${folder}/${file}.cpp`, "utf8");
+        // what is refused goes to the terminal
+        const told = text.replace(/\/\/.*/g, "").replace(/\b(?:InputError|runtime_error|complain)\b[\s\S]*?;\n/g, "");
+        for (const literal of literalsOf(told)) {
+          if (/\/|^\w+\.|_/.test(literal)) continue; // includes, ids, names of files
+          for (const part of fragments(normalise(literal)).map((p) => p.replace(/^[;,:. )"+]+|[;,:. ("]+$/g, "")))
+            if (part.split(" ").length >= 3 && !table.includes(part)) missing.push(`${folder}/${file}.cpp: ${part}`);
+        }
       }
-    }
     assert.deepEqual(missing, []);
   });
 
@@ -101,32 +118,80 @@ const collect = (page) =>
     return out;
   });
 
-if (given !== undefined)
+/// Compares the page at `path` with itself in German. `name` names the picture that is left for people to look at; `namesOf`
+/// gives, of the page's data, what people named and what is alike in both languages.
+async function compareLanguages(path, name, namesOf) {
+  await mkdir(out, { recursive: true });
+  const english = await readFile(path, "utf8");
+  const germanPath = `${out}${name}.html`;
+  await writeFile(germanPath, english.replace('<html lang="en">', '<html lang="de">'));
+  const one = await openPage(path), other = await openPage(germanPath);
+  for (const { page } of [one, other])
+    await page.evaluate(() => {
+      for (const e of document.querySelectorAll("details")) e.open = true;
+      return new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
+    });
+  const before = await collect(one.page), after = await collect(other.page);
+  const { alike, named } = namesOf(JSON.parse(await one.page.textContent("#topple-data")));
+  assert.equal(after.length, before.length);
+  const names = new Set([...alike, ...named].flatMap((text) => [text, commas(prettify(text ?? ""))]));
+  const isNumber = /^[\d.,:\s·–≥≤%×^−-]*(?:m|s|t|MJ|MN|ms|UTC)?$/;
+  const left = after.filter((text, i) => (text === before[i] || text === commas(before[i])) && /[A-Za-z]{2}/.test(text) && !names.has(text) && !isNumber.test(text));
+  assert.deepEqual([...new Set(left)], []);
+  // function words of English, apart from names that people gave
+  const words = /\b(?:the|of|and|with|from|which|when|than|its|are|were|has|have|this|that|not)\b/i;
+  const odd = after.filter((text) => words.test(named.filter((t) => t !== "").reduce((rest, title) => rest.replaceAll(title, ""), text)));
+  assert.deepEqual([...new Set(odd)], []);
+  assert.deepEqual([...one.problems, ...other.problems], []);
+  const title = await other.page.title();
+  await other.page.screenshot({ path: `${out}${name}.png`, fullPage: true });
+  await one.close();
+  await other.close();
+  return title;
+}
+
+const namesOfRun = (data) => {
+  const { provenance: p } = data;
+  const alike = [p.plan_path, p.plan_sha256, p.engine, p.machine, `topple ${p.program_version}`, `topple ${p.program_version} ·`, "Plan", "Zone", "Esc", "Problem", "Moment", "[MJ]", "[MN]"];
+  for (const list of [data.bodies, data.zones, data.neighbours]) for (const one of list) alike.push(one.name);
+  for (const v of data.plan_values) alike.push(v.key, v.value, v.value.split(", ")[0]);
+  // findings about one member, under its name
+  for (const f of data.findings) if (/^farfield\.zone\.\d+$/.test(f.id)) alike.push(f.title);
+  const named = [p.title, ...data.neighbours.map((n) => n.name), ...data.events.filter((e) => e.kind === "stage").map((e) => /"(.*)"/.exec(e.text)?.[1] ?? "")];
+  return { alike, named };
+};
+
+const namesOfStudy = (data) => {
+  const quantities = [...data.inputs.flatMap((q) => [q.name, q.label]), ...data.derived.map((q) => q.name), ...data.outputs.map((q) => q.name)];
+  const units = [...data.inputs, ...data.derived, ...data.outputs].map((q) => q.unit);
+  const alike = [...quantities, ...units, data.origin.source_name, data.origin.model, data.origin.program_version, "α", "Plan"];
+  for (const q of [...data.inputs, ...data.derived, ...data.outputs]) alike.push(titleOf(q), unitWord(q.unit), `[${unitWord(q.unit)}]`);
+  // what a model says of its own failures, and what was typed
+  alike.push(...data.failures, data.boxes?.requirement, `topple ${data.origin.program_version}`);
+  return { alike, named: [data.title, data.asked, ...quantities, ...data.site.neighbours.map((n) => n.name)] };
+};
+
+if (run !== undefined)
   describe("the German page of a run", () => {
     it("has no English left", { timeout: 240000 }, async () => {
+      assert.match(await compareLanguages(run, "run", namesOfRun), /topple-Bericht$/);
+    });
+  });
+
+if (study !== undefined)
+  describe("the German page of a study", () => {
+    it("has no English left", { timeout: 240000 }, async () => {
+      assert.match(await compareLanguages(study, "study", namesOfStudy), /topple-Studie$/);
+    });
+  });
+
+if (run === undefined && study === undefined)
+  describe("the German page of a made-up study", () => {
+    it("has no English left", { timeout: 240000 }, async () => {
       await mkdir(out, { recursive: true });
-      const english = await readFile(given, "utf8");
-      const path = `${out}de.html`;
-      await writeFile(path, english.replace('<html lang="en">', '<html lang="de">'));
-      const one = await openPage(given), other = await openPage(path);
-      const before = await collect(one.page), after = await collect(other.page);
-      const data = JSON.parse(await one.page.textContent("#topple-data"));
-      assert.equal(after.length, before.length);
-      const { provenance: p } = data;
-      const names = new Set([p.title, p.plan_path, p.plan_sha256, p.engine, p.machine, `topple ${p.program_version}`, `topple ${p.program_version} ·`, "Plan", "Zone", "Esc", "Problem", "Moment"]);
-      for (const list of [data.bodies, data.zones, data.neighbours]) for (const one of list) names.add(one.name);
-      for (const v of data.plan_values) names.add(v.key), names.add(v.value.split(", ")[0]);
-      const left = after.filter((text, i) => text === before[i] && /[A-Za-z]{2}/.test(text) && !names.has(text) && !/^[\d.,:\s·–-]*(?:m|s|t|MJ|MN|ms|UTC)?$/.test(text) && !data.plan_values.some((v) => v.value === text));
-      assert.deepEqual([...new Set(left)], []);
-      // function words of English, apart from names that people gave
-      const words = /\b(?:the|of|and|with|from|which|when|than|its|are|were|has|have|this|that|not)\b/i;
-      const titles = [p.title, ...data.neighbours.map((n) => n.name), ...data.events.filter((e) => e.kind === "stage").map((e) => /"(.*)"/.exec(e.text)?.[1] ?? "")].filter((t) => t !== "");
-      const odd = after.filter((text) => words.test(titles.reduce((rest, title) => rest.replaceAll(title, ""), text)));
-      assert.deepEqual([...new Set(odd)], []);
-      assert.equal(await other.page.evaluate(() => document.title.endsWith("topple-Bericht")), true);
-      assert.deepEqual([...one.problems, ...other.problems], []);
-      await other.page.screenshot({ path: `${out}de.png`, fullPage: true });
-      await one.close();
-      await other.close();
+      // whatever people name: quotes and semicolons would be part of sentences
+      const made = JSON.parse(JSON.stringify(makeStudy()).replaceAll(JSON.stringify(hostile).slice(1, -1), "Kran"));
+      await writeStudy(made, `${out}made-up.en.html`);
+      await compareLanguages(`${out}made-up.en.html`, "made-up", namesOfStudy);
     });
   });

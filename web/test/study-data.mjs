@@ -45,9 +45,9 @@ export function makeStudy(count = 60) {
   return {
     format: "topple-study", version: 1, title: "Storehouse, fuzzy (synthetic)", state: "finished", ending: "complete", asked: "topple",
     verdict: [
-      { id: "verdict", status: "warning", text: "With the core values the outcome is \"topple\", as planned. It is not certain." },
-      { id: "outcome.vertical", status: "warning", text: `"vertical" is possible. It takes no more than ${hostile} 18 N/mm2.` },
-      { id: "failed", status: "warning", text: "1 of the runs failed." },
+      { id: "verdict", status: "warning", text: "With the core values the outcome is \"topple\", as planned. It is not certain: another outcome is possible (possibility at least 0.47), so its necessity is at most 0.53." },
+      { id: "outcome.vertical", status: "warning", text: `"vertical" is possible: possibility at least 0.47, necessity at most 0.00. It takes no more than ${hostile} 18 N/mm2 (core 25).` },
+      { id: "failed", status: "warning", text: `1 of ${count} runs failed; they are an outcome of their own, possible to at least 0.20. What would have happened there is not known.` },
     ],
     runs: count, failed: 1, seed: 1, inputs, derived: [{ name: "fct", unit: "N/mm2" }], outputs: [tilt, reach],
     outcomes: [
@@ -69,8 +69,8 @@ export function makeStudy(count = 60) {
     boxes: {
       requirement: "topple, reach <= 10", permissible_part: 0.62, permissible_part_error: 0.05, permissible_runs: 40, forbidden_runs: 19, failed_runs: 1, ending: "complete",
       list: [
-        { kept: true, guarantee: "No run violated the requirement in 25 inside. It is not proven.", inputs: [{ name: "fc", lower: 20, upper: 40, core: 28 }, { name: hostile, lower: 0.3, upper: 1.7, core: 1 }], volume: 0.4, runs: 25, fresh: 20, tries: 1, violating: 0.14, distance: 0.1, robustness: 1.2, outputs: [] },
-        { kept: false, guarantee: "Not kept: there were too few runs.", inputs: [{ name: "fc", lower: 20, upper: 21, core: null }, { name: hostile, lower: 0.3, upper: 0.4, core: null }], volume: 0.001, runs: 2, fresh: 0, tries: 0, violating: null, distance: 0, robustness: null, outputs: [] },
+        { kept: true, guarantee: "No run violated the requirement in 25 inside, 20 of them at fresh random points: with a confidence of 95 % at most 14.0 % of the box violates it. It is not proven, and smaller islands may exist.", inputs: [{ name: "fc", lower: 20, upper: 40, core: 28 }, { name: hostile, lower: 0.3, upper: 1.7, core: 1 }], volume: 0.4, runs: 25, fresh: 20, tries: 1, violating: 0.14, distance: 0.1, robustness: 1.2, outputs: [] },
+        { kept: false, guarantee: "Not kept: there were too few runs to check it at fresh points.", inputs: [{ name: "fc", lower: 20, upper: 21, core: null }, { name: hostile, lower: 0.3, upper: 0.4, core: null }], volume: 0.001, runs: 2, fresh: 0, tries: 0, violating: null, distance: 0, robustness: null, outputs: [] },
       ],
     },
     confirmation: {

@@ -2,17 +2,18 @@ import { formatDate, formatNumber, prettify } from "../units";
 import { isKnown, titleOf, type Driver, type Study } from "./data";
 import type { State } from "./state";
 import { OutcomeName } from "./verdict";
+import { say } from "../translate";
 
 function Share(props: { driver: Driver | undefined }) {
   const d = props.driver;
   if (d === undefined || d.first === null || d.first_error === null) return <td class="share"><span class="quiet">unknown</span></td>;
-  if (!isKnown(d)) return <td class="share"><span class="quiet">unknown, below {formatNumber(Math.max(0, d.first) + 2 * d.first_error, 2)}</span></td>;
+  if (!isKnown(d)) return <td class="share"><span class="quiet">{`unknown, below ${formatNumber(Math.max(0, d.first) + 2 * d.first_error, 2)}`}</span></td>;
   const percent = (v: number): string => `${Math.min(100, Math.max(0, 100 * v))}%`;
   return (
     <td class="share">
       <span class="degree" aria-hidden="true"><i style={{ width: percent(d.first) }} /></span>
       <span class="number">{d.first.toFixed(2)} ± {d.first_error.toFixed(2)}</span>
-      {d.total !== null && <span class="quiet"> with others {d.total.toFixed(2)}</span>}
+      {d.total !== null && <span class="quiet">{` with others ${d.total.toFixed(2)}`}</span>}
       <span class="quiet"> {d.places[0] === d.places[1] ? `place ${d.places[0]}` : `place ${d.places[0]} to ${d.places[1]}`}</span>
     </td>
   );
@@ -34,7 +35,8 @@ export function Drivers(props: { state: State }) {
         <>
           <p class="quiet">
             Part of the variance over the whole support that an input explains alone, with its standard error
-            {drivers.outputs.some((o) => o.inputs.some((d) => d.total !== null)) && ", and together with others"}. From {drivers.runs} runs ({drivers.from}). A share below its error is unknown.
+            {drivers.outputs.some((o) => o.inputs.some((d) => d.total !== null)) && ", and together with others"}
+            {`. From ${drivers.runs} runs (${drivers.from}). A share below its error is unknown.`}
           </p>
           <div class="scroller free" tabIndex={0} role="region" aria-label="Table of drivers">
             <table class="drivers">
@@ -80,13 +82,13 @@ export function Boxes(props: { state: State }) {
     <section class="panel" aria-label="Permissible values" data-test="boxes">
       <h2>Permissible values</h2>
       <p>
-        Asked: <strong>{boxes.requirement}</strong>. It holds on {formatNumber(100 * boxes.permissible_part, 3)} % of the support
-        (± {formatNumber(100 * boxes.permissible_part_error, 2)} %).
+        Asked: <strong>{boxes.requirement}</strong>
+        {`. It holds on ${formatNumber(100 * boxes.permissible_part, 3)} % of the support (± ${formatNumber(100 * boxes.permissible_part_error, 2)} %).`}
       </p>
       {boxes.list.length === 0 && <p class="quiet">No box of inputs was found that keeps it.</p>}
       {boxes.list.map((box, n) => (
         <div class={`box ${box.kept ? "" : "not-kept"}`} data-box={n}>
-          <h3>Box {n + 1}{box.kept ? "" : " (not kept)"}, {formatNumber(100 * box.volume, 2)} % of the support</h3>
+          <h3>{`Box ${n + 1}${box.kept ? "" : " (not kept)"}: ${formatNumber(100 * box.volume, 2)} % of the support`}</h3>
           <table class="box-table">
             <thead><tr><th scope="col">input</th><th scope="col">inside its support</th><th scope="col">from</th><th scope="col">core</th><th scope="col">to</th></tr></thead>
             <tbody>
@@ -128,12 +130,11 @@ export function Confirmed(props: { state: State }) {
     <section class="panel" aria-label="Confirmation by whole runs" data-test="confirmation">
       <h2>Condensed runs beside whole ones</h2>
       <p>
-        Runs were condensed: like frames of the building moved as one. {run} of them were run whole beside it; {alike} had the same outcome.
-        Of {c.bounds.length} bounds {states.map((s, i) => `${i === 0 ? "" : ", "}${c.bounds.filter((b) => b.state === s).length} ${s}`).join("")}.
+        {`Runs were condensed: like frames of the building moved as one. ${run} of them were run whole beside it; ${alike} had the same outcome.`}
+        {` Of ${c.bounds.length} bounds ${states.map((s) => `${c.bounds.filter((b) => b.state === s).length} ${say(s)}`).join(", ")}.`}
       </p>
       <p class="quiet">
-        Confirmed: whole runs in the cut come within {formatNumber(100 * c.tolerance, 2)} % of the output's width of the bound. Exceeded: one lies farther
-        out, the bound is too narrow. Not reached: none comes so far, the bound may be too wide. Not run: the limit of {c.limit} whole runs left it out.
+        {`Confirmed: whole runs in the cut come within ${formatNumber(100 * c.tolerance, 2)} % of the output's width of the bound. Exceeded: one lies farther out, the bound is too narrow. Not reached: none comes so far, the bound may be too wide. Not run: the limit of ${c.limit} whole runs left it out.`}
       </p>
       <table>
         <thead><tr><th scope="col">outcome</th><th scope="col">most possible run</th><th scope="col">whole</th><th scope="col" /></tr></thead>
@@ -141,7 +142,7 @@ export function Confirmed(props: { state: State }) {
           {c.outcomes.map((o) => (
             <tr>
               <th scope="row">{o.outcome}</th>
-              <td><button type="button" class="link" onClick={() => state.select(o.sample)}>run {o.sample}</button></td>
+              <td><button type="button" class="link" onClick={() => state.select(o.sample)}>{`run ${o.sample}`}</button></td>
               <td>{o.whole ?? "–"}</td><td>{o.state}</td>
             </tr>
           ))}
@@ -177,7 +178,7 @@ export function Notable(props: { state: State }) {
       <h2>Runs to look at</h2>
       <ul class="notable">
         {study.notable.map((n) => (
-          <li><button type="button" class="link" onClick={() => state.select(n.sample)}>run {n.sample}</button> {prettify(n.why)}</li>
+          <li><button type="button" class="link" onClick={() => state.select(n.sample)}>{`run ${n.sample}`}</button> {prettify(n.why)}</li>
         ))}
       </ul>
       {study.failures.length > 0 && (
@@ -246,7 +247,7 @@ export function Origin(props: { study: Study }) {
       <table class="pairs"><tbody>{pairs.map(([key, value]) => <tr><th scope="row">{key}</th><td>{value}</td></tr>)}</tbody></table>
       {origin.source !== "" && (
         <details>
-          <summary>Text of {origin.source_name || "the file"}</summary>
+          <summary>{origin.source_name === "" ? "Text of the file" : `Text of ${origin.source_name}`}</summary>
           <pre class="plan-text" tabIndex={0}>{origin.source}</pre>
         </details>
       )}
