@@ -12,6 +12,7 @@
 #include "collapse/outcome.h"
 #include "collapse/rigid_block.h"
 #include "collapse/stability.h"
+#include "record/told.h"
 
 namespace topple::collapse {
 
@@ -38,7 +39,7 @@ struct Context {
 
   void add(const std::string& id, const std::string& heading, const std::string& title, const std::string& text,
            double value = kNone, const std::string& unit = "", Status status = Status::Info) const {
-    r.findings.push_back({id, heading, title, text, value, unit, status});
+    record::add_finding(r, {id, heading, title, text, value, unit, status});
   }
   std::vector<StageTimes> stage_times() const { return find_stage_times(map); }
   std::string stage_name(size_t s) const { return plan.stages[s].name; }

@@ -10,6 +10,7 @@
 
 #include "base/rotation_fit.h"
 #include "base/unit.h"
+#include "record/told.h"
 
 namespace topple::collapse {
 
@@ -336,8 +337,8 @@ double Recorder::kinetic_at(double time) const {
 }
 
 void Recorder::add_event(record::Event event) {
-  if (callbacks_.on_event) callbacks_.on_event(event);
-  record_.events.push_back(std::move(event));
+  record::add_event(record_, std::move(event));
+  if (callbacks_.on_event) callbacks_.on_event(record_.events.back());
 }
 
 void Recorder::add_happening(const mbs::Happening& h) {

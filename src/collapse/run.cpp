@@ -13,6 +13,7 @@
 #include "collapse/recorder.h"
 #include "engines/engine.h"
 #include "mbs/quantity.h"
+#include "record/told.h"
 
 namespace topple::collapse {
 
@@ -60,7 +61,8 @@ void add_checks(const mbs::Model& model, const mbs::Summary& s, bool equilibrium
   using record::Status;
   const auto add = [&r](const std::string& id, const char* title, const std::string& text, double value,
                         const char* unit, Status status) {
-    r.findings.push_back({id, id.rfind("note.", 0) == 0 ? "Notes" : "Verification", title, text, value, unit, status});
+    record::add_finding(r,
+                        {id, id.rfind("note.", 0) == 0 ? "Notes" : "Verification", title, text, value, unit, status});
   };
   if (equilibrium)
     add("verification.equilibrium", "Equilibrium under dead load",

@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "base/unit.h"
+#include "record/told.h"
 
 namespace topple::farfield {
 
@@ -146,7 +147,7 @@ void add_fragment_findings(const product::Plan& plan, const Fragments& f, double
   constexpr size_t most = 12;  // zones that get a line of their own
   const auto add = [&r](const std::string& id, const std::string& title, const std::string& text, double value,
                         const char* unit, record::Status status) {
-    r.findings.push_back({id, "Zones and fragments", title, text, value, unit, status});
+    record::add_finding(r, {id, "Zones and fragments", title, text, value, unit, status});
   };
   if (f.zones.empty()) {
     add("farfield.zones", "Zones of accumulated damage",

@@ -12,6 +12,7 @@
 #include "farfield/checkpoint.h"
 #include "farfield/fragments.h"
 #include "farfield/motion.h"
+#include "record/told.h"
 
 namespace topple::farfield {
 
@@ -341,7 +342,7 @@ class Course {
 void Course::add_findings(record::Record& r) const {
   const auto add = [&r](const std::string& id, const char* title, const std::string& text, double value,
                         const char* unit, Status status) {
-    r.findings.push_back({id, "Finite elements", title, text, value, unit, status});
+    record::add_finding(r, {id, "Finite elements", title, text, value, unit, status});
   };
   add_fragment_findings(plan_, state_.fragments, state_.fragments_time, r);
   std::string text;

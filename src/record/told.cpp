@@ -1,0 +1,35 @@
+#include "record/told.h"
+
+#include <cctype>
+#include <utility>
+
+namespace topple::record {
+
+std::string drop_negative_zeros(const std::string& text) {
+  const auto at = [&text](size_t i) { return i < text.size() ? text[i] : ' '; };
+  const auto is_part = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; };
+  std::string out;
+  for (size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '-' && at(i + 1) == '0' && (i == 0 || !(is_part(text[i - 1]) || text[i - 1] == ')'))) {
+      size_t end = i + 1;
+      bool has_point = false;
+      while (at(end) == '0' || (at(end) == '.' && !has_point && at(end + 1) == '0')) has_point |= at(end++) == '.';
+      // "-0.05", "-0x" and "-0-1" go on
+      if (!is_part(at(end)) && at(end) != '-') continue;
+    }
+    out += text[i];
+  }
+  return out;
+}
+
+void add_finding(Record& r, Finding finding) {
+  finding.text = drop_negative_zeros(finding.text);
+  r.findings.push_back(std::move(finding));
+}
+
+void add_event(Record& r, Event event) {
+  event.text = drop_negative_zeros(event.text);
+  r.events.push_back(std::move(event));
+}
+
+}  // namespace topple::record

@@ -1,0 +1,17 @@
+#pragma once
+/// The one way of findings and events into a record: what people read in them is the same everywhere.
+
+#include <string>
+
+#include "record/record.h"
+
+namespace topple::record {
+
+/// The text without the sign of numbers that are zero as they are written: "-0.00 m" becomes "0.00 m". Numbers stand
+/// free: a minus behind a letter, digit or bracket belongs to a name or an exponent.
+std::string drop_negative_zeros(const std::string& text);
+
+void add_finding(Record&, Finding);
+void add_event(Record&, Event);
+
+}  // namespace topple::record

@@ -1,0 +1,30 @@
+#include "record/told.h"
+
+#include <gtest/gtest.h>
+
+namespace topple::record {
+namespace {
+
+TEST(Told, TakesTheSignFromNumbersThatAreZeroAsWritten) {
+  EXPECT_EQ(drop_negative_zeros("0.10 MJ and -0.00 MN s"), "0.10 MJ and 0.00 MN s");
+  EXPECT_EQ(drop_negative_zeros("-0"), "0");
+  EXPECT_EQ(drop_negative_zeros("at (-0.0, 3.1, -0) m, -0.000."), "at (0.0, 3.1, 0) m, 0.000.");
+  EXPECT_EQ(drop_negative_zeros("-0 deg: -0."), "0 deg: 0.");
+}
+
+TEST(Told, LeavesNamesExponentsAndOtherNumbersAlone) {
+  for (const char* text : {"-0.05 m", "-0.50", "C-A1-0 and C-A1-0/foot", "1.0e-05 J, 2e-0", "-10", "1.5 - 0.0",
+                           "S-A1B2-0", "-0x", "10-0", "-0.0001", "- 0", "towards -x", "-"})
+    EXPECT_EQ(drop_negative_zeros(text), text);
+}
+
+TEST(Told, CleansTextsOnTheirWayIntoTheRecord) {
+  Record r;
+  add_finding(r, {"debris.reach", "", "", "-0.0 m towards -x", -0.0, "m", Status::Info});
+  add_event(r, {1, "touchdown", "C-A1-0", "C-A1-0 touches the ground (-0.00 MN s)"});
+  EXPECT_EQ(r.findings[0].text, "0.0 m towards -x");
+  EXPECT_EQ(r.events[0].text, "C-A1-0 touches the ground (0.00 MN s)");
+}
+
+}  // namespace
+}  // namespace topple::record
