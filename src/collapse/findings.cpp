@@ -444,7 +444,7 @@ void add_verification(const Context& c) {
                           "(accepted: {:.2g} %){}.",
                           100 * s.energy_error, 100 * c.k.verification_energy_error,
                           s.energy_error > c.k.verification_energy_error
-                              ? fmt::format("; a step of {:.2g} ms makes it smaller", s.step * 500)
+                              ? fmt::format("; a step of {:.2g} ms shows whether it is the step's", s.step * 500)
                               : ""),
         negligible ? 0 : s.energy_error, "1",
         negligible || s.energy_error <= c.k.verification_energy_error ? Status::Good : Status::Bad);

@@ -55,7 +55,7 @@ function Page(props: { state: State; fitRef: { current: () => void } }) {
         </div>
         <div class="below">
           <div class="tables">
-            <Events state={state} />
+            <Events state={state} isPrinted />
             <PlanValues run={run} />
             <Details run={run} />
             <SitePlan run={run} />

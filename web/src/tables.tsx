@@ -1,12 +1,44 @@
 import { useComputed } from "@preact/signals";
 import type { Run } from "./data";
+import { groupEvents } from "./event_groups";
 import { EventSign } from "./signs";
 import { showStage, type State } from "./state";
 import { formatDate, formatDuration, formatMass, formatNumber, formatTime, prettify } from "./units";
 import { wordsOfEvent } from "./vocabulary";
 import { findBody } from "./zones";
 
-export function Events(props: { state: State }) {
+const mostSubjects = 5; // of a group that are named on paper
+
+/// On paper, instead of the list.
+function EventGroups(props: { run: Run }) {
+  return (
+    <div class="event-groups">
+      <table>
+        <tbody>
+          {groupEvents(props.run.events).map((group) => {
+            const first = group.events[0] as Run["events"][number];
+            const subjects = [...new Set(group.events.map((e) => e.subject).filter((s) => s !== ""))];
+            const others = subjects.length - mostSubjects;
+            return (
+              <tr>
+                <td class="number">{group.from === group.to ? formatTime(group.from) : `${formatTime(group.from)} – ${formatTime(group.to)}`}</td>
+                <th scope="row"><EventSign kind={group.kind} /> {wordsOfEvent(group.kind).word}</th>
+                <td class="number">{group.events.length > 1 && `${group.events.length} ×`}</td>
+                <td>
+                  {group.events.length === 1 ? first.text || first.subject : subjects.slice(0, mostSubjects).join(", ")}
+                  {group.events.length > 1 && others > 0 && ` and ${others} more`}
+                </td>
+              </tr>
+            );
+          })}
+        </tbody>
+      </table>
+      <p class="quiet">Events of one kind that follow each other are one line here; the record and events.csv have each with its time.</p>
+    </div>
+  );
+}
+
+export function Events(props: { state: State; isPrinted?: boolean }) {
   const { state } = props;
   const { run } = state;
   const count = new Map<string, number>();
@@ -32,6 +64,7 @@ export function Events(props: { state: State }) {
           ))}
         </div>
       )}
+      {props.isPrinted === true && <EventGroups run={run} />}
       <div class="scroller" tabIndex={0} role="region" aria-label="List of events">
         {state.shownEvents.value.map((event, i) => (
           <button

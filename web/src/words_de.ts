@@ -165,7 +165,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["Energy balance", "Energiebilanz"],
   ["The largest error of the energy balance is {:.1e} J, the work of lifting the building by {:.2g} mm.", "Der größte Fehler der Energiebilanz ist {} J, die Arbeit, das Gebäude um {} mm anzuheben."],
   ["The largest error of the energy balance is {:.2g} % of the released potential energy (accepted: {:.2g} %).", "Der größte Fehler der Energiebilanz ist {} % der frei gewordenen Lageenergie (zulässig: {} %)."],
-  ["The largest error of the energy balance is {:.2g} % of the released potential energy (accepted: {:.2g} %); a step of {:.2g} ms makes it smaller.", "Der größte Fehler der Energiebilanz ist {} % der frei gewordenen Lageenergie (zulässig: {} %); ein Zeitschritt von {} ms macht ihn kleiner."],
+  ["The largest error of the energy balance is {:.2g} % of the released potential energy (accepted: {:.2g} %); a step of {:.2g} ms shows whether it is the step's.", "Der größte Fehler der Energiebilanz ist {} % der frei gewordenen Lageenergie (zulässig: {} %); ein Zeitschritt von {} ms zeigt, ob er vom Schritt kommt."],
   ["Equilibrium under dead load", "Gleichgewicht unter Eigengewicht"],
   ["After {} iterations the largest unbalanced force is {:.1e} of the weight, and the reactions of the ground differ from the weight by {:.1e} of it.", "Nach {} Iterationen ist die größte nicht ausgeglichene Kraft das {}-Fache des Gewichts, und die Auflagerkräfte weichen um das {}-Fache davon ab."],
   ["After {} iterations the largest unbalanced force is {:.1e} of the weight, and the reactions of the ground differ from the weight by {:.1e} of it (the first charges fire in this instant).", "Nach {} Iterationen ist die größte nicht ausgeglichene Kraft das {}-Fache des Gewichts, und die Auflagerkräfte weichen um das {}-Fache davon ab (die ersten Ladungen zünden in diesem Augenblick)."],
@@ -523,6 +523,8 @@ export const german: readonly (readonly [string, string])[] = [
   ["Record", "Aufzeichnung"],
   ["the file of the run (record.h5), from which this page was made", "die Datei der Rechnung (record.h5), aus der diese Seite gemacht ist"],
   ["{:d} of {:d} limits broken so far", "Bisher {} von {} Vorgaben nicht eingehalten"],
+  ["and {:d} more", "und {} weitere"],
+  ["Events of one kind that follow each other are one line here; the record and events.csv have each with its time.", "Ereignisse einer Art, die aufeinander folgen, stehen hier in einer Zeile; die Aufzeichnung und events.csv haben jedes mit seiner Zeit."],
   // the page of a study
   ["topple study", "topple-Studie"],
   ["Study", "Studie"],

@@ -227,3 +227,25 @@ describe("colours of the picture", () => {
       linear(css).forEach((value, k) => assert.ok(Math.abs((toScreen(value) / 65535) * 255 - parseInt(css.slice(1 + 2 * k, 3 + 2 * k), 16)) < 0.5, css));
   });
 });
+
+describe("events on paper", () => {
+  const make = (kind, ...times) => times.map((time) => ({ time, kind, subject: `C-${time}`, text: "" }));
+
+  it("puts events of one kind that follow each other into one line, and stages apart", async () => {
+    const { groupEvents } = await load("event_groups.ts");
+    const groups = groupEvents([...make("stage", 0, 1), ...make("yield", 0.01, 0.05, 0.98, 1.02, 1.06), ...make("touchdown", 1.03)]);
+    assert.deepEqual(groups.map((g) => [g.kind, g.from, g.to, g.events.length]),
+      [["stage", 0, 0, 1], ["yield", 0.01, 0.05, 2], ["yield", 0.98, 0.98, 1], ["stage", 1, 1, 1], ["yield", 1.02, 1.06, 2], ["touchdown", 1.03, 1.03, 1]]);
+    assert.deepEqual(groupEvents([]), []);
+  });
+
+  it("fits on a page however many there are, and loses none", async () => {
+    const { groupEvents } = await load("event_groups.ts");
+    const events = ["yield", "rupture", "contact"].flatMap((kind) => make(kind, ...Array.from({ length: 500 }, (_, i) => 0.3 * i)));
+    const groups = groupEvents(events);
+    assert.ok(groups.length <= 36, String(groups.length));
+    assert.equal(groups.reduce((sum, g) => sum + g.events.length, 0), events.length);
+    // stages are never joined
+    assert.equal(groupEvents(make("stage", ...Array.from({ length: 50 }, (_, i) => i))).length, 50);
+  });
+});
