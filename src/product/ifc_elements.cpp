@@ -30,6 +30,20 @@ const std::set<std::string>& element_types() {
   return types;
 }
 
+/// Of its box, what the volume of a mesh has to fill to be taken for it. Walls have openings.
+constexpr double kFilled = 0.9, kFilledWall = 0.5;
+constexpr double kStraight = 0.8;  // distance of a bar's ends over its length; ties are bent round
+
+/// What a body is made of. Points in world axes [m].
+struct Body {
+  std::vector<Vec3> corners;  // of extrusions: foot and head of each corner of the profile in turn
+  std::vector<Vec3> points;   // of meshes
+  std::vector<Vec3> faces;    // their normals, as long as twice the area [m²]
+  double volume = 0;          // of meshes [m³]
+  bool is_round = false;
+  std::string why;  // what was not understood
+};
+
 class Reader {
  public:
   Reader(const StepFile& file) : file_(file) {}
@@ -38,16 +52,13 @@ class Reader {
     out_.schema = file_.schema;
     read_units();
     for (const StepEntity* b : file_.of_type("IFCBUILDING")) out_.name = b->at(2).text;
-    for (const StepEntity* s : file_.of_type("IFCBUILDINGSTOREY")) {
-      const double z = s->at(9).kind == Kind::Number ? s->at(9).number * out_.length_unit : placement(s->at(5)).p.z;
-      out_.storeys.emplace_back(s->at(2).text, z);
-    }
+    read_storeys();
     std::stable_sort(out_.storeys.begin(), out_.storeys.end(),
                      [](const auto& a, const auto& b) { return a.second < b.second; });
     read_materials();
     for (const StepEntity* r : file_.of_type("IFCRELAGGREGATES"))
       for (const StepValue& part : r->at(5).items) whole_of_[part.id()] = r->at(4).id();
-    std::vector<std::vector<Vec3>> corners;
+    std::vector<Body> bodies;
     for (const auto& [id, e] : file_.entities) {
       if (element_types().count(e.type) == 0) continue;
       IfcElement element;
@@ -56,21 +67,12 @@ class Reader {
       element.name = e.at(2).text;
       element.id = id;
       element.material = material_of(id);
-      corners.emplace_back();
-      element.has_box = find_corners(e, corners.back(), element.is_round);
+      bodies.push_back(find_body(e));
+      element.is_round = bodies.back().is_round;
       out_.elements.push_back(std::move(element));
     }
-    find_angle(corners);
-    for (size_t i = 0; i < corners.size(); ++i) {
-      IfcElement& e = out_.elements[i];
-      if (!e.has_box) continue;
-      e.low = {1e30, 1e30, 1e30};
-      e.high = {-1e30, -1e30, -1e30};
-      for (const Vec3& c : corners[i]) {
-        const Vec3 p = turn(c);
-        for (int k = 0; k < 3; ++k) e.low[k] = std::min(e.low[k], p[k]), e.high[k] = std::max(e.high[k], p[k]);
-      }
-    }
+    find_angle(bodies);
+    for (size_t i = 0; i < bodies.size(); ++i) find_box(bodies[i], out_.elements[i]);
     read_bars();
     return std::move(out_);
   }
@@ -83,6 +85,8 @@ class Reader {
     for (const StepEntity* a : file_.of_type("IFCUNITASSIGNMENT"))
       for (const StepValue& v : a->at(0).items) {
         const StepEntity* u = get(v);
+        if (u != nullptr && u->at(1).text == "PLANEANGLEUNIT" && u->type == "IFCCONVERSIONBASEDUNIT")
+          if (const StepEntity* measure = get(u->at(3))) angle_unit_ = measure->at(0).number;
         if (u == nullptr || u->at(1).text != "LENGTHUNIT") continue;
         if (u->type == "IFCSIUNIT") {
           const std::string prefix = u->at(2).text;
@@ -132,11 +136,113 @@ class Reader {
     return placement(e->at(0), depth + 1) * axis_placement(e->at(1));
   }
 
+  /// Heights of storeys: those of their placements, which know where site and building lie; of files that place all
+  /// storeys at one height, their elevations.
+  void read_storeys() {
+    double low = 1e30, high = -1e30;
+    const auto storeys = file_.of_type("IFCBUILDINGSTOREY");
+    for (const StepEntity* s : storeys) {
+      const double z = placement(s->at(5)).p.z;
+      low = std::min(low, z), high = std::max(high, z);
+    }
+    for (const StepEntity* s : storeys) {
+      const bool is_placed = high - low > 1e-3 || s->at(9).kind != Kind::Number;
+      out_.storeys.emplace_back(s->at(2).text,
+                                is_placed ? placement(s->at(5)).p.z : low + s->at(9).number * out_.length_unit);
+    }
+  }
+
+  /// Points along a curve, in its own axes [m].
+  bool find_points(const StepValue& v, std::vector<Vec3>& out, int depth = 0) const {
+    const StepEntity* e = get(v);
+    if (e == nullptr || depth > 10) return false;
+    const double u = out_.length_unit;
+    if (e->type == "IFCPOLYLINE") {
+      for (const StepValue& p : e->at(0).items) out.push_back(u * point(p));
+    } else if (e->type == "IFCINDEXEDPOLYCURVE") {
+      const StepEntity* list = get(e->at(0));
+      if (list == nullptr) return false;
+      for (size_t i = 0; i < list->at(0).items.size(); ++i) out.push_back(listed(*list, static_cast<double>(i + 1)));
+    } else if (e->type == "IFCCOMPOSITECURVE") {
+      for (const StepValue& part : e->at(0).items) {
+        const StepEntity* segment = get(part);
+        if (segment == nullptr) return false;
+        std::vector<Vec3> points;
+        if (!find_points(segment->at(2), points, depth + 1)) return false;
+        if (segment->at(1).text == "F") std::reverse(points.begin(), points.end());
+        out.insert(out.end(), points.begin(), points.end());
+      }
+    } else if (e->type == "IFCTRIMMEDCURVE") {
+      return find_trimmed(*e, out);
+    } else if (e->type == "IFCCIRCLE") {
+      add_arc(*e, 0, 2 * std::acos(-1.0), out);
+    } else {
+      return false;
+    }
+    return !out.empty();
+  }
+  /// A point of an IfcCartesianPointList; the first is 1.
+  Vec3 listed(const StepEntity& list, double index) const {
+    Vec3 p;
+    const size_t i = static_cast<size_t>(index) - 1;
+    if (!(index >= 1) || i >= list.at(0).items.size()) return p;
+    const std::vector<StepValue>& given = list.at(0).items[i].items;
+    for (size_t k = 0; k < std::min<size_t>(3, given.size()); ++k) p[static_cast<int>(k)] = given[k].number;
+    return out_.length_unit * p;
+  }
+  void add_arc(const StepEntity& circle, double from, double to, std::vector<Vec3>& out) const {
+    constexpr int pieces = 16;
+    const Pose X = axis_placement(circle.at(0));
+    const double r = circle.at(1).number * out_.length_unit;
+    for (int i = 0; i <= pieces; ++i) {
+      const double a = from + (to - from) * i / pieces;
+      out.push_back(X * Vec3{r * std::cos(a), r * std::sin(a), 0});
+    }
+  }
+  /// A piece of a line or a circle, between points or parameters.
+  bool find_trimmed(const StepEntity& e, std::vector<Vec3>& out) const {
+    const StepEntity* basis = get(e.at(0));
+    if (basis == nullptr || !(basis->type == "IFCLINE" || basis->type == "IFCCIRCLE")) return false;
+    const Pose X = axis_placement(basis->at(0));
+    double parameters[2] = {};
+    Vec3 ends[2];
+    for (size_t side = 0; side < 2; ++side) {
+      bool has_point = false;
+      for (const StepValue& t : e.at(1 + side).items) {
+        if (t.kind == Kind::Number) parameters[side] = t.number;
+        if (t.kind == Kind::Reference) ends[side] = out_.length_unit * point(t), has_point = true;
+      }
+      if (basis->type == "IFCLINE") {
+        const StepEntity* way = get(basis->at(1));
+        if (!has_point && way != nullptr)
+          ends[side] = out_.length_unit *
+                       (point(basis->at(0)) + parameters[side] * way->at(1).number * direction(way->at(0), {1, 0, 0}));
+      } else if (has_point) {
+        const Vec3 p = inverse(X) * ends[side];
+        parameters[side] = std::atan2(p.y, p.x);
+      } else {
+        parameters[side] *= angle_unit_;
+      }
+    }
+    if (basis->type == "IFCLINE") {
+      out.push_back(ends[0]), out.push_back(ends[1]);
+      return true;
+    }
+    const double turn = 2 * std::acos(-1.0);
+    const bool is_forward = e.at(3).text != "F";
+    double from = parameters[0], to = parameters[1];
+    while (is_forward && to <= from) to += turn;
+    while (!is_forward && to >= from) to -= turn;
+    add_arc(*basis, from, to, out);
+    return true;
+  }
+
   /// Corners of a profile's box in its own plane.
-  bool find_profile(const StepValue& v, std::vector<Vec3>& out, bool& is_round) const {
+  bool find_profile(const StepValue& v, std::vector<Vec3>& out, bool& is_round, std::string& why) const {
     const StepEntity* e = get(v);
     if (e == nullptr) return false;
     const double u = out_.length_unit;
+    why = "its profile is " + e->type;
     double x = 0, y = 0;
     if (e->type == "IFCRECTANGLEPROFILEDEF" || e->type == "IFCROUNDEDRECTANGLEPROFILEDEF") {
       x = 0.5 * e->at(3).number * u, y = 0.5 * e->at(4).number * u;
@@ -144,10 +250,14 @@ class Reader {
       x = y = e->at(3).number * u;
       is_round = true;
     } else if (e->type == "IFCARBITRARYCLOSEDPROFILEDEF" || e->type == "IFCARBITRARYPROFILEDEFWITHVOIDS") {
-      const StepEntity* curve = get(e->at(2));
-      if (!is(curve, "IFCPOLYLINE")) return false;
-      for (const StepValue& p : curve->at(0).items) out.push_back(u * point(p));
-      return out.size() >= 3;
+      is_round |= is(get(e->at(2)), "IFCCIRCLE");
+      return find_points(e->at(2), out) && out.size() >= 3;
+    } else if (e->type == "IFCDERIVEDPROFILEDEF" || e->type == "IFCMIRROREDPROFILEDEF") {
+      const StepEntity* moved = get(e->at(3));
+      std::vector<Vec3> parent;
+      if (!find_profile(e->at(2), parent, is_round, why)) return false;
+      for (const Vec3& p : parent) out.push_back(moved == nullptr ? Vec3{-p.x, p.y, p.z} : transform(*moved) * p);
+      return true;
     } else {
       return false;
     }
@@ -156,49 +266,127 @@ class Reader {
     return x > 0 && y > 0;
   }
 
-  bool find_item(const StepValue& v, const Pose& X, std::vector<Vec3>& out, bool& is_round, int depth) const {
+  /// IfcCartesianTransformationOperator; scales and mirrors are not understood.
+  Pose transform(const StepEntity& e) const {
+    const Vec3 x = direction(e.at(0), {1, 0, 0});
+    Vec3 y = direction(e.at(1), std::abs(x.y) < 0.9 ? Vec3{0, 1, 0} : Vec3{-1, 0, 0});
+    y = y - dot(x, y) * x;
+    const Vec3 z = cross(x, norm(y) > 1e-9 ? (1 / norm(y)) * y : Vec3{0, 1, 0});
+    return {out_.length_unit * point(e.at(2)), to_quat(Mat3::from_columns(x, cross(z, x), z))};
+  }
+
+  /// A face with its corners in turn; volumes add up to that of a closed mesh.
+  void add_face(const std::vector<Vec3>& corners, Body& out) const {
+    Vec3 normal;
+    for (size_t i = 0; i < corners.size(); ++i) {
+      out.points.push_back(corners[i]);
+      if (i < 2) continue;
+      const Vec3 o = out.points.front(), fan = cross(corners[i - 1] - corners[0], corners[i] - corners[0]);
+      out.volume += dot(corners[0] - o, fan) / 6;
+      normal += fan;
+    }
+    out.faces.push_back(normal);
+  }
+  bool find_mesh(const StepEntity& e, const Pose& X, Body& out) const {
+    const size_t before = out.points.size();
+    const auto add_loops = [&](const StepValue& shell) {
+      const StepEntity* faces = get(shell);
+      if (faces == nullptr) return;
+      for (const StepValue& f : faces->at(0).items)
+        if (const StepEntity* face = get(f))
+          for (const StepValue& b : face->at(0).items) {
+            const StepEntity* bound = get(b);
+            const StepEntity* loop = bound == nullptr ? nullptr : get(bound->at(0));
+            if (!is(loop, "IFCPOLYLOOP")) continue;
+            std::vector<Vec3> corners;
+            for (const StepValue& p : loop->at(0).items) corners.push_back(X * (out_.length_unit * point(p)));
+            if (bound->at(1).text == "F") std::reverse(corners.begin(), corners.end());
+            add_face(corners, out);
+          }
+    };
+    const auto add_indexed = [&](const StepEntity& list, const StepValue& indices) {
+      std::vector<Vec3> corners;
+      for (const StepValue& i : indices.items) corners.push_back(X * listed(list, i.number));
+      add_face(corners, out);
+    };
+    if (e.type == "IFCFACETEDBREP") {
+      add_loops(e.at(0));
+    } else if (e.type == "IFCSHELLBASEDSURFACEMODEL" || e.type == "IFCFACEBASEDSURFACEMODEL") {
+      for (const StepValue& shell : e.at(0).items) add_loops(shell);
+    } else if (const StepEntity* list = get(e.at(0)); list != nullptr && e.type == "IFCTRIANGULATEDFACESET") {
+      for (const StepValue& triangle : e.at(3).items) add_indexed(*list, triangle);
+    } else if (list != nullptr && e.type == "IFCPOLYGONALFACESET") {
+      for (const StepValue& f : e.at(2).items)
+        if (const StepEntity* face = get(f)) add_indexed(*list, face->at(0));
+    }
+    return out.points.size() > before + 5;
+  }
+
+  bool find_item(const StepValue& v, const Pose& X, Body& out, int depth) const {
     const StepEntity* e = get(v);
     if (e == nullptr || depth > 10) return false;
     if (e->type == "IFCEXTRUDEDAREASOLID") {
       std::vector<Vec3> profile;
-      if (!find_profile(e->at(0), profile, is_round)) return false;
+      if (!find_profile(e->at(0), profile, out.is_round, out.why)) return false;
       const Pose X_WP = X * axis_placement(e->at(1));
       const Vec3 way = e->at(3).number * out_.length_unit * direction(e->at(2), {0, 0, 1});
       for (const Vec3& p : profile) {
-        out.push_back(X_WP * p);
-        out.push_back(X_WP * (p + way));
+        out.corners.push_back(X_WP * p);
+        out.corners.push_back(X_WP * (p + way));
       }
       return true;
     }
     if (e->type == "IFCBOOLEANCLIPPINGRESULT" || e->type == "IFCBOOLEANRESULT")
-      return find_item(e->at(1), X, out, is_round, depth + 1);
+      return find_item(e->at(1), X, out, depth + 1);
     if (e->type == "IFCMAPPEDITEM") {
       const StepEntity *map = get(e->at(0)), *target = get(e->at(1));
       if (map == nullptr || target == nullptr) return false;
-      const Vec3 x = direction(target->at(0), {1, 0, 0}), y = direction(target->at(1), {0, 1, 0});
-      const Vec3 z = direction(target->at(4), cross(x, y));
-      const Pose at{out_.length_unit * point(target->at(2)), to_quat(Mat3::from_columns(x, y, z))};
       const StepEntity* body = get(map->at(1));
       bool any = false;
       if (body != nullptr)
         for (const StepValue& item : body->at(3).items)
-          any |= find_item(item, X * at * inverse(axis_placement(map->at(0))), out, is_round, depth + 1);
+          any |= find_item(item, X * transform(*target) * inverse(axis_placement(map->at(0))), out, depth + 1);
       return any;
     }
-    return false;
+    out.why = "its body is " + e->type;
+    return find_mesh(*e, X, out);
   }
 
-  bool find_corners(const StepEntity& e, std::vector<Vec3>& out, bool& is_round) const {
+  Body find_body(const StepEntity& e) const {
+    Body out;
     const StepEntity* shape = get(e.at(6));
-    if (shape == nullptr) return false;
+    if (shape == nullptr) {
+      out.why = "it has no body";
+      return out;
+    }
     const Pose X = placement(e.at(5));
-    bool any = false;
     for (const StepValue& v : shape->at(2).items) {
       const StepEntity* r = get(v);
       if (r == nullptr || (r->at(1).kind == Kind::Text && r->at(1).text != "Body")) continue;
-      for (const StepValue& item : r->at(3).items) any |= find_item(item, X, out, is_round, 0);
+      for (const StepValue& item : r->at(3).items) find_item(item, X, out, 0);
     }
-    return any && out.size() >= 6;
+    return out;
+  }
+
+  void find_box(const Body& body, IfcElement& e) const {
+    e.is_mesh = !body.points.empty();
+    e.why = body.why;
+    if (body.corners.size() + body.points.size() < 6) return;
+    e.low = {1e30, 1e30, 1e30};
+    e.high = {-1e30, -1e30, -1e30};
+    for (const auto* list : {&body.corners, &body.points})
+      for (const Vec3& c : *list) {
+        const Vec3 p = turn(c);
+        for (int k = 0; k < 3; ++k) e.low[k] = std::min(e.low[k], p[k]), e.high[k] = std::max(e.high[k], p[k]);
+      }
+    e.has_box = true;
+    if (!e.is_mesh || !body.corners.empty()) return;
+    const Vec3 size = e.high - e.low;
+    const double filled = std::abs(body.volume) / (size.x * size.y * size.z);
+    const double round = std::acos(-1.0) / 4;
+    e.is_round = e.type == "IFCCOLUMN" && std::abs(size.x - size.y) < 0.02 * size.x && std::abs(filled - round) < 0.04;
+    e.has_box = e.is_round || filled >= (e.type == "IFCWALL" ? kFilledWall : kFilled);
+    if (!e.has_box) e.why = "its body is a mesh that is no upright box";
   }
 
   void read_materials() {
@@ -234,14 +422,18 @@ class Reader {
   }
 
   /// The direction that most of the plan's edges have, modulo a right angle, by their length.
-  void find_angle(const std::vector<std::vector<Vec3>>& corners) {
+  void find_angle(const std::vector<Body>& bodies) {
     double c = 0, s = 0;
-    for (const auto& all : corners)
-      for (size_t i = 0; i + 2 < all.size(); i += 2) {
-        const Vec3 d = all[i + 2] - all[i];
-        const double length = std::hypot(d.x, d.y), a = 4 * std::atan2(d.y, d.x);
-        c += length * std::cos(a), s += length * std::sin(a);
-      }
+    const auto add = [&](const Vec3& d) {
+      const double length = std::hypot(d.x, d.y), a = 4 * std::atan2(d.y, d.x);
+      c += length * std::cos(a), s += length * std::sin(a);
+    };
+    for (const Body& body : bodies) {
+      for (size_t i = 0; i + 2 < body.corners.size(); i += 2) add(body.corners[i + 2] - body.corners[i]);
+      // upright faces, as triangles have diagonals
+      for (const Vec3& n : body.faces)
+        if (std::abs(n.z) < 1e-3 * norm(n)) add(n);
+    }
     out_.angle = std::hypot(c, s) > 0 ? std::atan2(s, c) / 4 : 0;
     if (std::abs(out_.angle) < 1e-4) out_.angle = 0;
   }
@@ -250,30 +442,87 @@ class Reader {
     return {c * p.x + s * p.y, -s * p.x + c * p.y, p.z};
   }
 
+  /// Axes of bars, in world axes before the turn.
+  void find_disks(const StepValue& v, const Pose& X, std::vector<std::vector<Vec3>>& out, double& radius,
+                  int depth) const {
+    const StepEntity* e = get(v);
+    if (e == nullptr || depth > 10) return;
+    if (e->type == "IFCSWEPTDISKSOLID" || e->type == "IFCSWEPTDISKSOLIDPOLYGONAL") {
+      std::vector<Vec3> line;
+      if (!find_points(e->at(0), line)) return;
+      for (Vec3& p : line) p = X * p;
+      out.push_back(std::move(line));
+      radius = e->at(1).number * out_.length_unit;
+    } else if (e->type == "IFCEXTRUDEDAREASOLID") {
+      const StepEntity* profile = get(e->at(0));
+      if (!is(profile, "IFCCIRCLEPROFILEDEF")) return;
+      const Pose X_WP = X * axis_placement(e->at(1));
+      out.push_back({X_WP.p, X_WP * (e->at(3).number * out_.length_unit * direction(e->at(2), {0, 0, 1}))});
+      radius = profile->at(3).number * out_.length_unit;
+    } else if (e->type == "IFCMAPPEDITEM") {
+      const StepEntity *map = get(e->at(0)), *target = get(e->at(1));
+      const StepEntity* body = map == nullptr ? nullptr : get(map->at(1));
+      if (body == nullptr || target == nullptr) return;
+      for (const StepValue& item : body->at(3).items)
+        find_disks(item, X * transform(*target) * inverse(axis_placement(map->at(0))), out, radius, depth + 1);
+    }
+  }
+
+  /// The element that a part belongs to, also through assemblies; 0 if none.
+  int host_of(int id) const {
+    for (int depth = 0; depth < 10; ++depth) {
+      const auto whole = whole_of_.find(id);
+      if (whole == whole_of_.end()) return 0;
+      id = whole->second;
+      const StepEntity* e = file_.find(id);
+      if (e != nullptr && element_types().count(e->type) != 0) return id;
+    }
+    return 0;
+  }
+
+  /// One bar of the plan for each axis of an entity, as programs write groups of bars into one; what the bar does not
+  /// say its type does.
   void read_bars() {
     for (const StepEntity* e : file_.of_type("IFCREINFORCINGBAR")) {
       IfcBar bar;
-      bar.grade = e->at(8).text;
+      const auto type_id = type_of_.find(e->id);
+      const StepEntity* type = type_id == type_of_.end() ? nullptr : file_.find(type_id->second);
+      if (!is(type, "IFCREINFORCINGBARTYPE")) type = nullptr;
+      bar.grade = e->at(8).text.empty() ? material_of(e->id) : e->at(8).text;
       bar.diameter = e->at(9).number * out_.length_unit;
-      const std::string role = e->at(12).text;
-      bar.is_main = !(role == "LIGATURE" || role == "SHEAR" || role == "RING");
-      if (const auto whole = whole_of_.find(e->id); whole != whole_of_.end()) bar.host = whole->second;
-      Pose X = placement(e->at(5));
+      std::string role = e->at(12).text;
+      if (role.empty() && type != nullptr) role = type->at(9).text;
+      if (bar.diameter <= 0 && type != nullptr) bar.diameter = type->at(10).number * out_.length_unit;
+      bar.host = host_of(e->id);
+      const Pose X = placement(e->at(5));
       bar.has_place = e->at(5).kind == Kind::Reference;
+      std::vector<std::vector<Vec3>> axes;
+      double radius = 0;
       if (const StepEntity* shape = get(e->at(6)))
         for (const StepValue& v : shape->at(2).items)
-          if (const StepEntity* r = get(v))
-            for (const StepValue& item : r->at(3).items)
-              if (const StepEntity* disk = get(item); is(disk, "IFCSWEPTDISKSOLID"))
-                if (const StepEntity* line = get(disk->at(0)); is(line, "IFCPOLYLINE") && !line->at(0).items.empty())
-                  X = X * Pose{out_.length_unit * point(line->at(0).items[0]), {}};
-      bar.place = turn(X.p);
-      out_.bars.push_back(std::move(bar));
+          if (const StepEntity* r = get(v); r != nullptr && r->at(1).text != "Axis")
+            for (const StepValue& item : r->at(3).items) find_disks(item, X, axes, radius, 0);
+      if (bar.diameter <= 0) bar.diameter = 2 * radius;
+      const bool is_told = !role.empty() && role != "NOTDEFINED" && role != "USERDEFINED";
+      bar.is_main = !(role == "LIGATURE" || role == "SHEAR" || role == "RING");
+      if (axes.empty()) {
+        bar.place = turn(X.p);
+        out_.bars.push_back(std::move(bar));
+        continue;
+      }
+      for (const std::vector<Vec3>& line : axes) {
+        double length = 0;
+        for (size_t i = 1; i < line.size(); ++i) length += norm(line[i] - line[i - 1]);
+        if (!is_told) bar.is_main = norm(line.back() - line.front()) >= kStraight * length;
+        bar.place = turn(line.front());
+        out_.bars.push_back(bar);
+      }
     }
   }
 
   const StepFile& file_;
   IfcBuilding out_;
+  double angle_unit_ = 1;  // of parameters of circles [rad]
   std::map<int, std::string> material_;
   std::map<int, int> type_of_, whole_of_;
 };
@@ -289,8 +538,15 @@ IfcBuilding read_ifc(const std::string& text, const std::string& name) {
     fail("its schema is \"" + file.schema + "\"", "IFC2X3 and IFC4 are understood");
   IfcBuilding out = Reader(file).read();
   if (std::none_of(out.elements.begin(), out.elements.end(),
-                   [](const IfcElement& e) { return e.type == "IFCCOLUMN" && e.has_box; }))
-    fail("it has no columns whose body is an extruded profile", "a plan's grid is made from its columns");
+                   [](const IfcElement& e) { return e.type == "IFCCOLUMN" && e.has_box; })) {
+    std::string help = "a plan's grid is made from its columns";
+    for (const IfcElement& e : out.elements)
+      if (e.type == "IFCCOLUMN" && !e.why.empty()) {
+        help += "; of the first one, " + e.why;
+        break;
+      }
+    fail("it has no columns whose body is an extruded profile", help);
+  }
   return out;
 }
 

@@ -10,14 +10,17 @@
 
 namespace topple::product {
 
-/// An element whose body is an extruded profile; world axes turned by IfcBuilding::angle about z.
+/// An element whose body is an extruded profile, or a mesh that fills its box; world axes turned by IfcBuilding::angle
+/// about z.
 struct IfcElement {
   std::string type;      // "IFCCOLUMN"
   std::string name;      // as the file has it
   std::string material;  // empty: none given
   int id = 0;
-  bool has_box = false;  // false: its body is no extrusion of a profile that is understood
+  bool has_box = false;  // false: its body is not understood, for the reason `why`
+  bool is_mesh = false;  // the box was found around faces
   bool is_round = false;
+  std::string why;
   Vec3 low, high;  // box [m]
 };
 

@@ -71,6 +71,10 @@ class Planner {
     place_slabs();
     place_walls();
     count_rest();
+    if (const auto meshes = std::count_if(b_.elements.begin(), b_.elements.end(),
+                                          [](const IfcElement& e) { return e.is_mesh && e.has_box; });
+        meshes > 0)
+      guessed(fmt::format("{} elements are meshes of faces: their boxes were taken, as they fill them", meshes));
     write();
     return {std::move(text_), std::move(report_)};
   }
@@ -96,20 +100,21 @@ class Planner {
       if (e.has_box) {
         out.push_back(&e);
       } else {
-        left_out(e, "its body is no extruded profile");
+        left_out(e, e.why.empty() ? "its body is no extruded profile" : e.why);
       }
     }
     return out;
   }
 
   void find_grid() {
-    std::vector<double> xs, ys;
+    std::vector<double> xs, ys, tops;
     double bottom = 1e30, top = -1e30;
     for (const IfcElement* e : all("IFCCOLUMN")) {
       xs.push_back(0.5 * (e->low.x + e->high.x));
       ys.push_back(0.5 * (e->low.y + e->high.y));
       bottom = std::min(bottom, e->low.z);
       top = std::max(top, e->high.z);
+      tops.push_back(e->high.z);
     }
     rows_ = find_lines(xs);
     frames_ = find_lines(ys);
@@ -117,6 +122,11 @@ class Planner {
     levels_.push_back(bottom);
     for (const auto& [name, z] : b_.storeys)
       if (z > levels_.back() + 1 && z < top - 1) levels_.push_back(z);
+    if (levels_.size() == 1) {
+      for (const double z : find_lines(tops))
+        if (z > levels_.back() + 1 && z < top - 1) levels_.push_back(z);
+      if (levels_.size() > 1) guessed("the file has no storeys where its columns stand: floors are where columns end");
+    }
     levels_.push_back(top);
     taken(fmt::format("{} rows by {} frames and {} storeys, from the places of {} columns and {} storeys of the file",
                       rows_.size(), frames_.size(), levels_.size() - 1, xs.size(), b_.storeys.size()));

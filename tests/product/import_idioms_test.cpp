@@ -1,0 +1,243 @@
+// Small files in the ways in which CAD programs write buildings: meshes instead of extrusions, bars in assemblies and
+// of types, storeys that only their placements know, profiles along indexed and composite curves.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <functional>
+
+#include "base/error.h"
+#include "product/import.h"
+
+namespace topple::product {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+using testing::Not;
+
+std::string file(const std::string& schema, const std::string& body) {
+  return "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('" + schema + "'));\nENDSEC;\nDATA;\n" + body +
+         "ENDSEC;\nEND-ISO-10303-21;\n";
+}
+
+/// Writes entities and gives their references, "#7".
+class Writer {
+ public:
+  std::string add(const std::string& text) {
+    const std::string id = "#" + std::to_string(++last_);
+    body_ += id + "=" + text + ";\n";
+    return id;
+  }
+  static std::string tuple(std::initializer_list<double> values) {
+    std::string out;
+    for (const double v : values) out += (out.empty() ? "(" : ",") + std::to_string(v);
+    return out + ")";
+  }
+  std::string point(double x, double y, double z) { return add("IFCCARTESIANPOINT(" + tuple({x, y, z}) + ")"); }
+  std::string placement(const std::string& parent, double x, double y, double z) {
+    return add("IFCLOCALPLACEMENT(" + parent + "," + add("IFCAXIS2PLACEMENT3D(" + point(x, y, z) + ",$,$)") + ")");
+  }
+  std::string shape(const std::string& type, const std::string& items) {
+    return add("IFCPRODUCTDEFINITIONSHAPE($,$,(" +
+               add("IFCSHAPEREPRESENTATION($,'Body','" + type + "',(" + items + "))") + "))");
+  }
+  std::string extrusion(const std::string& profile, double depth) {
+    return add("IFCEXTRUDEDAREASOLID(" + profile + ",$," + add("IFCDIRECTION((0.,0.,1.))") + "," +
+               std::to_string(depth) + ")");
+  }
+  std::string rectangle(double x, double y) {
+    return add("IFCRECTANGLEPROFILEDEF(.AREA.,$,$," + std::to_string(x) + "," + std::to_string(y) + ")");
+  }
+  std::string element(const std::string& type, const std::string& place, const std::string& body) {
+    return add(type + "('g',$,'" + type + "',$,$," + place + "," + body + ",'1',$)");
+  }
+  /// A box from its foot's middle, as a triangulated face set.
+  std::string triangulated(double w, double d, double h) {
+    const double x = w / 2, y = d / 2;
+    const std::string list = add("IFCCARTESIANPOINTLIST3D((" + tuple({-x, -y, 0}) + "," + tuple({x, -y, 0}) + "," +
+                                 tuple({x, y, 0}) + "," + tuple({-x, y, 0}) + "," + tuple({-x, -y, h}) + "," +
+                                 tuple({x, -y, h}) + "," + tuple({x, y, h}) + "," + tuple({-x, y, h}) + "))");
+    return add(
+        "IFCTRIANGULATEDFACESET(" + list +
+        ",$,.T.,((1,3,2),(1,4,3),(5,6,7),(5,7,8),(1,2,6),(1,6,5),(2,3,7),(2,7,6),(3,4,8),(3,8,7),(4,1,5),(4,5,8)),$)");
+  }
+  /// The same as a brep of polyloops, its foot's area `share` of its head's (a prism if 1).
+  std::string brep(double w, double d, double h, double share = 1) {
+    std::vector<std::string> p;
+    for (int i = 0; i < 8; ++i) {
+      const double s = i < 4 ? share : 1;
+      p.push_back(
+          point((i % 4 == 1 || i % 4 == 2 ? 0.5 : -0.5) * w * s, (i % 4 >= 2 ? 0.5 : -0.5) * d * s, i < 4 ? 0 : h));
+    }
+    std::string faces;
+    for (const auto& f :
+         {std::array{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}}) {
+      std::string loop;
+      for (const int i : f) loop += (loop.empty() ? "" : ",") + p[static_cast<size_t>(i)];
+      faces += (faces.empty() ? "" : ",") +
+               add("IFCFACE((" + add("IFCFACEOUTERBOUND(" + add("IFCPOLYLOOP((" + loop + "))") + ",.T.)") + "))");
+    }
+    return add("IFCFACETEDBREP(" + add("IFCCLOSEDSHELL((" + faces + "))") + ")");
+  }
+  void metres() { add("IFCUNITASSIGNMENT((" + add("IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.)") + "))"); }
+  const std::string& str() const { return body_; }
+
+ private:
+  std::string body_;
+  int last_ = 0;
+};
+
+Import import(const std::string& schema, const Writer& w) {
+  return make_plan_text(read_ifc(file(schema, w.str()), "b.ifc"), "b.ifc");
+}
+
+/// Columns of two storeys at the corners of 6 m x 5 m.
+void add_columns(Writer& w, const std::string& site, const std::function<std::string()>& make_body) {
+  for (int s = 0; s < 2; ++s)
+    for (const double x : {0.0, 6.0})
+      for (const double y : {0.0, 5.0}) w.element("IFCCOLUMN", w.placement(site, x, y, 3 * s), make_body());
+}
+
+TEST(ImportIfcIdioms, FindsBoxesInMeshesAndStoreysByTheirPlacement) {
+  Writer w;
+  w.metres();
+  // the site lies at 112 m; elevations count from the building's zero
+  const std::string site = w.placement("$", 3500000, 5600000, 112);
+  for (const double z : {0.0, 3.0})
+    w.add("IFCBUILDINGSTOREY('g',$,'S',$,$," + w.placement(site, 0, 0, z) + ",$,$,.ELEMENT.," + std::to_string(z) +
+          ")");
+  add_columns(w, site, [&] { return w.shape("Tessellation", w.triangulated(0.4, 0.3, 3)); });
+  w.element("IFCBEAM", w.placement(site, 3, 0, 2.4), w.shape("Brep", w.brep(6, 0.25, 0.6)));
+  w.element("IFCBEAM", w.placement(site, 3, 5, 2.4), w.shape("Brep", w.brep(6, 0.25, 0.6, 0.5)));  // haunched
+  // a slab along an indexed curve
+  const std::string list = w.add("IFCCARTESIANPOINTLIST2D(((0.,0.),(6.,0.),(6.,5.),(0.,5.),(0.,0.)))");
+  const std::string curve = w.add("IFCINDEXEDPOLYCURVE(" + list + ",(IFCLINEINDEX((1,2,3,4,5))),.F.)");
+  w.element("IFCSLAB", w.placement(site, 0, 0, 2.8),
+            w.shape("SweptSolid", w.extrusion(w.add("IFCARBITRARYCLOSEDPROFILEDEF(.AREA.,$," + curve + ")"), 0.2)));
+  const Import made = import("IFC4", w);
+  EXPECT_THAT(made.text, HasSubstr("heights = [\"3.000 m\", \"3.000 m\"]"));
+  EXPECT_THAT(made.text, HasSubstr("rows = { A = \"0.000 m\", B = \"6.000 m\" }"));
+  EXPECT_THAT(made.text, HasSubstr("width = \"40 cm\"\nheight = \"30 cm\""));
+  EXPECT_THAT(made.text, HasSubstr("thickness = \"20 cm\""));
+  EXPECT_THAT(made.text, HasSubstr("at = [\"A1B1\"]"));
+  EXPECT_THAT(made.report.taken, Contains(HasSubstr("1 beams")));
+  EXPECT_THAT(made.report.guessed, Contains(HasSubstr("9 elements are meshes")));
+  EXPECT_THAT(made.report.missing, Contains(HasSubstr("1 x BEAM: its body is a mesh that is no upright box")));
+}
+
+TEST(ImportIfcIdioms, TakesFloorsFromColumnsWhereThereAreNoStoreys) {
+  Writer w;
+  w.metres();
+  w.add("IFCBUILDINGSTOREY('g',$,'Undefined',$,$,$,$,$,.ELEMENT.,0.)");
+  add_columns(w, "$", [&] { return w.shape("Brep", w.brep(0.4, 0.4, 3)); });
+  const Import made = import("IFC2X3", w);
+  EXPECT_THAT(made.text, HasSubstr("heights = [\"3.000 m\", \"3.000 m\"]"));
+  EXPECT_THAT(made.report.guessed, Contains(HasSubstr("floors are where columns end")));
+}
+
+TEST(ImportIfcIdioms, CountsBarsOfGroupsInAssembliesByTheirShape) {
+  Writer w;
+  w.metres();
+  std::string column;
+  add_columns(w, "$", [&] { return w.shape("SweptSolid", w.extrusion(w.rectangle(0.4, 0.4), 3)); });
+  column =
+      w.element("IFCCOLUMN", w.placement("$", 12, 0, 0), w.shape("SweptSolid", w.extrusion(w.rectangle(0.5, 0.4), 6)));
+  // one entity for eight bars, and one for a stirrup along a composite curve, both of no role
+  std::string disks;
+  for (int i = 0; i < 8; ++i)
+    disks += (disks.empty() ? "" : ",") +
+             w.add("IFCSWEPTDISKSOLID(" +
+                   w.add("IFCPOLYLINE((" + w.point(0.1 * i, 0, 0.05) + "," + w.point(0.1 * i, 0, 5.9) + "))") +
+                   ",0.0125,$,0.,1.)");
+  const std::string place = w.placement("$", 11.8, -0.15, 0);
+  const std::string bars =
+      w.add("IFCREINFORCINGBAR('g',$,'LONGITUDINAL',$,$," + place + "," + w.shape("AdvancedSweptSolid", disks) +
+            ",'1','B500B',0.025,4.9E-4,5.85,.NOTDEFINED.,$)");
+  std::string segments;
+  const double corners[5][2] = {{0, 0}, {0.4, 0}, {0.4, 0.3}, {0, 0.3}, {0, 0}};
+  for (int i = 0; i < 4; ++i)
+    segments +=
+        (segments.empty() ? "" : ",") + w.add("IFCCOMPOSITECURVESEGMENT(.CONTINUOUS.,.T.," +
+                                              w.add("IFCPOLYLINE((" + w.point(corners[i][0], corners[i][1], 1) + "," +
+                                                    w.point(corners[i + 1][0], corners[i + 1][1], 1) + "))") +
+                                              ")");
+  const std::string tie = w.add(
+      "IFCREINFORCINGBAR('g',$,'STIRRUP',$,$," + place + "," +
+      w.shape("AdvancedSweptSolid",
+              w.add("IFCSWEPTDISKSOLID(" + w.add("IFCCOMPOSITECURVE((" + segments + "),.F.)") + ",0.004,$,0.,4.)")) +
+      ",'1','B500B',0.008,5.E-5,1.4,.USERDEFINED.,$)");
+  const std::string cage = w.add("IFCELEMENTASSEMBLY('g',$,'CAGE',$,$,$,$,'1',$,.REINFORCEMENT_UNIT.)");
+  w.add("IFCRELAGGREGATES('g',$,$,$," + cage + ",(" + bars + "," + tie + "))");
+  w.add("IFCRELAGGREGATES('g',$,$,$," + column + ",(" + cage + "))");
+  const Import made = import("IFC2X3", w);
+  EXPECT_THAT(made.text, HasSubstr("bars = { count_y = 3, count_z = 3, diameter = \"25 mm\" }"));
+  EXPECT_THAT(made.text, HasSubstr("ties = { diameter = \"8 mm\", spacing = \"?\" }"));
+}
+
+TEST(ImportIfcIdioms, TakesDiameterAndRoleFromTheTypeOfMappedBars) {
+  Writer w;
+  w.metres();
+  add_columns(w, "$", [&] { return w.shape("SweptSolid", w.extrusion(w.rectangle(0.4, 0.4), 3)); });
+  const std::string origin = w.add("IFCAXIS2PLACEMENT3D(" + w.point(0, 0, 0) + ",$,$)");
+  const std::string list = w.add("IFCCARTESIANPOINTLIST3D(((0.,0.,0.05),(0.,0.,2.9)),$)");
+  const std::string disk =
+      w.add("IFCSWEPTDISKSOLID(" + w.add("IFCINDEXEDPOLYCURVE(" + list + ",$,.F.)") + ",0.01,$,$,$)");
+  const std::string map = w.add("IFCREPRESENTATIONMAP(" + origin + "," +
+                                w.add("IFCSHAPEREPRESENTATION($,'Body','SolidModel',(" + disk + "))") + ")");
+  std::string bars;
+  for (const double x : {-0.15, 0.15})
+    for (const double y : {-0.15, 0.15}) {
+      const std::string item =
+          w.add("IFCMAPPEDITEM(" + map + "," +
+                w.add("IFCCARTESIANTRANSFORMATIONOPERATOR3D($,$," + w.point(x, y, 0) + ",1.,$)") + ")");
+      bars += (bars.empty() ? "" : ",") + w.add("IFCREINFORCINGBAR('g',$,$,$,$," + w.placement("$", 0, 0, 0) + "," +
+                                                w.shape("MappedRepresentation", item) + ",$,$,$,$,$,$,$)");
+    }
+  const std::string type =
+      w.add("IFCREINFORCINGBARTYPE('g',$,'20 mm',$,$,$,(" + map + "),$,$,.MAIN.,0.02,3.14E-4,2.85,.TEXTURED.,$,$)");
+  w.add("IFCRELDEFINESBYTYPE('g',$,$,$,(" + bars + ")," + type + ")");
+  const Import made = import("IFC4", w);
+  EXPECT_THAT(made.text, HasSubstr("bars = { count_y = 2, count_z = 2, diameter = \"20 mm\" }"));
+}
+
+TEST(ImportIfcIdioms, FollowsArcsOfCompositeCurvesInTheFilesAngles) {
+  Writer w;
+  const std::string radian = w.add("IFCSIUNIT(*,.PLANEANGLEUNIT.,$,.RADIAN.)");
+  const std::string degree = w.add("IFCMEASUREWITHUNIT(IFCPLANEANGLEMEASURE(0.0174532925199433)," + radian + ")");
+  w.add("IFCUNITASSIGNMENT((" + w.add("IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.)") + "," +
+        w.add("IFCCONVERSIONBASEDUNIT($,.PLANEANGLEUNIT.,'DEGREE'," + degree + ")") + "))");
+  // a column 0.6 m wide with a half round of 0.2 m at one end: 0.8 m x 0.4 m
+  const auto body = [&] {
+    const std::string straight = w.add("IFCPOLYLINE((" + w.point(0, 0.2, 0) + "," + w.point(-0.6, 0.2, 0) + "," +
+                                       w.point(-0.6, -0.2, 0) + "," + w.point(0, -0.2, 0) + "))");
+    const std::string circle = w.add("IFCCIRCLE(" + w.add("IFCAXIS2PLACEMENT2D(" + w.point(0, 0, 0) + ",$)") + ",0.2)");
+    const std::string arc =
+        w.add("IFCTRIMMEDCURVE(" + circle + ",(IFCPARAMETERVALUE(270.)),(IFCPARAMETERVALUE(90.)),.T.,.PARAMETER.)");
+    const std::string outline =
+        w.add("IFCCOMPOSITECURVE((" + w.add("IFCCOMPOSITECURVESEGMENT(.CONTINUOUS.,.T.," + straight + ")") + "," +
+              w.add("IFCCOMPOSITECURVESEGMENT(.CONTINUOUS.,.T.," + arc + ")") + "),.F.)");
+    return w.shape("SweptSolid", w.extrusion(w.add("IFCARBITRARYCLOSEDPROFILEDEF(.AREA.,$," + outline + ")"), 3));
+  };
+  add_columns(w, "$", body);
+  EXPECT_THAT(import("IFC2X3", w).text, HasSubstr("width = \"80 cm\"\nheight = \"40 cm\""));
+}
+
+TEST(ImportIfcIdioms, NamesTheProfileOfSteel) {
+  Writer w;
+  w.metres();
+  add_columns(w, "$", [&] {
+    return w.shape("SweptSolid",
+                   w.extrusion(w.add("IFCISHAPEPROFILEDEF(.AREA.,'HEA200',$,0.2,0.19,0.0065,0.01,0.018)"), 3));
+  });
+  try {
+    import("IFC2X3", w);
+    FAIL() << "steel was taken for concrete";
+  } catch (const InputError& e) {
+    EXPECT_EQ(e.diagnostics()[0].code, "E112");
+    EXPECT_THAT(e.diagnostics()[0].help, HasSubstr("its profile is IFCISHAPEPROFILEDEF"));
+  }
+}
+
+}  // namespace
+}  // namespace topple::product
