@@ -34,3 +34,19 @@ if(NPM)
   set_tests_properties(export_gltf PROPERTIES LABELS web FIXTURES_REQUIRED export_files TIMEOUT 120
                                               ENVIRONMENT "TOPPLE_EXPORTS=${exports}/files")
 endif()
+
+# the storehouse in Blender's importer
+find_program(TOPPLE_BLENDER blender)
+if(TOPPLE_BLENDER)
+  set(storehouse ${CMAKE_CURRENT_BINARY_DIR}/exports_storehouse)
+  add_test(NAME export_storehouse_run COMMAND topple run ${PROJECT_SOURCE_DIR}/examples/weida/plan.toml -o ${storehouse} --no-report)
+  add_test(NAME export_storehouse COMMAND topple export ${storehouse}/record.h5 --gltf --json --frame-rate "10 Hz" -o ${storehouse})
+  add_test(NAME export_blender COMMAND ${TOPPLE_BLENDER} -b --python-exit-code 1 --python
+                                       ${CMAKE_CURRENT_SOURCE_DIR}/python/check_gltf_blender.py -- ${storehouse})
+  set_tests_properties(export_storehouse_run PROPERTIES LABELS slow FIXTURES_SETUP export_storehouse_run TIMEOUT 600)
+  set_tests_properties(export_storehouse PROPERTIES LABELS slow FIXTURES_REQUIRED export_storehouse_run FIXTURES_SETUP export_storehouse
+                                                    TIMEOUT 120)
+  set_tests_properties(export_blender PROPERTIES LABELS slow FIXTURES_REQUIRED export_storehouse TIMEOUT 300)
+else()
+  message(STATUS "blender not found: its import of glTF is not tested")
+endif()
