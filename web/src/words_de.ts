@@ -678,6 +678,8 @@ export const german: readonly (readonly [string, string])[] = [
   ["converged", "zum Ende gekommen"],
   ["yes", "ja"],
   ["no", "nein"],
+  ["The {:d} most possible of {:d} runs are listed.", "Die {} möglichsten von {} Rechnungen stehen hier."],
+  ["evaluator", "Auswerteprogramm"],
   ["Table of bounds", "Tabelle der Grenzen"],
   ["Table of confirmed bounds", "Tabelle der bestätigten Grenzen"],
   ["output", "Ergebnisgröße"],

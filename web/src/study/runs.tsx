@@ -283,7 +283,7 @@ export function Runs(props: { state: State }) {
         </div>
         <OneRun state={state} />
       </div>
-      {shown.length < inside.length && <p class="quiet">The {shown.length} most possible of {inside.length} runs are listed.</p>}
+      {shown.length < inside.length && <p class="quiet">{`The ${shown.length} most possible of ${inside.length} runs are listed.`}</p>}
     </section>
   );
 }
