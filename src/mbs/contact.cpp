@@ -17,6 +17,7 @@ namespace {
 
 constexpr int kMostContactInterval = 2;
 constexpr double kLookAngle = 0.12;      // of a contact's swing from one look for points to the next, at most [rad]
+constexpr int kMembersOfNode = 15;       // shapes of a body; more are pieces of one surface
 constexpr double kStickStiffness = 1.2;  // of the mean normal stiffness of a corner
 
 /// Component of a vector in a block of lanes.
@@ -60,7 +61,12 @@ double System::calc_contact_frequency() const {
       if (id != kGround) inverse_mass += state.body[static_cast<size_t>(id.index)].inverse_mass;
     most = std::max(most, contact_laws[2 + i].mean * (p.stiffness > 0 ? p.stiffness * inverse_mass : usual));
   }
-  return std::sqrt(most);
+  // of members that meet in a node one or two touch at once, of the staves of a ring all
+  int pieces = 1;
+  for (size_t b = 0; b < B; ++b)
+    if (const int shapes = state.body[b].shapes; !fixed[b] && shapes > kMembersOfNode)
+      pieces = std::max(pieces, shapes);
+  return std::sqrt(most * pieces);
 }
 
 int System::find_pair_law(int a, int b) const {

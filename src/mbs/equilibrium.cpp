@@ -11,6 +11,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "mbs/contact_kernel.h"
 #include "mbs/joint_rows.h"
 #include "mbs/system.h"
 
@@ -71,6 +72,29 @@ void add_outers(const KinematicRow rows[6], const double k[6], const Unknowns& u
       if (body[a] >= 0 && body[b] >= 0)
         out.emplace_back(u.at(body[a], m), u.at(body[b], n), sum[6 * a + u.coordinate(m)][6 * b + u.coordinate(n)]);
     }
+}
+
+/// Upper bound of the frequencies with which the points that touch swing their bodies [rad/s].
+double find_touching_frequency(const State& s) {
+  const Touching& t = s.touching;
+  if (t.group.empty()) return 0;
+  const size_t W = kernel::lanes();
+  std::vector<double> stiffness(t.body.size(), 0.0);
+  for (const ContactGroup& g : t.group) {
+    const size_t block = g.slot / W, place = g.slot % W;
+    const double mean = t.groups[(block * kernel::kGroupFields + kernel::kMean) * W + place];
+    double sum = 0;
+    for (size_t i = 0; i < static_cast<size_t>(g.count); ++i)
+      sum += t.points[((t.rows[block] + i) * kernel::kPointFields + kernel::kPointStiffness) * W + place];
+    // Gershgorin's bound: a partner that moves counts once more
+    const double bound = (g.a == 0 || g.b == 0 ? 1 : 2) * mean * sum;
+    stiffness[static_cast<size_t>(g.a)] += bound;
+    stiffness[static_cast<size_t>(g.b)] += bound;
+  }
+  double most = 0;
+  for (size_t i = 1; i < t.body.size(); ++i)  // the first is the ground
+    most = std::max(most, stiffness[i] * s.body[static_cast<size_t>(t.body[i])].inverse_mass);
+  return std::sqrt(3 * most);  // a flat box rocks with the square root of 3 times what lifts it
 }
 
 }  // namespace
@@ -282,7 +306,14 @@ void System::adopt_step() {
 void System::review_step() {
   std::vector<double>& due = state.review_times;
   const bool is_due = std::any_of(due.begin(), due.end(), [&](double t) { return t <= state.time; });
-  if (!is_due && 4 * state.live_elements >= 3 * state.live_at_review) return;
+  if (!is_due && 4 * state.live_elements >= 3 * state.live_at_review) {
+    // many shapes of two bodies that touch at once are stiffer together than the four corners of calc_step_limit
+    if (options.step > 0 || state.touching.steps != 1) return;
+    const double touching = find_touching_frequency(state);
+    if (step * touching > 2 * options.step_safety)
+      set_step(2 * options.step_safety / std::hypot(find_highest_frequency(), touching));
+    return;
+  }
   due.erase(std::remove_if(due.begin(), due.end(), [&](double t) { return t <= state.time; }), due.end());
   state.live_at_review = state.live_elements;
   if (options.step > 0) return;
