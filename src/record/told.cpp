@@ -15,7 +15,8 @@ std::string drop_negative_zeros(const std::string& text) {
       bool has_point = false;
       while (at(end) == '0' || (at(end) == '.' && !has_point && at(end + 1) == '0')) has_point |= at(end++) == '.';
       // "-0.05", "-0x" and "-0-1" go on
-      if (!is_part(at(end)) && at(end) != '-') continue;
+      const bool goes_on = is_part(at(end)) || at(end) == '-' || (at(end) == '.' && is_part(at(end + 1)));
+      if (!goes_on) continue;
     }
     out += text[i];
   }
