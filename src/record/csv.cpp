@@ -26,10 +26,10 @@ std::string quoted(std::string_view text) {
   return out + '"';
 }
 
-/// The shortest digits that give the same number back, zero without a sign; not a number is an empty field.
+/// The shortest digits that give the same number back; not a number is an empty field.
 template <class Number>
 std::string digits(Number value) {
-  return std::isnan(value) ? std::string() : fmt::format("{}", value == 0 ? Number{} : value);
+  return std::isnan(value) ? std::string() : fmt::format("{}", value);
 }
 
 std::string with_unit(const std::string& name, const std::string& unit) {
