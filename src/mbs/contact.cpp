@@ -17,7 +17,7 @@ namespace {
 
 constexpr int kMostContactInterval = 2;
 constexpr double kLookAngle = 0.12;      // of a contact's swing from one look for points to the next, at most [rad]
-constexpr int kMembersOfNode = 8;        // shapes of a body; more are pieces of one surface
+constexpr int kMembersOfNode = 15;       // shapes of a body; more are pieces of one surface
 constexpr double kStickStiffness = 1.2;  // of the mean normal stiffness of a corner
 
 /// Component of a vector in a block of lanes.
