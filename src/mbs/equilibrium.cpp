@@ -377,8 +377,7 @@ bool System::find_equilibrium(std::string& message) {
     const Sparse K = assembly.make_stiffness(false, weight);
     for (Eigen::Index i = 0; i < n; ++i) largest = std::max(largest, K.coeff(i, i));
   }
-  // as stiff as the stiffest body is held: more would turn round-off of places into larger forces and save no iteration
-  const double penalty = largest;
+  const double penalty = 30 * largest;
   Eigen::SimplicialLDLT<Sparse> solver;
   bool analysed = false;  // the pattern stays what it is
   const auto factorise = [&] {
