@@ -159,6 +159,23 @@ struct BendingPlane {
   }
 };
 
+/// Where a normal force stands in a cell: how far from its middle force, and on which side.
+template <class D>
+struct CellForce {
+  Num<D> share;
+  hn::Mask<D> upper;
+
+  HWY_INLINE CellForce(const double* HWY_RESTRICT flow, int cell, Num<D> force) {
+    const Num<D> above = force - load<D>(flow, cell + kCellForce);
+    upper = hn::Ge(above.v, hn::Zero(D()));
+    share = abs(above * select(upper, load<D>(flow, cell + kCellForce + 2), load<D>(flow, cell + kCellForce + 1)));
+  }
+  /// Between values at the cell's three forces.
+  HWY_INLINE Num<D> mix(Num<D> low, Num<D> middle, Num<D> high) const {
+    return fma(share, select(upper, high, low) - middle, middle);
+  }
+};
+
 /// The law of a zone that flows in bending, shear or torsion (docs/theory/zones.md, eq. 1 to 9). Sets the elastic
 /// resultants f; gives the lanes among `wanted` for which that is the whole truth and moves their history; the others
 /// keep theirs.
@@ -212,23 +229,17 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
     M moves = to.out;
     for (int q = 0; q < 2; ++q) {
       const int cell = kStations + s * kStationFields + kCell + q * kCellFields;
-      const N above = f[0] - load<D>(flow, cell + kCellForce);
-      const auto upper = hn::Ge(above.v, zero.v);
-      const N t =
-          abs(above * select(upper, load<D>(flow, cell + kCellForce + 2), load<D>(flow, cell + kCellForce + 1)));
+      const CellForce<D> at(flow, cell, f[0]);
       const N r = (load<D>(flow, kStations + s * kStationFields + kReached) - load<D>(flow, cell + kCellRotation)) *
                   load<D>(flow, cell + kCellRotation + 1);
-      demand(hn::And(hn::Le(t.v, one.v), hn::And(hn::Ge(r.v, zero.v), hn::Le(r.v, one.v))));
+      demand(hn::And(hn::Le(at.share.v, one.v), hn::And(hn::Ge(r.v, zero.v), hn::Le(r.v, one.v))));
       const auto positive = hn::Ge(plane[q].m[s].v, zero.v);
       const auto corner = [&](int force, int rotation) {
-        const int at = cell + 2 * force + rotation;
-        return select(positive, load<D>(flow, at + kCellPositive), load<D>(flow, at + kCellNegative));
+        const int value = cell + 2 * force + rotation;
+        return select(positive, load<D>(flow, value + kCellPositive), load<D>(flow, value + kCellNegative));
       };
-      const auto along_force = [&](int rotation) {
-        const N middle = corner(1, rotation);
-        return fma(t, select(upper, corner(2, rotation), corner(0, rotation)) - middle, middle);
-      };
-      const N low = along_force(0), high = along_force(1);
+      const N low = at.mix(corner(0, 0), corner(1, 0), corner(2, 0));
+      const N high = at.mix(corner(0, 1), corner(1, 1), corner(2, 1));
       const N limit = fma(r, high - low, low), size = abs(plane[q].m[s]);
       to.none[q] = hn::Le(limit.v, zero.v);
       const N ratio = select(to.none[q], zero, size / N{hn::Max(limit.v, tiny.v)});
@@ -327,27 +338,24 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
   N elongation = zero;
   for (int s = 0; s < 2; ++s) {
     const N so_far = load<D>(flow, kStations + s * kStationFields + kReached);
-    const M grows = hn::And(good, hn::Gt(reached[s].v, so_far.v));
+    M grows = hn::And(good, hn::Gt(reached[s].v, so_far.v));
     if (hn::AllFalse(tag, grows)) continue;
     N squares = zero, along = zero, bending = zero;
     for (int q = 0; q < 2; ++q) {
       const int cell = kStations + s * kStationFields + kCell + q * kCellFields;
-      const N above = f[0] - load<D>(flow, cell + kCellForce);
-      const auto upper = hn::Ge(above.v, zero.v);
-      const N t =
-          abs(above * select(upper, load<D>(flow, cell + kCellForce + 2), load<D>(flow, cell + kCellForce + 1)));
       const auto positive = hn::Ge(plane[q].phi[s].v, zero.v);
       const auto lift_at = [&](int force) {
         return select(positive, load<D>(flow, cell + kCellLiftPositive + force),
                       load<D>(flow, cell + kCellLiftNegative + force));
       };
-      const N middle = lift_at(1);
-      const N lift = fma(t, select(upper, lift_at(2), lift_at(0)) - middle, middle);
+      const N lift = CellForce<D>(flow, cell, f[0]).mix(lift_at(0), lift_at(1), lift_at(2));
       const N square = plane[q].phi[s] * plane[q].phi[s];
       squares = squares + square;
       along = fma(square, lift, along);
       bending = fma(plane[q].m[s], by[q][s], bending);
     }
+    grows = hn::And(grows, hn::Ne(along.v, zero.v));
+    if (hn::AllFalse(tag, grows)) continue;
     const N unbound = (reached[s] - so_far) * along / squares;
     // the axial spring takes no more than bending brings
     const N brought =

@@ -690,6 +690,7 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
         along += phi[q][s] * phi[q][s] * (phi[q][s] >= 0 ? lift.positive : lift.negative);
         bending += m[q][s] * (phi[q][s] - phi_trial[q][s]);
       }
+      if (along == 0) continue;
       double by = grown[s] * along / squares;
       // the axial spring takes no more than bending brings: |by| (½ k |by| - N') <= brought, N' pulling the way of by
       const double brought = (1 - 0.5 * station_limits[s].law().damage_share) * std::max(0.0, bending);
