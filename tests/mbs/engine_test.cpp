@@ -335,21 +335,14 @@ TEST(Zone, EachStationBreaksAtTheRotationOfItsOwnLaw) {
     laws[0].rupture_rotation = first;
     laws[1].rupture_rotation = second;
     const std::vector<CompiledLaw> compiled{compile_law(laws[0]), compile_law(laws[1])};
-    const double L = 3, EI = 3e7;
-    ZoneParameters p;
-    for (double& k : p.stiffness) k = 1e8;
-    p.stiffness[1] = p.stiffness[2] = 12 * EI / (L * L * L);
-    p.stiffness[4] = p.stiffness[5] = EI / L;
-    p.stations = 2;
-    p.x[0] = -L / 2, p.x[1] = L / 2;
-    p.law[0] = 0, p.law[1] = 1;
+    const ZoneParameters p = test::make_member(1);
     ZoneState z;
     double broken_at = 0;
     for (int i = 1; i <= 2000 && z.live; ++i) {
       const double u = 0.12 * i / 2000;
       advance_zone(p, compiled, {{0, u, 0, 0, 0, 0}}, 0, 0, z);
       // rotation of a station is the chord's less the elastic end rotation M L / 6 EI
-      broken_at = u / L - 1e5 * L / (6 * EI);
+      broken_at = u / test::kMemberLength - 1e5 * test::kMemberLength / (6 * test::kMemberEI);
     }
     EXPECT_EQ(z.reason, z.live ? BreakReason::None : BreakReason::Rotation);
     return z.live ? 0 : broken_at;

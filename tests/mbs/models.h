@@ -8,6 +8,7 @@
 
 #include "mbs/model.h"
 #include "mbs/solver.h"
+#include "mbs/zone.h"
 
 namespace topple::mbs::test {
 
@@ -66,6 +67,20 @@ inline Cantilever make_cantilever(int n, double length, double width, double hei
     c.tip = b;
   }
   return c;
+}
+
+/// A whole member as one zone with a station at each end, laws 0 and `second`: bends like a beam of this length and EI.
+inline constexpr double kMemberLength = 3, kMemberEI = 3e7;
+inline ZoneParameters make_member(int second = 0) {
+  constexpr double L = kMemberLength, EI = kMemberEI;
+  ZoneParameters p;
+  for (double& k : p.stiffness) k = 1e8;
+  p.stiffness[1] = p.stiffness[2] = 12 * EI / (L * L * L);
+  p.stiffness[4] = p.stiffness[5] = EI / L;
+  p.stations = 2;
+  p.x[0] = -L / 2, p.x[1] = L / 2;
+  p.law[0] = 0, p.law[1] = second;
+  return p;
 }
 
 /// Elastic-plastic law of one axis: limit moment about z whatever the normal force, bending about y unlimited.

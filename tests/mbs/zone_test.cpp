@@ -199,11 +199,7 @@ TEST(Zone, ShortensOrLengthensAsItsRotationGrows) {
 TEST(Zone, LengthensByBothStations) {
   ZoneLaw law = make_lifting_law();
   law.shear_y = law.shear_z = kUnlimited;
-  const double L = 3, EI = 3e7;
-  ZoneParameters p = make_parameters(2, L / 2);
-  p.stiffness[1] = p.stiffness[2] = 12 * EI / (L * L * L);
-  p.stiffness[4] = p.stiffness[5] = EI / L;
-  Walk w(law, p);
+  Walk w(law, test::make_member());
   for (int i = 1; i <= 4000; ++i) w.go({{w.z.axial, 0.03 * i / 4000, 0, 0, 0, 0}}, 1);
   // one turns forwards, one backwards
   EXPECT_LT(w.z.station[0].phi[1] * w.z.station[1].phi[1], 0);
@@ -298,11 +294,8 @@ TEST(Zone, TwoStationsOfAMemberYieldAtItsEnds) {
   // a member of length 3 in double curvature: shear 2M/L when both ends have yielded
   ZoneLaw law = make_law();
   law.shear_y = law.shear_z = kUnlimited;
-  const double L = 3, EI = 3e7;
-  ZoneParameters p = make_parameters(2, L / 2);
-  p.stiffness[1] = p.stiffness[2] = 12 * EI / (L * L * L);
-  p.stiffness[4] = p.stiffness[5] = EI / L;
-  Walk w(law, p);
+  const double L = test::kMemberLength, EI = test::kMemberEI;
+  Walk w(law, test::make_member());
   const double u = L * (0.004 + 100e3 / (6 * EI / L));
   w.go({{0, u, 0, 0, 0, 0}}, 4000);
   // both ends turned by 0.004: the limit there is 108 kNm
