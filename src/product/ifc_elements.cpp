@@ -322,6 +322,16 @@ class Reader {
     return out.points.size() > before + 5;
   }
 
+  /// Calls use(item, its pose) for every item of the representation that a mapped item places.
+  template <typename Use>
+  void for_mapped_items(const StepEntity& mapped, const Pose& X, const Use& use) const {
+    const StepEntity *map = get(mapped.at(0)), *target = get(mapped.at(1));
+    const StepEntity* body = map == nullptr ? nullptr : get(map->at(1));
+    if (body == nullptr || target == nullptr) return;
+    const Pose X_WI = X * transform(*target) * inverse(axis_placement(map->at(0)));
+    for (const StepValue& item : body->at(3).items) use(item, X_WI);
+  }
+
   bool find_item(const StepValue& v, const Pose& X, Body& out, int depth) const {
     const StepEntity* e = get(v);
     if (e == nullptr || depth > 10) return false;
@@ -339,13 +349,9 @@ class Reader {
     if (e->type == "IFCBOOLEANCLIPPINGRESULT" || e->type == "IFCBOOLEANRESULT")
       return find_item(e->at(1), X, out, depth + 1);
     if (e->type == "IFCMAPPEDITEM") {
-      const StepEntity *map = get(e->at(0)), *target = get(e->at(1));
-      if (map == nullptr || target == nullptr) return false;
-      const StepEntity* body = get(map->at(1));
       bool any = false;
-      if (body != nullptr)
-        for (const StepValue& item : body->at(3).items)
-          any |= find_item(item, X * transform(*target) * inverse(axis_placement(map->at(0))), out, depth + 1);
+      for_mapped_items(*e, X,
+                       [&](const StepValue& item, const Pose& X_WI) { any |= find_item(item, X_WI, out, depth + 1); });
       return any;
     }
     out.why = "its body is " + e->type;
@@ -460,11 +466,8 @@ class Reader {
       out.push_back({X_WP.p, X_WP * (e->at(3).number * out_.length_unit * direction(e->at(2), {0, 0, 1}))});
       radius = profile->at(3).number * out_.length_unit;
     } else if (e->type == "IFCMAPPEDITEM") {
-      const StepEntity *map = get(e->at(0)), *target = get(e->at(1));
-      const StepEntity* body = map == nullptr ? nullptr : get(map->at(1));
-      if (body == nullptr || target == nullptr) return;
-      for (const StepValue& item : body->at(3).items)
-        find_disks(item, X * transform(*target) * inverse(axis_placement(map->at(0))), out, radius, depth + 1);
+      for_mapped_items(
+          *e, X, [&](const StepValue& item, const Pose& X_WI) { find_disks(item, X_WI, out, radius, depth + 1); });
     }
   }
 
@@ -511,10 +514,21 @@ class Reader {
         continue;
       }
       for (const std::vector<Vec3>& line : axes) {
-        double length = 0;
-        for (size_t i = 1; i < line.size(); ++i) length += norm(line[i] - line[i - 1]);
+        double length = 0, longest = 0;
+        bar.has_place = bar.has_axis = true;
+        bar.place = bar.low = bar.high = turn(line.front());
+        for (size_t i = 1; i < line.size(); ++i) {
+          const Vec3 a = turn(line[i - 1]), b = turn(line[i]);
+          const double part = norm(b - a);
+          length += part;
+          if (part > longest) {
+            longest = part;
+            bar.place = 0.5 * (a + b);
+          }
+          bar.low = {std::min(bar.low.x, b.x), std::min(bar.low.y, b.y), std::min(bar.low.z, b.z)};
+          bar.high = {std::max(bar.high.x, b.x), std::max(bar.high.y, b.y), std::max(bar.high.z, b.z)};
+        }
         if (!is_told) bar.is_main = norm(line.back() - line.front()) >= kStraight * length;
-        bar.place = turn(line.front());
         out_.bars.push_back(bar);
       }
     }

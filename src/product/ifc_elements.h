@@ -28,9 +28,10 @@ struct IfcBar {
   double diameter = 0;  // [m]
   std::string grade;
   bool is_main = true;  // not a tie or stirrup
-  bool has_place = false;
-  Vec3 place;    // of its start, in the same axes [m]
-  int host = 0;  // element that it is part of, 0: not said
+  bool has_place = false, has_axis = false;
+  Vec3 place;      // of the middle of its longest straight part, else of its placement, in the axes of elements [m]
+  Vec3 low, high;  // box of its axis [m]
+  int host = 0;    // element that it is part of, 0: not said
 };
 
 struct IfcBuilding {

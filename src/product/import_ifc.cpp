@@ -7,6 +7,7 @@
 #include <set>
 
 #include "base/unit.h"
+#include "product/ifc_reinforcement.h"
 #include "product/import.h"
 
 namespace topple::product {
@@ -305,66 +306,81 @@ class Planner {
     }
   }
 
-  struct Bars {
-    int main = 0, top = 0, bottom = 0, ties = 0;
-    double diameter = 0, tie_diameter = 0;
-    std::string grade;
-  };
   /// Bars of the first element of a group that has some.
-  Bars find_bars(const Group& g) const {
-    for (const IfcElement* e : g.elements) {
-      Bars out;
-      for (const IfcBar& bar : b_.bars) {
-        const bool inside = bar.has_place && bar.place.x > e->low.x - 0.05 && bar.place.x < e->high.x + 0.05 &&
-                            bar.place.y > e->low.y - 0.05 && bar.place.y < e->high.y + 0.05 &&
-                            bar.place.z > e->low.z - 0.3 && bar.place.z < e->high.z;
-        if (bar.host != 0 ? bar.host != e->id : !inside) continue;
-        if (!bar.is_main) {
-          ++out.ties;
-          out.tie_diameter = bar.diameter;
-          continue;
-        }
-        ++out.main;
-        (bar.place.z > 0.5 * (e->low.z + e->high.z) ? out.top : out.bottom) += 1;
-        out.diameter = bar.diameter;
-        out.grade = bar.grade;
-      }
-      if (out.main > 0) return out;
-    }
+  MemberBars find_bars_of(const Group& g) const {
+    for (const IfcElement* e : g.elements)
+      if (MemberBars bars = find_bars(*e, b_.bars); bars.all.count > 0 || bars.ties.count > 0) return bars;
     return {};
   }
 
-  void write_section(const std::string& name, const Group& g, bool is_column) {
-    text_ += fmt::format("[section.{}]\nwidth = {}\nheight = {}\nconcrete = \"{}\"\nsteel = \"bars\"\ncover = \"?\"\n",
-                         name, centimetres(g.width), centimetres(g.height), concrete_key(g.concrete));
-    const Bars bars = find_bars(g);
-    if (bars.ties > 0 && bars.tie_diameter > 0) {
-      text_ += fmt::format("ties = {{ diameter = {}, spacing = \"?\" }}\n", millimetres(bars.tie_diameter));
-    } else {
-      text_ += "ties = { diameter = \"?\", spacing = \"?\" }\n";
+  /// "4 x 20 mm"
+  std::string describe(const BarGroup& bars, const std::string& name, const char* where) {
+    if (bars.has_diameters)
+      guessed(fmt::format("section {}: its {} bars {} have several diameters; {:.1f} mm gives the same area", name,
+                          bars.count, where, 1000 * bars.diameter));
+    return fmt::format("{} x {:g} mm", bars.count, std::round(1e4 * bars.diameter) / 10);
+  }
+
+  void write_cover_and_ties(const std::string& name, const MemberBars& bars) {
+    std::string gaps;
+    const auto add_gap = [&gaps](const char* what) { gaps += (gaps.empty() ? "" : ", ") + std::string(what); };
+    text_ += "cover = " + (bars.has_cover ? millimetres(bars.cover) : "\"?\"") + "\n";
+    if (!bars.has_cover) add_gap("cover");
+    if (bars.has_cover && bars.largest_cover - bars.cover > 5e-3)
+      guessed(fmt::format("section {}: its cover is {:.0f} to {:.0f} mm; the least one was taken", name,
+                          1000 * bars.cover, 1000 * bars.largest_cover));
+    const double diameter = bars.ties.diameter, spacing = bars.tie_spacing;
+    text_ += fmt::format("ties = {{ diameter = {}, spacing = {} }}\n", diameter > 0 ? millimetres(diameter) : "\"?\"",
+                         spacing > 0 ? millimetres(spacing) : "\"?\"");
+    if (!(diameter > 0)) add_gap("diameter of ties");
+    if (!(spacing > 0)) add_gap("spacing of ties");
+    if (diameter > 0 && spacing > 0)
+      taken(fmt::format("section {}: ties of {:.0f} mm every {:.0f} mm", name, 1000 * diameter, 1000 * spacing));
+    if (bars.largest_tie_spacing > 1.2 * bars.least_tie_spacing)
+      guessed(fmt::format("section {}: its ties lie {:.0f} to {:.0f} mm apart; the median was taken", name,
+                          1000 * bars.least_tie_spacing, 1000 * bars.largest_tie_spacing));
+    if (!gaps.empty()) missing(fmt::format("section {}: {}", name, gaps));
+  }
+
+  void write_column_bars(const std::string& name, const MemberBars& bars) {
+    const int count = bars.all.count;
+    if (bars.count_y == 0 && (count < 4 || count % 4 != 0)) {
+      text_ += "bars = { count_y = \"?\", count_z = \"?\", diameter = \"?\" }\n";
+      missing(fmt::format("section {}: {}", name,
+                          count > 0 ? fmt::format("how its {} bars lie", count) : std::string("its bars")));
+      return;
     }
-    missing(fmt::format("section {}: cover and spacing of ties{}", name, bars.ties > 0 ? "" : ", their diameter"));
-    if (!bars.grade.empty()) grade_ = bars.grade;
-    if (is_column) {
-      if (bars.main >= 4 && bars.main % 4 == 0) {
-        const int side = bars.main / 4 + 1;
-        text_ += fmt::format("bars = {{ count_y = {0}, count_z = {0}, diameter = {1} }}\n", side,
-                             millimetres(bars.diameter));
-        taken(fmt::format("section {}: {} bars of {:.0f} mm", name, bars.main, 1000 * bars.diameter));
-        guessed(fmt::format("section {}: its bars lie evenly on the four sides", name));
-      } else {
-        text_ += "bars = { count_y = \"?\", count_z = \"?\", diameter = \"?\" }\n";
-        missing(fmt::format("section {}: {}", name,
-                            bars.main > 0 ? fmt::format("how its {} bars lie", bars.main) : std::string("its bars")));
-      }
-    } else if (bars.top > 0 && bars.bottom > 0) {
-      text_ += fmt::format("top = \"{} x {:g} mm\"\nbottom = \"{} x {:g} mm\"\n", bars.top, 1000 * bars.diameter,
-                           bars.bottom, 1000 * bars.diameter);
-      taken(fmt::format("section {}: {} bars above, {} below, of {:.0f} mm", name, bars.top, bars.bottom,
-                        1000 * bars.diameter));
-    } else {
+    const int even = count / 4 + 1;
+    text_ +=
+        fmt::format("bars = {{ count_y = {}, count_z = {}, diameter = {} }}\n", bars.count_y > 0 ? bars.count_y : even,
+                    bars.count_z > 0 ? bars.count_z : even, millimetres(bars.all.diameter));
+    taken(fmt::format("section {}: {} bars", name, describe(bars.all, name, "along the faces")));
+    if (bars.count_y == 0) guessed(fmt::format("section {}: its bars lie evenly on the four sides", name));
+  }
+
+  void write_beam_bars(const std::string& name, const MemberBars& bars) {
+    if (bars.middle > 0)
+      missing(fmt::format("section {}: {} bars at the middle of its height are left out", name, bars.middle));
+    if (bars.top.count == 0 || bars.bottom.count == 0) {
       text_ += "top = \"?\"\nbottom = \"?\"\n";
       missing(fmt::format("section {}: its bars", name));
+      return;
+    }
+    const std::string top = describe(bars.top, name, "above"), bottom = describe(bars.bottom, name, "below");
+    text_ += fmt::format("top = \"{}\"\nbottom = \"{}\"\n", top, bottom);
+    taken(fmt::format("section {}: {} above, {} below", name, top, bottom));
+  }
+
+  void write_section(const std::string& name, const Group& g, bool is_column) {
+    text_ += fmt::format("[section.{}]\nwidth = {}\nheight = {}\nconcrete = \"{}\"\nsteel = \"bars\"\n", name,
+                         centimetres(g.width), centimetres(g.height), concrete_key(g.concrete));
+    const MemberBars bars = find_bars_of(g);
+    if (!bars.grade.empty()) grade_ = bars.grade;
+    write_cover_and_ties(name, bars);
+    if (is_column) {
+      write_column_bars(name, bars);
+    } else {
+      write_beam_bars(name, bars);
     }
   }
 

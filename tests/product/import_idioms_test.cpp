@@ -5,6 +5,7 @@
 
 #include <array>
 #include <functional>
+#include <vector>
 
 #include "base/error.h"
 #include "product/import.h"
@@ -145,11 +146,17 @@ TEST(ImportIfcIdioms, CountsBarsOfGroupsInAssembliesByTheirShape) {
       w.element("IFCCOLUMN", w.placement("$", 12, 0, 0), w.shape("SweptSolid", w.extrusion(w.rectangle(0.5, 0.4), 6)));
   // one entity for eight bars, and one for a stirrup along a composite curve, both of no role
   std::string disks;
-  for (int i = 0; i < 8; ++i)
+  for (const auto& [x, y] : std::array<std::array<double, 2>, 8>{{{0.02, 0.02},
+                                                                  {0.2, 0.02},
+                                                                  {0.38, 0.02},
+                                                                  {0.38, 0.15},
+                                                                  {0.38, 0.28},
+                                                                  {0.2, 0.28},
+                                                                  {0.02, 0.28},
+                                                                  {0.02, 0.15}}})
     disks += (disks.empty() ? "" : ",") +
              w.add("IFCSWEPTDISKSOLID(" +
-                   w.add("IFCPOLYLINE((" + w.point(0.1 * i, 0, 0.05) + "," + w.point(0.1 * i, 0, 5.9) + "))") +
-                   ",0.0125,$,0.,1.)");
+                   w.add("IFCPOLYLINE((" + w.point(x, y, 0.05) + "," + w.point(x, y, 5.9) + "))") + ",0.0125,$,0.,1.)");
   const std::string place = w.placement("$", 11.8, -0.15, 0);
   const std::string bars =
       w.add("IFCREINFORCINGBAR('g',$,'LONGITUDINAL',$,$," + place + "," + w.shape("AdvancedSweptSolid", disks) +
@@ -172,7 +179,81 @@ TEST(ImportIfcIdioms, CountsBarsOfGroupsInAssembliesByTheirShape) {
   w.add("IFCRELAGGREGATES('g',$,$,$," + column + ",(" + cage + "))");
   const Import made = import("IFC2X3", w);
   EXPECT_THAT(made.text, HasSubstr("bars = { count_y = 3, count_z = 3, diameter = \"25 mm\" }"));
+  EXPECT_THAT(made.text, HasSubstr("cover = \"46 mm\""));
   EXPECT_THAT(made.text, HasSubstr("ties = { diameter = \"8 mm\", spacing = \"?\" }"));
+  EXPECT_THAT(made.report.missing, Contains(HasSubstr("column_500x400_unknown: spacing of ties")));
+}
+
+/// Bars of the given diameter and role along lines, as parts of an element.
+void add_bars(Writer& w, const std::string& host, const char* role, double diameter,
+              const std::vector<std::vector<std::array<double, 3>>>& lines) {
+  std::string bars;
+  for (const auto& line : lines) {
+    std::string points;
+    for (const auto& p : line) points += (points.empty() ? "" : ",") + w.point(p[0], p[1], p[2]);
+    const std::string disk = w.add("IFCSWEPTDISKSOLID(" + w.add("IFCPOLYLINE((" + points + "))") + "," +
+                                   std::to_string(diameter / 2) + ",$,$,$)");
+    bars += (bars.empty() ? "" : ",") + w.add("IFCREINFORCINGBAR('g',$,$,$,$," + w.placement("$", 0, 0, 0) + "," +
+                                              w.shape("AdvancedSweptSolid", disk) + ",'1','B500B'," +
+                                              std::to_string(diameter) + ",1.E-4,1.,." + role + ".,$)");
+  }
+  w.add("IFCRELAGGREGATES('g',$,$,$," + host + ",(" + bars + "))");
+}
+
+TEST(ImportIfcIdioms, ReadsCoverTiesAndLayersWhereTheBarsLie) {
+  Writer w;
+  w.metres();
+  std::string column;  // 0.4 m x 0.5 m, 4 m high
+  for (const double x : {0.0, 6.0})
+    for (const double y : {0.0, 5.0})
+      column = w.element("IFCCOLUMN", w.placement("$", x, y, 0),
+                         w.shape("SweptSolid", w.extrusion(w.rectangle(0.4, 0.5), 4)));
+  const std::string beam = w.element("IFCBEAM", w.placement("$", 3, 0, 3.4), w.shape("Brep", w.brep(6, 0.3, 0.6)));
+  // the last column: two bars along x, three along y, and starters that end below the middle
+  std::vector<std::vector<std::array<double, 3>>> bars, starters, ties;
+  for (const double x : {5.85, 6.15})
+    for (const double y : {4.8, 5.0, 5.2}) {
+      bars.push_back({{x, y, 0.05}, {x, y, 3.95}});
+      starters.push_back({{x, y + 0.025, -0.5}, {x, y + 0.025, 1.0}});
+    }
+  // 8 mm, axis 29 mm inside the faces: 25 mm clear; closer at the ends
+  for (const double z : {0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 1.1})
+    ties.push_back({{5.829, 4.779, z}, {6.171, 4.779, z}, {6.171, 5.221, z}, {5.829, 5.221, z}, {5.829, 4.779, z}});
+  add_bars(w, column, "MAIN", 0.02, bars);
+  add_bars(w, column, "MAIN", 0.02, starters);
+  add_bars(w, column, "LIGATURE", 0.008, ties);
+  // the beam, x from 0 to 6 m: three bars of 16 mm below, two of them bent up at their ends as hooks; above two of 12
+  // mm all along and one of 20 mm over each support; one at the middle of the height
+  add_bars(w, beam, "MAIN", 0.016,
+           {{{0.1, -0.1, 3.9}, {0.1, -0.1, 3.45}, {5.9, -0.1, 3.45}, {5.9, -0.1, 3.9}},
+            {{0.1, 0.0, 3.45}, {5.9, 0.0, 3.45}},
+            {{0.1, 0.1, 3.9}, {0.1, 0.1, 3.45}, {5.9, 0.1, 3.45}, {5.9, 0.1, 3.9}}});
+  add_bars(w, beam, "MAIN", 0.012,
+           {{{0.1, -0.1, 3.95}, {5.9, -0.1, 3.95}},
+            {{0.1, 0.1, 3.95}, {5.9, 0.1, 3.95}},
+            {{0.1, 0.1, 3.7}, {5.9, 0.1, 3.7}}});
+  add_bars(w, beam, "MAIN", 0.02, {{{0.1, 0.0, 3.95}, {1.5, 0.0, 3.95}}, {{4.5, 0.0, 3.95}, {5.9, 0.0, 3.95}}});
+  const Import made = import("IFC4", w);
+  EXPECT_THAT(made.text, HasSubstr("cover = \"25 mm\"\nties = { diameter = \"8 mm\", spacing = \"200 mm\" }\n"
+                                   "bars = { count_y = 2, count_z = 3, diameter = \"20 mm\" }"));
+  EXPECT_THAT(made.report.guessed, Contains(HasSubstr("its ties lie 100 to 200 mm apart")));
+  // the areas of 2 x 12 mm and 20 mm are those of 3 x 15.1 mm
+  EXPECT_THAT(made.text, HasSubstr("cover = \"?\"\nties = { diameter = \"?\", spacing = \"?\" }\ntop = \"3 x 15.1 "
+                                   "mm\"\nbottom = \"3 x 16 mm\""));
+  EXPECT_THAT(made.report.guessed, Contains(HasSubstr("its 3 bars above have several diameters")));
+  EXPECT_THAT(made.report.missing, Contains(HasSubstr("1 bars at the middle of its height are left out")));
+  EXPECT_THAT(made.report.missing, Contains(HasSubstr("cover, diameter of ties, spacing of ties")));
+}
+
+TEST(ImportIfcIdioms, LeavesAGapWhereTiesAreOutsideTheirColumn) {
+  Writer w;
+  w.metres();
+  std::string column;
+  add_columns(w, "$", [&] { return w.shape("SweptSolid", w.extrusion(w.rectangle(0.4, 0.4), 3)); });
+  column =
+      w.element("IFCCOLUMN", w.placement("$", 12, 0, 0), w.shape("SweptSolid", w.extrusion(w.rectangle(0.5, 0.4), 6)));
+  add_bars(w, column, "LIGATURE", 0.008, {{{11.7, -0.25, 1}, {12.3, -0.25, 1}, {12.3, 0.25, 1}, {11.7, 0.25, 1}}});
+  EXPECT_THAT(import("IFC4", w).text, HasSubstr("cover = \"?\"\nties = { diameter = \"8 mm\", spacing = \"?\" }"));
 }
 
 TEST(ImportIfcIdioms, TakesDiameterAndRoleFromTheTypeOfMappedBars) {

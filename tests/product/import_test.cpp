@@ -119,7 +119,7 @@ std::string make_building(const std::string& schema, double unit, double angle) 
   f.element("IFCSTAIR", f.placement(12, 22, 0), f.shape(1, 1, 3), "$,.NOTDEFINED.");
   // eight bars and a tie in the first column
   for (int i = 0; i < 8; ++i)
-    f.add("IFCREINFORCINGBAR('g',$,'bar',$,$," + f.ref(f.placement(9.85 + 0.3 * (i % 2), 19.8 + 0.1 * i / 2, 0.05)) +
+    f.add("IFCREINFORCINGBAR('g',$,'bar',$,$," + f.ref(f.placement(9.85 + 0.3 * (i % 2), 19.8 + 0.13 * (i / 2), 0.05)) +
           ",$,$,'BSt 420/500'," + f.number(0.025) + "," + f.number(4.9e-4) + "," + f.number(3) + ",.MAIN.,$)");
   f.add("IFCREINFORCINGBAR('g',$,'tie',$,$," + f.ref(f.placement(9.85, 19.8, 0.5)) + ",$,$,'BSt 420/500'," +
         f.number(0.008) + "," + f.number(5e-5) + "," + f.number(1.5) + ",.LIGATURE.,$)");
@@ -141,7 +141,7 @@ TEST_P(ImportIfc, FindsGridStoreysMembersAndBars) {
   EXPECT_THAT(t, HasSubstr("frames = { 1 = \"0.000 m\", 2 = \"4.000 m\", 3 = \"8.000 m\" }"));
   EXPECT_THAT(t, HasSubstr("heights = [\"3.200 m\", \"3.000 m\"]"));
   EXPECT_THAT(t, HasSubstr("[section.column_400x500_Concrete__C20_25]\nwidth = \"40 cm\"\nheight = \"50 cm\""));
-  EXPECT_THAT(t, HasSubstr("bars = { count_y = 3, count_z = 3, diameter = \"25 mm\" }"));
+  EXPECT_THAT(t, HasSubstr("bars = { count_y = 2, count_z = 4, diameter = \"25 mm\" }"));
   EXPECT_THAT(t, HasSubstr("ties = { diameter = \"8 mm\", spacing = \"?\" }"));
   EXPECT_THAT(t, HasSubstr("[section.beam_300x600_Concrete__C20_25]"));
   EXPECT_THAT(t, HasSubstr("thickness = \"18 cm\""));

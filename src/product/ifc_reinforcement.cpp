@@ -1,0 +1,152 @@
+#include "product/ifc_reinforcement.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace topple::product {
+
+namespace {
+
+constexpr double kReach = 0.05;        // how far a bar may lie outside the element that it lies in [m]
+constexpr double kUnder = 0.3;         // and below its foot, in a lap [m]
+constexpr double kSameLine = 0.6;      // bars whose axes differ by less diameters lie in one line
+constexpr double kMiddle = 0.25;       // of a beam's height from its middle: bars of no layer
+constexpr double kEnd = 0.1;           // where a beam's section is looked at, over its length
+constexpr double kLargestCover = 0.2;  // more is no cover [m]
+
+using Component = double Vec3::*;
+
+bool lies_in(const IfcBar& bar, const IfcElement& e) {
+  return bar.has_place && bar.place.x > e.low.x - kReach && bar.place.x < e.high.x + kReach &&
+         bar.place.y > e.low.y - kReach && bar.place.y < e.high.y + kReach && bar.place.z > e.low.z - kUnder &&
+         bar.place.z < e.high.z;
+}
+
+void add(BarGroup& group, const IfcBar& bar) {
+  group.has_diameters |= group.count > 0 && std::abs(group.diameter - bar.diameter) > 1e-4;
+  const double area = group.count * group.diameter * group.diameter + bar.diameter * bar.diameter;
+  group.diameter = std::sqrt(area / ++group.count);
+}
+
+/// The element's axis and the two directions of its section.
+struct Axes {
+  Component along, width, height;
+};
+Axes axes_of(const IfcElement& e) {
+  if (e.type == "IFCCOLUMN") return {&Vec3::z, &Vec3::x, &Vec3::y};
+  if (e.high.x - e.low.x > e.high.y - e.low.y) return {&Vec3::x, &Vec3::y, &Vec3::z};
+  return {&Vec3::y, &Vec3::x, &Vec3::z};
+}
+
+/// Bars that pass the section at `where` along the axis; those without an axis of their own pass everywhere.
+std::vector<const IfcBar*> find_passing(const std::vector<const IfcBar*>& bars, Component along, double where) {
+  std::vector<const IfcBar*> out;
+  for (const IfcBar* bar : bars)
+    if (!bar->has_axis || (bar->low.*along <= where && where <= bar->high.*along)) out.push_back(bar);
+  return out;
+}
+
+/// How many bars lie at each of both faces, if as many do.
+int count_at_faces(const std::vector<const IfcBar*>& bars, Component across) {
+  double low = 1e30, high = -1e30;
+  for (const IfcBar* bar : bars) {
+    low = std::min(low, bar->place.*across);
+    high = std::max(high, bar->place.*across);
+  }
+  int at_low = 0, at_high = 0;
+  for (const IfcBar* bar : bars) {
+    at_low += std::abs(bar->place.*across - low) < kSameLine * bar->diameter;
+    at_high += std::abs(bar->place.*across - high) < kSameLine * bar->diameter;
+  }
+  return at_low == at_high ? at_low : 0;
+}
+
+void find_column_bars(const std::vector<const IfcBar*>& bars, MemberBars& out) {
+  for (const IfcBar* bar : bars) add(out.all, *bar);
+  if (std::any_of(bars.begin(), bars.end(), [](const IfcBar* bar) { return !bar->has_place; })) return;
+  const int along_x = count_at_faces(bars, &Vec3::y), along_y = count_at_faces(bars, &Vec3::x);
+  if (along_x < 2 || along_y < 2 || 2 * (along_x + along_y) - 4 != out.all.count) return;
+  out.count_y = along_x;
+  out.count_z = along_y;
+}
+
+void find_beam_bars(const std::vector<const IfcBar*>& bars, const IfcElement& e, MemberBars& out) {
+  const double middle = 0.5 * (e.low.z + e.high.z), height = e.high.z - e.low.z;
+  for (const IfcBar* bar : bars) {
+    const double z = bar->place.z - middle;
+    if (std::abs(z) < kMiddle * height) {
+      ++out.middle;
+      continue;
+    }
+    add(out.all, *bar);
+    add(z > 0 ? out.top : out.bottom, *bar);
+  }
+}
+
+void find_spacing(const std::vector<const IfcBar*>& ties, Component along, MemberBars& out) {
+  std::vector<double> places;
+  for (const IfcBar* tie : ties)
+    if (tie->has_place)
+      places.push_back(tie->has_axis ? 0.5 * (tie->low.*along + tie->high.*along) : tie->place.*along);
+  std::sort(places.begin(), places.end());
+  std::vector<double> gaps;
+  for (size_t i = 1; i < places.size(); ++i)  // ties side by side are one tie of more legs
+    if (const double gap = places[i] - places[i - 1]; gap > 2 * out.ties.diameter) gaps.push_back(gap);
+  if (gaps.size() < 2) return;
+  std::sort(gaps.begin(), gaps.end());
+  out.tie_spacing = gaps[gaps.size() / 2];
+  out.least_tie_spacing = gaps.front();
+  out.largest_tie_spacing = gaps.back();
+}
+
+/// From the outermost ties, else from the outermost bars and the ties around them.
+void find_cover(const std::vector<const IfcBar*>& bars, const std::vector<const IfcBar*>& ties, const IfcElement& e,
+                const Axes& axes, MemberBars& out) {
+  const auto measure = [&](const std::vector<const IfcBar*>& list, double around) {
+    std::array<double, 4> face{1e30, 1e30, 1e30, 1e30};
+    for (const IfcBar* bar : list) {
+      if (!bar->has_axis) continue;
+      const double r = 0.5 * bar->diameter + around;
+      const double gap[4] = {bar->low.*axes.width - e.low.*axes.width, e.high.*axes.width - bar->high.*axes.width,
+                             bar->low.*axes.height - e.low.*axes.height, e.high.*axes.height - bar->high.*axes.height};
+      for (size_t i = 0; i < 4; ++i) face[i] = std::min(face[i], gap[i] - r);
+    }
+    const auto [low, high] = std::minmax_element(face.begin(), face.end());
+    if (*low < 0 || *high > kLargestCover) return;
+    out.cover = *low;
+    out.largest_cover = *high;
+    out.has_cover = true;
+  };
+  measure(ties, 0);
+  if (!out.has_cover && out.ties.diameter > 0) measure(bars, out.ties.diameter);
+}
+
+}  // namespace
+
+MemberBars find_bars(const IfcElement& e, const std::vector<IfcBar>& all) {
+  const Axes axes = axes_of(e);
+  std::vector<const IfcBar*> bars, ties;
+  for (const IfcBar& bar : all) {
+    if (bar.host != 0 ? bar.host != e.id : !lies_in(bar, e)) continue;
+    (bar.is_main ? bars : ties).push_back(&bar);
+  }
+  MemberBars out;
+  for (const IfcBar* tie : ties) add(out.ties, *tie);
+  if (!bars.empty()) out.grade = bars.front()->grade;
+  const double low = e.low.*axes.along, length = e.high.*axes.along - low;
+  if (e.type == "IFCCOLUMN") {
+    bars = find_passing(bars, axes.along, low + 0.5 * length);
+    find_column_bars(bars, out);
+  } else {
+    std::vector<const IfcBar*> first = find_passing(bars, axes.along, low + kEnd * length);
+    std::vector<const IfcBar*> last = find_passing(bars, axes.along, low + (1 - kEnd) * length);
+    bars = first.size() >= last.size() ? std::move(first) : std::move(last);
+    find_beam_bars(bars, e, out);
+  }
+  find_spacing(ties, axes.along, out);
+  find_cover(bars, ties, e, axes, out);
+  return out;
+}
+
+}  // namespace topple::product

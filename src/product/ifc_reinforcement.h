@@ -1,0 +1,36 @@
+#pragma once
+/// What the reinforcing bars of an IFC file say about the section of the member that they lie in.
+
+#include <string>
+#include <vector>
+
+#include "product/ifc_elements.h"
+
+namespace topple::product {
+
+/// Bars of one kind; none if `count` is 0.
+struct BarGroup {
+  int count = 0;
+  double diameter = 0;         // of bars of the same area in all [m]
+  bool has_diameters = false;  // bars of different diameters
+};
+
+struct MemberBars {
+  BarGroup all, top, bottom;  // bars along the member; top and bottom: of beams
+  int count_y = 0,
+      count_z = 0;  // of columns, along x and y, corners counted in both; 0: they do not lie along the faces
+  int middle = 0;   // of beams, between both layers, not counted above
+  BarGroup ties;
+  double tie_spacing = 0;                                 // 0: not known [m]
+  double least_tie_spacing = 0, largest_tie_spacing = 0;  // [m]
+  double cover = 0, largest_cover = 0;                    // clear, of the ties, least and largest of the faces [m]
+  bool has_cover = false;
+  std::string grade;
+};
+
+/// Bars that are part of the element, or lie in it where they are part of none. A column's section is that at the
+/// middle of its height, clear of laps; a beam's is the richer one of those at a tenth of its length from its ends,
+/// where it turns.
+MemberBars find_bars(const IfcElement&, const std::vector<IfcBar>&);
+
+}  // namespace topple::product
