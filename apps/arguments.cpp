@@ -80,6 +80,8 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   run->add_option("plan", a.input, "plan (TOML)")->type_name("FILE")->required();
   run->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")
       ->type_name("FILE");
+  run->add_flag("--check-step", a.check_step,
+                "run also at half the step and say what differs; with --threads 2 both at once");
   add_run_options(run);
 
   CLI::App* rules = app.add_subcommand("rules", "Show the knowledge rules of the simulation manager.");
@@ -341,6 +343,8 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   topple check plan.toml --json            complaints for programs)");
   add_examples(run, R"(  topple run plan.toml -o out              findings, out/record.h5, out/report.html
   topple run plan.toml -o out --csv        also tables for spreadsheets
+  topple run plan.toml -o out --check-step --threads 2
+                                           and what half the time step makes of it
   topple run plan.toml -o half --duration "1 s" --no-report)");
   add_examples(rules, R"(  topple rules                             with their reasons
   topple rules --json > rules.json         to change one and run with --knowledge)");

@@ -60,10 +60,11 @@ struct Arguments {
   StudyArguments study;
   FeArguments fe;
   int threads = 1, frames = 0;
-  std::string port;      // of the steering server, empty: a free one
-  bool no_open = false;  // do not open the page
-  bool open = false;     // do (of verbs that do not by themselves)
-  bool goes_on = false;  // with the latest steering session of the plan
+  std::string port;         // of the steering server, empty: a free one
+  bool no_open = false;     // do not open the page
+  bool open = false;        // do (of verbs that do not by themselves)
+  bool goes_on = false;     // with the latest steering session of the plan
+  bool check_step = false;  // run also at half the step
   bool json = false, csv = false, no_report = false, report = false, verbose = false;
   bool bodies = false, skip_unsupported = false;
   bool vtk = false, gltf = false, adams = false;  // formats of an export, beside csv and json

@@ -14,6 +14,7 @@
 #include "base/file.h"
 #include "base/unit.h"
 #include "collapse/run.h"
+#include "collapse/step_check.h"
 #include "mbs/model_json.h"
 #include "product/plan.h"
 #include "product/templates.h"
@@ -287,7 +288,8 @@ int run_plan_file(const Arguments& a, const std::atomic<bool>& cancel) {
     callbacks.on_event = [&](const record::Event& e) { events.print(e); };
     callbacks.progress.report = [&](double done, double whole) { progress.show(done, whole); };
     callbacks.progress.cancel = &cancel;
-    const record::Record r = collapse::run_plan(plan, knowledge, options, callbacks);
+    const record::Record r = a.check_step ? collapse::run_plan_at_two_steps(plan, knowledge, options, callbacks)
+                                          : collapse::run_plan(plan, knowledge, options, callbacks);
     progress.clear();
     return close_run(r, a, out, std::move(files));
   } catch (const InputError& e) { return refuse(e, warnings, text, a.json); }

@@ -54,6 +54,8 @@ const std::map<std::string, Field>& fields() {
       {"mechanism.together_share", &Knowledge::mechanism_together_share},
       {"mechanism.aborted_rotation", &Knowledge::mechanism_aborted_rotation},
       {"verification.energy_error", &Knowledge::verification_energy_error},
+      {"verification.step_time", &Knowledge::verification_step_time},
+      {"verification.step_tilt", &Knowledge::verification_step_tilt},
       {"verification.equilibrium_residual", &Knowledge::verification_equilibrium_residual},
   };
   return table;

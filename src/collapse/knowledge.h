@@ -30,7 +30,7 @@ struct Knowledge {
   double mechanism_topple_rotation;
   double mechanism_coherent_share, mechanism_fold_share, mechanism_fold_rotation, mechanism_direction_tolerance;
   double mechanism_together_share, mechanism_aborted_rotation;
-  double verification_energy_error, verification_equilibrium_residual;
+  double verification_energy_error, verification_equilibrium_residual, verification_step_time, verification_step_tilt;
   std::vector<Rule> rules;  // as read
 };
 

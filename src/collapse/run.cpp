@@ -111,6 +111,7 @@ record::Record run_plan(const product::Plan& plan, const Knowledge& k, const Run
   Recorder recorder(model, map, k, r, callbacks);
   tell_failing_charges(plan, map, recorder);
   mbs::Options o = make_mbs_options(settings_of(plan, k, options), k, options.threads, callbacks.progress);
+  o.step_share = options.step_share;
   record_into(recorder, o);
   const mbs::Summary summary = move(model, map, o);
   end_record(summary, " before the first charge", recorder, r);
@@ -122,7 +123,7 @@ record::Record run_plan(const product::Plan& plan, const Knowledge& k, const Run
 mbs::RunSettings settings_of(const product::Plan& plan, const Knowledge& k, const RunOptions& options) {
   mbs::RunSettings s;
   s.duration = options.duration > 0 ? options.duration : plan.analysis.duration;
-  s.step = options.step > 0 ? options.step : plan.analysis.step;
+  s.step = options.step_share * (options.step > 0 ? options.step : plan.analysis.step);
   const double rate = options.frame_rate > 0 ? options.frame_rate : plan.analysis.frame_rate;
   s.frame_interval = 1 / (rate > 0 ? rate : 60);
   s.equilibrium = true;

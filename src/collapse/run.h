@@ -18,6 +18,7 @@ namespace topple::collapse {
 struct RunOptions {
   double duration = 0;    // 0: the plan's [s]
   double step = 0;        // 0: the plan's, or chosen from the stiffest mode [s]
+  double step_share = 1;  // of that step
   double frame_rate = 0;  // 0: the plan's [1/s]
   int threads = 1;
   std::string engine = "native";

@@ -166,7 +166,7 @@ export function Verification(props: { run: Run }) {
           <ul>{other.sentences.map((text) => <li>{prettify(text)}</li>)}</ul>
         </div>
       ))}
-      <p class="quiet plot-note">Halving the step (topple run --step), the finite elements (topple fe) and other engines (topple mbs compare) are further checks.</p>
+      <p class="quiet plot-note">Half the step (topple run --check-step), the finite elements (topple fe) and other engines (topple mbs compare) are further checks.</p>
     </section>
   );
 }
