@@ -36,6 +36,9 @@ struct Context {
   const mbs::Summary& summary;
   record::Record& r;
   bool is_under_way = false;
+  const std::atomic<bool>* cancel = nullptr;
+
+  bool is_cancelled() const { return cancel != nullptr && *cancel; }
 
   void add(const std::string& id, const std::string& heading, const std::string& title, const std::string& text,
            double value = kNone, const std::string& unit = "", Status status = Status::Info) const {
@@ -178,7 +181,7 @@ void add_clearances(const Context& c) {
       for (size_t i : {0UL, 1UL}) nlow[i] = std::min(nlow[i], p[i]), nhigh[i] = std::max(nhigh[i], p[i]);
     double least = std::numeric_limits<double>::infinity(), when = 0;
     std::string who;
-    for (size_t f = 0; f < c.r.time.size(); ++f)
+    for (size_t f = 0; f < c.r.time.size() && !c.is_cancelled(); ++f)
       for (size_t b = 0; b < c.r.bodies.size(); ++b) {
         if (f > 0 && c.r.bodies[b].fixed) continue;
         const Pose X_WB = c.pose(f, b);
@@ -482,24 +485,27 @@ const std::vector<std::string>& not_modelled() {
   return list;
 }
 
-void add_findings(const product::Plan& plan, const mbs::Model& model, const ModelMap& map, const Knowledge& k,
-                  const Recorder& recorder, const mbs::Summary& summary, record::Record& r) {
+bool add_findings(const product::Plan& plan, const mbs::Model& model, const ModelMap& map, const Knowledge& k,
+                  const Recorder& recorder, const mbs::Summary& summary, record::Record& r,
+                  const std::atomic<bool>* cancel) {
   r.not_modelled = not_modelled();
   if (!plan.shafts.empty())
     r.not_modelled.emplace_back(
         "rings that flatten as they land: single pieces of a shaft may roll and tumble farther than real ones");
   const bool is_under_way = r.ending == "under_way";
-  const Context c{plan, model, map, k, recorder, summary, r, is_under_way};
+  const Context c{plan, model, map, k, recorder, summary, r, is_under_way, cancel};
   if (r.time.empty()) {
     c.add("mechanism", "Mechanism", "No result", r.ending_text, kNone, "", Status::Bad);
-    return;
+    return true;
   }
   const Mechanism m = judge_run(plan, model, map, k, recorder, summary, is_under_way);
   add_mechanism(c, m);
   add_rigid_block(c);
   const bool stood = add_stability(c);
+  if (c.is_cancelled()) return false;
   const Reach reach = add_debris(c, m);
   add_clearances(c);
+  if (c.is_cancelled()) return false;
   add_touchdown(c);
   add_events(c);
   if (r.ending == "at_rest" || r.ending == "time_limit") add_criteria(c, m, stood, reach);
@@ -507,6 +513,7 @@ void add_findings(const product::Plan& plan, const mbs::Model& model, const Mode
   for (const std::string& s : r.not_modelled) list += (list.empty() ? "" : "; ") + s;
   c.add("not_modelled", "Not modelled", "Not modelled", list + ".", kNone, "");
   add_verification(c);
+  return true;
 }
 
 }  // namespace topple::collapse

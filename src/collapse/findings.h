@@ -1,6 +1,7 @@
 #pragma once
 /// What a run means for the planner: findings in the order in which they matter.
 
+#include <atomic>
 #include <string>
 #include <vector>
 
@@ -12,8 +13,9 @@ namespace topple::collapse {
 const std::vector<std::string>& not_modelled();
 
 /// Fills findings, not_modelled and the rigid block's series of a record. Where its ending is "under_way" they say how
-/// things stand so far, and nothing that may still change is called good or bad.
-void add_findings(const product::Plan&, const mbs::Model&, const ModelMap&, const Knowledge&, const Recorder&,
-                  const mbs::Summary&, record::Record&);
+/// things stand so far, and nothing that may still change is called good or bad. False if `cancel` was seen set; then
+/// they are not complete.
+bool add_findings(const product::Plan&, const mbs::Model&, const ModelMap&, const Knowledge&, const Recorder&,
+                  const mbs::Summary&, record::Record&, const std::atomic<bool>* cancel = nullptr);
 
 }  // namespace topple::collapse

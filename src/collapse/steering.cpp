@@ -3,19 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
 #include <set>
 
 #include "base/error.h"
-#include "collapse/findings.h"
-#include "collapse/plan_record.h"
+#include "collapse/branch_record.h"
 
 namespace topple::collapse {
 
 namespace {
 
 constexpr size_t kLongestName = 80;
-constexpr double kAlways = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
@@ -319,27 +316,10 @@ Steering::Made Steering::undo() {
   return made;
 }
 
-record::Record Steering::make_record(const Branch& b) const {
-  const LiveRun& run = b.run();
-  const LiveModel& live = run.model();
-  record::Record r;
-  RunOptions options = options_.run;
-  fill_provenance(options, "native", r);
-  fill_from_plan(live.plan(), live.model(), live.map(), r);
-  const RunCallbacks nobody;
-  Recorder recorder(live.model(), live.map(), k_, r, nobody);
-  for (const Piece& p : b.pieces) {
-    const bool is_last = &p == &b.pieces.back();
-    recorder.append(p.run->recorder(), is_last ? p.run->record().time.size() : p.frames, is_last ? kAlways : p.time);
-  }
-  const mbs::Summary summary = run.summary();
-  end_record(summary, " before the first charge", recorder, r);
-  if (!run.has_ended()) {
-    r.ending = "under_way";
-    r.ending_text = fmt::format("The run is under way: computed up to {:.2f} s so far.", run.time());
-  }
-  if (!r.time.empty()) add_findings(live.plan(), live.model(), live.map(), k_, recorder, summary, r);
-  return r;
+std::unique_ptr<BranchRecord> Steering::copy_record(const Branch& b) const {
+  return std::make_unique<BranchRecord>(b, k_, options_.run);
 }
+
+record::Record Steering::make_record(const Branch& b) const { return *copy_record(b)->finish(); }
 
 }  // namespace topple::collapse

@@ -12,6 +12,8 @@
 
 namespace topple::collapse {
 
+class BranchRecord;
+
 /// A stretch of a run that a branch goes through: its first frames, until a step.
 struct Piece {
   std::shared_ptr<LiveRun> run;
@@ -110,6 +112,8 @@ class Steering {
   /// Takes back the last edit of the active branch. Throws InputError E934.
   Made undo();
 
+  /// What a branch has recorded so far, for findings that are made elsewhere.
+  std::unique_ptr<BranchRecord> copy_record(const Branch&) const;
   /// The whole record of a branch so far, with findings.
   record::Record make_record(const Branch&) const;
   /// Times of moments kept along a branch [s].

@@ -36,10 +36,6 @@ bool has(const Json& command, const char* key) {
   return it != command.end() && !it->is_null();
 }
 
-Json make_ack(std::int64_t id, Json result) { return {{"type", "ack"}, {"id", id}, {"result", std::move(result)}}; }
-
-Json make_error(Json id, Json error) { return {{"type", "error"}, {"id", std::move(id)}, {"error", std::move(error)}}; }
-
 std::vector<std::string> split(const std::string& path) {
   std::vector<std::string> parts;
   for (std::size_t at = 1; at <= path.size();) {
@@ -540,6 +536,23 @@ void Hub::play_sample(const std::shared_ptr<Client>& client, std::int64_t id, co
   session->post(client, id, std::move(action));
 }
 
+Reply Hub::write_record(const JudgedBranch& judged, const std::string& what) const {
+  const record::Record& r = judged.record;
+  if (what == "record.json") return {200, "application/json", record::to_report_json(r), ""};
+  if (what == "report.html")
+    return {200, "text/html; charset=utf-8", record::make_page(record::to_report_json(r), options_.report),
+            "report.html"};
+  if (what == "findings") return {200, "application/json", dump(describe_findings(judged)), ""};
+  std::string name = (fs::temp_directory_path() / "topple-record-XXXXXX").string();
+  const int file = mkstemp(name.data());
+  if (file < 0) throw std::runtime_error("no temporary file can be made");
+  ::close(file);
+  record::write_hdf5(r, name);
+  std::string bytes = read_file(name);
+  fs::remove(name);
+  return {200, "application/x-hdf5", std::move(bytes), "record.h5"};
+}
+
 void Hub::get(const std::string& path, std::function<void(Reply)> answer) {
   if (path == "/" || path.empty()) {
     if (options_.page.empty())
@@ -627,44 +640,22 @@ void Hub::get(const std::string& path, std::function<void(Reply)> answer) {
   if (what == "report.html" && options_.report.empty())
     return answer(
         make_error_reply(404, "E903", "the report page is not built", "run `npm ci && npm run build` in web/"));
-  // the record is put together in the session's thread, written elsewhere
+  // the record is copied in the session's thread, judged in that of its records, written elsewhere
   session->ask([this, b = *branch, what, answer = std::move(answer)](Session& s) {
-    auto record = std::make_shared<record::Record>();
-    Json notes = Json::array();
-    try {
-      *record = s.make_record(b);
-      notes = s.steering()->steering().branch(b).run().model().map().notes;
-    } catch (const InputError& e) {
+    RecordRequest request;
+    request.branches = {b};
+    request.refuse = [answer](const InputError& e) {
       const std::string& code = e.diagnostics().front().code;
-      return answer(make_error_reply(code == "E920" ? 404 : 409, code, e.diagnostics().front().message));
-    }
-    run_errand([this, record, notes, what, answer] {
-      try {
-        if (what == "record.json") return answer({200, "application/json", record::to_report_json(*record), ""});
-        if (what == "report.html")
-          return answer({200, "text/html; charset=utf-8",
-                         record::make_page(record::to_report_json(*record), options_.report), "report.html"});
-        if (what == "record.h5") {
-          std::string name = (fs::temp_directory_path() / "topple-record-XXXXXX").string();
-          const int file = mkstemp(name.data());
-          if (file < 0) throw std::runtime_error("no temporary file can be made");
-          ::close(file);
-          record::write_hdf5(*record, name);
-          std::string bytes = read_file(name);
-          fs::remove(name);
-          return answer({200, "application/x-hdf5", std::move(bytes), "record.h5"});
-        }
-        Json out{{"ending", {{"kind", record->ending}, {"text", record->ending_text}}},
-                 {"time", number(record->time.empty() ? 0 : record->time.back())},
-                 {"findings", Json::array()},
-                 {"events", Json::array()}};
-        for (const record::Finding& f : record->findings) out["findings"].push_back(describe_finding(f));
-        for (const record::Event& e : record->events) out["events"].push_back(describe_event(e));
-        out["not_modelled"] = record->not_modelled;
-        out["notes"] = notes;
-        answer({200, "application/json", dump(out), ""});
-      } catch (const std::exception& e) { answer(make_error_reply(500, "E940", e.what())); }
-    });
+      answer(make_error_reply(code == "E920" ? 404 : 409, code, e.diagnostics().front().message));
+    };
+    request.use = [this, what, answer](const JudgedBranches& judged) {
+      run_errand([this, judged, what, answer] {
+        try {
+          answer(write_record(judged->front(), what));
+        } catch (const std::exception& e) { answer(make_error_reply(500, "E940", e.what())); }
+      });
+    };
+    s.want_records(std::move(request));
   });
 }
 

@@ -78,6 +78,8 @@ class Hub {
                    const std::shared_ptr<Session>&);
   void play_sample(const std::shared_ptr<Client>&, std::int64_t id, const Json& command,
                    const std::shared_ptr<Session>&);
+  /// A file of a branch's record: findings, record.json, record.h5 or report.html.
+  Reply write_record(const JudgedBranch&, const std::string& what) const;
   void forget_old_clients();
   /// Work that must not hold up the sockets.
   void run_errand(std::function<void()>);

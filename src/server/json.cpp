@@ -30,6 +30,10 @@ Json describe_diagnostics(const std::vector<Diagnostic>& diagnostics) {
   return list;
 }
 
+Json make_ack(std::int64_t id, Json result) { return {{"type", "ack"}, {"id", id}, {"result", std::move(result)}}; }
+
+Json make_error(Json id, Json error) { return {{"type", "error"}, {"id", std::move(id)}, {"error", std::move(error)}}; }
+
 Json describe_error(const InputError& e) {
   const Diagnostic& d = e.diagnostics().front();
   return {{"code", d.code},

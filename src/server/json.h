@@ -1,6 +1,7 @@
 #pragma once
 /// The objects of the protocol as JSON (docs/protocol.md).
 
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -17,6 +18,10 @@ std::string dump(const Json&);
 /// null for NaN and infinities.
 Json number(double);
 Json numbers(const std::vector<double>&);
+
+/// Answers of commands.
+Json make_ack(std::int64_t id, Json result);
+Json make_error(Json id, Json error);
 
 /// {"code", "message", "help", "diagnostics"} of the first complaint, and all of them.
 Json describe_error(const InputError&);

@@ -43,6 +43,11 @@ Session::Session(int id, SessionPlan plan, const SessionSetting& setting)
   last_state_ = last_frame_ = last_reached_ = last_look_ = rate_start_ = speed_start_ = command_at_ = now;
   file_sha256_ = calc_sha256(plan_.text);
   brief_ = {{"id", id_}, {"title", plan_.title}, {"path", plan_.path}, {"phase", phase_word()}};
+  records_.emplace([this] {
+    ask([](Session& s) {
+      if (s.steering_) s.records_->serve(s.core());
+    });
+  });
   thread_ = std::thread([this] { work(); });
 }
 
@@ -53,6 +58,10 @@ Session::~Session() {
   }
   wakes_.notify_all();
   thread_.join();
+  records_.reset();
+  const Json over = describe_error(InputError("E920", "the session was closed"));
+  for (const Task& t : tasks_)
+    if (t.client) t.client->answer(t.id, dump(make_error(t.id, over)));
 }
 
 void Session::post(std::shared_ptr<Client> client, std::int64_t id, Json command) {
@@ -199,11 +208,29 @@ Json Session::describe() const {
   return j;
 }
 
-record::Record Session::make_record(int branch) const {
-  const Steering& s = core();
-  const Branch& b = branch > 0 ? s.branch(branch) : s.active();
-  if (b.frames() == 0) throw InputError("E930", "the branch has no frame yet");
-  return s.make_record(b);
+void Session::want_records(RecordRequest request) {
+  try {
+    const Steering& s = core();
+    records_->ask(std::move(request));
+    records_->serve(s);
+  } catch (const InputError& e) { request.refuse(e); }
+}
+
+void Session::answer_from_records(const Task& task, std::vector<int> branches,
+                                  std::function<Json(const JudgedBranches&)> make) {
+  RecordRequest request;
+  request.branches = std::move(branches);
+  request.refuse = [client = task.client, id = task.id](const InputError& e) {
+    client->answer(id, dump(make_error(id, describe_error(e))));
+  };
+  request.use = [client = task.client, id = task.id, make = std::move(make)](const JudgedBranches& judged) {
+    std::string text;
+    try {
+      text = dump(make_ack(id, make(judged)));
+    } catch (const std::exception& e) { text = dump(make_error(id, describe_error(InputError("E940", e.what())))); }
+    client->answer(id, std::move(text));
+  };
+  want_records(std::move(request));
 }
 
 std::vector<std::string> Session::log_lines() const {
@@ -396,6 +423,7 @@ Json Session::go_on_from_log(const Json& command) {
   // the log that this session has begun holds nothing
   const std::string own = steering_->path(), path = earlier_->path;
   phase_ = Phase::Building;
+  records_->cancel();
   steering_.reset();
   std::error_code ignored;
   if (!own.empty()) std::filesystem::remove(own, ignored);
@@ -525,17 +553,15 @@ void Session::work() {
       }
       Json answer;
       try {
-        answer = {{"type", "ack"}, {"id", t.id}, {"result", perform(*t.client, t.command)}};
+        std::optional<Json> result = perform(t);
+        if (!result) continue;
+        answer = make_ack(t.id, std::move(*result));
       } catch (const Conflict& e) {
-        answer = {{"type", "error"}, {"id", t.id}, {"error", describe_error(e)}};
+        answer = make_error(t.id, describe_error(e));
         answer["error"]["sha256"] = e.sha256;
         answer["error"]["text"] = e.text;
-      } catch (const InputError& e) {
-        answer = {{"type", "error"}, {"id", t.id}, {"error", describe_error(e)}};
-      } catch (const std::exception& e) {
-        answer = {{"type", "error"},
-                  {"id", t.id},
-                  {"error", {{"code", "E940"}, {"message", e.what()}, {"help", ""}, {"diagnostics", Json::array()}}}};
+      } catch (const InputError& e) { answer = make_error(t.id, describe_error(e)); } catch (const std::exception& e) {
+        answer = make_error(t.id, describe_error(InputError("E940", e.what())));
       }
       t.client->answer(t.id, dump(answer));
     }

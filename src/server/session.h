@@ -15,6 +15,7 @@
 #include "collapse/action_log.h"
 #include "server/client.h"
 #include "server/json.h"
+#include "server/record_worker.h"
 
 namespace topple::server {
 
@@ -72,8 +73,8 @@ class Session {
   Json describe() const;
   const collapse::LoggedSteering* steering() const { return steering_.get(); }
   const SessionPlan& plan() const { return plan_; }
-  /// The record of a branch so far, with findings; 0: the active one.
-  record::Record make_record(int branch) const;
+  /// Records of branches so far, with findings, which come later.
+  void want_records(RecordRequest);
   std::vector<std::string> log_lines() const;
   const product::Plan* find_plan() const { return checked_plan_ ? &*checked_plan_ : nullptr; }
 
@@ -105,10 +106,17 @@ class Session {
   std::shared_ptr<FrameBody> make_frame(const collapse::Branch&, std::size_t frame) const;
   void send_frame(const std::shared_ptr<const FrameBody>&);
 
-  /// The result of a command (session_commands.cpp). Throws InputError.
-  Json perform(Client&, const Json& command);
+  struct Task {
+    std::shared_ptr<Client> client;
+    std::int64_t id = 0;
+    Json command;
+    std::function<void(Session&)> call;
+  };
+  /// The result of a command (session_commands.cpp); nothing if its answer comes later. Throws InputError.
+  std::optional<Json> perform(const Task&);
+  /// Answers a command by what records of branches give.
+  void answer_from_records(const Task&, std::vector<int> branches, std::function<Json(const JudgedBranches&)>);
   Json run_clock(const std::string& word, const Json& command);
-  Json compare(const Json& command) const;
   Json send_frames(Client&, const Json& command) const;
   Json watch_zone(Client&, const Json& command) const;
   Json read_series(const Json& command) const;
@@ -127,12 +135,6 @@ class Session {
   std::optional<double> progress_;               // of building, 0..1
 
   // commands
-  struct Task {
-    std::shared_ptr<Client> client;
-    std::int64_t id = 0;
-    Json command;
-    std::function<void(Session&)> call;
-  };
   mutable std::mutex mutex_;
   std::condition_variable wakes_;
   std::deque<Task> tasks_;
@@ -158,6 +160,7 @@ class Session {
   Json last_state_told_;
   std::string file_sha256_;
 
+  std::optional<RecordWorker> records_;
   std::thread thread_;
 };
 

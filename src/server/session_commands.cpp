@@ -10,6 +10,7 @@
 #include "base/hash.h"
 #include "collapse/branch_plan.h"
 #include "collapse/edit_json.h"
+#include "server/judged_branch.h"
 #include "server/session.h"
 
 namespace topple::server {
@@ -30,21 +31,6 @@ constexpr std::size_t kMostFrames = 4000, kMostFrameBytes = std::size_t{32} << 2
 bool has(const Json& command, const char* key) {
   const auto it = command.find(key);
   return it != command.end() && !it->is_null();
-}
-
-/// Value of a series of a branch at a time, between frames on a straight line.
-double value_at(const std::vector<double>& time, const std::vector<double>& value, double t) {
-  const auto after = std::lower_bound(time.begin(), time.end(), t);
-  if (after == time.begin()) return value.front();
-  if (after == time.end()) return value.back();
-  const auto i = static_cast<std::size_t>(after - time.begin());
-  const double s = (t - time[i - 1]) / (time[i] - time[i - 1]);
-  return (1 - s) * value[i - 1] + s * value[i];
-}
-
-std::size_t frame_at(const std::vector<double>& time, double t) {
-  const auto after = std::upper_bound(time.begin(), time.end(), t + 1e-9);
-  return after == time.begin() ? 0 : static_cast<std::size_t>(after - time.begin()) - 1;
 }
 
 std::vector<std::string> command_words() {
@@ -75,7 +61,9 @@ Branch& Session::branch_of(const Json& command) const {
   return has(command, "branch") ? core().branch(read_integer(command, "branch", 1, kMostIds)) : core().active();
 }
 
-Json Session::perform(Client& client, const Json& command) {
+std::optional<Json> Session::perform(const Task& task) {
+  const Json& command = task.command;
+  Client& client = *task.client;
   const std::string word = read_text(command, "command");
   if (word == "run" || word == "pause" || word == "step" || word == "speed" || word == "rewind" || word == "live")
     return run_clock(word, command);
@@ -95,32 +83,31 @@ Json Session::perform(Client& client, const Json& command) {
     checked_plan_ = plan;
     diagnostics_ = warnings;
     for (const auto& c : watchers()) welcome(c);
-    return {{"branch", 1}};
+    return Json{{"branch", 1}};
   }
   if (word == "session.continue") return go_on_from_log(command);
   if (collapse::LoggedSteering::is_action(word)) return change(word, command);
   if (word == "scene") {
     check_keys(command, {});
     const Branch& b = branch_of(command);
-    return {{"scene",
-             describe_scene(b.run().record(), b.run().record().time.empty() ? 0 : b.run().record().time.size() - 1)}};
+    return Json{{"scene", describe_scene(b.run().record(),
+                                         b.run().record().time.empty() ? 0 : b.run().record().time.size() - 1)}};
   }
   if (word == "frames") return send_frames(client, command);
   if (word == "series") return read_series(command);
-  if (word == "compare") return compare(command);
+  if (word == "compare") {
+    check_keys(command, {"a", "b", "frames"});
+    const int count = has(command, "frames") ? read_integer(command, "frames", 2, 10000) : 200;
+    answer_from_records(task, {read_integer(command, "a", 1, kMostIds), read_integer(command, "b", 1, kMostIds)},
+                        [count](const JudgedBranches& b) { return compare(b->front(), b->back(), count); });
+    return std::nullopt;
+  }
   if (word == "zone") return watch_zone(client, command);
   if (word == "findings") {
     check_keys(command, {});
-    const Branch& b = branch_of(command);
-    const record::Record r = make_record(b.id);
-    Json out{{"ending", {{"kind", r.ending}, {"text", r.ending_text}}}, {"time", number(b.frontier())}};
-    Json& findings = out["findings"] = Json::array();
-    for (const record::Finding& f : r.findings) findings.push_back(describe_finding(f));
-    Json& events = out["events"] = Json::array();
-    for (const record::Event& e : r.events) events.push_back(describe_event(e));
-    out["not_modelled"] = r.not_modelled;
-    out["notes"] = b.run().model().map().notes;
-    return out;
+    answer_from_records(task, {branch_of(command).id},
+                        [](const JudgedBranches& b) { return describe_findings(b->front()); });
+    return std::nullopt;
   }
   if (word == "log") {
     check_keys(command, {"from"});
@@ -129,19 +116,19 @@ Json Session::perform(Client& client, const Json& command) {
         has(command, "from") ? static_cast<std::size_t>(read_integer(command, "from", 0, kMostIds)) : 0;
     Json entries = Json::array();
     for (std::size_t i = from; i < lines.size(); ++i) entries.push_back(Json::parse(lines[i]));
-    return {{"entries", std::move(entries)}};
+    return Json{{"entries", std::move(entries)}};
   }
   if (word == "plan.text") {
     check_keys(command, {"edits"});
-    if (!steering_) return {{"text", plan_.text}, {"sha256", calc_sha256(plan_.text)}, {"path", plan_.path}};
+    if (!steering_) return Json{{"text", plan_.text}, {"sha256", calc_sha256(plan_.text)}, {"path", plan_.path}};
     const collapse::LiveModel& live = branch_of(command).run().model();
     collapse::BranchPlan plan{live.plan().text, {}, {}};
     if (read_flag(command, "edits", false)) plan = collapse::write_branch_plan(live);
-    return {{"text", plan.text},
-            {"sha256", calc_sha256(plan.text)},
-            {"path", plan_.path},
-            {"taken", plan.taken},
-            {"left_out", plan.left_out}};
+    return Json{{"text", plan.text},
+                {"sha256", calc_sha256(plan.text)},
+                {"path", plan_.path},
+                {"taken", plan.taken},
+                {"left_out", plan.left_out}};
   }
   if (word == "plan.save") return save_plan(command);
   const std::string near = nearest_name(word, command_words());
@@ -298,77 +285,6 @@ Json Session::read_series(const Json& command) const {
     for (std::size_t i = 0; i < r.series.size(); ++i)
       out["series"][i]["value"].push_back(number(r.series[i].value[row]));
   }
-  return out;
-}
-
-Json Session::compare(const Json& command) const {
-  check_keys(command, {"a", "b", "frames"});
-  const int n = has(command, "frames") ? read_integer(command, "frames", 2, 10000) : 200;
-  const int ids[2] = {read_integer(command, "a", 1, kMostIds), read_integer(command, "b", 1, kMostIds)};
-  record::Record r[2] = {make_record(ids[0]), make_record(ids[1])};
-  const double end = std::min(r[0].time.back(), r[1].time.back());
-  std::vector<double> times;
-  for (int i = 0; i < n; ++i) times.push_back(end * i / (n - 1));
-  Json out{{"a", ids[0]}, {"b", ids[1]}, {"time", numbers(times)}, {"series", Json::array()}};
-  // those that both have: a branch that has ended has more
-  for (const record::Series& s : r[0].series) {
-    const auto other =
-        std::find_if(r[1].series.begin(), r[1].series.end(), [&](const auto& o) { return o.id == s.id; });
-    if (other == r[1].series.end()) continue;
-    Json entry{{"id", s.id}, {"title", s.title}, {"unit", s.unit}, {"group", s.group}};
-    for (int side : {0, 1}) {
-      const std::vector<double>& series = side == 0 ? s.value : other->value;
-      Json& values = entry[side == 0 ? "a" : "b"] = Json::array();
-      for (const double t : times) values.push_back(number(value_at(r[side].time, series, t)));
-    }
-    out["series"].push_back(std::move(entry));
-  }
-  // bodies of both by name; debris follows no calculation
-  const auto place = [&](int side, std::size_t frame, std::size_t body) {
-    const float* p = &r[side].position[3 * (frame * r[side].bodies.size() + body)];
-    return Vec3{p[0], p[1], p[2]};
-  };
-  std::map<std::string, std::size_t> index;
-  for (std::size_t b = 0; b < r[1].bodies.size(); ++b) index[r[1].bodies[b].name] = b;
-  std::vector<std::pair<std::size_t, std::size_t>> pairs;
-  for (std::size_t b = 0; b < r[0].bodies.size(); ++b)
-    if (const auto it = index.find(r[0].bodies[b].name); it != index.end() && r[0].bodies[b].kind != "debris")
-      pairs.emplace_back(b, it->second);
-  const auto distances = [&](double t) {
-    std::vector<std::pair<double, std::string>> list;
-    const std::size_t fa = frame_at(r[0].time, t), fb = frame_at(r[1].time, t);
-    for (const auto& [a, b] : pairs) list.emplace_back(norm(place(0, fa, a) - place(1, fb, b)), r[0].bodies[a].name);
-    return list;
-  };
-  Json& largest = out["largest"] = {{"time", times}, {"distance", Json::array()}};
-  for (const double t : times) {
-    double d = 0;
-    for (const auto& [distance, name] : distances(t)) d = std::max(d, distance);
-    largest["distance"].push_back(number(d));
-  }
-  auto last = distances(end);
-  std::stable_sort(last.begin(), last.end(), [](const auto& x, const auto& y) { return x.first > y.first; });
-  out["bodies"] = Json::array();
-  for (std::size_t i = 0; i < std::min<std::size_t>(10, last.size()); ++i)
-    out["bodies"].push_back({{"name", last[i].second}, {"distance", number(last[i].first)}});
-  out["findings"] = Json::array();
-  for (const record::Finding& f : r[0].findings) {
-    const auto it =
-        std::find_if(r[1].findings.begin(), r[1].findings.end(), [&](const auto& g) { return g.id == f.id; });
-    const std::string other = it == r[1].findings.end() ? "" : it->text;
-    if (other != f.text) out["findings"].push_back({{"id", f.id}, {"title", f.title}, {"a", f.text}, {"b", other}});
-  }
-  for (const record::Finding& f : r[1].findings)
-    if (std::none_of(r[0].findings.begin(), r[0].findings.end(), [&](const auto& g) { return g.id == f.id; }))
-      out["findings"].push_back({{"id", f.id}, {"title", f.title}, {"a", ""}, {"b", f.text}});
-  Json& edits = out["edits"] = {{"a", Json::array()}, {"b", Json::array()}};
-  for (int side : {0, 1})
-    for (const Branch* b = &core().branch(ids[side]);; b = &core().branch(b->parent)) {
-      for (auto e = b->edits.rbegin(); e != b->edits.rend(); ++e)
-        edits[side == 0 ? "a" : "b"].insert(edits[side == 0 ? "a" : "b"].begin(),
-                                            Json{{"time", e->time}, {"text", e->text}});
-      if (b->parent == 0) break;
-    }
   return out;
 }
 

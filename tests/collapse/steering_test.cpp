@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <thread>
+
 #include "base/error.h"
 #include "collapse/action_log.h"
+#include "collapse/branch_record.h"
 #include "collapse/edit_json.h"
 #include "collapse/run.h"
 #include "plans.h"
@@ -94,6 +97,32 @@ TEST(SteeringReplay, ABranchWithoutAnEditGoesOnWithTheSameBits) {
   const record::Record again = s.make_record(s.active());
   expect_same_motion(whole, again);
   expect_same_words(whole, again);
+}
+
+TEST(SteeringReplay, ACopyIsJudgedElsewhereWhileTheBranchGoesOn) {
+  Steering s(default_knowledge(), options());
+  ASSERT_TRUE(s.begin(s.add_root(two_stages(), "main")));
+  advance_until(s, 0.4);
+  s.edit(delay_of_stage(1, 0.5));
+  advance_until(s, 0.7);
+  const record::Record then = s.make_record(s.active());
+  const std::unique_ptr<BranchRecord> copy = s.copy_record(s.active());
+  std::optional<record::Record> elsewhere;
+  std::thread judge([&] { elsewhere = copy->finish(); });
+  advance_until(s, 0.9);
+  Edit rough;
+  rough.kind = Edit::Kind::SetFriction;
+  rough.ground = 0.7;
+  s.edit(rough, {}, true);
+  advance_until(s, 0.95);
+  judge.join();
+  EXPECT_EQ(copy->branch(), 2);
+  EXPECT_LT(copy->time(), s.active().frontier());
+  ASSERT_TRUE(elsewhere);
+  expect_same_motion(then, *elsewhere);
+  expect_same_words(then, *elsewhere);
+  const std::atomic<bool> cancel = true;
+  EXPECT_FALSE(s.copy_record(s.active())->finish(&cancel));
 }
 
 TEST(SteeringReplay, SwitchingToAndFroChangesNothing) {

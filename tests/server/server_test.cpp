@@ -1,7 +1,10 @@
 #include "server/server.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 
@@ -17,12 +20,30 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr int kRings = 5, kRingCorners = 200;  // of neighbours
+
 std::string two_stages(const std::string& duration = "1 s") {
   return collapse::house(collapse::charge("C-A*-0", "0.2 s") + collapse::charge("C-B*-0", "0.6 s"), duration);
 }
 
 std::string one_stage(const std::string& duration) {
   return collapse::house(collapse::charge("C-A*-0", "0.1 s"), duration);
+}
+
+/// Neighbours all around a house, with corners by the hundred: their clearances take seconds of findings.
+std::string surrounded(const std::string& duration) {
+  std::string plan = collapse::house(collapse::charge("C-A*-0", "0.1 s"), duration);
+  for (int k = 0; k < kRings; ++k) {
+    std::string corners;
+    // a ring that is open towards +x, so that all parts lie inside its bounds
+    const int n = kRingCorners / 2;
+    for (int i = 0; i < 2 * n; ++i) {
+      const double r = (i < n ? 30.0 : 31.0) + k, a = 0.1 + 6.0 * (i < n ? i : 2 * n - 1 - i) / (n - 1);
+      corners += fmt::format("{}[\"{:.4f} m\", \"{:.4f} m\"]", i > 0 ? ", " : "", r * std::cos(a), r * std::sin(a));
+    }
+    plan += fmt::format("[[site.neighbour]]\nname = \"Ring {}\"\nfootprint = [{}]\n", k, corners);
+  }
+  return plan;
 }
 
 /// A server over a folder of its own.
@@ -523,6 +544,66 @@ TEST_F(ServerTest, APlanWithErrorsIsMendedInThePage) {
   EXPECT_TRUE(c->wait_for_phase("finished").is_object());
   // another one beside it
   EXPECT_EQ(c->result("plan.apply", {{"text", one_stage("0.2 s")}, {"name", "short"}})["branch"], 2);
+}
+
+TEST_F(ServerTest, CommandsDoNotWaitForFindings) {
+  start(surrounded("1 s"));
+  const auto c = watcher();
+  c->result("run");
+  c->wait_for_phase("finished");
+  c->forget();
+  // all at once: findings first, then an edit in the past, and its branch runs
+  ASSERT_TRUE(c->send_text(R"({"id": 101, "command": "findings"})"));
+  ASSERT_TRUE(c->send_text(R"({"id": 102, "command": "rewind", "time": 0.5})"));
+  ASSERT_TRUE(c->send_text(R"({"id": 103, "command": "set_friction", "ground": 0.4})"));
+  ASSERT_TRUE(c->send_text(R"({"id": 104, "command": "run"})"));
+  const auto is_answer = [](const TestJson& j) { return j["type"] == "ack" || j["type"] == "error"; };
+  for (const int id : {102, 103, 104}) {
+    const TestJson answer = c->wait_for(is_answer);
+    EXPECT_EQ(answer["id"], id) << "waited for the findings";
+    EXPECT_EQ(answer["type"], "ack") << answer;
+  }
+  const TestJson moving = c->wait_for([&](const TestJson& j) {
+    return is_answer(j) || (j["type"] == "state" && j["branch"] == 2 && j["time"] > 0.55);
+  });
+  EXPECT_EQ(moving["type"], "state") << "the run waited for the findings";
+  const TestJson findings = c->wait_for(is_answer);
+  EXPECT_EQ(findings["id"], 101);
+  EXPECT_EQ(findings["result"]["branch"], 1) << "of the branch that was active then";
+  EXPECT_NEAR(findings["result"]["time"].get<double>(), 1, 0.01) << "at the time when they were asked for";
+  EXPECT_EQ(findings["result"]["ending"]["kind"], "time_limit");
+  // those of the other branch, and both together
+  c->wait_for_phase("finished");
+  EXPECT_EQ(c->result("findings")["branch"], 2);
+  EXPECT_EQ(c->result("compare", {{"a", 1}, {"b", 2}})["edits"]["b"].size(), 1U);
+}
+
+TEST_F(ServerTest, FindingsEndWithTheirSession) {
+  start(surrounded("1 s"));
+  const auto c = watcher();
+  c->result("run");
+  c->wait_for_phase("finished");
+  const auto begin = std::chrono::steady_clock::now();
+  c->result("findings");
+  const auto whole = std::chrono::steady_clock::now() - begin;
+  c->forget();
+  // one under way, others in line
+  ASSERT_TRUE(c->send_text(R"({"id": 101, "command": "findings"})"));
+  ASSERT_TRUE(c->send_text(R"({"id": 102, "command": "findings"})"));
+  ASSERT_TRUE(c->send_text(R"({"id": 103, "command": "compare", "a": 1, "b": 1})"));
+  TestClient http(port());
+  ASSERT_TRUE(http.send_raw("GET " + at("/api/sessions/1/branches/1/findings") + " HTTP/1.1\r\nHost: " + http.host() +
+                            "\r\n\r\n"));
+  const auto other = watcher();
+  const auto close_begin = std::chrono::steady_clock::now();
+  EXPECT_EQ(other->result("session.close", {{"session", 1}})["session"], 1);
+  EXPECT_LT(std::chrono::steady_clock::now() - close_begin, whole / 2) << "waited for the findings";
+  for (int k = 0; k < 3; ++k) {
+    const TestJson answer = c->wait_for([](const TestJson& j) { return j["type"] == "ack" || j["type"] == "error"; });
+    EXPECT_EQ(answer["type"], "error") << answer;
+    EXPECT_EQ(answer["error"]["code"], "E930");
+  }
+  EXPECT_EQ(http.read_answer().status, 409);
 }
 
 TEST_F(ServerTest, SessionsComeAndGo) {

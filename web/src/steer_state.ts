@@ -133,9 +133,14 @@ export function makeSteerState(address: string) {
           runs.get(message["branch"] as number)?.addEvents(message["events"] as RunEvent[]);
           draws.value += 1;
           break;
-        case "branch":
-          putBranch(message["branch"] as Branch);
+        case "branch": {
+          const made = message["branch"] as Branch;
+          const isNew = !branches.value.some((b) => b.id === made.id);
+          putBranch(made);
+          // What parts from the active branch is active from then on: its picture need not wait for the next state.
+          if (isNew && made.parent === active.value) void show(made.id);
           break;
+        }
         case "log":
           if (!log.value.some((e) => e.seq === (message["entry"] as LogEntry).seq)) log.value = [...log.value, message["entry"] as LogEntry];
           break;
@@ -269,7 +274,7 @@ export function makeSteerState(address: string) {
     useRun(run);
     if (!following.value) run.state.seek(time);
     if (zone.value !== null) void watchZone(zone.value.zone);
-    // the solver judges between its steps: first the picture of the branch
+    // findings take a processor: first the picture of the branch
     setTimeout(() => void readFindings(), phase.value === "running" ? 500 : 0);
     fill();
   }
@@ -368,10 +373,10 @@ export function makeSteerState(address: string) {
       });
   }
   setInterval(fill, 1000);
-  // The verdict so far, while there is news. The solver waits meanwhile: at most a twentieth of the time goes into it.
+  // The verdict so far, while there is news. It takes a processor beside the run: at most a tenth of the time.
   let judgedAt = 0, judging = 0; // [ms]
   setInterval(() => {
-    if (phase.value === "running" && connection.status.value === "open" && performance.now() - judgedAt > 20 * judging) void readFindings();
+    if (phase.value === "running" && connection.status.value === "open" && performance.now() - judgedAt > 10 * judging) void readFindings();
   }, 3000);
 
   let reading = false;

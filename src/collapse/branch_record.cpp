@@ -1,0 +1,41 @@
+#include "collapse/branch_record.h"
+
+#include <fmt/format.h>
+
+#include <limits>
+
+#include "collapse/findings.h"
+#include "collapse/plan_record.h"
+
+namespace topple::collapse {
+
+BranchRecord::BranchRecord(const Branch& b, const Knowledge& k, const RunOptions& options)
+    : live_(b.run().model_pointer()),
+      k_(k),
+      branch_(b.id),
+      time_(b.frontier()),
+      has_ended_(b.run().has_ended()),
+      summary_(b.run().summary()) {
+  fill_provenance(options, "native", record_);
+  fill_from_plan(live_->plan(), live_->model(), live_->map(), record_);
+  recorder_.emplace(live_->model(), live_->map(), k_, record_, nobody_);
+  for (const Piece& p : b.pieces) {
+    const bool is_last = &p == &b.pieces.back();
+    recorder_->append(p.run->recorder(), is_last ? p.run->record().time.size() : p.frames,
+                      is_last ? std::numeric_limits<double>::infinity() : p.time);
+  }
+}
+
+std::optional<record::Record> BranchRecord::finish(const std::atomic<bool>* cancel) {
+  end_record(summary_, " before the first charge", *recorder_, record_);
+  if (!has_ended_) {
+    record_.ending = "under_way";
+    record_.ending_text = fmt::format("The run is under way: computed up to {:.2f} s so far.", time_);
+  }
+  if (!record_.time.empty() &&
+      !add_findings(live_->plan(), live_->model(), live_->map(), k_, *recorder_, summary_, record_, cancel))
+    return std::nullopt;
+  return std::move(record_);
+}
+
+}  // namespace topple::collapse

@@ -1,0 +1,107 @@
+#include "server/judged_branch.h"
+
+#include <algorithm>
+#include <array>
+#include <map>
+
+namespace topple::server {
+
+namespace {
+
+/// Value of a series of a branch at a time, between frames on a straight line.
+double value_at(const std::vector<double>& time, const std::vector<double>& value, double t) {
+  const auto after = std::lower_bound(time.begin(), time.end(), t);
+  if (after == time.begin()) return value.front();
+  if (after == time.end()) return value.back();
+  const auto i = static_cast<std::size_t>(after - time.begin());
+  const double s = (t - time[i - 1]) / (time[i] - time[i - 1]);
+  return (1 - s) * value[i - 1] + s * value[i];
+}
+
+std::size_t frame_at(const std::vector<double>& time, double t) {
+  const auto after = std::upper_bound(time.begin(), time.end(), t + 1e-9);
+  return after == time.begin() ? 0 : static_cast<std::size_t>(after - time.begin()) - 1;
+}
+
+Json describe_edits(const JudgedBranch& b) {
+  Json edits = Json::array();
+  for (const JudgedBranch::Edit& e : b.edits) edits.push_back({{"time", e.time}, {"text", e.text}});
+  return edits;
+}
+
+}  // namespace
+
+Json describe_findings(const JudgedBranch& b) {
+  const record::Record& r = b.record;
+  Json out{{"branch", b.branch}, {"ending", {{"kind", r.ending}, {"text", r.ending_text}}}, {"time", number(b.time)}};
+  Json& findings = out["findings"] = Json::array();
+  for (const record::Finding& f : r.findings) findings.push_back(describe_finding(f));
+  Json& events = out["events"] = Json::array();
+  for (const record::Event& e : r.events) events.push_back(describe_event(e));
+  out["not_modelled"] = r.not_modelled;
+  out["notes"] = b.notes;
+  return out;
+}
+
+Json compare(const JudgedBranch& first, const JudgedBranch& second, int n) {
+  const std::array<const record::Record*, 2> r{&first.record, &second.record};
+  const double end = std::min(r[0]->time.back(), r[1]->time.back());
+  std::vector<double> times;
+  for (int i = 0; i < n; ++i) times.push_back(end * i / (n - 1));
+  Json out{{"a", first.branch}, {"b", second.branch}, {"time", numbers(times)}, {"series", Json::array()}};
+  // those that both have: a branch that has ended has more
+  for (const record::Series& s : r[0]->series) {
+    const auto other =
+        std::find_if(r[1]->series.begin(), r[1]->series.end(), [&](const auto& o) { return o.id == s.id; });
+    if (other == r[1]->series.end()) continue;
+    Json entry{{"id", s.id}, {"title", s.title}, {"unit", s.unit}, {"group", s.group}};
+    for (const std::size_t side : {0U, 1U}) {
+      const std::vector<double>& series = side == 0 ? s.value : other->value;
+      Json& values = entry[side == 0 ? "a" : "b"] = Json::array();
+      for (const double t : times) values.push_back(number(value_at(r[side]->time, series, t)));
+    }
+    out["series"].push_back(std::move(entry));
+  }
+  // bodies of both by name; debris follows no calculation
+  const auto place = [&](std::size_t side, std::size_t frame, std::size_t body) {
+    const float* p = &r[side]->position[3 * (frame * r[side]->bodies.size() + body)];
+    return Vec3{p[0], p[1], p[2]};
+  };
+  std::map<std::string, std::size_t> index;
+  for (std::size_t b = 0; b < r[1]->bodies.size(); ++b) index[r[1]->bodies[b].name] = b;
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;
+  for (std::size_t b = 0; b < r[0]->bodies.size(); ++b)
+    if (const auto it = index.find(r[0]->bodies[b].name); it != index.end() && r[0]->bodies[b].kind != "debris")
+      pairs.emplace_back(b, it->second);
+  const auto distances = [&](double t) {
+    std::vector<std::pair<double, std::string>> list;
+    const std::size_t fa = frame_at(r[0]->time, t), fb = frame_at(r[1]->time, t);
+    for (const auto& [a, b] : pairs) list.emplace_back(norm(place(0, fa, a) - place(1, fb, b)), r[0]->bodies[a].name);
+    return list;
+  };
+  Json& largest = out["largest"] = {{"time", times}, {"distance", Json::array()}};
+  for (const double t : times) {
+    double d = 0;
+    for (const auto& [distance, name] : distances(t)) d = std::max(d, distance);
+    largest["distance"].push_back(number(d));
+  }
+  auto last = distances(end);
+  std::stable_sort(last.begin(), last.end(), [](const auto& x, const auto& y) { return x.first > y.first; });
+  out["bodies"] = Json::array();
+  for (std::size_t i = 0; i < std::min<std::size_t>(10, last.size()); ++i)
+    out["bodies"].push_back({{"name", last[i].second}, {"distance", number(last[i].first)}});
+  out["findings"] = Json::array();
+  for (const record::Finding& f : r[0]->findings) {
+    const auto it =
+        std::find_if(r[1]->findings.begin(), r[1]->findings.end(), [&](const auto& g) { return g.id == f.id; });
+    const std::string other = it == r[1]->findings.end() ? "" : it->text;
+    if (other != f.text) out["findings"].push_back({{"id", f.id}, {"title", f.title}, {"a", f.text}, {"b", other}});
+  }
+  for (const record::Finding& f : r[1]->findings)
+    if (std::none_of(r[0]->findings.begin(), r[0]->findings.end(), [&](const auto& g) { return g.id == f.id; }))
+      out["findings"].push_back({{"id", f.id}, {"title", f.title}, {"a", ""}, {"b", f.text}});
+  out["edits"] = {{"a", describe_edits(first)}, {"b", describe_edits(second)}};
+  return out;
+}
+
+}  // namespace topple::server

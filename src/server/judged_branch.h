@@ -1,0 +1,30 @@
+#pragma once
+/// A branch as it was at one moment, with what is found of it.
+
+#include <string>
+#include <vector>
+
+#include "record/record.h"
+#include "server/json.h"
+
+namespace topple::server {
+
+struct JudgedBranch {
+  int branch = 0;
+  double time = 0;  // of its frontier then [s]
+  record::Record record;
+  std::vector<std::string> notes;  // of its model
+  struct Edit {
+    double time = 0;  // [s]
+    std::string text;
+  };
+  std::vector<Edit> edits;  // along it, from the plan's start on
+};
+
+/// The answer of `findings` (docs/protocol.md).
+Json describe_findings(const JudgedBranch&);
+
+/// The answer of `compare`: both at `count` times that they share. Each has at least one frame.
+Json compare(const JudgedBranch& a, const JudgedBranch& b, int count);
+
+}  // namespace topple::server
