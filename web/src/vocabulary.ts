@@ -96,6 +96,7 @@ const eventWords: Record<string, EventWords> = {
   contact: { word: "Contact", colour: "#8b97a3", shape: "square", small: true },
   rest: { word: "End", colour: "#009e73", shape: "square", small: false },
   cable: { word: "Cable", colour: "#009e73", shape: "diamond", small: false },
+  edit: { word: "Edit", colour: "#0072b2", shape: "diamond", small: false },
   failure: { word: "Failure", colour: "#d55e00", shape: "cross", small: false },
 };
 export function wordsOfEvent(kind: string): EventWords {
