@@ -23,6 +23,9 @@ export function toReadable(unit: string): Readable {
   return readable[unit] ?? { unit, factor: 1 };
 }
 
+/// A whole number as an exponent.
+const raise = (n: number): string => String(n).replace(/-/g, "⁻").replace(/\d/g, (digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(digit)] as string);
+
 /// Four significant digits; "–" for what is not a number.
 export function formatNumber(value: number | null | undefined, digits = 4): string {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
@@ -30,7 +33,7 @@ export function formatNumber(value: number | null | undefined, digits = 4): stri
   const size = Math.abs(value);
   if (size >= 1e6 || size < 1e-4) {
     const [mantissa, exponent] = value.toExponential(digits - 1).split("e") as [string, string];
-    return `${mantissa} × 10^${Number(exponent)}`.replace(/-/g, "−");
+    return `${mantissa.replace("-", "−")} × 10${raise(Number(exponent))}`;
   }
   const decimals = Math.max(0, Math.min(6, digits - 1 - Math.floor(Math.log10(size))));
   return value.toFixed(decimals).replace("-", "−");
@@ -51,10 +54,7 @@ export function prettify(text: string): string {
     .replace(/\b((?:c|m|N\/[cm]?|kg\/)?m)([23])\b/g, (_, unit: string, power: string) => unit + (power === "2" ? "²" : "³"))
     .replace(/ \+- /g, " ± ")
     .replace(/ -(?=[xy\d])/g, " −")
-    .replace(/\b(\d(?:\.\d+)?)e([+-])0*(\d+)/g, (_, mantissa: string, sign: string, power: string) => {
-      const raised = [...power].map((digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(digit)]).join("");
-      return `${mantissa}·10${sign === "-" ? "⁻" : ""}${raised}`;
-    });
+    .replace(/\b(\d(?:\.\d+)?)e([+-]\d+)/g, (_, mantissa: string, power: string) => `${mantissa}·10${raise(Number(power))}`);
 }
 
 /// "2026-01-01 12:00 UTC" from ISO 8601; anything else stays as it is.

@@ -69,7 +69,7 @@ describe("units", () => {
 
   it("keeps four digits from small to large", () => {
     assert.deepEqual([0, 0.00123456, 12.3456, 98765.4, 1.23456e9, null, NaN].map((v) => formatNumber(v)),
-      ["0", "0.001235", "12.35", "98765", "1.235 × 10^9", "–", "–"]);
+      ["0", "0.001235", "12.35", "98765", "1.235 × 10⁹", "–", "–"]);
   });
 
   it("writes durations, dates and masses", () => {
