@@ -109,7 +109,7 @@ export function PlanEditor(props: { s: SteerState }) {
       return;
     }
     try {
-      const r = await s.connection.command<{ sha256: string }>("plan.save", { text, base_sha256: s.plan.value.sha256 });
+      const r = await s.connection.command<{ sha256: string }>("plan.save", { text, base_sha256: s.planBase() });
       s.plan.value = { ...s.plan.value, text, sha256: r.sha256 };
       s.editedText.value = null;
       s.notify("good", `Saved ${s.plan.value.path}.`);

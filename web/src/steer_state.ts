@@ -84,6 +84,12 @@ export function makeSteerState(address: string) {
     }
   }
 
+  // What the edited text began from: a change on the disk that the page hears of later is not in it.
+  let planBase = "";
+  effect(() => {
+    if (editedText.value === null) planBase = plan.value.sha256;
+  });
+
   const branches = computed(() => session.value?.branches ?? []);
   const branch = computed(() => branches.value.find((b) => b.id === active.value));
   const phase = computed(() => progress.value?.phase ?? session.value?.phase ?? "paused");
@@ -572,6 +578,7 @@ export function makeSteerState(address: string) {
     },
     complain,
     readPlan,
+    planBase: () => planBase,
   };
 }
 export type SteerState = ReturnType<typeof makeSteerState>;
