@@ -328,8 +328,12 @@ export function makeSteerState(address: string) {
   }
   const renewing = new Set<number>();
 
+  // While an edit is on its way the processors are for it, not for pictures of what it leaves.
+  let editedAt = -Infinity; // [ms]
+  const longestHold = 300;
   // Frames come faster than pictures: what came is shown once per picture.
   const showWhatCame = (): void => {
+    if (performance.now() - editedAt < longestHold) return;
     for (const run of runs.values()) run.flush();
     const run = view.peek();
     if (run === null) return;
@@ -430,10 +434,16 @@ export function makeSteerState(address: string) {
   /// Sends an edit to act where the viewer looks. Throws a CommandError if it cannot.
   async function tryEdit(command: string, keys: Record<string, unknown>): Promise<void> {
     const at = following.value ? undefined : view.value?.state.time.value;
-    if (at !== undefined) await connection.command("rewind", { time: at });
-    else if (progress.value?.cursor !== null && progress.value?.cursor !== undefined && progress.value.cursor < frontier.value) await connection.command("live");
-    const result = await connection.command<{ branch: Branch | number; edit?: { text: string } }>(command, keys);
-    await arrive(result.branch, result.edit?.text);
+    editedAt = performance.now();
+    try {
+      if (at !== undefined) await connection.command("rewind", { time: at });
+      else if (progress.value?.cursor !== null && progress.value?.cursor !== undefined && progress.value.cursor < frontier.value) await connection.command("live");
+      const result = await connection.command<{ branch: Branch | number; edit?: { text: string } }>(command, keys);
+      await arrive(result.branch, result.edit?.text);
+    } finally {
+      editedAt = -Infinity;
+      draws.value += 1;
+    }
   }
   const edit = (command: string, keys: Record<string, unknown>): Promise<void> => tryEdit(command, keys).catch(complain);
 
