@@ -53,7 +53,7 @@ function Header(props: { s: SteerState }) {
       <h1 class="visually-hidden">{session?.title || session?.path || "topple"}</h1>
       <span class={`phase ${phase}`} data-test="phase"><span aria-hidden="true">{phaseSign[phase]} </span>{phase === "failed" && !isBuilt ? "Cannot be run" : phaseWord[phase]}</span>
       <span class="number" data-test="header-time">{formatTime(s.frontier.value)}</span>
-      {phase === "running" && p?.real_time_factor !== null && p !== null && <span class="number quiet">{p.real_time_factor.toFixed(2)}× real time{p.eta === null ? "" : `, ${formatDuration(p.eta)} to go`}</span>}
+      {phase === "running" && p?.real_time_factor !== null && p !== null && <span class="number quiet">{p.real_time_factor.toFixed(2)}× real time{p.eta === null ? "" : `, ${formatDuration(Math.ceil(p.eta))} to go`}</span>}
       {p !== null && (phase === "building" || phase === "equilibrium") && <progress max={1} {...(typeof p.progress === "number" ? { value: p.progress } : {})} aria-label="Progress" />}
       <span>Branch <strong data-test="active-branch">{s.branch.value?.name ?? "–"}</strong></span>
       <span class="spring" />

@@ -28,8 +28,14 @@ function Membership(props: { bounds: Bounds; unit: string }) {
         <svg viewBox={`0 0 ${width} ${height}`} role="img" aria-label={`${bounds.output}: from ${formatNumber(least)} to ${formatNumber(most)} ${unit}`}>
           <line x1={left} x2={width - left} y1={y(0)} y2={y(0)} stroke="var(--line)" />
           <polygon points={points.map(([v, a]) => `${x(v).toFixed(1)},${y(a).toFixed(1)}`).join(" ")} fill="var(--accent-faint)" stroke="var(--series-0)" stroke-width="1.6" />
-          <text x={x(least)} y={height - 5} text-anchor="start">{formatNumber(least, 3)}</text>
-          <text x={x(most)} y={height - 5} text-anchor="end">{formatNumber(most, 3)}</text>
+          {most > least ? (
+            <>
+              <text x={x(least)} y={height - 5} text-anchor="start">{formatNumber(least, 3)}</text>
+              <text x={x(most)} y={height - 5} text-anchor="end">{formatNumber(most, 3)}</text>
+            </>
+          ) : (
+            <text x={x(least)} y={height - 5} text-anchor="middle">{formatNumber(least, 3)}</text>
+          )}
         </svg>
       )}
     </figure>
@@ -223,7 +229,7 @@ export function StudyPanel(props: { s: SteerState }) {
           <>
             <progress max={study.limit} value={study.done} aria-label="Runs done" />
             <span data-test="study-state">{study.state}, {study.done} of {study.limit} runs{study.failed > 0 ? `, ${study.failed} failed` : ""}</span>
-            {study.state === "running" && study.eta !== null && <span class="quiet">{formatDuration(study.eta)} to go</span>}
+            {study.state === "running" && study.eta !== null && <span class="quiet">{formatDuration(Math.ceil(study.eta))} to go</span>}
             {study.state === "running" && <button type="button" onClick={() => void s.ask("study.cancel", { study: study.id })}>Cancel</button>}
             <a href={`api/studies/${study.id}/study.html`} target="_blank" rel="noopener">Page of the study</a>
           </>

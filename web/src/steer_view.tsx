@@ -97,6 +97,7 @@ export function SteerView(props: { s: SteerState; onReady: () => void }) {
       };
       scene.stage.onSharpness = (share) => setSharpness(Math.round(10 * share) / 10);
       let shown = s.view.peek() as BranchRun;
+      let session = s.session.peek()?.id;
       let debrisDue: ReturnType<typeof setTimeout> | undefined;
       let debrisCost = 0; // [ms]; at most a tenth of the time goes into it
       const drawDebris = (): void => {
@@ -114,6 +115,9 @@ export function SteerView(props: { s: SteerState; onReady: () => void }) {
           if (view === null || view === shown) return;
           shown = view;
           scene.setRun(view.run);
+          const now = s.session.peek()?.id;
+          if (now !== session) scene.fit("oblique"); // another building, maybe elsewhere and of another size
+          session = now;
           setGridStep(scene.gridStep);
         }),
         effect(() => {
