@@ -1,9 +1,9 @@
 // Measures how many pictures a second the steering page shows: node test/speed.mjs [bodies]. Not a test: a number of
 // this machine at this moment. The run plays, then stands while the picture is turned. Beside the time between pictures
 // stands the processor time of the browser's processes, which other work on the machine does not change much.
-import { readFileSync, readdirSync } from "node:fs";
 import { openPage } from "./browser.mjs";
 import { closeAll } from "./harness.mjs";
+import { readTime } from "./processes.mjs";
 import { Standin, useData } from "./standin.mjs";
 import { makeSynthetic } from "./synthetic.mjs";
 
@@ -38,22 +38,7 @@ const server = new Standin();
 server.rate = 1;
 server.frames = data.time.length;
 await server.start();
-const before = new Set(readdirSync("/proc"));
 const { page } = await openPage(server.url);
-/// Processor time of the browser's processes of a kind so far [ms].
-function readTime(kind) {
-  let sum = 0;
-  for (const id of readdirSync("/proc").filter((name) => /^\d+$/.test(name) && !before.has(name))) {
-    try {
-      if (!readFileSync(`/proc/${id}/cmdline`, "latin1").includes(`--type=${kind}`)) continue;
-      const fields = readFileSync(`/proc/${id}/stat`, "latin1").split(") ")[1].split(" ");
-      sum += 10 * (Number(fields[11]) + Number(fields[12]));
-    } catch {
-      continue; // it has ended
-    }
-  }
-  return sum;
-}
 const watch = async (milliseconds) => {
   const begin = [readTime("gpu-process"), readTime("renderer")];
   const result = await page.evaluate(async (limit) => {

@@ -4,6 +4,7 @@ import { copyFile, mkdir, readFile, rm, writeFile } from "node:fs/promises";
 import { fileURLToPath } from "node:url";
 import { openPage } from "./browser.mjs";
 import { after, before, describe, it } from "./harness.mjs";
+import { listOwn, putToSleep } from "./processes.mjs";
 import { assertPng, assertWebm, makeDriver, takeDownload } from "./steer_helpers.mjs";
 import { startServer } from "./steer_server.mjs";
 
@@ -80,6 +81,11 @@ describe("steering the storehouse", { timeout: 240000 }, () => {
     await page.keyboard.press("Control+z");
     await page.waitForFunction((n) => document.querySelector("[data-test=active-branch]").textContent !== n || !document.querySelector("[data-test=edits]")?.textContent.includes("0.5"), name);
     await shot("edits");
+    const covered = await page.evaluate(() => {
+      const bar = document.querySelector(".view .toolbar").getBoundingClientRect().bottom;
+      return [...document.querySelectorAll(".notice")].filter((n) => n.getBoundingClientRect().top < bar).map((n) => n.textContent);
+    });
+    assert.deepEqual(covered, [], "notices over the controls of the picture");
     await d.tab("log");
     for (const words of ["set delay", "add charge", "add pre cut", "add cable", "set friction", "undo"]) await d.until("log", words);
     await shot("log");
@@ -119,6 +125,38 @@ describe("steering the storehouse", { timeout: 240000 }, () => {
     await d.click("live");
   });
 
+  it("wakes with the machine, without a reload and with each command done once", async () => {
+    await page.selectOption("[data-test=solver-speed]", "0.1");
+    await d.run();
+    const before = await page.evaluate(() => {
+      globalThis.stays = true;
+      return { branches: topple.branches.value.length, edits: topple.log.value.filter((e) => e.action === "set_friction").length };
+    });
+    // an edit is on its way when all stops, for longer than the server waits for a silent page (45 s)
+    const own = listOwn();
+    const wakeServer = putToSleep(own.filter((p) => p.id === server.id));
+    await page.evaluate(() => void topple.tryEdit("set_friction", { ground: 0.55, bodies: 0.55 }).then(() => (globalThis.edited = "done"), (error) => (globalThis.edited = String(error))));
+    const wakeBrowser = putToSleep(own.filter((p) => p.id !== server.id));
+    await new Promise((done) => setTimeout(done, 48000));
+    wakeBrowser();
+    wakeServer();
+    await page.waitForFunction(() => globalThis.edited !== undefined);
+    assert.equal(await page.evaluate(() => globalThis.edited), "done");
+    const seen = await d.frontier();
+    await d.untilFrontier(seen + 0.05);
+    await d.pause();
+    const after = await page.evaluate(() => ({
+      stays: globalThis.stays, status: topple.status.value, branches: topple.branches.value.length,
+      edits: topple.log.value.filter((e) => e.action === "set_friction").length,
+    }));
+    assert.deepEqual([after.stays, after.status, after.branches, after.edits], [true, "open", before.branches + 1, before.edits + 1]);
+    await page.waitForFunction(() => topple.view.value.rows.every((row, i) => row === i), undefined, { timeout: 20000 }); // no frame is missing
+    await shot("awake");
+    await page.locator("[data-test=branch]", { hasText: "main" }).click();
+    await d.untilBranch("main");
+    await page.selectOption("[data-test=solver-speed]", "");
+  });
+
   it("compares two branches", async () => {
     await d.tab("compare");
     await d.click("compare-go");
@@ -143,9 +181,10 @@ describe("steering the storehouse", { timeout: 240000 }, () => {
     await d.click("save");
     await d.until("notice", "Saved");
     assert.equal(await readFile(`${out}plan.toml`, "utf8"), mine);
-    await writeFile(`${out}plan.toml`, `${mine}# by another\n`);
     await page.fill("[data-test=plan-text]", `${mine}# by me\n`);
-    // the page may hear of the change on the disk first; its text is still from before
+    await writeFile(`${out}plan.toml`, `${mine}# by another\n`);
+    // the page hears of the change on the disk; its text is still from before
+    await page.waitForFunction(() => topple.plan.value.text.includes("# by another"));
     await d.click("save");
     await page.waitForSelector("[data-test=conflict]");
     await d.click("overwrite");
@@ -171,6 +210,14 @@ describe("steering the storehouse", { timeout: 240000 }, () => {
     await page.locator("[data-test=open-path]", { hasText: "fuzzy.toml" }).click();
     await page.waitForFunction(() => document.querySelector("[data-test=open-plan]") === null);
     await d.until("phase", "Paused");
+    await d.until("sessions", "Short run, fuzzy");
+    await d.settle();
+    // another building: the picture holds all of it and its neighbours, and is full of them
+    const edge = await page.evaluate(() => {
+      const { stage, building } = toppleView.scene;
+      return Math.max(...building.fitPoints.flatMap((p) => { const q = p.clone().project(stage.camera); return [Math.abs(q.x), Math.abs(q.y)]; }));
+    });
+    assert.ok(edge > 0.8 && edge < 1, `${edge}`);
     await d.tab("study");
     await page.fill(".study .count", "12");
     await d.click("study-start");

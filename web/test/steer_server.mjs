@@ -27,5 +27,5 @@ export async function startServer(program, plan, folder) {
     child.on("error", (error) => fail((clearTimeout(timer), new Error(`${program}: ${error.message}`))));
     void end.then(() => fail((clearTimeout(timer), new Error(`${program} steer ended:\n${output}`))));
   });
-  return { url, close, output: () => output, ended: () => ended };
+  return { url, id: child.pid, close, output: () => output, ended: () => ended };
 }
