@@ -196,6 +196,7 @@ void System::find_pairs() {
 
   // joined, or joined to the same third body: the joint or element between them governs
   search.near.assign(B, -1);  // the last body that the body is near to in this sense
+  int marked = -1;            // whose neighbours are marked
   const auto holders = [&](int b) {
     const size_t i = static_cast<size_t>(b);
     return std::span<const int>(search.link.data() + search.first_link[i],
@@ -203,7 +204,9 @@ void System::find_pairs() {
   };
   const auto are_near = [&](int a, int b) {
     std::vector<int>& near = search.near;
-    if (near[static_cast<size_t>(a)] != a) {
+    if (marked != a) {
+      // other bodies may have overwritten what was marked for this one before
+      marked = a;
       near[static_cast<size_t>(a)] = a;
       for (const int i : holders(a)) {
         near[static_cast<size_t>(i)] = a;

@@ -120,6 +120,40 @@ TEST(BodyContact, OfNeighboursThatOverlapPushesOnlyWhatPenetratesFurther) {
   EXPECT_NEAR(e.kinetic, 0.5 * 500 * 0.25, 1e-9);
 }
 
+TEST(BodyContact, IsNotBetweenBodiesTiedToTheSameThird) {
+  // tall and top are tied to one node, top and low to another; the search meets tall, then low, then tall and top.
+  // Each is beside something at its foot, tall beside top at its head
+  Model m;
+  m.gravity = {};
+  m.contact.ground = false;
+  const BodyId tall = add_body(m, make_box("tall", 1000, {0.5, 5, 0.5}, {0.5, 5, 0}));
+  const BodyId top = add_body(m, make_box("top", 1000, {0.45, 0.5, 0.5}, {0.5, 9.5, 1.02}));
+  const BodyId low = add_body(m, make_box("low", 1000, {0.5, 0.5, 0.5}, {3.5, 0.5, 0}));
+  add_body(m, make_box("beside tall", 1000, {0.45, 0.5, 0.5}, {0.5, 0.5, 1.02}));
+  add_body(m, make_box("beside low", 1000, {0.45, 0.5, 0.5}, {3.5, 0.5, 1.02}));
+  const BodyId node = add_body(m, make_box("node", 1000, {0.5, 0.5, 0.5}, {30, 0, 0}));
+  const BodyId other = add_body(m, make_box("other node", 1000, {0.5, 0.5, 0.5}, {40, 0, 0}));
+  m.bodies[static_cast<size_t>(top.index)].v_WB = {0, 0, -1};
+  const auto tie = [&](BodyId a, BodyId b) {
+    ZoneElement e;
+    e.name = "tie" + std::to_string(m.elements.size());
+    e.a = a, e.b = b;
+    e.translational_stiffness = e.rotational_stiffness = {1, 1, 1};
+    add_element(m, e);
+  };
+  tie(tall, node), tie(node, top), tie(top, other), tie(other, low);
+  for (const bool are_tied : {true, false}) {
+    if (!are_tied) m.elements.clear();
+    int blows = 0;
+    Options o = free_options(0.1, 1e-3);
+    o.on_happening = [&](const Happening& h) {
+      blows += h.kind == Happening::Kind::BodyContact && h.index == tall.index && h.other == top.index;
+    };
+    EXPECT_EQ(run(m, o).ending, Summary::Ending::TimeLimit);
+    EXPECT_EQ(blows, are_tied ? 0 : 1);
+  }
+}
+
 TEST(BodyContact, StackStaysAndLosesNoHeight) {
   Model m;
   for (int i = 0; i < 4; ++i)
