@@ -377,7 +377,8 @@ bool System::find_equilibrium(std::string& message) {
     const Sparse K = assembly.make_stiffness(false, weight);
     for (Eigen::Index i = 0; i < n; ++i) largest = std::max(largest, K.coeff(i, i));
   }
-  const double penalty = 30 * largest;
+  // as stiff as the stiffest body is held: more would turn round-off of places into larger forces and save no iteration
+  const double penalty = largest;
   Eigen::SimplicialLDLT<Sparse> solver;
   bool analysed = false;  // the pattern stays what it is
   const auto factorise = [&] {

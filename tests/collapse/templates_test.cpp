@@ -120,6 +120,22 @@ TEST(TemplatePhysics, AColumnOfTheHallBearsHalfAGirderAndItsRoof) {
   EXPECT_NEAR(compression_in("hall", "C-A3-0/foot"), weight, 0.03 * weight);  // the frame is stiff along the hall
 }
 
+TEST(TemplatePhysics, HallsOfAnySpanHaveAnEquilibrium) {
+  const std::string text = product::find_template("hall").text, rows = "B = \"12 m\"";
+  for (const std::string span : {"15", "17", "20"}) {
+    std::string wider = text;
+    ASSERT_NE(wider.find(rows), std::string::npos);
+    wider.replace(wider.find(rows), rows.size(), "B = \"" + span + " m\"");
+    const product::Plan plan = read(wider);
+    RunOptions options;
+    options.duration = 0.02;
+    const record::Record r = run_plan(plan, default_knowledge(), options, {});
+    const record::Finding& f = finding_of(r, "verification.equilibrium");
+    EXPECT_EQ(f.status, record::Status::Good) << span << ": " << f.text;
+    EXPECT_LT(f.value, 1e-8) << span;  // round-off of places times the stiffest spring; 30 times that was 3e-8
+  }
+}
+
 TEST(TemplatePhysics, AnInnerPanelBearsTheFloorsOfItsOwnArea) {
   const double floors = 5 * (2500 * 0.14 + 1000 / 9.81) * 3.6 * 4, panels = 2500 * 2.4 * 0.15 * (5 * 2.8 - 0.9);
   const double weight = 9.81 * (floors + panels);
