@@ -190,6 +190,7 @@ TEST(StorehousePhysics, StandsOnTwoRowsAndThenTopplesToTheFront) {
     for (const double other : {1.0, 0.99, 0.98, 0.97, 0.96}) {
       RunOptions fine;
       fine.step = share * other * r.provenance.step;
+      fine.duration = second + 1.1;
       sum += value_at(run_plan(plan, default_knowledge(), fine, {}), "tilt_angle", second + 1);
     }
     return sum / 5;
