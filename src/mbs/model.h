@@ -66,6 +66,7 @@ struct ZoneLaw {
   double biaxial_exponent = 1.5;           // (|My|/Ly)^p + (|Mz|/Lz)^p <= 1
   double damage_share = 0;                 // share of the inelastic rotation that is recovered on unloading, 0..1
   double rupture_rotation = kUnlimited;    // plastic rotation at which the element breaks altogether [rad]
+  double rupture_rotation_pressed = 0;     // the same while its normal force presses, if that is more [rad]
   Curve compression;                       // limit against plastic shortening [m] -> [N]
   Curve tension;                           // limit against plastic elongation [m] -> [N]
   double crush_length = kUnlimited;        // plastic shortening at which the element breaks [m]

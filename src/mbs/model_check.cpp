@@ -260,7 +260,8 @@ void Checker::check_laws() {
                                                        {"twist_rupture", l.twist_rupture}};
     for (const auto& [key, x] : ruptures)
       if (!(x > 0)) fail(p, key, fmt::format("lengths and rotations of rupture must be > 0, this is {:g}", x));
-    const std::pair<const char*, double> limits[] = {{"shear_y", l.shear_y},
+    const std::pair<const char*, double> limits[] = {{"rupture_rotation_pressed", l.rupture_rotation_pressed},
+                                                     {"shear_y", l.shear_y},
                                                      {"shear_z", l.shear_z},
                                                      {"shear_friction", l.shear_friction},
                                                      {"slip_softening", l.slip_softening},

@@ -76,6 +76,7 @@ Json json_of(const ZoneLaw& l) {
   j["biaxial_exponent"] = l.biaxial_exponent;
   j["damage_share"] = l.damage_share;
   put(j, "rupture_rotation", l.rupture_rotation);
+  if (l.rupture_rotation_pressed != 0) put(j, "rupture_rotation_pressed", l.rupture_rotation_pressed);
   if (!l.compression.x.empty()) j["compression"] = json_of(l.compression);
   if (!l.tension.x.empty()) j["tension"] = json_of(l.tension);
   put(j, "crush_length", l.crush_length);

@@ -10,6 +10,8 @@ namespace topple::mbs {
 
 namespace {
 
+constexpr double kTiny = 1e-300;
+
 /// Largest i with grid[i] <= x, within [0, n-2]; `hint` is where it was last time.
 inline int find_interval(const std::vector<double>& grid, double x, int hint) {
   const int last = static_cast<int>(grid.size()) - 2;
@@ -79,6 +81,7 @@ CompiledLaw compile_law(const ZoneLaw& law) {
   c.biaxial_exponent = law.biaxial_exponent;
   c.damage_share = law.damage_share;
   c.rupture_rotation = law.rupture_rotation;
+  c.rupture_rotation_pressed = std::max(law.rupture_rotation, law.rupture_rotation_pressed);
   c.crush_length = law.crush_length;
   c.rupture_elongation = law.rupture_elongation;
   c.shear[0] = law.shear_y;
@@ -267,6 +270,8 @@ void find_safe_bounds(const ZoneParameters& p, const std::vector<CompiledLaw>& l
     from = std::max(from, -limits.compression(reached, z.shortened, whole));
     to = std::min(to, limits.tension(z.elongated));
   }
+  for (int s = 0; s < p.stations; ++s)
+    if (z.station[s].reached >= law_of(s).rupture_rotation) to = std::min(to, -kTiny);  // held by what presses it
   z.safe_force[0] = 1, z.safe_force[1] = -1;
   if (whole != 1 || !(from <= to)) return;
   for (int q = 0; q < 2; ++q) {
@@ -321,7 +326,6 @@ double raised(double x, double e) { return e == 1.5 ? x * std::sqrt(x) : std::po
 /// and its inverse.
 double root_of(double x, double e) { return e == 1.5 ? std::cbrt(x * x) : std::pow(x, 1 / e); }
 
-constexpr double kTiny = 1e-300;
 using kernel::kMostDamage;
 
 /// The stiffness goes over to its share without a jump of the forces: the rest of the deformation becomes permanent.
@@ -655,7 +659,9 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
         st.reached = std::max(st.reached, std::sqrt(phi[0][s] * phi[0][s] + phi[1][s] * phi[1][s]));
         grown[s] = st.reached - so_far;
       }
-      if (st.reached >= station_limits[s].law().rupture_rotation) broke = BreakReason::Rotation;
+      const CompiledLaw& law = station_limits[s].law();
+      if (st.reached >= (force[0] < 0 ? law.rupture_rotation_pressed : law.rupture_rotation))
+        broke = BreakReason::Rotation;
     }
     if (flowed) {
       // split what is new of the inelastic rotation into a plastic part and added flexibility
@@ -833,7 +839,8 @@ bool write_flow(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, c
   if (!(whole > 0)) return false;
   std::fill(out, out + kFlowFields, 0.0);
   out[kAxial] = z.axial, out[kSlip] = z.slip[0], out[kSlip + 1] = z.slip[1], out[kTwist] = z.twist;
-  double far = 0;  // no cell reaches beyond this rotation
+  double far = 0;           // no cell reaches beyond this rotation
+  bool is_pressed = false;  // only what presses it holds it together
   for (int s = 0; s < 2; ++s) {
     double* station = &out[kStations + s * kStationFields];
     station[kRupture] = kUnlimited;
@@ -845,7 +852,9 @@ bool write_flow(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, c
         station[kPhi + q] = z.station[s].phi[q], station[kSoftness + q] = z.station[s].soft[q];
       station[kReached] = z.station[s].reached;
       station[kShare] = law->damage_share;
-      station[kRupture] = law->rupture_rotation;
+      const bool is_far = z.station[s].reached >= law->rupture_rotation;
+      is_pressed = is_pressed || is_far;
+      station[kRupture] = is_far ? law->rupture_rotation_pressed : law->rupture_rotation;
       far = std::max(far, z.station[s].reached);
     }
     for (int q = 0; q < 2; ++q) {
@@ -898,7 +907,7 @@ bool write_flow(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, c
     }
   }
   out[kFlowLeast] = -limits.compression(far, z.shortened, whole);
-  out[kFlowMost] = limits.tension(z.elongated);
+  out[kFlowMost] = is_pressed ? -kTiny : limits.tension(z.elongated);
   for (int axis = 0; axis < 2; ++axis)
     out[kShearOwn + axis] = law.slip_softening > 0 ? std::min(law.shear[axis], unlimited) : 0;
   out[kShearFriction] = law.shear_friction;

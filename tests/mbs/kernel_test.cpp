@@ -42,13 +42,13 @@ ZoneLaw make_law(double strength) {
 }
 
 /// A body that is put where the test wants it, held to the ground by one element.
-Model make_model(int stations, double strength) {
+Model make_model(int stations, const ZoneLaw& law) {
   Model m;
   Body body;
   body.name = "end";
   body.fixed = true;
   add_body(m, body);
-  add_law(m, make_law(strength));
+  add_law(m, law);
   ZoneElement e;
   e.name = "zone";
   e.a = kGround;
@@ -83,11 +83,11 @@ struct Walked {
 };
 
 /// The path through the kernel (System) and through the law alone.
-void walk(int stations, double strength, double amplitude, std::uint32_t seed, size_t width,
+void walk(int stations, const ZoneLaw& zone, double amplitude, std::uint32_t seed, size_t width,
           std::vector<Walked>& kernel, std::vector<Walked>* law, double& share_of_full_law) {
   Options options;
   options.step = 1e-4;
-  System s(make_model(stations, strength), options, width);
+  System s(make_model(stations, zone), options, width);
   s.start();
   ZoneState z = s.state.element[0];
   long outside = 0;
@@ -122,7 +122,7 @@ TEST_P(KernelLaw, FollowsTheFullLaw) {
   for (std::uint32_t seed = 1; seed <= 6; ++seed) {
     std::vector<Walked> kernel, law;
     double full = 0;
-    walk(stations, strength, amplitude, seed, 0, kernel, &law, full);
+    walk(stations, make_law(strength), amplitude, seed, 0, kernel, &law, full);
     ASSERT_EQ(kernel.size(), law.size());
     double largest[6] = {0, 0, 0, 0, 0, 0};
     for (const Walked& w : law)
@@ -151,12 +151,38 @@ INSTANTIATE_TEST_SUITE_P(Paths, KernelLaw,
 INSTANTIATE_TEST_SUITE_P(FarBeyond, KernelLaw,
                          testing::Combine(testing::Values(1, 2), testing::Values(2e-2), testing::Values(1e-3)));
 
+TEST(Kernel, BreaksZonesWhenTheFullLawDoes) {
+  ZoneLaw zone = make_law(1);
+  zone.rupture_rotation = 0.01, zone.rupture_rotation_pressed = 0.03;
+  int pressed = 0, pulled_apart = 0, turned_apart = 0;
+  for (const int stations : {1, 2})
+    for (std::uint32_t seed = 1; seed <= 12; ++seed) {
+      std::vector<Walked> kernel, law;
+      double full = 0;
+      walk(stations, zone, 2e-2, seed, 0, kernel, &law, full);
+      ASSERT_EQ(kernel.size(), law.size());
+      double largest = 0;
+      for (const Walked& w : law) largest = std::max(largest, std::abs(w.resultant.c[0]));
+      for (size_t i = 0; i < law.size(); ++i) {
+        ASSERT_NEAR(kernel[i].resultant.c[0], law[i].resultant.c[0], 1e-8 * largest) << i << " seed " << seed;
+        ASSERT_NEAR(kernel[i].reached, law[i].reached, 1e-9) << i;
+        if (law[i].reached > 0.01 && law[i].resultant.c[0] < 0) ++pressed;
+      }
+      if (law.size() == 6000) continue;
+      (law.back().reached < 0.03 ? pulled_apart : turned_apart) += 1;
+    }
+  // each of the three was seen
+  EXPECT_GT(pressed, 1000);
+  EXPECT_GT(pulled_apart, 0);
+  EXPECT_GT(turned_apart, 0);
+}
+
 TEST(Kernel, GivesTheSameBitsWhateverTheWidth) {
   for (const int stations : {0, 1, 2}) {
     std::vector<Walked> wide, single;
     double share = 0;
-    walk(stations, 1, 5e-3, 3, 0, wide, nullptr, share);
-    walk(stations, 1, 5e-3, 3, 1, single, nullptr, share);
+    walk(stations, make_law(1), 5e-3, 3, 0, wide, nullptr, share);
+    walk(stations, make_law(1), 5e-3, 3, 1, single, nullptr, share);
     ASSERT_EQ(wide.size(), single.size());
     for (size_t i = 0; i < wide.size(); ++i) {
       for (int c = 0; c < 6; ++c) ASSERT_EQ(wide[i].resultant.c[c], single[i].resultant.c[c]) << i;

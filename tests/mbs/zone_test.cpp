@@ -196,6 +196,39 @@ TEST(Zone, ShortensOrLengthensAsItsRotationGrows) {
   }
 }
 
+TEST(Zone, HoldsWhilePressedBeyondItsRupture) {
+  ZoneLaw law = make_law();
+  law.rupture_rotation_pressed = 0.18;
+  Walk pressed(law);
+  turn_at(pressed, -0.5e6, 0.17);
+  ASSERT_TRUE(pressed.z.live);
+  EXPECT_GT(pressed.z.station[0].reached, 0.16);
+  EXPECT_NEAR(pressed.z.resultant.c[0], -0.5e6, 1);
+  EXPECT_NEAR(pressed.moment_z(), 30e3, 1);  // what the family leaves from 0.05 rad on, between its rows
+  EXPECT_NEAR(pressed.z.energy + pressed.z.plastic, pressed.work, 2e-3 * pressed.work);
+  // apart as soon as nothing presses it
+  Walk pulled = pressed;
+  turn_at(pulled, -1e3, 0.17, 1);
+  EXPECT_TRUE(pulled.z.live);
+  turn_at(pulled, 0, 0.17, 1);
+  EXPECT_FALSE(pulled.z.live);
+  EXPECT_EQ(pulled.z.reason, BreakReason::Rotation);
+  EXPECT_NEAR(pulled.z.plastic, pulled.work, 2e-3 * pulled.work);
+  // or turned to the end
+  turn_at(pressed, -0.5e6, 0.19);
+  EXPECT_FALSE(pressed.z.live);
+  EXPECT_EQ(pressed.z.reason, BreakReason::Rotation);
+  EXPECT_NEAR(pressed.z.station[0].reached, 0.18, 1e-4);
+  // without pressure, and without the second rotation, at the first
+  for (const double N : {0.0, -0.5e6}) {
+    law.rupture_rotation_pressed = N < 0 ? 0.1 : 0.18;  // less than the first: not used
+    Walk w(law);
+    turn_at(w, N, 0.17);
+    EXPECT_FALSE(w.z.live);
+    EXPECT_NEAR(w.z.station[0].reached, 0.15, 1e-4);
+  }
+}
+
 TEST(Zone, LengthensByBothStations) {
   ZoneLaw law = make_lifting_law();
   law.shear_y = law.shear_z = kUnlimited;
