@@ -22,6 +22,7 @@ const std::map<std::string, Field>& fields() {
       {"zone.rupture_rotation", &Knowledge::zone_rupture_rotation},
       {"zone.slip_softening", &Knowledge::zone_slip_softening},
       {"zone.slip_rupture", &Knowledge::zone_slip_rupture},
+      {"zone.rupture_rotation_pressed", &Knowledge::zone_rupture_rotation_pressed},
       {"zone.twist_rupture", &Knowledge::zone_twist_rupture},
       {"zone.biaxial_exponent", &Knowledge::zone_biaxial_exponent},
       {"zone.damping_ratio", &Knowledge::zone_damping_ratio},

@@ -18,7 +18,8 @@ struct Rule {
 struct Knowledge {
   double zone_length_by_depth, zone_length_by_span, zone_length_by_bar, zone_length_at_most;
   double zone_elongation_share;
-  double zone_rupture_rotation, zone_slip_softening, zone_slip_rupture, zone_twist_rupture, zone_biaxial_exponent;
+  double zone_rupture_rotation, zone_rupture_rotation_pressed, zone_slip_softening, zone_slip_rupture,
+      zone_twist_rupture, zone_biaxial_exponent;
   double zone_damping_ratio;
   double slab_elongation_lengths, wall_stiffness_share, wall_axial_share, wall_crush_share;
   double charge_release_time, charge_cage_rupture_rotation, charge_transition_reach, charge_scatter_limit;

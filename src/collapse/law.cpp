@@ -393,6 +393,8 @@ mbs::ZoneLaw make_zone_law(const nearfield::Rcc& rcc, double EI_y, double EI_z, 
       law.rupture_rotation = std::isfinite(law.rupture_rotation)
                                  ? std::max(law.rupture_rotation, f->plastic_rotation.back())
                                  : f->plastic_rotation.back();
+  if (k.zone_rupture_rotation_pressed > k.zone_rupture_rotation)
+    law.rupture_rotation_pressed = k.zone_rupture_rotation_pressed;
   law.compression = make_curve(rcc.compression);
   law.tension = make_curve(rcc.tension);
   law.crush_length = rcc.length;

@@ -88,6 +88,20 @@ TEST(ZoneLaw, LengthensByTheShareThatTheRuleGives) {
   EXPECT_EQ(none.moment_y.positive, all.moment_y.positive);
 }
 
+TEST(ZoneLaw, TurnsFurtherUnderPressureIfTheRuleSaysSo) {
+  const nearfield::Rcc rcc = nearfield::make_rcc(column_zone());
+  const auto pressed = [&](double rotation) {
+    Knowledge k = default_knowledge();
+    k.zone_rupture_rotation_pressed = rotation;
+    return make_zone_law(rcc, rcc.calc_EI_effective_y(0), rcc.calc_EI_effective_z(0), "zone", k);
+  };
+  const double first = default_knowledge().zone_rupture_rotation;
+  EXPECT_EQ(pressed(2 * first).rupture_rotation_pressed, 2 * first);
+  EXPECT_EQ(pressed(2 * first).rupture_rotation, pressed(first).rupture_rotation);
+  // not more than the other one: none, also where a family ends before
+  for (const double share : {0.5, 1.0}) EXPECT_EQ(pressed(share * first).rupture_rotation_pressed, 0);
+}
+
 TEST(ZoneLaw, PassesTheModelsCheck) {
   mbs::Model model;
   const nearfield::ZoneInput in = column_zone();
