@@ -54,7 +54,7 @@ std::string Steering::free_name(const std::string& wanted) const {
     return wanted;
   }
   for (int n = 1;; ++n)
-    if (const std::string name = fmt::format("what-if {}", n); !is_taken(name)) return name;
+    if (std::string name = fmt::format("what-if {}", n); !is_taken(name)) return name;
 }
 
 Branch& Steering::add_branch(Branch b) {
