@@ -139,7 +139,7 @@ async function compareLanguages(path, name, namesOf) {
   assert.equal(after.length, before.length);
   const names = new Set([...alike, ...named].flatMap((text) => [text, commas(prettify(text ?? ""))]));
   const areNames = (text) => names.has(text) || text.split(", ").every((part) => names.has(part));
-  const isNumber = /^[\d.,:\s·–≥≤%×^−-]*(?:m|s|t|MJ|MN|ms|UTC)?$/;
+  const isNumber = /^[\d.,:\s·–≥≤%×^⁰¹²³⁴-⁹⁻−-]*(?:m|s|t|MJ|MN|ms|UTC)?$/;
   const left = after.filter((text, i) => (text === before[i] || text === commas(before[i])) && /[A-Za-z]{2}/.test(text) && !areNames(text) && !isNumber.test(text));
   assert.deepEqual([...new Set(left)], []);
   // function words of English, apart from names that people gave
