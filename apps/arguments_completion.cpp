@@ -69,7 +69,10 @@ std::string make_bash(const std::vector<VerbPath>& verbs) {
       options.insert(options.end(), o.names.begin(), o.names.end());
       if (o.takes == Takes::Nothing) continue;
       std::string patterns;
-      for (const std::string& name : o.names) patterns += (patterns.empty() ? "" : " | ") + quote(path + ":" + name);
+      for (const std::string& name : o.names) {
+        if (!patterns.empty()) patterns += " | ";
+        patterns += quote(fmt::format("{}:{}", path, name));
+      }
       const std::string action = o.takes == Takes::Choice   ? "_topple_words " + quote(join(o.choices))
                                  : o.takes == Takes::File   ? "_topple_files -f"
                                  : o.takes == Takes::Folder ? "_topple_files -d"
