@@ -27,6 +27,10 @@ double interpolate(const std::vector<double>& x, const double* y, double at) {
   return y[i - 1] + (y[i] - y[i - 1]) * (at - x[i - 1]) / (x[i] - x[i - 1]);
 }
 
+mbs::ZoneLaw make_effective_law(const nearfield::Rcc& rcc, const Knowledge& k) {
+  return make_zone_law(rcc, rcc.calc_EI_effective_y(0), rcc.calc_EI_effective_z(0), "zone", k);
+}
+
 TEST(ZoneLaw, ElasticAndPlasticRotationTogetherAreTheFamilys) {
   const nearfield::Rcc rcc = nearfield::make_rcc(column_zone());
   const double N = -600e3, EI_y = rcc.calc_EI_effective_y(N), EI_z = rcc.calc_EI_effective_z(N);
@@ -57,8 +61,7 @@ TEST(ZoneLaw, ElasticAndPlasticRotationTogetherAreTheFamilys) {
 
 TEST(ZoneLaw, PlasticRotationBeginsAtFirstYieldOrLater) {
   const nearfield::Rcc rcc = nearfield::make_rcc(column_zone());
-  const mbs::ZoneLaw law =
-      make_zone_law(rcc, rcc.calc_EI_effective_y(0), rcc.calc_EI_effective_z(0), "z", default_knowledge());
+  const mbs::ZoneLaw law = make_effective_law(rcc, default_knowledge());
   const size_t J = law.moment_y.plastic_rotation.size();
   for (size_t k = 0; k < rcc.y_pos.normal_force.size(); ++k) {
     const auto at = std::find_if(law.moment_y.normal_force.begin(), law.moment_y.normal_force.end(),
@@ -74,7 +77,7 @@ TEST(ZoneLaw, LengthensByTheShareThatTheRuleGives) {
   const auto elongation = [&](double share) {
     Knowledge k = default_knowledge();
     k.zone_elongation_share = share;
-    return make_zone_law(rcc, rcc.calc_EI_effective_y(0), rcc.calc_EI_effective_z(0), "zone", k);
+    return make_effective_law(rcc, k);
   };
   const mbs::ZoneLaw none = elongation(0), half = elongation(0.5), all = elongation(1);
   EXPECT_TRUE(none.moment_y.elongation_positive.empty() && none.moment_z.elongation_negative.empty());
@@ -93,7 +96,7 @@ TEST(ZoneLaw, TurnsFurtherUnderPressureIfTheRuleSaysSo) {
   const auto pressed = [&](double rotation) {
     Knowledge k = default_knowledge();
     k.zone_rupture_rotation_pressed = rotation;
-    return make_zone_law(rcc, rcc.calc_EI_effective_y(0), rcc.calc_EI_effective_z(0), "zone", k);
+    return make_effective_law(rcc, k);
   };
   const double first = default_knowledge().zone_rupture_rotation;
   EXPECT_EQ(pressed(2 * first).rupture_rotation_pressed, 2 * first);
