@@ -11,6 +11,7 @@ import { hostile } from "./synthetic.mjs";
 
 const { prettify } = await load("units.ts");
 const { makeTicks, findRange } = await load("study/chart.tsx");
+const { placeLabels, calcWidth } = await load("study/labels.ts");
 const { readStudy } = await load("study/data.ts");
 const out = fileURLToPath(new URL("out/", import.meta.url));
 const given = process.env.TOPPLE_STUDY;
@@ -39,6 +40,20 @@ describe("a study's parts", () => {
     const [low, high] = findRange([null, 5, 5]);
     assert.ok(low < 5 && high > 5, "a range is never empty");
     assert.deepEqual(findRange([]), [0, 1]);
+  });
+
+  it("places labels so that none covers another one", () => {
+    const frame = { left: 0, right: 200, top: 0, foot: 100 };
+    const line = (y) => Array.from({ length: 21 }, (_, k) => [10 * k, y]);
+    const labels = [40, 44, 48].map((y, i) => ({ text: `0.${i}25`, places: line(y), avoid: [40, 44, 48].filter((other) => other !== y).flatMap(line) }));
+    const places = placeLabels(labels, frame);
+    for (let a = 0; a < 3; ++a) {
+      const half = calcWidth(labels[a].text) / 2;
+      assert.ok(places[a][0] - half >= 0 && places[a][0] + half <= 200, "within the frame");
+      for (let b = 0; b < a; ++b) assert.ok(Math.abs(places[a][0] - places[b][0]) >= 2 * half || Math.abs(places[a][1] - places[b][1]) >= 14);
+    }
+    assert.deepEqual(placeLabels([{ text: "1", places: [[50, 50], [60, 50]], avoid: [[50, 52]] }], frame), [[60, 50]], "away from what is not its own");
+    assert.deepEqual(placeLabels([{ text: "1", places: [[50, 50]] }, { text: "2", places: [[52, 50]] }], frame), [[50, 50], undefined]);
   });
 
   it("refuses data that are damaged or of another kind", () => {
@@ -111,6 +126,11 @@ describe("the page of a study", () => {
     const plan = page.locator("[data-test=debris]");
     assert.equal(await plan.locator("path.debris").count(), data.debris[0].levels.length);
     assert.match(await plan.textContent(), /no safe distance/);
+    const boxes = await plan.locator(".level-text").evaluateAll((list) => list.map((e) => e.getBoundingClientRect().toJSON()));
+    assert.ok(boxes.length > 0);
+    for (const [i, a] of boxes.entries())
+      for (const b of boxes.slice(0, i))
+        assert.ok(a.left >= b.right || b.left >= a.right || a.top + 3 >= b.bottom || b.top + 3 >= a.bottom, "labels lie apart");
     await plan.locator("summary").click();
     await plan.locator("tbody tr").first().waitFor();
     assert.equal(await plan.locator("tbody tr").count(), data.debris[0].levels.length);

@@ -3,6 +3,7 @@ import { formatNumber } from "../units";
 import type { Point } from "../data";
 import { Chart, ValueTable, findRange, makePath, makeScale, makeTicks, tickText } from "./chart";
 import { titleOf, unitWord, type Fan, type Level, type Output, type Study } from "./data";
+import { calcWidth, placeLabels, walk, type Label } from "./labels";
 import { lookOf, nameOf, type State } from "./state";
 import { OutcomeName } from "./verdict";
 
@@ -175,6 +176,44 @@ export function Fans(props: { state: State }) {
 const pathOf = (corners: readonly Point[], x: (v: number) => number, y: (v: number) => number): string =>
   corners.length === 0 ? "" : `${corners.map((p, i) => `${i === 0 ? "M" : "L"}${x(p[0]).toFixed(1)} ${y(p[1]).toFixed(1)}`).join("")}Z`;
 
+interface Outline {
+  from: number;
+  to: number; // degrees
+  corners: Point[];
+}
+
+/// Of degrees from the lowest on; those that cannot be told apart are one.
+function findOutlines(levels: readonly { alpha: number; corners: Point[] }[]): Outline[] {
+  const outlines: Outline[] = [];
+  for (const { alpha, corners } of levels) {
+    const last = outlines[outlines.length - 1];
+    const isSame = last?.corners.length === corners.length && last.corners.every(([x, y], k) => Math.hypot(x - (corners[k] as Point)[0], y - (corners[k] as Point)[1]) < 1);
+    if (last !== undefined && isSame) last.to = alpha;
+    else if (corners.length > 0) outlines.push({ from: alpha, to: alpha, corners });
+  }
+  return outlines;
+}
+
+/// Names above, below or within the neighbours, degrees on their outlines. In units of the picture.
+function label(outlines: readonly Outline[], neighbours: readonly { name: string; corners: Point[] }[], footprint: readonly Point[]): Label[] {
+  const lines = outlines.map((o) => walk(o.corners, 8));
+  const building = walk(footprint, 8);
+  const areas = neighbours.flatMap((n) => walk(n.corners, 8));
+  return [
+    ...neighbours.map(({ name, corners }): Label => {
+      const xs = corners.map((p) => p[0]), ys = corners.map((p) => p[1]), half = calcWidth(name) / 2;
+      const west = Math.min(...xs), east = Math.max(...xs), top = Math.min(...ys), foot = Math.max(...ys);
+      const places = [top - 9, foot + 9, (top + foot) / 2].flatMap((y) => [(west + east) / 2, west + half, east - half].map((x): Point => [x, y]));
+      return { text: name, places, avoid: [...building, ...areas, ...lines.flat()] };
+    }),
+    ...outlines.map((o, i): Label => ({
+      text: o.from === o.to ? String(o.from) : `${o.from}–${o.to}`,
+      places: [...(lines[i] as Point[])].sort((a, b) => a[1] - b[1]),
+      avoid: [...building, ...areas, ...lines.filter((_, k) => k !== i).flat()],
+    })),
+  ];
+}
+
 export function DebrisPlan(props: { state: State }) {
   const { study } = props.state;
   const [chosen, setChosen] = useState(0);
@@ -189,6 +228,10 @@ export function DebrisPlan(props: { state: State }) {
   const middle = (xs[0] + xs[1]) / 2;
   const x = (v: number): number => width / 2 + (v - middle) * factor;
   const y = makeScale(ys[0], ys[1], height - margin, height - margin - factor * (ys[1] - ys[0])).to;
+  const toPicture = (corners: readonly Point[]): Point[] => corners.map((p) => [x(p[0]), y(p[1])]);
+  const outlines = findOutlines(debris.levels.map((l) => ({ alpha: l.alpha, corners: toPicture(l.corners) })));
+  const labels = label(outlines, study.site.neighbours.map((n) => ({ name: n.name, corners: toPicture(n.footprint) })), toPicture(study.site.footprint));
+  const places = placeLabels(labels, { left: margin, right: width, top: 0, foot: height - margin });
   return (
     <section class="panel plot" aria-label="Debris" data-test="debris">
       <h2>Where parts may lie</h2>
@@ -217,11 +260,9 @@ export function DebrisPlan(props: { state: State }) {
         ))}
         {debris.levels.map((l) => <path class="debris" d={pathOf(l.corners, x, y)} />)}
         <path class="footprint" d={pathOf(study.site.footprint, x, y)} />
-        {debris.levels.map((l, i) => {
-          const corner = l.corners.reduce<Point | undefined>((best, p) => (best === undefined || p[1] > best[1] ? p : best), undefined);
-          return corner === undefined ? null : <text class="level-text" x={x(corner[0]) + 26 * (i - debris.levels.length / 2)} y={y(corner[1]) - 3} text-anchor="middle">{l.alpha}</text>;
-        })}
-        {study.site.neighbours.map((n) => n.footprint[0] !== undefined && <text class="level-text" x={x(n.footprint[0][0])} y={y(n.footprint[0][1]) - 4} text-anchor={x(n.footprint[0][0]) > 0.7 * width ? "end" : "start"}>{n.name}</text>)}
+        {places.map((place, i) => place !== undefined && (
+          <text class="level-text" x={place[0]} y={place[1] + 4} text-anchor="middle">{labels[i]?.text}</text>
+        ))}
       </svg>
       <p class="quiet plot-note">
         Seen from above; the strong line is the building. Outside the outline of a degree no part of any run that is possible to that degree lay at the end of its
