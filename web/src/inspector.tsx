@@ -20,7 +20,7 @@ export function Inspector(props: { state: State }) {
   const body = run.bodies[index];
   if (body === undefined) return null;
 
-  const { frame, fraction } = findFrame(run.time, state.time.value);
+  const { frame, fraction } = findFrame(run.time, state.timeSlowly.value);
   const p: Triple = [0, 0, 0], p0: Triple = [0, 0, 0];
   const q: Quadruple = [1, 0, 0, 0], q0: Quadruple = [1, 0, 0, 0];
   const placed = run.time.length > 0 && calcPose(run, index, frame, fraction, p, q) && calcPose(run, index, 0, 0, p0, q0);
@@ -51,7 +51,7 @@ export function Inspector(props: { state: State }) {
           </>
         )}
       </dl>
-      <h3>Zones at {formatTime(state.time.value)}</h3>
+      <h3>Zones at {formatTime(state.timeSlowly.value)}</h3>
       {zones.length === 0 && <p class="quiet">This part has no zones: it stays rigid.</p>}
       {zones.map((z) => {
         const zone = run.zones[z];

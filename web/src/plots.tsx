@@ -126,7 +126,7 @@ export function PlotPanel(props: { state: State; group: Group; onSeek?: (time: n
     namePlot(plot, group.title);
     plot.over.appendChild(cursorLine);
     const placeLine = (): void => {
-      cursorLine.style.transform = `translateX(${plot.valToPos(state.time.value, "x") || 0}px)`;
+      cursorLine.style.transform = `translateX(${plot.valToPos(state.timeSlowly.value, "x") || 0}px)`;
     };
     const seek = (event: PointerEvent): void => {
       if (event.buttons & 1) (props.onSeek ?? state.pauseAt)(plot.posToVal(event.clientX - plot.over.getBoundingClientRect().left, "x"));
@@ -192,7 +192,7 @@ export function niceRange(low: number | null, high: number | null): [number, num
 
 function PlotLegend(props: { state: State; group: Group; values: (number | null)[][] }) {
   const { state, group, values } = props;
-  const frame = Math.min(state.frameSlowly.value, (values[0]?.length ?? 0) - 1); // frames may have come since
+  const frame = Math.min(state.frame.value, (values[0]?.length ?? 0) - 1); // frames may have come since
   return (
     <ul class="plot-legend">
       {group.series.map((s, i) => (

@@ -23,19 +23,22 @@ export function makeLook() {
 }
 export type Look = ReturnType<typeof makeLook>;
 
-/// Follows another signal, `wait` [ms] behind it at most.
-function followSlowly(from: ReadonlySignal<number>, wait: number): ReadonlySignal<number> {
+/// Follows another signal, `wait` [ms] behind it at most; `hurry` brings it there at once.
+function followSlowly(from: ReadonlySignal<number>, wait: number): { slow: ReadonlySignal<number>; hurry: () => void } {
   const slow = signal(from.peek());
   let waiting = false;
+  const hurry = (): void => {
+    slow.value = from.peek();
+  };
   from.subscribe((value) => {
     if (waiting || value === slow.peek()) return;
     waiting = true;
     setTimeout(() => {
       waiting = false;
-      slow.value = from.peek();
+      hurry();
     }, wait);
   });
-  return slow;
+  return { slow, hurry };
 }
 
 /// `begin` is where the time axis begins, also where frames before the first one are still to come.
@@ -47,18 +50,26 @@ export function makeState(run: Run, look: Look = makeLook(), begin = run.time[0]
   const limit = signal(0);
   const span = computed(() => Math.max(limit.value, end.value));
   /// Follows `grown` at most four times a second, for what is slow to draw.
-  const grownSlowly = followSlowly(grown, 250);
+  const grownSlowly = followSlowly(grown, 250).slow;
   const time = signal(begin);
+  /// Follows `time` at most ten times a second while it moves by itself: for texts, sliders and lines in plots, each change
+  /// of which costs a layout of the page and the drawing of its parts.
+  const { slow: timeSlowly, hurry } = followSlowly(time, 100);
   const playing = signal(false);
+  playing.subscribe(hurry); // what stands still is exact
   const hiddenKinds = signal<ReadonlySet<string>>(chooseHiddenKinds(run));
-  const frame = computed(() => (grown.value, findFrame(run.time, time.value).frame));
-  /// Follows `frame` at most ten times a second, for numbers to be read.
-  const frameSlowly = followSlowly(frame, 100);
+  /// Of `timeSlowly`.
+  const frame = computed(() => (grown.value, findFrame(run.time, timeSlowly.value).frame));
   const inOrder = computed(() => (grownSlowly.value, [...run.events].sort((a, b) => a.time - b.time)));
   const shownEvents = computed(() => inOrder.value.filter((e) => !hiddenKinds.value.has(e.kind)));
 
-  const seek = (t: number): void => {
+  /// For time that moves by itself.
+  const move = (t: number): void => {
     time.value = Math.min(end.peek(), Math.max(begin, t));
+  };
+  const seek = (t: number): void => {
+    move(t);
+    hurry();
   };
   const pauseAt = (t: number): void => {
     playing.value = false;
@@ -70,8 +81,8 @@ export function makeState(run: Run, look: Look = makeLook(), begin = run.time[0]
     begin,
     end,
     time,
+    timeSlowly,
     frame,
-    frameSlowly,
     grown,
     grownSlowly,
     limit,
@@ -80,6 +91,7 @@ export function makeState(run: Run, look: Look = makeLook(), begin = run.time[0]
     ...look,
     hiddenKinds,
     shownEvents,
+    move,
     seek,
     pauseAt,
     togglePlay(): void {
@@ -134,7 +146,7 @@ export function runClock(state: State): void {
     if (passed >= wait) {
       last = now;
       // A tab that slept does not leap.
-      state.seek(state.time.value + Math.min(passed, 0.5) * state.speed.value);
+      state.move(state.time.value + Math.min(passed, 0.5) * state.speed.value);
       if (state.time.value >= state.end.value) state.playing.value = false;
     }
     changeNext(tick);

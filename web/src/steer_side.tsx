@@ -64,7 +64,7 @@ export function ZonePlot(props: { s: SteerState; zone: ZoneWatch }) {
     const { data, names } = makeCurves(law, latest.current, which);
     const turn = 180 / Math.PI;
     const visible = (): [number, number][] => {
-      const t = s.view.peek()?.state.time.value ?? Infinity;
+      const t = s.view.peek()?.state.timeSlowly.peek() ?? Infinity;
       const out: [number, number][] = [];
       for (const p of latest.current) {
         const r = p[column + 2], m = p[column];
@@ -74,7 +74,7 @@ export function ZonePlot(props: { s: SteerState; zone: ZoneWatch }) {
     };
     // The curve for the normal force that is nearest to the present one stands out.
     const nearest = (): number => {
-      const t = s.view.peek()?.state.time.value ?? Infinity;
+      const t = s.view.peek()?.state.timeSlowly.peek() ?? Infinity;
       const now = [...latest.current].reverse().find((p) => (p[0] as number) <= t + 1e-9)?.[1];
       if (now === null || now === undefined || law === undefined) return -1;
       return law.normal_force.reduce((best, f, k) => (Math.abs(f - now) < Math.abs((law.normal_force[best] as number) - now) ? k : best), 0);
@@ -137,7 +137,7 @@ export function ZonePlot(props: { s: SteerState; zone: ZoneWatch }) {
     };
   }, [zone.zone, law, which, s.colouring.value]);
 
-  const time = s.view.value?.state.time.value;
+  const time = s.view.value?.state.timeSlowly.value;
   void s.view.value?.state.grownSlowly.value;
   useEffect(() => {
     plotRef.current?.redraw(true, true);

@@ -337,7 +337,7 @@ export function makeSteerState(address: string) {
     for (const run of runs.values()) run.flush();
     const run = view.peek();
     if (run === null) return;
-    if (following.peek()) run.state.seek(run.last);
+    if (following.peek()) run.state.move(run.last);
     else if (wanted !== undefined && run.last >= wanted) {
       run.state.seek(wanted);
       wanted = undefined;

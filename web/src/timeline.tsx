@@ -98,7 +98,7 @@ export function IconButton(props: { icon: keyof typeof icons; label: string; key
   );
 }
 
-// Slider and clock follow the time on their own, so that the rest stands still while playing.
+// Slider and clock follow the time on their own and slowly, so that the rest stands still while playing.
 export function Slider(props: { state: State; onSeek: (time: number) => void }) {
   const { state } = props;
   return (
@@ -106,11 +106,11 @@ export function Slider(props: { state: State; onSeek: (time: number) => void }) 
       type="range"
       data-test="slider"
       aria-label="Time"
-      aria-valuetext={formatTime(state.time.value)}
+      aria-valuetext={formatTime(state.timeSlowly.value)}
       min={state.begin}
       max={state.span.value}
       step="any"
-      value={state.time.value}
+      value={state.timeSlowly.value}
       disabled={state.run.time.length < 2}
       onInput={(e) => props.onSeek(e.currentTarget.valueAsNumber)}
     />
@@ -119,10 +119,11 @@ export function Slider(props: { state: State; onSeek: (time: number) => void }) 
 
 export function Clock(props: { state: State }) {
   const { state } = props;
+  void state.grownSlowly.value;
   const frames = state.run.time.length;
   return (
     <span class="clock">
-      <strong data-test="time">{formatTime(state.time.value)}</strong> of {formatTime(state.end.value)}
+      <strong data-test="time">{formatTime(state.timeSlowly.value)}</strong> of {formatTime(state.end.peek())}
       <span class="quiet">
         {" "}
         · frame {frames === 0 ? 0 : state.frame.value + 1} of {frames}
