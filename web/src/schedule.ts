@@ -4,24 +4,32 @@
 const changes = new Set<(now: number) => void>();
 const drawings = new Set<(now: number) => void>();
 let due = false;
-let asked = 0;
-let shown = 0; // what is drawn now was asked for then
+let drawn = -Infinity; // [ms]
+let isOffered = true;
+let gap = 0;
 
-/// When the first of what is being done was asked for [ms].
-export const askedAt = (): number => shown;
+/// From the last drawing to when the screen would have taken the next picture, whether or not there was one [ms].
+export const lastGap = (): number => gap;
 
 function ask(): void {
   if (due) return;
   due = true;
-  asked = performance.now();
   requestAnimationFrame((now) => {
-    shown = asked;
+    const begin = performance.now();
+    if (!isOffered) gap = begin - drawn;
+    isOffered = true;
     try {
       take(changes, now);
     } finally {
       due = false; // what a drawing asks for is of the next picture
       if (changes.size > 0) ask(); // and so is what a change asks to change
-      take(drawings, now);
+      if (drawings.size > 0) {
+        drawn = begin;
+        isOffered = false;
+        take(drawings, now);
+        // to be told when the screen is ready for the next one; behind the messages that wait, which may change it
+        setTimeout(ask, 0);
+      }
     }
   });
 }

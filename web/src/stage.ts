@@ -3,7 +3,7 @@ import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { screenSpace } from "./colour";
 import type { Triple } from "./data";
-import { askedAt } from "./schedule";
+import { lastGap } from "./schedule";
 import type { SceneLike } from "./scene_view";
 import { darkTheme, lightTheme, type Theme } from "./site";
 
@@ -185,7 +185,6 @@ export class Stage implements SceneLike {
   render(): void {
     if (this.options.adaptive && !this.held) this.adapt();
     this.draw();
-    this.lastDone = performance.now();
   }
 
   draw(): void {
@@ -212,8 +211,8 @@ export class Stage implements SceneLike {
     const now = performance.now();
     const interval = now - this.lastRender;
     this.lastRender = now;
-    // A picture that comes a second later begins another motion. Time in which none was asked for is not the renderer's.
-    if (interval < 1000) this.meanInterval += 0.2 * (interval - Math.max(0, askedAt() - this.lastDone) - this.meanInterval);
+    // A picture that comes a second later begins another motion.
+    if (interval < 1000) this.meanInterval += 0.2 * (lastGap() - this.meanInterval);
     ++this.since;
     if (this.meanInterval > slow && this.ratio > leastRatio && this.since >= settled) {
       // More pixels were too many: the next try comes later.
@@ -245,7 +244,6 @@ export class Stage implements SceneLike {
     this.since = 0;
     this.setRatio(ratio);
   }
-  private lastDone = 0;
   private since = 0; // pictures since the ratio changed
   private triedAt = -Infinity; // when more pixels were tried
   private nextTry = 0;
