@@ -15,13 +15,14 @@ const faces: [string, [number, number, number, number]][] = [
   ["-y", [4, 0, 1, 5]], ["+z", [7, 6, 4, 5]], ["-z", [2, 3, 1, 0]],
 ];
 
-/// Its vertices: which corner of the box each is, which face it shades, its place on the face.
+/// Its vertices: which corner of the box each is, which face it shades, its place on the face; six of them for each face.
 interface Shape {
   corner: number[];
   face: number[];
   uv: number[];
   index: number[];
 }
+const perFace = 6;
 
 /// A box of eight corners. Each face is shaded by the corner that its two triangles end with (WebGL takes `flat` values
 /// from there), which carries the face's direction: a third of the vertices of a box with four for each face.
@@ -61,7 +62,7 @@ function makeGeometry(count: number, one: Shape): THREE.BufferGeometry {
     for (let i = 0; i < count; ++i) uv.set(one.uv, i * one.uv.length);
     geometry.setAttribute("uv", new THREE.BufferAttribute(uv, 2));
   }
-  geometry.setIndex(new THREE.BufferAttribute(index, 1));
+  geometry.setIndex(new THREE.BufferAttribute(index, 1).setUsage(THREE.DynamicDrawUsage));
   return geometry;
 }
 
@@ -101,6 +102,43 @@ export class Boxes {
     this.colours = new Float32Array(3 * count);
     this.mesh = new THREE.Mesh(makeGeometry(count, this.shape), makeMaterial(many));
     this.mesh.frustumCulled = false;
+    this.mesh.onBeforeRender = (_, __, camera) => this.chooseFaces(camera);
+  }
+
+  private readonly eye = new THREE.Vector3(NaN, NaN, NaN); // that the faces were chosen for; NaN: none
+  private readonly seenFrom = new THREE.Vector3();
+  private hasAllFaces = true;
+
+  /// Leaves out the faces that look away from the camera: in software each triangle costs more than to find that out here.
+  /// All are drawn where a section opens the boxes.
+  private chooseFaces(camera: THREE.Camera): void {
+    const isOpen = this.mesh.material.side === THREE.DoubleSide;
+    this.seenFrom.setFromMatrixPosition(camera.matrixWorld);
+    if (isOpen ? this.hasAllFaces : this.seenFrom.equals(this.eye)) return;
+    this.eye.copy(isOpen ? this.eye.setScalar(NaN) : this.seenFrom);
+    this.hasAllFaces = isOpen;
+    const { x, y, z } = this.seenFrom;
+    const attribute = this.mesh.geometry.getIndex() as THREE.BufferAttribute;
+    const index = attribute.array as Uint32Array;
+    const one = this.shape.index, n = this.shape.corner.length, v = this.values;
+    let count = 0;
+    const add = (face: number, first: number): void => {
+      for (let k = perFace * face; k < perFace * (face + 1); ++k) index[count++] = first + (one[k] as number);
+    };
+    for (let box = 0; box < this.count; ++box) {
+      const at = perBox * box, first = n * box;
+      const dx = x - (v[at + 3] as number), dy = y - (v[at + 7] as number), dz = z - (v[at + 11] as number);
+      for (let axis = 0; axis < 3; ++axis) {
+        const ax = v[at + axis] as number, ay = v[at + 4 + axis] as number, az = v[at + 8 + axis] as number;
+        const along = ax * dx + ay * dy + az * dz, half = 0.5 * (ax * ax + ay * ay + az * az);
+        if (isOpen || along > half) add(2 * axis, first);
+        if (isOpen || along < -half) add(2 * axis + 1, first);
+      }
+    }
+    attribute.clearUpdateRanges();
+    attribute.addUpdateRange(0, count);
+    attribute.needsUpdate = true;
+    this.mesh.geometry.setDrawRange(0, count);
   }
 
   /// `matrix` takes the cube of edge 1 around the origin to the box.
@@ -155,6 +193,7 @@ export class Boxes {
     }
     position.needsUpdate = true;
     tint.needsUpdate = true;
+    this.eye.setScalar(NaN);
   }
 
   /// Box that a ray meets first, -1 if there is none; what lies behind a plane is not met.
