@@ -53,15 +53,14 @@ function makeCourse(second) {
     out.writeUInt32LE(B, 32);
     out.writeUInt32LE(Z, 36);
     out.writeUInt32LE(V, 40);
-    let at = 48;
-    const put = (value) => (at = out.writeFloatLE(value, at));
+    const values = new Float32Array(out.buffer, out.byteOffset + 48, 7 * B + V + Z);
     for (let b = 0; b < B; ++b) {
-      for (let k = 0; k < 3; ++k) put(position[3 * (row * B + b) + k]);
-      for (let k = 0; k < 4; ++k) put(orientation[4 * (row * B + b) + k]);
+      for (let k = 0; k < 3; ++k) values[7 * b + k] = position[3 * (row * B + b) + k];
+      for (let k = 0; k < 4; ++k) values[7 * b + 3 + k] = orientation[4 * (row * B + b) + k];
     }
-    for (const series of data.series) put(series.value[row] ?? NaN);
-    for (let z = 0; z < Z; ++z) put(utilisation[row * Z + z]);
-    state.copy(out, at, row * Z, (row + 1) * Z);
+    data.series.forEach((series, k) => (values[7 * B + k] = series.value[row] ?? NaN));
+    values.set(utilisation.subarray(row * Z, (row + 1) * Z), 7 * B + V);
+    state.copy(out, 48 + 4 * values.length, row * Z, (row + 1) * Z);
     return out;
   };
   const scene = {
@@ -78,7 +77,7 @@ function makeCourse(second) {
 
 class Session {
   constructor(server, id, text, path) {
-    Object.assign(this, { server, id, path, disk: text, text, phase: "paused", seq: 0, log: [], branches: [], cursor: null, speed: null, studies: [], zone: null, broken: [], earlier: null });
+    Object.assign(this, { server, id, path, disk: text, text, phase: "paused", seq: 0, log: [], branches: [], cursor: null, speed: null, studies: [], zone: null, broken: [], earlier: null, toldAt: 0 });
     this.title = /title = "(.*)"/.exec(text)?.[1] ?? "untitled";
     this.fuzzy = !text.includes("crisp");
     this.active = this.addBranch("main", null, 0, 4).id;
@@ -120,6 +119,7 @@ class Session {
     for (const client of this.server.clients) if (client.session === this) client.send(message);
   }
   tellState() {
+    this.toldAt = performance.now();
     const b = this.branch();
     const { time } = makeCourse(b.own.second).data;
     this.tell("state", {
@@ -145,7 +145,7 @@ class Session {
       this.phase = "finished";
       b.ending = { kind: this.server.endingKind, text: this.server.endingKind === "at_rest" ? "All parts are at rest at 9.00 s." : "The plan's duration of 9 s is over; 14 parts are still moving." };
       this.tell("branch", { branch: this.describeBranch(b) });
-    }
+    } else if (performance.now() - this.toldAt < 100) return; // as the server, ten times a second
     this.tellState();
   }
   zonePoint(t) {

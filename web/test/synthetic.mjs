@@ -215,3 +215,27 @@ export async function writePage(data, path) {
   const script = `<script type="application/json" id="topple-data">${text}</script>`;
   await writeFile(path, page.replace("<!--TOPPLE-DATA-->", () => script));
 }
+
+/// The made-up building as often beside itself as it takes, over fewer frames.
+export function makeMany(count) {
+  const frames = count > 2000 ? 150 : 270;
+  const one = makeSynthetic(frames);
+  const B = one.bodies.length, copies = Math.max(1, Math.round(count / B));
+  const floats = (text) => new Float32Array(Uint8Array.from(Buffer.from(text, "base64")).buffer);
+  const p = floats(one.position), q = floats(one.orientation);
+  const N = B * copies;
+  const position = new Float32Array(frames * N * 3), orientation = new Float32Array(frames * N * 4);
+  const side = Math.ceil(Math.sqrt(copies));
+  for (let s = 0; s < frames; ++s)
+    for (let c = 0; c < copies; ++c)
+      for (let b = 0; b < B; ++b) {
+        const from = s * B + b, to = s * N + c * B + b;
+        for (let k = 0; k < 3; ++k) position[3 * to + k] = p[3 * from + k] + (k === 0 ? 16 * (c % side) : k === 1 ? 26 * Math.floor(c / side) : 0);
+        for (let k = 0; k < 4; ++k) orientation[4 * to + k] = q[4 * from + k];
+      }
+  const text = (values) => Buffer.from(values.buffer).toString("base64");
+  return {
+    ...one, bodies: Array.from({ length: N }, (_, i) => ({ ...one.bodies[i % B], name: `${one.bodies[i % B].name}-${Math.floor(i / B)}` })),
+    position: text(position), orientation: text(orientation),
+  };
+}
