@@ -34,6 +34,6 @@ struct ExplicitChunks {
   size_t slots() const { return element_of_slot.size(); }
 };
 
-ExplicitChunks make_chunks(const ExplicitModel&, size_t lanes, size_t elements_a_chunk = 512);
+ExplicitChunks make_chunks(const ExplicitModel&, size_t lanes, size_t elements_a_chunk = 640);
 
 }  // namespace topple::fem

@@ -123,6 +123,8 @@ ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
     flags = static_cast<std::uint8_t>(flags | (support.x ? kernel::kHoldX : 0) | (support.y ? kernel::kHoldY : 0) |
                                       (support.z ? kernel::kHoldZ : 0));
   }
+  for (size_t row = 0; row < N; ++row)
+    if (!(s.rows[8 * row + kernel::kNodeMass] > 0)) s.flags[row] |= kernel::kHoldX | kernel::kHoldY | kernel::kHoldZ;
   for (const NodalForce& f : model.forces) {
     const std::uint32_t row = chunks.row_of_node[static_cast<size_t>(f.node)];
     for (int c = 0; c < 3; ++c) loads[4 * size_t{row} + static_cast<size_t>(c)] += f.force[c];

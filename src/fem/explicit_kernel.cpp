@@ -43,14 +43,18 @@ HWY_INLINE V3 scale(V s, const V3& a) { return {mul(s, a.x), mul(s, a.y), mul(s,
 /// s a + b
 HWY_INLINE V3 fma(V s, const V3& a, const V3& b) { return {fma(s, a.x, b.x), fma(s, a.y, b.y), fma(s, a.z, b.z)}; }
 
+/// Two components of one corner of all lanes.
+struct Pair {
+  V first, second;
+};
 #if HWY_TARGET == HWY_SCALAR
-HWY_INLINE V3 load_corner(const double* HWY_RESTRICT rows, const std::uint16_t* HWY_RESTRICT node) {
+HWY_INLINE Pair load_pair(const double* HWY_RESTRICT rows, const std::uint16_t* HWY_RESTRICT node) {
   const double* at = rows + node[0];
-  return {num(at[0]), num(at[1]), num(at[2])};
+  return {num(at[0]), num(at[1])};
 }
-HWY_INLINE void add_corner(const V3& f, double* HWY_RESTRICT rows, const std::uint16_t* HWY_RESTRICT node) {
+HWY_INLINE void add_corner(V x, V y, V z, double* HWY_RESTRICT rows, const std::uint16_t* HWY_RESTRICT node) {
   double* at = rows + node[0];
-  at[0] += hn::GetLane(f.x), at[1] += hn::GetLane(f.y), at[2] += hn::GetLane(f.z);
+  at[0] += hn::GetLane(x), at[1] += hn::GetLane(y), at[2] += hn::GetLane(z);
 }
 #else
 /// Pairs of doubles of every second lane's node, one a 128-bit block: lanes first, first + 2, ...
@@ -65,13 +69,10 @@ HWY_INLINE hn::Vec<D2> load_pairs(D2 d, const double* HWY_RESTRICT at, const std
     return hn::Combine(d, high, load_pairs(half, at, node));
   }
 }
-
-/// Component vectors of one corner of all lanes, from rows.
-HWY_INLINE V3 load_corner(const double* HWY_RESTRICT rows, const std::uint16_t* HWY_RESTRICT node) {
+HWY_INLINE Pair load_pair(const double* HWY_RESTRICT rows, const std::uint16_t* HWY_RESTRICT node) {
   const D d;
-  const V xy0 = load_pairs(d, rows, node), xy1 = load_pairs(d, rows, node + 1);
-  const V z0 = load_pairs(d, rows + 2, node), z1 = load_pairs(d, rows + 2, node + 1);
-  return {hn::InterleaveLower(d, xy0, xy1), hn::InterleaveUpper(d, xy0, xy1), hn::InterleaveLower(d, z0, z1)};
+  const V even = load_pairs(d, rows, node), odd = load_pairs(d, rows, node + 1);
+  return {hn::InterleaveLower(d, even, odd), hn::InterleaveUpper(d, even, odd)};
 }
 
 /// Adds vectors of x y and z 0 of every second lane, as load_pairs gives them, to rows of forces.
@@ -96,60 +97,63 @@ HWY_INLINE void add_rows(D2 d, hn::Vec<D2> xy0, hn::Vec<D2> z0, hn::Vec<D2> xy1,
              rows, node + kHere / 2);
   }
 }
-HWY_INLINE void add_corner(const V3& f, double* HWY_RESTRICT rows, const std::uint16_t* HWY_RESTRICT node) {
+HWY_INLINE void add_corner(V x, V y, V z, double* HWY_RESTRICT rows, const std::uint16_t* HWY_RESTRICT node) {
   const D d;
-  add_rows(d, hn::InterleaveLower(d, f.x, f.y), hn::InterleaveLower(d, f.z, hn::Zero(d)),
-           hn::InterleaveUpper(d, f.x, f.y), hn::InterleaveUpper(d, f.z, hn::Zero(d)), rows, node);
+  add_rows(d, hn::InterleaveLower(d, x, y), hn::InterleaveLower(d, z, hn::Zero(d)), hn::InterleaveUpper(d, x, y),
+           hn::InterleaveUpper(d, z, hn::Zero(d)), rows, node);
 }
 #endif
+
+/// Sums over the corners of a face ζ = const with the signs of 1 ξ η ξη.
+struct Quad {
+  V one, x, y, xy;
+};
+struct QuadPair {
+  Quad first, second;
+};
+HWY_INLINE Quad transform(V n0, V n1, V n2, V n3) {
+  const V s0 = add(n1, n0), d0 = sub(n1, n0), s1 = add(n2, n3), d1 = sub(n2, n3);
+  return {add(s1, s0), add(d1, d0), sub(s1, s0), sub(d1, d0)};
+}
+HWY_INLINE QuadPair load_face(const double* HWY_RESTRICT rows, const std::uint16_t* HWY_RESTRICT corners) {
+  const Pair n0 = load_pair(rows, corners), n1 = load_pair(rows, corners + kLanes);
+  const Pair n3 = load_pair(rows, corners + 3 * kLanes), n2 = load_pair(rows, corners + 2 * kLanes);
+  return {transform(n0.first, n1.first, n2.first, n3.first), transform(n0.second, n1.second, n2.second, n3.second)};
+}
 
 /// Sums over the corners with the signs of ξ η ζ ηζ ζξ ξη ξηζ: eight times the modal amplitudes (eq. 1).
 struct Modes {
   V a, b, c, d, e, f, g;
 };
-HWY_INLINE Modes transform(V n0, V n1, V n2, V n3, V n4, V n5, V n6, V n7) {
-  const V s0 = add(n1, n0), d0 = sub(n1, n0), s1 = add(n2, n3), d1 = sub(n2, n3);
-  const V s2 = add(n5, n4), d2 = sub(n5, n4), s3 = add(n6, n7), d3 = sub(n6, n7);
-  const V ss0 = add(s1, s0), sd0 = sub(s1, s0), ds0 = add(d1, d0), dd0 = sub(d1, d0);
-  const V ss1 = add(s3, s2), sd1 = sub(s3, s2), ds1 = add(d3, d2), dd1 = sub(d3, d2);
-  return {add(ds1, ds0), add(sd1, sd0), sub(ss1, ss0), sub(sd1, sd0), sub(ds1, ds0), add(dd1, dd0), sub(dd1, dd0)};
-}
-/// The transposed: values at the corners.
-HWY_INLINE void spread(const Modes& m, V* HWY_RESTRICT n) {
-  // along ζ: parts at ζ = -1 (0) and +1 (1) of 1, ξ, η, ξη
-  const V one1 = m.c, one0 = hn::Neg(m.c);
-  const V x0 = sub(m.a, m.e), x1 = add(m.a, m.e), y0 = sub(m.b, m.d), y1 = add(m.b, m.d);
-  const V xy0 = sub(m.f, m.g), xy1 = add(m.f, m.g);
-  const V l0 = sub(one0, y0), u0 = add(one0, y0), lx0 = sub(x0, xy0), ux0 = add(x0, xy0);
-  const V l1 = sub(one1, y1), u1 = add(one1, y1), lx1 = sub(x1, xy1), ux1 = add(x1, xy1);
-  n[0] = sub(l0, lx0), n[1] = add(l0, lx0), n[2] = add(u0, ux0), n[3] = sub(u0, ux0);
-  n[4] = sub(l1, lx1), n[5] = add(l1, lx1), n[6] = add(u1, ux1), n[7] = sub(u1, ux1);
+HWY_INLINE Modes transform(const Quad& low, const Quad& high) {
+  return {add(high.x, low.x), add(high.y, low.y),   sub(high.one, low.one), sub(high.y, low.y),
+          sub(high.x, low.x), add(high.xy, low.xy), sub(high.xy, low.xy)};
 }
 struct Modes3 {
   V3 a, b, c, d, e, f, g;
 };
-HWY_INLINE Modes3 transform(const V3* HWY_RESTRICT n) {
-  const Modes x = transform(n[0].x, n[1].x, n[2].x, n[3].x, n[4].x, n[5].x, n[6].x, n[7].x);
-  const Modes y = transform(n[0].y, n[1].y, n[2].y, n[3].y, n[4].y, n[5].y, n[6].y, n[7].y);
-  const Modes z = transform(n[0].z, n[1].z, n[2].z, n[3].z, n[4].z, n[5].z, n[6].z, n[7].z);
-  return {{x.a, y.a, z.a}, {x.b, y.b, z.b}, {x.c, y.c, z.c}, {x.d, y.d, z.d},
-          {x.e, y.e, z.e}, {x.f, y.f, z.f}, {x.g, y.g, z.g}};
-}
 
 /// Derivatives of the volume by the modes but for factors (eq. 3, 4).
 struct Gradients {
   V3 a, b, c, d, e, f;
   V volume;  // 64 times
 };
+/// a×b + c×d
+HWY_INLINE V3 cross_sum(const V3& a, const V3& b, const V3& c, const V3& d) {
+  return {fnma(c.z, d.y, fma(c.y, d.z, fnma(a.z, b.y, mul(a.y, b.z)))),
+          fnma(c.x, d.z, fma(c.z, d.x, fnma(a.x, b.z, mul(a.z, b.x)))),
+          fnma(c.y, d.x, fma(c.x, d.y, fnma(a.y, b.x, mul(a.x, b.y))))};
+}
 HWY_INLINE Gradients differentiate(const Modes3& m) {
   const V third = num(1.0 / 3);
+  const V3 d = scale(third, m.d), e = scale(third, m.e), f = scale(third, m.f);
   Gradients g;
-  g.a = fma(third, cross(m.f, m.e), cross(m.b, m.c));
-  g.b = fma(third, cross(m.d, m.f), cross(m.c, m.a));
-  g.c = fma(third, cross(m.e, m.d), cross(m.a, m.b));
-  g.d = scale(third, add(cross(m.c, m.e), cross(m.f, m.b)));
-  g.e = scale(third, add(cross(m.d, m.c), cross(m.a, m.f)));
-  g.f = scale(third, add(cross(m.b, m.d), cross(m.e, m.a)));
+  g.a = cross_sum(m.b, m.c, f, m.e);
+  g.b = cross_sum(m.c, m.a, d, m.f);
+  g.c = cross_sum(m.a, m.b, e, m.d);
+  g.d = cross_sum(m.c, e, f, m.b);
+  g.e = cross_sum(d, m.c, m.a, f);
+  g.f = cross_sum(m.b, d, e, m.a);
   g.volume = add(dot(m.a, g.a), dot(m.d, g.d));
   return g;
 }
@@ -175,6 +179,7 @@ HWY_INLINE Yield find_yield(const Law& law, V strain) {
   V c = num(law.compression[0]), cs = num(law.compression_slope[0]);
   for (int k = 1; k < law.points; ++k) {
     const auto past = hn::Ge(strain, num(law.at[k]));
+    if (hn::AllFalse(D(), past)) break;
     t = hn::IfThenElse(past, num(law.tension[k]), t), ts = hn::IfThenElse(past, num(law.tension_slope[k]), ts);
     c = hn::IfThenElse(past, num(law.compression[k]), c);
     cs = hn::IfThenElse(past, num(law.compression_slope[k]), cs);
@@ -191,9 +196,25 @@ struct Amplitudes {
   V bending[6], twist[3], corner[3];
 };
 
+/// Values at the corners of a face of which parts with 1 ξ η ξη are given.
+HWY_INLINE void spread(const Quad& m, V* HWY_RESTRICT n) {
+  const V l = sub(m.one, m.y), u = add(m.one, m.y), lx = sub(m.x, m.xy), ux = add(m.x, m.xy);
+  n[0] = sub(l, lx), n[1] = add(l, lx), n[2] = add(u, ux), n[3] = sub(u, ux);
+}
+HWY_INLINE void add_face(const Quad& x, const Quad& y, const Quad& z, double* HWY_RESTRICT rows,
+                         const std::uint16_t* HWY_RESTRICT corners) {
+  V nx[4], ny[4], nz[4];
+  spread(x, nx), spread(y, ny), spread(z, nz);
+  for (size_t i = 0; i < 4; ++i) add_corner(nx[i], ny[i], nz[i], rows, corners + i * kLanes);
+}
+
+/// Adds the outer product v ⊗ g.
+HWY_INLINE void add_product(const V3& v, const V3& g, Matrix& m) {
+  m.x = fma(v.x, g, m.x), m.y = fma(v.y, g, m.y), m.z = fma(v.z, g, m.z);
+}
+
 /// Everything of a block of elements between the nodes' motion and their forces.
-HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t block, double* HWY_RESTRICT forces,
-                              Sums& sums) {
+HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t block, Sums& sums) {
   const D d;
   const Law& law = job.laws[job.law_of_block[block]];
   const std::uint16_t* HWY_RESTRICT corners = job.corners + block * 8 * kLanes;
@@ -202,24 +223,73 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
 
   // the next block's state on its way
   for (size_t i = 0; i < kElementFields * kLanes; i += 8) hwy::Prefetch(element + kElementFields * kLanes + i);
-  V3 places[8], speeds[8];
-  for (size_t i = 0; i < 8; ++i) {
-    places[i] = load_corner(job.room, corners + i * kLanes);
-    speeds[i] = load_corner(job.room + kSpeed, corners + i * kLanes);
+
+  // places, and paths of the last step (v)
+  Modes3 x, v;
+  {
+    const double* HWY_RESTRICT rows = job.room;
+    const QuadPair low = load_face(rows, corners), high = load_face(rows, corners + 4 * kLanes);
+    const Modes p = transform(low.first, high.first), q = transform(low.second, high.second);
+    x.a.x = p.a, x.b.x = p.b, x.c.x = p.c, x.d.x = p.d, x.e.x = p.e, x.f.x = p.f, x.g.x = p.g;
+    x.a.y = q.a, x.b.y = q.b, x.c.y = q.c, x.d.y = q.d, x.e.y = q.e, x.f.y = q.f, x.g.y = q.g;
   }
-  const Modes3 x = transform(places), v = transform(speeds);
+  {
+    const double* HWY_RESTRICT rows = job.room + 2;
+    const QuadPair low = load_face(rows, corners), high = load_face(rows, corners + 4 * kLanes);
+    const Modes p = transform(low.first, high.first), q = transform(low.second, high.second);
+    x.a.z = p.a, x.b.z = p.b, x.c.z = p.c, x.d.z = p.d, x.e.z = p.e, x.f.z = p.f, x.g.z = p.g;
+    v.a.z = q.a, v.b.z = q.b, v.c.z = q.c, v.d.z = q.d, v.e.z = q.e, v.f.z = q.f, v.g.z = q.g;
+  }
+  {
+    const double* HWY_RESTRICT rows = job.room + 4;
+    const QuadPair low = load_face(rows, corners), high = load_face(rows, corners + 4 * kLanes);
+    const Modes p = transform(low.first, high.first), q = transform(low.second, high.second);
+    v.a.x = p.a, v.b.x = p.b, v.c.x = p.c, v.d.x = p.d, v.e.x = p.e, v.f.x = p.f, v.g.x = p.g;
+    v.a.y = q.a, v.b.y = q.b, v.c.y = q.c, v.d.y = q.d, v.e.y = q.e, v.f.y = q.f, v.g.y = q.g;
+  }
   const Gradients g = differentiate(x);
   const V inverse = hn::Div(num(1), g.volume);
 
   // velocity gradient times the step (eq. 5)
-  const V rate = mul(inverse, num(step.past));
-  const auto row = [&](V va, V vb, V vc, V vd, V ve, V vf) HWY_ATTR {
-    const V3 r = fma(vf, g.f, fma(ve, g.e, fma(vd, g.d, fma(vc, g.c, fma(vb, g.b, scale(va, g.a))))));
-    return scale(rate, r);
-  };
-  const Matrix L{row(v.a.x, v.b.x, v.c.x, v.d.x, v.e.x, v.f.x), row(v.a.y, v.b.y, v.c.y, v.d.y, v.e.y, v.f.y),
-                 row(v.a.z, v.b.z, v.c.z, v.d.z, v.e.z, v.f.z)};
+  Matrix L{scale(v.a.x, g.a), scale(v.a.y, g.a), scale(v.a.z, g.a)};
+  add_product(v.b, g.b, L), add_product(v.c, g.c, L), add_product(v.d, g.d, L);
+  add_product(v.e, g.e, L), add_product(v.f, g.f, L);
+  L = {scale(inverse, L.x), scale(inverse, L.y), scale(inverse, L.z)};
   const V trace = add(add(L.x.x, L.y.y), L.z.z);
+
+  // what varies over the element (eq. 8 to 11)
+  const V length_a = dot(x.a, x.a), length_b = dot(x.b, x.b), length_c = dot(x.c, x.c);
+  const V bc = mul(length_b, length_c);
+  const V all = hn::Div(num(1), mul(length_a, bc));
+  const V ia = mul(all, bc), ib = mul(all, mul(length_c, length_a)), ic = mul(all, mul(length_a, length_b));
+  Amplitudes s;
+  {
+    const auto beyond = [&](const V3& vm, const V3& xm) HWY_ATTR {
+      const auto component = [&](V motion, const V3& l)
+                                 HWY_ATTR { return fnma(l.z, xm.z, fnma(l.y, xm.y, fnma(l.x, xm.x, motion))); };
+      return V3{component(vm.x, L.x), component(vm.y, L.y), component(vm.z, L.z)};
+    };
+    const V e = num(law.bending), enu = num(law.bending * law.nu), mu = num(law.mu), E = num(law.E);
+    const V3 q1 = beyond(v.d, x.d);
+    const V x1 = dot(x.a, q1), y1 = mul(ib, dot(x.b, q1)), z1 = mul(ic, dot(x.c, q1));
+    const V3 q2 = beyond(v.e, x.e);
+    const V x2 = mul(ia, dot(x.a, q2)), y2 = dot(x.b, q2), z2 = mul(ic, dot(x.c, q2));
+    s.bending[0] = fma(e, x2, fma(enu, y1, load_field(element, kBending)));
+    s.bending[1] = fma(e, y1, fma(enu, x2, load_field(element, kBending + 1)));
+    s.twist[0] = fma(mu, add(x1, y2), load_field(element, kTwist));
+    const V3 q3 = beyond(v.f, x.f);
+    const V x3 = mul(ia, dot(x.a, q3)), y3 = mul(ib, dot(x.b, q3)), z3 = dot(x.c, q3);
+    s.bending[2] = fma(e, x3, fma(enu, z1, load_field(element, kBending + 2)));
+    s.bending[3] = fma(e, z1, fma(enu, x3, load_field(element, kBending + 3)));
+    s.twist[1] = fma(mu, add(x1, z3), load_field(element, kTwist + 1));
+    s.bending[4] = fma(e, y3, fma(enu, z2, load_field(element, kBending + 4)));
+    s.bending[5] = fma(e, z2, fma(enu, y3, load_field(element, kBending + 5)));
+    s.twist[2] = fma(mu, add(y2, z3), load_field(element, kTwist + 2));
+    const V3 q4 = beyond(v.g, x.g);
+    s.corner[0] = fma(mul(E, ia), dot(x.a, q4), load_field(element, kCorner));
+    s.corner[1] = fma(mul(E, ib), dot(x.b, q4), load_field(element, kCorner + 1));
+    s.corner[2] = fma(mul(E, ic), dot(x.c, q4), load_field(element, kCorner + 2));
+  }
 
   // mean stress: turned with the element (Jaumann), then elastic (eq. 7)
   V sxx = load_field(element, kStress), syy = load_field(element, kStress + 1), szz = load_field(element, kStress + 2);
@@ -232,63 +302,21 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
     const V txy = fma(wxy, sub(syy, sxx), fma(wxz, syz, mul(wyz, szx)));
     const V txz = fma(wxz, sub(szz, sxx), fms(wxy, syz, mul(wyz, sxy)));
     const V tyz = fnma(wxz, sxy, fnma(wxy, szx, mul(wyz, sub(szz, syy))));
-    const V ab = add(a, b), ca = sub(c, a), bc = add(b, c);
-    const V pressure = mul(num(law.lambda), trace), mu2 = num(2 * law.mu), mu = num(law.mu);
-    sxx = add(sxx, fma(mu2, L.x.x, add(pressure, add(ab, ab))));
-    syy = add(syy, fma(mu2, L.y.y, add(pressure, add(ca, ca))));
-    szz = add(szz, fma(mu2, L.z.z, sub(pressure, add(bc, bc))));
+    const V ab = add(a, b), ca = sub(c, a), bc2 = add(b, c);
+    const V pressure = mul(num(law.lambda), trace), mu2 = num(2 * law.mu), mu = num(law.mu), two = num(2);
+    sxx = add(sxx, fma(mu2, L.x.x, fma(two, ab, pressure)));
+    syy = add(syy, fma(mu2, L.y.y, fma(two, ca, pressure)));
+    szz = add(szz, fma(mu2, L.z.z, fnma(two, bc2, pressure)));
     sxy = add(sxy, fma(mu, add(L.x.y, L.y.x), txy));
     syz = add(syz, fma(mu, add(L.y.z, L.z.y), tyz));
     szx = add(szx, fma(mu, add(L.x.z, L.z.x), txz));
   }
-
-  // what varies over the element (eq. 8 to 11)
-  const V length_a = dot(x.a, x.a), length_b = dot(x.b, x.b), length_c = dot(x.c, x.c);
-  const V all = hn::Div(num(1), mul(length_a, mul(length_b, length_c)));
-  const V ia = mul(all, mul(length_b, length_c)), ib = mul(all, mul(length_c, length_a)),
-          ic = mul(all, mul(length_a, length_b));
-  Amplitudes s;
-  {
-    const V h = num(step.past);
-    const auto beyond = [&](const V3& vm, const V3& xm) HWY_ATTR {
-      const V3 linear = times(L, xm);
-      return V3{fms(h, vm.x, linear.x), fms(h, vm.y, linear.y), fms(h, vm.z, linear.z)};
-    };
-    const V3 q1 = beyond(v.d, x.d), q2 = beyond(v.e, x.e), q3 = beyond(v.f, x.f), q4 = beyond(v.g, x.g);
-    const V3 A = scale(ia, x.a), B = scale(ib, x.b), C = scale(ic, x.c);
-    const V e = num(law.bending), enu = num(law.bending * law.nu), mu = num(law.mu), E = num(law.E);
-    const V x2 = dot(A, q2), x3 = dot(A, q3), y1 = dot(B, q1), y3 = dot(B, q3), z1 = dot(C, q1), z2 = dot(C, q2);
-    s.bending[0] = fma(e, x2, fma(enu, y1, load_field(element, kBending)));
-    s.bending[1] = fma(e, y1, fma(enu, x2, load_field(element, kBending + 1)));
-    s.bending[2] = fma(e, x3, fma(enu, z1, load_field(element, kBending + 2)));
-    s.bending[3] = fma(e, z1, fma(enu, x3, load_field(element, kBending + 3)));
-    s.bending[4] = fma(e, y3, fma(enu, z2, load_field(element, kBending + 4)));
-    s.bending[5] = fma(e, z2, fma(enu, y3, load_field(element, kBending + 5)));
-    const V x1 = dot(x.a, q1), y2 = dot(x.b, q2), z3 = dot(x.c, q3);
-    s.twist[0] = fma(mu, add(x1, y2), load_field(element, kTwist));
-    s.twist[1] = fma(mu, add(x1, z3), load_field(element, kTwist + 1));
-    s.twist[2] = fma(mu, add(y2, z3), load_field(element, kTwist + 2));
-    s.corner[0] = fma(E, dot(A, q4), load_field(element, kCorner));
-    s.corner[1] = fma(E, dot(B, q4), load_field(element, kCorner + 1));
-    s.corner[2] = fma(E, dot(C, q4), load_field(element, kCorner + 2));
-  }
-  const V iab = mul(ia, ib), iac = mul(ia, ic), ibc = mul(ib, ic);
   const V mass = load_field(element, kMass);
-  const V volume = mul(num(1.0 / 64), g.volume);
   const auto live = hn::Gt(mass, zero);
 
   if (law.points > 0) {
     V strain = load_field(element, kStrain);
-    Yield y;
-    V pure;  // bending that a section without normal force bears, over 1.5 elastic stresses (eq. 14)
-    if (hn::AllTrue(d, hn::Eq(strain, zero))) {
-      const double t = law.tension[0], c = law.compression[0];
-      y = {num(t), num(law.tension_slope[0]), num(c), num(law.compression_slope[0])};
-      pure = num(2 / 1.5 * t * c / (t + c));
-    } else {
-      y = find_yield(law, strain);
-      pure = hn::Div(mul(num(2 / 1.5), mul(y.tension, y.compression)), add(y.tension, y.compression));
-    }
+    const Yield y = find_yield(law, strain);
     V mean = mul(num(1.0 / 3), add(sxx, add(syy, szz)));
     const V dx = sub(sxx, mean), dy = sub(syy, mean), dz = sub(szz, mean);
     const V q2 =
@@ -296,23 +324,30 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
     // share of compression (eq. 12)
     const V w = hn::Min(num(1), hn::Max(zero, mul(num(law.per_pressure), sub(num(-law.least_pressure), mean))));
     const V limit = fma(sub(y.compression, y.tension), w, y.tension);
-    V h2 = zero;
-    for (int k = 0; k < 6; k += 2) {
+    // bending that a section without normal force bears, over 1.5 elastic stresses (eq. 14): product over sum
+    const V sum = add(y.tension, y.compression), product = mul(num(2 / 1.5), mul(y.tension, y.compression));
+    const V iab = mul(ia, ib), iac = mul(ia, ic), ibc = mul(ib, ic);
+    V h2 = mul(s.bending[1], s.bending[1]);
+    h2 = fma(s.bending[0], sub(s.bending[0], s.bending[1]), h2);
+    for (int k = 2; k < 6; k += 2) {
       const V a = s.bending[k], b = s.bending[k + 1];
-      h2 = add(h2, fma(a, sub(a, b), mul(b, b)));
+      h2 = fma(a, sub(a, b), fma(b, b, h2));
     }
     const V t2 = fma(mul(s.twist[0], s.twist[0]), iab,
                      fma(mul(s.twist[1], s.twist[1]), iac, mul(mul(s.twist[2], s.twist[2]), ibc)));
     const V corner2 = fma(s.corner[0], s.corner[0], fma(s.corner[1], s.corner[1], mul(s.corner[2], s.corner[2])));
     h2 = fma(num(3), t2, fma(num(1.0 / 3), corner2, h2));
-    const V top = mul(num(law.cutoff), y.tension), limit2 = mul(limit, limit);
+    const V top = mul(num(law.cutoff), y.tension);
     // a bound of what eq. 14 says, without roots
-    const V bent2_limit2 = mul(h2, mul(pure, pure));
-    const auto may_flow = hn::Gt(mul(num(1.2886751345948130), fma(q2, limit2, bent2_limit2)), mul(limit2, limit2));
+    const V scaled = mul(limit, sum), scaled2 = mul(scaled, scaled);
+    const auto may_flow = hn::Gt(mul(num(1.2886751345948130), fma(q2, scaled2, mul(h2, mul(product, product)))),
+                                 mul(mul(limit, limit), scaled2));
     const auto tears = hn::Gt(mean, top);
     if (HWY_UNLIKELY(!hn::AllFalse(d, hn::And(live, hn::Or(may_flow, tears))))) {
-      const V bent2 = hn::Div(bent2_limit2, limit2);
       // mean stress and what varies come back together, the more so the more they are of one kind (eq. 13, 14)
+      const V pure = hn::Div(product, scaled);
+      const V slope = fma(sub(y.compression_slope, y.tension_slope), w, y.tension_slope);
+      const V mu3 = num(3 * law.mu), per_rate = hn::Div(num(1), add(mu3, slope));
       const auto along = [&](const V3& u) HWY_ATTR {
         return V3{fma(dx, u.x, fma(sxy, u.y, mul(szx, u.z))), fma(sxy, u.x, fma(dy, u.y, mul(syz, u.z))),
                   fma(szx, u.x, fma(syz, u.y, mul(dz, u.z)))};
@@ -323,13 +358,12 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
       const V k1 = fma(daa, s.bending[0], fma(dbb, s.bending[1], mul(two, mul(mul(iab, dot(x.a, db)), s.twist[0]))));
       const V k2 = fma(daa, s.bending[2], fma(dcc, s.bending[3], mul(two, mul(mul(iac, dot(x.a, dc)), s.twist[1]))));
       const V k3 = fma(dbb, s.bending[4], fma(dcc, s.bending[5], mul(two, mul(mul(ibc, dot(x.b, dc)), s.twist[2]))));
-      const V alike = mul(num(1.5), hn::Sqrt(fma(k1, k1, fma(k2, k2, mul(k3, k3)))));
-      const V common = hn::Div(mul(alike, pure), limit);
-      const V q = hn::Sqrt(hn::Max(fma(num(0.57735026918962576), common, add(q2, bent2)), num(1e-300)));
-      const V slope = fma(sub(y.compression_slope, y.tension_slope), w, y.tension_slope);
-      const V mu3 = num(3 * law.mu);
-      const V flow = hn::Max(zero, hn::Div(sub(q, limit), add(mu3, slope)));
-      const V keep = fnma(mu3, hn::Div(flow, hn::Max(q, num(1e-300))), num(1));
+      const V alike = hn::Sqrt(fma(k1, k1, fma(k2, k2, mul(k3, k3))));
+      // 1.5 over the root of 3
+      const V common = mul(num(0.86602540378443865), mul(alike, pure));
+      const V q = hn::Sqrt(hn::Max(fma(mul(h2, pure), pure, add(q2, common)), num(1e-300)));
+      const V flow = hn::Max(zero, mul(sub(q, limit), per_rate));
+      const V keep = fnma(mu3, hn::Div(flow, q), num(1));
       const V part = mul(keep, sub(num(1), keep));
       const V opening = hn::Max(zero, hn::Div(sub(mean, top), num(law.bulk)));
       mean = hn::Min(mean, top);
@@ -338,17 +372,17 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
       // an infinite cutoff leaves no opening, but infinity times nothing
       const V torn = hn::IfThenElseZero(tears, mul(hn::Min(top, num(1e300)), opening));
       const V spent = fma(mul(part, q2), num(1 / (3 * law.mu)), torn);
-      sums.mean = add(sums.mean, hn::IfThenElseZero(live, mul(volume, spent)));
+      const V volume = hn::IfThenElseZero(live, mul(num(1.0 / 64), g.volume)), weight = mul(volume, part);
+      sums.mean = fma(volume, spent, sums.mean);
       V stored = zero;  // three times twice the energy over the volume
       for (int k = 0; k < 6; k += 2) {
         const V a = s.bending[k], b = s.bending[k + 1];
-        stored = add(stored, fnma(mul(num(2 * law.nu), a), b, fma(a, a, mul(b, b))));
+        stored = fma(a, fnma(num(2 * law.nu), b, a), fma(b, b, stored));
       }
       const V corner_energy = mul(num(1.0 / (9 * law.E)), corner2);
       stored = fma(num(1.0 / (3 * law.E)), stored, fma(num(1.0 / (3 * law.mu)), t2, corner_energy));
-      const V weight = mul(volume, part);
-      sums.varying = add(sums.varying, hn::IfThenElseZero(live, mul(weight, stored)));
-      sums.corner = add(sums.corner, hn::IfThenElseZero(live, mul(weight, corner_energy)));
+      sums.varying = fma(weight, stored, sums.varying);
+      sums.corner = fma(weight, corner_energy, sums.corner);
       for (V& a : s.bending) a = mul(a, keep);
       for (V& a : s.twist) a = mul(a, keep);
       for (V& a : s.corner) a = mul(a, keep);
@@ -382,6 +416,13 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
     }
   }
 
+  if (HWY_UNLIKELY(job.live[block] != (1U << kLanes) - 1)) {
+    const auto keep_live = [&](V& x1) HWY_ATTR { x1 = hn::IfThenElseZero(live, x1); };
+    keep_live(sxx), keep_live(syy), keep_live(szz), keep_live(sxy), keep_live(syz), keep_live(szx);
+    for (V& a : s.bending) keep_live(a);
+    for (V& a : s.twist) keep_live(a);
+    for (V& a : s.corner) keep_live(a);
+  }
   store_field(sxx, element, kStress), store_field(syy, element, kStress + 1), store_field(szz, element, kStress + 2);
   store_field(sxy, element, kStress + 3), store_field(syz, element, kStress + 4);
   store_field(szx, element, kStress + 5);
@@ -391,54 +432,56 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
 
   // bulk viscosity of a closing element (eq. 15)
   {
-    const V closing = hn::Max(zero, mul(num(-1 / step.h), trace));
-    const V length = load_field(element, kLength);
-    const V pressure =
-        mul(mul(mul(num(64), mul(mass, inverse)), mul(length, closing)),
-            fma(num(step.quadratic * step.quadratic), mul(length, closing), num(step.linear * law.speed)));
-    const V both = mul(num(-0.5), add(pressure, load_field(element, kViscous)));
+    const V closing = mul(load_field(element, kLength), hn::Max(zero, mul(num(-1 / step.h), trace)));
+    const V pressure = mul(mul(mul(num(64), mul(mass, inverse)), closing),
+                           fma(num(step.quadratic * step.quadratic), closing, num(step.linear * law.speed)));
+    const V both = mul(add(pressure, load_field(element, kViscous)), mul(trace, g.volume));
     store_field(pressure, element, kViscous);
-    sums.viscous = fma(mul(both, trace), volume, sums.viscous);
+    sums.viscous = fma(num(-0.5 / 64), both, sums.viscous);
     sxx = sub(sxx, pressure), syy = sub(syy, pressure), szz = sub(szz, pressure);
   }
 
-  // forces of the modes (eq. 6, 9): 64 times
-  V third_volume = mul(num(-1.0 / 3), g.volume);
-  if (HWY_UNLIKELY(job.live[block] != (1U << kLanes) - 1)) {
-    third_volume = hn::IfThenElseZero(live, third_volume);
-    sxx = hn::IfThenElseZero(live, sxx), syy = hn::IfThenElseZero(live, syy), szz = hn::IfThenElseZero(live, szz);
-    sxy = hn::IfThenElseZero(live, sxy), syz = hn::IfThenElseZero(live, syz), szx = hn::IfThenElseZero(live, szx);
-  }
-  const V n1x = fma(s.twist[0], iab, mul(s.twist[1], iac)), n2y = fma(s.twist[0], iab, mul(s.twist[2], ibc)),
-          n3z = fma(s.twist[1], iac, mul(s.twist[2], ibc));
-  const V3 A = scale(third_volume, x.a), B = scale(third_volume, x.b), C = scale(third_volume, x.c);
+  // forces of the modes (eq. 6, 9), against the stress; the linear part of the modes goes to the mean one
+  const V part_volume = mul(num(-1.0 / 192), g.volume), share = num(-1.0 / 64);
+  const V3 A = scale(mul(part_volume, ia), x.a), B = scale(mul(part_volume, ib), x.b),
+           C = scale(mul(part_volume, ic), x.c);
   const auto combine = [&](V a, V b, V c) HWY_ATTR { return fma(c, C, fma(b, B, scale(a, A))); };
-  V3 p1 = combine(n1x, mul(s.bending[1], ib), mul(s.bending[3], ic));
-  V3 p2 = combine(mul(s.bending[0], ia), n2y, mul(s.bending[5], ic));
-  V3 p3 = combine(mul(s.bending[2], ia), mul(s.bending[4], ib), n3z);
+  V3 p1 = combine(fma(s.twist[0], ib, mul(s.twist[1], ic)), s.bending[1], s.bending[3]);
+  V3 p2 = combine(s.bending[0], fma(s.twist[0], ia, mul(s.twist[2], ic)), s.bending[5]);
+  V3 p3 = combine(s.bending[2], s.bending[4], fma(s.twist[1], ia, mul(s.twist[2], ib)));
   const V third = num(1.0 / 3);
-  const V3 p4 =
-      combine(mul(third, mul(s.corner[0], ia)), mul(third, mul(s.corner[1], ib)), mul(third, mul(s.corner[2], ic)));
-  // forces are against the stress; the linear part of the modes goes to the mean one
-  const auto effective = [&](V sx, V sy, V sz, V a, V b, V c, V e) HWY_ATTR {
-    const V3 moved = fma(e, x.g, fma(c, x.f, fma(b, x.e, scale(a, x.d))));
-    const V3 back = scale(inverse, moved);
-    return V3{hn::Neg(add(sx, back.x)), hn::Neg(add(sy, back.y)), hn::Neg(add(sz, back.z))};
-  };
-  const Matrix t{effective(sxx, sxy, szx, p1.x, p2.x, p3.x, p4.x), effective(sxy, syy, syz, p1.y, p2.y, p3.y, p4.y),
-                 effective(szx, syz, szz, p1.z, p2.z, p3.z, p4.z)};
+  const V3 p4 = combine(mul(third, s.corner[0]), mul(third, s.corner[1]), mul(third, s.corner[2]));
+  Matrix t{scale(p1.x, x.d), scale(p1.y, x.d), scale(p1.z, x.d)};
+  add_product(p2, x.e, t), add_product(p3, x.f, t), add_product(p4, x.g, t);
+  {
+    const V txx = mul(share, sxx), tyy = mul(share, syy), tzz = mul(share, szz);
+    const V txy = mul(share, sxy), tyz = mul(share, syz), tzx = mul(share, szx);
+    t.x = {fnma(inverse, t.x.x, txx), fnma(inverse, t.x.y, txy), fnma(inverse, t.x.z, tzx)};
+    t.y = {fnma(inverse, t.y.x, txy), fnma(inverse, t.y.y, tyy), fnma(inverse, t.y.z, tyz)};
+    t.z = {fnma(inverse, t.z.x, tzx), fnma(inverse, t.z.y, tyz), fnma(inverse, t.z.z, tzz)};
+  }
   const V3 fa = times(t, g.a), fb = times(t, g.b), fc = times(t, g.c);
-  p1 = add(p1, times(t, g.d)), p2 = add(p2, times(t, g.e)), p3 = add(p3, times(t, g.f));
-  const V share = num(1.0 / 64);
-  V nx[8], ny[8], nz[8];
-  const auto modes = [&](V a, V b, V c, V dd, V e, V f, V gg) HWY_ATTR {
-    return Modes{mul(share, a), mul(share, b), mul(share, c), mul(share, dd),
-                 mul(share, e), mul(share, f), mul(share, gg)};
+  const auto times_add = [&](const V3& u, const V3& to) HWY_ATTR {
+    const auto row = [&](const V3& r, V start) HWY_ATTR { return fma(r.z, u.z, fma(r.y, u.y, fma(r.x, u.x, start))); };
+    return V3{row(t.x, to.x), row(t.y, to.y), row(t.z, to.z)};
   };
-  spread(modes(fa.x, fb.x, fc.x, p1.x, p2.x, p3.x, p4.x), nx);
-  spread(modes(fa.y, fb.y, fc.y, p1.y, p2.y, p3.y, p4.y), ny);
-  spread(modes(fa.z, fb.z, fc.z, p1.z, p2.z, p3.z, p4.z), nz);
-  for (size_t i = 0; i < 8; ++i) add_corner({nx[i], ny[i], nz[i]}, forces, corners + i * kLanes);
+  p1 = times_add(g.d, p1), p2 = times_add(g.e, p2), p3 = times_add(g.f, p3);
+  double* HWY_RESTRICT forces = job.room + kRoomForce;
+  // corners of the face ζ = -1, then +1: parts of 1 ξ η ξη there
+  {
+    const auto parts = [&](V c, V b, V d1, V a, V e, V f, V g4) HWY_ATTR {
+      return Quad{hn::Neg(c), sub(a, e), sub(b, d1), sub(f, g4)};
+    };
+    add_face(parts(fc.x, fb.x, p1.x, fa.x, p2.x, p3.x, p4.x), parts(fc.y, fb.y, p1.y, fa.y, p2.y, p3.y, p4.y),
+             parts(fc.z, fb.z, p1.z, fa.z, p2.z, p3.z, p4.z), forces, corners);
+  }
+  {
+    const auto parts = [&](V c, V b, V d1, V a, V e, V f, V g4) HWY_ATTR {
+      return Quad{c, add(a, e), add(b, d1), add(f, g4)};
+    };
+    add_face(parts(fc.x, fb.x, p1.x, fa.x, p2.x, p3.x, p4.x), parts(fc.y, fb.y, p1.y, fa.y, p2.y, p3.y, p4.y),
+             parts(fc.z, fb.z, p1.z, fa.z, p2.z, p3.z, p4.z), forces, corners + 4 * kLanes);
+  }
 }
 
 /// Rows are read in vectors of up to four.
@@ -459,88 +502,155 @@ HWY_INLINE Motion make_motion(const StepJob& step) {
   return m;
 }
 
-/// Motion of one node; `force` has 4 entries, the last 0. Returns whether it is below a ground.
-HWY_INLINE bool move_node(const StepJob& step, const Motion& motion, double* HWY_RESTRICT node,
-                          const double* HWY_RESTRICT force, std::uint8_t flags, const double* HWY_RESTRICT push) {
+/// New place of one node that nothing holds or pushes; `force` has 4 entries, the last 0.
+HWY_INLINE void move_free(const Motion& motion, double* HWY_RESTRICT node, const double* HWY_RESTRICT force) {
   const Row d;
-  const double inverse = node[kInverseMass];
-  if (HWY_UNLIKELY(!(inverse > 0))) return false;
-  const auto kick = hn::Set(d, motion.kick * inverse);
+  const auto kick = hn::Set(d, motion.kick * node[kInverseMass]);
+  for (size_t c = 0; c < 4; c += kRowLanes) {
+    double* v = node + kSpeed + c;
+    const auto speed =
+        hn::MulAdd(kick, hn::Load(d, force + c),
+                   hn::MulAdd(hn::Load(d, motion.keep + c), hn::Load(d, v), hn::Load(d, motion.fall + c)));
+    hn::Store(speed, d, v);
+    hn::Store(hn::MulAdd(hn::Load(d, motion.drift + c), speed, hn::Load(d, node + c)), d, node + c);
+  }
+}
+HWY_INLINE void move_flagged(const StepJob& step, double* HWY_RESTRICT node, const double* HWY_RESTRICT force,
+                             std::uint8_t flags, const double* HWY_RESTRICT push) {
+  const bool pushed = (flags & kPushed) != 0;
   double* v = node + kSpeed;
-  if (HWY_LIKELY(flags == 0)) {
-    for (size_t c = 0; c < 4; c += kRowLanes) {
-      const auto speed =
-          hn::MulAdd(kick, hn::Load(d, force + c),
-                     hn::MulAdd(hn::Load(d, motion.keep + c), hn::Load(d, v + c), hn::Load(d, motion.fall + c)));
-      hn::Store(speed, d, v + c);
-      hn::Store(hn::MulAdd(hn::Load(d, motion.drift + c), speed, hn::Load(d, node + c)), d, node + c);
-    }
-  } else {
-    const bool pushed = (flags & kPushed) != 0;
-    for (int c = 0; c < 3; ++c) {
-      const double f = pushed ? force[c] + push[c] : force[c];
-      v[c] = (flags & (1 << c)) != 0 ? 0 : motion.keep[c] * v[c] + motion.kick * inverse * f + motion.fall[c];
-      node[c] += step.h * v[c];
+  for (int c = 0; c < 3; ++c) {
+    const double f = pushed ? force[c] + push[c] : force[c];
+    v[c] = (flags & (1 << c)) != 0 ? 0 : step.keep * v[c] + step.kick * node[kInverseMass] * f + step.fall[c];
+    node[c] += step.h * v[c];
+  }
+}
+HWY_INLINE void move_node(const StepJob& step, const Motion& motion, double* HWY_RESTRICT node,
+                          const double* HWY_RESTRICT force, std::uint8_t flags, const double* HWY_RESTRICT push) {
+  if (HWY_LIKELY(flags == 0))
+    move_free(motion, node, force);
+  else
+    move_flagged(step, node, force, flags, push);
+}
+
+/// Bounds of places, to look at a ground's planes once for many nodes.
+class Box {
+ public:
+  HWY_INLINE explicit Box(const double* HWY_RESTRICT node) {
+    const Row d;
+    for (size_t k = 0; k < kVectors; ++k) low_[k] = high_[k] = hn::Load(d, node + k * kRowLanes);
+  }
+  HWY_INLINE void add(const double* HWY_RESTRICT node) {
+    const Row d;
+    for (size_t k = 0; k < kVectors; ++k) {
+      const auto place = hn::Load(d, node + k * kRowLanes);
+      low_[k] = hn::Min(low_[k], place), high_[k] = hn::Max(high_[k], place);
     }
   }
+  HWY_INLINE bool reaches_ground(const StepJob& step) const {
+    const Row d;
+    HWY_ALIGN double low[4], high[4];
+    for (size_t k = 0; k < kVectors; ++k)
+      hn::Store(low_[k], d, low + k * kRowLanes), hn::Store(high_[k], d, high + k * kRowLanes);
+    for (int i = 0; i < step.grounds; ++i) {
+      const double* n = step.ground[i];
+      double nearest = 0;
+      for (int c = 0; c < 3; ++c) nearest += n[c] * (n[c] > 0 ? low[c] : high[c]);
+      if (nearest < n[3]) return true;
+    }
+    return false;
+  }
+
+ private:
+  static constexpr size_t kVectors = 4 / kRowLanes;
+  hn::Vec<Row> low_[kVectors], high_[kVectors];
+};
+
+HWY_INLINE bool is_below(const StepJob& step, const double* HWY_RESTRICT node) {
   bool below = false;
   for (int i = 0; i < step.grounds; ++i) {
     const double* n = step.ground[i];
     below = below || (n[0] * node[0] + n[1] * node[1] + n[2] * node[2] < n[3]);
   }
-  return below;
+  return below && node[kInverseMass] > 0;
+}
+
+/// A node's row into the room: path of the last step, place in the middle of it, no force.
+HWY_INLINE void copy_node(const StepJob& step, const double* HWY_RESTRICT from, double* HWY_RESTRICT to) {
+#if HWY_TARGET == HWY_SCALAR
+  for (int c = 0; c < 3; ++c) {
+    const double path = step.past * from[kSpeed + c];
+    to[c] = from[c] - 0.5 * path, to[c < 2 ? c + 4 : 3] = path;
+    to[kRoomForce + c] = 0;
+  }
+#else
+  const hn::CappedTag<double, 2> d;
+  const auto past = hn::Set(d, step.past), back = hn::Set(d, -0.5);
+  const auto xy = hn::Mul(past, hn::Load(d, from + kSpeed)), z = hn::Mul(past, hn::Load(d, from + kSpeed + 2));
+  hn::Store(hn::MulAdd(back, xy, hn::Load(d, from)), d, to);
+  hn::Store(hn::InterleaveLower(d, hn::MulAdd(back, z, hn::Load(d, from + 2)), z), d, to + 2);
+  hn::Store(xy, d, to + 4);
+  const Row row;
+  for (size_t c = 0; c < 4; c += kRowLanes) hn::Store(hn::Zero(row), row, to + kRoomForce + c);
+#endif
 }
 
 void advance_chunk(const StepJob& step, ChunkJob& job) {
   double* HWY_RESTRICT rows = job.room;
-  double* HWY_RESTRICT forces = job.room + 8;
-  // places in the middle of the last step
-  const Row row;
-  HWY_ALIGN double back[4] = {-0.5 * step.past, -0.5 * step.past, -0.5 * step.past, 0};
-  const auto copy = [&](const double* HWY_RESTRICT from, double* HWY_RESTRICT to) HWY_ATTR {
-    for (size_t c = 0; c < 4; c += kRowLanes) {
-      const auto speed = hn::Load(row, from + kSpeed + c);
-      hn::Store(hn::MulAdd(hn::Load(row, back + c), speed, hn::Load(row, from + c)), row, to + c);
-      hn::Store(speed, row, to + kSpeed + c);
-      hn::Store(hn::Zero(row), row, to + 8 + c);
-    }
-  };
   constexpr size_t kAhead = 12;  // rows of other chunks, all over memory
   for (size_t i = 0; i < std::min(kAhead, job.shared); ++i)
     hwy::Prefetch(job.nodes + 8 * static_cast<size_t>(job.shared_nodes[i]));
-  for (size_t i = 0; i < job.own; ++i) copy(job.own_nodes + 8 * i, rows + kRoomFields * i);
+  for (size_t i = 0; i < job.own; ++i) copy_node(step, job.own_nodes + 8 * i, rows + kRoomFields * i);
   for (size_t i = 0; i < job.shared; ++i) {
     if (i + kAhead < job.shared) hwy::Prefetch(job.nodes + 8 * static_cast<size_t>(job.shared_nodes[i + kAhead]));
-    copy(job.nodes + 8 * static_cast<size_t>(job.shared_nodes[i]), rows + kRoomFields * (job.own + i));
+    copy_node(step, job.nodes + 8 * static_cast<size_t>(job.shared_nodes[i]), rows + kRoomFields * (job.own + i));
   }
 
   const D d;
   Sums sums{hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d)};
-  for (size_t block = 0; block < job.blocks; ++block)
-    if (job.live[block] != 0) advance_block(step, job, block, forces, sums);
+  const double* ahead = job.own_nodes + 8 * job.own;  // the next chunk's rows on their way, as many as here
+  const size_t rows_a_block = job.own / std::max<size_t>(1, job.blocks) + 1;
+  for (size_t block = 0; block < job.blocks; ++block) {
+    for (size_t i = 0; i < rows_a_block; ++i, ahead += 8) hwy::Prefetch(ahead);
+    if (job.live[block] != 0) advance_block(step, job, block, sums);
+  }
   const V* vectors[4] = {&sums.mean, &sums.varying, &sums.corner, &sums.viscous};
   for (int i = 0; i < 4; ++i) job.sums[i] += hn::GetLane(hn::SumOfLanes(d, *vectors[i]));
 
+  const double* HWY_RESTRICT forces = job.room + kRoomForce;
   const Motion motion = make_motion(step);
-  for (size_t i = 0; i < job.own; ++i)
-    if (move_node(step, motion, job.own_nodes + 8 * i, forces + kRoomFields * i, job.own_flags[i],
-                  job.own_pushes + 4 * i))
-      job.grounded->push_back(static_cast<std::uint32_t>(i));
+  Box box(job.own_nodes);
+  for (size_t i = 0; i < job.own; ++i) {
+    double* node = job.own_nodes + 8 * i;
+    move_node(step, motion, node, forces + kRoomFields * i, job.own_flags[i], job.own_pushes + 4 * i);
+    box.add(node);
+  }
+  if (job.own > 0 && box.reaches_ground(step))
+    for (size_t i = 0; i < job.own; ++i)
+      if (is_below(step, job.own_nodes + 8 * i)) job.grounded->push_back(static_cast<std::uint32_t>(i));
   for (size_t i = 0; i < job.shared; ++i)
     std::memcpy(job.shared_forces + 4 * i, forces + kRoomFields * (job.own + i), 4 * sizeof(double));
 }
 
 void advance_shared(const StepJob& step, const SharedJob& job) {
   const Motion motion = make_motion(step);
+  const Row d;
+  constexpr std::uint32_t kAhead = 16;  // forces of other chunks, all over memory
+  const std::uint32_t end = job.starts[job.last];
   for (size_t i = job.first; i < job.last; ++i) {
-    HWY_ALIGN double f[4] = {0, 0, 0, 0};
-    for (std::uint32_t k = job.starts[i]; k < job.starts[i + 1]; ++k) {
-      const double* HWY_RESTRICT from = job.forces + 4 * static_cast<size_t>(job.entries[k]);
-      for (int c = 0; c < 4; ++c) f[c] += from[c];
+    HWY_ALIGN double f[4];
+    for (size_t c = 0; c < 4; c += kRowLanes) {
+      auto sum = hn::Zero(d);
+      for (std::uint32_t k = job.starts[i]; k < job.starts[i + 1]; ++k) {
+        if (c == 0 && k + kAhead < end) hwy::Prefetch(job.forces + 4 * static_cast<size_t>(job.entries[k + kAhead]));
+        sum = hn::Add(sum, hn::Load(d, job.forces + 4 * static_cast<size_t>(job.entries[k]) + c));
+      }
+      hn::Store(sum, d, f + c);
     }
     const size_t row = job.first_row + i;
-    if (move_node(step, motion, job.nodes + 8 * row, f, job.flags[row], job.pushes + 4 * row))
-      job.grounded->push_back(static_cast<std::uint32_t>(row));
+    double* node = job.nodes + 8 * row;
+    move_node(step, motion, node, f, job.flags[row], job.pushes + 4 * row);
+    if (is_below(step, node)) job.grounded->push_back(static_cast<std::uint32_t>(row));
   }
 }
 

@@ -34,8 +34,9 @@ enum ElementField : int {
 /// Fields of a node's row.
 enum NodeField : int { kPlace = 0, kInverseMass = 3, kSpeed = 4, kNodeMass = 7, kNodeFields = 8 };
 
-/// Fields of a node in the room of a chunk: place in the middle of the last step, speed, force; 4 each, the last 0.
-inline constexpr int kRoomFields = 12;
+/// Fields of a node in the room of a chunk: place x y z in the middle of the last step, path z x y of it, 2 unused,
+/// force with a fourth entry of 0.
+inline constexpr int kRoomFields = 12, kRoomForce = 8;
 
 /// Flags of a node.
 enum NodeFlag : std::uint8_t { kHoldX = 1, kHoldY = 2, kHoldZ = 4, kPushed = 8 };

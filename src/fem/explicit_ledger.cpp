@@ -210,6 +210,7 @@ void ExplicitSystem::Inside::remove_element(ExplicitState& state, int element, R
       state.removed_gravity -= extra * dot(model.gravity, vector_at(r) - start[row]);
       r[kernel::kNodeMass] = 0;
       for (int c = 4; c < 7; ++c) r[c] = 0;
+      state.flags[row] |= kernel::kHoldX | kernel::kHoldY | kernel::kHoldZ;
     }
     r[kernel::kInverseMass] = r[kernel::kNodeMass] > 0 ? 1 / r[kernel::kNodeMass] : 0;
   }
