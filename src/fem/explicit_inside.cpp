@@ -153,6 +153,7 @@ ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
   failed.resize(chunks.chunks.size());
   chunk_sums.resize(chunks.chunks.size());
   grounded.resize(chunks.chunks.size() + kTasks);
+  balances.resize(grounded.size());
   start.resize(N);
   for (size_t row = 0; row < N; ++row) start[row] = model.nodes[static_cast<size_t>(chunks.node_of_row[row])];
 }
@@ -213,6 +214,7 @@ void ExplicitSystem::Inside::advance_nodes(const kernel::StepJob& step, Explicit
       job.failed = &failed[i], job.grounded = &grounded[i];
       kernel::advance_chunk(step, job);
       for (size_t k = 0; k < 4; ++k) chunk_sums[i][k] = job.sums[k];
+      balances[i] = job.balance;
       for (std::uint32_t& row : grounded[i]) row += static_cast<std::uint32_t>(chunk.first_row);
       for (std::uint32_t& f : failed[i]) f += static_cast<std::uint32_t>(4 * chunk.first_block * W);
     }
@@ -227,6 +229,7 @@ void ExplicitSystem::Inside::advance_nodes(const kernel::StepJob& step, Explicit
     job.grounded = &grounded[count + task];
     job.grounded->clear();
     kernel::advance_shared(step, job);
+    balances[count + task] = job.balance;
   };
   if (options.threads == 1 || count == 1) {
     for (size_t task = 0; task < tasks; ++task) run_task(task);

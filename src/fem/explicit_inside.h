@@ -81,6 +81,7 @@ struct ExplicitSystem::Inside {
   std::vector<AlignedVector<double>> rooms;
   std::vector<std::vector<std::uint32_t>> failed, grounded;
   std::vector<std::array<double, 4>> chunk_sums;
+  std::vector<kernel::Balance> balances;  // of chunks, then of shares of the shared nodes
   Timing timing;
   mutable std::vector<DebrisParticle> debris_view;
 
@@ -93,7 +94,7 @@ struct ExplicitSystem::Inside {
   std::array<Vec3, 8> corners(const ExplicitState&, int element) const;
 
   kernel::StepJob make_step() const;
-  /// Internal forces and motion of all nodes; fills failed, grounded and chunk_sums.
+  /// Internal forces and motion of all nodes; fills failed, grounded, chunk_sums and balances.
   void advance_nodes(const kernel::StepJob&, ExplicitState&);
   void collect(ExplicitState&, bool moves_on);
   /// One step of everything; `removes`: failed elements go.

@@ -104,6 +104,15 @@ HWY_INLINE void add_corner(V x, V y, V z, double* HWY_RESTRICT rows, const std::
 }
 #endif
 
+/// Makes the compiler read again what a pointer points to: cheaper than addresses that wait in memory.
+HWY_INLINE void reread(const std::uint16_t*& pointer) {
+#if defined(__GNUC__)
+  asm("" : "+r"(pointer));
+#else
+  (void)pointer;
+#endif
+}
+
 /// Sums over the corners of a face ζ = const with the signs of 1 ξ η ξη.
 struct Quad {
   V one, x, y, xy;
@@ -217,7 +226,7 @@ HWY_INLINE void add_product(const V3& v, const V3& g, Matrix& m) {
 HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t block, Sums& sums) {
   const D d;
   const Law& law = job.laws[job.law_of_block[block]];
-  const std::uint16_t* HWY_RESTRICT corners = job.corners + block * 8 * kLanes;
+  const std::uint16_t* corners = job.corners + block * 8 * kLanes;
   double* HWY_RESTRICT element = job.elements + block * static_cast<size_t>(kElementFields) * kLanes;
   const V zero = hn::Zero(d);
 
@@ -233,6 +242,7 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
     x.a.x = p.a, x.b.x = p.b, x.c.x = p.c, x.d.x = p.d, x.e.x = p.e, x.f.x = p.f, x.g.x = p.g;
     x.a.y = q.a, x.b.y = q.b, x.c.y = q.c, x.d.y = q.d, x.e.y = q.e, x.f.y = q.f, x.g.y = q.g;
   }
+  reread(corners);
   {
     const double* HWY_RESTRICT rows = job.room + 2;
     const QuadPair low = load_face(rows, corners), high = load_face(rows, corners + 4 * kLanes);
@@ -240,6 +250,7 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
     x.a.z = p.a, x.b.z = p.b, x.c.z = p.c, x.d.z = p.d, x.e.z = p.e, x.f.z = p.f, x.g.z = p.g;
     v.a.z = q.a, v.b.z = q.b, v.c.z = q.c, v.d.z = q.d, v.e.z = q.e, v.f.z = q.f, v.g.z = q.g;
   }
+  reread(corners);
   {
     const double* HWY_RESTRICT rows = job.room + 4;
     const QuadPair low = load_face(rows, corners), high = load_face(rows, corners + 4 * kLanes);
@@ -494,11 +505,12 @@ struct Motion {
   HWY_ALIGN double fall[4];  // added to speeds
   HWY_ALIGN double drift[4];
   double kick = 0;
+  bool weighs = false;
 };
 HWY_INLINE Motion make_motion(const StepJob& step) {
   Motion m{};
   for (int c = 0; c < 3; ++c) m.keep[c] = step.keep, m.fall[c] = step.fall[c], m.drift[c] = step.h;
-  m.keep[3] = 1, m.kick = step.kick;
+  m.keep[3] = 1, m.kick = step.kick, m.weighs = step.weighs;
   return m;
 }
 
@@ -516,21 +528,28 @@ HWY_INLINE void move_free(const Motion& motion, double* HWY_RESTRICT node, const
   }
 }
 HWY_INLINE void move_flagged(const StepJob& step, double* HWY_RESTRICT node, const double* HWY_RESTRICT force,
-                             std::uint8_t flags, const double* HWY_RESTRICT push) {
+                             std::uint8_t flags, const double* HWY_RESTRICT push, Balance& balance) {
   const bool pushed = (flags & kPushed) != 0;
   double* v = node + kSpeed;
+  double force2 = 0, speed2 = 0;
   for (int c = 0; c < 3; ++c) {
-    const double f = pushed ? force[c] + push[c] : force[c];
-    v[c] = (flags & (1 << c)) != 0 ? 0 : step.keep * v[c] + step.kick * node[kInverseMass] * f + step.fall[c];
+    double f = pushed ? force[c] + push[c] : force[c];
+    if (step.weighs) f += node[kNodeMass] * step.weight[c];
+    const bool held = (flags & (1 << c)) != 0;
+    v[c] = held ? 0 : step.keep * v[c] + step.kick * node[kInverseMass] * f + step.fall[c];
     node[c] += step.h * v[c];
+    if (!held) force2 += f * f, speed2 += v[c] * v[c];
   }
+  if (step.weighs && speed2 > 0) balance.kinetic += speed2 / node[kInverseMass];
+  balance.force2 += force2;
 }
 HWY_INLINE void move_node(const StepJob& step, const Motion& motion, double* HWY_RESTRICT node,
-                          const double* HWY_RESTRICT force, std::uint8_t flags, const double* HWY_RESTRICT push) {
-  if (HWY_LIKELY(flags == 0))
+                          const double* HWY_RESTRICT force, std::uint8_t flags, const double* HWY_RESTRICT push,
+                          Balance& balance) {
+  if (HWY_LIKELY(flags == 0 && !motion.weighs))
     move_free(motion, node, force);
   else
-    move_flagged(step, node, force, flags, push);
+    move_flagged(step, node, force, flags, push, balance);
 }
 
 /// Bounds of places, to look at a ground's planes once for many nodes.
@@ -576,65 +595,85 @@ HWY_INLINE bool is_below(const StepJob& step, const double* HWY_RESTRICT node) {
 }
 
 /// A node's row into the room: path of the last step, place in the middle of it, no force.
-HWY_INLINE void copy_node(const StepJob& step, const double* HWY_RESTRICT from, double* HWY_RESTRICT to) {
+HWY_INLINE void copy_node(double past, const double* HWY_RESTRICT from, double* HWY_RESTRICT to) {
 #if HWY_TARGET == HWY_SCALAR
   for (int c = 0; c < 3; ++c) {
-    const double path = step.past * from[kSpeed + c];
+    const double path = past * from[kSpeed + c];
     to[c] = from[c] - 0.5 * path, to[c < 2 ? c + 4 : 3] = path;
     to[kRoomForce + c] = 0;
   }
 #else
   const hn::CappedTag<double, 2> d;
-  const auto past = hn::Set(d, step.past), back = hn::Set(d, -0.5);
-  const auto xy = hn::Mul(past, hn::Load(d, from + kSpeed)), z = hn::Mul(past, hn::Load(d, from + kSpeed + 2));
-  hn::Store(hn::MulAdd(back, xy, hn::Load(d, from)), d, to);
-  hn::Store(hn::InterleaveLower(d, hn::MulAdd(back, z, hn::Load(d, from + 2)), z), d, to + 2);
+  const auto h = hn::Set(d, past), half = hn::Set(d, 0.5);
+  const auto xy = hn::Mul(h, hn::Load(d, from + kSpeed)), z = hn::Mul(h, hn::Load(d, from + kSpeed + 2));
+  hn::Store(hn::NegMulAdd(half, xy, hn::Load(d, from)), d, to);
+  hn::Store(hn::InterleaveLower(d, hn::NegMulAdd(half, z, hn::Load(d, from + 2)), z), d, to + 2);
   hn::Store(xy, d, to + 4);
   const Row row;
   for (size_t c = 0; c < 4; c += kRowLanes) hn::Store(hn::Zero(row), row, to + kRoomForce + c);
 #endif
 }
 
-void advance_chunk(const StepJob& step, ChunkJob& job) {
-  double* HWY_RESTRICT rows = job.room;
+HWY_NOINLINE void load_room(const StepJob& step, const ChunkJob& job) {
+  const size_t own = job.own, shared = job.shared;
+  const double past = step.past;
+  double* HWY_RESTRICT to = job.room;
+  const double* HWY_RESTRICT from = job.own_nodes;
+  for (const double* end = from + 8 * own; from != end; from += 8, to += kRoomFields) copy_node(past, from, to);
   constexpr size_t kAhead = 12;  // rows of other chunks, all over memory
-  for (size_t i = 0; i < std::min(kAhead, job.shared); ++i)
-    hwy::Prefetch(job.nodes + 8 * static_cast<size_t>(job.shared_nodes[i]));
-  for (size_t i = 0; i < job.own; ++i) copy_node(step, job.own_nodes + 8 * i, rows + kRoomFields * i);
-  for (size_t i = 0; i < job.shared; ++i) {
-    if (i + kAhead < job.shared) hwy::Prefetch(job.nodes + 8 * static_cast<size_t>(job.shared_nodes[i + kAhead]));
-    copy_node(step, job.nodes + 8 * static_cast<size_t>(job.shared_nodes[i]), rows + kRoomFields * (job.own + i));
+  const double* HWY_RESTRICT nodes = job.nodes;
+  const std::uint32_t* HWY_RESTRICT list = job.shared_nodes;
+  const auto row = [&](size_t i) { return nodes + 8 * static_cast<size_t>(list[i]); };
+  for (size_t i = 0; i < std::min(kAhead, shared); ++i) hwy::Prefetch(row(i));
+  for (size_t i = 0; i < shared; ++i, to += kRoomFields) {
+    if (i + kAhead < shared) hwy::Prefetch(row(i + kAhead));
+    copy_node(past, row(i), to);
   }
+}
 
+HWY_NOINLINE void move_own_nodes(const StepJob& step, ChunkJob& job) {
+  const size_t own = job.own;
+  if (own == 0) return;
+  const Motion motion = make_motion(step);
+  double* HWY_RESTRICT nodes = job.own_nodes;
+  const double* HWY_RESTRICT force = job.room + kRoomForce;
+  const std::uint8_t* HWY_RESTRICT flags = job.own_flags;
+  const double* HWY_RESTRICT pushes = job.own_pushes;
+  Box box(nodes);
+  Balance balance;
+  for (size_t i = 0; i < own; ++i, force += kRoomFields) {
+    double* node = nodes + 8 * i;
+    move_node(step, motion, node, force, flags[i], pushes + 4 * i, balance);
+    box.add(node);
+  }
+  job.balance = balance;
+  if (!box.reaches_ground(step)) return;
+  for (size_t i = 0; i < own; ++i)
+    if (is_below(step, nodes + 8 * i)) job.grounded->push_back(static_cast<std::uint32_t>(i));
+}
+
+void advance_chunk(const StepJob& step, ChunkJob& job) {
+  load_room(step, job);
   const D d;
   Sums sums{hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d)};
   const double* ahead = job.own_nodes + 8 * job.own;  // the next chunk's rows on their way, as many as here
-  const size_t rows_a_block = job.own / std::max<size_t>(1, job.blocks) + 1;
-  for (size_t block = 0; block < job.blocks; ++block) {
-    for (size_t i = 0; i < rows_a_block; ++i, ahead += 8) hwy::Prefetch(ahead);
-    if (job.live[block] != 0) advance_block(step, job, block, sums);
+  const size_t blocks = job.blocks, rows_a_block = job.own / std::max<size_t>(1, blocks) + 1;
+  const unsigned char* HWY_RESTRICT live = job.live;
+  for (size_t block = 0; block < blocks; ++block) {
+    for (const double* end = ahead + 8 * rows_a_block; ahead != end; ahead += 8) hwy::Prefetch(ahead);
+    if (live[block] != 0) advance_block(step, job, block, sums);
   }
   const V* vectors[4] = {&sums.mean, &sums.varying, &sums.corner, &sums.viscous};
   for (int i = 0; i < 4; ++i) job.sums[i] += hn::GetLane(hn::SumOfLanes(d, *vectors[i]));
-
-  const double* HWY_RESTRICT forces = job.room + kRoomForce;
-  const Motion motion = make_motion(step);
-  Box box(job.own_nodes);
-  for (size_t i = 0; i < job.own; ++i) {
-    double* node = job.own_nodes + 8 * i;
-    move_node(step, motion, node, forces + kRoomFields * i, job.own_flags[i], job.own_pushes + 4 * i);
-    box.add(node);
-  }
-  if (job.own > 0 && box.reaches_ground(step))
-    for (size_t i = 0; i < job.own; ++i)
-      if (is_below(step, job.own_nodes + 8 * i)) job.grounded->push_back(static_cast<std::uint32_t>(i));
+  move_own_nodes(step, job);
   for (size_t i = 0; i < job.shared; ++i)
-    std::memcpy(job.shared_forces + 4 * i, forces + kRoomFields * (job.own + i), 4 * sizeof(double));
+    std::memcpy(job.shared_forces + 4 * i, job.room + kRoomFields * (job.own + i) + kRoomForce, 4 * sizeof(double));
 }
 
-void advance_shared(const StepJob& step, const SharedJob& job) {
+void advance_shared(const StepJob& step, SharedJob& job) {
   const Motion motion = make_motion(step);
   const Row d;
+  Balance balance;
   constexpr std::uint32_t kAhead = 16;  // forces of other chunks, all over memory
   const std::uint32_t end = job.starts[job.last];
   for (size_t i = job.first; i < job.last; ++i) {
@@ -649,9 +688,10 @@ void advance_shared(const StepJob& step, const SharedJob& job) {
     }
     const size_t row = job.first_row + i;
     double* node = job.nodes + 8 * row;
-    move_node(step, motion, node, f, job.flags[row], job.pushes + 4 * row);
+    move_node(step, motion, node, f, job.flags[row], job.pushes + 4 * row, balance);
     if (is_below(step, node)) job.grounded->push_back(static_cast<std::uint32_t>(row));
   }
+  job.balance = balance;
 }
 
 size_t count_lanes() { return kLanes; }
@@ -672,7 +712,7 @@ HWY_EXPORT(advance_shared);
 size_t lanes() { return HWY_DYNAMIC_DISPATCH(count_lanes)(); }
 std::string target_name() { return HWY_DYNAMIC_DISPATCH(name_target)(); }
 void advance_chunk(const StepJob& step, ChunkJob& job) { HWY_DYNAMIC_DISPATCH(advance_chunk)(step, job); }
-void advance_shared(const StepJob& step, const SharedJob& job) { HWY_DYNAMIC_DISPATCH(advance_shared)(step, job); }
+void advance_shared(const StepJob& step, SharedJob& job) { HWY_DYNAMIC_DISPATCH(advance_shared)(step, job); }
 
 }  // namespace topple::fem::kernel
 #endif

@@ -67,10 +67,18 @@ struct StepJob {
   double past = 0;                   // h, or 0 in a first step: what the speeds have strained before it does not count
   double keep = 1, kick = 0;         // v = keep v + kick (f/m) + fall
   double fall[3] = {0, 0, 0};        // gravity times the step [m/s]
+  bool weighs = false;               // relaxation: masses of rows weigh, inverse ones are fictitious; sums of balance
+  double weight[3] = {0, 0, 0};      // force of a mass [m/s²]
   double linear = 0, quadratic = 0;  // bulk viscosity
   bool removes = true;               // elements may fail
   int grounds = 0;
   double ground[kMostGrounds][4];  // n and n·p: below where n·x - n·p < 0
+};
+
+/// Of nodes in a relaxation, held components aside.
+struct Balance {
+  double force2 = 0;   // squares of forces out of balance [N²]
+  double kinetic = 0;  // twice the energy of the fictitious masses [J]
 };
 
 /// Elements of a chunk and the nodes they touch.
@@ -90,6 +98,7 @@ struct ChunkJob {
   const double* own_pushes = nullptr;           // forces of flagged nodes, 4 each
   double* room = nullptr;                       // kRoomFields a node of the chunk
   // written
+  Balance balance;
   double sums[4] = {0, 0, 0, 0};  // dissipated: mean, over the element, the corner mode in it, bulk viscosity [J]
   std::vector<std::uint32_t>* failed = nullptr;    // 4 * slot + cause (1 tension, 2 compression, 3 degenerate)
   std::vector<std::uint32_t>* grounded = nullptr;  // own nodes below some ground after the step
@@ -106,6 +115,7 @@ struct SharedJob {
   const std::uint8_t* flags = nullptr;  // of all nodes
   const double* pushes = nullptr;       // of all nodes
   std::vector<std::uint32_t>* grounded = nullptr;
+  Balance balance;  // written
 };
 
 size_t lanes();
@@ -113,6 +123,6 @@ std::string target_name();
 /// Stresses and forces at the present places from the motion of the last half steps, then the motion of own nodes.
 void advance_chunk(const StepJob&, ChunkJob&);
 /// The same forces without motion or history, for inspection: forces of the chunk's nodes into `room`.
-void advance_shared(const StepJob&, const SharedJob&);
+void advance_shared(const StepJob&, SharedJob&);
 
 }  // namespace topple::fem::kernel

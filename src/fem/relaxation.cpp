@@ -47,9 +47,8 @@ RelaxationSummary relax_system(ExplicitSystem::Inside& in, const RelaxationOptio
   for (const std::uint32_t row : in.loaded)
     for (size_t c = 0; c < 3; ++c) load2 += std::pow(in.loads[4 * row + c], 2);
 
-  std::vector<Vec3> before(N);
   kernel::StepJob step = in.make_step();
-  step.removes = false, step.linear = step.quadratic = 0;
+  step.removes = false, step.linear = step.quadratic = 0, step.weighs = true;
   for (double& fall : step.fall) fall = 0;
   double last_kinetic = 0;
   bool rests = true;
@@ -58,15 +57,12 @@ RelaxationSummary relax_system(ExplicitSystem::Inside& in, const RelaxationOptio
     const double ramp = std::min(1.0, (summary.steps + 1.0) / std::max(1, options.ramp));
     in.clear_pushes(s);
     in.press_grounds(s);
-    for (const std::uint32_t row : live) {
-      in.push(s, row, (ramp * s.rows[8 * size_t{row} + kernel::kNodeMass]) * in.model.gravity);
-      // nodal forces, which a push begins with, rise as well
-      for (int c = 0; c < 3; ++c)
-        s.pushes[4 * size_t{row} + static_cast<size_t>(c)] -=
-            (1 - ramp) * in.loads[4 * size_t{row} + static_cast<size_t>(c)];
-      const double* r = s.rows.data() + 8 * size_t{row};
-      before[row] = {r[4], r[5], r[6]};
-    }
+    for (int c = 0; c < 3; ++c) step.weight[c] = ramp * in.model.gravity[c];
+    // nodal forces, which a push begins with, rise as well
+    if (ramp < 1)
+      for (const std::uint32_t row : in.loaded)
+        if (s.uses[row] > 0)
+          for (size_t c = 0; c < 3; ++c) s.pushes[4 * size_t{row} + c] -= (1 - ramp) * in.loads[4 * size_t{row} + c];
     // while loads rise, damped; then free from one peak of the kinetic energy to the next
     const double half = ramp < 1 ? 0.05 : 0;
     step.keep = (1 - half) / (1 + half),
@@ -77,15 +73,7 @@ RelaxationSummary relax_system(ExplicitSystem::Inside& in, const RelaxationOptio
     for (const auto& rows : in.grounded) s.grounded.insert(s.grounded.end(), rows.begin(), rows.end());
 
     double out2 = 0, kinetic = 0;
-    for (const std::uint32_t row : live) {
-      const double* r = s.rows.data() + 8 * size_t{row};
-      for (int c = 0; c < 3; ++c)
-        if ((s.flags[row] & (1 << c)) == 0) {
-          const double f = (r[4 + c] - step.keep * before[row][c]) / (step.kick * r[3]);
-          out2 += f * f;
-          kinetic += r[4 + c] * r[4 + c] / r[3];
-        }
-    }
+    for (const kernel::Balance& balance : in.balances) out2 += balance.force2, kinetic += balance.kinetic;
     if (ramp >= 1 && kinetic < last_kinetic) {
       // the mode that leads stands in its equilibrium: back to the places of the stresses, and stop
       for (const std::uint32_t row : live) {
