@@ -341,7 +341,7 @@ void System::evaluate_elements() {
     l.evaluate_elements(0, l.element_blocks, l.outside);
   }
   for (const std::uint32_t slot : l.outside) evaluate_outside(slot);
-  if (2 * l.live_elements < l.used_slots && l.used_slots > 4 * l.W) lay_out_elements();
+  if (8 * l.live_elements < 7 * l.used_slots && l.used_slots > 4 * l.W) lay_out_elements();
   sum_element_forces();
 }
 

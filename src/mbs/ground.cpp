@@ -14,7 +14,7 @@ void System::find_ground_points() {
   const Vec3 n = c.normal;
   const LaneLayout layout = lanes->body_layout(lane);
   for (size_t b = 0; b < B; ++b) {
-    if (s.ground_clear[b] && lanes->low[layout.at(b, 0, 1)] > 0) continue;
+    if (s.ground_clear[b] && (s.tied_to_ground[b] || lanes->low[layout.at(b, 0, 1)] > 0)) continue;
     const BodyConstants& body = s.body[b];
     s.ground_clear[b] = 1;
     if (fixed[b] || body.shapes == 0) continue;
@@ -52,7 +52,6 @@ void System::find_ground_points() {
         if (-above_centre > reach) continue;
       }
       shape.is_clear = possible;
-      if (!possible) s.ground_clear[b] = 0;
       const size_t first = contact.point.size();
       const Hull* polyhedron = hull ? &hulls[static_cast<size_t>(shape.hull)] : nullptr;
       const int corners = count_corners(shape);
