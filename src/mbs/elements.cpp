@@ -329,6 +329,7 @@ void System::evaluate_elements_fully(double h) {
 void System::evaluate_elements() {
   Lanes& l = *lanes;
   l.outside.clear();
+  l.lay_poses();
   if (options.threads > 1 && l.element_blocks >= kBlocksForThreads) {
     // every block writes its own places only; reports follow in order, so threads change no bit
     const size_t chunks = (l.element_blocks + kChunk - 1) / kChunk;

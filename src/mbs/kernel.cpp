@@ -96,22 +96,66 @@ struct Poses {
   Q4<D> q;
 };
 
-/// From blocks of bodies; `bodies` one a lane.
+#if HWY_TARGET != HWY_SCALAR
+/// Two numbers of the rows of every second body, from the first on.
 template <class D>
-HWY_INLINE Poses<D> gather(const ElementJob& job, const std::uint32_t* HWY_RESTRICT bodies) {
-  const hn::RebindToSigned<D> di;
-  const hn::Rebind<std::uint32_t, D> du;
-  const size_t group = size_t{1} << job.body_shift;
-  const auto body = hn::BitCast(di, hn::PromoteTo(hn::RebindToUnsigned<D>(), hn::LoadU(du, bodies)));
-  const auto lane = hn::And(body, hn::Set(di, static_cast<std::int64_t>(group - 1)));
-  const auto first = hn::Sub(body, lane);  // block times group
-  const auto at_p = hn::Add(hn::Add(first, hn::Add(first, first)), lane);
-  const auto at_q = hn::Add(hn::Add(hn::Add(first, first), hn::Add(first, first)), lane);
-  const auto take = [&](const double* from, size_t field, auto at) -> Num<D> {
-    return {hn::GatherIndex(D(), from + field * group, at)};
-  };
-  return {{take(job.p, 0, at_p), take(job.p, 1, at_p), take(job.p, 2, at_p)},
-          {take(job.q, 0, at_q), take(job.q, 1, at_q), take(job.q, 2, at_q), take(job.q, 3, at_q)}};
+HWY_INLINE hn::Vec<D> read_pairs(const double* HWY_RESTRICT poses, const std::uint32_t* HWY_RESTRICT bodies) {
+  if constexpr (hn::MaxLanes(D()) == 2) {
+    return hn::LoadU(D(), poses + kPoseRow * bodies[0]);
+  } else {
+    using Half = hn::Half<D>;
+    return hn::Combine(D(), read_pairs<Half>(poses, bodies + hn::MaxLanes(Half())), read_pairs<Half>(poses, bodies));
+  }
+}
+
+/// Writes them.
+template <class D>
+HWY_INLINE void write_pairs(hn::Vec<D> pairs, double* HWY_RESTRICT rows) {
+  if constexpr (hn::MaxLanes(D()) == 2) {
+    hn::StoreU(pairs, D(), rows);
+  } else {
+    using Half = hn::Half<D>;
+    write_pairs<Half>(hn::LowerHalf(Half(), pairs), rows);
+    write_pairs<Half>(hn::UpperHalf(Half(), pairs), rows + kPoseRow * hn::MaxLanes(Half()));
+  }
+}
+#endif
+
+/// Poses of the bodies of a block of elements; `bodies` one a lane.
+template <class D>
+HWY_INLINE Poses<D> read_poses(const double* HWY_RESTRICT poses, const std::uint32_t* HWY_RESTRICT bodies) {
+  Num<D> field[kPoseRow];
+#if HWY_TARGET != HWY_SCALAR
+  if constexpr (hn::MaxLanes(D()) > 1) {
+    const D d;
+    for (size_t i = 0; i < kPoseRow; i += 2) {
+      const auto even = read_pairs<D>(poses + i, bodies), odd = read_pairs<D>(poses + i, bodies + 1);
+      field[i] = {hn::InterleaveLower(d, even, odd)}, field[i + 1] = {hn::InterleaveUpper(d, even, odd)};
+    }
+  }
+#endif
+  if constexpr (hn::MaxLanes(D()) == 1)
+    for (size_t i = 0; i < kPoseRow; ++i) field[i] = num<D>(poses[kPoseRow * bodies[0] + i]);
+  return {{field[0], field[1], field[2]}, {field[3], field[4], field[5], field[6]}};
+}
+
+template <class D>
+HWY_INLINE void lay_pose_block(const PoseJob& job, size_t block) {
+  const D d;
+  const size_t W = hn::Lanes(d);
+  const double *p = job.p + 3 * W * block, *q = job.q + 4 * W * block;
+  const Num<D> field[kPoseRow] = {load<D>(p, 0), load<D>(p, 1), load<D>(p, 2), load<D>(q, 0),
+                                  load<D>(q, 1), load<D>(q, 2), load<D>(q, 3), num<D>(0)};
+  double* rows = job.poses + kPoseRow * W * block;
+#if HWY_TARGET != HWY_SCALAR
+  if constexpr (hn::MaxLanes(D()) > 1)
+    for (size_t i = 0; i < kPoseRow; i += 2) {
+      write_pairs<D>(hn::InterleaveLower(d, field[i].v, field[i + 1].v), rows + i);
+      write_pairs<D>(hn::InterleaveUpper(d, field[i].v, field[i + 1].v), rows + i + kPoseRow);
+    }
+#endif
+  if constexpr (hn::MaxLanes(D()) == 1)
+    for (size_t i = 0; i < kPoseRow; ++i) hn::Store(field[i].v, d, rows + i);
 }
 
 /// a^(-2/3) of 1 <= a <= kMostOver by Newton's method on a² y³ = 1, powers of 8 taken out.
@@ -588,7 +632,8 @@ HWY_INLINE void evaluate_all(const ElementJob& job) {
   size_t next = find_next(job.first);
   if (job.a != nullptr) {
     for (; next < job.last; next = find_next(next + 1))
-      evaluate_element_block<D>(job, next, gather<D>(job, job.a + next * W), gather<D>(job, job.b + next * W));
+      evaluate_element_block<D>(job, next, read_poses<D>(job.poses, job.a + next * W),
+                                read_poses<D>(job.poses, job.b + next * W));
   } else {
     for (; next < job.last; next = find_next(next + 1)) {
       const size_t a = job.body_a[next], b = job.body_b[next];
@@ -603,6 +648,11 @@ HWY_INLINE void advance_all(const BodyJob& job) {
   Num<D> sum = num<D>(0);
   for (size_t block = 0; block < job.blocks; ++block) advance_body_block<D>(job, block, sum);
   store<D>(sum, job.sum, 0);
+}
+
+template <class D>
+HWY_INLINE void lay_all(const PoseJob& job) {
+  for (size_t block = 0; block < job.blocks; ++block) lay_pose_block<D>(job, block);
 }
 
 template <class D>
@@ -631,8 +681,10 @@ using One = hn::CappedTag<double, 1>;
 size_t lanes_here() { return hn::Lanes(Wide()); }
 const char* name_here() { return hwy::TargetName(HWY_TARGET); }
 void advance_bodies_here(const BodyJob& job) { advance_all<Wide>(job); }
+void lay_poses_here(const PoseJob& job) { lay_all<Wide>(job); }
 void evaluate_elements_here(const ElementJob& job) { evaluate_all<Wide>(job); }
 void advance_bodies_singly_here(const BodyJob& job) { advance_all<One>(job); }
+void lay_poses_singly_here(const PoseJob& job) { lay_all<One>(job); }
 void evaluate_elements_singly_here(const ElementJob& job) { evaluate_all<One>(job); }
 void sum_forces_here(const SumJob& job) { sum_all<Wide>(job); }
 void sum_forces_singly_here(const SumJob& job) { sum_all<One>(job); }
@@ -647,8 +699,10 @@ namespace topple::mbs::kernel {
 HWY_EXPORT(lanes_here);
 HWY_EXPORT(name_here);
 HWY_EXPORT(advance_bodies_here);
+HWY_EXPORT(lay_poses_here);
 HWY_EXPORT(evaluate_elements_here);
 HWY_EXPORT(advance_bodies_singly_here);
+HWY_EXPORT(lay_poses_singly_here);
 HWY_EXPORT(evaluate_elements_singly_here);
 HWY_EXPORT(sum_forces_here);
 HWY_EXPORT(sum_forces_singly_here);
@@ -656,8 +710,10 @@ HWY_EXPORT(sum_forces_singly_here);
 size_t lanes() { return HWY_DYNAMIC_DISPATCH(lanes_here)(); }
 std::string target_name() { return HWY_DYNAMIC_DISPATCH(name_here)(); }
 void advance_bodies(const BodyJob& job) { HWY_DYNAMIC_DISPATCH(advance_bodies_here)(job); }
+void lay_poses(const PoseJob& job) { HWY_DYNAMIC_DISPATCH(lay_poses_here)(job); }
 void evaluate_elements(const ElementJob& job) { HWY_DYNAMIC_DISPATCH(evaluate_elements_here)(job); }
 void advance_bodies_singly(const BodyJob& job) { HWY_DYNAMIC_DISPATCH(advance_bodies_singly_here)(job); }
+void lay_poses_singly(const PoseJob& job) { HWY_DYNAMIC_DISPATCH(lay_poses_singly_here)(job); }
 void evaluate_elements_singly(const ElementJob& job) { HWY_DYNAMIC_DISPATCH(evaluate_elements_singly_here)(job); }
 void sum_forces(const SumJob& job) { HWY_DYNAMIC_DISPATCH(sum_forces_here)(job); }
 void sum_forces_singly(const SumJob& job) { HWY_DYNAMIC_DISPATCH(sum_forces_singly_here)(job); }

@@ -136,9 +136,17 @@ struct ElementJob {
   double* forces;                        // kForceFields a block
   const std::uint32_t *a, *b;            // body slot of each lane (W a block); null: batch
   const std::uint32_t *body_a, *body_b;  // batch: body of each block
-  const double *p, *q;                   // of the bodies
-  size_t body_shift = 0;                 // log2 of W when the lanes of a block of bodies are bodies
+  const double *p, *q;                   // batch: of the bodies
+  const double* poses;                   // of the bodies, kPoseRow numbers each
   std::vector<std::uint32_t>* outside;   // slots that need the full law, untouched
+};
+
+/// Poses from blocks of bodies to a row for each, so that elements read whole rows: p (3), q (4), 0.
+inline constexpr size_t kPoseRow = 8;
+struct PoseJob {
+  size_t blocks = 0;
+  const double *p, *q;  // 3, 4 fields a block
+  double* poses;        // W rows a block
 };
 
 /// Forces of the elements summed for each body, in the order of `entries`; batch only.
@@ -152,11 +160,13 @@ struct SumJob {
 size_t lanes();
 std::string target_name();
 void advance_bodies(const BodyJob&);
+void lay_poses(const PoseJob&);
 void evaluate_elements(const ElementJob&);
 void sum_forces(const SumJob&);
 
 /// The same with one lane at a time in the same instruction set, for tests of the claim above.
 void advance_bodies_singly(const BodyJob&);
+void lay_poses_singly(const PoseJob&);
 void evaluate_elements_singly(const ElementJob&);
 void sum_forces_singly(const SumJob&);
 

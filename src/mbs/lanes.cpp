@@ -200,6 +200,16 @@ void Lanes::find_ways() {
   }
 }
 
+void Lanes::lay_poses() {
+  poses.resize(body_blocks * W * kernel::kPoseRow);
+  const kernel::PoseJob job{body_blocks, p.data(), q.data(), poses.data()};
+  if (W == kernel::lanes()) {
+    kernel::lay_poses(job);
+  } else {
+    kernel::lay_poses_singly(job);
+  }
+}
+
 void Lanes::evaluate_elements(size_t first, size_t last, std::vector<std::uint32_t>& beyond) {
   kernel::ElementJob job;
   job.first = first, job.last = last;
@@ -208,8 +218,7 @@ void Lanes::evaluate_elements(size_t first, size_t last, std::vector<std::uint32
   job.forces = element_forces.data();
   job.a = is_batch ? nullptr : body_a.data(), job.b = is_batch ? nullptr : body_b.data();
   job.body_a = body_a.data(), job.body_b = body_b.data();
-  job.p = p.data(), job.q = q.data();
-  job.body_shift = body_layout(0).shift;
+  job.p = p.data(), job.q = q.data(), job.poses = poses.data();
   job.outside = &beyond;
   if (W == kernel::lanes()) {
     kernel::evaluate_elements(job);

@@ -28,6 +28,7 @@ struct Lanes {
   size_t body_blocks = 0, element_blocks = 0;
   // bodies, the ground behind the last one
   AlignedVector<double> p, v, L, w, q, R, force, torque, joint_force, joint_torque, body_constants;
+  AlignedVector<double> poses;        // a row for each body, as lay_poses() left them; one run
   AlignedVector<double> bounds, low;  // boxes around the shapes in B, and how low they reach (kernel::LowJob)
   AlignedVector<double> reach, way;   // radius of a body's shapes, and its farthest point's way in a step (WayJob)
   Pairs pairs;
@@ -96,6 +97,8 @@ struct Lanes {
   void find_lows();
   /// Ways of the bodies' farthest points in the last motion.
   void find_ways();
+  /// Where the bodies are now, for evaluate_elements() of a run of its own.
+  void lay_poses();
   /// Forces of the elements in blocks [first, last).
   void evaluate_elements(size_t first, size_t last, std::vector<std::uint32_t>& beyond);
   /// Forces of the elements on every body; batch only.
