@@ -34,6 +34,7 @@ struct ExplicitChunks {
   size_t slots() const { return element_of_slot.size(); }
 };
 
+/// At most 680 elements a chunk: kRoomFields times 8 nodes of each is to fit 16 bits.
 ExplicitChunks make_chunks(const ExplicitModel&, size_t lanes, size_t elements_a_chunk = 640);
 
 }  // namespace topple::fem

@@ -230,8 +230,8 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
   double* HWY_RESTRICT element = job.elements + block * static_cast<size_t>(kElementFields) * kLanes;
   const V zero = hn::Zero(d);
 
-  // the next block's state on its way
-  for (size_t i = 0; i < kElementFields * kLanes; i += 8) hwy::Prefetch(element + kElementFields * kLanes + i);
+  // a later block's state on its way
+  for (size_t i = 0; i < kElementFields * kLanes; i += 8) hwy::Prefetch(element + 4 * kElementFields * kLanes + i);
 
   // places, and paths of the last step (v)
   Modes3 x, v;
@@ -330,24 +330,22 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
     const Yield y = find_yield(law, strain);
     V mean = mul(num(1.0 / 3), add(sxx, add(syy, szz)));
     const V dx = sub(sxx, mean), dy = sub(syy, mean), dz = sub(szz, mean);
-    const V q2 =
-        mul(num(1.5), fma(dx, dx, fma(dy, dy, fma(dz, dz, mul(num(2), fma(sxy, sxy, fma(syz, syz, mul(szx, szx))))))));
+    // short chains of sums: here all waits for one number
+    const V shear2 = fma(sxy, sxy, fma(syz, syz, mul(szx, szx))), normal2 = fma(dx, dx, fma(dy, dy, mul(dz, dz)));
+    const V q2 = fma(num(3), shear2, mul(num(1.5), normal2));
     // share of compression (eq. 12)
     const V w = hn::Min(num(1), hn::Max(zero, mul(num(law.per_pressure), sub(num(-law.least_pressure), mean))));
     const V limit = fma(sub(y.compression, y.tension), w, y.tension);
     // bending that a section without normal force bears, over 1.5 elastic stresses (eq. 14): product over sum
     const V sum = add(y.tension, y.compression), product = mul(num(2 / 1.5), mul(y.tension, y.compression));
     const V iab = mul(ia, ib), iac = mul(ia, ic), ibc = mul(ib, ic);
-    V h2 = mul(s.bending[1], s.bending[1]);
-    h2 = fma(s.bending[0], sub(s.bending[0], s.bending[1]), h2);
-    for (int k = 2; k < 6; k += 2) {
-      const V a = s.bending[k], b = s.bending[k + 1];
-      h2 = fma(a, sub(a, b), fma(b, b, h2));
-    }
+    const auto bend2 = [&](const V* bent)
+                           HWY_ATTR { return fma(bent[0], sub(bent[0], bent[1]), mul(bent[1], bent[1])); };
     const V t2 = fma(mul(s.twist[0], s.twist[0]), iab,
                      fma(mul(s.twist[1], s.twist[1]), iac, mul(mul(s.twist[2], s.twist[2]), ibc)));
     const V corner2 = fma(s.corner[0], s.corner[0], fma(s.corner[1], s.corner[1], mul(s.corner[2], s.corner[2])));
-    h2 = fma(num(3), t2, fma(num(1.0 / 3), corner2, h2));
+    const V h2 = fma(
+        num(3), t2, fma(num(1.0 / 3), corner2, add(bend2(s.bending), add(bend2(s.bending + 2), bend2(s.bending + 4)))));
     const V top = mul(num(law.cutoff), y.tension);
     // a bound of what eq. 14 says, without roots
     const V scaled = mul(limit, sum), scaled2 = mul(scaled, scaled);
@@ -385,11 +383,10 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
       const V spent = fma(mul(part, q2), num(1 / (3 * law.mu)), torn);
       const V volume = hn::IfThenElseZero(live, mul(num(1.0 / 64), g.volume)), weight = mul(volume, part);
       sums.mean = fma(volume, spent, sums.mean);
-      V stored = zero;  // three times twice the energy over the volume
-      for (int k = 0; k < 6; k += 2) {
-        const V a = s.bending[k], b = s.bending[k + 1];
-        stored = fma(a, fnma(num(2 * law.nu), b, a), fma(b, b, stored));
-      }
+      const auto store = [&](const V* bent) HWY_ATTR {  // three times twice the energy over the volume
+        return fma(bent[0], fnma(num(2 * law.nu), bent[1], bent[0]), mul(bent[1], bent[1]));
+      };
+      V stored = add(store(s.bending), add(store(s.bending + 2), store(s.bending + 4)));
       const V corner_energy = mul(num(1.0 / (9 * law.E)), corner2);
       stored = fma(num(1.0 / (3 * law.E)), stored, fma(num(1.0 / (3 * law.mu)), t2, corner_energy));
       sums.varying = fma(weight, stored, sums.varying);
