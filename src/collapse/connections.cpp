@@ -250,7 +250,9 @@ void Builder::connect_ground_column(const GridPoint& at, int index) {
   // the limit that follows the normal force is the foot's, which carries the same shear; here the largest possible one
   const double crushing = *std::max_element(rcc.compression.force.begin(), rcc.compression.force.end());
   joint.shear_limit = std::max(rcc.shear_y, rcc.shear_z) + rcc.shear_friction * crushing;
-  joint.rotation_limit = law.rupture_rotation + largest_moment(law.moment_z) / stiffness;
+  // one whose hinge has broken before, because nothing presses it, turns freely
+  joint.rotation_limit =
+      std::max(law.rupture_rotation, law.rupture_rotation_pressed) + largest_moment(law.moment_z) / stiffness;
   ZoneEntry entry;
   entry.name = joint.name, entry.member = m.name, entry.subsystem = kHinge;
   entry.body_a = shaft, entry.body_b = node, entry.p_W = top;

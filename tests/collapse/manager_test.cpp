@@ -161,6 +161,17 @@ TEST(Manager, NamesMembersThatCannotBeBuilt) {
   EXPECT_EQ(complaint_of(plan), "");  // the beams carry the joint over it
 }
 
+TEST(Manager, TheTopOfAColumnTurnsAsFarAsItsHingeDoes) {
+  Knowledge k = default_knowledge();
+  const auto limit = [&](double pressed) {
+    k.zone_rupture_rotation_pressed = pressed;
+    ModelMap map;
+    return make_model(read(portal()), k, map).joints.front().rotation_limit;
+  };
+  EXPECT_LT(limit(k.zone_rupture_rotation), 0.5);
+  EXPECT_GT(limit(1), 1);
+}
+
 TEST(Manager, StiffnessOfMembersIsThatOfPrismaticBars) {
   const product::Plan plan = read(house(charge("C-A*-0")));
   const Built b = build(plan);
