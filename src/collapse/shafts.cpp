@@ -83,6 +83,15 @@ double find_end(const nearfield::Rcc& rcc) {
   return end;
 }
 
+/// A ring's zone ends, pressed or not, where edges that are crushed meet as a contact, and the lips of a mouth of this
+/// height (0: none) that closes.
+void end_at_contact(mbs::ZoneLaw& law, const nearfield::Rcc& rcc, const nearfield::RingInput& ring, double height) {
+  law.crush_length = std::min(law.crush_length, kCrushing * ring.thickness);
+  law.rupture_rotation = find_end(rcc);
+  law.rupture_rotation_pressed = 0;
+  if (height > 0) law.rupture_rotation = std::min(law.rupture_rotation, kClosing * height / (2 * ring.outer));
+}
+
 /// Largest moment about z that presses the side of positive y, under a normal force.
 double find_resistance(const mbs::MomentFamily& f, double N) {
   const size_t J = f.plastic_rotation.size();
@@ -308,11 +317,7 @@ void Builder::connect_shaft(int index) {
       if (e.charge >= 0) name += number++ > 0 ? fmt::format("/mouth{}", number) : "/mouth";
       mbs::ZoneLaw law = make_zone_law(rcc, EI_y, EI_z, name, k);
       law.biaxial_exponent = std::clamp(rcc.biaxial_exponent, 1.0, 4.0);
-      // edges that are crushed meet as a contact, and so do the lips of a mouth that closes
-      law.crush_length = std::min(law.crush_length, kCrushing * e.ring.thickness);
-      law.rupture_rotation = find_end(rcc);
-      if (joint.height > 0)
-        law.rupture_rotation = std::min(law.rupture_rotation, kClosing * joint.height / (2 * e.ring.outer));
+      end_at_contact(law, rcc, e.ring, joint.height);
       const Vec3 p_W = m.start + joint.at * up + e.whole.y * along + e.whole.z * across;
       const mbs::LawId id = mbs::add_law(model, law);
       e.element = add_element(name, index, joint.below, joint.above, p_W, axes, {rcc.EA / l, rcc.GA / l, rcc.GA / l},
@@ -394,8 +399,7 @@ void Builder::fire_shaft(const Firing& firing, mbs::Event& event, mbs::Event& li
           const nearfield::Rcc rcc = nearfield::make_ring_rcc(in);
           mbs::ZoneLaw law = make_zone_law(rcc, was.rotational_stiffness.y * joint.length,
                                            was.rotational_stiffness.z * joint.length, m.name + "/transition", k);
-          law.crush_length = std::min(law.crush_length, kCrushing * e.ring.thickness);
-          law.rupture_rotation = std::min(find_end(rcc), kClosing * joint.height / (2 * e.ring.outer));
+          end_at_contact(law, rcc, e.ring, joint.height);
           cage_laws[damaged] = mbs::add_law(model, law);
         }
         switch_to(cage_laws[damaged], 1);

@@ -265,6 +265,16 @@ TEST(ShaftPhysics, ASmallMouthLeavesItStanding) {
     if (f.id == "mechanism") { EXPECT_EQ(f.title, "Mechanism: stands") << f.text; }
 }
 
+// its edges, or the lips of its mouth, meet as a contact
+TEST(Shaft, NoRingHoldsTogetherBecauseItIsPressed) {
+  Knowledge k = default_knowledge();
+  k.zone_rupture_rotation_pressed = 1;
+  ModelMap map;
+  const mbs::Model model = make_model(read(tower(slender + strong, mouth("1.5 m", "200 deg"), "1 s")), k, map);
+  ASSERT_FALSE(model.laws.empty());
+  for (const mbs::ZoneLaw& law : model.laws) EXPECT_EQ(law.rupture_rotation_pressed, 0) << law.name;
+}
+
 TEST(Shaft, WhatIsNotModelledSaysSo) {
   const std::string near_each_other =
       mouth("2 m", "200 deg") +
