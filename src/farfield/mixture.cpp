@@ -18,6 +18,10 @@ constexpr double kLeast = 0.01;
 /// Softening of at most so many E: the solver refuses three shear moduli, 1.25 E.
 constexpr double kSteepest = 0.5;
 
+/// Largest mean tension over the yield stress in tension: that of pure pull along a member, and in both directions of a
+/// panel. What is held from contracting sideways, at a foot or beside a stiffer part, cracks all the same.
+constexpr double kAlongMember = 1.0 / 3, kInPanel = 2.0 / 3;
+
 /// Stress over the gross area as a function of strain, both positive in tension.
 using Curve = std::function<double(double)>;
 
@@ -133,6 +137,7 @@ fem::ExplicitMaterial make_section_material(const nearfield::ZoneInput& in, doub
   m.density = in.concrete.density;
   m.nu = kPoisson;
   m.E = in.concrete.Ec + steel / area * (in.steel.Es - in.concrete.Ec);
+  m.tension_cutoff = kAlongMember;
   fill_law(
       m, [&](double e) { return nearfield::calc_resultants(fibres, e, 0).N / area; }, fibres.core.eps_ct,
       in.steel.fy / in.steel.Es, in.steel.eps_u, zone.length / element_length);
@@ -145,6 +150,7 @@ fem::ExplicitMaterial make_panel_material(const product::Plan& plan, const produ
   m.name = panel.name;
   m.density = panel.density;
   m.nu = kPoisson;
+  m.tension_cutoff = kInPanel;
   if (panel.concrete < 0) {
     m.E = panel.modulus;
     m.yield = {{0, 0.1e6, panel.strength}};
