@@ -4,6 +4,7 @@ import { Boxes } from "./boxes";
 import { linear } from "./colour";
 import type { Frame, Quadruple, Run, Triple } from "./data";
 import { calcPose, findFrame } from "./data";
+import { SignMesh, type SignShape } from "./sign_mesh";
 import type { Theme } from "./site";
 import type { Colouring, ZoneMarks } from "./state";
 import { colourOfKind, colourOfMaterial, colourOfUtilisation, highestSpeed, zoneStates } from "./vocabulary";
@@ -11,31 +12,6 @@ import { findMaterials, findParts, findZonesOfBodies, partOfShape, type ZonesOfB
 
 const broken = 3; // index in zoneStates
 const outside = new THREE.Matrix4().makeScale(0, 0, 0);
-
-function makeMarkGeometry(shape: string): THREE.BufferGeometry {
-  switch (shape) {
-    case "triangle":
-      return new THREE.ConeGeometry(1.1, 1.7, 3).rotateX(Math.PI / 2);
-    case "diamond":
-      return new THREE.OctahedronGeometry(1.15);
-    case "cross": {
-      const box = new THREE.BoxGeometry(2.4, 0.6, 0.6);
-      return mergeGeometries([box.clone().rotateY(Math.PI / 4), box.clone().rotateY(-Math.PI / 4), box.clone().rotateZ(Math.PI / 2)]);
-    }
-    case "star":
-      return new THREE.TetrahedronGeometry(1.4);
-    default:
-      return new THREE.SphereGeometry(0.7, 10, 8);
-  }
-}
-
-function mergeGeometries(parts: THREE.BufferGeometry[]): THREE.BufferGeometry {
-  const positions: number[] = [];
-  for (const part of parts) positions.push(...part.toNonIndexed().getAttribute("position").array);
-  const geometry = new THREE.BufferGeometry();
-  geometry.setAttribute("position", new THREE.Float32BufferAttribute(positions, 3));
-  return geometry;
-}
 
 const rampSteps = 64;
 const ramp = Array.from({ length: rampSteps + 1 }, (_, i) => linear(colourOfUtilisation(i / rampSteps)));
@@ -61,7 +37,8 @@ export class Building {
   private readonly bodyPose: THREE.Matrix4[];
   private readonly bodyColour: [number, number, number][];
   private readonly hidden: Uint8Array; // (B)
-  private readonly marks: THREE.InstancedMesh<THREE.BufferGeometry, THREE.MeshBasicMaterial>[];
+  private readonly marks: SignMesh;
+  private readonly markColours = zoneStates.map((state) => new THREE.Color(state.colour));
   private readonly zonePlace: { body: number; local: THREE.Vector3 }[];
   private readonly selection: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
   private colouring: Colouring = "kind";
@@ -83,18 +60,9 @@ export class Building {
     this.markSize = Math.min(0.6, Math.max(0.15, this.height * 0.013));
 
     this.zonePlace = run.zones.map((zone) => this.placeZone(zone.place, zone.body_a >= 0 ? zone.body_a : zone.body_b));
-    this.marks = zoneStates.map((state) => {
-      const mesh = new THREE.InstancedMesh(
-        makeMarkGeometry(state.shape),
-        new THREE.MeshBasicMaterial({ color: state.colour, depthTest: false, transparent: true, opacity: 0.95 }),
-        Math.max(1, run.zones.length),
-      );
-      mesh.count = 0;
-      mesh.frustumCulled = false;
-      mesh.renderOrder = 10;
-      this.group.add(mesh);
-      return mesh;
-    });
+    this.marks = new SignMesh(0.95);
+    this.marks.mesh.renderOrder = 10;
+    this.group.add(this.marks.mesh);
 
     const edges = new THREE.EdgesGeometry(new THREE.BoxGeometry(1, 1, 1));
     this.selection = new THREE.LineSegments(edges, new THREE.LineBasicMaterial({ depthTest: false }));
@@ -216,7 +184,8 @@ export class Building {
 
   setTheme(theme: Theme, dark: boolean): void {
     this.selection.material.color.set(theme.selection);
-    zoneStates.forEach((state, i) => this.marks[i]?.material.color.set((dark ? state.onDark : undefined) ?? state.colour));
+    zoneStates.forEach((state, i) => this.markColours[i]?.set((dark ? state.onDark : undefined) ?? state.colour));
+    this.placeMarks();
   }
 
   setTime(t: number): void {
@@ -255,7 +224,7 @@ export class Building {
     material.clippingPlanes = planes;
     material.side = planes.length > 0 ? THREE.DoubleSide : THREE.FrontSide;
     material.needsUpdate = true;
-    for (const mesh of this.marks) mesh.material.clippingPlanes = planes;
+    this.marks.mesh.material.clippingPlanes = planes;
   }
 
   /// A run shown for comparison only: in one colour, see-through unless `opacity` is 1.
@@ -275,24 +244,19 @@ export class Building {
     const now = this.run.frames[frame];
     // A break is marked while it is fresh: later its parts lie apart, and marks would hide them.
     const before = this.run.frames[findFrame(this.run.time, this.time - 0.4).frame];
-    for (const mesh of this.marks) mesh.count = 0;
+    this.marks.clear();
     if (this.zoneMarks !== "none" && now !== undefined && before !== undefined)
       for (let z = 0; z < this.run.zones.length; ++z) {
         const state = now.state[z] as number;
-        const mesh = this.marks[state];
-        if (mesh === undefined || (this.zoneMarks === "damaged" && (state === 0 || (state === broken && before.state[z] === broken)))) continue;
+        const colour = this.markColours[state];
+        if (colour === undefined || (this.zoneMarks === "damaged" && (state === 0 || (state === broken && before.state[z] === broken)))) continue;
         const { body, local } = this.zonePlace[z] as { body: number; local: THREE.Vector3 };
         if (body >= 0 && this.hidden[body] === 1) continue;
         this.point.copy(local);
         if (body >= 0) this.point.applyMatrix4(this.bodyPose[body] as THREE.Matrix4);
-        const size = state === 0 ? 0.6 * this.markSize : this.markSize;
-        this.matrix.makeScale(size, size, size).setPosition(this.point);
-        mesh.setMatrixAt(mesh.count++, this.matrix);
+        this.marks.add((zoneStates[state]?.shape ?? "circle") as SignShape, this.point, state === 0 ? 0.6 * this.markSize : this.markSize, colour);
       }
-    for (const mesh of this.marks) {
-      mesh.instanceMatrix.needsUpdate = true;
-      mesh.visible = mesh.count > 0;
-    }
+    this.marks.commit();
   }
 
   /// Centre of a body at the time shown; false where it has no pose or is left out.

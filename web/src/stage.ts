@@ -284,6 +284,5 @@ export function disposeOf(root: THREE.Object3D): void {
       (one as THREE.SpriteMaterial | undefined)?.map?.dispose();
       one?.dispose();
     }
-    if (object instanceof THREE.InstancedMesh) object.dispose();
   });
 }

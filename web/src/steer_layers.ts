@@ -2,6 +2,7 @@
 import * as THREE from "three";
 import type { Building } from "./building";
 import type { Run } from "./data";
+import { SignMesh } from "./sign_mesh";
 import { wordsOfEvent } from "./vocabulary";
 import { findBody } from "./zones";
 
@@ -134,26 +135,16 @@ const most = 400;
 /// Signs of what has just happened (contacts, touchdowns, breaks) and of charges that wait.
 export class EventLayer {
   readonly group = new THREE.Group();
-  private readonly rings: THREE.InstancedMesh<THREE.BufferGeometry, THREE.MeshBasicMaterial>;
-  private readonly charges: THREE.InstancedMesh<THREE.BufferGeometry, THREE.MeshBasicMaterial>;
-  private readonly matrix = new THREE.Matrix4();
+  private readonly signs = new SignMesh(0.9);
   private readonly place = new THREE.Vector3();
   private readonly colour = new THREE.Color();
+  private readonly chargeColour = new THREE.Color("#e0218a");
   private bodies = new Map<string, number>();
   private run: Run | undefined;
 
   constructor() {
-    const make = (geometry: THREE.BufferGeometry, colour: string): THREE.InstancedMesh<THREE.BufferGeometry, THREE.MeshBasicMaterial> => {
-      const mesh = new THREE.InstancedMesh(geometry, new THREE.MeshBasicMaterial({ color: colour, depthTest: false, transparent: true, opacity: 0.9 }), most);
-      mesh.instanceColor = new THREE.InstancedBufferAttribute(new Float32Array(3 * most).fill(1), 3);
-      mesh.count = 0;
-      mesh.frustumCulled = false;
-      mesh.renderOrder = 12;
-      this.group.add(mesh);
-      return mesh;
-    };
-    this.rings = make(new THREE.TorusGeometry(1, 0.16, 6, 24), "#ffffff");
-    this.charges = make(new THREE.CylinderGeometry(0.5, 0.5, 2.2, 10).rotateX(Math.PI / 2), "#e0218a");
+    this.signs.mesh.renderOrder = 12;
+    this.group.add(this.signs.mesh);
   }
 
   private findBody(run: Run, name: string): number {
@@ -167,6 +158,7 @@ export class EventLayer {
   }
 
   update(run: Run, building: Building, time: number, waiting: readonly { member: string }[]): void {
+    this.signs.clear();
     let n = 0;
     for (let k = run.events.length - 1; k >= 0 && n < most; --k) {
       const event = run.events[k];
@@ -175,24 +167,17 @@ export class EventLayer {
       if (body < 0 || !building.findPlace(body, this.place)) continue;
       const age = (time - event.time) / shownFor;
       const size = building.markSize * (event.kind === "touchdown" ? 3 : 1.8) * (1 + age);
-      this.matrix.makeScale(size, size, size).setPosition(this.place);
-      this.rings.setMatrixAt(n, this.matrix);
-      this.rings.setColorAt(n++, this.colour.set(wordsOfEvent(event.kind).colour.startsWith("#") ? wordsOfEvent(event.kind).colour : "#8a5a3c"));
+      const { colour } = wordsOfEvent(event.kind);
+      this.signs.add("ring", this.place, size, this.colour.set(colour.startsWith("#") ? colour : "#8a5a3c"), true);
+      ++n;
     }
-    this.rings.count = n;
     n = 0;
     for (const { member } of waiting) {
       const body = n < most ? this.findBody(run, member) : -1;
       if (body < 0 || !building.findPlace(body, this.place)) continue;
-      const size = 0.8 * building.markSize;
-      this.matrix.makeScale(size, size, size).setPosition(this.place);
-      this.charges.setMatrixAt(n++, this.matrix);
+      this.signs.add("bar", this.place, 0.8 * building.markSize, this.chargeColour);
+      ++n;
     }
-    this.charges.count = n;
-    for (const mesh of [this.rings, this.charges]) {
-      mesh.visible = mesh.count > 0;
-      mesh.instanceMatrix.needsUpdate = true;
-      if (mesh.instanceColor !== null) mesh.instanceColor.needsUpdate = true;
-    }
+    this.signs.commit();
   }
 }
