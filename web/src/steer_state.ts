@@ -94,6 +94,9 @@ export function makeSteerState(address: string) {
   const branch = computed(() => branches.value.find((b) => b.id === active.value));
   const phase = computed(() => progress.value?.phase ?? session.value?.phase ?? "paused");
   const frontier = computed(() => progress.value?.time ?? branch.value?.frontier ?? 0);
+  /// The branch's charges: the server tells of a branch when it is changed, not when a charge fires.
+  const lastFiring = computed(() => Math.max(-Infinity, ...(branch.value?.charges ?? []).map((c) => c.time).filter((t) => t <= frontier.value)));
+  const charges = computed(() => (branch.value?.charges ?? []).map((c) => ({ ...c, fired: c.fired || (!c.removed && !c.fails && c.time <= lastFiring.value) })));
   /// The end of the time axis: what the plan asks for, or how far the run came.
   const span = computed(() => Math.max(branch.value?.duration ?? 0, frontier.value, view.value?.state.end.value ?? 0, 1e-3));
   /// Neither at its end nor failed: what is found so far may change.
@@ -489,7 +492,7 @@ export function makeSteerState(address: string) {
   return {
     ...look,
     connection, status: connection.status, ask, notify, dismiss, notices, welcomed,
-    session, sessions, branches, branch, active, view, plan, progress, phase, frontier, span, following, editTime, isUnderWay, earlier, log, findings,
+    session, sessions, branches, branch, charges, active, view, plan, progress, phase, frontier, span, following, editTime, isUnderWay, earlier, log, findings,
     studies, samples, watchedStudy, zone, comparison, tab, tall, dialog, hiddenStoreys, section, showDebris, planCheck, editedText, imported, draws,
     edit, tryEdit, arrive, show, fill, runs,
 

@@ -82,17 +82,18 @@ function StageRows(props: { s: SteerState; stage: Stage; charges: Charge[] }) {
 
 function Charges(props: { s: SteerState; branch: Branch }) {
   const { s, branch } = props;
-  const rest = branch.charges.filter((c) => !branch.stages.some((st) => st.index === c.stage));
+  const charges = s.charges.value;
+  const rest = charges.filter((c) => !branch.stages.some((st) => st.index === c.stage));
   return (
     <details open>
       <summary>Charges</summary>
       <ul class="plain-list">
         {branch.stages.map((stage) => (
-          <StageRows s={s} stage={stage} charges={branch.charges.filter((c) => c.stage === stage.index)} />
+          <StageRows s={s} stage={stage} charges={charges.filter((c) => c.stage === stage.index)} />
         ))}
         {rest.length > 0 && <StageRows s={s} stage={{ index: -1, name: "Added", time: rest[0]?.time ?? 0 }} charges={rest} />}
       </ul>
-      {branch.charges.length === 0 && <p class="quiet">None: nothing removes a support.</p>}
+      {charges.length === 0 && <p class="quiet">None: nothing removes a support.</p>}
       <button type="button" class="small" data-test="add-charge" onClick={() => (s.dialog.value = { kind: "charge", member: selectedMember(s) })}>Add a charge…</button>
     </details>
   );

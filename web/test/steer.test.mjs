@@ -74,6 +74,15 @@ describe("steering page", () => {
     near(await d.frontier(), begin + 9 / 269, 2e-3);
   });
 
+  it("lists charges that have fired as done", async () => {
+    const stage = page.locator(".stage-row", { hasText: "Rows A and B" });
+    assert.ok((await d.frontier()) > 0.5);
+    const [, all, done] = /(\d+) charges, (\d+) done/.exec(await stage.textContent());
+    assert.equal(done, all);
+    assert.equal(await page.locator("[data-test=delay-stage-0]").count(), 0, "its time cannot be changed any more");
+    assert.equal(await page.locator("[data-test=delay-stage-1]").count(), 1);
+  });
+
   it("keeps the two clocks apart: scrubbing does not change the run", async () => {
     const frontier = await d.frontier();
     const log = server.sessions[0].log.length;
