@@ -17,7 +17,7 @@ void SystemDeleter::operator()(Course* c) const { delete c; }
 
 Simulation::Simulation(const Model& model, const Options& options) : system_(new System(model, options)) {}
 Simulation::Simulation(const Model& model, const Options& options, const Moment& moment, bool is_successor)
-    : system_(new System(model, options)) {
+    : system_(new System(model, options, 0, true)) {
   go_on(moment, *system_, is_successor);
   course_.reset(new Course(*system_, moment.course));
 }

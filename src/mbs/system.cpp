@@ -35,12 +35,12 @@ double viscous_share(double damping_ratio) { return 4 * damping_ratio / (1 - 2 *
 
 }  // namespace
 
-System::System(const Model& m, const Options& o, size_t width)
+System::System(const Model& m, const Options& o, size_t width, bool has_moment)
     : model(m), options(o), own_lanes(std::make_unique<Lanes>()), lanes(own_lanes.get()) {
   check_model(model);
   lanes->W = width > 0 ? width : kernel::lanes();
   compile();
-  choose_step();
+  if (!has_moment) choose_step();
 }
 
 void System::compile() {

@@ -159,8 +159,9 @@ struct JointCluster {
 
 class System {
  public:
-  /// `width` lanes in a block, 0: as many as the machine has.
-  System(const Model& model, const Options& options, size_t width = 0);
+  ///   width       lanes in a block, 0: as many as the machine has
+  ///   has_moment  a state is read next, which brings its step
+  System(const Model& model, const Options& options, size_t width = 0, bool has_moment = false);
 
   const Model model;
   Options options;
