@@ -231,7 +231,8 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
   const V zero = hn::Zero(d);
 
   // a later block's state on its way
-  for (size_t i = 0; i < kElementFields * kLanes; i += 8) hwy::Prefetch(element + 4 * kElementFields * kLanes + i);
+  constexpr size_t kSize = size_t{kElementFields} * kLanes;
+  for (size_t i = 0; i < kSize; i += 8) hwy::Prefetch(element + 4 * kSize + i);
 
   // places, and paths of the last step (v)
   Modes3 x, v;

@@ -45,7 +45,7 @@ RelaxationSummary relax_system(ExplicitSystem::Inside& in, const RelaxationOptio
     load2 += mass * mass * g2;
   }
   for (const std::uint32_t row : in.loaded)
-    for (size_t c = 0; c < 3; ++c) load2 += std::pow(in.loads[4 * row + c], 2);
+    for (size_t c = 0; c < 3; ++c) load2 += std::pow(in.loads[4 * size_t{row} + c], 2);
 
   kernel::StepJob step = in.make_step();
   step.removes = false, step.linear = step.quadratic = 0, step.weighs = true;
