@@ -337,8 +337,6 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
     // share of compression (eq. 12)
     const V w = hn::Min(num(1), hn::Max(zero, mul(num(law.per_pressure), sub(num(-law.least_pressure), mean))));
     const V limit = fma(sub(y.compression, y.tension), w, y.tension);
-    // bending that a section without normal force bears, over 1.5 elastic stresses (eq. 14): product over sum
-    const V sum = add(y.tension, y.compression), product = mul(num(2 / 1.5), mul(y.tension, y.compression));
     const V iab = mul(ia, ib), iac = mul(ia, ic), ibc = mul(ib, ic);
     const auto bend2 = [&](const V* bent)
                            HWY_ATTR { return fma(bent[0], sub(bent[0], bent[1]), mul(bent[1], bent[1])); };
@@ -348,14 +346,23 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
     const V h2 = fma(
         num(3), t2, fma(num(1.0 / 3), corner2, add(bend2(s.bending), add(bend2(s.bending + 2), bend2(s.bending + 4)))));
     const V top = mul(num(law.cutoff), y.tension);
-    // a bound of what eq. 14 says, without roots
-    const V scaled = mul(limit, sum), scaled2 = mul(scaled, scaled);
-    const auto may_flow = hn::Gt(mul(num(1.2886751345948130), fma(q2, scaled2, mul(h2, mul(product, product)))),
-                                 mul(mul(limit, limit), scaled2));
+    // a bound of what eq. 14 says, without roots: m is at most 2 h
+    const auto may_flow = hn::Gt(mul(num(1.2886751345948130), fma(num(4), h2, q2)), mul(limit, limit));
     const auto tears = hn::Gt(mean, top);
     if (HWY_UNLIKELY(!hn::AllFalse(d, hn::And(live, hn::Or(may_flow, tears))))) {
       // mean stress and what varies come back together, the more so the more they are of one kind (eq. 13, 14)
-      const V pure = hn::Div(product, scaled);
+      // m / h: what the mean stress may still grow towards its own side (margin over rise) and the other (eq. 14)
+      const V t = y.tension, c = y.compression, both = add(t, c), one = num(1);
+      const V mean_size = hn::Min(hn::Sqrt(q2), limit), margin = sub(limit, mean_size);
+      const auto is_pressed = hn::Gt(mul(w, both), t);
+      const V own = hn::IfThenElse(is_pressed, c, t), other = hn::IfThenElse(is_pressed, t, c);
+      const V along_line = hn::Div(add(other, other), both);
+      const V alone = hn::Div(margin, hn::Max(sub(own, mean_size), num(1e-9)));
+      const V rise = hn::IfThenElse(is_pressed, hn::Max(along_line, hn::Min(alone, one)), hn::Min(along_line, alone));
+      const V back = hn::Div(mul(mul(num(0.5), add(limit, mean_size)), both), own), least = add(other, mean_size);
+      const V opposite = hn::IfThenElse(is_pressed, hn::Max(back, least), hn::Min(back, least));
+      const V per_bending =
+          mul(mul(num(1.0 / 3), add(one, hn::Div(mean_size, limit))), add(rise, hn::Div(margin, opposite)));
       const V slope = fma(sub(y.compression_slope, y.tension_slope), w, y.tension_slope);
       const V mu3 = num(3 * law.mu), per_rate = hn::Div(num(1), add(mu3, slope));
       const auto along = [&](const V3& u) HWY_ATTR {
@@ -370,8 +377,8 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
       const V k3 = fma(dbb, s.bending[4], fma(dcc, s.bending[5], mul(two, mul(mul(ibc, dot(x.b, dc)), s.twist[2]))));
       const V alike = hn::Sqrt(fma(k1, k1, fma(k2, k2, mul(k3, k3))));
       // 1.5 over the root of 3
-      const V common = mul(num(0.86602540378443865), mul(alike, pure));
-      const V q = hn::Sqrt(hn::Max(fma(mul(h2, pure), pure, add(q2, common)), num(1e-300)));
+      const V common = mul(num(0.86602540378443865), mul(alike, per_bending));
+      const V q = hn::Sqrt(hn::Max(fma(mul(h2, per_bending), per_bending, add(q2, common)), num(1e-300)));
       const V flow = hn::Max(zero, mul(sub(q, limit), per_rate));
       const V keep = fnma(mu3, hn::Div(flow, q), num(1));
       const V part = mul(keep, sub(num(1), keep));
