@@ -141,6 +141,17 @@ HWY_INLINE Modes transform(const Quad& low, const Quad& high) {
 struct Modes3 {
   V3 a, b, c, d, e, f, g;
 };
+HWY_INLINE void put(const Modes& from, Modes3& to, V V3::*axis) {
+  to.a.*axis = from.a, to.b.*axis = from.b, to.c.*axis = from.c, to.d.*axis = from.d;
+  to.e.*axis = from.e, to.f.*axis = from.f, to.g.*axis = from.g;
+}
+/// Modes of a pair of numbers that lie side by side in the rows of nodes.
+HWY_INLINE void read_modes(const double* HWY_RESTRICT rows, const std::uint16_t* corners, Modes3& first,
+                           V V3::*first_axis, Modes3& second, V V3::*second_axis) {
+  const QuadPair low = load_face(rows, corners), high = load_face(rows, corners + 4 * kLanes);
+  put(transform(low.first, high.first), first, first_axis);
+  put(transform(low.second, high.second), second, second_axis);
+}
 
 /// Derivatives of the volume by the modes but for factors (eq. 3, 4).
 struct Gradients {
@@ -236,29 +247,11 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
 
   // places, and paths of the last step (v)
   Modes3 x, v;
-  {
-    const double* HWY_RESTRICT rows = job.room;
-    const QuadPair low = load_face(rows, corners), high = load_face(rows, corners + 4 * kLanes);
-    const Modes p = transform(low.first, high.first), q = transform(low.second, high.second);
-    x.a.x = p.a, x.b.x = p.b, x.c.x = p.c, x.d.x = p.d, x.e.x = p.e, x.f.x = p.f, x.g.x = p.g;
-    x.a.y = q.a, x.b.y = q.b, x.c.y = q.c, x.d.y = q.d, x.e.y = q.e, x.f.y = q.f, x.g.y = q.g;
-  }
+  read_modes(job.room, corners, x, &V3::x, x, &V3::y);
   reread(corners);
-  {
-    const double* HWY_RESTRICT rows = job.room + 2;
-    const QuadPair low = load_face(rows, corners), high = load_face(rows, corners + 4 * kLanes);
-    const Modes p = transform(low.first, high.first), q = transform(low.second, high.second);
-    x.a.z = p.a, x.b.z = p.b, x.c.z = p.c, x.d.z = p.d, x.e.z = p.e, x.f.z = p.f, x.g.z = p.g;
-    v.a.z = q.a, v.b.z = q.b, v.c.z = q.c, v.d.z = q.d, v.e.z = q.e, v.f.z = q.f, v.g.z = q.g;
-  }
+  read_modes(job.room + 2, corners, x, &V3::z, v, &V3::z);
   reread(corners);
-  {
-    const double* HWY_RESTRICT rows = job.room + 4;
-    const QuadPair low = load_face(rows, corners), high = load_face(rows, corners + 4 * kLanes);
-    const Modes p = transform(low.first, high.first), q = transform(low.second, high.second);
-    v.a.x = p.a, v.b.x = p.b, v.c.x = p.c, v.d.x = p.d, v.e.x = p.e, v.f.x = p.f, v.g.x = p.g;
-    v.a.y = q.a, v.b.y = q.b, v.c.y = q.c, v.d.y = q.d, v.e.y = q.e, v.f.y = q.f, v.g.y = q.g;
-  }
+  read_modes(job.room + 4, corners, v, &V3::x, v, &V3::y);
   const Gradients g = differentiate(x);
   const V inverse = hn::Div(num(1), g.volume);
 
