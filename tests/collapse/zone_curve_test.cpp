@@ -6,7 +6,6 @@
 #include <cmath>
 #include <random>
 
-#include "base/error.h"
 #include "base/unit.h"
 #include "collapse/law.h"
 #include "mbs/solver.h"
@@ -15,23 +14,12 @@
 #include "nearfield/history.h"
 #include "nearfield/solid.h"
 #include "plans.h"
-#include "product/section_file.h"
+#include "zone_I.h"
 
 namespace topple::collapse {
 namespace {
 
 using unit::MN;
-
-/// The ground column of the storehouse: 50 x 50 cm, 64 cm², zone of 39 cm.
-nearfield::ZoneInput make_zone_I() {
-  std::vector<Diagnostic> warnings;
-  std::string text;
-  const product::SectionFile file =
-      product::read_section_file(TOPPLE_SOURCE_DIR "/examples/rcc/zone_I.toml", warnings, text);
-  nearfield::ZoneInput in;
-  in.section = file.section, in.concrete = file.concrete, in.steel = file.steel, in.length = file.length;
-  return in;
-}
 
 /// A family by itself: linear between its rotations, then between its forces.
 struct Reference {

@@ -3,12 +3,11 @@
 
 #include <cmath>
 
-#include "base/error.h"
+#include "../collapse/zone_I.h"
 #include "base/unit.h"
 #include "farfield/mixture.h"
 #include "fem/explicit_system.h"
 #include "fem/mesh.h"
-#include "product/section_file.h"
 
 namespace topple::farfield {
 namespace {
@@ -22,12 +21,7 @@ struct Turned {
 /// Two layers of 25 cm of the storehouse's ground column, 2 x 2 across, foot held, under a rigid head of 32 m that
 /// carries N and turns at 0.6 rad/s: the mean moment at the foot between two rotations, the elongation at the second.
 Turned turn(double N, double from, double to) {
-  std::vector<Diagnostic> warnings;
-  std::string text;
-  const product::SectionFile file =
-      product::read_section_file(TOPPLE_SOURCE_DIR "/examples/rcc/zone_I.toml", warnings, text);
-  nearfield::ZoneInput in;
-  in.section = file.section, in.concrete = file.concrete, in.steel = file.steel, in.length = file.length;
+  const nearfield::ZoneInput in = collapse::make_zone_I();
   const double edge = 0.25, high = 2 * edge, rate = 0.6, hinge = 0.5 * edge;
   fem::ExplicitModel model;
   model.gravity = {};
