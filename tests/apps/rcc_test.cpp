@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "../base/own_folder.h"
 #include "base/file.h"
 #include "nearfield/fibres.h"
 #include "nearfield/solid.h"
@@ -169,10 +170,11 @@ TEST(RccSolidCommand, BothRoutesStandInOneReport) {
 }
 
 TEST(RccFuzzyCommand, FanIsNestedAndHoldsItsOriginals) {
-  const fs::path inputs = fs::path(testing::TempDir()) / "topple_rcc_inputs.toml";
+  const OwnFolder own;
+  const std::string inputs = own / "inputs.toml";
   const std::string table_1 = read_file(TOPPLE_SOURCE_DIR "/examples/rcc/zone_I_fuzzy.toml");
-  replace_file(inputs.string(), table_1 + "[search]\nlevels = [0, 0.5, 1]\nsamples = 600\n");
-  const fs::path folder = run("fuzzy", "--normal-force \"2.9 MN\" --fuzzy " + inputs.string());
+  replace_file(inputs, table_1 + "[search]\nlevels = [0, 0.5, 1]\nsamples = 600\n");
+  const fs::path folder = run("fuzzy", "--normal-force \"2.9 MN\" --fuzzy " + inputs);
   const auto j = nlohmann::json::parse(read_file((folder / "fuzzy.json").string()));
   const auto& fan = j["fans"][0];
   const size_t J = fan["rotation"].size();
@@ -197,15 +199,16 @@ TEST(RccFuzzyCommand, FanIsNestedAndHoldsItsOriginals) {
 }
 
 TEST(RccFuzzyCommand, EveryOriginalIsTheCurveOfItsInputs) {
-  const fs::path inputs = fs::path(testing::TempDir()) / "topple_rcc_inputs.toml";
+  const OwnFolder own;
+  const std::string inputs = own / "inputs.toml";
   const std::string table_1 = read_file(TOPPLE_SOURCE_DIR "/examples/rcc/zone_I_fuzzy.toml");
-  replace_file(inputs.string(), table_1 + "[search]\nlevels = [0, 1]\nsamples = 300\n");
-  const fs::path folder = run("originals", "--normal-force \"2.9 MN\" --fuzzy " + inputs.string());
+  replace_file(inputs, table_1 + "[search]\nlevels = [0, 1]\nsamples = 300\n");
+  const fs::path folder = run("originals", "--normal-force \"2.9 MN\" --fuzzy " + inputs);
   const auto j = nlohmann::json::parse(read_file((folder / "fuzzy.json").string()));
   std::vector<Diagnostic> warnings;
   std::string text;
   const product::SectionFile file = product::read_section_file(section, warnings, text);
-  const product::FuzzyFile fuzzy = product::read_fuzzy_file(inputs.string(), file, warnings, text);
+  const product::FuzzyFile fuzzy = product::read_fuzzy_file(inputs, file, warnings, text);
   const auto& fan = j["fans"][0];
   const auto rotation = fan["rotation"].get<std::vector<double>>();
   int compared = 0;
@@ -228,10 +231,11 @@ TEST(RccFuzzyCommand, EveryOriginalIsTheCurveOfItsInputs) {
 
 TEST(RccFuzzyCommand, CrushingForceHasTheEndsOfTableOne) {
   // left values of Table 1 crush at about 3.2 MN, core values at 8.9 MN (docs/weida.md)
-  const fs::path inputs = fs::path(testing::TempDir()) / "topple_rcc_inputs.toml";
+  const OwnFolder own;
+  const std::string inputs = own / "inputs.toml";
   const std::string table_1 = read_file(TOPPLE_SOURCE_DIR "/examples/rcc/zone_I_fuzzy.toml");
-  replace_file(inputs.string(), table_1 + "[search]\nlevels = [0, 1]\nsamples = 300\n");
-  const fs::path folder = run("crushing", "--normal-force \"3.7 MN\" --fuzzy " + inputs.string());
+  replace_file(inputs, table_1 + "[search]\nlevels = [0, 1]\nsamples = 300\n");
+  const fs::path folder = run("crushing", "--normal-force \"3.7 MN\" --fuzzy " + inputs);
   const auto j = nlohmann::json::parse(read_file((folder / "fuzzy.json").string()));
   const auto& cuts = j["crushing_force"];
   EXPECT_NEAR(cuts.front()["left"].get<double>(), 3.27e6, 0.02e6);

@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "base/error.h"
+#include "own_folder.h"
 
 namespace topple {
 namespace {
@@ -18,13 +19,9 @@ using testing::ThrowsMessage;
 
 class File : public testing::Test {
  protected:
-  File() : folder_(fs::path(testing::TempDir()) / ("topple_file_" + std::to_string(getpid()))) {
-    fs::create_directories(folder_);
-  }
-  ~File() override { fs::remove_all(folder_); }
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  std::string path(const std::string& name) const { return folder_ / name; }
 
-  fs::path folder_;
+  OwnFolder folder_;
 };
 
 TEST_F(File, ComesBackByteForByte) {
@@ -49,7 +46,7 @@ TEST_F(File, SaysWhichFileCannotBeWritten) {
               ThrowsMessage<std::runtime_error>(HasSubstr("/proc/topple/a")));
   fs::create_directories(path("folder/inside"));
   EXPECT_THAT([&] { replace_file(path("folder"), "y"); }, ThrowsMessage<std::runtime_error>(HasSubstr(path("folder"))));
-  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 2) << "a half-written file was left";
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_.path()), {}), 2) << "a half-written file was left";
 }
 
 TEST_F(File, KeepsTheOldOneWhenTheDiskIsFull) {
@@ -64,12 +61,12 @@ TEST_F(File, KeepsTheOldOneWhenTheDiskIsFull) {
   setrlimit(RLIMIT_FSIZE, &before);
   std::signal(SIGXFSZ, handler);
   EXPECT_EQ(read_file(path("a")), "old");
-  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_.path()), {}), 1);
 }
 
 TEST_F(File, RefusesToReadWhatIsNotAFile) {
   EXPECT_THROW(read_file(path("missing")), InputError);
-  EXPECT_THROW(read_file(folder_.string()), InputError);
+  EXPECT_THROW(read_file(folder_.str()), InputError);
 }
 
 }  // namespace

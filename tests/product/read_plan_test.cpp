@@ -10,6 +10,7 @@
 #include <set>
 #include <sstream>
 
+#include "../base/own_folder.h"
 #include "plan_text.h"
 #include "product/plan.h"
 
@@ -525,7 +526,7 @@ TEST(Mass, CountsEveryPieceOfConcreteOnce) {
 class PlanFile : public testing::Test {
  protected:
   std::string write(const std::string& bytes) {
-    const std::string path = testing::TempDir() + "topple_plan_file_test.toml";
+    const std::string path = folder_ / "plan.toml";
     std::ofstream(path, std::ios::binary) << bytes;
     return path;
   }
@@ -540,6 +541,7 @@ class PlanFile : public testing::Test {
     return "none";
   }
   std::string text_;
+  OwnFolder folder_;
 };
 
 TEST_F(PlanFile, IsReadWithItsBytes) {

@@ -4,9 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "../base/own_folder.h"
 #include "base/error.h"
 #include "base/file.h"
 
@@ -135,13 +135,11 @@ TEST(Compare, WritesTablesThatHoldTheNumbers) {
 
 class Photos : public testing::Test {
  protected:
-  Photos() : folder(testing::TempDir() + "topple_photos/") { std::filesystem::create_directories(folder); }
-  ~Photos() override { std::filesystem::remove_all(folder); }
   std::string write(const std::string& name, const std::string& text) const {
-    replace_file(folder + name, text);
-    return folder + name;
+    replace_file(folder / name, text);
+    return folder / name;
   }
-  std::string folder;
+  OwnFolder folder;
 };
 
 TEST_F(Photos, AreReadFromATableBesideThem) {

@@ -12,6 +12,7 @@
 #include <regex>
 #include <sstream>
 
+#include "../base/own_folder.h"
 #include "base/bytes.h"
 #include "base/file.h"
 #include "sample.h"
@@ -22,21 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-/// A folder of this test's own, gone with it.
-class Folder {
- public:
-  Folder() {
-    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-    path_ = fs::path(testing::TempDir()) / (std::string("topple-") + test->test_suite_name() + "-" + test->name());
-    fs::remove_all(path_);
-  }
-  ~Folder() { fs::remove_all(path_); }
-  std::string str() const { return path_.string(); }
-  std::string read(const std::string& name) const { return read_file((path_ / name).string()); }
-
- private:
-  fs::path path_;
-};
+std::string read(const OwnFolder& folder, const std::string& name) { return read_file(folder / name); }
 
 /// Two bodies of three boxes in all, of which one moves and turns; one zone between them.
 Record make_two() {
@@ -108,12 +95,12 @@ TEST(Base64, KnowsTheVectorsOfItsStandard) {
 }
 
 TEST(ExportVtk, PlacesEveryCornerWhereTheRecordHasIt) {
-  const Folder folder;
+  const OwnFolder folder;
   const Record r = make_two();
   const auto paths = export_vtk(r, folder.str());
   EXPECT_EQ(paths.size(), 1 + 1 + 2 * r.time.size());
   for (std::size_t s = 0; s < r.time.size(); ++s) {
-    const std::string vtu = folder.read("vtk/parts_0000" + std::to_string(s) + ".vtu");
+    const std::string vtu = read(folder, "vtk/parts_0000" + std::to_string(s) + ".vtu");
     const auto points = read_array<float>(vtu, "Points"), moved = read_array<float>(vtu, "displacement");
     ASSERT_EQ(points.size(), 4 * 8 * 3U);
     std::size_t i = 0;
@@ -143,25 +130,25 @@ TEST(ExportVtk, PlacesEveryCornerWhereTheRecordHasIt) {
 }
 
 TEST(ExportVtk, ListsEveryFrameAtItsTimeAndZonesMoveWithTheirBody) {
-  const Folder folder;
+  const OwnFolder folder;
   const Record r = make_two();
   export_vtk(r, folder.str());
-  const std::string pvd = folder.read("record.pvd");
+  const std::string pvd = read(folder, "record.pvd");
   const std::regex entry("timestep=\"([^\"]*)\" group=\"\" part=\"([0-9])\" file=\"([^\"]*)\"");
   std::size_t n = 0;
   for (std::sregex_iterator i(pvd.begin(), pvd.end(), entry), end; i != end; ++i, ++n) {
     EXPECT_EQ(std::stod((*i)[1]), r.time[n / 3]);
-    EXPECT_TRUE(fs::is_regular_file(fs::path(folder.str()) / (*i)[3].str())) << (*i)[3];
+    EXPECT_TRUE(fs::is_regular_file(folder.path() / (*i)[3].str())) << (*i)[3];
   }
   EXPECT_EQ(n, 3 * r.time.size());
-  const std::string zones = folder.read("vtk/zones_00003.vtu");
+  const std::string zones = read(folder, "vtk/zones_00003.vtu");
   const auto p = read_array<float>(zones, "Points");
   // body W at frame 3: its zone stood at (0.5, 0.25, 3) when W stood at (0, 2, 3)
   const Vec3 expected = pose_at(r, 3, 1) * Vec3{0.5, -1.75, 0};
   for (int k = 0; k < 3; ++k) EXPECT_NEAR(p[static_cast<std::size_t>(k)], expected[k], 2e-6);
   EXPECT_EQ(read_array<std::uint8_t>(zones, "state"), std::vector<std::uint8_t>{3});
   EXPECT_EQ(read_array<float>(zones, "utilisation"), std::vector<float>{0.75F});
-  const std::string site = folder.read("vtk/site.vtu");
+  const std::string site = read(folder, "vtk/site.vtu");
   EXPECT_EQ(read_array<std::int32_t>(site, "neighbour"), (std::vector<std::int32_t>{-1, 0, 1}));
   EXPECT_EQ(read_array<std::int32_t>(site, "offsets"), (std::vector<std::int32_t>{5, 9, 12}));
 }
@@ -238,10 +225,10 @@ TEST(ExportGltf, WritesEvenAnEmptyRecord) {
 }
 
 TEST(ExportJson, HoldsTheRecordAsPlainNumbers) {
-  const Folder folder;
+  const OwnFolder folder;
   const Record r = make_two();
   export_json(r, folder.str());
-  const json j = json::parse(folder.read("record.json"));
+  const json j = json::parse(read(folder, "record.json"));
   EXPECT_EQ(j["format"], "topple-record-json");
   ASSERT_EQ(j["position"].size(), 4U);
   ASSERT_EQ(j["position"][3].size(), 3U);
@@ -253,24 +240,24 @@ TEST(ExportJson, HoldsTheRecordAsPlainNumbers) {
 }
 
 TEST(ExportJson, TakesAwkwardRecords) {
-  const Folder folder;
+  const OwnFolder folder;
   export_json(make_sample(), folder.str());
-  const json j = json::parse(folder.read("record.json"));
+  const json j = json::parse(read(folder, "record.json"));
   EXPECT_TRUE(j["position"][0][1][1].is_null());  // a NaN
   EXPECT_EQ(j["events"].size(), 3U);
 }
 
 TEST(ExportCsv, HoldsOneLinePerFrameAndBodyAndEachChangeOfAZone) {
-  const Folder folder;
+  const OwnFolder folder;
   const auto paths = export_csv(make_two(), folder.str());
   EXPECT_EQ(paths.size(), 6U);
-  std::istringstream poses(folder.read("poses.csv"));
+  std::istringstream poses(read(folder, "poses.csv"));
   std::vector<std::string> lines;
   for (std::string line; std::getline(poses, line);) lines.push_back(line);
   ASSERT_EQ(lines.size(), 1 + 4 * 3U);
   EXPECT_EQ(lines[0], "time [s],body,x [m],y [m],z [m],qw,qx,qy,qz\r");
   EXPECT_EQ(lines[2], "0.5,W,0,2,3,1,0,0,0\r");
-  EXPECT_EQ(folder.read("zones.csv"),
+  EXPECT_EQ(read(folder, "zones.csv"),
             "time [s],zone,member,subsystem,state,utilisation\r\n"
             "0.5,C-A1-0/top,C-A1-0,six-component element,elastic,0\r\n"
             "1,C-A1-0/top,C-A1-0,six-component element,broken,0.5\r\n");

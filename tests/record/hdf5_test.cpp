@@ -9,6 +9,7 @@
 #include <random>
 #include <thread>
 
+#include "../base/own_folder.h"
 #include "base/error.h"
 #include "base/file.h"
 #include "record/record.h"
@@ -136,11 +137,7 @@ void expect_same(const Record& a, const Record& b) {
 
 class Hdf5 : public testing::Test {
  protected:
-  Hdf5() : folder_(fs::path(testing::TempDir()) / ("topple_hdf5_" + std::to_string(getpid()))) {
-    fs::create_directories(folder_);
-  }
-  ~Hdf5() override { fs::remove_all(folder_); }
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  std::string path(const std::string& name) const { return folder_ / name; }
   std::string code_of_reading(const std::string& name) const {
     try {
       (void)read_hdf5(path(name));
@@ -151,7 +148,7 @@ class Hdf5 : public testing::Test {
     }
   }
 
-  fs::path folder_;
+  OwnFolder folder_;
 };
 
 TEST_F(Hdf5, BringsEveryFieldBackBitForBit) {
@@ -410,7 +407,7 @@ TEST_F(Hdf5, NamesThePathThatCannotBeWritten) {
 
 TEST_F(Hdf5, MakesMissingFoldersAndLeavesNothingBeside) {
   write_hdf5({}, path("a/b/record.h5"));
-  EXPECT_EQ(std::distance(fs::directory_iterator(folder_ / "a/b"), {}), 1);
+  EXPECT_EQ(std::distance(fs::directory_iterator(path("a/b")), {}), 1);
 }
 
 TEST_F(Hdf5, LeavesTheOldFileWhenTheRecordDoesNotFitTogether) {
@@ -423,7 +420,7 @@ TEST_F(Hdf5, LeavesTheOldFileWhenTheRecordDoesNotFitTogether) {
   wrong.series[1].value.push_back(1);
   EXPECT_THROW(write_hdf5(wrong, path("record.h5")), std::logic_error);
   EXPECT_TRUE(read_file(path("record.h5")) == before);
-  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_.path()), {}), 1);
 }
 
 TEST_F(Hdf5, ServesSeveralThreads) {
