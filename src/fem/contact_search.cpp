@@ -5,7 +5,10 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <tuple>
+#include <utility>
 
+#include "base/parallel.h"
 #include "fem/explicit_inside.h"
 #include "fem/segment_contact.h"
 
@@ -15,6 +18,8 @@ namespace {
 
 constexpr size_t kGroup = 64;  // elements
 constexpr int kLook = 16;      // steps between looks at what has moved
+/// Of the margin: how far impacts between two looks may carry something beyond what its speed tells.
+constexpr double kLeastShare = 1.0 / 8;
 
 Vec3 place(const ExplicitState& s, std::uint32_t row) {
   const double* r = s.rows.data() + 8 * static_cast<size_t>(row);
@@ -26,28 +31,13 @@ Vec3 speed(const ExplicitState& s, std::uint32_t row) {
 }
 bool has_mass(const ExplicitState& s, std::uint32_t row) { return s.rows[8 * size_t{row} + kernel::kNodeMass] > 0; }
 
-struct Box {
-  Vec3 low{1e300, 1e300, 1e300}, high{-1e300, -1e300, -1e300};
-  void add(const Vec3& p, double r) {
-    for (int c = 0; c < 3; ++c) low[c] = std::min(low[c], p[c] - r), high[c] = std::max(high[c], p[c] + r);
-  }
-  bool is_empty() const { return low.x > high.x; }
-  bool meets(const Box& b) const {
-    return low.x <= b.high.x && b.low.x <= high.x && low.y <= b.high.y && b.low.y <= high.y && low.z <= b.high.z &&
-           b.low.z <= high.z;
-  }
-  bool has(const Vec3& p, double r) const {
-    return p.x >= low.x - r && p.x <= high.x + r && p.y >= low.y - r && p.y <= high.y + r && p.z >= low.z - r &&
-           p.z <= high.z + r;
-  }
-};
-
 /// A face as the search sees it.
 struct Face {
   std::uint32_t number = 0;
   Vec3 centre, normal;
   Vec3 along, across;  // ξ and η of a point from the middle by scalar products
   double radius = 0, depth = 0;
+  double uneven = 0;  // of the corners, to either side
 };
 struct Point {
   ContactPoint point;
@@ -58,100 +48,140 @@ struct Point {
 struct Skin {
   std::vector<Face> faces;
   std::vector<Point> points;
-  Box box;  // of the faces
+  ContactBox box;  // of the faces
 };
+
+/// Calls body(i) for all i below count, `run` of them a task.
+template <class Body>
+void for_all(size_t count, size_t run, int threads, const Body& body) {
+  (void)parallel_for((count + run - 1) / run, threads, [&](size_t task) {
+    for (size_t i = task * run; i < std::min(count, (task + 1) * run); ++i) body(i);
+  });
+}
 
 class Search {
  public:
-  Search(const ContactSetup& setup, ExplicitState& state)
-      : setup_(setup), s_(state), groups_(static_cast<std::uint32_t>(setup.group_starts.size() - 1)), skins_(groups_) {}
+  Search(const ContactSetup& setup, ExplicitState& state, double h, int threads)
+      : setup_(setup),
+        s_(state),
+        h_(h),
+        threads_(threads),
+        groups_(static_cast<std::uint32_t>(setup.group_starts.size() - 1)),
+        skins_(groups_) {}
 
-  void look(double h) {
+  void look() {
+    const double elapsed = kLook * h_;
+    book_motion(elapsed);
     ContactState& c = s_.contact;
-    const size_t objects = groups_ + s_.particles.size();
-    const size_t known = c.speed.size();
-    c.travel.resize(objects, 0), c.speed.resize(objects), c.spread.resize(objects, 0);
-    const std::vector<Vec3> before = c.speed;
-    const double elapsed = kLook * h;
-    for (std::uint32_t o = 0; o < objects; ++o) {
-      const double spread = c.spread[o];
-      measure(o);
-      if (o >= known) continue;
-      c.spread[o] = std::max(spread, c.spread[o]);
-      c.travel[o] += (std::max(norm(before[o]), norm(c.speed[o])) + c.spread[o]) * elapsed;
-    }
-    for (ContactPair& pair : c.pairs) {
-      const double apart = std::max(norm(c.speed[pair.a] - c.speed[pair.b]), norm(before[pair.a] - before[pair.b]));
-      pair.slack -= (apart + c.spread[pair.a] + c.spread[pair.b]) * elapsed;
-    }
-    // deviations were held at the larger of both ends of the interval; from here on they are the present ones
-    for (std::uint32_t o = 0; o < objects; ++o) measure(o);
-    bool box = c.fresh || s_.particles.size() != c.boxed_particles;
-    for (const double t : c.travel) box = box || t > 0.5 * setup_.reach;
-    if (box) make_pairs();
+    bool stale = c.fresh;
+    for (size_t o = 0; o < c.room.size(); ++o) stale = stale || c.travel[o] > kRoomShare * c.room[o];
+    if (stale)
+      make_pairs();
+    else
+      add_particles();
+    std::vector<ContactPair*> due;
     for (ContactPair& pair : c.pairs) {
       const bool changed = c.changed[pair.b] != 0 || (pair.a < groups_ && c.changed[pair.a] != 0);
-      if (pair.slack >= 0 && !changed) continue;
-      find_candidates(pair);
-      pair.slack = setup_.margin;
-      ++c.searches;
+      if (pair.slack < 0 || changed) due.push_back(&pair);
     }
+    make_skins(due);
+    for_all(due.size(), 64, threads_, [&](size_t i) {
+      find_candidates(*due[i]);
+      due[i]->slack = setup_.margin;
+    });
+    c.searches += static_cast<long long>(due.size());
+    find_near(elapsed);
     std::fill(c.changed.begin(), c.changed.end(), 0);
     c.any_changed = false;
     c.fresh = false;
   }
 
  private:
-  void measure(std::uint32_t o) {
-    ContactState& c = s_.contact;
-    if (o >= groups_) {
-      c.speed[o] = s_.particles[o - groups_].v, c.spread[o] = 0;
-      return;
-    }
+  /// Boxes are made anew when something has travelled by this share of the room around it, which is enough for so many
+  /// steps.
+  static constexpr double kRoomShare = 0.8;
+  static constexpr int kBoxSteps = 640;
+
+  /// Mean velocity of an object and the largest deviation from it.
+  std::pair<Vec3, double> measure(std::uint32_t o) const {
+    if (o >= groups_) return {s_.particles[o - groups_].v, 0};
     Vec3 mean;
     int count = 0;
-    for (std::uint32_t i = setup_.node_starts[o]; i < setup_.node_starts[o + 1]; ++i)
-      if (has_mass(s_, setup_.node_rows[i])) mean += speed(s_, setup_.node_rows[i]), ++count;
+    const auto first = setup_.node_rows.begin() + setup_.node_starts[o],
+               last = setup_.node_rows.begin() + setup_.node_starts[o + 1];
+    for (auto row = first; row != last; ++row)
+      if (has_mass(s_, *row)) mean += speed(s_, *row), ++count;
     if (count > 0) mean *= 1.0 / count;
     double square = 0;
-    for (std::uint32_t i = setup_.node_starts[o]; i < setup_.node_starts[o + 1]; ++i)
-      if (has_mass(s_, setup_.node_rows[i])) {
-        const Vec3 d = speed(s_, setup_.node_rows[i]) - mean;
+    for (auto row = first; row != last; ++row)
+      if (has_mass(s_, *row)) {
+        const Vec3 d = speed(s_, *row) - mean;
         square = std::max(square, dot(d, d));
       }
-    c.speed[o] = mean, c.spread[o] = std::sqrt(square);
+    return {mean, std::sqrt(square)};
+  }
+
+  /// How far objects and pairs may have moved since the last look, at the larger of the speeds at both ends.
+  void book_motion(double elapsed) {
+    ContactState& c = s_.contact;
+    const size_t objects = groups_ + s_.particles.size(), known = c.speed.size();
+    std::vector<Vec3> mean(objects);
+    std::vector<double> spread(objects, 0);
+    for_all(objects, 64, threads_,
+            [&](size_t o) { std::tie(mean[o], spread[o]) = measure(static_cast<std::uint32_t>(o)); });
+    c.travel.resize(objects, 0);
+    for (size_t o = 0; o < known; ++o) {
+      c.spread[o] = std::max(c.spread[o], spread[o]);
+      c.travel[o] += (std::max(norm(c.speed[o]), norm(mean[o])) + c.spread[o]) * elapsed;
+    }
+    for_all(c.pairs.size(), 4096, threads_, [&](size_t i) {
+      ContactPair& pair = c.pairs[i];
+      const double apart = std::max(norm(mean[pair.a] - mean[pair.b]), norm(c.speed[pair.a] - c.speed[pair.b]));
+      pair.slack -= (apart + c.spread[pair.a] + c.spread[pair.b]) * elapsed;
+    });
+    c.speed = std::move(mean), c.spread = std::move(spread);
+  }
+
+  double calc_room(std::uint32_t o) const {
+    const double speed = norm(s_.contact.speed[o]) + s_.contact.spread[o];
+    return std::max(0.5 * setup_.reach, kBoxSteps * h_ * speed);
+  }
+  ContactBox make_box(std::uint32_t o, double room) const {
+    ContactBox box;
+    if (o >= groups_) {
+      box.add(s_.particles[o - groups_].p, s_.particles[o - groups_].full_radius + room);
+      return box;
+    }
+    for (std::uint32_t i = setup_.node_starts[o]; i < setup_.node_starts[o + 1]; ++i)
+      if (has_mass(s_, setup_.node_rows[i])) box.add(place(s_, setup_.node_rows[i]), room);
+    return box;
   }
 
   void make_pairs() {
     ContactState& c = s_.contact;
-    struct Object {
-      Box box;
-      std::uint32_t id;
-    };
-    std::vector<Object> objects;
-    for (std::uint32_t g = 0; g < groups_; ++g) {
-      Object o{{}, g};
-      for (std::uint32_t i = setup_.node_starts[g]; i < setup_.node_starts[g + 1]; ++i)
-        if (has_mass(s_, setup_.node_rows[i])) o.box.add(place(s_, setup_.node_rows[i]), 0.5 * setup_.reach);
-      if (!o.box.is_empty()) objects.push_back(o);
-    }
-    for (size_t i = 0; i < s_.particles.size(); ++i) {
-      Object o{{}, groups_ + static_cast<std::uint32_t>(i)};
-      o.box.add(s_.particles[i].p, s_.particles[i].full_radius + 0.5 * setup_.reach);
-      objects.push_back(o);
-    }
-    std::sort(objects.begin(), objects.end(), [](const Object& a, const Object& b) {
-      return a.box.low.x < b.box.low.x || (a.box.low.x == b.box.low.x && a.id < b.id);
+    const size_t objects = groups_ + s_.particles.size();
+    c.boxes.resize(objects), c.room.resize(objects);
+    for_all(objects, 64, threads_, [&](size_t i) {
+      const auto o = static_cast<std::uint32_t>(i);
+      c.room[o] = calc_room(o);
+      c.boxes[o] = make_box(o, c.room[o]);
+    });
+    std::vector<std::uint32_t> ids;
+    for (std::uint32_t o = 0; o < objects; ++o)
+      if (!c.boxes[o].is_empty()) ids.push_back(o);
+    std::sort(ids.begin(), ids.end(), [&](std::uint32_t a, std::uint32_t b) {
+      return std::pair(c.boxes[a].low.x, a) < std::pair(c.boxes[b].low.x, b);
     });
     std::vector<std::array<std::uint32_t, 2>> met;  // larger number first
     c.particle_pairs.clear();
-    for (size_t i = 0; i < objects.size(); ++i) {
-      if (objects[i].id < groups_) met.push_back({objects[i].id, objects[i].id});
-      for (size_t j = i + 1; j < objects.size() && objects[j].box.low.x <= objects[i].box.high.x; ++j) {
-        if (!objects[i].box.meets(objects[j].box)) continue;
-        const std::uint32_t a = std::max(objects[i].id, objects[j].id), b = std::min(objects[i].id, objects[j].id);
+    for (size_t i = 0; i < ids.size(); ++i) {
+      const ContactBox& box = c.boxes[ids[i]];
+      if (ids[i] < groups_) met.push_back({ids[i], ids[i]});
+      for (size_t j = i + 1; j < ids.size() && c.boxes[ids[j]].low.x <= box.high.x; ++j) {
+        if (!box.meets(c.boxes[ids[j]])) continue;
+        const std::uint32_t a = std::max(ids[i], ids[j]), b = std::min(ids[i], ids[j]);
         if (b >= groups_)
-          c.particle_pairs.push_back({b - groups_, a - groups_});
+          c.particle_pairs.push_back({a - groups_, b - groups_});
         else
           met.push_back({a, b});
       }
@@ -169,34 +199,138 @@ class Search {
         pair.a = met[i][0], pair.b = met[i][1];
     }
     c.pairs = std::move(pairs);
-    c.boxed_particles = static_cast<std::uint32_t>(s_.particles.size());
     std::fill(c.travel.begin(), c.travel.end(), 0.0);
   }
 
-  const Skin& skin_of(std::uint32_t g) {
-    if (skins_[g]) return *skins_[g];
-    Skin& skin = skins_[g].emplace();
+  /// Pairs of particles that have come since boxes were made: those of the others hold as long as they do.
+  void add_particles() {
+    ContactState& c = s_.contact;
+    for (auto a = static_cast<std::uint32_t>(c.boxes.size()); a < groups_ + s_.particles.size(); ++a) {
+      c.room.push_back(calc_room(a));
+      c.boxes.push_back(make_box(a, c.room.back()));
+      for (std::uint32_t b = 0; b < a; ++b) {
+        if (!c.boxes[a].meets(c.boxes[b])) continue;
+        if (b >= groups_)
+          c.particle_pairs.push_back({a - groups_, b - groups_});
+        else
+          c.pairs.push_back({a, b, -1, {}});
+      }
+    }
+  }
+
+  /// What may touch within `ahead`, at twice the present speeds and a share of the margin for impacts in between.
+  void find_near(double ahead) {
+    ContactState& c = s_.contact;
+    const double least = kLeastShare * setup_.margin;
+    constexpr size_t kRun = 512;
+    std::vector<std::vector<ContactCandidate>> found((c.pairs.size() + kRun - 1) / kRun);
+    for_all(c.pairs.size(), kRun, threads_, [&](size_t i) {
+      const ContactPair& pair = c.pairs[i];
+      if (pair.candidates.empty()) return;
+      const double path =
+          2 * ahead * (norm(c.speed[pair.a] - c.speed[pair.b]) + c.spread[pair.a] + c.spread[pair.b]) + least;
+      for (const ContactCandidate& candidate : pair.candidates)
+        if (is_near(candidate, path)) found[i / kRun].push_back(candidate);
+    });
+    c.near.clear();
+    for (const auto& list : found)
+      for (const ContactCandidate& candidate : list) c.near.push_back({candidate, {}});
+    std::sort(c.near.begin(), c.near.end(),
+              [](const NearCandidate& a, const NearCandidate& b) { return a.candidate < b.candidate; });
+    for (NearCandidate& near : c.near) near.rows = rows_of(near.candidate.face);
+    std::vector<std::vector<ParticlePair>> near((c.particle_pairs.size() + kRun - 1) / kRun);
+    for_all(c.particle_pairs.size(), kRun, threads_, [&](size_t i) {
+      const ParticlePair& pair = c.particle_pairs[i];
+      const Particle &a = s_.particles[pair[0]], &b = s_.particles[pair[1]];
+      const Vec3 d = a.p - b.p, v = a.v - b.v;
+      const double reach = a.radius + b.radius + least;
+      // (reach + path)² below what this is: the root of the speed's square is not needed far away
+      const double square = dot(d, d);
+      if (square > 2 * (reach * reach + 4 * ahead * ahead * dot(v, v))) return;
+      if (std::sqrt(square) < reach + 2 * ahead * norm(v)) near[i / kRun].push_back(pair);
+    });
+    c.near_particles.clear();
+    for (const auto& list : near) c.near_particles.insert(c.near_particles.end(), list.begin(), list.end());
+  }
+
+  /// Whether a point and a face may touch when they move against each other by `path`.
+  bool is_near(const ContactCandidate& candidate, double path) const {
+    const ContactPoint& point = candidate.point;
+    const auto is_gone = [&](std::uint32_t face) { return s_.contact.gone[face / 6] != 0; };
+    if (is_gone(candidate.face) || (point.kind == ContactPoint::Centre && is_gone(point.index))) return false;
+    Vec3 p;
+    double radius = 0;
+    switch (point.kind) {
+      case ContactPoint::Node:
+        p = place(s_, point.index);
+        break;
+      case ContactPoint::Centre:
+        for (const Vec3& x : corners_of(point.index)) p += 0.25 * x;
+        break;
+      case ContactPoint::Debris:
+        p = s_.particles[point.index].p, radius = s_.particles[point.index].radius;
+    }
+    const Face face = make_face(candidate.face);
+    const Vec3 d = p - face.centre;
+    const double height = dot(d, face.normal), reach = radius + path;
+    if (height > reach + face.uneven || height < -(face.depth + face.uneven + path)) return false;
+    const double beside = calc_beside(d, face);
+    // a ball at the height of the face's edge may touch it from beside, one below it does not
+    if (height < -(face.uneven + path)) return beside < path;
+    const double above = std::max(0.0, height - face.uneven);
+    return above * above + beside * beside < reach * reach;
+  }
+
+  std::array<std::uint32_t, 4> rows_of(std::uint32_t face) const {
+    std::array<std::uint32_t, 4> rows{};
+    for (size_t k = 0; k < 4; ++k) rows[k] = setup_.rows_of_element[face / 6][static_cast<size_t>(kFaces[face % 6][k])];
+    return rows;
+  }
+  std::array<Vec3, 4> corners_of(std::uint32_t face) const {
+    std::array<Vec3, 4> x;
+    const std::array<std::uint32_t, 4> rows = rows_of(face);
+    for (size_t k = 0; k < 4; ++k) x[k] = place(s_, rows[k]);
+    return x;
+  }
+
+  Face make_face(std::uint32_t number) const {
+    Face face;
+    face.number = number;
+    const std::array<Vec3, 4> x = corners_of(number);
+    Vec3 far;
+    for (const Vec3& p : corners_of(number ^ 1)) far += 0.25 * p;
+    face.centre = 0.25 * (x[0] + x[1] + x[2] + x[3]);
+    const Vec3 n = cross(x[2] - x[0], x[3] - x[1]);
+    face.normal = (1 / std::max(norm(n), 1e-300)) * n;
+    const Vec3 a = 0.25 * (x[1] + x[2] - x[0] - x[3]), b = 0.25 * (x[2] + x[3] - x[0] - x[1]);
+    const double area = std::max(dot(cross(a, b), face.normal), 1e-300);
+    face.along = (1 / area) * cross(b, face.normal), face.across = (1 / area) * cross(face.normal, a);
+    face.depth = kFaceDepth * std::max(0.0, dot(face.normal, face.centre - far));
+    face.uneven = std::abs(dot(x[0] - face.centre, face.normal));
+    return face;
+  }
+
+  void make_skins(const std::vector<ContactPair*>& due) {
+    std::vector<unsigned char> wanted(groups_, 0);
+    for (const ContactPair* pair : due) {
+      wanted[pair->b] = 1;
+      if (pair->a < groups_) wanted[pair->a] = 1;
+    }
+    for_all(groups_, 8, threads_, [&](size_t g) {
+      if (wanted[g] != 0) skins_[g] = make_skin(static_cast<std::uint32_t>(g));
+    });
+  }
+  Skin make_skin(std::uint32_t g) const {
+    Skin skin;
     for (std::uint32_t i = setup_.group_starts[g]; i < setup_.group_starts[g + 1]; ++i) {
       const size_t e = static_cast<size_t>(setup_.order[i]);
       if (s_.contact.gone[e] != 0) continue;
       for (size_t f = 0; f < 6; ++f) {
         const int beside = setup_.surface.neighbour[e][f];
         if (beside >= 0 && s_.contact.gone[static_cast<size_t>(beside)] == 0) continue;
-        Vec3 x[4], far;
-        for (size_t k = 0; k < 4; ++k) {
-          x[k] = place(s_, setup_.rows_of_element[e][static_cast<size_t>(kFaces[f][k])]);
-          far += 0.25 * place(s_, setup_.rows_of_element[e][static_cast<size_t>(kFaces[f ^ 1][k])]);
-        }
-        Face face;
-        face.number = static_cast<std::uint32_t>(6 * e + f);
-        face.centre = 0.25 * (x[0] + x[1] + x[2] + x[3]);
-        const Vec3 n = cross(x[2] - x[0], x[3] - x[1]);
-        face.normal = (1 / std::max(norm(n), 1e-300)) * n;
-        const Vec3 a = 0.25 * (x[1] + x[2] - x[0] - x[3]), b = 0.25 * (x[2] + x[3] - x[0] - x[1]);
-        const double area = std::max(dot(cross(a, b), face.normal), 1e-300);
-        face.along = (1 / area) * cross(b, face.normal), face.across = (1 / area) * cross(face.normal, a);
-        for (const Vec3& p : x) face.radius = std::max(face.radius, norm(p - face.centre)), skin.box.add(p, 0);
-        face.depth = kFaceDepth * std::max(0.0, dot(face.normal, face.centre - far));
+        Face face = make_face(static_cast<std::uint32_t>(6 * e + f));
+        for (const Vec3& p : corners_of(face.number))
+          face.radius = std::max(face.radius, norm(p - face.centre)), skin.box.add(p, 0);
         skin.faces.push_back(face);
         skin.points.push_back({{ContactPoint::Centre, face.number}, face.centre, 0});
       }
@@ -221,6 +355,14 @@ class Search {
     return false;
   }
 
+  /// How far a point is at least beside a face, less what an uneven one may hide.
+  static double calc_beside(const Vec3& d, const Face& face) {
+    constexpr double kUneven = 0.1;
+    const double x = std::max(0.0, std::abs(dot(d, face.along)) - (1 + kUneven)) / norm(face.along);
+    const double y = std::max(0.0, std::abs(dot(d, face.across)) - (1 + kUneven)) / norm(face.across);
+    return std::max(x, y);
+  }
+
   void match(const std::vector<Point>& points, const Skin& skin, std::vector<ContactCandidate>& found) const {
     if (skin.faces.empty()) return;
     for (const Point& q : points) {
@@ -232,19 +374,15 @@ class Search {
         if (height > near || height < -(face.depth + setup_.margin) ||
             dot(d, d) > reach * reach + face.depth * face.depth)
           continue;
-        // beside the face by more than the margin, or what an uneven one may hide
-        constexpr double kUneven = 0.1;
-        if (std::abs(dot(d, face.along)) > 1 + kUneven + near * norm(face.along) ||
-            std::abs(dot(d, face.across)) > 1 + kUneven + near * norm(face.across))
-          continue;
+        if (calc_beside(d, face) > near) continue;
         if (!are_joined(q.point, face.number)) found.push_back({q.point, face.number});
       }
     }
   }
 
-  void find_candidates(ContactPair& pair) {
+  void find_candidates(ContactPair& pair) const {
     pair.candidates.clear();
-    const Skin& b = skin_of(pair.b);
+    const Skin& b = *skins_[pair.b];
     if (pair.a >= groups_) {
       const std::uint32_t i = pair.a - groups_;
       match({{{ContactPoint::Debris, i}, s_.particles[i].p, s_.particles[i].full_radius}}, b, pair.candidates);
@@ -254,13 +392,15 @@ class Search {
       match(b.points, b, pair.candidates);
       return;
     }
-    const Skin& a = skin_of(pair.a);
+    const Skin& a = *skins_[pair.a];
     match(a.points, b, pair.candidates);
     match(b.points, a, pair.candidates);
   }
 
   const ContactSetup& setup_;
   ExplicitState& s_;
+  double h_;
+  int threads_;
   std::uint32_t groups_;
   std::vector<std::optional<Skin>> skins_;
 };
@@ -317,15 +457,25 @@ ContactSetup make_contact_setup(const ExplicitModel& model, const ExplicitChunks
   return setup;
 }
 
-void search_contact(const ContactSetup& setup, ExplicitState& state, double h, double& seconds) {
+void search_contact(const ContactSetup& setup, ExplicitState& state, double h, int threads, double& seconds) {
   ContactState& c = state.contact;
   if (c.gone.empty()) c.gone.assign(setup.rows_of_element.size(), 0);
   if (c.changed.empty()) c.changed.assign(setup.group_starts.size() - 1, 0);
   if (!c.fresh && --c.countdown > 0) return;
   const auto start = std::chrono::steady_clock::now();
   c.countdown = kLook;
-  Search(setup, state).look(h);
+  Search(setup, state, h, threads).look();
   seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+void hurry_search(const ContactSetup& setup, ExplicitState& state, double h) {
+  ContactState& c = state.contact;
+  const size_t groups = setup.group_starts.size() - 1;
+  const double most = kLeastShare * setup.margin / (kLook * h);
+  for (size_t i = 0; groups + i < c.speed.size(); ++i) {
+    const Vec3 gain = state.particles[i].v - c.speed[groups + i];
+    if (dot(gain, gain) > most * most) c.countdown = 0;
+  }
 }
 
 void mark_changed(const ContactSetup& setup, ContactState& c, int element) {

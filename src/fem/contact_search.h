@@ -1,9 +1,12 @@
 #pragma once
 /// Points of the outer surface against segments (faces) of it, and debris particles: who may touch whom. Groups of
 /// neighbouring elements are looked at first; pairs of groups are looked through again when they have moved against
-/// each other by the search margin (docs/theory/explicit.md, "Contact").
+/// each other by the search margin; of what was found steps see what may touch before the next look
+/// (docs/theory/explicit.md, "Contact").
 
+#include <algorithm>
 #include <array>
+#include <compare>
 #include <cstdint>
 #include <vector>
 
@@ -21,13 +24,37 @@ struct ContactPoint {
   enum Kind : std::uint32_t { Node, Centre, Debris };
   Kind kind = Node;
   std::uint32_t index = 0;  // row of a node; 6 element + face; particle
-  friend bool operator==(const ContactPoint&, const ContactPoint&) = default;
+  friend auto operator<=>(const ContactPoint&, const ContactPoint&) = default;
 };
 
 /// A point that may touch a face.
 struct ContactCandidate {
   ContactPoint point;
   std::uint32_t face = 0;  // 6 element + face
+  friend auto operator<=>(const ContactCandidate&, const ContactCandidate&) = default;
+};
+
+/// A candidate that may touch before the next look, with the rows of its face's corners.
+struct NearCandidate {
+  ContactCandidate candidate;
+  std::array<std::uint32_t, 4> rows{};
+};
+
+/// Along the axes; empty while low is above high.
+struct ContactBox {
+  Vec3 low{1e300, 1e300, 1e300}, high{-1e300, -1e300, -1e300};
+  void add(const Vec3& p, double r) {
+    for (int c = 0; c < 3; ++c) low[c] = std::min(low[c], p[c] - r), high[c] = std::max(high[c], p[c] + r);
+  }
+  bool is_empty() const { return low.x > high.x; }
+  bool meets(const ContactBox& b) const {
+    return low.x <= b.high.x && b.low.x <= high.x && low.y <= b.high.y && b.low.y <= high.y && low.z <= b.high.z &&
+           b.low.z <= high.z;
+  }
+  bool has(const Vec3& p, double r) const {
+    return p.x >= low.x - r && p.x <= high.x + r && p.y >= low.y - r && p.y <= high.y + r && p.z >= low.z - r &&
+           p.z <= high.z + r;
+  }
 };
 
 /// Constant.
@@ -62,19 +89,25 @@ struct SurfaceTouch {
   double stored = 0, depth = 0;
 };
 
+using ParticlePair = std::array<std::uint32_t, 2>;  // the later one first
+
 struct ContactState {
-  std::vector<unsigned char> gone;  // elements
-  std::vector<std::array<std::uint32_t, 2>> particle_pairs;
-  std::vector<ContactPair> pairs;
+  std::vector<unsigned char> gone;           // elements
+  std::vector<ParticlePair> particle_pairs;  // in order
+  std::vector<ContactPair> pairs;            // in the order of a, then b
+  // what may touch before the next look, in order
+  std::vector<NearCandidate> near;
+  std::vector<ParticlePair> near_particles;
+  std::vector<ContactBox> boxes;       // of objects, with their room around them
+  std::vector<double> room;            // at least half the reach, more for what is fast [m]
   std::vector<double> travel;          // of an object since the boxes were made [m]
   std::vector<Vec3> speed;             // mean, of an object, at the last look
   std::vector<double> spread;          // largest deviation from it
   std::vector<unsigned char> changed;  // groups whose surface has changed
   bool any_changed = false;
-  bool fresh = true;  // no boxes yet
-  int countdown = 0;  // steps until the next look
-  std::vector<SurfaceTouch> touches;
-  std::uint32_t boxed_particles = 0;
+  bool fresh = true;                               // no boxes yet
+  int countdown = 0;                               // steps until the next look
+  std::vector<std::vector<SurfaceTouch>> touches;  // of shares of what is near
   long long searches = 0;
 };
 

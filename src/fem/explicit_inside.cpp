@@ -244,15 +244,6 @@ void ExplicitSystem::Inside::advance_nodes(const kernel::StepJob& step, Explicit
   }
 }
 
-void ExplicitSystem::Inside::push(ExplicitState& state, std::uint32_t row, const Vec3& force) const {
-  if ((state.flags[row] & kernel::kPushed) == 0) {
-    state.flags[row] |= kernel::kPushed;
-    for (size_t c = 0; c < 3; ++c) state.pushes[4 * size_t{row} + c] = loads[4 * size_t{row} + c];
-    state.pushed.push_back(row);
-  }
-  for (int c = 0; c < 3; ++c) state.pushes[4 * size_t{row} + static_cast<size_t>(c)] += force[c];
-}
-
 void ExplicitSystem::Inside::clear_pushes(ExplicitState& state) const {
   for (const std::uint32_t row : state.pushed) {
     state.flags[row] = static_cast<std::uint8_t>(state.flags[row] & ~kernel::kPushed);
@@ -274,17 +265,18 @@ void ExplicitSystem::Inside::advance_step(ExplicitState& state, bool removes) {
   double t1 = seconds();
   timing.contact += t1 - t0;
   if (options.contact || !state.particles.empty()) {
-    search_contact(contact, state, h, timing.search);
+    search_contact(contact, state, h, options.threads, timing.search);
     timing.searches = state.contact.searches;
     t1 = seconds();
-    press_surfaces(contact, options, h, state, [&](std::uint32_t row, const Vec3& f) { push(state, row, f); });
+    press_surfaces(*this, state);
     timing.contact += seconds() - t1;
   }
   advance_nodes(step, state);
   const double t2 = seconds();
   move_particles(state);
+  hurry_search(contact, state, h);
   book_grounds(state);
-  book_surfaces(contact, h, state);
+  book_surfaces(*this, state);
   for (const auto& sums : chunk_sums)
     for (size_t k = 0; k < 4; ++k) state.sums[k] += sums[k];
   state.grounded.clear();

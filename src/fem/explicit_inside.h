@@ -104,7 +104,14 @@ struct ExplicitSystem::Inside {
   void press_grounds(ExplicitState&) const;
   void book_grounds(ExplicitState&) const;
   void move_particles(ExplicitState&) const;
-  void push(ExplicitState&, std::uint32_t row, const Vec3& force) const;
+  void push(ExplicitState& state, std::uint32_t row, const Vec3& force) const {
+    if ((state.flags[row] & kernel::kPushed) == 0) {
+      state.flags[row] |= kernel::kPushed;
+      for (size_t c = 0; c < 3; ++c) state.pushes[4 * size_t{row} + c] = loads[4 * size_t{row} + c];
+      state.pushed.push_back(row);
+    }
+    for (int c = 0; c < 3; ++c) state.pushes[4 * size_t{row} + static_cast<size_t>(c)] += force[c];
+  }
   void clear_pushes(ExplicitState&) const;
   /// Elastic energy of an element: in all, in what varies over it, in the corner mode [J].
   std::array<double, 3> calc_elastic(const ExplicitState&, int element) const;

@@ -339,23 +339,24 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
     const V h2 = fma(
         num(3), t2, fma(num(1.0 / 3), corner2, add(bend2(s.bending), add(bend2(s.bending + 2), bend2(s.bending + 4)))));
     const V top = mul(num(law.cutoff), y.tension);
-    // a bound of what eq. 14 says, without roots: m is at most 2 h
-    const auto may_flow = hn::Gt(mul(num(1.2886751345948130), fma(num(4), h2, q2)), mul(limit, limit));
+    // m / h (eq. 14): what the mean stress may still grow towards its own side (margin over rise) and the other
+    const V t = y.tension, c = y.compression, both = add(t, c), one = num(1);
+    const V mean_size = hn::Min(hn::Sqrt(q2), limit), margin = sub(limit, mean_size), reached = add(limit, mean_size);
+    const auto is_pressed = hn::Gt(mul(w, both), t);
+    const V own = hn::IfThenElse(is_pressed, c, t), other = hn::IfThenElse(is_pressed, t, c);
+    const V back = mul(mul(num(0.5), reached), both), least = mul(own, add(other, mean_size));
+    const V opposite = hn::IfThenElse(is_pressed, hn::Max(back, least), hn::Min(back, least));  // times own
+    const V ahead = hn::Max(sub(own, mean_size), num(1e-9));
+    const V per = hn::Div(one, mul(limit, both)), per_side = mul(margin, hn::Div(one, mul(ahead, opposite)));
+    const V along_line = mul(add(other, other), mul(limit, per)), alone = mul(opposite, per_side);
+    const V rise = hn::IfThenElse(is_pressed, hn::Max(along_line, hn::Min(alone, one)), hn::Min(along_line, alone));
+    const V per_bending = mul(mul(num(1.0 / 3), mul(reached, mul(both, per))), fma(mul(own, ahead), per_side, rise));
+    // k is at most 4/√3 q m, in an element of any shape
+    const V m2 = mul(mul(h2, per_bending), per_bending), left = sub(mul(limit, limit), add(q2, m2));
+    const auto may_flow = hn::Or(hn::Lt(left, zero), hn::Lt(mul(left, left), mul(num(16.0 / 9), mul(q2, m2))));
     const auto tears = hn::Gt(mean, top);
     if (HWY_UNLIKELY(!hn::AllFalse(d, hn::And(live, hn::Or(may_flow, tears))))) {
       // mean stress and what varies come back together, the more so the more they are of one kind (eq. 13, 14)
-      // m / h: what the mean stress may still grow towards its own side (margin over rise) and the other (eq. 14)
-      const V t = y.tension, c = y.compression, both = add(t, c), one = num(1);
-      const V mean_size = hn::Min(hn::Sqrt(q2), limit), margin = sub(limit, mean_size);
-      const auto is_pressed = hn::Gt(mul(w, both), t);
-      const V own = hn::IfThenElse(is_pressed, c, t), other = hn::IfThenElse(is_pressed, t, c);
-      const V along_line = hn::Div(add(other, other), both);
-      const V alone = hn::Div(margin, hn::Max(sub(own, mean_size), num(1e-9)));
-      const V rise = hn::IfThenElse(is_pressed, hn::Max(along_line, hn::Min(alone, one)), hn::Min(along_line, alone));
-      const V back = hn::Div(mul(mul(num(0.5), add(limit, mean_size)), both), own), least = add(other, mean_size);
-      const V opposite = hn::IfThenElse(is_pressed, hn::Max(back, least), hn::Min(back, least));
-      const V per_bending =
-          mul(mul(num(1.0 / 3), add(one, hn::Div(mean_size, limit))), add(rise, hn::Div(margin, opposite)));
       const V slope = fma(sub(y.compression_slope, y.tension_slope), w, y.tension_slope);
       const V mu3 = num(3 * law.mu), per_rate = hn::Div(num(1), add(mu3, slope));
       const auto along = [&](const V3& u) HWY_ATTR {
@@ -371,43 +372,45 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
       const V alike = hn::Sqrt(fma(k1, k1, fma(k2, k2, mul(k3, k3))));
       // 1.5 over the root of 3
       const V common = mul(num(0.86602540378443865), mul(alike, per_bending));
-      const V q = hn::Sqrt(hn::Max(fma(mul(h2, per_bending), per_bending, add(q2, common)), num(1e-300)));
-      const V flow = hn::Max(zero, mul(sub(q, limit), per_rate));
-      const V keep = fnma(mu3, hn::Div(flow, q), num(1));
-      const V part = mul(keep, sub(num(1), keep));
-      const V opening = hn::Max(zero, hn::Div(sub(mean, top), num(law.bulk)));
-      mean = hn::Min(mean, top);
-      sxx = fma(dx, keep, mean), syy = fma(dy, keep, mean), szz = fma(dz, keep, mean);
-      sxy = mul(sxy, keep), syz = mul(syz, keep), szx = mul(szx, keep);
-      // an infinite cutoff leaves no opening, but infinity times nothing
-      const V torn = hn::IfThenElseZero(tears, mul(hn::Min(top, num(1e300)), opening));
-      const V spent = fma(mul(part, q2), num(1 / (3 * law.mu)), torn);
-      const V volume = hn::IfThenElseZero(live, mul(num(1.0 / 64), g.volume)), weight = mul(volume, part);
-      sums.mean = fma(volume, spent, sums.mean);
-      const auto store = [&](const V* bent) HWY_ATTR {  // three times twice the energy over the volume
-        return fma(bent[0], fnma(num(2 * law.nu), bent[1], bent[0]), mul(bent[1], bent[1]));
-      };
-      V stored = add(store(s.bending), add(store(s.bending + 2), store(s.bending + 4)));
-      const V corner_energy = mul(num(1.0 / (9 * law.E)), corner2);
-      stored = fma(num(1.0 / (3 * law.E)), stored, fma(num(1.0 / (3 * law.mu)), t2, corner_energy));
-      sums.varying = fma(weight, stored, sums.varying);
-      sums.corner = fma(weight, corner_energy, sums.corner);
-      for (V& a : s.bending) a = mul(a, keep);
-      for (V& a : s.twist) a = mul(a, keep);
-      for (V& a : s.corner) a = mul(a, keep);
-      const V more = add(flow, opening);
-      strain = add(strain, more);
-      const V wear = fma(num(law.compression_rate - law.tension_rate), w, num(law.tension_rate));
-      const V damage = fma(more, wear, load_field(element, kDamage));
-      store_field(strain, element, kStrain);
-      store_field(damage, element, kDamage);
-      const auto gone = hn::And(live, hn::Ge(damage, num(1)));
-      if (HWY_UNLIKELY(step.removes && !hn::AllFalse(d, gone))) {
-        HWY_ALIGN double pressed[kLanes], lane_damage[kLanes], lane_mass[kLanes];
-        hn::Store(mean, d, pressed), hn::Store(damage, d, lane_damage), hn::Store(mass, d, lane_mass);
-        for (size_t l = 0; l < kLanes; ++l)
-          if (lane_mass[l] > 0 && lane_damage[l] >= 1)
-            job.failed->push_back(static_cast<std::uint32_t>(4 * (block * kLanes + l) + (pressed[l] > 0 ? 1 : 2)));
+      const V q = hn::Sqrt(hn::Max(add(m2, add(q2, common)), num(1e-300)));
+      if (HWY_UNLIKELY(!hn::AllFalse(d, hn::And(live, hn::Or(hn::Gt(q, limit), tears))))) {
+        const V flow = hn::Max(zero, mul(sub(q, limit), per_rate));
+        const V keep = fnma(mu3, hn::Div(flow, q), num(1));
+        const V part = mul(keep, sub(num(1), keep));
+        const V opening = hn::Max(zero, mul(num(1 / law.bulk), sub(mean, top)));
+        mean = hn::Min(mean, top);
+        sxx = fma(dx, keep, mean), syy = fma(dy, keep, mean), szz = fma(dz, keep, mean);
+        sxy = mul(sxy, keep), syz = mul(syz, keep), szx = mul(szx, keep);
+        // an infinite cutoff leaves no opening, but infinity times nothing
+        const V torn = hn::IfThenElseZero(tears, mul(hn::Min(top, num(1e300)), opening));
+        const V spent = fma(mul(part, q2), num(1 / (3 * law.mu)), torn);
+        const V volume = hn::IfThenElseZero(live, mul(num(1.0 / 64), g.volume)), weight = mul(volume, part);
+        sums.mean = fma(volume, spent, sums.mean);
+        const auto store = [&](const V* bent) HWY_ATTR {  // three times twice the energy over the volume
+          return fma(bent[0], fnma(num(2 * law.nu), bent[1], bent[0]), mul(bent[1], bent[1]));
+        };
+        V stored = add(store(s.bending), add(store(s.bending + 2), store(s.bending + 4)));
+        const V corner_energy = mul(num(1.0 / (9 * law.E)), corner2);
+        stored = fma(num(1.0 / (3 * law.E)), stored, fma(num(1.0 / (3 * law.mu)), t2, corner_energy));
+        sums.varying = fma(weight, stored, sums.varying);
+        sums.corner = fma(weight, corner_energy, sums.corner);
+        for (V& a : s.bending) a = mul(a, keep);
+        for (V& a : s.twist) a = mul(a, keep);
+        for (V& a : s.corner) a = mul(a, keep);
+        const V more = add(flow, opening);
+        strain = add(strain, more);
+        const V wear = fma(num(law.compression_rate - law.tension_rate), w, num(law.tension_rate));
+        const V damage = fma(more, wear, load_field(element, kDamage));
+        store_field(strain, element, kStrain);
+        store_field(damage, element, kDamage);
+        const auto gone = hn::And(live, hn::Ge(damage, num(1)));
+        if (HWY_UNLIKELY(step.removes && !hn::AllFalse(d, gone))) {
+          HWY_ALIGN double pressed[kLanes], lane_damage[kLanes], lane_mass[kLanes];
+          hn::Store(mean, d, pressed), hn::Store(damage, d, lane_damage), hn::Store(mass, d, lane_mass);
+          for (size_t l = 0; l < kLanes; ++l)
+            if (lane_mass[l] > 0 && lane_damage[l] >= 1)
+              job.failed->push_back(static_cast<std::uint32_t>(4 * (block * kLanes + l) + (pressed[l] > 0 ? 1 : 2)));
+        }
       }
     }
   }

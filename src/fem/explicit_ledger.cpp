@@ -256,8 +256,9 @@ ExplicitEnergy ExplicitSystem::Inside::calc_energy() {
     normal += dot(t.normal_force, t.before), friction += dot(t.friction, t.before), stored += t.stored;
   book(s.ground_work, normal, friction, stored);
   normal = friction = stored = 0;
-  for (const SurfaceTouch& t : ahead.contact.touches)
-    normal += dot(t.normal_force, t.before), friction += dot(t.friction, t.before), stored += t.stored;
+  for (const auto& touches : ahead.contact.touches)
+    for (const SurfaceTouch& t : touches)
+      normal += dot(t.normal_force, t.before), friction += dot(t.friction, t.before), stored += t.stored;
   book(s.surface_work, normal, friction, stored);
   energy.removed_internal = s.removed_internal, energy.removed_kinetic = s.removed_kinetic;
   energy.removed_gravity = s.removed_gravity;

@@ -9,7 +9,7 @@ namespace topple::fem {
 
 namespace {
 
-constexpr std::uint64_t kMark = 0x7470'6578'0000'0003;  // name and version of the layout
+constexpr std::uint64_t kMark = 0x7470'6578'0000'0004;  // name and version of the layout
 
 class Writer {
  public:
@@ -26,6 +26,11 @@ class Writer {
     value(static_cast<std::uint64_t>(v.size()));
     const auto* from = reinterpret_cast<const std::byte*>(v.data());
     bytes.insert(bytes.end(), from, from + v.size() * sizeof(T));
+  }
+  template <class T>
+  void lists(const std::vector<std::vector<T>>& v) {
+    value(static_cast<std::uint64_t>(v.size()));
+    for (const std::vector<T>& inner : v) list(inner);
   }
 };
 
@@ -44,6 +49,14 @@ class Reader {
     if (count > bytes_.size() / sizeof(T)) fail();
     v.resize(count);
     take(v.data(), count * sizeof(T));
+  }
+  template <class T>
+  void lists(std::vector<std::vector<T>>& v) {
+    std::uint64_t count = 0;
+    value(count);
+    if (count > bytes_.size() / sizeof(count)) fail();
+    v.resize(count);
+    for (std::vector<T>& inner : v) list(inner);
   }
   [[noreturn]] static void fail() {
     throw InputError("E643", "this is not a snapshot of this model and its options",
@@ -70,9 +83,10 @@ void pass_state(Archive& archive, State& s) {
   archive.list(s.ground_forces), archive.list(s.touchdowns), archive.list(s.removals);
   archive.value(s.removed_internal), archive.value(s.removed_kinetic), archive.value(s.removed_gravity);
   auto& c = s.contact;
-  archive.list(c.gone), archive.list(c.particle_pairs), archive.list(c.travel), archive.list(c.speed);
+  archive.list(c.gone), archive.list(c.particle_pairs), archive.list(c.near), archive.list(c.near_particles);
+  archive.list(c.boxes), archive.list(c.room), archive.list(c.travel), archive.list(c.speed);
   archive.list(c.spread), archive.list(c.changed), archive.value(c.any_changed), archive.value(c.fresh);
-  archive.value(c.countdown), archive.list(c.touches), archive.value(c.boxed_particles), archive.value(c.searches);
+  archive.value(c.countdown), archive.lists(c.touches), archive.value(c.searches);
 }
 
 /// What tells one model and its options from others.

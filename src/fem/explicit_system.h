@@ -18,7 +18,7 @@ namespace topple::fem {
 struct ExplicitOptions {
   /// Steps are this share of the critical one of the worst element, less what bulk viscosity takes. The rest is the
   /// reserve for elements that get shorter.
-  double step_share = 0.8;
+  double step_share = 0.9;
   /// > 0: elements that would need a smaller step get mass added until they do not [s].
   double scaled_step = 0;
   int threads = 1;                   // 0: all of the machine

@@ -93,6 +93,7 @@ RelaxationSummary relax_system(ExplicitSystem::Inside& in, const RelaxationOptio
     if (progress.report && summary.steps % 100 == 0) progress.report(summary.steps, options.most_steps);
   }
   s.steps = steps;
+  s.contact.pairs.clear(), s.contact.fresh = true;  // of other places
   in.clear_pushes(s);
   for (const std::uint32_t row : live) {
     double* r = s.rows.data() + 8 * size_t{row};

@@ -1,9 +1,13 @@
 #include "fem/segment_contact.h"
 
+#include <hwy/cache_control.h>
+
 #include <algorithm>
 #include <cmath>
-#include <tuple>
+#include <optional>
+#include <span>
 
+#include "base/parallel.h"
 #include "fem/explicit_inside.h"
 
 namespace topple::fem {
@@ -47,10 +51,6 @@ PointState find_point(const ContactSetup& setup, const ExplicitState& s, const C
   }
   return q;
 }
-Vec3 speed_of(const ContactSetup& setup, const ExplicitState& s, const ContactPoint& point) {
-  return find_point(setup, s, point).v;
-}
-
 /// The place of a point on a quadrilateral: x(ξ, η) + height n = p with the normal n of its middle (eq. 22).
 struct Projection {
   double weights[4];
@@ -64,12 +64,17 @@ Projection project(const Vec3& p, const Vec3 (&x)[4], bool clamps) {
              b = 0.25 * (x[2] + x[3] - x[0] - x[1]), d = 0.25 * (x[0] + x[2] - x[1] - x[3]);
   const Vec3 n = cross(a, b);
   out.normal = (1 / std::max(norm(n), 1e-300)) * n;
+  // in the plane of the middle, with one axis along a
+  const Vec3 along = (1 / std::max(norm(a), 1e-300)) * a, across = cross(out.normal, along);
+  const double a1 = dot(a, along), b1 = dot(b, along), b2 = dot(b, across), d1 = dot(d, along), d2 = dot(d, across);
+  const double p1 = dot(p - c, along), p2 = dot(p - c, across);
   double xi = 0, eta = 0;
   for (int i = 0; i < 4; ++i) {
-    const Vec3 t1 = a + eta * d, t2 = b + xi * d, r = p - (c + xi * a + eta * b + (xi * eta) * d);
-    const double area = dot(cross(t1, t2), out.normal);
+    const double t1 = a1 + eta * d1, t2 = eta * d2, u1 = b1 + xi * d1, u2 = b2 + xi * d2;
+    const double r1 = p1 - (xi * t1 + eta * b1), r2 = p2 - (xi * t2 + eta * b2);
+    const double area = t1 * u2 - t2 * u1;
     if (!(std::abs(area) > 1e-300)) break;
-    const double dx = dot(cross(r, t2), out.normal) / area, dy = dot(cross(t1, r), out.normal) / area;
+    const double dx = (r1 * u2 - r2 * u1) / area, dy = (t1 * r2 - t2 * r1) / area;
     xi = std::clamp(xi + dx, -3.0, 3.0), eta = std::clamp(eta + dy, -3.0, 3.0);
     if (std::abs(dx) + std::abs(dy) < 1e-12) break;
   }
@@ -120,117 +125,147 @@ bool is_nearest(const ContactSetup& setup, const ExplicitState& s, const Vec3& p
   return true;
 }
 
-/// Of the touches of each point that of least depth, in the order of points.
-void keep_nearest(std::vector<SurfaceTouch>& touches) {
-  const auto key = [](const SurfaceTouch& t) { return std::tuple(t.point.kind, t.point.index, t.depth, t.face); };
-  std::sort(touches.begin(), touches.end(),
-            [&](const SurfaceTouch& a, const SurfaceTouch& b) { return key(a) < key(b); });
-  touches.erase(std::unique(touches.begin(), touches.end(),
-                            [](const SurfaceTouch& a, const SurfaceTouch& b) { return a.point == b.point; }),
-                touches.end());
+/// A candidate's touch of a face, if it touches.
+std::optional<SurfaceTouch> press_face(const ContactSetup& setup, const ExplicitOptions& options, double h,
+                                       const ExplicitState& s, const PointState& q, const NearCandidate& near) {
+  const ContactState& c = s.contact;
+  const ContactCandidate& candidate = near.candidate;
+  const bool debris = candidate.point.kind == ContactPoint::Debris;
+  if (!debris && !setup.enabled) return {};
+  if (c.gone[candidate.face / 6] != 0) return {};
+  if (candidate.point.kind == ContactPoint::Centre && c.gone[candidate.point.index / 6] != 0) return {};
+  if (!(q.inverse_mass > 0)) return {};
+  Vec3 x[4];
+  for (size_t k = 0; k < 4; ++k) x[k] = vector_at(s.rows.data() + 8 * size_t{near.rows[k]});
+  // a look before the projection: above the middle by more than the face is uneven
+  const Vec3 middle = 0.25 * (x[0] + x[1] + x[2] + x[3]), n = cross(x[2] - x[0], x[3] - x[1]);
+  const double size = norm(n), above = dot(q.p - middle, n);
+  if (above > (q.radius + std::abs(dot(x[0] - middle, n)) / std::max(size, 1e-300)) * size) return {};
+  const Projection on = project(q.p, x, debris);
+  double share = 1;
+  if (!on.inside) {
+    if (!debris || above < 0) return {};
+    share = 0.5;  // two faces have the edge
+  }
+  const double depth = q.radius - on.height;
+  if (!(depth > 0)) return {};
+  Vec3 far;
+  for (const std::uint32_t row : quad_of(setup, candidate.face ^ 1).rows)
+    far += 0.25 * vector_at(s.rows.data() + 8 * size_t{row});
+  if (-on.height * size > kFaceDepth * dot(n, middle - far)) return {};
+  if (on.height < 0 && !is_nearest(setup, s, q.p, candidate.face, -on.height)) return {};
+  double inverse = q.inverse_mass;
+  Vec3 v = q.v;
+  SurfaceTouch touch;
+  touch.point = candidate.point, touch.face = candidate.face;
+  for (size_t k = 0; k < 4; ++k) {
+    const double* r = s.rows.data() + 8 * size_t{near.rows[k]};
+    touch.weights[k] = on.weights[k];
+    inverse += on.weights[k] * on.weights[k] * r[kernel::kInverseMass];
+    v -= on.weights[k] * vector_at(r + 4);
+  }
+  double rate = kRate / (h * h * inverse);
+  if (debris) rate = std::min(rate, s.particles[candidate.point.index].stiffness);
+  calc_forces(depth, on.normal, v, share * rate, inverse, options, h, touch);
+  return touch;
 }
 
-}  // namespace
+/// Touches of candidates in the order of points.
+void press_points(const ContactSetup& setup, const ExplicitOptions& options, double h, const ExplicitState& s,
+                  std::span<const NearCandidate> near, std::vector<SurfaceTouch>& touches) {
+  constexpr size_t kAhead = 8;  // corners that lie all over memory
+  PointState q;
+  std::optional<SurfaceTouch> nearest;  // a point inside bodies goes out by the nearest face alone
+  for (size_t i = 0; i < near.size(); ++i) {
+    if (i + kAhead < near.size())
+      for (const std::uint32_t row : near[i + kAhead].rows) hwy::Prefetch(s.rows.data() + 8 * size_t{row});
+    const ContactPoint& point = near[i].candidate.point;
+    if (i == 0 || near[i - 1].candidate.point != point) q = find_point(setup, s, point);
+    const std::optional<SurfaceTouch> touch = press_face(setup, options, h, s, q, near[i]);
+    if (touch && touch->depth <= q.radius)
+      touches.push_back(*touch);
+    else if (touch && (!nearest || touch->depth < nearest->depth))
+      nearest = touch;
+    if (nearest && (i + 1 == near.size() || near[i + 1].candidate.point != point))
+      touches.push_back(*nearest), nearest.reset();
+  }
+}
 
-void press_surfaces(const ContactSetup& setup, const ExplicitOptions& options, double h, ExplicitState& s,
-                    const std::function<void(std::uint32_t row, const Vec3&)>& push) {
-  ContactState& c = s.contact;
-  c.touches.clear();
-  std::vector<SurfaceTouch> buried;
-  for (const ContactPair& pair : c.pairs)
-    for (const ContactCandidate& candidate : pair.candidates) {
-      const bool debris = candidate.point.kind == ContactPoint::Debris;
-      if (!debris && !setup.enabled) continue;
-      if (c.gone[candidate.face / 6] != 0) continue;
-      if (candidate.point.kind == ContactPoint::Centre && c.gone[candidate.point.index / 6] != 0) continue;
-      const PointState q = find_point(setup, s, candidate.point);
-      if (!(q.inverse_mass > 0)) continue;
-      const Quad quad = quad_of(setup, candidate.face);
-      Vec3 x[4];
-      for (size_t k = 0; k < 4; ++k) x[k] = vector_at(s.rows.data() + 8 * size_t{quad.rows[k]});
-      // a look before the projection: above the middle by more than the face is uneven
-      const Vec3 middle = 0.25 * (x[0] + x[1] + x[2] + x[3]), n = cross(x[2] - x[0], x[3] - x[1]);
-      const double size = norm(n), above = dot(q.p - middle, n);
-      if (above > (q.radius + std::abs(dot(x[0] - middle, n)) / std::max(size, 1e-300)) * size) continue;
-      const Projection on = project(q.p, x, debris);
-      double share = 1;
-      if (!on.inside) {
-        if (!debris || above < 0) continue;
-        share = 0.5;  // two faces have the edge
-      }
-      const double depth = q.radius - on.height;
-      if (!(depth > 0)) continue;
-      Vec3 far;
-      for (const int corner : kFaces[(candidate.face % 6) ^ 1])
-        far += 0.25 * vector_at(s.rows.data() +
-                                8 * size_t{setup.rows_of_element[candidate.face / 6][static_cast<size_t>(corner)]});
-      if (-on.height * size > kFaceDepth * dot(n, middle - far)) continue;
-      if (on.height < 0 && !is_nearest(setup, s, q.p, candidate.face, -on.height)) continue;
-      double inverse = q.inverse_mass;
-      Vec3 v = q.v;
-      SurfaceTouch touch;
-      touch.point = candidate.point, touch.face = candidate.face;
-      for (size_t k = 0; k < 4; ++k) {
-        const double* r = s.rows.data() + 8 * size_t{quad.rows[k]};
-        touch.weights[k] = on.weights[k];
-        inverse += on.weights[k] * on.weights[k] * r[kernel::kInverseMass];
-        v -= on.weights[k] * vector_at(r + 4);
-      }
-      double rate = kRate / (h * h * inverse);
-      if (debris) {
-        Particle& particle = s.particles[candidate.point.index];
-        rate = std::min(rate, particle.stiffness);
-        particle.touched = 1;
-      }
-      calc_forces(depth, on.normal, v, share * rate, inverse, options, h, touch);
-      // a point inside a body goes out by the nearest face alone
-      (on.height < 0 ? buried : c.touches).push_back(touch);
-    }
-  keep_nearest(buried);
-  c.touches.insert(c.touches.end(), buried.begin(), buried.end());
-  for (const auto& pair : c.particle_pairs) {
-    Particle &a = s.particles[pair[0]], &b = s.particles[pair[1]];
+void press_particles(const ExplicitOptions& options, double h, const ExplicitState& s,
+                     std::span<const ParticlePair> near, std::vector<SurfaceTouch>& touches) {
+  for (const ParticlePair& pair : near) {
+    const Particle &a = s.particles[pair[0]], &b = s.particles[pair[1]];
     const Vec3 d = a.p - b.p;
     const double reach = a.radius + b.radius, square = dot(d, d);
     if (square >= reach * reach || !(square > 0)) continue;
     const double distance = std::sqrt(square);
     SurfaceTouch touch;
     touch.point = {ContactPoint::Debris, pair[0]}, touch.other = pair[1] + 1;
-    a.touched = b.touched = 1;
     calc_forces(reach - distance, (1 / distance) * d, a.v - b.v, std::min(a.stiffness, b.stiffness),
                 1 / a.mass + 1 / b.mass, options, h, touch);
-    c.touches.push_back(touch);
-  }
-  for (const SurfaceTouch& touch : c.touches) {
-    const Vec3 force = touch.normal_force + touch.friction;
-    if (touch.point.kind == ContactPoint::Debris)
-      s.particles[touch.point.index].force += force;
-    else if (touch.point.kind == ContactPoint::Node)
-      push(touch.point.index, force);
-    else
-      for (const std::uint32_t row : quad_of(setup, touch.point.index).rows) push(row, 0.25 * force);
-    if (touch.other > 0) {
-      s.particles[touch.other - 1].force -= force;
-      continue;
-    }
-    const Quad quad = quad_of(setup, touch.face);
-    for (size_t k = 0; k < 4; ++k) push(quad.rows[k], -touch.weights[k] * force);
+    touches.push_back(touch);
   }
 }
 
-void book_surfaces(const ContactSetup& setup, double h, ExplicitState& s) {
-  for (const SurfaceTouch& touch : s.contact.touches) {
-    Vec3 now = speed_of(setup, s, touch.point);
-    if (touch.other > 0) {
-      now -= s.particles[touch.other - 1].v;
-    } else {
-      const Quad quad = quad_of(setup, touch.face);
-      for (size_t k = 0; k < 4; ++k) now -= touch.weights[k] * vector_at(s.rows.data() + 8 * size_t{quad.rows[k]} + 4);
+}  // namespace
+
+void press_surfaces(const ExplicitSystem::Inside& in, ExplicitState& s) {
+  ContactState& c = s.contact;
+  const std::vector<NearCandidate>& near = c.near;
+  // their number depends on nothing else, so that sums over them are always the same
+  const size_t pairs = c.near_particles.size(), tasks = std::clamp<size_t>((near.size() + pairs) / 256, 1, 16);
+  // all candidates of a point belong to one task
+  const auto begin_of = [&](size_t task) {
+    size_t i = near.size() * task / tasks;
+    while (i > 0 && i < near.size() && near[i].candidate.point == near[i - 1].candidate.point) ++i;
+    return i;
+  };
+  c.touches.resize(tasks);
+  (void)parallel_for(tasks, in.options.threads, [&](size_t task) {
+    std::vector<SurfaceTouch>& touches = c.touches[task];
+    touches.clear();
+    const size_t first = begin_of(task), last = begin_of(task + 1);
+    press_points(in.contact, in.options, in.h, s, std::span(near).subspan(first, last - first), touches);
+    const size_t from = pairs * task / tasks, to = pairs * (task + 1) / tasks;
+    press_particles(in.options, in.h, s, std::span(c.near_particles).subspan(from, to - from), touches);
+  });
+  for (const auto& touches : c.touches)
+    for (const SurfaceTouch& touch : touches) {
+      const Vec3 force = touch.normal_force + touch.friction;
+      if (touch.point.kind == ContactPoint::Debris)
+        s.particles[touch.point.index].force += force, s.particles[touch.point.index].touched = 1;
+      else if (touch.point.kind == ContactPoint::Node)
+        in.push(s, touch.point.index, force);
+      else
+        for (const std::uint32_t row : quad_of(in.contact, touch.point.index).rows) in.push(s, row, 0.25 * force);
+      if (touch.other > 0) {
+        s.particles[touch.other - 1].force -= force, s.particles[touch.other - 1].touched = 1;
+        continue;
+      }
+      const Quad quad = quad_of(in.contact, touch.face);
+      for (size_t k = 0; k < 4; ++k) in.push(s, quad.rows[k], -touch.weights[k] * force);
     }
-    const Vec3 path = (0.5 * h) * (touch.before + now);
-    s.surface_work.normal += dot(touch.normal_force, path);
-    s.surface_work.friction += dot(touch.friction, path);
-  }
+}
+
+void book_surfaces(const ExplicitSystem::Inside& in, ExplicitState& s) {
+  const auto& touches = s.contact.touches;
+  std::vector<ContactWork> work(touches.size());
+  (void)parallel_for(touches.size(), in.options.threads, [&](size_t task) {
+    for (const SurfaceTouch& touch : touches[task]) {
+      Vec3 now = find_point(in.contact, s, touch.point).v;
+      if (touch.other > 0) {
+        now -= s.particles[touch.other - 1].v;
+      } else {
+        const Quad quad = quad_of(in.contact, touch.face);
+        for (size_t k = 0; k < 4; ++k)
+          now -= touch.weights[k] * vector_at(s.rows.data() + 8 * size_t{quad.rows[k]} + 4);
+      }
+      const Vec3 path = (0.5 * in.h) * (touch.before + now);
+      work[task].normal += dot(touch.normal_force, path);
+      work[task].friction += dot(touch.friction, path);
+    }
+  });
+  for (const ContactWork& w : work) s.surface_work.normal += w.normal, s.surface_work.friction += w.friction;
 }
 
 }  // namespace topple::fem

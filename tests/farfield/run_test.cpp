@@ -139,9 +139,17 @@ TEST(FarfieldPhysics, IsPushedUpByTheGroundOnWhichItFalls) {
   double weight = 0;
   for (const record::BodyInfo& body : r.bodies) weight += body.mass * 9.81;
   const std::vector<double>& force = series(r, "ground_force");
-  // an impact: more than the weight, and never a pull of more than the stumps that swing at their feet
-  EXPECT_GT(*std::max_element(force.begin(), force.end()), weight);
-  EXPECT_GT(*std::min_element(force.begin(), force.end()), -0.5 * weight);
+  EXPECT_GT(*std::max_element(force.begin(), force.end()), weight);  // an impact
+  // Stumps ring at their feet, so that a single frame may show a pull, of whatever phase. In the mean nothing holds
+  // what falls, and what lands is borne.
+  double falling = 0, landing = 0;
+  int fall_frames = 0, land_frames = 0;
+  for (size_t i = 0; i < force.size(); ++i) {
+    if (r.time[i] > 0.1 && r.time[i] < 0.65) falling += force[i], ++fall_frames;
+    if (r.time[i] > 0.69) landing += force[i], ++land_frames;
+  }
+  EXPECT_NEAR(falling / fall_frames, 0, 0.2 * weight);
+  EXPECT_GT(landing / land_frames, 0.5 * weight);
 }
 
 TEST(FarfieldPhysics, FallsAsTheMultibodyModelDoes) {

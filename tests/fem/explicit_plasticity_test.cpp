@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
+#include "base/aligned.h"
 #include "explicit_mesh.h"
+#include "fem/explicit_kernel.h"
 
 namespace topple::fem {
 namespace {
@@ -130,6 +133,138 @@ TEST(ExplicitHingePhysics, ABeamYieldsAtItsPlasticMoment) {
     EXPECT_FALSE(stands_above) << across;
     EXPECT_GT(above, 1.5 * below) << across;
   }
+}
+
+/// One element by itself: what the kernel's lanes hold, and (12) to (14) of docs/theory/explicit.md without its
+/// shortcuts.
+struct SampleElement {
+  std::array<Vec3, 8> x;
+  double stress[6], bending[6], twist[3], corner[3];
+};
+
+struct Excess {
+  double Q = 0, Y = 0;
+  double bound = 0;  // of Q² with m = 2 h and axes at right angles
+};
+Excess calc_excess(const SampleElement& e, double t, double c) {
+  Vec3 axes[3];  // 8 a, b, c
+  for (size_t i = 0; i < 8; ++i) {
+    const double sign[3] = {i % 4 == 1 || i % 4 == 2 ? 1.0 : -1.0, i % 4 >= 2 ? 1.0 : -1.0, i >= 4 ? 1.0 : -1.0};
+    for (size_t k = 0; k < 3; ++k) axes[k] += sign[k] * e.x[i];
+  }
+  const double mean = (e.stress[0] + e.stress[1] + e.stress[2]) / 3;
+  const double D[3][3] = {{e.stress[0] - mean, e.stress[3], e.stress[5]},
+                          {e.stress[3], e.stress[1] - mean, e.stress[4]},
+                          {e.stress[5], e.stress[4], e.stress[2] - mean}};
+  double q2 = 0;
+  for (const auto& row : D)
+    for (const double d : row) q2 += 1.5 * d * d;
+  const double w = std::clamp((-mean + t / 3) / (c / 3 + t / 3), 0.0, 1.0), Y = t + (c - t) * w;
+  const auto along = [&](size_t a, size_t b) {
+    double sum = 0;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) sum += axes[a][i] * D[i][j] * axes[b][j];
+    return sum / (norm(axes[a]) * norm(axes[b]));
+  };
+  constexpr size_t kPairs[3][2] = {{0, 1}, {0, 2}, {1, 2}};
+  double h2 = 0, alike2 = 0;
+  for (size_t i = 0; i < 3; ++i) {
+    const size_t a = kPairs[i][0], b = kPairs[i][1];
+    const double x = e.bending[2 * i], y = e.bending[2 * i + 1], twist = e.twist[i] / (norm(axes[a]) * norm(axes[b]));
+    h2 += x * x - x * y + y * y + 3 * twist * twist + e.corner[i] * e.corner[i] / 3;
+    alike2 += std::pow(along(a, a) * x + along(b, b) * y + 2 * along(a, b) * twist, 2);
+  }
+  const double q = std::min(std::sqrt(q2), Y), n = q / Y;
+  const auto over = [](double a, double b) { return a / std::max(b, 1e-9); };
+  double g = 0, B = 0;
+  if (w * (t + c) > t) {
+    g = std::max(2 * t / (t + c), std::min(1.0, over(Y - q, c - q)));
+    B = std::max((Y + q) * (t + c) / (2 * c), t + q);
+  } else {
+    g = std::min(2 * c / (t + c), over(Y - q, t - q));
+    B = std::min((Y + q) * (t + c) / (2 * t), c + q);
+  }
+  const double per = (1 + n) * (g + (Y - q) / B) / 3, m2 = per * per * h2;
+  Excess out;
+  out.Q = std::sqrt(q2 + m2 + 1.5 / std::sqrt(3) * std::sqrt(alike2) * per), out.Y = Y;
+  out.bound = (1 + 0.5 / std::sqrt(3)) * (q2 + 4 * h2);
+  return out;
+}
+
+TEST(ExplicitYield, PassesOverNoElementThatYieldsWhateverItsStrengths) {
+  std::mt19937_64 random(7);
+  const auto uniform = [&](double low, double high) {
+    return low + (high - low) * static_cast<double>(random() >> 11U) * 0x1p-53;
+  };
+  const auto any = [&] { return uniform(-1, 1); };
+  const size_t W = kernel::lanes();
+  constexpr double E = 30e9, nu = 0.2, mu = E / (2 * (1 + nu));
+  int yielding = 0, barely = 0, beyond_twice = 0;
+  for (int trial = 0; trial < 20000; ++trial) {
+    const double c = 20e6, t = c * std::pow(10, uniform(-2, 2));
+    kernel::Law law;
+    law.E = E, law.nu = nu, law.mu = mu, law.lambda = E * nu / ((1 + nu) * (1 - 2 * nu));
+    law.bending = E / (1 - nu * nu), law.bulk = law.lambda + 2.0 / 3 * mu, law.speed = 3600;
+    law.points = 1, law.tension[0] = t, law.compression[0] = c;
+    law.least_pressure = -t / 3, law.per_pressure = 3 / (t + c), law.cutoff = 1e300;
+
+    std::vector<SampleElement> samples(W);
+    AlignedVector<double> elements(W * size_t{kernel::kElementFields}, 0), nodes(size_t{64} * W, 0),
+        pushes(size_t{32} * W, 0);
+    AlignedVector<double> room(size_t{8} * kernel::kRoomFields * W, 0);
+    std::vector<std::uint8_t> flags(8 * W, 0);
+    std::vector<std::uint16_t> corners(8 * W);
+    for (size_t l = 0; l < W; ++l) {
+      SampleElement& e = samples[l];
+      // a brick, every other one with slanting axes
+      const double slant = l % 2 == 0 ? 0 : uniform(0, 0.8),
+                   size[3] = {uniform(.1, .5), uniform(.1, .5), uniform(.1, .5)};
+      for (size_t i = 0; i < 8; ++i) {
+        const double s[3] = {i % 4 == 1 || i % 4 == 2 ? 1.0 : 0.0, i % 4 >= 2 ? 1.0 : 0.0, i >= 4 ? 1.0 : 0.0};
+        e.x[i] = {size[0] * s[0] + slant * size[1] * s[1], size[1] * s[1] + slant * size[2] * s[2], size[2] * s[2]};
+        const size_t node = 8 * l + i;
+        for (int k = 0; k < 3; ++k) nodes[8 * node + static_cast<size_t>(k)] = e.x[i][k];
+        nodes[8 * node + kernel::kNodeMass] = nodes[8 * node + kernel::kInverseMass] = 1;
+        corners[i * W + l] = static_cast<std::uint16_t>(kernel::kRoomFields * node);
+      }
+      // mean stresses and amplitudes of any ratio, the pressure of any size beside them
+      const double least = std::min(t, c), q = least * std::pow(10, uniform(-3, 0.3)),
+                   h = least * std::pow(10, uniform(-2, 0.5)), p = std::max(t, c) * any();
+      for (int k = 0; k < 6; ++k) e.stress[k] = q * any() + (k < 3 ? p : 0);
+      for (double& b : e.bending) b = h * any();
+      for (int k = 0; k < 3; ++k) e.corner[k] = h * any();
+      e.twist[0] = h * any() * 16 * size[0] * size[1], e.twist[1] = h * any() * 16 * size[0] * size[2];
+      e.twist[2] = h * any() * 16 * size[1] * size[2];
+      const auto put = [&](int field, double value) { elements[static_cast<size_t>(field) * W + l] = value; };
+      for (int k = 0; k < 6; ++k) put(kernel::kStress + k, e.stress[k]), put(kernel::kBending + k, e.bending[k]);
+      for (int k = 0; k < 3; ++k) put(kernel::kTwist + k, e.twist[k]), put(kernel::kCorner + k, e.corner[k]);
+      put(kernel::kMass, 2400 * size[0] * size[1] * size[2]), put(kernel::kLength, 0.1);
+    }
+    kernel::StepJob step;
+    step.h = 1e-6, step.removes = false;
+    const std::uint16_t law_of_block = 0;
+    const auto live = static_cast<unsigned char>((1U << W) - 1);
+    std::vector<std::uint32_t> failed, grounded;
+    kernel::ChunkJob job;
+    job.laws = &law, job.law_of_block = &law_of_block, job.blocks = 1, job.elements = elements.data();
+    job.corners = corners.data(), job.live = &live, job.own = 8 * W, job.own_nodes = nodes.data();
+    job.nodes = nodes.data(), job.own_flags = flags.data(), job.own_pushes = pushes.data(), job.room = room.data();
+    job.failed = &failed, job.grounded = &grounded;
+    kernel::advance_chunk(step, job);
+    for (size_t l = 0; l < W; ++l) {
+      const Excess excess = calc_excess(samples[l], t, c);
+      const double strain = elements[static_cast<size_t>(kernel::kStrain) * W + l];
+      ASSERT_NEAR(strain * 3 * mu, std::max(0.0, excess.Q - excess.Y), 1e-9 * (excess.Q + excess.Y))
+          << "t/c " << t / c << " Q/Y " << excess.Q / excess.Y;
+      if (excess.Q <= excess.Y) continue;
+      ++yielding;
+      barely += excess.Q < 1.1 * excess.Y;
+      beyond_twice += excess.bound <= excess.Y * excess.Y;
+    }
+  }
+  EXPECT_GT(yielding, 5000);
+  EXPECT_GT(barely, 500);
+  EXPECT_GT(beyond_twice, 50);  // m is more than 2 h in many of them
 }
 
 }  // namespace
