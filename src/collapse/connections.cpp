@@ -149,6 +149,11 @@ Builder::Stiffness Builder::calc_stiffness(const MemberZones& z) const {
 }
 
 mbs::ZoneLaw Builder::make_law(int zone, const Stiffness& s, const std::string& name, Bending bending) {
+  if (const auto same = laws.find({zone, s.EI_y, s.EI_z, bending}); same != laws.end()) {
+    mbs::ZoneLaw law = model.laws[static_cast<size_t>(same->second.index)];
+    law.name = name;
+    return law;
+  }
   std::string key = library.key(zone);
   append_bytes(key, s.EI_y), append_bytes(key, s.EI_z), append_bytes(key, static_cast<double>(bending));
   if (known)

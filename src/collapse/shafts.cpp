@@ -181,7 +181,7 @@ void Builder::make_shaft(int index) {
         const double angle = bounds[i + 1] - bounds[i], turn = shaft.azimuth + 0.5 * (bounds[i] + bounds[i + 1]);
         // boxes whose inertia about the axis is that of the ring
         double radius = mean, breadth = 0;
-        for (int k_ = 0; k_ < 4; ++k_) {
+        for (int iteration = 0; iteration < 4; ++iteration) {
           breadth = 2 * (radius + 0.5 * t) * std::tan(0.5 * angle);
           radius = std::sqrt(std::max(0.25 * mean * mean, mean * mean + t * t / 6 - breadth * breadth / 12));
         }

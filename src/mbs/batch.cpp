@@ -43,10 +43,13 @@ Lanes make_batch(const System& build, size_t W) {
   Lanes l;
   l.W = W;
   l.is_batch = true;
+  l.is_planar = build.lanes->is_planar;
   l.allocate_bodies(build.B);
   l.allocate_elements(build.elements.size());
   const auto body = [&](int b) { return static_cast<std::uint32_t>(b < 0 ? static_cast<int>(build.B) : b); };
   for (const CompiledElement& e : build.elements) {
+    l.planes[l.body_a.size()] = e.zone.plane;
+    l.single[l.body_a.size()] = e.zone.stations < 2;
     l.body_a.push_back(body(e.a));
     l.body_b.push_back(body(e.b));
   }
@@ -57,6 +60,19 @@ Lanes make_batch(const System& build, size_t W) {
   }
   for (size_t slot = 0; slot < l.element_blocks * W; ++slot) l.clear_slot(slot);
   return l;
+}
+
+/// Throws InputError if other elements than before leave the plane of a planar model.
+void check_planes(const Lanes& lanes, const System& s, size_t sample) {
+  if (s.lanes->is_planar != lanes.is_planar)
+    throw InputError("E602", "variation " + std::to_string(sample) + " turns bodies out of their planes or into them",
+                     "all variations of a planar model move in its planes, or none");
+  for (size_t e = 0; e < s.elements.size(); ++e)
+    if (s.elements[e].zone.plane != lanes.planes[e])
+      throw InputError("E602",
+                       "variation " + std::to_string(sample) + " turns elements[" + std::to_string(e) +
+                           "] out of its plane or into it",
+                       "all variations of a planar model have it in its plane, or none");
 }
 
 /// Runs the samples [first, last), one in each lane.
@@ -98,6 +114,7 @@ void run_lanes(const Model& model, const std::vector<Variation>& variations, con
       continue;
     }
     if (!lanes) lanes = make_batch(s, W);
+    check_planes(*lanes, s, first + i);
     s.join_batch(*lanes, i);
     active[i] = &s;
   }

@@ -24,14 +24,6 @@ template <class D>
 using Mask = hn::Mask<D>;
 
 template <class D>
-HWY_INLINE Num<D> minimum(Num<D> a, Num<D> b) {
-  return {hn::Min(a.v, b.v)};
-}
-template <class D>
-HWY_INLINE Num<D> maximum(Num<D> a, Num<D> b) {
-  return {hn::Max(a.v, b.v)};
-}
-template <class D>
 HWY_INLINE Num<D> root(Num<D> a) {
   return {hn::Sqrt(a.v)};
 }

@@ -89,24 +89,28 @@ void System::evaluate_contact(double h) {
   const bool follows = h > 0 && !is_look_due();
   const int passed = t.steps;
   if (!follows) {
-    find_contacts();
+    find_contacts(h);
     t.steps = 0;
   }
   resolve_contacts(h, follows, passed);
   ++t.steps;
 }
 
-void System::find_contacts() {
+void System::find_contacts(double h) {
   Touching& t = state.touching;
   const size_t W = kernel::lanes();
   // friction springs as they are now
   contact.sticks.clear();
-  for (const ContactGroup& g : t.group)
+  contact.earnings.clear();
+  contact.lost = 0;
+  for (const ContactGroup& g : t.group) {
+    contact.earnings.push_back(h > 0 ? calc_earnings(g, h) : Earnings{});
     for (int i = 0; i < g.count; ++i) {
       const size_t row = t.rows[g.slot / W] + static_cast<size_t>(i);
       const double* at = t.points.data() + row * kernel::kPointFields * W + g.slot % W;
       contact.sticks.push_back({read3(at, kernel::kPlace, W), read3(at, kernel::kSpringSlip, W)});
     }
+  }
   contact.place.assign(B, -1);
   t.body.assign(1, static_cast<int>(B));
   contact.groups.assign(1, 0);
@@ -116,6 +120,20 @@ void System::find_contacts() {
   if (model.contact.ground) find_ground_points();
   if (model.contact.bodies) find_pair_points();
   fill_contact_blocks();
+}
+
+Earnings System::calc_earnings(const ContactGroup& g, double h) const {
+  const State& s = state;
+  const size_t W = kernel::lanes(), a = static_cast<size_t>(s.touching.body[static_cast<size_t>(g.a)]),
+               b = static_cast<size_t>(s.touching.body[static_cast<size_t>(g.b)]);
+  if (a == B || b == B) return {};  // corners on the ground stay what they are
+  const double* slot = s.touching.groups.data() + g.slot / W * kernel::kGroupFields * W + g.slot % W;
+  const Vec3 f = -slot[kernel::kHeldForce * W] * g.n, turn = read3(slot, kernel::kHeldTorque, W);
+  const Vec3 w_b = s.w[b], v = s.v[a] - s.v[b] - cross(w_b, read3(slot, kernel::kApart, W)), w = s.w[a] - w_b;
+  const double damped = dot(read3(slot, kernel::kDamp, W), v + read3(slot, kernel::kMotion, W)) +
+                        dot(read3(slot, kernel::kDamp + 3, W), w + read3(slot, kernel::kMotion + 3, W));
+  return {std::max(0.0, slot[kernel::kPressEnergy * W] - 0.5 * h * (dot(f, v) + dot(turn, w))),
+          slot[kernel::kSpent * W] - 0.5 * h * damped};
 }
 
 void System::add_contact_point(const Vec3& at, double depth, double stiffness) {
@@ -211,6 +229,9 @@ void System::fill_contact_blocks() {
                             law.friction,
                             kStickStiffness * law.mean * g.stiffness};
     static_assert(std::size(known) == kernel::kStick + 1);
+    double* earnings = t.groups.data() + (block * kernel::kGroupFields + kernel::kEarned) * W + place;
+    earnings[0] = g.earnings.stored, earnings[W] = g.earnings.spent;
+    static_assert(kernel::kSpent == kernel::kEarned + 1);
     double* to = t.groups.data() + block * kernel::kGroupFields * W + place;
     for (const double x : known) *to = x, to += W;
     for (int i = 0; i < g.count; ++i) {
@@ -232,7 +253,7 @@ void System::resolve_contacts(double h, bool follows, int passed) {
   State& s = state;
   Touching& t = s.touching;
   s.contact_energy = s.stick_energy = 0;
-  double loss = 0, loss_after = 0, friction = 0, friction_after = 0;
+  double loss = 0, loss_after = 0, friction = 0, friction_after = 0, lost = follows ? 0 : contact.lost;
   if (!t.group.empty()) {
     const size_t W = kernel::lanes(), blocks = (t.body.size() + W - 1) / W;
     const LaneLayout layout = lanes->body_layout(lane);
@@ -292,6 +313,7 @@ void System::resolve_contacts(double h, bool follows, int passed) {
       push(g, slot, kernel::kRub, kernel::kRubSum);
       s.contact_energy += slot[kernel::kPressEnergy * W];
       s.stick_energy += slot[kernel::kStickEnergy * W];
+      if (!follows) lost += slot[kernel::kLost * W];
     }
     kernel::update_touched(bodies);
     kernel::rub_contacts(job);
@@ -322,7 +344,7 @@ void System::resolve_contacts(double h, bool follows, int passed) {
       torque[b] += three(kernel::kPressSum + 3) + damp_turn + rub_turn;
     }
   }
-  s.contact_loss += 0.5 * h * (s.contact_loss_power + loss);
+  s.contact_loss += 0.5 * h * (s.contact_loss_power + loss) + lost;
   s.friction_work += 0.5 * h * (s.friction_power + friction);
   s.contact_loss_power = loss_after;
   s.friction_power = friction_after;

@@ -62,6 +62,7 @@ struct PairState {
   double depth = 0;    // of the deepest point beyond it at the last look, or minus the gap [m]
   double way = 0;      // State::travel of both bodies then [m]
   StickRange sticks;
+  int group = -1;  // in Touching::group of the last look, -1: did not touch
 };
 
 /// Two bodies with rules of their own, a < b.
@@ -79,14 +80,21 @@ struct ContactPoint {
   bool is_fresh = true;  // not touched in the step before
 };
 
+/// Energy that a pair's points leave to those that are found after them [J].
+struct Earnings {
+  double stored = -1;  // kernel::kEarned
+  double spent = 0;    // kernel::kSpent
+};
+
 /// Points of a pair of shapes, or of one on the ground, with a common normal.
 struct ContactGroup {
   int a = 0, b = 0;  // into the touched bodies
   int first = 0, count = 0;
-  Vec3 n;                  // from a to b
-  Vec3 apart;              // from b's mass centre to a's, 0 on the ground [m]
-  int law = 0;             // into System::contact_laws
-  double stiffness = 0;    // k of one corner of a box [N/m]
+  Vec3 n;                // from a to b
+  Vec3 apart;            // from b's mass centre to a's, 0 on the ground [m]
+  int law = 0;           // into System::contact_laws
+  double stiffness = 0;  // k of one corner of a box [N/m]
+  Earnings earnings;
   std::uint32_t slot = 0;  // in the kernel's blocks
 };
 
@@ -138,7 +146,9 @@ struct ContactScratch {
   AlignedVector<double> touched;                // as the kernel sees them
   std::vector<std::uint32_t> vectors, tensors;  // places of what belongs to them
   std::vector<ContactPoint> point;
-  std::vector<Stick> sticks;  // of all points of the step before
+  std::vector<Stick> sticks;       // of all points of the step before
+  std::vector<Earnings> earnings;  // of all groups of the step before
+  double lost = 0;                 // by pairs that touched before and do not now [J]
   std::vector<std::uint32_t> by_count;
   std::vector<std::uint32_t> candidates;  // pairs that may be due
   std::vector<PairLook> looks;

@@ -16,7 +16,8 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr double kSlideZeta = 100;  // friction below its limit is a dashpot of this share
+constexpr double kSlideZeta = 100;    // friction below its limit is a dashpot of this share
+constexpr double kLeastShare = 0.05;  // of its stiffness that a pair keeps whatever it has earned
 
 template <class D>
 HWY_INLINE V3<D> zeros() {
@@ -196,6 +197,12 @@ HWY_INLINE void press_block(const ContactJob& job, size_t block) {
     turned = h * A.three(kSpeed + 3);
   }
   const Motion<D> m = calc_motion(A, B, apart, kSpeed);
+  const Num<D> zero = num<D>(0), half = num<D>(0.5), one = num<D>(1), along = dot(n, m.v);
+  if (job.follows) {
+    const V3<D> v = load3<D>(g, kMotion) + m.v, w = load3<D>(g, kMotion + 3) + m.w;
+    const Num<D> power = dot(load3<D>(g, kDamp), v) + dot(load3<D>(g, kDamp + 3), w);
+    store<D>(fnma(half * h, power, load<D>(g, kSpent)), g, kSpent);
+  }
   store3<D>(m.v, g, kMotion), store3<D>(m.w, g, kMotion + 3);
   store<D>(A(kTouchedMass), g, kMassA), store<D>(B(kTouchedMass), g, kMassB);
   store<D>(A(kGroups), g, kGroupsA), store<D>(B(kGroups), g, kGroupsB);
@@ -203,13 +210,12 @@ HWY_INLINE void press_block(const ContactJob& job, size_t block) {
     store<D>(A(kTouchedInertia + i), g, kInertiaA + i);
     store<D>(B(kTouchedInertia + i), g, kInertiaB + i);
   }
-  const Num<D> zero = num<D>(0), half = num<D>(0.5), one = num<D>(1), along = dot(n, m.v);
   const Num<D> inverse_mass = load<D>(g, kMassA) + load<D>(g, kMassB), mean = load<D>(g, kMean),
                damping = load<D>(g, kDamping), twice_zeta = num<D>(2) * load<D>(g, kZeta);
   const V3<D> to_b = cross(apart, n);
   const auto plain = hn::Ge(damping.v, hn::Zero(d));
-  Num<D> energy = zero, impedance = zero, total = zero;
-  V3<D> torque = zeros<D>();
+  Num<D> energy = zero, impedance = zero, total = zero, held = zero, stores = zero;
+  V3<D> torque = zeros<D>(), held_torque = torque;
   for (size_t row = job.rows[block]; row < job.rows[block + 1]; ++row) {
     double* p = job.points + row * kPointFields * W;
     V3<D> place = load3<D>(p, kPlace);
@@ -231,10 +237,15 @@ HWY_INLINE void press_block(const ContactJob& job, size_t block) {
     impedance = impedance + z;
     Num<D> full = k * depth;
     energy = fma(full, depth, energy);
+    const Num<D> plain_force = mean * full;
+    held = held + plain_force;
+    held_torque = fma(zero - plain_force, la, held_torque);
     // of a step in which the surfaces meet or part, only a share is in touch; they may have met before they were seen
     const auto passes = hn::Gt(way.v, depth.v), meets = hn::Gt(speed.v, hn::Zero(d));
     const Num<D> share = depth / select(hn::Gt(way.v, hn::Zero(d)), way, one);
     const auto was_late = hn::And(meets, hn::Le(share.v, hn::Set(d, job.longest)));
+    // what has been met since has its energy from (4)
+    stores = stores + select(was_late, zero, half * plain_force * fnma(h, speed, depth));
     full = select(hn::Or(passes, was_late), full * fma(half, share, half), full);
     Num<D> rate = twice_zeta * z;
     if (HWY_UNLIKELY(!hn::AllFalse(d, plain))) {
@@ -247,9 +258,32 @@ HWY_INLINE void press_block(const ContactJob& job, size_t block) {
     torque = fma(zero - force, la, torque);
     store<D>(speed, p, kApproach), store<D>(full, p, kFull), store<D>(rate, p, kRate), store<D>(force, p, kNormalForce);
   }
+  if (!job.follows) {
+    // the points that are found store no more than those before have earned and dashpots give; what is more is lost
+    const Num<D> earned = load<D>(g, kEarned);
+    const auto is_known = hn::And(hn::Ge(earned.v, hn::Zero(d)), hn::Gt(stores.v, hn::Zero(d)));
+    const Num<D> given = minimum(maximum(load<D>(g, kSpent), zero), maximum(stores - earned, zero));
+    const Num<D> ratio = (earned + given) / select(is_known, stores, one);
+    const Num<D> kept = select(is_known, minimum(maximum(ratio, num<D>(kLeastShare)), one), one);
+    store<D>(select(is_known, maximum(earned - stores, zero) - given, maximum(earned, zero)), g, kLost);
+    store<D>(zero, g, kSpent);
+    if (!hn::AllTrue(d, hn::Ge(kept.v, one.v))) {
+      const Num<D> root = {hn::Sqrt(kept.v)};
+      for (size_t row = job.rows[block]; row < job.rows[block + 1]; ++row) {
+        double* p = job.points + row * kPointFields * W;
+        for (const int field : {kPointStiffness, kFull, kNormalForce}) store<D>(kept * load<D>(p, field), p, field);
+        const Num<D> rate = load<D>(p, kRate);
+        store<D>(select(plain, rate, root * rate), p, kRate);
+      }
+      impedance = root * impedance;
+      energy = kept * energy, total = kept * total, held = kept * held;
+      torque = kept * torque, held_torque = kept * held_torque;
+    }
+  }
   store<D>(impedance, g, kImpedance);
   store3<D>((zero - total) * n, g, kPress), store3<D>(torque, g, kPress + 3);
   store<D>(half * mean * energy, g, kPressEnergy);
+  store<D>(held, g, kHeldForce), store3<D>(held_torque, g, kHeldTorque);
 }
 
 template <class D>

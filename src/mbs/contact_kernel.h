@@ -51,7 +51,12 @@ enum Group : int {
   kRub = 49,        // by friction: damp gives its springs' part, rub adds the rest (6)
   kPressEnergy = 55,
   kStickEnergy = 56,
-  kGroupFields = 57
+  kHeldForce = 57,   // normal force of the springs, (4) of the theory left out [N]
+  kHeldTorque = 58,  // and its torque on a (3)
+  kEarned = 61,      // energy of the pair's points before, and their work since; below 0: there were none [J]
+  kSpent = 62,       // work of the pair's dashpots since points were looked for [J]
+  kLost = 63,        // of what was earned, that which the points that are found cannot store, less what they took [J]
+  kGroupFields = 64
 };
 
 /// Fields of a point; a place without a point has no stiffness.

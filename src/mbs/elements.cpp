@@ -19,10 +19,37 @@ constexpr size_t kChunk = 32;              // blocks a thread takes at once
 /// Spring behind the damper of a slot times the stiffness.
 double calc_rate(const Lanes& l, size_t slot, int i) { return l.field(slot, kViscous) * l.field(slot, kStiffness + i); }
 
+/// As the kernel has the axes of a marker: in a plane the turn about y that brings x there.
+Quat turn_in_plane(Plane plane, const Quat& q) {
+  return plane == Plane::AboutZ ? q * Quat{std::sqrt(0.5), std::sqrt(0.5), 0, 0} : q;
+}
+
 /// What the kernel may use of a biaxial exponent.
 double floor_exponent(double e) { return e >= 2 ? 2 : e >= 1.5 ? 1.5 : 1; }
 
 }  // namespace
+
+bool System::keeps_planes() const {
+  if (!model.is_planar || model.gravity.y != 0) return false;
+  for (size_t b = 0; b < B; ++b) {
+    const Quat q = state.q[b];
+    const Vec3 v = state.v[b], w = state.w[b];
+    if (q.x != 0 || q.z != 0 || v.y != 0 || w.x != 0 || w.z != 0) return false;
+  }
+  return true;
+}
+
+Plane System::find_plane(const CompiledElement& e) const {
+  constexpr double tilted = 1e-12, beside = 1e-10;  // round-off of axes, of places [m]
+  if (!lanes->is_planar) return Plane::Space;
+  const Pose a = pose_of(e.a), b = pose_of(e.b);
+  if (std::abs((b * e.p_BM).y - (a * e.p_AF).y) > beside) return Plane::Space;
+  const Mat3 axes_a = to_matrix(e.q_AF), axes_b = to_matrix(e.q_BM);
+  const auto is_normal = [&](int axis) {
+    return norm(axes_a.column(axis) - Vec3{0, 1, 0}) < tilted && norm(axes_b.column(axis) - Vec3{0, 1, 0}) < tilted;
+  };
+  return is_normal(1) ? Plane::AboutY : is_normal(2) ? Plane::AboutZ : Plane::Space;
+}
 
 size_t System::slot_of(size_t e) const { return lanes->is_batch ? e * lanes->W + lane : lanes->slot_of[e]; }
 
@@ -39,19 +66,37 @@ void System::lay_out_elements() {
   Lanes& l = *lanes;
   const size_t E = elements.size(), W = l.W;
   std::vector<double> moved;
-  std::vector<std::uint32_t> kept;
+  std::vector<std::uint32_t> kept;  // kNoSlot: a gap
+  std::vector<Plane> planes;        // of blocks
+  std::vector<unsigned char> single;
+  size_t live = 0;
   const bool first = l.slot_of.empty();
-  for (size_t e = 0; e < E; ++e) {
-    const std::uint32_t slot = first ? 0 : l.slot_of[e];
-    if (!first && (slot == Lanes::kNoSlot || l.field(slot, kMostTurn) == kUnlimited)) continue;
-    kept.push_back(static_cast<std::uint32_t>(e));
-    if (first) continue;
-    save_slot(slot, moved);
+  // blocks of one plane each, in a plane with one station or two
+  constexpr std::pair<Plane, bool> kinds[] = {{Plane::Space, false},
+                                              {Plane::AboutY, true},
+                                              {Plane::AboutY, false},
+                                              {Plane::AboutZ, true},
+                                              {Plane::AboutZ, false}};
+  for (const auto& [plane, is_single] : kinds) {
+    for (size_t e = 0; e < E; ++e) {
+      const ZoneParameters& zone = elements[e].zone;
+      if (zone.plane != plane || (plane != Plane::Space && (zone.stations < 2) != is_single)) continue;
+      const std::uint32_t slot = first ? 0 : l.slot_of[e];
+      if (!first && (slot == Lanes::kNoSlot || l.field(slot, kMostTurn) == kUnlimited)) continue;
+      if (kept.size() % W == 0) planes.push_back(plane), single.push_back(is_single);
+      kept.push_back(static_cast<std::uint32_t>(e));
+      ++live;
+      if (!first) save_slot(slot, moved);
+    }
+    kept.resize((kept.size() + W - 1) / W * W, Lanes::kNoSlot);
   }
   std::vector<unsigned char> soft(E, 0);
   if (!first)
-    for (const std::uint32_t e : kept) soft[e] = l.softened[l.slot_of[e] / W];
+    for (const std::uint32_t e : kept)
+      if (e != Lanes::kNoSlot) soft[e] = l.softened[l.slot_of[e] / W];
   l.allocate_elements(kept.size());
+  l.planes = planes;
+  l.single = single;
   l.slot_of.assign(E, Lanes::kNoSlot);
   const size_t slots = l.element_blocks * W;
   l.element_of.assign(slots, Lanes::kNoSlot);
@@ -61,8 +106,8 @@ void System::lay_out_elements() {
   const auto body = [&](int b) { return b < 0 ? static_cast<std::uint32_t>(B) : static_cast<std::uint32_t>(b); };
   for (size_t slot = 0; slot < slots; ++slot) {
     l.clear_slot(slot);
-    if (slot >= kept.size()) continue;
     const std::uint32_t e = kept[slot];
+    if (e == Lanes::kNoSlot) continue;
     l.slot_of[e] = static_cast<std::uint32_t>(slot);
     l.element_of[slot] = e;
     l.body_a[slot] = body(elements[e].a);
@@ -76,7 +121,7 @@ void System::lay_out_elements() {
     next = restore_slot(slot, next);
   }
   if (!first) l.share_constants();
-  l.used_slots = l.live_elements = kept.size();
+  l.used_slots = l.live_elements = live;
   l.first_entry.assign(B + 1, 0);
   l.entries.clear();
   for (size_t b = 0; b < B; ++b) {
@@ -102,14 +147,22 @@ void System::pack_element(size_t e, bool has_moved) {
     const Vec3 pa = c.a >= 0 ? c.p_AF - state.p_offset[static_cast<size_t>(c.a)] : c.p_AF;
     const Vec3 pb = c.b >= 0 ? c.p_BM - state.p_offset[static_cast<size_t>(c.b)] : c.p_BM;
     for (int i = 0; i < 3; ++i) put(kMarkerA + i, pa[i]), put(kMarkerB + i, pb[i]);
-    const double qa[4] = {c.q_AF.w, c.q_AF.x, c.q_AF.y, c.q_AF.z}, qb[4] = {c.q_BM.w, c.q_BM.x, c.q_BM.y, c.q_BM.z};
+    const Quat q_a = turn_in_plane(c.zone.plane, c.q_AF), q_b = turn_in_plane(c.zone.plane, c.q_BM);
+    const double qa[4] = {q_a.w, q_a.x, q_a.y, q_a.z}, qb[4] = {q_b.w, q_b.x, q_b.y, q_b.z};
     for (int i = 0; i < 4; ++i) put(kMarkerA + 3 + i, qa[i]), put(kMarkerB + 3 + i, qb[i]);
   }
-  for (int i = 0; i < 6; ++i) put(kStiffness + i, z.share * c.zone.stiffness[i]);
-  put(kViscous, c.zone.viscous);
-  put(kRelaxation, c.zone.relaxation);
-  put(kStation, c.zone.x[0]), put(kStation + 1, c.zone.x[c.zone.stations > 1 ? 1 : 0]);
-  put(kMostTurn, kLargestTurn);
+  const ActiveComponents active = components_of(c.zone.plane);
+  const int first = first_bending(c.zone.plane), last = last_bending(c.zone.plane);
+  const auto each = [&active](auto&& put_one) {
+    for (int i = 0; i < active.count; ++i) put_one(active.at[i]);
+  };
+  each([&](int i) { put(kStiffness + i, z.share * c.zone.stiffness[i]); });
+  if (has_moved) {
+    put(kViscous, c.zone.viscous);
+    put(kRelaxation, c.zone.relaxation);
+    put(kStation, c.zone.x[0]), put(kStation + 1, c.zone.x[c.zone.stations > 1 ? 1 : 0]);
+    put(kMostTurn, kLargestTurn);
+  }
   put(kTorsionScale, 0);
   const bool has_flow = l.field(slot, kFlows) > 0;  // its constants are there
   put(kFlows, 0);
@@ -133,7 +186,7 @@ void System::pack_element(size_t e, bool has_moved) {
         const int at = kStations + station * kStationFields;
         copy(at + kPhi, at + kCell);
         const int law = z.base_law < 0 ? c.zone.law[station] : z.base_law;
-        for (int q = 0; q < 2; ++q)
+        for (int q = first; q <= last; ++q)
           if (laws[static_cast<size_t>(law)].moment[q].K > 0)
             copy(at + kCell + q * kCellFields, at + kCell + (q + 1) * kCellFields);
       }
@@ -143,22 +196,22 @@ void System::pack_element(size_t e, bool has_moved) {
     put(kFlows, 1);
     z.safe_force[0] = 1, z.safe_force[1] = -1;  // void as soon as it flows
   } else {
-    for (int i = 0; i < 2; ++i) {
-      put(kMomentScale + i, free ? 0 : z.safe_moment[i]);
-      put(kShearScale + i, free ? 0 : z.safe_shear[i]);
+    for (int q = first; q <= last; ++q) {
+      put(kMomentScale + q, free ? 0 : z.safe_moment[q]);
+      put(kShearScale + 1 - q, free ? 0 : z.safe_shear[1 - q]);
     }
     put(kTorsionScale, free ? 0 : z.safe_torsion);
     put(kExponent, floor_exponent(z.safe_exponent));
   }
-  for (int i = 0; i < 6; ++i) {
+  each([&](int i) {
     put(kOffset + i, flows ? 0 : z.offset[i]);
     put(kStretch + i, flows ? z.elastic[i] : z.deformation[i] - z.offset[i]);
     put(kBehind + i, z.elastic[i] - z.flowed[i]);
-  }
+  });
   put(kDamped, 0);
   put(kBled, 0);
   z.packed_damping = z.damping, z.packed_plastic = z.plastic, z.packed_behind = z.damper_energy;
-  for (int plane = 0; plane < 2; ++plane) {
+  for (int plane = first; plane <= last; ++plane) {
     const int shear = plane == 0 ? 2 : 1, bend = plane == 0 ? 4 : 5, at = kSoft + 4 * plane;
     const double ks = l.field(slot, kStiffness + shear), kb = l.field(slot, kStiffness + bend);
     const bool soft = !flows && z.is_softened;
@@ -177,16 +230,23 @@ void System::unpack_element(size_t e) {
   const Lanes& l = *lanes;
   const bool flows = l.field(slot, kFlows) > 0;
   if (!flows && l.field(slot, kLeastForce) > l.field(slot, kMostForce)) return;  // the full law has it
+  const Plane in = elements[e].zone.plane;
+  const ActiveComponents active = components_of(in);
+  const int first = first_bending(in), last = last_bending(in);
   double u[6], stretch[6];
-  for (int i = 0; i < 6; ++i) u[i] = stretch[i] = l.field(slot, kStretch + i);
+  for (int c = 0; c < active.count; ++c) {
+    const int i = active.at[c];
+    u[i] = stretch[i] = l.field(slot, kStretch + i);
+  }
   if (!flows)
-    for (int plane = 0; plane < 2; ++plane) {
+    for (int plane = first; plane <= last; ++plane) {
       const int shear = plane == 0 ? 2 : 1, bend = plane == 0 ? 4 : 5, at = kSoft + 4 * plane;
       stretch[shear] = l.field(slot, at) * u[shear] + l.field(slot, at + 1) * u[bend];
       stretch[bend] = l.field(slot, at + 2) * u[shear] + l.field(slot, at + 3) * u[bend];
     }
   z.energy = z.damper_energy = 0;
-  for (int i = 0; i < 6; ++i) {
+  for (int c = 0; c < active.count; ++c) {
+    const int i = active.at[c];
     const double behind = l.field(slot, kBehind + i), k = l.field(slot, kStiffness + i), rate = calc_rate(l, slot, i);
     z.elastic[i] = stretch[i];
     z.elastic_force[i] = k * stretch[i];
@@ -205,13 +265,13 @@ void System::unpack_element(size_t e) {
   z.plastic += l.flow(slot, kPlastic);
   z.lifted += l.flow(slot, kAxial) - z.axial;
   z.axial = l.flow(slot, kAxial);
-  for (int i = 0; i < 2; ++i) z.slip[i] = l.flow(slot, kSlip + i);
+  for (int a = 1 - last; a <= 1 - first; ++a) z.slip[a] = l.flow(slot, kSlip + a);
   z.slipped = l.flow(slot, kSlipped);
   z.twist = l.flow(slot, kTwist);
   z.twisted = l.flow(slot, kTwisted);
   for (int s = 0; s < elements[e].zone.stations; ++s) {
     const int at = kStations + s * kStationFields;
-    for (int q = 0; q < 2; ++q) {
+    for (int q = first; q <= last; ++q) {
       z.station[s].phi[q] = l.flow(slot, at + kPhi + q);
       z.station[s].soft[q] = l.flow(slot, at + kSoftness + q);
     }
@@ -349,6 +409,20 @@ void System::evaluate_elements() {
 void System::sum_element_forces() {
   const Lanes& l = *lanes;
   const size_t W = l.W;
+  if (model.is_planar) {
+    for (size_t b = 0; b < B; ++b) {
+      double x = 0, z = 0, turn = 0;
+      for (std::uint32_t i = l.first_entry[b]; i < l.first_entry[b + 1]; ++i) {
+        const double* from = l.element_forces.data() + l.entries[i] / 2;
+        const bool is_b = l.entries[i] % 2 != 0;
+        const double sign = is_b ? -1 : 1;
+        x += sign * from[0], z += sign * from[2 * W], turn += sign * from[(is_b ? 7 : 4) * W];
+      }
+      force[b] = Vec3{x, 0, z};
+      torque[b] = Vec3{0, turn, 0};
+    }
+    return;
+  }
   for (size_t b = 0; b < B; ++b) {
     Vec3 f, t;
     for (std::uint32_t i = l.first_entry[b]; i < l.first_entry[b + 1]; ++i) {

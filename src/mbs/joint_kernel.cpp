@@ -8,6 +8,8 @@
 // after foreach_target
 #include <hwy/highway.h>
 
+#include <utility>
+
 #include "mbs/lane_math.inc"
 
 HWY_BEFORE_NAMESPACE();
@@ -51,6 +53,40 @@ struct Partner {
   Q4<D> q;
 };
 
+/// A vector in the plane y = const.
+template <class D>
+struct V2 {
+  Num<D> x, z;
+};
+template <class D>
+HWY_INLINE V2<D> operator+(const V2<D>& a, const V2<D>& b) {
+  return {a.x + b.x, a.z + b.z};
+}
+template <class D>
+HWY_INLINE V2<D> operator-(const V2<D>& a, const V2<D>& b) {
+  return {a.x - b.x, a.z - b.z};
+}
+/// s a + b
+template <class D>
+HWY_INLINE V2<D> fma(Num<D> s, const V2<D>& a, const V2<D>& b) {
+  return {fma(s, a.x, b.x), fma(s, a.z, b.z)};
+}
+/// About y.
+template <class D>
+HWY_INLINE Num<D> cross(const V2<D>& a, const V2<D>& b) {
+  return fms(a.z, b.x, a.x * b.z);
+}
+/// Of a spin about y.
+template <class D>
+HWY_INLINE V2<D> cross(Num<D> w, const V2<D>& r) {
+  return {w * r.z, num<D>(0) - w * r.x};
+}
+template <class D>
+HWY_INLINE V2<D> operator*(const PlanarTurn<D>& t, const V2<D>& r) {
+  V2<D> out;
+  t.apply(r.x, r.z, out.x, out.z);
+  return out;
+}
 /// Where the bodies of a block lie: side by side, or each anywhere.
 template <class D>
 struct Places {
@@ -100,6 +136,45 @@ struct Places {
       const size_t lane = slots[l] % W;
       double* at = to + static_cast<size_t>(N) * (slots[l] - lane) + lane;
       for (int c = 0; c < N; ++c) at[static_cast<size_t>(c) * W] = lanes[c][l];
+    }
+  }
+  /// Component c of N.
+  HWY_INLINE Num<D> read_one(const double* HWY_RESTRICT from, size_t N, size_t c) const {
+    const D d;
+    const size_t W = hn::Lanes(d);
+    if (straight) return load<D>(from + N * slots[0], static_cast<int>(c));
+    alignas(64) double lanes[kMostLanes];
+    for (size_t l = 0; l < W; ++l) {
+      const size_t lane = slots[l] % W;
+      lanes[l] = from[N * (slots[l] - lane) + lane + c * W];
+    }
+    return {hn::Load(d, lanes)};
+  }
+  HWY_INLINE V2<D> read_plane(const double* HWY_RESTRICT from) const {
+    return {read_one(from, 3, 0), read_one(from, 3, 2)};
+  }
+  struct Component {
+    Num<D> x;
+    int c;
+  };
+  /// Some components of N.
+  template <int Count, int N, class M>
+  HWY_INLINE void write_plane(M mask, const bool* flags, const Component (&parts)[Count],
+                              double* HWY_RESTRICT to) const {
+    const D d;
+    const size_t W = hn::Lanes(d);
+    for (const Component& part : parts) {
+      if (straight) {
+        store_where<D>(mask, part.x, to + static_cast<size_t>(N) * slots[0], part.c);
+        continue;
+      }
+      alignas(64) double lanes[kMostLanes];
+      hn::Store(part.x.v, d, lanes);
+      for (size_t l = 0; l < W; ++l) {
+        if (!flags[l]) continue;
+        const size_t lane = slots[l] % W;
+        to[static_cast<size_t>(N) * (slots[l] - lane) + lane + static_cast<size_t>(part.c) * W] = lanes[l];
+      }
     }
   }
   template <class M>
@@ -431,6 +506,128 @@ HWY_INLINE void close_points(const PairJob& job, size_t block) {
 }
 
 template <class D>
+HWY_INLINE M33<D> to_matrix(const PlanarTurn<D>& t) {
+  const Num<D> zero = num<D>(0), c = t.cosine(), s = t.sine();
+  return {{c, zero, s}, {zero, num<D>(1), zero}, {zero - s, zero, c}};
+}
+
+/// A body of a hinge in the plane at the beginning of the step.
+template <class D>
+struct PlanarMover {
+  V2<D> p, v, arm;  // arm: to the hinge, in its axes
+  Num<D> L, inverse_inertia, inverse_mass;
+  PlanarTurn<D> q;
+
+  HWY_INLINE PlanarMover(const PairJob& job, const Places<D>& at, const double* c, int lever, int mass, int inertia)
+      : p(at.read_plane(job.p)),
+        v(at.read_plane(job.v)),
+        arm{load<D>(c, lever), load<D>(c, lever + 2)},
+        L(at.read_one(job.L, 3, 1)),
+        inverse_inertia(load<D>(c, inertia + 3)),
+        inverse_mass(load<D>(c, mass)),
+        q(at.read_one(job.q, 4, 0), at.read_one(job.q, 4, 2)) {}
+};
+
+/// As close_points() of a hinge about y between bodies that keep to y = const: two lines, and nothing turns them out of
+/// the plane.
+template <class D>
+HWY_INLINE void close_in_plane(const PairJob& job, size_t block) {
+  const D d;
+  const size_t W = hn::Lanes(d);
+  const double* c = job.constants + static_cast<size_t>(kPairConstants) * W * block;
+  double* s = job.states + static_cast<size_t>(kPairStates) * W * block;
+  const Places<D> parents{job.parent + W * block, (job.straight[block] & 1) != 0};
+  const Places<D> children{job.child + W * block, (job.straight[block] & 2) != 0};
+  const Num<D> zero = num<D>(0), h = load<D>(job.h, 0), half_h = num<D>(0.5) * h, per_h = num<D>(1) / h;
+  const auto live = hn::And(hn::Gt(load<D>(c, kPairLive).v, hn::Zero(d)), hn::Gt(h.v, hn::Zero(d)));
+  const PlanarMover<D> a(job, parents, c, kLeverParent, kInverseMassParent, kInverseInertiaParent);
+  const PlanarMover<D> b(job, children, c, kLeverChild, kInverseMassChild, kInverseInertiaChild);
+  const V2<D> ra = a.q * a.arm, rb = b.q * b.arm;
+
+  Num<D> A[2][2] = {{zero, zero}, {zero, zero}};
+  for (const auto& [m, l] : {std::pair<const PlanarMover<D>&, const V2<D>&>{a, ra}, {b, rb}}) {
+    A[0][0] = A[0][0] + fma(m.inverse_inertia * l.z, l.z, m.inverse_mass);
+    A[1][0] = A[1][0] - m.inverse_inertia * l.z * l.x;
+    A[1][1] = A[1][1] + fma(m.inverse_inertia * l.x, l.x, m.inverse_mass);
+  }
+  Factor<D, 2> factor;
+  factor.make(A);
+  const V2<D> gap = (b.p + rb) - (a.p + ra);
+  const Num<D> wa = a.inverse_inertia * a.L, wb = b.inverse_inertia * b.L;
+  const V2<D> va = cross(wa, ra), vb = cross(wb, rb);
+  const V2<D> rate = fma(half_h, cross(wb, vb) - cross(wa, va), fma(per_h, gap, (b.v + vb) - (a.v + va)));
+  Num<D> x[2] = {zero - rate.x, zero - rate.z}, total[2], linear[2];
+  factor.solve(x);
+  for (int i = 0; i < 2; ++i) {
+    linear[i] = x[i];
+    x[i] = total[i] = x[i] + load<D>(s, kCurvature + 2 * i);
+  }
+  const Num<D> gap_tolerance = load<D>(c, kGapTolerance);
+  struct Moved {
+    V2<D> p, v;
+    Num<D> L;
+    PlanarTurn<D> q;
+  };
+  Moved MA{a.p, a.v, a.L, a.q}, MB{b.p, b.v, b.L, b.q};
+  auto slow = live, open = live;
+  Num<D> widest = zero;
+  const auto move = [&](const PlanarMover<D>& m, Moved& out) {
+    out.p = fma(h, out.v, m.p);
+    const Num<D> turned = h * (m.inverse_inertia * out.L), half2 = num<D>(0.25) * (turned * turned);
+    slow = hn::And(slow, hn::Le(half2.v, hn::Set(d, kMostHalf2)));
+    out.q = PlanarTurn<D>(exp_rotation(V3<D>{zero, turned, zero}, half2)).then(m.q).normalized();
+  };
+  for (int round = 0;; ++round) {
+    const V2<D> line{x[0], x[1]};
+    MA.v = fma(zero - a.inverse_mass, line, MA.v);
+    MB.v = fma(b.inverse_mass, line, MB.v);
+    MA.L = MA.L - cross(ra, line);
+    MB.L = MB.L + cross(rb, line);
+    move(a, MA);
+    move(b, MB);
+    const V2<D> left = (MB.p + MB.q * b.arm) - (MA.p + MA.q * a.arm);
+    x[0] = left.x, x[1] = left.z;
+    const Num<D> far = {hn::Max(abs(left.x).v, abs(left.z).v)};
+    // a lane that is closed stays as it is
+    widest = select(open, far, widest);
+    open = hn::And(slow, hn::AndNot(hn::Lt(far.v, gap_tolerance.v), open));
+    if (HWY_LIKELY(hn::AllFalse(d, open)) || round == kMostRounds) break;
+    for (int i = 0; i < 2; ++i) x[i] = {hn::IfThenElseZero(open, (zero - per_h * x[i]).v)};
+    factor.solve(x);
+    for (int i = 0; i < 2; ++i) total[i] = total[i] + x[i];
+  }
+  const auto here = hn::And(slow, hn::AndNot(open, live));
+  const auto unfit = hn::AndNot(here, live);
+  if (HWY_UNLIKELY(!hn::AllFalse(d, unfit))) report<D>(unfit, block, *job.unfit);
+
+  const Num<D> per_time = num<D>(1) / load<D>(job.kick, 0);
+  const V2<D> force{per_time * total[0], per_time * total[1]};
+  const auto write = [&](const Places<D>& at, const PlanarMover<D>& m, const Moved& to, const V2<D>& f, Num<D> torque) {
+    const auto mask = hn::And(here, hn::Gt(m.inverse_mass.v, hn::Zero(d)));
+    bool flags[kMostLanes];
+    read_flags<D>(mask, flags);
+    const Num<D> cosine = to.q.cosine(), sine = to.q.sine();
+    at.template write_plane<2, 3>(mask, flags, {{to.p.x, 0}, {to.p.z, 2}}, job.p);
+    at.template write_plane<2, 3>(mask, flags, {{to.v.x, 0}, {to.v.z, 2}}, job.v);
+    at.template write_plane<1, 3>(mask, flags, {{to.L, 1}}, job.L);
+    at.template write_plane<1, 3>(mask, flags, {{m.inverse_inertia * to.L, 1}}, job.w);
+    at.template write_plane<2, 3>(mask, flags, {{f.x, 0}, {f.z, 2}}, job.force);
+    at.template write_plane<1, 3>(mask, flags, {{torque, 1}}, job.torque);
+    at.template write_plane<2, 4>(mask, flags, {{to.q.w, 0}, {to.q.y, 2}}, job.q);
+    at.template write_plane<4, 9>(mask, flags, {{cosine, 0}, {sine, 2}, {zero - sine, 6}, {cosine, 8}}, job.R);
+  };
+  write(parents, a, MA, {zero - force.x, zero - force.z}, zero - cross(ra, force));
+  write(children, b, MB, force, cross(rb, force));
+  for (int i = 0; i < 2; ++i) store_where<D>(here, total[i] - linear[i], s, kCurvature + 2 * i);
+  store_where<D>(here, widest, s, kOpen);
+  const M33<D> RA = to_matrix(MA.q);
+  const V3<D> along = to_matrix(MB.q) * load3<D>(c, kChildX);
+  store_where<D>(here, dot(along, RA * load3<D>(c, kParentAxes)), s, kCosine);
+  store_where<D>(here, dot(along, RA * load3<D>(c, kParentAxes + 3)), s, kSine);
+  finish_reaction<D>(job, block, here, RA, V3<D>{force.x, zero, force.z}, zero3<D>(), c, s);
+}
+
+template <class D>
 HWY_INLINE void close_all(const PairJob& job) {
   for (size_t block = 0; block < job.blocks; ++block) {
     switch (job.kind[block]) {
@@ -447,6 +644,9 @@ HWY_INLINE void close_all(const PairJob& job) {
         break;
       case PairKind::Hinge:
         close_points<D, 2>(job, block);
+        break;
+      case PairKind::PlanarHinge:
+        close_in_plane<D>(job, block);
         break;
     }
   }

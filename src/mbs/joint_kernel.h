@@ -10,8 +10,9 @@
 
 namespace topple::mbs::kernel {
 
-/// What a block of pairs holds; from Ball on, three lines and as many rotations as the kind is beyond it.
-enum class PairKind : unsigned char { None, Weld, Ball, Universal, Hinge };
+/// What a block of pairs holds; from Ball to Hinge, three lines and as many rotations as the kind is beyond Ball. A
+/// planar hinge turns about y between bodies that keep to y = const.
+enum class PairKind : unsigned char { None, Weld, Ball, Universal, Hinge, PlanarHinge };
 
 /// Fields of a pair's constants. Vectors of the parent or the child are in their axes, from their centres of mass.
 enum PairConstant : int {

@@ -13,8 +13,9 @@ namespace {
 
 using kernel::PairKind;
 
-PairKind kind_of(Joint::Kind kind) {
-  switch (kind) {
+PairKind kind_of(const CompiledJoint& j, bool is_planar) {
+  const auto is_normal = [](const Mat3& R) { return norm(R.column(2) - Vec3{0, 1, 0}) < 1e-12; };
+  switch (j.kind) {
     case Joint::Kind::Fixed:
       return PairKind::Weld;
     case Joint::Kind::Spherical:
@@ -22,7 +23,7 @@ PairKind kind_of(Joint::Kind kind) {
     case Joint::Kind::Universal:
       return PairKind::Universal;
     case Joint::Kind::Revolute:
-      return PairKind::Hinge;
+      return is_planar && is_normal(j.R_PF) && is_normal(j.R_CM) ? PairKind::PlanarHinge : PairKind::Hinge;
     case Joint::Kind::Prismatic:
     case Joint::Kind::Cylindrical:
     case Joint::Kind::Distance:
@@ -43,7 +44,7 @@ void System::pack_pairs() {
   for (JointCluster& c : clusters) {
     if (c.joints.size() != 1) continue;
     const CompiledJoint& j = joints[static_cast<size_t>(c.joints[0])];
-    const PairKind kind = kind_of(j.kind);
+    const PairKind kind = kind_of(j, l.is_planar);
     // a body welded to one that does not move has nothing left to solve, and no composite
     c.is_pair = kind != PairKind::None && (kind != PairKind::Weld || (moving(j.parent) && moving(j.child)));
     if (c.is_pair) paired.push_back(c.joints[0]);
@@ -57,7 +58,7 @@ void System::pack_pairs() {
     if (l.pairs.blocks != joints.size()) {
       l.allocate_pairs(joints.size());
       for (size_t j = 0; j < joints.size(); ++j) {
-        l.pairs.kind[j] = kind_of(joints[j].kind);
+        l.pairs.kind[j] = kind_of(joints[j], l.is_planar);
         const auto item = [&](int b) { return b < 0 ? B : static_cast<size_t>(b); };
         for (size_t i = 0; i < W; ++i) {
           l.pairs.parent[j * W + i] = static_cast<std::uint32_t>(item(joints[j].parent) * W + i);
@@ -74,9 +75,10 @@ void System::pack_pairs() {
     // blocks of one kind each
     std::vector<PairKind> kinds;
     size_t slot = 0;
-    for (const PairKind kind : {PairKind::Weld, PairKind::Ball, PairKind::Universal, PairKind::Hinge}) {
+    for (const PairKind kind :
+         {PairKind::Weld, PairKind::Ball, PairKind::Universal, PairKind::Hinge, PairKind::PlanarHinge}) {
       for (const int j : paired) {
-        if (kind_of(joints[static_cast<size_t>(j)].kind) != kind) continue;
+        if (kind_of(joints[static_cast<size_t>(j)], l.is_planar) != kind) continue;
         if (slot % W == 0) kinds.push_back(kind);
         pair_slot[static_cast<size_t>(j)] = static_cast<std::uint32_t>(slot++);
       }

@@ -63,6 +63,40 @@ HWY_INLINE void advance_body_block(const BodyJob& job, size_t block, Num<D>& sum
   sum = sum + (((place.x + place.y) + place.z) + ((speed.x + speed.y) + speed.z));
 }
 
+/// The same of bodies that keep to y = const and turn about y alone: what stays zero is left out.
+template <class D>
+HWY_INLINE void advance_planar_block(const BodyJob& job, size_t block, Num<D>& sum) {
+  const D d;
+  const size_t W = hn::Lanes(d);
+  double *p = job.p + 3 * W * block, *v = job.v + 3 * W * block, *L = job.L + 3 * W * block, *w = job.w + 3 * W * block,
+         *q = job.q + 4 * W * block, *R = job.R + 9 * W * block;
+  const double *c = job.constants + static_cast<size_t>(kBodyFields) * W * block, *force = job.force + 3 * W * block;
+  const Num<D> kick = load<D>(job.kick, 0), h = load<D>(job.h, 0), zero = num<D>(0);
+  const Num<D> push = kick * load<D>(c, kInverseMass), pull = kick * load<D>(c, kFree);
+  const Num<D> vx = fma(push, load<D>(force, 0), fma(pull, load<D>(job.gx, 0), load<D>(v, 0)));
+  const Num<D> vz = fma(push, load<D>(force, 2), fma(pull, load<D>(job.gz, 0), load<D>(v, 2)));
+  const Num<D> spin = fma(kick, load<D>(job.torque + 3 * W * block, 1), load<D>(L, 1));
+  store<D>(vx, v, 0);
+  store<D>(vz, v, 2);
+  store<D>(spin, L, 1);
+  const auto drifts = hn::Gt(load<D>(c, kDrifts).v, hn::Zero(d));
+  const Num<D> x = fma(h, vx, load<D>(p, 0)), z = fma(h, vz, load<D>(p, 2));
+  const Num<D> rate = load<D>(c, kInverseInertia + 3) * spin, turned = h * rate;
+  const Num<D> half2 = num<D>(0.25) * (turned * turned);
+  const auto fast = hn::And(drifts, hn::Not(hn::Le(half2.v, hn::Set(d, kMostHalf2))));
+  const Q4<D> q0{load<D>(q, 0), zero, load<D>(q, 2), zero}, by = exp_rotation(V3<D>{zero, turned, zero}, half2);
+  const PlanarTurn<D> end = PlanarTurn<D>(by).then(PlanarTurn<D>(q0)).normalized();
+  const auto here = hn::AndNot(fast, drifts);
+  store_where<D>(here, x, p, 0), store_where<D>(here, z, p, 2);
+  store_where<D>(here, end.w, q, 0), store_where<D>(here, end.y, q, 2);
+  const Num<D> cosine = end.cosine(), sine = end.sine();
+  store_where<D>(here, cosine, R, 0), store_where<D>(here, sine, R, 2);
+  store_where<D>(here, zero - sine, R, 6), store_where<D>(here, cosine, R, 8);
+  store_where<D>(here, rate, w, 1);
+  if (HWY_UNLIKELY(!hn::AllFalse(d, fast))) report<D>(fast, block, *job.spins);
+  sum = sum + ((x + z) + (vx + vz));
+}
+
 /// Rotation vector over the vector of its quaternion, 2 asin(s)/s, and the coefficient of eq. 4,
 /// 1/θ² - (1 + cos θ) / (2 θ sin θ), up to θ of 60 degrees. Each lane takes the series for small or large angles after
 /// its own s².
@@ -139,6 +173,21 @@ HWY_INLINE Poses<D> read_poses(const double* HWY_RESTRICT poses, const std::uint
   return {{field[0], field[1], field[2]}, {field[3], field[4], field[5], field[6]}};
 }
 
+/// A marker of a block in the plane: its body's place and the marker's lever from there in x and z of W, its turn.
+template <class D>
+struct PlanarMarker {
+  Num<D> px, pz, lever_x, lever_z;
+  PlanarTurn<D> turn;
+
+  /// c: the marker's fields of the slot, p_x p_y p_z and the turn's w x y z.
+  template <class Constant>
+  HWY_INLINE PlanarMarker(const Poses<D>& body, const Constant& constant, int c) : px(body.p.x), pz(body.p.z) {
+    const PlanarTurn<D> at(body.q);
+    at.apply(constant(c), constant(c + 2), lever_x, lever_z);
+    turn = at.then({constant(c + 3), constant(c + 5)});
+  }
+};
+
 template <class D>
 HWY_INLINE void lay_pose_block(const PoseJob& job, size_t block) {
   const D d;
@@ -183,10 +232,10 @@ HWY_INLINE Num<D> inverse_root(Num<D> a) {
   return scale * y;
 }
 
-constexpr double kNear = 0.854;  // kNearBounds to the power of the biaxial bound
+constexpr double kNearPlane = 0.9, kNear = 0.854;  // kNearBounds, and to the power of the biaxial bound
 
 /// A bending plane of a zone: about y with shear along z (sign +1), or about z with shear along y (sign -1).
-template <class D>
+template <class D, int Hinges>
 struct BendingPlane {
   Num<D> shear_stiffness, bending_stiffness;
   Num<D> stiffness[2], cross;  // of the stations against their own rotation and the other's
@@ -194,12 +243,19 @@ struct BendingPlane {
   Num<D> shift, rotation;      // deformations
   Num<D> phi[2], soft[2], m[2];
 
-  HWY_INLINE Num<D> shear() const { return shear_stiffness * fnma(lever[1], phi[1], fnma(lever[0], phi[0], shift)); }
-  HWY_INLINE Num<D> moment() const { return bending_stiffness * ((rotation - phi[0]) - phi[1]); }
+  HWY_INLINE Num<D> shear() const {
+    Num<D> u = shift;
+    for (int s = 0; s < Hinges; ++s) u = fnma(lever[s], phi[s], u);
+    return shear_stiffness * u;
+  }
+  HWY_INLINE Num<D> moment() const {
+    Num<D> u = rotation;
+    for (int s = 0; s < Hinges; ++s) u = u - phi[s];
+    return bending_stiffness * u;
+  }
   HWY_INLINE void measure() {
     const Num<D> v = shear(), b = moment();
-    m[0] = fma(lever[0], v, b);
-    m[1] = fma(lever[1], v, b);
+    for (int s = 0; s < Hinges; ++s) m[s] = fma(lever[s], v, b);
   }
 };
 
@@ -214,6 +270,11 @@ struct CellForce {
     upper = hn::Ge(above.v, hn::Zero(D()));
     share = abs(above * select(upper, load<D>(flow, cell + kCellForce + 2), load<D>(flow, cell + kCellForce + 1)));
   }
+  /// Rise of such values with the force.
+  HWY_INLINE Num<D> slope(const double* HWY_RESTRICT flow, int cell, Num<D> low, Num<D> middle, Num<D> high) const {
+    return select(upper, (high - middle) * load<D>(flow, cell + kCellForce + 2),
+                  (middle - low) * load<D>(flow, cell + kCellForce + 1));
+  }
   /// Between values at the cell's three forces.
   HWY_INLINE Num<D> mix(Num<D> low, Num<D> middle, Num<D> high) const {
     return fma(share, select(upper, high, low) - middle, middle);
@@ -223,55 +284,62 @@ struct CellForce {
 /// The law of a zone that flows in bending, shear or torsion (docs/theory/zones.md, eq. 1 to 9). Sets the elastic
 /// resultants f; gives the lanes among `wanted` for which that is the whole truth and moves their history; the others
 /// keep theirs.
-template <class D, class M>
+template <class D, Plane In, int Hinges, class M>
 HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], const Num<D> k[6], const Num<D> d[6],
                        const Num<D> e_before[6], Num<D> f[6]) {
   using N = Num<D>;
+  constexpr int first = first_bending(In), last = last_bending(In);
+  constexpr bool is_plane = In != Plane::Space;
+  constexpr ActiveComponents active = components_of(In);
   const D tag;
   const N zero = num<D>(0), one = num<D>(1), half = num<D>(0.5), tiny = num<D>(1e-290);
   M good = wanted;
   const auto demand = [&](M condition) { good = hn::And(good, condition); };
 
   const N slip[2] = {load<D>(flow, kSlip), load<D>(flow, kSlip + 1)}, twist = load<D>(flow, kTwist);
+  for (int i = 0; i < 6; ++i) f[i] = zero;
   f[0] = k[0] * (d[0] - load<D>(flow, kAxial));
-  f[3] = k[3] * (d[3] - twist);
+  if constexpr (!is_plane) f[3] = k[3] * (d[3] - twist);
   demand(hn::Ge(f[0].v, load<D>(flow, kFlowLeast).v));
   demand(hn::Le(f[0].v, load<D>(flow, kFlowMost).v));
 
-  BendingPlane<D> plane[2];
-  for (int q = 0; q < 2; ++q) {
-    BendingPlane<D>& P = plane[q];
+  BendingPlane<D, Hinges> plane[2];
+  for (int q = first; q <= last; ++q) {
+    BendingPlane<D, Hinges>& P = plane[q];
     const int shear = q == 0 ? 2 : 1, bend = q == 0 ? 4 : 5;
     P.shear_stiffness = k[shear], P.bending_stiffness = k[bend];
     P.shift = d[shear] - slip[shear - 1];
     P.rotation = d[bend];
-    for (int s = 0; s < 2; ++s) {
+    for (int s = 0; s < Hinges; ++s) {
       P.lever[s] = q == 0 ? x[s] : zero - x[s];
       P.stiffness[s] = fma(x[s] * x[s], k[shear], k[bend]);
       P.phi[s] = load<D>(flow, kStations + s * kStationFields + kPhi + q);
       P.soft[s] = load<D>(flow, kStations + s * kStationFields + kSoftness + q);
     }
-    P.cross = fma(x[0] * x[1], k[shear], k[bend]);
     // damage adds flexibility at the stations: (1 + S C) m = m0
     P.measure();
-    const N s11 = fma(P.stiffness[0], P.soft[0], one), s22 = fma(P.stiffness[1], P.soft[1], one);
-    const N s12 = P.cross * P.soft[1], s21 = P.cross * P.soft[0];
-    const N scale = one / fms(s11, s22, s12 * s21);
-    const N m0 = fms(P.m[0], s22, P.m[1] * s12) * scale, m1 = fms(P.m[1], s11, P.m[0] * s21) * scale;
-    P.phi[0] = fma(P.soft[0], m0, P.phi[0]);
-    P.phi[1] = fma(P.soft[1], m1, P.phi[1]);
-    P.m[0] = m0, P.m[1] = m1;
+    if constexpr (Hinges == 1) {
+      P.m[0] = P.m[0] / fma(P.stiffness[0], P.soft[0], one);
+    } else {
+      P.cross = fma(x[0] * x[1], k[shear], k[bend]);
+      const N s11 = fma(P.stiffness[0], P.soft[0], one), s22 = fma(P.stiffness[1], P.soft[1], one);
+      const N s12 = P.cross * P.soft[1], s21 = P.cross * P.soft[0];
+      const N scale = one / fms(s11, s22, s12 * s21);
+      const N m0 = fms(P.m[0], s22, P.m[1] * s12) * scale, m1 = fms(P.m[1], s11, P.m[0] * s21) * scale;
+      P.m[0] = m0, P.m[1] = m1;
+    }
+    for (int s = 0; s < Hinges; ++s) P.phi[s] = fma(P.soft[s], P.m[s], P.phi[s]);
   }
 
-  // (|My|/Ly)^1.5 + (|Mz|/Lz)^1.5 of a station; an axis without any limit left stands apart
+  // (|My|/Ly)^1.5 + (|Mz|/Lz)^1.5 of a station, in a plane |M|/L; an axis without any limit left stands apart
   struct Demand {
     N sum;
-    M out, none[2];
+    M out, lost, none[2];
   };
   const auto calc_demand = [&](int s) {
-    Demand to{zero, hn::FirstN(tag, 0), {hn::FirstN(tag, 0), hn::FirstN(tag, 0)}};
-    M moves = to.out;
-    for (int q = 0; q < 2; ++q) {
+    const M no = hn::FirstN(tag, 0);
+    Demand to{zero, no, no, {no, no}};
+    for (int q = first; q <= last; ++q) {
       const int cell = kStations + s * kStationFields + kCell + q * kCellFields;
       const CellForce<D> at(flow, cell, f[0]);
       const N r = (load<D>(flow, kStations + s * kStationFields + kReached) - load<D>(flow, cell + kCellRotation)) *
@@ -287,28 +355,46 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
       const N limit = fma(r, high - low, low), size = abs(plane[q].m[s]);
       to.none[q] = hn::Le(limit.v, zero.v);
       const N ratio = select(to.none[q], zero, size / N{hn::Max(limit.v, tiny.v)});
-      to.sum = to.sum + ratio * N{hn::Sqrt(ratio.v)};
-      moves = hn::Or(moves, hn::And(to.none[q], hn::Gt(size.v, zero.v)));
+      to.sum = is_plane ? ratio : to.sum + ratio * N{hn::Sqrt(ratio.v)};
+      to.lost = hn::Or(to.lost, hn::And(to.none[q], hn::Gt(size.v, zero.v)));
     }
-    to.out = hn::Or(moves, hn::Gt(to.sum.v, one.v));
+    to.out = hn::Or(to.lost, hn::Gt(to.sum.v, one.v));
     return to;
   };
   const auto calc_scale = [&](const Demand& at, N scale[2]) {
-    demand(hn::Or(hn::Not(at.out), hn::Le(at.sum.v, hn::Set(tag, kMostOver))));
-    const N common = select(hn::Gt(at.sum.v, one.v), inverse_root<D>(at.sum), one);
-    for (int q = 0; q < 2; ++q) scale[q] = select(at.none[q], zero, common);
+    const auto beyond = hn::Gt(at.sum.v, one.v);
+    N common;
+    if constexpr (is_plane) {
+      common = select(beyond, one / select(beyond, at.sum, one), one);
+    } else {
+      demand(hn::Or(hn::Not(at.out), hn::Le(at.sum.v, hn::Set(tag, kMostOver))));
+      common = select(beyond, inverse_root<D>(at.sum), one);
+    }
+    for (int q = first; q <= last; ++q) scale[q] = select(at.none[q], zero, common);
   };
-  const Demand at[2] = {calc_demand(0), calc_demand(1)};
+  const Demand at_first = calc_demand(0), at[2] = {at_first, Hinges == 1 ? at_first : calc_demand(1)};
   N by[2][2] = {{zero, zero}, {zero, zero}};  // further inelastic rotation [plane][station]
+  N phi_trial[2][2], m_trial[2][2];           // [plane][station], [station][plane]
+  for (int q = first; q <= last; ++q)
+    for (int s = 0; s < Hinges; ++s) phi_trial[q][s] = plane[q].phi[s], m_trial[s][q] = plane[q].m[s];
   const M bends = hn::And(good, hn::Or(at[0].out, at[1].out));
-  if (!hn::AllFalse(tag, bends)) {
+  if (Hinges == 1 && !hn::AllFalse(tag, bends)) {
+    N scale[2];
+    calc_scale(at[0], scale);
+    for (int q = first; q <= last; ++q) {
+      const BendingPlane<D, Hinges>& P = plane[q];
+      const N turn = (P.m[0] - P.m[0] * scale[q]) / P.stiffness[0];
+      by[q][0] = select(hn::And(at[0].out, hn::Gt(P.stiffness[0].v, zero.v)), turn, zero);
+    }
+  }
+  if (Hinges == 2 && !hn::AllFalse(tag, bends)) {
     N scale[2][2], target[2][2], trial[2][2];
-    for (int s = 0; s < 2; ++s) calc_scale(at[s], scale[s]);
+    for (int s = 0; s < Hinges; ++s) calc_scale(at[s], scale[s]);
     // one station alone
     const M alone[2] = {hn::AndNot(at[1].out, at[0].out), hn::AndNot(at[0].out, at[1].out)};
-    for (int q = 0; q < 2; ++q) {
-      BendingPlane<D>& P = plane[q];
-      for (int s = 0; s < 2; ++s) {
+    for (int q = first; q <= last; ++q) {
+      BendingPlane<D, Hinges>& P = plane[q];
+      for (int s = 0; s < Hinges; ++s) {
         trial[q][s] = P.m[s];
         target[q][s] = P.m[s] * scale[s][q];
         const N turn = (P.m[s] - target[q][s]) / P.stiffness[s];
@@ -320,7 +406,7 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
     }
     // which may push the other one out
     M both = hn::And(at[0].out, at[1].out);
-    for (int s = 0; s < 2; ++s) {
+    for (int s = 0; s < Hinges; ++s) {
       const Demand again = calc_demand(s);
       const M pushed = hn::And(alone[1 - s], again.out);
       if (HWY_LIKELY(hn::AllFalse(tag, pushed))) continue;
@@ -328,13 +414,13 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
       const M so_far = good;
       calc_scale(again, back);
       good = hn::Or(good, hn::AndNot(pushed, so_far));
-      for (int q = 0; q < 2; ++q) target[q][s] = select(pushed, plane[q].m[s] * back[q], target[q][s]);
+      for (int q = first; q <= last; ++q) target[q][s] = select(pushed, plane[q].m[s] * back[q], target[q][s]);
       both = hn::Or(both, pushed);
     }
     if (!hn::AllFalse(tag, both)) {
       N work[2] = {zero, zero};
-      for (int q = 0; q < 2; ++q) {
-        const BendingPlane<D>& P = plane[q];
+      for (int q = first; q <= last; ++q) {
+        const BendingPlane<D, Hinges>& P = plane[q];
         const N determinant = fms(P.stiffness[0], P.stiffness[1], P.cross * P.cross);
         demand(hn::Or(hn::Not(both), hn::Gt(determinant.v, (num<D>(1e-9) * P.stiffness[0] * P.stiffness[1]).v)));
         const N over0 = trial[q][0] - target[q][0], over1 = trial[q][1] - target[q][1];
@@ -348,26 +434,141 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
       demand(hn::Or(hn::Not(both), hn::And(hn::Ge(work[0].v, zero.v), hn::Ge(work[1].v, zero.v))));
     }
   }
-  for (int q = 0; q < 2; ++q) {
-    BendingPlane<D>& P = plane[q];
-    for (int s = 0; s < 2; ++s) P.phi[s] = P.phi[s] + by[q][s];
-    P.measure();
-    f[q == 0 ? 2 : 1] = P.shear();
-    f[q == 0 ? 4 : 5] = P.moment();
+  const auto turn = [&] {
+    for (int q = first; q <= last; ++q) {
+      for (int s = 0; s < Hinges; ++s) plane[q].phi[s] = phi_trial[q][s] + by[q][s];
+      plane[q].measure();
+    }
+  };
+  turn();
+
+  // what turns further lengthens or shortens
+  const auto length_of = [&](const auto& about) {
+    if constexpr (is_plane)
+      return abs(about(first));
+    else
+      return N{hn::Sqrt(fma(about(0), about(0), about(1) * about(1)).v)};
+  };
+  const auto gone = [&](int s) { return length_of([&](int q) { return plane[q].phi[s]; }); };
+  N elongation = zero, so_far[2];
+  M turns[2] = {hn::FirstN(tag, 0), hn::FirstN(tag, 0)};
+  const auto calc_elongation = [&] {
+    N sum = zero;
+    for (int s = 0; s < Hinges; ++s) {
+      const N length = gone(s);
+      M grows = hn::And(turns[s], hn::Gt(length.v, so_far[s].v));
+      if (hn::AllFalse(tag, grows)) continue;
+      N squares = zero, along = zero, bending = zero;
+      for (int q = first; q <= last; ++q) {
+        const int cell = kStations + s * kStationFields + kCell + q * kCellFields;
+        const auto positive = hn::Ge(plane[q].phi[s].v, zero.v);
+        const auto lift_at = [&](int force) {
+          return select(positive, load<D>(flow, cell + kCellLiftPositive + force),
+                        load<D>(flow, cell + kCellLiftNegative + force));
+        };
+        const N lift = CellForce<D>(flow, cell, f[0]).mix(lift_at(0), lift_at(1), lift_at(2));
+        const N square = plane[q].phi[s] * plane[q].phi[s];
+        squares = squares + square;
+        along = fma(square, lift, along);
+        bending = fma(plane[q].m[s], by[q][s], bending);
+      }
+      grows = hn::And(grows, hn::Ne(along.v, zero.v));
+      if (hn::AllFalse(tag, grows)) continue;
+      const N unbound = (length - so_far[s]) * along / squares;
+      // the axial spring takes no more than bending brings
+      const N brought =
+          fnma(half, load<D>(flow, kStations + s * kStationFields + kShare), one) * N{hn::Max(zero.v, bending.v)};
+      const N pull = N{hn::CopySign(one.v, unbound.v)} * fnma(k[0], sum, f[0]);
+      const N root = {hn::Sqrt(fma(num<D>(2) * k[0], brought, pull * pull).v)};
+      const N most = select(hn::Lt(pull.v, zero.v), num<D>(2) * brought / (root - pull),
+                            (pull + root) / N{hn::Max(k[0].v, tiny.v)});
+      const N bound = {hn::CopySign(hn::Min(abs(unbound).v, most.v), unbound.v)};
+      sum = sum + select(grows, bound, zero);
+    }
+    return sum;
+  };
+  // share of the turn of a station that brings it to the limit under the force that is left
+  const auto calc_share = [&](int s, M changes) {
+    const N length = gone(s);
+    M grows = hn::And(hn::And(changes, turns[s]), hn::Gt(length.v, so_far[s].v));
+    grows = hn::And(grows, hn::AndNot(at[s].lost, hn::Gt(at[s].sum.v, one.v)));
+    if (hn::AllFalse(tag, grows)) return one;
+    const N sum = select(grows, at[s].sum, one);
+    N slope = zero;  // of what the limit leaves of the moments with the force
+    for (int q = first; q <= last; ++q) {
+      const int cell = kStations + s * kStationFields + kCell + q * kCellFields;
+      const CellForce<D> force(flow, cell, f[0]);
+      const N r = (load<D>(flow, kStations + s * kStationFields + kReached) - load<D>(flow, cell + kCellRotation)) *
+                  load<D>(flow, cell + kCellRotation + 1);
+      const auto positive = hn::Ge(m_trial[s][q].v, zero.v);
+      N limit[3];  // at the cell's forces
+      for (int i = 0; i < 3; ++i) {
+        const int value = cell + 2 * i;
+        const N low = select(positive, load<D>(flow, value + kCellPositive), load<D>(flow, value + kCellNegative));
+        const N high =
+            select(positive, load<D>(flow, value + 1 + kCellPositive), load<D>(flow, value + 1 + kCellNegative));
+        limit[i] = fma(r, high - low, low);
+      }
+      const N here = force.mix(limit[0], limit[1], limit[2]);
+      const N ratio = abs(m_trial[s][q]) / N{hn::Max(here.v, tiny.v)};
+      const N part = (is_plane ? ratio : ratio * N{hn::Sqrt(ratio.v)}) *
+                     force.slope(flow, cell, limit[0], limit[1], limit[2]) / here;
+      slope = slope + select(hn::Gt(here.v, zero.v), part, zero);
+    }
+    N left;
+    if constexpr (is_plane)
+      left = one / sum;
+    else
+      left = inverse_root<D>(sum);
+    const N rise = zero - (left * k[0]) * (slope * elongation) / sum;
+    grows = hn::And(grows, hn::Gt(rise.v, zero.v));
+    const N trial = {hn::Max(so_far[s].v, length_of([&](int q) { return phi_trial[q][s]; }).v)};
+    const N ahead = (trial - so_far[s]) / (length - so_far[s]);  // by damage, before it turns
+    const N over = one - left;
+    const N part = fnma(rise, ahead, over) / fma(rise, one - ahead, over);
+    return select(grows, N{hn::Max(zero.v, part.v)}, one);
+  };
+  if (!hn::AllFalse(tag, bends)) {
+    for (int s = 0; s < Hinges; ++s) {
+      // rotation up to which a station had gone in the step before, by plastic flow or on the flexibility of its damage
+      const int station = kStations + s * kStationFields;
+      const N before = length_of([&](int q) {
+        const int shear = q == 0 ? 2 : 1, bend = q == 0 ? 4 : 5;
+        const N m = fma(plane[q].lever[s], k[shear] * e_before[shear], k[bend] * e_before[bend]);
+        return fma(plane[q].soft[s], m, load<D>(flow, station + kPhi + q));
+      });
+      so_far[s] = {hn::Max(load<D>(flow, station + kReached).v, before.v)};
+      turns[s] = hn::Ne(by[first][s].v, zero.v);
+      if constexpr (!is_plane) turns[s] = hn::Or(turns[s], hn::Ne(by[1][s].v, zero.v));
+      turns[s] = hn::And(good, turns[s]);
+    }
+    elongation = calc_elongation();
+    const M changes = hn::Ne(elongation.v, zero.v);
+    if (!hn::AllFalse(tag, changes)) {
+      // that changes the normal force and with it the limits
+      N share = calc_share(0, changes);
+      if constexpr (Hinges == 2) share = {hn::Min(share.v, calc_share(1, changes).v)};
+      for (int q = first; q <= last; ++q)
+        for (int s = 0; s < Hinges; ++s) by[q][s] = share * by[q][s];
+      turn();
+      elongation = calc_elongation();
+    }
+  }
+  for (int q = first; q <= last; ++q) {
+    f[q == 0 ? 2 : 1] = plane[q].shear();
+    f[q == 0 ? 4 : 5] = plane[q].moment();
   }
   N reached[2];
-  for (int s = 0; s < 2; ++s) {
-    const N turned = fma(plane[0].phi[s], plane[0].phi[s], plane[1].phi[s] * plane[1].phi[s]);
-    const N so_far = load<D>(flow, kStations + s * kStationFields + kReached);
-    const M moves = hn::Or(hn::Ne(by[0][s].v, zero.v), hn::Ne(by[1][s].v, zero.v));
-    reached[s] = select(moves, N{hn::Max(so_far.v, hn::Sqrt(turned.v))}, so_far);
+  for (int s = 0; s < Hinges; ++s) {
+    const N held = load<D>(flow, kStations + s * kStationFields + kReached);
+    reached[s] = select(turns[s], N{hn::Max(held.v, gone(s).v)}, held);
     demand(hn::Lt(reached[s].v, load<D>(flow, kStations + s * kStationFields + kRupture).v));
   }
   // what is new of the inelastic rotation: a plastic part and added flexibility
   N plastic[2][2], soft[2][2];  // [plane][station]
-  for (int q = 0; q < 2; ++q)
-    for (int s = 0; s < 2; ++s) {
-      const BendingPlane<D>& P = plane[q];
+  for (int q = first; q <= last; ++q)
+    for (int s = 0; s < Hinges; ++s) {
+      const BendingPlane<D, Hinges>& P = plane[q];
       const int station = kStations + s * kStationFields;
       const N m = P.m[s], share = load<D>(flow, station + kShare);
       const N added = fnma(P.soft[s], m, P.phi[s] - load<D>(flow, station + kPhi + q));
@@ -378,86 +579,66 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
       plastic[q][s] = fnma(soft[q][s], m, P.phi[s]);
     }
 
-  // what turns further lengthens or shortens
-  N elongation = zero;
-  for (int s = 0; s < 2; ++s) {
-    const N so_far = load<D>(flow, kStations + s * kStationFields + kReached);
-    M grows = hn::And(good, hn::Gt(reached[s].v, so_far.v));
-    if (hn::AllFalse(tag, grows)) continue;
-    N squares = zero, along = zero, bending = zero;
-    for (int q = 0; q < 2; ++q) {
-      const int cell = kStations + s * kStationFields + kCell + q * kCellFields;
-      const auto positive = hn::Ge(plane[q].phi[s].v, zero.v);
-      const auto lift_at = [&](int force) {
-        return select(positive, load<D>(flow, cell + kCellLiftPositive + force),
-                      load<D>(flow, cell + kCellLiftNegative + force));
-      };
-      const N lift = CellForce<D>(flow, cell, f[0]).mix(lift_at(0), lift_at(1), lift_at(2));
-      const N square = plane[q].phi[s] * plane[q].phi[s];
-      squares = squares + square;
-      along = fma(square, lift, along);
-      bending = fma(plane[q].m[s], by[q][s], bending);
-    }
-    grows = hn::And(grows, hn::Ne(along.v, zero.v));
-    if (hn::AllFalse(tag, grows)) continue;
-    const N unbound = (reached[s] - so_far) * along / squares;
-    // the axial spring takes no more than bending brings
-    const N brought =
-        fnma(half, load<D>(flow, kStations + s * kStationFields + kShare), one) * N{hn::Max(zero.v, bending.v)};
-    const N pull = N{hn::CopySign(one.v, unbound.v)} * fnma(k[0], elongation, f[0]);
-    const N root = {hn::Sqrt(fma(num<D>(2) * k[0], brought, pull * pull).v)};
-    const N most =
-        select(hn::Lt(pull.v, zero.v), num<D>(2) * brought / (root - pull), (pull + root) / N{hn::Max(k[0].v, tiny.v)});
-    const N bound = {hn::CopySign(hn::Min(abs(unbound).v, most.v), unbound.v)};
-    elongation = elongation + select(grows, bound, zero);
-  }
   f[0] = fnma(k[0], elongation, f[0]);
 
   // shear
   const N pressed = load<D>(flow, kShearFriction) * N{hn::Max(zero.v, (zero - f[0]).v)};
   N slipped = load<D>(flow, kSlipped);
   const N left = {hn::Max(zero.v, fnma(slipped, load<D>(flow, kSlipSoftening), one).v)};
-  const N vy = f[1] / N{hn::Max(fma(load<D>(flow, kShearOwn), left, pressed).v, tiny.v)};
-  const N vz = f[2] / N{hn::Max(fma(load<D>(flow, kShearOwn + 1), left, pressed).v, tiny.v)};
-  const N over2 = fma(vy, vy, vz * vz);
+  N over2 = zero;
+  for (int q = first; q <= last; ++q) {
+    const N v = f[2 - q] / N{hn::Max(fma(load<D>(flow, kShearOwn + 1 - q), left, pressed).v, tiny.v)};
+    over2 = fma(v, v, over2);
+  }
   const M slides = hn::And(good, hn::Gt(over2.v, one.v));
   N slid[2] = {zero, zero};
   if (!hn::AllFalse(tag, slides)) {
     const N holds = select(slides, one / N{hn::Sqrt(over2.v)}, one);
-    for (int a = 0; a < 2; ++a) {
+    N way2 = zero;
+    for (int q = first; q <= last; ++q) {
+      const int a = 1 - q;
       const N held = f[1 + a] * holds;
       slid[a] = select(slides, (f[1 + a] - held) * load<D>(flow, kFlexibility + 1 + a), zero);
       f[1 + a] = held;
+      way2 = fma(slid[a], slid[a], way2);
     }
-    slipped = select(slides, slipped + N{hn::Sqrt(fma(slid[0], slid[0], slid[1] * slid[1]).v)}, slipped);
+    slipped = select(slides, slipped + N{hn::Sqrt(way2.v)}, slipped);
     demand(hn::Lt(slipped.v, load<D>(flow, kSlipRupture).v));
-    for (int q = 0; q < 2; ++q)
-      for (int s = 0; s < 2; ++s)
+    for (int q = first; q <= last; ++q)
+      for (int s = 0; s < Hinges; ++s)
         plane[q].m[s] = select(slides, fma(plane[q].lever[s], f[q == 0 ? 2 : 1], f[q == 0 ? 4 : 5]), plane[q].m[s]);
   }
   // torsion
-  const N torsion = load<D>(flow, kTorsion);
-  const M twists = hn::And(good, hn::Gt(abs(f[3]).v, torsion.v));
-  N twisted = load<D>(flow, kTwisted), over = zero;
-  if (!hn::AllFalse(tag, twists)) {
-    const N held = {hn::CopySign(torsion.v, f[3].v)};
-    over = select(twists, (f[3] - held) * load<D>(flow, kFlexibility + 3), zero);
-    f[3] = select(twists, held, f[3]);
-    twisted = twisted + abs(over);
-    demand(hn::Lt(twisted.v, load<D>(flow, kTwistRupture).v));
+  N twisted = zero, over = zero;
+  M flowed = hn::Or(bends, slides);
+  if constexpr (!is_plane) {
+    const N torsion = load<D>(flow, kTorsion);
+    const M twists = hn::And(good, hn::Gt(abs(f[3]).v, torsion.v));
+    twisted = load<D>(flow, kTwisted);
+    if (!hn::AllFalse(tag, twists)) {
+      const N held = {hn::CopySign(torsion.v, f[3].v)};
+      over = select(twists, (f[3] - held) * load<D>(flow, kFlexibility + 3), zero);
+      f[3] = select(twists, held, f[3]);
+      twisted = twisted + abs(over);
+      demand(hn::Lt(twisted.v, load<D>(flow, kTwistRupture).v));
+    }
+    flowed = hn::Or(flowed, twists);
   }
 
-  M flowed = hn::Or(bends, hn::Or(slides, twists));
   // near its limits a zone would be sent back at once
-  const M near = hn::Or(hn::Ge(at[0].sum.v, hn::Set(tag, kNear)), hn::Ge(at[1].sum.v, hn::Set(tag, kNear)));
+  const N near_from = num<D>(is_plane ? kNearPlane : kNear);
+  const M near = hn::Or(hn::Ge(at[0].sum.v, near_from.v), hn::Ge(at[1].sum.v, near_from.v));
   const N idle = select(hn::Or(flowed, near), zero, load<D>(flow, kIdle) + one);
   demand(hn::Lt(idle.v, hn::Set(tag, kLongestIdle)));
   flowed = hn::And(good, flowed);
   const M turned = hn::And(good, bends);
   N stored = zero;
-  for (int i = 0; i < 6; ++i) stored = fma(f[i] * load<D>(flow, kFlexibility + i), f[i], stored);
-  for (int q = 0; q < 2; ++q)
-    for (int s = 0; s < 2; ++s) {
+  for (int c = 0; c < active.count; ++c) {
+    const int i = active.at[c];
+    stored = fma(f[i] * load<D>(flow, kFlexibility + i), f[i], stored);
+  }
+  for (int q = first; q <= last; ++q)
+    for (int s = 0; s < Hinges; ++s) {
       const int station = kStations + s * kStationFields;
       store_where<D>(turned, soft[q][s], flow, station + kSoftness + q);
       store_where<D>(turned, plastic[q][s], flow, station + kPhi + q);
@@ -465,7 +646,8 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
     }
   stored = half * stored;
   N work = zero;
-  for (int i = 0; i < 6; ++i) {
+  for (int c = 0; c < active.count; ++c) {
+    const int i = active.at[c];
     work = fma(fma(k[i], e_before[i], f[i]), d[i] - load<D>(flow, kBefore + i), work);
     store_where<D>(good, d[i], flow, kBefore + i);
   }
@@ -473,21 +655,24 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
   // nothing in an elastic step, unless the zone was lengthened from outside before it
   store_where<D>(good, load<D>(flow, kPlastic) + lost, flow, kPlastic);
   store_where<D>(flowed, load<D>(flow, kAxial) + elongation, flow, kAxial);
-  store_where<D>(flowed, slip[0] + slid[0], flow, kSlip);
-  store_where<D>(flowed, slip[1] + slid[1], flow, kSlip + 1);
+  for (int a = 1 - last; a <= 1 - first; ++a) store_where<D>(flowed, slip[a] + slid[a], flow, kSlip + a);
   store_where<D>(flowed, slipped, flow, kSlipped);
-  store_where<D>(flowed, twist + over, flow, kTwist);
-  store_where<D>(flowed, twisted, flow, kTwisted);
+  if constexpr (!is_plane) {
+    store_where<D>(flowed, twist + over, flow, kTwist);
+    store_where<D>(flowed, twisted, flow, kTwisted);
+  }
   store_where<D>(good, stored, flow, kStored);
   store_where<D>(good, idle, flow, kIdle);
-  for (int s = 0; s < 2; ++s) store_where<D>(good, reached[s], flow, kStations + s * kStationFields + kReached);
+  for (int s = 0; s < Hinges; ++s) store_where<D>(good, reached[s], flow, kStations + s * kStationFields + kReached);
   return good;
 }
 
 /// Forces of one block of elements (docs/theory/zones.md, eq. 1 to 12, and multibody.md, eq. 4).
-template <class D>
+template <class D, Plane In, int Hinges>
 HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, const Poses<D>& A, const Poses<D>& B) {
   using N = Num<D>;
+  constexpr bool is_plane = In != Plane::Space;
+  constexpr ActiveComponents active = components_of(In);
   const D tag;
   const size_t W = hn::Lanes(tag);
   double* HWY_RESTRICT state = job.states + static_cast<size_t>(kStateFields) * W * block;
@@ -503,33 +688,54 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
   };
   double* HWY_RESTRICT out = job.forces + static_cast<size_t>(kForceFields) * W * block;
 
-  const V3<D> lever_a = turn(A.q, constant3(kMarkerA));
-  const V3<D> lever_b = turn(B.q, constant3(kMarkerB));
-  const Q4<D> qF = A.q * constant4(kMarkerA + 3), qM = B.q * constant4(kMarkerB + 3);
-  const M33<D> F = to_matrix(qF);
-  const V3<D> apart = B.p - A.p;
-  const V3<D> t = transpose_times(F, (apart - lever_a) + lever_b);
-  const Q4<D> q = conj_times(qF, qM);
-  const V3<D> v{{hn::CopySign(q.x.v, hn::Xor(q.x.v, q.w.v))},
-                {hn::CopySign(q.y.v, hn::Xor(q.y.v, q.w.v))},
-                {hn::CopySign(q.z.v, hn::Xor(q.z.v, q.w.v))}};
-  const N s2 = dot(v, v);
-  N over_sine, coefficient;
-  turning<D>(s2, over_sine, coefficient);
-  const V3<D> r = over_sine * v;
+  N d[6];
+  V3<D> apart, lever_b, r;
+  M33<D> F;
+  N sine, cosine;  // of the turn of F in the plane
+  N s2, over_sine, coefficient;
+  if constexpr (is_plane) {
+    const PlanarMarker<D> at_a(A, constant, kMarkerA), at_b(B, constant, kMarkerB);
+    sine = at_a.turn.sine(), cosine = at_a.turn.cosine();
+    apart = {at_b.px - at_a.px, num<D>(0), at_b.pz - at_a.pz};
+    lever_b = {at_b.lever_x, num<D>(0), at_b.lever_z};
+    const N x = (apart.x - at_a.lever_x) + at_b.lever_x, z = (apart.z - at_a.lever_z) + at_b.lever_z;
+    const PlanarTurn<D> apart_by = at_a.turn.back().then(at_b.turn);
+    const N v = {hn::CopySign(apart_by.y.v, hn::Xor(apart_by.y.v, apart_by.w.v))};
+    s2 = v * v;
+    turning<D>(s2, over_sine, coefficient);
+    const N across = fma(cosine, z, sine * x);
+    d[0] = fms(cosine, x, sine * z);
+    d[active.at[1]] = In == Plane::AboutY ? across : num<D>(0) - across;
+    d[active.at[2]] = over_sine * v;
+  } else {
+    const V3<D> lever_a = turn(A.q, constant3(kMarkerA));
+    lever_b = turn(B.q, constant3(kMarkerB));
+    const Q4<D> qF = A.q * constant4(kMarkerA + 3), qM = B.q * constant4(kMarkerB + 3);
+    F = to_matrix(qF);
+    apart = B.p - A.p;
+    const V3<D> t = transpose_times(F, (apart - lever_a) + lever_b);
+    const Q4<D> q = conj_times(qF, qM);
+    const V3<D> v{{hn::CopySign(q.x.v, hn::Xor(q.x.v, q.w.v))},
+                  {hn::CopySign(q.y.v, hn::Xor(q.y.v, q.w.v))},
+                  {hn::CopySign(q.z.v, hn::Xor(q.z.v, q.w.v))}};
+    s2 = dot(v, v);
+    turning<D>(s2, over_sine, coefficient);
+    r = over_sine * v;
+    d[0] = t.x, d[1] = t.y, d[2] = t.z, d[3] = r.x, d[4] = r.y, d[5] = r.z;
+  }
   const auto too_far = hn::Gt(s2.v, constant(kMostTurn).v);
   auto outside = too_far;
 
-  const N d[6] = {t.x, t.y, t.z, r.x, r.y, r.z};
   N u[6], e[6], f[6], k[6], was[6], before[6];
-  for (int i = 0; i < 6; ++i) {
+  for (int c = 0; c < active.count; ++c) {
+    const int i = active.at[c];
     u[i] = d[i] - constant(kOffset + i);
     was[i] = load<D>(state, kStretch + i);
     e[i] = u[i], before[i] = was[i];
   }
   const bool softened = job.softened[block] != 0;
   if (softened) {
-    for (int plane = 0; plane < 2; ++plane) {
+    for (int plane = first_bending(In); plane <= last_bending(In); ++plane) {
       const int shear = plane == 0 ? 2 : 1, bend = plane == 0 ? 4 : 5, at = kSoft + 4 * plane;
       const N c00 = constant(at), c01 = constant(at + 1), c10 = constant(at + 2), c11 = constant(at + 3);
       e[shear] = fma(c00, u[shear], c01 * u[bend]);
@@ -538,7 +744,8 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
       before[bend] = fma(c10, was[shear], c11 * was[bend]);
     }
   }
-  for (int i = 0; i < 6; ++i) {
+  for (int c = 0; c < active.count; ++c) {
+    const int i = active.at[c];
     k[i] = constant(kStiffness + i);
     f[i] = k[i] * e[i];
   }
@@ -546,37 +753,53 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
   const N one = num<D>(1), zero = num<D>(0);
   outside = hn::Or(outside,
                    hn::Not(hn::And(hn::Ge(f[0].v, constant(kLeastForce).v), hn::Le(f[0].v, constant(kMostForce).v))));
-  const N vy = f[1] * constant(kShearScale), vz = f[2] * constant(kShearScale + 1);
-  outside = hn::Or(outside, hn::Gt(fma(vy, vy, vz * vz).v, one.v));
-  const N torsion_scale = constant(kTorsionScale);
-  outside = hn::Or(outside, hn::Gt((abs(f[3]) * torsion_scale).v, one.v));
-  const N exponent = constant(kExponent);
-  const N scale_y = constant(kMomentScale), scale_z = constant(kMomentScale + 1);
   const N x[2] = {constant(kStation), constant(kStation + 1)};
-  for (int station = 0; station < 2; ++station) {
-    const N my = abs(fma(x[station], f[2], f[4])) * scale_y, mz = abs(fnma(x[station], f[1], f[5])) * scale_z;
-    const auto linear = hn::Gt((my + mz).v, one.v);
-    if (HWY_LIKELY(hn::AllFalse(tag, linear))) continue;
-    const auto is_square = hn::Ge(exponent.v, hn::Set(tag, 2.0)),
-               is_three_halves = hn::Ge(exponent.v, hn::Set(tag, 1.5));
-    const auto raised = [&](N m) -> N {
-      return select(is_square, m * m, select(is_three_halves, m * N{hn::Sqrt(m.v)}, m));
-    };
-    outside = hn::Or(outside, hn::Gt((raised(my) + raised(mz)).v, one.v));
+  if constexpr (is_plane) {
+    constexpr int q = first_bending(In), shear = active.at[1], bend = active.at[2];
+    outside = hn::Or(outside, hn::Gt((abs(f[shear]) * constant(kShearScale + shear - 1)).v, one.v));
+    const N scale = constant(kMomentScale + q);
+    for (int station = 0; station < Hinges; ++station) {
+      const N m = q == 0 ? fma(x[station], f[shear], f[bend]) : fnma(x[station], f[shear], f[bend]);
+      outside = hn::Or(outside, hn::Gt((abs(m) * scale).v, one.v));
+    }
+  } else {
+    const N vy = f[1] * constant(kShearScale), vz = f[2] * constant(kShearScale + 1);
+    outside = hn::Or(outside, hn::Gt(fma(vy, vy, vz * vz).v, one.v));
+    const N torsion_scale = constant(kTorsionScale);
+    outside = hn::Or(outside, hn::Gt((abs(f[3]) * torsion_scale).v, one.v));
+    const N exponent = constant(kExponent);
+    const N scale_y = constant(kMomentScale), scale_z = constant(kMomentScale + 1);
+    for (int station = 0; station < 2; ++station) {
+      const N my = abs(fma(x[station], f[2], f[4])) * scale_y, mz = abs(fnma(x[station], f[1], f[5])) * scale_z;
+      const auto linear = hn::Gt((my + mz).v, one.v);
+      if (HWY_LIKELY(hn::AllFalse(tag, linear))) continue;
+      const auto is_square = hn::Ge(exponent.v, hn::Set(tag, 2.0)),
+                 is_three_halves = hn::Ge(exponent.v, hn::Set(tag, 1.5));
+      const auto raised = [&](N m) -> N {
+        return select(is_square, m * m, select(is_three_halves, m * N{hn::Sqrt(m.v)}, m));
+      };
+      outside = hn::Or(outside, hn::Gt((raised(my) + raised(mz)).v, one.v));
+    }
   }
   // what the damper does on the part of the deformation that is not elastic
   N slid[6] = {zero, zero, zero, zero, zero, zero};
+  const auto slide = [&] {
+    for (int c = 0; c < active.count; ++c) {
+      const int i = active.at[c];
+      slid[i] = (u[i] - was[i]) - (e[i] - before[i]);
+    }
+  };
   bool books_slid = softened;
   if (HWY_UNLIKELY(!hn::AllFalse(tag, outside))) {
     const auto flows = hn::AndNot(too_far, hn::And(outside, hn::Gt(constant(kFlows).v, zero.v)));
-    if (softened)
-      for (int i = 0; i < 6; ++i) slid[i] = (u[i] - was[i]) - (e[i] - before[i]);
+    if (softened) slide();
     if (!hn::AllFalse(tag, flows)) {
       double* HWY_RESTRICT flow = job.flows + static_cast<size_t>(kFlowFields) * W * block;
       N f_flow[6], d_before[6];
-      for (int i = 0; i < 6; ++i) d_before[i] = load<D>(flow, kBefore + i);
-      const auto good = flow_zone<D>(flows, flow, x, k, d, was, f_flow);
-      for (int i = 0; i < 6; ++i) {
+      for (int c = 0; c < active.count; ++c) d_before[active.at[c]] = load<D>(flow, kBefore + active.at[c]);
+      const auto good = flow_zone<D, In, Hinges>(flows, flow, x, k, d, was, f_flow);
+      for (int c = 0; c < active.count; ++c) {
+        const int i = active.at[c];
         f[i] = select(good, f_flow[i], f[i]);
         const N stretch = f_flow[i] * load<D>(flow, kFlexibility + i);
         e[i] = select(good, stretch, e[i]);
@@ -588,7 +811,7 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
       outside = hn::AndNot(good, outside);
     }
   } else if (softened) {
-    for (int i = 0; i < 6; ++i) slid[i] = (u[i] - was[i]) - (e[i] - before[i]);
+    slide();
   }
 
   // standard linear solid: the damper follows the mean of the step
@@ -596,7 +819,8 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
   const N taken = fma(half, keep, half);
   const auto inside = hn::Not(outside);
   N g[6], work = zero, lost = zero;
-  for (int i = 0; i < 6; ++i) {
+  for (int c = 0; c < active.count; ++c) {
+    const int i = active.at[c];
     const N old = load<D>(state, kBehind + i), stretched = e[i] - before[i];
     const N behind = fma(taken, stretched, keep * old), rate = viscous * k[i];
     const N twice_mean = rate * (behind + old);
@@ -609,16 +833,42 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
   store_where<D>(inside, fma(half, work, load<D>(state, kDamped)), state, kDamped);
   if (books_slid) store_where<D>(inside, fma(half, lost, load<D>(state, kBled)), state, kBled);
 
-  // torque conjugate to the rate of the rotation vector
-  const V3<D> m{g[3], g[4], g[5]};
-  const V3<D> rm = cross(r, m);
-  const V3<D> turned = fma(coefficient, cross(r, rm), fma(half, rm, m));
-  const V3<D> force = F * V3<D>{g[0], g[1], g[2]}, torque = F * turned;
-  store3<D>(force, out, 0);
-  // M seen from both centres
-  store3<D>(cross(apart + lever_b, force) + torque, out, 3);
-  store3<D>(cross(lever_b, force) + torque, out, 6);
+  if constexpr (is_plane) {
+    const N across = In == Plane::AboutY ? g[2] : zero - g[1], torque = g[active.at[2]];
+    const N fx = fma(cosine, g[0], sine * across), fz = fms(cosine, across, sine * g[0]);
+    store<D>(fx, out, 0);
+    store<D>(fz, out, 2);
+    // M seen from both centres
+    const N lever_x = apart.x + lever_b.x, lever_z = apart.z + lever_b.z;
+    store<D>(fms(lever_z, fx, lever_x * fz) + torque, out, 4);
+    store<D>(fms(lever_b.z, fx, lever_b.x * fz) + torque, out, 7);
+  } else {
+    // torque conjugate to the rate of the rotation vector
+    const V3<D> m{g[3], g[4], g[5]};
+    const V3<D> rm = cross(r, m);
+    const V3<D> turned = fma(coefficient, cross(r, rm), fma(half, rm, m));
+    const V3<D> force = F * V3<D>{g[0], g[1], g[2]}, torque = F * turned;
+    store3<D>(force, out, 0);
+    // M seen from both centres
+    store3<D>(cross(apart + lever_b, force) + torque, out, 3);
+    store3<D>(cross(lever_b, force) + torque, out, 6);
+  }
   if (HWY_UNLIKELY(!hn::AllFalse(tag, outside))) report<D>(outside, block, *job.outside);
+}
+
+template <class D>
+HWY_INLINE void evaluate_block_of(const ElementJob& job, size_t block, const Poses<D>& a, const Poses<D>& b) {
+  const bool is_single = job.single[block] != 0;
+  switch (job.planes[block]) {
+    case Plane::Space:
+      return evaluate_element_block<D, Plane::Space, 2>(job, block, a, b);
+    case Plane::AboutY:
+      return is_single ? evaluate_element_block<D, Plane::AboutY, 1>(job, block, a, b)
+                       : evaluate_element_block<D, Plane::AboutY, 2>(job, block, a, b);
+    case Plane::AboutZ:
+      return is_single ? evaluate_element_block<D, Plane::AboutZ, 1>(job, block, a, b)
+                       : evaluate_element_block<D, Plane::AboutZ, 2>(job, block, a, b);
+  }
 }
 
 template <class D>
@@ -632,13 +882,13 @@ HWY_INLINE void evaluate_all(const ElementJob& job) {
   size_t next = find_next(job.first);
   if (job.a != nullptr) {
     for (; next < job.last; next = find_next(next + 1))
-      evaluate_element_block<D>(job, next, read_poses<D>(job.poses, job.a + next * W),
-                                read_poses<D>(job.poses, job.b + next * W));
+      evaluate_block_of<D>(job, next, read_poses<D>(job.poses, job.a + next * W),
+                           read_poses<D>(job.poses, job.b + next * W));
   } else {
     for (; next < job.last; next = find_next(next + 1)) {
       const size_t a = job.body_a[next], b = job.body_b[next];
-      evaluate_element_block<D>(job, next, {load3<D>(job.p + 3 * W * a, 0), load4<D>(job.q + 4 * W * a, 0)},
-                                {load3<D>(job.p + 3 * W * b, 0), load4<D>(job.q + 4 * W * b, 0)});
+      evaluate_block_of<D>(job, next, {load3<D>(job.p + 3 * W * a, 0), load4<D>(job.q + 4 * W * a, 0)},
+                           {load3<D>(job.p + 3 * W * b, 0), load4<D>(job.q + 4 * W * b, 0)});
     }
   }
 }
@@ -646,7 +896,8 @@ HWY_INLINE void evaluate_all(const ElementJob& job) {
 template <class D>
 HWY_INLINE void advance_all(const BodyJob& job) {
   Num<D> sum = num<D>(0);
-  for (size_t block = 0; block < job.blocks; ++block) advance_body_block<D>(job, block, sum);
+  for (size_t block = 0; block < job.blocks; ++block)
+    job.is_planar ? advance_planar_block<D>(job, block, sum) : advance_body_block<D>(job, block, sum);
   store<D>(sum, job.sum, 0);
 }
 

@@ -14,6 +14,23 @@ namespace topple::mbs::kernel {
 /// Widest block, for those who need room before they know.
 inline constexpr size_t kMostLanes = 8;
 
+/// What of an element's six components can be other than zero: all, or those of a plane whose normal is its axis y or
+/// z. Bodies of such an element keep to the plane y = const of W and turn about y alone, in which its markers lie.
+enum class Plane : unsigned char { Space, AboutY, AboutZ };
+
+/// Components along x, across it and about the normal.
+struct ActiveComponents {
+  int at[6], count;
+};
+constexpr ActiveComponents components_of(Plane plane) {
+  return plane == Plane::Space    ? ActiveComponents{{0, 1, 2, 3, 4, 5}, 6}
+         : plane == Plane::AboutY ? ActiveComponents{{0, 2, 4}, 3}
+                                  : ActiveComponents{{0, 1, 5}, 3};
+}
+/// Bending planes, 0: about y with shear along z, 1: about z with shear along y.
+constexpr int first_bending(Plane plane) { return plane == Plane::AboutZ ? 1 : 0; }
+constexpr int last_bending(Plane plane) { return plane == Plane::AboutY ? 0 : 1; }
+
 // Field numbers are constants, and named so.
 // NOLINTBEGIN(readability-identifier-naming)
 
@@ -25,7 +42,7 @@ enum Slot : int {
   kDamped = 12,  // work of the dampers so far
   kBled = 13,    // the part of it on what damage softened
   kStateFields = 14,
-  kMarkerA = kStateFields,  // p_AF, from the present centre of mass (3), q_AF (4)
+  kMarkerA = kStateFields,  // p_AF, from the present centre of mass (3), q_AF (4); in a plane the turn of x about y
   kMarkerB = 21,            // p_BM (3), q_BM (4)
   kStiffness = 28,          // x y z, about x y z (6)
   kViscous = 34,            // stiffness behind the damper over the elastic one
@@ -108,7 +125,7 @@ enum BodyField : int {
 // NOLINTEND(readability-identifier-naming)
 
 /// Of an element: force on a (3; on b the opposite), torque on a (3), and the opposite of that on b (3); in W, about
-/// the centres of mass.
+/// the centres of mass. In a plane all but forces along x and z and torques about y stay zero.
 inline constexpr int kForceFields = 9;
 
 /// One step of all bodies: kick by the forces, then drift of those that nobody else moves.
@@ -120,6 +137,7 @@ struct BodyJob {
   // one value a lane; `shared` lanes: block after block is the same sample's bodies
   const double *kick, *h;             // (W)
   const double *gx, *gy, *gz;         // gravity (W)
+  bool is_planar;                     // bodies keep to y = const and turn about y alone
   double* sum;                        // of all places and speeds, finite as long as they are (W)
   std::vector<std::uint32_t>* spins;  // slots that turn too fast for the series, left where they were
 };
@@ -129,6 +147,8 @@ struct ElementJob {
   size_t first = 0, last = 0;            // blocks
   const unsigned char* live;             // per block: live lanes, 0 skips it
   const unsigned char* softened;         // per block: some lane is softened by damage
+  const Plane* planes;                   // per block
+  const unsigned char* single;           // per block: no element has more than one station; in a plane only
   double* states;                        // kStateFields a block
   const double* pool;                    // vectors of W
   const std::uint32_t* constants;        // which of the pool, kConstants a block

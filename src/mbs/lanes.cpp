@@ -57,6 +57,8 @@ void Lanes::allocate_elements(size_t elements) {
   element_forces.assign(element_blocks * kernel::kForceFields * W, 0);
   live.assign(element_blocks, 0);
   softened.assign(element_blocks, 0);
+  planes.assign(element_blocks, kernel::Plane::Space);
+  single.assign(element_blocks, 0);
 }
 
 void Lanes::clear_slot(size_t slot) {
@@ -169,10 +171,10 @@ void Lanes::close_pairs() {
 
 void Lanes::advance_bodies() {
   spins.clear();
-  const kernel::BodyJob job{body_blocks, p.data(), v.data(),     L.data(),      w.data(),
-                            q.data(),    R.data(), force.data(), torque.data(), body_constants.data(),
-                            kick.data(), h.data(), gx.data(),    gy.data(),     gz.data(),
-                            sum.data(),  &spins};
+  const kernel::BodyJob job{body_blocks, p.data(),   v.data(),     L.data(),      w.data(),
+                            q.data(),    R.data(),   force.data(), torque.data(), body_constants.data(),
+                            kick.data(), h.data(),   gx.data(),    gy.data(),     gz.data(),
+                            is_planar,   sum.data(), &spins};
   if (W == kernel::lanes()) {
     kernel::advance_bodies(job);
   } else {
@@ -213,7 +215,8 @@ void Lanes::lay_poses() {
 void Lanes::evaluate_elements(size_t first, size_t last, std::vector<std::uint32_t>& beyond) {
   kernel::ElementJob job;
   job.first = first, job.last = last;
-  job.live = live.data(), job.softened = softened.data();
+  job.live = live.data(), job.softened = softened.data(), job.planes = planes.data();
+  job.single = single.data();
   job.states = states.data(), job.pool = pool.data(), job.constants = constants.data(), job.flows = flows.data(),
   job.forces = element_forces.data();
   job.a = is_batch ? nullptr : body_a.data(), job.b = is_batch ? nullptr : body_b.data();

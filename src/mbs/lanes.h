@@ -25,6 +25,7 @@ struct Pairs {
 struct Lanes {
   size_t W = 1;
   bool is_batch = false;
+  bool is_planar = false;  // bodies keep to y = const and turn about y alone
   size_t body_blocks = 0, element_blocks = 0;
   // bodies, the ground behind the last one
   AlignedVector<double> p, v, L, w, q, R, force, torque, joint_force, joint_torque, body_constants;
@@ -38,6 +39,8 @@ struct Lanes {
   std::vector<std::uint32_t> constants;       // of each block, in the pool (kConstants)
   std::vector<std::uint32_t> uses;            // of each vector of the pool
   std::vector<unsigned char> live, softened;  // lanes of each block
+  std::vector<kernel::Plane> planes;          // of each block
+  std::vector<unsigned char> single;          // of each block: as of the job
   // one run: slots of elements (several may be gone), bodies of slots; elements meeting in each body
   std::vector<std::uint32_t> slot_of, element_of, body_a, body_b;  // batch: bodies of each block
   std::vector<std::uint32_t> first_entry, entries;                 // 2 * slot (batch: block) + side

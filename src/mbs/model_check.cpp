@@ -95,9 +95,9 @@ class Checker {
     return (id == kGround && ground_allowed) || index(p, key, id.index, m_.bodies);
   }
   bool two_bodies(const Place& p, BodyId a, BodyId b, const char* key_a = "a", const char* key_b = "b") {
-    const bool known = body(p, key_a, a, true) & body(p, key_b, b, true);
+    const bool knows_a = body(p, key_a, a, true), knows_b = body(p, key_b, b, true);  // both are complained of
     if (a == b) fail(p, "", "joins a body to itself");
-    return known && !(a == b);
+    return knows_a && knows_b && !(a == b);
   }
   Pose pose_of(BodyId id) const { return id == kGround ? Pose{} : m_.bodies[static_cast<size_t>(id.index)].X_WB; }
 
@@ -419,7 +419,8 @@ void Checker::check_contact() {
   for (size_t i = 0; i < c.pairs.size(); ++i) {
     const Contact::Pair& pair = c.pairs[i];
     const Place in = at("contact.pairs", i);
-    if (body(in, "a", pair.a, false) & body(in, "b", pair.b, true)) {
+    const bool knows_a = body(in, "a", pair.a, false), knows_b = body(in, "b", pair.b, true);
+    if (knows_a && knows_b) {
       if (pair.a == pair.b) fail(in, "", "names one body twice");
       const auto [it, is_new] = seen.emplace(std::minmax(pair.a.index, pair.b.index), i);
       if (!is_new) fail(in, "", fmt::format("these two have rules already, number {}", it->second));

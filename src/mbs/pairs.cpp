@@ -114,7 +114,10 @@ void System::find_pair_points() {
     // overlap at birth, is allowed
     const double possible = pair.depth + way - pair.way;
     pair.way = way;
+    const Earnings earnings = pair.group >= 0 ? contact.earnings[static_cast<size_t>(pair.group)] : Earnings{};
+    pair.group = -1;
     if (points.count == 0) {
+      contact.lost += std::max(0.0, earnings.stored);
       due.way = way + points.gap;
       due.touching = false;
       pair.sticks = {};
@@ -127,6 +130,7 @@ void System::find_pair_points() {
     pair.allowed = std::max(std::min(pair.allowed, deepest), deepest - std::max(0.0, possible));
     pair.depth = deepest - pair.allowed;
     if (pair.depth <= 0) {
+      contact.lost += std::max(0.0, earnings.stored);
       due.touching = false;
       pair.sticks = {};
       continue;
@@ -153,6 +157,8 @@ void System::find_pair_points() {
     }
     body_contacts += static_cast<int>(contact.point.size() - first);
     add_contact_group(a, b, points.normal, first, pair.law, stiffness, pair.sticks);
+    pair.group = static_cast<int>(s.touching.group.size()) - 1;
+    s.touching.group.back().earnings = earnings;
     due.touching = true;
   }
 }

@@ -86,6 +86,7 @@ void System::compile() {
     }
   }
   layout_shapes();
+  lanes->is_planar = keeps_planes();
 
   for (const ZoneLaw& law : model.laws) laws.push_back(compile_law(law));
 
@@ -97,6 +98,7 @@ void System::compile() {
     c.p_BM = e.X_BM.p;
     c.q_AF = normalized(e.X_AF.q);
     c.q_BM = normalized(e.X_BM.q);
+    c.zone.plane = find_plane(c);
     for (int i = 0; i < 3; ++i) {
       c.zone.stiffness[i] = e.translational_stiffness[i];
       c.zone.stiffness[3 + i] = e.rotational_stiffness[i];
@@ -143,6 +145,8 @@ void System::compile() {
     c.zone.external_axial = true;
     c.zone.viscous = viscous_share(r.damping_ratio);
     c.axial_element = r.axial_element.index;
+    if (r.axial_element.is_valid())
+      c.zone.relief = model.elements[static_cast<size_t>(c.axial_element)].translational_stiffness.x;
     if (r.law.is_valid()) {
       c.zone.stations = 1;
       c.zone.law[0] = r.law.index;

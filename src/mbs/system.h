@@ -312,6 +312,10 @@ class System {
   void view_forces(View&) const;
   Vec3 calc_point(int body, const Vec3& p) const;
   // elements (elements.cpp)
+  /// Whether nothing of the bodies' motion ever leaves their planes.
+  bool keeps_planes() const;
+  /// In which plane an element stays for good.
+  kernel::Plane find_plane(const CompiledElement&) const;
   size_t slot_of(size_t element) const;
   void kill_slot(size_t element);
   /// Gives every live element a slot, in their order.
@@ -368,7 +372,9 @@ class System {
   /// Whether the next evaluation looks for touching points, rather than moving those of the one before.
   bool is_look_due() const { return state.touching.steps == 0 || state.touching.steps >= contact_interval; }
   /// Finds the touching points; between looks they move with their bodies.
-  void find_contacts();
+  void find_contacts(double h);
+  /// As a step of h ends; none on the ground, where corners stay what they are.
+  Earnings calc_earnings(const ContactGroup&, double h) const;
   /// Forces at the points found, on the bodies and in the ledger.
   void resolve_contacts(double h, bool follows, int passed);
   /// Moves a body from its pose at the beginning of the step to the end of it.

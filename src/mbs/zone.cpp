@@ -10,7 +10,14 @@ namespace topple::mbs {
 
 namespace {
 
+using kernel::ActiveComponents;
+using kernel::components_of;
+using kernel::first_bending;
+using kernel::last_bending;
+using kernel::Plane;
+
 constexpr double kTiny = 1e-300;
+constexpr double kRoundOff = 1e-12;
 
 /// Largest i with grid[i] <= x, within [0, n-2]; `hint` is where it was last time.
 inline int find_interval(const std::vector<double>& grid, double x, int hint) {
@@ -36,8 +43,9 @@ CompiledLaw compile_law(const ZoneLaw& law) {
     to.limit.resize(from.positive.size() * 2);
     double largest = 0;
     for (size_t i = 0; i < from.positive.size(); ++i) {
-      to.limit[2 * i] = from.positive[i];
-      to.limit[2 * i + 1] = from.negative[i];
+      const size_t at = to.place(i / from.plastic_rotation.size(), i % from.plastic_rotation.size());
+      to.limit[at] = from.positive[i];
+      to.limit[at + 1] = from.negative[i];
       largest = std::max({largest, from.positive[i], from.negative[i]});
     }
     if (!from.elongation_positive.empty()) {
@@ -46,8 +54,9 @@ CompiledLaw compile_law(const ZoneLaw& law) {
       for (size_t i = 0; i < from.positive.size(); ++i) {
         const size_t j = std::min(i % J, J - 2), row = i - i % J;  // the last interval goes on
         const double step = to.rotation[j + 1] - to.rotation[j];
-        to.lift[2 * i] = (from.elongation_positive[row + j + 1] - from.elongation_positive[row + j]) / step;
-        to.lift[2 * i + 1] = (from.elongation_negative[row + j + 1] - from.elongation_negative[row + j]) / step;
+        const size_t at = to.place(i / J, i % J);
+        to.lift[at] = (from.elongation_positive[row + j + 1] - from.elongation_positive[row + j]) / step;
+        to.lift[at + 1] = (from.elongation_negative[row + j + 1] - from.elongation_negative[row + j]) / step;
       }
     }
     // The capacity at a rotation is where the interpolated limit reaches zero on the side of compression.
@@ -55,7 +64,7 @@ CompiledLaw compile_law(const ZoneLaw& law) {
     for (int j = 0; j < to.J; ++j) {
       double capacity = 0;
       for (int k = 0; k < to.K; ++k) {
-        const size_t i = 2 * (static_cast<size_t>(k) * static_cast<size_t>(to.J) + static_cast<size_t>(j));
+        const size_t i = to.place(static_cast<size_t>(k), static_cast<size_t>(j));
         if (std::max(to.limit[i], to.limit[i + 1]) > 1e-3 * largest) {
           capacity = -to.force[static_cast<size_t>(std::max(k - 1, 0))];
           break;
@@ -103,42 +112,65 @@ double calc_curve(const CompiledCurve& curve, double x) {
   return curve.f[i] + t * (curve.f[i + 1] - curve.f[i]);
 }
 
+namespace {
+
+/// A force on the edge of a family, where a section is while it is crushed, may be beyond it by round-off.
+double put_on_edge(const CompiledFamily& family, double normal_force) {
+  const double inside = std::clamp(normal_force, family.force.front(), family.force.back());
+  return std::abs(normal_force - inside) <= kRoundOff * std::abs(inside) ? inside : normal_force;
+}
+bool is_within(const CompiledFamily& family, double normal_force) {
+  return normal_force >= family.force.front() && normal_force <= family.force.back();
+}
+
+}  // namespace
+
 MomentLimit calc_moment_limit(const CompiledFamily& family, double normal_force, double rotation, int& k, int& j) {
   if (family.K == 0) return {kUnlimited, kUnlimited};
-  if (normal_force <= family.force.front() || normal_force >= family.force.back()) {
-    // On the edge itself the table counts; beyond it nothing is left.
-    if (normal_force != family.force.front() && normal_force != family.force.back()) return {0, 0};
-  }
+  normal_force = put_on_edge(family, normal_force);
+  if (!is_within(family, normal_force)) return {0, 0};
   k = find_interval(family.force, normal_force, k);
   j = find_interval(family.rotation, rotation, j);
-  const size_t K = static_cast<size_t>(k), J = static_cast<size_t>(j), width = static_cast<size_t>(family.J);
+  const size_t K = static_cast<size_t>(k), J = static_cast<size_t>(j);
   const double t = (normal_force - family.force[K]) / (family.force[K + 1] - family.force[K]);
   const double s =
       std::clamp((rotation - family.rotation[J]) / (family.rotation[J + 1] - family.rotation[J]), 0.0, 1.0);
-  const double* a = &family.limit[2 * (K * width + J)];
-  const double* b = a + 2 * width;
+  const double *a = &family.limit[family.place(K, J)], *b = &family.limit[family.place(K, J + 1)];
   const double w00 = (1 - t) * (1 - s), w01 = (1 - t) * s, w10 = t * (1 - s), w11 = t * s;
-  return {w00 * a[0] + w01 * a[2] + w10 * b[0] + w11 * b[2], w00 * a[1] + w01 * a[3] + w10 * b[1] + w11 * b[3]};
+  return {w00 * a[0] + w01 * b[0] + w10 * a[2] + w11 * b[2], w00 * a[1] + w01 * b[1] + w10 * a[3] + w11 * b[3]};
+}
+
+MomentLimit calc_moment_slope(const CompiledFamily& family, double normal_force, double rotation, int k, int j) {
+  if (family.K == 0) return {0, 0};
+  normal_force = put_on_edge(family, normal_force);
+  if (!is_within(family, normal_force)) return {0, 0};
+  const size_t K = static_cast<size_t>(find_interval(family.force, normal_force, k));
+  const size_t J = static_cast<size_t>(find_interval(family.rotation, rotation, j));
+  const double s =
+      std::clamp((rotation - family.rotation[J]) / (family.rotation[J + 1] - family.rotation[J]), 0.0, 1.0);
+  const double *a = &family.limit[family.place(K, J)], *b = &family.limit[family.place(K, J + 1)];
+  const double width = family.force[K + 1] - family.force[K];
+  return {((1 - s) * (a[2] - a[0]) + s * (b[2] - b[0])) / width, ((1 - s) * (a[3] - a[1]) + s * (b[3] - b[1])) / width};
 }
 
 Lift calc_lift(const CompiledFamily& family, double normal_force, double rotation, int& k, int& j) {
-  if (family.lift.empty() || !(normal_force >= family.force.front() && normal_force <= family.force.back())) return {};
+  if (family.lift.empty()) return {};
+  normal_force = put_on_edge(family, normal_force);
+  if (!is_within(family, normal_force)) return {};
   k = find_interval(family.force, normal_force, k);
   j = find_interval(family.rotation, rotation, j);
-  const size_t K = static_cast<size_t>(k), width = static_cast<size_t>(family.J);
-  const size_t J = rotation < family.rotation.back() ? static_cast<size_t>(j) : width - 1;
+  const size_t K = static_cast<size_t>(k);
+  const size_t J = static_cast<size_t>(rotation < family.rotation.back() ? j : family.J - 1);
   const double t = (normal_force - family.force[K]) / (family.force[K + 1] - family.force[K]);
-  const double* a = &family.lift[2 * (K * width + J)];
-  const double* b = a + 2 * width;
-  return {(1 - t) * a[0] + t * b[0], (1 - t) * a[1] + t * b[1]};
+  const double* a = &family.lift[family.place(K, J)];
+  return {(1 - t) * a[0] + t * a[2], (1 - t) * a[1] + t * a[3]};
 }
 
-double calc_compression_capacity(const CompiledFamily& family, double rotation) {
+double calc_compression_capacity(const CompiledFamily& family, double rotation, int j) {
   if (family.K == 0) return kUnlimited;
   const size_t last = static_cast<size_t>(family.J) - 1;
   if (rotation >= family.rotation[last]) return family.capacity[last];
-  const auto above = std::upper_bound(family.rotation.begin(), family.rotation.end(), rotation);
-  const size_t i = static_cast<size_t>(above - family.rotation.begin()) - 1;
+  const size_t i = static_cast<size_t>(find_interval(family.rotation, rotation, j));
   const double t = (rotation - family.rotation[i]) / (family.rotation[i + 1] - family.rotation[i]);
   return family.capacity[i] + t * (family.capacity[i + 1] - family.capacity[i]);
 }
@@ -168,11 +200,13 @@ class Limits {
     });
   }
   /// Largest compression after a rotation and a plastic shortening.
-  double compression(double rotation, double shortened, double integrity) const {
+  ///   near  a station that has turned about as far
+  double compression(double rotation, double shortened, double integrity, const StationState& near) const {
     return blend([&](const CompiledLaw& l) {
-      return std::min(calc_curve(l.compression, shortened),
-                      (l.elongates ? 1 : integrity) * std::min(calc_compression_capacity(l.moment[0], rotation),
-                                                               calc_compression_capacity(l.moment[1], rotation)));
+      return std::min(
+          calc_curve(l.compression, shortened),
+          (l.elongates ? 1 : integrity) * std::min(calc_compression_capacity(l.moment[0], rotation, near.j[0]),
+                                                   calc_compression_capacity(l.moment[1], rotation, near.j[1])));
     });
   }
   MomentLimit moment(int axis, double normal_force, StationState& s) const {
@@ -184,6 +218,14 @@ class Limits {
     }
     return {mix(a.positive, b.positive), mix(a.negative, b.negative)};
   }
+  /// Rise of the limits with the normal force.
+  MomentLimit slope(int axis, double normal_force, const StationState& s) const {
+    MomentLimit a{0, 0}, b{0, 0};
+    if (share_ < 1) a = calc_moment_slope(from_.get().moment[axis], normal_force, s.reached, s.k[axis], s.j[axis]);
+    if (share_ > 0) b = calc_moment_slope(to_.get().moment[axis], normal_force, s.reached, 0, 0);
+    return {mix(a.positive, b.positive), mix(a.negative, b.negative)};
+  }
+  bool elongates() const { return from_.get().elongates || to_.get().elongates; }
   Lift lift(int axis, double normal_force, double rotation, StationState& s) const {
     Lift a, b;
     if (share_ < 1) a = calc_lift(from_.get().moment[axis], normal_force, rotation, s.k[axis], s.j[axis]);
@@ -218,7 +260,7 @@ class Limits {
 
 /// Rotations and moments of the stations of one bending plane, and the resultants at the marker.
 ///   sign  +1 about y (shear along z), -1 about z (shear along y)
-struct Plane {
+struct Bending {
   double shear_stiffness, bending_stiffness, sign;
   double shear_deformation;  // elastic and that of the stations, slip taken out
   double rotation;
@@ -239,9 +281,9 @@ struct Plane {
 
 /// Least limit moment of a family between two normal forces: at an end or at a force of the table, for it is linear
 /// between.
-double find_least_moment(const CompiledFamily& family, double from, double to, double rotation) {
+///   k, j  where to look first
+double find_least_moment(const CompiledFamily& family, double from, double to, double rotation, int k, int j) {
   double least = kUnlimited;
-  int k = 0, j = 0;
   const auto look = [&](double force) {
     const MomentLimit limit = calc_moment_limit(family, force, rotation, k, j);
     least = std::min({least, limit.positive, limit.negative});
@@ -258,6 +300,7 @@ void find_safe_bounds(const ZoneParameters& p, const std::vector<CompiledLaw>& l
   const auto law_of = [&](int s) -> const CompiledLaw& {
     return laws[static_cast<size_t>(z.base_law < 0 ? p.law[s] : z.base_law)];
   };
+  const int first = first_bending(p.plane), last = last_bending(p.plane);
   double reach = kUnlimited, reached = 0;
   for (int s = 0; s < p.stations; ++s) {
     reached = std::max(reached, z.station[s].reached);
@@ -267,24 +310,25 @@ void find_safe_bounds(const ZoneParameters& p, const std::vector<CompiledLaw>& l
   const double whole = limits.integrity(z.shortened);
   double from = force - reach, to = force + reach;
   if (!p.external_axial) {
-    from = std::max(from, -limits.compression(reached, z.shortened, whole));
+    from = std::max(from, -limits.compression(reached, z.shortened, whole, z.station[0]));
     to = std::min(to, limits.tension(z.elongated));
   }
   for (int s = 0; s < p.stations; ++s)
     if (z.station[s].reached >= law_of(s).rupture_rotation) to = std::min(to, -kTiny);  // held by what presses it
   z.safe_force[0] = 1, z.safe_force[1] = -1;
   if (whole != 1 || !(from <= to)) return;
-  for (int q = 0; q < 2; ++q) {
+  for (int q = first; q <= last; ++q) {
     z.safe_moment[q] = kUnlimited;
     for (int s = 0; s < p.stations; ++s)
-      z.safe_moment[q] =
-          std::min(z.safe_moment[q], find_least_moment(law_of(s).moment[q], from, to, z.station[s].reached));
-    z.safe_shear[q] = limits.shear(q, z.slipped, -to);
-    if (!(z.safe_moment[q] > 0 && z.safe_shear[q] > 0 && limits.torsion() > 0)) return;
+      z.safe_moment[q] = std::min(
+          z.safe_moment[q],
+          find_least_moment(law_of(s).moment[q], from, to, z.station[s].reached, z.station[s].k[q], z.station[s].j[q]));
+    z.safe_shear[1 - q] = limits.shear(1 - q, z.slipped, -to);
+    if (!(z.safe_moment[q] > 0 && z.safe_shear[1 - q] > 0 && limits.torsion() > 0)) return;
   }
-  for (int q = 0; q < 2; ++q) {
+  for (int q = first; q <= last; ++q) {
     z.safe_moment[q] = 1 / z.safe_moment[q];
-    z.safe_shear[q] = 1 / z.safe_shear[q];
+    z.safe_shear[1 - q] = 1 / z.safe_shear[1 - q];
   }
   z.safe_torsion = 1 / limits.torsion();
   z.safe_exponent = kUnlimited;
@@ -292,7 +336,7 @@ void find_safe_bounds(const ZoneParameters& p, const std::vector<CompiledLaw>& l
   // what the springs do not see, and how damage softens them: flexibilities add up
   double turned[2] = {0, 0}, shifted[2] = {0, 0};
   z.is_softened = false;
-  for (int q = 0; q < 2; ++q) {
+  for (int q = first; q <= last; ++q) {
     const double ks = z.share * p.stiffness[q == 0 ? 2 : 1], kb = z.share * p.stiffness[q == 0 ? 4 : 5];
     const double sign = q == 0 ? 1 : -1;
     double c = 0, cx = 0, cxx = 0;
@@ -383,10 +427,14 @@ void break_zone(ZoneState& z, BreakReason reason) {
 namespace {
 
 /// The common case: a zone whose forces stay inside its safe bounds is a spring with a damper. False if it is not so.
+template <Plane In>
 bool advance_inside_bounds(const ZoneParameters& p, const Six& d, double h, ZoneState& z) {
   if (!is_bounded(z, false) || h <= 0 || z.is_adjusted) return false;
+  constexpr ActiveComponents active = components_of(In);
+  constexpr int first = first_bending(In), last = last_bending(In);
   double u[6], e[6], f[6], k[6];  // deformation from the offset, its elastic part, resultant, stiffness
-  for (int i = 0; i < 6; ++i) {
+  for (int c = 0; c < active.count; ++c) {
+    const int i = active.at[c];
     k[i] = z.share * p.stiffness[i];
     u[i] = e[i] = d.c[i] - z.offset[i];
     f[i] = k[i] * e[i];
@@ -396,7 +444,7 @@ bool advance_inside_bounds(const ZoneParameters& p, const Six& d, double h, Zone
     f[0] = d.c[0];
   }
   if (z.is_softened) {
-    for (int q = 0; q < 2; ++q) {
+    for (int q = first; q <= last; ++q) {
       const int shear = q == 0 ? 2 : 1, bend = q == 0 ? 4 : 5;
       f[shear] = z.plane[q][0] * u[shear] + z.plane[q][1] * u[bend];
       f[bend] = z.plane[q][1] * u[shear] + z.plane[q][2] * u[bend];
@@ -404,16 +452,26 @@ bool advance_inside_bounds(const ZoneParameters& p, const Six& d, double h, Zone
       e[bend] = k[bend] > 0 ? f[bend] / k[bend] : 0;
     }
   }
-  if (f[0] < z.safe_force[0] || f[0] > z.safe_force[1] || std::abs(f[3]) * z.safe_torsion > 1) return false;
-  const double vy = f[1] * z.safe_shear[0], vz = f[2] * z.safe_shear[1];
-  if (vy * vy + vz * vz > 1) return false;
-  for (int s = 0; s < p.stations; ++s) {
-    const double my = std::abs(f[4] + p.x[s] * f[2]) * z.safe_moment[0];
-    const double mz = std::abs(f[5] - p.x[s] * f[1]) * z.safe_moment[1];
-    if (my + mz > 1 && raised(my, z.safe_exponent) + raised(mz, z.safe_exponent) > 1) return false;
+  if (f[0] < z.safe_force[0] || f[0] > z.safe_force[1]) return false;
+  if constexpr (In == Plane::Space) {
+    if (std::abs(f[3]) * z.safe_torsion > 1) return false;
+    const double vy = f[1] * z.safe_shear[0], vz = f[2] * z.safe_shear[1];
+    if (vy * vy + vz * vz > 1) return false;
+    for (int s = 0; s < p.stations; ++s) {
+      const double my = std::abs(f[4] + p.x[s] * f[2]) * z.safe_moment[0];
+      const double mz = std::abs(f[5] - p.x[s] * f[1]) * z.safe_moment[1];
+      if (my + mz > 1 && raised(my, z.safe_exponent) + raised(mz, z.safe_exponent) > 1) return false;
+    }
+  } else {
+    constexpr int shear = active.at[1], bend = active.at[2];
+    constexpr double sign = first == 0 ? 1 : -1;
+    if (std::abs(f[shear]) * z.safe_shear[shear - 1] > 1) return false;
+    for (int s = 0; s < p.stations; ++s)
+      if (std::abs(f[bend] + sign * p.x[s] * f[shear]) * z.safe_moment[first] > 1) return false;
   }
   double energy = 0, damper_energy = 0, damped = 0, bled = 0;
-  for (int i = 0; i < 6; ++i) {
+  for (int c = 0; c < active.count; ++c) {
+    const int i = active.at[c];
     const double before = z.elastic[i], stretched = e[i] - before;
     const double flowed = z.flowed[i] + p.relaxation * (0.5 * (e[i] + before) - z.flowed[i]);
     const double stretch = e[i] - flowed, damper = p.viscous * k[i] * stretch;
@@ -441,31 +499,56 @@ bool advance_inside_bounds(const ZoneParameters& p, const Six& d, double h, Zone
 
 namespace {
 
+/// Moments over their limits and the root of (|My|/Ly)^p + (|Mz|/Lz)^p: 1 on the limit, infinite where an axis has
+/// none.
+struct Excess {
+  double ry = 0, rz = 0, r = 0;
+};
+double calc_excess(double m, const MomentLimit& most) {
+  const double limit = m >= 0 ? most.positive : most.negative, size = std::abs(m);
+  return limit > 0 ? size / limit : (size > 0 ? kUnlimited : 0);
+}
+Excess calc_excess(double my, double mz, const MomentLimit& ly, const MomentLimit& lz, double exponent) {
+  Excess e;
+  e.ry = calc_excess(my, ly), e.rz = calc_excess(mz, lz);
+  // the larger ratio taken out of the power, so that an uniaxial state keeps its limit to round-off
+  const double big = std::max(e.ry, e.rz), small = std::min(e.ry, e.rz);
+  e.r = !std::isinf(big) && small > 1e-9 * big ? big * root_of(1 + raised(small / big, exponent), exponent) : big;
+  return e;
+}
+
 /// Shares of both moments that (|My|/Ly)^p + (|Mz|/Lz)^p = 1 leaves; false if they are inside.
 bool find_return(double my, double mz, const MomentLimit& ly, const MomentLimit& lz, double exponent, double scale[2]) {
-  const double limit_y = my >= 0 ? ly.positive : ly.negative, limit_z = mz >= 0 ? lz.positive : lz.negative;
-  const double ay = std::abs(my), az = std::abs(mz);
-  if (ay <= 0.5 * limit_y && az <= 0.5 * limit_z) return false;  // p >= 1: inside for sure
-  const double ry = limit_y > 0 ? ay / limit_y : (ay > 0 ? kUnlimited : 0);
-  const double rz = limit_z > 0 ? az / limit_z : (az > 0 ? kUnlimited : 0);
-  if (std::isinf(ry) || std::isinf(rz)) {
-    scale[0] = std::isinf(ry) ? 0 : std::min(1.0, 1 / std::max(ry, kTiny));
-    scale[1] = std::isinf(rz) ? 0 : std::min(1.0, 1 / std::max(rz, kTiny));
+  if (std::abs(my) <= 0.5 * (my >= 0 ? ly.positive : ly.negative) &&
+      std::abs(mz) <= 0.5 * (mz >= 0 ? lz.positive : lz.negative))
+    return false;  // p >= 1: inside for sure
+  const Excess e = calc_excess(my, mz, ly, lz, exponent);
+  if (e.r <= 1) return false;
+  if (std::isinf(e.r)) {
+    scale[0] = std::isinf(e.ry) ? 0 : std::min(1.0, 1 / std::max(e.ry, kTiny));
+    scale[1] = std::isinf(e.rz) ? 0 : std::min(1.0, 1 / std::max(e.rz, kTiny));
     return true;
   }
-  // the larger ratio taken out of the power, so that an uniaxial state keeps its limit to round-off
-  const double big = std::max(ry, rz), small = std::min(ry, rz);
-  const double r = small > 1e-9 * big ? big * root_of(1 + raised(small / big, exponent), exponent) : big;
-  if (r <= 1) return false;
-  scale[0] = scale[1] = 1 / r;
+  scale[0] = scale[1] = 1 / e.r;
   return true;
 }
 
-}  // namespace
+/// The same of one moment.
+bool find_return(double m, const MomentLimit& most, double& scale) {
+  const double limit = m >= 0 ? most.positive : most.negative, size = std::abs(m);
+  if (size <= limit) return false;
+  scale = limit / size;
+  return true;
+}
 
-void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, const Six& d, double time, double h,
-                  ZoneState& z) {
-  if (advance_inside_bounds(p, d, h, z)) return;
+/// In space, or what is left of it in a plane.
+template <Plane In>
+void advance_in(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, const Six& d, double time, double h,
+                ZoneState& z) {
+  constexpr ActiveComponents active = components_of(In);
+  constexpr int first = first_bending(In), last = last_bending(In);
+  constexpr bool is_plane = In != Plane::Space;
+  if (advance_inside_bounds<In>(p, d, h, z)) return;
   if (z.next_law >= 0 && time >= z.ramp_begin + z.ramp) {
     // the switch is done
     if (z.next_share != z.share) soften(p, z);
@@ -476,18 +559,19 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
   for (int i = 0; i < 6; ++i) k[i] = z.share * p.stiffness[i];
   const int n = p.stations;
 
-  double force[6];   // elastic resultants at the marker
-  double phi[2][2];  // inelastic rotation [plane][station], damage included
-  double m[2][2];    // moment at the station [plane][station]
+  double force[6] = {0, 0, 0, 0, 0, 0};  // elastic resultants at the marker
+  double phi[2][2];                      // inelastic rotation [plane][station], damage included
+  double m[2][2];                        // moment at the station [plane][station]
   bool flowed = false;
 
   force[0] = p.external_axial ? d.c[0] : k[0] * (d.c[0] - z.axial);
-  force[3] = k[3] * (d.c[3] - z.twist);
+  if constexpr (!is_plane) force[3] = k[3] * (d.c[3] - z.twist);
 
   // plane 0 bends about y with shear along z; plane 1 bends about z with shear along y
-  const Plane planes[2] = {{k[2], k[4], +1, d.c[2] - z.slip[1], d.c[4]}, {k[1], k[5], -1, d.c[1] - z.slip[0], d.c[5]}};
+  const Bending planes[2] = {{k[2], k[4], +1, d.c[2] - z.slip[1], d.c[4]},
+                             {k[1], k[5], -1, d.c[1] - z.slip[0], d.c[5]}};
   double station_stiffness[2][2];
-  for (int q = 0; q < 2; ++q) {
+  for (int q = first; q <= last; ++q) {
     for (int s = 0; s < n; ++s) {
       station_stiffness[q][s] = planes[q].bending_stiffness + p.x[s] * p.x[s] * planes[q].shear_stiffness;
       phi[q][s] = z.station[s].phi[q];
@@ -498,7 +582,7 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
     if (c[0] > 0 || c[1] > 0) {
       double m0[2] = {0, 0};
       const double v = planes[q].shear(p.x, phi[q], n), b = planes[q].moment(phi[q], n);
-      for (int s = 0; s < n; ++s) m0[s] = Plane::at(b, v, p.x[s], planes[q].sign);
+      for (int s = 0; s < n; ++s) m0[s] = Bending::at(b, v, p.x[s], planes[q].sign);
       const double cross = planes[q].bending_stiffness + p.x[0] * p.x[1] * planes[q].shear_stiffness;
       const double s11 = 1 + station_stiffness[q][0] * c[0], s22 = n > 1 ? 1 + station_stiffness[q][1] * c[1] : 1;
       const double s12 = n > 1 ? cross * c[1] : 0, s21 = n > 1 ? cross * c[0] : 0;
@@ -509,18 +593,18 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
     const double v = planes[q].shear(p.x, phi[q], n), b = planes[q].moment(phi[q], n);
     force[q == 0 ? 2 : 1] = v;
     force[q == 0 ? 4 : 5] = b;
-    for (int s = 0; s < n; ++s) m[q][s] = Plane::at(b, v, p.x[s], planes[q].sign);
+    for (int s = 0; s < n; ++s) m[q][s] = Bending::at(b, v, p.x[s], planes[q].sign);
   }
 
   const auto elastic_energy = [&]() {
     double e = 0;
-    for (int i = 0; i < 6; ++i)
-      if (k[i] > 0) e += 0.5 * force[i] * force[i] / k[i];
+    for (int c = 0; c < active.count; ++c)
+      if (const int i = active.at[c]; k[i] > 0) e += 0.5 * force[i] * force[i] / k[i];
     return e;
   };
   const auto soft_energy = [&]() {
     double e = 0;
-    for (int q = 0; q < 2; ++q)
+    for (int q = first; q <= last; ++q)
       for (int s = 0; s < n; ++s) e += 0.5 * z.station[s].soft[q] * m[q][s] * m[q][s];
     return e;
   };
@@ -537,12 +621,12 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
     if (p.external_axial) {
       // held by somebody else
     } else if (force[0] < 0) {
-      double limit = limits.compression(reached, z.shortened, integrity);
+      double limit = limits.compression(reached, z.shortened, integrity, z.station[0]);
       if (-force[0] > limit) {
         // the curve falls while the zone shortens: one more look at it after the first estimate
-        const double first = (-force[0] - limit) / k[0];
-        integrity = limits.integrity(z.shortened + first);
-        limit = limits.compression(reached, z.shortened + first, integrity);
+        const double guess = (-force[0] - limit) / k[0];
+        integrity = limits.integrity(z.shortened + guess);
+        limit = limits.compression(reached, z.shortened + guess, integrity, z.station[0]);
         const double shortening = std::max(0.0, (-force[0] - limit) / k[0]);
         z.axial -= shortening;
         z.shortened += shortening;
@@ -552,8 +636,8 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
     } else {
       double limit = limits.tension(z.elongated);
       if (force[0] > limit) {
-        const double first = (force[0] - limit) / k[0];
-        limit = limits.tension(z.elongated + first);
+        const double guess = (force[0] - limit) / k[0];
+        limit = limits.tension(z.elongated + guess);
         const double elongation = (force[0] - limit) / k[0];
         z.axial += elongation;
         z.elongated += elongation;
@@ -570,24 +654,27 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
     const double axial = integrity > 0 ? force[0] / integrity : 0;
     MomentLimit most[2][2];  // [plane][station]
     for (int s = 0; s < n; ++s)
-      for (int q = 0; q < 2; ++q) {
+      for (int q = first; q <= last; ++q) {
         most[q][s] = station_limits[s].moment(q, axial, z.station[s]);
         most[q][s].positive *= integrity;
         most[q][s].negative *= integrity;
       }
     const auto measure = [&](int s) {
-      for (int q = 0; q < 2; ++q)
-        m[q][s] = Plane::at(planes[q].moment(phi[q], n), planes[q].shear(p.x, phi[q], n), p.x[s], planes[q].sign);
+      for (int q = first; q <= last; ++q)
+        m[q][s] = Bending::at(planes[q].moment(phi[q], n), planes[q].shear(p.x, phi[q], n), p.x[s], planes[q].sign);
     };
     // share of the station's moments that its limits allow; true if that is not all
     const auto is_outside = [&](int s, double scale[2]) {
+      if constexpr (is_plane) return find_return(m[first][s], most[first][s], scale[first]);
       return find_return(m[0][s], m[1][s], most[0][s], most[1][s], station_limits[s].law().biaxial_exponent, scale);
     };
     bool turned[2] = {false, false};
-    const double phi_trial[2][2] = {{phi[0][0], n > 1 ? phi[0][1] : 0}, {phi[1][0], n > 1 ? phi[1][1] : 0}};
+    double phi_trial[2][2];
+    for (int q = first; q <= last; ++q)
+      for (int s = 0; s < n; ++s) phi_trial[q][s] = phi[q][s];
     const auto turn = [&](int s, const double scale[2]) {
       bool far = false;  // enough for the other station to feel it
-      for (int q = 0; q < 2; ++q) {
+      for (int q = first; q <= last; ++q) {
         const double by = station_stiffness[q][s] > 0 ? m[q][s] * (1 - scale[q]) / station_stiffness[q][s] : 0;
         phi[q][s] += by;
         m[q][s] *= scale[q];
@@ -596,10 +683,12 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
       }
       return far;
     };
-    double scale[2][2];  // [station][plane]
+    double scale[2][2];    // [station][plane]
+    double m_trial[2][2];  // [plane][station]
     bool outside[2] = {false, false};
     for (int s = 0; s < n; ++s) {
       measure(s);
+      for (int q = first; q <= last; ++q) m_trial[q][s] = m[q][s];
       outside[s] = is_outside(s, scale[s]);
     }
     if (n == 1) {
@@ -607,7 +696,7 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
     } else if (outside[0] || outside[1]) {
       double trial[2][2];  // moments and rotations before either station turns
       double before[2][2];
-      for (int q = 0; q < 2; ++q)
+      for (int q = first; q <= last; ++q)
         for (int s = 0; s < 2; ++s) trial[q][s] = m[q][s], before[q][s] = phi[q][s];
       if (outside[0] != outside[1]) {
         const int one = outside[0] ? 0 : 1, other = 1 - one;
@@ -620,7 +709,7 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
         // both at once: two by two in each plane
         double target[2][2], by[2][2];
         bool good = true;
-        for (int q = 0; q < 2 && good; ++q) {
+        for (int q = first; q <= last && good; ++q) {
           const double s12 = planes[q].bending_stiffness + p.x[0] * p.x[1] * planes[q].shear_stiffness;
           const double s11 = station_stiffness[q][0], s22 = station_stiffness[q][1];
           const double determinant = s11 * s22 - s12 * s12;
@@ -630,9 +719,13 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
           by[q][0] = (s22 * over0 - s12 * over1) / determinant;
           by[q][1] = (s11 * over1 - s12 * over0) / determinant;
         }
-        for (int s = 0; s < 2 && good; ++s) good = target[0][s] * by[0][s] + target[1][s] * by[1][s] >= 0;
+        for (int s = 0; s < 2 && good; ++s) {
+          double work = 0;
+          for (int q = first; q <= last; ++q) work += target[q][s] * by[q][s];
+          good = work >= 0;
+        }
         if (good) {
-          for (int q = 0; q < 2; ++q)
+          for (int q = first; q <= last; ++q)
             for (int s = 0; s < 2; ++s) {
               phi[q][s] = before[q][s] + by[q][s];
               turned[s] = turned[s] || by[q][s] != 0;
@@ -650,14 +743,95 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
         }
       }
     }
-    double grown[2] = {0, 0};  // of the rotations reached
+    // what turns further lengthens or shortens
+    const double axial_stiffness = p.external_axial ? 0 : k[0], relief = p.external_axial ? p.relief : k[0];
+    const auto length_of = [](const double turns[2][2], int s) {
+      return is_plane ? std::abs(turns[first][s]) : std::sqrt(turns[0][s] * turns[0][s] + turns[1][s] * turns[1][s]);
+    };
+    // rotation up to which a station had gone in the step before, by plastic flow or on the flexibility of its damage
+    double so_far[2] = {0, 0};
+    for (int s = 0; s < n; ++s) {
+      if (!turned[s] || !station_limits[s].elongates()) continue;
+      const StationState& st = z.station[s];
+      double before[2][2];
+      for (int q = first; q <= last; ++q) {
+        const double b = z.elastic_force[q == 0 ? 4 : 5], v = z.elastic_force[q == 0 ? 2 : 1];
+        before[q][s] = st.phi[q] + st.soft[q] * Bending::at(b, v, p.x[s], planes[q].sign);
+      }
+      so_far[s] = std::max(st.reached, length_of(before, s));
+    }
+    const auto grows = [&](int s) {
+      return turned[s] && station_limits[s].elongates() && length_of(phi, s) > so_far[s];
+    };
+    const auto calc_elongation = [&]() {
+      double sum = 0;
+      for (int s = 0; s < n; ++s) {
+        if (!grows(s)) continue;
+        StationState& st = z.station[s];
+        double squares = 0, along = 0, bending = 0;
+        for (int q = first; q <= last; ++q) {
+          const Lift lift = station_limits[s].lift(q, axial, st.reached, st);
+          squares += phi[q][s] * phi[q][s];
+          along += phi[q][s] * phi[q][s] * (phi[q][s] >= 0 ? lift.positive : lift.negative);
+          bending += m[q][s] * (phi[q][s] - phi_trial[q][s]);
+        }
+        if (along == 0) continue;
+        double by = (length_of(phi, s) - so_far[s]) * along / squares;
+        // the axial spring takes no more than bending brings: |by| (½ k |by| - N') <= brought, N' pulling the way of by
+        const double brought = (1 - 0.5 * station_limits[s].law().damage_share) * std::max(0.0, bending);
+        const double pull = std::copysign(1.0, by) * (force[0] - axial_stiffness * sum);
+        const double root = std::sqrt(pull * pull + 2 * axial_stiffness * brought);
+        const double bound = pull < 0              ? 2 * brought / (root - pull)
+                             : axial_stiffness > 0 ? (pull + root) / axial_stiffness
+                                                   : kUnlimited;
+        by = std::copysign(std::min(std::abs(by), bound), by);
+        sum += by;
+      }
+      return sum;
+    };
+    for (int s = 0; s < n && (grows(0) || (n > 1 && grows(1))); ++s) measure(s);
+    double elongation = calc_elongation();
+    if (elongation != 0 && relief > 0) {
+      // that changes the normal force and with it the limits: a station turns to the limit under the force that is left
+      double share = 1;  // of the turn
+      for (int s = 0; s < n; ++s) {
+        if (!grows(s)) continue;
+        const double exponent = station_limits[s].law().biaxial_exponent;
+        double excess = 0;
+        if constexpr (is_plane)
+          excess = calc_excess(m_trial[first][s], most[first][s]);
+        else
+          excess = calc_excess(m_trial[0][s], m_trial[1][s], most[0][s], most[1][s], exponent).r;
+        if (!(excess > 1) || std::isinf(excess)) continue;
+        // rise of what the limit leaves of the moments with the force; that of I L(N/I) is that of L
+        const double left = 1 / excess;
+        double slope = 0;
+        for (int q = first; q <= last; ++q) {
+          const bool is_positive = m_trial[q][s] >= 0;
+          const double limit = is_positive ? most[q][s].positive : most[q][s].negative;
+          if (!(limit > 0) || limit == kUnlimited) continue;
+          const MomentLimit rise = station_limits[s].slope(q, axial, z.station[s]);
+          slope += raised(left * std::abs(m_trial[q][s]) / limit, exponent) *
+                   (is_positive ? rise.positive : rise.negative) / limit;
+        }
+        const double rise = -left * slope * relief * elongation;
+        if (!(rise > 0)) continue;
+        const double length = length_of(phi, s), trial = std::max(so_far[s], length_of(phi_trial, s));
+        const double ahead = (trial - so_far[s]) / (length - so_far[s]);  // by damage, before it turns
+        share = std::min(share, std::max(0.0, (1 - left - rise * ahead) / (1 - left + rise * (1 - ahead))));
+      }
+      if (share < 1) {
+        for (int q = first; q <= last; ++q)
+          for (int s = 0; s < n; ++s) phi[q][s] = phi_trial[q][s] + share * (phi[q][s] - phi_trial[q][s]);
+        for (int s = 0; s < n; ++s) measure(s);
+        elongation = calc_elongation();
+      }
+    }
     for (int s = 0; s < n; ++s) {
       StationState& st = z.station[s];
       if (turned[s]) {
         flowed = true;
-        const double so_far = st.reached;
-        st.reached = std::max(st.reached, std::sqrt(phi[0][s] * phi[0][s] + phi[1][s] * phi[1][s]));
-        grown[s] = st.reached - so_far;
+        st.reached = std::max(st.reached, length_of(phi, s));
       }
       const CompiledLaw& law = station_limits[s].law();
       if (st.reached >= (force[0] < 0 ? law.rupture_rotation_pressed : law.rupture_rotation))
@@ -665,12 +839,12 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
     }
     if (flowed) {
       // split what is new of the inelastic rotation into a plastic part and added flexibility
-      for (int q = 0; q < 2; ++q) {
+      for (int q = first; q <= last; ++q) {
         force[q == 0 ? 2 : 1] = planes[q].shear(p.x, phi[q], n);
         force[q == 0 ? 4 : 5] = planes[q].moment(phi[q], n);
         for (int s = 0; s < n; ++s) {
           StationState& st = z.station[s];
-          m[q][s] = Plane::at(force[q == 0 ? 4 : 5], force[q == 0 ? 2 : 1], p.x[s], planes[q].sign);
+          m[q][s] = Bending::at(force[q == 0 ? 4 : 5], force[q == 0 ? 2 : 1], p.x[s], planes[q].sign);
           const double added = phi[q][s] - st.phi[q] - st.soft[q] * m[q][s];
           const double share = station_limits[s].law().damage_share;
           if (share > 0 && added * m[q][s] > 0) {
@@ -683,29 +857,6 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
       }
     }
 
-    // what turns further lengthens or shortens
-    double elongation = 0;
-    const double axial_stiffness = p.external_axial ? 0 : k[0];
-    for (int s = 0; s < n; ++s) {
-      if (!(grown[s] > 0)) continue;
-      StationState& st = z.station[s];
-      double squares = 0, along = 0, bending = 0;
-      for (int q = 0; q < 2; ++q) {
-        const Lift lift = station_limits[s].lift(q, axial, st.reached - grown[s], st);
-        squares += phi[q][s] * phi[q][s];
-        along += phi[q][s] * phi[q][s] * (phi[q][s] >= 0 ? lift.positive : lift.negative);
-        bending += m[q][s] * (phi[q][s] - phi_trial[q][s]);
-      }
-      if (along == 0) continue;
-      double by = grown[s] * along / squares;
-      // the axial spring takes no more than bending brings: |by| (½ k |by| - N') <= brought, N' pulling the way of by
-      const double brought = (1 - 0.5 * station_limits[s].law().damage_share) * std::max(0.0, bending);
-      const double pull = std::copysign(1.0, by) * (force[0] - axial_stiffness * elongation);
-      const double root = std::sqrt(pull * pull + 2 * axial_stiffness * brought);
-      const double bound = pull < 0 ? 2 * brought / (root - pull) : (pull + root) / std::max(axial_stiffness, kTiny);
-      by = std::copysign(std::min(std::abs(by), bound), by);
-      elongation += by;
-    }
     z.axial += elongation;
     z.lifted += elongation;
     force[0] -= axial_stiffness * elongation;
@@ -713,33 +864,39 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
     // shear
     {
       const double compression = -force[0];
-      const double limit_y = limits.shear(0, z.slipped, compression), limit_z = limits.shear(1, z.slipped, compression);
-      const double ry = limit_y > 0 ? std::abs(force[1]) / limit_y : (force[1] != 0 ? kUnlimited : 0);
-      const double rz = limit_z > 0 ? std::abs(force[2]) / limit_z : (force[2] != 0 ? kUnlimited : 0);
-      const double r = std::sqrt(ry * ry + rz * rz);
-      if (r > 1) {
+      double over2 = 0;  // square of the demand over the limits
+      for (int a = 1 - last; a <= 1 - first; ++a) {
+        const double limit = limits.shear(a, z.slipped, compression);
+        const double ratio = limit > 0 ? std::abs(force[1 + a]) / limit : (force[1 + a] != 0 ? kUnlimited : 0);
+        over2 += ratio * ratio;
+      }
+      if (const double r = std::sqrt(over2); r > 1) {
         const double s = std::isinf(r) ? 0 : 1 / r;
-        const double dy = k[1] > 0 ? force[1] * (1 - s) / k[1] : 0, dz = k[2] > 0 ? force[2] * (1 - s) / k[2] : 0;
-        z.slip[0] += dy;
-        z.slip[1] += dz;
-        z.slipped += std::sqrt(dy * dy + dz * dz);
-        force[1] *= s;
-        force[2] *= s;
+        double way2 = 0;
+        for (int a = 1 - last; a <= 1 - first; ++a) {
+          const double by = k[1 + a] > 0 ? force[1 + a] * (1 - s) / k[1 + a] : 0;
+          z.slip[a] += by;
+          way2 += by * by;
+          force[1 + a] *= s;
+        }
+        z.slipped += std::sqrt(way2);
         flowed = true;
-        for (int q = 0; q < 2; ++q)
+        for (int q = first; q <= last; ++q)
           for (int st = 0; st < n; ++st)
-            m[q][st] = Plane::at(force[q == 0 ? 4 : 5], force[q == 0 ? 2 : 1], p.x[st], planes[q].sign);
+            m[q][st] = Bending::at(force[q == 0 ? 4 : 5], force[q == 0 ? 2 : 1], p.x[st], planes[q].sign);
       }
       if (z.slipped >= limits.law().slip_rupture) broke = BreakReason::Shear;
     }
 
     // torsion
-    if (const double limit = limits.torsion(); std::abs(force[3]) > limit) {
-      const double over = std::copysign((std::abs(force[3]) - limit) / k[3], force[3]);
-      z.twist += over;
-      z.twisted += std::abs(over);
-      force[3] = std::copysign(limit, force[3]);
-      flowed = true;
+    if constexpr (!is_plane) {
+      if (const double limit = limits.torsion(); std::abs(force[3]) > limit) {
+        const double over = std::copysign((std::abs(force[3]) - limit) / k[3], force[3]);
+        z.twist += over;
+        z.twisted += std::abs(over);
+        force[3] = std::copysign(limit, force[3]);
+        flowed = true;
+      }
     }
     if (z.twisted >= limits.law().twist_rupture) broke = BreakReason::Torsion;
     if (flowed || z.next_law >= 0) {
@@ -752,7 +909,7 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
         double used = 0;
         for (int s = 0; s < n; ++s) {
           double sum = 0;
-          for (int q = 0; q < 2; ++q)
+          for (int q = first; q <= last; ++q)
             sum += std::abs(m[q][s]) / std::max(std::min(most[q][s].positive, most[q][s].negative), kTiny);
           used = std::max(used, sum);
         }
@@ -773,8 +930,10 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
   if (flowed || broken || z.is_adjusted) {
     // what was put in since the last evaluation and is not stored is gone; work by the trapezium, as the bodies feel it
     double work = 0;
-    for (int i = p.external_axial ? 1 : 0; i < 6; ++i)
+    for (int c = p.external_axial ? 1 : 0; c < active.count; ++c) {
+      const int i = active.at[c];
       work += 0.5 * (z.elastic_force[i] + force[i]) * (d.c[i] - z.deformation[i]);
+    }
     z.plastic += work - (energy - z.energy);
     z.yielded = z.yielded || flowed || broken;
     z.is_adjusted = false;
@@ -790,7 +949,8 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
   // A damper in series with a spring, both beside the elastic deformation (standard linear solid): no plastic flow is
   // damped, and at rest it carries nothing. The damper follows the mean of the step.
   double damper_energy = 0;
-  for (int i = 0; i < 6; ++i) {
+  for (int c = 0; c < active.count; ++c) {
+    const int i = active.at[c];
     const double e = k[i] > 0 ? force[i] / k[i] : 0;
     double damper = 0;
     if (p.viscous > 0 && z.has_elastic && h > 0) {
@@ -813,6 +973,20 @@ void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws,
   z.damping -= damper_energy - z.damper_energy;
   z.damper_energy = damper_energy;
   z.has_elastic = true;
+}
+
+}  // namespace
+
+void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, const Six& d, double time, double h,
+                  ZoneState& z) {
+  switch (p.plane) {
+    case Plane::Space:
+      return advance_in<Plane::Space>(p, laws, d, time, h, z);
+    case Plane::AboutY:
+      return advance_in<Plane::AboutY>(p, laws, d, time, h, z);
+    case Plane::AboutZ:
+      return advance_in<Plane::AboutZ>(p, laws, d, time, h, z);
+  }
 }
 
 double calc_bound_utilisation(const ZoneParameters& p, const ZoneState& z) {
@@ -868,7 +1042,7 @@ bool write_flow(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, c
       if (!(force > family->force.front() && force < family->force.back())) return false;
       // the interval that the force is in and the nearer one beside it
       const std::vector<double>& forces = family->force;
-      const size_t k = static_cast<size_t>(find_interval(forces, force, 0)), last = forces.size() - 1;
+      const size_t k = static_cast<size_t>(find_interval(forces, force, z.station[s].k[q])), last = forces.size() - 1;
       const bool is_low = force - forces[k] < forces[k + 1] - force;
       const size_t middle = (is_low && k > 0) || k + 1 == last ? k : k + 1;
       const size_t row[3] = {middle > 0 ? middle - 1 : middle, middle, std::min(middle + 1, last)};
@@ -879,18 +1053,18 @@ bool write_flow(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, c
       size_t j[2] = {family->rotation.size() - 1, family->rotation.size() - 1};
       cell[kCellRotation] = reached;
       if (reached < family->rotation.back()) {
-        j[0] = static_cast<size_t>(find_interval(family->rotation, reached, 0)), j[1] = j[0] + 1;
+        j[0] = static_cast<size_t>(find_interval(family->rotation, reached, z.station[s].j[q])), j[1] = j[0] + 1;
         cell[kCellRotation] = family->rotation[j[0]];
         cell[kCellRotation + 1] = 1 / (family->rotation[j[1]] - family->rotation[j[0]]);
         far = std::max(far, family->rotation[j[1]]);
       }
       for (size_t c = 0; c < 6; ++c) {
-        const double* limit = &family->limit[2 * (row[c / 2] * static_cast<size_t>(family->J) + j[c % 2])];
+        const double* limit = &family->limit[family->place(row[c / 2], j[c % 2])];
         cell[static_cast<size_t>(kCellPositive) + c] = whole * limit[0];
         cell[static_cast<size_t>(kCellNegative) + c] = whole * limit[1];
       }
       for (size_t c = 0; c < 3 && !family->lift.empty(); ++c) {
-        const double* lift = &family->lift[2 * (row[c] * static_cast<size_t>(family->J) + j[0])];
+        const double* lift = &family->lift[family->place(row[c], j[0])];
         cell[static_cast<size_t>(kCellLiftPositive) + c] = lift[0];
         cell[static_cast<size_t>(kCellLiftNegative) + c] = lift[1];
       }
@@ -899,14 +1073,15 @@ bool write_flow(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, c
   const CompiledLaw& law = limits.law();
   // where little compression is left at the end of the cell, it is asked again before
   const double reached = std::max(z.station[0].reached, z.station[1].reached);
-  if (far > reached && limits.compression(far, z.shortened, whole) < limits.compression(reached, z.shortened, whole)) {
+  if (far > reached && limits.compression(far, z.shortened, whole, z.station[0]) <
+                           limits.compression(reached, z.shortened, whole, z.station[0])) {
     far = reached + 0.25 * (far - reached);
     for (int s = 0; s < p.stations; ++s) {
       double& rupture = out[kStations + s * kStationFields + kRupture];
       rupture = std::min(rupture, far);
     }
   }
-  out[kFlowLeast] = -limits.compression(far, z.shortened, whole);
+  out[kFlowLeast] = -limits.compression(far, z.shortened, whole, z.station[0]);
   out[kFlowMost] = is_pressed ? -kTiny : limits.tension(z.elongated);
   for (int axis = 0; axis < 2; ++axis)
     out[kShearOwn + axis] = law.slip_softening > 0 ? std::min(law.shear[axis], unlimited) : 0;
@@ -940,7 +1115,7 @@ double calc_utilisation(const ZoneParameters& p, const std::vector<CompiledLaw>&
   if (p.stations > 1) reached = std::max(reached, z.station[1].reached);
   const double integrity = limits.integrity(z.shortened);
   double u = p.external_axial ? 0.0
-             : force[0] < 0   ? ratio(-force[0], limits.compression(reached, z.shortened, integrity))
+             : force[0] < 0   ? ratio(-force[0], limits.compression(reached, z.shortened, integrity, z.station[0]))
                               : ratio(force[0], limits.tension(z.elongated));
   for (int s = 0; s < p.stations; ++s) {
     const Limits station_limits(laws, p.law[s], z, time);

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "mbs/kernel.h"
 #include "mbs/model.h"
 
 namespace topple::mbs {
@@ -15,10 +16,13 @@ struct CompiledFamily {
   int K = 0, J = 0;              // K == 0: unlimited
   std::vector<double> force;     // (K)
   std::vector<double> rotation;  // (J)
-  std::vector<double> limit;     // positive and negative side by side (K x J x 2)
+  std::vector<double> limit;     // positive and negative side by side, by rotation (J x K x 2)
   std::vector<double> lift;      // plastic elongation per growth of rotation, behind each rotation, positive and
-                                 // negative side by side; empty: none [m/rad] (K x J x 2)
+                                 // negative side by side; empty: none [m/rad] (J x K x 2)
   std::vector<double> capacity;  // compression beyond which no moment is left, per rotation (J)
+
+  /// In `limit` and `lift`, of force k and rotation j; the next force follows.
+  size_t place(size_t k, size_t j) const { return 2 * (j * static_cast<size_t>(K) + k); }
 };
 
 struct CompiledCurve {
@@ -50,8 +54,8 @@ struct Lift {
   double positive = 0, negative = 0;
 };
 Lift calc_lift(const CompiledFamily&, double normal_force, double rotation, int& k, int& j);
-/// Compression that the zone can still carry at a plastic rotation [N], infinity if unlimited.
-double calc_compression_capacity(const CompiledFamily&, double rotation);
+/// Compression that the zone can still carry at a plastic rotation [N], infinity if unlimited. j is a hint.
+double calc_compression_capacity(const CompiledFamily&, double rotation, int j = 0);
 
 /// Six deformations or resultants: x y z translation, x y z rotation.
 struct Six {
@@ -117,13 +121,15 @@ struct ZoneState {
 /// Constants of a zone for evaluation.
 struct ZoneParameters {
   double stiffness[6];
-  double viscous = 0;     // stiffness of the spring behind the damper over the elastic one
-  double relaxation = 0;  // share of that spring's deformation that the damper takes in one step
+  double viscous = 0;                          // stiffness of the spring behind the damper over the elastic one
+  double relaxation = 0;                       // share of that spring's deformation that the damper takes in one step
+  kernel::Plane plane = kernel::Plane::Space;  // out of which its deformations have no part
   int stations = 0;
   double x[2] = {0, 0};
   int law[2] = {-1, -1};
   bool external_axial =
-      false;  // the deformation's first component is the normal force itself; it follows no limit here
+      false;          // the deformation's first component is the normal force itself; it follows no limit here
+  double relief = 0;  // of an external force: what it loses by a unit of the zone's elongation [N/m]
 };
 
 /// Evaluates a live zone at a deformation: sets resultant, history, energies; breaks it where a limit of rupture is

@@ -60,10 +60,12 @@ void expect_same_words(const record::Record& a, const record::Record& b) {
   EXPECT_EQ(a.ending_text, b.ending_text);
 }
 
-double final_residual(const record::Record& r) {
+/// Largest error of the balance until a time, over what the fall has released in the end.
+double largest_residual(const record::Record& r, double until) {
   double residual = 0, released = 0;
   for (const record::Series& s : r.series) {
-    if (s.id == "energy_residual") residual = std::abs(s.value.back());
+    for (size_t i = 0; s.id == "energy_residual" && i < r.time.size() && r.time[i] <= until; ++i)
+      residual = std::max(residual, std::abs(s.value[i]));
     if (s.id == "energy_gravity") released = std::abs(s.value.back());
   }
   return residual / released;
@@ -265,15 +267,14 @@ TEST(Steering, ChargesFireNowAndCanBeTakenOut) {
   }
   EXPECT_EQ(fired_3, 1);
   EXPECT_EQ(fired_4, 0);
-  EXPECT_LT(final_residual(r), default_knowledge().verification_energy_error);
+  EXPECT_LT(largest_residual(r, 10), default_knowledge().verification_energy_error);
 }
 
 TEST(SteeringPhysics, EveryEditKeepsTheLedger) {
-  // the balance of energy holds through each edit as well as it does without one
+  // the balance of energy holds through each edit until parts land, which has an error of its own
   Steering plain(default_knowledge(), options());
   ASSERT_TRUE(plain.begin(plain.add_root(two_stages(), "main")));
   advance_until(plain, 10);
-  const double without = final_residual(plain.make_record(plain.active()));
   const char* const edits[] = {
       R"({"command": "add_pre_cut", "member": "C-B1-0", "at": 2.4, "cut_bars": 0.5})",
       R"({"command": "add_pre_cut", "member": "B-A1B1-1", "at": 0.3, "cut_bars": 0.5, "cut_concrete": 0.3})",
@@ -289,7 +290,8 @@ TEST(SteeringPhysics, EveryEditKeepsTheLedger) {
     s.edit(read_edit(Json::parse(text)));
     advance_until(s, 10);
     const record::Record r = s.make_record(s.active());
-    EXPECT_LT(final_residual(r), 2 * without + 1e-4) << text;
+    EXPECT_LT(largest_residual(r, 0.8), 1e-5) << text;
+    EXPECT_LT(largest_residual(r, 10), default_knowledge().verification_energy_error) << text;
     EXPECT_NE(r.position, plain.make_record(plain.active()).position) << text;
     EXPECT_TRUE(std::any_of(r.events.begin(), r.events.end(), [](const auto& e) { return e.kind == "edit"; })) << text;
   }
@@ -312,7 +314,7 @@ TEST(Steering, ACableComesAndGoes) {
   s.edit(e);
   EXPECT_THROW(s.edit(e), InputError) << "it is let go already";
   advance_until(s, 10);
-  EXPECT_LT(final_residual(s.make_record(s.active())), default_knowledge().verification_energy_error);
+  EXPECT_LT(largest_residual(s.make_record(s.active()), 10), default_knowledge().verification_energy_error);
 }
 
 TEST(Steering, RefusedEditsChangeNothing) {

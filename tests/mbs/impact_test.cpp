@@ -263,7 +263,8 @@ double run_elastic(const Body& a, const Body& b, double step) {
   EXPECT_LT(norm(p - p0), 1e-12 * norm(p0));
   EXPECT_LT(norm(spin - spin0), 1e-9);  // the midpoint rule's error in free flight
   EXPECT_EQ(e.contact, 0);
-  EXPECT_NEAR(e.residual, e.kinetic - start, 1e-9);  // the ledger sees what is wrong
+  // the ledger sees what is wrong
+  EXPECT_NEAR(e.residual, e.kinetic + e.contact_loss - start, 1e-9 * std::max(1.0, start));
   return e.kinetic / start - 1;
 }
 
@@ -282,6 +283,25 @@ TEST(ImpactPhysics, ElasticCollisionsKeepMomentumAndEnergy) {
   Body cube = make_box("cube", 3, {0.5, 0.5, 0.5}, {-1.2, -0.3, -0.25});
   cube.v_WB = {2, 0, 0};
   EXPECT_NEAR(run_elastic(cube, box, 1e-5), 0, 3e-3);
+}
+
+TEST(ImpactPhysics, PanelsWhoseLongEdgesCrossMakeNoEnergy) {
+  // the corner of the common area where edges that are all but parallel cross runs along them
+  const double tilt = std::numbers::pi / 12;
+  const Vec3 half{1.2, 0.075, 1.4};
+  const Body lower = make_box("lower", 2000, half, {0, 0, -half.z});
+  for (const double slide : {0.03, 0.05, 0.07, 0.1, 0.2})
+    for (const double turn : {0.001, 0.002, 0.003, 0.004, 0.006}) {
+      Body upper = make_box("upper", 2000, half, {});
+      upper.X_WB.q = exp_rotation({0, 0, turn}) * exp_rotation({0, tilt, 0});
+      const Vec3 lowest = to_matrix(upper.X_WB.q) * Vec3{half.x, 0, -half.z};
+      upper.X_WB.p = Vec3{0.3, 0, 0.001} - lowest;
+      upper.v_WB = {0, slide, -5};
+      const double change = run_elastic(lower, upper, 1e-4);
+      EXPECT_LT(change, 1e-4) << slide << " " << turn;
+      // where they hardly slide, the new corners can store less
+      EXPECT_GT(change, slide > 15 * turn ? -1e-4 : -0.3) << slide << " " << turn;
+    }
 }
 
 // ------------------------------------------------------------------------------------------------------ slopes

@@ -191,5 +191,90 @@ TEST(Kernel, GivesTheSameBitsWhateverTheWidth) {
   }
 }
 
+/// A zone at a body that keeps to y = const, x along x of W and bending about its y, or upright and bending about its
+/// z.
+Model make_planar_model(int stations, bool is_upright) {
+  Model m = make_model(stations, make_law(1));
+  const Mat3 up = Mat3::from_columns({0, 0, 1}, {1, 0, 0}, {0, 1, 0});
+  ZoneElement& e = m.elements[0];
+  if (is_upright) e.X_AF.q = e.X_BM.q = to_quat(up);
+  // markers off the centres, and askew in the plane
+  e.X_AF.p = {0.3, 2, -0.2}, e.X_BM.p = {0.1, 2, 0.4};
+  e.X_BM.q = exp_rotation({0, 0.02, 0}) * e.X_BM.q;
+  const Quat turned = exp_rotation({0, -0.02, 0});
+  m.bodies[0].X_WB = {e.X_AF.p - to_matrix(turned) * e.X_BM.p, turned};
+  return m;
+}
+
+class KernelPlane : public testing::TestWithParam<std::tuple<bool, int, double, bool>> {};
+
+TEST_P(KernelPlane, GivesTheForcesOfSpace) {
+  const auto [is_upright, stations, amplitude, by_full_law] = GetParam();
+  double most_plastic = 0;
+  int compared = 0;
+  for (std::uint32_t seed = 1; seed <= 6; ++seed) {
+    Model m = make_planar_model(stations, is_upright);
+    Options options;
+    options.step = 1e-4;
+    options.full_law = by_full_law;
+    // in space, on a path that differs in its last digits, and in the plane
+    System space(m, options), nudged(m, options);
+    m.is_planar = true;
+    System plane(m, options);
+    ASSERT_NE(plane.elements[0].zone.plane, kernel::Plane::Space);
+    ASSERT_EQ(space.elements[0].zone.plane, kernel::Plane::Space);
+    const Pose at = m.bodies[0].X_WB;
+    double most[2] = {0, 0}, apart[2] = {0, 0};  // of forces, torques
+    for (System* s : {&space, &nudged, &plane}) s->start();
+    for (int i = 1; i <= 6000; ++i) {
+      const Six d = path_at(i, amplitude, seed);
+      for (System* s : {&space, &nudged, &plane}) {
+        const double nudge = s == &nudged ? 1 + 1e-14 : 1;
+        s->state.p[0] = at.p + nudge * Vec3{is_upright ? d.c[1] : d.c[0], 0, is_upright ? d.c[0] : d.c[2]};
+        s->state.q[0] = exp_rotation({0, nudge * d.c[4], 0}) * at.q;
+        s->state.R[0] = to_matrix(s->state.q[0]);
+        s->state.time = 1e-4 * i;
+        s->evaluate_elements();
+        s->unpack_elements();
+      }
+      const ZoneState &a = space.state.element[0], &b = plane.state.element[0];
+      ASSERT_EQ(a.live, b.live) << i << " seed " << seed;
+      if (!a.live) break;
+      const Vec3 f = space.force[0], g = plane.force[0];
+      const double t = Vec3(space.torque[0]).y, u = Vec3(plane.torque[0]).y;
+      most[0] = std::max(most[0], norm(f)), most[1] = std::max(most[1], std::abs(t));
+      apart[0] = std::max(apart[0], norm(f - nudged.force[0]));
+      apart[1] = std::max(apart[1], std::abs(t - Vec3(nudged.torque[0]).y));
+      // the same sums in another order, some forty of them; softening tables multiply the round-off
+      ASSERT_LE(std::hypot(f.x - g.x, f.z - g.z), 1e-12 * most[0] + 20 * apart[0]) << i << " seed " << seed;
+      ASSERT_LE(std::abs(t - u), 1e-12 * most[1] + 20 * apart[1]) << i << " seed " << seed;
+      // a zone that snaps tells last digits apart from here on
+      if (apart[0] > 1e-7 * most[0]) break;
+      ASSERT_NEAR(a.energy + a.plastic + a.damping, b.energy + b.plastic + b.damping,
+                  1e-8 * (a.energy + a.plastic) + 1e-9)
+          << i << " seed " << seed;
+      ++compared;
+    }
+    most_plastic = std::max(most_plastic, space.state.element[0].plastic);
+  }
+  if (amplitude > 1e-3 && stations > 0) { EXPECT_GT(most_plastic, 100); }
+  EXPECT_GT(compared, 15000);
+}
+
+INSTANTIATE_TEST_SUITE_P(Paths, KernelPlane,
+                         testing::Combine(testing::Bool(), testing::Values(0, 1, 2), testing::Values(1e-5, 5e-3, 2e-2),
+                                          testing::Bool()));
+
+TEST(Kernel, LeavesElementsAcrossThePlaneInSpace) {
+  Model m = make_planar_model(1, false);
+  m.is_planar = true;
+  m.elements[0].X_AF.q = m.elements[0].X_BM.q = to_quat(Mat3::from_columns({0, 1, 0}, {-1, 0, 0}, {0, 0, 1}));
+  EXPECT_EQ(System(m, {}).elements[0].zone.plane, kernel::Plane::Space);
+  m = make_planar_model(1, false);
+  m.is_planar = true;
+  m.elements[0].X_AF.p.y += 1e-3;
+  EXPECT_EQ(System(m, {}).elements[0].zone.plane, kernel::Plane::Space) << "its markers are not beside each other";
+}
+
 }  // namespace
 }  // namespace topple::mbs

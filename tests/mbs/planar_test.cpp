@@ -105,6 +105,48 @@ TEST(PlanarPhysics, PendulumSwingsAsInSpace) {
   EXPECT_LT(s.joint_drift, 1e-8);
 }
 
+TEST(PlanarPhysics, HingedBodiesFlyAsInSpace) {
+  // two bars that spin apart about a hinge with offset centres, thrown up
+  Model m;
+  m.contact.ground = m.contact.bodies = false;
+  m.gravity = {0, 0, -9.81};
+  for (int i = 0; i < 2; ++i) {
+    Body b = make_box(i == 0 ? "left" : "right", 10 + 7 * i, {0.5, 0.05, 0.05}, {i == 0 ? -0.5 : 0.5, 2, 0.1 * i});
+    b.w_WB = {0, i == 0 ? 3.0 : -5.0, 0};
+    b.v_WB = Vec3{1, 0, 4} + cross(b.w_WB, b.X_WB.p - Vec3{0, 2, 0});
+    add_body(m, b);
+  }
+  Joint j;
+  j.kind = Joint::Kind::Revolute;
+  j.name = "pin";
+  j.parent = {0}, j.child = {1};
+  j.X_PF.q = j.X_CM.q = to_quat(Mat3::from_columns({0, 0, 1}, {1, 0, 0}, {0, 1, 0}));
+  j.X_PF.p = {0.5, 0, 0}, j.X_CM.p = {-0.5, 0, -0.1};
+  add_joint(m, j);
+  std::vector<View> in_space, in_plane;
+  Options o = look(1, in_space);
+  o.step = 1e-3;
+  (void)run(m, o);
+  m.is_planar = true;
+  o = look(1, in_plane);
+  o.step = 1e-3;
+  const Summary s = run(m, o);
+  ASSERT_EQ(in_space.size(), in_plane.size());
+  EXPECT_GT(std::abs(in_space.back().joint_angle[0]), 2) << "it turns";
+  // iterations end at a gap of 1e-9 of the size; of a step that is a speed, and with 20 kg a force
+  const double rate = 1e-9 / o.step;
+  for (size_t i = 0; i < in_space.size(); ++i) {
+    const View &a = in_space[i], &b = in_plane[i];
+    for (size_t k = 0; k < 2; ++k) {
+      EXPECT_LT(norm(a.X_WB[k].p - b.X_WB[k].p), 1e-9) << a.time;
+      EXPECT_LT(norm(a.w_WB[k] - b.w_WB[k]), rate) << a.time;
+    }
+    EXPECT_LT(norm(a.joint_force[0] - b.joint_force[0]), 20 * rate / o.step) << a.time;
+    EXPECT_NEAR(a.joint_angle[0], b.joint_angle[0], 1e-9) << a.time;
+  }
+  EXPECT_LT(s.joint_drift, 1e-8);
+}
+
 TEST(PlanarPhysics, EquilibriumIsThatOfThePlane) {
   // a beam that bends downwards alone: in space and in the plane it is the same
   test::Cantilever c = test::make_cantilever(8, 4, 0.3, 0.3, 30e9, 2500);
