@@ -140,11 +140,16 @@ Reach add_debris(const Context& c, const Mechanism& m) {
   } else {
     const double planned = std::atan2(c.map.fall_direction.y, c.map.fall_direction.x);
     const double off = std::remainder(m.azimuth - planned, 2 * kPi);
-    std::string text = fmt::format("The mass centre moved towards {}", azimuth_words(m.azimuth));
+    std::string text = m.is_azimuth_of_lean ? fmt::format("At {:.2f} s the upper block leans towards {}", m.time,
+                                                          azimuth_words(m.azimuth))
+                                            : "The mass centre moved towards " + azimuth_words(m.azimuth);
     if (c.map.is_direction_planned)
       text += fmt::format(", {:.0f} deg from the planned {}", std::abs(off) / unit::deg, azimuth_words(planned));
-    c.add("azimuth", "Fall and debris", "Direction of fall", text + " (0 deg is +x, counter-clockwise).", m.azimuth,
-          "rad");
+    text += " (0 deg is +x, counter-clockwise).";
+    if (m.is_azimuth_of_lean)
+      text += fmt::format(" The mass centre moved by {:.1f} m towards {}.", norm(m.run),
+                          azimuth_words(std::atan2(m.run.y, m.run.x)));
+    c.add("azimuth", "Fall and debris", "Direction of fall", text, m.azimuth, "rad");
   }
   std::string text = fmt::format(
       "Beyond the footprint: {:.1f} m towards -x, {:.1f} m towards +x, {:.1f} m towards -y, {:.1f} m towards +y; the "

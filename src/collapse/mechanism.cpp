@@ -10,6 +10,8 @@
 
 namespace topple::collapse {
 
+constexpr double kLeastRun = 0.5;  // of a mass centre that has gone to a side [m]
+
 double calc_tilt(const Quat& q, const Vec3& fall_direction) {
   const Vec3 axis = cross({0, 0, 1}, fall_direction);
   // twist of the rotation about the axis
@@ -31,8 +33,8 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
   }
   out.time = touched ? in.touchdown : last.time;
   out.moved = last.moved;
-  const Vec3 run = last.centre - in.frames.front().centre;
-  out.azimuth = std::hypot(run.x, run.y) < 0.5 ? std::numeric_limits<double>::quiet_NaN() : std::atan2(run.y, run.x);
+  out.run = last.centre - in.frames.front().centre;
+  out.run.z = 0;
 
   // the way it leans when it touches down: the planned one, unless it turned more about another axis
   const Vec3 turned = log_rotation(at->rotation);
@@ -101,6 +103,10 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
     out.name = "topple";
     out.text = fmt::format("It topples: {}.", motion);
   }
+  out.is_azimuth_of_lean = out.name == "topple" || out.name == "wrong direction";
+  const Vec3& way = out.is_azimuth_of_lean ? direction : out.run;
+  const bool has_way = out.is_azimuth_of_lean || norm(out.run) >= kLeastRun;
+  out.azimuth = has_way ? std::atan2(way.y, way.x) : std::numeric_limits<double>::quiet_NaN();
   if (in.is_under_way)
     out.text += fmt::format(" The run is under way: this is how it stands at {:.2f} s.", last.time);
   else if (out.name != "stands" && !in.came_to_rest)

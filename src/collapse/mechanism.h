@@ -43,7 +43,10 @@ struct Mechanism {
   double rear_share = 0;  // then, drop of the rear edge over that of the front edge
   double drop = 0;        // then, of the block's mass centre [m]
   double moved = 0;       // at the end, share of the moving mass
-  double azimuth = 0;     // in which the mass centre moved, NaN below half a metre [rad]
+  // the way the block leans then, if it topples; else the way the mass centre moved, NaN below half a metre [rad]
+  double azimuth = 0;
+  bool is_azimuth_of_lean = false;
+  Vec3 run;  // of the mass centre until the end, horizontal [m]
 };
 
 /// Rotation about the axis that leans by a positive angle towards the direction [rad].

@@ -80,6 +80,24 @@ TEST(Mechanism, TurningToTheOtherSideIsTheWrongDirection) {
   EXPECT_EQ(name_of(in), "topple");
 }
 
+TEST(Mechanism, WhatTopplesFallsTheWayItLeans) {
+  MechanismInput in = synthetic(0.2, 0, 1);
+  in.frames.back().centre = {6 + 0.5, 0.5, 4};  // its debris slides back and aside
+  const Mechanism m = judge_mechanism(in, default_knowledge());
+  EXPECT_TRUE(m.is_azimuth_of_lean);
+  EXPECT_NEAR(m.azimuth, std::acos(-1.0), 1e-12);
+  EXPECT_NEAR(norm(m.run - Vec3{0.5, 0.5, 0}), 0, 1e-12);
+}
+
+TEST(Mechanism, WhatDropsFallsTheWayItsMassGoes) {
+  MechanismInput in = synthetic(0.01, 2.4, 1);
+  ASSERT_EQ(name_of(in), "vertical");
+  in.frames.back().centre = in.frames.front().centre + Vec3{0, 0.6, -4};
+  EXPECT_NEAR(judge_mechanism(in, default_knowledge()).azimuth, std::acos(0.0), 1e-12);
+  in.frames.back().centre.y = 0.4;
+  EXPECT_TRUE(std::isnan(judge_mechanism(in, default_knowledge()).azimuth));
+}
+
 TEST(Mechanism, TwoPartsTurningAgainstEachOtherFold) {
   MechanismInput in = synthetic(0.02, 2, 1);
   for (BlockFrame& f : in.frames) f.forward = 0.4, f.backward = 0.35;
