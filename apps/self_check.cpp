@@ -108,11 +108,13 @@ std::vector<CheckedNumber> check_record(const fs::path& scratch) {
   r.ending = "at_rest";
   r.bodies.resize(7);
   for (size_t b = 0; b < r.bodies.size(); ++b) r.bodies[b].name = "B" + std::to_string(b);
-  const std::vector<double> numbers = make_numbers(7 * 7 * 40);
-  for (size_t f = 0; f < 40; ++f) r.time.push_back(0.1 * static_cast<double>(f));
-  for (size_t i = 0; i < 40 * 7 * 3; ++i) r.position.push_back(static_cast<float>(std::fmod(numbers[i], 1e6)));
-  for (size_t i = 0; i < 40 * 7; ++i) r.orientation.insert(r.orientation.end(), {1, 0, 0, 0});
-  r.series = {{"x", "Numbers", "m", "x", {numbers.begin(), numbers.begin() + 40}}};
+  constexpr size_t kFrames = 40;
+  const size_t poses = kFrames * r.bodies.size();
+  const std::vector<double> numbers = make_numbers(3 * poses);
+  for (size_t f = 0; f < kFrames; ++f) r.time.push_back(0.1 * static_cast<double>(f));
+  for (const double x : numbers) r.position.push_back(static_cast<float>(std::fmod(x, 1e6)));
+  for (size_t i = 0; i < poses; ++i) r.orientation.insert(r.orientation.end(), {1, 0, 0, 0});
+  r.series = {{"x", "Numbers", "m", "x", {numbers.begin(), numbers.begin() + kFrames}}};
   const std::string path = (scratch / "record.h5").string();
   record::write_hdf5(r, path);
   const record::Record back = record::read_hdf5(path);
@@ -157,7 +159,8 @@ std::vector<CheckedNumber> check_threads() {
       b.name = "b" + std::to_string(i);
       b.mass = 100 + i;
       b.inertia = Mat3::diagonal({10, 11, 12});
-      b.X_WB.p = {0.7 * (i % 3), 0.6 * (i / 3 % 3), 0.5 + 0.9 * (i / 9)};
+      const int row = i / 3 % 3, layer = i / 9;
+      b.X_WB.p = {0.7 * (i % 3), 0.6 * row, 0.5 + 0.9 * layer};
       b.X_WB.q = exp_rotation({0.1 * i, 0.2, 0.05 * i});
       b.shapes = {mbs::Shape{mbs::Shape::Kind::Box, {}, {0.25, 0.2, 0.15}, 0, {}}};
       mbs::add_body(m, b);

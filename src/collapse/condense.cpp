@@ -345,7 +345,7 @@ void limit_frequency(mbs::Model& model, double highest) {
     int body;
     Vec3 lever;
   };
-  const auto ends_of = [&model](const mbs::ZoneElement& e) {
+  const auto ends_of = [](const mbs::ZoneElement& e) {
     return std::array<End, 2>{End{e.a.index, e.X_AF.p}, End{e.b.index, e.X_BM.p}};
   };
   const auto is_free = [&model](int b) { return b >= 0 && !model.bodies[static_cast<size_t>(b)].fixed; };

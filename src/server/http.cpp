@@ -27,7 +27,7 @@ namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace http = beast::http;
 namespace websocket = beast::websocket;
-using tcp = asio::ip::tcp;
+using Tcp = asio::ip::tcp;
 
 namespace {
 
@@ -257,7 +257,7 @@ class Socket : public Outlet, public std::enable_shared_from_this<Socket> {
     if (client_) context_->hub.disconnect(client_, this);
     beast::get_lowest_layer(stream_).cancel();
     beast::error_code ignored;
-    beast::get_lowest_layer(stream_).socket().shutdown(tcp::socket::shutdown_both, ignored);
+    beast::get_lowest_layer(stream_).socket().shutdown(Tcp::socket::shutdown_both, ignored);
     beast::get_lowest_layer(stream_).socket().close(ignored);
   }
 
@@ -279,7 +279,7 @@ class Socket : public Outlet, public std::enable_shared_from_this<Socket> {
 /// Requests of one connection, one after the other, until it becomes a WebSocket.
 class Connection : public std::enable_shared_from_this<Connection> {
  public:
-  Connection(tcp::socket&& socket, std::shared_ptr<Context> context,
+  Connection(Tcp::socket&& socket, std::shared_ptr<Context> context,
              std::function<void(std::weak_ptr<Socket>)> on_socket)
       : stream_(std::move(socket)), context_(std::move(context)), on_socket_(std::move(on_socket)) {
     is_too_many_ = ++context_->connections > context_->options.most_connections;
@@ -360,7 +360,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
 
   void finish() {
     beast::error_code ignored;
-    stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
+    stream_.socket().shutdown(Tcp::socket::shutdown_send, ignored);
   }
 
   beast::tcp_stream stream_;
@@ -388,17 +388,17 @@ std::string make_token() {
 struct Server::Impl {
   std::shared_ptr<Context> context;
   asio::io_context io{1};
-  tcp::acceptor acceptor{io};
+  Tcp::acceptor acceptor{io};
   std::mutex mutex;
   std::vector<std::weak_ptr<Socket>> sockets;
   std::thread thread;
 
   void accept() {
-    acceptor.async_accept(asio::make_strand(io), [this](beast::error_code e, tcp::socket socket) {
+    acceptor.async_accept(asio::make_strand(io), [this](beast::error_code e, Tcp::socket socket) {
       if (!acceptor.is_open()) return;
       if (!e) {
         beast::error_code ignored;
-        socket.set_option(tcp::no_delay(true), ignored);
+        socket.set_option(Tcp::no_delay(true), ignored);
         std::make_shared<Connection>(std::move(socket), context, [this](std::weak_ptr<Socket> s) {
           const std::lock_guard lock(mutex);
           std::erase_if(sockets, [](const auto& weak) { return weak.expired(); });
@@ -414,7 +414,7 @@ Server::Server(Hub& hub, const ServerOptions& options)
     : token_(options.token.empty() ? make_token() : options.token), impl_(std::make_unique<Impl>()) {
   impl_->context.reset(new Context{hub, options, token_});
   try {
-    const tcp::endpoint place(asio::ip::make_address("127.0.0.1"), options.port);
+    const Tcp::endpoint place(asio::ip::make_address("127.0.0.1"), options.port);
     impl_->acceptor.open(place.protocol());
     impl_->acceptor.set_option(asio::socket_base::reuse_address(true));
     impl_->acceptor.bind(place);
