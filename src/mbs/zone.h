@@ -8,54 +8,9 @@
 
 #include "mbs/kernel.h"
 #include "mbs/model.h"
+#include "mbs/zone_law.h"
 
 namespace topple::mbs {
-
-/// A moment family laid out for lookup: K forces by J rotations.
-struct CompiledFamily {
-  int K = 0, J = 0;              // K == 0: unlimited
-  std::vector<double> force;     // (K)
-  std::vector<double> rotation;  // (J)
-  std::vector<double> limit;     // positive and negative side by side, by rotation (J x K x 2)
-  std::vector<double> lift;      // plastic elongation per growth of rotation, behind each rotation, positive and
-                                 // negative side by side; empty: none [m/rad] (J x K x 2)
-  std::vector<double> capacity;  // compression beyond which no moment is left, per rotation (J)
-
-  /// In `limit` and `lift`, of force k and rotation j; the next force follows.
-  size_t place(size_t k, size_t j) const { return 2 * (j * static_cast<size_t>(K) + k); }
-};
-
-struct CompiledCurve {
-  std::vector<double> x, f;  // empty: unlimited
-};
-
-struct CompiledLaw {
-  CompiledFamily moment[2];  // about y, about z
-  CompiledCurve compression, tension;
-  double peak_compression = 0, peak_shortening = 0;  // of the compression curve [N, m]
-  bool elongates = false;                            // some family has an elongation
-  double biaxial_exponent = 1.5, damage_share = 0, crush_length = 0, rupture_elongation = 0;
-  double rupture_rotation = 0, rupture_rotation_pressed = 0;  // the latter while N < 0, never the lesser one
-  double shear[2] = {0, 0}, shear_friction = 0, slip_softening = 0, slip_rupture = 0, torsion = 0, twist_rupture = 0;
-};
-
-CompiledLaw compile_law(const ZoneLaw&);
-
-/// Value of a curve, constant beyond its ends; infinity for an empty one.
-double calc_curve(const CompiledCurve&, double x);
-
-/// Limit moments at a normal force and a plastic rotation. k and j are hints from the last call, updated.
-struct MomentLimit {
-  double positive, negative;
-};
-MomentLimit calc_moment_limit(const CompiledFamily&, double normal_force, double rotation, int& k, int& j);
-/// Plastic elongation per growth of the rotation reached, for positive and for negative rotations [m/rad].
-struct Lift {
-  double positive = 0, negative = 0;
-};
-Lift calc_lift(const CompiledFamily&, double normal_force, double rotation, int& k, int& j);
-/// Compression that the zone can still carry at a plastic rotation [N], infinity if unlimited. j is a hint.
-double calc_compression_capacity(const CompiledFamily&, double rotation, int j = 0);
 
 /// Six deformations or resultants: x y z translation, x y z rotation.
 struct Six {

@@ -1,0 +1,263 @@
+#include <algorithm>
+#include <cmath>
+
+#include "mbs/kernel.h"
+#include "mbs/zone_limits.h"
+
+namespace topple::mbs {
+
+namespace {
+
+constexpr double kTiny = 1e-300;
+
+/// Least limit moment of a family between two normal forces: at an end or at a force of the table, for it is linear
+/// between.
+///   k, j  where to look first
+double find_least_moment(const CompiledFamily& family, double from, double to, double rotation, int k, int j) {
+  double least = kUnlimited;
+  const auto look = [&](double force) {
+    const MomentLimit limit = calc_moment_limit(family, force, rotation, k, j);
+    least = std::min({least, limit.positive, limit.negative});
+  };
+  look(from);
+  look(to);
+  for (const double f : family.force)
+    if (f > from && f < to) look(f);
+  return least;
+}
+
+}  // namespace
+
+void find_safe_bounds(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, const Limits& limits,
+                      double normal_force, ZoneState& z) {
+  const auto law_of = [&](int s) -> const CompiledLaw& {
+    return laws[static_cast<size_t>(z.base_law < 0 ? p.law[s] : z.base_law)];
+  };
+  const int first = kernel::first_bending(p.plane), last = kernel::last_bending(p.plane);
+  double reach = kUnlimited, reached = 0;
+  for (int s = 0; s < p.stations; ++s) {
+    reached = std::max(reached, z.station[s].reached);
+    for (const CompiledFamily& family : law_of(s).moment)
+      if (family.K > 0) reach = std::min(reach, 0.06 * (family.force.back() - family.force.front()));
+  }
+  const double whole = limits.integrity(z.shortened);
+  double from = normal_force - reach, to = normal_force + reach;
+  if (!p.external_axial) {
+    from = std::max(from, -limits.compression(reached, z.shortened, whole, z.station[0]));
+    to = std::min(to, limits.tension(z.elongated));
+  }
+  for (int s = 0; s < p.stations; ++s)
+    if (z.station[s].reached >= law_of(s).rupture_rotation) to = std::min(to, -kTiny);  // held by what presses it
+  z.safe_force[0] = 1, z.safe_force[1] = -1;
+  if (whole != 1 || !(from <= to)) return;
+  for (int q = first; q <= last; ++q) {
+    z.safe_moment[q] = kUnlimited;
+    for (int s = 0; s < p.stations; ++s)
+      z.safe_moment[q] = std::min(
+          z.safe_moment[q],
+          find_least_moment(law_of(s).moment[q], from, to, z.station[s].reached, z.station[s].k[q], z.station[s].j[q]));
+    z.safe_shear[1 - q] = limits.shear(1 - q, z.slipped, -to);
+    if (!(z.safe_moment[q] > 0 && z.safe_shear[1 - q] > 0 && limits.torsion() > 0)) return;
+  }
+  for (int q = first; q <= last; ++q) {
+    z.safe_moment[q] = 1 / z.safe_moment[q];
+    z.safe_shear[1 - q] = 1 / z.safe_shear[1 - q];
+  }
+  z.safe_torsion = 1 / limits.torsion();
+  z.safe_exponent = kUnlimited;
+  for (int s = 0; s < p.stations; ++s) z.safe_exponent = std::min(z.safe_exponent, law_of(s).biaxial_exponent);
+  // what the springs do not see, and how damage softens them: flexibilities add up
+  double turned[2] = {0, 0}, shifted[2] = {0, 0};
+  z.is_softened = false;
+  for (int q = first; q <= last; ++q) {
+    const double ks = z.share * p.stiffness[q == 0 ? 2 : 1], kb = z.share * p.stiffness[q == 0 ? 4 : 5];
+    const double sign = q == 0 ? 1 : -1;
+    double c = 0, cx = 0, cxx = 0;
+    for (int s = 0; s < p.stations; ++s) {
+      turned[q] += z.station[s].phi[q];
+      shifted[q] += p.x[s] * z.station[s].phi[q];
+      c += z.station[s].soft[q];
+      cx += sign * p.x[s] * z.station[s].soft[q];
+      cxx += p.x[s] * p.x[s] * z.station[s].soft[q];
+    }
+    double* plane = z.plane[q];
+    plane[0] = ks, plane[1] = 0, plane[2] = kb;
+    if (c == 0) continue;
+    z.is_softened = true;
+    if (!(kb > 0)) return;
+    if (ks > 0) {
+      const double f11 = 1 / ks + cxx, f12 = cx, f22 = 1 / kb + c, determinant = f11 * f22 - f12 * f12;
+      plane[0] = f22 / determinant, plane[1] = -f12 / determinant, plane[2] = f11 / determinant;
+    } else {
+      plane[2] = 1 / (1 / kb + c);
+    }
+  }
+  z.safe_force[0] = from;
+  z.safe_force[1] = to;
+  const double offset[6] = {z.axial, z.slip[0] - shifted[1], z.slip[1] + shifted[0], z.twist, turned[0], turned[1]};
+  std::copy(offset, offset + 6, z.offset);
+}
+
+double calc_bound_utilisation(const ZoneParameters& p, const ZoneState& z) {
+  if (p.stations == 0) return 0;
+  const double* f = z.elastic_force;
+  const double vy = f[1] * z.safe_shear[0], vz = f[2] * z.safe_shear[1];
+  double u = std::max(std::abs(f[3]) * z.safe_torsion, std::sqrt(vy * vy + vz * vz));
+  for (int s = 0; s < p.stations; ++s) {
+    const double my = std::abs(f[4] + p.x[s] * f[2]) * z.safe_moment[0];
+    const double mz = std::abs(f[5] - p.x[s] * f[1]) * z.safe_moment[1];
+    u = std::max(u, my + mz);
+  }
+  return u;
+}
+
+bool write_flow(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, const ZoneState& z, double time,
+                double* out) {
+  using namespace kernel;
+  constexpr double unlimited = 1e300;
+  if (!z.live || !z.has_elastic || z.next_law >= 0 || p.stations == 0 || p.external_axial) return false;
+  const Limits limits(laws, p.law[0], z, time);
+  // what is left of a crushed section carries both force and moment
+  const double whole = limits.integrity(z.shortened);
+  if (!(whole > 0)) return false;
+  std::fill(out, out + kFlowFields, 0.0);
+  out[kAxial] = z.axial, out[kSlip] = z.slip[0], out[kSlip + 1] = z.slip[1], out[kTwist] = z.twist;
+  double far = 0;           // no cell reaches beyond this rotation
+  bool is_pressed = false;  // only what presses it holds it together
+  for (int s = 0; s < 2; ++s) {
+    double* station = &out[kStations + s * kStationFields];
+    station[kRupture] = kUnlimited;
+    const CompiledLaw* law = nullptr;
+    if (s < p.stations) {
+      law = &laws[static_cast<size_t>(z.base_law < 0 ? p.law[s] : z.base_law)];
+      if (law->biaxial_exponent != 1.5) return false;
+      for (int q = 0; q < 2; ++q)
+        station[kPhi + q] = z.station[s].phi[q], station[kSoftness + q] = z.station[s].soft[q];
+      station[kReached] = z.station[s].reached;
+      station[kShare] = law->damage_share;
+      const bool is_far = z.station[s].reached >= law->rupture_rotation;
+      is_pressed = is_pressed || is_far;
+      station[kRupture] = is_far ? law->rupture_rotation_pressed : law->rupture_rotation;
+      far = std::max(far, z.station[s].reached);
+    }
+    for (int q = 0; q < 2; ++q) {
+      double* cell = &station[kCell + q * kCellFields];
+      const CompiledFamily* family = law != nullptr ? &law->moment[q] : nullptr;
+      if (family == nullptr || family->K == 0) {
+        std::fill(cell + kCellPositive, cell + kCellLiftPositive, unlimited);
+        continue;
+      }
+      const double force = z.normal_force / whole, reached = z.station[s].reached;
+      if (!(force > family->force.front() && force < family->force.back())) return false;
+      // the interval that the force is in and the nearer one beside it
+      const std::vector<double>& forces = family->force;
+      const size_t k = static_cast<size_t>(find_interval(forces, force, z.station[s].k[q])), last = forces.size() - 1;
+      const bool is_low = force - forces[k] < forces[k + 1] - force;
+      const size_t middle = (is_low && k > 0) || k + 1 == last ? k : k + 1;
+      const size_t row[3] = {middle > 0 ? middle - 1 : middle, middle, std::min(middle + 1, last)};
+      cell[kCellForce] = whole * forces[middle];
+      // no width: nothing but the full law beyond
+      cell[kCellForce + 1] = row[0] < middle ? 1 / (whole * (forces[middle] - forces[row[0]])) : unlimited;
+      cell[kCellForce + 2] = row[2] > middle ? 1 / (whole * (forces[row[2]] - forces[middle])) : unlimited;
+      size_t j[2] = {family->rotation.size() - 1, family->rotation.size() - 1};
+      cell[kCellRotation] = reached;
+      if (reached < family->rotation.back()) {
+        j[0] = static_cast<size_t>(find_interval(family->rotation, reached, z.station[s].j[q])), j[1] = j[0] + 1;
+        cell[kCellRotation] = family->rotation[j[0]];
+        cell[kCellRotation + 1] = 1 / (family->rotation[j[1]] - family->rotation[j[0]]);
+        far = std::max(far, family->rotation[j[1]]);
+      }
+      for (size_t c = 0; c < 6; ++c) {
+        const double* limit = &family->limit[family->place(row[c / 2], j[c % 2])];
+        cell[static_cast<size_t>(kCellPositive) + c] = whole * limit[0];
+        cell[static_cast<size_t>(kCellNegative) + c] = whole * limit[1];
+      }
+      for (size_t c = 0; c < 3 && !family->lift.empty(); ++c) {
+        const double* lift = &family->lift[family->place(row[c], j[0])];
+        cell[static_cast<size_t>(kCellLiftPositive) + c] = lift[0];
+        cell[static_cast<size_t>(kCellLiftNegative) + c] = lift[1];
+      }
+    }
+  }
+  const CompiledLaw& law = limits.law();
+  // where little compression is left at the end of the cell, it is asked again before
+  const double reached = std::max(z.station[0].reached, z.station[1].reached);
+  if (far > reached && limits.compression(far, z.shortened, whole, z.station[0]) <
+                           limits.compression(reached, z.shortened, whole, z.station[0])) {
+    far = reached + 0.25 * (far - reached);
+    for (int s = 0; s < p.stations; ++s) {
+      double& rupture = out[kStations + s * kStationFields + kRupture];
+      rupture = std::min(rupture, far);
+    }
+  }
+  out[kFlowLeast] = -limits.compression(far, z.shortened, whole, z.station[0]);
+  out[kFlowMost] = is_pressed ? -kTiny : limits.tension(z.elongated);
+  for (int axis = 0; axis < 2; ++axis)
+    out[kShearOwn + axis] = law.slip_softening > 0 ? std::min(law.shear[axis], unlimited) : 0;
+  out[kShearFriction] = law.shear_friction;
+  out[kSlipped] = z.slipped;
+  out[kSlipSoftening] = law.slip_softening > 0 ? 1 / law.slip_softening : 0;
+  out[kSlipRupture] = law.slip_rupture;
+  out[kTwisted] = z.twisted;
+  out[kTwistRupture] = law.twist_rupture;
+  out[kTorsion] = law.torsion;
+  for (int i = 0; i < 6; ++i) {
+    out[kFlexibility + i] = p.stiffness[i] > 0 ? 1 / (z.share * p.stiffness[i]) : 0;
+    out[kBefore + i] = z.deformation[i];
+  }
+  out[kStored] = z.energy;
+  return true;
+}
+
+double calc_utilisation(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, double time,
+                        const ZoneState& z) {
+  if (!z.live || p.stations == 0) return 0;
+  const Limits limits(laws, p.law[0], z, time);
+  const auto ratio = [](double demand, double capacity) {
+    if (capacity == kUnlimited) return 0.0;
+    return capacity > 0 ? demand / capacity : (demand > 0 ? 1.0 : 0.0);
+  };
+  double force[6];
+  for (int i = 0; i < 6; ++i) force[i] = z.elastic_force[i];
+  force[0] = z.normal_force;
+  double reached = z.station[0].reached;
+  if (p.stations > 1) reached = std::max(reached, z.station[1].reached);
+  const double integrity = limits.integrity(z.shortened);
+  double u = p.external_axial ? 0.0
+             : force[0] < 0   ? ratio(-force[0], limits.compression(reached, z.shortened, integrity, z.station[0]))
+                              : ratio(force[0], limits.tension(z.elongated));
+  for (int s = 0; s < p.stations; ++s) {
+    const Limits station_limits(laws, p.law[s], z, time);
+    StationState st = z.station[s];
+    const double my = force[4] + p.x[s] * force[2], mz = force[5] - p.x[s] * force[1];
+    const double axial = integrity > 0 ? force[0] / integrity : 0;
+    const MomentLimit ly = station_limits.moment(0, axial, st), lz = station_limits.moment(1, axial, st);
+    const double ry = ratio(std::abs(my), integrity * (my >= 0 ? ly.positive : ly.negative));
+    const double rz = ratio(std::abs(mz), integrity * (mz >= 0 ? lz.positive : lz.negative));
+    const double e = station_limits.law().biaxial_exponent;
+    u = std::max(u, root_of(raised(ry, e) + raised(rz, e), e));
+  }
+  const double vy = ratio(std::abs(force[1]), limits.shear(0, z.slipped, -force[0]));
+  const double vz = ratio(std::abs(force[2]), limits.shear(1, z.slipped, -force[0]));
+  u = std::max(u, std::sqrt(vy * vy + vz * vz));
+  return std::max(u, ratio(std::abs(force[3]), limits.torsion()));
+}
+
+bool is_softening(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, double time, const ZoneState& z) {
+  if (!z.live || p.stations == 0) return false;
+  const Limits limits(laws, p.law[0], z, time);
+  const double integrity = limits.integrity(z.shortened);
+  if (integrity < 0.95) return true;
+  const double axial = z.normal_force / integrity;
+  for (int s = 0; s < p.stations; ++s)
+    for (int q = 0; q < 2; ++q) {
+      const Limits station_limits(laws, p.law[s], z, time);
+      StationState now = z.station[s], fresh;
+      if (now.reached == 0) continue;
+      const MomentLimit a = station_limits.moment(q, axial, now), b = station_limits.moment(q, axial, fresh);
+      if (b.positive != kUnlimited && a.positive + a.negative < 0.85 * (b.positive + b.negative)) return true;
+    }
+  return false;
+}
+
+}  // namespace topple::mbs

@@ -1,0 +1,163 @@
+#include "mbs/zone_law.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace topple::mbs {
+
+int find_interval(const std::vector<double>& grid, double x, int hint) {
+  const int last = static_cast<int>(grid.size()) - 2;
+  int i = std::clamp(hint, 0, last);
+  while (i > 0 && x < grid[static_cast<size_t>(i)]) --i;
+  while (i < last && x >= grid[static_cast<size_t>(i) + 1]) ++i;
+  return i;
+}
+
+CompiledLaw compile_law(const ZoneLaw& law) {
+  CompiledLaw c;
+  const MomentFamily* families[2] = {&law.moment_y, &law.moment_z};
+  for (int axis = 0; axis < 2; ++axis) {
+    const MomentFamily& from = *families[axis];
+    CompiledFamily& to = c.moment[axis];
+    to.K = static_cast<int>(from.normal_force.size());
+    to.J = static_cast<int>(from.plastic_rotation.size());
+    to.force = from.normal_force;
+    to.rotation = from.plastic_rotation;
+    to.limit.resize(from.positive.size() * 2);
+    double largest = 0;
+    for (size_t i = 0; i < from.positive.size(); ++i) {
+      const size_t at = to.place(i / from.plastic_rotation.size(), i % from.plastic_rotation.size());
+      to.limit[at] = from.positive[i];
+      to.limit[at + 1] = from.negative[i];
+      largest = std::max({largest, from.positive[i], from.negative[i]});
+    }
+    if (!from.elongation_positive.empty()) {
+      const size_t J = from.plastic_rotation.size();
+      to.lift.resize(to.limit.size());
+      for (size_t i = 0; i < from.positive.size(); ++i) {
+        const size_t j = std::min(i % J, J - 2), row = i - i % J;  // the last interval goes on
+        const double step = to.rotation[j + 1] - to.rotation[j];
+        const size_t at = to.place(i / J, i % J);
+        to.lift[at] = (from.elongation_positive[row + j + 1] - from.elongation_positive[row + j]) / step;
+        to.lift[at + 1] = (from.elongation_negative[row + j + 1] - from.elongation_negative[row + j]) / step;
+      }
+    }
+    // The capacity at a rotation is where the interpolated limit reaches zero on the side of compression.
+    to.capacity.resize(static_cast<size_t>(to.J));
+    for (int j = 0; j < to.J; ++j) {
+      double capacity = 0;
+      for (int k = 0; k < to.K; ++k) {
+        const size_t i = to.place(static_cast<size_t>(k), static_cast<size_t>(j));
+        if (std::max(to.limit[i], to.limit[i + 1]) > 1e-3 * largest) {
+          capacity = -to.force[static_cast<size_t>(std::max(k - 1, 0))];
+          break;
+        }
+      }
+      to.capacity[static_cast<size_t>(j)] = std::max(capacity, 0.0);
+    }
+    // a zone does not regain capacity by turning further
+    for (int j = 1; j < to.J; ++j)
+      to.capacity[static_cast<size_t>(j)] =
+          std::min(to.capacity[static_cast<size_t>(j)], to.capacity[static_cast<size_t>(j) - 1]);
+  }
+  c.elongates = !c.moment[0].lift.empty() || !c.moment[1].lift.empty();
+  c.compression = {law.compression.x, law.compression.f};
+  c.tension = {law.tension.x, law.tension.f};
+  if (!law.compression.f.empty()) {
+    const auto peak = std::max_element(law.compression.f.begin(), law.compression.f.end());
+    c.peak_compression = *peak;
+    c.peak_shortening = law.compression.x[static_cast<size_t>(peak - law.compression.f.begin())];
+  } else {
+    c.peak_shortening = kUnlimited;
+  }
+  c.biaxial_exponent = law.biaxial_exponent;
+  c.damage_share = law.damage_share;
+  c.rupture_rotation = law.rupture_rotation;
+  c.rupture_rotation_pressed = std::max(law.rupture_rotation, law.rupture_rotation_pressed);
+  c.crush_length = law.crush_length;
+  c.rupture_elongation = law.rupture_elongation;
+  c.shear[0] = law.shear_y;
+  c.shear[1] = law.shear_z;
+  c.shear_friction = law.shear_friction;
+  c.slip_softening = law.slip_softening;
+  c.slip_rupture = law.slip_rupture;
+  c.torsion = law.torsion;
+  c.twist_rupture = law.twist_rupture;
+  return c;
+}
+
+double calc_curve(const CompiledCurve& curve, double x) {
+  if (curve.x.empty()) return kUnlimited;
+  if (x <= curve.x.front()) return curve.f.front();
+  if (x >= curve.x.back()) return curve.f.back();
+  const size_t i = static_cast<size_t>(std::upper_bound(curve.x.begin(), curve.x.end(), x) - curve.x.begin()) - 1;
+  const double t = (x - curve.x[i]) / (curve.x[i + 1] - curve.x[i]);
+  return curve.f[i] + t * (curve.f[i + 1] - curve.f[i]);
+}
+
+namespace {
+
+constexpr double kRoundOff = 1e-12;
+
+/// A force on the edge of a family, where a section is while it is crushed, may be beyond it by round-off.
+double put_on_edge(const CompiledFamily& family, double normal_force) {
+  const double inside = std::clamp(normal_force, family.force.front(), family.force.back());
+  return std::abs(normal_force - inside) <= kRoundOff * std::abs(inside) ? inside : normal_force;
+}
+bool is_within(const CompiledFamily& family, double normal_force) {
+  return normal_force >= family.force.front() && normal_force <= family.force.back();
+}
+
+}  // namespace
+
+MomentLimit calc_moment_limit(const CompiledFamily& family, double normal_force, double rotation, int& k, int& j) {
+  if (family.K == 0) return {kUnlimited, kUnlimited};
+  normal_force = put_on_edge(family, normal_force);
+  if (!is_within(family, normal_force)) return {0, 0};
+  k = find_interval(family.force, normal_force, k);
+  j = find_interval(family.rotation, rotation, j);
+  const size_t K = static_cast<size_t>(k), J = static_cast<size_t>(j);
+  const double t = (normal_force - family.force[K]) / (family.force[K + 1] - family.force[K]);
+  const double s =
+      std::clamp((rotation - family.rotation[J]) / (family.rotation[J + 1] - family.rotation[J]), 0.0, 1.0);
+  const double *a = &family.limit[family.place(K, J)], *b = &family.limit[family.place(K, J + 1)];
+  const double w00 = (1 - t) * (1 - s), w01 = (1 - t) * s, w10 = t * (1 - s), w11 = t * s;
+  return {w00 * a[0] + w01 * b[0] + w10 * a[2] + w11 * b[2], w00 * a[1] + w01 * b[1] + w10 * a[3] + w11 * b[3]};
+}
+
+MomentLimit calc_moment_slope(const CompiledFamily& family, double normal_force, double rotation, int k, int j) {
+  if (family.K == 0) return {0, 0};
+  normal_force = put_on_edge(family, normal_force);
+  if (!is_within(family, normal_force)) return {0, 0};
+  const size_t K = static_cast<size_t>(find_interval(family.force, normal_force, k));
+  const size_t J = static_cast<size_t>(find_interval(family.rotation, rotation, j));
+  const double s =
+      std::clamp((rotation - family.rotation[J]) / (family.rotation[J + 1] - family.rotation[J]), 0.0, 1.0);
+  const double *a = &family.limit[family.place(K, J)], *b = &family.limit[family.place(K, J + 1)];
+  const double width = family.force[K + 1] - family.force[K];
+  return {((1 - s) * (a[2] - a[0]) + s * (b[2] - b[0])) / width, ((1 - s) * (a[3] - a[1]) + s * (b[3] - b[1])) / width};
+}
+
+Lift calc_lift(const CompiledFamily& family, double normal_force, double rotation, int& k, int& j) {
+  if (family.lift.empty()) return {};
+  normal_force = put_on_edge(family, normal_force);
+  if (!is_within(family, normal_force)) return {};
+  k = find_interval(family.force, normal_force, k);
+  j = find_interval(family.rotation, rotation, j);
+  const size_t K = static_cast<size_t>(k);
+  const size_t J = static_cast<size_t>(rotation < family.rotation.back() ? j : family.J - 1);
+  const double t = (normal_force - family.force[K]) / (family.force[K + 1] - family.force[K]);
+  const double* a = &family.lift[family.place(K, J)];
+  return {(1 - t) * a[0] + t * a[2], (1 - t) * a[1] + t * a[3]};
+}
+
+double calc_compression_capacity(const CompiledFamily& family, double rotation, int j) {
+  if (family.K == 0) return kUnlimited;
+  const size_t last = static_cast<size_t>(family.J) - 1;
+  if (rotation >= family.rotation[last]) return family.capacity[last];
+  const size_t i = static_cast<size_t>(find_interval(family.rotation, rotation, j));
+  const double t = (rotation - family.rotation[i]) / (family.rotation[i + 1] - family.rotation[i]);
+  return family.capacity[i] + t * (family.capacity[i + 1] - family.capacity[i]);
+}
+
+}  // namespace topple::mbs
