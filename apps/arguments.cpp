@@ -10,6 +10,441 @@
 
 namespace topple::apps {
 
+namespace {
+
+void add_language(CLI::App* verb, Arguments& a) {
+  verb->add_option("--language", a.language, "of the page: en (default) or de")->check(CLI::IsMember({"en", "de"}));
+}
+
+/// Of what runs a multibody model.
+void add_run_options(CLI::App* verb, Arguments& a) {
+  verb->add_option("-o,--output", a.output, "folder for the results; it is made if missing")
+      ->type_name("FOLDER")
+      ->required();
+  verb->add_option("--duration", a.duration, "simulated time, such as \"10 s\"")->type_name("QUANTITY");
+  verb->add_option("--step", a.step, "time step, such as \"0.1 ms\"; chosen from the stiffest element if not given")
+      ->type_name("QUANTITY");
+  verb->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
+  verb->add_option("--engine", a.engine, "program that solves the multibody model");
+  verb->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
+  verb->add_flag("--csv", a.csv, "also write tables for spreadsheets");
+  add_language(verb, a);
+  verb->add_flag("--verbose", a.verbose, "show every event");
+  CLI::Option* none = verb->add_flag("--no-report", a.no_report, "do not write report.html");
+  verb->add_flag("--report", a.report, "fail if report.html cannot be written")->excludes(none);
+}
+
+/// Of what runs models for studies.
+void add_worker_options(CLI::App* verb, StudyArguments& y) {
+  verb->add_option_function<int>(
+          "--jobs", [&y](int n) { y.jobs = n, y.is_jobs_given = true; },
+          "runs at the same time here (default: as many as there are processors); 0: workers elsewhere do everything")
+      ->check(CLI::Range(0, 4096));
+  verb->add_option("--batch", y.batch, "points that one evaluator gets at once (1)")->check(CLI::Range(1, 100000));
+  verb->add_option("--lease", y.lease, "time without a sign of life after which a run is given to another (30 s)")
+      ->type_name("QUANTITY");
+}
+
+/// Examples in the help; each works in a folder where those of the verbs above it were run (tests/apps/cli_test.sh).
+void add_examples(CLI::App* verb, const std::string& lines) { verb->footer("Examples:\n" + lines); }
+
+void add_new(CLI::App& app, Arguments& a) {
+  CLI::App* verb_new = app.add_subcommand("new", "Write a commented plan to begin with.");
+  CLI::Option* new_file =
+      verb_new->add_option("file", a.input, "file to write; an existing one is left alone")->type_name("FILE");
+  verb_new->add_option("-o,--output", a.input, "the same")->type_name("FILE")->excludes(new_file);
+  verb_new->add_option("--template", a.plan_template, "kind of structure, as --list shows them (frame)");
+  verb_new->add_flag("--list", a.list, "show the templates");
+  verb_new->callback([&a] { a.verb = Arguments::Verb::New; });
+  add_examples(verb_new, R"(  topple new plan.toml
+  topple new --list)");
+}
+
+void add_check(CLI::App& app, Arguments& a) {
+  CLI::App* check = app.add_subcommand("check", "Report everything that is wrong with a plan.");
+  check->add_option("plan", a.input, "plan (TOML)")->type_name("FILE")->required();
+  check->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")
+      ->type_name("FILE");
+  check->add_flag("--json", a.json, "one JSON object on standard output");
+  check->callback([&a] { a.verb = Arguments::Verb::Check; });
+  add_examples(check, R"(  topple check plan.toml
+  topple check plan.toml --json            complaints for programs)");
+}
+
+void add_run(CLI::App& app, Arguments& a) {
+  CLI::App* run = app.add_subcommand("run", "Simulate a plan.");
+  run->add_option("plan", a.input, "plan (TOML)")->type_name("FILE")->required();
+  run->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")
+      ->type_name("FILE");
+  run->add_flag("--check-step", a.check_step,
+                "run also at half the step and say what differs; with --threads 2 both at once");
+  add_run_options(run, a);
+  run->callback([&a] { a.verb = Arguments::Verb::Run; });
+  add_examples(run, R"(  topple run plan.toml -o out              findings, out/record.h5, out/report.html
+  topple run plan.toml -o out --csv        also tables for spreadsheets
+  topple run plan.toml -o out --check-step --threads 2
+                                           and what half the time step makes of it
+  topple run plan.toml -o half --duration "1 s" --no-report)");
+}
+
+void add_rules(CLI::App& app, Arguments& a) {
+  CLI::App* rules = app.add_subcommand("rules", "Show the knowledge rules of the simulation manager.");
+  rules->add_flag("--json", a.json, "as a file that --knowledge reads");
+  rules->callback([&a] { a.verb = Arguments::Verb::Rules; });
+  add_examples(rules, R"(  topple rules                             with their reasons
+  topple rules --json > rules.json         to change one and run with --knowledge)");
+}
+
+void add_mbs_run(CLI::App& mbs, Arguments& a) {
+  CLI::App* mbs_run = mbs.add_subcommand("run", "Run a multibody model on its own.");
+  mbs_run->add_option("model", a.input, "multibody model (JSON)")->type_name("FILE")->required();
+  mbs_run->add_option("--frame-rate", a.frame_rate, "poses kept, such as \"60 Hz\"")->type_name("QUANTITY");
+  CLI::Option* with = mbs_run->add_flag_callback(
+      "--equilibrium", [&a] { a.equilibrium = true; },
+      "begin with the equilibrium under dead load, whatever the file says");
+  mbs_run
+      ->add_flag_callback(
+          "--no-equilibrium", [&a] { a.equilibrium = false; }, "begin with the poses and velocities of the file")
+      ->excludes(with);
+  add_run_options(mbs_run, a);
+  mbs_run->callback([&a] { a.verb = Arguments::Verb::MbsRun; });
+  add_examples(mbs_run, R"(  topple mbs run out/model.json -o again --duration "1 s")");
+}
+
+void add_mbs_compare(CLI::App& mbs, Arguments& a) {
+  CLI::App* mbs_compare = mbs.add_subcommand("compare", "Run a multibody model on several engines and compare.");
+  mbs_compare->add_option("model", a.input, "multibody model (JSON)")->type_name("FILE")->required();
+  mbs_compare->add_option("--engines", a.engines,
+                          "names between commas, such as native,simbody,mujoco; all if left out");
+  mbs_compare->add_option("-o,--output", a.output, "folder for compare.csv and compare.svg")->type_name("FOLDER");
+  mbs_compare->add_option("--duration", a.duration, "simulated time, such as \"10 s\"")->type_name("QUANTITY");
+  mbs_compare->add_option("--step", a.step, "fixed step of all engines, such as \"0.1 ms\"")->type_name("QUANTITY");
+  mbs_compare->add_option("--accuracy", a.accuracy,
+                          "relative, of engines that control their errors; 1e-9 without --step");
+  mbs_compare->add_option("--frames", a.frames, "instants that are compared (100)")->check(CLI::Range(1, 1000000));
+  mbs_compare->add_flag("--bodies", a.bodies, "also list every body");
+  mbs_compare->add_flag("--skip-unsupported", a.skip_unsupported,
+                        "go on without engines that cannot express the model");
+  mbs_compare->add_flag("--json", a.json, "one JSON object on standard output");
+  mbs_compare->callback([&a] { a.verb = Arguments::Verb::MbsCompare; });
+  add_examples(mbs_compare, R"(  topple mbs compare out/model.json --engines native --duration "0.2 s"
+  topple mbs compare model.json --engines native,simbody,mujoco -o engines)");
+}
+
+void add_mbs_verify(CLI::App& mbs, Arguments& a) {
+  CLI::App* mbs_verify = mbs.add_subcommand("verify", "Check an engine against models whose answers are known.");
+  mbs_verify->add_option("--engine", a.engine, "program that solves the multibody models");
+  mbs_verify->add_option("--markdown", a.markdown, "page to write (docs/verification.md is one)")->type_name("FILE");
+  mbs_verify->add_option("--json", a.json_file, "the same for programs: file to write")->type_name("FILE");
+  mbs_verify->callback([&a] { a.verb = Arguments::Verb::MbsVerify; });
+  add_examples(mbs_verify, R"(  topple mbs verify
+  topple mbs verify --engine simbody --markdown simbody.md)");
+}
+
+void add_mbs(CLI::App& app, Arguments& a) {
+  CLI::App* mbs = app.add_subcommand("mbs", "Work with multibody models.");
+  mbs->require_subcommand(1);
+  add_mbs_run(*mbs, a);
+  add_mbs_compare(*mbs, a);
+  add_mbs_verify(*mbs, a);
+  add_examples(mbs, R"(  topple mbs run out/model.json -o again --duration "1 s"
+  topple mbs verify)");
+}
+
+void add_report(CLI::App& app, Arguments& a) {
+  CLI::App* report = app.add_subcommand("report", "Make the self-contained page from a record.");
+  report->add_option("record", a.input, "record (HDF5)")->type_name("FILE")->required();
+  report->add_option("-o,--output", a.output, "page to write")->type_name("FILE")->required();
+  report->add_option("--study", a.study_results, "also tell what a fuzzy study found: its folder or its results.json")
+      ->type_name("PATH");
+  report->add_option("--compare", a.other_records, "also tell how other records differ, say one of topple fe")
+      ->type_name("FILE");
+  add_language(report, a);
+  report->callback([&a] { a.verb = Arguments::Verb::Report; });
+  add_examples(report, R"(  topple report out/record.h5 -o report.html
+  topple report out/record.h5 -o bericht.html --language de
+  topple report out/record.h5 -o report.html --study study --compare fe/record.h5)");
+}
+
+void add_export(CLI::App& app, Arguments& a) {
+  CLI::App* exports =
+      app.add_subcommand("export", "Write a record, or a multibody model, for other programs (docs/exports.md).");
+  exports->add_option("file", a.input, "record (HDF5); with --adams a multibody model (JSON), with --lsdyna a plan")
+      ->type_name("FILE")
+      ->required();
+  exports->add_option("-o,--output", a.output, "folder for the files; with --adams and --lsdyna the file to write")
+      ->type_name("FOLDER")
+      ->required();
+  CLI::Option* vtk = exports->add_flag("--vtk", a.vtk, "record.pvd and vtk/*.vtu, for ParaView");
+  CLI::Option* gltf = exports->add_flag("--gltf", a.gltf, "record.glb with animation, for Blender and browsers");
+  CLI::Option* csv = exports->add_flag("--csv", a.csv, "tables for spreadsheets");
+  CLI::Option* as_json = exports->add_flag("--json", a.json, "record.json, for scripts");
+  CLI::Option* rate =
+      exports->add_option("--frame-rate", a.frame_rate, "frames kept, such as \"10 Hz\"; all if left out")
+          ->type_name("QUANTITY");
+  CLI::Option* adams = exports->add_flag("--adams", a.adams, "dataset for MSC.ADAMS, and its commands (.acf)");
+  CLI::Option* lsdyna = exports->add_flag("--lsdyna", a.fe.lsdyna,
+                                          "keyword file (.k) of a plan's finite elements, for LS-DYNA and OpenRadioss");
+  exports->add_option("--size", a.fe.size, "edge of the elements of --lsdyna (0.4 m)")
+      ->type_name("QUANTITY")
+      ->needs(lsdyna);
+  exports->add_option("--until", a.duration, "time that --lsdyna asks for; the plan's duration if not given")
+      ->type_name("QUANTITY")
+      ->needs(lsdyna);
+  lsdyna->excludes(adams);
+  for (CLI::Option* other : {vtk, gltf, csv, as_json, rate}) adams->excludes(other), lsdyna->excludes(other);
+  exports->callback([&a] { a.verb = Arguments::Verb::Export; });
+  add_examples(exports, R"(  topple export out/record.h5 --csv -o tables
+  topple export out/record.h5 --vtk --frame-rate "10 Hz" -o vtk
+  topple export out/record.h5 --gltf -o scene
+  topple export out/model.json --adams -o model.adm)");
+}
+
+void add_import(CLI::App& app, Arguments& a) {
+  CLI::App* import = app.add_subcommand(
+      "import", "Make a plan with marked gaps from an IFC file, or a site from a DXF drawing (docs/imports.md).");
+  import->add_option("file", a.input, "building (.ifc) or site (.dxf)")->type_name("FILE")->required();
+  import->add_option("-o,--output", a.output, "plan to write; an existing one is left alone")
+      ->type_name("FILE")
+      ->required();
+  import->add_option("--unit", a.unit, "of a drawing's numbers, such as \"1 mm\", whatever its header says")
+      ->type_name("QUANTITY");
+  import->callback([&a] { a.verb = Arguments::Verb::Import;
+});
+add_examples(import, R"(  topple import building.ifc -o building.toml
+  topple import site.dxf -o site.toml --unit "1 mm")");
+}  // namespace
+
+void add_rcc(CLI::App& app, Arguments& a) {
+  CLI::App* rcc = app.add_subcommand("rcc", "Compute the resistance curves of a zone of a section, or of a member.");
+  rcc->add_option("file", a.input, "section (TOML), or a plan with --member")->type_name("FILE")->required();
+  rcc->add_option("-o,--output", a.output, "folder for curves, page and pictures; it is made if missing")
+      ->type_name("FOLDER");
+  rcc->add_option("--normal-force", a.normal_forces,
+                  "such as \"3.7 MN\", compression positive; may be given more than once")
+      ->type_name("QUANTITY")
+      ->type_size(1)
+      ->allow_extra_args(false);
+  CLI::Option* member = rcc->add_option("--member", a.member, "column or beam of the plan, such as C-D1-0");
+  rcc->add_option("--zone", a.zone, "end of the member: foot (start) or top (end)")
+      ->check(CLI::IsMember({"foot", "top", "start", "end"}))
+      ->needs(member);
+  CLI::Option* fuzzy =
+      rcc->add_option("--fuzzy", a.fuzzy, "file of fuzzy inputs (TOML): also fuzzy curves")->type_name("FILE");
+  fuzzy->excludes(member);
+  rcc->add_option("--route", a.route, "layered (default), solid (finite elements, minutes), or both")
+      ->check(CLI::IsMember({"layered", "solid", "both"}));
+  rcc->add_option("--axis", a.axis, "of fuzzy curves and of the solid route: y (default) or z")
+      ->check(CLI::IsMember({"y", "z"}));
+  rcc->add_option("--direction", a.direction, "of fuzzy curves and of the solid route: + (default) or -")
+      ->check(CLI::IsMember({"+", "-"}));
+  rcc->add_option("--rotation", a.rotation, "largest rotation of the solid route, such as \"0.02 rad\"")
+      ->type_name("QUANTITY");
+  rcc->add_option("--element-size", a.element_size, "largest edge of an element of the solid route, such as \"5 cm\"")
+      ->type_name("QUANTITY");
+  rcc->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")
+      ->type_name("FILE");
+  rcc->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
+  rcc->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
+  rcc->callback([&a] { a.verb = Arguments::Verb::Rcc; });
+  add_examples(rcc, R"(  topple rcc plan.toml --member C-A1-0 -o zone
+  topple rcc plan.toml --member C-A1-0 --zone top --normal-force "300 kN"
+  topple rcc section.toml --fuzzy fuzzy.toml -o curves)");
+}
+
+void add_fe(CLI::App& app, Arguments& a) {
+  FeArguments& f = a.fe;
+  CLI::App* fe = app.add_subcommand("fe", "Simulate a plan with explicit finite elements, as a second opinion.");
+  fe->add_option("plan", a.input, "plan (TOML)")->type_name("FILE")->required();
+  fe->add_option("-o,--output", a.output, "folder for the results; it is made if missing")->type_name("FOLDER");
+  fe->add_option("--size", f.size, "edge of the elements (0.4 m); smaller ones cost more and shorten the step")
+      ->type_name("QUANTITY");
+  CLI::Option* mesh_only = fe->add_flag("--mesh-only", f.mesh_only, "only make the mesh and say what it is like");
+  fe->add_option("--scaled-step", f.scaled_step,
+                 "give mass to elements that do not bear this step, such as \"0.02 ms\"")
+      ->type_name("QUANTITY");
+  fe->add_flag("--skip-quiet", f.skip_quiet, "do not wait through the time in which nothing moves before a charge");
+  fe->add_option("--until", a.duration, "simulated time, such as \"6 s\"; the plan's duration if not given")
+      ->type_name("QUANTITY");
+  CLI::Option* checkpoint =
+      fe->add_flag("--checkpoint", f.checkpoint, "keep checkpoint.bin in the folder, to go on from with --resume");
+  fe->add_option("--checkpoint-interval", f.checkpoint_interval, "of the clock (60 s)")
+      ->type_name("QUANTITY")
+      ->needs(checkpoint);
+  fe->add_flag("--resume", f.resume, "go on from checkpoint.bin in the folder")->excludes(mesh_only);
+  fe->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
+  fe->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")->type_name("FILE");
+  fe->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
+  add_language(fe, a);
+  fe->add_flag("--csv", a.csv, "also write tables for spreadsheets");
+  fe->add_flag("--verbose", a.verbose, "show every event");
+  fe->add_flag("--no-report", a.no_report, "do not write report.html");
+  fe->callback([&a] { a.verb = Arguments::Verb::Fe; });
+  add_examples(fe, R"(  topple fe plan.toml --mesh-only          what the mesh is like
+  topple fe plan.toml --size "0.4 m" -o fe
+  topple fe plan.toml --resume -o fe       go on after an interruption with --checkpoint)");
+}
+
+void add_compare(CLI::App& app, Arguments& a) {
+  CLI::App* compare = app.add_subcommand("compare", "Compare two runs of one building: text, CSV, JSON and a page.");
+  compare->add_option("first", a.input, "record A (HDF5)")->type_name("FILE")->required();
+  compare->add_option("second", a.fe.second, "record B")->type_name("FILE")->required();
+  compare->add_option("-o,--output", a.output, "folder for compare.txt, .csv, .json and .html; it is made if missing")
+      ->type_name("FOLDER")
+      ->required();
+  compare->add_option("--photos", a.fe.photos, "table \"time,file\" of photographs of the real event [s]")
+      ->type_name("FILE");
+  compare->add_flag("--json", a.json, "print compare.json instead of the text");
+  compare->callback([&a] { a.verb = Arguments::Verb::Compare; });
+  add_examples(compare, R"(  topple compare out/record.h5 half/record.h5 -o both)");
+}
+
+void add_steer(CLI::App& app, Arguments& a) {
+  CLI::App* steer = app.add_subcommand("steer", "Watch a plan come down, stop it, change it, go on.");
+  steer->add_option("plan", a.input, "plan (TOML); without one the page begins with templates")->type_name("FILE");
+  steer->add_option("-o,--output", a.output, "folder of action logs and studies (steer)")->type_name("FOLDER");
+  steer->add_option("--port", a.port, "port of 127.0.0.1; a free one if not given");
+  steer->add_flag("--no-open", a.no_open, "only print the address");
+  steer->add_flag("--continue", a.goes_on, "go on with the latest session of this plan, from its action log");
+  steer->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")
+      ->type_name("FILE");
+  steer->add_option("--threads", a.threads, "threads of the solver; results do not depend on it")
+      ->check(CLI::Range(1, 1024));
+  steer->callback([&a] { a.verb = Arguments::Verb::Steer; });
+  add_examples(steer, R"(  topple steer plan.toml                   opens the page
+  topple steer plan.toml --no-open --port 8080)");
+}
+
+void add_replay(CLI::App& app, Arguments& a) {
+  CLI::App* replay = app.add_subcommand("replay", "Do again what an action log of topple steer says.");
+  replay->add_option("log", a.input, "action log (JSON lines)")->type_name("FILE")->required();
+  replay->add_option("-o,--output", a.output, "folder for the records of the branches")
+      ->type_name("FOLDER")
+      ->required();
+  replay->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")
+      ->type_name("FILE");
+  replay->add_option("--threads", a.threads, "threads of the solver; results do not depend on it")
+      ->check(CLI::Range(1, 1024));
+  replay->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
+  replay->add_flag("--csv", a.csv, "also write tables for spreadsheets");
+  replay->add_flag("--no-report", a.no_report, "do not write report.html");
+  replay->callback([&a] { a.verb = Arguments::Verb::Replay; });
+  add_examples(replay, R"(  topple replay steer/plan.steer.jsonl -o again)");
+}
+
+void add_study(CLI::App& app, Arguments& a) {
+  StudyArguments& y = a.study;
+  CLI::App* study = app.add_subcommand("study", "Fuzzy analysis: many runs, and what follows from them.");
+  study->add_option("file", a.input, "plan with [fuzzy], or fuzzy inputs of an evaluator (TOML)")->type_name("FILE");
+  study->add_option("-o,--output", a.output, "folder of the study; the same command again goes on with it")
+      ->type_name("FOLDER");
+  study->add_option("--evaluator", y.evaluator,
+                    "command that is the model: reads points and writes answers as JSON lines (docs/study.md)");
+  study->add_option("--alpha", y.alpha, "levels between commas, such as 0,0.25,0.5,0.75,1");
+  study->add_option("--samples", y.samples, "runs at most")->check(CLI::Range(10, 100000000));
+  study->add_option("--seed", y.seed, "of spread points and searches")->check(CLI::NonNegativeNumber);
+  study->add_option("--permissible", y.permissible,
+                    "look for boxes of inputs that keep this, such as \"topple, reach_pos_x <= 20\"");
+  study->add_flag("--no-drivers", y.no_drivers, "spend no runs on which input drives what");
+  study->add_option("--timeout", y.timeout, "time for one answer, such as \"60 s\"; none if left out")
+      ->type_name("QUANTITY");
+  study->add_flag("--one-shot", y.one_shot, "start the command for every point and close its input behind it");
+  study->add_option("--store", y.store, "database on a server, postgresql://user@host/name; a file if left out");
+  study->add_option("--name", y.name, "of the study on the server; that of the folder if left out");
+  CLI::Option* condensed =
+      study->add_flag("--condensed", y.condensed,
+                      "of a plan: run its like frames as one, at a tenth of the cost; whole runs confirm the bounds");
+  study->add_option("--confirm", y.confirm, "whole runs at the end of a condensed study at most")
+      ->check(CLI::Range(1, 1000000))
+      ->needs(condensed);
+  study->add_flag("--rerun-failed", y.rerun_failed, "run those again that failed");
+  study->add_option("--knowledge", a.knowledge, "of a plan: file of knowledge rules instead of the built-in ones")
+      ->type_name("FILE");
+  study->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
+  add_worker_options(study, y);
+  CLI::App* study_show = study->add_subcommand("show", "Show what a study has found so far.");
+  CLI::App* study_export = study->add_subcommand("export", "Write what a study has found so far: page, CSV and JSON.");
+  for (CLI::App* verb : {study_show, study_export})
+    verb->add_option("folder", a.input, "folder of the study")->type_name("FOLDER")->required();
+  add_language(study, a);
+  add_language(study_export, a);
+  study_show->add_flag("--json", a.json, "as a JSON object");
+  study_export->add_option("-o,--output", a.output, "folder for the files; the study's own if left out")
+      ->type_name("FOLDER");
+  study->callback([&a] { a.verb = Arguments::Verb::Study; });
+  add_examples(study, R"(  topple study plan-fuzzy.toml -o study --samples 300
+  topple study inputs.toml --evaluator ./model -o study
+  topple study show study)");
+  study_show->callback([&y] { y.action = StudyArguments::Action::Show; });
+  study_export->callback([&y] { y.action = StudyArguments::Action::Export; });
+  add_examples(study_show, R"(  topple study show study)");
+  add_examples(study_export, R"(  topple study export study -o tables)");
+}
+
+void add_worker(CLI::App& app, Arguments& a) {
+  StudyArguments& y = a.study;
+  CLI::App* worker = app.add_subcommand("worker", "Work for studies: take runs, do them, write their results.");
+  worker->add_option("store", a.input, "folder of a study, or postgresql://user@host/name")
+      ->type_name("FOLDER")
+      ->required();
+  worker->add_option("--idle", y.idle, "end after so long without work, such as \"10 min\"; else when no study is open")
+      ->type_name("QUANTITY");
+  add_worker_options(worker, y);
+  worker->callback([&a] { a.verb = Arguments::Verb::Worker; });
+  add_examples(worker, R"(  topple worker study --jobs 4
+  topple worker postgresql://user@host/studies --idle "10 min")");
+}
+
+void add_demo(CLI::App& app, Arguments& a) {
+  CLI::App* demo = app.add_subcommand("demo", "Bring down a storehouse that is built in, and show its report.");
+  demo->add_option("-o,--output", a.output, "folder for the plan and the results (storehouse)")->type_name("FOLDER");
+  add_language(demo, a);
+  demo->add_flag("--open", a.open, "open the report in the desktop's browser");
+  demo->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
+  demo->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
+  demo->callback([&a] { a.verb = Arguments::Verb::Demo; });
+  add_examples(demo, R"(  topple demo                              into the folder storehouse
+  topple demo -o first --open              and open the report)");
+}
+
+void add_doctor(CLI::App& app, Arguments& a) {
+  CLI::App* doctor = app.add_subcommand("doctor", "Show what is installed and check it against known numbers.");
+  doctor->add_flag("--json", a.json, "one JSON object on standard output");
+  doctor->callback([&a] { a.verb = Arguments::Verb::Doctor; });
+  add_examples(doctor, R"(  topple doctor
+  topple doctor --json)");
+}
+
+void add_version(CLI::App& app, Arguments& a) {
+  CLI::App* version = app.add_subcommand("version", "Show the version.");
+  version->callback([&a] { a.verb = Arguments::Verb::Version; });
+  add_examples(version, R"(  topple version)");
+}
+
+/// What is missing and the parser cannot know of, as text to print; empty if nothing is.
+std::string find_missing(const Arguments& a) {
+  const auto refuse = [](const std::string& verb, const std::string& what) {
+    return "topple " + verb + ": " + what + "\nRun topple " + verb + " --help for more information.\n";
+  };
+  switch (a.verb) {
+    case Arguments::Verb::New:
+      return a.input.empty() && !a.list ? refuse("new", "a file to write is required") : "";
+    case Arguments::Verb::Export:
+      if (a.vtk || a.gltf || a.csv || a.json || a.adams || a.fe.lsdyna) return "";
+      return refuse("export", "say what for: --vtk, --gltf, --csv, --json, --adams or --lsdyna");
+    case Arguments::Verb::Fe:
+      return a.output.empty() && !a.fe.mesh_only ? refuse("fe", "--output is required") : "";
+    case Arguments::Verb::Study:
+      if (a.study.action != StudyArguments::Action::Run || !(a.input.empty() || a.output.empty())) return "";
+      return refuse("study",
+                    (a.input.empty() ? "a plan or a file of fuzzy inputs" : "--output") + std::string(" is required"));
+    default:
+      return "";
+  }
+}
+
+}  // namespace topple::apps
+
 std::variant<Arguments, int> parse_arguments(int argc, char** argv) {
   Arguments a;
   CLI::App app{"topple shows a demolition engineer how a building will come down.", "topple"};
@@ -43,351 +478,20 @@ std::variant<Arguments, int> parse_arguments(int argc, char** argv) {
 
 Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterion of the plan is violated.)");
 
-  const auto add_language = [&a](CLI::App* verb) {
-    verb->add_option("--language", a.language, "of the page: en (default) or de")->check(CLI::IsMember({"en", "de"}));
-  };
-  const auto add_run_options = [&a, &add_language](CLI::App* verb) {
-    verb->add_option("-o,--output", a.output, "folder for the results; it is made if missing")
-        ->type_name("FOLDER")
-        ->required();
-    verb->add_option("--duration", a.duration, "simulated time, such as \"10 s\"")->type_name("QUANTITY");
-    verb->add_option("--step", a.step, "time step, such as \"0.1 ms\"; chosen from the stiffest element if not given")
-        ->type_name("QUANTITY");
-    verb->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
-    verb->add_option("--engine", a.engine, "program that solves the multibody model");
-    verb->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
-    verb->add_flag("--csv", a.csv, "also write tables for spreadsheets");
-    add_language(verb);
-    verb->add_flag("--verbose", a.verbose, "show every event");
-    CLI::Option* none = verb->add_flag("--no-report", a.no_report, "do not write report.html");
-    verb->add_flag("--report", a.report, "fail if report.html cannot be written")->excludes(none);
-  };
-
-  CLI::App* verb_new = app.add_subcommand("new", "Write a commented plan to begin with.");
-  CLI::Option* new_file =
-      verb_new->add_option("file", a.input, "file to write; an existing one is left alone")->type_name("FILE");
-  verb_new->add_option("-o,--output", a.input, "the same")->type_name("FILE")->excludes(new_file);
-  verb_new->add_option("--template", a.plan_template, "kind of structure, as --list shows them (frame)");
-  verb_new->add_flag("--list", a.list, "show the templates");
-
-  CLI::App* check = app.add_subcommand("check", "Report everything that is wrong with a plan.");
-  check->add_option("plan", a.input, "plan (TOML)")->type_name("FILE")->required();
-  check->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")
-      ->type_name("FILE");
-  check->add_flag("--json", a.json, "one JSON object on standard output");
-
-  CLI::App* run = app.add_subcommand("run", "Simulate a plan.");
-  run->add_option("plan", a.input, "plan (TOML)")->type_name("FILE")->required();
-  run->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")
-      ->type_name("FILE");
-  run->add_flag("--check-step", a.check_step,
-                "run also at half the step and say what differs; with --threads 2 both at once");
-  add_run_options(run);
-
-  CLI::App* rules = app.add_subcommand("rules", "Show the knowledge rules of the simulation manager.");
-  rules->add_flag("--json", a.json, "as a file that --knowledge reads");
-
-  CLI::App* mbs = app.add_subcommand("mbs", "Work with multibody models.");
-  mbs->require_subcommand(1);
-  CLI::App* mbs_run = mbs->add_subcommand("run", "Run a multibody model on its own.");
-  mbs_run->add_option("model", a.input, "multibody model (JSON)")->type_name("FILE")->required();
-  mbs_run->add_option("--frame-rate", a.frame_rate, "poses kept, such as \"60 Hz\"")->type_name("QUANTITY");
-  CLI::Option* with = mbs_run->add_flag_callback(
-      "--equilibrium", [&a] { a.equilibrium = true; },
-      "begin with the equilibrium under dead load, whatever the file says");
-  mbs_run
-      ->add_flag_callback(
-          "--no-equilibrium", [&a] { a.equilibrium = false; }, "begin with the poses and velocities of the file")
-      ->excludes(with);
-  add_run_options(mbs_run);
-
-  CLI::App* mbs_compare = mbs->add_subcommand("compare", "Run a multibody model on several engines and compare.");
-  mbs_compare->add_option("model", a.input, "multibody model (JSON)")->type_name("FILE")->required();
-  mbs_compare->add_option("--engines", a.engines,
-                          "names between commas, such as native,simbody,mujoco; all if left out");
-  mbs_compare->add_option("-o,--output", a.output, "folder for compare.csv and compare.svg")->type_name("FOLDER");
-  mbs_compare->add_option("--duration", a.duration, "simulated time, such as \"10 s\"")->type_name("QUANTITY");
-  mbs_compare->add_option("--step", a.step, "fixed step of all engines, such as \"0.1 ms\"")->type_name("QUANTITY");
-  mbs_compare->add_option("--accuracy", a.accuracy,
-                          "relative, of engines that control their errors; 1e-9 without --step");
-  mbs_compare->add_option("--frames", a.frames, "instants that are compared (100)")->check(CLI::Range(1, 1000000));
-  mbs_compare->add_flag("--bodies", a.bodies, "also list every body");
-  mbs_compare->add_flag("--skip-unsupported", a.skip_unsupported,
-                        "go on without engines that cannot express the model");
-  mbs_compare->add_flag("--json", a.json, "one JSON object on standard output");
-
-  CLI::App* mbs_verify = mbs->add_subcommand("verify", "Check an engine against models whose answers are known.");
-  mbs_verify->add_option("--engine", a.engine, "program that solves the multibody models");
-  mbs_verify->add_option("--markdown", a.markdown, "page to write (docs/verification.md is one)")->type_name("FILE");
-  mbs_verify->add_option("--json", a.json_file, "the same for programs: file to write")->type_name("FILE");
-
-  CLI::App* report = app.add_subcommand("report", "Make the self-contained page from a record.");
-  report->add_option("record", a.input, "record (HDF5)")->type_name("FILE")->required();
-  report->add_option("-o,--output", a.output, "page to write")->type_name("FILE")->required();
-  report->add_option("--study", a.study_results, "also tell what a fuzzy study found: its folder or its results.json")
-      ->type_name("PATH");
-  report->add_option("--compare", a.other_records, "also tell how other records differ, say one of topple fe")
-      ->type_name("FILE");
-  add_language(report);
-
-  CLI::App* exports =
-      app.add_subcommand("export", "Write a record, or a multibody model, for other programs (docs/exports.md).");
-  exports->add_option("file", a.input, "record (HDF5); with --adams a multibody model (JSON), with --lsdyna a plan")
-      ->type_name("FILE")
-      ->required();
-  exports->add_option("-o,--output", a.output, "folder for the files; with --adams and --lsdyna the file to write")
-      ->type_name("FOLDER")
-      ->required();
-  CLI::Option* vtk = exports->add_flag("--vtk", a.vtk, "record.pvd and vtk/*.vtu, for ParaView");
-  CLI::Option* gltf = exports->add_flag("--gltf", a.gltf, "record.glb with animation, for Blender and browsers");
-  CLI::Option* csv = exports->add_flag("--csv", a.csv, "tables for spreadsheets");
-  CLI::Option* as_json = exports->add_flag("--json", a.json, "record.json, for scripts");
-  CLI::Option* rate =
-      exports->add_option("--frame-rate", a.frame_rate, "frames kept, such as \"10 Hz\"; all if left out")
-          ->type_name("QUANTITY");
-  CLI::Option* adams = exports->add_flag("--adams", a.adams, "dataset for MSC.ADAMS, and its commands (.acf)");
-  CLI::Option* lsdyna = exports->add_flag("--lsdyna", a.fe.lsdyna,
-                                          "keyword file (.k) of a plan's finite elements, for LS-DYNA and OpenRadioss");
-  exports->add_option("--size", a.fe.size, "edge of the elements of --lsdyna (0.4 m)")
-      ->type_name("QUANTITY")
-      ->needs(lsdyna);
-  exports->add_option("--until", a.duration, "time that --lsdyna asks for; the plan's duration if not given")
-      ->type_name("QUANTITY")
-      ->needs(lsdyna);
-  lsdyna->excludes(adams);
-  for (CLI::Option* other : {vtk, gltf, csv, as_json, rate}) adams->excludes(other), lsdyna->excludes(other);
-
-  CLI::App* import = app.add_subcommand(
-      "import", "Make a plan with marked gaps from an IFC file, or a site from a DXF drawing (docs/imports.md).");
-  import->add_option("file", a.input, "building (.ifc) or site (.dxf)")->type_name("FILE")->required();
-  import->add_option("-o,--output", a.output, "plan to write; an existing one is left alone")
-      ->type_name("FILE")
-      ->required();
-  import->add_option("--unit", a.unit, "of a drawing's numbers, such as \"1 mm\", whatever its header says")
-      ->type_name("QUANTITY");
-
-  CLI::App* rcc = app.add_subcommand("rcc", "Compute the resistance curves of a zone of a section, or of a member.");
-  rcc->add_option("file", a.input, "section (TOML), or a plan with --member")->type_name("FILE")->required();
-  rcc->add_option("-o,--output", a.output, "folder for curves, page and pictures; it is made if missing")
-      ->type_name("FOLDER");
-  rcc->add_option("--normal-force", a.normal_forces,
-                  "such as \"3.7 MN\", compression positive; may be given more than once")
-      ->type_name("QUANTITY")
-      ->type_size(1)
-      ->allow_extra_args(false);
-  CLI::Option* member = rcc->add_option("--member", a.member, "column or beam of the plan, such as C-D1-0");
-  rcc->add_option("--zone", a.zone, "end of the member: foot (start) or top (end)")
-      ->check(CLI::IsMember({"foot", "top", "start", "end"}))
-      ->needs(member);
-  CLI::Option* fuzzy =
-      rcc->add_option("--fuzzy", a.fuzzy, "file of fuzzy inputs (TOML): also fuzzy curves")->type_name("FILE");
-  fuzzy->excludes(member);
-  rcc->add_option("--route", a.route, "layered (default), solid (finite elements, minutes), or both")
-      ->check(CLI::IsMember({"layered", "solid", "both"}));
-  rcc->add_option("--axis", a.axis, "of fuzzy curves and of the solid route: y (default) or z")
-      ->check(CLI::IsMember({"y", "z"}));
-  rcc->add_option("--direction", a.direction, "of fuzzy curves and of the solid route: + (default) or -")
-      ->check(CLI::IsMember({"+", "-"}));
-  rcc->add_option("--rotation", a.rotation, "largest rotation of the solid route, such as \"0.02 rad\"")
-      ->type_name("QUANTITY");
-  rcc->add_option("--element-size", a.element_size, "largest edge of an element of the solid route, such as \"5 cm\"")
-      ->type_name("QUANTITY");
-  rcc->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")
-      ->type_name("FILE");
-  rcc->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
-  rcc->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
-
-  FeArguments& f = a.fe;
-  CLI::App* fe = app.add_subcommand("fe", "Simulate a plan with explicit finite elements, as a second opinion.");
-  fe->add_option("plan", a.input, "plan (TOML)")->type_name("FILE")->required();
-  fe->add_option("-o,--output", a.output, "folder for the results; it is made if missing")->type_name("FOLDER");
-  fe->add_option("--size", f.size, "edge of the elements (0.4 m); smaller ones cost more and shorten the step")
-      ->type_name("QUANTITY");
-  CLI::Option* mesh_only = fe->add_flag("--mesh-only", f.mesh_only, "only make the mesh and say what it is like");
-  fe->add_option("--scaled-step", f.scaled_step,
-                 "give mass to elements that do not bear this step, such as \"0.02 ms\"")
-      ->type_name("QUANTITY");
-  fe->add_flag("--skip-quiet", f.skip_quiet, "do not wait through the time in which nothing moves before a charge");
-  fe->add_option("--until", a.duration, "simulated time, such as \"6 s\"; the plan's duration if not given")
-      ->type_name("QUANTITY");
-  CLI::Option* checkpoint =
-      fe->add_flag("--checkpoint", f.checkpoint, "keep checkpoint.bin in the folder, to go on from with --resume");
-  fe->add_option("--checkpoint-interval", f.checkpoint_interval, "of the clock (60 s)")
-      ->type_name("QUANTITY")
-      ->needs(checkpoint);
-  fe->add_flag("--resume", f.resume, "go on from checkpoint.bin in the folder")->excludes(mesh_only);
-  fe->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
-  fe->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")->type_name("FILE");
-  fe->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
-  add_language(fe);
-  fe->add_flag("--csv", a.csv, "also write tables for spreadsheets");
-  fe->add_flag("--verbose", a.verbose, "show every event");
-  fe->add_flag("--no-report", a.no_report, "do not write report.html");
-
-  CLI::App* compare = app.add_subcommand("compare", "Compare two runs of one building: text, CSV, JSON and a page.");
-  compare->add_option("first", a.input, "record A (HDF5)")->type_name("FILE")->required();
-  compare->add_option("second", f.second, "record B")->type_name("FILE")->required();
-  compare->add_option("-o,--output", a.output, "folder for compare.txt, .csv, .json and .html; it is made if missing")
-      ->type_name("FOLDER")
-      ->required();
-  compare->add_option("--photos", f.photos, "table \"time,file\" of photographs of the real event [s]")
-      ->type_name("FILE");
-  compare->add_flag("--json", a.json, "print compare.json instead of the text");
-
-  StudyArguments& y = a.study;
-  const auto add_worker_options = [&](CLI::App* verb) {
-    verb->add_option_function<int>(
-            "--jobs", [&y](int n) { y.jobs = n, y.is_jobs_given = true; },
-            "runs at the same time here (default: as many as there are processors); 0: workers elsewhere do everything")
-        ->check(CLI::Range(0, 4096));
-    verb->add_option("--batch", y.batch, "points that one evaluator gets at once (1)")->check(CLI::Range(1, 100000));
-    verb->add_option("--lease", y.lease, "time without a sign of life after which a run is given to another (30 s)")
-        ->type_name("QUANTITY");
-  };
-  CLI::App* steer = app.add_subcommand("steer", "Watch a plan come down, stop it, change it, go on.");
-  steer->add_option("plan", a.input, "plan (TOML); without one the page begins with templates")->type_name("FILE");
-  steer->add_option("-o,--output", a.output, "folder of action logs and studies (steer)")->type_name("FOLDER");
-  steer->add_option("--port", a.port, "port of 127.0.0.1; a free one if not given");
-  steer->add_flag("--no-open", a.no_open, "only print the address");
-  steer->add_flag("--continue", a.goes_on, "go on with the latest session of this plan, from its action log");
-  steer->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")
-      ->type_name("FILE");
-  steer->add_option("--threads", a.threads, "threads of the solver; results do not depend on it")
-      ->check(CLI::Range(1, 1024));
-
-  CLI::App* replay = app.add_subcommand("replay", "Do again what an action log of topple steer says.");
-  replay->add_option("log", a.input, "action log (JSON lines)")->type_name("FILE")->required();
-  replay->add_option("-o,--output", a.output, "folder for the records of the branches")
-      ->type_name("FOLDER")
-      ->required();
-  replay->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")
-      ->type_name("FILE");
-  replay->add_option("--threads", a.threads, "threads of the solver; results do not depend on it")
-      ->check(CLI::Range(1, 1024));
-  replay->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
-  replay->add_flag("--csv", a.csv, "also write tables for spreadsheets");
-  replay->add_flag("--no-report", a.no_report, "do not write report.html");
-
-  CLI::App* study = app.add_subcommand("study", "Fuzzy analysis: many runs, and what follows from them.");
-  study->add_option("file", a.input, "plan with [fuzzy], or fuzzy inputs of an evaluator (TOML)")->type_name("FILE");
-  study->add_option("-o,--output", a.output, "folder of the study; the same command again goes on with it")
-      ->type_name("FOLDER");
-  study->add_option("--evaluator", y.evaluator,
-                    "command that is the model: reads points and writes answers as JSON lines (docs/study.md)");
-  study->add_option("--alpha", y.alpha, "levels between commas, such as 0,0.25,0.5,0.75,1");
-  study->add_option("--samples", y.samples, "runs at most")->check(CLI::Range(10, 100000000));
-  study->add_option("--seed", y.seed, "of spread points and searches")->check(CLI::NonNegativeNumber);
-  study->add_option("--permissible", y.permissible,
-                    "look for boxes of inputs that keep this, such as \"topple, reach_pos_x <= 20\"");
-  study->add_flag("--no-drivers", y.no_drivers, "spend no runs on which input drives what");
-  study->add_option("--timeout", y.timeout, "time for one answer, such as \"60 s\"; none if left out")
-      ->type_name("QUANTITY");
-  study->add_flag("--one-shot", y.one_shot, "start the command for every point and close its input behind it");
-  study->add_option("--store", y.store, "database on a server, postgresql://user@host/name; a file if left out");
-  study->add_option("--name", y.name, "of the study on the server; that of the folder if left out");
-  CLI::Option* condensed =
-      study->add_flag("--condensed", y.condensed,
-                      "of a plan: run its like frames as one, at a tenth of the cost; whole runs confirm the bounds");
-  study->add_option("--confirm", y.confirm, "whole runs at the end of a condensed study at most")
-      ->check(CLI::Range(1, 1000000))
-      ->needs(condensed);
-  study->add_flag("--rerun-failed", y.rerun_failed, "run those again that failed");
-  study->add_option("--knowledge", a.knowledge, "of a plan: file of knowledge rules instead of the built-in ones")
-      ->type_name("FILE");
-  study->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
-  add_worker_options(study);
-  CLI::App* study_show = study->add_subcommand("show", "Show what a study has found so far.");
-  CLI::App* study_export = study->add_subcommand("export", "Write what a study has found so far: page, CSV and JSON.");
-  for (CLI::App* verb : {study_show, study_export})
-    verb->add_option("folder", a.input, "folder of the study")->type_name("FOLDER")->required();
-  add_language(study);
-  add_language(study_export);
-  study_show->add_flag("--json", a.json, "as a JSON object");
-  study_export->add_option("-o,--output", a.output, "folder for the files; the study's own if left out")
-      ->type_name("FOLDER");
-
-  CLI::App* worker = app.add_subcommand("worker", "Work for studies: take runs, do them, write their results.");
-  worker->add_option("store", a.input, "folder of a study, or postgresql://user@host/name")
-      ->type_name("FOLDER")
-      ->required();
-  worker->add_option("--idle", y.idle, "end after so long without work, such as \"10 min\"; else when no study is open")
-      ->type_name("QUANTITY");
-  add_worker_options(worker);
-
-  CLI::App* demo = app.add_subcommand("demo", "Bring down a storehouse that is built in, and show its report.");
-  demo->add_option("-o,--output", a.output, "folder for the plan and the results (storehouse)")->type_name("FOLDER");
-  add_language(demo);
-  demo->add_flag("--open", a.open, "open the report in the desktop's browser");
-  demo->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
-  demo->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
-
-  CLI::App* doctor = app.add_subcommand("doctor", "Show what is installed and check it against known numbers.");
-  doctor->add_flag("--json", a.json, "one JSON object on standard output");
-
+  for (const auto add : {add_new, add_check, add_run, add_rules, add_mbs, add_report, add_export, add_import, add_rcc,
+                         add_fe, add_compare, add_steer, add_replay, add_study, add_worker, add_demo, add_doctor})
+    add(app, a);
   std::string shell;
   CLI::App* completion = app.add_subcommand("completion", "Write what completes topple's words in a shell.");
   completion->add_option("shell", shell, "bash, zsh or fish")
       ->required()
       ->check(CLI::IsMember({"bash", "zsh", "fish"}));
-  CLI::App* manual = app.add_subcommand("manual", "Write the manual page, for man -l.");
-
-  CLI::App* version = app.add_subcommand("version", "Show the version.");
-
-  // Each example works in a folder where those above it were run (tests/apps/cli_test.sh).
-  const auto add_examples = [](CLI::App* verb, const std::string& lines) { verb->footer("Examples:\n" + lines); };
-  add_examples(demo, R"(  topple demo                              into the folder storehouse
-  topple demo -o first --open              and open the report)");
-  add_examples(verb_new, R"(  topple new plan.toml
-  topple new --list)");
-  add_examples(check, R"(  topple check plan.toml
-  topple check plan.toml --json            complaints for programs)");
-  add_examples(run, R"(  topple run plan.toml -o out              findings, out/record.h5, out/report.html
-  topple run plan.toml -o out --csv        also tables for spreadsheets
-  topple run plan.toml -o out --check-step --threads 2
-                                           and what half the time step makes of it
-  topple run plan.toml -o half --duration "1 s" --no-report)");
-  add_examples(rules, R"(  topple rules                             with their reasons
-  topple rules --json > rules.json         to change one and run with --knowledge)");
-  add_examples(report, R"(  topple report out/record.h5 -o report.html
-  topple report out/record.h5 -o bericht.html --language de
-  topple report out/record.h5 -o report.html --study study --compare fe/record.h5)");
-  add_examples(exports, R"(  topple export out/record.h5 --csv -o tables
-  topple export out/record.h5 --vtk --frame-rate "10 Hz" -o vtk
-  topple export out/record.h5 --gltf -o scene
-  topple export out/model.json --adams -o model.adm)");
-  add_examples(compare, R"(  topple compare out/record.h5 half/record.h5 -o both)");
-  add_examples(rcc, R"(  topple rcc plan.toml --member C-A1-0 -o zone
-  topple rcc plan.toml --member C-A1-0 --zone top --normal-force "300 kN"
-  topple rcc section.toml --fuzzy fuzzy.toml -o curves)");
-  add_examples(mbs_run, R"(  topple mbs run out/model.json -o again --duration "1 s")");
-  add_examples(mbs_compare, R"(  topple mbs compare out/model.json --engines native --duration "0.2 s"
-  topple mbs compare model.json --engines native,simbody,mujoco -o engines)");
-  add_examples(mbs_verify, R"(  topple mbs verify
-  topple mbs verify --engine simbody --markdown simbody.md)");
-  add_examples(mbs, R"(  topple mbs run out/model.json -o again --duration "1 s"
-  topple mbs verify)");
-  add_examples(fe, R"(  topple fe plan.toml --mesh-only          what the mesh is like
-  topple fe plan.toml --size "0.4 m" -o fe
-  topple fe plan.toml --resume -o fe       go on after an interruption with --checkpoint)");
-  add_examples(import, R"(  topple import building.ifc -o building.toml
-  topple import site.dxf -o site.toml --unit "1 mm")");
-  add_examples(steer, R"(  topple steer plan.toml                   opens the page
-  topple steer plan.toml --no-open --port 8080)");
-  add_examples(replay, R"(  topple replay steer/plan.steer.jsonl -o again)");
-  add_examples(study, R"(  topple study plan-fuzzy.toml -o study --samples 300
-  topple study inputs.toml --evaluator ./model -o study
-  topple study show study)");
-  add_examples(study_show, R"(  topple study show study)");
-  add_examples(study_export, R"(  topple study export study -o tables)");
-  add_examples(worker, R"(  topple worker study --jobs 4
-  topple worker postgresql://user@host/studies --idle "10 min")");
-  add_examples(doctor, R"(  topple doctor
-  topple doctor --json)");
   add_examples(completion, R"(  topple completion bash > topple.bash     then: source topple.bash
   topple completion zsh > _topple          in a folder of $fpath
   topple completion fish > topple.fish     in ~/.config/fish/completions)");
+  CLI::App* manual = app.add_subcommand("manual", "Write the manual page, for man -l.");
   add_examples(manual, R"(  topple manual > topple.1                 then: man -l topple.1)");
-  add_examples(version, R"(  topple version)");
+  add_version(app, a);
 
   if (argc > 1 && argv[1][0] != '-') {
     std::vector<std::string> verbs;
@@ -406,53 +510,6 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
     const int code = app.exit(e, std::cout, std::cerr);
     return code == 0 ? kOk : kBadInput;
   }
-  using Verb = Arguments::Verb;
-  if (verb_new->parsed()) {
-    a.verb = Verb::New;
-    if (a.input.empty() && !a.list) {
-      std::cerr << "topple new: a file to write is required\nRun topple new --help for more information.\n";
-      return kBadInput;
-    }
-  }
-  if (check->parsed()) a.verb = Verb::Check;
-  if (run->parsed()) a.verb = Verb::Run;
-  if (rules->parsed()) a.verb = Verb::Rules;
-  if (mbs_run->parsed()) a.verb = Verb::MbsRun;
-  if (mbs_compare->parsed()) a.verb = Verb::MbsCompare;
-  if (mbs_verify->parsed()) a.verb = Verb::MbsVerify;
-  if (report->parsed()) a.verb = Verb::Report;
-  if (exports->parsed()) {
-    a.verb = Verb::Export;
-    if (!(a.vtk || a.gltf || a.csv || a.json || a.adams || a.fe.lsdyna)) {
-      std::cerr << "topple export: say what for: --vtk, --gltf, --csv, --json, --adams or --lsdyna\n"
-                << "Run topple export --help for more information.\n";
-      return kBadInput;
-    }
-  }
-  if (import->parsed()) a.verb = Verb::Import;
-  if (rcc->parsed()) a.verb = Verb::Rcc;
-  if (compare->parsed()) a.verb = Verb::Compare;
-  if (fe->parsed()) {
-    a.verb = Verb::Fe;
-    if (a.output.empty() && !f.mesh_only) {
-      std::cerr << "topple fe: --output is required\nRun topple fe --help for more information.\n";
-      return kBadInput;
-    }
-  }
-  if (study->parsed()) {
-    a.verb = Verb::Study;
-    if (study_show->parsed()) y.action = StudyArguments::Action::Show;
-    if (study_export->parsed()) y.action = StudyArguments::Action::Export;
-    if (y.action == StudyArguments::Action::Run && (a.input.empty() || a.output.empty())) {
-      std::cerr << "topple study: " << (a.input.empty() ? "a plan or a file of fuzzy inputs" : "--output")
-                << " is required\n"
-                << "Run topple study --help for more information.\n";
-      return kBadInput;
-    }
-  }
-  if (worker->parsed()) a.verb = Verb::Worker;
-  if (steer->parsed()) a.verb = Verb::Steer;
-  if (replay->parsed()) a.verb = Verb::Replay;
   if (completion->parsed()) {
     std::cout << make_completion(app, shell);
     return kOk;
@@ -461,9 +518,10 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
     std::cout << make_manual(app);
     return kOk;
   }
-  if (demo->parsed()) a.verb = Verb::Demo;
-  if (doctor->parsed()) a.verb = Verb::Doctor;
-  if (version->parsed()) a.verb = Verb::Version;
+  if (const std::string missing = find_missing(a); !missing.empty()) {
+    std::cerr << missing;
+    return kBadInput;
+  }
   return a;
 }
 
