@@ -331,209 +331,263 @@ void System::choose_step() {
   summary.highest_frequency = highest_frequency;
 }
 
-bool System::find_equilibrium(std::string& message) {
-  const Assembly assembly(*this);
-  const int n = assembly.count();
-  if (n == 0) return true;
-  const Unknowns& u = assembly.unknowns();
-  const auto saved_report = std::exchange(options.on_happening, nullptr);
-  const auto finish = [&](bool good) {
-    options.on_happening = saved_report;
-    ignores_limits = false;
-    return good;
-  };
+namespace {
 
-  // everything must hang on the ground
-  std::vector<int> root(B + 1);
-  for (size_t i = 0; i <= B; ++i) root[i] = static_cast<int>(i);
+/// The dead-load equilibrium by Newton's method, joints by multipliers that each iteration corrects.
+class DeadLoad {
+ public:
+  explicit DeadLoad(System& s) : s_(s), assembly_(s), u_(assembly_.unknowns()), multiplier_(s.joints.size()) {}
+
+  bool is_needed() const { return assembly_.count() > 0; }
+  /// Puts bodies and joints into the equilibrium. False: there is none, and the message says why.
+  bool find(std::string& message);
+
+ private:
+  /// A free body that hangs on nothing, -1 if there is none.
+  int find_loose_body() const;
+  /// What gravity and constant loads push with; 1 if that is nothing [N].
+  double calc_weight() const;
+  /// Of the stiffness with joints held by the penalty. False: a mechanism.
+  bool factorise(std::string& message);
+  /// Evaluates all forces where the bodies are now; multipliers and joints' forces follow their gaps.
+  void find_unbalanced();
+  void move(const Vector& by);
+  void find_most_loaded();
+  std::string describe_failure(bool has_diverged) const;
+
+  System& s_;
+  const Assembly assembly_;
+  const Unknowns& u_;
+  double weight_ = 1, penalty_ = 1;
+  Eigen::SimplicialLDLT<Sparse> solver_;
+  bool is_analysed_ = false;  // the pattern stays what it is
+  std::vector<std::array<double, 6>> multiplier_;
+  Vector pushed_;                         // unbalanced, and gaps pushed back
+  double unbalanced_ = 0, gap_left_ = 0;  // over the weight; [m, rad]
+  size_t most_loaded_ = 0;                // element, without limits
+  double most_load_ = 0;
+};
+
+int DeadLoad::find_loose_body() const {
+  std::vector<int> root(s_.B + 1);
+  for (size_t i = 0; i <= s_.B; ++i) root[i] = static_cast<int>(i);
   const auto find = [&](int x) {
     while (root[static_cast<size_t>(x)] != x)
       x = root[static_cast<size_t>(x)] = root[static_cast<size_t>(root[static_cast<size_t>(x)])];
     return x;
   };
-  const auto node = [&](int b) { return b < 0 || fixed[static_cast<size_t>(b)] ? static_cast<int>(B) : b; };
+  const auto node = [&](int b) { return b < 0 || s_.fixed[static_cast<size_t>(b)] ? static_cast<int>(s_.B) : b; };
   const auto join = [&](int a, int b) { root[static_cast<size_t>(find(node(a)))] = find(node(b)); };
-  for (const CompiledElement& e : elements) join(e.a, e.b);
-  for (const CompiledJoint& j : joints) join(j.parent, j.child);
-  for (const CompiledSpring& k : forces.springs) join(k.a, k.b);
-  for (const CompiledBushing& k : forces.bushings) join(k.a, k.b);
-  for (const int b : assembly.free_bodies())
-    if (find(b) != find(static_cast<int>(B))) {
-      message = "body \"" + model.bodies[static_cast<size_t>(b)].name +
-                "\" is not connected to the ground by any element or joint: there is no dead-load equilibrium";
-      return finish(false);
-    }
+  for (const CompiledElement& e : s_.elements) join(e.a, e.b);
+  for (const CompiledJoint& j : s_.joints) join(j.parent, j.child);
+  for (const CompiledSpring& k : s_.forces.springs) join(k.a, k.b);
+  for (const CompiledBushing& k : s_.forces.bushings) join(k.a, k.b);
+  for (const int b : assembly_.free_bodies())
+    if (find(b) != find(static_cast<int>(s_.B))) return b;
+  return -1;
+}
 
+double DeadLoad::calc_weight() const {
   double weight = 0;
-  for (const int b : assembly.free_bodies()) weight += state.body[static_cast<size_t>(b)].mass * norm(model.gravity);
-  for (size_t i = 0; i < forces.loads.size(); ++i)
-    if (state.load[i].begin <= 0)
-      weight += norm(forces.loads[i].force) *
-                (forces.loads[i].is_constant ? 1 : std::abs(calc_force(forces.loads[i].factor, 0)));
-  if (weight == 0) weight = 1;
+  for (const int b : assembly_.free_bodies())
+    weight += s_.state.body[static_cast<size_t>(b)].mass * norm(s_.model.gravity);
+  for (size_t i = 0; i < s_.forces.loads.size(); ++i)
+    if (s_.state.load[i].begin <= 0)
+      weight += norm(s_.forces.loads[i].force) *
+                (s_.forces.loads[i].is_constant ? 1 : std::abs(calc_force(s_.forces.loads[i].factor, 0)));
+  return weight == 0 ? 1 : weight;
+}
 
-  double largest = 1;
-  {
-    const Sparse K = assembly.make_stiffness(false, weight);
-    for (Eigen::Index i = 0; i < n; ++i) largest = std::max(largest, K.coeff(i, i));
+bool DeadLoad::factorise(std::string& message) {
+  const int n = assembly_.count();
+  Sparse K = assembly_.make_stiffness(false, weight_);
+  Triplets t;
+  for (const CompiledJoint& j : s_.joints) {
+    KinematicRow rows[6];
+    double gap[6];
+    const int count = assembly_.joint_rows(j, rows, gap);
+    for (int i = 0; i < count; ++i) add_outer(rows[i], penalty_, u_, t);
   }
-  // as stiff as the stiffest body is held: more would turn round-off of places into larger forces and save no iteration
-  const double penalty = largest;
-  Eigen::SimplicialLDLT<Sparse> solver;
-  bool analysed = false;  // the pattern stays what it is
-  const auto factorise = [&] {
-    Sparse K = assembly.make_stiffness(false, weight);
-    Triplets t;
-    for (const CompiledJoint& j : joints) {
-      KinematicRow rows[6];
-      double gap[6];
-      const int count = assembly.joint_rows(j, rows, gap);
-      for (int i = 0; i < count; ++i) add_outer(rows[i], penalty, u, t);
-    }
-    Sparse P(n, n);
-    P.setFromTriplets(t.begin(), t.end());
-    K += P;
-    if (!analysed) solver.analyzePattern(K);
-    analysed = true;
-    solver.factorize(K);
-    if (solver.info() != Eigen::Success) {
-      message = "the stiffness matrix of the dead-load equilibrium could not be factorised: the model is a mechanism";
-      return false;
-    }
-    const Vector D = solver.vectorD();
-    Eigen::Index worst = 0;
-    const double least = D.minCoeff(&worst);
-    if (least > 1e-13 * D.maxCoeff()) return true;
-    const Eigen::Index unknown = solver.permutationPinv().indices()[worst];
-    message = "body \"" +
-              model.bodies[static_cast<size_t>(assembly.free_bodies()[static_cast<size_t>(unknown / u.each)])].name +
-              "\" can move without resistance: the model is a mechanism and has no dead-load equilibrium";
+  Sparse P(n, n);
+  P.setFromTriplets(t.begin(), t.end());
+  K += P;
+  if (!is_analysed_) solver_.analyzePattern(K);
+  is_analysed_ = true;
+  solver_.factorize(K);
+  if (solver_.info() != Eigen::Success) {
+    message = "the stiffness matrix of the dead-load equilibrium could not be factorised: the model is a mechanism";
     return false;
-  };
+  }
+  const Vector D = solver_.vectorD();
+  Eigen::Index worst = 0;
+  const double least = D.minCoeff(&worst);
+  if (least > 1e-13 * D.maxCoeff()) return true;
+  const Eigen::Index unknown = solver_.permutationPinv().indices()[worst];
+  message = "body \"" +
+            s_.model.bodies[static_cast<size_t>(assembly_.free_bodies()[static_cast<size_t>(unknown / u_.each)])].name +
+            "\" can move without resistance: the model is a mechanism and has no dead-load equilibrium";
+  return false;
+}
 
+void DeadLoad::find_unbalanced() {
+  s_.ground_reaction = {};
+  s_.update_angles();
+  s_.evaluate_elements_fully(0);
+  s_.evaluate_rotationals(0);
+  s_.evaluate_cables();
+  s_.evaluate_springs(true);
+  s_.evaluate_loads(true);
+  Vector r(assembly_.count());
+  for (size_t i = 0; i < assembly_.free_bodies().size(); ++i) {
+    const size_t b = static_cast<size_t>(assembly_.free_bodies()[i]);
+    const Vec3 f = s_.force[b] + s_.state.body[b].mass * s_.model.gravity, t = s_.torque[b];
+    for (int k = 0; k < u_.each; ++k) {
+      const int c = u_.coordinate(k);
+      r[u_.at(static_cast<int>(i), k)] = c < 3 ? f[c] : t[c - 3];
+    }
+  }
+  pushed_ = r;
+  gap_left_ = 0;
+  for (size_t j = 0; j < s_.joints.size(); ++j) {
+    KinematicRow rows[6];
+    double gap[6];
+    const int count = assembly_.joint_rows(s_.joints[j], rows, gap);
+    JointState& js = s_.state.joint[j];
+    js.force = js.moment = {};
+    for (int i = 0; i < count; ++i) {
+      const KinematicRow& row = rows[i];
+      double& held = multiplier_[j][static_cast<size_t>(i)];
+      held -= penalty_ * gap[i];
+      gap_left_ = std::max(gap_left_, std::abs(gap[i]));
+      const auto load = [&](Vector& on, double f) {
+        for (int k = 0; k < u_.each; ++k) {
+          const int c = u_.coordinate(k);
+          if (row.a >= 0) on[u_.at(row.a, k)] += f * (c < 3 ? row.va[c] : row.wa[c - 3]);
+          if (row.b >= 0) on[u_.at(row.b, k)] += f * (c < 3 ? row.vb[c] : row.wb[c - 3]);
+        }
+      };
+      load(r, held);
+      load(pushed_, held - penalty_ * gap[i]);
+      js.force += held * row.vb;
+      if (i >= s_.joints[j].lines) js.moment += held * row.wb;
+    }
+  }
+  unbalanced_ = r.lpNorm<Eigen::Infinity>() / weight_;
+}
+
+void DeadLoad::move(const Vector& by) {
+  for (size_t i = 0; i < assembly_.free_bodies().size(); ++i) {
+    const size_t b = static_cast<size_t>(assembly_.free_bodies()[i]);
+    Vec3 moved, turned;
+    for (int k = 0; k < u_.each; ++k) {
+      const int c = u_.coordinate(k);
+      (c < 3 ? moved[c] : turned[c - 3]) = by[u_.at(static_cast<int>(i), k)];
+    }
+    s_.state.p[b] += moved;
+    s_.state.q[b] = normalized(exp_rotation(turned) * s_.state.q[b]);
+    s_.state.R[b] = to_matrix(s_.state.q[b]);
+  }
+}
+
+void DeadLoad::find_most_loaded() {
+  for (size_t i = 0; i < s_.elements.size(); ++i)
+    if (const double used = calc_utilisation(s_.elements[i].zone, s_.laws, 0, s_.state.element[i]); used > most_load_)
+      most_load_ = used, most_loaded_ = i;
+}
+
+std::string DeadLoad::describe_failure(bool has_diverged) const {
+  char numbers[200];
+  std::snprintf(numbers, sizeof numbers,
+                "no dead-load equilibrium after %d iterations: the largest unbalanced force %s %.2g of the weight",
+                s_.summary.equilibrium_iterations, has_diverged ? "grew without bound and was last" : "is",
+                unbalanced_);
+  std::string message = numbers;
+  if (most_load_ > 0) {
+    std::snprintf(numbers, sizeof numbers, "; without limits element \"%s\" would be loaded to %.0f %% of its capacity",
+                  s_.model.elements[most_loaded_].name.substr(0, 60).c_str(), 100 * most_load_);
+    message += numbers;
+  }
+  return message;
+}
+
+bool DeadLoad::find(std::string& message) {
+  if (const int b = find_loose_body(); b >= 0) {
+    message = "body \"" + s_.model.bodies[static_cast<size_t>(b)].name +
+              "\" is not connected to the ground by any element or joint: there is no dead-load equilibrium";
+    return false;
+  }
+  weight_ = calc_weight();
+  // joints as stiff as the stiffest body is held: more would turn round-off of places into larger forces and save no
+  // iteration
+  {
+    const Sparse K = assembly_.make_stiffness(false, weight_);
+    for (Eigen::Index i = 0; i < K.rows(); ++i) penalty_ = std::max(penalty_, K.coeff(i, i));
+  }
   // places are known to round-off only, and the stiffest spring turns that into a force
   double extent = 1;
-  for (const int b : assembly.free_bodies()) extent = std::max(extent, norm(state.p[static_cast<size_t>(b)]));
-  const double good_enough = std::max(1e-8, 1e-15 * largest * extent / weight);
+  for (const int b : assembly_.free_bodies()) extent = std::max(extent, norm(s_.state.p[static_cast<size_t>(b)]));
+  const double good_enough = std::max(1e-8, 1e-15 * penalty_ * extent / weight_);
 
-  const std::vector<ZoneState> virgin = state.element, virgin_rotational = state.rotational;
-  std::vector<std::array<double, 6>> multiplier(joints.size(), std::array<double, 6>{});
+  const std::vector<ZoneState> virgin = s_.state.element, virgin_rotational = s_.state.rotational;
   // first without limits, so that an overloaded element can be named; then with them
-  ignores_limits = true;
-  size_t most_loaded = 0;
-  double most_load = 0;
-  double unbalanced = 0, gap_left = 0, best = 1e300;
-  int idle = 0;
+  s_.ignores_limits = true;
   constexpr int most = 400;
   constexpr int fresh = 12;       // most iterations with a stiffness of their own; then the last one serves
   constexpr double quick = 0.03;  // of the unbalanced force is left after an iteration with a stiffness that still fits
-  int factorised = 0;
-  double last_unbalanced = 0, last_finite = 0;
+  int idle = 0, factorised = 0;
+  double best = 1e300, last_unbalanced = 0, last_finite = 0;
   bool has_diverged = false;
   for (int round = 0; round <= most; ++round) {
-    state.element = virgin;
-    state.rotational = virgin_rotational;
-    ground_reaction = {};
-    update_angles();
-    evaluate_elements_fully(0);
-    evaluate_rotationals(0);
-    evaluate_cables();
-    evaluate_springs(true);
-    evaluate_loads(true);
-    Vector r(n);
-    for (size_t i = 0; i < assembly.free_bodies().size(); ++i) {
-      const size_t b = static_cast<size_t>(assembly.free_bodies()[i]);
-      const Vec3 f = force[b] + state.body[b].mass * model.gravity, t = torque[b];
-      for (int k = 0; k < u.each; ++k) {
-        const int c = u.coordinate(k);
-        r[u.at(static_cast<int>(i), k)] = c < 3 ? f[c] : t[c - 3];
-      }
-    }
-    Vector penalised = r;
-    gap_left = 0;
-    for (size_t j = 0; j < joints.size(); ++j) {
-      KinematicRow rows[6];
-      double gap[6];
-      const int count = assembly.joint_rows(joints[j], rows, gap);
-      JointState& js = state.joint[j];
-      js.force = js.moment = {};
-      for (int i = 0; i < count; ++i) {
-        const KinematicRow& row = rows[i];
-        const double held = multiplier[j][static_cast<size_t>(i)], wanted = held - penalty * gap[i];
-        gap_left = std::max(gap_left, std::abs(gap[i]));
-        const auto load = [&](Vector& on, double f) {
-          for (int k = 0; k < u.each; ++k) {
-            const int c = u.coordinate(k);
-            if (row.a >= 0) on[u.at(row.a, k)] += f * (c < 3 ? row.va[c] : row.wa[c - 3]);
-            if (row.b >= 0) on[u.at(row.b, k)] += f * (c < 3 ? row.vb[c] : row.wb[c - 3]);
-          }
-        };
-        load(r, wanted);
-        load(penalised, wanted - penalty * gap[i]);
-        multiplier[j][static_cast<size_t>(i)] = wanted;
-        js.force += wanted * row.vb;
-        if (i >= joints[j].lines) js.moment += wanted * row.wb;
-      }
-    }
-    unbalanced = r.lpNorm<Eigen::Infinity>() / weight;
-    summary.equilibrium_iterations = round;
-    summary.equilibrium_residual = unbalanced;
-    if (!std::isfinite(unbalanced)) {
-      summary.equilibrium_residual = unbalanced = last_finite;
+    s_.state.element = virgin;
+    s_.state.rotational = virgin_rotational;
+    find_unbalanced();
+    s_.summary.equilibrium_iterations = round;
+    s_.summary.equilibrium_residual = unbalanced_;
+    if (!std::isfinite(unbalanced_)) {
+      s_.summary.equilibrium_residual = unbalanced_ = last_finite;
       has_diverged = true;
       break;
     }
-    last_finite = unbalanced;
-    if (ignores_limits && ((unbalanced < 1e-6 && gap_left < 1e-6) || round == most / 2)) {
-      for (size_t i = 0; i < elements.size(); ++i)
-        if (const double used = calc_utilisation(elements[i].zone, laws, 0, state.element[i]); used > most_load)
-          most_load = used, most_loaded = i;
-      ignores_limits = false;
+    last_finite = unbalanced_;
+    if (s_.ignores_limits && ((unbalanced_ < 1e-6 && gap_left_ < 1e-6) || round == most / 2)) {
+      find_most_loaded();
+      s_.ignores_limits = false;
       continue;
     }
-    if (!ignores_limits && unbalanced < 1e-11 && gap_left < 1e-11) break;
+    if (!s_.ignores_limits && unbalanced_ < 1e-11 && gap_left_ < 1e-11) break;
     // round-off ends the improvement of very stiff models earlier
-    idle = unbalanced < 0.5 * best ? 0 : idle + 1;
-    best = std::min(best, unbalanced);
-    if (round == most || (idle > 2 && unbalanced < good_enough)) break;
-    state.element = virgin;
-    if (round == 0 || (factorised < fresh && unbalanced > good_enough && unbalanced > quick * last_unbalanced)) {
+    idle = unbalanced_ < 0.5 * best ? 0 : idle + 1;
+    best = std::min(best, unbalanced_);
+    if (round == most || (idle > 2 && unbalanced_ < good_enough)) break;
+    s_.state.element = virgin;
+    if (round == 0 || (factorised < fresh && unbalanced_ > good_enough && unbalanced_ > quick * last_unbalanced)) {
       ++factorised;
-      if (!factorise()) return finish(false);
+      if (!factorise(message)) return false;
     }
-    last_unbalanced = unbalanced;
-    const Vector d = solver.solve(penalised);
-    for (size_t i = 0; i < assembly.free_bodies().size(); ++i) {
-      const size_t b = static_cast<size_t>(assembly.free_bodies()[i]);
-      Vec3 moved, turned;
-      for (int k = 0; k < u.each; ++k) {
-        const int c = u.coordinate(k);
-        (c < 3 ? moved[c] : turned[c - 3]) = d[u.at(static_cast<int>(i), k)];
-      }
-      state.p[b] += moved;
-      state.q[b] = normalized(exp_rotation(turned) * state.q[b]);
-      state.R[b] = to_matrix(state.q[b]);
-    }
+    last_unbalanced = unbalanced_;
+    move(solver_.solve(pushed_));
   }
-  if (has_diverged || !(unbalanced < good_enough)) {
-    char numbers[200];
-    std::snprintf(numbers, sizeof numbers,
-                  "no dead-load equilibrium after %d iterations: the largest unbalanced force %s %.2g of the weight",
-                  summary.equilibrium_iterations, has_diverged ? "grew without bound and was last" : "is", unbalanced);
-    message = numbers;
-    if (most_load > 0) {
-      std::snprintf(numbers, sizeof numbers,
-                    "; without limits element \"%s\" would be loaded to %.0f %% of its capacity",
-                    model.elements[most_loaded].name.substr(0, 60).c_str(), 100 * most_load);
-      message += numbers;
-    }
-    return finish(false);
+  if (has_diverged || !(unbalanced_ < good_enough)) {
+    message = describe_failure(has_diverged);
+    return false;
   }
-  if (find_overload(message)) return finish(false);
+  return true;
+}
+
+}  // namespace
+
+bool System::find_equilibrium(std::string& message) {
+  DeadLoad load(*this);
+  if (!load.is_needed()) return true;
+  const auto report = std::exchange(options.on_happening, nullptr);
+  const bool is_found = load.find(message) && !find_overload(message);
+  options.on_happening = report;
+  ignores_limits = false;
+  if (!is_found) return false;
   for (auto* list : {&state.element, &state.rotational})
     for (ZoneState& z : *list) z.plastic = z.damping = 0;
   for (size_t b = 0; b < B; ++b) state.v[b] = state.w[b] = state.L[b] = {};
-  return finish(true);
+  return true;
 }
 
 }  // namespace topple::mbs
