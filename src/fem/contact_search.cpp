@@ -27,7 +27,7 @@ Vec3 place(const ExplicitState& s, std::uint32_t row) {
 }
 Vec3 speed(const ExplicitState& s, std::uint32_t row) {
   const double* r = s.rows.data() + 8 * static_cast<size_t>(row);
-  return {r[4], r[5], r[6]};
+  return {r[kernel::kSpeed], r[kernel::kSpeed + 1], r[kernel::kSpeed + 2]};
 }
 bool has_mass(const ExplicitState& s, std::uint32_t row) { return s.rows[8 * size_t{row} + kernel::kNodeMass] > 0; }
 
@@ -428,8 +428,8 @@ ContactSetup make_contact_setup(const ExplicitModel& model, const ExplicitChunks
   setup.order = chunks.order;
   setup.group_of_element.resize(E);
   constexpr std::uint32_t kNobody = std::numeric_limits<std::uint32_t>::max();
-  setup.owner.assign(model.nodes.size(), kNobody);
-  std::vector<std::uint32_t> seen(model.nodes.size(), kNobody);
+  setup.owner.assign(chunks.node_of_row.size(), kNobody);
+  std::vector<std::uint32_t> seen(chunks.node_of_row.size(), kNobody);
   size_t first = 0;
   setup.node_starts.push_back(0);
   for (const ElementChunk& chunk : chunks.chunks) {

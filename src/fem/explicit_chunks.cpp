@@ -71,6 +71,7 @@ ExplicitChunks make_chunks(const ExplicitModel& model, size_t lanes, size_t elem
       }
   constexpr std::uint32_t kUnset = kNobody;
   c.row_of_node.assign(N, kUnset);
+  std::vector<std::uint32_t> copied(N, kNobody);  // the last chunk with a copy
   const auto add_row = [&](int n) {
     c.row_of_node[static_cast<size_t>(n)] = static_cast<std::uint32_t>(c.node_of_row.size());
     c.node_of_row.push_back(n);
@@ -82,6 +83,13 @@ ExplicitChunks make_chunks(const ExplicitModel& model, size_t lanes, size_t elem
       for (const int n : model.elements[static_cast<size_t>(c.order[i])].node)
         if (owner[static_cast<size_t>(n)] == k && c.row_of_node[static_cast<size_t>(n)] == kUnset) add_row(n);
     chunk.own = c.node_of_row.size() - chunk.first_row;
+    // copies of the others
+    for (size_t i = ranges[k].first; i < ranges[k].second; ++i)
+      for (const int n : model.elements[static_cast<size_t>(c.order[i])].node) {
+        if (owner[static_cast<size_t>(n)] != kSeveral || copied[static_cast<size_t>(n)] == k) continue;
+        copied[static_cast<size_t>(n)] = static_cast<std::uint32_t>(k);
+        c.node_of_row.push_back(n);
+      }
     c.chunks.push_back(chunk);
   }
   c.first_shared_row = c.node_of_row.size();
@@ -93,7 +101,7 @@ ExplicitChunks make_chunks(const ExplicitModel& model, size_t lanes, size_t elem
 
   // slots and the chunk's own numbers of nodes
   std::vector<std::uint32_t> place(N, kUnset);
-  std::vector<std::uint32_t> count(N - c.first_shared_row + 1, 0);
+  std::vector<std::uint32_t> count(c.node_of_row.size() - c.first_shared_row + 1, 0);
   for (size_t k = 0; k < ranges.size(); ++k) {
     ElementChunk& chunk = c.chunks[k];
     const size_t elements = ranges[k].second - ranges[k].first;
@@ -136,7 +144,7 @@ ExplicitChunks make_chunks(const ExplicitModel& model, size_t lanes, size_t elem
           }
           for (size_t j = 0; j < 8; ++j)
             c.corners[(block * 8 + j) * c.W + l] = static_cast<std::uint16_t>(
-                kernel::kRoomFields * place[static_cast<size_t>(model.elements[static_cast<size_t>(e)].node[j])]);
+                kernel::kNodeFields * place[static_cast<size_t>(model.elements[static_cast<size_t>(e)].node[j])]);
         }
       first = last;
     }
@@ -145,7 +153,7 @@ ExplicitChunks make_chunks(const ExplicitModel& model, size_t lanes, size_t elem
       for (const int n : model.elements[static_cast<size_t>(c.order[ranges[k].first + i])].node)
         place[static_cast<size_t>(n)] = kUnset;
   }
-  c.starts.assign(N - c.first_shared_row + 1, 0);
+  c.starts.assign(c.node_of_row.size() - c.first_shared_row + 1, 0);
   for (size_t i = 0; i + 1 < c.starts.size(); ++i) c.starts[i + 1] = c.starts[i] + count[i];
   c.entries.resize(c.shared_rows.size());
   std::vector<std::uint32_t> next(c.starts.begin(), c.starts.end() - 1);

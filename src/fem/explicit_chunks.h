@@ -24,9 +24,11 @@ struct ExplicitChunks {
   std::vector<int> element_of_slot;  // -1: empty
   std::vector<std::uint16_t> material_of_block;
   std::vector<int> order;  // elements of chunk after chunk, neighbours close
+  // rows: of each chunk its own nodes, then copies of the shared ones that its elements read; then nodes of several
+  // chunks
   std::vector<std::uint32_t> row_of_node;
-  std::vector<int> node_of_row;
-  std::vector<std::uint16_t> corners;          // kRoomFields times the places among the chunk's nodes, 8 x W a block
+  std::vector<int> node_of_row;                // of copies as well
+  std::vector<std::uint16_t> corners;          // kNodeFields times the places among the chunk's nodes, 8 x W a block
   std::vector<std::uint32_t> shared_rows;      // of chunk after chunk
   size_t first_shared_row = 0;                 // shared nodes, and those without elements, come last
   std::vector<std::uint32_t> starts, entries;  // of shared nodes: their rows of shared forces
@@ -34,7 +36,7 @@ struct ExplicitChunks {
   size_t slots() const { return element_of_slot.size(); }
 };
 
-/// At most 680 elements a chunk: kRoomFields times 8 nodes of each is to fit 16 bits.
-ExplicitChunks make_chunks(const ExplicitModel&, size_t lanes, size_t elements_a_chunk = 640);
+/// At most 1,024 elements a chunk: kNodeFields times 8 nodes of each is to fit 16 bits.
+ExplicitChunks make_chunks(const ExplicitModel&, size_t lanes, size_t elements_a_chunk = 1000);
 
 }  // namespace topple::fem

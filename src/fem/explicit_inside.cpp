@@ -47,8 +47,8 @@ double seconds() { return std::chrono::duration<double>(std::chrono::steady_cloc
 
 ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o) : model(m), options(o) {
   check_explicit_model(model);
-  const size_t N = model.nodes.size(), E = model.elements.size();
   chunks = make_chunks(model, kernel::lanes());
+  const size_t N = model.nodes.size(), E = model.elements.size(), rows = chunks.node_of_row.size();
   for (const ExplicitMaterial& material : model.materials) laws.push_back(make_law(material));
 
   // step and mass scaling
@@ -77,15 +77,15 @@ ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
 
   // state
   const size_t W = chunks.W, fields = kernel::kElementFields;
-  s.rows.assign(8 * N, 0);
-  s.flags.assign(N, 0);
-  s.pushes.assign(4 * N, 0);
-  loads.assign(4 * N, 0);
-  s.uses.assign(N, 0);
+  s.rows.assign(8 * rows, 0);
+  s.flags.assign(rows, 0);
+  s.pushes.assign(4 * rows, 0);
+  loads.assign(4 * rows, 0);
+  s.uses.assign(rows, 0);
   s.elements.assign(chunks.slots() * fields, 0);
   s.live.assign(chunks.slots() / W, 0);
   rows_of_element.resize(E);
-  first_part_of_row.assign(N, std::numeric_limits<int>::max());
+  first_part_of_row.assign(rows, std::numeric_limits<int>::max());
   for (size_t n = 0; n < N; ++n) {
     double* row = s.rows.data() + 8 * static_cast<size_t>(chunks.row_of_node[n]);
     row[0] = model.nodes[n].x, row[1] = model.nodes[n].y, row[2] = model.nodes[n].z;
@@ -113,7 +113,7 @@ ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
     const std::uint32_t slot = chunks.slot_of_element[e];
     s.live[slot / W] = static_cast<unsigned char>(s.live[slot / W] | (1U << (slot % W)));
   }
-  for (size_t row = 0; row < N; ++row) {
+  for (size_t row = 0; row < rows; ++row) {
     double* r = s.rows.data() + 8 * row;
     if (s.uses[row] == 0) r[kernel::kNodeMass] = 0;
     r[kernel::kInverseMass] = r[kernel::kNodeMass] > 0 ? 1 / r[kernel::kNodeMass] : 0;
@@ -123,7 +123,7 @@ ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
     flags = static_cast<std::uint8_t>(flags | (support.x ? kernel::kHoldX : 0) | (support.y ? kernel::kHoldY : 0) |
                                       (support.z ? kernel::kHoldZ : 0));
   }
-  for (size_t row = 0; row < N; ++row)
+  for (size_t row = 0; row < rows; ++row)
     if (!(s.rows[8 * row + kernel::kNodeMass] > 0)) s.flags[row] |= kernel::kHoldX | kernel::kHoldY | kernel::kHoldZ;
   for (const NodalForce& f : model.forces) {
     const std::uint32_t row = chunks.row_of_node[static_cast<size_t>(f.node)];
@@ -135,7 +135,7 @@ ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
   for (const std::uint32_t row : loaded) push(s, row, {});
   s.ground_forces.assign(model.grounds.size(), {});
   s.touchdowns.assign(static_cast<size_t>(parts), -1);
-  for (size_t row = 0; row < N; ++row)
+  for (size_t row = 0; row < rows; ++row)
     for (const ExplicitGround& g : model.grounds) {
       const double* r = s.rows.data() + 8 * row;
       if (r[kernel::kNodeMass] > 0 && dot(g.normal, Vec3{r[0], r[1], r[2]} - g.point) < 0) {
@@ -149,13 +149,13 @@ ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
 
   shared_forces.assign(4 * std::max<size_t>(1, chunks.shared_rows.size()), 0);
   rooms.resize(std::min(kTasks, chunks.chunks.size()));
-  for (auto& room : rooms) room.assign(kernel::kRoomFields * chunks.most_nodes, 0);
+  for (auto& room : rooms) room.assign(4 * chunks.most_nodes, 0);
   failed.resize(chunks.chunks.size());
   chunk_sums.resize(chunks.chunks.size());
   grounded.resize(chunks.chunks.size() + kTasks);
   balances.resize(grounded.size());
-  start.resize(N);
-  for (size_t row = 0; row < N; ++row) start[row] = model.nodes[static_cast<size_t>(chunks.node_of_row[row])];
+  start.resize(rows);
+  for (size_t row = 0; row < rows; ++row) start[row] = model.nodes[static_cast<size_t>(chunks.node_of_row[row])];
 }
 
 double* ExplicitSystem::Inside::element_block(ExplicitState& state, int element, size_t& lane) const {
@@ -193,6 +193,7 @@ kernel::StepJob ExplicitSystem::Inside::make_step() const {
 void ExplicitSystem::Inside::advance_nodes(const kernel::StepJob& step, ExplicitState& state) {
   const size_t count = chunks.chunks.size(), tasks = rooms.size(), W = chunks.W;
   const double t0 = seconds();
+  for (kernel::Law& law : laws) kernel::set_step(law, step.past);
   const auto run_task = [&](size_t task) {
     for (size_t i = count * task / tasks; i < count * (task + 1) / tasks; ++i) {
       const ElementChunk& chunk = chunks.chunks[i];
@@ -209,7 +210,7 @@ void ExplicitSystem::Inside::advance_nodes(const kernel::StepJob& step, Explicit
       job.shared_forces = shared_forces.data() + 4 * chunk.first_shared;
       job.own_flags = state.flags.data() + chunk.first_row;
       job.own_pushes = state.pushes.data() + 4 * chunk.first_row;
-      job.room = rooms[task].data();
+      job.forces = rooms[task].data();
       failed[i].clear(), grounded[i].clear();
       job.failed = &failed[i], job.grounded = &grounded[i];
       kernel::advance_chunk(step, job);
@@ -219,7 +220,7 @@ void ExplicitSystem::Inside::advance_nodes(const kernel::StepJob& step, Explicit
       for (std::uint32_t& f : failed[i]) f += static_cast<std::uint32_t>(4 * chunk.first_block * W);
     }
   };
-  const size_t shared = model.nodes.size() - chunks.first_shared_row;
+  const size_t shared = chunks.node_of_row.size() - chunks.first_shared_row;
   const auto run_shared = [&](size_t task) {
     kernel::SharedJob job;
     job.first = shared * task / kTasks, job.last = shared * (task + 1) / kTasks;

@@ -53,7 +53,7 @@ HWY_INLINE Pair load_pair(const double* HWY_RESTRICT rows, const std::uint16_t* 
   return {num(at[0]), num(at[1])};
 }
 HWY_INLINE void add_corner(V x, V y, V z, double* HWY_RESTRICT rows, const std::uint16_t* HWY_RESTRICT node) {
-  double* at = rows + node[0];
+  double* at = rows + node[0] / 2;
   at[0] += hn::GetLane(x), at[1] += hn::GetLane(y), at[2] += hn::GetLane(z);
 }
 #else
@@ -75,6 +75,11 @@ HWY_INLINE Pair load_pair(const double* HWY_RESTRICT rows, const std::uint16_t* 
   return {hn::InterleaveLower(d, even, odd), hn::InterleaveUpper(d, even, odd)};
 }
 
+/// A node's force, of half as many numbers as its row: no arithmetic, four bytes for one of the offset.
+HWY_INLINE double* force_at(double* HWY_RESTRICT forces, size_t node) {
+  return reinterpret_cast<double*>(reinterpret_cast<char*>(forces) + 4 * node);
+}
+
 /// Adds vectors of x y and z 0 of every second lane, as load_pairs gives them, to rows of forces.
 template <class D2>
 HWY_INLINE void add_rows(D2 d, hn::Vec<D2> xy0, hn::Vec<D2> z0, hn::Vec<D2> xy1, hn::Vec<D2> z1,
@@ -82,13 +87,13 @@ HWY_INLINE void add_rows(D2 d, hn::Vec<D2> xy0, hn::Vec<D2> z0, hn::Vec<D2> xy1,
   constexpr size_t kHere = hn::MaxLanes(D2());
   const auto add_to = [&](hn::Vec<D2> f, double* at) HWY_ATTR { hn::Store(hn::Add(hn::Load(d, at), f), d, at); };
   if constexpr (kHere == 2) {
-    add_to(xy0, rows + node[0]), add_to(z0, rows + node[0] + 2);
-    add_to(xy1, rows + node[1]), add_to(z1, rows + node[1] + 2);
+    add_to(xy0, force_at(rows, node[0])), add_to(z0, force_at(rows, node[0]) + 2);
+    add_to(xy1, force_at(rows, node[1])), add_to(z1, force_at(rows, node[1]) + 2);
   } else if constexpr (kHere == 4) {
-    add_to(hn::ConcatLowerLower(d, z0, xy0), rows + node[0]);
-    add_to(hn::ConcatLowerLower(d, z1, xy1), rows + node[1]);
-    add_to(hn::ConcatUpperUpper(d, z0, xy0), rows + node[2]);
-    add_to(hn::ConcatUpperUpper(d, z1, xy1), rows + node[3]);
+    add_to(hn::ConcatLowerLower(d, z0, xy0), force_at(rows, node[0]));
+    add_to(hn::ConcatLowerLower(d, z1, xy1), force_at(rows, node[1]));
+    add_to(hn::ConcatUpperUpper(d, z0, xy0), force_at(rows, node[2]));
+    add_to(hn::ConcatUpperUpper(d, z1, xy1), force_at(rows, node[3]));
   } else {
     const hn::Half<D2> half;
     add_rows(half, hn::LowerHalf(half, xy0), hn::LowerHalf(half, z0), hn::LowerHalf(half, xy1), hn::LowerHalf(half, z1),
@@ -238,6 +243,7 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
   const D d;
   const Law& law = job.laws[job.law_of_block[block]];
   const std::uint16_t* corners = job.corners + block * 8 * kLanes;
+  const double* HWY_RESTRICT rows = job.own_nodes;
   double* HWY_RESTRICT element = job.elements + block * static_cast<size_t>(kElementFields) * kLanes;
   const V zero = hn::Zero(d);
 
@@ -245,17 +251,27 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
   constexpr size_t kSize = size_t{kElementFields} * kLanes;
   for (size_t i = 0; i < kSize; i += 8) hwy::Prefetch(element + 4 * kSize + i);
 
-  // places, and paths of the last step (v)
+  // speeds, and places in the middle of the last step
   Modes3 x, v;
-  read_modes(job.room, corners, x, &V3::x, x, &V3::y);
+  read_modes(rows, corners, x, &V3::x, x, &V3::y);
   reread(corners);
-  read_modes(job.room + 2, corners, x, &V3::z, v, &V3::z);
+  read_modes(rows + 2, corners, x, &V3::z, v, &V3::x);
   reread(corners);
-  read_modes(job.room + 4, corners, v, &V3::x, v, &V3::y);
+  read_modes(rows + 4, corners, v, &V3::y, v, &V3::z);
+  {
+    const V half = num(0.5 * step.past);
+    const auto back = [&](V3 Modes3::*mode) HWY_ATTR {
+      V3& to = x.*mode;
+      const V3& u = v.*mode;
+      to = {fnma(half, u.x, to.x), fnma(half, u.y, to.y), fnma(half, u.z, to.z)};
+    };
+    back(&Modes3::a), back(&Modes3::b), back(&Modes3::c), back(&Modes3::d);
+    back(&Modes3::e), back(&Modes3::f), back(&Modes3::g);
+  }
   const Gradients g = differentiate(x);
   const V inverse = hn::Div(num(1), g.volume);
 
-  // velocity gradient times the step (eq. 5)
+  // velocity gradient (eq. 5)
   Matrix L{scale(v.a.x, g.a), scale(v.a.y, g.a), scale(v.a.z, g.a)};
   add_product(v.b, g.b, L), add_product(v.c, g.c, L), add_product(v.d, g.d, L);
   add_product(v.e, g.e, L), add_product(v.f, g.f, L);
@@ -274,7 +290,7 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
                                  HWY_ATTR { return fnma(l.z, xm.z, fnma(l.y, xm.y, fnma(l.x, xm.x, motion))); };
       return V3{component(vm.x, L.x), component(vm.y, L.y), component(vm.z, L.z)};
     };
-    const V e = num(law.bending), enu = num(law.bending * law.nu), mu = num(law.mu), E = num(law.E);
+    const V e = num(law.step_bending), enu = num(law.step_bending_nu), mu = num(law.step_mu), E = num(law.step_E);
     const V3 q1 = beyond(v.d, x.d);
     const V x1 = dot(x.a, q1), y1 = mul(ib, dot(x.b, q1)), z1 = mul(ic, dot(x.c, q1));
     const V3 q2 = beyond(v.e, x.e);
@@ -301,14 +317,15 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
   V sxy = load_field(element, kStress + 3), syz = load_field(element, kStress + 4),
     szx = load_field(element, kStress + 5);
   {
-    const V half = num(0.5);
+    const V half = num(0.5 * step.past);
     const V wxy = mul(half, sub(L.x.y, L.y.x)), wyz = mul(half, sub(L.y.z, L.z.y)), wxz = mul(half, sub(L.x.z, L.z.x));
     const V a = mul(wxy, sxy), b = mul(wxz, szx), c = mul(wyz, syz);
     const V txy = fma(wxy, sub(syy, sxx), fma(wxz, syz, mul(wyz, szx)));
     const V txz = fma(wxz, sub(szz, sxx), fms(wxy, syz, mul(wyz, sxy)));
     const V tyz = fnma(wxz, sxy, fnma(wxy, szx, mul(wyz, sub(szz, syy))));
     const V ab = add(a, b), ca = sub(c, a), bc2 = add(b, c);
-    const V pressure = mul(num(law.lambda), trace), mu2 = num(2 * law.mu), mu = num(law.mu), two = num(2);
+    const V pressure = mul(num(law.step_lambda), trace), mu2 = num(2 * law.step_mu), mu = num(law.step_mu),
+            two = num(2);
     sxx = add(sxx, fma(mu2, L.x.x, fma(two, ab, pressure)));
     syy = add(syy, fma(mu2, L.y.y, fma(two, ca, pressure)));
     szz = add(szz, fma(mu2, L.z.z, fnma(two, bc2, pressure)));
@@ -444,12 +461,12 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
 
   // bulk viscosity of a closing element (eq. 15)
   {
-    const V closing = mul(load_field(element, kLength), hn::Max(zero, mul(num(-1 / step.h), trace)));
+    const V closing = mul(load_field(element, kLength), hn::Max(zero, mul(num(step.past > 0 ? -1 : 0), trace)));
     const V pressure = mul(mul(mul(num(64), mul(mass, inverse)), closing),
                            fma(num(step.quadratic * step.quadratic), closing, num(step.linear * law.speed)));
     const V both = mul(add(pressure, load_field(element, kViscous)), mul(trace, g.volume));
     store_field(pressure, element, kViscous);
-    sums.viscous = fma(num(-0.5 / 64), both, sums.viscous);
+    sums.viscous = fma(num(-0.5 / 64 * step.past), both, sums.viscous);
     sxx = sub(sxx, pressure), syy = sub(syy, pressure), szz = sub(szz, pressure);
   }
 
@@ -478,7 +495,7 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
     return V3{row(t.x, to.x), row(t.y, to.y), row(t.z, to.z)};
   };
   p1 = times_add(g.d, p1), p2 = times_add(g.e, p2), p3 = times_add(g.f, p3);
-  double* HWY_RESTRICT forces = job.room + kRoomForce;
+  double* HWY_RESTRICT forces = job.forces;
   // corners of the face ζ = -1, then +1: parts of 1 ξ η ξη there
   {
     const auto parts = [&](V c, V b, V d1, V a, V e, V f, V g4) HWY_ATTR {
@@ -515,57 +532,15 @@ HWY_INLINE Motion make_motion(const StepJob& step) {
   return m;
 }
 
-/// New place of one node that nothing holds or pushes; `force` has 4 entries, the last 0.
-HWY_INLINE void move_free(const Motion& motion, double* HWY_RESTRICT node, const double* HWY_RESTRICT force) {
-  const Row d;
-  const auto kick = hn::Set(d, motion.kick * node[kInverseMass]);
-  for (size_t c = 0; c < 4; c += kRowLanes) {
-    double* v = node + kSpeed + c;
-    const auto speed =
-        hn::MulAdd(kick, hn::Load(d, force + c),
-                   hn::MulAdd(hn::Load(d, motion.keep + c), hn::Load(d, v), hn::Load(d, motion.fall + c)));
-    hn::Store(speed, d, v);
-    hn::Store(hn::MulAdd(hn::Load(d, motion.drift + c), speed, hn::Load(d, node + c)), d, node + c);
-  }
-}
-HWY_INLINE void move_flagged(const StepJob& step, double* HWY_RESTRICT node, const double* HWY_RESTRICT force,
-                             std::uint8_t flags, const double* HWY_RESTRICT push, Balance& balance) {
-  const bool pushed = (flags & kPushed) != 0;
-  double* v = node + kSpeed;
-  double force2 = 0, speed2 = 0;
-  for (int c = 0; c < 3; ++c) {
-    double f = pushed ? force[c] + push[c] : force[c];
-    if (step.weighs) f += node[kNodeMass] * step.weight[c];
-    const bool held = (flags & (1 << c)) != 0;
-    v[c] = held ? 0 : step.keep * v[c] + step.kick * node[kInverseMass] * f + step.fall[c];
-    node[c] += step.h * v[c];
-    if (!held) force2 += f * f, speed2 += v[c] * v[c];
-  }
-  if (step.weighs && speed2 > 0) balance.kinetic += speed2 / node[kInverseMass];
-  balance.force2 += force2;
-}
-HWY_INLINE void move_node(const StepJob& step, const Motion& motion, double* HWY_RESTRICT node,
-                          const double* HWY_RESTRICT force, std::uint8_t flags, const double* HWY_RESTRICT push,
-                          Balance& balance) {
-  if (HWY_LIKELY(flags == 0 && !motion.weighs))
-    move_free(motion, node, force);
-  else
-    move_flagged(step, node, force, flags, push, balance);
-}
-
 /// Bounds of places, to look at a ground's planes once for many nodes.
 class Box {
  public:
-  HWY_INLINE explicit Box(const double* HWY_RESTRICT node) {
-    const Row d;
-    for (size_t k = 0; k < kVectors; ++k) low_[k] = high_[k] = hn::Load(d, node + k * kRowLanes);
+  HWY_INLINE Box() {
+    for (size_t k = 0; k < kVectors; ++k) low_[k] = hn::Set(Row(), 1e300), high_[k] = hn::Set(Row(), -1e300);
   }
-  HWY_INLINE void add(const double* HWY_RESTRICT node) {
-    const Row d;
-    for (size_t k = 0; k < kVectors; ++k) {
-      const auto place = hn::Load(d, node + k * kRowLanes);
-      low_[k] = hn::Min(low_[k], place), high_[k] = hn::Max(high_[k], place);
-    }
+  /// Part k of a place, what is behind it aside.
+  HWY_INLINE void add(size_t k, hn::Vec<Row> place) {
+    low_[k] = hn::Min(low_[k], place), high_[k] = hn::Max(high_[k], place);
   }
   HWY_INLINE bool reaches_ground(const StepJob& step) const {
     const Row d;
@@ -586,6 +561,61 @@ class Box {
   hn::Vec<Row> low_[kVectors], high_[kVectors];
 };
 
+/// New place of one node that nothing holds or pushes; `force` has 4 entries, the last 0.
+HWY_INLINE void move_free(const Motion& motion, double* HWY_RESTRICT node, const double* HWY_RESTRICT force, Box& box) {
+#if HWY_TARGET == HWY_SCALAR
+  const double kick = motion.kick * node[kInverseMass];
+  for (size_t c = 0; c < 3; ++c) {
+    node[kSpeed + c] = kick * force[c] + motion.keep[c] * node[kSpeed + c] + motion.fall[c];
+    node[c] += motion.drift[c] * node[kSpeed + c];
+    box.add(c, num(node[c]));
+  }
+#else
+  // the fourth of the speeds is the inverse mass, which stays; the fourth of the places is a speed, written after it
+  const Row d;
+  const auto kick = hn::Set(d, motion.kick * node[kInverseMass]);
+  hn::Vec<Row> speed[4 / kRowLanes];
+  for (size_t c = 0; c < 4; c += kRowLanes)
+    speed[c / kRowLanes] = hn::MulAdd(
+        kick, hn::Load(d, force + c),
+        hn::MulAdd(hn::Load(d, motion.keep + c), hn::LoadU(d, node + kSpeed + c), hn::Load(d, motion.fall + c)));
+  for (size_t c = 0; c < 4; c += kRowLanes) {
+    const auto place = hn::MulAdd(hn::Load(d, motion.drift + c), speed[c / kRowLanes], hn::Load(d, node + c));
+    box.add(c / kRowLanes, place);
+    hn::Store(place, d, node + c);
+  }
+  for (size_t c = 0; c < 4; c += kRowLanes) hn::StoreU(speed[c / kRowLanes], d, node + kSpeed + c);
+#endif
+}
+HWY_INLINE void move_flagged(const StepJob& step, double* HWY_RESTRICT node, const double* HWY_RESTRICT force,
+                             std::uint8_t flags, const double* HWY_RESTRICT push, Balance& balance, Box& box) {
+  const bool pushed = (flags & kPushed) != 0;
+  double* v = node + kSpeed;
+  double force2 = 0, speed2 = 0;
+  for (int c = 0; c < 3; ++c) {
+    double f = pushed ? force[c] + push[c] : force[c];
+    if (step.weighs) f += node[kNodeMass] * step.weight[c];
+    const bool held = (flags & (1 << c)) != 0;
+    v[c] = held ? 0 : step.keep * v[c] + step.kick * node[kInverseMass] * f + step.fall[c];
+    node[c] += step.h * v[c];
+    if (!held) force2 += f * f, speed2 += v[c] * v[c];
+  }
+  for (size_t c = 0; c < 4; c += kRowLanes) {
+    HWY_ALIGN double place[4] = {node[0], node[1], node[2], 0};
+    box.add(c / kRowLanes, hn::Load(Row(), place + c));
+  }
+  if (step.weighs && speed2 > 0) balance.kinetic += speed2 / node[kInverseMass];
+  balance.force2 += force2;
+}
+HWY_INLINE void move_node(const StepJob& step, const Motion& motion, double* HWY_RESTRICT node,
+                          const double* HWY_RESTRICT force, std::uint8_t flags, const double* HWY_RESTRICT push,
+                          Balance& balance, Box& box) {
+  if (HWY_LIKELY(flags == 0 && !motion.weighs))
+    move_free(motion, node, force, box);
+  else
+    move_flagged(step, node, force, flags, push, balance, box);
+}
+
 HWY_INLINE bool is_below(const StepJob& step, const double* HWY_RESTRICT node) {
   bool below = false;
   for (int i = 0; i < step.grounds; ++i) {
@@ -595,40 +625,17 @@ HWY_INLINE bool is_below(const StepJob& step, const double* HWY_RESTRICT node) {
   return below && node[kInverseMass] > 0;
 }
 
-/// A node's row into the room: path of the last step, place in the middle of it, no force.
-HWY_INLINE void copy_node(double past, const double* HWY_RESTRICT from, double* HWY_RESTRICT to) {
-#if HWY_TARGET == HWY_SCALAR
-  for (int c = 0; c < 3; ++c) {
-    const double path = past * from[kSpeed + c];
-    to[c] = from[c] - 0.5 * path, to[c < 2 ? c + 4 : 3] = path;
-    to[kRoomForce + c] = 0;
-  }
-#else
-  const hn::CappedTag<double, 2> d;
-  const auto h = hn::Set(d, past), half = hn::Set(d, 0.5);
-  const auto xy = hn::Mul(h, hn::Load(d, from + kSpeed)), z = hn::Mul(h, hn::Load(d, from + kSpeed + 2));
-  hn::Store(hn::NegMulAdd(half, xy, hn::Load(d, from)), d, to);
-  hn::Store(hn::InterleaveLower(d, hn::NegMulAdd(half, z, hn::Load(d, from + 2)), z), d, to + 2);
-  hn::Store(xy, d, to + 4);
-  const Row row;
-  for (size_t c = 0; c < 4; c += kRowLanes) hn::Store(hn::Zero(row), row, to + kRoomForce + c);
-#endif
-}
-
-HWY_NOINLINE void load_room(const StepJob& step, const ChunkJob& job) {
-  const size_t own = job.own, shared = job.shared;
-  const double past = step.past;
-  double* HWY_RESTRICT to = job.room;
-  const double* HWY_RESTRICT from = job.own_nodes;
-  for (const double* end = from + 8 * own; from != end; from += 8, to += kRoomFields) copy_node(past, from, to);
-  constexpr size_t kAhead = 12;  // rows of other chunks, all over memory
-  const double* HWY_RESTRICT nodes = job.nodes;
+/// Rows of shared nodes behind the chunk's own, without mass.
+HWY_NOINLINE void copy_shared_nodes(const ChunkJob& job) {
+  constexpr size_t kAhead = 12;  // rows all over memory
+  const size_t shared = job.shared;
   const std::uint32_t* HWY_RESTRICT list = job.shared_nodes;
-  const auto row = [&](size_t i) { return nodes + 8 * static_cast<size_t>(list[i]); };
+  const auto row = [&](size_t i) { return job.nodes + 8 * static_cast<size_t>(list[i]); };
   for (size_t i = 0; i < std::min(kAhead, shared); ++i) hwy::Prefetch(row(i));
-  for (size_t i = 0; i < shared; ++i, to += kRoomFields) {
+  double* to = job.own_nodes + 8 * job.own;
+  for (size_t i = 0; i < shared; ++i, to += 8) {
     if (i + kAhead < shared) hwy::Prefetch(row(i + kAhead));
-    copy_node(past, row(i), to);
+    std::memcpy(to, row(i), 6 * sizeof(double));
   }
 }
 
@@ -637,15 +644,15 @@ HWY_NOINLINE void move_own_nodes(const StepJob& step, ChunkJob& job) {
   if (own == 0) return;
   const Motion motion = make_motion(step);
   double* HWY_RESTRICT nodes = job.own_nodes;
-  const double* HWY_RESTRICT force = job.room + kRoomForce;
+  double* HWY_RESTRICT force = job.forces;
   const std::uint8_t* HWY_RESTRICT flags = job.own_flags;
   const double* HWY_RESTRICT pushes = job.own_pushes;
-  Box box(nodes);
+  Box box;
   Balance balance;
-  for (size_t i = 0; i < own; ++i, force += kRoomFields) {
+  for (size_t i = 0; i < own; ++i, force += 4) {
     double* node = nodes + 8 * i;
-    move_node(step, motion, node, force, flags[i], pushes + 4 * i, balance);
-    box.add(node);
+    move_node(step, motion, node, force, flags[i], pushes + 4 * i, balance, box);
+    for (size_t c = 0; c < 4; c += kRowLanes) hn::Store(hn::Zero(Row()), Row(), force + c);
   }
   job.balance = balance;
   if (!box.reaches_ground(step)) return;
@@ -654,10 +661,11 @@ HWY_NOINLINE void move_own_nodes(const StepJob& step, ChunkJob& job) {
 }
 
 void advance_chunk(const StepJob& step, ChunkJob& job) {
-  load_room(step, job);
+  copy_shared_nodes(job);
   const D d;
   Sums sums{hn::Zero(d), hn::Zero(d), hn::Zero(d), hn::Zero(d)};
-  const double* ahead = job.own_nodes + 8 * job.own;  // the next chunk's rows on their way, as many as here
+  const double* ahead =
+      job.own_nodes + 8 * (job.own + job.shared);  // the next chunk's rows on their way, as many as here
   const size_t blocks = job.blocks, rows_a_block = job.own / std::max<size_t>(1, blocks) + 1;
   const unsigned char* HWY_RESTRICT live = job.live;
   for (size_t block = 0; block < blocks; ++block) {
@@ -667,14 +675,16 @@ void advance_chunk(const StepJob& step, ChunkJob& job) {
   const V* vectors[4] = {&sums.mean, &sums.varying, &sums.corner, &sums.viscous};
   for (int i = 0; i < 4; ++i) job.sums[i] += hn::GetLane(hn::SumOfLanes(d, *vectors[i]));
   move_own_nodes(step, job);
-  for (size_t i = 0; i < job.shared; ++i)
-    std::memcpy(job.shared_forces + 4 * i, job.room + kRoomFields * (job.own + i) + kRoomForce, 4 * sizeof(double));
+  double* HWY_RESTRICT shared = job.forces + 4 * job.own;
+  std::memcpy(job.shared_forces, shared, 4 * job.shared * sizeof(double));
+  std::memset(shared, 0, 4 * job.shared * sizeof(double));
 }
 
 void advance_shared(const StepJob& step, SharedJob& job) {
   const Motion motion = make_motion(step);
   const Row d;
   Balance balance;
+  Box box;
   constexpr std::uint32_t kAhead = 16;  // forces of other chunks, all over memory
   const std::uint32_t end = job.starts[job.last];
   for (size_t i = job.first; i < job.last; ++i) {
@@ -689,7 +699,7 @@ void advance_shared(const StepJob& step, SharedJob& job) {
     }
     const size_t row = job.first_row + i;
     double* node = job.nodes + 8 * row;
-    move_node(step, motion, node, f, job.flags[row], job.pushes + 4 * row, balance);
+    move_node(step, motion, node, f, job.flags[row], job.pushes + 4 * row, balance, box);
     if (is_below(step, node)) job.grounded->push_back(static_cast<std::uint32_t>(row));
   }
   job.balance = balance;
@@ -709,6 +719,11 @@ HWY_EXPORT(count_lanes);
 HWY_EXPORT(name_target);
 HWY_EXPORT(advance_chunk);
 HWY_EXPORT(advance_shared);
+
+void set_step(Law& law, double past) {
+  law.step_lambda = past * law.lambda, law.step_mu = past * law.mu, law.step_E = past * law.E;
+  law.step_bending = past * law.bending, law.step_bending_nu = past * (law.bending * law.nu);
+}
 
 size_t lanes() { return HWY_DYNAMIC_DISPATCH(count_lanes)(); }
 std::string target_name() { return HWY_DYNAMIC_DISPATCH(name_target)(); }

@@ -32,11 +32,7 @@ enum ElementField : int {
 };
 
 /// Fields of a node's row.
-enum NodeField : int { kPlace = 0, kInverseMass = 3, kSpeed = 4, kNodeMass = 7, kNodeFields = 8 };
-
-/// Fields of a node in the room of a chunk: place x y z in the middle of the last step, path z x y of it, 2 unused,
-/// force with a fourth entry of 0.
-inline constexpr int kRoomFields = 12, kRoomForce = 8;
+enum NodeField : int { kPlace = 0, kSpeed = 3, kInverseMass = 6, kNodeMass = 7, kNodeFields = 8 };
 
 /// Flags of a node.
 enum NodeFlag : std::uint8_t { kHoldX = 1, kHoldY = 2, kHoldZ = 4, kPushed = 8 };
@@ -59,6 +55,8 @@ struct Law {
   double per_pressure = 0;                        // one over the range to where the compressive one does [1/Pa]
   double cutoff = 0;                              // largest mean tension over the tensile yield stress
   double tension_rate = 0, compression_rate = 0;  // damage for plastic strain
+  // of a step: times StepJob::past (set_step)
+  double step_lambda = 0, step_mu = 0, step_E = 0, step_bending = 0, step_bending_nu = 0;  // [Pa s]
 };
 
 /// What is the same for all chunks of a step.
@@ -87,16 +85,16 @@ struct ChunkJob {
   const std::uint16_t* law_of_block = nullptr;  // into them
   size_t blocks = 0;
   double* elements = nullptr;                   // kElementFields a block
-  const std::uint16_t* corners = nullptr;       // 8 a block of W lanes: kRoomFields times the node's place
+  const std::uint16_t* corners = nullptr;       // 8 a block of W lanes: kNodeFields times the node's place
   const unsigned char* live = nullptr;          // bits of the lanes of a block
   size_t own = 0, shared = 0;                   // nodes: those of this chunk alone come first
-  double* own_nodes = nullptr;                  // kNodeFields each
+  double* own_nodes = nullptr;                  // kNodeFields each; copies of shared nodes follow, written
   const double* nodes = nullptr;                // rows of all nodes
   const std::uint32_t* shared_nodes = nullptr;  // their rows
   double* shared_forces = nullptr;              // 4 each, written
   const std::uint8_t* own_flags = nullptr;      //
   const double* own_pushes = nullptr;           // forces of flagged nodes, 4 each
-  double* room = nullptr;                       // kRoomFields a node of the chunk
+  double* forces = nullptr;                     // room: 4 a node of the chunk, all 0 before and after
   // written
   Balance balance;
   double sums[4] = {0, 0, 0, 0};  // dissipated: mean, over the element, the corner mode in it, bulk viscosity [J]
@@ -120,9 +118,10 @@ struct SharedJob {
 
 size_t lanes();
 std::string target_name();
+/// What of a law goes with the path of the last step.
+void set_step(Law&, double past);
 /// Stresses and forces at the present places from the motion of the last half steps, then the motion of own nodes.
 void advance_chunk(const StepJob&, ChunkJob&);
-/// The same forces without motion or history, for inspection: forces of the chunk's nodes into `room`.
 void advance_shared(const StepJob&, SharedJob&);
 
 }  // namespace topple::fem::kernel

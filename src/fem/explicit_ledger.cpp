@@ -50,7 +50,8 @@ void ExplicitSystem::Inside::press_grounds(ExplicitState& state) const {
     const double mass = r[kernel::kNodeMass];
     if (!(mass > 0)) continue;
     const size_t before = state.touches.size();
-    const Vec3 force = press(row, false, vector_at(r), vector_at(r + 4), mass, 0, kGroundRate * mass / (h * h));
+    const Vec3 force =
+        press(row, false, vector_at(r), vector_at(r + kernel::kSpeed), mass, 0, kGroundRate * mass / (h * h));
     push(state, row, force);
     if (state.touches.size() > before) {
       double& first = state.touchdowns[static_cast<size_t>(first_part_of_row[row])];
@@ -70,8 +71,8 @@ void ExplicitSystem::Inside::press_grounds(ExplicitState& state) const {
 void ExplicitSystem::Inside::book_grounds(ExplicitState& state) const {
   state.ground_work.stored = 0;
   for (const GroundTouch& t : state.touches) {
-    const Vec3 now =
-        t.particle != 0 ? state.particles[t.row].v : vector_at(state.rows.data() + 8 * static_cast<size_t>(t.row) + 4);
+    const Vec3 now = t.particle != 0 ? state.particles[t.row].v
+                                     : vector_at(state.rows.data() + 8 * static_cast<size_t>(t.row) + kernel::kSpeed);
     const Vec3 path = (0.5 * h) * (t.before + now);
     state.ground_work.normal += dot(t.normal_force, path);
     state.ground_work.friction += dot(t.friction, path);
@@ -181,7 +182,7 @@ void ExplicitSystem::Inside::remove_element(ExplicitState& state, int element, R
   std::array<Vec3, 8> v;
   for (size_t i = 0; i < 8; ++i) {
     const double* r = state.rows.data() + 8 * static_cast<size_t>(rows_of_element[e][i]);
-    v[i] = vector_at(r + 4);
+    v[i] = vector_at(r + kernel::kSpeed);
     state.removed_kinetic += 0.5 * share * dot(v[i], v[i]);
   }
   if (cause != RemovalCause::Charge && options.debris) {
@@ -205,11 +206,11 @@ void ExplicitSystem::Inside::remove_element(ExplicitState& state, int element, R
       // what else hung at the node goes with it
       const int node = chunks.node_of_row[row];
       const double extra = model.extra_mass.empty() ? 0 : model.extra_mass[static_cast<size_t>(node)];
-      const Vec3 speed = vector_at(r + 4);
+      const Vec3 speed = vector_at(r + kernel::kSpeed);
       state.removed_kinetic += 0.5 * extra * dot(speed, speed);
       state.removed_gravity -= extra * dot(model.gravity, vector_at(r) - start[row]);
       r[kernel::kNodeMass] = 0;
-      for (int c = 4; c < 7; ++c) r[c] = 0;
+      for (int c = 0; c < 3; ++c) r[kernel::kSpeed + c] = 0;
       state.flags[row] |= kernel::kHoldX | kernel::kHoldY | kernel::kHoldZ;
     }
     r[kernel::kInverseMass] = r[kernel::kNodeMass] > 0 ? 1 / r[kernel::kNodeMass] : 0;
@@ -228,7 +229,8 @@ ExplicitEnergy ExplicitSystem::Inside::calc_energy() {
     const double* r = s.rows.data() + 8 * row;
     const double mass = r[kernel::kNodeMass];
     if (!(mass > 0)) continue;
-    energy.kinetic += 0.5 * mass * dot(vector_at(r + 4), vector_at(ahead.rows.data() + 8 * row + 4));
+    energy.kinetic +=
+        0.5 * mass * dot(vector_at(r + kernel::kSpeed), vector_at(ahead.rows.data() + 8 * row + kernel::kSpeed));
     energy.gravity -= mass * dot(model.gravity, vector_at(r) - start[row]);
   }
   for (const std::uint32_t row : loaded)

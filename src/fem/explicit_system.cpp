@@ -67,7 +67,8 @@ void ExplicitSystem::set_velocities(std::span<const Vec3> v) {
   for (size_t n = 0; n < in.model.nodes.size(); ++n) {
     const std::uint32_t row = in.chunks.row_of_node[n];
     double* r = in.s.rows.data() + 8 * static_cast<size_t>(row);
-    for (int c = 0; c < 3; ++c) r[4 + c] = r[kernel::kNodeMass] > 0 && (in.s.flags[row] & (1 << c)) == 0 ? v[n][c] : 0;
+    for (int c = 0; c < 3; ++c)
+      r[kernel::kSpeed + c] = r[kernel::kNodeMass] > 0 && (in.s.flags[row] & (1 << c)) == 0 ? v[n][c] : 0;
   }
   in.started = false;
   in.s.begins = true;
@@ -80,7 +81,7 @@ Vec3 ExplicitSystem::p(int node) const {
 }
 Vec3 ExplicitSystem::v(int node) const {
   const double* r = inside_->row(inside_->s, node);
-  return {r[4], r[5], r[6]};
+  return {r[kernel::kSpeed], r[kernel::kSpeed + 1], r[kernel::kSpeed + 2]};
 }
 double ExplicitSystem::node_mass(int node) const { return inside_->row(inside_->s, node)[kernel::kNodeMass]; }
 void ExplicitSystem::copy_positions(std::vector<Vec3>& out) const {
@@ -161,7 +162,7 @@ Vec3 ExplicitSystem::calc_momentum() const {
   Vec3 sum;
   for (size_t row = 0; row < inside_->start.size(); ++row) {
     const double* r = inside_->s.rows.data() + 8 * row;
-    sum += r[kernel::kNodeMass] * Vec3{r[4], r[5], r[6]};
+    sum += r[kernel::kNodeMass] * Vec3{r[kernel::kSpeed], r[kernel::kSpeed + 1], r[kernel::kSpeed + 2]};
   }
   for (const Particle& q : inside_->s.particles) sum += q.mass * q.v;
   return sum;
@@ -199,7 +200,7 @@ ExplicitSystem::Resultant ExplicitSystem::calc_resultant(std::span<const int> el
   for (size_t row = 0; row < in.start.size(); ++row) {
     double* r = copy.rows.data() + 8 * row;
     r[kernel::kInverseMass] = 1;
-    for (int c = 4; c < 7; ++c) r[c] = 0;
+    for (int c = 0; c < 3; ++c) r[kernel::kSpeed + c] = 0;
   }
   std::fill(copy.flags.begin(), copy.flags.end(), static_cast<std::uint8_t>(0));
   kernel::StepJob step = in.make_step();
@@ -212,7 +213,7 @@ ExplicitSystem::Resultant ExplicitSystem::calc_resultant(std::span<const int> el
   Resultant sum;
   for (const int n : nodes) {
     const double* r = in.row(copy, n);
-    const Vec3 f{r[4], r[5], r[6]};
+    const Vec3 f{r[kernel::kSpeed], r[kernel::kSpeed + 1], r[kernel::kSpeed + 2]};
     sum.force += f;
     sum.moment += cross(p(n) - about, f);
   }

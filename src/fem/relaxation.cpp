@@ -37,7 +37,7 @@ RelaxationSummary relax_system(ExplicitSystem::Inside& in, const RelaxationOptio
   const double g2 = dot(in.model.gravity, in.model.gravity);
   for (size_t row = 0; row < N; ++row) {
     double* r = s.rows.data() + 8 * row;
-    for (int c = 4; c < 7; ++c) r[c] = 0;
+    for (int c = 0; c < 3; ++c) r[kernel::kSpeed + c] = 0;
     const double mass = r[kernel::kNodeMass];
     if (!(mass > 0)) continue;
     live.push_back(static_cast<std::uint32_t>(row));
@@ -78,7 +78,7 @@ RelaxationSummary relax_system(ExplicitSystem::Inside& in, const RelaxationOptio
       // the mode that leads stands in its equilibrium: back to the places of the stresses, and stop
       for (const std::uint32_t row : live) {
         double* r = s.rows.data() + 8 * size_t{row};
-        for (int c = 0; c < 3; ++c) r[c] -= in.h * r[4 + c], r[4 + c] = 0;
+        for (int c = 0; c < 3; ++c) r[c] -= in.h * r[kernel::kSpeed + c], r[kernel::kSpeed + c] = 0;
       }
       kinetic = 0;
       rests = true;
@@ -98,7 +98,7 @@ RelaxationSummary relax_system(ExplicitSystem::Inside& in, const RelaxationOptio
   for (const std::uint32_t row : live) {
     double* r = s.rows.data() + 8 * size_t{row};
     r[kernel::kInverseMass] = 1 / r[kernel::kNodeMass];
-    for (int c = 4; c < 7; ++c) r[c] = 0;
+    for (int c = 0; c < 3; ++c) r[kernel::kSpeed + c] = 0;
     summary.settlement = std::max(summary.settlement, norm(Vec3{r[0], r[1], r[2]} - in.start[row]));
   }
   summary.text = fmt::format("dead load {} after {} steps: out of balance by {:.2g} of the load, settled by {:.3g} mm",

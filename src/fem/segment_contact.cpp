@@ -41,12 +41,12 @@ PointState find_point(const ContactSetup& setup, const ExplicitState& s, const C
   }
   if (point.kind == ContactPoint::Node) {
     const double* r = s.rows.data() + 8 * size_t{point.index};
-    return {vector_at(r), vector_at(r + 4), r[kernel::kInverseMass], 0};
+    return {vector_at(r), vector_at(r + kernel::kSpeed), r[kernel::kInverseMass], 0};
   }
   const Quad quad = quad_of(setup, point.index);
   for (const std::uint32_t row : quad.rows) {
     const double* r = s.rows.data() + 8 * size_t{row};
-    q.p += 0.25 * vector_at(r), q.v += 0.25 * vector_at(r + 4);
+    q.p += 0.25 * vector_at(r), q.v += 0.25 * vector_at(r + kernel::kSpeed);
     q.inverse_mass += r[kernel::kInverseMass] / 16;
   }
   return q;
@@ -162,7 +162,7 @@ std::optional<SurfaceTouch> press_face(const ContactSetup& setup, const Explicit
     const double* r = s.rows.data() + 8 * size_t{near.rows[k]};
     touch.weights[k] = on.weights[k];
     inverse += on.weights[k] * on.weights[k] * r[kernel::kInverseMass];
-    v -= on.weights[k] * vector_at(r + 4);
+    v -= on.weights[k] * vector_at(r + kernel::kSpeed);
   }
   double rate = kRate / (h * h * inverse);
   if (debris) rate = std::min(rate, s.particles[candidate.point.index].stiffness);
@@ -258,7 +258,7 @@ void book_surfaces(const ExplicitSystem::Inside& in, ExplicitState& s) {
       } else {
         const Quad quad = quad_of(in.contact, touch.face);
         for (size_t k = 0; k < 4; ++k)
-          now -= touch.weights[k] * vector_at(s.rows.data() + 8 * size_t{quad.rows[k]} + 4);
+          now -= touch.weights[k] * vector_at(s.rows.data() + 8 * size_t{quad.rows[k]} + kernel::kSpeed);
       }
       const Vec3 path = (0.5 * in.h) * (touch.before + now);
       work[task].normal += dot(touch.normal_force, path);

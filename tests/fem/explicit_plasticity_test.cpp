@@ -211,7 +211,7 @@ TEST(ExplicitYield, PassesOverNoElementThatYieldsWhateverItsStrengths) {
     std::vector<SampleElement> samples(W);
     AlignedVector<double> elements(W * size_t{kernel::kElementFields}, 0), nodes(size_t{64} * W, 0),
         pushes(size_t{32} * W, 0);
-    AlignedVector<double> room(size_t{8} * kernel::kRoomFields * W, 0);
+    AlignedVector<double> forces(size_t{32} * W, 0);
     std::vector<std::uint8_t> flags(8 * W, 0);
     std::vector<std::uint16_t> corners(8 * W);
     for (size_t l = 0; l < W; ++l) {
@@ -225,7 +225,7 @@ TEST(ExplicitYield, PassesOverNoElementThatYieldsWhateverItsStrengths) {
         const size_t node = 8 * l + i;
         for (int k = 0; k < 3; ++k) nodes[8 * node + static_cast<size_t>(k)] = e.x[i][k];
         nodes[8 * node + kernel::kNodeMass] = nodes[8 * node + kernel::kInverseMass] = 1;
-        corners[i * W + l] = static_cast<std::uint16_t>(kernel::kRoomFields * node);
+        corners[i * W + l] = static_cast<std::uint16_t>(kernel::kNodeFields * node);
       }
       // mean stresses and amplitudes of any ratio, the pressure of any size beside them
       const double least = std::min(t, c), q = least * std::pow(10, uniform(-3, 0.3)),
@@ -248,7 +248,7 @@ TEST(ExplicitYield, PassesOverNoElementThatYieldsWhateverItsStrengths) {
     kernel::ChunkJob job;
     job.laws = &law, job.law_of_block = &law_of_block, job.blocks = 1, job.elements = elements.data();
     job.corners = corners.data(), job.live = &live, job.own = 8 * W, job.own_nodes = nodes.data();
-    job.nodes = nodes.data(), job.own_flags = flags.data(), job.own_pushes = pushes.data(), job.room = room.data();
+    job.nodes = nodes.data(), job.own_flags = flags.data(), job.own_pushes = pushes.data(), job.forces = forces.data();
     job.failed = &failed, job.grounded = &grounded;
     kernel::advance_chunk(step, job);
     for (size_t l = 0; l < W; ++l) {
