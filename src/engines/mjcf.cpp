@@ -14,9 +14,6 @@ namespace {
 
 using Kind = mbs::Joint::Kind;
 
-// Contact bits: what a geom offers (type) meets what another takes (affinity).
-constexpr int kGroundBit = 1, kBodyBit = 2;
-
 std::string text_of(const Vec3& v) { return fmt::format("{:.17g} {:.17g} {:.17g}", v.x, v.y, v.z); }
 std::string text_of(const Quat& q) { return fmt::format("{:.17g} {:.17g} {:.17g} {:.17g}", q.w, q.x, q.y, q.z); }
 std::string text_of(const Pose& X) { return fmt::format("pos=\"{}\" quat=\"{}\"", text_of(X.p), text_of(X.q)); }

@@ -12,6 +12,9 @@
 
 namespace topple::engines {
 
+/// Contact bits: what a geom offers (type) meets what another takes (affinity).
+inline constexpr int kGroundBit = 1, kBodyBit = 2;
+
 struct Mjcf {
   std::string text;
   std::vector<int> twin_of_loop;  // number of the twin that closes each loop of the articulation; -1: a distance

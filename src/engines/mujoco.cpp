@@ -34,8 +34,6 @@ namespace topple::engines {
 
 namespace {
 
-constexpr int kGroundBit = 1, kBodyBit = 2;
-
 /// MuJoCo's handlers of errors and warnings are the process's; these act for threads that are inside a run alone. Its
 /// own would end the process, or write to a file.
 thread_local bool is_inside = false;

@@ -3,6 +3,7 @@
 /// no zero-energy modes, no parameters of its own to be condensed.
 
 #include <array>
+#include <cstddef>
 #include <vector>
 
 #include "base/linalg.h"
@@ -13,7 +14,7 @@ inline constexpr int kPoints = 8;  // integration points, 2 x 2 x 2; bit 0, 1, 2
 
 /// Strains of one element's shape. Voigt xx yy zz xy yz zx with engineering shear, in the frame of the coordinates.
 struct HexShape {
-  std::array<std::array<double, 6 * 24>, kPoints>
+  std::array<std::array<double, std::size_t{6} * 24>, kPoints>
       B{};                               // strain from displacements x1 y1 z1 x2 ..., column by column [1/m]
   std::array<double, kPoints> volume{};  // of each point [m³]
 };

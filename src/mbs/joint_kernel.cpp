@@ -8,6 +8,7 @@
 // after foreach_target
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "mbs/lane_math.inc"
@@ -399,7 +400,7 @@ HWY_INLINE void close_points(const PairJob& job, size_t block) {
     const V3<D> rate = fma(half_h, bias, ((b.v + rb) - (a.v + ra)) + per_h * gap);
     x[0] = rate.x, x[1] = rate.y, x[2] = rate.z;
   }
-  V3<D> axis[N > 0 ? N : 1];
+  V3<D> axis[std::max(N, 1)];
   if constexpr (N > 0) {
     const M33<D> Ra = to_matrix(a.q), Rb = to_matrix(b.q);
     const V3<D> w = wb - wa;
