@@ -44,6 +44,7 @@ Lanes make_batch(const System& build, size_t W) {
   l.W = W;
   l.is_batch = true;
   l.is_planar = build.lanes->is_planar;
+  l.sums_in_plane = build.model.is_planar;
   l.allocate_bodies(build.B);
   l.allocate_elements(build.elements.size());
   const auto body = [&](int b) { return static_cast<std::uint32_t>(b < 0 ? static_cast<int>(build.B) : b); };
@@ -64,7 +65,7 @@ Lanes make_batch(const System& build, size_t W) {
 
 /// Throws InputError if other elements than before leave the plane of a planar model.
 void check_planes(const Lanes& lanes, const System& s, size_t sample) {
-  if (s.lanes->is_planar != lanes.is_planar)
+  if (s.lanes->is_planar != lanes.is_planar || s.model.is_planar != lanes.sums_in_plane)
     throw InputError("E602", "variation " + std::to_string(sample) + " turns bodies out of their planes or into them",
                      "all variations of a planar model move in its planes, or none");
   for (size_t e = 0; e < s.elements.size(); ++e)

@@ -921,6 +921,7 @@ HWY_INLINE void sum_all(const SumJob& job) {
         t = t - load3<D>(from, 6);
       }
     }
+    if (job.is_planar) f.y = t.x = t.z = num<D>(0);
     store3<D>(f, job.force + 3 * W * b, 0);
     store3<D>(t, job.torque + 3 * W * b, 0);
   }

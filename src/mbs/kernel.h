@@ -174,6 +174,7 @@ struct SumJob {
   size_t bodies = 0;
   const std::uint32_t *first, *entries;  // 2 * block + side (side 1: body b)
   const double* forces;
+  bool is_planar = false;  // nothing but what acts in the plane y = const
   double *force, *torque;
 };
 

@@ -231,8 +231,8 @@ void Lanes::evaluate_elements(size_t first, size_t last, std::vector<std::uint32
 }
 
 void Lanes::sum_forces() {
-  const kernel::SumJob job{first_entry.size() - 1, first_entry.data(), entries.data(),
-                           element_forces.data(),  force.data(),       torque.data()};
+  const kernel::SumJob job{first_entry.size() - 1, first_entry.data(), entries.data(), element_forces.data(),
+                           sums_in_plane,          force.data(),       torque.data()};
   if (W == kernel::lanes()) {
     kernel::sum_forces(job);
   } else {

@@ -25,7 +25,8 @@ struct Pairs {
 struct Lanes {
   size_t W = 1;
   bool is_batch = false;
-  bool is_planar = false;  // bodies keep to y = const and turn about y alone
+  bool is_planar = false;      // bodies keep to y = const and turn about y alone
+  bool sums_in_plane = false;  // batch: forces of elements across y = const are left out, as Model::is_planar asks
   size_t body_blocks = 0, element_blocks = 0;
   // bodies, the ground behind the last one
   AlignedVector<double> p, v, L, w, q, R, force, torque, joint_force, joint_torque, body_constants;

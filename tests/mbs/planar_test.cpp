@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "mbs/batch.h"
 #include "mbs/model_json.h"
 #include "models.h"
 #include "views.h"
@@ -159,6 +160,44 @@ TEST(PlanarPhysics, EquilibriumIsThatOfThePlane) {
   const size_t tip = static_cast<size_t>(c.tip.index);
   EXPECT_LT(in_space.front().X_WB[tip].p.z, -1e-3) << "it does bend";
   EXPECT_NEAR(in_plane.front().X_WB[tip].p.z, in_space.front().X_WB[tip].p.z, 1e-9);
+}
+
+TEST(PlanarReplay, ABatchRubsOnTheGroundAsItsSamplesDo) {
+  // two blocks slide side by side; what pulls one to the other acts across their planes and is nothing to friction
+  Model m;
+  m.is_planar = true;
+  m.contact.ground = true, m.contact.bodies = false;
+  BodyId block[2];
+  for (int i = 0; i < 2; ++i) {
+    Body b = make_box("b" + std::to_string(i), 1000, {1, 0.5, 0.2}, {0, 4.0 * i, 0.21});
+    b.v_WB = {2.0 + i, 0, 0};
+    block[i] = add_body(m, b);
+  }
+  ZoneElement link;
+  link.name = "link";
+  link.a = block[0], link.b = block[1];
+  link.X_AF.p = {0, 2, 0.1};
+  link.X_BM.p = {0, -2.01, 0.1};
+  link.translational_stiffness = {2e5, 2e5, 2e5};
+  link.rotational_stiffness = {1e4, 1e4, 1e4};
+  add_element(m, link);
+  std::vector<View> alone;
+  ASSERT_EQ(run(m, look(0.5, alone)).ending, Summary::Ending::TimeLimit);
+  EXPECT_GT(norm(alone.back().element_force[0]), 500) << "the link pulls";
+  EXPECT_LT(alone.back().v_WB[0].x, 1.5) << "friction slows the blocks";
+  BatchOptions o;
+  std::vector<View> unused, together;
+  o.run = look(0.5, unused);
+  o.on_frame = [&](size_t sample, const View& v) {
+    if (sample == 0) together.push_back(v);
+  };
+  (void)run_batch(m, {nullptr, nullptr, nullptr}, o);
+  ASSERT_EQ(alone.size(), together.size());
+  for (size_t f = 0; f < alone.size(); ++f)
+    for (size_t b = 0; b < 2; ++b) {
+      ASSERT_EQ(alone[f].X_WB[b].p, together[f].X_WB[b].p) << alone[f].time;
+      ASSERT_EQ(alone[f].v_WB[b], together[f].v_WB[b]) << alone[f].time;
+    }
 }
 
 TEST(Planar, RefusesAJointBesideThePlaneOfItsBody) {
