@@ -50,7 +50,7 @@ TEST(Knowledge, RefusesWhatIsNotASet) {
                              testing::HasSubstr("\"zone.slip_rupture\" is missing")));
   EXPECT_THAT(complaint_of(replaced(shipped(), "\"value\": 0.35", "\"value\": -0.35")),
               testing::HasSubstr("\"zone.rupture_rotation\" needs a value > 0"));
-  EXPECT_THAT(complaint_of(replaced(shipped(), "\"zone.elongation_share\", \"value\": 0",
+  EXPECT_THAT(complaint_of(replaced(shipped(), "\"zone.elongation_share\", \"value\": 1",
                                     "\"zone.elongation_share\", \"value\": -1")),
               testing::HasSubstr("\"zone.elongation_share\" needs a value >= 0"));
   EXPECT_THAT(complaint_of(replaced(shipped(), "\"value\": 0.35", "\"value\": \"much\"")),

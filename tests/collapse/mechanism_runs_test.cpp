@@ -102,13 +102,11 @@ TEST(MechanismRunPhysics, WithOneColumnGoneItStands) {
 }
 
 TEST(MechanismRunPhysics, ABinThatSinksAndStandsIsAborted) {
-  for (const char* length : {"0.3 m", "0.6 m", "1.8 m"}) {
+  // from 1.5 m on its floors come off as it lands, and what stands then hangs on the step
+  for (const char* length : {"0.3 m", "0.6 m", "1.2 m"}) {
     const auto m = find_mechanism(bin(4) + fire({"C-*-0"}, length), "8 s");
     EXPECT_EQ(m.title, "Mechanism: partial") << length << ": " << m.text;
-    // after the long drop its floors have come off, and the largest part left does not speak for the whole
-    const bool is_whole = std::string(length) != "1.8 m";
-    EXPECT_THAT(m.text, HasSubstr(is_whole ? "Aborted collapse: the upper block has sunk by" : "Aborted collapse"))
-        << length;
+    EXPECT_THAT(m.text, HasSubstr("Aborted collapse: the upper block has sunk by")) << length;
   }
 }
 
