@@ -358,12 +358,14 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
     const V top = mul(num(law.cutoff), y.tension);
     // m / h (eq. 14): what the mean stress may still grow towards its own side (margin over rise) and the other
     const V t = y.tension, c = y.compression, both = add(t, c), one = num(1);
-    const V mean_size = hn::Min(hn::Sqrt(q2), limit), margin = sub(limit, mean_size), reached = add(limit, mean_size);
+    // at its limit the mean stress is a trifle below it, where the quotient of both margins is still that of g
+    const V mean_size = hn::Min(hn::Sqrt(q2), mul(num(1 - 1e-10), limit));
+    const V margin = sub(limit, mean_size), reached = add(limit, mean_size);
     const auto is_pressed = hn::Gt(mul(w, both), t);
     const V own = hn::IfThenElse(is_pressed, c, t), other = hn::IfThenElse(is_pressed, t, c);
     const V back = mul(mul(num(0.5), reached), both), least = mul(own, add(other, mean_size));
     const V opposite = hn::IfThenElse(is_pressed, hn::Max(back, least), hn::Min(back, least));  // times own
-    const V ahead = hn::Max(sub(own, mean_size), num(1e-9));
+    const V ahead = hn::Max(sub(own, mean_size), mul(num(1e-15), limit));
     const V per = hn::Div(one, mul(limit, both)), per_side = mul(margin, hn::Div(one, mul(ahead, opposite)));
     const V along_line = mul(add(other, other), mul(limit, per)), alone = mul(opposite, per_side);
     const V rise = hn::IfThenElse(is_pressed, hn::Max(along_line, hn::Min(alone, one)), hn::Min(along_line, alone));

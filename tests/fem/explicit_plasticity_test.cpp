@@ -174,8 +174,8 @@ Excess calc_excess(const SampleElement& e, double t, double c) {
     h2 += x * x - x * y + y * y + 3 * twist * twist + e.corner[i] * e.corner[i] / 3;
     alike2 += std::pow(along(a, a) * x + along(b, b) * y + 2 * along(a, b) * twist, 2);
   }
-  const double q = std::min(std::sqrt(q2), Y), n = q / Y;
-  const auto over = [](double a, double b) { return a / std::max(b, 1e-9); };
+  const double q = std::min(std::sqrt(q2), (1 - 1e-10) * Y), n = q / Y;
+  const auto over = [](double a, double b) { return b > 0 ? a / b : 1e300; };
   double g = 0, B = 0;
   if (w * (t + c) > t) {
     g = std::max(2 * t / (t + c), std::min(1.0, over(Y - q, c - q)));
@@ -191,6 +191,62 @@ Excess calc_excess(const SampleElement& e, double t, double c) {
   return out;
 }
 
+constexpr double kSampleE = 30e9, kSampleNu = 0.2, kSampleMu = kSampleE / (2 * (1 + kSampleNu));
+
+/// Ideally plastic, with strengths t and c.
+kernel::Law make_sample_law(double t, double c) {
+  kernel::Law law;
+  law.E = kSampleE, law.nu = kSampleNu, law.mu = kSampleMu;
+  law.lambda = kSampleE * kSampleNu / ((1 + kSampleNu) * (1 - 2 * kSampleNu));
+  law.bending = kSampleE / (1 - kSampleNu * kSampleNu), law.bulk = law.lambda + 2.0 / 3 * kSampleMu, law.speed = 3600;
+  law.points = 1, law.tension[0] = t, law.compression[0] = c;
+  law.least_pressure = -t / 3, law.per_pressure = 3 / (t + c), law.cutoff = 1e300;
+  return law;
+}
+
+void set_corners(SampleElement& e, const Vec3& size, double slant) {
+  for (size_t i = 0; i < 8; ++i) {
+    const double s[3] = {i % 4 == 1 || i % 4 == 2 ? 1.0 : 0.0, i % 4 >= 2 ? 1.0 : 0.0, i >= 4 ? 1.0 : 0.0};
+    e.x[i] = {size.x * s[0] + slant * size.y * s[1], size.y * s[1] + slant * size.z * s[2], size.z * s[2]};
+  }
+}
+
+/// What a block of elements (W) yields in a step without motion: plastic strains.
+std::vector<double> find_strains(const std::vector<SampleElement>& samples, const kernel::Law& law) {
+  const size_t W = kernel::lanes();
+  AlignedVector<double> elements(W * size_t{kernel::kElementFields}, 0), nodes(size_t{64} * W, 0),
+      pushes(size_t{32} * W, 0), forces(size_t{32} * W, 0);
+  const std::vector<std::uint8_t> flags(8 * W, 0);
+  std::vector<std::uint16_t> corners(8 * W);
+  for (size_t l = 0; l < W; ++l) {
+    const SampleElement& e = samples[l];
+    for (size_t i = 0; i < 8; ++i) {
+      const size_t node = 8 * l + i;
+      for (int k = 0; k < 3; ++k) nodes[8 * node + static_cast<size_t>(k)] = e.x[i][k];
+      nodes[8 * node + kernel::kNodeMass] = nodes[8 * node + kernel::kInverseMass] = 1;
+      corners[i * W + l] = static_cast<std::uint16_t>(kernel::kNodeFields * node);
+    }
+    const auto put = [&](int field, double value) { elements[static_cast<size_t>(field) * W + l] = value; };
+    for (int k = 0; k < 6; ++k) put(kernel::kStress + k, e.stress[k]), put(kernel::kBending + k, e.bending[k]);
+    for (int k = 0; k < 3; ++k) put(kernel::kTwist + k, e.twist[k]), put(kernel::kCorner + k, e.corner[k]);
+    put(kernel::kMass, 2400 * calc_hex_volume(e.x)), put(kernel::kLength, 0.1);
+  }
+  kernel::StepJob step;
+  step.h = 1e-6, step.removes = false;
+  const std::uint16_t law_of_block = 0;
+  const auto live = static_cast<unsigned char>((1U << W) - 1);
+  std::vector<std::uint32_t> failed, grounded;
+  kernel::ChunkJob job;
+  job.laws = &law, job.law_of_block = &law_of_block, job.blocks = 1, job.elements = elements.data();
+  job.corners = corners.data(), job.live = &live, job.own = 8 * W, job.own_nodes = nodes.data();
+  job.nodes = nodes.data(), job.own_flags = flags.data(), job.own_pushes = pushes.data(), job.forces = forces.data();
+  job.failed = &failed, job.grounded = &grounded;
+  kernel::advance_chunk(step, job);
+  std::vector<double> strains(W);
+  for (size_t l = 0; l < W; ++l) strains[l] = elements[static_cast<size_t>(kernel::kStrain) * W + l];
+  return strains;
+}
+
 TEST(ExplicitYield, PassesOverNoElementThatYieldsWhateverItsStrengths) {
   std::mt19937_64 random(7);
   const auto uniform = [&](double low, double high) {
@@ -198,63 +254,29 @@ TEST(ExplicitYield, PassesOverNoElementThatYieldsWhateverItsStrengths) {
   };
   const auto any = [&] { return uniform(-1, 1); };
   const size_t W = kernel::lanes();
-  constexpr double E = 30e9, nu = 0.2, mu = E / (2 * (1 + nu));
   int yielding = 0, barely = 0, beyond_twice = 0;
   for (int trial = 0; trial < 20000; ++trial) {
     const double c = 20e6, t = c * std::pow(10, uniform(-2, 2));
-    kernel::Law law;
-    law.E = E, law.nu = nu, law.mu = mu, law.lambda = E * nu / ((1 + nu) * (1 - 2 * nu));
-    law.bending = E / (1 - nu * nu), law.bulk = law.lambda + 2.0 / 3 * mu, law.speed = 3600;
-    law.points = 1, law.tension[0] = t, law.compression[0] = c;
-    law.least_pressure = -t / 3, law.per_pressure = 3 / (t + c), law.cutoff = 1e300;
-
     std::vector<SampleElement> samples(W);
-    AlignedVector<double> elements(W * size_t{kernel::kElementFields}, 0), nodes(size_t{64} * W, 0),
-        pushes(size_t{32} * W, 0);
-    AlignedVector<double> forces(size_t{32} * W, 0);
-    std::vector<std::uint8_t> flags(8 * W, 0);
-    std::vector<std::uint16_t> corners(8 * W);
     for (size_t l = 0; l < W; ++l) {
       SampleElement& e = samples[l];
       // a brick, every other one with slanting axes
-      const double slant = l % 2 == 0 ? 0 : uniform(0, 0.8),
-                   size[3] = {uniform(.1, .5), uniform(.1, .5), uniform(.1, .5)};
-      for (size_t i = 0; i < 8; ++i) {
-        const double s[3] = {i % 4 == 1 || i % 4 == 2 ? 1.0 : 0.0, i % 4 >= 2 ? 1.0 : 0.0, i >= 4 ? 1.0 : 0.0};
-        e.x[i] = {size[0] * s[0] + slant * size[1] * s[1], size[1] * s[1] + slant * size[2] * s[2], size[2] * s[2]};
-        const size_t node = 8 * l + i;
-        for (int k = 0; k < 3; ++k) nodes[8 * node + static_cast<size_t>(k)] = e.x[i][k];
-        nodes[8 * node + kernel::kNodeMass] = nodes[8 * node + kernel::kInverseMass] = 1;
-        corners[i * W + l] = static_cast<std::uint16_t>(kernel::kNodeFields * node);
-      }
+      const double slant = l % 2 == 0 ? 0 : uniform(0, 0.8), size_x = uniform(.1, .5), size_y = uniform(.1, .5);
+      const Vec3 size{size_x, size_y, uniform(.1, .5)};
+      set_corners(e, size, slant);
       // mean stresses and amplitudes of any ratio, the pressure of any size beside them
       const double least = std::min(t, c), q = least * std::pow(10, uniform(-3, 0.3)),
                    h = least * std::pow(10, uniform(-2, 0.5)), p = std::max(t, c) * any();
       for (int k = 0; k < 6; ++k) e.stress[k] = q * any() + (k < 3 ? p : 0);
       for (double& b : e.bending) b = h * any();
       for (int k = 0; k < 3; ++k) e.corner[k] = h * any();
-      e.twist[0] = h * any() * 16 * size[0] * size[1], e.twist[1] = h * any() * 16 * size[0] * size[2];
-      e.twist[2] = h * any() * 16 * size[1] * size[2];
-      const auto put = [&](int field, double value) { elements[static_cast<size_t>(field) * W + l] = value; };
-      for (int k = 0; k < 6; ++k) put(kernel::kStress + k, e.stress[k]), put(kernel::kBending + k, e.bending[k]);
-      for (int k = 0; k < 3; ++k) put(kernel::kTwist + k, e.twist[k]), put(kernel::kCorner + k, e.corner[k]);
-      put(kernel::kMass, 2400 * size[0] * size[1] * size[2]), put(kernel::kLength, 0.1);
+      e.twist[0] = h * any() * 16 * size.x * size.y, e.twist[1] = h * any() * 16 * size.x * size.z;
+      e.twist[2] = h * any() * 16 * size.y * size.z;
     }
-    kernel::StepJob step;
-    step.h = 1e-6, step.removes = false;
-    const std::uint16_t law_of_block = 0;
-    const auto live = static_cast<unsigned char>((1U << W) - 1);
-    std::vector<std::uint32_t> failed, grounded;
-    kernel::ChunkJob job;
-    job.laws = &law, job.law_of_block = &law_of_block, job.blocks = 1, job.elements = elements.data();
-    job.corners = corners.data(), job.live = &live, job.own = 8 * W, job.own_nodes = nodes.data();
-    job.nodes = nodes.data(), job.own_flags = flags.data(), job.own_pushes = pushes.data(), job.forces = forces.data();
-    job.failed = &failed, job.grounded = &grounded;
-    kernel::advance_chunk(step, job);
+    const std::vector<double> strains = find_strains(samples, make_sample_law(t, c));
     for (size_t l = 0; l < W; ++l) {
       const Excess excess = calc_excess(samples[l], t, c);
-      const double strain = elements[static_cast<size_t>(kernel::kStrain) * W + l];
-      ASSERT_NEAR(strain * 3 * mu, std::max(0.0, excess.Q - excess.Y), 1e-9 * (excess.Q + excess.Y))
+      ASSERT_NEAR(strains[l] * 3 * kSampleMu, std::max(0.0, excess.Q - excess.Y), 1e-9 * (excess.Q + excess.Y))
           << "t/c " << t / c << " Q/Y " << excess.Q / excess.Y;
       if (excess.Q <= excess.Y) continue;
       ++yielding;
@@ -265,6 +287,31 @@ TEST(ExplicitYield, PassesOverNoElementThatYieldsWhateverItsStrengths) {
   EXPECT_GT(yielding, 5000);
   EXPECT_GT(barely, 500);
   EXPECT_GT(beyond_twice, 50);  // m is more than 2 h in many of them
+}
+
+TEST(ExplicitYield, DoesNotJumpWhereTheMeanStressReachesItsLimit) {
+  const double t = 2e6, c = 20e6, bent = 1e6;
+  // pressure, the yield stress with it, and g of eq. 14 at that limit
+  const struct {
+    double p, Y, g;
+  } cases[] = {{-0.2e6, t + (c - t) * (t / 3 - 0.2e6) / ((t + c) / 3), 2 * c / (t + c)},  // pulled, between t and c
+               {-1.2e6, t, 1},                                                            // pulled, wide open
+               {2e6, t + (c - t) * (t / 3 + 2e6) / ((t + c) / 3), 2 * t / (t + c)},       // pressed, between
+               {25e6, c, 1}};                                                             // held sideways
+  for (const auto& state : cases)
+    for (const double aside : {-1e-6, 1e-6}) {
+      SampleElement e{};
+      set_corners(e, {0.3, 0.2, 0.4}, 0);
+      // shear along x and y, bending along x: of no kind in common, k = 0
+      for (size_t k = 0; k < 3; ++k) e.stress[k] = -state.p;
+      e.stress[3] = (1 + aside) * state.Y / std::sqrt(3);
+      e.bending[2] = bent;
+      const double strain = find_strains(std::vector(kernel::lanes(), e), make_sample_law(t, c))[0];
+      const double m = 2.0 / 3 * state.g * bent;
+      // g changes by at most the offset over (Y - own)/Y beside the limit
+      EXPECT_NEAR(strain * 3 * kSampleMu, std::hypot(state.Y, m) - state.Y, 1e-5 * state.Y)
+          << "p " << state.p << " aside " << aside;
+    }
 }
 
 }  // namespace
