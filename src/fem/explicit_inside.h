@@ -1,6 +1,7 @@
 #pragma once
 /// What an ExplicitSystem is made of: the constant arrangement, and the state that a snapshot holds.
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -32,6 +33,10 @@ struct Particle {
   Vec3 p, v, force;
   Vec3 start;  // where its potential counts from
   double mass = 0, radius = 0, full_radius = 0, stiffness = 0;
+  double bears = 0;    // force at which it is crushed [N]
+  double crushed = 0;  // by how much in this step [m]
+  /// Takes what a spring would press it by beyond what it bears.
+  void crush(double rate, double depth) { crushed = std::max(crushed, depth - bears / rate); }
   int element = 0;
   std::uint32_t touched = 0;  // in this step
 };

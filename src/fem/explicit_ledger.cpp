@@ -11,6 +11,8 @@ namespace {
 
 /// Penalty rate over mass and step squared; shares of the mass that dashpots of friction stop in a step.
 constexpr double kGroundRate = 0.2, kGroundGrip = 0.2;
+/// Of its full radius: debris is crushed no further.
+constexpr double kLeastRadius = 0.1;
 
 Vec3 vector_at(const double* r) { return {r[0], r[1], r[2]}; }
 
@@ -61,10 +63,12 @@ void ExplicitSystem::Inside::press_grounds(ExplicitState& state) const {
   for (size_t i = 0; i < state.particles.size(); ++i) {
     Particle& q = state.particles[i];
     q.force = q.mass * model.gravity;
-    q.touched = 0;
+    q.touched = 0, q.crushed = 0;
     const size_t before = state.touches.size();
     q.force += press(static_cast<std::uint32_t>(i), true, q.p, q.v, q.mass, q.radius, q.stiffness);
     if (state.touches.size() > before) q.touched = 1;
+    for (size_t k = before; k < state.touches.size(); ++k)
+      q.crush(q.stiffness, std::sqrt(2 * state.touches[k].stored / q.stiffness));
   }
 }
 
@@ -83,6 +87,7 @@ void ExplicitSystem::Inside::move_particles(ExplicitState& state) const {
   for (Particle& q : state.particles) {
     q.v += (h / q.mass) * q.force;
     q.p += h * q.v;
+    q.radius = std::max(std::min(q.radius, kLeastRadius * q.full_radius), q.radius - q.crushed);
     // room permitting it grows to its volume within a tenth of a second
     if (q.touched == 0 && q.radius < q.full_radius)
       q.radius = std::min(q.full_radius, q.radius + 10 * h * q.full_radius);
@@ -162,6 +167,7 @@ void ExplicitSystem::Inside::add_debris(ExplicitState& state, int element, const
         q.radius = std::min(0.475 * side, q.full_radius);
         // as stiff as a ball of the material between plates, as far as the step allows
         q.stiffness = std::min(0.02 * q.mass / (h * h), law.E * q.radius);
+        q.bears = law.points > 0 ? law.compression[0] * M_PI * q.full_radius * q.full_radius : 1e300;
         q.element = element;
         state.particles.push_back(q);
       }

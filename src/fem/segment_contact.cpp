@@ -232,6 +232,11 @@ void press_surfaces(const ExplicitSystem::Inside& in, ExplicitState& s) {
   for (const auto& touches : c.touches)
     for (const SurfaceTouch& touch : touches) {
       const Vec3 force = touch.normal_force + touch.friction;
+      const double rate = touch.depth > 0 ? 2 * touch.stored / (touch.depth * touch.depth) : 0;
+      if (touch.point.kind == ContactPoint::Debris && rate > 0) {
+        s.particles[touch.point.index].crush(rate, touch.depth);
+        if (touch.other > 0) s.particles[touch.other - 1].crush(rate, touch.depth);
+      }
       if (touch.point.kind == ContactPoint::Debris)
         s.particles[touch.point.index].force += force, s.particles[touch.point.index].touched = 1;
       else if (touch.point.kind == ContactPoint::Node)

@@ -224,6 +224,24 @@ TEST(ExplicitDebrisPhysics, RubbleBetweenBlockAndGroundCarriesLoadAndKeepsVolume
   }
 }
 
+TEST(ExplicitDebrisPhysics, BallsStoreNoMoreThanWhatTheyBear) {
+  const ExplicitModel model = make_pillar();
+  ExplicitOptions options;
+  options.debris_damping = 0;
+  ExplicitSystem system(model, options);
+  system.set_velocity({0, 0, -10});
+  const double start = system.calc_energy().sum();
+  double fastest = 0;
+  for (int i = 1; i <= 200; ++i) {
+    ASSERT_EQ(system.advance(1e-3 * i), ExplicitEnding::ReachedTime);
+    for (const DebrisParticle& q : system.debris()) fastest = std::max(fastest, norm(q.v));
+  }
+  ASSERT_GT(system.debris().size(), 16U);
+  EXPECT_LT(fastest, 20) << system.debris().size();
+  const ExplicitEnergy energy = system.calc_energy();
+  EXPECT_LT(std::abs(energy.residual()), 0.02 * (start + energy.plastic));
+}
+
 TEST(ExplicitRemovalPhysics, BooksMassAndEnergyOfWhatAChargeTakes) {
   ExplicitModel model = make_pillar();
   model.gravity = {0, 0, -9.81};
