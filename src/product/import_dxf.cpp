@@ -25,7 +25,7 @@ std::vector<Pair> read_pairs(const std::string& text, const std::string& name) {
   std::istringstream in(text);
   std::string code, value;
   int line = 1;
-  const auto trimmed = [](std::string s) {
+  const auto trimmed = [](const std::string& s) {
     const size_t from = s.find_first_not_of(" \t\r"), to = s.find_last_not_of(" \t\r");
     return from == std::string::npos ? std::string() : s.substr(from, to - from + 1);
   };

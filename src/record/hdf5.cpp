@@ -163,8 +163,6 @@ std::size_t size_of(const Shape& shape) {
 /// Puts datasets into a file in memory.
 class Writer {
  public:
-  static constexpr bool writes = true;
-
   Writer() : file_(make_file()) {
     const Handle root(H5Gopen2(file_, "/", H5P_DEFAULT), H5Gclose, "/");
     put_text_attribute(root, "format", format_name);
@@ -286,8 +284,6 @@ class Writer {
 /// Takes datasets out of the bytes of a file.
 class Reader {
  public:
-  static constexpr bool writes = false;
-
   Reader(std::string& bytes, std::string path) : path_(std::move(path)), file_bytes_(bytes.size()), file_(open(bytes)) {
     const Handle root(H5Gopen2(file_, "/", H5P_DEFAULT), H5Gclose, "/");
     if (text_attribute(root, "format") != format_name) throw LibraryError{"format"};
