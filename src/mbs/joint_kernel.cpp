@@ -238,19 +238,37 @@ HWY_INLINE void finish_reaction(const PairJob& job, size_t block, M mask, const 
   if (HWY_UNLIKELY(!hn::AllFalse(d, here))) report<D>(here, block, *job.over);
 }
 
+/// What a block of pairs begins a step with.
+template <class D>
+struct PairBlock {
+  const double* constants;  // kPairConstants
+  double* states;           // kPairStates
+  Places<D> parents, children;
+  Num<D> h;
+  hn::Mask<D> live;  // of pairs that hold, in samples that move
+
+  HWY_INLINE PairBlock(const PairJob& job, size_t block) {
+    const D d;
+    const size_t first = hn::Lanes(d) * block;
+    constants = job.constants + static_cast<size_t>(kPairConstants) * first;
+    states = job.states + static_cast<size_t>(kPairStates) * first;
+    parents = {job.parent + first, (job.straight[block] & 1) != 0};
+    children = {job.child + first, (job.straight[block] & 2) != 0};
+    h = load<D>(job.h, 0);
+    live = hn::And(hn::Gt(load<D>(constants, kPairLive).v, hn::Zero(d)), hn::Gt(h.v, hn::Zero(d)));
+  }
+};
+
 /// Two bodies that move as one (docs/theory/multibody.md, "Joints between two bodies").
 template <class D>
 HWY_INLINE void advance_weld(const PairJob& job, size_t block) {
   const D d;
-  const size_t W = hn::Lanes(d);
-  const double* c = job.constants + static_cast<size_t>(kPairConstants) * W * block;
-  double* s = job.states + static_cast<size_t>(kPairStates) * W * block;
-  const Places<D> parents{job.parent + W * block, (job.straight[block] & 1) != 0};
-  const Places<D> children{job.child + W * block, (job.straight[block] & 2) != 0};
-  const Num<D> h = load<D>(job.h, 0), half_h = num<D>(0.5) * h;
-  const auto live = hn::And(hn::Gt(load<D>(c, kPairLive).v, hn::Zero(d)), hn::Gt(h.v, hn::Zero(d)));
-  const Partner<D> a = read_partner(job, parents);
-  const V3<D> child_v = children.read3(job.v), child_L = children.read3(job.L);
+  const PairBlock<D> pairs(job, block);
+  const double* c = pairs.constants;
+  double* s = pairs.states;
+  const Num<D> h = pairs.h, half_h = num<D>(0.5) * h;
+  const Partner<D> a = read_partner(job, pairs.parents);
+  const V3<D> child_v = pairs.children.read3(job.v), child_L = pairs.children.read3(job.L);
 
   const M33<D> R0 = to_matrix(a.q);
   const V3<D> reach = load3<D>(c, kReach), r0 = R0 * reach, apart = child_v - a.v;
@@ -264,8 +282,8 @@ HWY_INLINE void advance_weld(const PairJob& job, size_t block) {
   const V3<D> turned = h * w;
   const Num<D> half2 = num<D>(0.25) * dot(turned, turned);
   const auto slow = hn::Le(half2.v, hn::Set(d, kMostHalf2));
-  const auto here = hn::And(live, slow);
-  const auto unfit = hn::AndNot(slow, live);
+  const auto here = hn::And(pairs.live, slow);
+  const auto unfit = hn::AndNot(slow, pairs.live);
   if (HWY_UNLIKELY(!hn::AllFalse(d, unfit))) report<D>(unfit, block, *job.unfit);
 
   const Q4<D> step = exp_rotation(turned, half2);
@@ -299,8 +317,8 @@ HWY_INLINE void advance_weld(const PairJob& job, size_t block) {
   B.torque = per_time * (B.L - child_L);
   A.torque = per_time * (A.L - a.L);
   const V3<D> moment = B.torque - cross(R0 * load3<D>(c, kLeverChild), force);
-  write_partner(job, parents, here, A);
-  write_partner(job, children, here, B);
+  write_partner(job, pairs.parents, here, A);
+  write_partner(job, pairs.children, here, B);
   finish_reaction<D>(job, block, here, A.R, force, moment, c, s);
 }
 
@@ -364,20 +382,19 @@ HWY_INLINE void add_mobility(const Mover<D>& m, Num<D> (&a)[3][3]) {
 template <class D, int N>
 HWY_INLINE void close_points(const PairJob& job, size_t block) {
   const D d;
-  const size_t W = hn::Lanes(d);
-  const double* c = job.constants + static_cast<size_t>(kPairConstants) * W * block;
-  double* s = job.states + static_cast<size_t>(kPairStates) * W * block;
-  const Places<D> parents{job.parent + W * block, (job.straight[block] & 1) != 0};
-  const Places<D> children{job.child + W * block, (job.straight[block] & 2) != 0};
-  const Num<D> h = load<D>(job.h, 0), half_h = num<D>(0.5) * h, per_h = num<D>(1) / h;
-  const auto live = hn::And(hn::Gt(load<D>(c, kPairLive).v, hn::Zero(d)), hn::Gt(h.v, hn::Zero(d)));
+  const PairBlock<D> pairs(job, block);
+  const double* c = pairs.constants;
+  double* s = pairs.states;
+  const Num<D> h = pairs.h, half_h = num<D>(0.5) * h, per_h = num<D>(1) / h;
 
   const auto make_mover = [&](const Partner<D>& x, int lever, int inverse_mass, int inertia) -> Mover<D> {
     const M33<D> R = to_matrix(x.q);
     return {x.p, x.v, x.L, R * load3<D>(c, lever), x.q, turn(R, load6<D>(c, inertia)), load<D>(c, inverse_mass)};
   };
-  const Mover<D> a = make_mover(read_partner(job, parents), kLeverParent, kInverseMassParent, kInverseInertiaParent);
-  const Mover<D> b = make_mover(read_partner(job, children), kLeverChild, kInverseMassChild, kInverseInertiaChild);
+  const Mover<D> a =
+      make_mover(read_partner(job, pairs.parents), kLeverParent, kInverseMassParent, kInverseInertiaParent);
+  const Mover<D> b =
+      make_mover(read_partner(job, pairs.children), kLeverChild, kInverseMassChild, kInverseInertiaChild);
 
   // matrix
   constexpr int n = 3 + N;
@@ -430,7 +447,7 @@ HWY_INLINE void close_points(const PairJob& job, size_t block) {
   const Num<D> gap_tolerance = load<D>(c, kGapTolerance), turn_tolerance = load<D>(c, kTurnTolerance);
   Moved<D> MA, MB;
   MA.v = a.v, MA.L = a.L, MB.v = b.v, MB.L = b.L;
-  auto slow = live, open = live;
+  auto slow = pairs.live, open = pairs.live;
   Num<D> widest = num<D>(0), cosine = num<D>(1), sine = num<D>(0);
   const auto move = [&](const Mover<D>& m, const V3<D>& v, const V3<D>& L, Moved<D>& out) {
     out.p = fma(h, v, m.p);
@@ -472,8 +489,8 @@ HWY_INLINE void close_points(const PairJob& job, size_t block) {
     factor.solve(x);
     for (int i = 0; i < n; ++i) total[i] = total[i] + x[i];
   }
-  const auto here = hn::And(slow, hn::AndNot(open, live));
-  const auto unfit = hn::AndNot(here, live);
+  const auto here = hn::And(slow, hn::AndNot(open, pairs.live));
+  const auto unfit = hn::AndNot(here, pairs.live);
   if (HWY_UNLIKELY(!hn::AllFalse(d, unfit))) report<D>(unfit, block, *job.unfit);
 
   const auto end_spin = [&](const Moved<D>& m, int inertia) {
@@ -492,8 +509,8 @@ HWY_INLINE void close_points(const PairJob& job, size_t block) {
   MA.force = zero3<D>() - force;
   MB.torque = cross(b.lever, force) + moment;
   MA.torque = (zero3<D>() - cross(a.lever, force)) - moment;
-  write_partner(job, parents, hn::And(here, hn::Gt(a.inverse_mass.v, hn::Zero(d))), MA);
-  write_partner(job, children, hn::And(here, hn::Gt(b.inverse_mass.v, hn::Zero(d))), MB);
+  write_partner(job, pairs.parents, hn::And(here, hn::Gt(a.inverse_mass.v, hn::Zero(d))), MA);
+  write_partner(job, pairs.children, hn::And(here, hn::Gt(b.inverse_mass.v, hn::Zero(d))), MB);
   for (int i = 0; i < n; ++i) store_where<D>(here, total[i] - linear[i], s, kCurvature + i);
   store_where<D>(here, widest, s, kOpen);
   if constexpr (N == 2) {
@@ -534,15 +551,12 @@ struct PlanarMover {
 template <class D>
 HWY_INLINE void close_in_plane(const PairJob& job, size_t block) {
   const D d;
-  const size_t W = hn::Lanes(d);
-  const double* c = job.constants + static_cast<size_t>(kPairConstants) * W * block;
-  double* s = job.states + static_cast<size_t>(kPairStates) * W * block;
-  const Places<D> parents{job.parent + W * block, (job.straight[block] & 1) != 0};
-  const Places<D> children{job.child + W * block, (job.straight[block] & 2) != 0};
-  const Num<D> zero = num<D>(0), h = load<D>(job.h, 0), half_h = num<D>(0.5) * h, per_h = num<D>(1) / h;
-  const auto live = hn::And(hn::Gt(load<D>(c, kPairLive).v, hn::Zero(d)), hn::Gt(h.v, hn::Zero(d)));
-  const PlanarMover<D> a(job, parents, c, kLeverParent, kInverseMassParent, kInverseInertiaParent);
-  const PlanarMover<D> b(job, children, c, kLeverChild, kInverseMassChild, kInverseInertiaChild);
+  const PairBlock<D> pairs(job, block);
+  const double* c = pairs.constants;
+  double* s = pairs.states;
+  const Num<D> zero = num<D>(0), h = pairs.h, half_h = num<D>(0.5) * h, per_h = num<D>(1) / h;
+  const PlanarMover<D> a(job, pairs.parents, c, kLeverParent, kInverseMassParent, kInverseInertiaParent);
+  const PlanarMover<D> b(job, pairs.children, c, kLeverChild, kInverseMassChild, kInverseInertiaChild);
   const V2<D> ra = a.q * a.arm, rb = b.q * b.arm;
 
   Num<D> A[2][2] = {{zero, zero}, {zero, zero}};
@@ -570,7 +584,7 @@ HWY_INLINE void close_in_plane(const PairJob& job, size_t block) {
     PlanarTurn<D> q;
   };
   Moved MA{a.p, a.v, a.L, a.q}, MB{b.p, b.v, b.L, b.q};
-  auto slow = live, open = live;
+  auto slow = pairs.live, open = pairs.live;
   Num<D> widest = zero;
   const auto move = [&](const PlanarMover<D>& m, Moved& out) {
     out.p = fma(h, out.v, m.p);
@@ -597,8 +611,8 @@ HWY_INLINE void close_in_plane(const PairJob& job, size_t block) {
     factor.solve(x);
     for (int i = 0; i < 2; ++i) total[i] = total[i] + x[i];
   }
-  const auto here = hn::And(slow, hn::AndNot(open, live));
-  const auto unfit = hn::AndNot(here, live);
+  const auto here = hn::And(slow, hn::AndNot(open, pairs.live));
+  const auto unfit = hn::AndNot(here, pairs.live);
   if (HWY_UNLIKELY(!hn::AllFalse(d, unfit))) report<D>(unfit, block, *job.unfit);
 
   const Num<D> per_time = num<D>(1) / load<D>(job.kick, 0);
@@ -617,8 +631,8 @@ HWY_INLINE void close_in_plane(const PairJob& job, size_t block) {
     at.template write_plane<2, 4>(mask, flags, {{to.q.w, 0}, {to.q.y, 2}}, job.q);
     at.template write_plane<4, 9>(mask, flags, {{cosine, 0}, {sine, 2}, {zero - sine, 6}, {cosine, 8}}, job.R);
   };
-  write(parents, a, MA, {zero - force.x, zero - force.z}, zero - cross(ra, force));
-  write(children, b, MB, force, cross(rb, force));
+  write(pairs.parents, a, MA, {zero - force.x, zero - force.z}, zero - cross(ra, force));
+  write(pairs.children, b, MB, force, cross(rb, force));
   for (int i = 0; i < 2; ++i) store_where<D>(here, total[i] - linear[i], s, kCurvature + 2 * i);
   store_where<D>(here, widest, s, kOpen);
   const M33<D> RA = to_matrix(MA.q);

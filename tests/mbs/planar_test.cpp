@@ -17,6 +17,24 @@ namespace {
 using test::look;
 using test::make_box;
 
+constexpr double kStep = 1e-3;  // [s]
+
+/// The same model in space and in its plane, for so long.
+struct Both {
+  std::vector<View> in_space, in_plane;
+  double drift_in_plane = 0;
+};
+Both run_in_both(Model m, double duration) {
+  Both out;
+  for (const bool is_planar : {false, true}) {
+    m.is_planar = is_planar;
+    Options o = look(duration, is_planar ? out.in_plane : out.in_space);
+    o.step = kStep;
+    out.drift_in_plane = run(m, o).joint_drift;
+  }
+  return out;
+}
+
 TEST(PlanarPhysics, NothingLeavesItsPlane) {
   Model m;
   m.is_planar = true;
@@ -91,19 +109,13 @@ TEST(PlanarPhysics, PendulumSwingsAsInSpace) {
   j.X_PF.q = j.X_CM.q = test::upright();  // z along W's y
   j.X_CM.p = {-0.5, 0, 0};
   add_joint(m, j);
-  std::vector<View> in_space, in_plane;
-  Options o = look(2, in_space);
-  o.step = 1e-3;
-  (void)run(m, o);
-  m.is_planar = true;
-  o = look(2, in_plane);
-  o.step = 1e-3;
-  const Summary s = run(m, o);
+  const Both both = run_in_both(m, 2);
+  const std::vector<View>&in_space = both.in_space, &in_plane = both.in_plane;
   ASSERT_EQ(in_space.size(), in_plane.size());
   // the same equations; only what round-off makes of them differs
   for (size_t i = 0; i < in_space.size(); ++i)
     EXPECT_LT(norm(in_space[i].X_WB[0].p - in_plane[i].X_WB[0].p), 1e-9) << in_space[i].time;
-  EXPECT_LT(s.joint_drift, 1e-8);
+  EXPECT_LT(both.drift_in_plane, 1e-8);
 }
 
 TEST(PlanarPhysics, HingedBodiesFlyAsInSpace) {
@@ -124,28 +136,22 @@ TEST(PlanarPhysics, HingedBodiesFlyAsInSpace) {
   j.X_PF.q = j.X_CM.q = to_quat(Mat3::from_columns({0, 0, 1}, {1, 0, 0}, {0, 1, 0}));
   j.X_PF.p = {0.5, 0, 0}, j.X_CM.p = {-0.5, 0, -0.1};
   add_joint(m, j);
-  std::vector<View> in_space, in_plane;
-  Options o = look(1, in_space);
-  o.step = 1e-3;
-  (void)run(m, o);
-  m.is_planar = true;
-  o = look(1, in_plane);
-  o.step = 1e-3;
-  const Summary s = run(m, o);
+  const Both both = run_in_both(m, 1);
+  const std::vector<View>&in_space = both.in_space, &in_plane = both.in_plane;
   ASSERT_EQ(in_space.size(), in_plane.size());
   EXPECT_GT(std::abs(in_space.back().joint_angle[0]), 2) << "it turns";
   // iterations end at a gap of 1e-9 of the size; of a step that is a speed, and with 20 kg a force
-  const double rate = 1e-9 / o.step;
+  const double rate = 1e-9 / kStep;
   for (size_t i = 0; i < in_space.size(); ++i) {
     const View &a = in_space[i], &b = in_plane[i];
     for (size_t k = 0; k < 2; ++k) {
       EXPECT_LT(norm(a.X_WB[k].p - b.X_WB[k].p), 1e-9) << a.time;
       EXPECT_LT(norm(a.w_WB[k] - b.w_WB[k]), rate) << a.time;
     }
-    EXPECT_LT(norm(a.joint_force[0] - b.joint_force[0]), 20 * rate / o.step) << a.time;
+    EXPECT_LT(norm(a.joint_force[0] - b.joint_force[0]), 20 * rate / kStep) << a.time;
     EXPECT_NEAR(a.joint_angle[0], b.joint_angle[0], 1e-9) << a.time;
   }
-  EXPECT_LT(s.joint_drift, 1e-8);
+  EXPECT_LT(both.drift_in_plane, 1e-8);
 }
 
 TEST(PlanarPhysics, EquilibriumIsThatOfThePlane) {
