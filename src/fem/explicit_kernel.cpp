@@ -146,16 +146,39 @@ HWY_INLINE Modes transform(const Quad& low, const Quad& high) {
 struct Modes3 {
   V3 a, b, c, d, e, f, g;
 };
-HWY_INLINE void put(const Modes& from, Modes3& to, V V3::*axis) {
-  to.a.*axis = from.a, to.b.*axis = from.b, to.c.*axis = from.c, to.d.*axis = from.d;
-  to.e.*axis = from.e, to.f.*axis = from.f, to.g.*axis = from.g;
+
+/// Modes of places and speeds of a block, gathered while the block before it is worked on.
+struct Gathered {
+  // modes a to g of x y z, then of the speeds
+  static constexpr size_t kSize = 42 * kLanes;
+  double* HWY_RESTRICT at;
+
+  HWY_INLINE void put(size_t number, const Modes& m) const {
+    const D d;
+    double* to = at + number * kLanes;
+    const V all[7] = {m.a, m.b, m.c, m.d, m.e, m.f, m.g};
+    for (size_t i = 0; i < 7; ++i) hn::Store(all[i], d, to + 6 * i * kLanes);
+  }
+  HWY_INLINE V3 place(size_t mode) const { return load(6 * mode); }
+  HWY_INLINE V3 speed(size_t mode) const { return load(6 * mode + 3); }
+
+ private:
+  HWY_INLINE V3 load(size_t i) const {
+    const D d;
+    return {hn::Load(d, at + i * kLanes), hn::Load(d, at + (i + 1) * kLanes), hn::Load(d, at + (i + 2) * kLanes)};
+  }
+};
+/// A pair of numbers that lie side by side in the rows of nodes: 0 x y, 1 z and speed along x, 2 speeds along y z.
+HWY_INLINE QuadPair gather_low(const double* HWY_RESTRICT rows, const std::uint16_t* corners, size_t pair) {
+  reread(corners);
+  return load_face(rows + 2 * pair, corners);
 }
-/// Modes of a pair of numbers that lie side by side in the rows of nodes.
-HWY_INLINE void read_modes(const double* HWY_RESTRICT rows, const std::uint16_t* corners, Modes3& first,
-                           V V3::*first_axis, Modes3& second, V V3::*second_axis) {
-  const QuadPair low = load_face(rows, corners), high = load_face(rows, corners + 4 * kLanes);
-  put(transform(low.first, high.first), first, first_axis);
-  put(transform(low.second, high.second), second, second_axis);
+HWY_INLINE void gather_high(const double* HWY_RESTRICT rows, const std::uint16_t* corners, size_t pair,
+                            const QuadPair& low, const Gathered& to) {
+  reread(corners);
+  const QuadPair high = load_face(rows + 2 * pair, corners + 4 * kLanes);
+  to.put(2 * pair, transform(low.first, high.first));
+  to.put(2 * pair + 1, transform(low.second, high.second));
 }
 
 /// Derivatives of the volume by the modes but for factors (eq. 3, 4).
@@ -212,6 +235,56 @@ HWY_INLINE Yield find_yield(const Law& law, V strain) {
   return {fma(ts, strain, t), ts, fma(cs, strain, c), cs};
 }
 
+/// What a block may bear beside its mean stress, in stages that wait for roots and quotients.
+struct Capacity {
+  Yield yield;
+  V mean, dx, dy, dz;  // of the mean stress, and its deviator
+  V q2;                // its equivalent stress, squared
+  V w, limit;          // eq. 12
+  V per_bending;       // m / h (eq. 14)
+
+  HWY_INLINE void begin(const Law& law, V strain, V sxx, V syy, V szz, V sxy, V syz, V szx) {
+    yield = find_yield(law, strain);
+    mean = mul(num(1.0 / 3), add(sxx, add(syy, szz)));
+    dx = sub(sxx, mean), dy = sub(syy, mean), dz = sub(szz, mean);
+    // short chains of sums: here all waits for one number
+    const V shear2 = fma(sxy, sxy, fma(syz, syz, mul(szx, szx))), normal2 = fma(dx, dx, fma(dy, dy, mul(dz, dz)));
+    q2 = fma(num(3), shear2, mul(num(1.5), normal2));
+  }
+  HWY_INLINE void take_root(const Law& law) {
+    root_ = hn::Sqrt(q2);
+    w = hn::Min(num(1), hn::Max(hn::Zero(D()), mul(num(law.per_pressure), sub(num(-law.least_pressure), mean))));
+    limit = fma(sub(yield.compression, yield.tension), w, yield.tension);
+    both_ = add(yield.tension, yield.compression);
+    per_ = hn::Div(num(1), mul(limit, both_));
+  }
+  // m / h: what the mean stress may still grow towards its own side (margin over rise) and the other
+  HWY_INLINE void divide() {
+    const V t = yield.tension, c = yield.compression;
+    // at its limit the mean stress is a trifle below it, where the quotient of both margins is still that of g
+    const V mean_size = hn::Min(root_, mul(num(1 - 1e-10), limit));
+    const V margin = sub(limit, mean_size);
+    reached_ = add(limit, mean_size);
+    pressed_ = hn::Gt(mul(w, both_), t);
+    const V own = hn::IfThenElse(pressed_, c, t);
+    other_ = hn::IfThenElse(pressed_, t, c);
+    const V back = mul(mul(num(0.5), reached_), both_), least = mul(own, add(other_, mean_size));
+    opposite_ = hn::IfThenElse(pressed_, hn::Max(back, least), hn::Min(back, least));  // times own
+    const V ahead = hn::Max(sub(own, mean_size), mul(num(1e-15), limit));
+    per_side_ = mul(margin, hn::Div(num(1), mul(ahead, opposite_)));
+    share_ = mul(own, ahead);
+  }
+  HWY_INLINE void end() {
+    const V along_line = mul(add(other_, other_), mul(limit, per_)), alone = mul(opposite_, per_side_);
+    const V rise = hn::IfThenElse(pressed_, hn::Max(along_line, hn::Min(alone, num(1))), hn::Min(along_line, alone));
+    per_bending = mul(mul(num(1.0 / 3), mul(reached_, mul(both_, per_))), fma(share_, per_side_, rise));
+  }
+
+ private:
+  V root_, both_, per_, reached_, other_, opposite_, per_side_, share_;
+  hn::Mask<D> pressed_;
+};
+
 struct Sums {
   V mean, varying, corner, viscous;
 };
@@ -238,11 +311,14 @@ HWY_INLINE void add_product(const V3& v, const V3& g, Matrix& m) {
   m.x = fma(v.x, g, m.x), m.y = fma(v.y, g, m.y), m.z = fma(v.z, g, m.z);
 }
 
-/// Everything of a block of elements between the nodes' motion and their forces.
-HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t block, Sums& sums) {
+/// Everything of a block of elements between the motion of its nodes' modes and their forces. Long chains of arithmetic
+/// alternate with gathering the next block, which depends on none of them.
+HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t block, const Gathered& modes,
+                              size_t next, const Gathered& ahead, Sums& sums) {
   const D d;
   const Law& law = job.laws[job.law_of_block[block]];
   const std::uint16_t* corners = job.corners + block * 8 * kLanes;
+  const std::uint16_t* next_corners = job.corners + next * 8 * kLanes;
   const double* HWY_RESTRICT rows = job.own_nodes;
   double* HWY_RESTRICT element = job.elements + block * static_cast<size_t>(kElementFields) * kLanes;
   const V zero = hn::Zero(d);
@@ -251,66 +327,32 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
   constexpr size_t kSize = size_t{kElementFields} * kLanes;
   for (size_t i = 0; i < kSize; i += 8) hwy::Prefetch(element + 4 * kSize + i);
 
-  // speeds, and places in the middle of the last step
-  Modes3 x, v;
-  read_modes(rows, corners, x, &V3::x, x, &V3::y);
-  reread(corners);
-  read_modes(rows + 2, corners, x, &V3::z, v, &V3::x);
-  reread(corners);
-  read_modes(rows + 4, corners, v, &V3::y, v, &V3::z);
+  // places in the middle of the last step
+  Modes3 x;
   {
     const V half = num(0.5 * step.past);
-    const auto back = [&](V3 Modes3::*mode) HWY_ATTR {
-      V3& to = x.*mode;
-      const V3& u = v.*mode;
-      to = {fnma(half, u.x, to.x), fnma(half, u.y, to.y), fnma(half, u.z, to.z)};
+    const auto back = [&](size_t mode) HWY_ATTR {
+      const V3 to = modes.place(mode), u = modes.speed(mode);
+      return V3{fnma(half, u.x, to.x), fnma(half, u.y, to.y), fnma(half, u.z, to.z)};
     };
-    back(&Modes3::a), back(&Modes3::b), back(&Modes3::c), back(&Modes3::d);
-    back(&Modes3::e), back(&Modes3::f), back(&Modes3::g);
+    x = {back(0), back(1), back(2), back(3), back(4), back(5), back(6)};
   }
-  const Gradients g = differentiate(x);
-  const V inverse = hn::Div(num(1), g.volume);
-
-  // velocity gradient (eq. 5)
-  Matrix L{scale(v.a.x, g.a), scale(v.a.y, g.a), scale(v.a.z, g.a)};
-  add_product(v.b, g.b, L), add_product(v.c, g.c, L), add_product(v.d, g.d, L);
-  add_product(v.e, g.e, L), add_product(v.f, g.f, L);
-  L = {scale(inverse, L.x), scale(inverse, L.y), scale(inverse, L.z)};
-  const V trace = add(add(L.x.x, L.y.y), L.z.z);
-
-  // what varies over the element (eq. 8 to 11)
   const V length_a = dot(x.a, x.a), length_b = dot(x.b, x.b), length_c = dot(x.c, x.c);
   const V bc = mul(length_b, length_c);
   const V all = hn::Div(num(1), mul(length_a, bc));
   const V ia = mul(all, bc), ib = mul(all, mul(length_c, length_a)), ic = mul(all, mul(length_a, length_b));
-  Amplitudes s;
-  {
-    const auto beyond = [&](const V3& vm, const V3& xm) HWY_ATTR {
-      const auto component = [&](V motion, const V3& l)
-                                 HWY_ATTR { return fnma(l.z, xm.z, fnma(l.y, xm.y, fnma(l.x, xm.x, motion))); };
-      return V3{component(vm.x, L.x), component(vm.y, L.y), component(vm.z, L.z)};
-    };
-    const V e = num(law.step_bending), enu = num(law.step_bending_nu), mu = num(law.step_mu), E = num(law.step_E);
-    const V3 q1 = beyond(v.d, x.d);
-    const V x1 = dot(x.a, q1), y1 = mul(ib, dot(x.b, q1)), z1 = mul(ic, dot(x.c, q1));
-    const V3 q2 = beyond(v.e, x.e);
-    const V x2 = mul(ia, dot(x.a, q2)), y2 = dot(x.b, q2), z2 = mul(ic, dot(x.c, q2));
-    s.bending[0] = fma(e, x2, fma(enu, y1, load_field(element, kBending)));
-    s.bending[1] = fma(e, y1, fma(enu, x2, load_field(element, kBending + 1)));
-    s.twist[0] = fma(mu, add(x1, y2), load_field(element, kTwist));
-    const V3 q3 = beyond(v.f, x.f);
-    const V x3 = mul(ia, dot(x.a, q3)), y3 = mul(ib, dot(x.b, q3)), z3 = dot(x.c, q3);
-    s.bending[2] = fma(e, x3, fma(enu, z1, load_field(element, kBending + 2)));
-    s.bending[3] = fma(e, z1, fma(enu, x3, load_field(element, kBending + 3)));
-    s.twist[1] = fma(mu, add(x1, z3), load_field(element, kTwist + 1));
-    s.bending[4] = fma(e, y3, fma(enu, z2, load_field(element, kBending + 4)));
-    s.bending[5] = fma(e, z2, fma(enu, y3, load_field(element, kBending + 5)));
-    s.twist[2] = fma(mu, add(y2, z3), load_field(element, kTwist + 2));
-    const V3 q4 = beyond(v.g, x.g);
-    s.corner[0] = fma(mul(E, ia), dot(x.a, q4), load_field(element, kCorner));
-    s.corner[1] = fma(mul(E, ib), dot(x.b, q4), load_field(element, kCorner + 1));
-    s.corner[2] = fma(mul(E, ic), dot(x.c, q4), load_field(element, kCorner + 2));
-  }
+  const QuadPair low0 = gather_low(rows, next_corners, 0);
+  const Gradients g = differentiate(x);
+  const V inverse = hn::Div(num(1), g.volume);
+
+  // velocity gradient (eq. 5)
+  const V3 va = modes.speed(0);
+  Matrix L{scale(va.x, g.a), scale(va.y, g.a), scale(va.z, g.a)};
+  add_product(modes.speed(1), g.b, L), add_product(modes.speed(2), g.c, L), add_product(modes.speed(3), g.d, L);
+  add_product(modes.speed(4), g.e, L), add_product(modes.speed(5), g.f, L);
+  gather_high(rows, next_corners, 0, low0, ahead);
+  L = {scale(inverse, L.x), scale(inverse, L.y), scale(inverse, L.z)};
+  const V trace = add(add(L.x.x, L.y.y), L.z.z);
 
   // mean stress: turned with the element (Jaumann), then elastic (eq. 7)
   V sxx = load_field(element, kStress), syy = load_field(element, kStress + 1), szz = load_field(element, kStress + 2);
@@ -336,17 +378,57 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
   const V mass = load_field(element, kMass);
   const auto live = hn::Gt(mass, zero);
 
+  // what varies over the element (eq. 8 to 11), and between it what else takes its time
+  Amplitudes s;
+  Capacity cap;
+  const bool yields = law.points > 0;
+  {
+    const auto beyond = [&](const V3& vm, const V3& xm) HWY_ATTR {
+      const auto component = [&](V motion, const V3& l)
+                                 HWY_ATTR { return fnma(l.z, xm.z, fnma(l.y, xm.y, fnma(l.x, xm.x, motion))); };
+      return V3{component(vm.x, L.x), component(vm.y, L.y), component(vm.z, L.z)};
+    };
+    const V e = num(law.step_bending), enu = num(law.step_bending_nu), mu = num(law.step_mu), E = num(law.step_E);
+    const V3 q1 = beyond(modes.speed(3), x.d);
+    const V x1 = dot(x.a, q1), y1 = mul(ib, dot(x.b, q1)), z1 = mul(ic, dot(x.c, q1));
+    if (yields) cap.begin(law, load_field(element, kStrain), sxx, syy, szz, sxy, syz, szx);
+    const QuadPair low1 = gather_low(rows, next_corners, 1);
+    if (yields) cap.take_root(law);
+    gather_high(rows, next_corners, 1, low1, ahead);
+    const V3 q2 = beyond(modes.speed(4), x.e);
+    const V x2 = mul(ia, dot(x.a, q2)), y2 = dot(x.b, q2), z2 = mul(ic, dot(x.c, q2));
+    s.bending[0] = fma(e, x2, fma(enu, y1, load_field(element, kBending)));
+    s.bending[1] = fma(e, y1, fma(enu, x2, load_field(element, kBending + 1)));
+    s.twist[0] = fma(mu, add(x1, y2), load_field(element, kTwist));
+    if (yields) cap.divide();
+    const QuadPair low2 = gather_low(rows, next_corners, 2);
+    const V3 q3 = beyond(modes.speed(5), x.f);
+    const V x3 = mul(ia, dot(x.a, q3)), y3 = mul(ib, dot(x.b, q3)), z3 = dot(x.c, q3);
+    s.bending[2] = fma(e, x3, fma(enu, z1, load_field(element, kBending + 2)));
+    s.bending[3] = fma(e, z1, fma(enu, x3, load_field(element, kBending + 3)));
+    s.twist[1] = fma(mu, add(x1, z3), load_field(element, kTwist + 1));
+    s.bending[4] = fma(e, y3, fma(enu, z2, load_field(element, kBending + 4)));
+    s.bending[5] = fma(e, z2, fma(enu, y3, load_field(element, kBending + 5)));
+    s.twist[2] = fma(mu, add(y2, z3), load_field(element, kTwist + 2));
+    gather_high(rows, next_corners, 2, low2, ahead);
+    if (yields) cap.end();
+    const V3 q4 = beyond(modes.speed(6), x.g);
+    s.corner[0] = fma(mul(E, ia), dot(x.a, q4), load_field(element, kCorner));
+    s.corner[1] = fma(mul(E, ib), dot(x.b, q4), load_field(element, kCorner + 1));
+    s.corner[2] = fma(mul(E, ic), dot(x.c, q4), load_field(element, kCorner + 2));
+  }
+
+  // too short for the step (eq. 16), or turned inside out
+  const V aa = dot(g.a, g.a), bb = dot(g.b, g.b), cc = dot(g.c, g.c);
+  const V stiff = fma(num(law.lambda), add(aa, add(bb, cc)), mul(num(2 * law.mu), hn::Max(aa, hn::Max(bb, cc))));
+  const auto lost = hn::And(live, hn::Gt(mul(num(step.h * step.h), stiff), mul(num(4), mul(mass, g.volume))));
+
   if (law.points > 0) {
-    V strain = load_field(element, kStrain);
-    const Yield y = find_yield(law, strain);
-    V mean = mul(num(1.0 / 3), add(sxx, add(syy, szz)));
-    const V dx = sub(sxx, mean), dy = sub(syy, mean), dz = sub(szz, mean);
-    // short chains of sums: here all waits for one number
-    const V shear2 = fma(sxy, sxy, fma(syz, syz, mul(szx, szx))), normal2 = fma(dx, dx, fma(dy, dy, mul(dz, dz)));
-    const V q2 = fma(num(3), shear2, mul(num(1.5), normal2));
-    // share of compression (eq. 12)
-    const V w = hn::Min(num(1), hn::Max(zero, mul(num(law.per_pressure), sub(num(-law.least_pressure), mean))));
-    const V limit = fma(sub(y.compression, y.tension), w, y.tension);
+    const Yield& y = cap.yield;
+    const V dx = cap.dx, dy = cap.dy, dz = cap.dz, q2 = cap.q2, w = cap.w, limit = cap.limit;
+    const V top = mul(num(law.cutoff), y.tension);
+    const V per_bending = cap.per_bending;
+    V mean = cap.mean;
     const V iab = mul(ia, ib), iac = mul(ia, ic), ibc = mul(ib, ic);
     const auto bend2 = [&](const V* bent)
                            HWY_ATTR { return fma(bent[0], sub(bent[0], bent[1]), mul(bent[1], bent[1])); };
@@ -355,21 +437,6 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
     const V corner2 = fma(s.corner[0], s.corner[0], fma(s.corner[1], s.corner[1], mul(s.corner[2], s.corner[2])));
     const V h2 = fma(
         num(3), t2, fma(num(1.0 / 3), corner2, add(bend2(s.bending), add(bend2(s.bending + 2), bend2(s.bending + 4)))));
-    const V top = mul(num(law.cutoff), y.tension);
-    // m / h (eq. 14): what the mean stress may still grow towards its own side (margin over rise) and the other
-    const V t = y.tension, c = y.compression, both = add(t, c), one = num(1);
-    // at its limit the mean stress is a trifle below it, where the quotient of both margins is still that of g
-    const V mean_size = hn::Min(hn::Sqrt(q2), mul(num(1 - 1e-10), limit));
-    const V margin = sub(limit, mean_size), reached = add(limit, mean_size);
-    const auto is_pressed = hn::Gt(mul(w, both), t);
-    const V own = hn::IfThenElse(is_pressed, c, t), other = hn::IfThenElse(is_pressed, t, c);
-    const V back = mul(mul(num(0.5), reached), both), least = mul(own, add(other, mean_size));
-    const V opposite = hn::IfThenElse(is_pressed, hn::Max(back, least), hn::Min(back, least));  // times own
-    const V ahead = hn::Max(sub(own, mean_size), mul(num(1e-15), limit));
-    const V per = hn::Div(one, mul(limit, both)), per_side = mul(margin, hn::Div(one, mul(ahead, opposite)));
-    const V along_line = mul(add(other, other), mul(limit, per)), alone = mul(opposite, per_side);
-    const V rise = hn::IfThenElse(is_pressed, hn::Max(along_line, hn::Min(alone, one)), hn::Min(along_line, alone));
-    const V per_bending = mul(mul(num(1.0 / 3), mul(reached, mul(both, per))), fma(mul(own, ahead), per_side, rise));
     // k is at most 4/√3 q m, in an element of any shape
     const V m2 = mul(mul(h2, per_bending), per_bending), left = sub(mul(limit, limit), add(q2, m2));
     const auto may_flow = hn::Or(hn::Lt(left, zero), hn::Lt(mul(left, left), mul(num(16.0 / 9), mul(q2, m2))));
@@ -417,7 +484,7 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
         for (V& a : s.twist) a = mul(a, keep);
         for (V& a : s.corner) a = mul(a, keep);
         const V more = add(flow, opening);
-        strain = add(strain, more);
+        const V strain = add(load_field(element, kStrain), more);
         const V wear = fma(num(law.compression_rate - law.tension_rate), w, num(law.tension_rate));
         const V damage = fma(more, wear, load_field(element, kDamage));
         store_field(strain, element, kStrain);
@@ -434,19 +501,12 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
     }
   }
 
-  // too short for the step (eq. 16), or turned inside out
-  {
-    const V aa = dot(g.a, g.a), bb = dot(g.b, g.b), cc = dot(g.c, g.c);
-    const V stiff = fma(num(law.lambda), add(aa, add(bb, cc)), mul(num(2 * law.mu), hn::Max(aa, hn::Max(bb, cc))));
-    const auto lost = hn::And(live, hn::Gt(mul(num(step.h * step.h), stiff), mul(num(4), mul(mass, g.volume))));
-    if (HWY_UNLIKELY(step.removes && !hn::AllFalse(d, lost))) {
-      HWY_ALIGN double bits[kLanes];
-      hn::Store(hn::IfThenElseZero(lost, num(1)), d, bits);
-      for (size_t l = 0; l < kLanes; ++l)
-        if (bits[l] > 0) job.failed->push_back(static_cast<std::uint32_t>(4 * (block * kLanes + l) + 3));
-    }
+  if (HWY_UNLIKELY(step.removes && !hn::AllFalse(d, lost))) {
+    HWY_ALIGN double bits[kLanes];
+    hn::Store(hn::IfThenElseZero(lost, num(1)), d, bits);
+    for (size_t l = 0; l < kLanes; ++l)
+      if (bits[l] > 0) job.failed->push_back(static_cast<std::uint32_t>(4 * (block * kLanes + l) + 3));
   }
-
   if (HWY_UNLIKELY(job.live[block] != (1U << kLanes) - 1)) {
     const auto keep_live = [&](V& x1) HWY_ATTR { x1 = hn::IfThenElseZero(live, x1); };
     keep_live(sxx), keep_live(syy), keep_live(szz), keep_live(sxy), keep_live(syz), keep_live(szx);
@@ -670,9 +730,22 @@ void advance_chunk(const StepJob& step, ChunkJob& job) {
       job.own_nodes + 8 * (job.own + job.shared);  // the next chunk's rows on their way, as many as here
   const size_t blocks = job.blocks, rows_a_block = job.own / std::max<size_t>(1, blocks) + 1;
   const unsigned char* HWY_RESTRICT live = job.live;
+  HWY_ALIGN double room[2 * Gathered::kSize];
+  Gathered now{room}, then{room + Gathered::kSize};
+  size_t first = 0;
+  while (first < blocks && live[first] == 0) ++first;
+  if (first < blocks)
+    for (size_t pair = 0; pair < 3; ++pair) {
+      const std::uint16_t* corners = job.corners + first * 8 * kLanes;
+      gather_high(job.own_nodes, corners, pair, gather_low(job.own_nodes, corners, pair), now);
+    }
   for (size_t block = 0; block < blocks; ++block) {
     for (const double* end = ahead + 8 * rows_a_block; ahead != end; ahead += 8) hwy::Prefetch(ahead);
-    if (live[block] != 0) advance_block(step, job, block, sums);
+    if (live[block] == 0) continue;
+    size_t next = block + 1;
+    while (next < blocks && live[next] == 0) ++next;
+    advance_block(step, job, block, now, std::min(next, blocks - 1), then, sums);
+    std::swap(now.at, then.at);
   }
   const V* vectors[4] = {&sums.mean, &sums.varying, &sums.corner, &sums.viscous};
   for (int i = 0; i < 4; ++i) job.sums[i] += hn::GetLane(hn::SumOfLanes(d, *vectors[i]));
