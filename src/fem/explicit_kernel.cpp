@@ -604,11 +604,19 @@ class Box {
   HWY_INLINE void add(size_t k, hn::Vec<Row> place) {
     low_[k] = hn::Min(low_[k], place), high_[k] = hn::Max(high_[k], place);
   }
+  /// A place of which the numbers have just been written one by one, and cannot be read as a vector without waiting.
+  HWY_INLINE void add(const double* place) {
+    for (int c = 0; c < 3; ++c) {
+      single_low_[c] = std::min(single_low_[c], place[c]);
+      single_high_[c] = std::max(single_high_[c], place[c]);
+    }
+  }
   HWY_INLINE bool reaches_ground(const StepJob& step) const {
     const Row d;
     HWY_ALIGN double low[4], high[4];
     for (size_t k = 0; k < kVectors; ++k)
       hn::Store(low_[k], d, low + k * kRowLanes), hn::Store(high_[k], d, high + k * kRowLanes);
+    for (int c = 0; c < 3; ++c) low[c] = std::min(low[c], single_low_[c]), high[c] = std::max(high[c], single_high_[c]);
     for (int i = 0; i < step.grounds; ++i) {
       const double* n = step.ground[i];
       double nearest = 0;
@@ -621,6 +629,7 @@ class Box {
  private:
   static constexpr size_t kVectors = 4 / kRowLanes;
   hn::Vec<Row> low_[kVectors], high_[kVectors];
+  double single_low_[3] = {1e300, 1e300, 1e300}, single_high_[3] = {-1e300, -1e300, -1e300};
 };
 
 /// New place of one node that nothing holds or pushes; `force` has 4 entries, the last 0.
@@ -662,10 +671,7 @@ HWY_INLINE void move_flagged(const StepJob& step, double* HWY_RESTRICT node, con
     node[c] += step.h * v[c];
     if (!held) force2 += f * f, speed2 += v[c] * v[c];
   }
-  for (size_t c = 0; c < 4; c += kRowLanes) {
-    HWY_ALIGN double place[4] = {node[0], node[1], node[2], 0};
-    box.add(c / kRowLanes, hn::Load(Row(), place + c));
-  }
+  box.add(node);
   if (step.weighs && speed2 > 0) balance.kinetic += speed2 / node[kInverseMass];
   balance.force2 += force2;
 }
@@ -709,17 +715,20 @@ HWY_NOINLINE void move_own_nodes(const StepJob& step, ChunkJob& job) {
   double* HWY_RESTRICT force = job.forces;
   const std::uint8_t* HWY_RESTRICT flags = job.own_flags;
   const double* HWY_RESTRICT pushes = job.own_pushes;
-  Box box;
   Balance balance;
-  for (size_t i = 0; i < own; ++i, force += 4) {
-    double* node = nodes + 8 * i;
-    move_node(step, motion, node, force, flags[i], pushes + 4 * i, balance, box);
-    for (size_t c = 0; c < 4; c += kRowLanes) hn::Store(hn::Zero(Row()), Row(), force + c);
+  constexpr size_t kRun = 32;  // neighbours, which a ground is looked for together
+  for (size_t begin = 0; begin < own; begin += kRun) {
+    const size_t end = std::min(own, begin + kRun);
+    Box box;
+    for (size_t i = begin; i < end; ++i, force += 4) {
+      move_node(step, motion, nodes + 8 * i, force, flags[i], pushes + 4 * i, balance, box);
+      for (size_t c = 0; c < 4; c += kRowLanes) hn::Store(hn::Zero(Row()), Row(), force + c);
+    }
+    if (!box.reaches_ground(step)) continue;
+    for (size_t i = begin; i < end; ++i)
+      if (is_below(step, nodes + 8 * i)) job.grounded->push_back(static_cast<std::uint32_t>(i));
   }
   job.balance = balance;
-  if (!box.reaches_ground(step)) return;
-  for (size_t i = 0; i < own; ++i)
-    if (is_below(step, nodes + 8 * i)) job.grounded->push_back(static_cast<std::uint32_t>(i));
 }
 
 void advance_chunk(const StepJob& step, ChunkJob& job) {
