@@ -16,9 +16,8 @@ namespace topple::mbs {
 namespace {
 
 constexpr int kMostContactInterval = 2;
-constexpr double kLookAngle = 0.12;      // of a contact's swing from one look for points to the next, at most [rad]
-constexpr int kMembersOfNode = 15;       // shapes of a body; more are pieces of one surface
-constexpr double kStickStiffness = 1.2;  // of the mean normal stiffness of a corner
+constexpr double kLookAngle = 0.12;  // of a contact's swing from one look for points to the next, at most [rad]
+constexpr int kMembersOfNode = 15;   // shapes of a body; more are pieces of one surface
 
 /// Component of a vector in a block of lanes.
 Vec3 read3(const double* slot, int field, size_t W) {
@@ -85,6 +84,7 @@ int System::calc_contact_interval() const {
 
 void System::evaluate_contact(double h) {
   add_travel(h);
+  if (!has_other_contacts()) return;
   Touching& t = state.touching;
   const bool follows = h > 0 && !is_look_due();
   const int passed = t.steps;
@@ -227,7 +227,7 @@ void System::fill_contact_blocks() {
                             law.zeta,
                             law.damping,
                             law.friction,
-                            kStickStiffness * law.mean * g.stiffness};
+                            kernel::kStickStiffness * law.mean * g.stiffness};
     static_assert(std::size(known) == kernel::kStick + 1);
     double* earnings = t.groups.data() + (block * kernel::kGroupFields + kernel::kEarned) * W + place;
     earnings[0] = g.earnings.stored, earnings[W] = g.earnings.spent;

@@ -8,6 +8,8 @@
 #include "base/aligned.h"
 #include "mbs/boxes.h"
 #include "mbs/contact_law.h"
+#include "mbs/ground_kernel.h"
+#include "mbs/lane_array.h"
 #include "mbs/model.h"
 
 namespace topple::mbs {
@@ -43,6 +45,27 @@ struct CompiledShape {
 struct GroundPoint {
   double born = 0;      // penetration allowed because it was there when contact became possible [m]
   bool active = false;  // contact is possible
+};
+
+/// What a body of one box remembers of the ground where it touches nothing else; fields as kernel::GroundState.
+struct GroundBox {
+  double born[8];                           // [m]
+  Vec3 slip[8];                             // [m]
+  double loss = 0, loss_power = 0;          // [J, W]
+  double friction = 0, friction_power = 0;  // [J, W]
+  double pressed = 0, stuck = 0;            // [J]
+  Vec3 push;                                // [N]
+
+  GroundBox() { forget(); }
+  /// No corner touches or has been where contact is possible.
+  void forget() {
+    for (double& x : born) x = -1;
+    for (Vec3& x : slip) x = {kUnlimited, 0, 0};
+  }
+};
+template <>
+struct Components<GroundBox> {
+  static constexpr size_t D = kernel::kGroundFields;
 };
 
 /// Two shapes near each other, in an order that does not depend on the bodies' numbers, and when to look at them again.

@@ -8,6 +8,7 @@
 // after foreach_target
 #include <hwy/highway.h>
 
+#include "mbs/contact_math.inc"
 #include "mbs/lane_math.inc"
 
 HWY_BEFORE_NAMESPACE();
@@ -16,7 +17,6 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr double kSlideZeta = 100;    // friction below its limit is a dashpot of this share
 constexpr double kLeastShare = 0.05;  // of its stiffness that a pair keeps whatever it has earned
 
 template <class D>
@@ -149,36 +149,6 @@ HWY_INLINE Num<D> calc_mobility(const double* HWY_RESTRICT g, const V3<D>& apart
   const Num<D> f2 = dot(force, force);
   return fma(load<D>(g, kGroupsA), fma(load<D>(g, kMassA), f2, dot(torque, times<D>(g, kInertiaA, torque))),
              load<D>(g, kGroupsB) * fma(load<D>(g, kMassB), f2, dot(torque_b, times<D>(g, kInertiaB, torque_b))));
-}
-
-/// How much of its explicit force a dashpot has that would slow its own motion at the rate g / h, and the time within
-/// the step whose speed it sees: at small g the middle, at large the end.
-template <class D>
-struct Damper {
-  Num<D> at, share;
-  HWY_INLINE Damper(Num<D> h, Num<D> mobility, Num<D> power) {
-    const D d;
-    const Num<D> one = num<D>(1);
-    const auto acts = hn::Gt(power.v, hn::Zero(d));
-    const Num<D> g = select(acts, h * mobility / select(acts, power, one), num<D>(0));
-    at = (one + g) / (num<D>(2) + g);
-    share = one / fma(at, g, one);
-  }
-};
-
-template <class D>
-HWY_INLINE V3<D> across(const V3<D>& n, const V3<D>& v) {
-  return fma(num<D>(0) - dot(n, v), n, v);
-}
-
-/// Shortens a vector to `most`; gives the square of its length then.
-template <class D>
-HWY_INLINE Num<D> limit(V3<D>& f, Num<D> most) {
-  const Num<D> size2 = dot(f, f), most2 = most * most;
-  const auto over = hn::Gt(size2.v, most2.v);
-  const Num<D> scale = select(over, most / Num<D>{hn::Sqrt(size2.v)}, num<D>(1));
-  f = scale * f;
-  return select(over, most2, size2);
 }
 
 template <class D>

@@ -73,6 +73,8 @@ enum Point : int {
   kSlide = 13,          // speed across the normal (3)
   kPointFields = 16
 };
+/// Stiffness of a friction spring over the mean normal stiffness of a corner.
+inline constexpr double kStickStiffness = 1.2;
 // NOLINTEND(readability-identifier-naming)
 
 /// How low bodies reach: the box around their shapes over the plane n·p = offset, a value of each lane.

@@ -498,6 +498,7 @@ void System::join_batch(Lanes& batch, size_t to) {
     array->attach(store->data(), layout);
   state.q.attach(batch.q.data(), layout);
   state.R.attach(batch.R.data(), layout);
+  state.ground_box.attach(batch.ground_states.data(), layout);
   lanes = &batch;
   lane = to;
   clusters_due = true;

@@ -7,6 +7,60 @@
 
 namespace topple::mbs {
 
+bool System::is_ground_box(size_t b) const {
+  const BodyConstants& body = state.body[b];
+  return model.contact.ground && !model.contact.bodies && !fixed[b] && body.shapes == 1 &&
+         state.shapes[static_cast<size_t>(body.first_shape)].kind == Shape::Kind::Box;
+}
+
+void System::count_other_bodies() {
+  other_on_ground = 0;
+  for (size_t b = 0; b < B; ++b) other_on_ground += !fixed[b] && state.body[b].shapes > 0 && !is_ground_box(b);
+}
+
+void System::pack_ground_box(size_t b) {
+  Lanes& l = *lanes;
+  const LaneLayout layout = l.body_layout(lane);
+  const auto put = [&](int f, double x) {
+    l.ground_constants[layout.at(b, static_cast<size_t>(f), kernel::kGroundConstants)] = x;
+  };
+  put(kernel::kPossible, 0);
+  // a box that was there has its ledger closed
+  l.watch[layout.at(b, 0, 1)] = kernel::kAlwaysLook;
+  if (!is_ground_box(b)) return;
+  const BodyConstants& body = state.body[b];
+  const CompiledShape& shape = state.shapes[static_cast<size_t>(body.first_shape)];
+  for (int i = 0; i < 3; ++i) {
+    put(kernel::kBoxCentre + i, shape.p_BS[i]);
+    const Vec3 edge = shape.half[i] * shape.R_BS.column(i);
+    for (int k = 0; k < 3; ++k) put(kernel::kBoxEdges + 3 * i + k, edge[k]);
+  }
+  const ContactLaw& law = contact_laws[static_cast<size_t>(ground_law[b])];
+  const double frequency = model.contact.contact_frequency;
+  put(kernel::kCornerStiffness, law.stiffness > 0 ? law.stiffness : body.mass * frequency * frequency);
+  put(kernel::kGroundMean, law.mean), put(kernel::kGroundBand, law.band), put(kernel::kGroundMost, law.most);
+  put(kernel::kGroundZeta, law.zeta), put(kernel::kGroundDamping, law.damping);
+  put(kernel::kGroundFriction, law.friction);
+  put(kernel::kPossible, !state.tied_to_ground[b] && law.touches ? 1 : 0);
+}
+
+void System::note_landing(std::uint32_t slot) {
+  const size_t b = lanes->is_batch ? slot / lanes->W : slot;
+  State& s = state;
+  if (s.touched_ground[b]) return;
+  s.touched_ground[b] = 1;
+  // the speed of the first corner that touches
+  const CompiledShape& shape = s.shapes[static_cast<size_t>(s.body[b].first_shape)];
+  const GroundBox box = s.ground_box[b];
+  size_t corner = 0;
+  while (corner < 7 && !(box.slip[corner].x < kUnlimited)) ++corner;
+  const Vec3 local{corner & 1 ? shape.half.x : -shape.half.x, corner & 2 ? shape.half.y : -shape.half.y,
+                   corner & 4 ? shape.half.z : -shape.half.z};
+  const Mat3 R_WB = s.R[b];
+  const double approach = -dot(model.contact.normal, s.v[b] + cross(s.w[b], R_WB * (shape.p_BS + shape.R_BS * local)));
+  say({Happening::Kind::GroundContact, s.time, static_cast<int>(b), -1, {}, std::max(0.0, approach)});
+}
+
 void System::find_ground_points() {
   State& s = state;
   const State& now = state;
@@ -14,6 +68,7 @@ void System::find_ground_points() {
   const Vec3 n = c.normal;
   const LaneLayout layout = lanes->body_layout(lane);
   for (size_t b = 0; b < B; ++b) {
+    if (is_ground_box(b)) continue;
     if (s.ground_clear[b] && (s.tied_to_ground[b] || lanes->low[layout.at(b, 0, 1)] > 0)) continue;
     const BodyConstants& body = s.body[b];
     s.ground_clear[b] = 1;

@@ -6,6 +6,7 @@
 #include <unordered_map>
 
 #include "mbs/contact_kernel.h"
+#include "mbs/ground_kernel.h"
 
 namespace topple::mbs {
 
@@ -35,6 +36,9 @@ void Lanes::allocate_bodies(size_t bodies) {
   low.assign(body_blocks * W, 0);
   reach.assign(body_blocks * W, 0);
   way.assign(body_blocks * W, 0);
+  ground_states.assign(body_blocks * kernel::kGroundFields * W, 0);
+  ground_constants.assign(body_blocks * kernel::kGroundConstants * W, 0);
+  watch.assign(body_blocks * W, kernel::kNeverLook);
   // idle lanes and the ground keep a valid orientation
   for (size_t block = 0; block < body_blocks; ++block)
     for (size_t l = 0; l < W; ++l) {
@@ -189,6 +193,38 @@ void Lanes::find_lows() {
     kernel::find_lows(job);
   } else {
     kernel::find_lows_singly(job);
+  }
+}
+
+void Lanes::press_ground() {
+  landed.clear();
+  const kernel::GroundJob job{body_blocks,
+                              p.data(),
+                              v.data(),
+                              w.data(),
+                              R.data(),
+                              body_constants.data(),
+                              joint_force.data(),
+                              joint_torque.data(),
+                              force.data(),
+                              torque.data(),
+                              low.data(),
+                              watch.data(),
+                              ground_states.data(),
+                              ground_constants.data(),
+                              nx.data(),
+                              ny.data(),
+                              nz.data(),
+                              offset.data(),
+                              gx.data(),
+                              gy.data(),
+                              gz.data(),
+                              h.data(),
+                              &landed};
+  if (W == kernel::lanes()) {
+    kernel::press_ground(job);
+  } else {
+    kernel::press_ground_singly(job);
   }
 }
 

@@ -33,6 +33,7 @@ struct Lanes {
   AlignedVector<double> poses;        // a row for each body, as lay_poses() left them; one run
   AlignedVector<double> bounds, low;  // boxes around the shapes in B, and how low they reach (kernel::LowJob)
   AlignedVector<double> reach, way;   // radius of a body's shapes, and its farthest point's way in a step (WayJob)
+  AlignedVector<double> ground_states, ground_constants, watch;  // boxes on the ground (kernel::GroundJob)
   Pairs pairs;
   // elements
   AlignedVector<double> states, flows, element_forces;
@@ -51,7 +52,7 @@ struct Lanes {
   AlignedVector<double> nx, ny, nz, offset;            // of the ground
   AlignedVector<double> search_x, search_y, search_z;  // State::search_velocity
   // reports of the kernel
-  std::vector<std::uint32_t> outside, spins;
+  std::vector<std::uint32_t> outside, spins, landed;
 
   static constexpr std::uint32_t kNoSlot = 0xffffffff;
 
@@ -99,6 +100,8 @@ struct Lanes {
   void close_pairs();
   /// How low bodies reach above the ground.
   void find_lows();
+  /// Adds what the ground does to boxes that touch nothing else, whose lows are known.
+  void press_ground();
   /// Ways of the bodies' farthest points in the last motion.
   void find_ways();
   /// Where the bodies are now, for evaluate_elements() of a run of its own.

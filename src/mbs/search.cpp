@@ -69,6 +69,7 @@ void System::find_links() {
     search.link[static_cast<size_t>(search.first_link[static_cast<size_t>(a) + 1]++)] = b;
     search.link[static_cast<size_t>(search.first_link[static_cast<size_t>(b) + 1]++)] = a;
   });
+  for (size_t b = 0; b < B; ++b) pack_ground_box(b);
 }
 
 /// Speeds of the bodies' farthest points, as the ways are counted, and which are the fastest.

@@ -65,6 +65,8 @@ void System::compile() {
   s.q.attach(lanes->q.data(), layout);
   s.R.resize(B);
   s.R.attach(lanes->R.data(), layout);
+  s.ground_box.resize(B);
+  s.ground_box.attach(lanes->ground_states.data(), layout);
   s.p_offset.assign(B, {});
   s.touched_ground.assign(B, 0);
   s.tied_to_ground.assign(B, 0);
@@ -86,6 +88,7 @@ void System::compile() {
     }
   }
   layout_shapes();
+  count_other_bodies();
   lanes->is_planar = keeps_planes();
 
   for (const ZoneLaw& law : model.laws) laws.push_back(compile_law(law));
@@ -293,6 +296,7 @@ void System::pack_body(size_t b) {
   // a plane, which only fixed bodies have, has no such box
   for (size_t f = 0; f < 6; ++f) l.bounds[layout.at(b, f, 6)] = std::isfinite(box[f]) ? box[f] : 0;
   l.reach[layout.at(b, 0, 1)] = fixed[b] ? 0 : c.radius;
+  pack_ground_box(b);
 }
 
 Mat3 System::calc_world_inverse_inertia(size_t b) const {
@@ -480,11 +484,23 @@ void System::replace_body(size_t b, const Body& replacement) {
   drop_pairs_of(b);
   s.touching.steps = 0;  // its points are others now
   s.ground_clear[b] = 0;
+  GroundBox box = s.ground_box[b];
+  box.forget();
+  s.ground_box[b] = box;
+  pack_ground_box(b);
+  count_other_bodies();
 }
 
 void System::evaluate_forces() {
   begin_forces();
   evaluate_elements_fully(0);
+  push_bodies(0);
+  if (model.contact.ground && !model.contact.bodies) {
+    set_lane_values(0, 0);
+    lanes->find_lows();
+    lanes->press_ground();
+    for (const std::uint32_t slot : lanes->landed) note_landing(slot);
+  }
   finish_forces(0);
 }
 
@@ -494,11 +510,14 @@ void System::begin_forces() {
   fire_events();
 }
 
-void System::finish_forces(double h) {
+void System::push_bodies(double h) {
   evaluate_rotationals(h);
   evaluate_cables();
   evaluate_springs(false);
   evaluate_loads(false);
+}
+
+void System::finish_forces(double h) {
   if (model.contact.ground || model.contact.bodies) evaluate_contact(h);
   evaluate_dampers();
   if (model.is_planar)
@@ -537,11 +556,15 @@ void System::prepare_step() {
     joint_torque.fill({});
     joint_sums_due = false;
   }
+  set_lane_values(kick_time(), step);
+}
+
+void System::set_lane_values(double kick, double h) {
   // one run fills all lanes, a sample of a batch its own
   const size_t first = lanes->is_batch ? lane : 0, last = lanes->is_batch ? lane + 1 : lanes->W;
   for (size_t i = first; i < last; ++i) {
-    lanes->kick[i] = kick_time();
-    lanes->h[i] = step;
+    lanes->kick[i] = kick;
+    lanes->h[i] = h;
     lanes->gx[i] = model.gravity.x, lanes->gy[i] = model.gravity.y, lanes->gz[i] = model.gravity.z;
     const Contact& c = model.contact;
     lanes->search_x[i] = state.search_velocity.x, lanes->search_y[i] = state.search_velocity.y,
@@ -594,12 +617,12 @@ void advance_together(Lanes& lanes, std::span<System* const> systems) {
     s.begin_forces();
   });
   lanes.outside.clear();
-  if (std::any_of(systems.begin(), systems.end(),
-                  [](const System* s) { return s != nullptr && s->model.contact.ground && s->is_look_due(); }))
-    lanes.find_lows();
-  if (std::any_of(systems.begin(), systems.end(),
-                  [](const System* s) { return s != nullptr && s->model.contact.bodies; }))
-    lanes.find_ways();
+  const auto any = [&](auto&& is) {
+    return std::any_of(systems.begin(), systems.end(), [&](const System* s) { return s != nullptr && is(*s); });
+  };
+  const bool lands_boxes = any([](const System& s) { return s.model.contact.ground && !s.model.contact.bodies; });
+  if (lands_boxes || any([](const System& s) { return s.model.contact.ground && s.is_look_due(); })) lanes.find_lows();
+  if (any([](const System& s) { return s.model.contact.bodies; })) lanes.find_ways();
   if (!lanes.is_batch) {
     systems.front()->evaluate_elements();
   } else {
@@ -607,6 +630,12 @@ void advance_together(Lanes& lanes, std::span<System* const> systems) {
     for (const std::uint32_t slot : lanes.outside)
       if (System* s = systems[slot % lanes.W]) s->evaluate_outside(slot);
     lanes.sum_forces();
+  }
+  each([](System& s) { s.push_bodies(s.step); });
+  if (lands_boxes) {
+    lanes.press_ground();
+    for (const std::uint32_t slot : lanes.landed)
+      if (System* s = systems[lanes.is_batch ? slot % lanes.W : 0]) s->note_landing(slot);
   }
   each([](System& s) { s.finish_forces(s.step); });
 }
@@ -656,9 +685,14 @@ Energy System::calc_energy() const {
     e.plastic += c.plastic;
   }
   add_energy_of_forces(e);
-  e.contact = state.contact_energy + state.stick_energy;
-  e.friction = -state.friction_work - state.stick_energy;
+  double pressed = state.contact_energy, stuck = state.stick_energy, rubbed = state.friction_work;
   e.contact_loss = state.contact_loss;
+  for (size_t b = 0; b < B && model.contact.ground; ++b) {
+    const GroundBox box = state.ground_box[b];
+    pressed += box.pressed, stuck += box.stuck, rubbed += box.friction, e.contact_loss += box.loss;
+  }
+  e.contact = pressed + stuck;
+  e.friction = -rubbed - stuck;
   e.removed = state.removed;
   e.residual = e.kinetic + e.gravity + e.elastic + e.contact + e.plastic + e.damping + e.friction + e.contact_loss +
                e.removed - e.loads - state.total_at_start;
@@ -730,8 +764,9 @@ const View& System::calc_view() {
   v.cable_force.resize(s.cable.size());
   for (size_t i = 0; i < s.cable.size(); ++i) v.cable_force[i] = s.cable[i].force;
   view_forces(v);
-  v.ground_force = calc_element_reaction() + ground_reaction + ground_contact + joints_on_ground;
   v.contact_force_ground = ground_contact;
+  for (size_t b = 0; b < B; ++b) v.contact_force_ground += GroundBox(s.ground_box[b]).push;
+  v.ground_force = calc_element_reaction() + ground_reaction + v.contact_force_ground + joints_on_ground;
   v.body_contacts = body_contacts;
   v.energy = calc_energy();
   return v;

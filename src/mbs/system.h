@@ -92,6 +92,7 @@ struct State {
   std::vector<Vec3> p_offset;  // of the present centre of mass in the frame of the model's body
   std::vector<CompiledShape> shapes;
   std::vector<GroundPoint> ground_points;
+  LaneArray<GroundBox> ground_box;  // (B)
   std::vector<unsigned char> touched_ground;
   std::vector<unsigned char> ground_clear;  // no point touches the ground or remembers that it did (B)
   // connections
@@ -178,6 +179,7 @@ class System {
   void prepare_step();
   void finish_motion();
   void begin_forces();
+  void push_bodies(double h);
   void finish_forces(double h);
   bool is_finite() const;
   /// Goes over to a lane of a batch.
@@ -233,6 +235,7 @@ class System {
   std::vector<Vec3> body_reaction, body_reaction_turn;  // their sums on bodies (B)
   Vec3 ground_reaction, ground_contact;
   int body_contacts = 0;
+  size_t other_on_ground = 0;   // moving bodies with shapes that are not the kernel's on the ground
   int contact_interval = 1;     // steps from one look for touching points to the next
   std::string trouble;          // why the run cannot go on; empty: nothing
   std::vector<int> due_events;  // of this step
@@ -247,6 +250,8 @@ class System {
 
   // parts, one file each
   void compile();
+  /// What the kernel reads of all bodies of a run or a sample at once.
+  void set_lane_values(double kick, double h);
   /// Of the elastic system as it is now, with what the dampers add [rad/s].
   double find_highest_frequency() const;
   /// Longest stable step for the highest frequency and contact [s].
@@ -358,6 +363,15 @@ class System {
   /// Law of two bodies, into contact_laws.
   int find_pair_law(int a, int b) const;
   void find_ground_points();
+  /// Whether the kernel has what a body and the ground do to each other: of one box, where bodies do not touch each
+  /// other.
+  bool is_ground_box(size_t body) const;
+  void pack_ground_box(size_t body);
+  void count_other_bodies();
+  /// Tells of boxes that the kernel has found to touch the ground (its slots).
+  void note_landing(std::uint32_t slot);
+  /// Whether something else touches anything.
+  bool has_other_contacts() const { return model.contact.bodies || other_on_ground > 0; }
   void find_pair_points();
   void add_contact_point(const Vec3& at, double depth, double stiffness);
   /// Counts a group of a body; its place among those touched.
