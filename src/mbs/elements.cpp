@@ -56,7 +56,7 @@ size_t System::slot_of(size_t e) const { return lanes->is_batch ? e * lanes->W +
 void System::kill_slot(size_t e) {
   const size_t slot = slot_of(e);
   if (slot == Lanes::kNoSlot || lanes->field(slot, kMostTurn) == kUnlimited) return;
-  lanes->clear_slot(slot);
+  lanes->still_slot(slot);
   --lanes->live[slot / lanes->W];
   --lanes->live_elements;
   --state.live_elements;

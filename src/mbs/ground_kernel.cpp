@@ -96,23 +96,28 @@ HWY_INLINE void press_ground_block(const GroundJob& job, size_t block) {
   const D d;
   const size_t W = hn::Lanes(d);
   const N watch = load<D>(job.watch + W * block, 0), zero = num<D>(0), half = num<D>(0.5), one = num<D>(1);
-  const M active = hn::Or(hn::Gt(watch.v, hn::Set(d, kLookWhenLow)),
-                          hn::And(hn::Gt(watch.v, zero.v), hn::Le(load<D>(job.low + W * block, 0).v, zero.v)));
-  if (HWY_LIKELY(hn::AllFalse(d, active))) return;
+  const M always = hn::Gt(watch.v, hn::Set(d, kLookWhenLow));
+  const V3<D> up{load<D>(job.nx, 0), load<D>(job.ny, 0), load<D>(job.nz, 0)}, n{zero - up.x, zero - up.y, zero - up.z};
+  // how far the plane lies above the centre of mass
+  const N above = load<D>(job.offset, 0) - dot(up, load3<D>(job.p + 3 * W * block, 0));
+  const auto is_low = [&](N plane, N reach) {
+    return hn::Or(always, hn::And(hn::Gt(watch.v, zero.v), hn::Ge((plane + reach).v, zero.v)));
+  };
+  if (HWY_LIKELY(hn::AllFalse(d, is_low(above, load<D>(job.reach + W * block, 0))))) return;
   double* HWY_RESTRICT state = job.states + static_cast<size_t>(kGroundFields) * W * block;
   const double* HWY_RESTRICT constants = job.constants + static_cast<size_t>(kGroundConstants) * W * block;
   const double* HWY_RESTRICT rotation = job.R + 9 * W * block;
   const M33<D> R{load3<D>(rotation, 0), load3<D>(rotation, 3), load3<D>(rotation, 6)};
-  const V3<D> up{load<D>(job.nx, 0), load<D>(job.ny, 0), load<D>(job.nz, 0)}, n{zero - up.x, zero - up.y, zero - up.z};
   const N h = load<D>(job.h, 0);
 
   // corners in the ground
   const V3<D> centre = R * load3<D>(constants, kBoxCentre);
   const V3<D> x = R * load3<D>(constants, kBoxEdges), y = R * load3<D>(constants, kBoxEdges + 3),
               z = R * load3<D>(constants, kBoxEdges + 6);
+  const N below = above - dot(up, centre), along_x = dot(up, x), along_y = dot(up, y), along_z = dot(up, z);
+  const M active = is_low(below, (abs(along_x) + abs(along_y)) + abs(along_z));
+  if (hn::AllFalse(d, active)) return;
   const M possible = hn::Gt(load<D>(constants, kPossible).v, zero.v);
-  const N below = (load<D>(job.offset, 0) - dot(up, load3<D>(job.p + 3 * W * block, 0))) - dot(up, centre);
-  const N along_x = dot(up, x), along_y = dot(up, y), along_z = dot(up, z);
   V3<D> place[kCorners];
   Corner<D> corner[kCorners];
   int number[kCorners], count = 0;
@@ -179,14 +184,16 @@ HWY_INLINE void press_ground_block(const GroundJob& job, size_t block) {
     N full = k * c.depth;
     energy = fma(full, c.depth, energy);
     // of a step in which the surfaces meet or part, only a share is in touch
-    const M passes = hn::Gt(way.v, c.depth.v), meets = hn::Gt(speed.v, zero.v);
-    const N share = c.depth / select(hn::Gt(way.v, zero.v), way, one);
-    const M was_late = hn::And(meets, hn::Le(share.v, one.v));
-    full = select(hn::Or(passes, was_late), full * fma(half, share, half), full);
-    N rate = twice_zeta * root;
+    const M passes = hn::And(c.touches, hn::Ge(way.v, c.depth.v));
+    N rate = twice_zeta * root, share = one;
+    if (!hn::AllFalse(d, passes)) {
+      share = select(passes, c.depth / select(passes, way, one), one);
+      full = select(passes, full * fma(half, share, half), full);
+    }
     if (HWY_UNLIKELY(!hn::AllFalse(d, plain))) {
       // a plain dashpot begins with a jump: for half a step, and the share of the one before
-      const N steady = select(hn::And(passes, meets), (half + share) * damping, damping);
+      const M begins = hn::And(hn::And(passes, hn::Gt(way.v, c.depth.v)), hn::Gt(speed.v, zero.v));
+      const N steady = select(begins, (half + share) * damping, damping);
       rate = select(hn::And(plain, c.touches), steady, rate);
     }
     const N force = mean * full;

@@ -53,7 +53,7 @@ struct GroundJob {
   const double* body_constants;              // kBodyFields
   const double *joint_force, *joint_torque;  // 3, 3
   double *force, *torque;                    // of everything else on the body; the ground's are added (3, 3)
-  const double* low;                         // as LowJob left it (W a block)
+  const double* reach;                       // of the shapes about the centre of mass (W a block) [m]
   double* watch;                             // (W a block)
   double* states;                            // kGroundFields
   const double* constants;                   // kGroundConstants

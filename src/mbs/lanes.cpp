@@ -65,6 +65,17 @@ void Lanes::allocate_elements(size_t elements) {
   single.assign(element_blocks, 0);
 }
 
+void Lanes::still_slot(size_t slot) {
+  using namespace kernel;
+  constexpr double unlimited = std::numeric_limits<double>::infinity();
+  for (int f = 0; f < kStateFields; ++f) set(slot, f, 0);
+  for (int i = 0; i < 6; ++i) set(slot, kStiffness + i, 0);
+  set(slot, kLeastForce, -unlimited), set(slot, kMostForce, unlimited);
+  set(slot, kMostTurn, unlimited);
+  set(slot, kFlows, 0);
+  for (size_t f = 0; f < static_cast<size_t>(kForceFields); ++f) force_field(slot, f) = 0;
+}
+
 void Lanes::clear_slot(size_t slot) {
   using namespace kernel;
   constexpr double unlimited = std::numeric_limits<double>::infinity();
@@ -96,6 +107,10 @@ void Lanes::set(size_t slot, int f, double x) {
   pool[size_t{entry} * W + slot % W] = x;
 }
 
+void Lanes::share_again() {
+  if (uses.size() > 2 * shared + 64) share_constants();
+}
+
 void Lanes::share_constants() {
   AlignedVector<double> merged;
   std::vector<std::uint32_t> counts, moved(uses.size(), kNoSlot);
@@ -117,6 +132,7 @@ void Lanes::share_constants() {
   }
   pool = std::move(merged);
   uses = std::move(counts);
+  shared = uses.size();
 }
 
 void Lanes::allocate_pairs(size_t blocks) {
@@ -208,7 +224,7 @@ void Lanes::press_ground() {
                               joint_torque.data(),
                               force.data(),
                               torque.data(),
-                              low.data(),
+                              reach.data(),
                               watch.data(),
                               ground_states.data(),
                               ground_constants.data(),

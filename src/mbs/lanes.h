@@ -40,6 +40,7 @@ struct Lanes {
   AlignedVector<double> pool;                 // lane vectors of constants, shared by blocks
   std::vector<std::uint32_t> constants;       // of each block, in the pool (kConstants)
   std::vector<std::uint32_t> uses;            // of each vector of the pool
+  size_t shared = 0;                          // vectors when they were last shared
   std::vector<unsigned char> live, softened;  // lanes of each block
   std::vector<kernel::Plane> planes;          // of each block
   std::vector<unsigned char> single;          // of each block: as of the job
@@ -65,6 +66,8 @@ struct Lanes {
   void set(size_t slot, int f, double x);
   /// Lets blocks share what is equal in all lanes.
   void share_constants();
+  /// The same when many vectors have been added.
+  void share_again();
   double& force_field(size_t slot, size_t f) {
     return element_forces[(slot / W * kernel::kForceFields + f) * W + slot % W];
   }
@@ -84,6 +87,8 @@ struct Lanes {
   void allocate_elements(size_t elements);
   /// Nothing in it: no force, and never a report.
   void clear_slot(size_t slot);
+  /// The same of one that was live; what does nothing without stiffness stays, so that blocks go on sharing it.
+  void still_slot(size_t slot);
   /// Kicks all bodies and moves those that drift.
   void advance_bodies();
   /// Empty blocks of joints, whose lanes stand on the ground.

@@ -497,7 +497,6 @@ void System::evaluate_forces() {
   push_bodies(0);
   if (model.contact.ground && !model.contact.bodies) {
     set_lane_values(0, 0);
-    lanes->find_lows();
     lanes->press_ground();
     for (const std::uint32_t slot : lanes->landed) note_landing(slot);
   }
@@ -620,8 +619,8 @@ void advance_together(Lanes& lanes, std::span<System* const> systems) {
   const auto any = [&](auto&& is) {
     return std::any_of(systems.begin(), systems.end(), [&](const System* s) { return s != nullptr && is(*s); });
   };
-  const bool lands_boxes = any([](const System& s) { return s.model.contact.ground && !s.model.contact.bodies; });
-  if (lands_boxes || any([](const System& s) { return s.model.contact.ground && s.is_look_due(); })) lanes.find_lows();
+  if (any([](const System& s) { return s.model.contact.ground && s.has_other_contacts() && s.is_look_due(); }))
+    lanes.find_lows();
   if (any([](const System& s) { return s.model.contact.bodies; })) lanes.find_ways();
   if (!lanes.is_batch) {
     systems.front()->evaluate_elements();
@@ -629,10 +628,11 @@ void advance_together(Lanes& lanes, std::span<System* const> systems) {
     lanes.evaluate_elements(0, lanes.element_blocks, lanes.outside);
     for (const std::uint32_t slot : lanes.outside)
       if (System* s = systems[slot % lanes.W]) s->evaluate_outside(slot);
+    lanes.share_again();
     lanes.sum_forces();
   }
   each([](System& s) { s.push_bodies(s.step); });
-  if (lands_boxes) {
+  if (any([](const System& s) { return s.model.contact.ground && !s.model.contact.bodies; })) {
     lanes.press_ground();
     for (const std::uint32_t slot : lanes.landed)
       if (System* s = systems[lanes.is_batch ? slot % lanes.W : 0]) s->note_landing(slot);
