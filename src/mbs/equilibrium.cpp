@@ -55,23 +55,72 @@ void add_outer(const KinematicRow& r, double k, const Unknowns& u, Triplets& out
     }
 }
 
-/// The same of six rows between the same bodies.
-void add_outers(const KinematicRow rows[6], const double k[6], const Unknowns& u, Triplets& out) {
-  double sum[12][12] = {};
-  for (int r = 0; r < 6; ++r) {
-    const Vec3* part[4] = {&rows[r].va, &rows[r].wa, &rows[r].vb, &rows[r].wb};
-    double x[12];
-    for (int i = 0; i < 12; ++i) x[i] = (*part[i / 3])[i % 3];
-    for (int i = 0; i < 12; ++i)
-      for (int j = 0; j < 12; ++j) sum[i][j] += k[r] * x[i] * x[j];
+/// A symmetric matrix between free bodies, added up block by block. Its pattern is that of the pairs of bodies, zeros
+/// included, so it never changes with the numbers.
+class PairMatrix {
+ public:
+  using Block = double[12][12];  // both bodies' coordinates: x y z, about x y z
+
+  PairMatrix(int bodies, const Unknowns& u) : u_(u), near_(static_cast<size_t>(bodies)) {}
+  /// First all pairs of places, -1 for held bodies ...
+  void join(int a, int b) {
+    for (const auto& [x, y] : {std::pair{a, a}, {a, b}, {b, a}, {b, b}})
+      if (x >= 0 && y >= 0) near_[static_cast<size_t>(x)].push_back(y);
   }
-  const int body[2] = {rows[0].a, rows[0].b};
-  for (int i = 0; i < 2 * u.each; ++i)
-    for (int j = 0; j < 2 * u.each; ++j) {
-      const int a = i / u.each, b = j / u.each, m = i % u.each, n = j % u.each;
-      if (body[a] >= 0 && body[b] >= 0)
-        out.emplace_back(u.at(body[a], m), u.at(body[b], n), sum[6 * a + u.coordinate(m)][6 * b + u.coordinate(n)]);
+  /// ... then what is between them.
+  void lay_out() {
+    const int bodies = static_cast<int>(near_.size()), each = u_.each;
+    for (std::vector<int>& list : near_) {
+      std::sort(list.begin(), list.end());
+      list.erase(std::unique(list.begin(), list.end()), list.end());
     }
+    matrix_.resize(each * bodies, each * bodies);
+    size_t count = 0;
+    for (const std::vector<int>& list : near_) count += list.size() * static_cast<size_t>(each * each);
+    matrix_.resizeNonZeros(static_cast<Eigen::Index>(count));
+    int* outer = matrix_.outerIndexPtr();
+    int at = 0;
+    for (int column = 0; column < each * bodies; ++column) {
+      outer[column] = at;
+      for (const int row : near_[static_cast<size_t>(column / each)])
+        for (int m = 0; m < each; ++m) matrix_.innerIndexPtr()[at++] = u_.at(row, m);
+    }
+    outer[each * bodies] = at;
+    std::fill_n(matrix_.valuePtr(), count, 0.0);
+  }
+  void add(int a, int b, const Block& sum) {
+    const int body[2] = {a, b}, each = u_.each;
+    for (int j = 0; j < 2; ++j) {
+      if (body[j] < 0) continue;
+      const std::vector<int>& list = near_[static_cast<size_t>(body[j])];
+      for (int i = 0; i < 2; ++i) {
+        if (body[i] < 0) continue;
+        const auto place = std::lower_bound(list.begin(), list.end(), body[i]) - list.begin();
+        for (int n = 0; n < each; ++n) {
+          double* to = matrix_.valuePtr() + matrix_.outerIndexPtr()[u_.at(body[j], n)] + each * place;
+          for (int m = 0; m < each; ++m) to[m] += sum[6 * i + u_.coordinate(m)][6 * j + u_.coordinate(n)];
+        }
+      }
+    }
+  }
+  Sparse take() { return std::move(matrix_); }
+
+ private:
+  Unknowns u_;
+  std::vector<std::vector<int>> near_;  // of each body, those whose rows its columns have
+  Sparse matrix_;
+};
+
+/// Adds k times a row's outer product.
+void add_outer(const KinematicRow& r, double k, PairMatrix::Block& sum) {
+  const Vec3* part[4] = {&r.va, &r.wa, &r.vb, &r.wb};
+  double x[12];
+  for (int i = 0; i < 12; ++i) x[i] = (*part[i / 3])[i % 3];
+  for (int i = 0; i < 12; ++i) {
+    if (x[i] == 0) continue;
+    const double y = k * x[i];
+    for (int j = 0; j < 12; ++j) sum[i][j] += y * x[j];
+  }
 }
 
 /// Upper bound of the frequencies with which the points that touch swing their bodies [rad/s].
@@ -157,29 +206,38 @@ class Assembly {
   /// Stiffness of all live elements: at rest, or that of fast motion, which the springs behind the dampers add to.
   /// `force_scale` is that of the forces, for springs.
   Sparse make_stiffness(bool fast, double force_scale = 1) const {
-    Triplets t;
-    t.reserve(size_t{144} * s_.elements.size());
-    for (size_t i = 0; i < s_.elements.size(); ++i) {
-      if (!s_.state.element[i].live) continue;
-      const CompiledElement& e = s_.elements[i];
+    const std::vector<StiffRow> springs = s_.calc_spring_stiffness(fast, force_scale);
+    PairMatrix sum(static_cast<int>(free_.size()), unknowns_);
+    const auto each_element = [&](auto&& f) {
+      for (size_t i = 0; i < s_.elements.size(); ++i)
+        if (s_.state.element[i].live) f(s_.elements[i], s_.state.element[i].share);
+    };
+    const auto each_row = [&](auto&& f) {
+      for (const CompiledRotational& r : s_.rotationals)
+        f(rotational_row(s_.joints[static_cast<size_t>(r.joint)]),
+          (fast ? 1 + r.zone.viscous : 1) * r.zone.stiffness[5]);
+      for (size_t i = 0; i < s_.model.cables.size(); ++i)
+        if (s_.state.cable[i].live) f(cable_row(s_.model.cables[i]), s_.model.cables[i].stiffness);
+      for (const StiffRow& r : springs)
+        f(KinematicRow{place(r.a), place(r.b), -r.row.line, -r.row.turn_a, r.row.line, r.row.turn_b}, r.stiffness);
+    };
+    each_element([&](const CompiledElement& e, double) { sum.join(place(e.a), place(e.b)); });
+    each_row([&](const KinematicRow& r, double) { sum.join(r.a, r.b); });
+    sum.lay_out();
+    each_element([&](const CompiledElement& e, double share) {
       const double factor = fast ? 1 + e.zone.viscous : 1;
       KinematicRow rows[6];
       element_rows(e, rows);
-      double stiffness[6];
-      for (int k = 0; k < 6; ++k) stiffness[k] = factor * s_.state.element[i].share * e.zone.stiffness[k];
-      add_outers(rows, stiffness, unknowns_, t);
-    }
-    for (const CompiledRotational& r : s_.rotationals)
-      add_outer(rotational_row(s_.joints[static_cast<size_t>(r.joint)]),
-                (fast ? 1 + r.zone.viscous : 1) * r.zone.stiffness[5], unknowns_, t);
-    for (size_t i = 0; i < s_.model.cables.size(); ++i)
-      if (s_.state.cable[i].live) add_outer(cable_row(s_.model.cables[i]), s_.model.cables[i].stiffness, unknowns_, t);
-    for (const StiffRow& r : s_.calc_spring_stiffness(fast, force_scale))
-      add_outer({place(r.a), place(r.b), -r.row.line, -r.row.turn_a, r.row.line, r.row.turn_b}, r.stiffness, unknowns_,
-                t);
-    Sparse m(count(), count());
-    m.setFromTriplets(t.begin(), t.end());
-    return m;
+      PairMatrix::Block block = {};
+      for (int k = 0; k < 6; ++k) add_outer(rows[k], factor * share * e.zone.stiffness[k], block);
+      sum.add(rows[0].a, rows[0].b, block);
+    });
+    each_row([&](const KinematicRow& r, double stiffness) {
+      PairMatrix::Block block = {};
+      add_outer(r, stiffness, block);
+      sum.add(r.a, r.b, block);
+    });
+    return sum.take();
   }
 
  private:
@@ -361,6 +419,7 @@ class DeadLoad {
   double weight_ = 1, penalty_ = 1;
   Eigen::SimplicialLDLT<Sparse> solver_;
   bool is_analysed_ = false;  // the pattern stays what it is
+  Sparse first_;              // stiffness at the start, once
   std::vector<std::array<double, 6>> multiplier_;
   Vector pushed_;                         // unbalanced, and gaps pushed back
   double unbalanced_ = 0, gap_left_ = 0;  // over the weight; [m, rad]
@@ -400,17 +459,20 @@ double DeadLoad::calc_weight() const {
 
 bool DeadLoad::factorise(std::string& message) {
   const int n = assembly_.count();
-  Sparse K = assembly_.make_stiffness(false, weight_);
-  Triplets t;
-  for (const CompiledJoint& j : s_.joints) {
-    KinematicRow rows[6];
-    double gap[6];
-    const int count = assembly_.joint_rows(j, rows, gap);
-    for (int i = 0; i < count; ++i) add_outer(rows[i], penalty_, u_, t);
+  Sparse K = first_.rows() > 0 ? std::move(first_) : assembly_.make_stiffness(false, weight_);
+  first_.resize(0, 0);
+  if (!s_.joints.empty()) {
+    Triplets t;
+    for (const CompiledJoint& j : s_.joints) {
+      KinematicRow rows[6];
+      double gap[6];
+      const int count = assembly_.joint_rows(j, rows, gap);
+      for (int i = 0; i < count; ++i) add_outer(rows[i], penalty_, u_, t);
+    }
+    Sparse P(n, n);
+    P.setFromTriplets(t.begin(), t.end());
+    K += P;
   }
-  Sparse P(n, n);
-  P.setFromTriplets(t.begin(), t.end());
-  K += P;
   if (!is_analysed_) solver_.analyzePattern(K);
   is_analysed_ = true;
   solver_.factorize(K);
@@ -520,8 +582,8 @@ bool DeadLoad::find(std::string& message) {
   // joints as stiff as the stiffest body is held: more would turn round-off of places into larger forces and save no
   // iteration
   {
-    const Sparse K = assembly_.make_stiffness(false, weight_);
-    for (Eigen::Index i = 0; i < K.rows(); ++i) penalty_ = std::max(penalty_, K.coeff(i, i));
+    first_ = assembly_.make_stiffness(false, weight_);
+    for (Eigen::Index i = 0; i < first_.rows(); ++i) penalty_ = std::max(penalty_, first_.coeff(i, i));
   }
   // places are known to round-off only, and the stiffest spring turns that into a force
   double extent = 1;
