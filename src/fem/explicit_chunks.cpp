@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
 #include <numeric>
+#include <span>
 
 namespace topple::fem {
 
@@ -40,7 +42,107 @@ class Bisection {
   size_t chunk_;
 };
 
+/// Elements of which each has the face ζ = +1 of the one before as its face ζ = -1.
+using Strip = std::vector<int>;
+
+/// Puts elements in strips, along those of their axes that make long ones, and turns them so that it is ζ.
+std::vector<Strip> find_strips(const ExplicitModel& model, std::span<const int> elements,
+                               std::vector<std::uint8_t>& turn_of_element) {
+  using Key = std::array<int, 4>;
+  constexpr size_t kNone = std::numeric_limits<size_t>::max();
+  const auto face = [&](size_t i, int turn, size_t first) {
+    const auto node = turn_corners(model.elements[static_cast<size_t>(elements[i])].node, turn);
+    return Key{node[first], node[first + 1], node[first + 2], node[first + 3]};
+  };
+  const size_t count = elements.size();
+  std::array<std::vector<size_t>, 3> next;
+  std::array<size_t, 3> links{};
+  for (int turn = 0; turn < 3; ++turn) {
+    std::map<Key, size_t> low;
+    for (size_t i = 0; i < count; ++i) low[face(i, turn, 0)] = i;
+    std::vector<size_t>& to = next[static_cast<size_t>(turn)];
+    to.assign(count, kNone);
+    for (size_t i = 0; i < count; ++i)
+      if (const auto found = low.find(face(i, turn, 4)); found != low.end())
+        to[i] = found->second, ++links[static_cast<size_t>(turn)];
+  }
+  std::array<int, 3> turns{0, 1, 2};
+  std::stable_sort(turns.begin(), turns.end(),
+                   [&](int a, int b) { return links[static_cast<size_t>(a)] > links[static_cast<size_t>(b)]; });
+
+  std::vector<Strip> strips;
+  std::vector<std::uint8_t> used(count, 0);
+  const auto take = [&](int turn, size_t least) {
+    const std::vector<size_t>& to = next[static_cast<size_t>(turn)];
+    std::vector<std::uint8_t> follows(count, 0), seen = used;
+    for (size_t i = 0; i < count; ++i)
+      if (used[i] == 0 && to[i] != kNone) follows[to[i]] = 1;
+    for (const bool rings : {false, true})  // which have no beginning
+      for (size_t i = 0; i < count; ++i) {
+        if (seen[i] != 0 || (follows[i] != 0 && !rings)) continue;
+        std::vector<size_t> line;
+        for (size_t at = i; at != kNone && seen[at] == 0; at = to[at]) line.push_back(at), seen[at] = 1;
+        if (line.size() < least) continue;
+        Strip& strip = strips.emplace_back();
+        for (const size_t at : line) {
+          used[at] = 1;
+          strip.push_back(elements[at]);
+          turn_of_element[static_cast<size_t>(elements[at])] = static_cast<std::uint8_t>(turn);
+        }
+      }
+  };
+  constexpr size_t kLeast = 4;
+  for (const int turn : turns) take(turn, kLeast);
+  take(turns[0], 1);
+  return strips;
+}
+
+/// Calls add(blocks of a group) for groups of `lanes` strips of one length, until all are used up; the last one may
+/// have fewer lanes. Neighbours go to different groups where they can, so that a block's forces meet few common nodes.
+template <class Add>
+void pack_strips(std::vector<Strip> strips, size_t lanes, const Add& add) {
+  const auto part = [](const Strip& strip, size_t first, size_t last) {
+    return Strip(strip.begin() + static_cast<std::ptrdiff_t>(first), strip.begin() + static_cast<std::ptrdiff_t>(last));
+  };
+  while (!strips.empty()) {
+    std::stable_sort(strips.begin(), strips.end(), [](const Strip& a, const Strip& b) { return a.size() > b.size(); });
+    if (strips.size() < lanes && strips[0].size() > 1) {
+      const size_t size = strips[0].size();
+      strips.push_back(part(strips[0], size / 2, size));
+      strips[0].resize(size / 2);
+      continue;
+    }
+    if (strips.size() < lanes) {
+      add(strips);
+      return;
+    }
+    const size_t length = strips[lanes - 1].size();
+    size_t count = lanes;
+    while (count < strips.size() && strips[count].size() == length) ++count;
+    const size_t groups = count / lanes;
+    for (size_t k = 0; k < groups; ++k) {
+      std::vector<Strip> group;
+      for (size_t l = 0; l < lanes; ++l) group.push_back(part(strips[l * groups + k], 0, length));
+      add(group);
+    }
+    std::vector<Strip> rest;
+    for (size_t i = 0; i < strips.size(); ++i) {
+      const size_t first = i < groups * lanes ? length : 0;
+      if (strips[i].size() > first) rest.push_back(part(strips[i], first, strips[i].size()));
+    }
+    strips = std::move(rest);
+  }
+}
+
 }  // namespace
+
+std::array<int, 8> turn_corners(const std::array<int, 8>& node, int turn) {
+  constexpr std::array<std::array<size_t, 8>, 3> kCorner = {
+      {{0, 1, 2, 3, 4, 5, 6, 7}, {0, 3, 7, 4, 1, 2, 6, 5}, {0, 4, 5, 1, 3, 7, 6, 2}}};
+  std::array<int, 8> turned{};
+  for (size_t i = 0; i < 8; ++i) turned[i] = node[kCorner[static_cast<size_t>(turn)][i]];
+  return turned;
+}
 
 ExplicitChunks make_chunks(const ExplicitModel& model, size_t lanes, size_t elements_a_chunk) {
   ExplicitChunks c;
@@ -52,7 +154,7 @@ ExplicitChunks make_chunks(const ExplicitModel& model, size_t lanes, size_t elem
   }
   c.order.resize(E);
   std::iota(c.order.begin(), c.order.end(), 0);
-  c.slot_of_element.resize(E);
+  c.slot_of_element.resize(E), c.turn_of_element.assign(E, 0);
   Bisection(centres, elements_a_chunk).sort(c.order.data(), c.order.data() + E);
   std::vector<std::pair<size_t, size_t>> ranges;  // of order, chunk after chunk
   for (size_t i = 0; i < E; i += elements_a_chunk) ranges.emplace_back(i, std::min(E, i + elements_a_chunk));
@@ -122,7 +224,7 @@ ExplicitChunks make_chunks(const ExplicitModel& model, size_t lanes, size_t elem
       }
     chunk.shared = c.shared_rows.size() - chunk.first_shared;
     c.most_nodes = std::max(c.most_nodes, chunk.own + chunk.shared);
-    // blocks of one material; neighbours go to different blocks' lanes, so that a block's forces meet few common nodes
+    // blocks of one material, in strips
     std::vector<int> sorted(c.order.begin() + static_cast<std::ptrdiff_t>(ranges[k].first),
                             c.order.begin() + static_cast<std::ptrdiff_t>(ranges[k].second));
     const auto material_of = [&](int e) { return model.elements[static_cast<size_t>(e)].material; };
@@ -130,22 +232,27 @@ ExplicitChunks make_chunks(const ExplicitModel& model, size_t lanes, size_t elem
     for (size_t first = 0; first < elements;) {
       size_t last = first;
       while (last < elements && material_of(sorted[last]) == material_of(sorted[first])) ++last;
-      const size_t first_block = c.material_of_block.size(), blocks = (last - first + c.W - 1) / c.W;
-      c.material_of_block.resize(first_block + blocks, static_cast<std::uint16_t>(material_of(sorted[first])));
-      c.element_of_slot.resize((first_block + blocks) * c.W, -1);
-      c.corners.resize((first_block + blocks) * 8 * c.W);
-      for (size_t l = 0; l < c.W; ++l)
-        for (size_t b = 0; b < blocks; ++b) {
-          const size_t i = first + l * blocks + b, block = first_block + b;
-          const int e = sorted[i < last ? i : first];
-          if (i < last) {
-            c.element_of_slot[block * c.W + l] = e;
-            c.slot_of_element[static_cast<size_t>(e)] = static_cast<std::uint32_t>(block * c.W + l);
+      const std::span<const int> same(sorted.data() + first, last - first);
+      pack_strips(find_strips(model, same, c.turn_of_element), c.W, [&](const std::vector<Strip>& group) {
+        for (size_t i = 0; i < group[0].size(); ++i) {
+          const size_t block = c.material_of_block.size();
+          c.material_of_block.push_back(static_cast<std::uint16_t>(material_of(sorted[first])));
+          c.joined.push_back(i > 0 ? 1 : 0);
+          c.element_of_slot.resize((block + 1) * c.W, -1);
+          c.corners.resize((block + 1) * 8 * c.W);
+          for (size_t l = 0; l < c.W; ++l) {
+            const size_t e = static_cast<size_t>(group[l < group.size() ? l : 0][i]);
+            if (l < group.size()) {
+              c.element_of_slot[block * c.W + l] = static_cast<int>(e);
+              c.slot_of_element[e] = static_cast<std::uint32_t>(block * c.W + l);
+            }
+            const auto node = turn_corners(model.elements[e].node, c.turn_of_element[e]);
+            for (size_t j = 0; j < 8; ++j)
+              c.corners[(block * 8 + j) * c.W + l] =
+                  static_cast<std::uint16_t>(kernel::kNodeFields * place[static_cast<size_t>(node[j])]);
           }
-          for (size_t j = 0; j < 8; ++j)
-            c.corners[(block * 8 + j) * c.W + l] = static_cast<std::uint16_t>(
-                kernel::kNodeFields * place[static_cast<size_t>(model.elements[static_cast<size_t>(e)].node[j])]);
         }
+      });
       first = last;
     }
     chunk.blocks = c.material_of_block.size() - chunk.first_block;

@@ -2,6 +2,7 @@
 /// Elements in chunks that lie close together and fit the cache, nodes in the order of the chunks that own them. A
 /// chunk is the unit of work of a thread; nodes of several chunks get their forces summed in a fixed order.
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -23,7 +24,9 @@ struct ExplicitChunks {
   std::vector<std::uint32_t> slot_of_element;
   std::vector<int> element_of_slot;  // -1: empty
   std::vector<std::uint16_t> material_of_block;
-  std::vector<int> order;  // elements of chunk after chunk, neighbours close
+  std::vector<std::uint8_t> joined;           // blocks: faces ζ = -1 are those ζ = +1 of the block before
+  std::vector<std::uint8_t> turn_of_element;  // its axes ξ η ζ here are those of the model turned on by so many
+  std::vector<int> order;                     // elements of chunk after chunk, neighbours close
   // rows: of each chunk its own nodes, then copies of the shared ones that its elements read; then nodes of several
   // chunks
   std::vector<std::uint32_t> row_of_node;
@@ -35,6 +38,9 @@ struct ExplicitChunks {
   size_t most_nodes = 0;                       // of a chunk
   size_t slots() const { return element_of_slot.size(); }
 };
+
+/// The corners of an element turned by 0 to 2 axes.
+std::array<int, 8> turn_corners(const std::array<int, 8>& node, int turn);
 
 /// At most 1,024 elements a chunk: kNodeFields times 8 nodes of each is to fit 16 bits.
 ExplicitChunks make_chunks(const ExplicitModel&, size_t lanes, size_t elements_a_chunk = 1000);

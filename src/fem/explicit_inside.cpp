@@ -48,6 +48,8 @@ double seconds() { return std::chrono::duration<double>(std::chrono::steady_cloc
 ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o) : model(m), options(o) {
   check_explicit_model(model);
   chunks = make_chunks(model, kernel::lanes());
+  for (size_t e = 0; e < model.elements.size(); ++e)
+    model.elements[e].node = turn_corners(model.elements[e].node, chunks.turn_of_element[e]);
   const size_t N = model.nodes.size(), E = model.elements.size(), rows = chunks.node_of_row.size();
   for (const ExplicitMaterial& material : model.materials) laws.push_back(make_law(material));
 
@@ -202,6 +204,7 @@ void ExplicitSystem::Inside::advance_nodes(const kernel::StepJob& step, Explicit
       job.blocks = chunk.blocks;
       job.elements = state.elements.data() + chunk.first_block * W * kernel::kElementFields;
       job.corners = chunks.corners.data() + chunk.first_block * 8 * W;
+      job.joined = chunks.joined.data() + chunk.first_block;
       job.live = state.live.data() + chunk.first_block;
       job.own = chunk.own, job.shared = chunk.shared;
       job.own_nodes = state.rows.data() + 8 * chunk.first_row;

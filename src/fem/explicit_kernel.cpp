@@ -168,17 +168,41 @@ struct Gathered {
     return {hn::Load(d, at + i * kLanes), hn::Load(d, at + (i + 1) * kLanes), hn::Load(d, at + (i + 2) * kLanes)};
   }
 };
-/// A pair of numbers that lie side by side in the rows of nodes: 0 x y, 1 z and speed along x, 2 speeds along y z.
-HWY_INLINE QuadPair gather_low(const double* HWY_RESTRICT rows, const std::uint16_t* corners, size_t pair) {
-  reread(corners);
-  return load_face(rows + 2 * pair, corners);
+/// Sums over corners of the face between two blocks of a strip.
+struct Face {
+  static constexpr size_t kSize = 24 * kLanes;
+  double* HWY_RESTRICT at;
+
+  HWY_INLINE void put(size_t number, const Quad& q) const {
+    const D d;
+    double* to = at + 4 * number * kLanes;
+    hn::Store(q.one, d, to), hn::Store(q.x, d, to + kLanes);
+    hn::Store(q.y, d, to + 2 * kLanes), hn::Store(q.xy, d, to + 3 * kLanes);
+  }
+  HWY_INLINE Quad get(size_t number) const {
+    const D d;
+    const double* from = at + 4 * number * kLanes;
+    return {hn::Load(d, from), hn::Load(d, from + kLanes), hn::Load(d, from + 2 * kLanes),
+            hn::Load(d, from + 3 * kLanes)};
+  }
+};
+/// The face ζ = -1 of a strip's first block.
+HWY_NOINLINE void gather_low(const double* HWY_RESTRICT rows, const std::uint16_t* corners, const Face& low) {
+  for (size_t pair = 0; pair < 3; ++pair) {
+    const QuadPair face = load_face(rows + 2 * pair, corners);
+    low.put(2 * pair, face.first), low.put(2 * pair + 1, face.second);
+  }
 }
-HWY_INLINE void gather_high(const double* HWY_RESTRICT rows, const std::uint16_t* corners, size_t pair,
-                            const QuadPair& low, const Gathered& to) {
+/// A block's modes of a pair of numbers that lie side by side in the rows of nodes: 0 x y, 1 z and speed along x, 2
+/// speeds along y z. `face` is the one ζ = -1 before and ζ = +1 after.
+HWY_INLINE void gather(const double* HWY_RESTRICT rows, const std::uint16_t* corners, size_t pair, const Face& face,
+                       const Gathered& to) {
   reread(corners);
   const QuadPair high = load_face(rows + 2 * pair, corners + 4 * kLanes);
-  to.put(2 * pair, transform(low.first, high.first));
-  to.put(2 * pair + 1, transform(low.second, high.second));
+  to.put(2 * pair, transform(face.get(2 * pair), high.first));
+  face.put(2 * pair, high.first);
+  to.put(2 * pair + 1, transform(face.get(2 * pair + 1), high.second));
+  face.put(2 * pair + 1, high.second);
 }
 
 /// Derivatives of the volume by the modes but for factors (eq. 3, 4).
@@ -306,6 +330,12 @@ HWY_INLINE void add_face(const Quad& x, const Quad& y, const Quad& z, double* HW
   for (size_t i = 0; i < 4; ++i) add_corner(nx[i], ny[i], nz[i], rows, corners + i * kLanes);
 }
 
+/// Forces on the upper face of a strip's last block.
+HWY_NOINLINE void end_strip(const Face& carry, double* HWY_RESTRICT rows, const std::uint16_t* HWY_RESTRICT corners) {
+  add_face(carry.get(0), carry.get(1), carry.get(2), rows, corners);
+  for (size_t i = 0; i < 12; ++i) hn::Store(hn::Zero(D()), D(), carry.at + i * kLanes);
+}
+
 /// Adds the outer product v ⊗ g.
 HWY_INLINE void add_product(const V3& v, const V3& g, Matrix& m) {
   m.x = fma(v.x, g, m.x), m.y = fma(v.y, g, m.y), m.z = fma(v.z, g, m.z);
@@ -313,8 +343,13 @@ HWY_INLINE void add_product(const V3& v, const V3& g, Matrix& m) {
 
 /// Everything of a block of elements between the motion of its nodes' modes and their forces. Long chains of arithmetic
 /// alternate with gathering the next block, which depends on none of them.
+///   next   the block to gather, on the upper face of this one if `joined`
+///   face   sums over corners of this block's upper face
+///   carry  forces on the lower face from the block before, zero if it is not joined to this one; on the upper one
+///   after
 HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t block, const Gathered& modes,
-                              size_t next, const Gathered& ahead, Sums& sums) {
+                              size_t next, bool joined, const Gathered& ahead, const Face& face, const Face& carry,
+                              Sums& sums) {
   const D d;
   const Law& law = job.laws[job.law_of_block[block]];
   const std::uint16_t* corners = job.corners + block * 8 * kLanes;
@@ -341,7 +376,7 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
   const V bc = mul(length_b, length_c);
   const V all = hn::Div(num(1), mul(length_a, bc));
   const V ia = mul(all, bc), ib = mul(all, mul(length_c, length_a)), ic = mul(all, mul(length_a, length_b));
-  const QuadPair low0 = gather_low(rows, next_corners, 0);
+  if (HWY_UNLIKELY(!joined)) gather_low(rows, next_corners, face);
   const Gradients g = differentiate(x);
   const V inverse = hn::Div(num(1), g.volume);
 
@@ -350,7 +385,7 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
   Matrix L{scale(va.x, g.a), scale(va.y, g.a), scale(va.z, g.a)};
   add_product(modes.speed(1), g.b, L), add_product(modes.speed(2), g.c, L), add_product(modes.speed(3), g.d, L);
   add_product(modes.speed(4), g.e, L), add_product(modes.speed(5), g.f, L);
-  gather_high(rows, next_corners, 0, low0, ahead);
+  gather(rows, next_corners, 0, face, ahead);
   L = {scale(inverse, L.x), scale(inverse, L.y), scale(inverse, L.z)};
   const V trace = add(add(L.x.x, L.y.y), L.z.z);
 
@@ -392,16 +427,14 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
     const V3 q1 = beyond(modes.speed(3), x.d);
     const V x1 = dot(x.a, q1), y1 = mul(ib, dot(x.b, q1)), z1 = mul(ic, dot(x.c, q1));
     if (yields) cap.begin(law, load_field(element, kStrain), sxx, syy, szz, sxy, syz, szx);
-    const QuadPair low1 = gather_low(rows, next_corners, 1);
     if (yields) cap.take_root(law);
-    gather_high(rows, next_corners, 1, low1, ahead);
+    gather(rows, next_corners, 1, face, ahead);
     const V3 q2 = beyond(modes.speed(4), x.e);
     const V x2 = mul(ia, dot(x.a, q2)), y2 = dot(x.b, q2), z2 = mul(ic, dot(x.c, q2));
     s.bending[0] = fma(e, x2, fma(enu, y1, load_field(element, kBending)));
     s.bending[1] = fma(e, y1, fma(enu, x2, load_field(element, kBending + 1)));
     s.twist[0] = fma(mu, add(x1, y2), load_field(element, kTwist));
     if (yields) cap.divide();
-    const QuadPair low2 = gather_low(rows, next_corners, 2);
     const V3 q3 = beyond(modes.speed(5), x.f);
     const V x3 = mul(ia, dot(x.a, q3)), y3 = mul(ib, dot(x.b, q3)), z3 = dot(x.c, q3);
     s.bending[2] = fma(e, x3, fma(enu, z1, load_field(element, kBending + 2)));
@@ -410,7 +443,7 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
     s.bending[4] = fma(e, y3, fma(enu, z2, load_field(element, kBending + 4)));
     s.bending[5] = fma(e, z2, fma(enu, y3, load_field(element, kBending + 5)));
     s.twist[2] = fma(mu, add(y2, z3), load_field(element, kTwist + 2));
-    gather_high(rows, next_corners, 2, low2, ahead);
+    gather(rows, next_corners, 2, face, ahead);
     if (yields) cap.end();
     const V3 q4 = beyond(modes.speed(6), x.g);
     s.corner[0] = fma(mul(E, ia), dot(x.a, q4), load_field(element, kCorner));
@@ -558,21 +591,22 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
   };
   p1 = times_add(g.d, p1), p2 = times_add(g.e, p2), p3 = times_add(g.f, p3);
   double* HWY_RESTRICT forces = job.forces;
-  // corners of the face ζ = -1, then +1: parts of 1 ξ η ξη there
+  // faces ζ = -1, then +1: parts of 1 ξ η ξη there
   {
-    const auto parts = [&](V c, V b, V d1, V a, V e, V f, V g4) HWY_ATTR {
-      return Quad{hn::Neg(c), sub(a, e), sub(b, d1), sub(f, g4)};
+    const auto parts = [&](size_t axis, V c, V b, V d1, V a, V e, V f, V g4) HWY_ATTR {
+      const Quad before = carry.get(axis);
+      return Quad{sub(before.one, c), add(before.x, sub(a, e)), add(before.y, sub(b, d1)), add(before.xy, sub(f, g4))};
     };
-    add_face(parts(fc.x, fb.x, p1.x, fa.x, p2.x, p3.x, p4.x), parts(fc.y, fb.y, p1.y, fa.y, p2.y, p3.y, p4.y),
-             parts(fc.z, fb.z, p1.z, fa.z, p2.z, p3.z, p4.z), forces, corners);
+    add_face(parts(0, fc.x, fb.x, p1.x, fa.x, p2.x, p3.x, p4.x), parts(1, fc.y, fb.y, p1.y, fa.y, p2.y, p3.y, p4.y),
+             parts(2, fc.z, fb.z, p1.z, fa.z, p2.z, p3.z, p4.z), forces, corners);
   }
-  {
-    const auto parts = [&](V c, V b, V d1, V a, V e, V f, V g4) HWY_ATTR {
-      return Quad{c, add(a, e), add(b, d1), add(f, g4)};
-    };
-    add_face(parts(fc.x, fb.x, p1.x, fa.x, p2.x, p3.x, p4.x), parts(fc.y, fb.y, p1.y, fa.y, p2.y, p3.y, p4.y),
-             parts(fc.z, fb.z, p1.z, fa.z, p2.z, p3.z, p4.z), forces, corners + 4 * kLanes);
-  }
+  const auto parts = [&](V c, V b, V d1, V a, V e, V f, V g4) HWY_ATTR {
+    return Quad{c, add(a, e), add(b, d1), add(f, g4)};
+  };
+  carry.put(0, parts(fc.x, fb.x, p1.x, fa.x, p2.x, p3.x, p4.x));
+  carry.put(1, parts(fc.y, fb.y, p1.y, fa.y, p2.y, p3.y, p4.y));
+  carry.put(2, parts(fc.z, fb.z, p1.z, fa.z, p2.z, p3.z, p4.z));
+  if (HWY_UNLIKELY(!joined)) end_strip(carry, forces, corners + 4 * kLanes);
 }
 
 /// Rows are read in vectors of up to four.
@@ -739,21 +773,24 @@ void advance_chunk(const StepJob& step, ChunkJob& job) {
       job.own_nodes + 8 * (job.own + job.shared);  // the next chunk's rows on their way, as many as here
   const size_t blocks = job.blocks, rows_a_block = job.own / std::max<size_t>(1, blocks) + 1;
   const unsigned char* HWY_RESTRICT live = job.live;
-  HWY_ALIGN double room[2 * Gathered::kSize];
+  HWY_ALIGN double room[2 * Gathered::kSize + Face::kSize];
+  HWY_ALIGN double forces_between[12 * kLanes] = {};
   Gathered now{room}, then{room + Gathered::kSize};
+  const Face face{room + 2 * Gathered::kSize}, carry{forces_between};
   size_t first = 0;
   while (first < blocks && live[first] == 0) ++first;
-  if (first < blocks)
-    for (size_t pair = 0; pair < 3; ++pair) {
-      const std::uint16_t* corners = job.corners + first * 8 * kLanes;
-      gather_high(job.own_nodes, corners, pair, gather_low(job.own_nodes, corners, pair), now);
-    }
+  if (first < blocks) {
+    const std::uint16_t* corners = job.corners + first * 8 * kLanes;
+    gather_low(job.own_nodes, corners, face);
+    for (size_t pair = 0; pair < 3; ++pair) gather(job.own_nodes, corners, pair, face, now);
+  }
   for (size_t block = 0; block < blocks; ++block) {
     for (const double* end = ahead + 8 * rows_a_block; ahead != end; ahead += 8) hwy::Prefetch(ahead);
     if (live[block] == 0) continue;
     size_t next = block + 1;
     while (next < blocks && live[next] == 0) ++next;
-    advance_block(step, job, block, now, std::min(next, blocks - 1), then, sums);
+    const bool joined = next == block + 1 && next < blocks && job.joined[next] != 0;
+    advance_block(step, job, block, now, std::min(next, blocks - 1), joined, then, face, carry, sums);
     std::swap(now.at, then.at);
   }
   const V* vectors[4] = {&sums.mean, &sums.varying, &sums.corner, &sums.viscous};

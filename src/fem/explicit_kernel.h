@@ -86,6 +86,7 @@ struct ChunkJob {
   size_t blocks = 0;
   double* elements = nullptr;                   // kElementFields a block
   const std::uint16_t* corners = nullptr;       // 8 a block of W lanes: kNodeFields times the node's place
+  const std::uint8_t* joined = nullptr;         // of blocks: faces ζ = -1 are those ζ = +1 of the block before
   const unsigned char* live = nullptr;          // bits of the lanes of a block
   size_t own = 0, shared = 0;                   // nodes: those of this chunk alone come first
   double* own_nodes = nullptr;                  // kNodeFields each; copies of shared nodes follow, written
