@@ -8,7 +8,7 @@
 #include <tuple>
 #include <utility>
 
-#include "base/parallel.h"
+#include "base/team.h"
 #include "fem/explicit_inside.h"
 #include "fem/segment_contact.h"
 
@@ -53,19 +53,19 @@ struct Skin {
 
 /// Calls body(i) for all i below count, `run` of them a task.
 template <class Body>
-void for_all(size_t count, size_t run, int threads, const Body& body) {
-  (void)parallel_for((count + run - 1) / run, threads, [&](size_t task) {
+void for_all(size_t count, size_t run, Team& team, const Body& body) {
+  team.run((count + run - 1) / run, [&](size_t task) {
     for (size_t i = task * run; i < std::min(count, (task + 1) * run); ++i) body(i);
   });
 }
 
 class Search {
  public:
-  Search(const ContactSetup& setup, ExplicitState& state, double h, int threads)
+  Search(const ContactSetup& setup, ExplicitState& state, double h, Team& team)
       : setup_(setup),
         s_(state),
         h_(h),
-        threads_(threads),
+        team_(team),
         groups_(static_cast<std::uint32_t>(setup.group_starts.size() - 1)),
         skins_(groups_) {}
 
@@ -85,7 +85,7 @@ class Search {
       if (pair.slack < 0 || changed) due.push_back(&pair);
     }
     make_skins(due);
-    for_all(due.size(), 64, threads_, [&](size_t i) {
+    for_all(due.size(), 64, team_, [&](size_t i) {
       find_candidates(*due[i]);
       due[i]->slack = setup_.margin;
     });
@@ -127,14 +127,14 @@ class Search {
     const size_t objects = groups_ + s_.particles.size(), known = c.speed.size();
     std::vector<Vec3> mean(objects);
     std::vector<double> spread(objects, 0);
-    for_all(objects, 64, threads_,
+    for_all(objects, 64, team_,
             [&](size_t o) { std::tie(mean[o], spread[o]) = measure(static_cast<std::uint32_t>(o)); });
     c.travel.resize(objects, 0);
     for (size_t o = 0; o < known; ++o) {
       c.spread[o] = std::max(c.spread[o], spread[o]);
       c.travel[o] += (std::max(norm(c.speed[o]), norm(mean[o])) + c.spread[o]) * elapsed;
     }
-    for_all(c.pairs.size(), 4096, threads_, [&](size_t i) {
+    for_all(c.pairs.size(), 4096, team_, [&](size_t i) {
       ContactPair& pair = c.pairs[i];
       const double apart = std::max(norm(mean[pair.a] - mean[pair.b]), norm(c.speed[pair.a] - c.speed[pair.b]));
       pair.slack -= (apart + c.spread[pair.a] + c.spread[pair.b]) * elapsed;
@@ -161,7 +161,7 @@ class Search {
     ContactState& c = s_.contact;
     const size_t objects = groups_ + s_.particles.size();
     c.boxes.resize(objects), c.room.resize(objects);
-    for_all(objects, 64, threads_, [&](size_t i) {
+    for_all(objects, 64, team_, [&](size_t i) {
       const auto o = static_cast<std::uint32_t>(i);
       c.room[o] = calc_room(o);
       c.boxes[o] = make_box(o, c.room[o]);
@@ -224,7 +224,7 @@ class Search {
     const double least = kLeastShare * setup_.margin;
     constexpr size_t kRun = 512;
     std::vector<std::vector<ContactCandidate>> found((c.pairs.size() + kRun - 1) / kRun);
-    for_all(c.pairs.size(), kRun, threads_, [&](size_t i) {
+    for_all(c.pairs.size(), kRun, team_, [&](size_t i) {
       const ContactPair& pair = c.pairs[i];
       if (pair.candidates.empty()) return;
       const double path =
@@ -239,7 +239,7 @@ class Search {
               [](const NearCandidate& a, const NearCandidate& b) { return a.candidate < b.candidate; });
     for (NearCandidate& near : c.near) near.rows = rows_of(near.candidate.face);
     std::vector<std::vector<ParticlePair>> near((c.particle_pairs.size() + kRun - 1) / kRun);
-    for_all(c.particle_pairs.size(), kRun, threads_, [&](size_t i) {
+    for_all(c.particle_pairs.size(), kRun, team_, [&](size_t i) {
       const ParticlePair& pair = c.particle_pairs[i];
       const Particle &a = s_.particles[pair[0]], &b = s_.particles[pair[1]];
       const Vec3 d = a.p - b.p, v = a.v - b.v;
@@ -316,7 +316,7 @@ class Search {
       wanted[pair->b] = 1;
       if (pair->a < groups_) wanted[pair->a] = 1;
     }
-    for_all(groups_, 8, threads_, [&](size_t g) {
+    for_all(groups_, 8, team_, [&](size_t g) {
       if (wanted[g] != 0) skins_[g] = make_skin(static_cast<std::uint32_t>(g));
     });
   }
@@ -400,7 +400,7 @@ class Search {
   const ContactSetup& setup_;
   ExplicitState& s_;
   double h_;
-  int threads_;
+  Team& team_;
   std::uint32_t groups_;
   std::vector<std::optional<Skin>> skins_;
 };
@@ -457,14 +457,14 @@ ContactSetup make_contact_setup(const ExplicitModel& model, const ExplicitChunks
   return setup;
 }
 
-void search_contact(const ContactSetup& setup, ExplicitState& state, double h, int threads, double& seconds) {
+void search_contact(const ContactSetup& setup, ExplicitState& state, double h, Team& team, double& seconds) {
   ContactState& c = state.contact;
   if (c.gone.empty()) c.gone.assign(setup.rows_of_element.size(), 0);
   if (c.changed.empty()) c.changed.assign(setup.group_starts.size() - 1, 0);
   if (!c.fresh && --c.countdown > 0) return;
   const auto start = std::chrono::steady_clock::now();
   c.countdown = kLook;
-  Search(setup, state, h, threads).look();
+  Search(setup, state, h, team).look();
   seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 

@@ -4,7 +4,6 @@
 #include <chrono>
 #include <cmath>
 
-#include "base/parallel.h"
 #include "fem/segment_contact.h"
 
 namespace topple::fem {
@@ -38,14 +37,15 @@ kernel::Law make_law(const ExplicitMaterial& m) {
   return law;
 }
 
-/// Chunks are shared out to this many tasks at most, each with room of its own.
+/// Chunks are shared out to this many tasks at most.
 constexpr size_t kTasks = 16;
 
 double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 }  // namespace
 
-ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o) : model(m), options(o) {
+ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
+    : model(m), options(o), team(std::make_unique<Team>(o.threads)) {
   check_explicit_model(model);
   chunks = make_chunks(model, kernel::lanes());
   for (size_t e = 0; e < model.elements.size(); ++e)
@@ -150,8 +150,6 @@ ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
   contact = make_contact_setup(model, chunks, edge, options.contact);
 
   shared_forces.assign(4 * std::max<size_t>(1, chunks.shared_rows.size()), 0);
-  rooms.resize(std::min(kTasks, chunks.chunks.size()));
-  for (auto& room : rooms) room.assign(4 * chunks.most_nodes, 0);
   failed.resize(chunks.chunks.size());
   chunk_sums.resize(chunks.chunks.size());
   grounded.resize(chunks.chunks.size() + kTasks);
@@ -193,10 +191,13 @@ kernel::StepJob ExplicitSystem::Inside::make_step() const {
 }
 
 void ExplicitSystem::Inside::advance_nodes(const kernel::StepJob& step, ExplicitState& state) {
-  const size_t count = chunks.chunks.size(), tasks = rooms.size(), W = chunks.W;
+  const size_t count = chunks.chunks.size(), tasks = std::min(kTasks, chunks.chunks.size()), W = chunks.W;
   const double t0 = seconds();
   for (kernel::Law& law : laws) kernel::set_step(law, step.past);
   const auto run_task = [&](size_t task) {
+    // of a thread rather than a task, so that it stays in the cache; all 0 between chunks
+    static thread_local AlignedVector<double> room;
+    if (room.size() < 4 * chunks.most_nodes) room.assign(4 * chunks.most_nodes, 0);
     for (size_t i = count * task / tasks; i < count * (task + 1) / tasks; ++i) {
       const ElementChunk& chunk = chunks.chunks[i];
       kernel::ChunkJob job;
@@ -213,7 +214,7 @@ void ExplicitSystem::Inside::advance_nodes(const kernel::StepJob& step, Explicit
       job.shared_forces = shared_forces.data() + 4 * chunk.first_shared;
       job.own_flags = state.flags.data() + chunk.first_row;
       job.own_pushes = state.pushes.data() + 4 * chunk.first_row;
-      job.forces = rooms[task].data();
+      job.forces = room.data();
       failed[i].clear(), grounded[i].clear();
       job.failed = &failed[i], job.grounded = &grounded[i];
       kernel::advance_chunk(step, job);
@@ -235,17 +236,10 @@ void ExplicitSystem::Inside::advance_nodes(const kernel::StepJob& step, Explicit
     kernel::advance_shared(step, job);
     balances[count + task] = job.balance;
   };
-  if (options.threads == 1 || count == 1) {
-    for (size_t task = 0; task < tasks; ++task) run_task(task);
-    const double t1 = seconds();
-    for (size_t task = 0; task < kTasks; ++task) run_shared(task);
-    timing.kernel += t1 - t0, timing.boundary += seconds() - t1;
-  } else {
-    (void)parallel_for(tasks, options.threads, run_task);
-    const double t1 = seconds();
-    (void)parallel_for(kTasks, options.threads, run_shared);
-    timing.kernel += t1 - t0, timing.boundary += seconds() - t1;
-  }
+  team->run(tasks, run_task);
+  const double t1 = seconds();
+  team->run(kTasks, run_shared);
+  timing.kernel += t1 - t0, timing.boundary += seconds() - t1;
 }
 
 void ExplicitSystem::Inside::clear_pushes(ExplicitState& state) const {
@@ -269,7 +263,7 @@ void ExplicitSystem::Inside::advance_step(ExplicitState& state, bool removes) {
   double t1 = seconds();
   timing.contact += t1 - t0;
   if (options.contact || !state.particles.empty()) {
-    search_contact(contact, state, h, options.threads, timing.search);
+    search_contact(contact, state, h, *team, timing.search);
     timing.searches = state.contact.searches;
     t1 = seconds();
     press_surfaces(*this, state);

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "base/aligned.h"
+#include "base/team.h"
 #include "fem/contact_search.h"
 #include "fem/explicit_chunks.h"
 #include "fem/explicit_kernel.h"
@@ -81,9 +83,9 @@ struct ExplicitSystem::Inside {
   std::vector<Vec3> start;  // places from which potentials count (rows)
   double start_energy = 0;
   bool started = false;
+  std::unique_ptr<Team> team;
   // room for a step
   AlignedVector<double> shared_forces;
-  std::vector<AlignedVector<double>> rooms;
   std::vector<std::vector<std::uint32_t>> failed, grounded;
   std::vector<std::array<double, 4>> chunk_sums;
   std::vector<kernel::Balance> balances;  // of chunks, then of shares of the shared nodes

@@ -7,7 +7,6 @@
 #include <optional>
 #include <span>
 
-#include "base/parallel.h"
 #include "fem/explicit_inside.h"
 
 namespace topple::fem {
@@ -221,7 +220,7 @@ void press_surfaces(const ExplicitSystem::Inside& in, ExplicitState& s) {
     return i;
   };
   c.touches.resize(tasks);
-  (void)parallel_for(tasks, in.options.threads, [&](size_t task) {
+  in.team->run(tasks, [&](size_t task) {
     std::vector<SurfaceTouch>& touches = c.touches[task];
     touches.clear();
     const size_t first = begin_of(task), last = begin_of(task + 1);
@@ -255,7 +254,7 @@ void press_surfaces(const ExplicitSystem::Inside& in, ExplicitState& s) {
 void book_surfaces(const ExplicitSystem::Inside& in, ExplicitState& s) {
   const auto& touches = s.contact.touches;
   std::vector<ContactWork> work(touches.size());
-  (void)parallel_for(touches.size(), in.options.threads, [&](size_t task) {
+  in.team->run(touches.size(), [&](size_t task) {
     for (const SurfaceTouch& touch : touches[task]) {
       Vec3 now = find_point(in.contact, s, touch.point).v;
       if (touch.other > 0) {

@@ -4,12 +4,16 @@
 #include "fem/contact_search.h"
 #include "fem/explicit_system.h"
 
+namespace topple {
+class Team;
+}
+
 namespace topple::fem {
 
 struct ExplicitState;
 
 /// Looks for candidates where something has moved enough; adds the time it takes [s].
-void search_contact(const ContactSetup&, ExplicitState&, double h, int threads, double& seconds);
+void search_contact(const ContactSetup&, ExplicitState&, double h, Team&, double& seconds);
 /// Looks at the next step where a piece of debris has been knocked away faster than a look reckons with.
 void hurry_search(const ContactSetup&, ExplicitState&, double h);
 /// Forces of all candidates that touch.
