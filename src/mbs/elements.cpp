@@ -57,7 +57,7 @@ void System::kill_slot(size_t e) {
   const size_t slot = slot_of(e);
   if (slot == Lanes::kNoSlot || lanes->field(slot, kMostTurn) == kUnlimited) return;
   lanes->still_slot(slot);
-  --lanes->live[slot / lanes->W];
+  if (--lanes->live[slot / lanes->W] == 0) lanes->has_dead_entries = lanes->is_batch;
   --lanes->live_elements;
   --state.live_elements;
 }
@@ -177,6 +177,7 @@ void System::pack_element(size_t e, bool has_moved) {
   put(kMostForce, !bounded ? -1 : free ? kUnlimited : z.safe_force[1]);
   if (!bounded && !flows) return;
   if (flows) {
+    l.open_flows();
     const auto copy = [&](int from, int to) {
       for (int f = from; f < to; ++f) l.flow(slot, f) = fields[f];
     };
@@ -451,8 +452,10 @@ void System::save_slot(size_t slot, std::vector<double>& to) const {
 const double* System::restore_slot(size_t slot, const double* from) {
   for (int f = 0; f < kSlotFields; ++f) lanes->set(slot, f, *from++);
   for (size_t f = 0; f < static_cast<size_t>(kForceFields); ++f) lanes->force_field(slot, f) = *from++;
-  if (lanes->field(slot, kFlows) > 0)
+  if (lanes->field(slot, kFlows) > 0) {
+    lanes->open_flows();
     for (int f = 0; f < kFlowFields; ++f) lanes->flow(slot, f) = *from++;
+  }
   return from;
 }
 

@@ -104,8 +104,30 @@ class PairMatrix {
     }
   }
   Sparse take() { return std::move(matrix_); }
+  /// Times a vector, in the order in which Sparse sums.
+  void times(const Vector& x, Vector& y) const { u_.each == 6 ? times_by<6>(x, y) : times_by<3>(x, y); }
 
  private:
+  template <int Each>
+  void times_by(const Vector& x, Vector& y) const {
+    y.setZero(x.size());
+    const double* block = matrix_.valuePtr();
+    for (size_t j = 0; j < near_.size(); ++j) {
+      const std::vector<int>& list = near_[j];
+      const size_t stride = Each * list.size();  // from column to column
+      const double* from = x.data() + Each * j;
+      for (const int i : list) {
+        double sum[Each];
+        double* to = y.data() + Each * i;
+        for (int m = 0; m < Each; ++m) sum[m] = to[m];
+        for (size_t n = 0; n < Each; ++n)
+          for (size_t m = 0; m < Each; ++m) sum[m] += block[n * stride + m] * from[n];
+        for (int m = 0; m < Each; ++m) to[m] = sum[m];
+        block += Each;
+      }
+      block += (Each - 1) * stride;
+    }
+  }
   Unknowns u_;
   std::vector<std::vector<int>> near_;  // of each body, those whose rows its columns have
   Sparse matrix_;
@@ -205,7 +227,7 @@ class Assembly {
   }
   /// Stiffness of all live elements: at rest, or that of fast motion, which the springs behind the dampers add to.
   /// `force_scale` is that of the forces, for springs.
-  Sparse make_stiffness(bool fast, double force_scale = 1) const {
+  PairMatrix make_stiffness(bool fast, double force_scale = 1) const {
     const std::vector<StiffRow> springs = s_.calc_spring_stiffness(fast, force_scale);
     PairMatrix sum(static_cast<int>(free_.size()), unknowns_);
     const auto each_element = [&](auto&& f) {
@@ -237,7 +259,7 @@ class Assembly {
       add_outer(r, stiffness, block);
       sum.add(r.a, r.b, block);
     });
-    return sum.take();
+    return sum;
   }
 
  private:
@@ -253,12 +275,11 @@ class Assembly {
 };
 
 /// Largest eigenvalue of M⁻¹ K by Lanczos' method in the inner product of M.
-///   accelerate  x -> M⁻¹ x; weigh  x -> M x
+///   accelerate(x, y)  y = M⁻¹ x; weigh(x, y)  y = M x
 template <class Accelerate, class Weigh>
-double find_largest_eigenvalue(const Sparse& K, Accelerate&& accelerate, Weigh&& weigh) {
-  const Eigen::Index n = K.rows();
+double find_largest_eigenvalue(const PairMatrix& K, Eigen::Index n, Accelerate&& accelerate, Weigh&& weigh) {
   constexpr int most = 80;
-  Vector x(n), before = Vector::Zero(n);
+  Vector x(n), before = Vector::Zero(n), f(n), next(n), weighed(n);
   // a start that no mode is orthogonal to by symmetry
   std::uint64_t seed = 88172645463325252ULL;
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -266,19 +287,21 @@ double find_largest_eigenvalue(const Sparse& K, Accelerate&& accelerate, Weigh&&
     x[i] = static_cast<double>(seed >> 11) * 0x1p-53 - 0.5;
   }
   std::vector<double> diagonal, beside;
-  double found = 0, norm2 = x.dot(weigh(x));
+  weigh(x, weighed);
+  double found = 0, norm2 = x.dot(weighed);
   for (int round = 0; round < most && norm2 > 0; ++round) {
     const double norm = std::sqrt(norm2);
     if (round > 0) beside.push_back(norm);
     x /= norm;
-    const Vector f = K * x;
+    K.times(x, f);
     diagonal.push_back(x.dot(f));
-    Vector next = accelerate(f);
+    accelerate(f, next);
     next -= diagonal.back() * x;
     if (round > 0) next -= norm * before;
-    before = x;
-    x = next;
-    norm2 = x.dot(weigh(x));
+    before.swap(x);
+    x.swap(next);
+    weigh(x, weighed);
+    norm2 = x.dot(weighed);
     const bool exhausted = !(norm2 > 1e-20 * diagonal.back() * diagonal.back());
     if (round % 4 != 3 && round + 1 != n && !exhausted) continue;
     Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver;
@@ -305,24 +328,26 @@ double System::find_highest_frequency() const {
     inertia[i] = R * state.body[b].inertia * transpose(R);
     inverse_inertia[i] = R * state.body[b].inverse_inertia * transpose(R);
   }
-  const auto scale = [&](const Vector& x, bool inverse) {
-    Vector y(n);
+  const auto scale = [&](const Vector& x, bool inverse, Vector& y) {
     for (size_t i = 0; i < inertia.size(); ++i) {
       const BodyConstants& body = state.body[static_cast<size_t>(assembly.free_bodies()[i])];
       const double m = inverse ? body.inverse_mass : body.mass;
-      double in[6] = {};
-      for (int k = 0; k < u.each; ++k) in[u.coordinate(k)] = x[u.at(static_cast<int>(i), k)];
-      const Vec3 w = (inverse ? inverse_inertia[i] : inertia[i]) * Vec3{in[3], in[4], in[5]};
-      for (int k = 0; k < u.each; ++k) {
-        const int c = u.coordinate(k);
-        y[u.at(static_cast<int>(i), k)] = c < 3 ? m * in[c] : w[c - 3];
+      const Mat3& I = inverse ? inverse_inertia[i] : inertia[i];
+      const double* from = x.data() + u.each * static_cast<Eigen::Index>(i);
+      double* to = y.data() + u.each * static_cast<Eigen::Index>(i);
+      if (u.each == 6) {
+        const Vec3 w = I * Vec3{from[3], from[4], from[5]};
+        to[0] = m * from[0], to[1] = m * from[1], to[2] = m * from[2];
+        to[3] = w.x, to[4] = w.y, to[5] = w.z;
+      } else {
+        to[0] = m * from[0], to[1] = m * from[1];
+        to[2] = (I * Vec3{0, from[2], 0}).y;
       }
     }
-    return y;
   };
   const double omega2 = find_largest_eigenvalue(
-      assembly.make_stiffness(true), [&](const Vector& x) { return scale(x, true); },
-      [&](const Vector& x) { return scale(x, false); });
+      assembly.make_stiffness(true), n, [&](const Vector& x, Vector& y) { scale(x, true, y); },
+      [&](const Vector& x, Vector& y) { scale(x, false, y); });
   return 1.01 * std::sqrt(std::max(0.0, omega2));  // the iteration stops a little below
 }
 
@@ -459,7 +484,7 @@ double DeadLoad::calc_weight() const {
 
 bool DeadLoad::factorise(std::string& message) {
   const int n = assembly_.count();
-  Sparse K = first_.rows() > 0 ? std::move(first_) : assembly_.make_stiffness(false, weight_);
+  Sparse K = first_.rows() > 0 ? std::move(first_) : assembly_.make_stiffness(false, weight_).take();
   first_.resize(0, 0);
   if (!s_.joints.empty()) {
     Triplets t;
@@ -582,7 +607,7 @@ bool DeadLoad::find(std::string& message) {
   // joints as stiff as the stiffest body is held: more would turn round-off of places into larger forces and save no
   // iteration
   {
-    first_ = assembly_.make_stiffness(false, weight_);
+    first_ = assembly_.make_stiffness(false, weight_).take();
     for (Eigen::Index i = 0; i < first_.rows(); ++i) penalty_ = std::max(penalty_, first_.coeff(i, i));
   }
   // places are known to round-off only, and the stiffest spring turns that into a force

@@ -57,7 +57,7 @@ void Lanes::allocate_elements(size_t elements) {
   pool.assign(W, 0);
   constants.assign(element_blocks * kernel::kConstants, 0);
   uses.assign(1, static_cast<std::uint32_t>(constants.size()));
-  flows.assign(element_blocks * kernel::kFlowFields * W, 0);
+  flows.clear();
   element_forces.assign(element_blocks * kernel::kForceFields * W, 0);
   live.assign(element_blocks, 0);
   softened.assign(element_blocks, 0);
@@ -105,6 +105,23 @@ void Lanes::set(size_t slot, int f, double x) {
     std::copy_n(pool.begin() + static_cast<std::ptrdiff_t>(from), W, pool.end() - static_cast<std::ptrdiff_t>(W));
   }
   pool[size_t{entry} * W + slot % W] = x;
+}
+
+void Lanes::open_flows() {
+  if (flows.empty()) flows.assign(element_blocks * kernel::kFlowFields * W, 0);
+}
+
+void Lanes::drop_dead_entries() {
+  size_t kept = 0;
+  std::uint32_t from = 0;
+  for (size_t b = 0; b + 1 < first_entry.size(); ++b) {
+    const std::uint32_t to = first_entry[b + 1];
+    for (; from < to; ++from)
+      if (live[entries[from] / 2] > 0) entries[kept++] = entries[from];
+    first_entry[b + 1] = static_cast<std::uint32_t>(kept);
+  }
+  entries.resize(kept);
+  has_dead_entries = false;
 }
 
 void Lanes::share_again() {
@@ -283,6 +300,7 @@ void Lanes::evaluate_elements(size_t first, size_t last, std::vector<std::uint32
 }
 
 void Lanes::sum_forces() {
+  if (has_dead_entries) drop_dead_entries();
   const kernel::SumJob job{first_entry.size() - 1, first_entry.data(), entries.data(), element_forces.data(),
                            sums_in_plane,          force.data(),       torque.data()};
   if (W == kernel::lanes()) {

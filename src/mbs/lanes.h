@@ -47,6 +47,7 @@ struct Lanes {
   // one run: slots of elements (several may be gone), bodies of slots; elements meeting in each body
   std::vector<std::uint32_t> slot_of, element_of, body_a, body_b;  // batch: bodies of each block
   std::vector<std::uint32_t> first_entry, entries;                 // 2 * slot (batch: block) + side
+  bool has_dead_entries = false;                                   // batch: blocks have died
   size_t live_elements = 0, used_slots = 0;                        // one run
   // one value a lane
   AlignedVector<double> kick, h, gx, gy, gz, sum;
@@ -115,8 +116,11 @@ struct Lanes {
   void evaluate_elements(size_t first, size_t last, std::vector<std::uint32_t>& beyond);
   /// Forces of the elements on every body; batch only.
   void sum_forces();
+  /// Memory for flows, before the first is written.
+  void open_flows();
 
  private:
+  void drop_dead_entries();
   size_t state_at(size_t slot, int f) const {
     return (slot / W * kernel::kStateFields + static_cast<size_t>(f)) * W + slot % W;
   }

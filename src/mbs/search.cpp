@@ -43,6 +43,7 @@ void System::find_links() {
   State& s = state;
   PairSearch& search = contact.search;
   search.has_links = true;
+  const std::vector<unsigned char> tied = s.tied_to_ground;
   std::fill(s.tied_to_ground.begin(), s.tied_to_ground.end(), 0);
   std::fill(s.ground_clear.begin(), s.ground_clear.end(), 0);
   const auto grounded = [&](int x) { return x < 0 || fixed[static_cast<size_t>(x)]; };
@@ -69,7 +70,8 @@ void System::find_links() {
     search.link[static_cast<size_t>(search.first_link[static_cast<size_t>(a) + 1]++)] = b;
     search.link[static_cast<size_t>(search.first_link[static_cast<size_t>(b) + 1]++)] = a;
   });
-  for (size_t b = 0; b < B; ++b) pack_ground_box(b);
+  for (size_t b = 0; b < B; ++b)
+    if (s.tied_to_ground[b] != tied[b]) pack_ground_box(b);
 }
 
 /// Speeds of the bodies' farthest points, as the ways are counted, and which are the fastest.
