@@ -64,9 +64,9 @@ struct Corner {
 
 /// Displacements of the friction springs that corners take over from the step before: their own, or that of the nearest
 /// corner which touched then.
-template <class D>
-HWY_INLINE void take_over_slips(const double* HWY_RESTRICT state, const V3<D> place[kCorners], const int* number,
-                                int count, Corner<D>* corner) {
+template <class D, class Place>
+HWY_INLINE void take_over_slips(const double* HWY_RESTRICT state, const Place& place_of, const int* number, int count,
+                                Corner<D>* corner) {
   const D d;
   const auto none = hn::Set(d, std::numeric_limits<double>::infinity());
   for (int i = 0; i < count; ++i) {
@@ -75,10 +75,10 @@ HWY_INLINE void take_over_slips(const double* HWY_RESTRICT state, const V3<D> pl
     const auto is_new = hn::Eq(own.x.v, none);
     c.is_fresh = is_new;
     c.slip = {select(is_new, num<D>(0), own.x), select(is_new, num<D>(0), own.y), select(is_new, num<D>(0), own.z)};
-    if (hn::AllFalse(d, hn::And(is_new, c.touches))) continue;
+    if (HWY_LIKELY(hn::AllFalse(d, hn::And(is_new, c.touches)))) continue;
     Num<D> least = {none};
     for (int j = 0; j < kCorners; ++j) {
-      const V3<D> other = load3<D>(state, kCornerSlip + 3 * j), apart = place[j] - c.place;
+      const V3<D> other = load3<D>(state, kCornerSlip + 3 * j), apart = place_of(j) - c.place;
       const Num<D> distance2 = dot(apart, apart);
       const auto nearer = hn::And(is_new, hn::And(hn::Lt(other.x.v, none), hn::Lt(distance2.v, least.v)));
       least = select(nearer, distance2, least);
@@ -118,36 +118,40 @@ HWY_INLINE void press_ground_block(const GroundJob& job, size_t block) {
   const M active = is_low(below, (abs(along_x) + abs(along_y)) + abs(along_z));
   if (hn::AllFalse(d, active)) return;
   const M possible = hn::Gt(load<D>(constants, kPossible).v, zero.v);
-  V3<D> place[kCorners];
+  const auto end = [](int corner, int axis, const N& from, const N& by) {
+    return corner & axis ? from + by : from - by;
+  };
+  const auto place_of = [&](int i) -> V3<D> {
+    return {end(i, 4, end(i, 2, end(i, 1, centre.x, x.x), y.x), z.x),
+            end(i, 4, end(i, 2, end(i, 1, centre.y, x.y), y.y), z.y),
+            end(i, 4, end(i, 2, end(i, 1, centre.z, x.z), y.z), z.z)};
+  };
+  // `below` is how far the plane lies above the box's centre
+  N edge[4];
+  for (int i = 0; i < 4; ++i) edge[i] = end(~i, 2, end(~i, 1, below, along_x), along_y);
   Corner<D> corner[kCorners];
   int number[kCorners], count = 0;
-  M busy = hn::FirstN(d, 0), touching = busy, touched = busy;
+  M busy = hn::FirstN(d, 0), touching = busy;
+  const M may_touch = hn::And(active, possible);
   const auto none = hn::Set(d, std::numeric_limits<double>::infinity());
   for (int i = 0; i < kCorners; ++i) {
-    const auto end = [i](int axis, const N& from, const N& by) { return i & axis ? from + by : from - by; };
-    place[i] = {end(4, end(2, end(1, centre.x, x.x), y.x), z.x), end(4, end(2, end(1, centre.y, x.y), y.y), z.y),
-                end(4, end(2, end(1, centre.z, x.z), y.z), z.z)};
-    // `below` is how far the plane lies above the box's centre
-    const auto sink = [i](int axis, const N& from, const N& by) { return i & axis ? from - by : from + by; };
-    const N penetration = sink(4, sink(2, sink(1, below, along_x), along_y), along_z);
-    const N before = load<D>(state, kBorn + i);
-    const N born =
-        maximum(zero, minimum(select(hn::Ge(before.v, zero.v), before, maximum(zero, penetration)), penetration));
+    const N penetration = end(~i, 4, edge[i & 3], along_z), before = load<D>(state, kBorn + i);
+    const N born = maximum(zero, minimum(select(hn::Ge(before.v, zero.v), before, penetration), penetration));
     const N depth = penetration - born;
-    const M touches = hn::And(hn::And(active, possible), hn::Gt(depth.v, zero.v));
+    const M touches = hn::And(may_touch, hn::Gt(depth.v, zero.v));
     store_where<D>(active, select(possible, born, num<D>(-1)), state, kBorn + i);
-    busy = hn::Or(busy, hn::Or(touches, hn::And(possible, hn::Gt(born.v, zero.v))));
-    touching = hn::Or(touching, touches);
-    touched = hn::Or(touched, hn::Lt(load<D>(state, kCornerSlip + 3 * i).v, none));
+    busy = hn::Or(busy, hn::Gt(born.v, zero.v));
     if (hn::AllFalse(d, touches)) continue;
-    corner[count].place = place[i];
+    touching = hn::Or(touching, touches);
+    corner[count].place = place_of(i);
     corner[count].touches = touches;
     corner[count].depth = select(touches, depth, zero);
     number[count++] = i;
   }
-  store_where<D>(active, select(busy, num<D>(kAlwaysLook), select(possible, num<D>(kLookWhenLow), num<D>(kNeverLook))),
-                 job.watch + W * block, 0);
-  const M lands = hn::AndNot(touched, touching);
+  const N look = select(touching, num<D>(kTouches),
+                        select(possible, select(busy, num<D>(kAlwaysLook), num<D>(kLookWhenLow)), num<D>(kNeverLook)));
+  store_where<D>(active, look, job.watch + W * block, 0);
+  const M lands = hn::AndNot(hn::Ge(watch.v, hn::Set(d, kTouches)), touching);
   if (HWY_UNLIKELY(!hn::AllFalse(d, lands))) report<D>(lands, block, *job.landed);
   const auto book = [&](N now, N after, int work, int power) {
     store_where<D>(active, fma(half * h, load<D>(state, power) + now, load<D>(state, work)), state, work);
@@ -160,7 +164,7 @@ HWY_INLINE void press_ground_block(const GroundJob& job, size_t block) {
     for (int i = 0; i < kCorners; ++i) store_where<D>(active, N{none}, state, kCornerSlip + 3 * i);
     return;
   }
-  take_over_slips<D>(state, place, number, count, corner);
+  take_over_slips<D>(state, place_of, number, count, corner);
 
   // springs
   const double* HWY_RESTRICT body = job.body_constants + static_cast<size_t>(kBodyFields) * W * block;

@@ -44,8 +44,8 @@ enum GroundConstant : int {
 };
 // NOLINTEND(readability-identifier-naming)
 
-/// When a body is looked at, in GroundJob::watch.
-inline constexpr double kNeverLook = 0, kLookWhenLow = 1, kAlwaysLook = 2;
+/// When a body is looked at, in GroundJob::watch: always as well where it touched in the last step.
+inline constexpr double kNeverLook = 0, kLookWhenLow = 1, kAlwaysLook = 2, kTouches = 3;
 
 struct GroundJob {
   size_t blocks = 0;                         // of bodies
@@ -59,7 +59,7 @@ struct GroundJob {
   const double* constants;                   // kGroundConstants
   const double *nx, *ny, *nz, *offset;       // of the ground's plane (W)
   const double *gx, *gy, *gz, *h;            // gravity, step (W)
-  std::vector<std::uint32_t>* landed;        // slots that touch and did not in the step before
+  std::vector<std::uint32_t>* landed;        // slots that touch and are not known to have done so
 };
 void press_ground(const GroundJob&);
 void press_ground_singly(const GroundJob&);
