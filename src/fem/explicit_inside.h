@@ -89,6 +89,7 @@ struct ExplicitSystem::Inside {
   std::vector<std::vector<std::uint32_t>> failed, grounded;
   std::vector<std::array<double, 4>> chunk_sums;
   std::vector<kernel::Balance> balances;  // of chunks, then of shares of the shared nodes
+  ExplicitState spare;                    // kept, so that copies need no new memory
   Timing timing;
   mutable std::vector<DebrisParticle> debris_view;
 

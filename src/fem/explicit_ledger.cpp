@@ -226,7 +226,8 @@ void ExplicitSystem::Inside::remove_element(ExplicitState& state, int element, R
 
 ExplicitEnergy ExplicitSystem::Inside::calc_energy() {
   // one step ahead on a copy gives stresses and contact at the present places, and speeds on both sides
-  ExplicitState ahead = s;
+  ExplicitState& ahead = spare;
+  ahead = s;
   const Timing kept = timing;
   advance_step(ahead, false);
   timing = kept;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
 #include "base/error.h"
 #include "fem/explicit_inside.h"
@@ -180,42 +182,75 @@ Vec3 ExplicitSystem::calc_centre_of_mass() const {
 
 ExplicitSystem::Resultant ExplicitSystem::calc_resultant(std::span<const int> elements, std::span<const int> nodes,
                                                          const Vec3& about) const {
-  // nodal forces of the chosen elements alone: the kernel on a copy in which all others are gone, without history
+  // the kernel on copies of the chosen elements and their nodes alone, at rest and with masses of 1: speeds are forces
   const Inside& in = *inside_;
-  ExplicitState copy = in.s;
-  const size_t W = in.chunks.W;
-  std::fill(copy.live.begin(), copy.live.end(), static_cast<unsigned char>(0));
-  std::vector<unsigned char> chosen(in.model.elements.size(), 0);
-  for (const int e : elements) chosen[static_cast<size_t>(e)] = 1;
-  for (size_t e = 0; e < chosen.size(); ++e) {
-    size_t lane = 0;
-    double* block = in.element_block(copy, static_cast<int>(e), lane);
-    if (chosen[e] == 0 || !(block[kernel::kMass * W + lane] > 0)) {
-      block[kernel::kMass * W + lane] = 0;
-      continue;
-    }
-    const std::uint32_t slot = in.chunks.slot_of_element[e];
-    copy.live[slot / W] = static_cast<unsigned char>(copy.live[slot / W] | (1U << (slot % W)));
-  }
-  for (size_t row = 0; row < in.start.size(); ++row) {
-    double* r = copy.rows.data() + 8 * row;
-    r[kernel::kInverseMass] = 1;
-    for (int c = 0; c < 3; ++c) r[kernel::kSpeed + c] = 0;
-  }
-  std::fill(copy.flags.begin(), copy.flags.end(), static_cast<std::uint8_t>(0));
+  const size_t W = in.chunks.W, fields = kernel::kElementFields;
   kernel::StepJob step = in.make_step();
   step.removes = false, step.grounds = 0, step.kick = 1;
   for (double& fall : step.fall) fall = 0;
-  Inside& room = *inside_;
-  const Timing kept = room.timing;
-  room.advance_nodes(step, copy);
-  room.timing = kept;
+  std::vector<int> chosen;
+  for (const int e : elements)
+    if (is_alive(e)) chosen.push_back(e);
+  const auto material_of = [&](int e) { return in.model.elements[static_cast<size_t>(e)].material; };
+  std::sort(chosen.begin(), chosen.end(),
+            [&](int a, int b) { return std::pair(material_of(a), a) < std::pair(material_of(b), b); });
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+
   Resultant sum;
-  for (const int n : nodes) {
-    const double* r = in.row(copy, n);
-    const Vec3 f{r[kernel::kSpeed], r[kernel::kSpeed + 1], r[kernel::kSpeed + 2]};
-    sum.force += f;
-    sum.moment += cross(p(n) - about, f);
+  constexpr size_t kMost = 1000;  // of a chunk
+  for (size_t first = 0; first < chosen.size(); first += kMost) {
+    const std::span<const int> these =
+        std::span<const int>(chosen).subspan(first, std::min(kMost, chosen.size() - first));
+    std::map<int, size_t> place;
+    AlignedVector<double> rows, state;
+    std::vector<std::uint16_t> corners, laws;
+    std::vector<unsigned char> live;
+    for (size_t i = 0; i < these.size();) {
+      const int material = material_of(these[i]);
+      laws.push_back(static_cast<std::uint16_t>(material)), live.push_back(0);
+      const size_t block = laws.size() - 1;
+      state.resize((block + 1) * fields * W, 0), corners.resize((block + 1) * 8 * W);
+      const size_t begin = i;
+      for (size_t lane = 0; lane < W; ++lane) {
+        const bool is_used = i < these.size() && material_of(these[i]) == material;
+        const size_t e = static_cast<size_t>(these[is_used ? i++ : begin]);
+        size_t from_lane = 0;
+        const double* from = in.element_block(in.s, static_cast<int>(e), from_lane);
+        if (is_used) live[block] = static_cast<unsigned char>(live[block] | (1U << lane));
+        for (size_t f = 0; is_used && f < fields; ++f) state[(block * fields + f) * W + lane] = from[f * W + from_lane];
+        for (size_t k = 0; k < 8; ++k) {
+          const int node = in.model.elements[e].node[k];
+          const auto [at, is_new] = place.emplace(node, place.size());
+          if (is_new) {
+            const double* r = in.row(in.s, node);
+            const double row[kernel::kNodeFields] = {r[0], r[1], r[2], 0, 0, 0, 1, 1};
+            rows.insert(rows.end(), row, row + kernel::kNodeFields);
+          }
+          corners[(block * 8 + k) * W + lane] = static_cast<std::uint16_t>(kernel::kNodeFields * at->second);
+        }
+      }
+    }
+    const size_t count = place.size();
+    const AlignedVector<double> pushes(4 * count, 0);
+    AlignedVector<double> forces(4 * count, 0);
+    const std::vector<std::uint8_t> flags(count, 0), joined(laws.size(), 0);
+    std::vector<std::uint32_t> failed, grounded;
+    kernel::ChunkJob job;
+    job.laws = in.laws.data(), job.law_of_block = laws.data(), job.blocks = laws.size();
+    job.elements = state.data(), job.corners = corners.data(), job.joined = joined.data(), job.live = live.data();
+    job.own = count, job.own_nodes = rows.data(), job.own_flags = flags.data(), job.own_pushes = pushes.data();
+    job.forces = forces.data(), job.failed = &failed, job.grounded = &grounded;
+    double none = 0;
+    job.shared_forces = &none;
+    kernel::advance_chunk(step, job);
+    for (const int n : nodes) {
+      const auto at = place.find(n);
+      if (at == place.end()) continue;
+      const double* r = rows.data() + kernel::kNodeFields * at->second + kernel::kSpeed;
+      const Vec3 f{r[0], r[1], r[2]};
+      sum.force += f;
+      sum.moment += cross(p(n) - about, f);
+    }
   }
   return sum;
 }
