@@ -618,12 +618,14 @@ struct Motion {
   HWY_ALIGN double keep[4];  // of speeds
   HWY_ALIGN double fall[4];  // added to speeds
   HWY_ALIGN double drift[4];
+  HWY_ALIGN double weight[4];  // force of a mass
   double kick = 0;
   bool weighs = false;
 };
 HWY_INLINE Motion make_motion(const StepJob& step) {
   Motion m{};
-  for (int c = 0; c < 3; ++c) m.keep[c] = step.keep, m.fall[c] = step.fall[c], m.drift[c] = step.h;
+  for (int c = 0; c < 3; ++c)
+    m.keep[c] = step.keep, m.fall[c] = step.fall[c], m.drift[c] = step.h, m.weight[c] = step.weight[c];
   m.keep[3] = 1, m.kick = step.kick, m.weighs = step.weighs;
   return m;
 }
@@ -666,23 +668,16 @@ class Box {
   double single_low_[3] = {1e300, 1e300, 1e300}, single_high_[3] = {-1e300, -1e300, -1e300};
 };
 
-/// New place of one node that nothing holds or pushes; `force` has 4 entries, the last 0.
-HWY_INLINE void move_free(const Motion& motion, double* HWY_RESTRICT node, const double* HWY_RESTRICT force, Box& box) {
-#if HWY_TARGET == HWY_SCALAR
-  const double kick = motion.kick * node[kInverseMass];
-  for (size_t c = 0; c < 3; ++c) {
-    node[kSpeed + c] = kick * force[c] + motion.keep[c] * node[kSpeed + c] + motion.fall[c];
-    node[c] += motion.drift[c] * node[kSpeed + c];
-    box.add(c, num(node[c]));
-  }
-#else
+#if HWY_TARGET != HWY_SCALAR
+/// New place of one node that nothing holds. The force comes as vectors of a row, its fourth entry 0.
+HWY_INLINE void move_free(const Motion& motion, double* HWY_RESTRICT node, const hn::Vec<Row>* force,
+                          hn::Vec<Row>* speed, Box& box) {
   // the fourth of the speeds is the inverse mass, which stays; the fourth of the places is a speed, written after it
   const Row d;
   const auto kick = hn::Set(d, motion.kick * node[kInverseMass]);
-  hn::Vec<Row> speed[4 / kRowLanes];
   for (size_t c = 0; c < 4; c += kRowLanes)
     speed[c / kRowLanes] = hn::MulAdd(
-        kick, hn::Load(d, force + c),
+        kick, force[c / kRowLanes],
         hn::MulAdd(hn::Load(d, motion.keep + c), hn::LoadU(d, node + kSpeed + c), hn::Load(d, motion.fall + c)));
   for (size_t c = 0; c < 4; c += kRowLanes) {
     const auto place = hn::MulAdd(hn::Load(d, motion.drift + c), speed[c / kRowLanes], hn::Load(d, node + c));
@@ -690,8 +685,32 @@ HWY_INLINE void move_free(const Motion& motion, double* HWY_RESTRICT node, const
     hn::Store(place, d, node + c);
   }
   for (size_t c = 0; c < 4; c += kRowLanes) hn::StoreU(speed[c / kRowLanes], d, node + kSpeed + c);
-#endif
 }
+/// The same of a node that is pushed, or in a relaxation.
+HWY_INLINE void move_pushed(const Motion& motion, double* HWY_RESTRICT node, const double* HWY_RESTRICT force,
+                            bool is_pushed, const double* HWY_RESTRICT push, Balance& balance, Box& box) {
+  const Row d;
+  hn::Vec<Row> f[4 / kRowLanes], v[4 / kRowLanes];
+  const auto mass = hn::Set(d, motion.weighs ? node[kNodeMass] : 0);
+  for (size_t c = 0; c < 4; c += kRowLanes) {
+    auto& sum = f[c / kRowLanes];
+    sum = hn::Load(d, force + c);
+    if (is_pushed) sum = hn::Add(sum, hn::Load(d, push + c));
+    sum = hn::MulAdd(mass, hn::Load(d, motion.weight + c), sum);
+  }
+  move_free(motion, node, f, v, box);
+  if (!motion.weighs) return;
+  HWY_ALIGN double force2[4], speed2[4];
+  for (size_t c = 0; c < 4; c += kRowLanes) {
+    hn::Store(hn::Mul(f[c / kRowLanes], f[c / kRowLanes]), d, force2 + c);
+    hn::Store(hn::Mul(v[c / kRowLanes], v[c / kRowLanes]), d, speed2 + c);
+  }
+  balance.force2 += force2[0] + force2[1] + force2[2];
+  const double square = speed2[0] + speed2[1] + speed2[2];
+  if (square > 0) balance.kinetic += square / node[kInverseMass];
+}
+#endif
+/// Any node, number by number.
 HWY_INLINE void move_flagged(const StepJob& step, double* HWY_RESTRICT node, const double* HWY_RESTRICT force,
                              std::uint8_t flags, const double* HWY_RESTRICT push, Balance& balance, Box& box) {
   const bool pushed = (flags & kPushed) != 0;
@@ -709,13 +728,22 @@ HWY_INLINE void move_flagged(const StepJob& step, double* HWY_RESTRICT node, con
   if (step.weighs && speed2 > 0) balance.kinetic += speed2 / node[kInverseMass];
   balance.force2 += force2;
 }
-HWY_INLINE void move_node(const StepJob& step, const Motion& motion, double* HWY_RESTRICT node,
+HWY_INLINE void move_node(const StepJob& step, [[maybe_unused]] const Motion& motion, double* HWY_RESTRICT node,
                           const double* HWY_RESTRICT force, std::uint8_t flags, const double* HWY_RESTRICT push,
                           Balance& balance, Box& box) {
-  if (HWY_LIKELY(flags == 0 && !motion.weighs))
-    move_free(motion, node, force, box);
-  else
-    move_flagged(step, node, force, flags, push, balance, box);
+  constexpr std::uint8_t kHeld = kHoldX | kHoldY | kHoldZ;
+  // what is held stands where it did
+  if ((flags & kHeld) == kHeld) return box.add(node);
+#if HWY_TARGET != HWY_SCALAR
+  if (HWY_LIKELY(flags == 0 && !motion.weighs)) {
+    const Row d;
+    hn::Vec<Row> f[4 / kRowLanes], v[4 / kRowLanes];
+    for (size_t c = 0; c < 4; c += kRowLanes) f[c / kRowLanes] = hn::Load(d, force + c);
+    return move_free(motion, node, f, v, box);
+  }
+  if ((flags & kHeld) == 0) return move_pushed(motion, node, force, (flags & kPushed) != 0, push, balance, box);
+#endif
+  move_flagged(step, node, force, flags, push, balance, box);
 }
 
 HWY_INLINE bool is_below(const StepJob& step, const double* HWY_RESTRICT node) {
