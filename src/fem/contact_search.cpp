@@ -172,19 +172,31 @@ class Search {
     std::sort(ids.begin(), ids.end(), [&](std::uint32_t a, std::uint32_t b) {
       return std::pair(c.boxes[a].low.x, a) < std::pair(c.boxes[b].low.x, b);
     });
-    std::vector<std::array<std::uint32_t, 2>> met;  // larger number first
-    c.particle_pairs.clear();
-    for (size_t i = 0; i < ids.size(); ++i) {
+    // the larger number first
+    constexpr size_t kRun = 128;
+    struct Found {
+      std::vector<std::array<std::uint32_t, 2>> met;
+      std::vector<ParticlePair> particles;
+    };
+    std::vector<Found> found((ids.size() + kRun - 1) / kRun);
+    for_all(ids.size(), kRun, team_, [&](size_t i) {
       const ContactBox& box = c.boxes[ids[i]];
-      if (ids[i] < groups_) met.push_back({ids[i], ids[i]});
+      Found& to = found[i / kRun];
+      if (ids[i] < groups_) to.met.push_back({ids[i], ids[i]});
       for (size_t j = i + 1; j < ids.size() && c.boxes[ids[j]].low.x <= box.high.x; ++j) {
         if (!box.meets(c.boxes[ids[j]])) continue;
         const std::uint32_t a = std::max(ids[i], ids[j]), b = std::min(ids[i], ids[j]);
         if (b >= groups_)
-          c.particle_pairs.push_back({a - groups_, b - groups_});
+          to.particles.push_back({a - groups_, b - groups_});
         else
-          met.push_back({a, b});
+          to.met.push_back({a, b});
       }
+    });
+    std::vector<std::array<std::uint32_t, 2>> met;
+    c.particle_pairs.clear();
+    for (const Found& of : found) {
+      met.insert(met.end(), of.met.begin(), of.met.end());
+      c.particle_pairs.insert(c.particle_pairs.end(), of.particles.begin(), of.particles.end());
     }
     std::sort(met.begin(), met.end());
     std::sort(c.particle_pairs.begin(), c.particle_pairs.end());
@@ -468,14 +480,15 @@ void search_contact(const ContactSetup& setup, ExplicitState& state, double h, T
   seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-void hurry_search(const ContactSetup& setup, ExplicitState& state, double h) {
-  ContactState& c = state.contact;
+bool is_knocked(const ContactSetup& setup, const ExplicitState& state, double h, size_t first, size_t last) {
+  const ContactState& c = state.contact;
   const size_t groups = setup.group_starts.size() - 1;
   const double most = kLeastShare * setup.margin / (kLook * h);
-  for (size_t i = 0; groups + i < c.speed.size(); ++i) {
+  for (size_t i = first; i < last && groups + i < c.speed.size(); ++i) {
     const Vec3 gain = state.particles[i].v - c.speed[groups + i];
-    if (dot(gain, gain) > most * most) c.countdown = 0;
+    if (dot(gain, gain) > most * most) return true;
   }
+  return false;
 }
 
 void mark_changed(const ContactSetup& setup, ContactState& c, int element) {

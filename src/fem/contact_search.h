@@ -82,8 +82,9 @@ struct ContactPair {
 /// A touch of the last step, for the ledger.
 struct SurfaceTouch {
   ContactPoint point;
-  std::uint32_t face = 0;   // none for two particles
-  std::uint32_t other = 0;  // particle + 1 where two touch, 0: a face
+  std::uint32_t face = 0;                             // none for two particles
+  std::uint32_t other = 0;                            // particle + 1 where two touch, 0: a face
+  std::array<std::uint32_t, 4> rows{}, point_rows{};  // of the face's corners; of the point's, a node's first
   double weights[4] = {0, 0, 0, 0};
   Vec3 normal_force, friction, before;
   double stored = 0, depth = 0;

@@ -272,7 +272,6 @@ void ExplicitSystem::Inside::advance_step(ExplicitState& state, bool removes) {
   advance_nodes(step, state);
   const double t2 = seconds();
   move_particles(state);
-  hurry_search(contact, state, h);
   book_grounds(state);
   book_surfaces(*this, state);
   for (const auto& sums : chunk_sums)

@@ -104,7 +104,6 @@ struct ExplicitSystem::Inside {
   kernel::StepJob make_step() const;
   /// Internal forces and motion of all nodes; fills failed, grounded, chunk_sums and balances.
   void advance_nodes(const kernel::StepJob&, ExplicitState&);
-  void collect(ExplicitState&, bool moves_on);
   /// One step of everything; `removes`: failed elements go.
   void advance_step(ExplicitState&, bool removes);
   void remove_element(ExplicitState&, int element, RemovalCause) const;
@@ -112,11 +111,22 @@ struct ExplicitSystem::Inside {
   void press_grounds(ExplicitState&) const;
   void book_grounds(ExplicitState&) const;
   void move_particles(ExplicitState&) const;
-  void push(ExplicitState& state, std::uint32_t row, const Vec3& force) const {
+  /// Calls body(share, first, last) for shares of the particles, the same for any number of threads.
+  template <class Body>
+  void for_particles(const ExplicitState& state, const Body& body) const {
+    const size_t count = state.particles.size(), shares = particle_shares(state);
+    team->run(shares, [&](size_t share) { body(share, count * share / shares, count * (share + 1) / shares); });
+  }
+  static size_t particle_shares(const ExplicitState& state) {
+    return std::clamp<size_t>(state.particles.size() / 256, 1, 16);
+  }
+  void push(ExplicitState& state, std::uint32_t row, const Vec3& force) const { push(state, row, force, state.pushed); }
+  /// `pushed` gets rows that are pushed for the first time in this step.
+  void push(ExplicitState& state, std::uint32_t row, const Vec3& force, std::vector<std::uint32_t>& pushed) const {
     if ((state.flags[row] & kernel::kPushed) == 0) {
       state.flags[row] |= kernel::kPushed;
       for (size_t c = 0; c < 3; ++c) state.pushes[4 * size_t{row} + c] = loads[4 * size_t{row} + c];
-      state.pushed.push_back(row);
+      pushed.push_back(row);
     }
     for (int c = 0; c < 3; ++c) state.pushes[4 * size_t{row} + static_cast<size_t>(c)] += force[c];
   }

@@ -22,7 +22,7 @@ void ExplicitSystem::Inside::press_grounds(ExplicitState& state) const {
   state.touches.clear();
   std::fill(state.ground_forces.begin(), state.ground_forces.end(), Vec3{});
   const auto press = [&](std::uint32_t row, bool particle, const Vec3& p, const Vec3& v, double mass, double radius,
-                         double rate) {
+                         double rate, std::vector<GroundTouch>& touches, std::vector<Vec3>& forces) {
     Vec3 sum;
     for (size_t i = 0; i < model.grounds.size(); ++i) {
       const ExplicitGround& g = model.grounds[i];
@@ -40,9 +40,9 @@ void ExplicitSystem::Inside::press_grounds(ExplicitState& state) const {
       touch.friction = slide > 0 ? (-grip / slide) * along : Vec3{};
       touch.stored = 0.5 * rate * depth * depth;
       touch.before = v;
-      state.touches.push_back(touch);
+      touches.push_back(touch);
       const Vec3 force = touch.normal_force + touch.friction;
-      state.ground_forces[i] += -force;
+      forces[i] += -force;
       sum += force;
     }
     return sum;
@@ -52,23 +52,36 @@ void ExplicitSystem::Inside::press_grounds(ExplicitState& state) const {
     const double mass = r[kernel::kNodeMass];
     if (!(mass > 0)) continue;
     const size_t before = state.touches.size();
-    const Vec3 force =
-        press(row, false, vector_at(r), vector_at(r + kernel::kSpeed), mass, 0, kGroundRate * mass / (h * h));
+    const Vec3 force = press(row, false, vector_at(r), vector_at(r + kernel::kSpeed), mass, 0,
+                             kGroundRate * mass / (h * h), state.touches, state.ground_forces);
     push(state, row, force);
     if (state.touches.size() > before) {
       double& first = state.touchdowns[static_cast<size_t>(first_part_of_row[row])];
       if (first < 0) first = static_cast<double>(state.steps) * h;
     }
   }
-  for (size_t i = 0; i < state.particles.size(); ++i) {
-    Particle& q = state.particles[i];
-    q.force = q.mass * model.gravity;
-    q.touched = 0, q.crushed = 0;
-    const size_t before = state.touches.size();
-    q.force += press(static_cast<std::uint32_t>(i), true, q.p, q.v, q.mass, q.radius, q.stiffness);
-    if (state.touches.size() > before) q.touched = 1;
-    for (size_t k = before; k < state.touches.size(); ++k)
-      q.crush(q.stiffness, std::sqrt(2 * state.touches[k].stored / q.stiffness));
+  struct Share {
+    std::vector<GroundTouch> touches;
+    std::vector<Vec3> forces;
+  };
+  std::vector<Share> shares(particle_shares(state));
+  for_particles(state, [&](size_t share, size_t first, size_t last) {
+    auto& [touches, forces] = shares[share];
+    forces.assign(model.grounds.size(), {});
+    for (size_t i = first; i < last; ++i) {
+      Particle& q = state.particles[i];
+      q.force = q.mass * model.gravity;
+      q.touched = 0, q.crushed = 0;
+      const size_t before = touches.size();
+      q.force += press(static_cast<std::uint32_t>(i), true, q.p, q.v, q.mass, q.radius, q.stiffness, touches, forces);
+      if (touches.size() > before) q.touched = 1;
+      for (size_t k = before; k < touches.size(); ++k)
+        q.crush(q.stiffness, std::sqrt(2 * touches[k].stored / q.stiffness));
+    }
+  });
+  for (const Share& share : shares) {
+    state.touches.insert(state.touches.end(), share.touches.begin(), share.touches.end());
+    for (size_t i = 0; i < share.forces.size(); ++i) state.ground_forces[i] += share.forces[i];
   }
 }
 
@@ -84,14 +97,21 @@ void ExplicitSystem::Inside::book_grounds(ExplicitState& state) const {
 }
 
 void ExplicitSystem::Inside::move_particles(ExplicitState& state) const {
-  for (Particle& q : state.particles) {
-    q.v += (h / q.mass) * q.force;
-    q.p += h * q.v;
-    q.radius = std::max(std::min(q.radius, kLeastRadius * q.full_radius), q.radius - q.crushed);
-    // room permitting it grows to its volume within a tenth of a second
-    if (q.touched == 0 && q.radius < q.full_radius)
-      q.radius = std::min(q.full_radius, q.radius + 10 * h * q.full_radius);
-  }
+  std::vector<unsigned char> knocked(particle_shares(state), 0);
+  for_particles(state, [&](size_t share, size_t first, size_t last) {
+    for (size_t i = first; i < last; ++i) {
+      Particle& q = state.particles[i];
+      q.v += (h / q.mass) * q.force;
+      q.p += h * q.v;
+      q.radius = std::max(std::min(q.radius, kLeastRadius * q.full_radius), q.radius - q.crushed);
+      // room permitting it grows to its volume within a tenth of a second
+      if (q.touched == 0 && q.radius < q.full_radius)
+        q.radius = std::min(q.full_radius, q.radius + 10 * h * q.full_radius);
+    }
+    knocked[share] = is_knocked(contact, state, h, first, last) ? 1 : 0;
+  });
+  for (const unsigned char is : knocked)
+    if (is != 0) state.contact.countdown = 0;
 }
 
 std::array<double, 3> ExplicitSystem::Inside::calc_elastic(const ExplicitState& state, int element) const {

@@ -9,7 +9,7 @@ namespace topple::fem {
 
 namespace {
 
-constexpr std::uint64_t kMark = 0x7470'6578'0000'0007;  // name and version of the layout
+constexpr std::uint64_t kMark = 0x7470'6578'0000'0008;  // name and version of the layout
 
 class Writer {
  public:

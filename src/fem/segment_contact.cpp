@@ -20,7 +20,7 @@ constexpr double kRate = 0.03, kGrip = 0.02;
 Vec3 vector_at(const double* r) { return {r[0], r[1], r[2]}; }
 
 struct Quad {
-  std::uint32_t rows[4];
+  std::array<std::uint32_t, 4> rows;
 };
 Quad quad_of(const ContactSetup& setup, std::uint32_t face) {
   Quad q{};
@@ -156,7 +156,11 @@ std::optional<SurfaceTouch> press_face(const ContactSetup& setup, const Explicit
   double inverse = q.inverse_mass;
   Vec3 v = q.v;
   SurfaceTouch touch;
-  touch.point = candidate.point, touch.face = candidate.face;
+  touch.point = candidate.point, touch.face = candidate.face, touch.rows = near.rows;
+  if (candidate.point.kind == ContactPoint::Node)
+    touch.point_rows[0] = candidate.point.index;
+  else if (candidate.point.kind == ContactPoint::Centre)
+    touch.point_rows = quad_of(setup, candidate.point.index).rows;
   for (size_t k = 0; k < 4; ++k) {
     const double* r = s.rows.data() + 8 * size_t{near.rows[k]};
     touch.weights[k] = on.weights[k];
@@ -228,41 +232,66 @@ void press_surfaces(const ExplicitSystem::Inside& in, ExplicitState& s) {
     const size_t from = pairs * task / tasks, to = pairs * (task + 1) / tasks;
     press_particles(in.options, in.h, s, std::span(c.near_particles).subspan(from, to - from), touches);
   });
-  for (const auto& touches : c.touches)
-    for (const SurfaceTouch& touch : touches) {
-      const Vec3 force = touch.normal_force + touch.friction;
-      const double rate = touch.depth > 0 ? 2 * touch.stored / (touch.depth * touch.depth) : 0;
-      if (touch.point.kind == ContactPoint::Debris && rate > 0) {
-        s.particles[touch.point.index].crush(rate, touch.depth);
-        if (touch.other > 0) s.particles[touch.other - 1].crush(rate, touch.depth);
+  // each share adds what falls to its rows and particles, in the order of touches whoever does it
+  size_t count = 0;
+  for (const auto& touches : c.touches) count += touches.size();
+  constexpr size_t kMostShares = 4;
+  const size_t shares = count > 128 ? kMostShares : 1;
+  std::array<std::vector<std::uint32_t>, kMostShares> pushed;
+  in.team->run(shares, [&](size_t share) {
+    const auto push = [&](std::uint32_t row, const Vec3& force) {
+      if (row / 64 % shares == share) in.push(s, row, force, pushed[share]);
+    };
+    const auto press = [&](std::uint32_t number, const SurfaceTouch& touch, double rate, const Vec3& force) {
+      if (number / 16 % shares != share) return;
+      Particle& particle = s.particles[number];
+      if (rate > 0) particle.crush(rate, touch.depth);
+      particle.force += force, particle.touched = 1;
+    };
+    for (const auto& touches : c.touches)
+      for (const SurfaceTouch& touch : touches) {
+        const Vec3 force = touch.normal_force + touch.friction;
+        const double rate = touch.depth > 0 ? 2 * touch.stored / (touch.depth * touch.depth) : 0;
+        if (touch.point.kind == ContactPoint::Debris)
+          press(touch.point.index, touch, rate, force);
+        else if (touch.point.kind == ContactPoint::Node)
+          push(touch.point_rows[0], force);
+        else
+          for (const std::uint32_t row : touch.point_rows) push(row, 0.25 * force);
+        if (touch.other > 0)
+          press(touch.other - 1, touch, rate, -force);
+        else
+          for (size_t k = 0; k < 4; ++k) push(touch.rows[k], -touch.weights[k] * force);
       }
-      if (touch.point.kind == ContactPoint::Debris)
-        s.particles[touch.point.index].force += force, s.particles[touch.point.index].touched = 1;
-      else if (touch.point.kind == ContactPoint::Node)
-        in.push(s, touch.point.index, force);
-      else
-        for (const std::uint32_t row : quad_of(in.contact, touch.point.index).rows) in.push(s, row, 0.25 * force);
-      if (touch.other > 0) {
-        s.particles[touch.other - 1].force -= force, s.particles[touch.other - 1].touched = 1;
-        continue;
-      }
-      const Quad quad = quad_of(in.contact, touch.face);
-      for (size_t k = 0; k < 4; ++k) in.push(s, quad.rows[k], -touch.weights[k] * force);
-    }
+  });
+  for (const auto& rows : pushed) s.pushed.insert(s.pushed.end(), rows.begin(), rows.end());
 }
+
+namespace {
+
+/// Of a touch's point.
+Vec3 find_speed(const ExplicitState& s, const SurfaceTouch& touch) {
+  const auto of_row = [&](std::uint32_t row) { return vector_at(s.rows.data() + 8 * size_t{row} + kernel::kSpeed); };
+  if (touch.point.kind == ContactPoint::Debris) return s.particles[touch.point.index].v;
+  if (touch.point.kind == ContactPoint::Node) return of_row(touch.point_rows[0]);
+  Vec3 v;
+  for (const std::uint32_t row : touch.point_rows) v += 0.25 * of_row(row);
+  return v;
+}
+
+}  // namespace
 
 void book_surfaces(const ExplicitSystem::Inside& in, ExplicitState& s) {
   const auto& touches = s.contact.touches;
   std::vector<ContactWork> work(touches.size());
   in.team->run(touches.size(), [&](size_t task) {
     for (const SurfaceTouch& touch : touches[task]) {
-      Vec3 now = find_point(in.contact, s, touch.point).v;
+      Vec3 now = find_speed(s, touch);
       if (touch.other > 0) {
         now -= s.particles[touch.other - 1].v;
       } else {
-        const Quad quad = quad_of(in.contact, touch.face);
         for (size_t k = 0; k < 4; ++k)
-          now -= touch.weights[k] * vector_at(s.rows.data() + 8 * size_t{quad.rows[k]} + kernel::kSpeed);
+          now -= touch.weights[k] * vector_at(s.rows.data() + 8 * size_t{touch.rows[k]} + kernel::kSpeed);
       }
       const Vec3 path = (0.5 * in.h) * (touch.before + now);
       work[task].normal += dot(touch.normal_force, path);

@@ -14,8 +14,9 @@ struct ExplicitState;
 
 /// Looks for candidates where something has moved enough; adds the time it takes [s].
 void search_contact(const ContactSetup&, ExplicitState&, double h, Team&, double& seconds);
-/// Looks at the next step where a piece of debris has been knocked away faster than a look reckons with.
-void hurry_search(const ContactSetup&, ExplicitState&, double h);
+/// Whether a piece of debris of [first, last) has been knocked away faster than a look reckons with, so that the next
+/// step is to look.
+bool is_knocked(const ContactSetup&, const ExplicitState&, double h, size_t first, size_t last);
 /// Forces of all candidates that touch.
 void press_surfaces(const ExplicitSystem::Inside&, ExplicitState&);
 /// Work of the last step's forces.

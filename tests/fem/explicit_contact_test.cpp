@@ -292,6 +292,25 @@ TEST(ExplicitReplay, GivesTheSameBitsForAnyThreadsAndAfterASnapshot) {
   EXPECT_EQ(once, run_pillar(1, true));
 }
 
+// A weak wall that crumbles on the ground: enough balls and touches that both go to several shares.
+TEST(ExplicitReplay, GivesTheSameBitsInAHeap) {
+  ExplicitModel model = make_pillar();
+  model.nodes.clear(), model.elements.clear();
+  add_brick(model, {0, 0, 0}, {4.8, 0.8, 1.2}, 24, 4, 6);
+  std::vector<std::byte> once;
+  for (const int threads : {1, 2, 4}) {
+    ExplicitOptions options;
+    options.threads = threads;
+    ExplicitSystem system(model, options);
+    system.set_velocity({0.5, 0, -25});
+    ASSERT_EQ(system.advance(0.03), ExplicitEnding::ReachedTime);
+    EXPECT_GT(system.debris().size(), 512U);
+    EXPECT_GT(system.contacts(), 200);
+    if (threads == 1) once = system.write_snapshot();
+    EXPECT_EQ(once, system.write_snapshot()) << threads << " threads";
+  }
+}
+
 TEST(ExplicitReplay, RefusesASnapshotOfAnotherModel) {
   const ExplicitModel pillar = make_pillar(), blocks = make_two_blocks(0.1, false);
   ExplicitSystem a(pillar, {}), b(blocks, {});
