@@ -144,6 +144,11 @@ std::array<int, 8> turn_corners(const std::array<int, 8>& node, int turn) {
   return turned;
 }
 
+size_t choose_chunk(const ExplicitModel& model) {
+  // larger ones share fewer nodes; a small model still has some for each thread
+  return std::clamp<size_t>(model.elements.size() / 32, 1000, 2000);
+}
+
 ExplicitChunks make_chunks(const ExplicitModel& model, size_t lanes, size_t elements_a_chunk) {
   ExplicitChunks c;
   c.W = lanes;
@@ -224,6 +229,8 @@ ExplicitChunks make_chunks(const ExplicitModel& model, size_t lanes, size_t elem
       }
     chunk.shared = c.shared_rows.size() - chunk.first_shared;
     c.most_nodes = std::max(c.most_nodes, chunk.own + chunk.shared);
+    if (kernel::kNodeFields * c.most_nodes > std::numeric_limits<std::uint16_t>::max())
+      return make_chunks(model, lanes, elements_a_chunk / 2);
     // blocks of one material, in strips
     std::vector<int> sorted(c.order.begin() + static_cast<std::ptrdiff_t>(ranges[k].first),
                             c.order.begin() + static_cast<std::ptrdiff_t>(ranges[k].second));

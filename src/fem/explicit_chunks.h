@@ -42,7 +42,9 @@ struct ExplicitChunks {
 /// The corners of an element turned by 0 to 2 axes.
 std::array<int, 8> turn_corners(const std::array<int, 8>& node, int turn);
 
-/// At most 1,024 elements a chunk: kNodeFields times 8 nodes of each is to fit 16 bits.
-ExplicitChunks make_chunks(const ExplicitModel&, size_t lanes, size_t elements_a_chunk = 1000);
+/// Elements of a chunk that its nodes, of which several belong to more than one, and the number of threads call for.
+size_t choose_chunk(const ExplicitModel&);
+/// Chunks are smaller where kNodeFields times their nodes would not fit 16 bits.
+ExplicitChunks make_chunks(const ExplicitModel&, size_t lanes, size_t elements_a_chunk);
 
 }  // namespace topple::fem

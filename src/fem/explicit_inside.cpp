@@ -47,7 +47,7 @@ double seconds() { return std::chrono::duration<double>(std::chrono::steady_cloc
 ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
     : model(m), options(o), team(std::make_unique<Team>(o.threads)) {
   check_explicit_model(model);
-  chunks = make_chunks(model, kernel::lanes());
+  chunks = make_chunks(model, kernel::lanes(), choose_chunk(model));
   for (size_t e = 0; e < model.elements.size(); ++e)
     model.elements[e].node = turn_corners(model.elements[e].node, chunks.turn_of_element[e]);
   const size_t N = model.nodes.size(), E = model.elements.size(), rows = chunks.node_of_row.size();
@@ -191,7 +191,7 @@ kernel::StepJob ExplicitSystem::Inside::make_step() const {
 }
 
 void ExplicitSystem::Inside::advance_nodes(const kernel::StepJob& step, ExplicitState& state) {
-  const size_t count = chunks.chunks.size(), tasks = std::min(kTasks, chunks.chunks.size()), W = chunks.W;
+  const size_t count = chunks.chunks.size(), tasks = std::min(kTasks, count), W = chunks.W;
   const double t0 = seconds();
   for (kernel::Law& law : laws) kernel::set_step(law, step.past);
   const auto run_task = [&](size_t task) {

@@ -54,6 +54,20 @@ TEST(ExplicitChunks, PutEachElementInOneSlotAndStripsFaceToFace) {
   }
 }
 
+TEST(ExplicitChunks, AreSmallerWhereTheirNodesWouldNotFit) {
+  ExplicitModel model;  // bricks that share no node
+  model.materials = {make_explicit_elastic(2400, 30e9, 0.2)};
+  for (int i = 0; i < 1500; ++i) add_brick(model, {2.0 * i, 0, 0}, {2.0 * i + 1, 1, 1}, 1, 1, 1);
+  const ExplicitChunks c = make_chunks(model, 4, 1500);
+  EXPECT_EQ(c.chunks.size(), 2U);
+  EXPECT_EQ(c.most_nodes, 8U * 750);
+  std::vector<std::uint16_t> offsets(c.corners.begin(),
+                                     c.corners.begin() + static_cast<std::ptrdiff_t>(8 * 4 * c.chunks[0].blocks));
+  std::sort(offsets.begin(), offsets.end());
+  offsets.erase(std::unique(offsets.begin(), offsets.end()), offsets.end());
+  EXPECT_EQ(offsets.size(), 8U * 750) << "nodes that wrap round would be the same";
+}
+
 TEST(ExplicitChunks, TurnCornersWithoutMirroring) {
   const std::array<int, 8> node{0, 1, 2, 3, 4, 5, 6, 7};
   EXPECT_EQ(turn_corners(turn_corners(node, 1), 1), turn_corners(node, 2));
