@@ -262,6 +262,7 @@ void System::unpack_element(size_t e) {
   z.damping = z.packed_damping + l.field(slot, kDamped) - (z.damper_energy - z.packed_behind);
   z.plastic = z.packed_plastic + l.field(slot, kBled);
   if (!flows) return;
+  z.crushed = 0;  // by the full law
   z.energy = l.flow(slot, kStored);
   z.plastic += l.flow(slot, kPlastic);
   z.lifted += l.flow(slot, kAxial) - z.axial;

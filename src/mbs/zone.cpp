@@ -68,12 +68,22 @@ void soften(const ZoneParameters& p, ZoneState& z) {
   z.share = z.next_share;
 }
 
+/// What a section shortens by turning need not be crushed: gives back what was in the last evaluation, as far as that
+/// goes. Returns by how much the zone is longer for it [m].
+double take_back_crushing(double elongation, ZoneState& z) {
+  const double back = std::min(z.crushed, std::max(0.0, -elongation));
+  z.shortened -= back;
+  z.crushed -= back;
+  return back;
+}
+
 }  // namespace
 
 void elongate_zone(const ZoneParameters& p, double by, ZoneState& z) {
   if (!z.live || by == 0) return;
-  z.axial += by;
   z.lifted += by;
+  by += take_back_crushing(by, z);
+  z.axial += by;
   z.offset[0] += by;
   z.is_adjusted = true;
   if (!z.has_elastic) return;
@@ -297,6 +307,7 @@ struct Evaluation {
     double reached = z.station[0].reached;
     if (n > 1) reached = std::max(reached, z.station[1].reached);
     double integrity = limits.integrity(z.shortened);
+    z.crushed = 0;
     if (p.external_axial) {
       // held by somebody else
     } else if (force[0] < 0) {
@@ -309,6 +320,7 @@ struct Evaluation {
         const double shortening = std::max(0.0, (-force[0] - limit) / k[0]);
         z.axial -= shortening;
         z.shortened += shortening;
+        z.crushed = shortening;
         force[0] = std::max(force[0], -limit);
         flowed = true;
       }
@@ -604,9 +616,10 @@ struct Evaluation {
         broke = BreakReason::Rotation;
     }
     if (flowed) keep_rotations(limits);
-    z.axial += elongation;
     z.lifted += elongation;
-    if (!p.external_axial) force[0] -= k[0] * elongation;
+    const double longer = elongation + take_back_crushing(elongation, z);
+    z.axial += longer;
+    if (!p.external_axial) force[0] -= k[0] * longer;
     slip(limits[0]);
     twist(limits[0]);
     renew_bounds(laws, limits);

@@ -229,6 +229,26 @@ TEST(Zone, HoldsWhilePressedBeyondItsRupture) {
   }
 }
 
+TEST(Zone, StaysOnItsCurveWhileItIsCrushedAndTurned) {
+  // crushed at 2 MN whatever its length, and shortened by its rotation: in few steps as in many
+  ZoneLaw law = make_lifting_law();
+  law.compression = {{0, 0.1}, {2e6, 2e6}};
+  double shortened[2];
+  for (const int n : {100, 1600}) {
+    Walk w(law);
+    w.go(deform(-0.002 - 2e6 / kStiff, 0, 0));
+    for (int i = 1; i <= n; ++i) {
+      w.go(deform(-0.002 - 2e6 / kStiff - 0.02 * i / n, 0, 0.02 * i / n), 1);
+      ASSERT_NEAR(w.z.resultant.c[0], -2e6, 1) << n << " " << i;
+    }
+    EXPECT_GT(w.z.station[0].reached, 0.01);
+    EXPECT_LT(w.z.lifted, -1e-3);
+    EXPECT_NEAR(-w.z.axial, w.z.shortened - w.z.lifted, 1e-12);
+    shortened[n > 100] = w.z.shortened;
+  }
+  EXPECT_NEAR(shortened[0], shortened[1], 0.01 * shortened[1]);
+}
+
 TEST(Zone, LengthensByBothStations) {
   ZoneLaw law = make_lifting_law();
   law.shear_y = law.shear_z = kUnlimited;
