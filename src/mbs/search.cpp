@@ -14,7 +14,6 @@ constexpr double kLeastAllowance = 0.05;  // [m]; way of a body until the next s
 constexpr double kAllowedTime = 0.025;    // [s]; more for fast bodies
 constexpr double kMostAllowance = 0.4;    // [m]
 constexpr double kSlowShare = 0.8;        // of the bodies
-constexpr long kSearchPause = 80;         // steps between searches that breaks ask for
 
 }  // namespace
 
@@ -36,7 +35,8 @@ void System::add_travel(double h) {
   }
   s.clock[0] += most[0];
   s.clock[1] += std::max(most[0], most[1]);
-  if (is_far || (s.search_due && (s.last_search < 0 || s.step_index - s.last_search >= kSearchPause))) find_pairs();
+  // what a link held together touches from the moment on when it breaks
+  if (is_far || s.search_due) find_pairs();
 }
 
 void System::find_links() {
@@ -54,6 +54,8 @@ void System::find_links() {
       if (s.bushing[i].live) f(forces.bushings[i].a, forces.bushings[i].b);
     for (size_t j = 0; j < joints.size(); ++j)
       if (s.joint[j].live) f(joints[j].parent, joints[j].child);
+    for (const CompiledRotational& r : rotationals)
+      if (is_loose(r)) f(joints[static_cast<size_t>(r.joint)].parent, joints[static_cast<size_t>(r.joint)].child);
   };
   search.first_link.assign(B + 2, 0);
   each_link([&](int a, int b) {
@@ -144,7 +146,6 @@ void System::find_pairs() {
   PairSearch& search = contact.search;
   if (s.search_due || !search.has_links) find_links();
   s.search_due = false;
-  s.last_search = s.step_index;
   s.travel.resize(B);
   s.is_fast.resize(B);
   if (!model.contact.bodies) {

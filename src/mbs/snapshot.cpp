@@ -89,8 +89,7 @@ void visit(Archive& ar, S& s, C& sys) {
   ar(s.element), ar(s.rotational), ar(s.joint), ar(s.cable);
   ar(s.spring), ar(s.torsion), ar(s.bushing), ar(s.load);
   ar(s.pairs), ar(s.pair_due), ar(s.pair_clock), ar(s.pair_fast), ar(s.clock), ar(s.is_fast), ar(s.travel),
-      ar(s.search_velocity), ar(s.allowance), ar(s.tied_to_ground), ar(s.search_due), ar(s.last_search),
-      ar(s.touched_pairs);
+      ar(s.search_velocity), ar(s.allowance), ar(s.tied_to_ground), ar(s.search_due), ar(s.touched_pairs);
   ar(s.touching.steps), ar(s.touching.body), ar(s.touching.group), ar(s.touching.rows), ar(s.touching.a),
       ar(s.touching.b), ar(s.touching.groups), ar(s.touching.points), ar(s.touching.share);
   ar(s.removed), ar(s.contact_energy), ar(s.stick_energy), ar(s.contact_loss), ar(s.contact_loss_power),

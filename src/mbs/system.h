@@ -116,7 +116,6 @@ struct State {
   std::vector<double> allowance;  // the way at which a body asks for a new search (B) [m]
   std::vector<unsigned char> tied_to_ground;
   bool search_due = true;
-  long last_search = -1;  // step
   Touching touching;
   std::vector<long> touched_pairs;  // a * B + b, sorted
   // ledger [J]
