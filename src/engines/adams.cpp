@@ -491,6 +491,9 @@ class Dataset {
         return off("BUSHING", of(bushing_, a.index));
       case Kind::RemoveLoad:
         return off("GFORCE", of(load_, a.index));
+      case Kind::LoosenJoint:
+        losses_.add("a joint that a charge loosens stays: the stub above the charge cannot be crushed");
+        return {};
       case Kind::ApplyLoad:
         losses_.add("a load that an event applies acts from the start");
         return {};

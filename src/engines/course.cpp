@@ -261,8 +261,14 @@ bool Course::check_joints() {
   return released;
 }
 
+void Course::loosen(size_t j) {
+  if (!joint_live_[j] || !forces_.loosen_joint(j)) return;
+  joint_live_[j] = 0;
+  must_rebuild_ = true;
+}
+
 void Course::release(size_t j, const char* reason) {
-  if (!joint_live_[j]) return;
+  if (!joint_live_[j] && !forces_.is_loose(j)) return;
   joint_live_[j] = 0;
   must_rebuild_ = true;
   forces_.release_joint(j, time_);
@@ -322,6 +328,8 @@ void Course::act(const mbs::Event& event, const mbs::Action& a) {
       return forces_.remove_bushing(index);
     case Kind::RemoveLoad:
       return forces_.remove_load(index);
+    case Kind::LoosenJoint:
+      return loosen(static_cast<size_t>(a.joint.index));
     case Kind::ApplyLoad:
       return forces_.apply_load(index, event.triggers.empty() ? event.time : time_);
   }
@@ -436,7 +444,7 @@ const mbs::View& Course::calc_view() {
   for (size_t j = 0; j < J; ++j) {
     using Kind = mbs::Joint::Kind;
     const mbs::Joint& x = model_.joints[j];
-    v.joint_released[j] = !joint_live_[j];
+    v.joint_released[j] = !joint_live_[j] && !forces_.is_loose(j);
     if (!joint_live_[j]) continue;
     const JointFrames f = frames_of(x);
     if (x.kind == Kind::Revolute || x.kind == Kind::Cylindrical) v.joint_angle[j] = angle_[j];

@@ -93,6 +93,7 @@ class Course {
   bool fire_events();
   void act(const mbs::Event&, const mbs::Action&);
   void replace_body(size_t, const mbs::Body&);
+  void loosen(size_t joint);
   void release(size_t joint, const char* reason);
   bool check_joints();
   JointFrames frames_of(const mbs::Joint&) const;

@@ -277,6 +277,12 @@ void Forces::calc(double time, const Motion& motion, std::vector<Wrench>& on) co
     mbs::ZoneParameters p = rotational_[i].parameters;
     prepare(p, time - accepted_);
     mbs::ZoneState trial = rotational_[i].state;
+    if (rotational_[i].is_loose) {
+      const Six s = calc_six(motion, j.parent, j.X_PF, j.child, j.X_CM, {});
+      mbs::advance_zone(p, lasting_laws_, s.deformation, time, h, trial);
+      push_six(motion, j.parent, j.child, s, trial.resultant.c, on);
+      continue;
+    }
     mbs::Six d;
     d.c[0] = rotational_[i].axial_force;
     d.c[5] = angle_of(motion, r.joint, rotational_[i].angle);
@@ -412,6 +418,15 @@ bool Forces::advance(double time, const Motion& motion, const std::vector<Vec3>&
     if (!z.state.live) continue;
     const mbs::RotationalElement& r = model_.rotational_elements[i];
     const mbs::Joint& j = model_.joints[static_cast<size_t>(r.joint.index)];
+    if (z.is_loose) {
+      const Six s = calc_six(motion, j.parent, j.X_PF, j.child, j.X_CM, {});
+      const bool was_yielded = z.state.yielded;
+      prepare(z.parameters, h);
+      mbs::advance_zone(z.parameters, laws_, s.deformation, time, h, z.state);
+      tell(z, was_yielded, zone_.size() + i);
+      if (z.state.live) push_six(motion, j.parent, j.child, s, z.state.resultant.c, cached_);
+      continue;
+    }
     if (!joint_force.empty()) z.axial_force = -joint_force[static_cast<size_t>(r.joint.index)].x;
     z.angle = angle_of(motion, r.joint, z.angle);
     const bool was_yielded = z.state.yielded;
@@ -518,6 +533,30 @@ void Forces::switch_law(const mbs::Action& a, double time) {
   z.ramp_begin = time;
   z.ramp = a.ramp;
   z.next_share = a.stiffness_share;
+}
+
+bool Forces::loosen_joint(size_t j) {
+  for (size_t i = 0; i < rotational_.size(); ++i) {
+    const mbs::RotationalElement& r = model_.rotational_elements[i];
+    Zone& z = rotational_[i];
+    if (r.joint.index != static_cast<int>(j) || !z.state.live) continue;
+    is_cached_ = false;
+    z.is_loose = true;
+    z.parameters.external_axial = false;
+    for (int c = 0; c < 3; ++c) z.parameters.stiffness[c] = r.loose_translational[c];
+    z.parameters.stiffness[3] = r.loose_torsion;
+    z.parameters.stiffness[4] = r.loose_bending;
+    mbs::free_zone(z.state);
+    return true;
+  }
+  return false;
+}
+
+bool Forces::is_loose(size_t j) const {
+  for (size_t i = 0; i < rotational_.size(); ++i)
+    if (model_.rotational_elements[i].joint.index == static_cast<int>(j))
+      return rotational_[i].is_loose && rotational_[i].state.live;
+  return false;
 }
 
 void Forces::release_joint(size_t j, double time) {

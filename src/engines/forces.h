@@ -57,6 +57,10 @@ class Forces {
   // Events; they count from the next evaluation on.
   void remove_element(size_t);
   void switch_law(const mbs::Action&, double time);
+  /// Lets the joint's rotational element take over; false if it has none that holds.
+  bool loosen_joint(size_t joint);
+  /// Whether it has, and still holds.
+  bool is_loose(size_t joint) const;
   void release_joint(size_t, double time);
   void release_cable(size_t);
   void remove_spring(size_t);
@@ -85,6 +89,7 @@ class Forces {
     mbs::ZoneState state;
     double angle = 0;        // of a rotational element's joint, accepted [rad]
     double axial_force = 0;  // of a rotational element's joint, accepted; tension positive [N]
+    bool is_loose = false;   // a rotational element that has taken over from its joint
   };
   struct Spring {
     bool live = true;

@@ -186,17 +186,17 @@ class Assembly {
   int place(int body) const { return body < 0 ? -1 : place_[static_cast<size_t>(body)]; }
 
   /// Six rows of an element at its marker M, in the axes of F.
-  void element_rows(const CompiledElement& e, KinematicRow rows[6]) const {
-    const Mat3 F = to_matrix(s_.pose_of(e.a).q * e.q_AF);
-    const Vec3 p_M = point(e.b, e.p_BM);
+  void element_rows(int a, int b, const Quat& q_AF, const Vec3& p_BM, KinematicRow rows[6]) const {
+    const Mat3 F = to_matrix(s_.pose_of(a).q * q_AF);
+    const Vec3 p_M = point(b, p_BM);
     for (int i = 0; i < 6; ++i) {
       const Vec3 axis = F.column(i % 3);
-      KinematicRow r{place(e.a), place(e.b), {}, -axis, {}, axis};
+      KinematicRow r{place(a), place(b), {}, -axis, {}, axis};
       if (i < 3) {
         r.va = -axis;
         r.vb = axis;
-        r.wa = -cross(p_M - centre(e.a), axis);
-        r.wb = cross(p_M - centre(e.b), axis);
+        r.wa = -cross(p_M - centre(a), axis);
+        r.wb = cross(p_M - centre(b), axis);
       }
       rows[i] = r;
     }
@@ -235,9 +235,18 @@ class Assembly {
         if (s_.state.element[i].live) f(s_.elements[i], s_.state.element[i].share);
     };
     const auto each_row = [&](auto&& f) {
-      for (const CompiledRotational& r : s_.rotationals)
-        f(rotational_row(s_.joints[static_cast<size_t>(r.joint)]),
-          (fast ? 1 + r.zone.viscous : 1) * r.zone.stiffness[5]);
+      for (size_t i = 0; i < s_.rotationals.size(); ++i) {
+        const CompiledRotational& r = s_.rotationals[i];
+        const CompiledJoint& j = s_.joints[static_cast<size_t>(r.joint)];
+        const double factor = fast ? 1 + r.zone.viscous : 1;
+        if (!s_.is_loose(r)) {
+          f(rotational_row(j), factor * r.zone.stiffness[5]);
+          continue;
+        }
+        KinematicRow rows[6];
+        element_rows(j.parent, j.child, r.q_F, j.p_CM, rows);
+        for (int k = 0; k < 6; ++k) f(rows[k], factor * s_.state.rotational[i].share * r.loose.stiffness[k]);
+      }
       for (size_t i = 0; i < s_.model.cables.size(); ++i)
         if (s_.state.cable[i].live) f(cable_row(s_.model.cables[i]), s_.model.cables[i].stiffness);
       for (const StiffRow& r : springs)
@@ -249,7 +258,7 @@ class Assembly {
     each_element([&](const CompiledElement& e, double share) {
       const double factor = fast ? 1 + e.zone.viscous : 1;
       KinematicRow rows[6];
-      element_rows(e, rows);
+      element_rows(e.a, e.b, e.q_AF, e.p_BM, rows);
       PairMatrix::Block block = {};
       for (int k = 0; k < 6; ++k) add_outer(rows[k], factor * share * e.zone.stiffness[k], block);
       sum.add(rows[0].a, rows[0].b, block);
@@ -378,7 +387,7 @@ void System::adopt_step() {
   contact_interval = calc_contact_interval();
   summary.shortest_step = summary.shortest_step > 0 ? std::min(summary.shortest_step, step) : step;
   const double relaxation = 1 - std::exp(-step * model.damping_frequency);
-  for (CompiledRotational& r : rotationals) r.zone.relaxation = relaxation;
+  for (CompiledRotational& r : rotationals) r.zone.relaxation = r.loose.relaxation = relaxation;
   for (size_t e = 0; e < elements.size(); ++e) {
     elements[e].zone.relaxation = relaxation;
     const size_t slot = slot_of(e);

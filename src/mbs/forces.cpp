@@ -345,12 +345,7 @@ void System::evaluate_bushing(size_t i, bool at_rest) {
     s.energy += calc_integral(k.spring[c], x[c]);
   }
   s.has_been_evaluated = true;
-  // torque conjugate to the rate of the rotation vector (eq. 4)
-  const Vec3 m{f[3], f[4], f[5]}, rm = cross(d.r, m);
-  const Vec3 t = k.turns ? d.F * (m + 0.5 * rm + calc_kappa(dot(d.r, d.r)) * cross(d.r, rm)) : Vec3{};
-  const Vec3 n = d.F * Vec3{f[0], f[1], f[2]};
-  load_body(k.a, n, cross(d.p_M - centre_of(k.a), n) + t);
-  load_body(k.b, -n, -(cross(d.p_M - centre_of(k.b), n) + t));
+  load_frames(k.a, k.b, d, f);
   if (!k.is_damped && (k.is_bound || at_rest)) return;
   ForceRow rows[6];
   find_bushing_rows(k, d, rows);
@@ -359,6 +354,15 @@ void System::evaluate_bushing(size_t i, bool at_rest) {
       watch_stiffness(k.a, k.b, rows[c], calc_slope(k.spring[c], x[c]), "bushing", model.bushings[i].name);
     add_damper(k.a, k.b, rows[c], k.damper[c], s.component[c], s.damping, model.bushings[i].name);
   }
+}
+
+void System::load_frames(int a, int b, const FrameDeformation& d, const double f[6]) {
+  // torque conjugate to the rate of the rotation vector (eq. 4)
+  const Vec3 m{f[3], f[4], f[5]}, rm = cross(d.r, m);
+  const Vec3 t = m == Vec3{} ? m : d.F * (m + 0.5 * rm + calc_kappa(dot(d.r, d.r)) * cross(d.r, rm));
+  const Vec3 n = d.F * Vec3{f[0], f[1], f[2]};
+  load_body(a, n, cross(d.p_M - centre_of(a), n) + t);
+  load_body(b, -n, -(cross(d.p_M - centre_of(b), n) + t));
 }
 
 std::vector<StiffRow> System::calc_spring_stiffness(bool fast, double force_scale) const {

@@ -539,9 +539,8 @@ void System::check_joints() {
   }
 }
 
-void System::release_joint(size_t i, const char* reason) {
+void System::drop_joint(size_t i) {
   JointState& js = state.joint[i];
-  if (!js.live) return;
   js.live = false;
   js.force = js.moment = {};
   for (JointState& other : state.joint) {
@@ -549,10 +548,24 @@ void System::release_joint(size_t i, const char* reason) {
     other.is_examined = false;
     std::fill(std::begin(other.curvature), std::end(other.curvature), 0.0);
   }
-  if (const int r = joints[i].rotational; r >= 0 && state.rotational[static_cast<size_t>(r)].live)
-    break_zone(state.rotational[static_cast<size_t>(r)], BreakReason::Removed);
   clusters_due = true;
   mark_search_due();
+}
+
+void System::loosen_joint(size_t i) {
+  const int r = joints[i].rotational;
+  ZoneState& z = state.rotational[static_cast<size_t>(r)];
+  if (!state.joint[i].live || !z.live) return;  // one that turns freely stays a joint
+  drop_joint(i);
+  free_zone(z);
+}
+
+void System::release_joint(size_t i, const char* reason) {
+  const int r = joints[i].rotational;
+  const bool has_element = r >= 0 && state.rotational[static_cast<size_t>(r)].live;
+  if (!state.joint[i].live && !has_element) return;  // neither it nor what has taken over from it
+  drop_joint(i);
+  if (has_element) break_zone(state.rotational[static_cast<size_t>(r)], BreakReason::Removed);
   say({Happening::Kind::JointReleased, state.time, static_cast<int>(i), -1, reason, 0});
 }
 

@@ -185,7 +185,14 @@ struct RotationalElement {
   double damping_ratio = 0.05;  // as of a zone element
   LawId law;                    // invalid: elastic
   ElementId axial_element;      // takes the elongation that comes with this one's rotation; invalid: none
+  // in place of the joint once an action has loosened it, at the origin of M; all 0: it cannot be loosened
+  Vec3 loose_translational;                     // along x, y, z of F [N/m]
+  double loose_torsion = 0, loose_bending = 0;  // about x, y of F [N·m/rad]
 };
+inline bool can_be_loosened(const RotationalElement& r) {
+  const Vec3& k = r.loose_translational;
+  return k.x > 0 && k.y > 0 && k.z > 0;
+}
 
 /// Tension-only cable between a point of a body and a point of another (or of the ground).
 struct Cable {
@@ -277,7 +284,8 @@ struct Action {
     RemoveRotationalSpring,  // index
     RemoveBushing,           // index
     RemoveLoad,              // index; a load is there from the start
-    ApplyLoad                // index; makes a load that some event applies absent until then; its table starts then
+    ApplyLoad,               // index; makes a load that some event applies absent until then; its table starts then
+    LoosenJoint              // joint: its rotational element takes over as a six-component element by all of its law
   };
   Kind kind = Kind::RemoveElement;
   ElementId element;

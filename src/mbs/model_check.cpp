@@ -329,6 +329,9 @@ void Checker::check_rotational_elements() {
     if (r.axial_element.is_valid()) index(p, "axial_element", r.axial_element.index, m_.elements);
     finite_not_negative(p, "stiffness", r.stiffness);
     share(p, "damping_ratio", r.damping_ratio, 0, 0.2);
+    for (int k = 0; k < 3; ++k) finite_not_negative(p, "loose_translational", r.loose_translational[k]);
+    finite_not_negative(p, "loose_torsion", r.loose_torsion);
+    finite_not_negative(p, "loose_bending", r.loose_bending);
   }
 }
 
@@ -477,6 +480,12 @@ void Checker::check_action(const Place& p, const Action& a) {
     }
     case Action::Kind::ReleaseJoint:
       index(p, "joint", a.joint.index, m_.joints);
+      break;
+    case Action::Kind::LoosenJoint:
+      if (index(p, "joint", a.joint.index, m_.joints) &&
+          std::none_of(m_.rotational_elements.begin(), m_.rotational_elements.end(),
+                       [&](const RotationalElement& r) { return r.joint == a.joint && can_be_loosened(r); }))
+        fail(p, "joint", "has no rotational element with loose_translational > 0 that could take over");
       break;
     case Action::Kind::ReplaceBody: {
       const Place in{p.path + ".replacement", p.name};

@@ -443,6 +443,9 @@ RotationalElement Reader::rotational_element_from(const Node& n) const {
   read(n, "damping_ratio", r.damping_ratio);
   if (n.has("law")) r.law = {refer(n["law"], laws_, -1)};
   if (n.has("axial_element")) r.axial_element = {refer(n["axial_element"], elements_, -1)};
+  read(n, "loose_translational", r.loose_translational);
+  read(n, "loose_torsion", r.loose_torsion);
+  read(n, "loose_bending", r.loose_bending);
   return r;
 }
 
@@ -649,6 +652,7 @@ Action Reader::action_from(const Node& n) const {
       read(n, "stiffness_share", a.stiffness_share);
       break;
     case Kind::ReleaseJoint:
+    case Kind::LoosenJoint:
       only({"joint"});
       a.joint = {refer(n["joint"], joints_)};
       break;

@@ -137,6 +137,11 @@ Json json_of(const RotationalElement& r) {
          {"damping_ratio", r.damping_ratio},
          {"law", r.law.index}};
   if (r.axial_element.is_valid()) j["axial_element"] = r.axial_element.index;
+  if (can_be_loosened(r)) {
+    j["loose_translational"] = json_of(r.loose_translational);
+    j["loose_torsion"] = r.loose_torsion;
+    j["loose_bending"] = r.loose_bending;
+  }
   return j;
 }
 
@@ -258,6 +263,7 @@ Json json_of(const Action& a) {
       j["stiffness_share"] = a.stiffness_share;
       break;
     case Action::Kind::ReleaseJoint:
+    case Action::Kind::LoosenJoint:
       j["joint"] = a.joint.index;
       break;
     case Action::Kind::ReplaceBody:

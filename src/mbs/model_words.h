@@ -15,7 +15,7 @@ inline const std::vector<std::string> kJointWords = {"fixed",     "revolute",   
 /// In the order of Action::Kind.
 inline const std::vector<std::string> kActionWords = {
     "remove_element",           "switch_law",     "release_joint", "replace_body", "release_cable", "remove_spring",
-    "remove_rotational_spring", "remove_bushing", "remove_load",   "apply_load"};
+    "remove_rotational_spring", "remove_bushing", "remove_load",   "apply_load",   "loosen_joint"};
 /// In the order of Trigger::component.
 inline const std::vector<std::string> kComponentWords = {"x", "y", "z", "magnitude"};
 

@@ -154,6 +154,14 @@ void System::compile() {
       c.zone.stations = 1;
       c.zone.law[0] = r.law.index;
     }
+    c.loose = c.zone;
+    c.loose.external_axial = false;
+    c.loose.relief = 0;
+    for (int i = 0; i < 3; ++i) c.loose.stiffness[i] = r.loose_translational[i];
+    c.loose.stiffness[3] = r.loose_torsion;
+    c.loose.stiffness[4] = r.loose_bending;
+    const Joint& frames = model.joints[static_cast<size_t>(c.joint)];
+    c.q_F = normalized(frames.X_PF.q), c.q_M = normalized(frames.X_CM.q);
     rotationals.push_back(c);
   }
   s.rotational.resize(rotationals.size());
@@ -310,31 +318,37 @@ void System::evaluate_rotationals(double h) {
     const CompiledRotational& c = rotationals[i];
     const CompiledJoint& j = joints[static_cast<size_t>(c.joint)];
     const JointState& js = state.joint[static_cast<size_t>(c.joint)];
-    const Mat3 R = rotation_of(j.parent);
-    const Vec3 axis = R * j.R_PF.column(2);
+    const bool loose = !js.live;
+    FrameDeformation between;
+    Vec3 axis;
+    Six d;
+    if (loose) {
+      between = measure_frames(j.parent, j.child, j.p_PF, c.q_F, j.p_CM, c.q_M);
+      d = {{between.u.x, between.u.y, between.u.z, between.r.x, between.r.y, between.r.z}};
+    } else {
+      const Mat3 R = rotation_of(j.parent);
+      axis = R * j.R_PF.column(2);
+      d.c[0] = -dot(R * j.R_PF.column(0), js.force);
+      d.c[5] = js.angle;
+    }
+    ZoneParameters zone = loose ? c.loose : c.zone;
+    if (ignores_limits) zone.stations = 0;
     const bool was_yielded = z.yielded;
     const double elongated = z.axial;
-    Six d;
-    d.c[0] = -dot(R * j.R_PF.column(0), js.force);
-    d.c[5] = js.angle;
-    if (ignores_limits) {
-      ZoneParameters elastic = c.zone;
-      elastic.stations = 0;
-      advance_zone(elastic, laws, d, state.time, h, z);
-    } else {
-      advance_zone(c.zone, laws, d, state.time, h, z);
-    }
+    advance_zone(zone, laws, d, state.time, h, z);
     if (z.yielded && !was_yielded)
       say({Happening::Kind::ElementYielded, state.time, static_cast<int>(elements.size() + i), -1, {}, 0});
-    if (c.axial_element >= 0 && h > 0 && z.axial != elongated)
+    if (!loose && c.axial_element >= 0 && h > 0 && z.axial != elongated)
       elongate_element(static_cast<size_t>(c.axial_element), z.axial - elongated);
     if (!z.live) {
       break_element(elements.size() + i, z.reason);
-      continue;
+    } else if (loose) {
+      load_frames(j.parent, j.child, between, z.resultant.c);
+    } else {
+      const Vec3 t = z.resultant.c[5] * axis;
+      if (j.child >= 0) torque[static_cast<size_t>(j.child)] -= t;
+      if (j.parent >= 0) torque[static_cast<size_t>(j.parent)] += t;
     }
-    const Vec3 t = z.resultant.c[5] * axis;
-    if (j.child >= 0) torque[static_cast<size_t>(j.child)] -= t;
-    if (j.parent >= 0) torque[static_cast<size_t>(j.parent)] += t;
   }
 }
 
@@ -425,6 +439,9 @@ void System::act(const Event& event) {
       }
       case Action::Kind::ReleaseJoint:
         release_joint(static_cast<size_t>(a.joint.index), "released");
+        break;
+      case Action::Kind::LoosenJoint:
+        loosen_joint(static_cast<size_t>(a.joint.index));
         break;
       case Action::Kind::ReplaceBody:
         replace_body(static_cast<size_t>(a.body.index), a.replacement);
@@ -742,7 +759,8 @@ const View& System::calc_view() {
     v.element_translation[i] = {z.deformation[0], z.deformation[1], z.deformation[2]};
     v.element_rotation[i] = {z.deformation[3], z.deformation[4], z.deformation[5]};
   }
-  for (size_t i = 0; i < R; ++i) fill(E + i, rotationals[i].zone, s.rotational[i]);
+  for (size_t i = 0; i < R; ++i)
+    fill(E + i, is_loose(rotationals[i]) ? rotationals[i].loose : rotationals[i].zone, s.rotational[i]);
   v.joint_force.resize(joints.size());
   v.joint_moment.resize(joints.size());
   v.joint_released.resize(joints.size());
@@ -755,6 +773,13 @@ const View& System::calc_view() {
     v.joint_force[j] = transpose_times(F, reaction_force[j]);
     v.joint_moment[j] = transpose_times(F, reaction_moment[j]);
     v.joint_released[j] = !s.joint[j].live;
+    if (c.rotational >= 0 && is_loose(rotationals[static_cast<size_t>(c.rotational)])) {
+      // of a on b is minus the resultant
+      const double* f = s.rotational[static_cast<size_t>(c.rotational)].resultant.c;
+      v.joint_force[j] = -Vec3{f[0], f[1], f[2]};
+      v.joint_moment[j] = -Vec3{f[3], f[4], f[5]};
+      v.joint_released[j] = false;
+    }
     v.joint_angle[j] = s.joint[j].angle;
     const bool slides = c.kind == Joint::Kind::Prismatic || c.kind == Joint::Kind::Cylindrical;
     v.joint_displacement[j] = slides ? dot(F.column(2), calc_joint_frames(s, c).gap) : 0;

@@ -51,6 +51,9 @@ struct CompiledRotational {
   int joint = -1;
   int axial_element = -1;  // that takes its elongation
   ZoneParameters zone;
+  // once its joint is loosened: a six-component element between the joint's frames
+  ZoneParameters loose;
+  Quat q_F, q_M;  // in the bodies' frames
 };
 
 struct JointState {
@@ -294,6 +297,8 @@ class System {
   FrameDeformation measure_bushing(size_t bushing) const;
   FrameDeformation measure_frames(int a, int b, const Vec3& p_AF, const Quat& q_AF, const Vec3& p_BM,
                                   const Quat& q_BM) const;
+  /// A force and a moment of a on b, given in F at M's origin: x y z [N], and conjugate to the rotation vector [N·m].
+  void load_frames(int a, int b, const FrameDeformation&, const double f[6]);
   void find_bushing_rows(const CompiledBushing&, const FrameDeformation&, ForceRow rows[6]) const;
   /// Stiffness of all live springs: the present tangent, or for the step the largest that is foreseen.
   ///   force_scale  at which a law that starts flat is looked at for a stiffness in its stead [N, N·m]
@@ -345,6 +350,13 @@ class System {
   void restore_elements(const std::vector<double>& history);
   void pack_body(size_t body);
   void evaluate_rotationals(double h);
+  /// Whether a rotational element has taken over from its joint and still holds.
+  bool is_loose(const CompiledRotational& r) const {
+    return !state.joint[static_cast<size_t>(r.joint)].live &&
+           state.rotational[static_cast<size_t>(joints[static_cast<size_t>(r.joint)].rotational)].live;
+  }
+  void loosen_joint(size_t j);
+  void drop_joint(size_t j);
   void evaluate_cables();
   void evaluate_contact(double h);
   void compile_contact();

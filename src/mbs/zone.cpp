@@ -92,6 +92,14 @@ void elongate_zone(const ZoneParameters& p, double by, ZoneState& z) {
   z.plastic += released;
 }
 
+void free_zone(ZoneState& z) {
+  z.axial = z.lifted = 0;  // those of the element that took them
+  z.deformation[0] = z.elastic[0] = z.elastic_force[0] = z.damper_force[0] = z.flowed[0] = 0;
+  z.normal_force = z.resultant.c[0] = 0;
+  for (double& x : z.offset) x = 0;
+  z.safe_force[0] = 1, z.safe_force[1] = -1;
+}
+
 void break_zone(ZoneState& z, BreakReason reason) {
   z.live = false;
   z.reason = reason;

@@ -107,6 +107,9 @@ bool write_flow(const ZoneParameters&, const std::vector<CompiledLaw>&, const Zo
 /// Lengthens a live zone's plastic axial deformation from outside; what that takes from or adds to the elastic energy
 /// is booked as plastic work. The resultants follow at the next evaluation.
 void elongate_zone(const ZoneParameters&, double by, ZoneState&);
+/// Makes the state of a rotational element that of a six-component one, which then has no external axial force: it
+/// keeps its rotation and what that stores, and transmits nothing else yet.
+void free_zone(ZoneState&);
 /// Ends a zone: what it stores is booked as dissipated.
 void break_zone(ZoneState&, BreakReason);
 

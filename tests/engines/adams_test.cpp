@@ -176,7 +176,12 @@ mbs::Model make_hinge() {
   j.X_CM = {{0, 0, -1}, {}};
   j.shear_limit = 1e5;
   const mbs::JointId id = add_joint(m, j);
-  m.rotational_elements.push_back({"C-A1-0/top", id, 1e8, 0.05, l, {}});
+  mbs::RotationalElement hinge;
+  hinge.name = "C-A1-0/top";
+  hinge.joint = id;
+  hinge.stiffness = 1e8;
+  hinge.law = l;
+  m.rotational_elements.push_back(hinge);
   mbs::ZoneElement e;
   e.name = "C-A1-0/foot";
   e.a = mbs::kGround;

@@ -241,6 +241,25 @@ TEST_P(EnginesAlikeReference, RotationalElementsAndSprings) {
   expect_alike(m, 2, 3e-7);
 }
 
+TEST_P(EnginesAlikeReference, AJointThatIsLoosened) {
+  NEEDS_ENGINE();
+  mbs::Model m = test::make_bar(Kind::Revolute, test::z_along_y());
+  mbs::RotationalElement e;
+  e.joint = {0};
+  e.stiffness = 20;
+  e.loose_translational = {4e3, 3e3, 5e3};
+  e.loose_torsion = 30, e.loose_bending = 40;
+  m.rotational_elements.push_back(e);
+  mbs::Event event;
+  event.time = 0.4;
+  event.actions.resize(1);
+  event.actions[0].kind = mbs::Action::Kind::LoosenJoint;
+  event.actions[0].joint = {0};
+  m.events.push_back(event);
+  expect_alike(m, 1.5, 1e-5);
+  EXPECT_LT(compare_with_native(m, 1.5, kStep / 2).position.value, 3e-6);  // events fire at steps
+}
+
 TEST_P(EnginesAlikeReference, EventsAndReleases) {
   NEEDS_ENGINE();
   mbs::Model m = test::make_bar(Kind::Revolute, test::z_along_y());

@@ -530,6 +530,27 @@ TEST(CheckModel, RefusesAReplacementThatIsTurnedOrFixed) {
   EXPECT_THAT(complaint_of([&] { check_model(c.model); }), HasSubstr("fixed"));
 }
 
+TEST(CheckModel, RefusesToLoosenAJointThatNothingTakesOverFrom) {
+  Model m = make_rod();
+  Event e;
+  e.actions.resize(1);
+  e.actions[0].kind = Action::Kind::LoosenJoint;
+  e.actions[0].joint = {0};
+  m.events = {e};
+  EXPECT_THAT(complaint_of([&] { check_model(m); }),
+              HasSubstr("has no rotational element with loose_translational > 0"));
+  RotationalElement r;
+  r.joint = {0};
+  r.stiffness = 1;
+  m.rotational_elements = {r};
+  EXPECT_THAT(complaint_of([&] { check_model(m); }),
+              HasSubstr("has no rotational element with loose_translational > 0"));
+  m.rotational_elements[0].loose_translational = {1, 1, 1};
+  EXPECT_EQ(complaint_of([&] { check_model(m); }), "no complaint");
+  m.rotational_elements[0].loose_bending = -1;
+  EXPECT_THAT(complaint_of([&] { check_model(m); }), HasSubstr("loose_bending"));
+}
+
 TEST(CheckModel, RefusesTwoRotationalElementsOnOneJoint) {
   Model m = make_rod();
   RotationalElement r;

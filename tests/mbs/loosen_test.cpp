@@ -1,0 +1,193 @@
+// Joints that go over to their rotational elements. g = 9.81.
+#include <gtest/gtest.h>
+
+#include "models.h"
+
+namespace topple::mbs {
+namespace {
+
+using test::hash_of;
+using test::make_box;
+
+constexpr double kStubMass = 20, kBlockMass = 4000, kFall = 1, kStub = 0.5;  // [kg, kg, m, m]
+constexpr double kBears = 2e5;  // the stub, whatever it is shortened by [N]
+
+/// A block on top of a short stub, joined by a revolute joint with a rotational element, falling from `kFall` on flat
+/// ground; the joint is loosened on the way.
+Model make_falling_block(double crush_length = kUnlimited) {
+  Model m;
+  m.contact.restitution = 0;
+  add_body(m, make_box("stub", kStubMass, {0.2, 0.2, kStub / 2}, {0, 0, kFall + kStub / 2}));
+  add_body(m, make_box("block", kBlockMass, {1, 1, 0.5}, {0, 0, kFall + kStub + 0.5}));
+  Joint j;
+  j.kind = Joint::Kind::Revolute;
+  j.name = "top";
+  j.parent = {0};
+  j.child = {1};
+  j.X_PF = {{0, 0, kStub / 2}, test::upright()};
+  j.X_CM = {{0, 0, -0.5}, test::upright()};
+  RotationalElement r;
+  r.name = "top";
+  r.joint = add_joint(m, j);
+  r.stiffness = 1e7;
+  r.damping_ratio = 0;
+  r.loose_translational = {1e8, 1e8, 1e8};
+  r.loose_torsion = r.loose_bending = 1e7;
+  ZoneLaw law;
+  law.compression = {{0, 10}, {kBears, kBears}};
+  law.crush_length = crush_length;
+  r.law = add_law(m, law);
+  m.rotational_elements.push_back(r);
+  Event e;
+  e.time = 0.05;
+  e.name = "loosen";
+  e.actions.resize(1);
+  e.actions[0].kind = Action::Kind::LoosenJoint;
+  e.actions[0].joint = {0};
+  m.events.push_back(e);
+  return m;
+}
+
+Options options_of(double duration, double step) {
+  Options o;
+  o.duration = duration;
+  o.step = step;
+  o.equilibrium = false;
+  o.frame_interval = 1e-3;
+  return o;
+}
+
+TEST(LoosenJointPhysics, ABlockCrushesTheStubThatItFallsOn) {
+  // its fall and the way of crushing are the work of the stub: m g (h + s) = F s
+  const double s = kBlockMass * 9.81 * kFall / (kBears - kBlockMass * 9.81);
+  for (const double step : {2e-4, 1e-4}) {
+    double least = 1e9, released = 0, force = 0;
+    Options o = options_of(0.75, step);
+    o.on_frame = [&](const View& v) {
+      least = std::min(least, v.X_WB[1].p.z - v.X_WB[0].p.z - 0.5 - kStub / 2);
+      released += v.joint_released[0];
+      force = std::max(force, v.joint_force[0].x);
+    };
+    const Summary sum = run(make_falling_block(), o);
+    // the spring of the zone, 2 mm, takes a part of the way
+    EXPECT_NEAR(-least, s, 0.01 * s) << step;
+    EXPECT_EQ(released, 0);  // it goes on to hold
+    EXPECT_NEAR(force, kBears, 0.02 * kBears);
+    EXPECT_LT(sum.energy_error, 1e-3);
+  }
+}
+
+TEST(LoosenJointPhysics, WhatIsCrushedThroughComesApart) {
+  Options o = options_of(0.75, 1e-4);
+  std::vector<std::string> told;
+  o.on_happening = [&](const Happening& h) {
+    if (h.kind == Happening::Kind::ElementBroken) told.push_back("element " + std::to_string(h.index) + " " + h.reason);
+    if (h.kind == Happening::Kind::JointReleased) told.push_back("joint");
+  };
+  bool released = false;
+  o.on_frame = [&](const View& v) {
+    released = v.joint_released[0];
+    if (released) { EXPECT_EQ(norm(v.joint_force[0]), 0); }
+  };
+  const Summary sum = run(make_falling_block(0.1), o);
+  EXPECT_EQ(told, std::vector<std::string>{"element 0 crushing"});
+  EXPECT_TRUE(released);
+  EXPECT_LT(sum.energy_error, 1e-3);
+}
+
+TEST(LoosenJoint, KeepsTheRotationAndWhatItStores) {
+  // a rod that swings on an elastic hinge: stiff enough, the element goes on as the joint did
+  Model m;
+  m.contact.ground = m.contact.bodies = false;
+  Body rod = make_box("rod", 1, {0.5, 0.02, 0.02}, {0.5, 0, 0});
+  rod.shapes.clear();
+  add_body(m, rod);
+  Joint j;
+  j.kind = Joint::Kind::Revolute;
+  j.child = {0};
+  j.X_PF.q = j.X_CM.q = to_quat(Mat3::from_columns({1, 0, 0}, {0, 0, -1}, {0, 1, 0}));
+  j.X_CM.p = {-0.5, 0, 0};
+  RotationalElement r;
+  r.joint = add_joint(m, j);
+  r.stiffness = 30;
+  r.loose_translational = {1e7, 1e7, 1e7};
+  r.loose_torsion = r.loose_bending = 1e5;
+  m.rotational_elements.push_back(r);
+  Options o = options_of(0.6, 2e-5);
+  o.frame_interval = 0.6;
+  Pose joined, loose;
+  Energy energy;
+  o.on_frame = [&](const View& v) { joined = v.X_WB[0]; };
+  (void)run(m, o);
+  Event e;
+  e.time = 0.25;
+  e.actions.resize(1);
+  e.actions[0].kind = Action::Kind::LoosenJoint;
+  e.actions[0].joint = {0};
+  m.events.push_back(e);
+  o.on_frame = [&](const View& v) { loose = v.X_WB[0], energy = v.energy; };
+  const Summary s = run(m, o);
+  EXPECT_GT(std::abs(joined.p.z), 0.01);
+  EXPECT_NEAR(norm(loose.p - joined.p), 0, 2e-5);
+  EXPECT_LT(s.energy_error, 1e-4);
+  EXPECT_GT(energy.elastic, 0.01);
+}
+
+TEST(LoosenJoint, OneThatTurnsFreelyStaysAJoint) {
+  Model m = make_falling_block();
+  m.laws[0].moment_z = test::plastic_hinge(1).moment_z;
+  m.laws[0].rupture_rotation = 1e-9;
+  m.bodies[1].w_WB = m.bodies[0].w_WB = {};
+  m.bodies[1].w_WB.y = 0.01;  // breaks the hinge before the event
+  m.bodies[1].v_WB.x = 0.005;
+  Options o = options_of(0.1, 1e-4);
+  bool released = true;
+  double drift = 0;
+  o.on_frame = [&](const View& v) {
+    released = v.joint_released[0];
+    drift = norm(v.X_WB[0].p + to_matrix(v.X_WB[0].q) * Vec3{0, 0, kStub / 2} - v.X_WB[1].p -
+                 to_matrix(v.X_WB[1].q) * Vec3{0, 0, -0.5});
+  };
+  (void)run(m, o);
+  EXPECT_FALSE(released);
+  EXPECT_LT(drift, 1e-9);
+}
+
+TEST(LoosenJoint, AReleaseAfterwardsEndsTheElement) {
+  Model m = make_falling_block();
+  Event e;
+  e.time = 0.1;
+  e.actions.resize(1);
+  e.actions[0].kind = Action::Kind::ReleaseJoint;
+  e.actions[0].joint = {0};
+  m.events.push_back(e);
+  Options o = options_of(0.2, 1e-4);
+  bool released = false;
+  ElementState state = ElementState::Elastic;
+  o.on_frame = [&](const View& v) { released = v.joint_released[0], state = v.element_state[0]; };
+  (void)run(m, o);
+  EXPECT_TRUE(released);
+  EXPECT_EQ(state, ElementState::Removed);
+}
+
+TEST(LoosenJointReplay, GoesOnFromASnapshotWithTheSameBits) {
+  const Model m = make_falling_block();
+  Options o;
+  o.equilibrium = false;
+  o.step = 1e-4;
+  Simulation whole(m, o), other(m, o);
+  std::vector<std::vector<std::byte>> kept;
+  for (int i = 0; i < 6000; ++i) {
+    if (i == 600 || i == 5000) kept.push_back(whole.snapshot());  // loose in flight, and while it is crushed
+    ASSERT_TRUE(whole.advance_step());
+  }
+  const std::uint64_t end = hash_of(whole.calc_view());
+  for (size_t k = 0; k < 2; ++k) {
+    other.restore(kept[k]);
+    for (int i = k == 0 ? 600 : 5000; i < 6000; ++i) ASSERT_TRUE(other.advance_step());
+    EXPECT_EQ(hash_of(other.calc_view()), end) << k;
+  }
+}
+
+}  // namespace
+}  // namespace topple::mbs
