@@ -147,6 +147,9 @@ struct Builder : BuilderState {
   Bending bending_of_x_beam() const { return condensation ? Bending::Y : Bending::Both; }
   /// Law of a rotational element: bending about the hinge axis is that about z of its frame.
   mbs::LawId hinge_law_of(int zone, const Stiffness&, const std::string& name);
+  ///   length  of the stub [m]
+  mbs::LawId stub_law_of(int zone, const Stiffness&, int member, double length);
+  void make_stub(const product::Charge&, const MemberZones&, mbs::Event& event, mbs::Event& lighter);
   Pose frame_in(int body, const Vec3& p_W, const Mat3& R_WF) const;
   mbs::ElementId add_element(const std::string& name, int member, int a, int b, const Vec3& p_W, const Mat3& R_WF,
                              const Vec3& translational, const Vec3& rotational, std::vector<mbs::Station> stations);

@@ -20,6 +20,24 @@ constexpr double kLeastStiffnessShare = 1e-3;  // of a fired zone, so that its f
 using product::Member;
 using product::MemberKind;
 
+/// What is above a charge in a column of the ground storey becomes a stub under its joint: whatever it meets can crush
+/// it, shear it off or turn it.
+void Builder::make_stub(const product::Charge& c, const MemberZones& z, mbs::Event& event, mbs::Event& lighter) {
+  const MemberStation& top = z.station[1];
+  const double length = z.clear_length - (c.position + 0.5 * c.destroyed_length);
+  if (!(length > 0)) return;
+  mbs::Action act;
+  act.kind = mbs::Action::Kind::SwitchLaw;
+  act.rotational = z.rotational;
+  act.ramp = k.charge_release_time;
+  act.law = stub_law_of(top.damaged >= 0 ? top.damaged : top.zone, calc_stiffness(z), c.member, length);
+  event.actions.push_back(act);
+  act = {};
+  act.kind = mbs::Action::Kind::LoosenJoint;
+  act.joint = model.rotational_elements[static_cast<size_t>(z.rotational)].joint;
+  lighter.actions.push_back(std::move(act));
+}
+
 void Builder::add_events(std::vector<Firing> schedule) {
   map.schedule = std::move(schedule);
   for (size_t s = 0; s < plan.stages.size(); ++s)
@@ -134,15 +152,9 @@ void Builder::add_events(std::vector<Firing> schedule) {
         act.ramp = k.charge_release_time;
         act.law = law_of(station.damaged, calc_stiffness(z), m.name + "/transition");
         event.actions.push_back(act);
-      } else if (z.rotational >= 0) {
-        mbs::Action act;
-        act.kind = mbs::Action::Kind::SwitchLaw;
-        act.rotational = z.rotational;
-        act.ramp = k.charge_release_time;
-        act.law = hinge_law_of(station.damaged, calc_stiffness(z), m.name + "/transition");
-        event.actions.push_back(act);
       }
     }
+    if (z.rotational >= 0) make_stub(c, z, event, lighter);
     model.events.push_back(std::move(event));
     map.events.push_back(entry);
     if (lighter.actions.empty()) continue;

@@ -284,6 +284,8 @@ class Condenser {
       const double n = counts[static_cast<size_t>(r.joint.index)];
       rotational_count_.push_back(n);
       r.stiffness *= n;
+      r.loose_translational *= n;
+      r.loose_torsion *= n, r.loose_bending *= n;
       r.law = law_of(r.law, n);
       ZoneEntry& entry = b_.map.rotationals[i];
       entry.body_a = model_.joints[static_cast<size_t>(r.joint.index)].parent.index;

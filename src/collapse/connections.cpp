@@ -179,7 +179,25 @@ mbs::LawId Builder::hinge_law_of(int zone, const Stiffness& s, const std::string
   const auto key = std::make_tuple(zone, s.EI_y, s.EI_z, name);
   if (const auto it = hinge_laws.find(key); it != hinge_laws.end()) return it->second;
   mbs::ZoneLaw law = make_law(zone, s, name, bending_of_column());
-  if (!hinge_about_y) law.moment_z = law.moment_y;
+  if (!hinge_about_y) {
+    // y of the joint is -z of the column, its z is y of the column
+    std::swap(law.moment_y, law.moment_z);
+    std::swap(law.moment_y.positive, law.moment_y.negative);
+    std::swap(law.moment_y.elongation_positive, law.moment_y.elongation_negative);
+    std::swap(law.shear_y, law.shear_z);
+  }
+  return hinge_laws[key] = mbs::add_law(model, law);
+}
+
+mbs::LawId Builder::stub_law_of(int zone, const Stiffness& s, int index, double length) {
+  const std::string name = member(index).name + "/stub";
+  const auto key = std::make_tuple(zone, s.EI_y, s.EI_z, name + std::to_string(length));
+  if (const auto it = hinge_laws.find(key); it != hinge_laws.end()) return it->second;
+  mbs::ZoneLaw law = model.laws[static_cast<size_t>(hinge_law_of(zone, s, member(index).name + "/top").index)];
+  law.name = name;
+  // crushing goes on until nothing of it is left, and it is off its joint when it has slid by its own thickness
+  law.crush_length = length;
+  law.slip_rupture = std::max(law.slip_rupture, std::min(section_of(index).width, section_of(index).height));
   return hinge_laws[key] = mbs::add_law(model, law);
 }
 
@@ -270,6 +288,10 @@ void Builder::connect_ground_column(const GridPoint& at, int index) {
   hinge.damping_ratio = k.zone_damping_ratio;
   hinge.law = law_id;
   hinge.axial_element = mbs::ElementId{z.element[0]};
+  // a charge makes a stub of the column, which whatever it meets can crush, shear and turn: as soft as the foot
+  hinge.loose_translational = {s.EA / L, s.GA / L, s.GA / L};
+  hinge.loose_torsion = s.GJ / L;
+  hinge.loose_bending = 6 * (hinge_about_y ? s.EI_y : s.EI_z) / L;
   z.rotational = static_cast<int>(model.rotational_elements.size());
   model.rotational_elements.push_back(hinge);
   map.ground_columns.push_back({m.name, m.start, top, false, z.normal_force, hinge});

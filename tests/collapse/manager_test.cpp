@@ -216,7 +216,7 @@ TEST(Manager, AChargeRemovesItsLengthFromTheShaft) {
   EXPECT_LT(limits.stiffness_share, 0.1);  // bars alone, over the destroyed length
   EXPECT_NEAR(gone.time, fired.time + limits.ramp, 1e-12);
   EXPECT_TRUE(b.map.events[1].is_aftermath);
-  ASSERT_EQ(gone.actions.size(), 1u);
+  ASSERT_EQ(gone.actions.size(), 2u);
   const mbs::Action& lighter = gone.actions[0];
   EXPECT_EQ(lighter.kind, mbs::Action::Kind::ReplaceBody);
   // 1 m of a column of 0.3 x 0.4 m goes, half of it from the stump
@@ -226,6 +226,39 @@ TEST(Manager, AChargeRemovesItsLengthFromTheShaft) {
   EXPECT_NEAR(shaft.mass - lighter.replacement.mass, 0.5 * per_metre, 1e-6);
   // what is left reaches from 1.5 m to the underside of the beam at 2.5 m: its centre rises by a quarter of a metre
   EXPECT_NEAR(lighter.replacement.X_WB.p.z, 0.25, 1e-9);
+  // and hangs as a stub that can be crushed from then on, over all its length
+  const mbs::Action &stub = fired.actions[1], &loosen = gone.actions[1];
+  EXPECT_EQ(stub.kind, mbs::Action::Kind::SwitchLaw);
+  EXPECT_EQ(loosen.kind, mbs::Action::Kind::LoosenJoint);
+  const mbs::RotationalElement& top = b.model.rotational_elements[static_cast<size_t>(stub.rotational)];
+  EXPECT_EQ(top.name, "C-A1-0/top");
+  EXPECT_EQ(top.joint, loosen.joint);
+  const mbs::ZoneLaw &now = b.model.laws[static_cast<size_t>(stub.law.index)],
+                     &before = b.model.laws[static_cast<size_t>(top.law.index)];
+  EXPECT_NEAR(now.crush_length, 1, 1e-9);
+  EXPECT_NEAR(now.slip_rupture, 0.3, 1e-9);
+  EXPECT_EQ(now.compression.f, before.compression.f);
+  EXPECT_EQ(now.moment_z.positive, before.moment_z.positive);
+  // as stiff as the foot
+  const mbs::ZoneElement& foot = b.model.elements[static_cast<size_t>(limits.element.index)];
+  EXPECT_EQ(top.loose_translational.x, foot.translational_stiffness.x);
+}
+
+TEST(ManagerPhysics, AStubIsCrushedByWhatComesDownOnIt) {
+  // the house tilts over row A, whose stubs of 1 m reach the ground at 0.71 s: they do not prop it up
+  const product::Plan plan = read(house(charge("C-A*-0", "0.1 s"), "1.1 s"));
+  double landing[2];
+  for (const double step : {0.0, 1.5e-4}) {
+    RunOptions o;
+    o.step = step;
+    const record::Record r = run_plan(plan, default_knowledge(), o, {});
+    const auto at = std::find_if(r.events.begin(), r.events.end(),
+                                 [](const record::Event& e) { return e.kind == "touchdown" && e.subject == "N-A2-0"; });
+    ASSERT_NE(at, r.events.end()) << step;
+    landing[step > 0] = at->time;
+  }
+  EXPECT_LT(landing[0], 1);  // propped up until 1.5 s by a rigid one
+  EXPECT_NEAR(landing[0], landing[1], 0.01);
 }
 
 TEST(Manager, AFailingChargeDoesNothing) {

@@ -172,7 +172,7 @@ TEST(ShaftPhysics, ItFallsAsARigidBodyAboutItsHinge) {
 TEST(ShaftPhysics, TheMomentInTheFallingShaftIsLargestAtAThirdOfItsHeight) {
   Built b(tower(slender + strong + "joint_spacing = \"2.5 m\"\n", mouth("4 m", "270 deg"), "8 s"));
   const Fall f = fall(b.model, 8, 0.005);
-  ASSERT_GT(f.angle.back(), 0.5) << "it does not fall";
+  ASSERT_GT(*std::max_element(f.angle.begin(), f.angle.end()), 0.65) << "it does not fall";
   // A rod that turns about a pivot b behind its axis: what gravity and its acceleration leave across the axis,
   //   q = mu (g sin a + b a'^2 - s a''),   a'' = g (L/2 sin a + b cos a) / (L^2/3 + b^2 + k^2)
   // bends it at x = s/L by M = m L ((g sin a + b a'^2) (1-x)^2 / 2 - L a'' (x (1-x)^2 / 2 + (1-x)^3 / 3)), less the
