@@ -99,7 +99,7 @@ void visit(Archive& ar, S& s, C& sys) {
   ar(sys.ground_reaction), ar(sys.ground_contact), ar(sys.body_contacts);
 }
 
-constexpr std::uint64_t kMagic = 0x36534e41504f54ULL;  // "TOPANS6"
+constexpr std::uint64_t kMagic = 0x37534e41504f54ULL;  // "TOPANS7"
 
 /// What of the system's scratch the next step takes over, under the same names.
 struct Carried {
