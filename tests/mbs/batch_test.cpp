@@ -5,10 +5,12 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <cmath>
 #include <map>
 #include <mutex>
 
 #include "base/error.h"
+#include "mbs/lanes.h"
 #include "models.h"
 
 namespace topple::mbs {
@@ -83,6 +85,64 @@ TEST(Batch, SampleHasTheBitsOfItsRunAlone) {
       EXPECT_EQ(said, happenings);
     }
   }
+}
+
+TEST(Batch, ElementsThatHoldInOneSampleAloneStayInTheSums) {
+  // one element is cut in all samples, another one in all but the third
+  Model base = test::make_tower();
+  Event second = base.events[0];
+  second.name = "second";
+  second.time = 0.12;
+  second.actions[0].element = {3};
+  base.events.push_back(second);
+  std::vector<Variation> variations;
+  for (int i = 0; i < 4; ++i)
+    variations.push_back([i](Model& m) {
+      m.bodies[1].mass *= 1 + 0.01 * i;
+      if (i == 2) m.events[1].time = 10;
+    });
+  std::vector<std::uint64_t> alone(4), together(4);
+  Options run_options = make_options();
+  run_options.duration = 0.3;
+  for (size_t i = 0; i < 4; ++i) {
+    Model m = base;
+    variations[i](m);
+    Options o = run_options;
+    o.on_frame = [&](const View& v) { alone[i] = test::hash_of(v); };
+    (void)run(m, o);
+  }
+  BatchOptions o;
+  o.run = run_options;
+  o.on_frame = [&](size_t i, const View& v) { together[i] = test::hash_of(v); };
+  (void)run_batch(base, variations, o);
+  EXPECT_EQ(together, alone);
+}
+
+TEST(Batch, ConstantsAreSharedAgainAndStayWhatTheyAre) {
+  Lanes l;
+  l.W = 4;
+  l.is_batch = true;
+  l.allocate_elements(200);
+  for (size_t slot = 0; slot < 800; ++slot) l.clear_slot(slot);
+  l.share_constants();
+  const size_t few = l.uses.size();
+  const auto value = [](size_t slot, int f) { return static_cast<double>((slot % 4 + 1) * static_cast<size_t>(f)); };
+  // every change of one lane makes a vector of its own, until there are many
+  for (size_t slot = 0; slot < 800; ++slot)
+    for (const int f : {kernel::kMarkerA, kernel::kStiffness, kernel::kShearScale}) l.set(slot, f, value(slot, f));
+  const size_t many = l.uses.size();
+  EXPECT_GE(many, 600U);
+  l.share_again();
+  EXPECT_LE(l.uses.size(), few + 3);
+  for (size_t slot = 0; slot < 800; ++slot)
+    for (const int f : {kernel::kMarkerA, kernel::kStiffness, kernel::kShearScale})
+      EXPECT_EQ(l.field(slot, f), value(slot, f));
+  // what was broken has neither stiffness nor bounds, and keeps its markers
+  l.still_slot(5);
+  EXPECT_EQ(l.field(5, kernel::kStiffness), 0);
+  EXPECT_EQ(l.field(5, kernel::kMarkerA), value(5, kernel::kMarkerA));
+  EXPECT_EQ(l.field(4, kernel::kStiffness), value(4, kernel::kStiffness));
+  EXPECT_TRUE(std::isinf(l.field(5, kernel::kMostTurn)));
 }
 
 TEST(Batch, SampleThatEndsEarlyDisturbsNoOther) {
