@@ -92,7 +92,7 @@ TEST(Batch, ElementsThatHoldInOneSampleAloneStayInTheSums) {
   Model base = test::make_tower();
   Event second = base.events[0];
   second.name = "second";
-  second.time = 0.12;
+  second.time = 0.08;  // before the first, after which sums are made anew
   second.actions[0].element = {3};
   base.events.push_back(second);
   std::vector<Variation> variations;
