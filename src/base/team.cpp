@@ -25,12 +25,17 @@ void pause() {
 #endif
 }
 
-/// Looks until is_done() for about a tenth of a millisecond.
+/// Looks until is_done() for about a millisecond, after a tenth of it only while no other thread wants the processor.
+/// Who slept at once would be woken on the processor of who calls where all others are taken, and get none.
 template <class Done>
 bool look(const Done& is_done) {
   for (int i = 0; i < 2500; ++i) {
     if (is_done()) return true;
     pause();
+  }
+  for (int i = 0; i < 2500; ++i) {
+    if (is_done()) return true;
+    std::this_thread::yield();
   }
   return false;
 }

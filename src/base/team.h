@@ -7,7 +7,7 @@
 
 namespace topple {
 
-/// Between loops its threads look for work for a tenth of a millisecond, then sleep.
+/// Between loops its threads look for work for about a millisecond, then sleep.
 class Team {
  public:
   /// `threads` with the one that calls run (0: all of the machine).
