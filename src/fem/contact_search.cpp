@@ -217,17 +217,25 @@ class Search {
   /// Pairs of particles that have come since boxes were made: those of the others hold as long as they do.
   void add_particles() {
     ContactState& c = s_.contact;
-    for (auto a = static_cast<std::uint32_t>(c.boxes.size()); a < groups_ + s_.particles.size(); ++a) {
+    const auto first = static_cast<std::uint32_t>(c.boxes.size());
+    const auto end = static_cast<std::uint32_t>(groups_ + s_.particles.size());
+    for (std::uint32_t a = first; a < end; ++a) {
       c.room.push_back(calc_room(a));
       c.boxes.push_back(make_box(a, c.room.back()));
-      for (std::uint32_t b = 0; b < a; ++b) {
-        if (!c.boxes[a].meets(c.boxes[b])) continue;
+    }
+    std::vector<std::vector<std::uint32_t>> met(end - first);
+    for_all(met.size(), 1, team_, [&](size_t i) {
+      const auto a = static_cast<std::uint32_t>(first + i);
+      for (std::uint32_t b = 0; b < a; ++b)
+        if (c.boxes[a].meets(c.boxes[b])) met[i].push_back(b);
+    });
+    for (std::uint32_t a = first; a < end; ++a)
+      for (const std::uint32_t b : met[a - first]) {
         if (b >= groups_)
           c.particle_pairs.push_back({a - groups_, b - groups_});
         else
           c.pairs.push_back({a, b, -1, {}});
       }
-    }
   }
 
   /// What may touch within `ahead`, at twice the present speeds and a share of the margin for impacts in between.
