@@ -360,7 +360,7 @@ void limit_frequency(mbs::Model& model, double highest) {
     for (int i = 0; i < 3; ++i) sum += R(axis, i) * R(axis, i) * k[i];
     return sum;
   };
-  const auto fast = [](const mbs::ZoneElement& e) { return 1 + 4 * e.damping_ratio / (1 - 2 * e.damping_ratio); };
+  const auto fast = [](const auto& e) { return 1 + 4 * e.damping_ratio / (1 - 2 * e.damping_ratio); };
   const double most = 0.5 * highest * highest;  // of stiffnesses over a mass
 
   // along the frames beams are far stiffer than anything else: the stiffest springs of a body are cut to one common
@@ -404,17 +404,31 @@ void limit_frequency(mbs::Model& model, double highest) {
   for (const mbs::RotationalElement& r : model.rotational_elements) {
     const mbs::Joint& j = model.joints[static_cast<size_t>(r.joint.index)];
     for (const int b : {j.parent.index, j.child.index})
-      if (is_free(b))
-        turn[static_cast<size_t>(b)] += r.stiffness * (1 + 4 * r.damping_ratio / (1 - 2 * r.damping_ratio));
+      if (is_free(b)) turn[static_cast<size_t>(b)] += fast(r) * r.stiffness;
   }
-  const auto raise = [&](mbs::Body& body, size_t b) {
-    body.inertia(1, 1) = std::max(body.inertia(1, 1), turn[b] / most);
+  const auto raise = [&](mbs::Body& body, double stiffness) {
+    body.inertia(1, 1) = std::max(body.inertia(1, 1), stiffness / most);
   };
   for (size_t b = 0; b < B; ++b)
-    if (!model.bodies[b].fixed) raise(model.bodies[b], b);
+    if (!model.bodies[b].fixed) raise(model.bodies[b], turn[b]);
+  // a stub swings on what its joint becomes
   for (mbs::Event& event : model.events)
-    for (mbs::Action& a : event.actions)
-      if (a.kind == mbs::Action::Kind::ReplaceBody) raise(a.replacement, static_cast<size_t>(a.body.index));
+    for (mbs::Action& a : event.actions) {
+      if (a.kind != mbs::Action::Kind::ReplaceBody) continue;
+      const size_t b = static_cast<size_t>(a.body.index);
+      double stub = 0;
+      for (mbs::RotationalElement& r : model.rotational_elements) {
+        const mbs::Joint& j = model.joints[static_cast<size_t>(r.joint.index)];
+        if (!(j.parent == a.body) || !can_be_loosened(r)) continue;
+        const Mat3 R = to_matrix(model.bodies[b].X_WB.q * j.X_PF.q);
+        const Vec3 lever = j.X_PF.p - a.replacement.X_WB.p;
+        for (int i = 0; i < 3; ++i)
+          r.loose_translational[i] = std::min(r.loose_translational[i], most * a.replacement.mass / fast(r));
+        stub += fast(r) * (along(R, r.loose_translational, 0) * lever.z * lever.z +
+                           along(R, r.loose_translational, 2) * lever.x * lever.x);
+      }
+      raise(a.replacement, turn[b] + stub);
+    }
 }
 
 }  // namespace

@@ -139,6 +139,17 @@ TEST(CondensePhysics, FrequencyIsCutWhereItIsAskedFor) {
   EXPECT_GT(frequency(0), 4000);
   // the bound looks at shifts and turns by themselves; both together may swing up to √2 above it
   EXPECT_LT(frequency(2000), 1.42 * 2000);
+  // and the stubs that the first charges leave are as slow
+  for (const double highest : {0.0, 2000.0}) {
+    ModelMap map;
+    mbs::Options o;
+    o.duration = 0.03;
+    const mbs::Summary s = mbs::run(condense(plan, map, highest), o);
+    if (highest == 0)
+      EXPECT_GT(s.highest_frequency, 5000);
+    else
+      EXPECT_LT(s.highest_frequency, 1.42 * 2000);
+  }
 }
 
 }  // namespace
