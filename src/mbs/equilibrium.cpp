@@ -74,18 +74,19 @@ class PairMatrix {
       std::sort(list.begin(), list.end());
       list.erase(std::unique(list.begin(), list.end()), list.end());
     }
-    matrix_.resize(each * bodies, each * bodies);
+    const int columns = each * bodies;
+    matrix_.resize(columns, columns);
     size_t count = 0;
     for (const std::vector<int>& list : near_) count += list.size() * static_cast<size_t>(each * each);
     matrix_.resizeNonZeros(static_cast<Eigen::Index>(count));
     int* outer = matrix_.outerIndexPtr();
     int at = 0;
-    for (int column = 0; column < each * bodies; ++column) {
+    for (int column = 0; column < columns; ++column) {
       outer[column] = at;
       for (const int row : near_[static_cast<size_t>(column / each)])
         for (int m = 0; m < each; ++m) matrix_.innerIndexPtr()[at++] = u_.at(row, m);
     }
-    outer[each * bodies] = at;
+    outer[columns] = at;
     std::fill_n(matrix_.valuePtr(), count, 0.0);
   }
   void add(int a, int b, const Block& sum) {
@@ -103,7 +104,11 @@ class PairMatrix {
       }
     }
   }
-  Sparse take() { return std::move(matrix_); }
+  Sparse take() {
+    Sparse taken;
+    taken.swap(matrix_);
+    return taken;
+  }
   /// Times a vector, in the order in which Sparse sums.
   void times(const Vector& x, Vector& y) const { u_.each == 6 ? times_by<6>(x, y) : times_by<3>(x, y); }
 
@@ -118,7 +123,7 @@ class PairMatrix {
       const double* from = x.data() + Each * j;
       for (const int i : list) {
         double sum[Each];
-        double* to = y.data() + Each * i;
+        double* to = y.data() + Eigen::Index{Each} * i;
         for (int m = 0; m < Each; ++m) sum[m] = to[m];
         for (size_t n = 0; n < Each; ++n)
           for (size_t m = 0; m < Each; ++m) sum[m] += block[n * stride + m] * from[n];
@@ -493,8 +498,11 @@ double DeadLoad::calc_weight() const {
 
 bool DeadLoad::factorise(std::string& message) {
   const int n = assembly_.count();
-  Sparse K = first_.rows() > 0 ? std::move(first_) : assembly_.make_stiffness(false, weight_).take();
-  first_.resize(0, 0);
+  Sparse K;
+  if (first_.rows() > 0)
+    K.swap(first_);
+  else
+    K = assembly_.make_stiffness(false, weight_).take();
   if (!s_.joints.empty()) {
     Triplets t;
     for (const CompiledJoint& j : s_.joints) {
