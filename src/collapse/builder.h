@@ -146,6 +146,7 @@ struct Builder : BuilderState {
   Bending bending_of_column() const { return condensation ? Bending::Z : Bending::Both; }
   Bending bending_of_x_beam() const { return condensation ? Bending::Y : Bending::Both; }
   /// Law of a rotational element: bending about the hinge axis is that about z of its frame.
+  mbs::ZoneLaw make_hinge_law(int zone, const Stiffness&, const std::string& name);
   mbs::LawId hinge_law_of(int zone, const Stiffness&, const std::string& name);
   ///   length  of the stub [m]
   mbs::LawId stub_law_of(int zone, const Stiffness&, int member, double length);

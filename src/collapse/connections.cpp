@@ -175,9 +175,7 @@ mbs::LawId Builder::law_of(int zone, const Stiffness& s, const std::string& name
   return id;
 }
 
-mbs::LawId Builder::hinge_law_of(int zone, const Stiffness& s, const std::string& name) {
-  const auto key = std::make_tuple(zone, s.EI_y, s.EI_z, name);
-  if (const auto it = hinge_laws.find(key); it != hinge_laws.end()) return it->second;
+mbs::ZoneLaw Builder::make_hinge_law(int zone, const Stiffness& s, const std::string& name) {
   mbs::ZoneLaw law = make_law(zone, s, name, bending_of_column());
   if (!hinge_about_y) {
     // y of the joint is -z of the column, its z is y of the column
@@ -186,15 +184,20 @@ mbs::LawId Builder::hinge_law_of(int zone, const Stiffness& s, const std::string
     std::swap(law.moment_y.elongation_positive, law.moment_y.elongation_negative);
     std::swap(law.shear_y, law.shear_z);
   }
-  return hinge_laws[key] = mbs::add_law(model, law);
+  return law;
+}
+
+mbs::LawId Builder::hinge_law_of(int zone, const Stiffness& s, const std::string& name) {
+  const auto key = std::make_tuple(zone, s.EI_y, s.EI_z, name);
+  if (const auto it = hinge_laws.find(key); it != hinge_laws.end()) return it->second;
+  return hinge_laws[key] = mbs::add_law(model, make_hinge_law(zone, s, name));
 }
 
 mbs::LawId Builder::stub_law_of(int zone, const Stiffness& s, int index, double length) {
-  const std::string name = member(index).name + "/stub";
-  const auto key = std::make_tuple(zone, s.EI_y, s.EI_z, name + std::to_string(length));
+  const std::string name = "stub of " + std::to_string(length) + " m";  // of all columns alike
+  const auto key = std::make_tuple(zone, s.EI_y, s.EI_z, name);
   if (const auto it = hinge_laws.find(key); it != hinge_laws.end()) return it->second;
-  mbs::ZoneLaw law = model.laws[static_cast<size_t>(hinge_law_of(zone, s, member(index).name + "/top").index)];
-  law.name = name;
+  mbs::ZoneLaw law = make_hinge_law(zone, s, name);
   // crushing goes on until nothing of it is left, and it is off its joint when it has slid by its own thickness
   law.crush_length = length;
   law.slip_rupture = std::max(law.slip_rupture, std::min(section_of(index).width, section_of(index).height));

@@ -260,34 +260,33 @@ void Forces::calc(double time, const Motion& motion, std::vector<Wrench>& on) co
   const Vec3 ground_before = on_ground_;
   // a history that has begun goes on from its damper's state even if no time has passed
   const double h = std::max(time - accepted_, std::numeric_limits<double>::min());
-  for (size_t i = 0; i < zone_.size(); ++i) {
-    if (!zone_[i].state.live) continue;
-    const mbs::ZoneElement& e = model_.elements[i];
-    const Six s = calc_six(motion, e.a, e.X_AF, e.b, e.X_BM, {});
-    mbs::ZoneParameters p = zone_[i].parameters;
+  const auto try_zone = [&](const Zone& z, const mbs::Six& d) {
+    mbs::ZoneParameters p = z.parameters;
     prepare(p, time - accepted_);
-    mbs::ZoneState trial = zone_[i].state;
-    mbs::advance_zone(p, lasting_laws_, s.deformation, time, h, trial);
-    push_six(motion, e.a, e.b, s, trial.resultant.c, on);
+    mbs::ZoneState trial = z.state;
+    mbs::advance_zone(p, lasting_laws_, d, time, h, trial);
+    return trial.resultant;
+  };
+  const auto push_zone = [&](const Zone& z, mbs::BodyId a, const Pose& X_AF, mbs::BodyId b, const Pose& X_BM) {
+    const Six s = calc_six(motion, a, X_AF, b, X_BM, {});
+    push_six(motion, a, b, s, try_zone(z, s.deformation).c, on);
+  };
+  for (size_t i = 0; i < zone_.size(); ++i) {
+    const mbs::ZoneElement& e = model_.elements[i];
+    if (zone_[i].state.live) push_zone(zone_[i], e.a, e.X_AF, e.b, e.X_BM);
   }
   for (size_t i = 0; i < rotational_.size(); ++i) {
     if (!rotational_[i].state.live) continue;
     const mbs::RotationalElement& r = model_.rotational_elements[i];
     const mbs::Joint& j = model_.joints[static_cast<size_t>(r.joint.index)];
-    mbs::ZoneParameters p = rotational_[i].parameters;
-    prepare(p, time - accepted_);
-    mbs::ZoneState trial = rotational_[i].state;
     if (rotational_[i].is_loose) {
-      const Six s = calc_six(motion, j.parent, j.X_PF, j.child, j.X_CM, {});
-      mbs::advance_zone(p, lasting_laws_, s.deformation, time, h, trial);
-      push_six(motion, j.parent, j.child, s, trial.resultant.c, on);
+      push_zone(rotational_[i], j.parent, j.X_PF, j.child, j.X_CM);
       continue;
     }
     mbs::Six d;
     d.c[0] = rotational_[i].axial_force;
     d.c[5] = angle_of(motion, r.joint, rotational_[i].angle);
-    mbs::advance_zone(p, lasting_laws_, d, time, h, trial);
-    const Vec3 torque = trial.resultant.c[5] * axis_of(motion, r.joint);
+    const Vec3 torque = try_zone(rotational_[i], d).c[5] * axis_of(motion, r.joint);
     twist(j.child, -torque, on);
     twist(j.parent, torque, on);
   }
@@ -402,16 +401,21 @@ bool Forces::advance(double time, const Motion& motion, const std::vector<Vec3>&
     say_({Happening::Kind::ElementBroken, time, static_cast<int>(index), -1, words[static_cast<int>(z.state.reason)],
           0});
   };
-  for (size_t i = 0; i < zone_.size(); ++i) {
-    Zone& z = zone_[i];
-    if (!z.state.live) continue;
-    const mbs::ZoneElement& e = model_.elements[i];
-    const Six s = calc_six(motion, e.a, e.X_AF, e.b, e.X_BM, {});
+  const auto advance = [&](Zone& z, size_t index, const mbs::Six& d) {
     const bool was_yielded = z.state.yielded;
     prepare(z.parameters, h);
-    mbs::advance_zone(z.parameters, laws_, s.deformation, time, h, z.state);
-    tell(z, was_yielded, i);
-    if (z.state.live) push_six(motion, e.a, e.b, s, z.state.resultant.c, cached_);
+    mbs::advance_zone(z.parameters, laws_, d, time, h, z.state);
+    tell(z, was_yielded, index);
+  };
+  const auto advance_six = [&](Zone& z, size_t index, mbs::BodyId a, const Pose& X_AF, mbs::BodyId b,
+                               const Pose& X_BM) {
+    const Six s = calc_six(motion, a, X_AF, b, X_BM, {});
+    advance(z, index, s.deformation);
+    if (z.state.live) push_six(motion, a, b, s, z.state.resultant.c, cached_);
+  };
+  for (size_t i = 0; i < zone_.size(); ++i) {
+    const mbs::ZoneElement& e = model_.elements[i];
+    if (zone_[i].state.live) advance_six(zone_[i], i, e.a, e.X_AF, e.b, e.X_BM);
   }
   for (size_t i = 0; i < rotational_.size(); ++i) {
     Zone& z = rotational_[i];
@@ -419,24 +423,16 @@ bool Forces::advance(double time, const Motion& motion, const std::vector<Vec3>&
     const mbs::RotationalElement& r = model_.rotational_elements[i];
     const mbs::Joint& j = model_.joints[static_cast<size_t>(r.joint.index)];
     if (z.is_loose) {
-      const Six s = calc_six(motion, j.parent, j.X_PF, j.child, j.X_CM, {});
-      const bool was_yielded = z.state.yielded;
-      prepare(z.parameters, h);
-      mbs::advance_zone(z.parameters, laws_, s.deformation, time, h, z.state);
-      tell(z, was_yielded, zone_.size() + i);
-      if (z.state.live) push_six(motion, j.parent, j.child, s, z.state.resultant.c, cached_);
+      advance_six(z, zone_.size() + i, j.parent, j.X_PF, j.child, j.X_CM);
       continue;
     }
     if (!joint_force.empty()) z.axial_force = -joint_force[static_cast<size_t>(r.joint.index)].x;
     z.angle = angle_of(motion, r.joint, z.angle);
-    const bool was_yielded = z.state.yielded;
     const double elongated = z.state.axial;
-    prepare(z.parameters, h);
     mbs::Six d;
     d.c[0] = z.axial_force;
     d.c[5] = z.angle;
-    mbs::advance_zone(z.parameters, laws_, d, time, h, z.state);
-    tell(z, was_yielded, zone_.size() + i);
+    advance(z, zone_.size() + i, d);
     if (r.axial_element.is_valid() && h > 0) {
       Zone& along = zone_[static_cast<size_t>(r.axial_element.index)];
       mbs::elongate_zone(along.parameters, z.state.axial - elongated, along.state);

@@ -244,7 +244,7 @@ class Assembly {
         const CompiledRotational& r = s_.rotationals[i];
         const CompiledJoint& j = s_.joints[static_cast<size_t>(r.joint)];
         const double factor = fast ? 1 + r.zone.viscous : 1;
-        if (!s_.is_loose(r)) {
+        if (!s_.is_loose(i)) {
           f(rotational_row(j), factor * r.zone.stiffness[5]);
           continue;
         }

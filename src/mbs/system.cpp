@@ -318,7 +318,7 @@ void System::evaluate_rotationals(double h) {
     const CompiledRotational& c = rotationals[i];
     const CompiledJoint& j = joints[static_cast<size_t>(c.joint)];
     const JointState& js = state.joint[static_cast<size_t>(c.joint)];
-    const bool loose = !js.live;
+    const bool loose = is_loose(i);
     FrameDeformation between;
     Vec3 axis;
     Six d;
@@ -331,11 +331,16 @@ void System::evaluate_rotationals(double h) {
       d.c[0] = -dot(R * j.R_PF.column(0), js.force);
       d.c[5] = js.angle;
     }
-    ZoneParameters zone = loose ? c.loose : c.zone;
-    if (ignores_limits) zone.stations = 0;
+    const ZoneParameters& zone = loose ? c.loose : c.zone;
     const bool was_yielded = z.yielded;
     const double elongated = z.axial;
-    advance_zone(zone, laws, d, state.time, h, z);
+    if (ignores_limits) {
+      ZoneParameters elastic = zone;
+      elastic.stations = 0;
+      advance_zone(elastic, laws, d, state.time, h, z);
+    } else {
+      advance_zone(zone, laws, d, state.time, h, z);
+    }
     if (z.yielded && !was_yielded)
       say({Happening::Kind::ElementYielded, state.time, static_cast<int>(elements.size() + i), -1, {}, 0});
     if (!loose && c.axial_element >= 0 && h > 0 && z.axial != elongated)
@@ -759,8 +764,7 @@ const View& System::calc_view() {
     v.element_translation[i] = {z.deformation[0], z.deformation[1], z.deformation[2]};
     v.element_rotation[i] = {z.deformation[3], z.deformation[4], z.deformation[5]};
   }
-  for (size_t i = 0; i < R; ++i)
-    fill(E + i, is_loose(rotationals[i]) ? rotationals[i].loose : rotationals[i].zone, s.rotational[i]);
+  for (size_t i = 0; i < R; ++i) fill(E + i, is_loose(i) ? rotationals[i].loose : rotationals[i].zone, s.rotational[i]);
   v.joint_force.resize(joints.size());
   v.joint_moment.resize(joints.size());
   v.joint_released.resize(joints.size());
@@ -773,9 +777,9 @@ const View& System::calc_view() {
     v.joint_force[j] = transpose_times(F, reaction_force[j]);
     v.joint_moment[j] = transpose_times(F, reaction_moment[j]);
     v.joint_released[j] = !s.joint[j].live;
-    if (c.rotational >= 0 && is_loose(rotationals[static_cast<size_t>(c.rotational)])) {
+    if (const size_t r = static_cast<size_t>(c.rotational); c.rotational >= 0 && is_loose(r)) {
       // of a on b is minus the resultant
-      const double* f = s.rotational[static_cast<size_t>(c.rotational)].resultant.c;
+      const double* f = s.rotational[r].resultant.c;
       v.joint_force[j] = -Vec3{f[0], f[1], f[2]};
       v.joint_moment[j] = -Vec3{f[3], f[4], f[5]};
       v.joint_released[j] = false;

@@ -351,11 +351,12 @@ class System {
   void pack_body(size_t body);
   void evaluate_rotationals(double h);
   /// Whether a rotational element has taken over from its joint and still holds.
-  bool is_loose(const CompiledRotational& r) const {
-    return !state.joint[static_cast<size_t>(r.joint)].live &&
-           state.rotational[static_cast<size_t>(joints[static_cast<size_t>(r.joint)].rotational)].live;
+  bool is_loose(size_t rotational) const {
+    return !state.joint[static_cast<size_t>(rotationals[rotational].joint)].live && state.rotational[rotational].live;
   }
+  /// Lets the joint's rotational element take over; one whose element has broken stays a joint.
   void loosen_joint(size_t j);
+  /// Takes a joint out of the constraints.
   void drop_joint(size_t j);
   void evaluate_cables();
   void evaluate_contact(double h);

@@ -326,11 +326,7 @@ TEST(BodyContact, BeginsWhenTheLinkBetweenThemEnds) {
   e.X_BM.p = {0, 0, -0.65};
   e.translational_stiffness = {1, 1, 1};
   add_element(m, e);
-  Event cut;
-  cut.time = 0.2;
-  cut.actions.resize(1);
-  cut.actions[0].element = {0};
-  m.events.push_back(cut);
+  m.events.push_back(test::make_event(0.2, Action::Kind::RemoveElement, 0));
   double least = 1e9;
   Options o = free_options(0.3, 2e-4);
   o.on_frame = [&](const View& v) { least = std::min(least, norm(v.X_WB[1].p - v.X_WB[0].p)); };

@@ -532,11 +532,7 @@ TEST(CheckModel, RefusesAReplacementThatIsTurnedOrFixed) {
 
 TEST(CheckModel, RefusesToLoosenAJointThatNothingTakesOverFrom) {
   Model m = make_rod();
-  Event e;
-  e.actions.resize(1);
-  e.actions[0].kind = Action::Kind::LoosenJoint;
-  e.actions[0].joint = {0};
-  m.events = {e};
+  m.events = {test::make_event(0, Action::Kind::LoosenJoint, 0)};
   EXPECT_THAT(complaint_of([&] { check_model(m); }),
               HasSubstr("has no rotational element with loose_translational > 0"));
   RotationalElement r;

@@ -53,14 +53,7 @@ Model make_boxes(bool any_shapes) {
   tie.X_AF.p = {100, 3, 0.1};
   tie.translational_stiffness = tie.rotational_stiffness = {1e6, 1e6, 1e6};
   add_element(m, tie);
-  Event cut;
-  cut.name = "cut";
-  cut.time = 0.2;
-  Action a;
-  a.kind = Action::Kind::RemoveElement;
-  a.element = {0};
-  cut.actions.push_back(a);
-  m.events.push_back(cut);
+  m.events.push_back(test::make_event(0.2, Action::Kind::RemoveElement, 0, "cut"));
   return m;
 }
 

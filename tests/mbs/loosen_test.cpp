@@ -8,6 +8,7 @@ namespace {
 
 using test::hash_of;
 using test::make_box;
+using test::make_event;
 
 constexpr double kStubMass = 20, kBlockMass = 4000, kFall = 1, kStub = 0.5;  // [kg, kg, m, m]
 constexpr double kBears = 2e5;  // the stub, whatever it is shortened by [N]
@@ -38,13 +39,7 @@ Model make_falling_block(double crush_length = kUnlimited) {
   law.crush_length = crush_length;
   r.law = add_law(m, law);
   m.rotational_elements.push_back(r);
-  Event e;
-  e.time = 0.05;
-  e.name = "loosen";
-  e.actions.resize(1);
-  e.actions[0].kind = Action::Kind::LoosenJoint;
-  e.actions[0].joint = {0};
-  m.events.push_back(e);
+  m.events.push_back(make_event(0.05, Action::Kind::LoosenJoint, 0, "loosen"));
   return m;
 }
 
@@ -119,12 +114,7 @@ TEST(LoosenJoint, KeepsTheRotationAndWhatItStores) {
   Energy energy;
   o.on_frame = [&](const View& v) { joined = v.X_WB[0]; };
   (void)run(m, o);
-  Event e;
-  e.time = 0.25;
-  e.actions.resize(1);
-  e.actions[0].kind = Action::Kind::LoosenJoint;
-  e.actions[0].joint = {0};
-  m.events.push_back(e);
+  m.events.push_back(make_event(0.25, Action::Kind::LoosenJoint, 0));
   o.on_frame = [&](const View& v) { loose = v.X_WB[0], energy = v.energy; };
   const Summary s = run(m, o);
   EXPECT_GT(std::abs(joined.p.z), 0.01);
@@ -155,12 +145,7 @@ TEST(LoosenJoint, OneThatTurnsFreelyStaysAJoint) {
 
 TEST(LoosenJoint, AReleaseAfterwardsEndsTheElement) {
   Model m = make_falling_block();
-  Event e;
-  e.time = 0.1;
-  e.actions.resize(1);
-  e.actions[0].kind = Action::Kind::ReleaseJoint;
-  e.actions[0].joint = {0};
-  m.events.push_back(e);
+  m.events.push_back(make_event(0.1, Action::Kind::ReleaseJoint, 0));
   Options o = options_of(0.2, 1e-4);
   bool released = false;
   ElementState state = ElementState::Elastic;

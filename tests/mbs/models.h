@@ -93,6 +93,20 @@ inline ZoneLaw plastic_hinge(double moment) {
   return law;
 }
 
+/// Does one thing to an element (RemoveElement) or a joint.
+inline Event make_event(double time, Action::Kind kind, int item, const std::string& name = "") {
+  Event e;
+  e.time = time;
+  e.name = name;
+  e.actions.resize(1);
+  e.actions[0].kind = kind;
+  if (kind == Action::Kind::RemoveElement)
+    e.actions[0].element = {item};
+  else
+    e.actions[0].joint = {item};
+  return e;
+}
+
 /// A tower of boxes on weak zones that comes down: yielding, breaking, ground and body contact, a joint that is
 /// released.
 inline Model make_tower() {
@@ -131,14 +145,7 @@ inline Model make_tower() {
   j.X_CM.p = {-0.2, 0, 0};
   j.shear_limit = 3e4;
   add_joint(m, j);
-  Event e;
-  e.time = 0.1;
-  e.name = "cut";
-  Action a;
-  a.kind = Action::Kind::RemoveElement;
-  a.element = {0};
-  e.actions.push_back(a);
-  m.events.push_back(e);
+  m.events.push_back(make_event(0.1, Action::Kind::RemoveElement, 0, "cut"));
   return m;
 }
 
