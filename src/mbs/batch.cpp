@@ -116,6 +116,8 @@ void run_lanes(const Model& model, const std::vector<Variation>& variations, con
     }
     if (!lanes) lanes = make_batch(s, W);
     check_planes(*lanes, s, first + i);
+    for (size_t e = 0; e < s.elements.size(); ++e)
+      if (s.elements[e].zone.stations > 1) lanes->single[e] = 0;
     s.join_batch(*lanes, i);
     active[i] = &s;
   }

@@ -15,6 +15,7 @@ using namespace kernel;
 
 constexpr size_t kBlocksForThreads = 256;  // below, waking threads costs more than they save
 constexpr size_t kChunk = 32;              // blocks a thread takes at once
+constexpr long kLayoutInterval = 256;      // steps between looks whether zones that flow still lie side by side
 
 /// Spring behind the damper of a slot times the stiffness.
 double calc_rate(const Lanes& l, size_t slot, int i) { return l.field(slot, kViscous) * l.field(slot, kStiffness + i); }
@@ -71,29 +72,25 @@ void System::lay_out_elements() {
   std::vector<unsigned char> single;
   size_t live = 0;
   const bool first = l.slot_of.empty();
-  // blocks of one plane each, in a plane with one station or two
-  constexpr std::pair<Plane, bool> kinds[] = {{Plane::Space, false},
-                                              {Plane::AboutY, true},
-                                              {Plane::AboutY, false},
-                                              {Plane::AboutZ, true},
-                                              {Plane::AboutZ, false}};
+  // blocks of one plane each, with one station or two; in them elements that flow side by side
+  constexpr std::pair<Plane, bool> kinds[] = {{Plane::Space, true},   {Plane::Space, false}, {Plane::AboutY, true},
+                                              {Plane::AboutY, false}, {Plane::AboutZ, true}, {Plane::AboutZ, false}};
   for (const auto& [plane, is_single] : kinds) {
-    for (size_t e = 0; e < E; ++e) {
-      const ZoneParameters& zone = elements[e].zone;
-      if (zone.plane != plane || (plane != Plane::Space && (zone.stations < 2) != is_single)) continue;
-      const std::uint32_t slot = first ? 0 : l.slot_of[e];
-      if (!first && (slot == Lanes::kNoSlot || l.field(slot, kMostTurn) == kUnlimited)) continue;
-      if (kept.size() % W == 0) planes.push_back(plane), single.push_back(is_single);
-      kept.push_back(static_cast<std::uint32_t>(e));
-      ++live;
-      if (!first) save_slot(slot, moved);
+    for (const bool flows : {true, false}) {
+      for (size_t e = 0; e < E; ++e) {
+        const ZoneParameters& zone = elements[e].zone;
+        if (zone.plane != plane || (zone.stations < 2) != is_single) continue;
+        const std::uint32_t slot = first ? 0 : l.slot_of[e];
+        if (!first && (slot == Lanes::kNoSlot || l.field(slot, kMostTurn) == kUnlimited)) continue;
+        if ((!first && l.field(slot, kFlows) > 0) != flows) continue;
+        if (kept.size() % W == 0) planes.push_back(plane), single.push_back(is_single);
+        kept.push_back(static_cast<std::uint32_t>(e));
+        ++live;
+        if (!first) save_slot(slot, moved);
+      }
     }
     kept.resize((kept.size() + W - 1) / W * W, Lanes::kNoSlot);
   }
-  std::vector<unsigned char> soft(E, 0);
-  if (!first)
-    for (const std::uint32_t e : kept)
-      if (e != Lanes::kNoSlot) soft[e] = l.softened[l.slot_of[e] / W];
   l.allocate_elements(kept.size());
   l.planes = planes;
   l.single = single;
@@ -113,11 +110,11 @@ void System::lay_out_elements() {
     l.body_a[slot] = body(elements[e].a);
     l.body_b[slot] = body(elements[e].b);
     ++l.live[slot / W];
-    l.softened[slot / W] |= soft[e];
     if (first) {
       l.set(slot, kMostTurn, kLargestTurn);
       continue;
     }
+    if (state.element[e].is_softened) l.softened[slot / W] = 1;
     next = restore_slot(slot, next);
   }
   if (!first) l.share_constants();
@@ -133,6 +130,19 @@ void System::lay_out_elements() {
     }
     l.first_entry[b + 1] = static_cast<std::uint32_t>(l.entries.size());
   }
+}
+
+bool System::are_flows_scattered() const {
+  const Lanes& l = *lanes;
+  size_t flowing = 0, blocks = 0;
+  for (size_t block = 0; block < l.element_blocks; ++block) {
+    if (l.live[block] == 0) continue;
+    size_t here = 0;
+    for (size_t slot = block * l.W; slot < (block + 1) * l.W; ++slot) here += l.field(slot, kFlows) > 0 ? 1 : 0;
+    flowing += here;
+    blocks += here > 0 ? 1 : 0;
+  }
+  return 3 * blocks * l.W > 4 * (flowing + 2 * l.W);
 }
 
 void System::pack_element(size_t e, bool has_moved) {
@@ -403,8 +413,12 @@ void System::evaluate_elements() {
   } else {
     l.evaluate_elements(0, l.element_blocks, l.outside);
   }
+  // where they lie says nothing about what is told first
+  std::sort(l.outside.begin(), l.outside.end(),
+            [&](std::uint32_t x, std::uint32_t y) { return l.element_of[x] < l.element_of[y]; });
   for (const std::uint32_t slot : l.outside) evaluate_outside(slot);
-  if (8 * l.live_elements < 7 * l.used_slots && l.used_slots > 4 * l.W) lay_out_elements();
+  const bool has_gaps = 8 * l.live_elements < 7 * l.used_slots && l.used_slots > 4 * l.W;
+  if (has_gaps || (state.step_index % kLayoutInterval == 0 && are_flows_scattered())) lay_out_elements();
   sum_element_forces();
 }
 

@@ -319,7 +319,8 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
     // damage adds flexibility at the stations: (1 + S C) m = m0
     P.measure();
     if constexpr (Hinges == 1) {
-      P.m[0] = P.m[0] / fma(P.stiffness[0], P.soft[0], one);
+      const N s11 = fma(P.stiffness[0], P.soft[0], one);
+      P.m[0] = is_plane ? P.m[0] / s11 : P.m[0] * (one / s11);
     } else {
       P.cross = fma(x[0] * x[1], k[shear], k[bend]);
       const N s11 = fma(P.stiffness[0], P.soft[0], one), s22 = fma(P.stiffness[1], P.soft[1], one);
@@ -769,7 +770,7 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
     outside = hn::Or(outside, hn::Gt((abs(f[3]) * torsion_scale).v, one.v));
     const N exponent = constant(kExponent);
     const N scale_y = constant(kMomentScale), scale_z = constant(kMomentScale + 1);
-    for (int station = 0; station < 2; ++station) {
+    for (int station = 0; station < Hinges; ++station) {
       const N my = abs(fma(x[station], f[2], f[4])) * scale_y, mz = abs(fnma(x[station], f[1], f[5])) * scale_z;
       const auto linear = hn::Gt((my + mz).v, one.v);
       if (HWY_LIKELY(hn::AllFalse(tag, linear))) continue;
@@ -861,7 +862,8 @@ HWY_INLINE void evaluate_block_of(const ElementJob& job, size_t block, const Pos
   const bool is_single = job.single[block] != 0;
   switch (job.planes[block]) {
     case Plane::Space:
-      return evaluate_element_block<D, Plane::Space, 2>(job, block, a, b);
+      return is_single ? evaluate_element_block<D, Plane::Space, 1>(job, block, a, b)
+                       : evaluate_element_block<D, Plane::Space, 2>(job, block, a, b);
     case Plane::AboutY:
       return is_single ? evaluate_element_block<D, Plane::AboutY, 1>(job, block, a, b)
                        : evaluate_element_block<D, Plane::AboutY, 2>(job, block, a, b);

@@ -148,7 +148,7 @@ struct ElementJob {
   const unsigned char* live;             // per block: live lanes, 0 skips it
   const unsigned char* softened;         // per block: some lane is softened by damage
   const Plane* planes;                   // per block
-  const unsigned char* single;           // per block: no element has more than one station; in a plane only
+  const unsigned char* single;           // per block: no element has more than one station
   double* states;                        // kStateFields a block
   const double* pool;                    // vectors of W
   const std::uint32_t* constants;        // which of the pool, kConstants a block

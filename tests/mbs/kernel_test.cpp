@@ -191,6 +191,58 @@ TEST(Kernel, GivesTheSameBitsWhateverTheWidth) {
   }
 }
 
+TEST(Kernel, ZonesThatFlowAreLaidSideBySideAndKeepTheirBits) {
+  // every third of 48 zones is strong enough to stay elastic, every second has two stations
+  constexpr int zones = 48, n = 1200;
+  Model m = make_model(1, make_law(1));
+  add_law(m, make_law(30));
+  for (int i = 1; i < zones; ++i) {
+    Body body = m.bodies[0];
+    body.name += std::to_string(i);
+    add_body(m, body);
+    ZoneElement e = m.elements[0];
+    e.name += std::to_string(i);
+    e.b = {i};
+    const LawId law{i % 3 == 0 ? 0 : 1};
+    if (i % 2 == 1) e.stations = {{-1.5, law}, {1.5, law}};
+    for (Station& s : e.stations) s.law = law;
+    add_element(m, e);
+  }
+  Options options;
+  options.step = 1e-4;
+  System laid(m, options), left(m, options), singly(m, options, 1);
+  const size_t W = laid.lanes->W;
+  int scattered = 0, flowed = 0;
+  for (System* s : {&laid, &left, &singly}) s->start();
+  for (int i = 1; i <= n; ++i) {
+    for (System* s : {&laid, &left, &singly}) {
+      for (int b = 0; b < zones; ++b) {
+        const Six d = path_at(i, 5e-3, static_cast<std::uint32_t>(b + 1));
+        const size_t at = static_cast<size_t>(b);
+        s->state.p[at] = Vec3{d.c[0], d.c[1], d.c[2]};
+        s->state.q[at] = exp_rotation({d.c[3], d.c[4], d.c[5]});
+        s->state.R[at] = to_matrix(s->state.q[at]);
+      }
+      s->state.time = 1e-4 * i;
+      s->state.step_index = s == &left ? 1 : i;  // that one never looks
+      s->evaluate_elements();
+    }
+    const auto flows = [&](const System& s, size_t e) { return s.lanes->field(s.slot_of(e), kernel::kFlows) > 0; };
+    for (size_t e = 0; e < zones; ++e) {
+      for (size_t f = 0; f < static_cast<size_t>(kernel::kForceFields); ++f) {
+        const double force = laid.lanes->force_field(laid.slot_of(e), f);
+        ASSERT_EQ(force, left.lanes->force_field(left.slot_of(e), f)) << e << " at " << i;
+        ASSERT_EQ(force, singly.lanes->force_field(singly.slot_of(e), f)) << e << " at " << i;
+      }
+      flowed += flows(laid, e) ? 1 : 0;
+    }
+    scattered += left.are_flows_scattered() ? 1 : 0;
+    if (i % 256 == 0 && W > 1) { EXPECT_FALSE(laid.are_flows_scattered()) << i; }
+  }
+  EXPECT_GT(flowed, 5 * n);
+  if (W == 8) { EXPECT_GT(scattered, n / 4); }
+}
+
 /// A zone at a body that keeps to y = const, x along x of W and bending about its y, or upright and bending about its
 /// z.
 Model make_planar_model(int stations, bool is_upright) {
