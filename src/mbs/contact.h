@@ -88,6 +88,12 @@ struct PairState {
   int group = -1;  // in Touching::group of the last look, -1: did not touch
 };
 
+/// Two shapes near each other whose bodies are linked: a pair once the link ends. In the order of pairs.
+struct HeldPair {
+  int a = -1, b = -1;            // bodies
+  int shape_a = 0, shape_b = 0;  // into State::shapes
+};
+
 /// Two bodies with rules of their own, a < b.
 struct PairRule {
   int a = 0, b = 0, law = 0;
@@ -136,8 +142,8 @@ struct PairSearch {
   std::vector<int> first_in_slab, in_slab, unbounded, near, hits;
   std::vector<ShapeBounds> here;  // of one slab
   std::vector<double> extents, ways, speeds;
-  std::vector<std::uint64_t> found;  // ranks of both shapes
-  std::vector<int> first_old, old;   // old pairs of each shape
+  std::vector<std::uint64_t> found, held;  // ranks of both shapes
+  std::vector<int> first_old, old;         // old pairs of each shape
   std::vector<PairState> pairs;
   std::vector<PairDue> due;
   std::vector<double> clock;

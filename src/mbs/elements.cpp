@@ -546,7 +546,7 @@ Vec3 System::calc_element_reaction() const {
 
 void System::break_element(size_t e, BreakReason reason) {
   static const char* const words[] = {"", "tension", "crushing", "shear", "rotation", "torsion", "removed"};
-  mark_search_due();
+  mark_links_due();
   say({Happening::Kind::ElementBroken, state.time, static_cast<int>(e), -1, words[static_cast<int>(reason)], 0});
 }
 

@@ -271,7 +271,7 @@ void System::evaluate_springs(bool at_rest) {
     const double x = measure_spring(k, row) - k.free_length, f = calc_force(k.spring, x);
     if (!at_rest && (f > k.tension_strength || -f > k.compression_strength)) {
       s.plastic += end_spring(s, x);
-      mark_search_due();
+      mark_links_due();
       say({Happening::Kind::SpringBroken, state.time, static_cast<int>(i), -1, f > 0 ? "tension" : "compression", 0});
       continue;
     }
@@ -296,7 +296,7 @@ void System::evaluate_springs(bool at_rest) {
     const bool is_loose = !js.live;  // its joint has been released
     if (is_loose || (!at_rest && std::abs(f) > k.strength)) {
       s.plastic += end_spring(s, x);
-      mark_search_due();
+      mark_links_due();
       say({Happening::Kind::RotationalSpringBroken, state.time, static_cast<int>(i), -1,
            is_loose ? "released" : "torsion", 0});
       continue;
@@ -329,7 +329,7 @@ void System::evaluate_bushing(size_t i, bool at_rest) {
   }
   if (broken) {
     s.plastic += end_bushing(s, x);
-    mark_search_due();
+    mark_links_due();
     say({Happening::Kind::BushingBroken, state.time, static_cast<int>(i), -1, broken, 0});
     return;
   }
@@ -462,7 +462,7 @@ void System::remove_spring(size_t i) {
   ForceRow row;
   const double x = measure_spring(forces.springs[i], row) - forces.springs[i].free_length;
   state.removed += end_spring(state.spring[i], x);
-  mark_search_due();
+  mark_links_due();
 }
 
 void System::remove_torsion(size_t i) {
@@ -470,7 +470,7 @@ void System::remove_torsion(size_t i) {
   ForceRow row;
   state.removed +=
       end_spring(state.torsion[i], measure_torsion(forces.torsions[i], row) - forces.torsions[i].free_angle);
-  mark_search_due();
+  mark_links_due();
 }
 
 void System::remove_bushing(size_t i) {
@@ -478,7 +478,7 @@ void System::remove_bushing(size_t i) {
   const FrameDeformation d = measure_bushing(i);
   const double x[6] = {d.u.x, d.u.y, d.u.z, d.r.x, d.r.y, d.r.z};
   state.removed += end_bushing(state.bushing[i], x);
-  mark_search_due();
+  mark_links_due();
 }
 
 void System::add_energy_of_forces(Energy& e) const {

@@ -549,7 +549,7 @@ void System::drop_joint(size_t i) {
     std::fill(std::begin(other.curvature), std::end(other.curvature), 0.0);
   }
   clusters_due = true;
-  mark_search_due();
+  mark_links_due();
 }
 
 void System::loosen_joint(size_t i) {

@@ -15,6 +15,36 @@ constexpr double kAllowedTime = 0.025;    // [s]; more for fast bodies
 constexpr double kMostAllowance = 0.4;    // [m]
 constexpr double kSlowShare = 0.8;        // of the bodies
 
+/// Who is joined to a body, or joined to the same third body: what joins them governs instead of contact.
+class NearBodies {
+ public:
+  NearBodies(PairSearch& search, size_t bodies) : search_(search) { search_.near.assign(bodies, -1); }
+
+  /// Quick for the same a in turn.
+  bool operator()(int a, int b) {
+    std::vector<int>& near = search_.near;  // the last body that the body is near to in this sense
+    if (marked_ != a) {
+      // other bodies may have overwritten what was marked for this one before
+      marked_ = a;
+      near[static_cast<size_t>(a)] = a;
+      for (const int i : holders(a)) {
+        near[static_cast<size_t>(i)] = a;
+        for (const int j : holders(i)) near[static_cast<size_t>(j)] = a;
+      }
+    }
+    return near[static_cast<size_t>(b)] == a;
+  }
+
+ private:
+  std::span<const int> holders(int b) const {
+    const size_t i = static_cast<size_t>(b);
+    return {search_.link.data() + search_.first_link[i],
+            static_cast<size_t>(search_.first_link[i + 1] - search_.first_link[i])};
+  }
+  PairSearch& search_;
+  int marked_ = -1;  // whose neighbours are marked
+};
+
 }  // namespace
 
 void System::add_travel(double h) {
@@ -36,13 +66,18 @@ void System::add_travel(double h) {
   s.clock[0] += most[0];
   s.clock[1] += std::max(most[0], most[1]);
   // what a link held together touches from the moment on when it breaks
-  if (is_far || s.search_due) find_pairs();
+  if (is_far || s.search_due) {
+    find_pairs();
+  } else if (s.links_due) {
+    release_pairs();
+  }
 }
 
 void System::find_links() {
   State& s = state;
   PairSearch& search = contact.search;
   search.has_links = true;
+  s.links_due = false;
   const std::vector<unsigned char> tied = s.tied_to_ground;
   std::fill(s.tied_to_ground.begin(), s.tied_to_ground.end(), 0);
   std::fill(s.ground_clear.begin(), s.ground_clear.end(), 0);
@@ -144,7 +179,7 @@ void System::find_bounds() {
 void System::find_pairs() {
   State& s = state;
   PairSearch& search = contact.search;
-  if (s.search_due || !search.has_links) find_links();
+  if (s.links_due || !search.has_links) find_links();
   s.search_due = false;
   s.travel.resize(B);
   s.is_fast.resize(B);
@@ -198,33 +233,15 @@ void System::find_pairs() {
       search.in_slab[static_cast<size_t>(search.first_in_slab[static_cast<size_t>(k) + 1]++)] = static_cast<int>(i);
   }
 
-  // joined, or joined to the same third body: the joint or element between them governs
-  search.near.assign(B, -1);  // the last body that the body is near to in this sense
-  int marked = -1;            // whose neighbours are marked
-  const auto holders = [&](int b) {
-    const size_t i = static_cast<size_t>(b);
-    return std::span<const int>(search.link.data() + search.first_link[i],
-                                static_cast<size_t>(search.first_link[i + 1] - search.first_link[i]));
-  };
-  const auto are_near = [&](int a, int b) {
-    std::vector<int>& near = search.near;
-    if (marked != a) {
-      // other bodies may have overwritten what was marked for this one before
-      marked = a;
-      near[static_cast<size_t>(a)] = a;
-      for (const int i : holders(a)) {
-        near[static_cast<size_t>(i)] = a;
-        for (const int j : holders(i)) near[static_cast<size_t>(j)] = a;
-      }
-    }
-    return near[static_cast<size_t>(b)] == a;
-  };
+  NearBodies are_near(search, B);
   search.found.clear();
+  search.held.clear();
   const auto look = [&](size_t i, size_t j) {
     const ShapeBounds &x = bounds[i], &y = bounds[j];
     if (x.body == y.body || (fixed[static_cast<size_t>(x.body)] && fixed[static_cast<size_t>(y.body)])) return;
-    if (are_near(x.body, y.body) || !contact_laws[static_cast<size_t>(find_pair_law(x.body, y.body))].touches) return;
-    search.found.push_back(static_cast<std::uint64_t>(std::min(i, j)) << 32 | std::max(i, j));
+    if (!contact_laws[static_cast<size_t>(find_pair_law(x.body, y.body))].touches) return;
+    (are_near(x.body, y.body) ? search.held : search.found)
+        .push_back(static_cast<std::uint64_t>(std::min(i, j)) << 32 | std::max(i, j));
   };
   for (size_t k = 0; k < slabs; ++k) {
     const std::span<const int> slab(search.in_slab.data() + search.first_in_slab[k],
@@ -252,6 +269,12 @@ void System::find_pairs() {
     for (size_t i = 0; i < n; ++i)
       if (std::isfinite(bounds[i].low[0])) look(static_cast<size_t>(u), i);
   std::sort(search.found.begin(), search.found.end());
+  std::sort(search.held.begin(), search.held.end());
+  s.held_pairs.clear();
+  for (const std::uint64_t key : search.held) {
+    const ShapeBounds &x = bounds[key >> 32], &y = bounds[key & 0xffffffffU];
+    s.held_pairs.push_back({x.body, y.body, x.shape, y.shape});
+  }
 
   // keep what old pairs remember
   search.first_old.assign(s.shapes.size() + 2, 0);
@@ -285,10 +308,7 @@ void System::find_pairs() {
       p.way -= way;
       d.way -= way;
     } else {
-      d.a = x.body, d.b = y.body;
-      d.shape_a = x.shape, d.shape_b = y.shape;
-      const auto is_box = [&](int i) { return s.shapes[static_cast<size_t>(i)].kind == Shape::Kind::Box; };
-      d.are_boxes = is_box(x.shape) && is_box(y.shape);
+      d = make_pair_due({x.body, y.body, x.shape, y.shape});
       p.law = find_pair_law(d.a, d.b);
     }
     search.fast.push_back(s.is_fast[static_cast<size_t>(d.a)] | s.is_fast[static_cast<size_t>(d.b)]);
@@ -298,6 +318,37 @@ void System::find_pairs() {
   s.pair_due.swap(due);
   s.pair_clock.swap(search.clock);
   s.pair_fast.swap(search.fast);
+}
+
+PairDue System::make_pair_due(const HeldPair& pair) const {
+  PairDue d;
+  d.a = pair.a, d.b = pair.b;
+  d.shape_a = pair.shape_a, d.shape_b = pair.shape_b;
+  const auto is_box = [&](int i) { return state.shapes[static_cast<size_t>(i)].kind == Shape::Kind::Box; };
+  d.are_boxes = is_box(d.shape_a) && is_box(d.shape_b);
+  return d;
+}
+
+/// Those that are no longer held follow behind the others, in their order.
+void System::release_pairs() {
+  State& s = state;
+  find_links();
+  NearBodies are_near(contact.search, B);
+  size_t kept = 0;
+  for (const HeldPair& pair : s.held_pairs) {
+    if (are_near(pair.a, pair.b)) {
+      s.held_pairs[kept++] = pair;
+      continue;
+    }
+    PairDue& d = s.pair_due.emplace_back(make_pair_due(pair));
+    PairState& p = s.pairs.emplace_back();
+    p.law = find_pair_law(d.a, d.b);
+    const size_t a = static_cast<size_t>(d.a), b = static_cast<size_t>(d.b);
+    p.way = d.way = s.travel[a] + s.travel[b];  // due at once
+    s.pair_fast.push_back(s.is_fast[a] | s.is_fast[b]);
+    s.pair_clock.push_back(s.clock[s.pair_fast.back()]);
+  }
+  s.held_pairs.resize(kept);
 }
 
 /// Any frame serves that is the same for all bodies; in that of their mean motion they stay near their places longest.

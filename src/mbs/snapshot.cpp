@@ -88,8 +88,9 @@ void visit(Archive& ar, S& s, C& sys) {
   ar(s.shapes), ar(s.ground_points), ar(s.touched_ground), ar(s.ground_clear), ar(s.ground_box);
   ar(s.element), ar(s.rotational), ar(s.joint), ar(s.cable);
   ar(s.spring), ar(s.torsion), ar(s.bushing), ar(s.load);
-  ar(s.pairs), ar(s.pair_due), ar(s.pair_clock), ar(s.pair_fast), ar(s.clock), ar(s.is_fast), ar(s.travel),
-      ar(s.search_velocity), ar(s.allowance), ar(s.tied_to_ground), ar(s.search_due), ar(s.touched_pairs);
+  ar(s.pairs), ar(s.pair_due), ar(s.held_pairs), ar(s.pair_clock), ar(s.pair_fast), ar(s.clock), ar(s.is_fast),
+      ar(s.travel), ar(s.search_velocity), ar(s.allowance), ar(s.tied_to_ground), ar(s.search_due), ar(s.links_due),
+      ar(s.touched_pairs);
   ar(s.touching.steps), ar(s.touching.body), ar(s.touching.group), ar(s.touching.rows), ar(s.touching.a),
       ar(s.touching.b), ar(s.touching.groups), ar(s.touching.points), ar(s.touching.share);
   ar(s.removed), ar(s.contact_energy), ar(s.stick_energy), ar(s.contact_loss), ar(s.contact_loss_power),
@@ -99,7 +100,7 @@ void visit(Archive& ar, S& s, C& sys) {
   ar(sys.ground_reaction), ar(sys.ground_contact), ar(sys.body_contacts);
 }
 
-constexpr std::uint64_t kMagic = 0x37534e41504f54ULL;  // "TOPANS7"
+constexpr std::uint64_t kMagic = 0x38534e41504f54ULL;  // "TOPANS8"
 
 /// What of the system's scratch the next step takes over, under the same names.
 struct Carried {

@@ -426,7 +426,7 @@ void System::act(const Event& event) {
         z.energy = z.damper_energy = 0;
         break_zone(z, BreakReason::Removed);
         pack_element(e);
-        mark_search_due();
+        mark_links_due();
         break;
       }
       case Action::Kind::SwitchLaw: {
@@ -502,7 +502,7 @@ void System::replace_body(size_t b, const Body& replacement) {
   append_shapes(replacement, s.body[b]);
   layout_shapes();
   s.removed += before - energy();
-  mark_search_due();
+  s.search_due = true;
   drop_pairs_of(b);
   s.touching.steps = 0;  // its points are others now
   s.ground_clear[b] = 0;

@@ -109,6 +109,7 @@ struct State {
   // contact pairs
   std::vector<PairState> pairs;
   std::vector<PairDue> pair_due;
+  std::vector<HeldPair> held_pairs;
   std::vector<double> pair_clock;        // no pair is due before its clock comes to this (P) [m]
   std::vector<unsigned char> pair_fast;  // that is the second clock (P)
   double clock[2] = {0, 0};              // ways of the fastest slow body and of the fastest body, added up [m]
@@ -119,6 +120,7 @@ struct State {
   std::vector<double> allowance;  // the way at which a body asks for a new search (B) [m]
   std::vector<unsigned char> tied_to_ground;
   bool search_due = true;
+  bool links_due = true;  // some link has ended since they were looked at
   Touching touching;
   std::vector<long> touched_pairs;  // a * B + b, sorted
   // ledger [J]
@@ -370,6 +372,9 @@ class System {
   /// Bodies whose shapes are near each other, and who is tied to the ground.
   void find_pairs();
   void find_links();
+  /// Makes pairs of held ones whose links have ended.
+  void release_pairs();
+  PairDue make_pair_due(const HeldPair&) const;
   void find_fast_bodies();
   void find_bounds();
   void choose_search_velocity();
@@ -446,7 +451,8 @@ class System {
   void append_shapes(const Body&, BodyConstants&);
   int count_corners(const CompiledShape&) const;
   void layout_shapes();
-  void mark_search_due() { state.search_due = true; }
+  /// A link between bodies has ended, or may have.
+  void mark_links_due() { state.links_due = true; }
   Mat3 rotation_of(int body) const { return body < 0 ? Mat3::identity() : state.R[static_cast<size_t>(body)]; }
   Vec3 centre_of(int body) const { return body < 0 ? Vec3{} : state.p[static_cast<size_t>(body)]; }
   Pose pose_of(int body) const {
