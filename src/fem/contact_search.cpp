@@ -1,5 +1,7 @@
 #include "fem/contact_search.h"
 
+#include <hwy/cache_control.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -9,6 +11,7 @@
 #include <utility>
 
 #include "base/team.h"
+#include "fem/contact_cells.h"
 #include "fem/explicit_inside.h"
 #include "fem/segment_contact.h"
 
@@ -44,11 +47,18 @@ struct Point {
   Vec3 p;
   double radius = 0;
 };
+/// Faces that follow one another, which lie close together.
+struct FaceRun {
+  ContactBox box;  // of all that may be near them, but for what a point is away
+  size_t first = 0, last = 0;
+};
 /// The outside of a group.
 struct Skin {
   std::vector<Face> faces;
+  std::vector<FaceRun> runs;
   std::vector<Point> points;
-  ContactBox box;  // of the faces
+  ContactBox box;     // of the faces
+  double radius = 0;  // the largest of a face
 };
 
 /// Calls body(i) for all i below count, `run` of them a task.
@@ -79,16 +89,9 @@ class Search {
       make_pairs();
     else
       add_particles();
-    std::vector<ContactPair*> due;
-    for (ContactPair& pair : c.pairs) {
-      const bool changed = c.changed[pair.b] != 0 || (pair.a < groups_ && c.changed[pair.a] != 0);
-      if (pair.slack < 0 || changed) due.push_back(&pair);
-    }
+    const std::vector<ContactPair*> due = list_due();
     make_skins(due);
-    for_all(due.size(), 64, team_, [&](size_t i) {
-      find_candidates(*due[i]);
-      due[i]->slack = setup_.margin;
-    });
+    for_all(due.size(), 64, team_, [&](size_t i) { find_candidates(*due[i]); });
     c.searches += static_cast<long long>(due.size());
     find_near(elapsed);
     std::fill(c.changed.begin(), c.changed.end(), 0);
@@ -102,23 +105,40 @@ class Search {
   static constexpr double kRoomShare = 0.8;
   static constexpr int kBoxSteps = 640;
 
-  /// Mean velocity of an object and the largest deviation from it.
-  std::pair<Vec3, double> measure(std::uint32_t o) const {
-    if (o >= groups_) return {s_.particles[o - groups_].v, 0};
+  /// Mean velocity of an object, the largest deviation from it, and the box around it.
+  struct Motion {
     Vec3 mean;
-    int count = 0;
-    const auto first = setup_.node_rows.begin() + setup_.node_starts[o],
-               last = setup_.node_rows.begin() + setup_.node_starts[o + 1];
-    for (auto row = first; row != last; ++row)
-      if (has_mass(s_, *row)) mean += speed(s_, *row), ++count;
-    if (count > 0) mean *= 1.0 / count;
+    double spread = 0;
+    ContactBox box;
+  };
+  Motion measure(std::uint32_t o) const {
+    Motion motion;
+    if (o >= groups_) {
+      const Particle& particle = s_.particles[o - groups_];
+      motion.mean = particle.v;
+      motion.box.add(particle.p, particle.full_radius);
+      return motion;
+    }
+    static thread_local std::vector<Vec3> speeds;
+    speeds.clear();
+    constexpr std::uint32_t kAhead = 16;  // rows all over memory; those of the next object follow
+    const auto all = static_cast<std::uint32_t>(setup_.node_rows.size());
+    for (std::uint32_t i = setup_.node_starts[o]; i < setup_.node_starts[o + 1]; ++i) {
+      if (i + kAhead < all) hwy::Prefetch(s_.rows.data() + 8 * size_t{setup_.node_rows[i + kAhead]});
+      const std::uint32_t row = setup_.node_rows[i];
+      if (!has_mass(s_, row)) continue;
+      speeds.push_back(speed(s_, row));
+      motion.mean += speeds.back();
+      motion.box.add(place(s_, row), 0);
+    }
+    if (!speeds.empty()) motion.mean *= 1.0 / static_cast<double>(speeds.size());
     double square = 0;
-    for (auto row = first; row != last; ++row)
-      if (has_mass(s_, *row)) {
-        const Vec3 d = speed(s_, *row) - mean;
-        square = std::max(square, dot(d, d));
-      }
-    return {mean, std::sqrt(square)};
+    for (const Vec3& v : speeds) {
+      const Vec3 d = v - motion.mean;
+      square = std::max(square, dot(d, d));
+    }
+    motion.spread = std::sqrt(square);
+    return motion;
   }
 
   /// How far objects and pairs may have moved since the last look, at the larger of the speeds at both ends.
@@ -127,8 +147,11 @@ class Search {
     const size_t objects = groups_ + s_.particles.size(), known = c.speed.size();
     std::vector<Vec3> mean(objects);
     std::vector<double> spread(objects, 0);
-    for_all(objects, 64, team_,
-            [&](size_t o) { std::tie(mean[o], spread[o]) = measure(static_cast<std::uint32_t>(o)); });
+    boxes_.resize(objects);
+    for_all(objects, 64, team_, [&](size_t o) {
+      const Motion motion = measure(static_cast<std::uint32_t>(o));
+      mean[o] = motion.mean, spread[o] = motion.spread, boxes_[o] = motion.box;
+    });
     c.travel.resize(objects, 0);
     for (size_t o = 0; o < known; ++o) {
       c.spread[o] = std::max(c.spread[o], spread[o]);
@@ -147,13 +170,8 @@ class Search {
     return std::max(0.5 * setup_.reach, kBoxSteps * h_ * speed);
   }
   ContactBox make_box(std::uint32_t o, double room) const {
-    ContactBox box;
-    if (o >= groups_) {
-      box.add(s_.particles[o - groups_].p, s_.particles[o - groups_].full_radius + room);
-      return box;
-    }
-    for (std::uint32_t i = setup_.node_starts[o]; i < setup_.node_starts[o + 1]; ++i)
-      if (has_mass(s_, setup_.node_rows[i])) box.add(place(s_, setup_.node_rows[i]), room);
+    ContactBox box = boxes_[o];
+    if (!box.is_empty()) box.low -= Vec3{room, room, room}, box.high += Vec3{room, room, room};
     return box;
   }
 
@@ -166,30 +184,28 @@ class Search {
       c.room[o] = calc_room(o);
       c.boxes[o] = make_box(o, c.room[o]);
     });
-    std::vector<std::uint32_t> ids;
-    for (std::uint32_t o = 0; o < objects; ++o)
-      if (!c.boxes[o].is_empty()) ids.push_back(o);
-    std::sort(ids.begin(), ids.end(), [&](std::uint32_t a, std::uint32_t b) {
-      return std::pair(c.boxes[a].low.x, a) < std::pair(c.boxes[b].low.x, b);
-    });
+    ContactBox bounds;
+    for (size_t o = 0; o < (groups_ > 0 ? groups_ : objects); ++o)
+      if (!c.boxes[o].is_empty()) bounds.add(c.boxes[o].low, 0), bounds.add(c.boxes[o].high, 0);
+    const ContactCells cells(c.boxes, bounds, 2 * setup_.reach);
     // the larger number first
     constexpr size_t kRun = 128;
     struct Found {
       std::vector<std::array<std::uint32_t, 2>> met;
       std::vector<ParticlePair> particles;
     };
-    std::vector<Found> found((ids.size() + kRun - 1) / kRun);
-    for_all(ids.size(), kRun, team_, [&](size_t i) {
-      const ContactBox& box = c.boxes[ids[i]];
-      Found& to = found[i / kRun];
-      if (ids[i] < groups_) to.met.push_back({ids[i], ids[i]});
-      for (size_t j = i + 1; j < ids.size() && c.boxes[ids[j]].low.x <= box.high.x; ++j) {
-        if (!box.meets(c.boxes[ids[j]])) continue;
-        const std::uint32_t a = std::max(ids[i], ids[j]), b = std::min(ids[i], ids[j]);
-        if (b >= groups_)
-          to.particles.push_back({a - groups_, b - groups_});
-        else
-          to.met.push_back({a, b});
+    std::vector<Found> found((objects + kRun - 1) / kRun);
+    team_.run(found.size(), [&](size_t run) {
+      std::vector<std::uint32_t> before;
+      for (size_t i = run * kRun; i < std::min(objects, (run + 1) * kRun); ++i) {
+        const auto a = static_cast<std::uint32_t>(i);
+        cells.find_before(c.boxes, a, before);
+        for (const std::uint32_t b : before)
+          if (b >= groups_)
+            found[run].particles.push_back({a - groups_, b - groups_});
+          else
+            found[run].met.push_back({a, b});
+        if (a < groups_ && !c.boxes[a].is_empty()) found[run].met.push_back({a, a});
       }
     });
     std::vector<std::array<std::uint32_t, 2>> met;
@@ -198,8 +214,6 @@ class Search {
       met.insert(met.end(), of.met.begin(), of.met.end());
       c.particle_pairs.insert(c.particle_pairs.end(), of.particles.begin(), of.particles.end());
     }
-    std::sort(met.begin(), met.end());
-    std::sort(c.particle_pairs.begin(), c.particle_pairs.end());
     std::vector<ContactPair> pairs(met.size());
     size_t old = 0;
     for (size_t i = 0; i < met.size(); ++i) {
@@ -236,6 +250,27 @@ class Search {
         else
           c.pairs.push_back({a, b, -1, {}});
       }
+  }
+
+  /// Pairs to be looked through. Those that are further apart than the margin need not be until they have moved by
+  /// that.
+  std::vector<ContactPair*> list_due() {
+    ContactState& c = s_.contact;
+    constexpr size_t kRun = 4096;
+    std::vector<std::vector<ContactPair*>> found((c.pairs.size() + kRun - 1) / kRun);
+    for_all(c.pairs.size(), kRun, team_, [&](size_t i) {
+      ContactPair& pair = c.pairs[i];
+      const bool changed = c.changed[pair.b] != 0 || (pair.a < groups_ && c.changed[pair.a] != 0);
+      if (pair.slack >= 0 && !changed) return;
+      const double gap = boxes_[pair.a].calc_gap(boxes_[pair.b]);
+      if (gap > setup_.margin)
+        pair.candidates.clear(), pair.slack = gap;
+      else
+        found[i / kRun].push_back(&pair);
+    });
+    std::vector<ContactPair*> due;
+    for (const auto& list : found) due.insert(due.end(), list.begin(), list.end());
+    return due;
   }
 
   /// What may touch within `ahead`, at twice the present speeds and a share of the margin for impacts in between.
@@ -290,9 +325,17 @@ class Search {
       case ContactPoint::Debris:
         p = s_.particles[point.index].p, radius = s_.particles[point.index].radius;
     }
+    const double reach = radius + path;
+    {
+      // most are too high above it, which its corners alone tell
+      const std::array<Vec3, 4> x = corners_of(candidate.face);
+      const Vec3 centre = 0.25 * (x[0] + x[1] + x[2] + x[3]), n = cross(x[2] - x[0], x[3] - x[1]);
+      const double size = std::max(norm(n), 1e-300);
+      if (dot(p - centre, n) > reach * size + std::abs(dot(x[0] - centre, n))) return false;
+    }
     const Face face = make_face(candidate.face);
     const Vec3 d = p - face.centre;
-    const double height = dot(d, face.normal), reach = radius + path;
+    const double height = dot(d, face.normal);
     if (height > reach + face.uneven || height < -(face.depth + face.uneven + path)) return false;
     const double beside = calc_beside(d, face);
     // a ball at the height of the face's edge may touch it from beside, one below it does not
@@ -331,16 +374,19 @@ class Search {
   }
 
   void make_skins(const std::vector<ContactPair*>& due) {
-    std::vector<unsigned char> wanted(groups_, 0);
+    enum : unsigned char { Nothing, Faces, All };
+    std::vector<unsigned char> wanted(groups_, Nothing);
     for (const ContactPair* pair : due) {
-      wanted[pair->b] = 1;
-      if (pair->a < groups_) wanted[pair->a] = 1;
+      const bool is_particle = pair->a >= groups_;
+      if (!is_particle) wanted[pair->a] = All;
+      wanted[pair->b] = std::max<unsigned char>(wanted[pair->b], is_particle ? Faces : All);
     }
     for_all(groups_, 8, team_, [&](size_t g) {
-      if (wanted[g] != 0) skins_[g] = make_skin(static_cast<std::uint32_t>(g));
+      if (wanted[g] != Nothing) skins_[g] = make_skin(static_cast<std::uint32_t>(g), wanted[g] == All);
     });
   }
-  Skin make_skin(std::uint32_t g) const {
+  Skin make_skin(std::uint32_t g, bool has_points) const {
+    constexpr size_t kRun = 8;
     Skin skin;
     for (std::uint32_t i = setup_.group_starts[g]; i < setup_.group_starts[g + 1]; ++i) {
       const size_t e = static_cast<size_t>(setup_.order[i]);
@@ -349,12 +395,22 @@ class Search {
         const int beside = setup_.surface.neighbour[e][f];
         if (beside >= 0 && s_.contact.gone[static_cast<size_t>(beside)] == 0) continue;
         Face face = make_face(static_cast<std::uint32_t>(6 * e + f));
-        for (const Vec3& p : corners_of(face.number))
-          face.radius = std::max(face.radius, norm(p - face.centre)), skin.box.add(p, 0);
+        double square = 0;
+        for (const Vec3& p : corners_of(face.number)) {
+          const Vec3 d = p - face.centre;
+          square = std::max(square, dot(d, d)), skin.box.add(p, 0);
+        }
+        face.radius = std::sqrt(square);
+        skin.radius = std::max(skin.radius, face.radius);
+        if (skin.faces.size() % kRun == 0) skin.runs.push_back({{}, skin.faces.size(), 0});
+        FaceRun& run = skin.runs.back();
+        run.box.add(face.centre, face.radius + face.depth);
         skin.faces.push_back(face);
-        skin.points.push_back({{ContactPoint::Centre, face.number}, face.centre, 0});
+        run.last = skin.faces.size();
+        if (has_points) skin.points.push_back({{ContactPoint::Centre, face.number}, face.centre, 0});
       }
     }
+    if (!has_points) return skin;
     for (std::uint32_t i = setup_.node_starts[g]; i < setup_.node_starts[g + 1]; ++i) {
       const std::uint32_t row = setup_.node_rows[i];
       // eight elements around a node hide it
@@ -383,12 +439,13 @@ class Search {
     return std::max(x, y);
   }
 
-  void match(const std::vector<Point>& points, const Skin& skin, std::vector<ContactCandidate>& found) const {
-    if (skin.faces.empty()) return;
-    for (const Point& q : points) {
-      const double near = setup_.margin + q.radius;
-      if (!skin.box.has(q.p, near)) continue;
-      for (const Face& face : skin.faces) {
+  void match(const Point& q, const Skin& skin, std::vector<ContactCandidate>& found) const {
+    const double near = setup_.margin + q.radius;
+    if (!skin.box.has(q.p, near)) return;
+    for (const FaceRun& run : skin.runs) {
+      if (!run.box.has(q.p, near)) continue;
+      for (size_t i = run.first; i < run.last; ++i) {
+        const Face& face = skin.faces[i];
         const Vec3 d = q.p - face.centre;
         const double height = dot(d, face.normal), reach = face.radius + near;
         if (height > near || height < -(face.depth + setup_.margin) ||
@@ -399,13 +456,26 @@ class Search {
       }
     }
   }
+  void match(const std::vector<Point>& points, const Skin& skin, std::vector<ContactCandidate>& found) const {
+    for (const Point& q : points) match(q, skin, found);
+  }
 
+  /// Candidates of a pair, and how far its objects may move against each other until it is looked through again.
   void find_candidates(ContactPair& pair) const {
     pair.candidates.clear();
+    pair.slack = setup_.margin;
     const Skin& b = *skins_[pair.b];
     if (pair.a >= groups_) {
       const std::uint32_t i = pair.a - groups_;
-      match({{{ContactPoint::Debris, i}, s_.particles[i].p, s_.particles[i].full_radius}}, b, pair.candidates);
+      const Particle& particle = s_.particles[i];
+      match({{ContactPoint::Debris, i}, particle.p, particle.full_radius}, b, pair.candidates);
+      if (!pair.candidates.empty()) return;
+      double nearest = std::numeric_limits<double>::infinity();  // squared
+      for (const Face& face : b.faces) {
+        const Vec3 d = particle.p - face.centre;
+        nearest = std::min(nearest, dot(d, d));
+      }
+      pair.slack = std::max(pair.slack, std::sqrt(nearest) - b.radius - particle.full_radius);
       return;
     }
     if (pair.a == pair.b) {
@@ -422,6 +492,7 @@ class Search {
   double h_;
   Team& team_;
   std::uint32_t groups_;
+  std::vector<ContactBox> boxes_;  // of objects, as they are
   std::vector<std::optional<Skin>> skins_;
 };
 

@@ -4,13 +4,13 @@
 /// each other by the search margin; of what was found steps see what may touch before the next look
 /// (docs/theory/explicit.md, "Contact").
 
-#include <algorithm>
 #include <array>
 #include <compare>
 #include <cstdint>
 #include <vector>
 
 #include "base/linalg.h"
+#include "fem/contact_cells.h"
 #include "fem/explicit_chunks.h"
 #include "fem/outer_surface.h"
 
@@ -38,23 +38,6 @@ struct ContactCandidate {
 struct NearCandidate {
   ContactCandidate candidate;
   std::array<std::uint32_t, 4> rows{};
-};
-
-/// Along the axes; empty while low is above high.
-struct ContactBox {
-  Vec3 low{1e300, 1e300, 1e300}, high{-1e300, -1e300, -1e300};
-  void add(const Vec3& p, double r) {
-    for (int c = 0; c < 3; ++c) low[c] = std::min(low[c], p[c] - r), high[c] = std::max(high[c], p[c] + r);
-  }
-  bool is_empty() const { return low.x > high.x; }
-  bool meets(const ContactBox& b) const {
-    return low.x <= b.high.x && b.low.x <= high.x && low.y <= b.high.y && b.low.y <= high.y && low.z <= b.high.z &&
-           b.low.z <= high.z;
-  }
-  bool has(const Vec3& p, double r) const {
-    return p.x >= low.x - r && p.x <= high.x + r && p.y >= low.y - r && p.y <= high.y + r && p.z >= low.z - r &&
-           p.z <= high.z + r;
-  }
 };
 
 /// Constant.
