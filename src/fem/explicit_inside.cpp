@@ -252,6 +252,20 @@ void ExplicitSystem::Inside::clear_pushes(ExplicitState& state) const {
     if (state.uses[row] > 0) push(state, row, {});
 }
 
+bool ExplicitSystem::Inside::is_finite(const ExplicitState& state) const {
+  constexpr size_t kRow = kernel::kNodeFields;
+  const size_t rows = state.rows.size() / kRow;
+  std::array<bool, kTasks> finite{};
+  team->run(kTasks, [&](size_t task) {
+    // a number that is not finite leaves none in a sum; eight sums, so that none waits for the one before
+    std::array<double, kRow> sums{};
+    for (size_t row = rows * task / kTasks; row < rows * (task + 1) / kTasks; ++row)
+      for (size_t i = 0; i < kRow; ++i) sums[i] += state.rows[kRow * row + i];
+    finite[task] = std::all_of(sums.begin(), sums.end(), [](double sum) { return std::isfinite(sum); });
+  });
+  return std::all_of(finite.begin(), finite.end(), [](bool is) { return is; });
+}
+
 void ExplicitSystem::Inside::advance_step(ExplicitState& state, bool removes) {
   kernel::StepJob step = make_step();
   step.removes = removes;

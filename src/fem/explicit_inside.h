@@ -37,10 +37,29 @@ struct Particle {
   double mass = 0, radius = 0, full_radius = 0, stiffness = 0;
   double bears = 0;    // force at which it is crushed [N]
   double crushed = 0;  // by how much in this step [m]
-  /// Takes what a spring would press it by beyond what it bears.
-  void crush(double rate, double depth) { crushed = std::max(crushed, depth - bears / rate); }
+  /// By how much a spring would press it beyond what it bears [m].
+  double calc_crushed(double rate, double depth) const { return depth - bears / rate; }
   int element = 0;
   std::uint32_t touched = 0;  // in this step
+};
+
+/// Forces of touches, in their order, in shares that several threads add up.
+inline constexpr size_t kContactShares = 4;
+struct ContactPushes {
+  struct OfRow {
+    Vec3 force;
+    std::uint32_t row = 0;
+  };
+  struct OfParticle {
+    Vec3 force;
+    double crushed = 0;
+    std::uint32_t number = 0;
+  };
+  struct Share {
+    std::vector<OfRow> rows;
+    std::vector<OfParticle> particles;
+  };
+  std::array<Share, kContactShares> shares;
 };
 
 struct ExplicitState {
@@ -88,8 +107,9 @@ struct ExplicitSystem::Inside {
   AlignedVector<double> shared_forces;
   std::vector<std::vector<std::uint32_t>> failed, grounded;
   std::vector<std::array<double, 4>> chunk_sums;
-  std::vector<kernel::Balance> balances;  // of chunks, then of shares of the shared nodes
-  ExplicitState spare;                    // kept, so that copies need no new memory
+  std::vector<kernel::Balance> balances;      // of chunks, then of shares of the shared nodes
+  std::vector<ContactPushes> contact_pushes;  // of tasks
+  ExplicitState spare;                        // kept, so that copies need no new memory
   Timing timing;
   mutable std::vector<DebrisParticle> debris_view;
 
@@ -131,6 +151,8 @@ struct ExplicitSystem::Inside {
     for (int c = 0; c < 3; ++c) state.pushes[4 * size_t{row} + static_cast<size_t>(c)] += force[c];
   }
   void clear_pushes(ExplicitState&) const;
+  /// Whether all of the nodes' rows is finite.
+  bool is_finite(const ExplicitState&) const;
   /// Elastic energy of an element: in all, in what varies over it, in the corner mode [J].
   std::array<double, 3> calc_elastic(const ExplicitState&, int element) const;
   ExplicitEnergy calc_energy();

@@ -76,7 +76,7 @@ void ExplicitSystem::Inside::press_grounds(ExplicitState& state) const {
       q.force += press(static_cast<std::uint32_t>(i), true, q.p, q.v, q.mass, q.radius, q.stiffness, touches, forces);
       if (touches.size() > before) q.touched = 1;
       for (size_t k = before; k < touches.size(); ++k)
-        q.crush(q.stiffness, std::sqrt(2 * touches[k].stored / q.stiffness));
+        q.crushed = std::max(q.crushed, q.calc_crushed(q.stiffness, std::sqrt(2 * touches[k].stored / q.stiffness)));
     }
   });
   for (const Share& share : shares) {

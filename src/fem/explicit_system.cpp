@@ -51,10 +51,7 @@ ExplicitEnding ExplicitSystem::advance(double until, const Progress& progress) {
     if (progress.is_cancelled()) return ExplicitEnding::Cancelled;
     in.advance_step(in.s, true);
     if (in.s.steps % 64 != 0 && in.s.steps != last) continue;
-    // a number that is not finite spreads
-    double sum = 0;
-    for (const double x : in.s.rows) sum += x;
-    if (!std::isfinite(sum)) return ExplicitEnding::Diverged;
+    if (!in.is_finite(in.s)) return ExplicitEnding::Diverged;
     if (progress.report) progress.report(time() - begin, until - begin);
   }
   return ExplicitEnding::ReachedTime;

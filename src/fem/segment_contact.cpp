@@ -139,7 +139,7 @@ std::optional<SurfaceTouch> press_face(const ContactSetup& setup, const Explicit
   // a look before the projection: above the middle by more than the face is uneven
   const Vec3 middle = 0.25 * (x[0] + x[1] + x[2] + x[3]), n = cross(x[2] - x[0], x[3] - x[1]);
   const double size = norm(n), above = dot(q.p - middle, n);
-  if (above > (q.radius + std::abs(dot(x[0] - middle, n)) / std::max(size, 1e-300)) * size) return {};
+  if (above > q.radius * size + std::abs(dot(x[0] - middle, n))) return {};
   const Projection on = project(q.p, x, debris);
   double share = 1;
   if (!on.inside) {
@@ -148,11 +148,13 @@ std::optional<SurfaceTouch> press_face(const ContactSetup& setup, const Explicit
   }
   const double depth = q.radius - on.height;
   if (!(depth > 0)) return {};
-  Vec3 far;
-  for (const std::uint32_t row : quad_of(setup, candidate.face ^ 1).rows)
-    far += 0.25 * vector_at(s.rows.data() + 8 * size_t{row});
-  if (-on.height * size > kFaceDepth * dot(n, middle - far)) return {};
-  if (on.height < 0 && !is_nearest(setup, s, q.p, candidate.face, -on.height)) return {};
+  if (on.height < 0) {
+    Vec3 far;
+    for (const std::uint32_t row : quad_of(setup, candidate.face ^ 1).rows)
+      far += 0.25 * vector_at(s.rows.data() + 8 * size_t{row});
+    if (-on.height * size > kFaceDepth * dot(n, middle - far)) return {};
+    if (!is_nearest(setup, s, q.p, candidate.face, -on.height)) return {};
+  }
   double inverse = q.inverse_mass;
   Vec3 v = q.v;
   SurfaceTouch touch;
@@ -212,7 +214,37 @@ void press_particles(const ExplicitOptions& options, double h, const ExplicitSta
 
 }  // namespace
 
-void press_surfaces(const ExplicitSystem::Inside& in, ExplicitState& s) {
+namespace {
+
+/// What touches of a task exert, by the share that adds it up: neighbouring rows and particles belong to one.
+void list_pushes(const ExplicitState& s, const std::vector<SurfaceTouch>& touches, ContactPushes& pushes) {
+  for (auto& share : pushes.shares) share.rows.clear(), share.particles.clear();
+  const auto push = [&](std::uint32_t row, const Vec3& force) {
+    pushes.shares[row / 64 % kContactShares].rows.push_back({force, row});
+  };
+  const auto press = [&](std::uint32_t number, const SurfaceTouch& touch, double rate, const Vec3& force) {
+    const double crushed = rate > 0 ? s.particles[number].calc_crushed(rate, touch.depth) : 0;
+    pushes.shares[number / 16 % kContactShares].particles.push_back({force, crushed, number});
+  };
+  for (const SurfaceTouch& touch : touches) {
+    const Vec3 force = touch.normal_force + touch.friction;
+    const double rate = touch.depth > 0 ? 2 * touch.stored / (touch.depth * touch.depth) : 0;
+    if (touch.point.kind == ContactPoint::Debris)
+      press(touch.point.index, touch, rate, force);
+    else if (touch.point.kind == ContactPoint::Node)
+      push(touch.point_rows[0], force);
+    else
+      for (const std::uint32_t row : touch.point_rows) push(row, 0.25 * force);
+    if (touch.other > 0)
+      press(touch.other - 1, touch, rate, -force);
+    else
+      for (size_t k = 0; k < 4; ++k) push(touch.rows[k], -touch.weights[k] * force);
+  }
+}
+
+}  // namespace
+
+void press_surfaces(ExplicitSystem::Inside& in, ExplicitState& s) {
   ContactState& c = s.contact;
   const std::vector<NearCandidate>& near = c.near;
   // their number depends on nothing else, so that sums over them are always the same
@@ -224,6 +256,7 @@ void press_surfaces(const ExplicitSystem::Inside& in, ExplicitState& s) {
     return i;
   };
   c.touches.resize(tasks);
+  if (in.contact_pushes.size() < tasks) in.contact_pushes.resize(tasks);
   in.team->run(tasks, [&](size_t task) {
     std::vector<SurfaceTouch>& touches = c.touches[task];
     touches.clear();
@@ -231,39 +264,25 @@ void press_surfaces(const ExplicitSystem::Inside& in, ExplicitState& s) {
     press_points(in.contact, in.options, in.h, s, std::span(near).subspan(first, last - first), touches);
     const size_t from = pairs * task / tasks, to = pairs * (task + 1) / tasks;
     press_particles(in.options, in.h, s, std::span(c.near_particles).subspan(from, to - from), touches);
+    list_pushes(s, touches, in.contact_pushes[task]);
   });
   // each share adds what falls to its rows and particles, in the order of touches whoever does it
-  size_t count = 0;
-  for (const auto& touches : c.touches) count += touches.size();
-  constexpr size_t kMostShares = 4;
-  const size_t shares = count > 128 ? kMostShares : 1;
-  std::array<std::vector<std::uint32_t>, kMostShares> pushed;
-  in.team->run(shares, [&](size_t share) {
-    const auto push = [&](std::uint32_t row, const Vec3& force) {
-      if (row / 64 % shares == share) in.push(s, row, force, pushed[share]);
-    };
-    const auto press = [&](std::uint32_t number, const SurfaceTouch& touch, double rate, const Vec3& force) {
-      if (number / 16 % shares != share) return;
-      Particle& particle = s.particles[number];
-      if (rate > 0) particle.crush(rate, touch.depth);
-      particle.force += force, particle.touched = 1;
-    };
-    for (const auto& touches : c.touches)
-      for (const SurfaceTouch& touch : touches) {
-        const Vec3 force = touch.normal_force + touch.friction;
-        const double rate = touch.depth > 0 ? 2 * touch.stored / (touch.depth * touch.depth) : 0;
-        if (touch.point.kind == ContactPoint::Debris)
-          press(touch.point.index, touch, rate, force);
-        else if (touch.point.kind == ContactPoint::Node)
-          push(touch.point_rows[0], force);
-        else
-          for (const std::uint32_t row : touch.point_rows) push(row, 0.25 * force);
-        if (touch.other > 0)
-          press(touch.other - 1, touch, rate, -force);
-        else
-          for (size_t k = 0; k < 4; ++k) push(touch.rows[k], -touch.weights[k] * force);
+  std::array<std::vector<std::uint32_t>, kContactShares> pushed;
+  const auto add_up = [&](size_t share) {
+    for (size_t task = 0; task < tasks; ++task) {
+      const ContactPushes::Share& from = in.contact_pushes[task].shares[share];
+      for (const auto& [force, row] : from.rows) in.push(s, row, force, pushed[share]);
+      for (const auto& [force, crushed, number] : from.particles) {
+        Particle& particle = s.particles[number];
+        particle.crushed = std::max(particle.crushed, crushed);
+        particle.force += force, particle.touched = 1;
       }
-  });
+    }
+  };
+  if (tasks > 1)
+    in.team->run(kContactShares, add_up);
+  else
+    for (size_t share = 0; share < kContactShares; ++share) add_up(share);
   for (const auto& rows : pushed) s.pushed.insert(s.pushed.end(), rows.begin(), rows.end());
 }
 

@@ -18,7 +18,7 @@ void search_contact(const ContactSetup&, ExplicitState&, double h, Team&, double
 /// step is to look.
 bool is_knocked(const ContactSetup&, const ExplicitState&, double h, size_t first, size_t last);
 /// Forces of all candidates that touch.
-void press_surfaces(const ExplicitSystem::Inside&, ExplicitState&);
+void press_surfaces(ExplicitSystem::Inside&, ExplicitState&);
 /// Work of the last step's forces.
 void book_surfaces(const ExplicitSystem::Inside&, ExplicitState&);
 /// An element has gone: its neighbours' faces are outside now.
