@@ -325,22 +325,14 @@ class Search {
       case ContactPoint::Debris:
         p = s_.particles[point.index].p, radius = s_.particles[point.index].radius;
     }
-    const double reach = radius + path;
-    {
-      // most are too high above it, which its corners alone tell
-      const std::array<Vec3, 4> x = corners_of(candidate.face);
-      const Vec3 centre = 0.25 * (x[0] + x[1] + x[2] + x[3]), n = cross(x[2] - x[0], x[3] - x[1]);
-      const double size = std::max(norm(n), 1e-300);
-      if (dot(p - centre, n) > reach * size + std::abs(dot(x[0] - centre, n))) return false;
-    }
     const Face face = make_face(candidate.face);
     const Vec3 d = p - face.centre;
-    const double height = dot(d, face.normal);
-    if (height > reach + face.uneven || height < -(face.depth + face.uneven + path)) return false;
-    const double beside = calc_beside(d, face);
+    const double height = dot(d, face.normal), reach = radius + path;
+    if (height > reach + face.uneven) return false;
     // a ball at the height of the face's edge may touch it from beside, one below it does not
-    if (height < -(face.uneven + path)) return beside < path;
-    const double above = std::max(0.0, height - face.uneven);
+    if (height < -(face.uneven + path))
+      return calc_beside(d, face) < path && height >= -(find_depth(face) + face.uneven + path);
+    const double beside = calc_beside(d, face), above = std::max(0.0, height - face.uneven);
     return above * above + beside * beside < reach * reach;
   }
 
@@ -356,21 +348,24 @@ class Search {
     return x;
   }
 
+  /// Without depth and radius.
   Face make_face(std::uint32_t number) const {
     Face face;
     face.number = number;
     const std::array<Vec3, 4> x = corners_of(number);
-    Vec3 far;
-    for (const Vec3& p : corners_of(number ^ 1)) far += 0.25 * p;
     face.centre = 0.25 * (x[0] + x[1] + x[2] + x[3]);
     const Vec3 n = cross(x[2] - x[0], x[3] - x[1]);
     face.normal = (1 / std::max(norm(n), 1e-300)) * n;
     const Vec3 a = 0.25 * (x[1] + x[2] - x[0] - x[3]), b = 0.25 * (x[2] + x[3] - x[0] - x[1]);
     const double area = std::max(dot(cross(a, b), face.normal), 1e-300);
     face.along = (1 / area) * cross(b, face.normal), face.across = (1 / area) * cross(face.normal, a);
-    face.depth = kFaceDepth * std::max(0.0, dot(face.normal, face.centre - far));
     face.uneven = std::abs(dot(x[0] - face.centre, face.normal));
     return face;
+  }
+  double find_depth(const Face& face) const {
+    Vec3 far;
+    for (const Vec3& p : corners_of(face.number ^ 1)) far += 0.25 * p;
+    return kFaceDepth * std::max(0.0, dot(face.normal, face.centre - far));
   }
 
   void make_skins(const std::vector<ContactPair*>& due) {
@@ -395,6 +390,7 @@ class Search {
         const int beside = setup_.surface.neighbour[e][f];
         if (beside >= 0 && s_.contact.gone[static_cast<size_t>(beside)] == 0) continue;
         Face face = make_face(static_cast<std::uint32_t>(6 * e + f));
+        face.depth = find_depth(face);
         double square = 0;
         for (const Vec3& p : corners_of(face.number)) {
           const Vec3 d = p - face.centre;

@@ -37,8 +37,16 @@ kernel::Law make_law(const ExplicitMaterial& m) {
   return law;
 }
 
-/// Chunks are shared out to this many tasks at most.
+/// What is shared out by rows goes to this many tasks.
 constexpr size_t kTasks = 16;
+
+/// First chunks of tasks: a quarter of what one thread has left, so that none waits long for another at the end.
+std::vector<size_t> share_chunks(size_t count, int threads) {
+  std::vector<size_t> starts{0};
+  while (starts.back() < count)
+    starts.push_back(starts.back() + std::max<size_t>(1, (count - starts.back()) / (4 * static_cast<size_t>(threads))));
+  return starts;
+}
 
 double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
@@ -151,6 +159,7 @@ ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
 
   shared_forces.assign(4 * std::max<size_t>(1, chunks.shared_rows.size()), 0);
   failed.resize(chunks.chunks.size());
+  task_starts = share_chunks(chunks.chunks.size(), team->threads());
   chunk_sums.resize(chunks.chunks.size());
   grounded.resize(chunks.chunks.size() + kTasks);
   balances.resize(grounded.size());
@@ -191,14 +200,14 @@ kernel::StepJob ExplicitSystem::Inside::make_step() const {
 }
 
 void ExplicitSystem::Inside::advance_nodes(const kernel::StepJob& step, ExplicitState& state) {
-  const size_t count = chunks.chunks.size(), tasks = std::min(kTasks, count), W = chunks.W;
+  const size_t count = chunks.chunks.size(), W = chunks.W;
   const double t0 = seconds();
   for (kernel::Law& law : laws) kernel::set_step(law, step.past);
   const auto run_task = [&](size_t task) {
     // of a thread rather than a task, so that it stays in the cache; all 0 between chunks
     static thread_local AlignedVector<double> room;
     if (room.size() < 4 * chunks.most_nodes) room.assign(4 * chunks.most_nodes, 0);
-    for (size_t i = count * task / tasks; i < count * (task + 1) / tasks; ++i) {
+    for (size_t i = task_starts[task]; i < task_starts[task + 1]; ++i) {
       const ElementChunk& chunk = chunks.chunks[i];
       kernel::ChunkJob job;
       job.laws = laws.data(), job.law_of_block = chunks.material_of_block.data() + chunk.first_block;
@@ -236,17 +245,21 @@ void ExplicitSystem::Inside::advance_nodes(const kernel::StepJob& step, Explicit
     kernel::advance_shared(step, job);
     balances[count + task] = job.balance;
   };
-  team->run(tasks, run_task);
+  team->run(task_starts.size() - 1, run_task);
   const double t1 = seconds();
   team->run(kTasks, run_shared);
   timing.kernel += t1 - t0, timing.boundary += seconds() - t1;
 }
 
 void ExplicitSystem::Inside::clear_pushes(ExplicitState& state) const {
-  for (const std::uint32_t row : state.pushed) {
-    state.flags[row] = static_cast<std::uint8_t>(state.flags[row] & ~kernel::kPushed);
-    for (size_t c = 0; c < 3; ++c) state.pushes[4 * size_t{row} + c] = 0;
-  }
+  const size_t count = state.pushed.size(), tasks = std::clamp<size_t>(count / 512, 1, kTasks);
+  team->run(tasks, [&](size_t task) {
+    for (size_t i = count * task / tasks; i < count * (task + 1) / tasks; ++i) {
+      const std::uint32_t row = state.pushed[i];
+      state.flags[row] = static_cast<std::uint8_t>(state.flags[row] & ~kernel::kPushed);
+      for (size_t c = 0; c < 3; ++c) state.pushes[4 * size_t{row} + c] = 0;
+    }
+  });
   state.pushed.clear();
   for (const std::uint32_t row : loaded)
     if (state.uses[row] > 0) push(state, row, {});
