@@ -325,13 +325,14 @@ class Search {
       case ContactPoint::Debris:
         p = s_.particles[point.index].p, radius = s_.particles[point.index].radius;
     }
-    const Face face = make_face(candidate.face);
+    const Face face = make_face(candidate.face, corners_of(candidate.face));
     const Vec3 d = p - face.centre;
     const double height = dot(d, face.normal), reach = radius + path;
     if (height > reach + face.uneven) return false;
     // a ball at the height of the face's edge may touch it from beside, one below it does not
     if (height < -(face.uneven + path))
-      return calc_beside(d, face) < path && height >= -(find_depth(face) + face.uneven + path);
+      return calc_beside(d, face) < path &&
+             height >= -(calc_depth(face, corners_of(face.number ^ 1)) + face.uneven + path);
     const double beside = calc_beside(d, face), above = std::max(0.0, height - face.uneven);
     return above * above + beside * beside < reach * reach;
   }
@@ -349,10 +350,9 @@ class Search {
   }
 
   /// Without depth and radius.
-  Face make_face(std::uint32_t number) const {
+  static Face make_face(std::uint32_t number, const std::array<Vec3, 4>& x) {
     Face face;
     face.number = number;
-    const std::array<Vec3, 4> x = corners_of(number);
     face.centre = 0.25 * (x[0] + x[1] + x[2] + x[3]);
     const Vec3 n = cross(x[2] - x[0], x[3] - x[1]);
     face.normal = (1 / std::max(norm(n), 1e-300)) * n;
@@ -362,9 +362,10 @@ class Search {
     face.uneven = std::abs(dot(x[0] - face.centre, face.normal));
     return face;
   }
-  double find_depth(const Face& face) const {
+  /// By the corners of the face opposite.
+  static double calc_depth(const Face& face, const std::array<Vec3, 4>& opposite) {
     Vec3 far;
-    for (const Vec3& p : corners_of(face.number ^ 1)) far += 0.25 * p;
+    for (const Vec3& p : opposite) far += 0.25 * p;
     return kFaceDepth * std::max(0.0, dot(face.normal, face.centre - far));
   }
 
@@ -381,18 +382,32 @@ class Search {
     });
   }
   Skin make_skin(std::uint32_t g, bool has_points) const {
-    constexpr size_t kRun = 8;
+    constexpr size_t kRun = 8, kUsual = 128;
     Skin skin;
+    skin.faces.reserve(kUsual), skin.runs.reserve(kUsual / kRun);
+    if (has_points) skin.points.reserve(2 * kUsual);
     for (std::uint32_t i = setup_.group_starts[g]; i < setup_.group_starts[g + 1]; ++i) {
       const size_t e = static_cast<size_t>(setup_.order[i]);
       if (s_.contact.gone[e] != 0) continue;
+      const std::array<int, 6>& neighbour = setup_.surface.neighbour[e];
+      std::array<Vec3, 8> corners;
+      bool has_corners = false;
       for (size_t f = 0; f < 6; ++f) {
-        const int beside = setup_.surface.neighbour[e][f];
+        const int beside = neighbour[f];
         if (beside >= 0 && s_.contact.gone[static_cast<size_t>(beside)] == 0) continue;
-        Face face = make_face(static_cast<std::uint32_t>(6 * e + f));
-        face.depth = find_depth(face);
+        if (!has_corners)
+          for (size_t k = 0; k < 8; ++k) corners[k] = place(s_, setup_.rows_of_element[e][k]);
+        has_corners = true;
+        const auto corners_at = [&](size_t number) {
+          std::array<Vec3, 4> x;
+          for (size_t k = 0; k < 4; ++k) x[k] = corners[static_cast<size_t>(kFaces[number][k])];
+          return x;
+        };
+        const std::array<Vec3, 4> x = corners_at(f);
+        Face face = make_face(static_cast<std::uint32_t>(6 * e + f), x);
+        face.depth = calc_depth(face, corners_at(f ^ 1));
         double square = 0;
-        for (const Vec3& p : corners_of(face.number)) {
+        for (const Vec3& p : x) {
           const Vec3 d = p - face.centre;
           square = std::max(square, dot(d, d)), skin.box.add(p, 0);
         }
