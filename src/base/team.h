@@ -7,7 +7,9 @@
 
 namespace topple {
 
-/// Between loops its threads look for work for about a millisecond, then sleep.
+/// A thread begins with the same part of the indices in every loop of as many, so that what it works on stays in its
+/// cache, and then takes from the end of what others have left. Between loops its threads look for work for about a
+/// millisecond, then sleep.
 class Team {
  public:
   /// `threads` with the one that calls run (0: all of the machine).

@@ -40,14 +40,6 @@ kernel::Law make_law(const ExplicitMaterial& m) {
 /// What is shared out by rows goes to this many tasks.
 constexpr size_t kTasks = 16;
 
-/// First chunks of tasks: a quarter of what one thread has left, so that none waits long for another at the end.
-std::vector<size_t> share_chunks(size_t count, int threads) {
-  std::vector<size_t> starts{0};
-  while (starts.back() < count)
-    starts.push_back(starts.back() + std::max<size_t>(1, (count - starts.back()) / (4 * static_cast<size_t>(threads))));
-  return starts;
-}
-
 double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 }  // namespace
@@ -159,7 +151,6 @@ ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
 
   shared_forces.assign(4 * std::max<size_t>(1, chunks.shared_rows.size()), 0);
   failed.resize(chunks.chunks.size());
-  task_starts = share_chunks(chunks.chunks.size(), team->threads());
   chunk_sums.resize(chunks.chunks.size());
   grounded.resize(chunks.chunks.size() + kTasks);
   balances.resize(grounded.size());
@@ -203,35 +194,33 @@ void ExplicitSystem::Inside::advance_nodes(const kernel::StepJob& step, Explicit
   const size_t count = chunks.chunks.size(), W = chunks.W;
   const double t0 = seconds();
   for (kernel::Law& law : laws) kernel::set_step(law, step.past);
-  const auto run_task = [&](size_t task) {
-    // of a thread rather than a task, so that it stays in the cache; all 0 between chunks
+  const auto run_chunk = [&](size_t i) {
+    // of a thread rather than a chunk, so that it stays in the cache; all 0 between chunks
     static thread_local AlignedVector<double> room;
     if (room.size() < 4 * chunks.most_nodes) room.assign(4 * chunks.most_nodes, 0);
-    for (size_t i = task_starts[task]; i < task_starts[task + 1]; ++i) {
-      const ElementChunk& chunk = chunks.chunks[i];
-      kernel::ChunkJob job;
-      job.laws = laws.data(), job.law_of_block = chunks.material_of_block.data() + chunk.first_block;
-      job.blocks = chunk.blocks;
-      job.elements = state.elements.data() + chunk.first_block * W * kernel::kElementFields;
-      job.corners = chunks.corners.data() + chunk.first_block * 8 * W;
-      job.joined = chunks.joined.data() + chunk.first_block;
-      job.live = state.live.data() + chunk.first_block;
-      job.own = chunk.own, job.shared = chunk.shared;
-      job.own_nodes = state.rows.data() + 8 * chunk.first_row;
-      job.nodes = state.rows.data();
-      job.shared_nodes = chunks.shared_rows.data() + chunk.first_shared;
-      job.shared_forces = shared_forces.data() + 4 * chunk.first_shared;
-      job.own_flags = state.flags.data() + chunk.first_row;
-      job.own_pushes = state.pushes.data() + 4 * chunk.first_row;
-      job.forces = room.data();
-      failed[i].clear(), grounded[i].clear();
-      job.failed = &failed[i], job.grounded = &grounded[i];
-      kernel::advance_chunk(step, job);
-      for (size_t k = 0; k < 4; ++k) chunk_sums[i][k] = job.sums[k];
-      balances[i] = job.balance;
-      for (std::uint32_t& row : grounded[i]) row += static_cast<std::uint32_t>(chunk.first_row);
-      for (std::uint32_t& f : failed[i]) f += static_cast<std::uint32_t>(4 * chunk.first_block * W);
-    }
+    const ElementChunk& chunk = chunks.chunks[i];
+    kernel::ChunkJob job;
+    job.laws = laws.data(), job.law_of_block = chunks.material_of_block.data() + chunk.first_block;
+    job.blocks = chunk.blocks;
+    job.elements = state.elements.data() + chunk.first_block * W * kernel::kElementFields;
+    job.corners = chunks.corners.data() + chunk.first_block * 8 * W;
+    job.joined = chunks.joined.data() + chunk.first_block;
+    job.live = state.live.data() + chunk.first_block;
+    job.own = chunk.own, job.shared = chunk.shared;
+    job.own_nodes = state.rows.data() + 8 * chunk.first_row;
+    job.nodes = state.rows.data();
+    job.shared_nodes = chunks.shared_rows.data() + chunk.first_shared;
+    job.shared_forces = shared_forces.data() + 4 * chunk.first_shared;
+    job.own_flags = state.flags.data() + chunk.first_row;
+    job.own_pushes = state.pushes.data() + 4 * chunk.first_row;
+    job.forces = room.data();
+    failed[i].clear(), grounded[i].clear();
+    job.failed = &failed[i], job.grounded = &grounded[i];
+    kernel::advance_chunk(step, job);
+    for (size_t k = 0; k < 4; ++k) chunk_sums[i][k] = job.sums[k];
+    balances[i] = job.balance;
+    for (std::uint32_t& row : grounded[i]) row += static_cast<std::uint32_t>(chunk.first_row);
+    for (std::uint32_t& f : failed[i]) f += static_cast<std::uint32_t>(4 * chunk.first_block * W);
   };
   const size_t shared = chunks.node_of_row.size() - chunks.first_shared_row;
   const auto run_shared = [&](size_t task) {
@@ -245,7 +234,7 @@ void ExplicitSystem::Inside::advance_nodes(const kernel::StepJob& step, Explicit
     kernel::advance_shared(step, job);
     balances[count + task] = job.balance;
   };
-  team->run(task_starts.size() - 1, run_task);
+  team->run(count, run_chunk);
   const double t1 = seconds();
   team->run(kTasks, run_shared);
   timing.kernel += t1 - t0, timing.boundary += seconds() - t1;

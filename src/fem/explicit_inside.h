@@ -103,7 +103,6 @@ struct ExplicitSystem::Inside {
   double start_energy = 0;
   bool started = false;
   std::unique_ptr<Team> team;
-  std::vector<size_t> task_starts;  // of tasks of chunks, which get smaller towards the end
   // room for a step
   AlignedVector<double> shared_forces;
   std::vector<std::vector<std::uint32_t>> failed, grounded;

@@ -35,6 +35,27 @@ TEST(Team, UsesTheThreadsItIsGiven) {
   EXPECT_EQ(here, 2);
 }
 
+TEST(Team, GivesAThreadTheSamePartInEveryLoop) {
+  Team team(2);
+  for (int loop = 0; loop < 1000; ++loop) {
+    std::atomic<int> here = 0;
+    std::vector<std::thread::id> by(2);
+    team.run(2, [&](std::size_t i) {
+      by[i] = std::this_thread::get_id();
+      ++here;
+      while (here < 2) std::this_thread::yield();
+    });
+    ASSERT_EQ(by[0], std::this_thread::get_id());
+  }
+}
+
+TEST(Team, DoesMoreIndicesThanItCountsOneByOne) {
+  Team team(3);
+  std::vector<unsigned char> calls(200001, 0);
+  team.run(calls.size(), [&](std::size_t i) { ++calls[i]; });
+  for (std::size_t i = 0; i < calls.size(); ++i) ASSERT_EQ(calls[i], 1) << i;
+}
+
 TEST(Team, WaitsAsleep) {
   Team team(4);
   team.run(8, [](std::size_t) {});
