@@ -57,8 +57,7 @@ struct Skin {
   std::vector<Face> faces;
   std::vector<FaceRun> runs;
   std::vector<Point> points;
-  ContactBox box;     // of the faces
-  double radius = 0;  // the largest of a face
+  ContactBox box;  // of the faces
 };
 
 /// Calls body(i) for all i below count, `run` of them a task.
@@ -412,7 +411,6 @@ class Search {
           square = std::max(square, dot(d, d)), skin.box.add(p, 0);
         }
         face.radius = std::sqrt(square);
-        skin.radius = std::max(skin.radius, face.radius);
         if (skin.faces.size() % kRun == 0) skin.runs.push_back({{}, skin.faces.size(), 0});
         FaceRun& run = skin.runs.back();
         run.box.add(face.centre, face.radius + face.depth);
@@ -480,13 +478,6 @@ class Search {
       const std::uint32_t i = pair.a - groups_;
       const Particle& particle = s_.particles[i];
       match({{ContactPoint::Debris, i}, particle.p, particle.full_radius}, b, pair.candidates);
-      if (!pair.candidates.empty()) return;
-      double nearest = std::numeric_limits<double>::infinity();  // squared
-      for (const Face& face : b.faces) {
-        const Vec3 d = particle.p - face.centre;
-        nearest = std::min(nearest, dot(d, d));
-      }
-      pair.slack = std::max(pair.slack, std::sqrt(nearest) - b.radius - particle.full_radius);
       return;
     }
     if (pair.a == pair.b) {

@@ -127,6 +127,28 @@ TEST(ExplicitContactPhysics, AnImpactOfBlocksKeepsMomentumAndEnergy) {
   EXPECT_GT(upper / 2400, lower / 2400);
 }
 
+TEST(ExplicitContactPhysics, BlocksThatComeFromAfarMeet) {
+  // each a group of its own, within the room in which pairs are kept and beyond the margin in which they are looked
+  // through
+  ExplicitModel model;
+  model.materials = {make_explicit_elastic(2400, 30e9, 0.2)};
+  model.gravity = {};
+  add_brick(model, {0, 0, 0}, {1, 1, 1}, 4, 4, 4, 0, 0);
+  add_brick(model, {0.13, 0.21, 1.2}, {1.13, 1.21, 2.2}, 4, 4, 4, 0, 1);
+  ExplicitSystem system(model, {});
+  std::vector<Vec3> v(model.nodes.size());
+  for (size_t n = 0; n < v.size(); ++n)
+    if (model.nodes[n].z > 1.1) v[n] = {0, 0, -4};
+  system.set_velocities(v);
+  ASSERT_EQ(system.advance(0.048), ExplicitEnding::ReachedTime);
+  EXPECT_EQ(system.contacts(), 0);
+  ASSERT_EQ(system.advance(0.06), ExplicitEnding::ReachedTime);
+  double lower = 0;
+  for (size_t n = 0; n < v.size(); ++n)
+    if (model.nodes[n].z < 1.1) lower += system.node_mass(static_cast<int>(n)) * system.v(static_cast<int>(n)).z;
+  EXPECT_LT(lower / 2400, -2);
+}
+
 TEST(ExplicitContactPhysics, TheOrderOfBodiesDoesNotCount) {
   std::array<double, 2> height{};
   for (const bool swapped : {false, true}) {
