@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "collapse/knowledge.h"
+
 namespace topple::bench {
 
 namespace {
@@ -78,7 +80,7 @@ void connect(Model& m, BodyId a, BodyId b, const Vec3& at, const Vec3& axis, dou
 Model make_frame(int bays) {
   Model m;
   m.name = "frame255";
-  m.contact.contact_frequency = 800;  // as the manager gives buildings
+  m.contact.contact_frequency = collapse::default_knowledge().contact_frequency;
   const LawId column_law = add_law(m, make_brittle("column", 9e6, 1.5e6, 1.2e6, 0.7e6, 0.5e6));
   const LawId beam_law = add_law(m, make_brittle("beam", 4e6, 1.0e6, 0.8e6, 0.6e6, 0.3e6));
   const LawId slab_law = add_law(m, make_brittle("slab", 4e6, 0.8e6, 0.5e6, 0.15e6, 0.15e6));

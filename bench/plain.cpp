@@ -15,7 +15,6 @@ namespace topple::bench {
 namespace {
 
 constexpr double kDuration = 1.7;                // [s]
-constexpr double kGroundFrequency = 800;         // of a body on one corner [rad/s]
 constexpr double kFriction = 0.6, kSlow = 0.01;  // Coulomb's, reached at this speed [m/s]
 
 struct PlainBody {
@@ -36,12 +35,14 @@ struct PlainConnection {
 };
 
 struct PlainFrame {
+  double ground_frequency = 0;  // of a body on one corner [rad/s]
   std::vector<PlainBody> bodies;
   std::vector<PlainConnection> connections;
   std::vector<int> front;  // connections that are taken away
   Vec3 gravity;
 
-  PlainFrame(const mbs::Model& model, const std::vector<Pose>& start) : gravity(model.gravity) {
+  PlainFrame(const mbs::Model& model, const std::vector<Pose>& start)
+      : ground_frequency(model.contact.contact_frequency), gravity(model.gravity) {
     for (size_t i = 0; i < model.bodies.size(); ++i) {
       const mbs::Body& from = model.bodies[i];
       PlainBody b;
@@ -88,7 +89,7 @@ struct PlainFrame {
 
   void touch_ground(PlainBody& b) const {
     if (b.p.z > b.radius) return;
-    const double stiffness = b.mass * kGroundFrequency * kGroundFrequency / 8;
+    const double stiffness = b.mass * ground_frequency * ground_frequency / 8;
     for (int corner = 0; corner < 8; ++corner) {
       const Vec3 lever = b.R * Vec3{corner & 1 ? b.half.x : -b.half.x, corner & 2 ? b.half.y : -b.half.y,
                                     corner & 4 ? b.half.z : -b.half.z};
