@@ -57,7 +57,9 @@ struct Projection {
   double height = 0;
   bool inside = false;
 };
-Projection project(const Vec3& p, const Vec3 (&x)[4], bool clamps) {
+/// None where a ball of `radius`, clamped to the face, or a point that is to be above or below it cannot touch.
+std::optional<Projection> project(const Vec3& p, const Vec3 (&x)[4], double radius, bool clamps) {
+  constexpr double kEdge = 1.001;  // faces that meet at an edge leave no gap
   Projection out;
   const Vec3 c = 0.25 * (x[0] + x[1] + x[2] + x[3]), a = 0.25 * (x[1] + x[2] - x[0] - x[3]),
              b = 0.25 * (x[2] + x[3] - x[0] - x[1]), d = 0.25 * (x[0] + x[2] - x[1] - x[3]);
@@ -67,17 +69,22 @@ Projection project(const Vec3& p, const Vec3 (&x)[4], bool clamps) {
   const Vec3 along = (1 / std::max(norm(a), 1e-300)) * a, across = cross(out.normal, along);
   const double a1 = dot(a, along), b1 = dot(b, along), b2 = dot(b, across), d1 = dot(d, along), d2 = dot(d, across);
   const double p1 = dot(p - c, along), p2 = dot(p - c, across);
+  // beside the rectangle around the face
+  const double beside1 = std::abs(p1) - kEdge * kEdge * (std::abs(a1) + std::abs(b1) + std::abs(d1)),
+               beside2 = std::abs(p2) - kEdge * kEdge * (std::abs(b2) + std::abs(d2));
+  const double far1 = std::max(0.0, beside1), far2 = std::max(0.0, beside2);
+  if (far1 * far1 + far2 * far2 > radius * radius) return {};
   double xi = 0, eta = 0;
   for (int i = 0; i < 4; ++i) {
     const double t1 = a1 + eta * d1, t2 = eta * d2, u1 = b1 + xi * d1, u2 = b2 + xi * d2;
     const double r1 = p1 - (xi * t1 + eta * b1), r2 = p2 - (xi * t2 + eta * b2);
+    if (std::abs(r1) + std::abs(r2) < 1e-14 * a1) break;
     const double area = t1 * u2 - t2 * u1;
     if (!(std::abs(area) > 1e-300)) break;
     const double dx = (r1 * u2 - r2 * u1) / area, dy = (t1 * r2 - t2 * r1) / area;
     xi = std::clamp(xi + dx, -3.0, 3.0), eta = std::clamp(eta + dy, -3.0, 3.0);
     if (std::abs(dx) + std::abs(dy) < 1e-12) break;
   }
-  constexpr double kEdge = 1.001;  // faces that meet at an edge leave no gap
   out.inside = std::abs(xi) <= kEdge && std::abs(eta) <= kEdge;
   if (clamps) xi = std::clamp(xi, -1.0, 1.0), eta = std::clamp(eta, -1.0, 1.0);
   out.weights[0] = 0.25 * (1 - xi) * (1 - eta), out.weights[1] = 0.25 * (1 + xi) * (1 - eta);
@@ -140,7 +147,9 @@ std::optional<SurfaceTouch> press_face(const ContactSetup& setup, const Explicit
   const Vec3 middle = 0.25 * (x[0] + x[1] + x[2] + x[3]), n = cross(x[2] - x[0], x[3] - x[1]);
   const double size = norm(n), above = dot(q.p - middle, n);
   if (above > q.radius * size + std::abs(dot(x[0] - middle, n))) return {};
-  const Projection on = project(q.p, x, debris);
+  const std::optional<Projection> found = project(q.p, x, q.radius, debris);
+  if (!found) return {};
+  const Projection& on = *found;
   double share = 1;
   if (!on.inside) {
     if (!debris || above < 0) return {};
