@@ -192,6 +192,7 @@ void System::pack_element(size_t e, bool has_moved) {
       for (int f = from; f < to; ++f) l.flow(slot, f) = fields[f];
     };
     if (has_flow) {
+      fields[kIdle] = kLongestIdle - kLongestIdleAgain;  // the full law has found no bounds
       copy(kAxial, kShearOwn), copy(kSlipped, kSlipped + 1), copy(kTwisted, kTwisted + 1), copy(kBefore, kStations);
       for (int station = 0; station < c.zone.stations; ++station) {
         const int at = kStations + station * kStationFields;
@@ -393,6 +394,16 @@ void System::evaluate_outside(size_t slot) {
   pack_element(e, false);
 }
 
+void System::write_cells(size_t slot, double axial) {
+  Lanes& l = *lanes;
+  const size_t e = l.is_batch ? slot / l.W : l.element_of[slot];
+  const ZoneParameters& zone = elements[e].zone;
+  ZoneState& z = state.element[e];
+  double reached[2] = {0, 0};
+  for (int s = 0; s < zone.stations; ++s) reached[s] = l.flow(slot, kStations + s * kStationFields + kReached);
+  (void)write_flow_cells(zone, laws, z, axial, reached, &l.flow(slot, 0), l.W);
+}
+
 void System::evaluate_elements_fully(double h) {
   for (size_t i = 0; i < elements.size(); ++i) evaluate_element(i, h);
   sum_element_forces();
@@ -402,16 +413,18 @@ void System::evaluate_elements() {
   Lanes& l = *lanes;
   l.outside.clear();
   l.lay_poses();
+  const CellWriter cells{
+      [](void* owner, size_t slot, double axial) { static_cast<System*>(owner)->write_cells(slot, axial); }, this};
   if (options.threads > 1 && l.element_blocks >= kBlocksForThreads) {
     // every block writes its own places only; reports follow in order, so threads change no bit
     const size_t chunks = (l.element_blocks + kChunk - 1) / kChunk;
     std::vector<std::vector<std::uint32_t>> beyond(chunks);
     (void)parallel_for(chunks, options.threads, [&](size_t c) {
-      l.evaluate_elements(c * kChunk, std::min(l.element_blocks, (c + 1) * kChunk), beyond[c]);
+      l.evaluate_elements(c * kChunk, std::min(l.element_blocks, (c + 1) * kChunk), cells, beyond[c]);
     });
     for (const auto& list : beyond) l.outside.insert(l.outside.end(), list.begin(), list.end());
   } else {
-    l.evaluate_elements(0, l.element_blocks, l.outside);
+    l.evaluate_elements(0, l.element_blocks, cells, l.outside);
   }
   // where they lie says nothing about what is told first
   std::sort(l.outside.begin(), l.outside.end(),

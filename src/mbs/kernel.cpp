@@ -281,9 +281,56 @@ struct CellForce {
   }
 };
 
-/// The law of a zone that flows in bending, shear or torsion (docs/theory/zones.md, eq. 1 to 9). Sets the elastic
-/// resultants f; gives the lanes among `wanted` for which that is the whole truth and moves their history; the others
-/// keep theirs.
+/// Those lanes among `wanted` whose normal force and rotations are in their cells, which are written anew where they
+/// have left them, and that do not flow axially.
+template <class D, Plane In, int Hinges, class M>
+HWY_INLINE M enter_cells(const ElementJob& job, size_t block, M wanted, Num<D> k, Num<D> d) {
+  using N = Num<D>;
+  const D tag;
+  const size_t W = hn::Lanes(tag);
+  const double* flow = job.flows + static_cast<size_t>(kFlowFields) * W * block;
+  const N one = num<D>(1), zero = num<D>(0), force = k * (d - load<D>(flow, kAxial));
+  struct Place {
+    M is_in_cells, is_known, is_within;
+  };
+  const auto find = [&] {
+    Place at{wanted, wanted, wanted};
+    N most = zero;  // rotation reached
+    for (int s = 0; s < Hinges; ++s) {
+      const N reached = load<D>(flow, kStations + s * kStationFields + kReached);
+      most = {hn::Max(most.v, reached.v)};
+      for (int q = first_bending(In); q <= last_bending(In); ++q) {
+        const int cell = kStations + s * kStationFields + kCell + q * kCellFields;
+        const N r = (reached - load<D>(flow, cell + kCellRotation)) * load<D>(flow, cell + kCellRotation + 1);
+        at.is_in_cells = hn::And(at.is_in_cells, hn::And(hn::Le(CellForce<D>(flow, cell, force).share.v, one.v),
+                                                         hn::And(hn::Ge(r.v, zero.v), hn::Le(r.v, one.v))));
+      }
+    }
+    at.is_known = hn::Le(most.v, load<D>(flow, kTurnedFar).v);
+    N least = load<D>(flow, kFlowLeast);
+    for (int q = 0; q < 2; ++q)
+      least = maximum(least, fma(load<D>(flow, kTurnedSlope + q), most - load<D>(flow, kTurnedFrom + q),
+                                 load<D>(flow, kTurnedLeast + q)));
+    at.is_within = hn::And(hn::Ge(force.v, least.v), hn::Le(force.v, load<D>(flow, kFlowMost).v));
+    return at;
+  };
+  Place at = find();
+  const M left = hn::AndNot(hn::And(at.is_in_cells, at.is_known), wanted);
+  const M stale = hn::And(left, hn::Or(at.is_within, hn::Not(at.is_known)));
+  if (HWY_UNLIKELY(!hn::AllFalse(tag, stale))) {
+    alignas(64) double forces[kMostLanes], is_stale[kMostLanes];
+    hn::Store(force.v, tag, forces);
+    hn::Store(hn::IfThenElseZero(stale, one.v), tag, is_stale);
+    for (size_t l = 0; l < W; ++l)
+      if (is_stale[l] != 0) job.cells.write(job.cells.owner, block * W + l, forces[l]);
+    at = find();
+  }
+  return hn::And(hn::And(wanted, at.is_within), hn::And(at.is_in_cells, at.is_known));
+}
+
+/// The law of a zone that flows in bending, shear or torsion (docs/theory/zones.md, eq. 1 to 9), in its cells. Sets
+/// the elastic resultants f; gives the lanes among `wanted` for which that is the whole truth and moves their history;
+/// the others keep theirs.
 template <class D, Plane In, int Hinges, class M>
 HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], const Num<D> k[6], const Num<D> d[6],
                        const Num<D> e_before[6], Num<D> f[6]) {
@@ -300,8 +347,6 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
   for (int i = 0; i < 6; ++i) f[i] = zero;
   f[0] = k[0] * (d[0] - load<D>(flow, kAxial));
   if constexpr (!is_plane) f[3] = k[3] * (d[3] - twist);
-  demand(hn::Ge(f[0].v, load<D>(flow, kFlowLeast).v));
-  demand(hn::Le(f[0].v, load<D>(flow, kFlowMost).v));
 
   BendingPlane<D, Hinges> plane[2];
   for (int q = first; q <= last; ++q) {
@@ -345,7 +390,6 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
       const CellForce<D> at(flow, cell, f[0]);
       const N r = (load<D>(flow, kStations + s * kStationFields + kReached) - load<D>(flow, cell + kCellRotation)) *
                   load<D>(flow, cell + kCellRotation + 1);
-      demand(hn::And(hn::Le(at.share.v, one.v), hn::And(hn::Ge(r.v, zero.v), hn::Le(r.v, one.v))));
       const auto positive = hn::Ge(plane[q].m[s].v, zero.v);
       const auto corner = [&](int force, int rotation) {
         const int value = cell + 2 * force + rotation;
@@ -792,8 +836,9 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
   };
   bool books_slid = softened;
   if (HWY_UNLIKELY(!hn::AllFalse(tag, outside))) {
-    const auto flows = hn::AndNot(too_far, hn::And(outside, hn::Gt(constant(kFlows).v, zero.v)));
+    auto flows = hn::AndNot(too_far, hn::And(outside, hn::Gt(constant(kFlows).v, zero.v)));
     if (softened) slide();
+    if (!hn::AllFalse(tag, flows)) flows = enter_cells<D, In, Hinges>(job, block, flows, k[0], d[0]);
     if (!hn::AllFalse(tag, flows)) {
       double* HWY_RESTRICT flow = job.flows + static_cast<size_t>(kFlowFields) * W * block;
       N f_flow[6], d_before[6];

@@ -68,22 +68,26 @@ enum Flow : int {
   kAxial = 0,           // plastic elongation
   kSlip = 1,            // along y, z (2)
   kTwist = 3,           //
-  kFlowLeast = 4,       // range of normal force in which neither end of the axial law is reached
-  kFlowMost = 5,        //
-  kShearOwn = 6,        // limits without normal force and slip, along y, z (2)
-  kShearFriction = 8,   //
-  kSlipped = 9,         // so far
-  kSlipSoftening = 10,  // one over the slip at which nothing of the own limits is left
-  kSlipRupture = 11,    //
-  kTwisted = 12,        // so far
-  kTwistRupture = 13,   //
-  kTorsion = 14,        // limit
-  kFlexibility = 15,    // one over the stiffness, 0 for none (6)
-  kBefore = 21,         // deformation at the step before (6)
-  kStored = 27,         // elastic energy at the step before
-  kPlastic = 28,        // dissipated since the slot was written
-  kIdle = 29,           // steps without flow
-  kStations = 30,       // both stations, kStationFields each
+  kFlowMost = 4,        // normal force at which it flows in tension
+  kFlowLeast = 5,       // in compression, whatever the rotation
+  kTurnedFrom = 6,      // lowest rotation of the interval of each family's compression capacity (2)
+  kTurnedLeast = 8,     // normal force there at which it flows (2)
+  kTurnedSlope = 10,    // and its rise with the rotation (2)
+  kTurnedFar = 12,      // rotation up to which that holds
+  kShearOwn = 13,       // limits without normal force and slip, along y, z (2)
+  kShearFriction = 15,  //
+  kSlipped = 16,        // so far
+  kSlipSoftening = 17,  // one over the slip at which nothing of the own limits is left
+  kSlipRupture = 18,    //
+  kTwisted = 19,        // so far
+  kTwistRupture = 20,   //
+  kTorsion = 21,        // limit
+  kFlexibility = 22,    // one over the stiffness, 0 for none (6)
+  kBefore = 28,         // deformation at the step before (6)
+  kStored = 34,         // elastic energy at the step before
+  kPlastic = 35,        // dissipated since the slot was written
+  kIdle = 36,           // steps without flow
+  kStations = 37,       // both stations, kStationFields each
   kStationFields = 53,
   kFlowFields = kStations + 2 * kStationFields
 };
@@ -109,8 +113,8 @@ enum FlowCell : int {
   kCellLiftPositive = 17,
   kCellLiftNegative = 20
 };
-/// Steps without flow after which the full law is asked for bounds.
-inline constexpr double kLongestIdle = 20;
+/// Steps without flow after which the full law is asked for bounds, and after which again if it found none.
+inline constexpr double kLongestIdle = 20, kLongestIdleAgain = 200;
 /// Most flexibility that damage adds, over the elastic one: unloading keeps a twentieth of the stiffness.
 inline constexpr double kMostDamage = 19;
 
@@ -142,6 +146,13 @@ struct BodyJob {
   std::vector<std::uint32_t>* spins;  // slots that turn too fast for the series, left where they were
 };
 
+/// Writes the cells of a zone that flows anew, around a normal force that has left them or a rotation that has, while
+/// the kernel waits; leaves them as they are where no cell has that force.
+struct CellWriter {
+  void (*write)(void* owner, size_t slot, double force) = nullptr;
+  void* owner = nullptr;
+};
+
 /// One evaluation of all elements.
 struct ElementJob {
   size_t first = 0, last = 0;            // blocks
@@ -158,7 +169,8 @@ struct ElementJob {
   const std::uint32_t *body_a, *body_b;  // batch: body of each block
   const double *p, *q;                   // batch: of the bodies
   const double* poses;                   // of the bodies, kPoseRow numbers each
-  std::vector<std::uint32_t>* outside;   // slots that need the full law, untouched
+  CellWriter cells;
+  std::vector<std::uint32_t>* outside;  // slots that need the full law, untouched
 };
 
 /// Poses from blocks of bodies to a row for each, so that elements read whole rows: p (3), q (4), 0.

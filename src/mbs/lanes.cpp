@@ -281,7 +281,8 @@ void Lanes::lay_poses() {
   }
 }
 
-void Lanes::evaluate_elements(size_t first, size_t last, std::vector<std::uint32_t>& beyond) {
+void Lanes::evaluate_elements(size_t first, size_t last, const kernel::CellWriter& cells,
+                              std::vector<std::uint32_t>& beyond) {
   kernel::ElementJob job;
   job.first = first, job.last = last;
   job.live = live.data(), job.softened = softened.data(), job.planes = planes.data();
@@ -291,6 +292,7 @@ void Lanes::evaluate_elements(size_t first, size_t last, std::vector<std::uint32
   job.a = is_batch ? nullptr : body_a.data(), job.b = is_batch ? nullptr : body_b.data();
   job.body_a = body_a.data(), job.body_b = body_b.data();
   job.p = p.data(), job.q = q.data(), job.poses = poses.data();
+  job.cells = cells;
   job.outside = &beyond;
   if (W == kernel::lanes()) {
     kernel::evaluate_elements(job);

@@ -100,7 +100,7 @@ void visit(Archive& ar, S& s, C& sys) {
   ar(sys.ground_reaction), ar(sys.ground_contact), ar(sys.body_contacts);
 }
 
-constexpr std::uint64_t kMagic = 0x38534e41504f54ULL;  // "TOPANS8"
+constexpr std::uint64_t kMagic = 0x39534e41504f54ULL;  // "TOPANS9"
 
 /// What of the system's scratch the next step takes over, under the same names.
 struct Carried {

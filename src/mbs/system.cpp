@@ -647,7 +647,16 @@ void advance_together(Lanes& lanes, std::span<System* const> systems) {
   if (!lanes.is_batch) {
     systems.front()->evaluate_elements();
   } else {
-    lanes.evaluate_elements(0, lanes.element_blocks, lanes.outside);
+    struct Batch {
+      const Lanes& lanes;
+      std::span<System* const> systems;
+    } batch{lanes, systems};
+    const kernel::CellWriter cells{[](void* owner, size_t slot, double force) {
+                                     const Batch& all = *static_cast<const Batch*>(owner);
+                                     if (System* s = all.systems[slot % all.lanes.W]) s->write_cells(slot, force);
+                                   },
+                                   &batch};
+    lanes.evaluate_elements(0, lanes.element_blocks, cells, lanes.outside);
     for (const std::uint32_t slot : lanes.outside)
       if (System* s = systems[slot % lanes.W]) s->evaluate_outside(slot);
     lanes.share_again();

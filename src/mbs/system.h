@@ -345,6 +345,8 @@ class System {
   void elongate_element(size_t e, double by);
   void evaluate_elements_fully(double h);
   void evaluate_elements();
+  /// For the kernel: cells of a zone that flows, around a normal force [N].
+  void write_cells(size_t slot, double axial);
   void sum_element_forces();
   Vec3 calc_element_reaction() const;
   void save_slot(size_t slot, std::vector<double>& to) const;

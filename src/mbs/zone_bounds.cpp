@@ -9,6 +9,7 @@ namespace topple::mbs {
 namespace {
 
 constexpr double kTiny = 1e-300;
+constexpr double kMostLimit = 1e300;  // finite, for the kernel
 
 /// Least limit moment of a family between two normal forces: at an end or at a force of the table, for it is linear
 /// between.
@@ -111,18 +112,96 @@ double calc_bound_utilisation(const ZoneParameters& p, const ZoneState& z) {
   return u;
 }
 
-bool write_flow(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, const ZoneState& z, double time,
-                double* out) {
+namespace {
+
+/// Compression limit over the rotation, from the interval of each family that it is in.
+void write_capacity(const CompiledLaw& law, const ZoneState& z, double whole, double reached, double* out,
+                    size_t stride) {
   using namespace kernel;
-  constexpr double unlimited = 1e300;
+  const auto put = [&](int field, double x) { out[static_cast<size_t>(field) * stride] = x; };
+  put(kFlowLeast, -std::min(calc_curve(law.compression, z.shortened), kMostLimit));
+  const double share = law.elongates ? 1 : whole;
+  double far = kUnlimited;
+  for (int q = 0; q < 2; ++q) {
+    const CompiledFamily& family = law.moment[q];
+    double from = 0, least = -kMostLimit, slope = 0;
+    if (family.K > 0 && reached >= family.rotation.back()) {
+      least = -share * family.capacity.back();
+    } else if (family.K > 0) {
+      const size_t j = static_cast<size_t>(find_interval(family.rotation, reached, z.station[0].j[q]));
+      from = family.rotation[j];
+      least = -share * family.capacity[j];
+      slope = -share * (family.capacity[j + 1] - family.capacity[j]) / (family.rotation[j + 1] - from);
+      far = std::min(far, family.rotation[j + 1]);
+    }
+    put(kTurnedFrom + q, from), put(kTurnedLeast + q, least), put(kTurnedSlope + q, slope);
+  }
+  put(kTurnedFar, far);
+}
+
+}  // namespace
+
+bool write_flow_cells(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, ZoneState& z, double force,
+                      const double reached[2], double* out, size_t stride) {
+  using namespace kernel;
+  const auto law_of = [&](int s) -> const CompiledLaw& {
+    return laws[static_cast<size_t>(z.base_law < 0 ? p.law[s] : z.base_law)];
+  };
+  // what is left of a crushed section carries both force and moment
+  const double whole = calc_integrity(law_of(0), z.shortened);
+  if (!(whole > 0)) return false;
+  const double axial = force / whole;
+  for (int s = 0; s < p.stations; ++s)
+    for (const CompiledFamily& family : law_of(s).moment)
+      if (family.K > 0 && !(axial > family.force.front() && axial < family.force.back())) return false;
+  for (int s = 0; s < p.stations; ++s)
+    for (int q = 0; q < 2; ++q) {
+      const CompiledFamily& family = law_of(s).moment[q];
+      if (family.K == 0) continue;
+      StationState& st = z.station[s];
+      double* cell = out + static_cast<size_t>(kStations + s * kStationFields + kCell + q * kCellFields) * stride;
+      const auto put = [&](size_t field, double x) { cell[field * stride] = x; };
+      // the interval that the force is in and the nearer one beside it
+      const std::vector<double>& forces = family.force;
+      st.k[q] = find_interval(forces, axial, st.k[q]);
+      const size_t k = static_cast<size_t>(st.k[q]), last = forces.size() - 1;
+      const bool is_low = axial - forces[k] < forces[k + 1] - axial;
+      const size_t middle = (is_low && k > 0) || k + 1 == last ? k : k + 1;
+      const size_t row[3] = {middle > 0 ? middle - 1 : middle, middle, std::min(middle + 1, last)};
+      put(kCellForce, whole * forces[middle]);
+      // no width: nothing but the full law beyond
+      put(kCellForce + 1, row[0] < middle ? 1 / (whole * (forces[middle] - forces[row[0]])) : kMostLimit);
+      put(kCellForce + 2, row[2] > middle ? 1 / (whole * (forces[row[2]] - forces[middle])) : kMostLimit);
+      size_t j[2] = {family.rotation.size() - 1, family.rotation.size() - 1};
+      double lowest = reached[s], per_width = 0;
+      if (reached[s] < family.rotation.back()) {
+        st.j[q] = find_interval(family.rotation, reached[s], st.j[q]);
+        j[0] = static_cast<size_t>(st.j[q]), j[1] = j[0] + 1;
+        lowest = family.rotation[j[0]];
+        per_width = 1 / (family.rotation[j[1]] - family.rotation[j[0]]);
+      }
+      put(kCellRotation, lowest), put(kCellRotation + 1, per_width);
+      for (size_t c = 0; c < 6; ++c) {
+        const double* limit = &family.limit[family.place(row[c / 2], j[c % 2])];
+        put(kCellPositive + c, whole * limit[0]);
+        put(kCellNegative + c, whole * limit[1]);
+      }
+      for (size_t c = 0; c < 3 && !family.lift.empty(); ++c) {
+        const double* lift = &family.lift[family.place(row[c], j[0])];
+        put(kCellLiftPositive + c, lift[0]);
+        put(kCellLiftNegative + c, lift[1]);
+      }
+    }
+  write_capacity(law_of(0), z, whole, std::max(reached[0], reached[1]), out, stride);
+  return true;
+}
+
+bool write_flow(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, ZoneState& z, double time, double* out) {
+  using namespace kernel;
   if (!z.live || !z.has_elastic || z.next_law >= 0 || p.stations == 0 || p.external_axial) return false;
   const Limits limits(laws, p.law[0], z, time);
-  // what is left of a crushed section carries both force and moment
-  const double whole = limits.integrity(z.shortened);
-  if (!(whole > 0)) return false;
   std::fill(out, out + kFlowFields, 0.0);
   out[kAxial] = z.axial, out[kSlip] = z.slip[0], out[kSlip + 1] = z.slip[1], out[kTwist] = z.twist;
-  double far = 0;           // no cell reaches beyond this rotation
   bool is_pressed = false;  // only what presses it holds it together
   for (int s = 0; s < 2; ++s) {
     double* station = &out[kStations + s * kStationFields];
@@ -138,62 +217,19 @@ bool write_flow(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, c
       const bool is_far = z.station[s].reached >= law->rupture_rotation;
       is_pressed = is_pressed || is_far;
       station[kRupture] = is_far ? law->rupture_rotation_pressed : law->rupture_rotation;
-      far = std::max(far, z.station[s].reached);
     }
     for (int q = 0; q < 2; ++q) {
       double* cell = &station[kCell + q * kCellFields];
-      const CompiledFamily* family = law != nullptr ? &law->moment[q] : nullptr;
-      if (family == nullptr || family->K == 0) {
-        std::fill(cell + kCellPositive, cell + kCellLiftPositive, unlimited);
-        continue;
-      }
-      const double force = z.normal_force / whole, reached = z.station[s].reached;
-      if (!(force > family->force.front() && force < family->force.back())) return false;
-      // the interval that the force is in and the nearer one beside it
-      const std::vector<double>& forces = family->force;
-      const size_t k = static_cast<size_t>(find_interval(forces, force, z.station[s].k[q])), last = forces.size() - 1;
-      const bool is_low = force - forces[k] < forces[k + 1] - force;
-      const size_t middle = (is_low && k > 0) || k + 1 == last ? k : k + 1;
-      const size_t row[3] = {middle > 0 ? middle - 1 : middle, middle, std::min(middle + 1, last)};
-      cell[kCellForce] = whole * forces[middle];
-      // no width: nothing but the full law beyond
-      cell[kCellForce + 1] = row[0] < middle ? 1 / (whole * (forces[middle] - forces[row[0]])) : unlimited;
-      cell[kCellForce + 2] = row[2] > middle ? 1 / (whole * (forces[row[2]] - forces[middle])) : unlimited;
-      size_t j[2] = {family->rotation.size() - 1, family->rotation.size() - 1};
-      cell[kCellRotation] = reached;
-      if (reached < family->rotation.back()) {
-        j[0] = static_cast<size_t>(find_interval(family->rotation, reached, z.station[s].j[q])), j[1] = j[0] + 1;
-        cell[kCellRotation] = family->rotation[j[0]];
-        cell[kCellRotation + 1] = 1 / (family->rotation[j[1]] - family->rotation[j[0]]);
-        far = std::max(far, family->rotation[j[1]]);
-      }
-      for (size_t c = 0; c < 6; ++c) {
-        const double* limit = &family->limit[family->place(row[c / 2], j[c % 2])];
-        cell[static_cast<size_t>(kCellPositive) + c] = whole * limit[0];
-        cell[static_cast<size_t>(kCellNegative) + c] = whole * limit[1];
-      }
-      for (size_t c = 0; c < 3 && !family->lift.empty(); ++c) {
-        const double* lift = &family->lift[family->place(row[c], j[0])];
-        cell[static_cast<size_t>(kCellLiftPositive) + c] = lift[0];
-        cell[static_cast<size_t>(kCellLiftNegative) + c] = lift[1];
-      }
+      if (law == nullptr || law->moment[q].K == 0)
+        std::fill(cell + kCellPositive, cell + kCellLiftPositive, kMostLimit);
     }
   }
+  const double reached[2] = {z.station[0].reached, z.station[1].reached};
+  if (!write_flow_cells(p, laws, z, z.normal_force, reached, out, 1)) return false;
   const CompiledLaw& law = limits.law();
-  // where little compression is left at the end of the cell, it is asked again before
-  const double reached = std::max(z.station[0].reached, z.station[1].reached);
-  if (far > reached && limits.compression(far, z.shortened, whole, z.station[0]) <
-                           limits.compression(reached, z.shortened, whole, z.station[0])) {
-    far = reached + 0.25 * (far - reached);
-    for (int s = 0; s < p.stations; ++s) {
-      double& rupture = out[kStations + s * kStationFields + kRupture];
-      rupture = std::min(rupture, far);
-    }
-  }
-  out[kFlowLeast] = -limits.compression(far, z.shortened, whole, z.station[0]);
   out[kFlowMost] = is_pressed ? -kTiny : limits.tension(z.elongated);
   for (int axis = 0; axis < 2; ++axis)
-    out[kShearOwn + axis] = law.slip_softening > 0 ? std::min(law.shear[axis], unlimited) : 0;
+    out[kShearOwn + axis] = law.slip_softening > 0 ? std::min(law.shear[axis], kMostLimit) : 0;
   out[kShearFriction] = law.shear_friction;
   out[kSlipped] = z.slipped;
   out[kSlipSoftening] = law.slip_softening > 0 ? 1 / law.slip_softening : 0;

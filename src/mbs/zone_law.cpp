@@ -95,6 +95,11 @@ double calc_curve(const CompiledCurve& curve, double x) {
   return curve.f[i] + t * (curve.f[i + 1] - curve.f[i]);
 }
 
+double calc_integrity(const CompiledLaw& law, double shortened) {
+  if (shortened <= law.peak_shortening) return 1;
+  return law.peak_compression > 0 ? calc_curve(law.compression, shortened) / law.peak_compression : 0;
+}
+
 namespace {
 
 constexpr double kRoundOff = 1e-12;

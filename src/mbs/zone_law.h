@@ -40,6 +40,9 @@ CompiledLaw compile_law(const ZoneLaw&);
 /// Value of a curve, constant beyond its ends; infinity for an empty one.
 double calc_curve(const CompiledCurve&, double x);
 
+/// Share of the section that is left after a shortening [m]: 1 until the peak of the compression curve.
+double calc_integrity(const CompiledLaw&, double shortened);
+
 /// Limit moments at a normal force and a plastic rotation. k and j are hints from the last call, updated.
 struct MomentLimit {
   double positive, negative;

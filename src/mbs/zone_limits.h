@@ -27,10 +27,7 @@ class Limits {
   }
   /// Share of the section that is still there: 1 until the peak of the compression curve, then what is left of it.
   double integrity(double shortened) const {
-    return blend([&](const CompiledLaw& l) {
-      if (shortened <= l.peak_shortening) return 1.0;
-      return l.peak_compression > 0 ? calc_curve(l.compression, shortened) / l.peak_compression : 0.0;
-    });
+    return blend([&](const CompiledLaw& l) { return calc_integrity(l, shortened); });
   }
   /// Largest compression after a rotation and a plastic shortening.
   ///   near  a station that has turned about as far

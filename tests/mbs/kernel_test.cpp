@@ -139,8 +139,8 @@ TEST_P(KernelLaw, FollowsTheFullLaw) {
       ASSERT_NEAR(kernel[i].reached, law[i].reached, 1e-9) << i;
     }
     if (amplitude > 1e-3) { EXPECT_GT(law.back().plastic, 0); }
-    // the kernel does most of it; the widest paths also slip in shear and are torn, which is the full law's
-    EXPECT_LT(full, amplitude > 0.01 ? 0.5 : 0.2) << "seed " << seed;
+    // the kernel does nearly all of it, cell after cell; the full law what flows axially or breaks, and new bounds
+    EXPECT_LT(full, 0.02) << "seed " << seed;
   }
 }
 
@@ -269,19 +269,19 @@ TEST_P(KernelPlane, GivesTheForcesOfSpace) {
     Options options;
     options.step = 1e-4;
     options.full_law = by_full_law;
-    // in space, on a path that differs in its last digits, and in the plane
-    System space(m, options), nudged(m, options);
+    // in space, on paths that differ in their last digits to both sides, and in the plane
+    System space(m, options), more(m, options), less(m, options);
     m.is_planar = true;
     System plane(m, options);
     ASSERT_NE(plane.elements[0].zone.plane, kernel::Plane::Space);
     ASSERT_EQ(space.elements[0].zone.plane, kernel::Plane::Space);
     const Pose at = m.bodies[0].X_WB;
     double most[2] = {0, 0}, apart[2] = {0, 0};  // of forces, torques
-    for (System* s : {&space, &nudged, &plane}) s->start();
+    for (System* s : {&space, &more, &less, &plane}) s->start();
     for (int i = 1; i <= 6000; ++i) {
       const Six d = path_at(i, amplitude, seed);
-      for (System* s : {&space, &nudged, &plane}) {
-        const double nudge = s == &nudged ? 1 + 1e-14 : 1;
+      for (System* s : {&space, &more, &less, &plane}) {
+        const double nudge = s == &more ? 1 + 1e-14 : s == &less ? 1 - 1e-14 : 1;
         s->state.p[0] = at.p + nudge * Vec3{is_upright ? d.c[1] : d.c[0], 0, is_upright ? d.c[0] : d.c[2]};
         s->state.q[0] = exp_rotation({0, nudge * d.c[4], 0}) * at.q;
         s->state.R[0] = to_matrix(s->state.q[0]);
@@ -295,8 +295,10 @@ TEST_P(KernelPlane, GivesTheForcesOfSpace) {
       const Vec3 f = space.force[0], g = plane.force[0];
       const double t = Vec3(space.torque[0]).y, u = Vec3(plane.torque[0]).y;
       most[0] = std::max(most[0], norm(f)), most[1] = std::max(most[1], std::abs(t));
-      apart[0] = std::max(apart[0], norm(f - nudged.force[0]));
-      apart[1] = std::max(apart[1], std::abs(t - Vec3(nudged.torque[0]).y));
+      for (System* s : {&more, &less}) {
+        apart[0] = std::max(apart[0], norm(f - s->force[0]));
+        apart[1] = std::max(apart[1], std::abs(t - Vec3(s->torque[0]).y));
+      }
       // the same sums in another order, some forty of them; softening tables multiply the round-off
       ASSERT_LE(std::hypot(f.x - g.x, f.z - g.z), 1e-12 * most[0] + 20 * apart[0]) << i << " seed " << seed;
       ASSERT_LE(std::abs(t - u), 1e-12 * most[1] + 20 * apart[1]) << i << " seed " << seed;
