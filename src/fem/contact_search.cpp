@@ -40,7 +40,8 @@ struct Face {
   Vec3 centre, normal;
   Vec3 along, across;  // ξ and η of a point from the middle by scalar products
   double radius = 0, depth = 0;
-  double uneven = 0;  // of the corners, to either side
+  double uneven = 0;             // of the corners, to either side
+  double wider = 0, higher = 0;  // than the parallelogram of its middle, in ξ and η
 };
 struct Point {
   ContactPoint point;
@@ -359,6 +360,8 @@ class Search {
     const double area = std::max(dot(cross(a, b), face.normal), 1e-300);
     face.along = (1 / area) * cross(b, face.normal), face.across = (1 / area) * cross(face.normal, a);
     face.uneven = std::abs(dot(x[0] - face.centre, face.normal));
+    const Vec3 c = 0.25 * (x[0] + x[2] - x[1] - x[3]);
+    face.wider = std::abs(dot(c, face.along)), face.higher = std::abs(dot(c, face.across));
     return face;
   }
   /// By the corners of the face opposite.
@@ -440,11 +443,11 @@ class Search {
     return false;
   }
 
-  /// How far a point is at least beside a face, less what an uneven one may hide.
+  /// How far a point is at least beside a face.
   static double calc_beside(const Vec3& d, const Face& face) {
-    constexpr double kUneven = 0.1;
-    const double x = std::max(0.0, std::abs(dot(d, face.along)) - (1 + kUneven)) / norm(face.along);
-    const double y = std::max(0.0, std::abs(dot(d, face.across)) - (1 + kUneven)) / norm(face.across);
+    constexpr double kEdge = 1.01;  // what counts as on it, and what it stretches until the next look
+    const double x = std::max(0.0, std::abs(dot(d, face.along)) - (kEdge + face.wider)) / norm(face.along);
+    const double y = std::max(0.0, std::abs(dot(d, face.across)) - (kEdge + face.higher)) / norm(face.across);
     return std::max(x, y);
   }
 
