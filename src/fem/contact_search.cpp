@@ -1,7 +1,5 @@
 #include "fem/contact_search.h"
 
-#include <hwy/cache_control.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -121,10 +119,7 @@ class Search {
     }
     static thread_local std::vector<Vec3> speeds;
     speeds.clear();
-    constexpr std::uint32_t kAhead = 16;  // rows all over memory; those of the next object follow
-    const auto all = static_cast<std::uint32_t>(setup_.node_rows.size());
     for (std::uint32_t i = setup_.node_starts[o]; i < setup_.node_starts[o + 1]; ++i) {
-      if (i + kAhead < all) hwy::Prefetch(s_.rows.data() + 8 * size_t{setup_.node_rows[i + kAhead]});
       const std::uint32_t row = setup_.node_rows[i];
       if (!has_mass(s_, row)) continue;
       speeds.push_back(speed(s_, row));
