@@ -104,17 +104,20 @@ HWY_INLINE void find_block(const BoxJob& job, size_t block) {
   using V = V3<D>;
   const D d;
   const size_t W = hn::Lanes(d);
-  const double *A = job.a + block * kBoxFields * W, *B = job.b + block * kBoxFields * W;
+  N A[kBoxFields], B[kBoxFields];
+  read_rows<D, kBoxFields>(job.boxes, job.a + block * W, A);
+  read_rows<D, kBoxFields>(job.boxes, job.b + block * W, B);
+  const auto three = [](const N* box, int field) -> V { return {box[field], box[field + 1], box[field + 2]}; };
   double* out = job.answers + block * kBoxAnswerFields * W;
   const N zero = num<D>(0), one = num<D>(1), half = num<D>(0.5);
-  const V place_a = load3<D>(A, kBoxPlace), apart = load3<D>(B, kBoxPlace) - place_a;
-  const V axes_a[3] = {load3<D>(A, kBoxAxes), load3<D>(A, kBoxAxes + 3), load3<D>(A, kBoxAxes + 6)};
-  const V ha = load3<D>(A, kBoxHalf), hb = load3<D>(B, kBoxHalf);
+  const V place_a = three(A, kBoxPlace), apart = three(B, kBoxPlace) - place_a;
+  const V axes_a[3] = {three(A, kBoxAxes), three(A, kBoxAxes + 3), three(A, kBoxAxes + 6)};
+  const V ha = three(A, kBoxHalf), hb = three(B, kBoxHalf);
   const N a[3] = {ha.x, ha.y, ha.z}, b[3] = {hb.x, hb.y, hb.z};
   // b's axes and place in a's
   V axes_b[3];
   for (int j = 0; j < 3; ++j) {
-    const V x = load3<D>(B, kBoxAxes + 3 * j);
+    const V x = three(B, kBoxAxes + 3 * j);
     axes_b[j] = {dot(axes_a[0], x), dot(axes_a[1], x), dot(axes_a[2], x)};
   }
   const V place_b{dot(axes_a[0], apart), dot(axes_a[1], apart), dot(axes_a[2], apart)};
@@ -127,7 +130,7 @@ HWY_INLINE void find_block(const BoxJob& job, size_t block) {
     for (int j = 0; j < 3; ++j) m[i][j] = abs(c[i][j]);
 
   // the sphere around both, then the axes that can separate them (Gottschalk, Lin and Manocha 1996)
-  N gap = root(dot(apart, apart)) - (load<D>(A, kBoxReach) + load<D>(B, kBoxReach));
+  N gap = root(dot(apart, apart)) - (A[kBoxReach] + B[kBoxReach]);
   N least = num<D>(1e300);
   V normal{zero, zero, zero};
   for (int i = 0; i < 3; ++i) {

@@ -11,7 +11,7 @@ namespace topple::mbs::kernel {
 // Field numbers are constants, and named so.
 // NOLINTBEGIN(readability-identifier-naming)
 
-/// A box in W.
+/// A box in W, in a row.
 enum BoxField : int {
   kBoxPlace = 0,   // centre (3) [m]
   kBoxAxes = 3,    // columns of its rotation (3 x 3)
@@ -33,8 +33,9 @@ enum BoxAnswer : int {
 
 struct BoxJob {
   size_t blocks = 0;
-  const double *a, *b;  // kBoxFields a block
-  double* answers;      // kBoxAnswerFields a block
+  const double* boxes;         // kBoxFields each
+  const std::uint32_t *a, *b;  // which of them (W a block)
+  double* answers;             // kBoxAnswerFields a block
 };
 
 void find_box_contacts(const BoxJob&);

@@ -14,12 +14,12 @@ namespace {
 
 void box_box(const Solid& a, const Solid& b, BoxContact& out) {
   const size_t W = kernel::lanes();
-  alignas(kCacheLine) double first[kernel::kBoxFields * kernel::kMostLanes] = {},
-                                                        second[kernel::kBoxFields * kernel::kMostLanes] = {},
-                                                        answers[kernel::kBoxAnswerFields * kernel::kMostLanes];
-  write_box(a, first, W);
-  write_box(b, second, W);
-  kernel::find_box_contacts({1, first, second, answers});
+  alignas(kCacheLine) double boxes[2 * kernel::kBoxFields], answers[kernel::kBoxAnswerFields * kernel::kMostLanes];
+  constexpr std::uint32_t first[kernel::kMostLanes] = {}, second[kernel::kMostLanes] = {1, 1, 1, 1, 1, 1, 1, 1};
+  static_assert(kernel::kMostLanes == 8);
+  write_box(a, boxes);
+  write_box(b, boxes + kernel::kBoxFields);
+  kernel::find_box_contacts({1, boxes, first, second, answers});
   read_box_contact(answers, W, out);
 }
 
@@ -60,12 +60,12 @@ void sphere_box(const Solid& sphere, const Solid& box, bool flipped, BoxContact&
 
 }  // namespace
 
-void write_box(const Solid& box, double* slot, size_t W) {
+void write_box(const Solid& box, double* row) {
   const Mat3& R = box.R;
   const double fields[] = {box.p.x, box.p.y, box.p.z, R(0, 0), R(1, 0),    R(2, 0),    R(0, 1),    R(1, 1),
                            R(2, 1), R(0, 2), R(1, 2), R(2, 2), box.half.x, box.half.y, box.half.z, box.reach};
   static_assert(std::size(fields) == kernel::kBoxFields);
-  for (const double x : fields) *slot = x, slot += W;
+  std::copy(std::begin(fields), std::end(fields), row);
 }
 
 void read_box_contact(const double* slot, size_t W, BoxContact& out) {

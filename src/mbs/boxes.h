@@ -36,8 +36,8 @@ struct BoxContact {
 /// separated two polyhedra at the last call and only saves time.
 void find_contact(const Solid& a, const Solid& b, int& axis, BoxContact& out);
 
-/// A box for the kernel of boxes, and what it found, in slots of blocks of W lanes.
-void write_box(const Solid& box, double* slot, size_t W);
+/// A box for the kernel of boxes, kernel::kBoxFields numbers, and what it found, in slots of blocks of W lanes.
+void write_box(const Solid& box, double* row);
 void read_box_contact(const double* slot, size_t W, BoxContact& out);
 
 }  // namespace topple::mbs

@@ -138,7 +138,9 @@ struct ShapeBounds {
 struct PairSearch {
   bool has_links = false;
   std::vector<int> first_link, link;  // bodies that each body is tied to
-  std::vector<ShapeBounds> bounds;    // by place
+  std::vector<int> first_link_before, link_before;
+  std::vector<unsigned char> relinked;  // whether they are others than those before (B)
+  std::vector<ShapeBounds> bounds;      // by place
   std::vector<int> first_in_slab, in_slab, unbounded, near, hits;
   std::vector<ShapeBounds> here;  // of one slab
   std::vector<double> extents, ways, speeds;
@@ -181,7 +183,9 @@ struct ContactScratch {
   std::vector<std::uint32_t> by_count;
   std::vector<std::uint32_t> candidates;  // pairs that may be due
   std::vector<PairLook> looks;
-  AlignedVector<double> boxes_a, boxes_b, box_answers;  // the kernel's blocks of pairs of boxes
+  AlignedVector<double> boxes;              // rows for the kernel, one a shape and one for idle lanes
+  std::vector<std::uint32_t> box_a, box_b;  // which of them, in the kernel's blocks of pairs of boxes
+  AlignedVector<double> box_answers;
   PairSearch search;
 };
 

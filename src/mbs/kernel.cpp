@@ -131,18 +131,7 @@ struct Poses {
 };
 
 #if HWY_TARGET != HWY_SCALAR
-/// Two numbers of the rows of every second body, from the first on.
-template <class D>
-HWY_INLINE hn::Vec<D> read_pairs(const double* HWY_RESTRICT poses, const std::uint32_t* HWY_RESTRICT bodies) {
-  if constexpr (hn::MaxLanes(D()) == 2) {
-    return hn::LoadU(D(), poses + kPoseRow * bodies[0]);
-  } else {
-    using Half = hn::Half<D>;
-    return hn::Combine(D(), read_pairs<Half>(poses, bodies + hn::MaxLanes(Half())), read_pairs<Half>(poses, bodies));
-  }
-}
-
-/// Writes them.
+/// Writes two numbers of the rows of every second body.
 template <class D>
 HWY_INLINE void write_pairs(hn::Vec<D> pairs, double* HWY_RESTRICT rows) {
   if constexpr (hn::MaxLanes(D()) == 2) {
@@ -159,17 +148,7 @@ HWY_INLINE void write_pairs(hn::Vec<D> pairs, double* HWY_RESTRICT rows) {
 template <class D>
 HWY_INLINE Poses<D> read_poses(const double* HWY_RESTRICT poses, const std::uint32_t* HWY_RESTRICT bodies) {
   Num<D> field[kPoseRow];
-#if HWY_TARGET != HWY_SCALAR
-  if constexpr (hn::MaxLanes(D()) > 1) {
-    const D d;
-    for (size_t i = 0; i < kPoseRow; i += 2) {
-      const auto even = read_pairs<D>(poses + i, bodies), odd = read_pairs<D>(poses + i, bodies + 1);
-      field[i] = {hn::InterleaveLower(d, even, odd)}, field[i + 1] = {hn::InterleaveUpper(d, even, odd)};
-    }
-  }
-#endif
-  if constexpr (hn::MaxLanes(D()) == 1)
-    for (size_t i = 0; i < kPoseRow; ++i) field[i] = num<D>(poses[kPoseRow * bodies[0] + i]);
+  read_rows<D, kPoseRow>(poses, bodies, field);
   return {{field[0], field[1], field[2]}, {field[3], field[4], field[5], field[6]}};
 }
 

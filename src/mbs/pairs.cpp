@@ -32,6 +32,11 @@ void System::find_pair_points() {
   // each shape where it is now, at most once a step
   solids.resize(s.shapes.size());
   solid_step.resize(s.shapes.size(), -1);
+  const size_t idle = s.shapes.size();
+  if (contact.boxes.size() != (idle + 1) * kernel::kBoxFields) {
+    contact.boxes.assign((idle + 1) * kernel::kBoxFields, 0);
+    solid_step.assign(idle, -1);
+  }
   const auto solid_of = [&](size_t body, int shape) -> const Solid& {
     const size_t i = static_cast<size_t>(shape);
     if (solid_step[i] != s.step_index) {
@@ -45,14 +50,12 @@ void System::find_pair_points() {
                    c_shape.radius,
                    c_shape.reach,
                    c_shape.hull >= 0 ? &hulls[static_cast<size_t>(c_shape.hull)] : nullptr};
+      write_box(solids[i], &contact.boxes[i * kernel::kBoxFields]);
     }
     return solids[i];
   };
   // those that are due; two boxes go to the kernel, those that touched side by side
   const size_t W = kernel::lanes();
-  std::vector<PairLook>& looks = contact.looks;
-  looks.clear();
-  size_t boxes[2] = {0, 0};  // that did not touch, that did
   // no branch depends on what is compared
   contact.candidates.resize(s.pairs.size());
   size_t candidates = 0;
@@ -60,37 +63,37 @@ void System::find_pair_points() {
     contact.candidates[candidates] = static_cast<std::uint32_t>(i);
     candidates += s.pair_clock[i] <= s.clock[s.pair_fast[i]];
   }
+  if (contact.looks.size() < candidates) contact.looks.resize(candidates);
+  size_t found = 0;
   for (const size_t i : std::span(contact.candidates).first(candidates)) {
     const PairDue& due = s.pair_due[i];
     const double way = s.travel[static_cast<size_t>(due.a)] + s.travel[static_cast<size_t>(due.b)];
     s.pair_clock[i] = s.clock[s.pair_fast[i]] + 0.5 * (due.way - way);
-    if (way < due.way) continue;
-    PairLook& look = looks.emplace_back();
-    look.pair = i;
-    look.way = way;
+    contact.looks[found].pair = i;
+    contact.looks[found].way = way;
+    found += way >= due.way;
+  }
+  const std::span looks(contact.looks.data(), found);
+  size_t boxes[2] = {0, 0};  // that did not touch, that did
+  for (PairLook& look : looks) {
+    const PairDue& due = s.pair_due[look.pair];
     if (due.are_boxes) look.slot = boxes[due.touching ? 1 : 0]++;
   }
   const size_t first_touching = (boxes[0] + W - 1) / W * W, blocks = first_touching / W + (boxes[1] + W - 1) / W;
-  contact.boxes_a.resize(blocks * W * kernel::kBoxFields);
-  contact.boxes_b.resize(blocks * W * kernel::kBoxFields);
+  contact.box_a.assign(blocks * W, static_cast<std::uint32_t>(idle));
+  contact.box_b.assign(blocks * W, static_cast<std::uint32_t>(idle));
   contact.box_answers.resize(blocks * W * kernel::kBoxAnswerFields);
-  const auto slot_of = [&](AlignedVector<double>& of, size_t slot, size_t fields) {
-    return of.data() + slot / W * fields * W + slot % W;
-  };
-  const auto write = [&](size_t slot, const Solid& A, const Solid& Bb) {
-    write_box(A, slot_of(contact.boxes_a, slot, kernel::kBoxFields), W);
-    write_box(Bb, slot_of(contact.boxes_b, slot, kernel::kBoxFields), W);
-  };
   for (PairLook& look : looks) {
     const PairDue& due = s.pair_due[look.pair];
     if (!due.are_boxes) continue;
     if (due.touching) look.slot += first_touching;
-    write(look.slot, solid_of(static_cast<size_t>(due.a), due.shape_a),
-          solid_of(static_cast<size_t>(due.b), due.shape_b));
+    (void)solid_of(static_cast<size_t>(due.a), due.shape_a);
+    (void)solid_of(static_cast<size_t>(due.b), due.shape_b);
+    contact.box_a[look.slot] = static_cast<std::uint32_t>(due.shape_a);
+    contact.box_b[look.slot] = static_cast<std::uint32_t>(due.shape_b);
   }
-  for (size_t slot = boxes[0]; slot < first_touching; ++slot) write(slot, {}, {});
-  for (size_t slot = first_touching + boxes[1]; slot < blocks * W; ++slot) write(slot, {}, {});
-  kernel::find_box_contacts({blocks, contact.boxes_a.data(), contact.boxes_b.data(), contact.box_answers.data()});
+  kernel::find_box_contacts(
+      {blocks, contact.boxes.data(), contact.box_a.data(), contact.box_b.data(), contact.box_answers.data()});
 
   BoxContact points;
   for (const PairLook& look : looks) {
@@ -100,7 +103,7 @@ void System::find_pair_points() {
     const size_t a = static_cast<size_t>(due.a), b = static_cast<size_t>(due.b);
     points.count = 0;
     if (due.are_boxes) {
-      read_box_contact(slot_of(contact.box_answers, look.slot, kernel::kBoxAnswerFields), W, points);
+      read_box_contact(&contact.box_answers[look.slot / W * kernel::kBoxAnswerFields * W + look.slot % W], W, points);
     } else {
       const Solid &A = solid_of(a, due.shape_a), &Bb = solid_of(b, due.shape_b);
       const double reach = A.reach + Bb.reach;

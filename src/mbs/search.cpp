@@ -11,8 +11,8 @@ namespace topple::mbs {
 namespace {
 
 constexpr double kLeastAllowance = 0.05;  // [m]; way of a body until the next search
-constexpr double kAllowedTime = 0.025;    // [s]; more for fast bodies
-constexpr double kMostAllowance = 0.4;    // [m]
+constexpr double kAllowedTime = 0.05;     // [s]; more for fast bodies
+constexpr double kMostAllowance = 0.6;    // [m]
 constexpr double kSlowShare = 0.8;        // of the bodies
 
 /// Who is joined to a body, or joined to the same third body: what joins them governs instead of contact.
@@ -76,8 +76,11 @@ void System::add_travel(double h) {
 void System::find_links() {
   State& s = state;
   PairSearch& search = contact.search;
+  const bool had_links = search.has_links;
   search.has_links = true;
   s.links_due = false;
+  search.first_link_before.swap(search.first_link);
+  search.link_before.swap(search.link);
   const std::vector<unsigned char> tied = s.tied_to_ground;
   std::fill(s.tied_to_ground.begin(), s.tied_to_ground.end(), 0);
   std::fill(s.ground_clear.begin(), s.ground_clear.end(), 0);
@@ -109,6 +112,13 @@ void System::find_links() {
   });
   for (size_t b = 0; b < B; ++b)
     if (s.tied_to_ground[b] != tied[b]) pack_ground_box(b);
+  const auto links_of = [](const std::vector<int>& first, const std::vector<int>& link, size_t b) {
+    return std::span(link).subspan(static_cast<size_t>(first[b]), static_cast<size_t>(first[b + 1] - first[b]));
+  };
+  search.relinked.assign(B, 1);
+  for (size_t b = 0; b < B && had_links; ++b)
+    search.relinked[b] = !std::ranges::equal(links_of(search.first_link, search.link, b),
+                                             links_of(search.first_link_before, search.link_before, b));
 }
 
 /// Speeds of the bodies' farthest points, as the ways are counted, and which are the fastest.
@@ -335,8 +345,11 @@ void System::release_pairs() {
   find_links();
   NearBodies are_near(contact.search, B);
   size_t kept = 0;
+  const std::vector<unsigned char>& relinked = contact.search.relinked;
   for (const HeldPair& pair : s.held_pairs) {
-    if (are_near(pair.a, pair.b)) {
+    // joined by a link of one of the two, or by one of each
+    const bool is_due = relinked[static_cast<size_t>(pair.a)] || relinked[static_cast<size_t>(pair.b)];
+    if (!is_due || are_near(pair.a, pair.b)) {
       s.held_pairs[kept++] = pair;
       continue;
     }

@@ -179,21 +179,21 @@ TEST(BoxKernelReplay, ALaneDoesNotDependOnTheOthers) {
   std::mt19937 random(11);
   std::uniform_real_distribution<double> unit(-1, 1);
   for (int round = 0; round < 200; ++round) {
-    AlignedVector<double> a(kBoxFields * W), b(kBoxFields * W), all(kBoxAnswerFields * W, 0);
+    AlignedVector<double> boxes(2 * kBoxFields * W), all(kBoxAnswerFields * W, 0);
+    std::vector<std::uint32_t> a(W), b(W);
     std::vector<Solid> as, bs;
     for (size_t l = 0; l < W; ++l) {
       const auto any = [&] { return Vec3{unit(random), unit(random), unit(random)}; };
       as.push_back(make_solid({0.7, 0.5, 1}, any(), any()));
       bs.push_back(make_solid({1, 0.4, 0.6}, as.back().p + 1.4 * any(), any()));
-      write_box(as[l], a.data() + l, W);
-      write_box(bs[l], b.data() + l, W);
+      write_box(as[l], &boxes[2 * l * kBoxFields]);
+      write_box(bs[l], &boxes[(2 * l + 1) * kBoxFields]);
+      a[l] = static_cast<std::uint32_t>(2 * l), b[l] = a[l] + 1;
     }
-    find_box_contacts({1, a.data(), b.data(), all.data()});
+    find_box_contacts({1, boxes.data(), a.data(), b.data(), all.data()});
     for (size_t l = 0; l < W; ++l) {
-      AlignedVector<double> a1(kBoxFields), b1(kBoxFields), one(kBoxAnswerFields, 0);
-      write_box(as[l], a1.data(), 1);
-      write_box(bs[l], b1.data(), 1);
-      find_box_contacts_singly({1, a1.data(), b1.data(), one.data()});
+      AlignedVector<double> one(kBoxAnswerFields, 0);
+      find_box_contacts_singly({1, boxes.data(), &a[l], &b[l], one.data()});
       BoxContact x, y;
       read_box_contact(all.data() + l, W, x);
       read_box_contact(one.data(), 1, y);
