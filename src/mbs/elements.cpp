@@ -15,7 +15,7 @@ using namespace kernel;
 
 constexpr size_t kBlocksForThreads = 256;  // below, waking threads costs more than they save
 constexpr size_t kChunk = 32;              // blocks a thread takes at once
-constexpr long kLayoutInterval = 256;      // steps between looks whether zones that flow still lie side by side
+constexpr long kLayoutInterval = 512;      // steps between looks whether zones that flow still lie side by side
 
 /// Spring behind the damper of a slot times the stiffness.
 double calc_rate(const Lanes& l, size_t slot, int i) { return l.field(slot, kViscous) * l.field(slot, kStiffness + i); }
