@@ -12,6 +12,9 @@ namespace topple::collapse {
 /// What no run tells, for people.
 const std::vector<std::string>& not_modelled();
 
+/// Behind "the fastest mode has ... rad/s": what it asked of a set step that was too long for it; empty if it was not.
+std::string describe_step_needed(const mbs::Summary&);
+
 /// Fills findings, not_modelled and the rigid block's series of a record. Where its ending is "under_way" they say how
 /// things stand so far, and nothing that may still change is called good or bad. False if `cancel` was seen set; then
 /// they are not complete.

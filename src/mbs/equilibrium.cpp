@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 #include <utility>
 
 #include "mbs/contact_kernel.h"
@@ -19,6 +20,8 @@ namespace topple::mbs {
 
 namespace {
 
+constexpr double kOverestimate = 1.01;  // of the highest frequency: the iteration stops a little below
+constexpr double kHeld = 1e6;           // inertia of what joints hold, over that of the heaviest body
 constexpr double kContactAngle = 0.18;  // of a contact's swing in a step, at most [rad]
 
 using Sparse = Eigen::SparseMatrix<double>;
@@ -231,9 +234,9 @@ class Assembly {
             cross(p_B - centre(c.b.index), d)};
   }
   /// Stiffness of all live elements: at rest, or that of fast motion, which the springs behind the dampers add to.
-  /// `force_scale` is that of the forces, for springs.
-  PairMatrix make_stiffness(bool fast, double force_scale = 1) const {
-    const std::vector<StiffRow> springs = s_.calc_spring_stiffness(fast, force_scale);
+  /// `force_scale` is that of the forces, for springs; they have their present slopes, or the largest foreseen.
+  PairMatrix make_stiffness(bool fast, double force_scale = 1, std::optional<bool> foreseen = {}) const {
+    const std::vector<StiffRow> springs = s_.calc_spring_stiffness(foreseen.value_or(fast), force_scale);
     PairMatrix sum(static_cast<int>(free_.size()), unknowns_);
     const auto each_element = [&](auto&& f) {
       for (size_t i = 0; i < s_.elements.size(); ++i)
@@ -274,6 +277,34 @@ class Assembly {
       sum.add(r.a, r.b, block);
     });
     return sum;
+  }
+
+  /// Masses and inertias (in W, of the free bodies) with the joints' rows, each as inertia against its motion.
+  Sparse make_held_mass(const std::vector<Mat3>& inertia) const {
+    Triplets t;
+    double mass = 0, turning = 0;
+    for (size_t i = 0; i < free_.size(); ++i) {
+      const double m = s_.state.body[static_cast<size_t>(free_[i])].mass;
+      for (int k = 0; k < unknowns_.each; ++k)
+        for (int l = 0; l < unknowns_.each; ++l) {
+          const int c = unknowns_.coordinate(k), d = unknowns_.coordinate(l);
+          if ((c < 3) != (d < 3)) continue;
+          const double value = c < 3 ? (c == d ? m : 0) : inertia[i](c - 3, d - 3);
+          t.emplace_back(unknowns_.at(static_cast<int>(i), k), unknowns_.at(static_cast<int>(i), l), value);
+          (c < 3 ? mass : turning) = std::max(c < 3 ? mass : turning, value);
+        }
+    }
+    for (size_t j = 0; j < s_.joints.size(); ++j) {
+      if (!s_.state.joint[j].live) continue;
+      KinematicRow rows[6];
+      double gap[6];
+      const int count = joint_rows(s_.joints[j], rows, gap);
+      for (int i = 0; i < count; ++i)
+        add_outer(rows[i], kHeld * (i < s_.joints[j].lines ? mass : turning), unknowns_, t);
+    }
+    Sparse M(this->count(), this->count());
+    M.setFromTriplets(t.begin(), t.end());
+    return M;
   }
 
  private:
@@ -330,7 +361,7 @@ double find_largest_eigenvalue(const PairMatrix& K, Eigen::Index n, Accelerate&&
   return found;
 }
 
-double System::find_highest_frequency() const {
+double System::find_highest_frequency(bool is_present) const {
   const Assembly assembly(*this);
   const int n = assembly.count();
   if (n == 0) return 0;
@@ -359,10 +390,20 @@ double System::find_highest_frequency() const {
       }
     }
   };
-  const double omega2 = find_largest_eigenvalue(
-      assembly.make_stiffness(true), n, [&](const Vector& x, Vector& y) { scale(x, true, y); },
-      [&](const Vector& x, Vector& y) { scale(x, false, y); });
-  return 1.01 * std::sqrt(std::max(0.0, omega2));  // the iteration stops a little below
+  double omega2 = 0;
+  if (!is_present) {
+    omega2 = find_largest_eigenvalue(
+        assembly.make_stiffness(true), n, [&](const Vector& x, Vector& y) { scale(x, true, y); },
+        [&](const Vector& x, Vector& y) { scale(x, false, y); });
+  } else {
+    // inertia against what joints hold, so large that nothing of it moves
+    const Sparse M = assembly.make_held_mass(inertia);
+    const Eigen::SimplicialLDLT<Sparse> factor(M);
+    omega2 = find_largest_eigenvalue(
+        assembly.make_stiffness(true, 1, false), n, [&](const Vector& x, Vector& y) { y = factor.solve(x); },
+        [&](const Vector& x, Vector& y) { y = M * x; });
+  }
+  return kOverestimate * std::sqrt(std::max(0.0, omega2));
 }
 
 double System::calc_step_limit() const {
@@ -413,16 +454,32 @@ void System::review_step() {
   }
   due.erase(std::remove_if(due.begin(), due.end(), [&](double t) { return t <= state.time; }), due.end());
   state.live_at_review = state.live_elements;
-  if (options.step > 0) return;
   highest_frequency = find_highest_frequency();
+  if (double longest = 0; !bears_set_step(longest))
+    summary.step_needed = summary.step_needed > 0 ? std::min(summary.step_needed, longest) : longest;
   summary.highest_frequency = std::max(summary.highest_frequency, highest_frequency);
-  set_step(calc_own_step());
+  if (options.step <= 0) set_step(calc_own_step());
+}
+
+bool System::bears_set_step(double& longest) {
+  const auto bears = [this] { return step * highest_frequency <= 2 * kOverestimate; };
+  if (options.step <= 0 || bears()) return true;
+  highest_frequency = find_highest_frequency(true);
+  longest = 2 * kOverestimate / highest_frequency;
+  return bears();
 }
 
 void System::choose_step() {
   highest_frequency = find_highest_frequency();
   state.live_elements = state.live_at_review = elements.size();
   set_step(options.step > 0 ? options.step : calc_own_step());
+  if (double longest = 0; !bears_set_step(longest)) {
+    char words[160];
+    std::snprintf(words, sizeof words,
+                  "the fastest mode has %.4g rad/s and needs a step below %.3g s, and the step is %.3g s", 2 / longest,
+                  longest, step);
+    trouble = words;
+  }
   note_fast_dampers();
   summary.step = step;
   summary.highest_frequency = highest_frequency;

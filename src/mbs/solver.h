@@ -123,6 +123,7 @@ struct Summary {
   double time = 0;           // reached [s]
   double step = 0;           // at the start [s]
   double shortest_step = 0;  // on the way; the step follows the live model unless Options::step is set [s]
+  double step_needed = 0;    // least that the fastest mode on the way asked of a set step, 0: no less than it is [s]
   long steps = 0;
   double highest_frequency = 0;  // largest of the elastic system on the way [rad/s]
   int equilibrium_iterations = 0;

@@ -257,12 +257,16 @@ class System {
   /// What the kernel reads of all bodies of a run or a sample at once.
   void set_lane_values(double kick, double h);
   /// Of the elastic system as it is now, with what the dampers add [rad/s].
-  double find_highest_frequency() const;
+  ///   is_present  joints hold and springs have the slopes of now; else joints are left out and slopes are the largest
+  ///               that are foreseen, which is quicker and gives no less
+  double find_highest_frequency(bool is_present = false) const;
   /// Longest stable step for the highest frequency and contact [s].
   double calc_step_limit() const;
   /// The engine's own, without Options::step [s].
   double calc_own_step() const;
   void choose_step();
+  /// Whether the fastest mode bears the step that was set; else how long one it bears. Joints count.
+  bool bears_set_step(double& longest);
   /// After events, and when a quarter of the elements is gone: a step for the model as it is now.
   void review_step();
   void set_step(double h);

@@ -129,6 +129,73 @@ TEST_P(LighterBodyPhysics, KeepsTheAutomaticStepStable) {
 
 INSTANTIATE_TEST_SUITE_P(AtRampShares, LighterBodyPhysics, testing::Values(0.0, 0.5, 1.0));
 
+TEST(SetStep, LongerThanTheFastestModeBearsEndsTheRun) {
+  // a block on a spring: its six modes alone, the fastest along the column
+  Column c = make_column();
+  c.model.bodies.resize(1);
+  c.model.elements.resize(1);
+  c.model.elements[0].damping_ratio = 0;
+  c.model.elements[0].rotational_stiffness = {1e6, 1e6, 1e6};
+  c.model.elements[0].translational_stiffness = {8e8, 1e6, 1e6};
+  const double bears = 2 / std::sqrt(8e8 / 1000);  // [s]
+  Options o;
+  o.duration = 0.1;
+  o.step = 0.98 * bears;
+  EXPECT_EQ(run(c.model, o).ending, Summary::Ending::TimeLimit);
+  o.step = 1.02 * bears;
+  const Summary s = run(c.model, o);
+  EXPECT_EQ(s.ending, Summary::Ending::Diverged);
+  EXPECT_EQ(s.steps, 1);
+  EXPECT_THAT(s.message, HasSubstr("the fastest mode has 894.4 rad/s and needs a step below 0.00224 s"));
+}
+
+TEST(SetStep, WhatAJointHoldsIsNoMode) {
+  // the same spring between bodies that a joint holds together: one block on the spring below
+  Column c = make_column();
+  c.model.elements[1].translational_stiffness = {1e12, 1e12, 1e12};
+  Options o;
+  o.duration = 0.1;
+  o.step = 1e-3;
+  EXPECT_EQ(run(c.model, o).ending, Summary::Ending::Diverged);
+  Joint j;
+  j.kind = Joint::Kind::Fixed;
+  j.parent = {0};
+  j.child = {1};
+  j.X_PF.p = {0, 0, 0.5};
+  j.X_CM.p = {0, 0, -1};
+  add_joint(c.model, j);
+  const Summary s = run(c.model, o);
+  EXPECT_EQ(s.ending, Summary::Ending::TimeLimit) << s.message;
+  EXPECT_EQ(s.step_needed, 0);
+}
+
+TEST(SetStep, TooLongForWhatAnEventLeavesIsTold) {
+  // the piece becomes so light that its springs swing faster than the step bears
+  Column c = make_column();
+  for (ZoneElement& e : c.model.elements) {
+    e.damping_ratio = 0;
+    e.translational_stiffness = {8e8, 1e6, 1e6};
+    e.rotational_stiffness = {1e6, 1e6, 1e6};
+  }
+  Event lighter;
+  lighter.time = 0.01;
+  Action a;
+  a.kind = Action::Kind::ReplaceBody;
+  a.body = {0};
+  a.replacement = make_box("piece", 100, {0.25, 0.25, 0.5}, {0, 0, 0});
+  lighter.actions = {a};
+  c.model.events = {lighter};
+  Options o;
+  o.duration = 0.02;
+  o.step = 0.6e-3;
+  const Summary s = run(c.model, o);
+  EXPECT_EQ(s.ending, Summary::Ending::TimeLimit) << s.message;
+  // on both springs along the column, the block nearly at rest
+  EXPECT_NEAR(s.step_needed, 2 / std::sqrt(2 * 8e8 / 100 + 8e8 / 20e3), 0.03 * s.step_needed);
+  o.step = 0.0;
+  EXPECT_EQ(run(c.model, o).step_needed, 0);  // the engine's own step follows
+}
+
 TEST(SwitchLaw, ASecondOneBeginsWhereTheFirstEnded) {
   // crushing all along: at half the block's weight from 0.05 s on, then down to a fifth of it within 20 ms
   const double weight = 20e3 * kGravity;

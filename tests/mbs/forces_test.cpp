@@ -371,7 +371,7 @@ TEST(SpringPhysics, CarriesADeadLoadAtRest) {
   guide.X_AF.p = {2, 0, 0};
   for (int c = 1; c < 6; ++c) guide.spring[c] = linear(1e6);
   m.bushings.push_back(guide);
-  Options o = options_of(0.1, 1e-3);
+  Options o = options_of(0.1, 5e-4);
   o.equilibrium = true;
   const double sag = std::cbrt(98.1 / 8000);
   o.on_frame = [&](const View& v) {
