@@ -455,8 +455,13 @@ void System::review_step() {
   due.erase(std::remove_if(due.begin(), due.end(), [&](double t) { return t <= state.time; }), due.end());
   state.live_at_review = state.live_elements;
   highest_frequency = find_highest_frequency();
-  if (double longest = 0; !bears_set_step(longest))
+  double longest = 0;
+  const bool is_too_long = !bears_set_step(longest);
+  if (is_too_long && set_step_doubted)
     summary.step_needed = summary.step_needed > 0 ? std::min(summary.step_needed, longest) : longest;
+  else if (is_too_long)
+    due.push_back(state.time);  // what an event leaves between two steps lasts for one; the next step looks again
+  set_step_doubted = is_too_long;
   summary.highest_frequency = std::max(summary.highest_frequency, highest_frequency);
   if (options.step <= 0) set_step(calc_own_step());
 }

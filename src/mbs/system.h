@@ -207,8 +207,9 @@ class System {
   std::vector<unsigned char> fixed;
   std::vector<std::vector<int>> incidence;  // elements of each body: 2 * element + side
 
-  bool ignores_limits = false;  // elements stay elastic (equilibrium's first phase)
-  bool started = false;         // forces at the start are there
+  bool set_step_doubted = false;  // it was too long at the last review
+  bool ignores_limits = false;    // elements stay elastic (equilibrium's first phase)
+  bool started = false;           // forces at the start are there
 
   // where bodies and elements lie for the kernel; of this run, or shared with the samples of a batch
   std::unique_ptr<Lanes> own_lanes;
