@@ -84,7 +84,7 @@ void print_summary(std::FILE* out, const mbs::Model& m, const mbs::Summary& s, c
     rows.emplace_back("Energy error", fmt::format("{:.1e} of the released potential energy", s.energy_error));
     if (!m.joints.empty()) rows.emplace_back("Joint drift", fmt::format("{:.1e} m or rad", s.joint_drift));
   }
-  if (s.step_needed > 0) rows.emplace_back("Note", "the fastest mode" + collapse::describe_step_needed(s));
+  if (s.step_needed > 0) rows.emplace_back("Note", collapse::describe_step_needed(s));
   for (const std::string& note : s.notes) rows.emplace_back("Note", note);
   std::fprintf(out, "\n");
   print_table(out, rows);

@@ -185,6 +185,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["After {} iterations the largest unbalanced force is {:.1e} of the weight, and the reactions of the ground differ from the weight by {:.1e} of it.", "Nach {} Iterationen ist die größte nicht ausgeglichene Kraft das {}-Fache des Gewichts, und die Auflagerkräfte weichen um das {}-Fache davon ab."],
   ["After {} iterations the largest unbalanced force is {:.1e} of the weight, and the reactions of the ground differ from the weight by {:.1e} of it (the first charges fire in this instant).", "Nach {} Iterationen ist die größte nicht ausgeglichene Kraft das {}-Fache des Gewichts, und die Auflagerkräfte weichen um das {}-Fache davon ab (die ersten Ladungen zünden in diesem Augenblick)."],
   ["Time step", "Zeitschritt"],
+  ["The fastest mode needs less than {:.3g} ms: what swings so fast may have been thrown about.", "Die schnellste Eigenform verlangt weniger als {} ms: Was so schnell schwingt, kann fortgeschleudert worden sein."],
   ["{:.3g} ms in {} steps; the fastest mode has {:.0f} rad/s, and joints drift by at most {:.1e} m or rad.", "{} ms in {} Schritten; die schnellste Eigenform hat {} rad/s, und Gelenke weichen um höchstens {} m oder rad ab."],
   ["Half the time step", "Halber Zeitschritt"],
   ["With {:.3g} ms the same verdict.", "Mit {} ms dasselbe Urteil."],
