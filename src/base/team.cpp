@@ -86,7 +86,7 @@ struct Team::Inside {
     while (!now.is_empty()) {
       const auto* call = body.load(std::memory_order_acquire);
       const std::size_t size = bundle.load(std::memory_order_acquire), all = count.load(std::memory_order_acquire);
-      const std::size_t number = is_own ? now.first() : now.last() - 1, bundles_in_all = (all + size - 1) / size;
+      const std::size_t number = is_own ? now.first() : now.last() - 1, bundles_in_all = bundles();
       if (!shared.compare_exchange_weak(now.number, is_own ? now.without_first() : now.without_last(),
                                         std::memory_order_acq_rel, std::memory_order_acquire))
         continue;

@@ -221,10 +221,6 @@ void press_particles(const ExplicitOptions& options, double h, const ExplicitSta
   }
 }
 
-}  // namespace
-
-namespace {
-
 /// What touches of a task exert, by the share that adds it up: neighbouring rows and particles belong to one.
 void list_pushes(const ExplicitState& s, const std::vector<SurfaceTouch>& touches, ContactPushes& pushes) {
   for (auto& share : pushes.shares) share.rows.clear(), share.particles.clear();

@@ -9,7 +9,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <optional>
 #include <utility>
 
 #include "mbs/contact_kernel.h"
@@ -234,9 +233,10 @@ class Assembly {
             cross(p_B - centre(c.b.index), d)};
   }
   /// Stiffness of all live elements: at rest, or that of fast motion, which the springs behind the dampers add to.
-  /// `force_scale` is that of the forces, for springs; they have their present slopes, or the largest foreseen.
-  PairMatrix make_stiffness(bool fast, double force_scale = 1, std::optional<bool> foreseen = {}) const {
-    const std::vector<StiffRow> springs = s_.calc_spring_stiffness(foreseen.value_or(fast), force_scale);
+  /// `force_scale` is that of the forces, for springs; those of fast motion have the largest slope that is foreseen, if
+  /// wanted.
+  PairMatrix make_stiffness(bool fast, double force_scale = 1, bool foreseen = true) const {
+    const std::vector<StiffRow> springs = s_.calc_spring_stiffness(fast && foreseen, force_scale);
     PairMatrix sum(static_cast<int>(free_.size()), unknowns_);
     const auto each_element = [&](auto&& f) {
       for (size_t i = 0; i < s_.elements.size(); ++i)
@@ -457,11 +457,11 @@ void System::review_step() {
   highest_frequency = find_highest_frequency();
   double longest = 0;
   const bool is_too_long = !bears_set_step(longest);
-  if (is_too_long && set_step_doubted)
+  if (is_too_long && state.set_step_doubted)
     summary.step_needed = summary.step_needed > 0 ? std::min(summary.step_needed, longest) : longest;
   else if (is_too_long)
     due.push_back(state.time);  // what an event leaves between two steps lasts for one; the next step looks again
-  set_step_doubted = is_too_long;
+  state.set_step_doubted = is_too_long;
   summary.highest_frequency = std::max(summary.highest_frequency, highest_frequency);
   if (options.step <= 0) set_step(calc_own_step());
 }

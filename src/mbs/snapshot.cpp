@@ -83,7 +83,8 @@ class Reader {
 template <class Archive, class S, class C>
 void visit(Archive& ar, S& s, C& sys) {
   ar(s.step_index), ar(s.time), ar(s.step), ar(s.time_base), ar(s.index_base), ar(s.last_kick), ar(s.review_times),
-      ar(s.live_elements), ar(s.live_at_review), ar(s.first_kick), ar(s.next_event), ar(s.waiting);
+      ar(s.live_elements), ar(s.live_at_review), ar(s.set_step_doubted), ar(s.first_kick), ar(s.next_event),
+      ar(s.waiting);
   ar(s.body), ar(s.p), ar(s.v), ar(s.L), ar(s.w), ar(s.q), ar(s.R), ar(s.p_offset);
   ar(s.shapes), ar(s.ground_points), ar(s.touched_ground), ar(s.ground_clear), ar(s.ground_box);
   ar(s.element), ar(s.rotational), ar(s.joint), ar(s.cable);
@@ -100,7 +101,7 @@ void visit(Archive& ar, S& s, C& sys) {
   ar(sys.ground_reaction), ar(sys.ground_contact), ar(sys.body_contacts);
 }
 
-constexpr std::uint64_t kMagic = 0x39534e41504f54ULL;  // "TOPANS9"
+constexpr std::uint64_t kMagic = 0x41534e41504f54ULL;  // "TOPANSA"
 
 /// What of the system's scratch the next step takes over, under the same names.
 struct Carried {

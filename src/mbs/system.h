@@ -84,6 +84,7 @@ struct State {
   double last_kick = 0;  // step of the kick before [s]
   std::vector<double> review_times;
   size_t live_elements = 0, live_at_review = 0;
+  bool set_step_doubted = false;  // it was too long at the last review
   size_t next_event = 0;
   std::vector<int> waiting;  // events whose time has come and that wait for a trigger, in the order of the model
   // bodies (B)
@@ -207,9 +208,8 @@ class System {
   std::vector<unsigned char> fixed;
   std::vector<std::vector<int>> incidence;  // elements of each body: 2 * element + side
 
-  bool set_step_doubted = false;  // it was too long at the last review
-  bool ignores_limits = false;    // elements stay elastic (equilibrium's first phase)
-  bool started = false;           // forces at the start are there
+  bool ignores_limits = false;  // elements stay elastic (equilibrium's first phase)
+  bool started = false;         // forces at the start are there
 
   // where bodies and elements lie for the kernel; of this run, or shared with the samples of a batch
   std::unique_ptr<Lanes> own_lanes;
