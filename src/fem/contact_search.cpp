@@ -1,6 +1,7 @@
 #include "fem/contact_search.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -87,11 +88,11 @@ class Search {
       make_pairs();
     else
       add_particles();
-    const std::vector<ContactPair*> due = list_due();
+    const auto [due, active] = list_pairs(elapsed);
     make_skins(due);
     for_all(due.size(), 64, team_, [&](size_t i) { find_candidates(*due[i]); });
     c.searches += static_cast<long long>(due.size());
-    find_near(elapsed);
+    find_near(active, elapsed);
     std::fill(c.changed.begin(), c.changed.end(), 0);
     c.any_changed = false;
     c.fresh = false;
@@ -152,11 +153,9 @@ class Search {
       c.spread[o] = std::max(c.spread[o], spread[o]);
       c.travel[o] += (std::max(norm(c.speed[o]), norm(mean[o])) + c.spread[o]) * elapsed;
     }
-    for_all(c.pairs.size(), 4096, team_, [&](size_t i) {
-      ContactPair& pair = c.pairs[i];
-      const double apart = std::max(norm(mean[pair.a] - mean[pair.b]), norm(c.speed[pair.a] - c.speed[pair.b]));
-      pair.slack -= (apart + c.spread[pair.a] + c.spread[pair.b]) * elapsed;
-    });
+    speed_before_ = std::move(c.speed), most_spread_ = std::move(c.spread);
+    speed_before_.insert(speed_before_.end(), mean.begin() + static_cast<std::ptrdiff_t>(known), mean.end());
+    most_spread_.insert(most_spread_.end(), spread.begin() + static_cast<std::ptrdiff_t>(known), spread.end());
     c.speed = std::move(mean), c.spread = std::move(spread);
   }
 
@@ -220,6 +219,7 @@ class Search {
         pair.a = met[i][0], pair.b = met[i][1];
     }
     c.pairs = std::move(pairs);
+    c.particle_free.assign(c.particle_pairs.size(), -1);
     std::fill(c.travel.begin(), c.travel.end(), 0.0);
   }
 
@@ -243,44 +243,76 @@ class Search {
         if (b >= groups_)
           c.particle_pairs.push_back({a - groups_, b - groups_});
         else
-          c.pairs.push_back({a, b, -1, {}});
+          c.pairs.emplace_back().a = a, c.pairs.back().b = b;
       }
+    c.particle_free.resize(c.particle_pairs.size(), -1);
   }
 
-  /// Pairs to be looked through. Those that are further apart than the margin need not be until they have moved by
-  /// that.
-  std::vector<ContactPair*> list_due() {
+  /// The most with which objects of a pair move against each other [m/s].
+  double calc_pace(const ContactPair& pair) const {
+    const ContactState& c = s_.contact;
+    return norm(c.speed[pair.a] - c.speed[pair.b]) + c.spread[pair.a] + c.spread[pair.b];
+  }
+  /// How far what moves at a pace may get until the next look, with a share of the margin for impacts in between.
+  double calc_path(double pace, double ahead) const { return 2 * ahead * pace + kLeastShare * setup_.margin; }
+
+  struct Pairs {
+    std::vector<ContactPair*> due;     // to be looked through
+    std::vector<ContactPair*> active;  // with candidates that may be near
+  };
+  /// Those that are further apart than the margin need not be looked through until they have moved by that.
+  Pairs list_pairs(double elapsed) {
     ContactState& c = s_.contact;
     constexpr size_t kRun = 4096;
-    std::vector<std::vector<ContactPair*>> found((c.pairs.size() + kRun - 1) / kRun);
+    std::vector<Pairs> found((c.pairs.size() + kRun - 1) / kRun);
     for_all(c.pairs.size(), kRun, team_, [&](size_t i) {
       ContactPair& pair = c.pairs[i];
+      const Vec3 now = c.speed[pair.a] - c.speed[pair.b], before = speed_before_[pair.a] - speed_before_[pair.b];
+      const double apart = std::sqrt(std::max(dot(now, now), dot(before, before)));
+      const double path = (apart + most_spread_[pair.a] + most_spread_[pair.b]) * elapsed;
+      pair.moved += static_cast<float>(path);
       const bool changed = c.changed[pair.b] != 0 || (pair.a < groups_ && c.changed[pair.a] != 0);
-      if (pair.slack >= 0 && !changed) return;
+      Pairs& lists = found[i / kRun];
+      if (pair.moved + path <= pair.until && !changed) {
+        // at more than the pace, as it may be larger than at present
+        if (!pair.candidates.empty() && 2 * pair.moved + calc_path(path / elapsed, elapsed) > pair.free)
+          lists.active.push_back(&pair);
+        return;
+      }
+      pair.moved = 0;
       const double gap = boxes_[pair.a].calc_gap(boxes_[pair.b]);
       if (gap > setup_.margin)
-        pair.candidates.clear(), pair.slack = gap;
+        pair.candidates.clear(), pair.until = static_cast<float>(gap);
       else
-        found[i / kRun].push_back(&pair);
+        lists.due.push_back(&pair), lists.active.push_back(&pair);
     });
-    std::vector<ContactPair*> due;
-    for (const auto& list : found) due.insert(due.end(), list.begin(), list.end());
-    return due;
+    Pairs all;
+    for (const Pairs& lists : found) {
+      all.due.insert(all.due.end(), lists.due.begin(), lists.due.end());
+      all.active.insert(all.active.end(), lists.active.begin(), lists.active.end());
+    }
+    return all;
   }
 
   /// What may touch within `ahead`, at twice the present speeds and a share of the margin for impacts in between.
-  void find_near(double ahead) {
+  void find_near(const std::vector<ContactPair*>& active, double ahead) {
     ContactState& c = s_.contact;
     const double least = kLeastShare * setup_.margin;
     constexpr size_t kRun = 512;
-    std::vector<std::vector<ContactCandidate>> found((c.pairs.size() + kRun - 1) / kRun);
-    for_all(c.pairs.size(), kRun, team_, [&](size_t i) {
-      const ContactPair& pair = c.pairs[i];
-      if (pair.candidates.empty()) return;
-      const double path =
-          2 * ahead * (norm(c.speed[pair.a] - c.speed[pair.b]) + c.spread[pair.a] + c.spread[pair.b]) + least;
-      for (const ContactCandidate& candidate : pair.candidates)
-        if (is_near(candidate, path)) found[i / kRun].push_back(candidate);
+    std::vector<std::vector<ContactCandidate>> found((active.size() + kRun - 1) / kRun);
+    for_all(active.size(), kRun, team_, [&](size_t i) {
+      ContactPair& pair = *active[i];
+      const double path = calc_path(calc_pace(pair), ahead);
+      pair.free = std::numeric_limits<float>::infinity();
+      for (FoundCandidate& of : pair.candidates) {
+        // near no sooner than the pair has moved by half of what is free: faces turn
+        if (2 * pair.moved + path > of.free) {
+          const Gap gap = find_gap(of.candidate);
+          if (gap.now < path) found[i / kRun].push_back(of.candidate);
+          of.free = static_cast<float>(2 * pair.moved + gap.grown);
+        }
+        pair.free = std::min(pair.free, of.free);
+      }
     });
     c.near.clear();
     for (const auto& list : found)
@@ -288,28 +320,33 @@ class Search {
     std::sort(c.near.begin(), c.near.end(),
               [](const NearCandidate& a, const NearCandidate& b) { return a.candidate < b.candidate; });
     for (NearCandidate& near : c.near) near.rows = rows_of(near.candidate.face);
+    std::vector<double> reach(s_.particles.size());  // twice what a particle has moved and will
+    for (size_t i = 0; i < reach.size(); ++i) reach[i] = 2 * (c.travel[groups_ + i] + ahead * norm(s_.particles[i].v));
     std::vector<std::vector<ParticlePair>> near((c.particle_pairs.size() + kRun - 1) / kRun);
     for_all(c.particle_pairs.size(), kRun, team_, [&](size_t i) {
       const ParticlePair& pair = c.particle_pairs[i];
+      if (reach[pair[0]] + reach[pair[1]] <= c.particle_free[i]) return;
       const Particle &a = s_.particles[pair[0]], &b = s_.particles[pair[1]];
-      const Vec3 d = a.p - b.p, v = a.v - b.v;
-      const double reach = a.radius + b.radius + least;
-      // (reach + path)² below what this is: the root of the speed's square is not needed far away
-      const double square = dot(d, d);
-      if (square > 2 * (reach * reach + 4 * ahead * ahead * dot(v, v))) return;
-      if (std::sqrt(square) < reach + 2 * ahead * norm(v)) near[i / kRun].push_back(pair);
+      const double distance = norm(a.p - b.p);
+      const double travel = c.travel[groups_ + pair[0]] + c.travel[groups_ + pair[1]];
+      c.particle_free[i] = static_cast<float>(2 * travel + distance - a.full_radius - b.full_radius - least);
+      if (distance < a.radius + b.radius + least + 2 * ahead * norm(a.v - b.v)) near[i / kRun].push_back(pair);
     });
     c.near_particles.clear();
     for (const auto& list : near) c.near_particles.insert(c.near_particles.end(), list.begin(), list.end());
   }
 
-  /// Whether a point and a face may touch when they move against each other by `path`.
-  bool is_near(const ContactCandidate& candidate, double path) const {
+  /// How far a point and a face may move against each other until they may touch, and until they may when the point
+  /// has its full radius.
+  struct Gap {
+    double now = std::numeric_limits<double>::infinity(), grown = now;
+  };
+  Gap find_gap(const ContactCandidate& candidate) const {
     const ContactPoint& point = candidate.point;
     const auto is_gone = [&](std::uint32_t face) { return s_.contact.gone[face / 6] != 0; };
-    if (is_gone(candidate.face) || (point.kind == ContactPoint::Centre && is_gone(point.index))) return false;
+    if (is_gone(candidate.face) || (point.kind == ContactPoint::Centre && is_gone(point.index))) return {};
     Vec3 p;
-    double radius = 0;
+    double radius = 0, grows = 0;
     switch (point.kind) {
       case ContactPoint::Node:
         p = place(s_, point.index);
@@ -317,19 +354,22 @@ class Search {
       case ContactPoint::Centre:
         for (const Vec3& x : corners_of(point.index)) p += 0.25 * x;
         break;
-      case ContactPoint::Debris:
-        p = s_.particles[point.index].p, radius = s_.particles[point.index].radius;
+      case ContactPoint::Debris: {
+        const Particle& particle = s_.particles[point.index];
+        p = particle.p, radius = particle.radius, grows = particle.full_radius - radius;
+      }
     }
     const Face face = make_face(candidate.face, corners_of(candidate.face));
     const Vec3 d = p - face.centre;
-    const double height = dot(d, face.normal), reach = radius + path;
-    if (height > reach + face.uneven) return false;
-    // a ball at the height of the face's edge may touch it from beside, one below it does not
-    if (height < -(face.uneven + path))
-      return calc_beside(d, face) < path &&
-             height >= -(calc_depth(face, corners_of(face.number ^ 1)) + face.uneven + path);
-    const double beside = calc_beside(d, face), above = std::max(0.0, height - face.uneven);
-    return above * above + beside * beside < reach * reach;
+    const double height = dot(d, face.normal), beside = calc_beside(d, face);
+    const double above = std::max(0.0, height - face.uneven), lower = -(height + face.uneven);
+    const auto add = [grows](double gap) { return Gap{gap, gap - grows}; };
+    if (lower > 0) {
+      // a ball at the height of the face's edge may touch it from beside, one below it does not
+      const double below = std::max(beside, lower - calc_depth(face, corners_of(face.number ^ 1)));
+      if (below < lower) return {below, below};
+    }
+    return add(std::max(lower, std::sqrt(above * above + beside * beside) - radius));
   }
 
   std::array<std::uint32_t, 4> rows_of(std::uint32_t face) const {
@@ -446,7 +486,7 @@ class Search {
     return std::max(x, y);
   }
 
-  void match(const Point& q, const Skin& skin, std::vector<ContactCandidate>& found) const {
+  void match(const Point& q, const Skin& skin, std::vector<FoundCandidate>& found) const {
     const double near = setup_.margin + q.radius;
     if (!skin.box.has(q.p, near)) return;
     for (const FaceRun& run : skin.runs) {
@@ -459,18 +499,18 @@ class Search {
             dot(d, d) > reach * reach + face.depth * face.depth)
           continue;
         if (calc_beside(d, face) > near) continue;
-        if (!are_joined(q.point, face.number)) found.push_back({q.point, face.number});
+        if (!are_joined(q.point, face.number)) found.push_back({{q.point, face.number}, -1});
       }
     }
   }
-  void match(const std::vector<Point>& points, const Skin& skin, std::vector<ContactCandidate>& found) const {
+  void match(const std::vector<Point>& points, const Skin& skin, std::vector<FoundCandidate>& found) const {
     for (const Point& q : points) match(q, skin, found);
   }
 
   /// Candidates of a pair, and how far its objects may move against each other until it is looked through again.
   void find_candidates(ContactPair& pair) const {
     pair.candidates.clear();
-    pair.slack = setup_.margin;
+    pair.moved = 0, pair.until = static_cast<float>(setup_.margin), pair.free = -1;
     const Skin& b = *skins_[pair.b];
     if (pair.a >= groups_) {
       const std::uint32_t i = pair.a - groups_;
@@ -492,7 +532,9 @@ class Search {
   double h_;
   Team& team_;
   std::uint32_t groups_;
-  std::vector<ContactBox> boxes_;  // of objects, as they are
+  std::vector<ContactBox> boxes_;    // of objects, as they are
+  std::vector<Vec3> speed_before_;   // of objects at the last look
+  std::vector<double> most_spread_;  // at both
   std::vector<std::optional<Skin>> skins_;
 };
 
@@ -556,6 +598,8 @@ void search_contact(const ContactSetup& setup, ExplicitState& state, double h, T
   const auto start = std::chrono::steady_clock::now();
   c.countdown = kLook;
   Search(setup, state, h, team).look();
+  static std::atomic<std::uint64_t> looks = 0;
+  c.look = ++looks;
   seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 

@@ -34,6 +34,12 @@ struct ContactCandidate {
   friend auto operator<=>(const ContactCandidate&, const ContactCandidate&) = default;
 };
 
+/// A candidate of a pair.
+struct FoundCandidate {
+  ContactCandidate candidate;
+  float free = -1;  // not near before twice what the pair has moved and the path ahead are more than this [m]
+};
+
 /// A candidate that may touch before the next look, with the rows of its face's corners.
 struct NearCandidate {
   ContactCandidate candidate;
@@ -58,19 +64,17 @@ ContactSetup make_contact_setup(const ExplicitModel&, const ExplicitChunks&, dou
 /// Two groups (or a particle and a group) that are near each other, and what was found between them.
 struct ContactPair {
   std::uint32_t a = 0, b = 0;  // objects: groups, then particles; a >= b
-  double slack = -1;           // what they may still move against each other until they are looked through [m]
-  std::vector<ContactCandidate> candidates;
+  // since they were looked through, how far they have moved against each other, and may until it is to be done again
+  // [m]
+  float moved = 0, until = -1;
+  float free = -1;  // least of the candidates'
+  std::vector<FoundCandidate> candidates;
 };
 
-/// A touch of the last step, for the ledger.
-struct SurfaceTouch {
-  ContactPoint point;
-  std::uint32_t face = 0;                             // none for two particles
-  std::uint32_t other = 0;                            // particle + 1 where two touch, 0: a face
-  std::array<std::uint32_t, 4> rows{}, point_rows{};  // of the face's corners; of the point's, a node's first
-  double weights[4] = {0, 0, 0, 0};
-  Vec3 normal_force, friction, before;
-  double stored = 0, depth = 0;
+/// Touches of a step: their number, power at the speeds before it [W], and what is in their springs [J].
+struct TouchSums {
+  long long count = 0;
+  double normal = 0, friction = 0, stored = 0;
 };
 
 using ParticlePair = std::array<std::uint32_t, 2>;  // the later one first
@@ -78,6 +82,7 @@ using ParticlePair = std::array<std::uint32_t, 2>;  // the later one first
 struct ContactState {
   std::vector<unsigned char> gone;           // elements
   std::vector<ParticlePair> particle_pairs;  // in order
+  std::vector<float> particle_free;          // of these, as of candidates, by the travel of both
   std::vector<ContactPair> pairs;            // in the order of a, then b
   // what may touch before the next look, in order
   std::vector<NearCandidate> near;
@@ -89,9 +94,10 @@ struct ContactState {
   std::vector<double> spread;          // largest deviation from it
   std::vector<unsigned char> changed;  // groups whose surface has changed
   bool any_changed = false;
-  bool fresh = true;                               // no boxes yet
-  int countdown = 0;                               // steps until the next look
-  std::vector<std::vector<SurfaceTouch>> touches;  // of shares of what is near
+  bool fresh = true;       // no boxes yet
+  int countdown = 0;       // steps until the next look
+  std::uint64_t look = 0;  // which found what is near, like no other; 0: not known
+  TouchSums touching;      // in the last step
   long long searches = 0;
 };
 

@@ -278,7 +278,8 @@ void ExplicitSystem::Inside::advance_step(ExplicitState& state, bool removes) {
   press_grounds(state);
   double t1 = seconds();
   timing.contact += t1 - t0;
-  if (options.contact || !state.particles.empty()) {
+  const bool has_contact = options.contact || !state.particles.empty();
+  if (has_contact) {
     search_contact(contact, state, h, *team, timing.search);
     timing.searches = state.contact.searches;
     t1 = seconds();
@@ -289,7 +290,7 @@ void ExplicitSystem::Inside::advance_step(ExplicitState& state, bool removes) {
   const double t2 = seconds();
   move_particles(state);
   book_grounds(state);
-  book_surfaces(*this, state);
+  if (has_contact) book_surfaces(*this, state);
   for (const auto& sums : chunk_sums)
     for (size_t k = 0; k < 4; ++k) state.sums[k] += sums[k];
   state.grounded.clear();

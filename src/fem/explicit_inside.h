@@ -9,6 +9,7 @@
 
 #include "base/aligned.h"
 #include "base/team.h"
+#include "fem/contact_lanes.h"
 #include "fem/contact_search.h"
 #include "fem/explicit_chunks.h"
 #include "fem/explicit_kernel.h"
@@ -43,23 +44,29 @@ struct Particle {
   std::uint32_t touched = 0;  // in this step
 };
 
-/// Forces of touches, in their order, in shares that several threads add up.
-inline constexpr size_t kContactShares = 4;
-struct ContactPushes {
-  struct OfRow {
-    Vec3 force;
-    std::uint32_t row = 0;
-  };
-  struct OfParticle {
-    Vec3 force;
-    double crushed = 0;
-    std::uint32_t number = 0;
-  };
-  struct Share {
-    std::vector<OfRow> rows;
-    std::vector<OfParticle> particles;
-  };
-  std::array<Share, kContactShares> shares;
+/// A touch of the step; forces on the point, or on the first particle [N].
+struct FaceTouch {
+  Vec3 normal_force, friction;
+  double weights[4] = {0, 0, 0, 0};  // of the face's corners
+  double crushed = 0;                // of a particle [m]
+  std::array<std::uint32_t, 4> rows{};
+  ContactPoint point;
+};
+struct ParticleTouch {
+  Vec3 normal_force, friction;
+  std::array<double, 2> crushed{};
+  ParticlePair pair{};
+};
+
+/// What a task has of near candidates and what touches.
+struct ContactTask {
+  std::uint64_t look = 0;  // that candidates are of
+  lanes::Faces faces;
+  std::vector<ContactPoint> points;  // of faces
+  std::vector<lanes::Touch> found;
+  std::vector<FaceTouch> faces_touched;
+  std::vector<ParticleTouch> particles_touched;
+  TouchSums sums;
 };
 
 struct ExplicitState {
@@ -107,9 +114,9 @@ struct ExplicitSystem::Inside {
   AlignedVector<double> shared_forces;
   std::vector<std::vector<std::uint32_t>> failed, grounded;
   std::vector<std::array<double, 4>> chunk_sums;
-  std::vector<kernel::Balance> balances;      // of chunks, then of shares of the shared nodes
-  std::vector<ContactPushes> contact_pushes;  // of tasks
-  ExplicitState spare;                        // kept, so that copies need no new memory
+  std::vector<kernel::Balance> balances;  // of chunks, then of shares of the shared nodes
+  std::vector<ContactTask> contact_tasks;
+  ExplicitState spare;  // kept, so that copies need no new memory
   Timing timing;
   mutable std::vector<DebrisParticle> debris_view;
 

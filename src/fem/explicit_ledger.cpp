@@ -284,11 +284,8 @@ ExplicitEnergy ExplicitSystem::Inside::calc_energy() {
   for (const GroundTouch& t : ahead.touches)
     normal += dot(t.normal_force, t.before), friction += dot(t.friction, t.before), stored += t.stored;
   book(s.ground_work, normal, friction, stored);
-  normal = friction = stored = 0;
-  for (const auto& touches : ahead.contact.touches)
-    for (const SurfaceTouch& t : touches)
-      normal += dot(t.normal_force, t.before), friction += dot(t.friction, t.before), stored += t.stored;
-  book(s.surface_work, normal, friction, stored);
+  const TouchSums& sums = ahead.contact.touching;
+  book(s.surface_work, sums.normal, sums.friction, sums.stored);
   energy.removed_internal = s.removed_internal, energy.removed_kinetic = s.removed_kinetic;
   energy.removed_gravity = s.removed_gravity;
   energy.start = start_energy;

@@ -9,7 +9,7 @@ namespace topple::fem {
 
 namespace {
 
-constexpr std::uint64_t kMark = 0x7470'6578'0000'0008;  // name and version of the layout
+constexpr std::uint64_t kMark = 0x7470'6578'0000'0009;  // name and version of the layout
 
 class Writer {
  public:
@@ -26,11 +26,6 @@ class Writer {
     value(static_cast<std::uint64_t>(v.size()));
     const auto* from = reinterpret_cast<const std::byte*>(v.data());
     bytes.insert(bytes.end(), from, from + v.size() * sizeof(T));
-  }
-  template <class T>
-  void lists(const std::vector<std::vector<T>>& v) {
-    value(static_cast<std::uint64_t>(v.size()));
-    for (const std::vector<T>& inner : v) list(inner);
   }
 };
 
@@ -49,14 +44,6 @@ class Reader {
     if (count > bytes_.size() / sizeof(T)) fail();
     v.resize(count);
     take(v.data(), count * sizeof(T));
-  }
-  template <class T>
-  void lists(std::vector<std::vector<T>>& v) {
-    std::uint64_t count = 0;
-    value(count);
-    if (count > bytes_.size() / sizeof(count)) fail();
-    v.resize(count);
-    for (std::vector<T>& inner : v) list(inner);
   }
   [[noreturn]] static void fail() {
     throw InputError("E643", "this is not a snapshot of this model and its options",
@@ -83,10 +70,11 @@ void pass_state(Archive& archive, State& s) {
   archive.list(s.ground_forces), archive.list(s.touchdowns), archive.list(s.removals);
   archive.value(s.removed_internal), archive.value(s.removed_kinetic), archive.value(s.removed_gravity);
   auto& c = s.contact;
-  archive.list(c.gone), archive.list(c.particle_pairs), archive.list(c.near), archive.list(c.near_particles);
+  archive.list(c.gone), archive.list(c.particle_pairs), archive.list(c.particle_free), archive.list(c.near),
+      archive.list(c.near_particles);
   archive.list(c.boxes), archive.list(c.room), archive.list(c.travel), archive.list(c.speed);
   archive.list(c.spread), archive.list(c.changed), archive.value(c.any_changed), archive.value(c.fresh);
-  archive.value(c.countdown), archive.lists(c.touches), archive.value(c.searches);
+  archive.value(c.countdown), archive.value(c.touching), archive.value(c.searches);
 }
 
 /// What tells one model and its options from others.
@@ -106,7 +94,8 @@ std::vector<std::byte> ExplicitSystem::write_snapshot() const {
   pass_state(out, in.s);
   out.value(static_cast<std::uint64_t>(in.s.contact.pairs.size()));
   for (const ContactPair& pair : in.s.contact.pairs)
-    out.value(pair.a), out.value(pair.b), out.value(pair.slack), out.list(pair.candidates);
+    out.value(pair.a), out.value(pair.b), out.value(pair.moved), out.value(pair.until), out.value(pair.free),
+        out.list(pair.candidates);
   out.list(in.start), out.value(in.start_energy), out.value(in.started);
   return std::move(out.bytes);
 }
@@ -124,7 +113,8 @@ void ExplicitSystem::read_snapshot(std::span<const std::byte> bytes) {
   from.value(pairs);
   for (std::uint64_t i = 0; i < pairs; ++i) {
     ContactPair& pair = s.contact.pairs.emplace_back();
-    from.value(pair.a), from.value(pair.b), from.value(pair.slack), from.list(pair.candidates);
+    from.value(pair.a), from.value(pair.b), from.value(pair.moved), from.value(pair.until), from.value(pair.free);
+    from.list(pair.candidates);
   }
   std::vector<Vec3> start;
   double start_energy = 0;

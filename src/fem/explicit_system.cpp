@@ -145,11 +145,7 @@ bool ExplicitSystem::touches_ground(int node) const {
                      [&](const GroundTouch& t) { return t.particle == 0 && t.row == row; });
 }
 const std::vector<double>& ExplicitSystem::touchdowns() const { return inside_->s.touchdowns; }
-int ExplicitSystem::contacts() const {
-  size_t count = 0;
-  for (const auto& touches : inside_->s.contact.touches) count += touches.size();
-  return static_cast<int>(count);
-}
+int ExplicitSystem::contacts() const { return static_cast<int>(inside_->s.contact.touching.count); }
 
 double ExplicitSystem::calc_mass() const {
   double mass = 0;

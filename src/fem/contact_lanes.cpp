@@ -1,0 +1,255 @@
+// Compiled once for each instruction set (Highway's foreach_target).
+#include "fem/contact_lanes.h"
+
+#include <algorithm>
+
+#include "fem/explicit_kernel.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "fem/contact_lanes.cpp"
+// one wide target for each family of machines keeps the build short
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4 | HWY_AVX3_DL)
+#include <hwy/foreach_target.h>
+// after foreach_target
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace topple::fem::lanes {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+using D = hn::ScalableTag<double>;
+using DI = hn::RebindToSigned<D>;
+using V = hn::Vec<D>;
+using VI = hn::Vec<DI>;
+using M = hn::Mask<D>;
+constexpr size_t kLanes = hn::MaxLanes(D());
+static_assert(kLanes <= 8);
+
+// no fused products: all instruction sets give the same bits
+struct V3 {
+  V x, y, z;
+};
+HWY_INLINE V num(double x) { return hn::Set(D(), x); }
+HWY_INLINE V add(V a, V b) { return hn::Add(a, b); }
+HWY_INLINE V sub(V a, V b) { return hn::Sub(a, b); }
+HWY_INLINE V mul(V a, V b) { return hn::Mul(a, b); }
+HWY_INLINE V3 add(const V3& a, const V3& b) { return {add(a.x, b.x), add(a.y, b.y), add(a.z, b.z)}; }
+HWY_INLINE V3 sub(const V3& a, const V3& b) { return {sub(a.x, b.x), sub(a.y, b.y), sub(a.z, b.z)}; }
+HWY_INLINE V3 scale(V s, const V3& a) { return {mul(s, a.x), mul(s, a.y), mul(s, a.z)}; }
+HWY_INLINE V dot(const V3& a, const V3& b) { return add(add(mul(a.x, b.x), mul(a.y, b.y)), mul(a.z, b.z)); }
+HWY_INLINE V3 cross(const V3& a, const V3& b) {
+  return {sub(mul(a.y, b.z), mul(a.z, b.y)), sub(mul(a.z, b.x), mul(a.x, b.z)), sub(mul(a.x, b.y), mul(a.y, b.x))};
+}
+HWY_INLINE V length(const V3& a) { return hn::Sqrt(dot(a, a)); }
+HWY_INLINE V clamp(V x, double most) { return hn::Min(hn::Max(x, num(-most)), num(most)); }
+HWY_INLINE V3 choose(M mask, const V3& a, const V3& b) {
+  return {hn::IfThenElse(mask, a.x, b.x), hn::IfThenElse(mask, a.y, b.y), hn::IfThenElse(mask, a.z, b.z)};
+}
+
+HWY_INLINE V3 gather(const double* HWY_RESTRICT from, VI at) {
+  const D d;
+  return {hn::GatherIndex(d, from, at), hn::GatherIndex(d, from + 1, at), hn::GatherIndex(d, from + 2, at)};
+}
+
+/// Candidates of a block, the last one again in lanes that are left over.
+struct Block {
+  VI point, corner[4];  // where they begin, in numbers
+};
+template <class Number>
+HWY_INLINE VI load_places(size_t stride, const Number& number) {
+  HWY_ALIGN std::int64_t at[kLanes];
+  for (size_t l = 0; l < kLanes; ++l) at[l] = static_cast<std::int64_t>(stride * number(l));
+  return hn::Load(DI(), at);
+}
+template <class Number>
+HWY_INLINE Block load_block(const Faces& faces, const Number& number) {
+  Block block;
+  block.point = load_places(sizeof(Point) / sizeof(double), [&](size_t l) { return faces.point[number(l)]; });
+  for (size_t k = 0; k < 4; ++k)
+    block.corner[k] = load_places(kernel::kNodeFields, [&](size_t l) { return faces.corners[k][number(l)]; });
+  return block;
+}
+HWY_INLINE void load_corners(const double* HWY_RESTRICT rows, const Block& block, V3 (&x)[4]) {
+  for (size_t k = 0; k < 4; ++k) x[k] = gather(rows, block.corner[k]);
+}
+
+/// A face's middle, the product of its diagonals, and how far a point is above the middle, times the length of that.
+struct Look {
+  V3 middle, n;
+  V size, above;
+};
+HWY_INLINE Look look(const V3& p, const V3 (&x)[4]) {
+  Look out;
+  out.middle = scale(num(0.25), add(add(add(x[0], x[1]), x[2]), x[3]));
+  out.n = cross(sub(x[2], x[0]), sub(x[3], x[1]));
+  out.size = length(out.n), out.above = dot(sub(p, out.middle), out.n);
+  return out;
+}
+
+/// Numbers of the candidates that are not above their face by more than it is uneven.
+HWY_NOINLINE size_t sift(const Setup& setup, const Faces& faces, size_t first, size_t last,
+                         std::uint32_t* HWY_RESTRICT passed) {
+  const D d;
+  const auto* points = reinterpret_cast<const double*>(faces.points.data());
+  size_t kept = 0;
+  for (size_t i = first; i < last; i += kLanes) {
+    const Block block = load_block(faces, [&](size_t l) { return std::min(i + l, last - 1); });
+    V3 x[4];
+    load_corners(setup.rows, block, x);
+    const Look at = look(gather(points, block.point), x);
+    const V radius = hn::GatherIndex(d, points + offsetof(Point, radius) / sizeof(double), block.point);
+    const V most = add(mul(radius, at.size), hn::Abs(dot(sub(x[0], at.middle), at.n)));
+    // written so that what is no number stays
+    const M is_above = hn::Gt(at.above, most);
+    std::uint8_t bits[8] = {};
+    hn::StoreMaskBits(d, is_above, bits);
+    for (size_t l = 0; l < kLanes; ++l) {
+      passed[kept] = static_cast<std::uint32_t>(i + l);
+      kept += (bits[0] >> l & 1U) == 0 && i + l < last ? 1 : 0;
+    }
+  }
+  return kept;
+}
+
+/// The place of points on quadrilaterals: x(ξ, η) + height n = p with the normal n of the middle (eq. 22).
+struct Projection {
+  V weights[4];
+  V3 normal;  // from the face to the point
+  V height;
+  M inside, may_touch;
+};
+HWY_INLINE Projection project(const V3& p, const V3 (&x)[4], V radius, M is_ball) {
+  constexpr double kEdge = 1.001;  // faces that meet at an edge leave no gap
+  const V zero = num(0), one = num(1), quarter = num(0.25);
+  Projection out;
+  const V3 c = scale(quarter, add(add(add(x[0], x[1]), x[2]), x[3]));
+  const V3 a = scale(quarter, sub(sub(add(x[1], x[2]), x[0]), x[3]));
+  const V3 b = scale(quarter, sub(sub(add(x[2], x[3]), x[0]), x[1]));
+  const V3 e = scale(quarter, sub(sub(add(x[0], x[2]), x[1]), x[3]));
+  const V3 n = cross(a, b);
+  out.normal = scale(hn::Div(one, hn::Max(length(n), num(1e-300))), n);
+  // in the plane of the middle, with one axis along a
+  const V3 along = scale(hn::Div(one, hn::Max(length(a), num(1e-300))), a), across = cross(out.normal, along);
+  const V a1 = dot(a, along), b1 = dot(b, along), b2 = dot(b, across), e1 = dot(e, along), e2 = dot(e, across);
+  const V p1 = dot(sub(p, c), along), p2 = dot(sub(p, c), across);
+  // beside the rectangle around the face a ball, clamped to the face, cannot touch
+  const V wider = num(kEdge * kEdge);
+  const V beside1 = sub(hn::Abs(p1), mul(wider, add(add(hn::Abs(a1), hn::Abs(b1)), hn::Abs(e1))));
+  const V beside2 = sub(hn::Abs(p2), mul(wider, add(hn::Abs(b2), hn::Abs(e2))));
+  const V far1 = hn::Max(zero, beside1), far2 = hn::Max(zero, beside2);
+  out.may_touch = hn::Le(add(mul(far1, far1), mul(far2, far2)), mul(radius, radius));
+  V xi = zero, eta = zero;
+  M goes_on = out.may_touch;
+  for (int i = 0; i < 4; ++i) {
+    const V t1 = add(a1, mul(eta, e1)), t2 = mul(eta, e2), u1 = add(b1, mul(xi, e1)), u2 = add(b2, mul(xi, e2));
+    const V r1 = sub(p1, add(mul(xi, t1), mul(eta, b1))), r2 = sub(p2, add(mul(xi, t2), mul(eta, b2)));
+    goes_on = hn::AndNot(hn::Lt(add(hn::Abs(r1), hn::Abs(r2)), mul(num(1e-14), a1)), goes_on);
+    const V area = sub(mul(t1, u2), mul(t2, u1));
+    goes_on = hn::And(goes_on, hn::Gt(hn::Abs(area), num(1e-300)));
+    if (hn::AllFalse(D(), goes_on)) break;
+    const V dx = hn::Div(sub(mul(r1, u2), mul(r2, u1)), area), dy = hn::Div(sub(mul(t1, r2), mul(t2, r1)), area);
+    xi = hn::IfThenElse(goes_on, clamp(add(xi, dx), 3), xi), eta = hn::IfThenElse(goes_on, clamp(add(eta, dy), 3), eta);
+    goes_on = hn::AndNot(hn::Lt(add(hn::Abs(dx), hn::Abs(dy)), num(1e-12)), goes_on);
+  }
+  out.inside = hn::And(hn::Le(hn::Abs(xi), num(kEdge)), hn::Le(hn::Abs(eta), num(kEdge)));
+  xi = hn::IfThenElse(is_ball, clamp(xi, 1), xi), eta = hn::IfThenElse(is_ball, clamp(eta, 1), eta);
+  const V low_xi = mul(quarter, sub(one, xi)), high_xi = mul(quarter, add(one, xi));
+  out.weights[0] = mul(low_xi, sub(one, eta)), out.weights[1] = mul(high_xi, sub(one, eta));
+  out.weights[2] = mul(high_xi, add(one, eta)), out.weights[3] = mul(low_xi, add(one, eta));
+  const V3 r = sub(p, add(add(add(c, scale(xi, a)), scale(eta, b)), scale(mul(xi, eta), e)));
+  out.height = dot(r, out.normal);
+  const M is_beside = hn::AndNot(out.inside, is_ball);
+  const V distance = length(r);
+  out.normal = choose(hn::And(is_beside, hn::Gt(distance, zero)), scale(hn::Div(one, distance), r), out.normal);
+  out.height = hn::IfThenElse(is_beside, distance, out.height);
+  return out;
+}
+
+HWY_NOINLINE void press(const Setup& setup, const Faces& faces, size_t count, std::vector<Touch>& touches) {
+  const D d;
+  const V zero = num(0), h = num(setup.h);
+  const auto* points = reinterpret_cast<const double*>(faces.points.data());
+  const auto field = [&](size_t offset) HWY_ATTR { return points + offset / sizeof(double); };
+  const std::uint32_t* HWY_RESTRICT passed = faces.passed.data();
+  for (size_t i = 0; i < count; i += kLanes) {
+    const Block block = load_block(faces, [&](size_t l) { return passed[std::min(i + l, count - 1)]; });
+    V3 x[4];
+    load_corners(setup.rows, block, x);
+    const V3 p = gather(points, block.point);
+    const V radius = hn::GatherIndex(d, field(offsetof(Point, radius)), block.point);
+    const M is_ball = hn::Gt(hn::GatherIndex(d, field(offsetof(Point, ball)), block.point), zero);
+    const V above = look(p, x).above;
+    const Projection on = project(p, x, radius, is_ball);
+    const V depth = sub(radius, on.height);
+    // beside it only balls that are not below
+    const M beside = hn::AndNot(on.inside, hn::AndNot(hn::Lt(above, zero), is_ball));
+    const M touch = hn::And(on.may_touch, hn::And(hn::Or(on.inside, beside), hn::Gt(depth, zero)));
+    if (hn::AllFalse(d, touch)) continue;
+
+    V inverse = hn::GatherIndex(d, field(offsetof(Point, inverse_mass)), block.point);
+    V3 v = gather(field(offsetof(Point, v)), block.point);
+    for (size_t k = 0; k < 4; ++k) {
+      const V mass = hn::GatherIndex(d, setup.rows + kernel::kInverseMass, block.corner[k]);
+      inverse = add(inverse, mul(mul(on.weights[k], on.weights[k]), mass));
+      v = sub(v, scale(on.weights[k], gather(setup.rows + kernel::kSpeed, block.corner[k])));
+    }
+    V rate = hn::Div(num(setup.rate), mul(num(setup.h * setup.h), inverse));
+    rate = hn::Min(rate, hn::GatherIndex(d, field(offsetof(Point, stiffness)), block.point));
+    rate = mul(hn::IfThenElse(on.inside, num(1), num(0.5)), rate);  // two faces have an edge
+    const V damping = hn::GatherIndex(d, field(offsetof(Point, damping)), block.point);
+    const V closing = hn::Neg(dot(on.normal, v));
+    const V dashpot = mul(mul(mul(num(2), damping), hn::Sqrt(hn::Div(rate, inverse))), closing);
+    const V push = hn::Max(zero, add(mul(rate, depth), dashpot));
+    const V3 along = add(v, scale(closing, on.normal));
+    const V slide = length(along);
+    const V grip = hn::Min(mul(num(setup.friction), push), hn::Div(mul(num(setup.grip), slide), mul(inverse, h)));
+    const V pull = hn::IfThenElseZero(hn::Gt(slide, zero), hn::Div(hn::Neg(grip), slide));
+    const V3 force = scale(push, on.normal), friction = scale(pull, along);
+    const V stored = mul(mul(mul(num(0.5), rate), depth), depth);
+
+    // what presses a ball beyond what it bears
+    const V spring = hn::Div(mul(num(2), stored), mul(depth, depth));
+    const V bears = hn::GatherIndex(d, field(offsetof(Point, bears)), block.point);
+    const V crushed = hn::IfThenElseZero(hn::Gt(spring, zero), sub(depth, hn::Div(bears, spring)));
+
+    const V fields[] = {on.height,     depth,   on.weights[0], on.weights[1],   on.weights[2], on.weights[3],
+                        force.x,       force.y, force.z,       friction.x,      friction.y,    friction.z,
+                        dot(force, v), stored,  crushed,       dot(friction, v)};
+    constexpr size_t kFields = sizeof(fields) / sizeof(V);
+    HWY_ALIGN double out[kFields][kLanes];
+    for (size_t f = 0; f < kFields; ++f) hn::Store(fields[f], d, out[f]);
+    std::uint8_t bits[8] = {};
+    hn::StoreMaskBits(d, touch, bits);
+    for (size_t l = 0; l < kLanes && i + l < count; ++l) {
+      if ((bits[0] >> l & 1U) == 0) continue;
+      Touch& t = touches.emplace_back();
+      t.candidate = passed[i + l], t.height = out[0][l], t.depth = out[1][l];
+      for (size_t k = 0; k < 4; ++k) t.weights[k] = out[2 + k][l];
+      t.normal_force = {out[6][l], out[7][l], out[8][l]}, t.friction = {out[9][l], out[10][l], out[11][l]};
+      t.normal = out[12][l], t.stored = out[13][l], t.crushed = out[14][l], t.rubbing = out[15][l];
+    }
+  }
+}
+
+void press_faces(const Setup& setup, Faces& faces, size_t first, size_t last, std::vector<Touch>& touches) {
+  if (faces.passed.size() < last - first + kLanes) faces.passed.resize(last - first + kLanes);
+  press(setup, faces, sift(setup, faces, first, last, faces.passed.data()), touches);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace topple::fem::lanes
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace topple::fem::lanes {
+
+HWY_EXPORT(press_faces);
+
+void press_faces(const Setup& setup, Faces& faces, size_t first, size_t last, std::vector<Touch>& touches) {
+  touches.clear();
+  if (first < last) HWY_DYNAMIC_DISPATCH(press_faces)(setup, faces, first, last, touches);
+}
+
+}  // namespace topple::fem::lanes
+#endif
