@@ -33,12 +33,10 @@ Vec3 speed(const ExplicitState& s, std::uint32_t row) {
 }
 bool has_mass(const ExplicitState& s, std::uint32_t row) { return s.rows[8 * size_t{row} + kernel::kNodeMass] > 0; }
 
-/// A face as the search sees it.
+/// A face as it is seen whether a point may touch it.
 struct Face {
-  std::uint32_t number = 0;
   Vec3 centre, normal;
-  Vec3 along, across;  // ξ and η of a point from the middle by scalar products
-  double radius = 0, depth = 0;
+  Vec3 along, across;            // ξ and η of a point from the middle by scalar products
   double uneven = 0;             // of the corners, to either side
   double wider = 0, higher = 0;  // than the parallelogram of its middle, in ξ and η
 };
@@ -47,17 +45,11 @@ struct Point {
   Vec3 p;
   double radius = 0;
 };
-/// Faces that follow one another, which lie close together.
-struct FaceRun {
-  ContactBox box;  // of all that may be near them, but for what a point is away
-  size_t first = 0, last = 0;
-};
 /// The outside of a group.
 struct Skin {
-  std::vector<Face> faces;
-  std::vector<FaceRun> runs;
+  const std::vector<std::uint32_t>* numbers = nullptr;  // of faces
+  lanes::Skin faces;
   std::vector<Point> points;
-  ContactBox box;  // of the faces
 };
 
 /// Calls body(i) for all i below count, `run` of them a task.
@@ -70,9 +62,10 @@ void for_all(size_t count, size_t run, Team& team, const Body& body) {
 
 class Search {
  public:
-  Search(const ContactSetup& setup, ExplicitState& state, double h, Team& team)
+  Search(const ContactSetup& setup, ExplicitState& state, ContactFaces& faces, double h, Team& team)
       : setup_(setup),
         s_(state),
+        faces_(faces),
         h_(h),
         team_(team),
         groups_(static_cast<std::uint32_t>(setup.group_starts.size() - 1)),
@@ -115,7 +108,7 @@ class Search {
     if (o >= groups_) {
       const Particle& particle = s_.particles[o - groups_];
       motion.mean = particle.v;
-      motion.box.add(particle.p, particle.full_radius);
+      motion.box.add(particle.p, s_.particle_makes[o - groups_].full_radius);
       return motion;
     }
     static thread_local std::vector<Vec3> speeds;
@@ -329,7 +322,8 @@ class Search {
       const Particle &a = s_.particles[pair[0]], &b = s_.particles[pair[1]];
       const double distance = norm(a.p - b.p);
       const double travel = c.travel[groups_ + pair[0]] + c.travel[groups_ + pair[1]];
-      c.particle_free[i] = static_cast<float>(2 * travel + distance - a.full_radius - b.full_radius - least);
+      const double full = s_.particle_makes[pair[0]].full_radius + s_.particle_makes[pair[1]].full_radius;
+      c.particle_free[i] = static_cast<float>(2 * travel + distance - full - least);
       if (distance < a.radius + b.radius + least + 2 * ahead * norm(a.v - b.v)) near[i / kRun].push_back(pair);
     });
     c.near_particles.clear();
@@ -356,17 +350,17 @@ class Search {
         break;
       case ContactPoint::Debris: {
         const Particle& particle = s_.particles[point.index];
-        p = particle.p, radius = particle.radius, grows = particle.full_radius - radius;
+        p = particle.p, radius = particle.radius, grows = s_.particle_makes[point.index].full_radius - radius;
       }
     }
-    const Face face = make_face(candidate.face, corners_of(candidate.face));
+    const Face face = make_face(corners_of(candidate.face));
     const Vec3 d = p - face.centre;
     const double height = dot(d, face.normal), beside = calc_beside(d, face);
     const double above = std::max(0.0, height - face.uneven), lower = -(height + face.uneven);
     const auto add = [grows](double gap) { return Gap{gap, gap - grows}; };
     if (lower > 0) {
       // a ball at the height of the face's edge may touch it from beside, one below it does not
-      const double below = std::max(beside, lower - calc_depth(face, corners_of(face.number ^ 1)));
+      const double below = std::max(beside, lower - calc_depth(face, corners_of(candidate.face ^ 1)));
       if (below < lower) return {below, below};
     }
     return add(std::max(lower, std::sqrt(above * above + beside * beside) - radius));
@@ -384,10 +378,8 @@ class Search {
     return x;
   }
 
-  /// Without depth and radius.
-  static Face make_face(std::uint32_t number, const std::array<Vec3, 4>& x) {
+  static Face make_face(const std::array<Vec3, 4>& x) {
     Face face;
-    face.number = number;
     face.centre = 0.25 * (x[0] + x[1] + x[2] + x[3]);
     const Vec3 n = cross(x[2] - x[0], x[3] - x[1]);
     face.normal = (1 / std::max(norm(n), 1e-300)) * n;
@@ -415,48 +407,41 @@ class Search {
       wanted[pair->b] = std::max<unsigned char>(wanted[pair->b], is_particle ? Faces : All);
     }
     for_all(groups_, 8, team_, [&](size_t g) {
+      if (s_.contact.changed[g] != 0) faces_[g].is_stale = true;
       if (wanted[g] != Nothing) skins_[g] = make_skin(static_cast<std::uint32_t>(g), wanted[g] == All);
     });
   }
-  Skin make_skin(std::uint32_t g, bool has_points) const {
-    constexpr size_t kRun = 8, kUsual = 128;
-    Skin skin;
-    skin.faces.reserve(kUsual), skin.runs.reserve(kUsual / kRun);
-    if (has_points) skin.points.reserve(2 * kUsual);
+  /// Faces of a group that are outside.
+  void list_faces(std::uint32_t g, GroupFaces& faces) const {
+    faces.numbers.clear();
+    for (auto& rows : faces.corners) rows.clear();
     for (std::uint32_t i = setup_.group_starts[g]; i < setup_.group_starts[g + 1]; ++i) {
       const size_t e = static_cast<size_t>(setup_.order[i]);
       if (s_.contact.gone[e] != 0) continue;
-      const std::array<int, 6>& neighbour = setup_.surface.neighbour[e];
-      std::array<Vec3, 8> corners;
-      bool has_corners = false;
+      const std::array<std::uint32_t, 8>& rows = setup_.rows_of_element[e];
       for (size_t f = 0; f < 6; ++f) {
-        const int beside = neighbour[f];
+        const int beside = setup_.surface.neighbour[e][f];
         if (beside >= 0 && s_.contact.gone[static_cast<size_t>(beside)] == 0) continue;
-        if (!has_corners)
-          for (size_t k = 0; k < 8; ++k) corners[k] = place(s_, setup_.rows_of_element[e][k]);
-        has_corners = true;
-        const auto corners_at = [&](size_t number) {
-          std::array<Vec3, 4> x;
-          for (size_t k = 0; k < 4; ++k) x[k] = corners[static_cast<size_t>(kFaces[number][k])];
-          return x;
-        };
-        const std::array<Vec3, 4> x = corners_at(f);
-        Face face = make_face(static_cast<std::uint32_t>(6 * e + f), x);
-        face.depth = calc_depth(face, corners_at(f ^ 1));
-        double square = 0;
-        for (const Vec3& p : x) {
-          const Vec3 d = p - face.centre;
-          square = std::max(square, dot(d, d)), skin.box.add(p, 0);
+        faces.numbers.push_back(static_cast<std::uint32_t>(6 * e + f));
+        for (size_t k = 0; k < 4; ++k) {
+          faces.corners[k].push_back(rows[static_cast<size_t>(kFaces[f][k])]);
+          faces.corners[4 + k].push_back(rows[static_cast<size_t>(kFaces[f ^ 1][k])]);
         }
-        face.radius = std::sqrt(square);
-        if (skin.faces.size() % kRun == 0) skin.runs.push_back({{}, skin.faces.size(), 0});
-        FaceRun& run = skin.runs.back();
-        run.box.add(face.centre, face.radius + face.depth);
-        skin.faces.push_back(face);
-        run.last = skin.faces.size();
-        if (has_points) skin.points.push_back({{ContactPoint::Centre, face.number}, face.centre, 0});
       }
     }
+    lanes::fill_runs(faces.corners);
+    faces.is_stale = false;
+  }
+  Skin make_skin(std::uint32_t g, bool has_points) const {
+    GroupFaces& faces = faces_[g];
+    if (faces.is_stale) list_faces(g, faces);
+    Skin skin;
+    skin.numbers = &faces.numbers;
+    const std::vector<std::uint32_t>& numbers = faces.numbers;
+    lanes::make_skin(s_.rows.data(), kFaceDepth, faces.corners, numbers.size(), skin.faces);
+    if (has_points) skin.points.reserve(numbers.size() + setup_.node_starts[g + 1] - setup_.node_starts[g]);
+    for (size_t i = 0; has_points && i < numbers.size(); ++i)
+      skin.points.push_back({{ContactPoint::Centre, numbers[i]}, skin.faces.centre(i), 0});
     if (!has_points) return skin;
     for (std::uint32_t i = setup_.node_starts[g]; i < setup_.node_starts[g + 1]; ++i) {
       const std::uint32_t row = setup_.node_rows[i];
@@ -487,20 +472,13 @@ class Search {
   }
 
   void match(const Point& q, const Skin& skin, std::vector<FoundCandidate>& found) const {
+    static thread_local std::vector<std::uint32_t> faces;
     const double near = setup_.margin + q.radius;
-    if (!skin.box.has(q.p, near)) return;
-    for (const FaceRun& run : skin.runs) {
-      if (!run.box.has(q.p, near)) continue;
-      for (size_t i = run.first; i < run.last; ++i) {
-        const Face& face = skin.faces[i];
-        const Vec3 d = q.p - face.centre;
-        const double height = dot(d, face.normal), reach = face.radius + near;
-        if (height > near || height < -(face.depth + setup_.margin) ||
-            dot(d, d) > reach * reach + face.depth * face.depth)
-          continue;
-        if (calc_beside(d, face) > near) continue;
-        if (!are_joined(q.point, face.number)) found.push_back({{q.point, face.number}, -1});
-      }
+    if (!skin.faces.box.has(q.p, near)) return;
+    lanes::find_faces(skin.faces, q.p, near, setup_.margin, faces);
+    for (const std::uint32_t i : faces) {
+      const std::uint32_t number = (*skin.numbers)[i];
+      if (!are_joined(q.point, number)) found.push_back({{q.point, number}, -1});
     }
   }
   void match(const std::vector<Point>& points, const Skin& skin, std::vector<FoundCandidate>& found) const {
@@ -515,7 +493,7 @@ class Search {
     if (pair.a >= groups_) {
       const std::uint32_t i = pair.a - groups_;
       const Particle& particle = s_.particles[i];
-      match({{ContactPoint::Debris, i}, particle.p, particle.full_radius}, b, pair.candidates);
+      match({{ContactPoint::Debris, i}, particle.p, s_.particle_makes[i].full_radius}, b, pair.candidates);
       return;
     }
     if (pair.a == pair.b) {
@@ -529,6 +507,7 @@ class Search {
 
   const ContactSetup& setup_;
   ExplicitState& s_;
+  ContactFaces& faces_;
   double h_;
   Team& team_;
   std::uint32_t groups_;
@@ -590,14 +569,16 @@ ContactSetup make_contact_setup(const ExplicitModel& model, const ExplicitChunks
   return setup;
 }
 
-void search_contact(const ContactSetup& setup, ExplicitState& state, double h, Team& team, double& seconds) {
+void search_contact(const ContactSetup& setup, ExplicitState& state, ContactFaces& faces, double h, Team& team,
+                    double& seconds) {
   ContactState& c = state.contact;
   if (c.gone.empty()) c.gone.assign(setup.rows_of_element.size(), 0);
   if (c.changed.empty()) c.changed.assign(setup.group_starts.size() - 1, 0);
   if (!c.fresh && --c.countdown > 0) return;
   const auto start = std::chrono::steady_clock::now();
   c.countdown = kLook;
-  Search(setup, state, h, team).look();
+  faces.resize(setup.group_starts.size() - 1);
+  Search(setup, state, faces, h, team).look();
   static std::atomic<std::uint64_t> looks = 0;
   c.look = ++looks;
   seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -11,6 +11,7 @@
 
 #include "base/linalg.h"
 #include "fem/contact_cells.h"
+#include "fem/contact_skin.h"
 #include "fem/explicit_chunks.h"
 #include "fem/outer_surface.h"
 
@@ -60,6 +61,14 @@ struct ContactSetup {
   bool enabled = true;
 };
 ContactSetup make_contact_setup(const ExplicitModel&, const ExplicitChunks&, double margin, bool enabled);
+
+/// The outer faces of a group, as long as its surface has not changed.
+struct GroupFaces {
+  bool is_stale = true;
+  std::vector<std::uint32_t> numbers;  // 6 element + face
+  lanes::FaceCorners corners;
+};
+using ContactFaces = std::vector<GroupFaces>;
 
 /// Two groups (or a particle and a group) that are near each other, and what was found between them.
 struct ContactPair {

@@ -280,7 +280,7 @@ void ExplicitSystem::Inside::advance_step(ExplicitState& state, bool removes) {
   timing.contact += t1 - t0;
   const bool has_contact = options.contact || !state.particles.empty();
   if (has_contact) {
-    search_contact(contact, state, h, *team, timing.search);
+    search_contact(contact, state, contact_faces, h, *team, timing.search);
     timing.searches = state.contact.searches;
     t1 = seconds();
     press_surfaces(*this, state);

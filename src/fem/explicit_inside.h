@@ -32,16 +32,25 @@ struct ContactWork {
   double normal = 0, friction = 0, stored = 0;
 };
 
-struct Particle {
-  Vec3 p, v, force;
+/// A ball of debris in three parts, so that steps pass over no more memory than they must. A line of the cache:
+struct alignas(kCacheLine) Particle {
+  Vec3 p, v;
+  double radius = 0, mass = 0;
+};
+/// Of the step.
+struct ParticlePush {
+  Vec3 force;
+  double crushed = -1;  // by how much, negative: nothing touches it [m]
+};
+/// What does not change.
+struct ParticleMake {
   Vec3 start;  // where its potential counts from
-  double mass = 0, radius = 0, full_radius = 0, stiffness = 0;
-  double bears = 0;    // force at which it is crushed [N]
-  double crushed = 0;  // by how much in this step [m]
+  double full_radius = 0, stiffness = 0;
+  double bears = 0;  // force at which it is crushed [N]
+  int element = 0;
+  std::uint32_t unused = 0;  // no gaps
   /// By how much a spring would press it beyond what it bears [m].
   double calc_crushed(double rate, double depth) const { return depth - bears / rate; }
-  int element = 0;
-  std::uint32_t touched = 0;  // in this step
 };
 
 /// A touch of the step; forces on the point, or on the first particle [N].
@@ -81,7 +90,9 @@ struct ExplicitState {
   std::vector<std::uint32_t> grounded;  // rows below a ground
   std::vector<std::uint16_t> uses;      // live elements of a row's node
   std::array<double, 4> sums{};         // dissipated, see kernel::ChunkJob
-  std::vector<Particle> particles;
+  AlignedVector<Particle> particles;
+  std::vector<ParticlePush> particle_pushes;
+  std::vector<ParticleMake> particle_makes;
   std::vector<GroundTouch> touches;
   ContactWork ground_work, surface_work;
   ContactState contact;
@@ -116,7 +127,8 @@ struct ExplicitSystem::Inside {
   std::vector<std::array<double, 4>> chunk_sums;
   std::vector<kernel::Balance> balances;  // of chunks, then of shares of the shared nodes
   std::vector<ContactTask> contact_tasks;
-  ExplicitState spare;  // kept, so that copies need no new memory
+  ContactFaces contact_faces;  // of the last look
+  ExplicitState spare;         // kept, so that copies need no new memory
   Timing timing;
   mutable std::vector<DebrisParticle> debris_view;
 

@@ -69,14 +69,20 @@ void ExplicitSystem::Inside::press_grounds(ExplicitState& state) const {
     auto& [touches, forces] = shares[share];
     forces.assign(model.grounds.size(), {});
     for (size_t i = first; i < last; ++i) {
-      Particle& q = state.particles[i];
-      q.force = q.mass * model.gravity;
-      q.touched = 0, q.crushed = 0;
+      const Particle& q = state.particles[i];
+      ParticlePush& push = state.particle_pushes[i];
+      push.force = q.mass * model.gravity, push.crushed = -1;
+      const auto is_in = [&](const ExplicitGround& g) { return q.radius - dot(g.normal, q.p - g.point) > 0; };
+      if (std::none_of(model.grounds.begin(), model.grounds.end(), is_in)) continue;
+      const ParticleMake& make = state.particle_makes[i];
       const size_t before = touches.size();
-      q.force += press(static_cast<std::uint32_t>(i), true, q.p, q.v, q.mass, q.radius, q.stiffness, touches, forces);
-      if (touches.size() > before) q.touched = 1;
-      for (size_t k = before; k < touches.size(); ++k)
-        q.crushed = std::max(q.crushed, q.calc_crushed(q.stiffness, std::sqrt(2 * touches[k].stored / q.stiffness)));
+      push.force +=
+          press(static_cast<std::uint32_t>(i), true, q.p, q.v, q.mass, q.radius, make.stiffness, touches, forces);
+      push.crushed = 0;
+      for (size_t k = before; k < touches.size(); ++k) {
+        const double depth = std::sqrt(2 * touches[k].stored / make.stiffness);
+        push.crushed = std::max(push.crushed, make.calc_crushed(make.stiffness, depth));
+      }
     }
   });
   for (const Share& share : shares) {
@@ -101,12 +107,16 @@ void ExplicitSystem::Inside::move_particles(ExplicitState& state) const {
   for_particles(state, [&](size_t share, size_t first, size_t last) {
     for (size_t i = first; i < last; ++i) {
       Particle& q = state.particles[i];
-      q.v += (h / q.mass) * q.force;
+      const ParticlePush& push = state.particle_pushes[i];
+      q.v += (h / q.mass) * push.force;
       q.p += h * q.v;
-      q.radius = std::max(std::min(q.radius, kLeastRadius * q.full_radius), q.radius - q.crushed);
+      if (push.crushed == 0) continue;
+      const double full = state.particle_makes[i].full_radius;
       // room permitting it grows to its volume within a tenth of a second
-      if (q.touched == 0 && q.radius < q.full_radius)
-        q.radius = std::min(q.full_radius, q.radius + 10 * h * q.full_radius);
+      if (push.crushed > 0)
+        q.radius = std::max(std::min(q.radius, kLeastRadius * full), q.radius - push.crushed);
+      else if (q.radius < full)
+        q.radius = std::min(full, q.radius + 10 * h * full);
     }
     knocked[share] = is_knocked(contact, state, h, first, last) ? 1 : 0;
   });
@@ -180,16 +190,17 @@ void ExplicitSystem::Inside::add_debris(ExplicitState& state, int element, const
         const double a = (2 * i + 1.0) / cells[0] - 1, b = (2 * j + 1.0) / cells[1] - 1,
                      c = (2 * k + 1.0) / cells[2] - 1;
         Particle q;
+        ParticleMake make;
         q.p = at(x, a, b, c), q.v = at(v, a, b, c);
-        q.start = q.p - moved;
+        make.start = q.p - moved;
         q.mass = element_mass[e] / count;
-        q.full_radius = std::cbrt(3 * volume / (4 * M_PI));
-        q.radius = std::min(0.475 * side, q.full_radius);
+        make.full_radius = std::cbrt(3 * volume / (4 * M_PI));
+        q.radius = std::min(0.475 * side, make.full_radius);
         // as stiff as a ball of the material between plates, as far as the step allows
-        q.stiffness = std::min(0.02 * q.mass / (h * h), law.E * q.radius);
-        q.bears = law.points > 0 ? law.compression[0] * M_PI * q.full_radius * q.full_radius : 1e300;
-        q.element = element;
-        state.particles.push_back(q);
+        make.stiffness = std::min(0.02 * q.mass / (h * h), law.E * q.radius);
+        make.bears = law.points > 0 ? law.compression[0] * M_PI * make.full_radius * make.full_radius : 1e300;
+        make.element = element;
+        state.particles.push_back(q), state.particle_pushes.emplace_back(), state.particle_makes.push_back(make);
       }
 }
 
@@ -266,7 +277,7 @@ ExplicitEnergy ExplicitSystem::Inside::calc_energy() {
   for (size_t i = 0; i < s.particles.size(); ++i) {
     const Particle& q = s.particles[i];
     energy.debris_kinetic += 0.5 * q.mass * dot(q.v, ahead.particles[i].v);
-    energy.gravity -= q.mass * dot(model.gravity, q.p - q.start);
+    energy.gravity -= q.mass * dot(model.gravity, q.p - s.particle_makes[i].start);
   }
   for (size_t e = 0; e < element_mass.size(); ++e) {
     const auto stored = calc_elastic(ahead, static_cast<int>(e));

@@ -9,7 +9,7 @@ namespace topple::fem {
 
 namespace {
 
-constexpr std::uint64_t kMark = 0x7470'6578'0000'0009;  // name and version of the layout
+constexpr std::uint64_t kMark = 0x7470'6578'0000'000a;  // name and version of the layout
 
 class Writer {
  public:
@@ -66,7 +66,8 @@ void pass_state(Archive& archive, State& s) {
   archive.value(s.steps), archive.value(s.begins), archive.list(s.rows), archive.list(s.elements), archive.list(s.live),
       archive.list(s.flags);
   archive.list(s.pushes), archive.list(s.pushed), archive.list(s.grounded), archive.list(s.uses), archive.value(s.sums);
-  archive.list(s.particles), archive.list(s.touches), archive.value(s.ground_work), archive.value(s.surface_work);
+  archive.list(s.particles), archive.list(s.particle_pushes), archive.list(s.particle_makes);
+  archive.list(s.touches), archive.value(s.ground_work), archive.value(s.surface_work);
   archive.list(s.ground_forces), archive.list(s.touchdowns), archive.list(s.removals);
   archive.value(s.removed_internal), archive.value(s.removed_kinetic), archive.value(s.removed_gravity);
   auto& c = s.contact;
@@ -123,6 +124,7 @@ void ExplicitSystem::read_snapshot(std::span<const std::byte> bytes) {
   if (!from.is_empty() || start.size() != in.start.size() || s.rows.size() != in.s.rows.size() ||
       s.elements.size() != in.s.elements.size())
     Reader::fail();
+  in.contact_faces.clear();  // of another state
   in.s = std::move(s), in.start = std::move(start), in.start_energy = start_energy, in.started = started;
 }
 

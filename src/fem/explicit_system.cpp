@@ -111,7 +111,11 @@ const std::vector<Removal>& ExplicitSystem::removals() const { return inside_->s
 const std::vector<DebrisParticle>& ExplicitSystem::debris() const {
   auto& view = inside_->debris_view;
   view.clear();
-  for (const Particle& q : inside_->s.particles) view.push_back({q.p, q.v, q.mass, q.radius, q.full_radius, q.element});
+  for (size_t i = 0; i < inside_->s.particles.size(); ++i) {
+    const Particle& q = inside_->s.particles[i];
+    const ParticleMake& make = inside_->s.particle_makes[i];
+    view.push_back({q.p, q.v, q.mass, q.radius, make.full_radius, make.element});
+  }
   return view;
 }
 

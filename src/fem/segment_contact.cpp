@@ -86,7 +86,8 @@ void list_faces(const ContactSetup& setup, const ExplicitOptions& options, const
     if (task.points.empty() || task.points.back() != point) {
       lanes::Point& q = faces.points.emplace_back();
       if (is_ball)
-        q.ball = 1, q.stiffness = s.particles[point.index].stiffness, q.bears = s.particles[point.index].bears;
+        q.ball = 1, q.stiffness = s.particle_makes[point.index].stiffness,
+        q.bears = s.particle_makes[point.index].bears;
       q.damping = is_ball ? options.debris_damping : options.contact_damping;
       task.points.push_back(point);
     }
@@ -149,14 +150,19 @@ void press_points(const ContactSetup& setup, const ExplicitOptions& options, dou
 
 void press_particles(const ExplicitOptions& options, double h, const ExplicitState& s,
                      std::span<const ParticlePair> near, ContactTask& task) {
-  for (const ParticlePair& pair : near) {
+  constexpr size_t kAhead = 8;
+  for (size_t i = 0; i < near.size(); ++i) {
+    if (i + kAhead < near.size())
+      for (const std::uint32_t number : near[i + kAhead]) hwy::Prefetch(&s.particles[number]);
+    const ParticlePair& pair = near[i];
     const Particle &a = s.particles[pair[0]], &b = s.particles[pair[1]];
     const Vec3 d = a.p - b.p;
     const double reach = a.radius + b.radius, square = dot(d, d);
     if (square >= reach * reach || !(square > 0)) continue;
     const double distance = std::sqrt(square), depth = reach - distance;
     const Vec3 normal = (1 / distance) * d, v = a.v - b.v;
-    const double rate = std::min(a.stiffness, b.stiffness), inverse_mass = 1 / a.mass + 1 / b.mass;
+    const ParticleMake &make_a = s.particle_makes[pair[0]], &make_b = s.particle_makes[pair[1]];
+    const double rate = std::min(make_a.stiffness, make_b.stiffness), inverse_mass = 1 / a.mass + 1 / b.mass;
     const double closing = -dot(normal, v);
     const double push =
         std::max(0.0, rate * depth + 2 * options.debris_damping * std::sqrt(rate / inverse_mass) * closing);
@@ -167,7 +173,7 @@ void press_particles(const ExplicitOptions& options, double h, const ExplicitSta
     touch.normal_force = push * normal;
     touch.friction = slide > 0 ? (-grip / slide) * along : Vec3{};
     const double stored = 0.5 * rate * depth * depth, spring = depth > 0 ? 2 * stored / (depth * depth) : 0;
-    if (spring > 0) touch.crushed = {a.calc_crushed(spring, depth), b.calc_crushed(spring, depth)};
+    if (spring > 0) touch.crushed = {make_a.calc_crushed(spring, depth), make_b.calc_crushed(spring, depth)};
     touch.pair = pair;
     task.sums.normal += dot(touch.normal_force, v), task.sums.friction += dot(touch.friction, v);
     task.sums.stored += stored;
@@ -217,9 +223,8 @@ void press_surfaces(ExplicitSystem::Inside& in, ExplicitState& s) {
     };
     const auto press = [&](std::uint32_t number, const Vec3& force, double crushed) {
       if (!is_own(number, 256)) return;
-      Particle& particle = s.particles[number];
-      particle.crushed = std::max(particle.crushed, crushed);
-      particle.force += force, particle.touched = 1;
+      ParticlePush& to = s.particle_pushes[number];
+      to.crushed = std::max({0.0, to.crushed, crushed}), to.force += force;
     };
     for (const ContactTask& task : in.contact_tasks)
       for (const FaceTouch& touch : task.faces_touched) {

@@ -12,8 +12,9 @@ namespace topple::fem {
 
 struct ExplicitState;
 
-/// Looks for candidates where something has moved enough; adds the time it takes [s].
-void search_contact(const ContactSetup&, ExplicitState&, double h, Team&, double& seconds);
+/// Looks for candidates where something has moved enough; adds the time it takes [s]. `faces` are kept from look to
+/// look.
+void search_contact(const ContactSetup&, ExplicitState&, ContactFaces& faces, double h, Team&, double& seconds);
 /// Whether a piece of debris of [first, last) has been knocked away faster than a look reckons with, so that the next
 /// step is to look.
 bool is_knocked(const ContactSetup&, const ExplicitState&, double h, size_t first, size_t last);

@@ -1,0 +1,186 @@
+// Compiled once for each instruction set (Highway's foreach_target).
+#include "fem/contact_skin.h"
+
+#include <algorithm>
+
+#include "fem/explicit_kernel.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "fem/contact_skin.cpp"
+// one wide target for each family of machines keeps the build short
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4 | HWY_AVX3_DL)
+#include <hwy/foreach_target.h>
+// after foreach_target
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace topple::fem::lanes {
+namespace HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+using D = hn::CappedTag<double, kFaceRun>;
+using DI = hn::RebindToSigned<D>;
+using V = hn::Vec<D>;
+constexpr size_t kLanes = hn::MaxLanes(D());
+
+/// Fields of a face: middle, normal, axes in its plane (unit vectors, towards ξ and η) with half the width along them.
+enum Field : size_t { kCentre = 0, kNormal = 3, kAlong = 6, kAcross = 9, kWide = 12, kHigh, kDepth, kFields };
+static_assert(kFields == kSkinFields);
+
+// no fused products: all instruction sets find the same
+struct V3 {
+  V x, y, z;
+};
+HWY_INLINE V num(double x) { return hn::Set(D(), x); }
+HWY_INLINE V add(V a, V b) { return hn::Add(a, b); }
+HWY_INLINE V sub(V a, V b) { return hn::Sub(a, b); }
+HWY_INLINE V mul(V a, V b) { return hn::Mul(a, b); }
+HWY_INLINE V3 add(const V3& a, const V3& b) { return {add(a.x, b.x), add(a.y, b.y), add(a.z, b.z)}; }
+HWY_INLINE V3 sub(const V3& a, const V3& b) { return {sub(a.x, b.x), sub(a.y, b.y), sub(a.z, b.z)}; }
+HWY_INLINE V3 scale(V s, const V3& a) { return {mul(s, a.x), mul(s, a.y), mul(s, a.z)}; }
+HWY_INLINE V dot(const V3& a, const V3& b) { return add(add(mul(a.x, b.x), mul(a.y, b.y)), mul(a.z, b.z)); }
+HWY_INLINE V3 cross(const V3& a, const V3& b) {
+  return {sub(mul(a.y, b.z), mul(a.z, b.y)), sub(mul(a.z, b.x), mul(a.x, b.z)), sub(mul(a.x, b.y), mul(a.y, b.x))};
+}
+HWY_INLINE V per_length(const V3& a) { return hn::Div(num(1), hn::Max(hn::Sqrt(dot(a, a)), num(1e-300))); }
+HWY_INLINE V3 smaller(const V3& a, const V3& b) { return {hn::Min(a.x, b.x), hn::Min(a.y, b.y), hn::Min(a.z, b.z)}; }
+HWY_INLINE V3 larger(const V3& a, const V3& b) { return {hn::Max(a.x, b.x), hn::Max(a.y, b.y), hn::Max(a.z, b.z)}; }
+HWY_INLINE Vec3 least_of(const V3& a) {
+  const D d;
+  return {hn::GetLane(hn::MinOfLanes(d, a.x)), hn::GetLane(hn::MinOfLanes(d, a.y)),
+          hn::GetLane(hn::MinOfLanes(d, a.z))};
+}
+HWY_INLINE Vec3 most_of(const V3& a) {
+  const D d;
+  return {hn::GetLane(hn::MaxOfLanes(d, a.x)), hn::GetLane(hn::MaxOfLanes(d, a.y)),
+          hn::GetLane(hn::MaxOfLanes(d, a.z))};
+}
+
+HWY_INLINE V3 load_corner(const double* HWY_RESTRICT rows, const std::uint32_t* HWY_RESTRICT row) {
+  const D d;
+  const hn::Rebind<std::uint32_t, D> d_row;
+  const auto at = hn::ShiftLeft<3>(hn::BitCast(DI(), hn::PromoteTo(hn::RebindToUnsigned<D>(), hn::LoadU(d_row, row))));
+  static_assert(kernel::kNodeFields == 8);
+  return {hn::GatherIndex(d, rows, at), hn::GatherIndex(d, rows + 1, at), hn::GatherIndex(d, rows + 2, at)};
+}
+
+void make_skin(const double* HWY_RESTRICT rows, double depth_share, const FaceCorners& corners, size_t count,
+               Skin& skin) {
+  constexpr double kEdge = 1.01;  // what counts as on a face, and what it stretches until the next look
+  const D d;
+  const size_t runs = (count + kFaceRun - 1) / kFaceRun;
+  skin.count = count;
+  skin.faces.resize(runs * kFields * kFaceRun);
+  skin.boxes.assign((runs + 7) / 8 * 6 * 8, 1e300);  // nothing is in the boxes of no run
+  const V quarter = num(0.25);
+  V3 all_low{num(1e300), num(1e300), num(1e300)}, all_high{num(-1e300), num(-1e300), num(-1e300)};
+  for (size_t run = 0; run < runs; ++run) {
+    V3 low{num(1e300), num(1e300), num(1e300)}, high{num(-1e300), num(-1e300), num(-1e300)};
+    for (size_t l = 0; l < kFaceRun; l += kLanes) {
+      V3 x[8];
+      for (size_t k = 0; k < 8; ++k) x[k] = load_corner(rows, corners[k].data() + run * kFaceRun + l);
+      const V3 centre = scale(quarter, add(add(add(x[0], x[1]), x[2]), x[3]));
+      const V3 far = scale(quarter, add(add(add(x[4], x[5]), x[6]), x[7]));
+      const V3 n = cross(sub(x[2], x[0]), sub(x[3], x[1]));
+      const V3 normal = scale(per_length(n), n);
+      const V3 a = scale(quarter, sub(sub(add(x[1], x[2]), x[0]), x[3]));
+      const V3 b = scale(quarter, sub(sub(add(x[2], x[3]), x[0]), x[1]));
+      const V3 c = scale(quarter, sub(sub(add(x[0], x[2]), x[1]), x[3]));
+      // normal to the other edge of the parallelogram of the middle, which is as wide as a reaches along it
+      const V3 to_xi = cross(b, normal), to_eta = cross(normal, a);
+      const V3 along = scale(per_length(to_xi), to_xi), across = scale(per_length(to_eta), to_eta);
+      const V wide = add(mul(num(kEdge), hn::Abs(dot(a, along))), hn::Abs(dot(c, along)));
+      const V tall = add(mul(num(kEdge), hn::Abs(dot(b, across))), hn::Abs(dot(c, across)));
+      const V depth = mul(num(depth_share), hn::Max(num(0), dot(normal, sub(centre, far))));
+      V square = num(0);
+      for (size_t k = 0; k < 4; ++k) {
+        const V3 r = sub(x[k], centre);
+        square = hn::Max(square, dot(r, r));
+        all_low = smaller(all_low, x[k]), all_high = larger(all_high, x[k]);
+      }
+      const V reach = add(hn::Sqrt(square), depth);
+      low = smaller(low, sub(centre, V3{reach, reach, reach})),
+      high = larger(high, add(centre, V3{reach, reach, reach}));
+      double* HWY_RESTRICT to = skin.faces.data() + run * kFields * kFaceRun + l;
+      const V fields[kFields] = {centre.x, centre.y, centre.z, normal.x, normal.y, normal.z, along.x, along.y,
+                                 along.z,  across.x, across.y, across.z, wide,     tall,     depth};
+      for (size_t f = 0; f < kFields; ++f) hn::Store(fields[f], d, to + f * kFaceRun);
+    }
+    const Vec3 from = least_of(low), until = most_of(high);
+    double* box = skin.boxes.data() + run / 8 * 6 * 8 + run % 8;
+    for (int i = 0; i < 3; ++i) box[8 * i] = from[i], box[8 * (3 + i)] = until[i];
+  }
+  if (runs > 0) skin.box.low = least_of(all_low), skin.box.high = most_of(all_high);
+}
+
+template <class Mask>
+HWY_INLINE unsigned bits_of(Mask mask) {
+  std::uint8_t bits[8] = {};
+  hn::StoreMaskBits(D(), mask, bits);
+  return bits[0];
+}
+/// Bits of numbers in lanes of a whole run.
+template <class Test>
+HWY_INLINE unsigned test_run(const Test& test) {
+  unsigned bits = 0;
+  for (size_t l = 0; l < kFaceRun; l += kLanes) bits |= bits_of(test(l)) << l;
+  return bits;
+}
+
+void find_faces(const Skin& skin, const Vec3& p, double near_by, double margin, std::vector<std::uint32_t>& found) {
+  const D d;
+  const V near = num(near_by), behind = num(-margin);
+  const V3 at{num(p.x), num(p.y), num(p.z)};
+  const V3 low = add(at, V3{near, near, near}), high = sub(at, V3{near, near, near});
+  for (size_t eight = 0; eight < skin.boxes.size() / (6 * 8); ++eight) {
+    const double* HWY_RESTRICT box = skin.boxes.data() + eight * 6 * 8;
+    unsigned runs = test_run([&](size_t l) HWY_ATTR {
+      const auto is_in = [&](size_t i, V above, V below) HWY_ATTR {
+        return hn::And(hn::Le(hn::Load(d, box + 8 * i + l), above), hn::Ge(hn::Load(d, box + 8 * (3 + i) + l), below));
+      };
+      return hn::And(hn::And(is_in(0, low.x, high.x), is_in(1, low.y, high.y)), is_in(2, low.z, high.z));
+    });
+    for (size_t run = 8 * eight; runs != 0; ++run, runs >>= 1) {
+      if ((runs & 1U) == 0) continue;
+      const double* HWY_RESTRICT from = skin.faces.data() + run * kFields * kFaceRun;
+      const unsigned faces = test_run([&](size_t l) HWY_ATTR {
+        const auto field = [&](size_t f) HWY_ATTR { return hn::Load(d, from + f * kFaceRun + l); };
+        const auto vector = [&](size_t f) HWY_ATTR { return V3{field(f), field(f + 1), field(f + 2)}; };
+        const V3 r = sub(at, vector(kCentre));
+        const V height = dot(r, vector(kNormal));
+        const V beside = hn::Max(sub(hn::Abs(dot(r, vector(kAlong))), field(kWide)),
+                                 sub(hn::Abs(dot(r, vector(kAcross))), field(kHigh)));
+        return hn::And(hn::And(hn::Le(height, near), hn::Ge(height, sub(behind, field(kDepth)))), hn::Le(beside, near));
+      });
+      for (size_t l = 0; l < kFaceRun; ++l) {
+        const size_t i = run * kFaceRun + l;
+        if ((faces >> l & 1U) != 0 && i < skin.count) found.push_back(static_cast<std::uint32_t>(i));
+      }
+    }
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace topple::fem::lanes
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace topple::fem::lanes {
+
+HWY_EXPORT(make_skin);
+HWY_EXPORT(find_faces);
+
+void fill_runs(FaceCorners& corners) {
+  for (auto& rows : corners)
+    while (rows.size() % kFaceRun != 0) rows.push_back(rows.back());
+}
+void make_skin(const double* rows, double depth, const FaceCorners& corners, size_t count, Skin& skin) {
+  HWY_DYNAMIC_DISPATCH(make_skin)(rows, depth, corners, count, skin);
+}
+void find_faces(const Skin& skin, const Vec3& p, double near, double margin, std::vector<std::uint32_t>& found) {
+  found.clear();
+  HWY_DYNAMIC_DISPATCH(find_faces)(skin, p, near, margin, found);
+}
+
+}  // namespace topple::fem::lanes
+#endif
