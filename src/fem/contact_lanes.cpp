@@ -11,6 +11,7 @@
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4 | HWY_AVX3_DL)
 #include <hwy/foreach_target.h>
 // after foreach_target
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
@@ -93,7 +94,10 @@ HWY_NOINLINE size_t sift(const Setup& setup, const Faces& faces, size_t first, s
   const D d;
   const auto* points = reinterpret_cast<const double*>(faces.points.data());
   size_t kept = 0;
+  constexpr size_t kAhead = 16;  // corners that lie all over memory
   for (size_t i = first; i < last; i += kLanes) {
+    for (size_t l = i + kAhead; l < std::min(i + kAhead + kLanes, faces.point.size()); ++l)
+      for (const auto& rows : faces.corners) hwy::Prefetch(setup.rows + kernel::kNodeFields * size_t{rows[l]});
     const Block block = load_block(faces, [&](size_t l) { return std::min(i + l, last - 1); });
     V3 x[4];
     load_corners(setup.rows, block, x);

@@ -5,7 +5,6 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <tuple>
 #include <utility>
 
@@ -40,18 +39,6 @@ struct Face {
   double uneven = 0;             // of the corners, to either side
   double wider = 0, higher = 0;  // than the parallelogram of its middle, in ξ and η
 };
-struct Point {
-  ContactPoint point;
-  Vec3 p;
-  double radius = 0;
-};
-/// The outside of a group.
-struct Skin {
-  const std::vector<std::uint32_t>* numbers = nullptr;  // of faces
-  lanes::Skin faces;
-  std::vector<Point> points;
-};
-
 /// Calls body(i) for all i below count, `run` of them a task.
 template <class Body>
 void for_all(size_t count, size_t run, Team& team, const Body& body) {
@@ -68,8 +55,7 @@ class Search {
         faces_(faces),
         h_(h),
         team_(team),
-        groups_(static_cast<std::uint32_t>(setup.group_starts.size() - 1)),
-        skins_(groups_) {}
+        groups_(static_cast<std::uint32_t>(setup.group_starts.size() - 1)) {}
 
   void look() {
     const double elapsed = kLook * h_;
@@ -408,7 +394,7 @@ class Search {
     }
     for_all(groups_, 8, team_, [&](size_t g) {
       if (s_.contact.changed[g] != 0) faces_[g].is_stale = true;
-      if (wanted[g] != Nothing) skins_[g] = make_skin(static_cast<std::uint32_t>(g), wanted[g] == All);
+      if (wanted[g] != Nothing) make_skin(static_cast<std::uint32_t>(g), wanted[g] == All);
     });
   }
   /// Faces of a group that are outside.
@@ -432,24 +418,20 @@ class Search {
     lanes::fill_runs(faces.corners);
     faces.is_stale = false;
   }
-  Skin make_skin(std::uint32_t g, bool has_points) const {
+  void make_skin(std::uint32_t g, bool has_points) const {
     GroupFaces& faces = faces_[g];
     if (faces.is_stale) list_faces(g, faces);
-    Skin skin;
-    skin.numbers = &faces.numbers;
-    const std::vector<std::uint32_t>& numbers = faces.numbers;
-    lanes::make_skin(s_.rows.data(), kFaceDepth, faces.corners, numbers.size(), skin.faces);
-    if (has_points) skin.points.reserve(numbers.size() + setup_.node_starts[g + 1] - setup_.node_starts[g]);
-    for (size_t i = 0; has_points && i < numbers.size(); ++i)
-      skin.points.push_back({{ContactPoint::Centre, numbers[i]}, skin.faces.centre(i), 0});
-    if (!has_points) return skin;
+    lanes::make_skin(s_.rows.data(), kFaceDepth, faces.corners, faces.numbers.size(), faces.skin);
+    if (!has_points) return;
+    faces.points.clear();
+    for (size_t i = 0; i < faces.numbers.size(); ++i)
+      faces.points.push_back({{ContactPoint::Centre, faces.numbers[i]}, faces.skin.centre(i)});
     for (std::uint32_t i = setup_.node_starts[g]; i < setup_.node_starts[g + 1]; ++i) {
       const std::uint32_t row = setup_.node_rows[i];
       // eight elements around a node hide it
       if (setup_.owner[row] != g || s_.uses[row] == 0 || s_.uses[row] >= 8) continue;
-      skin.points.push_back({{ContactPoint::Node, row}, place(s_, row), 0});
+      faces.points.push_back({{ContactPoint::Node, row}, place(s_, row)});
     }
-    return skin;
   }
 
   bool are_joined(const ContactPoint& point, std::uint32_t face) const {
@@ -471,38 +453,32 @@ class Search {
     return std::max(x, y);
   }
 
-  void match(const Point& q, const Skin& skin, std::vector<FoundCandidate>& found) const {
-    static thread_local std::vector<std::uint32_t> faces;
-    const double near = setup_.margin + q.radius;
-    if (!skin.faces.box.has(q.p, near)) return;
-    lanes::find_faces(skin.faces, q.p, near, setup_.margin, faces);
-    for (const std::uint32_t i : faces) {
-      const std::uint32_t number = (*skin.numbers)[i];
-      if (!are_joined(q.point, number)) found.push_back({{q.point, number}, -1});
-    }
+  void match(const ContactPoint& point, const Vec3& p, double radius, const GroupFaces& faces,
+             std::vector<FoundCandidate>& found) const {
+    static thread_local std::vector<std::uint32_t> near_by;
+    const double near = setup_.margin + radius;
+    if (!faces.skin.box.has(p, near)) return;
+    lanes::find_faces(faces.skin, p, near, setup_.margin, near_by);
+    for (const std::uint32_t i : near_by)
+      if (!are_joined(point, faces.numbers[i])) found.push_back({{point, faces.numbers[i]}, -1});
   }
-  void match(const std::vector<Point>& points, const Skin& skin, std::vector<FoundCandidate>& found) const {
-    for (const Point& q : points) match(q, skin, found);
+  void match(const GroupFaces& of, const GroupFaces& faces, std::vector<FoundCandidate>& found) const {
+    for (const GroupFaces::Point& q : of.points) match(q.point, q.p, 0, faces, found);
   }
 
   /// Candidates of a pair, and how far its objects may move against each other until it is looked through again.
   void find_candidates(ContactPair& pair) const {
     pair.candidates.clear();
     pair.moved = 0, pair.until = static_cast<float>(setup_.margin), pair.free = -1;
-    const Skin& b = *skins_[pair.b];
+    const GroupFaces& b = faces_[pair.b];
     if (pair.a >= groups_) {
       const std::uint32_t i = pair.a - groups_;
-      const Particle& particle = s_.particles[i];
-      match({{ContactPoint::Debris, i}, particle.p, s_.particle_makes[i].full_radius}, b, pair.candidates);
+      match({ContactPoint::Debris, i}, s_.particles[i].p, s_.particle_makes[i].full_radius, b, pair.candidates);
       return;
     }
-    if (pair.a == pair.b) {
-      match(b.points, b, pair.candidates);
-      return;
-    }
-    const Skin& a = *skins_[pair.a];
-    match(a.points, b, pair.candidates);
-    match(b.points, a, pair.candidates);
+    const GroupFaces& a = faces_[pair.a];
+    match(a, b, pair.candidates);
+    if (pair.a != pair.b) match(b, a, pair.candidates);
   }
 
   const ContactSetup& setup_;
@@ -514,7 +490,6 @@ class Search {
   std::vector<ContactBox> boxes_;    // of objects, as they are
   std::vector<Vec3> speed_before_;   // of objects at the last look
   std::vector<double> most_spread_;  // at both
-  std::vector<std::optional<Skin>> skins_;
 };
 
 }  // namespace

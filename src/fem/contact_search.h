@@ -62,11 +62,18 @@ struct ContactSetup {
 };
 ContactSetup make_contact_setup(const ExplicitModel&, const ExplicitChunks&, double margin, bool enabled);
 
-/// The outer faces of a group, as long as its surface has not changed.
+/// The outside of a group. Which faces there are holds as long as its surface does not change, where they are for a
+/// look.
 struct GroupFaces {
+  struct Point {
+    ContactPoint point;
+    Vec3 p;
+  };
   bool is_stale = true;
   std::vector<std::uint32_t> numbers;  // 6 element + face
   lanes::FaceCorners corners;
+  lanes::Skin skin;
+  std::vector<Point> points;
 };
 using ContactFaces = std::vector<GroupFaces>;
 

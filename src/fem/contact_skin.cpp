@@ -175,6 +175,7 @@ void fill_runs(FaceCorners& corners) {
     while (rows.size() % kFaceRun != 0) rows.push_back(rows.back());
 }
 void make_skin(const double* rows, double depth, const FaceCorners& corners, size_t count, Skin& skin) {
+  skin.box = {};
   HWY_DYNAMIC_DISPATCH(make_skin)(rows, depth, corners, count, skin);
 }
 void find_faces(const Skin& skin, const Vec3& p, double near, double margin, std::vector<std::uint32_t>& found) {

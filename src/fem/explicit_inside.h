@@ -27,6 +27,12 @@ struct GroundTouch {
   Vec3 before;        // velocity half a step before
 };
 
+/// Of a share of the particles.
+struct GroundShare {
+  std::vector<GroundTouch> touches;
+  std::vector<Vec3> forces;  // (grounds)
+};
+
 /// Work of contact so far, and what is in the springs now [J].
 struct ContactWork {
   double normal = 0, friction = 0, stored = 0;
@@ -128,7 +134,8 @@ struct ExplicitSystem::Inside {
   std::vector<kernel::Balance> balances;  // of chunks, then of shares of the shared nodes
   std::vector<ContactTask> contact_tasks;
   ContactFaces contact_faces;  // of the last look
-  ExplicitState spare;         // kept, so that copies need no new memory
+  mutable std::vector<GroundShare> ground_shares;
+  ExplicitState spare;  // kept, so that copies need no new memory
   Timing timing;
   mutable std::vector<DebrisParticle> debris_view;
 

@@ -60,14 +60,11 @@ void ExplicitSystem::Inside::press_grounds(ExplicitState& state) const {
       if (first < 0) first = static_cast<double>(state.steps) * h;
     }
   }
-  struct Share {
-    std::vector<GroundTouch> touches;
-    std::vector<Vec3> forces;
-  };
-  std::vector<Share> shares(particle_shares(state));
+  std::vector<GroundShare>& shares = ground_shares;
+  shares.resize(particle_shares(state));
   for_particles(state, [&](size_t share, size_t first, size_t last) {
     auto& [touches, forces] = shares[share];
-    forces.assign(model.grounds.size(), {});
+    touches.clear(), forces.assign(model.grounds.size(), {});
     for (size_t i = first; i < last; ++i) {
       const Particle& q = state.particles[i];
       ParticlePush& push = state.particle_pushes[i];
@@ -85,7 +82,7 @@ void ExplicitSystem::Inside::press_grounds(ExplicitState& state) const {
       }
     }
   });
-  for (const Share& share : shares) {
+  for (const GroundShare& share : shares) {
     state.touches.insert(state.touches.end(), share.touches.begin(), share.touches.end());
     for (size_t i = 0; i < share.forces.size(); ++i) state.ground_forces[i] += share.forces[i];
   }

@@ -226,8 +226,14 @@ void press_surfaces(ExplicitSystem::Inside& in, ExplicitState& s) {
       ParticlePush& to = s.particle_pushes[number];
       to.crushed = std::max({0.0, to.crushed, crushed}), to.force += force;
     };
+    constexpr size_t kAhead = 8;  // rows that lie all over memory
     for (const ContactTask& task : in.contact_tasks)
-      for (const FaceTouch& touch : task.faces_touched) {
+      for (size_t i = 0; i < task.faces_touched.size(); ++i) {
+        if (i + kAhead < task.faces_touched.size())
+          for (const std::uint32_t row : task.faces_touched[i + kAhead].rows) {
+            hwy::Prefetch(s.pushes.data() + 4 * size_t{row}), hwy::Prefetch(s.flags.data() + row);
+          }
+        const FaceTouch& touch = task.faces_touched[i];
         const Vec3 force = touch.normal_force + touch.friction;
         if (touch.point.kind == ContactPoint::Debris)
           press(touch.point.index, force, touch.crushed);
@@ -257,7 +263,12 @@ void book_surfaces(const ExplicitSystem::Inside& in, ExplicitState& s) {
   in.team->run(tasks.size(), [&](size_t number) {
     const ContactTask& task = tasks[number];
     double normal = task.sums.normal, friction = task.sums.friction;  // at the speeds before, then at both
-    for (const FaceTouch& touch : task.faces_touched) {
+    constexpr size_t kAhead = 8;                                      // rows that lie all over memory
+    for (size_t i = 0; i < task.faces_touched.size(); ++i) {
+      if (i + kAhead < task.faces_touched.size())
+        for (const std::uint32_t row : task.faces_touched[i + kAhead].rows)
+          hwy::Prefetch(s.rows.data() + 8 * size_t{row});
+      const FaceTouch& touch = task.faces_touched[i];
       Vec3 v;
       if (touch.point.kind == ContactPoint::Debris)
         v = s.particles[touch.point.index].v;
