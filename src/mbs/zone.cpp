@@ -66,6 +66,7 @@ void soften(const ZoneParameters& p, ZoneState& z) {
   z.energy += stored;
   z.plastic -= stored;
   z.share = z.next_share;
+  z.safe_force[0] = 1, z.safe_force[1] = -1;  // the bounds were those of the stiff zone
 }
 
 /// What a section shortens by turning need not be crushed: gives back what was in the last evaluation, as far as that
@@ -694,16 +695,18 @@ template <Plane In>
 void advance_in(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, const Six& d, double time, double h,
                 ZoneState& z) {
   if (advance_inside_bounds<In>(p, d, h, z)) return;
-  if (z.next_law >= 0 && time >= z.ramp_begin + z.ramp) {
-    // the switch is done
-    if (z.next_share != z.share) soften(p, z);
+  const bool is_switched = z.next_law >= 0 && time >= z.ramp_begin + z.ramp;
+  if (is_switched) {
     z.base_law = z.next_law;
     z.next_law = -1;
   }
   Evaluation<In> now(p, d, z);
   const double energy = now.calc_energy();
   if (now.n > 0) now.flow(laws, time);
-  if (now.keep(energy)) now.damp(h);
+  if (!now.keep(energy)) return;
+  now.damp(h);
+  // only now: on the soft springs, forces beyond the new limits would leave long ways of flow, and dampers that pull
+  if (is_switched && z.next_share != z.share) soften(p, z);
 }
 
 }  // namespace

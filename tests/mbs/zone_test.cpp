@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "models.h"
 
 namespace topple::mbs {
@@ -371,6 +373,28 @@ TEST(Zone, AChargeTakesTheLimitsAwayWithinItsRamp) {
   for (int i = 1; i <= 10; ++i) advance_zone(w.p, w.laws, d, 0.001 * i, 0.001, w.z);
   EXPECT_NEAR(-w.z.resultant.c[0], 0.2e6, 0.2e6 * 0.3);  // at the foot of the weak curve: 0.15 to 0.2 MN
   EXPECT_LT(-w.z.resultant.c[0], 0.21e6);
+}
+
+TEST(Zone, AChargeLeavesWhatItsBarsCarryAtEveryStep) {
+  // bars of 10 kN on a spring of 0.4 % take over from a zone under 1 MN; what it gives up flows on the stiff spring
+  ZoneLaw bars = make_law();
+  for (double& f : bars.compression.f) f = 10e3;
+  for (const double h : {1e-3, 1e-4}) {
+    Walk w;
+    w.p.viscous = 0.2;
+    w.p.relaxation = 1 - std::exp(-50 * h);
+    w.laws.push_back(compile_law(bars));
+    const Six held = deform(-1e6 / kStiff, 0, 0);
+    w.go(held, 10);
+    w.z.next_law = 1;
+    w.z.ramp = 2.5e-3;
+    w.z.next_share = 0.004;
+    for (int i = 1; i * h < 6e-3; ++i) advance_zone(w.p, w.laws, held, i * h, h, w.z);
+    ASSERT_TRUE(w.z.live);
+    EXPECT_EQ(w.z.share, 0.004);
+    EXPECT_NEAR(w.z.shortened, (1e6 - 10e3) / kStiff, 1e-9);
+    EXPECT_NEAR(w.z.resultant.c[0], -10e3, 0.1 * 10e3);  // what is left in the damper goes on relaxing
+  }
 }
 
 TEST(Zone, SoftensWithoutAJumpOfItsForces) {
