@@ -470,14 +470,20 @@ void add_verification(const Context& c) {
             ? Status::Good
             : Status::Bad);
   c.add("verification.step", "Verification", "Time step",
-        fmt::format(
-            "{:.3g} ms in {} steps; the fastest mode has {:.0f} rad/s, and joints drift by at most {:.1e} m or rad.",
-            s.step * 1e3, s.steps, s.highest_frequency, s.joint_drift) +
-            (s.step_needed > 0 ? " " + describe_step_needed(s) : ""),
-        s.step, "s", s.step_needed > 0 ? Status::Warning : Status::Info);
+        describe_steps(s) + fmt::format(" Joints drift by at most {:.1e} m or rad.", s.joint_drift), s.step, "s",
+        s.step_needed > 0 ? Status::Warning : Status::Info);
 }
 
 }  // namespace
+
+std::string describe_steps(const mbs::Summary& s) {
+  std::string text = s.shortest_step < 0.995 * s.step
+                         ? fmt::format("{:.3g} ms at first, {:.3g} ms at the shortest, {} steps in all.", s.step * 1e3,
+                                       s.shortest_step * 1e3, s.steps)
+                         : fmt::format("{:.3g} ms in {} steps.", s.step * 1e3, s.steps);
+  text += fmt::format(" The fastest mode has {:.0f} rad/s.", s.highest_frequency);
+  return s.step_needed > 0 ? text + " " + describe_step_needed(s) : text;
+}
 
 std::string describe_step_needed(const mbs::Summary& s) {
   return fmt::format("The fastest mode needs less than {:.3g} ms: what swings so fast may have been thrown about.",

@@ -12,7 +12,8 @@ namespace topple::collapse {
 /// What no run tells, for people.
 const std::vector<std::string>& not_modelled();
 
-/// What the fastest mode asked of a set step that was too long for it.
+/// The steps of a run, and what the fastest mode asked of a set step that was too long for it.
+std::string describe_steps(const mbs::Summary&);
 std::string describe_step_needed(const mbs::Summary&);
 
 /// Fills findings, not_modelled and the rigid block's series of a record. Where its ending is "under_way" they say how
