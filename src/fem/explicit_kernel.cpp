@@ -824,6 +824,7 @@ void advance_chunk(const StepJob& step, ChunkJob& job) {
   const V* vectors[4] = {&sums.mean, &sums.varying, &sums.corner, &sums.viscous};
   for (int i = 0; i < 4; ++i) job.sums[i] += hn::GetLane(hn::SumOfLanes(d, *vectors[i]));
   move_own_nodes(step, job);
+  if (job.shared == 0) return;
   double* HWY_RESTRICT shared = job.forces + 4 * job.own;
   std::memcpy(job.shared_forces, shared, 4 * job.shared * sizeof(double));
   std::memset(shared, 0, 4 * job.shared * sizeof(double));
