@@ -170,9 +170,32 @@ HWY_INLINE Projection project(const V3& p, const V3 (&x)[4], V radius, M is_ball
   return out;
 }
 
+/// Forces of springs with dashpots and friction.
+struct Pressed {
+  V3 force, friction;
+  V stored;
+};
+HWY_INLINE Pressed press_along(V depth, const V3& normal, const V3& v, V rate, V inverse, V damping,
+                               double friction_share, double grip_share, double h) {
+  const V zero = num(0);
+  const V closing = hn::Neg(dot(normal, v));
+  const V dashpot = mul(mul(mul(num(2), damping), hn::Sqrt(hn::Div(rate, inverse))), closing);
+  const V push = hn::Max(zero, add(mul(rate, depth), dashpot));
+  const V3 along = add(v, scale(closing, normal));
+  const V slide = length(along);
+  const V grip = hn::Min(mul(num(friction_share), push), hn::Div(mul(num(grip_share), slide), mul(inverse, num(h))));
+  const V pull = hn::IfThenElseZero(hn::Gt(slide, zero), hn::Div(hn::Neg(grip), slide));
+  return {scale(push, normal), scale(pull, along), mul(mul(mul(num(0.5), rate), depth), depth)};
+}
+/// What presses a ball beyond what it bears.
+HWY_INLINE V calc_crushed(const Pressed& on, V depth, V bears) {
+  const V spring = hn::Div(mul(num(2), on.stored), mul(depth, depth));
+  return hn::IfThenElseZero(hn::Gt(spring, num(0)), sub(depth, hn::Div(bears, spring)));
+}
+
 HWY_NOINLINE void press(const Setup& setup, const Faces& faces, size_t count, std::vector<Touch>& touches) {
   const D d;
-  const V zero = num(0), h = num(setup.h);
+  const V zero = num(0);
   const auto* points = reinterpret_cast<const double*>(faces.points.data());
   const auto field = [&](size_t offset) HWY_ATTR { return points + offset / sizeof(double); };
   const std::uint32_t* HWY_RESTRICT passed = faces.passed.data();
@@ -202,20 +225,11 @@ HWY_NOINLINE void press(const Setup& setup, const Faces& faces, size_t count, st
     rate = hn::Min(rate, hn::GatherIndex(d, field(offsetof(Point, stiffness)), block.point));
     rate = mul(hn::IfThenElse(on.inside, num(1), num(0.5)), rate);  // two faces have an edge
     const V damping = hn::GatherIndex(d, field(offsetof(Point, damping)), block.point);
-    const V closing = hn::Neg(dot(on.normal, v));
-    const V dashpot = mul(mul(mul(num(2), damping), hn::Sqrt(hn::Div(rate, inverse))), closing);
-    const V push = hn::Max(zero, add(mul(rate, depth), dashpot));
-    const V3 along = add(v, scale(closing, on.normal));
-    const V slide = length(along);
-    const V grip = hn::Min(mul(num(setup.friction), push), hn::Div(mul(num(setup.grip), slide), mul(inverse, h)));
-    const V pull = hn::IfThenElseZero(hn::Gt(slide, zero), hn::Div(hn::Neg(grip), slide));
-    const V3 force = scale(push, on.normal), friction = scale(pull, along);
-    const V stored = mul(mul(mul(num(0.5), rate), depth), depth);
-
-    // what presses a ball beyond what it bears
-    const V spring = hn::Div(mul(num(2), stored), mul(depth, depth));
-    const V bears = hn::GatherIndex(d, field(offsetof(Point, bears)), block.point);
-    const V crushed = hn::IfThenElseZero(hn::Gt(spring, zero), sub(depth, hn::Div(bears, spring)));
+    const Pressed pressed =
+        press_along(depth, on.normal, v, rate, inverse, damping, setup.friction, setup.grip, setup.h);
+    const V3 &force = pressed.force, &friction = pressed.friction;
+    const V stored = pressed.stored;
+    const V crushed = calc_crushed(pressed, depth, hn::GatherIndex(d, field(offsetof(Point, bears)), block.point));
 
     const V fields[] = {on.height,     depth,   on.weights[0], on.weights[1],   on.weights[2], on.weights[3],
                         force.x,       force.y, force.z,       friction.x,      friction.y,    friction.z,
@@ -241,6 +255,55 @@ void press_faces(const Setup& setup, Faces& faces, size_t first, size_t last, st
   press(setup, faces, sift(setup, faces, first, last, faces.passed.data()), touches);
 }
 
+void press_particles(const ParticleSetup& setup, std::span<const ParticlePair> pairs,
+                     std::vector<ParticleTouch>& touches, TouchSums& sums) {
+  const D d;
+  const V one = num(1);
+  const auto* particles = reinterpret_cast<const double*>(setup.particles);
+  const auto* makes = reinterpret_cast<const double*>(setup.makes);
+  for (size_t i = 0; i < pairs.size(); i += kLanes) {
+    V3 p[2], v[2];
+    V radius[2], per_mass[2], stiffness[2], bears[2];
+    for (size_t side = 0; side < 2; ++side) {
+      const auto number = [&](size_t l) { return pairs[std::min(i + l, pairs.size() - 1)][side]; };
+      const VI at = load_places(sizeof(Particle) / sizeof(double), number);
+      const VI make = load_places(sizeof(ParticleMake) / sizeof(double), number);
+      const auto field = [&](size_t offset) HWY_ATTR { return particles + offset / sizeof(double); };
+      p[side] = gather(field(offsetof(Particle, p)), at), v[side] = gather(field(offsetof(Particle, v)), at);
+      radius[side] = hn::GatherIndex(d, field(offsetof(Particle, radius)), at);
+      per_mass[side] = hn::Div(one, hn::GatherIndex(d, field(offsetof(Particle, mass)), at));
+      stiffness[side] = hn::GatherIndex(d, makes + offsetof(ParticleMake, stiffness) / sizeof(double), make);
+      bears[side] = hn::GatherIndex(d, makes + offsetof(ParticleMake, bears) / sizeof(double), make);
+    }
+    const V3 apart = sub(p[0], p[1]), along_v = sub(v[0], v[1]);
+    const V distance = length(apart), depth = sub(add(radius[0], radius[1]), distance);
+    const V3 normal = scale(hn::Div(one, distance), apart);
+    const V rate = hn::Min(stiffness[0], stiffness[1]), inverse = add(per_mass[0], per_mass[1]);
+    const Pressed on =
+        press_along(depth, normal, along_v, rate, inverse, num(setup.damping), setup.friction, setup.grip, setup.h);
+    const V fields[] = {on.force.x,
+                        on.force.y,
+                        on.force.z,
+                        on.friction.x,
+                        on.friction.y,
+                        on.friction.z,
+                        dot(on.force, along_v),
+                        dot(on.friction, along_v),
+                        on.stored,
+                        calc_crushed(on, depth, bears[0]),
+                        calc_crushed(on, depth, bears[1])};
+    constexpr size_t kFields = sizeof(fields) / sizeof(V);
+    HWY_ALIGN double out[kFields][kLanes];
+    for (size_t f = 0; f < kFields; ++f) hn::Store(fields[f], d, out[f]);
+    for (size_t l = 0; l < kLanes && i + l < pairs.size(); ++l) {
+      ParticleTouch& t = touches.emplace_back();
+      t.normal_force = {out[0][l], out[1][l], out[2][l]}, t.friction = {out[3][l], out[4][l], out[5][l]};
+      t.crushed = {out[9][l], out[10][l]}, t.pair = pairs[i + l];
+      sums.normal += out[6][l], sums.friction += out[7][l], sums.stored += out[8][l];
+    }
+  }
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace topple::fem::lanes
 HWY_AFTER_NAMESPACE();
@@ -249,10 +312,16 @@ HWY_AFTER_NAMESPACE();
 namespace topple::fem::lanes {
 
 HWY_EXPORT(press_faces);
+HWY_EXPORT(press_particles);
 
 void press_faces(const Setup& setup, Faces& faces, size_t first, size_t last, std::vector<Touch>& touches) {
   touches.clear();
   if (first < last) HWY_DYNAMIC_DISPATCH(press_faces)(setup, faces, first, last, touches);
+}
+
+void press_particles(const ParticleSetup& setup, std::span<const ParticlePair> pairs,
+                     std::vector<ParticleTouch>& touches, TouchSums& sums) {
+  HWY_DYNAMIC_DISPATCH(press_particles)(setup, pairs, touches, sums);
 }
 
 }  // namespace topple::fem::lanes

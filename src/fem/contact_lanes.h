@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "base/aligned.h"
@@ -56,5 +57,18 @@ struct Setup {
 /// Those of the candidates [first, last) that touch, in order. Some behind a face may be too deep, or nearer to another
 /// one.
 void press_faces(const Setup&, Faces&, size_t first, size_t last, std::vector<Touch>&);
+
+/// Constant.
+struct ParticleSetup {
+  const Particle* particles = nullptr;
+  const ParticleMake* makes = nullptr;
+  double h = 0;                      // step [s]
+  double friction = 0, damping = 0;  // damping: of critical
+  double grip = 0;                   // share of the mass stopped by friction in a step
+};
+
+/// Pairs of particles whose middles are apart by less than their radii, though not in one place; appends touches, and
+/// adds to the sums.
+void press_particles(const ParticleSetup&, std::span<const ParticlePair>, std::vector<ParticleTouch>&, TouchSums&);
 
 }  // namespace topple::fem::lanes

@@ -14,6 +14,7 @@
 #include "fem/contact_skin.h"
 #include "fem/explicit_chunks.h"
 #include "fem/outer_surface.h"
+#include "fem/particle.h"
 
 namespace topple::fem {
 
@@ -92,8 +93,6 @@ struct TouchSums {
   long long count = 0;
   double normal = 0, friction = 0, stored = 0;
 };
-
-using ParticlePair = std::array<std::uint32_t, 2>;  // the later one first
 
 struct ContactState {
   std::vector<unsigned char> gone;           // elements

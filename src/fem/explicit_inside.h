@@ -14,6 +14,7 @@
 #include "fem/explicit_chunks.h"
 #include "fem/explicit_kernel.h"
 #include "fem/explicit_system.h"
+#include "fem/particle.h"
 
 namespace topple::fem {
 
@@ -38,28 +39,7 @@ struct ContactWork {
   double normal = 0, friction = 0, stored = 0;
 };
 
-/// A ball of debris in three parts, so that steps pass over no more memory than they must. A line of the cache:
-struct alignas(kCacheLine) Particle {
-  Vec3 p, v;
-  double radius = 0, mass = 0;
-};
-/// Of the step.
-struct ParticlePush {
-  Vec3 force;
-  double crushed = -1;  // by how much, negative: nothing touches it [m]
-};
-/// What does not change.
-struct ParticleMake {
-  Vec3 start;  // where its potential counts from
-  double full_radius = 0, stiffness = 0;
-  double bears = 0;  // force at which it is crushed [N]
-  int element = 0;
-  std::uint32_t unused = 0;  // no gaps
-  /// By how much a spring would press it beyond what it bears [m].
-  double calc_crushed(double rate, double depth) const { return depth - bears / rate; }
-};
-
-/// A touch of the step; forces on the point, or on the first particle [N].
+/// A touch of the step; forces on the point [N].
 struct FaceTouch {
   Vec3 normal_force, friction;
   double weights[4] = {0, 0, 0, 0};  // of the face's corners
@@ -67,12 +47,6 @@ struct FaceTouch {
   std::array<std::uint32_t, 4> rows{};
   ContactPoint point;
 };
-struct ParticleTouch {
-  Vec3 normal_force, friction;
-  std::array<double, 2> crushed{};
-  ParticlePair pair{};
-};
-
 /// What a task has of near candidates and what touches.
 struct ContactTask {
   std::uint64_t look = 0;  // that candidates are of
@@ -80,6 +54,7 @@ struct ContactTask {
   std::vector<ContactPoint> points;  // of faces
   std::vector<lanes::Touch> found;
   std::vector<FaceTouch> faces_touched;
+  std::vector<ParticlePair> particles;  // that touch
   std::vector<ParticleTouch> particles_touched;
   TouchSums sums;
 };

@@ -151,33 +151,20 @@ void press_points(const ContactSetup& setup, const ExplicitOptions& options, dou
 void press_particles(const ExplicitOptions& options, double h, const ExplicitState& s,
                      std::span<const ParticlePair> near, ContactTask& task) {
   constexpr size_t kAhead = 8;
+  task.particles.clear();
   for (size_t i = 0; i < near.size(); ++i) {
     if (i + kAhead < near.size())
       for (const std::uint32_t number : near[i + kAhead]) hwy::Prefetch(&s.particles[number]);
-    const ParticlePair& pair = near[i];
-    const Particle &a = s.particles[pair[0]], &b = s.particles[pair[1]];
+    const Particle &a = s.particles[near[i][0]], &b = s.particles[near[i][1]];
     const Vec3 d = a.p - b.p;
     const double reach = a.radius + b.radius, square = dot(d, d);
     if (square >= reach * reach || !(square > 0)) continue;
-    const double distance = std::sqrt(square), depth = reach - distance;
-    const Vec3 normal = (1 / distance) * d, v = a.v - b.v;
-    const ParticleMake &make_a = s.particle_makes[pair[0]], &make_b = s.particle_makes[pair[1]];
-    const double rate = std::min(make_a.stiffness, make_b.stiffness), inverse_mass = 1 / a.mass + 1 / b.mass;
-    const double closing = -dot(normal, v);
-    const double push =
-        std::max(0.0, rate * depth + 2 * options.debris_damping * std::sqrt(rate / inverse_mass) * closing);
-    const Vec3 along = v + closing * normal;
-    const double slide = norm(along);
-    const double grip = std::min(options.friction * push, kGrip * slide / (inverse_mass * h));
-    ParticleTouch& touch = task.particles_touched.emplace_back();
-    touch.normal_force = push * normal;
-    touch.friction = slide > 0 ? (-grip / slide) * along : Vec3{};
-    const double stored = 0.5 * rate * depth * depth, spring = depth > 0 ? 2 * stored / (depth * depth) : 0;
-    if (spring > 0) touch.crushed = {make_a.calc_crushed(spring, depth), make_b.calc_crushed(spring, depth)};
-    touch.pair = pair;
-    task.sums.normal += dot(touch.normal_force, v), task.sums.friction += dot(touch.friction, v);
-    task.sums.stored += stored;
+    for (const std::uint32_t number : near[i]) hwy::Prefetch(&s.particle_makes[number]);
+    task.particles.push_back(near[i]);
   }
+  const lanes::ParticleSetup setup{s.particles.data(), s.particle_makes.data(), h,
+                                   options.friction,   options.debris_damping,  kGrip};
+  lanes::press_particles(setup, task.particles, task.particles_touched, task.sums);
 }
 
 }  // namespace

@@ -112,5 +112,71 @@ TEST(ContactLanes, GivesTheSameBitsWithEveryInstructionSet) {
   }
 }
 
+struct Balls {
+  AlignedVector<Particle> particles;
+  std::vector<ParticleMake> makes;
+  void add(const Vec3& p, const Vec3& v, double radius, double mass) {
+    particles.push_back({p, v, radius, mass});
+    ParticleMake make;
+    make.full_radius = radius, make.stiffness = 1e6, make.bears = 5e3;
+    makes.push_back(make);
+  }
+  std::vector<ParticleTouch> press(std::span<const ParticlePair> pairs, TouchSums& sums) const {
+    std::vector<ParticleTouch> touches;
+    press_particles({particles.data(), makes.data(), 1e-5, 0.5, 0.25, 0.02}, pairs, touches, sums);
+    return touches;
+  }
+};
+
+TEST(ContactLanes, PressesBallsApartByTheirOverlap) {
+  Balls balls;
+  balls.add({0.19, 0, 0}, {-1, 0, 0}, 0.1, 2), balls.add({0, 0, 0}, {1, 0, 0}, 0.1, 2);
+  const std::vector<ParticlePair> pairs = {{0, 1}};
+  TouchSums sums;
+  const std::vector<ParticleTouch> touches = balls.press(pairs, sums);
+  ASSERT_EQ(touches.size(), 1U);
+  // spring 1e6 N/m by 1 cm, dashpot 2 ζ √(k m) v with the mass of both in series, 1 kg
+  const double spring = 1e4, dashpot = 2 * 0.25 * 1e3 * 2;
+  EXPECT_NEAR(touches[0].normal_force.x, spring + dashpot, 1e-6);
+  EXPECT_EQ(touches[0].friction, Vec3{});
+  EXPECT_NEAR(sums.stored, 50, 1e-9);
+  EXPECT_NEAR(sums.normal, -2 * (spring + dashpot), 1e-6);
+  for (const double crushed : touches[0].crushed) EXPECT_NEAR(crushed, 0.005, 1e-12);
+  EXPECT_EQ(touches[0].pair, pairs[0]);
+}
+
+TEST(ContactLanes, PressesBallsWithTheSameBitsWithEveryInstructionSet) {
+  std::mt19937 random(9);
+  std::uniform_real_distribution<double> number(-1, 1);
+  const auto vector = [&] { return Vec3{number(random), number(random), number(random)}; };
+  Balls balls;
+  std::vector<ParticlePair> pairs;
+  for (std::uint32_t i = 0; i < 101; ++i) {
+    balls.add(vector(), 5 * vector(), 2, 3 + number(random));
+    if (i > 0) pairs.push_back({i, i / 2});
+  }
+  const std::int64_t supported = hwy::SupportedTargets();
+  std::vector<ParticleTouch> first;
+  TouchSums first_sums;
+  for (std::int64_t left = supported; left != 0; left &= left - 1) {
+    hwy::SetSupportedTargetsForTest(left & -left);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    TouchSums sums;
+    const std::vector<ParticleTouch> touches = balls.press(pairs, sums);
+    if (first.empty()) first = touches, first_sums = sums;
+    ASSERT_EQ(touches.size(), pairs.size());
+    EXPECT_EQ(std::memcmp(touches.data(), first.data(), first.size() * sizeof(ParticleTouch)), 0);
+    EXPECT_EQ(std::memcmp(&sums, &first_sums, sizeof sums), 0);
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  for (const ParticleTouch& t : first) {
+    const Particle &a = balls.particles[t.pair[0]], &b = balls.particles[t.pair[1]];
+    EXPECT_GE(dot(t.normal_force, a.p - b.p), 0);
+    EXPECT_LE(dot(t.friction, a.v - b.v), 0);
+    EXPECT_LE(norm(t.friction), 0.5 * norm(t.normal_force) * (1 + 1e-12));
+  }
+}
+
 }  // namespace
 }  // namespace topple::fem::lanes
