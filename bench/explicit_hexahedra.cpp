@@ -100,5 +100,40 @@ void explicit_hexahedra_threads(benchmark::State& state) {
 }
 BENCHMARK(explicit_hexahedra_threads)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->Iterations(4);
 
+/// A frame of weak concrete that has fallen to pieces: balls and faces in touch with each other; argument: 0 the
+/// machine's best instructions, 1 at most AVX2.
+void explicit_debris(benchmark::State& state) {
+  if (state.range(0) == 1) hwy::DisableTargets(HWY_AVX3 | HWY_AVX3_DL);
+  ExplicitModel model = make_explicit_frame(3, 3, 4);
+  for (fem::ExplicitMaterial& m : model.materials) {
+    for (fem::YieldPoint& y : m.yield) y.tension /= 5, y.compression /= 5;
+    m.tension_limit = 0.03, m.compression_limit = 0.05;
+  }
+  fem::ExplicitSystem system(model, {});
+  system.set_velocity({1, 0, -12});
+  if (system.advance(0.4) != fem::ExplicitEnding::ReachedTime) state.SkipWithError("diverged");
+  const auto before = system.timing();
+  const long long first = system.steps();
+  for (auto _ : state)
+    if (system.advance(system.time() + 256 * system.step()) != fem::ExplicitEnding::ReachedTime)
+      state.SkipWithError("diverged");
+  const auto after = system.timing();
+  const double steps = static_cast<double>(system.steps() - first);
+  const double kernel = after.kernel - before.kernel + after.boundary - before.boundary;
+  const double press = after.contact - before.contact, search = after.search - before.search;
+  int alive = 0;
+  for (size_t e = 0; e < model.elements.size(); ++e) alive += system.is_alive(static_cast<int>(e));
+  state.counters["alive"] = alive;
+  state.counters["balls"] = static_cast<double>(system.debris().size());
+  state.counters["touches"] = system.contacts();
+  state.counters["kernel_us"] = 1e6 * kernel / steps;
+  state.counters["press_us"] = 1e6 * press / steps;
+  state.counters["search_us"] = 1e6 * search / steps;
+  state.counters["contact_over_kernel"] = (press + search) / kernel;
+  state.SetLabel(system.instruction_set());
+  hwy::DisableTargets(0);
+}
+BENCHMARK(explicit_debris)->Arg(1)->Arg(0)->Unit(benchmark::kMillisecond)->Iterations(4);
+
 }  // namespace
 }  // namespace topple::bench
