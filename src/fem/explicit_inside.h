@@ -22,7 +22,6 @@ namespace topple::fem {
 struct GroundTouch {
   std::uint32_t row = 0;  // of a node, or number of a particle
   std::int32_t ground = 0;
-  std::uint32_t particle = 0, unused = 0;  // no gaps: a snapshot copies bytes
   Vec3 normal_force, friction;
   double stored = 0;  // in the spring [J]
   Vec3 before;        // velocity half a step before
@@ -32,6 +31,7 @@ struct GroundTouch {
 struct GroundShare {
   std::vector<GroundTouch> touches;
   std::vector<Vec3> forces;  // (grounds)
+  TouchSums sums;
 };
 
 /// Work of contact so far, and what is in the springs now [J].
@@ -74,7 +74,8 @@ struct ExplicitState {
   AlignedVector<Particle> particles;
   std::vector<ParticlePush> particle_pushes;
   std::vector<ParticleMake> particle_makes;
-  std::vector<GroundTouch> touches;
+  std::vector<GroundTouch> touches;  // of nodes
+  TouchSums ground_touching;         // of particles
   ContactWork ground_work, surface_work;
   ContactState contact;
   std::vector<Vec3> ground_forces;

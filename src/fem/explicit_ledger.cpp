@@ -16,6 +16,11 @@ constexpr double kLeastRadius = 0.1;
 
 Vec3 vector_at(const double* r) { return {r[0], r[1], r[2]}; }
 
+void add_to(TouchSums& sums, const GroundTouch& t) {
+  ++sums.count, sums.normal += dot(t.normal_force, t.before), sums.friction += dot(t.friction, t.before);
+  sums.stored += t.stored;
+}
+
 }  // namespace
 
 void ExplicitSystem::Inside::press_grounds(ExplicitState& state) const {
@@ -35,7 +40,7 @@ void ExplicitSystem::Inside::press_grounds(ExplicitState& state) const {
       const double slide = norm(along);
       const double grip = std::min(g.friction * normal, kGroundGrip * mass / h * slide);
       GroundTouch touch;
-      touch.row = row, touch.ground = static_cast<std::int32_t>(i), touch.particle = particle ? 1 : 0;
+      touch.row = row, touch.ground = static_cast<std::int32_t>(i);
       touch.normal_force = normal * g.normal;
       touch.friction = slide > 0 ? (-grip / slide) * along : Vec3{};
       touch.stored = 0.5 * rate * depth * depth;
@@ -63,8 +68,8 @@ void ExplicitSystem::Inside::press_grounds(ExplicitState& state) const {
   std::vector<GroundShare>& shares = ground_shares;
   shares.resize(particle_shares(state));
   for_particles(state, [&](size_t share, size_t first, size_t last) {
-    auto& [touches, forces] = shares[share];
-    touches.clear(), forces.assign(model.grounds.size(), {});
+    auto& [touches, forces, sums] = shares[share];
+    touches.clear(), forces.assign(model.grounds.size(), {}), sums = {};
     for (size_t i = first; i < last; ++i) {
       const Particle& q = state.particles[i];
       ParticlePush& push = state.particle_pushes[i];
@@ -79,11 +84,14 @@ void ExplicitSystem::Inside::press_grounds(ExplicitState& state) const {
       for (size_t k = before; k < touches.size(); ++k) {
         const double depth = std::sqrt(2 * touches[k].stored / make.stiffness);
         push.crushed = std::max(push.crushed, make.calc_crushed(make.stiffness, depth));
+        add_to(sums, touches[k]);
       }
     }
   });
+  state.ground_touching = {};
   for (const GroundShare& share : shares) {
-    state.touches.insert(state.touches.end(), share.touches.begin(), share.touches.end());
+    state.ground_touching.count += share.sums.count, state.ground_touching.normal += share.sums.normal;
+    state.ground_touching.friction += share.sums.friction, state.ground_touching.stored += share.sums.stored;
     for (size_t i = 0; i < share.forces.size(); ++i) state.ground_forces[i] += share.forces[i];
   }
 }
@@ -91,12 +99,22 @@ void ExplicitSystem::Inside::press_grounds(ExplicitState& state) const {
 void ExplicitSystem::Inside::book_grounds(ExplicitState& state) const {
   state.ground_work.stored = 0;
   for (const GroundTouch& t : state.touches) {
-    const Vec3 now = t.particle != 0 ? state.particles[t.row].v
-                                     : vector_at(state.rows.data() + 8 * static_cast<size_t>(t.row) + kernel::kSpeed);
+    const Vec3 now = vector_at(state.rows.data() + 8 * static_cast<size_t>(t.row) + kernel::kSpeed);
     const Vec3 path = (0.5 * h) * (t.before + now);
     state.ground_work.normal += dot(t.normal_force, path);
     state.ground_work.friction += dot(t.friction, path);
   }
+  std::vector<ContactWork> work(ground_shares.size());
+  team->run(work.size(), [&](size_t share) {
+    const GroundShare& of = ground_shares[share];
+    double normal = of.sums.normal, friction = of.sums.friction;  // at the speeds before, then at both
+    for (const GroundTouch& t : of.touches) {
+      const Vec3& now = state.particles[t.row].v;
+      normal += dot(t.normal_force, now), friction += dot(t.friction, now);
+    }
+    work[share].normal = 0.5 * h * normal, work[share].friction = 0.5 * h * friction;
+  });
+  for (const ContactWork& w : work) state.ground_work.normal += w.normal, state.ground_work.friction += w.friction;
 }
 
 void ExplicitSystem::Inside::move_particles(ExplicitState& state) const {
@@ -288,10 +306,9 @@ ExplicitEnergy ExplicitSystem::Inside::calc_energy() {
     energy.contact_damping += -(so_far.normal + 0.5 * h * normal) - stored;
     energy.friction += -(so_far.friction + 0.5 * h * friction);
   };
-  double normal = 0, friction = 0, stored = 0;
-  for (const GroundTouch& t : ahead.touches)
-    normal += dot(t.normal_force, t.before), friction += dot(t.friction, t.before), stored += t.stored;
-  book(s.ground_work, normal, friction, stored);
+  TouchSums ground = ahead.ground_touching;
+  for (const GroundTouch& t : ahead.touches) add_to(ground, t);
+  book(s.ground_work, ground.normal, ground.friction, ground.stored);
   const TouchSums& sums = ahead.contact.touching;
   book(s.surface_work, sums.normal, sums.friction, sums.stored);
   energy.removed_internal = s.removed_internal, energy.removed_kinetic = s.removed_kinetic;

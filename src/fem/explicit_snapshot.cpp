@@ -9,7 +9,7 @@ namespace topple::fem {
 
 namespace {
 
-constexpr std::uint64_t kMark = 0x7470'6578'0000'000a;  // name and version of the layout
+constexpr std::uint64_t kMark = 0x7470'6578'0000'000b;  // name and version of the layout
 
 class Writer {
  public:
@@ -67,7 +67,8 @@ void pass_state(Archive& archive, State& s) {
       archive.list(s.flags);
   archive.list(s.pushes), archive.list(s.pushed), archive.list(s.grounded), archive.list(s.uses), archive.value(s.sums);
   archive.list(s.particles), archive.list(s.particle_pushes), archive.list(s.particle_makes);
-  archive.list(s.touches), archive.value(s.ground_work), archive.value(s.surface_work);
+  archive.list(s.touches), archive.value(s.ground_touching), archive.value(s.ground_work),
+      archive.value(s.surface_work);
   archive.list(s.ground_forces), archive.list(s.touchdowns), archive.list(s.removals);
   archive.value(s.removed_internal), archive.value(s.removed_kinetic), archive.value(s.removed_gravity);
   auto& c = s.contact;

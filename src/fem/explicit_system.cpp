@@ -146,7 +146,7 @@ Vec3 ExplicitSystem::ground_force(int ground) const { return inside_->s.ground_f
 bool ExplicitSystem::touches_ground(int node) const {
   const std::uint32_t row = inside_->chunks.row_of_node[static_cast<size_t>(node)];
   return std::any_of(inside_->s.touches.begin(), inside_->s.touches.end(),
-                     [&](const GroundTouch& t) { return t.particle == 0 && t.row == row; });
+                     [&](const GroundTouch& t) { return t.row == row; });
 }
 const std::vector<double>& ExplicitSystem::touchdowns() const { return inside_->s.touchdowns; }
 int ExplicitSystem::contacts() const { return static_cast<int>(inside_->s.contact.touching.count); }
