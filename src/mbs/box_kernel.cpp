@@ -246,8 +246,11 @@ HWY_INLINE void find_block(const BoxJob& job, size_t block) {
           e2 = side_a(axes_a[2], axes_a[0], axes_a[1]);
   const V direction = fma(n.z, e2, fma(n.y, e1, n.x * e0)), origin = fma(surface, e0, place_a);
   store3<D>(direction, out, kBoxNormal);
+  N places = zero;
   const auto write = [&](int place, Mask<D> valid, const V& x, N both) {
-    const N depth = select(hn::And(valid, hn::And(overlaps, hn::Gt(x.z.v, hn::Zero(d)))), x.z, zero);
+    const auto is_point = hn::And(valid, hn::And(overlaps, hn::Gt(x.z.v, hn::Zero(d))));
+    const N depth = select(is_point, x.z, zero);
+    places = places + select(is_point, num<D>(1 << place), zero);
     const V p = fma(zero - half * depth, direction, fma(x.y, e2, fma(x.x, e1, origin)));
     const int field = kBoxPoints + place * kBoxPointFields;
     store3<D>(p, out, field);
@@ -272,6 +275,7 @@ HWY_INLINE void find_block(const BoxJob& job, size_t block) {
     write(8 + k, within, {x_of[k], y_of[k], fma(beta[k], T.z, fma(alpha[k], U.z, middle.z))},
           of_a[k] + of_a[(k + 3) % 4]);
   }
+  store<D>(places, out, kBoxPlaces);
 }
 
 template <class D>

@@ -24,7 +24,8 @@ enum BoxField : int {
 enum BoxAnswer : int {
   kGap = 0,        // without points: the boxes are at least this far apart; negative: they overlap [m]
   kBoxNormal = 1,  // unit, from the first to the second (3)
-  kBoxPoints = 4,  // kMostBoxPoints places, each kBoxPointFields
+  kBoxPlaces = 4,  // which places have points: sum of 2^place
+  kBoxPoints = 5,  // kMostBoxPoints places, each kBoxPointFields
   kMostBoxPoints = 12,
   kBoxPointFields = 5,  // halfway between the surfaces (3) [m]; depth, 0: no point [m]; weight
   kBoxAnswerFields = kBoxPoints + kMostBoxPoints * kBoxPointFields

@@ -1,8 +1,8 @@
 #include "mbs/boxes.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <iterator>
 
 #include "base/aligned.h"
 #include "mbs/box_kernel.h"
@@ -60,14 +60,6 @@ void sphere_box(const Solid& sphere, const Solid& box, bool flipped, BoxContact&
 
 }  // namespace
 
-void write_box(const Solid& box, double* row) {
-  const Mat3& R = box.R;
-  const double fields[] = {box.p.x, box.p.y, box.p.z, R(0, 0), R(1, 0),    R(2, 0),    R(0, 1),    R(1, 1),
-                           R(2, 1), R(0, 2), R(1, 2), R(2, 2), box.half.x, box.half.y, box.half.z, box.reach};
-  static_assert(std::size(fields) == kernel::kBoxFields);
-  std::copy(std::begin(fields), std::end(fields), row);
-}
-
 void read_box_contact(const double* slot, size_t W, BoxContact& out) {
   const auto field = [&](int f) { return slot[static_cast<size_t>(f) * W]; };
   out.count = 0;
@@ -75,12 +67,10 @@ void read_box_contact(const double* slot, size_t W, BoxContact& out) {
   if (out.gap >= 0) return;
   out.gap = 0;
   out.normal = {field(kernel::kBoxNormal), field(kernel::kBoxNormal + 1), field(kernel::kBoxNormal + 2)};
-  for (int i = 0; i < kernel::kMostBoxPoints; ++i) {
-    const int at = kernel::kBoxPoints + i * kernel::kBoxPointFields;
-    const double depth = field(at + 3);
-    if (depth <= 0) continue;
+  for (unsigned places = static_cast<unsigned>(field(kernel::kBoxPlaces)); places != 0; places &= places - 1) {
+    const int at = kernel::kBoxPoints + std::countr_zero(places) * kernel::kBoxPointFields;
     out.p[out.count] = {field(at), field(at + 1), field(at + 2)};
-    out.depth[out.count] = depth;
+    out.depth[out.count] = field(at + 3);
     out.weight[out.count++] = field(at + 4);
   }
 }

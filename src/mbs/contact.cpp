@@ -202,18 +202,18 @@ void System::fill_contact_blocks() {
   t.a.assign(blocks * W, 0);
   t.b.assign(blocks * W, 0);
   t.groups.resize(blocks * W * kernel::kGroupFields);
-  t.points.assign(t.rows[blocks] * W * kernel::kPointFields, 0);
+  t.points.resize(t.rows[blocks] * W * kernel::kPointFields);
+  // a place without a point has no depth and no stiffness, and what the last point there left
+  static_assert(kernel::kPointStiffness == kernel::kDepth + 1);
+  for (size_t row = 0; row < t.rows[blocks]; ++row)
+    std::fill_n(t.points.data() + (row * kernel::kPointFields + kernel::kDepth) * W, 2 * W, 0.0);
   for (size_t slot = groups; slot < blocks * W; ++slot)
     for (size_t f = 0; f < kernel::kGroupFields; ++f)
       t.groups[(slot / W * kernel::kGroupFields + f) * W + slot % W] = 0;
-  const auto place_of = [&](int body) {
-    const size_t i = static_cast<size_t>(body);
-    return static_cast<std::uint32_t>(i / W * kernel::kTouchedFields * W + i % W);
-  };
   for (const ContactGroup& g : t.group) {
     const size_t block = g.slot / W, place = g.slot % W;
-    t.a[g.slot] = place_of(g.a);
-    t.b[g.slot] = place_of(g.b);
+    t.a[g.slot] = static_cast<std::uint32_t>(g.a);
+    t.b[g.slot] = static_cast<std::uint32_t>(g.b);
     const ContactLaw& law = contact_laws[static_cast<size_t>(g.law)];
     const double known[] = {g.n.x,
                             g.n.y,
@@ -260,15 +260,15 @@ void System::resolve_contacts(double h, bool follows, int passed) {
     contact.vectors.assign(blocks * W, static_cast<std::uint32_t>(layout.at(B, 0, 3)));
     contact.tensors.assign(blocks * W, static_cast<std::uint32_t>(layout.at(B, 0, 9)));
     contact.touched.resize(blocks * W * kernel::kTouchedFields);
+    contact.rows.resize(blocks * W * kernel::kTouchedRow);
+    contact.changes.resize(blocks * W * kernel::kWrenchRow);
+    contact.sums.resize(blocks * W * kernel::kWrenchRow);
+    contact.wrenches.resize(t.a.size() * 2 * kernel::kWrenchRow);
     for (size_t i = 0; i < t.body.size(); ++i) {
       const size_t b = static_cast<size_t>(t.body[i]);
       contact.vectors[i] = static_cast<std::uint32_t>(layout.at(b, 0, 3));
       contact.tensors[i] = static_cast<std::uint32_t>(layout.at(b, 0, 9));
     }
-    const auto field_of = [&](size_t body, int field) -> double& {
-      return contact.touched[(body / W * kernel::kTouchedFields + static_cast<size_t>(field)) * W + body % W];
-    };
-    for (size_t i = 0; i < t.share.size(); ++i) field_of(i, kernel::kGroups) = t.share[i];
     kernel::TouchJob bodies;
     bodies.blocks = blocks;
     bodies.vectors = contact.vectors.data(), bodies.tensors = contact.tensors.data();
@@ -277,71 +277,55 @@ void System::resolve_contacts(double h, bool follows, int passed) {
     bodies.constants = lanes->body_constants.data();
     bodies.force = lanes->force.data(), bodies.torque = lanes->torque.data();
     bodies.joint_force = lanes->joint_force.data(), bodies.joint_torque = lanes->joint_torque.data();
+    bodies.groups = t.share.data();
     bodies.touched = contact.touched.data();
+    bodies.rows = contact.rows.data(), bodies.changes = contact.changes.data(), bodies.sums = contact.sums.data();
     bodies.h = h;
     for (int i = 0; i < 3; ++i) bodies.gravity[i] = model.gravity[i];
     kernel::ContactJob job;
     job.blocks = t.rows.size() - 1;
     job.rows = t.rows.data();
     job.a = t.a.data(), job.b = t.b.data();
-    job.touched = contact.touched.data();
+    job.count = t.group.size();
+    job.bodies = contact.rows.data(), job.changes = contact.changes.data(), job.sums = contact.sums.data();
+    job.wrenches = contact.wrenches.data();
     job.groups = t.groups.data();
     job.points = t.points.data();
     job.h = h;
     job.follows = follows;
     job.longest = follows ? 1 : std::max(1, passed);
-    const auto slot_of_group = [&](const ContactGroup& g) {
-      return t.groups.data() + g.slot / W * kernel::kGroupFields * W + g.slot % W;
-    };
-    // adds the wrenches of all groups to their bodies
-    const auto push = [&](const ContactGroup& g, const double* slot, int field, int sum) {
-      const Vec3 f = read3(slot, field, W), turn = read3(slot, field + 3, W);
-      double *a = contact.touched.data() + t.a[g.slot] + static_cast<size_t>(sum) * W,
-             *b = contact.touched.data() + t.b[g.slot] + static_cast<size_t>(sum) * W;
-      const Vec3 turn_b = turn + cross(read3(slot, kernel::kApart, W), f);
-      a[0] += f.x, a[W] += f.y, a[2 * W] += f.z, a[3 * W] += turn.x, a[4 * W] += turn.y, a[5 * W] += turn.z;
-      b[0] -= f.x, b[W] -= f.y, b[2 * W] -= f.z, b[3 * W] -= turn_b.x, b[4 * W] -= turn_b.y, b[5 * W] -= turn_b.z;
+    const auto push = [&] {
+      kernel::sum_wrenches(job);
+      kernel::update_touched(bodies);
     };
     kernel::read_touched(bodies);
     kernel::press_contacts(job);
-    for (const ContactGroup& g : t.group) push(g, slot_of_group(g), kernel::kPress, kernel::kPressSum);
-    kernel::update_touched(bodies);
+    push();
     kernel::damp_contacts(job);
-    for (const ContactGroup& g : t.group) {
-      const double* slot = slot_of_group(g);
-      push(g, slot, kernel::kDamp, kernel::kDampSum);
-      push(g, slot, kernel::kRub, kernel::kRubSum);
-      s.contact_energy += slot[kernel::kPressEnergy * W];
-      s.stick_energy += slot[kernel::kStickEnergy * W];
-      if (!follows) lost += slot[kernel::kLost * W];
-    }
-    kernel::update_touched(bodies);
+    push();
     kernel::rub_contacts(job);
-    for (size_t i = 0; i < blocks * W; ++i)
-      for (int f = 0; f < 6; ++f) field_of(i, kernel::kRubSum + f) = 0;
-    for (const ContactGroup& g : t.group) push(g, slot_of_group(g), kernel::kRub, kernel::kRubSum);
-    kernel::update_touched(bodies);
+    push();
+    kernel::book_contacts(job);
 
     // forces do their work over the half steps before and after
+    for (size_t slot = 0; slot < job.count; ++slot) {
+      const double* g = t.groups.data() + slot / W * kernel::kGroupFields * W + slot % W;
+      s.contact_energy += g[kernel::kPressEnergy * W];
+      s.stick_energy += g[kernel::kStickEnergy * W];
+      loss += g[kernel::kGroupLoss * W], loss_after += g[(kernel::kGroupLoss + 1) * W];
+      friction += g[kernel::kGroupRubPower * W], friction_after += g[(kernel::kGroupRubPower + 1) * W];
+      if (!follows) lost += g[kernel::kLost * W];
+    }
     for (size_t i = 0; i < t.body.size(); ++i) {
-      const auto three = [&](int field) {
-        return Vec3{field_of(i, field), field_of(i, field + 1), field_of(i, field + 2)};
-      };
-      const Vec3 press = three(kernel::kPressSum), damp = three(kernel::kDampSum), rub = three(kernel::kRubSum);
+      const double* sum = contact.sums.data() + i * kernel::kWrenchRow;
+      const Vec3 f{sum[0], sum[1], sum[2]};
       if (i == 0) {
-        ground_contact -= press + damp + rub;
+        ground_contact -= f;
         continue;
       }
-      const Vec3 damp_turn = three(kernel::kDampSum + 3), rub_turn = three(kernel::kRubSum + 3);
-      const Vec3 v = three(kernel::kSpeed), w = three(kernel::kSpeed + 3);
-      const Vec3 v1 = v + three(kernel::kChange), w1 = w + three(kernel::kChange + 3);
-      loss -= dot(damp, v) + dot(damp_turn, w);
-      loss_after -= dot(damp, v1) + dot(damp_turn, w1);
-      friction += dot(rub, v) + dot(rub_turn, w);
-      friction_after += dot(rub, v1) + dot(rub_turn, w1);
       const size_t b = static_cast<size_t>(t.body[i]);
-      force[b] += press + damp + rub;
-      torque[b] += three(kernel::kPressSum + 3) + damp_turn + rub_turn;
+      force[b] += f;
+      torque[b] += Vec3{sum[3], sum[4], sum[5]};
     }
   }
   s.contact_loss += 0.5 * h * (s.contact_loss_power + loss) + lost;

@@ -167,15 +167,15 @@ struct Touching {
   // the kernel's blocks, groups of like counts of points together
   std::vector<std::uint32_t> rows, a, b;
   AlignedVector<double> groups, points;
-  std::vector<double> share;  // groups of each body, filled up to blocks (T)
+  AlignedVector<double> share;  // groups of each body, filled up to blocks (T)
 };
 
 /// Scratch of contacts.
 struct ContactScratch {
-  std::vector<int> place;                       // of each body among those touched, -1: is not (B)
-  std::vector<int> groups;                      // of each touched body
-  AlignedVector<double> touched;                // as the kernel sees them
-  std::vector<std::uint32_t> vectors, tensors;  // places of what belongs to them
+  std::vector<int> place;                                        // of each body among those touched, -1: is not (B)
+  std::vector<int> groups;                                       // of each touched body
+  AlignedVector<double> touched, rows, changes, sums, wrenches;  // as of kernel::TouchJob and ContactJob
+  std::vector<std::uint32_t> vectors, tensors;                   // places of what belongs to them
   std::vector<ContactPoint> point;
   std::vector<Stick> sticks;       // of all points of the step before
   std::vector<Earnings> earnings;  // of all groups of the step before
@@ -184,6 +184,7 @@ struct ContactScratch {
   std::vector<std::uint32_t> candidates;  // pairs that may be due
   std::vector<PairLook> looks;
   AlignedVector<double> boxes;              // rows for the kernel, one a shape and one for idle lanes
+  std::vector<long> box_step;               // in which a row was written
   std::vector<std::uint32_t> box_a, box_b;  // which of them, in the kernel's blocks of pairs of boxes
   AlignedVector<double> box_answers;
   PairSearch search;

@@ -70,57 +70,6 @@ HWY_INLINE void find_all_ways(const WayJob& job) {
   }
 }
 
-template <class D>
-HWY_INLINE void read_block(const TouchJob& job, size_t block) {
-  const size_t W = hn::Lanes(D());
-  double* to = job.touched + block * kTouchedFields * W;
-  const auto vectors = [&](const double* from) {
-    return Reader<D>(from, job.vectors + block * W, job.stride).three(0);
-  };
-  store3<D>(vectors(job.v), to, kSpeed);
-  store3<D>(vectors(job.w), to, kSpeed + 3);
-  const Reader<D> R(job.R, job.tensors + block * W, job.stride), c(job.constants, job.tensors + block * W, job.stride);
-  static_assert(kBodyFields == 9, "constants lie as matrices do");
-  store<D>(c(kInverseMass), to, kTouchedMass);
-  // R I Rᵀ
-  const Num<D> xx = c(kInverseInertia), xy = c(kInverseInertia + 1), xz = c(kInverseInertia + 2),
-               yy = c(kInverseInertia + 3), yz = c(kInverseInertia + 4), zz = c(kInverseInertia + 5);
-  const V3<D> r[3] = {R.three(0), R.three(3), R.three(6)};
-  int field = kTouchedInertia;
-  for (int i = 0; i < 3; ++i) {
-    const V3<D> x{fma(xz, r[i].z, fma(xy, r[i].y, xx * r[i].x)), fma(yz, r[i].z, fma(yy, r[i].y, xy * r[i].x)),
-                  fma(zz, r[i].z, fma(yz, r[i].y, xz * r[i].x))};
-    for (int j = i; j < 3; ++j) store<D>(dot(r[j], x), to, field++);
-  }
-  for (int i = 0; i < 6; ++i) store<D>(num<D>(0), to, kChange + i);
-  for (int i = kPressSum; i < kTouchedFields; ++i) store<D>(num<D>(0), to, i);
-}
-
-template <class D>
-HWY_INLINE void update_block(const TouchJob& job, size_t block) {
-  const size_t W = hn::Lanes(D());
-  double* t = job.touched + block * kTouchedFields * W;
-  const auto vectors = [&](const double* from) {
-    return Reader<D>(from, job.vectors + block * W, job.stride).three(0);
-  };
-  const Num<D> h = num<D>(job.h), m = load<D>(t, kTouchedMass);
-  const V3<D> gravity{num<D>(job.gravity[0]), num<D>(job.gravity[1]), num<D>(job.gravity[2])};
-  const V3<D> force = (vectors(job.force) + vectors(job.joint_force)) +
-                      ((load3<D>(t, kPressSum) + load3<D>(t, kDampSum)) + load3<D>(t, kRubSum));
-  const V3<D> torque = (vectors(job.torque) + vectors(job.joint_torque)) +
-                       ((load3<D>(t, kPressSum + 3) + load3<D>(t, kDampSum + 3)) + load3<D>(t, kRubSum + 3));
-  // what does not move has no gravity
-  const Num<D> free = select(hn::Gt(m.v, hn::Zero(D())), h, num<D>(0));
-  store3<D>(fma(free, gravity, (h * m) * force), t, kChange);
-  const Num<D> xy = load<D>(t, kTouchedInertia + 1), xz = load<D>(t, kTouchedInertia + 2),
-               yz = load<D>(t, kTouchedInertia + 4);
-  const V3<D> x = h * torque;
-  store3<D>({fma(xz, x.z, fma(xy, x.y, load<D>(t, kTouchedInertia) * x.x)),
-             fma(yz, x.z, fma(load<D>(t, kTouchedInertia + 3), x.y, xy * x.x)),
-             fma(load<D>(t, kTouchedInertia + 5), x.z, fma(yz, x.y, xz * x.x))},
-            t, kChange + 3);
-}
-
 /// Symmetric matrix times vector; its six fields begin at `field`.
 template <class D>
 HWY_INLINE V3<D> times(const double* HWY_RESTRICT group, int field, const V3<D>& v) {
@@ -130,15 +79,91 @@ HWY_INLINE V3<D> times(const double* HWY_RESTRICT group, int field, const V3<D>&
           fma(load<D>(group, field + 5), v.z, fma(yz, v.y, xz * v.x))};
 }
 
+template <class D>
+HWY_INLINE void read_block(const TouchJob& job, size_t block) {
+  const size_t W = hn::Lanes(D());
+  double* to = job.touched + block * kTouchedFields * W;
+  const auto vectors = [&](const double* from) {
+    return Reader<D>(from, job.vectors + block * W, job.stride).three(0);
+  };
+  const Num<D> zero = num<D>(0);
+  const V3<D> v = vectors(job.v), w = vectors(job.w);
+  Num<D> row[kTouchedRow] = {v.x, v.y, v.z, w.x, w.y, w.z};
+  const Reader<D> R(job.R, job.tensors + block * W, job.stride), c(job.constants, job.tensors + block * W, job.stride);
+  static_assert(kBodyFields == 9, "constants lie as matrices do");
+  const Num<D> m = row[kRowMass] = c(kInverseMass);
+  // R I Rᵀ
+  const Num<D> xx = c(kInverseInertia), xy = c(kInverseInertia + 1), xz = c(kInverseInertia + 2),
+               yy = c(kInverseInertia + 3), yz = c(kInverseInertia + 4), zz = c(kInverseInertia + 5);
+  const V3<D> r[3] = {R.three(0), R.three(3), R.three(6)};
+  Num<D>* inertia = row + kRowInertia;
+  int field = 0;
+  for (int i = 0; i < 3; ++i) {
+    const V3<D> x{fma(xz, r[i].z, fma(xy, r[i].y, xx * r[i].x)), fma(yz, r[i].z, fma(yy, r[i].y, xy * r[i].x)),
+                  fma(zz, r[i].z, fma(yz, r[i].y, xz * r[i].x))};
+    for (int j = i; j < 3; ++j) inertia[field++] = dot(r[j], x);
+  }
+  row[kRowGroups] = load<D>(job.groups + block * W, 0), row[kRowGroups + 1] = row[kRowGroups + 2] = zero;
+  write_rows<D, kTouchedRow>(row, job.rows + block * W * kTouchedRow);
+  store<D>(m, to, kTouchedMass);
+  for (int i = 0; i < 6; ++i) store<D>(inertia[i], to, kTouchedInertia + i);
+  const Num<D> h = num<D>(job.h);
+  const V3<D> gravity{num<D>(job.gravity[0]), num<D>(job.gravity[1]), num<D>(job.gravity[2])};
+  const V3<D> force = vectors(job.force) + vectors(job.joint_force);
+  const V3<D> torque = vectors(job.torque) + vectors(job.joint_torque);
+  // what does not move has no gravity
+  const Num<D> free = select(hn::Gt(m.v, hn::Zero(D())), h, zero);
+  store3<D>(fma(free, gravity, (h * m) * force), to, kChangeBefore);
+  store3<D>(times<D>(to, kTouchedInertia, h * torque), to, kChangeBefore + 3);
+  const hn::CappedTag<double, kWrenchRow> d;
+  double* sums = job.sums + block * W * kWrenchRow;
+  for (size_t i = 0; i < W * kWrenchRow; i += hn::Lanes(d)) hn::StoreU(hn::Zero(d), d, sums + i);
+}
+
+template <class D>
+HWY_INLINE void update_block(const TouchJob& job, size_t block) {
+  const size_t W = hn::Lanes(D());
+  const double* t = job.touched + block * kTouchedFields * W;
+  constexpr std::uint32_t in_turn[kMostLanes] = {0, 1, 2, 3, 4, 5, 6, 7};
+  Num<D> s[kWrenchRow];
+  read_rows<D, kWrenchRow>(job.sums + block * W * kWrenchRow, in_turn, s);
+  const Num<D> h = num<D>(job.h), zero = num<D>(0);
+  const V3<D> v = fma(h * load<D>(t, kTouchedMass), {s[0], s[1], s[2]}, load3<D>(t, kChangeBefore));
+  const V3<D> w = times<D>(t, kTouchedInertia, h * V3<D>{s[3], s[4], s[5]}) + load3<D>(t, kChangeBefore + 3);
+  const Num<D> change[kWrenchRow] = {v.x, v.y, v.z, w.x, w.y, w.z, zero, zero};
+  write_rows<D, kWrenchRow>(change, job.changes + block * W * kWrenchRow);
+}
+
 /// Of a against b at a's centre.
 template <class D>
 struct Motion {
   V3<D> v, w;
 };
 template <class D>
-HWY_INLINE Motion<D> calc_motion(const Reader<D>& A, const Reader<D>& B, const V3<D>& apart, int field) {
-  const V3<D> wb = B.three(field + 3);
-  return {(A.three(field) - B.three(field)) - cross(wb, apart), A.three(field + 3) - wb};
+HWY_INLINE Motion<D> calc_motion(const Num<D>* A, const Num<D>* B, const V3<D>& apart) {
+  const V3<D> va{A[0], A[1], A[2]}, wa{A[3], A[4], A[5]}, vb{B[0], B[1], B[2]}, wb{B[3], B[4], B[5]};
+  return {(va - vb) - cross(wb, apart), wa - wb};
+}
+/// By what the forces known so far change it within the step.
+template <class D>
+HWY_INLINE Motion<D> calc_change(const ContactJob& job, size_t block, const V3<D>& apart) {
+  const size_t W = hn::Lanes(D());
+  Num<D> A[kWrenchRow], B[kWrenchRow];
+  read_rows<D, kWrenchRow>(job.changes, job.a + block * W, A);
+  read_rows<D, kWrenchRow>(job.changes, job.b + block * W, B);
+  return calc_motion<D>(A, B, apart);
+}
+
+/// A wrench on a about its centre, and what it takes from b about b's.
+template <class D>
+HWY_INLINE void write_wrench(const ContactJob& job, size_t block, const V3<D>& apart, const V3<D>& force,
+                             const V3<D>& torque) {
+  const size_t W = hn::Lanes(D());
+  const Num<D> zero = num<D>(0);
+  const V3<D> torque_b = torque + cross(apart, force);
+  const Num<D> row[2 * kWrenchRow] = {force.x, force.y, force.z, torque.x,   torque.y,   torque.z,   zero, zero,
+                                      force.x, force.y, force.z, torque_b.x, torque_b.y, torque_b.z, zero, zero};
+  write_rows<D, 2 * kWrenchRow>(row, job.wrenches + block * W * 2 * kWrenchRow);
 }
 
 /// The force times the speed that it makes, the groups of a body sharing its mass.
@@ -156,17 +181,19 @@ HWY_INLINE void press_block(const ContactJob& job, size_t block) {
   const D d;
   const size_t W = hn::Lanes(d);
   double* g = job.groups + block * kGroupFields * W;
-  const Reader<D> A(job.touched, job.a + block * W, W), B(job.touched, job.b + block * W, W);
+  Num<D> A[kTouchedRow], B[kTouchedRow];
+  read_rows<D, kTouchedRow>(job.bodies, job.a + block * W, A);
+  read_rows<D, kTouchedRow>(job.bodies, job.b + block * W, B);
   const V3<D> n = load3<D>(g, kNormal);
   V3<D> apart = load3<D>(g, kApart);
   const Num<D> h = num<D>(job.h);
   V3<D> turned = zeros<D>();  // of a in the step
   if (job.follows) {
-    apart = fma(h, A.three(kSpeed) - B.three(kSpeed), apart);
+    apart = fma(h, V3<D>{A[0], A[1], A[2]} - V3<D>{B[0], B[1], B[2]}, apart);
     store3<D>(apart, g, kApart);
-    turned = h * A.three(kSpeed + 3);
+    turned = h * V3<D>{A[3], A[4], A[5]};
   }
-  const Motion<D> m = calc_motion(A, B, apart, kSpeed);
+  const Motion<D> m = calc_motion<D>(A, B, apart);
   const Num<D> zero = num<D>(0), half = num<D>(0.5), one = num<D>(1), along = dot(n, m.v);
   if (job.follows) {
     const V3<D> v = load3<D>(g, kMotion) + m.v, w = load3<D>(g, kMotion + 3) + m.w;
@@ -174,11 +201,11 @@ HWY_INLINE void press_block(const ContactJob& job, size_t block) {
     store<D>(fnma(half * h, power, load<D>(g, kSpent)), g, kSpent);
   }
   store3<D>(m.v, g, kMotion), store3<D>(m.w, g, kMotion + 3);
-  store<D>(A(kTouchedMass), g, kMassA), store<D>(B(kTouchedMass), g, kMassB);
-  store<D>(A(kGroups), g, kGroupsA), store<D>(B(kGroups), g, kGroupsB);
+  store<D>(A[kRowMass], g, kMassA), store<D>(B[kRowMass], g, kMassB);
+  store<D>(A[kRowGroups], g, kGroupsA), store<D>(B[kRowGroups], g, kGroupsB);
   for (int i = 0; i < 6; ++i) {
-    store<D>(A(kTouchedInertia + i), g, kInertiaA + i);
-    store<D>(B(kTouchedInertia + i), g, kInertiaB + i);
+    store<D>(A[kRowInertia + i], g, kInertiaA + i);
+    store<D>(B[kRowInertia + i], g, kInertiaB + i);
   }
   const Num<D> inverse_mass = load<D>(g, kMassA) + load<D>(g, kMassB), mean = load<D>(g, kMean),
                damping = load<D>(g, kDamping), twice_zeta = num<D>(2) * load<D>(g, kZeta);
@@ -251,7 +278,7 @@ HWY_INLINE void press_block(const ContactJob& job, size_t block) {
     }
   }
   store<D>(impedance, g, kImpedance);
-  store3<D>((zero - total) * n, g, kPress), store3<D>(torque, g, kPress + 3);
+  write_wrench<D>(job, block, apart, (zero - total) * n, torque);
   store<D>(half * mean * energy, g, kPressEnergy);
   store<D>(held, g, kHeldForce), store3<D>(held_torque, g, kHeldTorque);
 }
@@ -261,9 +288,8 @@ HWY_INLINE void damp_block(const ContactJob& job, size_t block) {
   const D d;
   const size_t W = hn::Lanes(d);
   double* g = job.groups + block * kGroupFields * W;
-  const Reader<D> A(job.touched, job.a + block * W, W), B(job.touched, job.b + block * W, W);
   const V3<D> n = load3<D>(g, kNormal), apart = load3<D>(g, kApart);
-  const Motion<D> change = calc_motion(A, B, apart, kChange);
+  const Motion<D> change = calc_change<D>(job, block, apart);
   const Num<D> zero = num<D>(0), h = num<D>(job.h), along = dot(n, change.v);
   const size_t first = job.rows[block], last = job.rows[block + 1];
   const auto point = [&](size_t row) { return job.points + row * kPointFields * W; };
@@ -297,7 +323,8 @@ HWY_INLINE void damp_block(const ContactJob& job, size_t block) {
     torque = fma(zero - f, la, torque);
   }
   store<D>(total, g, kTotal);
-  store3<D>((zero - sum) * n, g, kDamp), store3<D>(torque, g, kDamp + 3);
+  const V3<D> damping = (zero - sum) * n, damping_torque = torque;
+  store3<D>(damping, g, kDamp), store3<D>(torque, g, kDamp + 3);
 
   // friction springs share the load as the normal forces do
   const V3<D> v = load3<D>(g, kMotion), w = load3<D>(g, kMotion + 3);
@@ -323,6 +350,7 @@ HWY_INLINE void damp_block(const ContactJob& job, size_t block) {
   }
   store3<D>(rub, g, kRub), store3<D>(rub_torque, g, kRub + 3);
   store<D>(num<D>(0.5) * rate * energy, g, kStickEnergy);
+  write_wrench<D>(job, block, apart, damping + rub, damping_torque + rub_torque);
 }
 
 template <class D>
@@ -330,9 +358,8 @@ HWY_INLINE void rub_block(const ContactJob& job, size_t block) {
   const D d;
   const size_t W = hn::Lanes(d);
   double* g = job.groups + block * kGroupFields * W;
-  const Reader<D> A(job.touched, job.a + block * W, W), B(job.touched, job.b + block * W, W);
   const V3<D> n = load3<D>(g, kNormal), apart = load3<D>(g, kApart);
-  const Motion<D> change = calc_motion(A, B, apart, kChange);
+  const Motion<D> change = calc_change<D>(job, block, apart);
   const Num<D> zero = num<D>(0), one = num<D>(1), h = num<D>(job.h), total = load<D>(g, kTotal);
   const size_t first = job.rows[block], last = job.rows[block + 1];
   const auto point = [&](size_t row) { return job.points + row * kPointFields * W; };
@@ -367,7 +394,36 @@ HWY_INLINE void rub_block(const ContactJob& job, size_t block) {
     force = force + f;
     torque = torque + cross(r, f);
   }
+  write_wrench<D>(job, block, apart, force - load3<D>(g, kRub), torque - load3<D>(g, kRub + 3));
   store3<D>(force, g, kRub), store3<D>(torque, g, kRub + 3);
+}
+
+template <class D>
+HWY_INLINE void book_block(const ContactJob& job, size_t block) {
+  const size_t W = hn::Lanes(D());
+  double* g = job.groups + block * kGroupFields * W;
+  const Motion<D> change = calc_change<D>(job, block, load3<D>(g, kApart));
+  const V3<D> v = load3<D>(g, kMotion), w = load3<D>(g, kMotion + 3), v1 = v + change.v, w1 = w + change.w;
+  const V3<D> damp = load3<D>(g, kDamp), damp_turn = load3<D>(g, kDamp + 3), rub = load3<D>(g, kRub),
+              rub_turn = load3<D>(g, kRub + 3);
+  const Num<D> zero = num<D>(0);
+  store<D>(zero - (dot(damp, v) + dot(damp_turn, w)), g, kGroupLoss);
+  store<D>(zero - (dot(damp, v1) + dot(damp_turn, w1)), g, kGroupLoss + 1);
+  store<D>(dot(rub, v) + dot(rub_turn, w), g, kGroupRubPower);
+  store<D>(dot(rub, v1) + dot(rub_turn, w1), g, kGroupRubPower + 1);
+}
+
+/// The same in all lanes, whatever their number: no two groups at once.
+HWY_INLINE void sum_all_wrenches(const ContactJob& job) {
+  const hn::CappedTag<double, kWrenchRow> d;
+  for (size_t slot = 0; slot < job.count; ++slot) {
+    const double* wrench = job.wrenches + slot * 2 * kWrenchRow;
+    double *a = job.sums + size_t{job.a[slot]} * kWrenchRow, *b = job.sums + size_t{job.b[slot]} * kWrenchRow;
+    for (size_t i = 0; i < kWrenchRow; i += hn::Lanes(d))
+      hn::StoreU(hn::Add(hn::LoadU(d, a + i), hn::LoadU(d, wrench + i)), d, a + i);
+    for (size_t i = 0; i < kWrenchRow; i += hn::Lanes(d))
+      hn::StoreU(hn::Sub(hn::LoadU(d, b + i), hn::LoadU(d, wrench + kWrenchRow + i)), d, b + i);
+  }
 }
 
 using Wide = hn::ScalableTag<double>;
@@ -387,6 +443,8 @@ void update_touched_here(const TouchJob& job) { each_block(job, update_block<Wid
 void press_contacts_here(const ContactJob& job) { each_block(job, press_block<Wide>); }
 void damp_contacts_here(const ContactJob& job) { each_block(job, damp_block<Wide>); }
 void rub_contacts_here(const ContactJob& job) { each_block(job, rub_block<Wide>); }
+void sum_wrenches_here(const ContactJob& job) { sum_all_wrenches(job); }
+void book_contacts_here(const ContactJob& job) { each_block(job, book_block<Wide>); }
 
 }  // namespace HWY_NAMESPACE
 }  // namespace topple::mbs::kernel
@@ -404,6 +462,8 @@ HWY_EXPORT(update_touched_here);
 HWY_EXPORT(press_contacts_here);
 HWY_EXPORT(damp_contacts_here);
 HWY_EXPORT(rub_contacts_here);
+HWY_EXPORT(sum_wrenches_here);
+HWY_EXPORT(book_contacts_here);
 
 void find_lows(const LowJob& job) { HWY_DYNAMIC_DISPATCH(find_lows_here)(job); }
 void find_lows_singly(const LowJob& job) { HWY_DYNAMIC_DISPATCH(find_lows_singly_here)(job); }
@@ -414,6 +474,8 @@ void update_touched(const TouchJob& job) { HWY_DYNAMIC_DISPATCH(update_touched_h
 void press_contacts(const ContactJob& job) { HWY_DYNAMIC_DISPATCH(press_contacts_here)(job); }
 void damp_contacts(const ContactJob& job) { HWY_DYNAMIC_DISPATCH(damp_contacts_here)(job); }
 void rub_contacts(const ContactJob& job) { HWY_DYNAMIC_DISPATCH(rub_contacts_here)(job); }
+void sum_wrenches(const ContactJob& job) { HWY_DYNAMIC_DISPATCH(sum_wrenches_here)(job); }
+void book_contacts(const ContactJob& job) { HWY_DYNAMIC_DISPATCH(book_contacts_here)(job); }
 
 }  // namespace topple::mbs::kernel
 #endif

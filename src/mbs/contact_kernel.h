@@ -15,16 +15,22 @@ namespace topple::mbs::kernel {
 
 /// Fields of a touched body, in blocks of lanes as bodies are.
 enum Touched : int {
-  kSpeed = 0,            // v, w half a step ago (6)
-  kChange = 6,           // what the forces known so far add to them within the step (6)
-  kTouchedMass = 12,     // one over it
-  kTouchedInertia = 13,  // inverse inertia in W: xx xy xz yy yz zz
-  kGroups = 19,          // that the body has
-  kPressSum = 20,        // force and torque of all groups: by the springs (6)
-  kDampSum = 26,         // by the dashpots (6)
-  kRubSum = 32,          // by friction (6)
-  kTouchedFields = 38
+  kTouchedMass = 0,     // one over it
+  kTouchedInertia = 1,  // inverse inertia in W: xx xy xz yy yz zz
+  kChangeBefore = 7,    // what other forces than those of contact add to v, w within the step (6)
+  kTouchedFields = 13
 };
+
+/// The same for those who meet it, in a row.
+enum TouchedRow : int {
+  kRowSpeed = 0,    // v, w half a step ago (6)
+  kRowMass = 6,     // one over it
+  kRowInertia = 7,  // as above
+  kRowGroups = 13,  // that the body has
+  kTouchedRow = 16
+};
+/// Rows of what the forces known so far add to v, w within the step, of force and torque, and of two wrenches.
+inline constexpr int kWrenchRow = 8;
 
 /// Fields of a group: what is given, what press leaves to the others, and the answers.
 enum Group : int {
@@ -43,20 +49,21 @@ enum Group : int {
   kGroupsA = 26,
   kMassB = 27,
   kInertiaB = 28,
-  kGroupsB = 34,    // of the bodies
-  kImpedance = 35,  // sum over the points [N·s/m]
-  kTotal = 36,      // normal force of all points [N]
-  kPress = 37,      // wrench on a about its centre, by the springs (6)
-  kDamp = 43,       // by the dashpots (6)
-  kRub = 49,        // by friction: damp gives its springs' part, rub adds the rest (6)
-  kPressEnergy = 55,
-  kStickEnergy = 56,
-  kHeldForce = 57,   // normal force of the springs, (4) of the theory left out [N]
-  kHeldTorque = 58,  // and its torque on a (3)
-  kEarned = 61,      // energy of the pair's points before, and their work since; below 0: there were none [J]
-  kSpent = 62,       // work of the pair's dashpots since points were looked for [J]
-  kLost = 63,        // of what was earned, that which the points that are found cannot store, less what they took [J]
-  kGroupFields = 64
+  kGroupsB = 34,      // of the bodies
+  kImpedance = 35,    // sum over the points [N·s/m]
+  kTotal = 36,        // normal force of all points [N]
+  kDamp = 37,         // wrench on a about its centre, by the dashpots (6)
+  kRub = 43,          // by friction: damp gives its springs' part, rub puts all in its stead (6)
+  kPressEnergy = 49,  // stored by the springs [J]
+  kStickEnergy = 50,  // and by those of friction [J]
+  kGroupLoss = 51,  // power of the dashpots with the speeds before and after the forces, taken from the motion (2) [W]
+  kGroupRubPower = 53,  // of friction, given to it (2) [W]
+  kHeldForce = 55,      // normal force of the springs, (4) of the theory left out [N]
+  kHeldTorque = 56,     // and its torque on a (3)
+  kEarned = 59,         // energy of the pair's points before, and their work since; below 0: there were none [J]
+  kSpent = 60,          // work of the pair's dashpots since points were looked for [J]
+  kLost = 61,  // of what was earned, that which the points that are found cannot store, less what they took [J]
+  kGroupFields = 62
 };
 
 /// Fields of a point; a place without a point has no stiffness.
@@ -106,23 +113,30 @@ struct TouchJob {
   size_t stride = 1;                       // between their components
   const double *v, *w, *R, *constants;
   const double *force, *torque, *joint_force, *joint_torque;
-  double* touched;
+  const double* groups;  // of each (W a block)
+  double* touched;       // kTouchedFields a block
+  double* rows;          // kTouchedRow each
+  double* changes;       // kWrenchRow each
+  double* sums;          // of the wrenches on each, kWrenchRow
   double h = 0;
   double gravity[3] = {0, 0, 0};
 };
 
-/// Speeds and inertia; nothing pushes yet.
+/// Speeds, inertia and what other forces change; no wrenches yet.
 void read_touched(const TouchJob&);
 /// What all forces known so far add to the speeds within the step.
 void update_touched(const TouchJob&);
 
 struct ContactJob {
   size_t blocks = 0;
-  const std::uint32_t* rows;   // block i has the points in rows[i] to rows[i + 1], W in each
-  const std::uint32_t *a, *b;  // where the fields of the groups' bodies begin (W a block)
-  const double* touched;       // bodies
-  double* groups;              // kGroupFields a block
-  double* points;              // kPointFields a row
+  const std::uint32_t* rows;       // block i has the points in rows[i] to rows[i + 1], W in each
+  size_t count = 0;                // groups; idle lanes are behind them
+  const std::uint32_t *a, *b;      // which of the touched bodies (W a block)
+  const double *bodies, *changes;  // rows of the touched bodies
+  double* sums;                    // the same
+  double* wrenches;                // what a stage adds on a and takes from b, two rows a group
+  double* groups;                  // kGroupFields a block
+  double* points;                  // kPointFields a row
   double h = 0;
   bool follows = false;  // the points are those of the step before, moved with the bodies
   double longest = 1;    // steps since points were looked for before
@@ -134,5 +148,9 @@ void press_contacts(const ContactJob&);
 void damp_contacts(const ContactJob&);
 /// What else friction takes to stop the sliding, within its limit.
 void rub_contacts(const ContactJob&);
+/// Adds the wrenches of a stage to the sums of their bodies, group after group.
+void sum_wrenches(const ContactJob&);
+/// Powers of dashpots and friction, once all forces are known.
+void book_contacts(const ContactJob&);
 
 }  // namespace topple::mbs::kernel

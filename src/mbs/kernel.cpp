@@ -130,20 +130,6 @@ struct Poses {
   Q4<D> q;
 };
 
-#if HWY_TARGET != HWY_SCALAR
-/// Writes two numbers of the rows of every second body.
-template <class D>
-HWY_INLINE void write_pairs(hn::Vec<D> pairs, double* HWY_RESTRICT rows) {
-  if constexpr (hn::MaxLanes(D()) == 2) {
-    hn::StoreU(pairs, D(), rows);
-  } else {
-    using Half = hn::Half<D>;
-    write_pairs<Half>(hn::LowerHalf(Half(), pairs), rows);
-    write_pairs<Half>(hn::UpperHalf(Half(), pairs), rows + kPoseRow * hn::MaxLanes(Half()));
-  }
-}
-#endif
-
 /// Poses of the bodies of a block of elements; `bodies` one a lane.
 template <class D>
 HWY_INLINE Poses<D> read_poses(const double* HWY_RESTRICT poses, const std::uint32_t* HWY_RESTRICT bodies) {
@@ -169,21 +155,11 @@ struct PlanarMarker {
 
 template <class D>
 HWY_INLINE void lay_pose_block(const PoseJob& job, size_t block) {
-  const D d;
-  const size_t W = hn::Lanes(d);
+  const size_t W = hn::Lanes(D());
   const double *p = job.p + 3 * W * block, *q = job.q + 4 * W * block;
   const Num<D> field[kPoseRow] = {load<D>(p, 0), load<D>(p, 1), load<D>(p, 2), load<D>(q, 0),
                                   load<D>(q, 1), load<D>(q, 2), load<D>(q, 3), num<D>(0)};
-  double* rows = job.poses + kPoseRow * W * block;
-#if HWY_TARGET != HWY_SCALAR
-  if constexpr (hn::MaxLanes(D()) > 1)
-    for (size_t i = 0; i < kPoseRow; i += 2) {
-      write_pairs<D>(hn::InterleaveLower(d, field[i].v, field[i + 1].v), rows + i);
-      write_pairs<D>(hn::InterleaveUpper(d, field[i].v, field[i + 1].v), rows + i + kPoseRow);
-    }
-#endif
-  if constexpr (hn::MaxLanes(D()) == 1)
-    for (size_t i = 0; i < kPoseRow; ++i) hn::Store(field[i].v, d, rows + i);
+  write_rows<D, kPoseRow>(field, job.poses + kPoseRow * W * block);
 }
 
 /// a^(-2/3) of 1 <= a <= kMostOver by Newton's method on a² y³ = 1, powers of 8 taken out.

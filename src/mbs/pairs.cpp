@@ -29,30 +29,28 @@ void System::find_pair_points() {
   State& s = state;
   const State& now = state;
   const Contact& c = model.contact;
-  // each shape where it is now, at most once a step
-  solids.resize(s.shapes.size());
-  solid_step.resize(s.shapes.size(), -1);
+  // each shape where it is now, boxes for the kernel at most once a step
   const size_t idle = s.shapes.size();
   if (contact.boxes.size() != (idle + 1) * kernel::kBoxFields) {
     contact.boxes.assign((idle + 1) * kernel::kBoxFields, 0);
-    solid_step.assign(idle, -1);
+    contact.box_step.assign(idle, -1);
   }
-  const auto solid_of = [&](size_t body, int shape) -> const Solid& {
+  const auto solid_of = [&](size_t body, int shape) -> Solid {
+    const CompiledShape& c_shape = s.shapes[static_cast<size_t>(shape)];
+    const Mat3 R = now.R[body];
+    return {c_shape.kind,
+            now.p[body] + R * c_shape.p_BS,
+            c_shape.is_straight ? R : R * c_shape.R_BS,
+            c_shape.half,
+            c_shape.radius,
+            c_shape.reach,
+            c_shape.hull >= 0 ? &hulls[static_cast<size_t>(c_shape.hull)] : nullptr};
+  };
+  const auto write = [&](size_t body, int shape) {
     const size_t i = static_cast<size_t>(shape);
-    if (solid_step[i] != s.step_index) {
-      solid_step[i] = s.step_index;
-      const CompiledShape& c_shape = s.shapes[i];
-      const Mat3 R = now.R[body];
-      solids[i] = {c_shape.kind,
-                   now.p[body] + R * c_shape.p_BS,
-                   c_shape.is_straight ? R : R * c_shape.R_BS,
-                   c_shape.half,
-                   c_shape.radius,
-                   c_shape.reach,
-                   c_shape.hull >= 0 ? &hulls[static_cast<size_t>(c_shape.hull)] : nullptr};
-      write_box(solids[i], &contact.boxes[i * kernel::kBoxFields]);
-    }
-    return solids[i];
+    if (contact.box_step[i] == s.step_index) return;
+    contact.box_step[i] = s.step_index;
+    write_box(solid_of(body, shape), &contact.boxes[i * kernel::kBoxFields]);
   };
   // those that are due; two boxes go to the kernel, those that touched side by side
   const size_t W = kernel::lanes();
@@ -87,8 +85,8 @@ void System::find_pair_points() {
     const PairDue& due = s.pair_due[look.pair];
     if (!due.are_boxes) continue;
     if (due.touching) look.slot += first_touching;
-    (void)solid_of(static_cast<size_t>(due.a), due.shape_a);
-    (void)solid_of(static_cast<size_t>(due.b), due.shape_b);
+    write(static_cast<size_t>(due.a), due.shape_a);
+    write(static_cast<size_t>(due.b), due.shape_b);
     contact.box_a[look.slot] = static_cast<std::uint32_t>(due.shape_a);
     contact.box_b[look.slot] = static_cast<std::uint32_t>(due.shape_b);
   }
@@ -105,7 +103,7 @@ void System::find_pair_points() {
     if (due.are_boxes) {
       read_box_contact(&contact.box_answers[look.slot / W * kernel::kBoxAnswerFields * W + look.slot % W], W, points);
     } else {
-      const Solid &A = solid_of(a, due.shape_a), &Bb = solid_of(b, due.shape_b);
+      const Solid A = solid_of(a, due.shape_a), Bb = solid_of(b, due.shape_b);
       const double reach = A.reach + Bb.reach;
       if (const double distance2 = dot(Bb.p - A.p, Bb.p - A.p); distance2 < reach * reach) {
         find_contact(A, Bb, pair.axis, points);

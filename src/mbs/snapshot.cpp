@@ -101,7 +101,7 @@ void visit(Archive& ar, S& s, C& sys) {
   ar(sys.ground_reaction), ar(sys.ground_contact), ar(sys.body_contacts);
 }
 
-constexpr std::uint64_t kMagic = 0x41534e41504f54ULL;  // "TOPANSA"
+constexpr std::uint64_t kMagic = 0x42534e41504f54ULL;  // "TOPANSB"
 
 /// What of the system's scratch the next step takes over, under the same names.
 struct Carried {
@@ -143,7 +143,7 @@ void read_state(Reader& r, System& system) {
   system.ground_contact = carried.ground_contact;
   system.body_contacts = carried.body_contacts;
   system.clusters_due = true;
-  system.solid_step.clear();
+  system.contact.boxes.clear();
   system.contact.search.has_links = false;
   system.started = true;
 }

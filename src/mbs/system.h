@@ -245,8 +245,6 @@ class System {
   std::string trouble;          // why the run cannot go on; empty: nothing
   std::vector<int> due_events;  // of this step
   ContactScratch contact;
-  std::vector<Solid> solids;  // shapes in W, as of solid_step
-  std::vector<long> solid_step;
   View view;
 
   void say(const Happening& h) const {
