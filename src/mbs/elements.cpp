@@ -15,7 +15,7 @@ using namespace kernel;
 
 constexpr size_t kBlocksForThreads = 256;  // below, waking threads costs more than they save
 constexpr size_t kChunk = 32;              // blocks a thread takes at once
-constexpr long kLayoutInterval = 512;      // steps between looks whether zones that flow still lie side by side
+constexpr long kLayoutInterval = 64;       // steps between looks whether zones that flow still lie side by side
 
 /// Spring behind the damper of a slot times the stiffness.
 double calc_rate(const Lanes& l, size_t slot, int i) { return l.field(slot, kViscous) * l.field(slot, kStiffness + i); }
@@ -66,43 +66,52 @@ void System::kill_slot(size_t e) {
 void System::lay_out_elements() {
   Lanes& l = *lanes;
   const size_t E = elements.size(), W = l.W;
-  std::vector<double> moved;
   std::vector<std::uint32_t> kept;  // kNoSlot: a gap
   std::vector<Plane> planes;        // of blocks
   std::vector<unsigned char> single;
   size_t live = 0;
   const bool first = l.slot_of.empty();
-  // blocks of one plane each, with one station or two; in them elements that flow side by side
+  std::vector<Work> work(E, Work::None);
+  for (size_t e = 0; e < E; ++e)
+    work[e] = first ? Work::Springs : l.slot_of[e] == Lanes::kNoSlot ? Work::None : find_work(l.slot_of[e]);
+  // blocks of one plane each, with one station or two; in them elements of like work side by side
   constexpr std::pair<Plane, bool> kinds[] = {{Plane::Space, true},   {Plane::Space, false}, {Plane::AboutY, true},
                                               {Plane::AboutY, false}, {Plane::AboutZ, true}, {Plane::AboutZ, false}};
   for (const auto& [plane, is_single] : kinds) {
-    for (const bool flows : {true, false}) {
+    for (const Work here : {Work::Flows, Work::MayFlow, Work::Springs}) {
       for (size_t e = 0; e < E; ++e) {
         const ZoneParameters& zone = elements[e].zone;
-        if (zone.plane != plane || (zone.stations < 2) != is_single) continue;
-        const std::uint32_t slot = first ? 0 : l.slot_of[e];
-        if (!first && (slot == Lanes::kNoSlot || l.field(slot, kMostTurn) == kUnlimited)) continue;
-        if ((!first && l.field(slot, kFlows) > 0) != flows) continue;
+        if (work[e] != here || zone.plane != plane || (zone.stations < 2) != is_single) continue;
         if (kept.size() % W == 0) planes.push_back(plane), single.push_back(is_single);
         kept.push_back(static_cast<std::uint32_t>(e));
         ++live;
-        if (!first) save_slot(slot, moved);
       }
     }
     kept.resize((kept.size() + W - 1) / W * W, Lanes::kNoSlot);
   }
-  l.allocate_elements(kept.size());
+  const size_t slots = kept.size();
+  if (first) {
+    l.allocate_elements(slots);
+    for (size_t slot = 0; slot < slots; ++slot) {
+      l.clear_slot(slot);
+      if (kept[slot] != Lanes::kNoSlot) l.set(slot, kMostTurn, kLargestTurn);
+    }
+  } else {
+    std::vector<std::uint32_t> from = kept;
+    for (std::uint32_t& slot : from)
+      if (slot != Lanes::kNoSlot) slot = l.slot_of[slot];
+    l.move_slots(from);
+  }
   l.planes = planes;
   l.single = single;
+  l.live.assign(l.element_blocks, 0);
+  l.softened.assign(l.element_blocks, 0);
   l.slot_of.assign(E, Lanes::kNoSlot);
-  const size_t slots = l.element_blocks * W;
   l.element_of.assign(slots, Lanes::kNoSlot);
   l.body_a.assign(slots, static_cast<std::uint32_t>(B));
   l.body_b.assign(slots, static_cast<std::uint32_t>(B));
-  const double* next = moved.data();
   const auto body = [&](int b) { return b < 0 ? static_cast<std::uint32_t>(B) : static_cast<std::uint32_t>(b); };
   for (size_t slot = 0; slot < slots; ++slot) {
-    l.clear_slot(slot);
     const std::uint32_t e = kept[slot];
     if (e == Lanes::kNoSlot) continue;
     l.slot_of[e] = static_cast<std::uint32_t>(slot);
@@ -110,14 +119,8 @@ void System::lay_out_elements() {
     l.body_a[slot] = body(elements[e].a);
     l.body_b[slot] = body(elements[e].b);
     ++l.live[slot / W];
-    if (first) {
-      l.set(slot, kMostTurn, kLargestTurn);
-      continue;
-    }
-    if (state.element[e].is_softened) l.softened[slot / W] = 1;
-    next = restore_slot(slot, next);
+    if (!first && state.element[e].is_softened) l.softened[slot / W] = 1;
   }
-  if (!first) l.share_constants();
   l.used_slots = l.live_elements = live;
   l.first_entry.assign(B + 1, 0);
   l.entries.clear();
@@ -132,17 +135,33 @@ void System::lay_out_elements() {
   }
 }
 
-bool System::are_flows_scattered() const {
+System::Work System::find_work(size_t slot) const {
   const Lanes& l = *lanes;
-  size_t flowing = 0, blocks = 0;
+  if (l.field(slot, kMostTurn) == kUnlimited) return Work::None;
+  if (!(l.field(slot, kFlows) > 0)) return Work::Springs;
+  return l.flow(slot, kIdle) > 0 ? Work::MayFlow : Work::Flows;
+}
+
+bool System::is_work_scattered() const {
+  const Lanes& l = *lanes;
+  // a zone at its limit is as much again, and one that may come there half of that
+  size_t blocks = 0, done = 0, may_flow[6] = {}, flow[6] = {};  // the last two in lanes, by kind of block
   for (size_t block = 0; block < l.element_blocks; ++block) {
     if (l.live[block] == 0) continue;
-    size_t here = 0;
-    for (size_t slot = block * l.W; slot < (block + 1) * l.W; ++slot) here += l.field(slot, kFlows) > 0 ? 1 : 0;
-    flowing += here;
-    blocks += here > 0 ? 1 : 0;
+    ++blocks;
+    const size_t kind = 2 * static_cast<size_t>(l.planes[block]) + l.single[block];
+    size_t here = 0, at_work = 0;
+    for (size_t slot = block * l.W; slot < (block + 1) * l.W; ++slot) {
+      const Work work = find_work(slot);
+      here += work == Work::MayFlow || work == Work::Flows ? 1 : 0;
+      at_work += work == Work::Flows ? 1 : 0;
+    }
+    may_flow[kind] += here, flow[kind] += at_work;
+    done += (here > 0 ? 1 : 0) + (at_work > 0 ? 2 : 0);
   }
-  return 3 * blocks * l.W > 4 * (flowing + 2 * l.W);
+  const auto blocks_of = [&](size_t in_lanes) { return (in_lanes + l.W - 1) / l.W; };
+  for (size_t kind = 0; kind < 6; ++kind) done -= blocks_of(may_flow[kind]) + 2 * blocks_of(flow[kind]);
+  return 4 * done > blocks;
 }
 
 void System::pack_element(size_t e, bool has_moved) {
@@ -431,7 +450,8 @@ void System::evaluate_elements() {
             [&](std::uint32_t x, std::uint32_t y) { return l.element_of[x] < l.element_of[y]; });
   for (const std::uint32_t slot : l.outside) evaluate_outside(slot);
   const bool has_gaps = 8 * l.live_elements < 7 * l.used_slots && l.used_slots > 4 * l.W;
-  if (has_gaps || (state.step_index % kLayoutInterval == 0 && are_flows_scattered())) lay_out_elements();
+  if (has_gaps || (state.step_index % kLayoutInterval == 0 && is_work_scattered())) lay_out_elements();
+  if (has_gaps) l.share_constants();
   sum_element_forces();
 }
 

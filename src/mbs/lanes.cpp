@@ -18,6 +18,29 @@ size_t log2_of(size_t W) {
   return shift;
 }
 
+/// Field f of a slot with nothing in it.
+double empty_field(int f) {
+  using namespace kernel;
+  constexpr double unlimited = std::numeric_limits<double>::infinity();
+  const bool is_one =
+      f == kMarkerA + 3 || f == kMarkerB + 3 || f == kSoft || f == kSoft + 3 || f == kSoft + 4 || f == kSoft + 7;
+  const bool is_unlimited = f == kMostForce || f == kMostTurn;
+  return is_one ? 1 : is_unlimited ? unlimited : f == kLeastForce ? -unlimited : 0;
+}
+
+/// Fields of slots that change places; `moved` is scratch. Where nothing comes from, what lies there stays.
+void move_fields(const std::vector<std::uint32_t>& from, size_t fields, size_t W, AlignedVector<double>& values,
+                 AlignedVector<double>& moved) {
+  moved.resize(from.size() * fields);
+  for (size_t slot = 0; slot < from.size(); ++slot) {
+    if (from[slot] == Lanes::kNoSlot) continue;
+    const double* old = values.data() + from[slot] / W * fields * W + from[slot] % W;
+    double* to = moved.data() + slot / W * fields * W + slot % W;
+    for (size_t f = 0; f < fields; ++f) to[f * W] = old[f * W];
+  }
+  values.swap(moved);
+}
+
 }  // namespace
 
 LaneLayout Lanes::body_layout(size_t lane) const {
@@ -77,15 +100,55 @@ void Lanes::still_slot(size_t slot) {
 }
 
 void Lanes::clear_slot(size_t slot) {
+  for (int f = 0; f < kernel::kSlotFields; ++f) set(slot, f, empty_field(f));
+  for (size_t f = 0; f < static_cast<size_t>(kernel::kForceFields); ++f) force_field(slot, f) = 0;
+}
+
+void Lanes::move_slots(const std::vector<std::uint32_t>& from) {
   using namespace kernel;
-  constexpr double unlimited = std::numeric_limits<double>::infinity();
-  for (int f = 0; f < kSlotFields; ++f) {
-    const bool is_one =
-        f == kMarkerA + 3 || f == kMarkerB + 3 || f == kSoft || f == kSoft + 3 || f == kSoft + 4 || f == kSoft + 7;
-    const bool is_unlimited = f == kMostForce || f == kMostTurn;
-    set(slot, f, is_one ? 1 : is_unlimited ? unlimited : f == kLeastForce ? -unlimited : 0);
+  element_blocks = from.size() / W;
+  if (!flows.empty()) {
+    std::vector<std::uint32_t> flowing = from;
+    for (std::uint32_t& slot : flowing)
+      if (slot != kNoSlot && !(field(slot, kFlows) > 0)) slot = kNoSlot;
+    move_fields(flowing, kFlowFields, W, flows, moved_flows);
   }
-  for (size_t f = 0; f < static_cast<size_t>(kForceFields); ++f) force_field(slot, f) = 0;
+  move_fields(from, kStateFields, W, states, moved_states);
+  move_fields(from, kForceFields, W, element_forces, moved_forces);
+  for (size_t slot = 0; slot < from.size(); ++slot) {
+    if (from[slot] != kNoSlot) continue;
+    for (int f = 0; f < kStateFields; ++f) states[state_at(slot, f)] = 0;
+    for (size_t f = 0; f < static_cast<size_t>(kForceFields); ++f) force_field(slot, f) = 0;
+  }
+  pool.swap(moved_pool);
+  constants.swap(moved_constants);
+  pool.clear();
+  constants.clear();
+  uses.clear();
+  for (size_t block = 0; block < element_blocks; ++block) {
+    const std::uint32_t* slots = from.data() + block * W;
+    for (size_t f = 0; f < static_cast<size_t>(kConstants); ++f) {
+      alignas(kCacheLine) double x[kMostLanes];
+      const double empty = empty_field(static_cast<int>(f) + kStateFields);
+      for (size_t l = 0; l < W; ++l)
+        x[l] = slots[l] == kNoSlot
+                   ? empty
+                   : moved_pool[size_t{moved_constants[slots[l] / W * kConstants + f]} * W + slots[l] % W];
+      // shared with the block before
+      if (block > 0) {
+        const std::uint32_t last = constants[(block - 1) * kConstants + f];
+        if (std::equal(x, x + W, pool.begin() + static_cast<std::ptrdiff_t>(size_t{last} * W))) {
+          constants.push_back(last);
+          ++uses[last];
+          continue;
+        }
+      }
+      constants.push_back(static_cast<std::uint32_t>(uses.size()));
+      uses.push_back(1);
+      pool.insert(pool.end(), x, x + W);
+    }
+  }
+  shared = uses.size();
 }
 
 void Lanes::set(size_t slot, int f, double x) {

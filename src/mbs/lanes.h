@@ -84,6 +84,9 @@ struct Lanes {
     return flows[(slot / W * kernel::kFlowFields + static_cast<size_t>(f)) * W + slot % W];
   }
 
+  /// Puts slots in another order, each where the one of `from` lay, a whole number of blocks; kNoSlot: an empty one.
+  void move_slots(const std::vector<std::uint32_t>& from);
+
   void allocate_bodies(size_t bodies);
   void allocate_elements(size_t elements);
   /// Nothing in it: no force, and never a report.
@@ -121,6 +124,8 @@ struct Lanes {
   void open_flows();
 
  private:
+  AlignedVector<double> moved_states, moved_forces, moved_flows, moved_pool;  // scratch of move_slots()
+  std::vector<std::uint32_t> moved_constants;
   void drop_dead_entries();
   size_t state_at(size_t slot, int f) const {
     return (slot / W * kernel::kStateFields + static_cast<size_t>(f)) * W + slot % W;

@@ -330,11 +330,15 @@ class System {
   bool keeps_planes() const;
   /// In which plane an element stays for good.
   kernel::Plane find_plane(const CompiledElement&) const;
-  /// Whether elements that flow lie in many more blocks than they fill.
-  bool are_flows_scattered() const;
+  /// What the kernel does with a slot: nothing, a spring inside its bounds, a zone that may flow or one at its limits.
+  enum class Work : unsigned char { None, Springs, MayFlow, Flows };
+  Work find_work(size_t slot) const;
+  /// Whether slots of like work no longer lie side by side.
+  bool is_work_scattered() const;
   size_t slot_of(size_t element) const;
   void kill_slot(size_t element);
-  /// Gives every live element a slot: by plane and number of stations, those that flow first, then in their order.
+  /// Gives every live element a slot: by plane and number of stations, those at their limits first, then
+  /// those that may flow, each in their order.
   void lay_out_elements();
   /// From the state of the zones to the slots, and back.
   /// Markers and constants are written only if they may have changed.

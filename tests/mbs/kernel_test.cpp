@@ -236,8 +236,8 @@ TEST(Kernel, ZonesThatFlowAreLaidSideBySideAndKeepTheirBits) {
       }
       flowed += flows(laid, e) ? 1 : 0;
     }
-    scattered += left.are_flows_scattered() ? 1 : 0;
-    if (i % 512 == 0 && W > 1) { EXPECT_FALSE(laid.are_flows_scattered()) << i; }
+    scattered += left.is_work_scattered() ? 1 : 0;
+    if (i % 64 == 0 && W > 1) { EXPECT_FALSE(laid.is_work_scattered()) << i; }
   }
   EXPECT_GT(flowed, 5 * n);
   if (W == 8) { EXPECT_GT(scattered, n / 4); }
