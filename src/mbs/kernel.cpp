@@ -285,10 +285,10 @@ HWY_INLINE M enter_cells(const ElementJob& job, size_t block, M wanted, Num<D> k
 
 /// The law of a zone that flows in bending, shear or torsion (docs/theory/zones.md, eq. 1 to 9), in its cells. Sets
 /// the elastic resultants f; gives the lanes among `wanted` for which that is the whole truth and moves their history;
-/// the others keep theirs.
+/// the others keep theirs. `flowed` are those of them that have passed a limit in this step.
 template <class D, Plane In, int Hinges, class M>
 HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], const Num<D> k[6], const Num<D> d[6],
-                       const Num<D> e_before[6], Num<D> f[6]) {
+                       const Num<D> e_before[6], Num<D> f[6], M& flowed) {
   using N = Num<D>;
   constexpr int first = first_bending(In), last = last_bending(In);
   constexpr bool is_plane = In != Plane::Space;
@@ -610,7 +610,7 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
   }
   // torsion
   N twisted = zero, over = zero;
-  M flowed = hn::Or(bends, slides);
+  flowed = hn::Or(bends, slides);
   if constexpr (!is_plane) {
     const N torsion = load<D>(flow, kTorsion);
     const M twists = hn::And(good, hn::Gt(abs(f[3]).v, torsion.v));
@@ -665,6 +665,14 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
   store_where<D>(good, idle, flow, kIdle);
   for (int s = 0; s < Hinges; ++s) store_where<D>(good, reached[s], flow, kStations + s * kStationFields + kReached);
   return good;
+}
+
+/// What the damper of a zone that flows sees of a change of its elastic deformation: not more than the deformation
+/// itself changes, and nothing the other way (zones.md, eq. 11a).
+template <class D>
+HWY_INLINE Num<D> drive_damper(Num<D> stretched, Num<D> way) {
+  const Num<D> zero = num<D>(0);
+  return minimum(maximum(stretched, minimum(way, zero)), maximum(way, zero));
 }
 
 /// Forces of one block of elements (docs/theory/zones.md, eq. 1 to 12, and multibody.md, eq. 4).
@@ -798,15 +806,18 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
       double* HWY_RESTRICT flow = job.flows + static_cast<size_t>(kFlowFields) * W * block;
       N f_flow[6], d_before[6];
       for (int c = 0; c < active.count; ++c) d_before[active.at[c]] = load<D>(flow, kBefore + active.at[c]);
-      const auto good = flow_zone<D, In, Hinges>(flows, flow, x, k, d, was, f_flow);
+      auto flowed = flows;
+      const auto good = flow_zone<D, In, Hinges>(flows, flow, x, k, d, was, f_flow, flowed);
       for (int c = 0; c < active.count; ++c) {
         const int i = active.at[c];
         f[i] = select(good, f_flow[i], f[i]);
         const N stretch = f_flow[i] * load<D>(flow, kFlexibility + i);
         e[i] = select(good, stretch, e[i]);
         u[i] = select(good, stretch, u[i]);
-        before[i] = select(good, was[i], before[i]);
-        slid[i] = select(good, (d[i] - d_before[i]) - (stretch - was[i]), slid[i]);
+        const N way = d[i] - d_before[i], stretched = stretch - was[i];
+        const N driven = select(flowed, drive_damper(stretched, way), stretched);
+        before[i] = select(good, select(flowed, stretch - driven, was[i]), before[i]);
+        slid[i] = select(good, way - driven, slid[i]);
       }
       books_slid = true;
       outside = hn::AndNot(good, outside);

@@ -669,13 +669,18 @@ struct Evaluation {
       const double e = k[i] > 0 ? force[i] / k[i] : 0;
       double damper = 0;
       if (p.viscous > 0 && z.has_elastic && h > 0) {
-        z.flowed[i] += p.relaxation * (0.5 * (e + z.elastic[i]) - z.flowed[i]);
+        // where the limits fall, what the spring gives up is no motion that would be damped
+        const double way = d.c[i] - z.deformation[i], stretched = e - z.elastic[i];
+        const double driven = flowed ? std::clamp(stretched, std::min(way, 0.0), std::max(way, 0.0)) : stretched;
+        const double before = e - driven;
+        z.flowed[i] += before - z.elastic[i];
+        z.flowed[i] += p.relaxation * (0.5 * (e + before) - z.flowed[i]);
         const double stretch = e - z.flowed[i];
         damper = p.viscous * k[i] * stretch;
         damper_energy += 0.5 * damper * stretch;
-        const double mean = 0.5 * (damper + z.damper_force[i]), stretched = e - z.elastic[i];
-        z.damping += mean * stretched;
-        z.plastic += mean * (d.c[i] - z.deformation[i] - stretched);
+        const double mean = 0.5 * (damper + z.damper_force[i]);
+        z.damping += mean * driven;
+        z.plastic += mean * (way - driven);
       } else {
         z.flowed[i] = e;
       }
