@@ -38,7 +38,7 @@ std::string words_of_time(double seconds) {
 }
 
 /// Done, running, failed, rate, what is left, bounds so far.
-std::string words_of(const StudyState& s) {
+std::string words_of(const study::Problem& p, const StudyState& s) {
   const double rate = s.seconds > 0 ? static_cast<double>(s.run_here) / s.seconds : 0;
   std::string text = fmt::format("{}{} done, {} running, {} failed",
                                  s.is_confirming ? "confirming by whole runs: " : "", s.done, s.running, s.failed);
@@ -49,7 +49,9 @@ std::string words_of(const StudyState& s) {
   if (!s.so_far) return text;
   for (std::size_t i = 0; i < std::min<std::size_t>(2, s.so_far->alpha.outputs.size()); ++i) {
     const auto& support = s.so_far->alpha.outputs[i].levels.front();
-    text += fmt::format("; {} {:.5g} to {:.5g}", s.so_far->outputs[i], support.lower.value, support.upper.value);
+    const study::Quantity& q = study::find_output(p, s.so_far->outputs[i]);
+    text += fmt::format("; {} {:.5g} to {:.5g}{}{}", q.name, support.lower.value / q.unit_value,
+                        support.upper.value / q.unit_value, q.unit.empty() ? "" : " ", q.unit);
   }
   return text;
 }
@@ -96,7 +98,7 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
   StudyResult r;
   try {
     r = study::run_study(problem, make_factories(), options, progress,
-                         [&](const StudyState& s) { line.say(words_of(s)); });
+                         [&](const StudyState& s) { line.say(words_of(problem, s)); });
   } catch (const InputError& e) {
     line.clear();
     if (e.diagnostics().front().code != "E824") return complain(e, text);
