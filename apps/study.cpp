@@ -31,31 +31,6 @@ constexpr const char* no_study_page =
     "The page of studies is not built, so there is no study.html (run `npm ci && npm run build` in web/, then `topple "
     "study export`).";
 
-std::string words_of_time(double seconds) {
-  if (seconds < 100) return fmt::format("{:.0f} s", seconds);
-  if (seconds < 6000) return fmt::format("{:.0f} min", seconds / 60);
-  return fmt::format("{:.1f} h", seconds / 3600);
-}
-
-/// Done, running, failed, rate, what is left, bounds so far.
-std::string words_of(const study::Problem& p, const StudyState& s) {
-  const double rate = s.seconds > 0 ? static_cast<double>(s.run_here) / s.seconds : 0;
-  std::string text = fmt::format("{}{} done, {} running, {} failed",
-                                 s.is_confirming ? "confirming by whole runs: " : "", s.done, s.running, s.failed);
-  if (s.run_here > 0) {
-    text += fmt::format(", {:.3g}/s", rate);
-    text += fmt::format(", at most {} left", words_of_time(static_cast<double>(std::max(0L, s.limit - s.done)) / rate));
-  }
-  if (!s.so_far) return text;
-  for (std::size_t i = 0; i < std::min<std::size_t>(2, s.so_far->alpha.outputs.size()); ++i) {
-    const auto& support = s.so_far->alpha.outputs[i].levels.front();
-    const study::Quantity& q = study::find_output(p, s.so_far->outputs[i]);
-    text += fmt::format("; {} {:.5g} to {:.5g}{}{}", q.name, support.lower.value / q.unit_value,
-                        support.upper.value / q.unit_value, q.unit.empty() ? "" : " ", q.unit);
-  }
-  return text;
-}
-
 /// Files of results and the page, into a folder; tells which. `source` is the file that was studied.
 void write_all(std::FILE* out, const std::string& folder, const study::Problem& p, const StudyResult& r,
                const std::string& source, const std::string& source_name, const std::string& language) {
@@ -98,7 +73,7 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
   StudyResult r;
   try {
     r = study::run_study(problem, make_factories(), options, progress,
-                         [&](const StudyState& s) { line.say(words_of(problem, s)); });
+                         [&](const StudyState& s) { line.say(describe_state(problem, s)); });
   } catch (const InputError& e) {
     line.clear();
     if (e.diagnostics().front().code != "E824") return complain(e, text);

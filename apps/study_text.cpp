@@ -20,6 +20,12 @@ using study::StudyResult;
 
 constexpr std::size_t most_columns = 3;  // of levels on a line
 
+std::string words_of_time(double seconds) {
+  if (seconds < 100) return fmt::format("{:.0f} s", seconds);
+  if (seconds < 6000) return fmt::format("{:.0f} min", seconds / 60);
+  return fmt::format("{:.1f} h", seconds / 3600);
+}
+
 void print_heading(std::FILE* out, const char* text) { std::fprintf(out, "\n%s\n", text); }
 
 void print_line(std::FILE* out, const std::string& text) {
@@ -168,6 +174,24 @@ void print_confirmation(std::FILE* out, const Problem& p, const StudyResult& r) 
 }
 
 }  // namespace
+
+std::string describe_state(const Problem& p, const study::StudyState& s) {
+  const double rate = s.seconds > 0 ? static_cast<double>(s.run_here) / s.seconds : 0;
+  std::string text = fmt::format("{}{} done, {} running, {} failed",
+                                 s.is_confirming ? "confirming by whole runs: " : "", s.done, s.running, s.failed);
+  if (s.run_here > 0) {
+    text += fmt::format(", {:.3g}/s", rate);
+    text += fmt::format(", at most {} left", words_of_time(static_cast<double>(std::max(0L, s.limit - s.done)) / rate));
+  }
+  if (!s.so_far) return text;
+  for (std::size_t i = 0; i < std::min<std::size_t>(2, s.so_far->alpha.outputs.size()); ++i) {
+    const auto& support = s.so_far->alpha.outputs[i].levels.front();
+    const study::Quantity& q = study::find_output(p, s.so_far->outputs[i]);
+    text += fmt::format("; {} {:.5g} to {:.5g}{}{}", q.name, support.lower.value / q.unit_value,
+                        support.upper.value / q.unit_value, q.unit.empty() ? "" : " ", q.unit);
+  }
+  return text;
+}
 
 void print_study(std::FILE* out, const Problem& p, const StudyResult& r) {
   if (!p.title.empty()) std::fprintf(out, "%s\n", p.title.c_str());
