@@ -27,21 +27,8 @@ using M = hn::Mask<D>;
 constexpr size_t kLanes = hn::MaxLanes(D());
 static_assert(kLanes <= 8);
 
-// no fused products: all instruction sets give the same bits
-struct V3 {
-  V x, y, z;
-};
-HWY_INLINE V num(double x) { return hn::Set(D(), x); }
-HWY_INLINE V add(V a, V b) { return hn::Add(a, b); }
-HWY_INLINE V sub(V a, V b) { return hn::Sub(a, b); }
-HWY_INLINE V mul(V a, V b) { return hn::Mul(a, b); }
-HWY_INLINE V3 add(const V3& a, const V3& b) { return {add(a.x, b.x), add(a.y, b.y), add(a.z, b.z)}; }
-HWY_INLINE V3 sub(const V3& a, const V3& b) { return {sub(a.x, b.x), sub(a.y, b.y), sub(a.z, b.z)}; }
-HWY_INLINE V3 scale(V s, const V3& a) { return {mul(s, a.x), mul(s, a.y), mul(s, a.z)}; }
-HWY_INLINE V dot(const V3& a, const V3& b) { return add(add(mul(a.x, b.x), mul(a.y, b.y)), mul(a.z, b.z)); }
-HWY_INLINE V3 cross(const V3& a, const V3& b) {
-  return {sub(mul(a.y, b.z), mul(a.z, b.y)), sub(mul(a.z, b.x), mul(a.x, b.z)), sub(mul(a.x, b.y), mul(a.y, b.x))};
-}
+#include "fem/contact_vectors.inc"
+
 HWY_INLINE V length(const V3& a) { return hn::Sqrt(dot(a, a)); }
 HWY_INLINE V clamp(V x, double most) { return hn::Min(hn::Max(x, num(-most)), num(most)); }
 HWY_INLINE V3 choose(M mask, const V3& a, const V3& b) {

@@ -92,6 +92,10 @@ struct ContactPair {
 struct TouchSums {
   long long count = 0;
   double normal = 0, friction = 0, stored = 0;
+  TouchSums& operator+=(const TouchSums& of) {
+    count += of.count, normal += of.normal, friction += of.friction, stored += of.stored;
+    return *this;
+  }
 };
 
 struct ContactState {

@@ -27,21 +27,8 @@ constexpr size_t kLanes = hn::MaxLanes(D());
 enum Field : size_t { kCentre = 0, kNormal = 3, kAlong = 6, kAcross = 9, kWide = 12, kHigh, kDepth, kFields };
 static_assert(kFields == kSkinFields);
 
-// no fused products: all instruction sets find the same
-struct V3 {
-  V x, y, z;
-};
-HWY_INLINE V num(double x) { return hn::Set(D(), x); }
-HWY_INLINE V add(V a, V b) { return hn::Add(a, b); }
-HWY_INLINE V sub(V a, V b) { return hn::Sub(a, b); }
-HWY_INLINE V mul(V a, V b) { return hn::Mul(a, b); }
-HWY_INLINE V3 add(const V3& a, const V3& b) { return {add(a.x, b.x), add(a.y, b.y), add(a.z, b.z)}; }
-HWY_INLINE V3 sub(const V3& a, const V3& b) { return {sub(a.x, b.x), sub(a.y, b.y), sub(a.z, b.z)}; }
-HWY_INLINE V3 scale(V s, const V3& a) { return {mul(s, a.x), mul(s, a.y), mul(s, a.z)}; }
-HWY_INLINE V dot(const V3& a, const V3& b) { return add(add(mul(a.x, b.x), mul(a.y, b.y)), mul(a.z, b.z)); }
-HWY_INLINE V3 cross(const V3& a, const V3& b) {
-  return {sub(mul(a.y, b.z), mul(a.z, b.y)), sub(mul(a.z, b.x), mul(a.x, b.z)), sub(mul(a.x, b.y), mul(a.y, b.x))};
-}
+#include "fem/contact_vectors.inc"
+
 HWY_INLINE V per_length(const V3& a) { return hn::Div(num(1), hn::Max(hn::Sqrt(dot(a, a)), num(1e-300))); }
 HWY_INLINE V3 smaller(const V3& a, const V3& b) { return {hn::Min(a.x, b.x), hn::Min(a.y, b.y), hn::Min(a.z, b.z)}; }
 HWY_INLINE V3 larger(const V3& a, const V3& b) { return {hn::Max(a.x, b.x), hn::Max(a.y, b.y), hn::Max(a.z, b.z)}; }

@@ -90,8 +90,7 @@ void ExplicitSystem::Inside::press_grounds(ExplicitState& state) const {
   });
   state.ground_touching = {};
   for (const GroundShare& share : shares) {
-    state.ground_touching.count += share.sums.count, state.ground_touching.normal += share.sums.normal;
-    state.ground_touching.friction += share.sums.friction, state.ground_touching.stored += share.sums.stored;
+    state.ground_touching += share.sums;
     for (size_t i = 0; i < share.forces.size(); ++i) state.ground_forces[i] += share.forces[i];
   }
 }

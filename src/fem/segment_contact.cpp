@@ -194,10 +194,7 @@ void press_surfaces(ExplicitSystem::Inside& in, ExplicitState& s) {
     task.sums.count = static_cast<long long>(task.faces_touched.size() + task.particles_touched.size());
   });
   c.touching = {};
-  for (const ContactTask& task : in.contact_tasks) {
-    c.touching.count += task.sums.count, c.touching.stored += task.sums.stored;
-    c.touching.normal += task.sums.normal, c.touching.friction += task.sums.friction;
-  }
+  for (const ContactTask& task : in.contact_tasks) c.touching += task.sums;
   // each share adds what falls to its rows and particles, of faces and then of pairs of particles: an order that
   // neither the number of shares nor of tasks changes
   const size_t shares = c.touching.count < 256 ? 1 : std::min<size_t>(4, static_cast<size_t>(in.team->threads()));
