@@ -40,12 +40,11 @@ bool System::keeps_planes() const {
   return true;
 }
 
-Plane System::find_plane(const CompiledElement& e) const {
+Plane System::find_plane(int a, int b, const Pose& X_AF, const Pose& X_BM) const {
   constexpr double tilted = 1e-12, beside = 1e-10;  // round-off of axes, of places [m]
   if (!lanes->is_planar) return Plane::Space;
-  const Pose a = pose_of(e.a), b = pose_of(e.b);
-  if (std::abs((b * e.p_BM).y - (a * e.p_AF).y) > beside) return Plane::Space;
-  const Mat3 axes_a = to_matrix(e.q_AF), axes_b = to_matrix(e.q_BM);
+  if (std::abs((pose_of(b) * X_BM.p).y - (pose_of(a) * X_AF.p).y) > beside) return Plane::Space;
+  const Mat3 axes_a = to_matrix(X_AF.q), axes_b = to_matrix(X_BM.q);
   const auto is_normal = [&](int axis) {
     return norm(axes_a.column(axis) - Vec3{0, 1, 0}) < tilted && norm(axes_b.column(axis) - Vec3{0, 1, 0}) < tilted;
   };

@@ -101,7 +101,7 @@ void System::compile() {
     c.p_BM = e.X_BM.p;
     c.q_AF = normalized(e.X_AF.q);
     c.q_BM = normalized(e.X_BM.q);
-    c.zone.plane = find_plane(c);
+    c.zone.plane = find_plane(c.a, c.b, {c.p_AF, c.q_AF}, {c.p_BM, c.q_BM});
     for (int i = 0; i < 3; ++i) {
       c.zone.stiffness[i] = e.translational_stiffness[i];
       c.zone.stiffness[3 + i] = e.rotational_stiffness[i];
@@ -162,6 +162,8 @@ void System::compile() {
     c.loose.stiffness[4] = r.loose_bending;
     const Joint& frames = model.joints[static_cast<size_t>(c.joint)];
     c.q_F = normalized(frames.X_PF.q), c.q_M = normalized(frames.X_CM.q);
+    if (find_plane(j.parent, j.child, {j.p_PF, c.q_F}, {j.p_CM, c.q_M}) == kernel::Plane::AboutZ)
+      c.zone.plane = c.loose.plane = kernel::Plane::AboutZ;
     rotationals.push_back(c);
   }
   s.rotational.resize(rotationals.size());

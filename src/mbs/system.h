@@ -328,8 +328,8 @@ class System {
   // elements (elements.cpp)
   /// Whether nothing of the bodies' motion ever leaves their planes.
   bool keeps_planes() const;
-  /// In which plane an element stays for good.
-  kernel::Plane find_plane(const CompiledElement&) const;
+  /// In which plane an element between two markers stays for good.
+  kernel::Plane find_plane(int a, int b, const Pose& X_AF, const Pose& X_BM) const;
   /// What the kernel does with a slot: nothing, a spring inside its bounds, a zone that may flow or one at its limits.
   enum class Work : unsigned char { None, Springs, MayFlow, Flows };
   Work find_work(size_t slot) const;
