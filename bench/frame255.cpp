@@ -69,15 +69,16 @@ void frame255_ensemble(benchmark::State& state) {
   std::vector<mbs::Variation> variations;
   for (size_t i = 0; i < count; ++i)
     variations.push_back([i](mbs::Model& m) {
-      for (mbs::ZoneLaw& law : m.laws) {
-        const double f = 0.9 + 0.2 * static_cast<double>((7 * i) % 16) / 16;
+      const double f = 0.9 + 0.2 * static_cast<double>((7 * i) % 16) / 16;
+      const auto vary = [f](mbs::ZoneLaw& law) {
         for (mbs::Curve* c : {&law.tension, &law.compression})
           for (double& x : c->f) x *= f;
         for (mbs::MomentFamily* family : {&law.moment_y, &law.moment_z})
           for (std::vector<double>* limits : {&family->positive, &family->negative})
             for (double& x : *limits) x *= f;
         law.shear_y *= f, law.shear_z *= f, law.torsion *= f;
-      }
+      };
+      for (size_t k = 0; k < m.laws.size(); ++k) m.laws.edit(k, vary);
     });
   mbs::BatchOptions options;
   options.run.duration = kDuration;

@@ -43,7 +43,7 @@ ZoneLaw make_law() {
 /// Goes to and fro in bending about both axes; a turn of `amplitude` [rad] about each.
 ///   stations  1, or 2 at the ends of a member of 3 m
 void walk(benchmark::State& state, double amplitude, int stations) {
-  const std::vector<CompiledLaw> laws{compile_law(make_law())};
+  const CompiledLaws laws{compile_law(make_law())};
   ZoneParameters p;
   for (int i = 0; i < 6; ++i) p.stiffness[i] = kStiff;
   p.viscous = 0.2, p.relaxation = 0.006;  // 5 % damping, 10 Hz, steps of 0.1 ms

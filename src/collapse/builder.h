@@ -140,13 +140,13 @@ struct Builder : BuilderState {
     double EA = 0, GA = 0, GJ = 0, EI_y = 0, EI_z = 0;
   };
   Stiffness calc_stiffness(const MemberZones&) const;
-  mbs::ZoneLaw make_law(int zone, const Stiffness&, const std::string& name, Bending);
+  mbs::SharedLaw make_law(int zone, const Stiffness&, const std::string& name, Bending);
   mbs::LawId law_of(int zone, const Stiffness&, const std::string& member, Bending = Bending::Both);
   /// A condensed model stays in its plane, so that members of a frame bend about one axis alone.
   Bending bending_of_column() const { return condensation ? Bending::Z : Bending::Both; }
   Bending bending_of_x_beam() const { return condensation ? Bending::Y : Bending::Both; }
   /// Law of a rotational element: bending about the hinge axis is that about z of its frame.
-  mbs::ZoneLaw make_hinge_law(int zone, const Stiffness&, const std::string& name);
+  mbs::SharedLaw make_hinge_law(int zone, const Stiffness&, const std::string& name);
   mbs::LawId hinge_law_of(int zone, const Stiffness&, const std::string& name);
   ///   length  of the stub [m]
   mbs::LawId stub_law_of(int zone, const Stiffness&, int member, double length);

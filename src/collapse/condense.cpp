@@ -95,7 +95,8 @@ std::string find_refusal(const product::Plan& plan, const Knowledge& k) {
   return {};
 }
 
-mbs::ZoneLaw scale(mbs::ZoneLaw law, double n) {
+mbs::SharedLaw scale(const mbs::SharedLaw& one, double n) {
+  mbs::ZoneLaw law = *one;
   const auto all = [n](std::vector<double>& list) {
     for (double& v : list) v *= n;
   };
@@ -234,8 +235,17 @@ class Condenser {
   mbs::LawId law_of(mbs::LawId id, double n) {
     if (!id.is_valid()) return id;
     const auto [at, is_new] = laws_.emplace(std::pair{id.index, n}, static_cast<int>(scaled_.size()));
-    if (is_new) scaled_.push_back(scale(model_.laws[static_cast<size_t>(id.index)], n));
+    if (is_new) scaled_.push_back(scale_once(model_.laws.shared(static_cast<size_t>(id.index)), n));
     return mbs::LawId{at->second};
+  }
+  mbs::SharedLaw scale_once(const mbs::SharedLaw& law, double n) const {
+    const std::pair key{law.identity(), n};
+    if (b_.known)
+      if (const auto found = b_.known->multiples.find(key); found != b_.known->multiples.end())
+        return found->second.many;
+    mbs::SharedLaw many = scale(law, n);
+    if (b_.made) b_.made->multiples.emplace(key, KnownCurves::Multiple{law, many});
+    return many;
   }
 
   void condense_elements() {
@@ -321,7 +331,7 @@ class Condenser {
   std::vector<double> share_;    // mass of each body's class over its own
   std::vector<double> offset_;   // of each body before, along y from its frame [m]
   std::map<std::pair<int, double>, int> laws_;
-  std::vector<mbs::ZoneLaw> scaled_;
+  mbs::Laws scaled_;
   std::vector<double> element_count_, rotational_count_;
 };
 
@@ -431,6 +441,14 @@ void limit_frequency(mbs::Model& model, double highest) {
     }
 }
 
+mbs::Model build_condensed(Builder& b) {
+  b.build();
+  b.add_events(make_schedule(b.plan, b.k));
+  mbs::Model model = std::move(b.model);
+  Condenser(b, *b.condensation, model).condense();
+  return model;
+}
+
 }  // namespace
 
 Condensation find_like_frames(std::span<const product::Plan* const> plans, const Knowledge& k) {
@@ -460,8 +478,7 @@ KnownCurves make_known_curves(const product::Plan& plan, const Knowledge& k, con
   Builder builder(plan, k, map, 1);
   builder.condensation = &c;
   builder.made = &out;
-  builder.build();
-  builder.add_events(make_schedule(plan, k));
+  (void)build_condensed(builder);
   return out;
 }
 
@@ -470,10 +487,7 @@ mbs::Model make_condensed_model(const product::Plan& plan, const Knowledge& k, c
   map = {};
   Builder builder(plan, k, map, 1, known);
   builder.condensation = &c;
-  builder.build();
-  builder.add_events(make_schedule(plan, k));
-  mbs::Model model = std::move(builder.model);
-  Condenser(builder, c, model).condense();
+  mbs::Model model = build_condensed(builder);
   if (options.highest_frequency > 0) limit_frequency(model, options.highest_frequency);
   return model;
 }

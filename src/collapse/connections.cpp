@@ -148,21 +148,20 @@ Builder::Stiffness Builder::calc_stiffness(const MemberZones& z) const {
   return s;
 }
 
-mbs::ZoneLaw Builder::make_law(int zone, const Stiffness& s, const std::string& name, Bending bending) {
-  if (const auto same = laws.find({zone, s.EI_y, s.EI_z, bending}); same != laws.end()) {
-    mbs::ZoneLaw law = model.laws[static_cast<size_t>(same->second.index)];
+mbs::SharedLaw Builder::make_law(int zone, const Stiffness& s, const std::string& name, Bending bending) {
+  const auto named = [&name](const mbs::SharedLaw& from) {
+    if (from->name == name) return from;
+    mbs::ZoneLaw law = *from;
     law.name = name;
-    return law;
-  }
+    return mbs::SharedLaw(std::move(law));
+  };
+  if (const auto same = laws.find({zone, s.EI_y, s.EI_z, bending}); same != laws.end())
+    return named(model.laws.shared(static_cast<size_t>(same->second.index)));
   std::string key = library.key(zone);
   append_bytes(key, s.EI_y), append_bytes(key, s.EI_z), append_bytes(key, static_cast<double>(bending));
   if (known)
-    if (const auto found = known->laws.find(key); found != known->laws.end()) {
-      mbs::ZoneLaw law = found->second;
-      law.name = name;
-      return law;
-    }
-  mbs::ZoneLaw law = make_zone_law(library.rcc(zone), s.EI_y, s.EI_z, name, k, PlasticFrom::Yield, bending);
+    if (const auto found = known->laws.find(key); found != known->laws.end()) return named(found->second);
+  mbs::SharedLaw law = make_zone_law(library.rcc(zone), s.EI_y, s.EI_z, name, k, PlasticFrom::Yield, bending);
   if (made) made->laws.emplace(std::move(key), law);
   return law;
 }
@@ -175,15 +174,15 @@ mbs::LawId Builder::law_of(int zone, const Stiffness& s, const std::string& name
   return id;
 }
 
-mbs::ZoneLaw Builder::make_hinge_law(int zone, const Stiffness& s, const std::string& name) {
-  mbs::ZoneLaw law = make_law(zone, s, name, bending_of_column());
-  if (!hinge_about_y) {
-    // y of the joint is -z of the column, its z is y of the column
-    std::swap(law.moment_y, law.moment_z);
-    std::swap(law.moment_y.positive, law.moment_y.negative);
-    std::swap(law.moment_y.elongation_positive, law.moment_y.elongation_negative);
-    std::swap(law.shear_y, law.shear_z);
-  }
+mbs::SharedLaw Builder::make_hinge_law(int zone, const Stiffness& s, const std::string& name) {
+  const mbs::SharedLaw same = make_law(zone, s, name, bending_of_column());
+  if (hinge_about_y) return same;
+  // y of the joint is -z of the column, its z is y of the column
+  mbs::ZoneLaw law = *same;
+  std::swap(law.moment_y, law.moment_z);
+  std::swap(law.moment_y.positive, law.moment_y.negative);
+  std::swap(law.moment_y.elongation_positive, law.moment_y.elongation_negative);
+  std::swap(law.shear_y, law.shear_z);
   return law;
 }
 
@@ -197,7 +196,7 @@ mbs::LawId Builder::stub_law_of(int zone, const Stiffness& s, int index, double 
   const std::string name = "stub of " + std::to_string(length) + " m";  // of all columns alike
   const auto key = std::make_tuple(zone, s.EI_y, s.EI_z, name);
   if (const auto it = hinge_laws.find(key); it != hinge_laws.end()) return it->second;
-  mbs::ZoneLaw law = make_hinge_law(zone, s, name);
+  mbs::ZoneLaw law = *make_hinge_law(zone, s, name);
   // crushing goes on until nothing of it is left, and it is off its joint when it has slid by its own thickness
   law.crush_length = length;
   law.slip_rupture = std::max(law.slip_rupture, std::min(section_of(index).width, section_of(index).height));

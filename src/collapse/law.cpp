@@ -360,7 +360,7 @@ void ZoneLibrary::compute(int threads) {
         rccs_[zone] = found->second;
         return;
       }
-    rccs_[zone] = nearfield::make_rcc(inputs_[zone]);
+    rccs_[zone] = std::make_shared<const nearfield::Rcc>(nearfield::make_rcc(inputs_[zone]));
   });
   if (!finished) rccs_.resize(done);
 }

@@ -2,7 +2,9 @@
 /// Resistance characteristic curves in the form of the multibody system (docs/theory/manager.md, section 3).
 
 #include <map>
+#include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "collapse/knowledge.h"
@@ -18,8 +20,13 @@ double calc_zone_length(const product::Section&, const product::Concrete&, const
 
 /// Curves and laws by all the numbers that they follow from: what many models of one plan share.
 struct KnownCurves {
-  std::map<std::string, nearfield::Rcc> zones;
-  std::map<std::string, mbs::ZoneLaw> laws;
+  std::map<std::string, std::shared_ptr<const nearfield::Rcc>> zones;
+  std::map<std::string, mbs::SharedLaw> laws;
+  /// A law and its multiple, by the law's identity and the factor.
+  struct Multiple {
+    mbs::SharedLaw one, many;
+  };
+  std::map<std::pair<const void*, double>, Multiple> multiples;
 };
 
 /// Computes each distinct zone once, on several threads.
@@ -31,7 +38,7 @@ class ZoneLibrary {
   int request(const nearfield::ZoneInput&);
   /// Computes what was requested since the last call. Throws InputError.
   void compute(int threads);
-  const nearfield::Rcc& rcc(int zone) const { return rccs_[static_cast<size_t>(zone)]; }
+  const nearfield::Rcc& rcc(int zone) const { return *rccs_[static_cast<size_t>(zone)]; }
   const nearfield::ZoneInput& input(int zone) const { return inputs_[static_cast<size_t>(zone)]; }
   size_t size() const { return inputs_.size(); }
   void collect(KnownCurves&) const;
@@ -43,7 +50,7 @@ class ZoneLibrary {
   std::map<std::string, int> numbers_;
   std::vector<const std::string*> keys_;
   std::vector<nearfield::ZoneInput> inputs_;
-  std::vector<nearfield::Rcc> rccs_;
+  std::vector<std::shared_ptr<const nearfield::Rcc>> rccs_;
 };
 
 /// Appends the bytes of a number.

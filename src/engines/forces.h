@@ -135,7 +135,7 @@ class Forces {
 
   const mbs::Model& model_;
   Say say_;
-  std::vector<mbs::CompiledLaw> laws_, lasting_laws_;  // as they are; without rupture, for trial states
+  mbs::CompiledLaws laws_, lasting_laws_;  // as they are; without rupture, for trial states
   std::vector<Zone> zone_, rotational_;
   std::vector<Spring> spring_;
   std::vector<Held> bushing_;

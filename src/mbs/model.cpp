@@ -22,7 +22,7 @@ ElementId add_element(Model& model, ZoneElement element) {
   return {static_cast<int>(model.elements.size()) - 1};
 }
 
-LawId add_law(Model& model, ZoneLaw law) {
+LawId add_law(Model& model, SharedLaw law) {
   model.laws.push_back(std::move(law));
   return {static_cast<int>(model.laws.size()) - 1};
 }

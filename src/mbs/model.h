@@ -2,12 +2,12 @@
 /// The special multibody system as a constant description. Rigid bodies, ideal joints, force elements, contact, events.
 /// SI; W is the inertial frame; a body's frame B has its origin in the centre of mass. Knows no concrete.
 
-#include <limits>
 #include <string>
 #include <vector>
 
 #include "base/id.h"
 #include "base/linalg.h"
+#include "mbs/laws.h"
 
 namespace topple::mbs {
 
@@ -17,7 +17,6 @@ using ElementId = Id<struct ElementTag>;
 using LawId = Id<struct LawTag>;
 
 inline constexpr BodyId kGround{-1};  // the inertial frame as a partner of joints and elements
-inline constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
 /// Contact geometry fixed in a body.
 struct Shape {
@@ -39,44 +38,6 @@ struct Body {
   Vec3 w_WB;                        // in W [rad/s]
   std::vector<Shape> shapes;        // empty: touches nothing
   bool fixed = false;               // never moves (stumps, footings)
-};
-
-/// Magnitude of a force against a displacement that only grows; linear between points, constant after the last.
-struct Curve {
-  std::vector<double> x;  // rising from 0
-  std::vector<double> f;  // >= 0
-};
-
-/// Limit moments of one axis against plastic rotation, one row for each normal force (tension positive).
-/// K forces, J rotations; outside the range of forces the limit is 0.
-struct MomentFamily {
-  std::vector<double> normal_force;      // rising [N] (K)
-  std::vector<double> plastic_rotation;  // rising from 0 [rad] (J)
-  std::vector<double> positive;          // limit for moments > 0 [N·m] (K x J)
-  std::vector<double> negative;          // magnitude of the limit for moments < 0 [N·m] (K x J)
-  // plastic elongation along the axis that comes with plastic rotation > 0 and < 0; both or none [m] (K x J)
-  std::vector<double> elongation_positive, elongation_negative;
-};
-
-/// Limits of what a zone can transmit: an rcc in the form of the multibody system (docs/theory/zones.md).
-/// Axes: x along the member from a to b, y and z across. An empty curve or family means unlimited (elastic).
-struct ZoneLaw {
-  std::string name;
-  MomentFamily moment_y, moment_z;
-  double biaxial_exponent = 1.5;           // (|My|/Ly)^p + (|Mz|/Lz)^p <= 1
-  double damage_share = 0;                 // share of the inelastic rotation that is recovered on unloading, 0..1
-  double rupture_rotation = kUnlimited;    // plastic rotation at which the element breaks altogether [rad]
-  double rupture_rotation_pressed = 0;     // the same while its normal force presses, if that is more [rad]
-  Curve compression;                       // limit against plastic shortening [m] -> [N]
-  Curve tension;                           // limit against plastic elongation [m] -> [N]
-  double crush_length = kUnlimited;        // plastic shortening at which the element breaks [m]
-  double rupture_elongation = kUnlimited;  // plastic elongation at which it breaks [m]
-  double shear_y = kUnlimited, shear_z = kUnlimited;  // limits without normal force [N]
-  double shear_friction = 0;                          // further limit per newton of compression
-  double slip_softening = kUnlimited;  // slip over which the shear limits fall to their friction part [m]
-  double slip_rupture = kUnlimited;    // slip at which the element breaks [m]
-  double torsion = kUnlimited;         // [N·m]
-  double twist_rupture = kUnlimited;   // [rad]
 };
 
 /// A station where inelastic rotation gathers, on the member's axis.
@@ -319,7 +280,7 @@ struct Model {
   std::vector<Joint> joints;
   std::vector<ZoneElement> elements;
   std::vector<RotationalElement> rotational_elements;
-  std::vector<ZoneLaw> laws;
+  Laws laws;
   std::vector<Cable> cables;
   std::vector<SpringDamper> springs;
   std::vector<RotationalSpring> rotational_springs;
@@ -333,7 +294,7 @@ struct Model {
 BodyId add_body(Model&, Body);
 JointId add_joint(Model&, Joint);
 ElementId add_element(Model&, ZoneElement);
-LawId add_law(Model&, ZoneLaw);
+LawId add_law(Model&, SharedLaw);
 
 /// Throws InputError with every complaint: ids out of range, masses or inertias not positive (definite), tables that do
 /// not rise, numbers that are not finite, frames of a joint that do not meet.

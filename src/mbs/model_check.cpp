@@ -85,8 +85,8 @@ class Checker {
   }
 
   // references
-  template <class T>
-  bool index(const Place& p, const char* key, int i, const std::vector<T>& of) {
+  template <class List>
+  bool index(const Place& p, const char* key, int i, const List& of) {
     if (i >= 0 && static_cast<size_t>(i) < of.size()) return true;
     fail(p, key, fmt::format("names number {}; there are {}", i, of.size()));
     return false;
@@ -245,7 +245,10 @@ void Checker::check_bodies() {
 
 void Checker::check_laws() {
   for (size_t i = 0; i < m_.laws.size(); ++i) {
-    const ZoneLaw& l = m_.laws[i];
+    const SharedLaw& law = m_.laws.shared(i);
+    if (law.is_checked()) continue;
+    const size_t found_before = found_.size();
+    const ZoneLaw& l = *law;
     const Place p = at("laws", i, l.name);
     family(p, "moment_y", l.moment_y);
     family(p, "moment_z", l.moment_z);
@@ -267,6 +270,7 @@ void Checker::check_laws() {
                                                      {"slip_softening", l.slip_softening},
                                                      {"torsion", l.torsion}};
     for (const auto& [key, x] : limits) not_negative(p, key, x);
+    if (found_.size() == found_before) law.note_checked();
   }
 }
 

@@ -234,12 +234,12 @@ class Reader {
     }
   }
   /// Reads a list; an item that is wrong leaves its place to a default one.
-  template <class T, class F>
-  void each(const char* key, std::vector<T>& list, F&& read_item) {
+  template <class List, class F>
+  void each(const char* key, List& list, F&& read_item) {
     if (!root_.has(key)) return;
     attempt([&] {
       for (const Node& n : root_[key].items()) {
-        T item;
+        std::invoke_result_t<F, const Node&> item;
         attempt([&] { item = read_item(n); });
         list.push_back(std::move(item));
       }

@@ -302,9 +302,9 @@ Json json_of(const Event& e) {
 }
 
 template <class T>
-Json list_of(const std::vector<T>& items) {
+Json list_of(const T& items) {
   Json j = Json::array();
-  for (const T& item : items) j.push_back(json_of(item));
+  for (const auto& item : items) j.push_back(json_of(item));
   return j;
 }
 

@@ -91,7 +91,7 @@ void System::compile() {
   count_other_bodies();
   lanes->is_planar = keeps_planes();
 
-  for (const ZoneLaw& law : model.laws) laws.push_back(compile_law(law));
+  for (size_t i = 0; i < model.laws.size(); ++i) laws.push_back(model.laws.shared(i).compile());
 
   for (const ZoneElement& e : model.elements) {
     CompiledElement c;

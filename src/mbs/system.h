@@ -195,7 +195,7 @@ class System {
   // constant after compilation
   size_t B = 0;
   std::vector<CompiledElement> elements;
-  std::vector<CompiledLaw> laws;
+  CompiledLaws laws;
   std::vector<CompiledJoint> joints;
   std::vector<CompiledRotational> rotationals;
   ForceElements forces;

@@ -584,7 +584,7 @@ struct Evaluation {
   }
 
   /// Safe bounds for the steps to come.
-  void renew_bounds(const std::vector<CompiledLaw>& laws, const Limits (&limits)[2]) {
+  void renew_bounds(const CompiledLaws& laws, const Limits (&limits)[2]) {
     if (!flowed && z.next_law < 0) {
       if (force[0] >= z.safe_force[0] && force[0] <= z.safe_force[1]) return;
       // bounds are the least limits around this force: none that are far enough away can be found near the limits here
@@ -606,7 +606,7 @@ struct Evaluation {
   }
 
   /// All flow of this step, and what breaks the zone.
-  void flow(const std::vector<CompiledLaw>& laws, double time) {
+  void flow(const CompiledLaws& laws, double time) {
     const Limits first_limits(laws, p.law[0], z, time);
     const double integrity = flow_axially(first_limits);
     const Limits limits[2] = {first_limits, n > 1 ? Limits(laws, p.law[1], z, time) : first_limits};
@@ -697,8 +697,7 @@ struct Evaluation {
 };
 
 template <Plane In>
-void advance_in(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, const Six& d, double time, double h,
-                ZoneState& z) {
+void advance_in(const ZoneParameters& p, const CompiledLaws& laws, const Six& d, double time, double h, ZoneState& z) {
   if (advance_inside_bounds<In>(p, d, h, z)) return;
   const bool is_switched = z.next_law >= 0 && time >= z.ramp_begin + z.ramp;
   if (is_switched) {
@@ -716,7 +715,7 @@ void advance_in(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, c
 
 }  // namespace
 
-void advance_zone(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, const Six& d, double time, double h,
+void advance_zone(const ZoneParameters& p, const CompiledLaws& laws, const Six& d, double time, double h,
                   ZoneState& z) {
   switch (p.plane) {
     case Plane::Space:

@@ -91,7 +91,7 @@ struct ZoneParameters {
 /// Evaluates a live zone at a deformation: sets resultant, history, energies; breaks it where a limit of rupture is
 /// passed.
 ///   time  of the evaluation [s]; h  since the last one [s], 0 when there is none
-void advance_zone(const ZoneParameters&, const std::vector<CompiledLaw>&, const Six& deformation, double time, double h,
+void advance_zone(const ZoneParameters&, const CompiledLaws&, const Six& deformation, double time, double h,
                   ZoneState&);
 /// Whether the zone is a spring with a damper for as long as its forces stay inside its safe bounds.
 inline bool is_bounded(const ZoneState& z, bool unlimited) {
@@ -103,12 +103,12 @@ inline constexpr double kNearBounds = 0.9;
 double calc_bound_utilisation(const ZoneParameters&, const ZoneState&);
 /// Writes what the kernel needs to let a zone flow in bending, kernel::kFlowFields values; false if it cannot: a law on
 /// its way to another one, a crushed section, a force beyond the tables, an exponent other than 1.5, or no law at all.
-bool write_flow(const ZoneParameters&, const std::vector<CompiledLaw>&, ZoneState&, double time, double* fields);
+bool write_flow(const ZoneParameters&, const CompiledLaws&, ZoneState&, double time, double* fields);
 /// Of these the cells of the moment families and the compression limit around a normal force [N] and the rotations that
 /// its stations have reached [rad]; false, and cells as they were, if there is none. Looks up from the hints of z.
 ///   stride  between the fields
-bool write_flow_cells(const ZoneParameters&, const std::vector<CompiledLaw>&, ZoneState&, double force,
-                      const double reached[2], double* fields, size_t stride);
+bool write_flow_cells(const ZoneParameters&, const CompiledLaws&, ZoneState&, double force, const double reached[2],
+                      double* fields, size_t stride);
 /// Lengthens a live zone's plastic axial deformation from outside; what that takes from or adds to the elastic energy
 /// is booked as plastic work. The resultants follow at the next evaluation.
 void elongate_zone(const ZoneParameters&, double by, ZoneState&);
@@ -119,10 +119,10 @@ void free_zone(ZoneState&);
 void break_zone(ZoneState&, BreakReason);
 
 /// Largest demand over capacity of a live zone at its last evaluation.
-double calc_utilisation(const ZoneParameters&, const std::vector<CompiledLaw>&, double time, const ZoneState&);
+double calc_utilisation(const ZoneParameters&, const CompiledLaws&, double time, const ZoneState&);
 
 /// Whether a live zone has lost strength: a section shortened to less than 95 % of its compression capacity, or limit
 /// moments below 85 % of those at its first yield (same normal force).
-bool is_softening(const ZoneParameters&, const std::vector<CompiledLaw>&, double time, const ZoneState&);
+bool is_softening(const ZoneParameters&, const CompiledLaws&, double time, const ZoneState&);
 
 }  // namespace topple::mbs

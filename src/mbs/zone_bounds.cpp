@@ -29,8 +29,8 @@ double find_least_moment(const CompiledFamily& family, double from, double to, d
 
 }  // namespace
 
-void find_safe_bounds(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, const Limits& limits,
-                      double normal_force, ZoneState& z) {
+void find_safe_bounds(const ZoneParameters& p, const CompiledLaws& laws, const Limits& limits, double normal_force,
+                      ZoneState& z) {
   const auto law_of = [&](int s) -> const CompiledLaw& {
     return laws[static_cast<size_t>(z.base_law < 0 ? p.law[s] : z.base_law)];
   };
@@ -141,7 +141,7 @@ void write_capacity(const CompiledLaw& law, const ZoneState& z, double whole, do
 
 }  // namespace
 
-bool write_flow_cells(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, ZoneState& z, double force,
+bool write_flow_cells(const ZoneParameters& p, const CompiledLaws& laws, ZoneState& z, double force,
                       const double reached[2], double* out, size_t stride) {
   using namespace kernel;
   const auto law_of = [&](int s) -> const CompiledLaw& {
@@ -196,7 +196,7 @@ bool write_flow_cells(const ZoneParameters& p, const std::vector<CompiledLaw>& l
   return true;
 }
 
-bool write_flow(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, ZoneState& z, double time, double* out) {
+bool write_flow(const ZoneParameters& p, const CompiledLaws& laws, ZoneState& z, double time, double* out) {
   using namespace kernel;
   if (!z.live || !z.has_elastic || z.next_law >= 0 || p.stations == 0 || p.external_axial) return false;
   const Limits limits(laws, p.law[0], z, time);
@@ -245,8 +245,7 @@ bool write_flow(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, Z
   return true;
 }
 
-double calc_utilisation(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, double time,
-                        const ZoneState& z) {
+double calc_utilisation(const ZoneParameters& p, const CompiledLaws& laws, double time, const ZoneState& z) {
   if (!z.live || p.stations == 0) return 0;
   const Limits limits(laws, p.law[0], z, time);
   const auto ratio = [](double demand, double capacity) {
@@ -279,7 +278,7 @@ double calc_utilisation(const ZoneParameters& p, const std::vector<CompiledLaw>&
   return std::max(u, ratio(std::abs(force[3]), limits.torsion()));
 }
 
-bool is_softening(const ZoneParameters& p, const std::vector<CompiledLaw>& laws, double time, const ZoneState& z) {
+bool is_softening(const ZoneParameters& p, const CompiledLaws& laws, double time, const ZoneState& z) {
   if (!z.live || p.stations == 0) return false;
   const Limits limits(laws, p.law[0], z, time);
   const double integrity = limits.integrity(z.shortened);

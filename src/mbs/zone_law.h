@@ -1,9 +1,11 @@
 #pragma once
 /// Laws of zones laid out for lookup: families of limit moments and curves along the axis (docs/theory/zones.md).
 
+#include <initializer_list>
+#include <memory>
 #include <vector>
 
-#include "mbs/model.h"
+#include "mbs/laws.h"
 
 namespace topple::mbs {
 
@@ -36,6 +38,22 @@ struct CompiledLaw {
 };
 
 CompiledLaw compile_law(const ZoneLaw&);
+
+/// Compiled laws by number, shared with the models that have them.
+class CompiledLaws {
+ public:
+  CompiledLaws() = default;
+  CompiledLaws(std::initializer_list<CompiledLaw> laws) {
+    for (const CompiledLaw& law : laws) push_back(law);
+  }
+  size_t size() const { return laws_.size(); }
+  const CompiledLaw& operator[](size_t i) const { return *laws_[i]; }
+  void push_back(CompiledLaw law) { laws_.push_back(std::make_shared<const CompiledLaw>(std::move(law))); }
+  void push_back(std::shared_ptr<const CompiledLaw> law) { laws_.push_back(std::move(law)); }
+
+ private:
+  std::vector<std::shared_ptr<const CompiledLaw>> laws_;
+};
 
 /// Value of a curve, constant beyond its ends; infinity for an empty one.
 double calc_curve(const CompiledCurve&, double x);

@@ -13,7 +13,7 @@ namespace topple::mbs {
 /// The limits in force at a moment in time: those of one law, or two of them blended while a charge takes effect.
 class Limits {
  public:
-  Limits(const std::vector<CompiledLaw>& laws, int law, const ZoneState& z, double time)
+  Limits(const CompiledLaws& laws, int law, const ZoneState& z, double time)
       : from_(laws[static_cast<size_t>(z.base_law < 0 ? law : z.base_law)]), to_(from_) {
     if (z.next_law < 0) return;
     to_ = laws[static_cast<size_t>(z.next_law)];
@@ -94,7 +94,6 @@ inline double raised(double x, double e) { return e == 1.5 ? x * std::sqrt(x) : 
 inline double root_of(double x, double e) { return e == 1.5 ? std::cbrt(x * x) : std::pow(x, 1 / e); }
 
 /// Sets the safe bounds around a normal force [N], an empty range of forces if there are none.
-void find_safe_bounds(const ZoneParameters&, const std::vector<CompiledLaw>&, const Limits&, double normal_force,
-                      ZoneState&);
+void find_safe_bounds(const ZoneParameters&, const CompiledLaws&, const Limits&, double normal_force, ZoneState&);
 
 }  // namespace topple::mbs

@@ -28,10 +28,10 @@ mbs::Model condense(const product::Plan& plan, ModelMap& map, double highest_fre
   return make_condensed_model(plan, default_knowledge(), c, o, known, map);
 }
 
-product::Plan weida() {
+product::Plan weida(const std::string& file = "plan.toml") {
   std::vector<Diagnostic> warnings;
   std::string text;
-  return product::read_plan_file(TOPPLE_SOURCE_DIR "/examples/weida/plan.toml", warnings, text);
+  return product::read_plan_file(TOPPLE_SOURCE_DIR "/examples/weida/" + file, warnings, text);
 }
 
 TEST(Condense, GableFramesOfTheStorehouseAreAlikeAndInnerOnesAre) {
@@ -128,6 +128,24 @@ TEST(Condense, KnownCurvesChangeNoBit) {
   product::Plan other = plan;
   other.concretes[0].fc *= 1.1;
   EXPECT_EQ(mbs::to_json(condense(other, a, 0, &known), {}), mbs::to_json(condense(other, b, 0), {}));
+}
+
+TEST(Condense, SamplesShareTheLawsThatTheirValuesLeaveAsTheyAre) {
+  const product::Plan plan = weida("plan-fuzzy.toml");
+  const KnownCurves known = make_known_curves(plan, default_knowledge(), find(plan));
+  product::Plan other = plan;
+  for (product::Concrete& c : other.concretes)
+    if (c.name == "hinge") c.fc *= 1.1;
+  ModelMap a, b;
+  const mbs::Model one = condense(plan, a, 2000, &known), two = condense(other, b, 2000, &known);
+  ASSERT_EQ(one.laws.size(), two.laws.size());
+  int large = 0, shared = 0;
+  for (size_t i = 0; i < one.laws.size(); ++i) {
+    if (one.laws[i].moment_y.positive.size() + one.laws[i].moment_z.positive.size() < 100) continue;
+    ++large;
+    shared += one.laws.shared(i).identity() == two.laws.shared(i).identity();
+  }
+  EXPECT_GT(2 * shared, large);
 }
 
 TEST(CondensePhysics, FrequencyIsCutWhereItIsAskedFor) {

@@ -78,7 +78,7 @@ struct Reference {
 
 /// A zone alone, with the spring of the elements that carry it: N is prescribed, and the rotation.
 struct Zone {
-  std::vector<mbs::CompiledLaw> laws;
+  mbs::CompiledLaws laws;
   mbs::ZoneParameters p;
   mbs::ZoneState z;
   int axis;  // 4: about y, 5: about z

@@ -179,7 +179,7 @@ TEST_P(EnginesAlikeReference, YieldingZone) {
 TEST_P(EnginesAlikeReference, RupturingZone) {
   NEEDS_ENGINE();
   mbs::Model m = make_hinged_block(30);
-  m.laws[0].rupture_rotation = 0.3;
+  m.laws.edit(0, [](mbs::ZoneLaw& law) { law.rupture_rotation = 0.3; });
   const EngineRun r = compare_with_native(m, 0.8);
   EXPECT_EQ(r.broken, 1);
   EXPECT_LT(r.position.value, 5e-4);  // half a step, 0.05 ms, at 3 m/s and what follows

@@ -26,7 +26,9 @@ std::vector<Variation> make_variations() {
         m.bodies[b].mass *= f;
         m.bodies[b].inertia = f * m.bodies[b].inertia;
       }
-      for (double& x : m.laws[0].moment_z.positive) x *= 1 + 0.1 * i;
+      m.laws.edit(0, [i](ZoneLaw& law) {
+        for (double& x : law.moment_z.positive) x *= 1 + 0.1 * i;
+      });
       m.events[0].time = 0.05 + 0.01 * (i % 3);
       if (i == 4) m.events.clear();  // stands
       if (i == 7) m.gravity.z = -3;

@@ -401,7 +401,7 @@ TEST(Zone, EachStationBreaksAtTheRotationOfItsOwnLaw) {
     ZoneLaw laws[2] = {test::plastic_hinge(1e5), test::plastic_hinge(1e5)};
     laws[0].rupture_rotation = first;
     laws[1].rupture_rotation = second;
-    const std::vector<CompiledLaw> compiled{compile_law(laws[0]), compile_law(laws[1])};
+    const CompiledLaws compiled{compile_law(laws[0]), compile_law(laws[1])};
     const ZoneParameters p = test::make_member(1);
     ZoneState z;
     double broken_at = 0;
@@ -573,9 +573,9 @@ TEST(CheckModel, RefusesLengthsOfRuptureThatAreZero) {
   for (double ZoneLaw::*length : {&ZoneLaw::rupture_rotation, &ZoneLaw::crush_length, &ZoneLaw::rupture_elongation,
                                   &ZoneLaw::slip_rupture, &ZoneLaw::twist_rupture}) {
     Column c = make_column();
-    c.model.laws[0].*length = 0;
+    c.model.laws.edit(0, [length](ZoneLaw& law) { law.*length = 0; });
     EXPECT_THAT(complaint_of([&] { check_model(c.model); }), HasSubstr("rupture must be > 0"));
-    c.model.laws[0].*length = 1e-9;
+    c.model.laws.edit(0, [length](ZoneLaw& law) { law.*length = 1e-9; });
     EXPECT_EQ(complaint_of([&] { check_model(c.model); }), "no complaint");
   }
 }

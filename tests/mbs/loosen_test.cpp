@@ -125,8 +125,10 @@ TEST(LoosenJoint, KeepsTheRotationAndWhatItStores) {
 
 TEST(LoosenJoint, OneThatTurnsFreelyStaysAJoint) {
   Model m = make_falling_block();
-  m.laws[0].moment_z = test::plastic_hinge(1).moment_z;
-  m.laws[0].rupture_rotation = 1e-9;
+  m.laws.edit(0, [](ZoneLaw& law) {
+    law.moment_z = test::plastic_hinge(1).moment_z;
+    law.rupture_rotation = 1e-9;
+  });
   m.bodies[1].w_WB = m.bodies[0].w_WB = {};
   m.bodies[1].w_WB.y = 0.01;  // breaks the hinge before the event
   m.bodies[1].v_WB.x = 0.005;

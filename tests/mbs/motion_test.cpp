@@ -113,7 +113,7 @@ TEST(RotationalElement, TurnsPlasticallyAtItsLimit) {
   // gives way elastically for its first 3e-4 rad, at half the resistance: 1 ms of 200 ms at the full moment, 1 to 3 %
   EXPECT_NEAR(w, 3 * (weight_moment - limit) * 0.2, 0.04 * 3 * (weight_moment - limit) * 0.2);
   // and a limit above the moment holds the rod
-  m.laws[0] = test::plastic_hinge(3 * weight_moment);
+  m.laws.set(0, test::plastic_hinge(3 * weight_moment));
   o.duration = 0.05;
   (void)run(m, o);
   EXPECT_EQ(rotation, 0);

@@ -47,7 +47,7 @@ ZoneParameters make_parameters(int stations = 1, double x = 0) {
 }
 
 struct Walk {
-  std::vector<CompiledLaw> laws;
+  CompiledLaws laws;
   ZoneParameters p;
   ZoneState z;
   double work = 0;
