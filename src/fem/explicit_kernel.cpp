@@ -186,23 +186,37 @@ struct Face {
             hn::Load(d, from + 3 * kLanes)};
   }
 };
+/// Sums of places in the middle of the last step.
+HWY_INLINE Quad take_back(const Quad& place, V half, const Quad& speed) {
+  return {fnma(half, speed.one, place.one), fnma(half, speed.x, place.x), fnma(half, speed.y, place.y),
+          fnma(half, speed.xy, place.xy)};
+}
 /// The face ζ = -1 of a strip's first block.
-HWY_NOINLINE void gather_low(const double* HWY_RESTRICT rows, const std::uint16_t* corners, const Face& low) {
+HWY_NOINLINE void gather_low(const double* HWY_RESTRICT rows, const std::uint16_t* corners, double half,
+                             const Face& low) {
   for (size_t pair = 0; pair < 3; ++pair) {
     const QuadPair face = load_face(rows + 2 * pair, corners);
     low.put(2 * pair, face.first), low.put(2 * pair + 1, face.second);
   }
+  for (size_t axis = 0; axis < 3; ++axis) low.put(axis, take_back(low.get(axis), num(half), low.get(3 + axis)));
 }
-/// A block's modes of a pair of numbers that lie side by side in the rows of nodes: 0 x y, 1 z and speed along x, 2
-/// speeds along y z. `face` is the one ζ = -1 before and ζ = +1 after.
-HWY_INLINE void gather(const double* HWY_RESTRICT rows, const std::uint16_t* corners, size_t pair, const Face& face,
-                       const Gathered& to) {
+/// A block's modes of a pair of numbers that lie side by side in the rows of nodes, in this order: 2 speeds along y z,
+/// 1 z and speed along x, 0 x y. `face` is the one ζ = -1 before and ζ = +1 after.
+///   half  of the last step
+HWY_INLINE void gather(const double* HWY_RESTRICT rows, const std::uint16_t* corners, size_t pair, double half,
+                       const Face& face, const Gathered& to) {
   reread(corners);
-  const QuadPair high = load_face(rows + 2 * pair, corners + 4 * kLanes);
-  to.put(2 * pair, transform(face.get(2 * pair), high.first));
-  face.put(2 * pair, high.first);
-  to.put(2 * pair + 1, transform(face.get(2 * pair + 1), high.second));
-  face.put(2 * pair + 1, high.second);
+  QuadPair high = load_face(rows + 2 * pair, corners + 4 * kLanes);
+  const auto put = [&](size_t number, const Quad& q) HWY_ATTR {
+    to.put(number, transform(face.get(number), q));
+    face.put(number, q);
+  };
+  if (pair == 0) {
+    high.first = take_back(high.first, num(half), face.get(3));
+    high.second = take_back(high.second, num(half), face.get(4));
+  }
+  if (pair == 1) high.first = take_back(high.first, num(half), face.get(5));
+  put(2 * pair, high.first), put(2 * pair + 1, high.second);
 }
 
 /// Derivatives of the volume by the modes but for factors (eq. 3, 4).
@@ -362,21 +376,14 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
   constexpr size_t kSize = size_t{kElementFields} * kLanes;
   for (size_t i = 0; i < kSize; i += 8) hwy::Prefetch(element + 4 * kSize + i);
 
-  // places in the middle of the last step
-  Modes3 x;
-  {
-    const V half = num(0.5 * step.past);
-    const auto back = [&](size_t mode) HWY_ATTR {
-      const V3 to = modes.place(mode), u = modes.speed(mode);
-      return V3{fnma(half, u.x, to.x), fnma(half, u.y, to.y), fnma(half, u.z, to.z)};
-    };
-    x = {back(0), back(1), back(2), back(3), back(4), back(5), back(6)};
-  }
+  const double half = 0.5 * step.past;
+  const Modes3 x{modes.place(0), modes.place(1), modes.place(2), modes.place(3),
+                 modes.place(4), modes.place(5), modes.place(6)};
   const V length_a = dot(x.a, x.a), length_b = dot(x.b, x.b), length_c = dot(x.c, x.c);
   const V bc = mul(length_b, length_c);
   const V all = hn::Div(num(1), mul(length_a, bc));
   const V ia = mul(all, bc), ib = mul(all, mul(length_c, length_a)), ic = mul(all, mul(length_a, length_b));
-  if (HWY_UNLIKELY(!joined)) gather_low(rows, next_corners, face);
+  if (HWY_UNLIKELY(!joined)) gather_low(rows, next_corners, half, face);
   const Gradients g = differentiate(x);
   const V inverse = hn::Div(num(1), g.volume);
 
@@ -385,7 +392,7 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
   Matrix L{scale(va.x, g.a), scale(va.y, g.a), scale(va.z, g.a)};
   add_product(modes.speed(1), g.b, L), add_product(modes.speed(2), g.c, L), add_product(modes.speed(3), g.d, L);
   add_product(modes.speed(4), g.e, L), add_product(modes.speed(5), g.f, L);
-  gather(rows, next_corners, 0, face, ahead);
+  gather(rows, next_corners, 2, half, face, ahead);
   L = {scale(inverse, L.x), scale(inverse, L.y), scale(inverse, L.z)};
   const V trace = add(add(L.x.x, L.y.y), L.z.z);
 
@@ -394,8 +401,8 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
   V sxy = load_field(element, kStress + 3), syz = load_field(element, kStress + 4),
     szx = load_field(element, kStress + 5);
   {
-    const V half = num(0.5 * step.past);
-    const V wxy = mul(half, sub(L.x.y, L.y.x)), wyz = mul(half, sub(L.y.z, L.z.y)), wxz = mul(half, sub(L.x.z, L.z.x));
+    const V wxy = mul(num(half), sub(L.x.y, L.y.x)), wyz = mul(num(half), sub(L.y.z, L.z.y)),
+            wxz = mul(num(half), sub(L.x.z, L.z.x));
     const V a = mul(wxy, sxy), b = mul(wxz, szx), c = mul(wyz, syz);
     const V txy = fma(wxy, sub(syy, sxx), fma(wxz, syz, mul(wyz, szx)));
     const V txz = fma(wxz, sub(szz, sxx), fms(wxy, syz, mul(wyz, sxy)));
@@ -428,7 +435,7 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
     const V x1 = dot(x.a, q1), y1 = mul(ib, dot(x.b, q1)), z1 = mul(ic, dot(x.c, q1));
     if (yields) cap.begin(law, load_field(element, kStrain), sxx, syy, szz, sxy, syz, szx);
     if (yields) cap.take_root(law);
-    gather(rows, next_corners, 1, face, ahead);
+    gather(rows, next_corners, 1, half, face, ahead);
     const V3 q2 = beyond(modes.speed(4), x.e);
     const V x2 = mul(ia, dot(x.a, q2)), y2 = dot(x.b, q2), z2 = mul(ic, dot(x.c, q2));
     s.bending[0] = fma(e, x2, fma(enu, y1, load_field(element, kBending)));
@@ -443,7 +450,7 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
     s.bending[4] = fma(e, y3, fma(enu, z2, load_field(element, kBending + 4)));
     s.bending[5] = fma(e, z2, fma(enu, y3, load_field(element, kBending + 5)));
     s.twist[2] = fma(mu, add(y2, z3), load_field(element, kTwist + 2));
-    gather(rows, next_corners, 2, face, ahead);
+    gather(rows, next_corners, 0, half, face, ahead);
     if (yields) cap.end();
     const V3 q4 = beyond(modes.speed(6), x.g);
     s.corner[0] = fma(mul(E, ia), dot(x.a, q4), load_field(element, kCorner));
@@ -640,6 +647,9 @@ class Box {
   HWY_INLINE void add(size_t k, hn::Vec<Row> place) {
     low_[k] = hn::Min(low_[k], place), high_[k] = hn::Max(high_[k], place);
   }
+  HWY_INLINE void add(size_t k, hn::Vec<Row> low, hn::Vec<Row> high) {
+    low_[k] = hn::Min(low_[k], low), high_[k] = hn::Max(high_[k], high);
+  }
   /// A place of which the numbers have just been written one by one, and cannot be read as a vector without waiting.
   HWY_INLINE void add(const double* place) {
     for (int c = 0; c < 3; ++c) {
@@ -671,7 +681,7 @@ class Box {
 #if HWY_TARGET != HWY_SCALAR
 /// New place of one node that nothing holds. The force comes as vectors of a row, its fourth entry 0.
 HWY_INLINE void move_free(const Motion& motion, double* HWY_RESTRICT node, const hn::Vec<Row>* force,
-                          hn::Vec<Row>* speed, Box& box) {
+                          hn::Vec<Row>* speed, hn::Vec<Row>* place) {
   // the fourth of the speeds is the inverse mass, which stays; the fourth of the places is a speed, written after it
   const Row d;
   const auto kick = hn::Set(d, motion.kick * node[kInverseMass]);
@@ -680,11 +690,33 @@ HWY_INLINE void move_free(const Motion& motion, double* HWY_RESTRICT node, const
         kick, force[c / kRowLanes],
         hn::MulAdd(hn::Load(d, motion.keep + c), hn::LoadU(d, node + kSpeed + c), hn::Load(d, motion.fall + c)));
   for (size_t c = 0; c < 4; c += kRowLanes) {
-    const auto place = hn::MulAdd(hn::Load(d, motion.drift + c), speed[c / kRowLanes], hn::Load(d, node + c));
-    box.add(c / kRowLanes, place);
-    hn::Store(place, d, node + c);
+    place[c / kRowLanes] = hn::MulAdd(hn::Load(d, motion.drift + c), speed[c / kRowLanes], hn::Load(d, node + c));
+    hn::Store(place[c / kRowLanes], d, node + c);
   }
   for (size_t c = 0; c < 4; c += kRowLanes) hn::StoreU(speed[c / kRowLanes], d, node + kSpeed + c);
+}
+HWY_INLINE void move_free(const Motion& motion, double* HWY_RESTRICT node, const hn::Vec<Row>* force,
+                          hn::Vec<Row>* speed, Box& box) {
+  hn::Vec<Row> place[4 / kRowLanes];
+  move_free(motion, node, force, speed, place);
+  for (size_t k = 0; k < 4 / kRowLanes; ++k) box.add(k, place[k]);
+}
+/// The same of neighbours; takes their forces away.
+template <size_t kNodes>
+HWY_INLINE void move_free(const Motion& motion, double* HWY_RESTRICT nodes, double* HWY_RESTRICT forces, Box& box) {
+  const Row d;
+  hn::Vec<Row> place[kNodes][4 / kRowLanes];
+  for (size_t i = 0; i < kNodes; ++i) {
+    hn::Vec<Row> f[4 / kRowLanes], v[4 / kRowLanes];
+    for (size_t c = 0; c < 4; c += kRowLanes) f[c / kRowLanes] = hn::Load(d, forces + 4 * i + c);
+    for (size_t c = 0; c < 4; c += kRowLanes) hn::Store(hn::Zero(d), d, forces + 4 * i + c);
+    move_free(motion, nodes + 8 * i, f, v, place[i]);
+  }
+  for (size_t k = 0; k < 4 / kRowLanes; ++k) {
+    auto low = place[0][k], high = low;
+    for (size_t i = 1; i < kNodes; ++i) low = hn::Min(low, place[i][k]), high = hn::Max(high, place[i][k]);
+    box.add(k, low, high);
+  }
 }
 /// The same of a node that is pushed, or in a relaxation.
 HWY_INLINE void move_pushed(const Motion& motion, double* HWY_RESTRICT node, const double* HWY_RESTRICT force,
@@ -783,6 +815,16 @@ HWY_NOINLINE void move_own_nodes(const StepJob& step, ChunkJob& job) {
     const size_t end = std::min(own, begin + kRun);
     Box box;
     for (size_t i = begin; i < end; ++i, force += 4) {
+#if HWY_TARGET != HWY_SCALAR
+      constexpr size_t kFree = 4;
+      std::uint32_t some = 0;
+      if (i + kFree <= end) std::memcpy(&some, flags + i, kFree);
+      if (HWY_LIKELY(i + kFree <= end && some == 0 && !motion.weighs)) {
+        move_free<kFree>(motion, nodes + 8 * i, force, box);
+        i += kFree - 1, force += 4 * (kFree - 1);
+        continue;
+      }
+#endif
       move_node(step, motion, nodes + 8 * i, force, flags[i], pushes + 4 * i, balance, box);
       for (size_t c = 0; c < 4; c += kRowLanes) hn::Store(hn::Zero(Row()), Row(), force + c);
     }
@@ -809,8 +851,9 @@ void advance_chunk(const StepJob& step, ChunkJob& job) {
   while (first < blocks && live[first] == 0) ++first;
   if (first < blocks) {
     const std::uint16_t* corners = job.corners + first * 8 * kLanes;
-    gather_low(job.own_nodes, corners, face);
-    for (size_t pair = 0; pair < 3; ++pair) gather(job.own_nodes, corners, pair, face, now);
+    const double half = 0.5 * step.past;
+    gather_low(job.own_nodes, corners, half, face);
+    for (const size_t pair : {2, 1, 0}) gather(job.own_nodes, corners, pair, half, face, now);
   }
   for (size_t block = 0; block < blocks; ++block) {
     for (const double* end = ahead + 8 * rows_a_block; ahead != end; ahead += 8) hwy::Prefetch(ahead);
