@@ -523,7 +523,7 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
         for (V& a : s.bending) a = mul(a, keep);
         for (V& a : s.twist) a = mul(a, keep);
         for (V& a : s.corner) a = mul(a, keep);
-        const V more = add(flow, opening);
+        const V more = hn::IfThenElseZero(live, add(flow, opening));
         const V strain = add(load_field(element, kStrain), more);
         const V wear = fma(num(law.compression_rate - law.tension_rate), w, num(law.tension_rate));
         const V damage = fma(more, wear, load_field(element, kDamage));

@@ -135,6 +135,30 @@ TEST(ExplicitHingePhysics, ABeamYieldsAtItsPlasticMoment) {
   }
 }
 
+// A bar that is torn apart has yielded throughout; what is taken out of it keeps the plastic strain it had.
+TEST(ExplicitRemovalPhysics, AnElementThatIsGoneDoesNotYieldOn) {
+  ExplicitModel model;
+  ExplicitMaterial steel = make_explicit_elastic(7850, 30e9, 0.2);
+  steel.yield = {{0, 3e6, 3e6}};
+  model.materials = {steel};
+  model.gravity = {};
+  add_brick(model, {0, 0, 0}, {1.6, 0.2, 0.2}, 8, 1, 1);
+  ExplicitOptions options;
+  options.contact = false;
+  ExplicitSystem system(model, options);
+  std::vector<Vec3> v;
+  for (const Vec3& p : model.nodes) v.push_back({10 * p.x, 0, 0});
+  system.set_velocities(v);
+  ASSERT_EQ(system.advance(1e-3), ExplicitEnding::ReachedTime);
+  const int taken[] = {3};
+  const double strain = system.plastic_strain(3), beside = system.plastic_strain(2);
+  EXPECT_GT(strain, 1e-3);
+  system.remove(taken);
+  ASSERT_EQ(system.advance(3e-3), ExplicitEnding::ReachedTime);
+  EXPECT_EQ(system.plastic_strain(3), strain);
+  EXPECT_GT(system.plastic_strain(2), beside);
+}
+
 /// One element by itself: what the kernel's lanes hold, and (12) to (14) of docs/theory/explicit.md without its
 /// shortcuts.
 struct SampleElement {
