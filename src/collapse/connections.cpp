@@ -368,37 +368,50 @@ void Builder::connect_slab(const GridPoint& at, int index) {
   const Vec3 middle = 0.5 * (m.start + m.end);
   // a strip as a prismatic member, concentrated at its middle; in its plane a deep beam with shear
   const auto join = [&](const std::string& name, int a, int b, const Vec3& p_W, const Mat3& axes, double width,
-                        double span) {
+                        double span, bool has_ends) {
     if (a < 0 || b < 0 || a == b) return;
+    if (!(span > 0)) return complain(index, "no clear span is left between its columns");
     const double EA = rcc.EA * width * kept, EI = rcc.EI * width * kept;
+    const mbs::LawId law = mbs::add_law(model, make_slab_law(rcc, width, kept, name, k));
+    std::vector<mbs::Station> stations{{0, law}};
+    if (has_ends) stations = {{-0.5 * span, law}, {0.5 * span, law}};
     add_element(name, index, a, b, p_W, axes, {EA / span, EA / 2.4 / 1.2 / span, 12 * EI / (span * span * span)},
-                {EI / span, EI / span, EA * width * width / 12 / span},
-                {{0, mbs::add_law(model, make_slab_law(rcc, width, kept, name, k))}});
+                {EI / span, EI / span, EA * width * width / 12 / span}, std::move(stations));
   };
   // on each side a beam carries it, or the two joints at its corners do
   std::array<int, 2> beam{};
   std::array<std::array<int, 2>, 2> corner{};  // [side][x]
-  for (int side : {0, 1}) {
-    const size_t i = static_cast<size_t>(side);
-    const int x_beam = find_at(x_beams, {at.row, at.frame + side, at.storey});
-    beam[i] = x_beam < 0 ? -1 : own_body.at(x_beam);
-    for (int x : {0, 1}) corner[i][static_cast<size_t>(x)] = node_at({at.row + x, at.frame + side, at.storey});
+  std::array<std::array<Vec3, 2>, 2> half{};   // of the joints there
+  for (size_t side : {0UL, 1UL}) {
+    const int frame = at.frame + static_cast<int>(side);
+    const int x_beam = find_at(x_beams, {at.row, frame, at.storey});
+    beam[side] = x_beam < 0 ? -1 : own_body.at(x_beam);
+    for (size_t x : {0UL, 1UL}) {
+      const GridPoint joint{at.row + static_cast<int>(x), frame, at.storey};
+      corner[side][x] = node_at(joint), half[side][x] = half_of_node(joint);
+    }
   }
-  const auto clear = [&](int row) { return half_of_node({row, at.frame, at.storey}).x; };
-  const double width = span_x - clear(at.row) - clear(at.row + 1);
   if (beam[0] >= 0 && beam[1] >= 0) {
-    const Vec3 p_W{m.start.x + clear(at.row) + 0.5 * width, middle.y, middle.z};
-    join(m.name, beam[0], beam[1], p_W, y_beam_axes(), width, span_y);
+    const double width = span_x - half[0][0].x - half[0][1].x;
+    join(m.name, beam[0], beam[1], {m.start.x + half[0][0].x + 0.5 * width, middle.y, middle.z}, y_beam_axes(), width,
+         span_y, false);
     return;
   }
-  for (size_t x : {0UL, 1UL})
+  // between joints it is held at their faces and turns there
+  for (size_t x : {0UL, 1UL}) {
+    const double low = beam[0] >= 0 ? 0 : half[0][x].y, high = beam[1] >= 0 ? 0 : half[1][x].y;
     join(m.name + (x == 0 ? "/y1" : "/y2"), beam[0] >= 0 ? beam[0] : corner[0][x],
-         beam[1] >= 0 ? beam[1] : corner[1][x], {middle.x + (x == 0 ? -0.25 : 0.25) * span_x, middle.y, middle.z},
-         y_beam_axes(), 0.5 * width, span_y);
+         beam[1] >= 0 ? beam[1] : corner[1][x],
+         {middle.x + (x == 0 ? -0.25 : 0.25) * span_x, middle.y + 0.5 * (low - high), middle.z}, y_beam_axes(),
+         0.5 * span_x, span_y - low - high, true);
+  }
   for (size_t side : {0UL, 1UL})
-    if (beam[side] < 0)
+    if (beam[side] < 0) {
+      const double low = half[side][0].x, high = half[side][1].x;
       join(m.name + (side == 0 ? "/x1" : "/x2"), corner[side][0], corner[side][1],
-           {middle.x, middle.y + (side == 0 ? -0.25 : 0.25) * span_y, middle.z}, x_beam_axes(), 0.5 * span_y, span_x);
+           {middle.x + 0.5 * (low - high), middle.y + (side == 0 ? -0.25 : 0.25) * span_y, middle.z}, x_beam_axes(),
+           0.5 * span_y, span_x - low - high, true);
+    }
 }
 
 void Builder::connect_wall(const GridPoint& at, int index, bool along_x) {
