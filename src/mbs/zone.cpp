@@ -334,10 +334,12 @@ struct Evaluation {
         flowed = true;
       }
     } else {
-      double limit = limits.tension(z.elongated);
+      // a hinge that has turned far holds what presses it, and does not pull
+      const bool is_far = reached >= limits.law().rupture_rotation;
+      double limit = is_far ? 0 : limits.tension(z.elongated);
       if (force[0] > limit) {
         const double guess = (force[0] - limit) / k[0];
-        limit = limits.tension(z.elongated + guess);
+        if (!is_far) limit = limits.tension(z.elongated + guess);
         const double elongation = (force[0] - limit) / k[0];
         z.axial += elongation;
         z.elongated += elongation;
@@ -616,12 +618,13 @@ struct Evaluation {
     const double elongation = lengthen(limits, axial);
     for (int s = 0; s < n; ++s) {
       StationState& st = z.station[s];
+      const CompiledLaw& law = limits[s].law();
+      const bool was_far = st.reached >= law.rupture_rotation;
       if (turned[s]) {
         flowed = true;
         st.reached = std::max(st.reached, length_of(phi, s));
       }
-      const CompiledLaw& law = limits[s].law();
-      if (st.reached >= (force[0] < 0 ? law.rupture_rotation_pressed : law.rupture_rotation))
+      if (st.reached >= (force[0] < 0 || was_far ? law.rupture_rotation_pressed : law.rupture_rotation))
         broke = BreakReason::Rotation;
     }
     if (flowed) keep_rotations(limits);

@@ -208,14 +208,23 @@ TEST(Zone, HoldsWhilePressedBeyondItsRupture) {
   EXPECT_NEAR(pressed.z.resultant.c[0], -0.5e6, 1);
   EXPECT_NEAR(pressed.moment_z(), 30e3, 1);  // what the family leaves from 0.05 rad on, between its rows
   EXPECT_NEAR(pressed.z.energy + pressed.z.plastic, pressed.work, 2e-3 * pressed.work);
-  // apart as soon as nothing presses it
-  Walk pulled = pressed;
-  turn_at(pulled, -1e3, 0.17, 1);
-  EXPECT_TRUE(pulled.z.live);
-  turn_at(pulled, 0, 0.17, 1);
-  EXPECT_FALSE(pulled.z.live);
-  EXPECT_EQ(pulled.z.reason, BreakReason::Rotation);
-  EXPECT_NEAR(pulled.z.plastic, pulled.work, 2e-3 * pulled.work);
+  // it does not pull, and bears again when it is pressed again
+  Walk lifted = pressed;
+  const auto lift = [&lifted](double by) {
+    for (int i = 1; i <= 100; ++i) lifted.go(deform(lifted.before.c[0] + by / 100, 0, 0.17), 1);
+  };
+  lift(0.5e6 / kStiff + 2e-3);
+  ASSERT_TRUE(lifted.z.live);
+  EXPECT_EQ(lifted.z.resultant.c[0], 0);
+  EXPECT_NEAR(lifted.z.elongated, 2e-3, 1e-9);
+  lift(-1e-4);
+  EXPECT_NEAR(lifted.z.resultant.c[0], -1e-4 * kStiff, 1);
+  EXPECT_NEAR(lifted.z.energy + lifted.z.plastic, lifted.work, 2e-3 * lifted.work);
+  // apart when it is drawn as far as its bars bear
+  lift(law.rupture_elongation);
+  EXPECT_FALSE(lifted.z.live);
+  EXPECT_EQ(lifted.z.reason, BreakReason::Tension);
+  EXPECT_NEAR(lifted.z.plastic, lifted.work, 2e-3 * lifted.work);
   // or turned to the end
   turn_at(pressed, -0.5e6, 0.19);
   EXPECT_FALSE(pressed.z.live);
