@@ -77,8 +77,9 @@ record::RccState make_state(const nearfield::ZoneInput& in, const nearfield::Fib
   out.rotation = at.rotation, out.moment = at.moment;
   out.eps_0 = c.eps_0[i] + s * (c.eps_0[j] - c.eps_0[i]);
   out.curvature = c.kappa[i] + s * (c.kappa[j] - c.kappa[i]);
-  nearfield::find_equilibrium(fibres, c.N, out.curvature, out.eps_0);
-  const nearfield::SectionState state = nearfield::make_section_state(in, fibres, c.axis, out.eps_0, out.curvature);
+  nearfield::find_equilibrium(fibres, c.N, out.curvature, out.eps_0, c.bars[i]);
+  const nearfield::SectionState state =
+      nearfield::make_section_state(in, fibres, c.axis, out.eps_0, out.curvature, c.bars[i]);
   for (const auto& l : state.layers)
     out.layers.push_back({l.from, l.to, l.core_breadth, l.cover_breadth, l.strain, l.core_stress, l.cover_stress,
                           nearfield::name_of(l.core), nearfield::name_of(l.cover)});
@@ -221,7 +222,8 @@ record::RccReport make_rcc_report(const nearfield::ZoneInput& in, const nearfiel
   r.not_modelled = {
       "Slip of bars and their anchorage beyond the zone: bond is perfect.",
       "Shear deformation, and loss of shear strength with rotation; shear and torsion are limits of their own.",
-      "Stresses follow the envelopes: fibres that unload while the rotation rises are taken as never loaded.",
+      "Concrete follows its envelope: layers that unload while the rotation rises are taken as never loaded. Bars "
+      "remember.",
       "Creep, shrinkage, corrosion, rate of loading and heat."};
   return r;
 }

@@ -27,7 +27,6 @@ const std::map<std::string, Field>& fields() {
       {"zone.biaxial_exponent", &Knowledge::zone_biaxial_exponent},
       {"zone.damping_ratio", &Knowledge::zone_damping_ratio},
       {"zone.elongation_share", &Knowledge::zone_elongation_share},
-      {"zone.elongation_share_panel", &Knowledge::zone_elongation_share_panel},
       {"slab.elongation_lengths", &Knowledge::slab_elongation_lengths},
       {"wall.stiffness_share", &Knowledge::wall_stiffness_share},
       {"wall.axial_share", &Knowledge::wall_axial_share},
@@ -103,7 +102,7 @@ Knowledge read_knowledge(const std::string& text, const std::string& name) {
       continue;
     }
     seen[rule.id] = true;
-    const bool may_be_zero = rule.id.rfind("zone.elongation_share", 0) == 0;
+    const bool may_be_zero = rule.id == "zone.elongation_share";
     if (!entry.contains("value") || !entry["value"].is_number() || !std::isfinite(entry["value"].get<double>()) ||
         entry["value"].get<double>() < 0 || (entry["value"].get<double>() == 0 && !may_be_zero)) {
       complain("rule \"" + rule.id + "\" needs a value " + (may_be_zero ? ">= 0" : "> 0"));

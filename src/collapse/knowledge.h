@@ -17,7 +17,7 @@ struct Rule {
 /// The rules' values under the names of their ids, `.` written as `_`.
 struct Knowledge {
   double zone_length_by_depth, zone_length_by_span, zone_length_by_bar, zone_length_at_most;
-  double zone_elongation_share, zone_elongation_share_panel;
+  double zone_elongation_share;
   double zone_rupture_rotation, zone_rupture_rotation_pressed, zone_slip_softening, zone_slip_rupture,
       zone_twist_rupture, zone_biaxial_exponent;
   double zone_damping_ratio;

@@ -13,9 +13,6 @@ namespace topple::collapse {
 
 namespace {
 
-/// Sections longer than this share of their thickness are walls (EN 1992-1-1, 5.3.1 (7)).
-constexpr double kWallAspect = 4;
-
 /// Limit moment and plastic elongation against plastic rotation at one normal force.
 struct Row {
   std::vector<double> rotation, moment, elongation;
@@ -383,7 +380,7 @@ mbs::ZoneLaw make_zone_law(const nearfield::Rcc& rcc, double EI_y, double EI_z, 
     law.moment_z = law.moment_y;
   else if (bending != Bending::Y)
     law.moment_z = make_family(rcc.z_pos, rcc.z_neg, EI_z, rcc.length, k.zone_rupture_rotation, begin);
-  const double share = rcc.aspect > kWallAspect ? k.zone_elongation_share_panel : k.zone_elongation_share;
+  const double share = k.zone_elongation_share;
   for (mbs::MomentFamily* f : {&law.moment_y, &law.moment_z})
     for (std::vector<double>* u : {&f->elongation_positive, &f->elongation_negative}) {
       if (share == 0) u->clear();

@@ -53,31 +53,17 @@ Steel make_steel(const SteelInput& in) {
 }
 
 SteelResponse advance(const Steel& s, SteelState& state, double eps) {
+  const SteelResponse out = calc_response(s, state, eps);
   if (state.ruptured || eps > s.eps_u) {
     state.ruptured = true;
-    return {0, 0};
+    return out;
   }
-  // Return map with linear kinematic hardening: modulus H gives the slope `hardening` to the stress-strain line.
+  // Flow of linear kinematic hardening; what buckling takes from the stress becomes plastic strain too.
   const double H = s.hardening * s.Es / (s.Es - s.hardening);
-  double stress = s.Es * (eps - state.plastic), tangent = s.Es;
-  const double trial = stress - state.back, excess = std::abs(trial) - s.fy;
-  if (excess > 0) {
-    const double flow = excess / (s.Es + H), sign = trial > 0 ? 1 : -1;
-    state.plastic += sign * flow;
-    state.back += sign * H * flow;
-    stress -= sign * s.Es * flow;
-    tangent = s.hardening;
-  }
-  // Buckling: no more compression than the envelope's at this strain; what is missing becomes plastic strain.
-  if (-eps > s.eps_y && stress < 0) {
-    const SteelResponse limit = calc_envelope(s, eps);
-    if (stress < limit.stress) {
-      stress = limit.stress;
-      tangent = limit.tangent;
-      state.plastic = eps - stress / s.Es;
-    }
-  }
-  return {stress, tangent};
+  const double elastic = s.Es * (eps - state.plastic), trial = elastic - state.back, excess = std::abs(trial) - s.fy;
+  if (excess > 0) state.back += (trial > 0 ? 1 : -1) * H * excess / (s.Es + H);
+  if (out.stress != elastic) state.plastic = eps - out.stress / s.Es;
+  return out;
 }
 
 }  // namespace topple::material

@@ -35,34 +35,30 @@ struct SteelResponse {
   double stress = 0, tangent = 0;
 };
 
+/// Largest compressive stress at a strain, a magnitude, and its growth with the shortening: the strength, Euler and
+/// Johnson, then Dhakal & Maekawa.
+inline SteelResponse calc_compression_limit(const Steel& s, double eps) {
+  const double e = -eps, most = s.fu < s.buckling_stress ? s.fu : s.buckling_stress;
+  if (!(e > s.eps_y)) return {most, 0};
+  // linear to (ε*, σ*), then down to the residual
+  SteelResponse limit{s.residual, 0};
+  if (e <= s.eps_star)
+    limit = {s.fy + s.slope_star * (e - s.eps_y), s.slope_star};
+  else if (e < s.eps_residual)
+    limit = {s.stress_star - 0.02 * s.Es * (e - s.eps_star), -0.02 * s.Es};
+  return limit.stress < most ? limit : SteelResponse{most, 0};
+}
+
 /// Envelope of monotonic loading: no history.
 inline SteelResponse calc_envelope(const Steel& s, double eps) {
-  if (eps >= 0) {
-    if (eps <= s.eps_y) return {s.Es * eps, s.Es};
-    if (eps > s.eps_u) return {0, 0};
-    return {s.fy + s.hardening * (eps - s.eps_y), s.hardening};
-  }
-  const double e = -eps;
-  double stress = s.Es * e, tangent = s.Es;
-  if (e > s.eps_y) stress = s.fy + s.hardening * (e - s.eps_y), tangent = s.hardening;
-  if (stress > s.fu) stress = s.fu, tangent = 0;
-  if (stress > s.buckling_stress) stress = s.buckling_stress, tangent = 0;
-  if (e > s.eps_y) {
-    // Dhakal & Maekawa: linear to (ε*, σ*), then down to the residual.
-    double limit, slope;
-    if (e <= s.eps_star) {
-      slope = s.slope_star;
-      limit = s.fy + slope * (e - s.eps_y);
-    } else if (e < s.eps_residual) {
-      slope = -0.02 * s.Es;
-      limit = s.stress_star + slope * (e - s.eps_star);
-    } else {
-      slope = 0;
-      limit = s.residual;
-    }
-    if (limit < stress) stress = limit, tangent = slope;
-  }
-  return {-stress, tangent};
+  if (eps > s.eps_u) return {0, 0};
+  const double e = eps < 0 ? -eps : eps;
+  SteelResponse out{s.Es * e, s.Es};
+  if (e > s.eps_y) out = {s.fy + s.hardening * (e - s.eps_y), s.hardening};
+  if (eps >= 0) return out;
+  const SteelResponse limit = calc_compression_limit(s, eps);
+  if (limit.stress < out.stress) out = limit;
+  return {-out.stress, out.tangent};
 }
 
 /// History of one bar.
@@ -72,7 +68,21 @@ struct SteelState {
   bool ruptured = false;
 };
 
-/// Stress at a strain after a history; the state moves on.
+/// Stress at a strain that is reached on a straight way from a history. Of a bar never loaded: calc_envelope.
+inline SteelResponse calc_response(const Steel& s, const SteelState& state, double eps) {
+  if (state.ruptured || eps > s.eps_u) return {0, 0};
+  double stress = s.Es * (eps - state.plastic), tangent = s.Es;
+  const double trial = stress - state.back, excess = (trial < 0 ? -trial : trial) - s.fy;
+  if (excess > 0) {
+    const double limit = s.fy + s.hardening / s.Es * excess;
+    stress = state.back + (trial > 0 ? limit : -limit), tangent = s.hardening;
+  }
+  if (stress >= 0) return {stress, tangent};
+  const SteelResponse limit = calc_compression_limit(s, eps);
+  return -stress > limit.stress ? SteelResponse{-limit.stress, limit.tangent} : SteelResponse{stress, tangent};
+}
+
+/// The same; the state moves on.
 SteelResponse advance(const Steel&, SteelState&, double eps);
 
 }  // namespace topple::material

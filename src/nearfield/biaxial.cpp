@@ -37,7 +37,7 @@ ObliquePeak find_oblique_peak(const ZoneInput& in, double angle, double N) {
   const auto peak = std::max_element(m.moment.begin(), m.moment.end());
   const auto j = static_cast<size_t>(peak - m.moment.begin());
   if (j >= m.eps_0.size() || !(*peak > 0)) return {};
-  return {*peak, calc_cross_moment(f, m.eps_0[j], m.origin + kappa[j])};
+  return {*peak, calc_cross_moment(f, m.eps_0[j], m.origin + kappa[j], m.bars_at(j))};
 }
 
 BiaxialPoint make_point(double angle, double N, const ObliquePeak& peak, double peak_y, double peak_z) {

@@ -29,7 +29,7 @@ std::vector<double> make_rotations(double first, double yield, double last) {
 
 std::vector<double> make_forces(double crushing, double rupture) {
   std::vector<double> out;
-  for (double share : {1.0, 0.97, 0.9, 0.8, 0.7, 0.6, 0.5, 0.45, 0.4, 0.35, 0.3, 0.2, 0.1})
+  for (double share : {1.0, 0.97, 0.9, 0.8, 0.7, 0.6, 0.5, 0.45, 0.4, 0.35, 0.3, 0.2, 0.1, 0.05})
     out.push_back(-share * crushing);
   for (double share : {0.0, 0.4, 0.75, 1.0}) out.push_back(share * rupture);
   return out;

@@ -204,7 +204,15 @@ Fibres make_fibres(const ZoneInput& in, double angle) {
   return out;
 }
 
-double calc_cross_moment(const Fibres& f, double eps_0, double kappa) {
+namespace {
+
+material::SteelResponse calc_bar(const Fibres& f, const BarStates& bars, size_t i, double eps) {
+  return material::calc_response(f.bar_law[i], bars.empty() ? material::SteelState{} : bars[i], eps);
+}
+
+}  // namespace
+
+double calc_cross_moment(const Fibres& f, double eps_0, double kappa, const BarStates& bars) {
   double M = 0;
   for (size_t i = 0; i < f.at.size(); ++i) {
     const double eps = eps_0 + kappa * f.at[i];
@@ -214,7 +222,7 @@ double calc_cross_moment(const Fibres& f, double eps_0, double kappa) {
   const bool displaces = has_concrete(f);
   for (size_t i = 0; i < f.bar_at.size(); ++i) {
     const double eps = eps_0 + kappa * f.bar_at[i];
-    double stress = material::calc_envelope(f.bar_law[i], eps).stress;
+    double stress = calc_bar(f, bars, i, eps).stress;
     if (displaces) stress -= material::calc_envelope(f.core, eps).stress;
     M += f.bar_area[i] * f.bar_across[i] * stress;
   }
@@ -223,7 +231,7 @@ double calc_cross_moment(const Fibres& f, double eps_0, double kappa) {
 
 bool has_concrete(const Fibres& f) { return !f.at.empty() && f.core_area[f.at.size() / 2] > 0; }
 
-Resultants calc_resultants(const Fibres& f, double eps_0, double kappa) {
+Resultants calc_resultants(const Fibres& f, double eps_0, double kappa, const BarStates& bars) {
   Resultants r;
   const auto add = [&](double at, double force, double stiffness) {
     r.N += force, r.M += force * at;
@@ -245,7 +253,7 @@ Resultants calc_resultants(const Fibres& f, double eps_0, double kappa) {
   const bool displaces = has_concrete(f);
   for (size_t i = 0; i < rows; ++i) {
     const double eps = eps_0 + kappa * f.bar_at[i];
-    const material::SteelResponse s = material::calc_envelope(f.bar_law[i], eps);
+    const material::SteelResponse s = calc_bar(f, bars, i, eps);
     double stress = s.stress, tangent = s.tangent;
     if (displaces) {  // the bar stands where the layers have counted concrete
       const material::Response a = material::calc_envelope(f.core, eps);
@@ -342,9 +350,17 @@ bool find(const PackedSection& f, const Search& search, double kappa, double& ep
 
 }  // namespace
 
-bool find_equilibrium(const Fibres& f, double N, double kappa, double& eps_0) {
+bool find_equilibrium(const Fibres& f, double N, double kappa, double& eps_0, const BarStates& bars) {
   Resultants r;
-  return find(pack_section(f), {N, 1e-9 * calc_force_scale(f)}, kappa, eps_0, r);
+  PackedSection packed = pack_section(f);
+  set_bars(packed, bars.data(), bars.size());
+  return find(packed, {N, 1e-9 * calc_force_scale(f)}, kappa, eps_0, r);
+}
+
+BarStates March::bars_at(size_t point) const {
+  const size_t rows = bars.size() / eps_0.size();
+  const auto first = bars.begin() + static_cast<std::ptrdiff_t>(point * rows);
+  return {first, first + static_cast<std::ptrdiff_t>(rows)};
 }
 
 Peak find_crushing(const Fibres& f) {
@@ -377,7 +393,7 @@ March march_curvature(const Fibres& f, double N, int direction, const std::vecto
   March out;
   out.moment.assign(kappa.size(), 0.0);
   const Search search{N, 1e-7 * calc_force_scale(f)};
-  const PackedSection packed = pack_section(f);
+  PackedSection packed = pack_section(f);
   double eps_0 = 0;
   Resultants r;
   if (!find(packed, search, 0, eps_0, r)) return out;
@@ -402,8 +418,17 @@ March march_curvature(const Fibres& f, double N, int direction, const std::vecto
 
   out.origin = origin;
   out.eps_0.reserve(kappa.size());
-  out.eps_0.push_back(eps_0);
-  out.last = 0;
+  const size_t rows = f.bar_at.size();
+  out.bars.reserve(kappa.size() * rows);
+  BarStates bars(rows);
+  const auto accept = [&](double e, double k) {
+    out.eps_0.push_back(e);
+    ++out.last;
+    for (size_t i = 0; i < rows; ++i) material::advance(f.bar_law[i], bars[i], e + k * f.bar_at[i]);
+    set_bars(packed, bars.data(), rows);
+    out.bars.insert(out.bars.end(), bars.begin(), bars.end());
+  };
+  accept(eps_0, origin);
 
   // First yield: steel in tension, or the compressive strain of the peak at the edge.
   const auto yields = [&](double e, double k) {
@@ -421,8 +446,7 @@ March march_curvature(const Fibres& f, double N, int direction, const std::vecto
     if (r.dN > 0) e += ahead * (slope + (j > 1 ? 0.5 * ahead * (slope - previous_slope) / previous_step : 0));
     if (!find(packed, search, k, e, r)) break;
     out.moment[j] = std::max(0.0, direction * r.M);
-    out.last = static_cast<int>(j);
-    out.eps_0.push_back(e);
+    accept(e, k);
     if (!yielded && yields(e, k)) {
       // Bisection between the last two points, the strain taken linearly.
       double low = 0, high = 1;

@@ -40,15 +40,18 @@ Fibres make_fibres(const ZoneInput&, Axis);
 /// The same for bending about an axis in the section at `angle` from y towards z: `at` = z cos - y sin, in strips along
 /// the axis. Angle 0 bends about y; π/2 about z, where a positive curvature pulls at -y. Throws InputError.
 Fibres make_fibres(const ZoneInput&, double angle);
+/// Histories of the rows of bars (R); none: never loaded.
+using BarStates = std::vector<material::SteelState>;
+
 /// Moment about the axis at a right angle to the bending axis, ∫ σ across dA, of a section at an angle [N·m].
-double calc_cross_moment(const Fibres&, double eps_0, double kappa);
+double calc_cross_moment(const Fibres&, double eps_0, double kappa, const BarStates& = {});
 
 /// Resultants at the mean strain ε0 and the curvature κ.
-Resultants calc_resultants(const Fibres&, double eps_0, double kappa);
+Resultants calc_resultants(const Fibres&, double eps_0, double kappa, const BarStates& = {});
 
 /// Mean strain at which the section carries N at curvature κ, searched from `eps_0` towards equilibrium, as a section
 /// under a constant force would move. False: no equilibrium on that way; the section can no longer carry N.
-bool find_equilibrium(const Fibres&, double N, double kappa, double& eps_0);
+bool find_equilibrium(const Fibres&, double N, double kappa, double& eps_0, const BarStates& = {});
 
 /// One march at constant N from M = 0 on.
 struct March {
@@ -57,8 +60,11 @@ struct March {
   double yield_kappa = 0, yield_moment = 0;
   double origin = 0;          // curvature at M = 0; curvatures count from it, in the direction of the march [1/m]
   std::vector<double> eps_0;  // mean strain at each curvature held (last + 1)
+  BarStates bars;             // histories at each curvature held (last + 1 times R)
+
+  BarStates bars_at(size_t point) const;
 };
-/// `kappa` rises from 0; direction +1 or -1.
+/// `kappa` rises from 0; direction +1 or -1. Bars remember what they have come through on the way, concrete does not.
 March march_curvature(const Fibres&, double N, int direction, const std::vector<double>& kappa);
 
 /// Largest compressive force at no curvature (magnitude, positive) and the strain there (magnitude).

@@ -28,12 +28,14 @@ ConcreteCondition judge(const material::Concrete& c, double strain, double stres
   return -stress < 0.2 * c.fc ? ConcreteCondition::Crushed : ConcreteCondition::Crushing;
 }
 
-BarCondition judge(const material::Steel& s, double strain) {
-  if (strain > s.eps_u) return BarCondition::Torn;
-  if (strain > s.eps_y) return BarCondition::YieldsInTension;
-  if (-strain > std::min(s.eps_star, s.buckling_stress / s.Es)) return BarCondition::Buckled;
-  if (-strain > s.eps_y) return BarCondition::YieldsInCompression;
-  return BarCondition::Elastic;
+BarCondition judge(const material::Steel& s, const material::SteelState& state, double strain) {
+  if (state.ruptured || strain > s.eps_u) return BarCondition::Torn;
+  const double trial = s.Es * (strain - state.plastic) - state.back, flows = s.fy * (1 - 1e-9);
+  if (trial > flows) return BarCondition::YieldsInTension;
+  const bool shortened = -strain > std::min(s.eps_star, s.buckling_stress / s.Es);
+  if (shortened && trial < 0) return BarCondition::Buckled;
+  if (trial < -flows) return BarCondition::YieldsInCompression;
+  return state.plastic == 0 ? BarCondition::Elastic : BarCondition::Yielded;
 }
 
 }  // namespace
@@ -66,16 +68,18 @@ MomentCurve make_moment_curve(const Fibres& fibres, Axis axis, double N, int dir
     out.moment.push_back(march.moment[j]);
     out.eps_0.push_back(march.eps_0[j]);
     out.kappa.push_back(march.origin + side * kappa[j]);
+    out.bars.push_back(march.bars_at(j));
   }
   out.yield_rotation = march.yield_kappa * length;
   out.yield_moment = march.yield_moment;
   out.loses_force = held < rotation.size();
   if (out.loses_force) {  // the last equilibrium lies between two rotations of the grid
     double low = out.rotation.back(), high = rotation[held], eps_0 = out.eps_0.back();
+    BarStates bars = out.bars.back();
     while (high - low > 1e-3 * high) {
       const double middle = 0.5 * (low + high), k = march.origin + side * middle / length;
       double e = eps_0;
-      if (!find_equilibrium(fibres, N, k, e)) {
+      if (!find_equilibrium(fibres, N, k, e, bars)) {
         high = middle;
         continue;
       }
@@ -84,9 +88,10 @@ MomentCurve make_moment_curve(const Fibres& fibres, Axis axis, double N, int dir
     if (low > out.rotation.back()) {
       const double k = march.origin + side * low / length;
       out.rotation.push_back(low);
-      out.moment.push_back(std::max(0.0, side * calc_resultants(fibres, eps_0, k).M));
+      out.moment.push_back(std::max(0.0, side * calc_resultants(fibres, eps_0, k, bars).M));
       out.eps_0.push_back(eps_0);
       out.kappa.push_back(k);
+      out.bars.push_back(bars);
     }
   }
   out.carried_to = out.rotation.back();
@@ -94,6 +99,7 @@ MomentCurve make_moment_curve(const Fibres& fibres, Axis axis, double N, int dir
   for (size_t j = peak + 1; j < out.rotation.size(); ++j) {
     if (out.moment[j] > 0) continue;
     for (auto* list : {&out.rotation, &out.moment, &out.eps_0, &out.kappa}) list->resize(j + 1);
+    out.bars.resize(j + 1);
     break;
   }
   for (size_t j = 1; j < out.rotation.size(); ++j) {
@@ -162,7 +168,8 @@ Interaction make_interaction(const Fibres& fibres, Axis axis, int direction, con
   return out;
 }
 
-SectionState make_section_state(const ZoneInput& in, const Fibres& fibres, Axis axis, double eps_0, double kappa) {
+SectionState make_section_state(const ZoneInput& in, const Fibres& fibres, Axis axis, double eps_0, double kappa,
+                                const BarStates& bars) {
   SectionState out;
   out.eps_0 = eps_0, out.kappa = kappa;
   const product::Section& s = in.section;
@@ -190,8 +197,9 @@ SectionState make_section_state(const ZoneInput& in, const Fibres& fibres, Axis 
     size_t row = 0;
     while (row + 1 < fibres.bar_at.size() && std::abs(fibres.bar_at[row] - at) >= 1e-9) ++row;
     b.strain = eps_0 + kappa * at;
-    b.stress = material::calc_envelope(fibres.bar_law[row], b.strain).stress;
-    b.condition = judge(fibres.bar_law[row], b.strain);
+    const material::SteelState state = bars.empty() ? material::SteelState{} : bars[row];
+    b.stress = material::calc_response(fibres.bar_law[row], state, b.strain).stress;
+    b.condition = judge(fibres.bar_law[row], state, b.strain);
     out.bars.push_back(b);
   }
   return out;
@@ -223,6 +231,8 @@ const char* name_of(BarCondition c) {
       return "yields in tension";
     case BarCondition::YieldsInCompression:
       return "yields in compression";
+    case BarCondition::Yielded:
+      return "has yielded";
     case BarCondition::Buckled:
       return "buckled";
     case BarCondition::Torn:

@@ -21,6 +21,7 @@ struct MomentCurve {
   double length = 0;                            // of the zone [m]
   std::vector<double> rotation, moment;         // [rad], [N·m] (J); none: N cannot be carried
   std::vector<double> eps_0, kappa;             // the section at each point [-], [1/m] (J)
+  std::vector<BarStates> bars;                  // histories of its rows of bars (J)
   double yield_rotation = 0, yield_moment = 0;  // as in MomentFamily
   bool loses_force = false;                     // beyond `carried_to` N cannot be carried
   double carried_to = 0;  // last rotation at which N is carried; beyond the last point if no moment was left [rad]
@@ -54,7 +55,7 @@ struct Interaction {
 Interaction make_interaction(const Fibres&, Axis, int direction, const MomentFamily&, double length, int count);
 
 enum class ConcreteCondition { Uncracked, Cracked, Open, Compressed, Crushing, Crushed };
-enum class BarCondition { Elastic, YieldsInTension, YieldsInCompression, Buckled, Torn };
+enum class BarCondition { Elastic, YieldsInTension, YieldsInCompression, Yielded, Buckled, Torn };
 
 /// The section at one point of a curve. Places along the strain gradient: z for bending about y, y for bending about z.
 struct SectionState {
@@ -75,8 +76,9 @@ struct SectionState {
   std::vector<BarState> bars;  // as in the section
 };
 /// Open: the crack carries no more than a hundredth of f_ct. Crushing: beyond the strain of the peak; crushed: below a
-/// fifth of the strength.
-SectionState make_section_state(const ZoneInput&, const Fibres&, Axis, double eps_0, double kappa);
+/// fifth of the strength. Yielded: a bar that has yielded and is elastic again.
+SectionState make_section_state(const ZoneInput&, const Fibres&, Axis, double eps_0, double kappa,
+                                const BarStates& = {});
 
 const char* name_of(ConcreteCondition);
 const char* name_of(BarCondition);

@@ -121,7 +121,6 @@ Rcc make_rcc(const ZoneInput& in) {
   const Fibres about_y = make_fibres(in, Axis::Y), about_z = make_fibres(in, Axis::Z);
   Rcc out;
   out.length = in.length;
-  out.aspect = std::max(in.section.width, in.section.height) / std::min(in.section.width, in.section.height);
 
   double area = 0;
   for (size_t i = 0; i < about_y.at.size(); ++i) {

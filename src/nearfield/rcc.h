@@ -60,7 +60,6 @@ struct Rcc {
   double calc_EI_effective_y(double N) const;
   double calc_EI_effective_z(double N) const;
   double length = 0;
-  double aspect = 1;  // longer over shorter side of the section
 };
 
 /// Curves of an intact or prepared zone. Throws InputError for sections that cannot be computed, and for a length at or

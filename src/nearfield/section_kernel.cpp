@@ -32,6 +32,8 @@ enum SteelField : size_t {
   kSlopeStar,
   kEpsResidual,
   kResidual,
+  kPlastic,
+  kBack,
   kSteelFields
 };
 }  // namespace topple::nearfield::kernel
@@ -118,32 +120,33 @@ HWY_INLINE Stress<D> calc_concrete(D d, const material::Concrete& c, hn::Vec<D> 
   return out;
 }
 
-/// material::calc_envelope of a row of bars.
+/// material::calc_response of a row of bars.
 template <class D>
 HWY_INLINE Stress<D> calc_steel(D d, const double* row, hn::Vec<D> eps) {
   const auto field = [&](SteelField f) { return hn::LoadU(d, row + f * kRow); };
   const auto zero = hn::Zero(d);
-  const auto e = hn::Abs(eps), eps_y = field(kEpsY), fy = field(kFy), hardening = field(kHardening);
-  const auto beyond = hn::Sub(e, eps_y);
-  const auto flows = hn::Gt(beyond, zero), pulled = hn::Ge(eps, zero);
-  auto stress = hn::IfThenElse(flows, hn::Add(fy, hn::Mul(hardening, beyond)), hn::Mul(field(kEs), e));
-  auto tangent = hn::IfThenElse(flows, hardening, field(kEs));
+  const auto Es = field(kEs), fy = field(kFy), hardening = field(kHardening), back = field(kBack);
+  auto stress = hn::Mul(Es, hn::Sub(eps, field(kPlastic))), tangent = Es;
+  const auto trial = hn::Sub(stress, back), excess = hn::Sub(hn::Abs(trial), fy);
+  const auto flows = hn::Gt(excess, zero);
+  const auto bound = hn::Add(fy, hn::Mul(hn::Div(hardening, Es), excess));
+  stress = hn::IfThenElse(flows, hn::Add(back, hn::CopySign(bound, trial)), stress);
+  tangent = hn::IfThenElse(flows, hardening, tangent);
   // compression: the strength, Euler and Johnson, Dhakal & Maekawa
+  const auto e = hn::Neg(eps), star = field(kEpsStar), eps_y = field(kEpsY);
   auto limit = hn::Min(field(kFu), field(kBuckling)), slope = zero;
-  const auto star = field(kEpsStar), end = field(kEpsResidual);
-  const auto before = hn::Le(e, star), falls = hn::Lt(e, end);
-  const auto fall_slope = hn::Mul(hn::Set(d, -0.02), field(kEs));
+  const auto before = hn::Le(e, star), falls = hn::Lt(e, field(kEpsResidual));
+  const auto fall_slope = hn::Mul(hn::Set(d, -0.02), Es);
   const auto down = hn::IfThenElse(
-      before, hn::Add(fy, hn::Mul(field(kSlopeStar), beyond)),
+      before, hn::Add(fy, hn::Mul(field(kSlopeStar), hn::Sub(e, eps_y))),
       hn::IfThenElse(falls, hn::Add(field(kStressStar), hn::Mul(fall_slope, hn::Sub(e, star))), field(kResidual)));
   const auto down_slope = hn::IfThenElse(before, field(kSlopeStar), hn::IfThenElse(falls, fall_slope, zero));
-  const auto steeper = hn::And(flows, hn::Lt(down, limit));
+  const auto steeper = hn::And(hn::Gt(e, eps_y), hn::Lt(down, limit));
   limit = hn::IfThenElse(steeper, down, limit), slope = hn::IfThenElse(steeper, down_slope, slope);
-  const auto caps = hn::AndNot(pulled, hn::Lt(limit, stress));
-  stress = hn::IfThenElse(caps, limit, stress), tangent = hn::IfThenElse(caps, slope, tangent);
-  const auto broken = hn::And(pulled, hn::Gt(e, field(kEpsU)));
-  stress = hn::IfThenElse(broken, zero, stress), tangent = hn::IfThenElse(broken, zero, tangent);
-  return {hn::IfThenElse(pulled, stress, hn::Neg(stress)), tangent};
+  const auto caps = hn::Gt(hn::Neg(stress), hn::Max(limit, zero));
+  stress = hn::IfThenElse(caps, hn::Neg(limit), stress), tangent = hn::IfThenElse(caps, slope, tangent);
+  const auto broken = hn::Gt(eps, field(kEpsU));
+  return {hn::IfThenElse(broken, zero, stress), hn::IfThenElse(broken, zero, tangent)};
 }
 
 /// Sums over the eight places of a row, held in as many vectors as that takes.
@@ -266,11 +269,23 @@ PackedSection pack_section(const Fibres& f) {
                                           s.stress_star,
                                           s.slope_star,
                                           s.eps_residual,
-                                          s.residual};
+                                          s.residual,
+                                          0,
+                                          0};
       for (size_t k = 0; k < kSteelFields; ++k) out.data[begin + k * kRow + l] = field[k];
     }
   }
   return out;
+}
+
+void set_bars(PackedSection& s, const material::SteelState* bars, size_t count) {
+  using namespace kernel;
+  double* rows = s.data.data() + (s.core_rows + s.cover_rows) * 2 * kRow;
+  for (size_t i = 0; i < count; ++i) {
+    double* field = rows + i / kRow * kSteelFields * kRow + i % kRow;
+    field[kPlastic * kRow] = bars[i].plastic, field[kBack * kRow] = bars[i].back;
+    if (bars[i].ruptured) field[kArea * kRow] = 0;
+  }
 }
 
 Resultants calc_resultants(const PackedSection& s, double eps_0, double kappa) {

@@ -20,6 +20,8 @@ struct PackedSection {
 };
 
 PackedSection pack_section(const Fibres&);
+/// Gives the bars their histories; those that have torn lose their area. States of the section's rows of bars (R).
+void set_bars(PackedSection&, const material::SteelState* bars, size_t count);
 
 /// As calc_resultants of the section that was packed, to round-off.
 Resultants calc_resultants(const PackedSection&, double eps_0, double kappa);

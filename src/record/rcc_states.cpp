@@ -36,6 +36,7 @@ void draw_bar(Drawing& d, Dot at, double radius, const std::string& condition) {
     d.circle(at, radius, Ink::BarCompression, Ink::Text);
   } else {
     d.circle(at, radius, Ink::Panel, Ink::Text);
+    if (condition == "has yielded") d.circle(at, 0.5 * radius, Ink::BarTension);
   }
   const double a = 0.7 * radius;
   if (condition == "torn" || condition == "buckled")
@@ -203,7 +204,7 @@ Drawing draw_states(const RccReport& r, const std::vector<const RccState*>& stat
   x = left, y += 24;
   d.text({x, y + 4}, "Bars", Ink::Quiet, 12, 0, true);
   x += 66;
-  for (const char* name : {"elastic", "yields in tension", "yields in compression", "buckled", "torn"}) {
+  for (const char* name : {"elastic", "yields in tension", "yields in compression", "has yielded", "buckled", "torn"}) {
     draw_bar(d, {x + 6, y}, 5, name);
     d.text({x + 17, y + 4}, name, Ink::Text, 12);
     x += 34 + 6.6 * static_cast<double>(std::char_traits<char>::length(name));

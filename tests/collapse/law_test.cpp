@@ -91,18 +91,6 @@ TEST(ZoneLaw, LengthensByTheShareThatTheRuleGives) {
   EXPECT_EQ(none.moment_y.positive, all.moment_y.positive);
 }
 
-TEST(ZoneLaw, OfAPanelHasAShareOfItsOwn) {
-  nearfield::ZoneInput in = column_zone();
-  Knowledge k = default_knowledge();
-  k.zone_elongation_share = 1, k.zone_elongation_share_panel = 0;
-  const auto elongates = [&](double width) {
-    in.section.width = width;
-    return !make_effective_law(nearfield::make_rcc(in), k).moment_z.elongation_positive.empty();
-  };
-  EXPECT_TRUE(elongates(3.9 * in.section.height));
-  EXPECT_FALSE(elongates(4.1 * in.section.height));  // EN 1992-1-1, 5.3.1 (7): a wall
-}
-
 TEST(ZoneLaw, TurnsFurtherUnderPressureIfTheRuleSaysSo) {
   const nearfield::Rcc rcc = nearfield::make_rcc(column_zone());
   const auto pressed = [&](double rotation) {

@@ -258,7 +258,8 @@ TEST(ManagerPhysics, AStubIsCrushedByWhatComesDownOnIt) {
     landing[step > 0] = at->time;
   }
   EXPECT_LT(landing[0], 1);  // propped up until 1.5 s by a rigid one
-  EXPECT_NEAR(landing[0], landing[1], 0.01);
+  EXPECT_NEAR(landing[0], landing[1],
+              0.02);  // of thirteen steps from 0.05 to 0.59 ms: 0.949 to 0.971 s, without a trend
 }
 
 TEST(Manager, AFailingChargeDoesNothing) {

@@ -41,7 +41,7 @@ TEST(MomentCurve, PassesThroughThePointsOfTheFamily) {
       peak = std::max(peak, c.moment[4 * j]);
     }
     EXPECT_GT(peak, 30e3);
-    EXPECT_LT(worst, 1e-5 * peak) << "the equilibrium of both is found to 1e-7 of the squash force; level " << k;
+    EXPECT_LT(worst, 0.01 * peak) << "bars remember the points in between; level " << k;
   }
 }
 
@@ -52,7 +52,7 @@ TEST(MomentCurve, EveryPointIsInEquilibrium) {
   const MomentCurve c = make_moment_curve(f, Axis::Y, -2.9e6, 1, in.length, refine_rotations(rcc.y_pos, 4));
   ASSERT_GT(c.rotation.size(), 20u);
   for (size_t j = 0; j < c.rotation.size(); ++j) {
-    const Resultants r = calc_resultants(f, c.eps_0[j], c.kappa[j]);
+    const Resultants r = calc_resultants(f, c.eps_0[j], c.kappa[j], c.bars[j]);
     EXPECT_NEAR(r.N, c.N, 2e-7 * 10e6);
     EXPECT_NEAR(std::max(0.0, r.M), c.moment[j], 1e-9 * 1e6);
     EXPECT_NEAR(c.kappa[j], c.rotation[j] / in.length, 1e-15);
@@ -68,7 +68,7 @@ TEST(MomentCurve, LosesItsForceOnceTheConcreteIsCrushed) {
   EXPECT_TRUE(c.loses_force);
   // held at the last rotation, lost a thousandth beyond
   double e = c.eps_0.back();
-  EXPECT_TRUE(find_equilibrium(f, c.N, c.kappa.back(), e));
+  EXPECT_TRUE(find_equilibrium(f, c.N, c.kappa.back(), e, c.bars.back()));
   EXPECT_EQ(c.moment.back(), 0) << "bent so far, it pushes instead of resisting";
   EXPECT_GT(c.carried_to, c.rotation.back());
   EXPECT_LT(c.carried_to, 0.1);
@@ -134,7 +134,7 @@ TEST(SectionState, ItsStressesIntegrateToTheResultants) {
   const Fibres f = make_fibres(in, Axis::Y);
   const MomentCurve c = make_moment_curve(f, Axis::Y, -2e6, 1, in.length, refine_rotations(rcc.y_pos, 4));
   const size_t j = static_cast<size_t>(std::max_element(c.moment.begin(), c.moment.end()) - c.moment.begin());
-  const SectionState s = make_section_state(in, f, Axis::Y, c.eps_0[j], c.kappa[j]);
+  const SectionState s = make_section_state(in, f, Axis::Y, c.eps_0[j], c.kappa[j], c.bars[j]);
   EXPECT_NEAR(s.layers.front().from, -0.25, 1e-12);
   EXPECT_NEAR(s.layers.back().to, 0.25, 1e-12);
   double N = 0, M = 0;
@@ -158,12 +158,12 @@ TEST(SectionState, NamesWhatHappensAtTheEdges) {
   const MomentCurve c = make_moment_curve(f, Axis::Y, -2e6, 1, in.length, refine_rotations(rcc.y_pos, 4));
   size_t j = 0;
   while (j + 1 < c.rotation.size() && c.rotation[j] < 0.03) ++j;  // beyond twice its ultimate rotation
-  const SectionState s = make_section_state(in, f, Axis::Y, c.eps_0[j], c.kappa[j]);
+  const SectionState s = make_section_state(in, f, Axis::Y, c.eps_0[j], c.kappa[j], c.bars[j]);
   EXPECT_EQ(s.layers.front().cover, ConcreteCondition::Crushed) << "compressed at -z";
   EXPECT_EQ(s.layers.back().cover, ConcreteCondition::Open) << "pulled at +z";
   const MomentCurve free = make_moment_curve(f, Axis::Y, 0, 1, in.length, refine_rotations(rcc.y_pos, 4));
   while (j > 0 && free.rotation[j] > 0.02) --j;
-  for (const auto& b : make_section_state(in, f, Axis::Y, free.eps_0[j], free.kappa[j]).bars)
+  for (const auto& b : make_section_state(in, f, Axis::Y, free.eps_0[j], free.kappa[j], free.bars[j]).bars)
     if (b.z > 0.1) { EXPECT_EQ(b.condition, BarCondition::YieldsInTension); }
   const SectionState begin = make_section_state(in, f, Axis::Y, 0, 0);
   EXPECT_EQ(begin.layers.front().core, ConcreteCondition::Uncracked);
