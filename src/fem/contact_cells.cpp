@@ -40,6 +40,20 @@ void ContactCells::find_before(const std::vector<ContactBox>& boxes, std::uint32
   std::sort(found.begin(), found.end());
 }
 
+void ContactCells::find_met(const std::vector<ContactBox>& boxes, const ContactBox& other,
+                            std::vector<std::uint32_t>& found) const {
+  found.clear();
+  if (other.is_empty()) return;
+  const Range range = find_range(other);
+  for_cells(range, [&](size_t cell) {
+    for (std::uint32_t i = starts_[cell]; i < starts_[cell + 1]; ++i) {
+      const std::uint32_t b = entries_[i];
+      if (first_common(range, ranges_[b]) == cell && other.meets(boxes[b])) found.push_back(b);
+    }
+  });
+  std::sort(found.begin(), found.end());
+}
+
 ContactCells::Range ContactCells::find_range(const ContactBox& box) const {
   Range range{};
   for (int c = 0; c < 3; ++c) {

@@ -43,6 +43,8 @@ class ContactCells {
 
   /// Numbers of the boxes before box `a` that meet it, in order.
   void find_before(const std::vector<ContactBox>& boxes, std::uint32_t a, std::vector<std::uint32_t>& found) const;
+  /// Numbers of the boxes that meet another one, in order.
+  void find_met(const std::vector<ContactBox>& boxes, const ContactBox& other, std::vector<std::uint32_t>& found) const;
 
  private:
   using Range = std::array<std::array<std::uint16_t, 2>, 3>;  // first and last cell along each axis

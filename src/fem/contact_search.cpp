@@ -211,19 +211,32 @@ class Search {
       c.room.push_back(calc_room(a));
       c.boxes.push_back(make_box(a, c.room.back()));
     }
-    std::vector<std::vector<std::uint32_t>> met(end - first);
-    for_all(met.size(), 1, team_, [&](size_t i) {
-      const auto a = static_cast<std::uint32_t>(first + i);
-      for (std::uint32_t b = 0; b < a; ++b)
-        if (c.boxes[a].meets(c.boxes[b])) met[i].push_back(b);
-    });
-    for (std::uint32_t a = first; a < end; ++a)
-      for (const std::uint32_t b : met[a - first]) {
-        if (b >= groups_)
-          c.particle_pairs.push_back({a - groups_, b - groups_});
-        else
-          c.pairs.emplace_back().a = a, c.pairs.back().b = b;
+    if (first == end) return;
+    // those that have come are few: the others are looked up in a grid of theirs
+    const std::vector<ContactBox> come(c.boxes.begin() + first, c.boxes.end());
+    ContactBox bounds;
+    for (const ContactBox& box : come) bounds.add(box.low, 0), bounds.add(box.high, 0);
+    const ContactCells cells(come, bounds, 2 * setup_.reach);
+    constexpr size_t kRun = 1024;
+    std::vector<std::vector<std::array<std::uint32_t, 2>>> found((end + kRun - 1) / kRun);
+    team_.run(found.size(), [&](size_t run) {
+      std::vector<std::uint32_t> met;
+      for (size_t b = run * kRun; b < std::min<size_t>(end, (run + 1) * kRun); ++b) {
+        if (!c.boxes[b].meets(bounds)) continue;
+        cells.find_met(come, c.boxes[b], met);
+        for (const std::uint32_t a : met)
+          if (b < first + a) found[run].push_back({first + a, static_cast<std::uint32_t>(b)});
       }
+    });
+    std::vector<std::array<std::uint32_t, 2>> all;
+    for (const auto& of : found) all.insert(all.end(), of.begin(), of.end());
+    std::sort(all.begin(), all.end());
+    for (const auto& [a, b] : all) {
+      if (b >= groups_)
+        c.particle_pairs.push_back({a - groups_, b - groups_});
+      else
+        c.pairs.emplace_back().a = a, c.pairs.back().b = b;
+    }
     c.particle_free.resize(c.particle_pairs.size(), -1);
   }
 
@@ -423,14 +436,17 @@ class Search {
     if (faces.is_stale) list_faces(g, faces);
     lanes::make_skin(s_.rows.data(), kFaceDepth, faces.corners, faces.numbers.size(), faces.skin);
     if (!has_points) return;
-    faces.points.clear();
+    faces.points.clear(), faces.places.clear();
+    const auto add = [&faces](const ContactPoint& point, const Vec3& p) {
+      faces.points.push_back(point), faces.places.add(p);
+    };
     for (size_t i = 0; i < faces.numbers.size(); ++i)
-      faces.points.push_back({{ContactPoint::Centre, faces.numbers[i]}, faces.skin.centre(i)});
+      add({ContactPoint::Centre, faces.numbers[i]}, faces.skin.centre(i));
     for (std::uint32_t i = setup_.node_starts[g]; i < setup_.node_starts[g + 1]; ++i) {
       const std::uint32_t row = setup_.node_rows[i];
       // eight elements around a node hide it
       if (setup_.owner[row] != g || s_.uses[row] == 0 || s_.uses[row] >= 8) continue;
-      faces.points.push_back({{ContactPoint::Node, row}, place(s_, row)});
+      add({ContactPoint::Node, row}, place(s_, row));
     }
   }
 
@@ -453,17 +469,18 @@ class Search {
     return std::max(x, y);
   }
 
-  void match(const ContactPoint& point, const Vec3& p, double radius, const GroupFaces& faces,
+  /// Of a point near the box of faces.
+  void match(const ContactPoint& point, const Vec3& p, double near, const GroupFaces& faces,
              std::vector<FoundCandidate>& found) const {
     static thread_local std::vector<std::uint32_t> near_by;
-    const double near = setup_.margin + radius;
-    if (!faces.skin.box.has(p, near)) return;
     lanes::find_faces(faces.skin, p, near, setup_.margin, near_by);
     for (const std::uint32_t i : near_by)
       if (!are_joined(point, faces.numbers[i])) found.push_back({{point, faces.numbers[i]}, -1});
   }
   void match(const GroupFaces& of, const GroupFaces& faces, std::vector<FoundCandidate>& found) const {
-    for (const GroupFaces::Point& q : of.points) match(q.point, q.p, 0, faces, found);
+    static thread_local std::vector<std::uint32_t> near_by;
+    lanes::find_points(of.places, faces.skin.box, setup_.margin, near_by);
+    for (const std::uint32_t i : near_by) match(of.points[i], of.places[i], setup_.margin, faces, found);
   }
 
   /// Candidates of a pair, and how far its objects may move against each other until it is looked through again.
@@ -473,7 +490,9 @@ class Search {
     const GroupFaces& b = faces_[pair.b];
     if (pair.a >= groups_) {
       const std::uint32_t i = pair.a - groups_;
-      match({ContactPoint::Debris, i}, s_.particles[i].p, s_.particle_makes[i].full_radius, b, pair.candidates);
+      const double near = setup_.margin + s_.particle_makes[i].full_radius;
+      if (b.skin.box.has(s_.particles[i].p, near))
+        match({ContactPoint::Debris, i}, s_.particles[i].p, near, b, pair.candidates);
       return;
     }
     const GroupFaces& a = faces_[pair.a];

@@ -66,15 +66,12 @@ ContactSetup make_contact_setup(const ExplicitModel&, const ExplicitChunks&, dou
 /// The outside of a group. Which faces there are holds as long as its surface does not change, where they are for a
 /// look.
 struct GroupFaces {
-  struct Point {
-    ContactPoint point;
-    Vec3 p;
-  };
   bool is_stale = true;
   std::vector<std::uint32_t> numbers;  // 6 element + face
   lanes::FaceCorners corners;
   lanes::Skin skin;
-  std::vector<Point> points;
+  std::vector<ContactPoint> points;
+  lanes::Places places;  // of these
 };
 using ContactFaces = std::vector<GroupFaces>;
 

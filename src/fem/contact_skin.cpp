@@ -114,6 +114,24 @@ HWY_INLINE unsigned test_run(const Test& test) {
   return bits;
 }
 
+void find_points(const Places& places, const ContactBox& box, double near, std::vector<std::uint32_t>& found) {
+  const D d;
+  V low[3], high[3];
+  for (int c = 0; c < 3; ++c) low[c] = num(box.low[c] - near), high[c] = num(box.high[c] + near);
+  for (size_t run = 0; run < places.runs.size() / (3 * kFaceRun); ++run) {
+    const double* HWY_RESTRICT from = places.runs.data() + run * 3 * kFaceRun;
+    unsigned inside = test_run([&](size_t l) HWY_ATTR {
+      const auto is_in = [&](size_t c) HWY_ATTR {
+        const V x = hn::Load(d, from + c * kFaceRun + l);
+        return hn::And(hn::Ge(x, low[c]), hn::Le(x, high[c]));
+      };
+      return hn::And(hn::And(is_in(0), is_in(1)), is_in(2));
+    });
+    for (size_t i = run * kFaceRun; inside != 0; ++i, inside >>= 1)
+      if ((inside & 1U) != 0) found.push_back(static_cast<std::uint32_t>(i));
+  }
+}
+
 void find_faces(const Skin& skin, const Vec3& p, double near_by, double margin, std::vector<std::uint32_t>& found) {
   const D d;
   const V near = num(near_by), behind = num(-margin);
@@ -156,6 +174,7 @@ namespace topple::fem::lanes {
 
 HWY_EXPORT(make_skin);
 HWY_EXPORT(find_faces);
+HWY_EXPORT(find_points);
 
 void fill_runs(FaceCorners& corners) {
   for (auto& rows : corners)
@@ -168,6 +187,10 @@ void make_skin(const double* rows, double depth, const FaceCorners& corners, siz
 void find_faces(const Skin& skin, const Vec3& p, double near, double margin, std::vector<std::uint32_t>& found) {
   found.clear();
   HWY_DYNAMIC_DISPATCH(find_faces)(skin, p, near, margin, found);
+}
+void find_points(const Places& places, const ContactBox& box, double near, std::vector<std::uint32_t>& found) {
+  found.clear();
+  HWY_DYNAMIC_DISPATCH(find_points)(places, box, near, found);
 }
 
 }  // namespace topple::fem::lanes

@@ -33,6 +33,23 @@ struct Skin {
   }
 };
 
+/// Points in runs of kFaceRun.
+struct Places {
+  size_t count = 0;
+  AlignedVector<double> runs;  // x y z of a run side by side
+  void clear() { count = 0, runs.clear(); }
+  void add(const Vec3& p) {
+    if (count % kFaceRun == 0) runs.resize(runs.size() + 3 * kFaceRun, 1e300);  // in no box
+    double* at = runs.data() + count / kFaceRun * 3 * kFaceRun + count % kFaceRun;
+    for (int c = 0; c < 3; ++c) at[c * static_cast<int>(kFaceRun)] = p[c];
+    ++count;
+  }
+  Vec3 operator[](size_t i) const {
+    const double* at = runs.data() + i / kFaceRun * 3 * kFaceRun + i % kFaceRun;
+    return {at[0], at[kFaceRun], at[2 * kFaceRun]};
+  }
+};
+
 /// Of `count` faces; `rows`: kNodeFields a node. `depth` is how far behind a face counts, over the thickness of its
 /// element.
 void make_skin(const double* rows, double depth, const FaceCorners&, size_t count, Skin&);
@@ -40,5 +57,7 @@ void make_skin(const double* rows, double depth, const FaceCorners&, size_t coun
 /// Numbers of faces that a point may be nearer to than `near`, or behind by no more than their depth and
 /// `margin`; in order.
 void find_faces(const Skin&, const Vec3& p, double near, double margin, std::vector<std::uint32_t>& found);
+/// Numbers of points no further than `near` out of a box along any axis; in order.
+void find_points(const Places&, const ContactBox&, double near, std::vector<std::uint32_t>& found);
 
 }  // namespace topple::fem::lanes

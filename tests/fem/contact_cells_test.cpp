@@ -41,6 +41,27 @@ TEST(ContactCells, FindTheBoxesThatMeetAsLookingAtAllPairsDoes) {
   }
 }
 
+TEST(ContactCells, FindTheBoxesThatMeetAnyOther) {
+  const std::vector<ContactBox> boxes = make_boxes(400, 2);
+  ContactBox bounds;
+  bounds.add({-8, -2, -9}, 0), bounds.add({9, 3, 8}, 0);
+  const ContactCells cells(boxes, bounds, 0.5);
+  std::vector<ContactBox> others = make_boxes(60, 15);
+  for (ContactBox& box : others)
+    if (!box.is_empty()) box.add(box.low + Vec3{0.1, 0.2, 0.3}, 0.05);
+  size_t count = 0;
+  std::vector<std::uint32_t> found, expected;
+  for (const ContactBox& other : others) {
+    expected.clear();
+    for (std::uint32_t b = 0; b < boxes.size(); ++b)
+      if (other.meets(boxes[b])) expected.push_back(b);
+    cells.find_met(boxes, other, found);
+    EXPECT_EQ(found, expected);
+    count += found.size();
+  }
+  EXPECT_GT(count, 100U);
+}
+
 TEST(ContactCells, GapIsTheDistanceOfTheNearestPoints) {
   ContactBox a, b;
   a.add({0, 0, 0}, 1), b.add({5, 0, 0}, 1);

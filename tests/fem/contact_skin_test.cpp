@@ -65,6 +65,35 @@ TEST(ContactSkin, FindsTheFacesNearAPoint) {
   EXPECT_GT(all, 200U);
 }
 
+TEST(ContactSkin, FindsThePointsInABox) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> number(-3, 3);
+  Places places;
+  std::vector<Vec3> points;
+  for (int i = 0; i < 61; ++i) {  // no multiple of a run
+    points.push_back({number(random), number(random), number(random)});
+    places.add(points.back());
+    EXPECT_EQ(norm(places[points.size() - 1] - points.back()), 0);
+  }
+  ContactBox box;
+  box.add({-1, -2, 0}, 0), box.add({2, 1, 2}, 0);
+  const std::int64_t supported = hwy::SupportedTargets();
+  for (std::int64_t left = supported; left != 0; left &= left - 1) {
+    hwy::SetSupportedTargetsForTest(left & -left);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    for (const double near : {0.0, 0.25, 9.0}) {
+      std::vector<std::uint32_t> found, expected;
+      for (std::uint32_t i = 0; i < 61; ++i)
+        if (box.has(points[i], near)) expected.push_back(i);
+      find_points(places, box, near, found);
+      EXPECT_FALSE(found.empty());
+      EXPECT_EQ(found, expected);
+    }
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+}
+
 TEST(ContactSkin, IsTheSameWithEveryInstructionSet) {
   const std::int64_t supported = hwy::SupportedTargets();
   std::vector<Skin> skins;
