@@ -134,7 +134,7 @@ ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
   }
   std::sort(loaded.begin(), loaded.end());
   loaded.erase(std::unique(loaded.begin(), loaded.end()), loaded.end());
-  for (const std::uint32_t row : loaded) push(s, row, {});
+  for (const std::uint32_t row : loaded) push_load(s, row);
   s.ground_forces.assign(model.grounds.size(), {});
   s.touchdowns.assign(static_cast<size_t>(parts), -1);
   for (size_t row = 0; row < rows; ++row)
@@ -251,7 +251,7 @@ void ExplicitSystem::Inside::clear_pushes(ExplicitState& state) const {
   });
   state.pushed.clear();
   for (const std::uint32_t row : loaded)
-    if (state.uses[row] > 0) push(state, row, {});
+    if (state.uses[row] > 0) push_load(state, row);
 }
 
 bool ExplicitSystem::Inside::is_finite(const ExplicitState& state) const {

@@ -143,11 +143,14 @@ struct ExplicitSystem::Inside {
     return std::clamp<size_t>(state.particles.size() / 256, 1, 16);
   }
   void push(ExplicitState& state, std::uint32_t row, const Vec3& force) const { push(state, row, force, state.pushed); }
+  void push_load(ExplicitState& state, std::uint32_t row) const {
+    const double* load = loads.data() + 4 * size_t{row};
+    push(state, row, {load[0], load[1], load[2]});
+  }
   /// `pushed` gets rows that are pushed for the first time in this step.
   void push(ExplicitState& state, std::uint32_t row, const Vec3& force, std::vector<std::uint32_t>& pushed) const {
     if ((state.flags[row] & kernel::kPushed) == 0) {
       state.flags[row] |= kernel::kPushed;
-      for (size_t c = 0; c < 3; ++c) state.pushes[4 * size_t{row} + c] = loads[4 * size_t{row} + c];
       pushed.push_back(row);
     }
     for (int c = 0; c < 3; ++c) state.pushes[4 * size_t{row} + static_cast<size_t>(c)] += force[c];
