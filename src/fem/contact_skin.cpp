@@ -2,6 +2,7 @@
 #include "fem/contact_skin.h"
 
 #include <algorithm>
+#include <bit>
 
 #include "fem/explicit_kernel.h"
 
@@ -106,6 +107,8 @@ HWY_INLINE unsigned bits_of(Mask mask) {
   hn::StoreMaskBits(D(), mask, bits);
   return bits[0];
 }
+/// The lowest of some bits.
+HWY_INLINE std::uint32_t first_of(unsigned bits) { return static_cast<std::uint32_t>(std::countr_zero(bits)); }
 /// Bits of numbers in lanes of a whole run.
 template <class Test>
 HWY_INLINE unsigned test_run(const Test& test) {
@@ -127,8 +130,8 @@ void find_points(const Places& places, const ContactBox& box, double near, std::
       };
       return hn::And(hn::And(is_in(0), is_in(1)), is_in(2));
     });
-    for (size_t i = run * kFaceRun; inside != 0; ++i, inside >>= 1)
-      if ((inside & 1U) != 0) found.push_back(static_cast<std::uint32_t>(i));
+    for (; inside != 0; inside &= inside - 1)
+      found.push_back(static_cast<std::uint32_t>(run * kFaceRun) + first_of(inside));
   }
 }
 
@@ -145,10 +148,10 @@ void find_faces(const Skin& skin, const Vec3& p, double near_by, double margin, 
       };
       return hn::And(hn::And(is_in(0, low.x, high.x), is_in(1, low.y, high.y)), is_in(2, low.z, high.z));
     });
-    for (size_t run = 8 * eight; runs != 0; ++run, runs >>= 1) {
-      if ((runs & 1U) == 0) continue;
+    for (; runs != 0; runs &= runs - 1) {
+      const size_t run = 8 * eight + first_of(runs);
       const double* HWY_RESTRICT from = skin.faces.data() + run * kFields * kFaceRun;
-      const unsigned faces = test_run([&](size_t l) HWY_ATTR {
+      unsigned faces = test_run([&](size_t l) HWY_ATTR {
         const auto field = [&](size_t f) HWY_ATTR { return hn::Load(d, from + f * kFaceRun + l); };
         const auto vector = [&](size_t f) HWY_ATTR { return V3{field(f), field(f + 1), field(f + 2)}; };
         const V3 r = sub(at, vector(kCentre));
@@ -157,10 +160,9 @@ void find_faces(const Skin& skin, const Vec3& p, double near_by, double margin, 
                                  sub(hn::Abs(dot(r, vector(kAcross))), field(kHigh)));
         return hn::And(hn::And(hn::Le(height, near), hn::Ge(height, sub(behind, field(kDepth)))), hn::Le(beside, near));
       });
-      for (size_t l = 0; l < kFaceRun; ++l) {
-        const size_t i = run * kFaceRun + l;
-        if ((faces >> l & 1U) != 0 && i < skin.count) found.push_back(static_cast<std::uint32_t>(i));
-      }
+      if (run == skin.count / kFaceRun) faces &= (1U << skin.count % kFaceRun) - 1;  // the last one, filled up
+      const auto first = static_cast<std::uint32_t>(run * kFaceRun);
+      for (; faces != 0; faces &= faces - 1) found.push_back(first + first_of(faces));
     }
   }
 }

@@ -151,17 +151,20 @@ void press_points(const ContactSetup& setup, const ExplicitOptions& options, dou
 void press_particles(const ExplicitOptions& options, double h, const ExplicitState& s,
                      std::span<const ParticlePair> near, ContactTask& task) {
   constexpr size_t kAhead = 8;
-  task.particles.clear();
+  task.particles.resize(near.size());
+  size_t touching = 0;
   for (size_t i = 0; i < near.size(); ++i) {
     if (i + kAhead < near.size())
       for (const std::uint32_t number : near[i + kAhead]) hwy::Prefetch(&s.particles[number]);
     const Particle &a = s.particles[near[i][0]], &b = s.particles[near[i][1]];
     const Vec3 d = a.p - b.p;
     const double reach = a.radius + b.radius, square = dot(d, d);
-    if (square >= reach * reach || !(square > 0)) continue;
+    // every second one does, so no branch
+    task.particles[touching] = near[i];
+    touching += (square < reach * reach) & (square > 0) ? 1 : 0;
     for (const std::uint32_t number : near[i]) hwy::Prefetch(&s.particle_makes[number]);
-    task.particles.push_back(near[i]);
   }
+  task.particles.resize(touching);
   const lanes::ParticleSetup setup{s.particles.data(), s.particle_makes.data(), h,
                                    options.friction,   options.debris_damping,  kGrip};
   lanes::press_particles(setup, task.particles, task.particles_touched, task.sums);
