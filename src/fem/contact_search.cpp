@@ -1,5 +1,7 @@
 #include "fem/contact_search.h"
 
+#include <hwy/cache_control.h>
+
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -292,18 +294,37 @@ class Search {
     const double least = kLeastShare * setup_.margin;
     constexpr size_t kRun = 512;
     std::vector<std::vector<ContactCandidate>> found((active.size() + kRun - 1) / kRun);
-    for_all(active.size(), kRun, team_, [&](size_t i) {
-      ContactPair& pair = *active[i];
-      const double path = calc_path(calc_pace(pair), ahead);
-      pair.free = std::numeric_limits<float>::infinity();
-      for (FoundCandidate& of : pair.candidates) {
-        // near no sooner than the pair has moved by half of what is free: faces turn
-        if (2 * pair.moved + path > of.free) {
-          const Gap gap = find_gap(of.candidate);
-          if (gap.now < path) found[i / kRun].push_back(of.candidate);
-          of.free = static_cast<float>(2 * pair.moved + gap.grown);
-        }
-        pair.free = std::min(pair.free, of.free);
+    team_.run(found.size(), [&](size_t run) {
+      struct Due {
+        ContactPair* pair;
+        FoundCandidate* of;
+        double path;
+      };
+      static thread_local std::vector<Due> due;
+      due.clear();
+      for (size_t i = run * kRun; i < std::min(active.size(), (run + 1) * kRun); ++i) {
+        ContactPair& pair = *active[i];
+        const double path = calc_path(calc_pace(pair), ahead);
+        pair.free = std::numeric_limits<float>::infinity();
+        for (FoundCandidate& of : pair.candidates)
+          // near no sooner than the pair has moved by half of what is free: faces turn
+          if (2 * pair.moved + path > of.free)
+            due.push_back({&pair, &of, path});
+          else
+            pair.free = std::min(pair.free, of.free);
+      }
+      constexpr size_t kAhead = 6;  // corners that lie all over memory
+      for (size_t i = 0; i < due.size(); ++i) {
+        if (i + 2 * kAhead < due.size())
+          hwy::Prefetch(&setup_.rows_of_element[due[i + 2 * kAhead].of->candidate.face / 6]);
+        if (i + kAhead < due.size())
+          for (const std::uint32_t row : setup_.rows_of_element[due[i + kAhead].of->candidate.face / 6])
+            hwy::Prefetch(s_.rows.data() + kernel::kNodeFields * size_t{row});
+        const auto& [pair, of, path] = due[i];
+        const Gap gap = find_gap(of->candidate);
+        if (gap.now < path) found[run].push_back(of->candidate);
+        of->free = static_cast<float>(2 * pair->moved + gap.grown);
+        pair->free = std::min(pair->free, of->free);
       }
     });
     c.near.clear();
