@@ -198,49 +198,46 @@ void press_surfaces(ExplicitSystem::Inside& in, ExplicitState& s) {
   });
   c.touching = {};
   for (const ContactTask& task : in.contact_tasks) c.touching += task.sums;
-  // each share adds what falls to its rows and particles, of faces and then of pairs of particles: an order that
-  // neither the number of shares nor of tasks changes
-  const size_t shares = c.touching.count < 256 ? 1 : std::min<size_t>(4, static_cast<size_t>(in.team->threads()));
-  std::vector<std::vector<std::uint32_t>> pushed(shares);
-  const auto add_up = [&](size_t share) {
-    // neighbours belong to one
-    const auto is_own = [&](std::uint32_t number, std::uint32_t run) { return number / run % shares == share; };
-    const auto push = [&](std::uint32_t row, const Vec3& force) {
-      if (is_own(row, 1024)) in.push(s, row, force, pushed[share]);
-    };
-    const auto press = [&](std::uint32_t number, const Vec3& force, double crushed) {
-      if (!is_own(number, 256)) return;
-      ParticlePush& to = s.particle_pushes[number];
-      to.crushed = std::max({0.0, to.crushed, crushed}), to.force += force;
-    };
-    constexpr size_t kAhead = 8;  // rows that lie all over memory
+  // faces first, then pairs of particles: an order that the number of tasks does not change
+  constexpr size_t kAhead = 8;  // rows and particles that lie all over memory
+  const auto push_rows = [&] {
     for (const ContactTask& task : in.contact_tasks)
       for (size_t i = 0; i < task.faces_touched.size(); ++i) {
         if (i + kAhead < task.faces_touched.size())
-          for (const std::uint32_t row : task.faces_touched[i + kAhead].rows) {
+          for (const std::uint32_t row : task.faces_touched[i + kAhead].rows)
             hwy::Prefetch(s.pushes.data() + 4 * size_t{row}), hwy::Prefetch(s.flags.data() + row);
-          }
         const FaceTouch& touch = task.faces_touched[i];
         const Vec3 force = touch.normal_force + touch.friction;
-        if (touch.point.kind == ContactPoint::Debris)
-          press(touch.point.index, force, touch.crushed);
-        else if (touch.point.kind == ContactPoint::Node)
-          push(touch.point.index, force);
-        else
-          for (const std::uint32_t row : quad_of(in.contact, touch.point.index).rows) push(row, 0.25 * force);
-        for (size_t k = 0; k < 4; ++k) push(touch.rows[k], -touch.weights[k] * force);
-      }
-    for (const ContactTask& task : in.contact_tasks)
-      for (const ParticleTouch& touch : task.particles_touched) {
-        const Vec3 force = touch.normal_force + touch.friction;
-        press(touch.pair[0], force, touch.crushed[0]), press(touch.pair[1], -force, touch.crushed[1]);
+        if (touch.point.kind == ContactPoint::Node)
+          in.push(s, touch.point.index, force);
+        else if (touch.point.kind == ContactPoint::Centre)
+          for (const std::uint32_t row : quad_of(in.contact, touch.point.index).rows) in.push(s, row, 0.25 * force);
+        for (size_t k = 0; k < 4; ++k) in.push(s, touch.rows[k], -touch.weights[k] * force);
       }
   };
-  if (shares > 1)
-    in.team->run(shares, add_up);
+  const auto push_particles = [&] {
+    const auto push = [&](std::uint32_t number, const Vec3& force, double crushed) {
+      ParticlePush& to = s.particle_pushes[number];
+      to.crushed = std::max({0.0, to.crushed, crushed}), to.force += force;
+    };
+    for (const ContactTask& task : in.contact_tasks)
+      for (const FaceTouch& touch : task.faces_touched)
+        if (touch.point.kind == ContactPoint::Debris)
+          push(touch.point.index, touch.normal_force + touch.friction, touch.crushed);
+    for (const ContactTask& task : in.contact_tasks)
+      for (size_t i = 0; i < task.particles_touched.size(); ++i) {
+        if (i + kAhead < task.particles_touched.size())
+          for (const std::uint32_t number : task.particles_touched[i + kAhead].pair)
+            hwy::Prefetch(&s.particle_pushes[number]);
+        const ParticleTouch& touch = task.particles_touched[i];
+        const Vec3 force = touch.normal_force + touch.friction;
+        push(touch.pair[0], force, touch.crushed[0]), push(touch.pair[1], -force, touch.crushed[1]);
+      }
+  };
+  if (c.touching.count < 256)
+    push_rows(), push_particles();
   else
-    add_up(0);
-  for (const auto& rows : pushed) s.pushed.insert(s.pushed.end(), rows.begin(), rows.end());
+    in.team->run(2, [&](size_t task) { task == 0 ? push_rows() : push_particles(); });
 }
 
 void book_surfaces(const ExplicitSystem::Inside& in, ExplicitState& s) {
