@@ -291,11 +291,10 @@ void System::unpack_element(size_t e) {
   z.damping = z.packed_damping + l.field(slot, kDamped) - (z.damper_energy - z.packed_behind);
   z.plastic = z.packed_plastic + l.field(slot, kBled);
   if (!flows) return;
-  z.crushed = 0;  // by the full law
   z.energy = l.flow(slot, kStored);
   z.plastic += l.flow(slot, kPlastic);
-  z.lifted += l.flow(slot, kAxial) - z.axial;
-  z.axial = l.flow(slot, kAxial);
+  z.axial = l.flow(slot, kAxial), z.lifted = l.flow(slot, kLifted);
+  z.shortened = l.flow(slot, kShortened), z.crushed = l.flow(slot, kCrushed);
   for (int a = 1 - last; a <= 1 - first; ++a) z.slip[a] = l.flow(slot, kSlip + a);
   z.slipped = l.flow(slot, kSlipped);
   z.twist = l.flow(slot, kTwist);
@@ -383,6 +382,11 @@ void System::elongate_element(size_t e, double by) {
   if (!z.live || slot == Lanes::kNoSlot) return;
   Lanes& l = *lanes;
   if (l.field(slot, kFlows) > 0) {
+    l.flow(slot, kLifted) += by;
+    // what it shortens by turning need not be crushed
+    const double back = std::min(l.flow(slot, kCrushed), std::max(0.0, -by));
+    l.flow(slot, kShortened) -= back, l.flow(slot, kCrushed) -= back;
+    by += back;
     const double k = l.field(slot, kStiffness), released = by * k * (l.field(slot, kStretch) - 0.5 * by);
     l.flow(slot, kAxial) += by;
     l.flow(slot, kStored) -= released;
@@ -400,10 +404,13 @@ void System::elongate_element(size_t e, double by) {
 void System::evaluate_outside(size_t slot) {
   const size_t e = lanes->is_batch ? slot / lanes->W : lanes->element_of[slot];
   unpack_element(e);
-  const double axial = state.element[e].axial, lifted = state.element[e].lifted;
+  const ZoneState& z = state.element[e];
+  const double elongated = z.elongated;
+  const bool was_switching = z.next_law >= 0;
   evaluate_element(e, step);
-  if (state.element[e].live && state.element[e].axial != axial && state.element[e].lifted == lifted) {
-    // what flows axially will do so in the next step: the full law keeps it
+  if (z.live && (was_switching || z.elongated != elongated)) {
+    // The full law keeps what flows in tension, for it will do so in the next step, and what has just got another
+    // stiffness: the damper's force is still that of the one before.
     lanes->set(slot, kFlows, 0);
     lanes->set(slot, kLeastForce, 1);
     lanes->set(slot, kMostForce, -1);
@@ -419,7 +426,7 @@ void System::write_cells(size_t slot, double axial) {
   ZoneState& z = state.element[e];
   double reached[2] = {0, 0};
   for (int s = 0; s < zone.stations; ++s) reached[s] = l.flow(slot, kStations + s * kStationFields + kReached);
-  (void)write_flow_cells(zone, laws, z, axial, reached, &l.flow(slot, 0), l.W);
+  (void)write_flow_cells(zone, laws, z, axial, l.flow(slot, kShortened), reached, &l.flow(slot, 0), l.W);
 }
 
 void System::evaluate_elements_fully(double h) {

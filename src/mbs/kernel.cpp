@@ -9,6 +9,8 @@
 // after foreach_target
 #include <hwy/highway.h>
 
+#include <limits>
+
 #include "mbs/lane_math.inc"
 
 HWY_BEFORE_NAMESPACE();
@@ -236,37 +238,88 @@ struct CellForce {
   }
 };
 
+/// Normal force of a zone that may flow in compression, and how far it does (docs/theory/zones.md, eq. 5).
+template <class D>
+struct Pressing {
+  Num<D> force;       // elastic, within the limit
+  Num<D> shortening;  // plastic, of this step
+  Num<D> whole;       // section that is left, and over what was left when the cells were written
+  Num<D> share;       //
+  Num<D> per_share;   //
+  hn::Mask<D> flows;
+  hn::Mask<D> is_known;   // what the slot has of the limits holds here
+  hn::Mask<D> is_within;  // then the numbers are the whole truth: it neither flows in tension nor breaks
+
+  HWY_INLINE Pressing() {}
+  /// k, d: stiffness and elongation; reached: largest rotation of the stations.
+  HWY_INLINE Pressing(const double* HWY_RESTRICT flow, Num<D> k, Num<D> d, Num<D> reached) {
+    using N = Num<D>;
+    const D tag;
+    const N zero = num<D>(0);
+    const N trial = k * (d - load<D>(flow, kAxial)), shortened = load<D>(flow, kShortened);
+    N least = {hn::Set(tag, -std::numeric_limits<double>::infinity())};
+    for (int q = 0; q < 2; ++q)
+      least = maximum(least, fma(load<D>(flow, kTurnedSlope + q), reached - load<D>(flow, kTurnedFrom + q),
+                                 load<D>(flow, kTurnedLeast + q)));
+    const N capacity = zero - least, part = load<D>(flow, kTurnedPart);
+    const auto calc_limit = [&](N at, N& left) {
+      const N curve = fma(load<D>(flow, kCurveSlope), at - load<D>(flow, kCurveFrom), load<D>(flow, kCurveForce));
+      left = fma(load<D>(flow, kWholePerForce), curve, load<D>(flow, kWhole));
+      return minimum(curve, fma(part * capacity, left - num<D>(1), capacity));
+    };
+    const N limit = calc_limit(shortened, whole), over = (zero - trial) - limit;
+    flows = hn::And(hn::Gt(over.v, zero.v), hn::Lt(trial.v, zero.v));
+    is_known = hn::And(
+        hn::Le(reached.v, load<D>(flow, kTurnedFar).v),
+        hn::And(hn::Ge(shortened.v, load<D>(flow, kCurveFrom).v), hn::Le(shortened.v, load<D>(flow, kCurveFar).v)));
+    force = trial, shortening = zero;
+    if (!hn::AllFalse(tag, flows)) {
+      // the curve falls while the zone shortens: one more look at it after the first estimate
+      N left;
+      const N behind = shortened + over / k, then = calc_limit(behind, left);
+      flows = hn::And(flows, hn::Le(behind.v, load<D>(flow, kCurveFar).v));
+      shortening = select(flows, maximum(zero, ((zero - trial) - then) / k), zero);
+      whole = select(flows, left, whole);
+      force = select(flows, maximum(trial, zero - then), trial);
+    }
+    const N written = load<D>(flow, kWrittenWhole);
+    share = whole / written, per_share = written / whole;
+    is_within = hn::And(hn::And(hn::Or(flows, hn::Le(over.v, zero.v)), hn::Le(trial.v, load<D>(flow, kFlowMost).v)),
+                        hn::Lt((shortened + shortening).v, load<D>(flow, kCrushLength).v));
+  }
+  /// As the cells have it.
+  HWY_INLINE Num<D> in_cells() const { return force * per_share; }
+};
+
 /// Those lanes among `wanted` whose normal force and rotations are in their cells, which are written anew where they
-/// have left them, and that do not flow axially.
+/// have left them, and that do not flow in tension.
 template <class D, Plane In, int Hinges, class M>
-HWY_INLINE M enter_cells(const ElementJob& job, size_t block, M wanted, Num<D> k, Num<D> d) {
+HWY_INLINE M enter_cells(const ElementJob& job, size_t block, M wanted, Num<D> k, Num<D> d, Pressing<D>& pressing) {
   using N = Num<D>;
   const D tag;
   const size_t W = hn::Lanes(tag);
   const double* flow = job.flows + static_cast<size_t>(kFlowFields) * W * block;
-  const N one = num<D>(1), zero = num<D>(0), force = k * (d - load<D>(flow, kAxial));
+  const N one = num<D>(1), zero = num<D>(0), on_edge = num<D>(1 + 1e-10);
   struct Place {
     M is_in_cells, is_known, is_within;
   };
   const auto find = [&] {
     Place at{wanted, wanted, wanted};
     N most = zero;  // rotation reached
+    for (int s = 0; s < Hinges; ++s) most = maximum(most, load<D>(flow, kStations + s * kStationFields + kReached));
+    pressing = Pressing<D>(flow, k, d, most);
+    const N force = pressing.in_cells();
     for (int s = 0; s < Hinges; ++s) {
       const N reached = load<D>(flow, kStations + s * kStationFields + kReached);
-      most = {hn::Max(most.v, reached.v)};
       for (int q = first_bending(In); q <= last_bending(In); ++q) {
         const int cell = kStations + s * kStationFields + kCell + q * kCellFields;
         const N r = (reached - load<D>(flow, cell + kCellRotation)) * load<D>(flow, cell + kCellRotation + 1);
-        at.is_in_cells = hn::And(at.is_in_cells, hn::And(hn::Le(CellForce<D>(flow, cell, force).share.v, one.v),
+        at.is_in_cells = hn::And(at.is_in_cells, hn::And(hn::Le(CellForce<D>(flow, cell, force).share.v, on_edge.v),
                                                          hn::And(hn::Ge(r.v, zero.v), hn::Le(r.v, one.v))));
       }
     }
-    at.is_known = hn::Le(most.v, load<D>(flow, kTurnedFar).v);
-    N least = load<D>(flow, kFlowLeast);
-    for (int q = 0; q < 2; ++q)
-      least = maximum(least, fma(load<D>(flow, kTurnedSlope + q), most - load<D>(flow, kTurnedFrom + q),
-                                 load<D>(flow, kTurnedLeast + q)));
-    at.is_within = hn::And(hn::Ge(force.v, least.v), hn::Le(force.v, load<D>(flow, kFlowMost).v));
+    at.is_known = pressing.is_known;
+    at.is_within = pressing.is_within;
     return at;
   };
   Place at = find();
@@ -274,7 +327,7 @@ HWY_INLINE M enter_cells(const ElementJob& job, size_t block, M wanted, Num<D> k
   const M stale = hn::And(left, hn::Or(at.is_within, hn::Not(at.is_known)));
   if (HWY_UNLIKELY(!hn::AllFalse(tag, stale))) {
     alignas(64) double forces[kMostLanes], is_stale[kMostLanes];
-    hn::Store(force.v, tag, forces);
+    hn::Store((pressing.force / pressing.whole).v, tag, forces);
     hn::Store(hn::IfThenElseZero(stale, one.v), tag, is_stale);
     for (size_t l = 0; l < W; ++l)
       if (is_stale[l] != 0) job.cells.write(job.cells.owner, block * W + l, forces[l]);
@@ -283,12 +336,12 @@ HWY_INLINE M enter_cells(const ElementJob& job, size_t block, M wanted, Num<D> k
   return hn::And(hn::And(wanted, at.is_within), hn::And(at.is_in_cells, at.is_known));
 }
 
-/// The law of a zone that flows in bending, shear or torsion (docs/theory/zones.md, eq. 1 to 9), in its cells. Sets
-/// the elastic resultants f; gives the lanes among `wanted` for which that is the whole truth and moves their history;
-/// the others keep theirs. `flowed` are those of them that have passed a limit in this step.
+/// The law of a zone that flows in bending, shear, torsion or compression (docs/theory/zones.md, eq. 1 to 9), in its
+/// cells. Sets the elastic resultants f; gives the lanes among `wanted` for which that is the whole truth and moves
+/// their history; the others keep theirs. `flowed` are those of them that have passed a limit in this step.
 template <class D, Plane In, int Hinges, class M>
-HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], const Num<D> k[6], const Num<D> d[6],
-                       const Num<D> e_before[6], Num<D> f[6], M& flowed) {
+HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& pressing, const Num<D> x[2],
+                       const Num<D> k[6], const Num<D> d[6], const Num<D> e_before[6], Num<D> f[6], M& flowed) {
   using N = Num<D>;
   constexpr int first = first_bending(In), last = last_bending(In);
   constexpr bool is_plane = In != Plane::Space;
@@ -300,7 +353,8 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
 
   const N slip[2] = {load<D>(flow, kSlip), load<D>(flow, kSlip + 1)}, twist = load<D>(flow, kTwist);
   for (int i = 0; i < 6; ++i) f[i] = zero;
-  f[0] = k[0] * (d[0] - load<D>(flow, kAxial));
+  f[0] = pressing.force;
+  const N in_cells = pressing.in_cells();
   if constexpr (!is_plane) f[3] = k[3] * (d[3] - twist);
 
   BendingPlane<D, Hinges> plane[2];
@@ -342,7 +396,7 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
     Demand to{zero, no, no, {no, no}};
     for (int q = first; q <= last; ++q) {
       const int cell = kStations + s * kStationFields + kCell + q * kCellFields;
-      const CellForce<D> at(flow, cell, f[0]);
+      const CellForce<D> at(flow, cell, in_cells);
       const N r = (load<D>(flow, kStations + s * kStationFields + kReached) - load<D>(flow, cell + kCellRotation)) *
                   load<D>(flow, cell + kCellRotation + 1);
       const auto positive = hn::Ge(plane[q].m[s].v, zero.v);
@@ -352,7 +406,7 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
       };
       const N low = at.mix(corner(0, 0), corner(1, 0), corner(2, 0));
       const N high = at.mix(corner(0, 1), corner(1, 1), corner(2, 1));
-      const N limit = fma(r, high - low, low), size = abs(plane[q].m[s]);
+      const N limit = pressing.share * fma(r, high - low, low), size = abs(plane[q].m[s]);
       to.none[q] = hn::Le(limit.v, zero.v);
       const N ratio = select(to.none[q], zero, size / N{hn::Max(limit.v, tiny.v)});
       to.sum = is_plane ? ratio : to.sum + ratio * N{hn::Sqrt(ratio.v)};
@@ -466,7 +520,7 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
           return select(positive, load<D>(flow, cell + kCellLiftPositive + force),
                         load<D>(flow, cell + kCellLiftNegative + force));
         };
-        const N lift = CellForce<D>(flow, cell, f[0]).mix(lift_at(0), lift_at(1), lift_at(2));
+        const N lift = CellForce<D>(flow, cell, in_cells).mix(lift_at(0), lift_at(1), lift_at(2));
         const N square = plane[q].phi[s] * plane[q].phi[s];
         squares = squares + square;
         along = fma(square, lift, along);
@@ -497,7 +551,7 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
     N slope = zero;  // of what the limit leaves of the moments with the force
     for (int q = first; q <= last; ++q) {
       const int cell = kStations + s * kStationFields + kCell + q * kCellFields;
-      const CellForce<D> force(flow, cell, f[0]);
+      const CellForce<D> force(flow, cell, in_cells);
       const N r = (load<D>(flow, kStations + s * kStationFields + kReached) - load<D>(flow, cell + kCellRotation)) *
                   load<D>(flow, cell + kCellRotation + 1);
       const auto positive = hn::Ge(m_trial[s][q].v, zero.v);
@@ -509,7 +563,7 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
             select(positive, load<D>(flow, value + 1 + kCellPositive), load<D>(flow, value + 1 + kCellNegative));
         limit[i] = fma(r, high - low, low);
       }
-      const N here = force.mix(limit[0], limit[1], limit[2]);
+      const N here = force.mix(limit[0], limit[1], limit[2]) * pressing.share;
       const N ratio = abs(m_trial[s][q]) / N{hn::Max(here.v, tiny.v)};
       const N part = (is_plane ? ratio : ratio * N{hn::Sqrt(ratio.v)}) *
                      force.slope(flow, cell, limit[0], limit[1], limit[2]) / here;
@@ -579,7 +633,9 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
       plastic[q][s] = fnma(soft[q][s], m, P.phi[s]);
     }
 
-  f[0] = fnma(k[0], elongation, f[0]);
+  // what it shortens by turning need not be crushed
+  const N back = minimum(pressing.shortening, maximum(zero, zero - elongation)), longer = elongation + back;
+  f[0] = fnma(k[0], longer, f[0]);
 
   // shear
   const N pressed = load<D>(flow, kShearFriction) * N{hn::Max(zero.v, (zero - f[0]).v)};
@@ -610,7 +666,7 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
   }
   // torsion
   N twisted = zero, over = zero;
-  flowed = hn::Or(bends, slides);
+  flowed = hn::Or(hn::Or(bends, slides), pressing.flows);
   if constexpr (!is_plane) {
     const N torsion = load<D>(flow, kTorsion);
     const M twists = hn::And(good, hn::Gt(abs(f[3]).v, torsion.v));
@@ -654,7 +710,11 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Num<D> x[2], c
   const N lost = fms(half, work, stored - load<D>(flow, kStored));
   // nothing in an elastic step, unless the zone was lengthened from outside before it
   store_where<D>(good, load<D>(flow, kPlastic) + lost, flow, kPlastic);
-  store_where<D>(flowed, load<D>(flow, kAxial) + elongation, flow, kAxial);
+  const N crushed = pressing.shortening - back;
+  store_where<D>(flowed, load<D>(flow, kAxial) + (longer - pressing.shortening), flow, kAxial);
+  store_where<D>(flowed, load<D>(flow, kLifted) + elongation, flow, kLifted);
+  store_where<D>(flowed, load<D>(flow, kShortened) + crushed, flow, kShortened);
+  store_where<D>(good, crushed, flow, kCrushed);
   for (int a = 1 - last; a <= 1 - first; ++a) store_where<D>(flowed, slip[a] + slid[a], flow, kSlip + a);
   store_where<D>(flowed, slipped, flow, kSlipped);
   if constexpr (!is_plane) {
@@ -801,13 +861,14 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
   if (HWY_UNLIKELY(!hn::AllFalse(tag, outside))) {
     auto flows = hn::AndNot(too_far, hn::And(outside, hn::Gt(constant(kFlows).v, zero.v)));
     if (softened) slide();
-    if (!hn::AllFalse(tag, flows)) flows = enter_cells<D, In, Hinges>(job, block, flows, k[0], d[0]);
+    Pressing<D> pressing;
+    if (!hn::AllFalse(tag, flows)) flows = enter_cells<D, In, Hinges>(job, block, flows, k[0], d[0], pressing);
     if (!hn::AllFalse(tag, flows)) {
       double* HWY_RESTRICT flow = job.flows + static_cast<size_t>(kFlowFields) * W * block;
       N f_flow[6], d_before[6];
       for (int c = 0; c < active.count; ++c) d_before[active.at[c]] = load<D>(flow, kBefore + active.at[c]);
       auto flowed = flows;
-      const auto good = flow_zone<D, In, Hinges>(flows, flow, x, k, d, was, f_flow, flowed);
+      const auto good = flow_zone<D, In, Hinges>(flows, flow, pressing, x, k, d, was, f_flow, flowed);
       for (int c = 0; c < active.count; ++c) {
         const int i = active.at[c];
         f[i] = select(good, f_flow[i], f[i]);

@@ -63,31 +63,43 @@ enum Slot : int {
 };
 inline constexpr double kLargestTurn = 0.25;  // kMostTurn of a live element: 60 degrees
 
-/// Fields of the slot of a zone that may flow in bending, shear and torsion; for axial flow the full law is asked.
+/// Fields of the slot of a zone that may flow in bending, shear, torsion and compression; for tension the full law is
+/// asked.
 enum Flow : int {
   kAxial = 0,           // plastic elongation
   kSlip = 1,            // along y, z (2)
   kTwist = 3,           //
   kFlowMost = 4,        // normal force at which it flows in tension
-  kFlowLeast = 5,       // in compression, whatever the rotation
-  kTurnedFrom = 6,      // lowest rotation of the interval of each family's compression capacity (2)
-  kTurnedLeast = 8,     // normal force there at which it flows (2)
-  kTurnedSlope = 10,    // and its rise with the rotation (2)
-  kTurnedFar = 12,      // rotation up to which that holds
-  kShearOwn = 13,       // limits without normal force and slip, along y, z (2)
-  kShearFriction = 15,  //
-  kSlipped = 16,        // so far
-  kSlipSoftening = 17,  // one over the slip at which nothing of the own limits is left
-  kSlipRupture = 18,    //
-  kTwisted = 19,        // so far
-  kTwistRupture = 20,   //
-  kTorsion = 21,        // limit
-  kFlexibility = 22,    // one over the stiffness, 0 for none (6)
-  kBefore = 28,         // deformation at the step before (6)
-  kStored = 34,         // elastic energy at the step before
-  kPlastic = 35,        // dissipated since the slot was written
-  kIdle = 36,           // steps without flow
-  kStations = 37,       // both stations, kStationFields each
+  kTurnedFrom = 5,      // lowest rotation of the interval of each family's compression capacity (2)
+  kTurnedLeast = 7,     // normal force there at which it flows while the section is whole (2)
+  kTurnedSlope = 9,     // and its rise with the rotation (2)
+  kTurnedFar = 11,      // rotation up to which that holds
+  kTurnedPart = 12,     // 1 where that falls with the section that is left, 0 where not
+  kLifted = 13,         // of the plastic elongation, what came with rotation
+  kShortened = 14,      // plastic shortening so far
+  kCrushed = 15,        // of it, in the step before
+  kCurveFrom = 16,      // interval of the compression curve: shortening where it begins ...
+  kCurveForce = 17,     // limit there
+  kCurveSlope = 18,     // and its rise
+  kCurveFar = 19,       // ... and ends
+  kWhole = 20,          // section that is left: this, and ...
+  kWholePerForce = 21,  // ... so much for each newton of that limit
+  kWrittenWhole = 22,   // what was left when the cells were written
+  kCrushLength = 23,    //
+  kShearOwn = 24,       // limits without normal force and slip, along y, z (2)
+  kShearFriction = 26,  //
+  kSlipped = 27,        // so far
+  kSlipSoftening = 28,  // one over the slip at which nothing of the own limits is left
+  kSlipRupture = 29,    //
+  kTwisted = 30,        // so far
+  kTwistRupture = 31,   //
+  kTorsion = 32,        // limit
+  kFlexibility = 33,    // one over the stiffness, 0 for none (6)
+  kBefore = 39,         // deformation at the step before (6)
+  kStored = 45,         // elastic energy at the step before
+  kPlastic = 46,        // dissipated since the slot was written
+  kIdle = 47,           // steps without flow
+  kStations = 48,       // both stations, kStationFields each
   kStationFields = 53,
   kFlowFields = kStations + 2 * kStationFields
 };
@@ -147,7 +159,8 @@ struct BodyJob {
 };
 
 /// Writes the cells of a zone that flows anew, around a normal force that has left them or a rotation that has, while
-/// the kernel waits; leaves them as they are where no cell has that force.
+/// the kernel waits; leaves them as they are where no cell has that force. `force` is that over the section that is
+/// left.
 struct CellWriter {
   void (*write)(void* owner, size_t slot, double force) = nullptr;
   void* owner = nullptr;

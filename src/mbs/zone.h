@@ -34,7 +34,7 @@ struct ZoneState {
   double axial = 0;                      // plastic elongation, signed [m]
   double lifted = 0;                     // of it, what came with rotation [m]
   double shortened = 0, elongated = 0;   // accumulated [m]
-  double crushed = 0;                    // of `shortened`, in the last evaluation by the full law [m]
+  double crushed = 0;                    // of `shortened`, in the last evaluation [m]
   double slip[2] = {0, 0}, slipped = 0;  // [m]
   double twist = 0, twisted = 0;         // [rad]
   StationState station[2];
@@ -104,11 +104,12 @@ double calc_bound_utilisation(const ZoneParameters&, const ZoneState&);
 /// Writes what the kernel needs to let a zone flow in bending, kernel::kFlowFields values; false if it cannot: a law on
 /// its way to another one, a crushed section, a force beyond the tables, an exponent other than 1.5, or no law at all.
 bool write_flow(const ZoneParameters&, const CompiledLaws&, ZoneState&, double time, double* fields);
-/// Of these the cells of the moment families and the compression limit around a normal force [N] and the rotations that
-/// its stations have reached [rad]; false, and cells as they were, if there is none. Looks up from the hints of z.
+/// Of these the cells of the moment families and the compression limit around a normal force over the section that is
+/// left [N], a plastic shortening [m] and the rotations that its stations have reached [rad]; false, and cells as they
+/// were, if there is none. Looks up from the hints of z.
 ///   stride  between the fields
-bool write_flow_cells(const ZoneParameters&, const CompiledLaws&, ZoneState&, double force, const double reached[2],
-                      double* fields, size_t stride);
+bool write_flow_cells(const ZoneParameters&, const CompiledLaws&, ZoneState&, double axial, double shortened,
+                      const double reached[2], double* fields, size_t stride);
 /// Lengthens a live zone's plastic axial deformation from outside; what that takes from or adds to the elastic energy
 /// is booked as plastic work. The resultants follow at the next evaluation.
 void elongate_zone(const ZoneParameters&, double by, ZoneState&);

@@ -114,24 +114,45 @@ double calc_bound_utilisation(const ZoneParameters& p, const ZoneState& z) {
 
 namespace {
 
-/// Compression limit over the rotation, from the interval of each family that it is in.
-void write_capacity(const CompiledLaw& law, const ZoneState& z, double whole, double reached, double* out,
-                    size_t stride) {
+/// The interval of the compression curve that a shortening is in, and what of the section is left along it.
+///   may_flow  false: the full law is to see the first flow
+void write_curve(const CompiledLaw& law, double shortened, bool may_flow, double* out, size_t stride) {
   using namespace kernel;
   const auto put = [&](int field, double x) { out[static_cast<size_t>(field) * stride] = x; };
-  put(kFlowLeast, -std::min(calc_curve(law.compression, z.shortened), kMostLimit));
-  const double share = law.elongates ? 1 : whole;
+  const CompiledCurve& curve = law.compression;
+  double from = 0, limit = kMostLimit, slope = 0, far = kUnlimited;
+  if (!curve.x.empty()) {
+    const auto next = std::upper_bound(curve.x.begin(), curve.x.end(), shortened);
+    const size_t i = static_cast<size_t>(std::max<std::ptrdiff_t>(next - curve.x.begin(), 1)) - 1;
+    from = curve.x[i], limit = curve.f[i];
+    if (next != curve.x.end()) {
+      far = *next;
+      slope = (curve.f[i + 1] - curve.f[i]) / (far - from);
+    }
+  }
+  const bool has_peak = law.peak_compression > 0, is_whole = from < law.peak_shortening || !has_peak;
+  put(kCurveFrom, from), put(kCurveForce, limit), put(kCurveSlope, slope);
+  put(kCurveFar, may_flow && (has_peak || curve.x.empty()) ? far : shortened);
+  put(kWhole, is_whole ? 1 : 0);
+  put(kWholePerForce, is_whole ? 0 : 1 / law.peak_compression);
+}
+
+/// Compression limit over the rotation, from the interval of each family that it is in.
+void write_capacity(const CompiledLaw& law, const ZoneState& z, double reached, double* out, size_t stride) {
+  using namespace kernel;
+  const auto put = [&](int field, double x) { out[static_cast<size_t>(field) * stride] = x; };
+  put(kTurnedPart, law.elongates ? 0 : 1);
   double far = kUnlimited;
   for (int q = 0; q < 2; ++q) {
     const CompiledFamily& family = law.moment[q];
     double from = 0, least = -kMostLimit, slope = 0;
     if (family.K > 0 && reached >= family.rotation.back()) {
-      least = -share * family.capacity.back();
+      least = -family.capacity.back();
     } else if (family.K > 0) {
       const size_t j = static_cast<size_t>(find_interval(family.rotation, reached, z.station[0].j[q]));
       from = family.rotation[j];
-      least = -share * family.capacity[j];
-      slope = -share * (family.capacity[j + 1] - family.capacity[j]) / (family.rotation[j + 1] - from);
+      least = -family.capacity[j];
+      slope = -(family.capacity[j + 1] - family.capacity[j]) / (family.rotation[j + 1] - from);
       far = std::min(far, family.rotation[j + 1]);
     }
     put(kTurnedFrom + q, from), put(kTurnedLeast + q, least), put(kTurnedSlope + q, slope);
@@ -141,19 +162,20 @@ void write_capacity(const CompiledLaw& law, const ZoneState& z, double whole, do
 
 }  // namespace
 
-bool write_flow_cells(const ZoneParameters& p, const CompiledLaws& laws, ZoneState& z, double force,
+bool write_flow_cells(const ZoneParameters& p, const CompiledLaws& laws, ZoneState& z, double axial, double shortened,
                       const double reached[2], double* out, size_t stride) {
   using namespace kernel;
   const auto law_of = [&](int s) -> const CompiledLaw& {
     return laws[static_cast<size_t>(z.base_law < 0 ? p.law[s] : z.base_law)];
   };
   // what is left of a crushed section carries both force and moment
-  const double whole = calc_integrity(law_of(0), z.shortened);
+  const double whole = calc_integrity(law_of(0), shortened);
   if (!(whole > 0)) return false;
-  const double axial = force / whole;
+  // while a section is crushed its force is on the edge, and beside it once part of the crushing is taken back
+  constexpr double on_edge = 1.01;
   for (int s = 0; s < p.stations; ++s)
     for (const CompiledFamily& family : law_of(s).moment)
-      if (family.K > 0 && !(axial > family.force.front() && axial < family.force.back())) return false;
+      if (family.K > 0 && !(axial >= on_edge * family.force.front() && axial < family.force.back())) return false;
   for (int s = 0; s < p.stations; ++s)
     for (int q = 0; q < 2; ++q) {
       const CompiledFamily& family = law_of(s).moment[q];
@@ -192,7 +214,9 @@ bool write_flow_cells(const ZoneParameters& p, const CompiledLaws& laws, ZoneSta
         put(kCellLiftNegative + c, lift[1]);
       }
     }
-  write_capacity(law_of(0), z, whole, std::max(reached[0], reached[1]), out, stride);
+  out[kWrittenWhole * stride] = whole;
+  write_curve(law_of(0), shortened, z.yielded, out, stride);
+  write_capacity(law_of(0), z, std::max(reached[0], reached[1]), out, stride);
   return true;
 }
 
@@ -225,8 +249,11 @@ bool write_flow(const ZoneParameters& p, const CompiledLaws& laws, ZoneState& z,
     }
   }
   const double reached[2] = {z.station[0].reached, z.station[1].reached};
-  if (!write_flow_cells(p, laws, z, z.normal_force, reached, out, 1)) return false;
+  const double whole = limits.integrity(z.shortened);
+  if (!write_flow_cells(p, laws, z, z.normal_force / whole, z.shortened, reached, out, 1)) return false;
   const CompiledLaw& law = limits.law();
+  out[kLifted] = z.lifted, out[kShortened] = z.shortened, out[kCrushed] = z.crushed;
+  out[kCrushLength] = law.crush_length;
   out[kFlowMost] = is_pressed ? -kTiny : limits.tension(z.elongated);
   for (int axis = 0; axis < 2; ++axis)
     out[kShearOwn + axis] = law.slip_softening > 0 ? std::min(law.shear[axis], kMostLimit) : 0;
@@ -264,13 +291,15 @@ double calc_utilisation(const ZoneParameters& p, const CompiledLaws& laws, doubl
   for (int s = 0; s < p.stations; ++s) {
     const Limits station_limits(laws, p.law[s], z, time);
     StationState st = z.station[s];
-    const double my = force[4] + p.x[s] * force[2], mz = force[5] - p.x[s] * force[1];
     const double axial = integrity > 0 ? force[0] / integrity : 0;
-    const MomentLimit ly = station_limits.moment(0, axial, st), lz = station_limits.moment(1, axial, st);
-    const double ry = ratio(std::abs(my), integrity * (my >= 0 ? ly.positive : ly.negative));
-    const double rz = ratio(std::abs(mz), integrity * (mz >= 0 ? lz.positive : lz.negative));
+    const auto bends = [&](int q, double m) {
+      if (m == 0) return 0.0;
+      const MomentLimit most = station_limits.moment(q, axial, st);
+      return ratio(std::abs(m), integrity * (m >= 0 ? most.positive : most.negative));
+    };
+    const double ry = bends(0, force[4] + p.x[s] * force[2]), rz = bends(1, force[5] - p.x[s] * force[1]);
     const double e = station_limits.law().biaxial_exponent;
-    u = std::max(u, root_of(raised(ry, e) + raised(rz, e), e));
+    u = std::max(u, ry == 0 ? rz : rz == 0 ? ry : root_of(raised(ry, e) + raised(rz, e), e));
   }
   const double vy = ratio(std::abs(force[1]), limits.shear(0, z.slipped, -force[0]));
   const double vz = ratio(std::abs(force[2]), limits.shear(1, z.slipped, -force[0]));
@@ -289,6 +318,7 @@ bool is_softening(const ZoneParameters& p, const CompiledLaws& laws, double time
       const Limits station_limits(laws, p.law[s], z, time);
       StationState now = z.station[s], fresh;
       if (now.reached == 0) continue;
+      std::copy(now.k, now.k + 2, fresh.k);  // where to look first
       const MomentLimit a = station_limits.moment(q, axial, now), b = station_limits.moment(q, axial, fresh);
       if (b.positive != kUnlimited && a.positive + a.negative < 0.85 * (b.positive + b.negative)) return true;
     }
