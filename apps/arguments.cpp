@@ -24,6 +24,8 @@ void add_run_options(CLI::App* verb, Arguments& a) {
   verb->add_option("--duration", a.duration, "simulated time, such as \"10 s\"")->type_name("QUANTITY");
   verb->add_option("--step", a.step, "time step, such as \"0.1 ms\"; chosen from the stiffest element if not given")
       ->type_name("QUANTITY");
+  verb->add_option("--step-share", a.step_share, "of that step, such as 0.5, to see what hangs on it")
+      ->check(CLI::Range(0.001, 1.0));
   verb->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
   verb->add_option("--engine", a.engine, "program that solves the multibody model");
   verb->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");

@@ -50,6 +50,7 @@ struct Arguments {
   std::string engines;                     // names between commas, empty: all
   std::string accuracy;                    // relative, as typed
   std::string duration, step, frame_rate;  // quantities as typed; empty: the plan's
+  double step_share = 1;
   std::vector<std::string> normal_forces;  // as typed
   std::string member, zone = "foot";       // of a plan
   std::string fuzzy;                       // file of fuzzy inputs, empty: none

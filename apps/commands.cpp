@@ -105,6 +105,7 @@ collapse::RunOptions make_options(const Arguments& a) {
   collapse::RunOptions o;
   o.duration = read_quantity(a.duration, Dimension::Time, "--duration");
   o.step = read_quantity(a.step, Dimension::Time, "--step");
+  o.step_share = a.step_share;
   o.frame_rate = read_quantity(a.frame_rate, Dimension::Frequency, "--frame-rate");
   o.threads = a.threads;
   o.engine = a.engine;

@@ -175,7 +175,7 @@ mbs::LawId Builder::law_of(int zone, const Stiffness& s, const std::string& name
 }
 
 mbs::SharedLaw Builder::make_hinge_law(int zone, const Stiffness& s, const std::string& name) {
-  const mbs::SharedLaw same = make_law(zone, s, name, bending_of_column());
+  mbs::SharedLaw same = make_law(zone, s, name, bending_of_column());
   if (hinge_about_y) return same;
   // y of the joint is -z of the column, its z is y of the column
   mbs::ZoneLaw law = *same;

@@ -142,9 +142,10 @@ record::Record run_model(const mbs::Model& model, const RunOptions& options, con
   Recorder recorder(model, map, k, r, callbacks);
   mbs::RunSettings settings;
   settings.duration = options.duration > 0 ? options.duration : 10;
-  settings.step = options.step;
+  settings.step = options.step_share * options.step;
   settings.frame_interval = 1 / (options.frame_rate > 0 ? options.frame_rate : 60);
   mbs::Options o = make_mbs_options(settings, k, options.threads, callbacks.progress);
+  o.step_share = options.step_share;
   record_into(recorder, o);
   o.equilibrium = options.equilibrium;
   o.rest_speed = options.rest_speed.value_or(k.rest_speed);

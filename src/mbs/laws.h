@@ -76,11 +76,11 @@ class Laws {
  public:
   class Iterator {
    public:
-    using iterator_category = std::forward_iterator_tag;
-    using value_type = ZoneLaw;
-    using difference_type = std::ptrdiff_t;
-    using pointer = const ZoneLaw*;
-    using reference = const ZoneLaw&;
+    using iterator_category = std::forward_iterator_tag;  // NOLINT(readability-identifier-naming)
+    using value_type = ZoneLaw;                           // NOLINT(readability-identifier-naming)
+    using difference_type = std::ptrdiff_t;               // NOLINT(readability-identifier-naming)
+    using pointer = const ZoneLaw*;                       // NOLINT(readability-identifier-naming)
+    using reference = const ZoneLaw&;                     // NOLINT(readability-identifier-naming)
     Iterator() = default;
     explicit Iterator(const SharedLaw* at) : at_(at) {}
     reference operator*() const { return **at_; }

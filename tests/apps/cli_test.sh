@@ -251,6 +251,8 @@ mbs)
   has e/outputs/lower_position.csv "time [s]"
   expect 2 "$topple" mbs run "$pendulum" -o e --equilibrium --no-equilibrium
   expect 0 "$topple" mbs run "$pendulum" -o f --no-report --step "1 ms" --duration 0.5s; has out "0.5 s in 500 steps of 1 ms"
+  expect 0 "$topple" mbs run "$pendulum" -o f --no-report --step "1 ms" --step-share 0.5 --duration 0.5s; has out "0.5 s in 1000 steps of 0.5 ms"
+  expect 2 "$topple" mbs run "$pendulum" -o f --no-report --step-share 2; has err "--step-share"
   # a mistake is shown where it stands
   sed 's/"child": "lower"/"child": "lwoer"/' "$pendulum" >typo.json
   expect 2 "$topple" mbs run typo.json -o g
