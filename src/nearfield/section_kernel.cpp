@@ -26,6 +26,7 @@ enum SteelField : size_t {
   kEpsY,
   kEpsU,
   kHardening,
+  kHardeningShare,
   kBuckling,
   kEpsStar,
   kStressStar,
@@ -129,7 +130,7 @@ HWY_INLINE Stress<D> calc_steel(D d, const double* row, hn::Vec<D> eps) {
   auto stress = hn::Mul(Es, hn::Sub(eps, field(kPlastic))), tangent = Es;
   const auto trial = hn::Sub(stress, back), excess = hn::Sub(hn::Abs(trial), fy);
   const auto flows = hn::Gt(excess, zero);
-  const auto bound = hn::Add(fy, hn::Mul(hn::Div(hardening, Es), excess));
+  const auto bound = hn::Add(fy, hn::Mul(field(kHardeningShare), excess));
   stress = hn::IfThenElse(flows, hn::Add(back, hn::CopySign(bound, trial)), stress);
   tangent = hn::IfThenElse(flows, hardening, tangent);
   // compression: the strength, Euler and Johnson, Dhakal & Maekawa
@@ -264,6 +265,7 @@ PackedSection pack_section(const Fibres& f) {
                                           s.eps_y,
                                           s.eps_u,
                                           s.hardening,
+                                          s.hardening / s.Es,
                                           s.buckling_stress,
                                           s.eps_star,
                                           s.stress_star,
