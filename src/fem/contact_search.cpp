@@ -59,8 +59,8 @@ class Search {
         team_(team),
         groups_(static_cast<std::uint32_t>(setup.group_starts.size() - 1)) {}
 
-  void look() {
-    const double elapsed = kLook * h_;
+  /// After so much time since the last look, for as much as is ahead until the next one.
+  void look(double elapsed, double ahead) {
     book_motion(elapsed);
     ContactState& c = s_.contact;
     bool stale = c.fresh;
@@ -69,11 +69,11 @@ class Search {
       make_pairs();
     else
       add_particles();
-    const auto [due, active] = list_pairs(elapsed);
+    const auto [due, active] = list_pairs(elapsed, ahead);
     make_skins(due);
     for_all(due.size(), 64, team_, [&](size_t i) { find_candidates(*due[i]); });
     c.searches += static_cast<long long>(due.size());
-    find_near(active, elapsed);
+    find_near(active, ahead);
     std::fill(c.changed.begin(), c.changed.end(), 0);
     c.any_changed = false;
     c.fresh = false;
@@ -255,7 +255,7 @@ class Search {
     std::vector<ContactPair*> active;  // with candidates that may be near
   };
   /// Those that are further apart than the margin need not be looked through until they have moved by that.
-  Pairs list_pairs(double elapsed) {
+  Pairs list_pairs(double elapsed, double ahead) {
     ContactState& c = s_.contact;
     constexpr size_t kRun = 4096;
     std::vector<Pairs> found((c.pairs.size() + kRun - 1) / kRun);
@@ -263,13 +263,13 @@ class Search {
       ContactPair& pair = c.pairs[i];
       const Vec3 now = c.speed[pair.a] - c.speed[pair.b], before = speed_before_[pair.a] - speed_before_[pair.b];
       const double apart = std::sqrt(std::max(dot(now, now), dot(before, before)));
-      const double path = (apart + most_spread_[pair.a] + most_spread_[pair.b]) * elapsed;
-      pair.moved += static_cast<float>(path);
+      const double pace = apart + most_spread_[pair.a] + most_spread_[pair.b];
+      pair.moved += static_cast<float>(pace * elapsed);
       const bool changed = c.changed[pair.b] != 0 || (pair.a < groups_ && c.changed[pair.a] != 0);
       Pairs& lists = found[i / kRun];
-      if (pair.moved + path <= pair.until && !changed) {
+      if (pair.moved + pace * ahead <= pair.until && !changed) {
         // at more than the pace, as it may be larger than at present
-        if (!pair.candidates.empty() && 2 * pair.moved + calc_path(path / elapsed, elapsed) > pair.free)
+        if (!pair.candidates.empty() && 2 * pair.moved + calc_path(pace, ahead) > pair.free)
           lists.active.push_back(&pair);
         return;
       }
@@ -584,25 +584,33 @@ ContactSetup make_contact_setup(const ExplicitModel& model, const ExplicitChunks
   return setup;
 }
 
-void search_contact(const ContactSetup& setup, ExplicitState& state, ContactFaces& faces, double h, Team& team,
-                    double& seconds) {
+/// Steps between looks, which are where debris stands at the time of the nodes.
+static int calc_look(const ExplicitSystem::Inside& in) {
+  return (kLook + in.debris_steps - 1) / in.debris_steps * in.debris_steps;
+}
+
+void search_contact(ExplicitSystem::Inside& in, ExplicitState& state) {
+  const ContactSetup& setup = in.contact;
   ContactState& c = state.contact;
   if (c.gone.empty()) c.gone.assign(setup.rows_of_element.size(), 0);
   if (c.changed.empty()) c.changed.assign(setup.group_starts.size() - 1, 0);
-  if (!c.fresh && --c.countdown > 0) return;
+  if (!c.fresh) {
+    ++c.since;
+    if (!in.pushes_debris(state) || (c.since < kLook && !c.knocked)) return;
+  }
   const auto start = std::chrono::steady_clock::now();
-  c.countdown = kLook;
-  faces.resize(setup.group_starts.size() - 1);
-  Search(setup, state, faces, h, team).look();
+  in.contact_faces.resize(setup.group_starts.size() - 1);
+  Search(setup, state, in.contact_faces, in.h, *in.team).look(c.since * in.h, calc_look(in) * in.h);
+  c.since = 0, c.knocked = false;
   static std::atomic<std::uint64_t> looks = 0;
   c.look = ++looks;
-  seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  in.timing.search += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-bool is_knocked(const ContactSetup& setup, const ExplicitState& state, double h, size_t first, size_t last) {
+bool is_knocked(const ExplicitSystem::Inside& in, const ExplicitState& state, size_t first, size_t last) {
   const ContactState& c = state.contact;
-  const size_t groups = setup.group_starts.size() - 1;
-  const double most = kLeastShare * setup.margin / (kLook * h);
+  const size_t groups = in.contact.group_starts.size() - 1;
+  const double most = kLeastShare * in.contact.margin / (calc_look(in) * in.h);
   for (size_t i = first; i < last && groups + i < c.speed.size(); ++i) {
     const Vec3 gain = state.particles[i].v - c.speed[groups + i];
     if (dot(gain, gain) > most * most) return true;

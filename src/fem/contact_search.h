@@ -111,9 +111,11 @@ struct ContactState {
   std::vector<unsigned char> changed;  // groups whose surface has changed
   bool any_changed = false;
   bool fresh = true;       // no boxes yet
-  int countdown = 0;       // steps until the next look
+  bool knocked = false;    // debris has gained more speed than the last look reckons with
+  int since = 0;           // steps since the last look
   std::uint64_t look = 0;  // which found what is near, like no other; 0: not known
-  TouchSums touching;      // in the last step
+  TouchSums touching;      // of surfaces in the last step
+  TouchSums debris;        // of debris at its last forces; power of impulses over a step, 0 where there are none
   long long searches = 0;
 };
 

@@ -40,6 +40,24 @@ kernel::Law make_law(const ExplicitMaterial& m) {
 /// What is shared out by rows goes to this many tasks.
 constexpr size_t kTasks = 16;
 
+/// Steps of the elements in one of the debris (docs/theory/explicit.md, eq. 23): as many as are stable where balls of
+/// one size are packed most densely, which have 8 times the squared frequency of one spring and dashpots alike. Forces
+/// held on nodes lag by half of what a step is longer, a dashpot that gives: there must be twice as much of the other
+/// kind.
+int choose_debris_steps(double damping) {
+  constexpr int kMost = 4;
+  constexpr double kNeighbours = 8;
+  int steps = kMost;
+  const auto is_stable = [&] {
+    const double spring = kNeighbours * kDebrisRate * steps * steps;
+    const double dashpot = kNeighbours * 2 * damping * std::sqrt(kDebrisRate / 2) * steps;
+    const double lag = 0.25 * (steps - 1) * std::sqrt(kTouchRate);
+    return spring + 2 * dashpot < 4 && damping >= 2 * lag;
+  };
+  while (steps > 1 && !is_stable()) --steps;
+  return steps;
+}
+
 double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 }  // namespace
@@ -135,7 +153,7 @@ ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
   std::sort(loaded.begin(), loaded.end());
   loaded.erase(std::unique(loaded.begin(), loaded.end()), loaded.end());
   for (const std::uint32_t row : loaded) push_load(s, row);
-  s.ground_forces.assign(model.grounds.size(), {});
+  s.ground_forces.assign(model.grounds.size(), {}), s.debris_forces = s.ground_forces;
   s.touchdowns.assign(static_cast<size_t>(parts), -1);
   for (size_t row = 0; row < rows; ++row)
     for (const ExplicitGround& g : model.grounds) {
@@ -145,6 +163,7 @@ ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
         break;
       }
     }
+  debris_steps = options.debris_steps > 0 ? options.debris_steps : choose_debris_steps(options.debris_damping);
   double edge = options.search_margin;
   if (!(edge > 0)) edge = calc_mesh_summary(model).smallest_edge / 3;
   contact = make_contact_setup(model, chunks, edge, options.contact);
@@ -274,22 +293,23 @@ void ExplicitSystem::Inside::advance_step(ExplicitState& state, bool removes) {
   if (state.begins) step.past = 0;
   state.begins = false;
   const double t0 = seconds();
+  const bool debris = pushes_debris(state);
   clear_pushes(state);
-  press_grounds(state);
+  press_grounds(state, debris);
   double t1 = seconds();
   timing.contact += t1 - t0;
   const bool has_contact = options.contact || !state.particles.empty();
   if (has_contact) {
-    search_contact(contact, state, contact_faces, h, *team, timing.search);
+    search_contact(*this, state);
     timing.searches = state.contact.searches;
     t1 = seconds();
-    press_surfaces(*this, state);
+    press_surfaces(*this, state, debris);
     timing.contact += seconds() - t1;
   }
   advance_nodes(step, state);
   const double t2 = seconds();
-  move_particles(state);
-  book_grounds(state);
+  if (debris) move_particles(state);
+  book_grounds(state, debris);
   if (has_contact) book_surfaces(*this, state);
   for (const auto& sums : chunk_sums)
     for (size_t k = 0; k < 4; ++k) state.sums[k] += sums[k];

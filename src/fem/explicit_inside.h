@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "base/aligned.h"
@@ -39,6 +40,12 @@ struct ContactWork {
   double normal = 0, friction = 0, stored = 0;
 };
 
+/// What debris exerts on a node from its forces to its next ones.
+struct HeldPush {
+  Vec3 normal_force, friction;  // [N]
+  std::uint32_t row = 0, unused = 0;
+};
+
 /// A touch of the step; forces on the point [N].
 struct FaceTouch {
   Vec3 normal_force, friction;
@@ -49,6 +56,7 @@ struct FaceTouch {
 };
 /// What a task has of near candidates and what touches.
 struct ContactTask {
+  bool is_debris = false;  // its touches are those of debris
   std::uint64_t look = 0;  // that candidates are of
   lanes::Faces faces;
   std::vector<ContactPoint> points;  // of faces
@@ -74,12 +82,14 @@ struct ExplicitState {
   AlignedVector<Particle> particles;
   std::vector<ParticlePush> particle_pushes;
   std::vector<ParticleMake> particle_makes;
-  std::vector<GroundTouch> touches;  // of nodes
-  TouchSums ground_touching;         // of particles
-  ContactWork ground_work, surface_work;
+  std::vector<GroundTouch> touches;       // of nodes
+  TouchSums ground_touching;              // of particles, as ContactState::debris
+  ContactWork ground_work, surface_work;  // but for
+  std::vector<HeldPush> held;             //
+  ContactWork held_work;                  // at the speeds of steps so far, those before this one half where it begins
   ContactState contact;
-  std::vector<Vec3> ground_forces;
-  std::vector<double> touchdowns;  // by part
+  std::vector<Vec3> ground_forces, debris_forces;  // on grounds: of all, of particles at their last forces
+  std::vector<double> touchdowns;                  // by part
   double removed_internal = 0, removed_kinetic = 0, removed_gravity = 0;
   std::vector<Removal> removals;
 };
@@ -96,6 +106,7 @@ struct ExplicitSystem::Inside {
   AlignedVector<double> loads;                       // constant forces, 4 a row
   std::vector<std::uint32_t> loaded;                 // rows with such
   double h = 0, added_mass = 0;
+  int debris_steps = 1;  // of h in a step of the debris
   int scaled_elements = 0, parts = 0;
 
   ExplicitState s;
@@ -108,8 +119,10 @@ struct ExplicitSystem::Inside {
   std::vector<std::vector<std::uint32_t>> failed, grounded;
   std::vector<std::array<double, 4>> chunk_sums;
   std::vector<kernel::Balance> balances;  // of chunks, then of shares of the shared nodes
-  std::vector<ContactTask> contact_tasks;
-  ContactFaces contact_faces;  // of the last look
+  std::vector<ContactTask> contact_room;
+  std::span<ContactTask> contact_tasks;   // of the step, in that room
+  std::vector<std::uint32_t> held_place;  // of rows; 0: none (rows)
+  ContactFaces contact_faces;             // of the last look
   mutable std::vector<GroundShare> ground_shares;
   ExplicitState spare;  // kept, so that copies need no new memory
   Timing timing;
@@ -129,9 +142,18 @@ struct ExplicitSystem::Inside {
   /// One step of everything; `removes`: failed elements go.
   void advance_step(ExplicitState&, bool removes);
   void remove_element(ExplicitState&, int element, RemovalCause) const;
+  /// Books what debris has done to a node that goes, and returns the impulse that it does not get any more [N s].
+  Vec3 end_held(ExplicitState&, std::uint32_t row) const;
   void add_debris(ExplicitState&, int element, const std::array<Vec3, 8>& v) const;
-  void press_grounds(ExplicitState&) const;
-  void book_grounds(ExplicitState&) const;
+  /// Whether forces of debris act in the step that is to come: impulses of debris_steps times as long.
+  bool pushes_debris(const ExplicitState& state) const { return state.steps % debris_steps == 0; }
+  double debris_step() const { return debris_steps * h; }
+  /// Particles stand where they will be at their next forces, by so much time ahead [s].
+  double calc_lead(const ExplicitState& state) const {
+    return static_cast<double>((debris_steps - state.steps % debris_steps) % debris_steps) * h;
+  }
+  void press_grounds(ExplicitState&, bool debris) const;
+  void book_grounds(ExplicitState&, bool debris) const;
   void move_particles(ExplicitState&) const;
   /// Calls body(share, first, last) for shares of the particles, the same for any number of threads.
   template <class Body>

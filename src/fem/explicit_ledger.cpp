@@ -23,7 +23,7 @@ void add_to(TouchSums& sums, const GroundTouch& t) {
 
 }  // namespace
 
-void ExplicitSystem::Inside::press_grounds(ExplicitState& state) const {
+void ExplicitSystem::Inside::press_grounds(ExplicitState& state, bool debris) const {
   state.touches.clear();
   std::fill(state.ground_forces.begin(), state.ground_forces.end(), Vec3{});
   const auto press = [&](std::uint32_t row, bool particle, const Vec3& p, const Vec3& v, double mass, double radius,
@@ -65,6 +65,14 @@ void ExplicitSystem::Inside::press_grounds(ExplicitState& state) const {
       if (first < 0) first = static_cast<double>(state.steps) * h;
     }
   }
+  const auto add_debris_forces = [&] {
+    for (size_t i = 0; i < state.ground_forces.size(); ++i) state.ground_forces[i] += state.debris_forces[i];
+  };
+  if (!debris) {
+    state.ground_touching.normal = state.ground_touching.friction = 0;
+    add_debris_forces();
+    return;
+  }
   std::vector<GroundShare>& shares = ground_shares;
   shares.resize(particle_shares(state));
   for_particles(state, [&](size_t share, size_t first, size_t last) {
@@ -89,13 +97,16 @@ void ExplicitSystem::Inside::press_grounds(ExplicitState& state) const {
     }
   });
   state.ground_touching = {};
+  std::fill(state.debris_forces.begin(), state.debris_forces.end(), Vec3{});
   for (const GroundShare& share : shares) {
     state.ground_touching += share.sums;
-    for (size_t i = 0; i < share.forces.size(); ++i) state.ground_forces[i] += share.forces[i];
+    for (size_t i = 0; i < share.forces.size(); ++i) state.debris_forces[i] += share.forces[i];
   }
+  state.ground_touching.normal *= debris_steps, state.ground_touching.friction *= debris_steps;
+  add_debris_forces();
 }
 
-void ExplicitSystem::Inside::book_grounds(ExplicitState& state) const {
+void ExplicitSystem::Inside::book_grounds(ExplicitState& state, bool debris) const {
   state.ground_work.stored = 0;
   for (const GroundTouch& t : state.touches) {
     const Vec3 now = vector_at(state.rows.data() + 8 * static_cast<size_t>(t.row) + kernel::kSpeed);
@@ -103,6 +114,7 @@ void ExplicitSystem::Inside::book_grounds(ExplicitState& state) const {
     state.ground_work.normal += dot(t.normal_force, path);
     state.ground_work.friction += dot(t.friction, path);
   }
+  if (!debris) return;
   std::vector<ContactWork> work(ground_shares.size());
   team->run(work.size(), [&](size_t share) {
     const GroundShare& of = ground_shares[share];
@@ -111,31 +123,32 @@ void ExplicitSystem::Inside::book_grounds(ExplicitState& state) const {
       const Vec3& now = state.particles[t.row].v;
       normal += dot(t.normal_force, now), friction += dot(t.friction, now);
     }
-    work[share].normal = 0.5 * h * normal, work[share].friction = 0.5 * h * friction;
+    work[share].normal = 0.5 * debris_step() * normal, work[share].friction = 0.5 * debris_step() * friction;
   });
   for (const ContactWork& w : work) state.ground_work.normal += w.normal, state.ground_work.friction += w.friction;
 }
 
 void ExplicitSystem::Inside::move_particles(ExplicitState& state) const {
   std::vector<unsigned char> knocked(particle_shares(state), 0);
+  const double step = debris_step();
   for_particles(state, [&](size_t share, size_t first, size_t last) {
     for (size_t i = first; i < last; ++i) {
       Particle& q = state.particles[i];
       const ParticlePush& push = state.particle_pushes[i];
-      q.v += (h / q.mass) * push.force;
-      q.p += h * q.v;
+      q.v += (step / q.mass) * push.force;
+      q.p += step * q.v;
       if (push.crushed == 0) continue;
       const double full = state.particle_makes[i].full_radius;
-      // room permitting it grows to its volume within a tenth of a second
+      // room permitting it grows to its volume within a tenth of a second for each step of the elements in one of it
       if (push.crushed > 0)
         q.radius = std::max(std::min(q.radius, kLeastRadius * full), q.radius - push.crushed);
       else if (q.radius < full)
         q.radius = std::min(full, q.radius + 10 * h * full);
     }
-    knocked[share] = is_knocked(contact, state, h, first, last) ? 1 : 0;
+    knocked[share] = is_knocked(*this, state, first, last) ? 1 : 0;
   });
   for (const unsigned char is : knocked)
-    if (is != 0) state.contact.countdown = 0;
+    if (is != 0) state.contact.knocked = true;
 }
 
 std::array<double, 3> ExplicitSystem::Inside::calc_elastic(const ExplicitState& state, int element) const {
@@ -211,11 +224,26 @@ void ExplicitSystem::Inside::add_debris(ExplicitState& state, int element, const
         make.full_radius = std::cbrt(3 * volume / (4 * M_PI));
         q.radius = std::min(0.475 * side, make.full_radius);
         // as stiff as a ball of the material between plates, as far as the step allows
-        make.stiffness = std::min(0.02 * q.mass / (h * h), law.E * q.radius);
+        make.stiffness = std::min(kDebrisRate * q.mass / (h * h), law.E * q.radius);
         make.bears = law.points > 0 ? law.compression[0] * M_PI * make.full_radius * make.full_radius : 1e300;
         make.element = element;
+        q.p += calc_lead(state) * q.v;
         state.particles.push_back(q), state.particle_pushes.emplace_back(), state.particle_makes.push_back(make);
       }
+}
+
+Vec3 ExplicitSystem::Inside::end_held(ExplicitState& state, std::uint32_t row) const {
+  Vec3 impulse;
+  const Vec3 v = vector_at(state.rows.data() + 8 * size_t{row} + kernel::kSpeed);
+  for (HeldPush& held : state.held) {
+    if (held.row != row) continue;
+    // they have worked to the end of the step
+    state.held_work.normal += 0.5 * h * dot(held.normal_force, v);
+    state.held_work.friction += 0.5 * h * dot(held.friction, v);
+    impulse += calc_lead(state) * (held.normal_force + held.friction);
+    held.normal_force = held.friction = {};
+  }
+  return impulse;
 }
 
 void ExplicitSystem::Inside::remove_element(ExplicitState& state, int element, RemovalCause cause) const {
@@ -236,6 +264,11 @@ void ExplicitSystem::Inside::remove_element(ExplicitState& state, int element, R
     v[i] = vector_at(r + kernel::kSpeed);
     state.removed_kinetic += 0.5 * share * dot(v[i], v[i]);
   }
+  // what debris would still give to nodes that go
+  Vec3 rest;
+  for (const std::uint32_t row : rows_of_element[e])
+    if (state.uses[row] == 1) rest += end_held(state, row);
+  for (Vec3& speed : v) speed += (1 / element_mass[e]) * rest;
   if (cause != RemovalCause::Charge && options.debris) {
     const size_t first = state.particles.size();
     add_debris(state, element, v);
@@ -288,10 +321,11 @@ ExplicitEnergy ExplicitSystem::Inside::calc_energy() {
   for (const std::uint32_t row : loaded)
     energy.loads +=
         dot(vector_at(loads.data() + 4 * size_t{row}), vector_at(s.rows.data() + 8 * size_t{row}) - start[row]);
+  const double lead = calc_lead(s);
   for (size_t i = 0; i < s.particles.size(); ++i) {
     const Particle& q = s.particles[i];
     energy.debris_kinetic += 0.5 * q.mass * dot(q.v, ahead.particles[i].v);
-    energy.gravity -= q.mass * dot(model.gravity, q.p - s.particle_makes[i].start);
+    energy.gravity -= q.mass * dot(model.gravity, q.p - lead * q.v - s.particle_makes[i].start);
   }
   for (size_t e = 0; e < element_mass.size(); ++e) {
     const auto stored = calc_elastic(ahead, static_cast<int>(e));
@@ -308,8 +342,11 @@ ExplicitEnergy ExplicitSystem::Inside::calc_energy() {
   TouchSums ground = ahead.ground_touching;
   for (const GroundTouch& t : ahead.touches) add_to(ground, t);
   book(s.ground_work, ground.normal, ground.friction, ground.stored);
-  const TouchSums& sums = ahead.contact.touching;
-  book(s.surface_work, sums.normal, sums.friction, sums.stored);
+  TouchSums sums = ahead.contact.touching;
+  sums += ahead.contact.debris;
+  ContactWork surface = s.surface_work;
+  surface.normal += ahead.held_work.normal, surface.friction += ahead.held_work.friction;
+  book(surface, sums.normal, sums.friction, sums.stored);
   energy.removed_internal = s.removed_internal, energy.removed_kinetic = s.removed_kinetic;
   energy.removed_gravity = s.removed_gravity;
   energy.start = start_energy;

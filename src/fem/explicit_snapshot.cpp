@@ -9,7 +9,7 @@ namespace topple::fem {
 
 namespace {
 
-constexpr std::uint64_t kMark = 0x7470'6578'0000'000b;  // name and version of the layout
+constexpr std::uint64_t kMark = 0x7470'6578'0000'000c;  // name and version of the layout
 
 class Writer {
  public:
@@ -68,23 +68,29 @@ void pass_state(Archive& archive, State& s) {
   archive.list(s.pushes), archive.list(s.pushed), archive.list(s.grounded), archive.list(s.uses), archive.value(s.sums);
   archive.list(s.particles), archive.list(s.particle_pushes), archive.list(s.particle_makes);
   archive.list(s.touches), archive.value(s.ground_touching), archive.value(s.ground_work),
-      archive.value(s.surface_work);
-  archive.list(s.ground_forces), archive.list(s.touchdowns), archive.list(s.removals);
+      archive.value(s.surface_work), archive.list(s.held), archive.value(s.held_work);
+  archive.list(s.ground_forces), archive.list(s.debris_forces), archive.list(s.touchdowns), archive.list(s.removals);
   archive.value(s.removed_internal), archive.value(s.removed_kinetic), archive.value(s.removed_gravity);
   auto& c = s.contact;
   archive.list(c.gone), archive.list(c.particle_pairs), archive.list(c.particle_free), archive.list(c.near),
       archive.list(c.near_particles);
   archive.list(c.boxes), archive.list(c.room), archive.list(c.travel), archive.list(c.speed);
   archive.list(c.spread), archive.list(c.changed), archive.value(c.any_changed), archive.value(c.fresh);
-  archive.value(c.countdown), archive.value(c.touching), archive.value(c.searches);
+  archive.value(c.knocked), archive.value(c.since), archive.value(c.touching), archive.value(c.debris),
+      archive.value(c.searches);
 }
 
 /// What tells one model and its options from others.
-std::array<double, 6> describe(const ExplicitSystem::Inside& in) {
+std::array<double, 7> describe(const ExplicitSystem::Inside& in) {
   double sum = 0;
   for (size_t e = 0; e < in.element_mass.size(); ++e) sum += static_cast<double>(e % 97 + 1) * in.element_mass[e];
-  return {static_cast<double>(in.model.nodes.size()), static_cast<double>(in.model.elements.size()), in.h, sum,
-          static_cast<double>(in.chunks.W),           static_cast<double>(in.model.grounds.size())};
+  return {static_cast<double>(in.model.nodes.size()),
+          static_cast<double>(in.model.elements.size()),
+          in.h,
+          sum,
+          static_cast<double>(in.chunks.W),
+          static_cast<double>(in.model.grounds.size()),
+          static_cast<double>(in.debris_steps)};
 }
 
 }  // namespace
@@ -106,7 +112,7 @@ void ExplicitSystem::read_snapshot(std::span<const std::byte> bytes) {
   Inside& in = *inside_;
   Reader from(bytes);
   std::uint64_t mark = 0;
-  std::array<double, 6> description{};
+  std::array<double, 7> description{};
   from.value(mark), from.value(description);
   if (mark != kMark || description != describe(in)) Reader::fail();
   ExplicitState s;

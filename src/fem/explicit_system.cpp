@@ -111,10 +111,11 @@ const std::vector<Removal>& ExplicitSystem::removals() const { return inside_->s
 const std::vector<DebrisParticle>& ExplicitSystem::debris() const {
   auto& view = inside_->debris_view;
   view.clear();
+  const double lead = inside_->calc_lead(inside_->s);
   for (size_t i = 0; i < inside_->s.particles.size(); ++i) {
     const Particle& q = inside_->s.particles[i];
     const ParticleMake& make = inside_->s.particle_makes[i];
-    view.push_back({q.p, q.v, q.mass, q.radius, make.full_radius, make.element});
+    view.push_back({q.p - lead * q.v, q.v, q.mass, q.radius, make.full_radius, make.element});
   }
   return view;
 }
@@ -149,7 +150,9 @@ bool ExplicitSystem::touches_ground(int node) const {
                      [&](const GroundTouch& t) { return t.row == row; });
 }
 const std::vector<double>& ExplicitSystem::touchdowns() const { return inside_->s.touchdowns; }
-int ExplicitSystem::contacts() const { return static_cast<int>(inside_->s.contact.touching.count); }
+int ExplicitSystem::contacts() const {
+  return static_cast<int>(inside_->s.contact.touching.count + inside_->s.contact.debris.count);
+}
 
 double ExplicitSystem::calc_mass() const {
   double mass = 0;
@@ -173,7 +176,8 @@ Vec3 ExplicitSystem::calc_centre_of_mass() const {
     const double* r = inside_->s.rows.data() + 8 * row;
     sum += r[kernel::kNodeMass] * Vec3{r[0], r[1], r[2]}, mass += r[kernel::kNodeMass];
   }
-  for (const Particle& q : inside_->s.particles) sum += q.mass * q.p, mass += q.mass;
+  const double lead = inside_->calc_lead(inside_->s);
+  for (const Particle& q : inside_->s.particles) sum += q.mass * (q.p - lead * q.v), mass += q.mass;
   return (1 / mass) * sum;
 }
 

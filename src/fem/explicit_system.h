@@ -29,6 +29,7 @@ struct ExplicitOptions {
   double contact_damping = 0.1;      // of critical, ground too; 0: elastic
   double debris_damping = 0.5;       // the same where debris takes part: rubble does not bounce
   bool debris = true;                // what is crushed or torn stays as particles
+  int debris_steps = 0;              // steps of the elements in one of the debris; 0: as many as its springs allow
   double search_margin = 0;          // reach of a contact search [m]; 0: a third of the smallest edge
 };
 

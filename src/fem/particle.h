@@ -9,6 +9,9 @@
 
 namespace topple::fem {
 
+/// Largest penalty rate of a ball over its mass and the elements' step squared.
+inline constexpr double kDebrisRate = 0.02;  // NOLINT(readability-identifier-naming)
+
 using ParticlePair = std::array<std::uint32_t, 2>;  // the later one first
 
 /// A ball of debris in three parts, so that steps pass over no more memory than they must. A line of the cache:

@@ -56,7 +56,7 @@ RelaxationSummary relax_system(ExplicitSystem::Inside& in, const RelaxationOptio
   for (; summary.steps < options.most_steps && !progress.is_cancelled(); ++summary.steps) {
     const double ramp = std::min(1.0, (summary.steps + 1.0) / std::max(1, options.ramp));
     in.clear_pushes(s);
-    in.press_grounds(s);
+    in.press_grounds(s, false);
     for (int c = 0; c < 3; ++c) step.weight[c] = ramp * in.model.gravity[c];
     // nodal forces, which a push begins with, rise as well
     if (ramp < 1)
@@ -93,7 +93,7 @@ RelaxationSummary relax_system(ExplicitSystem::Inside& in, const RelaxationOptio
     if (progress.report && summary.steps % 100 == 0) progress.report(summary.steps, options.most_steps);
   }
   s.steps = steps;
-  s.contact.pairs.clear(), s.contact.fresh = true;  // of other places
+  s.contact.pairs.clear(), s.contact.fresh = true, s.held.clear();  // of other places
   in.clear_pushes(s);
   for (const std::uint32_t row : live) {
     double* r = s.rows.data() + 8 * size_t{row};

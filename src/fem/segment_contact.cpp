@@ -13,9 +13,8 @@ namespace topple::fem {
 
 namespace {
 
-/// Penalty rate over the mass felt and the step squared, and the share of that mass that a dashpot of friction stops in
-/// a step: a node takes part in up to ten touches.
-constexpr double kRate = 0.03, kGrip = 0.02;
+/// Of the mass felt: what a dashpot of friction stops in a step.
+constexpr double kGrip = 0.02;
 
 Vec3 vector_at(const double* r) { return {r[0], r[1], r[2]}; }
 
@@ -115,7 +114,13 @@ void press_points(const ContactSetup& setup, const ExplicitOptions& options, dou
     std::copy_n(t.weights, 4, touch.weights);
     touch.crushed = t.crushed, touch.rows = near[faces.number[t.candidate]].rows;
     touch.point = task.points[faces.point[t.candidate]];
-    task.sums.normal += t.normal, task.sums.friction += t.rubbing, task.sums.stored += t.stored;
+    task.sums.stored += t.stored;
+    if (!task.is_debris) {
+      task.sums.normal += t.normal, task.sums.friction += t.rubbing;
+      return;
+    }
+    const Vec3& v = faces.points[faces.point[t.candidate]].v;
+    task.sums.normal += dot(t.normal_force, v), task.sums.friction += dot(t.friction, v);
   };
   // elements may have gone since the look
   const auto is_there = [&](const lanes::Touch& t) {
@@ -125,7 +130,7 @@ void press_points(const ContactSetup& setup, const ExplicitOptions& options, dou
     if (point.kind == ContactPoint::Centre && c.gone[point.index / 6] != 0) return false;
     return faces.points[number].inverse_mass > 0 && c.gone[near[faces.number[t.candidate]].candidate.face / 6] == 0;
   };
-  const lanes::Setup lanes_setup{s.rows.data(), h, options.friction, kRate, kGrip};
+  const lanes::Setup lanes_setup{s.rows.data(), h, options.friction, kTouchRate, kGrip};
   for (size_t first = 0; first < faces.point.size();) {
     size_t last = std::min(first + kRun, faces.point.size());
     while (last < faces.point.size() && faces.point[last] == faces.point[last - 1]) ++last;
@@ -170,38 +175,95 @@ void press_particles(const ExplicitOptions& options, double h, const ExplicitSta
   lanes::press_particles(setup, task.particles, task.particles_touched, task.sums);
 }
 
+/// Forces of debris on nodes, until its next ones.
+void list_held(ExplicitSystem::Inside& in, ExplicitState& s) {
+  std::vector<std::uint32_t>& place = in.held_place;
+  place.resize(s.flags.size(), 0);
+  s.held.clear();
+  for (const ContactTask& task : in.contact_tasks) {
+    if (!task.is_debris) continue;
+    for (const FaceTouch& touch : task.faces_touched)
+      for (size_t k = 0; k < 4; ++k) {
+        std::uint32_t& at = place[touch.rows[k]];
+        if (at == 0) s.held.push_back({{}, {}, touch.rows[k]}), at = static_cast<std::uint32_t>(s.held.size());
+        HeldPush& held = s.held[at - 1];
+        held.normal_force += -touch.weights[k] * touch.normal_force;
+        held.friction += -touch.weights[k] * touch.friction;
+      }
+  }
+  for (const HeldPush& held : s.held) place[held.row] = 0;
+}
+/// Calls body(held) for all, with work of so many steps at the present speeds: half where forces begin and end.
+template <class Body>
+void for_held(const ExplicitSystem::Inside& in, ExplicitState& s, double steps, const Body& body) {
+  constexpr size_t kAhead = 8;  // rows that lie all over memory
+  double normal = 0, friction = 0;
+  for (size_t i = 0; i < s.held.size(); ++i) {
+    if (i + kAhead < s.held.size()) {
+      const size_t row = s.held[i + kAhead].row;
+      hwy::Prefetch(s.rows.data() + 8 * row), hwy::Prefetch(s.pushes.data() + 4 * row);
+    }
+    const HeldPush& held = s.held[i];
+    const Vec3 v = vector_at(s.rows.data() + 8 * size_t{held.row} + kernel::kSpeed);
+    normal += dot(held.normal_force, v), friction += dot(held.friction, v);
+    body(held);
+  }
+  s.held_work.normal += steps * in.h * normal, s.held_work.friction += steps * in.h * friction;
+}
+
 }  // namespace
 
-void press_surfaces(ExplicitSystem::Inside& in, ExplicitState& s) {
+void press_surfaces(ExplicitSystem::Inside& in, ExplicitState& s, bool debris) {
   ContactState& c = s.contact;
-  const std::vector<NearCandidate>& near = c.near;
-  // their number depends on nothing else, so that sums over them are always the same
-  const size_t pairs = c.near_particles.size(), tasks = std::clamp<size_t>((near.size() + pairs) / 256, 1, 16);
-  // all candidates of a point belong to one task
-  const auto begin_of = [&](size_t task) {
-    size_t i = near.size() * task / tasks;
-    while (i > 0 && i < near.size() && near[i].candidate.point == near[i - 1].candidate.point) ++i;
-    return i;
-  };
-  in.contact_tasks.resize(tasks);
+  const std::span<const NearCandidate> near = c.near;
+  const size_t pairs = c.near_particles.size();
+  const auto is_surface = [](const NearCandidate& n) { return n.candidate.point.kind != ContactPoint::Debris; };
+  const auto surfaces = static_cast<size_t>(std::partition_point(near.begin(), near.end(), is_surface) - near.begin());
+  // their numbers depend on nothing else, so that sums over them are always the same
+  const auto tasks_of = [](size_t work) { return work > 0 ? std::clamp<size_t>(work / 256, 1, 16) : 0; };
+  const size_t first_debris = tasks_of(surfaces);
+  const size_t tasks = first_debris + (debris ? tasks_of(near.size() - surfaces + pairs) : 0);
+  in.contact_room.resize(std::max(tasks, in.contact_room.size()));
+  in.contact_tasks = std::span(in.contact_room).first(tasks);
   in.team->run(tasks, [&](size_t number) {
     ContactTask& task = in.contact_tasks[number];
     task.faces_touched.clear(), task.particles_touched.clear(), task.sums = {};
-    const size_t first = begin_of(number), last = begin_of(number + 1);
-    const std::span<const NearCandidate> candidates = std::span(near).subspan(first, last - first);
+    task.is_debris = number >= first_debris;
+    const std::span<const NearCandidate> mine = task.is_debris ? near.subspan(surfaces) : near.first(surfaces);
+    const size_t place = task.is_debris ? number - first_debris : number;
+    const size_t shares = task.is_debris ? tasks - first_debris : first_debris;
+    // all candidates of a point belong to one task
+    const auto begin_of = [&](size_t share) {
+      size_t i = mine.size() * share / shares;
+      while (i > 0 && i < mine.size() && mine[i].candidate.point == mine[i - 1].candidate.point) ++i;
+      return i;
+    };
+    const size_t first = begin_of(place), last = begin_of(place + 1);
+    const std::span<const NearCandidate> candidates = mine.subspan(first, last - first);
     if (c.look == 0 || task.look != c.look) list_faces(in.contact, in.options, s, candidates, task);
     task.look = c.look;
     press_points(in.contact, in.options, in.h, s, candidates, task);
-    const size_t from = pairs * number / tasks, to = pairs * (number + 1) / tasks;
-    press_particles(in.options, in.h, s, std::span(c.near_particles).subspan(from, to - from), task);
+    if (task.is_debris) {
+      const size_t from = pairs * place / shares, to = pairs * (place + 1) / shares;
+      press_particles(in.options, in.h, s, std::span(c.near_particles).subspan(from, to - from), task);
+    }
     task.sums.count = static_cast<long long>(task.faces_touched.size() + task.particles_touched.size());
   });
   c.touching = {};
-  for (const ContactTask& task : in.contact_tasks) c.touching += task.sums;
+  if (debris) c.debris = {};
+  c.debris.normal = c.debris.friction = 0;
+  for (const ContactTask& task : in.contact_tasks) (task.is_debris ? c.debris : c.touching) += task.sums;
+  c.debris.normal *= in.debris_steps, c.debris.friction *= in.debris_steps;
   // faces first, then pairs of particles: an order that the number of tasks does not change
   constexpr size_t kAhead = 8;  // rows and particles that lie all over memory
   const auto push_rows = [&] {
-    for (const ContactTask& task : in.contact_tasks)
+    if (debris) {
+      for_held(in, s, 0.5, [](const HeldPush&) {});
+      list_held(in, s);
+    }
+    for_held(in, s, debris ? 0.5 : 1,
+             [&](const HeldPush& held) { in.push(s, held.row, held.normal_force + held.friction); });
+    for (const ContactTask& task : in.contact_tasks.first(first_debris))
       for (size_t i = 0; i < task.faces_touched.size(); ++i) {
         if (i + kAhead < task.faces_touched.size())
           for (const std::uint32_t row : task.faces_touched[i + kAhead].rows)
@@ -210,7 +272,7 @@ void press_surfaces(ExplicitSystem::Inside& in, ExplicitState& s) {
         const Vec3 force = touch.normal_force + touch.friction;
         if (touch.point.kind == ContactPoint::Node)
           in.push(s, touch.point.index, force);
-        else if (touch.point.kind == ContactPoint::Centre)
+        else
           for (const std::uint32_t row : quad_of(in.contact, touch.point.index).rows) in.push(s, row, 0.25 * force);
         for (size_t k = 0; k < 4; ++k) in.push(s, touch.rows[k], -touch.weights[k] * force);
       }
@@ -222,8 +284,7 @@ void press_surfaces(ExplicitSystem::Inside& in, ExplicitState& s) {
     };
     for (const ContactTask& task : in.contact_tasks)
       for (const FaceTouch& touch : task.faces_touched)
-        if (touch.point.kind == ContactPoint::Debris)
-          push(touch.point.index, touch.normal_force + touch.friction, touch.crushed);
+        if (task.is_debris) push(touch.point.index, touch.normal_force + touch.friction, touch.crushed);
     for (const ContactTask& task : in.contact_tasks)
       for (size_t i = 0; i < task.particles_touched.size(); ++i) {
         if (i + kAhead < task.particles_touched.size())
@@ -234,14 +295,14 @@ void press_surfaces(ExplicitSystem::Inside& in, ExplicitState& s) {
         push(touch.pair[0], force, touch.crushed[0]), push(touch.pair[1], -force, touch.crushed[1]);
       }
   };
-  if (c.touching.count < 256)
+  if (c.touching.count + (debris ? c.debris.count : 0) < 256)
     push_rows(), push_particles();
   else
     in.team->run(2, [&](size_t task) { task == 0 ? push_rows() : push_particles(); });
 }
 
 void book_surfaces(const ExplicitSystem::Inside& in, ExplicitState& s) {
-  const auto& tasks = in.contact_tasks;
+  const std::span<const ContactTask> tasks = in.contact_tasks;
   std::vector<ContactWork> work(tasks.size());
   const auto speed_of = [&](std::uint32_t row) { return vector_at(s.rows.data() + 8 * size_t{row} + kernel::kSpeed); };
   in.team->run(tasks.size(), [&](size_t number) {
@@ -249,14 +310,17 @@ void book_surfaces(const ExplicitSystem::Inside& in, ExplicitState& s) {
     double normal = task.sums.normal, friction = task.sums.friction;  // at the speeds before, then at both
     constexpr size_t kAhead = 8;                                      // rows that lie all over memory
     for (size_t i = 0; i < task.faces_touched.size(); ++i) {
+      const FaceTouch& touch = task.faces_touched[i];
+      if (task.is_debris) {  // what is held on faces is booked as it goes
+        const Vec3& v = s.particles[touch.point.index].v;
+        normal += dot(touch.normal_force, v), friction += dot(touch.friction, v);
+        continue;
+      }
       if (i + kAhead < task.faces_touched.size())
         for (const std::uint32_t row : task.faces_touched[i + kAhead].rows)
           hwy::Prefetch(s.rows.data() + 8 * size_t{row});
-      const FaceTouch& touch = task.faces_touched[i];
       Vec3 v;
-      if (touch.point.kind == ContactPoint::Debris)
-        v = s.particles[touch.point.index].v;
-      else if (touch.point.kind == ContactPoint::Node)
+      if (touch.point.kind == ContactPoint::Node)
         v = speed_of(touch.point.index);
       else
         for (const std::uint32_t row : quad_of(in.contact, touch.point.index).rows) v += 0.25 * speed_of(row);
@@ -267,7 +331,8 @@ void book_surfaces(const ExplicitSystem::Inside& in, ExplicitState& s) {
       const Vec3 v = s.particles[touch.pair[0]].v - s.particles[touch.pair[1]].v;
       normal += dot(touch.normal_force, v), friction += dot(touch.friction, v);
     }
-    work[number].normal = 0.5 * in.h * normal, work[number].friction = 0.5 * in.h * friction;
+    const double half = 0.5 * (task.is_debris ? in.debris_step() : in.h);
+    work[number].normal = half * normal, work[number].friction = half * friction;
   });
   for (const ContactWork& w : work) s.surface_work.normal += w.normal, s.surface_work.friction += w.friction;
 }
