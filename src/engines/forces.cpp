@@ -36,13 +36,6 @@ mbs::ZoneLaw make_lasting(mbs::ZoneLaw law) {
   return law;
 }
 
-/// Coefficient of r x (r x .) in the rate of a rotation vector (docs/theory/multibody.md, eq. 4).
-double calc_kappa(double angle2) {
-  if (angle2 < 1e-3) return 1.0 / 12 + angle2 / 720 + angle2 * angle2 / 30240;
-  const double half = 0.5 * std::sqrt(angle2);
-  return (1 - half / std::tan(half)) / angle2;
-}
-
 /// Of the vectors of one rotation the one nearest to another.
 Vec3 find_nearest_rotation(const Vec3& r, const Vec3& near) {
   const double angle = norm(r);
@@ -52,6 +45,12 @@ Vec3 find_nearest_rotation(const Vec3& r, const Vec3& near) {
 }
 
 bool is_same(const Motion& a, const Motion& b) { return a.X_WB == b.X_WB && a.v_WB == b.v_WB && a.w_WB == b.w_WB; }
+
+mbs::Six deformation_of(const mbs::ElementGeometry& g) {
+  mbs::Six d;
+  std::copy(g.deformation, g.deformation + 6, d.c);
+  return d;
+}
 
 }  // namespace
 
@@ -170,7 +169,7 @@ mbs::Six Forces::calc_rates(const Motion& m, mbs::BodyId a, mbs::BodyId b, const
   const auto spin = [&](mbs::BodyId id) { return id == mbs::kGround ? Vec3{} : m.w_WB[static_cast<size_t>(id.index)]; };
   const Vec3 w = transpose_times(s.R_WF, spin(b) - spin(a));
   const Vec3 u = transpose_times(s.R_WF, velocity_at(m, b, s.p_M) - velocity_at(m, a, s.p_M));
-  const Vec3 r = w - 0.5 * cross(s.r, w) + calc_kappa(dot(s.r, s.r)) * cross(s.r, cross(s.r, w));
+  const Vec3 r = w - 0.5 * cross(s.r, w) + mbs::calc_kappa(dot(s.r, s.r)) * cross(s.r, cross(s.r, w));
   mbs::Six rate;
   for (int i = 0; i < 3; ++i) {
     rate.c[i] = u[i];
@@ -224,14 +223,26 @@ void Forces::twist(mbs::BodyId id, const Vec3& torque, std::vector<Wrench>& on) 
 
 void Forces::push_six(const Motion& m, mbs::BodyId a, mbs::BodyId b, const Six& s, const double f[6],
                       std::vector<Wrench>& on) const {
-  const Vec3 moment{f[3], f[4], f[5]};
-  const Vec3 rm = cross(s.r, moment);
-  const Vec3 torque = s.R_WF * (moment + 0.5 * rm + calc_kappa(dot(s.r, s.r)) * cross(s.r, rm));
+  const Vec3 torque = s.R_WF * mbs::calc_conjugate_torque(s.r, {f[3], f[4], f[5]});
   const Vec3 force = s.R_WF * Vec3{f[0], f[1], f[2]};
   push(m, a, s.p_M, force, on);
   push(m, b, s.p_M, -force, on);
   twist(a, torque, on);
   twist(b, -torque, on);
+}
+
+mbs::ElementGeometry Forces::measure_zone(const Zone& z, const Motion& m, mbs::BodyId a, const Pose& X_AF,
+                                          mbs::BodyId b, const Pose& X_BM) const {
+  return mbs::measure_element(pose_of(m, a) * X_AF, pose_of(m, b) * X_BM, z.parameters.span());
+}
+
+void Forces::push_zone_forces(const Zone& z, const Motion& m, mbs::BodyId a, mbs::BodyId b,
+                              const mbs::ElementGeometry& g, const double f[6], std::vector<Wrench>& on) const {
+  const mbs::ElementForces pushed = mbs::calc_element_forces(g, z.parameters.span(), f);
+  push(m, a, g.p_a, pushed.force, on);
+  push(m, b, g.p_b, -pushed.force, on);
+  twist(a, pushed.torque_a, on);
+  twist(b, -pushed.torque_b, on);
 }
 
 void Forces::start(const Motion& motion) {
@@ -268,8 +279,8 @@ void Forces::calc(double time, const Motion& motion, std::vector<Wrench>& on) co
     return trial.resultant;
   };
   const auto push_zone = [&](const Zone& z, mbs::BodyId a, const Pose& X_AF, mbs::BodyId b, const Pose& X_BM) {
-    const Six s = calc_six(motion, a, X_AF, b, X_BM, {});
-    push_six(motion, a, b, s, try_zone(z, s.deformation).c, on);
+    const mbs::ElementGeometry g = measure_zone(z, motion, a, X_AF, b, X_BM);
+    push_zone_forces(z, motion, a, b, g, try_zone(z, deformation_of(g)).c, on);
   };
   for (size_t i = 0; i < zone_.size(); ++i) {
     const mbs::ZoneElement& e = model_.elements[i];
@@ -409,9 +420,9 @@ bool Forces::advance(double time, const Motion& motion, const std::vector<Vec3>&
   };
   const auto advance_six = [&](Zone& z, size_t index, mbs::BodyId a, const Pose& X_AF, mbs::BodyId b,
                                const Pose& X_BM) {
-    const Six s = calc_six(motion, a, X_AF, b, X_BM, {});
-    advance(z, index, s.deformation);
-    if (z.state.live) push_six(motion, a, b, s, z.state.resultant.c, cached_);
+    const mbs::ElementGeometry g = measure_zone(z, motion, a, X_AF, b, X_BM);
+    advance(z, index, deformation_of(g));
+    if (z.state.live) push_zone_forces(z, motion, a, b, g, z.state.resultant.c, cached_);
   };
   for (size_t i = 0; i < zone_.size(); ++i) {
     const mbs::ZoneElement& e = model_.elements[i];
@@ -638,12 +649,12 @@ void Forces::fill(double time, const Motion& motion, mbs::View& v) const {
   for (size_t i = 0; i < E; ++i) {
     const mbs::ZoneElement& e = model_.elements[i];
     fill_zone(i, time, zone_[i], v);
-    const Six s = calc_six(motion, e.a, e.X_AF, e.b, e.X_BM, {});
+    const mbs::ElementGeometry g = measure_zone(zone_[i], motion, e.a, e.X_AF, e.b, e.X_BM);
     v.shortening[i] = zone_[i].state.shortened;
     v.element_force[i] = -three(zone_[i].state.resultant.c);
     v.element_moment[i] = -three(zone_[i].state.resultant.c + 3);
-    v.element_translation[i] = three(s.deformation.c);
-    v.element_rotation[i] = three(s.deformation.c + 3);
+    v.element_translation[i] = three(g.deformation);
+    v.element_rotation[i] = three(g.deformation + 3);
   }
   for (size_t i = 0; i < R; ++i) fill_zone(E + i, time, rotational_[i], v);
   v.cable_force.resize(rope_.size());

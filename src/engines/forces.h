@@ -127,6 +127,10 @@ class Forces {
 
   void push(const Motion&, mbs::BodyId, const Vec3& p_W, const Vec3& force, std::vector<Wrench>&) const;
   void twist(mbs::BodyId, const Vec3& torque, std::vector<Wrench>&) const;
+  mbs::ElementGeometry measure_zone(const Zone&, const Motion&, mbs::BodyId a, const Pose& X_AF, mbs::BodyId b,
+                                    const Pose& X_BM) const;
+  void push_zone_forces(const Zone&, const Motion&, mbs::BodyId a, mbs::BodyId b, const mbs::ElementGeometry&,
+                        const double resultant[6], std::vector<Wrench>&) const;
   void push_six(const Motion&, mbs::BodyId a, mbs::BodyId b, const Six&, const double resultant[6],
                 std::vector<Wrench>&) const;
   void push_others(double time, const Motion&, std::vector<Wrench>&) const;

@@ -172,8 +172,11 @@ void System::pack_element(size_t e, bool has_moved) {
   const CompiledElement& c = elements[e];
   const auto put = [&](int f, double x) { l.set(slot, f, x); };
   if (has_moved) {
-    const Vec3 pa = c.a >= 0 ? c.p_AF - state.p_offset[static_cast<size_t>(c.a)] : c.p_AF;
-    const Vec3 pb = c.b >= 0 ? c.p_BM - state.p_offset[static_cast<size_t>(c.b)] : c.p_BM;
+    // of a member its stations
+    const Vec3 at_a = c.p_AF + c.zone.span().a * to_matrix(c.q_AF).column(0);
+    const Vec3 at_b = c.p_BM + c.zone.span().b * to_matrix(c.q_BM).column(0);
+    const Vec3 pa = c.a >= 0 ? at_a - state.p_offset[static_cast<size_t>(c.a)] : at_a;
+    const Vec3 pb = c.b >= 0 ? at_b - state.p_offset[static_cast<size_t>(c.b)] : at_b;
     for (int i = 0; i < 3; ++i) put(kMarkerA + i, pa[i]), put(kMarkerB + i, pb[i]);
     const Quat q_a = turn_in_plane(c.zone.plane, c.q_AF), q_b = turn_in_plane(c.zone.plane, c.q_BM);
     const double qa[4] = {q_a.w, q_a.x, q_a.y, q_a.z}, qb[4] = {q_b.w, q_b.x, q_b.y, q_b.z};
@@ -318,31 +321,22 @@ void System::pack_elements() {
   lanes->share_constants();
 }
 
+ElementGeometry System::measure_zone(const CompiledElement& e) const {
+  const Quat q_A = pose_of(e.a).q, q_B = pose_of(e.b).q;
+  return measure_element({calc_point(e.a, e.p_AF), q_A * e.q_AF}, {calc_point(e.b, e.p_BM), q_B * e.q_BM},
+                         e.zone.span());
+}
+
 /// By the full law, from the state of the zone; the force goes to the slot.
 void System::evaluate_element(size_t i, double h) {
   ZoneState& z = state.element[i];
   const size_t slot = slot_of(i);
   if (!z.live || slot == Lanes::kNoSlot) return;
   const CompiledElement& e = elements[i];
-  Vec3 p_F = e.p_AF, p_M = e.p_BM, origin_a, origin_b;
-  Quat q_F = e.q_AF, q_M = e.q_BM;
-  if (e.a >= 0) {
-    const size_t a = static_cast<size_t>(e.a);
-    origin_a = state.p[a];
-    p_F = origin_a + state.R[a] * (e.p_AF - state.p_offset[a]);
-    q_F = state.q[a] * e.q_AF;
-  }
-  if (e.b >= 0) {
-    const size_t b = static_cast<size_t>(e.b);
-    origin_b = state.p[b];
-    p_M = origin_b + state.R[b] * (e.p_BM - state.p_offset[b]);
-    q_M = state.q[b] * e.q_BM;
-  }
-  const Mat3 R_WF = to_matrix(q_F);
-  const Vec3 u = transpose_times(R_WF, p_M - p_F);
-  const Vec3 r = log_rotation(conjugate(q_F) * q_M);
+  const ElementGeometry g = measure_zone(e);
   const bool was_yielded = z.yielded;
-  const Six d{{u.x, u.y, u.z, r.x, r.y, r.z}};
+  Six d;
+  std::copy(g.deformation, g.deformation + 6, d.c);
   if (ignores_limits) {
     ZoneParameters elastic = e.zone;
     elastic.stations = 0;
@@ -353,19 +347,10 @@ void System::evaluate_element(size_t i, double h) {
   if (z.yielded && !was_yielded) say({Happening::Kind::ElementYielded, state.time, static_cast<int>(i), -1, {}, 0});
   Vec3 on_a, torque_a, torque_b;
   if (z.live) {
-    const double* f = z.resultant.c;
-    // torque conjugate to the rate of the rotation vector (docs/theory/multibody.md, eq. 4)
-    const Vec3 m{f[3], f[4], f[5]};
-    const double angle2 = dot(r, r);
-    const double kappa =
-        angle2 < 1e-3
-            ? 1.0 / 12 + angle2 / 720 + angle2 * angle2 / 30240
-            : (1 / angle2 - (1 + std::cos(std::sqrt(angle2))) / (2 * std::sqrt(angle2) * std::sin(std::sqrt(angle2))));
-    const Vec3 rm = cross(r, m);
-    const Vec3 turning = R_WF * (m + 0.5 * rm + kappa * cross(r, rm));
-    on_a = R_WF * Vec3{f[0], f[1], f[2]};
-    torque_a = cross(p_M - origin_a, on_a) + turning;
-    torque_b = cross(p_M - origin_b, on_a) + turning;
+    const ElementForces f = calc_element_forces(g, e.zone.span(), z.resultant.c);
+    on_a = f.force;
+    torque_a = cross(g.p_a - centre_of(e.a), on_a) + f.torque_a;
+    torque_b = cross(g.p_b - centre_of(e.b), on_a) + f.torque_b;
   } else {
     break_element(i, z.reason);
   }

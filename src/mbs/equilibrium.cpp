@@ -192,6 +192,31 @@ class Assembly {
   const std::vector<int>& free_bodies() const { return free_; }
   int place(int body) const { return body < 0 ? -1 : place_[static_cast<size_t>(body)]; }
 
+  /// Six rows of an element; a member's are of its chord, for small rotations against it.
+  void element_rows(const CompiledElement& e, KinematicRow rows[6]) const {
+    const Span span = e.zone.span();
+    if (!span.is_member()) return element_rows(e.a, e.b, e.q_AF, e.p_BM, rows);
+    const ElementGeometry g = s_.measure_zone(e);
+    const double slope = span.length() / g.length;
+    for (int i = 0; i < 6; ++i) {
+      const Vec3 axis = g.axes.column(i % 3);
+      KinematicRow r{place(e.a), place(e.b), {}, -axis, {}, axis};
+      if (i < 3) {
+        const double share = i == 0 ? 1 : slope;
+        r.va = -share * axis;
+        r.vb = share * axis;
+        r.wa = -share * cross(g.p_a - centre(e.a), axis);
+        r.wb = share * cross(g.p_b - centre(e.b), axis);
+        // the rotations of both ends, with the levers of the stations
+        if (i > 0) {
+          const Vec3 about = cross(g.axes.column(0), axis);
+          r.wa += span.a * about;
+          r.wb -= span.b * about;
+        }
+      }
+      rows[i] = r;
+    }
+  }
   /// Six rows of an element at its marker M, in the axes of F.
   void element_rows(int a, int b, const Quat& q_AF, const Vec3& p_BM, KinematicRow rows[6]) const {
     const Mat3 F = to_matrix(s_.pose_of(a).q * q_AF);
@@ -266,7 +291,7 @@ class Assembly {
     each_element([&](const CompiledElement& e, double share) {
       const double factor = fast ? 1 + e.zone.viscous : 1;
       KinematicRow rows[6];
-      element_rows(e.a, e.b, e.q_AF, e.p_BM, rows);
+      element_rows(e, rows);
       PairMatrix::Block block = {};
       for (int k = 0; k < 6; ++k) add_outer(rows[k], factor * share * e.zone.stiffness[k], block);
       sum.add(rows[0].a, rows[0].b, block);

@@ -58,13 +58,6 @@ Vec3 find_nearest_rotation(const Vec3& r, const Vec3& before) {
   return dot(e, e) < dot(d, d) ? other : r;
 }
 
-/// Factor of the double cross product in the rate of a rotation vector (eq. 4), valid below a full turn.
-double calc_kappa(double angle2) {
-  if (angle2 < 1e-3) return 1.0 / 12 + angle2 / 720 + angle2 * angle2 / 30240;
-  const double angle = std::sqrt(angle2);
-  return 1 / angle2 - 1 / (2 * angle * std::tan(0.5 * angle));
-}
-
 constexpr double kLargestRotation = 6;  // of a bushing, short of the full turn where its rotation vector ends [rad]
 
 }  // namespace
@@ -357,9 +350,7 @@ void System::evaluate_bushing(size_t i, bool at_rest) {
 }
 
 void System::load_frames(int a, int b, const FrameDeformation& d, const double f[6]) {
-  // torque conjugate to the rate of the rotation vector (eq. 4)
-  const Vec3 m{f[3], f[4], f[5]}, rm = cross(d.r, m);
-  const Vec3 t = m == Vec3{} ? m : d.F * (m + 0.5 * rm + calc_kappa(dot(d.r, d.r)) * cross(d.r, rm));
+  const Vec3 t = d.F * calc_conjugate_torque(d.r, {f[3], f[4], f[5]});
   const Vec3 n = d.F * Vec3{f[0], f[1], f[2]};
   load_body(a, n, cross(d.p_M - centre_of(a), n) + t);
   load_body(b, -n, -(cross(d.p_M - centre_of(b), n) + t));

@@ -756,32 +756,71 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
   };
   double* HWY_RESTRICT out = job.forces + static_cast<size_t>(kForceFields) * W * block;
 
+  const N one = num<D>(1), zero = num<D>(0), half = num<D>(0.5);
+  constexpr bool is_member = Hinges == 2;
+  const N x[2] = {constant(kStation), constant(kStation + 1)};
   N d[6];
-  V3<D> apart, lever_b, r;
-  M33<D> F;
-  N sine, cosine;  // of the turn of F in the plane
+  V3<D> lever_a, lever_b, r;
+  M33<D> axes;     // F, of a member those of its chord
+  N sine, cosine;  // of their turn in the plane
   N s2, over_sine, coefficient;
+  // a member: x of the stations on a and on b, the chord in the axes of a, the turn from there to the chord
+  N x_a, x_b, over_length, chord_x, chord_y, chord_z, swing_w, swing_y, swing_z, s2_a, over_sine_a, coefficient_a;
+  const auto measure_chord = [&](V3<D> chord) {
+    x_a = minimum(x[0], x[1]), x_b = maximum(x[0], x[1]);
+    // an empty lane has none
+    over_length = one / N{hn::Sqrt(maximum(dot(chord, chord), num<D>(1e-60)).v)};
+    chord_x = over_length * chord.x, chord_y = over_length * chord.y, chord_z = over_length * chord.z;
+    const N twice = maximum(chord_x + one, num<D>(1e-30)), w = N{hn::Sqrt((half * twice).v)};
+    const N share = half / w;
+    swing_w = w, swing_y = zero - share * chord_z, swing_z = share * chord_y;
+    s2_a = fma(swing_y, swing_y, swing_z * swing_z);
+    turning<D>(s2_a, over_sine_a, coefficient_a);
+    d[0] = fms(over_length, dot(chord, chord), x_b - x_a);
+  };
   if constexpr (is_plane) {
     const PlanarMarker<D> at_a(A, constant, kMarkerA), at_b(B, constant, kMarkerB);
-    sine = at_a.turn.sine(), cosine = at_a.turn.cosine();
-    apart = {at_b.px - at_a.px, num<D>(0), at_b.pz - at_a.pz};
-    lever_b = {at_b.lever_x, num<D>(0), at_b.lever_z};
-    const N x = (apart.x - at_a.lever_x) + at_b.lever_x, z = (apart.z - at_a.lever_z) + at_b.lever_z;
-    const PlanarTurn<D> apart_by = at_a.turn.back().then(at_b.turn);
+    PlanarTurn<D> turned = at_a.turn;
+    const N apart_x = at_b.px - at_a.px, apart_z = at_b.pz - at_a.pz;
+    const N along_x = (apart_x - at_a.lever_x) + at_b.lever_x, along_z = (apart_z - at_a.lever_z) + at_b.lever_z;
+    lever_a = {at_a.lever_x, zero, at_a.lever_z};
+    lever_b = {at_b.lever_x, zero, at_b.lever_z};
+    sine = turned.sine(), cosine = turned.cosine();
+    const N along = fms(cosine, along_x, sine * along_z), across = fma(cosine, along_z, sine * along_x);
+    if constexpr (is_member) {
+      measure_chord({along, zero, across});
+      turned = turned.then({swing_w, swing_y});
+      sine = turned.sine(), cosine = turned.cosine();
+    } else {
+      lever_a = {apart_x + at_b.lever_x, zero, apart_z + at_b.lever_z};
+    }
+    const PlanarTurn<D> apart_by = turned.back().then(at_b.turn);
     const N v = {hn::CopySign(apart_by.y.v, hn::Xor(apart_by.y.v, apart_by.w.v))};
     s2 = v * v;
     turning<D>(s2, over_sine, coefficient);
-    const N across = fma(cosine, z, sine * x);
-    d[0] = fms(cosine, x, sine * z);
-    d[active.at[1]] = In == Plane::AboutY ? across : num<D>(0) - across;
-    d[active.at[2]] = over_sine * v;
+    N moved = across, turn = over_sine * v;
+    if constexpr (is_member) {
+      const N turn_a = over_sine_a * swing_y;
+      moved = fma(x_a, turn_a, x_b * turn);
+      turn = turn_a + turn;
+    } else {
+      d[0] = along;
+    }
+    d[active.at[1]] = In == Plane::AboutY ? moved : zero - moved;
+    d[active.at[2]] = turn;
   } else {
-    const V3<D> lever_a = turn(A.q, constant3(kMarkerA));
+    lever_a = turn(A.q, constant3(kMarkerA));
     lever_b = turn(B.q, constant3(kMarkerB));
-    const Q4<D> qF = A.q * constant4(kMarkerA + 3), qM = B.q * constant4(kMarkerB + 3);
-    F = to_matrix(qF);
-    apart = B.p - A.p;
-    const V3<D> t = transpose_times(F, (apart - lever_a) + lever_b);
+    Q4<D> qF = A.q * constant4(kMarkerA + 3);
+    const Q4<D> qM = B.q * constant4(kMarkerB + 3);
+    const V3<D> apart = B.p - A.p, between = (apart - lever_a) + lever_b;
+    if constexpr (is_member) {
+      measure_chord(turn(Q4<D>{qF.w, zero - qF.x, zero - qF.y, zero - qF.z}, between));
+      qF = qF * Q4<D>{swing_w, zero, swing_y, swing_z};
+    } else {
+      lever_a = apart + lever_b;
+    }
+    axes = to_matrix(qF);
     const Q4<D> q = conj_times(qF, qM);
     const V3<D> v{{hn::CopySign(q.x.v, hn::Xor(q.x.v, q.w.v))},
                   {hn::CopySign(q.y.v, hn::Xor(q.y.v, q.w.v))},
@@ -789,9 +828,17 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
     s2 = dot(v, v);
     turning<D>(s2, over_sine, coefficient);
     r = over_sine * v;
-    d[0] = t.x, d[1] = t.y, d[2] = t.z, d[3] = r.x, d[4] = r.y, d[5] = r.z;
+    if constexpr (is_member) {
+      const N turn_y = over_sine_a * swing_y, turn_z = over_sine_a * swing_z;
+      d[1] = zero - fma(x_a, turn_z, x_b * r.z), d[2] = fma(x_a, turn_y, x_b * r.y);
+      d[3] = r.x, d[4] = turn_y + r.y, d[5] = turn_z + r.z;
+    } else {
+      const V3<D> t = transpose_times(axes, between);
+      d[0] = t.x, d[1] = t.y, d[2] = t.z, d[3] = r.x, d[4] = r.y, d[5] = r.z;
+    }
   }
-  const auto too_far = hn::Gt(s2.v, constant(kMostTurn).v);
+  auto too_far = hn::Gt(s2.v, constant(kMostTurn).v);
+  if constexpr (is_member) too_far = hn::Or(too_far, hn::Gt(s2_a.v, constant(kMostTurn).v));
   auto outside = too_far;
 
   N u[6], e[6], f[6], k[6], was[6], before[6];
@@ -818,10 +865,8 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
     f[i] = k[i] * e[i];
   }
   // is every resultant inside the bounds for sure?
-  const N one = num<D>(1), zero = num<D>(0);
   outside = hn::Or(outside,
                    hn::Not(hn::And(hn::Ge(f[0].v, constant(kLeastForce).v), hn::Le(f[0].v, constant(kMostForce).v))));
-  const N x[2] = {constant(kStation), constant(kStation + 1)};
   if constexpr (is_plane) {
     constexpr int q = first_bending(In), shear = active.at[1], bend = active.at[2];
     outside = hn::Or(outside, hn::Gt((abs(f[shear]) * constant(kShearScale + shear - 1)).v, one.v));
@@ -888,7 +933,7 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
   }
 
   // standard linear solid: the damper follows the mean of the step
-  const N viscous = constant(kViscous), half = num<D>(0.5), keep = one - constant(kRelaxation);
+  const N viscous = constant(kViscous), keep = one - constant(kRelaxation);
   const N taken = fma(half, keep, half);
   const auto inside = hn::Not(outside);
   N g[6], work = zero, lost = zero;
@@ -907,24 +952,40 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
   if (books_slid) store_where<D>(inside, fma(half, lost, load<D>(state, kBled)), state, kBled);
 
   if constexpr (is_plane) {
-    const N across = In == Plane::AboutY ? g[2] : zero - g[1], torque = g[active.at[2]];
+    N across = In == Plane::AboutY ? g[2] : zero - g[1], torque_a = g[active.at[2]], torque_b = torque_a;
+    if constexpr (is_member) {
+      torque_a = fma(x_a, across, torque_a), torque_b = fma(x_b, across, torque_b);
+      across = over_length * (torque_b - torque_a);
+    }
     const N fx = fma(cosine, g[0], sine * across), fz = fms(cosine, across, sine * g[0]);
     store<D>(fx, out, 0);
     store<D>(fz, out, 2);
-    // M seen from both centres
-    const N lever_x = apart.x + lever_b.x, lever_z = apart.z + lever_b.z;
-    store<D>(fms(lever_z, fx, lever_x * fz) + torque, out, 4);
-    store<D>(fms(lever_b.z, fx, lever_b.x * fz) + torque, out, 7);
+    // seen from both centres
+    store<D>(fms(lever_a.z, fx, lever_a.x * fz) + torque_a, out, 4);
+    store<D>(fms(lever_b.z, fx, lever_b.x * fz) + torque_b, out, 7);
   } else {
-    // torque conjugate to the rate of the rotation vector
-    const V3<D> m{g[3], g[4], g[5]};
+    // torques conjugate to the rates of the rotation vectors
+    V3<D> m{g[3], g[4], g[5]}, shear{g[0], g[1], g[2]}, torque_a;
+    if constexpr (is_member) m.y = fma(x_b, g[2], m.y), m.z = fnma(x_b, g[1], m.z);
     const V3<D> rm = cross(r, m);
-    const V3<D> turned = fma(coefficient, cross(r, rm), fma(half, rm, m));
-    const V3<D> force = F * V3<D>{g[0], g[1], g[2]}, torque = F * turned;
+    V3<D> torque_b = fma(coefficient, cross(r, rm), fma(half, rm, m));
+    if constexpr (is_member) {
+      const N turn_y = over_sine_a * swing_y, turn_z = over_sine_a * swing_z;
+      const N m_y = fma(x_a, g[2], g[4]), m_z = fnma(x_a, g[1], g[5]);
+      const N twist = fms(turn_y, m_z, turn_z * m_y), bent = coefficient_a * twist;
+      const V3<D> seen{zero - half * twist, fma(bent, turn_z, m_y), fnma(bent, turn_y, m_z)};
+      const N handed = (seen.x - torque_b.x) / maximum(one + chord_x, num<D>(1e-30));
+      torque_a = {torque_b.x, fma(handed, chord_y, seen.y), fma(handed, chord_z, seen.z)};
+      shear.y = over_length * (torque_a.z - torque_b.z), shear.z = over_length * (torque_b.y - torque_a.y);
+      torque_a = axes * torque_a, torque_b = axes * torque_b;
+    } else {
+      torque_a = torque_b = axes * torque_b;
+    }
+    const V3<D> force = axes * shear;
     store3<D>(force, out, 0);
-    // M seen from both centres
-    store3<D>(cross(apart + lever_b, force) + torque, out, 3);
-    store3<D>(cross(lever_b, force) + torque, out, 6);
+    // seen from both centres
+    store3<D>(cross(lever_a, force) + torque_a, out, 3);
+    store3<D>(cross(lever_b, force) + torque_b, out, 6);
   }
   if (HWY_UNLIKELY(!hn::AllFalse(tag, outside))) report<D>(outside, block, *job.outside);
 }

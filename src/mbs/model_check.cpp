@@ -291,6 +291,7 @@ void Checker::check_elements() {
       const Place in{fmt::format("{}.stations[{}]", p.path, k), p.name};
       finite(in, "x", e.stations[k].x);
       index(in, "law", e.stations[k].law.index, m_.laws);
+      if (k == 1 && e.stations[0].x == e.stations[1].x) fail(in, "x", "is that of the other station");
     }
   }
 }

@@ -300,6 +300,7 @@ class System {
   double measure_spring(const CompiledSpring&, ForceRow&) const;
   double measure_torsion(const CompiledTorsion&, ForceRow&) const;
   FrameDeformation measure_bushing(size_t bushing) const;
+  ElementGeometry measure_zone(const CompiledElement&) const;
   FrameDeformation measure_frames(int a, int b, const Vec3& p_AF, const Quat& q_AF, const Vec3& p_BM,
                                   const Quat& q_BM) const;
   /// A force and a moment of a on b, given in F at M's origin: x y z [N], and conjugate to the rotation vector [N·m].

@@ -43,8 +43,9 @@ double System::calc_component(const Quantity& q, int component) {
     case Quantity::Kind::ElementTranslation:
     case Quantity::Kind::ElementRotation: {
       const CompiledElement& e = elements[i];
-      const FrameDeformation d = measure_frames(e.a, e.b, e.p_AF, e.q_AF, e.p_BM, e.q_BM);
-      return component_of(q.kind == Quantity::Kind::ElementTranslation ? d.u : d.r, component);
+      const ElementGeometry g = measure_zone(e);
+      const double* d = g.deformation + (q.kind == Quantity::Kind::ElementTranslation ? 0 : 3);
+      return component_of(Vec3{d[0], d[1], d[2]}, component);
     }
     case Quantity::Kind::ElementForce:
     case Quantity::Kind::ElementMoment: {

@@ -3,9 +3,11 @@
 /// Stress resultants are those of tension-positive structural mechanics: N > 0 pulls, and the force of a on b is minus
 /// them.
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
+#include "mbs/element_geometry.h"
 #include "mbs/kernel.h"
 #include "mbs/model.h"
 #include "mbs/zone_law.h"
@@ -86,6 +88,9 @@ struct ZoneParameters {
   bool external_axial =
       false;          // the deformation's first component is the normal force itself; it follows no limit here
   double relief = 0;  // of an external force: what it loses by a unit of the zone's elongation [N/m]
+
+  /// Of a whole member: two stations.
+  Span span() const { return stations == 2 ? Span{std::min(x[0], x[1]), std::max(x[0], x[1])} : Span{}; }
 };
 
 /// Evaluates a live zone at a deformation: sets resultant, history, energies; breaks it where a limit of rupture is

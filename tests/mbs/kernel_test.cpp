@@ -108,7 +108,10 @@ void walk(int stations, const ZoneLaw& zone, double amplitude, std::uint32_t see
     kernel.push_back({k.resultant, k.energy, k.plastic, k.damping, std::max(k.station[0].reached, k.station[1].reached),
                       k.shortened});
     if (law != nullptr) {
-      if (z.live) advance_zone(s.elements[0].zone, s.laws, d, 1e-4 * i, 1e-4, z);
+      const ElementGeometry g = s.measure_zone(s.elements[0]);
+      Six deformation;
+      std::copy(g.deformation, g.deformation + 6, deformation.c);
+      if (z.live) advance_zone(s.elements[0].zone, s.laws, deformation, 1e-4 * i, 1e-4, z);
       law->push_back({z.resultant, z.energy, z.plastic, z.damping, std::max(z.station[0].reached, z.station[1].reached),
                       z.shortened});
       EXPECT_EQ(k.live, z.live) << i;
@@ -303,6 +306,8 @@ TEST_P(KernelPlane, GivesTheForcesOfSpace) {
   const auto [is_upright, stations, amplitude, by_full_law] = GetParam();
   double most_plastic = 0;
   int compared = 0;
+  // of paths some millimetres long; a member's chord of 3 m has the round-off of its length
+  const double nudged = stations == 2 ? 1e-13 : 1e-14;
   for (std::uint32_t seed = 1; seed <= 6; ++seed) {
     Model m = make_planar_model(stations, is_upright);
     Options options;
@@ -320,7 +325,7 @@ TEST_P(KernelPlane, GivesTheForcesOfSpace) {
     for (int i = 1; i <= 6000; ++i) {
       const Six d = path_at(i, amplitude, seed);
       for (System* s : {&space, &more, &less, &plane}) {
-        const double nudge = s == &more ? 1 + 1e-14 : s == &less ? 1 - 1e-14 : 1;
+        const double nudge = s == &more ? 1 + nudged : s == &less ? 1 - nudged : 1;
         s->state.p[0] = at.p + nudge * Vec3{is_upright ? d.c[1] : d.c[0], 0, is_upright ? d.c[0] : d.c[2]};
         s->state.q[0] = exp_rotation({0, nudge * d.c[4], 0}) * at.q;
         s->state.R[0] = to_matrix(s->state.q[0]);

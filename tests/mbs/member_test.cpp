@@ -1,0 +1,176 @@
+// Whole members: elements with a station at each end, whose forces follow the chord between them.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "mbs/element_geometry.h"
+#include "mbs/system.h"
+#include "models.h"
+
+namespace topple::mbs {
+namespace {
+
+constexpr double kLength = 3, kMass = 60e3, kMoment = 50e3, kGravity = 9.81;
+
+/// Hinges of 50 kNm whatever the force.
+ZoneLaw make_law() {
+  ZoneLaw law;
+  law.name = "hinge";
+  for (MomentFamily* m : {&law.moment_y, &law.moment_z}) {
+    m->normal_force = {-8e6, 0, 4e6};
+    m->plastic_rotation = {0, 1.4};
+    m->positive = m->negative = std::vector<double>(6, kMoment);
+  }
+  law.damage_share = 0;
+  law.rupture_rotation = law.rupture_rotation_pressed = 1.4;
+  return law;
+}
+
+/// A floor that does not turn on four columns, each a member with a hinge at both ends, pushed off with a speed.
+Model make_storey(double speed, double stiffness_share = 1) {
+  Model m;
+  m.contact.ground = m.contact.bodies = false;
+  m.gravity = {0, 0, -kGravity};
+  Body floor;
+  floor.name = "floor", floor.mass = kMass;
+  floor.inertia = Mat3::diagonal({1e9, 1e9, 1e9});
+  floor.X_WB.p = {0, 0, kLength};
+  floor.v_WB = {speed, 0, 0};
+  const BodyId f = add_body(m, floor);
+  const LawId law = add_law(m, make_law());
+  const double E = 30e9, A = 0.09, I = 0.3 * 0.3 * 0.3 * 0.3 / 12 * stiffness_share, L = kLength;
+  for (int i = 0; i < 4; ++i) {
+    const Vec3 foot{i % 2 == 0 ? -2.0 : 2.0, i / 2 == 0 ? -2.0 : 2.0, 0};
+    ZoneElement e;
+    e.name = "column " + std::to_string(i), e.a = kGround, e.b = f;
+    e.X_AF = {foot + Vec3{0, 0, 0.5 * L}, test::upright()};
+    e.X_BM = {foot - Vec3{0, 0, 0.5 * L}, test::upright()};
+    e.translational_stiffness = {E * A / L, 12 * E * I / (L * L * L), 12 * E * I / (L * L * L)};
+    e.rotational_stiffness = {1e7, E * I / L, E * I / L};
+    e.damping_ratio = 0;
+    e.stations = {{0.5 * L, law}, {-0.5 * L, law}};
+    add_element(m, e);
+  }
+  return m;
+}
+
+/// Seconds that rigid-plastic columns take from upright to an angle: m L² θ'' = m g L sin θ - 8 M_p.
+double integrate_storey(double speed, double until) {
+  const double h = 1e-5;
+  double angle = 0, rate = speed / kLength, t = 0;
+  while (angle < until && t < 10) {
+    const double gain = kGravity / kLength * std::sin(angle) - 8 * kMoment / (kMass * kLength * kLength);
+    rate += h * gain, angle += h * rate, t += h;
+    if (rate < 0) return INFINITY;
+  }
+  return t;
+}
+
+/// Seconds that the floor takes to where its columns lean by an angle; infinite if it comes to rest before.
+double time_to(const Model& m, double until, double& drop, double& off) {
+  Options options;
+  options.step_share = 0.25;
+  System s(m, options);
+  s.start();
+  const double away = kLength * std::sin(until);
+  while (Vec3(s.state.p[0]).x < away) {
+    s.advance_step();
+    if (s.state.time > 10 || Vec3(s.state.v[0]).x < -0.05) return INFINITY;
+  }
+  drop = kLength - Vec3(s.state.p[0]).z;
+  off = norm(Vec3{0, Vec3(s.state.p[0]).y, 0});
+  return s.state.time;
+}
+
+TEST(Member, StoreysSwayAsTheirColumnsLean) {
+  // half of the angle at which the weight's moment passes that of the hinges, and far beyond it
+  const double critical = std::asin(8 * kMoment / (kMass * kGravity * kLength));
+  const double needed = std::sqrt(2 * (8 * kMoment * critical / kMass - kGravity * kLength * (1 - std::cos(critical))));
+  double drop = 0, off = 0;
+  EXPECT_EQ(time_to(make_storey(0.9 * needed), 0.9, drop, off), INFINITY);
+  const double expected = integrate_storey(1.2 * needed, 0.9);
+  EXPECT_NEAR(time_to(make_storey(1.2 * needed), 0.9, drop, off), expected, 0.02 * expected);
+  EXPECT_NEAR(drop, kLength * (1 - std::cos(0.9)), 0.005);
+  EXPECT_LT(off, 1e-9);
+}
+
+TEST(Member, WeightTakesStiffnessFromASwayingStorey) {
+  // without hinges' moment reached: 4 · 12 EI/L³ less m g/L, a chord that leans under the weight
+  constexpr double share = 0.02, I = 0.3 * 0.3 * 0.3 * 0.3 / 12 * share;
+  const double k = 4 * 12 * 30e9 * I / (kLength * kLength * kLength) - kMass * kGravity / kLength;
+  ASSERT_GT(kMass * kGravity / kLength, 0.2 * k);
+  Model m = make_storey(1e-3, share);
+  m.damping_frequency = 1;
+  Options options;
+  options.step_share = 0.25;
+  System s(m, options);
+  s.start();
+  double first = 0;
+  while (s.state.time < 20) {
+    const double before = Vec3(s.state.p[0]).x;
+    s.advance_step();
+    if (before > 0 && Vec3(s.state.p[0]).x <= 0) {
+      first = s.state.time;
+      break;
+    }
+  }
+  const double half_period = 3.14159265358979 / std::sqrt(k / kMass);
+  EXPECT_NEAR(first, half_period, 0.002 * half_period);
+}
+
+struct Poses {
+  Pose F, M;
+};
+
+Poses make_poses(std::mt19937& random, double turn) {
+  std::uniform_real_distribution<double> share(-1, 1);
+  const auto any = [&] { return Vec3{share(random), share(random), share(random)}; };
+  Poses p;
+  p.F = {5 * any(), exp_rotation(3 * any())};
+  p.M = {p.F.p + turn * any(), exp_rotation(turn * any()) * p.F.q};
+  return p;
+}
+
+TEST(Member, ForcesDoTheWorkOfTheResultants) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> share(-1, 1);
+  const auto any = [&] { return Vec3{share(random), share(random), share(random)}; };
+  const Span span{-1.4, 1.7};
+  for (const double turn : {1e-3, 0.3, 0.8}) {
+    for (int i = 0; i < 50; ++i) {
+      const Poses p = make_poses(random, turn);
+      const double f[6] = {share(random), share(random), share(random), share(random), share(random), share(random)};
+      const ElementGeometry g = measure_element(p.F, p.M, span);
+      const ElementForces on = calc_element_forces(g, span, f);
+      const Vec3 v_a = any(), w_a = any(), v_b = any(), w_b = any();
+      constexpr double h = 1e-6;
+      double power = 0;
+      for (const double side : {-1.0, 1.0}) {
+        const auto moved = [&](const Pose& X, const Vec3& v, const Vec3& w) {
+          return Pose{X.p + side * h * v, exp_rotation(side * h * w) * X.q};
+        };
+        const ElementGeometry at = measure_element(moved(p.F, v_a, w_a), moved(p.M, v_b, w_b), span);
+        for (int c = 0; c < 6; ++c) power += side * f[c] * at.deformation[c] / (2 * h);
+      }
+      const double given = dot(-on.force, v_a + cross(w_a, g.p_a - p.F.p)) - dot(on.torque_a, w_a) +
+                           dot(on.force, v_b + cross(w_b, g.p_b - p.M.p)) + dot(on.torque_b, w_b);
+      EXPECT_NEAR(given, power, 1e-8) << turn << " " << i;
+      // no force and no moment is left over
+      const Vec3 left = on.torque_a - on.torque_b + cross(g.p_a - g.p_b, on.force);
+      EXPECT_LT(norm(left), 1e-12) << turn << " " << i;
+    }
+  }
+}
+
+TEST(Member, SmallDeformationsAreThoseOfTheMarkers) {
+  std::mt19937 random(3);
+  for (int i = 0; i < 20; ++i) {
+    const Poses p = make_poses(random, 1e-6);
+    const ElementGeometry member = measure_element(p.F, p.M, {-1.5, 1.5}), marker = measure_element(p.F, p.M, {});
+    for (int c = 0; c < 6; ++c) EXPECT_NEAR(member.deformation[c], marker.deformation[c], 2e-11) << c;
+  }
+}
+
+}  // namespace
+}  // namespace topple::mbs
