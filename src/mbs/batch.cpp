@@ -22,6 +22,9 @@ std::string find_difference(const Model& base, const Model& varied) {
   for (size_t i = 0; i < base.elements.size(); ++i)
     if (varied.elements[i].a != base.elements[i].a || varied.elements[i].b != base.elements[i].b)
       return "the bodies of elements[" + std::to_string(i) + "]";
+  for (size_t i = 0; i < base.elements.size(); ++i)
+    if ((varied.elements[i].stations.size() == 2) != (base.elements[i].stations.size() == 2))
+      return "the stations of elements[" + std::to_string(i) + "], a whole member in only one of both";
   for (size_t i = 0; i < base.joints.size(); ++i) {
     const Joint &a = base.joints[i], &b = varied.joints[i];
     if (a.kind != b.kind) return "the kind of joints[" + std::to_string(i) + "]";
@@ -116,8 +119,6 @@ void run_lanes(const Model& model, const std::vector<Variation>& variations, con
     }
     if (!lanes) lanes = make_batch(s, W);
     check_planes(*lanes, s, first + i);
-    for (size_t e = 0; e < s.elements.size(); ++e)
-      if (s.elements[e].zone.stations > 1) lanes->single[e] = 0;
     s.join_batch(*lanes, i);
     active[i] = &s;
   }

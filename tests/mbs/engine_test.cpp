@@ -552,6 +552,12 @@ TEST(CheckModel, RefusesASwitchOfAnElementWithoutStations) {
   EXPECT_THAT(complaint_of([&] { check_model(c.model); }), HasSubstr("has no station whose law could change"));
 }
 
+TEST(CheckModel, RefusesAMemberWithoutLength) {
+  Column c = make_column();
+  c.model.elements[0].stations = {{0.5, c.strong}, {0.5, c.strong}};
+  EXPECT_THAT(complaint_of([&] { check_model(c.model); }), HasSubstr("is that of the other station"));
+}
+
 TEST(CheckModel, RefusesASwitchOfARotationalElementWithoutALaw) {
   Model m = make_rod();
   RotationalElement r;
