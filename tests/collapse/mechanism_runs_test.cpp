@@ -86,7 +86,7 @@ TEST(MechanismRunPhysics, WithTheMiddleGoneBothEndsFoldInwards) {
 }
 
 TEST(MechanismRunPhysics, ALossThatSpreadsIsProgressive) {
-  const auto m = find_mechanism(gallery(6, 3, "5 kN/m2") + fire({"C-C*-0", "C-D*-0"}), "4 s");
+  const auto m = find_mechanism(gallery(6, 3, "5.4 kN/m2") + fire({"C-C*-0", "C-D*-0"}), "4 s");
   EXPECT_EQ(m.title, "Mechanism: progressive") << m.text;
 }
 
