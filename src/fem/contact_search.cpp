@@ -34,13 +34,6 @@ Vec3 speed(const ExplicitState& s, std::uint32_t row) {
 }
 bool has_mass(const ExplicitState& s, std::uint32_t row) { return s.rows[8 * size_t{row} + kernel::kNodeMass] > 0; }
 
-/// A face as it is seen whether a point may touch it.
-struct Face {
-  Vec3 centre, normal;
-  Vec3 along, across;            // ξ and η of a point from the middle by scalar products
-  double uneven = 0;             // of the corners, to either side
-  double wider = 0, higher = 0;  // than the parallelogram of its middle, in ξ and η
-};
 /// Calls body(i) for all i below count, `run` of them a task.
 template <class Body>
 void for_all(size_t count, size_t run, Team& team, const Body& body) {
@@ -313,18 +306,26 @@ class Search {
           else
             pair.free = std::min(pair.free, of.free);
       }
-      constexpr size_t kAhead = 6;  // corners that lie all over memory
-      for (size_t i = 0; i < due.size(); ++i) {
-        if (i + 2 * kAhead < due.size())
-          hwy::Prefetch(&setup_.rows_of_element[due[i + 2 * kAhead].of->candidate.face / 6]);
-        if (i + kAhead < due.size())
-          for (const std::uint32_t row : setup_.rows_of_element[due[i + kAhead].of->candidate.face / 6])
-            hwy::Prefetch(s_.rows.data() + kernel::kNodeFields * size_t{row});
-        const auto& [pair, of, path] = due[i];
-        const Gap gap = find_gap(of->candidate);
-        if (gap.now < path) found[run].push_back(of->candidate);
-        of->free = static_cast<float>(2 * pair->moved + gap.grown);
-        pair->free = std::min(pair->free, of->free);
+      static thread_local lanes::FaceCorners corners;
+      static thread_local lanes::Skin skin;
+      constexpr size_t kBatch = 32;  // faces whose corners, all over memory, are asked for before they are seen
+      for (size_t first = 0; first < due.size(); first += kBatch) {
+        const size_t count = std::min(kBatch, due.size() - first);
+        for (auto& rows : corners) rows.clear();
+        for (size_t i = first; i < first + count; ++i) {
+          if (i + kBatch < due.size()) hwy::Prefetch(&setup_.rows_of_element[due[i + kBatch].of->candidate.face / 6]);
+          add_corners(due[i].of->candidate.face, corners);
+          for (const auto& rows : corners) hwy::Prefetch(s_.rows.data() + kernel::kNodeFields * size_t{rows.back()});
+        }
+        lanes::fill_runs(corners);
+        lanes::make_skin(s_.rows.data(), kFaceDepth, corners, count, skin);
+        for (size_t i = 0; i < count; ++i) {
+          const auto& [pair, of, path] = due[first + i];
+          const Gap gap = find_gap(of->candidate, skin.face(i));
+          if (gap.now < path) found[run].push_back(of->candidate);
+          of->free = static_cast<float>(2 * pair->moved + gap.grown);
+          pair->free = std::min(pair->free, of->free);
+        }
       }
     });
     c.near.clear();
@@ -355,9 +356,9 @@ class Search {
   struct Gap {
     double now = std::numeric_limits<double>::infinity(), grown = now;
   };
-  Gap find_gap(const ContactCandidate& candidate) const {
+  Gap find_gap(const ContactCandidate& candidate, const lanes::SkinFace& face) const {
     const ContactPoint& point = candidate.point;
-    const auto is_gone = [&](std::uint32_t face) { return s_.contact.gone[face / 6] != 0; };
+    const auto is_gone = [&](std::uint32_t number) { return s_.contact.gone[number / 6] != 0; };
     if (is_gone(candidate.face) || (point.kind == ContactPoint::Centre && is_gone(point.index))) return {};
     Vec3 p;
     double radius = 0, grows = 0;
@@ -373,17 +374,18 @@ class Search {
         p = particle.p, radius = particle.radius, grows = s_.particle_makes[point.index].full_radius - radius;
       }
     }
-    const Face face = make_face(corners_of(candidate.face));
     const Vec3 d = p - face.centre;
-    const double height = dot(d, face.normal), beside = calc_beside(d, face);
+    const double height = dot(d, face.normal);
+    const double beside =
+        std::max({0.0, std::abs(dot(d, face.along)) - face.wide, std::abs(dot(d, face.across)) - face.high});
     const double above = std::max(0.0, height - face.uneven), lower = -(height + face.uneven);
-    const auto add = [grows](double gap) { return Gap{gap, gap - grows}; };
     if (lower > 0) {
       // a ball at the height of the face's edge may touch it from beside, one below it does not
-      const double below = std::max(beside, lower - calc_depth(face, corners_of(candidate.face ^ 1)));
+      const double below = std::max(beside, lower - face.depth);
       if (below < lower) return {below, below};
     }
-    return add(std::max(lower, std::sqrt(above * above + beside * beside) - radius));
+    const double gap = std::max(lower, std::sqrt(above * above + beside * beside) - radius);
+    return {gap, gap - grows};
   }
 
   std::array<std::uint32_t, 4> rows_of(std::uint32_t face) const {
@@ -396,26 +398,6 @@ class Search {
     const std::array<std::uint32_t, 4> rows = rows_of(face);
     for (size_t k = 0; k < 4; ++k) x[k] = place(s_, rows[k]);
     return x;
-  }
-
-  static Face make_face(const std::array<Vec3, 4>& x) {
-    Face face;
-    face.centre = 0.25 * (x[0] + x[1] + x[2] + x[3]);
-    const Vec3 n = cross(x[2] - x[0], x[3] - x[1]);
-    face.normal = (1 / std::max(norm(n), 1e-300)) * n;
-    const Vec3 a = 0.25 * (x[1] + x[2] - x[0] - x[3]), b = 0.25 * (x[2] + x[3] - x[0] - x[1]);
-    const double area = std::max(dot(cross(a, b), face.normal), 1e-300);
-    face.along = (1 / area) * cross(b, face.normal), face.across = (1 / area) * cross(face.normal, a);
-    face.uneven = std::abs(dot(x[0] - face.centre, face.normal));
-    const Vec3 c = 0.25 * (x[0] + x[2] - x[1] - x[3]);
-    face.wider = std::abs(dot(c, face.along)), face.higher = std::abs(dot(c, face.across));
-    return face;
-  }
-  /// By the corners of the face opposite.
-  static double calc_depth(const Face& face, const std::array<Vec3, 4>& opposite) {
-    Vec3 far;
-    for (const Vec3& p : opposite) far += 0.25 * p;
-    return kFaceDepth * std::max(0.0, dot(face.normal, face.centre - far));
   }
 
   void make_skins(const std::vector<ContactPair*>& due) {
@@ -431,6 +413,14 @@ class Search {
       if (wanted[g] != Nothing) make_skin(static_cast<std::uint32_t>(g), wanted[g] == All);
     });
   }
+  /// Rows of a face and of the one opposite.
+  void add_corners(std::uint32_t face, lanes::FaceCorners& corners) const {
+    const std::array<std::uint32_t, 8>& rows = setup_.rows_of_element[face / 6];
+    for (size_t k = 0; k < 4; ++k) {
+      corners[k].push_back(rows[static_cast<size_t>(kFaces[face % 6][k])]);
+      corners[4 + k].push_back(rows[static_cast<size_t>(kFaces[(face % 6) ^ 1][k])]);
+    }
+  }
   /// Faces of a group that are outside.
   void list_faces(std::uint32_t g, GroupFaces& faces) const {
     faces.numbers.clear();
@@ -438,15 +428,11 @@ class Search {
     for (std::uint32_t i = setup_.group_starts[g]; i < setup_.group_starts[g + 1]; ++i) {
       const size_t e = static_cast<size_t>(setup_.order[i]);
       if (s_.contact.gone[e] != 0) continue;
-      const std::array<std::uint32_t, 8>& rows = setup_.rows_of_element[e];
       for (size_t f = 0; f < 6; ++f) {
         const int beside = setup_.surface.neighbour[e][f];
         if (beside >= 0 && s_.contact.gone[static_cast<size_t>(beside)] == 0) continue;
         faces.numbers.push_back(static_cast<std::uint32_t>(6 * e + f));
-        for (size_t k = 0; k < 4; ++k) {
-          faces.corners[k].push_back(rows[static_cast<size_t>(kFaces[f][k])]);
-          faces.corners[4 + k].push_back(rows[static_cast<size_t>(kFaces[f ^ 1][k])]);
-        }
+        add_corners(faces.numbers.back(), faces.corners);
       }
     }
     lanes::fill_runs(faces.corners);
@@ -480,14 +466,6 @@ class Search {
       if (std::find(rows.begin(), rows.end(), row) != rows.end()) return true;
     }
     return false;
-  }
-
-  /// How far a point is at least beside a face.
-  static double calc_beside(const Vec3& d, const Face& face) {
-    constexpr double kEdge = 1.01;  // what counts as on it, and what it stretches until the next look
-    const double x = std::max(0.0, std::abs(dot(d, face.along)) - (kEdge + face.wider)) / norm(face.along);
-    const double y = std::max(0.0, std::abs(dot(d, face.across)) - (kEdge + face.higher)) / norm(face.across);
-    return std::max(x, y);
   }
 
   /// Of a point near the box of faces.

@@ -24,8 +24,8 @@ using DI = hn::RebindToSigned<D>;
 using V = hn::Vec<D>;
 constexpr size_t kLanes = hn::MaxLanes(D());
 
-/// Fields of a face: middle, normal, axes in its plane (unit vectors, towards ξ and η) with half the width along them.
-enum Field : size_t { kCentre = 0, kNormal = 3, kAlong = 6, kAcross = 9, kWide = 12, kHigh, kDepth, kFields };
+/// Fields of a face, see SkinFace.
+enum Field : size_t { kCentre = 0, kNormal = 3, kAlong = 6, kAcross = 9, kWide = 12, kHigh, kDepth, kUneven, kFields };
 static_assert(kFields == kSkinFields);
 
 #include "fem/contact_vectors.inc"
@@ -80,6 +80,7 @@ void make_skin(const double* HWY_RESTRICT rows, double depth_share, const FaceCo
       const V wide = add(mul(num(kEdge), hn::Abs(dot(a, along))), hn::Abs(dot(c, along)));
       const V tall = add(mul(num(kEdge), hn::Abs(dot(b, across))), hn::Abs(dot(c, across)));
       const V depth = mul(num(depth_share), hn::Max(num(0), dot(normal, sub(centre, far))));
+      const V uneven = hn::Abs(dot(normal, sub(x[0], centre)));
       V square = num(0);
       for (size_t k = 0; k < 4; ++k) {
         const V3 r = sub(x[k], centre);
@@ -91,7 +92,7 @@ void make_skin(const double* HWY_RESTRICT rows, double depth_share, const FaceCo
       high = larger(high, add(centre, V3{reach, reach, reach}));
       double* HWY_RESTRICT to = skin.faces.data() + run * kFields * kFaceRun + l;
       const V fields[kFields] = {centre.x, centre.y, centre.z, normal.x, normal.y, normal.z, along.x, along.y,
-                                 along.z,  across.x, across.y, across.z, wide,     tall,     depth};
+                                 along.z,  across.x, across.y, across.z, wide,     tall,     depth,   uneven};
       for (size_t f = 0; f < kFields; ++f) hn::Store(fields[f], d, to + f * kFaceRun);
     }
     const Vec3 from = least_of(low), until = most_of(high);

@@ -19,7 +19,13 @@ using FaceCorners = std::array<std::vector<std::uint32_t>, 8>;
 /// Fills the last run with its last face.
 void fill_runs(FaceCorners&);
 
-inline constexpr size_t kSkinFields = 15;  // of a face, its middle first
+inline constexpr size_t kSkinFields = 16;  // of a face, in the order of SkinFace
+/// A face as it is seen whether a point may touch it: unit vectors, those in its plane towards ξ and η with half the
+/// width along them; how far behind it counts, and how far its corners are to either side of its plane.
+struct SkinFace {
+  Vec3 centre, normal, along, across;
+  double wide = 0, high = 0, depth = 0, uneven = 0;
+};
 
 /// F faces in runs, R runs.
 struct Skin {
@@ -30,6 +36,12 @@ struct Skin {
   Vec3 centre(size_t i) const {
     const double* at = faces.data() + i / kFaceRun * kSkinFields * kFaceRun + i % kFaceRun;
     return {at[0], at[kFaceRun], at[2 * kFaceRun]};
+  }
+  SkinFace face(size_t i) const {
+    const double* at = faces.data() + i / kFaceRun * kSkinFields * kFaceRun + i % kFaceRun;
+    const auto field = [&](size_t f) { return at[f * kFaceRun]; };
+    const auto vector = [&](size_t f) { return Vec3{field(f), field(f + 1), field(f + 2)}; };
+    return {vector(0), vector(3), vector(6), vector(9), field(12), field(13), field(14), field(15)};
   }
 };
 
