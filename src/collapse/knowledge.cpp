@@ -27,6 +27,7 @@ const std::map<std::string, Field>& fields() {
       {"zone.biaxial_exponent", &Knowledge::zone_biaxial_exponent},
       {"zone.damping_ratio", &Knowledge::zone_damping_ratio},
       {"zone.elongation_share", &Knowledge::zone_elongation_share},
+      {"member.uncracked_share", &Knowledge::member_uncracked_share},
       {"slab.elongation_lengths", &Knowledge::slab_elongation_lengths},
       {"wall.stiffness_share", &Knowledge::wall_stiffness_share},
       {"wall.axial_share", &Knowledge::wall_axial_share},
@@ -102,10 +103,12 @@ Knowledge read_knowledge(const std::string& text, const std::string& name) {
       continue;
     }
     seen[rule.id] = true;
-    const bool may_be_zero = rule.id == "zone.elongation_share";
+    const bool is_between = rule.id == "member.uncracked_share";  // 0 and 1
+    const bool may_be_zero = is_between || rule.id == "zone.elongation_share";
     if (!entry.contains("value") || !entry["value"].is_number() || !std::isfinite(entry["value"].get<double>()) ||
-        entry["value"].get<double>() < 0 || (entry["value"].get<double>() == 0 && !may_be_zero)) {
-      complain("rule \"" + rule.id + "\" needs a value " + (may_be_zero ? ">= 0" : "> 0"));
+        entry["value"].get<double>() < 0 || (entry["value"].get<double>() == 0 && !may_be_zero) ||
+        (entry["value"].get<double>() > 1 && is_between)) {
+      complain("rule \"" + rule.id + "\" needs a value " + (is_between ? "from 0 to 1" : may_be_zero ? ">= 0" : "> 0"));
       continue;
     }
     rule.value = entry["value"].get<double>();

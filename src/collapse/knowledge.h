@@ -17,7 +17,7 @@ struct Rule {
 /// The rules' values under the names of their ids, `.` written as `_`.
 struct Knowledge {
   double zone_length_by_depth, zone_length_by_span, zone_length_by_bar, zone_length_at_most;
-  double zone_elongation_share;
+  double zone_elongation_share, member_uncracked_share;
   double zone_rupture_rotation, zone_rupture_rotation_pressed, zone_slip_softening, zone_slip_rupture,
       zone_twist_rupture, zone_biaxial_exponent;
   double zone_damping_ratio;
@@ -36,7 +36,8 @@ struct Knowledge {
 };
 
 /// Reads a set of rules. InputError for text that is not such a set, and for rules that are missing, unknown, given
-/// twice or not positive numbers (`zone.elongation_share` may be 0).
+/// twice or not positive numbers (`zone.elongation_share` and
+/// `member.uncracked_share` may be 0, the latter at most 1).
 Knowledge read_knowledge(const std::string& text, const std::string& name);
 
 /// The rules that are built in.

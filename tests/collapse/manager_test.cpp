@@ -11,6 +11,7 @@
 #include "collapse/law.h"
 #include "collapse/run.h"
 #include "mbs/solver.h"
+#include "mbs/zone_law.h"
 #include "plans.h"
 
 namespace topple::collapse {
@@ -170,6 +171,33 @@ TEST(Manager, TheTopOfAColumnTurnsAsFarAsItsHingeDoes) {
   };
   EXPECT_LT(limit(k.zone_rupture_rotation), 0.5);
   EXPECT_GT(limit(1), 1);
+}
+
+TEST(Manager, MembersCanBeAsStiffAsUncrackedOnesUntilTheyYield) {
+  Knowledge k = default_knowledge();
+  const auto beam = [&](double share, mbs::ZoneLaw& law) {
+    k.member_uncracked_share = share;
+    ModelMap map;
+    const mbs::Model m = make_model(read(portal()), k, map);
+    for (const mbs::ZoneElement& e : m.elements)
+      if (e.name.starts_with("B-") && e.name.ends_with("/start")) {
+        law = m.laws[static_cast<size_t>(e.stations[0].law.index)];
+        return e.rotational_stiffness.y;
+      }
+    return 0.0;
+  };
+  mbs::ZoneLaw cracked, half, whole;
+  const double k0 = beam(0, cracked), k_half = beam(0.5, half), k1 = beam(1, whole);
+  EXPECT_GT(k1, 1.5 * k0);
+  EXPECT_NEAR(k_half, 0.5 * (k0 + k1), 1e-9 * k1);
+  // stiffer, it yields no later, and at 10 mrad resists as before
+  const auto limit = [](const mbs::ZoneLaw& law, double rotation) {
+    int at_force = 0, at_rotation = 0;
+    return mbs::calc_moment_limit(mbs::compile_law(law).moment[0], 0, rotation, at_force, at_rotation).positive;
+  };
+  EXPECT_LE(limit(whole, 0), limit(cracked, 0));
+  EXPECT_GT(limit(whole, 0), 0.7 * limit(cracked, 0));
+  EXPECT_NEAR(limit(whole, 0.01), limit(cracked, 0.01), 0.02 * limit(cracked, 0.01));
 }
 
 TEST(Manager, StiffnessOfMembersIsThatOfPrismaticBars) {
