@@ -111,17 +111,17 @@ void Lanes::move_slots(const std::vector<std::uint32_t>& from) {
     std::vector<std::uint32_t> flowing = from;
     for (std::uint32_t& slot : flowing)
       if (slot != kNoSlot && !(field(slot, kFlows) > 0)) slot = kNoSlot;
-    move_fields(flowing, kFlowFields, W, flows, moved_flows);
+    move_fields(flowing, kFlowFields, W, flows, moved_flows_);
   }
-  move_fields(from, kStateFields, W, states, moved_states);
-  move_fields(from, kForceFields, W, element_forces, moved_forces);
+  move_fields(from, kStateFields, W, states, moved_states_);
+  move_fields(from, kForceFields, W, element_forces, moved_forces_);
   for (size_t slot = 0; slot < from.size(); ++slot) {
     if (from[slot] != kNoSlot) continue;
     for (int f = 0; f < kStateFields; ++f) states[state_at(slot, f)] = 0;
     for (size_t f = 0; f < static_cast<size_t>(kForceFields); ++f) force_field(slot, f) = 0;
   }
-  pool.swap(moved_pool);
-  constants.swap(moved_constants);
+  pool.swap(moved_pool_);
+  constants.swap(moved_constants_);
   pool.clear();
   constants.clear();
   uses.clear();
@@ -133,7 +133,7 @@ void Lanes::move_slots(const std::vector<std::uint32_t>& from) {
       for (size_t l = 0; l < W; ++l)
         x[l] = slots[l] == kNoSlot
                    ? empty
-                   : moved_pool[size_t{moved_constants[slots[l] / W * kConstants + f]} * W + slots[l] % W];
+                   : moved_pool_[size_t{moved_constants_[slots[l] / W * kConstants + f]} * W + slots[l] % W];
       // shared with the block before
       if (block > 0) {
         const std::uint32_t last = constants[(block - 1) * kConstants + f];

@@ -124,8 +124,8 @@ struct Lanes {
   void open_flows();
 
  private:
-  AlignedVector<double> moved_states, moved_forces, moved_flows, moved_pool;  // scratch of move_slots()
-  std::vector<std::uint32_t> moved_constants;
+  AlignedVector<double> moved_states_, moved_forces_, moved_flows_, moved_pool_;  // scratch of move_slots()
+  std::vector<std::uint32_t> moved_constants_;
   void drop_dead_entries();
   size_t state_at(size_t slot, int f) const {
     return (slot / W * kernel::kStateFields + static_cast<size_t>(f)) * W + slot % W;
