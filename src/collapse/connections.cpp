@@ -135,6 +135,9 @@ bool Builder::has_link(int frame) const {
 }
 
 Builder::Stiffness Builder::calc_stiffness(const MemberZones& z) const {
+  const auto mix = [share = k.member_uncracked_share](double at_yield, double uncracked) {
+    return at_yield + share * std::max(0.0, uncracked - at_yield);
+  };
   Stiffness s;
   for (const MemberStation& station : z.station) {
     // a preparation is local, so the member keeps the stiffness of its better end
@@ -142,9 +145,6 @@ Builder::Stiffness Builder::calc_stiffness(const MemberZones& z) const {
     s.EA = std::max(s.EA, rcc.EA);
     s.GA = std::max(s.GA, rcc.GA);
     s.GJ = std::max(s.GJ, rcc.GJ);
-    const auto mix = [share = k.member_uncracked_share](double at_yield, double uncracked) {
-      return at_yield + share * std::max(0.0, uncracked - at_yield);
-    };
     s.EI_y = std::max(s.EI_y, mix(rcc.calc_EI_effective_y(z.normal_force), rcc.EI_y));
     s.EI_z = std::max(s.EI_z, mix(rcc.calc_EI_effective_z(z.normal_force), rcc.EI_z));
   }

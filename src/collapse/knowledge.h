@@ -36,8 +36,8 @@ struct Knowledge {
 };
 
 /// Reads a set of rules. InputError for text that is not such a set, and for rules that are missing, unknown, given
-/// twice or not positive numbers (`zone.elongation_share` and
-/// `member.uncracked_share` may be 0, the latter at most 1).
+/// twice or not positive numbers (`zone.elongation_share` and `member.uncracked_share` may be 0, the latter at
+/// most 1).
 Knowledge read_knowledge(const std::string& text, const std::string& name);
 
 /// The rules that are built in.

@@ -46,12 +46,6 @@ Vec3 find_nearest_rotation(const Vec3& r, const Vec3& near) {
 
 bool is_same(const Motion& a, const Motion& b) { return a.X_WB == b.X_WB && a.v_WB == b.v_WB && a.w_WB == b.w_WB; }
 
-mbs::Six deformation_of(const mbs::ElementGeometry& g) {
-  mbs::Six d;
-  std::copy(g.deformation, g.deformation + 6, d.c);
-  return d;
-}
-
 }  // namespace
 
 double calc_characteristic(const Characteristic& c, double x) {
@@ -236,9 +230,9 @@ mbs::ElementGeometry Forces::measure_zone(const Zone& z, const Motion& m, mbs::B
   return mbs::measure_element(pose_of(m, a) * X_AF, pose_of(m, b) * X_BM, z.parameters.span());
 }
 
-void Forces::push_zone_forces(const Zone& z, const Motion& m, mbs::BodyId a, mbs::BodyId b,
-                              const mbs::ElementGeometry& g, const double f[6], std::vector<Wrench>& on) const {
-  const mbs::ElementForces pushed = mbs::calc_element_forces(g, z.parameters.span(), f);
+void Forces::push_zone_forces(const Motion& m, mbs::BodyId a, mbs::BodyId b, const mbs::ElementGeometry& g,
+                              const mbs::Six& resultant, std::vector<Wrench>& on) const {
+  const mbs::ElementForces pushed = mbs::calc_element_forces(g, resultant);
   push(m, a, g.p_a, pushed.force, on);
   push(m, b, g.p_b, -pushed.force, on);
   twist(a, pushed.torque_a, on);
@@ -280,7 +274,7 @@ void Forces::calc(double time, const Motion& motion, std::vector<Wrench>& on) co
   };
   const auto push_zone = [&](const Zone& z, mbs::BodyId a, const Pose& X_AF, mbs::BodyId b, const Pose& X_BM) {
     const mbs::ElementGeometry g = measure_zone(z, motion, a, X_AF, b, X_BM);
-    push_zone_forces(z, motion, a, b, g, try_zone(z, deformation_of(g)).c, on);
+    push_zone_forces(motion, a, b, g, try_zone(z, g.deformation), on);
   };
   for (size_t i = 0; i < zone_.size(); ++i) {
     const mbs::ZoneElement& e = model_.elements[i];
@@ -421,8 +415,8 @@ bool Forces::advance(double time, const Motion& motion, const std::vector<Vec3>&
   const auto advance_six = [&](Zone& z, size_t index, mbs::BodyId a, const Pose& X_AF, mbs::BodyId b,
                                const Pose& X_BM) {
     const mbs::ElementGeometry g = measure_zone(z, motion, a, X_AF, b, X_BM);
-    advance(z, index, deformation_of(g));
-    if (z.state.live) push_zone_forces(z, motion, a, b, g, z.state.resultant.c, cached_);
+    advance(z, index, g.deformation);
+    if (z.state.live) push_zone_forces(motion, a, b, g, z.state.resultant, cached_);
   };
   for (size_t i = 0; i < zone_.size(); ++i) {
     const mbs::ZoneElement& e = model_.elements[i];
@@ -653,8 +647,8 @@ void Forces::fill(double time, const Motion& motion, mbs::View& v) const {
     v.shortening[i] = zone_[i].state.shortened;
     v.element_force[i] = -three(zone_[i].state.resultant.c);
     v.element_moment[i] = -three(zone_[i].state.resultant.c + 3);
-    v.element_translation[i] = three(g.deformation);
-    v.element_rotation[i] = three(g.deformation + 3);
+    v.element_translation[i] = three(g.deformation.c);
+    v.element_rotation[i] = three(g.deformation.c + 3);
   }
   for (size_t i = 0; i < R; ++i) fill_zone(E + i, time, rotational_[i], v);
   v.cable_force.resize(rope_.size());

@@ -129,8 +129,8 @@ class Forces {
   void twist(mbs::BodyId, const Vec3& torque, std::vector<Wrench>&) const;
   mbs::ElementGeometry measure_zone(const Zone&, const Motion&, mbs::BodyId a, const Pose& X_AF, mbs::BodyId b,
                                     const Pose& X_BM) const;
-  void push_zone_forces(const Zone&, const Motion&, mbs::BodyId a, mbs::BodyId b, const mbs::ElementGeometry&,
-                        const double resultant[6], std::vector<Wrench>&) const;
+  void push_zone_forces(const Motion&, mbs::BodyId a, mbs::BodyId b, const mbs::ElementGeometry&,
+                        const mbs::Six& resultant, std::vector<Wrench>&) const;
   void push_six(const Motion&, mbs::BodyId a, mbs::BodyId b, const Six&, const double resultant[6],
                 std::vector<Wrench>&) const;
   void push_others(double time, const Motion&, std::vector<Wrench>&) const;

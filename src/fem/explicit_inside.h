@@ -42,8 +42,8 @@ struct ContactWork {
 
 /// What debris exerts on a node from its forces to its next ones.
 struct HeldPush {
-  Vec3 normal_force, friction;  // [N]
-  std::uint32_t row = 0, unused = 0;
+  Vec3 normal_force, friction;         // [N]
+  std::uint32_t row = 0, padding = 0;  // whose bytes snapshots hold
 };
 
 /// A touch of the step; forces on the point [N].
@@ -82,11 +82,11 @@ struct ExplicitState {
   AlignedVector<Particle> particles;
   std::vector<ParticlePush> particle_pushes;
   std::vector<ParticleMake> particle_makes;
-  std::vector<GroundTouch> touches;       // of nodes
-  TouchSums ground_touching;              // of particles, as ContactState::debris
-  ContactWork ground_work, surface_work;  // but for
-  std::vector<HeldPush> held;             //
-  ContactWork held_work;                  // at the speeds of steps so far, those before this one half where it begins
+  std::vector<GroundTouch> touches;  // of nodes
+  TouchSums ground_touching;         // of particles, as ContactState::debris
+  ContactWork ground_work, surface_work;
+  std::vector<HeldPush> held;  // what debris exerts on nodes until its next forces
+  ContactWork held_work;       // of it, not in surface_work; half of the first and of the last of its steps at a time
   ContactState contact;
   std::vector<Vec3> ground_forces, debris_forces;  // on grounds: of all, of particles at their last forces
   std::vector<double> touchdowns;                  // by part

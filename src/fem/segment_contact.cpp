@@ -282,9 +282,9 @@ void press_surfaces(ExplicitSystem::Inside& in, ExplicitState& s, bool debris) {
       ParticlePush& to = s.particle_pushes[number];
       to.crushed = std::max({0.0, to.crushed, crushed}), to.force += force;
     };
-    for (const ContactTask& task : in.contact_tasks)
+    for (const ContactTask& task : in.contact_tasks.last(tasks - first_debris))
       for (const FaceTouch& touch : task.faces_touched)
-        if (task.is_debris) push(touch.point.index, touch.normal_force + touch.friction, touch.crushed);
+        push(touch.point.index, touch.normal_force + touch.friction, touch.crushed);
     for (const ContactTask& task : in.contact_tasks)
       for (size_t i = 0; i < task.particles_touched.size(); ++i) {
         if (i + kAhead < task.particles_touched.size())

@@ -18,13 +18,15 @@ Vec3 calc_conjugate_torque(const Vec3& r, const Vec3& m) {
 
 ElementGeometry measure_element(const Pose& X_WF, const Pose& X_WM, const Span& span) {
   ElementGeometry g;
+  g.span = span;
+  double* deformation = g.deformation.c;
   const Mat3 F = to_matrix(X_WF.q);
   if (!span.is_member()) {
     const Vec3 u = transpose_times(F, X_WM.p - X_WF.p);
     g.axes = F;
     g.p_a = g.p_b = X_WM.p;
     g.turn_b = log_rotation(conjugate(X_WF.q) * X_WM.q);
-    for (int i = 0; i < 3; ++i) g.deformation[i] = u[i], g.deformation[3 + i] = g.turn_b[i];
+    for (int i = 0; i < 3; ++i) deformation[i] = u[i], deformation[3 + i] = g.turn_b[i];
     return g;
   }
   g.p_a = X_WF.p + span.a * F.column(0);
@@ -40,14 +42,16 @@ ElementGeometry measure_element(const Pose& X_WF, const Pose& X_WM, const Span& 
   g.axes = to_matrix(q_WC);
   g.turn_a = log_rotation(swing);
   g.turn_b = log_rotation(conjugate(q_WC) * X_WM.q);
-  g.deformation[0] = g.length - span.length();
-  g.deformation[1] = -(span.a * g.turn_a.z + span.b * g.turn_b.z);
-  g.deformation[2] = span.a * g.turn_a.y + span.b * g.turn_b.y;
-  for (int i = 0; i < 3; ++i) g.deformation[3 + i] = g.turn_a[i] + g.turn_b[i];
+  deformation[0] = g.length - span.length();
+  deformation[1] = -(span.a * g.turn_a.z + span.b * g.turn_b.z);
+  deformation[2] = span.a * g.turn_a.y + span.b * g.turn_b.y;
+  for (int i = 0; i < 3; ++i) deformation[3 + i] = g.turn_a[i] + g.turn_b[i];
   return g;
 }
 
-ElementForces calc_element_forces(const ElementGeometry& g, const Span& span, const double f[6]) {
+ElementForces calc_element_forces(const ElementGeometry& g, const Six& resultants) {
+  const double* f = resultants.c;
+  const Span& span = g.span;
   if (!span.is_member()) {
     const Vec3 torque = g.axes * calc_conjugate_torque(g.turn_b, {f[3], f[4], f[5]});
     return {g.axes * Vec3{f[0], f[1], f[2]}, torque, torque};

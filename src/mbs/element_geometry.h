@@ -6,6 +6,11 @@
 
 namespace topple::mbs {
 
+/// Six deformations or resultants: x y z translation, x y z rotation.
+struct Six {
+  double c[6] = {0, 0, 0, 0, 0, 0};
+};
+
 /// Factor of the double cross product in the rate of a rotation vector (eq. 4), valid below a full turn.
 ///   angle2  square of the rotation vector [rad²]
 double calc_kappa(double angle2);
@@ -22,12 +27,13 @@ struct Span {
 };
 
 struct ElementGeometry {
-  double deformation[6] = {0, 0, 0, 0, 0, 0};  // x y z [m], about x y z [rad]
-  Mat3 axes;                                   // of the resultants, in W
-  Vec3 p_a, p_b;                               // where the force acts on a and on b, in W
-  Vec3 turn_a, turn_b;                         // rotation vectors from a to `axes` (a member's) and on to b, in `axes`
-  Vec3 along_a;                                // x of `axes` in those of a
-  double length = 0;                           // between the stations of a member [m]
+  Span span;
+  Six deformation;      // [m], [rad]
+  Mat3 axes;            // of the resultants, in W
+  Vec3 p_a, p_b;        // where the force acts on a and on b, in W
+  Vec3 turn_a, turn_b;  // rotation vectors from a to `axes` (a member's) and on to b, in `axes`
+  Vec3 along_a;         // x of `axes` in those of a
+  double length = 0;    // between the stations of a member [m]
 };
 
 /// Force on a, on b its opposite; torque on a about p_a and the opposite of that on b about p_b. All in W.
@@ -41,6 +47,6 @@ ElementGeometry measure_element(const Pose& X_WF, const Pose& X_WM, const Span&)
 
 /// The forces that do the work of the resultants on the rates of the deformations.
 ///   resultants  N, V_y, V_z [N], T, M_y, M_z [N·m]
-ElementForces calc_element_forces(const ElementGeometry&, const Span&, const double resultants[6]);
+ElementForces calc_element_forces(const ElementGeometry&, const Six& resultants);
 
 }  // namespace topple::mbs

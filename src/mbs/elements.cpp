@@ -335,19 +335,17 @@ void System::evaluate_element(size_t i, double h) {
   const CompiledElement& e = elements[i];
   const ElementGeometry g = measure_zone(e);
   const bool was_yielded = z.yielded;
-  Six d;
-  std::copy(g.deformation, g.deformation + 6, d.c);
   if (ignores_limits) {
     ZoneParameters elastic = e.zone;
     elastic.stations = 0;
-    advance_zone(elastic, laws, d, state.time, h, z);
+    advance_zone(elastic, laws, g.deformation, state.time, h, z);
   } else {
-    advance_zone(e.zone, laws, d, state.time, h, z);
+    advance_zone(e.zone, laws, g.deformation, state.time, h, z);
   }
   if (z.yielded && !was_yielded) say({Happening::Kind::ElementYielded, state.time, static_cast<int>(i), -1, {}, 0});
   Vec3 on_a, torque_a, torque_b;
   if (z.live) {
-    const ElementForces f = calc_element_forces(g, e.zone.span(), z.resultant.c);
+    const ElementForces f = calc_element_forces(g, z.resultant);
     on_a = f.force;
     torque_a = cross(g.p_a - centre_of(e.a), on_a) + f.torque_a;
     torque_b = cross(g.p_b - centre_of(e.b), on_a) + f.torque_b;

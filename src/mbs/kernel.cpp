@@ -798,16 +798,16 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
     const N v = {hn::CopySign(apart_by.y.v, hn::Xor(apart_by.y.v, apart_by.w.v))};
     s2 = v * v;
     turning<D>(s2, over_sine, coefficient);
-    N moved = across, turn = over_sine * v;
+    N moved = across, rotation = over_sine * v;
     if constexpr (is_member) {
       const N turn_a = over_sine_a * swing_y;
-      moved = fma(x_a, turn_a, x_b * turn);
-      turn = turn_a + turn;
+      moved = fma(x_a, turn_a, x_b * rotation);
+      rotation = turn_a + rotation;
     } else {
       d[0] = along;
     }
     d[active.at[1]] = In == Plane::AboutY ? moved : zero - moved;
-    d[active.at[2]] = turn;
+    d[active.at[2]] = rotation;
   } else {
     lever_a = turn(A.q, constant3(kMarkerA));
     lever_b = turn(B.q, constant3(kMarkerB));

@@ -44,7 +44,7 @@ double System::calc_component(const Quantity& q, int component) {
     case Quantity::Kind::ElementRotation: {
       const CompiledElement& e = elements[i];
       const ElementGeometry g = measure_zone(e);
-      const double* d = g.deformation + (q.kind == Quantity::Kind::ElementTranslation ? 0 : 3);
+      const double* d = g.deformation.c + (q.kind == Quantity::Kind::ElementTranslation ? 0 : 3);
       return component_of(Vec3{d[0], d[1], d[2]}, component);
     }
     case Quantity::Kind::ElementForce:

@@ -14,11 +14,6 @@
 
 namespace topple::mbs {
 
-/// Six deformations or resultants: x y z translation, x y z rotation.
-struct Six {
-  double c[6] = {0, 0, 0, 0, 0, 0};
-};
-
 enum class BreakReason : std::uint8_t { None, Tension, Crushing, Shear, Rotation, Torsion, Removed };
 
 /// Inelastic history of a station.

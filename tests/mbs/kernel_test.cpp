@@ -108,9 +108,7 @@ void walk(int stations, const ZoneLaw& zone, double amplitude, std::uint32_t see
     kernel.push_back({k.resultant, k.energy, k.plastic, k.damping, std::max(k.station[0].reached, k.station[1].reached),
                       k.shortened});
     if (law != nullptr) {
-      const ElementGeometry g = s.measure_zone(s.elements[0]);
-      Six deformation;
-      std::copy(g.deformation, g.deformation + 6, deformation.c);
+      const Six deformation = s.measure_zone(s.elements[0]).deformation;
       if (z.live) advance_zone(s.elements[0].zone, s.laws, deformation, 1e-4 * i, 1e-4, z);
       law->push_back({z.resultant, z.energy, z.plastic, z.damping, std::max(z.station[0].reached, z.station[1].reached),
                       z.shortened});

@@ -84,7 +84,7 @@ double time_to(const Model& m, double until, double& drop, double& off) {
 }
 
 TEST(Member, StoreysSwayAsTheirColumnsLean) {
-  // half of the angle at which the weight's moment passes that of the hinges, and far beyond it
+  // the speed that just brings it to where the weight's moment passes that of the hinges
   const double critical = std::asin(8 * kMoment / (kMass * kGravity * kLength));
   const double needed = std::sqrt(2 * (8 * kMoment * critical / kMass - kGravity * kLength * (1 - std::cos(critical))));
   double drop = 0, off = 0;
@@ -140,9 +140,9 @@ TEST(Member, ForcesDoTheWorkOfTheResultants) {
   for (const double turn : {1e-3, 0.3, 0.8}) {
     for (int i = 0; i < 50; ++i) {
       const Poses p = make_poses(random, turn);
-      const double f[6] = {share(random), share(random), share(random), share(random), share(random), share(random)};
+      const Six f{{share(random), share(random), share(random), share(random), share(random), share(random)}};
       const ElementGeometry g = measure_element(p.F, p.M, span);
-      const ElementForces on = calc_element_forces(g, span, f);
+      const ElementForces on = calc_element_forces(g, f);
       const Vec3 v_a = any(), w_a = any(), v_b = any(), w_b = any();
       constexpr double h = 1e-6;
       double power = 0;
@@ -151,7 +151,7 @@ TEST(Member, ForcesDoTheWorkOfTheResultants) {
           return Pose{X.p + side * h * v, exp_rotation(side * h * w) * X.q};
         };
         const ElementGeometry at = measure_element(moved(p.F, v_a, w_a), moved(p.M, v_b, w_b), span);
-        for (int c = 0; c < 6; ++c) power += side * f[c] * at.deformation[c] / (2 * h);
+        for (int c = 0; c < 6; ++c) power += side * f.c[c] * at.deformation.c[c] / (2 * h);
       }
       const double given = dot(-on.force, v_a + cross(w_a, g.p_a - p.F.p)) - dot(on.torque_a, w_a) +
                            dot(on.force, v_b + cross(w_b, g.p_b - p.M.p)) + dot(on.torque_b, w_b);
@@ -168,7 +168,7 @@ TEST(Member, SmallDeformationsAreThoseOfTheMarkers) {
   for (int i = 0; i < 20; ++i) {
     const Poses p = make_poses(random, 1e-6);
     const ElementGeometry member = measure_element(p.F, p.M, {-1.5, 1.5}), marker = measure_element(p.F, p.M, {});
-    for (int c = 0; c < 6; ++c) EXPECT_NEAR(member.deformation[c], marker.deformation[c], 2e-11) << c;
+    for (int c = 0; c < 6; ++c) EXPECT_NEAR(member.deformation.c[c], marker.deformation.c[c], 2e-11) << c;
   }
 }
 
