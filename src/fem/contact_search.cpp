@@ -21,6 +21,8 @@ namespace {
 
 constexpr size_t kGroup = 64;  // elements
 constexpr int kLook = 16;      // steps between looks at what has moved
+constexpr size_t kHidden = 8;  // elements around a node that hide it
+constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 /// Of the margin: how far impacts between two looks may carry something beyond what its speed tells.
 constexpr double kLeastShare = 1.0 / 8;
 
@@ -62,13 +64,17 @@ class Search {
       make_pairs();
     else
       add_particles();
-    const auto [due, active] = list_pairs(elapsed, ahead);
-    make_skins(due);
-    for_all(due.size(), 64, team_, [&](size_t i) { find_candidates(*due[i]); });
-    c.searches += static_cast<long long>(due.size());
-    find_near(active, ahead);
-    std::fill(c.changed.begin(), c.changed.end(), 0);
-    c.any_changed = false;
+    list_news();
+    Pairs pairs = list_pairs(elapsed, ahead);
+    make_skins(pairs);
+    for_all(pairs.due.size(), 64, team_, [&](size_t i) { find_candidates(*pairs.due[i]); });
+    for_all(pairs.grown.size(), 64, team_, [&](size_t i) { add_candidates(pairs.grown[i]); });
+    c.searches += static_cast<long long>(pairs.due.size());
+    pairs.active.insert(pairs.active.end(), pairs.due.begin(), pairs.due.end());
+    for (const Grown& of : pairs.grown)
+      if (of.is_active || of.pair->free < 0) pairs.active.push_back(of.pair);
+    find_near(pairs.active, ahead);
+    c.removed.clear();
     c.fresh = false;
   }
 
@@ -243,10 +249,86 @@ class Search {
   /// How far what moves at a pace may get until the next look, with a share of the margin for impacts in between.
   double calc_path(double pace, double ahead) const { return 2 * ahead * pace + kLeastShare * setup_.margin; }
 
-  struct Pairs {
-    std::vector<ContactPair*> due;     // to be looked through
-    std::vector<ContactPair*> active;  // with candidates that may be near
+  /// What has come to the outside since the last look, by group.
+  void list_news() {
+    const ContactState& c = s_.contact;
+    news_.clear(), news_of_.assign(groups_, kNone);
+    const auto news_of = [&](std::uint32_t group) -> GroupNews& {
+      if (news_of_[group] == kNone) {
+        news_of_[group] = static_cast<std::uint32_t>(news_.size());
+        news_.emplace_back().group = group;
+      }
+      return news_[news_of_[group]];
+    };
+    std::vector<std::uint32_t> rows;  // of nodes, once for each element that has gone
+    for (const std::uint32_t e : c.removed) {
+      faces_[setup_.group_of_element[e]].is_stale = true;
+      rows.insert(rows.end(), setup_.rows_of_element[e].begin(), setup_.rows_of_element[e].end());
+      for (const int beside : setup_.surface.neighbour[e]) {
+        if (beside < 0 || c.gone[static_cast<size_t>(beside)] != 0) continue;
+        const auto b = static_cast<size_t>(beside);
+        const auto& around = setup_.surface.neighbour[b];
+        const auto f = std::find(around.begin(), around.end(), static_cast<int>(e)) - around.begin();
+        faces_[setup_.group_of_element[b]].is_stale = true;
+        news_of(setup_.group_of_element[b])
+            .numbers.push_back(static_cast<std::uint32_t>(6 * b + static_cast<size_t>(f)));
+      }
+    }
+    std::sort(rows.begin(), rows.end());
+    for (size_t i = 0, next = 0; i < rows.size(); i = next) {
+      while (next < rows.size() && rows[next] == rows[i]) ++next;
+      const size_t now = s_.uses[rows[i]];
+      if (now > 0 && now < kHidden && now + (next - i) >= kHidden)
+        news_of(setup_.owner[rows[i]]).points.push_back({ContactPoint::Node, rows[i]});
+    }
+    for_all(news_.size(), 8, team_, [&](size_t i) {
+      GroupNews& news = news_[i];
+      std::sort(news.numbers.begin(), news.numbers.end());
+      for (const std::uint32_t face : news.numbers) {
+        add_corners(face, news.corners);
+        news.points.push_back({ContactPoint::Centre, face});
+      }
+      if (!news.numbers.empty()) lanes::fill_runs(news.corners);
+      lanes::make_skin(s_.rows.data(), kFaceDepth, news.corners, news.numbers.size(), news.skin);
+      news.box = news.skin.box;
+      const size_t nodes = news.points.size() - news.numbers.size();
+      for (size_t k = 0; k < nodes; ++k) {
+        news.places.add(place(s_, news.points[k].index));
+        news.box.add(news.places[k], 0);
+      }
+      for (size_t k = 0; k < news.numbers.size(); ++k) news.places.add(news.skin.centre(k));
+    });
+  }
+  const GroupNews* find_news(std::uint32_t group) const {
+    return news_of_[group] == kNone ? nullptr : &news_[news_of_[group]];
+  }
+
+  /// A pair to which candidates come since something of a or b is outside now.
+  struct Grown {
+    ContactPair* pair = nullptr;
+    bool of_a = false, of_b = false;  // near the other one
+    bool is_active = false;
   };
+  struct Pairs {
+    std::vector<ContactPair*> due;  // to be looked through
+    std::vector<Grown> grown;
+    std::vector<ContactPair*> active;  // others with candidates that may be near
+  };
+  Grown find_grown(ContactPair& pair) const {
+    Grown out{&pair};
+    if (pair.until > static_cast<float>(setup_.margin)) return out;  // too far apart to have been looked through
+    const GroupNews* b = find_news(pair.b);
+    if (pair.a >= groups_) {
+      const std::uint32_t i = pair.a - groups_;
+      out.of_b = b != nullptr && b->skin.box.has(s_.particles[i].p, setup_.margin + s_.particle_makes[i].full_radius);
+      return out;
+    }
+    const auto is_near = [&](const GroupNews* news, std::uint32_t other) {
+      return news != nullptr && news->box.calc_gap(boxes_[other]) <= setup_.margin;
+    };
+    out.of_a = is_near(find_news(pair.a), pair.b), out.of_b = pair.a != pair.b && is_near(b, pair.a);
+    return out;
+  }
   /// Those that are further apart than the margin need not be looked through until they have moved by that.
   Pairs list_pairs(double elapsed, double ahead) {
     ContactState& c = s_.contact;
@@ -258,11 +340,14 @@ class Search {
       const double apart = std::sqrt(std::max(dot(now, now), dot(before, before)));
       const double pace = apart + most_spread_[pair.a] + most_spread_[pair.b];
       pair.moved += static_cast<float>(pace * elapsed);
-      const bool changed = c.changed[pair.b] != 0 || (pair.a < groups_ && c.changed[pair.a] != 0);
       Pairs& lists = found[i / kRun];
-      if (pair.moved + pace * ahead <= pair.until && !changed) {
+      if (pair.moved + pace * ahead <= pair.until) {
         // at more than the pace, as it may be larger than at present
-        if (!pair.candidates.empty() && 2 * pair.moved + calc_path(pace, ahead) > pair.free)
+        Grown grown = find_grown(pair);
+        grown.is_active = !pair.candidates.empty() && 2 * pair.moved + calc_path(pace, ahead) > pair.free;
+        if (grown.of_a || grown.of_b)
+          lists.grown.push_back(grown);
+        else if (grown.is_active)
           lists.active.push_back(&pair);
         return;
       }
@@ -271,11 +356,12 @@ class Search {
       if (gap > setup_.margin)
         pair.candidates.clear(), pair.until = static_cast<float>(gap);
       else
-        lists.due.push_back(&pair), lists.active.push_back(&pair);
+        lists.due.push_back(&pair);
     });
     Pairs all;
     for (const Pairs& lists : found) {
       all.due.insert(all.due.end(), lists.due.begin(), lists.due.end());
+      all.grown.insert(all.grown.end(), lists.grown.begin(), lists.grown.end());
       all.active.insert(all.active.end(), lists.active.begin(), lists.active.end());
     }
     return all;
@@ -364,6 +450,7 @@ class Search {
     double radius = 0, grows = 0;
     switch (point.kind) {
       case ContactPoint::Node:
+        if (s_.uses[point.index] == 0) return {};
         p = place(s_, point.index);
         break;
       case ContactPoint::Centre:
@@ -400,16 +487,19 @@ class Search {
     return x;
   }
 
-  void make_skins(const std::vector<ContactPair*>& due) {
+  void make_skins(const Pairs& pairs) {
     enum : unsigned char { Nothing, Faces, All };
     std::vector<unsigned char> wanted(groups_, Nothing);
-    for (const ContactPair* pair : due) {
+    for (const ContactPair* pair : pairs.due) {
       const bool is_particle = pair->a >= groups_;
       if (!is_particle) wanted[pair->a] = All;
       wanted[pair->b] = std::max<unsigned char>(wanted[pair->b], is_particle ? Faces : All);
     }
+    for (const Grown& of : pairs.grown) {
+      if (of.of_a) wanted[of.pair->b] = All;
+      if (of.of_b && of.pair->a < groups_) wanted[of.pair->a] = All;
+    }
     for_all(groups_, 8, team_, [&](size_t g) {
-      if (s_.contact.changed[g] != 0) faces_[g].is_stale = true;
       if (wanted[g] != Nothing) make_skin(static_cast<std::uint32_t>(g), wanted[g] == All);
     });
   }
@@ -451,8 +541,7 @@ class Search {
       add({ContactPoint::Centre, faces.numbers[i]}, faces.skin.centre(i));
     for (std::uint32_t i = setup_.node_starts[g]; i < setup_.node_starts[g + 1]; ++i) {
       const std::uint32_t row = setup_.node_rows[i];
-      // eight elements around a node hide it
-      if (setup_.owner[row] != g || s_.uses[row] == 0 || s_.uses[row] >= 8) continue;
+      if (setup_.owner[row] != g || s_.uses[row] == 0 || s_.uses[row] >= kHidden) continue;
       add({ContactPoint::Node, row}, place(s_, row));
     }
   }
@@ -469,17 +558,21 @@ class Search {
   }
 
   /// Of a point near the box of faces.
-  void match(const ContactPoint& point, const Vec3& p, double near, const GroupFaces& faces,
+  template <class Faces>
+  void match(const ContactPoint& point, const Vec3& p, double near, const Faces& faces,
              std::vector<FoundCandidate>& found) const {
     static thread_local std::vector<std::uint32_t> near_by;
     lanes::find_faces(faces.skin, p, near, setup_.margin, near_by);
     for (const std::uint32_t i : near_by)
       if (!are_joined(point, faces.numbers[i])) found.push_back({{point, faces.numbers[i]}, -1});
   }
-  void match(const GroupFaces& of, const GroupFaces& faces, std::vector<FoundCandidate>& found) const {
+  /// Of groups or of what is new of them: all points near all faces, but for those points that are not to be.
+  template <class Points, class Faces, class Passes>
+  void match(const Points& of, const Faces& faces, std::vector<FoundCandidate>& found, const Passes& passes) const {
     static thread_local std::vector<std::uint32_t> near_by;
     lanes::find_points(of.places, faces.skin.box, setup_.margin, near_by);
-    for (const std::uint32_t i : near_by) match(of.points[i], of.places[i], setup_.margin, faces, found);
+    for (const std::uint32_t i : near_by)
+      if (!passes(of.points[i])) match(of.points[i], of.places[i], setup_.margin, faces, found);
   }
 
   /// Candidates of a pair, and how far its objects may move against each other until it is looked through again.
@@ -495,8 +588,33 @@ class Search {
       return;
     }
     const GroupFaces& a = faces_[pair.a];
-    match(a, b, pair.candidates);
-    if (pair.a != pair.b) match(b, a, pair.candidates);
+    const auto none = [](const ContactPoint&) { return false; };
+    match(a, b, pair.candidates, none);
+    if (pair.a != pair.b) match(b, a, pair.candidates, none);
+  }
+
+  /// Candidates of a pair that are new, as its others still hold.
+  void add_candidates(const Grown& of) const {
+    ContactPair& pair = *of.pair;
+    const size_t before = pair.candidates.size();
+    const GroupNews *news_a = pair.a < groups_ ? find_news(pair.a) : nullptr, *news_b = find_news(pair.b);
+    if (pair.a >= groups_) {
+      const std::uint32_t i = pair.a - groups_;
+      const double near = setup_.margin + s_.particle_makes[i].full_radius;
+      match({ContactPoint::Debris, i}, s_.particles[i].p, near, *news_b, pair.candidates);
+    } else {
+      // points that are new with all faces, the others with faces that are new
+      const auto add = [&](const GroupNews& news, const GroupNews* other_news, const GroupFaces& other) {
+        match(news, other, pair.candidates, [](const ContactPoint&) { return false; });
+        match(other, news, pair.candidates, [&](const ContactPoint& point) {
+          return other_news != nullptr &&
+                 std::find(other_news->points.begin(), other_news->points.end(), point) != other_news->points.end();
+        });
+      };
+      if (of.of_a) add(*news_a, news_b, faces_[pair.b]);
+      if (of.of_b) add(*news_b, news_a, faces_[pair.a]);
+    }
+    if (pair.candidates.size() > before) pair.free = -1;
   }
 
   const ContactSetup& setup_;
@@ -508,6 +626,8 @@ class Search {
   std::vector<ContactBox> boxes_;    // of objects, as they are
   std::vector<Vec3> speed_before_;   // of objects at the last look
   std::vector<double> most_spread_;  // at both
+  std::vector<GroupNews> news_;
+  std::vector<std::uint32_t> news_of_;  // of groups; kNone: nothing
 };
 
 }  // namespace
@@ -532,9 +652,8 @@ ContactSetup make_contact_setup(const ExplicitModel& model, const ExplicitChunks
   setup.reach = std::max(2 * margin, size);
   setup.order = chunks.order;
   setup.group_of_element.resize(E);
-  constexpr std::uint32_t kNobody = std::numeric_limits<std::uint32_t>::max();
-  setup.owner.assign(chunks.node_of_row.size(), kNobody);
-  std::vector<std::uint32_t> seen(chunks.node_of_row.size(), kNobody);
+  setup.owner.assign(chunks.node_of_row.size(), kNone);
+  std::vector<std::uint32_t> seen(chunks.node_of_row.size(), kNone);
   size_t first = 0;
   setup.node_starts.push_back(0);
   for (const ElementChunk& chunk : chunks.chunks) {
@@ -548,7 +667,7 @@ ContactSetup make_contact_setup(const ExplicitModel& model, const ExplicitChunks
         const size_t e = static_cast<size_t>(setup.order[i]);
         setup.group_of_element[e] = group;
         for (const std::uint32_t row : setup.rows_of_element[e]) {
-          if (setup.owner[row] == kNobody) setup.owner[row] = group;
+          if (setup.owner[row] == kNone) setup.owner[row] = group;
           if (seen[row] == group) continue;
           seen[row] = group;
           setup.node_rows.push_back(row);
@@ -571,7 +690,6 @@ void search_contact(ExplicitSystem::Inside& in, ExplicitState& state) {
   const ContactSetup& setup = in.contact;
   ContactState& c = state.contact;
   if (c.gone.empty()) c.gone.assign(setup.rows_of_element.size(), 0);
-  if (c.changed.empty()) c.changed.assign(setup.group_starts.size() - 1, 0);
   if (!c.fresh) {
     ++c.since;
     if (!in.pushes_debris(state) || (c.since < kLook && !c.knocked)) return;
@@ -598,14 +716,8 @@ bool is_knocked(const ExplicitSystem::Inside& in, const ExplicitState& state, si
 
 void mark_changed(const ContactSetup& setup, ContactState& c, int element) {
   if (c.gone.empty()) c.gone.assign(setup.rows_of_element.size(), 0);
-  if (c.changed.empty()) c.changed.assign(setup.group_starts.size() - 1, 0);
-  const size_t e = static_cast<size_t>(element);
-  c.gone[e] = 1;
-  c.changed[setup.group_of_element[e]] = 1;
-  for (const int beside : setup.surface.neighbour[e])
-    if (beside >= 0) c.changed[setup.group_of_element[static_cast<size_t>(beside)]] = 1;
-  for (const std::uint32_t row : setup.rows_of_element[e]) c.changed[setup.owner[row]] = 1;
-  c.any_changed = true;
+  c.gone[static_cast<size_t>(element)] = 1;
+  c.removed.push_back(static_cast<std::uint32_t>(element));
 }
 
 }  // namespace topple::fem

@@ -75,6 +75,17 @@ struct GroupFaces {
 };
 using ContactFaces = std::vector<GroupFaces>;
 
+/// What is outside of a group since elements beside it have gone.
+struct GroupNews {
+  std::uint32_t group = 0;
+  std::vector<std::uint32_t> numbers;  // of faces, in order
+  lanes::FaceCorners corners;
+  lanes::Skin skin;
+  std::vector<ContactPoint> points;  // in order
+  lanes::Places places;              // of these
+  ContactBox box;                    // of all
+};
+
 /// Two groups (or a particle and a group) that are near each other, and what was found between them.
 struct ContactPair {
   std::uint32_t a = 0, b = 0;  // objects: groups, then particles; a >= b
@@ -97,25 +108,24 @@ struct TouchSums {
 
 struct ContactState {
   std::vector<unsigned char> gone;           // elements
+  std::vector<std::uint32_t> removed;        // elements that have gone since the last look
   std::vector<ParticlePair> particle_pairs;  // in order
   std::vector<float> particle_free;          // of these, as of candidates, by the travel of both
   std::vector<ContactPair> pairs;            // in the order of a, then b
   // what may touch before the next look, in order
   std::vector<NearCandidate> near;
   std::vector<ParticlePair> near_particles;
-  std::vector<ContactBox> boxes;       // of objects, with their room around them
-  std::vector<double> room;            // at least half the reach, more for what is fast [m]
-  std::vector<double> travel;          // of an object since the boxes were made [m]
-  std::vector<Vec3> speed;             // mean, of an object, at the last look
-  std::vector<double> spread;          // largest deviation from it
-  std::vector<unsigned char> changed;  // groups whose surface has changed
-  bool any_changed = false;
-  bool fresh = true;       // no boxes yet
-  bool knocked = false;    // debris has gained more speed than the last look reckons with
-  int since = 0;           // steps since the last look
-  std::uint64_t look = 0;  // which found what is near, like no other; 0: not known
-  TouchSums touching;      // of surfaces in the last step
-  TouchSums debris;        // of debris at its last forces; power of impulses over a step, 0 where there are none
+  std::vector<ContactBox> boxes;  // of objects, with their room around them
+  std::vector<double> room;       // at least half the reach, more for what is fast [m]
+  std::vector<double> travel;     // of an object since the boxes were made [m]
+  std::vector<Vec3> speed;        // mean, of an object, at the last look
+  std::vector<double> spread;     // largest deviation from it
+  bool fresh = true;              // no boxes yet
+  bool knocked = false;           // debris has gained more speed than the last look reckons with
+  int since = 0;                  // steps since the last look
+  std::uint64_t look = 0;         // which found what is near, like no other; 0: not known
+  TouchSums touching;             // of surfaces in the last step
+  TouchSums debris;               // of debris at its last forces; power of impulses over a step, 0 where there are none
   long long searches = 0;
 };
 

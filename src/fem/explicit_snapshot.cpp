@@ -9,7 +9,7 @@ namespace topple::fem {
 
 namespace {
 
-constexpr std::uint64_t kMark = 0x7470'6578'0000'000c;  // name and version of the layout
+constexpr std::uint64_t kMark = 0x7470'6578'0000'000d;  // name and version of the layout
 
 class Writer {
  public:
@@ -75,7 +75,7 @@ void pass_state(Archive& archive, State& s) {
   archive.list(c.gone), archive.list(c.particle_pairs), archive.list(c.particle_free), archive.list(c.near),
       archive.list(c.near_particles);
   archive.list(c.boxes), archive.list(c.room), archive.list(c.travel), archive.list(c.speed);
-  archive.list(c.spread), archive.list(c.changed), archive.value(c.any_changed), archive.value(c.fresh);
+  archive.list(c.spread), archive.list(c.removed), archive.value(c.fresh);
   archive.value(c.knocked), archive.value(c.since), archive.value(c.touching), archive.value(c.debris),
       archive.value(c.searches);
 }

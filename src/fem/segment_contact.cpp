@@ -124,7 +124,7 @@ void press_points(const ContactSetup& setup, const ExplicitOptions& options, dou
   };
   // elements may have gone since the look
   const auto is_there = [&](const lanes::Touch& t) {
-    if (!c.any_changed) return true;
+    if (c.removed.empty()) return true;
     const std::uint32_t number = faces.point[t.candidate];
     const ContactPoint& point = task.points[number];
     if (point.kind == ContactPoint::Centre && c.gone[point.index / 6] != 0) return false;
