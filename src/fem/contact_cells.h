@@ -17,6 +17,13 @@ struct ContactBox {
   void add(const Vec3& p, double r) {
     for (int c = 0; c < 3; ++c) low[c] = std::min(low[c], p[c] - r), high[c] = std::max(high[c], p[c] + r);
   }
+  void add(const ContactBox& b) {
+    for (int c = 0; c < 3; ++c) low[c] = std::min(low[c], b.low[c]), high[c] = std::max(high[c], b.high[c]);
+  }
+  /// With so much room around it; empty if it is.
+  ContactBox widened(double room) const {
+    return is_empty() ? *this : ContactBox{low - Vec3{room, room, room}, high + Vec3{room, room, room}};
+  }
   bool is_empty() const { return low.x > high.x; }
   bool meets(const ContactBox& b) const {
     return low.x <= b.high.x && b.low.x <= high.x && low.y <= b.high.y && b.low.y <= high.y && low.z <= b.high.z &&

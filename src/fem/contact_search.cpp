@@ -4,13 +4,15 @@
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <tuple>
+#include <span>
 #include <utility>
 
 #include "base/team.h"
+#include "fem/contact_balls.h"
 #include "fem/contact_cells.h"
 #include "fem/explicit_inside.h"
 #include "fem/segment_contact.h"
@@ -60,13 +62,14 @@ class Search {
     ContactState& c = s_.contact;
     bool stale = c.fresh;
     for (size_t o = 0; o < c.room.size(); ++o) stale = stale || c.travel[o] > kRoomShare * c.room[o];
-    if (stale)
-      make_pairs();
-    else
-      add_particles();
+    if (stale) make_pairs();
     list_news();
     Pairs pairs = list_pairs(elapsed, ahead);
-    make_skins(pairs);
+    std::vector<double> reach(s_.particles.size());
+    for (size_t i = 0; i < reach.size(); ++i)
+      reach[i] = s_.particles[i].radius + 0.5 * calc_path(2 * norm(s_.particles[i].v), ahead);
+    const BallCells balls(s_.particles, reach);
+    make_skins(pairs, balls, ahead);
     for_all(pairs.due.size(), 64, team_, [&](size_t i) { find_candidates(*pairs.due[i]); });
     for_all(pairs.grown.size(), 64, team_, [&](size_t i) { add_candidates(pairs.grown[i]); });
     c.searches += static_cast<long long>(pairs.due.size());
@@ -74,6 +77,8 @@ class Search {
     for (const Grown& of : pairs.grown)
       if (of.is_active || of.pair->free < 0) pairs.active.push_back(of.pair);
     find_near(pairs.active, ahead);
+    find_near_faces(balls, ahead);
+    find_near_particles(balls, ahead);
     c.removed.clear();
     c.fresh = false;
   }
@@ -84,23 +89,17 @@ class Search {
   static constexpr double kRoomShare = 0.8;
   static constexpr int kBoxSteps = 640;
 
-  /// Mean velocity of an object, the largest deviation from it, and the box around it.
+  /// Mean velocity of a group, the largest deviation from it, and the box around it.
   struct Motion {
     Vec3 mean;
     double spread = 0;
     ContactBox box;
   };
-  Motion measure(std::uint32_t o) const {
+  Motion measure(std::uint32_t g) const {
     Motion motion;
-    if (o >= groups_) {
-      const Particle& particle = s_.particles[o - groups_];
-      motion.mean = particle.v;
-      motion.box.add(particle.p, s_.particle_makes[o - groups_].full_radius);
-      return motion;
-    }
     static thread_local std::vector<Vec3> speeds;
     speeds.clear();
-    for (std::uint32_t i = setup_.node_starts[o]; i < setup_.node_starts[o + 1]; ++i) {
+    for (std::uint32_t i = setup_.node_starts[g]; i < setup_.node_starts[g + 1]; ++i) {
       const std::uint32_t row = setup_.node_rows[i];
       if (!has_mass(s_, row)) continue;
       speeds.push_back(speed(s_, row));
@@ -117,77 +116,50 @@ class Search {
     return motion;
   }
 
-  /// How far objects and pairs may have moved since the last look, at the larger of the speeds at both ends.
+  /// How far groups may have moved since the last look, at the larger of the speeds at both ends.
   void book_motion(double elapsed) {
     ContactState& c = s_.contact;
-    const size_t objects = groups_ + s_.particles.size(), known = c.speed.size();
-    std::vector<Vec3> mean(objects);
-    std::vector<double> spread(objects, 0);
-    boxes_.resize(objects);
-    for_all(objects, 64, team_, [&](size_t o) {
-      const Motion motion = measure(static_cast<std::uint32_t>(o));
-      mean[o] = motion.mean, spread[o] = motion.spread, boxes_[o] = motion.box;
+    std::vector<Vec3> mean(groups_);
+    std::vector<double> spread(groups_, 0);
+    boxes_.resize(groups_);
+    for_all(groups_, 64, team_, [&](size_t g) {
+      const Motion motion = measure(static_cast<std::uint32_t>(g));
+      mean[g] = motion.mean, spread[g] = motion.spread, boxes_[g] = motion.box;
     });
-    c.travel.resize(objects, 0);
-    for (size_t o = 0; o < known; ++o) {
-      c.spread[o] = std::max(c.spread[o], spread[o]);
-      c.travel[o] += (std::max(norm(c.speed[o]), norm(mean[o])) + c.spread[o]) * elapsed;
+    if (c.fresh) c.speed = mean, c.spread = spread, c.travel.assign(groups_, 0);
+    for (size_t g = 0; g < groups_; ++g) {
+      c.spread[g] = std::max(c.spread[g], spread[g]);
+      c.travel[g] += (std::max(norm(c.speed[g]), norm(mean[g])) + c.spread[g]) * elapsed;
     }
     speed_before_ = std::move(c.speed), most_spread_ = std::move(c.spread);
-    speed_before_.insert(speed_before_.end(), mean.begin() + static_cast<std::ptrdiff_t>(known), mean.end());
-    most_spread_.insert(most_spread_.end(), spread.begin() + static_cast<std::ptrdiff_t>(known), spread.end());
     c.speed = std::move(mean), c.spread = std::move(spread);
-  }
-
-  double calc_room(std::uint32_t o) const {
-    const double speed = norm(s_.contact.speed[o]) + s_.contact.spread[o];
-    return std::max(0.5 * setup_.reach, kBoxSteps * h_ * speed);
-  }
-  ContactBox make_box(std::uint32_t o, double room) const {
-    ContactBox box = boxes_[o];
-    if (!box.is_empty()) box.low -= Vec3{room, room, room}, box.high += Vec3{room, room, room};
-    return box;
+    c.particle_speed.resize(s_.particles.size());
+    for (size_t i = 0; i < s_.particles.size(); ++i) c.particle_speed[i] = s_.particles[i].v;
   }
 
   void make_pairs() {
     ContactState& c = s_.contact;
-    const size_t objects = groups_ + s_.particles.size();
-    c.boxes.resize(objects), c.room.resize(objects);
-    for_all(objects, 64, team_, [&](size_t i) {
-      const auto o = static_cast<std::uint32_t>(i);
-      c.room[o] = calc_room(o);
-      c.boxes[o] = make_box(o, c.room[o]);
-    });
+    c.boxes.resize(groups_), c.room.resize(groups_);
     ContactBox bounds;
-    for (size_t o = 0; o < (groups_ > 0 ? groups_ : objects); ++o)
-      if (!c.boxes[o].is_empty()) bounds.add(c.boxes[o].low, 0), bounds.add(c.boxes[o].high, 0);
+    for (size_t g = 0; g < groups_; ++g) {
+      c.room[g] = std::max(0.5 * setup_.reach, kBoxSteps * h_ * (norm(c.speed[g]) + c.spread[g]));
+      c.boxes[g] = boxes_[g].widened(c.room[g]);
+      bounds.add(c.boxes[g]);
+    }
     const ContactCells cells(c.boxes, bounds, 2 * setup_.reach);
     // the larger number first
     constexpr size_t kRun = 128;
-    struct Found {
-      std::vector<std::array<std::uint32_t, 2>> met;
-      std::vector<ParticlePair> particles;
-    };
-    std::vector<Found> found((objects + kRun - 1) / kRun);
+    std::vector<std::vector<std::array<std::uint32_t, 2>>> found((groups_ + kRun - 1) / kRun);
     team_.run(found.size(), [&](size_t run) {
       std::vector<std::uint32_t> before;
-      for (size_t i = run * kRun; i < std::min(objects, (run + 1) * kRun); ++i) {
+      for (size_t i = run * kRun; i < std::min<size_t>(groups_, (run + 1) * kRun); ++i) {
         const auto a = static_cast<std::uint32_t>(i);
         cells.find_before(c.boxes, a, before);
-        for (const std::uint32_t b : before)
-          if (b >= groups_)
-            found[run].particles.push_back({a - groups_, b - groups_});
-          else
-            found[run].met.push_back({a, b});
-        if (a < groups_ && !c.boxes[a].is_empty()) found[run].met.push_back({a, a});
+        for (const std::uint32_t b : before) found[run].push_back({a, b});
+        if (!c.boxes[a].is_empty()) found[run].push_back({a, a});
       }
     });
-    std::vector<std::array<std::uint32_t, 2>> met;
-    c.particle_pairs.clear();
-    for (const Found& of : found) {
-      met.insert(met.end(), of.met.begin(), of.met.end());
-      c.particle_pairs.insert(c.particle_pairs.end(), of.particles.begin(), of.particles.end());
-    }
+    const std::vector<std::array<std::uint32_t, 2>> met = join(found);
     std::vector<ContactPair> pairs(met.size());
     size_t old = 0;
     for (size_t i = 0; i < met.size(); ++i) {
@@ -199,49 +171,10 @@ class Search {
         pair.a = met[i][0], pair.b = met[i][1];
     }
     c.pairs = std::move(pairs);
-    c.particle_free.assign(c.particle_pairs.size(), -1);
     std::fill(c.travel.begin(), c.travel.end(), 0.0);
   }
 
-  /// Pairs of particles that have come since boxes were made: those of the others hold as long as they do.
-  void add_particles() {
-    ContactState& c = s_.contact;
-    const auto first = static_cast<std::uint32_t>(c.boxes.size());
-    const auto end = static_cast<std::uint32_t>(groups_ + s_.particles.size());
-    for (std::uint32_t a = first; a < end; ++a) {
-      c.room.push_back(calc_room(a));
-      c.boxes.push_back(make_box(a, c.room.back()));
-    }
-    if (first == end) return;
-    // those that have come are few: the others are looked up in a grid of theirs
-    const std::vector<ContactBox> come(c.boxes.begin() + first, c.boxes.end());
-    ContactBox bounds;
-    for (const ContactBox& box : come) bounds.add(box.low, 0), bounds.add(box.high, 0);
-    const ContactCells cells(come, bounds, 2 * setup_.reach);
-    constexpr size_t kRun = 1024;
-    std::vector<std::vector<std::array<std::uint32_t, 2>>> found((end + kRun - 1) / kRun);
-    team_.run(found.size(), [&](size_t run) {
-      std::vector<std::uint32_t> met;
-      for (size_t b = run * kRun; b < std::min<size_t>(end, (run + 1) * kRun); ++b) {
-        if (!c.boxes[b].meets(bounds)) continue;
-        cells.find_met(come, c.boxes[b], met);
-        for (const std::uint32_t a : met)
-          if (b < first + a) found[run].push_back({first + a, static_cast<std::uint32_t>(b)});
-      }
-    });
-    std::vector<std::array<std::uint32_t, 2>> all;
-    for (const auto& of : found) all.insert(all.end(), of.begin(), of.end());
-    std::sort(all.begin(), all.end());
-    for (const auto& [a, b] : all) {
-      if (b >= groups_)
-        c.particle_pairs.push_back({a - groups_, b - groups_});
-      else
-        c.pairs.emplace_back().a = a, c.pairs.back().b = b;
-    }
-    c.particle_free.resize(c.particle_pairs.size(), -1);
-  }
-
-  /// The most with which objects of a pair move against each other [m/s].
+  /// The most with which groups of a pair move against each other [m/s].
   double calc_pace(const ContactPair& pair) const {
     const ContactState& c = s_.contact;
     return norm(c.speed[pair.a] - c.speed[pair.b]) + c.spread[pair.a] + c.spread[pair.b];
@@ -317,16 +250,10 @@ class Search {
   Grown find_grown(ContactPair& pair) const {
     Grown out{&pair};
     if (pair.until > static_cast<float>(setup_.margin)) return out;  // too far apart to have been looked through
-    const GroupNews* b = find_news(pair.b);
-    if (pair.a >= groups_) {
-      const std::uint32_t i = pair.a - groups_;
-      out.of_b = b != nullptr && b->skin.box.has(s_.particles[i].p, setup_.margin + s_.particle_makes[i].full_radius);
-      return out;
-    }
     const auto is_near = [&](const GroupNews* news, std::uint32_t other) {
       return news != nullptr && news->box.calc_gap(boxes_[other]) <= setup_.margin;
     };
-    out.of_a = is_near(find_news(pair.a), pair.b), out.of_b = pair.a != pair.b && is_near(b, pair.a);
+    out.of_a = is_near(find_news(pair.a), pair.b), out.of_b = pair.a != pair.b && is_near(find_news(pair.b), pair.a);
     return out;
   }
   /// Those that are further apart than the margin need not be looked through until they have moved by that.
@@ -369,8 +296,6 @@ class Search {
 
   /// What may touch within `ahead`, at twice the present speeds and a share of the margin for impacts in between.
   void find_near(const std::vector<ContactPair*>& active, double ahead) {
-    ContactState& c = s_.contact;
-    const double least = kLeastShare * setup_.margin;
     constexpr size_t kRun = 512;
     std::vector<std::vector<ContactCandidate>> found((active.size() + kRun - 1) / kRun);
     team_.run(found.size(), [&](size_t run) {
@@ -407,72 +332,76 @@ class Search {
         lanes::make_skin(s_.rows.data(), kFaceDepth, corners, count, skin);
         for (size_t i = 0; i < count; ++i) {
           const auto& [pair, of, path] = due[first + i];
-          const Gap gap = find_gap(of->candidate, skin.face(i));
-          if (gap.now < path) found[run].push_back(of->candidate);
-          of->free = static_cast<float>(2 * pair->moved + gap.grown);
+          const double gap = find_gap(of->candidate, skin.face(i));
+          if (gap < path) found[run].push_back(of->candidate);
+          of->free = static_cast<float>(2 * pair->moved + gap);
           pair->free = std::min(pair->free, of->free);
         }
       }
     });
-    c.near.clear();
+    std::vector<NearCandidate>& near = s_.contact.near;
+    near.clear();
     for (const auto& list : found)
-      for (const ContactCandidate& candidate : list) c.near.push_back({candidate, {}});
-    std::sort(c.near.begin(), c.near.end(),
+      for (const ContactCandidate& candidate : list) near.push_back({candidate, rows_of(candidate.face)});
+    std::sort(near.begin(), near.end(),
               [](const NearCandidate& a, const NearCandidate& b) { return a.candidate < b.candidate; });
-    for (NearCandidate& near : c.near) near.rows = rows_of(near.candidate.face);
-    std::vector<double> reach(s_.particles.size());  // twice what a particle has moved and will
-    for (size_t i = 0; i < reach.size(); ++i) reach[i] = 2 * (c.travel[groups_ + i] + ahead * norm(s_.particles[i].v));
-    std::vector<std::vector<ParticlePair>> near((c.particle_pairs.size() + kRun - 1) / kRun);
-    for_all(c.particle_pairs.size(), kRun, team_, [&](size_t i) {
-      const ParticlePair& pair = c.particle_pairs[i];
-      if (reach[pair[0]] + reach[pair[1]] <= c.particle_free[i]) return;
-      const Particle &a = s_.particles[pair[0]], &b = s_.particles[pair[1]];
-      const double distance = norm(a.p - b.p);
-      const double travel = c.travel[groups_ + pair[0]] + c.travel[groups_ + pair[1]];
-      const double full = s_.particle_makes[pair[0]].full_radius + s_.particle_makes[pair[1]].full_radius;
-      c.particle_free[i] = static_cast<float>(2 * travel + distance - full - least);
-      if (distance < a.radius + b.radius + least + 2 * ahead * norm(a.v - b.v)) near[i / kRun].push_back(pair);
-    });
-    c.near_particles.clear();
-    for (const auto& list : near) c.near_particles.insert(c.near_particles.end(), list.begin(), list.end());
   }
 
-  /// How far a point and a face may move against each other until they may touch, and until they may when the point
-  /// has its full radius.
-  struct Gap {
-    double now = std::numeric_limits<double>::infinity(), grown = now;
-  };
-  Gap find_gap(const ContactCandidate& candidate, const lanes::SkinFace& face) const {
+  lanes::Ahead calc_ahead(size_t g, double ahead) const {
+    return {ahead, kLeastShare * setup_.margin, s_.contact.speed[g], s_.contact.spread[g]};
+  }
+  /// Faces near particles; in order behind what is near otherwise.
+  void find_near_faces(const BallCells& balls, double ahead) const {
+    constexpr size_t kRun = 8;
+    std::vector<std::vector<std::array<std::uint32_t, 2>>> found((groups_ + kRun - 1) / kRun);
+    for_all(groups_, kRun, team_, [&](size_t g) {
+      if (meets_[g] == 0) return;
+      static thread_local std::vector<std::uint32_t> near_by;
+      const GroupFaces& faces = faces_[g];
+      const lanes::Ahead until = calc_ahead(g, ahead);
+      auto& list = found[g / kRun];
+      size_t first = list.size();
+      for (size_t run = 0; run < faces.skin.runs(); ++run) {
+        balls.find_in_box(faces.skin.run_box(run).widened(until.calc_path({})), near_by);
+        lanes::find_near_faces(faces.skin, run, s_.particles.data(), near_by, until, list);
+      }
+      for (; first < list.size(); ++first) list[first][1] = faces.numbers[list[first][1]];
+    });
+    for (const auto& [ball, face] : sort_pairs(found, s_.particles.size()))
+      s_.contact.near.push_back({{{ContactPoint::Debris, ball}, face}, rows_of(face)});
+  }
+  void find_near_particles(const BallCells& cells, double ahead) const {
+    const double least = kLeastShare * setup_.margin;
+    std::vector<std::vector<ParticlePair>> found(cells.tasks());
+    team_.run(found.size(), [&](size_t task) {
+      cells.find_pairs(task, found[task]);
+      std::erase_if(found[task], [&](const ParticlePair& pair) {
+        const Particle &a = s_.particles[pair[0]], &b = s_.particles[pair[1]];
+        return !(norm(a.p - b.p) < a.radius + b.radius + least + 2 * ahead * norm(a.v - b.v));
+      });
+    });
+    s_.contact.near_particles = sort_pairs(found, s_.particles.size());
+  }
+  template <class T>
+  static std::vector<T> join(const std::vector<std::vector<T>>& lists) {
+    std::vector<T> all;
+    for (const auto& list : lists) all.insert(all.end(), list.begin(), list.end());
+    return all;
+  }
+
+  /// How far a point and a face may move against each other until they may touch.
+  double find_gap(const ContactCandidate& candidate, const lanes::SkinFace& face) const {
     const ContactPoint& point = candidate.point;
     const auto is_gone = [&](std::uint32_t number) { return s_.contact.gone[number / 6] != 0; };
-    if (is_gone(candidate.face) || (point.kind == ContactPoint::Centre && is_gone(point.index))) return {};
+    const bool is_node = point.kind == ContactPoint::Node;
+    if (is_gone(candidate.face) || (is_node ? s_.uses[point.index] == 0 : is_gone(point.index)))
+      return std::numeric_limits<double>::infinity();
     Vec3 p;
-    double radius = 0, grows = 0;
-    switch (point.kind) {
-      case ContactPoint::Node:
-        if (s_.uses[point.index] == 0) return {};
-        p = place(s_, point.index);
-        break;
-      case ContactPoint::Centre:
-        for (const Vec3& x : corners_of(point.index)) p += 0.25 * x;
-        break;
-      case ContactPoint::Debris: {
-        const Particle& particle = s_.particles[point.index];
-        p = particle.p, radius = particle.radius, grows = s_.particle_makes[point.index].full_radius - radius;
-      }
-    }
-    const Vec3 d = p - face.centre;
-    const double height = dot(d, face.normal);
-    const double beside =
-        std::max({0.0, std::abs(dot(d, face.along)) - face.wide, std::abs(dot(d, face.across)) - face.high});
-    const double above = std::max(0.0, height - face.uneven), lower = -(height + face.uneven);
-    if (lower > 0) {
-      // a ball at the height of the face's edge may touch it from beside, one below it does not
-      const double below = std::max(beside, lower - face.depth);
-      if (below < lower) return {below, below};
-    }
-    const double gap = std::max(lower, std::sqrt(above * above + beside * beside) - radius);
-    return {gap, gap - grows};
+    if (is_node)
+      p = place(s_, point.index);
+    else
+      for (const Vec3& x : corners_of(point.index)) p += 0.25 * x;
+    return lanes::calc_gap(face, p, 0);
   }
 
   std::array<std::uint32_t, 4> rows_of(std::uint32_t face) const {
@@ -487,20 +416,19 @@ class Search {
     return x;
   }
 
-  void make_skins(const Pairs& pairs) {
-    enum : unsigned char { Nothing, Faces, All };
-    std::vector<unsigned char> wanted(groups_, Nothing);
-    for (const ContactPair* pair : pairs.due) {
-      const bool is_particle = pair->a >= groups_;
-      if (!is_particle) wanted[pair->a] = All;
-      wanted[pair->b] = std::max<unsigned char>(wanted[pair->b], is_particle ? Faces : All);
-    }
+  void make_skins(const Pairs& pairs, const BallCells& balls, double ahead) {
+    std::vector<bool> wanted(groups_, false);  // with points
+    for (const ContactPair* pair : pairs.due) wanted[pair->a] = wanted[pair->b] = true;
     for (const Grown& of : pairs.grown) {
-      if (of.of_a) wanted[of.pair->b] = All;
-      if (of.of_b && of.pair->a < groups_) wanted[of.pair->a] = All;
+      if (of.of_a) wanted[of.pair->b] = true;
+      if (of.of_b) wanted[of.pair->a] = true;
     }
-    for_all(groups_, 8, team_, [&](size_t g) {
-      if (wanted[g] != Nothing) make_skin(static_cast<std::uint32_t>(g), wanted[g] == All);
+    meets_.resize(groups_);
+    for_all(groups_, 8, team_, [&](size_t i) {
+      const auto g = static_cast<std::uint32_t>(i);
+      const lanes::Ahead until = calc_ahead(g, ahead);
+      meets_[g] = balls.has_in_box(boxes_[g].widened(until.calc_path({}))) ? 1 : 0;
+      if (meets_[g] != 0 || wanted[g]) make_skin(g, wanted[g]);
     });
   }
   /// Rows of a face and of the one opposite.
@@ -549,7 +477,6 @@ class Search {
   bool are_joined(const ContactPoint& point, std::uint32_t face) const {
     const auto& rows = setup_.rows_of_element[face / 6];
     if (point.kind == ContactPoint::Node) return std::find(rows.begin(), rows.end(), point.index) != rows.end();
-    if (point.kind == ContactPoint::Debris) return false;
     for (const int corner : kFaces[point.index % 6]) {
       const std::uint32_t row = setup_.rows_of_element[point.index / 6][static_cast<size_t>(corner)];
       if (std::find(rows.begin(), rows.end(), row) != rows.end()) return true;
@@ -557,37 +484,24 @@ class Search {
     return false;
   }
 
-  /// Of a point near the box of faces.
-  template <class Faces>
-  void match(const ContactPoint& point, const Vec3& p, double near, const Faces& faces,
-             std::vector<FoundCandidate>& found) const {
-    static thread_local std::vector<std::uint32_t> near_by;
-    lanes::find_faces(faces.skin, p, near, setup_.margin, near_by);
-    for (const std::uint32_t i : near_by)
-      if (!are_joined(point, faces.numbers[i])) found.push_back({{point, faces.numbers[i]}, -1});
-  }
   /// Of groups or of what is new of them: all points near all faces, but for those points that are not to be.
   template <class Points, class Faces, class Passes>
   void match(const Points& of, const Faces& faces, std::vector<FoundCandidate>& found, const Passes& passes) const {
-    static thread_local std::vector<std::uint32_t> near_by;
-    lanes::find_points(of.places, faces.skin.box, setup_.margin, near_by);
-    for (const std::uint32_t i : near_by)
-      if (!passes(of.points[i])) match(of.points[i], of.places[i], setup_.margin, faces, found);
+    static thread_local std::vector<std::uint32_t> points, near_by;
+    lanes::find_points(of.places, faces.skin.box, setup_.margin, points);
+    for (const std::uint32_t i : points) {
+      if (passes(of.points[i])) continue;
+      lanes::find_faces(faces.skin, of.places[i], setup_.margin, setup_.margin, near_by);
+      for (const std::uint32_t k : near_by)
+        if (!are_joined(of.points[i], faces.numbers[k])) found.push_back({{of.points[i], faces.numbers[k]}, -1});
+    }
   }
 
-  /// Candidates of a pair, and how far its objects may move against each other until it is looked through again.
+  /// Candidates of a pair, and how far its groups may move against each other until it is looked through again.
   void find_candidates(ContactPair& pair) const {
     pair.candidates.clear();
     pair.moved = 0, pair.until = static_cast<float>(setup_.margin), pair.free = -1;
-    const GroupFaces& b = faces_[pair.b];
-    if (pair.a >= groups_) {
-      const std::uint32_t i = pair.a - groups_;
-      const double near = setup_.margin + s_.particle_makes[i].full_radius;
-      if (b.skin.box.has(s_.particles[i].p, near))
-        match({ContactPoint::Debris, i}, s_.particles[i].p, near, b, pair.candidates);
-      return;
-    }
-    const GroupFaces& a = faces_[pair.a];
+    const GroupFaces &a = faces_[pair.a], &b = faces_[pair.b];
     const auto none = [](const ContactPoint&) { return false; };
     match(a, b, pair.candidates, none);
     if (pair.a != pair.b) match(b, a, pair.candidates, none);
@@ -597,23 +511,17 @@ class Search {
   void add_candidates(const Grown& of) const {
     ContactPair& pair = *of.pair;
     const size_t before = pair.candidates.size();
-    const GroupNews *news_a = pair.a < groups_ ? find_news(pair.a) : nullptr, *news_b = find_news(pair.b);
-    if (pair.a >= groups_) {
-      const std::uint32_t i = pair.a - groups_;
-      const double near = setup_.margin + s_.particle_makes[i].full_radius;
-      match({ContactPoint::Debris, i}, s_.particles[i].p, near, *news_b, pair.candidates);
-    } else {
-      // points that are new with all faces, the others with faces that are new
-      const auto add = [&](const GroupNews& news, const GroupNews* other_news, const GroupFaces& other) {
-        match(news, other, pair.candidates, [](const ContactPoint&) { return false; });
-        match(other, news, pair.candidates, [&](const ContactPoint& point) {
-          return other_news != nullptr &&
-                 std::find(other_news->points.begin(), other_news->points.end(), point) != other_news->points.end();
-        });
-      };
-      if (of.of_a) add(*news_a, news_b, faces_[pair.b]);
-      if (of.of_b) add(*news_b, news_a, faces_[pair.a]);
-    }
+    const GroupNews *news_a = find_news(pair.a), *news_b = find_news(pair.b);
+    // points that are new with all faces, the others with faces that are new
+    const auto add = [&](const GroupNews& news, const GroupNews* other_news, const GroupFaces& other) {
+      match(news, other, pair.candidates, [](const ContactPoint&) { return false; });
+      match(other, news, pair.candidates, [&](const ContactPoint& point) {
+        return other_news != nullptr &&
+               std::find(other_news->points.begin(), other_news->points.end(), point) != other_news->points.end();
+      });
+    };
+    if (of.of_a) add(*news_a, news_b, faces_[pair.b]);
+    if (of.of_b) add(*news_b, news_a, faces_[pair.a]);
     if (pair.candidates.size() > before) pair.free = -1;
   }
 
@@ -623,9 +531,10 @@ class Search {
   double h_;
   Team& team_;
   std::uint32_t groups_;
-  std::vector<ContactBox> boxes_;    // of objects, as they are
-  std::vector<Vec3> speed_before_;   // of objects at the last look
-  std::vector<double> most_spread_;  // at both
+  std::vector<ContactBox> boxes_;     // of groups, as they are
+  std::vector<Vec3> speed_before_;    // of groups at the last look
+  std::vector<double> most_spread_;   // at both
+  std::vector<unsigned char> meets_;  // groups: particles may be near its faces
   std::vector<GroupNews> news_;
   std::vector<std::uint32_t> news_of_;  // of groups; kNone: nothing
 };
@@ -705,10 +614,9 @@ void search_contact(ExplicitSystem::Inside& in, ExplicitState& state) {
 
 bool is_knocked(const ExplicitSystem::Inside& in, const ExplicitState& state, size_t first, size_t last) {
   const ContactState& c = state.contact;
-  const size_t groups = in.contact.group_starts.size() - 1;
   const double most = kLeastShare * in.contact.margin / (calc_look(in) * in.h);
-  for (size_t i = first; i < last && groups + i < c.speed.size(); ++i) {
-    const Vec3 gain = state.particles[i].v - c.speed[groups + i];
+  for (size_t i = first; i < last && i < c.particle_speed.size(); ++i) {
+    const Vec3 gain = state.particles[i].v - c.particle_speed[i];
     if (dot(gain, gain) > most * most) return true;
   }
   return false;

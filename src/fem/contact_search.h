@@ -1,8 +1,7 @@
 #pragma once
-/// Points of the outer surface against segments (faces) of it, and debris particles: who may touch whom. Groups of
-/// neighbouring elements are looked at first; pairs of groups are looked through again when they have moved against
-/// each other by the search margin; of what was found steps see what may touch before the next look
-/// (docs/theory/explicit.md, "Contact").
+/// Points of the outer surface against segments (faces) of it, and debris particles: who may touch whom before the next
+/// look. Groups of neighbouring elements are looked at first; pairs of groups are looked through again when they have
+/// moved against each other by the search margin, debris at each look (docs/theory/explicit.md, "Contact").
 
 #include <array>
 #include <compare>
@@ -86,9 +85,9 @@ struct GroupNews {
   ContactBox box;                    // of all
 };
 
-/// Two groups (or a particle and a group) that are near each other, and what was found between them.
+/// Two groups that are near each other, and what was found between them.
 struct ContactPair {
-  std::uint32_t a = 0, b = 0;  // objects: groups, then particles; a >= b
+  std::uint32_t a = 0, b = 0;  // a >= b
   // since they were looked through, how far they have moved against each other, and may until it is to be done again
   // [m]
   float moved = 0, until = -1;
@@ -107,25 +106,24 @@ struct TouchSums {
 };
 
 struct ContactState {
-  std::vector<unsigned char> gone;           // elements
-  std::vector<std::uint32_t> removed;        // elements that have gone since the last look
-  std::vector<ParticlePair> particle_pairs;  // in order
-  std::vector<float> particle_free;          // of these, as of candidates, by the travel of both
-  std::vector<ContactPair> pairs;            // in the order of a, then b
+  std::vector<unsigned char> gone;     // elements
+  std::vector<std::uint32_t> removed;  // elements that have gone since the last look
+  std::vector<ContactPair> pairs;      // in the order of a, then b
   // what may touch before the next look, in order
   std::vector<NearCandidate> near;
   std::vector<ParticlePair> near_particles;
-  std::vector<ContactBox> boxes;  // of objects, with their room around them
-  std::vector<double> room;       // at least half the reach, more for what is fast [m]
-  std::vector<double> travel;     // of an object since the boxes were made [m]
-  std::vector<Vec3> speed;        // mean, of an object, at the last look
-  std::vector<double> spread;     // largest deviation from it
-  bool fresh = true;              // no boxes yet
-  bool knocked = false;           // debris has gained more speed than the last look reckons with
-  int since = 0;                  // steps since the last look
-  std::uint64_t look = 0;         // which found what is near, like no other; 0: not known
-  TouchSums touching;             // of surfaces in the last step
-  TouchSums debris;               // of debris at its last forces; power of impulses over a step, 0 where there are none
+  std::vector<ContactBox> boxes;     // of groups, with their room around them
+  std::vector<double> room;          // at least half the reach, more for what is fast [m]
+  std::vector<double> travel;        // of a group since the boxes were made [m]
+  std::vector<Vec3> speed;           // mean, of a group, at the last look
+  std::vector<double> spread;        // largest deviation from it
+  std::vector<Vec3> particle_speed;  // at the last look
+  bool fresh = true;                 // no boxes yet
+  bool knocked = false;              // debris has gained more speed than the last look reckons with
+  int since = 0;                     // steps since the last look
+  std::uint64_t look = 0;            // which found what is near, like no other; 0: not known
+  TouchSums touching;                // of surfaces in the last step
+  TouchSums debris;  // of debris at its last forces; power of impulses over a step, 0 where there are none
   long long searches = 0;
 };
 

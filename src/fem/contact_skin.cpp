@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 
 #include "fem/explicit_kernel.h"
 
@@ -81,15 +82,12 @@ void make_skin(const double* HWY_RESTRICT rows, double depth_share, const FaceCo
       const V tall = add(mul(num(kEdge), hn::Abs(dot(b, across))), hn::Abs(dot(c, across)));
       const V depth = mul(num(depth_share), hn::Max(num(0), dot(normal, sub(centre, far))));
       const V uneven = hn::Abs(dot(normal, sub(x[0], centre)));
-      V square = num(0);
+      const V3 behind = scale(depth, normal);
       for (size_t k = 0; k < 4; ++k) {
-        const V3 r = sub(x[k], centre);
-        square = hn::Max(square, dot(r, r));
+        const V3 inside = sub(x[k], behind);
         all_low = smaller(all_low, x[k]), all_high = larger(all_high, x[k]);
+        low = smaller(low, smaller(x[k], inside)), high = larger(high, larger(x[k], inside));
       }
-      const V reach = add(hn::Sqrt(square), depth);
-      low = smaller(low, sub(centre, V3{reach, reach, reach})),
-      high = larger(high, add(centre, V3{reach, reach, reach}));
       double* HWY_RESTRICT to = skin.faces.data() + run * kFields * kFaceRun + l;
       const V fields[kFields] = {centre.x, centre.y, centre.z, normal.x, normal.y, normal.z, along.x, along.y,
                                  along.z,  across.x, across.y, across.z, wide,     tall,     depth,   uneven};
@@ -136,6 +134,23 @@ void find_points(const Places& places, const ContactBox& box, double near, std::
   }
 }
 
+/// Bits of a run's faces for which the test holds, of heights and distances beside them.
+template <class Test>
+HWY_INLINE unsigned test_faces(const Skin& skin, size_t run, const V3& at, const Test& test) {
+  const D d;
+  const double* HWY_RESTRICT from = skin.faces.data() + run * kFields * kFaceRun;
+  unsigned faces = test_run([&](size_t l) HWY_ATTR {
+    const auto field = [&](size_t f) HWY_ATTR { return hn::Load(d, from + f * kFaceRun + l); };
+    const auto vector = [&](size_t f) HWY_ATTR { return V3{field(f), field(f + 1), field(f + 2)}; };
+    const V3 r = sub(at, vector(kCentre));
+    const V beside = hn::Max(sub(hn::Abs(dot(r, vector(kAlong))), field(kWide)),
+                             sub(hn::Abs(dot(r, vector(kAcross))), field(kHigh)));
+    return test(dot(r, vector(kNormal)), beside, field(kDepth), field(kUneven));
+  });
+  if (run == skin.count / kFaceRun) faces &= (1U << skin.count % kFaceRun) - 1;  // the last one, filled up
+  return faces;
+}
+
 void find_faces(const Skin& skin, const Vec3& p, double near_by, double margin, std::vector<std::uint32_t>& found) {
   const D d;
   const V near = num(near_by), behind = num(-margin);
@@ -151,20 +166,32 @@ void find_faces(const Skin& skin, const Vec3& p, double near_by, double margin, 
     });
     for (; runs != 0; runs &= runs - 1) {
       const size_t run = 8 * eight + first_of(runs);
-      const double* HWY_RESTRICT from = skin.faces.data() + run * kFields * kFaceRun;
-      unsigned faces = test_run([&](size_t l) HWY_ATTR {
-        const auto field = [&](size_t f) HWY_ATTR { return hn::Load(d, from + f * kFaceRun + l); };
-        const auto vector = [&](size_t f) HWY_ATTR { return V3{field(f), field(f + 1), field(f + 2)}; };
-        const V3 r = sub(at, vector(kCentre));
-        const V height = dot(r, vector(kNormal));
-        const V beside = hn::Max(sub(hn::Abs(dot(r, vector(kAlong))), field(kWide)),
-                                 sub(hn::Abs(dot(r, vector(kAcross))), field(kHigh)));
-        return hn::And(hn::And(hn::Le(height, near), hn::Ge(height, sub(behind, field(kDepth)))), hn::Le(beside, near));
+      unsigned faces = test_faces(skin, run, at, [&](V height, V beside, V depth, V /*uneven*/) HWY_ATTR {
+        return hn::And(hn::And(hn::Le(height, near), hn::Ge(height, sub(behind, depth))), hn::Le(beside, near));
       });
-      if (run == skin.count / kFaceRun) faces &= (1U << skin.count % kFaceRun) - 1;  // the last one, filled up
       const auto first = static_cast<std::uint32_t>(run * kFaceRun);
       for (; faces != 0; faces &= faces - 1) found.push_back(first + first_of(faces));
     }
+  }
+}
+
+void find_near_faces(const Skin& skin, size_t run, const Particle* particles, std::span<const std::uint32_t> balls,
+                     const Ahead& ahead, std::vector<std::array<std::uint32_t, 2>>& found) {
+  for (const std::uint32_t number : balls) {
+    const Particle& ball = particles[number];
+    const V zero = num(0), radius = num(ball.radius), path = num(ahead.calc_path(ball.v));
+    // as calc_gap
+    unsigned faces = test_faces(
+        skin, run, {num(ball.p.x), num(ball.p.y), num(ball.p.z)}, [&](V height, V side, V depth, V uneven) HWY_ATTR {
+          const V beside = hn::Max(zero, side), above = hn::Max(zero, sub(height, uneven));
+          const V lower = hn::Neg(add(height, uneven));
+          const V gap = hn::Max(lower, sub(hn::Sqrt(add(mul(above, above), mul(beside, beside))), radius));
+          const V below = hn::Max(beside, sub(lower, depth));
+          const auto is_below = hn::And(hn::Gt(lower, zero), hn::Lt(below, lower));
+          return hn::Lt(hn::IfThenElse(is_below, below, gap), path);
+        });
+    for (; faces != 0; faces &= faces - 1)
+      found.push_back({number, static_cast<std::uint32_t>(run * kFaceRun) + first_of(faces)});
   }
 }
 
@@ -177,6 +204,7 @@ namespace topple::fem::lanes {
 
 HWY_EXPORT(make_skin);
 HWY_EXPORT(find_faces);
+HWY_EXPORT(find_near_faces);
 HWY_EXPORT(find_points);
 
 void fill_runs(FaceCorners& corners) {
@@ -190,6 +218,23 @@ void make_skin(const double* rows, double depth, const FaceCorners& corners, siz
 void find_faces(const Skin& skin, const Vec3& p, double near, double margin, std::vector<std::uint32_t>& found) {
   found.clear();
   HWY_DYNAMIC_DISPATCH(find_faces)(skin, p, near, margin, found);
+}
+void find_near_faces(const Skin& skin, size_t run, const Particle* particles, std::span<const std::uint32_t> balls,
+                     const Ahead& ahead, std::vector<std::array<std::uint32_t, 2>>& found) {
+  if (!balls.empty()) HWY_DYNAMIC_DISPATCH(find_near_faces)(skin, run, particles, balls, ahead, found);
+}
+double calc_gap(const SkinFace& face, const Vec3& p, double radius) {
+  const Vec3 d = p - face.centre;
+  const double height = dot(d, face.normal);
+  const double beside =
+      std::max({0.0, std::abs(dot(d, face.along)) - face.wide, std::abs(dot(d, face.across)) - face.high});
+  const double above = std::max(0.0, height - face.uneven), lower = -(height + face.uneven);
+  if (lower > 0) {
+    // a ball at the height of the face's edge may touch it from beside, one below it does not
+    const double below = std::max(beside, lower - face.depth);
+    if (below < lower) return below;
+  }
+  return std::max(lower, std::sqrt(above * above + beside * beside) - radius);
 }
 void find_points(const Places& places, const ContactBox& box, double near, std::vector<std::uint32_t>& found) {
   found.clear();

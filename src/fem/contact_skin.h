@@ -4,10 +4,12 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "base/aligned.h"
 #include "fem/contact_cells.h"
+#include "fem/particle.h"
 
 namespace topple::fem::lanes {
 
@@ -31,8 +33,13 @@ struct SkinFace {
 struct Skin {
   size_t count = 0;             // F
   AlignedVector<double> faces;  // fields of a run side by side (R x fields x kFaceRun)
-  AlignedVector<double> boxes;  // of all that may be near a run (runs, rounded up to 8, x 6 x 8)
+  AlignedVector<double> boxes;  // of runs' faces and what is behind them (runs, rounded up to 8, x 6 x 8)
   ContactBox box;               // of the faces
+  size_t runs() const { return (count + kFaceRun - 1) / kFaceRun; }
+  ContactBox run_box(size_t run) const {
+    const double* at = boxes.data() + run / 8 * 6 * 8 + run % 8;
+    return {{at[0], at[8], at[16]}, {at[24], at[32], at[40]}};
+  }
   Vec3 centre(size_t i) const {
     const double* at = faces.data() + i / kFaceRun * kSkinFields * kFaceRun + i % kFaceRun;
     return {at[0], at[kFaceRun], at[2 * kFaceRun]};
@@ -69,6 +76,20 @@ void make_skin(const double* rows, double depth, const FaceCorners&, size_t coun
 /// Numbers of faces that a point may be nearer to than `near`, or behind by no more than their depth and
 /// `margin`; in order.
 void find_faces(const Skin&, const Vec3& p, double near, double margin, std::vector<std::uint32_t>& found);
+/// How far a ball (a point: radius 0) and a face may move against each other until they may touch.
+double calc_gap(const SkinFace&, const Vec3& p, double radius);
+/// How far something may get until a later look.
+struct Ahead {
+  double time = 0;   // until then [s]
+  double least = 0;  // beyond what speeds tell [m]
+  Vec3 speed;        // of faces
+  double spread = 0;
+  /// At twice the present speeds.
+  double calc_path(const Vec3& v) const { return 2 * time * (norm(v - speed) + spread) + least; }
+};
+/// Appends balls and those faces of a run that they may touch until then.
+void find_near_faces(const Skin&, size_t run, const Particle*, std::span<const std::uint32_t> balls, const Ahead&,
+                     std::vector<std::array<std::uint32_t, 2>>& found);
 /// Numbers of points no further than `near` out of a box along any axis; in order.
 void find_points(const Places&, const ContactBox&, double near, std::vector<std::uint32_t>& found);
 

@@ -72,9 +72,9 @@ void pass_state(Archive& archive, State& s) {
   archive.list(s.ground_forces), archive.list(s.debris_forces), archive.list(s.touchdowns), archive.list(s.removals);
   archive.value(s.removed_internal), archive.value(s.removed_kinetic), archive.value(s.removed_gravity);
   auto& c = s.contact;
-  archive.list(c.gone), archive.list(c.particle_pairs), archive.list(c.particle_free), archive.list(c.near),
-      archive.list(c.near_particles);
-  archive.list(c.boxes), archive.list(c.room), archive.list(c.travel), archive.list(c.speed);
+  archive.list(c.gone), archive.list(c.near), archive.list(c.near_particles);
+  archive.list(c.boxes), archive.list(c.room), archive.list(c.travel), archive.list(c.speed),
+      archive.list(c.particle_speed);
   archive.list(c.spread), archive.list(c.removed), archive.value(c.fresh);
   archive.value(c.knocked), archive.value(c.since), archive.value(c.touching), archive.value(c.debris),
       archive.value(c.searches);

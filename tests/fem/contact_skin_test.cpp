@@ -55,14 +55,59 @@ TEST(ContactSkin, FindsTheFacesNearAPoint) {
       const Vec3 d = p - middle;
       const double height = dot(d, normal), beside = std::max(std::abs(dot(d, a)), std::abs(dot(d, b))) - 1;
       // a face counts as a hundredth larger than it is
-      const bool is_near = height < kNear && height > -(0.4 + kMargin) && beside<kNear, is_far = height> kNear ||
-                           height < -(0.4 + kMargin) || beside > kNear + 0.01 + 1e-9;
+      const bool is_far = height > kNear || height < -(0.4 + kMargin) || beside > kNear + 0.01 + 1e-9;
+      const Vec3 away{std::max(0.0, std::abs(dot(d, a)) - 1), std::max(0.0, std::abs(dot(d, b)) - 1),
+                      std::max({0.0, height, -(0.4 + kMargin - kNear) - height})};
+      const bool is_near = norm(away) < kNear;
       if (is_near) { EXPECT_EQ(is_found.count(f), 1U); }
       if (is_far) { EXPECT_EQ(is_found.count(f), 0U); }
       all += is_near ? 1 : 0;
     }
   }
   EXPECT_GT(all, 200U);
+}
+
+TEST(ContactSkin, FindsTheFacesThatBallsMayTouch) {
+  const Squares squares(61);
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> number(-7, 7);
+  std::vector<Particle> balls(400);
+  std::vector<std::uint32_t> numbers;
+  for (std::uint32_t i = 0; i < balls.size(); ++i) {
+    balls[i].p = {number(random), number(random), number(random)};
+    balls[i].v = {number(random), number(random), number(random)};
+    balls[i].radius = 0.4 + 0.05 * number(random);
+    if (i % 3 > 0) numbers.push_back(i);
+  }
+  const Ahead ahead{0.01, 0.02, {3, -2, 1}, 0.5};
+  EXPECT_NEAR(ahead.calc_path({3, 2, 4}), 2 * 0.01 * (5 + 0.5) + 0.02, 1e-15);
+  std::set<std::array<std::uint32_t, 2>> expected;
+  for (const std::uint32_t i : numbers)
+    for (std::uint32_t f = 0; f < 61; ++f)
+      if (calc_gap(squares.skin.face(f), balls[i].p, balls[i].radius) < ahead.calc_path(balls[i].v))
+        expected.insert({i, f});
+  EXPECT_GT(expected.size(), 40U);
+  std::vector<std::array<std::uint32_t, 2>> found;
+  for (size_t run = 0; run < squares.skin.runs(); ++run) {
+    const size_t before = found.size();
+    find_near_faces(squares.skin, run, balls.data(), numbers, ahead, found);
+    for (size_t i = before; i < found.size(); ++i) EXPECT_EQ(found[i][1] / kFaceRun, run);
+  }
+  EXPECT_EQ(found.size(), expected.size());
+  EXPECT_EQ((std::set<std::array<std::uint32_t, 2>>(found.begin(), found.end())), expected);
+}
+
+TEST(ContactSkin, TellsHowFarBallsAreFromAFace) {
+  // a square of 2 m, its element 1 m thick: from above, behind, beside and off a corner
+  SkinFace face;
+  face.normal = {0, 0, 1}, face.along = {1, 0, 0}, face.across = {0, 1, 0};
+  face.wide = face.high = 1, face.depth = 0.4;
+  EXPECT_NEAR(calc_gap(face, {0.3, 0.2, 2}, 0.5), 1.5, 1e-14);
+  EXPECT_NEAR(calc_gap(face, {0.3, 0.2, 0.2}, 0.1), 0.1, 1e-14);
+  EXPECT_NEAR(calc_gap(face, {4, 5, 0}, 0.5), 3.5, 1e-14);
+  EXPECT_NEAR(calc_gap(face, {4, 5, 3}, 0.5), 4.5, 1e-14);
+  EXPECT_EQ(calc_gap(face, {0.3, 0.2, -0.3}, 0.5), 0);
+  EXPECT_NEAR(calc_gap(face, {0.3, 0.2, -0.9}, 0.5), 0.5, 1e-14);
 }
 
 TEST(ContactSkin, FindsThePointsInABox) {

@@ -149,6 +149,43 @@ TEST(ExplicitContactPhysics, BlocksThatComeFromAfarMeet) {
   EXPECT_LT(lower / 2400, -2);
 }
 
+TEST(ExplicitContactPhysics, WhatAChargeUncoversIsTouched) {
+  // a block on its way to a slab in thin layers, of which the upper one goes; the pair is not looked through in between
+  ExplicitModel model;
+  model.materials = {make_explicit_elastic(2400, 30e9, 0.2)};
+  model.gravity = {};
+  add_brick(model, {0, 0, 0}, {1, 1, 0.1}, 4, 4, 5, 0, 0);
+  add_brick(model, {0.13, 0.21, 0.11}, {0.83, 0.91, 0.36}, 3, 3, 1, 0, 1);
+  ExplicitOptions options;
+  options.search_margin = 0.2;
+  ExplicitSystem system(model, options);
+  std::vector<Vec3> v(model.nodes.size());
+  for (size_t n = 0; n < v.size(); ++n)
+    if (model.nodes[n].z > 0.105) v[n] = {0, 0, -4};
+  system.set_velocities(v);
+  ASSERT_EQ(system.advance(0.0002), ExplicitEnding::ReachedTime);
+  const long long searches = system.timing().searches;
+  std::vector<int> upper;
+  for (size_t e = 0; e < model.elements.size(); ++e)
+    if (model.nodes[static_cast<size_t>(model.elements[e].node[4])].z == 0.1) upper.push_back(static_cast<int>(e));
+  ASSERT_EQ(upper.size(), 16U);
+  system.remove(upper);
+  ASSERT_EQ(system.advance(0.0074), ExplicitEnding::ReachedTime);
+  EXPECT_EQ(system.contacts(), 0);
+  EXPECT_EQ(system.timing().searches, searches);
+  ASSERT_EQ(system.advance(0.0085), ExplicitEnding::ReachedTime);
+  double slab = 0, lowest = 1;
+  for (size_t n = 0; n < v.size(); ++n) {
+    const auto node = static_cast<int>(n);
+    if (model.nodes[n].z < 0.105)
+      slab += system.node_mass(node) * system.v(node).z;
+    else
+      lowest = std::min(lowest, system.p(node).z);
+  }
+  EXPECT_LT(slab / (0.08 * 2400), -1);
+  EXPECT_GT(lowest, 0.07);
+}
+
 TEST(ExplicitContactPhysics, TheOrderOfBodiesDoesNotCount) {
   std::array<double, 2> height{};
   for (const bool swapped : {false, true}) {
