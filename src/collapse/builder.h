@@ -140,6 +140,7 @@ struct Builder : BuilderState {
     double EA = 0, GA = 0, GJ = 0, EI_y = 0, EI_z = 0;
   };
   Stiffness calc_stiffness(const MemberZones&) const;
+  /// One that is known keeps its name.
   mbs::SharedLaw make_law(int zone, const Stiffness&, const std::string& name, Bending);
   mbs::LawId law_of(int zone, const Stiffness&, const std::string& member, Bending = Bending::Both);
   /// A condensed model stays in its plane, so that members of a frame bend about one axis alone.

@@ -24,6 +24,14 @@ double largest_moment(const mbs::MomentFamily& f) {
   return m;
 }
 
+/// The same law by a name.
+mbs::SharedLaw named(const mbs::SharedLaw& from, const std::string& name) {
+  if (from->name == name) return from;
+  mbs::ZoneLaw law = *from;
+  law.name = name;
+  return law;
+}
+
 }  // namespace
 
 double Builder::kept_of(int index) const {
@@ -152,18 +160,12 @@ Builder::Stiffness Builder::calc_stiffness(const MemberZones& z) const {
 }
 
 mbs::SharedLaw Builder::make_law(int zone, const Stiffness& s, const std::string& name, Bending bending) {
-  const auto named = [&name](const mbs::SharedLaw& from) {
-    if (from->name == name) return from;
-    mbs::ZoneLaw law = *from;
-    law.name = name;
-    return mbs::SharedLaw(std::move(law));
-  };
   if (const auto same = laws.find({zone, s.EI_y, s.EI_z, bending}); same != laws.end())
-    return named(model.laws.shared(static_cast<size_t>(same->second.index)));
+    return model.laws.shared(static_cast<size_t>(same->second.index));
   std::string key = library.key(zone);
   append_bytes(key, s.EI_y), append_bytes(key, s.EI_z), append_bytes(key, static_cast<double>(bending));
   if (known)
-    if (const auto found = known->laws.find(key); found != known->laws.end()) return named(found->second);
+    if (const auto found = known->laws.find(key); found != known->laws.end()) return found->second;
   mbs::SharedLaw law = make_zone_law(library.rcc(zone), s.EI_y, s.EI_z, name, k, PlasticFrom::Yield, bending);
   if (made) made->laws.emplace(std::move(key), law);
   return law;
@@ -172,7 +174,7 @@ mbs::SharedLaw Builder::make_law(int zone, const Stiffness& s, const std::string
 mbs::LawId Builder::law_of(int zone, const Stiffness& s, const std::string& name, Bending bending) {
   const auto key = std::make_tuple(zone, s.EI_y, s.EI_z, bending);
   if (const auto it = laws.find(key); it != laws.end()) return it->second;
-  const mbs::LawId id = mbs::add_law(model, make_law(zone, s, name, bending));
+  const mbs::LawId id = mbs::add_law(model, named(make_law(zone, s, name, bending), name));
   laws[key] = id;
   return id;
 }
@@ -192,7 +194,7 @@ mbs::SharedLaw Builder::make_hinge_law(int zone, const Stiffness& s, const std::
 mbs::LawId Builder::hinge_law_of(int zone, const Stiffness& s, const std::string& name) {
   const auto key = std::make_tuple(zone, s.EI_y, s.EI_z, name);
   if (const auto it = hinge_laws.find(key); it != hinge_laws.end()) return it->second;
-  return hinge_laws[key] = mbs::add_law(model, make_hinge_law(zone, s, name));
+  return hinge_laws[key] = mbs::add_law(model, named(make_hinge_law(zone, s, name), name));
 }
 
 mbs::LawId Builder::stub_law_of(int zone, const Stiffness& s, int index, double length) {
@@ -200,10 +202,11 @@ mbs::LawId Builder::stub_law_of(int zone, const Stiffness& s, int index, double 
   const auto key = std::make_tuple(zone, s.EI_y, s.EI_z, name);
   if (const auto it = hinge_laws.find(key); it != hinge_laws.end()) return it->second;
   mbs::ZoneLaw law = *make_hinge_law(zone, s, name);
+  law.name = name;
   // crushing goes on until nothing of it is left, and it is off its joint when it has slid by its own thickness
   law.crush_length = length;
   law.slip_rupture = std::max(law.slip_rupture, std::min(section_of(index).width, section_of(index).height));
-  return hinge_laws[key] = mbs::add_law(model, law);
+  return hinge_laws[key] = mbs::add_law(model, std::move(law));
 }
 
 Pose Builder::frame_in(int body, const Vec3& p_W, const Mat3& R_WF) const {

@@ -23,7 +23,8 @@ struct Row {
 class Reader {
  public:
   explicit Reader(const Row& row, std::vector<double> Row::*values = &Row::moment)
-      : x_(row.rotation), m_(row.*values) {}
+      : Reader(row.rotation, row.*values) {}
+  Reader(const std::vector<double>& rotation, const std::vector<double>& values) : x_(rotation), m_(values) {}
   double operator()(double phi) {
     while (i_ < x_.size() && x_[i_] < phi) ++i_;
     if (phi <= x_.front()) return m_.front();
@@ -53,13 +54,12 @@ std::vector<double> sample(const Row& row, const std::vector<double>& rotation, 
 }
 
 /// Moment of a row, constant beyond its ends.
-double calc_moment(const Row& row, double phi) {
+///   above  its first rotation that is not below
+double calc_moment(const Row& row, double phi, size_t above) {
   const std::vector<double>&x = row.rotation, &m = row.moment;
   if (phi <= x.front()) return m.front();
-  const auto above = std::lower_bound(x.begin(), x.end(), phi);
-  if (above == x.end()) return m.back();
-  const size_t i = static_cast<size_t>(above - x.begin());
-  return m[i - 1] + (phi - x[i - 1]) / (x[i] - x[i - 1]) * (m[i] - m[i - 1]);
+  if (above == x.size()) return m.back();
+  return m[above - 1] + (phi - x[above - 1]) / (x[above] - x[above - 1]) * (m[above] - m[above - 1]);
 }
 
 /// All rotations of some rows below `last`, rising, and `last`.
@@ -97,8 +97,7 @@ Row make_row(const nearfield::MomentFamily& family, double N, double EI, double 
   std::vector<double> u(J, 0.0);
   if (!family.elongation.empty())
     for (size_t j = 0; j < J; ++j) u[j] = mix(family.elongation, (k - 1) * J + j, k * J + j);
-  const Row whole{family.rotation, M, u};
-  const auto elongation_at = [&](double rotation) { return Reader(whole, &Row::elongation)(rotation); };
+  const auto elongation_at = [&](double rotation) { return Reader(family.rotation, u)(rotation); };
   Row row;
   const auto add = [&row](double rotation, double moment, double elongation) {
     if (!row.rotation.empty() && !(rotation > row.rotation.back() + 1e-9)) return;
@@ -183,55 +182,72 @@ std::vector<double> find_rotations(const std::vector<const Row*>& rows, double l
   // chord beside one of them.
   struct Bend {
     size_t at;  // into all rotations
-    double rotation, share;
+    size_t row;
+    double share;
   };
   struct Shares {
     const Row* row;
     double most;
-    std::vector<Bend> bends;
   };
   std::vector<Shares> shares;
+  std::vector<Bend> found;
   for (const Row* r : rows) {
     const double most = r->largest();
     if (!(most > 0)) continue;
-    Shares& to = shares.emplace_back(Shares{r, most, {}});
+    shares.push_back({r, most});
     Reader at(*r);
     size_t j = 0, next = 0;
     for (const double x : r->rotation) {
       while (j + 1 < all.size() && all[j] < x) ++j;
       for (size_t i = std::max(next, all[j] == x || j == 0 ? j : j - 1); i <= j; next = ++i)
-        to.bends.push_back({i, all[i], at(all[i]) / most});
+        found.push_back({i, shares.size() - 1, at(all[i]) / most});
     }
   }
-  // points that are kept, with the shares of all rows there
+  // by rotation, so that those of an interval lie side by side
+  std::vector<size_t> first_bend(all.size() + 1, 0);
+  for (const Bend& bend : found) ++first_bend[bend.at + 1];
+  for (size_t i = 0; i < all.size(); ++i) first_bend[i + 1] += first_bend[i];
+  std::vector<Bend> bends(found.size());
+  std::vector<size_t> place(first_bend.begin(), first_bend.end() - 1);
+  for (const Bend& bend : found) bends[place[bend.at]++] = bend;
+  // points that are kept, with the shares of all rows there and each row's first rotation that is not below
   struct Point {
     size_t at;
     std::vector<double> share;
+    std::vector<size_t> above;
   };
   std::vector<Point> points;
-  const auto keep = [&](size_t at) {
-    Point& to = points.emplace_back(Point{at, {}});
-    for (const Shares& row : shares) to.share.push_back(calc_moment(*row.row, all[at]) / row.most);
+  const auto keep = [&](size_t at, const Point* begin, const Point* end) {
+    Point to{at, std::vector<double>(shares.size()), std::vector<size_t>(shares.size())};
+    for (size_t r = 0; r < shares.size(); ++r) {
+      const std::vector<double>& x = shares[r].row->rotation;
+      const auto from = x.begin() + static_cast<std::ptrdiff_t>(begin ? begin->above[r] : 0);
+      const auto until = end ? x.begin() + static_cast<std::ptrdiff_t>(end->above[r]) : x.end();
+      to.above[r] = static_cast<size_t>(std::lower_bound(from, until, all[at]) - x.begin());
+      to.share[r] = calc_moment(*shares[r].row, all[at], to.above[r]) / shares[r].most;
+    }
+    points.push_back(std::move(to));
     return points.size() - 1;
   };
-  const size_t first = keep(0), last_point = keep(all.size() - 1);
+  const size_t first = keep(0, nullptr, nullptr), last_point = keep(all.size() - 1, nullptr, nullptr);
   std::vector<std::pair<size_t, size_t>> open{{first, last_point}};
+  std::vector<double> slope(shares.size());
   while (!open.empty()) {
     const auto [begin, end] = open.back();
     open.pop_back();
-    const size_t a = points[begin].at, b = points[end].at;
+    const Point &from = points[begin], &to = points[end];
+    const size_t a = from.at, b = to.at;
+    for (size_t r = 0; r < shares.size(); ++r) slope[r] = (to.share[r] - from.share[r]) / (all[b] - all[a]);
     double worst = tolerance;
-    size_t where = 0;
-    for (size_t r = 0; r < shares.size(); ++r) {
-      const double start = points[begin].share[r], slope = (points[end].share[r] - start) / (all[b] - all[a]);
-      auto bend = std::upper_bound(shares[r].bends.begin(), shares[r].bends.end(), a,
-                                   [](size_t at, const Bend& x) { return at < x.at; });
-      for (; bend != shares[r].bends.end() && bend->at < b; ++bend)
-        if (const double off = std::abs(bend->share - start - slope * (bend->rotation - all[a])); off > worst)
-          worst = off, where = bend->at;
+    size_t where = 0, of = 0;
+    for (size_t i = first_bend[a + 1]; i < first_bend[b]; ++i) {
+      const Bend& bend = bends[i];
+      const double off = std::abs(bend.share - from.share[bend.row] - slope[bend.row] * (all[bend.at] - all[a]));
+      // of equal ones that of the first row
+      if (off > worst || (off == worst && bend.row < of)) worst = off, where = bend.at, of = bend.row;
     }
     if (where == 0) continue;
-    const size_t middle = keep(where);
+    const size_t middle = keep(where, &from, &to);
     open.emplace_back(begin, middle);
     open.emplace_back(middle, end);
   }
@@ -248,12 +264,13 @@ mbs::MomentFamily make_family(const nearfield::MomentFamily& positive, const nea
   constexpr double between_rotations = 0.0075, between_forces = 0.015;
   const bool same = positive.moment == negative.moment && positive.normal_force == negative.normal_force;
   const std::map<double, Row> pos = make_rows(positive, EI, length, begin, between_forces);
-  const std::map<double, Row> neg = same ? pos : make_rows(negative, EI, length, begin, between_forces);
+  const std::map<double, Row> other =
+      same ? std::map<double, Row>() : make_rows(negative, EI, length, begin, between_forces);
+  const std::map<double, Row>& neg = same ? pos : other;
   mbs::MomentFamily out;
   std::vector<const Row*> rows;
   double end = 0;
-  for (const auto* some : {&pos, &neg}) {
-    if (same && some == &neg) continue;
+  for (const auto* some : {&pos, &other}) {
     for (const auto& [N, row] : *some) {
       rows.push_back(&row);
       end = std::max(end, row.rotation.back());
@@ -266,12 +283,15 @@ mbs::MomentFamily make_family(const nearfield::MomentFamily& positive, const nea
   out.normal_force.erase(std::unique(out.normal_force.begin(), out.normal_force.end(),
                                      [span](double a, double b) { return b - a < 1e-9 * span; }),
                          out.normal_force.end());
-  const auto append = [](std::vector<double>& to, const std::vector<double>& from) {
+  const size_t values = out.normal_force.size() * out.plastic_rotation.size();
+  const auto append = [values](std::vector<double>& to, const std::vector<double>& from) {
+    to.reserve(values);
     for (const double m : from) to.push_back(std::max(0.0, m));
   };
   const bool elongates = !positive.elongation.empty() && !negative.elongation.empty();
   const auto append_elongation = [&](std::vector<double>& to, const std::map<double, Row>& from, double N) {
     const std::vector<double> u = sample(from, N, out.plastic_rotation, &Row::elongation);
+    to.reserve(values);
     to.insert(to.end(), u.begin(), u.end());
   };
   for (const double N : out.normal_force) {
