@@ -1,9 +1,6 @@
 #pragma once
 /// Where two convex solids touch.
 
-#include <algorithm>
-#include <iterator>
-
 #include "mbs/box_kernel.h"
 #include "mbs/model.h"
 
@@ -40,14 +37,15 @@ struct BoxContact {
 /// separated two polyhedra at the last call and only saves time.
 void find_contact(const Solid& a, const Solid& b, int& axis, BoxContact& out);
 
-/// A box for the kernel of boxes, kernel::kBoxFields numbers.
-inline void write_box(const Solid& box, double* row) {
-  const Mat3& R = box.R;
-  const double fields[] = {box.p.x, box.p.y, box.p.z, R(0, 0), R(1, 0),    R(2, 0),    R(0, 1),    R(1, 1),
-                           R(2, 1), R(0, 2), R(1, 2), R(2, 2), box.half.x, box.half.y, box.half.z, box.reach};
-  static_assert(std::size(fields) == kernel::kBoxFields);
-  std::copy(std::begin(fields), std::end(fields), row);
+/// A box for the kernel of boxes, kernel::kBoxFields numbers: centre, axes, half edges and the sphere that holds it.
+inline void write_box(const Vec3& p, const Mat3& R, const Vec3& half, double reach, double* row) {
+  for (int i = 0; i < 3; ++i) {
+    row[kernel::kBoxPlace + i] = p[i], row[kernel::kBoxHalf + i] = half[i];
+    for (int j = 0; j < 3; ++j) row[kernel::kBoxAxes + 3 * j + i] = R(i, j);
+  }
+  row[kernel::kBoxReach] = reach;
 }
+inline void write_box(const Solid& box, double* row) { write_box(box.p, box.R, box.half, box.reach, row); }
 /// What it found, in a slot of blocks of W lanes.
 void read_box_contact(const double* slot, size_t W, BoxContact& out);
 

@@ -50,7 +50,11 @@ void System::find_pair_points() {
     const size_t i = static_cast<size_t>(shape);
     if (contact.box_step[i] == s.step_index) return;
     contact.box_step[i] = s.step_index;
-    write_box(solid_of(body, shape), &contact.boxes[i * kernel::kBoxFields]);
+    const CompiledShape& box = s.shapes[i];
+    const Mat3 R = now.R[body];
+    const Vec3 p = now.p[body] + R * box.p_BS;
+    double* row = &contact.boxes[i * kernel::kBoxFields];
+    box.is_straight ? write_box(p, R, box.half, box.reach, row) : write_box(p, R * box.R_BS, box.half, box.reach, row);
   };
   // those that are due; two boxes go to the kernel, those that touched side by side
   const size_t W = kernel::lanes();

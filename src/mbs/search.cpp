@@ -53,18 +53,22 @@ void System::add_travel(double h) {
   s.allowance.resize(B);
   s.is_fast.resize(B);
   bool is_far = false;
-  double most[2] = {0, 0};
-  const LaneLayout layout = lanes->body_layout(lane);
-  for (size_t b = 0; b < B && model.contact.bodies; ++b) {
+  if (h > 0 && model.contact.bodies) {
     // the drift before this evaluation was by the speeds of half a step ago
-    const double way = h > 0 ? lanes->way[layout.at(b, 0, 1)] : 0;
-    double& longest = most[s.is_fast[b]];
-    longest = std::max(longest, way);
-    s.travel[b] += way;
-    is_far = is_far || s.travel[b] > s.allowance[b];
+    double of_slow = 0, of_all = 0;
+    const LaneLayout layout = lanes->body_layout(lane);
+    const size_t first = layout.at(0, 0, 1), stride = layout.at(1, 0, 1) - first;
+    const double* ways = lanes->way.data() + first;
+    for (size_t b = 0; b < B; ++b) {
+      const double way = ways[b * stride];
+      of_slow = std::max(of_slow, s.is_fast[b] ? 0.0 : way);
+      of_all = std::max(of_all, way);
+      s.travel[b] += way;
+      is_far |= s.travel[b] > s.allowance[b];
+    }
+    s.clock[0] += of_slow;
+    s.clock[1] += of_all;
   }
-  s.clock[0] += most[0];
-  s.clock[1] += std::max(most[0], most[1]);
   // what a link held together touches from the moment on when it breaks
   if (is_far || s.search_due) {
     find_pairs();

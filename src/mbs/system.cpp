@@ -543,12 +543,13 @@ void System::push_bodies(double h) {
 void System::finish_forces(double h) {
   if (model.contact.ground || model.contact.bodies) evaluate_contact(h);
   evaluate_dampers();
-  if (model.is_planar)
+  if (model.is_planar) {
+    const LaneLayout layout = lanes->body_layout(lane);
     for (size_t b = 0; b < B; ++b) {
-      const Vec3 f = force[b], t = torque[b];
-      force[b] = Vec3{f.x, 0, f.z};
-      torque[b] = Vec3{0, t.y, 0};
+      lanes->force[layout.at(b, 1, 3)] = 0;
+      lanes->torque[layout.at(b, 0, 3)] = lanes->torque[layout.at(b, 2, 3)] = 0;
     }
+  }
 }
 
 void System::drift(size_t b, double h, const Vec3& p0, const Quat& q0, const Mat3& R0) {
