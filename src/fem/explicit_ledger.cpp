@@ -134,16 +134,18 @@ void ExplicitSystem::Inside::move_particles(ExplicitState& state) const {
   for_particles(state, [&](size_t share, size_t first, size_t last) {
     for (size_t i = first; i < last; ++i) {
       Particle& q = state.particles[i];
-      const ParticlePush& push = state.particle_pushes[i];
+      ParticlePush& push = state.particle_pushes[i];
       q.v += (step / q.mass) * push.force;
       q.p += step * q.v;
-      if (push.crushed == 0) continue;
       const double full = state.particle_makes[i].full_radius;
-      // room permitting it grows to its volume within a tenth of a second for each step of the elements in one of it
-      if (push.crushed > 0)
-        q.radius = std::max(std::min(q.radius, kLeastRadius * full), q.radius - push.crushed);
-      else if (q.radius < full)
-        q.radius = std::min(full, q.radius + 10 * h * full);
+      if (push.crushed >= 0) {
+        push.growth = 0;
+        if (push.crushed > 0) q.radius = std::max(std::min(q.radius, kLeastRadius * full), q.radius - push.crushed);
+      } else if (q.radius < full) {
+        // into room around it as fast as what lies loose falls into it
+        push.growth += step * norm(model.gravity);
+        q.radius = std::min(full, q.radius + step * push.growth);
+      }
     }
     knocked[share] = is_knocked(*this, state, first, last) ? 1 : 0;
   });

@@ -9,7 +9,7 @@ namespace topple::fem {
 
 namespace {
 
-constexpr std::uint64_t kMark = 0x7470'6578'0000'000d;  // name and version of the layout
+constexpr std::uint64_t kMark = 0x7470'6578'0000'000e;  // name and version of the layout
 
 class Writer {
  public:

@@ -23,6 +23,7 @@ struct alignas(kCacheLine) Particle {
 struct ParticlePush {
   Vec3 force;
   double crushed = -1;  // by how much, negative: nothing touches it [m]
+  double growth = 0;    // of the radius since something touched it last [m/s]
 };
 /// What does not change.
 struct ParticleMake {

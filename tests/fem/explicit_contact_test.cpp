@@ -358,15 +358,15 @@ TEST(ExplicitReplay, GivesTheSameBitsForAnyThreadsAndAfterASnapshot) {
 }
 
 /// A weak wall that crumbles on the ground: enough balls and touches that both go to several shares.
-ExplicitModel make_wall() {
+ExplicitModel make_wall(int columns) {
   ExplicitModel model = make_pillar();
   model.nodes.clear(), model.elements.clear();
-  add_brick(model, {0, 0, 0}, {4.8, 0.8, 1.2}, 24, 4, 6);
+  add_brick(model, {0, 0, 0}, {0.2 * columns, 0.8, 1.2}, columns, 4, 6);
   return model;
 }
 
 TEST(ExplicitDebrisPhysics, AHeapDoesNotFeelTheStepOfTheDebris) {
-  const ExplicitModel model = make_wall();
+  const ExplicitModel model = make_wall(24);
   std::vector<ExplicitEnergy> energies;
   std::vector<Vec3> centres;
   for (const int debris_steps : {1, 2}) {
@@ -378,15 +378,38 @@ TEST(ExplicitDebrisPhysics, AHeapDoesNotFeelTheStepOfTheDebris) {
     energies.push_back(system.calc_energy()), centres.push_back(system.calc_centre_of_mass());
     EXPECT_LT(std::abs(energies.back().residual()), 2e-4 * energies.back().start);
   }
-  // of the first order in the step; found 0.3, 0.5, 1.6 and 3 %
+  // of the first order in the step; found 0.1, 0.3, 0.3 and 0.2 %, and 11 mm of rebound after a fall at 25 m/s
   const auto expect_alike = [&](double ExplicitEnergy::*energy, double tolerance) {
     EXPECT_NEAR(energies[1].*energy, energies[0].*energy, tolerance * energies[0].*energy);
   };
-  expect_alike(&ExplicitEnergy::contact_damping, 0.02);
-  expect_alike(&ExplicitEnergy::friction, 0.02);
-  expect_alike(&ExplicitEnergy::plastic_hourglass, 0.1);
-  expect_alike(&ExplicitEnergy::debris_kinetic, 0.1);
-  EXPECT_LT(norm(centres[1] - centres[0]), 0.01);
+  expect_alike(&ExplicitEnergy::contact_damping, 0.01);
+  expect_alike(&ExplicitEnergy::friction, 0.01);
+  expect_alike(&ExplicitEnergy::plastic_hourglass, 0.02);
+  expect_alike(&ExplicitEnergy::debris_kinetic, 0.02);
+  EXPECT_LT(norm(centres[1] - centres[0]), 0.015);
+}
+
+TEST(ExplicitDebrisPhysics, ABallGrowsIntoTheRoomAroundItAsFastAsItWouldFall) {
+  ExplicitModel model;
+  model.materials = {make_concrete_like()};
+  model.materials[0].tension_limit = 1e-4;
+  add_brick(model, {0, 0, 0}, {1, 1, 1}, 1, 1, 1);
+  for (const int debris_steps : {1, 2, 3}) {
+    ExplicitOptions options;
+    options.debris_steps = debris_steps;
+    ExplicitSystem system(model, options);
+    std::vector<Vec3> v(model.nodes.size());
+    for (size_t n = 0; n < v.size(); ++n) v[n] = {10 * (model.nodes[n].x - 0.5), 0, 0};
+    system.set_velocities(v);
+    while (system.debris().empty())
+      ASSERT_EQ(system.advance(system.time() + system.step()), ExplicitEnding::ReachedTime);
+    const double start = system.time(), radius = system.debris()[0].radius, full = system.debris()[0].full_radius;
+    ASSERT_EQ(system.advance(start + 0.1), ExplicitEnding::ReachedTime);
+    const double grown = system.debris()[0].radius - radius, expected = 0.5 * 9.81 * 0.1 * 0.1;
+    EXPECT_NEAR(grown, expected, 2 * debris_steps * system.step() / 0.1 * expected);  // of the first order in the step
+    ASSERT_EQ(system.advance(start + 0.5), ExplicitEnding::ReachedTime);
+    EXPECT_EQ(system.debris()[0].radius, full);
+  }
 }
 
 TEST(ExplicitDebrisPhysics, KeepsMomentumOverAStepOfItsOwn) {
@@ -414,14 +437,14 @@ TEST(ExplicitDebrisPhysics, KeepsMomentumOverAStepOfItsOwn) {
 }
 
 TEST(ExplicitReplay, GivesTheSameBitsInAHeap) {
-  const ExplicitModel model = make_wall();
+  const ExplicitModel model = make_wall(36);
   std::vector<std::byte> once;
   for (const int threads : {1, 2, 4}) {
     ExplicitOptions options;
     options.threads = threads;
     ExplicitSystem system(model, options);
     system.set_velocity({0.5, 0, -25});
-    ASSERT_EQ(system.advance(0.017), ExplicitEnding::ReachedTime);
+    ASSERT_EQ(system.advance(0.0125), ExplicitEnding::ReachedTime);
     EXPECT_GT(system.debris().size(), 512U);
     EXPECT_GT(system.contacts(), 256);
     if (threads == 1) once = system.write_snapshot();
