@@ -144,7 +144,7 @@ BallCells::BallCells(std::span<const Particle> particles, std::span<const double
     if (!(cells > kCellsPerBall * static_cast<double>(count) + 8)) break;
   }
   for (int c = 0; c < 3; ++c) {
-    counts_[static_cast<size_t>(c)] = static_cast<size_t>(std::floor((high[c] - low_[c]) / edge) + 1);
+    counts_[static_cast<size_t>(c)] = static_cast<size_t>(std::max(1.0, std::floor((high[c] - low_[c]) / edge) + 1));
     per_edge_[c] = 1 / edge;
   }
   std::vector<std::uint32_t> cell_of(count);

@@ -4,6 +4,7 @@
 #include <hwy/targets.h>
 
 #include <algorithm>
+#include <limits>
 #include <random>
 
 namespace topple::fem {
@@ -53,6 +54,18 @@ TEST(BallCells, FindThePairsThatLookingAtAllFinds) {
       EXPECT_EQ(sort_pairs(found, count), expected) << count;
     });
     EXPECT_TRUE(count < 300 || expected.size() > count / 2);
+  }
+}
+
+TEST(BallCells, FindPairsBesideABallThatIsNowhere) {
+  Balls balls(2);
+  for (const double place : {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
+    balls.particles.resize(3), balls.reach = {1, 1, 1};
+    balls.particles[0].p = {0, 0, 0}, balls.particles[1].p = {1, 1, 0}, balls.particles[2].p = {place, place, 0};
+    const BallCells cells(balls.particles, balls.reach);
+    std::vector<std::vector<ParticlePair>> found(cells.tasks());
+    for (size_t task = 0; task < found.size(); ++task) cells.find_pairs(task, found[task]);
+    EXPECT_EQ(sort_pairs(found, 3), (std::vector<ParticlePair>{{1, 0}}));
   }
 }
 
