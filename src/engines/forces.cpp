@@ -95,6 +95,7 @@ Forces::Forces(const mbs::Model& model, Say say) : model_(model), say_(std::move
       z.parameters.stiffness[i] = e.translational_stiffness[i];
       z.parameters.stiffness[3 + i] = e.rotational_stiffness[i];
     }
+    for (int i = 0; i < 2; ++i) z.parameters.cracking[i] = e.cracking[i];
     z.parameters.viscous = viscous(e.damping_ratio);
     z.parameters.stations = static_cast<int>(e.stations.size());
     for (size_t i = 0; i < e.stations.size(); ++i) {
@@ -107,6 +108,7 @@ Forces::Forces(const mbs::Model& model, Say say) : model_(model), say_(std::move
     Zone z;
     for (double& k : z.parameters.stiffness) k = 0;
     z.parameters.stiffness[5] = r.stiffness;
+    z.parameters.cracking[1] = r.cracking;
     z.parameters.external_axial = true;
     z.parameters.viscous = viscous(r.damping_ratio);
     if (r.law.is_valid()) {
@@ -547,7 +549,7 @@ bool Forces::loosen_joint(size_t j) {
     for (int c = 0; c < 3; ++c) z.parameters.stiffness[c] = r.loose_translational[c];
     z.parameters.stiffness[3] = r.loose_torsion;
     z.parameters.stiffness[4] = r.loose_bending;
-    mbs::free_zone(z.state);
+    mbs::free_zone(z.parameters, z.state);
     return true;
   }
   return false;

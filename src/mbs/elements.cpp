@@ -197,6 +197,10 @@ void System::pack_element(size_t e, bool has_moved) {
   put(kTorsionScale, 0);
   const bool has_flow = l.field(slot, kFlows) > 0;  // its constants are there
   put(kFlows, 0);
+  find_crack_bounds(c.zone, z);
+  for (int s = 0; s < 2; ++s)
+    for (int q = 0; q < 2; ++q)
+      for (int side : {0, 1}) put(kCrackScale + 4 * s + 2 * q + side, z.crack_scale[s][q][side]);
   const bool free = c.zone.stations == 0;
   double fields[kFlowFields];
   // near its bounds a zone is better served by the law itself

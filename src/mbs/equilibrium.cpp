@@ -14,6 +14,7 @@
 #include "mbs/contact_kernel.h"
 #include "mbs/joint_rows.h"
 #include "mbs/system.h"
+#include "mbs/zone_limits.h"
 
 namespace topple::mbs {
 
@@ -41,6 +42,11 @@ struct Unknowns {
   /// Of the body's coordinates x y z, about x y z.
   int coordinate(int unknown) const { return stride * unknown; }
 };
+
+/// Of the same two bodies.
+KinematicRow sum_of(const KinematicRow& r, const KinematicRow& s) {
+  return {r.a, r.b, r.va + s.va, r.wa + s.wa, r.vb + s.vb, r.wb + s.wb};
+}
 
 void add_outer(const KinematicRow& r, double k, const Unknowns& u, Triplets& out) {
   const int body[2] = {r.a, r.b};
@@ -257,43 +263,73 @@ class Assembly {
             d,
             cross(p_B - centre(c.b.index), d)};
   }
+  /// Of stations beside the elastic one [rad/(N·m)].
+  struct Flexibility {
+    std::vector<std::array<std::array<double, 2>, 2>> element, rotational;  // [axis][station]
+  };
+  /// Of a zone's stations about an axis: what is given, or what has cracked for good.
+  static std::array<double, 2> flexibility_of(const ZoneState& z, int axis, const Flexibility* given,
+                                              decltype(Flexibility::element) Flexibility::*list, size_t i) {
+    if (given != nullptr) return (given->*list)[i][static_cast<size_t>(axis)];
+    return {z.station[0].crack[axis], z.station[1].crack[axis]};
+  }
   /// Stiffness of all live elements: at rest, or that of fast motion, which the springs behind the dampers add to.
   /// `force_scale` is that of the forces, for springs; those of fast motion have the largest slope that is foreseen, if
   /// wanted.
-  PairMatrix make_stiffness(bool fast, double force_scale = 1, bool foreseen = true) const {
+  ///   added  to the stations' flexibility; null: what has cracked
+  PairMatrix make_stiffness(bool fast, double force_scale = 1, bool foreseen = true,
+                            const Flexibility* added = nullptr) const {
     const std::vector<StiffRow> springs = s_.calc_spring_stiffness(fast && foreseen, force_scale);
     PairMatrix sum(static_cast<int>(free_.size()), unknowns_);
     const auto each_element = [&](auto&& f) {
       for (size_t i = 0; i < s_.elements.size(); ++i)
-        if (s_.state.element[i].live) f(s_.elements[i], s_.state.element[i].share);
+        if (s_.state.element[i].live) f(i, s_.elements[i], s_.state.element[i].share);
     };
     const auto each_row = [&](auto&& f) {
       for (size_t i = 0; i < s_.rotationals.size(); ++i) {
         const CompiledRotational& r = s_.rotationals[i];
         const CompiledJoint& j = s_.joints[static_cast<size_t>(r.joint)];
         const double factor = fast ? 1 + r.zone.viscous : 1;
-        if (!s_.is_loose(i)) {
-          f(rotational_row(j), factor * r.zone.stiffness[5]);
+        const bool is_loose = s_.is_loose(i);
+        const double share = is_loose ? s_.state.rotational[i].share : 1;
+        double plane[3];  // about z; the station is at the marker, so nothing couples
+        soften_plane(r.zone, share, 1,
+                     flexibility_of(s_.state.rotational[i], 1, added, &Flexibility::rotational, i).data(), plane);
+        if (!is_loose) {
+          f(rotational_row(j), factor * plane[2]);
           continue;
         }
         KinematicRow rows[6];
         element_rows(j.parent, j.child, r.q_F, j.p_CM, rows);
-        for (int k = 0; k < 6; ++k) f(rows[k], factor * s_.state.rotational[i].share * r.loose.stiffness[k]);
+        for (int k = 0; k < 5; ++k) f(rows[k], factor * share * r.loose.stiffness[k]);
+        f(rows[5], factor * plane[2]);
       }
       for (size_t i = 0; i < s_.model.cables.size(); ++i)
         if (s_.state.cable[i].live) f(cable_row(s_.model.cables[i]), s_.model.cables[i].stiffness);
       for (const StiffRow& r : springs)
         f(KinematicRow{place(r.a), place(r.b), -r.row.line, -r.row.turn_a, r.row.line, r.row.turn_b}, r.stiffness);
     };
-    each_element([&](const CompiledElement& e, double) { sum.join(place(e.a), place(e.b)); });
+    each_element([&](size_t, const CompiledElement& e, double) { sum.join(place(e.a), place(e.b)); });
     each_row([&](const KinematicRow& r, double) { sum.join(r.a, r.b); });
     sum.lay_out();
-    each_element([&](const CompiledElement& e, double share) {
+    each_element([&](size_t i, const CompiledElement& e, double share) {
       const double factor = fast ? 1 + e.zone.viscous : 1;
       KinematicRow rows[6];
       element_rows(e, rows);
       PairMatrix::Block block = {};
-      for (int k = 0; k < 6; ++k) add_outer(rows[k], factor * share * e.zone.stiffness[k], block);
+      double stiffness[6];
+      for (int k = 0; k < 6; ++k) stiffness[k] = factor * share * e.zone.stiffness[k];
+      for (int q = 0; q < 2; ++q) {
+        const auto cracked = flexibility_of(s_.state.element[i], q, added, &Flexibility::element, i);
+        if (cracked[0] == 0 && cracked[1] == 0) continue;
+        const int shear = q == 0 ? 2 : 1, bend = q == 0 ? 4 : 5;
+        double plane[3];
+        soften_plane(e.zone, share, q, cracked.data(), plane);
+        for (double& k : plane) k *= factor;
+        stiffness[shear] = plane[0] - plane[1], stiffness[bend] = plane[2] - plane[1];
+        add_outer(sum_of(rows[shear], rows[bend]), plane[1], block);
+      }
+      for (int k = 0; k < 6; ++k) add_outer(rows[k], stiffness[k], block);
       sum.add(rows[0].a, rows[0].b, block);
     });
     each_row([&](const KinematicRow& r, double stiffness) {
@@ -537,6 +573,8 @@ class DeadLoad {
   void find_unbalanced();
   void move(const Vector& by);
   void find_most_loaded();
+  /// Of the last evaluation: tangents where they lead nearer, else secants, which go there slowly but surely.
+  void find_cracks(bool by_tangents);
   std::string describe_failure(bool has_diverged) const;
 
   System& s_;
@@ -546,6 +584,8 @@ class DeadLoad {
   Eigen::SimplicialLDLT<Sparse> solver_;
   bool is_analysed_ = false;  // the pattern stays what it is
   Sparse first_;              // stiffness at the start, once
+  Assembly::Flexibility cracks_;
+  bool has_cracks_ = false;
   std::vector<std::array<double, 6>> multiplier_;
   Vector pushed_;                         // unbalanced, and gaps pushed back
   double unbalanced_ = 0, gap_left_ = 0;  // over the weight; [m, rad]
@@ -589,7 +629,7 @@ bool DeadLoad::factorise(std::string& message) {
   if (first_.rows() > 0)
     K.swap(first_);
   else
-    K = assembly_.make_stiffness(false, weight_).take();
+    K = assembly_.make_stiffness(false, weight_, true, &cracks_).take();
   if (!s_.joints.empty()) {
     Triplets t;
     for (const CompiledJoint& j : s_.joints) {
@@ -686,6 +726,22 @@ void DeadLoad::find_most_loaded() {
       most_load_ = used, most_loaded_ = i;
 }
 
+void DeadLoad::find_cracks(bool by_tangents) {
+  has_cracks_ = false;
+  const auto copy = [&](const std::vector<ZoneState>& from, auto& to) {
+    to.resize(from.size());
+    for (size_t i = 0; i < from.size(); ++i)
+      for (size_t q = 0; q < 2; ++q)
+        for (size_t s = 0; s < 2; ++s) {
+          const StationState& st = from[i].station[s];
+          to[i][q][s] = by_tangents ? st.tangent[q] : st.crack[q];
+          has_cracks_ = has_cracks_ || st.crack[q] > 0;
+        }
+  };
+  copy(s_.state.element, cracks_.element);
+  copy(s_.state.rotational, cracks_.rotational);
+}
+
 std::string DeadLoad::describe_failure(bool has_diverged) const {
   char numbers[200];
   std::snprintf(numbers, sizeof numbers,
@@ -723,9 +779,11 @@ bool DeadLoad::find(std::string& message) {
   // first without limits, so that an overloaded element can be named; then with them
   s_.ignores_limits = true;
   constexpr int most = 400;
-  constexpr int fresh = 12;       // most iterations with a stiffness of their own; then the last one serves
+  constexpr int fresh = 12;  // most iterations with a stiffness of their own; then the last one serves
+  constexpr int fresh_by_cracks = 60;
   constexpr double quick = 0.03;  // of the unbalanced force is left after an iteration with a stiffness that still fits
-  int idle = 0, factorised = 0;
+  int idle = 0, factorised = 0, secants = 0;
+  bool by_tangents = false;
   double best = 1e300, last_unbalanced = 0, last_finite = 0;
   bool has_diverged = false;
   for (int round = 0; round <= most; ++round) {
@@ -750,8 +808,13 @@ bool DeadLoad::find(std::string& message) {
     idle = unbalanced_ < 0.5 * best ? 0 : idle + 1;
     best = std::min(best, unbalanced_);
     if (round == most || (idle > 2 && unbalanced_ < good_enough)) break;
+    if (by_tangents && unbalanced_ > 0.5 * last_unbalanced) secants = 4;
+    by_tangents = secants == 0;
+    find_cracks(by_tangents);
+    secants = std::max(0, secants - 1);
     s_.state.element = virgin;
-    if (round == 0 || (factorised < fresh && unbalanced_ > good_enough && unbalanced_ > quick * last_unbalanced)) {
+    if (round == 0 || (factorised < (has_cracks_ ? fresh_by_cracks : fresh) && unbalanced_ > good_enough &&
+                       unbalanced_ > quick * last_unbalanced)) {
       ++factorised;
       if (!factorise(message)) return false;
     }

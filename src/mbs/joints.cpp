@@ -557,7 +557,7 @@ void System::loosen_joint(size_t i) {
   ZoneState& z = state.rotational[static_cast<size_t>(r)];
   if (!state.joint[i].live || !z.live) return;  // one that turns freely stays a joint
   drop_joint(i);
-  free_zone(z);
+  free_zone(rotationals[static_cast<size_t>(r)].zone, z);
 }
 
 void System::release_joint(size_t i, const char* reason) {

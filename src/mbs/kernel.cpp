@@ -198,7 +198,7 @@ struct BendingPlane {
   Num<D> stiffness[2], cross;  // of the stations against their own rotation and the other's
   Num<D> lever[2];             // sign times x
   Num<D> shift, rotation;      // deformations
-  Num<D> phi[2], soft[2], m[2];
+  Num<D> phi[2], soft[2], crack[2], m[2];
 
   HWY_INLINE Num<D> shear() const {
     Num<D> u = shift;
@@ -213,6 +213,17 @@ struct BendingPlane {
   HWY_INLINE void measure() {
     const Num<D> v = shear(), b = moment();
     for (int s = 0; s < Hinges; ++s) m[s] = fma(lever[s], v, b);
+  }
+};
+
+/// One over the bounds of cracks, for moments > 0 and < 0 [1/(N·m)].
+template <class D, int Hinges>
+struct CrackScales {
+  Num<D> of[Hinges][2][2];  // [station][axis][sign]
+
+  HWY_INLINE auto grow(int station, int axis, Num<D> moment) const {
+    const Num<D>* scale = of[station][axis];
+    return hn::Gt(maximum(moment * scale[0], (num<D>(0) - moment) * scale[1]).v, num<D>(1).v);
   }
 };
 
@@ -341,7 +352,8 @@ HWY_INLINE M enter_cells(const ElementJob& job, size_t block, M wanted, Num<D> k
 /// their history; the others keep theirs. `flowed` are those of them that have passed a limit in this step.
 template <class D, Plane In, int Hinges, class M>
 HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& pressing, const Num<D> x[2],
-                       const Num<D> k[6], const Num<D> d[6], const Num<D> e_before[6], Num<D> f[6], M& flowed) {
+                       const Num<D> k[6], const Num<D> d[6], const Num<D> e_before[6],
+                       const CrackScales<D, Hinges>& cracks, Num<D> f[6], M& flowed) {
   using N = Num<D>;
   constexpr int first = first_bending(In), last = last_bending(In);
   constexpr bool is_plane = In != Plane::Space;
@@ -369,6 +381,7 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
       P.stiffness[s] = fma(x[s] * x[s], k[shear], k[bend]);
       P.phi[s] = load<D>(flow, kStations + s * kStationFields + kPhi + q);
       P.soft[s] = load<D>(flow, kStations + s * kStationFields + kSoftness + q);
+      P.crack[s] = load<D>(flow, kStations + s * kStationFields + kCracked + q);
     }
     // damage adds flexibility at the stations: (1 + S C) m = m0
     P.measure();
@@ -383,7 +396,10 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
       const N m0 = fms(P.m[0], s22, P.m[1] * s12) * scale, m1 = fms(P.m[1], s11, P.m[0] * s21) * scale;
       P.m[0] = m0, P.m[1] = m1;
     }
-    for (int s = 0; s < Hinges; ++s) P.phi[s] = fma(P.soft[s], P.m[s], P.phi[s]);
+    for (int s = 0; s < Hinges; ++s) {
+      P.phi[s] = fma(P.soft[s], P.m[s], P.phi[s]);
+      demand(hn::Not(cracks.grow(s, q, P.m[s])));
+    }
   }
 
   // (|My|/Ly)^1.5 + (|Mz|/Lz)^1.5 of a station, in a plane |M|/L; an axis without any limit left stands apart
@@ -503,7 +519,8 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
     else
       return N{hn::Sqrt(fma(about(0), about(0), about(1) * about(1)).v)};
   };
-  const auto gone = [&](int s) { return length_of([&](int q) { return plane[q].phi[s]; }); };
+  const auto beyond_cracks = [&](int q, int s) { return fnma(plane[q].crack[s], plane[q].m[s], plane[q].phi[s]); };
+  const auto gone = [&](int s) { return length_of([&](int q) { return beyond_cracks(q, s); }); };
   N elongation = zero, so_far[2];
   M turns[2] = {hn::FirstN(tag, 0), hn::FirstN(tag, 0)};
   const auto calc_elongation = [&] {
@@ -515,13 +532,14 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
       N squares = zero, along = zero, bending = zero;
       for (int q = first; q <= last; ++q) {
         const int cell = kStations + s * kStationFields + kCell + q * kCellFields;
-        const auto positive = hn::Ge(plane[q].phi[s].v, zero.v);
+        const N turned = beyond_cracks(q, s);
+        const auto positive = hn::Ge(turned.v, zero.v);
         const auto lift_at = [&](int force) {
           return select(positive, load<D>(flow, cell + kCellLiftPositive + force),
                         load<D>(flow, cell + kCellLiftNegative + force));
         };
         const N lift = CellForce<D>(flow, cell, in_cells).mix(lift_at(0), lift_at(1), lift_at(2));
-        const N square = plane[q].phi[s] * plane[q].phi[s];
+        const N square = turned * turned;
         squares = squares + square;
         along = fma(square, lift, along);
         bending = fma(plane[q].m[s], by[q][s], bending);
@@ -576,7 +594,8 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
       left = inverse_root<D>(sum);
     const N rise = zero - (left * k[0]) * (slope * elongation) / sum;
     grows = hn::And(grows, hn::Gt(rise.v, zero.v));
-    const N trial = {hn::Max(so_far[s].v, length_of([&](int q) { return phi_trial[q][s]; }).v)};
+    const N trial = {hn::Max(
+        so_far[s].v, length_of([&](int q) { return fnma(plane[q].crack[s], m_trial[s][q], phi_trial[q][s]); }).v)};
     const N ahead = (trial - so_far[s]) / (length - so_far[s]);  // by damage, before it turns
     const N over = one - left;
     const N part = fnma(rise, ahead, over) / fma(rise, one - ahead, over);
@@ -589,7 +608,7 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
       const N before = length_of([&](int q) {
         const int shear = q == 0 ? 2 : 1, bend = q == 0 ? 4 : 5;
         const N m = fma(plane[q].lever[s], k[shear] * e_before[shear], k[bend] * e_before[bend]);
-        return fma(plane[q].soft[s], m, load<D>(flow, station + kPhi + q));
+        return fma(plane[q].soft[s] - plane[q].crack[s], m, load<D>(flow, station + kPhi + q));
       });
       so_far[s] = {hn::Max(load<D>(flow, station + kReached).v, before.v)};
       turns[s] = hn::Ne(by[first][s].v, zero.v);
@@ -627,7 +646,8 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
       const N m = P.m[s], share = load<D>(flow, station + kShare);
       const N added = fnma(P.soft[s], m, P.phi[s] - load<D>(flow, station + kPhi + q));
       const M damages = hn::And(bends, hn::And(hn::Gt(share.v, zero.v), hn::Gt((added * m).v, zero.v)));
-      const N top = {hn::Min((share * abs(P.phi[s]) / abs(m)).v, (num<D>(kMostDamage) / P.stiffness[s]).v)};
+      const N most = P.crack[s] + share * abs(beyond_cracks(q, s)) / abs(m);
+      const N top = {hn::Min(most.v, (num<D>(kMostDamage) / P.stiffness[s]).v)};
       const N grown = fma(share, added / m, P.soft[s]);
       soft[q][s] = select(damages, N{hn::Max(P.soft[s].v, hn::Min(top.v, grown.v))}, P.soft[s]);
       plastic[q][s] = fnma(soft[q][s], m, P.phi[s]);
@@ -864,6 +884,10 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
     k[i] = constant(kStiffness + i);
     f[i] = k[i] * e[i];
   }
+  CrackScales<D, Hinges> cracks;
+  for (int station = 0; station < Hinges; ++station)
+    for (int axis = first_bending(In); axis <= last_bending(In); ++axis)
+      for (int side : {0, 1}) cracks.of[station][axis][side] = constant(kCrackScale + 4 * station + 2 * axis + side);
   // is every resultant inside the bounds for sure?
   outside = hn::Or(outside,
                    hn::Not(hn::And(hn::Ge(f[0].v, constant(kLeastForce).v), hn::Le(f[0].v, constant(kMostForce).v))));
@@ -873,7 +897,7 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
     const N scale = constant(kMomentScale + q);
     for (int station = 0; station < Hinges; ++station) {
       const N m = q == 0 ? fma(x[station], f[shear], f[bend]) : fnma(x[station], f[shear], f[bend]);
-      outside = hn::Or(outside, hn::Gt((abs(m) * scale).v, one.v));
+      outside = hn::Or(outside, hn::Or(hn::Gt((abs(m) * scale).v, one.v), cracks.grow(station, q, m)));
     }
   } else {
     const N vy = f[1] * constant(kShearScale), vz = f[2] * constant(kShearScale + 1);
@@ -883,7 +907,9 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
     const N exponent = constant(kExponent);
     const N scale_y = constant(kMomentScale), scale_z = constant(kMomentScale + 1);
     for (int station = 0; station < Hinges; ++station) {
-      const N my = abs(fma(x[station], f[2], f[4])) * scale_y, mz = abs(fnma(x[station], f[1], f[5])) * scale_z;
+      const N about_y = fma(x[station], f[2], f[4]), about_z = fnma(x[station], f[1], f[5]);
+      outside = hn::Or(outside, hn::Or(cracks.grow(station, 0, about_y), cracks.grow(station, 1, about_z)));
+      const N my = abs(about_y) * scale_y, mz = abs(about_z) * scale_z;
       const auto linear = hn::Gt((my + mz).v, one.v);
       if (HWY_LIKELY(hn::AllFalse(tag, linear))) continue;
       const auto is_square = hn::Ge(exponent.v, hn::Set(tag, 2.0)),
@@ -913,7 +939,7 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
       N f_flow[6], d_before[6];
       for (int c = 0; c < active.count; ++c) d_before[active.at[c]] = load<D>(flow, kBefore + active.at[c]);
       auto flowed = flows;
-      const auto good = flow_zone<D, In, Hinges>(flows, flow, pressing, x, k, d, was, f_flow, flowed);
+      const auto good = flow_zone<D, In, Hinges>(flows, flow, pressing, x, k, d, was, cracks, f_flow, flowed);
       for (int c = 0; c < active.count; ++c) {
         const int i = active.at[c];
         f[i] = select(good, f_flow[i], f[i]);

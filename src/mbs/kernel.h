@@ -58,7 +58,8 @@ enum Slot : int {
   kOffset = 47,             // inelastic deformation at the marker (6)
   kSoft = 53,               // about y: elastic shear and rotation from both (2 x 2), about z (2 x 2)
   kFlows = 61,              // 1: the law of flowing zones below governs instead of the bounds
-  kSlotFields = 62,
+  kCrackScale = 62,         // of a station, about y and z, for moments > 0 and < 0 (2 x 2 x 2)
+  kSlotFields = 70,
   kConstants = kSlotFields - kStateFields
 };
 inline constexpr double kLargestTurn = 0.25;  // kMostTurn of a live element: 60 degrees
@@ -100,7 +101,7 @@ enum Flow : int {
   kPlastic = 46,        // dissipated since the slot was written
   kIdle = 47,           // steps without flow
   kStations = 48,       // both stations, kStationFields each
-  kStationFields = 53,
+  kStationFields = 55,
   kFlowFields = kStations + 2 * kStationFields
 };
 /// Fields of a station: inelastic rotations, damage, and the cell of the moment family about each axis.
@@ -110,7 +111,8 @@ enum FlowStation : int {
   kReached = 4,   //
   kShare = 5,     // of damage
   kRupture = 6,   // rotation
-  kCell = 7,      // about y, about z: kCellFields each
+  kCracked = 7,   // of the softness, by cracks, about y, z (2)
+  kCell = 9,      // about y, about z: kCellFields each
   kCellFields = 23
 };
 /// Fields of a cell, which is two intervals of normal force and one of rotation: the middle force, one over the widths

@@ -46,6 +46,13 @@ struct Station {
   LawId law;
 };
 
+/// How a station about an axis cracks before it has ever yielded: the rotation that cracks add rises along a straight
+/// line from 0 at `begin` to `flexibility` times the moment at `end`; what has cracked stays so.
+struct Cracking {
+  double begin[2] = {0, 0}, end[2] = {0, 0};  // moments > 0, and magnitudes of those < 0 [N·m]
+  double flexibility = 0;                     // at `end`; 0: does not crack [rad/(N·m)]
+};
+
 /// Six-component force element between marker F on body a and marker M on body b, at rest where F = M.
 /// Elastic in series with the inelastic rotations of its stations (one for a zone; two, at x = -L/2 and +L/2 with the
 /// markers at mid-length, for a whole prismatic member: exact with diagonal stiffness EA/L, 12EI/L³, GJ/L, EI/L). Axial
@@ -58,6 +65,7 @@ struct ZoneElement {
   Vec3 rotational_stiffness;      // about x, y, z of F [N·m/rad]
   double damping_ratio = 0.05;    // share of critical damping at Model::damping_frequency, 0 to 0.2
   std::vector<Station> stations;  // none: elastic; at most two
+  Cracking cracking[2];           // of each station, about y and about z
 };
 
 /// Two bodies joined by an ideal joint between frame F on the parent and frame M on the child. What each kind holds
@@ -145,6 +153,7 @@ struct RotationalElement {
   double stiffness = 0;         // [N·m/rad]
   double damping_ratio = 0.05;  // as of a zone element
   LawId law;                    // invalid: elastic
+  Cracking cracking;            // as of a zone element, about z of F
   ElementId axial_element;      // takes the elongation that comes with this one's rotation; invalid: none
   // in place of the joint once an action has loosened it, at the origin of M; all 0: it cannot be loosened
   Vec3 loose_translational;                     // along x, y, z of F [N/m]

@@ -109,6 +109,7 @@ class Checker {
     if (!c.x.empty() && c.x.front() != 0) fail(p, key, "must begin at x = 0");
   }
   void family(const Place& p, const char* key, const MomentFamily&);
+  void cracking(const Place& p, const char* key, const Cracking&);
   void characteristic(const Place& p, const char* key, const Characteristic&);
   void mass_and_inertia(const Place& p, const Body&);
   void shapes(const Place& p, const Body&, bool fixed);
@@ -157,6 +158,16 @@ void Checker::family(const Place& p, const char* key, const MomentFamily& m) {
         fail(in, list == &m.elongation_positive ? "elongation_positive" : "elongation_negative", "is not finite");
         break;
       }
+}
+
+void Checker::cracking(const Place& p, const char* key, const Cracking& c) {
+  const Place in{p.path + "." + key, p.name};
+  finite_not_negative(in, "flexibility", c.flexibility);
+  if (c.flexibility == 0) return;
+  for (int side : {0, 1})
+    if (!(c.begin[side] > 0 && c.end[side] > c.begin[side] && std::isfinite(c.end[side])))
+      fail(in, "",
+           fmt::format("needs 0 < begin < end in each direction, these are {:g} and {:g}", c.begin[side], c.end[side]));
 }
 
 void Checker::characteristic(const Place& p, const char* key, const Characteristic& c) {
@@ -286,6 +297,8 @@ void Checker::check_elements() {
       finite_not_negative(p, "rotational_stiffness", e.rotational_stiffness[k]);
     }
     share(p, "damping_ratio", e.damping_ratio, 0, 0.2);
+    cracking(p, "cracking_y", e.cracking[0]);
+    cracking(p, "cracking_z", e.cracking[1]);
     if (e.stations.size() > 2) fail(p, "stations", "has more than two stations");
     for (size_t k = 0; k < e.stations.size(); ++k) {
       const Place in{fmt::format("{}.stations[{}]", p.path, k), p.name};
@@ -333,6 +346,7 @@ void Checker::check_rotational_elements() {
     if (r.law.is_valid()) index(p, "law", r.law.index, m_.laws);
     if (r.axial_element.is_valid()) index(p, "axial_element", r.axial_element.index, m_.elements);
     finite_not_negative(p, "stiffness", r.stiffness);
+    cracking(p, "cracking", r.cracking);
     share(p, "damping_ratio", r.damping_ratio, 0, 0.2);
     for (int k = 0; k < 3; ++k) finite_not_negative(p, "loose_translational", r.loose_translational[k]);
     finite_not_negative(p, "loose_torsion", r.loose_torsion);

@@ -159,6 +159,18 @@ MomentFamily family_from(const Node& n) {
   return f;
 }
 
+Cracking cracking_from(const Node& n) {
+  n.only(keys_of("cracking"));
+  Cracking c;
+  for (const auto& [key, to] : {std::pair{"begin", c.begin}, {"end", c.end}}) {
+    const std::vector<double> both = n[key].numbers();
+    if (both.size() != 2) n[key].fail("needs two moments, for those > 0 and for those < 0");
+    std::copy(both.begin(), both.end(), to);
+  }
+  c.flexibility = n["flexibility"].number();
+  return c;
+}
+
 Curve curve_from(const Node& n) {
   n.only(keys_of("curve"));
   return {n["x"].numbers(), n["f"].numbers()};
@@ -431,6 +443,8 @@ ZoneElement Reader::element_from(const Node& n) const {
       s.only(keys_of("station"));
       e.stations.push_back({s["x"].number(), {refer(s["law"], laws_)}});
     }
+  if (n.has("cracking_y")) e.cracking[0] = cracking_from(n["cracking_y"]);
+  if (n.has("cracking_z")) e.cracking[1] = cracking_from(n["cracking_z"]);
   return e;
 }
 
@@ -442,6 +456,7 @@ RotationalElement Reader::rotational_element_from(const Node& n) const {
   r.stiffness = n["stiffness"].number();
   read(n, "damping_ratio", r.damping_ratio);
   if (n.has("law")) r.law = {refer(n["law"], laws_, -1)};
+  if (n.has("cracking")) r.cracking = cracking_from(n["cracking"]);
   if (n.has("axial_element")) r.axial_element = {refer(n["axial_element"], elements_, -1)};
   read(n, "loose_translational", r.loose_translational);
   read(n, "loose_torsion", r.loose_torsion);

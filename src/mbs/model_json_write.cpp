@@ -116,6 +116,8 @@ Json json_of(const Joint& x) {
   return j;
 }
 
+Json json_of(const Cracking& c) { return {{"begin", c.begin}, {"end", c.end}, {"flexibility", c.flexibility}}; }
+
 Json json_of(const ZoneElement& e) {
   Json j{{"name", e.name}};
   j["a"] = e.a.index;
@@ -127,6 +129,8 @@ Json json_of(const ZoneElement& e) {
   j["damping_ratio"] = e.damping_ratio;
   j["stations"] = Json::array();
   for (const Station& s : e.stations) j["stations"].push_back({{"x", s.x}, {"law", s.law.index}});
+  if (e.cracking[0].flexibility > 0) j["cracking_y"] = json_of(e.cracking[0]);
+  if (e.cracking[1].flexibility > 0) j["cracking_z"] = json_of(e.cracking[1]);
   return j;
 }
 
@@ -136,6 +140,7 @@ Json json_of(const RotationalElement& r) {
          {"stiffness", r.stiffness},
          {"damping_ratio", r.damping_ratio},
          {"law", r.law.index}};
+  if (r.cracking.flexibility > 0) j["cracking"] = json_of(r.cracking);
   if (r.axial_element.is_valid()) j["axial_element"] = r.axial_element.index;
   if (can_be_loosened(r)) {
     j["loose_translational"] = json_of(r.loose_translational);

@@ -106,6 +106,7 @@ void System::compile() {
       c.zone.stiffness[i] = e.translational_stiffness[i];
       c.zone.stiffness[3 + i] = e.rotational_stiffness[i];
     }
+    for (int i = 0; i < 2; ++i) c.zone.cracking[i] = e.cracking[i];
     c.zone.viscous = viscous_share(e.damping_ratio);
     c.zone.stations = static_cast<int>(e.stations.size());
     for (int i = 0; i < c.zone.stations; ++i) {
@@ -146,6 +147,7 @@ void System::compile() {
     for (int i = 0; i < 6; ++i) c.zone.stiffness[i] = 0;
     c.zone.stiffness[5] = r.stiffness;
     c.zone.external_axial = true;
+    c.zone.cracking[1] = r.cracking;
     c.zone.viscous = viscous_share(r.damping_ratio);
     c.axial_element = r.axial_element.index;
     if (r.axial_element.is_valid())

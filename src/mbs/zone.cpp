@@ -1,6 +1,7 @@
 #include "mbs/zone.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "mbs/kernel.h"
@@ -93,7 +94,30 @@ void elongate_zone(const ZoneParameters& p, double by, ZoneState& z) {
   z.plastic += released;
 }
 
-void free_zone(ZoneState& z) {
+namespace {
+
+/// Makes the cracks of all stations what they are at first yield; deformations and forces stay.
+void crack_zone(const ZoneParameters& p, ZoneState& z) {
+  for (int s = 0; s < p.stations; ++s)
+    for (int q = 0; q < 2; ++q) {
+      StationState& st = z.station[s];
+      const double grown = p.cracking[q].flexibility - st.crack[q];
+      if (!(grown > 0)) continue;
+      const double lever = (q == 0 ? 1 : -1) * p.x[s], m = z.elastic_force[4 + q] + lever * z.elastic_force[2 - q];
+      st.crack[q] += grown;
+      st.soft[q] += grown;
+      st.phi[q] -= grown * m;
+      const double stored = 0.5 * grown * m * m;
+      z.energy += stored;
+      z.plastic -= stored;
+      z.safe_force[0] = 1, z.safe_force[1] = -1;  // the bounds were those of the stiff zone
+    }
+}
+
+}  // namespace
+
+void free_zone(const ZoneParameters& p, ZoneState& z) {
+  crack_zone(p, z);
   z.axial = z.lifted = 0;  // those of the element that took them
   z.deformation[0] = z.elastic[0] = z.elastic_force[0] = z.damper_force[0] = z.flowed[0] = 0;
   z.normal_force = z.resultant.c[0] = 0;
@@ -112,6 +136,12 @@ void break_zone(ZoneState& z, BreakReason reason) {
 }
 
 namespace {
+
+/// Whether a moment is beyond the bounds of a station's cracks.
+bool cracks_grow(const ZoneState& z, int station, int axis, double moment) {
+  const double* scale = z.crack_scale[station][axis];
+  return std::max(moment * scale[0], -moment * scale[1]) > 1;
+}
 
 /// The common case: a zone whose forces stay inside its safe bounds is a spring with a damper. False if it is not so.
 template <Plane In>
@@ -145,16 +175,19 @@ bool advance_inside_bounds(const ZoneParameters& p, const Six& d, double h, Zone
     const double vy = f[1] * z.safe_shear[0], vz = f[2] * z.safe_shear[1];
     if (vy * vy + vz * vz > 1) return false;
     for (int s = 0; s < p.stations; ++s) {
-      const double my = std::abs(f[4] + p.x[s] * f[2]) * z.safe_moment[0];
-      const double mz = std::abs(f[5] - p.x[s] * f[1]) * z.safe_moment[1];
+      const double about_y = f[4] + p.x[s] * f[2], about_z = f[5] - p.x[s] * f[1];
+      if (cracks_grow(z, s, 0, about_y) || cracks_grow(z, s, 1, about_z)) return false;
+      const double my = std::abs(about_y) * z.safe_moment[0], mz = std::abs(about_z) * z.safe_moment[1];
       if (my + mz > 1 && raised(my, z.safe_exponent) + raised(mz, z.safe_exponent) > 1) return false;
     }
   } else {
     constexpr int shear = active.at[1], bend = active.at[2];
     constexpr double sign = first == 0 ? 1 : -1;
     if (std::abs(f[shear]) * z.safe_shear[shear - 1] > 1) return false;
-    for (int s = 0; s < p.stations; ++s)
-      if (std::abs(f[bend] + sign * p.x[s] * f[shear]) * z.safe_moment[first] > 1) return false;
+    for (int s = 0; s < p.stations; ++s) {
+      const double about = f[bend] + sign * p.x[s] * f[shear];
+      if (cracks_grow(z, s, first, about) || std::abs(about) * z.safe_moment[first] > 1) return false;
+    }
   }
   double energy = 0, damper_energy = 0, damped = 0, bled = 0;
   for (int c = 0; c < active.count; ++c) {
@@ -249,7 +282,7 @@ struct Evaluation {
   double phi_trial[2][2], m_trial[2][2];  // before stations turn [q][s]
   MomentLimit most[2][2];                 // [q][s]
   bool turned[2] = {false, false};        // [s]
-  bool flowed = false;
+  bool cracked = false, flowed = false;
   BreakReason broke = BreakReason::None;
 
   Evaluation(const ZoneParameters& parameters, const Six& deformation, ZoneState& state)
@@ -276,29 +309,30 @@ struct Evaluation {
   void find_trial() {
     force[0] = p.external_axial ? d.c[0] : k[0] * (d.c[0] - z.axial);
     if constexpr (!is_plane) force[3] = k[3] * (d.c[3] - z.twist);
-    for (int q = first; q <= last; ++q) {
-      for (int s = 0; s < n; ++s) {
-        station_stiffness[q][s] = planes[q].bending_stiffness + p.x[s] * p.x[s] * planes[q].shear_stiffness;
-        phi[q][s] = z.station[s].phi[q];
-      }
-      // damage adds flexibility at the stations: (1 + S C) m = m0, two by two at most
-      double c[2] = {0, 0};
-      for (int s = 0; s < n; ++s) c[s] = z.station[s].soft[q];
-      if (c[0] > 0 || c[1] > 0) {
-        double m0[2] = {0, 0};
-        const double v = planes[q].shear(p.x, phi[q], n), b = planes[q].moment(phi[q], n);
-        for (int s = 0; s < n; ++s) m0[s] = Bending::at(b, v, p.x[s], planes[q].sign);
-        const double cross = planes[q].bending_stiffness + p.x[0] * p.x[1] * planes[q].shear_stiffness;
-        const double s11 = 1 + station_stiffness[q][0] * c[0], s22 = n > 1 ? 1 + station_stiffness[q][1] * c[1] : 1;
-        const double s12 = n > 1 ? cross * c[1] : 0, s21 = n > 1 ? cross * c[0] : 0;
-        const double determinant = s11 * s22 - s12 * s21;
-        phi[q][0] += c[0] * (m0[0] * s22 - m0[1] * s12) / determinant;
-        if (n > 1) phi[q][1] += c[1] * (m0[1] * s11 - m0[0] * s21) / determinant;
-      }
-      force[shear_of(q)] = planes[q].shear(p.x, phi[q], n);
-      force[bend_of(q)] = planes[q].moment(phi[q], n);
-      for (int s = 0; s < n; ++s) m[q][s] = Bending::at(force[bend_of(q)], force[shear_of(q)], p.x[s], planes[q].sign);
+    for (int q = first; q <= last; ++q) find_trial(q);
+  }
+  void find_trial(int q) {
+    for (int s = 0; s < n; ++s) {
+      station_stiffness[q][s] = planes[q].bending_stiffness + p.x[s] * p.x[s] * planes[q].shear_stiffness;
+      phi[q][s] = z.station[s].phi[q];
     }
+    // cracks and damage add flexibility at the stations: (1 + S C) m = m0, two by two at most
+    double c[2] = {0, 0};
+    for (int s = 0; s < n; ++s) c[s] = z.station[s].soft[q];
+    if (c[0] > 0 || c[1] > 0) {
+      double m0[2] = {0, 0};
+      const double v = planes[q].shear(p.x, phi[q], n), b = planes[q].moment(phi[q], n);
+      for (int s = 0; s < n; ++s) m0[s] = Bending::at(b, v, p.x[s], planes[q].sign);
+      const double cross = planes[q].bending_stiffness + p.x[0] * p.x[1] * planes[q].shear_stiffness;
+      const double s11 = 1 + station_stiffness[q][0] * c[0], s22 = n > 1 ? 1 + station_stiffness[q][1] * c[1] : 1;
+      const double s12 = n > 1 ? cross * c[1] : 0, s21 = n > 1 ? cross * c[0] : 0;
+      const double determinant = s11 * s22 - s12 * s21;
+      phi[q][0] += c[0] * (m0[0] * s22 - m0[1] * s12) / determinant;
+      if (n > 1) phi[q][1] += c[1] * (m0[1] * s11 - m0[0] * s21) / determinant;
+    }
+    force[shear_of(q)] = planes[q].shear(p.x, phi[q], n);
+    force[bend_of(q)] = planes[q].moment(phi[q], n);
+    for (int s = 0; s < n; ++s) m[q][s] = Bending::at(force[bend_of(q)], force[shear_of(q)], p.x[s], planes[q].sign);
   }
 
   /// Stored in the springs and in what damage softened [J].
@@ -371,16 +405,85 @@ struct Evaluation {
     return far;
   }
 
-  /// Bending at the stations: radial return on (|My|/Ly)^p + (|Mz|/Lz)^p = 1.
-  ///   axial  normal force of the whole section
-  void turn_stations(const Limits (&limits)[2], double axial, double integrity) {
+  /// Limit moments under this normal force of the whole section.
+  void find_limits(const Limits (&limits)[2], double axial, double integrity) {
     for (int s = 0; s < n; ++s)
       for (int q = first; q <= last; ++q) {
         most[q][s] = limits[s].moment(q, axial, z.station[s]);
         most[q][s].positive *= integrity;
         most[q][s].negative *= integrity;
-        phi_trial[q][s] = phi[q][s];
       }
+  }
+
+  /// Cracks grow where a station comes to a larger moment than they are known from (zones.md, eq. 7b).
+  ///   h  since the last evaluation [s]
+  void crack_stations(double h) {
+    // at rest as far ahead as motion leaves them
+    const double ahead = h > 0 ? 1 : kCracksAhead;
+    for (int q = first; q <= last; ++q) {
+      bool grow = false;
+      for (int s = 0; s < n; ++s) {
+        z.station[s].tangent[q] = z.station[s].soft[q];
+        grow = grow || std::abs(m[q][s]) > cracks_of(p, z, s, q, ahead).calc_bound(m[q][s]);
+      }
+      if (grow) crack_plane(q, {cracks_of(p, z, 0, q, ahead), cracks_of(p, z, n - 1, q, ahead)}, kCracksAhead / ahead);
+    }
+  }
+
+  /// m + S φ(m) = m of the plastic rotations alone, where φ(m) is straight in pieces.
+  ///   further  moment that cracks are to be known from over the one of now
+  void crack_plane(int q, const std::array<Cracks, 2>& cracks, double further) {
+    double plastic[2] = {0, 0}, m0[2] = {0, 0}, other[2] = {0, 0};
+    for (int s = 0; s < n; ++s) plastic[s] = z.station[s].phi[q];
+    for (int s = 0; s < n; ++s) {
+      m0[s] = Bending::at(planes[q].moment(plastic, n), planes[q].shear(p.x, plastic, n), p.x[s], planes[q].sign);
+      other[s] = z.station[s].soft[q] - z.station[s].crack[q];
+    }
+    const double s12 = n > 1 ? planes[q].bending_stiffness + p.x[0] * p.x[1] * planes[q].shear_stiffness : 0;
+    const double s11 = station_stiffness[q][0], s22 = n > 1 ? station_stiffness[q][1] : 0;
+    // each station by itself with the other one as it is finds the pieces, both together then the moments
+    Cracks::Piece piece[2];
+    double at[2] = {m[q][0], n > 1 ? m[q][1] : 0};
+    constexpr int most_sweeps = 40;
+    for (int sweep = 0; sweep < most_sweeps; ++sweep) {
+      for (int s = 0; s < n; ++s) {
+        const double beside = n > 1 ? s12 * (piece[1 - s].from + (other[1 - s] + piece[1 - s].slope) * at[1 - s]) : 0;
+        at[s] = cracks[static_cast<size_t>(s)].find_moment(m0[s] - beside, station_stiffness[q][s], other[s], piece[s]);
+      }
+      if (n == 1) break;
+      const double c1 = other[0] + piece[0].slope, c2 = other[1] + piece[1].slope;
+      const double r1 = m0[0] - s11 * piece[0].from - s12 * piece[1].from;
+      const double r2 = m0[1] - s12 * piece[0].from - s22 * piece[1].from;
+      const double a11 = 1 + s11 * c1, a12 = s12 * c2, a21 = s12 * c1, a22 = 1 + s22 * c2, det = a11 * a22 - a12 * a21;
+      const double both[2] = {(r1 * a22 - r2 * a12) / det, (r2 * a11 - r1 * a21) / det};
+      bool same = true;
+      for (int s = 0; s < 2; ++s)
+        same =
+            same && cracks[static_cast<size_t>(s)].find_piece(both[s]).slope == piece[s].slope && both[s] * at[s] >= 0;
+      if (!same) continue;
+      std::copy(both, both + 2, at);
+      break;
+    }
+    for (size_t s = 0; s < static_cast<size_t>(n); ++s) {
+      StationState& st = z.station[s];
+      st.tangent[q] = other[s] + piece[s].slope;
+      if (!(std::abs(at[s]) > cracks[s].calc_bound(at[s]))) continue;
+      st.crack[q] = std::max(st.crack[q], cracks[s].calc_flexibility(further * at[s]));
+      st.soft[q] = other[s] + st.crack[q];
+      cracked = true;
+    }
+    find_trial(q);
+  }
+
+  /// Rotation of a station beyond that of its cracks.
+  double beyond_cracks(const double turns[2][2], const double moments[2][2], int q, int s) const {
+    return turns[q][s] - z.station[s].crack[q] * moments[q][s];
+  }
+
+  /// Bending at the stations: radial return on (|My|/Ly)^p + (|Mz|/Lz)^p = 1.
+  void turn_stations(const Limits (&limits)[2]) {
+    for (int s = 0; s < n; ++s)
+      for (int q = first; q <= last; ++q) phi_trial[q][s] = phi[q][s];
     double scale[2][2];  // [s][q]
     bool outside[2] = {false, false};
     for (int s = 0; s < n; ++s) {
@@ -441,6 +544,12 @@ struct Evaluation {
   static double length_of(const double turns[2][2], int s) {
     return is_plane ? std::abs(turns[first][s]) : std::sqrt(turns[0][s] * turns[0][s] + turns[1][s] * turns[1][s]);
   }
+  /// Of what a station has turned beyond its cracks.
+  double length_of(const double turns[2][2], const double moments[2][2], int s) const {
+    double beyond[2][2] = {};
+    for (int q = first; q <= last; ++q) beyond[q][s] = beyond_cracks(turns, moments, q, s);
+    return length_of(beyond, s);
+  }
 
   /// What turns further lengthens or shortens. Returns by how much; stations then turn to the limit under the force
   /// that is left.
@@ -454,11 +563,11 @@ struct Evaluation {
       double before[2][2];
       for (int q = first; q <= last; ++q) {
         const double b = z.elastic_force[bend_of(q)], v = z.elastic_force[shear_of(q)];
-        before[q][s] = st.phi[q] + st.soft[q] * Bending::at(b, v, p.x[s], planes[q].sign);
+        before[q][s] = st.phi[q] + (st.soft[q] - st.crack[q]) * Bending::at(b, v, p.x[s], planes[q].sign);
       }
       so_far[s] = std::max(st.reached, length_of(before, s));
     }
-    const auto grows = [&](int s) { return turned[s] && limits[s].elongates() && length_of(phi, s) > so_far[s]; };
+    const auto grows = [&](int s) { return turned[s] && limits[s].elongates() && length_of(phi, m, s) > so_far[s]; };
     const auto calc_elongation = [&]() {
       double sum = 0;
       for (int s = 0; s < n; ++s) {
@@ -467,12 +576,13 @@ struct Evaluation {
         double squares = 0, along = 0, bending = 0;
         for (int q = first; q <= last; ++q) {
           const Lift lift = limits[s].lift(q, axial, st.reached, st);
-          squares += phi[q][s] * phi[q][s];
-          along += phi[q][s] * phi[q][s] * (phi[q][s] >= 0 ? lift.positive : lift.negative);
+          const double gone = beyond_cracks(phi, m, q, s);
+          squares += gone * gone;
+          along += gone * gone * (gone >= 0 ? lift.positive : lift.negative);
           bending += m[q][s] * (phi[q][s] - phi_trial[q][s]);
         }
         if (along == 0) continue;
-        double by = (length_of(phi, s) - so_far[s]) * along / squares;
+        double by = (length_of(phi, m, s) - so_far[s]) * along / squares;
         // the axial spring takes no more than bending brings: |by| (½ k |by| - N') <= brought, N' pulling the way of by
         const double brought = (1 - 0.5 * limits[s].law().damage_share) * std::max(0.0, bending);
         const double pull = std::copysign(1.0, by) * (force[0] - axial_stiffness * sum);
@@ -485,7 +595,8 @@ struct Evaluation {
       }
       return sum;
     };
-    for (int s = 0; s < n && (grows(0) || (n > 1 && grows(1))); ++s) measure(s);
+    if (turned[0] || (n > 1 && turned[1]))
+      for (int s = 0; s < n; ++s) measure(s);
     const double elongation = calc_elongation();
     if (elongation == 0 || !(relief > 0)) return elongation;
     // that changes the normal force and with it the limits
@@ -500,7 +611,10 @@ struct Evaluation {
       if (!(excess > 1) || std::isinf(excess)) continue;
       const double left = 1 / excess, rise = -left * calc_rise(limits[s], axial, s, left) * relief * elongation;
       if (!(rise > 0)) continue;
-      const double length = length_of(phi, s), trial = std::max(so_far[s], length_of(phi_trial, s));
+      const double length = length_of(phi, m, s);
+      double before[2][2] = {};
+      for (int q = first; q <= last; ++q) before[q][s] = m_trial[q][s];
+      const double trial = std::max(so_far[s], length_of(phi_trial, before, s));
       const double ahead = (trial - so_far[s]) / (length - so_far[s]);  // by damage, before it turns
       share = std::min(share, std::max(0.0, (1 - left - rise * ahead) / (1 - left + rise * (1 - ahead))));
     }
@@ -537,8 +651,8 @@ struct Evaluation {
         const double added = phi[q][s] - st.phi[q] - st.soft[q] * m[q][s];
         const double share = limits[s].law().damage_share;
         if (share > 0 && added * m[q][s] > 0) {
-          const double top =
-              std::min(share * std::abs(phi[q][s]) / std::abs(m[q][s]), kMostDamage / station_stiffness[q][s]);
+          const double top = std::min(st.crack[q] + share * std::abs(beyond_cracks(phi, m, q, s)) / std::abs(m[q][s]),
+                                      kMostDamage / station_stiffness[q][s]);
           st.soft[q] = std::max(st.soft[q], std::min(top, st.soft[q] + share * added / m[q][s]));
         }
         st.phi[q] = phi[q][s] - st.soft[q] * m[q][s];
@@ -587,7 +701,7 @@ struct Evaluation {
 
   /// Safe bounds for the steps to come.
   void renew_bounds(const CompiledLaws& laws, const Limits (&limits)[2]) {
-    if (!flowed && z.next_law < 0) {
+    if (!flowed && !cracked && z.next_law < 0) {
       if (force[0] >= z.safe_force[0] && force[0] <= z.safe_force[1]) return;
       // bounds are the least limits around this force: none that are far enough away can be found near the limits here
       bool is_near = !p.external_axial;
@@ -608,13 +722,16 @@ struct Evaluation {
   }
 
   /// All flow of this step, and what breaks the zone.
-  void flow(const CompiledLaws& laws, double time) {
+  ///   h  since the last evaluation [s]
+  void flow(const CompiledLaws& laws, double time, double h) {
     const Limits first_limits(laws, p.law[0], z, time);
     const double integrity = flow_axially(first_limits);
     const Limits limits[2] = {first_limits, n > 1 ? Limits(laws, p.law[1], z, time) : first_limits};
     // what is left of the section carries both the force and the moment
     const double axial = integrity > 0 ? force[0] / integrity : 0;
-    turn_stations(limits, axial, integrity);
+    find_limits(limits, axial, integrity);
+    crack_stations(h);
+    turn_stations(limits);
     const double elongation = lengthen(limits, axial);
     for (int s = 0; s < n; ++s) {
       StationState& st = z.station[s];
@@ -622,12 +739,12 @@ struct Evaluation {
       const bool was_far = st.reached >= law.rupture_rotation;
       if (turned[s]) {
         flowed = true;
-        st.reached = std::max(st.reached, length_of(phi, s));
+        st.reached = std::max(st.reached, length_of(phi, m, s));
       }
       if (st.reached >= (force[0] < 0 || was_far ? law.rupture_rotation_pressed : law.rupture_rotation))
         broke = BreakReason::Rotation;
     }
-    if (flowed) keep_rotations(limits);
+    if (flowed || cracked) keep_rotations(limits);
     z.lifted += elongation;
     const double longer = elongation + take_back_crushing(elongation, z);
     z.axial += longer;
@@ -640,10 +757,10 @@ struct Evaluation {
   /// Books what was dissipated. False if the zone is broken.
   bool keep(double energy_trial) {
     const bool broken = broke != BreakReason::None;
-    const double energy = broken ? 0 : flowed ? calc_energy() : energy_trial;
+    const double energy = broken ? 0 : flowed || cracked ? calc_energy() : energy_trial;
     if (broken)
       for (double& f : force) f = 0;
-    if (flowed || broken || z.is_adjusted) {
+    if (flowed || cracked || broken || z.is_adjusted) {
       // what was put in since the last evaluation and is not stored is gone; work by the trapezium, as the bodies feel
       // it
       double work = 0;
@@ -674,7 +791,8 @@ struct Evaluation {
       if (p.viscous > 0 && z.has_elastic && h > 0) {
         // where the limits fall, what the spring gives up is no motion that would be damped
         const double way = d.c[i] - z.deformation[i], stretched = e - z.elastic[i];
-        const double driven = flowed ? std::clamp(stretched, std::min(way, 0.0), std::max(way, 0.0)) : stretched;
+        const double driven =
+            flowed || cracked ? std::clamp(stretched, std::min(way, 0.0), std::max(way, 0.0)) : stretched;
         const double before = e - driven;
         z.flowed[i] += before - z.elastic[i];
         z.flowed[i] += p.relaxation * (0.5 * (e + before) - z.flowed[i]);
@@ -709,7 +827,7 @@ void advance_in(const ZoneParameters& p, const CompiledLaws& laws, const Six& d,
   }
   Evaluation<In> now(p, d, z);
   const double energy = now.calc_energy();
-  if (now.n > 0) now.flow(laws, time);
+  if (now.n > 0) now.flow(laws, time, h);
   if (!now.keep(energy)) return;
   now.damp(h);
   // only now: on the soft springs, forces beyond the new limits would leave long ways of flow, and dampers that pull

@@ -19,8 +19,10 @@ enum class BreakReason : std::uint8_t { None, Tension, Crushing, Shear, Rotation
 /// Inelastic history of a station.
 struct StationState {
   double phi[2] = {0, 0};            // plastic rotations about y, z [rad]
-  double soft[2] = {0, 0};           // added flexibility by damage [rad/(N·m)]
-  double reached = 0;                // largest inelastic rotation so far [rad]
+  double soft[2] = {0, 0};           // added flexibility by cracks and damage [rad/(N·m)]
+  double crack[2] = {0, 0};          // of it, by cracks before first yield
+  double tangent[2] = {0, 0};        // rise of the rotation with the moment in the last evaluation, for the equilibrium
+  double reached = 0;                // largest inelastic rotation so far, without that of cracks [rad]
   int k[2] = {0, 0}, j[2] = {0, 0};  // lookup hints
 };
 
@@ -58,12 +60,14 @@ struct ZoneState {
   // Bounds within which no limit is passed whatever the combination, for normal forces in a range; renewed when the
   // force leaves the range, void (an empty range) after any inelastic step. With them goes the inelastic part of the
   // deformation at the marker: inside the bounds the zone is a spring from there.
-  double safe_force[2] = {1, -1};               // [N]
-  double safe_moment[2] = {0, 0};               // (|My| a)^p + (|Mz| b)^p <= 1 at each station [1/(N·m)]
-  double safe_exponent = 1;                     // p
-  double safe_shear[2] = {0, 0};                // (Vy a)² + (Vz b)² <= 1 [1/N]
-  double safe_torsion = 0;                      // |T| a <= 1 [1/(N·m)]
-  double offset[6] = {0, 0, 0, 0, 0, 0};        // [m, rad]
+  double safe_force[2] = {1, -1};         // [N]
+  double safe_moment[2] = {0, 0};         // (|My| a)^p + (|Mz| b)^p <= 1 at each station [1/(N·m)]
+  double crack_scale[2][2][2] = {};       // one over the bounds of cracks that may grow: of a station, about y and
+                                          // z, for moments > 0 and < 0 [1/(N·m)]
+  double safe_exponent = 1;               // p
+  double safe_shear[2] = {0, 0};          // (Vy a)² + (Vz b)² <= 1 [1/N]
+  double safe_torsion = 0;                // |T| a <= 1 [1/(N·m)]
+  double offset[6] = {0, 0, 0, 0, 0, 0};  // [m, rad]
   double plane[2][3] = {{0, 0, 0}, {0, 0, 0}};  // stiffness of both bending planes with what damage softens:
                                                 // shear, coupling, bending
   bool is_softened = false;                     // planes differ from the element's own stiffness
@@ -81,8 +85,9 @@ struct ZoneParameters {
   double x[2] = {0, 0};
   int law[2] = {-1, -1};
   bool external_axial =
-      false;          // the deformation's first component is the normal force itself; it follows no limit here
-  double relief = 0;  // of an external force: what it loses by a unit of the zone's elongation [N/m]
+      false;             // the deformation's first component is the normal force itself; it follows no limit here
+  double relief = 0;     // of an external force: what it loses by a unit of the zone's elongation [N/m]
+  Cracking cracking[2];  // about y, z
 
   /// Of a whole member: two stations.
   Span span() const { return stations == 2 ? Span{std::min(x[0], x[1]), std::max(x[0], x[1])} : Span{}; }
@@ -101,6 +106,8 @@ inline bool is_bounded(const ZoneState& z, bool unlimited) {
 inline constexpr double kNearBounds = 0.9;
 /// Largest demand over the safe bounds of a bounded zone at its last evaluation, moments added; 0 without limits.
 double calc_bound_utilisation(const ZoneParameters&, const ZoneState&);
+/// Sets `crack_scale`.
+void find_crack_bounds(const ZoneParameters&, ZoneState&);
 /// Writes what the kernel needs to let a zone flow in bending, kernel::kFlowFields values; false if it cannot: a law on
 /// its way to another one, a crushed section, a force beyond the tables, an exponent other than 1.5, or no law at all.
 bool write_flow(const ZoneParameters&, const CompiledLaws&, ZoneState&, double time, double* fields);
@@ -114,8 +121,9 @@ bool write_flow_cells(const ZoneParameters&, const CompiledLaws&, ZoneState&, do
 /// is booked as plastic work. The resultants follow at the next evaluation.
 void elongate_zone(const ZoneParameters&, double by, ZoneState&);
 /// Makes the state of a rotational element that of a six-component one, which then has no external axial force: it
-/// keeps its rotation and what that stores, and transmits nothing else yet.
-void free_zone(ZoneState&);
+/// keeps its rotation and moment, has cracked as far as at first yield, and transmits nothing else yet. What cracks
+/// store is booked against the plastic work.
+void free_zone(const ZoneParameters&, ZoneState&);
 /// Ends a zone: what it stores is booked as dissipated.
 void break_zone(ZoneState&, BreakReason);
 

@@ -29,6 +29,34 @@ double find_least_moment(const CompiledFamily& family, double from, double to, d
 
 }  // namespace
 
+void soften_plane(const ZoneParameters& p, double share, int q, const double flexibility[2], double stiffness[3]) {
+  const double ks = share * p.stiffness[q == 0 ? 2 : 1], kb = share * p.stiffness[q == 0 ? 4 : 5];
+  const double sign = q == 0 ? 1 : -1;
+  double c = 0, cx = 0, cxx = 0;  // flexibilities add up
+  for (int s = 0; s < p.stations; ++s) {
+    c += flexibility[s];
+    cx += sign * p.x[s] * flexibility[s];
+    cxx += p.x[s] * p.x[s] * flexibility[s];
+  }
+  stiffness[0] = ks, stiffness[1] = 0, stiffness[2] = kb;
+  if (c == 0 || !(kb > 0)) return;
+  if (ks > 0) {
+    const double f11 = 1 / ks + cxx, f12 = cx, f22 = 1 / kb + c, determinant = f11 * f22 - f12 * f12;
+    stiffness[0] = f22 / determinant, stiffness[1] = -f12 / determinant, stiffness[2] = f11 / determinant;
+  } else {
+    stiffness[2] = 1 / (1 / kb + c);
+  }
+}
+
+void find_crack_bounds(const ZoneParameters& p, ZoneState& z) {
+  for (int s = 0; s < p.stations; ++s)
+    for (int q = kernel::first_bending(p.plane); q <= kernel::last_bending(p.plane); ++q) {
+      const Cracks cracks = cracks_of(p, z, s, q);
+      z.crack_scale[s][q][0] = 1 / cracks.calc_bound(1);
+      z.crack_scale[s][q][1] = 1 / cracks.calc_bound(-1);
+    }
+}
+
 void find_safe_bounds(const ZoneParameters& p, const CompiledLaws& laws, const Limits& limits, double normal_force,
                       ZoneState& z) {
   const auto law_of = [&](int s) -> const CompiledLaw& {
@@ -67,32 +95,22 @@ void find_safe_bounds(const ZoneParameters& p, const CompiledLaws& laws, const L
   z.safe_torsion = 1 / limits.torsion();
   z.safe_exponent = kUnlimited;
   for (int s = 0; s < p.stations; ++s) z.safe_exponent = std::min(z.safe_exponent, law_of(s).biaxial_exponent);
-  // what the springs do not see, and how damage softens them: flexibilities add up
+  // what the springs do not see, and how cracks and damage soften them
   double turned[2] = {0, 0}, shifted[2] = {0, 0};
   z.is_softened = false;
   for (int q = first; q <= last; ++q) {
-    const double ks = z.share * p.stiffness[q == 0 ? 2 : 1], kb = z.share * p.stiffness[q == 0 ? 4 : 5];
-    const double sign = q == 0 ? 1 : -1;
-    double c = 0, cx = 0, cxx = 0;
+    double flexibility[2] = {0, 0};
     for (int s = 0; s < p.stations; ++s) {
       turned[q] += z.station[s].phi[q];
       shifted[q] += p.x[s] * z.station[s].phi[q];
-      c += z.station[s].soft[q];
-      cx += sign * p.x[s] * z.station[s].soft[q];
-      cxx += p.x[s] * p.x[s] * z.station[s].soft[q];
+      flexibility[s] = z.station[s].soft[q];
     }
-    double* plane = z.plane[q];
-    plane[0] = ks, plane[1] = 0, plane[2] = kb;
-    if (c == 0) continue;
+    soften_plane(p, z.share, q, flexibility, z.plane[q]);
+    if (flexibility[0] + flexibility[1] == 0) continue;
     z.is_softened = true;
-    if (!(kb > 0)) return;
-    if (ks > 0) {
-      const double f11 = 1 / ks + cxx, f12 = cx, f22 = 1 / kb + c, determinant = f11 * f22 - f12 * f12;
-      plane[0] = f22 / determinant, plane[1] = -f12 / determinant, plane[2] = f11 / determinant;
-    } else {
-      plane[2] = 1 / (1 / kb + c);
-    }
+    if (!(z.share * p.stiffness[q == 0 ? 4 : 5] > 0)) return;
   }
+  find_crack_bounds(p, z);
   z.safe_force[0] = from;
   z.safe_force[1] = to;
   const double offset[6] = {z.axial, z.slip[0] - shifted[1], z.slip[1] + shifted[0], z.twist, turned[0], turned[1]};
@@ -235,7 +253,8 @@ bool write_flow(const ZoneParameters& p, const CompiledLaws& laws, ZoneState& z,
       law = &laws[static_cast<size_t>(z.base_law < 0 ? p.law[s] : z.base_law)];
       if (law->biaxial_exponent != 1.5) return false;
       for (int q = 0; q < 2; ++q)
-        station[kPhi + q] = z.station[s].phi[q], station[kSoftness + q] = z.station[s].soft[q];
+        station[kPhi + q] = z.station[s].phi[q], station[kSoftness + q] = z.station[s].soft[q],
+                       station[kCracked + q] = z.station[s].crack[q];
       station[kReached] = z.station[s].reached;
       station[kShare] = law->damage_share;
       const bool is_far = z.station[s].reached >= law->rupture_rotation;

@@ -88,10 +88,76 @@ class Limits {
   double share_ = 0;
 };
 
+/// Cracks grow a little ahead of their moment, so that not every step has to see to them and dead load leaves them at
+/// rest.
+inline constexpr double kCracksAhead = 1.01;
+
+/// The cracks of a station about one axis while they may grow.
+struct Cracks {
+  Cracking law;
+  double flexibility;  // so far [rad/(N·m)]
+
+  /// Moment of this sign beyond which they grow: 1/M = (1 - r)/begin + r/end, r their share of the law's flexibility.
+  double calc_bound(double sign) const {
+    const int side = sign >= 0 ? 0 : 1;
+    const double share = law.flexibility > 0 ? flexibility / law.flexibility : 1;
+    return share < 1 ? 1 / ((1 - share) / law.begin[side] + share / law.end[side]) : kUnlimited;
+  }
+  /// Flexibility of which a moment is the bound.
+  double calc_flexibility(double moment) const {
+    const int side = moment >= 0 ? 0 : 1;
+    const double at = 1 / law.begin[side];
+    return law.flexibility * std::clamp((at - 1 / std::abs(moment)) / (at - 1 / law.end[side]), 0.0, 1.0);
+  }
+  /// Rotation by cracks around a moment, from + slope m.
+  struct Piece {
+    double from = 0, slope = 0;
+  };
+  Piece find_piece(double moment) const {
+    if (!(std::abs(moment) > calc_bound(moment))) return {0, flexibility};
+    return std::abs(moment) < law.end[moment >= 0 ? 0 : 1] ? find_growing(moment) : Piece{0, law.flexibility};
+  }
+  /// m of m + S (c m + φ(m)) = trial, and the piece that it is on.
+  ///   stiffness  S;  other  c, flexibility besides
+  double find_moment(double trial, double stiffness, double other, Piece& piece) const {
+    const auto solve = [&] { return (trial - stiffness * piece.from) / (1 + stiffness * (other + piece.slope)); };
+    piece = {0, flexibility};
+    double m = solve();
+    if (!(std::abs(m) > calc_bound(trial))) return m;
+    piece = find_growing(trial);
+    m = solve();
+    if (std::abs(m) < law.end[trial >= 0 ? 0 : 1]) return m;
+    piece = {0, law.flexibility};
+    return solve();
+  }
+
+ private:
+  Piece find_growing(double moment) const {
+    const int side = moment >= 0 ? 0 : 1;
+    const double slope = law.flexibility * law.end[side] / (law.end[side] - law.begin[side]);
+    return {moment >= 0 ? -slope * law.begin[side] : slope * law.begin[side], slope};
+  }
+};
+/// Of a station of a live zone whose law is still that of the model.
+///   ahead  moment that cracks are known from over the one at which they are
+inline Cracks cracks_of(const ZoneParameters& p, const ZoneState& z, int station, int axis, double ahead = 1) {
+  Cracking law;
+  const bool is_first = z.next_law < 0 && z.base_law < 0;
+  if (p.cracking[axis].flexibility > 0 && z.station[station].reached == 0 && is_first) {
+    law = p.cracking[axis];
+    for (int side : {0, 1}) law.begin[side] /= ahead, law.end[side] /= ahead;
+  }
+  return {law, z.station[station].crack[axis]};
+}
+
 /// x to the power e, quickly for the exponent that is usual.
 inline double raised(double x, double e) { return e == 1.5 ? x * std::sqrt(x) : std::pow(x, e); }
 /// and its inverse.
 inline double root_of(double x, double e) { return e == 1.5 ? std::cbrt(x * x) : std::pow(x, 1 / e); }
+
+/// Stiffness of a bending plane whose stations have these flexibilities beside the elastic one [rad/(N·m)]: shear,
+/// coupling, bending.
+void soften_plane(const ZoneParameters&, double share, int plane, const double flexibility[2], double stiffness[3]);
 
 /// Sets the safe bounds around a normal force [N], an empty range of forces if there are none.
 void find_safe_bounds(const ZoneParameters&, const CompiledLaws&, const Limits&, double normal_force, ZoneState&);
