@@ -136,10 +136,14 @@ struct Builder : BuilderState {
   bool has_frame(int frame) const;
   bool has_link(int frame) const;
   void connect_cable(const product::Cable&);
+  /// Of a member; EI of a section at first yield, and before it cracks.
   struct Stiffness {
-    double EA = 0, GA = 0, GJ = 0, EI_y = 0, EI_z = 0;
+    double EA = 0, GA = 0, GJ = 0, EI_y = 0, EI_z = 0, uncracked_EI_y = 0, uncracked_EI_z = 0;
   };
   Stiffness calc_stiffness(const MemberZones&) const;
+  /// How a member's ends crack about y and z that are as stiff as EI over these lengths [m].
+  std::array<mbs::Cracking, 2> calc_cracking(const MemberZones&, const Stiffness&, double length_y,
+                                             double length_z) const;
   /// One that is known keeps its name.
   mbs::SharedLaw make_law(int zone, const Stiffness&, const std::string& name, Bending);
   mbs::LawId law_of(int zone, const Stiffness&, const std::string& member, Bending = Bending::Both);
@@ -154,7 +158,8 @@ struct Builder : BuilderState {
   void make_stub(const product::Charge&, const MemberZones&, mbs::Event& event, mbs::Event& lighter);
   Pose frame_in(int body, const Vec3& p_W, const Mat3& R_WF) const;
   mbs::ElementId add_element(const std::string& name, int member, int a, int b, const Vec3& p_W, const Mat3& R_WF,
-                             const Vec3& translational, const Vec3& rotational, std::vector<mbs::Station> stations);
+                             const Vec3& translational, const Vec3& rotational, std::vector<mbs::Station> stations,
+                             const std::array<mbs::Cracking, 2>& = {});
   std::vector<mbs::Station> order_stations(const MemberZones&, const Stiffness&, const std::string& member,
                                            Bending = Bending::Both);
 

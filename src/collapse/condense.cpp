@@ -106,6 +106,12 @@ mbs::SharedLaw scale(const mbs::SharedLaw& one, double n) {
   return law;
 }
 
+mbs::Cracking scale(mbs::Cracking c, double n) {
+  for (int side : {0, 1}) c.begin[side] *= n, c.end[side] *= n;
+  c.flexibility /= n;
+  return c;
+}
+
 /// Goes from the bodies of all frames, of which one of each class is connected, to one frame a class.
 class Condenser {
  public:
@@ -264,6 +270,7 @@ class Condenser {
       e.a = body_of(e.a), e.b = body_of(e.b);
       e.translational_stiffness = n * e.translational_stiffness;
       e.rotational_stiffness = n * e.rotational_stiffness;
+      for (mbs::Cracking& c : e.cracking) c = scale(c, n);
       for (mbs::Station& s : e.stations) s.law = law_of(s.law, n);
       ZoneEntry& entry = b_.map.elements[i];
       entry.body_a = e.a.index, entry.body_b = e.b.index;
@@ -294,6 +301,7 @@ class Condenser {
       const double n = counts[static_cast<size_t>(r.joint.index)];
       rotational_count_.push_back(n);
       r.stiffness *= n;
+      r.cracking = scale(r.cracking, n);
       r.loose_translational *= n;
       r.loose_torsion *= n, r.loose_bending *= n;
       r.law = law_of(r.law, n);

@@ -143,9 +143,6 @@ bool Builder::has_link(int frame) const {
 }
 
 Builder::Stiffness Builder::calc_stiffness(const MemberZones& z) const {
-  const auto mix = [share = k.member_uncracked_share](double at_yield, double uncracked) {
-    return at_yield + share * std::max(0.0, uncracked - at_yield);
-  };
   Stiffness s;
   for (const MemberStation& station : z.station) {
     // a preparation is local, so the member keeps the stiffness of its better end
@@ -153,10 +150,27 @@ Builder::Stiffness Builder::calc_stiffness(const MemberZones& z) const {
     s.EA = std::max(s.EA, rcc.EA);
     s.GA = std::max(s.GA, rcc.GA);
     s.GJ = std::max(s.GJ, rcc.GJ);
-    s.EI_y = std::max(s.EI_y, mix(rcc.calc_EI_effective_y(z.normal_force), rcc.EI_y));
-    s.EI_z = std::max(s.EI_z, mix(rcc.calc_EI_effective_z(z.normal_force), rcc.EI_z));
+    s.EI_y = std::max(s.EI_y, rcc.calc_EI_effective_y(z.normal_force));
+    s.EI_z = std::max(s.EI_z, rcc.calc_EI_effective_z(z.normal_force));
+    s.uncracked_EI_y = std::max(s.uncracked_EI_y, rcc.EI_y);
+    s.uncracked_EI_z = std::max(s.uncracked_EI_z, rcc.EI_z);
   }
+  const auto mix = [share = k.member_uncracked_share](double at_yield, double uncracked) {
+    return at_yield + share * std::max(0.0, uncracked - at_yield);
+  };
+  s.uncracked_EI_y = mix(s.EI_y, s.uncracked_EI_y);
+  s.uncracked_EI_z = mix(s.EI_z, s.uncracked_EI_z);
   return s;
+}
+
+std::array<mbs::Cracking, 2> Builder::calc_cracking(const MemberZones& z, const Stiffness& s, double length_y,
+                                                    double length_z) const {
+  // of the end that the stiffness is of
+  const auto stiffness = [&](const MemberStation& station) { return library.rcc(station.zone).EI_y; };
+  const bool first = stiffness(z.station[0]) >= stiffness(z.station[1]);
+  const nearfield::Rcc& rcc = library.rcc(z.station[first ? 0 : 1].zone);
+  return {make_cracking(rcc.y_pos, rcc.y_neg, rcc.length, z.normal_force, s.uncracked_EI_y, s.EI_y, length_y),
+          make_cracking(rcc.z_pos, rcc.z_neg, rcc.length, z.normal_force, s.uncracked_EI_z, s.EI_z, length_z)};
 }
 
 mbs::SharedLaw Builder::make_law(int zone, const Stiffness& s, const std::string& name, Bending bending) {
@@ -216,7 +230,7 @@ Pose Builder::frame_in(int body, const Vec3& p_W, const Mat3& R_WF) const {
 
 mbs::ElementId Builder::add_element(const std::string& name, int index, int a, int b, const Vec3& p_W, const Mat3& R_WF,
                                     const Vec3& translational, const Vec3& rotational,
-                                    std::vector<mbs::Station> stations) {
+                                    std::vector<mbs::Station> stations, const std::array<mbs::Cracking, 2>& cracking) {
   mbs::ZoneElement e;
   e.name = name;
   e.a = a < 0 ? mbs::kGround : mbs::BodyId{a};
@@ -227,6 +241,7 @@ mbs::ElementId Builder::add_element(const std::string& name, int index, int a, i
   e.rotational_stiffness = rotational;
   e.damping_ratio = k.zone_damping_ratio;
   e.stations = std::move(stations);
+  std::copy(cracking.begin(), cracking.end(), e.cracking);
   ZoneEntry entry;
   entry.name = name, entry.member = member(index).name, entry.subsystem = kSixComponents;
   entry.body_a = a, entry.body_b = b, entry.p_W = p_W;
@@ -257,10 +272,11 @@ void Builder::connect_ground_column(const GridPoint& at, int index) {
   Vec3 foot = m.start;
   if (stump >= 0) foot.z += z.station[0].at;
   // both ends of the column turn about the hinge axis, only its foot about the other one
-  Vec3 rotational{s.GJ / L, 3 * s.EI_y / L, 3 * s.EI_z / L};
-  rotational[hinge_about_y ? 2 : 1] *= 2;
+  const double ends_y = hinge_about_y ? 3 : 6, ends_z = hinge_about_y ? 6 : 3;
+  const Vec3 rotational{s.GJ / L, ends_y * s.uncracked_EI_y / L, ends_z * s.uncracked_EI_z / L};
   z.element[0] = add_element(m.name + "/foot", index, stump, shaft, foot, column_axes(), {s.EA / L, s.GA / L, s.GA / L},
-                             rotational, {{0, law_of(z.station[0].zone, s, m.name + "/foot", bending_of_column())}})
+                             rotational, {{0, law_of(z.station[0].zone, s, m.name + "/foot", bending_of_column())}},
+                             calc_cracking(z, s, L / ends_y, L / ends_z))
                      .index;
 
   mbs::Joint joint;
@@ -276,14 +292,15 @@ void Builder::connect_ground_column(const GridPoint& at, int index) {
   const nearfield::Rcc& rcc = library.rcc(z.station[1].zone);
   const mbs::LawId law_id = hinge_law_of(z.station[1].zone, s, m.name + "/top");
   const mbs::ZoneLaw& law = model.laws[static_cast<size_t>(law_id.index)];
-  const double stiffness = 6 * (hinge_about_y ? s.EI_z : s.EI_y) / L;
+  const double stiffness = 6 * (hinge_about_y ? s.uncracked_EI_z : s.uncracked_EI_y) / L;
+  const mbs::Cracking cracking = calc_cracking(z, s, L / 6, L / 6)[hinge_about_y ? 1 : 0];
   joint.tension_limit = *std::max_element(rcc.tension.force.begin(), rcc.tension.force.end());
   // the limit that follows the normal force is the foot's, which carries the same shear; here the largest possible one
   const double crushing = *std::max_element(rcc.compression.force.begin(), rcc.compression.force.end());
   joint.shear_limit = std::max(rcc.shear_y, rcc.shear_z) + rcc.shear_friction * crushing;
   // one whose hinge has broken before, because nothing presses it, turns freely
-  joint.rotation_limit =
-      std::max(law.rupture_rotation, law.rupture_rotation_pressed) + largest_moment(law.moment_z) / stiffness;
+  joint.rotation_limit = std::max(law.rupture_rotation, law.rupture_rotation_pressed) +
+                         largest_moment(law.moment_z) * (1 / stiffness + cracking.flexibility);
   ZoneEntry entry;
   entry.name = joint.name, entry.member = m.name, entry.subsystem = kHinge;
   entry.body_a = shaft, entry.body_b = node, entry.p_W = top;
@@ -295,6 +312,7 @@ void Builder::connect_ground_column(const GridPoint& at, int index) {
   hinge.stiffness = stiffness;
   hinge.damping_ratio = k.zone_damping_ratio;
   hinge.law = law_id;
+  hinge.cracking = cracking;
   hinge.axial_element = mbs::ElementId{z.element[0]};
   // a charge makes a stub of the column, which whatever it meets can crush, shear and turn: as soft as the foot
   hinge.loose_translational = {s.EA / L, s.GA / L, s.GA / L};
@@ -317,8 +335,9 @@ void Builder::connect_column(const GridPoint& at, int index) {
   middle.z += 0.5 * L;
   z.element[0] = z.element[1] =
       add_element(m.name, index, below, node_at(at), middle, column_axes(),
-                  {s.EA / L, bending(s.EI_z), bending(s.EI_y)}, {s.GJ / L, s.EI_y / L, s.EI_z / L},
-                  order_stations(z, s, m.name, bending_of_column()))
+                  {s.EA / L, bending(s.uncracked_EI_z), bending(s.uncracked_EI_y)},
+                  {s.GJ / L, s.uncracked_EI_y / L, s.uncracked_EI_z / L},
+                  order_stations(z, s, m.name, bending_of_column()), calc_cracking(z, s, L / 6, L / 6))
           .index;
 }
 
@@ -329,13 +348,14 @@ void Builder::connect_x_beam(const GridPoint& at, int index) {
   const double L = z.clear_length;
   const int body = own_body.at(index);
   const Vec3 translational{2 * s.EA / L, 2 * s.GA / L, 2 * s.GA / L};
-  const Vec3 rotational{2 * s.GJ / L, 6 * s.EI_y / L, 6 * s.EI_z / L};
+  const Vec3 rotational{2 * s.GJ / L, 6 * s.uncracked_EI_y / L, 6 * s.uncracked_EI_z / L};
+  const std::array<mbs::Cracking, 2> cracking = calc_cracking(z, s, L / 6, L / 6);
   // fixed-end moments of the weight it carries: at rest the ends are turned so that they pull at the top
   double mass = assemblies[static_cast<size_t>(body)].mass();
   if (const int wall = find_at(x_walls, {at.row, at.frame, at.storey + 1});
       wall >= 0 && own_body.count(wall) && !is_cast_on_beam(wall))
     mass += assemblies[static_cast<size_t>(own_body.at(wall))].mass();
-  const double turn = plan.analysis.gravity * mass * L / 12 / rotational.y;
+  const double fixed_end = plan.analysis.gravity * mass * L / 12;
   for (int end : {0, 1}) {
     const int node = node_at({at.row + end, at.frame, at.storey});
     const std::string name = m.name + (end == 0 ? "/start" : "/end");
@@ -343,9 +363,11 @@ void Builder::connect_x_beam(const GridPoint& at, int index) {
     face.x += z.station[static_cast<size_t>(end)].at;
     z.element[end] =
         add_element(name, index, end == 0 ? node : body, end == 0 ? body : node, face, x_beam_axes(), translational,
-                    rotational, {{0, law_of(z.station[static_cast<size_t>(end)].zone, s, name, bending_of_x_beam())}})
+                    rotational, {{0, law_of(z.station[static_cast<size_t>(end)].zone, s, name, bending_of_x_beam())}},
+                    cracking)
             .index;
     mbs::ZoneElement& e = model.elements.back();
+    const double turn = fixed_end / rotational.y + calc_crack_rotation(cracking[0], fixed_end);
     e.X_BM.q = e.X_BM.q * exp_rotation({0, turn, 0});
   }
 }
@@ -353,15 +375,20 @@ void Builder::connect_x_beam(const GridPoint& at, int index) {
 void Builder::connect_y_beam(const GridPoint& at, int index) {
   const Member& m = member(index);
   MemberZones& z = zones[index];
-  const Stiffness s = calc_stiffness(z);
+  Stiffness s = calc_stiffness(z);
+  // joints of a condensed model do not turn about x, which makes these beams softer in the building: uncracked they
+  // would hand gable frames 8 % too much
+  if (condensation) s.uncracked_EI_y = s.EI_y, s.uncracked_EI_z = s.EI_z;
   const double L = z.clear_length;
   const auto bending = [&](double EI) { return 12 * EI / (L * L * L) / (1 + 12 * EI / (s.GA * L * L)); };
   Vec3 middle = m.start;
   middle.y += z.clear_start + 0.5 * L;
-  z.element[0] = z.element[1] = add_element(m.name, index, node_at(at), node_at({at.row, at.frame + 1, at.storey}),
-                                            middle, y_beam_axes(), {s.EA / L, bending(s.EI_z), bending(s.EI_y)},
-                                            {s.GJ / L, s.EI_y / L, s.EI_z / L}, order_stations(z, s, m.name))
-                                    .index;
+  z.element[0] = z.element[1] =
+      add_element(m.name, index, node_at(at), node_at({at.row, at.frame + 1, at.storey}), middle, y_beam_axes(),
+                  {s.EA / L, bending(s.uncracked_EI_z), bending(s.uncracked_EI_y)},
+                  {s.GJ / L, s.uncracked_EI_y / L, s.uncracked_EI_z / L}, order_stations(z, s, m.name),
+                  calc_cracking(z, s, L / 6, L / 6))
+          .index;
 }
 
 void Builder::connect_slab(const GridPoint& at, int index) {

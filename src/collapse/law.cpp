@@ -76,27 +76,40 @@ std::vector<double> merge_rotations(const std::vector<const Row*>& rows, double 
   return all;
 }
 
+/// The two forces of a family beside a normal force, and values between them.
+class BetweenForces {
+ public:
+  BetweenForces(const nearfield::MomentFamily& family, double N) {
+    const std::vector<double>& forces = family.normal_force;
+    const auto above = std::upper_bound(forces.begin(), forces.end(), N);
+    k_ = std::clamp<size_t>(static_cast<size_t>(above - forces.begin()), 1, forces.size() - 1);
+    share_ = (N - forces[k_ - 1]) / (forces[k_] - forces[k_ - 1]);
+  }
+  /// Of rows of J values the j-th.
+  double mix(const std::vector<double>& v, size_t J = 1, size_t j = 0) const {
+    const double below = v[(k_ - 1) * J + j], above = v[k_ * J + j];
+    return share_ <= 0 ? below : share_ >= 1 ? above : (1 - share_) * below + share_ * above;
+  }
+
+ private:
+  size_t k_;
+  double share_;
+};
+
 /// The row of a family at a normal force with the rotation of the element's spring taken out: what is left adds up with
 /// the element to the family again. Plastic rotation that begins at first yield at the earliest: where the row is
 /// softer than the element, it turns under the yield moment to where the row yields.
 Row make_row(const nearfield::MomentFamily& family, double N, double EI, double length, PlasticFrom from) {
-  const size_t J = family.rotation.size(), K = family.normal_force.size();
-  const size_t k = std::clamp<size_t>(
-      static_cast<size_t>(std::upper_bound(family.normal_force.begin(), family.normal_force.end(), N) -
-                          family.normal_force.begin()),
-      1, K - 1);
-  const double share = (N - family.normal_force[k - 1]) / (family.normal_force[k] - family.normal_force[k - 1]);
-  const auto mix = [&](const std::vector<double>& v, size_t below, size_t above) {
-    return share <= 0 ? v[below] : share >= 1 ? v[above] : (1 - share) * v[below] + share * v[above];
-  };
+  const size_t J = family.rotation.size();
+  const BetweenForces at(family, N);
   std::vector<double> M(J);
-  for (size_t j = 0; j < J; ++j) M[j] = mix(family.moment, (k - 1) * J + j, k * J + j);
-  const double yield_moment = mix(family.yield_moment, k - 1, k), yield_rotation = mix(family.yield_rotation, k - 1, k);
+  for (size_t j = 0; j < J; ++j) M[j] = at.mix(family.moment, J, j);
+  const double yield_moment = at.mix(family.yield_moment), yield_rotation = at.mix(family.yield_rotation);
   const double stiffness = EI / length, plastic_at_yield = yield_rotation - yield_moment / stiffness;
   const auto plastic = [&](size_t j) { return family.rotation[j] - M[j] / stiffness; };
   std::vector<double> u(J, 0.0);
   if (!family.elongation.empty())
-    for (size_t j = 0; j < J; ++j) u[j] = mix(family.elongation, (k - 1) * J + j, k * J + j);
+    for (size_t j = 0; j < J; ++j) u[j] = at.mix(family.elongation, J, j);
   const auto elongation_at = [&](double rotation) { return Reader(family.rotation, u)(rotation); };
   Row row;
   const auto add = [&row](double rotation, double moment, double elongation) {
@@ -428,6 +441,46 @@ mbs::ZoneLaw make_zone_law(const nearfield::Rcc& rcc, double EI_y, double EI_z, 
   law.torsion = rcc.torsion;
   law.twist_rupture = k.zone_twist_rupture;
   return law;
+}
+
+mbs::Cracking make_cracking(const nearfield::MomentFamily& positive, const nearfield::MomentFamily& negative,
+                            double zone_length, double normal_force, double EI, double EI_at_yield, double length) {
+  // a line from nothing would be no longer one of the uncracked section, and one up to first yield none of a cracked
+  // one
+  constexpr double least = 0.02, most = 0.98;
+  mbs::Cracking out;
+  if (!(EI > EI_at_yield)) return out;
+  double share = 0;
+  for (size_t side : {0UL, 1UL}) {
+    const nearfield::MomentFamily& family = side == 0 ? positive : negative;
+    const size_t J = family.rotation.size();
+    const BetweenForces at(family, normal_force);
+    std::vector<double> M(J);
+    for (size_t j = 0; j < J; ++j) M[j] = at.mix(family.moment, J, j);
+    Reader moment(family.rotation, M);
+    const double M_y = at.mix(family.yield_moment), phi_y = at.mix(family.yield_rotation);
+    double work = 0;  // of the section's curve up to first yield
+    for (size_t j = 0; j + 1 < J && family.rotation[j] < phi_y; ++j) {
+      const double end = std::min(family.rotation[j + 1], phi_y);
+      work += 0.5 * (end - family.rotation[j]) * (M[j] + moment(end));
+    }
+    // an uncracked line and a straight one from there to first yield that take as much
+    const double kink = phi_y - M_y * zone_length / EI;
+    if (!(M_y > 0 && kink > 0)) return {};
+    const double r = std::clamp((2 * work / M_y - phi_y) / kink, least, most);
+    // along the member, whose moment falls linearly to its point of inflection
+    out.begin[side] = 3 * r / (2 + r) * M_y;
+    out.end[side] = M_y;
+    share += 0.5 * (1 - r) * (1 + 0.5 * r);
+  }
+  out.flexibility = share * length * (1 / EI_at_yield - 1 / EI);
+  return out;
+}
+
+double calc_crack_rotation(const mbs::Cracking& c, double moment) {
+  if (c.flexibility == 0) return 0;
+  if (moment >= c.end[0]) return c.flexibility * moment;
+  return c.flexibility * c.end[0] * std::max(0.0, moment - c.begin[0]) / (c.end[0] - c.begin[0]);
 }
 
 mbs::ZoneLaw make_cage_law(const nearfield::ResidualCage& cage, double destroyed_length, const std::string& name,

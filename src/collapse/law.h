@@ -68,6 +68,14 @@ enum class Bending { Both, Y, Z };
 mbs::ZoneLaw make_zone_law(const nearfield::Rcc&, double EI_y, double EI_z, const std::string& name, const Knowledge&,
                            PlasticFrom = PlasticFrom::Yield, Bending = Bending::Both);
 
+/// How the end of a member cracks under a normal force [N], docs/theory/manager.md (1a): families of a zone of this
+/// length for moments > 0 and < 0, bending stiffness EI of the uncracked section and at first yield [N·m²], and the
+/// length over which an end is as stiff as EI [m].
+mbs::Cracking make_cracking(const nearfield::MomentFamily& positive, const nearfield::MomentFamily& negative,
+                            double zone_length, double normal_force, double EI, double EI_at_yield, double length);
+/// Rotation that cracks add at a moment > 0 that grows for the first time [rad].
+double calc_crack_rotation(const mbs::Cracking&, double moment);
+
 /// Law of the bars that a charge leaves; nothing at all if there are none.
 mbs::ZoneLaw make_cage_law(const nearfield::ResidualCage&, double destroyed_length, const std::string& name,
                            const Knowledge&);

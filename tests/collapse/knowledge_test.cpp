@@ -53,7 +53,7 @@ TEST(Knowledge, RefusesWhatIsNotASet) {
   EXPECT_THAT(complaint_of(replaced(shipped(), "\"zone.elongation_share\", \"value\": 1",
                                     "\"zone.elongation_share\", \"value\": -1")),
               testing::HasSubstr("\"zone.elongation_share\" needs a value >= 0"));
-  EXPECT_THAT(complaint_of(replaced(shipped(), "\"member.uncracked_share\", \"value\": 0",
+  EXPECT_THAT(complaint_of(replaced(shipped(), "\"member.uncracked_share\", \"value\": 1",
                                     "\"member.uncracked_share\", \"value\": 1.5")),
               testing::HasSubstr("\"member.uncracked_share\" needs a value from 0 to 1"));
   EXPECT_THAT(complaint_of(replaced(shipped(), "\"value\": 0.35", "\"value\": \"much\"")),
