@@ -834,7 +834,13 @@ bool System::find_equilibrium(std::string& message) {
   DeadLoad load(*this);
   if (!load.is_needed()) return true;
   const auto report = std::exchange(options.on_happening, nullptr);
+  const auto keep_lengths = [this](bool held) {
+    for (CompiledElement& e : elements) e.zone.keeps_length = held;
+    for (CompiledRotational& r : rotationals) r.zone.keeps_length = r.loose.keeps_length = held;
+  };
+  keep_lengths(true);
   const bool is_found = load.find(message) && !find_overload(message);
+  keep_lengths(false);
   options.on_happening = report;
   ignores_limits = false;
   if (!is_found) return false;

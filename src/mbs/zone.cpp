@@ -554,6 +554,10 @@ struct Evaluation {
   /// What turns further lengthens or shortens. Returns by how much; stations then turn to the limit under the force
   /// that is left.
   double lengthen(const Limits (&limits)[2], double axial) {
+    if (p.keeps_length) {
+      for (int s = 0; s < n && (turned[0] || turned[1]); ++s) measure(s);
+      return 0;
+    }
     const double axial_stiffness = p.external_axial ? 0 : k[0], relief = p.external_axial ? p.relief : k[0];
     // rotation up to which a station had gone in the step before, by plastic flow or on the flexibility of its damage
     double so_far[2] = {0, 0};

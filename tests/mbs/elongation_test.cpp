@@ -104,6 +104,45 @@ TEST(ElongationPhysics, AFallOfTheHeadIsWorkOfTheHinges) {
   EXPECT_LT(with.summary.energy_error, 1e-3);
 }
 
+TEST(ElongationPhysics, DeadLoadYieldsAHingeWithoutLengtheningIt) {
+  // A part on two columns 2 m apart, turned by 170 kNm: the hinge under one side yields, hardens and would push up
+  // against the other, whose force raises what it bears.
+  Model m;
+  m.contact.ground = m.contact.bodies = false;
+  m.gravity = {};
+  ZoneLaw law;
+  law.name = "hinge";
+  law.moment_y.normal_force = {-4e6, 0, 2e6};
+  law.moment_y.plastic_rotation = {0, 0.02};
+  law.moment_y.positive = law.moment_y.negative = {900e3, 940e3, 100e3, 140e3, 50e3, 90e3};
+  law.moment_y.elongation_positive = law.moment_y.elongation_negative = {0, 6e-3, 0, 6e-3, 0, 6e-3};
+  const LawId hinge = add_law(m, law);
+  Body part;
+  part.name = "part", part.mass = 1e4, part.inertia = Mat3::diagonal({1e4, 1e4, 1e4});
+  const BodyId body = add_body(m, part);
+  for (const double y : {-1.0, 1.0}) {
+    ZoneElement e;
+    e.name = y < 0 ? "yields" : "holds", e.a = kGround, e.b = body;
+    const Quat up = to_quat(Mat3::from_columns({0, 0, 1}, {0, 1, 0}, {-1, 0, 0}));
+    e.X_AF = e.X_BM = {{0, y, 0}, up};
+    e.translational_stiffness = {5e9, 1e9, 1e9};
+    e.rotational_stiffness = {1e7, y < 0 ? 5e7 : 1e7, 1e7};
+    if (y < 0) e.stations = {{0, hinge}};
+    add_element(m, e);
+  }
+  Load load;
+  load.name = "torque", load.body = body, load.torque = {0, 170e3, 0};
+  m.loads.push_back(load);
+  Simulation s(m, {});
+  std::string message;
+  ASSERT_TRUE(s.find_equilibrium(message)) << message;
+  const View& v = s.calc_view();
+  // it bears what it bears before it turns, 100 kNm, and the other one 10 MNm times all of the rotation
+  EXPECT_NEAR(100e3 + 1e7 * (v.rotation[0] + 100e3 / 5e7), 170e3, 1e2);
+  EXPECT_NEAR(v.element_force[0].x, 0, 1e3);
+  EXPECT_NEAR(v.X_WB[0].p.z, 0, 1e-7);
+}
+
 TEST(ElongationPhysics, ConvergesWithTheStep) {
   const Pushed fine = push(kLift, 2.5e-5), middle = push(kLift, 1e-4), coarse = push(kLift, 2e-4);
   const double near = std::abs(middle.shortened - fine.shortened), far = std::abs(coarse.shortened - fine.shortened);
