@@ -424,6 +424,7 @@ struct Evaluation {
       bool grow = false;
       for (int s = 0; s < n; ++s) {
         z.station[s].tangent[q] = z.station[s].soft[q];
+        if (!(p.cracking[q].flexibility > 0)) continue;
         grow = grow || std::abs(m[q][s]) > cracks_of(p, z, s, q, ahead).calc_bound(m[q][s]);
       }
       if (grow) crack_plane(q, {cracks_of(p, z, 0, q, ahead), cracks_of(p, z, n - 1, q, ahead)}, kCracksAhead / ahead);
@@ -616,9 +617,7 @@ struct Evaluation {
       const double left = 1 / excess, rise = -left * calc_rise(limits[s], axial, s, left) * relief * elongation;
       if (!(rise > 0)) continue;
       const double length = length_of(phi, m, s);
-      double before[2][2] = {};
-      for (int q = first; q <= last; ++q) before[q][s] = m_trial[q][s];
-      const double trial = std::max(so_far[s], length_of(phi_trial, before, s));
+      const double trial = std::max(so_far[s], length_of(phi_trial, m_trial, s));
       const double ahead = (trial - so_far[s]) / (length - so_far[s]);  // by damage, before it turns
       share = std::min(share, std::max(0.0, (1 - left - rise * ahead) / (1 - left + rise * (1 - ahead))));
     }

@@ -145,7 +145,8 @@ inline Cracks cracks_of(const ZoneParameters& p, const ZoneState& z, int station
   const bool is_first = z.next_law < 0 && z.base_law < 0;
   if (p.cracking[axis].flexibility > 0 && z.station[station].reached == 0 && is_first) {
     law = p.cracking[axis];
-    for (int side : {0, 1}) law.begin[side] /= ahead, law.end[side] /= ahead;
+    if (ahead != 1)
+      for (int side : {0, 1}) law.begin[side] /= ahead, law.end[side] /= ahead;
   }
   return {law, z.station[station].crack[axis]};
 }
