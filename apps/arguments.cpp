@@ -7,6 +7,7 @@
 #include "arguments_completion.h"
 #include "arguments_manual.h"
 #include "base/error.h"
+#include "program.h"
 
 namespace topple::apps {
 
@@ -451,7 +452,7 @@ std::variant<Arguments, int> parse_arguments(int argc, char** argv) {
   Arguments a;
   CLI::App app{"topple shows a demolition engineer how a building will come down.", "topple"};
   app.require_subcommand(1);
-  app.set_version_flag("--version", "topple " TOPPLE_VERSION);
+  app.set_version_flag("--version", "topple " + program_version());
   app.footer(R"(Examples:
   topple demo                                      see one building come down
   topple doctor                                    what is installed, and whether it calculates what is known

@@ -18,6 +18,7 @@
 #include "mbs/model_json.h"
 #include "product/plan.h"
 #include "product/templates.h"
+#include "program.h"
 #include "record/compare.h"
 #include "record/page.h"
 #include "record/record.h"
@@ -109,7 +110,7 @@ collapse::RunOptions make_options(const Arguments& a) {
   o.frame_rate = read_quantity(a.frame_rate, Dimension::Frequency, "--frame-rate");
   o.threads = a.threads;
   o.engine = a.engine;
-  o.program_version = TOPPLE_VERSION;
+  o.program_version = program_version();
   return o;
 }
 

@@ -22,6 +22,7 @@
 #include "fem/explicit_kernel.h"
 #include "mbs/kernel.h"
 #include "nearfield/section_kernel.h"
+#include "program.h"
 #include "record/provenance.h"
 #include "results.h"
 #include "self_check.h"
@@ -165,7 +166,7 @@ int examine(const Arguments& a, const std::atomic<bool>& cancel) {
       "with assertions";
 #endif
   if (!a.json) {
-    std::printf("topple %s, built %s by %s\n", TOPPLE_VERSION, build, describe_compiler().c_str());
+    std::printf("topple %s, built %s by %s\n", program_version().c_str(), build, describe_compiler().c_str());
     std::printf("%s, %u cores\n", record::machine_words().c_str(), cores);
     print("Engines", list_engine_parts());
     print("Libraries", list_libraries());
@@ -183,7 +184,7 @@ int examine(const Arguments& a, const std::atomic<bool>& cancel) {
   const int code = ok ? kOk : kRunFailed;
   if (a.json) {
     json out{{"exit_code", code},
-             {"version", TOPPLE_VERSION},
+             {"version", program_version()},
              {"build", build},
              {"compiler", describe_compiler()},
              {"machine", record::machine_words()},

@@ -6,6 +6,7 @@
 #include "arguments.h"
 #include "base/error.h"
 #include "commands.h"
+#include "program.h"
 
 namespace {
 
@@ -60,7 +61,7 @@ int dispatch(const topple::apps::Arguments& a) {
     case Arguments::Verb::Doctor:
       return topple::apps::examine(a, cancel);
     case Arguments::Verb::Version:
-      std::puts("topple " TOPPLE_VERSION);
+      std::printf("topple %s\n", topple::apps::program_version().c_str());
       return topple::apps::kOk;
     case Arguments::Verb::None:
       break;

@@ -18,6 +18,7 @@
 #include "collapse/member_zone.h"
 #include "commands.h"
 #include "product/section_file.h"
+#include "program.h"
 #include "rcc_fuzzy.h"
 #include "rcc_report.h"
 #include "rcc_solid.h"
@@ -294,7 +295,7 @@ int compute_rcc(const Arguments& a, const std::atomic<bool>& cancel) {
     report.title = task.title;
     report.source = a.input;
     report.sha256 = calc_sha256(text);
-    report.program_version = TOPPLE_VERSION;
+    report.program_version = program_version();
     report.zone = fmt::format("{}, zone of {:.3g} m", task.name, task.zone.length);
     report.notes.insert(report.notes.begin(), task.notes.begin(), task.notes.end());
 

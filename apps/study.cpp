@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "commands.h"
+#include "program.h"
 #include "record/page.h"
 #include "record/provenance.h"
 #include "results.h"
@@ -41,8 +42,8 @@ void write_all(std::FILE* out, const std::string& folder, const study::Problem& 
     return;
   }
   const std::string path = (std::filesystem::path(folder) / "study.html").string();
-  record::write_page(study::to_page_json(p, r, {TOPPLE_VERSION, record::now_utc(), source, source_name}), *bundle, path,
-                     language);
+  record::write_page(study::to_page_json(p, r, {program_version(), record::now_utc(), source, source_name}), *bundle,
+                     path, language);
   std::fprintf(out, "wrote %s\n", path.c_str());
 }
 

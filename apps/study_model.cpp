@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "base/unit.h"
+#include "program.h"
 #include "results.h"
 #include "study/evaluator.h"
 #include "study/inputs_file.h"
@@ -102,7 +103,14 @@ StudyPlace find_place(const std::string& where) {
 }
 
 study::RunnerFactories make_factories() {
-  return {{"evaluator", study::make_evaluator}, {"plan", study::make_plan_runner}};
+  const auto make_plan_runner = [](const std::string& definition) {
+    const std::string asked = json::parse(definition).at("identity").value("topple", "");
+    if (asked != program_version())
+      throw InputError("E826", fmt::format("the study is of topple {}, and this is {}", asked, program_version()),
+                       "only the same build gives the same bits: use one on all machines");
+    return study::make_plan_runner(definition);
+  };
+  return {{"evaluator", study::make_evaluator}, {"plan", make_plan_runner}};
 }
 
 study::Problem read_problem(const Arguments& a, std::string& text) {
@@ -116,7 +124,7 @@ study::Problem read_problem(const Arguments& a, std::string& text) {
     options.condensed = y.condensed;
     p = study::make_plan_problem(plan, options, a.knowledge.empty() ? std::string() : read_file(a.knowledge));
     json identity = json::parse(p.identity);
-    identity["topple"] = TOPPLE_VERSION;  // other programs give other answers
+    identity["topple"] = program_version();  // other programs give other answers
     study::set_plan_identity(p, identity.dump());
     if (y.confirm > 0) p.confirm = y.confirm;
   } else {

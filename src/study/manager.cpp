@@ -160,10 +160,7 @@ class Manager {
         asked_model_(model_),
         store_(options.store, progress.cancel, options.pool.patience) {
     const auto there = store_.find_study(options.name);
-    if (there && there->model != model_)
-      throw InputError(
-          "E822", fmt::format("{} holds a study of another model or of other inputs", hide_password(options.store)),
-          "choose another folder or name, or delete it");
+    if (there && there->model != model_) refuse(*there);
     store_.put_model(model_, make_model_definition(problem));
     row_ = {options.name, model_, make_study_definition(problem, options), "open", ""};
     store_.put_study(row_);
@@ -292,6 +289,21 @@ class Manager {
   }
 
  private:
+  [[noreturn]] void refuse(const StudyRow& there) {
+    const std::string where = hide_password(options_.store);
+    const char* help = "choose another folder or name, or delete it";
+    json was = json::parse(store_.find_model(there.model).value_or("{}")),
+         is = json::parse(make_model_definition(problem_));
+    const std::string old = was["identity"].value("topple", ""), now = is["identity"].value("topple", "");
+    for (json* d : {&was, &is}) (*d)["identity"].erase("topple"), d->erase("settings");
+    if (was != is)
+      throw InputError("E822", fmt::format("{} holds a study of another model or of other inputs", where), help);
+    throw InputError(
+        "E826",
+        fmt::format("{} was begun with topple {}, and this is {}, which may give other answers", where, old, now),
+        help);
+  }
+
   void start_pool() {
     PoolOptions own = options_.pool;
     own.model = asked_model_;  // programs of other studies may not be here

@@ -205,5 +205,32 @@ TEST_F(StudyFaults, LeaveACondensedStudyOfAPlanAsItWouldBe) {
   EXPECT_NE(read(folder / "log").find("E822"), std::string::npos);
 }
 
+TEST_F(StudyFaults, DoNotMixBuilds) {
+  std::ofstream(folder / "plan.toml") << collapse::house(
+      collapse::charge("C-A*-0") +
+      "[fuzzy]\nconcrete.C25.fc = { triangular = [\"15 N/mm2\", \"25 N/mm2\", \"45 N/mm2\"] }\n");
+  const std::vector<std::string> words = {
+      TOPPLE_PROGRAM, "study", folder / "plan.toml", "-o", folder / "out", "--samples", "10",
+      "--alpha",      "0,1",   "--no-drivers"};
+  ASSERT_EQ(run(words), 0) << read(folder / "log");
+  const auto db = open_database(folder / "out/study.sqlite");
+  const long count = results(*db);
+  // as an older program would have left it
+  db->run("UPDATE model SET hash = 'old', definition = replace(definition, '\"topple\":\"', '\"topple\":\"0.0.9 of ')",
+          {});
+  db->run("UPDATE study SET model = 'old', state = 'open'", {});
+  db->run("UPDATE job SET model = 'old'", {});
+  db->run("DELETE FROM result WHERE hash = (SELECT hash FROM job WHERE number = 1)", {});
+  db->run("UPDATE job SET state = 'waiting' WHERE number = 1", {});
+  for (const auto& asked : {words, {TOPPLE_PROGRAM, "worker", folder / "out", "--idle", "1 s"}}) {
+    EXPECT_EQ(run(asked), 2);
+    const std::string log = read(folder / "log");
+    EXPECT_TRUE(log.find("E826") != std::string::npos && log.find("0.0.9 of ") != std::string::npos) << log;
+  }
+  EXPECT_EQ(results(*db), count - 1);
+  EXPECT_EQ(number(*db, "SELECT count(*) FROM job WHERE state = 'waiting'"), 1) << "for one who may";
+  EXPECT_EQ(run({TOPPLE_PROGRAM, "study", "show", folder / "out"}), 0) << "what it found can be read";
+}
+
 }  // namespace
 }  // namespace topple::study
