@@ -291,12 +291,17 @@ void set_bars(PackedSection& s, const material::SteelState* bars, size_t count) 
 }
 
 Resultants calc_resultants(const PackedSection& s, double eps_0, double kappa) {
-  return HWY_DYNAMIC_DISPATCH(kernel::calc_here)(s, eps_0, kappa);
+  using namespace kernel;
+  return HWY_DYNAMIC_DISPATCH(calc_here)(s, eps_0, kappa);
 }
 Resultants calc_resultants_singly(const PackedSection& s, double eps_0, double kappa) {
-  return HWY_DYNAMIC_DISPATCH(kernel::calc_singly_here)(s, eps_0, kappa);
+  using namespace kernel;
+  return HWY_DYNAMIC_DISPATCH(calc_singly_here)(s, eps_0, kappa);
 }
-std::string section_kernel_target() { return HWY_DYNAMIC_DISPATCH(kernel::name_here)(); }
+std::string section_kernel_target() {
+  using namespace kernel;
+  return HWY_DYNAMIC_DISPATCH(name_here)();
+}
 
 }  // namespace topple::nearfield
 #endif
