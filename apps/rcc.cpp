@@ -301,6 +301,9 @@ int compute_rcc(const Arguments& a, const std::atomic<bool>& cancel) {
 
     std::vector<std::string> failures;
     if (a.route != "layered") {
+      if (task.zone.flange.breadth > 0)
+        throw InputError("E618", task.name + " has slabs as flanges, which the solid route does not know",
+                         "use --route layered, or describe its section in a file of its own");
       const auto outcome = compute_solid(a, task, report, cancel);
       if (!outcome) return say_cancelled();
       failures = *outcome;

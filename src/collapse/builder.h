@@ -122,6 +122,8 @@ struct Builder : BuilderState {
   void estimate_normal_forces();
   void request_zones();
   void request_station(int member, int which);
+  /// What of the slabs beside a beam along x works with it.
+  nearfield::Flange find_flange(const GridPoint&, int beam) const;
   void connect_ground_column(const GridPoint&, int member);
   void connect_column(const GridPoint&, int member);
   void connect_x_beam(const GridPoint&, int member);

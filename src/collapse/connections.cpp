@@ -66,6 +66,33 @@ void Builder::estimate_normal_forces() {
     }
 }
 
+nearfield::Flange Builder::find_flange(const GridPoint& at, int beam) const {
+  nearfield::Flange out;
+  const product::Section& web = section_of(beam);
+  for (const int side : {-1, 0}) {
+    const int slab = find_at(slabs, {at.row, at.frame + side, at.storey});
+    if (slab < 0 || panel_of(slab).concrete < 0) continue;
+    const Member& m = member(slab);
+    const product::Panel& panel = panel_of(slab);
+    const double half_gap = 0.5 * (m.end.y - m.start.y - web.width);
+    if (!(half_gap > 0) || panel.thickness > web.height) continue;
+    const double breadth =
+        k.slab_flange_share * kept_of(slab) * calc_flange_breadth(half_gap, zones.at(beam).clear_length);
+    const double strength = plan.concretes[static_cast<size_t>(panel.concrete)].fc / concrete_of(web).fc;
+    out.breadth += std::min(1.0, strength) * breadth;
+    // of two slabs the thinner one
+    const bool is_first = out.thickness == 0;
+    if (is_first || panel.thickness < out.thickness) out.thickness = panel.thickness;
+    if (panel.steel < 0) continue;
+    // it spans from beam to beam, so what lies along this one only distributes
+    const double bars = k.slab_distribution_share * breadth;
+    out.top = {panel.cover, out.top.area + bars * panel.as_top};
+    out.bottom = {panel.thickness - panel.cover, out.bottom.area + bars * panel.as_bottom};
+    out.steel = plan.steels[static_cast<size_t>(panel.steel)];
+  }
+  return out;
+}
+
 void Builder::request_station(int index, int which) {
   const Member& m = member(index);
   const product::Section& s = section_of(index);
@@ -78,6 +105,8 @@ void Builder::request_station(int index, int which) {
   in.steel = steel_of(s);
   const bool is_column = m.kind == MemberKind::Column;
   const double depth = is_column && hinge_about_y ? s.width : s.height;
+  if (const GridPoint at{m.row_a, m.frame_a, m.storey}; find_at(x_beams, at) == index && !is_column)
+    in.flange = find_flange(at, index);
   in.length = calc_zone_length(s, in.concrete, in.steel, depth, z.clear_length, k);
   for (const product::Weakening& w : m.weakenings) {
     // the nearer station has it; the first one when both are as near

@@ -28,6 +28,8 @@ const std::map<std::string, Field>& fields() {
       {"zone.damping_ratio", &Knowledge::zone_damping_ratio},
       {"zone.elongation_share", &Knowledge::zone_elongation_share},
       {"member.uncracked_share", &Knowledge::member_uncracked_share},
+      {"slab.flange_share", &Knowledge::slab_flange_share},
+      {"slab.distribution_share", &Knowledge::slab_distribution_share},
       {"slab.elongation_lengths", &Knowledge::slab_elongation_lengths},
       {"wall.stiffness_share", &Knowledge::wall_stiffness_share},
       {"wall.axial_share", &Knowledge::wall_axial_share},
@@ -103,7 +105,8 @@ Knowledge read_knowledge(const std::string& text, const std::string& name) {
       continue;
     }
     seen[rule.id] = true;
-    const bool is_between = rule.id == "member.uncracked_share";  // 0 and 1
+    const bool is_between = rule.id == "member.uncracked_share" || rule.id == "slab.flange_share" ||
+                            rule.id == "slab.distribution_share";  // 0 and 1
     const bool may_be_zero = is_between || rule.id == "zone.elongation_share";
     if (!entry.contains("value") || !entry["value"].is_number() || !std::isfinite(entry["value"].get<double>()) ||
         entry["value"].get<double>() < 0 || (entry["value"].get<double>() == 0 && !may_be_zero) ||

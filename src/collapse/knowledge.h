@@ -21,6 +21,7 @@ struct Knowledge {
   double zone_rupture_rotation, zone_rupture_rotation_pressed, zone_slip_softening, zone_slip_rupture,
       zone_twist_rupture, zone_biaxial_exponent;
   double zone_damping_ratio;
+  double slab_flange_share, slab_distribution_share;
   double slab_elongation_lengths, wall_stiffness_share, wall_axial_share, wall_crush_share;
   double charge_release_time, charge_cage_rupture_rotation, charge_transition_reach, charge_scatter_limit;
   double body_least_radius_of_gyration;
@@ -36,8 +37,8 @@ struct Knowledge {
 };
 
 /// Reads a set of rules. InputError for text that is not such a set, and for rules that are missing, unknown, given
-/// twice or not positive numbers (`zone.elongation_share` and `member.uncracked_share` may be 0, the latter at
-/// most 1).
+/// twice or not positive numbers (`zone.elongation_share` may be 0; `member.uncracked_share`, `slab.flange_share` and
+/// `slab.distribution_share` lie between 0 and 1).
 Knowledge read_knowledge(const std::string& text, const std::string& name);
 
 /// The rules that are built in.

@@ -359,6 +359,11 @@ void append_bytes(std::string& to, double v) {
   to.append(bytes, sizeof v);
 }
 
+double calc_flange_breadth(double half_gap, double span) {
+  const double zero_moments = 0.7 * span;
+  return std::min({0.2 * half_gap + 0.1 * zero_moments, 0.2 * zero_moments, half_gap});
+}
+
 int ZoneLibrary::request(const nearfield::ZoneInput& in) {
   std::string key;
   const auto put = [&key](double v) { append_bytes(key, v); };
@@ -370,6 +375,12 @@ int ZoneLibrary::request(const nearfield::ZoneInput& in) {
   const product::Concrete& c = in.concrete;
   for (double v : {c.fc, c.fct, c.Ec, c.eps_c1, c.Gf, c.Gcl}) put(v);
   for (double v : {in.steel.fy, in.steel.fu, in.steel.Es, in.steel.eps_u}) put(v);
+  const nearfield::Flange& flange = in.flange;
+  put(flange.breadth);
+  if (flange.breadth > 0)
+    for (double v : {flange.thickness, flange.top.depth, flange.top.area, flange.bottom.depth, flange.bottom.area,
+                     flange.steel.fy, flange.steel.fu, flange.steel.Es, flange.steel.eps_u})
+      put(v);
   for (double v : {in.length, in.cut_bars, in.cut_concrete, in.concrete_loss}) put(v);
   key += in.cover_lost ? 'c' : '-';
   const auto [found, is_new] = numbers_.emplace(std::move(key), static_cast<int>(inputs_.size()));

@@ -18,6 +18,10 @@ namespace topple::collapse {
 double calc_zone_length(const product::Section&, const product::Concrete&, const product::Steel&, double depth,
                         double clear_length, const Knowledge&);
 
+/// Effective breadth of a slab on one side of a beam's web, EN 1992-1-1, 5.3.2.1, as of an inner span [m].
+///   half_gap  half of the clear distance to the next beam [m]; span  clear, of the beam [m]
+double calc_flange_breadth(double half_gap, double span);
+
 /// Curves and laws by all the numbers that they follow from: what many models of one plan share.
 struct KnownCurves {
   std::map<std::string, std::shared_ptr<const nearfield::Rcc>> zones;

@@ -30,13 +30,22 @@ Frame make_frame(const ZoneInput& in, Axis axis) {
 }
 
 /// Layers from `from` to `to`.
-void add_layers(Fibres& out, int count, double from, double to, double core_breadth, double cover_breadth) {
+///   cover_area  of a layer between two places [m²]
+template <typename F>
+void add_layers(Fibres& out, int count, double from, double to, double core_breadth, F cover_area) {
   const double t = (to - from) / count;
   for (int i = 0; i < count; ++i) {
     out.at.push_back(from + (i + 0.5) * t);
     out.core_area.push_back(t * core_breadth);
-    out.cover_area.push_back(t * cover_breadth);
+    out.cover_area.push_back(cover_area(from + i * t, t));
   }
+}
+
+/// A bar in a slab, which does not let it buckle.
+material::Steel make_flange_bar(const product::Steel& s) {
+  material::SteelInput steel;
+  steel.fy = s.fy, steel.fu = s.fu, steel.Es = s.Es, steel.eps_u = s.eps_u;
+  return material::make_steel(steel);
 }
 
 }  // namespace
@@ -89,13 +98,22 @@ Fibres make_fibres(const ZoneInput& in, Axis axis) {
   const double kept = in.concrete_loss >= 1 ? 0 : left_over(in.cut_concrete);
   const double cover_kept = in.cover_lost ? 0 : kept;
   constexpr int core_layers = 32, cover_layers = 4;
+  const bool has_flange = axis == Axis::Y && in.flange.breadth > 0;
+  const auto cover = [&](double breadth) {
+    return [&, breadth](double from, double t) {
+      double area = t * cover_kept * breadth;
+      if (has_flange)
+        area += std::clamp(from + t - (0.5 * f.depth - in.flange.thickness), 0.0, t) * cover_kept * in.flange.breadth;
+      return area;
+    };
+  };
   if (f.core_depth > 0 && f.core_breadth > 0) {
     const double a = 0.5 * f.depth, c = 0.5 * f.core_depth;
-    if (cover_kept > 0) add_layers(out, cover_layers, -a, -c, 0, cover_kept * f.breadth);
-    add_layers(out, core_layers, -c, c, kept * f.core_breadth, cover_kept * (f.breadth - f.core_breadth));
-    if (cover_kept > 0) add_layers(out, cover_layers, c, a, 0, cover_kept * f.breadth);
+    if (cover_kept > 0) add_layers(out, cover_layers, -a, -c, 0, cover(f.breadth));
+    add_layers(out, core_layers, -c, c, kept * f.core_breadth, cover(f.breadth - f.core_breadth));
+    if (cover_kept > 0) add_layers(out, cover_layers, c, a, 0, cover(f.breadth));
   } else {
-    add_layers(out, core_layers, -0.5 * f.depth, 0.5 * f.depth, 0, cover_kept * f.breadth);
+    add_layers(out, core_layers, -0.5 * f.depth, 0.5 * f.depth, 0, cover(f.breadth));
   }
 
   std::vector<double> diameters;
@@ -112,6 +130,13 @@ Fibres make_fibres(const ZoneInput& in, Axis axis) {
     }
     out.bar_area[row] += bars_kept * bar.area;
   }
+  if (has_flange)
+    for (const Flange::Bars& bars : {in.flange.top, in.flange.bottom}) {
+      if (!(bars.area > 0)) continue;
+      out.bar_at.push_back(0.5 * f.depth - bars.depth);
+      out.bar_area.push_back(bars_kept * bars.area);
+      out.bar_law.push_back(make_flange_bar(in.flange.steel));
+    }
   return out;
 }
 

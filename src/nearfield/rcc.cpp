@@ -22,7 +22,12 @@ double calc_bar_force(const ZoneInput& in, double stress) {
   return (1 - in.cut_bars) * in.section.steel_area() * stress;
 }
 
-bool is_symmetric(const Fibres& f) {
+double calc_flange_bar_force(const ZoneInput& in, double stress) {
+  return (1 - in.cut_bars) * (in.flange.top.area + in.flange.bottom.area) * stress;
+}
+
+bool is_symmetric(const ZoneInput& in, const Fibres& f, Axis axis) {
+  if (axis == Axis::Y && in.flange.breadth > 0) return false;
   for (size_t i = 0; i < f.bar_at.size(); ++i) {
     double here = 0, mirrored = 0;
     for (size_t j = 0; j < f.bar_at.size(); ++j) {
@@ -108,6 +113,13 @@ void check_zone(const ZoneInput& in) {
     complain("cover, diameter and spacing of the ties must not be negative");
   if (!is_share(in.cut_bars) || !is_share(in.cut_concrete) || !is_share(in.concrete_loss))
     complain("cut_bars, cut_concrete and concrete_loss must lie between 0 and 1");
+  const Flange& flange = in.flange;
+  if (!(flange.breadth >= 0)) complain("the breadth of a flange must not be negative");
+  if (flange.breadth > 0 && !(flange.thickness > 0 && flange.thickness <= s.height))
+    complain("a flange must be thinner than the section is high");
+  for (const Flange::Bars& bars : {flange.top, flange.bottom})
+    if (!(bars.area >= 0) || !(bars.depth >= 0 && bars.depth <= s.height))
+      complain("a flange's bar lies outside of it");
   for (const product::Bar& bar : s.bars) {
     if (!(bar.area > 0) || !(bar.diameter > 0)) complain("bars need a positive area and diameter");
     if (!(std::abs(bar.y) <= 0.5 * s.width) || !(std::abs(bar.z) <= 0.5 * s.height))
@@ -122,11 +134,15 @@ Rcc make_rcc(const ZoneInput& in) {
   Rcc out;
   out.length = in.length;
 
-  double area = 0;
+  double area = 0, first = 0;
   for (size_t i = 0; i < about_y.at.size(); ++i) {
     const double a = about_y.core_area[i] + about_y.cover_area[i];
-    area += a;
-    out.EI_y += about_y.cover.Ec * a * about_y.at[i] * about_y.at[i];
+    area += a, first += a * about_y.at[i];
+  }
+  const double centre = in.flange.breadth > 0 && area > 0 ? first / area : 0;
+  for (size_t i = 0; i < about_y.at.size(); ++i) {
+    const double z = about_y.at[i] - centre;
+    out.EI_y += about_y.cover.Ec * (about_y.core_area[i] + about_y.cover_area[i]) * z * z;
   }
   for (size_t i = 0; i < about_z.at.size(); ++i)
     out.EI_z += about_z.cover.Ec * (about_z.core_area[i] + about_z.cover_area[i]) * about_z.at[i] * about_z.at[i];
@@ -134,7 +150,7 @@ Rcc make_rcc(const ZoneInput& in) {
   out.EA = about_y.cover.Ec * area;
   for (size_t i = 0; i < about_y.bar_at.size(); ++i) {
     out.EA += n * about_y.bar_area[i];
-    out.EI_y += n * about_y.bar_area[i] * about_y.bar_at[i] * about_y.bar_at[i];
+    out.EI_y += n * about_y.bar_area[i] * (about_y.bar_at[i] - centre) * (about_y.bar_at[i] - centre);
   }
   for (size_t i = 0; i < about_z.bar_at.size(); ++i)
     out.EI_z += n * about_z.bar_area[i] * about_z.bar_at[i] * about_z.bar_at[i];
@@ -142,7 +158,8 @@ Rcc make_rcc(const ZoneInput& in) {
 
   const Peak peak = find_crushing(about_y);
   out.compression = make_compression(about_y, peak, out.EA, in.length);
-  const TensionBars bars{calc_bar_force(in, in.steel.fy), calc_bar_force(in, in.steel.fu),
+  const TensionBars bars{calc_bar_force(in, in.steel.fy) + calc_flange_bar_force(in, in.flange.steel.fy),
+                         calc_bar_force(in, in.steel.fu) + calc_flange_bar_force(in, in.flange.steel.fu),
                          in.steel.eps_u - in.steel.fu / in.steel.Es};
   out.tension = make_tension(bars, about_y.cover, area, in.length);
   const std::vector<double> force = make_forces(peak.force, calc_rupture_force(in, area, about_y.cover, peak.force));
@@ -150,7 +167,7 @@ Rcc make_rcc(const ZoneInput& in) {
   const auto rotation_y = make_rotations(in, in.section.height, about_y.cover);
   const auto rotation_z = make_rotations(in, in.section.width, about_z.cover);
   out.y_pos = make_family(about_y, 1, force, rotation_y, in.length);
-  out.y_neg = is_symmetric(about_y) ? out.y_pos : make_family(about_y, -1, force, rotation_y, in.length);
+  out.y_neg = is_symmetric(in, about_y, Axis::Y) ? out.y_pos : make_family(about_y, -1, force, rotation_y, in.length);
   const bool same = about_y.at == about_z.at && about_y.core_area == about_z.core_area &&
                     about_y.cover_area == about_z.cover_area && about_y.bar_at == about_z.bar_at &&
                     about_y.bar_area == about_z.bar_area && in.section.width == in.section.height;
@@ -158,10 +175,16 @@ Rcc make_rcc(const ZoneInput& in) {
     out.z_pos = out.y_neg, out.z_neg = out.y_pos;
   } else {
     out.z_pos = make_family(about_z, -1, force, rotation_z, in.length);
-    out.z_neg = is_symmetric(about_z) ? out.z_pos : make_family(about_z, 1, force, rotation_z, in.length);
+    out.z_neg = is_symmetric(in, about_z, Axis::Z) ? out.z_pos : make_family(about_z, 1, force, rotation_z, in.length);
   }
   add_shear(in, out);
-  out.biaxial_exponent = calc_biaxial_exponent(in, out);
+  if (in.flange.breadth > 0) {  // a slab does not bend aside with its beam
+    ZoneInput web = in;
+    web.flange = {};
+    out.biaxial_exponent = make_rcc(web).biaxial_exponent;
+  } else {
+    out.biaxial_exponent = calc_biaxial_exponent(in, out);
+  }
   out.damage_share = 1 - about_y.core.b_c;
   return out;
 }

@@ -9,14 +9,27 @@
 
 namespace topple::nearfield {
 
+/// What of a slab works with a beam along its upper edge, in bending about y and along the axis. Its concrete is the
+/// beam's; one that is weaker counts by less breadth.
+struct Flange {
+  double breadth = 0;    // beside the web, both sides together; 0: none [m]
+  double thickness = 0;  // [m]
+  struct Bars {
+    double depth = 0, area = 0;  // below the upper edge [m], along the beam [m²]
+  };
+  Bars top, bottom;
+  product::Steel steel;
+};
+
 /// What is asked: one zone of one section.
 struct ZoneInput {
   product::Section section;
   product::Concrete concrete;
   product::Steel steel;
+  Flange flange;
   double length = 0;         // length over which curvature localises [m]
-  double cut_bars = 0;       // fraction of bars cut before (preparation)
-  double cut_concrete = 0;   // fraction of the area taken out before
+  double cut_bars = 0;       // fraction of bars cut before (preparation), those of the flange too
+  double cut_concrete = 0;   // fraction of the area taken out before, of the flange's too
   double concrete_loss = 0;  // strength lost in the transition zone beside a charge, 0..1
   bool cover_lost = false;
 };

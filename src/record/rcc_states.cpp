@@ -71,10 +71,13 @@ Profile make_profile(Drawing& d, double x, double width, double top, double dept
   return p;
 }
 
+/// Breadth of the section at a layer, where a flange may lie beside the web [m].
+double breadth_of(const RccState::Layer& l, double web) { return std::max(web, l.core_breadth + l.cover_breadth); }
+
 void draw_section(Drawing& d, const RccReport& r, const RccState& s, double x, double top, double depth, double scale) {
   const bool about_y = s.axis == 'y';
   const double breadth = about_y ? r.width : r.height, picture = depth * scale;
-  const double half = 0.5 * breadth * scale, middle = x;
+  const double middle = x;
   const auto y_of = [&](double a) { return top + (0.5 - a / depth) * picture; };
   const auto fill = [&](double from, double to, double y1, double y2, const std::string& condition) {
     d.area({{from, y1}, {to, y1}, {to, y2}, {from, y2}}, ink_of(condition));
@@ -88,9 +91,10 @@ void draw_section(Drawing& d, const RccReport& r, const RccState& s, double x, d
     for (next = i + 1; next < s.layers.size(); ++next) {
       const RccState::Layer& n = s.layers[next];
       if (n.core != l.core || n.cover != l.cover || n.core_breadth != l.core_breadth ||
-          n.cover_breadth != l.cover_breadth)
+          std::abs(n.cover_breadth - l.cover_breadth) > 1e-9)
         break;
     }
+    const double half = 0.5 * breadth_of(l, breadth) * scale;
     const double core = 0.5 * l.core_breadth * scale, y1 = y_of(s.layers[next - 1].to), y2 = y_of(l.from);
     if (l.cover_breadth > 0 && !(l.core_breadth > 0)) fill(middle - half, middle + half, y1, y2, l.cover);
     if (l.cover_breadth > 0 && l.core_breadth > 0) {
@@ -99,12 +103,15 @@ void draw_section(Drawing& d, const RccReport& r, const RccState& s, double x, d
     }
     if (l.core_breadth > 0) fill(middle - core, middle + core, y1, y2, l.core);
   }
-  d.line({{middle - half, top},
-          {middle + half, top},
-          {middle + half, top + picture},
-          {middle - half, top + picture},
-          {middle - half, top}},
-         Ink::Text);
+  std::vector<Dot> right{{middle + 0.5 * breadth * scale, top + picture}}, outline;
+  for (const RccState::Layer& l : s.layers)
+    if (const double edge = middle + 0.5 * breadth_of(l, breadth) * scale; std::abs(edge - right.back().x) > 0.5)
+      right.push_back({right.back().x, y_of(l.from)}), right.push_back({edge, y_of(l.from)});
+  right.push_back({right.back().x, top});
+  outline = right;
+  for (auto p = right.rbegin(); p != right.rend(); ++p) outline.push_back({2 * middle - p->x, p->y});
+  outline.push_back(right.front());
+  d.line(outline, Ink::Text);
   // the edge of the core
   double low = depth, high = -depth, core = 0;
   for (const RccState::Layer& l : s.layers)
@@ -140,7 +147,9 @@ Drawing draw_states(const RccReport& r, const std::vector<const RccState*>& stat
                         first.direction < 0 ? '-' : '+', first.axis, shown(first.normal_force, unit::MN));
   d.text({left, 22}, d.title, Ink::Text, 15, 0, true);
   const double depth = first.axis == 'y' ? r.height : r.width;
-  const double breadth = first.axis == 'y' ? r.width : r.height;
+  double breadth = first.axis == 'y' ? r.width : r.height;
+  for (const RccState* s : states)
+    for (const RccState::Layer& l : s->layers) breadth = breadth_of(l, breadth);
   const double scale = std::min(largest_depth / depth, largest_breadth / breadth);
   const double picture = depth * scale, section_width = breadth * scale;
 

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "collapse/law.h"
+#include "collapse/member_zone.h"
 #include "collapse/run.h"
 #include "mbs/solver.h"
 #include "mbs/zone_law.h"
@@ -261,6 +262,8 @@ TEST(Manager, StiffnessOfMembersIsThatOfPrismaticBars) {
   const product::Member& m = plan.members[static_cast<size_t>(plan.find_member("B-A1B1-0"))];
   in.section = plan.sections[static_cast<size_t>(m.section)];
   in.concrete = plan.concretes[0], in.steel = plan.steels[0];
+  in.flange = find_member_zone(plan, default_knowledge(), plan.find_member("B-A1B1-0"), false).input.flange;
+  EXPECT_GT(in.flange.breadth, 0);
   const double L = 5 - 0.3;
   in.length = calc_zone_length(in.section, in.concrete, in.steel, 0.5, L, default_knowledge());
   const nearfield::Rcc rcc = nearfield::make_rcc(in);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "base/error.h"
@@ -49,6 +50,33 @@ TEST(MemberZone, HasTheSectionAndThePreparationOfItsEnd) {
   EXPECT_EQ(top.input.cut_bars, 0);
   EXPECT_EQ(top.name, "C-A1-0, top");
   EXPECT_GT(foot.input.length, 0.1);
+}
+
+// EN 1992-1-1, 5.3.2.1, as of an inner span: 0.2 b + 0.1 l0 on each side, l0 = 0.7 l.
+TEST(MemberZone, SlabsAreFlangesOfBeamsAlongX) {
+  const product::Plan plan = read(house());
+  const auto flange = [](const product::Plan& p, const char* name, const Knowledge& k = default_knowledge()) {
+    return find_member_zone(p, k, p.find_member(name), false).input.flange;
+  };
+  const double gap = 4 - 0.3, l0 = 0.7 * (5 - 0.3);  // between webs, between columns
+  const double side = std::min(0.2 * 0.5 * gap + 0.1 * l0, 0.2 * l0);
+  const nearfield::Flange middle = flange(plan, "B-A2B2-0");
+  EXPECT_NEAR(middle.breadth, 2 * side, 1e-12);
+  EXPECT_EQ(middle.thickness, 0.15);
+  EXPECT_NEAR(middle.top.area, 0.2 * 2 * side * 4e-4, 1e-12) << "distribution bars";
+  EXPECT_NEAR(flange(plan, "B-A1B1-0").breadth, side, 1e-12) << "at the edge";
+  EXPECT_EQ(flange(plan, "B-A1A2-0").breadth, 0) << "the slab is an element of its own there";
+  EXPECT_EQ(flange(read(house("[preparation]\nremoved = [\"S-*-0\"]\n")), "B-A2B2-0").breadth, 0);
+  Knowledge none = default_knowledge();
+  none.slab_flange_share = 0;
+  EXPECT_EQ(flange(plan, "B-A2B2-0", none).breadth, 0);
+  // a weaker slab counts by less breadth
+  std::string text = house();
+  const std::string panel = "[slab.floor]\nthickness = \"15 cm\"\nconcrete = \"C25\"";
+  text.replace(text.find(panel), panel.size(),
+               "[concrete.light]\nfc = \"10 N/mm2\"\nEc = \"12 GPa\"\n[slab.floor]\nthickness = \"15 cm\"\nconcrete = "
+               "\"light\"");
+  EXPECT_NEAR(flange(read(text), "B-A2B2-0").breadth, 0.4 * 2 * side, 1e-12);
 }
 
 TEST(MemberZone, RefusesWhatHasNoZone) {

@@ -285,6 +285,76 @@ TEST(Rcc, PreparationWeakens) {
   compare(in, "no concrete");
 }
 
+/// A beam of 30 x 60 cm with 20 cm2 below and 10 above, and a slab of 15 cm on both sides.
+ZoneInput make_tee() {
+  ZoneInput in = make_core();
+  product::Section& s = in.section;
+  s.width = 0.3, s.height = 0.6;
+  s.bars = {
+      {-0.1, -0.25, 10e-4, 0.0357}, {0.1, -0.25, 10e-4, 0.0357}, {-0.1, 0.25, 5e-4, 0.0252}, {0.1, 0.25, 5e-4, 0.0252}};
+  in.length = 0.4;
+  in.flange.breadth = 1.2, in.flange.thickness = 0.15, in.flange.steel = in.steel;
+  return in;
+}
+
+// EI by Steiner; sagging, the flange is the zone of compression: A_s f_y (d - x / 2), x = A_s f_y / (b f_c).
+TEST(Flange, IsStiffAndPressedOverItsBreadth) {
+  const ZoneInput tee = make_tee();
+  ZoneInput web = tee;
+  web.flange = {};
+  const Rcc with = make_rcc(tee), without = make_rcc(web);
+  const double Ec = 30e9, n = (200e9 - Ec) / Ec;
+  const double parts[][2] = {{0.3 * 0.6, 0}, {1.2 * 0.15, 0.225}};  // area, place
+  double area = 0, first = 0;
+  for (const auto& p : parts) area += p[0], first += p[0] * p[1];
+  const double centre = first / area;
+  double I = 0.3 * std::pow(0.6, 3) / 12 + 1.2 * std::pow(0.15, 3) / 12;
+  for (const auto& p : parts) I += p[0] * std::pow(p[1] - centre, 2);
+  for (const product::Bar& b : tee.section.bars) I += n * b.area * std::pow(b.z - centre, 2);
+  EXPECT_NEAR(with.EI_y, Ec * I, 0.01 * Ec * I) << "layers do not end where the flange does";
+  EXPECT_NEAR(with.EA, without.EA + Ec * 0.18, 1e-9 * with.EA);
+  EXPECT_EQ(with.EI_z, without.EI_z);
+  EXPECT_EQ(with.z_pos.moment.size(), without.z_pos.moment.size());
+  EXPECT_EQ(with.shear_z, without.shear_z) << "the web's affair";
+  EXPECT_EQ(with.biaxial_exponent, without.biaxial_exponent);
+  // positive about y pulls at the top
+  const auto yields = [](const MomentFamily& f) { return f.yield_moment[row_of(f, 0)]; };
+  const double force = 20e-4 * 420 * MPa, x = force / (1.5 * 25 * MPa);
+  const double sagging = peak_of(with.y_neg, row_of(with.y_neg, 0));
+  EXPECT_GT(sagging, force * (0.55 - 0.5 * x)) << "bars harden";
+  EXPECT_LT(sagging, 1.25 * force * 0.55);
+  EXPECT_GT(yields(with.y_neg), 1.02 * yields(without.y_neg));
+  EXPECT_NEAR(yields(with.y_pos), yields(without.y_pos), 0.02 * yields(without.y_pos)) << "cracked";
+}
+
+TEST(Flange, ItsBarsPullWithThoseOfTheWeb) {
+  ZoneInput in = make_tee();
+  const Rcc plain = make_rcc(in);
+  in.flange.top = {0.02, 3e-4};
+  in.flange.bottom = {0.13, 3e-4};
+  const Rcc with = make_rcc(in);
+  const auto peak = [](const MomentFamily& f) { return peak_of(f, row_of(f, 0)); };
+  // about 20 cm of concrete press: levers of 0.5 and 0.4 m at least
+  const double more = peak(with.y_pos) - peak(plain.y_pos), force = 3e-4 * 420 * MPa;
+  EXPECT_GT(more, (0.4 + 0.3) * force);
+  EXPECT_LT(more, (0.6 + 0.5) * 1.25 * force);
+  EXPECT_NEAR(with.tension.force.front() - plain.tension.force.front(), 2 * force, 1e-6 * force);
+  in.cut_bars = 0.5;
+  EXPECT_NEAR(make_rcc(in).tension.force.front(), 0.5 * with.tension.force.front(), 1e-6 * force) << "cut with them";
+}
+
+TEST(Flange, IsRefusedWhereItIsNoSlabAtTheUpperEdge) {
+  for (const auto& spoil :
+       {+[](Flange& f) { f.breadth = -1; }, +[](Flange& f) { f.thickness = 0; }, +[](Flange& f) { f.thickness = 0.7; },
+        +[](Flange& f) {
+          f.top = {0.9, 1e-4};
+        }}) {
+    ZoneInput in = make_tee();
+    spoil(in.flange);
+    EXPECT_THROW(make_rcc(in), InputError);
+  }
+}
+
 TEST(Rcc, ShearAndTorsionGrowWithTies) {
   ZoneInput in = make_core();
   const Rcc r = make_rcc(in);
