@@ -23,6 +23,7 @@ struct Part {
 
   std::size_t first() const { return number >> 16 & kMost; }
   std::size_t last() const { return number & kMost; }
+  std::uint64_t loop() const { return number >> 32; }
   bool is_empty() const { return first() == last(); }
   std::uint64_t without_first() const { return number + (1U << 16); }
   std::uint64_t without_last() const { return number - 1; }
@@ -79,11 +80,12 @@ struct Team::Inside {
     return (count.load(std::memory_order_acquire) + size - 1) / size;
   }
 
-  /// Takes of a part, its owner from the front, others from the back, until nothing is left.
-  void work_on(std::size_t k, bool is_own) {
+  /// Takes of a part, its owner from the front, others from the back, until nothing is left. Others take of this loop
+  /// alone: the next one begins with everybody's own.
+  void work_on(std::size_t k, bool is_own, std::uint64_t joined) {
     std::atomic<std::uint64_t>& shared = parts[k].number;
     Part now{shared.load(std::memory_order_acquire)};
-    while (!now.is_empty()) {
+    while (!now.is_empty() && (is_own || now.loop() == joined)) {
       const auto* call = body.load(std::memory_order_acquire);
       const std::size_t size = bundle.load(std::memory_order_acquire), all = count.load(std::memory_order_acquire);
       const std::size_t number = is_own ? now.first() : now.last() - 1, bundles_in_all = bundles();
@@ -104,8 +106,9 @@ struct Team::Inside {
   }
   /// The part of thread `k`, which it had in the loops before and so has in its cache, then what others have left.
   void work(std::size_t k) {
-    work_on(k, true);
-    for (std::size_t i = 1; i < parts.size(); ++i) work_on((k + i) % parts.size(), false);
+    const std::uint64_t joined = Part{parts[k].number.load(std::memory_order_acquire)}.loop();
+    work_on(k, true, joined);
+    for (std::size_t i = 1; i < parts.size(); ++i) work_on((k + i) % parts.size(), false, joined);
   }
 
   void stand_by(std::size_t k) {
