@@ -482,7 +482,7 @@ struct Evaluation {
   }
 
   /// Bending at the stations: radial return on (|My|/Ly)^p + (|Mz|/Lz)^p = 1.
-  void turn_stations(const Limits (&limits)[2]) {
+  void turn_stations(const Limits (&limits)[2], bool is_at_rest) {
     for (int s = 0; s < n; ++s)
       for (int q = first; q <= last; ++q) phi_trial[q][s] = phi[q][s];
     double scale[2][2];  // [s][q]
@@ -505,12 +505,22 @@ struct Evaluation {
       }
     }
     if (!outside[0] || !outside[1] || turn_both(scale)) return;
-    // in turns
-    for (int sweep = 0; sweep < 12; ++sweep) {
+    // in turns; at rest, where a whole deformation comes at once, each anew, so that it gives back what the other one
+    // has made needless
+    const int most_sweeps = is_at_rest ? 60 : 12;
+    for (int sweep = 0; sweep < most_sweeps; ++sweep) {
       bool changed = false;
       for (int s = 0; s < 2; ++s) {
+        double before[2] = {0, 0};
+        for (int q = first; q <= last; ++q) {
+          before[q] = phi[q][s];
+          if (is_at_rest) phi[q][s] = phi_trial[q][s];
+        }
+        turned[s] = turned[s] && !is_at_rest;
         measure(s);
-        if (is_outside(limits[s], s, scale[s]) && turn(s, scale[s])) changed = true;
+        if (is_outside(limits[s], s, scale[s])) (void)turn(s, scale[s]);
+        for (int q = first; q <= last; ++q)
+          changed = changed || std::abs(phi[q][s] - before[q]) > 1e-9 * std::abs(phi[q][s]);
       }
       if (!changed) break;
     }
@@ -734,7 +744,7 @@ struct Evaluation {
     const double axial = integrity > 0 ? force[0] / integrity : 0;
     find_limits(limits, axial, integrity);
     crack_stations(h);
-    turn_stations(limits);
+    turn_stations(limits, h == 0);
     const double elongation = lengthen(limits, axial);
     for (int s = 0; s < n; ++s) {
       StationState& st = z.station[s];

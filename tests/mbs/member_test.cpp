@@ -172,5 +172,68 @@ TEST(Member, SmallDeformationsAreThoseOfTheMarkers) {
   }
 }
 
+/// Resultants of a member from virgin state, and what its stations have done.
+struct FromVirgin {
+  CompiledLaws laws{compile_law(make_law())};
+  ZoneParameters p = test::make_member();
+  ZoneState z;
+  FromVirgin(const double (&d)[4], kernel::Plane plane) {
+    p.plane = plane;
+    Six deformation{};
+    deformation.c[1] = d[0], deformation.c[2] = d[1], deformation.c[4] = d[2], deformation.c[5] = d[3];
+    advance_zone(p, laws, deformation, 0, 0, z);
+  }
+  double moment(int station, int axis) const {
+    return z.elastic_force[4 + axis] + (axis == 0 ? 1 : -1) * p.x[station] * z.elastic_force[2 - axis];
+  }
+};
+
+TEST(Member, StationsThatHaveTurnedStandOnTheirLimitWhichPushesThem) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> some(-1, 1);
+  int turned[3] = {0, 0, 0};
+  for (int i = 0; i < 6000; ++i) {
+    const bool is_plane = i % 2 == 0;
+    const double size = std::pow(some(random), 2);
+    const double d[4] = {0.03 * size * some(random), is_plane ? 0 : 0.03 * size * some(random),
+                         is_plane ? 0 : 0.02 * size * some(random), 0.02 * size * some(random)};
+    const FromVirgin v(d, is_plane ? kernel::Plane::AboutZ : kernel::Plane::Space);
+    int count = 0;
+    for (int s = 0; s < 2; ++s) {
+      const double* phi = v.z.station[s].phi;
+      const double m[2] = {v.moment(s, 0), v.moment(s, 1)};
+      const double used = std::pow(std::abs(m[0]) / kMoment, 1.5) + std::pow(std::abs(m[1]) / kMoment, 1.5);
+      EXPECT_LE(used, 1 + 1e-6) << i << " " << s;
+      if (phi[0] == 0 && phi[1] == 0) continue;
+      ++count;
+      EXPECT_GE(used, 1 - 1e-6) << i << " " << s;
+      EXPECT_GE(phi[0] * m[0] + phi[1] * m[1], 0) << i << " " << s;
+    }
+    ++turned[count];
+  }
+  for (const int n : turned) EXPECT_GT(n, 200);
+}
+
+TEST(Member, ForcesFollowLargeDeformationsWithoutAJump) {
+  // across where both stations flow and one of them begins to give back: 400 steps from one bent shape to another
+  std::mt19937 random(12);
+  std::uniform_real_distribution<double> some(-1, 1);
+  for (int i = 0; i < 200; ++i) {
+    double from[4], by[4];
+    for (double* x : {from, by}) x[0] = 0.03 * some(random), x[3] = 0.02 * some(random), x[1] = x[2] = 0;
+    double before = 0;
+    constexpr int steps = 400;
+    for (int k = 0; k <= steps; ++k) {
+      double d[4];
+      for (int c = 0; c < 4; ++c) d[c] = from[c] + k * by[c] / steps;
+      const double moment = FromVirgin(d, kernel::Plane::AboutZ).moment(0, 1);
+      // no more than the spring would bring: 6 EI/L² of the displacement, 4 EI/L of the rotation, in one step
+      const double most = test::kMemberEI / kLength * (6 * std::abs(by[0]) / kLength + 4 * std::abs(by[3])) / steps;
+      if (k > 0) { EXPECT_LE(std::abs(moment - before), 2 * most + 1e-6) << i << " " << k; }
+      before = moment;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace topple::mbs
