@@ -195,6 +195,10 @@ void System::find_pairs() {
   PairSearch& search = contact.search;
   if (s.links_due || !search.has_links) find_links();
   s.search_due = false;
+  // bodies that are nowhere are near no other; the step ends as diverged
+  Vec3 sum;
+  for (size_t b = 0; b < B; ++b) sum += s.p[b] + s.v[b] + s.w[b];
+  if (!std::isfinite(sum.x + sum.y + sum.z)) return;
   s.travel.resize(B);
   s.is_fast.resize(B);
   if (!model.contact.bodies) {

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
 #include <set>
 #include <utility>
 
@@ -114,6 +115,20 @@ TEST(Search, MissesNoPairWhereLinksEnd) {
   EXPECT_GT(overlaps, 5000);
   EXPECT_GT(releases, 5);
   EXPECT_LT(searches, 200);  // breaks alone ask for none
+}
+
+TEST(Search, EndsWhereABodyIsNowhere) {
+  for (const double nowhere : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    Options o;
+    o.equilibrium = false;
+    System s(make_wall(), o);
+    s.start();
+    for (const size_t b : {3, 7, 11}) s.state.p[b] = Vec3{1.5, nowhere, 0};
+    s.find_pairs();
+    for (const size_t b : {3, 7, 11}) s.state.p[b] = Vec3{nowhere, 0, 0};
+    s.find_pairs();
+    EXPECT_FALSE(s.advance_step());
+  }
 }
 
 TEST(SearchReplay, GoesOnWithTheSameBitsWherePairsAreHeld) {
