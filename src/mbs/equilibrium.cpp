@@ -11,6 +11,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "mbs/acceleration.h"
 #include "mbs/contact_kernel.h"
 #include "mbs/joint_rows.h"
 #include "mbs/system.h"
@@ -556,7 +557,12 @@ namespace {
 /// The dead-load equilibrium by Newton's method, joints by multipliers that each iteration corrects.
 class DeadLoad {
  public:
-  explicit DeadLoad(System& s) : s_(s), assembly_(s), u_(assembly_.unknowns()), multiplier_(s.joints.size()) {}
+  explicit DeadLoad(System& s)
+      : s_(s),
+        assembly_(s),
+        u_(assembly_.unknowns()),
+        multiplier_(s.joints.size()),
+        pushed_back_(Vector::Zero(6 * static_cast<Eigen::Index>(s.joints.size()))) {}
 
   bool is_needed() const { return assembly_.count() > 0; }
   /// Puts bodies and joints into the equilibrium. False: there is none, and the message says why.
@@ -572,6 +578,16 @@ class DeadLoad {
   /// Evaluates all forces where the bodies are now; multipliers and joints' forces follow their gaps.
   void find_unbalanced();
   void move(const Vector& by);
+  /// Of free bodies, and the joints' multipliers.
+  struct Place {
+    std::vector<Vec3> p;
+    std::vector<Quat> q;
+    std::vector<std::array<double, 6>> multiplier;
+  };
+  Place find_place() const;
+  void go_back(const Place&);
+  /// Moves by the accelerated step; where the last one led away, from where that began.
+  void move_accelerated();
   void find_most_loaded();
   /// Of the last evaluation: tangents where they lead nearer, else secants, which go there slowly but surely.
   void find_cracks(bool by_tangents);
@@ -587,10 +603,15 @@ class DeadLoad {
   Assembly::Flexibility cracks_;
   bool has_cracks_ = false;
   std::vector<std::array<double, 6>> multiplier_;
+  Vector pushed_back_;                    // what multipliers changed by last (6 per joint)
   Vector pushed_;                         // unbalanced, and gaps pushed back
   double unbalanced_ = 0, gap_left_ = 0;  // over the weight; [m, rad]
+  size_t most_unbalanced_ = 0;            // body
   size_t most_loaded_ = 0;                // element, without limits
   double most_load_ = 0;
+  Acceleration acceleration_;
+  Place begun_;  // of the last accelerated step
+  Vector begun_step_, begun_pushed_;
 };
 
 int DeadLoad::find_loose_body() const {
@@ -689,6 +710,7 @@ void DeadLoad::find_unbalanced() {
       const KinematicRow& row = rows[i];
       double& held = multiplier_[j][static_cast<size_t>(i)];
       held -= penalty_ * gap[i];
+      pushed_back_[static_cast<Eigen::Index>(6 * j) + i] = -penalty_ * gap[i];
       gap_left_ = std::max(gap_left_, std::abs(gap[i]));
       const auto load = [&](Vector& on, double f) {
         for (int k = 0; k < u_.each; ++k) {
@@ -703,7 +725,10 @@ void DeadLoad::find_unbalanced() {
       if (i >= s_.joints[j].lines) js.moment += held * row.wb;
     }
   }
+  Eigen::Index most = 0;
+  r.cwiseAbs().maxCoeff(&most);
   unbalanced_ = r.lpNorm<Eigen::Infinity>() / weight_;
+  most_unbalanced_ = static_cast<size_t>(assembly_.free_bodies()[static_cast<size_t>(most / u_.each)]);
 }
 
 void DeadLoad::move(const Vector& by) {
@@ -718,6 +743,43 @@ void DeadLoad::move(const Vector& by) {
     s_.state.q[b] = normalized(exp_rotation(turned) * s_.state.q[b]);
     s_.state.R[b] = to_matrix(s_.state.q[b]);
   }
+}
+
+DeadLoad::Place DeadLoad::find_place() const {
+  Place place;
+  for (const int b : assembly_.free_bodies()) {
+    place.p.push_back(s_.state.p[static_cast<size_t>(b)]);
+    place.q.push_back(s_.state.q[static_cast<size_t>(b)]);
+  }
+  place.multiplier = multiplier_;
+  return place;
+}
+
+void DeadLoad::go_back(const Place& place) {
+  for (size_t i = 0; i < assembly_.free_bodies().size(); ++i) {
+    const size_t b = static_cast<size_t>(assembly_.free_bodies()[i]);
+    s_.state.p[b] = place.p[i];
+    s_.state.q[b] = place.q[i];
+    s_.state.R[b] = to_matrix(place.q[i]);
+  }
+  multiplier_ = place.multiplier;
+}
+
+void DeadLoad::move_accelerated() {
+  Vector step(assembly_.count() + pushed_back_.size());
+  step << solver_.solve(pushed_), pushed_back_;
+  if (acceleration_.accepts(step, pushed_)) {
+    begun_ = find_place(), begun_step_ = step, begun_pushed_ = pushed_;
+  } else {
+    go_back(begun_);
+    step = begun_step_, pushed_ = begun_pushed_;
+  }
+  const Vector way = acceleration_.improve(step, pushed_);
+  // joints' reactions follow; of that the step itself has been done
+  const Vector more = (way - step).tail(pushed_back_.size());
+  for (size_t j = 0; j < multiplier_.size(); ++j)
+    for (size_t i = 0; i < 6; ++i) multiplier_[j][i] += more[static_cast<Eigen::Index>(6 * j + i)];
+  move(way.head(assembly_.count()));
 }
 
 void DeadLoad::find_most_loaded() {
@@ -743,16 +805,21 @@ void DeadLoad::find_cracks(bool by_tangents) {
 }
 
 std::string DeadLoad::describe_failure(bool has_diverged) const {
-  char numbers[200];
-  std::snprintf(numbers, sizeof numbers,
+  char words[240];
+  std::snprintf(words, sizeof words,
                 "no dead-load equilibrium after %d iterations: the largest unbalanced force %s %.2g of the weight",
                 s_.summary.equilibrium_iterations, has_diverged ? "grew without bound and was last" : "is",
                 unbalanced_);
-  std::string message = numbers;
+  std::string message = words;
+  if (!has_diverged) message += ", of body \"" + s_.model.bodies[most_unbalanced_].name.substr(0, 60) + "\"";
   if (most_load_ > 0) {
-    std::snprintf(numbers, sizeof numbers, "; without limits element \"%s\" would be loaded to %.0f %% of its capacity",
-                  s_.model.elements[most_loaded_].name.substr(0, 60).c_str(), 100 * most_load_);
-    message += numbers;
+    constexpr double countless = 100;  // hardly any capacity is left
+    if (most_load_ < countless)
+      std::snprintf(words, sizeof words, "to %.0f %% of its capacity", 100 * most_load_);
+    else
+      std::snprintf(words, sizeof words, "to more than %.0f times its capacity", countless);
+    message += "; without limits element \"" + s_.model.elements[most_loaded_].name.substr(0, 60) +
+               "\" would be loaded " + words;
   }
   return message;
 }
@@ -781,26 +848,35 @@ bool DeadLoad::find(std::string& message) {
   constexpr int most = 400;
   constexpr int fresh = 12;  // most iterations with a stiffness of their own; then the last one serves
   constexpr int fresh_by_cracks = 60;
+  constexpr int patience = 8;            // slow rounds before the stiffness stays and steps are accelerated
+  constexpr int most_accelerated = 400;  // then on as before, from where that began
   constexpr double quick = 0.03;  // of the unbalanced force is left after an iteration with a stiffness that still fits
-  int idle = 0, factorised = 0, secants = 0;
+  int idle = 0, factorised = 0, secants = 0, slow = 0;
   bool by_tangents = false;
   double best = 1e300, last_unbalanced = 0, last_finite = 0;
   bool has_diverged = false;
-  for (int round = 0; round <= most; ++round) {
+  enum class Steps { Plain, Accelerated, PlainAgain } steps = Steps::Plain;
+  int accelerated = 0;
+  Place slow_place;
+  for (int round = 0, all = 0;; ++all) {
     s_.state.element = virgin;
     s_.state.rotational = virgin_rotational;
     find_unbalanced();
-    s_.summary.equilibrium_iterations = round;
+    s_.summary.equilibrium_iterations = all;
     s_.summary.equilibrium_residual = unbalanced_;
-    if (!std::isfinite(unbalanced_)) {
+    if (std::isfinite(unbalanced_)) {
+      last_finite = unbalanced_;
+    } else if (steps != Steps::Accelerated) {
       s_.summary.equilibrium_residual = unbalanced_ = last_finite;
       has_diverged = true;
       break;
     }
-    last_finite = unbalanced_;
     if (s_.ignores_limits && ((unbalanced_ < 1e-6 && gap_left_ < 1e-6) || round == most / 2)) {
       find_most_loaded();
       s_.ignores_limits = false;
+      steps = Steps::Plain;
+      slow = accelerated = 0, acceleration_ = {};
+      ++round;
       continue;
     }
     if (!s_.ignores_limits && unbalanced_ < 1e-11 && gap_left_ < 1e-11) break;
@@ -808,24 +884,45 @@ bool DeadLoad::find(std::string& message) {
     idle = unbalanced_ < 0.5 * best ? 0 : idle + 1;
     best = std::min(best, unbalanced_);
     if (round == most || (idle > 2 && unbalanced_ < good_enough)) break;
-    if (by_tangents && unbalanced_ > 0.5 * last_unbalanced) secants = 4;
-    by_tangents = secants == 0;
+    if (steps == Steps::Accelerated) {
+      if (++accelerated < most_accelerated && (std::isfinite(unbalanced_) || !acceleration_.is_plain())) {
+        move_accelerated();
+        continue;
+      }
+      go_back(slow_place);
+      steps = Steps::PlainAgain;
+      continue;
+    }
+    if (unbalanced_ > 0.5 * last_unbalanced) {
+      ++slow;
+      if (by_tangents) secants = 4;
+    }
+    if (steps == Steps::Plain && slow == patience) {
+      steps = Steps::Accelerated;
+      slow_place = find_place();
+    }
+    by_tangents = secants == 0 && steps != Steps::Accelerated;
     find_cracks(by_tangents);
     secants = std::max(0, secants - 1);
     s_.state.element = virgin;
-    if (round == 0 || (factorised < (has_cracks_ ? fresh_by_cracks : fresh) && unbalanced_ > good_enough &&
-                       unbalanced_ > quick * last_unbalanced)) {
+    if (round == 0 || steps == Steps::Accelerated ||
+        (factorised < (has_cracks_ ? fresh_by_cracks : fresh) && unbalanced_ > good_enough &&
+         unbalanced_ > quick * last_unbalanced)) {
       ++factorised;
       if (!factorise(message)) return false;
     }
     last_unbalanced = unbalanced_;
-    move(solver_.solve(pushed_));
+    if (steps == Steps::Accelerated) {
+      move_accelerated();
+    } else {
+      move(solver_.solve(pushed_));
+    }
+    ++round;
   }
-  if (has_diverged || !(unbalanced_ < good_enough)) {
-    message = describe_failure(has_diverged);
-    return false;
-  }
-  return true;
+  if (!has_diverged && unbalanced_ < good_enough) return true;
+  constexpr double boundless = 1e6;
+  message = describe_failure(has_diverged || !(unbalanced_ < boundless));
+  return false;
 }
 
 }  // namespace

@@ -246,9 +246,11 @@ export const german: readonly (readonly [string, string])[] = [
   ["body \"{}\" is not connected to the ground by any element or joint: there is no dead-load equilibrium", "Körper „{}“ ist durch kein Element und kein Gelenk mit dem Boden verbunden: Es gibt kein Gleichgewicht unter Eigengewicht"],
   ["the stiffness matrix of the dead-load equilibrium could not be factorised: the model is a mechanism", "die Steifigkeitsmatrix des Gleichgewichts ließ sich nicht zerlegen: Das Modell ist ein Mechanismus"],
   ["body \"{}\" can move without resistance: the model is a mechanism and has no dead-load equilibrium", "Körper „{}“ kann sich ohne Widerstand bewegen: Das Modell ist ein Mechanismus und hat kein Gleichgewicht unter Eigengewicht"],
+  ["no dead-load equilibrium after {:d} iterations: the largest unbalanced force is {:.2g} of the weight, of body \"{}\"", "kein Gleichgewicht nach {} Iterationen: Die größte nicht ausgeglichene Kraft ist das {}-Fache des Gewichts, an Körper „{}“"],
   ["no dead-load equilibrium after {:d} iterations: the largest unbalanced force is {:.2g} of the weight", "kein Gleichgewicht nach {} Iterationen: Die größte nicht ausgeglichene Kraft ist das {}-Fache des Gewichts"],
   ["no dead-load equilibrium after {:d} iterations: the largest unbalanced force grew without bound and was last {:.2g} of the weight", "kein Gleichgewicht nach {} Iterationen: Die größte nicht ausgeglichene Kraft wuchs ohne Grenze und war zuletzt das {}-Fache des Gewichts"],
   ["without limits element \"{}\" would be loaded to {:.0f} % of its capacity", "ohne Grenzen wäre Element „{}“ zu {} % seines Widerstands belastet"],
+  ["without limits element \"{}\" would be loaded to more than {:.0f} times its capacity", "ohne Grenzen wäre Element „{}“ zu mehr als dem {}-Fachen seines Widerstands belastet"],
   ["dead load not in equilibrium after {:d} steps: out of balance by {:.2g} of the load, settled by {:.3g} mm", "Eigengewicht nach {} Schritten nicht im Gleichgewicht: das {}-Fache der Last nicht ausgeglichen, um {} mm gesetzt"],
   ["positions are no longer finite", "Orte sind keine endlichen Zahlen mehr"],
   // not modelled
