@@ -115,8 +115,14 @@ collapse::RunOptions make_options(const Arguments& a) {
 }
 
 collapse::Knowledge load_knowledge(const Arguments& a) {
-  return a.knowledge.empty() ? collapse::default_knowledge()
-                             : collapse::read_knowledge(read_file(a.knowledge), a.knowledge);
+  if (a.knowledge.empty()) return collapse::default_knowledge();
+  try {
+    return collapse::read_knowledge(read_file(a.knowledge), a.knowledge);
+  } catch (const InputError& e) {
+    std::vector<Diagnostic> complaints = e.diagnostics();
+    for (Diagnostic& d : complaints) d.width = 0;  // lines that are shown are those of the plan
+    throw InputError(complaints);
+  }
 }
 
 std::optional<std::string> find_bundle(const std::string& name) {

@@ -50,7 +50,7 @@ std::string render(const Diagnostic& d, const std::string& text, bool colour) {
     out += ": ";
   }
   out += std::string(off) + tint + (error ? "error " : "warning ") + d.code + off + ": " + d.message + "\n";
-  if (d.where.line > 0 && !text.empty()) {
+  if (d.where.line > 0 && d.width > 0 && !text.empty()) {
     // a line of minified or hostile input can be huge: show a window of it around the place
     constexpr size_t window = 160;
     std::string line = line_of(text, d.where.line);

@@ -21,7 +21,7 @@ struct Diagnostic {
   Severity severity = Severity::Error;
   std::string code;      // stable, "E203"
   SourcePosition where;  // where the offending words begin
-  int width = 1;         // characters to underline
+  int width = 1;         // characters to underline; 0: the line is not shown
   std::string message;   // what is wrong, with the field, its value and the allowed range
   std::string help;      // what to do; may be empty
 };

@@ -3,9 +3,11 @@
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "base/error.h"
 #include "collapse/knowledge_data.h"
+#include "mbs/json_document.h"
 
 namespace topple::collapse {
 
@@ -70,18 +72,28 @@ const std::map<std::string, Field>& fields() {
 Knowledge read_knowledge(const std::string& text, const std::string& name) {
   using nlohmann::json;
   std::vector<Diagnostic> complaints;
+  constexpr const char* help = "`topple rules --json` writes a whole set";
+  std::optional<mbs::JsonDocument> places;
+  try {
+    places.emplace(text, name);
+  } catch (const InputError& e) {
+    complaints = e.diagnostics();
+    for (Diagnostic& d : complaints) d.help = help;
+    throw InputError(complaints);
+  }
+  std::string at;  // path of the rule in hand
   const auto complain = [&](const std::string& what) {
-    complaints.push_back({Severity::Error, "E661", {name, 0, 0}, 1, what, "`topple rules --json` writes a whole set"});
+    complaints.push_back(places->make_diagnostic("E661", at, what, help));
   };
   Knowledge knowledge{};
-  const json document = json::parse(text, nullptr, false);
-  if (document.is_discarded() || !document.is_object() || !document.contains("rules") ||
-      !document["rules"].is_array()) {
+  const json document = json::parse(text);
+  if (!document.is_object() || !document.contains("rules") || !document["rules"].is_array()) {
     complain("is not a JSON object with a list \"rules\"");
     throw InputError(complaints);
   }
   std::map<std::string, bool> seen;
   for (const json& entry : document["rules"]) {
+    at = "rules[" + std::to_string(&entry - &document["rules"].front()) + "]";
     Rule rule;
     const auto word = [&](const char* key) {
       return entry.is_object() && entry.contains(key) && entry[key].is_string() ? entry[key].get<std::string>()
@@ -111,6 +123,7 @@ Knowledge read_knowledge(const std::string& text, const std::string& name) {
     if (!entry.contains("value") || !entry["value"].is_number() || !std::isfinite(entry["value"].get<double>()) ||
         entry["value"].get<double>() < 0 || (entry["value"].get<double>() == 0 && !may_be_zero) ||
         (entry["value"].get<double>() > 1 && is_between)) {
+      at += ".value";
       complain("rule \"" + rule.id + "\" needs a value " + (is_between ? "from 0 to 1" : may_be_zero ? ">= 0" : "> 0"));
       continue;
     }
@@ -118,6 +131,7 @@ Knowledge read_knowledge(const std::string& text, const std::string& name) {
     knowledge.*(field->second) = rule.value;
     knowledge.rules.push_back(std::move(rule));
   }
+  at.clear();
   for (const auto& [id, field] : fields())
     if (!seen[id]) complain("rule \"" + id + "\" is missing");
   if (!complaints.empty()) throw InputError(complaints);

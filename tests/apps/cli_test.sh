@@ -40,6 +40,8 @@ usage)
   expect 0 "$topple" check "$plan" --knowledge rules.json
   sed 's/"zone.rupture_rotation"/"zone.rupture_rotatoin"/' rules.json >wrong.json
   expect 2 "$topple" check "$plan" --knowledge wrong.json; has err 'did you mean "zone.rupture_rotation"'
+  head -c 200 rules.json >cut.json
+  expect 2 "$topple" check "$plan" --knowledge cut.json; has err "cut.json:8:49: "; has err "error E611: this is not JSON"
   ;;
 study)
   cat >in.toml <<'TEXT'

@@ -42,14 +42,17 @@ TEST(Knowledge, EveryRuleHasAReasonInWords) {
 }
 
 TEST(Knowledge, RefusesWhatIsNotASet) {
-  EXPECT_THAT(complaint_of(""), testing::HasSubstr("not a JSON object"));
+  EXPECT_THAT(complaint_of(""), testing::HasSubstr("E611"));
+  EXPECT_THAT(complaint_of("{\"rules\": [\n  {]}"),
+              testing::AllOf(testing::HasSubstr("E611"), testing::HasSubstr(":2:4:")));
   EXPECT_THAT(complaint_of("[1, 2]"), testing::HasSubstr("not a JSON object"));
   EXPECT_THAT(complaint_of("{\"rules\": []}"), testing::HasSubstr("\"zone.length_by_depth\" is missing"));
   EXPECT_THAT(complaint_of(replaced(shipped(), "\"zone.slip_rupture\"", "\"zone.slip_ruptur\"")),
               testing::AllOf(testing::HasSubstr("did you mean \"zone.slip_rupture\""),
                              testing::HasSubstr("\"zone.slip_rupture\" is missing")));
-  EXPECT_THAT(complaint_of(replaced(shipped(), "\"value\": 0.35", "\"value\": -0.35")),
-              testing::HasSubstr("\"zone.rupture_rotation\" needs a value > 0"));
+  EXPECT_THAT(
+      complaint_of(replaced(shipped(), "\"value\": 0.35", "\"value\": -0.35")),
+      testing::ContainsRegex(":[1-9][0-9]*:[1-9][0-9]*: error E661: rule \"zone.rupture_rotation\" needs a value > 0"));
   EXPECT_THAT(complaint_of(replaced(shipped(), "\"zone.elongation_share\", \"value\": 1",
                                     "\"zone.elongation_share\", \"value\": -1")),
               testing::HasSubstr("\"zone.elongation_share\" needs a value >= 0"));
