@@ -1,13 +1,17 @@
 #include "collapse/knowledge.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <utility>
 
 #include "base/error.h"
 #include "collapse/knowledge_data.h"
 #include "mbs/json_document.h"
+#include "mbs/laws.h"
 
 namespace topple::collapse {
 
@@ -67,6 +71,14 @@ const std::map<std::string, Field>& fields() {
   return table;
 }
 
+/// Of rules that the multibody model, or what they mean, bounds on both sides.
+const std::map<std::string, std::pair<double, double>>& ranges() {
+  static const std::map<std::string, std::pair<double, double>> list = {
+      {"member.uncracked_share", {0, 1}},   {"slab.flange_share", {0, 1}},    {"slab.distribution_share", {0, 1}},
+      {"contact.body_restitution", {0, 1}}, {"zone.damping_ratio", {0, 0.2}}, {"zone.biaxial_exponent", {1, 10}}};
+  return list;
+}
+
 }  // namespace
 
 Knowledge read_knowledge(const std::string& text, const std::string& name) {
@@ -117,17 +129,21 @@ Knowledge read_knowledge(const std::string& text, const std::string& name) {
       continue;
     }
     seen[rule.id] = true;
-    const bool is_between = rule.id == "member.uncracked_share" || rule.id == "slab.flange_share" ||
-                            rule.id == "slab.distribution_share";  // 0 and 1
-    const bool may_be_zero = is_between || rule.id == "zone.elongation_share";
-    if (!entry.contains("value") || !entry["value"].is_number() || !std::isfinite(entry["value"].get<double>()) ||
-        entry["value"].get<double>() < 0 || (entry["value"].get<double>() == 0 && !may_be_zero) ||
-        (entry["value"].get<double>() > 1 && is_between)) {
+    const auto limits = ranges().find(rule.id);
+    const auto [low, high] = limits == ranges().end() ? std::pair{0.0, mbs::kUnlimited} : limits->second;
+    const bool may_be_zero = rule.id == "zone.elongation_share" || (low == 0 && high == 1);
+    const double value = entry.contains("value") && entry["value"].is_number() ? entry["value"].get<double>() : -1;
+    if (!std::isfinite(value) || value < low || value > high || (value == 0 && !may_be_zero)) {
       at += ".value";
-      complain("rule \"" + rule.id + "\" needs a value " + (is_between ? "from 0 to 1" : may_be_zero ? ">= 0" : "> 0"));
+      complain(fmt::format("rule \"{}\" needs a value {}", rule.id,
+                           low > 0 || (may_be_zero && high < mbs::kUnlimited)
+                               ? fmt::format("from {:g} to {:g}", low, high)
+                           : may_be_zero            ? ">= 0"
+                           : high < mbs::kUnlimited ? fmt::format("> 0, at most {:g}", high)
+                                                    : "> 0"));
       continue;
     }
-    rule.value = entry["value"].get<double>();
+    rule.value = value;
     knowledge.*(field->second) = rule.value;
     knowledge.rules.push_back(std::move(rule));
   }

@@ -61,6 +61,12 @@ TEST(Knowledge, RefusesWhatIsNotASet) {
               testing::HasSubstr("\"member.uncracked_share\" needs a value from 0 to 1"));
   EXPECT_THAT(complaint_of(replaced(shipped(), "\"value\": 0.35", "\"value\": \"much\"")),
               testing::HasSubstr("needs a value > 0"));
+  EXPECT_THAT(complaint_of(replaced(shipped(), "\"zone.biaxial_exponent\", \"value\": 1.5",
+                                    "\"zone.biaxial_exponent\", \"value\": 11")),
+              testing::HasSubstr("\"zone.biaxial_exponent\" needs a value from 1 to 10"));
+  EXPECT_THAT(complaint_of(replaced(shipped(), "\"zone.damping_ratio\", \"value\": 0.05",
+                                    "\"zone.damping_ratio\", \"value\": 0.3")),
+              testing::HasSubstr("\"zone.damping_ratio\" needs a value > 0, at most 0.2"));
   EXPECT_THAT(complaint_of(replaced(shipped(), "\"zone.twist_rupture\"", "\"zone.slip_rupture\"")),
               testing::HasSubstr("given twice"));
 }
