@@ -99,6 +99,19 @@ std::string describe(const Range& range, Dimension dimension) {
 
 namespace {
 
+/// The usual example, or where that is not allowed one with a single digit from the middle of what is.
+std::string example_of(Dimension dimension, const Range& range) {
+  const std::string usual = example_of(dimension);
+  const auto value =
+      dimension == Dimension::Number ? 0.5 : parse_quantity(usual.substr(1, usual.size() - 2), dimension).value;
+  if (value && is_within(*value, range)) return usual;
+  const auto [name, size] = usual_unit(dimension);
+  const double middle = (range.low > 0 ? std::sqrt(range.low * range.high) : 0.5 * range.high) / size;
+  const double digit = std::pow(10, std::floor(std::log10(middle)));
+  const std::string text = number_text(std::round(middle / digit) * digit);
+  return *name ? "\"" + text + " " + name + "\"" : text;
+}
+
 /// NaN after a complaint.
 double read_value(const Node& node, const std::string& label, Dimension dimension, Range range,
                   Complaints& complaints) {
@@ -175,7 +188,7 @@ void TableReader::missing(const std::string& key, const std::string& help) const
 double TableReader::quantity(const std::string& key, Dimension dimension, Range range) {
   const Node* node = find(key);
   if (!node) {
-    missing(key, "add a line such as " + key + " = " + example_of(dimension));
+    missing(key, "add a line such as " + key + " = " + example_of(dimension, range));
     return nan;
   }
   return read_quantity(*node, label_ + ": " + key, dimension, range, complaints_);

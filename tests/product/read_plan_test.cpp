@@ -66,7 +66,7 @@ const Mistake syntax_mistakes[] = {
 };
 
 const Mistake key_mistakes[] = {
-    {"E201", "Ec = \"30 GPa\"\n", "", "concrete.C25: missing key \"Ec\"", "Ec = \"25 N/mm2\"", "[concrete.C25]",
+    {"E201", "Ec = \"30 GPa\"\n", "", "concrete.C25: missing key \"Ec\"", "Ec = \"10000 N/mm2\"", "[concrete.C25]",
      "«[concrete.C25]»"},
     {"E201", "[analysis]\nduration = \"5 s\"\n", "", "missing table \"analysis\"", "[analysis]", "title = \"Two bays\"",
      "«t»itle = \"Two bays\""},
