@@ -124,12 +124,17 @@ void System::find_contacts(double h) {
 
 Earnings System::calc_earnings(const ContactGroup& g, double h) const {
   const State& s = state;
-  const size_t W = kernel::lanes(), a = static_cast<size_t>(s.touching.body[static_cast<size_t>(g.a)]),
-               b = static_cast<size_t>(s.touching.body[static_cast<size_t>(g.b)]);
-  if (a == B || b == B) return {};  // corners on the ground stay what they are
+  if (g.is_on_ground) return {};  // corners stay what they are
+  const size_t W = kernel::lanes();
+  const auto speed_of = [&](int touched) {  // none of what is fixed
+    const size_t body = static_cast<size_t>(s.touching.body[static_cast<size_t>(touched)]);
+    return body == B ? std::pair<Vec3, Vec3>{} : std::pair<Vec3, Vec3>{s.v[body], s.w[body]};
+  };
+  const auto [v_a, w_a] = speed_of(g.a);
+  const auto [v_b, w_b] = speed_of(g.b);
   const double* slot = s.touching.groups.data() + g.slot / W * kernel::kGroupFields * W + g.slot % W;
   const Vec3 f = -slot[kernel::kHeldForce * W] * g.n, turn = read3(slot, kernel::kHeldTorque, W);
-  const Vec3 w_b = s.w[b], v = s.v[a] - s.v[b] - cross(w_b, read3(slot, kernel::kApart, W)), w = s.w[a] - w_b;
+  const Vec3 v = v_a - v_b - cross(w_b, read3(slot, kernel::kApart, W)), w = w_a - w_b;
   const double damped = dot(read3(slot, kernel::kDamp, W), v + read3(slot, kernel::kMotion, W)) +
                         dot(read3(slot, kernel::kDamp + 3, W), w + read3(slot, kernel::kMotion + 3, W));
   return {std::max(0.0, slot[kernel::kPressEnergy * W] - 0.5 * h * (dot(f, v) + dot(turn, w))),
@@ -176,7 +181,8 @@ void System::add_contact_group(size_t a, size_t b, const Vec3& n, size_t first, 
   g.first = sticks.first, g.count = sticks.count;
   g.n = n;
   const State& s = state;
-  if (b != B) g.apart = s.p[a] - s.p[b];
+  g.is_on_ground = b == B;
+  if (!g.is_on_ground) g.apart = s.p[a] - s.p[b];
   g.law = law;
   g.stiffness = stiffness;
 }

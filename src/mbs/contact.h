@@ -119,10 +119,11 @@ struct Earnings {
 struct ContactGroup {
   int a = 0, b = 0;  // into the touched bodies
   int first = 0, count = 0;
-  Vec3 n;                // from a to b
-  Vec3 apart;            // from b's mass centre to a's, 0 on the ground [m]
-  int law = 0;           // into System::contact_laws
-  double stiffness = 0;  // k of one corner of a box [N/m]
+  Vec3 n;                     // from a to b
+  Vec3 apart;                 // from b's mass centre to a's, 0 on the ground [m]
+  int law = 0;                // into System::contact_laws
+  double stiffness = 0;       // k of one corner of a box [N/m]
+  bool is_on_ground = false;  // its points are corners of shapes
   Earnings earnings;
   std::uint32_t slot = 0;  // in the kernel's blocks
 };
