@@ -815,11 +815,10 @@ std::string DeadLoad::describe_failure(bool has_diverged) const {
   if (most_load_ > 0) {
     constexpr double countless = 100;  // hardly any capacity is left
     if (most_load_ < countless)
-      std::snprintf(words, sizeof words, "to %.0f %% of its capacity", 100 * most_load_);
+      std::snprintf(words, sizeof words, "\" would be loaded to %.0f %% of its capacity", 100 * most_load_);
     else
-      std::snprintf(words, sizeof words, "to more than %.0f times its capacity", countless);
-    message += "; without limits element \"" + s_.model.elements[most_loaded_].name.substr(0, 60) +
-               "\" would be loaded " + words;
+      std::snprintf(words, sizeof words, "\" would be loaded to more than %.0f times its capacity", countless);
+    message += "; without limits element \"" + s_.model.elements[most_loaded_].name.substr(0, 60) + words;
   }
   return message;
 }
