@@ -143,7 +143,7 @@ void add_inputs(const nearfield::ZoneInput& in, record::RccReport& r) {
   if (const nearfield::Flange& f = in.flange; f.breadth > 0)
     add("Section", "Flange",
         fmt::format("{:.3g} m beside the web, {:.3g} cm thick, bars {:.3g} cm2", f.breadth, f.thickness / unit::cm,
-                    (f.top.area + f.bottom.area) / unit::cm2));
+                    f.bar_area() / unit::cm2));
   add("Section", "Clear cover", fmt::format("{:.3g} cm", s.cover / unit::cm));
   add("Section", "Ties",
       fmt::format("{:.3g} mm every {:.3g} cm, {} legs along y, {} along z", s.tie_diameter / unit::mm,

@@ -81,8 +81,7 @@ nearfield::Flange Builder::find_flange(const GridPoint& at, int beam) const {
     const double strength = plan.concretes[static_cast<size_t>(panel.concrete)].fc / concrete_of(web).fc;
     out.breadth += std::min(1.0, strength) * breadth;
     // of two slabs the thinner one
-    const bool is_first = out.thickness == 0;
-    if (is_first || panel.thickness < out.thickness) out.thickness = panel.thickness;
+    if (out.thickness == 0 || panel.thickness < out.thickness) out.thickness = panel.thickness;
     if (panel.steel < 0) continue;
     // it spans from beam to beam, so what lies along this one only distributes
     const double bars = k.slab_distribution_share * breadth;
@@ -105,7 +104,7 @@ void Builder::request_station(int index, int which) {
   in.steel = steel_of(s);
   const bool is_column = m.kind == MemberKind::Column;
   const double depth = is_column && hinge_about_y ? s.width : s.height;
-  if (const GridPoint at{m.row_a, m.frame_a, m.storey}; find_at(x_beams, at) == index && !is_column)
+  if (const GridPoint at{m.row_a, m.frame_a, m.storey}; find_at(x_beams, at) == index)
     in.flange = find_flange(at, index);
   in.length = calc_zone_length(s, in.concrete, in.steel, depth, z.clear_length, k);
   for (const product::Weakening& w : m.weakenings) {

@@ -37,8 +37,8 @@ struct Knowledge {
 };
 
 /// Reads a set of rules. InputError for text that is not such a set, and for rules that are missing, unknown, given
-/// twice or not positive numbers (`zone.elongation_share` may be 0; `member.uncracked_share`, `slab.flange_share` and
-/// `slab.distribution_share` lie between 0 and 1).
+/// twice or out of their range: above 0, of some at most a bound, of shares and restitution from 0 to 1;
+/// `zone.elongation_share` may be 0.
 Knowledge read_knowledge(const std::string& text, const std::string& name);
 
 /// The rules that are built in.

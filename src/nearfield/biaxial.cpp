@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "nearfield/family.h"
 #include "nearfield/fibres.h"
@@ -12,6 +13,7 @@ namespace topple::nearfield {
 namespace {
 
 constexpr double pi = 3.14159265358979323846;
+constexpr double kShares[] = {0.6, 0.4, 0.2, 0.0};  // forces of the exponent, over that of crushing
 
 /// Factor by which (y, z) lies outside of the curve of exponent p.
 double calc_excess(const BiaxialPoint& q, double p) {
@@ -38,6 +40,10 @@ ObliquePeak find_oblique_peak(const ZoneInput& in, double angle, double N) {
   const auto j = static_cast<size_t>(peak - m.moment.begin());
   if (j >= m.eps_0.size() || !(*peak > 0)) return {};
   return {*peak, calc_cross_moment(f, m.eps_0[j], m.origin + kappa[j], m.bars_at(j))};
+}
+
+double choose_exponent(const std::vector<BiaxialPoint>& points) {
+  return points.empty() ? 1.5 : fit_biaxial(points).exponent;
 }
 
 BiaxialPoint make_point(double angle, double N, const ObliquePeak& peak, double peak_y, double peak_z) {
@@ -84,7 +90,7 @@ double calc_biaxial_exponent(const ZoneInput& in, const Rcc& rcc) {
   };
   const double angle = std::atan2(in.section.height, in.section.width);
   std::vector<BiaxialPoint> points;
-  for (const double share : {0.6, 0.4, 0.2, 0.0}) {
+  for (const double share : kShares) {
     size_t k = 0;
     while (k + 1 < y.normal_force.size() && y.normal_force[k] < share * y.normal_force.front() * (1 + 1e-9)) ++k;
     const double peak_y = find_peak(y, k), peak_z = find_peak(z, k);
@@ -92,7 +98,11 @@ double calc_biaxial_exponent(const ZoneInput& in, const Rcc& rcc) {
     const ObliquePeak peak = find_oblique_peak(in, angle, y.normal_force[k]);
     if (peak.along > 0) points.push_back(make_point(angle, y.normal_force[k], peak, peak_y, peak_z));
   }
-  return points.empty() ? 1.5 : fit_biaxial(points).exponent;
+  return choose_exponent(points);
+}
+
+double calc_biaxial_exponent(const ZoneInput& in) {
+  return choose_exponent(calc_biaxial_points(in, {0.25 * pi}, {std::begin(kShares), std::end(kShares)}));
 }
 
 BiaxialFit fit_biaxial(const std::vector<BiaxialPoint>& points) {

@@ -34,5 +34,7 @@ BiaxialFit fit_biaxial(const std::vector<BiaxialPoint>&);
 /// The exponent of a zone whose families are known: skew π/4, forces of 0, 0.2, 0.4 and 0.6 of crushing; 1.5 if none of
 /// them leaves a moment.
 double calc_biaxial_exponent(const ZoneInput&, const Rcc&);
+/// The same where they are not known, without a flange.
+double calc_biaxial_exponent(const ZoneInput&);
 
 }  // namespace topple::nearfield

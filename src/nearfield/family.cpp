@@ -37,7 +37,7 @@ std::vector<double> make_forces(double crushing, double rupture) {
 
 double calc_rupture_force(const ZoneInput& in, double concrete_area, const material::Concrete& concrete,
                           double crushing) {
-  const double in_flange = (in.flange.top.area + in.flange.bottom.area) * in.flange.steel.fu;
+  const double in_flange = in.flange.bar_area() * in.flange.steel.fu;
   const double bars = (1 - in.cut_bars) * (in.section.steel_area() * in.steel.fu + in_flange);
   return std::max({bars, concrete_area * concrete.fct, 1e-6 * crushing});
 }

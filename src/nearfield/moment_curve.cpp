@@ -183,7 +183,7 @@ SectionState make_section_state(const ZoneInput& in, const Fibres& fibres, Axis 
     layer.to = edge = 2 * fibres.at[i] - layer.from;
     layer.core_breadth = fibres.core_area[i] > 0 ? core_breadth : 0;
     layer.cover_breadth = fibres.cover_area[i] > 0 ? breadth - layer.core_breadth : 0;
-    if (axis == Axis::Y && in.flange.breadth > 0)
+    if (axis == Axis::Y && in.flange.breadth > 0 && layer.cover_breadth > 0)
       layer.cover_breadth = fibres.cover_area[i] / ((1 - in.cut_concrete) * (layer.to - layer.from));
     layer.strain = eps_0 + kappa * fibres.at[i];
     layer.core_stress = material::calc_envelope(fibres.core, layer.strain).stress;

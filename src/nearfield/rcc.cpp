@@ -23,7 +23,7 @@ double calc_bar_force(const ZoneInput& in, double stress) {
 }
 
 double calc_flange_bar_force(const ZoneInput& in, double stress) {
-  return (1 - in.cut_bars) * (in.flange.top.area + in.flange.bottom.area) * stress;
+  return (1 - in.cut_bars) * in.flange.bar_area() * stress;
 }
 
 bool is_symmetric(const ZoneInput& in, const Fibres& f, Axis axis) {
@@ -178,13 +178,8 @@ Rcc make_rcc(const ZoneInput& in) {
     out.z_neg = is_symmetric(in, about_z, Axis::Z) ? out.z_pos : make_family(about_z, 1, force, rotation_z, in.length);
   }
   add_shear(in, out);
-  if (in.flange.breadth > 0) {  // a slab does not bend aside with its beam
-    ZoneInput web = in;
-    web.flange = {};
-    out.biaxial_exponent = make_rcc(web).biaxial_exponent;
-  } else {
-    out.biaxial_exponent = calc_biaxial_exponent(in, out);
-  }
+  // a slab does not bend aside with its beam: that of the web
+  out.biaxial_exponent = in.flange.breadth > 0 ? calc_biaxial_exponent(in) : calc_biaxial_exponent(in, out);
   out.damage_share = 1 - about_y.core.b_c;
   return out;
 }

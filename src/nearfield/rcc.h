@@ -19,6 +19,8 @@ struct Flange {
   };
   Bars top, bottom;
   product::Steel steel;
+
+  double bar_area() const { return top.area + bottom.area; }  // [m²]
 };
 
 /// What is asked: one zone of one section.

@@ -103,12 +103,12 @@ void draw_section(Drawing& d, const RccReport& r, const RccState& s, double x, d
     }
     if (l.core_breadth > 0) fill(middle - core, middle + core, y1, y2, l.core);
   }
-  std::vector<Dot> right{{middle + 0.5 * breadth * scale, top + picture}}, outline;
+  std::vector<Dot> right{{middle + 0.5 * breadth * scale, top + picture}};
   for (const RccState::Layer& l : s.layers)
     if (const double edge = middle + 0.5 * breadth_of(l, breadth) * scale; std::abs(edge - right.back().x) > 0.5)
       right.push_back({right.back().x, y_of(l.from)}), right.push_back({edge, y_of(l.from)});
   right.push_back({right.back().x, top});
-  outline = right;
+  std::vector<Dot> outline = right;
   for (auto p = right.rbegin(); p != right.rend(); ++p) outline.push_back({2 * middle - p->x, p->y});
   outline.push_back(right.front());
   d.line(outline, Ink::Text);

@@ -294,8 +294,14 @@ class Manager {
     const char* help = "choose another folder or name, or delete it";
     json was = json::parse(store_.find_model(there.model).value_or("{}")),
          is = json::parse(make_model_definition(problem_));
-    const std::string old = was["identity"].value("topple", ""), now = is["identity"].value("topple", "");
-    for (json* d : {&was, &is}) (*d)["identity"].erase("topple"), d->erase("settings");
+    const auto take_build = [](json& definition) {
+      json& identity = definition["identity"];
+      if (!identity.is_object()) identity = json::object();
+      const std::string build = identity.value("topple", "");
+      identity.erase("topple"), definition.erase("settings");
+      return build;
+    };
+    const std::string old = take_build(was), now = take_build(is);
     if (was != is)
       throw InputError("E822", fmt::format("{} holds a study of another model or of other inputs", where), help);
     throw InputError(

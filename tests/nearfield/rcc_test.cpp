@@ -316,7 +316,7 @@ TEST(Flange, IsStiffAndPressedOverItsBreadth) {
   EXPECT_EQ(with.EI_z, without.EI_z);
   EXPECT_EQ(with.z_pos.moment.size(), without.z_pos.moment.size());
   EXPECT_EQ(with.shear_z, without.shear_z) << "the web's affair";
-  EXPECT_EQ(with.biaxial_exponent, without.biaxial_exponent);
+  EXPECT_NEAR(with.biaxial_exponent, without.biaxial_exponent, 0.02);
   // positive about y pulls at the top
   const auto yields = [](const MomentFamily& f) { return f.yield_moment[row_of(f, 0)]; };
   const double force = 20e-4 * 420 * MPa, x = force / (1.5 * 25 * MPa);
