@@ -88,19 +88,22 @@ bool add_stability(const Context& c) {
   const auto describe = [&](const std::string& id, const std::string& title, size_t i, bool settled) {
     const ZoneFrame& z = zones[i];
     const auto margins = find_margins(c.r, i);
-    const bool has = z.zone >= 0 && z.utilisation > 0;
-    const double margin = has ? 1 / z.utilisation : kNone;
+    // margins are those of a building that stands
     const bool is_standing = stands(block[i], c.k);
-    std::string text = has ? fmt::format("Zone {} is nearest to its resistance and uses {:.0f} % of it (margin {:.2f})",
+    const bool has = is_standing && z.zone >= 0 && z.utilisation > 0;
+    const double margin = has ? 1 / z.utilisation : kNone;
+    std::string text = !is_standing ? "It does not stand"
+                       : has
+                           ? fmt::format("Zone {} is nearest to its resistance and uses {:.0f} % of it (margin {:.2f})",
                                          c.r.zones[static_cast<size_t>(z.zone)].name, 100 * z.utilisation, margin)
-                           : std::string("No zone is loaded");
+                           : "No zone is loaded";
     text += "; " + count_words(z.yielded, "no zone has yielded", "zone has yielded", "zones have yielded");
     if (settled)
       text += fmt::format(", {}. The upper block has moved by {:.1f} cm and its fastest part moves at {:.3f} m/s",
                           count_words(z.broken, "none is broken", "is broken", "are broken"),
                           100 * norm(block[i].displacement), block[i].fastest);
-    text += is_standing ? "." : ": it does not stand.";
-    if (margins.size() > 1) {
+    text += ".";
+    if (is_standing && margins.size() > 1) {
       text += " Lowest margins:";
       for (size_t m = 0; m < std::min<size_t>(margins.size(), kShownMargins); ++m)
         text += fmt::format("{} {} {:.2f}", m > 0 ? "," : "", margins[m].member, margins[m].margin);

@@ -253,11 +253,14 @@ void Recorder::add_frame(const mbs::View& v) {
     }
     if (fired) state = record::ZoneState::Fired;
     record_.zone_state.push_back(static_cast<std::uint8_t>(state));
-    record_.zone_utilisation.push_back(static_cast<float>(v.utilisation[i]));
+    // what has yielded gives way at its limit: above 1 is how far that fell in the last step, as far as it likes near
+    // zero
+    const double use = state == record::ZoneState::Elastic ? v.utilisation[i] : std::min(v.utilisation[i], 1.0);
+    record_.zone_utilisation.push_back(static_cast<float>(use));
     zf.broken += state == record::ZoneState::Broken;
     zf.yielded += state == record::ZoneState::Yielded || state == record::ZoneState::Softening;
-    if (state < record::ZoneState::Broken && v.utilisation[i] > zf.utilisation) {
-      zf.utilisation = v.utilisation[i];
+    if (state < record::ZoneState::Broken && use > zf.utilisation) {
+      zf.utilisation = use;
       zf.zone = static_cast<int>(i);
     }
   }

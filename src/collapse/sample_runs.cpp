@@ -161,7 +161,7 @@ void fill(Sample& s, const Knowledge& k, const SampleRunOptions& options, Sample
   const std::vector<StageTimes> stages = find_stage_times(s.map);
   const size_t before = find_frame(block, stages.empty() ? out.time.back() : stages.back().first);
   out.stood = stages.size() < 2 || stands(block[before], k);
-  out.utilisation = s.recorder->zone_frames()[before].utilisation;
+  out.utilisation = out.stood ? s.recorder->zone_frames()[before].utilisation : 1;
   out.touchdown = s.recorder->first_touchdown();
   const std::vector<double>& kinetic = series("energy_kinetic");
   out.touchdown_energy = out.touchdown <= out.time.back() ? s.recorder->kinetic_at(out.touchdown) : kinetic.back();

@@ -47,7 +47,7 @@ struct SampleRun {
   std::vector<double> tilt;  // towards the planned fall [rad]                                         (S)
   Mechanism mechanism;
   bool stood = true;       // until the last stage
-  double utilisation = 0;  // largest use of a zone's resistance before the last stage
+  double utilisation = 0;  // largest use of a zone's resistance before the last stage; 1 if it did not stand
   double touchdown = std::numeric_limits<double>::quiet_NaN();  // of the upper block; NaN if there was none [s]
   double touchdown_energy = 0;                                  // in motion then; at the end if there was none [J]
   double largest_energy = 0;                                    // in motion [J]

@@ -117,7 +117,7 @@ struct Record {
   std::vector<float> position;           // p_WB of the frame of each body [m] (S x B x 3)
   std::vector<float> orientation;        // unit quaternion w x y z         (S x B x 4)
   std::vector<std::uint8_t> zone_state;  // ZoneState                       (S x Z)
-  std::vector<float> zone_utilisation;   // demand over capacity            (S x Z)
+  std::vector<float> zone_utilisation;   // demand over capacity, 1 at most of zones that are not elastic (S x Z)
   std::vector<Series> series;
   std::vector<Output> outputs;  // read back in the order of their names
   std::vector<Event> events;

@@ -276,6 +276,10 @@ TEST(PlanMappingPhysics, StorehouseTopplesAtTheCoreAndFallsEarlyAtLeftValues) {
   EXPECT_EQ(m.outputs()[tilt].name, "tilt_1.7");
   EXPECT_GT(r[1].values[tilt], 10 * unit::deg) << "the block leans to the front and goes on";
   EXPECT_EQ(r[1].trajectory[m.trajectory_times().size() - 1], r[1].values[tilt]);
+  const size_t use = 13;
+  EXPECT_EQ(m.outputs()[use].name, "utilisation");
+  EXPECT_EQ(r[0].values[use], 1) << "it came down before the last stage";
+  for (const size_t i : {1, 2}) EXPECT_THAT(r[i].values[use], testing::AllOf(testing::Gt(0.5), testing::Le(1)));
 }
 
 TEST(CondensedMappingPhysics, StorehouseFallsAsItDoesWhole) {

@@ -50,7 +50,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["{} is broken", "{} ist gebrochen"],
   ["{} are broken", "{} sind gebrochen"],
   ["{*}, {}. The upper block has moved by {:.1f} cm and its fastest part moves at {:.3f} m/s", "{}, {}. Der obere Block hat sich um {} cm bewegt, sein schnellstes Teil bewegt sich mit {} m/s"],
-  ["{*}: it does not stand.", "{}: Es steht nicht."],
+  ["It does not stand; {}", "Es steht nicht; {}"],
   ["Lowest margins: {} of {} members.", "Kleinste Reserven: {} (von {} Bauteilen)."],
   ["It stands still.", "Es steht still."],
   ["It still sways (still: below {:.2f} m/s).", "Es schwankt noch (still: unter {} m/s)."],
