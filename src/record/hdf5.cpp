@@ -569,7 +569,8 @@ void transfer(Archive& a, Record& r, Flat& flat) {
           {.frame = "world", .meaning = "unit quaternion w x y z of the body's frame"});
   a.block("frames/zone_state", r.zone_state, {frames, zones},
           {.meaning = "0 elastic, 1 yielded, 2 softening, 3 broken, 4 fired"});
-  a.block("frames/zone_utilisation", r.zone_utilisation, {frames, zones}, {.meaning = "demand over capacity, 1 at most of zones that are not elastic"});
+  a.block("frames/zone_utilisation", r.zone_utilisation, {frames, zones},
+          {.meaning = "demand over capacity, 1 at most of zones that are not elastic"});
 
   a.first_column("series/id", r.series, &Series::id, {});
   a.column("series/title", r.series, &Series::title, {});

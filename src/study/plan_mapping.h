@@ -69,8 +69,8 @@ class PlanMapping {
   /// stage's time, and `after` if there is none by then; tilt and energy in motion then (at the end without one) and at
   /// most; reach of parts beyond the footprint to each side and of 95 % of the mass, at the end; rear_share: drop of
   /// the rear edge over that of the front edge; utilisation: largest use of a zone's resistance before the last stage
-  /// (the margin is its inverse), 1 if it did not stand until then; vibration_NAME: upper end of the screening band at a neighbour by what has touched
-  /// down at the end of the run.
+  /// (the margin is its inverse), 1 if it did not stand until then; vibration_NAME: upper end of the screening band at
+  /// a neighbour by what has touched down at the end of the run.
   const std::vector<PlanQuantity>& outputs() const;
   /// The trajectory is the tilt at these times after the last stage's [s], then how far parts extend from W's origin
   /// towards each of `directions` at the end [m].
