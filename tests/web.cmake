@@ -47,6 +47,25 @@ if(TARGET topple)
   add_test(NAME web_short_fe COMMAND topple fe ${CMAKE_CURRENT_SOURCE_DIR}/data/short.toml --size "40 cm" -o ${short_fe})
   set_tests_properties(web_short_fe PROPERTIES LABELS web FIXTURES_SETUP short_fe TIMEOUT 180)
   topple_web_test(web_german_fe german.test.mjs BROWSER FIXTURES short_fe ENVIRONMENT TOPPLE_REPORT=${short_fe}/report.html)
+  # a multibody model, a plan that does not stand, and a fuzzy one of which some samples do not and some are no plan
+  file(READ ${CMAKE_CURRENT_SOURCE_DIR}/data/short.toml short)
+  string(REPLACE "load = \"1 kN/m2\"" "load = \"90 kN/m2\"" overloaded "${short}")
+  set(odd ${CMAKE_CURRENT_BINARY_DIR}/odd_pages)
+  file(WRITE ${odd}/overloaded.toml "${overloaded}")
+  file(WRITE ${odd}/failing.toml "${short}
+[fuzzy]
+storeys.load = { triangular = [\"1 kN/m2\", \"1 kN/m2\", \"90 kN/m2\"] }
+stage.1.charge.1.position = { triangular = [\"0.7 m\", \"1.2 m\", \"1.4 m\"] }
+stage.1.charge.1.destroyed_length = { triangular = [\"0.8 m\", \"1.2 m\", \"1.6 m\"] }
+")
+  add_test(NAME web_odd_model COMMAND topple mbs run ${CMAKE_SOURCE_DIR}/examples/mbs/slider_crank.json --duration "0.1 s" -o ${odd}/model)
+  add_test(NAME web_odd_overloaded COMMAND topple run ${odd}/overloaded.toml -o ${odd}/overloaded)
+  add_test(NAME web_odd_study COMMAND topple study ${odd}/failing.toml --samples 40 --no-drivers -o ${odd}/study)
+  set_tests_properties(web_odd_model web_odd_overloaded web_odd_study PROPERTIES LABELS web FIXTURES_SETUP odd_pages TIMEOUT 120)
+  set_tests_properties(web_odd_overloaded PROPERTIES PASS_REGULAR_EXPRESSION "There is no equilibrium under dead load")
+  topple_web_test(web_german_model german.test.mjs BROWSER FIXTURES odd_pages ENVIRONMENT TOPPLE_REPORT=${odd}/model/report.html)
+  topple_web_test(web_german_overloaded german.test.mjs BROWSER FIXTURES odd_pages ENVIRONMENT TOPPLE_REPORT=${odd}/overloaded/report.html)
+  topple_web_test(web_german_failing german.test.mjs BROWSER FIXTURES odd_pages ENVIRONMENT TOPPLE_STUDY=${odd}/study/study.html)
   find_program(PDFINFO pdfinfo)
   find_program(PDFTOTEXT pdftotext)
   if(PDFINFO AND PDFTOTEXT)

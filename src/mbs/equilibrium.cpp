@@ -806,12 +806,15 @@ void DeadLoad::find_cracks(bool by_tangents) {
 
 std::string DeadLoad::describe_failure(bool has_diverged) const {
   char words[240];
-  std::snprintf(words, sizeof words,
-                "no dead-load equilibrium after %d iterations: the largest unbalanced force %s %.2g of the weight",
-                s_.summary.equilibrium_iterations, has_diverged ? "grew without bound and was last" : "is",
-                unbalanced_);
+  std::snprintf(words, sizeof words, "no dead-load equilibrium after %d iterations: the largest unbalanced force ",
+                s_.summary.equilibrium_iterations);
   std::string message = words;
-  if (!has_diverged) message += ", of body \"" + s_.model.bodies[most_unbalanced_].name.substr(0, 60) + "\"";
+  if (has_diverged) {
+    message += "grew without bound";
+  } else {
+    std::snprintf(words, sizeof words, "is %.2g of the weight", unbalanced_);
+    message = message + words + ", of body \"" + s_.model.bodies[most_unbalanced_].name.substr(0, 60) + "\"";
+  }
   if (most_load_ > 0) {
     constexpr double countless = 100;  // hardly any capacity is left
     if (most_load_ < countless)

@@ -1,6 +1,6 @@
 /// The page in the reader's language. English is what the sources and the record say; for German a table (words_de.ts)
 /// holds each text beside its translation. A text may hold places in the manner of the program's own format strings:
-/// `{}` a name or the like, within a sentence; `{w}` the same without commas; `{*}` sentences of this
+/// `{}` a name or the like, within a sentence; `{w}` the same without commas, `{n}` without spaces too; `{*}` sentences of this
 /// table; `{:.1f}`, `{:g}` a number. The texts of the record are made of such sentences, so that pages can be
 /// made from any record, also from an old one (docs/decisions/0054-german-pages.md).
 import { Fragment, options, type VNode } from "preact";
@@ -18,11 +18,11 @@ interface Sentence {
   weight: number; // letters that are fixed
 }
 
-const number = "[-−]?(?:\\d[\\d\\u202f]*(?:\\.\\d+)?(?:e[+-]?\\d+)?|nan|inf)";
+const number = "[-−]?(?:\\d[\\d\\u202f]*(?:\\.\\d+)?(?:e[+-]?\\d+| ?[×·] ?10[⁻⁰¹²³⁴-⁹]+)?|nan|inf)";
 const escape = (text: string): string => text.replace(/[.*+?^${}()|[\]\\]/g, "\\$&");
 
 function makeSentence([english, translated]: readonly [string, string]): Sentence {
-  const pieces = english.split(/(\{(?:\*|w|:[^}]*)?\})/);
+  const pieces = english.split(/(\{(?:\*|w|n|:[^}]*)?\})/);
   const isNumber: boolean[] = [];
   const isKnown: boolean[] = [];
   let pattern = "";
@@ -37,7 +37,7 @@ function makeSentence([english, translated]: readonly [string, string]): Sentenc
     }
     isKnown.push(piece === "{*}");
     isNumber.push(/:.*[fgde]\}$/.test(piece));
-    const any = piece === "{*}" ? ".+?" : piece === "{w}" ? "[^,;]+?" : "(?:(?![;.] ).)+?";
+    const any = piece === "{*}" ? ".+?" : piece === "{w}" ? "[^,;]+?" : piece === "{n}" ? "[^\\s,;:]+" : "(?:(?![;.] ).)+?";
     pattern += `(${isNumber[isNumber.length - 1] === true ? number : any})`;
   });
   return { whole: new RegExp(`^${pattern}$`, "s"), fixed, isNumber, isKnown, german: translated, weight };
@@ -52,7 +52,10 @@ export const commas = (text: string): string => text.replace(/(?<![\w.])(-?\d+)\
 
 /// The German of a text that is in the table as a whole or made of sentences that are; undefined if not.
 export function translate(text: string): string | undefined {
-  return translateWhole(text) ?? translateParts(text);
+  const said = translateWhole(text) ?? translateParts(text);
+  if (said !== undefined || !text.endsWith(".")) return said;
+  const sentence = translate(text.slice(0, -1));
+  return sentence === undefined ? undefined : `${sentence}.`;
 }
 
 function translateWhole(text: string): string | undefined {
