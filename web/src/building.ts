@@ -12,6 +12,7 @@ import { findMaterials, findParts, findZonesOfBodies, partOfShape, type ZonesOfB
 
 const broken = 3; // index in zoneStates
 const outside = new THREE.Matrix4().makeScale(0, 0, 0);
+const atOrigin = new THREE.Matrix4();
 
 const rampSteps = 64;
 const ramp = Array.from({ length: rampSteps + 1 }, (_, i) => linear(colourOfUtilisation(i / rampSteps)));
@@ -118,7 +119,8 @@ export class Building {
     const { frame, fraction } = findFrame(this.run.time, t);
     for (let b = 0; b < this.bodyPose.length; ++b) {
       const pose = this.bodyPose[b] as THREE.Matrix4;
-      if (this.run.time.length === 0) pose.identity();
+      // without frames nobody knows where parts are
+      if (this.run.time.length === 0) pose.copy(this.isGround(b) ? atOrigin : outside);
       else if (calcPose(this.run, b, frame, fraction, p, q))
         pose.compose(this.point.set(p[0], p[1], p[2]), this.turn.set(q[1], q[2], q[3], q[0]), this.unit);
       else pose.copy(outside);

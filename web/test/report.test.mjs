@@ -297,6 +297,20 @@ describe("unusual reports", () => {
     await browser.close();
   });
 
+  it("draws no parts where nobody knows where they are", async () => {
+    const data = makeSynthetic(2);
+    const none = { ...data, time: [], position: "", orientation: "", zone_state: "", zone_utilisation: "", series: data.series.map((s) => ({ ...s, value: [] })) };
+    const pictures = [];
+    for (const [name, bodies] of [["no-frames", data.bodies], ["no-parts", data.bodies.map((b) => (b.shapes.some((s) => s.material === "ground") ? b : { ...b, shapes: [] }))]]) {
+      const browser = await open(name, { ...none, bodies });
+      await settle(browser.page);
+      pictures.push(await picture(browser.page));
+      assert.deepEqual(browser.problems, []);
+      await browser.close();
+    }
+    assert.ok(pictures[0].equals(pictures[1]));
+  });
+
   it("shows a single frame without zones and poses that are not numbers", async () => {
     const data = makeSynthetic(2);
     const S = 1, B = data.bodies.length;
