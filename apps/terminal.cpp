@@ -109,7 +109,7 @@ EventPrinter::EventPrinter(std::FILE* out, bool verbose, ProgressLine& progress)
     : out_(out), verbose_(verbose), colour_(has_colour(out)), progress_(progress) {}
 
 void EventPrinter::print(const record::Event& e) {
-  static const std::map<std::string, int> most{{"yield", 3},   {"softening", 4}, {"rupture", 8},
+  static const std::map<std::string, int> most{{"yield", 3},   {"softening", 4}, {"crushing", 4}, {"rupture", 8},
                                                {"release", 4}, {"touchdown", 4}, {"contact", 0}};
   const auto limit = most.find(e.kind);
   if (!verbose_ && limit != most.end()) {

@@ -36,6 +36,13 @@ void Builder::make_stub(const product::Charge& c, const MemberZones& z, mbs::Eve
   act.kind = mbs::Action::Kind::LoosenJoint;
   act.joint = model.rotational_elements[static_cast<size_t>(z.rotational)].joint;
   lighter.actions.push_back(std::move(act));
+
+  const mbs::Curve& curve = model.laws[static_cast<size_t>(event.actions.back().law.index)].compression;
+  const auto peak = std::max_element(curve.f.begin(), curve.f.end());
+  StubEntry stub{member(c.member).name, static_cast<int>(model.elements.size()) + z.rotational, lighter.time, length,
+                 0};
+  if (peak != curve.f.end()) stub.peak = curve.x[static_cast<size_t>(peak - curve.f.begin())];
+  map.stubs.push_back(std::move(stub));
 }
 
 void Builder::add_events(std::vector<Firing> schedule) {

@@ -406,6 +406,26 @@ void add_events(const Context& c) {
     c.add("note." + std::to_string(++i), "Events", "Note", note, kNone, "", Status::Warning);
 }
 
+/// How far what came down has crushed what charges left of columns.
+void add_stubs(const Context& c) {
+  std::map<std::string, const StubEntry*> crushed;  // by member
+  const StubEntry* most = nullptr;
+  const auto by = [&c](const StubEntry& s) { return c.recorder.shortening_of(s.zone); };
+  for (const StubEntry& s : c.map.stubs) {
+    if (!(by(s) > s.peak)) continue;
+    crushed[s.member] = &s;
+    if (!most || by(s) > by(*most)) most = &s;
+  }
+  if (!most) return;
+  const auto first =
+      std::find_if(c.r.events.begin(), c.r.events.end(), [](const auto& e) { return e.kind == "crushing"; });
+  std::string text = fmt::format("Of {} stubs that charges left under joints what came down has crushed {}",
+                                 c.map.stubs.size(), crushed.size());
+  if (first != c.r.events.end()) text += fmt::format(", the first at {:.2f} s ({})", first->time, first->subject);
+  c.add("stubs", "Touchdown", "Crushed stubs",
+        text + fmt::format(". Most: {} by {:.2f} of {:.2f} m.", most->member, by(*most), most->length), by(*most), "m");
+}
+
 void add_criteria(const Context& c, const Mechanism& m, bool stood, const Reach& reach) {
   const product::Criteria& want = c.plan.criteria;
   const auto judge_one = [&](const std::string& id, const std::string& title, bool met, const std::string& text,
@@ -527,6 +547,7 @@ bool add_findings(const product::Plan& plan, const mbs::Model& model, const Mode
   add_clearances(c);
   if (c.is_cancelled()) return false;
   add_touchdown(c);
+  add_stubs(c);
   add_events(c);
   if (r.ending == "at_rest" || r.ending == "time_limit") add_criteria(c, m, stood, reach);
   std::string list;

@@ -79,6 +79,7 @@ void LiveModel::lay_out_events() {
   model.events.clear();
   map_.events.clear();
   map_.debris.clear();
+  map_.stubs.clear();
   map_.stages.clear();
   for (ZoneEntry& z : map_.elements) z.firing_time = std::numeric_limits<double>::infinity();
   for (GroundColumn& g : map_.ground_columns) g.is_fired = false;

@@ -60,6 +60,15 @@ struct GroundColumn {
 };
 
 /// Ties between plan and model. B bodies, E zone elements, R rotational elements, J joints.
+/// What a charge leaves of a ground column under its joint, once the concrete is thrown out.
+struct StubEntry {
+  std::string member;
+  int zone = -1;      // index into the record's zones
+  double time = 0;    // from which it is one [s]
+  double length = 0;  // [m]
+  double peak = 0;    // shortening at its compressive strength [m]
+};
+
 struct ModelMap {
   std::vector<BodyEntry> bodies;       // (B)
   std::vector<ZoneEntry> elements;     // (E)
@@ -67,6 +76,7 @@ struct ModelMap {
   std::vector<ZoneEntry> joints;       // (J)
   std::vector<EventEntry> events;      // as Model::events
   std::vector<DebrisEntry> debris;
+  std::vector<StubEntry> stubs;
   std::vector<GroundColumn> ground_columns;
   std::vector<std::string> stages;  // a line for each stage of the plan
   std::vector<Firing> schedule;     // failing charges included

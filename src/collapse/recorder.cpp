@@ -83,6 +83,15 @@ const ZoneEntry& Recorder::entry_of(int element) const {
   return i < map_.elements.size() ? map_.elements[i] : map_.rotationals[i - map_.elements.size()];
 }
 
+const StubEntry* Recorder::find_crushed_stub(size_t zone, const mbs::View& v) const {
+  const mbs::ElementState state = v.element_state[zone];
+  if (zone < model_.elements.size() || state < mbs::ElementState::Yielded || state > mbs::ElementState::Softening)
+    return nullptr;
+  for (const StubEntry& s : map_.stubs)
+    if (s.zone == static_cast<int>(zone) && s.time <= v.time && v.shortening[zone] > s.peak) return &s;
+  return nullptr;
+}
+
 BlockFrame Recorder::calc_block(const mbs::View& v) const {
   BlockFrame out;
   out.time = v.time;
@@ -160,6 +169,7 @@ void Recorder::look(const mbs::View& v) {
   last_v_ = v.v_WB;
   last_w_ = v.w_WB;
   last_mass_ = v.mass;
+  shortening_ = v.shortening;
 }
 
 void Recorder::follow(const Recorder& before, double until) {
@@ -175,6 +185,7 @@ void Recorder::follow(const Recorder& before, double until) {
     last_v_ = before.last_v_;
     last_w_ = before.last_w_;
     last_mass_ = before.last_mass_;
+    shortening_ = before.shortening_;
   }
   for (const Touchdown& t : before.touchdowns_)
     if (t.time <= until) touchdowns_.push_back(t);
@@ -252,6 +263,12 @@ void Recorder::add_frame(const mbs::View& v) {
         break;
     }
     if (fired) state = record::ZoneState::Fired;
+    if (const StubEntry* stub = find_crushed_stub(i, v)) {
+      state = record::ZoneState::Crushed;
+      const size_t frames = zone_frames_.size(), Z = record_.zones.size();
+      if (frames == 0 || record_.zone_state[(frames - 1) * Z + i] != static_cast<std::uint8_t>(state))
+        add_event({v.time, "crushing", stub->member, fmt::format("the stub of {} is being crushed", stub->member)});
+    }
     record_.zone_state.push_back(static_cast<std::uint8_t>(state));
     // what has yielded gives way at its limit: above 1 is how far that fell in the last step, as far as it likes near
     // zero
@@ -283,8 +300,6 @@ void Recorder::add_frame(const mbs::View& v) {
   }
   zone_frames_.push_back(zf);
   look(v);
-  shortening_ = v.shortening;
-  rotation_ = v.rotation;
 
   const BlockFrame block = calc_block(v);
   block_.push_back(block);

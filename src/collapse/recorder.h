@@ -49,6 +49,10 @@ class Recorder {
   double largest_ground_force() const { return largest_ground_force_; }
   double largest_ground_force_time() const { return largest_ground_force_time_; }
   double kinetic_at(double time) const;
+  /// Plastic shortening of a zone at the last frame; it never falls [m].
+  double shortening_of(int zone) const {
+    return zone < 0 || static_cast<size_t>(zone) >= shortening_.size() ? 0 : shortening_[static_cast<size_t>(zone)];
+  }
 
  private:
   record::Series& series(size_t i) { return record_.series[i]; }
@@ -57,6 +61,8 @@ class Recorder {
   void put_pose(const Pose&);
   void put_debris(double time);
   const ZoneEntry& entry_of(int element) const;
+  /// The stub that a zone is, if it is shortened beyond its strength and holds together.
+  const StubEntry* find_crushed_stub(size_t zone, const mbs::View&) const;
 
   const mbs::Model& model_;
   const ModelMap& map_;
@@ -66,7 +72,7 @@ class Recorder {
   std::vector<Pose> start_;
   std::vector<BlockFrame> block_;
   std::vector<ZoneFrame> zone_frames_;
-  std::vector<double> shortening_, rotation_;
+  std::vector<double> shortening_;  // of the last frame
   std::vector<int> fixed_joints_;
   std::vector<std::pair<double, int>> stages_told_;  // when, which
   std::vector<Pose> last_pose_;                      // of the bodies at the last frame, for what happens after it

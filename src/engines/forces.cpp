@@ -629,6 +629,7 @@ void Forces::fill_zone(size_t at, double time, const Zone& z, mbs::View& v) cons
                                                                           : ElementState::Elastic;
   v.utilisation[at] = mbs::calc_utilisation(z.parameters, laws_, time, s);
   v.rotation[at] = std::max(s.station[0].reached, s.station[1].reached);
+  v.shortening[at] = s.shortened;
 }
 
 void Forces::fill(double time, const Motion& motion, mbs::View& v) const {
@@ -636,7 +637,7 @@ void Forces::fill(double time, const Motion& motion, mbs::View& v) const {
   v.element_state.resize(E + R);
   v.utilisation.resize(E + R);
   v.rotation.resize(E + R);
-  v.shortening.resize(E);
+  v.shortening.resize(E + R);
   v.element_force.resize(E);
   v.element_moment.resize(E);
   v.element_translation.resize(E);
@@ -646,7 +647,6 @@ void Forces::fill(double time, const Motion& motion, mbs::View& v) const {
     const mbs::ZoneElement& e = model_.elements[i];
     fill_zone(i, time, zone_[i], v);
     const mbs::ElementGeometry g = measure_zone(zone_[i], motion, e.a, e.X_AF, e.b, e.X_BM);
-    v.shortening[i] = zone_[i].state.shortened;
     v.element_force[i] = -three(zone_[i].state.resultant.c);
     v.element_moment[i] = -three(zone_[i].state.resultant.c + 3);
     v.element_translation[i] = three(g.deformation.c);

@@ -135,7 +135,7 @@ mbs::View Motion::calc_view(const fem::ExplicitSystem& system, double time) cons
     v.joint_released.push_back(judge(z, utilisation) == mbs::ElementState::Broken);
   }
   v.rotation.assign(zones_.size(), 0);
-  v.shortening.assign(model_.elements.size(), 0);
+  v.shortening.assign(zones_.size(), 0);
   v.joint_force.assign(joints_.size(), {});
   v.joint_moment.assign(joints_.size(), {});
 

@@ -41,7 +41,7 @@ struct View {
   std::vector<ElementState> element_state;          // zone elements, then rotational elements
   std::vector<double> utilisation;                  // largest demand over capacity, same order
   std::vector<double> rotation;                     // largest plastic rotation, same order [rad]
-  std::vector<double> shortening;                   // plastic shortening, zone elements only [m]
+  std::vector<double> shortening;                   // plastic shortening, same order [m]
   std::vector<Vec3> element_force, element_moment;  // of a on b at the marker, in F; zone elements only
   std::vector<Vec3> joint_force, joint_moment;      // reaction of the parent on the child, in F
   std::vector<double> joint_angle;                  // of revolute and cylindrical joints, else 0 [rad]

@@ -756,7 +756,7 @@ const View& System::calc_view() {
   v.element_state.resize(E + R);
   v.utilisation.resize(E + R);
   v.rotation.resize(E + R);
-  v.shortening.resize(E);
+  v.shortening.resize(E + R);
   v.element_force.resize(E);
   v.element_moment.resize(E);
   v.element_translation.resize(E);
@@ -768,11 +768,11 @@ const View& System::calc_view() {
                                                              : ElementState::Elastic;
     v.utilisation[at] = calc_utilisation(p, laws, s.time, z);
     v.rotation[at] = std::max(z.station[0].reached, z.station[1].reached);
+    v.shortening[at] = z.shortened;
   };
   for (size_t i = 0; i < E; ++i) {
     const ZoneState& z = s.element[i];
     fill(i, elements[i].zone, z);
-    v.shortening[i] = z.shortened;
     v.element_force[i] = -Vec3{z.resultant.c[0], z.resultant.c[1], z.resultant.c[2]};
     v.element_moment[i] = -Vec3{z.resultant.c[3], z.resultant.c[4], z.resultant.c[5]};
     v.element_translation[i] = {z.deformation[0], z.deformation[1], z.deformation[2]};

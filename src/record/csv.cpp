@@ -136,7 +136,7 @@ std::string make_poses(const Record& r) {
 
 /// The zones at the first frame, then each whenever its state changes.
 std::string make_zones(const Record& r) {
-  static constexpr std::array<const char*, 5> words{"elastic", "yielded", "softening", "broken", "fired"};
+  static constexpr std::array<const char*, 6> words{"elastic", "yielded", "softening", "broken", "fired", "crushed"};
   const std::size_t zones = r.zones.size();
   Table table;
   for (const auto* name : {"time [s]", "zone", "member", "subsystem", "state", "utilisation"}) table.text(name);

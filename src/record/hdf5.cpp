@@ -568,7 +568,7 @@ void transfer(Archive& a, Record& r, Flat& flat) {
   a.block("frames/orientation", r.orientation, {frames, bodies, 4},
           {.frame = "world", .meaning = "unit quaternion w x y z of the body's frame"});
   a.block("frames/zone_state", r.zone_state, {frames, zones},
-          {.meaning = "0 elastic, 1 yielded, 2 softening, 3 broken, 4 fired"});
+          {.meaning = "0 elastic, 1 yielded, 2 softening, 3 broken, 4 fired, 5 crushed (a stub that a charge left)"});
   a.block("frames/zone_utilisation", r.zone_utilisation, {frames, zones},
           {.meaning = "demand over capacity, 1 at most of zones that are not elastic"});
 
@@ -644,7 +644,7 @@ void check_contents(const Reader& reader, const Record& r) {
     for (const int body : {zone.body_a, zone.body_b})
       if (body < -1 || body >= bodies) reader.damaged("zone " + zone.name + " names a body that is not there");
   for (const std::uint8_t state : r.zone_state)
-    if (state > static_cast<std::uint8_t>(ZoneState::Fired)) reader.damaged("frames/zone_state has an unknown state");
+    if (state > static_cast<std::uint8_t>(ZoneState::Crushed)) reader.damaged("frames/zone_state has an unknown state");
   for (const Finding& finding : r.findings)
     if (finding.status > Status::Bad) reader.damaged("findings/status has an unknown status");
 }

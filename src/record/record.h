@@ -26,7 +26,7 @@ struct BodyInfo {
   std::vector<BoxShape> shapes;
 };
 
-enum class ZoneState : std::uint8_t { Elastic = 0, Yielded = 1, Softening = 2, Broken = 3, Fired = 4 };
+enum class ZoneState : std::uint8_t { Elastic = 0, Yielded = 1, Softening = 2, Broken = 3, Fired = 4, Crushed = 5 };
 
 struct ZoneInfo {
   std::string name;              // e.g. "C-D1-0/foot"
@@ -37,9 +37,9 @@ struct ZoneInfo {
 };
 
 struct Event {
-  double time = 0;   // [s]
-  std::string kind;  // "stage", "charge", "yield", "softening", "rupture", "release", "touchdown", "contact", "rest",
-                     // "cable", "failure"
+  double time = 0;      // [s]
+  std::string kind;     // "stage", "charge", "yield", "softening", "crushing", "rupture", "release", "touchdown",
+                        // "contact", "rest", "cable", "failure"
   std::string subject;  // member or zone
   std::string text;     // a sentence
 };

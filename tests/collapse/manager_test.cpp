@@ -337,6 +337,26 @@ TEST(ManagerPhysics, AStubIsCrushedByWhatComesDownOnIt) {
                                  [](const record::Event& e) { return e.kind == "touchdown" && e.subject == "N-A2-0"; });
     ASSERT_NE(at, r.events.end()) << step;
     landing[step > 0] = at->time;
+    // it is marked from the frame at which it is shortened beyond its strength, and said
+    const auto zone =
+        std::find_if(r.zones.begin(), r.zones.end(), [](const auto& z) { return z.name == "C-A2-0/top"; });
+    const auto frame = std::find_if(r.time.begin(), r.time.end(), [&](const double& t) {
+      return r.zone_state[static_cast<size_t>(&t - r.time.data()) * r.zones.size() +
+                          static_cast<size_t>(zone - r.zones.begin())] == 5;
+    });
+    ASSERT_NE(frame, r.time.end());
+    const auto said = std::find_if(r.events.begin(), r.events.end(),
+                                   [](const auto& e) { return e.kind == "crushing" && e.subject == "C-A2-0"; });
+    ASSERT_NE(said, r.events.end());
+    EXPECT_EQ(said->time, *frame);
+    EXPECT_GT(*frame, 0.7);
+    EXPECT_EQ(std::count_if(r.events.begin(), r.events.end(), [](const auto& e) { return e.kind == "crushing"; }), 3);
+    const auto f = std::find_if(r.findings.begin(), r.findings.end(), [](const auto& x) { return x.id == "stubs"; });
+    ASSERT_NE(f, r.findings.end());
+    EXPECT_THAT(f->text,
+                testing::StartsWith("Of 3 stubs that charges left under joints what came down has crushed 3,"));
+    EXPECT_GT(f->value, 0.1);
+    EXPECT_LE(f->value, 1.01);
   }
   EXPECT_LT(landing[0], 1);  // propped up until 1.5 s by a rigid one
   EXPECT_NEAR(landing[0], landing[1],

@@ -315,7 +315,7 @@ TEST_F(Hdf5, RefusesContradictions) {
   EXPECT_TRUE(refused_after("findings/status", H5T_NATIVE_UINT8, std::vector<std::uint8_t>{0, 4, 0}));
   EXPECT_TRUE(refused_after("outputs/reaction [top]/time", H5T_NATIVE_DOUBLE, std::vector<double>{1, 1}));
   EXPECT_TRUE(refused_after("frames/time", H5T_NATIVE_DOUBLE, std::vector<double>(700, 1)));
-  EXPECT_TRUE(refused_after("frames/zone_state", H5T_NATIVE_UINT8, std::vector<std::uint8_t>(2100, 5)));
+  EXPECT_TRUE(refused_after("frames/zone_state", H5T_NATIVE_UINT8, std::vector<std::uint8_t>(2100, 6)));
 }
 
 TEST_F(Hdf5, RefusesATableOfUnequalColumns) {

@@ -10,7 +10,7 @@ import type { Colouring, ZoneMarks } from "./state";
 import { colourOfKind, colourOfMaterial, colourOfUtilisation, highestSpeed, zoneStates } from "./vocabulary";
 import { findMaterials, findParts, findZonesOfBodies, partOfShape, type ZonesOfBody } from "./zones";
 
-const broken = 3; // index in zoneStates
+const broken = 3, crushed = 5; // indices in zoneStates
 const outside = new THREE.Matrix4().makeScale(0, 0, 0);
 const atOrigin = new THREE.Matrix4();
 
@@ -284,7 +284,11 @@ export class Building {
     if (zones.length === 0 || now === undefined) return silent;
     if (this.colouring === "state") {
       let worst = 0;
-      for (const z of zones) worst = Math.max(worst, now.state[z] ?? 0);
+      for (const z of zones) {
+        const state = now.state[z] ?? 0;
+        // what is above a crushed stub is whole
+        if (state !== crushed || this.run.zones[z]?.member === this.run.bodies[body]?.name) worst = Math.max(worst, state);
+      }
       return ofState[worst] ?? silent;
     }
     let most = 0;

@@ -22,6 +22,7 @@ const shapes = {
   circle: fan(around(8, 0.7)),
   triangle: fan([[0, 0.95], [-0.98, -0.75], [0.98, -0.75]]),
   diamond: fan(around(4, 1.15)),
+  square: rectangle(0.75, 0.75),
   cross: [...turned(rectangle(1.2, 0.3), Math.PI / 4), ...turned(rectangle(1.2, 0.3), -Math.PI / 4)],
   star: [...ray, ...turned(ray, Math.PI / 2)],
   bar: rectangle(0.5, 1.1),

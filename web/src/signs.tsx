@@ -49,7 +49,7 @@ export function StatusWord(props: { status: Status }) {
 }
 
 export function ZoneSign(props: { words: ZoneStateWords }) {
-  return <Sign shape={props.words.shape} colour={props.words.onDark === undefined ? props.words.colour : "var(--broken)"} />;
+  return <Sign shape={props.words.shape} colour={props.words.variable === undefined ? props.words.colour : `var(${props.words.variable})`} />;
 }
 
 export function ZoneStateWord(props: { state: number }) {

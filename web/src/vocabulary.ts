@@ -9,15 +9,17 @@ export interface ZoneStateWords {
   colour: string;
   /// Where the colour would drown in a dark ground.
   onDark?: string;
-  shape: "circle" | "triangle" | "diamond" | "cross" | "star";
+  variable?: string; // of both in style.css
+  shape: "circle" | "triangle" | "diamond" | "cross" | "star" | "square";
 }
 /// Indexed by ZoneState of the record.
 export const zoneStates: ZoneStateWords[] = [
   { word: "elastic", colour: "#56b4e9", shape: "circle" },
   { word: "yielded", colour: "#e69f00", shape: "triangle" },
   { word: "softening", colour: "#d55e00", shape: "diamond" },
-  { word: "broken", colour: "#7a1f5c", onDark: "#b9a3ff", shape: "cross" },
+  { word: "broken", colour: "#7a1f5c", onDark: "#b9a3ff", variable: "--broken", shape: "cross" },
   { word: "fired", colour: "#cc79a7", shape: "star" },
+  { word: "crushed stub", colour: "#a50f15", onDark: "#ff8a80", variable: "--crushed", shape: "square" },
 ];
 
 /// "C-A1-0" says more to its reader with a word in front.
@@ -90,6 +92,7 @@ const eventWords: Record<string, EventWords> = {
   charge: { word: "Charge", colour: "#cc79a7", shape: "star", small: true },
   yield: { word: "Yield", colour: "#e69f00", shape: "triangle", small: true },
   softening: { word: "Softening", colour: "#b8860b", shape: "triangle", small: true },
+  crushing: { word: "Crushing", colour: "var(--crushed)", shape: "square", small: true },
   rupture: { word: "Rupture", colour: "var(--broken)", shape: "cross", small: true },
   release: { word: "Release", colour: "#d55e00", shape: "diamond", small: true },
   touchdown: { word: "Touchdown", colour: "var(--touchdown)", shape: "down", small: false },
