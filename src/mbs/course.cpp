@@ -109,7 +109,7 @@ bool Course::is_at_rest() {
   }
   quiet = quiet && twice_kinetic < limit2 * mass;
   state.quiet_steps = quiet ? state.quiet_steps + 1 : 0;
-  return state.quiet_steps >= std::max(1L, static_cast<long>(s_.options.rest_time / s_.step));
+  return static_cast<double>(state.quiet_steps) >= std::max(1.0, std::floor(s_.options.rest_time / s_.step));
 }
 
 bool Course::follow() {

@@ -78,5 +78,15 @@ TEST(PassQuiet, WaitsForLoadsThatFollowTheTime) {
   EXPECT_EQ(run(m, o).steps, steps);
 }
 
+TEST(Rest, TakesAsLongAsItsTimeHoweverLongThatIs) {
+  Model m = make_hanging();
+  Options o;
+  o.duration = 1, o.rest_speed = 0.01;
+  m.events.clear();
+  EXPECT_EQ(run(m, o).ending, Summary::Ending::AtRest);
+  o.rest_time = 1e30;
+  EXPECT_EQ(run(m, o).ending, Summary::Ending::TimeLimit);
+}
+
 }  // namespace
 }  // namespace topple::mbs
