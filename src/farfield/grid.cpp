@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <set>
 
+#include "base/error.h"
 #include "fem/explicit_model.h"
 
 namespace topple::farfield {
@@ -61,6 +63,22 @@ std::vector<Line> gather(std::vector<Face> faces) {
   return lines;
 }
 
+double count_parts(double gap, double size) { return std::max(1.0, std::ceil(gap / size - 0.25 - 1e-9)); }
+
+void check_size(const std::array<std::vector<Line>, 3>& lines, double size) {
+  double cells = 1;
+  for (const std::vector<Line>& axis : lines) {
+    double parts = 0;
+    for (size_t i = 0; i + 1 < axis.size(); ++i) parts += count_parts(axis[i + 1].at - axis[i].at, size);
+    cells *= parts;
+  }
+  if (!(cells <= kMostCells))
+    throw InputError("E676",
+                     fmt::format("elements of {:g} m make a grid of {:.2g} cells, at most {:g} are allowed", size,
+                                 cells, kMostCells),
+                     "choose a larger size");
+}
+
 /// Divides gaps so that edges are near the size.
 std::vector<Line> divide(const std::vector<Line>& lines, const GridOptions& o,
                          const std::vector<std::pair<double, double>>& to_divide) {
@@ -69,7 +87,7 @@ std::vector<Line> divide(const std::vector<Line>& lines, const GridOptions& o,
     out.push_back(lines[i]);
     if (i + 1 == lines.size()) break;
     const double from = lines[i].at, gap = lines[i + 1].at - from;
-    int n = std::max(1, static_cast<int>(std::ceil(gap / o.size - 0.25 - 1e-9)));
+    int n = static_cast<int>(count_parts(gap, o.size));
     for (const auto& [low, high] : to_divide)
       if (std::abs(low - from) < kSame && std::abs(high - from - gap) < kSame) n = std::max(n, o.least_across);
     for (int k = 1; k < n; ++k) out.push_back({from + gap * k / n, {}});
@@ -181,6 +199,7 @@ Grid make_grid(const product::Plan& plan, const GridOptions& o) {
       extent[b][axis] = {x.is_soft[axis][0] ? x.low[a] : line_of(lines[axis], box, x.low[a], reach).at,
                          x.is_soft[axis][1] ? x.high[a] : line_of(lines[axis], box, x.high[a], reach).at};
     }
+  check_size(lines, o.size);
   for (size_t axis = 0; axis < 3; ++axis) lines[axis] = divide(lines[axis], o, to_divide[axis]);
 
   Grid grid;

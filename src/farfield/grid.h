@@ -9,8 +9,11 @@
 
 namespace topple::farfield {
 
+/// Of the grid, empty ones counted: numbers of nodes and cells are ints, and each takes memory.
+inline constexpr double kMostCells = 1e9;
+
 struct GridOptions {
-  double size = 0.4;         // aimed at; edges are at most 1.25 times as long [m]
+  double size = 0.4;         // aimed at; edges are at most 1.25 times as long; the grid has at most kMostCells [m]
   double snap_share = 0.25;  // of the size: faces that lie nearer together share a line ...
   double snap_most = 0.1;    // ... if they are no farther apart than this, the thickness of thin walls [m]
   int least_across = 2;      // cells over the width and depth of columns and the depth of beams
@@ -40,7 +43,7 @@ struct Grid {
 /// Faces within the snap of each other share a line of the grid; its nodes then lie where the member wants them that
 /// claims room first (columns, beams, slabs, walls, destroyed lengths), so that a face moves only where two members
 /// meet that want different places. Throws InputError (E670 to E672), one complaint for each line of the plan: members
-/// without a cell, with a volume off by more than half, or with cells turned inside out.
+/// without a cell, with a volume off by more than half, or with cells turned inside out; E676: too many cells.
 Grid make_grid(const product::Plan&, const GridOptions&);
 
 /// Mass of a member and of what lies on it before the first charge [kg].

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numbers>
 
 #include "base/error.h"
 #include "base/unit.h"
@@ -18,6 +19,8 @@ namespace topple::nearfield {
 
 namespace {
 
+constexpr double kMostAcross = 100;  // elements over the shorter side: more do not fit into any memory
+
 double choose_size(const ZoneInput& in, const SolidOptions& options) {
   if (!(options.element_size >= 0) || !std::isfinite(options.element_size))
     throw InputError("E616", "the size of elements must not be negative");
@@ -26,7 +29,15 @@ double choose_size(const ZoneInput& in, const SolidOptions& options) {
   if (!(options.largest_lag > 0)) throw InputError("E616", "the largest lag must be positive");
   if (!(options.largest_rotation > 0) || options.steps < 1)
     throw InputError("E616", "a march needs a positive largest rotation and at least one step");
-  return options.element_size > 0 ? options.element_size : 0.1 * std::min(in.section.width, in.section.height);
+  if (options.largest_rotation > std::numbers::pi)
+    throw InputError("E616", fmt::format("a largest rotation of {:g} rad is more than half a turn, {:.4g} rad",
+                                         options.largest_rotation, std::numbers::pi));
+  const double side = std::min(in.section.width, in.section.height);
+  if (options.element_size > 0 && options.element_size < side / kMostAcross)
+    throw InputError("E616",
+                     fmt::format("elements of {:g} m are too small: at least {:g} m, {} across the shorter side",
+                                 options.element_size, side / kMostAcross, kMostAcross));
+  return options.element_size > 0 ? options.element_size : 0.1 * side;
 }
 
 /// Middle of the elements nearest to `place`.

@@ -13,8 +13,9 @@
 namespace topple::nearfield {
 
 struct SolidOptions {
-  double element_size = 0;         // largest edge of an element; 0: a tenth of the section's shorter side [m]
-  double largest_rotation = 0.03;  // of the zone, or drift of a cantilever [rad]
+  double element_size =
+      0;  // largest edge of an element; 0: a tenth of the section's shorter side; at least a hundredth [m]
+  double largest_rotation = 0.03;  // of the zone, or drift of a cantilever; at most π [rad]
   std::vector<double> path;      // rotations to be visited one after the other, for unloading; empty: largest_rotation
   int steps = 150;               // at least, from one turn of the path to the next
   std::vector<double> pictures;  // rotations at which a state is kept (first time they are passed)

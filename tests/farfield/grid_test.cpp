@@ -133,6 +133,16 @@ TEST(Grid, JoinsAllMembers) {
   for (size_t i = 0; i < parent.size(); ++i) ASSERT_EQ(root(static_cast<int>(i)), 0);
 }
 
+TEST(Grid, RefusesASizeWithMoreCellsThanItCanNumber) {
+  const product::Plan plan = read(portal());
+  for (const double size : {1e-3, 1e-10, 1e-300}) {
+    try {
+      (void)make(plan, size);
+      FAIL();
+    } catch (const InputError& e) { EXPECT_EQ(e.diagnostics()[0].code, "E676"); }
+  }
+}
+
 TEST(Grid, RefusesMembersWithoutRoomWithTheirLine) {
   // rows so near that the beam between them lies inside the columns
   const std::string text = materials() + grid("A = \"0 m\", B = \"0.3 m\"", "1 = \"0 m\"", 2) +

@@ -93,6 +93,10 @@ TEST(SolidMesh, RefusesWhatItCannotMesh) {
   SolidOptions options;
   options.element_size = -1;
   EXPECT_THROW((void)march_solid(in, 0, 0, 1, options, {}), InputError);
+  options.element_size = 1e-9;
+  EXPECT_THROW((void)march_solid(in, 0, 0, 1, options, {}), InputError);
+  options.element_size = 0, options.largest_rotation = 1e12;
+  EXPECT_THROW((void)march_solid(in, 0, 0, 1, options, {}), InputError);
   EXPECT_THROW((void)march_solid(in, 0, 0, 2, {}, {}), InputError);
   in.concrete_loss = 1;
   EXPECT_THROW((void)march_solid(in, 0, 0, 1, {}, {}), InputError);
