@@ -12,6 +12,7 @@
 #include "farfield/checkpoint.h"
 #include "farfield/fragments.h"
 #include "farfield/motion.h"
+#include "mbs/model_check.h"
 #include "record/told.h"
 
 namespace topple::farfield {
@@ -449,6 +450,8 @@ Whole make_whole(const product::Plan& plan, const collapse::Knowledge& k, const 
 
 record::Record run_plan(const product::Plan& plan, const collapse::Knowledge& k, const collapse::RunOptions& run,
                         const FeOptions& fe, const collapse::RunCallbacks& callbacks, const FeCallbacks& fe_callbacks) {
+  const double duration = run.duration > 0 ? run.duration : plan.analysis.duration;
+  mbs::check_step(fe.scaled_step, duration);
   std::unique_ptr<Course> course;
   // the manager's model must live as long as the course
   mbs::Model model;

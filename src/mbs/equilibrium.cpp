@@ -2,6 +2,8 @@
 /// stiffest mode by Lanczos' method (docs/theory/multibody.md, eq. 8 to 10). The one place of the module that sees
 /// sparse matrices.
 
+#include <fmt/format.h>
+
 #include <Eigen/Eigenvalues>
 #include <Eigen/Sparse>
 #include <Eigen/SparseCholesky>
@@ -484,6 +486,11 @@ double System::calc_own_step() const {
 
 void System::set_step(double h) {
   if (h == step) return;
+  if (!(options.duration <= kMostSteps * h) && trouble.empty())
+    trouble = fmt::format(
+        "the fastest mode has {:.4g} rad/s and contact {:.4g} rad/s, and {:.6g} s in steps of {:.3g} s are more steps "
+        "than the {:g} that a run may take",
+        highest_frequency, calc_contact_frequency(), options.duration, h, kMostSteps);
   state.time_base = state.time;
   state.index_base = state.step_index;
   state.step = h;

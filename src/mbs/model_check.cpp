@@ -8,7 +8,9 @@
 #include <set>
 #include <utility>
 
+#include "base/error.h"
 #include "mbs/quantity.h"
+#include "mbs/solver.h"
 
 namespace topple::mbs {
 
@@ -634,5 +636,15 @@ std::vector<Complaint> Checker::find() {
 }  // namespace
 
 std::vector<Complaint> find_complaints(const Model& model) { return Checker(model).find(); }
+
+void check_step(double step, double duration) {
+  if (!(step > 0) || duration <= kMostSteps * step) return;
+  throw InputError(
+      "E606",
+      fmt::format("a step of {:.3g} s is too short for {:.6g} s: the run would take {:.2g} steps, at most {:g} "
+                  "are allowed",
+                  step, duration, duration / step, kMostSteps),
+      fmt::format("give a step of {:.3g} s or more", duration / kMostSteps));
+}
 
 }  // namespace topple::mbs

@@ -12,6 +12,7 @@
 #include "mbs/model_check.h"
 #include "mbs/model_words.h"
 #include "mbs/quantity.h"
+#include "mbs/solver.h"
 
 namespace topple::mbs {
 
@@ -720,6 +721,9 @@ RunSettings Reader::run_from(const Node& n) const {
   RunSettings r;
   if (n.has("duration")) r.duration = n["duration"].positive();
   if (n.has("step")) r.step = n["step"].positive();
+  if (r.step > 0 && r.duration > kMostSteps * r.step)
+    n["step"].fail(fmt::format("must be at least {:.3g} for the duration of {:g} s: a run takes at most {:g} steps",
+                               r.duration / kMostSteps, r.duration, kMostSteps));
   if (n.has("frame_interval")) r.frame_interval = n["frame_interval"].positive();
   if (n.has("equilibrium")) r.equilibrium = n["equilibrium"].flag();
   if (n.has("rest_speed")) {

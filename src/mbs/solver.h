@@ -87,9 +87,12 @@ struct Sampling {
   std::function<void(const View&)> on_sample;
 };
 
+/// A run that would take more steps is refused: no model that means anything needs so many.
+inline constexpr double kMostSteps = 1e9;
+
 struct Options {
   double duration = 1;  // [s]
-  double step = 0;      // 0: step_safety times the limit of the stiffest mode
+  double step = 0;      // 0: step_safety times the limit of the stiffest mode; else at least duration / kMostSteps
   double step_safety = 0.85;
   double step_share = 1;  // of the engine's own step, for studies of convergence; without effect on a set step
   /// Every zone is asked by its full law at each step, none in lanes: slow, to check what lanes make of them.
@@ -134,7 +137,8 @@ struct Summary {
   double wall_time = 0;             // of the stepping [s]
 };
 
-/// Runs the model from its start to its end. Throws InputError if check_model does; everything else is in the summary.
+/// Runs the model from its start to its end. Throws InputError if check_model does, and for a set step
+/// that is too short; everything else is in the summary.
 Summary run(const Model&, const Options&);
 
 class System;  // compiled model and state

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "mbs/joint_rows.h"
+#include "mbs/model_check.h"
 
 namespace topple::mbs {
 
@@ -38,6 +39,7 @@ double viscous_share(double damping_ratio) { return 4 * damping_ratio / (1 - 2 *
 System::System(const Model& m, const Options& o, size_t width, bool has_moment)
     : model(m), options(o), own_lanes(std::make_unique<Lanes>()), lanes(own_lanes.get()) {
   check_model(model);
+  check_step(options.step, options.duration);
   lanes->W = width > 0 ? width : kernel::lanes();
   compile();
   if (!has_moment) choose_step();

@@ -67,6 +67,9 @@ TEST(Knowledge, RefusesWhatIsNotASet) {
   EXPECT_THAT(complaint_of(replaced(shipped(), "\"zone.damping_ratio\", \"value\": 0.05",
                                     "\"zone.damping_ratio\", \"value\": 0.3")),
               testing::HasSubstr("\"zone.damping_ratio\" needs a value > 0, at most 0.2"));
+  EXPECT_THAT(complaint_of(replaced(shipped(), "\"contact.frequency\", \"value\": 250",
+                                    "\"contact.frequency\", \"value\": 1e30")),
+              testing::HasSubstr("\"contact.frequency\" needs a value > 0, at most 100000"));
   EXPECT_THAT(complaint_of(replaced(shipped(), "\"zone.twist_rupture\"", "\"zone.slip_rupture\"")),
               testing::HasSubstr("given twice"));
 }

@@ -245,6 +245,12 @@ TEST_F(FarfieldReplay, GoesOnFromACheckpointAsIfNothingHadHappened) {
   expect_same(whole, rest);
 }
 
+TEST_F(FarfieldReplay, RefusesAScaledStepWithoutEnd) {
+  FeOptions fe = coarse();
+  fe.scaled_step = 1e-12;
+  EXPECT_THROW((void)run(with_duration(portal(), "20 ms"), fe), InputError);
+}
+
 TEST_F(FarfieldReplay, RefusesACheckpointOfSomethingElse) {
   FeOptions kept = coarse();
   kept.checkpoint = folder + "checkpoint.bin";

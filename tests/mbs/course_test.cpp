@@ -2,10 +2,12 @@
 
 #include "mbs/course.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <vector>
 
+#include "base/error.h"
 #include "models.h"
 #include "views.h"
 
@@ -86,6 +88,19 @@ TEST(Rest, TakesAsLongAsItsTimeHoweverLongThatIs) {
   EXPECT_EQ(run(m, o).ending, Summary::Ending::AtRest);
   o.rest_time = 1e30;
   EXPECT_EQ(run(m, o).ending, Summary::Ending::TimeLimit);
+}
+
+TEST(Step, IsRefusedWhereTheRunWouldHaveNoEnd) {
+  Model m = make_hanging();
+  Options o;
+  o.duration = 1, o.step = 0.99e-9, o.equilibrium = false;
+  EXPECT_THROW((void)run(m, o), InputError);
+  o.step = 0;
+  m.elements[0].translational_stiffness = {1e27, 1e27, 1e27};
+  const Summary stiff = run(m, o);
+  EXPECT_EQ(stiff.ending, Summary::Ending::Diverged);
+  EXPECT_THAT(stiff.message, testing::HasSubstr("more steps than the 1e+09 that a run may take"));
+  EXPECT_LE(stiff.steps, 1);
 }
 
 }  // namespace

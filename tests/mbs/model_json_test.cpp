@@ -140,6 +140,8 @@ TEST(ModelJson, ReadsTheSettingsOfTheRun) {
   for (const char* wrong : {"\"duration\": 0", "\"step\": -1", "\"frame_interval\": 0", "\"rest_speed\": -1",
                             "\"equilibrium\": 1", "\"steps\": 5"})
     EXPECT_THAT(complaints(std::string("\"run\": {") + wrong + "}"), HasSubstr("run")) << wrong;
+  EXPECT_THAT(complaints(R"("run": {"duration": 20, "step": 1e-30})"),
+              testing::AllOf(HasSubstr("5:"), HasSubstr("run.step"), HasSubstr("at least 2e-08")));
 }
 
 // --------------------------------------------------------------------------------------------- what people write
