@@ -185,10 +185,10 @@ TEST(PlanMapping, ScreensTheGroundVibrationAsARunDoes) {
   EXPECT_NEAR(mapped.values.back(), found->value, 1e-12);  // the upper end of the band; the same touchdowns
   // nothing of it in plans without the law, and where it is not wanted
   options.vibration = false;
-  for (const PlanQuantity& q : PlanMapping(plan, collapse::default_knowledge(), options).outputs())
-    EXPECT_EQ(q.name.rfind("vibration", 0), std::string::npos);
-  for (const PlanQuantity& q : PlanMapping(read_small(strengths), collapse::default_knowledge(), quick()).outputs())
-    EXPECT_EQ(q.name.rfind("vibration", 0), std::string::npos);
+  const PlanMapping not_wanted(plan, collapse::default_knowledge(), options);
+  const PlanMapping without_law(read_small(strengths), collapse::default_knowledge(), quick());
+  for (const PlanMapping* none : {&not_wanted, &without_law})
+    for (const PlanQuantity& q : none->outputs()) EXPECT_EQ(q.name.rfind("vibration", 0), std::string::npos);
 }
 
 TEST(PlanMapping, NamesScreeningsApart) {
