@@ -229,6 +229,7 @@ class Study {
   }
   advance() {
     const k = this.samples.length;
+    if (k >= this.session.server.studyBarrier) return;
     const a = ((k * 0.618034) % 1), b = ((k * 0.414214) % 1), reach = 18 + 10 * a + 3 * b;
     this.samples.push({ index: k, inputs: [10e6 + 35e6 * a, 380e6 + 80e6 * b, 0.4 + 0.4 * ((k * 0.732) % 1)], outputs: [reach, 3.14 + 0.2 * (a - 0.5), 4e6 + 3e6 * b], outcome: reach > 28 ? "partial" : "topple", ok: true });
     if (this.samples.length >= this.limit) this.stop("finished");
@@ -270,6 +271,7 @@ export class Standin {
   frames = frameCount;
   rate = 4; // frames a tick
   barrier = Infinity; // a run goes no further than this row, but stays a running one
+  studyBarrier = Infinity; // and a study no further than so many samples
   refuse = false; // new connections
   resume = new Map();
 
