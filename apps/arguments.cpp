@@ -446,10 +446,38 @@ std::string find_missing(const Arguments& a) {
   }
 }
 
+/// Of the first option that nobody knows, as text to print; empty if it was something else that was not expected.
+std::string find_unknown(const CLI::App& app) {
+  const CLI::App* verb = &app;
+  std::string name = "topple";
+  while (!verb->get_subcommands().empty()) {
+    verb = verb->get_subcommands().front();
+    name += " " + verb->get_name();
+  }
+  std::vector<std::string> known;
+  for (const CLI::Option* option : verb->get_options())
+    for (const std::string& word : option->get_lnames()) known.push_back("--" + word);
+  for (const std::string& word : app.remaining(true)) {
+    if (!word.starts_with('-')) continue;
+    const std::string near = nearest_name(word.substr(0, word.find('=')), known);
+    return name + ": there is no option " + word + (near.empty() ? "" : "; did you mean " + near + "?") + "\nRun " +
+           name + " --help for its options.\n";
+  }
+  return "";
+}
+
 }  // namespace topple::apps
 
 std::variant<Arguments, int> parse_arguments(int argc, char** argv) {
   Arguments a;
+  // topple help run: topple run --help
+  std::vector<char*> words(argv, argv + argc);
+  char flag[] = "--help";
+  if (argc > 1 && std::string_view(argv[1]) == "help") {
+    words.erase(words.begin() + 1);
+    words.push_back(flag);
+    argv = words.data();
+  }
   CLI::App app{"topple shows a demolition engineer how a building will come down.", "topple"};
   app.require_subcommand(1);
   app.set_version_flag("--version", "topple " + program_version());
@@ -509,6 +537,11 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   }
   try {
     app.parse(argc, argv);
+  } catch (const CLI::ExtrasError& e) {
+    const std::string unknown = find_unknown(app);
+    if (unknown.empty()) return app.exit(e, std::cout, std::cerr) == 0 ? kOk : kBadInput;
+    std::cerr << unknown;
+    return kBadInput;
   } catch (const CLI::ParseError& e) {
     const int code = app.exit(e, std::cout, std::cerr);
     return code == 0 ? kOk : kBadInput;

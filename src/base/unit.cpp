@@ -111,6 +111,12 @@ std::string article(const std::string& noun) {
 
 Quantity problem(std::string words) { return {std::nullopt, std::move(words)}; }
 
+/// The same letters, capital or not.
+bool is_alike(std::string_view a, std::string_view b) {
+  const auto small = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [&](char x, char y) { return small(x) == small(y); });
+}
+
 }  // namespace
 
 Quantity parse_quantity(std::string_view text, Dimension wanted) {
@@ -143,7 +149,13 @@ Quantity parse_quantity(std::string_view text, Dimension wanted) {
     if (!found && other)
       return problem(quoted(all) + " is " + article(name_of(other->dimension)) + "; " + article(name_of(wanted)) +
                      " is wanted");
-    if (!found) return problem("unknown unit " + quoted(trim(rest)) + " in " + quoted(all));
+    if (!found) {
+      std::string words = "unknown unit " + quoted(trim(rest)) + " in " + quoted(all);
+      for (const Unit& u : units)
+        if (u.dimension == wanted && is_alike(u.name, name))
+          return problem(words + "; did you mean " + quoted(u.name) + "?");
+      return problem(std::move(words));
+    }
     factor = found->factor;
   }
   const double value = number * factor;

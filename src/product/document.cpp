@@ -248,6 +248,29 @@ Place clamp_to_text(Place place, const std::string& text) {
   return place;
 }
 
+std::string_view line_at(std::string_view text, int line) {
+  size_t begin = 0;
+  for (int i = 1; i < line; ++i) begin = text.find('\n', begin) + 1;
+  return text.substr(begin, text.find('\n', begin) - begin);
+}
+
+/// What to write where the parser cannot go on, "" if nobody knows.
+///   column  counts characters from 1
+std::string find_help(const std::string& message, std::string_view line, int column) {
+  for (const char* quote : {"\u201C", "\u201D", "\u201E", "\u00AB", "\u00BB", "\u2018", "\u2019"})
+    if (line.find(quote) != std::string_view::npos) return "write straight quotes, such as \"3.14 m\"";
+  if (message.find("control characters") != std::string::npos && std::count(line.begin(), line.end(), '"') % 2 == 1)
+    return "a string ends with a quote in the line in which it begins: one is missing here";
+  if (!message.starts_with("expected a comment or whitespace")) return "";
+  size_t at = 0;
+  for (int i = 0; at < line.size(); ++at)
+    if (is_lead(line[at]) && ++i == column) break;
+  const auto is_digit = [&](size_t i) { return i < line.size() && line[i] >= '0' && line[i] <= '9'; };
+  if (at > 0 && at < line.size() && line[at] == ',' && is_digit(at - 1) && is_digit(at + 1))
+    return "decimals are written with a point, such as 0.1 or \"3.14 m\"";
+  return "a value with a unit is a string in quotes, such as \"3.14 m\"";
+}
+
 }  // namespace
 
 const Entry* Node::find(const std::string& key) const {
@@ -291,13 +314,14 @@ Node parse_document(const std::string& text, const std::string& file) {
     place.width = 1;
     if (message.find("cannot redefine existing") != std::string::npos) {
       place = place_of_doubled_key(text, place, message);
-      fail(file, "E102", place, "duplicate key: " + message, "each key and each table can be given once");
+      fail(file, "E102", place, "duplicate key: " + message,
+           message.find("array-of-tables") == std::string::npos
+               ? "each key and each table can be given once"
+               : "a table that can be given several times stands in two brackets each time, such as [[columns]]");
     }
     if (message.find("TOML_MAX_NESTED_VALUES") != std::string::npos)
       fail(file, "E105", place, "nested deeper than " + std::to_string(deepest_key) + " levels", "");
-    const bool is_behind_value = message.starts_with("expected a comment or whitespace");
-    fail(file, "E101", place, message,
-         is_behind_value ? "a value with a unit is a string in quotes, such as \"3.14 m\"" : "");
+    fail(file, "E101", place, message, find_help(message, line_at(text, place.line), place.column));
   } catch (const ParserDoubt&) { fail(file, "E101", find_doubtful_line(text), "this line is not TOML", ""); }
 }
 

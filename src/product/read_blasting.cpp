@@ -181,7 +181,8 @@ void read_stages(Reading& reading, TableReader& root) {
     reading.plan.stages.push_back(std::move(stage));
   }
   check_times(reading, nodes, firings);
-  if (reading.complaints.error_count() != errors_before || !reading.has_grid || nodes.empty()) return;
+  if (reading.complaints.error_count() != errors_before || !reading.has_grid || !reading.knows_members || nodes.empty())
+    return;
   if (blasting.fired_columns() == 0) {
     const std::string help = "put charges on columns, such as members = [\"C-A*-0\"], or leave out every [[stage]]";
     if (blasting.failing_columns() > 0) {

@@ -30,7 +30,9 @@ void check_corners(const TableReader& table, Place where, const FuzzyValue& valu
     if (mu < value.corners[i - 1].second) falls = true;
     if (falls && mu > value.corners[i - 1].second) is_hill = false;
   }
-  if (!rises) table.error("E207", where, "the values must rise from left to right");
+  if (!rises)
+    table.error("E207", where, "the values must rise from left to right",
+                "the least possible value first, then the core, then the largest possible one");
   if (!has_top || !is_hill || value.corners.front().second != 0 || value.corners.back().second != 0)
     table.error("E207", where, "the membership must go from 0 up to 1 and down to 0");
 }
@@ -232,6 +234,7 @@ Expression read_formula(const Node& node, const std::string& path, const std::ve
   if (fault.message.empty()) return e;
   Place place = node.place;
   place.column += 1 + static_cast<int>(fault.offset);  // behind the quotation mark
+  place.width = std::max(1, place.width - 2 - static_cast<int>(fault.offset));
   complaints.error("E208", place, path + ": formula: " + fault.message, fault.help);
   return e;
 }

@@ -138,6 +138,12 @@ void check_room(const TableReader& table, Place place, int count, double diamete
 
 void read_bars(TableReader& table, Section& s) {
   const double inset = s.cover + s.tie_diameter;
+  if (2 * inset >= std::min(s.width, s.height)) {
+    for (const char* key : {"bars", "top", "bottom"}) table.find(key);
+    table.error("E207", table.place_of("cover"), "cover: leaves no room for bars between the ties of this section",
+                "cover and ties of both sides must be less than its width and its height");
+    return;
+  }
   if (table.has("bars")) {
     const Node* node = table.table("bars");
     if (!node) return;

@@ -148,7 +148,8 @@ void apply_rule(Builder& builder, MemberKind kind, const Node& node, const std::
   const int errors_before = reading.complaints.error_count();
   std::vector<bool> storeys(plan.storey_heights.size(), true);
   if (const Node* marks = table.find("storeys"); marks && !storeys.empty()) {
-    storeys.assign(storeys.size(), false);
+    // how many there are is known from a grid that could be read
+    storeys.assign(reading.has_grid ? storeys.size() : static_cast<size_t>(most_storeys), false);
     mark_storeys(table, *marks, storeys, false);
   }
   std::vector<Word> at = table.has("at") ? table.required_words("at", "\"*\"") : std::vector<Word>{},
@@ -443,6 +444,10 @@ void read_members(Reading& reading, TableReader& root) {
     }
     for (size_t i = 0; i < nodes.size(); ++i) apply_rule(builder, kind, *nodes[i], key + "[" + std::to_string(i) + "]");
   }
+  // a misspelt table: not all members are known
+  for (const Entry& e : root.entries())
+    if (!nearest_name(e.key, {"columns", "beams", "slabs", "walls"}).empty() && !root.has_read(e.key))
+      reading.knows_members = false;
   if (!has_rules && !root.has("shafts")) root.missing("columns", "add [[columns]] with a section");
 
   Plan& plan = reading.plan;
@@ -462,6 +467,8 @@ void read_members(Reading& reading, TableReader& root) {
   publish();
   std::vector<Draft> drafts;
   for (auto& [key, draft] : builder.drafts) drafts.push_back(draft);
+  // without them others hang in the air
+  if (!reading.knows_members) return;
   check_support(plan, drafts, reading.complaints);
   if (reading.complaints.error_count() == 0) warn_of_unused(reading);
 }

@@ -71,7 +71,7 @@ std::vector<Point> read_footprint(TableReader& table) {
   if (!is_readable) return {};
   const double area = calc_signed_area(corners);
   if (std::abs(area) < 0.01) {
-    table.error("E308", node->place, "footprint: encloses no area");
+    table.error("E308", node->place, "footprint: encloses no area", "give the corners in order around the footprint");
   } else if (crosses_itself(corners)) {
     table.error("E308", node->place, "footprint: its edges cross", "give the corners in order around the footprint");
   } else if (area < 0) {

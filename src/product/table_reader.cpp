@@ -89,8 +89,13 @@ bool is_within(double value, const Range& range) {
 
 }  // namespace
 
-std::string describe(const Range& range, Dimension dimension) {
-  const auto [name, size] = usual_unit(dimension);
+std::string describe(const Range& range, Dimension dimension, const std::string& written) {
+  auto [name, size] = usual_unit(dimension);
+  // where the usual one gives fractions, that which stands behind the number
+  const size_t at = std::min(written.find_first_not_of("+-.0123456789eE \t"), written.size());
+  const std::string own = written.substr(at);
+  if (const Quantity one = parse_quantity("1 " + own, dimension); !own.empty() && one.value && range.high < size)
+    name = own.c_str(), size = *one.value;
   const std::string tail = *name ? std::string(" ") + name : "";
   const std::string high = number_text(range.high / size) + tail;
   if (range.above_low) return "above " + number_text(range.low / size) + ", at most " + high;
@@ -99,14 +104,14 @@ std::string describe(const Range& range, Dimension dimension) {
 
 namespace {
 
-/// The usual example, or where that is not allowed one with a single digit from the middle of what is.
+/// The usual example, or where that is not allowed one with a single digit from within what is.
 std::string example_of(Dimension dimension, const Range& range) {
   const std::string usual = example_of(dimension);
   const auto value =
       dimension == Dimension::Number ? 0.5 : parse_quantity(usual.substr(1, usual.size() - 2), dimension).value;
   if (value && is_within(*value, range)) return usual;
   const auto [name, size] = usual_unit(dimension);
-  const double middle = (range.low > 0 ? std::sqrt(range.low * range.high) : 0.5 * range.high) / size;
+  const double middle = (range.low > 0 ? std::sqrt(range.low * range.high) : 0.05 * range.high) / size;
   const double digit = std::pow(10, std::floor(std::log10(middle)));
   const std::string text = number_text(std::round(middle / digit) * digit);
   return *name ? "\"" + text + " " + name + "\"" : text;
@@ -145,8 +150,12 @@ double read_value(const Node& node, const std::string& label, Dimension dimensio
     return nan;
   }
   if (!is_within(value, range)) {
-    complaints.error("E205", node.place, label + ": " + written + " is out of range",
-                     "allowed: " + describe(range, dimension));
+    complaints.error(
+        "E205", node.place, label + ": " + written + " is out of range",
+        "allowed: " + describe(range, dimension, node.kind == Node::Kind::String ? node.text : std::string()) +
+            (dimension == Dimension::Number && range.high == 1 && value > 1 && value <= 100
+                 ? "; a percentage is written \"" + number_text(value) + " %\""
+                 : ""));
     return nan;
   }
   return value;

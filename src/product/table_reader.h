@@ -1,6 +1,7 @@
 #pragma once
 /// Typed access to one table of a plan: every wrong type, unit, value and unknown key becomes a complaint.
 
+#include <algorithm>
 #include <optional>
 #include <string>
 #include <vector>
@@ -25,8 +26,9 @@ struct Word {
   Place place;
 };
 
-/// "between 1 and 200 N/mm2", in the units people use for the dimension.
-std::string describe(const Range&, Dimension);
+/// "between 1 and 200 N/mm2", in the units people use for the dimension; less than one of these in that of a quantity
+/// as it is written.
+std::string describe(const Range&, Dimension, const std::string& written = {});
 
 class TableReader {
  public:
@@ -37,6 +39,9 @@ class TableReader {
   Place place() const { return node_.place; }
   bool is_table() const { return is_table_; }
   bool has(const std::string& key) const { return node_.find(key) != nullptr; }
+  const std::vector<Entry>& entries() const { return node_.entries; }
+  /// Whether somebody has asked for the key.
+  bool has_read(const std::string& key) const { return std::find(known_.begin(), known_.end(), key) != known_.end(); }
   /// The value of a key, nullptr if it is not given; from now on the key is a known one.
   const Node* find(const std::string& key);
   /// Where the key's value stands, or the table's header.

@@ -131,5 +131,22 @@ TEST(Arguments, ManualHasItsParts) {
   EXPECT_THAT(page, HasSubstr("\\-\\-frame\\-rate"));
 }
 
+TEST(Arguments, HelpIsAVerb) {
+  EXPECT_EQ(said({"help"}), said({"--help"}));
+  EXPECT_EQ(said({"help", "run"}), said({"run", "--help"}));
+  EXPECT_EQ(said({"help", "mbs", "run"}), said({"mbs", "run", "--help"}));
+  EXPECT_THAT(said({"help", "run"}).first, HasSubstr("--check-step"));
+}
+
+TEST(Arguments, OptionsThatNobodyKnowsAreNamed) {
+  std::ostringstream text;
+  std::streambuf* before = std::cerr.rdbuf(text.rdbuf());
+  const int code = said({"run", "--sterp", "3", "plan.toml", "-o", "x"}).second;
+  std::cerr.rdbuf(before);
+  EXPECT_EQ(code, 2);
+  EXPECT_EQ(text.str(),
+            "topple run: there is no option --sterp; did you mean --step?\nRun topple run --help for its options.\n");
+}
+
 }  // namespace
 }  // namespace topple::apps

@@ -34,6 +34,21 @@ struct Mistake {
 
 void PrintTo(const Mistake& mistake, std::ostream* out) { *out << mistake.code << " " << mistake.new_words; }
 
+TEST(ReadPlan, SaysWhereAQuoteIsMissing) {
+  const std::vector<Diagnostic> found =
+      complaints_about(replaced(small_plan(), "title = \"Two bays\"", "title = \"Two bays"));
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].where.line, 1);
+  EXPECT_THAT(found[0].help, HasSubstr("one is missing here"));
+}
+
+TEST(ReadPlan, SaysOneThingOfMembersThatCannotBeRead) {
+  for (const auto& [old_words, new_words] : {std::pair{"[[columns]]", "[[colums]]"}, {"count = 2", "count = 0"}}) {
+    const std::vector<Diagnostic> found = complaints_about(replaced(small_plan(), old_words, new_words));
+    EXPECT_EQ(found.size(), 1u) << rendered(found, small_plan());
+  }
+}
+
 class OneMistake : public testing::TestWithParam<Mistake> {};
 
 TEST_P(OneMistake, IsOneComplaintAtItsPlace) {
@@ -59,6 +74,9 @@ TEST_P(OneMistake, IsOneComplaintAtItsPlace) {
 const Mistake syntax_mistakes[] = {
     {"E101", "height = \"3 m\"", "height = 3 «m»", "saw 'm'", "a string in quotes"},
     {"E101", "[grid]", "[grid «x»]", "expected ']'", ""},
+    {"E101", "friction = 0.6", "friction = 0«,»6", "saw ','", "with a point"},
+    {"E101", "height = \"3 m\"", "height = «\u201E»3 m\u201C", "value type", "straight quotes"},
+    {"E102", "[[columns]]", "[columns]\nsection = \"column\"\n«[[columns]]»", "duplicate key", "two brackets"},
     {"E102", "friction = 0.6", "friction = 0.6\n  «friction» = 0.7", "duplicate key", ""},
     {"E102", "[criteria]", "«[storeys]»", "duplicate key", ""},
     {"E103", "title = \"Two bays\"", "title = \"Two «\xFF»bays\"", "not UTF-8", ""},
@@ -107,11 +125,20 @@ const Mistake key_mistakes[] = {
     {"E205", "load = \"1 kN/m2\"", "load = «[\"1 kN/m2\"]»", "1 values for 2 storeys", "each storey"},
     {"E205", "members = [\"C-B3-0\"]", "members = «[]»", "empty list", "C-A*-0"},
     {"E205", "fc = \"25 N/mm2\"", "fc = «\"25 kN/m2\"»", "out of range", "between 1 and 200 N/mm2"},
+    {"E204", "fc = \"25 N/mm2\"", "fc = «\"25 mpa\"»", "did you mean \"MPa\"?", "units: N/mm2"},
+    {"E205", "destroyed_length = \"1 m\"", "destroyed_length = \"1 m\"\nresidual_bars = «10»", "10 is out of range",
+     "written \"10 %\""},
+    {"E205", "width = \"40 cm\"\nheight = \"50 cm\"\nconcrete = \"C25\"\nsteel = \"S\"\ncover = \"3 cm\"",
+     "width = \"40 cm\"\nheight = \"50 cm\"\nconcrete = \"C25\"\nsteel = \"S\"\ncover = «\"60 cm\"»", "out of range",
+     "between 0 and 50 cm"},
     {"E206", "mechanism = \"topple\"", "mechanism = «\"tople\"»", "\"tople\" is not one of",
      "did you mean \"topple\"?"},
     {"E207", "fc = \"25 N/mm2\"", "fc = «\"7 N/mm2\"»", "fct: cannot be derived", "fct ="},
     {"E207", "Ec = \"30 GPa\"", "Ec = \"30 GPa\"\neps_c1 = «0.0008»", "eps_c1, must be larger than fc / Ec", "0.00083"},
     {"E207", "fu = \"500 N/mm2\"", "fu = «\"400 N/mm2\"»", "fu must not be smaller than fy", ""},
+    {"E207", "width = \"40 cm\"\nheight = \"50 cm\"\nconcrete = \"C25\"\nsteel = \"S\"\ncover = \"3 cm\"",
+     "width = \"40 cm\"\nheight = \"50 cm\"\nconcrete = \"C25\"\nsteel = \"S\"\ncover = «\"20 cm\"»", "leaves no room",
+     "less than its width"},
     {"E207", "bars = { count_y = 3, count_z = 3, diameter = \"20 mm\" }",
      "bars = «{ count_y = 30, count_z = 3, diameter = \"20 mm\" }»", "30 bars do not fit into the width", "thinner"},
     {"E207", "top = \"4 x 20 mm\"", "top = «\"14 x 20 mm\"»", "14 bars do not fit", ""},

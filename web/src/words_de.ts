@@ -325,6 +325,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["{n}: belongs to masonry; the concrete has its own", "{}: gehört zu Mauerwerk; der Beton hat eigene Werte"],
   ["the bars take more than 15 % of the section", "die Stäbe nehmen mehr als 15 % des Querschnitts ein"],
   ["cover: leaves no room for the reinforcement in this thickness", "cover: lässt in dieser Dicke keinen Platz für die Bewehrung"],
+  ["cover: leaves no room for bars between the ties of this section", "cover: lässt zwischen den Bügeln dieses Querschnitts keinen Platz für Stäbe"],
   ["cover: leaves no room for the bars in this thickness", "cover: lässt in dieser Dicke keinen Platz für die Stäbe"],
   ["{n}: leaves no hollow inside; the wall may take 0.9 of the outer radius", "{}: lässt innen keinen Hohlraum; die Wand darf 0,9 des äußeren Halbmessers einnehmen"],
   ["lining: fills the shaft", "lining: füllt den Schaft aus"],
