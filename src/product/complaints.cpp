@@ -16,6 +16,16 @@ void Complaints::warn(const char* code, Place place, std::string message, std::s
   add(Severity::Warning, code, place, std::move(message), std::move(help));
 }
 
+void Complaints::take_back(Place place, const std::string& message) {
+  const auto it = std::find_if(all_.begin(), all_.end(), [&](const Diagnostic& d) {
+    return d.severity == Severity::Error && d.where.line == place.line && d.where.column == place.column &&
+           d.message == message;
+  });
+  if (it == all_.end()) return;
+  all_.erase(it);
+  --errors_;
+}
+
 void Complaints::add(Severity severity, const char* code, Place place, std::string message, std::string help) {
   all_.push_back({severity, code, position(place), std::max(place.width, 1), std::move(message), std::move(help)});
 }

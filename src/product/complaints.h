@@ -26,6 +26,9 @@ class Complaints {
   void error(const char* code, Place, std::string message, std::string help = {});
   void warn(const char* code, Place, std::string message, std::string help = {});
 
+  /// Takes back an error that another one says better.
+  void take_back(Place, const std::string& message);
+
   int error_count() const { return errors_; }
   /// True once there are so many errors that looking for more is of no use.
   bool is_full() const { return errors_ >= most; }

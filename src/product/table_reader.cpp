@@ -190,8 +190,14 @@ void TableReader::error(const char* code, Place place, const std::string& messag
   complaints_.error(code, place, label_.empty() ? message : label_ + ": " + message, std::move(help));
 }
 
+std::string TableReader::words_of_missing(const std::string& key) const {
+  return (label_.empty() ? "missing table " : "missing key ") + quoted(key);
+}
+
 void TableReader::missing(const std::string& key, const std::string& help) const {
-  if (is_table_) error("E201", node_.place, (label_.empty() ? "missing table " : "missing key ") + quoted(key), help);
+  if (!is_table_) return;
+  error("E201", node_.place, words_of_missing(key), help);
+  missing_.push_back(key);
 }
 
 double TableReader::quantity(const std::string& key, Dimension dimension, Range range) {
@@ -366,9 +372,12 @@ void TableReader::finish() const {
     if (complaints_.is_full()) return;
     bool is_known = false;
     for (const std::string& key : known_) is_known = is_known || key == entry.key;
-    if (!is_known)
-      error("E203", entry.place, "unknown key " + quoted(entry.key),
-            did_you_mean(entry.key, known_, "known here: " + list_of(known_)));
+    if (is_known) continue;
+    error("E203", entry.place, "unknown key " + quoted(entry.key),
+          did_you_mean(entry.key, known_, "known here: " + list_of(known_)));
+    // the one that is missing is here, misspelt
+    if (const std::string near = nearest_name(entry.key, missing_); !near.empty())
+      complaints_.take_back(node_.place, (label_.empty() ? "" : label_ + ": ") + words_of_missing(near));
   }
 }
 

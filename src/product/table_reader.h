@@ -77,7 +77,9 @@ class TableReader {
   std::string label_;
   Complaints& complaints_;
   bool is_table_ = true;
+  std::string words_of_missing(const std::string& key) const;
   std::vector<std::string> known_;
+  mutable std::vector<std::string> missing_;  // complained of
 };
 
 /// One quantity out of a value that stands alone (in a list); NaN after a complaint.

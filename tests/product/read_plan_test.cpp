@@ -43,7 +43,10 @@ TEST(ReadPlan, SaysWhereAQuoteIsMissing) {
 }
 
 TEST(ReadPlan, SaysOneThingOfMembersThatCannotBeRead) {
-  for (const auto& [old_words, new_words] : {std::pair{"[[columns]]", "[[colums]]"}, {"count = 2", "count = 0"}}) {
+  for (const auto& [old_words, new_words] : {std::pair{"[[columns]]", "[[colums]]"},
+                                             {"count = 2", "count = 0"},
+                                             {"duration = \"5 s\"", "duratoin = \"5 s\""},
+                                             {"[analysis]", "[analisys]"}}) {
     const std::vector<Diagnostic> found = complaints_about(replaced(small_plan(), old_words, new_words));
     EXPECT_EQ(found.size(), 1u) << rendered(found, small_plan());
   }
