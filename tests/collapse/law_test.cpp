@@ -136,7 +136,7 @@ TEST(ZoneLength, FollowsItsRule) {
   EXPECT_NEAR(calc_zone_length(in.section, in.concrete, in.steel, 0.8, 0.6, k), 0.15, 1e-12);
 }
 
-TEST(ZoneLibrary, ComputesEachZoneOnceWhateverTheThreads) {
+TEST(ZoneLibraryReplay, ComputesEachZoneOnceWhateverTheThreads) {
   nearfield::ZoneInput a = column_zone(), b = a;
   b.cut_bars = 0.5;
   ZoneLibrary one, four;

@@ -62,7 +62,7 @@ TEST(PlanMapping, SaysWhatGoesInAndComesOut) {
   EXPECT_NEAR(std::max(0.0, r[0].trajectory[5] - footprint[2][0]), reach_of("reach_pos_x"), 1e-6);
 }
 
-TEST(PlanMapping, GivesTheSameBitsInAnyBatchOnAnyThread) {
+TEST(PlanMappingReplay, GivesTheSameBitsInAnyBatchOnAnyThread) {
   const product::Plan plan = read_small(strengths);
   const PlanMapping m(plan, collapse::default_knowledge(), quick());
   const std::vector<Result> all = evaluate(m, points);
@@ -218,7 +218,7 @@ product::Plan read_house() {
                                         "[\"0.8 m\", \"1 m\", \"1.2 m\"] }\n"));
 }
 
-TEST(CondensedMapping, GivesTheSameBitsInAnyBatchOnAnyThread) {
+TEST(CondensedMappingReplay, GivesTheSameBitsInAnyBatchOnAnyThread) {
   PlanMappingOptions o = quick();
   o.condensed = true;
   const product::Plan plan = read_house();
