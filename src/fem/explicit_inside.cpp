@@ -70,6 +70,8 @@ ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
     model.elements[e].node = turn_corners(model.elements[e].node, chunks.turn_of_element[e]);
   const size_t N = model.nodes.size(), E = model.elements.size(), rows = chunks.node_of_row.size();
   for (const ExplicitMaterial& material : model.materials) laws.push_back(make_law(material));
+  first_laws = laws;
+  s.bars.resize(model.bars.size()), s.releases.resize(model.releases.size());
 
   // step and mass scaling
   element_mass.resize(E), element_volume.resize(E);
@@ -294,7 +296,10 @@ void ExplicitSystem::Inside::advance_step(ExplicitState& state, bool removes) {
   state.begins = false;
   const double t0 = seconds();
   const bool debris = pushes_debris(state);
+  if (removes) end_releases(state);
+  set_laws(state);
   clear_pushes(state);
+  press_bars(state);
   press_grounds(state, debris);
   double t1 = seconds();
   timing.contact += t1 - t0;
@@ -309,6 +314,7 @@ void ExplicitSystem::Inside::advance_step(ExplicitState& state, bool removes) {
   advance_nodes(step, state);
   const double t2 = seconds();
   if (debris) move_particles(state);
+  book_bars(state);
   book_grounds(state, debris);
   if (has_contact) book_surfaces(*this, state);
   for (const auto& sums : chunk_sums)

@@ -19,6 +19,8 @@
 
 namespace topple::fem {
 
+inline Vec3 vector_at(const double* r) { return {r[0], r[1], r[2]}; }
+
 /// A point pressed on something rigid, with what its work is booked by.
 struct GroundTouch {
   std::uint32_t row = 0;  // of a node, or number of a particle
@@ -44,6 +46,21 @@ struct ContactWork {
 struct HeldPush {
   Vec3 normal_force, friction;         // [N]
   std::uint32_t row = 0, padding = 0;  // whose bytes snapshots hold
+};
+
+/// What an ExplicitBar has come through.
+struct BarState {
+  double length = 0;       // as it began [m]
+  double stretched = 0;    // plastic elongation [m]
+  double bent = 0;         // how much of its shortening stays, not positive [m]
+  double force = 0;        // positive pulled [N]
+  Vec3 pull, before;       // force on its end b [N]; speed of b against a half a step before [m/s]
+  std::int64_t phase = 0;  // 0 not yet, 1 bears, 2 gone
+};
+/// How far an ExplicitRelease is.
+struct ReleaseState {
+  std::int64_t begun = -1;  // step; negative: not yet
+  std::int64_t is_over = 0;
 };
 
 /// A touch of the step; forces on the point [N].
@@ -92,6 +109,9 @@ struct ExplicitState {
   std::vector<double> touchdowns;                  // by part
   double removed_internal = 0, removed_kinetic = 0, removed_gravity = 0;
   std::vector<Removal> removals;
+  std::vector<BarState> bars;
+  std::vector<ReleaseState> releases;
+  double bar_work = 0;  // of bars on nodes so far [J]
 };
 
 struct ExplicitSystem::Inside {
@@ -99,7 +119,7 @@ struct ExplicitSystem::Inside {
   ExplicitOptions options;
   ExplicitChunks chunks;
   ContactSetup contact;
-  std::vector<kernel::Law> laws;
+  std::vector<kernel::Law> laws, first_laws;  // now, and before any release
   std::vector<std::array<std::uint32_t, 8>> rows_of_element;
   std::vector<double> element_mass, element_volume;  // at the start
   std::vector<int> first_part_of_row;                // lowest part at a node
@@ -152,6 +172,16 @@ struct ExplicitSystem::Inside {
   double calc_lead(const ExplicitState& state) const {
     return static_cast<double>((debris_steps - state.steps % debris_steps) % debris_steps) * h;
   }
+  /// Takes away what releases have let go of.
+  void end_releases(ExplicitState&);
+  /// Laws as the state's releases have them.
+  void set_laws(const ExplicitState&);
+  void press_bars(ExplicitState&) const;
+  /// Place or speed of a bar's end, by field.
+  Vec3 calc_end(const ExplicitState&, const ExplicitBar::End&, int field) const;
+  void book_bars(ExplicitState&) const;
+  /// The ledger of bars begins anew.
+  void restart_bars(ExplicitState&) const;
   void press_grounds(ExplicitState&, bool debris) const;
   void book_grounds(ExplicitState&, bool debris) const;
   void move_particles(ExplicitState&) const;

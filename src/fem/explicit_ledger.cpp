@@ -14,8 +14,6 @@ constexpr double kGroundRate = 0.2, kGroundGrip = 0.2;
 /// Of its full radius: debris is crushed no further.
 constexpr double kLeastRadius = 0.1;
 
-Vec3 vector_at(const double* r) { return {r[0], r[1], r[2]}; }
-
 void add_to(TouchSums& sums, const GroundTouch& t) {
   ++sums.count, sums.normal += dot(t.normal_force, t.before), sums.friction += dot(t.friction, t.before);
   sums.stored += t.stored;
@@ -349,6 +347,13 @@ ExplicitEnergy ExplicitSystem::Inside::calc_energy() {
   ContactWork surface = s.surface_work;
   surface.normal += ahead.held_work.normal, surface.friction += ahead.held_work.friction;
   book(surface, sums.normal, sums.friction, sums.stored);
+  double bar_work = s.bar_work, stored = 0;
+  for (size_t b = 0; b < ahead.bars.size(); ++b) {
+    const BarState& bar = ahead.bars[b];
+    bar_work += 0.5 * h * dot(bar.pull, bar.before);
+    stored += 0.5 * bar.force * bar.force / model.bars[b].stiffness;
+  }
+  energy.elastic += stored, energy.plastic -= bar_work + stored;
   energy.removed_internal = s.removed_internal, energy.removed_kinetic = s.removed_kinetic;
   energy.removed_gravity = s.removed_gravity;
   energy.start = start_energy;

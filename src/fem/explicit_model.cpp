@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "base/error.h"
 
@@ -70,6 +71,77 @@ void check_material(const ExplicitMaterial& m, size_t index, std::vector<Diagnos
   }
 }
 
+using Complain = std::function<void(const std::string&, const std::string&)>;
+
+void check_bars(const ExplicitModel& model, const Complain& complain) {
+  const int N = static_cast<int>(model.nodes.size());
+  for (size_t i = 0; i < model.bars.size(); ++i) {
+    const ExplicitBar& bar = model.bars[i];
+    for (const ExplicitBar::End* end : {&bar.a, &bar.b}) {
+      bool known = end->node[0] < 0;
+      double sum = 0;
+      for (const double w : end->weight) sum += w;
+      if (!known) {
+        known = std::abs(sum - 1) < 1e-9;
+        for (const int n : end->node) known = known && n >= 0 && n < N;
+      }
+      if (!known) complain(fmt::format("bar {}: its ends need four nodes with weights of sum 1", i), "");
+    }
+    if (bar.a.node[0] < 0 && bar.b.node[0] < 0) complain(fmt::format("bar {}: both ends are held", i), "");
+    if (!(bar.stiffness > 0) || !(bar.yield >= 0) || !(bar.rupture >= bar.yield) || !(bar.tears_at >= 0))
+      complain(fmt::format("bar {}: stiffness {} N/m, yield {} N, rupture {} N, torn at {} m", i, bar.stiffness,
+                           bar.yield, bar.rupture, bar.tears_at),
+               "stiffness is positive, and it yields before it tears");
+    const bool pairs = !bar.shortening.empty() && bar.shortening.size() == bar.buckling.size();
+    if (!pairs || bar.shortening.front() != 0 ||
+        std::adjacent_find(bar.shortening.begin(), bar.shortening.end(), std::greater_equal<>()) !=
+            bar.shortening.end() ||
+        !std::all_of(bar.buckling.begin(), bar.buckling.end(), [](double f) { return f >= 0; }))
+      complain(fmt::format("bar {}: its buckling force is not one of a shortening that rises from 0", i), "");
+  }
+}
+
+void check_releases(const ExplicitModel& model, const Complain& complain) {
+  const auto is_of = [](int i, size_t size) { return i >= 0 && i < static_cast<int>(size); };
+  std::vector<int> release_of(model.materials.size(), -1);
+  for (size_t r = 0; r < model.releases.size(); ++r) {
+    const ExplicitRelease& release = model.releases[r];
+    if (!(release.duration >= 0) || !std::isfinite(release.duration))
+      complain(fmt::format("release {}: its duration, {} s, is not possible", r, release.duration), "");
+    for (const int b : release.bars)
+      if (!is_of(b, model.bars.size())) complain(fmt::format("release {}: no bar {}", r, b), "");
+    for (const int e : release.elements)
+      if (!is_of(e, model.elements.size())) complain(fmt::format("release {}: no element {}", r, e), "");
+    for (const int m : release.materials)
+      if (is_of(m, model.materials.size()))
+        release_of[static_cast<size_t>(m)] = static_cast<int>(r);
+      else
+        complain(fmt::format("release {}: no material {}", r, m), "");
+    for (const auto& [from, to] : release.weakened) {
+      if (!is_of(from, model.materials.size()) || !is_of(to, model.materials.size())) {
+        complain(fmt::format("release {}: no material {} or {}", r, from, to), "");
+        continue;
+      }
+      const ExplicitMaterial& a = model.materials[static_cast<size_t>(from)];
+      const ExplicitMaterial& b = model.materials[static_cast<size_t>(to)];
+      if (a.E != b.E || a.nu != b.nu || a.density != b.density)
+        complain(fmt::format("release {}: material {} is not as elastic and heavy as {}", r, to, from), "");
+    }
+  }
+  std::vector<int> taken(model.elements.size(), -1);
+  for (size_t r = 0; r < model.releases.size(); ++r)
+    for (const int e : model.releases[r].elements)
+      if (is_of(e, model.elements.size())) taken[static_cast<size_t>(e)] = static_cast<int>(r);
+  for (size_t e = 0; e < model.elements.size(); ++e) {
+    const int m = model.elements[e].material;
+    if (is_of(m, model.materials.size()) && release_of[static_cast<size_t>(m)] >= 0 &&
+        release_of[static_cast<size_t>(m)] != taken[e])
+      complain(fmt::format("element {} has material {} of release {}, which does not take it away", e, m,
+                           release_of[static_cast<size_t>(m)]),
+               "");
+  }
+}
+
 }  // namespace
 
 double calc_hex_volume(const std::array<Vec3, 8>& x) { return calc_gradients(x).volume64 / 64; }
@@ -118,6 +190,8 @@ void check_explicit_model(const ExplicitModel& model) {
   for (const NodalForce& f : model.forces)
     if (f.node < 0 || f.node >= N || !is_finite(f.force))
       complain(fmt::format("a force at node {} is not possible", f.node));
+  check_bars(model, complain);
+  check_releases(model, complain);
   if (model.grounds.size() > 4) complain(fmt::format("{} grounds; at most 4", model.grounds.size()));
   for (const ExplicitGround& g : model.grounds) {
     if (!(std::abs(norm(g.normal) - 1) < 1e-9)) complain("a ground's normal is not of length 1");

@@ -5,6 +5,7 @@
 #include <array>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/linalg.h"
@@ -60,6 +61,33 @@ struct ExplicitGround {
   double friction = 0.5;
 };
 
+/// A slender bar between two places of the mesh: a force along the line between them, from the beginning of its release
+/// on. Straight it yields, hardens and tears; shortened it buckles, and bears nothing on its way back until it is
+/// straight (eq. 26 there).
+struct ExplicitBar {
+  struct End {
+    std::array<int, 4> node{-1, -1, -1, -1};  // the first negative: a place that is held
+    std::array<double, 4> weight{};           // of the nodes' places, sum 1
+    Vec3 place;                               // in W, if held [m]
+  };
+  End a, b;
+  double stiffness = 0;            // of the straight bar [N/m]
+  double yield = 0, rupture = 0;   // forces when its plastic elongation begins and when it tears [N]
+  double tears_at = 0;             // plastic elongation [m]
+  std::vector<double> shortening;  // rising from 0 [m]
+  std::vector<double> buckling;    // largest force pushed so far together, magnitude [N] (shortening)
+};
+
+/// What loses its hold within some milliseconds, once it is told to (ExplicitSystem::release): yield stresses of some
+/// materials fall linearly to nothing, then their elements are taken away.
+struct ExplicitRelease {
+  double duration = 0;                        // [s]
+  std::vector<int> elements;                  // that are taken away ...
+  std::vector<int> materials;                 // ... and theirs, which no other elements have
+  std::vector<std::pair<int, int>> weakened;  // materials, and whose yield stresses they have once it is over
+  std::vector<int> bars;                      // that bear from its beginning on
+};
+
 struct ExplicitModel {
   std::vector<Vec3> nodes;  // [m]
   std::vector<ExplicitElement> elements;
@@ -68,11 +96,13 @@ struct ExplicitModel {
   std::vector<ExplicitSupport> supports;  // several of one node add up
   std::vector<NodalForce> forces;
   std::vector<ExplicitGround> grounds;
+  std::vector<ExplicitBar> bars;
+  std::vector<ExplicitRelease> releases;
   Vec3 gravity{0, 0, -9.81};  // [m/s²]
 };
 
 /// Throws InputError: nodes or materials that do not exist, elements turned inside out, values out of range; a
-/// softening steeper than three shear moduli.
+/// softening steeper than three shear moduli; releases whose materials others have, or whose successors are not alike.
 void check_explicit_model(const ExplicitModel&);
 
 /// Volume of the hexahedron [m³], eq. 3 there.

@@ -9,7 +9,7 @@ namespace topple::fem {
 
 namespace {
 
-constexpr std::uint64_t kMark = 0x7470'6578'0000'000e;  // name and version of the layout
+constexpr std::uint64_t kMark = 0x7470'6578'0000'000f;  // name and version of the layout
 
 class Writer {
  public:
@@ -71,6 +71,7 @@ void pass_state(Archive& archive, State& s) {
       archive.value(s.surface_work), archive.list(s.held), archive.value(s.held_work);
   archive.list(s.ground_forces), archive.list(s.debris_forces), archive.list(s.touchdowns), archive.list(s.removals);
   archive.value(s.removed_internal), archive.value(s.removed_kinetic), archive.value(s.removed_gravity);
+  archive.list(s.bars), archive.list(s.releases), archive.value(s.bar_work);
   auto& c = s.contact;
   archive.list(c.gone), archive.list(c.near), archive.list(c.near_particles);
   archive.list(c.boxes), archive.list(c.room), archive.list(c.travel), archive.list(c.speed),
@@ -129,10 +130,12 @@ void ExplicitSystem::read_snapshot(std::span<const std::byte> bytes) {
   bool started = false;
   from.list(start), from.value(start_energy), from.value(started);
   if (!from.is_empty() || start.size() != in.start.size() || s.rows.size() != in.s.rows.size() ||
-      s.elements.size() != in.s.elements.size())
+      s.elements.size() != in.s.elements.size() || s.bars.size() != in.s.bars.size() ||
+      s.releases.size() != in.s.releases.size())
     Reader::fail();
   in.contact_faces.clear();  // of another state
   in.s = std::move(s), in.start = std::move(start), in.start_energy = start_energy, in.started = started;
+  in.set_laws(in.s);
 }
 
 }  // namespace topple::fem

@@ -34,6 +34,7 @@ RelaxationSummary ExplicitSystem::relax(const RelaxationOptions& options, const 
     in.start[row] = {r[0], r[1], r[2]};
   }
   in.s.sums = {};
+  in.restart_bars(in.s);
   in.started = false;
   return summary;
 }
@@ -59,6 +60,15 @@ ExplicitEnding ExplicitSystem::advance(double until, const Progress& progress) {
 
 void ExplicitSystem::remove(std::span<const int> elements) {
   for (const int e : elements) inside_->remove_element(inside_->s, e, RemovalCause::Charge);
+}
+
+void ExplicitSystem::release(int number) {
+  Inside& in = *inside_;
+  ReleaseState& state = in.s.releases[static_cast<size_t>(number)];
+  if (state.begun >= 0) return;
+  state.begun = in.s.steps;
+  for (const int b : in.model.releases[static_cast<size_t>(number)].bars) in.s.bars[static_cast<size_t>(b)].phase = 1;
+  in.end_releases(in.s);
 }
 
 void ExplicitSystem::set_velocities(std::span<const Vec3> v) {

@@ -52,10 +52,10 @@ struct ExplicitEnergy {
   double debris_kinetic = 0;     // of particles, not in `kinetic`
   double gravity = 0;            // potential, of what is left, from the start
   double loads = 0;              // work of nodal forces
-  double elastic = 0;            // mean stress and stabilisation, of what is left
+  double elastic = 0;            // mean stress and stabilisation, of what is left, and bars
   double elastic_hourglass = 0;  // the share of `elastic` in the stabilisation, i.e. bending inside elements
   double corner_hourglass = 0;   // the share of `elastic` in modes that no beam theory knows (ξηζ)
-  double plastic = 0;            // dissipated by the mean stress
+  double plastic = 0;            // dissipated by the mean stress, and by bars
   double plastic_hourglass = 0;  // dissipated by stresses that vary over an element (bending)
   double plastic_corner = 0;     // the share of it in the mode ξηζ
   double bulk_viscosity = 0;     //
@@ -117,6 +117,8 @@ class ExplicitSystem {
 
   /// Takes elements away, with mass and energy; nothing stays of them. Those already gone are passed over.
   void remove(std::span<const int> elements);
+  /// Begins one of the model's releases, which goes on by itself; one that has begun is passed over.
+  void release(int number);
 
   /// Velocities of nodes (nodes) [m/s].
   void set_velocities(std::span<const Vec3>);

@@ -56,6 +56,7 @@ RelaxationSummary relax_system(ExplicitSystem::Inside& in, const RelaxationOptio
   for (; summary.steps < options.most_steps && !progress.is_cancelled(); ++summary.steps) {
     const double ramp = std::min(1.0, (summary.steps + 1.0) / std::max(1, options.ramp));
     in.clear_pushes(s);
+    in.press_bars(s);
     in.press_grounds(s, false);
     for (int c = 0; c < 3; ++c) step.weight[c] = ramp * in.model.gravity[c];
     // nodal forces, which a push begins with, rise as well

@@ -16,8 +16,6 @@ namespace {
 /// Of the mass felt: what a dashpot of friction stops in a step.
 constexpr double kGrip = 0.02;
 
-Vec3 vector_at(const double* r) { return {r[0], r[1], r[2]}; }
-
 struct Quad {
   std::array<std::uint32_t, 4> rows;
 };
