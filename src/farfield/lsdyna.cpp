@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <tuple>
 
 namespace topple::farfield {
@@ -77,6 +78,7 @@ std::string to_lsdyna(const product::Plan& plan, const Whole& whole, const colla
   d.comment("written by topple; units kg, m, s, N, Pa, J");
   d.comment("LS-DYNA puts on the dead load by dynamic relaxation; charges fire at their times after that.");
   for (const std::string& note : whole.notes) d.comment(note);
+  d.comment("Charges take effect at once and leave no bars; beside them concrete is damaged from the start.");
   d.comment("Bulk concrete and bars are one material. Elements fail at the plastic strain at which the bars tear;");
   d.comment("crushed ones stay, so that their volume does.");
   d.keyword("CONTROL_TERMINATION");
@@ -132,12 +134,17 @@ std::string to_lsdyna(const product::Plan& plan, const Whole& whole, const colla
       for (const fem::YieldPoint& y : fe.materials[m].yield)
         d.line(field(y.strain, 20) + field(side == 0 ? y.compression : y.tension, 20));
     }
+  std::vector<int> law_of(fe.materials.size());
+  std::iota(law_of.begin(), law_of.end(), 0);
+  for (const fem::ExplicitRelease& release : fe.releases)
+    for (const auto& [from, to] : release.weakened) law_of[static_cast<size_t>(from)] = to;
   int number = 0;
   std::vector<int> part_of(fe.elements.size());
   for (const auto& [key, elements] : parts) {
     ++number;
     for (const int e : elements) part_of[static_cast<size_t>(e)] = number;
-    const fem::ExplicitMaterial& m = fe.materials[static_cast<size_t>(key.material)];
+    const int law = law_of[static_cast<size_t>(key.material)];
+    const fem::ExplicitMaterial& m = fe.materials[static_cast<size_t>(law)];
     const double factor = fe.elements[static_cast<size_t>(elements.front())].mass_factor;
     std::string name = plan.members[static_cast<size_t>(key.member)].name;
     if (key.charge >= 0) name += "/charge";
@@ -151,7 +158,7 @@ std::string to_lsdyna(const product::Plan& plan, const Whole& whole, const colla
       const fem::YieldPoint& y = m.yield.front();
       d.keyword("MAT_PLASTICITY_COMPRESSION_TENSION");
       d.card(number, m.density * factor, m.E, m.nu, 0.0, 0.0, std::isfinite(m.tension_limit) ? m.tension_limit : 1e20);
-      const int curve = 10 + 2 * key.material;
+      const int curve = 10 + 2 * law;
       d.card(curve, curve + 1, 0, 0);
       d.card(y.compression / 3, y.tension / 3);
       d.card(0.0);

@@ -215,8 +215,9 @@ class Course {
   }
 
   void fire(const collapse::Firing& f) {
-    for (const ChargeElements& c : whole_.charges)
-      if (c.stage == f.stage && c.charge == f.charge) system_.remove(c.elements);
+    for (size_t c = 0; c < whole_.charges.size(); ++c)
+      if (whole_.charges[c].stage == f.stage && whole_.charges[c].charge == f.charge)
+        system_.release(static_cast<int>(c));
     state_.quiet_since = state_.swings_since = -1;
     for (size_t e = 0; e < map_.events.size(); ++e) {
       const collapse::EventEntry& entry = map_.events[e];
@@ -430,8 +431,7 @@ void Course::add_findings(record::Record& r) const {
 /// The elements crack within bays and panels, which the multibody model does not; what they lack is something else.
 void say_what_is_not_modelled(record::Record& r) {
   const std::string here =
-      "cracks that close again, slip and buckling of single bars (concrete and bars are one material), bars that a "
-      "charge leaves standing";
+      "cracks that close again, slip and buckling of single bars (concrete and bars are one material)";
   for (std::string& s : r.not_modelled)
     if (s.rfind("cracking of slabs", 0) == 0) s = here;
   std::string list;

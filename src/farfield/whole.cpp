@@ -19,7 +19,15 @@ namespace {
 /// Losses of a section somewhere along a member.
 struct Loss {
   double concrete = 0, cut_bars = 0, cut_concrete = 0;
+  bool any() const { return concrete > 0 || cut_bars > 0 || cut_concrete > 0; }
   auto operator<=>(const Loss&) const = default;
+};
+
+/// Whose law goes its own way from a charge on: those taken away by it, or damaged beside that.
+struct Fate {
+  int charge = -1;
+  bool is_taken = false;
+  auto operator<=>(const Fate&) const = default;
 };
 
 /// Materials as they are asked for.
@@ -28,10 +36,10 @@ class Materials {
   Materials(const product::Plan& plan, std::vector<fem::ExplicitMaterial>& out) : plan_(plan), out_(out) {}
 
   ///   zone, element  lengths of the zone that a member's damage gathers in, and of an element [m]
-  int of_section(int section, const Loss& loss, double zone, double element) {
+  int of_section(int section, const Loss& loss, const Fate& fate, double zone, double element) {
     const int grade = grade_of(zone / element);
     const auto [it, is_new] =
-        sections_.emplace(std::make_tuple(section, loss, zone, grade), static_cast<int>(out_.size()));
+        sections_.emplace(std::make_tuple(section, loss, fate, zone, grade), static_cast<int>(out_.size()));
     if (!is_new) return it->second;
     const product::Section& s = plan_.sections[static_cast<size_t>(section)];
     nearfield::ZoneInput in;
@@ -43,7 +51,8 @@ class Materials {
     in.cut_bars = loss.cut_bars;
     in.cut_concrete = loss.cut_concrete;
     std::string name = s.name + "/" + std::to_string(out_.size());
-    if (loss != Loss{}) name += "/weakened";
+    if (loss.any()) name += "/weakened";
+    if (fate.charge >= 0) name += fate.is_taken ? "/charge" : "/beside";
     out_.push_back(make_section_material(in, zone / ratio_of(grade), name));
     return it->second;
   }
@@ -66,9 +75,14 @@ class Materials {
 
   const product::Plan& plan_;
   std::vector<fem::ExplicitMaterial>& out_;
-  std::map<std::tuple<int, Loss, double, int>, int> sections_;
+  std::map<std::tuple<int, Loss, Fate, double, int>, int> sections_;
   std::map<std::pair<int, int>, int> panels_;
 };
+
+template <class T>
+void add_once(std::vector<T>& list, const T& x) {
+  if (std::find(list.begin(), list.end(), x) == list.end()) list.push_back(x);
+}
 
 /// Length of a cell along its member; of a slab or wall, which cracks in any direction, the edge of a square of its
 /// area in plane [m].
@@ -158,27 +172,10 @@ Whole make_whole(const product::Plan& plan, const collapse::Knowledge& k, const 
   fe.nodes = grid.nodes;
   fe.gravity = {0, 0, -plan.analysis.gravity};
 
-  // a charge's cells, and what its blast leaves beside them
-  const std::vector<DestroyedLength> destroyed = find_destroyed_lengths(plan);
+  ChargePlan charges = plan_charges(plan, k, grid);
   std::vector<Loss> loss(grid.cells.size());
   std::multimap<int, size_t> cells_of;
   for (size_t c = 0; c < grid.cells.size(); ++c) cells_of.emplace(grid.cells[c].member, c);
-  for (const DestroyedLength& d : destroyed) {
-    const product::Member& m = plan.members[static_cast<size_t>(d.member)];
-    const product::Charge& charge = plan.stages[static_cast<size_t>(d.stage)].charges[static_cast<size_t>(d.charge)];
-    const product::Section& s = plan.sections[static_cast<size_t>(m.section)];
-    const double reach = k.charge_transition_reach * std::max(s.width, s.height);
-    ChargeElements taken{d.stage, d.charge, {}};
-    const auto [first, last] = cells_of.equal_range(d.member);
-    for (auto it = first; it != last; ++it) {
-      const double at = grid.cells[it->second].centre[d.axis];
-      if (at > d.from && at < d.to)
-        taken.elements.push_back(static_cast<int>(it->second));
-      else if (!charge.fails && at > d.from - reach && at < d.to + reach)
-        loss[it->second].concrete = std::max(loss[it->second].concrete, charge.transition_damage);
-    }
-    whole.charges.push_back(std::move(taken));
-  }
   for (size_t i = 0; i < plan.members.size(); ++i) {
     const product::Member& m = plan.members[i];
     for (const product::Weakening& w : m.weakenings) {
@@ -197,6 +194,14 @@ Whole make_whole(const product::Plan& plan, const collapse::Knowledge& k, const 
     }
   }
 
+  for (size_t c = 0; c < charges.charges.size(); ++c) {
+    fem::ExplicitRelease release;
+    release.duration = k.charge_release_time;
+    release.elements = charges.charges[c].elements;
+    release.bars = charges.bars_of[c];
+    fe.releases.push_back(std::move(release));
+  }
+
   Materials materials(plan, fe.materials);
   const std::vector<double> zone_lengths = calc_zone_lengths(plan, k, map);
   const std::vector<int> bodies = find_bodies(grid, model, map);
@@ -209,8 +214,22 @@ Whole make_whole(const product::Plan& plan, const collapse::Knowledge& k, const 
     for (size_t i = 0; i < 8; ++i) corners[i] = grid.nodes[static_cast<size_t>(cell.node[i])];
     const double length = calc_cell_length(grid, cell, plan, fem::calc_hex_volume(corners));
     const double zone = zone_lengths[static_cast<size_t>(cell.member)];
-    e.material = m.section >= 0 ? materials.of_section(m.section, loss[c], zone, length)
-                                : materials.of_panel(m.panel, zone, length);
+    if (m.section < 0) {
+      e.material = materials.of_panel(m.panel, zone, length);
+    } else if (const int charge = std::max(charges.taken_by[c], charges.damaged_by[c]); charge < 0) {
+      e.material = materials.of_section(m.section, loss[c], {}, zone, length);
+    } else {
+      const bool is_taken = charges.taken_by[c] >= 0;
+      e.material = materials.of_section(m.section, loss[c], {charge, is_taken}, zone, length);
+      fem::ExplicitRelease& release = fe.releases[static_cast<size_t>(charge)];
+      if (is_taken) {
+        add_once(release.materials, e.material);
+      } else {
+        Loss damaged = loss[c];
+        damaged.concrete = charges.transition[c];
+        add_once(release.weakened, std::pair(e.material, materials.of_section(m.section, damaged, {}, zone, length)));
+      }
+    }
     e.part = bodies[c];
     const MemberFit& fit = grid.fits[static_cast<size_t>(cell.member)];
     e.mass_factor = calc_loaded_mass(plan, m) / (fit.volume * fe.materials[static_cast<size_t>(e.material)].density);
@@ -247,12 +266,9 @@ Whole make_whole(const product::Plan& plan, const collapse::Knowledge& k, const 
 
   for (const product::Cable& cable : plan.cables)
     whole.notes.push_back("Cable " + cable.name + " is left out: the finite elements have no cables.");
-  const bool has_residual = std::any_of(plan.stages.begin(), plan.stages.end(), [](const product::Stage& s) {
-    return std::any_of(s.charges.begin(), s.charges.end(),
-                       [](const product::Charge& c) { return c.residual_bars > 0; });
-  });
-  if (has_residual)
-    whole.notes.push_back("Bars that charges leave standing are left out: a destroyed length goes as a whole.");
+  whole.notes.insert(whole.notes.end(), charges.notes.begin(), charges.notes.end());
+  fe.bars = std::move(charges.bars);
+  whole.charges = std::move(charges.charges);
   return whole;
 }
 

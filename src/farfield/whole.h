@@ -5,16 +5,11 @@
 #include <vector>
 
 #include "collapse/manager.h"
+#include "farfield/charges.h"
 #include "farfield/grid.h"
 #include "fem/explicit_model.h"
 
 namespace topple::farfield {
-
-/// Elements that a charge takes away.
-struct ChargeElements {
-  int stage = 0, charge = 0;  // indices into the plan
-  std::vector<int> elements;
-};
 
 /// Where a member stands on the ground: nodes that are held, and the elements that press on them.
 struct Foot {
@@ -25,8 +20,8 @@ struct Foot {
 
 struct Whole {
   Grid grid;
-  fem::ExplicitModel fe;  // elements in the order of the grid's cells; their part is the manager's body
-  std::vector<ChargeElements> charges;
+  fem::ExplicitModel fe;                // elements in the order of the grid's cells; their part is the manager's body
+  std::vector<ChargeElements> charges;  // in the order of fe.releases
   std::vector<Foot> feet;
   std::vector<std::string> notes;  // what was left out, in sentences
 };

@@ -100,6 +100,49 @@ TEST(Whole, TakesAwayWhatAChargeDestroys) {
   EXPECT_EQ(whole.feet.size(), 2u);
 }
 
+TEST(Whole, LeavesBarsWhereAChargeDestroys) {
+  const product::Plan plan = read(portal(charge("C-A1-0", "0 s", "transition_damage = 0.4")));
+  const Whole whole = make_whole(plan, rules(), coarse().grid, 1);
+  const product::Member& m = plan.members[static_cast<size_t>(plan.find_member("C-A1-0"))];
+  const product::Section& s = plan.sections[static_cast<size_t>(m.section)];
+  ASSERT_EQ(whole.fe.releases.size(), 1u);
+  const fem::ExplicitRelease& release = whole.fe.releases[0];
+  EXPECT_EQ(release.duration, rules().charge_release_time);
+  EXPECT_EQ(release.elements, whole.charges[0].elements);
+  ASSERT_EQ(release.bars.size(), s.bars.size());
+  const product::Steel& steel = plan.steels[static_cast<size_t>(s.steel)];
+  for (size_t i = 0; i < s.bars.size(); ++i) {
+    const fem::ExplicitBar& bar = whole.fe.bars[i];
+    // 0.1 of the bars over 1 m, upright, where the section has them
+    EXPECT_NEAR(bar.yield, 0.1 * s.bars[i].area * steel.fy, 1e-9 * bar.yield);
+    EXPECT_NEAR(bar.stiffness, 0.1 * s.bars[i].area * steel.Es, 0.02 * bar.stiffness);
+    double height = 0;
+    for (const fem::ExplicitBar::End* end : {&bar.a, &bar.b}) {
+      Vec3 p;
+      for (size_t k = 0; k < 4; ++k) p += end->weight[k] * whole.fe.nodes[static_cast<size_t>(end->node[k])];
+      EXPECT_NEAR(p.x, m.start.x + s.bars[i].y, 1e-9);
+      EXPECT_NEAR(p.y, m.start.y + s.bars[i].z, 1e-9);
+      height = p.z - height;
+    }
+    EXPECT_NEAR(height, 1, 0.02);
+  }
+  // beside it concrete loses two fifths of its strength, once the charge has fired
+  ASSERT_FALSE(release.weakened.empty());
+  for (const auto& [from, to] : release.weakened) {
+    const double before = whole.fe.materials[static_cast<size_t>(from)].yield[0].compression;
+    const double after = whole.fe.materials[static_cast<size_t>(to)].yield[0].compression;
+    EXPECT_LT(after, 0.75 * before);
+    EXPECT_GT(after, 0.6 * before);  // bars stay
+  }
+}
+
+TEST(Whole, LeavesAllAsItIsWhereAChargeFails) {
+  const product::Plan plan = read(portal(charge("C-A1-0", "0 s", "fails = true\ntransition_damage = 0.4")));
+  const Whole whole = make_whole(plan, rules(), coarse().grid, 1);
+  EXPECT_TRUE(whole.fe.bars.empty());
+  for (const fem::ExplicitMaterial& m : whole.fe.materials) EXPECT_EQ(m.name.find("/charge"), std::string::npos);
+}
+
 TEST(FarfieldPhysics, CarriesTheDeadLoadToTheGround) {
   const record::Record r = run(with_duration(house(), "20 ms"), coarse());
   double upward = 0;
@@ -163,8 +206,8 @@ TEST(FarfieldPhysics, FallsAsTheMultibodyModelDoes) {
     EXPECT_EQ(fe.bodies[b].name, bodies.bodies[b].name);
     if (fe.bodies[b].kind != "beam") continue;
     const size_t i = 3 * ((fe.time.size() - 1) * fe.bodies.size() + b) + 2;
-    // the multibody model lets go over charge.release_time, 3 ms: 9 mm after 0.3 s of fall
-    EXPECT_NEAR(fe.position[i], bodies.position[i], 0.015);
+    // both let go over charge.release_time, 3 ms; an offset of it would be 9 mm after 0.3 s of fall
+    EXPECT_NEAR(fe.position[i], bodies.position[i], 0.005);
   }
 }
 
@@ -179,7 +222,7 @@ TEST(Farfield, SaysWhatWasTakenAway) {
   EXPECT_EQ(r.ending, "time_limit");
   EXPECT_THAT(find(r, "farfield.removed").text, testing::HasSubstr(" by charges, 0 torn, 0 crushed"));
   EXPECT_THAT(find(r, "farfield.fragments").text, testing::HasSubstr("sound parts"));
-  EXPECT_THAT(find(r, "not_modelled").text, testing::HasSubstr("bars that a charge leaves standing"));
+  EXPECT_THAT(find(r, "not_modelled").text, testing::HasSubstr("cracks that close again"));
 }
 
 TEST(Farfield, PassesOverTheTimeInWhichNothingMoves) {
