@@ -506,6 +506,7 @@ mbs::ZoneLaw make_cage_law(const nearfield::ResidualCage& cage, double destroyed
   law.moment_y = make_flat_family(compression, tension, cage.moment_y, cage.moment_y, law.rupture_rotation);
   law.moment_z = make_flat_family(compression, tension, cage.moment_z, cage.moment_z, law.rupture_rotation);
   law.biaxial_exponent = k.zone_biaxial_exponent;
+  law.buckles = true;
   law.crush_length = destroyed_length;
   law.rupture_elongation = law.tension.x.back();
   law.shear_y = law.shear_z = cage.shear;

@@ -42,6 +42,7 @@ struct ZoneLaw {
   double rupture_rotation_pressed = 0;     // the same while its normal force presses, if that is more [rad]
   Curve compression;                       // limit against plastic shortening [m] -> [N]
   Curve tension;                           // limit against plastic elongation [m] -> [N]
+  bool buckles = false;                    // shortened, it pulls only once it is straight again: slender bars
   double crush_length = kUnlimited;        // plastic shortening at which the element breaks [m]
   double rupture_elongation = kUnlimited;  // plastic elongation at which it breaks [m]
   double shear_y = kUnlimited, shear_z = kUnlimited;  // limits without normal force [N]

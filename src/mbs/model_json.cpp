@@ -189,6 +189,7 @@ ZoneLaw law_from(const Node& n) {
   read(n, "damage_share", l.damage_share);
   read(n, "rupture_rotation", l.rupture_rotation);
   read(n, "rupture_rotation_pressed", l.rupture_rotation_pressed);
+  read(n, "buckles", l.buckles);
   read(n, "crush_length", l.crush_length);
   read(n, "rupture_elongation", l.rupture_elongation);
   read(n, "shear_y", l.shear_y);

@@ -79,6 +79,7 @@ Json json_of(const ZoneLaw& l) {
   if (l.rupture_rotation_pressed != 0) put(j, "rupture_rotation_pressed", l.rupture_rotation_pressed);
   if (!l.compression.x.empty()) j["compression"] = json_of(l.compression);
   if (!l.tension.x.empty()) j["tension"] = json_of(l.tension);
+  if (l.buckles) j["buckles"] = true;
   put(j, "crush_length", l.crush_length);
   put(j, "rupture_elongation", l.rupture_elongation);
   put(j, "shear_y", l.shear_y);

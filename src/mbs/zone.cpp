@@ -368,12 +368,21 @@ struct Evaluation {
         flowed = true;
       }
     } else {
+      if (limits.law().buckles && z.shortened > 0 && force[0] > 0) {
+        // what has buckled becomes straight first
+        const double back = std::min(z.shortened, force[0] / k[0]);
+        z.axial += back;
+        z.shortened -= back;
+        force[0] = z.shortened > 0 ? 0 : force[0] - k[0] * back;
+        integrity = limits.integrity(z.shortened);
+        flowed = true;
+      }
       // a hinge that has turned far holds what presses it, and does not pull
       const bool is_far = reached >= limits.law().rupture_rotation;
-      double limit = is_far ? 0 : limits.tension(z.elongated);
+      double limit = is_far ? 0 : limits.tension(z.elongated, z.shortened);
       if (force[0] > limit) {
         const double guess = (force[0] - limit) / k[0];
-        if (!is_far) limit = limits.tension(z.elongated + guess);
+        if (!is_far) limit = limits.tension(z.elongated + guess, z.shortened);
         const double elongation = (force[0] - limit) / k[0];
         z.axial += elongation;
         z.elongated += elongation;

@@ -73,7 +73,7 @@ void find_safe_bounds(const ZoneParameters& p, const CompiledLaws& laws, const L
   double from = normal_force - reach, to = normal_force + reach;
   if (!p.external_axial) {
     from = std::max(from, -limits.compression(reached, z.shortened, whole, z.station[0]));
-    to = std::min(to, limits.tension(z.elongated));
+    to = std::min(to, limits.tension(z.elongated, z.shortened));
   }
   for (int s = 0; s < p.stations; ++s)
     if (z.station[s].reached >= law_of(s).rupture_rotation) to = std::min(to, -kTiny);  // held by what presses it
@@ -273,7 +273,7 @@ bool write_flow(const ZoneParameters& p, const CompiledLaws& laws, ZoneState& z,
   const CompiledLaw& law = limits.law();
   out[kLifted] = z.lifted, out[kShortened] = z.shortened, out[kCrushed] = z.crushed;
   out[kCrushLength] = law.crush_length;
-  out[kFlowMost] = is_pressed ? -kTiny : limits.tension(z.elongated);
+  out[kFlowMost] = is_pressed ? -kTiny : limits.tension(z.elongated, z.shortened);
   for (int axis = 0; axis < 2; ++axis)
     out[kShearOwn + axis] = law.slip_softening > 0 ? std::min(law.shear[axis], kMostLimit) : 0;
   out[kShearFriction] = law.shear_friction;
@@ -306,7 +306,7 @@ double calc_utilisation(const ZoneParameters& p, const CompiledLaws& laws, doubl
   const double integrity = limits.integrity(z.shortened);
   double u = p.external_axial ? 0.0
              : force[0] < 0   ? ratio(-force[0], limits.compression(reached, z.shortened, integrity, z.station[0]))
-                              : ratio(force[0], limits.tension(z.elongated));
+                              : ratio(force[0], limits.tension(z.elongated, z.shortened));
   for (int s = 0; s < p.stations; ++s) {
     const Limits station_limits(laws, p.law[s], z, time);
     StationState st = z.station[s];

@@ -70,6 +70,7 @@ CompiledLaw compile_law(const ZoneLaw& law) {
   } else {
     c.peak_shortening = kUnlimited;
   }
+  c.buckles = law.buckles;
   c.biaxial_exponent = law.biaxial_exponent;
   c.damage_share = law.damage_share;
   c.rupture_rotation = law.rupture_rotation;

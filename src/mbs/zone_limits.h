@@ -22,8 +22,9 @@ class Limits {
 
   /// The law that governs lengths of rupture.
   const CompiledLaw& law() const { return share_ > 0 ? to_.get() : from_.get(); }
-  double tension(double elongated) const {
-    return blend([&](const CompiledLaw& l) { return calc_curve(l.tension, elongated); });
+  double tension(double elongated, double shortened) const {
+    return blend(
+        [&](const CompiledLaw& l) { return l.buckles && shortened > 0 ? 0.0 : calc_curve(l.tension, elongated); });
   }
   /// Share of the section that is still there: 1 until the peak of the compression curve, then what is left of it.
   double integrity(double shortened) const {

@@ -210,6 +210,25 @@ TEST(Kernel, FollowsTheFullLawWhileASectionIsCrushed) {
       }
 }
 
+TEST(Kernel, FollowsTheFullLawWhileBarsBuckleAndAreLetGo) {
+  ZoneLaw zone = make_law(1);
+  zone.buckles = true;
+  zone.compression = {{0, 0.01, 0.1}, {0.5e6, 0.5e6, 0.1e6}};
+  zone.damage_share = 0;
+  for (MomentFamily* m : {&zone.moment_y, &zone.moment_z})
+    m->elongation_positive.clear(), m->elongation_negative.clear();
+  int slack = 0;
+  for (const int stations : {1, 2})
+    for (const double amplitude : {1e-5, 5e-3})
+      for (std::uint32_t seed = 1; seed <= 3; ++seed) {
+        double full = 0;
+        const std::vector<Walked> law = compare(stations, zone, amplitude, seed, 0.06, full);
+        for (const Walked& w : law) slack += w.shortened > 0 && w.resultant.c[0] > -1 ? 1 : 0;
+        EXPECT_GT(law.back().shortened, 0.03) << stations << " " << amplitude << " " << seed;
+      }
+  EXPECT_GT(slack, 500);  // steps of 72,000
+}
+
 TEST(Kernel, BreaksZonesWhenTheFullLawDoes) {
   ZoneLaw zone = make_law(1);
   zone.rupture_rotation = 0.01, zone.rupture_rotation_pressed = 0.03;

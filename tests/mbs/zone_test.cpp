@@ -305,6 +305,42 @@ TEST(Zone, IsLengthenedFromOutsideWithoutLosingEnergy) {
   EXPECT_NEAR(w.z.energy + w.z.plastic, w.work, 1e-12 * w.work);
 }
 
+TEST(Zone, OfBarsThatHaveBuckledPullsOnlyWhenTheyAreStraight) {
+  ZoneLaw law = make_law();
+  law.moment_y = law.moment_z = {};
+  law.compression = {{0, 0.002, 0.02}, {1e5, 1e5, 2e4}};
+  law.tension = {{0, 0.05}, {3e5, 3e5}};
+  law.buckles = true;
+  Walk w(law);
+  const auto force = [&] { return w.z.resultant.c[0]; };
+  const auto buckling = [&] { return 1e5 - 8e4 * (w.z.shortened - 0.002) / 0.018; };
+  w.go(deform(-0.02, 0, 0));
+  EXPECT_NEAR(w.z.shortened, 0.02 - buckling() / kStiff, 1e-7);
+  EXPECT_NEAR(force(), -buckling(), 10);
+  const double spent = w.z.plastic;
+  EXPECT_NEAR(spent, 1e5 * 0.002 + 0.5 * (1e5 + buckling()) * (w.z.shortened - 0.002), 10);
+  // back: nothing pulls, nothing is spent
+  w.go(deform(-0.01, 0, 0));
+  EXPECT_NEAR(force(), 0, 1e-6);
+  EXPECT_NEAR(w.z.shortened, 0.01, 1e-9);
+  EXPECT_NEAR(w.z.plastic, spent, 1e-3);
+  // pushed together again they bear what they do when shortened by so much
+  w.go(deform(-0.012, 0, 0));
+  EXPECT_NEAR(w.z.shortened, 0.012 - buckling() / kStiff, 1e-7);
+  EXPECT_NEAR(force(), -buckling(), 10);
+  // straight: the spring from where it began, up to its limit
+  w.go(deform(2e-3, 0, 0));
+  EXPECT_NEAR(force(), 2e-3 * kStiff, 1);
+  EXPECT_EQ(w.z.shortened, 0);
+  w.go(deform(0.01, 0, 0));
+  EXPECT_NEAR(force(), 3e5, 1);
+  EXPECT_NEAR(w.z.elongated, 0.01 - 3e5 / kStiff, 1e-9);
+  // and it buckles anew at its first force, from its new length on
+  w.go(deform(0.01 - 3e5 / kStiff - 0.0015, 0, 0));
+  EXPECT_NEAR(force(), -1e5, 1);
+  EXPECT_NEAR(w.work, w.z.energy + w.z.plastic, 1e-3 * w.work);
+}
+
 TEST(Zone, CrushesDownItsCurveAndBreaksAtItsLength) {
   Walk w;
   w.go(deform(-0.002 - 2e6 / kStiff, 0, 0));
