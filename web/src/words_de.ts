@@ -225,7 +225,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["At {:.2f} s the building only swung about where it stands. It was settled without motion, and the clock was put forward to {:.2f} s; it stands within {:.1f} mm of where it was built.", "Bei {} s schwang das Gebäude nur noch um seinen Stand. Es wurde ohne Bewegung zur Ruhe gebracht und die Uhr auf {} s vorgestellt; es steht höchstens {} mm neben seinem ursprünglichen Ort."],
   ["Left out", "Weggelassen"],
   ["Cable {} is left out: the finite elements have no cables.", "Seil {} bleibt weg: Die finiten Elemente haben keine Seile."],
-  ["Bars that charges leave standing are left out: a destroyed length goes as a whole.", "Stäbe, die Ladungen stehen lassen, bleiben weg: Eine zerstörte Länge fällt als Ganzes aus."],
+  ["{} bars that charges leave end where nothing is left to hold them, and are left out.", "{} Stäbe, die Ladungen stehen lassen, enden, wo nichts sie mehr hält, und bleiben weg."],
   ["{:.1e} of the load is out of balance (accepted: {:.1e})", "Das {}-Fache der Last ist nicht ausgeglichen (zulässig: {})"],
   ["{:.1e} of the load is out of balance (accepted: {:.1e}).", "Das {}-Fache der Last ist nicht ausgeglichen (zulässig: {})."],
   ["and the reactions of the ground differ from the weight by {:.1e} of it.", "und die Auflagerkräfte weichen um das {}-Fache vom Gewicht ab."],
@@ -421,7 +421,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["cracking of slabs within a bay, of walls within a panel and of members between their end zones", "Risse in Decken innerhalb eines Feldes, in Wänden innerhalb einer Scheibe und in Bauteilen zwischen ihren Endzonen"],
   ["rings that flatten as they land: single pieces of a shaft may roll and tumble farther than real ones", "Ringe, die beim Aufschlag flach werden: Einzelne Stücke eines Schafts können weiter rollen als wirkliche"],
   ["infill and finishes beyond their weight", "Ausfachung und Ausbau über ihr Gewicht hinaus"],
-  ["cracks that close again, slip and buckling of single bars (concrete and bars are one material), bars that a charge leaves standing", "Risse, die sich wieder schließen, Schlupf und Knicken einzelner Stäbe (Beton und Stahl sind ein Baustoff), Stäbe, die eine Ladung stehen lässt"],
+  ["cracks that close again, slip and buckling of single bars (concrete and bars are one material)", "Risse, die sich wieder schließen, Schlupf und Knicken einzelner Stäbe (Beton und Stahl sind ein Baustoff)"],
   // values of the plan
   ["Building", "Gebäude"],
   ["Rows", "Reihen"],
