@@ -273,7 +273,8 @@ bool write_flow(const ZoneParameters& p, const CompiledLaws& laws, ZoneState& z,
   const CompiledLaw& law = limits.law();
   out[kLifted] = z.lifted, out[kShortened] = z.shortened, out[kCrushed] = z.crushed;
   out[kCrushLength] = law.crush_length;
-  out[kFlowMost] = is_pressed ? -kTiny : limits.tension(z.elongated, z.shortened);
+  // what buckles is slack until it is straight, which a cell does not know
+  out[kFlowMost] = is_pressed ? -kTiny : law.buckles ? 0 : limits.tension(z.elongated, z.shortened);
   for (int axis = 0; axis < 2; ++axis)
     out[kShearOwn + axis] = law.slip_softening > 0 ? std::min(law.shear[axis], kMostLimit) : 0;
   out[kShearFriction] = law.shear_friction;

@@ -69,7 +69,7 @@ Model make_model(int stations, const ZoneLaw& law, bool cracks = false) {
 }
 
 /// A smooth path through six deformations with a seed of its own; `amplitude` in rad and 2 m, `pressed` by how much it
-/// is shortened on the way [m].
+/// is shortened on the way, or if below zero, how far it is pressed and pulled in turn [m].
 Six path_at(int i, double amplitude, std::uint32_t seed, double pressed = 0) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> share(0.3, 1.0);
@@ -80,7 +80,8 @@ Six path_at(int i, double amplitude, std::uint32_t seed, double pressed = 0) {
     d.c[c] = size * s * (c < 3 ? 2 : 1);
   }
   d.c[0] = -2e-3 + 1.2e-3 * std::sin(0.0011 * i) - 2e-3 * std::sin(0.0004 * i);
-  d.c[0] -= pressed * i / 6000.0 * (1 + 0.01 * std::sin(0.05 * i));  // it is let go again now and then
+  d.c[0] -= pressed > 0 ? pressed * i / 6000.0 * (1 + 0.01 * std::sin(0.05 * i))  // it is let go again now and then
+                        : -pressed * std::sin(0.005 * i);
   return d;
 }
 
@@ -215,9 +216,11 @@ TEST(Kernel, FollowsTheFullLawWhileBarsBuckleAndAreLetGo) {
   zone.buckles = true;
   zone.compression = {{0, 0.01, 0.1}, {0.5e6, 0.5e6, 0.1e6}};
   zone.damage_share = 0;
-  for (MomentFamily* m : {&zone.moment_y, &zone.moment_z})
+  for (MomentFamily* m : {&zone.moment_y, &zone.moment_z}) {
+    for (double& force : m->normal_force) force *= 4;  // so far apart that bars buckle and pull within one cell
     m->elongation_positive.clear(), m->elongation_negative.clear();
-  int slack = 0;
+  }
+  int slack = 0, straightened = 0;
   for (const int stations : {1, 2})
     for (const double amplitude : {1e-5, 5e-3})
       for (std::uint32_t seed = 1; seed <= 3; ++seed) {
@@ -225,7 +228,14 @@ TEST(Kernel, FollowsTheFullLawWhileBarsBuckleAndAreLetGo) {
         const std::vector<Walked> law = compare(stations, zone, amplitude, seed, 0.06, full);
         for (const Walked& w : law) slack += w.shortened > 0 && w.resultant.c[0] > -1 ? 1 : 0;
         EXPECT_GT(law.back().shortened, 0.03) << stations << " " << amplitude << " " << seed;
+        // straight again on the way, pulled, and pressed anew
+        for (const double swing : {-0.0005, -0.002, -0.008}) {
+          const std::vector<Walked> swung = compare(stations, zone, amplitude, seed, swing, full);
+          for (size_t i = 1; i < swung.size(); ++i)
+            straightened += swung[i - 1].shortened > 0 && swung[i].shortened == 0 ? 1 : 0;
+        }
       }
+  EXPECT_GT(straightened, 0);
   EXPECT_GT(slack, 500);  // steps of 72,000
 }
 
