@@ -297,7 +297,7 @@ void ExplicitSystem::Inside::advance_step(ExplicitState& state, bool removes) {
   const double t0 = seconds();
   const bool debris = pushes_debris(state);
   if (removes) end_releases(state);
-  set_laws(state);
+  fade_laws(state);
   clear_pushes(state);
   press_bars(state);
   press_grounds(state, debris);

@@ -174,8 +174,10 @@ struct ExplicitSystem::Inside {
   }
   /// Takes away what releases have let go of.
   void end_releases(ExplicitState&);
-  /// Laws as the state's releases have them.
-  void set_laws(const ExplicitState&);
+  /// Laws of what is about to go, and of what a release that is over has damaged; all as a state has them.
+  void fade_laws(const ExplicitState&);
+  void weaken_laws(size_t release);
+  void restore_laws(const ExplicitState&);
   void press_bars(ExplicitState&) const;
   /// Place or speed of a bar's end, by field.
   Vec3 calc_end(const ExplicitState&, const ExplicitBar::End&, int field) const;

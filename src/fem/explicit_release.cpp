@@ -59,24 +59,32 @@ void ExplicitSystem::Inside::end_releases(ExplicitState& state) {
     if (static_cast<double>(state.steps - release.begun) * h < model.releases[i].duration - 0.5 * h) continue;
     release.is_over = 1;
     for (const int e : model.releases[i].elements) remove_element(state, e, RemovalCause::Charge);
+    weaken_laws(i);
   }
-  set_laws(state);
 }
 
-void ExplicitSystem::Inside::set_laws(const ExplicitState& state) {
+void ExplicitSystem::Inside::weaken_laws(size_t release) {
+  for (const auto& [from, to] : model.releases[release].weakened)
+    laws[static_cast<size_t>(from)] = first_laws[static_cast<size_t>(to)];
+}
+
+void ExplicitSystem::Inside::restore_laws(const ExplicitState& state) {
+  laws = first_laws;
+  for (size_t i = 0; i < state.releases.size(); ++i)
+    if (state.releases[i].is_over != 0) weaken_laws(i);
+  fade_laws(state);
+}
+
+void ExplicitSystem::Inside::fade_laws(const ExplicitState& state) {
   for (size_t i = 0; i < model.releases.size(); ++i) {
     const ReleaseState& release = state.releases[i];
-    if (release.begun < 0) continue;
+    if (release.begun < 0 || release.is_over != 0) continue;
     const ExplicitRelease& of = model.releases[i];
     const double passed = static_cast<double>(state.steps - release.begun) * h;
     // a step longer, so that something is left until they go
-    const double left = std::max(0.0, 1 - passed / (of.duration + h));
-    for (const int m : of.materials) {
-      const size_t material = static_cast<size_t>(m);
-      if (left > 0) laws[material] = scale_strength(first_laws[material], left);
-    }
-    for (const auto& [from, to] : of.weakened)
-      if (release.is_over != 0) laws[static_cast<size_t>(from)] = first_laws[static_cast<size_t>(to)];
+    const double left = 1 - passed / (of.duration + h);
+    for (const int m : of.materials)
+      laws[static_cast<size_t>(m)] = scale_strength(first_laws[static_cast<size_t>(m)], left);
   }
 }
 

@@ -135,7 +135,7 @@ void ExplicitSystem::read_snapshot(std::span<const std::byte> bytes) {
     Reader::fail();
   in.contact_faces.clear();  // of another state
   in.s = std::move(s), in.start = std::move(start), in.start_energy = start_energy, in.started = started;
-  in.set_laws(in.s);
+  in.restore_laws(in.s);
 }
 
 }  // namespace topple::fem
