@@ -59,7 +59,6 @@ struct GroundColumn {
   mbs::RotationalElement element;  // of zone II
 };
 
-/// Ties between plan and model. B bodies, E zone elements, R rotational elements, J joints.
 /// What a charge leaves of a ground column under its joint, once the concrete is thrown out.
 struct StubEntry {
   std::string member;
@@ -69,6 +68,7 @@ struct StubEntry {
   double peak = 0;    // shortening at its compressive strength [m]
 };
 
+/// Ties between plan and model. B bodies, E zone elements, R rotational elements, J joints.
 struct ModelMap {
   std::vector<BodyEntry> bodies;       // (B)
   std::vector<ZoneEntry> elements;     // (E)

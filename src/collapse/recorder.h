@@ -49,7 +49,7 @@ class Recorder {
   double largest_ground_force() const { return largest_ground_force_; }
   double largest_ground_force_time() const { return largest_ground_force_time_; }
   double kinetic_at(double time) const;
-  /// Plastic shortening of a zone at the last frame; it never falls [m].
+  /// Plastic shortening of a zone at the last frame; that of a stub never falls [m].
   double shortening_of(int zone) const {
     return zone < 0 || static_cast<size_t>(zone) >= shortening_.size() ? 0 : shortening_[static_cast<size_t>(zone)];
   }

@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <set>
 
 #include "nearfield/rcc.h"
 
@@ -31,7 +32,7 @@ class EndOfBars {
       if (const double at = grid.cells[static_cast<size_t>(e)].centre[axis_]; std::abs(at - last) < 1e-6)
         layer_.push_back(e);
     for (const auto& [node, count] : taken_uses)
-      if (uses[static_cast<size_t>(node)] > count) anchors_[node] = true;
+      if (uses[static_cast<size_t>(node)] > count) anchors_.insert(node);
     const product::Member& m = plan.members[static_cast<size_t>(length.member)];
     stands_ = !is_upper && m.storey == 0 && m.kind == product::MemberKind::Column;
     foot_ = m.start[axis_];
@@ -86,7 +87,7 @@ class EndOfBars {
   bool stands_ = false;
   double foot_ = 0;
   std::vector<int> layer_;
-  std::map<int, bool> anchors_;
+  std::set<int> anchors_;  // nodes that something else holds
 };
 
 /// A bar of a section where a charge has left so much of it.

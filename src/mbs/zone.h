@@ -32,7 +32,7 @@ struct ZoneState {
   BreakReason reason = BreakReason::None;
   double axial = 0;                      // plastic elongation, signed [m]
   double lifted = 0;                     // of it, what came with rotation [m]
-  double shortened = 0, elongated = 0;   // accumulated [m]
+  double shortened = 0, elongated = 0;   // accumulated; what buckles is shortened by what it is not yet straight [m]
   double crushed = 0;                    // of `shortened`, in the last evaluation [m]
   double slip[2] = {0, 0}, slipped = 0;  // [m]
   double twist = 0, twisted = 0;         // [rad]
