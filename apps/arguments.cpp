@@ -191,6 +191,9 @@ void add_export(CLI::App& app, Arguments& a) {
   exports->add_option("--size", a.fe.size, "edge of the elements of --lsdyna (0.4 m)")
       ->type_name("QUANTITY")
       ->needs(lsdyna);
+  exports->add_option("--across", a.fe.across, "of these over the thickness of columns and beams, at least (2)")
+      ->check(CLI::Range(2, 8))
+      ->needs(lsdyna);
   exports->add_option("--until", a.duration, "time that --lsdyna asks for; the plan's duration if not given")
       ->type_name("QUANTITY")
       ->needs(lsdyna);
@@ -262,6 +265,8 @@ void add_fe(CLI::App& app, Arguments& a) {
   fe->add_option("-o,--output", a.output, "folder for the results; it is made if missing")->type_name("FOLDER");
   fe->add_option("--size", f.size, "edge of the elements (0.4 m); smaller ones cost more and shorten the step")
       ->type_name("QUANTITY");
+  fe->add_option("--across", f.across, "elements over the thickness of columns and beams, at least (2)")
+      ->check(CLI::Range(2, 8));
   CLI::Option* mesh_only = fe->add_flag("--mesh-only", f.mesh_only, "only make the mesh and say what it is like");
   fe->add_option("--scaled-step", f.scaled_step,
                  "give mass to elements that do not bear this step, such as \"0.02 ms\"")

@@ -39,6 +39,7 @@ int export_lsdyna(const Arguments& a) {
   try {
     farfield::GridOptions grid;
     grid.size = read_quantity(a.fe.size, Dimension::Length, "--size");
+    grid.least_across = a.fe.across;
     const double until = read_quantity(a.duration, Dimension::Time, "--until");
     const product::Plan plan = product::read_plan_file(a.input, warnings, text);
     print_diagnostics(warnings, text);

@@ -20,6 +20,7 @@ namespace {
 farfield::FeOptions make_fe_options(const Arguments& a) {
   farfield::FeOptions o;
   o.grid.size = read_quantity(a.fe.size, Dimension::Length, "--size");
+  o.grid.least_across = a.fe.across;
   o.scaled_step = read_quantity(a.fe.scaled_step, Dimension::Time, "--scaled-step");
   o.skip_quiet = a.fe.skip_quiet;
   o.resume = a.fe.resume;

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <set>
 
 #include "base/error.h"
@@ -79,18 +80,32 @@ void check_size(const std::array<std::vector<Line>, 3>& lines, double size) {
                      "choose a larger size");
 }
 
-/// Divides gaps so that edges are near the size.
+/// Divides gaps so that edges are near the size, and so many cells lie between the bounds of each pair as are asked
+/// for.
 std::vector<Line> divide(const std::vector<Line>& lines, const GridOptions& o,
                          const std::vector<std::pair<double, double>>& to_divide) {
+  const auto gap_behind = [&](size_t i) { return lines[i + 1].at - lines[i].at; };
+  std::vector<int> parts(lines.size(), 1);
+  for (size_t i = 0; i + 1 < lines.size(); ++i) parts[i] = static_cast<int>(count_parts(gap_behind(i), o.size));
+  for (const auto& [low, high] : to_divide) {
+    const auto place = [&](double at) {
+      return static_cast<size_t>(
+          std::lower_bound(lines.begin(), lines.end(), at - kSame, [](const Line& l, double x) { return l.at < x; }) -
+          lines.begin());
+    };
+    const size_t first = place(low), last = place(high);
+    for (int count = std::accumulate(&parts[first], &parts[last], 0); count < o.least_across; ++count) {
+      size_t widest = first;
+      for (size_t i = first; i < last; ++i)
+        if (gap_behind(i) / parts[i] > gap_behind(widest) / parts[widest] + kSame) widest = i;
+      ++parts[widest];
+    }
+  }
   std::vector<Line> out;
   for (size_t i = 0; i < lines.size(); ++i) {
     out.push_back(lines[i]);
-    if (i + 1 == lines.size()) break;
-    const double from = lines[i].at, gap = lines[i + 1].at - from;
-    int n = static_cast<int>(count_parts(gap, o.size));
-    for (const auto& [low, high] : to_divide)
-      if (std::abs(low - from) < kSame && std::abs(high - from - gap) < kSame) n = std::max(n, o.least_across);
-    for (int k = 1; k < n; ++k) out.push_back({from + gap * k / n, {}});
+    for (int k = 1; k < parts[i] && i + 1 < lines.size(); ++k)
+      out.push_back({lines[i].at + gap_behind(i) * k / parts[i], {}});
   }
   return out;
 }

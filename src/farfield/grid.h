@@ -16,7 +16,7 @@ struct GridOptions {
   double size = 0.4;         // aimed at; edges are at most 1.25 times as long; the grid has at most kMostCells [m]
   double snap_share = 0.25;  // of the size: faces that lie nearer together share a line ...
   double snap_most = 0.1;    // ... if they are no farther apart than this, the thickness of thin walls [m]
-  int least_across = 2;      // cells over the width and depth of columns and the depth of beams
+  int least_across = 2;      // cells over the width and depth of columns and the depth of beams, floors there included
 };
 
 struct Cell {

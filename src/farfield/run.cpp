@@ -48,8 +48,9 @@ class Course {
         system_(whole_.fe, make_options(fe, run)),
         motion_(whole_, model, map, fe.grid.size) {
     if (callbacks.on_mesh) callbacks.on_mesh(whole_, mesh_);
-    key_ = calc_sha256(fmt::format("{}\n{} {} {} {} {} {}", plan.text, run.program_version, fe.grid.size,
-                                   fe.grid.snap_share, fe.scaled_step, fe.skip_quiet, options.frame_interval));
+    key_ = calc_sha256(fmt::format("{}\n{} {} {} {} {} {} {}", plan.text, run.program_version, fe.grid.size,
+                                   fe.grid.least_across, fe.grid.snap_share, fe.scaled_step, fe.skip_quiet,
+                                   options.frame_interval));
     for (const collapse::Firing& f : map.schedule)
       if (!f.fails) schedule_.push_back(f);
     last_firing_ = schedule_.empty() ? 0 : schedule_.back().time;

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "fem/explicit_model.h"
@@ -86,6 +87,29 @@ TEST(Grid, PutsNearFacesOnOneLineAndEachNodeWhereItsMemberWantsIt) {
   // beams give way by at most those 5 cm, where they meet columns
   for (size_t i = 0; i < plan.members.size(); ++i)
     if (plan.members[i].kind == product::MemberKind::Beam) { EXPECT_LE(coarse.fits[i].shift, 0.05 + 1e-9); }
+}
+
+TEST(Grid, HasAsManyCellsAcrossColumnsAndBeamsAsAskedFor) {
+  const product::Plan plan = read(house());
+  const auto count_lines = [](const Grid& g, size_t axis, double from, double to) {
+    return std::count_if(g.lines[axis].begin(), g.lines[axis].end(),
+                         [&](double at) { return at > from - 1e-9 && at < to + 1e-9; });
+  };
+  const int column = plan.find_member("C-A2-0"), beam = plan.find_member("B-A1B1-0");
+  for (const int across : {2, 3, 4, 6}) {
+    GridOptions o;
+    o.size = 0.8;
+    o.least_across = across;
+    const Grid g = make_grid(plan, o);
+    const auto c = extent_of(g, column);
+    for (size_t axis : {0UL, 1UL}) {
+      const int a = static_cast<int>(axis);
+      EXPECT_GE(count_lines(g, axis, c.first[a], c.second[a]), across + 1) << across << " " << axis;
+    }
+    // its top is the floor's, which is one of them
+    const auto b = extent_of(g, beam);
+    EXPECT_EQ(count_lines(g, 2, b.first.z, b.second.z), across + 1) << across;
+  }
 }
 
 TEST(Grid, NeverClosesAMemberThatIsThinnerThanTheReach) {
