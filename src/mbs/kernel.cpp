@@ -198,7 +198,7 @@ struct BendingPlane {
   Num<D> stiffness[2], cross;  // of the stations against their own rotation and the other's
   Num<D> lever[2];             // sign times x
   Num<D> shift, rotation;      // deformations
-  Num<D> phi[2], soft[2], crack[2], m[2];
+  Num<D> phi[2], soft[2], crack[2], bow[2], m[2];
 
   HWY_INLINE Num<D> shear() const {
     Num<D> u = shift;
@@ -382,6 +382,7 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
       P.phi[s] = load<D>(flow, kStations + s * kStationFields + kPhi + q);
       P.soft[s] = load<D>(flow, kStations + s * kStationFields + kSoftness + q);
       P.crack[s] = load<D>(flow, kStations + s * kStationFields + kCracked + q);
+      P.bow[s] = load<D>(flow, kStations + s * kStationFields + kBow + q);
     }
     // damage adds flexibility at the stations: (1 + S C) m = m0
     P.measure();
@@ -519,7 +520,9 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
     else
       return N{hn::Sqrt(fma(about(0), about(0), about(1) * about(1)).v)};
   };
-  const auto beyond_cracks = [&](int q, int s) { return fnma(plane[q].crack[s], plane[q].m[s], plane[q].phi[s]); };
+  const auto beyond_cracks = [&](int q, int s) {
+    return fnma(plane[q].crack[s], plane[q].m[s], plane[q].phi[s] - plane[q].bow[s]);
+  };
   const auto gone = [&](int s) { return length_of([&](int q) { return beyond_cracks(q, s); }); };
   N elongation = zero, so_far[2];
   M turns[2] = {hn::FirstN(tag, 0), hn::FirstN(tag, 0)};
@@ -595,7 +598,8 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
     const N rise = zero - (left * k[0]) * (slope * elongation) / sum;
     grows = hn::And(grows, hn::Gt(rise.v, zero.v));
     const N trial = {hn::Max(
-        so_far[s].v, length_of([&](int q) { return fnma(plane[q].crack[s], m_trial[s][q], phi_trial[q][s]); }).v)};
+        so_far[s].v,
+        length_of([&](int q) { return fnma(plane[q].crack[s], m_trial[s][q], phi_trial[q][s] - plane[q].bow[s]); }).v)};
     const N ahead = (trial - so_far[s]) / (length - so_far[s]);  // by damage, before it turns
     const N over = one - left;
     const N part = fnma(rise, ahead, over) / fma(rise, one - ahead, over);
@@ -608,7 +612,7 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
       const N before = length_of([&](int q) {
         const int shear = q == 0 ? 2 : 1, bend = q == 0 ? 4 : 5;
         const N m = fma(plane[q].lever[s], k[shear] * e_before[shear], k[bend] * e_before[bend]);
-        return fma(plane[q].soft[s] - plane[q].crack[s], m, load<D>(flow, station + kPhi + q));
+        return fma(plane[q].soft[s] - plane[q].crack[s], m, load<D>(flow, station + kPhi + q) - plane[q].bow[s]);
       });
       so_far[s] = {hn::Max(load<D>(flow, station + kReached).v, before.v)};
       turns[s] = hn::Ne(by[first][s].v, zero.v);

@@ -101,7 +101,7 @@ enum Flow : int {
   kPlastic = 46,        // dissipated since the slot was written
   kIdle = 47,           // steps without flow
   kStations = 48,       // both stations, kStationFields each
-  kStationFields = 55,
+  kStationFields = 57,
   kFlowFields = kStations + 2 * kStationFields
 };
 /// Fields of a station: inelastic rotations, damage, and the cell of the moment family about each axis.
@@ -112,7 +112,8 @@ enum FlowStation : int {
   kShare = 5,     // of damage
   kRupture = 6,   // rotation
   kCracked = 7,   // of the softness, by cracks, about y, z (2)
-  kCell = 9,      // about y, about z: kCellFields each
+  kBow = 9,       // of the plastic rotation, that of cracks (2)
+  kCell = 11,     // about y, about z: kCellFields each
   kCellFields = 23
 };
 /// Fields of a cell, which is two intervals of normal force and one of rotation: the middle force, one over the widths

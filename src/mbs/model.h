@@ -47,7 +47,8 @@ struct Station {
 };
 
 /// How a station about an axis cracks before it has ever yielded: the rotation that cracks add rises along a straight
-/// line from 0 at `begin` to `flexibility` times the moment at `end`; what has cracked stays so.
+/// line from 0 at `begin` to `flexibility` times the moment at `end`, and goes back from there towards `begin`, or what
+/// has cracked, of the other side.
 struct Cracking {
   double begin[2] = {0, 0}, end[2] = {0, 0};  // moments > 0, and magnitudes of those < 0 [N·m]
   double flexibility = 0;                     // at `end`; 0: does not crack [rad/(N·m)]

@@ -101,8 +101,12 @@ void crack_zone(const ZoneParameters& p, ZoneState& z) {
   for (int s = 0; s < p.stations; ++s)
     for (int q = 0; q < 2; ++q) {
       StationState& st = z.station[s];
-      const double grown = p.cracking[q].flexibility - st.crack[q];
-      if (!(grown > 0)) continue;
+      if (!(p.cracking[q].flexibility > 0)) continue;
+      for (int side = 0; side < 2; ++side) st.crest[q][side] = p.cracking[q].end[side];
+      const CrackLine line = make_crack_line(p.cracking[q], st.crest[q]);
+      const double grown = line.flexibility - st.crack[q];
+      st.bow[q] = line.bow;
+      if (grown == 0) continue;
       const double lever = (q == 0 ? 1 : -1) * p.x[s], m = z.elastic_force[4 + q] + lever * z.elastic_force[2 - q];
       st.crack[q] += grown;
       st.soft[q] += grown;
@@ -436,13 +440,12 @@ struct Evaluation {
         if (!(p.cracking[q].flexibility > 0)) continue;
         grow = grow || std::abs(m[q][s]) > cracks_of(p, z, s, q, ahead).calc_bound(m[q][s]);
       }
-      if (grow) crack_plane(q, {cracks_of(p, z, 0, q, ahead), cracks_of(p, z, n - 1, q, ahead)}, kCracksAhead / ahead);
+      if (grow) crack_plane(q, {cracks_of(p, z, 0, q, ahead), cracks_of(p, z, n - 1, q, ahead)});
     }
   }
 
   /// m + S φ(m) = m of the plastic rotations alone, where φ(m) is straight in pieces.
-  ///   further  moment that cracks are to be known from over the one of now
-  void crack_plane(int q, const std::array<Cracks, 2>& cracks, double further) {
+  void crack_plane(int q, const std::array<Cracks, 2>& cracks) {
     double plastic[2] = {0, 0}, m0[2] = {0, 0}, other[2] = {0, 0};
     for (int s = 0; s < n; ++s) plastic[s] = z.station[s].phi[q];
     for (int s = 0; s < n; ++s) {
@@ -478,7 +481,12 @@ struct Evaluation {
       StationState& st = z.station[s];
       st.tangent[q] = other[s] + piece[s].slope;
       if (!(std::abs(at[s]) > cracks[s].calc_bound(at[s]))) continue;
-      st.crack[q] = std::max(st.crack[q], cracks[s].calc_flexibility(further * at[s]));
+      const size_t side = at[s] >= 0 ? 0 : 1;
+      st.crest[q][side] = std::min(kCracksAhead * std::abs(at[s]), p.cracking[q].end[side]);
+      const CrackLine line = make_crack_line(p.cracking[q], st.crest[q]);
+      st.phi[q] += line.bow - st.bow[q];
+      st.bow[q] = line.bow;
+      st.crack[q] = line.flexibility;
       st.soft[q] = other[s] + st.crack[q];
       cracked = true;
     }
@@ -487,7 +495,7 @@ struct Evaluation {
 
   /// Rotation of a station beyond that of its cracks.
   double beyond_cracks(const double turns[2][2], const double moments[2][2], int q, int s) const {
-    return turns[q][s] - z.station[s].crack[q] * moments[q][s];
+    return turns[q][s] - z.station[s].bow[q] - z.station[s].crack[q] * moments[q][s];
   }
 
   /// Bending at the stations: radial return on (|My|/Ly)^p + (|Mz|/Lz)^p = 1.
@@ -587,7 +595,7 @@ struct Evaluation {
       double before[2][2];
       for (int q = first; q <= last; ++q) {
         const double b = z.elastic_force[bend_of(q)], v = z.elastic_force[shear_of(q)];
-        before[q][s] = st.phi[q] + (st.soft[q] - st.crack[q]) * Bending::at(b, v, p.x[s], planes[q].sign);
+        before[q][s] = st.phi[q] - st.bow[q] + (st.soft[q] - st.crack[q]) * Bending::at(b, v, p.x[s], planes[q].sign);
       }
       so_far[s] = std::max(st.reached, length_of(before, s));
     }

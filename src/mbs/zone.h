@@ -21,6 +21,8 @@ struct StationState {
   double phi[2] = {0, 0};            // plastic rotations about y, z [rad]
   double soft[2] = {0, 0};           // added flexibility by cracks and damage [rad/(N·m)]
   double crack[2] = {0, 0};          // of it, by cracks before first yield
+  double bow[2] = {0, 0};            // of `phi`, what cracks leave without a moment [rad]
+  double crest[2][2] = {};           // about y, z: moments > 0 and < 0 up to which it has cracked [N·m]
   double tangent[2] = {0, 0};        // rise of the rotation with the moment in the last evaluation, for the equilibrium
   double reached = 0;                // largest inelastic rotation so far, without that of cracks [rad]
   int k[2] = {0, 0}, j[2] = {0, 0};  // lookup hints

@@ -254,7 +254,7 @@ bool write_flow(const ZoneParameters& p, const CompiledLaws& laws, ZoneState& z,
       if (law->biaxial_exponent != 1.5) return false;
       for (int q = 0; q < 2; ++q)
         station[kPhi + q] = z.station[s].phi[q], station[kSoftness + q] = z.station[s].soft[q],
-                       station[kCracked + q] = z.station[s].crack[q];
+                       station[kCracked + q] = z.station[s].crack[q], station[kBow + q] = z.station[s].bow[q];
       station[kReached] = z.station[s].reached;
       station[kShare] = law->damage_share;
       const bool is_far = z.station[s].reached >= law->rupture_rotation;

@@ -93,63 +93,83 @@ class Limits {
 /// rest.
 inline constexpr double kCracksAhead = 1.01;
 
+/// Rotation of cracks as a straight line: without a moment [rad], and its rise with the moment [rad/(N·m)].
+struct CrackLine {
+  double bow = 0, flexibility = 0;
+};
+/// From where the largest moment that is known on one side has come, or cracks begin, to the same on the other side
+/// (zones.md, eq. 7b); all a little before, since they are known from ahead.
+///   crest  moments that are known, > 0 and < 0, both without their sign [N·m]
+inline CrackLine make_crack_line(const Cracking& law, const double crest[2]) {
+  double moment[2], turn[2];
+  for (int side : {0, 1}) {
+    const double begin = law.begin[side], end = law.end[side], known = std::clamp(crest[side], begin, end);
+    moment[side] = known / kCracksAhead;
+    turn[side] = law.flexibility * end * (known - begin) / (end - begin) / kCracksAhead;
+  }
+  const double flexibility = (turn[0] + turn[1]) / (moment[0] + moment[1]);
+  return {turn[0] - flexibility * moment[0], flexibility};
+}
+
 /// The cracks of a station about one axis while they may grow.
 struct Cracks {
   Cracking law;
-  double flexibility;  // so far [rad/(N·m)]
+  double crest[2] = {0, 0};  // moments that they are known from, > 0 and < 0 [N·m]
+  CrackLine line;            // that they are on; its bow is part of the station's plastic rotation
+  double ahead = 1;          // moments that they are known from over those at which they are
 
-  /// Moment of this sign beyond which they grow: 1/M = (1 - r)/begin + r/end, r their share of the law's flexibility.
+  /// Moment of this sign beyond which they grow.
   double calc_bound(double sign) const {
-    const int side = sign >= 0 ? 0 : 1;
-    const double share = law.flexibility > 0 ? flexibility / law.flexibility : 1;
-    return share < 1 ? 1 / ((1 - share) / law.begin[side] + share / law.end[side]) : kUnlimited;
+    const int side = side_of(sign);
+    if (!(law.flexibility > 0) || crest[side] >= law.end[side]) return kUnlimited;
+    return std::max(crest[side], law.begin[side]) / ahead;
   }
-  /// Flexibility of which a moment is the bound.
-  double calc_flexibility(double moment) const {
-    const int side = moment >= 0 ? 0 : 1;
-    const double at = 1 / law.begin[side];
-    return law.flexibility * std::clamp((at - 1 / std::abs(moment)) / (at - 1 / law.end[side]), 0.0, 1.0);
-  }
-  /// Rotation by cracks around a moment, from + slope m.
+  /// Rotation by cracks around a moment beside the bow, from + slope m.
   struct Piece {
     double from = 0, slope = 0;
   };
   Piece find_piece(double moment) const {
-    if (!(std::abs(moment) > calc_bound(moment))) return {0, flexibility};
-    return std::abs(moment) < law.end[moment >= 0 ? 0 : 1] ? find_growing(moment) : Piece{0, law.flexibility};
+    if (!(std::abs(moment) > calc_bound(moment))) return {0, line.flexibility};
+    return is_growing(moment) ? find_growing(moment) : find_grown(moment);
   }
   /// m of m + S (c m + φ(m)) = trial, and the piece that it is on.
   ///   stiffness  S;  other  c, flexibility besides
   double find_moment(double trial, double stiffness, double other, Piece& piece) const {
     const auto solve = [&] { return (trial - stiffness * piece.from) / (1 + stiffness * (other + piece.slope)); };
-    piece = {0, flexibility};
+    piece = {0, line.flexibility};
     double m = solve();
     if (!(std::abs(m) > calc_bound(trial))) return m;
     piece = find_growing(trial);
     m = solve();
-    if (std::abs(m) < law.end[trial >= 0 ? 0 : 1]) return m;
-    piece = {0, law.flexibility};
+    if (is_growing(m)) return m;
+    piece = find_grown(trial);
     return solve();
   }
 
  private:
+  static int side_of(double moment) { return moment >= 0 ? 0 : 1; }
+  bool is_growing(double moment) const { return std::abs(moment) < law.end[side_of(moment)] / ahead; }
   Piece find_growing(double moment) const {
-    const int side = moment >= 0 ? 0 : 1;
+    const int side = side_of(moment);
     const double slope = law.flexibility * law.end[side] / (law.end[side] - law.begin[side]);
-    return {moment >= 0 ? -slope * law.begin[side] : slope * law.begin[side], slope};
+    return {(side == 0 ? -slope : slope) * law.begin[side] / ahead - line.bow, slope};
+  }
+  Piece find_grown(double moment) const {
+    double to[2] = {crest[0], crest[1]};
+    to[side_of(moment)] = law.end[side_of(moment)];
+    const CrackLine grown = make_crack_line(law, to);
+    return {grown.bow - line.bow, grown.flexibility};
   }
 };
 /// Of a station of a live zone whose law is still that of the model.
 ///   ahead  moment that cracks are known from over the one at which they are
 inline Cracks cracks_of(const ZoneParameters& p, const ZoneState& z, int station, int axis, double ahead = 1) {
-  Cracking law;
-  const bool is_first = z.next_law < 0 && z.base_law < 0;
-  if (p.cracking[axis].flexibility > 0 && z.station[station].reached == 0 && is_first) {
-    law = p.cracking[axis];
-    if (ahead != 1)
-      for (int side : {0, 1}) law.begin[side] /= ahead, law.end[side] /= ahead;
-  }
-  return {law, z.station[station].crack[axis]};
+  const StationState& st = z.station[station];
+  const bool may_grow = p.cracking[axis].flexibility > 0 && st.reached == 0 && z.next_law < 0 && z.base_law < 0;
+  return {may_grow ? p.cracking[axis] : Cracking{},
+          {st.crest[axis][0], st.crest[axis][1]},
+          {st.bow[axis], st.crack[axis]},
+          ahead};
 }
 
 /// x to the power e, quickly for the exponent that is usual.
