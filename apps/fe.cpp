@@ -29,6 +29,15 @@ farfield::FeOptions make_fe_options(const Arguments& a) {
   return o;
 }
 
+/// Those that a run has to have again to go on.
+std::string write_options(const FeArguments& f) {
+  std::string out = fmt::format(" --size \"{}\"", f.size);
+  if (f.across != FeArguments{}.across) out += fmt::format(" --across {}", f.across);
+  if (!f.scaled_step.empty()) out += fmt::format(" --scaled-step \"{}\"", f.scaled_step);
+  if (f.skip_quiet) out += " --skip-quiet";
+  return out;
+}
+
 void print_mesh(std::FILE* out, const farfield::MeshReport& report) {
   for (const std::string& line : farfield::describe(report)) std::fprintf(out, "%s\n", line.c_str());
 }
@@ -77,9 +86,10 @@ int run_finite_elements(const Arguments& a, const std::atomic<bool>& cancel) {
     callbacks.progress.report = [&](double done, double whole) { progress.show(done, whole); };
     callbacks.progress.cancel = &cancel;
     farfield::FeCallbacks fe_callbacks;
-    fe_callbacks.on_mesh = [&](const farfield::Whole&, const farfield::MeshReport& report) {
+    fe_callbacks.on_mesh = [&](const farfield::MeshReport& report, const std::string& added_mass) {
       std::fprintf(out, "%s\n", plan.title.c_str());
       print_mesh(out, report);
+      if (!added_mass.empty()) std::fprintf(out, "%s\n", added_mass.c_str());
       if (!fe.resume) std::fprintf(out, "Putting on the dead load ...\n");
       std::fflush(out);
     };
@@ -93,7 +103,7 @@ int run_finite_elements(const Arguments& a, const std::atomic<bool>& cancel) {
     progress.clear();
     const int code = close_run(r, a, out, {});
     if (r.ending == "cancelled" && !fe.checkpoint.empty())
-      std::fprintf(out, "Go on with: topple fe %s --size \"%s\" -o %s --resume\n", a.input.c_str(), a.fe.size.c_str(),
+      std::fprintf(out, "Go on with: topple fe %s%s -o %s --resume\n", a.input.c_str(), write_options(a.fe).c_str(),
                    a.output.c_str());
     return code;
   } catch (const InputError& e) { return refuse(e, warnings, text, a.json); }

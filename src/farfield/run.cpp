@@ -29,6 +29,9 @@ constexpr double kSwing = 5;
 /// Accepted difference between reactions and weight: what a thousandth out of balance at every node adds up to.
 constexpr double kReaction = 0.01;
 
+/// Mass that may be added for a longer step, over the building's, before the answer is another building's.
+constexpr double kMuchAddedMass = 0.02;
+
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 /// Moves the elements and shows them as the manager's bodies.
@@ -47,8 +50,10 @@ class Course {
         mesh_(calc_mesh_report(plan, whole_)),
         system_(whole_.fe, make_options(fe, run)),
         motion_(whole_, model, map, fe.grid.size) {
-    if (callbacks.on_mesh) callbacks.on_mesh(whole_, mesh_);
-    key_ = calc_sha256(fmt::format("{}\n{} {} {} {} {} {} {}", plan.text, run.program_version, fe.grid.size,
+    if (callbacks.on_mesh) callbacks.on_mesh(mesh_, describe_added_mass());
+    std::string rules;
+    for (const collapse::Rule& rule : k.rules) rules += fmt::format("{} {}\n", rule.id, rule.value);
+    key_ = calc_sha256(fmt::format("{}\n{}{} {} {} {} {} {} {}", plan.text, rules, run.program_version, fe.grid.size,
                                    fe.grid.least_across, fe.grid.snap_share, fe.scaled_step, fe.skip_quiet,
                                    options.frame_interval));
     for (const collapse::Firing& f : map.schedule)
@@ -98,6 +103,9 @@ class Course {
     return s;
   }
 
+  bool adds_much_mass() const;
+  /// Empty: none was.
+  std::string describe_added_mass() const;
   void add_findings(record::Record& r) const;
 
  private:
@@ -342,6 +350,19 @@ class Course {
   std::function<void(const fem::RelaxationSummary&)> on_relaxed_;
 };
 
+bool Course::adds_much_mass() const { return system_.added_mass() > kMuchAddedMass * mesh_.mesh.mass; }
+
+std::string Course::describe_added_mass() const {
+  if (!(system_.added_mass() > 0)) return "";
+  const std::string text =
+      fmt::format("{} elements got {:.2f} t more mass ({:.2g} % of all), so that they bear a step of {:.4f} ms.",
+                  system_.scaled_elements(), system_.added_mass() / unit::t,
+                  100 * system_.added_mass() / mesh_.mesh.mass, 1e3 * fe_.scaled_step);
+  return adds_much_mass()
+             ? text + " It has weight too: this is the answer of another building. Choose a shorter scaled step."
+             : text;
+}
+
 void Course::add_findings(record::Record& r) const {
   const auto add = [&r](const std::string& id, const char* title, const std::string& text, double value,
                         const char* unit, Status status) {
@@ -352,11 +373,8 @@ void Course::add_findings(record::Record& r) const {
   for (const std::string& line : describe(mesh_)) text += (text.empty() ? "" : " ") + line;
   add("farfield.mesh", "Mesh", text, mesh_.mesh.elements, "1", Status::Info);
   if (system_.added_mass() > 0)
-    add("farfield.scaled", "Mass scaling",
-        fmt::format("{} elements got {:.2f} t more mass ({:.2g} % of all), so that they bear a step of {:.4f} ms.",
-                    system_.scaled_elements(), system_.added_mass() / unit::t,
-                    100 * system_.added_mass() / mesh_.mesh.mass, 1e3 * fe_.scaled_step),
-        system_.added_mass(), "kg", Status::Info);
+    add("farfield.scaled", "Mass scaling", describe_added_mass(), system_.added_mass(), "kg",
+        adds_much_mass() ? Status::Warning : Status::Info);
   add("farfield.settling", "Dead load",
       fmt::format("Put on without motion in {} steps: {:.1e} of the load is out of balance, the building settled by up "
                   "to {:.1f} mm.",

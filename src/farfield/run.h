@@ -20,7 +20,8 @@ struct FeOptions {
 };
 
 struct FeCallbacks {
-  std::function<void(const Whole&, const MeshReport&)> on_mesh;
+  /// The mesh, and what is said of mass that its elements got (empty: none).
+  std::function<void(const MeshReport&, const std::string& added_mass)> on_mesh;
   std::function<void(int steps)> on_settling;  // now and then while a load is put on without motion
   std::function<void(const fem::RelaxationSummary&)> on_relaxed;
 };

@@ -288,6 +288,26 @@ TEST_F(FarfieldReplay, GoesOnFromACheckpointAsIfNothingHadHappened) {
   expect_same(whole, rest);
 }
 
+TEST(Farfield, SaysWhenAddedMassMakesItAnotherBuilding) {
+  const std::string text = with_duration(portal(), "20 ms");
+  for (const double step : {0.02e-3, 0.2e-3}) {
+    FeOptions fe = coarse();
+    fe.scaled_step = step;
+    std::string said;
+    FeCallbacks callbacks;
+    callbacks.on_mesh = [&](const MeshReport&, const std::string& added_mass) { said = added_mass; };
+    const record::Record r = run_plan(read(text), rules(), {}, fe, {}, callbacks);
+    if (said.empty()) {
+      EXPECT_EQ(step, 0.02e-3);
+      continue;
+    }
+    const record::Finding& f = find(r, "farfield.scaled");
+    EXPECT_EQ(f.text, said);
+    EXPECT_EQ(f.status, record::Status::Warning) << said;
+    EXPECT_THAT(said, testing::HasSubstr("another building"));
+  }
+}
+
 TEST_F(FarfieldReplay, RefusesAScaledStepWithoutEnd) {
   FeOptions fe = coarse();
   fe.scaled_step = 1e-12;
@@ -301,6 +321,16 @@ TEST_F(FarfieldReplay, RefusesACheckpointOfSomethingElse) {
   (void)run(with_duration(portal(), "20 ms"), kept);
   kept.resume = true;
   EXPECT_THROW((void)run(with_duration(portal(), "30 ms"), kept), InputError);
+  const auto resume_with = [&](const collapse::Knowledge& k, const FeOptions& fe) {
+    (void)run_plan(read(with_duration(portal(), "20 ms")), k, {}, fe, {}, {});
+  };
+  collapse::Knowledge other = rules();
+  other.rules.front().value *= 2;
+  EXPECT_THROW(resume_with(other, kept), InputError);
+  FeOptions finer = kept;
+  finer.grid.least_across = 3;
+  EXPECT_THROW(resume_with(rules(), finer), InputError);
+  EXPECT_NO_THROW(resume_with(rules(), kept));
   kept.checkpoint = folder + "missing.bin";
   EXPECT_THROW((void)run(with_duration(portal(), "20 ms"), kept), InputError);
 }

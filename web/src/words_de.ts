@@ -215,6 +215,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["No face was moved.", "Keine Fläche wurde verschoben."],
   ["Mass scaling", "Massenskalierung"],
   ["{} elements got {:.2f} t more mass ({:.2g} % of all), so that they bear a step of {:.4f} ms.", "{} Elemente bekamen {} t mehr Masse ({} % von allem), damit sie einen Zeitschritt von {} ms ertragen."],
+  ["It has weight too: this is the answer of another building. Choose a shorter scaled step.", "Sie hat auch Gewicht: Das ist die Antwort eines anderen Gebäudes. Wählen Sie einen kürzeren Zeitschritt."],
   ["Dead load", "Eigengewicht"],
   ["Put on without motion in {} steps: {:.1e} of the load is out of balance, the building settled by up to {:.1f} mm.", "Ohne Bewegung in {} Schritten aufgebracht: Das {}-Fache der Last ist nicht ausgeglichen, das Gebäude hat sich um bis zu {} mm gesetzt."],
   ["Stabilisation of elements", "Stabilisierung der Elemente"],
