@@ -30,12 +30,15 @@ farfield::FeOptions make_fe_options(const Arguments& a) {
 }
 
 /// Those that a run has to have again to go on.
-std::string write_options(const FeArguments& f) {
-  std::string out = fmt::format(" --size \"{}\"", f.size);
-  if (f.across != FeArguments{}.across) out += fmt::format(" --across {}", f.across);
-  if (!f.scaled_step.empty()) out += fmt::format(" --scaled-step \"{}\"", f.scaled_step);
-  if (f.skip_quiet) out += " --skip-quiet";
-  return out;
+std::string write_options(const Arguments& a) {
+  const auto quoted = [](const char* option, const std::string& value) {
+    return value.empty() ? "" : fmt::format(" {} \"{}\"", option, value);
+  };
+  std::string out = quoted("--size", a.fe.size);
+  if (a.fe.across != FeArguments{}.across) out += fmt::format(" --across {}", a.fe.across);
+  out += quoted("--scaled-step", a.fe.scaled_step);
+  if (a.fe.skip_quiet) out += " --skip-quiet";
+  return out + quoted("--knowledge", a.knowledge) + quoted("--until", a.duration);
 }
 
 void print_mesh(std::FILE* out, const farfield::MeshReport& report) {
@@ -103,7 +106,7 @@ int run_finite_elements(const Arguments& a, const std::atomic<bool>& cancel) {
     progress.clear();
     const int code = close_run(r, a, out, {});
     if (r.ending == "cancelled" && !fe.checkpoint.empty())
-      std::fprintf(out, "Go on with: topple fe %s%s -o %s --resume\n", a.input.c_str(), write_options(a.fe).c_str(),
+      std::fprintf(out, "Go on with: topple fe %s%s -o %s --resume\n", a.input.c_str(), write_options(a).c_str(),
                    a.output.c_str());
     return code;
   } catch (const InputError& e) { return refuse(e, warnings, text, a.json); }
