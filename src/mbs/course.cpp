@@ -54,6 +54,7 @@ void Course::show() {
   if (now_.shown == s_.state.time) return;
   now_.shown = s_.state.time;
   const View& v = s_.calc_view();
+  s_.tell_yields();
   for (size_t i = 0; i < now_.softened.size(); ++i)
     if (!now_.softened[i] && v.element_state[i] == ElementState::Softening) {
       now_.softened[i] = true;

@@ -338,7 +338,6 @@ void System::evaluate_element(size_t i, double h) {
   if (!z.live || slot == Lanes::kNoSlot) return;
   const CompiledElement& e = elements[i];
   const ElementGeometry g = measure_zone(e);
-  const bool was_yielded = z.yielded;
   if (ignores_limits) {
     ZoneParameters elastic = e.zone;
     elastic.stations = 0;
@@ -346,7 +345,7 @@ void System::evaluate_element(size_t i, double h) {
   } else {
     advance_zone(e.zone, laws, g.deformation, state.time, h, z);
   }
-  if (z.yielded && !was_yielded) say({Happening::Kind::ElementYielded, state.time, static_cast<int>(i), -1, {}, 0});
+  tell_yield(i, z);
   Vec3 on_a, torque_a, torque_b;
   if (z.live) {
     const ElementForces f = calc_element_forces(g, z.resultant);
@@ -568,6 +567,16 @@ Vec3 System::calc_element_reaction() const {
     if (grounded(elements[e].b)) sum += on_a;
   }
   return sum;
+}
+
+void System::tell_yield(size_t zone, ZoneState& z) {
+  if (z.is_told || !has_yielded(z)) return;
+  z.is_told = true;
+  say({Happening::Kind::ElementYielded, state.time, static_cast<int>(zone), -1, {}, 0});
+}
+
+void System::tell_yields() {
+  for (size_t i = 0; i < elements.size(); ++i) tell_yield(i, state.element[i]);
 }
 
 void System::break_element(size_t e, BreakReason reason) {

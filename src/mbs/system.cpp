@@ -338,7 +338,6 @@ void System::evaluate_rotationals(double h) {
       d.c[5] = js.angle;
     }
     const ZoneParameters& zone = loose ? c.loose : c.zone;
-    const bool was_yielded = z.yielded;
     const double elongated = z.axial;
     if (ignores_limits) {
       ZoneParameters elastic = zone;
@@ -347,8 +346,7 @@ void System::evaluate_rotationals(double h) {
     } else {
       advance_zone(zone, laws, d, state.time, h, z);
     }
-    if (z.yielded && !was_yielded)
-      say({Happening::Kind::ElementYielded, state.time, static_cast<int>(elements.size() + i), -1, {}, 0});
+    tell_yield(elements.size() + i, z);
     if (!loose && c.axial_element >= 0 && h > 0 && z.axial != elongated)
       elongate_element(static_cast<size_t>(c.axial_element), z.axial - elongated);
     if (!z.live) {
@@ -766,7 +764,7 @@ const View& System::calc_view() {
   const auto fill = [&](size_t at, const ZoneParameters& p, const ZoneState& z) {
     v.element_state[at] = !z.live ? (z.reason == BreakReason::Removed ? ElementState::Removed : ElementState::Broken)
                           : is_softening(p, laws, s.time, z) ? ElementState::Softening
-                          : z.yielded                        ? ElementState::Yielded
+                          : has_yielded(z)                   ? ElementState::Yielded
                                                              : ElementState::Elastic;
     v.utilisation[at] = calc_utilisation(p, laws, s.time, z);
     v.rotation[at] = std::max(z.station[0].reached, z.station[1].reached);

@@ -452,6 +452,11 @@ class System {
   /// True the first time for a cluster and a situation.
   bool note_once(const JointCluster&, int situation);
   void break_element(size_t e, BreakReason reason);
+  /// Says once that a zone has yielded.
+  ///   zone  elements, then rotational elements
+  void tell_yield(size_t zone, ZoneState&);
+  /// Of those that have in lanes, where nobody was told; their states are unpacked.
+  void tell_yields();
   void release_joint(size_t j, const char* reason);
   void replace_body(size_t b, const Body& replacement);
   /// Polyhedra of the model and of what events put in place of bodies.

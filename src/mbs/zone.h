@@ -57,7 +57,8 @@ struct ZoneState {
   double damper_force[6] = {0, 0, 0, 0, 0, 0};   // the damper's part of the step before
   double flowed[6] = {0, 0, 0, 0, 0, 0};         // of the dampers [m, rad]
   double damper_energy = 0;                      // stored behind the dampers [J]
-  bool yielded = false;                          // has ever passed a limit
+  bool yielded = false;                          // has ever passed a limit in the full law
+  bool is_told = false;                          // that it has yielded
   bool is_adjusted = false;                      // lengthened from outside since the last evaluation
   // Bounds within which no limit is passed whatever the combination, for normal forces in a range; renewed when the
   // force leaves the range, void (an empty range) after any inelastic step. With them goes the inelastic part of the
@@ -102,6 +103,12 @@ struct ZoneParameters {
 void advance_zone(const ZoneParameters&, const CompiledLaws&, const Six& deformation, double time, double h,
                   ZoneState&);
 /// Whether the zone is a spring with a damper for as long as its forces stay inside its safe bounds.
+/// Whether it has ever passed a limit, in lanes as well.
+inline bool has_yielded(const ZoneState& z) {
+  return z.yielded || z.station[0].reached > 0 || z.station[1].reached > 0 || z.shortened > 0 || z.slipped > 0 ||
+         z.twisted > 0;
+}
+
 inline bool is_bounded(const ZoneState& z, bool unlimited) {
   return z.live && z.has_elastic && z.next_law < 0 && (unlimited || z.safe_force[0] <= z.safe_force[1]);
 }

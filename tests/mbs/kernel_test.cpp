@@ -88,6 +88,7 @@ Six path_at(int i, double amplitude, std::uint32_t seed, double pressed = 0) {
 struct Walked {
   Six resultant;
   double energy, plastic, damping, reached, shortened;
+  bool yielded;
 };
 
 /// The path through the kernel (System) and through the law alone.
@@ -112,12 +113,12 @@ void walk(int stations, const ZoneLaw& zone, double amplitude, std::uint32_t see
     s.unpack_elements();
     const ZoneState& k = s.state.element[0];
     kernel.push_back({k.resultant, k.energy, k.plastic, k.damping, std::max(k.station[0].reached, k.station[1].reached),
-                      k.shortened});
+                      k.shortened, has_yielded(k)});
     if (law != nullptr) {
       const Six deformation = s.measure_zone(s.elements[0]).deformation;
       if (z.live) advance_zone(s.elements[0].zone, s.laws, deformation, 1e-4 * i, 1e-4, z);
       law->push_back({z.resultant, z.energy, z.plastic, z.damping, std::max(z.station[0].reached, z.station[1].reached),
-                      z.shortened});
+                      z.shortened, has_yielded(z)});
       EXPECT_EQ(k.live, z.live) << i;
       if (k.live != z.live || !z.live) break;
     }
@@ -146,6 +147,7 @@ std::vector<Walked> compare(int stations, const ZoneLaw& zone, double amplitude,
       ASSERT_NEAR(kernel[i].damping, law[i].damping, 1e-7 * energy + 1e-9) << i;
       ASSERT_NEAR(kernel[i].reached, law[i].reached, 1e-9) << i;
       ASSERT_NEAR(kernel[i].shortened, law[i].shortened, 1e-9) << i << " seed " << seed;
+      ASSERT_EQ(kernel[i].yielded, law[i].yielded) << i << " seed " << seed;
     }
   };
   check();
