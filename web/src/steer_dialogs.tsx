@@ -177,9 +177,7 @@ function Content(props: { s: SteerState; dialog: Dialog }) {
         <Form s={s} title="Save the plan" action="Save" note={<p class="quiet">This plan has no file yet. It goes into the folder that the server was started for.</p>}
           fields={[{ key: "path", label: "Name of the file", value: "plan.toml" }]}
           onDone={async (v) => {
-            const r = await s.connection.command<{ sha256: string; path?: string }>("plan.save", { text: dialog.text, path: v["path"] });
-            s.plan.value = { text: dialog.text, sha256: r.sha256, path: r.path ?? String(v["path"]) };
-            s.editedText.value = null;
+            await s.savePlan({ text: dialog.text, path: String(v["path"]) });
             s.notify("good", `Saved ${v["path"]}.`);
           }} />
       );
@@ -197,13 +195,10 @@ function Content(props: { s: SteerState; dialog: Dialog }) {
               }}>
               Take the one on the disk
             </button>
-            <button type="button" data-test="overwrite" onClick={() => void s.ask<{ sha256: string }>("plan.save", { text: dialog.text, base_sha256: dialog.sha256, force: true }).then((r) => {
-              if (r === undefined) return;
-              s.plan.value = { ...s.plan.value, text: dialog.text, sha256: r.sha256 };
-              s.editedText.value = null;
+            <button type="button" data-test="overwrite" onClick={() => void s.savePlan({ text: dialog.text, base_sha256: dialog.sha256, force: true }).then(() => {
               s.dialog.value = null;
               s.notify("good", "Saved over the one on the disk.");
-            })}>
+            }, s.complain)}>
               Save mine over it
             </button>
             <button type="button" onClick={() => (s.dialog.value = null)}>Neither yet</button>

@@ -109,9 +109,7 @@ export function PlanEditor(props: { s: SteerState }) {
       return;
     }
     try {
-      const r = await s.connection.command<{ sha256: string }>("plan.save", { text, base_sha256: s.planBase() });
-      s.plan.value = { ...s.plan.value, text, sha256: r.sha256 };
-      s.editedText.value = null;
+      await s.savePlan({ text, base_sha256: s.planBase() });
       s.notify("good", `Saved ${s.plan.value.path}.`);
     } catch (error) {
       if (error instanceof CommandError && error.error.code === "E941")

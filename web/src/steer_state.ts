@@ -164,7 +164,8 @@ export function makeSteerState(address: string) {
           sessions.value = message["sessions"] as Session[];
           break;
         case "plan_changed":
-          if (message["sha256"] !== plan.value.sha256) void readPlan();
+          if (saving > 0) told = String(message["sha256"]);
+          else if (message["sha256"] !== plan.value.sha256) void readPlan();
           break;
         case "bye":
           notify("bad", message["session"] === undefined ? `The server has ended: ${String(message["reason"])}` : `This session was closed: ${String(message["reason"])}`);
@@ -415,6 +416,23 @@ export function makeSteerState(address: string) {
     draws.value += 1;
   }
 
+  let saving = 0, told = "";
+  /// Saves the plan's text, which is then as it is on the disk: what the server tells of that meanwhile need not be read.
+  async function savePlan(what: { text: string; path?: string; base_sha256?: string; force?: boolean }): Promise<void> {
+    saving += 1;
+    try {
+      const r = await connection.command<{ sha256: string; path?: string }>("plan.save", what);
+      plan.value = { text: what.text, path: r.path ?? what.path ?? plan.value.path, sha256: r.sha256 };
+      editedText.value = null;
+    } finally {
+      saving -= 1;
+      if (saving === 0) {
+        if (told !== "" && told !== plan.value.sha256) void readPlan();
+        told = "";
+      }
+    }
+  }
+
   async function readPlan(): Promise<void> {
     const id = session.value?.id;
     const response = await fetch(`api/sessions/${id}/plan`);
@@ -591,6 +609,7 @@ export function makeSteerState(address: string) {
     },
     complain,
     readPlan,
+    savePlan,
     planBase: () => planBase,
   };
 }
