@@ -382,7 +382,12 @@ void add_rigid_block(const Context& c) {
           kNone, "rad");
   } else if (at != c.r.time.end()) {
     const size_t i = static_cast<size_t>(at - c.r.time.begin());
-    const double here = c.r.series.front().value[i], there = series.value[i];
+    const size_t before = i > 0 ? i - 1 : 0;
+    const double passed = i > 0 ? (when - c.r.time[before]) / (c.r.time[i] - c.r.time[before]) : 1;
+    const auto read = [&](const record::Series& of) {
+      return of.value[before] + passed * (of.value[i] - of.value[before]);
+    };
+    const double here = read(c.r.series.front()), there = read(series);
     c.add(
         "rigid_block", "Mechanism", "Beside a rigid block",
         fmt::format("1 s after the last stage the upper block leans by {:.1f} deg; {} would lean by {:.1f} deg. Unlike "
