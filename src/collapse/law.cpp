@@ -491,7 +491,7 @@ mbs::Cracking make_cracking(const nearfield::MomentFamily& positive, const nearf
 double calc_crack_rotation(const mbs::Cracking& c, double moment) {
   if (c.flexibility == 0) return 0;
   if (moment >= c.end[0]) return c.flexibility * moment;
-  return c.flexibility * c.end[0] * std::max(0.0, moment - c.begin[0]) / (c.end[0] - c.begin[0]);
+  return mbs::calc_crack_rotation(c, 0, std::max(moment, c.begin[0]));
 }
 
 mbs::ZoneLaw make_cage_law(const nearfield::ResidualCage& cage, double destroyed_length, const std::string& name,

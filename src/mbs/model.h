@@ -53,6 +53,12 @@ struct Cracking {
   double begin[2] = {0, 0}, end[2] = {0, 0};  // moments > 0, and magnitudes of those < 0 [N·m]
   double flexibility = 0;                     // at `end`; 0: does not crack [rad/(N·m)]
 };
+/// Rotation on that line [rad].
+///   side    0: moments > 0, 1: those < 0
+///   moment  without its sign, from `begin` to `end` [N·m]
+inline double calc_crack_rotation(const Cracking& c, int side, double moment) {
+  return c.flexibility * c.end[side] * (moment - c.begin[side]) / (c.end[side] - c.begin[side]);
+}
 
 /// Six-component force element between marker F on body a and marker M on body b, at rest where F = M.
 /// Elastic in series with the inelastic rotations of its stations (one for a zone; two, at x = -L/2 and +L/2 with the

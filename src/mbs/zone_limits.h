@@ -103,9 +103,9 @@ struct CrackLine {
 inline CrackLine make_crack_line(const Cracking& law, const double crest[2]) {
   double moment[2], turn[2];
   for (int side : {0, 1}) {
-    const double begin = law.begin[side], end = law.end[side], known = std::clamp(crest[side], begin, end);
+    const double known = std::clamp(crest[side], law.begin[side], law.end[side]);
     moment[side] = known / kCracksAhead;
-    turn[side] = law.flexibility * end * (known - begin) / (end - begin) / kCracksAhead;
+    turn[side] = calc_crack_rotation(law, side, known) / kCracksAhead;
   }
   const double flexibility = (turn[0] + turn[1]) / (moment[0] + moment[1]);
   return {turn[0] - flexibility * moment[0], flexibility};
