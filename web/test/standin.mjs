@@ -77,7 +77,7 @@ function makeCourse(second) {
 
 class Session {
   constructor(server, id, text, path) {
-    Object.assign(this, { server, id, path, disk: text, text, phase: "paused", seq: 0, log: [], branches: [], cursor: null, speed: null, studies: [], zone: null, broken: [], earlier: null, toldAt: 0 });
+    Object.assign(this, { server, id, path, disk: text, text, phase: "paused", seq: 0, log: [], branches: [], cursor: null, speed: null, studies: [], zone: null, broken: [], earlier: null, toldAt: 0, reads: 0 });
     this.title = /title = "(.*)"/.exec(text)?.[1] ?? "untitled";
     this.fuzzy = !text.includes("crisp");
     this.active = this.addBranch("main", null, 0, 4).id;
@@ -320,7 +320,10 @@ export class Standin {
     if (path === "/api/templates") return json({ templates: [{ name: "frame", title: "Frame of three storeys", text: planText }, { name: "chimney", title: "Chimney of 40 m", description: "A chimney that falls to one side", text: planText }], demo: { title: "Storehouse in Weida, 1998" } });
     if (path === "/api/plans") return json({ folder: "/plans", plans: [{ path: "storehouse.toml", title: "Storehouse of seven storeys" }, { path: "silo.toml", title: "Silo" }] });
     if (path === "/api/sessions") return json({ sessions: this.sessions.map((s) => s.describe()) });
-    if (session !== undefined && path.endsWith("/plan")) return send("text/plain; charset=utf-8", session.disk);
+    if (session !== undefined && path.endsWith("/plan")) {
+      session.reads += 1;
+      return send("text/plain; charset=utf-8", session.disk);
+    }
     if (session !== undefined && path.endsWith("/log")) return send("text/plain", session.log.map((e) => JSON.stringify(e)).join("\n"));
     if (session !== undefined && path.endsWith("/report.html")) return send("text/html; charset=utf-8", "<!DOCTYPE html><title>report</title><h1>Report of the branch</h1>");
     response.writeHead(404, { "content-type": "application/json" }).end(JSON.stringify({ error: { code: "E903", message: `nothing at ${path}`, help: "" } }));

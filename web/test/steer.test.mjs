@@ -357,9 +357,11 @@ describe("steering page", () => {
     const mine = planText.replace("500 ms", "600 ms");
     await page.fill("[data-test=plan-text]", mine);
     await d.until("check-count", "0 errors");
+    const reads = server.sessions[0].reads;
     await d.click("save");
     await d.until("notice", "Saved");
     assert.equal(server.sessions[0].disk, mine);
+    assert.equal(server.sessions[0].reads, reads, "what was just saved is read again");
     server.sessions[0].disk = planText.replace("500 ms", "700 ms");
     await page.fill("[data-test=plan-text]", mine.replace("600 ms", "650 ms"));
     await d.click("save");
