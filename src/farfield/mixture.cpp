@@ -137,7 +137,7 @@ fem::ExplicitMaterial make_section_material(const nearfield::ZoneInput& in, doub
   m.density = in.concrete.density;
   m.nu = kPoisson;
   m.E = in.concrete.Ec + steel / area * (in.steel.Es - in.concrete.Ec);
-  m.tension_cutoff = kAlongMember;
+  m.tension_cutoff = m.compression_cutoff = kAlongMember;
   fill_law(
       m, [&](double e) { return nearfield::calc_resultants(fibres, e, 0).N / area; }, fibres.core.eps_ct,
       in.steel.fy / in.steel.Es, in.steel.eps_u, zone.length / element_length);
@@ -150,7 +150,7 @@ fem::ExplicitMaterial make_panel_material(const product::Plan& plan, const produ
   m.name = panel.name;
   m.density = panel.density;
   m.nu = kPoisson;
-  m.tension_cutoff = kInPanel;
+  m.tension_cutoff = m.compression_cutoff = kInPanel;
   if (panel.concrete < 0) {
     m.E = panel.modulus;
     m.yield = {{0, 0.1e6, panel.strength}};

@@ -28,11 +28,7 @@ kernel::Law make_law(const ExplicitMaterial& m) {
     law.tension[i] = y.tension - law.tension_slope[i] * y.strain;
     law.compression[i] = y.compression - law.compression_slope[i] * y.strain;
   }
-  if (law.points > 0) {
-    law.least_pressure = -m.yield[0].tension / 3;
-    law.per_pressure = 3 / (m.yield[0].tension + m.yield[0].compression);
-  }
-  law.cutoff = m.tension_cutoff;
+  law.tension_cutoff = m.tension_cutoff, law.compression_cutoff = m.compression_cutoff;
   law.tension_rate = 1 / m.tension_limit, law.compression_rate = 1 / m.compression_limit;
   return law;
 }

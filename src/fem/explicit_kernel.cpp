@@ -289,12 +289,20 @@ struct Capacity {
     const V shear2 = fma(sxy, sxy, fma(syz, syz, mul(szx, szx))), normal2 = fma(dx, dx, fma(dy, dy, mul(dz, dz)));
     q2 = fma(num(3), shear2, mul(num(1.5), normal2));
   }
-  HWY_INLINE void take_root(const Law& law) {
+  HWY_INLINE void take_root() {
     root_ = hn::Sqrt(q2);
-    w = hn::Min(num(1), hn::Max(hn::Zero(D()), mul(num(law.per_pressure), sub(num(-law.least_pressure), mean))));
-    limit = fma(sub(yield.compression, yield.tension), w, yield.tension);
     both_ = add(yield.tension, yield.compression);
-    per_ = hn::Div(num(1), mul(limit, both_));
+    const V pressed = hn::Min(both_, hn::Max(hn::Zero(D()), fnma(num(3), mean, yield.tension)));  // w times both
+    const V line = fma(sub(yield.compression, yield.tension), pressed, mul(yield.tension, both_));
+    // one quotient for those by `both_` and by `line`, the limit times it
+    const V per = hn::Div(num(1), mul(line, both_)), per_both = mul(per, line);
+    per_ = mul(per, both_);
+    w = mul(pressed, per_both);
+    pressed_ = hn::Gt(pressed, yield.tension);
+    own_ = hn::IfThenElse(pressed_, yield.compression, yield.tension);
+    // at its ends the limit is a strength to the last digit
+    const auto inside = hn::And(hn::Gt(pressed, hn::Zero(D())), hn::Lt(pressed, both_));
+    limit = hn::IfThenElse(inside, mul(line, per_both), own_);
   }
   // m / h: what the mean stress may still grow towards its own side (margin over rise) and the other
   HWY_INLINE void divide() {
@@ -303,14 +311,12 @@ struct Capacity {
     const V mean_size = hn::Min(root_, mul(num(1 - 1e-10), limit));
     const V margin = sub(limit, mean_size);
     reached_ = add(limit, mean_size);
-    pressed_ = hn::Gt(mul(w, both_), t);
-    const V own = hn::IfThenElse(pressed_, c, t);
     other_ = hn::IfThenElse(pressed_, t, c);
-    const V back = mul(mul(num(0.5), reached_), both_), least = mul(own, add(other_, mean_size));
+    const V back = mul(mul(num(0.5), reached_), both_), least = mul(own_, add(other_, mean_size));
     opposite_ = hn::IfThenElse(pressed_, hn::Max(back, least), hn::Min(back, least));  // times own
-    const V ahead = hn::Max(sub(own, mean_size), mul(num(1e-15), limit));
+    const V ahead = hn::Max(sub(own_, mean_size), mul(num(1e-15), limit));
     per_side_ = mul(margin, hn::Div(num(1), mul(ahead, opposite_)));
-    share_ = mul(own, ahead);
+    share_ = mul(own_, ahead);
   }
   HWY_INLINE void end() {
     const V along_line = mul(add(other_, other_), mul(limit, per_)), alone = mul(opposite_, per_side_);
@@ -319,7 +325,7 @@ struct Capacity {
   }
 
  private:
-  V root_, both_, per_, reached_, other_, opposite_, per_side_, share_;
+  V root_, both_, per_, own_, reached_, other_, opposite_, per_side_, share_;
   hn::Mask<D> pressed_;
 };
 
@@ -434,7 +440,7 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
     const V3 q1 = beyond(modes.speed(3), x.d);
     const V x1 = dot(x.a, q1), y1 = mul(ib, dot(x.b, q1)), z1 = mul(ic, dot(x.c, q1));
     if (yields) cap.begin(law, load_field(element, kStrain), sxx, syy, szz, sxy, syz, szx);
-    if (yields) cap.take_root(law);
+    if (yields) cap.take_root();
     gather(rows, next_corners, 1, half, face, ahead);
     const V3 q2 = beyond(modes.speed(4), x.e);
     const V x2 = mul(ia, dot(x.a, q2)), y2 = dot(x.b, q2), z2 = mul(ic, dot(x.c, q2));
@@ -466,9 +472,11 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
   if (law.points > 0) {
     const Yield& y = cap.yield;
     const V dx = cap.dx, dy = cap.dy, dz = cap.dz, q2 = cap.q2, w = cap.w, limit = cap.limit;
-    const V top = mul(num(law.cutoff), y.tension);
     const V per_bending = cap.per_bending;
-    V mean = cap.mean;
+    // what is held sideways cracks and is crushed all the same
+    const V top = mul(num(law.tension_cutoff), y.tension), bottom = mul(num(-law.compression_cutoff), y.compression);
+    const V mean = hn::Max(hn::Min(cap.mean, top), bottom);
+    const auto exceeds = hn::Ne(mean, cap.mean);
     const V iab = mul(ia, ib), iac = mul(ia, ic), ibc = mul(ib, ic);
     const auto bend2 = [&](const V* bent)
                            HWY_ATTR { return fma(bent[0], sub(bent[0], bent[1]), mul(bent[1], bent[1])); };
@@ -480,8 +488,7 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
     // k is at most 4/√3 q m, in an element of any shape
     const V m2 = mul(mul(h2, per_bending), per_bending), left = sub(mul(limit, limit), add(q2, m2));
     const auto may_flow = hn::Or(hn::Lt(left, zero), hn::Lt(mul(left, left), mul(num(16.0 / 9), mul(q2, m2))));
-    const auto tears = hn::Gt(mean, top);
-    if (HWY_UNLIKELY(!hn::AllFalse(d, hn::And(live, hn::Or(may_flow, tears))))) {
+    if (HWY_UNLIKELY(!hn::AllFalse(d, hn::And(live, hn::Or(may_flow, exceeds))))) {
       // mean stress and what varies come back together, the more so the more they are of one kind (eq. 13, 14)
       const V slope = fma(sub(y.compression_slope, y.tension_slope), w, y.tension_slope);
       const V mu3 = num(3 * law.mu), per_rate = hn::Div(num(1), add(mu3, slope));
@@ -499,17 +506,14 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
       // 1.5 over the root of 3
       const V common = mul(num(0.86602540378443865), mul(alike, per_bending));
       const V q = hn::Sqrt(hn::Max(add(m2, add(q2, common)), num(1e-300)));
-      if (HWY_UNLIKELY(!hn::AllFalse(d, hn::And(live, hn::Or(hn::Gt(q, limit), tears))))) {
+      if (HWY_UNLIKELY(!hn::AllFalse(d, hn::And(live, hn::Or(hn::Gt(q, limit), exceeds))))) {
         const V flow = hn::Max(zero, mul(sub(q, limit), per_rate));
         const V keep = fnma(mu3, hn::Div(flow, q), num(1));
         const V part = mul(keep, sub(num(1), keep));
-        const V opening = hn::Max(zero, mul(num(1 / law.bulk), sub(mean, top)));
-        mean = hn::Min(mean, top);
+        const V swelling = mul(num(1 / law.bulk), sub(cap.mean, mean));  // plastic, of the volume
         sxx = fma(dx, keep, mean), syy = fma(dy, keep, mean), szz = fma(dz, keep, mean);
         sxy = mul(sxy, keep), syz = mul(syz, keep), szx = mul(szx, keep);
-        // an infinite cutoff leaves no opening, but infinity times nothing
-        const V torn = hn::IfThenElseZero(tears, mul(hn::Min(top, num(1e300)), opening));
-        const V spent = fma(mul(part, q2), num(1 / (3 * law.mu)), torn);
+        const V spent = fma(mul(part, q2), num(1 / (3 * law.mu)), mul(mean, swelling));
         const V volume = hn::IfThenElseZero(live, mul(num(1.0 / 64), g.volume)), weight = mul(volume, part);
         sums.mean = fma(volume, spent, sums.mean);
         const auto store = [&](const V* bent) HWY_ATTR {  // three times twice the energy over the volume
@@ -523,7 +527,7 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
         for (V& a : s.bending) a = mul(a, keep);
         for (V& a : s.twist) a = mul(a, keep);
         for (V& a : s.corner) a = mul(a, keep);
-        const V more = hn::IfThenElseZero(live, add(flow, opening));
+        const V more = hn::IfThenElseZero(live, fma(num(1.0 / 3), hn::Abs(swelling), flow));
         const V strain = add(load_field(element, kStrain), more);
         const V wear = fma(num(law.compression_rate - law.tension_rate), w, num(law.tension_rate));
         const V damage = fma(more, wear, load_field(element, kDamage));

@@ -51,10 +51,8 @@ struct Law {
   double at[kMostYieldPoints]{};                                          // plastic strain where a line begins
   double tension[kMostYieldPoints]{}, tension_slope[kMostYieldPoints]{};  // value at strain 0 and slope of the line
   double compression[kMostYieldPoints]{}, compression_slope[kMostYieldPoints]{};
-  double least_pressure = 0;                      // where the tensile yield stress counts [Pa]
-  double per_pressure = 0;                        // one over the range to where the compressive one does [1/Pa]
-  double cutoff = 0;                              // largest mean tension over the tensile yield stress
-  double tension_rate = 0, compression_rate = 0;  // damage for plastic strain
+  double tension_cutoff = 0, compression_cutoff = 0;  // largest mean stress over the yield stress
+  double tension_rate = 0, compression_rate = 0;      // damage for plastic strain
   // of a step: times StepJob::past (set_step)
   double step_lambda = 0, step_mu = 0, step_E = 0, step_bending = 0, step_bending_nu = 0;  // [Pa s]
 };

@@ -29,8 +29,9 @@ struct ExplicitMaterial {
   double E = 0;        // [Pa]
   double nu = 0;
   std::vector<YieldPoint> yield;  // empty: elastic; at most kMostYieldPoints
-  /// Largest mean tension over the tensile yield stress; infinite: none.
+  /// Largest mean tension over the tensile yield stress, largest pressure over the compressive one; infinite: none.
   double tension_cutoff = std::numeric_limits<double>::infinity();
+  double compression_cutoff = std::numeric_limits<double>::infinity();
   /// Plastic strains at which an element goes, in pure tension and in pure compression; infinite: never.
   double tension_limit = std::numeric_limits<double>::infinity();
   double compression_limit = std::numeric_limits<double>::infinity();

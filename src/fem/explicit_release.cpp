@@ -15,7 +15,6 @@ kernel::Law scale_strength(const kernel::Law& law, double factor) {
     out.tension[i] *= factor, out.tension_slope[i] *= factor;
     out.compression[i] *= factor, out.compression_slope[i] *= factor;
   }
-  out.least_pressure *= factor, out.per_pressure /= factor;
   return out;
 }
 

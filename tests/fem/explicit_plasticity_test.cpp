@@ -224,7 +224,7 @@ kernel::Law make_sample_law(double t, double c) {
   law.lambda = kSampleE * kSampleNu / ((1 + kSampleNu) * (1 - 2 * kSampleNu));
   law.bending = kSampleE / (1 - kSampleNu * kSampleNu), law.bulk = law.lambda + 2.0 / 3 * kSampleMu, law.speed = 3600;
   law.points = 1, law.tension[0] = t, law.compression[0] = c;
-  law.least_pressure = -t / 3, law.per_pressure = 3 / (t + c), law.cutoff = 1e300;
+  law.tension_cutoff = law.compression_cutoff = 1e300;
   return law;
 }
 
