@@ -31,6 +31,8 @@ constexpr double kReaction = 0.01;
 
 /// Mass that may be added for a longer step, over the building's, before the answer is another building's.
 constexpr double kMuchAddedMass = 0.02;
+/// From this share on the run is refused.
+constexpr double kAbsurdAddedMass = 1;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
@@ -50,6 +52,7 @@ class Course {
         mesh_(calc_mesh_report(plan, whole_)),
         system_(whole_.fe, make_options(fe, run)),
         motion_(whole_, model, map, fe.grid.size) {
+    check_added_mass();
     if (callbacks.on_mesh) callbacks.on_mesh(mesh_, describe_added_mass());
     std::string rules;
     for (const collapse::Rule& rule : k.rules) rules += fmt::format("{} {}\n", rule.id, rule.value);
@@ -106,6 +109,7 @@ class Course {
   bool adds_much_mass() const;
   /// Empty: none was.
   std::string describe_added_mass() const;
+  void check_added_mass() const;
   void add_findings(record::Record& r) const;
 
  private:
@@ -349,6 +353,16 @@ class Course {
   Progress settle_;
   std::function<void(const fem::RelaxationSummary&)> on_relaxed_;
 };
+
+void Course::check_added_mass() const {
+  const double times = system_.added_mass() / mesh_.mesh.mass;
+  if (times < kAbsurdAddedMass) return;
+  throw InputError("E677",
+                   fmt::format("a scaled step of {:.3g} ms would add {:.2g} times the building's mass to it",
+                               1e3 * fe_.scaled_step, times),
+                   fmt::format("give one that adds a per cent or two; without any the mesh bears {:.3g} ms",
+                               1e3 * mesh_.mesh.critical_step));
+}
 
 bool Course::adds_much_mass() const { return system_.added_mass() > kMuchAddedMass * mesh_.mesh.mass; }
 

@@ -290,7 +290,7 @@ TEST_F(FarfieldReplay, GoesOnFromACheckpointAsIfNothingHadHappened) {
 
 TEST(Farfield, SaysWhenAddedMassMakesItAnotherBuilding) {
   const std::string text = with_duration(portal(), "20 ms");
-  for (const double step : {0.02e-3, 0.2e-3}) {
+  for (const double step : {0.02e-3, 0.04e-3}) {
     FeOptions fe = coarse();
     fe.scaled_step = step;
     std::string said;
@@ -305,6 +305,20 @@ TEST(Farfield, SaysWhenAddedMassMakesItAnotherBuilding) {
     EXPECT_EQ(f.text, said);
     EXPECT_EQ(f.status, record::Status::Warning) << said;
     EXPECT_THAT(said, testing::HasSubstr("another building"));
+  }
+}
+
+TEST(Farfield, RefusesAScaledStepThatAddsABuilding) {
+  for (const double step : {5e-3, 1e10}) {
+    FeOptions fe = coarse();
+    fe.scaled_step = step;
+    try {
+      (void)run_plan(read(with_duration(portal(), "20 ms")), rules(), {}, fe, {}, {});
+      ADD_FAILURE() << step;
+    } catch (const InputError& e) {
+      EXPECT_EQ(e.diagnostics()[0].code, "E677");
+      EXPECT_THAT(e.diagnostics()[0].help, testing::HasSubstr("the mesh bears 0.0"));
+    }
   }
 }
 
