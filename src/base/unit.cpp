@@ -34,6 +34,12 @@ constexpr Unit units[] = {
     {Dimension::Force, "N", unit::N},
     {Dimension::Force, "kN", unit::kN},
     {Dimension::Force, "MN", unit::MN},
+    {Dimension::AreaLoad, "kN/m2", unit::kPa},
+    {Dimension::AreaLoad, "N/m2", unit::Pa},
+    {Dimension::AreaLoad, "N/mm2", unit::MPa},
+    {Dimension::AreaLoad, "MN/m2", unit::MPa},
+    {Dimension::AreaLoad, "Pa", unit::Pa},
+    {Dimension::AreaLoad, "kPa", unit::kPa},
     {Dimension::Stress, "N/mm2", unit::MPa},
     {Dimension::Stress, "kN/cm2", 10 * unit::MPa},
     {Dimension::Stress, "N/m2", unit::Pa},
@@ -180,6 +186,8 @@ std::string name_of(Dimension dimension) {
       return "mass";
     case Dimension::Force:
       return "force";
+    case Dimension::AreaLoad:
+      return "area load";
     case Dimension::Stress:
       return "stress";
     case Dimension::Density:

@@ -27,6 +27,7 @@ enum class Dimension {
   Time,                // s
   Mass,                // kg
   Force,               // N
+  AreaLoad,            // N/m² (floors)
   Stress,              // Pa
   Density,             // kg/m³
   Energy,              // J

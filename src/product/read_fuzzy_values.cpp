@@ -55,6 +55,8 @@ FuzzyUnits fuzzy_units(Dimension d) {
       return {1, 1, "kg", "kg"};
     case Dimension::Force:
       return {1, unit::kN, "kN", "N"};
+    case Dimension::AreaLoad:
+      return {unit::MPa, unit::kPa, "kN/m2", "Pa"};
     case Dimension::Stress:
       return {unit::MPa, unit::MPa, "N/mm2", "Pa"};
     case Dimension::Density:

@@ -85,7 +85,7 @@ bool read_storeys(Reading& reading, TableReader& root) {
   plan.storey_loads.assign(plan.storey_heights.size(), 0);
   if (const Node* load = table.find("load")) {
     if (load->kind != Node::Kind::Array) {
-      const double weight = read_quantity(*load, "storeys: load", Dimension::Stress, loads, reading.complaints);
+      const double weight = read_quantity(*load, "storeys: load", Dimension::AreaLoad, loads, reading.complaints);
       plan.storey_loads.assign(plan.storey_heights.size(), calc_floor_mass(weight));
     } else if (load->items.size() != plan.storey_heights.size()) {
       if (!plan.storey_heights.empty())
@@ -96,7 +96,7 @@ bool read_storeys(Reading& reading, TableReader& root) {
     } else {
       for (size_t i = 0; i < load->items.size(); ++i)
         plan.storey_loads[i] = calc_floor_mass(
-            read_quantity(load->items[i], "storeys: load", Dimension::Stress, loads, reading.complaints));
+            read_quantity(load->items[i], "storeys: load", Dimension::AreaLoad, loads, reading.complaints));
     }
   }
   table.finish();

@@ -29,6 +29,8 @@ std::pair<const char*, double> usual_unit(Dimension dimension) {
       return {"kg", 1};
     case Dimension::Force:
       return {"kN", unit::kN};
+    case Dimension::AreaLoad:
+      return {"kN/m2", unit::kPa};
     case Dimension::Stress:
       return {"N/mm2", unit::MPa};
     case Dimension::Density:

@@ -40,6 +40,7 @@ ties.spacing = { triangular = ["15 cm", "20 cm", "25 cm"] }
 )toml");
   ASSERT_EQ(plan.fuzzy.inputs.size(), 9u);
   EXPECT_EQ(plan.fuzzy.inputs[3].path, "grid.rows.B");
+  EXPECT_EQ(text_of(plan.fuzzy.inputs[2], 1500), "load = 1.5 kN/m2");
   const PlanSampler sampler = make_sampler(plan);
   const Plan s = make_sample(sampler, std::vector<double>{0.45, 2.5, 1500, 5.05, 1.3, 0.02, -35, 28e-4, 0.18});
   EXPECT_EQ(s.ground.friction, 0.45);
