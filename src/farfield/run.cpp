@@ -109,6 +109,7 @@ class Course {
   bool adds_much_mass() const;
   /// Empty: none was.
   std::string describe_added_mass() const;
+  /// Throws E677.
   void check_added_mass() const;
   void add_findings(record::Record& r) const;
 
@@ -120,6 +121,7 @@ class Course {
     return o;
   }
   double time() const { return system_.time() + state_.offset; }
+  double added_share() const { return system_.added_mass() / mesh_.mesh.mass; }
   double calc_seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
   double frame_time(long long frame) const { return static_cast<double>(frame) * options_.frame_interval; }
 
@@ -355,23 +357,21 @@ class Course {
 };
 
 void Course::check_added_mass() const {
-  const double times = system_.added_mass() / mesh_.mesh.mass;
-  if (times < kAbsurdAddedMass) return;
+  if (added_share() < kAbsurdAddedMass) return;
   throw InputError("E677",
                    fmt::format("a scaled step of {:.3g} ms would add {:.2g} times the building's mass to it",
-                               1e3 * fe_.scaled_step, times),
+                               1e3 * fe_.scaled_step, added_share()),
                    fmt::format("give one that adds a per cent or two; without any the mesh bears {:.3g} ms",
                                1e3 * mesh_.mesh.critical_step));
 }
 
-bool Course::adds_much_mass() const { return system_.added_mass() > kMuchAddedMass * mesh_.mesh.mass; }
+bool Course::adds_much_mass() const { return added_share() > kMuchAddedMass; }
 
 std::string Course::describe_added_mass() const {
   if (!(system_.added_mass() > 0)) return "";
-  const std::string text =
-      fmt::format("{} elements got {:.2f} t more mass ({:.2g} % of all), so that they bear a step of {:.4f} ms.",
-                  system_.scaled_elements(), system_.added_mass() / unit::t,
-                  100 * system_.added_mass() / mesh_.mesh.mass, 1e3 * fe_.scaled_step);
+  const std::string text = fmt::format(
+      "{} elements got {:.2f} t more mass ({:.2g} % of all), so that they bear a step of {:.4f} ms.",
+      system_.scaled_elements(), system_.added_mass() / unit::t, 100 * added_share(), 1e3 * fe_.scaled_step);
   return adds_much_mass()
              ? text + " It has weight too: this is the answer of another building. Choose a shorter scaled step."
              : text;
