@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace topple::fem {
 
@@ -11,9 +12,15 @@ RelaxationSummary relax_system(ExplicitSystem::Inside& in, const RelaxationOptio
   ExplicitState& s = in.s;
   const size_t N = in.start.size();
   RelaxationSummary summary;
+  const auto field = [&](size_t element, size_t number) -> double& {
+    size_t lane = 0;
+    double* block = in.element_block(s, static_cast<int>(element), lane);
+    return block[number * in.chunks.W + lane];
+  };
 
-  // masses with which every element has the same critical step
-  std::vector<double> fictitious(N, 0);
+  // masses with which every element has the same critical step, and its bulk viscosity with them: without viscosity
+  // what opens and closes at each step swings ever more
+  std::vector<double> fictitious(N, 0), lengths(in.element_mass.size(), 0);
   constexpr double kShare = 0.85;  // of the critical step
   for (size_t e = 0; e < in.element_mass.size(); ++e) {
     if (s.contact.gone.size() > e && s.contact.gone[e] != 0) continue;
@@ -23,6 +30,8 @@ RelaxationSummary relax_system(ExplicitSystem::Inside& in, const RelaxationOptio
     const double density = in.element_mass[e] / volume / material.density;
     const double ratio = in.h / (kShare * calc_element_step(x, material, density));
     for (const std::uint32_t row : in.rows_of_element[e]) fictitious[row] += in.element_mass[e] / 8 * ratio * ratio;
+    double& length = field(e, kernel::kLength);
+    lengths[e] = length, length *= ratio / std::sqrt(density);
   }
   // the ground's springs go with real masses
   for (size_t row = 0; row < N; ++row) {
@@ -48,13 +57,14 @@ RelaxationSummary relax_system(ExplicitSystem::Inside& in, const RelaxationOptio
     for (size_t c = 0; c < 3; ++c) load2 += std::pow(in.loads[4 * size_t{row} + c], 2);
 
   kernel::StepJob step = in.make_step();
-  step.removes = false, step.linear = step.quadratic = 0, step.weighs = true;
+  step.removes = false, step.quadratic = 0, step.weighs = true;
   for (double& fall : step.fall) fall = 0;
   double last_kinetic = 0;
   bool rests = true;
   const long long steps = s.steps;
+  const bool bears_its_load = steps > 0;
   for (; summary.steps < options.most_steps && !progress.is_cancelled(); ++summary.steps) {
-    const double ramp = std::min(1.0, (summary.steps + 1.0) / std::max(1, options.ramp));
+    const double ramp = bears_its_load ? 1 : std::min(1.0, (summary.steps + 1.0) / std::max(1, options.ramp));
     in.clear_pushes(s);
     in.press_bars(s);
     in.press_grounds(s, false);
@@ -68,14 +78,21 @@ RelaxationSummary relax_system(ExplicitSystem::Inside& in, const RelaxationOptio
     const double half = ramp < 1 ? 0.05 : 0;
     step.keep = (1 - half) / (1 + half),
     step.kick = in.h / (1 + half) * (rests ? 0.5 : 1);  // leapfrog from rest begins with half a kick
-    rests = false;
+    const bool rested = std::exchange(rests, false);
     in.advance_nodes(step, s);
     s.grounded.clear();
     for (const auto& rows : in.grounded) s.grounded.insert(s.grounded.end(), rows.begin(), rows.end());
 
     double out2 = 0, kinetic = 0;
     for (const kernel::Balance& balance : in.balances) out2 += balance.force2, kinetic += balance.kinetic;
-    if (ramp >= 1 && kinetic < last_kinetic) {
+    summary.residual = std::sqrt(out2 / load2);
+    // at rest no viscosity hides what is out of balance
+    const bool is_balanced = ramp >= 1 && summary.residual < options.tolerance;
+    if (is_balanced && rested) {
+      summary.converged = true;
+      break;
+    }
+    if (is_balanced || (ramp >= 1 && kinetic < last_kinetic)) {
       // the mode that leads stands in its equilibrium: back to the places of the stresses, and stop
       for (const std::uint32_t row : live) {
         double* r = s.rows.data() + 8 * size_t{row};
@@ -86,14 +103,11 @@ RelaxationSummary relax_system(ExplicitSystem::Inside& in, const RelaxationOptio
       ++summary.stops;
     }
     last_kinetic = kinetic;
-    summary.residual = std::sqrt(out2 / load2);
-    if (ramp >= 1 && summary.residual < options.tolerance) {
-      summary.converged = true;
-      break;
-    }
     if (progress.report && summary.steps % 100 == 0) progress.report(summary.steps, options.most_steps);
   }
   s.steps = steps;
+  for (size_t e = 0; e < lengths.size(); ++e)
+    if (lengths[e] > 0) { field(e, kernel::kLength) = lengths[e], field(e, kernel::kViscous) = 0; }
   s.contact.pairs.clear(), s.contact.fresh = true, s.held.clear();  // of other places
   in.clear_pushes(s);
   for (const std::uint32_t row : live) {

@@ -124,14 +124,13 @@ TEST(ExplicitHingePhysics, ABeamYieldsAtItsPlasticMoment) {
       const RelaxationSummary summary = system.relax(relaxation);
       return std::pair(summary.converged, -system.p(tip[0]).z);
     };
-    // it stands below the plastic moment, with more than the elastic deflection, and not above
+    // it stands below the plastic moment, with more than the elastic deflection; above it comes down until it hangs
     const auto [stands, below] = deflection(0.93);
     EXPECT_TRUE(stands) << across;
     const double elastic = 0.93 * most * 8 / (3 * 30e9 * std::pow(0.2, 4) / 12);
     EXPECT_GT(below, elastic) << across;
-    const auto [stands_above, above] = deflection(1.10);
-    EXPECT_FALSE(stands_above) << across;
-    EXPECT_GT(above, 1.5 * below) << across;
+    EXPECT_LT(below, 1.6 * elastic) << across;
+    EXPECT_GT(deflection(1.10).second, 6 * elastic) << across;
   }
 }
 
