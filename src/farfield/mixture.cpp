@@ -112,6 +112,7 @@ void fill_law(fem::ExplicitMaterial& m, const Curve& curve, double eps_cr, doubl
     if (e > 0.999 * eps_u) break;
     const double s = std::max(curve(e), kLeast * peak);
     const double before = early * ((std::min(e, eps_y) - eps_cr) - (std::min(s, yielding) - cracking) / m.E);
+    if (e <= eps_y) m.crack_strain = std::max(before, 0.0);
     t.add(std::max(before, 0.0) + spread * std::max(0.0, e - eps_y), s, m.E);
   }
   m.tension_limit = std::max(t.strain.back(), spread * eps_u);
@@ -154,7 +155,7 @@ fem::ExplicitMaterial make_panel_material(const product::Plan& plan, const produ
   if (panel.concrete < 0) {
     m.E = panel.modulus;
     m.yield = {{0, 0.1e6, panel.strength}};
-    m.tension_limit = m.compression_limit = 0.01;
+    m.tension_limit = m.compression_limit = m.crack_strain = 0.01;
     return m;
   }
   const product::Concrete& concrete = plan.concretes[static_cast<size_t>(panel.concrete)];
@@ -173,6 +174,7 @@ fem::ExplicitMaterial make_panel_material(const product::Plan& plan, const produ
       if (!m.yield.empty() && e < m.yield.back().strain + 1e-9) continue;
       m.yield.push_back({e, std::max(held, kLeast) * concrete.fct, std::max(1 - e / crushed, kLeast) * concrete.fc});
     }
+    m.crack_strain = end;
     m.tension_limit = std::max(end, 0.01);  // what has cracked still bears when pushed
     m.compression_limit = std::max(crushed, 0.01);
     return m;

@@ -464,7 +464,8 @@ void Course::add_findings(record::Record& r) const {
 /// The elements crack within bays and panels, which the multibody model does not; what they lack is something else.
 void say_what_is_not_modelled(record::Record& r) {
   const std::string here =
-      "cracks that close again, slip and buckling of single bars (concrete and bars are one material)";
+      "cracks that close again after bars have yielded, slip and buckling of single bars (concrete and bars are one "
+      "material)";
   for (std::string& s : r.not_modelled)
     if (s.rfind("cracking of slabs", 0) == 0) s = here;
   std::string list;

@@ -29,6 +29,7 @@ kernel::Law make_law(const ExplicitMaterial& m) {
     law.compression[i] = y.compression - law.compression_slope[i] * y.strain;
   }
   law.tension_cutoff = m.tension_cutoff, law.compression_cutoff = m.compression_cutoff;
+  law.crack_strain = m.crack_strain;
   law.tension_rate = 1 / m.tension_limit, law.compression_rate = 1 / m.compression_limit;
   return law;
 }
@@ -101,6 +102,7 @@ ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
   loads.assign(4 * rows, 0);
   s.uses.assign(rows, 0);
   s.elements.assign(chunks.slots() * fields, 0);
+  s.cracks.assign(chunks.slots() * 3, 0);
   s.live.assign(chunks.slots() / W, 0);
   rows_of_element.resize(E);
   first_part_of_row.assign(rows, std::numeric_limits<int>::max());
@@ -220,6 +222,7 @@ void ExplicitSystem::Inside::advance_nodes(const kernel::StepJob& step, Explicit
     job.laws = laws.data(), job.law_of_block = chunks.material_of_block.data() + chunk.first_block;
     job.blocks = chunk.blocks;
     job.elements = state.elements.data() + chunk.first_block * W * kernel::kElementFields;
+    job.cracks = state.cracks.data() + chunk.first_block * W * 3;
     job.corners = chunks.corners.data() + chunk.first_block * 8 * W;
     job.joined = chunks.joined.data() + chunk.first_block;
     job.live = state.live.data() + chunk.first_block;

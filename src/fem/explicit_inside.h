@@ -89,6 +89,7 @@ struct ExplicitState {
   bool begins = true;                   // speeds have been set: what they strained before does not count
   AlignedVector<double> rows;           // kNodeFields a node
   AlignedVector<double> elements;       // kElementFields x W a block
+  AlignedVector<double> cracks;         // 3 x W a block
   std::vector<unsigned char> live;      // lanes of a block
   std::vector<std::uint8_t> flags;      // of rows
   AlignedVector<double> pushes;         // 4 a row, zero where not flagged

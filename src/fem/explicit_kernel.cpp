@@ -338,6 +338,64 @@ struct Amplitudes {
   V bending[6], twist[3], corner[3];
 };
 
+/// Axes ξ η ζ of a block's elements, one over their squares, mean stress.
+struct CrackedBlock {
+  V3 axis[3];
+  V per_square[3];
+  V xx, yy, zz, xy, yz, zx;
+};
+
+/// Cracks close and open on the line to the stress at which they opened, one axis after the other (eq. 12a).
+///   strain  plastic; cracks of elements where it is 0 or beyond the law's stay as they are
+/// Returns the work done on them over the volume, negative as they close.
+HWY_NOINLINE V adapt_cracks(const Law& law, V strain, CrackedBlock& block, double* HWY_RESTRICT cracks) {
+  const D d;
+  const V zero = hn::Zero(d), stiffness = num(law.lambda + 2 * law.mu);
+  const auto adapts = hn::And(hn::Gt(strain, zero), hn::Lt(strain, num(law.crack_strain)));
+  const V per = hn::Div(strain, fma(stiffness, strain, find_yield(law, strain).tension));
+  V stress[3], along[3], all = zero, work = zero;
+  for (int i = 0; i < 3; ++i) {
+    const V3& n = block.axis[i];
+    const V3 on{fma(block.xx, n.x, fma(block.xy, n.y, mul(block.zx, n.z))),
+                fma(block.xy, n.x, fma(block.yy, n.y, mul(block.yz, n.z))),
+                fma(block.zx, n.x, fma(block.yz, n.y, mul(block.zz, n.z)))};
+    stress[i] = mul(block.per_square[i], dot(n, on));
+  }
+  for (int i = 0; i < 3; ++i) {
+    const V was = load_field(cracks, i), loaded = fma(num(law.lambda), all, stress[i]);
+    const V open = hn::Min(strain, hn::Max(zero, mul(per, fma(stiffness, was, loaded))));
+    const V closed = hn::IfThenElseZero(adapts, sub(was, open));
+    store_field(sub(was, closed), cracks, i);
+    all = add(all, closed);
+    work = fnma(closed, fma(stiffness, closed, loaded), work);
+    along[i] = mul(block.per_square[i], mul(num(2 * law.mu), closed));
+  }
+  const V even = mul(num(law.lambda), all);
+  block.xx = add(block.xx, even), block.yy = add(block.yy, even), block.zz = add(block.zz, even);
+  for (int i = 0; i < 3; ++i) {
+    const V3& n = block.axis[i];
+    const V3 a = scale(along[i], n);
+    block.xx = fma(a.x, n.x, block.xx), block.yy = fma(a.y, n.y, block.yy), block.zz = fma(a.z, n.z, block.zz);
+    block.xy = fma(a.x, n.y, block.xy), block.yz = fma(a.y, n.z, block.yz), block.zx = fma(a.z, n.x, block.zx);
+  }
+  return work;
+}
+
+/// What is pulled apart as a block flows opens its cracks.
+///   deviator  along ξ η ζ before it flowed, of which `keep` is left
+///   swelling  plastic, of the volume; w of (eq. 12)
+HWY_NOINLINE void open_cracks(const Law& law, const V* deviator, V keep, V mean, V swelling, V w,
+                              double* HWY_RESTRICT cracks) {
+  const V zero = hn::Zero(D()), tensile = sub(num(1), w);
+  const V sheared = mul(mul(tensile, sub(num(1), keep)), num(0.5 / law.mu));
+  const V swollen = mul(tensile, mul(num(1.0 / 3), swelling));
+  for (int i = 0; i < 3; ++i) {
+    const auto pulled = hn::Gt(fma(deviator[i], keep, mean), zero);
+    const V opening = hn::IfThenElseZero(pulled, hn::Max(zero, fma(deviator[i], sheared, swollen)));
+    store_field(add(load_field(cracks, i), opening), cracks, i);
+  }
+}
+
 /// Values at the corners of a face of which parts with 1 ξ η ξη are given.
 HWY_INLINE void spread(const Quad& m, V* HWY_RESTRICT n) {
   const V l = sub(m.one, m.y), u = add(m.one, m.y), lx = sub(m.x, m.xy), ux = add(m.x, m.xy);
@@ -375,6 +433,7 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
   const std::uint16_t* corners = job.corners + block * 8 * kLanes;
   const std::uint16_t* next_corners = job.corners + next * 8 * kLanes;
   const double* HWY_RESTRICT rows = job.own_nodes;
+  double* HWY_RESTRICT cracks = job.cracks + block * 3 * kLanes;
   double* HWY_RESTRICT element = job.elements + block * static_cast<size_t>(kElementFields) * kLanes;
   const V zero = hn::Zero(d);
 
@@ -430,6 +489,16 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
   Amplitudes s;
   Capacity cap;
   const bool yields = law.points > 0;
+  if (law.crack_strain > 0) {
+    const V strain = load_field(element, kStrain);
+    if (HWY_UNLIKELY(!hn::AllFalse(d, hn::And(hn::Gt(strain, zero), hn::Lt(strain, num(law.crack_strain)))))) {
+      // copies, so that what is called here keeps nothing of the block in memory
+      CrackedBlock cracked{{x.a, x.b, x.c}, {ia, ib, ic}, sxx, syy, szz, sxy, syz, szx};
+      const V work = adapt_cracks(law, hn::IfThenElseZero(live, strain), cracked, cracks);
+      sxx = cracked.xx, syy = cracked.yy, szz = cracked.zz, sxy = cracked.xy, syz = cracked.yz, szx = cracked.zx;
+      sums.mean = fma(mul(num(1.0 / 64), g.volume), work, sums.mean);
+    }
+  }
   {
     const auto beyond = [&](const V3& vm, const V3& xm) HWY_ATTR {
       const auto component = [&](V motion, const V3& l)
@@ -533,6 +602,10 @@ HWY_INLINE void advance_block(const StepJob& step, const ChunkJob& job, size_t b
         const V damage = fma(more, wear, load_field(element, kDamage));
         store_field(strain, element, kStrain);
         store_field(damage, element, kDamage);
+        if (law.crack_strain > 0) {
+          const V deviator[3] = {daa, dbb, dcc};
+          open_cracks(law, deviator, keep, mean, swelling, w, cracks);
+        }
         const auto gone = hn::And(live, hn::Ge(damage, num(1)));
         if (HWY_UNLIKELY(step.removes && !hn::AllFalse(d, gone))) {
           HWY_ALIGN double pressed[kLanes], lane_damage[kLanes], lane_mass[kLanes];

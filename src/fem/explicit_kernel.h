@@ -52,6 +52,7 @@ struct Law {
   double tension[kMostYieldPoints]{}, tension_slope[kMostYieldPoints]{};  // value at strain 0 and slope of the line
   double compression[kMostYieldPoints]{}, compression_slope[kMostYieldPoints]{};
   double tension_cutoff = 0, compression_cutoff = 0;  // largest mean stress over the yield stress
+  double crack_strain = 0;                            // cracks close where the plastic strain is below it
   double tension_rate = 0, compression_rate = 0;      // damage for plastic strain
   // of a step: times StepJob::past (set_step)
   double step_lambda = 0, step_mu = 0, step_E = 0, step_bending = 0, step_bending_nu = 0;  // [Pa s]
@@ -83,6 +84,7 @@ struct ChunkJob {
   const std::uint16_t* law_of_block = nullptr;  // into them
   size_t blocks = 0;
   double* elements = nullptr;                   // kElementFields a block
+  double* cracks = nullptr;                     // strains of open cracks along ξ η ζ, read where there are some
   const std::uint16_t* corners = nullptr;       // 8 a block of W lanes: kNodeFields times the node's place
   const std::uint8_t* joined = nullptr;         // of blocks: faces ζ = -1 are those ζ = +1 of the block before
   const unsigned char* live = nullptr;          // bits of the lanes of a block

@@ -53,6 +53,7 @@ void check_material(const ExplicitMaterial& m, size_t index, std::vector<Diagnos
   if (!(m.nu > -1 && m.nu < 0.5)) complain(fmt::format("nu {} is outside of -1 to 0.5", m.nu));
   if (!(m.tension_limit > 0 && m.compression_limit > 0)) complain("plastic strains of removal must be positive");
   if (!(m.tension_cutoff > 0)) complain("tension_cutoff must be positive");
+  if (!(m.crack_strain >= 0)) complain("crack_strain must not be negative");
   if (!(m.compression_cutoff > 0)) complain("compression_cutoff must be positive");
   if (m.yield.size() > kMostYieldPoints)
     complain(fmt::format("{} yield points; at most {}", m.yield.size(), kMostYieldPoints));

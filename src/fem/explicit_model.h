@@ -22,7 +22,7 @@ struct YieldPoint {
 };
 
 /// Isotropic elastic-plastic: von Mises whose yield stress goes linearly with the pressure from the tensile one at
-/// -tension/3 to the compressive one at compression/3 (of the first yield point), eq. 12 there.
+/// -tension/3 to the compressive one at compression/3, eq. 12 there.
 struct ExplicitMaterial {
   std::string name;
   double density = 0;  // [kg/m³]
@@ -32,6 +32,9 @@ struct ExplicitMaterial {
   /// Largest mean tension over the tensile yield stress, largest pressure over the compressive one; infinite: none.
   double tension_cutoff = std::numeric_limits<double>::infinity();
   double compression_cutoff = std::numeric_limits<double>::infinity();
+  /// Plastic strain below which cracks close and open again, on the line to the stress at which they opened (eq. 12a
+  /// there); what is pulled apart beyond it stays so. 0: no crack closes.
+  double crack_strain = 0;
   /// Plastic strains at which an element goes, in pure tension and in pure compression; infinite: never.
   double tension_limit = std::numeric_limits<double>::infinity();
   double compression_limit = std::numeric_limits<double>::infinity();

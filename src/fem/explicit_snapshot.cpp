@@ -9,7 +9,7 @@ namespace topple::fem {
 
 namespace {
 
-constexpr std::uint64_t kMark = 0x7470'6578'0000'000f;  // name and version of the layout
+constexpr std::uint64_t kMark = 0x7470'6578'0000'0010;  // name and version of the layout
 
 class Writer {
  public:
@@ -63,8 +63,8 @@ class Reader {
 /// One list of members for writing and reading.
 template <class Archive, class State>
 void pass_state(Archive& archive, State& s) {
-  archive.value(s.steps), archive.value(s.begins), archive.list(s.rows), archive.list(s.elements), archive.list(s.live),
-      archive.list(s.flags);
+  archive.value(s.steps), archive.value(s.begins), archive.list(s.rows), archive.list(s.elements),
+      archive.list(s.cracks), archive.list(s.live), archive.list(s.flags);
   archive.list(s.pushes), archive.list(s.pushed), archive.list(s.grounded), archive.list(s.uses), archive.value(s.sums);
   archive.list(s.particles), archive.list(s.particle_pushes), archive.list(s.particle_makes);
   archive.list(s.touches), archive.value(s.ground_touching), archive.value(s.ground_work),
@@ -130,8 +130,8 @@ void ExplicitSystem::read_snapshot(std::span<const std::byte> bytes) {
   bool started = false;
   from.list(start), from.value(start_energy), from.value(started);
   if (!from.is_empty() || start.size() != in.start.size() || s.rows.size() != in.s.rows.size() ||
-      s.elements.size() != in.s.elements.size() || s.bars.size() != in.s.bars.size() ||
-      s.releases.size() != in.s.releases.size())
+      s.elements.size() != in.s.elements.size() || s.cracks.size() != in.s.cracks.size() ||
+      s.bars.size() != in.s.bars.size() || s.releases.size() != in.s.releases.size())
     Reader::fail();
   in.contact_faces.clear();  // of another state
   in.s = std::move(s), in.start = std::move(start), in.start_energy = start_energy, in.started = started;

@@ -213,14 +213,15 @@ ExplicitSystem::Resultant ExplicitSystem::calc_resultant(std::span<const int> el
     const std::span<const int> these =
         std::span<const int>(chosen).subspan(first, std::min(kMost, chosen.size() - first));
     std::map<int, size_t> place;
-    AlignedVector<double> rows, state;
+    AlignedVector<double> rows, state, cracks;
     std::vector<std::uint16_t> corners, laws;
     std::vector<unsigned char> live;
     for (size_t i = 0; i < these.size();) {
       const int material = material_of(these[i]);
       laws.push_back(static_cast<std::uint16_t>(material)), live.push_back(0);
       const size_t block = laws.size() - 1;
-      state.resize((block + 1) * fields * W, 0), corners.resize((block + 1) * 8 * W);
+      state.resize((block + 1) * fields * W, 0), corners.resize((block + 1) * 8 * W),
+          cracks.resize(laws.size() * 3 * W, 0);
       const size_t begin = i;
       for (size_t lane = 0; lane < W; ++lane) {
         const bool is_used = i < these.size() && material_of(these[i]) == material;
@@ -229,6 +230,8 @@ ExplicitSystem::Resultant ExplicitSystem::calc_resultant(std::span<const int> el
         const double* from = in.element_block(in.s, static_cast<int>(e), from_lane);
         if (is_used) live[block] = static_cast<unsigned char>(live[block] | (1U << lane));
         for (size_t f = 0; is_used && f < fields; ++f) state[(block * fields + f) * W + lane] = from[f * W + from_lane];
+        const double* open = in.s.cracks.data() + in.chunks.slot_of_element[e] / W * 3 * W + from_lane;
+        for (size_t f = 0; is_used && f < 3; ++f) cracks[(block * 3 + f) * W + lane] = open[f * W];
         for (size_t k = 0; k < 8; ++k) {
           const int node = in.model.elements[e].node[k];
           const auto [at, is_new] = place.emplace(node, place.size());
@@ -248,7 +251,8 @@ ExplicitSystem::Resultant ExplicitSystem::calc_resultant(std::span<const int> el
     std::vector<std::uint32_t> failed, grounded;
     kernel::ChunkJob job;
     job.laws = in.laws.data(), job.law_of_block = laws.data(), job.blocks = laws.size();
-    job.elements = state.data(), job.corners = corners.data(), job.joined = joined.data(), job.live = live.data();
+    job.elements = state.data(), job.cracks = cracks.data(), job.corners = corners.data(), job.joined = joined.data(),
+    job.live = live.data();
     job.own = count, job.own_nodes = rows.data(), job.own_flags = flags.data(), job.own_pushes = pushes.data();
     job.forces = forces.data(), job.failed = &failed, job.grounded = &grounded;
     double none = 0;

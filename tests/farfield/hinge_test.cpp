@@ -18,15 +18,16 @@ struct Turned {
   double moment = 0, elongation = 0;  // [N·m], at the centre [m]
 };
 
-/// Two layers of 25 cm of the storehouse's ground column, 2 x 2 across, foot held, under a rigid head of 32 m that
-/// carries N and turns at 0.6 rad/s: the mean moment at the foot between two rotations, the elongation at the second.
-Turned turn(double N, double from, double to) {
+/// Two layers of 25 cm of the storehouse's ground column, so many elements across both ways, foot held, under a rigid
+/// head of 32 m that carries N and turns at 0.6 rad/s: the mean moment at the foot between two rotations, the
+/// elongation at the second.
+Turned turn(double N, double from, double to, int across) {
   const nearfield::ZoneInput in = collapse::make_zone_I();
   const double edge = 0.25, high = 2 * edge, rate = 0.6, hinge = 0.5 * edge;
   fem::ExplicitModel model;
   model.gravity = {};
-  const std::vector<double> y{-edge, 0, edge};
-  std::vector<double> x;
+  std::vector<double> x, y;
+  for (int i = 0; i <= across; ++i) y.push_back(-edge + 2 * edge * i / across);
   for (int i = -8; i < 0; ++i) x.push_back(-edge + 2 * i);
   x.insert(x.end(), y.begin(), y.end());
   for (int i = 1; i <= 8; ++i) x.push_back(edge + 2 * i);
@@ -64,8 +65,9 @@ Turned turn(double N, double from, double to) {
     if (p.z > hinge) speed[n] = {rate * (p.z - hinge), 0, -rate * p.x};
     if (p.z != high || std::abs(p.x) > edge) continue;
     top.push_back(static_cast<int>(n));
-    if (p.y == 0 && p.x != 0) sides[p.x > 0] = static_cast<int>(n);
-    const double share = (p.x == 0 ? 2 : 1) * (p.y == 0 ? 2 : 1) / 16.0;
+    const auto is_inside = [&](double at) { return std::abs(at) < (1 - 1e-9) * edge; };
+    if (is_inside(p.y) && !is_inside(p.x)) sides[p.x > 0] = static_cast<int>(n);
+    const double share = (is_inside(p.x) ? 2 : 1) * (is_inside(p.y) ? 2 : 1) / (4.0 * across * across);
     model.forces.push_back({static_cast<int>(n), {0, 0, -N * share}});
   }
   fem::ExplicitSystem system(model, {});
@@ -92,15 +94,16 @@ Turned turn(double N, double from, double to) {
 
 // Fibres: zone of 39 cm, of which `topple rcc examples/rcc/zone_I.toml` gives the moments. Where elements that are held
 // sideways bear what pressure they like they have 0.19 MNm more under 2.6 MN at 14 mrad.
-TEST(HingePhysics, OfTwoElementsAcrossBearsAndShortensAsItsFibres) {
+TEST(HingePhysics, OfTwoOrThreeElementsAcrossBearsAndShortensAsItsFibres) {
   struct Point {
     double N, rotation, moment, elongation;
+    int across = 2;
   };
   for (const Point& p : {Point{2.6 * MN, 0.004, 0.70 * MN, 0.1e-3}, Point{2.6 * MN, 0.008, 0.58 * MN, -0.2e-3},
                          Point{2.6 * MN, 0.014, 0.33 * MN, -1.4e-3}, Point{2.6 * MN, 0.03, 0.08 * MN, -5.2e-3},
                          Point{1.0 * MN, 0.008, 0.63 * MN, 0.6e-3}, Point{1.0 * MN, 0.014, 0.56 * MN, 0.6e-3},
-                         Point{1.0 * MN, 0.03, 0.43 * MN, -0.2e-3}}) {
-    const Turned found = turn(p.N, 0.9 * p.rotation, 1.1 * p.rotation);
+                         Point{1.0 * MN, 0.03, 0.43 * MN, -0.2e-3, 3}}) {
+    const Turned found = turn(p.N, 0.9 * p.rotation, 1.1 * p.rotation, p.across);
     EXPECT_NEAR(found.moment, p.moment, 0.1 * MN) << p.N << " N, " << p.rotation;
     EXPECT_NEAR(found.elongation, p.elongation, 0.6e-3 + 0.2 * std::abs(p.elongation)) << p.N << " N, " << p.rotation;
   }
