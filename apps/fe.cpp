@@ -102,9 +102,15 @@ int run_finite_elements(const Arguments& a, const std::atomic<bool>& cancel) {
       std::fprintf(out, "%s\n", s.text.c_str());
       std::fflush(out);
     };
+    fem::ExplicitSystem::Timing timing;
+    fe_callbacks.on_timing = [&](const fem::ExplicitSystem::Timing& t) { timing = t; };
     const record::Record r = farfield::run_plan(plan, knowledge, options, fe, callbacks, fe_callbacks);
     progress.clear();
     const int code = close_run(r, a, out, {});
+    const double elements = timing.kernel + timing.boundary, contact = timing.contact + timing.search;
+    if (elements > 0)
+      std::fprintf(out, "Elements and nodes took %.1f s, contact and debris %.1f s: %.2f of that.\n", elements, contact,
+                   contact / elements);
     if (r.ending == "cancelled" && !fe.checkpoint.empty())
       std::fprintf(out, "Go on with: topple fe %s%s -o %s --resume\n", a.input.c_str(), write_options(a).c_str(),
                    a.output.c_str());

@@ -10,7 +10,7 @@ namespace topple::farfield {
 
 namespace {
 
-constexpr char kMagic[] = "topple-fe-checkpoint-1";
+constexpr char kMagic[] = "topple-fe-checkpoint-2";
 
 class Writer {
  public:
@@ -105,7 +105,7 @@ template <class Io, class State>
 void pass_state(Io& io, State& s) {
   io(s.next_frame), io(s.offset), io(s.quiet_since), io(s.swings_since), io(s.next_firing), io(s.zone_state),
       io(s.has_touched);
-  io(s.skipped), io(s.relaxation.converged), io(s.relaxation.steps), io(s.relaxation.residual);
+  io(s.skipped), io(s.unsettled), io(s.relaxation.converged), io(s.relaxation.steps), io(s.relaxation.residual);
   io(s.relaxation.settlement), io(s.relaxation.text), io(s.ledger), io(s.energy_error), io(s.released), io(s.wall_time);
   io(s.has_fragments), io(s.fragments_time), io(s.fragments.damaged_strain), io(s.fragments.reach);
   io(s.fragments.zones), io(s.fragments.fragments);

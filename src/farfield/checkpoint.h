@@ -12,6 +12,14 @@
 
 namespace topple::farfield {
 
+/// A wait that was not passed over.
+struct UnsettledWait {
+  size_t firing = 0;    // number in the schedule of the one that was waited for
+  double time = 0;      // when it was tried [s]
+  double residual = 0;  // out-of-balance over load after the last step of the relaxation
+  long long steps = 0;  // of it
+};
+
 /// Everything that changes while a run goes on, beside the elements' state.
 struct RunState {
   std::vector<std::variant<mbs::View, mbs::Happening>> shown;  // in the order in which they were shown
@@ -24,6 +32,7 @@ struct RunState {
   std::vector<unsigned char> has_touched;                      // (bodies)
   std::vector<std::array<double, 3>> skipped;                  // quiet waits passed over, from and to [s], and how far
                                                                // the building settled in them [m]
+  std::vector<UnsettledWait> unsettled;
   fem::RelaxationSummary relaxation;
   mbs::Energy ledger;          // what the record holds beyond the elements' own ledger since they were settled last [J]
   double energy_error = 0;     // largest residual [J]

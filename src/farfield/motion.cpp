@@ -82,28 +82,25 @@ mbs::View Motion::calc_view(const fem::ExplicitSystem& system, double time) cons
         mass += share;
       }
     }
-    Pose X = start;
-    Vec3 velocity, spin;
-    if (mass > 0) {
-      const PointFit fit = fit_points(points);
-      X = {fit.after + to_matrix(fit.rotation) * (start.p - fit.before), fit.rotation * start.q};
-      velocity = (1 / mass) * momentum;
-    } else if (!debris[b].empty()) {
-      Vec3 before, after;
-      double m = 0;
-      for (const fem::DebrisParticle* d : debris[b]) {
-        m += d->mass;
-        before += d->mass * centre_[static_cast<size_t>(d->element)];
-        after += d->mass * d->p;
-        velocity += d->mass * d->v;
-      }
-      X.p += (1 / m) * (after - before);
-      velocity *= 1 / m;
+    // the rotation of what holds together; the place of all that was not taken away
+    PointFit fit = fit_points(points);
+    fit.before *= mass, fit.after *= mass;
+    for (const fem::DebrisParticle* d : debris[b]) {
+      fit.before += d->mass * centre_[static_cast<size_t>(d->element)];
+      fit.after += d->mass * d->p;
+      momentum += d->mass * d->v;
+      mass += d->mass;
     }
-    for (const fem::DebrisParticle* d : debris[b]) mass += d->mass;
+    Pose X = start;
+    Vec3 velocity;
+    if (mass > 0) {
+      const Vec3 before = (1 / mass) * fit.before, after = (1 / mass) * fit.after;
+      X = {after + to_matrix(fit.rotation) * (start.p - before), fit.rotation * start.q};
+      velocity = (1 / mass) * momentum;
+    }
     v.X_WB.push_back(X);
     v.v_WB.push_back(velocity);
-    v.w_WB.push_back(spin);
+    v.w_WB.emplace_back();
     v.mass.push_back(mass);
   }
 

@@ -18,8 +18,8 @@ class Motion {
  public:
   Motion(const Whole&, const mbs::Model&, const collapse::ModelMap&, double size);
 
-  /// The manager's bodies where least squares put the mass of their elements (a body without elements goes with its
-  /// debris, without debris it stays), its zones by what their elements have come through, the ledger of energies.
+  /// The manager's bodies with the mass centre of their elements and debris, turned as least squares turn the elements
+  /// (without any, not at all); its zones by what their elements have come through, the ledger of energies.
   ///   time  of the plan [s]
   mbs::View calc_view(const fem::ExplicitSystem&, double time) const;
   /// Vertical force of the ground on each foot, upwards [N]. (feet)

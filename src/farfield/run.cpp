@@ -26,6 +26,10 @@ using record::Status;
 /// 3 cm at half a hertz.
 constexpr double kSwing = 5;
 
+/// Out-of-balance over load to which a wait is settled: twice that of the dead load, and far less than the swing that
+/// is passed over.
+constexpr double kSettled = 2e-3;
+
 /// Accepted difference between reactions and weight: what a thousandth out of balance at every node adds up to.
 constexpr double kReaction = 0.01;
 
@@ -65,6 +69,7 @@ class Course {
     state_.zone_state.assign(model.elements.size() + model.rotational_elements.size(), 0);
     state_.has_touched.assign(model.bodies.size(), 0);
     on_relaxed_ = callbacks.on_relaxed;
+    on_timing_ = callbacks.on_timing;
     settle_.cancel = options_.progress.cancel;
     if (callbacks.on_settling)
       settle_.report = [call = callbacks.on_settling](double steps, double) { call(static_cast<int>(steps)); };
@@ -99,10 +104,9 @@ class Course {
     s.steps = static_cast<long>(system_.steps());
     s.shortest_step = system_.step();
     s.energy_error = state_.released > 0 ? state_.energy_error / state_.released : 0;
-    s.message = s.ending == mbs::Summary::Ending::Diverged ? "positions are no longer finite"
-                : message_.empty()                         ? s.message
-                                                           : message_;
+    if (s.ending == mbs::Summary::Ending::Diverged) s.message = "positions are no longer finite";
     s.wall_time = state_.wall_time + calc_seconds();
+    if (on_timing_) on_timing_(system_.timing());
     return s;
   }
 
@@ -155,7 +159,10 @@ class Course {
       if (until >= options_.duration) return Ending::TimeLimit;
       if (firing <= until) fire(schedule_[state_.next_firing++]);
       if (is_at_rest()) return Ending::AtRest;
-      if (!skip_quiet()) return options_.progress.is_cancelled() ? Ending::Cancelled : Ending::NoEquilibrium;
+      if (!skip_quiet()) {
+        keep();
+        return Ending::Cancelled;
+      }
       const bool due = std::chrono::duration<double>(Clock::now() - kept).count() >= fe_.checkpoint_interval;
       if (due) keep(), kept = Clock::now();
     }
@@ -273,19 +280,26 @@ class Course {
   }
 
   /// What only swings about where it stands comes to rest in the wait before the next charge: it is settled without
-  /// motion, and the plan's clock put forward to two frames before the charge.
+  /// motion, and the plan's clock put forward to two frames before the charge. What finds no equilibrium so is followed
+  /// in time. False: cancelled.
   [[nodiscard]] bool skip_quiet() {
     if (!fe_.skip_quiet || state_.next_firing == schedule_.size() || state_.swings_since < 0) return true;
     if (time() - state_.swings_since < k_.rest_time) return true;
     const long long to =
         static_cast<long long>(std::floor(schedule_[state_.next_firing].time / options_.frame_interval)) - 2;
     if (to <= state_.next_frame) return true;
+    if (!state_.unsettled.empty() && state_.unsettled.back().firing == state_.next_firing) return true;
     mbs::Energy before = motion_.calc_view(system_, time()).energy;
     add_ledger(before);
-    const fem::RelaxationSummary relaxed = system_.relax({}, settle_);
+    const std::vector<std::byte> swinging = system_.write_snapshot();
+    fem::RelaxationOptions settling;
+    settling.tolerance = kSettled;
+    const fem::RelaxationSummary relaxed = system_.relax(settling, settle_);
     if (!relaxed.converged) {
-      message_ = relaxed.text;
-      return false;
+      system_.read_snapshot(swinging);
+      if (options_.progress.is_cancelled()) return false;
+      state_.unsettled.push_back({state_.next_firing, time(), relaxed.residual, relaxed.steps});
+      return true;
     }
     state_.ledger = {};
     const mbs::Energy after = motion_.calc_view(system_, time()).energy;
@@ -347,13 +361,14 @@ class Course {
   MeshReport mesh_;
   fem::ExplicitSystem system_;
   Motion motion_;
-  std::string key_, message_;
+  std::string key_;
   std::vector<collapse::Firing> schedule_;
   double last_firing_ = 0;
   RunState state_;
   Clock::time_point start_;
   Progress settle_;
   std::function<void(const fem::RelaxationSummary&)> on_relaxed_;
+  std::function<void(const fem::ExplicitSystem::Timing&)> on_timing_;
 };
 
 void Course::check_added_mass() const {
@@ -424,6 +439,13 @@ void Course::add_findings(record::Record& r) const {
                     "clock was put forward to {:.2f} s; it stands within {:.1f} mm of where it was built.",
                     s[0], s[1], 1e3 * s[2]),
         s[1] - s[0], "s", Status::Info);
+  for (size_t i = 0; i < state_.unsettled.size(); ++i)
+    add(fmt::format("farfield.unsettled.{}", i + 1), "Wait followed in time",
+        fmt::format(
+            "At {:.2f} s the building seemed to swing about where it stands, but found no equilibrium there: {:.1e} "
+            "of the load was out of balance after {} steps without motion. The wait was not passed over.",
+            state_.unsettled[i].time, state_.unsettled[i].residual, state_.unsettled[i].steps),
+        kNone, "", Status::Warning);
   for (size_t i = 0; i < whole_.notes.size(); ++i)
     add(fmt::format("farfield.note.{}", i + 1), "Left out", whole_.notes[i], kNone, "", Status::Warning);
 

@@ -42,6 +42,7 @@ RelaxationSummary relax_system(ExplicitSystem::Inside& in, const RelaxationOptio
       if (dot(g.normal, Vec3{r[0], r[1], r[2]} - g.point) < 1e-2) fictitious[row] = std::max(fictitious[row], mass);
   }
   std::vector<std::uint32_t> live;
+  std::vector<Vec3> begin;  // of those
   double load2 = 0;
   const double g2 = dot(in.model.gravity, in.model.gravity);
   for (size_t row = 0; row < N; ++row) {
@@ -50,6 +51,7 @@ RelaxationSummary relax_system(ExplicitSystem::Inside& in, const RelaxationOptio
     const double mass = r[kernel::kNodeMass];
     if (!(mass > 0)) continue;
     live.push_back(static_cast<std::uint32_t>(row));
+    begin.push_back({r[0], r[1], r[2]});
     r[kernel::kInverseMass] = 1 / fictitious[row];
     load2 += mass * mass * g2;
   }
@@ -103,7 +105,15 @@ RelaxationSummary relax_system(ExplicitSystem::Inside& in, const RelaxationOptio
       ++summary.stops;
     }
     last_kinetic = kinetic;
-    if (progress.report && summary.steps % 100 == 0) progress.report(summary.steps, options.most_steps);
+    if (summary.steps % 100 != 0) continue;
+    if (progress.report) progress.report(summary.steps, options.most_steps);
+    const auto has_left = [&](size_t i) {
+      const double* r = s.rows.data() + 8 * size_t{live[i]};
+      return norm(Vec3{r[0], r[1], r[2]} - begin[i]) > options.most_settlement;
+    };
+    bool leaves = false;
+    for (size_t i = 0; i < live.size() && !leaves; ++i) leaves = has_left(i);
+    if (leaves) break;
   }
   s.steps = steps;
   for (size_t e = 0; e < lengths.size(); ++e)

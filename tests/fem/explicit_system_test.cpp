@@ -172,6 +172,17 @@ TEST(ExplicitCantileverPhysics, RelaxesToTheDeflectionOfABeam) {
   }
 }
 
+TEST(ExplicitCantileverPhysics, GivesUpWhatFalls) {
+  ExplicitModel model = make_cantilever(20, 1);
+  model.supports.clear();
+  ExplicitSystem system(model, {});
+  const RelaxationSummary summary = system.relax({});
+  EXPECT_FALSE(summary.converged);
+  EXPECT_LT(summary.steps, RelaxationOptions{}.most_steps);
+  EXPECT_NEAR(summary.settlement, RelaxationOptions{}.most_settlement, 0.1);  // looked at now and then
+  EXPECT_NE(summary.text.find("not in equilibrium"), std::string::npos) << summary.text;
+}
+
 TEST(ExplicitCantileverPhysics, SwingsAtTheFrequencyOfABeam) {
   const ExplicitModel model = make_cantilever(40, 2);
   ExplicitOptions options;
