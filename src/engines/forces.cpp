@@ -443,6 +443,9 @@ bool Forces::advance(double time, const Motion& motion, const std::vector<Vec3>&
     if (r.axial_element.is_valid() && h > 0) {
       Zone& along = zone_[static_cast<size_t>(r.axial_element.index)];
       mbs::elongate_zone(along.parameters, z.state.axial - elongated, along.state);
+      if (z.state.live && z.state.station[0].reached > 0)
+        along.state.hinge_bears =
+            std::min(along.state.hinge_bears, mbs::calc_bearing(z.parameters, laws_, time, z.state));
     }
     if (!z.state.live) continue;
     const Vec3 torque = z.state.resultant.c[5] * axis_of(motion, r.joint);

@@ -387,6 +387,20 @@ void System::elongate_element(size_t e, double by) {
   l.set(slot, kMostForce, -1);
 }
 
+void System::limit_element(size_t e, double compression) {
+  ZoneState& z = state.element[e];
+  if (!z.live || !(compression < z.hinge_bears)) return;
+  z.hinge_bears = compression;
+  z.safe_force[0] = std::max(z.safe_force[0], -compression);
+  const size_t slot = slot_of(e);
+  if (slot == Lanes::kNoSlot) return;
+  Lanes& l = *lanes;
+  if (l.field(slot, kFlows) > 0)
+    l.flow(slot, kTurnedHinge) = compression;
+  else if (l.field(slot, kLeastForce) < -compression)
+    l.set(slot, kLeastForce, -compression);
+}
+
 void System::evaluate_outside(size_t slot) {
   const size_t e = lanes->is_batch ? slot / lanes->W : lanes->element_of[slot];
   unpack_element(e);

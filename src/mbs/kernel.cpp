@@ -276,7 +276,7 @@ struct Pressing {
     const auto calc_limit = [&](N at, N& left) {
       const N curve = fma(load<D>(flow, kCurveSlope), at - load<D>(flow, kCurveFrom), load<D>(flow, kCurveForce));
       left = fma(load<D>(flow, kWholePerForce), curve, load<D>(flow, kWhole));
-      return minimum(curve, fma(part * capacity, left - num<D>(1), capacity));
+      return minimum(minimum(curve, fma(part * capacity, left - num<D>(1), capacity)), load<D>(flow, kTurnedHinge));
     };
     const N limit = calc_limit(shortened, whole), over = (zero - trial) - limit;
     flows = hn::And(hn::Gt(over.v, zero.v), hn::Lt(trial.v, zero.v));

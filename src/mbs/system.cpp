@@ -338,7 +338,7 @@ void System::evaluate_rotationals(double h) {
       d.c[5] = js.angle;
     }
     const ZoneParameters& zone = loose ? c.loose : c.zone;
-    const double elongated = z.axial;
+    const double elongated = z.axial, turned = z.station[0].reached;
     if (ignores_limits) {
       ZoneParameters elastic = zone;
       elastic.stations = 0;
@@ -347,8 +347,12 @@ void System::evaluate_rotationals(double h) {
       advance_zone(zone, laws, d, state.time, h, z);
     }
     tell_yield(elements.size() + i, z);
-    if (!loose && c.axial_element >= 0 && h > 0 && z.axial != elongated)
-      elongate_element(static_cast<size_t>(c.axial_element), z.axial - elongated);
+    if (!loose && c.axial_element >= 0 && h > 0) {
+      const auto along = static_cast<size_t>(c.axial_element);
+      if (z.axial != elongated) elongate_element(along, z.axial - elongated);
+      const bool is_known = z.station[0].reached == turned && state.element[along].hinge_bears < kUnlimited;
+      if (z.live && turned > 0 && !is_known) limit_element(along, calc_bearing(zone, laws, state.time, z));
+    }
     if (!z.live) {
       break_element(elements.size() + i, z.reason);
     } else if (loose) {

@@ -351,6 +351,8 @@ class System {
   void evaluate_outside(size_t slot);
   /// As elongate_zone, wherever the element's state is.
   void elongate_element(size_t e, double by);
+  /// The element bears no more compression from now on [N].
+  void limit_element(size_t e, double compression);
   void evaluate_elements_fully(double h);
   void evaluate_elements();
   /// For the kernel: cells of a zone that flows, around a normal force [N].

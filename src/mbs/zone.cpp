@@ -81,6 +81,10 @@ double take_back_crushing(double elongation, ZoneState& z) {
 
 }  // namespace
 
+double calc_bearing(const ZoneParameters& p, const CompiledLaws& laws, double time, const ZoneState& z) {
+  return Limits(laws, p.law[0], z, time).capacity(z.station[0].reached, z.station[0]);
+}
+
 void elongate_zone(const ZoneParameters& p, double by, ZoneState& z) {
   if (!z.live || by == 0) return;
   z.lifted += by;
@@ -358,12 +362,12 @@ struct Evaluation {
     if (p.external_axial) {
       // held by somebody else
     } else if (force[0] < 0) {
-      double limit = limits.compression(reached, z.shortened, integrity, z.station[0]);
+      double limit = std::min(limits.compression(reached, z.shortened, integrity, z.station[0]), z.hinge_bears);
       if (-force[0] > limit) {
         // the curve falls while the zone shortens: one more look at it after the first estimate
         const double guess = (-force[0] - limit) / k[0];
         integrity = limits.integrity(z.shortened + guess);
-        limit = limits.compression(reached, z.shortened + guess, integrity, z.station[0]);
+        limit = std::min(limits.compression(reached, z.shortened + guess, integrity, z.station[0]), z.hinge_bears);
         const double shortening = std::max(0.0, (-force[0] - limit) / k[0]);
         z.axial -= shortening;
         z.shortened += shortening;

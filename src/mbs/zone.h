@@ -38,6 +38,8 @@ struct ZoneState {
   double crushed = 0;                    // of `shortened`, in the last evaluation [m]
   double slip[2] = {0, 0}, slipped = 0;  // [m]
   double twist = 0, twisted = 0;         // [rad]
+  double hinge_bears = kUnlimited;       // compression at most: what a hinge of the same member bears as far as it has
+                                         // turned [N]
   StationState station[2];
   // a law taking over within a ramp
   int base_law = -1;  // of all stations instead of their own, once a switch is done and another begins
@@ -130,6 +132,8 @@ bool write_flow_cells(const ZoneParameters&, const CompiledLaws&, ZoneState&, do
 /// Lengthens a live zone's plastic axial deformation from outside; what that takes from or adds to the elastic energy
 /// is booked as plastic work. The resultants follow at the next evaluation.
 void elongate_zone(const ZoneParameters&, double by, ZoneState&);
+/// Largest compression that the first station bears as far as it has turned [N]; unlimited without moment families.
+double calc_bearing(const ZoneParameters&, const CompiledLaws&, double time, const ZoneState&);
 /// Makes the state of a rotational element that of a six-component one, which then has no external axial force: it
 /// keeps its rotation and moment, has cracked as far as at first yield, and transmits nothing else yet. What cracks
 /// store is booked against the plastic work.

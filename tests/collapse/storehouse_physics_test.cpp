@@ -184,13 +184,16 @@ TEST(StorehousePhysics, StandsOnTwoRowsAndThenTopplesToTheFront) {
   EXPECT_LT(after, 2 * block);
   EXPECT_NEAR(finding(r, "rigid_block").value, after - block, 0.001);  // read between frames, a millisecond later
 
-  // the block has landed by then; stubs, contacts and hinges go the same way with half the step
-  // (docs/decisions/0095-stubs-that-can-be-crushed.md)
+  // until it lands half the step gives the same; behind it, in the debris, nearly so (10.56 degrees with its own step,
+  // 10.70 to 10.72 with five of 0.16 ms and less)
   RunOptions fine;
   fine.step = 0.5 * r.provenance.step;
   const record::Record half = run_plan(plan, default_knowledge(), fine, {});
   const double finer = value_at(half, "tilt_angle", second + 1);
-  EXPECT_NEAR(after, finer, 0.01 * finer);
+  const double landing = value_at(r, "tilt_angle", second + 0.78),
+               landing_finer = value_at(half, "tilt_angle", second + 0.78);
+  EXPECT_NEAR(landing, landing_finer, 0.003 * landing_finer);
+  EXPECT_NEAR(after, finer, 0.02 * finer);
   EXPECT_NEAR(touchdown, finding(half, "touchdown.first").value, 0.01);
   RecordProperty("tilt_deg", std::to_string(after / unit::deg));
   RecordProperty("tilt_at_half_the_step_deg", std::to_string(finer / unit::deg));
