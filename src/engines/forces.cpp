@@ -445,7 +445,7 @@ bool Forces::advance(double time, const Motion& motion, const std::vector<Vec3>&
       mbs::elongate_zone(along.parameters, z.state.axial - elongated, along.state);
       if (z.state.live && z.state.station[0].reached > 0)
         along.state.hinge_bears =
-            std::min(along.state.hinge_bears, mbs::calc_bearing(z.parameters, laws_, time, z.state));
+            std::min(along.state.hinge_bears, mbs::calc_hinge_bearing(z.parameters, laws_, time, z.state));
     }
     if (!z.state.live) continue;
     const Vec3 torque = z.state.resultant.c[5] * axis_of(motion, r.joint);

@@ -351,7 +351,7 @@ void System::evaluate_rotationals(double h) {
       const auto along = static_cast<size_t>(c.axial_element);
       if (z.axial != elongated) elongate_element(along, z.axial - elongated);
       const bool is_known = z.station[0].reached == turned && state.element[along].hinge_bears < kUnlimited;
-      if (z.live && turned > 0 && !is_known) limit_element(along, calc_bearing(zone, laws, state.time, z));
+      if (z.live && turned > 0 && !is_known) limit_element(along, calc_hinge_bearing(zone, laws, state.time, z));
     }
     if (!z.live) {
       break_element(elements.size() + i, z.reason);

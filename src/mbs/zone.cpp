@@ -81,8 +81,8 @@ double take_back_crushing(double elongation, ZoneState& z) {
 
 }  // namespace
 
-double calc_bearing(const ZoneParameters& p, const CompiledLaws& laws, double time, const ZoneState& z) {
-  return Limits(laws, p.law[0], z, time).capacity(z.station[0].reached, z.station[0]);
+double calc_hinge_bearing(const ZoneParameters& p, const CompiledLaws& laws, double time, const ZoneState& z) {
+  return Limits(laws, p.law[0], z, time).capacity(1, z.station[0].reached, z.station[0]);
 }
 
 void elongate_zone(const ZoneParameters& p, double by, ZoneState& z) {

@@ -132,8 +132,9 @@ bool write_flow_cells(const ZoneParameters&, const CompiledLaws&, ZoneState&, do
 /// Lengthens a live zone's plastic axial deformation from outside; what that takes from or adds to the elastic energy
 /// is booked as plastic work. The resultants follow at the next evaluation.
 void elongate_zone(const ZoneParameters&, double by, ZoneState&);
-/// Largest compression that the first station bears as far as it has turned [N]; unlimited without moment families.
-double calc_bearing(const ZoneParameters&, const CompiledLaws&, double time, const ZoneState&);
+/// Largest compression that a hinge, which turns about its z alone, bears as far as it has turned [N]; unlimited
+/// without a family.
+double calc_hinge_bearing(const ZoneParameters&, const CompiledLaws&, double time, const ZoneState&);
 /// Makes the state of a rotational element that of a six-component one, which then has no external axial force: it
 /// keeps its rotation and moment, has cracked as far as at first yield, and transmits nothing else yet. What cracks
 /// store is booked against the plastic work.

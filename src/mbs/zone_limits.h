@@ -34,13 +34,16 @@ class Limits {
   ///   near  a station that has turned about as far
   double compression(double rotation, double shortened, double integrity, const StationState& near) const {
     return blend([&](const CompiledLaw& l) {
-      return std::min(calc_curve(l.compression, shortened),
-                      (l.elongates ? 1 : integrity) * calc_capacity(l, rotation, near));
+      return std::min(
+          calc_curve(l.compression, shortened),
+          (l.elongates ? 1 : integrity) * std::min(calc_compression_capacity(l.moment[0], rotation, near.j[0]),
+                                                   calc_compression_capacity(l.moment[1], rotation, near.j[1])));
     });
   }
-  /// That of a whole section.
-  double capacity(double rotation, const StationState& near) const {
-    return blend([&](const CompiledLaw& l) { return calc_capacity(l, rotation, near); });
+  /// That of a whole section which has turned about this axis alone.
+  double capacity(int axis, double rotation, const StationState& near) const {
+    return blend(
+        [&](const CompiledLaw& l) { return calc_compression_capacity(l.moment[axis], rotation, near.j[axis]); });
   }
   MomentLimit moment(int axis, double normal_force, StationState& s) const {
     MomentLimit a{0, 0}, b{0, 0};
@@ -80,10 +83,6 @@ class Limits {
   }
 
  private:
-  static double calc_capacity(const CompiledLaw& l, double rotation, const StationState& near) {
-    return std::min(calc_compression_capacity(l.moment[0], rotation, near.j[0]),
-                    calc_compression_capacity(l.moment[1], rotation, near.j[1]));
-  }
   double mix(double a, double b) const { return share_ <= 0 ? a : share_ >= 1 ? b : (1 - share_) * a + share_ * b; }
   template <class F>
   double blend(F&& f) const {
