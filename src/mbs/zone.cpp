@@ -362,12 +362,12 @@ struct Evaluation {
     if (p.external_axial) {
       // held by somebody else
     } else if (force[0] < 0) {
-      double limit = std::min(limits.compression(reached, z.shortened, integrity, z.station[0]), z.hinge_bears);
+      double limit = limits.compression(reached, z.shortened, integrity, z.station[0]);
       if (-force[0] > limit) {
         // the curve falls while the zone shortens: one more look at it after the first estimate
         const double guess = (-force[0] - limit) / k[0];
         integrity = limits.integrity(z.shortened + guess);
-        limit = std::min(limits.compression(reached, z.shortened + guess, integrity, z.station[0]), z.hinge_bears);
+        limit = limits.compression(reached, z.shortened + guess, integrity, z.station[0]);
         const double shortening = std::max(0.0, (-force[0] - limit) / k[0]);
         z.axial -= shortening;
         z.shortened += shortening;

@@ -72,7 +72,7 @@ void find_safe_bounds(const ZoneParameters& p, const CompiledLaws& laws, const L
   const double whole = limits.integrity(z.shortened);
   double from = normal_force - reach, to = normal_force + reach;
   if (!p.external_axial) {
-    from = std::max(from, -std::min(limits.compression(reached, z.shortened, whole, z.station[0]), z.hinge_bears));
+    from = std::max(from, -limits.compression(reached, z.shortened, whole, z.station[0]));
     to = std::min(to, limits.tension(z.elongated, z.shortened));
   }
   for (int s = 0; s < p.stations; ++s)
@@ -306,11 +306,9 @@ double calc_utilisation(const ZoneParameters& p, const CompiledLaws& laws, doubl
   double reached = z.station[0].reached;
   if (p.stations > 1) reached = std::max(reached, z.station[1].reached);
   const double integrity = limits.integrity(z.shortened);
-  double u =
-      p.external_axial ? 0.0
-      : force[0] < 0
-          ? ratio(-force[0], std::min(limits.compression(reached, z.shortened, integrity, z.station[0]), z.hinge_bears))
-          : ratio(force[0], limits.tension(z.elongated, z.shortened));
+  double u = p.external_axial ? 0.0
+             : force[0] < 0   ? ratio(-force[0], limits.compression(reached, z.shortened, integrity, z.station[0]))
+                              : ratio(force[0], limits.tension(z.elongated, z.shortened));
   for (int s = 0; s < p.stations; ++s) {
     const Limits station_limits(laws, p.law[s], z, time);
     StationState st = z.station[s];

@@ -14,7 +14,7 @@ namespace topple::mbs {
 class Limits {
  public:
   Limits(const CompiledLaws& laws, int law, const ZoneState& z, double time)
-      : from_(laws[static_cast<size_t>(z.base_law < 0 ? law : z.base_law)]), to_(from_) {
+      : from_(laws[static_cast<size_t>(z.base_law < 0 ? law : z.base_law)]), to_(from_), hinge_bears_(z.hinge_bears) {
     if (z.next_law < 0) return;
     to_ = laws[static_cast<size_t>(z.next_law)];
     share_ = z.ramp > 0 ? std::clamp((time - z.ramp_begin) / z.ramp, 0.0, 1.0) : 1.0;
@@ -30,15 +30,16 @@ class Limits {
   double integrity(double shortened) const {
     return blend([&](const CompiledLaw& l) { return calc_integrity(l, shortened); });
   }
-  /// Largest compression after a rotation and a plastic shortening.
+  /// Largest compression after a rotation and a plastic shortening, a hinge of the same member included.
   ///   near  a station that has turned about as far
   double compression(double rotation, double shortened, double integrity, const StationState& near) const {
-    return blend([&](const CompiledLaw& l) {
+    const double own = blend([&](const CompiledLaw& l) {
       return std::min(
           calc_curve(l.compression, shortened),
           (l.elongates ? 1 : integrity) * std::min(calc_compression_capacity(l.moment[0], rotation, near.j[0]),
                                                    calc_compression_capacity(l.moment[1], rotation, near.j[1])));
     });
+    return std::min(own, hinge_bears_);
   }
   /// That of a whole section which has turned about this axis alone.
   double capacity(int axis, double rotation, const StationState& near) const {
@@ -92,6 +93,7 @@ class Limits {
   }
   std::reference_wrapper<const CompiledLaw> from_, to_;
   double share_ = 0;
+  double hinge_bears_;
 };
 
 /// Cracks grow a little ahead of their moment, so that not every step has to see to them and dead load leaves them at
