@@ -431,6 +431,7 @@ mbs::ZoneLaw make_zone_law(const nearfield::Rcc& rcc, double EI_y, double EI_z, 
       for (double& v : *u) v *= share;
     }
   law.biaxial_exponent = k.zone_biaxial_exponent;
+  if (rcc.EI_y > 0 && rcc.EI_z > 0) law.rotation_ratio = std::sqrt(rcc.EI_z / rcc.EI_y);  // of the radii of inertia
   law.damage_share = rcc.damage_share;
   // the last rotation of a family is where nothing of the moment is left
   for (const mbs::MomentFamily* f : {&law.moment_y, &law.moment_z})

@@ -531,14 +531,10 @@ void Forces::remove_element(size_t i) {
 }
 
 void Forces::switch_law(const mbs::Action& a, double time) {
-  mbs::ZoneState& z = a.rotational >= 0 ? rotational_[static_cast<size_t>(a.rotational)].state
-                                        : zone_[static_cast<size_t>(a.element.index)].state;
+  auto& z =
+      a.rotational >= 0 ? rotational_[static_cast<size_t>(a.rotational)] : zone_[static_cast<size_t>(a.element.index)];
   is_cached_ = false;
-  if (z.next_law >= 0) z.base_law = z.next_law;
-  z.next_law = a.law.index;
-  z.ramp_begin = time;
-  z.ramp = a.ramp;
-  z.next_share = a.stiffness_share;
+  mbs::begin_switch(z.parameters, laws_, {a.law.index, time, a.ramp, a.stiffness_share}, z.state);
 }
 
 bool Forces::loosen_joint(size_t j) {

@@ -313,6 +313,7 @@ void System::unpack_element(size_t e) {
       z.station[s].soft[q] = l.flow(slot, at + kSoftness + q);
     }
     z.station[s].reached = l.flow(slot, at + kReached);
+    z.station[s].strained = l.flow(slot, at + kStrained);
   }
 }
 
@@ -424,9 +425,9 @@ void System::write_cells(size_t slot, double axial) {
   const size_t e = l.is_batch ? slot / l.W : l.element_of[slot];
   const ZoneParameters& zone = elements[e].zone;
   ZoneState& z = state.element[e];
-  double reached[2] = {0, 0};
-  for (int s = 0; s < zone.stations; ++s) reached[s] = l.flow(slot, kStations + s * kStationFields + kReached);
-  (void)write_flow_cells(zone, laws, z, axial, l.flow(slot, kShortened), reached, &l.flow(slot, 0), l.W);
+  double strained[2] = {0, 0};
+  for (int s = 0; s < zone.stations; ++s) strained[s] = l.flow(slot, kStations + s * kStationFields + kStrained);
+  (void)write_flow_cells(zone, laws, z, axial, l.flow(slot, kShortened), strained, &l.flow(slot, 0), l.W);
 }
 
 void System::evaluate_elements_fully(double h) {

@@ -262,15 +262,15 @@ struct Pressing {
   hn::Mask<D> is_within;  // then the numbers are the whole truth: it neither flows in tension nor breaks
 
   HWY_INLINE Pressing() {}
-  /// k, d: stiffness and elongation; reached: largest rotation of the stations.
-  HWY_INLINE Pressing(const double* HWY_RESTRICT flow, Num<D> k, Num<D> d, Num<D> reached) {
+  /// k, d: stiffness and elongation; strained: the largest one of the stations.
+  HWY_INLINE Pressing(const double* HWY_RESTRICT flow, Num<D> k, Num<D> d, Num<D> strained) {
     using N = Num<D>;
     const D tag;
     const N zero = num<D>(0);
     const N trial = k * (d - load<D>(flow, kAxial)), shortened = load<D>(flow, kShortened);
     N least = {hn::Set(tag, -std::numeric_limits<double>::infinity())};
     for (int q = 0; q < 2; ++q)
-      least = maximum(least, fma(load<D>(flow, kTurnedSlope + q), reached - load<D>(flow, kTurnedFrom + q),
+      least = maximum(least, fma(load<D>(flow, kTurnedSlope + q), strained - load<D>(flow, kTurnedFrom + q),
                                  load<D>(flow, kTurnedLeast + q)));
     const N capacity = zero - least, part = load<D>(flow, kTurnedPart);
     const auto calc_limit = [&](N at, N& left) {
@@ -281,7 +281,7 @@ struct Pressing {
     const N limit = calc_limit(shortened, whole), over = (zero - trial) - limit;
     flows = hn::And(hn::Gt(over.v, zero.v), hn::Lt(trial.v, zero.v));
     is_known = hn::And(
-        hn::Le(reached.v, load<D>(flow, kTurnedFar).v),
+        hn::Le(strained.v, load<D>(flow, kTurnedFar).v),
         hn::And(hn::Ge(shortened.v, load<D>(flow, kCurveFrom).v), hn::Le(shortened.v, load<D>(flow, kCurveFar).v)));
     force = trial, shortening = zero;
     if (!hn::AllFalse(tag, flows)) {
@@ -316,15 +316,15 @@ HWY_INLINE M enter_cells(const ElementJob& job, size_t block, M wanted, Num<D> k
   };
   const auto find = [&] {
     Place at{wanted, wanted, wanted};
-    N most = zero;  // rotation reached
-    for (int s = 0; s < Hinges; ++s) most = maximum(most, load<D>(flow, kStations + s * kStationFields + kReached));
+    N most = zero;
+    for (int s = 0; s < Hinges; ++s) most = maximum(most, load<D>(flow, kStations + s * kStationFields + kStrained));
     pressing = Pressing<D>(flow, k, d, most);
     const N force = pressing.in_cells();
     for (int s = 0; s < Hinges; ++s) {
-      const N reached = load<D>(flow, kStations + s * kStationFields + kReached);
+      const N strained = load<D>(flow, kStations + s * kStationFields + kStrained);
       for (int q = first_bending(In); q <= last_bending(In); ++q) {
         const int cell = kStations + s * kStationFields + kCell + q * kCellFields;
-        const N r = (reached - load<D>(flow, cell + kCellRotation)) * load<D>(flow, cell + kCellRotation + 1);
+        const N r = (strained - load<D>(flow, cell + kCellRotation)) * load<D>(flow, cell + kCellRotation + 1);
         at.is_in_cells = hn::And(at.is_in_cells, hn::And(hn::Le(CellForce<D>(flow, cell, force).share.v, on_edge.v),
                                                          hn::And(hn::Ge(r.v, zero.v), hn::Le(r.v, one.v))));
       }
@@ -414,7 +414,7 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
     for (int q = first; q <= last; ++q) {
       const int cell = kStations + s * kStationFields + kCell + q * kCellFields;
       const CellForce<D> at(flow, cell, in_cells);
-      const N r = (load<D>(flow, kStations + s * kStationFields + kReached) - load<D>(flow, cell + kCellRotation)) *
+      const N r = (load<D>(flow, kStations + s * kStationFields + kStrained) - load<D>(flow, cell + kCellRotation)) *
                   load<D>(flow, cell + kCellRotation + 1);
       const auto positive = hn::Ge(plane[q].m[s].v, zero.v);
       const auto corner = [&](int force, int rotation) {
@@ -523,19 +523,25 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
   const auto beyond_cracks = [&](int q, int s) {
     return fnma(plane[q].crack[s], plane[q].m[s], plane[q].phi[s] - plane[q].bow[s]);
   };
-  const auto gone = [&](int s) { return length_of([&](int q) { return beyond_cracks(q, s); }); };
+  // as the families count it
+  const auto strain_of = [&](int q, int s, N by_turn) {
+    return q == 0 ? by_turn : by_turn * load<D>(flow, kStations + s * kStationFields + kRotationRatio);
+  };
+  const auto strained_by = [&](int s) {
+    return length_of([&](int q) { return strain_of(q, s, beyond_cracks(q, s)); });
+  };
   N elongation = zero, so_far[2];
   M turns[2] = {hn::FirstN(tag, 0), hn::FirstN(tag, 0)};
   const auto calc_elongation = [&] {
     N sum = zero;
     for (int s = 0; s < Hinges; ++s) {
-      const N length = gone(s);
+      const N length = strained_by(s);
       M grows = hn::And(turns[s], hn::Gt(length.v, so_far[s].v));
       if (hn::AllFalse(tag, grows)) continue;
       N squares = zero, along = zero, bending = zero;
       for (int q = first; q <= last; ++q) {
         const int cell = kStations + s * kStationFields + kCell + q * kCellFields;
-        const N turned = beyond_cracks(q, s);
+        const N turned = strain_of(q, s, beyond_cracks(q, s));
         const auto positive = hn::Ge(turned.v, zero.v);
         const auto lift_at = [&](int force) {
           return select(positive, load<D>(flow, cell + kCellLiftPositive + force),
@@ -564,7 +570,7 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
   };
   // share of the turn of a station that brings it to the limit under the force that is left
   const auto calc_share = [&](int s, M changes) {
-    const N length = gone(s);
+    const N length = strained_by(s);
     M grows = hn::And(hn::And(changes, turns[s]), hn::Gt(length.v, so_far[s].v));
     grows = hn::And(grows, hn::AndNot(at[s].lost, hn::Gt(at[s].sum.v, one.v)));
     if (hn::AllFalse(tag, grows)) return one;
@@ -573,7 +579,7 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
     for (int q = first; q <= last; ++q) {
       const int cell = kStations + s * kStationFields + kCell + q * kCellFields;
       const CellForce<D> force(flow, cell, in_cells);
-      const N r = (load<D>(flow, kStations + s * kStationFields + kReached) - load<D>(flow, cell + kCellRotation)) *
+      const N r = (load<D>(flow, kStations + s * kStationFields + kStrained) - load<D>(flow, cell + kCellRotation)) *
                   load<D>(flow, cell + kCellRotation + 1);
       const auto positive = hn::Ge(m_trial[s][q].v, zero.v);
       N limit[3];  // at the cell's forces
@@ -597,9 +603,11 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
       left = inverse_root<D>(sum);
     const N rise = zero - (left * k[0]) * (slope * elongation) / sum;
     grows = hn::And(grows, hn::Gt(rise.v, zero.v));
-    const N trial = {hn::Max(
-        so_far[s].v,
-        length_of([&](int q) { return fnma(plane[q].crack[s], m_trial[s][q], phi_trial[q][s] - plane[q].bow[s]); }).v)};
+    const N trial = {
+        hn::Max(so_far[s].v, length_of([&](int q) {
+                               return strain_of(
+                                   q, s, fnma(plane[q].crack[s], m_trial[s][q], phi_trial[q][s] - plane[q].bow[s]));
+                             }).v)};
     const N ahead = (trial - so_far[s]) / (length - so_far[s]);  // by damage, before it turns
     const N over = one - left;
     const N part = fnma(rise, ahead, over) / fma(rise, one - ahead, over);
@@ -612,9 +620,10 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
       const N before = length_of([&](int q) {
         const int shear = q == 0 ? 2 : 1, bend = q == 0 ? 4 : 5;
         const N m = fma(plane[q].lever[s], k[shear] * e_before[shear], k[bend] * e_before[bend]);
-        return fma(plane[q].soft[s] - plane[q].crack[s], m, load<D>(flow, station + kPhi + q) - plane[q].bow[s]);
+        return strain_of(
+            q, s, fma(plane[q].soft[s] - plane[q].crack[s], m, load<D>(flow, station + kPhi + q) - plane[q].bow[s]));
       });
-      so_far[s] = {hn::Max(load<D>(flow, station + kReached).v, before.v)};
+      so_far[s] = {hn::Max(load<D>(flow, station + kStrained).v, before.v)};
       turns[s] = hn::Ne(by[first][s].v, zero.v);
       if constexpr (!is_plane) turns[s] = hn::Or(turns[s], hn::Ne(by[1][s].v, zero.v));
       turns[s] = hn::And(good, turns[s]);
@@ -635,10 +644,13 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
     f[q == 0 ? 2 : 1] = plane[q].shear();
     f[q == 0 ? 4 : 5] = plane[q].moment();
   }
-  N reached[2];
+  N reached[2], strained[2];
   for (int s = 0; s < Hinges; ++s) {
+    const N gone = length_of([&](int q) { return beyond_cracks(q, s); });
     const N held = load<D>(flow, kStations + s * kStationFields + kReached);
-    reached[s] = select(turns[s], N{hn::Max(held.v, gone(s).v)}, held);
+    const N known = load<D>(flow, kStations + s * kStationFields + kStrained);
+    reached[s] = select(turns[s], N{hn::Max(held.v, gone.v)}, held);
+    strained[s] = select(turns[s], N{hn::Max(known.v, strained_by(s).v)}, known);
     demand(hn::Lt(reached[s].v, load<D>(flow, kStations + s * kStationFields + kRupture).v));
   }
   // what is new of the inelastic rotation: a plastic part and added flexibility
@@ -747,7 +759,11 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
   }
   store_where<D>(good, stored, flow, kStored);
   store_where<D>(good, idle, flow, kIdle);
-  for (int s = 0; s < Hinges; ++s) store_where<D>(good, reached[s], flow, kStations + s * kStationFields + kReached);
+  for (int s = 0; s < Hinges; ++s) {
+    const int station = kStations + s * kStationFields;
+    store_where<D>(good, reached[s], flow, station + kReached);
+    store_where<D>(good, strained[s], flow, station + kStrained);
+  }
   return good;
 }
 

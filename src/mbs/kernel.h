@@ -102,19 +102,21 @@ enum Flow : int {
   kPlastic = 47,        // dissipated since the slot was written
   kIdle = 48,           // steps without flow
   kStations = 49,       // both stations, kStationFields each
-  kStationFields = 57,
+  kStationFields = 59,
   kFlowFields = kStations + 2 * kStationFields
 };
 /// Fields of a station: inelastic rotations, damage, and the cell of the moment family about each axis.
 enum FlowStation : int {
-  kPhi = 0,       // plastic rotation about y, z (2)
-  kSoftness = 2,  // flexibility added by damage about y, z (2)
-  kReached = 4,   //
-  kShare = 5,     // of damage
-  kRupture = 6,   // rotation
-  kCracked = 7,   // of the softness, by cracks, about y, z (2)
-  kBow = 9,       // of the plastic rotation, that of cracks (2)
-  kCell = 11,     // about y, about z: kCellFields each
+  kPhi = 0,             // plastic rotation about y, z (2)
+  kSoftness = 2,        // flexibility added by damage about y, z (2)
+  kReached = 4,         //
+  kShare = 5,           // of damage
+  kRupture = 6,         // rotation
+  kCracked = 7,         // of the softness, by cracks, about y, z (2)
+  kBow = 9,             // of the plastic rotation, that of cracks (2)
+  kStrained = 11,       // rotation about y that strains the edges as what was reached does
+  kRotationRatio = 12,  // that of a rotation about z
+  kCell = 13,           // about y, about z: kCellFields each
   kCellFields = 23
 };
 /// Fields of a cell, which is two intervals of normal force and one of rotation: the middle force, one over the widths

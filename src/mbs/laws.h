@@ -37,6 +37,7 @@ struct ZoneLaw {
   std::string name;
   MomentFamily moment_y, moment_z;
   double biaxial_exponent = 1.5;           // (|My|/Ly)^p + (|Mz|/Lz)^p <= 1
+  double rotation_ratio = 1;               // what of the edges a rotation about z strains over one about y
   double damage_share = 0;                 // share of the inelastic rotation that is recovered on unloading, 0..1
   double rupture_rotation = kUnlimited;    // plastic rotation at which the element breaks altogether [rad]
   double rupture_rotation_pressed = 0;     // the same while its normal force presses, if that is more [rad]

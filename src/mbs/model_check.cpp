@@ -268,6 +268,7 @@ void Checker::check_laws() {
     curve(p, "compression", l.compression);
     curve(p, "tension", l.tension);
     share(p, "biaxial_exponent", l.biaxial_exponent, 1, 10);
+    positive(p, "rotation_ratio", l.rotation_ratio);
     share(p, "damage_share", l.damage_share, 0, 0.95);
     const std::pair<const char*, double> ruptures[] = {{"rupture_rotation", l.rupture_rotation},
                                                        {"crush_length", l.crush_length},

@@ -186,6 +186,7 @@ ZoneLaw law_from(const Node& n) {
   if (n.has("compression")) l.compression = curve_from(n["compression"]);
   if (n.has("tension")) l.tension = curve_from(n["tension"]);
   read(n, "biaxial_exponent", l.biaxial_exponent);
+  read(n, "rotation_ratio", l.rotation_ratio);
   read(n, "damage_share", l.damage_share);
   read(n, "rupture_rotation", l.rupture_rotation);
   read(n, "rupture_rotation_pressed", l.rupture_rotation_pressed);

@@ -74,6 +74,7 @@ Json json_of(const ZoneLaw& l) {
   if (!l.moment_y.normal_force.empty()) j["moment_y"] = json_of(l.moment_y);
   if (!l.moment_z.normal_force.empty()) j["moment_z"] = json_of(l.moment_z);
   j["biaxial_exponent"] = l.biaxial_exponent;
+  if (l.rotation_ratio != 1) j["rotation_ratio"] = l.rotation_ratio;
   j["damage_share"] = l.damage_share;
   put(j, "rupture_rotation", l.rupture_rotation);
   if (l.rupture_rotation_pressed != 0) put(j, "rupture_rotation_pressed", l.rupture_rotation_pressed);

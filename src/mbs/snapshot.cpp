@@ -101,7 +101,7 @@ void visit(Archive& ar, S& s, C& sys) {
   ar(sys.ground_reaction), ar(sys.ground_contact), ar(sys.body_contacts);
 }
 
-constexpr std::uint64_t kMagic = 0x43534e41504f54ULL;  // "TOPANSC"
+constexpr std::uint64_t kMagic = 0x44534e41504f54ULL;  // "TOPANSD"
 
 /// What of the system's scratch the next step takes over, under the same names.
 struct Carried {

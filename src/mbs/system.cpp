@@ -441,11 +441,9 @@ void System::act(const Event& event) {
         if (a.rotational < 0) unpack_element(static_cast<size_t>(a.element.index));
         ZoneState& z = a.rotational >= 0 ? state.rotational[static_cast<size_t>(a.rotational)]
                                          : state.element[static_cast<size_t>(a.element.index)];
-        if (z.next_law >= 0) z.base_law = z.next_law;
-        z.next_law = a.law.index;
-        z.ramp_begin = time;
-        z.ramp = a.ramp;
-        z.next_share = a.stiffness_share;
+        begin_switch(a.rotational >= 0 ? rotationals[static_cast<size_t>(a.rotational)].zone
+                                       : elements[static_cast<size_t>(a.element.index)].zone,
+                     laws, {a.law.index, time, a.ramp, a.stiffness_share}, z);
         state.review_times.push_back(time + a.ramp);
         if (a.rotational < 0) pack_element(static_cast<size_t>(a.element.index));
         break;

@@ -82,7 +82,24 @@ double take_back_crushing(double elongation, ZoneState& z) {
 }  // namespace
 
 double calc_hinge_bearing(const ZoneParameters& p, const CompiledLaws& laws, double time, const ZoneState& z) {
-  return Limits(laws, p.law[0], z, time).capacity(1, z.station[0].reached, z.station[0]);
+  return Limits(laws, p.law[0], z, time).capacity(1, z.station[0].strained, z.station[0]);
+}
+
+void begin_switch(const ZoneParameters& p, const CompiledLaws& laws, const LawSwitch& to, ZoneState& z) {
+  if (z.next_law >= 0) z.base_law = z.next_law;
+  z.next_law = to.law;
+  z.ramp_begin = to.time;
+  z.ramp = to.ramp;
+  z.next_share = to.stiffness_share;
+  const double ratio = laws[static_cast<size_t>(to.law)].rotation_ratio;
+  for (int s = 0; s < p.stations; ++s) {
+    StationState& st = z.station[s];
+    const int before = z.base_law < 0 ? p.law[s] : z.base_law;
+    if (st.reached == 0 || laws[static_cast<size_t>(before)].rotation_ratio == ratio) continue;
+    // in the direction in which it stands
+    const double y = st.phi[0] - st.bow[0], turned_z = st.phi[1] - st.bow[1], length = std::hypot(y, turned_z);
+    st.strained = length > 0 ? st.reached * std::hypot(y, ratio * turned_z) / length : st.reached;
+  }
 }
 
 void elongate_zone(const ZoneParameters& p, double by, ZoneState& z) {
@@ -355,19 +372,19 @@ struct Evaluation {
 
   /// Flow along the axis. Returns the share of the section that is still there.
   double flow_axially(const Limits& limits) {
-    double reached = z.station[0].reached;
-    if (n > 1) reached = std::max(reached, z.station[1].reached);
+    double strained = z.station[0].strained;
+    if (n > 1) strained = std::max(strained, z.station[1].strained);
     double integrity = limits.integrity(z.shortened);
     z.crushed = 0;
     if (p.external_axial) {
       // held by somebody else
     } else if (force[0] < 0) {
-      double limit = limits.compression(reached, z.shortened, integrity, z.station[0]);
+      double limit = limits.compression(strained, z.shortened, integrity, z.station[0]);
       if (-force[0] > limit) {
         // the curve falls while the zone shortens: one more look at it after the first estimate
         const double guess = (-force[0] - limit) / k[0];
         integrity = limits.integrity(z.shortened + guess);
-        limit = limits.compression(reached, z.shortened + guess, integrity, z.station[0]);
+        limit = limits.compression(strained, z.shortened + guess, integrity, z.station[0]);
         const double shortening = std::max(0.0, (-force[0] - limit) / k[0]);
         z.axial -= shortening;
         z.shortened += shortening;
@@ -386,7 +403,7 @@ struct Evaluation {
         flowed = true;
       }
       // a hinge that has turned far holds what presses it, and does not pull
-      const bool is_far = reached >= limits.law().rupture_rotation;
+      const bool is_far = std::max(z.station[0].reached, z.station[1].reached) >= limits.law().rupture_rotation;
       double limit = is_far ? 0 : limits.tension(z.elongated, z.shortened);
       if (force[0] > limit) {
         const double guess = (force[0] - limit) / k[0];
@@ -582,6 +599,13 @@ struct Evaluation {
     for (int q = first; q <= last; ++q) beyond[q][s] = beyond_cracks(turns, moments, q, s);
     return length_of(beyond, s);
   }
+  /// The same as its edges feel it.
+  ///   ratio  of the law, what a rotation about z strains over one about y
+  double strain_of(const double turns[2][2], const double moments[2][2], int s, double ratio) const {
+    double beyond[2][2] = {};
+    for (int q = first; q <= last; ++q) beyond[q][s] = (q == 0 ? 1 : ratio) * beyond_cracks(turns, moments, q, s);
+    return length_of(beyond, s);
+  }
 
   /// What turns further lengthens or shortens. Returns by how much; stations then turn to the limit under the force
   /// that is left.
@@ -591,6 +615,7 @@ struct Evaluation {
       return 0;
     }
     const double axial_stiffness = p.external_axial ? 0 : k[0], relief = p.external_axial ? p.relief : k[0];
+    const auto ratio_of = [&](int q, int s) { return q == 0 ? 1 : limits[s].law().rotation_ratio; };
     // rotation up to which a station had gone in the step before, by plastic flow or on the flexibility of its damage
     double so_far[2] = {0, 0};
     for (int s = 0; s < n; ++s) {
@@ -599,11 +624,13 @@ struct Evaluation {
       double before[2][2];
       for (int q = first; q <= last; ++q) {
         const double b = z.elastic_force[bend_of(q)], v = z.elastic_force[shear_of(q)];
-        before[q][s] = st.phi[q] - st.bow[q] + (st.soft[q] - st.crack[q]) * Bending::at(b, v, p.x[s], planes[q].sign);
+        before[q][s] = ratio_of(q, s) *
+                       (st.phi[q] - st.bow[q] + (st.soft[q] - st.crack[q]) * Bending::at(b, v, p.x[s], planes[q].sign));
       }
-      so_far[s] = std::max(st.reached, length_of(before, s));
+      so_far[s] = std::max(st.strained, length_of(before, s));
     }
-    const auto grows = [&](int s) { return turned[s] && limits[s].elongates() && length_of(phi, m, s) > so_far[s]; };
+    const auto calc_strain = [&](int s) { return strain_of(phi, m, s, ratio_of(1, s)); };
+    const auto grows = [&](int s) { return turned[s] && limits[s].elongates() && calc_strain(s) > so_far[s]; };
     const auto calc_elongation = [&]() {
       double sum = 0;
       for (int s = 0; s < n; ++s) {
@@ -611,14 +638,14 @@ struct Evaluation {
         StationState& st = z.station[s];
         double squares = 0, along = 0, bending = 0;
         for (int q = first; q <= last; ++q) {
-          const Lift lift = limits[s].lift(q, axial, st.reached, st);
-          const double gone = beyond_cracks(phi, m, q, s);
+          const Lift lift = limits[s].lift(q, axial, st.strained, st);
+          const double gone = ratio_of(q, s) * beyond_cracks(phi, m, q, s);
           squares += gone * gone;
           along += gone * gone * (gone >= 0 ? lift.positive : lift.negative);
           bending += m[q][s] * (phi[q][s] - phi_trial[q][s]);
         }
         if (along == 0) continue;
-        double by = (length_of(phi, m, s) - so_far[s]) * along / squares;
+        double by = (calc_strain(s) - so_far[s]) * along / squares;
         // the axial spring takes no more than bending brings: |by| (½ k |by| - N') <= brought, N' pulling the way of by
         const double brought = (1 - 0.5 * limits[s].law().damage_share) * std::max(0.0, bending);
         const double pull = std::copysign(1.0, by) * (force[0] - axial_stiffness * sum);
@@ -647,8 +674,8 @@ struct Evaluation {
       if (!(excess > 1) || std::isinf(excess)) continue;
       const double left = 1 / excess, rise = -left * calc_rise(limits[s], axial, s, left) * relief * elongation;
       if (!(rise > 0)) continue;
-      const double length = length_of(phi, m, s);
-      const double trial = std::max(so_far[s], length_of(phi_trial, m_trial, s));
+      const double length = calc_strain(s);
+      const double trial = std::max(so_far[s], strain_of(phi_trial, m_trial, s, ratio_of(1, s)));
       const double ahead = (trial - so_far[s]) / (length - so_far[s]);  // by damage, before it turns
       share = std::min(share, std::max(0.0, (1 - left - rise * ahead) / (1 - left + rise * (1 - ahead))));
     }
@@ -774,6 +801,7 @@ struct Evaluation {
       if (turned[s]) {
         flowed = true;
         st.reached = std::max(st.reached, length_of(phi, m, s));
+        st.strained = std::max(st.strained, strain_of(phi, m, s, law.rotation_ratio));
       }
       if (st.reached >= (force[0] < 0 || was_far ? law.rupture_rotation_pressed : law.rupture_rotation))
         broke = BreakReason::Rotation;

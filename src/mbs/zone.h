@@ -25,6 +25,7 @@ struct StationState {
   double crest[2][2] = {};           // about y, z: moments > 0 and < 0 up to which it has cracked [N·m]
   double tangent[2] = {0, 0};        // rise of the rotation with the moment in the last evaluation, for the equilibrium
   double reached = 0;                // largest inelastic rotation so far, without that of cracks [rad]
+  double strained = 0;               // the same as the edges feel it: of rotations about y that strain them as much
   int k[2] = {0, 0}, j[2] = {0, 0};  // lookup hints
 };
 
@@ -124,11 +125,18 @@ void find_crack_bounds(const ZoneParameters&, ZoneState&);
 /// its way to another one, a crushed section, a force beyond the tables, an exponent other than 1.5, or no law at all.
 bool write_flow(const ZoneParameters&, const CompiledLaws&, ZoneState&, double time, double* fields);
 /// Of these the cells of the moment families and the compression limit around a normal force over the section that is
-/// left [N], a plastic shortening [m] and the rotations that its stations have reached [rad]; false, and cells as they
-/// were, if there is none. Looks up from the hints of z.
+/// left [N], a plastic shortening [m] and what the rotations of its stations have strained [rad]; false, and cells as
+/// they were, if there is none. Looks up from the hints of z.
 ///   stride  between the fields
 bool write_flow_cells(const ZoneParameters&, const CompiledLaws&, ZoneState&, double axial, double shortened,
-                      const double reached[2], double* fields, size_t stride);
+                      const double strained[2], double* fields, size_t stride);
+/// Another law for all stations of a zone, which takes over from a time on [s] within a ramp [s]; the stiffness follows
+/// once that is over.
+struct LawSwitch {
+  int law = 0;
+  double time = 0, ramp = 0, stiffness_share = 1;
+};
+void begin_switch(const ZoneParameters&, const CompiledLaws&, const LawSwitch&, ZoneState&);
 /// Lengthens a live zone's plastic axial deformation from outside; what that takes from or adds to the elastic energy
 /// is booked as plastic work. The resultants follow at the next evaluation.
 void elongate_zone(const ZoneParameters&, double by, ZoneState&);

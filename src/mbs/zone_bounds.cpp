@@ -63,16 +63,16 @@ void find_safe_bounds(const ZoneParameters& p, const CompiledLaws& laws, const L
     return laws[static_cast<size_t>(z.base_law < 0 ? p.law[s] : z.base_law)];
   };
   const int first = kernel::first_bending(p.plane), last = kernel::last_bending(p.plane);
-  double reach = kUnlimited, reached = 0;
+  double reach = kUnlimited, strained = 0;
   for (int s = 0; s < p.stations; ++s) {
-    reached = std::max(reached, z.station[s].reached);
+    strained = std::max(strained, z.station[s].strained);
     for (const CompiledFamily& family : law_of(s).moment)
       if (family.K > 0) reach = std::min(reach, 0.06 * (family.force.back() - family.force.front()));
   }
   const double whole = limits.integrity(z.shortened);
   double from = normal_force - reach, to = normal_force + reach;
   if (!p.external_axial) {
-    from = std::max(from, -limits.compression(reached, z.shortened, whole, z.station[0]));
+    from = std::max(from, -limits.compression(strained, z.shortened, whole, z.station[0]));
     to = std::min(to, limits.tension(z.elongated, z.shortened));
   }
   for (int s = 0; s < p.stations; ++s)
@@ -82,9 +82,9 @@ void find_safe_bounds(const ZoneParameters& p, const CompiledLaws& laws, const L
   for (int q = first; q <= last; ++q) {
     z.safe_moment[q] = kUnlimited;
     for (int s = 0; s < p.stations; ++s)
-      z.safe_moment[q] = std::min(
-          z.safe_moment[q],
-          find_least_moment(law_of(s).moment[q], from, to, z.station[s].reached, z.station[s].k[q], z.station[s].j[q]));
+      z.safe_moment[q] =
+          std::min(z.safe_moment[q], find_least_moment(law_of(s).moment[q], from, to, z.station[s].strained,
+                                                       z.station[s].k[q], z.station[s].j[q]));
     z.safe_shear[1 - q] = limits.shear(1 - q, z.slipped, -to);
     if (!(z.safe_moment[q] > 0 && z.safe_shear[1 - q] > 0 && limits.torsion() > 0)) return;
   }
@@ -156,7 +156,7 @@ void write_curve(const CompiledLaw& law, double shortened, bool may_flow, double
 }
 
 /// Compression limit over the rotation, from the interval of each family that it is in.
-void write_capacity(const CompiledLaw& law, const ZoneState& z, double reached, double* out, size_t stride) {
+void write_capacity(const CompiledLaw& law, const ZoneState& z, double strained, double* out, size_t stride) {
   using namespace kernel;
   const auto put = [&](int field, double x) { out[static_cast<size_t>(field) * stride] = x; };
   put(kTurnedPart, law.elongates ? 0 : 1);
@@ -165,10 +165,10 @@ void write_capacity(const CompiledLaw& law, const ZoneState& z, double reached, 
   for (int q = 0; q < 2; ++q) {
     const CompiledFamily& family = law.moment[q];
     double from = 0, least = -kMostLimit, slope = 0;
-    if (family.K > 0 && reached >= family.rotation.back()) {
+    if (family.K > 0 && strained >= family.rotation.back()) {
       least = -family.capacity.back();
     } else if (family.K > 0) {
-      const size_t j = static_cast<size_t>(find_interval(family.rotation, reached, z.station[0].j[q]));
+      const size_t j = static_cast<size_t>(find_interval(family.rotation, strained, z.station[0].j[q]));
       from = family.rotation[j];
       least = -family.capacity[j];
       slope = -(family.capacity[j + 1] - family.capacity[j]) / (family.rotation[j + 1] - from);
@@ -182,7 +182,7 @@ void write_capacity(const CompiledLaw& law, const ZoneState& z, double reached, 
 }  // namespace
 
 bool write_flow_cells(const ZoneParameters& p, const CompiledLaws& laws, ZoneState& z, double axial, double shortened,
-                      const double reached[2], double* out, size_t stride) {
+                      const double strained[2], double* out, size_t stride) {
   using namespace kernel;
   const auto law_of = [&](int s) -> const CompiledLaw& {
     return laws[static_cast<size_t>(z.base_law < 0 ? p.law[s] : z.base_law)];
@@ -214,9 +214,9 @@ bool write_flow_cells(const ZoneParameters& p, const CompiledLaws& laws, ZoneSta
       put(kCellForce + 1, row[0] < middle ? 1 / (whole * (forces[middle] - forces[row[0]])) : kMostLimit);
       put(kCellForce + 2, row[2] > middle ? 1 / (whole * (forces[row[2]] - forces[middle])) : kMostLimit);
       size_t j[2] = {family.rotation.size() - 1, family.rotation.size() - 1};
-      double lowest = reached[s], per_width = 0;
-      if (reached[s] < family.rotation.back()) {
-        st.j[q] = find_interval(family.rotation, reached[s], st.j[q]);
+      double lowest = strained[s], per_width = 0;
+      if (strained[s] < family.rotation.back()) {
+        st.j[q] = find_interval(family.rotation, strained[s], st.j[q]);
         j[0] = static_cast<size_t>(st.j[q]), j[1] = j[0] + 1;
         lowest = family.rotation[j[0]];
         per_width = 1 / (family.rotation[j[1]] - family.rotation[j[0]]);
@@ -235,7 +235,7 @@ bool write_flow_cells(const ZoneParameters& p, const CompiledLaws& laws, ZoneSta
     }
   out[kWrittenWhole * stride] = whole;
   write_curve(law_of(0), shortened, z.yielded, out, stride);
-  write_capacity(law_of(0), z, std::max(reached[0], reached[1]), out, stride);
+  write_capacity(law_of(0), z, std::max(strained[0], strained[1]), out, stride);
   return true;
 }
 
@@ -257,6 +257,8 @@ bool write_flow(const ZoneParameters& p, const CompiledLaws& laws, ZoneState& z,
         station[kPhi + q] = z.station[s].phi[q], station[kSoftness + q] = z.station[s].soft[q],
                        station[kCracked + q] = z.station[s].crack[q], station[kBow + q] = z.station[s].bow[q];
       station[kReached] = z.station[s].reached;
+      station[kStrained] = z.station[s].strained;
+      station[kRotationRatio] = law->rotation_ratio;
       station[kShare] = law->damage_share;
       const bool is_far = z.station[s].reached >= law->rupture_rotation;
       is_pressed = is_pressed || is_far;
@@ -268,9 +270,9 @@ bool write_flow(const ZoneParameters& p, const CompiledLaws& laws, ZoneState& z,
         std::fill(cell + kCellPositive, cell + kCellLiftPositive, kMostLimit);
     }
   }
-  const double reached[2] = {z.station[0].reached, z.station[1].reached};
+  const double strained[2] = {z.station[0].strained, z.station[1].strained};
   const double whole = limits.integrity(z.shortened);
-  if (!write_flow_cells(p, laws, z, z.normal_force / whole, z.shortened, reached, out, 1)) return false;
+  if (!write_flow_cells(p, laws, z, z.normal_force / whole, z.shortened, strained, out, 1)) return false;
   const CompiledLaw& law = limits.law();
   out[kLifted] = z.lifted, out[kShortened] = z.shortened, out[kCrushed] = z.crushed;
   out[kCrushLength] = law.crush_length;
@@ -303,11 +305,11 @@ double calc_utilisation(const ZoneParameters& p, const CompiledLaws& laws, doubl
   double force[6];
   for (int i = 0; i < 6; ++i) force[i] = z.elastic_force[i];
   force[0] = z.normal_force;
-  double reached = z.station[0].reached;
-  if (p.stations > 1) reached = std::max(reached, z.station[1].reached);
+  double strained = z.station[0].strained;
+  if (p.stations > 1) strained = std::max(strained, z.station[1].strained);
   const double integrity = limits.integrity(z.shortened);
   double u = p.external_axial ? 0.0
-             : force[0] < 0   ? ratio(-force[0], limits.compression(reached, z.shortened, integrity, z.station[0]))
+             : force[0] < 0   ? ratio(-force[0], limits.compression(strained, z.shortened, integrity, z.station[0]))
                               : ratio(force[0], limits.tension(z.elongated, z.shortened));
   for (int s = 0; s < p.stations; ++s) {
     const Limits station_limits(laws, p.law[s], z, time);
@@ -338,7 +340,7 @@ bool is_softening(const ZoneParameters& p, const CompiledLaws& laws, double time
     for (int q = 0; q < 2; ++q) {
       const Limits station_limits(laws, p.law[s], z, time);
       StationState now = z.station[s], fresh;
-      if (now.reached == 0) continue;
+      if (now.strained == 0) continue;
       std::copy(now.k, now.k + 2, fresh.k);  // where to look first
       const MomentLimit a = station_limits.moment(q, axial, now), b = station_limits.moment(q, axial, fresh);
       if (b.positive != kUnlimited && a.positive + a.negative < 0.85 * (b.positive + b.negative)) return true;

@@ -23,6 +23,8 @@ CompiledLaw compile_law(const ZoneLaw& law) {
     to.J = static_cast<int>(from.plastic_rotation.size());
     to.force = from.normal_force;
     to.rotation = from.plastic_rotation;
+    if (axis == 1)
+      for (double& r : to.rotation) r *= law.rotation_ratio;
     to.limit.resize(from.positive.size() * 2);
     double largest = 0;
     for (size_t i = 0; i < from.positive.size(); ++i) {
@@ -72,6 +74,7 @@ CompiledLaw compile_law(const ZoneLaw& law) {
   }
   c.buckles = law.buckles;
   c.biaxial_exponent = law.biaxial_exponent;
+  c.rotation_ratio = law.rotation_ratio;
   c.damage_share = law.damage_share;
   c.rupture_rotation = law.rupture_rotation;
   c.rupture_rotation_pressed = std::max(law.rupture_rotation, law.rupture_rotation_pressed);

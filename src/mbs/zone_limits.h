@@ -48,18 +48,18 @@ class Limits {
   }
   MomentLimit moment(int axis, double normal_force, StationState& s) const {
     MomentLimit a{0, 0}, b{0, 0};
-    if (share_ < 1) a = calc_moment_limit(from_.get().moment[axis], normal_force, s.reached, s.k[axis], s.j[axis]);
+    if (share_ < 1) a = calc_moment_limit(from_.get().moment[axis], normal_force, s.strained, s.k[axis], s.j[axis]);
     if (share_ > 0) {
       int k = 0, j = 0;
-      b = calc_moment_limit(to_.get().moment[axis], normal_force, s.reached, k, j);
+      b = calc_moment_limit(to_.get().moment[axis], normal_force, s.strained, k, j);
     }
     return {mix(a.positive, b.positive), mix(a.negative, b.negative)};
   }
   /// Rise of the limits with the normal force.
   MomentLimit slope(int axis, double normal_force, const StationState& s) const {
     MomentLimit a{0, 0}, b{0, 0};
-    if (share_ < 1) a = calc_moment_slope(from_.get().moment[axis], normal_force, s.reached, s.k[axis], s.j[axis]);
-    if (share_ > 0) b = calc_moment_slope(to_.get().moment[axis], normal_force, s.reached, 0, 0);
+    if (share_ < 1) a = calc_moment_slope(from_.get().moment[axis], normal_force, s.strained, s.k[axis], s.j[axis]);
+    if (share_ > 0) b = calc_moment_slope(to_.get().moment[axis], normal_force, s.strained, 0, 0);
     return {mix(a.positive, b.positive), mix(a.negative, b.negative)};
   }
   bool elongates() const { return from_.get().elongates || to_.get().elongates; }

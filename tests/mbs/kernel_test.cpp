@@ -87,9 +87,21 @@ Six path_at(int i, double amplitude, std::uint32_t seed, double pressed = 0) {
 
 struct Walked {
   Six resultant;
-  double energy, plastic, damping, reached, shortened;
+  double energy, plastic, damping, reached, strained, shortened;
   bool yielded;
 };
+
+Walked note(const ZoneState& z) {
+  const StationState &a = z.station[0], &b = z.station[1];
+  return {z.resultant,
+          z.energy,
+          z.plastic,
+          z.damping,
+          std::max(a.reached, b.reached),
+          std::max(a.strained, b.strained),
+          z.shortened,
+          has_yielded(z)};
+}
 
 /// The path through the kernel (System) and through the law alone.
 void walk(int stations, const ZoneLaw& zone, double amplitude, std::uint32_t seed, size_t width,
@@ -112,13 +124,11 @@ void walk(int stations, const ZoneLaw& zone, double amplitude, std::uint32_t see
     outside += static_cast<long>(s.lanes->outside.size());
     s.unpack_elements();
     const ZoneState& k = s.state.element[0];
-    kernel.push_back({k.resultant, k.energy, k.plastic, k.damping, std::max(k.station[0].reached, k.station[1].reached),
-                      k.shortened, has_yielded(k)});
+    kernel.push_back(note(k));
     if (law != nullptr) {
       const Six deformation = s.measure_zone(s.elements[0]).deformation;
       if (z.live) advance_zone(s.elements[0].zone, s.laws, deformation, 1e-4 * i, 1e-4, z);
-      law->push_back({z.resultant, z.energy, z.plastic, z.damping, std::max(z.station[0].reached, z.station[1].reached),
-                      z.shortened, has_yielded(z)});
+      law->push_back(note(z));
       EXPECT_EQ(k.live, z.live) << i;
       if (k.live != z.live || !z.live) break;
     }
@@ -127,8 +137,12 @@ void walk(int stations, const ZoneLaw& zone, double amplitude, std::uint32_t see
 }
 
 /// Walks through kernel and full law, which are to agree. Returns what the latter gave.
-std::vector<Walked> compare(int stations, const ZoneLaw& zone, double amplitude, std::uint32_t seed, double pressed,
+std::vector<Walked> compare(int stations, ZoneLaw zone, double amplitude, std::uint32_t seed, double pressed,
                             double& full, bool cracks = false) {
+  if (seed % 2 == 0) {  // a section that is not square, and turns further about its weak axis
+    zone.rotation_ratio = 0.4;
+    for (double& rotation : zone.moment_z.plastic_rotation) rotation /= 0.4;
+  }
   std::vector<Walked> kernel, law;
   const auto check = [&] {
     walk(stations, zone, amplitude, seed, 0, kernel, &law, full, pressed, cracks);
@@ -145,6 +159,7 @@ std::vector<Walked> compare(int stations, const ZoneLaw& zone, double amplitude,
       ASSERT_NEAR(kernel[i].energy, law[i].energy, 1e-8 * energy + 1e-9) << i;
       ASSERT_NEAR(kernel[i].plastic, law[i].plastic, 1e-7 * energy + 1e-9) << i << " seed " << seed;
       ASSERT_NEAR(kernel[i].damping, law[i].damping, 1e-7 * energy + 1e-9) << i;
+      ASSERT_NEAR(kernel[i].strained, law[i].strained, 3e-9) << i;
       ASSERT_NEAR(kernel[i].reached, law[i].reached, 1e-9) << i;
       ASSERT_NEAR(kernel[i].shortened, law[i].shortened, 1e-9) << i << " seed " << seed;
       ASSERT_EQ(kernel[i].yielded, law[i].yielded) << i << " seed " << seed;

@@ -118,6 +118,78 @@ TEST(Zone, BothAxesShareTheSection) {
   EXPECT_NEAR(std::pow(my / L, 1.5) + std::pow(mz / L, 1.5), 1, 1e-3);
 }
 
+TEST(Zone, TurnsAboutTheWeakAxisSpareTheStrongOne) {
+  // a panel: about z its edges are four times as far away
+  ZoneLaw law = make_law();
+  law.rotation_ratio = 4;
+  for (double& rotation : law.moment_z.plastic_rotation) rotation /= 4;
+  {
+    Walk w(law);
+    w.go(deform(0, 0.05 + 20e3 / kStiff, 0));  // about y down to 20 kNm
+    EXPECT_NEAR(w.z.station[0].reached, 0.05, 1e-4);
+    EXPECT_NEAR(w.z.station[0].strained, 0.05, 1e-4);
+    w.go(deform(0, 0.05, 0.01));  // let go, then about z at 0.05 / 4: on the same column of the family
+    EXPECT_NEAR(w.moment_z(), 20e3, 300);
+  }
+  {
+    Walk w(law);
+    w.go(deform(0, 0.01 + 120e3 / kStiff, 0));
+    w.go(deform(0, 0.01, 0));
+    w.go(deform(0, 0.01, 0.0005));
+    EXPECT_NEAR(w.moment_z(), 50e3, 1);  // springs back: about y it is at its peak, and so it is about z
+    w.go(deform(0, 0.01, 0.0005 + 120e3 / kStiff));
+    EXPECT_GT(w.moment_z(), 115e3);
+  }
+  {
+    Walk w(law);
+    w.go(deform(0, 0, 0.01 + 80e3 / kStiff));  // 10 mrad about z do as 40 mrad about y
+    // M = 120e3 - 100e3 (s - 0.01) / 0.04 with s = 4 (0.0108 - M / 1e8)
+    EXPECT_NEAR(w.moment_z(), 37e3 / 0.9, 200);
+    EXPECT_NEAR(w.z.station[0].reached, w.z.station[0].strained / 4, 1e-9);
+    EXPECT_NEAR(w.z.station[0].strained, 0.0432 - 4 * 37e3 / 0.9 / kStiff, 2e-5);
+  }
+}
+
+TEST(Zone, IsCrushedAsFarAsItsEdgesAreStrained) {
+  ZoneLaw law = make_law();
+  law.compression = {}, law.rotation_ratio = 4;
+  // 2 MN until 10 mrad about y, 1 MN from 20 mrad on
+  for (MomentFamily* m : {&law.moment_y, &law.moment_z}) {
+    m->plastic_rotation = {0, 0.01, 0.02, 0.2};
+    m->normal_force = {-2e6, -1e6, 0, 0.5e6};
+    m->positive = {1, 1, 0, 0, 100e3, 100e3, 0, 0, 100e3, 100e3, 100e3, 100e3, 0, 0, 0, 0};
+    m->negative = m->positive;
+  }
+  for (double& rotation : law.moment_z.plastic_rotation) rotation /= 4;
+  const auto bears = [&](double about_y, double about_z) {
+    Walk w(law);
+    w.go(deform(0, about_y, about_z));
+    w.go(deform(-3e6 / kStiff, about_y, about_z));
+    return -w.z.resultant.c[0];
+  };
+  const double springs = 100e3 / kStiff;
+  const double about_y = bears(0.013 + springs, 0), about_z = bears(0, 0.013 / 4 + springs / 4);
+  EXPECT_LT(about_y, 0.95 * bears(0.002, 0));
+  EXPECT_NEAR(about_y, about_z, 0.05 * about_y);
+  EXPECT_LT(bears(0, 0.013 + springs), 0.9 * about_y);
+}
+
+TEST(Zone, AnotherLawCountsRotationsItsOwnWay) {
+  ZoneLaw law = make_law(), panel = make_law();
+  panel.rotation_ratio = 4;
+  Walk w(law);
+  w.laws.push_back(compile_law(panel));
+  w.go(deform(0, 0.006, 0.008));
+  StationState& st = w.z.station[0];
+  ASSERT_GT(st.reached, 0.005);
+  EXPECT_EQ(st.strained, st.reached);
+  begin_switch(w.p, w.laws, {.law = 1, .time = 0, .ramp = 0, .stiffness_share = 1}, w.z);
+  const double length = std::hypot(st.phi[0], st.phi[1]);
+  EXPECT_NEAR(st.strained, st.reached * std::hypot(st.phi[0], 4 * st.phi[1]) / length, 1e-12);
+  begin_switch(w.p, w.laws, {.law = 0, .time = 0, .ramp = 0, .stiffness_share = 1}, w.z);
+  EXPECT_NEAR(st.strained, st.reached, 1e-12);
+}
+
 TEST(Zone, UnloadsElasticallyAndKeepsItsPlasticRotation) {
   Walk w;
   w.go(deform(0, 0, 0.01 + 120e3 / kStiff));

@@ -123,5 +123,41 @@ TEST(Biaxial, PowerLawFitsTheFibres) {
   }
 }
 
+/// Rotation at which a family has no moment left under a normal force, a force of its grid [rad].
+double find_loss(const MomentFamily& f, size_t k) {
+  const size_t J = f.rotation.size();
+  size_t j = J - 1;
+  while (j > 0 && !(f.moment[k * J + j] > 0)) --j;
+  return f.rotation[j];
+}
+
+TEST(Oblique, RotationsAreLostAsTheyStrainTheEdges) {
+  const struct {
+    const char* name;
+    ZoneInput in;
+  } cases[] = {{"square", make_column(0.5, 0.5, 3, 3, 0.022, 30)},
+               {"30 x 60", make_column(0.3, 0.6, 2, 5, 0.02, 30)},
+               {"60 x 15", make_column(0.6, 0.15, 5, 2, 0.012, 30)},
+               {"240 x 15", make_column(2.4, 0.15, 12, 2, 0.008, 30)}};
+  for (const auto& c : cases) {
+    const Rcc r = make_rcc(c.in);
+    const double ratio = std::sqrt(r.EI_z / r.EI_y);
+    const MomentFamily about_y = make_oblique_family(c.in, 0);
+    for (const double skew : {0.2, 0.25 * pi, 1.3, 0.5 * pi}) {
+      const double angle = std::atan2(c.in.section.height * std::sin(skew), c.in.section.width * std::cos(skew));
+      const MomentFamily f = make_oblique_family(c.in, angle);
+      for (size_t k = 1; k + 1 < f.normal_force.size(); ++k) {
+        const double share = f.normal_force[k] / f.normal_force[0];
+        if (share < 0.3 || share > 0.85) continue;
+        const double strained = std::hypot(std::cos(angle), ratio * std::sin(angle)) * find_loss(f, k);
+        // to the grid of rotations, 22 % from one to the next; a corner alone is crushed somewhat later
+        const double over = strained / find_loss(about_y, k);
+        EXPECT_GT(over, 0.78) << c.name << ", " << skew << ", " << share;
+        EXPECT_LT(over, 1.45) << c.name << ", " << skew << ", " << share;
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace topple::nearfield
