@@ -10,7 +10,7 @@ namespace topple::farfield {
 
 namespace {
 
-constexpr char kMagic[] = "topple-fe-checkpoint-2";
+constexpr char kMagic[] = "topple-fe-checkpoint-3";
 
 class Writer {
  public:
@@ -103,8 +103,8 @@ void pass_happening(Io& io, Happening& h) {
 
 template <class Io, class State>
 void pass_state(Io& io, State& s) {
-  io(s.next_frame), io(s.offset), io(s.quiet_since), io(s.swings_since), io(s.next_firing), io(s.zone_state),
-      io(s.has_touched);
+  io(s.next_frame), io(s.offset), io(s.quiet_since), io(s.swings_since), io(s.swing.most_speed), io(s.swing.path),
+      io(s.swing.has_turned), io(s.swing.is_short), io(s.next_firing), io(s.zone_state), io(s.has_touched);
   io(s.skipped), io(s.unsettled), io(s.relaxation.converged), io(s.relaxation.steps), io(s.relaxation.residual);
   io(s.relaxation.settlement), io(s.relaxation.text), io(s.ledger), io(s.energy_error), io(s.released), io(s.wall_time);
   io(s.has_fragments), io(s.fragments_time), io(s.fragments.damaged_strain), io(s.fragments.reach);
@@ -112,6 +112,13 @@ void pass_state(Io& io, State& s) {
 }
 
 }  // namespace
+
+bool Swing::has_passed(const Vec3& place) const {
+  if (path.empty()) return false;
+  const Vec3 way = place - path.front();
+  return std::any_of(path.begin(), path.end(),
+                     [&](const Vec3& p) { return dot(p - path.front(), way) >= dot(way, way); });
+}
 
 void write_checkpoint(const std::string& path, const std::string& key, const RunState& s,
                       const std::vector<std::byte>& system) {

@@ -20,6 +20,16 @@ struct UnsettledWait {
   long long steps = 0;  // of it
 };
 
+/// What has been seen of a building's motion since the last charge.
+struct Swing {
+  double most_speed = 0;    // largest mean speed [m/s]
+  std::vector<Vec3> path;   // mean place of the upper block when the charge fired, and in each frame since [m]
+  bool has_turned = false;  // its mean speed is half of that at most
+  bool is_short = false;    // it has not come as far as where it would come to rest
+  /// Whether it has been as far from where it was as a place is, in the direction to it.
+  bool has_passed(const Vec3& place) const;
+};
+
 /// Everything that changes while a run goes on, beside the elements' state.
 struct RunState {
   std::vector<std::variant<mbs::View, mbs::Happening>> shown;  // in the order in which they were shown
@@ -27,11 +37,12 @@ struct RunState {
   long long next_frame = 0;                                    // number of the next frame on the plan's clock
   double offset = 0;                                           // the plan's time less that of the elements [s]
   double quiet_since = -1, swings_since = -1;                  // negative: not so [s]
-  size_t next_firing = 0;                                      // in the schedule
-  std::vector<unsigned char> zone_state;                       // mbs::ElementState of the last frame
-  std::vector<unsigned char> has_touched;                      // (bodies)
-  std::vector<std::array<double, 3>> skipped;                  // quiet waits passed over, from and to [s], and how far
-                                                               // the building settled in them [m]
+  Swing swing;
+  size_t next_firing = 0;                      // in the schedule
+  std::vector<unsigned char> zone_state;       // mbs::ElementState of the last frame
+  std::vector<unsigned char> has_touched;      // (bodies)
+  std::vector<std::array<double, 3>> skipped;  // quiet waits passed over, from and to [s], and how far
+                                               // the building settled in them [m]
   std::vector<UnsettledWait> unsettled;
   fem::RelaxationSummary relaxation;
   mbs::Energy ledger;          // what the record holds beyond the elements' own ledger since they were settled last [J]

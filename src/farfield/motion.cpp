@@ -29,6 +29,8 @@ Motion::Motion(const Whole& whole, const mbs::Model& model, const collapse::Mode
     : whole_(whole), model_(model) {
   const fem::ExplicitModel& fe = whole.fe;
   body_elements_.resize(model.bodies.size());
+  for (size_t b = 0; b < map.bodies.size(); ++b)
+    if (map.bodies[b].is_upper) upper_.push_back(b);
   for (size_t e = 0; e < fe.elements.size(); ++e) {
     const fem::ExplicitElement& element = fe.elements[e];
     std::array<Vec3, 8> corners;
@@ -166,6 +168,13 @@ std::vector<double> Motion::calc_foot_forces(const fem::ExplicitSystem& system) 
     forces.push_back(force);
   }
   return forces;
+}
+
+Vec3 Motion::calc_upper_place(const mbs::View& v) const {
+  Vec3 sum;
+  double mass = 0;
+  for (const size_t b : upper_) sum += v.mass[b] * v.X_WB[b].p, mass += v.mass[b];
+  return mass > 0 ? (1 / mass) * sum : sum;
 }
 
 double Motion::calc_speed(const mbs::View& v) const {

@@ -24,12 +24,15 @@ class Motion {
   mbs::View calc_view(const fem::ExplicitSystem&, double time) const;
   /// Vertical force of the ground on each foot, upwards [N]. (feet)
   std::vector<double> calc_foot_forces(const fem::ExplicitSystem&) const;
+  /// Mean place of the upper block [m].
+  Vec3 calc_upper_place(const mbs::View&) const;
   /// Kinetic energy per half mass, as a speed [m/s].
   double calc_speed(const mbs::View&) const;
 
  private:
   const Whole& whole_;
   const mbs::Model& model_;
+  std::vector<size_t> upper_;                    // bodies of the upper block
   std::vector<std::vector<int>> body_elements_;  // (bodies)
   std::vector<double> element_mass_;             // (elements)
   std::vector<ZoneElements> zones_;              // zone elements, then rotational elements

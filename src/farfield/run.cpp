@@ -26,6 +26,10 @@ using record::Status;
 /// 3 cm at half a hertz.
 constexpr double kSwing = 5;
 
+/// It has turned back once, and may be settled, when its mean speed has fallen below this share of the largest one
+/// since the charge: a quarter of the energy in motion.
+constexpr double kTurned = 0.5;
+
 /// Out-of-balance over load to which a wait is settled: twice that of the dead load, and far less than the swing that
 /// is passed over.
 constexpr double kSettled = 2e-3;
@@ -185,8 +189,12 @@ class Course {
     add_ledger(v.energy);
     state_.energy_error = std::max(state_.energy_error, std::abs(v.energy.residual));
     state_.released = std::max(state_.released, v.energy.released);
-    note_quiet(state_.quiet_since, motion_.calc_speed(v) < k_.rest_speed, at);
-    note_quiet(state_.swings_since, motion_.calc_speed(v) < kSwing * k_.rest_speed, at);
+    const double speed = motion_.calc_speed(v);
+    note_quiet(state_.quiet_since, speed < k_.rest_speed, at);
+    note_quiet(state_.swings_since, speed < kSwing * k_.rest_speed, at);
+    state_.swing.most_speed = std::max(state_.swing.most_speed, speed);
+    state_.swing.has_turned = speed < kTurned * state_.swing.most_speed;
+    state_.swing.path.push_back(motion_.calc_upper_place(v));
     if (!state_.has_fragments && !state_.shown.empty()) look_at_fragments(false, at);
     show_changes(v);
     options_.on_frame(v);
@@ -241,6 +249,8 @@ class Course {
       if (whole_.charges[c].stage == f.stage && whole_.charges[c].charge == f.charge)
         system_.release(static_cast<int>(c));
     state_.quiet_since = state_.swings_since = -1;
+    state_.swing = {};
+    state_.swing.path = {motion_.calc_upper_place(motion_.calc_view(system_, f.time))};
     for (size_t e = 0; e < map_.events.size(); ++e) {
       const collapse::EventEntry& entry = map_.events[e];
       if (entry.stage != f.stage || entry.charge != f.charge || entry.is_aftermath) continue;
@@ -280,11 +290,13 @@ class Course {
   }
 
   /// What only swings about where it stands comes to rest in the wait before the next charge: it is settled without
-  /// motion, and the plan's clock put forward to two frames before the charge. What finds no equilibrium so is followed
-  /// in time. False: cancelled.
+  /// motion, and the plan's clock put forward to two frames before the charge. That may be after its first swing, if
+  /// this went at least as far as where it comes to rest, or when it has been swinging for a while. What finds no
+  /// equilibrium so is followed in time. False: cancelled.
   [[nodiscard]] bool skip_quiet() {
     if (!fe_.skip_quiet || state_.next_firing == schedule_.size() || state_.swings_since < 0) return true;
-    if (time() - state_.swings_since < k_.rest_time) return true;
+    const bool is_first = time() - state_.swings_since < k_.rest_time;
+    if (is_first && (!state_.swing.has_turned || state_.swing.is_short)) return true;
     const long long to =
         static_cast<long long>(std::floor(schedule_[state_.next_firing].time / options_.frame_interval)) - 2;
     if (to <= state_.next_frame) return true;
@@ -298,11 +310,21 @@ class Course {
     if (!relaxed.converged) {
       system_.read_snapshot(swinging);
       if (options_.progress.is_cancelled()) return false;
+      if (is_first) {
+        state_.swing.is_short = true;
+        return true;
+      }
       state_.unsettled.push_back({state_.next_firing, time(), relaxed.residual, relaxed.steps});
       return true;
     }
+    const mbs::View settled = motion_.calc_view(system_, time());
+    if (is_first && !state_.swing.has_passed(motion_.calc_upper_place(settled))) {
+      system_.read_snapshot(swinging);
+      state_.swing.is_short = true;
+      return true;
+    }
     state_.ledger = {};
-    const mbs::Energy after = motion_.calc_view(system_, time()).energy;
+    const mbs::Energy& after = settled.energy;
     state_.ledger.gravity = before.gravity - after.gravity;
     state_.ledger.plastic = before.plastic - after.plastic;
     state_.ledger.friction = before.friction - after.friction;
