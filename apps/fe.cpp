@@ -96,7 +96,7 @@ int run_finite_elements(const Arguments& a, const std::atomic<bool>& cancel) {
       if (!fe.resume) std::fprintf(out, "Putting on the dead load ...\n");
       std::fflush(out);
     };
-    fe_callbacks.on_settling = [&](int steps) { progress.say(fmt::format("dead load: {} steps", steps)); };
+    fe_callbacks.on_settling = [&](int steps) { progress.say(fmt::format("settling: {} steps", steps)); };
     fe_callbacks.on_relaxed = [&](const fem::RelaxationSummary& s) {
       progress.clear();
       std::fprintf(out, "%s\n", s.text.c_str());
