@@ -1,5 +1,6 @@
 #include "farfield/checkpoint.h"
 
+#include <algorithm>
 #include <cstring>
 #include <type_traits>
 

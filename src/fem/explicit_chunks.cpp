@@ -157,7 +157,7 @@ std::array<int, 8> turn_corners(const std::array<int, 8>& node, int turn) {
 
 size_t choose_chunk(const ExplicitModel& model) {
   // larger ones share fewer nodes; a small model still has some for each thread, and what is asked for ahead for the
-  // next chunk is to stay in the second cache beside this one's, some 0.4 kB an element both
+  // next chunk is to stay in the second cache beside this one's, some 0.5 kB an element
   constexpr size_t kLargeCache = 3UL << 19;
   const size_t most = second_cache() >= kLargeCache ? 2000 : 1000;
   return std::clamp<size_t>(model.elements.size() / 32, 1000, most);

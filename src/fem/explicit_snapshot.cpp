@@ -9,7 +9,7 @@ namespace topple::fem {
 
 namespace {
 
-constexpr std::uint64_t kMark = 0x7470'6578'0000'0010;  // name and version of the layout
+constexpr std::uint64_t kMark = 0x7470'6578'0000'0011;  // name and version of the layout
 
 class Writer {
  public:
@@ -82,7 +82,7 @@ void pass_state(Archive& archive, State& s) {
 }
 
 /// What tells one model and its options from others.
-std::array<double, 7> describe(const ExplicitSystem::Inside& in) {
+std::array<double, 8> describe(const ExplicitSystem::Inside& in) {
   double sum = 0;
   for (size_t e = 0; e < in.element_mass.size(); ++e) sum += static_cast<double>(e % 97 + 1) * in.element_mass[e];
   return {static_cast<double>(in.model.nodes.size()),
@@ -90,6 +90,7 @@ std::array<double, 7> describe(const ExplicitSystem::Inside& in) {
           in.h,
           sum,
           static_cast<double>(in.chunks.W),
+          static_cast<double>(in.chunks.chunks.size()),  // their size goes by the machine
           static_cast<double>(in.model.grounds.size()),
           static_cast<double>(in.debris_steps)};
 }
@@ -113,7 +114,7 @@ void ExplicitSystem::read_snapshot(std::span<const std::byte> bytes) {
   Inside& in = *inside_;
   Reader from(bytes);
   std::uint64_t mark = 0;
-  std::array<double, 7> description{};
+  std::array<double, 8> description{};
   from.value(mark), from.value(description);
   if (mark != kMark || description != describe(in)) Reader::fail();
   ExplicitState s;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "base/error.h"
 #include "explicit_mesh.h"
 
 namespace topple::fem {
@@ -459,6 +460,20 @@ TEST(ExplicitReplay, RefusesASnapshotOfAnotherModel) {
   EXPECT_ANY_THROW(b.read_snapshot(snapshot));
   snapshot.resize(snapshot.size() / 2);
   EXPECT_ANY_THROW(a.read_snapshot(snapshot));
+}
+
+TEST(ExplicitReplay, RefusesASnapshotOfOtherChunks) {
+  // as a machine with another cache writes it: the same model, its elements in more chunks
+  ExplicitSystem system(make_pillar(), {});
+  std::vector<std::byte> snapshot = system.write_snapshot();
+  system.read_snapshot(snapshot);
+  std::byte* const at = snapshot.data() + sizeof(std::uint64_t) + 5 * sizeof(double);
+  double chunks = 0;
+  std::memcpy(&chunks, at, sizeof chunks);
+  ASSERT_EQ(chunks, 1);
+  chunks = 2;
+  std::memcpy(at, &chunks, sizeof chunks);
+  EXPECT_THROW(system.read_snapshot(snapshot), InputError);
 }
 
 }  // namespace
