@@ -646,11 +646,13 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
   }
   N reached[2], strained[2];
   for (int s = 0; s < Hinges; ++s) {
-    const N gone = length_of([&](int q) { return beyond_cracks(q, s); });
-    const N held = load<D>(flow, kStations + s * kStationFields + kReached);
-    const N known = load<D>(flow, kStations + s * kStationFields + kStrained);
-    reached[s] = select(turns[s], N{hn::Max(held.v, gone.v)}, held);
-    strained[s] = select(turns[s], N{hn::Max(known.v, strained_by(s).v)}, known);
+    reached[s] = load<D>(flow, kStations + s * kStationFields + kReached);
+    strained[s] = load<D>(flow, kStations + s * kStationFields + kStrained);
+    if (!hn::AllFalse(tag, turns[s])) {
+      const N gone = length_of([&](int q) { return beyond_cracks(q, s); });
+      reached[s] = select(turns[s], N{hn::Max(reached[s].v, gone.v)}, reached[s]);
+      strained[s] = select(turns[s], N{hn::Max(strained[s].v, strained_by(s).v)}, strained[s]);
+    }
     demand(hn::Lt(reached[s].v, load<D>(flow, kStations + s * kStationFields + kRupture).v));
   }
   // what is new of the inelastic rotation: a plastic part and added flexibility

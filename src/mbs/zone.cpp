@@ -97,8 +97,9 @@ void begin_switch(const ZoneParameters& p, const CompiledLaws& laws, const LawSw
     const int before = z.base_law < 0 ? p.law[s] : z.base_law;
     if (st.reached == 0 || laws[static_cast<size_t>(before)].rotation_ratio == ratio) continue;
     // in the direction in which it stands
-    const double y = st.phi[0] - st.bow[0], turned_z = st.phi[1] - st.bow[1], length = std::hypot(y, turned_z);
-    st.strained = length > 0 ? st.reached * std::hypot(y, ratio * turned_z) / length : st.reached;
+    const double about_y = st.phi[0] - st.bow[0], about_z = st.phi[1] - st.bow[1],
+                 length = std::hypot(about_y, about_z);
+    st.strained = length > 0 ? st.reached * std::hypot(about_y, ratio * about_z) / length : st.reached;
   }
 }
 
@@ -372,8 +373,7 @@ struct Evaluation {
 
   /// Flow along the axis. Returns the share of the section that is still there.
   double flow_axially(const Limits& limits) {
-    double strained = z.station[0].strained;
-    if (n > 1) strained = std::max(strained, z.station[1].strained);
+    const double strained = most_strained(z);
     double integrity = limits.integrity(z.shortened);
     z.crushed = 0;
     if (p.external_axial) {

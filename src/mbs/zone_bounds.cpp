@@ -63,16 +63,15 @@ void find_safe_bounds(const ZoneParameters& p, const CompiledLaws& laws, const L
     return laws[static_cast<size_t>(z.base_law < 0 ? p.law[s] : z.base_law)];
   };
   const int first = kernel::first_bending(p.plane), last = kernel::last_bending(p.plane);
-  double reach = kUnlimited, strained = 0;
+  double reach = kUnlimited;
   for (int s = 0; s < p.stations; ++s) {
-    strained = std::max(strained, z.station[s].strained);
     for (const CompiledFamily& family : law_of(s).moment)
       if (family.K > 0) reach = std::min(reach, 0.06 * (family.force.back() - family.force.front()));
   }
   const double whole = limits.integrity(z.shortened);
   double from = normal_force - reach, to = normal_force + reach;
   if (!p.external_axial) {
-    from = std::max(from, -limits.compression(strained, z.shortened, whole, z.station[0]));
+    from = std::max(from, -limits.compression(most_strained(z), z.shortened, whole, z.station[0]));
     to = std::min(to, limits.tension(z.elongated, z.shortened));
   }
   for (int s = 0; s < p.stations; ++s)
@@ -305,12 +304,11 @@ double calc_utilisation(const ZoneParameters& p, const CompiledLaws& laws, doubl
   double force[6];
   for (int i = 0; i < 6; ++i) force[i] = z.elastic_force[i];
   force[0] = z.normal_force;
-  double strained = z.station[0].strained;
-  if (p.stations > 1) strained = std::max(strained, z.station[1].strained);
   const double integrity = limits.integrity(z.shortened);
   double u = p.external_axial ? 0.0
-             : force[0] < 0   ? ratio(-force[0], limits.compression(strained, z.shortened, integrity, z.station[0]))
-                              : ratio(force[0], limits.tension(z.elongated, z.shortened));
+             : force[0] < 0
+                 ? ratio(-force[0], limits.compression(most_strained(z), z.shortened, integrity, z.station[0]))
+                 : ratio(force[0], limits.tension(z.elongated, z.shortened));
   for (int s = 0; s < p.stations; ++s) {
     const Limits station_limits(laws, p.law[s], z, time);
     StationState st = z.station[s];

@@ -96,6 +96,9 @@ class Limits {
   double hinge_bears_;
 };
 
+/// What the rotations of the stations have strained at most, a missing station nothing [rad].
+inline double most_strained(const ZoneState& z) { return std::max(z.station[0].strained, z.station[1].strained); }
+
 /// Cracks grow a little ahead of their moment, so that not every step has to see to them and dead load leaves them at
 /// rest.
 inline constexpr double kCracksAhead = 1.01;
