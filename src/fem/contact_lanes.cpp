@@ -19,10 +19,8 @@ namespace topple::fem::lanes {
 namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
-using D = hn::ScalableTag<double>;
-using DI = hn::RebindToSigned<D>;
+using D = hn::CappedTag<double, 4>;
 using V = hn::Vec<D>;
-using VI = hn::Vec<DI>;
 using M = hn::Mask<D>;
 constexpr size_t kLanes = hn::MaxLanes(D());
 static_assert(kLanes <= 8);
@@ -35,31 +33,30 @@ HWY_INLINE V3 choose(M mask, const V3& a, const V3& b) {
   return {hn::IfThenElse(mask, a.x, b.x), hn::IfThenElse(mask, a.y, b.y), hn::IfThenElse(mask, a.z, b.z)};
 }
 
-HWY_INLINE V3 gather(const double* HWY_RESTRICT from, VI at) {
-  const D d;
-  return {hn::GatherIndex(d, from, at), hn::GatherIndex(d, from + 1, at), hn::GatherIndex(d, from + 2, at)};
-}
-
-/// Candidates of a block, the last one again in lanes that are left over.
+/// Candidates of a block, the last one again in lanes that are left over: where their points and nodes begin.
 struct Block {
-  VI point, corner[4];  // where they begin, in numbers
+  const double *point[kLanes], *corner[4][kLanes];
+
+  template <class Number>
+  HWY_INLINE Block(const double* rows, const Faces& faces, const Number& number) {
+    for (size_t l = 0; l < kLanes; ++l) {
+      const size_t i = number(l);
+      point[l] = reinterpret_cast<const double*>(&faces.points[faces.point[i]]);
+      for (size_t k = 0; k < 4; ++k) corner[k][l] = rows + kernel::kNodeFields * size_t{faces.corners[k][i]};
+    }
+  }
 };
-template <class Number>
-HWY_INLINE VI load_places(size_t stride, const Number& number) {
-  HWY_ALIGN std::int64_t at[kLanes];
-  for (size_t l = 0; l < kLanes; ++l) at[l] = static_cast<std::int64_t>(stride * number(l));
-  return hn::Load(DI(), at);
+HWY_INLINE Four load_four(const double* const (&from)[kLanes], size_t first) {
+  return load_four([&](size_t l) HWY_ATTR { return from[l] + first; });
 }
-template <class Number>
-HWY_INLINE Block load_block(const Faces& faces, const Number& number) {
-  Block block;
-  block.point = load_places(sizeof(Point) / sizeof(double), [&](size_t l) { return faces.point[number(l)]; });
-  for (size_t k = 0; k < 4; ++k)
-    block.corner[k] = load_places(kernel::kNodeFields, [&](size_t l) { return faces.corners[k][number(l)]; });
-  return block;
-}
-HWY_INLINE void load_corners(const double* HWY_RESTRICT rows, const Block& block, V3 (&x)[4]) {
-  for (size_t k = 0; k < 4; ++k) x[k] = gather(rows, block.corner[k]);
+static_assert(kernel::kPlace == 0 && kernel::kSpeed == 3 && kernel::kInverseMass == 6);
+static_assert(offsetof(Point, radius) == 24 && offsetof(Point, v) == 32 && offsetof(Point, stiffness) == 64);
+static_assert(offsetof(Particle, radius) == 48 && offsetof(ParticleMake, stiffness) == 32);
+HWY_INLINE void load_corners(const Block& block, V3 (&x)[4]) {
+  for (size_t k = 0; k < 4; ++k) {
+    const Four place = load_four(block.corner[k], 0);
+    x[k] = {place.a, place.b, place.c};
+  }
 }
 
 /// A face's middle, the product of its diagonals, and how far a point is above the middle, times the length of that.
@@ -79,18 +76,17 @@ HWY_INLINE Look look(const V3& p, const V3 (&x)[4]) {
 HWY_NOINLINE size_t sift(const Setup& setup, const Faces& faces, size_t first, size_t last,
                          std::uint32_t* HWY_RESTRICT passed) {
   const D d;
-  const auto* points = reinterpret_cast<const double*>(faces.points.data());
   size_t kept = 0;
   constexpr size_t kAhead = 16;  // corners that lie all over memory
   for (size_t i = first; i < last; i += kLanes) {
     for (size_t l = i + kAhead; l < std::min(i + kAhead + kLanes, faces.point.size()); ++l)
       for (const auto& rows : faces.corners) hwy::Prefetch(setup.rows + kernel::kNodeFields * size_t{rows[l]});
-    const Block block = load_block(faces, [&](size_t l) { return std::min(i + l, last - 1); });
+    const Block block(setup.rows, faces, [&](size_t l) { return std::min(i + l, last - 1); });
     V3 x[4];
-    load_corners(setup.rows, block, x);
-    const Look at = look(gather(points, block.point), x);
-    const V radius = hn::GatherIndex(d, points + offsetof(Point, radius) / sizeof(double), block.point);
-    const V most = add(mul(radius, at.size), hn::Abs(dot(sub(x[0], at.middle), at.n)));
+    load_corners(block, x);
+    const Four point = load_four(block.point, 0);
+    const Look at = look({point.a, point.b, point.c}, x);
+    const V most = add(mul(point.d, at.size), hn::Abs(dot(sub(x[0], at.middle), at.n)));
     // written so that what is no number stays
     const M is_above = hn::Gt(at.above, most);
     std::uint8_t bits[8] = {};
@@ -183,16 +179,15 @@ HWY_INLINE V calc_crushed(const Pressed& on, V depth, V bears) {
 HWY_NOINLINE void press(const Setup& setup, const Faces& faces, size_t count, std::vector<Touch>& touches) {
   const D d;
   const V zero = num(0);
-  const auto* points = reinterpret_cast<const double*>(faces.points.data());
-  const auto field = [&](size_t offset) HWY_ATTR { return points + offset / sizeof(double); };
   const std::uint32_t* HWY_RESTRICT passed = faces.passed.data();
   for (size_t i = 0; i < count; i += kLanes) {
-    const Block block = load_block(faces, [&](size_t l) { return passed[std::min(i + l, count - 1)]; });
+    const Block block(setup.rows, faces, [&](size_t l) { return passed[std::min(i + l, count - 1)]; });
     V3 x[4];
-    load_corners(setup.rows, block, x);
-    const V3 p = gather(points, block.point);
-    const V radius = hn::GatherIndex(d, field(offsetof(Point, radius)), block.point);
-    const M is_ball = hn::Gt(hn::GatherIndex(d, field(offsetof(Point, ball)), block.point), zero);
+    load_corners(block, x);
+    const Four place = load_four(block.point, 0), make = load_four(block.point, 8);
+    const V3 p{place.a, place.b, place.c};
+    const V radius = place.d;
+    const M is_ball = hn::Gt(make.c, zero);
     const V above = look(p, x).above;
     const Projection on = project(p, x, radius, is_ball);
     const V depth = sub(radius, on.height);
@@ -201,22 +196,22 @@ HWY_NOINLINE void press(const Setup& setup, const Faces& faces, size_t count, st
     const M touch = hn::And(on.may_touch, hn::And(hn::Or(on.inside, beside), hn::Gt(depth, zero)));
     if (hn::AllFalse(d, touch)) continue;
 
-    V inverse = hn::GatherIndex(d, field(offsetof(Point, inverse_mass)), block.point);
-    V3 v = gather(field(offsetof(Point, v)), block.point);
+    const Four motion = load_four(block.point, 4);
+    V inverse = motion.d;
+    V3 v{motion.a, motion.b, motion.c};
     for (size_t k = 0; k < 4; ++k) {
-      const V mass = hn::GatherIndex(d, setup.rows + kernel::kInverseMass, block.corner[k]);
-      inverse = add(inverse, mul(mul(on.weights[k], on.weights[k]), mass));
-      v = sub(v, scale(on.weights[k], gather(setup.rows + kernel::kSpeed, block.corner[k])));
+      const Four of = load_four(block.corner[k], kernel::kSpeed);  // with the inverse mass
+      inverse = add(inverse, mul(mul(on.weights[k], on.weights[k]), of.d));
+      v = sub(v, scale(on.weights[k], V3{of.a, of.b, of.c}));
     }
     V rate = hn::Div(num(setup.rate), mul(num(setup.h * setup.h), inverse));
-    rate = hn::Min(rate, hn::GatherIndex(d, field(offsetof(Point, stiffness)), block.point));
+    rate = hn::Min(rate, make.a);
     rate = mul(hn::IfThenElse(on.inside, num(1), num(0.5)), rate);  // two faces have an edge
-    const V damping = hn::GatherIndex(d, field(offsetof(Point, damping)), block.point);
     const Pressed pressed =
-        press_along(depth, on.normal, v, rate, inverse, damping, setup.friction, setup.grip, setup.h);
+        press_along(depth, on.normal, v, rate, inverse, make.b, setup.friction, setup.grip, setup.h);
     const V3 &force = pressed.force, &friction = pressed.friction;
     const V stored = pressed.stored;
-    const V crushed = calc_crushed(pressed, depth, hn::GatherIndex(d, field(offsetof(Point, bears)), block.point));
+    const V crushed = calc_crushed(pressed, depth, make.d);
 
     const V fields[] = {on.height,     depth,   on.weights[0], on.weights[1],   on.weights[2], on.weights[3],
                         force.x,       force.y, force.z,       friction.x,      friction.y,    friction.z,
@@ -252,15 +247,17 @@ void press_particles(const ParticleSetup& setup, std::span<const ParticlePair> p
     V3 p[2], v[2];
     V radius[2], per_mass[2], stiffness[2], bears[2];
     for (size_t side = 0; side < 2; ++side) {
-      const auto number = [&](size_t l) { return pairs[std::min(i + l, pairs.size() - 1)][side]; };
-      const VI at = load_places(sizeof(Particle) / sizeof(double), number);
-      const VI make = load_places(sizeof(ParticleMake) / sizeof(double), number);
-      const auto field = [&](size_t offset) HWY_ATTR { return particles + offset / sizeof(double); };
-      p[side] = gather(field(offsetof(Particle, p)), at), v[side] = gather(field(offsetof(Particle, v)), at);
-      radius[side] = hn::GatherIndex(d, field(offsetof(Particle, radius)), at);
-      per_mass[side] = hn::Div(one, hn::GatherIndex(d, field(offsetof(Particle, mass)), at));
-      stiffness[side] = hn::GatherIndex(d, makes + offsetof(ParticleMake, stiffness) / sizeof(double), make);
-      bears[side] = hn::GatherIndex(d, makes + offsetof(ParticleMake, bears) / sizeof(double), make);
+      const double *particle[kLanes], *make[kLanes];
+      for (size_t l = 0; l < kLanes; ++l) {
+        const size_t number = pairs[std::min(i + l, pairs.size() - 1)][side];
+        particle[l] = particles + sizeof(Particle) / sizeof(double) * number;
+        make[l] = makes + sizeof(ParticleMake) / sizeof(double) * number;
+      }
+      const Four first = load_four(particle, 0), second = load_four(particle, 4);
+      p[side] = {first.a, first.b, first.c}, v[side] = {first.d, second.a, second.b};
+      radius[side] = second.c, per_mass[side] = hn::Div(one, second.d);
+      const Four of = load_four(make, 2);
+      stiffness[side] = of.c, bears[side] = of.d;
     }
     const V3 apart = sub(p[0], p[1]), along_v = sub(v[0], v[1]);
     const V distance = length(apart), depth = sub(add(radius[0], radius[1]), distance);

@@ -15,9 +15,10 @@ namespace topple::fem::lanes {
 
 /// What faces must know of a point. The radius of a node is 0.
 struct alignas(kCacheLine) Point {
-  Vec3 p, v;                 // [m], [m/s]
-  double inverse_mass = 0;   // [1/kg]
+  Vec3 p;                    // [m]
   double radius = 0;         // [m]
+  Vec3 v;                    // [m/s]
+  double inverse_mass = 0;   // [1/kg]
   double stiffness = 1e300;  // at most [N/m]
   double damping = 0;        // of critical
   double ball = 0;           // 1: debris
