@@ -119,7 +119,7 @@ bool has_in_box(const Balls& balls, std::span<const BallRange> ranges, const Con
 
 }  // namespace lanes
 
-BallCells::BallCells(std::span<const Particle> particles, std::span<const double> reach) {
+BallCells::BallCells(std::span<const Particle> particles, std::span<const double> reach, Team& team) {
   const size_t count = particles.size();
   if (count == 0) return;
   constexpr size_t kNear = 995;  // of a thousand
@@ -149,11 +149,15 @@ BallCells::BallCells(std::span<const Particle> particles, std::span<const double
   }
   std::vector<std::uint32_t> cell_of(count);
   starts_.assign(counts_[0] * counts_[1] * counts_[2] + 1, 0);
-  for (size_t i = 0; i < count; ++i) {
-    const auto [x, y, z] = find_cell(particles[i].p);
-    cell_of[i] = static_cast<std::uint32_t>(number(x, y, z));
+  constexpr size_t kShare = 1024;
+  team.run((count + kShare - 1) / kShare, [&](size_t share) {
+    for (size_t i = share * kShare; i < std::min(count, (share + 1) * kShare); ++i) {
+      const auto [x, y, z] = find_cell(particles[i].p);
+      cell_of[i] = static_cast<std::uint32_t>(number(x, y, z));
+    }
+  });
+  for (size_t i = 0; i < count; ++i)
     if (!is_far(i)) ++starts_[cell_of[i] + 1];
-  }
   for (size_t i = 1; i < starts_.size(); ++i) starts_[i] += starts_[i - 1];
   std::vector<std::uint32_t> next(starts_.begin(), starts_.end() - 1);
   balls_.resize(count - far), far_.resize(far);

@@ -9,6 +9,7 @@
 
 #include "base/aligned.h"
 #include "base/linalg.h"
+#include "base/team.h"
 #include "fem/contact_cells.h"
 #include "fem/particle.h"
 
@@ -45,7 +46,7 @@ std::vector<std::array<std::uint32_t, 2>> sort_pairs(
 class BallCells {
  public:
   /// `reach`: how far from its middle each may touch another [m] (B).
-  BallCells(std::span<const Particle>, std::span<const double> reach);
+  BallCells(std::span<const Particle>, std::span<const double> reach, Team&);
 
   /// Pairs of balls that are apart by less than both reaches, the later one first, each once, in tasks of which
   /// there are `tasks()`.

@@ -66,9 +66,10 @@ class Search {
     list_news();
     Pairs pairs = list_pairs(elapsed, ahead);
     std::vector<double> reach(s_.particles.size());
-    for (size_t i = 0; i < reach.size(); ++i)
+    for_all(reach.size(), 1024, team_, [&](size_t i) {
       reach[i] = s_.particles[i].radius + 0.5 * calc_path(2 * norm(s_.particles[i].v), ahead);
-    const BallCells balls(s_.particles, reach);
+    });
+    const BallCells balls(s_.particles, reach, team_);
     make_skins(pairs, balls, ahead);
     for_all(pairs.due.size(), 64, team_, [&](size_t i) { find_candidates(*pairs.due[i]); });
     for_all(pairs.grown.size(), 64, team_, [&](size_t i) { add_candidates(pairs.grown[i]); });

@@ -40,6 +40,7 @@ void for_targets(const Body& body) {
 }
 
 TEST(BallCells, FindThePairsThatLookingAtAllFinds) {
+  Team team(2);
   for (const size_t count : {0, 1, 2, 300, 3000}) {
     const Balls balls(count);
     std::vector<ParticlePair> expected;
@@ -48,7 +49,7 @@ TEST(BallCells, FindThePairsThatLookingAtAllFinds) {
         if (norm(balls.particles[a].p - balls.particles[b].p) < balls.reach[a] + balls.reach[b])
           expected.push_back({a, b});
     for_targets([&] {
-      const BallCells cells(balls.particles, balls.reach);
+      const BallCells cells(balls.particles, balls.reach, team);
       std::vector<std::vector<ParticlePair>> found(cells.tasks());
       for (size_t task = 0; task < found.size(); ++task) cells.find_pairs(task, found[task]);
       EXPECT_EQ(sort_pairs(found, count), expected) << count;
@@ -58,11 +59,12 @@ TEST(BallCells, FindThePairsThatLookingAtAllFinds) {
 }
 
 TEST(BallCells, FindPairsBesideABallThatIsNowhere) {
+  Team team(1);
   Balls balls(2);
   for (const double place : {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
     balls.particles.resize(3), balls.reach = {1, 1, 1};
     balls.particles[0].p = {0, 0, 0}, balls.particles[1].p = {1, 1, 0}, balls.particles[2].p = {place, place, 0};
-    const BallCells cells(balls.particles, balls.reach);
+    const BallCells cells(balls.particles, balls.reach, team);
     std::vector<std::vector<ParticlePair>> found(cells.tasks());
     for (size_t task = 0; task < found.size(); ++task) cells.find_pairs(task, found[task]);
     EXPECT_EQ(sort_pairs(found, 3), (std::vector<ParticlePair>{{1, 0}}));
@@ -70,6 +72,7 @@ TEST(BallCells, FindPairsBesideABallThatIsNowhere) {
 }
 
 TEST(BallCells, FindThoseThatReachABox) {
+  Team team(2);
   const Balls balls(3000);
   std::mt19937 random(5);
   std::uniform_real_distribution<double> at(-6, 6);
@@ -83,7 +86,7 @@ TEST(BallCells, FindThoseThatReachABox) {
     for (std::uint32_t k = 0; k < balls.particles.size(); ++k)
       if (box.has(balls.particles[k].p, balls.reach[k])) expected.push_back(k);
     for_targets([&] {
-      const BallCells cells(balls.particles, balls.reach);
+      const BallCells cells(balls.particles, balls.reach, team);
       cells.find_in_box(box, found);
       std::sort(found.begin(), found.end());
       EXPECT_EQ(found, expected);
@@ -92,7 +95,7 @@ TEST(BallCells, FindThoseThatReachABox) {
     all += expected.size();
   }
   EXPECT_GT(all, 100U);
-  const BallCells cells(balls.particles, balls.reach);
+  const BallCells cells(balls.particles, balls.reach, team);
   std::vector<std::uint32_t> found{1};
   cells.find_in_box({}, found);
   EXPECT_TRUE(found.empty());
