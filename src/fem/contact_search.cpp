@@ -32,11 +32,6 @@ Vec3 place(const ExplicitState& s, std::uint32_t row) {
   const double* r = s.rows.data() + 8 * static_cast<size_t>(row);
   return {r[0], r[1], r[2]};
 }
-Vec3 speed(const ExplicitState& s, std::uint32_t row) {
-  const double* r = s.rows.data() + 8 * static_cast<size_t>(row);
-  return {r[kernel::kSpeed], r[kernel::kSpeed + 1], r[kernel::kSpeed + 2]};
-}
-bool has_mass(const ExplicitState& s, std::uint32_t row) { return s.rows[8 * size_t{row} + kernel::kNodeMass] > 0; }
 
 /// Calls body(i) for all i below count, `run` of them a task.
 template <class Body>
@@ -66,9 +61,8 @@ class Search {
     list_news();
     Pairs pairs = list_pairs(elapsed, ahead);
     std::vector<double> reach(s_.particles.size());
-    for_all(reach.size(), 1024, team_, [&](size_t i) {
-      reach[i] = s_.particles[i].radius + 0.5 * calc_path(2 * norm(s_.particles[i].v), ahead);
-    });
+    for_all(reach.size(), 1024, team_,
+            [&](size_t i) { reach[i] = s_.particles[i].radius + 0.5 * calc_path(2 * norm(s_.particles[i].v), ahead); });
     const BallCells balls(s_.particles, reach, team_);
     make_skins(pairs, balls, ahead);
     for_all(pairs.due.size(), 64, team_, [&](size_t i) { find_candidates(*pairs.due[i]); });
@@ -90,50 +84,19 @@ class Search {
   static constexpr double kRoomShare = 0.8;
   static constexpr int kBoxSteps = 640;
 
-  /// Mean velocity of a group, the largest deviation from it, and the box around it.
-  struct Motion {
-    Vec3 mean;
-    double spread = 0;
-    ContactBox box;
-  };
-  Motion measure(std::uint32_t g) const {
-    Motion motion;
-    static thread_local std::vector<Vec3> speeds;
-    speeds.clear();
-    for (std::uint32_t i = setup_.node_starts[g]; i < setup_.node_starts[g + 1]; ++i) {
-      const std::uint32_t row = setup_.node_rows[i];
-      if (!has_mass(s_, row)) continue;
-      speeds.push_back(speed(s_, row));
-      motion.mean += speeds.back();
-      motion.box.add(place(s_, row), 0);
-    }
-    if (!speeds.empty()) motion.mean *= 1.0 / static_cast<double>(speeds.size());
-    double square = 0;
-    for (const Vec3& v : speeds) {
-      const Vec3 d = v - motion.mean;
-      square = std::max(square, dot(d, d));
-    }
-    motion.spread = std::sqrt(square);
-    return motion;
-  }
-
   /// How far groups may have moved since the last look, at the larger of the speeds at both ends.
   void book_motion(double elapsed) {
     ContactState& c = s_.contact;
-    std::vector<Vec3> mean(groups_);
-    std::vector<double> spread(groups_, 0);
+    std::vector<lanes::GroupMotion> motion(groups_);
     boxes_.resize(groups_);
     for_all(groups_, 64, team_, [&](size_t g) {
-      const Motion motion = measure(static_cast<std::uint32_t>(g));
-      mean[g] = motion.mean, spread[g] = motion.spread, boxes_[g] = motion.box;
+      const auto nodes =
+          std::span(setup_.node_rows).subspan(setup_.node_starts[g], setup_.node_starts[g + 1] - setup_.node_starts[g]);
+      motion[g] = lanes::measure_motion(s_.rows.data(), nodes, boxes_[g]);
     });
-    if (c.fresh) c.speed = mean, c.spread = spread, c.travel.assign(groups_, 0);
-    for (size_t g = 0; g < groups_; ++g) {
-      c.spread[g] = std::max(c.spread[g], spread[g]);
-      c.travel[g] += (std::max(norm(c.speed[g]), norm(mean[g])) + c.spread[g]) * elapsed;
-    }
-    speed_before_ = std::move(c.speed), most_spread_ = std::move(c.spread);
-    c.speed = std::move(mean), c.spread = std::move(spread);
+    if (c.fresh) c.motion = motion, c.travel.assign(groups_, 0);
+    for (size_t g = 0; g < groups_; ++g) c.travel[g] += std::max(c.motion[g].most, motion[g].most) * elapsed;
+    before_ = std::exchange(c.motion, std::move(motion));
     c.particle_speed.resize(s_.particles.size());
     for (size_t i = 0; i < s_.particles.size(); ++i) c.particle_speed[i] = s_.particles[i].v;
   }
@@ -143,7 +106,7 @@ class Search {
     c.boxes.resize(groups_), c.room.resize(groups_);
     ContactBox bounds;
     for (size_t g = 0; g < groups_; ++g) {
-      c.room[g] = std::max(0.5 * setup_.reach, kBoxSteps * h_ * (norm(c.speed[g]) + c.spread[g]));
+      c.room[g] = std::max(0.5 * setup_.reach, kBoxSteps * h_ * c.motion[g].most);
       c.boxes[g] = boxes_[g].widened(c.room[g]);
       bounds.add(c.boxes[g]);
     }
@@ -175,10 +138,16 @@ class Search {
     std::fill(c.travel.begin(), c.travel.end(), 0.0);
   }
 
-  /// The most with which groups of a pair move against each other [m/s].
+  /// How fast points of bodies that turn may come nearer to each other, at most, without what deviates [m/s]. Both
+  /// turn about a place of the body that reaches less far; turning together does not change how far they are apart.
+  static double calc_approach(const lanes::GroupMotion& a, const lanes::GroupMotion& b) {
+    const lanes::GroupMotion& near = a.reach < b.reach ? a : b;
+    return norm(a.speed_at(near.place) - b.speed_at(near.place)) + norm(a.turning - b.turning) * near.reach;
+  }
+  /// How fast groups of a pair may come nearer to each other [m/s].
   double calc_pace(const ContactPair& pair) const {
-    const ContactState& c = s_.contact;
-    return norm(c.speed[pair.a] - c.speed[pair.b]) + c.spread[pair.a] + c.spread[pair.b];
+    const lanes::GroupMotion &a = s_.contact.motion[pair.a], &b = s_.contact.motion[pair.b];
+    return calc_approach(a, b) + a.spread + b.spread;
   }
   /// How far what moves at a pace may get until the next look, with a share of the margin for impacts in between.
   double calc_path(double pace, double ahead) const { return 2 * ahead * pace + kLeastShare * setup_.margin; }
@@ -264,9 +233,10 @@ class Search {
     std::vector<Pairs> found((c.pairs.size() + kRun - 1) / kRun);
     for_all(c.pairs.size(), kRun, team_, [&](size_t i) {
       ContactPair& pair = c.pairs[i];
-      const Vec3 now = c.speed[pair.a] - c.speed[pair.b], before = speed_before_[pair.a] - speed_before_[pair.b];
-      const double apart = std::sqrt(std::max(dot(now, now), dot(before, before)));
-      const double pace = apart + most_spread_[pair.a] + most_spread_[pair.b];
+      const lanes::GroupMotion &a = c.motion[pair.a], &b = c.motion[pair.b];
+      const lanes::GroupMotion &a_before = before_[pair.a], &b_before = before_[pair.b];
+      const double pace = std::max(calc_approach(a, b), calc_approach(a_before, b_before)) +
+                          std::max(a.spread, a_before.spread) + std::max(b.spread, b_before.spread);
       pair.moved += static_cast<float>(pace * elapsed);
       Pairs& lists = found[i / kRun];
       if (pair.moved + pace * ahead <= pair.until) {
@@ -349,7 +319,7 @@ class Search {
   }
 
   lanes::Ahead calc_ahead(size_t g, double ahead) const {
-    return {ahead, kLeastShare * setup_.margin, s_.contact.speed[g], s_.contact.spread[g]};
+    return {ahead, kLeastShare * setup_.margin, s_.contact.motion[g]};
   }
   /// Faces near particles; in order behind what is near otherwise.
   void find_near_faces(const BallCells& balls, double ahead) const {
@@ -363,7 +333,7 @@ class Search {
       auto& list = found[g / kRun];
       size_t first = list.size();
       for (size_t run = 0; run < faces.skin.runs(); ++run) {
-        balls.find_in_box(faces.skin.run_box(run).widened(until.calc_path({})), near_by);
+        balls.find_in_box(faces.skin.run_box(run).widened(until.calc_path()), near_by);
         lanes::find_near_faces(faces.skin, run, s_.particles.data(), near_by, until, list);
       }
       for (; first < list.size(); ++first) list[first][1] = faces.numbers[list[first][1]];
@@ -428,7 +398,7 @@ class Search {
     for_all(groups_, 8, team_, [&](size_t i) {
       const auto g = static_cast<std::uint32_t>(i);
       const lanes::Ahead until = calc_ahead(g, ahead);
-      meets_[g] = balls.has_in_box(boxes_[g].widened(until.calc_path({}))) ? 1 : 0;
+      meets_[g] = balls.has_in_box(boxes_[g].widened(until.calc_path())) ? 1 : 0;
       if (meets_[g] != 0 || wanted[g]) make_skin(g, wanted[g]);
     });
   }
@@ -532,10 +502,9 @@ class Search {
   double h_;
   Team& team_;
   std::uint32_t groups_;
-  std::vector<ContactBox> boxes_;     // of groups, as they are
-  std::vector<Vec3> speed_before_;    // of groups at the last look
-  std::vector<double> most_spread_;   // at both
-  std::vector<unsigned char> meets_;  // groups: particles may be near its faces
+  std::vector<ContactBox> boxes_;           // of groups, as they are
+  std::vector<lanes::GroupMotion> before_;  // of groups at the last look
+  std::vector<unsigned char> meets_;        // groups: particles may be near its faces
   std::vector<GroupNews> news_;
   std::vector<std::uint32_t> news_of_;  // of groups; kNone: nothing
 };

@@ -112,17 +112,16 @@ struct ContactState {
   // what may touch before the next look, in order
   std::vector<NearCandidate> near;
   std::vector<ParticlePair> near_particles;
-  std::vector<ContactBox> boxes;     // of groups, with their room around them
-  std::vector<double> room;          // at least half the reach, more for what is fast [m]
-  std::vector<double> travel;        // of a group since the boxes were made [m]
-  std::vector<Vec3> speed;           // mean, of a group, at the last look
-  std::vector<double> spread;        // largest deviation from it
-  std::vector<Vec3> particle_speed;  // at the last look
-  bool fresh = true;                 // no boxes yet
-  bool knocked = false;              // debris has gained more speed than the last look reckons with
-  int since = 0;                     // steps since the last look
-  std::uint64_t look = 0;            // which found what is near, like no other; 0: not known
-  TouchSums touching;                // of surfaces in the last step
+  std::vector<ContactBox> boxes;           // of groups, with their room around them
+  std::vector<double> room;                // at least half the reach, more for what is fast [m]
+  std::vector<double> travel;              // of a group since the boxes were made [m]
+  std::vector<lanes::GroupMotion> motion;  // of groups at the last look
+  std::vector<Vec3> particle_speed;        // at the last look
+  bool fresh = true;                       // no boxes yet
+  bool knocked = false;                    // debris has gained more speed than the last look reckons with
+  int since = 0;                           // steps since the last look
+  std::uint64_t look = 0;                  // which found what is near, like no other; 0: not known
+  TouchSums touching;                      // of surfaces in the last step
   TouchSums debris;  // of debris at its last forces; power of impulses over a step, 0 where there are none
   long long searches = 0;
 };

@@ -21,7 +21,6 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 using D = hn::CappedTag<double, kFaceRun>;
-using DI = hn::RebindToSigned<D>;
 using V = hn::Vec<D>;
 constexpr size_t kLanes = hn::MaxLanes(D());
 
@@ -46,11 +45,8 @@ HWY_INLINE Vec3 most_of(const V3& a) {
 }
 
 HWY_INLINE V3 load_corner(const double* HWY_RESTRICT rows, const std::uint32_t* HWY_RESTRICT row) {
-  const D d;
-  const hn::Rebind<std::uint32_t, D> d_row;
-  const auto at = hn::ShiftLeft<3>(hn::BitCast(DI(), hn::PromoteTo(hn::RebindToUnsigned<D>(), hn::LoadU(d_row, row))));
-  static_assert(kernel::kNodeFields == 8);
-  return {hn::GatherIndex(d, rows, at), hn::GatherIndex(d, rows + 1, at), hn::GatherIndex(d, rows + 2, at)};
+  const Four place = load_four([&](size_t l) HWY_ATTR { return rows + kernel::kNodeFields * size_t{row[l]}; });
+  return {place.a, place.b, place.c};
 }
 
 void make_skin(const double* HWY_RESTRICT rows, double depth_share, const FaceCorners& corners, size_t count,
@@ -98,6 +94,89 @@ void make_skin(const double* HWY_RESTRICT rows, double depth_share, const FaceCo
     for (int i = 0; i < 3; ++i) box[8 * i] = from[i], box[8 * (3 + i)] = until[i];
   }
   if (runs > 0) skin.box.low = least_of(all_low), skin.box.high = most_of(all_high);
+}
+
+/// Sums of a run's lanes, in the order of its numbers with every instruction set.
+template <size_t N>
+struct RunSums {
+  static constexpr size_t kParts = kFaceRun / kLanes;
+  V sums[N][kParts];
+  HWY_INLINE RunSums() {
+    for (auto& parts : sums)
+      for (V& part : parts) part = num(0);
+  }
+  HWY_INLINE void add_to(size_t n, size_t l, V x) { sums[n][l / kLanes] = add(sums[n][l / kLanes], x); }
+  HWY_INLINE double total(size_t n) const {
+    HWY_ALIGN double all[kFaceRun];
+    for (size_t i = 0; i < kParts; ++i) hn::Store(sums[n][i], D(), all + i * kLanes);
+    double sum = 0;
+    for (const double x : all) sum += x;
+    return sum;
+  }
+  HWY_INLINE Vec3 vector(size_t n) const { return {total(n), total(n + 1), total(n + 2)}; }
+};
+
+GroupMotion measure_motion(const double* HWY_RESTRICT rows, std::span<const std::uint32_t> nodes, ContactBox& box) {
+  const D d;
+  const auto row_of = [&](size_t i) HWY_ATTR { return rows + kernel::kNodeFields * size_t{nodes[i]}; };
+  size_t first = 0;
+  while (first < nodes.size() && !(row_of(first)[kernel::kNodeMass] > 0)) ++first;
+  box = {};
+  GroupMotion motion;
+  if (first == nodes.size()) return motion;
+  const auto vector_of = [](const double* at) { return Vec3{at[0], at[1], at[2]}; };
+  const Vec3 from = vector_of(row_of(first)), speed_from = vector_of(row_of(first) + kernel::kSpeed);
+  const V3 p0{num(from.x), num(from.y), num(from.z)}, v0{num(speed_from.x), num(speed_from.y), num(speed_from.z)};
+  /// Calls body(l, p, v) for lanes l, l + 1, ... of all runs, with the first node in place of what has no mass.
+  const auto for_nodes = [&](const auto& body) HWY_ATTR {
+    for (size_t run = first; run < nodes.size(); run += kFaceRun)
+      for (size_t l = 0; l < kFaceRun; l += kLanes) {
+        const auto at = [&](size_t lane) HWY_ATTR { return row_of(std::min(run + l + lane, nodes.size() - 1)); };
+        const Four place = load_four(at), rest = load_four([&](size_t lane) HWY_ATTR { return at(lane) + 4; });
+        const V number = hn::Iota(d, static_cast<double>(run + l));
+        const auto counts = hn::And(hn::Gt(rest.d, num(0)), hn::Lt(number, num(static_cast<double>(nodes.size()))));
+        const V3 p{hn::IfThenElse(counts, place.a, p0.x), hn::IfThenElse(counts, place.b, p0.y),
+                   hn::IfThenElse(counts, place.c, p0.z)};
+        const V3 v{hn::IfThenElse(counts, place.d, v0.x), hn::IfThenElse(counts, rest.a, v0.y),
+                   hn::IfThenElse(counts, rest.b, v0.z)};
+        body(l, p, v, hn::IfThenElseZero(counts, num(1)));
+      }
+  };
+  // against the first node, which adds nothing to sums
+  RunSums<16> sums;
+  V3 low = p0, high = p0;
+  for_nodes([&](size_t l, const V3& p, const V3& v, V count) HWY_ATTR {
+    low = smaller(low, p), high = larger(high, p);
+    const V3 r = sub(p, p0), u = sub(v, v0), spin = cross(r, u);
+    const V terms[] = {r.x,           r.y,           r.z,           u.x,           u.y,           u.z,
+                       spin.x,        spin.y,        spin.z,        mul(r.x, r.x), mul(r.y, r.y), mul(r.z, r.z),
+                       mul(r.x, r.y), mul(r.y, r.z), mul(r.z, r.x), count};
+    for (size_t n = 0; n < 16; ++n) sums.add_to(n, l, terms[n]);
+  });
+  box.low = least_of(low), box.high = most_of(high);
+  const double count = sums.total(15);
+  const Vec3 r = (1 / count) * sums.vector(0), u = (1 / count) * sums.vector(3);
+  motion.place = from + r, motion.speed = speed_from + u;
+  // about the mean
+  const Vec3 spin = sums.vector(6) - count * cross(r, u);
+  const double xx = sums.total(9) - count * r.x * r.x, yy = sums.total(10) - count * r.y * r.y,
+               zz = sums.total(11) - count * r.z * r.z, xy = sums.total(12) - count * r.x * r.y,
+               yz = sums.total(13) - count * r.y * r.z, zx = sums.total(14) - count * r.z * r.x;
+  const Mat3 inertia{{{yy + zz, -xy, -zx}, {-xy, zz + xx, -yz}, {-zx, -yz, xx + yy}}};
+  const double size = xx + yy + zz;
+  // nodes on a line may turn about it as they like
+  if (determinant(inertia) > 1e-6 * size * size * size) motion.turning = inverse(inertia) * spin;
+  const auto wide = [](const Vec3& a) HWY_ATTR { return V3{num(a.x), num(a.y), num(a.z)}; };
+  const V3 middle = wide(motion.place), speed = wide(motion.speed), turning = wide(motion.turning);
+  V spread = num(0), reach = num(0), most = num(0);
+  for_nodes([&](size_t /*l*/, const V3& p, const V3& v, V /*count*/) HWY_ATTR {
+    const V3 arm = sub(p, middle), off = sub(sub(v, speed), cross(turning, arm));
+    spread = hn::Max(spread, dot(off, off)), reach = hn::Max(reach, dot(arm, arm)), most = hn::Max(most, dot(v, v));
+  });
+  motion.spread = std::sqrt(hn::GetLane(hn::MaxOfLanes(d, spread)));
+  motion.reach = std::sqrt(hn::GetLane(hn::MaxOfLanes(d, reach)));
+  motion.most = std::sqrt(hn::GetLane(hn::MaxOfLanes(d, most)));
+  return motion;
 }
 
 template <class Mask>
@@ -179,7 +258,7 @@ void find_near_faces(const Skin& skin, size_t run, const Particle* particles, st
                      const Ahead& ahead, std::vector<std::array<std::uint32_t, 2>>& found) {
   for (const std::uint32_t number : balls) {
     const Particle& ball = particles[number];
-    const V zero = num(0), radius = num(ball.radius), path = num(ahead.calc_path(ball.v));
+    const V zero = num(0), radius = num(ball.radius), path = num(ahead.calc_path(ball.p, ball.v));
     // as calc_gap
     unsigned faces = test_faces(
         skin, run, {num(ball.p.x), num(ball.p.y), num(ball.p.z)}, [&](V height, V side, V depth, V uneven) HWY_ATTR {
@@ -203,6 +282,7 @@ HWY_AFTER_NAMESPACE();
 namespace topple::fem::lanes {
 
 HWY_EXPORT(make_skin);
+HWY_EXPORT(measure_motion);
 HWY_EXPORT(find_faces);
 HWY_EXPORT(find_near_faces);
 HWY_EXPORT(find_points);
@@ -214,6 +294,9 @@ void fill_runs(FaceCorners& corners) {
 void make_skin(const double* rows, double depth, const FaceCorners& corners, size_t count, Skin& skin) {
   skin.box = {};
   HWY_DYNAMIC_DISPATCH(make_skin)(rows, depth, corners, count, skin);
+}
+GroupMotion measure_motion(const double* rows, std::span<const std::uint32_t> nodes, ContactBox& box) {
+  return HWY_DYNAMIC_DISPATCH(measure_motion)(rows, nodes, box);
 }
 void find_faces(const Skin& skin, const Vec3& p, double near, double margin, std::vector<std::uint32_t>& found) {
   found.clear();

@@ -78,14 +78,28 @@ void make_skin(const double* rows, double depth, const FaceCorners&, size_t coun
 void find_faces(const Skin&, const Vec3& p, double near, double margin, std::vector<std::uint32_t>& found);
 /// How far a ball (a point: radius 0) and a face may move against each other until they may touch.
 double calc_gap(const SkinFace&, const Vec3& p, double radius);
-/// How far something may get until a later look.
+/// A group of nodes as a body that moves and turns: v = speed + turning x (p - place), and by how much nodes deviate.
+struct GroupMotion {
+  Vec3 place, speed, turning;  // means [m, m/s], about the mean place [rad/s]
+  double spread = 0;           // largest deviation [m/s]
+  double reach = 0;            // largest distance from the mean place [m]
+  double most = 0;             // largest speed [m/s]
+  Vec3 speed_at(const Vec3& p) const { return speed + cross(turning, p - place); }
+};
+/// Of nodes with mass, and the box around them.
+GroupMotion measure_motion(const double* rows, std::span<const std::uint32_t> nodes, ContactBox& box);
+/// How far something may get until a later look, against the faces of a group.
 struct Ahead {
   double time = 0;   // until then [s]
   double least = 0;  // beyond what speeds tell [m]
-  Vec3 speed;        // of faces
-  double spread = 0;
-  /// At twice the present speeds.
-  double calc_path(const Vec3& v) const { return 2 * time * (norm(v - speed) + spread) + least; }
+  GroupMotion faces;
+  /// At twice the present speeds, against faces that it may touch: those beside p, whose distance a turn does not
+  /// change.
+  double calc_path(const Vec3& p, const Vec3& v) const {
+    return 2 * time * (norm(v - faces.speed_at(p)) + faces.spread) + least;
+  }
+  /// Of the faces alone.
+  double calc_path() const { return 2 * time * faces.most + least; }
 };
 /// Appends balls and those faces of a run that they may touch until then.
 void find_near_faces(const Skin&, size_t run, const Particle*, std::span<const std::uint32_t> balls, const Ahead&,

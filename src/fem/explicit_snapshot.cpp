@@ -9,7 +9,7 @@ namespace topple::fem {
 
 namespace {
 
-constexpr std::uint64_t kMark = 0x7470'6578'0000'0011;  // name and version of the layout
+constexpr std::uint64_t kMark = 0x7470'6578'0000'0012;  // name and version of the layout
 
 class Writer {
  public:
@@ -74,9 +74,9 @@ void pass_state(Archive& archive, State& s) {
   archive.list(s.bars), archive.list(s.releases), archive.value(s.bar_work);
   auto& c = s.contact;
   archive.list(c.gone), archive.list(c.near), archive.list(c.near_particles);
-  archive.list(c.boxes), archive.list(c.room), archive.list(c.travel), archive.list(c.speed),
+  archive.list(c.boxes), archive.list(c.room), archive.list(c.travel), archive.list(c.motion),
       archive.list(c.particle_speed);
-  archive.list(c.spread), archive.list(c.removed), archive.value(c.fresh);
+  archive.list(c.removed), archive.value(c.fresh);
   archive.value(c.knocked), archive.value(c.since), archive.value(c.touching), archive.value(c.debris),
       archive.value(c.searches);
 }

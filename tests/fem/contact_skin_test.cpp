@@ -4,6 +4,7 @@
 #include <hwy/targets.h>
 
 #include <algorithm>
+#include <cstring>
 #include <random>
 #include <set>
 
@@ -79,12 +80,14 @@ TEST(ContactSkin, FindsTheFacesThatBallsMayTouch) {
     balls[i].radius = 0.4 + 0.05 * number(random);
     if (i % 3 > 0) numbers.push_back(i);
   }
-  const Ahead ahead{0.01, 0.02, {3, -2, 1}, 0.5};
-  EXPECT_NEAR(ahead.calc_path({3, 2, 4}), 2 * 0.01 * (5 + 0.5) + 0.02, 1e-15);
+  // faces that turn about z at 2 rad/s: half a metre along x beside the place they are 1 m/s faster along y
+  const Ahead ahead{0.01, 0.02, {{1, 1, 0}, {3, -2, 1}, {0, 0, 2}, 0.5, 7, 20}};
+  EXPECT_NEAR(ahead.calc_path({1.5, 1, 9}, {3, 3, 4}), 2 * 0.01 * (5 + 0.5) + 0.02, 1e-15);
+  EXPECT_NEAR(ahead.calc_path(), 2 * 0.01 * 20 + 0.02, 1e-15);
   std::set<std::array<std::uint32_t, 2>> expected;
   for (const std::uint32_t i : numbers)
     for (std::uint32_t f = 0; f < 61; ++f)
-      if (calc_gap(squares.skin.face(f), balls[i].p, balls[i].radius) < ahead.calc_path(balls[i].v))
+      if (calc_gap(squares.skin.face(f), balls[i].p, balls[i].radius) < ahead.calc_path(balls[i].p, balls[i].v))
         expected.insert({i, f});
   EXPECT_GT(expected.size(), 40U);
   std::vector<std::array<std::uint32_t, 2>> found;
@@ -134,6 +137,62 @@ TEST(ContactSkin, FindsThePointsInABox) {
       EXPECT_FALSE(found.empty());
       EXPECT_EQ(found, expected);
     }
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+}
+
+TEST(ContactSkin, MeasuresHowAGroupMoves) {
+  // 45 nodes of a body that turns about a place far off, one of them 0.7 m/s away from that, and one without mass
+  std::mt19937 random(13);
+  std::uniform_real_distribution<double> number(-1, 1);
+  const Vec3 turning{0.3, -0.2, 0.5}, about{40, -30, 20}, middle{100, 200, 5};
+  AlignedVector<double> rows;
+  std::vector<Vec3> places;
+  std::vector<std::uint32_t> nodes;
+  for (std::uint32_t i = 0; i < 46; ++i) {
+    const Vec3 p = middle + Vec3{number(random), 2 * number(random), 0.3 * number(random)};
+    const Vec3 v = i == 20 ? Vec3{500, 500, 500} : cross(turning, p - about);
+    rows.insert(rows.end(), {p.x, p.y, p.z, v.x, v.y, v.z, i == 20 ? 0.0 : 1.0, i == 20 ? 0.0 : 1.0});
+    nodes.push_back(i);
+    if (i != 20) places.push_back(p);
+  }
+  Vec3 mean;
+  for (const Vec3& p : places) mean += (1.0 / 45) * p;
+  double reach = 0;
+  for (const Vec3& p : places) reach = std::max(reach, norm(p - mean));
+  const std::int64_t supported = hwy::SupportedTargets();
+  std::vector<GroupMotion> measured;
+  for (std::int64_t left = supported; left != 0; left &= left - 1) {
+    hwy::SetSupportedTargetsForTest(left & -left);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    ContactBox box;
+    const GroupMotion motion = measure_motion(rows.data(), nodes, box);
+    EXPECT_LT(norm(motion.place - mean), 1e-12);
+    EXPECT_LT(norm(motion.turning - turning), 1e-11);
+    EXPECT_LT(norm(motion.speed - cross(turning, mean - about)), 1e-11);
+    EXPECT_LT(motion.spread, 1e-11);
+    EXPECT_NEAR(motion.reach, reach, 1e-12);
+    for (const Vec3& p : places) {
+      EXPECT_TRUE(box.has(p, 0));
+      EXPECT_GE(motion.most, norm(cross(turning, p - about)) - 1e-11);
+    }
+    EXPECT_LT(motion.most, norm(cross(turning, mean - about)) + norm(turning) * reach);
+    EXPECT_LT(norm(box.high - box.low), 6);
+    measured.push_back(motion);
+    EXPECT_EQ(std::memcmp(&motion, measured.data(), sizeof(motion)), 0);  // with every instruction set
+
+    // what deviates is found whole: the mean takes a 45th of it, the turn less than a tenth
+    AlignedVector<double> shaken = rows;
+    shaken[8 * 7 + 5] += 0.7;
+    const GroupMotion with = measure_motion(shaken.data(), nodes, box);
+    EXPECT_GT(with.spread, 0.6);
+    EXPECT_LT(with.spread, 0.7);
+    // a single node, nodes on a line, none
+    EXPECT_EQ(norm(measure_motion(rows.data(), std::span(nodes).first(1), box).turning), 0);
+    EXPECT_EQ(measure_motion(rows.data(), std::span(nodes).first(2), box).spread > 0, true);
+    EXPECT_EQ(measure_motion(rows.data(), std::span(nodes).subspan(20, 1), box).most, 0);
+    EXPECT_TRUE(box.is_empty());
   }
   hwy::SetSupportedTargetsForTest(0);
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());

@@ -150,6 +150,44 @@ TEST(ExplicitContactPhysics, BlocksThatComeFromAfarMeet) {
   EXPECT_LT(lower / 2400, -2);
 }
 
+TEST(ExplicitContactPhysics, WhatTurnsAsAWholeIsNotLookedThroughAndMeetsWhatIsInItsWay) {
+  // a bar of several groups that turns at 10 rad/s; 0.3 m from its end a block
+  ExplicitModel model;
+  model.materials = {make_explicit_elastic(2400, 30e9, 0.2)};
+  model.gravity = {};
+  add_brick(model, {-2, 0, 0}, {2, 0.3, 0.3}, 40, 3, 3, 0, 0);
+  const auto alone = static_cast<size_t>(model.nodes.size());
+  ExplicitModel both = model;
+  add_brick(both, {1.4, 0.6, -0.1}, {2, 1, 0.4}, 4, 4, 4, 0, 1);
+  const auto turn = [&](ExplicitSystem& system, size_t nodes) {
+    std::vector<Vec3> v(nodes);
+    for (size_t n = 0; n < alone; ++n) v[n] = cross({0, 0, 10}, model.nodes[n]);
+    system.set_velocities(v);
+  };
+  ExplicitSystem bar(model, {});
+  turn(bar, alone);
+  ASSERT_EQ(bar.advance(0.002), ExplicitEnding::ReachedTime);
+  const long long searches = bar.timing().searches;
+  EXPECT_GT(searches, 0);
+  ASSERT_EQ(bar.advance(0.05), ExplicitEnding::ReachedTime);  // half a radian; its ends move by 1 m
+  EXPECT_LT(norm(bar.p(0) - Vec3{-2 * std::cos(0.5), -2 * std::sin(0.5), 0}), 0.02);
+  EXPECT_EQ(bar.timing().searches, searches);
+
+  ExplicitSystem system(both, {});
+  turn(system, both.nodes.size());
+  const auto calc_momentum = [&] {
+    double y = 0;
+    for (size_t n = alone; n < both.nodes.size(); ++n)
+      y += system.node_mass(static_cast<int>(n)) * system.v(static_cast<int>(n)).y;
+    return y;
+  };
+  ASSERT_EQ(system.advance(0.013), ExplicitEnding::ReachedTime);
+  EXPECT_EQ(system.contacts(), 0);
+  EXPECT_EQ(calc_momentum(), 0);
+  ASSERT_EQ(system.advance(0.022), ExplicitEnding::ReachedTime);
+  EXPECT_GT(calc_momentum() / (0.6 * 0.4 * 0.5 * 2400), 5);
+}
+
 TEST(ExplicitContactPhysics, WhatAChargeUncoversIsTouched) {
   // a block on its way to a slab in thin layers, of which the upper one goes; the pair is not looked through in between
   ExplicitModel model;
