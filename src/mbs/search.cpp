@@ -80,7 +80,7 @@ void System::add_travel(double h) {
 void System::find_links() {
   State& s = state;
   PairSearch& search = contact.search;
-  const bool had_links = search.has_links;
+  const bool had_links = search.has_links, meets = model.contact.bodies;
   search.has_links = true;
   s.links_due = false;
   search.first_link_before.swap(search.first_link);
@@ -103,10 +103,13 @@ void System::find_links() {
   each_link([&](int a, int b) {
     if (grounded(a) && b >= 0) s.tied_to_ground[static_cast<size_t>(b)] = 1;
     if (grounded(b) && a >= 0) s.tied_to_ground[static_cast<size_t>(a)] = 1;
-    if (a < 0 || b < 0) return;
+    if (!meets || a < 0 || b < 0) return;
     ++search.first_link[static_cast<size_t>(a) + 2];
     ++search.first_link[static_cast<size_t>(b) + 2];
   });
+  for (size_t b = 0; b < B; ++b)
+    if (s.tied_to_ground[b] != tied[b]) pack_ground_box(b);
+  if (!meets) return;  // nobody asks who is tied to whom
   for (size_t b = 2; b < B + 2; ++b) search.first_link[b] += search.first_link[b - 1];
   search.link.resize(static_cast<size_t>(search.first_link[B + 1]));
   each_link([&](int a, int b) {
@@ -114,8 +117,6 @@ void System::find_links() {
     search.link[static_cast<size_t>(search.first_link[static_cast<size_t>(a) + 1]++)] = b;
     search.link[static_cast<size_t>(search.first_link[static_cast<size_t>(b) + 1]++)] = a;
   });
-  for (size_t b = 0; b < B; ++b)
-    if (s.tied_to_ground[b] != tied[b]) pack_ground_box(b);
   const auto links_of = [](const std::vector<int>& first, const std::vector<int>& link, size_t b) {
     return std::span(link).subspan(static_cast<size_t>(first[b]), static_cast<size_t>(first[b + 1] - first[b]));
   };
