@@ -127,7 +127,7 @@ GroupMotion measure_motion(const double* HWY_RESTRICT rows, std::span<const std:
   const auto vector_of = [](const double* at) { return Vec3{at[0], at[1], at[2]}; };
   const Vec3 from = vector_of(row_of(first)), speed_from = vector_of(row_of(first) + kernel::kSpeed);
   const V3 p0{num(from.x), num(from.y), num(from.z)}, v0{num(speed_from.x), num(speed_from.y), num(speed_from.z)};
-  /// Calls body(l, p, v) for lanes l, l + 1, ... of all runs, with the first node in place of what has no mass.
+  // calls body(l, p, v, 1) for lanes l, l + 1, ... of all runs; in place of what has no mass the first node, and 0
   const auto for_nodes = [&](const auto& body) HWY_ATTR {
     for (size_t run = first; run < nodes.size(); run += kFaceRun)
       for (size_t l = 0; l < kFaceRun; l += kLanes) {

@@ -143,7 +143,7 @@ TEST(ContactSkin, FindsThePointsInABox) {
 }
 
 TEST(ContactSkin, MeasuresHowAGroupMoves) {
-  // 45 nodes of a body that turns about a place far off, one of them 0.7 m/s away from that, and one without mass
+  // 45 nodes of a body that turns about a place far off, and one without mass
   std::mt19937 random(13);
   std::uniform_real_distribution<double> number(-1, 1);
   const Vec3 turning{0.3, -0.2, 0.5}, about{40, -30, 20}, middle{100, 200, 5};
@@ -190,7 +190,7 @@ TEST(ContactSkin, MeasuresHowAGroupMoves) {
     EXPECT_LT(with.spread, 0.7);
     // a single node, nodes on a line, none
     EXPECT_EQ(norm(measure_motion(rows.data(), std::span(nodes).first(1), box).turning), 0);
-    EXPECT_EQ(measure_motion(rows.data(), std::span(nodes).first(2), box).spread > 0, true);
+    EXPECT_GT(measure_motion(rows.data(), std::span(nodes).first(2), box).spread, 0);
     EXPECT_EQ(measure_motion(rows.data(), std::span(nodes).subspan(20, 1), box).most, 0);
     EXPECT_TRUE(box.is_empty());
   }
