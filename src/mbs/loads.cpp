@@ -30,13 +30,15 @@ void System::compile_loads() {
 
 void System::apply_load(size_t i, double time) {
   LoadState& l = state.load[i];
-  if (l.begin != kUnlimited) return;
+  const bool is_over = l.begin != kUnlimited && l.end <= time;
+  if (l.begin != kUnlimited && !is_over) return;
   l.begin = l.from = l.until = time;
+  if (is_over) l.end = kUnlimited, l.kick = 0;
 }
 
 void System::remove_load(size_t i, double time) {
   LoadState& l = state.load[i];
-  if (l.begin == kUnlimited) l.begin = l.from = l.until = time;  // an event that would apply it comes too late
+  if (l.begin == kUnlimited) return;  // it has not begun
   l.end = std::min(l.end, time);
 }
 

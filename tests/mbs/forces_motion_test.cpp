@@ -228,6 +228,21 @@ TEST(LoadPhysics, BeginsAndEndsAtTheTimesOfItsEvents) {
   }
 }
 
+TEST(LoadPhysics, CanBeAppliedAgain) {
+  // 8 N from 0.1 to 0.2 s and from 0.5 to 0.6003 s; what ends it before it has begun does nothing
+  Load l;
+  l.force = {8, 0, 0};
+  Model m = make_loaded(l);
+  using Kind = Action::Kind;
+  m.events = {event_of(Kind::RemoveLoad, 0.05), event_of(Kind::ApplyLoad, 0.1), event_of(Kind::RemoveLoad, 0.2),
+              event_of(Kind::ApplyLoad, 0.5), event_of(Kind::RemoveLoad, 0.6003)};
+  for (const double h : {4e-3, 1e-3}) {
+    const End e = end_of(m, 0.8, h);
+    EXPECT_NEAR(e.v, 2 * (0.1 + 0.1003), 1e-12) << h;
+    EXPECT_NEAR(e.x, 2 * (0.1 * (0.8 - 0.15) + 0.1003 * (0.8 - 0.55015)), 4 * h * h) << h;
+  }
+}
+
 TEST(LoadPhysics, GivesItsImpulseWhateverTheStepDoes) {
   // stiff company beside the mass bounds the step until an event lets it go, in the middle of a table and of a load
   // that comes at the same time
