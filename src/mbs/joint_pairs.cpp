@@ -160,6 +160,9 @@ void System::take_pairs(double h) {
   using namespace kernel;
   const Pairs& pairs = lanes->pairs;
   const auto mine = [&](std::uint32_t slot) { return !lanes->is_batch || slot % lanes->W == lane; };
+  for (const int joint : paired) joint_over[static_cast<size_t>(joint)] = 0;
+  for (const std::uint32_t slot : pairs.unfit)
+    if (mine(slot)) joint_over[pairs.joint[slot]] = 1;  // to be looked at
   for (const int joint : paired) {
     const size_t j = static_cast<size_t>(joint), slot = pair_slot[j];
     JointState& js = state.joint[j];
@@ -168,11 +171,11 @@ void System::take_pairs(double h) {
     };
     js.force = get3(kForce);
     js.moment = get3(kMoment);
-    joint_over[j] = 0;
     if (joints[j].kind == Joint::Kind::Fixed) continue;
     for (int r = 0; r < joints[j].rows; ++r) js.curvature[r] = lanes->pair_state(slot, kCurvature + r);
     state.largest_drift = std::max(state.largest_drift, lanes->pair_state(slot, kOpen));
-    if (joints[j].kind == Joint::Kind::Revolute)
+    // what the kernel leaves has no new cosine and sine there
+    if (joints[j].kind == Joint::Kind::Revolute && !joint_over[j])
       update_angle(j, lanes->pair_state(slot, kCosine), lanes->pair_state(slot, kSine));
   }
   for (const std::uint32_t slot : pairs.over)
@@ -183,7 +186,6 @@ void System::take_pairs(double h) {
     for (JointCluster& c : clusters)
       if (c.joints[0] == static_cast<int>(j)) solve_cluster(c, h);
     for (int r = 0; r < joints[j].rows; ++r) lanes->pair_state(slot, kCurvature + r) = state.joint[j].curvature[r];
-    joint_over[j] = 1;  // to be looked at
   }
 }
 
