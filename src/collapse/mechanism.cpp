@@ -18,36 +18,48 @@ double calc_tilt(const Quat& q, const Vec3& fall_direction) {
   return 2 * std::atan2(q.x * axis.x + q.y * axis.y + q.z * axis.z, q.w);
 }
 
+namespace {
+
+/// The block at a time, on its way from one frame to the next.
+BlockFrame find_block(const std::vector<BlockFrame>& frames, double time) {
+  const auto after = std::find_if(frames.begin(), frames.end(), [time](const BlockFrame& f) { return f.time >= time; });
+  if (after == frames.end()) return frames.back();
+  BlockFrame at = *after;
+  if (after == frames.begin() || after->time == time) return at;
+  const BlockFrame& before = *(after - 1);
+  const double share = (time - before.time) / (after->time - before.time);
+  at.time = time;
+  at.rotation =
+      normalized(exp_rotation(share * log_rotation(after->rotation * conjugate(before.rotation))) * before.rotation);
+  at.displacement = before.displacement + share * (after->displacement - before.displacement);
+  return at;
+}
+
+}  // namespace
+
 Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
   constexpr double pi = 3.14159265358979323846;
   Mechanism out;
   const BlockFrame& last = in.frames.back();
   const bool touched = std::isfinite(in.touchdown);
-  const BlockFrame* at = &last;
-  if (touched) {
-    for (const BlockFrame& f : in.frames)
-      if (f.time >= in.touchdown) {
-        at = &f;
-        break;
-      }
-  }
+  const BlockFrame at = touched ? find_block(in.frames, in.touchdown) : last;
   out.time = touched ? in.touchdown : last.time;
   out.moved = last.moved;
   out.run = last.centre - in.frames.front().centre;
   out.run.z = 0;
 
   // the way it leans when it touches down: the planned one, unless it turned more about another axis
-  const Vec3 turned = log_rotation(at->rotation);
+  const Vec3 turned = log_rotation(at.rotation);
   Vec3 direction = in.fall_direction;
   const Vec3 lean = cross({turned.x, turned.y, 0}, {0, 0, 1});
   if (norm(lean) > 1e-3) direction = (1 / norm(lean)) * lean;
   out.tilt = norm(Vec3{turned.x, turned.y, 0});
-  const Mat3 R = to_matrix(at->rotation);
-  const auto drop_of = [&](const Vec3& arm) { return -(at->displacement + R * arm - arm).z; };
+  const Mat3 R = to_matrix(at.rotation);
+  const auto drop_of = [&](const Vec3& arm) { return -(at.displacement + R * arm - arm).z; };
   const double along = std::abs(dot(direction, in.fall_direction)) > 0.5 ? dot(direction, in.fall_direction) : 1;
   const double front_reach = along > 0 ? in.front : in.rear, rear_reach = along > 0 ? in.rear : in.front;
   const double front = drop_of(front_reach * direction), rear = drop_of(-rear_reach * direction);
-  out.drop = -at->displacement.z;
+  out.drop = -at.displacement.z;
   out.rear_share = front > 1e-3 ? std::max(0.0, rear) / front : 1;
   double off = std::atan2(direction.y, direction.x) - std::atan2(in.fall_direction.y, in.fall_direction.x);
   off = std::remainder(off, 2 * pi);
@@ -84,14 +96,14 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
     out.name = "partial";
     out.text = fmt::format("Aborted collapse: at rest, leaning by {:.1f} deg with {:.0f} % of its height left; {}.",
                            final_tilt / unit::deg, 100 * height_left, motion);
-  } else if (at->forward >= k.mechanism_fold_share && at->backward >= k.mechanism_fold_share) {
+  } else if (at.forward >= k.mechanism_fold_share && at.backward >= k.mechanism_fold_share) {
     out.name = "fold";
     out.text = fmt::format("It folds: {:.0f} % of the upper mass turns forward, {:.0f} % backward; {}.",
-                           100 * at->forward, 100 * at->backward, motion);
-  } else if (at->connected < k.mechanism_coherent_share && at->moved < k.mechanism_together_share) {
+                           100 * at.forward, 100 * at.backward, motion);
+  } else if (at.connected < k.mechanism_coherent_share && at.moved < k.mechanism_together_share) {
     out.name = "progressive";
     out.text = fmt::format("Progressive collapse: the largest connected part holds {:.0f} % of the upper mass; {}.",
-                           100 * at->connected, motion);
+                           100 * at.connected, motion);
   } else if (out.rear_share >= k.mechanism_topple_rear_share && out.tilt < k.mechanism_topple_rotation) {
     out.name = "vertical";
     out.text = fmt::format("It comes down vertically (telescoping): {}.", motion);
