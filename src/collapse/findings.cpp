@@ -315,7 +315,6 @@ void add_touchdown(const Context& c) {
                           order[i]->place[1], order[i]->energy * 1e-6, order[i]->momentum * 1e-6);
     c.add("touchdown.parts", "Touchdown", "Touchdown of the parts", text + ".", energy, "J");
   }
-  add_vibration(c);
 }
 
 void add_rigid_block(const Context& c) {
@@ -537,10 +536,20 @@ bool add_findings(const product::Plan& plan, const mbs::Model& model, const Mode
   if (!plan.shafts.empty())
     r.not_modelled.emplace_back(
         "rings that flatten as they land: single pieces of a shaft may roll and tumble farther than real ones");
-  const bool is_under_way = r.ending == "under_way";
+  // what was cancelled says how far it came
+  const bool is_under_way = r.ending == "under_way" || r.ending == "cancelled";
   const Context c{plan, model, map, k, recorder, summary, r, is_under_way, cancel};
-  if (r.time.empty()) {
+  const auto add_not_modelled = [&] {
+    std::string list;
+    for (const std::string& s : r.not_modelled) list += (list.empty() ? "" : "; ") + s;
+    c.add("not_modelled", "Not modelled", "Not modelled", list + ".", kNone, "");
+  };
+  if (r.time.empty() || r.ending == "failed") {
     c.add("mechanism", "Mechanism", "No result", r.ending_text, kNone, "", Status::Bad);
+    if (r.time.empty()) return true;
+    add_events(c);
+    add_not_modelled();
+    add_verification(c);
     return true;
   }
   const Mechanism m = judge_run(plan, model, map, k, recorder, summary, is_under_way);
@@ -553,11 +562,10 @@ bool add_findings(const product::Plan& plan, const mbs::Model& model, const Mode
   if (c.is_cancelled()) return false;
   add_touchdown(c);
   add_stubs(c);
+  add_vibration(c);
   add_events(c);
   if (r.ending == "at_rest" || r.ending == "time_limit") add_criteria(c, m, stood, reach);
-  std::string list;
-  for (const std::string& s : r.not_modelled) list += (list.empty() ? "" : "; ") + s;
-  c.add("not_modelled", "Not modelled", "Not modelled", list + ".", kNone, "");
+  add_not_modelled();
   add_verification(c);
   return true;
 }

@@ -61,7 +61,7 @@ function Summary(props: { run: Run }) {
   return (
     <>
       <p class="verdict-title">
-        {criteria.length === 0 ? "The plan sets no limits" : props.run.ending.kind === "under_way" ? `${criteria.length - met} of ${criteria.length} limits broken so far` : met === criteria.length ? (met === 1 ? "The one limit of the plan kept" : `All ${met} limits of the plan kept`) : `${met} of ${criteria.length} limits of the plan kept`}
+        {props.run.ending.kind === "failed" ? "The limits of the plan were not examined" : criteria.length === 0 ? "The plan sets no limits" : props.run.ending.kind === "under_way" || props.run.ending.kind === "cancelled" ? `${criteria.length - met} of ${criteria.length} limits broken so far` : met === criteria.length ? (met === 1 ? "The one limit of the plan kept" : `All ${met} limits of the plan kept`) : `${met} of ${criteria.length} limits of the plan kept`}
       </p>
       {open.slice(0, most).map((f) => (
         <a class="open-finding" href={`#finding-${f.id}`} data-test="open-finding">
