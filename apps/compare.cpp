@@ -77,6 +77,9 @@ std::vector<std::unique_ptr<engines::Engine>> make_engines(const Arguments& a) {
   accuracy.relative = !a.accuracy.empty() ? read_positive(a.accuracy, Dimension::Number, "--accuracy")
                       : a.step.empty()    ? 1e-9
                                           : 0;
+  if (!(accuracy.relative < 1))
+    throw InputError("E801", fmt::format("--accuracy \"{}\": must be below 1", a.accuracy),
+                     "a relative error, 1e-9 for example");
   std::vector<std::unique_ptr<engines::Engine>> list;
   for (size_t i = 0; i < names.size(); ++i) {
     if (std::find(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(i), names[i]) !=
@@ -93,6 +96,7 @@ mbs::Options make_options(const Arguments& a, const mbs::RunSettings& run) {
                : run.duration > 0  ? run.duration
                                    : kDuration;
   o.step = !a.step.empty() ? read_positive(a.step, Dimension::Time, "--step") : run.step;
+  mbs::choose_steps(run, o);
   o.frame_interval = o.duration / (a.frames > 0 ? a.frames : kFrames);
   o.equilibrium = a.equilibrium.value_or(run.equilibrium.value_or(true));
   o.threads = a.threads;

@@ -79,19 +79,11 @@ std::string escaped(const std::string& text) {
   return out;
 }
 
-}  // namespace
-
-Comparison compare(const mbs::Model& model, mbs::Options options, const std::vector<std::unique_ptr<Engine>>& engines,
-                   const std::function<void(const std::string&)>& report) {
-  mbs::check_model(model);
-  Comparison out;
-  options = make_silent(options);
-  out.interval = options.frame_interval;
-  // every engine shall show the same instants: a whole number of steps between them
-  const double wanted = std::min(choose_step(model, options), out.interval);
-  options.step = out.interval / std::ceil(out.interval / wanted * (1 - 1e-9));
-  out.step = options.step;
-
+/// All engines with steps of options.step.
+std::vector<EngineRun> run_all(const mbs::Model& model, const mbs::Options& options,
+                               const std::vector<std::unique_ptr<Engine>>& engines,
+                               const std::function<void(const std::string&)>& report) {
+  std::vector<EngineRun> runs;
   std::vector<Frame> first;
   bool has_first = false;
   for (const auto& engine : engines) {
@@ -110,15 +102,45 @@ Comparison compare(const mbs::Model& model, mbs::Options options, const std::vec
         Frame frame{v.time, v.X_WB, calc_height(model, v)};
         if (!has_first) return first.push_back(std::move(frame));
         // runs that end early lack instants, or have an odd one at their end
-        while (at < first.size() && first[at].time < v.time - 0.25 * out.interval) ++at;
-        if (at < first.size() && std::abs(first[at].time - v.time) <= 1e-6 * out.interval)
+        while (at < first.size() && first[at].time < v.time - 0.25 * options.frame_interval) ++at;
+        if (at < first.size() && std::abs(first[at].time - v.time) <= 1e-6 * options.frame_interval)
           add_instant(model, first[at], frame, run);
       };
       run.summary = engine->run(model, o);
       has_first = true;
     }
-    out.runs.push_back(std::move(run));
+    runs.push_back(std::move(run));
     if (options.progress.is_cancelled()) break;
+  }
+  return runs;
+}
+
+/// The step that the stiffest mode on the way asks for.
+double calc_wanted_step(const std::vector<EngineRun>& runs, const mbs::Options& options) {
+  double fastest = 0;
+  for (const EngineRun& r : runs) fastest = std::max(fastest, r.summary.highest_frequency);
+  return fastest > 0 ? 2 * options.step_safety / fastest : options.step;
+}
+
+}  // namespace
+
+Comparison compare(const mbs::Model& model, mbs::Options options, const std::vector<std::unique_ptr<Engine>>& engines,
+                   const std::function<void(const std::string&)>& report) {
+  mbs::check_model(model);
+  Comparison out;
+  const bool is_step_given = options.step > 0;
+  options = make_silent(options);
+  out.interval = options.frame_interval;
+  double wanted = choose_step(model, options);
+  constexpr int most_rounds = 4;
+  for (int round = 0; round < most_rounds; ++round) {
+    // every engine shall show the same instants: a whole number of steps between them
+    options.step = out.interval / std::ceil(out.interval / std::min(wanted, out.interval) * (1 - 1e-9));
+    out.step = options.step;
+    out.runs = run_all(model, options, engines, report);
+    // events may leave something stiffer than it was at the start
+    wanted = calc_wanted_step(out.runs, options);
+    if (is_step_given || options.progress.is_cancelled() || options.step <= 1.05 * wanted) break;
   }
   return out;
 }

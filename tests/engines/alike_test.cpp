@@ -319,6 +319,36 @@ TEST_P(EnginesAlikeReference, EventsAndReleases) {
   EXPECT_LT(r.position.value, 1e-3);  // the trigger is seen at steps, 0.1 ms at some m/s
 }
 
+TEST_P(EnginesAlikeReference, WithoutAStepTheyFollowWhatEventsLeave) {
+  NEEDS_ENGINE();
+  // 1 kg in place of 100 on 10 kN/m: the step of the start is ten times too long then
+  mbs::Model m = test::make_empty({0, 0, 0});
+  mbs::add_body(m, test::make_body("mass", 100, {1, 1, 1}, {1, 0, 0}));
+  m.bodies[0].v_WB = {0.1, 0, 0};
+  mbs::SpringDamper s;
+  s.a = mbs::kGround;
+  s.b = {0};
+  s.free_length = 1;
+  s.spring.rate = 1e4;
+  m.springs.push_back(s);
+  mbs::Event shrink;
+  shrink.time = 0.5;
+  shrink.actions.emplace_back();
+  shrink.actions[0].kind = mbs::Action::Kind::ReplaceBody;
+  shrink.actions[0].body = {0};
+  shrink.actions[0].replacement = test::make_body("mass", 1, {1, 1, 1}, {0, 0, 0});
+  m.events = {shrink};
+  std::vector<std::unique_ptr<Engine>> list;
+  list.push_back(make_engine("native"));
+  list.push_back(make_engine(GetParam(), {1e-9}));
+  mbs::Options o = test::make_options(1, 0.05, 0);
+  o.equilibrium = false;
+  o.step_safety = 0.05;
+  const Comparison c = compare(m, o, list);
+  EXPECT_LE(c.step, 1.05 * 2 * 0.05 / 100);
+  EXPECT_LT(c.runs[1].position.value, 2e-3);  // of a swing of 10 mm
+}
+
 TEST_P(EnginesAlikeReference, JointThatIsPulledApart) {
   NEEDS_ENGINE();
   mbs::Model m = test::make_bar(Kind::Revolute, test::z_along_y());
