@@ -81,7 +81,9 @@ void print_summary(std::FILE* out, const mbs::Model& m, const mbs::Summary& s, c
   } else {
     rows.emplace_back("Time", fmt::format("{:.6g} s in {} steps of {:.4g} ms, computed in {:.2g} s", s.time, s.steps,
                                           s.step * 1e3, s.wall_time));
-    rows.emplace_back("Energy error", fmt::format("{:.1e} of the released potential energy", s.energy_error));
+    rows.emplace_back(
+        "Energy error",
+        fmt::format("{:.1e} of the potential energy released, or of the energy at the start", s.energy_error));
     if (!m.joints.empty()) rows.emplace_back("Joint drift", fmt::format("{:.1e} m or rad", s.joint_drift));
   }
   if (s.step_needed > 0) rows.emplace_back("Note", collapse::describe_step_needed(s));
@@ -103,6 +105,7 @@ int run_model_file(const Arguments& a, const std::atomic<bool>& cancel) {
     const mbs::Model model = mbs::model_from_json(text, a.input, &settings);
     if (!(options.duration > 0)) options.duration = settings.duration;
     if (!(options.step > 0)) options.step = settings.step;
+    options.stability_share = settings.stability_share;
     if (!(options.frame_rate > 0) && settings.frame_interval > 0) options.frame_rate = 1 / settings.frame_interval;
     options.equilibrium = a.equilibrium.value_or(settings.equilibrium.value_or(true));
     options.rest_speed = settings.rest_speed.value_or(0);

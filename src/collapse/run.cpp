@@ -74,8 +74,9 @@ void add_checks(const mbs::Model& model, const mbs::Summary& s, bool equilibrium
                                                                         : Status::Warning);
   if (s.ending != mbs::Summary::Ending::NoEquilibrium) {
     add("verification.energy", "Energy balance",
-        fmt::format("The largest error is {:.1e} of the released potential energy.", s.energy_error), s.energy_error,
-        "1", s.energy_error <= k.verification_energy_error ? Status::Good : Status::Warning);
+        fmt::format("The largest error is {:.1e} of the potential energy released, or of the energy at the start.",
+                    s.energy_error),
+        s.energy_error, "1", s.energy_error <= k.verification_energy_error ? Status::Good : Status::Warning);
     add("verification.step", "Time step", describe_steps(s), s.step, "s",
         s.step_needed > 0 ? Status::Warning : Status::Info);
     if (!model.joints.empty())
@@ -124,6 +125,7 @@ mbs::RunSettings settings_of(const product::Plan& plan, const Knowledge& k, cons
   s.step = options.step_share * (options.step > 0 ? options.step : plan.analysis.step);
   const double rate = options.frame_rate > 0 ? options.frame_rate : plan.analysis.frame_rate;
   s.frame_interval = 1 / (rate > 0 ? rate : 60);
+  s.stability_share = mbs::Options().step_safety;
   s.equilibrium = true;
   s.rest_speed = k.rest_speed;
   return s;
@@ -143,8 +145,10 @@ record::Record run_model(const mbs::Model& model, const RunOptions& options, con
   mbs::RunSettings settings;
   settings.duration = options.duration > 0 ? options.duration : 10;
   settings.step = options.step_share * options.step;
+  if (options.stability_share > 0) settings.stability_share = options.stability_share;
   settings.frame_interval = 1 / (options.frame_rate > 0 ? options.frame_rate : 60);
   mbs::Options o = make_mbs_options(settings, k, options.threads, callbacks.progress);
+  mbs::choose_steps(settings, o);
   o.step_share = options.step_share;
   record_into(recorder, o);
   o.equilibrium = options.equilibrium;

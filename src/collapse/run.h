@@ -24,6 +24,7 @@ struct RunOptions {
   std::string engine = "native";
   std::string program_version;  // for the record
   // of bare models alone
+  double stability_share = 0;        // mbs::RunSettings; 0: its default
   bool equilibrium = true;           // false: from the poses and velocities of the model
   std::optional<double> rest_speed;  // 0: do not stop at rest; none: that of the rules [m/s]
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 namespace topple::mbs {
 
@@ -113,6 +114,33 @@ bool Course::is_at_rest() {
   return static_cast<double>(state.quiet_steps) >= std::max(1.0, std::floor(s_.options.rest_time / s_.step));
 }
 
+double Course::calc_energy_error() const {
+  constexpr double lift = 1e-6;  // [m]
+  double weight = 0;
+  for (size_t b = 0; b < s_.B; ++b)
+    if (!s_.fixed[b]) weight += s_.state.body[b].mass * norm(s_.model.gravity);
+  // what rests in equilibrium stores energy that nothing sets free
+  const double brought = s_.options.equilibrium ? 0 : s_.state.total_at_start;
+  const double reference = std::max({s_.state.released, brought, lift * weight});
+  return reference > 0 ? s_.state.largest_residual / reference : 0;
+}
+
+bool Course::end() {
+  constexpr double near = 1.5;  // steps behind the last frame
+  if (s_.summary.ending == Summary::Ending::AtRest || s_.state.time - now_.shown > near * s_.step) show();
+  constexpr double most = 1;
+  if (const double error = calc_energy_error(); error > most) {
+    s_.summary.ending = Summary::Ending::Diverged;
+    char words[160];
+    std::snprintf(words, sizeof words,
+                  "the balance of energy lacks %.3g times what was released or there at the start; the step may be too "
+                  "long",
+                  error);
+    s_.trouble = words;
+  }
+  return false;
+}
+
 bool Course::follow() {
   Summary& out = s_.summary;
   const Options& options = s_.options;
@@ -137,10 +165,9 @@ bool Course::follow() {
   if (!s_.model.loads.empty()) last_event_ = std::max(last_event_, s_.calc_last_load_change());
   if (is_at_rest()) {
     out.ending = Summary::Ending::AtRest;
-    show();
-    return false;
+    return end();
   }
-  return time < options.duration - 1e-9 * s_.step;
+  return time < options.duration - 1e-9 * s_.step || end();
 }
 
 Summary Course::finish() {
@@ -150,7 +177,7 @@ Summary Course::finish() {
   out.wall_time = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
   out.time = state.time;
   out.steps = state.step_index;
-  out.energy_error = state.released > 0 ? state.largest_residual / state.released : 0;
+  out.energy_error = calc_energy_error();
   out.joint_drift = state.largest_drift;
   out.message = std::string(words_of(out.ending)) + " at " + std::to_string(out.time) + " s";
   if (!s_.trouble.empty()) {

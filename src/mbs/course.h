@@ -32,6 +32,9 @@ class Course {
  private:
   void show();
   bool is_at_rest();
+  /// The end has been reached: its frame, and whether the balance of energy can be believed at all. Returns false.
+  bool end();
+  double calc_energy_error() const;
   /// Looks at a frame for whether nothing happens any more.
   void watch(const View&);
   /// Goes on to the next event if nothing happens until then.

@@ -481,7 +481,15 @@ double System::calc_own_step() const {
   const double share = options.step_share, step_of_limit = share * options.step_safety * calc_step_limit();
   // steps in which bodies meet or part shall not change their energy much (docs/theory/contact.md)
   const double corner = calc_contact_frequency();
-  return corner > 0 ? std::min(step_of_limit, share * kContactAngle / corner) : step_of_limit;
+  double h = corner > 0 ? std::min(step_of_limit, share * kContactAngle / corner) : step_of_limit;
+  if (options.most_turn > 0) {
+    double fastest = 0;
+    for (size_t b = 0; b < B; ++b)
+      if (!fixed[b]) fastest = std::max(fastest, norm(state.w[b]));
+    if (h * fastest > share * options.most_turn) h = share * options.most_turn / fastest;
+  }
+  if (options.least_steps > 0 && options.duration > 0) h = std::min(h, share * options.duration / options.least_steps);
+  return h;
 }
 
 void System::set_step(double h) {
@@ -599,11 +607,15 @@ class DeadLoad {
   /// Of the last evaluation: tangents where they lead nearer, else secants, which go there slowly but surely.
   void find_cracks(bool by_tangents);
   std::string describe_failure(bool has_diverged) const;
+  enum class End { Found, None, Diverged };
+  /// Iterates from where the bodies are.
+  End search(double good_enough, std::string& message);
 
   System& s_;
   const Assembly assembly_;
   const Unknowns& u_;
   double weight_ = 1, penalty_ = 1;
+  double share_ = 1;  // of an iteration's way that is gone
   Eigen::SimplicialLDLT<Sparse> solver_;
   bool is_analysed_ = false;  // the pattern stays what it is
   Sparse first_;              // stiffness at the start, once
@@ -716,8 +728,8 @@ void DeadLoad::find_unbalanced() {
     for (int i = 0; i < count; ++i) {
       const KinematicRow& row = rows[i];
       double& held = multiplier_[j][static_cast<size_t>(i)];
-      held -= penalty_ * gap[i];
-      pushed_back_[static_cast<Eigen::Index>(6 * j) + i] = -penalty_ * gap[i];
+      held -= share_ * penalty_ * gap[i];
+      pushed_back_[static_cast<Eigen::Index>(6 * j) + i] = -share_ * penalty_ * gap[i];
       gap_left_ = std::max(gap_left_, std::abs(gap[i]));
       const auto load = [&](Vector& on, double f) {
         for (int k = 0; k < u_.each; ++k) {
@@ -774,7 +786,7 @@ void DeadLoad::go_back(const Place& place) {
 
 void DeadLoad::move_accelerated() {
   Vector step(assembly_.count() + pushed_back_.size());
-  step << solver_.solve(pushed_), pushed_back_;
+  step << share_ * solver_.solve(pushed_), pushed_back_;
   if (acceleration_.accepts(step, pushed_)) {
     begun_ = find_place(), begun_step_ = step, begun_pushed_ = pushed_;
   } else {
@@ -851,6 +863,25 @@ bool DeadLoad::find(std::string& message) {
   for (const int b : assembly_.free_bodies()) extent = std::max(extent, norm(s_.state.p[static_cast<size_t>(b)]));
   const double good_enough = std::max(1e-8, 1e-15 * penalty_ * extent / weight_);
 
+  const Place begun = find_place();
+  const std::vector<ZoneState> virgin = s_.state.element, virgin_rotational = s_.state.rotational;
+  // what gravity bends further than its springs alone tell overshoots: then on shorter ways
+  for (const double share : {1.0, 0.5, 0.2, 0.05}) {
+    share_ = share;
+    if (share < 1) {
+      go_back(begun);
+      s_.state.element = virgin, s_.state.rotational = virgin_rotational;
+      pushed_back_.setZero();
+      acceleration_ = {};
+      most_load_ = 0;
+    }
+    const End end = search(good_enough, message);
+    if (end != End::Diverged) return end == End::Found;
+  }
+  return false;
+}
+
+DeadLoad::End DeadLoad::search(double good_enough, std::string& message) {
   const std::vector<ZoneState> virgin = s_.state.element, virgin_rotational = s_.state.rotational;
   // first without limits, so that an overloaded element can be named; then with them
   s_.ignores_limits = true;
@@ -918,20 +949,21 @@ bool DeadLoad::find(std::string& message) {
         (factorised < (has_cracks_ ? fresh_by_cracks : fresh) && unbalanced_ > good_enough &&
          unbalanced_ > quick * last_unbalanced)) {
       ++factorised;
-      if (!factorise(message)) return false;
+      if (!factorise(message)) return End::None;
     }
     last_unbalanced = unbalanced_;
     if (steps == Steps::Accelerated) {
       move_accelerated();
     } else {
-      move(solver_.solve(pushed_));
+      move(share_ * solver_.solve(pushed_));
     }
     ++round;
   }
-  if (!has_diverged && unbalanced_ < good_enough) return true;
+  if (!has_diverged && unbalanced_ < good_enough) return End::Found;
   constexpr double boundless = 1e6;
-  message = describe_failure(has_diverged || !(unbalanced_ < boundless));
-  return false;
+  has_diverged = has_diverged || !(unbalanced_ < boundless);
+  message = describe_failure(has_diverged);
+  return has_diverged ? End::Diverged : End::None;
 }
 
 }  // namespace

@@ -726,6 +726,8 @@ RunSettings Reader::run_from(const Node& n) const {
   if (r.step > 0 && r.duration > kMostSteps * r.step)
     n["step"].fail(fmt::format("must be at least {:.3g} for the duration of {:g} s: a run takes at most {:g} steps",
                                r.duration / kMostSteps, r.duration, kMostSteps));
+  if (n.has("stability_share")) r.stability_share = n["stability_share"].positive();
+  if (r.stability_share > 1) n["stability_share"].fail("must be at most 1");
   if (n.has("frame_interval")) r.frame_interval = n["frame_interval"].positive();
   if (n.has("equilibrium")) r.equilibrium = n["equilibrium"].flag();
   if (n.has("rest_speed")) {
@@ -786,6 +788,12 @@ Model Reader::read_model(RunSettings* run) {
 }
 
 }  // namespace
+
+void choose_steps(const RunSettings& run, Options& o) {
+  constexpr double most_turn = 0.03;  // a free top that wobbles keeps its energy to 1e-3 then
+  constexpr int least_steps = 200;
+  o.step_safety = run.stability_share, o.most_turn = most_turn, o.least_steps = least_steps;
+}
 
 Model model_from_json(const std::string& text, const std::string& name, RunSettings* run) {
   return Reader(text, name).read_model(run);

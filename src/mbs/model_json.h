@@ -10,13 +10,19 @@
 namespace topple::mbs {
 
 /// How a file wants to be run; what it leaves out is for the program to choose.
+struct Options;
+
 struct RunSettings {
   double duration = 0;               // 0: not given [s]
   double step = 0;                   // 0: from the stiffest mode [s]
+  double stability_share = 0.1;      // of that mode's limit, in (0, 1]; Options::step_safety
   double frame_interval = 0;         // 0: not given [s]
   std::optional<bool> equilibrium;   // start from the dead-load equilibrium
   std::optional<double> rest_speed;  // stop when everything is slower; 0: never [m/s]
 };
+
+/// Steps of a model whose modes nobody knows beforehand, and all of which count.
+void choose_steps(const RunSettings&, Options&);
 
 /// Items refer to each other by their place in the list. Numbers come back as they are.
 std::string to_json(const Model&, const RunSettings& = {});

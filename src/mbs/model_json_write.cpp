@@ -322,6 +322,7 @@ std::string to_json(const Model& m, const RunSettings& run) {
   Json settings = Json::object();
   if (run.duration > 0) settings["duration"] = run.duration;
   if (run.step > 0) settings["step"] = run.step;
+  if (run.stability_share != RunSettings().stability_share) settings["stability_share"] = run.stability_share;
   if (run.frame_interval > 0) settings["frame_interval"] = run.frame_interval;
   if (run.equilibrium) settings["equilibrium"] = *run.equilibrium;
   if (run.rest_speed) settings["rest_speed"] = *run.rest_speed;

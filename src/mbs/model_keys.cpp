@@ -27,7 +27,7 @@ const std::vector<KeyList>& model_json_keys() {
         "contact",
         "events",
         "outputs"}},
-      {"run", {"duration", "step", "frame_interval", "equilibrium", "rest_speed"}},
+      {"run", {"duration", "step", "stability_share", "frame_interval", "equilibrium", "rest_speed"}},
       {"pose", {"p", "q", "axis", "angle"}},
       {"shape", {"box", "sphere", "hull", "plane", "X_BS"}},
       {"body", {"name", "mass", "inertia", "X_WB", "v_WB", "w_WB", "fixed", "shapes"}},

@@ -94,6 +94,10 @@ struct Options {
   double duration = 1;  // [s]
   double step = 0;      // 0: step_safety times the limit of the stiffest mode; else at least duration / kMostSteps
   double step_safety = 0.85;
+  /// The engine's own step lets no free body turn by more than this at its present rate [rad], and there are at least
+  /// so many in the duration; 0: it does not ask.
+  double most_turn = 0;
+  int least_steps = 0;
   double step_share = 1;  // of the engine's own step, for studies of convergence; without effect on a set step
   /// Every zone is asked by its full law at each step, none in lanes: slow, to check what lanes make of them.
   bool full_law = false;
@@ -131,10 +135,12 @@ struct Summary {
   double highest_frequency = 0;  // largest of the elastic system on the way [rad/s]
   int equilibrium_iterations = 0;
   double equilibrium_residual = 0;  // largest unbalanced force over the weight
-  double energy_error = 0;          // largest |residual| over the released potential energy
-  double joint_drift = 0;           // largest violation of a joint [m, rad]
-  std::vector<std::string> notes;   // redundant constraints, singular positions: what was done about them
-  double wall_time = 0;             // of the stepping [s]
+  /// Largest |residual| over the potential energy released, or the energy there was at the start if that is more; both
+  /// at least what lifts everything by a micrometre.
+  double energy_error = 0;
+  double joint_drift = 0;          // largest violation of a joint [m, rad]
+  std::vector<std::string> notes;  // redundant constraints, singular positions: what was done about them
+  double wall_time = 0;            // of the stepping [s]
 };
 
 /// Runs the model from its start to its end. Throws InputError if check_model does, and for a set step

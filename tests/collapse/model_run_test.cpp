@@ -209,6 +209,101 @@ TEST(ModelRun, SaysWhatTheEngineSaysOfItsNumbers) {
   EXPECT_EQ(e.record.findings[0].status, record::Status::Good);
 }
 
+/// What a file with these bodies and more gives without a step of its own.
+Example run_text(const std::string& more, double duration, bool equilibrium = false) {
+  Example e;
+  mbs::RunSettings settings;
+  e.model = mbs::model_from_json(R"({"format": "topple-mbs", "version": 2, "gravity": [0, 0, 0],
+      "contact": {"ground": false, "bodies": false}, )" +
+                                     more + "}",
+                                 "here", &settings);
+  RunOptions o;
+  o.duration = duration;
+  o.equilibrium = equilibrium;
+  o.rest_speed = 0;
+  o.frame_rate = 100;
+  o.stability_share = settings.stability_share;
+  RunCallbacks callbacks;
+  callbacks.on_summary = [&](const mbs::Summary& s) { e.summary = s; };
+  e.record = run_model(e.model, o, callbacks);
+  return e;
+}
+
+const record::Finding& finding_of(const Example& e, const std::string& id) {
+  for (const record::Finding& f : e.record.findings)
+    if (f.id == id) return f;
+  throw std::runtime_error("no finding " + id);
+}
+
+TEST(ModelRunPhysics, ItsOwnStepFollowsTheModesOfAModel) {
+  // 1 kg on 10 N/m, thrown at 1 m/s: x = 1 + sin(wt)/w
+  const Example e = run_text(R"("bodies": [{"name": "b", "mass": 1, "inertia": [1, 1, 1], "X_WB": {"p": [1, 0, 0]},
+      "v_WB": [1, 0, 0]}],
+      "springs": [{"name": "s", "a": "ground", "b": "b", "points": [[0, 0, 0], [1, 0, 0]], "spring": 10}])",
+                             5);
+  const double w = std::sqrt(10.0);
+  ASSERT_GT(e.record.time.size(), 80U);
+  for (size_t i = 0; i < e.record.time.size(); ++i)
+    EXPECT_NEAR(e.record.position[3 * i], 1 + std::sin(w * e.record.time[i]) / w, 2e-3 / w) << e.record.time[i];
+  EXPECT_LT(e.summary.energy_error, 0.01);
+}
+
+TEST(ModelRunPhysics, ItsOwnStepFollowsWhatSpins) {
+  // a free body about its middle axis: the energy is that of the start
+  const Example e =
+      run_text(R"("bodies": [{"name": "b", "mass": 1, "inertia": [1, 2, 3], "X_WB": {}, "w_WB": [1, 800, 1]}])", 0.2);
+  EXPECT_LE(e.summary.step, 0.03 / 800);
+  EXPECT_LT(e.summary.energy_error, 0.01);
+  EXPECT_EQ(finding_of(e, "verification.energy").status, record::Status::Good);
+}
+
+TEST(ModelRunPhysics, AShortRunHasManySteps) {
+  const Example e =
+      run_text(R"("bodies": [{"name": "b", "mass": 1, "inertia": [1, 2, 3], "X_WB": {}, "v_WB": [1, 0, 0]}])", 1e-3);
+  EXPECT_GE(e.summary.steps, 200);
+  EXPECT_NEAR(e.summary.time, 1e-3, 1e-5);
+}
+
+TEST(ModelRun, RestsWithoutAnErrorOfEnergyToSpeakOf) {
+  const Example e = run_text(R"("bodies": [{"name": "a", "mass": 10, "inertia": [1, 1, 1], "X_WB": {"p": [1, 0, 0]}},
+      {"name": "b", "mass": 10, "inertia": [1, 1, 1], "X_WB": {"p": [3, 0, 0]}}],
+      "joints": [{"name": "root", "kind": "fixed", "parent": "ground", "child": "a", "at": [0, 0, 0]},
+                 {"name": "tip", "kind": "fixed", "parent": "a", "child": "b", "at": [2, 0, 0]}],
+      "loads": [{"name": "push", "body": "b", "force": [0, 0, -200]}])",
+                             0.1, true);
+  EXPECT_EQ(finding_of(e, "verification.energy").status, record::Status::Good);
+}
+
+TEST(ModelRun, FailsWhereTheBalanceOfEnergyIsLost) {
+  // 1 kg in place of 100 on a spring of 1e4 N/m: the step of 50 ms is far too long then
+  const std::string more = R"("run": {"step": 0.05, "equilibrium": false},
+      "bodies": [{"name": "b", "mass": 100, "inertia": [1, 1, 1], "X_WB": {"p": [1, 0, 0]}, "v_WB": [0.1, 0, 0]}],
+      "springs": [{"name": "s", "a": "ground", "b": "b", "points": [[0, 0, 0], [1, 0, 0]], "spring": 10000}],
+      "events": [{"name": "shrink", "time": 0.5, "actions": [{"do": "replace_body", "body": "b",
+                  "with": {"name": "b", "mass": 1, "inertia": [1, 1, 1], "X_WB": {}}}]}])";
+  mbs::RunSettings settings;
+  const mbs::Model m = mbs::model_from_json(
+      R"({"format": "topple-mbs", "version": 2, "gravity": [0, 0, 0], )" + more + "}", "here", &settings);
+  RunOptions o;
+  o.duration = 2;
+  o.step = settings.step;
+  o.equilibrium = false;
+  const record::Record r = run_model(m, o, {});
+  EXPECT_EQ(r.ending, "failed");
+  EXPECT_NE(r.ending_text.find("energy"), std::string::npos) << r.ending_text;
+}
+
+TEST(ModelRun, ShowsWhereItEnds) {
+  mbs::Model m = run_example("double_pendulum.json").model;
+  RunOptions o;
+  o.duration = 0.5;
+  o.frame_rate = 5;
+  o.equilibrium = false;
+  const record::Record r = run_model(m, o, {});
+  ASSERT_EQ(r.time.size(), 4U);
+  EXPECT_NEAR(r.time.back(), 0.5, 0.01);
+}
+
 TEST(ModelRun, NotesOutputsThatAskForMoreThanThereIs) {
   const Example fine = run_example("double_pendulum.json", 5e-3);
   EXPECT_TRUE(fine.summary.notes.empty()) << fine.summary.notes.front();

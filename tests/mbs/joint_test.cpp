@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "mbs/quantity.h"
 #include "mechanisms.h"
 
 namespace topple::mbs {
@@ -462,6 +463,49 @@ TEST(Joints, OfAChainOfAHundredLinksHangTogether) {
   EXPECT_LT(s.joint_drift, 1e-10);
   EXPECT_GT(kinetic, 1000);
   EXPECT_LT(residual, 1e-3 * kinetic);
+}
+
+TEST(JointPhysics, AnArmOnASoftSpringFindsItsEquilibrium) {
+  // gravity turns it back by more than twice what the spring does: c a = m g L cos a
+  for (const double stiffness : {8.0, 12.0, 30.0}) {
+    Model m = empty_model();
+    m.gravity = {0, 0, -9.81};
+    Body b = test::make_rod("arm", 2, {0, 0, 0}, {2, 0, 0});
+    add_body(m, b);
+    test::join(m, Joint::Kind::Revolute, kGround, {0}, {0, 0, 0}, test::along({0, 1, 0}), "hinge");
+    RotationalSpring spring;
+    spring.joint = {0};
+    spring.spring.rate = stiffness;
+    m.rotational_springs.push_back(spring);
+    Options o = options_of(1e-3, 1e-3);
+    o.equilibrium = true;
+    double angle = 0;
+    o.on_frame = [&](const View& v) {
+      if (v.time == 0) angle = calc_quantity({Quantity::Kind::JointAngle, 0}, v)[0];
+    };
+    const Summary s = run(m, o);
+    ASSERT_EQ(s.ending, Summary::Ending::TimeLimit) << s.message;
+    EXPECT_NEAR(stiffness * angle, 2 * 9.81 * std::cos(angle), 1e-6) << stiffness;
+  }
+}
+
+TEST(JointPhysics, AHingeCountsAllTurnsOfWhatSpinsFast) {
+  // beyond 0.4 rad a step the lanes leave a pair to its cluster
+  for (const double rate : {30.0, 41.0, 170.0}) {
+    Model m = empty_model();
+    m.gravity = {};
+    Body b = test::make_rod("rotor", 1, {0, 0, 0}, {1, 0, 0});
+    b.X_WB.p = {};
+    b.inertia = Mat3::diagonal({1, 2, 3});
+    b.w_WB = {0, rate, 0};
+    add_body(m, b);
+    test::join(m, Joint::Kind::Revolute, kGround, {0}, {0, 0, 0}, test::along({0, 1, 0}), "hinge");
+    Options o = options_of(2, 1e-2);
+    double angle = 0;
+    o.samplings = {{2, [&](const View& v) { angle = calc_quantity({Quantity::Kind::JointAngle, 0}, v)[0]; }}};
+    const Summary s = run(m, o);
+    EXPECT_NEAR(angle, 2 * rate, 1e-9) << s.message;
+  }
 }
 
 }  // namespace

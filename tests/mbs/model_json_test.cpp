@@ -126,19 +126,22 @@ TEST(ModelJson, ReadsTheSettingsOfTheRun) {
   RunSettings run;
   (void)model_from_json(
       file_with(
-          R"("run": {"duration": 3, "step": 1e-4, "frame_interval": 0.1, "equilibrium": false, "rest_speed": 0.2})"),
+          R"("run": {"duration": 3, "step": 1e-4, "stability_share": 0.5, "frame_interval": 0.1, "equilibrium": false,
+              "rest_speed": 0.2})"),
       "m.json", &run);
   EXPECT_EQ(run.duration, 3);
   EXPECT_EQ(run.step, 1e-4);
+  EXPECT_EQ(run.stability_share, 0.5);
   EXPECT_EQ(run.frame_interval, 0.1);
   EXPECT_EQ(run.equilibrium, false);
   EXPECT_EQ(run.rest_speed, 0.2);
   RunSettings again;
   (void)model_from_json(to_json(read(""), run), "m.json", &again);
   EXPECT_EQ(again.duration, 3);
+  EXPECT_EQ(again.stability_share, 0.5);
   EXPECT_EQ(again.rest_speed, 0.2);
   for (const char* wrong : {"\"duration\": 0", "\"step\": -1", "\"frame_interval\": 0", "\"rest_speed\": -1",
-                            "\"equilibrium\": 1", "\"steps\": 5"})
+                            "\"stability_share\": 0", "\"stability_share\": 1.1", "\"equilibrium\": 1", "\"steps\": 5"})
     EXPECT_THAT(complaints(std::string("\"run\": {") + wrong + "}"), HasSubstr("run")) << wrong;
   EXPECT_THAT(complaints(R"("run": {"duration": 20, "step": 1e-30})"),
               testing::AllOf(HasSubstr("5:"), HasSubstr("run.step"), HasSubstr("at least 2e-08")));
