@@ -861,9 +861,12 @@ bool DeadLoad::find(std::string& message) {
   // places are known to round-off only, and the stiffest spring turns that into a force
   double extent = 1;
   for (const int b : assembly_.free_bodies()) extent = std::max(extent, norm(s_.state.p[static_cast<size_t>(b)]));
+  // where joints alone hold: the weight opens them by a thousandth at first
+  penalty_ = std::max(penalty_, 1e3 * weight_ / extent);
   const double good_enough = std::max(1e-8, 1e-15 * penalty_ * extent / weight_);
 
   const Place begun = find_place();
+  const std::vector<JointState> joints = s_.state.joint;  // their angles
   const std::vector<ZoneState> virgin = s_.state.element, virgin_rotational = s_.state.rotational;
   // what gravity bends further than its springs alone tell overshoots: then on shorter ways
   for (const double share : {1.0, 0.5, 0.2, 0.05}) {
@@ -871,6 +874,7 @@ bool DeadLoad::find(std::string& message) {
     if (share < 1) {
       go_back(begun);
       s_.state.element = virgin, s_.state.rotational = virgin_rotational;
+      s_.state.joint = joints;
       pushed_back_.setZero();
       acceleration_ = {};
       most_load_ = 0;

@@ -244,7 +244,7 @@ TEST(ModelRunPhysics, ItsOwnStepFollowsTheModesOfAModel) {
   const double w = std::sqrt(10.0);
   ASSERT_GT(e.record.time.size(), 80U);
   for (size_t i = 0; i < e.record.time.size(); ++i)
-    EXPECT_NEAR(e.record.position[3 * i], 1 + std::sin(w * e.record.time[i]) / w, 2e-3 / w) << e.record.time[i];
+    EXPECT_NEAR(e.record.position[3 * i], 1 + std::sin(w * e.record.time[i]) / w, 5e-3 / w) << e.record.time[i];
   EXPECT_LT(e.summary.energy_error, 0.01);
 }
 
@@ -280,7 +280,7 @@ TEST(ModelRun, FailsWhereTheBalanceOfEnergyIsLost) {
       "bodies": [{"name": "b", "mass": 100, "inertia": [1, 1, 1], "X_WB": {"p": [1, 0, 0]}, "v_WB": [0.1, 0, 0]}],
       "springs": [{"name": "s", "a": "ground", "b": "b", "points": [[0, 0, 0], [1, 0, 0]], "spring": 10000}],
       "events": [{"name": "shrink", "time": 0.5, "actions": [{"do": "replace_body", "body": "b",
-                  "with": {"name": "b", "mass": 1, "inertia": [1, 1, 1], "X_WB": {}}}]}])";
+                  "replacement": {"name": "b", "mass": 1, "inertia": [1, 1, 1], "X_WB": {}}}]}])";
   mbs::RunSettings settings;
   const mbs::Model m = mbs::model_from_json(
       R"({"format": "topple-mbs", "version": 2, "gravity": [0, 0, 0], )" + more + "}", "here", &settings);
