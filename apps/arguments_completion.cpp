@@ -143,9 +143,15 @@ std::string make_zsh(const std::vector<VerbPath>& verbs) {
   for (const auto& [verb, path] : verbs) {
     if (!path.empty()) known += (known.empty() ? "" : " | ") + quote(path);
     std::string specs, described;
-    for (const OptionShape& o : list_options(*verb)) {
+    const std::vector<OptionShape> options = list_options(*verb);
+    const auto positionals =
+        std::count_if(options.begin(), options.end(), [](const auto& o) { return o.is_positional; });
+    int at = 0;
+    for (const OptionShape& o : options) {
       if (o.is_positional) {
-        specs += " " + quote("*:" + spec_text(o.names[0]) + ":" + zsh_action(o));
+        // the last one stands for the rest, of which there may be one only
+        const std::string place = ++at < positionals ? std::to_string(at) : "*";
+        specs += " " + quote(place + ":" + spec_text(o.names[0]) + ":" + zsh_action(o));
         continue;
       }
       for (const std::string& name : o.names) {

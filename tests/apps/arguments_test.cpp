@@ -123,6 +123,20 @@ TEST(Arguments, CompletionKnowsEveryVerbAndOption) {
   EXPECT_EQ(said({"completion", "csh"}).second, kBadInput);
 }
 
+TEST(Arguments, ZshIsToldOfOneRestOfArgumentsAtMost) {
+  const std::string script = said({"completion", "zsh"}).first;
+  std::istringstream in(script);
+  int count = 0;
+  for (std::string line; std::getline(in, line);) {
+    const size_t first = line.find(" '*:");
+    if (first == std::string::npos) continue;
+    EXPECT_EQ(line.find(" '*:", first + 1), std::string::npos) << line;
+    ++count;
+  }
+  EXPECT_GT(count, 10);
+  EXPECT_THAT(script, HasSubstr(" '1:first:_files' '*:second:_files'"));
+}
+
 TEST(Arguments, ManualHasItsParts) {
   const auto [page, code] = said({"manual"});
   EXPECT_EQ(code, kOk);
