@@ -254,7 +254,7 @@ std::vector<OptionShape> list_options(const CLI::App& app) {
       o.takes = Takes::Choice;
       o.choices = split(type.substr(from + 1, to - from - 1), ',');
     } else {
-      o.takes = type == "FILE"                                            ? Takes::File
+      o.takes = type == "FILE" || type == "PATH"                          ? Takes::File
                 : type == "FOLDER"                                        ? Takes::Folder
                 : type == "QUANTITY"                                      ? Takes::Quantity
                 : type.rfind("INT", 0) == 0 || type.rfind("UINT", 0) == 0 ? Takes::Number

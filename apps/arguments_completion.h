@@ -15,7 +15,7 @@ struct VerbPath {
 /// The program and all its verbs, depth first, as they were added.
 std::vector<VerbPath> list_verbs(const CLI::App&);
 
-/// What an option takes.
+/// What an option takes; a file may be a folder where either will do.
 enum class Takes { Nothing, Word, Choice, Number, Quantity, File, Folder };
 struct OptionShape {
   std::vector<std::string> names;  // "-o", "--output"; a positional has its own: "plan"

@@ -449,6 +449,7 @@ SH
   offers "topple run --j" only --json
   offers "topple run pl" only plan.toml
   offers "topple run plan.toml -o fo" only folder
+  offers "topple report --study " folder plan.toml
   offers "topple rcc plan.toml --zone " only foot top start end
   offers "topple rcc plan.toml --zone = t" only top
   offers "topple completion " only bash zsh fish
@@ -463,8 +464,8 @@ SH
   expect 0 "$topple" completion fish; cp out topple.fish
   if command -v fish >/dev/null; then
     HOME=$work fish --no-execute topple.fish || failures=$((failures + 1))
-    HOME=$work fish -N -c 'source topple.fish; complete -C "topple mbs run --fr"; complete -C "topple rcc p --zone t"; complete -C "topple doc"' >got
-    has got "--frame-rate"; has got "top"; has got "doctor"; lacks got "verify"
+    HOME=$work fish -N -c 'source topple.fish; complete -C "topple mbs run --fr"; complete -C "topple rcc p --zone t"; complete -C "topple doc"; complete -C "topple report --study fo"' >got
+    has got "--frame-rate"; has got "top"; has got "doctor"; has got "folder/"; lacks got "verify"
   fi
   expect 2 "$topple" completion csh
   ;;
