@@ -143,7 +143,7 @@ export function Details(props: { run: Run }) {
     ["Created", formatDate(p.created) || "–"],
     ["Seed", p.seed],
     ["Step", p.step === null ? "–" : `${formatNumber(p.step * 1000, 3)} ms`],
-    ["Frames", String(time.length)],
+    ["Frames of the record", String(time.length)],
     ["Threads", String(p.threads)],
     ["Computing time", formatDuration(p.wall_time)],
   ];

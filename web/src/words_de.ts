@@ -537,6 +537,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["Created", "Erstellt"],
   ["Seed", "Startwert"],
   ["Step", "Zeitschritt"],
+  ["Frames of the record", "Bilder der Aufzeichnung"],
   ["Threads", "Rechenstränge"],
   ["Computing time", "Rechenzeit"],
   ["Kinds of events shown", "Gezeigte Arten von Ereignissen"],

@@ -175,6 +175,8 @@ describe("the German table", () => {
     assert.match(translate("It topples: when the upper block first touches the ground, at 1.23 s, it leans by 15.7 deg, its mass centre has come down by 1.47 m, and its rear edge 2 % as far as its front edge. In the end 100 % of the mass has come down. Parts were still moving when the run ended."),
       /^Es kippt: Wenn der obere Block zuerst den Boden berührt, bei 1,23 s, neigt er sich .* herunter\w+\. Als die Rechnung endete/);
     assert.equal(translate("Nobody ever says this."), undefined);
+    assert.equal(translate("Frames"), "Rahmen"); // of the building
+    assert.equal(translate("Frames of the record"), "Bilder der Aufzeichnung");
     assert.equal(translate("Row C fires at 5.5 s instead of 4 s"), "Row C zündet bei 5,5 s statt bei 4 s");
     assert.equal(translate("C-D2-0 is cut at 0 m: 50 % of the bars, 30 % of the concrete"), "C-D2-0 ist in 0 m angeschnitten: 50 % der Stäbe, 30 % des Betons");
     assert.equal(translate("friction of the ground 0.5, of the parts 0.6"), "Reibung am Boden 0,5, zwischen den Teilen 0,6");
