@@ -921,6 +921,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["Beside another computation", "Neben einer anderen Rechnung"],
   ["A is this run, B is by", "A ist diese Rechnung, B stammt von"],
   ["finite elements", "finiten Elementen"],
+  ["never", "nie"],
   ["First touchdown of the upper block: A {}, B {}.", "Erstes Aufsetzen des oberen Blocks: A {}, B {}."],
   ["First touchdown of the upper block: A {w}, B {w}, difference {w}.", "Erstes Aufsetzen des oberen Blocks: A {}, B {}, Unterschied {}."],
   ["Tilt up to {:.2f} s: largest difference {:.2f} deg at {:.2f} s.", "Neigung bis {} s: größter Unterschied {} deg bei {} s."],

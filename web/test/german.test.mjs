@@ -175,6 +175,9 @@ describe("the German table", () => {
     assert.match(translate("It topples: when the upper block first touches the ground, at 1.23 s, it leans by 15.7 deg, its mass centre has come down by 1.47 m, and its rear edge 2 % as far as its front edge. In the end 100 % of the mass has come down. Parts were still moving when the run ended."),
       /^Es kippt: Wenn der obere Block zuerst den Boden berührt, bei 1,23 s, neigt er sich .* herunter\w+\. Als die Rechnung endete/);
     assert.equal(translate("Nobody ever says this."), undefined);
+    assert.equal(translate("First touchdown of the upper block: A 4.80 s, B never."), "Erstes Aufsetzen des oberen Blocks: A 4,80 s, B nie.");
+    assert.equal(translate("First touchdown of the upper block: A never, B never."), "Erstes Aufsetzen des oberen Blocks: A nie, B nie.");
+    assert.equal(translate("First touchdown of the upper block: A 4.80 s, B 4.85 s, difference +0.050 s."), "Erstes Aufsetzen des oberen Blocks: A 4,80 s, B 4,85 s, Unterschied +0,050 s.");
     assert.equal(translate("Frames"), "Rahmen"); // of the building
     assert.equal(translate("Frames of the record"), "Bilder der Aufzeichnung");
     assert.equal(translate("Row C fires at 5.5 s instead of 4 s"), "Row C zündet bei 5,5 s statt bei 4 s");
