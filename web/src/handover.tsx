@@ -9,6 +9,9 @@ import { formatNumber, prettify } from "./units";
 
 const percent = (part: number): string => String(Math.max(1, Math.round(100 * part)));
 
+/// The distance that the plan asks for, as a clearance finding ends with it in either language; undefined if it asks for none.
+const findLimit = (f: Finding): string | undefined => /; (?:the limit is|der Grenzwert ist) (\d+(?:[.,]\d+)?) m\.$/.exec(f.text)?.[1]?.replace(",", ".");
+
 /// What would have to be otherwise for the findings not to hold, the nearest first.
 export function listConditions(run: Run): string[] {
   const out: string[] = [];
@@ -21,8 +24,15 @@ export function listConditions(run: Run): string[] {
   margins.sort((a, b) => (a.value as number) - (b.value as number));
   for (const f of margins.slice(0, 3)) out.push(`${f.title}: the most loaded zone resists ${percent(1 - 1 / (f.value as number))} % less than the plan says.`);
   const near = run.findings.filter((f) => f.id.startsWith("clearance.") && f.value !== null && f.value > 0 && f.status !== "bad");
-  near.sort((a, b) => (a.value as number) - (b.value as number));
-  for (const f of near.slice(0, 3)) out.push(`${f.title}: parts come ${formatNumber(f.value, 2)} m farther than in this run; they then reach it.`);
+  const ways = near.map((f) => {
+    const limit = findLimit(f);
+    return { title: f.title, limit, left: Math.max(0, (f.value as number) - Number(limit ?? 0)) };
+  });
+  ways.sort((a, b) => a.left - b.left);
+  for (const { title, limit, left } of ways.slice(0, 3)) {
+    if (limit === undefined) out.push(`${title}: parts come ${formatNumber(left, 2)} m farther than in this run; they then reach it.`);
+    else out.push(`${title}: parts come ${formatNumber(left, 2)} m farther than in this run; the limit of ${limit} m is then broken.`);
+  }
   out.push("Strengths, bars, weights or friction are not those of the plan. What other values do, a fuzzy study of the plan shows.");
   return out;
 }

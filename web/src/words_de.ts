@@ -683,6 +683,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["It fails already: {}.", "Schon jetzt nicht eingehalten: {}."],
   ["One of the {:d} charges does not fire, or not when the plan says.", "Eine der {} Ladungen zündet nicht, oder nicht, wenn der Plan es sagt."],
   ["{}: the most loaded zone resists {:d} % less than the plan says.", "{}: Die am höchsten ausgenutzte Zone trägt {} % weniger, als der Plan sagt."],
+  ["{}: parts come {:g} m farther than in this run; the limit of {:g} m is then broken.", "{}: Teile kommen {} m weiter als in dieser Rechnung; der Grenzwert von {} m ist dann unterschritten."],
   ["{}: parts come {:g} m farther than in this run; they then reach it.", "{}: Teile kommen {} m weiter als in dieser Rechnung; dann erreichen sie es."],
   ["Strengths, bars, weights or friction are not those of the plan. What other values do, a fuzzy study of the plan shows.", "Festigkeiten, Bewehrung, Gewichte oder Reibung sind nicht die des Plans. Was andere Werte bewirken, zeigt eine Fuzzy-Studie des Plans."],
   ["Site plan", "Lageplan"],

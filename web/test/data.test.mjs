@@ -7,6 +7,7 @@ import { makeSynthetic } from "./synthetic.mjs";
 const { decodeFloats, findFrame, slerp, readRun, calcPose } = await load("data.ts");
 const { formatNumber, formatValue, toReadable, formatDuration, formatDate, formatMass, prettify } = await load("units.ts");
 const { findCoherent } = await load("plots.tsx");
+const { listConditions } = await load("handover.tsx");
 const { chooseMoments } = await load("stills.tsx");
 const { findZonesOfBodies, findBody, partOfShape } = await load("zones.ts");
 const { colourOfUtilisation } = await load("vocabulary.ts");
@@ -247,5 +248,27 @@ describe("events on paper", () => {
     assert.equal(groups.reduce((sum, g) => sum + g.events.length, 0), events.length);
     // stages are never joined
     assert.equal(groupEvents(make("stage", ...Array.from({ length: 50 }, (_, i) => i))).length, 50);
+  });
+});
+
+describe("what would make it fail", () => {
+  const clearance = (title, value, text, status = "info") => ({ id: `clearance.${title}`, heading: "Clearance", title, text, value, unit: "m", status });
+  const mechanism = { id: "mechanism", heading: "Mechanism", title: "Mechanism: topple", text: "", value: 0.2, unit: "rad", status: "good" };
+  const tell = (...findings) => listConditions({ findings: [mechanism, ...findings], events: [] }).slice(0, -1);
+
+  it("counts the way to a neighbour up to the limit that the plan sets", () => {
+    const hall = clearance("Hall", 9.63, "The nearest part, C-A1-0, comes to 9.6 m at 4.10 s; the limit is 4.0 m.", "good");
+    const road = clearance("Road", 7.21, "The nearest part, C-A1-0, comes to 7.2 m at 4.10 s.");
+    assert.deepEqual(tell(road, hall), [
+      "Hall: parts come 5.6 m farther than in this run; the limit of 4.0 m is then broken.",
+      "Road: parts come 7.2 m farther than in this run; they then reach it.",
+    ]);
+    // a page that is in German already
+    assert.deepEqual(tell({ ...hall, text: "Das nächste Teil, C-A1-0, kommt bei 4,10 s auf 9,6 m heran; der Grenzwert ist 4,0 m." }),
+      ["Hall: parts come 5.6 m farther than in this run; the limit of 4.0 m is then broken."]);
+  });
+
+  it("tells of no way that is left where a limit is broken", () => {
+    assert.deepEqual(tell(clearance("Hall", 3.2, "The nearest part, C-A1-0, comes to 3.2 m at 4.10 s; the limit is 4.0 m.", "bad")), ["It fails already: Hall."]);
   });
 });
