@@ -92,7 +92,7 @@ Small models whose answers are known, run on the engine `{}` {}. Written by
 topple mbs verify --markdown docs/verification.md
 ```
 
-Each case is compared with a closed form, with an integral evaluated apart from the engine, or with a published number;
+`--json FILE` writes the same for programs, `--engine NAME` asks another engine. Each case is compared with a closed form, with an integral evaluated apart from the engine, or with a published number;
 the case says with which. It is run with three steps, each half of the one before. An error is the
 distance from the exact value, for several components the length of the difference. The order is log2 of the ratio of the
 errors at the two finest steps: 2 where halving the step quarters the error. A tolerance is that of the error at the finest
