@@ -80,6 +80,9 @@ export function PlotPanel(props: { state: State; group: Group; onSeek?: (time: n
     if (element === null) return;
     const cursorLine = document.createElement("div");
     cursorLine.className = "time-line";
+    const placeLine = (u: uPlot): void => {
+      cursorLine.style.transform = `translateX(${u.valToPos(state.timeSlowly.value, "x") || 0}px)`;
+    };
     const plot = new uPlot(
       {
         width: Math.max(200, element.clientWidth),
@@ -118,6 +121,7 @@ export function PlotPanel(props: { state: State; group: Group; onSeek?: (time: n
               ctx.restore();
             },
           ],
+          draw: [placeLine], // new data and sizes hold from then on, not when they are set
         },
       },
       [run.time, ...calcValues(run, group)],
@@ -125,9 +129,6 @@ export function PlotPanel(props: { state: State; group: Group; onSeek?: (time: n
     );
     namePlot(plot, group.title);
     plot.over.appendChild(cursorLine);
-    const placeLine = (): void => {
-      cursorLine.style.transform = `translateX(${plot.valToPos(state.timeSlowly.value, "x") || 0}px)`;
-    };
     const seek = (event: PointerEvent): void => {
       if (event.buttons & 1) (props.onSeek ?? state.pauseAt)(plot.posToVal(event.clientX - plot.over.getBoundingClientRect().left, "x"));
     };
@@ -136,10 +137,7 @@ export function PlotPanel(props: { state: State; group: Group; onSeek?: (time: n
       seek(event);
     });
     plot.over.addEventListener("pointermove", seek);
-    const observer = new ResizeObserver(() => {
-      plot.setSize({ width: Math.max(200, element.clientWidth), height });
-      placeLine();
-    });
+    const observer = new ResizeObserver(() => plot.setSize({ width: Math.max(200, element.clientWidth), height }));
     observer.observe(element);
     // Two plots side by side on A4; the paper's layout comes too late for the observer.
     const beforePrint = (): void => plot.setSize({ width: 330, height: 200 });
@@ -149,11 +147,9 @@ export function PlotPanel(props: { state: State; group: Group; onSeek?: (time: n
     const dark = matchMedia("(prefers-color-scheme: dark)");
     const redraw = (): void => plot.redraw();
     dark.addEventListener("change", redraw);
-    const stop = effect(placeLine);
+    const stop = effect(() => placeLine(plot));
     const stopGrowing = state.grownSlowly.subscribe((grown) => {
-      if (grown === 0) return;
-      plot.setData([run.time, ...calcValues(run, group)]);
-      placeLine();
+      if (grown !== 0) plot.setData([run.time, ...calcValues(run, group)]);
     });
     return () => {
       stop();

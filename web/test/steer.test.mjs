@@ -475,6 +475,16 @@ describe("steering page", () => {
     await d.tab("events");
     await shot("events");
     await d.tab("plots");
+    // the line in each plot stands where the view does, at the end of the run
+    await d.click("live");
+    await page.reload();
+    await page.waitForSelector("html[data-ready=yes]");
+    await d.untilBranch("what-if 1");
+    await page.waitForFunction(() => {
+      const lines = [...document.querySelectorAll(".time-line")].map((line) => [line.getBoundingClientRect(), line.parentElement.getBoundingClientRect()]);
+      return lines.length > 0 && lines.every(([line, plot]) => Math.abs((line.left + line.right) / 2 - plot.right) < 2);
+    });
+    await d.scrub(3);
   });
 
   it("opens another plan beside, and goes back", async () => {
