@@ -77,7 +77,8 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
                          [&](const StudyState& s) { line.say(describe_state(problem, s)); });
   } catch (const InputError& e) {
     line.clear();
-    if (e.diagnostics().front().code != "E824") return complain(e, text);
+    const std::string& code = e.diagnostics().front().code;
+    if (code != "E823" && code != "E824") return complain(e, text);
     study::Store store(place.store);
     const auto refusal = store.find_refusal(study::calc_model_hash(problem));
     complain(e, refusal ? study::read_refusal(*refusal).line : "");

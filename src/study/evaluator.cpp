@@ -1,7 +1,9 @@
 #include "study/evaluator.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -33,9 +35,12 @@ struct Reader {
   const std::string& command;
 
   Answer refuse(std::size_t offset, std::string message, std::string help = {}) const {
+    return make_refused("E824", offset, std::move(message), std::move(help));
+  }
+  Answer make_refused(const char* code, std::size_t offset, std::string message, std::string help) const {
     Refusal r;
     r.diagnostic = {Severity::Error,
-                    "E824",
+                    code,
                     {fmt::format("answer of \"{}\"", command), 1, 1 + count_characters(line, offset)},
                     1,
                     std::move(message),
@@ -223,6 +228,7 @@ class Evaluator {
       }
       const auto now = Clock::now();
       a.seconds = std::chrono::duration<double>(now - last).count();
+      a.line = std::move(line), a.source = command_;
       last = now;
       const bool is_refused = a.kind == Answer::Kind::Refused;
       is_answered[static_cast<std::size_t>(id)] = true;
@@ -287,6 +293,33 @@ Refusal read_refusal(const std::string& text) {
   r.diagnostic = {Severity::Error, j.at("code"), {j.at("file"), 1, j.at("column")}, 1, j.at("message"), j.at("help")};
   r.line = j.at("line");
   return r;
+}
+
+std::vector<std::string> list_outputs(const Answer& a) {
+  std::vector<std::string> names;
+  for (const auto& [name, value] : a.outputs) names.push_back(name);
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+Answer compare_outputs(const Answer& a, const std::vector<std::string>& elsewhere) {
+  const std::vector<std::string> here = list_outputs(a);
+  if (a.kind != Answer::Kind::Done || here == elsewhere) return a;
+  const auto join = [](const std::vector<std::string>& names) {
+    return names.empty() ? std::string("none") : fmt::format("{}", fmt::join(names, ", "));
+  };
+  // at the first name that is new, or at the list that lacks one
+  std::size_t offset = find_member(a.line, "outputs");
+  for (const auto& [name, value] : a.outputs)
+    if (!std::binary_search(elsewhere.begin(), elsewhere.end(), name)) {
+      offset = find_member(a.line, name);
+      break;
+    }
+  return Reader{a.line, a.source}.make_refused(
+      "E823", offset,
+      fmt::format("the model gave the outputs {} at this point and {} at others", join(here), join(elsewhere)),
+      "give the same outputs at every point, or {\"failed\": \"why\"} where one has no value; another model wants "
+      "another folder");
 }
 
 Runner make_evaluator(const std::string& definition) {

@@ -40,8 +40,10 @@ class Names {
       std::string before, now;
       for (const std::string& name : outputs) before += (before.empty() ? "" : ", ") + name;
       for (const auto& [name, value] : a.outputs) now += (now.empty() ? "" : ", ") + name;
-      throw InputError("E823", fmt::format("the model gave the outputs {} at one point and {} at another",
-                                           before.empty() ? "none" : before, now.empty() ? "none" : now));
+      throw InputError("E823",
+                       fmt::format("the model gave the outputs {} at one point and {} at another",
+                                   before.empty() ? "none" : before, now.empty() ? "none" : now),
+                       "give the same outputs at every point, then give the command again");
     };
     if (a.outputs.size() != outputs.size()) complain();
     for (std::size_t i = 0; i < outputs.size(); ++i) {
@@ -96,6 +98,23 @@ std::string make_study_definition(const Problem& p, const StudyOptions& options)
          {"drivers", p.has_drivers}};
   if (p.whole) d["confirm"] = p.confirm;
   return d.dump();
+}
+
+/// Hashes of the answers whose outputs are not those of most others: an older version kept one before it stopped.
+std::vector<std::string> find_strangers(const std::vector<StoredResult>& results) {
+  std::map<std::vector<std::string>, int> counts;
+  const std::vector<std::string>* usual = nullptr;
+  for (const StoredResult& r : results) {
+    if (r.answer.kind != Answer::Kind::Done) continue;
+    const auto place = counts.try_emplace(list_outputs(r.answer), 0).first;
+    ++place->second;
+    if (!usual || place->second > counts.at(*usual)) usual = &place->first;
+  }
+  std::vector<std::string> strangers;
+  if (counts.size() < 2) return strangers;
+  for (const StoredResult& r : results)
+    if (r.answer.kind == Answer::Kind::Done && list_outputs(r.answer) != *usual) strangers.push_back(r.hash);
+  return strangers;
 }
 
 std::vector<std::string> list_failures(const uncertainty::Archive& archive) {
@@ -167,7 +186,11 @@ class Manager {
     release_dead_workers(store_);
     store_.forget_refusals(model_);
     if (options.rerun_failed) store_.rerun_failed(model_);
-    for (StoredResult& r : store_.load_results(model_)) known_.emplace(std::move(r.hash), std::move(r.answer));
+    std::vector<StoredResult> results = store_.load_results(model_);
+    const std::vector<std::string> strangers = find_strangers(results);
+    if (!strangers.empty()) store_.rerun(strangers);
+    for (StoredResult& r : results) known_.emplace(std::move(r.hash), std::move(r.answer));
+    for (const std::string& hash : strangers) known_.erase(hash);
     start_pool();
   }
 
@@ -202,7 +225,12 @@ class Manager {
     for (std::size_t i = 0; i < batch.size(); ++i) {
       const auto found = known_.find(hashes[i]);
       if (found == known_.end()) continue;  // cancelled: not run
-      out[i] = names_.translate(found->second);
+      try {
+        out[i] = names_.translate(found->second);
+      } catch (const InputError&) {
+        store_.rerun({hashes[i]});  // workers in two places began with different outputs
+        throw;
+      }
       ++asked_;
       failed_ += out[i].state == Result::State::Failed;
     }
@@ -463,6 +491,8 @@ StudyResult run_study(const Problem& problem, const RunnerFactories& factories, 
 
 StudyResult read_study(const Problem& problem, Store& store, const StudyRow& row) {
   std::vector<StoredResult> results = store.load_results(row.model);
+  for (const std::string& hash : find_strangers(results))
+    std::erase_if(results, [&hash](const StoredResult& s) { return s.hash == hash; });
   StudyResult r;
   r.is_finished = row.state == "finished";
   const json summary = json::parse(row.summary.empty() ? "{}" : row.summary);

@@ -32,6 +32,7 @@ struct Answer {
   std::vector<double> trajectory;                       // values over a grid common to all points; may be empty
   std::string text;                                     // why not Done
   double seconds = 0;                                   // it took
+  std::string line{}, source{};                         // as an evaluator gave it, for complaints; not kept
 };
 
 /// Answers points, in any order, each at most once; a point without an answer counts as cancelled. Called by one

@@ -10,6 +10,8 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "study/evaluator.h"
+
 namespace topple::study {
 namespace {
 
@@ -110,6 +112,15 @@ void Pool::work(const std::string& name) {
   news_.notify_all();
 }
 
+Answer Pool::compare(Store& store, const std::string& model, const Answer& a) {
+  if (a.kind != Answer::Kind::Done) return a;
+  const std::lock_guard lock(outputs_mutex_);
+  auto known = outputs_.find(model);
+  if (known == outputs_.end())
+    known = outputs_.emplace(model, store.find_outputs(model).value_or(list_outputs(a))).first;
+  return compare_outputs(a, known->second);
+}
+
 void Pool::run_jobs(Store& store, const std::string& name, std::vector<Job> jobs,
                     std::map<std::string, Runner>& runners) {
   const int count = static_cast<int>(jobs.size());
@@ -117,7 +128,7 @@ void Pool::run_jobs(Store& store, const std::string& name, std::vector<Job> jobs
   std::vector<bool> is_given(jobs.size(), false);
   const auto finish = [&](std::size_t i, const Answer& a) {
     is_given[i] = true;
-    const bool is_kept = store.finish(jobs[i], name, a);
+    const bool is_kept = store.finish(jobs[i], name, compare(store, jobs[i].model, a));
     {
       const std::lock_guard lock(mutex_);
       ++(is_kept ? finished_ : refused_);

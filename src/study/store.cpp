@@ -440,6 +440,32 @@ void Store::forget_refusals(const std::string& model) {
   });
 }
 
+std::optional<std::vector<std::string>> Store::find_outputs(const std::string& model) {
+  return transact(
+      [&](bool) -> std::optional<std::vector<std::string>> {
+        const Rows rows = db_->run("SELECT outputs FROM result WHERE model = $1 AND status = 'done' LIMIT 1", {model});
+        if (rows.empty()) return std::nullopt;
+        std::vector<std::string> names;
+        const json outputs = json::parse(rows[0][0].value_or("{}"));
+        for (const auto& [name, value] : outputs.items()) names.push_back(name);
+        std::sort(names.begin(), names.end());
+        return names;
+      },
+      true);
+}
+
+void Store::rerun(const std::vector<std::string>& hashes) {
+  const std::string list = json(hashes).dump();
+  transact([&](bool) {
+    db_->run(fmt::format("DELETE FROM result WHERE hash IN {}", db_->dialect().listed), {list});
+    db_->run(
+        fmt::format("UPDATE job SET state = 'waiting', attempt = 0, worker = NULL, message = NULL WHERE hash IN {}",
+                    db_->dialect().listed),
+        {list});
+    return 0;
+  });
+}
+
 int Store::rerun_failed(const std::string& model) {
   return transact([&](bool) {
     db_->run("DELETE FROM result WHERE hash IN (SELECT hash FROM job WHERE model = $1 AND state = 'failed')", {model});

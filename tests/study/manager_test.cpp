@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+
 #include "base/error.h"
 #include "server.h"
 #include "small_study.h"
@@ -152,6 +154,66 @@ TEST(Study, RefusesOutputsThatChange) {
     run(make_small_problem(100), make_options(folder / "a"), factories);
     FAIL() << "accepted";
   } catch (const InputError& e) { EXPECT_EQ(e.diagnostics().front().code, "E823"); }
+}
+
+/// y everywhere, and z too at the run of that number.
+RunnerFactories make_strange_factories(int at, std::atomic<int>& runs) {
+  return {{"small", [at, &runs](const std::string&) -> Runner {
+             return [at, &runs](auto points, const auto& give, const auto&) {
+               for (std::size_t i = 0; i < points.size(); ++i) {
+                 Answer a{Answer::Kind::Done, {{"y", points[i][0] + points[i][1]}}, "", {}, "", 0};
+                 if (++runs == at) a.outputs.emplace_back("z", 1);
+                 a.line = nlohmann::json{{"outputs", {{"y", 1}, {"z", 1}}}}.dump();
+                 give(i, a);
+               }
+             };
+           }}};
+}
+
+TEST(Study, KeepsAStrangeAnswerOutAndGoesOnBehindIt) {
+  const Folder folder;
+  const Problem p = make_small_problem(200);
+  std::atomic<int> runs = 0;
+  const StudyResult whole = run(p, make_options(folder / "a"), make_strange_factories(0, runs));
+  runs = 0;
+  try {
+    run(p, make_options(folder / "b"), make_strange_factories(40, runs));
+    FAIL() << "accepted";
+  } catch (const InputError& e) {
+    const Diagnostic& d = e.diagnostics().front();
+    EXPECT_EQ(d.code, "E823");
+    EXPECT_EQ(d.where.column, 19) << "at the name that is new";
+    EXPECT_EQ(d.message, "the model gave the outputs y, z at this point and y at others");
+    EXPECT_FALSE(d.help.empty());
+  }
+  Store store(folder / "b");
+  EXPECT_GE(store.load_results(calc_model_hash(p)).size(), 30u) << "what was run before is kept";
+  for (const StoredResult& r : store.load_results(calc_model_hash(p))) EXPECT_EQ(r.answer.outputs.size(), 1u);
+  EXPECT_NO_THROW(read_study(p, store, *store.find_study("main")));
+  runs = 1000;
+  EXPECT_EQ(write_bits(run(p, make_options(folder / "b"), make_strange_factories(0, runs))), write_bits(whole));
+}
+
+TEST(Study, TakesAStrangeAnswerOutOfAnOldStore) {
+  const Folder folder;
+  const Problem p = make_small_problem(200);
+  std::atomic<int> runs = 0;
+  const StudyResult whole = run(p, make_options(folder / "a"), make_strange_factories(0, runs));
+  const std::string model = calc_model_hash(p);
+  {
+    Store store(folder / "a");
+    StudyRow row = *store.find_study("main");
+    row.state = "open", row.summary = "";
+    store.put_study(row);
+    const StoredResult some = store.load_results(model).at(40);
+    store.rerun({some.hash});
+    const std::vector<Job> jobs = store.claim("w", 1, 100, model);
+    ASSERT_EQ(jobs.size(), 1u);
+    ASSERT_TRUE(store.finish(jobs[0], "w", {Answer::Kind::Done, {{"y", 1}, {"z", 2}}, "", {}, "", 0}));
+    const StudyResult seen = read_study(p, store, row);
+    EXPECT_EQ(seen.alpha.archive.size() + 1, whole.alpha.archive.size()) << "all but that one can be shown";
+  }
+  EXPECT_EQ(write_bits(run(p, make_options(folder / "a"), make_strange_factories(0, runs))), write_bits(whole));
 }
 
 TEST(Study, TellsWhatEndedAWorker) {
