@@ -21,6 +21,26 @@ struct Columns {
   std::vector<std::vector<double>> mixed;  // per input
 };
 
+/// Part of a variance that rounding may make, for values of size 1.
+constexpr double rounding = 1e-28;
+
+/// Takes off a common value and the common size of what is left: then sizes do not matter, neither for squares nor for
+/// rounding. Values that differ by no more than rounding become 0. By powers of 2 first, which keep every bit.
+void normalise(const std::vector<std::vector<double>*>& columns) {
+  double largest = 0;
+  for (const auto* c : columns)
+    for (const double v : *c) largest = std::max(largest, std::abs(v));
+  if (!(largest > 0)) return;
+  const int exponent = std::ilogb(largest) + 1;
+  const double reference = std::ldexp(columns.front()->front(), -exponent);
+  double size = 0;
+  for (auto* c : columns)
+    for (double& v : *c) v = std::ldexp(v, -exponent) - reference, size = std::max(size, std::abs(v));
+  const bool is_constant = size <= 4 * std::numeric_limits<double>::epsilon();
+  for (auto* c : columns)
+    for (double& v : *c) v = is_constant ? 0 : v / size;
+}
+
 /// Indices from the rows [first, last).
 void calc_indices(const Columns& c, std::size_t first, std::size_t last, std::vector<double>& one,
                   std::vector<double>& total) {
@@ -33,7 +53,7 @@ void calc_indices(const Columns& c, std::size_t first, std::size_t last, std::ve
   const double variance = square / (2 * count);
   one.assign(c.mixed.size(), 0.0);
   total.assign(c.mixed.size(), 0.0);
-  if (!(variance > 0)) return;
+  if (!(variance > rounding)) return;
   for (std::size_t i = 0; i < c.mixed.size(); ++i) {
     double u = 0, t = 0;
     for (std::size_t k = first; k < last; ++k) {
@@ -45,11 +65,14 @@ void calc_indices(const Columns& c, std::size_t first, std::size_t last, std::ve
   }
 }
 
-std::vector<Driver> calc_drivers(const Columns& c) {
+std::vector<Driver> calc_drivers(Columns c) {
   constexpr std::size_t blocks = 8;
   std::vector<Driver> drivers(c.mixed.size());
   std::vector<double> one, total;
   if (c.a.size() < 2) return drivers;
+  std::vector<std::vector<double>*> columns = {&c.a, &c.b};
+  for (auto& m : c.mixed) columns.push_back(&m);
+  normalise(columns);
   calc_indices(c, 0, c.a.size(), one, total);
   for (std::size_t i = 0; i < drivers.size(); ++i) drivers[i].first = one[i], drivers[i].total = total[i];
   if (c.a.size() < 2 * blocks) return drivers;
@@ -73,19 +96,20 @@ std::vector<Driver> calc_drivers(const Columns& c) {
 /// bins. The bin's mean takes 1/size of its variance if samples are independent, and almost nothing if they are spread
 /// evenly: the share is the middle of both cases, and half their distance is part of its error, beside the scatter over
 /// bins.
-Driver calc_share_by_bins(const std::vector<double>& x, const std::vector<double>& y) {
+Driver calc_share_by_bins(const std::vector<double>& x, std::vector<double> y) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const std::size_t count = x.size();
   const std::size_t bins = static_cast<std::size_t>(std::sqrt(static_cast<double>(count)));
   if (bins < 3) return {nan, nan, nan, nan};
   Driver d{0, nan, 0, nan};
+  normalise({&y});
   std::vector<std::size_t> order(count);
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return x[a] < x[b]; });
   double mean = 0, variance = 0;
   for (const double v : y) mean += v / static_cast<double>(count);
   for (const double v : y) variance += (v - mean) * (v - mean) / static_cast<double>(count - 1);
-  if (!(variance > 0)) return d;
+  if (!(variance > rounding)) return d;
   struct Bin {
     double weight, inside, whole;  // part of the samples; variance about the bin's mean and about that of all
   };

@@ -86,6 +86,43 @@ TEST(SensitivityReference, SharesOfIshigamiFromSpreadRuns) {
     }
 }
 
+// What is the same everywhere has no drivers, and the size of values does not matter.
+TEST(Sensitivity, SharesDoNotHangOnSizeNorOnRounding) {
+  const Space space{{make_triangular(0, 1, 3), make_triangular(1, 2, 3)}, {}, {}};
+  const Evaluate model = [](std::span<const Point> batch, std::span<Result> out) {
+    for (std::size_t k = 0; k < batch.size(); ++k) {
+      const double a = batch[k][0], b = batch[k][1], y = a + 0.1 * b;
+      const double same = k % 2 == 0 ? 4.2 : 4.2 * (1 + 3e-16);
+      out[k] = {
+          Result::State::Done, {y, 99.7, same, 1e9 + 1e-5 * a, 1e300 * y, 1e300 * (1.5 - y), 1e-300 * y}, 0, {}, ""};
+    }
+  };
+  const Progress progress;
+  Asker asker(model, progress, nullptr, 100000);
+  const Box box = make_box(space, 0);
+  std::vector<Point> points;
+  for (const auto& u : make_sobol_points(2, 1, 300, 1)) points.push_back(place_in(box, u));
+  const Sensitivity spread = read_drivers(space, asker.archive(), asker.ask(points));
+  SensitivityOptions options;
+  options.rows = 64;
+  const Sensitivity rows = find_drivers(space, asker, options);
+  for (const Sensitivity* s : {&spread, &rows}) {
+    const auto share = [&](std::size_t output, std::size_t input) { return s->outputs.at(output).at(input); };
+    EXPECT_GT(share(0, 0).first, 0.8);
+    for (const std::size_t constant : {1U, 2U})
+      for (const std::size_t input : {0U, 1U}) {
+        EXPECT_EQ(share(constant, input).first, 0) << constant;
+        EXPECT_EQ(share(constant, input).first_error, 0) << constant;
+      }
+    EXPECT_NEAR(share(3, 0).first, 1, 0.2);
+    EXPECT_NEAR(share(3, 1).first, 0, 0.2);
+    for (const std::size_t scaled : {4U, 5U, 6U})
+      for (const std::size_t input : {0U, 1U})
+        EXPECT_NEAR(share(scaled, input).first, share(0, input).first, 1e-9) << scaled;
+    EXPECT_EQ(s->outcomes.at(0).inputs.at(0).first, 0) << "the only outcome";
+  }
+}
+
 TEST(Sensitivity, KnowsNothingFromAHandfulOfRuns) {
   const Space space{{make_triangular(0, 1, 2)}, {}, {}};
   const Progress progress;
