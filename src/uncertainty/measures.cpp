@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -40,18 +41,22 @@ double find_meeting(const FuzzyNumber& f, double zero, double one, bool right) {
 }  // namespace
 
 double calc_centroid(const FuzzyNumber& f) {
-  // slices of the area between two cuts: width and moment are linear and quadratic in alpha
+  // slices of the area between two cuts: width and moment are linear and quadratic in alpha. Seen from the left end, by
+  // the width: squares of large numbers would leave nothing of a small one
+  const AlphaCut support = f.support();
+  const double width = f.width();
+  if (!(width > 0)) return 0.5 * (support.left + support.right);
+  const auto place = [&](double x) { return (x - support.left) / width; };
   double area = 0, moment = 0;
   const auto& cuts = f.cuts();
   for (std::size_t k = 1; k < cuts.size(); ++k) {
-    const AlphaCut &a = cuts[k - 1], &b = cuts[k];
-    const double d = b.alpha - a.alpha;
-    area += d * 0.5 * (a.right - a.left + b.right - b.left);
-    moment += d / 6 *
-              (a.right * a.right + a.right * b.right + b.right * b.right - a.left * a.left - a.left * b.left -
-               b.left * b.left);
+    const double d = cuts[k].alpha - cuts[k - 1].alpha;
+    const double l = place(cuts[k - 1].left), r = place(cuts[k - 1].right);
+    const double m = place(cuts[k].left), s = place(cuts[k].right);
+    area += d * 0.5 * (r - l + s - m);
+    moment += d / 6 * (r * r + r * s + s * s - l * l - l * m - m * m);
   }
-  return area > 0 ? moment / area : 0.5 * (f.support().left + f.support().right);
+  return area > 0 ? support.left + width * std::clamp(moment / area, 0.0, 1.0) : 0.5 * (support.left + support.right);
 }
 
 double calc_mean_of_midpoints(const FuzzyNumber& f) {

@@ -22,6 +22,15 @@ TEST(Measures, OfATriangle) {
   EXPECT_NEAR(calc_chen(f), 1 + 3 * 0.5 * (0.6 + 1 - 0.75), round_off);
 }
 
+TEST(Measures, CentroidKeepsSmallWidthsBesideLargeValues) {
+  // an ulp beside 1e9 is 1.2e-7
+  EXPECT_NEAR(calc_centroid(make_triangular(1e9, 1e9 + 1, 1e9 + 3)) - 1e9, 4.0 / 3, 2e-7);
+  EXPECT_NEAR(calc_centroid(make_triangular(0, 1e300, 3e300)) / 1e300, 4.0 / 3, round_off);
+  const FuzzyNumber narrow = make_triangular(1e9, 1e9 + 1e-6, 1e9 + 3e-6);
+  EXPECT_GE(calc_centroid(narrow), narrow.support().left);
+  EXPECT_LE(calc_centroid(narrow), narrow.support().right);
+}
+
 TEST(Measures, OfASymmetricNumberAreItsMiddle) {
   const FuzzyNumber f = make_trapezoidal(-2, 0, 4, 6);
   EXPECT_NEAR(calc_centroid(f), 2, round_off);
