@@ -29,8 +29,9 @@ constexpr std::size_t most_inputs = 50, most_corners = 1000;
 struct Reader {
   Problem& out;
   Complaints& complaints;
-  std::vector<std::string> names;       // inputs, then formulas that were read
-  std::vector<Expression> formulas;     // each may use inputs and the formulas before it
+  std::vector<std::string> names;    // inputs, then formulas that were read
+  std::vector<Expression> formulas;  // each may use inputs and the formulas before it
+  std::vector<Place> formula_places;
   std::vector<Expression> differences;  // left and right sides of constraints, in pairs
   std::vector<bool> is_at_least;        // per constraint
   std::vector<Place> constraint_places;
@@ -198,6 +199,7 @@ struct Reader {
       }
       if (auto e = parse(*text, label, text->text, 0)) {
         formulas.push_back(*e);
+        formula_places.push_back(text->place);
         names.push_back(entry.key);
         out.derived.push_back({entry.key, unit, 1});
       }
@@ -273,7 +275,8 @@ struct Reader {
     const std::vector<double> values = complete(centre);
     for (std::size_t i = 0; i < out.derived.size(); ++i)
       if (!std::isfinite(values[centre.size() + i]))
-        complaints.error("E207", {}, out.derived[i].name + ": the formula has no value in the middle of the inputs");
+        complaints.error("E207", formula_places[i],
+                         out.derived[i].name + ": the formula has no value in the middle of the inputs");
     for (std::size_t i = 0; i < out.space.constraints.size(); ++i)
       if (out.space.constraints[i](centre) > 0)
         complaints.error("E207", constraint_places[i], "the middle of the inputs breaks this constraint");
@@ -291,7 +294,7 @@ Problem read_inputs_text(const std::string& text, const std::string& name) {
   const Node document = product::parse_document(text, name);
   Complaints complaints(name);
   TableReader root(document, "", complaints);
-  Reader reader{out, complaints, {}, {}, {}, {}, {}, {}, {}};
+  Reader reader{out, complaints, {}, {}, {}, {}, {}, {}, {}, {}};
   out.title = root.text("title", "");
   reader.read_inputs(root);
   if (complaints.error_count() == 0) {

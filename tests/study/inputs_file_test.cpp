@@ -68,6 +68,7 @@ TEST(InputsFile, PointsAtEveryMistake) {
            {"value = 7", "value = 7, triangular = [1, 2, 3]", 7, "E207"},
            {"d = {", "2d = {", 7, "E203"},
            {"(fc - 8)", "(fx - 8)", 9, "E208"},
+           {"(fc - 8)", "(fc - 80)", 9, "E207"},
            {"twice = ", "fc = ", 10, "E203"},
            {"a + b <= 6", "a + b < 6", 12, "E202"},
            {"a + b <= 6", "a + g <= 6", 12, "E208"},
