@@ -195,6 +195,7 @@ json to_json(const Insights& in) {
                              {"centre", b.centre},
                              {"volume", b.volume},
                              {"samples", b.samples},
+                             {"broken", b.broken},
                              {"fresh", b.fresh},
                              {"tries", b.tries},
                              {"violating", b.violating},
@@ -232,6 +233,7 @@ void read_json(Insights& out, const json& j) {
     b.centre = one.at("centre");
     b.volume = one.at("volume");
     b.samples = one.at("samples");
+    b.broken = one.value("broken", -1);
     b.fresh = one.at("fresh");
     b.tries = one.at("tries");
     b.violating = one.at("violating");

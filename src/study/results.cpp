@@ -128,10 +128,11 @@ json insights_json(const Problem& p, const StudyResult& r) {
       inputs.push_back(one);
     }
     boxes["list"].push_back({{"kept", b.kept},
-                             {"guarantee", tell_guarantee(b)},
+                             {"guarantee", tell_guarantee(b, p.space.has_interaction())},
                              {"inputs", inputs},
                              {"volume", b.volume},
                              {"runs", b.samples},
+                             {"violating_runs", b.broken},
                              {"fresh", b.fresh},
                              {"tries", b.tries},
                              {"violating", b.fresh > 0 ? json(b.violating) : json(nullptr)},

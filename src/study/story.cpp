@@ -156,15 +156,25 @@ void tell_requirement(const Problem& p, const StudyResult& r, std::vector<Senten
 
 }  // namespace
 
-std::string tell_guarantee(const uncertainty::PermissibleBox& b) {
-  std::string text = fmt::format("No run violated the requirement in {} inside, {} of them at fresh random points",
-                                 b.samples, b.fresh);
-  if (b.fresh > 0)
-    text += fmt::format(": with a confidence of 95 % at most {:.1f} % of the box violates it", 100 * b.violating);
-  text += ". It is not proven, and smaller islands may exist.";
-  if (!b.kept)
-    text = b.samples == 0 || b.fresh == 0 ? "Not kept: there were too few runs to check it at fresh points."
-                                          : "Not kept: it is too small, or its check was not finished. " + text;
+std::string tell_guarantee(const uncertainty::PermissibleBox& b, bool has_interaction) {
+  std::string text;
+  if (b.kept) {
+    text = fmt::format("No run violated the requirement in {} inside, {} of them at fresh random points", b.samples,
+                       b.fresh);
+    if (b.fresh > 0)
+      text += fmt::format(": with a confidence of 95 % at most {:.1f} % of the box violates it", 100 * b.violating);
+    text += ". It is not proven, and smaller islands may exist.";
+  } else if (b.samples == 0 || b.volume < uncertainty::DesignOptions{}.smallest) {
+    text = "Not kept: what violates the requirement leaves next to no room around these runs.";
+  } else if (b.broken < 0) {  // of an older version
+    text = "Not kept: it is too small, or its check was not finished.";
+  } else {
+    text = b.broken > 0
+               ? fmt::format("Not kept: {} of the {} runs inside violate the requirement.", b.broken, b.samples)
+               : std::string("Not kept: its check at fresh random points was not finished.");
+    text += " More runs may find a box.";
+  }
+  if (has_interaction) text += " The constraints take away a part of it, which its share of the support does not show.";
   return text;
 }
 

@@ -270,7 +270,8 @@ class Design {
     for (auto& b : boxes_) {
       double nearest = infinite;
       for (int i = 0; i < asker_.asked(); ++i)
-        if (b.box.contains(asker_.archive()[i].x)) ++b.samples, nearest = std::min(nearest, margin_of(i));
+        if (b.box.contains(asker_.archive()[i].x))
+          ++b.samples, b.broken += !is_good(i), nearest = std::min(nearest, margin_of(i));
       b.distance = high > low && nearest < infinite ? std::max(nearest, 0.0) / (high - low) : 0;
       const std::size_t o = static_cast<std::size_t>(options_.ranking_output);
       if (!b.kept || o >= b.outputs.size()) continue;

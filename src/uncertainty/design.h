@@ -39,7 +39,8 @@ struct PermissibleBox {
   int centre = -1;                  // sample in the middle of the group: the core
   std::vector<FuzzyNumber> inputs;  // triangles: support = box, core = centre
   double volume = 0;                // part of the support's volume
-  int samples = 0;                  // runs inside, all permissible
+  int samples = 0;                  // runs inside
+  int broken = 0;                   // of them violate, 0 where it is kept; -1: not known
   int fresh = 0;                    // independent random points that passed, last time
   int tries = 0;                    // how often so many were tried, violations before the last included
   double violating = 1;   // with the confidence, at most this part of the box violates: 1 - (β/tries)^(1/fresh)
