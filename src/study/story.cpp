@@ -55,6 +55,23 @@ void tell_outcomes(const Problem& p, const StudyResult& r, std::vector<Sentence>
   }
 }
 
+/// Of a model that tells no outcomes: its first outputs.
+std::string tell_outputs(const Problem& p, const StudyResult& r, const uncertainty::Sample& core) {
+  constexpr std::size_t most = 3;
+  std::string text;
+  for (std::size_t o = 0; o < std::min({most, r.outputs.size(), r.alpha.outputs.size()}); ++o) {
+    const auto& levels = r.alpha.outputs[o].levels;
+    if (o >= core.result.values.size() || levels.empty() || levels.front().lower.sample < 0) continue;
+    const Quantity q = find_output(p, r.outputs[o]);
+    text += fmt::format("{}With the core values {} is {}; over the whole support it lies between {} and {}.",
+                        text.empty() ? "" : " ", q.name, words_of_value(q, core.result.values[o]),
+                        words_of_number(levels.front().lower.value / q.unit_value),
+                        words_of_value(q, levels.front().upper.value));
+  }
+  if (r.outputs.size() > most) text += fmt::format(" And {} more outputs.", r.outputs.size() - most);
+  return text;
+}
+
 /// How possible it is that an output reaches its limit: the most possible run that does.
 void tell_limits(const Problem& p, const StudyResult& r, std::vector<Sentence>& out) {
   for (const Limit& limit : p.limits) {
@@ -308,6 +325,8 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
           runs, percent(1 - std::pow(0.05, 1.0 / spread)));
     }
     add("verdict", std::move(text), status);
+  } else if (std::string text = tell_outputs(p, r, *core); !text.empty()) {
+    add("verdict", std::move(text));
   }
   tell_requirement(p, r, out);
   if (has_names && classes > 1) {

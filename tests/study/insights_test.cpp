@@ -333,6 +333,37 @@ TEST(Story, OfNothingOfFailuresAndOfOneOutcome) {
   EXPECT_NE(text.find("5 %"), std::string::npos) << "and how large one may be";
 }
 
+TEST(Story, TellsOutputsWhereThereAreNoOutcomes) {
+  const Folder folder;
+  Problem p = make_problem({make_triangular(0, 1, 2)}, 40);
+  p.outputs = {{"z", "mm", 1e-3}};
+  const StudyResult r = run(p, folder, "s", make_factories([](const Point& x) {
+                              if (x[0] > 1.9) return Answer{Answer::Kind::Failed, {}, "", {}, "broke", 0};
+                              return done({{"y", x[0] < 1 ? x[0] : 1}, {"z", -x[0]}}, "");
+                            }));
+  const std::vector<Sentence> told = tell(p, r);
+  EXPECT_EQ(told.front().id, "verdict");
+  EXPECT_TRUE(
+      told.front().text.starts_with("With the core values y is 1; over the whole support it lies between 0 "
+                                    "and 1."))
+      << told.front().text;
+  EXPECT_NE(told.front().text.find("z is -1000 mm"), std::string::npos) << told.front().text;
+}
+
+TEST(Story, GuaranteesNothingOfABoxThatIsBroken) {
+  uncertainty::PermissibleBox b;
+  b.volume = 0.3, b.samples = 3135, b.broken = 3, b.fresh = 149, b.tries = 4, b.violating = 0.03;
+  EXPECT_EQ(tell_guarantee(b),
+            "Not kept: 3 of the 3135 runs inside violate the requirement. More runs may find a box.");
+  b.broken = 0;
+  EXPECT_NE(tell_guarantee(b).find("not finished"), std::string::npos);
+  b.volume = 0;
+  EXPECT_NE(tell_guarantee(b).find("no room"), std::string::npos);
+  b.volume = 0.3, b.kept = true;
+  EXPECT_NE(tell_guarantee(b).find("No run violated the requirement in 3135 inside, 149 of them"), std::string::npos);
+  EXPECT_NE(tell_guarantee(b, true).find("constraints"), std::string::npos);
+}
+
 TEST(StudyPage, ThinsRunsAndSaysWhichAreThere) {
   const Folder folder;
   Problem p = make_small_problem(1500);

@@ -20,7 +20,7 @@ export function Header(props: { study: Study }) {
           <StatusSign status={verdict?.status ?? "info"} size={30} />
           <div>
             <p class="verdict-title">Verdict <StatusWord status={verdict?.status ?? "info"} /></p>
-            <p class="verdict-text" data-test="verdict">{verdict === undefined ? "This study has no runs." : prettify(verdict.text)}</p>
+            <p class="verdict-text" data-test="verdict">{verdict !== undefined ? prettify(verdict.text) : study.runs === 0 ? "This study has no runs." : "What the runs say of each output stands below."}</p>
           </div>
         </section>
       </div>
