@@ -32,13 +32,22 @@ void print_line(std::FILE* out, const std::string& text) {
   std::fprintf(out, "  %s\n", wrap(text, find_width(out), 2).c_str());
 }
 
+/// "0.031", "4.5", "37", "100": two digits, no powers of ten for whole percentages.
+std::string words_of_percent(double percent) {
+  return percent >= 9.95 ? fmt::format("{:.0f}", percent) : fmt::format("{:.2g}", percent);
+}
+
+std::string name_outcome(const StudyResult& r, int outcome) {
+  const std::string name = study::name_of_outcome(r, outcome);
+  return name.empty() ? "(no name)" : name;
+}
+
 void print_outcomes(std::FILE* out, const StudyResult& r) {
   if (r.alpha.classes.size() < 2 && (r.outcomes.empty() || r.outcomes[0].empty())) return;
   std::fprintf(out, "\nOutcomes                     possibility  necessity    runs\n");
   for (const auto& c : r.alpha.classes) {
-    const std::string name = study::name_of_outcome(r, c.outcome);
-    std::fprintf(out, "  %-26s %11.5f %10.5f %7d\n", name.empty() ? "(no name)" : name.c_str(),
-                 study::possibility_of(r, c), uncertainty::calc_necessity(r.possibilities, c.outcome), c.count);
+    std::fprintf(out, "  %-26s %11.5f %10.5f %7d\n", name_outcome(r, c.outcome).c_str(), study::possibility_of(r, c),
+                 uncertainty::calc_necessity(r.possibilities, c.outcome), c.count);
   }
 }
 
@@ -103,8 +112,7 @@ void print_drivers(std::FILE* out, const Problem& p, const StudyResult& r) {
     print_heading(out, "Drivers: part of the variance that an input explains alone, over the support");
     for (const auto& c : in.drivers.outcomes)
       if (in.drivers.outcomes.size() > 1)
-        print_line(out,
-                   fmt::format("outcome {}: {}", study::name_of_outcome(r, c.outcome), words_of_drivers(p, c.inputs)));
+        print_line(out, fmt::format("outcome {}: {}", name_outcome(r, c.outcome), words_of_drivers(p, c.inputs)));
     for (std::size_t o = 0; o < in.drivers.outputs.size() && o < r.outputs.size(); ++o)
       print_line(out, fmt::format("{}: {}", r.outputs[o], words_of_drivers(p, in.drivers.outputs[o])));
     print_line(out, in.source == study::Insights::Source::Design
@@ -119,7 +127,7 @@ void print_drivers(std::FILE* out, const Problem& p, const StudyResult& r) {
       double degree = 0;
       for (const auto& k : f.classes)
         if (k.outcome == c.outcome) degree = k.possibility;
-      text += fmt::format(" {} {:.2f},", study::name_of_outcome(r, c.outcome), degree);
+      text += fmt::format(" {} {:.2f},", name_outcome(r, c.outcome), degree);
     }
     text.pop_back();
     print_line(out, text);
@@ -135,13 +143,13 @@ void print_boxes(std::FILE* out, const Problem& p, const StudyResult& r) {
   if (d.boxes.empty()) print_line(out, "no box was found");
   for (std::size_t k = 0; k < d.boxes.size(); ++k) {
     const uncertainty::PermissibleBox& b = d.boxes[k];
-    std::string text = fmt::format("box {}, {:.2g} % of the support: ", k + 1, 100 * b.volume);
+    std::string text = fmt::format("box {}, {} % of the support: ", k + 1, words_of_percent(100 * b.volume));
     for (std::size_t i = 0; i < p.inputs.size(); ++i)
       text += fmt::format("{}{} {} to {}", i ? ", " : "", study::make_short_names(p.inputs)[i],
                           study::words_of_number(b.box.lower[i] / p.inputs[i].unit_value),
                           study::words_of_value(p.inputs[i], b.box.upper[i]));
     print_line(out, text);
-    print_line(out, study::tell_guarantee(b));
+    print_line(out, study::tell_guarantee(b, p.space.has_interaction()));
   }
 }
 
@@ -158,10 +166,10 @@ void print_confirmation(std::FILE* out, const Problem& p, const StudyResult& r) 
                               count(State::Confirmed), count(State::Exceeded), count(State::NotReached),
                               count(State::NotRun), c.limit));
   for (const auto& o : c.outcomes)
-    print_line(out, fmt::format("{}, most possible run, whole: {}", study::name_of_outcome(r, o.outcome),
+    print_line(out, fmt::format("{}, most possible run, whole: {}", name_outcome(r, o.outcome),
                                 o.state == State::NotRun      ? "not run"
                                 : o.state == State::Confirmed ? "the same"
-                                                              : study::name_of_outcome(r, o.whole)));
+                                                              : name_outcome(r, o.whole)));
   for (const auto& b : c.bounds) {
     if (b.state != State::Exceeded && b.state != State::NotReached) continue;
     const auto& level = r.alpha.outputs[static_cast<std::size_t>(b.output)].levels[static_cast<std::size_t>(b.level)];

@@ -23,5 +23,32 @@ TEST(StudyText, ShowsBoundsOfARunningStudyInTheUnitsOfItsResults) {
             "20 done, 2 running, 0 failed, 2/s, at most 40 s left; lean -1 to 2 deg; share 0 to 0.5");
 }
 
+TEST(StudyText, WritesWholePercentagesAndOutcomesWithoutAName) {
+  study::Problem p;
+  p.inputs = {{"a", "", 1}};
+  p.space.inputs = {uncertainty::make_triangular(0, 1, 2)};
+  study::StudyResult r;
+  r.outcomes = {"", "falls"};
+  r.alpha.classes.resize(2);
+  r.alpha.classes[1].outcome = 1;
+  uncertainty::PermissibleBox b;
+  b.box = {{0}, {2}}, b.volume = 1, b.kept = true;
+  r.insights.has_boxes = true;
+  r.insights.boxes.boxes = {b, b};
+  r.insights.boxes.boxes[1].volume = 0.0123;
+  r.insights.source = study::Insights::Source::Spread;
+  r.insights.drivers.outcomes = {{0, 0.5, {{0.9, 0.9, 0.01, 0.01}}}, {1, 0.5, {{0.9, 0.9, 0.01, 0.01}}}};
+  char* text = nullptr;
+  std::size_t size = 0;
+  std::FILE* out = open_memstream(&text, &size);
+  print_study(out, p, r);
+  std::fclose(out);
+  const std::string said(text, size);
+  std::free(text);
+  EXPECT_NE(said.find("box 1, 100 % of the support"), std::string::npos) << said;
+  EXPECT_NE(said.find("box 2, 1.2 % of the support"), std::string::npos) << said;
+  EXPECT_NE(said.find("outcome (no name): a 0.90"), std::string::npos) << said;
+}
+
 }  // namespace
 }  // namespace topple::apps
