@@ -4,6 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "uncertainty/linear.h"
+#include "uncertainty/tangent.h"
+
 namespace topple::uncertainty {
 namespace {
 
@@ -105,8 +108,54 @@ void ModelSearch::ask_star() {
       pair.at = add(x);
       pairs_.push_back(pair);
     }
+  ask_around_constraints();
   // a place that interaction closes on all sides
   if (pending_.empty()) radius_ = 0;
+}
+
+/// Where constraints stop both ways along an axis, places beside them tell its slope.
+void ModelSearch::ask_around_constraints() {
+  aside_.clear();
+  if (!region_.space->has_interaction()) return;
+  const std::vector<double> here(axes_.size(), 0.0);
+  for (std::size_t k = 0; k < axes_.size(); ++k) {
+    if (axes_[k].at_a >= 0 || axes_[k].at_b >= 0) continue;
+    for (const double sign : {-1.0, 1.0}) {
+      std::vector<double> u = here;
+      u[k] = sign * radius_;
+      Point x = slide(here, std::move(u), radius_);
+      double length = 0;
+      for (const int i : region_.axes) length = std::max(length, std::abs(x[i] - best_[i]) / region_.scale[i]);
+      if (length < 0.01 * radius_ || std::find(pending_.begin(), pending_.end(), x) != pending_.end()) continue;
+      aside_.push_back(static_cast<int>(pending_.size()));
+      pending_.push_back(std::move(x));
+    }
+  }
+}
+
+/// Slopes of the axes along which nothing could be run: the least ones that explain the places beside the constraints.
+void ModelSearch::read_aside(std::span<const Told> told) {
+  std::vector<std::size_t> open;
+  for (std::size_t k = 0; k < axes_.size(); ++k)
+    if (axes_[k].at_a < 0 && axes_[k].at_b < 0) open.push_back(k);
+  if (open.empty() || aside_.empty()) return;
+  std::vector<Point> A(open.size(), Point(open.size(), 0.0));
+  Point slopes(open.size(), 0.0);
+  double trace = 0;
+  for (const int at : aside_) {
+    if (told[at].outcome != outcome_ || !std::isfinite(told[at].value)) continue;
+    const std::vector<double> step = find_step_to(pending_[at]), u = to_widths(step);
+    const double rest = told[at].value - value_ - calc_model(step);  // the open slopes are 0 so far
+    for (std::size_t i = 0; i < open.size(); ++i) {
+      slopes[i] += u[open[i]] * rest;
+      for (std::size_t j = 0; j < open.size(); ++j) A[i][j] += u[open[i]] * u[open[j]];
+      trace += u[open[i]] * u[open[i]];
+    }
+  }
+  if (!(trace > 0)) return;
+  for (std::size_t i = 0; i < open.size(); ++i) A[i][i] += 1e-9 * trace;
+  if (!solve(A, slopes)) return;
+  for (std::size_t i = 0; i < open.size(); ++i) axes_[open[i]].slope = slopes[i] / region_.scale[axes_[open[i]].input];
 }
 
 double ModelSearch::calc_model(const std::vector<double>& s) const {
@@ -151,13 +200,84 @@ std::vector<double> ModelSearch::find_step(bool mixed, double push) const {
   return s;
 }
 
-/// Improves a step on the model under the true constraints, which cost no runs: a (1+1) evolution.
+/// A step in the order of the axes, by widths of the support.
+std::vector<double> ModelSearch::to_widths(const std::vector<double>& step) const {
+  std::vector<double> u(step.size());
+  for (std::size_t k = 0; k < u.size(); ++k) u[k] = step[k] / region_.scale[axes_[k].input];
+  return u;
+}
+
+std::vector<double> ModelSearch::find_step_to(const Point& x) const {
+  std::vector<double> step(axes_.size());
+  for (std::size_t k = 0; k < step.size(); ++k) step[k] = x[axes_[k].input] - best_[axes_[k].input];
+  return step;
+}
+
+/// The allowed point nearest to best + u to first order, as seen from `from`, which is allowed; then on the way to it.
+Point ModelSearch::slide(const std::vector<double>& from, std::vector<double> u, double reach) const {
+  std::vector<double> lower(u.size()), upper(u.size()), whole(u.size());
+  for (std::size_t k = 0; k < u.size(); ++k) {
+    const int i = axes_[k].input;
+    lower[k] = std::max(-reach, (region_.box.lower[i] - best_[i]) / region_.scale[i]);
+    upper[k] = std::min(reach, (region_.box.upper[i] - best_[i]) / region_.scale[i]);
+  }
+  const auto place = [&](const std::vector<double>& v) {
+    for (std::size_t k = 0; k < v.size(); ++k) whole[k] = v[k] * region_.scale[axes_[k].input];
+    return moved(whole);
+  };
+  std::vector<double> seen = from;
+  for (int k = 0; k < 4; ++k) {
+    u = project(find_tangents(*region_.space, region_.alpha, best_, region_.axes, region_.scale, seen), lower, upper,
+                u);
+    if (region_.contains(place(u))) break;
+    seen = u;  // the constraints bend
+  }
+  return pull_inside(region_, place(from), place(u));
+}
+
+/// Improves an allowed step on the model by its slopes, along the constraints where they stop it.
+void ModelSearch::descend(std::vector<double>& step) const {
+  const std::size_t n = axes_.size();
+  std::vector<double> slope(n);
+  double value = calc_model(step), rate = 0;
+  for (int round = 0; round < 100; ++round) {
+    double largest = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      slope[i] = axes_[i].slope;
+      for (std::size_t j = 0; j < n; ++j) slope[i] += hessian_[i * n + j] * step[j];
+      slope[i] *= region_.scale[axes_[i].input];
+      largest = std::max(largest, std::abs(slope[i]));
+    }
+    if (!(largest > 0)) return;
+    rate = round == 0 ? trust_ / largest : 4 * rate;
+    const std::vector<double> from = to_widths(step);
+    bool is_better = false;
+    for (int halving = 0; halving < 20 && !is_better; ++halving, rate *= 0.25) {
+      std::vector<double> u = from;
+      for (std::size_t i = 0; i < n; ++i) u[i] -= rate * slope[i];
+      const std::vector<double> next = find_step_to(slide(from, std::move(u), trust_));
+      const double v = calc_model(next);
+      if (!(v < value - 1e-12 * std::abs(value))) continue;
+      is_better = true;
+      value = v, step = next;
+    }
+    if (!is_better) return;
+    rate *= 4;
+  }
+}
+
+/// Improves a step on the model under the true constraints, which cost no runs: along the constraints, then by a (1+1)
+/// evolution.
 void ModelSearch::find_allowed_step(std::vector<double>& step) {
   std::vector<double> best(axes_.size(), 0.0);
   const Point pulled = pull_inside(region_, best_, moved(step));
   for (std::size_t k = 0; k < axes_.size(); ++k) best[k] = pulled[axes_[k].input] - best_[axes_[k].input];
   double value = calc_model(best), width = trust_;
   if (value > 0) std::fill(best.begin(), best.end(), 0.0), value = 0;
+  std::vector<double> other(axes_.size(), 0.0);
+  descend(best), descend(other);
+  if (calc_model(other) < calc_model(best)) best = other;
+  value = calc_model(best);
   for (int trial = 0; trial < 4000 && width > 1e-9; ++trial) {
     std::vector<double> s = best;
     for (std::size_t k = 0; k < s.size(); ++k) {
@@ -215,6 +335,7 @@ void ModelSearch::read_star(std::span<const Told> told) {
     const double mixed = value_at(p.at) - value_at(p.at_i) - value_at(p.at_j) + value_;
     if (std::isfinite(mixed)) hessian_[p.i * n + p.j] = hessian_[p.j * n + p.i] = mixed / (p.di * p.dj);
   }
+  read_aside(told);
 }
 
 /// Whether trials met another outcome that is worse, and what the model promised did not come.
@@ -296,7 +417,7 @@ void ModelSearch::ask_trials() {
     steps.push_back(find_step(false));
     steps.push_back(together_);
     for (const double part : {0.5, 0.25, 0.0625}) {
-      steps.push_back(whole);
+      steps.push_back(region_.space->has_interaction() ? steps.front() : whole);
       for (double& s : steps.back()) s *= part;
     }
   }

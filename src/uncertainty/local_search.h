@@ -91,6 +91,12 @@ class ModelSearch : public LocalSearch {
   void note(std::span<const Told> told);
   bool is_blocked(std::span<const Told> told) const;
   bool ask_probe();
+  std::vector<double> to_widths(const std::vector<double>& step) const;
+  std::vector<double> find_step_to(const Point&) const;
+  Point slide(const std::vector<double>& from, std::vector<double> u, double reach) const;
+  void descend(std::vector<double>& step) const;
+  void ask_around_constraints();
+  void read_aside(std::span<const Told> told);
   void find_allowed_step(std::vector<double>& step);
   void ask_star();
   void read_star(std::span<const Told> told);
@@ -102,6 +108,7 @@ class ModelSearch : public LocalSearch {
   Random random_;
   std::vector<Axis> axes_;
   std::vector<Pair> pairs_;
+  std::vector<int> aside_;        // pending points beside constraints
   std::vector<double> together_;  // sum of the star's gains  (axes)
   std::vector<double> hessian_;   // axes x axes
   double radius_, trust_;

@@ -74,6 +74,29 @@ TEST(Interaction, ConstraintCutsTheInputs) {
   for (const auto& s : r.archive.samples()) EXPECT_LE(s.x[0] * s.x[0] + s.x[1] * s.x[1], 1);
 }
 
+TEST(InteractionReference, LinearProgrammesAreSolvedAlongTheirConstraints) {
+  // Σ ±i x_i over triangles under three constraints, all of them active; bounds by a simplex method
+  const FuzzyNumber f = make_triangular(-1, 0, 1.5);
+  const Space space{{f, f, f, f, f, f},
+                    {[](const Point& x) { return x[0] - x[1] + x[2] - x[3] + x[4] - x[5] - 1.2; },
+                     [](const Point& x) { return x[0] + 2 * x[1] - x[4] - 1; },
+                     [](const Point& x) { return x[2] + x[3] + 2 * x[5] - x[0] - 1.3; }},
+                    {}};
+  const auto model = make_evaluate_values(
+      [](const Point& x) { return std::vector{x[0] - 2 * x[1] + 3 * x[2] - 4 * x[3] + 5 * x[4] - 6 * x[5]}; });
+  const double expected[4][2] = {{-17.9, 14.1}, {-14.65, 11.475}, {-11.1, 8.85}, {-6.75, 5.65}};
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    AlphaOptions o;
+    o.seed = seed;
+    const AlphaResult r = optimise(space, model, o, {});
+    for (std::size_t k = 0; k < 4; ++k) {
+      EXPECT_NEAR(r.outputs[0].levels[k].lower.value, expected[k][0], 1e-6 * 32) << seed << " " << k;
+      EXPECT_NEAR(r.outputs[0].levels[k].upper.value, expected[k][1], 1e-6 * 32) << seed << " " << k;
+    }
+    EXPECT_LT(r.archive.size(), 6000U);
+  }
+}
+
 TEST(Interaction, JointMembershipCutsTheInputs) {
   // a cone: the cut at alpha is a disc of radius 1 - alpha
   const FuzzyNumber f = make_triangular(-1, 0, 1);
