@@ -253,15 +253,14 @@ class Manager {
     uncertainty::Asker asker([this](auto batch, auto out) { evaluate(batch, out); }, quiet, nullptr, budget.bounds);
     StudyResult r;
     ask_for_drivers(problem_, budget, asker);
-    r.alpha = uncertainty::optimise(problem_.space, asker, options);
-    r.ending = r.alpha.ending;
+    uncertainty::AlphaSearch search(problem_.space, asker, options);
+    r.alpha = search.run();
     bool has_more = false;
+    uncertainty::PossibilityOptions p;
+    p.seed = problem_.seed;
     if (!asker.is_cancelled() && r.alpha.classes.size() > 1) {
       asker.set_limit(budget.possibilities);
-      uncertainty::PossibilityOptions p;
-      p.seed = problem_.seed;
       r.possibilities = uncertainty::find_possibilities(problem_.space, asker, p);
-      if (r.ending == uncertainty::Ending::Complete) r.ending = r.possibilities.ending;
       if (!asker.is_cancelled() && budget.knowing > 0) {
         asker.set_limit(budget.outcomes);
         r.insights.knowing = uncertainty::find_outcomes_of_knowing(problem_.space, asker, p, budget.knowing);
@@ -273,6 +272,10 @@ class Manager {
       find_boxes(r.insights, problem_, budget, asker, options.levels, names_.outputs, names_.outcomes);
       has_more = true;
     }
+    has_more = give_back(r, asker, search, p, budget.limit) || has_more;
+    r.ending = r.alpha.ending;
+    if (r.ending == uncertainty::Ending::Complete && !r.possibilities.classes.empty())
+      r.ending = r.possibilities.ending;
     if (has_more) {
       // further runs may have moved bounds
       std::vector<int> space_points;
@@ -317,6 +320,31 @@ class Manager {
   }
 
  private:
+  /// What was kept for others and not used up goes to searches that had to end: half of it to possibilities, which take
+  /// what they need, the rest to bounds. True if there was any.
+  bool give_back(StudyResult& r, uncertainty::Asker& asker, uncertainty::AlphaSearch& search,
+                 const uncertainty::PossibilityOptions& options, int limit) {
+    using uncertainty::Ending;
+    bool has_more = false;
+    const auto find_more_possibilities = [&](int runs) {
+      const bool is_open =
+          r.possibilities.ending == Ending::LimitReached || r.possibilities.classes.size() < r.alpha.classes.size();
+      if (r.alpha.classes.size() < 2 || !is_open || !asker.can_go_on()) return;
+      asker.set_limit(asker.asked() + runs);
+      r.possibilities = uncertainty::find_possibilities(problem_.space, asker, options);
+      asker.set_limit(limit);
+      has_more = true;
+    };
+    asker.set_limit(limit);
+    find_more_possibilities((asker.rest() + 1) / 2);
+    if (r.alpha.ending == Ending::LimitReached && asker.can_go_on()) {
+      r.alpha = search.go_on();
+      has_more = true;
+    }
+    find_more_possibilities(asker.rest());
+    return has_more;
+  }
+
   [[noreturn]] void refuse(const StudyRow& there) {
     const std::string where = hide_password(options_.store);
     const char* help = "choose another folder or name, or delete it";

@@ -60,6 +60,19 @@ class Optimisation {
   AlphaResult run() {
     explore();
     search_from_best(false);
+    return search_on(true);
+  }
+
+  AlphaResult go_on() {
+    note_new();
+    unfinished_ = false;
+    recheck(false);
+    return search_on(false);
+  }
+
+ private:
+  /// Rounds from other places, then classes, to the end.
+  AlphaResult search_on(bool is_first) {
     const int limit = asker_.limit();
     if (options_.search_classes && !make_goals(true).empty()) asker_.set_limit(limit - asker_.rest() / 7);
     for (int idle = 0; asker_.can_go_on() && idle < options_.patience;) {
@@ -73,7 +86,7 @@ class Optimisation {
     }
     asker_.set_limit(limit);
     if (options_.search_classes) {
-      search_from_best(true);
+      if (is_first) search_from_best(true);
       recheck(true);
     }
     show(true);
@@ -82,7 +95,6 @@ class Optimisation {
     return result;
   }
 
- private:
   void ask(const std::vector<Point>& points) {
     const auto indices = asker_.ask(points);
     unfinished_ = unfinished_ || std::count(indices.begin(), indices.end(), -1) > 0;
@@ -478,9 +490,20 @@ AlphaResult read_archive(const Space& space, const Archive& archive, const std::
   return result;
 }
 
-AlphaResult optimise(const Space& space, Asker& asker, const AlphaOptions& options) {
+struct AlphaSearch::Parts {
+  Optimisation optimisation;
+};
+
+AlphaSearch::AlphaSearch(const Space& space, Asker& asker, const AlphaOptions& options) {
   check_space(space);
-  return Optimisation(space, asker, options).run();
+  parts_ = std::make_unique<Parts>(Parts{Optimisation(space, asker, options)});
+}
+AlphaSearch::~AlphaSearch() = default;
+AlphaResult AlphaSearch::run() { return parts_->optimisation.run(); }
+AlphaResult AlphaSearch::go_on() { return parts_->optimisation.go_on(); }
+
+AlphaResult optimise(const Space& space, Asker& asker, const AlphaOptions& options) {
+  return AlphaSearch(space, asker, options).run();
 }
 
 AlphaResult optimise(const Space& space, const Evaluate& evaluate, const AlphaOptions& options,

@@ -14,6 +14,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -120,6 +121,25 @@ AlphaResult optimise(const Space&, const Evaluate&, const AlphaOptions&, const P
 AlphaResult optimise(const std::vector<FuzzyNumber>&, const Evaluate&, const AlphaOptions&, const Progress&);
 /// The same with an asker that others use too: the result's archive stays empty, see `asker.archive()`.
 AlphaResult optimise(const Space&, Asker&, const AlphaOptions&);
+
+/// A search of bounds that can go on: what others of the same asker left of its limit may be given to it. Space, asker
+/// and options outlive it.
+class AlphaSearch {
+ public:
+  AlphaSearch(const Space&, Asker&, const AlphaOptions&);
+  ~AlphaSearch();
+  AlphaSearch(const AlphaSearch&) = delete;
+  AlphaSearch& operator=(const AlphaSearch&) = delete;
+
+  /// To its end, or to the asker's limit.
+  AlphaResult run();
+  /// After `run`, with a higher limit: from the best samples that are there by now, whoever asked for them.
+  AlphaResult go_on();
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
 
 /// Bounds, classes and coverage of the samples that are there, without a run. `space_points`: see Coverage; may be
 /// empty.

@@ -105,6 +105,57 @@ TEST(StudyReplay, ReadsBackWhatItFound) {
     EXPECT_EQ(again.alpha.outputs[0].levels[k].upper.converged, r.alpha.outputs[0].levels[k].upper.converged);
 }
 
+/// Many basins of like depth: no limit is enough for a proper search.
+RunnerFactories make_wavy_factories(bool has_outcomes) {
+  return {{"small", [has_outcomes](const std::string&) -> Runner {
+             return [has_outcomes](auto points, const auto& give, const auto& cancel) {
+               for (std::size_t i = 0; i < points.size() && !cancel; ++i) {
+                 const double a = points[i][0], b = points[i][1];
+                 const double z = std::cos(3 * a) * std::cos(2 * b) + 1e-3 * (a - b);
+                 give(i, {Answer::Kind::Done, {{"z", z}}, has_outcomes && a + b > 110 ? "far" : "", {}, "", 0});
+               }
+             };
+           }}};
+}
+
+TEST(Study, SpendsAllRunsBeforeItSaysThatTheyAreUsedUp) {
+  const Folder folder;
+  int number = 0;
+  for (const bool has_outcomes : {false, true})
+    for (const bool has_drivers : {false, true})
+      for (const int limit : {30, 100, 700}) {
+        Problem p = make_small_problem(limit);
+        p.has_drivers = has_drivers;
+        const StudyResult r =
+            run(p, make_options(folder / std::to_string(number++)), make_wavy_factories(has_outcomes));
+        EXPECT_EQ(r.ending, uncertainty::Ending::LimitReached) << limit << has_outcomes << has_drivers;
+        EXPECT_EQ(r.alpha.archive.size(), static_cast<std::size_t>(limit)) << has_outcomes << has_drivers;
+      }
+}
+
+TEST(StudyReplay, GoesOnInTheRunsThatOthersLeft) {
+  const Folder folder;
+  const Problem p = make_small_problem(400);
+  const std::string whole = write_bits(run(p, make_options(folder / "a", 1), make_wavy_factories(true)));
+  const StudyOptions o = make_options(folder / "b", 3);
+  for (const int stop : {150, 370, 1 << 30}) {
+    std::atomic<bool> cancel = false;
+    Progress progress;
+    progress.cancel = &cancel;
+    RunnerFactories slow = {{"small", [&](const std::string&) -> Runner {
+                               return [&, inner = make_wavy_factories(true).at("small")("")](
+                                          auto points, const auto& give, const auto& stopped) {
+                                 std::this_thread::sleep_for(std::chrono::milliseconds(points.size()));
+                                 inner(points, give, stopped);
+                               };
+                             }}};
+    const StudyResult r = run_study(p, slow, o, progress, [&](const StudyState& s) {
+      if (s.done > stop) cancel = true;
+    });
+    if (stop == 1 << 30) { EXPECT_EQ(write_bits(r), whole); }
+  }
+}
+
 TEST(Study, RunsFailedOnesAgainWhenAsked) {
   const Folder folder;
   const Problem p = make_small_problem(300);
