@@ -218,12 +218,15 @@ class Climb {
     around_ = false;
     const double t = 1 - best_;
     const std::size_t n = axes_.size();
+    // in the inputs themselves, by widths of the support: a cut's box does not grow evenly from its middle
     std::vector<Point> A;
     Point slope(n, 1.0);
+    const Point centre = calc_centre(space_);
     for (const auto& b : brackets_) {
       if (!b.found) continue;
+      const Point x = calc_place(space_, b.ray, b.in);
       A.emplace_back();
-      for (const int i : axes_) A.back().push_back(b.in * b.ray.w[i]);
+      for (const int i : axes_) A.back().push_back((x[i] - centre[i]) / space_.inputs[i].width());
     }
     const Ray here = to_surface(find_ray(space_, best_x_, t));
     std::vector<Ray> rays;

@@ -81,6 +81,33 @@ TEST(PossibilityPhysics, OfAHalfSpaceHasAClosedForm) {
 
 // A ball around a point off all axes and corners: its highest μ is at the place of the ball that is nearest to the core
 // in the largest norm; here along the first axis.
+// A cut of trapezoids does not grow evenly from its middle; the corner nearest to the core reaches the half space at
+// (5.37898 - limit) / 4.06132.
+TEST(PossibilityPhysics, OfAHalfSpaceOverTrapezoids) {
+  const Space space{{make_trapezoidal(-1.899, -0.711, 0.191, 1.005), make_trapezoidal(-1.879, -1.508, -0.511, 1.869),
+                     make_trapezoidal(-0.287, 0.095, 0.631, 1.491), make_trapezoidal(-0.623, -0.578, 0.361, 0.735)},
+                    {},
+                    {}};
+  for (const double limit : {1.9536, 3.0, 4.2}) {
+    const Evaluate model = [limit](std::span<const Point> batch, std::span<Result> out) {
+      for (std::size_t k = 0; k < batch.size(); ++k) {
+        const Point& x = batch[k];
+        const double s = 0.08 * x[0] + 1.06 * x[1] + 1.64 * x[2] - 1.4 * x[3];
+        out[k] = {Result::State::Done, {s}, s > limit ? 1 : 0, {}, ""};
+      }
+    };
+    const Progress progress;
+    Asker asker(model, progress, nullptr, 100000);
+    std::vector<Point> points;
+    for (const auto& u : make_sobol_points(4, 1, 320, 1)) points.push_back(place_in(make_box(space, 0), u));
+    asker.ask(points);
+    const int before = asker.asked();
+    const PossibilityResult r = find_possibilities(space, asker, {});
+    EXPECT_NEAR(calc_possibility_of(r, {1}), (5.37898 - limit) / 4.06132, 2e-4) << limit;
+    EXPECT_LT(asker.asked() - before, 3000) << limit;
+  }
+}
+
 TEST(PossibilityPhysics, OfABall) {
   const Space space{std::vector<FuzzyNumber>(3, make_triangular(-1, 0, 1)), {}, {}};
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
