@@ -79,12 +79,15 @@ void System::note_dependence(const JointCluster& c, int usual) {
 }
 
 void System::note_open(const JointCluster& c) {
-  constexpr double most = 0.01;  // of the length of what it joins
-  if (c.open > most * c.length && trouble.empty())
-    trouble = list_joints(model, c.joints) + " could not be closed: a gap of " + number(c.open) + " m or rad was left";
   if (!note_once(c, kOpen)) return;
   summary.notes.push_back(list_joints(model, c.joints) + ": the step at " + number(state.time) + " s left a gap of " +
                           number(c.open) + " m or rad; a shorter step may close it");
+}
+
+void System::stop_if_lost(const JointCluster& c) {
+  constexpr double most = 0.01;  // of the length of what it joins
+  if (c.open > most * c.length && trouble.empty())
+    trouble = list_joints(model, c.joints) + " could not be closed: a gap of " + number(c.open) + " m or rad is left";
 }
 
 void System::note_speed(const JointCluster& c, double speed) {

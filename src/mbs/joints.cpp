@@ -444,6 +444,7 @@ void System::solve_cluster(JointCluster& c, double h) {
   if (!regular) note_dependence(c, usual);
   if (!closed) note_open(c);
   s.largest_drift = std::max(s.largest_drift, c.open);
+  stop_if_lost(c);
   // reactions
   const double per_time = 1 / kick_time();
   const auto moving = [&](int b) { return b >= 0 && !fixed[static_cast<size_t>(b)]; };

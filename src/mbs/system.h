@@ -450,6 +450,8 @@ class System {
   /// close all joints.
   void note_dependence(const JointCluster&, int usual);
   void note_open(const JointCluster&);
+  /// The run has failed where joints are open by far.
+  void stop_if_lost(const JointCluster&);
   void note_speed(const JointCluster&, double speed);
   /// True the first time for a cluster and a situation.
   bool note_once(const JointCluster&, int situation);

@@ -1,5 +1,6 @@
 // Bare multibody models: the examples, what they write, and what a plan's model file keeps of its plan.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <array>
@@ -291,6 +292,32 @@ TEST(ModelRun, FailsWhereTheBalanceOfEnergyIsLost) {
   const record::Record r = run_model(m, o, {});
   EXPECT_EQ(r.ending, "failed");
   EXPECT_NE(r.ending_text.find("energy"), std::string::npos) << r.ending_text;
+}
+
+TEST(ModelRun, FailsWhereJointsAreLost) {
+  // three bars stretched between two hinges, held to second order only
+  std::string bodies, joints;
+  const char* const names[] = {"ground", "a", "b", "c", "ground"};
+  for (int i = 0; i < 4; ++i) {
+    joints += fmt::format(R"({}{{"name": "{}", "kind": "revolute", "parent": "{}", "child": "{}", "at": [{}, 0, 0],
+        "axis": [0, 1, 0]}})",
+                          i > 0 ? "," : "", i, names[i], names[i + 1], i);
+    if (i > 0)
+      bodies +=
+          fmt::format(R"({}{{"name": "{}", "mass": 1, "inertia": [0.01, 0.1, 0.1], "X_WB": {{"p": [{}, 0, 0]}}}})",
+                      i > 1 ? "," : "", names[i], i - 0.5);
+  }
+  mbs::Model m = mbs::model_from_json(
+      R"({"format": "topple-mbs", "version": 2, "contact": {"ground": false, "bodies": false}, "bodies": [)" + bodies +
+          R"(], "joints": [)" + joints + "]}",
+      "here");
+  RunOptions o;
+  o.duration = 0.3;
+  o.step = 1e-3;
+  o.equilibrium = false;
+  const record::Record r = run_model(m, o, {});
+  EXPECT_EQ(r.ending, "failed");
+  EXPECT_NE(r.ending_text.find("could not be closed"), std::string::npos) << r.ending_text;
 }
 
 TEST(ModelRun, ShowsWhereItEnds) {
