@@ -49,7 +49,7 @@ export class Scene implements SceneLike {
     this.building = new Building(run);
     const area = this.building.bounds.clone();
     for (const n of run.neighbours) for (const [x, y] of n.footprint) if (Number.isFinite(x + y)) area.expandByPoint(new THREE.Vector3(x, y, 0));
-    this.site = new Site(run, area, this.building.height);
+    this.site = new Site(run, area, this.building.bounds, this.building.height);
     this.stage.scene.add(this.building.group, this.site.group);
     this.stage.setFitPoints(this.building.fitPoints);
     this.site.setViewport(this.stage.height, fov);
@@ -101,6 +101,7 @@ export class Scene implements SceneLike {
   fit(view?: View | Triple): void {
     this.building.collectFitPoints();
     this.stage.setFitPoints(this.building.fitPoints);
+    this.site.resetAxes();
     this.stage.fit(view);
   }
 

@@ -89,9 +89,12 @@ export class Site {
   private readonly labels: THREE.Sprite[] = [];
   /// Labels of long things, which may stand at any of these places.
   private readonly roaming: { label: THREE.Sprite; home: THREE.Vector3; places: THREE.Vector3[] }[] = [];
+  private readonly axes = new THREE.Group();
+  /// Where the axes may stand.
+  private readonly corners: THREE.Vector3[] = [];
 
-  /// `area` is what must lie on the ground plane; `height` that of the building [m].
-  constructor(run: Run, area: THREE.Box3, height: number) {
+  /// `area` is what must lie on the ground plane, `near` the building in it; `height` that of the building [m].
+  constructor(run: Run, area: THREE.Box3, near: THREE.Box3, height: number) {
     const size = Math.max(area.max.x - area.min.x, area.max.y - area.min.y, 10);
     this.gridStep = [1, 2, 5, 10, 20, 50, 100].find((s) => size / s <= 24) ?? 200;
     const flat = { side: THREE.DoubleSide };
@@ -107,7 +110,7 @@ export class Site {
     if (run.building_outline.length >= 2)
       this.group.add(new THREE.Mesh(makeRibbon(run.building_outline, true, width, 0.03), this.materials.outline));
     for (const neighbour of run.neighbours) this.addNeighbour(neighbour.name, neighbour.footprint, neighbour.is_utility, height, width);
-    this.addAxes(area, width);
+    this.addAxes(area, near, width);
   }
 
   private addGround(area: THREE.Box3): void {
@@ -156,25 +159,53 @@ export class Site {
     this.roaming.push({ label, home: label.position.clone(), places });
   }
 
-  private addAxes(area: THREE.Box3, width: number): void {
+  /// Arrows with their labels, at the area's corner or at one of what is near: placeAxes.
+  private addAxes(area: THREE.Box3, near: THREE.Box3, width: number): void {
     const s = this.gridStep;
-    const x = Math.floor((area.min.x - 0.5 * s) / s) * s, y = Math.floor((area.min.y - 0.5 * s) / s) * s;
+    this.group.add(this.axes);
     for (const [dx, dy, name] of [[1, 0, "x"], [0, 1, "y"]] as [number, number, string][]) {
-      const tip: Point = [x + dx * s, y + dy * s];
-      const arrow: Point[] = [[x, y], tip];
-      this.group.add(new THREE.Mesh(makeRibbon(arrow, false, width, 0.05), this.materials.outline));
+      const tip: Point = [dx * s, dy * s];
+      this.axes.add(new THREE.Mesh(makeRibbon([[0, 0], tip], false, width, 0.05), this.materials.outline));
       const head: Point[] = [
         [tip[0] - 0.25 * s * dx - 0.15 * s * dy, tip[1] - 0.25 * s * dy - 0.15 * s * dx],
         tip,
         [tip[0] - 0.25 * s * dx + 0.15 * s * dy, tip[1] - 0.25 * s * dy + 0.15 * s * dx],
       ];
-      this.group.add(new THREE.Mesh(makeRibbon(head, false, width, 0.05), this.materials.outline));
-      this.addLabel(name, tip[0] + 0.2 * s * dx, tip[1] + 0.2 * s * dy, 0.1);
+      this.axes.add(new THREE.Mesh(makeRibbon(head, false, width, 0.05), this.materials.outline));
+      this.axes.add(this.addLabel(name, 1.2 * tip[0], 1.2 * tip[1], 0.1));
     }
+    const before = (v: number): number => Math.floor((v - 0.5 * s) / s) * s, behind = (v: number): number => Math.ceil((v + 0.5 * s) / s) * s;
+    this.axes.position.set(before(area.min.x), before(area.min.y), 0);
+    this.corners.push(this.axes.position.clone());
+    for (const x of [before(near.min.x), behind(near.max.x)])
+      for (const y of [before(near.min.y), behind(near.max.y)]) this.corners.push(new THREE.Vector3(x, y, 0));
   }
 
-  /// Puts the labels of long things where they are in the picture and farthest from `centre`.
+  /// The axes are looked for a place anew.
+  resetAxes(): void {
+    this.axes.position.copy(this.corners[0] as THREE.Vector3);
+  }
+
+  /// Leaves the axes where they are while they are in the picture; else puts them to the first corner at which they are and
+  /// that does not lie behind `centre`.
+  private placeAxes(camera: THREE.PerspectiveCamera, centre: THREE.Vector3): void {
+    camera.updateMatrixWorld();
+    const reach = 1.2 * this.gridStep;
+    const p = new THREE.Vector3();
+    const isSeen = (corner: THREE.Vector3): boolean =>
+      ([[0, 0], [reach, 0], [0, reach]] as Point[]).every(([dx, dy]) => {
+        p.set(corner.x + dx, corner.y + dy, 0).project(camera);
+        return p.z <= 1 && Math.abs(p.x) <= 0.97 && p.y >= -0.97 && p.y <= 0.9;
+      });
+    if (isSeen(this.axes.position)) return;
+    const toEye = camera.position.clone().sub(centre).normalize();
+    const isBehind = ({ x, y }: THREE.Vector3): boolean => (x - centre.x) * toEye.x + (y - centre.y) * toEye.y < -0.5 * Math.hypot(x - centre.x, y - centre.y);
+    this.axes.position.copy(this.corners.find((corner) => !isBehind(corner) && isSeen(corner)) ?? (this.corners[0] as THREE.Vector3));
+  }
+
+  /// Puts the labels of long things where they are in the picture and farthest from `centre`, and the axes where they are in it.
   placeLabels(camera: THREE.PerspectiveCamera, width: number, centre: THREE.Vector3): void {
+    this.placeAxes(camera, centre);
     const middle = centre.clone().project(camera);
     const p = new THREE.Vector3();
     for (const { label, home, places } of this.roaming) {

@@ -1,6 +1,7 @@
 // The parts of the page that need no browser.
 import assert from "node:assert/strict";
 import { describe, it } from "node:test";
+import * as THREE from "three";
 import { load } from "./load.mjs";
 import { makeSynthetic } from "./synthetic.mjs";
 
@@ -270,5 +271,42 @@ describe("what would make it fail", () => {
 
   it("tells of no way that is left where a limit is broken", () => {
     assert.deepEqual(tell(clearance("Hall", 3.2, "The nearest part, C-A1-0, comes to 3.2 m at 4.10 s; the limit is 4.0 m.", "bad")), ["It fails already: Hall."]);
+  });
+});
+
+describe("axes on the ground", () => {
+  it("stand at a corner where the picture shows them whole, and stay there while it does", async () => {
+    const { Site } = await load("site.ts");
+    // labels are drawn, which nobody looks at here
+    const context = { measureText: () => ({ width: 10 }), beginPath() {}, rect() {}, fill() {}, fillText() {} };
+    globalThis.document = { createElement: () => ({ getContext: () => context }) };
+    const near = new THREE.Box3(new THREE.Vector3(0, 0, 0), new THREE.Vector3(20, 20, 15));
+    const area = near.clone().expandByPoint(new THREE.Vector3(-60, -60, 0));
+    const site = new Site({ building_outline: [], neighbours: [] }, area, near, 15);
+    delete globalThis.document;
+    const camera = new THREE.PerspectiveCamera(40, 1.5, 0.1, 1000);
+    camera.up.set(0, 0, 1);
+    const look = (...eye) => {
+      camera.position.set(...eye);
+      camera.lookAt(10, 10, 5);
+      camera.updateMatrixWorld();
+      site.placeLabels(camera, 900, new THREE.Vector3(10, 10, 5));
+      return site.axes.position.toArray();
+    };
+    const isSeen = ([x, y]) => [[0, 0], [1, 0], [0, 1]].every(([dx, dy]) => {
+      const p = new THREE.Vector3(x + dx * site.gridStep, y + dy * site.gridStep, 0).project(camera);
+      return Math.max(Math.abs(p.x), Math.abs(p.y)) < 1;
+    });
+    const behind = [25, 25, 0];
+    const first = look(-40, -30, 35);
+    assert.ok(isSeen(first) && !isSeen([-65, -65, 0]), `${first}`);
+    assert.notDeepEqual(first, behind);
+    assert.deepEqual(look(-38, -33, 35), first);
+    // far enough away all of the area is in the picture; what stands in it stays
+    assert.deepEqual(look(-200, -150, 175), first);
+    site.resetAxes();
+    assert.deepEqual(look(-200, -150, 175), [-65, -65, 0], "a picture that is fitted again has them at home");
+    // from the other side that corner is behind the eye
+    assert.ok(isSeen(look(60, 55, 35)));
   });
 });
