@@ -109,6 +109,7 @@ TEST(RunReplay, TheModelFileRunsAgainToTheSamePoses) {
   const record::Record a = run_plan(plan, default_knowledge(), {}, callbacks);
   RunOptions again;
   again.duration = 0.6;
+  again.stability_share = settings_of(plan, default_knowledge(), {}).stability_share;
   const record::Record b = run_model(mbs::model_from_json(file, "model.json"), again, {});
   ASSERT_EQ(a.time, b.time);
   const size_t A = a.bodies.size(), B = b.bodies.size();
@@ -135,6 +136,7 @@ TEST(RunReplay, TheModelFileSaysHowItsPlanWasRun) {
   RunOptions again;
   again.duration = s.duration;
   again.step = s.step;
+  again.stability_share = s.stability_share;
   again.frame_rate = 1 / s.frame_interval;
   const record::Record b = run_model(m, again, {});
   EXPECT_EQ(a.time, b.time);

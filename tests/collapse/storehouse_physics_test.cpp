@@ -227,6 +227,7 @@ TEST(StorehouseReplay, TheWrittenModelRunsAgainToTheSamePoses) {
   const record::Record a = run_plan(plan, default_knowledge(), {}, callbacks);
   RunOptions again;
   again.duration = plan.analysis.duration;
+  again.stability_share = settings_of(plan, default_knowledge(), {}).stability_share;
   again.frame_rate = plan.analysis.frame_rate;
   const record::Record b = run_model(mbs::model_from_json(file, "model.json"), again, {});
   ASSERT_EQ(a.time, b.time);
