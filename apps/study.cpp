@@ -78,7 +78,7 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
   } catch (const InputError& e) {
     line.clear();
     const std::string& code = e.diagnostics().front().code;
-    if (code != "E823" && code != "E824") return complain(e, text);
+    if (code != "E823" && code != "E824" && code != "E827") return complain(e, text);
     study::Store store(place.store);
     const auto refusal = store.find_refusal(study::calc_model_hash(problem));
     complain(e, refusal ? study::read_refusal(*refusal).line : "");

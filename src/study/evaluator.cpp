@@ -202,6 +202,11 @@ class Evaluator {
           send();
           continue;
         }
+        // a shell's way to say so; a program that has answered is there
+        if (!has_answered_ && (ending.starts_with("exit code 127") || ending.starts_with("exit code 126"))) {
+          give_open(Answer::Kind::Refused, write_refusal(make_missing(ending)));
+          return;
+        }
         give_open(Answer::Kind::Crashed,
                   "the evaluator ended without an answer" + (ending.empty() ? "" : ": " + ending));
         return;
@@ -231,6 +236,7 @@ class Evaluator {
       a.line = std::move(line), a.source = command_;
       last = now;
       const bool is_refused = a.kind == Answer::Kind::Refused;
+      has_answered_ = has_answered_ || !is_refused;
       is_answered[static_cast<std::size_t>(id)] = true;
       --open;
       give(static_cast<std::size_t>(id), std::move(a));
@@ -251,6 +257,17 @@ class Evaluator {
     return true;
   }
 
+  Refusal make_missing(const std::string& ending) const {
+    Refusal r;
+    r.diagnostic = {Severity::Error,
+                    "E827",
+                    {},
+                    1,
+                    fmt::format("the command \"{}\" cannot be started: {}", command_, ending),
+                    "name the program with its folder, and make scripts executable (chmod +x)"};
+    return r;
+  }
+
   /// A line that it has written although nothing was open.
   bool find_surplus(std::string& line) {
     process_.look();
@@ -265,6 +282,7 @@ class Evaluator {
   std::string command_;
   double timeout_ = 0;
   bool is_one_shot_ = false;
+  bool has_answered_ = false;
   Process process_;
 };
 
@@ -290,7 +308,8 @@ std::string write_refusal(const Refusal& r) {
 Refusal read_refusal(const std::string& text) {
   const json j = json::parse(text);
   Refusal r;
-  r.diagnostic = {Severity::Error, j.at("code"), {j.at("file"), 1, j.at("column")}, 1, j.at("message"), j.at("help")};
+  r.diagnostic = {Severity::Error, j.at("code"), {}, 1, j.at("message"), j.at("help")};
+  if (j.at("file") != "") r.diagnostic.where = {j.at("file"), 1, j.at("column")};
   r.line = j.at("line");
   return r;
 }

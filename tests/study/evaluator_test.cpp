@@ -83,12 +83,29 @@ TEST(Evaluator, TellsHowItCrashed) {
   Model killed("read line; kill -SEGV $$");
   EXPECT_NE(killed.ask({{1, 1}})[0].text.find("signal 11"), std::string::npos);
   Model missing("/no/such/program");
-  EXPECT_EQ(missing.ask({{1, 1}})[0].kind, Kind::Crashed);
+  EXPECT_EQ(missing.ask({{1, 1}})[0].kind, Kind::Refused) << "it would fail at every point";
   EXPECT_NE(missing.ask({{1, 1}})[0].text.find("not found"), std::string::npos);
   Model recovers(shell(R"([ $x = 9.0 ] && exit 1; echo '{"z":1}')"));
   EXPECT_EQ(recovers.ask({{1, 1}})[0].kind, Kind::Done);
   EXPECT_EQ(recovers.ask({{9, 1}})[0].kind, Kind::Crashed);
   EXPECT_EQ(recovers.ask({{1, 1}})[0].kind, Kind::Done);
+}
+
+TEST(Evaluator, RefusesACommandThatCannotBeStarted) {
+  for (const char* command : {"/nowhere/model --fast", "/etc/passwd"}) {
+    Model m(command);
+    const Answer a = m.ask({{1, 1}, {2, 2}})[1];
+    ASSERT_EQ(a.kind, Kind::Refused) << a.text;
+    const Refusal r = read_refusal(a.text);
+    EXPECT_EQ(r.diagnostic.code, "E827");
+    EXPECT_NE(r.diagnostic.message.find(command), std::string::npos);
+    EXPECT_TRUE(r.diagnostic.where.file.empty());
+  }
+  // what has answered can be started
+  Model late("read line; echo '{\"z\": 1}'; read line; exit 127");
+  const std::vector<Answer> answers = late.ask({{1, 1}, {2, 1}});
+  EXPECT_EQ(answers[0].kind, Kind::Done);
+  EXPECT_EQ(answers[1].kind, Kind::Crashed);
 }
 
 TEST(Evaluator, GivesUpAfterItsTime) {
