@@ -12,6 +12,7 @@
 
 #include "base/error.h"
 #include "study/evaluator.h"
+#include "study/permissible.h"
 
 namespace topple::study {
 namespace {
@@ -225,6 +226,7 @@ class Manager {
     for (std::size_t i = 0; i < batch.size(); ++i) {
       const auto found = known_.find(hashes[i]);
       if (found == known_.end()) continue;  // cancelled: not run
+      check_request(found->second);
       try {
         out[i] = names_.translate(found->second);
       } catch (const InputError&) {
@@ -431,6 +433,13 @@ class Manager {
     return marks;
   }
 
+  /// Whether there is what boxes are asked to keep, by the first answer.
+  void check_request(const Answer& a) {
+    if (is_request_checked_ || a.kind != Answer::Kind::Done) return;
+    is_request_checked_ = true;
+    if (!problem_.permissible.empty()) check_outputs(read_permissible(problem_.permissible, problem_), list_outputs(a));
+  }
+
   void wait_for(std::vector<std::string>& open) {
     open_ = static_cast<long>(open.size());
     auto looked = Clock::now();
@@ -438,6 +447,7 @@ class Manager {
     for (;;) {
       pool_->check();
       std::vector<StoredResult> found = store_.find_results(open);
+      for (const StoredResult& r : found) check_request(r.answer);
       for (StoredResult& r : found) known_.emplace(std::move(r.hash), std::move(r.answer));
       if (!found.empty()) {
         std::erase_if(open, [this](const std::string& hash) { return known_.contains(hash); });
@@ -497,7 +507,7 @@ class Manager {
   long asked_ = 0, failed_ = 0, open_ = 0, running_ = 0, run_here_ = 0;
   long arrived_ = 0;  // of the batch that is being run
   int limit_ = 0;
-  bool is_confirming_ = false;
+  bool is_confirming_ = false, is_request_checked_ = false;
   Clock::time_point start_ = Clock::now(), shown_ = start_;
 };
 

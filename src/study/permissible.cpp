@@ -91,11 +91,20 @@ Permissible read_permissible(const std::string& text, const Problem& p) {
       continue;
     }
     const std::string name = unquoted(part);
+    if (find_outside(part, "=") != std::string::npos)
+      complain(fmt::format("\"{}\": an output can be kept below or above a number", part),
+               "such as \"r <= 0.3\"; the name of an outcome that has a sign stands in double quotes");
     if (!p.outcomes.empty() && std::find(p.outcomes.begin(), p.outcomes.end(), name) == p.outcomes.end())
       complain_of_name("outcome", name, p.outcomes);
     out.outcomes.push_back(name);
   }
   return out;
+}
+
+void check_outputs(const Permissible& p, const std::vector<std::string>& outputs) {
+  for (const PermissibleLimit& l : p.limits)
+    if (std::find(outputs.begin(), outputs.end(), l.output) == outputs.end())
+      complain_of_name("output", l.output, outputs);
 }
 
 uncertainty::Requirement make_requirement(const Permissible& p, const std::vector<std::string>& outputs,
@@ -105,8 +114,7 @@ uncertainty::Requirement make_requirement(const Permissible& p, const std::vecto
     const auto found = std::find(outcomes.begin(), outcomes.end(), name);
     if (found != outcomes.end()) allowed.push_back(static_cast<int>(found - outcomes.begin()));
   }
-  if (!p.outcomes.empty() && allowed.empty())
-    complain(fmt::format("no run had the outcome {}", list(p.outcomes)), "there were: " + list(outcomes));
+  check_outputs(p, outputs);
   struct Rule {
     std::size_t output;
     double sign, value, size;
@@ -114,12 +122,11 @@ uncertainty::Requirement make_requirement(const Permissible& p, const std::vecto
   std::vector<Rule> rules;
   for (const PermissibleLimit& l : p.limits) {
     const auto found = std::find(outputs.begin(), outputs.end(), l.output);
-    if (found == outputs.end()) complain_of_name("output", l.output, outputs);
     rules.push_back({static_cast<std::size_t>(found - outputs.begin()), l.is_most ? 1.0 : -1.0, l.value,
                      l.value == 0 ? 1.0 : std::abs(l.value)});
   }
-  return [allowed, rules](const uncertainty::Result& r) {
-    if (!allowed.empty() && std::find(allowed.begin(), allowed.end(), r.outcome) == allowed.end()) return -1.0;
+  return [has_outcomes = !p.outcomes.empty(), allowed, rules](const uncertainty::Result& r) {
+    if (has_outcomes && std::find(allowed.begin(), allowed.end(), r.outcome) == allowed.end()) return -1.0;
     double margin = 1;
     for (const Rule& rule : rules)
       margin = std::min(margin, rule.sign * (rule.value - r.values[rule.output]) / rule.size);

@@ -28,9 +28,12 @@ struct Permissible {
 /// Names are checked against what the problem knows beforehand. Throws InputError E825.
 Permissible read_permissible(const std::string& text, const Problem&);
 
+/// Throws InputError E825 for an output that is not among these.
+void check_outputs(const Permissible&, const std::vector<std::string>& outputs);
+
 /// The same as a requirement on results with these outputs and outcomes. Its size is the least part by which a limit is
-/// kept (of the limit's size, or of 1 for the limit 0), at most 1. Throws InputError E825 for an output that results do
-/// not have, and for outcomes of which none has happened.
+/// kept (of the limit's size, or of 1 for the limit 0), at most 1. Nothing keeps outcomes that have not happened.
+/// Throws InputError E825 for an output that results do not have.
 uncertainty::Requirement make_requirement(const Permissible&, const std::vector<std::string>& outputs,
                                           const std::vector<std::string>& outcomes);
 

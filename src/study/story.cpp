@@ -136,7 +136,7 @@ void tell_requirement(const Problem& p, const StudyResult& r, std::vector<Senten
   try {
     requirement = make_requirement(read_permissible(p.permissible, p), r.outputs, r.outcomes);
   } catch (const InputError&) {
-    return;  // no run had what it asks for, which the search for boxes says
+    return;  // nothing has been run that has what it asks for
   }
   using State = uncertainty::Result::State;
   const auto is_kept = [&](const uncertainty::Result& x) { return x.state == State::Done && requirement(x) >= 0; };
@@ -168,6 +168,9 @@ void tell_requirement(const Problem& p, const StudyResult& r, std::vector<Senten
       s.status = Status::Good;
     }
   }
+  for (const std::string& name : read_permissible(p.permissible, p).outcomes)
+    if (std::find(r.outcomes.begin(), r.outcomes.end(), name) == r.outcomes.end())
+      s.text += fmt::format(" No run had the outcome {}.", quoted(name));
   out.push_back(std::move(s));
 }
 

@@ -176,7 +176,39 @@ TEST(Permissible, ComplainsWithTheNamesThatAreThere) {
   EXPECT_NE(message_of("topple,,").find("empty"), std::string::npos);
   EXPECT_NE(message_of("\"topple").find("quote"), std::string::npos);
   EXPECT_NE(message_of("< 3").find("output"), std::string::npos);
-  EXPECT_THROW(make_requirement(read_permissible("other", make_small_problem()), {"z"}, {"falls"}), InputError);
+  EXPECT_NE(message_of("r=0.3").find("r <= 0.3"), std::string::npos);
+  EXPECT_EQ(message_of("reach_pos_x <= 3"), "nothing");
+  EXPECT_EQ(read_permissible("\"a=b\"", make_small_problem()).outcomes.at(0), "a=b");
+  // what has not happened is kept by nothing
+  const auto never = make_requirement(read_permissible("other", make_small_problem()), {"z"}, {"falls"});
+  EXPECT_LT(never({uncertainty::Result::State::Done, {1}, 0, {}, ""}), 0);
+  EXPECT_THROW(make_requirement(read_permissible("zz < 3", make_small_problem()), {"z"}, {"falls"}), InputError);
+}
+
+TEST(Permissible, IsRefusedAfterTheFirstAnswerOrSaysThatItNeverHappened) {
+  const Folder folder;
+  Problem p = make_small_problem(2000);
+  p.permissible = "zz <= 3";
+  std::atomic<int> runs = 0;
+  const RunnerFactories factories = make_factories([&runs](const Point& x) {
+    ++runs;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    return calc_small(x);
+  });
+  try {
+    run(p, folder, "a", factories);
+    FAIL() << "accepted";
+  } catch (const InputError& e) { EXPECT_EQ(e.diagnostics().front().code, "E825"); }
+  EXPECT_LT(runs, 200);
+  p = make_small_problem(600);
+  p.permissible = "flies";
+  const StudyResult r = run(p, folder, "b", make_small_factories());
+  EXPECT_TRUE(r.is_finished);
+  EXPECT_EQ(r.insights.boxes.fraction, 0);
+  EXPECT_TRUE(r.insights.boxes.boxes.empty());
+  std::string told;
+  for (const Sentence& s : tell(p, r)) told += s.text;
+  EXPECT_NE(told.find("No run had the outcome \"flies\"."), std::string::npos) << told;
 }
 
 // Reference case "jump": permissible part of R >= 8 is .879201442, the largest box 1200.224726 of 35 x 54.4.

@@ -775,6 +775,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["The core values keep the requirement {}.", "Die Kernwerte halten die Forderung {} ein."],
   ["Breaking it is {w}: possibility at least {:.2f}, so the necessity of keeping it is at most {:.2f}.", "Dass sie nicht eingehalten wird, ist {}: Möglichkeit mindestens {}, die Notwendigkeit der Einhaltung also höchstens {}."],
   ["Breaking the requirement {} is {w}: possibility at least {:.2f}, so the necessity of keeping it is at most {:.2f}.", "Dass die Forderung {} nicht eingehalten wird, ist {}: Möglichkeit mindestens {}, die Notwendigkeit der Einhaltung also höchstens {}."],
+  ["No run had the outcome {}.", "Keine Rechnung hatte den Ausgang {}."],
   ["None of {:d} runs broke it.", "Keine von {} Rechnungen hielt sie nicht ein."],
   ["(no name)", "(ohne Namen)"],
   ["the outcome without a name", "der Ausgang ohne Namen"],
