@@ -109,7 +109,7 @@ int run_study_command(const Arguments& a, const std::atomic<bool>& cancel) {
   if (a.study.action == StudyArguments::Action::Run) return start(a, cancel);
   try {
     const StudyPlace place = find_place(a.input);
-    study::Store store(place.store, &cancel, 10);
+    study::Store store(place.store, &cancel, 10, true);
     const std::optional<study::StudyRow> row = store.find_study(place.name);
     if (!row) throw InputError("E820", fmt::format("there is no study in {}", study::hide_password(a.input)));
     const study::Problem problem = read_problem(*row);

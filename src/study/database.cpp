@@ -20,8 +20,8 @@ std::string hide_password(const std::string& address) {
   return address.substr(0, colon) + address.substr(at);
 }
 
-std::unique_ptr<Database> open_database(const std::string& address) {
-  if (!is_server(address)) return open_sqlite(address);
+std::unique_ptr<Database> open_database(const std::string& address, bool is_read_only) {
+  if (!is_server(address)) return open_sqlite(address, is_read_only);
 #ifdef TOPPLE_POSTGRESQL
   return open_postgresql(address);
 #else

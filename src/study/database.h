@@ -52,8 +52,9 @@ std::string hide_password(const std::string& address);
 
 /// Connects. Throws InputError E820 if the file cannot be opened, E821 if this program was built without PostgreSQL;
 /// ConnectionLost if the server does not answer.
-std::unique_ptr<Database> open_database(const std::string& address);
-std::unique_ptr<Database> open_sqlite(const std::string& path);
+///   is_read_only  of a file: it may lie where nothing can be written
+std::unique_ptr<Database> open_database(const std::string& address, bool is_read_only = false);
+std::unique_ptr<Database> open_sqlite(const std::string& path, bool is_read_only = false);
 std::unique_ptr<Database> open_postgresql(const std::string& url);
 
 }  // namespace topple::study

@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 #include <sqlite3.h>
+#include <unistd.h>
 
+#include <filesystem>
 #include <unordered_map>
 
 #include "base/error.h"
@@ -13,20 +15,15 @@ constexpr int most_wait = 60000;  // for other writers [ms]
 
 class SqliteDatabase final : public Database {
  public:
-  explicit SqliteDatabase(const std::string& path) {
-    constexpr int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX;
-    if (sqlite3_open_v2(path.c_str(), &db_, flags, nullptr) != SQLITE_OK) {
-      const std::string why = db_ ? sqlite3_errmsg(db_) : "out of memory";
-      sqlite3_close(db_);
-      throw InputError("E820", fmt::format("cannot open {}: {}", path, why));
-    }
-    sqlite3_busy_timeout(db_, most_wait);
-    try {
-      run("PRAGMA journal_mode = WAL");
-      run("PRAGMA synchronous = NORMAL");
-    } catch (const std::exception& e) {
-      close();
-      throw InputError("E820", fmt::format("{} is no study: {}", path, e.what()));
+  SqliteDatabase(const std::string& path, bool is_read_only) : path_(path) {
+    if (is_read_only) {
+      open_to_read();
+    } else {
+      open(path, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
+      try {
+        run("PRAGMA journal_mode = WAL");
+        run("PRAGMA synchronous = NORMAL");
+      } catch (const std::exception& e) { refuse(e.what()); }
     }
     dialect_.now = "((julianday('now') - 2440587.5) * 86400.0)";
     dialect_.begin = "BEGIN IMMEDIATE";
@@ -67,21 +64,82 @@ class SqliteDatabase final : public Database {
     sqlite3_reset(s);
     sqlite3_clear_bindings(s);
     if (code == SQLITE_DONE) return rows;
-    if (code == SQLITE_BUSY || code == SQLITE_LOCKED) throw TryAgain(why);
-    throw std::runtime_error(fmt::format("SQLite: {}", why));
+    complain(code, why);
   }
 
   const Dialect& dialect() const override { return dialect_; }
   void reconnect() override {}
 
  private:
+  void open(const std::string& name, int flags) {
+    if (sqlite3_open_v2(name.c_str(), &db_, flags | SQLITE_OPEN_NOMUTEX, nullptr) != SQLITE_OK) {
+      const std::string why = db_ ? sqlite3_errmsg(db_) : "out of memory";
+      close();
+      throw InputError("E820", fmt::format("cannot open {}: {}", path_, why));
+    }
+    sqlite3_busy_timeout(db_, most_wait);
+  }
+
+  /// A reader leaves nothing behind where it may write: readers and writers agree by files beside the store, which the
+  /// last one takes away. A folder that may not be written to may have none: then nobody else is writing there.
+  void open_to_read() {
+    const std::string folder = std::filesystem::path(path_).parent_path().string();
+    const bool is_writable =
+        access(path_.c_str(), W_OK) == 0 && access(folder.empty() ? "." : folder.c_str(), W_OK) == 0;
+    if (is_writable) {
+      open(path_, SQLITE_OPEN_READWRITE);
+      if (!holds_studies()) refuse("it has no table of studies");
+      return;
+    }
+    open(path_, SQLITE_OPEN_READONLY);
+    try {
+      if (holds_studies()) return;
+    } catch (const std::exception&) {
+      // it cannot agree with writers
+    }
+    close();
+    std::string name = "file:";
+    for (const char c : path_) {
+      if (c == '%' || c == '?' || c == '#')
+        name += fmt::format("%{:02X}", static_cast<unsigned char>(c));
+      else
+        name += c;
+    }
+    open(name + "?immutable=1", SQLITE_OPEN_READONLY | SQLITE_OPEN_URI);
+    if (!holds_studies()) refuse("it has no table of studies");
+  }
+
+  bool holds_studies() {
+    try {
+      return !run("SELECT 1 FROM sqlite_master WHERE name = 'study'").empty();
+    } catch (const InputError&) { throw; } catch (const TryAgain&) {
+      throw;
+    } catch (const std::exception& e) { refuse(e.what()); }
+  }
+
+  [[noreturn]] void refuse(const std::string& why) {
+    close();
+    throw InputError("E820", fmt::format("{} is no study: {}", path_, why));
+  }
+
+  [[noreturn]] void complain(int code, const std::string& why) const {
+    if (code == SQLITE_BUSY || code == SQLITE_LOCKED) throw TryAgain(why);
+    if (code == SQLITE_CORRUPT)
+      throw InputError(
+          "E820", fmt::format("{} is damaged: {}", path_, why),
+          "take a copy that is whole; or save what can be read (sqlite3 FILE .recover), or begin in another "
+          "folder");
+    if (code == SQLITE_READONLY)
+      throw InputError("E820", fmt::format("{} may not be written to: {}", path_, why), "topple study show reads it");
+    throw std::runtime_error(fmt::format("SQLite: {}: {}", path_, why));
+  }
+
   sqlite3_stmt* prepare(const std::string& sql) {
     const auto known = statements_.find(sql);
     if (known != statements_.end()) return known->second;
     sqlite3_stmt* s = nullptr;
     const int code = sqlite3_prepare_v2(db_, sql.c_str(), static_cast<int>(sql.size()), &s, nullptr);
-    if (code == SQLITE_BUSY || code == SQLITE_LOCKED) throw TryAgain(sqlite3_errmsg(db_));
-    if (code != SQLITE_OK) throw std::runtime_error(fmt::format("SQLite: {}", sqlite3_errmsg(db_)));
+    if (code != SQLITE_OK) complain(code, sqlite3_errmsg(db_));
     statements_.emplace(sql, s);
     return s;
   }
@@ -92,6 +150,7 @@ class SqliteDatabase final : public Database {
     db_ = nullptr;
   }
 
+  std::string path_;
   sqlite3* db_ = nullptr;
   std::unordered_map<std::string, sqlite3_stmt*> statements_;
   Dialect dialect_;
@@ -99,6 +158,8 @@ class SqliteDatabase final : public Database {
 
 }  // namespace
 
-std::unique_ptr<Database> open_sqlite(const std::string& path) { return std::make_unique<SqliteDatabase>(path); }
+std::unique_ptr<Database> open_sqlite(const std::string& path, bool is_read_only) {
+  return std::make_unique<SqliteDatabase>(path, is_read_only);
+}
 
 }  // namespace topple::study

@@ -114,10 +114,11 @@ void roll_back(Database& db) {
   }
 }
 
-std::unique_ptr<Database> open_patiently(const std::string& address, const std::atomic<bool>* cancel, double patience) {
+std::unique_ptr<Database> open_patiently(const std::string& address, const std::atomic<bool>* cancel, double patience,
+                                         bool is_read_only) {
   const auto start = Clock::now();
   for (;;) try {
-      return open_database(address);
+      return open_database(address, is_read_only);
     } catch (const ConnectionLost&) {
       if ((cancel && cancel->load()) || std::chrono::duration<double>(Clock::now() - start).count() > patience) throw;
       std::this_thread::sleep_for(std::chrono::milliseconds(200));
@@ -177,8 +178,9 @@ auto Store::transact(F work, bool is_one_statement) {
   }
 }
 
-Store::Store(const std::string& address, const std::atomic<bool>* cancel, double patience)
-    : db_(open_patiently(address, cancel, patience)), cancel_(cancel), patience_(patience) {
+Store::Store(const std::string& address, const std::atomic<bool>* cancel, double patience, bool is_read_only)
+    : db_(open_patiently(address, cancel, patience, is_read_only)), cancel_(cancel), patience_(patience) {
+  if (is_read_only) return;
   // making what is there would wait for others, and let others wait
   const char* find = is_server(address) ? "SELECT 1 WHERE to_regclass('job_refused') IS NOT NULL"
                                         : "SELECT 1 FROM sqlite_master WHERE name = 'job_refused'";

@@ -53,8 +53,9 @@ std::vector<double> to_numbers(const std::string&);
 /// where that is safe; then they throw ConnectionLost.
 class Store {
  public:
-  /// Creates what is missing. Throws InputError E820, E821.
-  explicit Store(const std::string& address, const std::atomic<bool>* cancel = nullptr, double patience = 300);
+  /// Creates what is missing, unless it is only read. Throws InputError E820, E821.
+  explicit Store(const std::string& address, const std::atomic<bool>* cancel = nullptr, double patience = 300,
+                 bool is_read_only = false);
 
   void put_model(const std::string& hash, const std::string& definition);
   std::optional<std::string> find_model(const std::string& hash);

@@ -1,9 +1,11 @@
 #include "study/store.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <bit>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <set>
@@ -224,6 +226,52 @@ TEST(Store, HidesPasswords) {
   EXPECT_EQ(hide_password("postgresql://me:secret@host:5432/db"), "postgresql://me@host:5432/db");
   EXPECT_EQ(hide_password("postgresql://host:5432/db?a=b@c"), "postgresql://host:5432/db?a=b@c");
   EXPECT_EQ(hide_password("folder/a:b@c"), "folder/a:b@c");
+}
+
+TEST(Store, IsReadWhereNothingCanBeWritten) {
+  const Folder folder;
+  const std::string path = folder / "s 100%?.sqlite";
+  { Store(path).put_study({"main", "m", "{}", "open", ""}); }
+  const auto count = [](const std::string& where) {
+    long n = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(where)) n += entry.exists();
+    return n;
+  };
+  const std::filesystem::path place = std::filesystem::path(path).parent_path();
+  const long before = count(place);
+  std::filesystem::permissions(path, std::filesystem::perms::owner_read);
+  std::filesystem::permissions(place, std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec);
+  {
+    Store store(path, nullptr, 1, true);
+    EXPECT_TRUE(store.find_study("main").has_value());
+    if (geteuid() != 0) { EXPECT_THROW(store.put_study({"other", "m", "{}", "open", ""}), InputError); }
+  }
+  std::filesystem::permissions(place, std::filesystem::perms::owner_all);
+  EXPECT_EQ(count(place), before);
+  EXPECT_THROW(Store(folder / "none", nullptr, 1, true), InputError) << "nothing is made";
+}
+
+TEST(Store, SaysWhichFileIsDamaged) {
+  const Folder folder;
+  const std::string path = folder / "s.sqlite";
+  {
+    Store store(path);
+    for (int i = 0; i < 300; ++i)
+      store.put_study({"study " + std::to_string(i), "m", std::string(500, 'x'), "open", ""});
+  }
+  {
+    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+    for (int page = 2; page < 30; ++page) file.seekp(4096 * page), file << std::string(2000, 'y');
+  }
+  for (const bool is_read_only : {true, false}) try {
+      Store store(path, nullptr, 1, is_read_only);
+      for (int i = 0; i < 300; ++i) store.find_study("study " + std::to_string(i));
+      ADD_FAILURE() << "read";
+    } catch (const InputError& e) {
+      EXPECT_EQ(e.diagnostics().front().code, "E820");
+      EXPECT_NE(e.diagnostics().front().message.find("s.sqlite"), std::string::npos);
+      EXPECT_FALSE(e.diagnostics().front().help.empty());
+    }
 }
 
 TEST(Store, RefusesAFileThatIsNone) {
