@@ -350,7 +350,10 @@ void add_study(CLI::App& app, Arguments& a) {
                     "command that is the model: reads points and writes answers as JSON lines (docs/study.md)");
   study->add_option("--alpha", y.alpha, "levels between commas, such as 0,0.25,0.5,0.75,1");
   study->add_option("--samples", y.samples, "runs at most")->check(CLI::Range(10, 100000000));
-  study->add_option("--seed", y.seed, "of spread points and searches")->check(CLI::NonNegativeNumber);
+  study->add_option("--seed", y.seed, "of spread points and searches")->check([](const std::string& s) {
+    const bool is_whole = !s.empty() && s.find_first_not_of("0123456789") == std::string::npos;
+    return is_whole ? std::string() : "a whole number from 0 on is wanted, not " + s;
+  });
   study->add_option("--permissible", y.permissible,
                     "look for boxes of inputs that keep this, such as \"topple, reach_pos_x <= 20\"");
   study->add_flag("--no-drivers", y.no_drivers, "spend no runs on which input drives what");

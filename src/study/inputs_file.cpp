@@ -101,8 +101,7 @@ struct Reader {
       }
     const std::string label = table.label() + ": " + way;
     if (!given) {
-      table.error("E207", table.place(),
-                  table.label() + ": one of triangular, trapezoidal, polygonal, tabulated, value is wanted",
+      table.error("E207", table.place(), "one of triangular, trapezoidal, polygonal, tabulated, value is wanted",
                   "such as { triangular = [10, 25, 45] }");
       return std::nullopt;
     }
@@ -132,7 +131,9 @@ struct Reader {
         list.items = {*given};
         if (const auto v = read_numbers(list, label, 1)) return FuzzyNumber((*v)[0]);
       }
-    } catch (const InputError& e) { table.error("E207", given->place, label + ": " + e.diagnostics().front().message); }
+    } catch (const InputError& e) {
+      complaints.error("E207", given->place, label + ": " + e.diagnostics().front().message);
+    }
     return std::nullopt;
   }
 

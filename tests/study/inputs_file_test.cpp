@@ -90,6 +90,7 @@ TEST(InputsFile, PointsAtEveryMistake) {
         is_there = is_there || (d.where.line == w.line && d.code == w.code);
         found += d.code + " line " + std::to_string(d.where.line) + ": " + d.message + "\n";
       }
+      EXPECT_EQ(found.find("inputs.fc: inputs.fc"), std::string::npos) << found;
       EXPECT_TRUE(is_there) << w.to << "\n" << found;
     }
   }
