@@ -161,7 +161,8 @@ void find_boxes(Insights& out, const Problem& p, const Budget& b, uncertainty::A
   o.fresh = std::clamp(runs / 12, 20, 149);
   constexpr int least_rerun = 50;  // below, bounds would be those of a handful of points
   o.rerun_limit = runs / 12 < least_rerun ? 0 : std::min(2000, runs / 12);
-  o.k_max = std::clamp(runs / 400, 2, 6);
+  // a box that nothing is left to check is of no use
+  o.k_max = std::clamp(runs / (o.fresh + o.rerun_limit + 50 * axes), 2, 6);
   o.levels = levels;
   o.seed = p.seed;
   out.boxes = uncertainty::find_permissible_boxes(p.space, asker, requirement, o);

@@ -48,10 +48,10 @@ class Design {
     const int wanted = options_.growth_points > 0 ? options_.growth_points : 100 * n * n;
     for (std::size_t g = 0; g < centres.size(); ++g) {
       const int share = asker_.rest() / static_cast<int>(centres.size() - g);
-      if (share >= wanted)
-        grow(static_cast<int>(g), centres[g]);
-      else
-        choose(static_cast<int>(g), centres[g], share);
+      // growing may take more than there is; what it has learnt then serves a choice
+      const int end = asker_.asked() + share;
+      if (share < wanted || !grow(static_cast<int>(g), centres[g], 7 * share / 10))
+        choose(static_cast<int>(g), centres[g], std::max(0, end - asker_.asked()));
     }
     rank();
     for (int i = 0; i < asker_.asked(); ++i) {
@@ -132,7 +132,10 @@ class Design {
     return verdicts;
   }
 
-  void grow(int g, int centre) {
+  /// True if the box is kept, or that of another group.
+  bool grow(int g, int centre, int share) {
+    const int limit = asker_.limit();
+    asker_.set_limit(std::min(limit, asker_.asked() + share));
     PermissibleBox b;
     b.group = g, b.centre = centre;
     const Point middle = asker_.archive()[centre].x;
@@ -163,13 +166,16 @@ class Design {
       b.kept = !has_violation(b.box) && !asker_.is_cancelled();
       if (!asker_.can_go_on()) break;
     }
-    if (is_known(b.box)) return;
-    if (b.fresh > 0) b.violating = 1 - std::pow((1 - options_.confidence) / b.tries, 1.0 / b.fresh);
+    asker_.set_limit(limit);
+    if (is_known(b.box)) return true;
+    if (!b.kept) return false;
+    b.violating = 1 - std::pow((1 - options_.confidence) / b.tries, 1.0 / b.fresh);
     boxes_.push_back(std::move(b));
+    return true;
   }
 
-  /// With few runs: the largest box that keeps out what is known to violate, tried at fresh points; what violates there
-  /// is kept out of the next one.
+  /// With few runs: the largest box that keeps out what is known to violate, tried at its corners and at fresh points;
+  /// what violates there is kept out of the next one, by a distance that grows as runs are spent.
   void choose(int g, int centre, int share) {
     PermissibleBox b;
     b.group = g, b.centre = centre;
@@ -179,12 +185,29 @@ class Design {
     asker_.set_limit(std::min(limit, end));
     Random random(options_.seed + 104729 * static_cast<std::uint64_t>(g + 1));
     Front front(middle);
+    constexpr double coarse = 0.05, widest = 0.15;  // of the support's widths
+    BoxGrowth corners(
+        support_, middle, [this](const std::vector<Point>& points) { return judge(points); },
+        [this](const Point& x) { return is_allowed(space_, x); }, {coarse, options_.smallest, options_.rounds, 1});
+    const int start = asker_.asked();
     for (int seen = 0; !b.kept && asker_.can_go_on();) {
       for (; seen < asker_.asked(); ++seen)
         if (support_.contains(asker_.archive()[seen].x) && !is_good(seen)) front.add(asker_.archive()[seen].x);
-      b.box = find_largest_box(support_, front, options_.edge, 4, options_.seed + static_cast<std::uint64_t>(b.tries));
-      b.volume = calc_part(b.box);
+      const double spent = std::min(1.0, (asker_.asked() - start) / std::max(1.0, double(share - options_.fresh)));
+      for (double margin = options_.edge + widest * spent * spent;; margin = std::max(options_.edge, 0.5 * margin)) {
+        b.box = find_largest_box(support_, front, margin, 4, options_.seed + static_cast<std::uint64_t>(b.tries));
+        b.volume = calc_part(b.box);
+        if (b.volume >= options_.smallest || margin <= options_.edge) break;
+      }
       if (b.volume < options_.smallest || asker_.rest() < options_.fresh) break;
+      // with very few runs all of them are for fresh points
+      if (axes_.size() <= most_corner_axes && (20 << axes_.size()) <= share) {
+        // first to learn where the boundary is, then to come to an end
+        const bool is_good = spent < 0.5 ? check_corners(b.box, corners) : shrink_to_corners(b.box, middle);
+        b.volume = calc_part(b.box);
+        if (!is_good) continue;
+        if (b.volume < options_.smallest || asker_.rest() < options_.fresh) break;
+      }
       ++b.tries;
       constexpr int at_once = 8;
       int passed = 0;
@@ -207,6 +230,63 @@ class Design {
     if (is_known(b.box)) return;
     if (b.fresh > 0) b.violating = 1 - std::pow((1 - options_.confidence) / b.tries, 1.0 / b.fresh);
     boxes_.push_back(std::move(b));
+  }
+
+  static constexpr std::size_t most_corner_axes = 6;
+  std::vector<Point> make_corners_of(const Box& box) const {
+    std::vector<Point> points(std::size_t{1} << axes_.size(), box.lower);
+    for (std::size_t k = 0; k < points.size(); ++k)
+      for (std::size_t i = 0; i < axes_.size(); ++i)
+        if (k >> i & 1) points[k][axes_[i]] = box.upper[axes_[i]];
+    return points;
+  }
+
+  /// Whether all corners of a box keep the requirement; looks for the boundary on the way in from some that do not.
+  bool check_corners(const Box& box, BoxGrowth& search) {
+    std::vector<Point> points = make_corners_of(box), broken;
+    std::erase_if(points, [this](const Point& x) { return !is_allowed(space_, x); });
+    const std::vector<Verdict> verdicts = judge(points);
+    for (std::size_t k = 0; k < points.size(); ++k)
+      if (verdicts[k] == Verdict::Violating) broken.push_back(points[k]);
+    constexpr std::size_t most = 3;
+    if (broken.size() > most) {
+      for (std::size_t k = 0; k < most; ++k) broken[k] = broken[k * broken.size() / most];
+      broken.resize(most);
+    }
+    if (!broken.empty()) search.check(broken);
+    return std::all_of(verdicts.begin(), verdicts.end(), [](Verdict v) { return v == Verdict::Permissible; });
+  }
+
+  /// Shrinks a box towards a place inside until all its corners keep the requirement, step by step those that did not.
+  /// False if little is left of it, or runs are used up.
+  bool shrink_to_corners(Box& box, const Point& inside) {
+    const Box whole = box;
+    constexpr double step = 0.06, least = 0.3;
+    std::vector<std::size_t> broken;
+    bool is_checked = false;
+    for (double part = 1; part > least; part -= is_checked ? 0 : step) {
+      for (const int i : axes_) {
+        box.lower[i] = inside[i] + part * (whole.lower[i] - inside[i]);
+        box.upper[i] = inside[i] + part * (whole.upper[i] - inside[i]);
+      }
+      const std::vector<Point> all = make_corners_of(box);
+      std::vector<std::size_t> which = broken;
+      if (which.empty())
+        for (std::size_t k = 0; k < all.size(); ++k) which.push_back(k);
+      std::vector<Point> points;
+      std::erase_if(which, [&](std::size_t k) { return !is_allowed(space_, all[k]); });
+      for (const std::size_t k : which) points.push_back(all[k]);
+      const std::vector<Verdict> verdicts = judge(points);
+      const bool was_all = broken.empty();
+      broken.clear();
+      for (std::size_t k = 0; k < points.size(); ++k) {
+        if (verdicts[k] == Verdict::NotRun) return false;
+        if (verdicts[k] == Verdict::Violating) broken.push_back(which[k]);
+      }
+      if (broken.empty() && was_all) return true;
+      is_checked = broken.empty();  // the others at this size
+    }
+    return false;
   }
 
   double calc_part(const Box& box) const {
@@ -272,6 +352,7 @@ class Design {
       for (int i = 0; i < asker_.asked(); ++i)
         if (b.box.contains(asker_.archive()[i].x))
           ++b.samples, b.broken += !is_good(i), nearest = std::min(nearest, margin_of(i));
+      b.kept = b.kept && b.broken == 0;  // runs for other boxes may have met an island
       b.distance = high > low && nearest < infinite ? std::max(nearest, 0.0) / (high - low) : 0;
       const std::size_t o = static_cast<std::size_t>(options_.ranking_output);
       if (!b.kept || o >= b.outputs.size()) continue;

@@ -74,6 +74,31 @@ TEST(DesignPhysics, SaysLittleButTrueThingsFromFewRuns) {
   EXPECT_LE(wrong, 1);
 }
 
+// Corners are what breaks: random points inside seldom find them, the analysis of the box does.
+TEST(DesignPhysics, FinishesABoxWithTheRunsThatThereAre) {
+  for (const int n : {3, 5}) {
+    const double limit = n == 3 ? 2 : 3.2;
+    const auto is_good = [limit](const Point& x) {
+      double sum = 0;
+      for (const double v : x) sum += v;
+      return sum < limit;
+    };
+    const Space space{std::vector<FuzzyNumber>(static_cast<std::size_t>(n), make_triangular(0, 0.4, 1)), {}, {}};
+    DesignOptions options;
+    options.space_points = 200 * n;
+    options.rerun_limit = 300;
+    const Found f = find(space, make_model(is_good), outcome_0, options, 4000);
+    ASSERT_FALSE(f.design.boxes.empty());
+    EXPECT_TRUE(f.design.boxes.front().kept) << n;
+    for (const auto& b : f.design.boxes) {
+      EXPECT_EQ(b.kept, b.kept && b.broken == 0);
+      int broken = 0;
+      for (const auto& s : f.archive.samples()) broken += b.box.contains(s.x) && !is_good(s.x);
+      EXPECT_EQ(b.broken, broken) << "counted, kept or not";
+    }
+  }
+}
+
 TEST(Design, KeepsNoBoxWithoutRunsForIt) {
   DesignOptions options;
   options.space_points = 60;
