@@ -93,7 +93,7 @@ export class Site {
   /// Where the axes may stand.
   private readonly corners: THREE.Vector3[] = [];
 
-  /// `area` is what must lie on the ground plane, `near` the building in it; `height` that of the building [m].
+  /// `area` is what must lie on the ground plane, `near` all that the building comes to; `height` that of the building [m].
   constructor(run: Run, area: THREE.Box3, near: THREE.Box3, height: number) {
     const size = Math.max(area.max.x - area.min.x, area.max.y - area.min.y, 10);
     this.gridStep = [1, 2, 5, 10, 20, 50, 100].find((s) => size / s <= 24) ?? 200;
@@ -110,7 +110,9 @@ export class Site {
     if (run.building_outline.length >= 2)
       this.group.add(new THREE.Mesh(makeRibbon(run.building_outline, true, width, 0.03), this.materials.outline));
     for (const neighbour of run.neighbours) this.addNeighbour(neighbour.name, neighbour.footprint, neighbour.is_utility, height, width);
-    this.addAxes(area, near, width);
+    const outline = new THREE.Box3();
+    for (const [x, y] of run.building_outline) outline.expandByPoint(new THREE.Vector3(x, y, 0));
+    this.addAxes(area, outline.isEmpty() ? [near] : [near, outline], width);
   }
 
   private addGround(area: THREE.Box3): void {
@@ -159,8 +161,8 @@ export class Site {
     this.roaming.push({ label, home: label.position.clone(), places });
   }
 
-  /// Arrows with their labels, at the area's corner or at one of what is near: placeAxes.
-  private addAxes(area: THREE.Box3, near: THREE.Box3, width: number): void {
+  /// Arrows with their labels, at the area's corner or at one of `around`: placeAxes.
+  private addAxes(area: THREE.Box3, around: THREE.Box3[], width: number): void {
     const s = this.gridStep;
     this.group.add(this.axes);
     for (const [dx, dy, name] of [[1, 0, "x"], [0, 1, "y"]] as [number, number, string][]) {
@@ -177,8 +179,9 @@ export class Site {
     const before = (v: number): number => Math.floor((v - 0.5 * s) / s) * s, behind = (v: number): number => Math.ceil((v + 0.5 * s) / s) * s;
     this.axes.position.set(before(area.min.x), before(area.min.y), 0);
     this.corners.push(this.axes.position.clone());
-    for (const x of [before(near.min.x), behind(near.max.x)])
-      for (const y of [before(near.min.y), behind(near.max.y)]) this.corners.push(new THREE.Vector3(x, y, 0));
+    for (const box of around)
+      for (const x of [before(box.min.x), behind(box.max.x)])
+        for (const y of [before(box.min.y), behind(box.max.y)]) this.corners.push(new THREE.Vector3(x, y, 0));
   }
 
   /// The axes are looked for a place anew.
