@@ -56,6 +56,16 @@ TEST(Mechanism, TheRearEdgeDecidesBetweenBoth) {
   EXPECT_EQ(name_of(synthetic(0.2, 2.5, 1)), "vertical");
 }
 
+TEST(Mechanism, IsJudgedAtTheTouchdownBetweenFrames) {
+  MechanismInput in = synthetic(0.2, 0.3, 1);
+  in.touchdown = 0.75;
+  const Mechanism m = judge_mechanism(in, default_knowledge());
+  EXPECT_EQ(m.time, 0.75);
+  EXPECT_NEAR(m.tilt, 0.75 * 0.2, 1e-12);
+  EXPECT_NEAR(m.drop, 0.75 * (6 * std::sin(0.2) + 0.3), 1e-12);
+  EXPECT_NEAR(m.rear_share, 0.75 * 0.3 / (0.75 * 0.3 + 12 * std::sin(0.15)), 0.01);
+}
+
 TEST(Mechanism, LittleMassDownMeansStandingOrPartial) {
   EXPECT_EQ(name_of(synthetic(0, 0, 0.01)), "stands");
   EXPECT_EQ(name_of(synthetic(0.2, 0, 0.3)), "partial");

@@ -101,6 +101,22 @@ TEST(Run, CancellingEndsAtAStepWithARecord) {
   EXPECT_LT(r.time.back(), 0.2);
 }
 
+TEST(Run, EnergyAtTheTouchdownHangsLittleOnFrames) {
+  const product::Plan plan = read(house(charge("C-*-0", "0.05 s"), "1.2 s"));
+  const auto energy = [&plan](double rate) {
+    RunOptions o;
+    o.frame_rate = rate;
+    const record::Record r = run_plan(plan, default_knowledge(), o, {});
+    for (const record::Finding& f : r.findings)
+      if (f.id == "touchdown.first")
+        if (const size_t at = f.text.find("when "); at != std::string::npos) return std::stod(f.text.substr(at + 5));
+    return 0.0;
+  };
+  const double fine = energy(2000);
+  EXPECT_GT(fine, 0);
+  EXPECT_NEAR(energy(40), fine, 0.1 * fine);
+}
+
 TEST(RunReplay, TheModelFileRunsAgainToTheSamePoses) {
   const product::Plan plan = read(house(charge("C-A*-0", "0.05 s"), "0.6 s"));
   std::string file;
