@@ -37,17 +37,12 @@ std::string words_of_percent(double percent) {
   return percent >= 9.95 ? fmt::format("{:.0f}", percent) : fmt::format("{:.2g}", percent);
 }
 
-std::string name_outcome(const StudyResult& r, int outcome) {
-  const std::string name = study::name_of_outcome(r, outcome);
-  return name.empty() ? "(no name)" : name;
-}
-
 void print_outcomes(std::FILE* out, const StudyResult& r) {
   if (r.alpha.classes.size() < 2 && (r.outcomes.empty() || r.outcomes[0].empty())) return;
   std::fprintf(out, "\nOutcomes                     possibility  necessity    runs\n");
   for (const auto& c : r.alpha.classes) {
-    std::fprintf(out, "  %-26s %11.5f %10.5f %7d\n", name_outcome(r, c.outcome).c_str(), study::possibility_of(r, c),
-                 uncertainty::calc_necessity(r.possibilities, c.outcome), c.count);
+    std::fprintf(out, "  %-26s %11.5f %10.5f %7d\n", study::words_of_outcome(r, c.outcome).c_str(),
+                 study::possibility_of(r, c), uncertainty::calc_necessity(r.possibilities, c.outcome), c.count);
   }
 }
 
@@ -112,7 +107,8 @@ void print_drivers(std::FILE* out, const Problem& p, const StudyResult& r) {
     print_heading(out, "Drivers: part of the variance that an input explains alone, over the support");
     for (const auto& c : in.drivers.outcomes)
       if (in.drivers.outcomes.size() > 1)
-        print_line(out, fmt::format("outcome {}: {}", name_outcome(r, c.outcome), words_of_drivers(p, c.inputs)));
+        print_line(out,
+                   fmt::format("outcome {}: {}", study::words_of_outcome(r, c.outcome), words_of_drivers(p, c.inputs)));
     for (std::size_t o = 0; o < in.drivers.outputs.size() && o < r.outputs.size(); ++o)
       print_line(out, fmt::format("{}: {}", r.outputs[o], words_of_drivers(p, in.drivers.outputs[o])));
     print_line(out, in.source == study::Insights::Source::Design
@@ -127,7 +123,7 @@ void print_drivers(std::FILE* out, const Problem& p, const StudyResult& r) {
       double degree = 0;
       for (const auto& k : f.classes)
         if (k.outcome == c.outcome) degree = k.possibility;
-      text += fmt::format(" {} {:.2f},", name_outcome(r, c.outcome), degree);
+      text += fmt::format(" {} {:.2f},", study::words_of_outcome(r, c.outcome), degree);
     }
     text.pop_back();
     print_line(out, text);
@@ -166,10 +162,10 @@ void print_confirmation(std::FILE* out, const Problem& p, const StudyResult& r) 
                               count(State::Confirmed), count(State::Exceeded), count(State::NotReached),
                               count(State::NotRun), c.limit));
   for (const auto& o : c.outcomes)
-    print_line(out, fmt::format("{}, most possible run, whole: {}", name_outcome(r, o.outcome),
+    print_line(out, fmt::format("{}, most possible run, whole: {}", study::words_of_outcome(r, o.outcome),
                                 o.state == State::NotRun      ? "not run"
                                 : o.state == State::Confirmed ? "the same"
-                                                              : name_outcome(r, o.whole)));
+                                                              : study::words_of_outcome(r, o.whole)));
   for (const auto& b : c.bounds) {
     if (b.state != State::Exceeded && b.state != State::NotReached) continue;
     const auto& level = r.alpha.outputs[static_cast<std::size_t>(b.output)].levels[static_cast<std::size_t>(b.level)];

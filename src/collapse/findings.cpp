@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 
+#include "base/interpolate.h"
 #include "base/unit.h"
 #include "collapse/debris.h"
 #include "collapse/outcome.h"
@@ -362,7 +363,6 @@ void add_rigid_block(const Context& c) {
   record::Series series{"tilt_angle_rigid_block", "Tilt angle of a rigid block", "rad", "angle",
                         calc_rigid_block(block, c.r.time)};
   const double when = block.release + 1;
-  const auto at = std::lower_bound(c.r.time.begin(), c.r.time.end(), when - 1e-9);
   const std::string model_words = fmt::format(
       "a rigid block in its place ({:.0f} t on {} plastic hinges of {:.2f} MNm in all, its mass centre "
       "{:.2f} m ahead of them)",
@@ -379,14 +379,9 @@ void add_rigid_block(const Context& c) {
   if (block.mass * block.gravity * block.ahead <= block.plastic_moment) {
     c.add("rigid_block", "Mechanism", "Beside a rigid block", "By comparison, " + model_words + " would not tilt.",
           kNone, "rad");
-  } else if (at != c.r.time.end()) {
-    const size_t i = static_cast<size_t>(at - c.r.time.begin());
-    const size_t before = i > 0 ? i - 1 : 0;
-    const double passed = i > 0 ? (when - c.r.time[before]) / (c.r.time[i] - c.r.time[before]) : 1;
-    const auto read = [&](const record::Series& of) {
-      return of.value[before] + passed * (of.value[i] - of.value[before]);
-    };
-    const double here = read(c.r.series.front()), there = read(series);
+  } else if (when <= c.r.time.back() + 1e-9) {
+    const double here = interpolate(c.r.time, c.r.series.front().value, when),
+                 there = interpolate(c.r.time, series.value, when);
     c.add(
         "rigid_block", "Mechanism", "Beside a rigid block",
         fmt::format("1 s after the last stage the upper block leans by {:.1f} deg; {} would lean by {:.1f} deg. Unlike "

@@ -98,7 +98,6 @@ mbs::Options make_mbs_options(const mbs::RunSettings& settings, const Knowledge&
   mbs::Options o;
   o.duration = settings.duration;
   o.step = settings.step;
-  o.step_safety = settings.stability_share;
   o.frame_interval = settings.frame_interval;
   o.rest_speed = k.rest_speed;
   o.rest_time = k.rest_time;

@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 
+#include "base/interpolate.h"
 #include "base/rotation_fit.h"
 #include "base/unit.h"
 #include "record/told.h"
@@ -347,12 +348,8 @@ Touchdown Recorder::calc_touchdown(int body, double time, double speed) const {
 }
 
 double Recorder::kinetic_at(double time) const {
-  const auto it = std::lower_bound(record_.time.begin(), record_.time.end(), time);
-  const size_t i = std::min(static_cast<size_t>(it - record_.time.begin()), record_.time.size() - 1);
-  const size_t before = i > 0 && record_.time[i] > time ? i - 1 : i;
-  const double share = before < i ? (time - record_.time[before]) / (record_.time[i] - record_.time[before]) : 1;
   for (const record::Series& s : record_.series)
-    if (s.id == "energy_kinetic") return s.value[before] + share * (s.value[i] - s.value[before]);
+    if (s.id == "energy_kinetic") return interpolate(record_.time, s.value, time);
   return 0;
 }
 

@@ -200,7 +200,11 @@ mbs::Summary Course::finish(long steps) {
     summary_.wall_time = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
     summary_.time = time_;
     summary_.steps = steps;
-    summary_.energy_error = released_ > 0 ? largest_residual_ / released_ : 0;
+    double mass = 0;
+    for (size_t b = 0; b < body_.size(); ++b)
+      if (!model_.bodies[b].fixed) mass += body_[b].mass;
+    summary_.energy_error = mbs::calc_energy_error(
+        largest_residual_, released_, options_.equilibrium ? 0 : total_at_start_, mass * norm(model_.gravity));
     if (summary_.message.empty())
       summary_.message = std::string(words_of(summary_.ending)) + " at " + std::to_string(time_) + " s";
   }

@@ -26,6 +26,12 @@ const char* words_of(Summary::Ending e) {
 
 }  // namespace
 
+double calc_energy_error(double residual, double released, double brought, double weight) {
+  constexpr double lift = 1e-6;  // of everything, the least that an error is measured by [m]
+  const double reference = std::max({released, brought, lift * weight});
+  return reference > 0 ? residual / reference : 0;
+}
+
 Course::Course(System& s) : Course(s, {0, -1, std::vector<bool>(s.elements.size() + s.rotationals.size(), false)}) {}
 
 Course::Course(System& s, const CourseState& state) : s_(s), sampler_(s.options.samplings), now_(state) {
@@ -115,14 +121,11 @@ bool Course::is_at_rest() {
 }
 
 double Course::calc_energy_error() const {
-  constexpr double lift = 1e-6;  // [m]
-  double weight = 0;
+  double mass = 0;
   for (size_t b = 0; b < s_.B; ++b)
-    if (!s_.fixed[b]) weight += s_.state.body[b].mass * norm(s_.model.gravity);
-  // what rests in equilibrium stores energy that nothing sets free
+    if (!s_.fixed[b]) mass += s_.state.body[b].mass;
   const double brought = s_.options.equilibrium ? 0 : s_.state.total_at_start;
-  const double reference = std::max({s_.state.released, brought, lift * weight});
-  return reference > 0 ? s_.state.largest_residual / reference : 0;
+  return mbs::calc_energy_error(s_.state.largest_residual, s_.state.released, brought, mass * norm(s_.model.gravity));
 }
 
 bool Course::end() {

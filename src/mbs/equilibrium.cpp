@@ -576,6 +576,8 @@ class DeadLoad {
       : s_(s),
         assembly_(s),
         u_(assembly_.unknowns()),
+        virgin_(s.state.element),
+        virgin_rotational_(s.state.rotational),
         multiplier_(s.joints.size()),
         pushed_back_(Vector::Zero(6 * static_cast<Eigen::Index>(s.joints.size()))) {}
 
@@ -611,9 +613,13 @@ class DeadLoad {
   /// Iterates from where the bodies are.
   End search(double good_enough, std::string& message);
 
+  /// Zones forget what they were asked.
+  void make_virgin() { s_.state.element = virgin_, s_.state.rotational = virgin_rotational_; }
+
   System& s_;
   const Assembly assembly_;
   const Unknowns& u_;
+  const std::vector<ZoneState> virgin_, virgin_rotational_;
   double weight_ = 1, penalty_ = 1;
   double share_ = 1;  // of an iteration's way that is gone
   Eigen::SimplicialLDLT<Sparse> solver_;
@@ -867,13 +873,12 @@ bool DeadLoad::find(std::string& message) {
 
   const Place begun = find_place();
   const std::vector<JointState> joints = s_.state.joint;  // their angles
-  const std::vector<ZoneState> virgin = s_.state.element, virgin_rotational = s_.state.rotational;
   // what gravity bends further than its springs alone tell overshoots: then on shorter ways
   for (const double share : {1.0, 0.5, 0.2, 0.05}) {
     share_ = share;
     if (share < 1) {
       go_back(begun);
-      s_.state.element = virgin, s_.state.rotational = virgin_rotational;
+      make_virgin();
       s_.state.joint = joints;
       pushed_back_.setZero();
       acceleration_ = {};
@@ -886,7 +891,6 @@ bool DeadLoad::find(std::string& message) {
 }
 
 DeadLoad::End DeadLoad::search(double good_enough, std::string& message) {
-  const std::vector<ZoneState> virgin = s_.state.element, virgin_rotational = s_.state.rotational;
   // first without limits, so that an overloaded element can be named; then with them
   s_.ignores_limits = true;
   constexpr int most = 400;
@@ -903,8 +907,7 @@ DeadLoad::End DeadLoad::search(double good_enough, std::string& message) {
   int accelerated = 0;
   Place slow_place;
   for (int round = 0, all = 0;; ++all) {
-    s_.state.element = virgin;
-    s_.state.rotational = virgin_rotational;
+    make_virgin();
     find_unbalanced();
     s_.summary.equilibrium_iterations = all;
     s_.summary.equilibrium_residual = unbalanced_;
@@ -948,7 +951,7 @@ DeadLoad::End DeadLoad::search(double good_enough, std::string& message) {
     by_tangents = secants == 0 && steps != Steps::Accelerated;
     find_cracks(by_tangents);
     secants = std::max(0, secants - 1);
-    s_.state.element = virgin;
+    s_.state.element = virgin_;
     if (round == 0 || steps == Steps::Accelerated ||
         (factorised < (has_cracks_ ? fresh_by_cracks : fresh) && unbalanced_ > good_enough &&
          unbalanced_ > quick * last_unbalanced)) {

@@ -790,7 +790,7 @@ Model Reader::read_model(RunSettings* run) {
 }  // namespace
 
 void choose_steps(const RunSettings& run, Options& o) {
-  constexpr double most_turn = 0.03;  // a free top that wobbles keeps its energy to 1e-3 then
+  constexpr double most_turn = 0.03;  // a free top that wobbles keeps its energy to 1e-4 then
   constexpr int least_steps = 200;
   o.step_safety = run.stability_share, o.most_turn = most_turn, o.least_steps = least_steps;
 }

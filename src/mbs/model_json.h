@@ -9,9 +9,9 @@
 
 namespace topple::mbs {
 
-/// How a file wants to be run; what it leaves out is for the program to choose.
 struct Options;
 
+/// How a file wants to be run; what it leaves out is for the program to choose.
 struct RunSettings {
   double duration = 0;               // 0: not given [s]
   double step = 0;                   // 0: from the stiffest mode [s]

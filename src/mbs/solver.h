@@ -147,6 +147,12 @@ struct Summary {
 /// that is too short; everything else is in the summary.
 Summary run(const Model&, const Options&);
 
+/// What Summary::energy_error says, for engines that keep books of their own.
+///   residual, released  largest |residual|, energy released so far [J]
+///   brought             energy at the start, 0 of what rests in equilibrium: nothing sets free what that stores [J]
+///   weight              of all that moves [N]
+double calc_energy_error(double residual, double released, double brought, double weight);
+
 class System;  // compiled model and state
 class Course;
 struct Moment;  // mbs/moment.h

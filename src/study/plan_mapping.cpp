@@ -9,6 +9,7 @@
 #include <mutex>
 #include <numbers>
 
+#include "base/interpolate.h"
 #include "base/parallel.h"
 #include "base/unit.h"
 #include "collapse/sample_runs.h"
@@ -26,16 +27,6 @@ double now() {
   timespec t{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
-
-/// Between frames on a straight line; the first or last frame outside of them.
-double interpolate(const std::vector<double>& time, const std::vector<double>& value, double t) {
-  const auto after = std::lower_bound(time.begin(), time.end(), t);
-  if (after == time.begin()) return value.front();
-  if (after == time.end()) return value.back();
-  const size_t i = static_cast<size_t>(after - time.begin());
-  const double s = (t - time[i - 1]) / (time[i] - time[i - 1]);
-  return (1 - s) * value[i - 1] + s * value[i];
 }
 
 int find_outcome(const collapse::SampleRun& r) {

@@ -233,6 +233,11 @@ std::string name_of_outcome(const StudyResult& r, int outcome) {
   return i < r.outcomes.size() ? r.outcomes[i] : fmt::format("{}", outcome);
 }
 
+std::string words_of_outcome(const StudyResult& r, int outcome) {
+  const std::string name = name_of_outcome(r, outcome);
+  return name.empty() ? "(no name)" : name;
+}
+
 double possibility_of(const StudyResult& r, const uncertainty::ClassBounds& c) {
   for (const auto& p : r.possibilities.classes)
     if (p.outcome == c.outcome) return std::max(p.possibility, c.possibility);

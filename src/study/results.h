@@ -13,6 +13,8 @@ inline constexpr const char* failed_name = "failed";
 
 /// Name of an outcome class of a result; failed runs are one.
 std::string name_of_outcome(const StudyResult&, int outcome);
+/// The same for readers: "(no name)" where a model gives none.
+std::string words_of_outcome(const StudyResult&, int outcome);
 
 /// Everything but the samples, in the units of the file that was read; outputs in those of Problem::outputs.
 nlohmann::ordered_json make_results_json(const Problem&, const StudyResult&);

@@ -364,10 +364,8 @@ std::vector<NotableRun> list_notable_runs(const Problem& p, const StudyResult& r
   const uncertainty::Sample* core = find_core(p, r.alpha.archive);
   for (const auto& c : r.possibilities.classes)
     if (c.sample >= 0 && (!core || uncertainty::outcome_of(core->result) != c.outcome))
-      runs.push_back(
-          {c.sample, fmt::format("most possible run with the outcome {} ({:.2f})",
-                                 name_of_outcome(r, c.outcome).empty() ? "(no name)" : name_of_outcome(r, c.outcome),
-                                 c.possibility)});
+      runs.push_back({c.sample, fmt::format("most possible run with the outcome {} ({:.2f})",
+                                            words_of_outcome(r, c.outcome), c.possibility)});
   for (std::size_t o = 0; o < r.alpha.outputs.size() && o < r.outputs.size(); ++o) {
     if (r.alpha.outputs[o].levels.empty()) continue;
     const auto& support = r.alpha.outputs[o].levels.front();

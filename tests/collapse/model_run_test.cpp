@@ -23,20 +23,25 @@ struct Example {
   mbs::Summary summary;
 };
 
+Example run(mbs::Model model, const RunOptions& o) {
+  Example e;
+  e.model = std::move(model);
+  RunCallbacks callbacks;
+  callbacks.on_summary = [&](const mbs::Summary& s) { e.summary = s; };
+  e.record = run_model(e.model, o, callbacks);
+  return e;
+}
+
 Example run_example(const std::string& name, double step = 0) {
   const std::string path = std::string(TOPPLE_SOURCE_DIR) + "/examples/mbs/" + name;
   mbs::RunSettings settings;
-  Example e;
-  e.model = mbs::model_from_json(read_file(path), path, &settings);
+  mbs::Model model = mbs::model_from_json(read_file(path), path, &settings);
   RunOptions o;
   o.duration = settings.duration;
   o.step = step > 0 ? step : settings.step;
   o.equilibrium = settings.equilibrium.value_or(true);
   o.rest_speed = settings.rest_speed.value_or(0);
-  RunCallbacks callbacks;
-  callbacks.on_summary = [&](const mbs::Summary& s) { e.summary = s; };
-  e.record = run_model(e.model, o, callbacks);
-  return e;
+  return run(std::move(model), o);
 }
 
 const record::Output& output_of(const Example& e, const std::string& name) {
@@ -212,22 +217,18 @@ TEST(ModelRun, SaysWhatTheEngineSaysOfItsNumbers) {
 
 /// What a file with these bodies and more gives without a step of its own.
 Example run_text(const std::string& more, double duration, bool equilibrium = false) {
-  Example e;
   mbs::RunSettings settings;
-  e.model = mbs::model_from_json(R"({"format": "topple-mbs", "version": 2, "gravity": [0, 0, 0],
+  mbs::Model model = mbs::model_from_json(R"({"format": "topple-mbs", "version": 2, "gravity": [0, 0, 0],
       "contact": {"ground": false, "bodies": false}, )" +
-                                     more + "}",
-                                 "here", &settings);
+                                              more + "}",
+                                          "here", &settings);
   RunOptions o;
   o.duration = duration;
   o.equilibrium = equilibrium;
   o.rest_speed = 0;
   o.frame_rate = 100;
   o.stability_share = settings.stability_share;
-  RunCallbacks callbacks;
-  callbacks.on_summary = [&](const mbs::Summary& s) { e.summary = s; };
-  e.record = run_model(e.model, o, callbacks);
-  return e;
+  return run(std::move(model), o);
 }
 
 const record::Finding& finding_of(const Example& e, const std::string& id) {
