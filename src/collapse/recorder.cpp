@@ -77,6 +77,7 @@ Recorder::Recorder(const mbs::Model& model, const ModelMap& map, const Knowledge
                    {"energy_residual", "Error of the balance", "J", "energy", {}},
                    {"broken_zones", "Broken zones", "1", "count", {}},
                    {"connected_share", "Connected share of the upper block", "1", "share", {}}};
+  if (!model.loads.empty()) record.series.push_back({"energy_loads", "Work of loads", "J", "energy", {}});
 }
 
 const ZoneEntry& Recorder::entry_of(int element) const {
@@ -323,6 +324,7 @@ void Recorder::add_frame(const mbs::View& v) {
                            static_cast<double>(zf.broken),
                            block.connected};
   for (size_t i = 0; i < std::size(values); ++i) series(i).value.push_back(values[i]);
+  if (!model_.loads.empty()) record_.series.back().value.push_back(e.loads);
   if (ground_force > largest_ground_force_) {
     largest_ground_force_ = ground_force;
     largest_ground_force_time_ = v.time;

@@ -276,6 +276,26 @@ TEST(ModelRun, RestsWithoutAnErrorOfEnergyToSpeakOf) {
   EXPECT_EQ(finding_of(e, "verification.energy").status, record::Status::Good);
 }
 
+TEST(ModelRun, TellsTheWorkOfLoads) {
+  // 2 kg pushed by 6 N from rest: 3 m/s2
+  const Example e = run_text(R"("bodies": [{"name": "b", "mass": 2, "inertia": [1, 1, 1], "X_WB": {}}],
+      "loads": [{"name": "push", "body": "b", "force": [6, 0, 0]}])",
+                             1);
+  const auto series = [&e](const std::string& id) {
+    for (const record::Series& s : e.record.series)
+      if (s.id == id) return s.value;
+    return std::vector<double>();
+  };
+  const std::vector<double> work = series("energy_loads"), kinetic = series("energy_kinetic");
+  ASSERT_EQ(work.size(), e.record.time.size());
+  ASSERT_GT(work.size(), 90U);
+  for (size_t i = 0; i < work.size(); ++i) {
+    const double v = 3 * e.record.time[i];
+    EXPECT_NEAR(work[i], v * v, 0.05) << e.record.time[i];
+    EXPECT_NEAR(kinetic[i] - work[i], series("energy_residual")[i], 1e-9) << e.record.time[i];
+  }
+}
+
 TEST(ModelRun, FailsWhereTheBalanceOfEnergyIsLost) {
   // 1 kg in place of 100 on a spring of 1e4 N/m: the step of 50 ms is far too long then
   const std::string more = R"("run": {"step": 0.05, "equilibrium": false},

@@ -470,6 +470,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["Dissipated by impact", "Durch Stoß dissipiert"],
   ["Taken away with debris", "Mit Auswurf entfernt"],
   ["Error of the balance", "Fehler der Bilanz"],
+  ["Work of loads", "Arbeit der Lasten"],
   ["Broken zones", "Gebrochene Zonen"],
   ["Connected share of the upper block", "Zusammenhängender Teil des oberen Blocks"],
   ["Energies", "Energien"],
