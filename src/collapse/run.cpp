@@ -12,6 +12,7 @@
 #include "collapse/plan_record.h"
 #include "collapse/recorder.h"
 #include "engines/engine.h"
+#include "engines/requirements.h"
 #include "mbs/quantity.h"
 #include "record/told.h"
 
@@ -155,6 +156,9 @@ record::Record run_model(const mbs::Model& model, const RunOptions& options, con
   o.rest_speed = options.rest_speed.value_or(k.rest_speed);
   o.samplings = make_samplings(model, r);
   mbs::Summary summary = engine->run(model, o);
+  if (const auto odd = engines::find_impossible_inertias(model); !model.is_planar && !odd.empty())
+    summary.notes.push_back(fmt::format("{}: {}, which no body has{}", odd[0].place, odd[0].what,
+                                        odd.size() > 1 ? fmt::format("; {} more like it", odd.size() - 1) : ""));
   for (const mbs::Output& out : model.outputs)
     if (summary.step > 0 && out.rate * summary.step > 1.000001)
       summary.notes.push_back(fmt::format("output \"{}\" asks for {:g} samples a second, the steps give {:.4g}",

@@ -352,6 +352,20 @@ TEST(ModelRun, ShowsWhereItEnds) {
   EXPECT_NEAR(r.time.back(), 0.5, 0.01);
 }
 
+TEST(ModelRun, NotesAnInertiaThatNoBodyHas) {
+  const char* bodies = R"("bodies": [{{"name": "rod", "mass": 1, "inertia": [{}, 1, 1], "X_WB": {{}}}},
+      {{"name": "odd", "mass": 1, "inertia": [1, 1, {}], "X_WB": {{"p": [9, 0, 0]}}}}])";
+  EXPECT_TRUE(run_text(fmt::format(fmt::runtime(bodies), 1e-3, 2), 0.1).summary.notes.empty());
+  const Example e = run_text(fmt::format(fmt::runtime(bodies), 1e-3, 2.1), 0.1);
+  ASSERT_EQ(e.summary.notes.size(), 1U);
+  EXPECT_EQ(e.summary.notes[0],
+            "bodies[1] \"odd\".inertia: an inertia with a principal moment larger than the sum of the two others, "
+            "which no body has");
+  const Example both = run_text(fmt::format(fmt::runtime(bodies), 9, 2.1), 0.1);
+  ASSERT_EQ(both.summary.notes.size(), 1U);
+  EXPECT_NE(both.summary.notes[0].find("; 1 more like it"), std::string::npos) << both.summary.notes[0];
+}
+
 TEST(ModelRun, NotesOutputsThatAskForMoreThanThereIs) {
   const Example fine = run_example("double_pendulum.json", 5e-3);
   EXPECT_TRUE(fine.summary.notes.empty()) << fine.summary.notes.front();

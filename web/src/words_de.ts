@@ -270,6 +270,8 @@ export const german: readonly (readonly [string, string])[] = [
   ["After {} iterations the largest unbalanced force is {:.1e} of the weight.", "Nach {} Iterationen ist die größte nicht ausgeglichene Kraft das {}-Fache des Gewichts."],
   ["The largest error is {:.1e} of the potential energy released, or of the energy at the start.", "Der größte Fehler ist das {}-Fache der freigesetzten Lageenergie oder der Energie am Anfang."],
   ["They drift by at most {:.1e} m or rad.", "Sie weichen um höchstens {} m oder rad ab."],
+  ["{w}: an inertia with a principal moment larger than the sum of the two others, which no body has", "{}: ein Trägheitstensor mit einem Hauptmoment, das größer als die Summe der beiden anderen ist, was kein Körper hat"],
+  ["{w}: an inertia with a principal moment larger than the sum of the two others, which no body has; {:d} more like it", "{}: ein Trägheitstensor mit einem Hauptmoment, das größer als die Summe der beiden anderen ist, was kein Körper hat; {} weitere davon"],
   ["output {} asks for {:g} samples a second, the steps give {:.4g}", "Ausgabe {} will {} Werte je Sekunde, die Schritte geben {}"],
   ["{:d} constraint of {:d} repeats what the others hold; of all reactions that give the same motion the smallest are given", "{} Bedingung von {} wiederholt, was die anderen halten; von allen Reaktionen derselben Bewegung sind die kleinsten angegeben"],
   ["{:d} constraints of {:d} repeat what the others hold; of all reactions that give the same motion the smallest are given", "{} Bedingungen von {} wiederholen, was die anderen halten; von allen Reaktionen derselben Bewegung sind die kleinsten angegeben"],
