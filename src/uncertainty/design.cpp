@@ -203,7 +203,9 @@ class Design {
       // with very few runs all of them are for fresh points
       if (axes_.size() <= most_corner_axes && (20 << axes_.size()) <= share) {
         // first to learn where the boundary is, then to come to an end
+        const Box whole = b.box;
         const bool is_good = spent < 0.5 ? check_corners(b.box, corners) : shrink_to_corners(b.box, middle);
+        if (is_good) spread_out(b.box, whole);
         b.volume = calc_part(b.box);
         if (!is_good) continue;
         if (b.volume < options_.smallest || asker_.rest() < options_.fresh) break;
@@ -287,6 +289,37 @@ class Design {
       is_checked = broken.empty();  // the others at this size
     }
     return false;
+  }
+
+  /// Moves faces that shrank for the sake of others back towards the whole box, each as far as its corners keep the
+  /// requirement; runs for the fresh points are left over.
+  void spread_out(Box& box, const Box& whole) {
+    for (const double share : {1.0, 0.5, 0.25})
+      for (const int i : axes_)
+        for (const bool upper : {false, true}) {
+          if (asker_.rest() < options_.fresh + (1 << axes_.size())) return;
+          Box wider = box;
+          double& face = (upper ? wider.upper : wider.lower)[i];
+          const double way = (upper ? whole.upper : whole.lower)[i] - face;
+          const double width = support_.upper[i] - support_.lower[i];
+          if (std::abs(share * way) < options_.edge * width) continue;
+          face += share * way;
+          if (is_near_violation(wider)) continue;
+          std::vector<Point> points = make_corners_of(wider);
+          std::erase_if(points, [&](const Point& x) { return x[i] != face || !is_allowed(space_, x); });
+          const std::vector<Verdict> verdicts = judge(points);
+          if (std::all_of(verdicts.begin(), verdicts.end(), [](Verdict v) { return v == Verdict::Permissible; }))
+            box = std::move(wider);
+        }
+  }
+
+  /// Whether a known run violates that is in a box or nearer to it than a box may come.
+  bool is_near_violation(Box box) {
+    for (const int i : axes_) {
+      const double margin = options_.edge * (support_.upper[i] - support_.lower[i]) * (1 - 1e-9);
+      box.lower[i] -= margin, box.upper[i] += margin;
+    }
+    return has_violation(box);
   }
 
   double calc_part(const Box& box) const {

@@ -99,6 +99,22 @@ TEST(DesignPhysics, FinishesABoxWithTheRunsThatThereAre) {
   }
 }
 
+// Near the lower ends nothing violates: a box that had to shrink to its upper corners reaches down to them again.
+TEST(DesignPhysics, FacesThatShrankForOthersMoveBackOut) {
+  const auto is_good = [](const Point& x) { return x[0] + x[1] + x[2] + x[3] + x[4] < 2.5; };
+  const Space space{std::vector<FuzzyNumber>(5, make_triangular(0, 0.3, 1)), {}, {}};
+  DesignOptions options;
+  options.rerun_limit = 0;
+  const Found f = find(space, make_model(is_good), outcome_0, options, 8000);
+  const double largest_there_is = std::pow(0.5, 5);
+  ASSERT_FALSE(f.design.boxes.empty());
+  for (const auto& b : f.design.boxes) {
+    EXPECT_TRUE(b.kept);
+    EXPECT_GT(b.volume, 0.6 * largest_there_is);
+    EXPECT_LE(b.volume, largest_there_is);
+  }
+}
+
 TEST(Design, KeepsNoBoxWithoutRunsForIt) {
   DesignOptions options;
   options.space_points = 60;
