@@ -162,7 +162,7 @@ class Design {
       b.inputs.clear();
       for (int i = 0; i < space_.size(); ++i)
         b.inputs.push_back(make_triangular(b.box.lower[i], middle[i], b.box.upper[i]));
-      if (options_.rerun_limit > 0) rerun(b);
+      if (options_.rerun_limit > 0) rerun(b, options_.rerun_limit);
       b.kept = !has_violation(b.box) && !asker_.is_cancelled();
       if (!asker_.can_go_on()) break;
     }
@@ -201,7 +201,7 @@ class Design {
       }
       if (b.volume < options_.smallest || asker_.rest() < options_.fresh) break;
       // with very few runs all of them are for fresh points
-      if (axes_.size() <= most_corner_axes && (20 << axes_.size()) <= share) {
+      if (axes_.size() <= most_corner_axes && (12 << axes_.size()) <= share) {
         // first to learn where the boundary is, then to come to an end
         const Box whole = b.box;
         const bool is_good = spent < 0.5 ? check_corners(b.box, corners) : shrink_to_corners(b.box, middle);
@@ -225,7 +225,8 @@ class Design {
       b.inputs.clear();
       for (int i = 0; i < space_.size(); ++i)
         b.inputs.push_back(make_triangular(b.box.lower[i], middle[i], b.box.upper[i]));
-      if (options_.rerun_limit > 0) rerun(b);
+      // half of what is left, so that another box can be tried if the analysis finds a violation
+      if (options_.rerun_limit > 0) rerun(b, std::min(options_.rerun_limit, asker_.rest() / 2));
       b.kept = !has_violation(b.box) && !asker_.is_cancelled();
     }
     asker_.set_limit(limit);
@@ -356,14 +357,14 @@ class Design {
     return false;
   }
 
-  /// The box as fuzzy input.
-  void rerun(PermissibleBox& b) {
+  /// The box as fuzzy input, with at most so many runs.
+  void rerun(PermissibleBox& b, int runs) {
     Space inner{b.inputs, space_.constraints, {}};
     AlphaOptions o = make_thrifty_options();
     o.levels = options_.levels;
     o.seed = options_.seed;
     const int limit = asker_.limit();
-    asker_.set_limit(std::min(limit, asker_.asked() + options_.rerun_limit));
+    asker_.set_limit(std::min(limit, asker_.asked() + runs));
     b.outputs = optimise(inner, asker_, o).outputs;
     asker_.set_limit(limit);
   }
