@@ -1,9 +1,12 @@
 #include "commands.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -142,11 +145,18 @@ constexpr const char* kNoBundle =
 
 }  // namespace
 
-void make_folder(const std::string& path) {
+void make_folder(const std::string& path, const std::vector<const char*>& files) {
   std::error_code failure;
   fs::create_directories(path, failure);
   if (failure) throw std::runtime_error(path + ": the folder cannot be made: " + failure.message());
+  if (access(path.c_str(), W_OK | X_OK) != 0)
+    throw std::runtime_error(path + ": the folder cannot be written to: " + std::strerror(errno));
+  for (const char* name : files)
+    if (const fs::path file = fs::path(path) / name; fs::is_directory(file, failure))
+      throw std::runtime_error(file.string() + " is a folder, where a file is to be written");
 }
+
+void make_run_folder(const std::string& path) { make_folder(path, {"model.json", "record.h5", "report.html"}); }
 
 Files write_files(const record::Record& r, const Arguments& a, bool& failed_report) {
   Files files;
@@ -220,13 +230,13 @@ int exit_code_of(const record::Record& r, bool failed_report) {
 }
 
 int close_run(const record::Record& r, const Arguments& a, std::FILE* out, Files files) {
-  bool failed_report = false;
-  for (auto& f : write_files(r, a, failed_report)) files.push_back(std::move(f));
-  const int code = exit_code_of(r, failed_report);
   print_findings(out, r);
   std::fprintf(out, "\n%s Computed in %.1f s.\n", r.ending_text.c_str(), r.provenance.wall_time);
   for (const record::Finding& f : r.findings)
     if (is_violated(f)) std::fprintf(out, "Violated: %s (%s)\n", f.title.c_str(), f.heading.c_str());
+  bool failed_report = false;
+  for (auto& f : write_files(r, a, failed_report)) files.push_back(std::move(f));
+  const int code = exit_code_of(r, failed_report);
   for (const auto& [what, path] : files) std::fprintf(out, "Wrote %s\n", path.c_str());
   if (a.json) std::printf("%s\n", dump(summary_json(r, files, code)).c_str());
   return code;
@@ -281,7 +291,7 @@ int run_plan_file(const Arguments& a, const std::atomic<bool>& cancel) {
     const product::Plan plan = product::read_plan_file(a.input, warnings, text);
     const collapse::Knowledge knowledge = load_knowledge(a);
     print_diagnostics(warnings, text);
-    make_folder(a.output);
+    make_run_folder(a.output);
     ProgressLine progress;
     EventPrinter events(out, a.verbose, progress);
     Files files;

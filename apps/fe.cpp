@@ -81,7 +81,7 @@ int run_finite_elements(const Arguments& a, const std::atomic<bool>& cancel) {
       if (a.json) std::printf("%s\n", dump({{"exit_code", kOk}, {"mesh", to_json(report)}}).c_str());
       return kOk;
     }
-    make_folder(a.output);
+    make_run_folder(a.output);
     ProgressLine progress;
     EventPrinter events(out, a.verbose, progress);
     collapse::RunCallbacks callbacks;

@@ -74,6 +74,7 @@ int dispatch(const topple::apps::Arguments& a) {
 int main(int argc, char** argv) {
   std::signal(SIGINT, on_interrupt);
   std::signal(SIGTERM, on_interrupt);  // batch systems
+  std::signal(SIGXFSZ, SIG_IGN);       // a file that may not grow is an error of its own
   const auto arguments = topple::apps::parse_arguments(argc, argv);
   if (const int* code = std::get_if<int>(&arguments)) return *code;
   try {

@@ -109,7 +109,7 @@ int run_model_file(const Arguments& a, const std::atomic<bool>& cancel) {
     if (!(options.frame_rate > 0) && settings.frame_interval > 0) options.frame_rate = 1 / settings.frame_interval;
     options.equilibrium = a.equilibrium.value_or(settings.equilibrium.value_or(true));
     options.rest_speed = settings.rest_speed.value_or(0);
-    make_folder(a.output);
+    make_run_folder(a.output);
     print_model(out, model);
     ProgressLine progress;
     EventPrinter events(out, a.verbose, progress);

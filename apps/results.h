@@ -36,8 +36,11 @@ collapse::RunOptions make_options(const Arguments&);
 /// (E801) that names the option.
 double read_quantity(const std::string& text, Dimension, const char* option);
 
-/// Throws std::runtime_error with the path.
-void make_folder(const std::string& path);
+/// Throws std::runtime_error with the path if there is no folder that can be written to, or a folder in the place of
+/// one of the files that are to come.
+void make_folder(const std::string& path, const std::vector<const char*>& files = {});
+/// The same for the files of a run.
+void make_run_folder(const std::string& path);
 
 /// A built page, such as "report.html": beside an installed program, or in the source tree.
 std::optional<std::string> find_bundle(const std::string& name);
@@ -45,7 +48,7 @@ std::optional<std::string> find_bundle(const std::string& name);
 /// Files of a finished record. `failed_report` is set when a report was asked for and could not be made.
 Files write_files(const record::Record&, const Arguments&, bool& failed_report);
 
-/// Writes the files of a finished run, says what it found, and gives the exit code. `files` are there already.
+/// Says what a finished run found, writes its files, and gives the exit code. `files` are there already.
 int close_run(const record::Record&, const Arguments&, std::FILE* out, Files files);
 
 nlohmann::ordered_json summary_json(const record::Record&, const Files&, int exit_code);

@@ -212,6 +212,9 @@ run)
   printf '\n[criteria]\nmechanism = "stands"\n' | cat "$plan" - >stands.toml
   expect 3 "$topple" run stands.toml -o c --no-report; has out "Asked: stands"; has out "Violated: Mechanism (Criteria)"
   expect 1 "$topple" run "$plan" -o /proc/nowhere --no-report
+  mkdir -p taken/record.h5; expect 1 "$topple" run "$plan" -o taken; has err "taken/record.h5 is a folder"; lacks out "rigid bodies"
+  (ulimit -f 4; expect 1 "$topple" run "$plan" -o full --no-report; exit $failures) || failures=$((failures + 1))
+  has err "cannot write full/model.json: File too large"; [ -z "$(ls full)" ] || { echo "half a file is left"; failures=$((failures + 1)); }
   # the same plan and seed give the same bytes of poses
   expect 0 "$topple" run "$plan" -o d --csv --no-report --threads 2
   cmp a/b/series.csv d/series.csv || failures=$((failures + 1))
