@@ -129,21 +129,6 @@ std::vector<std::string> list_failures(const uncertainty::Archive& archive) {
   return lines;
 }
 
-/// Runs behind the search of boxes may have met something inside.
-void recount_boxes(std::vector<uncertainty::PermissibleBox>& boxes, const uncertainty::Requirement& requirement,
-                   const uncertainty::Archive& archive) {
-  for (uncertainty::PermissibleBox& b : boxes) {
-    b.samples = b.broken = 0;
-    for (const uncertainty::Sample& s : archive.samples()) {
-      if (!b.box.contains(s.x)) continue;
-      ++b.samples;
-      b.broken += !(s.result.state == Result::State::Done && requirement(s.result) >= 0);
-    }
-    b.kept = b.kept && b.broken == 0;
-  }
-  std::stable_partition(boxes.begin(), boxes.end(), [](const auto& b) { return b.kept; });
-}
-
 /// What the samples alone tell.
 std::vector<uncertainty::Possibility> list_possibilities(const uncertainty::AlphaResult& r) {
   std::vector<uncertainty::Possibility> list;
@@ -290,10 +275,7 @@ class Manager {
       has_more = true;
     }
     has_more = give_back(r, asker, search, p, budget.limit) || has_more;
-    if (!r.insights.boxes.boxes.empty())
-      recount_boxes(r.insights.boxes.boxes,
-                    make_requirement(read_permissible(problem_.permissible, problem_), names_.outputs, names_.outcomes),
-                    asker.archive());
+    review_boxes(r.insights, problem_, asker.archive(), options.levels, names_.outputs, names_.outcomes);
     r.ending = r.alpha.ending;
     if (r.ending == uncertainty::Ending::Complete && !r.possibilities.classes.empty())
       r.ending = r.possibilities.ending;

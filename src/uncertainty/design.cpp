@@ -28,6 +28,26 @@ void check_options(const DesignOptions& o) {
   demand(o.confidence > 0 && o.confidence < 1, "confidence lies between 0 and 1");
 }
 
+/// At most this part of a box violates whose fresh points have all passed.
+double bound_violating(const PermissibleBox& b, double confidence) {
+  return 1 - std::pow((1 - confidence) / b.tries, 1.0 / b.fresh);
+}
+
+std::vector<FuzzyNumber> make_inputs(const Box& box, const Point& core) {
+  std::vector<FuzzyNumber> inputs;
+  for (std::size_t i = 0; i < core.size(); ++i) inputs.push_back(make_triangular(box.lower[i], core[i], box.upper[i]));
+  return inputs;
+}
+
+/// Part of the support's volume.
+double calc_part(const Box& box, const Box& support) {
+  double part = 1;
+  for (std::size_t i = 0; i < box.lower.size(); ++i)
+    if (support.upper[i] > support.lower[i])
+      part *= (box.upper[i] - box.lower[i]) / (support.upper[i] - support.lower[i]);
+  return part;
+}
+
 class Design {
  public:
   Design(const Space& space, Asker& asker, const Requirement& requirement, const DesignOptions& options)
@@ -53,7 +73,8 @@ class Design {
       if (share < wanted || !grow(static_cast<int>(g), centres[g], 7 * share / 10))
         choose(static_cast<int>(g), centres[g], std::max(0, end - asker_.asked()));
     }
-    rank();
+    for (PermissibleBox& b : boxes_) result_.boxes.push_back(std::move(b));
+    review_boxes(space_, result_.boxes, requirement_, asker_.archive(), options_);
     for (int i = 0; i < asker_.asked(); ++i) {
       const double m = margin_of(i);
       ++(m == -infinite ? result_.failed : m >= 0 ? result_.permissible : result_.forbidden);
@@ -158,10 +179,9 @@ class Design {
         if (!asker_.can_go_on()) break;
         continue;
       }
+      b.fresh_points = fresh;
       b.fresh = static_cast<int>(fresh.size());
-      b.inputs.clear();
-      for (int i = 0; i < space_.size(); ++i)
-        b.inputs.push_back(make_triangular(b.box.lower[i], middle[i], b.box.upper[i]));
+      b.inputs = make_inputs(b.box, middle);
       if (options_.rerun_limit > 0) rerun(b, options_.rerun_limit);
       b.kept = !has_violation(b.box) && !asker_.is_cancelled();
       if (!asker_.can_go_on()) break;
@@ -169,7 +189,7 @@ class Design {
     asker_.set_limit(limit);
     if (is_known(b.box)) return true;
     if (!b.kept) return false;
-    b.violating = 1 - std::pow((1 - options_.confidence) / b.tries, 1.0 / b.fresh);
+    b.violating = bound_violating(b, options_.confidence);
     boxes_.push_back(std::move(b));
     return true;
   }
@@ -177,7 +197,7 @@ class Design {
   /// With few runs: the largest box that keeps out what is known to violate, tried at its corners and at fresh points;
   /// what violates there is kept out of the next one, by a distance that grows as runs are spent.
   void choose(int g, int centre, int share) {
-    PermissibleBox b;
+    PermissibleBox b, broken;  // broken: passed at its fresh points, and a later run violates
     b.group = g, b.centre = centre;
     const Point middle = asker_.archive()[centre].x;
     b.box = {middle, middle};
@@ -196,7 +216,7 @@ class Design {
       const double spent = std::min(1.0, (asker_.asked() - start) / std::max(1.0, double(share - options_.fresh)));
       for (double margin = options_.edge + widest * spent * spent;; margin = std::max(options_.edge, 0.5 * margin)) {
         b.box = find_largest_box(support_, front, margin, 4, options_.seed + static_cast<std::uint64_t>(b.tries));
-        b.volume = calc_part(b.box);
+        b.volume = calc_part(b.box, support_);
         if (b.volume >= options_.smallest || margin <= options_.edge) break;
       }
       if (b.volume < options_.smallest || asker_.rest() < options_.fresh) break;
@@ -206,32 +226,39 @@ class Design {
         const Box whole = b.box;
         const bool is_good = spent < 0.5 ? check_corners(b.box, corners) : shrink_to_corners(b.box, middle);
         if (is_good) spread_out(b.box, whole);
-        b.volume = calc_part(b.box);
+        b.volume = calc_part(b.box, support_);
         if (!is_good) continue;
         if (b.volume < options_.smallest || asker_.rest() < options_.fresh) break;
       }
       ++b.tries;
       constexpr int at_once = 8;
-      int passed = 0;
+      b.fresh = 0, b.fresh_points.clear();
       bool good = true;
-      while (good && passed < options_.fresh) {
-        const auto verdicts = judge(make_random_points(b.box, std::min(at_once, options_.fresh - passed), random));
-        good = !verdicts.empty();
-        for (const Verdict v : verdicts) good = good && v == Verdict::Permissible;
-        passed += static_cast<int>(verdicts.size());
+      while (good && static_cast<int>(b.fresh_points.size()) < options_.fresh) {
+        const int wanted = std::min(at_once, options_.fresh - static_cast<int>(b.fresh_points.size()));
+        const auto points = make_random_points(b.box, wanted, random);
+        good = !points.empty();
+        for (const Verdict v : judge(points)) good = good && v == Verdict::Permissible;
+        b.fresh_points.insert(b.fresh_points.end(), points.begin(), points.end());
       }
-      if (!good) continue;
-      b.fresh = passed;
-      b.inputs.clear();
-      for (int i = 0; i < space_.size(); ++i)
-        b.inputs.push_back(make_triangular(b.box.lower[i], middle[i], b.box.upper[i]));
+      if (!good) {
+        b.fresh_points.clear();
+        continue;
+      }
+      b.fresh = static_cast<int>(b.fresh_points.size());
+      b.inputs = make_inputs(b.box, middle);
       // half of what is left, so that another box can be tried if the analysis finds a violation
       if (options_.rerun_limit > 0) rerun(b, std::min(options_.rerun_limit, asker_.rest() / 2));
       b.kept = !has_violation(b.box) && !asker_.is_cancelled();
+      if (!b.kept) broken = b;
     }
     asker_.set_limit(limit);
+    if (!b.kept && !broken.fresh_points.empty()) {
+      broken.tries = b.tries;
+      b = std::move(broken);
+    }
     if (is_known(b.box)) return;
-    if (b.fresh > 0) b.violating = 1 - std::pow((1 - options_.confidence) / b.tries, 1.0 / b.fresh);
+    if (b.fresh > 0) b.violating = bound_violating(b, options_.confidence);
     boxes_.push_back(std::move(b));
   }
 
@@ -323,12 +350,6 @@ class Design {
     return has_violation(box);
   }
 
-  double calc_part(const Box& box) const {
-    double part = 1;
-    for (const int i : axes_) part *= (box.upper[i] - box.lower[i]) / (support_.upper[i] - support_.lower[i]);
-    return part;
-  }
-
   std::vector<Point> make_random_points(const Box& box, int count, Random& random) const {
     std::vector<Point> points;
     for (int attempt = 0; static_cast<int>(points.size()) < count && attempt < 1000 * count; ++attempt) {
@@ -369,48 +390,6 @@ class Design {
     asker_.set_limit(limit);
   }
 
-  void rank() {
-    double low = infinite, high = -infinite;
-    std::vector<double> least, most;  // of each output over all runs
-    for (int i = 0; i < asker_.asked(); ++i) {
-      const double m = margin_of(i);
-      if (m == -infinite) continue;
-      low = std::min(low, m), high = std::max(high, m);
-      const auto& values = asker_.archive()[i].result.values;
-      least.resize(values.size(), infinite), most.resize(values.size(), -infinite);
-      for (std::size_t o = 0; o < values.size(); ++o)
-        least[o] = std::min(least[o], values[o]), most[o] = std::max(most[o], values[o]);
-    }
-    for (auto& b : boxes_) {
-      double nearest = infinite;
-      for (int i = 0; i < asker_.asked(); ++i)
-        if (b.box.contains(asker_.archive()[i].x))
-          ++b.samples, b.broken += !is_good(i), nearest = std::min(nearest, margin_of(i));
-      b.kept = b.kept && b.broken == 0;  // runs for other boxes may have met an island
-      b.distance = high > low && nearest < infinite ? std::max(nearest, 0.0) / (high - low) : 0;
-      const std::size_t o = static_cast<std::size_t>(options_.ranking_output);
-      if (!b.kept || o >= b.outputs.size()) continue;
-      std::vector<double> entropies;
-      for (const int i : axes_) entropies.push_back(calc_entropy(b.inputs[i], support_.upper[i] - support_.lower[i]));
-      const double reference = most[o] > least[o] ? most[o] - least[o] : 1;
-      b.robustness = calc_robustness(entropies, calc_entropy(make_number(b.outputs[o]), reference));
-    }
-    // places by robustness and by distance are added; the larger volume decides a tie
-    const auto place = [this](const PermissibleBox& b, double PermissibleBox::*what) {
-      return std::count_if(boxes_.begin(), boxes_.end(), [&](const auto& o) { return o.kept && o.*what > b.*what; });
-    };
-    std::vector<std::pair<long, std::size_t>> order;
-    for (std::size_t k = 0; k < boxes_.size(); ++k)
-      order.emplace_back(place(boxes_[k], &PermissibleBox::robustness) + place(boxes_[k], &PermissibleBox::distance),
-                         k);
-    std::stable_sort(order.begin(), order.end(), [this](const auto& a, const auto& b) {
-      const auto &p = boxes_[a.second], &q = boxes_[b.second];
-      if (p.kept != q.kept) return p.kept;
-      return a.first != b.first ? a.first < b.first : p.volume > q.volume;
-    });
-    for (const auto& [places, k] : order) result_.boxes.push_back(std::move(boxes_[k]));
-  }
-
   const Space& space_;
   Asker& asker_;
   const Requirement& requirement_;
@@ -423,6 +402,109 @@ class Design {
 };
 
 }  // namespace
+
+namespace {
+
+/// What all runs say of boxes.
+class Review {
+ public:
+  Review(const Space& space, const Requirement& requirement, const Archive& archive, const DesignOptions& options)
+      : space_(space), archive_(archive), options_(options), support_(make_box(space, 0)) {
+    for (const Sample& s : archive.samples()) {
+      const double m = s.result.state == Result::State::Done ? requirement(s.result) : -infinite;
+      margins_.push_back(std::isnan(m) ? -infinite : m);
+      if (margins_.back() == -infinite) continue;
+      low_ = std::min(low_, m), high_ = std::max(high_, m);
+      const auto& values = s.result.values;
+      least_.resize(values.size(), infinite), most_.resize(values.size(), -infinite);
+      for (std::size_t o = 0; o < values.size(); ++o)
+        least_[o] = std::min(least_[o], values[o]), most_[o] = std::max(most_[o], values[o]);
+    }
+  }
+
+  void measure(PermissibleBox& b) const {
+    count(b);
+    if (b.broken > 0 && !b.fresh_points.empty()) {
+      b.kept = shrink(b);
+      count(b);
+    }
+    b.kept = b.kept && b.broken == 0;
+    double nearest = infinite;
+    for (std::size_t i = 0; i < margins_.size(); ++i)
+      if (b.box.contains(archive_[static_cast<int>(i)].x)) nearest = std::min(nearest, margins_[i]);
+    b.distance = high_ > low_ && nearest < infinite ? std::max(nearest, 0.0) / (high_ - low_) : 0;
+    b.robustness = 0;
+    const std::size_t o = static_cast<std::size_t>(options_.ranking_output);
+    if (!b.kept || o >= b.outputs.size() || b.outputs[o].levels.empty()) return;
+    std::vector<double> entropies;
+    for (std::size_t i = 0; i < b.inputs.size(); ++i)
+      if (const double width = support_.upper[i] - support_.lower[i]; width > 0)
+        entropies.push_back(calc_entropy(b.inputs[i], width));
+    const double reference = most_[o] > least_[o] ? most_[o] - least_[o] : 1;
+    b.robustness = calc_robustness(entropies, calc_entropy(make_number(b.outputs[o]), reference));
+  }
+
+ private:
+  void count(PermissibleBox& b) const {
+    b.samples = b.broken = 0;
+    for (std::size_t i = 0; i < margins_.size(); ++i)
+      if (b.box.contains(archive_[static_cast<int>(i)].x)) ++b.samples, b.broken += !(margins_[i] >= 0);
+  }
+
+  /// To what violations leave. Those of its fresh points that stay inside are as independent of the smaller box. False
+  /// if it loses more than half of itself or of them.
+  bool shrink(PermissibleBox& b) const {
+    const Point& core = archive_[b.centre].x;
+    Front front(core);
+    for (std::size_t i = 0; i < margins_.size(); ++i)
+      if (const Point& x = archive_[static_cast<int>(i)].x; !(margins_[i] >= 0) && b.box.contains(x)) front.add(x);
+    const Box box = find_largest_box(b.box, front, options_.edge, 8, options_.seed);
+    const double volume = calc_part(box, support_);
+    std::vector<Point> fresh = b.fresh_points;
+    std::erase_if(fresh, [&box](const Point& x) { return !box.contains(x); });
+    if (volume < std::max(options_.smallest, 0.5 * b.volume) || 2 * fresh.size() < b.fresh_points.size()) return false;
+    b.box = box;
+    b.volume = volume;
+    b.inputs = make_inputs(box, core);
+    b.fresh_points = std::move(fresh);
+    b.fresh = static_cast<int>(b.fresh_points.size());
+    b.violating = bound_violating(b, options_.confidence);
+    if (!b.outputs.empty())
+      b.outputs = read_archive({b.inputs, space_.constraints, {}}, archive_, options_.levels).outputs;
+    return true;
+  }
+
+  const Space& space_;
+  const Archive& archive_;
+  const DesignOptions& options_;
+  const Box support_;
+  std::vector<double> margins_;  // of samples, -infinite where the run failed
+  double low_ = infinite, high_ = -infinite;
+  std::vector<double> least_, most_;  // of each output over all runs
+};
+
+}  // namespace
+
+void review_boxes(const Space& space, std::vector<PermissibleBox>& boxes, const Requirement& requirement,
+                  const Archive& archive, const DesignOptions& options) {
+  const Review review(space, requirement, archive, options);
+  for (PermissibleBox& b : boxes) review.measure(b);
+  // places by robustness and by distance are added; the larger volume decides a tie
+  const auto place = [&boxes](const PermissibleBox& b, double PermissibleBox::*what) {
+    return std::count_if(boxes.begin(), boxes.end(), [&](const auto& o) { return o.kept && o.*what > b.*what; });
+  };
+  std::vector<std::pair<long, std::size_t>> order;
+  for (std::size_t k = 0; k < boxes.size(); ++k)
+    order.emplace_back(place(boxes[k], &PermissibleBox::robustness) + place(boxes[k], &PermissibleBox::distance), k);
+  std::stable_sort(order.begin(), order.end(), [&boxes](const auto& a, const auto& b) {
+    const auto &p = boxes[a.second], &q = boxes[b.second];
+    if (p.kept != q.kept) return p.kept;
+    return a.first != b.first ? a.first < b.first : p.volume > q.volume;
+  });
+  std::vector<PermissibleBox> ordered;
+  for (const auto& [places, k] : order) ordered.push_back(std::move(boxes[k]));
+  boxes = std::move(ordered);
+}
 
 DesignResult find_permissible_boxes(const Space& space, Asker& asker, const Requirement& requirement,
                                     const DesignOptions& options) {

@@ -42,6 +42,7 @@ struct PermissibleBox {
   int samples = 0;                  // runs inside
   int broken = 0;                   // of them violate, 0 where it is kept; -1: not known
   int fresh = 0;                    // independent random points that passed, last time
+  std::vector<Point> fresh_points;  // those
   int tries = 0;                    // how often so many were tried, violations before the last included
   double violating = 1;   // with the confidence, at most this part of the box violates: 1 - (β/tries)^(1/fresh)
   double distance = 0;    // least requirement inside over its range in all runs; 0 without a range
@@ -59,6 +60,11 @@ struct DesignResult {
   std::vector<int> permissible_samples, forbidden_samples;  // that were grouped, as samples of the archive
   Ending ending = Ending::Complete;
 };
+
+/// Counts and measures boxes anew by all runs of an archive, and ranks them. A box that has passed at its fresh points
+/// but in which another run violates shrinks to what that leaves; it is not kept if that is less than half of it.
+///   options  edge, smallest, confidence, ranking_output, levels, seed
+void review_boxes(const Space&, std::vector<PermissibleBox>&, const Requirement&, const Archive&, const DesignOptions&);
 
 /// Uses and fills the asker's archive. Throws InputError E804 (space), E809 (options out of range).
 DesignResult find_permissible_boxes(const Space&, Asker&, const Requirement&, const DesignOptions&);
