@@ -1,10 +1,10 @@
 import { effect } from "@preact/signals";
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import uPlot from "uplot";
 import type { Run, Series } from "./data";
 import type { State } from "./state";
 import { say } from "./translate";
-import { formatNumber, formatTime, formatValue, toReadable } from "./units";
+import { dropRoundOff, findLargest, formatNumber, formatTime, formatValue, toReadable } from "./units";
 import { dashOfSeries, groupOrder, groupWord, seriesColours } from "./vocabulary";
 
 interface Group {
@@ -188,7 +188,9 @@ export function niceRange(low: number | null, high: number | null): [number, num
 
 function PlotLegend(props: { state: State; group: Group; values: (number | null)[][] }) {
   const { state, group, values } = props;
-  const frame = Math.min(state.frame.value, (values[0]?.length ?? 0) - 1); // frames may have come since
+  const frames = values[0]?.length ?? 0;
+  const frame = Math.min(state.frame.value, frames - 1); // frames may have come since
+  const largest = useMemo(() => findLargest(values), [values, frames]);
   return (
     <ul class="plot-legend">
       {group.series.map((s, i) => (
@@ -200,7 +202,7 @@ function PlotLegend(props: { state: State; group: Group; values: (number | null)
               stroke-dasharray={dashOfSeries(i).join(" ")}
             />
           </svg>
-          {s.title} <span class="number now">{formatValue(values[i]?.[frame], group.unit)}</span>
+          {s.title} <span class="number now">{formatValue(dropRoundOff(values[i]?.[frame], largest), group.unit)}</span>
         </li>
       ))}
     </ul>

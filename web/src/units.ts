@@ -39,6 +39,18 @@ export function formatNumber(value: number | null | undefined, digits = 4): stri
   return value.toFixed(decimals).replace("-", "−");
 }
 
+/// The largest size of all numbers.
+export function findLargest(values: (number | null)[][]): number {
+  let largest = 0;
+  for (const list of values) for (const x of list) if (x !== null && Math.abs(x) > largest) largest = Math.abs(x);
+  return largest;
+}
+
+/// 0 for what a sum of numbers of this size leaves when it cancels.
+export function dropRoundOff(value: number | null | undefined, size: number): number | null | undefined {
+  return typeof value === "number" && Math.abs(value) < 1e-12 * size ? 0 : value;
+}
+
 /// A readable number with its unit.
 export function formatValue(value: number | null | undefined, unit: string): string {
   const number = unit === "" && Number.isInteger(value) ? String(value).replace("-", "−") : formatNumber(value);

@@ -6,7 +6,7 @@ import { load } from "./load.mjs";
 import { makeSynthetic } from "./synthetic.mjs";
 
 const { decodeFloats, findFrame, slerp, readRun, calcPose } = await load("data.ts");
-const { formatNumber, formatValue, toReadable, formatDuration, formatDate, formatMass, prettify } = await load("units.ts");
+const { dropRoundOff, findLargest, formatNumber, formatValue, toReadable, formatDuration, formatDate, formatMass, prettify } = await load("units.ts");
 const { findCoherent } = await load("plots.tsx");
 const { listConditions } = await load("handover.tsx");
 const { chooseMoments } = await load("stills.tsx");
@@ -72,6 +72,13 @@ describe("units", () => {
   it("keeps four digits from small to large", () => {
     assert.deepEqual([0, 0.00123456, 12.3456, 98765.4, 1.23456e9, null, NaN].map((v) => formatNumber(v)),
       ["0", "0.001235", "12.35", "98765", "1.235 × 10⁹", "–", "–"]);
+  });
+
+  it("shows no round-off of what cancels", () => {
+    const largest = findLargest([[200, null, -3], [], [-1.8e-16, 1e-9]]);
+    assert.equal(largest, 200);
+    assert.deepEqual([-1.8e-16, 1e-9, -3, null, undefined].map((v) => dropRoundOff(v, largest)), [0, 1e-9, -3, null, undefined]);
+    assert.equal(dropRoundOff(1e-30, 0), 1e-30);
   });
 
   it("writes durations, dates and masses", () => {
