@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
@@ -180,6 +181,27 @@ Files write_files(const record::Record& r, const Arguments& a, bool& failed_repo
   return files;
 }
 
+void print_leftovers(std::FILE* out, const Arguments& a, const Files& files) {
+  std::vector<fs::path> there;
+  for (const char* name : {"model.json", "series.csv", "events.csv", "bodies.csv", "findings.csv", "report.html"})
+    there.push_back(fs::path(a.output) / name);
+  std::error_code none;
+  std::vector<fs::path> outputs;
+  for (const auto& entry : fs::directory_iterator(fs::path(a.output) / "outputs", none))
+    if (entry.path().extension() == ".csv") outputs.push_back(entry.path());
+  std::sort(outputs.begin(), outputs.end());
+  there.insert(there.end(), outputs.begin(), outputs.end());
+  std::string words;
+  for (const fs::path& path : there) {
+    const auto is_same = [&path](const auto& file) { return fs::path(file.second) == path; };
+    if (!fs::exists(path, none) || fs::equivalent(path, a.input, none) ||
+        std::any_of(files.begin(), files.end(), is_same))
+      continue;
+    words += (words.empty() ? "" : ", ") + path.string();
+  }
+  if (!words.empty()) std::fprintf(out, "Left from before, not of this run: %s\n", words.c_str());
+}
+
 namespace {
 
 /// A finding that makes the exit code 3.
@@ -238,6 +260,7 @@ int close_run(const record::Record& r, const Arguments& a, std::FILE* out, Files
   for (auto& f : write_files(r, a, failed_report)) files.push_back(std::move(f));
   const int code = exit_code_of(r, failed_report);
   for (const auto& [what, path] : files) std::fprintf(out, "Wrote %s\n", path.c_str());
+  print_leftovers(out, a, files);
   if (a.json) std::printf("%s\n", dump(summary_json(r, files, code)).c_str());
   return code;
 }

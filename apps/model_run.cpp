@@ -131,12 +131,15 @@ int run_model_file(const Arguments& a, const std::atomic<bool>& cancel) {
     const int code = exit_code_of(r, failed_report);
     for (const auto& [what, path] : files) std::fprintf(out, "Wrote %s\n", path.c_str());
     json outputs = json::array();
+    Files all = files;
     for (const record::Output& o : r.outputs) {
       const std::string path = (fs::path(a.output) / "outputs" / (o.name + ".csv")).string();
       std::fprintf(out, "Wrote %s\n", path.c_str());
+      all.emplace_back("output", path);
       outputs.push_back(
           {{"name", o.name}, {"quantity", o.quantity}, {"unit", o.unit}, {"samples", o.time.size()}, {"file", path}});
     }
+    print_leftovers(out, a, all);
     if (a.json) {
       json j = summary_json(r, files, code);
       j["steps"] = summary.steps;

@@ -48,6 +48,9 @@ std::optional<std::string> find_bundle(const std::string& name);
 /// Files of a finished record. `failed_report` is set when a report was asked for and could not be made.
 Files write_files(const record::Record&, const Arguments&, bool& failed_report);
 
+/// Names files of an earlier run that are still in the folder.
+void print_leftovers(std::FILE* out, const Arguments&, const Files& of_this_run);
+
 /// Says what a finished run found, writes its files, and gives the exit code. `files` are there already.
 int close_run(const record::Record&, const Arguments&, std::FILE* out, Files files);
 

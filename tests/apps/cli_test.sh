@@ -215,6 +215,9 @@ run)
   mkdir -p taken/record.h5; expect 1 "$topple" run "$plan" -o taken; has err "taken/record.h5 is a folder"; lacks out "rigid bodies"
   (ulimit -f 4; expect 1 "$topple" run "$plan" -o full --no-report; exit $failures) || failures=$((failures + 1))
   has err "cannot write full/model.json: File too large"; [ -z "$(ls full)" ] || { echo "half a file is left"; failures=$((failures + 1)); }
+  expect 0 "$topple" run "$plan" -o a/b --no-report
+  has out "Left from before, not of this run: a/b/series.csv, a/b/events.csv, a/b/bodies.csv, a/b/findings.csv"
+  expect 0 "$topple" run "$plan" -o a/b --csv --no-report; lacks out "Left from before"
   # the same plan and seed give the same bytes of poses
   expect 0 "$topple" run "$plan" -o d --csv --no-report --threads 2
   cmp a/b/series.csv d/series.csv || failures=$((failures + 1))
@@ -249,6 +252,9 @@ mbs)
   [ "$(wc -l <d/outputs/lower_position.csv)" -eq 202 ] || { echo "not 201 samples"; failures=$((failures + 1)); }
   [ "$(wc -l <d/outputs/top_reaction.csv)" -eq 402 ] || { echo "not 401 samples"; failures=$((failures + 1)); }
   [ -z "$(find d -name '*.part')" ] || { echo "half files"; failures=$((failures + 1)); }
+  echo old >d/outputs/another.csv; cp "$pendulum" d/model.json
+  expect 0 "$topple" mbs run d/model.json -o d --no-report --duration 0.1
+  has out "Left from before, not of this run: d/outputs/another.csv"; lacks out "run: d/model.json"
   expect 0 "$topple" mbs run "$pendulum" -o d --no-report --json --duration 0.1
   is_json out; has out '"joint_drift"'; has out '"samples": 11'; has out '"file": "d/outputs/lower_position.csv"'
   # options go before the file
