@@ -34,6 +34,7 @@ class Course {
   bool is_at_rest();
   /// The end has been reached: its frame, and whether the balance of energy can be believed at all. Returns false.
   bool end();
+  double calc_weight() const;  // of all that moves [N]
   double calc_energy_error() const;
   /// Looks at a frame for whether nothing happens any more.
   void watch(const View&);

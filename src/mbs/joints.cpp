@@ -251,10 +251,12 @@ void System::read_cluster(JointCluster& c, double tolerance) {
         *this, c, c.geometry, [](size_t) { return 1.0; }, [&](size_t) -> const Mat3& { return turn; });
   };
   const bool is_examined = state.joint[static_cast<size_t>(c.joints[0])].is_examined;
+  c.is_plain = false;
   if (is_examined) read_repeating(*this, c);
   if ((!is_examined || c.repeating.empty()) && tolerance <= kDependent) {
     by_mass();
-    if (c.matrix.factorise(kSuspicious)) {
+    c.is_plain = c.matrix.factorise(kSuspicious);
+    if (c.is_plain) {
       c.dependent = 0;
       if (!is_examined) write_repeating(*this, c);
       return;
@@ -414,6 +416,27 @@ bool System::close_cluster(JointCluster& c, double h, bool from_before) {
   return false;
 }
 
+/// Closes what a direction that was left out has opened, along rows of the end of the step: bars that are stretched
+/// straight hold to second order only. False if that is not enough.
+bool System::pull_together(JointCluster& c, double h) {
+  constexpr int most_rounds = 40;
+  const size_t n = static_cast<size_t>(c.matrix.rows());
+  for (int round = 0; round < most_rounds; ++round) {
+    read_cluster(c, kDependent);
+    for (size_t r = 0; r < n; ++r) joint_rhs[r] = -joint_gaps[r] / h;
+    if (c.dependent > 0) c.matrix.project(joint_rhs.data());
+    double left = 0;
+    for (size_t r = 0; r < n; ++r) left = std::max(left, std::abs(joint_rhs[r]));
+    if (left * h < c.tolerance) return true;
+    if (!std::isfinite(left)) return false;
+    c.matrix.solve(joint_rhs.data());
+    for (size_t r = 0; r < n; ++r) joint_impulse[r] += joint_rhs[r];
+    apply_impulses(c, joint_rhs);
+    c.open = find_gaps(c, h);
+  }
+  return false;
+}
+
 void System::solve_cluster(JointCluster& c, double h) {
   State& s = state;
   double turn = 0;  // largest in a step
@@ -442,6 +465,11 @@ void System::solve_cluster(JointCluster& c, double h) {
     closed = close_cluster(c, h, false);
   }
   if (!regular) note_dependence(c, usual);
+  // a branch of a mechanism that goes on has gaps of a higher order than its way
+  constexpr double share_of_way = 0.01;
+  const bool is_pulled =
+      !closed || (c.dependent > 0 && c.open > std::max(10 * c.tolerance, share_of_way * turn * turn * c.length));
+  if (is_pulled) closed = pull_together(c, h);
   if (!closed) note_open(c);
   s.largest_drift = std::max(s.largest_drift, c.open);
   stop_if_lost(c);
@@ -463,7 +491,8 @@ void System::solve_cluster(JointCluster& c, double h) {
       if (r >= j.lines) js.moment += f * joint_rows[row].turn_child;
       turn_child += f * joint_rows[row].turn_child;
       turn_parent += f * joint_rows[row].turn_parent;
-      js.curvature[r] = regular ? (joint_impulse[row] - joint_linear[row]) * (r < j.lines ? 1 : c.length) : 0;
+      js.curvature[r] =
+          regular && !is_pulled ? (joint_impulse[row] - joint_linear[row]) * (r < j.lines ? 1 : c.length) : 0;
     }
     if (moving(j.child)) {
       joint_force[static_cast<size_t>(j.child)] += js.force;

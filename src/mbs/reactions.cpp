@@ -23,6 +23,13 @@ void System::calc_reactions() {
   for (JointCluster& c : clusters) {
     read_cluster(c, kDependent);
     note_dependence(c, c.dependent);
+    if (!c.is_plain) {
+      // next to a singular position the reaction of an instant says nothing of those within a step
+      constexpr double near = 1e-8;  // pivot over diagonal, geometry alone
+      const int usual = c.dependent;
+      read_cluster(c, near);
+      if (c.dependent == usual) read_cluster(c, kDependent);
+    }
     for (size_t i = 0; i < c.joints.size(); ++i) {
       const size_t joint = static_cast<size_t>(c.joints[i]);
       const CompiledJoint& j = joints[joint];

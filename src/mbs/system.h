@@ -157,6 +157,7 @@ struct JointCluster {
   double length = 1, tolerance = 0;  // [m]
   std::vector<int> repeating;        // rows that repeat others for good
   int dependent = 0;                 // rows that do so now
+  bool is_plain = false;             // no row was near to doing so when it was read last
   bool is_pair = false;              // one joint, moved by the kernel
   double open = 0;                   // widest gap [m, rad]
   BlockCholesky matrix;              // J M⁻¹ Jᵀ
@@ -432,6 +433,7 @@ class System {
   void apply_impulses(const JointCluster&, const std::vector<double>& impulse);
   double find_gaps(const JointCluster&, double h);
   bool close_cluster(JointCluster&, double h, bool from_before);
+  bool pull_together(JointCluster&, double h);
   void solve_cluster(JointCluster&, double h);
   void solve_joints(double h);
   /// Gives joints that share no moving body with others to the kernel, and takes what it made of them.

@@ -248,5 +248,30 @@ TEST(SingularPosition, SliderCrankOfEqualRodsGoesOnAlongItsBranch) {
   }
 }
 
+TEST(SingularPosition, BarsStretchedStraightStand) {
+  // between two fixed hinges: rigid, though to second order only; nothing of the first order holds their weight
+  for (const int n : {2, 3, 6})
+    for (const Joint::Kind kind : {Joint::Kind::Revolute, Joint::Kind::Spherical})
+      for (const double h : {1e-3, 1e-4}) {
+        Model m = empty_model();
+        for (int i = 0; i < n; ++i)
+          add_body(m, test::make_rod("bar " + std::to_string(i), 1, {1.0 * i, 0, 0}, {1.0 * i + 1, 0, 0}));
+        for (int i = 0; i <= n; ++i) {
+          const BodyId parent = i == 0 ? kGround : BodyId{i - 1}, child = i == n ? kGround : BodyId{i};
+          test::join(m, kind, parent, child, {1.0 * i, 0, 0}, test::along({0, 1, 0}));
+        }
+        double lowest = 0;
+        Options o = options_of(0.3, h);
+        o.on_frame = [&](const View& v) {
+          for (const Pose& X : v.X_WB) lowest = std::max(lowest, std::abs(X.p.z));
+        };
+        const Summary s = run(m, o);
+        EXPECT_EQ(s.ending, Summary::Ending::TimeLimit) << n << " bars: " << s.message;
+        EXPECT_LT(lowest, 2e-5) << n << " bars in steps of " << h;
+        EXPECT_LT(s.joint_drift, 1e-6) << n << " bars in steps of " << h;
+        EXPECT_GE(s.notes.size(), 1U);
+      }
+}
+
 }  // namespace
 }  // namespace topple::mbs
