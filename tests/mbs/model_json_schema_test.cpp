@@ -126,6 +126,33 @@ TEST(ModelSchema, EveryDefinitionIsUsedAndEveryNumberHasAUnitOrBounds) {
   }
 }
 
+TEST(ModelSchema, AllowsOfJointsWhatTheReaderAllows) {
+  const std::vector<std::pair<std::string, Json>> keys = {{"at", {1, 0, 0}},
+                                                          {"axis", {0, 1, 0}},
+                                                          {"axes", {{1, 0, 0}, {0, 1, 0}}},
+                                                          {"x", {1, 0, 0}},
+                                                          {"points", {{0, 0, 0}, {1, 0, 0}}},
+                                                          {"X_PF", Json::object()},
+                                                          {"X_CM", {{"p", {1, 0, 0}}}},
+                                                          {"tension_limit", 1}};
+  int allowed = 0;
+  for (const std::string kind : {"fixed", "revolute", "spherical", "universal", "prismatic", "cylindrical", "distance"})
+    for (unsigned some = 0; some < 1U << keys.size(); ++some) {
+      Json joint = {{"kind", kind}, {"parent", "ground"}, {"child", "a"}};
+      for (size_t k = 0; k < keys.size(); ++k)
+        if (some >> k & 1) joint[keys[k].first] = keys[k].second;
+      Json file = Json::parse(R"({"format": "topple-mbs", "version": 2, "bodies": [
+          {"name": "a", "mass": 1, "inertia": [1, 1, 1], "X_WB": {}}]})");
+      file["joints"] = Json::array({joint});
+      const std::string fault = schema().fault(file);
+      const Outcome o = try_text(file.dump(1));
+      EXPECT_EQ(fault.empty(), o.accepted)
+          << joint << ": schema " << fault << "; reader " << (o.accepted ? "" : o.complaints.front().message);
+      allowed += o.accepted;
+    }
+  EXPECT_GT(allowed, 20);
+}
+
 // -------------------------------------------------------------------------------------------------------------- damage
 
 TEST(ModelJsonDamage, AValueTakenAway) {
