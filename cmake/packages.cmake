@@ -19,7 +19,8 @@ find_path(CHOLMOD_INCLUDE cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
 find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
 add_library(SuiteSparse::cholmod UNKNOWN IMPORTED)
 set_target_properties(SuiteSparse::cholmod PROPERTIES IMPORTED_LOCATION ${CHOLMOD_LIBRARY}
-                                                      INTERFACE_INCLUDE_DIRECTORIES ${CHOLMOD_INCLUDE})
+                                                      INTERFACE_INCLUDE_DIRECTORIES ${CHOLMOD_INCLUDE}
+                                                      INTERFACE_LINK_LIBRARIES gomp)  # it is built with OpenMP
 # Other engines behind the adapter; topple runs without them (docs/engines.md).
 find_package(Simbody QUIET)
 find_package(mujoco QUIET)
