@@ -279,7 +279,7 @@ int write_template(const Arguments& a) {
     }
     replace_file(a.input, chosen.text);
   } catch (const InputError& e) { return refuse(e, {}, {}, false); }
-  std::printf("Wrote %s. Next: topple check %s\n", a.input.c_str(), a.input.c_str());
+  std::printf("Wrote %s. Next: topple check %s\n", a.input.c_str(), quote_word(a.input).c_str());
   return kOk;
 }
 
@@ -299,7 +299,7 @@ int check_plan(const Arguments& a) {
       std::printf("%s\n", dump(out).c_str());
     } else {
       std::printf("%s: no errors, %s. Next: topple run %s -o out\n", a.input.c_str(),
-                  count_words(static_cast<int>(warnings.size()), "warning").c_str(), a.input.c_str());
+                  count_words(static_cast<int>(warnings.size()), "warning").c_str(), quote_word(a.input).c_str());
     }
     return kOk;
   } catch (const InputError& e) { return refuse(e, warnings, text, a.json); }

@@ -31,14 +31,14 @@ farfield::FeOptions make_fe_options(const Arguments& a) {
 
 /// Those that a run has to have again to go on.
 std::string write_options(const Arguments& a) {
-  const auto quoted = [](const char* option, const std::string& value) {
-    return value.empty() ? "" : fmt::format(" {} \"{}\"", option, value);
+  const auto option = [](const char* name, const std::string& value) {
+    return value.empty() ? "" : fmt::format(" {} {}", name, quote_word(value));
   };
-  std::string out = quoted("--size", a.fe.size);
+  std::string out = option("--size", a.fe.size);
   if (a.fe.across != FeArguments{}.across) out += fmt::format(" --across {}", a.fe.across);
-  out += quoted("--scaled-step", a.fe.scaled_step);
+  out += option("--scaled-step", a.fe.scaled_step);
   if (a.fe.skip_quiet) out += " --skip-quiet";
-  return out + quoted("--knowledge", a.knowledge) + quoted("--until", a.duration);
+  return out + option("--knowledge", a.knowledge) + option("--until", a.duration);
 }
 
 void print_mesh(std::FILE* out, const farfield::MeshReport& report) {
@@ -112,8 +112,8 @@ int run_finite_elements(const Arguments& a, const std::atomic<bool>& cancel) {
       std::fprintf(out, "Elements and nodes took %.1f s, contact and debris %.1f s: %.2f of that.\n", elements, contact,
                    contact / elements);
     if (r.ending == "cancelled" && !fe.checkpoint.empty())
-      std::fprintf(out, "Go on with: topple fe %s%s -o %s --resume\n", a.input.c_str(), write_options(a).c_str(),
-                   a.output.c_str());
+      std::fprintf(out, "Go on with: topple fe %s%s -o %s --resume\n", quote_word(a.input).c_str(),
+                   write_options(a).c_str(), quote_word(a.output).c_str());
     return code;
   } catch (const InputError& e) { return refuse(e, warnings, text, a.json); }
 }

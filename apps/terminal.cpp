@@ -5,7 +5,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cstdlib>
+#include <string_view>
 
 #include "base/unit.h"
 
@@ -37,6 +39,19 @@ std::string wrap(const std::string& text, int width, int indent) {
     i = end + 1;
   }
   return out;
+}
+
+std::string quote_word(const std::string& word) {
+  const auto is_plain = [](char c) {
+    constexpr std::string_view signs = "_-./,:=@%+";
+    const auto u = static_cast<unsigned char>(c);
+    return u >= 128 || std::isalnum(u) != 0 || signs.find(c) != std::string_view::npos;
+  };
+  if (!word.empty() && std::all_of(word.begin(), word.end(), is_plain)) return word;
+  if (word.find_first_of("\"$`\\!") == std::string::npos) return '"' + word + '"';
+  std::string out = "'";
+  for (const char c : word) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return out + "'";
 }
 
 int find_width(std::FILE* f) {

@@ -20,6 +20,9 @@ int find_width(std::FILE*);
 /// spaces; the first is printed after as many.
 std::string wrap(const std::string& text, int width, int indent);
 
+/// A word as a shell takes it: in quotation marks where it needs them.
+std::string quote_word(const std::string&);
+
 /// Progress of simulated time on standard error: one line that renews itself on a terminal, a line now and then
 /// otherwise.
 class ProgressLine {

@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdio>
+
+#include "terminal.h"
+
 namespace topple::apps {
 namespace {
 
@@ -48,6 +52,21 @@ TEST(StudyText, WritesWholePercentagesAndOutcomesWithoutAName) {
   EXPECT_NE(said.find("box 1, 100 % of the support"), std::string::npos) << said;
   EXPECT_NE(said.find("box 2, 1.2 % of the support"), std::string::npos) << said;
   EXPECT_NE(said.find("outcome (no name): a 0.90"), std::string::npos) << said;
+}
+
+TEST(Terminal, QuotesWordsAsAShellTakesThem) {
+  EXPECT_EQ(quote_word("out/plan.toml"), "out/plan.toml");
+  EXPECT_EQ(quote_word("büro"), "büro");
+  EXPECT_EQ(quote_word("0.4 m"), "\"0.4 m\"");
+  for (const char* word :
+       {"a", "", "a b", "it's", "$HOME", "a\"b", "`ls`", "a\\b", "!1", "x;y", "(z)", "~", "*", "a'b\"c"}) {
+    std::FILE* shell = popen(("printf %s " + quote_word(word)).c_str(), "r");
+    ASSERT_NE(shell, nullptr);
+    char said[64] = {};
+    const size_t count = std::fread(said, 1, sizeof said - 1, shell);
+    EXPECT_EQ(pclose(shell), 0) << word;
+    EXPECT_EQ(std::string(said, count), word);
+  }
 }
 
 }  // namespace
