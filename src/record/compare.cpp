@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/rotation_fit.h"
 #include "base/unit.h"
 
 namespace topple::record {
@@ -17,6 +18,7 @@ namespace {
 
 using json = nlohmann::ordered_json;
 
+constexpr const char* kLean = "lean_compared";
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 /// Where an instant lies between two frames.
@@ -64,6 +66,14 @@ double value_of(const Record& r, const std::string& id) {
   for (const Finding& f : r.findings)
     if (f.id == id) return f.value;
   return kNone;
+}
+
+/// Angle from the vertical of what turned as bodies have moved since the first frame, by least squares [rad].
+double calc_lean(const Record& r, const Place& place, const std::vector<size_t>& bodies) {
+  std::vector<FitPoint> points;
+  for (const size_t b : bodies) points.push_back({r.bodies[b].mass, position_at(r, {}, b), position_at(r, place, b)});
+  const Vec3 up = to_matrix(fit_points(points).rotation) * Vec3{0, 0, 1};
+  return std::atan2(std::hypot(up.x, up.y), up.z);
 }
 
 const SeriesPair* find_series(const Comparison& c, const std::string& id) {
@@ -148,6 +158,16 @@ Comparison compare(const Record& a, const Record& b) {
     c.centre.push_back(norm(calc_centre(a, in_a[i]) - calc_centre(b, in_b[i])));
   }
 
+  constexpr size_t enough = 3;  // fewer lie on a line
+  if (matched.size() >= enough) {
+    std::vector<size_t> of_a, of_b;
+    for (const auto& [in_first, in_second] : matched) of_a.push_back(in_first), of_b.push_back(in_second);
+    SeriesPair lean{kLean, "Lean of all bodies compared", "rad", "angle", {}, {}};
+    for (size_t i = 0; i < c.time.size(); ++i)
+      lean.a.push_back(calc_lean(a, in_a[i], of_a)), lean.b.push_back(calc_lean(b, in_b[i], of_b));
+    c.series.push_back(std::move(lean));
+  }
+
   std::map<std::string, TouchdownPair> touched;
   for (const auto& [record, is_first] : {std::pair{&a, true}, std::pair{&b, false}})
     for (const Event& e : record->events) {
@@ -178,7 +198,7 @@ Comparison compare(const Record& a, const Record& b) {
 }
 
 std::vector<std::string> summarise(const Comparison& c) {
-  return {
+  std::vector<std::string> out = {
       fmt::format("First touchdown of the upper block: A {}, B {}{}.", seconds(c.touchdown_a), seconds(c.touchdown_b),
                   std::isfinite(c.touchdown_a) && std::isfinite(c.touchdown_b)
                       ? fmt::format(", difference {:+.3f} s", c.touchdown_b - c.touchdown_a)
@@ -189,6 +209,11 @@ std::vector<std::string> summarise(const Comparison& c) {
                       ? fmt::format(", {:.0f} % of the larger tilt at the end of this time", 100 * c.tilt_share)
                       : std::string()),
       fmt::format("Mass centres up to then: at most {:.2f} m apart.", c.centre_difference)};
+  // the tilt of a record is that of what hangs together there
+  if (const SeriesPair* lean = find_series(c, kLean))
+    out.push_back(fmt::format("At {:.2f} s all bodies compared lean by {:.2f} deg in A, {:.2f} deg in B.",
+                              c.time.back(), lean->a.back() / unit::deg, lean->b.back() / unit::deg));
+  return out;
 }
 
 std::string describe(const Comparison& c, const Record& a, const Record& b) {

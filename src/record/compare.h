@@ -23,6 +23,7 @@ struct TouchdownPair {
 struct Comparison {
   std::string name_a, name_b;  // what moved the building: "native", "finite elements"
   std::vector<double> time;    // frames of A within the time that both have [s]       (T)
+  // with three bodies in common also "lean_compared", the angle from the vertical of all of them by least squares
   std::vector<SeriesPair> series;
   std::string points;                     // a sentence: what was compared by position
   int matched = 0;                        // bodies of the same name in both
@@ -43,7 +44,7 @@ struct Comparison {
 /// Throws InputError E680: records without a frame in common time.
 Comparison compare(const Record& a, const Record& b);
 
-/// How they differ, in a sentence each: touchdown, tilt, mass centres.
+/// How they differ, in a sentence each: touchdown, tilt, mass centres, lean at the end.
 std::vector<std::string> summarise(const Comparison&);
 /// Lines for people: the summary, touchdowns, tilt at instants, energies.
 std::string describe(const Comparison&, const Record& a, const Record& b);

@@ -95,6 +95,33 @@ TEST(Compare, JudgesTheTiltUpToTheEarlierTouchdown) {
   EXPECT_THAT(describe(c, a, b), HasSubstr("A 1.50 s, B 1.75 s, difference +0.250 s"));
 }
 
+TEST(Compare, FindsTheLeanOfAllBodiesOfBoth) {
+  // four bodies in a tetrahedron; those of A turn about y by 0.2 rad a second, those of B about x by half of it; all
+  // fall
+  Record a = make_run("a", 0.25, 5, 0, 0, 1), b = make_run("b", 0.25, 5, 0, 0, 1);
+  const Vec3 corner[] = {{0, 0, 0}, {2, 0, 0}, {0, 3, 0}, {0, 0, 4}};
+  for (Record* r : {&a, &b}) {
+    r->bodies.resize(4, r->bodies[0]);
+    r->position.clear(), r->orientation.clear();
+    for (int i = 0; i < 4; ++i) r->bodies[static_cast<size_t>(i)].name = "body " + std::to_string(i);
+    for (const double t : r->time)
+      for (const Vec3& p : corner) {
+        const Mat3 R = to_matrix(exp_rotation(r == &a ? Vec3{0, 0.2 * t, 0} : Vec3{0.1 * t, 0, 0}));
+        const Vec3 x = R * p + Vec3{0, 0, -t};
+        for (const double v : {x.x, x.y, x.z}) r->position.push_back(static_cast<float>(v));
+        for (const double q : {1.0, 0.0, 0.0, 0.0}) r->orientation.push_back(static_cast<float>(q));
+      }
+  }
+  const Comparison c = compare(a, b);
+  const SeriesPair& lean = c.series.back();
+  EXPECT_EQ(lean.id, "lean_compared");
+  for (size_t i = 0; i < c.time.size(); ++i) {
+    EXPECT_NEAR(lean.a[i], 0.2 * c.time[i], 4 * kSingle);
+    EXPECT_NEAR(lean.b[i], 0.1 * c.time[i], 4 * kSingle);
+  }
+  EXPECT_THAT(describe(c, a, b), HasSubstr("At 1.00 s all bodies compared lean by 11.46 deg in A, 5.73 deg in B."));
+}
+
 TEST(Compare, PairsTouchdownsByBody) {
   Record a = make_run("a", 0.25, 9, 1, 0, 1), b = make_run("b", 0.25, 9, 1, 0, 1);
   a.events = {{1.0, "touchdown", "S-A1B2-0", ""}, {1.2, "touchdown", "S-A1B2-0", ""}};

@@ -166,7 +166,7 @@ function Touchdowns(props: { state: State; comparison: Comparison }) {
                 <td>{t.body}</td>
                 <td>{t.a?.toFixed(2) ?? "never"}</td>
                 <td>{t.b?.toFixed(2) ?? "never"}</td>
-                <td>{t.a === null || t.b === null ? "" : (t.b - t.a).toFixed(2)}</td>
+                <td>{t.a === null || t.b === null ? "" : (t.b - t.a).toFixed(2).replace(/^-(?=0\.00$)/, "")}</td>
               </tr>
             ))}
           </tbody>

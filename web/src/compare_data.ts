@@ -38,7 +38,7 @@ export interface Compared {
   plotted: { run: Run; titles: Record<string, string> };
 }
 
-const asked = ["tilt_angle", "mass_centre_height", "ground_force"];
+const asked = ["tilt_angle", "lean_compared", "mass_centre_height", "ground_force"];
 
 /// Throws an Error with a sentence for people if the text is not the data of a comparison.
 export function readComparison(text: string): Compared {
@@ -64,7 +64,7 @@ export function makePlotted(comparison: Comparison, a: Run): Compared["plotted"]
   }
   const { rms, largest, centre } = comparison.distance;
   titles["distance"] = "How far the same parts are apart";
-  series.splice(6, 0,
+  series.splice(2 * wanted.filter((s) => asked.includes(s.id)).length, 0,
     { id: "rms", title: "root of the mean square by mass", unit: "m", group: "distance", value: rms },
     { id: "largest", title: "largest", unit: "m", group: "distance", value: largest },
     { id: "centre", title: "mass centres", unit: "m", group: "distance", value: centre });

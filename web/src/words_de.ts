@@ -458,6 +458,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["not given", "nicht angegeben"],
   // plotted quantities
   ["Tilt angle", "Kippwinkel"],
+  ["Lean of all bodies compared", "Neigung aller verglichenen Körper"],
   ["Tilt angle of a rigid block", "Kippwinkel eines starren Blocks"],
   ["Ground force", "Bodenkraft"],
   ["Height of the mass centre", "Höhe des Schwerpunkts"],
@@ -943,5 +944,6 @@ export const german: readonly (readonly [string, string])[] = [
   ["First touchdown of the upper block: A {w}, B {w}, difference {w}.", "Erstes Aufsetzen des oberen Blocks: A {}, B {}, Unterschied {}."],
   ["Tilt up to {:.2f} s: largest difference {:.2f} deg at {:.2f} s.", "Neigung bis {} s: größter Unterschied {} deg bei {} s."],
   ["Tilt up to {:.2f} s: largest difference {:.2f} deg at {:.2f} s, {:.0f} % of the larger tilt at the end of this time.", "Neigung bis {} s: größter Unterschied {} deg bei {} s, {} % der größeren Neigung am Ende dieser Zeit."],
+  ["At {:.2f} s all bodies compared lean by {:.2f} deg in A, {:.2f} deg in B.", "Bei {} s neigen sich alle verglichenen Körper in A um {} deg, in B um {} deg."],
   ["Mass centres up to then: at most {:.2f} m apart.", "Schwerpunkte bis dahin: höchstens {} m auseinander."],
 ];
