@@ -1,9 +1,11 @@
 #include "fem/sparse.h"
 
 #include <cholmod.h>
+#include <dlfcn.h>
 
 #include <algorithm>
 #include <cstring>
+#include <mutex>
 #include <string>
 
 #include "base/error.h"
@@ -16,6 +18,11 @@ int omp_get_max_active_levels(void);
 namespace topple::fem {
 
 namespace {
+
+/// Keeps the BLAS below CHOLMOD on the thread that calls, where it is OpenBLAS with threads of its own.
+void take_one_thread_of_blas() {
+  if (void* set = dlsym(RTLD_DEFAULT, "openblas_set_num_threads")) reinterpret_cast<void (*)(int)>(set)(1);
+}
 
 /// Keeps loops of OpenMP on the thread that meets them, as long as it lives. CHOLMOD asks for four threads whatever the
 /// user allows, and they look for work without end: where others want the processors a factorisation takes fifty times
@@ -80,6 +87,8 @@ struct Cholesky::Data {
   mutable cholmod_dense *x = nullptr, *y = nullptr, *e = nullptr;
 
   Data() {
+    static std::once_flag once;
+    std::call_once(once, take_one_thread_of_blas);
     cholmod_start(&common);
     common.print = 0;
     common.error_handler = nullptr;
