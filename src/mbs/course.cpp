@@ -132,12 +132,23 @@ double Course::calc_energy_error() const {
   return mbs::calc_energy_error(s_.state.largest_residual, s_.state.released, brought, calc_weight());
 }
 
+double Course::calc_singular_play() const {
+  if (s_.joint_notes.empty()) return 0;
+  constexpr double lift = 1e-3;  // [m]
+  double force = calc_weight();
+  for (const Load& l : s_.model.loads) {
+    double most = l.factor.empty() ? 1 : 0;
+    for (const double f : l.factor) most = std::max(most, std::abs(f));
+    force += most * norm(l.force);
+  }
+  return lift * force;
+}
+
 bool Course::end() {
   constexpr double near = 1.5;  // steps behind the last frame
   if (s_.summary.ending == Summary::Ending::AtRest || s_.state.time - now_.shown > near * s_.step) show();
   constexpr double most = 1;
-  const double lift = s_.joint_notes.empty() ? 0 : 1e-3;  // of everything: the play of joints in singular positions [m]
-  if (const double error = calc_energy_error(); error > most && s_.state.largest_residual > lift * calc_weight()) {
+  if (const double error = calc_energy_error(); error > most && s_.state.largest_residual > calc_singular_play()) {
     s_.summary.ending = Summary::Ending::Diverged;
     char words[160];
     std::snprintf(words, sizeof words,

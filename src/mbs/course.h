@@ -36,6 +36,8 @@ class Course {
   bool end();
   double calc_weight() const;  // of all that moves [N]
   double calc_energy_error() const;
+  /// What the play of joints in singular positions may make of weight and loads; 0 if there were none [J].
+  double calc_singular_play() const;
   /// Looks at a frame for whether nothing happens any more.
   void watch(const View&);
   /// Goes on to the next event if nothing happens until then.

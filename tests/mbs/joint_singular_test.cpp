@@ -249,10 +249,11 @@ TEST(SingularPosition, SliderCrankOfEqualRodsGoesOnAlongItsBranch) {
 }
 
 TEST(SingularPosition, BarsStretchedStraightStand) {
-  // between two fixed hinges: rigid, though to second order only; nothing of the first order holds their weight
+  // between two fixed hinges: rigid, though to second order only; nothing of the first order holds their weight, or a
+  // load of a thousand times as much
   for (const int n : {2, 3, 6})
     for (const Joint::Kind kind : {Joint::Kind::Revolute, Joint::Kind::Spherical})
-      for (const double h : {1e-3, 1e-4}) {
+      for (const auto& [h, load] : {std::pair{1e-3, 0.0}, {1e-4, 0.0}, {2e-4, 1e4}}) {
         Model m = empty_model();
         for (int i = 0; i < n; ++i)
           add_body(m, test::make_rod("bar " + std::to_string(i), 1, {1.0 * i, 0, 0}, {1.0 * i + 1, 0, 0}));
@@ -260,6 +261,7 @@ TEST(SingularPosition, BarsStretchedStraightStand) {
           const BodyId parent = i == 0 ? kGround : BodyId{i - 1}, child = i == n ? kGround : BodyId{i};
           test::join(m, kind, parent, child, {1.0 * i, 0, 0}, test::along({0, 1, 0}));
         }
+        if (load > 0) m.loads.push_back({"pull", BodyId{n / 2}, {}, {0, 0, -load}, {}, false, {}, {}});
         double lowest = 0;
         Options o = options_of(0.3, h);
         o.on_frame = [&](const View& v) {
