@@ -511,7 +511,7 @@ void say_what_is_not_modelled(record::Record& r) {
       "cracks that close again after bars have yielded, slip and buckling of single bars (concrete and bars are one "
       "material)";
   for (std::string& s : r.not_modelled)
-    if (s.rfind("cracking of slabs", 0) == 0) s = here;
+    if (s.rfind("cracking and crushing of slabs", 0) == 0) s = here;
   std::string list;
   for (const std::string& s : r.not_modelled) list += (list.empty() ? "" : "; ") + s;
   for (record::Finding& f : r.findings)
