@@ -59,6 +59,13 @@ bool System::note_once(const JointCluster& c, int situation) {
   return true;
 }
 
+bool System::was_singular(const JointCluster& c) const {
+  const int first = *std::min_element(c.joints.begin(), c.joints.end());
+  return std::any_of(joint_notes.begin(), joint_notes.end(), [&](const auto& note) {
+    return note.first == first && (note.second == kSingular || note.second > c.dependent);
+  });
+}
+
 void System::note_dependence(const JointCluster& c, int usual) {
   if (c.dependent == 0) return;
   // what was told first is usual

@@ -23,8 +23,8 @@ void System::calc_reactions() {
   for (JointCluster& c : clusters) {
     read_cluster(c, kDependent);
     note_dependence(c, c.dependent);
-    if (!c.is_plain) {
-      // next to a singular position the reaction of an instant says nothing of those within a step
+    if (!c.is_plain && was_singular(c)) {
+      // in the play about a singular position the reaction of an instant says nothing of those within a step
       constexpr double near = 1e-8;  // pivot over diagonal, geometry alone
       const int usual = c.dependent;
       read_cluster(c, near);

@@ -457,6 +457,8 @@ class System {
   void note_speed(const JointCluster&, double speed);
   /// True the first time for a cluster and a situation.
   bool note_once(const JointCluster&, int situation);
+  /// Whether more rows were told to depend on others than do now, or to do so for a while.
+  bool was_singular(const JointCluster&) const;
   void break_element(size_t e, BreakReason reason);
   /// Says once that a zone has yielded.
   ///   zone  elements, then rotational elements

@@ -275,5 +275,31 @@ TEST(SingularPosition, BarsStretchedStraightStand) {
       }
 }
 
+TEST(SingularPosition, BarsThatSagALittlePullAsStaticsSays) {
+  // two bars of length l over a span of 2 m that sag by s pull with m g l / (2 s) along each other; down to a hundred
+  // thousandth the answer is not cut off
+  for (const double sag : {1e-2, 1e-4, 1e-5})
+    for (const double h : {1e-3, 1e-4}) {
+      Model m = empty_model();
+      const Vec3 end[] = {{0, 0, 0}, {1, 0, -sag}, {2, 0, 0}};
+      for (int i = 0; i < 2; ++i) add_body(m, test::make_rod("bar " + std::to_string(i), 1, end[i], end[i + 1]));
+      for (int i = 0; i < 3; ++i)
+        test::join(m, Joint::Kind::Revolute, i == 0 ? kGround : BodyId{i - 1}, i == 2 ? kGround : BodyId{i}, end[i],
+                   test::along({0, 1, 0}));
+      const double pull = 0.5 * 9.81 / sag;
+      double lowest = 1e300, largest = 0;
+      Options o = options_of(0.1, h);
+      o.on_frame = [&](const View& v) {
+        lowest = std::min(lowest, std::abs(v.joint_force[0].x)),
+        largest = std::max(largest, std::abs(v.joint_force[0].x));
+      };
+      const Summary s = run(m, o);
+      EXPECT_EQ(s.ending, Summary::Ending::TimeLimit) << s.message;
+      EXPECT_NEAR(lowest / pull, 1, 1e-5) << "sag " << sag << " in steps of " << h;
+      EXPECT_NEAR(largest / pull, 1, 1e-5) << "sag " << sag << " in steps of " << h;
+      EXPECT_LT(s.energy_error, 1e-3) << "sag " << sag << " in steps of " << h;
+    }
+}
+
 }  // namespace
 }  // namespace topple::mbs
