@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -96,6 +97,7 @@ void run_lanes(const Model& model, const std::vector<Variation>& variations, con
     done();
   };
   std::optional<Lanes> lanes;
+  const std::shared_ptr<StiffnessFactor> factor = make_stiffness_factor();
   for (size_t i = 0; i < samples.size(); ++i) {
     Model varied = model;
     if (variations[first + i]) variations[first + i](varied);
@@ -112,6 +114,7 @@ void run_lanes(const Model& model, const std::vector<Variation>& variations, con
       run.on_happening = [&options, sample = first + i](const Happening& h) { options.on_happening(sample, h); };
     samples[i].system.emplace(varied, run);
     System& s = *samples[i].system;
+    s.stiffness_factor = factor;
     samples[i].course.emplace(s);
     if (!samples[i].course->begin()) {
       end(i);

@@ -11,7 +11,9 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <memory>
 #include <utility>
+#include <vector>
 
 #include "mbs/acceleration.h"
 #include "mbs/contact_kernel.h"
@@ -115,11 +117,8 @@ class PairMatrix {
       }
     }
   }
-  Sparse take() {
-    Sparse taken;
-    taken.swap(matrix_);
-    return taken;
-  }
+  /// Hands the matrix over, which a return value would copy.
+  void move_to(Sparse& other) { other.swap(matrix_); }
   /// Times a vector, in the order in which Sparse sums.
   void times(const Vector& x, Vector& y) const { u_.each == 6 ? times_by<6>(x, y) : times_by<3>(x, y); }
 
@@ -567,6 +566,32 @@ void System::choose_step() {
   summary.highest_frequency = highest_frequency;
 }
 
+/// LDLᵀ of a symmetric matrix. The order of elimination is looked for where the pattern is not that of before.
+class StiffnessFactor {
+ public:
+  /// False: a pivot is zero.
+  bool factorise(const Sparse& K) {
+    const std::vector<int> first(K.outerIndexPtr(), K.outerIndexPtr() + K.outerSize() + 1);
+    const std::vector<int> row(K.innerIndexPtr(), K.innerIndexPtr() + K.nonZeros());
+    if (first != first_ || row != row_) {
+      solver_.analyzePattern(K);
+      first_ = first, row_ = row;
+    }
+    solver_.factorize(K);
+    return solver_.info() == Eigen::Success;
+  }
+  Vector solve(const Vector& b) const { return solver_.solve(b); }
+  Vector diagonal() const { return solver_.vectorD(); }
+  /// Whose pivot stands at a place of the diagonal.
+  Eigen::Index unknown_of(Eigen::Index pivot) const { return solver_.permutationPinv().indices()[pivot]; }
+
+ private:
+  Eigen::SimplicialLDLT<Sparse> solver_;
+  std::vector<int> first_, row_;  // of the matrix by columns
+};
+
+std::shared_ptr<StiffnessFactor> make_stiffness_factor() { return std::make_shared<StiffnessFactor>(); }
+
 namespace {
 
 /// The dead-load equilibrium by Newton's method, joints by multipliers that each iteration corrects.
@@ -578,6 +603,7 @@ class DeadLoad {
         u_(assembly_.unknowns()),
         virgin_(s.state.element),
         virgin_rotational_(s.state.rotational),
+        factor_(s.stiffness_factor ? s.stiffness_factor : make_stiffness_factor()),
         multiplier_(s.joints.size()),
         pushed_back_(Vector::Zero(6 * static_cast<Eigen::Index>(s.joints.size()))) {}
 
@@ -622,9 +648,8 @@ class DeadLoad {
   const std::vector<ZoneState> virgin_, virgin_rotational_;
   double weight_ = 1, penalty_ = 1;
   double share_ = 1;  // of an iteration's way that is gone
-  Eigen::SimplicialLDLT<Sparse> solver_;
-  bool is_analysed_ = false;  // the pattern stays what it is
-  Sparse first_;              // stiffness at the start, once
+  const std::shared_ptr<StiffnessFactor> factor_;
+  Sparse first_;  // stiffness at the start, once
   Assembly::Flexibility cracks_;
   bool has_cracks_ = false;
   std::vector<std::array<double, 6>> multiplier_;
@@ -675,7 +700,7 @@ bool DeadLoad::factorise(std::string& message) {
   if (first_.rows() > 0)
     K.swap(first_);
   else
-    K = assembly_.make_stiffness(false, weight_, true, &cracks_).take();
+    assembly_.make_stiffness(false, weight_, true, &cracks_).move_to(K);
   if (!s_.joints.empty()) {
     Triplets t;
     for (const CompiledJoint& j : s_.joints) {
@@ -688,18 +713,15 @@ bool DeadLoad::factorise(std::string& message) {
     P.setFromTriplets(t.begin(), t.end());
     K += P;
   }
-  if (!is_analysed_) solver_.analyzePattern(K);
-  is_analysed_ = true;
-  solver_.factorize(K);
-  if (solver_.info() != Eigen::Success) {
+  if (!factor_->factorise(K)) {
     message = "the stiffness matrix of the dead-load equilibrium could not be factorised: the model is a mechanism";
     return false;
   }
-  const Vector D = solver_.vectorD();
+  const Vector D = factor_->diagonal();
   Eigen::Index worst = 0;
   const double least = D.minCoeff(&worst);
   if (least > 1e-13 * D.maxCoeff()) return true;
-  const Eigen::Index unknown = solver_.permutationPinv().indices()[worst];
+  const Eigen::Index unknown = factor_->unknown_of(worst);
   message = "body \"" +
             s_.model.bodies[static_cast<size_t>(assembly_.free_bodies()[static_cast<size_t>(unknown / u_.each)])].name +
             "\" can move without resistance: the model is a mechanism and has no dead-load equilibrium";
@@ -792,7 +814,7 @@ void DeadLoad::go_back(const Place& place) {
 
 void DeadLoad::move_accelerated() {
   Vector step(assembly_.count() + pushed_back_.size());
-  step << share_ * solver_.solve(pushed_), pushed_back_;
+  step << share_ * factor_->solve(pushed_), pushed_back_;
   if (acceleration_.accepts(step, pushed_)) {
     begun_ = find_place(), begun_step_ = step, begun_pushed_ = pushed_;
   } else {
@@ -861,7 +883,7 @@ bool DeadLoad::find(std::string& message) {
   // joints as stiff as the stiffest body is held: more would turn round-off of places into larger forces and save no
   // iteration
   {
-    first_ = assembly_.make_stiffness(false, weight_).take();
+    assembly_.make_stiffness(false, weight_).move_to(first_);
     for (Eigen::Index i = 0; i < first_.rows(); ++i) penalty_ = std::max(penalty_, first_.coeff(i, i));
   }
   // places are known to round-off only, and the stiffest spring turns that into a force
@@ -962,7 +984,7 @@ DeadLoad::End DeadLoad::search(double good_enough, std::string& message) {
     if (steps == Steps::Accelerated) {
       move_accelerated();
     } else {
-      move(share_ * solver_.solve(pushed_));
+      move(share_ * factor_->solve(pushed_));
     }
     ++round;
   }

@@ -164,6 +164,9 @@ struct JointCluster {
   BlockCholesky geometry;            // J Jᵀ, where rows may depend on others
 };
 
+class StiffnessFactor;  // of the dead-load equilibrium: its pattern, order of elimination and factor
+std::shared_ptr<StiffnessFactor> make_stiffness_factor();
+
 class System {
  public:
   ///   width       lanes in a block, 0: as many as the machine has
@@ -211,6 +214,10 @@ class System {
 
   bool ignores_limits = false;  // elements stay elastic (equilibrium's first phase)
   bool started = false;         // forces at the start are there
+
+  /// Where the equilibrium keeps its factors; null: a new one. Samples that follow each other on one thread may share
+  /// one, so that the order of elimination is looked for once.
+  std::shared_ptr<StiffnessFactor> stiffness_factor;
 
   // where bodies and elements lie for the kernel; of this run, or shared with the samples of a batch
   std::unique_ptr<Lanes> own_lanes;

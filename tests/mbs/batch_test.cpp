@@ -162,6 +162,42 @@ TEST(Batch, SampleThatEndsEarlyDisturbsNoOther) {
   EXPECT_EQ(last[0], last[2]);
 }
 
+TEST(Batch, EquilibriaOneAfterTheOtherAreThoseOfRunsAlone) {
+  const Model base = test::make_tower();
+  std::vector<Variation> variations;
+  for (int i = 0; i < 5; ++i)
+    variations.push_back([i](Model& m) {
+      m.bodies[2].mass *= 1 + 0.1 * i;
+      if (i == 1) m.gravity.z *= 1000;  // more than it bears
+      if (i == 3)
+        for (ZoneElement& e : m.elements) e.translational_stiffness.x *= 0.5;
+    });
+  Options run_options = make_options();
+  run_options.equilibrium = true;
+  run_options.duration = 0.2;
+  std::vector<std::uint64_t> alone(5), together(5);
+  std::vector<Summary> ends;
+  for (size_t i = 0; i < 5; ++i) {
+    Model m = base;
+    variations[i](m);
+    Options o = run_options;
+    o.on_frame = [&](const View& v) { alone[i] = test::hash_of(v); };
+    ends.push_back(run(m, o));
+  }
+  BatchOptions o;
+  o.run = run_options;
+  o.on_frame = [&](size_t i, const View& v) { together[i] = test::hash_of(v); };
+  const std::vector<Summary> out = run_batch(base, variations, o);
+  EXPECT_EQ(together, alone);
+  for (size_t i = 0; i < 5; ++i) {
+    EXPECT_EQ(out[i].ending, i == 1 ? Summary::Ending::NoEquilibrium : Summary::Ending::TimeLimit) << out[i].message;
+    EXPECT_EQ(out[i].message, ends[i].message);
+    EXPECT_EQ(out[i].equilibrium_residual, ends[i].equilibrium_residual);
+    EXPECT_EQ(out[i].equilibrium_iterations, ends[i].equilibrium_iterations);
+  }
+  EXPECT_NE(alone[0], alone[2]);
+}
+
 TEST(Batch, RefusesAnotherBuild) {
   const Model base = test::make_tower();
   EXPECT_THROW(run_batch(base, {[](Model& m) { m.elements.pop_back(); }}, {}), InputError);
