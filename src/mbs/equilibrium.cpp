@@ -571,11 +571,15 @@ class StiffnessFactor {
  public:
   /// False: a pivot is zero.
   bool factorise(const Sparse& K) {
-    const std::vector<int> first(K.outerIndexPtr(), K.outerIndexPtr() + K.outerSize() + 1);
-    const std::vector<int> row(K.innerIndexPtr(), K.innerIndexPtr() + K.nonZeros());
-    if (first != first_ || row != row_) {
+    const int *first = K.outerIndexPtr(), *row = K.innerIndexPtr();
+    const auto columns = K.outerSize(), values = K.nonZeros();
+    const auto is_same = [](const std::vector<int>& known, const int* begin, Eigen::Index count) {
+      return std::equal(known.begin(), known.end(), begin, begin + count);
+    };
+    if (!is_same(first_, first, columns + 1) || !is_same(row_, row, values)) {
       solver_.analyzePattern(K);
-      first_ = first, row_ = row;
+      first_.assign(first, first + columns + 1);
+      row_.assign(row, row + values);
     }
     solver_.factorize(K);
     return solver_.info() == Eigen::Success;
