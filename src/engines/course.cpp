@@ -4,11 +4,14 @@
 #include <cmath>
 
 #include "engines/articulation.h"
+#include "engines/requirements.h"
 #include "mbs/quantity.h"
 
 namespace topple::engines {
 
 namespace {
+
+constexpr double kShortened = 0.05;  // of a box, before an engine builds its system anew [m]
 
 bool waits_for_joint(const mbs::Event& e) {
   using Kind = mbs::Quantity::Kind;
@@ -52,6 +55,7 @@ Course::Course(const mbs::Model& model, const mbs::Options& options)
       sampler_(options.samplings) {
   const size_t J = model.joints.size();
   for (const mbs::Body& b : model.bodies) body_.push_back({b.mass, {}, b.inertia, b.shapes, 0});
+  for (size_t b = 0; b < model.bodies.size(); ++b) find_crushed_boxes_of(b);
   joint_live_.assign(J, 1);
   angle_.assign(J, 0);
   distance_.assign(J, 0);
@@ -116,6 +120,10 @@ bool Course::start(double step) {
     distance_[j] = norm(f.X_WM.p - f.X_WF.p);
   }
   for (size_t b = 0; b < body_.size(); ++b) gravity_at_start_ += calc_gravity(b);
+  if (!crushed_boxes_.empty() && (can_touch_ground(model_) || can_touch_bodies(model_)))
+    note(
+        "members that are crushed (\"crush_through\") have rigid ends where they meet something; the native engine "
+        "crushes them");
   fire_events();
   must_rebuild_ = false;  // nothing is built yet
   forces_.start(motion_);
@@ -161,6 +169,7 @@ Course::Verdict Course::accept(double time, const Motion& motion, const Work& wo
       for (size_t j = 0; j < model_.joints.size(); ++j)
         in_F.push_back(transpose_times(to_matrix(frames_of(model_.joints[j]).X_WF.q), reactions_.force[j]));
     jumped |= forces_.advance(time, motion_, in_F);
+    shorten_boxes();
   }
   is_started_ = true;
   if (is_sampled) sampler_.take(calc_view(), calc_early());
@@ -348,8 +357,39 @@ void Course::replace_body(size_t b, const mbs::Body& replacement) {
   body_[b].shapes = replacement.shapes;
   for (mbs::Shape& s : body_[b].shapes) s.X_BS.p += body_[b].p_BBcm;
   ++body_[b].replaced;
+  std::erase_if(crushed_boxes_, [&](const mbs::CrushedBox& box) { return box.body == static_cast<int>(b); });
+  find_crushed_boxes_of(b);
   removed_ += before - calc_kinetic(b) - calc_gravity(b);
   must_rebuild_ = true;
+}
+
+void Course::find_crushed_boxes_of(size_t b) {
+  std::vector<double> stations;
+  for (size_t e = 0; e < model_.elements.size(); ++e) {
+    const mbs::ZoneElement& element = model_.elements[e];
+    if (!(element.crush_through > 0)) continue;
+    stations.clear();
+    for (const mbs::Station& s : element.stations) stations.push_back(s.x);
+    for (const bool is_b : {false, true}) {
+      if ((is_b ? element.b : element.a).index != static_cast<int>(b)) continue;
+      const size_t first = crushed_boxes_.size();
+      mbs::find_crushed_boxes(static_cast<int>(e), is_b ? element.X_BM : element.X_AF, is_b, stations, body_[b].shapes,
+                              crushed_boxes_);
+      for (size_t i = first; i < crushed_boxes_.size(); ++i) crushed_boxes_[i].body = static_cast<int>(b);
+    }
+  }
+}
+
+void Course::shorten_boxes() {
+  for (mbs::CrushedBox& box : crushed_boxes_) {
+    const double crushed = forces_.crushed_length(static_cast<size_t>(box.element));
+    if (!(std::min(crushed - box.begin, box.most) > box.taken + kShortened)) continue;
+    BodyNow& body = body_[static_cast<size_t>(box.body)];
+    mbs::Shape& s = body.shapes[static_cast<size_t>(box.shape)];
+    (void)mbs::shorten_box(crushed, box, s.X_BS.p, to_matrix(normalized(s.X_BS.q)), s.half);
+    ++body.replaced;
+    must_rebuild_ = true;
+  }
 }
 
 // --- energy, rest and frames

@@ -9,6 +9,7 @@
 
 #include "engines/forces.h"
 #include "engines/joint_frames.h"
+#include "mbs/crushed_boxes.h"
 #include "mbs/model.h"
 #include "mbs/sampler.h"
 #include "mbs/solver.h"
@@ -93,6 +94,9 @@ class Course {
   bool fire_events();
   void act(const mbs::Event&, const mbs::Action&);
   void replace_body(size_t, const mbs::Body&);
+  /// Boxes of a body that its elements shorten as they are crushed, and how short they are now.
+  void find_crushed_boxes_of(size_t body);
+  void shorten_boxes();
   void loosen(size_t joint);
   void release(size_t joint, const char* reason);
   bool check_joints();
@@ -119,6 +123,7 @@ class Course {
   Work work_;
   Touch touch_;
   std::vector<BodyNow> body_;
+  std::vector<mbs::CrushedBox> crushed_boxes_;
   std::vector<unsigned char> joint_live_;
   std::vector<double> angle_, distance_;  // of joints [rad, m]
   std::vector<size_t> timed_, waiting_;   // events without triggers, by time; and with them

@@ -97,6 +97,7 @@ Forces::Forces(const mbs::Model& model, Say say) : model_(model), say_(std::move
     }
     for (int i = 0; i < 2; ++i) z.parameters.cracking[i] = e.cracking[i];
     z.parameters.viscous = viscous(e.damping_ratio);
+    z.parameters.crush_through = e.crush_through;
     z.parameters.stations = static_cast<int>(e.stations.size());
     for (size_t i = 0; i < e.stations.size(); ++i) {
       z.parameters.x[i] = e.stations[i].x;
@@ -617,6 +618,11 @@ ElementEnergy Forces::calc_energy() const {
   for (const Torsion& s : torsion_) e.elastic += s.stored;
   for (const Rope& s : rope_) e.elastic += s.stored;
   return e;
+}
+
+double Forces::crushed_length(size_t element) const {
+  const Zone& z = zone_[element];
+  return mbs::is_crushed_by_shortening(z.parameters, laws_, z.state) ? z.state.shortened : 0;
 }
 
 void Forces::fill_zone(size_t at, double time, const Zone& z, mbs::View& v) const {

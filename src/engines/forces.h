@@ -77,6 +77,8 @@ class Forces {
   bool needs_joint_forces() const { return !rotational_.empty(); }
   /// Whether dampers outside zones or loads take part in the balance of energy.
   bool has_power() const { return has_power_; }
+  /// By how much crushing has shortened an element that is still there [m].
+  double crushed_length(size_t element) const;
   /// Whether an element, a bushing is still there.
   bool is_live(size_t element) const { return zone_[element].state.live; }
   bool is_bushing_live(size_t bushing) const { return bushing_[bushing].live; }

@@ -117,14 +117,14 @@ void System::find_contacts(double h) {
   contact.point.clear();
   t.group.clear();
   body_contacts = 0;
-  if (model.contact.ground) find_ground_points();
-  if (model.contact.bodies) find_pair_points();
+  if (model.contact.ground) find_ground_points(h);
+  if (model.contact.bodies) find_pair_points(h);
   fill_contact_blocks();
 }
 
 Earnings System::calc_earnings(const ContactGroup& g, double h) const {
   const State& s = state;
-  if (g.is_on_ground) return {};  // corners stay what they are
+  if (!g.hands_on) return {};
   const size_t W = kernel::lanes();
   const auto speed_of = [&](int touched) {  // none of what is fixed
     const size_t body = static_cast<size_t>(s.touching.body[static_cast<size_t>(touched)]);
@@ -181,8 +181,8 @@ void System::add_contact_group(size_t a, size_t b, const Vec3& n, size_t first, 
   g.first = sticks.first, g.count = sticks.count;
   g.n = n;
   const State& s = state;
-  g.is_on_ground = b == B;
-  if (!g.is_on_ground) g.apart = s.p[a] - s.p[b];
+  g.hands_on = b != B;
+  if (b != B) g.apart = s.p[a] - s.p[b];
   g.law = law;
   g.stiffness = stiffness;
 }

@@ -34,11 +34,13 @@ struct CompiledShape {
   double radius = 0;
   double reach = 0;          // radius of the sphere around p_BS that holds it, infinite for a plane [m]
   int hull = -1;             // into System::hulls
+  int crushed = -1;          // into State::crushed_boxes: the member whose end it has
   int first_corner = 0;      // into State::ground_points: 8 of a box, 1 of a sphere, the vertices of a polyhedron
   bool is_straight = false;  // its axes are those of the body
   bool is_clear = false;     // no point touches the ground or remembers that it did
   bool is_touching = false;  // the ground
   StickRange sticks;         // to the ground
+  int group = -1;            // on the ground, in Touching::group of the last look, of a member that can be crushed
 };
 
 /// A corner's contact with the ground.
@@ -119,11 +121,12 @@ struct Earnings {
 struct ContactGroup {
   int a = 0, b = 0;  // into the touched bodies
   int first = 0, count = 0;
-  Vec3 n;                     // from a to b
-  Vec3 apart;                 // from b's mass centre to a's, 0 on the ground [m]
-  int law = 0;                // into System::contact_laws
-  double stiffness = 0;       // k of one corner of a box [N/m]
-  bool is_on_ground = false;  // its points are corners of shapes
+  Vec3 n;                 // from a to b
+  Vec3 apart;             // from b's mass centre to a's, 0 on the ground [m]
+  int law = 0;            // into System::contact_laws
+  double stiffness = 0;   // k of one corner of a box [N/m]
+  bool hands_on = false;  // its energy goes over to the points that are found next; corners on the ground stay what
+                          // they are, unless they are those of a member that can be crushed
   Earnings earnings;
   std::uint32_t slot = 0;  // in the kernel's blocks
 };

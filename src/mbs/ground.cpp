@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "mbs/system.h"
 
@@ -10,7 +11,8 @@ namespace topple::mbs {
 bool System::is_ground_box(size_t b) const {
   const BodyConstants& body = state.body[b];
   return model.contact.ground && !model.contact.bodies && !fixed[b] && body.shapes == 1 &&
-         state.shapes[static_cast<size_t>(body.first_shape)].kind == Shape::Kind::Box;
+         state.shapes[static_cast<size_t>(body.first_shape)].kind == Shape::Kind::Box &&
+         state.shapes[static_cast<size_t>(body.first_shape)].crushed < 0;
 }
 
 void System::count_other_bodies() {
@@ -61,7 +63,7 @@ void System::note_landing(std::uint32_t slot) {
   say({Happening::Kind::GroundContact, s.time, static_cast<int>(b), -1, {}, std::max(0.0, approach)});
 }
 
-void System::find_ground_points() {
+void System::find_ground_points(double h) {
   State& s = state;
   const State& now = state;
   const Contact& c = model.contact;
@@ -86,6 +88,7 @@ void System::find_ground_points() {
         shape.is_clear = true;
         shape.is_touching = false;
         shape.sticks = {};
+        shape.group = -1;
       }
       continue;
     }
@@ -133,7 +136,9 @@ void System::find_ground_points() {
         const Vec3 at = box || hull ? centre + R * local : centre - shape.radius * n;
         add_contact_point(at, depth, hull ? polyhedron->weights[static_cast<size_t>(corner)] * stiffness : stiffness);
       }
+      const int earned = std::exchange(shape.group, -1);
       if (contact.point.size() == first) {
+        if (earned >= 0) contact.lost += std::max(0.0, contact.earnings[static_cast<size_t>(earned)].stored);
         shape.is_touching = false;
         shape.sticks = {};
         continue;
@@ -143,7 +148,14 @@ void System::find_ground_points() {
         const double approach = -dot(n, now.v[b] + cross(now.w[b], contact.point[first].at));
         say({Happening::Kind::GroundContact, s.time, static_cast<int>(b), -1, {}, std::max(0.0, approach)});
       }
+      (void)crush_ends(b, i, B, -1, -n, law, first, h);
       add_contact_group(b, B, -n, first, ground_law[b], stiffness, shape.sticks);
+      if (shape.crushed >= 0) {
+        ContactGroup& g = s.touching.group.back();
+        g.hands_on = true;
+        if (earned >= 0) g.earnings = contact.earnings[static_cast<size_t>(earned)];
+        shape.group = static_cast<int>(s.touching.group.size()) - 1;
+      }
       shape.is_touching = true;
     }
   }

@@ -300,6 +300,8 @@ void Checker::check_elements() {
       finite_not_negative(p, "rotational_stiffness", e.rotational_stiffness[k]);
     }
     share(p, "damping_ratio", e.damping_ratio, 0, 0.2);
+    finite_not_negative(p, "crush_through", e.crush_through);
+    if (e.crush_through > 0 && e.stations.empty()) fail(p, "crush_through", "needs a station whose law is crushed");
     cracking(p, "cracking_y", e.cracking[0]);
     cracking(p, "cracking_z", e.cracking[1]);
     if (e.stations.size() > 2) fail(p, "stations", "has more than two stations");

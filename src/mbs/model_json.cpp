@@ -446,6 +446,7 @@ ZoneElement Reader::element_from(const Node& n) const {
       s.only(keys_of("station"));
       e.stations.push_back({s["x"].number(), {refer(s["law"], laws_)}});
     }
+  read(n, "crush_through", e.crush_through);
   if (n.has("cracking_y")) e.cracking[0] = cracking_from(n["cracking_y"]);
   if (n.has("cracking_z")) e.cracking[1] = cracking_from(n["cracking_z"]);
   return e;

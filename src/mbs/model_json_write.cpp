@@ -131,6 +131,7 @@ Json json_of(const ZoneElement& e) {
   j["damping_ratio"] = e.damping_ratio;
   j["stations"] = Json::array();
   for (const Station& s : e.stations) j["stations"].push_back({{"x", s.x}, {"law", s.law.index}});
+  if (e.crush_through > 0) j["crush_through"] = e.crush_through;
   if (e.cracking[0].flexibility > 0) j["cracking_y"] = json_of(e.cracking[0]);
   if (e.cracking[1].flexibility > 0) j["cracking_z"] = json_of(e.cracking[1]);
   return j;

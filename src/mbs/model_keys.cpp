@@ -36,7 +36,7 @@ const std::vector<KeyList>& model_json_keys() {
         "shear_limit", "moment_limit", "rotation_limit"}},
       {"element",
        {"name", "a", "b", "X_AF", "X_BM", "at", "axis", "x", "translational_stiffness", "rotational_stiffness",
-        "damping_ratio", "stations", "cracking_y", "cracking_z"}},
+        "damping_ratio", "stations", "crush_through", "cracking_y", "cracking_z"}},
       {"cracking", {"begin", "end", "flexibility"}},
       {"station", {"x", "law"}},
       {"rotational_element",

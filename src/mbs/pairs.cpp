@@ -25,7 +25,7 @@ void System::drop_pairs_of(size_t b) {
   s.pair_due.resize(kept);
 }
 
-void System::find_pair_points() {
+void System::find_pair_points(double h) {
   State& s = state;
   const State& now = state;
   const Contact& c = model.contact;
@@ -160,6 +160,7 @@ void System::find_pair_points() {
       const double depth = points.depth[i] - pair.allowed;
       if (depth > 0) add_contact_point(points.p[i] - p_a, depth, points.weight[i] * stiffness);
     }
+    pair.depth -= crush_ends(a, due.shape_a, b, due.shape_b, points.normal, law, first, h);
     body_contacts += static_cast<int>(contact.point.size() - first);
     add_contact_group(a, b, points.normal, first, pair.law, stiffness, pair.sticks);
     pair.group = static_cast<int>(s.touching.group.size()) - 1;

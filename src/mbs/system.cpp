@@ -110,6 +110,7 @@ void System::compile() {
     }
     for (int i = 0; i < 2; ++i) c.zone.cracking[i] = e.cracking[i];
     c.zone.viscous = viscous_share(e.damping_ratio);
+    c.zone.crush_through = e.crush_through;
     c.zone.stations = static_cast<int>(e.stations.size());
     for (int i = 0; i < c.zone.stations; ++i) {
       c.zone.x[i] = e.stations[static_cast<size_t>(i)].x;
@@ -192,6 +193,7 @@ void System::compile() {
     if (elements[e].a >= 0) incidence[static_cast<size_t>(elements[e].a)].push_back(static_cast<int>(2 * e));
     if (elements[e].b >= 0) incidence[static_cast<size_t>(elements[e].b)].push_back(static_cast<int>(2 * e + 1));
   }
+  for (size_t b = 0; b < B; ++b) find_crushed_boxes_of(b, model.bodies[b]);
   lay_out_elements();
   compile_contact();
   p_before.resize(B);
@@ -497,6 +499,7 @@ void System::replace_body(size_t b, const Body& replacement) {
   s.p[b] += s.R[b] * moved;
   s.p_offset[b] += moved;
   clusters_due = true;  // levers and masses have changed
+  forget_crushed_boxes_of(b);
   s.body[b] = constants_of(replacement, model.is_planar);
   s.L[b] = world_tensor(s.R[b], s.body[b].inertia) * s.w[b];
   pack_body(b);
@@ -507,6 +510,7 @@ void System::replace_body(size_t b, const Body& replacement) {
   // the old shapes stay in the list, unused
   append_shapes(replacement, s.body[b]);
   layout_shapes();
+  find_crushed_boxes_of(b, replacement);
   s.removed += before - energy();
   s.search_due = true;
   drop_pairs_of(b);
@@ -545,6 +549,7 @@ void System::push_bodies(double h) {
 }
 
 void System::finish_forces(double h) {
+  if (!state.crushed_boxes.empty()) shorten_boxes();
   if (model.contact.ground || model.contact.bodies) evaluate_contact(h);
   evaluate_dampers();
   if (model.is_planar) {

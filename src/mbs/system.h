@@ -10,6 +10,7 @@
 
 #include "mbs/block_cholesky.h"
 #include "mbs/contact.h"
+#include "mbs/crushed_boxes.h"
 #include "mbs/forces.h"
 #include "mbs/hull.h"
 #include "mbs/lane_array.h"
@@ -95,6 +96,7 @@ struct State {
   LaneArray<Mat3> R;
   std::vector<Vec3> p_offset;  // of the present centre of mass in the frame of the model's body
   std::vector<CompiledShape> shapes;
+  std::vector<CrushedBox> crushed_boxes;  // by element; `shape` is into `shapes`
   std::vector<GroundPoint> ground_points;
   LaneArray<GroundBox> ground_box;  // (B)
   std::vector<unsigned char> touched_ground;
@@ -401,7 +403,7 @@ class System {
   void drop_pairs_of(size_t b);
   /// Law of two bodies, into contact_laws.
   int find_pair_law(int a, int b) const;
-  void find_ground_points();
+  void find_ground_points(double h);
   /// Whether the kernel has what a body and the ground do to each other: of one box, where bodies do not touch each
   /// other.
   bool is_ground_box(size_t body) const;
@@ -411,7 +413,7 @@ class System {
   void note_landing(std::uint32_t slot);
   /// Whether something else touches anything.
   bool has_other_contacts() const { return model.contact.bodies || other_on_ground > 0; }
-  void find_pair_points();
+  void find_pair_points(double h);
   void add_contact_point(const Vec3& at, double depth, double stiffness);
   /// Counts a group of a body; its place among those touched.
   int touch(size_t body);
@@ -479,6 +481,24 @@ class System {
   int find_hull(const Shape&) const;
   /// Appends a body's shapes in its frame.
   void append_shapes(const Body&, BodyConstants&);
+  /// Appends those of a body's shapes, as given, that its elements shorten.
+  void find_crushed_boxes_of(size_t b, const Body&);
+  void forget_crushed_boxes_of(size_t b);
+  void number_crushed_boxes();
+  void shorten_shape(CrushedBox&, double shortening);
+  /// What the end of a member bears against a surface with this normal out of body b [N]; unlimited for other shapes
+  /// and where the member is not met head on.
+  double calc_end_bearing(size_t b, int shape, const Vec3& outward) const;
+  /// Crushes the weaker of two ends that meet, or one that meets something, as far as it bears less than what presses
+  /// there: its box gets shorter and the points come out by as much, which is returned [m].
+  ///   b      B: the ground
+  ///   n      from a to b
+  ///   first  of the points
+  ///   h      the step [s]
+  double crush_ends(size_t a, int shape_a, size_t b, int shape_b, const Vec3& n, const ContactLaw&, size_t first,
+                    double h);
+  /// Boxes as short as the elements along them are now.
+  void shorten_boxes();
   int count_corners(const CompiledShape&) const;
   void layout_shapes();
   /// A link between bodies has ended, or may have.

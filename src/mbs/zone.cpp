@@ -415,7 +415,7 @@ struct Evaluation {
         flowed = true;
       }
     }
-    if (z.shortened >= limits.law().crush_length) broke = BreakReason::Crushing;
+    if (z.shortened >= calc_crush_length(p, limits.law())) broke = BreakReason::Crushing;
     if (z.elongated >= limits.law().rupture_elongation) broke = BreakReason::Tension;
     return integrity;
   }

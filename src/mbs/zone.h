@@ -93,12 +93,24 @@ struct ZoneParameters {
   bool external_axial =
       false;                  // the deformation's first component is the normal force itself; it follows no limit here
   bool keeps_length = false;  // turning does not lengthen it: at rest
+  double crush_through = 0;   // as of a ZoneElement [m]
   double relief = 0;          // of an external force: what it loses by a unit of the zone's elongation [N/m]
   Cracking cracking[2];       // about y, z
 
   /// Of a whole member: two stations.
   Span span() const { return stations == 2 ? Span{std::min(x[0], x[1]), std::max(x[0], x[1])} : Span{}; }
 };
+
+/// Plastic shortening at which a zone breaks while a law rules [m].
+inline double calc_crush_length(const ZoneParameters& p, const CompiledLaw& law) {
+  return law.buckles ? law.crush_length : std::max(law.crush_length, p.crush_through);
+}
+
+/// Whether what shortens a zone now is crushing: it is live, and its law, or the one on its way, does not buckle.
+inline bool is_crushed_by_shortening(const ZoneParameters& p, const CompiledLaws& laws, const ZoneState& z) {
+  const int law = z.next_law >= 0 ? z.next_law : z.base_law >= 0 ? z.base_law : p.law[0];
+  return z.live && law >= 0 && !laws[static_cast<size_t>(law)].buckles;
+}
 
 /// Evaluates a live zone at a deformation: sets resultant, history, energies; breaks it where a limit of rupture is
 /// passed.

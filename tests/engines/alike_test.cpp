@@ -365,6 +365,54 @@ TEST_P(EnginesAlikeReference, StandsInTheEquilibrium) {
   EXPECT_LT(r.position.value, 1e-9);
 }
 
+TEST_P(EnginesAlikeReference, BoxesOfCrushedMembers) {
+  NEEDS_ENGINE();
+  // a plate on a post, one body, whose element holds the foot half a metre high and is crushed by 0.78 m before it is
+  // cut: what is left of the post lands
+  mbs::Model m = test::make_empty({0, 0, -9.81});
+  const auto plate = test::add_box(m, "plate", 4000, {1, 1, 0.25}, {0, 0, 2.75});
+  mbs::Shape post;
+  post.half = {0.15, 0.15, 1};
+  post.X_BS.p = {0, 0, -1.25};
+  m.bodies[0].shapes.push_back(post);
+  m.bodies[0].v_WB = {0, 0, -8};
+  m.contact.ground = true;
+  m.contact.restitution = 0.1;
+  mbs::ZoneLaw law;
+  law.compression = {{0, 0.78, 0.8, 10}, {2e5, 2e5, 1e9, 1e9}};
+  law.crush_length = 0.3;
+  const mbs::LawId id = mbs::add_law(m, law);
+  mbs::ZoneElement e;
+  e.a = mbs::kGround;
+  e.b = plate;
+  const Quat up = to_quat(Mat3::from_columns({0, 0, 1}, {1, 0, 0}, {0, 1, 0}));
+  e.X_AF = {{0, 0, 1.5}, up};
+  e.X_BM = {{0, 0, -1.25}, up};
+  e.translational_stiffness = {1e8, 1e8, 1e8};
+  e.rotational_stiffness = {1e7, 1e7, 1e7};
+  e.stations = {{-1, id}, {1, id}};
+  e.crush_through = 1.9;
+  mbs::add_element(m, e);
+  mbs::Event cut;
+  cut.time = 0.4;
+  mbs::Action a;
+  a.kind = mbs::Action::Kind::RemoveElement;
+  a.element = {0};
+  cut.actions = {a};
+  m.events.push_back(cut);
+  const mbs::Options o = test::make_options(1.2, 0.4, kStep);
+  for (const std::string& engine : {std::string("native"), GetParam()}) {
+    const auto c = test::run(*make_engine(engine), m, o);
+    ASSERT_EQ(c.frames.size(), 4U) << engine << c.summary.message;
+    EXPECT_NEAR(c.frames[1].X_WB[0].p.z, 2.75 - 0.78, 0.02) << engine;
+    EXPECT_NEAR(c.frames[3].X_WB[0].p.z, 2.25 - 0.78, 0.07) << engine;  // others shorten boxes by 5 cm at once
+    const auto& notes = c.summary.notes;
+    EXPECT_EQ(std::any_of(notes.begin(), notes.end(),
+                          [](const std::string& n) { return n.find("rigid ends") != std::string::npos; }),
+              engine != "native");
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Each, EnginesAlikeReference, testing::Values("simbody", "mujoco"),
                          [](const testing::TestParamInfo<std::string>& subject) { return subject.param; });
 

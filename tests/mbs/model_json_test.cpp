@@ -429,6 +429,13 @@ TEST(CheckModel, FindsEachMistake) {
     a.index = index;
     return a;
   };
+  const auto crushed = [](double through) {
+    ZoneElement e;
+    e.a = kGround;
+    e.b = {0};
+    e.crush_through = through;
+    return e;
+  };
   const std::vector<std::pair<Edit, std::string>> cases = {
       {[](Model& m) { m.bodies[0].shapes.push_back(m.bodies[2].shapes[0]); },
        "bodies[0].shapes[2].plane \"a\": only a fixed"},
@@ -461,6 +468,8 @@ TEST(CheckModel, FindsEachMistake) {
          m.springs[0].p_A = {4, 0, 0};
        },
        "at the same place at the start"},
+      {[=](Model& m) { m.elements.push_back(crushed(-1)); }, "crush_through: must be finite and not negative"},
+      {[=](Model& m) { m.elements.push_back(crushed(1)); }, "crush_through: needs a station"},
       {[](Model& m) { m.springs[0].free_length = -1; }, "free_length: must be finite and not negative"},
       {[=](Model& m) { m.springs[0].spring.rate = inf; }, "springs[0].spring: is not a finite number"},
       {[=](Model& m) {
