@@ -306,6 +306,7 @@ void Builder::connect_ground_column(const GridPoint& at, int index) {
                              rotational, {{0, law_of(z.station[0].zone, s, m.name + "/foot", bending_of_column())}},
                              calc_cracking(z, s, L / ends_y, L / ends_z))
                      .index;
+  model.elements.back().crush_through = L;
 
   mbs::Joint joint;
   joint.kind = mbs::Joint::Kind::Revolute;
@@ -367,6 +368,7 @@ void Builder::connect_column(const GridPoint& at, int index) {
                   {s.GJ / L, s.uncracked_EI_y / L, s.uncracked_EI_z / L},
                   order_stations(z, s, m.name, bending_of_column()), calc_cracking(z, s, L / 6, L / 6))
           .index;
+  model.elements.back().crush_through = L;
 }
 
 void Builder::connect_x_beam(const GridPoint& at, int index) {

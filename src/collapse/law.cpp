@@ -328,6 +328,18 @@ mbs::Curve make_curve(const nearfield::AxialCurve& from) {
   return out;
 }
 
+/// Continues a zone's curve behind its length with the mean force of being crushed, for what is crushed then is the
+/// next zone of the member.
+void append_mean_force(double length, mbs::Curve& c) {
+  constexpr double rise = 0.05;  // of the length, from what is left of one zone to the mean of the others
+  double work = 0;
+  for (size_t i = 0; i + 1 < c.x.size(); ++i) work += 0.5 * (c.f[i] + c.f[i + 1]) * (c.x[i + 1] - c.x[i]);
+  const double span = c.x.back();
+  if (!(span > 0 && span <= length)) return;
+  c.x.push_back((1 + rise) * length);
+  c.f.push_back(work / span);
+}
+
 /// Constant moments between a compressive and a tensile capacity, falling to nothing at both.
 mbs::MomentFamily make_flat_family(double compression, double tension, double positive, double negative, double last) {
   mbs::MomentFamily out;
@@ -444,6 +456,7 @@ mbs::ZoneLaw make_zone_law(const nearfield::Rcc& rcc, double EI_y, double EI_z, 
   law.compression = make_curve(rcc.compression);
   law.tension = make_curve(rcc.tension);
   law.crush_length = rcc.length;
+  append_mean_force(rcc.length, law.compression);
   law.rupture_elongation = law.tension.x.back();
   law.shear_y = rcc.shear_y;
   law.shear_z = rcc.shear_z;

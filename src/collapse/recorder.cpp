@@ -411,7 +411,9 @@ void Recorder::add_happening(const mbs::Happening& h) {
       if (h.reason == "crushing") {
         how = "is crushed";
         if (has_law && z.firing_time > h.time) {
-          const double u = model_.laws[static_cast<size_t>(model_.elements[i].stations.front().law.index)].crush_length;
+          const mbs::ZoneElement& e = model_.elements[i];
+          const mbs::ZoneLaw& law = model_.laws[static_cast<size_t>(e.stations.front().law.index)];
+          const double u = law.buckles ? law.crush_length : std::max(law.crush_length, e.crush_through);
           if (std::isfinite(u)) how = fmt::format("is crushed (shortening {:.2f} m)", u);
         }
       }

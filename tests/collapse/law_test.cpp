@@ -105,6 +105,20 @@ TEST(ZoneLaw, TurnsFurtherUnderPressureIfTheRuleSaysSo) {
   for (const double share : {0.5, 1.0}) EXPECT_EQ(pressed(share * first).rupture_rotation_pressed, 0);
 }
 
+TEST(ZoneLaw, GoesOnWithTheMeanForceOfCrushing) {
+  const nearfield::Rcc rcc = nearfield::make_rcc(column_zone());
+  const mbs::Curve& c = make_effective_law(rcc, default_knowledge()).compression;
+  EXPECT_EQ(make_effective_law(rcc, default_knowledge()).crush_length, rcc.length);
+  ASSERT_GT(c.x.back(), rcc.length);
+  // the work of one zone on its length
+  const size_t last = c.x.size() - 2;
+  double work = 0;
+  for (size_t i = 0; i < last; ++i) work += 0.5 * (c.f[i] + c.f[i + 1]) * (c.x[i + 1] - c.x[i]);
+  EXPECT_NEAR(c.f.back() * rcc.length, work, 1e-3 * work);
+  EXPECT_GT(c.f.back(), c.f[last]);
+  EXPECT_LT(c.f.back(), 0.5 * *std::max_element(c.f.begin(), c.f.end()));
+}
+
 TEST(ZoneLaw, PassesTheModelsCheck) {
   mbs::Model model;
   const nearfield::ZoneInput in = column_zone();

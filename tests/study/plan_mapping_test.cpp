@@ -291,14 +291,18 @@ TEST(CondensedMappingPhysics, StorehouseFallsAsItDoesWhole) {
   const PlanMapping whole(plan, collapse::default_knowledge(), o);
   o.condensed = true;
   const PlanMapping condensed(plan, collapse::default_knowledge(), o);
-  // the core, and left values of the steel, whose rear edge comes down nearly half as far
-  for (const Point& x : {Point{30e9, 25e6, 420e6, 64e-4}, Point{30e9, 25e6, 230e6, 36e-4}}) {
-    const Result a = evaluate(whole, {x})[0], b = evaluate(condensed, {x})[0];
+  // the core, and left values of the steel, where row D is crushed on the way. Tilt 0.5 s after the second stage and
+  // touchdown: at 48 points they differ by 0.14 deg in the mean and by up to 0.72 deg and 0.011 s
+  // (docs/decisions/0034-condensed-samples.md)
+  struct Case {
+    Point x;
+    double tilt;  // [deg]
+  };
+  for (const Case& c : {Case{{30e9, 25e6, 420e6, 64e-4}, 0.14}, Case{{30e9, 25e6, 230e6, 36e-4}, 0.5}}) {
+    const Result a = evaluate(whole, {c.x})[0], b = evaluate(condensed, {c.x})[0];
     ASSERT_EQ(b.state, Result::State::Done) << b.text;
     EXPECT_EQ(a.outcome, b.outcome);
-    // tilt 0.5 s after the second stage and touchdown: at 48 points they differ by up to 0.32 deg and 0.010 s
-    // (docs/decisions/0034-condensed-samples.md)
-    EXPECT_NEAR(a.values[0], b.values[0], 0.35 * unit::deg);
+    EXPECT_NEAR(a.values[0], b.values[0], c.tilt * unit::deg);
     EXPECT_NEAR(a.values[3], b.values[3], 0.015);
   }
 }

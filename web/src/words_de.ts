@@ -426,7 +426,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["dust", "Staub"],
   ["ground vibration as such (at most a screening with the site's own law)", "Erschütterungen selbst (höchstens eine Abschätzung mit dem Gesetz des Standorts)"],
   ["wind, and people's behaviour; no distance given here is a safe distance", "Wind und das Verhalten von Menschen; keine Entfernung auf dieser Seite ist ein Sicherheitsabstand"],
-  ["cracking and crushing of slabs within a bay, of walls within a panel and of members between their end zones", "Risse und zerdrückter Beton in Decken innerhalb eines Feldes, in Wänden innerhalb einer Scheibe und in Bauteilen zwischen ihren Endzonen"],
+  ["cracking and crushing of slabs within a bay, of walls within a panel and of beams between their end zones; room that rubble takes", "Risse und zerdrückter Beton in Decken innerhalb eines Feldes, in Wänden innerhalb einer Scheibe und in Balken zwischen ihren Endzonen; Raum, den Schutt einnimmt"],
   ["rings that flatten as they land: single pieces of a shaft may roll and tumble farther than real ones", "Ringe, die beim Aufschlag flach werden: Einzelne Stücke eines Schafts können weiter rollen als wirkliche"],
   ["infill and finishes beyond their weight", "Ausfachung und Ausbau über ihr Gewicht hinaus"],
   ["cracks that close again after bars have yielded, slip and buckling of single bars (concrete and bars are one material)", "Risse, die sich schließen, nachdem der Stahl geflossen ist, Schlupf und Knicken einzelner Stäbe (Beton und Stahl sind ein Baustoff)"],
