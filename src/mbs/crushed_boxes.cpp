@@ -71,12 +71,10 @@ void System::find_crushed_boxes_of(size_t b, const Body& body) {
       box.shape += c.first_shape;
     }
   }
-  number_crushed_boxes();
 }
 
 void System::forget_crushed_boxes_of(size_t b) {
   std::erase_if(state.crushed_boxes, [&](const CrushedBox& box) { return box.body == static_cast<int>(b); });
-  number_crushed_boxes();
 }
 
 void System::number_crushed_boxes() {

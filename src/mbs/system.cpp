@@ -194,6 +194,7 @@ void System::compile() {
     if (elements[e].b >= 0) incidence[static_cast<size_t>(elements[e].b)].push_back(static_cast<int>(2 * e + 1));
   }
   for (size_t b = 0; b < B; ++b) find_crushed_boxes_of(b, model.bodies[b]);
+  number_crushed_boxes();
   lay_out_elements();
   compile_contact();
   p_before.resize(B);
@@ -511,6 +512,7 @@ void System::replace_body(size_t b, const Body& replacement) {
   append_shapes(replacement, s.body[b]);
   layout_shapes();
   find_crushed_boxes_of(b, replacement);
+  number_crushed_boxes();
   s.removed += before - energy();
   s.search_due = true;
   drop_pairs_of(b);
