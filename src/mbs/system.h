@@ -484,7 +484,9 @@ class System {
   /// Appends those of a body's shapes, as given, that its elements shorten.
   void find_crushed_boxes_of(size_t b, const Body&);
   void forget_crushed_boxes_of(size_t b);
+  /// Tells shapes their places in the list once it has changed.
   void number_crushed_boxes();
+  /// As short as an element's shortening leaves it [m].
   void shorten_shape(CrushedBox&, double shortening);
   /// What the end of a member bears against a surface with this normal out of body b [N]; unlimited for other shapes
   /// and where the member is not met head on.
