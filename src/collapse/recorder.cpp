@@ -11,6 +11,7 @@
 #include "base/interpolate.h"
 #include "base/rotation_fit.h"
 #include "base/unit.h"
+#include "mbs/zone.h"
 #include "record/told.h"
 
 namespace topple::collapse {
@@ -413,7 +414,7 @@ void Recorder::add_happening(const mbs::Happening& h) {
         if (has_law && z.firing_time > h.time) {
           const mbs::ZoneElement& e = model_.elements[i];
           const mbs::ZoneLaw& law = model_.laws[static_cast<size_t>(e.stations.front().law.index)];
-          const double u = law.buckles ? law.crush_length : std::max(law.crush_length, e.crush_through);
+          const double u = mbs::calc_crush_length(e.crush_through, law);
           if (std::isfinite(u)) how = fmt::format("is crushed (shortening {:.2f} m)", u);
         }
       }

@@ -415,7 +415,7 @@ struct Evaluation {
         flowed = true;
       }
     }
-    if (z.shortened >= calc_crush_length(p, limits.law())) broke = BreakReason::Crushing;
+    if (z.shortened >= calc_crush_length(p.crush_through, limits.law())) broke = BreakReason::Crushing;
     if (z.elongated >= limits.law().rupture_elongation) broke = BreakReason::Tension;
     return integrity;
   }

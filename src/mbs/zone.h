@@ -101,9 +101,11 @@ struct ZoneParameters {
   Span span() const { return stations == 2 ? Span{std::min(x[0], x[1]), std::max(x[0], x[1])} : Span{}; }
 };
 
-/// Plastic shortening at which a zone breaks while a law rules [m].
-inline double calc_crush_length(const ZoneParameters& p, const CompiledLaw& law) {
-  return law.buckles ? law.crush_length : std::max(law.crush_length, p.crush_through);
+/// Plastic shortening at which a zone breaks while a law, compiled or not, rules [m].
+///   crush_through  as of a ZoneElement [m]
+template <class Law>
+double calc_crush_length(double crush_through, const Law& law) {
+  return law.buckles ? law.crush_length : std::max(law.crush_length, crush_through);
 }
 
 /// Whether what shortens a zone now is crushing: it is live, and its law, or the one on its way, does not buckle.

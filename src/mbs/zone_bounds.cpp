@@ -274,7 +274,7 @@ bool write_flow(const ZoneParameters& p, const CompiledLaws& laws, ZoneState& z,
   if (!write_flow_cells(p, laws, z, z.normal_force / whole, z.shortened, strained, out, 1)) return false;
   const CompiledLaw& law = limits.law();
   out[kLifted] = z.lifted, out[kShortened] = z.shortened, out[kCrushed] = z.crushed;
-  out[kCrushLength] = calc_crush_length(p, law);
+  out[kCrushLength] = calc_crush_length(p.crush_through, law);
   // what buckles is slack until it is straight, which a cell does not know
   out[kFlowMost] = is_pressed ? -kTiny : law.buckles ? 0 : limits.tension(z.elongated, z.shortened);
   for (int axis = 0; axis < 2; ++axis)
