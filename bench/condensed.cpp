@@ -1,8 +1,8 @@
 /// How far condensed samples are from whole ones: the fuzzy storehouse at points of a Sobol sequence, as CSV.
-///   topple_condensed_bench [points=24] [seed=1] [frequency=2000] [step=1] [law=cells|full] [lanes=no|yes]
+///   topple_condensed_bench [points=24] [seed=1] [frequency=1400] [step=1] [law=cells|full] [lanes=no|yes]
 ///                          [pass=yes|no] [nudge=0] [whole=yes|no]
-/// step: share of the engine's own; law: full for every zone at each step; lanes: one sample in each; pass: over quiet
-/// times; nudge: share by which every value is moved.
+/// frequency: in place of rule body.highest_frequency [rad/s]; step: share of the engine's own; law: full for every
+/// zone at each step; lanes: one sample in each; pass: over quiet times; nudge: share by which every value is moved.
 /// The same seed gives the same points. Seeds 1 to 9 were used while the condensation was made, 11 and above only to
 /// measure it (docs/decisions/0034-condensed-samples.md).
 
@@ -33,6 +33,7 @@ struct Settings {
   int points = 24;
   std::uint64_t seed = 1;
   study::PlanMappingOptions mapping;
+  collapse::Knowledge knowledge = collapse::default_knowledge();
   double nudge = 0;
   bool with_whole = true;
 };
@@ -43,9 +44,9 @@ int compare(const Settings& settings) {
   const product::Plan plan = product::read_plan_file(TOPPLE_EXAMPLES "/weida/plan-fuzzy.toml", warnings, text);
   study::PlanMappingOptions options = settings.mapping;
   options.threads = 0;
-  const study::PlanMapping whole(plan, collapse::default_knowledge(), options);
+  const study::PlanMapping whole(plan, settings.knowledge, options);
   options.condensed = true;
-  const study::PlanMapping condensed(plan, collapse::default_knowledge(), options);
+  const study::PlanMapping condensed(plan, settings.knowledge, options);
   const uncertainty::Box support = uncertainty::make_box(whole.space(), 0);
   std::vector<uncertainty::Point> points;
   for (const uncertainty::Point& p :
@@ -93,7 +94,7 @@ int main(int argc, char** argv) {
     } else if (name == "seed") {
       settings.seed = static_cast<std::uint64_t>(std::atoi(value.c_str()));
     } else if (name == "frequency") {
-      settings.mapping.highest_frequency = std::atof(value.c_str());
+      settings.knowledge.body_highest_frequency = std::atof(value.c_str());
     } else if (name == "step") {
       settings.mapping.step_share = std::atof(value.c_str());
     } else if (name == "law") {

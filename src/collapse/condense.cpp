@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "collapse/builder.h"
+#include "collapse/frequency_limit.h"
 
 namespace topple::collapse {
 
@@ -343,112 +344,6 @@ class Condenser {
   std::vector<double> element_count_, rotational_count_;
 };
 
-/// Stiffnesses along the frames and rotary inertias of a planar model so that few modes are above a frequency: twice
-/// the largest sum of stiffnesses at a body over its mass bounds the square of the highest one (Gershgorin's theorem).
-void limit_frequency(mbs::Model& model, double highest) {
-  const size_t B = model.bodies.size();
-  // what joints tie together moves together, but turns alone
-  std::vector<size_t> root(B);
-  for (size_t b = 0; b < B; ++b) root[b] = b;
-  const auto find = [&root](size_t b) {
-    while (root[b] != b) b = root[b] = root[root[b]];
-    return b;
-  };
-  for (const mbs::Joint& j : model.joints)
-    if (!(j.parent == mbs::kGround) && !model.bodies[static_cast<size_t>(j.parent.index)].fixed)
-      root[find(static_cast<size_t>(j.parent.index))] = find(static_cast<size_t>(j.child.index));
-  std::vector<double> mass(B, 0.0);
-  for (size_t b = 0; b < B; ++b) mass[find(b)] += model.bodies[b].mass;
-
-  /// Of an element along x and z of W and about y, at one of its ends.
-  struct End {
-    int body;
-    Vec3 lever;
-  };
-  const auto ends_of = [](const mbs::ZoneElement& e) {
-    return std::array<End, 2>{End{e.a.index, e.X_AF.p}, End{e.b.index, e.X_BM.p}};
-  };
-  const auto is_free = [&model](int b) { return b >= 0 && !model.bodies[static_cast<size_t>(b)].fixed; };
-  const auto axes_of = [&model](const mbs::ZoneElement& e) {
-    return e.a == mbs::kGround ? to_matrix(e.X_AF.q)
-                               : to_matrix(model.bodies[static_cast<size_t>(e.a.index)].X_WB.q * e.X_AF.q);
-  };
-  const auto along = [](const Mat3& R, const Vec3& k, int axis) {
-    double sum = 0;
-    for (int i = 0; i < 3; ++i) sum += R(axis, i) * R(axis, i) * k[i];
-    return sum;
-  };
-  const auto fast = [](const auto& e) { return 1 + 4 * e.damping_ratio / (1 - 2 * e.damping_ratio); };
-  const double most = 0.5 * highest * highest;  // of stiffnesses over a mass
-
-  // along the frames beams are far stiffer than anything else: the stiffest springs of a body are cut to one common
-  // stiffness; what bears loads or sways is softer than that and stays
-  std::vector<std::vector<double>> pull(B);  // of groups
-  for (const mbs::ZoneElement& e : model.elements)
-    for (const End& end : ends_of(e))
-      if (is_free(end.body))
-        pull[find(static_cast<size_t>(end.body))].push_back(fast(e) * along(axes_of(e), e.translational_stiffness, 0));
-  std::vector<double> cap(B, mbs::kUnlimited);
-  for (size_t b = 0; b < B; ++b) {
-    std::sort(pull[b].begin(), pull[b].end());
-    double left = most * mass[b];
-    for (size_t i = 0; i < pull[b].size(); ++i) {
-      const double each = left / static_cast<double>(pull[b].size() - i);
-      if (pull[b][i] > each) {
-        cap[b] = each;
-        break;
-      }
-      left -= pull[b][i];
-    }
-  }
-  for (mbs::ZoneElement& e : model.elements) {
-    const Mat3 R = axes_of(e);
-    for (int i = 0; i < 3; ++i)
-      for (const End& end : ends_of(e))
-        if (is_free(end.body) && R(0, i) * R(0, i) > 0.5)
-          e.translational_stiffness[i] =
-              std::min(e.translational_stiffness[i], cap[find(static_cast<size_t>(end.body))] / fast(e));
-  }
-  std::vector<double> turn(B, 0.0);
-  for (const mbs::ZoneElement& e : model.elements) {
-    const Mat3 R = axes_of(e);
-    const double kx = along(R, e.translational_stiffness, 0), kz = along(R, e.translational_stiffness, 2);
-    for (const End& end : ends_of(e))
-      if (is_free(end.body))
-        turn[static_cast<size_t>(end.body)] +=
-            fast(e) *
-            (along(R, e.rotational_stiffness, 1) + kx * end.lever.z * end.lever.z + kz * end.lever.x * end.lever.x);
-  }
-  for (const mbs::RotationalElement& r : model.rotational_elements) {
-    const mbs::Joint& j = model.joints[static_cast<size_t>(r.joint.index)];
-    for (const int b : {j.parent.index, j.child.index})
-      if (is_free(b)) turn[static_cast<size_t>(b)] += fast(r) * r.stiffness;
-  }
-  const auto raise = [&](mbs::Body& body, double stiffness) {
-    body.inertia(1, 1) = std::max(body.inertia(1, 1), stiffness / most);
-  };
-  for (size_t b = 0; b < B; ++b)
-    if (!model.bodies[b].fixed) raise(model.bodies[b], turn[b]);
-  // a stub swings on what its joint becomes
-  for (mbs::Event& event : model.events)
-    for (mbs::Action& a : event.actions) {
-      if (a.kind != mbs::Action::Kind::ReplaceBody) continue;
-      const size_t b = static_cast<size_t>(a.body.index);
-      double stub = 0;
-      for (mbs::RotationalElement& r : model.rotational_elements) {
-        const mbs::Joint& j = model.joints[static_cast<size_t>(r.joint.index)];
-        if (!(j.parent == a.body) || !can_be_loosened(r)) continue;
-        const Mat3 R = to_matrix(model.bodies[b].X_WB.q * j.X_PF.q);
-        const Vec3 lever = j.X_PF.p - a.replacement.X_WB.p;
-        for (int i = 0; i < 3; ++i)
-          r.loose_translational[i] = std::min(r.loose_translational[i], most * a.replacement.mass / fast(r));
-        stub += fast(r) * (along(R, r.loose_translational, 0) * lever.z * lever.z +
-                           along(R, r.loose_translational, 2) * lever.x * lever.x);
-      }
-      raise(a.replacement, turn[b] + stub);
-    }
-}
-
 mbs::Model build_condensed(Builder& b) {
   b.build();
   b.add_events(make_schedule(b.plan, b.k));
@@ -491,12 +386,13 @@ KnownCurves make_known_curves(const product::Plan& plan, const Knowledge& k, con
 }
 
 mbs::Model make_condensed_model(const product::Plan& plan, const Knowledge& k, const Condensation& c,
-                                const CondenseOptions& options, const KnownCurves* known, ModelMap& map) {
+                                const KnownCurves* known, ModelMap& map) {
   map = {};
   Builder builder(plan, k, map, 1, known);
   builder.condensation = &c;
   mbs::Model model = build_condensed(builder);
-  if (options.highest_frequency > 0) limit_frequency(model, options.highest_frequency);
+  limit_frequency(model, k.body_highest_frequency);
+  limit_frequency_of_stubs(model, k.body_highest_frequency);
   return model;
 }
 

@@ -21,12 +21,6 @@ struct Condensation {
 /// sides, in all of the plans: a plan and samples of it. The plans differ in numbers only.
 Condensation find_like_frames(std::span<const product::Plan* const>, const Knowledge&);
 
-struct CondenseOptions {
-  /// Stiffnesses along the frames are cut, and rotary inertias raised, where modes are above this; 0: as they are
-  /// [rad/s].
-  double highest_frequency = 2000;
-};
-
 /// Curves and laws of the plan's condensed model: samples share those that do not depend on their values.
 KnownCurves make_known_curves(const product::Plan&, const Knowledge&, const Condensation&);
 
@@ -34,7 +28,7 @@ KnownCurves make_known_curves(const product::Plan&, const Knowledge&, const Cond
 /// plane of the frames. Numbers as of make_model; what lies between frames of one class is left out but for its mass.
 ///   known  curves that need not be made anew; may be null
 /// Throws InputError as make_model does.
-mbs::Model make_condensed_model(const product::Plan&, const Knowledge&, const Condensation&, const CondenseOptions&,
-                                const KnownCurves* known, ModelMap& map);
+mbs::Model make_condensed_model(const product::Plan&, const Knowledge&, const Condensation&, const KnownCurves* known,
+                                ModelMap& map);
 
 }  // namespace topple::collapse

@@ -45,6 +45,7 @@ const std::map<std::string, Field>& fields() {
       {"charge.transition_reach", &Knowledge::charge_transition_reach},
       {"charge.scatter_limit", &Knowledge::charge_scatter_limit},
       {"body.least_radius_of_gyration", &Knowledge::body_least_radius_of_gyration},
+      {"body.highest_frequency", &Knowledge::body_highest_frequency},
       {"contact.gap", &Knowledge::contact_gap},
       {"contact.body_friction", &Knowledge::contact_body_friction},
       {"contact.body_restitution", &Knowledge::contact_body_restitution},
@@ -74,9 +75,10 @@ const std::map<std::string, Field>& fields() {
 /// Of rules that the multibody model, or what they mean, bounds on both sides.
 const std::map<std::string, std::pair<double, double>>& ranges() {
   static const std::map<std::string, std::pair<double, double>> list = {
-      {"member.uncracked_share", {0, 1}},   {"slab.flange_share", {0, 1}},    {"slab.distribution_share", {0, 1}},
-      {"contact.body_restitution", {0, 1}}, {"zone.damping_ratio", {0, 0.2}}, {"zone.biaxial_exponent", {1, 10}},
-      {"contact.frequency", {0, 1e5}}};  // sound crosses 4 cm of concrete in the time of 1/1e5 s
+      {"member.uncracked_share", {0, 1}},     {"slab.flange_share", {0, 1}},    {"slab.distribution_share", {0, 1}},
+      {"contact.body_restitution", {0, 1}},   {"zone.damping_ratio", {0, 0.2}}, {"zone.biaxial_exponent", {1, 10}},
+      {"body.highest_frequency", {300, 1e5}}, {"contact.frequency", {0, 1e5}}};  // sound crosses 4 cm of concrete in
+                                                                                 // the time of 1/1e5 s
   return list;
 }
 

@@ -24,7 +24,7 @@ struct Knowledge {
   double slab_flange_share, slab_distribution_share;
   double slab_elongation_lengths, wall_stiffness_share, wall_axial_share, wall_crush_share;
   double charge_release_time, charge_cage_rupture_rotation, charge_transition_reach, charge_scatter_limit;
-  double body_least_radius_of_gyration;
+  double body_least_radius_of_gyration, body_highest_frequency;
   double contact_gap, contact_body_friction, contact_body_restitution, contact_frequency;
   double rest_speed, rest_time;
   double stands_displacement;

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/unit.h"
+#include "collapse/frequency_limit.h"
 
 namespace topple::collapse {
 
@@ -56,6 +57,7 @@ std::string words_of_time(double t) { return fmt::format("{:.6g} s", t); }
 LiveModel::LiveModel(product::Plan plan, const Knowledge& k, int threads) : plan_(std::move(plan)), k_(&k) {
   Builder builder(plan_, k, map_, threads);
   builder.build();
+  limit_frequency(builder.model, k.body_highest_frequency);
   built_ = std::move(static_cast<BuilderState&>(builder));
   for (const mbs::Body& b : built_.model.bodies) shapes_.push_back(b.shapes);
   for (const BodyEntry& b : map_.bodies) drawn_.push_back(b.shapes);
@@ -92,6 +94,7 @@ void LiveModel::lay_out_events() {
   std::stable_sort(schedule.begin(), schedule.end(), [](const Firing& a, const Firing& b) { return a.time < b.time; });
   Builder builder(std::move(built_), plan_, *k_, map_);
   builder.add_events(std::move(schedule));
+  limit_frequency_of_stubs(builder.model, k_->body_highest_frequency);
   built_ = std::move(static_cast<BuilderState&>(builder));
   for (const Extra& e : extras_) {
     built_.model.events.push_back(e.event);

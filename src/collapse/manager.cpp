@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "collapse/builder.h"
+#include "collapse/frequency_limit.h"
 
 namespace topple::collapse {
 
@@ -441,7 +442,9 @@ mbs::Model make_model(const product::Plan& plan, const Knowledge& knowledge, Mod
   map = {};
   Builder builder(plan, knowledge, map, threads);
   builder.build();
+  limit_frequency(builder.model, knowledge.body_highest_frequency);
   builder.add_events(make_schedule(plan, knowledge));
+  limit_frequency_of_stubs(builder.model, knowledge.body_highest_frequency);
   return std::move(builder.model);
 }
 

@@ -26,8 +26,7 @@ double now() {
 struct Sample {
   Sample(const product::Plan& p, const Knowledge& k, const SampleRunOptions& o)
       : plan(p),
-        model(o.condensation ? make_condensed_model(p, k, *o.condensation, o.condense, o.known, map)
-                             : make_model(p, k, map)) {
+        model(o.condensation ? make_condensed_model(p, k, *o.condensation, o.known, map) : make_model(p, k, map)) {
     record.building_outline = calc_building_outline(model, map);
     recorder = std::make_unique<Recorder>(model, map, k, record, callbacks);
   }

@@ -21,7 +21,6 @@ struct SampleRunOptions {
   double frame_rate = 0;  // 0: the plan's [1/s]
   const Condensation* condensation = nullptr;  // samples run condensed; null: whole
   const KnownCurves* known = nullptr;          // of condensed ones; may be null
-  CondenseOptions condense;
   double pass_speed = 0.1, pass_share = 2e-3;  // mbs::Options, of condensed samples
   double step_share = 1;                       // mbs::Options
   bool full_law = false;                       // mbs::Options

@@ -81,7 +81,6 @@ struct PlanMapping::Impl {
     collapse::SampleRunOptions o;
     o.after = options.after, o.frame_rate = options.frame_rate, o.lanes = options.lanes;
     if (options.condensed) o.condensation = &condensation, o.known = &known;
-    o.condense.highest_frequency = options.highest_frequency;
     if (!options.passes_quiet) o.pass_speed = 0;
     o.step_share = options.step_share, o.full_law = options.full_law;
     return o;

@@ -21,7 +21,6 @@ struct PlanMappingOptions {
   int directions = 24;                          // in which the debris outline is taken, from W's x counter-clockwise
   double frame_rate = 0;                        // at which runs are looked at; 0: the plan's [1/s]
   bool condensed = false;                       // like frames as one (collapse/condense.h)
-  double highest_frequency = 2000;              // of condensed models [rad/s]
   bool lanes = false;  // samples of one build in the lanes of one batch; slower than one by one (docs/plan-mapping.md)
   int threads = 1;     // 0: all of the machine
   double step_share = 1;     // of the engine's own step, for studies of convergence

@@ -53,10 +53,7 @@ Definition read_definition(const std::string& text) {
   out.options.tilt_interval = identity.at("tilt_interval");
   out.options.frame_rate = identity.at("frame_rate");
   out.options.directions = identity.at("directions");
-  if (identity.contains("condensed")) {
-    out.options.condensed = true;
-    out.options.highest_frequency = identity.at("condensed").at("highest_frequency");
-  }
+  out.options.condensed = identity.contains("condensed");
   out.options.vibration = identity.value("vibration", false);
   out.options.threads = 1;
   out.rules = identity.at("rules").get<std::string>();
@@ -153,7 +150,7 @@ Problem make_plan_problem(const product::Plan& plan, const PlanMappingOptions& g
     p.confirm = default_confirm;
     p.not_modelled.push_back("Frames that are alike move as one, in their plane: nothing falls sideways.");
     json identity = json::parse(p.identity);
-    identity["condensed"] = {{"highest_frequency", options.highest_frequency}};
+    identity["condensed"] = true;
     set_plan_identity(p, identity.dump());
   }
   p.levels = plan.fuzzy.search.levels;

@@ -19,13 +19,11 @@ Condensation find(const product::Plan& plan) {
   return find_like_frames(plans, default_knowledge());
 }
 
-mbs::Model condense(const product::Plan& plan, ModelMap& map, double highest_frequency = 0,
-                    const KnownCurves* known = nullptr) {
+mbs::Model condense(const product::Plan& plan, ModelMap& map, const KnownCurves* known = nullptr,
+                    const Knowledge& k = default_knowledge()) {
   const Condensation c = find(plan);
   EXPECT_EQ(c.refusal, "");
-  CondenseOptions o;
-  o.highest_frequency = highest_frequency;
-  return make_condensed_model(plan, default_knowledge(), c, o, known, map);
+  return make_condensed_model(plan, k, c, known, map);
 }
 
 product::Plan weida(const std::string& file = "plan.toml") {
@@ -104,7 +102,7 @@ TEST(CondensePhysics, ColumnsBearWhatTheyBearInTheBuilding) {
   ModelMap whole_map, map;
   double whole_weight = 0, weight = 0;
   const auto whole = forces(make_model(plan, default_knowledge(), whole_map), whole_map, whole_weight);
-  const auto condensed = forces(condense(plan, map, 2000), map, weight);
+  const auto condensed = forces(condense(plan, map), map, weight);
   EXPECT_NEAR(weight, whole_weight, 1e-6 * whole_weight) << "equilibrium to 1e-8 of the weight at each body";
   ASSERT_EQ(condensed.size(), 8u);
   for (const std::string row : {"A", "B", "C", "D"})
@@ -123,11 +121,11 @@ TEST(Condense, KnownCurvesChangeNoBit) {
   const KnownCurves known = make_known_curves(plan, default_knowledge(), find(plan));
   EXPECT_FALSE(known.laws.empty());
   ModelMap a, b;
-  EXPECT_EQ(mbs::to_json(condense(plan, a, 2000, &known), {}), mbs::to_json(condense(plan, b, 2000), {}));
+  EXPECT_EQ(mbs::to_json(condense(plan, a, &known), {}), mbs::to_json(condense(plan, b), {}));
   // of another strength only the laws that it does not concern are taken over
   product::Plan other = plan;
   other.concretes[0].fc *= 1.1;
-  EXPECT_EQ(mbs::to_json(condense(other, a, 0, &known), {}), mbs::to_json(condense(other, b, 0), {}));
+  EXPECT_EQ(mbs::to_json(condense(other, a, &known), {}), mbs::to_json(condense(other, b), {}));
 }
 
 TEST(Condense, SamplesShareTheLawsThatTheirValuesLeaveAsTheyAre) {
@@ -137,7 +135,7 @@ TEST(Condense, SamplesShareTheLawsThatTheirValuesLeaveAsTheyAre) {
   for (product::Concrete& c : other.concretes)
     if (c.name == "hinge") c.fc *= 1.1;
   ModelMap a, b;
-  const mbs::Model one = condense(plan, a, 2000, &known), two = condense(other, b, 2000, &known);
+  const mbs::Model one = condense(plan, a, &known), two = condense(other, b, &known);
   ASSERT_EQ(one.laws.size(), two.laws.size());
   int large = 0, shared = 0;
   for (size_t i = 0; i < one.laws.size(); ++i) {
@@ -146,28 +144,6 @@ TEST(Condense, SamplesShareTheLawsThatTheirValuesLeaveAsTheyAre) {
     shared += one.laws.shared(i).identity() == two.laws.shared(i).identity();
   }
   EXPECT_GT(2 * shared, large);
-}
-
-TEST(CondensePhysics, FrequencyIsCutWhereItIsAskedFor) {
-  const product::Plan plan = weida();
-  const auto frequency = [&](double highest) {
-    ModelMap map;
-    return mbs::Simulation(condense(plan, map, highest), {}).summary().highest_frequency;
-  };
-  EXPECT_GT(frequency(0), 4000);
-  // the bound looks at shifts and turns by themselves; both together may swing up to √2 above it
-  EXPECT_LT(frequency(2000), 1.42 * 2000);
-  // and the stubs that the first charges leave are as slow
-  for (const double highest : {0.0, 2000.0}) {
-    ModelMap map;
-    mbs::Options o;
-    o.duration = 0.03;
-    const mbs::Summary s = mbs::run(condense(plan, map, highest), o);
-    if (highest == 0)
-      EXPECT_GT(s.highest_frequency, 5000);
-    else
-      EXPECT_LT(s.highest_frequency, 1.42 * 2000);
-  }
 }
 
 }  // namespace
