@@ -364,7 +364,7 @@ void add_study(CLI::App& app, Arguments& a) {
   study->add_option("--name", y.name, "of the study on the server; that of the folder if left out");
   CLI::Option* condensed = study->add_flag(
       "--condensed", y.condensed,
-      "of a plan: run its like frames as one, at a fifteenth of the cost; whole runs confirm the bounds");
+      "of a plan: run its like frames as one, at a tenth of the cost; whole runs confirm the bounds");
   study->add_option("--confirm", y.confirm, "whole runs at the end of a condensed study at most")
       ->check(CLI::Range(1, 1000000))
       ->needs(condensed);
