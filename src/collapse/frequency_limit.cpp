@@ -45,12 +45,13 @@ class Limiter {
  public:
   Limiter(mbs::Model& model, double highest) : model_(model), square_(highest * highest) {}
 
-  void cut_along(int axis) {
+  void cut_horizontal_springs() {
     for (mbs::ZoneElement& e : model_.elements) {
       const double most = square_ * reduced_mass(e) / with_damper(e);
       const Mat3 R = axes_of(model_, e);
+      const auto is_cut = [&](int i) { return model_.is_planar ? R(0, i) * R(0, i) > 0.5 : R(2, i) * R(2, i) <= 0.5; };
       for (int i = 0; i < 3; ++i)
-        if (R(axis, i) * R(axis, i) > 0.5) e.translational_stiffness[i] = std::min(e.translational_stiffness[i], most);
+        if (is_cut(i)) e.translational_stiffness[i] = std::min(e.translational_stiffness[i], most);
     }
   }
 
@@ -123,8 +124,7 @@ std::vector<int> turning_axes(const mbs::Model& model) {
 
 void limit_frequency(mbs::Model& model, double highest) {
   Limiter limiter(model, highest);
-  limiter.cut_along(0);
-  if (!model.is_planar) limiter.cut_along(1);
+  limiter.cut_horizontal_springs();
   for (const int axis : turning_axes(model)) {
     const std::vector<double> turn = limiter.find_turning(axis);
     for (size_t b = 0; b < turn.size(); ++b)
