@@ -362,9 +362,9 @@ void add_study(CLI::App& app, Arguments& a) {
   study->add_flag("--one-shot", y.one_shot, "start the command for every point and close its input behind it");
   study->add_option("--store", y.store, "database on a server, postgresql://user@host/name; a file if left out");
   study->add_option("--name", y.name, "of the study on the server; that of the folder if left out");
-  CLI::Option* condensed = study->add_flag(
-      "--condensed", y.condensed,
-      "of a plan: run its like frames as one, at a tenth of the cost; whole runs confirm the bounds");
+  CLI::Option* condensed =
+      study->add_flag("--condensed", y.condensed,
+                      "of a plan: run its like frames as one, at a tenth of the cost; whole runs confirm the bounds");
   study->add_option("--confirm", y.confirm, "whole runs at the end of a condensed study at most")
       ->check(CLI::Range(1, 1000000))
       ->needs(condensed);
