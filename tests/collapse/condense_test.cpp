@@ -19,11 +19,10 @@ Condensation find(const product::Plan& plan) {
   return find_like_frames(plans, default_knowledge());
 }
 
-mbs::Model condense(const product::Plan& plan, ModelMap& map, const KnownCurves* known = nullptr,
-                    const Knowledge& k = default_knowledge()) {
+mbs::Model condense(const product::Plan& plan, ModelMap& map, const KnownCurves* known = nullptr) {
   const Condensation c = find(plan);
   EXPECT_EQ(c.refusal, "");
-  return make_condensed_model(plan, k, c, known, map);
+  return make_condensed_model(plan, default_knowledge(), c, known, map);
 }
 
 product::Plan weida(const std::string& file = "plan.toml") {
