@@ -61,6 +61,7 @@ LiveModel::LiveModel(product::Plan plan, const Knowledge& k, int threads) : plan
   built_ = std::move(static_cast<BuilderState&>(builder));
   for (const mbs::Body& b : built_.model.bodies) shapes_.push_back(b.shapes);
   for (const BodyEntry& b : map_.bodies) drawn_.push_back(b.shapes);
+  for (const mbs::RotationalElement& r : built_.model.rotational_elements) loose_.push_back(r.loose_translational);
   // places in the plan, not in time
   for (size_t s = 0; s < plan_.stages.size(); ++s)
     for (size_t c = 0; c < plan_.stages[s].charges.size(); ++c)
@@ -89,6 +90,7 @@ void LiveModel::lay_out_events() {
     model.bodies[b].shapes = shapes_[b];
     map_.bodies[b].shapes = drawn_[b];
   }
+  for (size_t r = 0; r < loose_.size(); ++r) model.rotational_elements[r].loose_translational = loose_[r];
   std::vector<Firing> schedule;
   for (const LiveCharge& c : charges_) schedule.push_back({c.stage, c.index, c.time, c.fails || c.is_removed});
   std::stable_sort(schedule.begin(), schedule.end(), [](const Firing& a, const Firing& b) { return a.time < b.time; });

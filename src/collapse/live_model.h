@@ -75,6 +75,7 @@ class LiveModel {
   // before any event
   std::vector<std::vector<mbs::Shape>> shapes_;       // of bodies
   std::vector<std::vector<record::BoxShape>> drawn_;  // of the map's bodies
+  std::vector<Vec3> loose_;                           // translational stiffness of loosened joints, of their elements
   std::vector<std::string> cables_off_;               // removed ones
   struct Extra {
     mbs::Event event;

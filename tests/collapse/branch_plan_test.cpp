@@ -1,5 +1,6 @@
 #include "collapse/branch_plan.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -49,6 +50,36 @@ TEST(BranchPlan, WithoutEditsIsThePlan) {
   const BranchPlan b = write_branch_plan(edited(plan, {}));
   EXPECT_EQ(b.text, plan.text);
   EXPECT_TRUE(b.taken.empty() && b.left_out.empty());
+}
+
+TEST(LiveModel, ForgetsStubsThatChargesTakenOutWouldHaveLeft) {
+  std::vector<Diagnostic> warnings;
+  std::string text;
+  const product::Plan plan = product::read_plan_file(TOPPLE_SOURCE_DIR "/examples/weida/plan.toml", warnings, text);
+  const LiveModel fresh(plan, default_knowledge(), 1);
+  const int last = static_cast<int>(fresh.charges().size());
+  const product::Charge& c = fresh.charge(fresh.charges().front());
+  const auto add = [&](double length) {
+    return fmt::format(R"({{"command": "add_charge", "member": "{}", "position": {}, "destroyed_length": {}, )"
+                       R"("residual_bars": {}, "transition_damage": {}, "time": 0}})",
+                       fresh.member_of(fresh.charges().front()), c.position, length, c.residual_bars,
+                       c.transition_damage);
+  };
+  const auto remove = [](int charge) { return fmt::format(R"({{"command": "remove_charge", "charge": {}}})", charge); };
+  // a stub half as long, then what the plan has
+  const double half_stub = c.destroyed_length + 0.5 * (2.44 - c.position - 0.5 * c.destroyed_length);
+  const LiveModel shorter = edited(plan, {{-1, remove(0)}, {-1, add(half_stub)}});
+  const LiveModel again =
+      edited(plan, {{-1, remove(0)}, {-1, add(half_stub)}, {-1, remove(last)}, {-1, add(c.destroyed_length)}});
+  const auto stiffness = [](const LiveModel& m, size_t r) {
+    return m.model().rotational_elements[r].loose_translational;
+  };
+  int differ = 0;
+  for (size_t r = 0; r < fresh.model().rotational_elements.size(); ++r) {
+    EXPECT_EQ(stiffness(again, r), stiffness(fresh, r)) << r;
+    differ += stiffness(shorter, r) == stiffness(fresh, r) ? 0 : 1;
+  }
+  EXPECT_EQ(differ, 1);
 }
 
 TEST(BranchPlan, FiresWhatTheBranchFires) {
