@@ -9,13 +9,7 @@ namespace topple::collapse {
 std::string make_height_table(const record::Record& r, double cell) {
   std::string out = "x [m],y [m],height [m]\r\n";
   if (r.time.empty()) return out;
-  std::vector<PlacedBox> boxes;
-  for (size_t b = 0; b < r.bodies.size(); ++b) {
-    if (r.bodies[b].fixed) continue;
-    const Pose X_WB = record::pose_at(r, r.time.size() - 1, b);
-    for (const record::BoxShape& s : r.bodies[b].shapes) boxes.push_back({X_WB * s.X_BS, s.half});
-  }
-  for (const Heap::Column& c : calc_heap(boxes, cell).columns)
+  for (const Heap::Column& c : calc_heap(find_moving_boxes(r, r.time.size() - 1), cell).columns)
     out += fmt::format("{},{},{}\r\n", (static_cast<double>(c.i) + 0.5) * cell, (static_cast<double>(c.j) + 0.5) * cell,
                        c.height);
   return out;

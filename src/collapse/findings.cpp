@@ -47,16 +47,6 @@ struct Context {
   }
   std::vector<StageTimes> stage_times() const { return find_stage_times(map); }
   std::string stage_name(size_t s) const { return plan.stages[s].name; }
-  std::vector<PlacedBox> boxes_at(size_t frame, bool moving_only) const {
-    std::vector<PlacedBox> boxes;
-    const size_t B = r.bodies.size();
-    for (size_t b = 0; b < B; ++b) {
-      if (moving_only && r.bodies[b].fixed) continue;
-      const Pose X_WB = pose(frame, b);
-      for (const record::BoxShape& s : r.bodies[b].shapes) boxes.push_back({X_WB * s.X_BS, s.half});
-    }
-    return boxes;
-  }
   Pose pose(size_t frame, size_t body) const { return record::pose_at(r, frame, body); }
 };
 
@@ -169,10 +159,11 @@ Reach add_debris(const Context& c, const Mechanism& m) {
     text += fmt::format(" The outline of the nearest {:.0f} % of the mass encloses {:.0f} m2.", 100 * share,
                         calc_area(calc_share_outline(c.r, last, share)));
   c.add("debris.reach", "Fall and debris", "Reach of the debris", text, reach.largest, "m");
-  const std::vector<PlacedBox> boxes = c.boxes_at(last, true);
-  const Heap heap = calc_heap(boxes, kHeapCell);
-  double solid = 0;
-  for (const PlacedBox& box : boxes) solid += 8 * box.half.x * box.half.y * box.half.z;
+  const Heap heap = calc_heap(find_moving_boxes(c.r, last), kHeapCell);
+  double solid = 0;  // what is crushed included
+  for (const record::BodyInfo& b : c.r.bodies)
+    if (!b.fixed)
+      for (const record::BoxShape& s : b.shapes) solid += 8 * s.half.x * s.half.y * s.half.z;
   c.add("debris.height", "Fall and debris", "Height of the hill",
         fmt::format("The highest point of all parts lies {:.1f} m above the ground.", heap.height), heap.height, "m");
   c.add("debris.volume", "Fall and debris", "Volume of the hill",
@@ -194,7 +185,8 @@ void add_clearances(const Context& c) {
       for (size_t b = 0; b < c.r.bodies.size(); ++b) {
         if (f > 0 && c.r.bodies[b].fixed) continue;
         const Pose X_WB = c.pose(f, b);
-        for (const record::BoxShape& s : c.r.bodies[b].shapes) {
+        for (size_t i = 0; i < c.r.bodies[b].shapes.size(); ++i) {
+          const record::BoxShape s = record::shape_at(c.r, f, b, i);
           const PlacedBox box{X_WB * s.X_BS, s.half};
           const double radius = norm(s.half);
           const double gap[2] = {std::max({nlow[0] - box.X_WS.p.x - radius, box.X_WS.p.x - radius - nhigh[0], 0.0}),

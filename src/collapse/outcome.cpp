@@ -69,6 +69,19 @@ Polygon calc_building_outline(const mbs::Model& model, const ModelMap& map) {
   return calc_hull(std::move(corners));
 }
 
+std::vector<PlacedBox> find_moving_boxes(const record::Record& r, size_t frame) {
+  std::vector<PlacedBox> boxes;
+  for (size_t b = 0; b < r.bodies.size(); ++b) {
+    if (r.bodies[b].fixed) continue;
+    const Pose X_WB = record::pose_at(r, frame, b);
+    for (size_t i = 0; i < r.bodies[b].shapes.size(); ++i) {
+      const record::BoxShape s = record::shape_at(r, frame, b, i);
+      boxes.push_back({X_WB * s.X_BS, s.half});
+    }
+  }
+  return boxes;
+}
+
 namespace {
 
 /// How far a part lies beyond the box around the footprint.
@@ -90,7 +103,8 @@ std::vector<PartReach> find_part_reaches(const record::Record& r, size_t frame) 
     part.body = b;
     part.mass = r.bodies[b].mass;
     const Pose X_WB = record::pose_at(r, frame, b);
-    for (const record::BoxShape& s : r.bodies[b].shapes)
+    for (size_t shape = 0; shape < r.bodies[b].shapes.size(); ++shape) {
+      const record::BoxShape s = record::shape_at(r, frame, b, shape);
       for (const Point2& p : calc_outline({X_WB * s.X_BS, s.half})) {
         part.corners.push_back(p);
         for (size_t i : {0UL, 1UL}) {
@@ -98,6 +112,7 @@ std::vector<PartReach> find_part_reaches(const record::Record& r, size_t frame) 
           part.side[2 * i + 1] = std::max(part.side[2 * i + 1], p[i] - high[i]);
         }
       }
+    }
     part.way = *std::max_element(part.side.begin(), part.side.end());
     parts.push_back(std::move(part));
   }

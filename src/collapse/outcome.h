@@ -29,6 +29,9 @@ size_t find_frame(const std::vector<BlockFrame>&, double time);
 /// Outline of the model as it stands at the start, seen from above.
 Polygon calc_building_outline(const mbs::Model&, const ModelMap&);
 
+/// Boxes of all bodies that can move, as crushing has left them.
+std::vector<PlacedBox> find_moving_boxes(const record::Record&, size_t frame);
+
 /// How far parts lie beyond the building's footprint (the box around its outline along W's axes).
 struct Reach {
   std::array<double, 4> side{};       // towards -x, +x, -y, +y; 0: not beyond [m]

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <optional>
 #include <set>
+#include <span>
 
 #include "base/interpolate.h"
 #include "base/rotation_fit.h"
@@ -63,6 +64,7 @@ Recorder::Recorder(const mbs::Model& model, const ModelMap& map, const Knowledge
     const ZoneEntry& z = map.joints[j];
     record.zones.push_back({z.name, z.member, z.subsystem, z.body_a, z.body_b, z.p_W});
   }
+  find_crushed_ends();
   record.series = {{"tilt_angle", "Tilt angle", "rad", "angle", {}},
                    {"ground_force", "Ground force", "N", "force", {}},
                    {"mass_centre_height", "Height of the mass centre", "m", "height", {}},
@@ -79,6 +81,71 @@ Recorder::Recorder(const mbs::Model& model, const ModelMap& map, const Knowledge
                    {"broken_zones", "Broken zones", "1", "count", {}},
                    {"connected_share", "Connected share of the upper block", "1", "share", {}}};
   if (!model.loads.empty()) record.series.push_back({"energy_loads", "Work of loads", "J", "energy", {}});
+}
+
+namespace {
+
+record::CrushedEnd end_of(const mbs::CrushedBox& box) { return {box.body, box.shape, box.axis, box.end}; }
+
+}  // namespace
+
+void Recorder::find_crushed_ends() {
+  for (size_t e = 0; e < model_.elements.size(); ++e) {
+    const mbs::ZoneElement& element = model_.elements[e];
+    if (!(element.crush_through > 0)) continue;
+    std::vector<double> stations;
+    for (const mbs::Station& s : element.stations) stations.push_back(s.x);
+    for (const bool is_b : {false, true}) {
+      const mbs::BodyId id = is_b ? element.b : element.a;
+      if (id == mbs::kGround) continue;
+      const size_t b = static_cast<size_t>(id.index);
+      const std::vector<mbs::Shape>& modelled = model_.bodies[b].shapes;
+      // what is drawn as a box must be one
+      if (std::any_of(modelled.begin(), modelled.end(), [](auto& s) { return s.kind != mbs::Shape::Kind::Box; }))
+        continue;
+      std::vector<mbs::Shape> drawn;
+      for (const record::BoxShape& s : map_.bodies[b].shapes)
+        drawn.push_back({mbs::Shape::Kind::Box, s.X_BS, s.half, 0, {}});
+      const size_t first = crushed_.size();
+      mbs::find_crushed_boxes(static_cast<int>(e), is_b ? element.X_BM : element.X_AF, is_b, stations, drawn, crushed_);
+      for (mbs::CrushedBox& box : std::span(crushed_).subspan(first)) box.body = id.index;
+    }
+  }
+  std::stable_sort(crushed_.begin(), crushed_.end(), [](auto& a, auto& b) { return end_of(a) < end_of(b); });
+  for (const mbs::CrushedBox& box : crushed_) record_.crushed_ends.push_back(end_of(box));
+}
+
+void Recorder::let_ends_recede(const mbs::View& v) {
+  if (v.crushed.empty()) return;  // finite elements have no members
+  const auto is_same_shape = [](const mbs::CrushedBox& a, const mbs::CrushedBox& b) {
+    return a.body == b.body && a.shape == b.shape && a.axis == b.axis;
+  };
+  for (size_t i = 0; i < crushed_.size(); ++i) {
+    mbs::CrushedBox& box = crushed_[i];
+    const size_t e = static_cast<size_t>(box.element);
+    const double wanted = v.crushed[e][model_.elements[e].b.index == box.body ? 1 : 0] - box.begin;
+    if (!(wanted > box.taken)) continue;
+    // what other ends of the box have left of it
+    double most = box.most;
+    for (size_t k = i; k-- > 0 && is_same_shape(crushed_[k], box);) most -= crushed_[k].taken;
+    for (size_t k = i + 1; k < crushed_.size() && is_same_shape(crushed_[k], box); ++k) most -= crushed_[k].taken;
+    box.taken = std::max(box.taken, std::min(wanted, most));
+  }
+}
+
+void Recorder::take_crushed_ends(const Recorder& from, double until) {
+  const std::vector<double>& time = from.record_.time;
+  const auto frames = static_cast<size_t>(std::upper_bound(time.begin(), time.end(), until) - time.begin());
+  const size_t C = from.crushed_.size();
+  size_t row = 0;
+  for (mbs::CrushedBox& box : crushed_) {
+    while (row < C && end_of(from.crushed_[row]) < end_of(box)) ++row;
+    if (row == C || end_of(box) < end_of(from.crushed_[row])) continue;
+    box.taken = from.last_time_ <= until ? from.crushed_[row].taken
+                : frames > 0             ? from.record_.crushed_length[(frames - 1) * C + row]
+                                         : 0;
+    ++row;
+  }
 }
 
 const ZoneEntry& Recorder::entry_of(int element) const {
@@ -162,6 +229,10 @@ Pose calc_debris_pose(const DebrisEntry& d, double gravity, double time) {
   return {p, {}};
 }
 
+void Recorder::put_crushed_ends() {
+  for (const mbs::CrushedBox& box : crushed_) record_.crushed_length.push_back(static_cast<float>(box.taken));
+}
+
 void Recorder::put_debris(double time) {
   for (const DebrisEntry& d : map_.debris) put_pose(calc_debris_pose(d, norm(model_.gravity), time));
 }
@@ -173,10 +244,12 @@ void Recorder::look(const mbs::View& v) {
   last_w_ = v.w_WB;
   last_mass_ = v.mass;
   shortening_ = v.shortening;
+  let_ends_recede(v);
 }
 
 void Recorder::follow(const Recorder& before, double until) {
   start_ = before.start_;
+  take_crushed_ends(before, until);
   reaction_error_ = before.reaction_error_;
   for (const auto& told : before.stages_told_)
     if (told.first <= until) stages_told_.push_back(told);
@@ -218,6 +291,11 @@ void Recorder::append(const Recorder& from, size_t frames, double until) {
   const auto copy = [](auto& to, const auto& source, size_t n) {
     to.insert(to.end(), source.begin(), source.begin() + static_cast<std::ptrdiff_t>(n));
   };
+  for (size_t i = 0; i < frames; ++i) {
+    take_crushed_ends(from, r.time[i]);
+    put_crushed_ends();
+  }
+  take_crushed_ends(from, until);
   copy(record_.zone_state, r.zone_state, frames * Z);
   copy(record_.zone_utilisation, r.zone_utilisation, frames * Z);
   for (size_t s = 0; s < record_.series.size(); ++s) copy(record_.series[s].value, r.series[s].value, frames);
@@ -303,6 +381,7 @@ void Recorder::add_frame(const mbs::View& v) {
   }
   zone_frames_.push_back(zf);
   look(v);
+  put_crushed_ends();
 
   const BlockFrame block = calc_block(v);
   block_.push_back(block);

@@ -10,6 +10,7 @@
 #include "collapse/mechanism.h"
 #include "collapse/run.h"
 #include "collapse/vibration.h"
+#include "mbs/crushed_boxes.h"
 
 namespace topple::collapse {
 
@@ -58,6 +59,12 @@ class Recorder {
   record::Series& series(size_t i) { return record_.series[i]; }
   Touchdown calc_touchdown(int body, double time, double speed) const;
   BlockFrame calc_block(const mbs::View&) const;
+  /// Ends of what is drawn that recede as members are crushed.
+  void find_crushed_ends();
+  void let_ends_recede(const mbs::View&);
+  /// As they were in another recorder at a time; ends that it does not have keep their lengths.
+  void take_crushed_ends(const Recorder& from, double until);
+  void put_crushed_ends();
   void put_pose(const Pose&);
   void put_debris(double time);
   const ZoneEntry& entry_of(int element) const;
@@ -72,7 +79,8 @@ class Recorder {
   std::vector<Pose> start_;
   std::vector<BlockFrame> block_;
   std::vector<ZoneFrame> zone_frames_;
-  std::vector<double> shortening_;  // of the last frame
+  std::vector<double> shortening_;        // of the last frame
+  std::vector<mbs::CrushedBox> crushed_;  // of the last frame, as Record::crushed_ends; shapes as drawn
   std::vector<int> fixed_joints_;
   std::vector<std::pair<double, int>> stages_told_;  // when, which
   std::vector<Pose> last_pose_;                      // of the bodies at the last frame, for what happens after it

@@ -478,6 +478,9 @@ const mbs::View& Course::calc_view() {
     v.mass[b] = body_[b].mass;
   }
   forces_.fill(time_, motion_, v);
+  v.crushed = mbs::calc_crushed(crushed_boxes_, model_.elements.size(), [&](auto& box) {
+    return model_.elements[static_cast<size_t>(box.element)].b.index == box.body;
+  });
   v.joint_released.assign(J, false);
   v.joint_angle.assign(J, 0);
   v.joint_displacement.assign(J, 0);

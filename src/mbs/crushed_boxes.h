@@ -1,6 +1,8 @@
 #pragma once
 /// Boxes that get shorter as the member that they belong to is crushed (docs/theory/contact.md).
 
+#include <algorithm>
+#include <array>
 #include <span>
 #include <vector>
 
@@ -33,6 +35,18 @@ void find_crushed_boxes(int element, const Pose& marker, bool is_b, std::span<co
 /// Shortens a box to what an element's shortening leaves of it; whether that changed anything. A box keeps kRubble.
 ///   shortening  of the element by crushing [m]
 bool shorten_box(double shortening, CrushedBox&, Vec3& p_BS, const Mat3& R_BS, Vec3& half);
+
+/// How much of the members of zone elements is crushed, on a and on b [m].
+///   is_on_b  whether a box belongs to the element's body b
+template <class IsOnB>
+std::vector<std::array<double, 2>> calc_crushed(std::span<const CrushedBox> boxes, size_t elements, IsOnB is_on_b) {
+  std::vector<std::array<double, 2>> crushed(elements, {0, 0});
+  for (const CrushedBox& box : boxes) {
+    double& end = crushed[static_cast<size_t>(box.element)][is_on_b(box) ? 1 : 0];
+    if (box.taken > 0) end = std::max(end, box.begin + box.taken);
+  }
+  return crushed;
+}
 
 /// Length that a box keeps when all of it has been crushed [m].
 inline constexpr double kRubble = 0.02;

@@ -2,6 +2,7 @@
 /// The native engine: equilibrium under dead load (implicit), then explicit steps through the events to the end.
 /// Constant model, separate state, memory allocated before the loop (docs/theory/multibody.md).
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -36,12 +37,13 @@ enum class ElementState : std::uint8_t { Elastic, Yielded, Softening, Broken, Re
 struct View {
   double time = 0;
   std::vector<Pose> X_WB;
-  std::vector<Vec3> v_WB, w_WB;                     // of the centre of mass, of the body; in W
-  std::vector<double> mass;                         // current [kg]
-  std::vector<ElementState> element_state;          // zone elements, then rotational elements
-  std::vector<double> utilisation;                  // largest demand over capacity, same order
-  std::vector<double> rotation;                     // largest plastic rotation, same order [rad]
-  std::vector<double> shortening;                   // plastic shortening, same order [m]
+  std::vector<Vec3> v_WB, w_WB;                // of the centre of mass, of the body; in W
+  std::vector<double> mass;                    // current [kg]
+  std::vector<ElementState> element_state;     // zone elements, then rotational elements
+  std::vector<double> utilisation;             // largest demand over capacity, same order
+  std::vector<double> rotation;                // largest plastic rotation, same order [rad]
+  std::vector<double> shortening;              // plastic shortening, same order [m]
+  std::vector<std::array<double, 2>> crushed;  // of members, from their far ends on a and b [m]; zone elements only
   std::vector<Vec3> element_force, element_moment;  // of a on b at the marker, in F; zone elements only
   std::vector<Vec3> joint_force, joint_moment;      // reaction of the parent on the child, in F
   std::vector<double> joint_angle;                  // of revolute and cylindrical joints, else 0 [rad]

@@ -770,6 +770,8 @@ const View& System::calc_view() {
   v.element_moment.resize(E);
   v.element_translation.resize(E);
   v.element_rotation.resize(E);
+  v.crushed = calc_crushed(s.crushed_boxes, E,
+                           [&](auto& box) { return elements[static_cast<size_t>(box.element)].b == box.body; });
   const auto fill = [&](size_t at, const ZoneParameters& p, const ZoneState& z) {
     v.element_state[at] = !z.live ? (z.reason == BreakReason::Removed ? ElementState::Removed : ElementState::Broken)
                           : is_softening(p, laws, s.time, z) ? ElementState::Softening

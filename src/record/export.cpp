@@ -10,7 +10,7 @@ namespace topple::record {
 Record keep_frames(const Record& r, double interval) {
   Record out = r;
   out.time.clear(), out.position.clear(), out.orientation.clear();
-  out.zone_state.clear(), out.zone_utilisation.clear();
+  out.zone_state.clear(), out.zone_utilisation.clear(), out.crushed_length.clear();
   for (Series& series : out.series) series.value.clear();
   const auto copy_row = [](const auto& from, auto& to, std::size_t row, std::size_t width) {
     const auto begin = from.begin() + static_cast<std::ptrdiff_t>(row * width);
@@ -25,6 +25,7 @@ Record keep_frames(const Record& r, double interval) {
     copy_row(r.orientation, out.orientation, s, 4 * B);
     copy_row(r.zone_state, out.zone_state, s, Z);
     copy_row(r.zone_utilisation, out.zone_utilisation, s, Z);
+    copy_row(r.crushed_length, out.crushed_length, s, r.crushed_ends.size());
     for (std::size_t i = 0; i < r.series.size(); ++i) out.series[i].value.push_back(r.series[i].value[s]);
   }
   return out;

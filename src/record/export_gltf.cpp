@@ -162,6 +162,26 @@ Path find_path(const Record& r, std::size_t body) {
   return path;
 }
 
+/// A box on its body as its member is crushed.
+struct Crushing {
+  std::vector<float> centre, half;  // (frames x 3)
+  bool happens = false;
+};
+
+Crushing find_crushing(const Record& r, std::size_t body, std::size_t shape) {
+  Crushing out;
+  const Vec3 whole = r.bodies[body].shapes[shape].half;
+  for (std::size_t s = 0; s < r.time.size(); ++s) {
+    const BoxShape box = shape_at(r, s, body, shape);
+    out.happens |= !(box.half == whole);
+    for (int i = 0; i < 3; ++i) {
+      out.centre.push_back(static_cast<float>(box.X_BS.p[i]));
+      out.half.push_back(static_cast<float>(box.half[i]));
+    }
+  }
+  return out;
+}
+
 /// The outlines on the ground as loops of lines.
 void add_outlines(Document& d, const Record& r, json& children) {
   const auto add = [&](const std::string& name, const std::vector<std::array<double, 2>>& outline) {
@@ -190,16 +210,22 @@ std::string to_gltf(const Record& r) {
   json children = json::array();
   Cubes cubes(d);
   std::vector<std::pair<int, Path>> moving;
+  std::vector<std::pair<int, Crushing>> crushed;
   for (std::size_t b = 0; b < r.bodies.size(); ++b) {
     const BodyInfo& body = r.bodies[b];
     if (body.shapes.empty() || r.time.empty()) continue;
     Path path = find_path(r, b);
     json shapes = json::array();
-    for (const BoxShape& s : body.shapes)
-      shapes.push_back(d.put("nodes", {{"mesh", cubes.mesh_of(s.material)},
+    for (std::size_t i = 0; i < body.shapes.size(); ++i) {
+      const BoxShape s = shape_at(r, 0, b, i);
+      const int node = d.put("nodes", {{"mesh", cubes.mesh_of(s.material)},
                                        {"translation", to_list(s.X_BS.p)},
                                        {"rotation", to_list(normalized(s.X_BS.q))},
-                                       {"scale", to_list(s.half)}}));
+                                       {"scale", to_list(s.half)}});
+      shapes.push_back(node);
+      Crushing crushing = find_crushing(r, b, i);
+      if (crushing.happens) crushed.emplace_back(node, std::move(crushing));
+    }
     const int node = d.put("nodes", {{"name", body.name},
                                      {"translation", to_list(path.start.p)},
                                      {"rotation", to_list(path.start.q)},
@@ -210,7 +236,7 @@ std::string to_gltf(const Record& r) {
   }
   add_outlines(d, r, children);
   if (!children.empty()) d.root["nodes"][0]["children"] = std::move(children);
-  if (!moving.empty()) {
+  if (!moving.empty() || !crushed.empty()) {
     std::vector<float> time;
     for (const double t : r.time) time.push_back(static_cast<float>(t - r.time.front()));
     d.begin_view(0);
@@ -224,6 +250,10 @@ std::string to_gltf(const Record& r) {
     for (const auto& [node, path] : moving) {
       add(node, "translation", d.add(path.place, kFloat, "VEC3", 3, false));
       add(node, "rotation", d.add(path.turn, kFloat, "VEC4", 4, false));
+    }
+    for (const auto& [node, crushing] : crushed) {
+      add(node, "translation", d.add(crushing.centre, kFloat, "VEC3", 3, false));
+      add(node, "scale", d.add(crushing.half, kFloat, "VEC3", 3, false));
     }
     d.put("animations", {{"name", "collapse"}, {"samplers", std::move(samplers)}, {"channels", std::move(channels)}});
   }

@@ -98,7 +98,8 @@ std::string make_parts(const Record& r, std::size_t frame) {
   for (std::size_t b = 0; b < r.bodies.size(); ++b) {
     const BodyInfo& body = r.bodies[b];
     const Pose X_WB = pose_at(r, frame, b), X_WB0 = pose_at(r, 0, b);
-    for (const BoxShape& shape : body.shapes) {
+    for (std::size_t k = 0; k < body.shapes.size(); ++k) {
+      const BoxShape shape = shape_at(r, frame, b, k);
       for (const Vec3& c : kCorners) {
         const Vec3 p_B = shape.X_BS * Vec3{c.x * shape.half.x, c.y * shape.half.y, c.z * shape.half.z};
         const Vec3 p_W = X_WB * p_B, u = p_W - X_WB0 * p_B;

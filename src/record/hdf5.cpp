@@ -194,6 +194,9 @@ class Writer {
     }
   }
 
+  /// Whether a group is to be there.
+  static bool has(const std::string&) { return true; }
+
   template <class Number>
   void block(const std::string& name, std::vector<Number>& values, const Shape& shape, const About& about) {
     if (values.size() != size_of(shape))
@@ -335,9 +338,11 @@ class Reader {
     fill(name, set, rows, project);
   }
 
+  bool has(const std::string& group) const { return H5Lexists(file_, group.c_str(), H5P_DEFAULT) > 0; }
+
   /// Names of the groups in a group, none if it is not there.
   std::vector<std::string> groups_in(const std::string& group) {
-    if (H5Lexists(file_, group.c_str(), H5P_DEFAULT) <= 0) return {};
+    if (!has(group)) return {};
     const Handle id(H5Gopen2(file_, group.c_str(), H5P_DEFAULT), H5Gclose, group);
     H5G_info_t info;
     demand(H5Gget_info(id, &info), group);
@@ -554,6 +559,15 @@ void transfer(Archive& a, Record& r, Flat& flat) {
   a.column("zones/body_b", r.zones, &ZoneInfo::body_b, {.meaning = "row of bodies, -1 the ground"});
   a.column("zones/position", r.zones, &ZoneInfo::p_W, {.unit = "m", .frame = "world", .meaning = "at the start"});
 
+  // not in records of before members were crushed through
+  const bool knows_crushing = a.has("crushed_ends");
+  if (knows_crushing) {
+    a.first_column("crushed_ends/body", r.crushed_ends, &CrushedEnd::body, {.meaning = "row of bodies"});
+    a.column("crushed_ends/shape", r.crushed_ends, &CrushedEnd::shape, {.meaning = "of that body's shapes, from 0"});
+    a.column("crushed_ends/axis", r.crushed_ends, &CrushedEnd::axis, {.frame = "shape", .meaning = "0 x, 1 y, 2 z"});
+    a.column("crushed_ends/side", r.crushed_ends, &CrushedEnd::side, {.meaning = "end of the axis: 1 or -1"});
+  }
+
   a.first_column("neighbours/name", r.neighbours, &Neighbour::name, {});
   a.column("neighbours/is_utility", r.neighbours, &Neighbour::is_utility, {});
   a.first_column("neighbour_corners/neighbour", flat.corners, &CornerRow::owner, {.meaning = "row of neighbours"});
@@ -571,6 +585,9 @@ void transfer(Archive& a, Record& r, Flat& flat) {
           {.meaning = "0 elastic, 1 yielded, 2 softening, 3 broken, 4 fired, 5 crushed (a stub that a charge left)"});
   a.block("frames/zone_utilisation", r.zone_utilisation, {frames, zones},
           {.meaning = "demand over capacity, 1 at most of zones that are not elastic"});
+  if (knows_crushing)
+    a.block("frames/crushed_length", r.crushed_length, {frames, r.crushed_ends.size()},
+            {.unit = "m", .meaning = "by which a crushed end has receded"});
 
   a.first_column("series/id", r.series, &Series::id, {});
   a.column("series/title", r.series, &Series::title, {});
@@ -643,6 +660,14 @@ void check_contents(const Reader& reader, const Record& r) {
   for (const ZoneInfo& zone : r.zones)
     for (const int body : {zone.body_a, zone.body_b})
       if (body < -1 || body >= bodies) reader.damaged("zone " + zone.name + " names a body that is not there");
+  for (std::size_t c = 0; c < r.crushed_ends.size(); ++c) {
+    const CrushedEnd& end = r.crushed_ends[c];
+    if (c > 0 && end < r.crushed_ends[c - 1]) reader.damaged("crushed_ends do not rise");
+    if (end.body < 0 || end.body >= bodies || end.shape < 0 ||
+        static_cast<std::size_t>(end.shape) >= r.bodies[static_cast<std::size_t>(end.body)].shapes.size() ||
+        end.axis < 0 || end.axis > 2 || std::abs(end.side) != 1)
+      reader.damaged("crushed_ends names a shape that is not there");
+  }
   for (const std::uint8_t state : r.zone_state)
     if (state > static_cast<std::uint8_t>(ZoneState::Crushed)) reader.damaged("frames/zone_state has an unknown state");
   for (const Finding& finding : r.findings)

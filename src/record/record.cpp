@@ -1,5 +1,6 @@
 #include "record/record.h"
 
+#include <algorithm>
 #include <stdexcept>
 
 namespace topple::record {
@@ -22,6 +23,21 @@ Pose pose_at(const Record& r, std::size_t frame, std::size_t body) {
   const float* p = &r.position[3 * (frame * r.bodies.size() + body)];
   const float* q = &r.orientation[4 * (frame * r.bodies.size() + body)];
   return {{p[0], p[1], p[2]}, normalized(Quat{q[0], q[1], q[2], q[3]})};
+}
+
+BoxShape shape_at(const Record& r, std::size_t frame, std::size_t body, std::size_t shape) {
+  BoxShape box = r.bodies[body].shapes[shape];
+  const auto place = [](const CrushedEnd& e) { return std::pair(e.body, e.shape); };
+  const auto ends =
+      std::ranges::equal_range(r.crushed_ends, std::pair(static_cast<int>(body), static_cast<int>(shape)), {}, place);
+  for (auto end = ends.begin(); end != ends.end(); ++end) {
+    const auto row = static_cast<std::size_t>(end - r.crushed_ends.begin());
+    const double half = 0.5 * r.crushed_length[frame * r.crushed_ends.size() + row];
+    if (half == 0) continue;
+    box.half[end->axis] -= half;
+    box.X_BS.p -= (half * end->side) * to_matrix(box.X_BS.q).column(end->axis);
+  }
+  return box;
 }
 
 }  // namespace topple::record

@@ -26,6 +26,14 @@ struct BodyInfo {
   std::vector<BoxShape> shapes;
 };
 
+/// An end of a box that recedes as its member is crushed.
+struct CrushedEnd {
+  int body = 0, shape = 0;  // index into Record::bodies, and into that body's shapes
+  int axis = 0;             // of the box: 0 x, 1 y, 2 z
+  int side = 1;             // of that axis: 1 or -1
+  auto operator<=>(const CrushedEnd&) const = default;
+};
+
 enum class ZoneState : std::uint8_t { Elastic = 0, Yielded = 1, Softening = 2, Broken = 3, Fired = 4, Crushed = 5 };
 
 struct ZoneInfo {
@@ -110,6 +118,7 @@ struct Record {
   std::vector<KeyValue> plan_values;
   std::vector<BodyInfo> bodies;
   std::vector<ZoneInfo> zones;
+  std::vector<CrushedEnd> crushed_ends;  // in rising order
   std::vector<Neighbour> neighbours;
   std::vector<std::array<double, 2>> building_outline;  // before the first charge, counter-clockwise [m]
 
@@ -118,6 +127,7 @@ struct Record {
   std::vector<float> orientation;        // unit quaternion w x y z         (S x B x 4)
   std::vector<std::uint8_t> zone_state;  // ZoneState                       (S x Z)
   std::vector<float> zone_utilisation;   // demand over capacity, 1 at most of zones that are not elastic (S x Z)
+  std::vector<float> crushed_length;     // by which each crushed end has receded, never falling [m] (S x C)
   std::vector<Series> series;
   std::vector<Output> outputs;  // read back in the order of their names
   std::vector<Event> events;
@@ -130,6 +140,8 @@ struct Record {
 
 /// A body in W at a frame.
 Pose pose_at(const Record&, std::size_t frame, std::size_t body);
+/// A shape of a body as crushing has left it at a frame.
+BoxShape shape_at(const Record&, std::size_t frame, std::size_t body, std::size_t shape);
 
 /// Writes one HDF5 file (beside, then renamed). Throws std::runtime_error with the path if it cannot.
 void write_hdf5(const Record&, const std::string& path);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdlib>
@@ -99,6 +100,7 @@ json make_json(const Record& record, Packing packing) {
   check_size("orientation", record.orientation.size(), S * B * 4);
   check_size("zone_state", record.zone_state.size(), S * Z);
   check_size("zone_utilisation", record.zone_utilisation.size(), S * Z);
+  check_size("crushed_length", record.crushed_length.size(), S * record.crushed_ends.size());
   for (const Series& series : record.series) check_size(series.id.c_str(), series.value.size(), S);
 
   json j;
@@ -142,6 +144,20 @@ json make_json(const Record& record, Packing packing) {
                      {"body_a", z.body_a},
                      {"body_b", z.body_b},
                      {"place", to_json(z.p_W)}});
+  json& ends = j["crushed_ends"] = json::array();
+  const std::size_t C = record.crushed_ends.size();
+  for (std::size_t c = 0; c < C; ++c) {
+    const CrushedEnd& e = record.crushed_ends[c];
+    std::vector<float> length(S);
+    for (std::size_t s = 0; s < S; ++s) length[s] = record.crushed_length[s * C + c];
+    // most ends never recede
+    if (std::ranges::none_of(length, [](float x) { return x != 0; })) continue;
+    ends.push_back({{"body", e.body},
+                    {"shape", e.shape},
+                    {"axis", e.axis},
+                    {"side", e.side},
+                    {"length", pack(length, {S}, packing)}});
+  }
   j["time"] = numbers(record.time);
   json& series = j["series"] = json::array();
   for (const Series& s : record.series)

@@ -1,5 +1,6 @@
 #include "server/frame.h"
 
+#include <algorithm>
 #include <bit>
 #include <cstring>
 
@@ -32,7 +33,10 @@ FrameBody make_frame_body(const record::Record& r, std::size_t row, std::size_t 
   f.bodies = static_cast<std::uint32_t>(shown);
   f.zones = static_cast<std::uint32_t>(Z);
   f.series = static_cast<std::uint32_t>(V);
-  f.bytes.resize(28 * shown + 4 * V + 5 * Z);
+  const std::size_t C = r.crushed_ends.size();
+  const float* length = r.crushed_length.data() + row * C;
+  f.crushed = static_cast<std::uint32_t>(std::count_if(length, length + C, [](float x) { return x != 0; }));
+  f.bytes.resize(28 * shown + 4 * V + 5 * Z + 12 * f.crushed);
   std::size_t at = 0;
   for (std::size_t b = 0; b < bodies; ++b) {
     put_floats(f.bytes, at, &r.position[3 * (row * B + b)], 3);
@@ -48,6 +52,14 @@ FrameBody make_frame_body(const record::Record& r, std::size_t row, std::size_t 
     put_floats(f.bytes, at, &value, 1);
   }
   put_floats(f.bytes, at, r.zone_utilisation.data() + row * Z, Z);
+  for (std::size_t c = 0; c < C; ++c) {
+    if (length[c] == 0) continue;
+    const record::CrushedEnd& end = r.crushed_ends[c];
+    put(f.bytes, at, static_cast<std::uint32_t>(end.body), 4),
+        put(f.bytes, at, static_cast<std::uint32_t>(end.shape), 2);
+    put(f.bytes, at, static_cast<std::uint32_t>(end.axis), 1), put(f.bytes, at, end.side > 0 ? 1 : 0, 1);
+    put_floats(f.bytes, at, length + c, 1);
+  }
   if (Z > 0) std::memcpy(f.bytes.data() + at, r.zone_state.data() + row * Z, Z);
   return f;
 }
@@ -58,7 +70,7 @@ std::array<std::uint8_t, kFrameHeader> make_frame_header(const FrameBody& f, uns
   put(h, at, 1, 2), put(h, at, flags, 2);
   put(h, at, f.session, 4), put(h, at, f.branch, 4), put(h, at, sequence, 4), put(h, at, f.frame, 4);
   put(h, at, std::bit_cast<std::uint64_t>(f.time), 8);
-  put(h, at, f.bodies, 4), put(h, at, f.zones, 4), put(h, at, f.series, 4), put(h, at, 0, 4);
+  put(h, at, f.bodies, 4), put(h, at, f.zones, 4), put(h, at, f.series, 4), put(h, at, f.crushed, 4);
   return h;
 }
 

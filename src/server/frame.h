@@ -16,6 +16,7 @@ struct FrameBody {
   std::uint32_t session = 0, branch = 0, frame = 0;
   double time = 0;
   std::uint32_t bodies = 0, zones = 0, series = 0;
+  std::uint32_t crushed = 0;        // ends that have receded
   std::vector<std::uint8_t> bytes;  // behind the header
 };
 

@@ -124,6 +124,7 @@ Json describe_scene(const record::Record& part, std::size_t frame) {
   one.plan_values = part.plan_values;
   one.bodies = part.bodies;
   one.zones = part.zones;
+  one.crushed_ends = part.crushed_ends;
   one.neighbours = part.neighbours;
   one.building_outline = part.building_outline;
   for (const record::Series& s : part.series) one.series.push_back({s.id, s.title, s.unit, s.group, {}});
@@ -137,6 +138,7 @@ Json describe_scene(const record::Record& part, std::size_t frame) {
     keep(part.orientation, one.orientation, 4 * part.bodies.size());
     keep(part.zone_state, one.zone_state, part.zones.size());
     keep(part.zone_utilisation, one.zone_utilisation, part.zones.size());
+    keep(part.crushed_length, one.crushed_length, part.crushed_ends.size());
     for (std::size_t i = 0; i < part.series.size(); ++i) one.series[i].value = {part.series[i].value[frame]};
   }
   return Json::parse(record::to_report_json(one));

@@ -45,6 +45,8 @@ void expect_same_motion(const record::Record& a, const record::Record& b) {
   EXPECT_EQ(a.orientation, b.orientation);
   EXPECT_EQ(a.zone_state, b.zone_state);
   EXPECT_EQ(a.zone_utilisation, b.zone_utilisation);
+  EXPECT_EQ(a.crushed_ends, b.crushed_ends);
+  EXPECT_EQ(a.crushed_length, b.crushed_length);
   ASSERT_EQ(a.series.size(), b.series.size());
   for (size_t i = 0; i < a.series.size(); ++i) EXPECT_EQ(a.series[i].value, b.series[i].value) << a.series[i].id;
 }

@@ -21,20 +21,34 @@ entries = [e.attrib for e in xml.etree.ElementTree.parse(folder / "record.pvd").
 assert [float(e["timestep"]) for e in entries if e["part"] == "0"] == list(time), "times differ"
 
 owner = record["shapes/body"][:]
+ends = {name: record["crushed_ends/" + name][:] for name in ("body", "shape", "axis", "side")}
+shape_of_end = numpy.searchsorted(owner, ends["body"]) + ends["shape"]
+
+
+def leave(frame):
+    """Centres and half edges of all boxes in their bodies, as crushing leaves them."""
+    centre, half = record["shapes/centre"][:], record["shapes/half"][:]
+    for k, axis, side, by in zip(shape_of_end, ends["axis"], ends["side"], record["frames/crushed_length"][frame]):
+        half[k, axis] -= by / 2
+        centre[k] -= side * by / 2 * rotate(record["shapes/orientation"][k], numpy.eye(3)[axis])
+    return centre, half
+
+
 checked = 0
 for frame in (0, len(time) // 2, len(time) - 1):
     mesh = meshio.read(folder / entries[3 * frame]["file"])
     assert [block.type for block in mesh.cells] == ["hexahedron"], mesh.cells
     corners = mesh.points[mesh.cells[0].data]  # shapes x 8 x 3
     assert len(corners) == len(owner)
+    centres, halves = leave(frame)
     for k, body in enumerate(owner):
         q, p = record["frames/orientation"][frame, body], record["frames/position"][frame, body]
         q = q / numpy.linalg.norm(q)
-        centre = p + rotate(q, record["shapes/centre"][k])
+        centre = p + rotate(q, centres[k])
         # corners 0 and 6 are opposite, 0-1, 0-3, 0-4 the edges; float32 of some ten metres
         assert numpy.allclose(corners[k].mean(axis=0), centre, atol=2e-5), (frame, k)
         edges = [numpy.linalg.norm(corners[k][i] - corners[k][0]) for i in (1, 3, 4)]
-        assert numpy.allclose(edges, 2 * record["shapes/half"][k], atol=2e-5), (frame, k)
+        assert numpy.allclose(edges, 2 * halves[k], atol=2e-5), (frame, k)
         volume = numpy.dot(numpy.cross(corners[k][1] - corners[k][0], corners[k][3] - corners[k][0]),
                            corners[k][4] - corners[k][0])
         assert volume > 0, "a cell is inside out"

@@ -129,6 +129,41 @@ TEST(ExportVtk, PlacesEveryCornerWhereTheRecordHasIt) {
   }
 }
 
+/// The column's foot recedes by 0.4 m in frame 2 and by 0.6 m in frame 3, an end of the wall's second box never.
+Record make_crushed() {
+  Record r = make_two();
+  r.crushed_ends = {{0, 0, 2, -1}, {1, 1, 0, 1}};
+  r.crushed_length = {0, 0, 0, 0, 0.4F, 0, 0.6F, 0};
+  return r;
+}
+
+TEST(CrushedEnds, TakeTheirPartOfABox) {
+  Record r = make_crushed();
+  const BoxShape& whole = r.bodies[0].shapes[0];
+  EXPECT_EQ(shape_at(r, 1, 0, 0).half, whole.half);
+  const BoxShape box = shape_at(r, 2, 0, 0);
+  EXPECT_NEAR(box.half.z, 1.3, 1e-7);
+  EXPECT_NEAR(box.X_BS.p.z + box.half.z, 2, 1e-7) << "the top stays";
+  EXPECT_EQ(box.half.x, whole.half.x);
+  EXPECT_EQ(shape_at(r, 3, 1, 1).X_BS.p, r.bodies[1].shapes[1].X_BS.p);
+  // a turned box, both of its ends
+  r.crushed_ends = {{1, 0, 0, -1}, {1, 0, 0, 1}};
+  r.crushed_length = {0, 0, 0, 0, 0.4F, 0, 0.6F, 0.2F};
+  const BoxShape turned = shape_at(r, 3, 1, 0);
+  EXPECT_NEAR(turned.half.x, 0.6, 1e-7);
+  EXPECT_NEAR(norm(turned.X_BS.p - Vec3{1 + 0.2 * std::cos(0.5), 0.2 * std::sin(0.5), 0}), 0, 1e-7);
+}
+
+TEST(ExportVtk, DrawsWhatCrushingLeaves) {
+  const OwnFolder folder;
+  export_vtk(make_crushed(), folder.str());
+  const auto points = read_array<float>(read(folder, "vtk/parts_00003.vtu"), "Points");
+  std::vector<float> z;
+  for (std::size_t corner = 0; corner < 8; ++corner) z.push_back(points[3 * corner + 2]);
+  EXPECT_NEAR(*std::min_element(z.begin(), z.end()), 0.6, 1e-6);
+  EXPECT_NEAR(*std::max_element(z.begin(), z.end()), 3, 1e-6);
+}
+
 TEST(ExportVtk, ListsEveryFrameAtItsTimeAndZonesMoveWithTheirBody) {
   const OwnFolder folder;
   const Record r = make_two();
@@ -208,6 +243,23 @@ TEST(ExportGltf, MovesWhatMovesAndTurnsTheShortWay) {
   }
 }
 
+TEST(ExportGltf, ShortensWhatIsCrushed) {
+  const Glb glb(to_gltf(make_crushed()));
+  const json& animation = glb.root["animations"][0];
+  ASSERT_EQ(animation["channels"].size(), 4U);
+  std::size_t column = 0;
+  for (const json& node : glb.root["nodes"])
+    if (node.value("name", "") == "C-A1-0") column = node["children"][0].get<std::size_t>();
+  for (std::size_t i : {2U, 3U}) {
+    const json& channel = animation["channels"][i];
+    EXPECT_EQ(channel["target"]["node"], column);
+    const auto values = glb.floats(animation["samplers"].at(channel["sampler"].get<std::size_t>())["output"]);
+    const bool is_scale = channel["target"]["path"] == "scale";
+    EXPECT_NEAR(values[3 * 3 + 2], is_scale ? 1.2 : 0.8, 1e-6);
+    EXPECT_NEAR(values[3 * 1 + 2], is_scale ? 1.5 : 0.5, 1e-6);
+  }
+}
+
 TEST(ExportGltf, HoldsTheLastPoseWhereOneIsNotANumber) {
   Record r = make_two();
   for (std::size_t k = 0; k < 3; ++k) r.position[(3 * 2 + 1) * 3 + k] = std::nanf("");
@@ -237,6 +289,14 @@ TEST(ExportJson, HoldsTheRecordAsPlainNumbers) {
   EXPECT_EQ(j["zone_state"], (json{{0}, {0}, {3}, {3}}));
   EXPECT_EQ(j["zone_utilisation"][3][0], 0.75);
   EXPECT_EQ(j["bodies"][1]["shapes"].size(), 2U);
+}
+
+TEST(ExportJson, ListsTheEndsThatRecede) {
+  const OwnFolder folder;
+  export_json(make_crushed(), folder.str());
+  const json j = json::parse(read(folder, "record.json"));
+  EXPECT_EQ(j["crushed_ends"],
+            (json{{{"body", 0}, {"shape", 0}, {"axis", 2}, {"side", -1}, {"length", {0, 0, 0.4, 0.6}}}}));
 }
 
 TEST(ExportJson, TakesAwkwardRecords) {
@@ -272,6 +332,7 @@ TEST(KeepFrames, KeepsFirstAndLastAndTheInterval) {
   EXPECT_EQ(kept.time.back(), r.time.back());
   for (std::size_t b = 0; b < r.bodies.size(); ++b) EXPECT_EQ(pose_at(kept, 100, b), pose_at(r, 200, b));
   EXPECT_EQ(kept.series[0].value[100], r.series[0].value[200]);
+  EXPECT_EQ(kept.crushed_length[100 * 2 + 1], r.crushed_length[200 * 2 + 1]);
   EXPECT_EQ(kept.zone_state[100 * 3 + 1], r.zone_state[200 * 3 + 1]);
   EXPECT_EQ(keep_frames(r, 0).time, r.time);
 }

@@ -94,6 +94,8 @@ void expect_same(const Record& a, const Record& b) {
   EXPECT_TRUE(same(a.position, b.position));
   EXPECT_TRUE(same(a.orientation, b.orientation));
   EXPECT_EQ(a.zone_state, b.zone_state);
+  EXPECT_EQ(a.crushed_ends, b.crushed_ends);
+  EXPECT_EQ(a.crushed_length, b.crushed_length);
   EXPECT_TRUE(same(a.zone_utilisation, b.zone_utilisation));
   ASSERT_EQ(a.series.size(), b.series.size());
   for (std::size_t i = 0; i < a.series.size(); ++i) {
@@ -169,6 +171,7 @@ TEST_F(Hdf5, KeepsBodiesWithoutFramesAndFramesWithoutBodies) {
   no_frames.orientation.clear();
   no_frames.zone_state.clear();
   no_frames.zone_utilisation.clear();
+  no_frames.crushed_length.clear();
   for (Series& series : no_frames.series) series.value.clear();
   write_hdf5(no_frames, path("a.h5"));
   expect_same(read_hdf5(path("a.h5")), no_frames);
@@ -314,6 +317,11 @@ TEST_F(Hdf5, RefusesContradictions) {
   EXPECT_TRUE(refused_after("shapes/body", H5T_NATIVE_INT, std::vector{-1, 1, 2, 4}));
   EXPECT_TRUE(refused_after("findings/status", H5T_NATIVE_UINT8, std::vector<std::uint8_t>{0, 4, 0}));
   EXPECT_TRUE(refused_after("outputs/reaction [top]/time", H5T_NATIVE_DOUBLE, std::vector<double>{1, 1}));
+  EXPECT_TRUE(refused_after("crushed_ends/body", H5T_NATIVE_INT, std::vector{2, 1}));
+  EXPECT_TRUE(refused_after("crushed_ends/body", H5T_NATIVE_INT, std::vector{1, 5}));
+  EXPECT_TRUE(refused_after("crushed_ends/shape", H5T_NATIVE_INT, std::vector{0, 2}));
+  EXPECT_TRUE(refused_after("crushed_ends/axis", H5T_NATIVE_INT, std::vector{2, 3}));
+  EXPECT_TRUE(refused_after("crushed_ends/side", H5T_NATIVE_INT, std::vector{-1, 0}));
   EXPECT_TRUE(refused_after("frames/time", H5T_NATIVE_DOUBLE, std::vector<double>(700, 1)));
   EXPECT_TRUE(refused_after("frames/zone_state", H5T_NATIVE_UINT8, std::vector<std::uint8_t>(2100, 6)));
 }
@@ -337,6 +345,17 @@ TEST_F(Hdf5, ReadsRecordsWithoutOutputs) {
   H5Fclose(file);
   Record expected = make_sample();
   expected.outputs.clear();
+  expect_same(read_hdf5(path("record.h5")), expected);
+}
+
+TEST_F(Hdf5, ReadsRecordsOfBeforeEndsReceded) {
+  write_hdf5(make_sample(), path("record.h5"));
+  const hid_t file = H5Fopen(path("record.h5").c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  H5Ldelete(file, "crushed_ends", H5P_DEFAULT);
+  H5Ldelete(file, "frames/crushed_length", H5P_DEFAULT);
+  H5Fclose(file);
+  Record expected = make_sample();
+  expected.crushed_ends.clear(), expected.crushed_length.clear();
   expect_same(read_hdf5(path("record.h5")), expected);
 }
 

@@ -49,6 +49,7 @@ inline Record make_sample() {
   r.neighbours = {
       {"Mill Street 4", {{0.1, 0.2}, {3, 0.4}, {5, 6}}, false}, {"none", {}, true}, {"main", {{1, 2}}, true}};
   r.building_outline = {{0, 0}, {18.5, 0}, {18.5, 12.25}, {0, 12.25}};
+  r.crushed_ends = {{1, 0, 2, -1}, {2, 1, 0, 1}};
   const std::size_t frames = 700;
   for (std::size_t s = 0; s < frames; ++s) {
     r.time.push_back(0.016 * static_cast<double>(s) - 1);
@@ -57,6 +58,7 @@ inline Record make_sample() {
       for (int k = 0; k < 3; ++k) r.position.push_back(std::sin(x + static_cast<float>(k)) / 3);
       for (int k = 0; k < 4; ++k) r.orientation.push_back(std::cos(x * static_cast<float>(k + 1)) / 7);
     }
+    for (const float rate : {0.0F, 1e-3F}) r.crushed_length.push_back(rate * static_cast<float>(s));
     for (std::size_t z = 0; z < r.zones.size(); ++z) {
       r.zone_state.push_back(static_cast<std::uint8_t>((s + z) % 5));
       r.zone_utilisation.push_back(static_cast<float>(s) / static_cast<float>(7 + z));

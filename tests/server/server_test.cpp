@@ -298,7 +298,9 @@ TEST_F(ServerTest, FramesHoldWhatTheRecordHolds) {
   ASSERT_EQ(c->frames.size(), S);
   for (std::size_t i = 0; i < S; ++i) {
     const std::string& f = c->frames[i];
-    ASSERT_EQ(f.size(), 48 + 28 * B + 4 * V + 5 * Z);
+    std::uint32_t receded = 0;
+    std::memcpy(&receded, &f[44], 4);
+    ASSERT_EQ(f.size(), 48 + 28 * B + 4 * V + 5 * Z + 12 * receded);
     EXPECT_EQ(f.substr(0, 4), "TPLF");
     std::uint32_t frame = 0, bodies = 0;
     std::uint16_t flags = 0;
@@ -459,7 +461,11 @@ TEST_F(ServerTest, ASlowReaderLosesFramesAndNothingElse) {
   for (std::size_t i = 1; i < slow_seqs.size(); ++i) EXPECT_LT(slow_seqs[i - 1], slow_seqs[i]);
   // every frame that it did get is whole, and the last one came
   ASSERT_FALSE(slow->frames.empty());
-  for (const std::string& f : slow->frames) EXPECT_EQ(f.size(), slow->frames.front().size());
+  for (const std::string& f : slow->frames) {
+    std::uint32_t count[4] = {};  // bodies, zones, series, crushed ends
+    std::memcpy(count, &f[32], sizeof count);
+    EXPECT_EQ(f.size(), 48 + 28 * count[0] + 5 * count[1] + 4 * count[2] + 12 * count[3]);
+  }
 }
 
 TEST_F(ServerTest, TwentyWatch) {

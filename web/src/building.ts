@@ -2,8 +2,8 @@
 import * as THREE from "three";
 import { Boxes } from "./boxes";
 import { linear } from "./colour";
-import type { Frame, Quadruple, Run, Triple } from "./data";
-import { calcPose, findFrame } from "./data";
+import type { Crushed, Frame, Quadruple, Run, Shape, Triple } from "./data";
+import { calcCrushed, calcPose, findFrame, shorten } from "./data";
 import { SignMesh, type SignShape } from "./sign_mesh";
 import type { Theme } from "./site";
 import type { Colouring, ZoneMarks } from "./state";
@@ -21,6 +21,16 @@ const ofState = zoneStates.map((s, i) => linear(i === 0 ? "#dde2e6" : s.colour))
 const silent = linear("#c3c9cf"); // no zone speaks for this body
 const chosen = linear("#f5d033");
 
+/// Takes the cube of edge 1 around the origin to a shape.
+function calcMatrix(shape: Shape): THREE.Matrix4 {
+  const [w, x, y, z] = shape.orientation;
+  return new THREE.Matrix4().compose(
+    new THREE.Vector3(...shape.centre),
+    new THREE.Quaternion(x, y, z, w),
+    new THREE.Vector3(...shape.half).multiplyScalar(2),
+  );
+}
+
 export class Building {
   readonly group = new THREE.Group();
   readonly zonesOfBody: ZonesOfBody;
@@ -34,7 +44,9 @@ export class Building {
   private readonly bodyOfInstance: number[] = [];
   private readonly colourOfPart: [number, number, number][] = [];
   private readonly colourOfStuff: [number, number, number][] = [];
-  private readonly shapePose: THREE.Matrix4[] = [];
+  private readonly firstInstance: number[] = []; // of each body
+  private readonly shapePose: THREE.Matrix4[] = []; // as crushing has left them at the time shown
+  private readonly shortened = new Set<number>(); // instances
   private readonly bodyPose: THREE.Matrix4[];
   private readonly bodyColour: [number, number, number][];
   private readonly hidden: Uint8Array; // (B)
@@ -81,18 +93,12 @@ export class Building {
 
   private makeBoxes(): Boxes {
     this.run.bodies.forEach((body, index) => {
+      this.firstInstance.push(this.shapePose.length);
       for (const shape of body.shapes) {
-        const [w, x, y, z] = shape.orientation;
         this.bodyOfInstance.push(index);
         this.colourOfPart.push(linear(colourOfKind(partOfShape(body, shape), this.kinds)));
         this.colourOfStuff.push(linear(colourOfMaterial(shape.material, this.materials)));
-        this.shapePose.push(
-          new THREE.Matrix4().compose(
-            new THREE.Vector3(...shape.centre),
-            new THREE.Quaternion(x, y, z, w),
-            new THREE.Vector3(...shape.half).multiplyScalar(2),
-          ),
-        );
+        this.shapePose.push(calcMatrix(shape));
       }
     });
     return new Boxes(this.shapePose.length);
@@ -124,6 +130,24 @@ export class Building {
       else if (calcPose(this.run, b, frame, fraction, p, q))
         pose.compose(this.point.set(p[0], p[1], p[2]), this.turn.set(q[1], q[2], q[3], q[0]), this.unit);
       else pose.copy(outside);
+    }
+    this.calcShapePoses(calcCrushed(this.run, frame, fraction));
+  }
+
+  private calcShapePoses(crushed: readonly Crushed[]): void {
+    const ends = new Map<number, Crushed[]>();
+    for (const c of crushed) {
+      const instance = (this.firstInstance[c.body] ?? 0) + c.shape;
+      ends.set(instance, [...(ends.get(instance) ?? []), c]);
+    }
+    for (const instance of this.shortened) if (!ends.has(instance)) ends.set(instance, []);
+    for (const [instance, list] of ends) {
+      const body = this.bodyOfInstance[instance] ?? -1;
+      const shape = this.run.bodies[body]?.shapes[instance - (this.firstInstance[body] ?? 0)];
+      if (shape === undefined) continue;
+      this.shapePose[instance] = calcMatrix(shorten(shape, list));
+      if (list.length > 0) this.shortened.add(instance);
+      else this.shortened.delete(instance);
     }
   }
 

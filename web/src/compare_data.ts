@@ -68,6 +68,6 @@ export function makePlotted(comparison: Comparison, a: Run): Compared["plotted"]
     { id: "rms", title: "root of the mean square by mass", unit: "m", group: "distance", value: rms },
     { id: "largest", title: "largest", unit: "m", group: "distance", value: largest },
     { id: "centre", title: "mass centres", unit: "m", group: "distance", value: centre });
-  const none: Frame = { pose: new Float32Array(7 * a.bodies.length), utilisation: new Float32Array(a.zones.length), state: new Uint8Array(a.zones.length) };
+  const none: Frame = { pose: new Float32Array(7 * a.bodies.length), utilisation: new Float32Array(a.zones.length), state: new Uint8Array(a.zones.length), crushed: [] };
   return { run: { ...a, time: comparison.time, series, frames: comparison.time.map(() => none) }, titles };
 }

@@ -104,11 +104,21 @@ export interface StudySummary {
   outputs: { name: string; unit: string; levels: { alpha: number; lower: number | null; upper: number | null }[] }[];
 }
 
+/// By how much an end of a box has receded because its member is crushed.
+export interface Crushed {
+  body: number;
+  shape: number; // of the body
+  axis: number; // of the box: 0, 1, 2
+  side: number; // 1 or -1
+  length: number; // [m]
+}
+
 /// What is kept of one moment.
 export interface Frame {
   pose: Float32Array; // (B x 7): position x y z [m], orientation w x y z
   utilisation: Float32Array; // (Z)
   state: Uint8Array; // (Z)
+  crushed: Crushed[]; // ends that have receded
 }
 
 export function decodeBytes(text: string): Uint8Array {
@@ -138,7 +148,7 @@ export function makeRun(raw: any): Run {
   if (raw === null || typeof raw !== "object" || raw.format !== "topple-report")
     throw new Error("This file does not hold the data of a run.");
   if (raw.version !== 1) throw new Error(`The data of this report has version ${raw.version}; this page reads version 1.`);
-  const { position, orientation, zone_state, zone_utilisation, ...rest } = raw;
+  const { position, orientation, zone_state, zone_utilisation, crushed_ends, ...rest } = raw;
   const run: Run = { ...rest, frames: [] };
   const S = run.time.length, B = run.bodies.length, Z = run.zones.length;
   const expect = (what: string, size: number, expected: number): void => {
@@ -150,6 +160,11 @@ export function makeRun(raw: any): Run {
   expect("orientation", orientations.length, S * B * 4);
   expect("zone_state", states.length, S * Z);
   expect("zone_utilisation", utilisations.length, S * Z);
+  const ends: { end: Crushed; length: Float32Array }[] = [];
+  for (const { length, ...end } of crushed_ends ?? []) {
+    ends.push({ end, length: decodeFloats(length) });
+    expect("crushed_ends", ends[ends.length - 1]?.length.length ?? 0, S);
+  }
   for (const series of run.series) expect(series.id, series.value.length, S);
   for (let s = 0; s < S; ++s) {
     const pose = new Float32Array(7 * B);
@@ -158,7 +173,12 @@ export function makeRun(raw: any): Run {
       for (let k = 0; k < 3; ++k) pose[7 * b + k] = positions[3 * i + k] as number;
       for (let k = 0; k < 4; ++k) pose[7 * b + 3 + k] = orientations[4 * i + k] as number;
     }
-    run.frames.push({ pose, utilisation: utilisations.subarray(s * Z, (s + 1) * Z), state: states.subarray(s * Z, (s + 1) * Z) });
+    run.frames.push({
+      pose,
+      utilisation: utilisations.subarray(s * Z, (s + 1) * Z),
+      state: states.subarray(s * Z, (s + 1) * Z),
+      crushed: ends.filter((e) => e.length[s] !== 0).map((e) => ({ ...e.end, length: e.length[s] as number })),
+    });
   }
   return run;
 }
@@ -177,6 +197,38 @@ export function findFrame(time: readonly number[], t: number): { frame: number; 
   }
   const begin = time[low] as number;
   return { frame: low, fraction: (t - begin) / ((time[high] as number) - begin) };
+}
+
+/// A vector turned by a quaternion w x y z.
+export function rotate(q: Quadruple, v: Triple): Triple {
+  const [w, x, y, z] = q;
+  const t: Triple = [2 * (y * v[2] - z * v[1]), 2 * (z * v[0] - x * v[2]), 2 * (x * v[1] - y * v[0])];
+  return [v[0] + w * t[0] + y * t[2] - z * t[1], v[1] + w * t[1] + z * t[0] - x * t[2], v[2] + w * t[2] + x * t[1] - y * t[0]];
+}
+
+/// What is crushed on the way from frame `frame` to the next.
+export function calcCrushed(run: Run, frame: number, fraction: number): Crushed[] {
+  const now = run.frames[frame]?.crushed ?? [];
+  const next = fraction > 0 ? run.frames[frame + 1]?.crushed : undefined;
+  if (next === undefined) return now;
+  const key = (c: Crushed): string => `${c.body} ${c.shape} ${c.axis} ${c.side}`;
+  const begin = new Map(now.map((c) => [key(c), c.length]));
+  return next.map((c) => {
+    const from = begin.get(key(c)) ?? 0;
+    return { ...c, length: from + fraction * (c.length - from) };
+  });
+}
+
+/// A shape with its ends receded.
+export function shorten(shape: Shape, ends: readonly Crushed[]): Shape {
+  if (ends.length === 0) return shape;
+  const half: Triple = [...shape.half], centre: Triple = [...shape.centre];
+  for (const { axis, side, length } of ends) {
+    half[axis as 0 | 1 | 2] -= 0.5 * length;
+    const along = rotate(shape.orientation, [0, 1, 2].map((k) => (k === axis ? -0.5 * side * length : 0)) as Triple);
+    for (const k of [0, 1, 2] as const) centre[k] += along[k];
+  }
+  return { ...shape, half, centre };
 }
 
 /// out = the way from the quaternion at index i of a to that at index j of b, at constant angular speed. w x y z.

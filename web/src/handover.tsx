@@ -1,6 +1,6 @@
 /// What the report hands over beside the findings: when they would not hold, the site from above, assumptions,
 /// verification, what fuzzy values do, and the words it uses.
-import { calcPose, type Finding, type Point, type Quadruple, type Run, type StudySummary, type Triple } from "./data";
+import { calcPose, type Finding, type Point, type Quadruple, rotate, type Run, shorten, type StudySummary, type Triple } from "./data";
 import { FindingRow, findVerdict } from "./findings";
 import { StatusSign } from "./signs";
 import { unitWord } from "./study/data";
@@ -64,22 +64,18 @@ export function calcHull(points: readonly Point[]): Point[] {
   return sorted.length < 3 ? sorted : [...half(sorted), ...half(sorted.reverse())];
 }
 
-const rotate = (q: Quadruple, v: Triple): Triple => {
-  const [w, x, y, z] = q;
-  const t: Triple = [2 * (y * v[2] - z * v[1]), 2 * (z * v[0] - x * v[2]), 2 * (x * v[1] - y * v[0])];
-  return [v[0] + w * t[0] + y * t[2] - z * t[1], v[1] + w * t[1] + z * t[0] - x * t[2], v[2] + w * t[2] + x * t[1] - y * t[0]];
-};
-
 /// Outlines from above of all moving parts at the last frame.
 export function findFallenParts(run: Run): Point[][] {
   const out: Point[][] = [];
   const frame = run.time.length - 1;
   if (frame < 0) return out;
+  const crushed = run.frames[frame]?.crushed ?? [];
   const p: Triple = [0, 0, 0];
   const q: Quadruple = [1, 0, 0, 0];
   run.bodies.forEach((body, b) => {
     if (body.fixed || !calcPose(run, b, frame, 0, p, q)) return;
-    for (const shape of body.shapes) {
+    for (const [i, whole] of body.shapes.entries()) {
+      const shape = shorten(whole, crushed.filter((c) => c.body === b && c.shape === i));
       const corners: Point[] = [];
       for (let k = 0; k < 8; ++k) {
         const local = rotate(shape.orientation, shape.half.map((h, i) => ((k >> i) & 1 ? h : -h)) as Triple);

@@ -1,5 +1,5 @@
 /// What the steering protocol sends (docs/protocol.md), as types. SI throughout.
-import type { Finding, Frame, RunEvent } from "./data";
+import type { Crushed, Finding, Frame, RunEvent } from "./data";
 
 export type Phase = "building" | "equilibrium" | "paused" | "running" | "finished" | "failed";
 export interface Ending {
@@ -198,8 +198,8 @@ export function decodeFrame(buffer: ArrayBuffer): WireFrame {
   if (buffer.byteLength < headerSize || view.getUint32(0, false) !== 0x54504c46) throw new Error("not a frame");
   const version = view.getUint16(4, true);
   if (version !== 1) throw new Error(`a frame of version ${version}`);
-  const B = view.getUint32(32, true), Z = view.getUint32(36, true), V = view.getUint32(40, true);
-  if (buffer.byteLength !== headerSize + 28 * B + 4 * V + 5 * Z) throw new Error("a frame of the wrong length");
+  const B = view.getUint32(32, true), Z = view.getUint32(36, true), V = view.getUint32(40, true), C = view.getUint32(44, true);
+  if (buffer.byteLength !== headerSize + 28 * B + 4 * V + 5 * Z + 12 * C) throw new Error("a frame of the wrong length");
   let at = headerSize;
   const floats = (count: number): Float32Array => {
     const values = new Float32Array(buffer, at, count); // little-endian, as every browser's machine
@@ -209,6 +209,15 @@ export function decodeFrame(buffer: ArrayBuffer): WireFrame {
   const pose = floats(7 * B);
   const series = floats(V);
   const utilisation = floats(Z);
+  const crushed: Crushed[] = [];
+  for (let c = 0; c < C; ++c, at += 12)
+    crushed.push({
+      body: view.getUint32(at, true),
+      shape: view.getUint16(at + 4, true),
+      axis: view.getUint8(at + 6),
+      side: view.getUint8(at + 7) === 1 ? 1 : -1,
+      length: view.getFloat32(at + 8, true),
+    });
   return {
     session: view.getUint32(8, true),
     branch: view.getUint32(12, true),
@@ -216,7 +225,7 @@ export function decodeFrame(buffer: ArrayBuffer): WireFrame {
     row: view.getUint32(20, true),
     time: view.getFloat64(24, true),
     asked: (view.getUint16(6, true) & 2) !== 0,
-    pose, series, utilisation,
+    pose, series, utilisation, crushed,
     state: new Uint8Array(buffer, at, Z),
   };
 }

@@ -173,23 +173,51 @@ describe("heights of debris", () => {
   });
 });
 
+describe("crushed ends", () => {
+  it("are read, recede evenly from frame to frame and shorten their box", async () => {
+    const { readRun, calcCrushed, shorten } = await load("data.ts");
+    const data = makeSynthetic(3);
+    const length = Buffer.alloc(12);
+    [0, 0.5, 1].forEach((v, k) => length.writeFloatLE(v, 4 * k));
+    data.crushed_ends = [{ body: 4, shape: 0, axis: 2, side: -1, length: length.toString("base64") }];
+    const run = readRun(JSON.stringify(data));
+    assert.deepEqual(run.frames.map((f) => f.crushed.length), [0, 1, 1]);
+    assert.deepEqual(calcCrushed(run, 0, 0), []);
+    assert.deepEqual(calcCrushed(run, 0, 0.5), [{ body: 4, shape: 0, axis: 2, side: -1, length: 0.25 }]);
+    assert.equal(calcCrushed(run, 1, 0.5)[0].length, 0.75);
+    const box = { centre: [0, 0, 1], orientation: [Math.SQRT1_2, 0, Math.SQRT1_2, 0], half: [0.2, 0.3, 1], material: "concrete" };
+    const short = shorten(box, calcCrushed(run, 2, 0));
+    assert.deepEqual(short.half, [0.2, 0.3, 0.5]);
+    // z of the box lies along x
+    [0.5, 0, 1].forEach((v, k) => assert.ok(Math.abs(short.centre[k] - v) < 1e-12));
+    data.crushed_ends[0].length = length.subarray(0, 8).toString("base64");
+    assert.throws(() => readRun(JSON.stringify(data)), /crushed_ends/);
+  });
+});
+
 describe("frames of the steering protocol", () => {
   it("are read as they are written, and refused otherwise", async () => {
     const { decodeFrame } = await load("steer_wire.ts");
-    const B = 2, Z = 3, V = 1;
-    const bytes = Buffer.alloc(48 + 28 * B + 4 * V + 5 * Z);
+    const B = 2, Z = 3, V = 1, C = 1;
+    const bytes = Buffer.alloc(48 + 28 * B + 4 * V + 5 * Z + 12 * C);
     bytes.write("TPLF");
     bytes.writeUInt16LE(1, 4);
     bytes.writeUInt16LE(2, 6);
     [7, 8, 9, 10].forEach((v, k) => bytes.writeUInt32LE(v, 8 + 4 * k));
     bytes.writeDoubleLE(1.25, 24);
-    [B, Z, V].forEach((v, k) => bytes.writeUInt32LE(v, 32 + 4 * k));
+    [B, Z, V, C].forEach((v, k) => bytes.writeUInt32LE(v, 32 + 4 * k));
     for (let k = 0; k < 7 * B + V + Z; ++k) bytes.writeFloatLE(k + 0.5, 48 + 4 * k);
-    bytes.set([0, 3, 4], 48 + 4 * (7 * B + V + Z));
+    const end = 48 + 4 * (7 * B + V + Z);
+    bytes.writeUInt32LE(1, end);
+    bytes.writeUInt16LE(300, end + 4);
+    bytes.set([2, 0], end + 6);
+    bytes.writeFloatLE(0.75, end + 8);
+    bytes.set([0, 3, 4], end + 12);
     const view = (b) => b.buffer.slice(b.byteOffset, b.byteOffset + b.length);
     const f = decodeFrame(view(bytes));
     assert.deepEqual([f.session, f.branch, f.sequence, f.row, f.time, f.asked], [7, 8, 9, 10, 1.25, true]);
     assert.deepEqual([[...f.pose].length, f.pose[13], [...f.series], [...f.utilisation], [...f.state]], [14, 13.5, [14.5], [15.5, 16.5, 17.5], [0, 3, 4]]);
+    assert.deepEqual(f.crushed, [{ body: 1, shape: 300, axis: 2, side: -1, length: 0.75 }]);
     assert.throws(() => decodeFrame(view(bytes.subarray(0, 60))), /length/);
     assert.throws(() => decodeFrame(new ArrayBuffer(8)), /not a frame/);
     bytes.writeUInt16LE(2, 4);
@@ -205,7 +233,7 @@ describe("plan text", () => {
 });
 
 describe("what came of a branch", () => {
-  const frame = (row, time) => ({ session: 1, branch: 1, sequence: row, row, time, asked: false, pose: new Float32Array(0), series: new Float32Array(0), utilisation: new Float32Array(0), state: new Uint8Array(0) });
+  const frame = (row, time) => ({ session: 1, branch: 1, sequence: row, row, time, asked: false, pose: new Float32Array(0), series: new Float32Array(0), utilisation: new Float32Array(0), state: new Uint8Array(0), crushed: [] });
   const make = () => new BranchRun(1, { ...readRun(JSON.stringify({ ...makeSynthetic(2) })), bodies: [], zones: [], series: [], time: [], frames: [], events: [] }, makeLook(), true);
 
   it("asks for near holes together, and for far ones apart", () => {
