@@ -170,10 +170,12 @@ struct Crushing {
 
 Crushing find_crushing(const Record& r, std::size_t body, std::size_t shape) {
   Crushing out;
+  // what is crushed stays so
   const Vec3 whole = r.bodies[body].shapes[shape].half;
+  if (shape_at(r, r.time.size() - 1, body, shape).half == whole) return out;
+  out.happens = true;
   for (std::size_t s = 0; s < r.time.size(); ++s) {
     const BoxShape box = shape_at(r, s, body, shape);
-    out.happens |= !(box.half == whole);
     for (int i = 0; i < 3; ++i) {
       out.centre.push_back(static_cast<float>(box.X_BS.p[i]));
       out.half.push_back(static_cast<float>(box.half[i]));

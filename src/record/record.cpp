@@ -27,10 +27,11 @@ Pose pose_at(const Record& r, std::size_t frame, std::size_t body) {
 
 BoxShape shape_at(const Record& r, std::size_t frame, std::size_t body, std::size_t shape) {
   BoxShape box = r.bodies[body].shapes[shape];
-  const auto place = [](const CrushedEnd& e) { return std::pair(e.body, e.shape); };
-  const auto ends =
-      std::ranges::equal_range(r.crushed_ends, std::pair(static_cast<int>(body), static_cast<int>(shape)), {}, place);
-  for (auto end = ends.begin(); end != ends.end(); ++end) {
+  const int b = static_cast<int>(body), s = static_cast<int>(shape);
+  auto end = std::lower_bound(r.crushed_ends.begin(), r.crushed_ends.end(), b,
+                              [](const CrushedEnd& e, int wanted) { return e.body < wanted; });
+  for (; end != r.crushed_ends.end() && end->body == b; ++end) {
+    if (end->shape != s) continue;
     const auto row = static_cast<std::size_t>(end - r.crushed_ends.begin());
     const double half = 0.5 * r.crushed_length[frame * r.crushed_ends.size() + row];
     if (half == 0) continue;
