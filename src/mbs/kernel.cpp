@@ -189,6 +189,8 @@ HWY_INLINE Num<D> inverse_root(Num<D> a) {
   return scale * y;
 }
 
+constexpr int kMostSweeps = 12;   // of two stations that turn one after the other
+constexpr double kStill = 1e-11;  // share of its rotation by which a station does not turn any more then
 constexpr double kNearPlane = 0.9, kNear = 0.854;  // kNearBounds, and to the power of the biaxial bound
 
 /// A bending plane of a zone: about y with shear along z (sign +1), or about z with shear along y (sign -1).
@@ -449,6 +451,34 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
   for (int q = first; q <= last; ++q)
     for (int s = 0; s < Hinges; ++s) phi_trial[q][s] = plane[q].phi[s], m_trial[s][q] = plane[q].m[s];
   const M bends = hn::And(good, hn::Or(at[0].out, at[1].out));
+  const auto apply_turns = [&] {
+    for (int q = first; q <= last; ++q) {
+      for (int s = 0; s < Hinges; ++s) plane[q].phi[s] = phi_trial[q][s] + by[q][s];
+      plane[q].measure();
+    }
+  };
+  // where both stations at once would bring work
+  const auto turn_in_turns = [&](M these) {
+    for (int sweep = 0; sweep < kMostSweeps && !hn::AllFalse(tag, these); ++sweep) {
+      M changed = hn::FirstN(tag, 0);
+      for (int s = 0; s < Hinges; ++s) {
+        apply_turns();
+        const Demand now = calc_demand(s);
+        const M out = hn::And(these, now.out), so_far = good;
+        N scale[2];
+        calc_scale(now, scale);
+        good = hn::Or(good, hn::AndNot(out, so_far));
+        for (int q = first; q <= last; ++q) {
+          const BendingPlane<D, Hinges>& P = plane[q];
+          const M turns = hn::And(out, hn::Gt(P.stiffness[s].v, zero.v));
+          const N more = select(turns, (P.m[s] - P.m[s] * scale[q]) / P.stiffness[s], zero);
+          by[q][s] = by[q][s] + more;
+          changed = hn::Or(changed, hn::Gt(abs(more).v, (num<D>(kStill) * abs(P.phi[s] + more)).v));
+        }
+      }
+      these = hn::And(these, changed);
+    }
+  };
   if (Hinges == 1 && !hn::AllFalse(tag, bends)) {
     N scale[2];
     calc_scale(at[0], scale);
@@ -489,29 +519,25 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
       both = hn::Or(both, pushed);
     }
     if (!hn::AllFalse(tag, both)) {
-      N work[2] = {zero, zero};
+      N work[2] = {zero, zero}, together[2][2];
+      M at_once = both;
       for (int q = first; q <= last; ++q) {
         const BendingPlane<D, Hinges>& P = plane[q];
         const N determinant = fms(P.stiffness[0], P.stiffness[1], P.cross * P.cross);
-        demand(hn::Or(hn::Not(both), hn::Gt(determinant.v, (num<D>(1e-9) * P.stiffness[0] * P.stiffness[1]).v)));
+        at_once = hn::And(at_once, hn::Gt(determinant.v, (num<D>(1e-9) * P.stiffness[0] * P.stiffness[1]).v));
         const N over0 = trial[q][0] - target[q][0], over1 = trial[q][1] - target[q][1];
-        const N by0 = fms(P.stiffness[1], over0, P.cross * over1) / determinant;
-        const N by1 = fms(P.stiffness[0], over1, P.cross * over0) / determinant;
-        work[0] = fma(target[q][0], by0, work[0]);
-        work[1] = fma(target[q][1], by1, work[1]);
-        by[q][0] = select(both, by0, by[q][0]);
-        by[q][1] = select(both, by1, by[q][1]);
+        together[q][0] = fms(P.stiffness[1], over0, P.cross * over1) / determinant;
+        together[q][1] = fms(P.stiffness[0], over1, P.cross * over0) / determinant;
+        work[0] = fma(target[q][0], together[q][0], work[0]);
+        work[1] = fma(target[q][1], together[q][1], work[1]);
       }
-      demand(hn::Or(hn::Not(both), hn::And(hn::Ge(work[0].v, zero.v), hn::Ge(work[1].v, zero.v))));
+      at_once = hn::And(at_once, hn::And(hn::Ge(work[0].v, zero.v), hn::Ge(work[1].v, zero.v)));
+      for (int q = first; q <= last; ++q)
+        for (int s = 0; s < Hinges; ++s) by[q][s] = select(at_once, together[q][s], by[q][s]);
+      turn_in_turns(hn::AndNot(at_once, both));
     }
   }
-  const auto turn = [&] {
-    for (int q = first; q <= last; ++q) {
-      for (int s = 0; s < Hinges; ++s) plane[q].phi[s] = phi_trial[q][s] + by[q][s];
-      plane[q].measure();
-    }
-  };
-  turn();
+  apply_turns();
 
   // what turns further lengthens or shortens
   const auto length_of = [&](const auto& about) {
@@ -636,7 +662,7 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
       if constexpr (Hinges == 2) share = {hn::Min(share.v, calc_share(1, changes).v)};
       for (int q = first; q <= last; ++q)
         for (int s = 0; s < Hinges; ++s) by[q][s] = share * by[q][s];
-      turn();
+      apply_turns();
       elongation = calc_elongation();
     }
   }

@@ -546,6 +546,7 @@ struct Evaluation {
     // in turns; at rest, where a whole deformation comes at once, each anew, so that it gives back what the other one
     // has made needless
     const int most_sweeps = is_at_rest ? 60 : 12;
+    const double still = is_at_rest ? 1e-9 : 1e-11;  // share of a rotation
     for (int sweep = 0; sweep < most_sweeps; ++sweep) {
       bool changed = false;
       for (int s = 0; s < 2; ++s) {
@@ -558,7 +559,7 @@ struct Evaluation {
         measure(s);
         if (is_outside(limits[s], s, scale[s])) (void)turn(s, scale[s]);
         for (int q = first; q <= last; ++q)
-          changed = changed || std::abs(phi[q][s] - before[q]) > 1e-9 * std::abs(phi[q][s]);
+          changed = changed || std::abs(phi[q][s] - before[q]) > still * std::abs(phi[q][s]);
       }
       if (!changed) break;
     }
@@ -762,8 +763,11 @@ struct Evaluation {
 
   /// Safe bounds for the steps to come.
   void renew_bounds(const CompiledLaws& laws, const Limits (&limits)[2]) {
+    const bool is_in_range = force[0] >= z.safe_force[0] && force[0] <= z.safe_force[1];
+    // limits do not know of cracks
+    if (cracked && !flowed && z.next_law < 0 && is_in_range && find_springs(p, z)) return;
     if (!flowed && !cracked && z.next_law < 0) {
-      if (force[0] >= z.safe_force[0] && force[0] <= z.safe_force[1]) return;
+      if (is_in_range) return;
       // bounds are the least limits around this force: none that are far enough away can be found near the limits here
       bool is_near = !p.external_axial;
       for (int s = 0; s < n; ++s) is_near = is_near && limits[s].law().biaxial_exponent == 1.5;

@@ -57,6 +57,27 @@ void find_crack_bounds(const ZoneParameters& p, ZoneState& z) {
     }
 }
 
+bool find_springs(const ZoneParameters& p, ZoneState& z) {
+  double turned[2] = {0, 0}, shifted[2] = {0, 0};
+  z.is_softened = false;
+  for (int q = kernel::first_bending(p.plane); q <= kernel::last_bending(p.plane); ++q) {
+    double flexibility[2] = {0, 0};
+    for (int s = 0; s < p.stations; ++s) {
+      turned[q] += z.station[s].phi[q];
+      shifted[q] += p.x[s] * z.station[s].phi[q];
+      flexibility[s] = z.station[s].soft[q];
+    }
+    soften_plane(p, z.share, q, flexibility, z.plane[q]);
+    if (flexibility[0] + flexibility[1] == 0) continue;
+    z.is_softened = true;
+    if (!(z.share * p.stiffness[q == 0 ? 4 : 5] > 0)) return false;
+  }
+  find_crack_bounds(p, z);
+  const double offset[6] = {z.axial, z.slip[0] - shifted[1], z.slip[1] + shifted[0], z.twist, turned[0], turned[1]};
+  std::copy(offset, offset + 6, z.offset);
+  return true;
+}
+
 void find_safe_bounds(const ZoneParameters& p, const CompiledLaws& laws, const Limits& limits, double normal_force,
                       ZoneState& z) {
   const auto law_of = [&](int s) -> const CompiledLaw& {
@@ -94,26 +115,9 @@ void find_safe_bounds(const ZoneParameters& p, const CompiledLaws& laws, const L
   z.safe_torsion = 1 / limits.torsion();
   z.safe_exponent = kUnlimited;
   for (int s = 0; s < p.stations; ++s) z.safe_exponent = std::min(z.safe_exponent, law_of(s).biaxial_exponent);
-  // what the springs do not see, and how cracks and damage soften them
-  double turned[2] = {0, 0}, shifted[2] = {0, 0};
-  z.is_softened = false;
-  for (int q = first; q <= last; ++q) {
-    double flexibility[2] = {0, 0};
-    for (int s = 0; s < p.stations; ++s) {
-      turned[q] += z.station[s].phi[q];
-      shifted[q] += p.x[s] * z.station[s].phi[q];
-      flexibility[s] = z.station[s].soft[q];
-    }
-    soften_plane(p, z.share, q, flexibility, z.plane[q]);
-    if (flexibility[0] + flexibility[1] == 0) continue;
-    z.is_softened = true;
-    if (!(z.share * p.stiffness[q == 0 ? 4 : 5] > 0)) return;
-  }
-  find_crack_bounds(p, z);
+  if (!find_springs(p, z)) return;
   z.safe_force[0] = from;
   z.safe_force[1] = to;
-  const double offset[6] = {z.axial, z.slip[0] - shifted[1], z.slip[1] + shifted[0], z.twist, turned[0], turned[1]};
-  std::copy(offset, offset + 6, z.offset);
 }
 
 double calc_bound_utilisation(const ZoneParameters& p, const ZoneState& z) {

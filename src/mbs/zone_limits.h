@@ -191,6 +191,10 @@ inline double root_of(double x, double e) { return e == 1.5 ? std::cbrt(x * x) :
 /// coupling, bending.
 void soften_plane(const ZoneParameters&, double share, int plane, const double flexibility[2], double stiffness[3]);
 
+/// Sets what a zone is as a spring inside its safe bounds: its planes as cracks and damage have softened them, what the
+/// springs do not see of its deformation, and the bounds of its cracks. False if it is none: softened without a
+/// stiffness against bending.
+bool find_springs(const ZoneParameters&, ZoneState&);
 /// Sets the safe bounds around a normal force [N], an empty range of forces if there are none.
 void find_safe_bounds(const ZoneParameters&, const CompiledLaws&, const Limits&, double normal_force, ZoneState&);
 
