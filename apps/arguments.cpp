@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <charconv>
 #include <iostream>
 
 #include "arguments_completion.h"
@@ -26,7 +27,9 @@ void add_run_options(CLI::App* verb, Arguments& a) {
   verb->add_option("--step", a.step, "time step, such as \"0.1 ms\"; chosen from the stiffest element if not given")
       ->type_name("QUANTITY");
   verb->add_option("--step-share", a.step_share, "of that step, such as 0.5, to see what hangs on it")
-      ->check(CLI::Range(0.001, 1.0));
+      ->check(CLI::Range(0.001, 1.0))
+      ->check(
+          [](const std::string& word) { return word.find_first_of("nN") == std::string::npos ? "" : "is no number"; });
   verb->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
   verb->add_option("--engine", a.engine, "program that solves the multibody model");
   verb->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
@@ -44,7 +47,8 @@ void add_worker_options(CLI::App* verb, StudyArguments& y) {
           "runs at the same time here (default: as many as there are processors); 0: workers elsewhere do everything")
       ->check(CLI::Range(0, 4096));
   verb->add_option("--batch", y.batch, "points that one evaluator gets at once (1)")->check(CLI::Range(1, 100000));
-  verb->add_option("--lease", y.lease, "time without a sign of life after which a run is given to another (30 s)")
+  verb->add_option("--lease", y.lease,
+                   "time without a sign of life after which a run is given to another, as --timeout (30 s)")
       ->type_name("QUANTITY");
 }
 
@@ -346,18 +350,30 @@ void add_study(CLI::App& app, Arguments& a) {
   study->add_option("file", a.input, "plan with [fuzzy], or fuzzy inputs of an evaluator (TOML)")->type_name("FILE");
   study->add_option("-o,--output", a.output, "folder of the study; the same command again goes on with it")
       ->type_name("FOLDER");
-  study->add_option("--evaluator", y.evaluator,
-                    "command that is the model: reads points and writes answers as JSON lines (docs/study.md)");
+  const auto is_given = [](const char* what) {
+    return [what](const std::string& s) {
+      return s.find_first_not_of(" \t\r\n") == std::string::npos ? std::string(what) + " is wanted" : std::string();
+    };
+  };
+  study
+      ->add_option("--evaluator", y.evaluator,
+                   "command that is the model: reads points and writes answers as JSON lines (docs/study.md)")
+      ->check(is_given("a command"));
   study->add_option("--alpha", y.alpha, "levels between commas, such as 0,0.25,0.5,0.75,1");
   study->add_option("--samples", y.samples, "runs at most")->check(CLI::Range(10, 100000000));
   study->add_option("--seed", y.seed, "of spread points and searches")->check([](const std::string& s) {
     const bool is_whole = !s.empty() && s.find_first_not_of("0123456789") == std::string::npos;
-    return is_whole ? std::string() : "a whole number from 0 on is wanted, not " + s;
+    if (!is_whole) return "a whole number from 0 on is wanted, not " + s;
+    long long number = 0;
+    const bool is_small = std::from_chars(s.data(), s.data() + s.size(), number).ec == std::errc();
+    return is_small ? std::string() : "a number below 2^63 is wanted, not " + s;
   });
-  study->add_option("--permissible", y.permissible,
-                    "look for boxes of inputs that keep this, such as \"topple, reach_pos_x <= 20\"");
+  study
+      ->add_option("--permissible", y.permissible,
+                   "look for boxes of inputs that keep this, such as \"topple, reach_pos_x <= 20\"")
+      ->check(is_given("a requirement"));
   study->add_flag("--no-drivers", y.no_drivers, "spend no runs on which input drives what");
-  study->add_option("--timeout", y.timeout, "time for one answer, such as \"60 s\"; none if left out")
+  study->add_option("--timeout", y.timeout, "time for one answer, such as \"60 s\" or 60 (seconds); none if left out")
       ->type_name("QUANTITY");
   study->add_flag("--one-shot", y.one_shot, "start the command for every point and close its input behind it");
   study->add_option("--store", y.store, "database on a server, postgresql://user@host/name; a file if left out");

@@ -78,7 +78,10 @@ int main(int argc, char** argv) {
   const auto arguments = topple::apps::parse_arguments(argc, argv);
   if (const int* code = std::get_if<int>(&arguments)) return *code;
   try {
-    return dispatch(std::get<topple::apps::Arguments>(arguments));
+    const int code = dispatch(std::get<topple::apps::Arguments>(arguments));
+    if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return code;
+    std::fprintf(stderr, "topple: standard output could not be written\n");
+    return code == topple::apps::kOk ? topple::apps::kRunFailed : code;
   } catch (const topple::InputError& e) {
     std::fprintf(stderr, "%s\n", e.what());
     return topple::apps::kBadInput;

@@ -79,8 +79,13 @@ void print_summary(std::FILE* out, const mbs::Model& m, const mbs::Summary& s, c
                       "a mechanism has no equilibrium: --no-equilibrium, or \"run\": {\"equilibrium\": false} in the "
                       "file, begins with the poses and velocities given");
   } else {
-    rows.emplace_back("Time", fmt::format("{:.6g} s in {} steps of {:.4g} ms, computed in {:.2g} s", s.time, s.steps,
-                                          s.step * 1e3, s.wall_time));
+    const std::string step =
+        !(s.step > 0) ? "the engine's choice"
+        : s.shortest_step < 0.9999 * s.step
+            ? fmt::format("{:.4g} ms at first, {:.4g} at the least", s.step * 1e3, s.shortest_step * 1e3)
+            : fmt::format("{:.4g} ms", s.step * 1e3);
+    rows.emplace_back(
+        "Time", fmt::format("{:.6g} s in {} steps of {}, computed in {:.2g} s", s.time, s.steps, step, s.wall_time));
     rows.emplace_back(
         "Energy error",
         fmt::format("{:.1e} of the potential energy released, or of the energy at the start", s.energy_error));

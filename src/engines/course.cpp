@@ -5,6 +5,7 @@
 
 #include "engines/articulation.h"
 #include "engines/requirements.h"
+#include "mbs/course.h"
 #include "mbs/quantity.h"
 
 namespace topple::engines {
@@ -214,6 +215,9 @@ mbs::Summary Course::finish(long steps) {
       if (!model_.bodies[b].fixed) mass += body_[b].mass;
     summary_.energy_error = mbs::calc_energy_error(
         largest_residual_, released_, options_.equilibrium ? 0 : total_at_start_, mass * norm(model_.gravity));
+    const bool is_run =
+        summary_.ending == mbs::Summary::Ending::TimeLimit || summary_.ending == mbs::Summary::Ending::AtRest;
+    if (const std::string lost = mbs::describe_lost_energy(summary_.energy_error); is_run && !lost.empty()) fail(lost);
     if (summary_.message.empty())
       summary_.message = std::string(words_of(summary_.ending)) + " at " + std::to_string(time_) + " s";
   }

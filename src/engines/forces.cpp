@@ -594,11 +594,12 @@ void Forces::remove_rotational_spring(size_t i) { is_cached_ = false, take_away(
 void Forces::remove_bushing(size_t i) { is_cached_ = false, take_away(bushing_[i], removed_); }
 void Forces::remove_load(size_t i) {
   is_cached_ = false;
-  load_[i].is_over = true;  // also if an event would apply it later
+  load_[i].is_over = true;
 }
 void Forces::apply_load(size_t i, double time) {
   is_cached_ = false;
-  if (!load_[i].has_begun) load_[i] = {true, load_[i].is_over, time};
+  // one that was removed begins anew; one that acts goes on
+  if (!load_[i].has_begun || load_[i].is_over) load_[i] = {true, false, time};
 }
 
 // --- what is seen

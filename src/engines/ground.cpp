@@ -20,7 +20,7 @@ double calc_restitution(double ratio) {
 }  // namespace
 
 double find_damping_ratio(double restitution) {
-  if (!(restitution > 1e-6)) return 500;  // 1 / (4 ζ²) is left
+  if (!(restitution > 1e-4)) return 50;  // 1 / (4 ζ²) is left
   double low = 0, high = 1;
   while (calc_restitution(high) > restitution) high *= 2;
   for (int i = 0; i < 200 && high - low > 1e-15 * high; ++i) {
@@ -30,8 +30,8 @@ double find_damping_ratio(double restitution) {
   return high;
 }
 
-Ground::Ground(const mbs::Model& model, const std::vector<BodyNow>& bodies)
-    : model_(model), body_(model.bodies.size()), is_there_(can_touch_ground(model)) {
+Ground::Ground(const mbs::Model& model, const std::vector<BodyNow>& bodies, double step)
+    : model_(model), body_(model.bodies.size()), is_there_(can_touch_ground(model)), step_(step) {
   if (!is_there_) return;
   damping_ratio_ = find_damping_ratio(model.contact.restitution);
   update_shapes(bodies);
@@ -66,6 +66,17 @@ double Ground::calc_overlap(const Point& point, const Pose& X_WB) const {
   return c.offset + point.radius - dot(c.normal, X_WB * point.p);
 }
 
+double Ground::find_bearable_ratio(size_t b, const Pose& X_WB) const {
+  if (!(step_ > 0)) return damping_ratio_;
+  double touching = 0;
+  for (const Point& point : body_[b].points)
+    touching += point.is_active && calc_overlap(point, X_WB) > point.born ? 1 : 0;
+  // n points that share a body brake its fastest motion by up to some n / 2 of what one does; more than half at once
+  // falls between the stages
+  const double most = std::min(0.5, 1 / std::max(touching, 1.0));
+  return std::min(damping_ratio_, most / (2 * model_.contact.contact_frequency * step_));
+}
+
 Vec3 Ground::calc(const Motion& m, const std::vector<BodyNow>& bodies, std::vector<Wrench>& on, double& power) const {
   const mbs::Contact& c = model_.contact;
   const Vec3 n = c.normal;
@@ -74,6 +85,7 @@ Vec3 Ground::calc(const Motion& m, const std::vector<BodyNow>& bodies, std::vect
   for (size_t b = 0; b < body_.size(); ++b) {
     if (body_[b].points.empty() || dot(n, m.X_WB[b].p) - c.offset > body_[b].reach) continue;
     const Mat3 R = to_matrix(m.X_WB[b].q), inverse_inertia = inverse(bodies[b].inertia);
+    const double damping_ratio = find_bearable_ratio(b, m.X_WB[b]);
     for (const Point& point : body_[b].points) {
       if (!point.is_active) continue;
       const double depth = calc_overlap(point, m.X_WB[b]) - point.born;
@@ -83,7 +95,7 @@ Vec3 Ground::calc(const Motion& m, const std::vector<BodyNow>& bodies, std::vect
       // mass that the point feels: spring and damper go with it, so that frequency and restitution are the model's
       const Vec3 lever = transpose_times(R, cross(r - R * bodies[b].p_BBcm, n));
       const double mass = 1 / (1 / bodies[b].mass + dot(lever, inverse_inertia * lever));
-      const double normal = mass * frequency * (frequency * depth + 2 * damping_ratio_ * approach);
+      const double normal = mass * frequency * (frequency * depth + 2 * damping_ratio * approach);
       if (!(normal > 0)) continue;
       const Vec3 slide = v + approach * n;
       const double speed = norm(slide);

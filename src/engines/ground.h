@@ -14,7 +14,8 @@ struct BodyNow;
 class Ground {
  public:
   /// The model must outlive it.
-  Ground(const mbs::Model&, const std::vector<BodyNow>&);
+  ///   step  of the engine if it is fixed, 0 otherwise [s]: dampers take no more in it than an explicit method bears
+  Ground(const mbs::Model&, const std::vector<BodyNow>&, double step);
 
   bool is_there() const { return is_there_; }
   /// Takes over the shapes of bodies that have been replaced.
@@ -39,15 +40,18 @@ class Ground {
     int replaced = -1;
   };
   double calc_overlap(const Point&, const Pose& X_WB) const;
+  /// Damping over critical damping of the points of body b where it is now, as far as the step bears it.
+  double find_bearable_ratio(size_t b, const Pose& X_WB) const;
 
   const mbs::Model& model_;
   std::vector<Body> body_;  // (B)
   bool is_there_ = false;
-  double damping_ratio_ = 0;
+  double damping_ratio_ = 0, step_ = 0;
 };
 
 /// Damping over critical damping of a spring that gives back the share e of the speed with which it was hit, if it
-/// cannot pull: e = exp(-2 ζ acos ζ / √(1 - ζ²)), and its continuation above 1. For e in [0, 1]; at most 500.
+/// cannot pull: e = exp(-2 ζ acos ζ / √(1 - ζ²)), and its continuation above 1. For e in [0, 1]; at most 50, which
+/// gives back 1e-4.
 double find_damping_ratio(double restitution);
 
 }  // namespace topple::engines

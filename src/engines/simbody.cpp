@@ -262,7 +262,7 @@ class SimbodyEngine : public Engine {
     long steps = 0;
     try {
       if (settings.step == 0 && has_history(model)) settings.longest_step = choose_step(model, options);
-      Ground ground(model, course.bodies());
+      Ground ground(model, course.bodies(), settings.step);
       if (ground.is_there()) {
         ground.advance(course.motion(), find_ties(model, course.forces(), course.joint_live()).is_grounded);
         course.note("contact with the ground is of springs and dampers at corners, not the native engine's");

@@ -32,6 +32,17 @@ double calc_energy_error(double residual, double released, double brought, doubl
   return reference > 0 ? residual / reference : 0;
 }
 
+std::string describe_lost_energy(double error) {
+  constexpr double most = 1;
+  if (!(error > most)) return {};
+  char words[160];
+  std::snprintf(words, sizeof words,
+                "the balance of energy lacks %.3g times what was released or there at the start; the step may be too "
+                "long",
+                error);
+  return words;
+}
+
 Course::Course(System& s) : Course(s, {0, -1, std::vector<bool>(s.elements.size() + s.rotationals.size(), false)}) {}
 
 Course::Course(System& s, const CourseState& state) : s_(s), sampler_(s.options.samplings), now_(state) {
@@ -147,15 +158,10 @@ double Course::calc_singular_play() const {
 bool Course::end() {
   constexpr double near = 1.5;  // steps behind the last frame
   if (s_.summary.ending == Summary::Ending::AtRest || s_.state.time - now_.shown > near * s_.step) show();
-  constexpr double most = 1;
-  if (const double error = calc_energy_error(); error > most && s_.state.largest_residual > calc_singular_play()) {
+  const std::string lost = describe_lost_energy(calc_energy_error());
+  if (!lost.empty() && s_.state.largest_residual > calc_singular_play()) {
     s_.summary.ending = Summary::Ending::Diverged;
-    char words[160];
-    std::snprintf(words, sizeof words,
-                  "the balance of energy lacks %.3g times what was released or there at the start; the step may be too "
-                  "long",
-                  error);
-    s_.trouble = words;
+    s_.trouble = lost;
   }
   return false;
 }

@@ -10,6 +10,9 @@
 
 namespace topple::mbs {
 
+/// Why a balance of energy cannot be believed, by the largest error of it (Summary::energy_error); empty if it can.
+std::string describe_lost_energy(double error);
+
 /// What a run knows beside the state of its system.
 struct CourseState {
   long frame = 0;              // the next one

@@ -255,16 +255,6 @@ class Assembly {
     const Vec3 axis = (s_.rotation_of(j.parent) * j.R_PF).column(2);
     return {place(j.parent), place(j.child), {}, -axis, {}, axis};
   }
-  KinematicRow cable_row(const Cable& c) const {
-    const Vec3 p_A = point(c.a.index, c.p_A), p_B = point(c.b.index, c.p_B);
-    const Vec3 d = (1 / norm(p_B - p_A)) * (p_B - p_A);
-    return {place(c.a.index),
-            place(c.b.index),
-            -d,
-            -cross(p_A - centre(c.a.index), d),
-            d,
-            cross(p_B - centre(c.b.index), d)};
-  }
   /// Of stations beside the elastic one [rad/(N·m)].
   struct Flexibility {
     std::vector<std::array<std::array<double, 2>, 2>> element, rotational;  // [axis][station]
@@ -306,8 +296,6 @@ class Assembly {
         for (int k = 0; k < 5; ++k) f(rows[k], factor * share * r.loose.stiffness[k]);
         f(rows[5], factor * plane[2]);
       }
-      for (size_t i = 0; i < s_.model.cables.size(); ++i)
-        if (s_.state.cable[i].live) f(cable_row(s_.model.cables[i]), s_.model.cables[i].stiffness);
       for (const StiffRow& r : springs)
         f(KinematicRow{place(r.a), place(r.b), -r.row.line, -r.row.turn_a, r.row.line, r.row.turn_b}, r.stiffness);
     };
@@ -682,6 +670,7 @@ int DeadLoad::find_loose_body() const {
   for (const CompiledJoint& j : s_.joints) join(j.parent, j.child);
   for (const CompiledSpring& k : s_.forces.springs) join(k.a, k.b);
   for (const CompiledBushing& k : s_.forces.bushings) join(k.a, k.b);
+  for (const Cable& k : s_.model.cables) join(k.a.index, k.b.index);
   for (const int b : assembly_.free_bodies())
     if (find(b) != find(static_cast<int>(s_.B))) return b;
   return -1;
@@ -737,7 +726,7 @@ void DeadLoad::find_unbalanced() {
   s_.update_angles();
   s_.evaluate_elements_fully(0);
   s_.evaluate_rotationals(0);
-  s_.evaluate_cables();
+  s_.evaluate_cables(true);
   s_.evaluate_springs(true);
   s_.evaluate_loads(true);
   Vector r(assembly_.count());
@@ -879,8 +868,10 @@ std::string DeadLoad::describe_failure(bool has_diverged) const {
 
 bool DeadLoad::find(std::string& message) {
   if (const int b = find_loose_body(); b >= 0) {
-    message = "body \"" + s_.model.bodies[static_cast<size_t>(b)].name +
-              "\" is not connected to the ground by any element or joint: there is no dead-load equilibrium";
+    message =
+        "body \"" + s_.model.bodies[static_cast<size_t>(b)].name +
+        "\" is not connected to the ground by any element, joint, spring, bushing or cable: there is no dead-load "
+        "equilibrium";
     return false;
   }
   weight_ = calc_weight();

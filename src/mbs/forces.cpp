@@ -379,28 +379,40 @@ std::vector<StiffRow> System::calc_spring_stiffness(bool fast, double force_scal
     const double chord = find_chord(c, force_scale);
     return tangent > 1e-3 * chord ? tangent : chord;
   };
+  // what is tight also holds its points sideways
+  const auto add_between = [&](int a, int b, const Vec3& p_A, const Vec3& p_B, double stiff, double across) {
+    const Vec3 d = p_B - p_A;
+    const double length = norm(d);
+    const Vec3 line = length > 0 ? (1 / length) * d : Vec3{1, 0, 0};
+    Vec3 side = std::abs(line.x) < 0.6 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
+    side = cross(line, side);
+    side = (1 / norm(side)) * side;
+    const auto along = [&](const Vec3& n) {
+      return ForceRow{n, cross(p_A - centre_of(a), n), cross(p_B - centre_of(b), n)};
+    };
+    add(a, b, along(line), stiff);
+    if (across > 0) {
+      add(a, b, along(side), across);
+      add(a, b, along(cross(line, side)), across);
+    }
+  };
   for (size_t i = 0; i < forces.springs.size(); ++i) {
     if (!state.spring[i].live) continue;
     const CompiledSpring& k = forces.springs[i];
     ForceRow row;
     const double length = measure_spring(k, row), x = length - k.free_length;
     const double stiff = stiffness_of(k.spring, x, std::max(k.tension_strength, k.compression_strength), k.a, k.b, row);
-    // a tight spring also holds its points sideways; one of no length is the same in all directions
+    // one of no length is the same in all directions
     const double across = length > 0 ? calc_force(k.spring, x) / length : k.free_length == 0 ? stiff : 0;
-    Vec3 line = row.line;
-    if (length == 0) line = {1, 0, 0};
-    Vec3 side = std::abs(line.x) < 0.6 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
-    side = cross(line, side);
-    side = (1 / norm(side)) * side;
-    const Vec3 p_A = calc_point(k.a, k.p_A), p_B = calc_point(k.b, k.p_B);
-    const auto along = [&](const Vec3& d) {
-      return ForceRow{d, cross(p_A - centre_of(k.a), d), cross(p_B - centre_of(k.b), d)};
-    };
-    add(k.a, k.b, along(line), stiff);
-    if (across > 0) {
-      add(k.a, k.b, along(side), across);
-      add(k.a, k.b, along(cross(line, side)), across);
-    }
+    add_between(k.a, k.b, calc_point(k.a, k.p_A), calc_point(k.b, k.p_B), stiff, across);
+  }
+  for (size_t i = 0; i < model.cables.size(); ++i) {
+    if (!state.cable[i].live) continue;
+    const Cable& k = model.cables[i];
+    const Vec3 p_A = calc_point(k.a.index, k.p_A), p_B = calc_point(k.b.index, k.p_B);
+    const double length = norm(p_B - p_A);
+    const double across = length > 0 ? k.stiffness * (length - state.cable[i].rest_length) / length : 0;
+    add_between(k.a.index, k.b.index, p_A, p_B, k.stiffness, across);
   }
   for (size_t i = 0; i < forces.torsions.size(); ++i) {
     if (!state.torsion[i].live) continue;
@@ -445,6 +457,9 @@ bool System::find_overload(std::string& message) const {
       if (const double f = state.bushing[i].component[c].spring;
           state.bushing[i].live && std::abs(f) > forces.bushings[i].strength[c])
         return complain("bushing \"" + model.bushings[i].name + "\"", f, forces.bushings[i].strength[c]);
+  for (size_t i = 0; i < model.cables.size(); ++i)
+    if (state.cable[i].live && state.cable[i].force > model.cables[i].strength)
+      return complain("cable \"" + model.cables[i].name + "\"", state.cable[i].force, model.cables[i].strength);
   return false;
 }
 

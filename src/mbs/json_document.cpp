@@ -259,6 +259,9 @@ bool find_path(const Json& from, const Json* to, std::string& path) {
 JsonDocument::JsonDocument(std::string text, std::string name) : text_(std::move(text)), name_(std::move(name)) {
   if (text_.find_first_not_of(" \t\r\n") == std::string::npos)
     refuse(name_, text_, 0, {}, "the file is empty", kWhatItIs);
+  // which would end the text for the parser
+  if (const size_t at = text_.find('\0'); at != std::string::npos)
+    refuse(name_, text_, at, {}, "a zero byte is no JSON", "the file may be damaged");
   Builder builder(text_, name_, root_);
   Json::sax_parse(text_, &builder);
 }

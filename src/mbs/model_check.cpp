@@ -252,6 +252,10 @@ void Checker::check_bodies() {
     pose(p, "X_WB", b.X_WB);
     finite(p, "v_WB", b.v_WB);
     finite(p, "w_WB", b.w_WB);
+    if (m_.is_planar && b.v_WB.y != 0)
+      fail(p, "v_WB", fmt::format("has {:g} m/s along y, across which nothing of a planar model moves", b.v_WB.y));
+    if (m_.is_planar && (b.w_WB.x != 0 || b.w_WB.z != 0))
+      fail(p, "w_WB", "has a part about x or z, while the bodies of a planar model turn about y alone");
     shapes(p, b, b.fixed);
   }
 }

@@ -368,7 +368,7 @@ void System::evaluate_rotationals(double h) {
   }
 }
 
-void System::evaluate_cables() {
+void System::evaluate_cables(bool at_rest) {
   for (size_t i = 0; i < model.cables.size(); ++i) {
     CableState& c = state.cable[i];
     if (!c.live) continue;
@@ -382,7 +382,7 @@ void System::evaluate_cables() {
     const double length = norm(d), stretch = length - c.rest_length;
     c.force = stretch > 0 ? k.stiffness * stretch : 0;
     c.energy = stretch > 0 ? 0.5 * c.force * stretch : 0;
-    if (c.force > k.strength) {
+    if (!at_rest && c.force > k.strength) {
       c.plastic += c.energy;
       c.force = c.energy = 0;
       c.live = false;
@@ -545,7 +545,7 @@ void System::begin_forces() {
 
 void System::push_bodies(double h) {
   evaluate_rotationals(h);
-  evaluate_cables();
+  evaluate_cables(false);
   evaluate_springs(false);
   evaluate_loads(false);
 }
@@ -786,8 +786,11 @@ const View& System::calc_view() {
     fill(i, elements[i].zone, z);
     v.element_force[i] = -Vec3{z.resultant.c[0], z.resultant.c[1], z.resultant.c[2]};
     v.element_moment[i] = -Vec3{z.resultant.c[3], z.resultant.c[4], z.resultant.c[5]};
-    v.element_translation[i] = {z.deformation[0], z.deformation[1], z.deformation[2]};
-    v.element_rotation[i] = {z.deformation[3], z.deformation[4], z.deformation[5]};
+    // of one that is broken the frames go on to part
+    const Six parted = z.live ? Six{} : measure_zone(elements[i]).deformation;
+    const double* d = z.live ? z.deformation : parted.c;
+    v.element_translation[i] = {d[0], d[1], d[2]};
+    v.element_rotation[i] = {d[3], d[4], d[5]};
   }
   for (size_t i = 0; i < R; ++i) fill(E + i, is_loose(i) ? rotationals[i].loose : rotationals[i].zone, s.rotational[i]);
   v.joint_force.resize(joints.size());
@@ -809,8 +812,8 @@ const View& System::calc_view() {
       v.joint_moment[j] = -Vec3{f[3], f[4], f[5]};
       v.joint_released[j] = false;
     }
-    v.joint_angle[j] = s.joint[j].angle;
-    const bool slides = c.kind == Joint::Kind::Prismatic || c.kind == Joint::Kind::Cylindrical;
+    v.joint_angle[j] = s.joint[j].live ? s.joint[j].angle : 0;
+    const bool slides = s.joint[j].live && (c.kind == Joint::Kind::Prismatic || c.kind == Joint::Kind::Cylindrical);
     v.joint_displacement[j] = slides ? dot(F.column(2), calc_joint_frames(s, c).gap) : 0;
     if (c.parent < 0 || fixed[static_cast<size_t>(c.parent)]) joints_on_ground += reaction_force[j];
     if (c.child < 0 || fixed[static_cast<size_t>(c.child)]) joints_on_ground -= reaction_force[j];

@@ -384,7 +384,7 @@ class System {
   void loosen_joint(size_t j);
   /// Takes a joint out of the constraints.
   void drop_joint(size_t j);
-  void evaluate_cables();
+  void evaluate_cables(bool at_rest);
   void evaluate_contact(double h);
   void compile_contact();
   /// Of a body on one point at the mean rate, the highest of all laws [rad/s].

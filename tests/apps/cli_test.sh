@@ -81,6 +81,36 @@ TEXT
   else
     has err "is not built"
   fi
+  # results of former settings do not stay
+  expect 0 "$topple" study in.toml --evaluator "$model" -o b --samples 100 --no-drivers
+  for file in boxes.csv drivers.csv; do [ ! -e b/$file ] || { echo "b/$file of former settings"; failures=$((failures + 1)); }; done
+  exists b/results.json
+  # the folder of another study on a server, or of one in a file
+  mkdir d; echo '{"store": "postgresql://h/d", "name": "other"}' >d/study.json; cp d/study.json was.json
+  for store in "--store postgresql://h/d" "--store postgresql://h/d --name mine" "--store postgresql://g/d --name other" "--name mine"; do
+    expect 2 "$topple" study in.toml --evaluator "$model" -o d $store; has err "E822"; has err '"other"'
+    cmp d/study.json was.json || failures=$((failures + 1))
+  done
+  expect 2 "$topple" study in.toml --evaluator "$model" -o b --store postgresql://h/d; has err "E822"; has err "a study in a file"
+  [ ! -e b/study.json ] || { echo "b/study.json of a refused study"; failures=$((failures + 1)); }
+  # curves of unequal length
+  curves='while read -r line; do case $line in *\"a\":3*) t="[1,2,3]" ;; *) t="[1,2]" ;; esac; echo "{\"z\": 1, \"trajectory\": $t}"; done'
+  expect 2 "$topple" study in.toml --evaluator "$curves" -o curves --samples 100 --jobs 1; has err "E823"; has err "a trajectory of the length"; has err "^"
+  # strict limits
+  expect 0 "$topple" study in.toml --evaluator "$model" -o strict --samples 100 --no-drivers --permissible "z > 2"; has out "core values break the requirement z > 2"
+  expect 0 "$topple" study in.toml --evaluator "$model" -o strict --samples 100 --no-drivers --permissible "z >= 2"; has out "core values keep the requirement z >= 2"
+  # options that cannot be meant
+  expect 2 "$topple" study in.toml -o e; has err "in.toml:2"; has err "--evaluator"
+  expect 2 "$topple" study in.toml --evaluator "" -o e; has err "a command is wanted"
+  expect 2 "$topple" study in.toml --evaluator "$model" --permissible " " -o e; has err "a requirement is wanted"
+  expect 2 "$topple" study in.toml --evaluator "$model" --knowledge rules.json -o e; has err "--knowledge"; has err "E801"
+  expect 2 "$topple" study in.toml --evaluator "$model" --name x -o e; has err "--name"; has err "E801"
+  expect 2 "$topple" study in.toml --evaluator "$model" --seed 9223372036854775808 -o e; has err "2^63"
+  expect 2 "$topple" study in.toml --evaluator "$model" -o in.toml; has err "E801"; has err "in.toml"
+  expect 2 "$topple" study export s -o in.toml; has err "E801"
+  expect 2 "$topple" study in.toml --evaluator /nowhere/model -o e; has err "E827"
+  [ ! -e e/study.sqlite ] || { echo "a store without a run"; failures=$((failures + 1)); }
+  expect 0 "$topple" study in.toml --evaluator "$model" -o e --samples 20
   # all runs fail: told, not hidden
   expect 0 "$topple" study in.toml --evaluator "exit 3" -o f --samples 10; has out "exit code 3"; has out "failed"
   ;;
@@ -264,6 +294,11 @@ mbs)
   expect 0 "$topple" mbs run "$pendulum" -o f --no-report --step "1 ms" --duration 0.5s; has out "0.5 s in 500 steps of 1 ms"
   expect 0 "$topple" mbs run "$pendulum" -o f --no-report --step "1 ms" --step-share 0.5 --duration 0.5s; has out "0.5 s in 1000 steps of 0.5 ms"
   expect 2 "$topple" mbs run "$pendulum" -o f --no-report --step-share 2; has err "--step-share"
+  expect 2 "$topple" mbs run "$pendulum" -o f --no-report --step-share nan; has err "is no number"
+  if [ -c /dev/full ]; then
+    expect 1 sh -c '"$1" mbs run "$2" -o f --no-report --json --duration 0.1s >/dev/full' sh "$topple" "$pendulum"
+    has err "standard output could not be written"
+  fi
   # a mistake is shown where it stands
   sed 's/"child": "lower"/"child": "lwoer"/' "$pendulum" >typo.json
   expect 2 "$topple" mbs run typo.json -o g

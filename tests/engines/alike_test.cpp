@@ -319,6 +319,28 @@ TEST_P(EnginesAlikeReference, EventsAndReleases) {
   EXPECT_LT(r.position.value, 1e-3);  // the trigger is seen at steps, 0.1 ms at some m/s
 }
 
+TEST_P(EnginesAlikeReference, ALoadThatWasRemovedIsAppliedAgain) {
+  NEEDS_ENGINE();
+  mbs::Model m = test::make_empty({0, 0, 0});
+  mbs::add_body(m, test::make_body("b", 2, {1, 1, 1}, {0, 0, 0}));
+  mbs::Load l;
+  l.body = {0};
+  l.force = {10, 0, 0};
+  m.loads.push_back(l);
+  using Do = mbs::Action::Kind;
+  const std::pair<double, Do> actions[] = {{0.1, Do::ApplyLoad}, {0.5, Do::RemoveLoad}, {0.7, Do::ApplyLoad}};
+  for (const auto& [time, kind] : actions) {
+    mbs::Event e;
+    e.time = time;
+    e.actions.resize(1);
+    e.actions[0].kind = kind;
+    e.actions[0].index = 0;
+    m.events.push_back(e);
+  }
+  const auto c = test::run(*make_engine(GetParam()), m, test::make_options(1, 1e-2, 1e-3));
+  EXPECT_NEAR(c.frames.back().v_WB[0].x, 3.5, 1e-6) << "5 m/s² for 0.4 and 0.3 s";
+}
+
 TEST_P(EnginesAlikeReference, WithoutAStepTheyFollowWhatEventsLeave) {
   NEEDS_ENGINE();
   // 1 kg in place of 100 on 10 kN/m: the step of the start is ten times too long then

@@ -170,5 +170,17 @@ TEST(Mujoco, ErrorsOfTheLibraryEndTheRunInsteadOfTheProgram) {
   EXPECT_NE(s.message.find("MuJoCo does not take the model"), std::string::npos) << s.message;
 }
 
+TEST(Mujoco, ARunThatGainsEnergyFails) {
+  TOPPLE_NEEDS_ENGINE("mujoco");
+  // boxes flush on others of the same faces: its contact throws them off
+  mbs::Model m = test::make_empty({0, 0, -9.81});
+  m.contact.ground = m.contact.bodies = true;
+  for (int i = 0; i < 8; ++i) add_box(m, "box" + std::to_string(i), 100, {0.1, 0.1, 0.1}, {0, 0, 0.1 + 0.2 * i});
+  const auto c = test::run(*make_engine("mujoco"), m, make_options(0.5, 0.1, 2e-4));
+  ASSERT_GT(c.summary.energy_error, 1) << "the case is another one";
+  EXPECT_EQ(c.summary.ending, mbs::Summary::Ending::Diverged);
+  EXPECT_NE(c.summary.message.find("the balance of energy lacks"), std::string::npos) << c.summary.message;
+}
+
 }  // namespace
 }  // namespace topple::engines

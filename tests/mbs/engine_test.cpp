@@ -349,6 +349,36 @@ TEST(StartReplay, RunIsMadeOfTheSameSteps) {
   }
 }
 
+TEST(Element, GoesOnToBeMeasuredWhenItIsBroken) {
+  Model m;
+  m.gravity = {kGravity, 0, 0};
+  m.contact.ground = m.contact.bodies = false;
+  const BodyId body = add_body(m, make_box("body", 100, {0.5, 0.5, 0.5}, {}));
+  ZoneElement e;
+  e.name = "thread";
+  e.a = kGround, e.b = body;
+  e.translational_stiffness = {1e5, 1e5, 1e5};
+  e.rotational_stiffness = {1e4, 1e4, 1e4};
+  ZoneLaw law;
+  law.tension = {{0, 1}, {1, 1}};
+  law.rupture_elongation = 1e-3;
+  e.stations = {{0, add_law(m, law)}};
+  add_element(m, e);
+  Options o;
+  o.equilibrium = false;
+  o.duration = 0.3;
+  o.frame_interval = 0.05;
+  int broken = 0;
+  o.on_frame = [&](const View& v) {
+    if (v.element_state[0] != ElementState::Broken) return;
+    ++broken;
+    EXPECT_NEAR(v.element_translation[0].x, v.X_WB[0].p.x, 1e-12);
+    EXPECT_EQ(norm(v.element_force[0]), 0);
+  };
+  EXPECT_EQ(run(m, o).ending, Summary::Ending::TimeLimit);
+  EXPECT_GT(broken, 3);
+}
+
 TEST(Start, AnOverloadedBrittleModelNamesItsMostLoadedElement) {
   // a table of 40 t, its mass centre over the left leg: that one has 1.5 times what it can carry, the right one little
   Model m;

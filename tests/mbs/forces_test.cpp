@@ -387,5 +387,56 @@ TEST(SpringPhysics, CarriesADeadLoadAtRest) {
   EXPECT_NE(weak.message.find("spring \"spring\" would carry"), std::string::npos) << weak.message;
 }
 
+/// A box held by cables alone, one from each of its corners outwards.
+Model make_hung_box(double pretension) {
+  Model m;
+  m.contact.ground = m.contact.bodies = false;
+  const BodyId box = add_body(m, make_box("box", 10, {0.5, 0.5, 0.5}, {}));
+  for (int i = 0; i < 8; ++i) {
+    const Vec3 corner{i & 1 ? 0.5 : -0.5, i & 2 ? 0.5 : -0.5, i & 4 ? 0.5 : -0.5};
+    Cable c;
+    c.name = "cable " + std::to_string(i);
+    c.a = kGround, c.b = box;
+    c.p_A = 3.0 * corner, c.p_B = corner;
+    c.stiffness = 1e4;
+    c.pretension = pretension;
+    m.cables.push_back(c);
+  }
+  return m;
+}
+
+TEST(CablePhysics, HoldABodyAtRestByTheirPull) {
+  const Model m = make_hung_box(500);
+  Options o = options_of(0.05, 1e-3);
+  o.equilibrium = true;
+  int frames = 0;
+  o.on_frame = [&](const View& v) {
+    ++frames;
+    EXPECT_NEAR(v.ground_force.z, 98.1, 1e-6);
+    // along the diagonals 4 (k / 3) (1 + 2 N / (k l)) on either side, up to the square of the sag
+    const double length = std::sqrt(3.0), across = 500 / length, stiff = 8 * (1e4 / 3 + 2.0 / 3 * across);
+    EXPECT_NEAR(v.X_WB[0].p.z, -98.1 / stiff, 1e-5);
+    EXPECT_LT(norm(v.w_WB[0]), 1e-9);
+  };
+  const Summary s = run(m, o);
+  EXPECT_EQ(s.ending, Summary::Ending::TimeLimit) << s.message;
+  EXPECT_GT(frames, 1);
+}
+
+TEST(CablePhysics, AStrengthPassedAtRestIsNoEquilibrium) {
+  Model m = make_hung_box(500);
+  m.cables[6].strength = 400;
+  Options o = options_of(0.05, 1e-3);
+  o.equilibrium = true;
+  const Summary s = run(m, o);
+  EXPECT_EQ(s.ending, Summary::Ending::NoEquilibrium);
+  EXPECT_NE(s.message.find("cable \"cable 6\" would carry"), std::string::npos) << s.message;
+  o.equilibrium = false;
+  int broken = 0;
+  o.on_happening = [&](const Happening& h) { broken += h.kind == Happening::Kind::CableBroken ? 1 : 0; };
+  EXPECT_EQ(run(m, o).ending, Summary::Ending::TimeLimit);
+  EXPECT_EQ(broken, 1);
+}
+
 }  // namespace
 }  // namespace topple::mbs

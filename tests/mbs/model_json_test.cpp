@@ -100,6 +100,12 @@ TEST(ModelJson, PlacesEveryComplaint) {
               HasSubstr("6:2 outputs[0].rate \"x\": must be > 0 and at most 1e6, is 0"));
 }
 
+TEST(ModelJson, RefusesWhatStandsBehindAZeroByte) {
+  std::string text = file_with("");
+  text.insert(text.size() - 1, std::string("\0 no JSON {", 11));
+  EXPECT_THAT(complaints_of([&] { (void)model_from_json(text, "m.json"); }), HasSubstr("a zero byte is no JSON"));
+}
+
 TEST(ModelJson, PlacesMistakesBehindOtherLetters) {
   // columns count characters, not bytes; a byte order mark is no character
   const std::string text =

@@ -228,6 +228,29 @@ TEST(Planar, RefusesAJointBesideThePlaneOfItsBody) {
   EXPECT_NO_THROW((void)run(m, {}));
 }
 
+TEST(Planar, RefusesVelocitiesThatLeaveThePlane) {
+  Model m;
+  m.contact.ground = m.contact.bodies = false;
+  Body b = make_box("rod", 10, {0.5, 0.05, 0.05}, {0.5, 2, 0});
+  const auto complaint = [&](const Vec3& v, const Vec3& w, bool is_planar) -> std::string {
+    m.is_planar = is_planar;
+    m.bodies.clear();
+    b.v_WB = v, b.w_WB = w;
+    add_body(m, b);
+    Options o;
+    o.duration = 0.01;
+    try {
+      (void)run(m, o);
+    } catch (const InputError& e) { return e.what(); }
+    return {};
+  };
+  EXPECT_NE(complaint({1, 0.5, 0}, {}, true).find("bodies[0].v_WB \"rod\": has 0.5 m/s along y"), std::string::npos);
+  for (const Vec3& w : {Vec3{1, 0, 0}, Vec3{0, 1, 2}})
+    EXPECT_NE(complaint({}, w, true).find("bodies[0].w_WB \"rod\": has a part about x or z"), std::string::npos);
+  EXPECT_EQ(complaint({1, 0, 2}, {0, 3, 0}, true), "");
+  EXPECT_EQ(complaint({1, 0.5, 0}, {1, 2, 3}, false), "");
+}
+
 TEST(Planar, GoesThroughItsFile) {
   Model m;
   add_body(m, make_box("b", 1, {1, 1, 1}, {0, 0, 0}));
