@@ -59,7 +59,12 @@ class Optimisation {
 
   AlphaResult run() {
     explore();
+    check_faces(false);
     search_from_best(false);
+    if (has_many_inputs()) {
+      recheck(false);
+      restart_until_settled(asker_.limit() / 5);
+    }
     return search_on(true);
   }
 
@@ -78,11 +83,17 @@ class Optimisation {
     for (int idle = 0; asker_.can_go_on() && idle < options_.patience;) {
       const std::vector<double> before = calc_bounds();
       if (rounds_ > 0) spread(0.25);
-      scan();
+      if (!has_many_inputs()) scan();
+      for (int k = 0; k < 2; ++k) restart_faces(true);
       search_dispersed();
       recheck(false);
       idle = has_gained(before) ? 0 : idle + 1;
       ++rounds_;
+    }
+    if (has_many_inputs()) {
+      restart_until_settled(0);
+      recheck(false);
+      unfinished_ = unfinished_ || asker_.rest() == 0;
     }
     asker_.set_limit(limit);
     if (options_.search_classes) {
@@ -285,6 +296,8 @@ class Optimisation {
   struct Running {
     Goal goal;
     std::unique_ptr<LocalSearch> search;
+    bool over_faces = false;
+    bool of_restart = false;  // refines where a search over the faces ended
   };
 
   std::unique_ptr<LocalSearch> make_model_search(const Goal& goal, const Candidate& start, double radius, int probes) {
@@ -295,6 +308,13 @@ class Optimisation {
     o.seed = options_.seed + ++searches_;
     return std::make_unique<ModelSearch>(regions_[goal.level], asker_.archive()[start.sample].x,
                                          tell_of(goal, start.sample), o);
+  }
+
+  FaceSearch::Options make_face_options(const Goal& goal) {
+    FaceSearch::Options o;
+    o.least_gain = 10 * options_.tolerance * width_of(goal.output);
+    o.seed = options_.seed + ++searches_;
+    return o;
   }
 
   std::unique_ptr<LocalSearch> make_evolution(const Goal& goal, const Candidate& start) {
@@ -328,6 +348,14 @@ class Optimisation {
     for (const auto& r : all) {
       if (!r.search->is_done()) unfinished_ = true;
       if (!r.search->is_converged()) continue;
+      if (r.over_faces) {
+        note_faces(r.goal, static_cast<const FaceSearch&>(*r.search));
+        continue;
+      }
+      if (r.of_restart) {
+        Faces& f = faces_[key_of(r.goal)];
+        f.last = r.search->value(), f.last_at = r.search->best();
+      }
       double& end = ends_.try_emplace(key_of(r.goal), infinite).first->second;
       end = std::min(end, r.search->value());
     }
@@ -341,6 +369,216 @@ class Optimisation {
   bool is_converged(const Goal& goal, const Candidate& best) const {
     const auto end = ends_.find(key_of(goal));
     return end != ends_.end() && end->second <= best.value + 2 * options_.tolerance * width_of(goal.output);
+  }
+  /// What a bound is marked with.
+  bool is_settled(const Goal& goal, const Candidate& best) const {
+    if (!is_converged(goal, best)) return false;
+    if (!is_open(goal.level)) return true;
+    return is_checked(goal, best) && (goal.outcome != any_class || is_confirmed(goal, best));
+  }
+
+  // ---- more inputs than all corners can be run of
+
+  bool has_many_inputs() const { return is_open(0); }
+  /// Whether the corners of a level's cut are left to searches.
+  bool is_open(int level) const { return static_cast<int>(regions_[level].axes.size()) > options_.corner_inputs; }
+
+  /// What searches over the faces did for a goal.
+  struct Faces {
+    double end = infinite;       // best value at which one ended
+    double paired = infinite;    // at which one ended behind all pairs of moves
+    double foretold = infinite;  // and whose model foretold what was tried
+    double best = infinite;      // to which the counts belong
+    int idle = 0;                // restarts without gain
+    int again = 0;               // of them, those that ended at the best from a place of their own
+    int elsewhere = 0;           // those that did not
+    double last = infinite;      // where the last restart ended
+    Point last_at;
+  };
+
+  void note_faces(const Goal& goal, const FaceSearch& search) {
+    Faces& f = faces_[key_of(goal)];
+    f.end = std::min(f.end, search.value());
+    if (search.is_paired()) f.paired = std::min(f.paired, search.value());
+    if (search.is_foretold()) f.foretold = std::min(f.foretold, search.value());
+    f.last = search.value(), f.last_at = search.best();
+  }
+
+  /// Whether restarts have shown that a better bound is unlikely.
+  bool is_confirmed(const Goal& goal, const Candidate& best) const {
+    const auto at = faces_.find(key_of(goal));
+    if (at == faces_.end()) return false;
+    const Faces& f = at->second;
+    const double close = best.value + 1e-4 * width_of(goal.output);
+    if (f.best > close || f.idle < options_.restarts) return false;
+    // the more searches ended elsewhere, the more are asked for
+    return f.foretold <= close ||
+           (f.again >= options_.again && f.again * f.idle >= options_.restarts * (f.again + 3 * f.elsewhere));
+  }
+
+  bool is_checked(const Goal& goal, const Candidate& best) const {
+    const auto f = faces_.find(key_of(goal));
+    return f != faces_.end() && f->second.end <= best.value + 20 * options_.tolerance * width_of(goal.output);
+  }
+
+  /// Best samples of one level at the same place in the cuts of the others, by fractions and as they are.
+  void share_between_levels(bool of_classes) {
+    std::vector<Point> points;
+    for (const Goal& goal : make_goals(of_classes)) {
+      const Candidate best = find_best(goal);
+      if (best.sample < 0 || !is_open(goal.level)) continue;
+      const Point& x = asker_.archive()[best.sample].x;
+      const Box& from = regions_[goal.level].box;
+      for (std::size_t k = 0; k < regions_.size(); ++k) {
+        if (static_cast<int>(k) == goal.level || !is_open(static_cast<int>(k))) continue;
+        const Region& r = regions_[k];
+        Point y = x;
+        for (const int i : r.axes)
+          y[i] = x[i] == from.lower[i]   ? r.box.lower[i]
+                 : x[i] == from.upper[i] ? r.box.upper[i]
+                                         : r.box.lower[i] + (x[i] - from.lower[i]) / (from.upper[i] - from.lower[i]) *
+                                                                (r.box.upper[i] - r.box.lower[i]);
+        for (Point p : {clip(r.box, std::move(y)), clip(r.box, x)})
+          if (!space_.has_interaction() || r.contains(p)) points.push_back(std::move(p));
+      }
+    }
+    ask(points);
+  }
+
+  /// From every best sample at which no search over the faces has ended, until there is none.
+  void check_faces(bool of_classes) {
+    std::set<std::pair<Key, int>> tried;
+    while (has_many_inputs() && asker_.can_go_on()) {
+      share_between_levels(of_classes);
+      std::vector<Running> all;
+      const std::vector<Goal> goals = make_goals(of_classes);
+      std::size_t pairs = 0;
+      for (const Goal& goal : goals) {
+        const Candidate best = find_best(goal);
+        if (!is_open(goal.level) || best.sample < 0 || is_checked(goal, best)) continue;
+        if (!tried.insert({key_of(goal), best.sample}).second) continue;
+        FaceSearch::Options o = make_face_options(goal);
+        o.wide_axes = regions_[goal.level].axes;
+        // all pairs for all goals must leave something for others
+        const std::size_t n = regions_[goal.level].axes.size();
+        o.pairs = best.value < faces_[key_of(goal)].paired - 1e-4 * width_of(goal.output) &&
+                  (pairs += n * (n - 1) / 2) < static_cast<std::size_t>(asker_.rest()) / 2;
+        all.push_back({goal,
+                       std::make_unique<FaceSearch>(regions_[goal.level], asker_.archive()[best.sample].x,
+                                                    tell_of(goal, best.sample), o),
+                       true});
+      }
+      if (all.empty()) break;
+      advance(all);
+    }
+  }
+
+  /// Inputs whose value at the best sample is no end of the cut.
+  std::vector<int> list_inner_axes(const Goal& goal) const {
+    std::vector<int> inner;
+    const Region& r = regions_[goal.level];
+    const Point& x = asker_.archive()[find_best(goal).sample].x;
+    for (const int i : r.axes)
+      if (x[i] != r.box.lower[i] && x[i] != r.box.upper[i]) inner.push_back(i);
+    return inner;
+  }
+
+  /// Another place in a cut for a restart: a good sample that is far from others, the best one with a third of its
+  /// coordinates moved, random ends, a random place.
+  Point choose_restart(const Goal& goal, const Candidate& best, int kind, Random& random) {
+    const Region& r = regions_[goal.level];
+    if (kind == 0)
+      if (const auto starts = find_starts(goal, 1); !starts.empty()) return asker_.archive()[starts[0].sample].x;
+    Point x = asker_.archive()[best.sample].x;
+    for (const int i : r.axes) {
+      const double low = r.box.lower[i], high = r.box.upper[i];
+      if (kind == 1 && random.next() > 1.0 / 3) continue;
+      if (kind == 3 || (kind == 1 && x[i] != low && x[i] != high))
+        x[i] = random.next(low, high);
+      else
+        x[i] = (kind == 1 ? x[i] == low : random.next() < 0.5) ? high : low;
+    }
+    // towards the centre until interaction allows it
+    const Point centre = calc_centre(space_);
+    for (int k = 0; k < 8 && space_.has_interaction() && !r.contains(x); ++k)
+      for (std::size_t i = 0; i < x.size(); ++i) x[i] += 0.3 * (centre[i] - x[i]);
+    return !space_.has_interaction() || r.contains(x) ? x : asker_.archive()[best.sample].x;
+  }
+
+  /// A search over the faces from another place for every goal, or for those that are not confirmed; false if there are
+  /// none.
+  bool restart_faces(bool of_all) {
+    std::vector<std::pair<Goal, Point>> starts;
+    std::vector<Point> points;
+    if (!has_many_inputs() || !asker_.can_go_on()) return false;
+    const int kind = restart_rounds_ % 4;
+    Random random(options_.seed + 104729 * ++restart_rounds_);
+    for (const Goal& goal : make_goals(false)) {
+      const Candidate best = find_best(goal);
+      if (!is_open(goal.level) || best.sample < 0 || (!of_all && is_confirmed(goal, best))) continue;
+      points.push_back(choose_restart(goal, best, kind, random));
+      starts.push_back({goal, points.back()});
+    }
+    if (starts.empty()) return false;
+    ask(points);
+    std::vector<Running> all;
+    for (const auto& [goal, x] : starts) {
+      faces_[key_of(goal)].last = infinite;
+      const int sample = asker_.archive().find(x);
+      if (sample < 0 || !std::isfinite(value_of(goal, sample))) continue;
+      FaceSearch::Options o = make_face_options(goal);
+      o.wide_axes = list_inner_axes(goal);
+      all.push_back({goal, std::make_unique<FaceSearch>(regions_[goal.level], x, tell_of(goal, sample), o), true});
+    }
+    restarts_ += static_cast<int>(all.size());
+    advance(all);
+    // a place inside that is nearly as good as the best one is no more than a start
+    std::vector<Running> refined;
+    for (const auto& [goal, x] : starts) {
+      const Faces& f = faces_[key_of(goal)];
+      const Candidate best = find_best(goal);
+      const int sample = std::isfinite(f.last) ? asker_.archive().find(f.last_at) : -1;
+      if (sample < 0 || list_inner_axes(goal).empty() || f.last > best.value + 0.05 * width_of(goal.output) ||
+          is_there(goal, best, f.last, f.last_at))
+        continue;
+      refined.push_back({goal, make_model_search(goal, {f.last, sample}, 0.05, 1), false, true});
+    }
+    advance(refined);
+    std::vector<std::pair<double, Point>> ends;
+    for (const auto& [goal, x] : starts) ends.push_back({faces_[key_of(goal)].last, faces_[key_of(goal)].last_at});
+    check_faces(false);
+    for (std::size_t k = 0; k < starts.size(); ++k)
+      count_restart(starts[k].first, kind != 1, ends[k].first, ends[k].second);
+    return true;
+  }
+
+  /// Whether a search ended at the best sample or at one that is as good.
+  bool is_there(const Goal& goal, const Candidate& best, double end, const Point& at) const {
+    const double width = width_of(goal.output);
+    if (end <= best.value + 1e-4 * width) return true;
+    const Region& r = regions_[goal.level];
+    const Point& x = asker_.archive()[best.sample].x;
+    return end <= best.value + 1e-2 * width && std::all_of(r.axes.begin(), r.axes.end(), [&](int i) {
+             return std::abs(at[i] - x[i]) <= 0.1 * (r.box.upper[i] - r.box.lower[i]);
+           });
+  }
+
+  void count_restart(const Goal& goal, bool is_independent, double end, const Point& at) {
+    Faces& f = faces_[key_of(goal)];
+    const Candidate best = find_best(goal);
+    const double width = width_of(goal.output);
+    if (best.value < f.best - 1e-4 * width) f.best = best.value, f.idle = f.again = f.elsewhere = 0;
+    ++f.idle;
+    if (is_independent && std::isfinite(end)) ++(is_there(goal, best, end, at) ? f.again : f.elsewhere);
+  }
+
+  /// Restarts for what is not confirmed, as long as so many runs are left.
+  void restart_until_settled(int reserve) {
+    for (int vain = 0; asker_.rest() > reserve && vain < 8;) {
+      const int before = asker_.asked();
+      if (!restart_faces(false)) return;
+      vain = asker_.asked() > before ? 0 : vain + 1;
+    }
   }
 
   void search_from_best(bool of_classes) {
@@ -359,9 +597,9 @@ class Optimisation {
     std::vector<Running> all;
     for (const Goal& goal : make_goals(false)) {
       if (regions_[goal.level].axes.empty()) continue;
-      for (const auto& start : find_starts(goal, options_.starts))
+      for (const auto& start : find_starts(goal, has_many_inputs() ? 1 : options_.starts))
         all.push_back({goal, make_model_search(goal, start, 0.1, 1)});
-      if (const Candidate best = find_best(goal); best.sample >= 0 && rounds_ == 0)
+      if (const Candidate best = find_best(goal); best.sample >= 0 && rounds_ == 0 && !has_many_inputs())
         for (int k = 0; k < options_.evolutions; ++k) all.push_back({goal, make_evolution(goal, best)});
     }
     advance(all);
@@ -371,6 +609,7 @@ class Optimisation {
   void recheck(bool of_classes) {
     std::set<std::pair<Key, int>> tried;
     while (asker_.can_go_on()) {
+      check_faces(of_classes);
       std::vector<Running> all;
       for (const Goal& goal : make_goals(of_classes)) {
         const Candidate best = find_best(goal);
@@ -391,8 +630,8 @@ class Optimisation {
         for (int k = 0; k < static_cast<int>(levels_.size()); ++k) {
           auto& b = outputs[o].levels[k];
           const bool point = regions_[k].axes.empty();
-          b.lower.converged = b.lower.sample >= 0 && (point || is_converged({o, k, 1, outcome}, {b.lower.value}));
-          b.upper.converged = b.upper.sample >= 0 && (point || is_converged({o, k, -1, outcome}, {-b.upper.value}));
+          b.lower.converged = b.lower.sample >= 0 && (point || is_settled({o, k, 1, outcome}, {b.lower.value}));
+          b.upper.converged = b.upper.sample >= 0 && (point || is_settled({o, k, -1, outcome}, {-b.upper.value}));
         }
     };
     mark(result.outputs, any_class);
@@ -402,6 +641,7 @@ class Optimisation {
     result.searches = static_cast<int>(searches_);
     result.rounds = rounds_;
     result.rechecks = rechecks_;
+    result.restarts = restarts_;
     return result;
   }
 
@@ -415,9 +655,10 @@ class Optimisation {
   std::vector<int> space_points_;           // per level
   std::map<Key, double> ends_;              // best value at which a search converged
   std::map<Key, std::vector<int>> starts_;  // samples from which dispersed searches began
+  std::map<Key, Faces> faces_;
   int next_spread_ = 1;
   std::uint64_t searches_ = 0;
-  int rechecks_ = 0, rounds_ = 0, shown_ = 0;
+  int rechecks_ = 0, rounds_ = 0, shown_ = 0, restarts_ = 0, restart_rounds_ = 0;
   bool unfinished_ = false;
 };
 
@@ -437,6 +678,7 @@ AlphaOptions make_thrifty_options() {
   o.starts = 1;
   o.evolutions = 0;
   o.patience = 1;
+  o.restarts = 2;
   o.search_classes = false;
   return o;
 }

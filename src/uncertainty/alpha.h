@@ -26,9 +26,11 @@ namespace topple::uncertainty {
 
 /// One end of an output's cut.
 struct Bound {
-  double value = 0;        // NaN if no run counts
-  int sample = -1;         // in the archive, where it was found
-  bool converged = false;  // a local search ended there because nothing better is near
+  double value = 0;  // NaN if no run counts
+  int sample = -1;   // in the archive, where it was found
+  /// A local search ended there because nothing better is near; with more than `corner_inputs` inputs, searches over
+  /// the faces as well, from other places too.
+  bool converged = false;
 };
 
 struct LevelBounds {
@@ -75,6 +77,7 @@ struct AlphaResult {
   int searches = 0;  // local searches
   int rounds = 0;    // of spread points and dispersed searches
   int rechecks = 0;  // of best samples at which no search had ended
+  int restarts = 0;  // searches over the faces from other places, where there are more than `corner_inputs`
 };
 
 struct AlphaOptions {
@@ -87,6 +90,9 @@ struct AlphaOptions {
   int space_points = 0, inner_points = 0;
   /// Largest number of fuzzy inputs for which all corners of every cut are run.
   int corner_inputs = 8;
+  /// With more of them, searches over the faces start from other places, per bound at least so many times in a row
+  /// without gain, and until they have found the same bound again as often as `again` says or runs are used up.
+  int restarts = 4, again = 3;
   /// Dispersed starts of model searches per bound and round.
   int starts = 2;
   /// Evolution searches per bound, in the first round.

@@ -516,4 +516,262 @@ void EvolutionSearch::tell(std::span<const Told> told) {
   ask();
 }
 
+FaceSearch::FaceSearch(Region region, Point start, const Told& at_start, const Options& options)
+    : LocalSearch(std::move(start), at_start), region_(std::move(region)), options_(options) {
+  for (const int i : region_.axes) axes_.push_back({i, {}, {}});
+  ask_star(false);
+}
+
+bool FaceSearch::add(const Point& x) {
+  if (x == best_ || (region_.space->has_interaction() && !region_.contains(x))) return false;
+  pending_.push_back(x);
+  return true;
+}
+
+void FaceSearch::ask_star(bool wide) {
+  pending_.clear(), asked_.clear();
+  stage_ = wide ? Stage::Wide : Stage::Star;
+  is_wide_ = wide;
+  if (!wide) {
+    next_ = best_, next_value_ = value_, next_outcome_ = outcome_;
+    for (Axis& axis : axes_) axis.places.clear();
+    if (iteration_++ >= options_.iterations) return;
+  }
+  const std::vector<double> parts = wide ? std::vector<double>{0.25, 0.5, 0.75} : std::vector<double>{0, 1};
+  for (std::size_t k = 0; k < axes_.size(); ++k) {
+    const int i = axes_[k].input;
+    const double low = region_.box.lower[i], high = region_.box.upper[i];
+    if (wide && std::count(options_.wide_axes.begin(), options_.wide_axes.end(), i) == 0) continue;
+    for (const double part : parts) {
+      Point x = best_;
+      x[i] = part == 0 ? low : part == 1 ? high : low + part * (high - low);
+      if (wide && std::abs(x[i] - best_[i]) < 0.05 * (high - low)) continue;
+      if (add(x)) asked_.push_back({static_cast<int>(k), x[i]});
+    }
+  }
+  if (pending_.empty()) wide ? ask_pairs() : conclude();
+}
+
+/// Along axes whose best place has one on either side: the vertex of the parabola through the three.
+void FaceSearch::ask_vertices() {
+  pending_.clear(), asked_.clear();
+  stage_ = Stage::Vertex;
+  for (std::size_t k = 0; k < axes_.size(); ++k) {
+    const int i = axes_[k].input;
+    std::vector<Place> all = axes_[k].places;
+    all.push_back({best_[i], value_});
+    std::sort(all.begin(), all.end(), [](const Place& a, const Place& b) { return a.at < b.at; });
+    const std::size_t least =
+        std::min_element(all.begin(), all.end(), [](const Place& a, const Place& b) { return a.value < b.value; }) -
+        all.begin();
+    if (least == 0 || least + 1 >= all.size()) continue;
+    const Place &a = all[least - 1], &b = all[least], &c = all[least + 1];
+    if (!std::isfinite(a.value) || !std::isfinite(c.value)) continue;
+    const double left = (a.value - b.value) / (a.at - b.at), right = (c.value - b.value) / (c.at - b.at);
+    const double curvature = (right - left) / (c.at - a.at);
+    if (!(curvature > 0)) continue;
+    Point x = best_;
+    x[i] = std::clamp(0.5 * (a.at + b.at - left / curvature), a.at, c.at);
+    if (std::abs(x[i] - b.at) < 0.02 * (region_.box.upper[i] - region_.box.lower[i])) continue;
+    if (add(x)) asked_.push_back({static_cast<int>(k), x[i]});
+  }
+  if (pending_.empty()) ask_together();
+}
+
+/// Moves that improve alone, the two, four ... best ones and all of them at once.
+void FaceSearch::ask_together() {
+  pending_.clear();
+  stage_ = Stage::Together;
+  std::vector<std::pair<Place, int>> gains;
+  for (const Axis& axis : axes_) {
+    const auto best = std::min_element(axis.places.begin(), axis.places.end(),
+                                       [](const Place& a, const Place& b) { return a.value < b.value; });
+    if (best != axis.places.end() && best->value < value_ - options_.least_gain) gains.push_back({*best, axis.input});
+  }
+  std::stable_sort(gains.begin(), gains.end(),
+                   [](const auto& a, const auto& b) { return a.first.value < b.first.value; });
+  Point x = best_;
+  for (std::size_t k = 0; k < gains.size(); ++k) {
+    x[gains[k].second] = gains[k].first.at;
+    const std::size_t count = k + 1;
+    if (count > 1 && (count == gains.size() || (count & (count - 1)) == 0)) add(x);
+  }
+  if (pending_.empty()) conclude();
+}
+
+/// Moves of an axis for pairs: to other valleys of what is known along it, two at most, or else to the better end.
+void FaceSearch::choose_moves(Axis& axis) const {
+  const int i = axis.input;
+  const double width = region_.box.upper[i] - region_.box.lower[i];
+  const auto is_less = [](const Place& a, const Place& b) { return a.value < b.value; };
+  axis.moves.clear();
+  std::vector<Place> all = axis.places, ends;
+  all.push_back({best_[i], value_});
+  std::sort(all.begin(), all.end(), [](const Place& a, const Place& b) { return a.at < b.at; });
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    const bool is_first = k == 0, is_last = k + 1 == all.size();
+    if (!std::isfinite(all[k].value) || std::abs(all[k].at - best_[i]) < 0.2 * width) continue;
+    if (is_first || is_last) ends.push_back(all[k]);
+    if ((is_first || all[k].value <= all[k - 1].value) && (is_last || all[k].value <= all[k + 1].value))
+      axis.moves.push_back(all[k]);
+  }
+  std::stable_sort(axis.moves.begin(), axis.moves.end(), is_less);
+  if (axis.moves.size() > 2) axis.moves.resize(2);
+  if (axis.moves.empty() && !ends.empty()) axis.moves.push_back(*std::min_element(ends.begin(), ends.end(), is_less));
+}
+
+void FaceSearch::ask_pairs() {
+  pending_.clear(), pairs_.clear(), first_.clear();
+  stage_ = Stage::Pairs;
+  if (!options_.pairs || paired_ || pairings_ >= 3) {
+    converged_ = true;
+    return;
+  }
+  ++pairings_;
+  int count = 0;
+  for (Axis& axis : axes_) {
+    choose_moves(axis);
+    first_.push_back(count);
+    count += static_cast<int>(axis.moves.size());
+  }
+  first_.push_back(count);
+  mixed_.assign(static_cast<std::size_t>(count) * count, infinite);
+  for (std::size_t a = 0; a < axes_.size(); ++a)
+    for (std::size_t b = a + 1; b < axes_.size(); ++b)
+      for (int p = first_[a]; p < first_[a + 1]; ++p)
+        for (int q = first_[b]; q < first_[b + 1]; ++q) {
+          Point x = best_;
+          x[axes_[a].input] = axes_[a].moves[p - first_[a]].at, x[axes_[b].input] = axes_[b].moves[q - first_[b]].at;
+          if (add(x)) pairs_.push_back({p, q});
+        }
+  if (pending_.empty()) converged_ = true;
+}
+
+/// Minima of the model of moves and pairs by steepest descents from random combinations, best first.
+std::vector<FaceSearch::Combination> FaceSearch::minimise_pairs() const {
+  const std::size_t n = axes_.size(), count = static_cast<std::size_t>(first_.back());
+  std::vector<double> alone(count);
+  for (std::size_t a = 0; a < n; ++a)
+    for (int p = first_[a]; p < first_[a + 1]; ++p) alone[p] = axes_[a].moves[p - first_[a]].value - value_;
+  Random random(options_.seed);
+  std::vector<Combination> found;
+  for (std::size_t start = 0; start < 30 * n; ++start) {
+    Combination c;
+    for (const Axis& axis : axes_)
+      c.moves.push_back(static_cast<int>(random.next() * static_cast<double>(axis.moves.size() + 1)));
+    const auto calc_change = [&](std::size_t a, int move) {
+      if (move == 0) return 0.0;
+      const std::size_t p = first_[a] + move - 1;
+      double sum = alone[p];
+      for (std::size_t b = 0; b < n; ++b)
+        if (b != a && c.moves[b] > 0) sum += mixed_[p * count + first_[b] + c.moves[b] - 1];
+      return sum;
+    };
+    for (std::size_t step = 0; step < 10 * n; ++step) {
+      double most = 0;
+      std::size_t axis = n;
+      int move = 0;
+      for (std::size_t a = 0; a < n; ++a) {
+        const double now = calc_change(a, c.moves[a]);
+        for (int m = 0; m <= static_cast<int>(axes_[a].moves.size()); ++m) {
+          const double then = m == c.moves[a] ? infinite : calc_change(a, m);
+          if (std::isfinite(then) && now - then > most) most = now - then, axis = a, move = m;
+        }
+      }
+      if (axis == n) break;
+      c.moves[axis] = move;
+    }
+    c.value = value_;
+    for (std::size_t a = 0; a < n; ++a) {
+      if (c.moves[a] == 0) continue;
+      const std::size_t p = first_[a] + c.moves[a] - 1;
+      c.value += alone[p];
+      for (std::size_t b = 0; b < a; ++b)
+        if (c.moves[b] > 0) c.value += mixed_[p * count + first_[b] + c.moves[b] - 1];
+    }
+    if (std::isfinite(c.value)) found.push_back(std::move(c));
+  }
+  // the same combination by another way differs in the last digits
+  std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.moves < b.moves; });
+  found.erase(std::unique(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.moves == b.moves; }),
+              found.end());
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+void FaceSearch::ask_foretold() {
+  pending_.clear(), foretold_.clear();
+  stage_ = Stage::Foretold;
+  for (const Combination& c : minimise_pairs()) {
+    if (static_cast<int>(pending_.size()) >= options_.trials) break;
+    if (c.moves.size() - std::count(c.moves.begin(), c.moves.end(), 0) < 3) continue;
+    Point x = best_;
+    for (std::size_t k = 0; k < axes_.size(); ++k)
+      if (c.moves[k] > 0) x[axes_[k].input] = axes_[k].moves[c.moves[k] - 1].at;
+    if (add(x)) foretold_.push_back(c.value);
+  }
+  if (pending_.empty()) conclude();
+}
+
+/// Goes to the best point of this stage, or on to the next stage where nothing improved.
+void FaceSearch::conclude() {
+  if (next_value_ < value_ - options_.least_gain) {
+    best_ = next_, value_ = next_value_, outcome_ = next_outcome_;
+    if (stage_ != Stage::Foretold) paired_ = foretells_ = false;
+    ask_star(false);
+  } else if (stage_ == Stage::Pairs || stage_ == Stage::Foretold) {
+    pending_.clear();
+    converged_ = paired_ = true;
+  } else if (!options_.wide_axes.empty() && !is_wide_) {
+    ask_star(true);
+  } else {
+    ask_pairs();
+  }
+}
+
+void FaceSearch::tell(std::span<const Told> told) {
+  for (std::size_t k = 0; k < told.size(); ++k)
+    if (told[k].value < next_value_) next_ = pending_[k], next_value_ = told[k].value, next_outcome_ = told[k].outcome;
+  switch (stage_) {
+    case Stage::Star:
+    case Stage::Wide:
+    case Stage::Vertex: {
+      for (std::size_t k = 0; k < told.size(); ++k)
+        axes_[asked_[k].axis].places.push_back({asked_[k].at, told[k].value});
+      stage_ == Stage::Vertex ? ask_together() : ask_vertices();
+      break;
+    }
+    case Stage::Together:
+      conclude();
+      break;
+    case Stage::Pairs: {
+      std::vector<double> alone;
+      for (const Axis& axis : axes_)
+        for (const Place& p : axis.moves) alone.push_back(p.value);
+      const std::size_t count = alone.size();
+      for (std::size_t k = 0; k < told.size(); ++k) {
+        const auto [p, q] = pairs_[k];
+        const double mixed = told[k].value - alone[p] - alone[q] + value_;
+        if (std::isfinite(mixed)) mixed_[p * count + q] = mixed_[q * count + p] = mixed;
+      }
+      ask_foretold();
+      break;
+    }
+    case Stage::Foretold: {
+      // a model that foretells values needs no second set of pairs
+      double off = 0;
+      for (std::size_t k = 0; k < told.size(); ++k) off = std::max(off, std::abs(told[k].value - foretold_[k]));
+      paired_ = off <= 10 * options_.least_gain;
+      foretells_ =
+          paired_ && std::all_of(axes_.begin(), axes_.end(), [this](const Axis& axis) {
+            const int i = axis.input;
+            const auto is_end = [&](double at) { return at == region_.box.lower[i] || at == region_.box.upper[i]; };
+            return is_end(best_[i]) && axis.moves.size() == 1 && is_end(axis.moves[0].at);
+          });
+      conclude();
+      break;
+    }
+  }
+}
+
 }  // namespace topple::uncertainty

@@ -145,4 +145,70 @@ class EvolutionSearch : public LocalSearch {
   int generation_ = 0;
 };
 
+/// Moves from end to end of the cut, for cuts with too many corners to run them all. Around the best point a star along
+/// the axes: ends, the vertex of a parabola through three places and, once nothing else helps, places between. What
+/// improves alone is tried together. Where no axis improves any more, all pairs of moves to other ends and valleys are
+/// run; they make a model of all combinations, whose best ones are tried. On mappings whose inputs act alone or in
+/// pairs this finds the best combination.
+class FaceSearch : public LocalSearch {
+ public:
+  struct Options {
+    std::vector<int> wide_axes;  // inputs of which places between are run as well
+    bool pairs = false;          // of moves
+    double least_gain = 0;       // of the value, absolute: less is no gain
+    int trials = 6;              // combinations that the model of the pairs proposes
+    int iterations = 40;         // at most
+    std::uint64_t seed = 1;
+  };
+  FaceSearch(Region region, Point start, const Told& at_start, const Options& options);
+  void tell(std::span<const Told> told) override;
+  /// Whether pairs were run around the best point, or a model that foretold it.
+  bool is_paired() const { return paired_; }
+  /// Whether the best point is a corner, and the model of the pairs foretold what came of all its proposals.
+  bool is_foretold() const { return foretells_ && converged_; }
+
+ private:
+  struct Place {
+    double at = 0, value = 0;
+  };
+  struct Axis {
+    int input = 0;
+    std::vector<Place> places;  // known ones around the best point, itself left out
+    std::vector<Place> moves;   // of pairs
+  };
+  struct Asked {
+    int axis = 0;
+    double at = 0;
+  };
+  /// Which move each axis makes, 0: none; with the value that the model of the pairs foretells.
+  struct Combination {
+    double value = 0;
+    std::vector<int> moves;
+    auto operator<=>(const Combination&) const = default;
+  };
+  void ask_star(bool wide);
+  void ask_vertices();
+  void ask_together();
+  void ask_pairs();
+  void ask_foretold();
+  void conclude();
+  bool add(const Point&);
+  void choose_moves(Axis&) const;
+  std::vector<Combination> minimise_pairs() const;
+
+  Region region_;
+  Options options_;
+  std::vector<Axis> axes_;
+  std::vector<Asked> asked_;
+  std::vector<int> first_;                  // of the moves of each axis, all moves counted; their number at the end
+  std::vector<double> mixed_;               // beyond the sum of both moves  (moves x moves)
+  std::vector<std::pair<int, int>> pairs_;  // of moves, pending
+  std::vector<double> foretold_;            // values of the pending points
+  enum class Stage { Star, Wide, Vertex, Together, Pairs, Foretold } stage_ = Stage::Star;
+  Point next_;
+  double next_value_ = 0;
+  int next_outcome_ = 0, iteration_ = 0, pairings_ = 0;
+  bool is_wide_ = false, paired_ = false, foretells_ = false;
+};
+
 }  // namespace topple::uncertainty

@@ -4,11 +4,13 @@
 
 #include <atomic>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "base/error.h"
 #include "base/parallel.h"
 #include "reference_cases.h"
+#include "uncertainty/random.h"
 
 namespace topple::uncertainty {
 namespace {
@@ -256,6 +258,161 @@ TEST(AlphaPhysics, BoundsAtAJumpAreSharp) {
     }
 }
 
+// ---- more inputs than all corners are run of
+
+struct Ends {
+  double lower, upper;
+};
+
+/// Bounds at alpha 0, 0.25, 0.5, 0.75 to 1e-6 of the support's width.
+void expect_bounds(const AlphaResult& r, const std::vector<Ends>& want, const std::string& name) {
+  const double tolerance = 1e-6 * (want[0].upper - want[0].lower);
+  EXPECT_LE(r.archive.size(), 10000u) << name;
+  for (std::size_t k = 0; k < want.size(); ++k) {
+    EXPECT_NEAR(r.outputs[0].levels[k].lower.value, want[k].lower, tolerance) << name << " level " << k;
+    EXPECT_NEAR(r.outputs[0].levels[k].upper.value, want[k].upper, tolerance) << name << " level " << k;
+  }
+}
+
+std::vector<Ends> calc_ends(const FuzzyNumber& f, const std::function<Ends(double, double)>& of_cut) {
+  std::vector<Ends> all;
+  for (const double alpha : {0.0, 0.25, 0.5, 0.75}) all.push_back(of_cut(f.cut(alpha).left, f.cut(alpha).right));
+  return all;
+}
+
+double calc_chain(const Point& x) {
+  double sum = 0;
+  for (std::size_t i = 0; i + 1 < x.size(); ++i) sum += (i % 2 == 0 ? 1 : -1) * x[i] * x[i + 1];
+  return sum;
+}
+
+/// Multilinear, so its extremes lie in corners: from one end of the chain to the other.
+Ends calc_chain_ends(int n, double low, double high) {
+  const auto calc_largest = [&](double sign) {
+    double at_low = 0, at_high = 0;
+    for (int i = 0; i + 1 < n; ++i) {
+      const double c = sign * (i % 2 == 0 ? 1 : -1);
+      const double to_low = std::max(at_low + c * low * low, at_high + c * high * low);
+      at_high = std::max(at_low + c * low * high, at_high + c * high * high);
+      at_low = to_low;
+    }
+    return std::max(at_low, at_high);
+  };
+  return {-calc_largest(-1), calc_largest(1)};
+}
+
+TEST(AlphaManyInputs, AlternatingChainIsExact) {
+  const FuzzyNumber f = make_triangular(-1, .3, 2);
+  const auto model = make_evaluate_values([](const Point& x) { return std::vector{calc_chain(x)}; });
+  for (const int n : {9, 10, 12, 15})
+    for (const std::uint64_t seed : {1, 2, 3}) {
+      AlphaOptions options;
+      options.seed = seed;
+      const auto want = calc_ends(f, [n](double low, double high) { return calc_chain_ends(n, low, high); });
+      expect_bounds(optimise(std::vector<FuzzyNumber>(n, f), model, options, {}), want,
+                    std::to_string(n) + " inputs, seed " + std::to_string(seed));
+    }
+}
+
+TEST(AlphaManyInputs, SumsOfQuarticsAreExact) {
+  // Styblinski and Tang: two valleys an input, the largest value at the upper ends
+  const FuzzyNumber f = make_triangular(-5, .5, 5);
+  const auto calc = [](double x) { return 0.5 * (x * x * x * x - 16 * x * x + 5 * x); };
+  const auto model = make_evaluate_values([&](const Point& x) {
+    double sum = 0;
+    for (const double v : x) sum += calc(v);
+    return std::vector{sum};
+  });
+  for (const int n : {10, 12})
+    for (const std::uint64_t seed : {1, 2, 3}) {
+      AlphaOptions options;
+      options.seed = seed;
+      const auto want = calc_ends(f, [&](double low, double high) {
+        Ends e{std::min(calc(low), calc(high)), std::max(calc(low), calc(high))};
+        for (const double at : {-2.903534027771177, 0.15673125637247, 2.746802771398705})
+          if (at > low && at < high) e = {std::min(e.lower, calc(at)), std::max(e.upper, calc(at))};
+        return Ends{n * e.lower, n * e.upper};
+      });
+      expect_bounds(optimise(std::vector<FuzzyNumber>(n, f), model, options, {}), want,
+                    std::to_string(n) + " inputs, seed " + std::to_string(seed));
+    }
+}
+
+TEST(AlphaManyInputs, RandomBilinearFormsAreExact) {
+  const FuzzyNumber f = make_triangular(-1, .1, 1.5);
+  for (const int n : {9, 10, 13})
+    for (const std::uint64_t seed : {1, 2, 3}) {
+      Random random(100 * seed + n);
+      std::vector<double> c(n * n + n);
+      for (double& v : c) v = random.next(-1, 1);
+      const auto calc = [&](const Point& x) {
+        double sum = 0;
+        for (int i = 0; i < n; ++i) {
+          sum += c[n * n + i] * x[i];
+          for (int j = 0; j < i; ++j) sum += c[i * n + j] * x[i] * x[j];
+        }
+        return sum;
+      };
+      const auto want = calc_ends(f, [&](double low, double high) {
+        Ends e{std::numeric_limits<double>::max(), std::numeric_limits<double>::lowest()};
+        for (const Point& x : make_corners(Box{Point(n, low), Point(n, high)}))
+          e = {std::min(e.lower, calc(x)), std::max(e.upper, calc(x))};
+        return e;
+      });
+      AlphaOptions options;
+      options.seed = seed;
+      const AlphaResult r =
+          optimise(std::vector<FuzzyNumber>(n, f),
+                   make_evaluate_values([&](const Point& x) { return std::vector{calc(x)}; }), options, {});
+      expect_bounds(r, want, std::to_string(n) + " inputs, seed " + std::to_string(seed));
+      EXPECT_EQ(r.ending, Ending::Complete);
+      EXPECT_GT(r.restarts, 0);
+      for (int k = 0; k < 4; ++k)
+        EXPECT_TRUE(r.outputs[0].levels[k].lower.converged && r.outputs[0].levels[k].upper.converged);
+    }
+}
+
+TEST(AlphaManyInputs, DoNotClaimWhatRestartsHaveNotConfirmed) {
+  // many valleys that bear on each other, and few runs
+  const FuzzyNumber f = make_triangular(-1, .1, 1.5);
+  const auto model = make_evaluate_values([](const Point& x) {
+    double sum = 0;
+    for (std::size_t i = 0; i < x.size(); ++i)
+      sum += std::sin(3 * x[i] + static_cast<double>(i)) + .3 * x[i] * x[(i + 1) % x.size()];
+    return std::vector{sum};
+  });
+  AlphaOptions options;
+  options.limit = 4000;
+  const AlphaResult r = optimise(std::vector<FuzzyNumber>(10, f), model, options, {});
+  EXPECT_EQ(r.archive.size(), 4000u);
+  EXPECT_EQ(r.ending, Ending::LimitReached);
+  EXPECT_FALSE(r.outputs[0].levels[0].lower.converged);
+}
+
+TEST(AlphaManyInputs, KeepToInteraction) {
+  // the sum over a ball that the corners stick out of
+  const FuzzyNumber f = make_triangular(-1, 0, 1);
+  const int n = 10;
+  const Space ball{std::vector<FuzzyNumber>(n, f),
+                   {[](const Point& x) {
+                     double sum = -4;
+                     for (const double v : x) sum += v * v;
+                     return sum;
+                   }},
+                   {}};
+  const auto model = make_evaluate_values([](const Point& x) {
+    double sum = 0;
+    for (const double v : x) sum += v;
+    return std::vector{sum};
+  });
+  const AlphaResult r = optimise(ball, model, {}, {});
+  const double radius = std::sqrt(4.0 * n);
+  EXPECT_NEAR(r.outputs[0].levels[0].upper.value, radius, 1e-4 * 2 * radius);
+  EXPECT_NEAR(r.outputs[0].levels[0].lower.value, -radius, 1e-4 * 2 * radius);
+  EXPECT_NEAR(r.outputs[0].levels[2].upper.value, 5, 1e-6) << "at alpha 0.5 the corner lies in the ball";
+  for (const auto& s : r.archive.samples()) EXPECT_TRUE(is_allowed(ball, s.x));
+}
+
 TEST(Alpha, LeavesSomeOfASmallLimitForTheSearches) {
   const cases::Case c = cases::make_all()[3];
   AlphaOptions options;
@@ -326,10 +483,18 @@ TEST(AlphaReplay, SameBitsForOneSeedAndAnyThreads) {
   }
 }
 
+cases::Case make_chain_case() {
+  return {"chain",
+          std::vector<FuzzyNumber>(9, make_triangular(-1, .3, 2)),
+          make_evaluate_values([](const Point& x) { return std::vector{calc_chain(x)}; }),
+          {},
+          0};
+}
+
 TEST(AlphaReplay, ResumedEqualsUninterrupted) {
-  for (const auto& c : {cases::make_all()[2], cases::make_all()[4]}) {
+  for (const auto& c : {cases::make_all()[2], cases::make_all()[4], make_chain_case()}) {
     const AlphaResult whole = optimise(c.inputs, c.model, {}, {});
-    for (const int batches : {0, 1, 3, 7}) {
+    for (const int batches : {0, 1, 3, 7, 13}) {
       // stops in the middle of a batch, as an interrupted study does
       std::atomic<bool> cancel = false;
       Progress progress;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -102,6 +103,85 @@ TEST(EvolutionSearch, LeavesASmallBasin) {
   drive(search, model);
   EXPECT_LT(search.value(), 0.3);
   EXPECT_FALSE(search.is_converged()) << "it has no model to tell";
+}
+
+TEST(FaceSearch, FindsTheBestCornerOfABilinearForm) {
+  const int n = 11;
+  const Space space = make_cube(n);
+  const auto calc = [](const Point& x) {
+    double s = 0;
+    for (int i = 0; i < n; ++i) {
+      s += std::cos(3.7 * i) * x[i];
+      for (int j = 0; j < i; ++j) s += std::sin(5.1 * i + 2.3 * j * j) * x[i] * x[j];
+    }
+    return s;
+  };
+  const Model model = [&](const Point& x) { return Told{calc(x), 0}; };
+  const Region region = make_region(space, 0);
+  double least = std::numeric_limits<double>::infinity();
+  for (const Point& x : make_corners(region.box)) least = std::min(least, calc(x));
+  FaceSearch::Options options;
+  options.least_gain = 1e-6;
+  int found = 0;
+  for (std::uint64_t start = 0; start < 10; ++start) {
+    const Point x = place_in(region.box, make_sobol_points(n, 1, 1, start)[0]);
+    FaceSearch alone(region, x, model(x), options);
+    EXPECT_LE(drive(alone, model), 150);
+    EXPECT_TRUE(alone.is_converged());
+    EXPECT_FALSE(alone.is_paired());
+    found += alone.value() <= least + 1e-9;
+    FaceSearch::Options with_pairs = options;
+    with_pairs.pairs = true;
+    FaceSearch search(region, x, model(x), with_pairs);
+    EXPECT_LE(drive(search, model), 250);
+    EXPECT_TRUE(search.is_paired());
+    EXPECT_TRUE(search.is_foretold());
+    EXPECT_NEAR(search.value(), least, 1e-9) << "start " << start;
+  }
+  EXPECT_LT(found, 10) << "single moves alone end in other corners too";
+}
+
+TEST(FaceSearch, FindsTheDeeperValleyOfEachInput) {
+  const Space space = make_cube(10);
+  const Model model = [](const Point& x) {
+    double s = 0;
+    for (const double v : x) s += v * v * v * v - 3 * v * v + 0.5 * v;
+    return Told{s, 0};
+  };
+  const Point start(10, 1.1);
+  FaceSearch::Options options;
+  options.least_gain = 1e-6;
+  const Region region = make_region(space, 0);
+  options.wide_axes = region.axes;
+  FaceSearch search(region, start, model(start), options);
+  drive(search, model);
+  for (const double v : search.best()) EXPECT_NEAR(v, -1.264, 0.3) << "refining is for others";
+  EXPECT_FALSE(search.is_foretold()) << "no corner";
+}
+
+TEST(FaceSearch, KeepsInsideAndPassesFailures) {
+  Space space = make_cube(9);
+  space.constraints.push_back([](const Point& x) { return x[0] + x[1] + x[2] - 3; });
+  const double infinite = std::numeric_limits<double>::infinity();
+  const Region region = make_region(space, 0);
+  const Model model = [&](const Point& x) {
+    EXPECT_TRUE(region.contains(x));
+    if (x[8] > 1) return Told{infinite, failed_outcome};
+    double s = 0;
+    for (const double v : x) s -= v;
+    return Told{s, 0};
+  };
+  const Point start(9, 0.1);
+  FaceSearch::Options options;
+  options.least_gain = 1e-6;
+  options.pairs = true;
+  options.wide_axes = region.axes;
+  FaceSearch search(region, start, model(start), options);
+  drive(search, model);
+  EXPECT_TRUE(search.is_converged());
+  EXPECT_LE(search.value(), -10 - 2.2 - 1)
+      << "five at their ends, two of the constraint's three, one before the failure";
+  EXPECT_LE(search.best()[8], 1);
 }
 
 TEST(WallProbe, FindsAPlane) {
