@@ -36,12 +36,13 @@ constexpr const char* no_study_page =
 void write_all(std::FILE* out, const std::string& folder, const study::Problem& p, const StudyResult& r,
                const std::string& source, const std::string& source_name, const std::string& language) {
   for (const std::string& path : study::write_results(folder, p, r)) std::fprintf(out, "wrote %s\n", path.c_str());
+  const std::string path = (std::filesystem::path(folder) / "study.html").string();
   const auto bundle = find_bundle("study.html");
   if (!bundle) {
+    study::remove_result(path);
     std::fprintf(stderr, "%s\n", no_study_page);
     return;
   }
-  const std::string path = (std::filesystem::path(folder) / "study.html").string();
   record::write_page(study::to_page_json(p, r, {program_version(), record::now_utc(), source, source_name}), *bundle,
                      path, language);
   std::fprintf(out, "wrote %s\n", path.c_str());
@@ -68,6 +69,8 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
   options.source = text;
   options.source_name = a.input;
   options.rerun_failed = a.study.rerun_failed;
+  options.accepted = [&] { keep_place(a.output, place); };
+  const bool is_new = !study::is_server(place.store) && !std::filesystem::exists(place.store);
   Progress progress;
   progress.cancel = &cancel;
   ProgressLine line;
@@ -78,12 +81,16 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
   } catch (const InputError& e) {
     line.clear();
     const std::string& code = e.diagnostics().front().code;
-    if (code != "E823" && code != "E824" && code != "E827") return complain(e, text);
-    study::Store store(place.store);
-    const auto refusal = store.find_refusal(study::calc_model_hash(problem));
-    complain(e, refusal ? study::read_refusal(*refusal).line : "");
-    std::fprintf(stderr,
-                 "The study stopped; what was run before is kept. Mend the evaluator and give the command again.\n");
+    const std::string model = study::calc_model_hash(problem);
+    if (code == "E823" || code == "E824" || code == "E827") {
+      const auto refusal = study::Store(place.store).find_refusal(model);
+      complain(e, refusal ? study::read_refusal(*refusal).line : "");
+      std::fprintf(stderr,
+                   "The study stopped; what was run before is kept. Mend the evaluator and give the command again.\n");
+    } else {
+      complain(e, text);
+    }
+    if (is_new) remove_unused(place, model);
     return kBadInput;
   } catch (const study::ConnectionLost& e) {
     line.clear();
@@ -116,7 +123,7 @@ int run_study_command(const Arguments& a, const std::atomic<bool>& cancel) {
     const StudyResult r = study::read_study(problem, store, *row);
     if (a.study.action == StudyArguments::Action::Export) {
       const std::string folder = a.output.empty() ? a.input : a.output;
-      make_folder(folder);
+      make_study_folder(folder);
       const nlohmann::json definition = nlohmann::json::parse(row->definition);
       write_all(stdout, folder, problem, r, definition.value("text", ""), definition.value("file", ""), a.language);
     } else if (a.json) {

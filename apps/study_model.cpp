@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "base/unit.h"
+#include "product/document.h"
 #include "program.h"
 #include "results.h"
 #include "study/evaluator.h"
@@ -48,6 +49,26 @@ std::vector<double> read_levels(const std::string& text) {
   return levels;
 }
 
+/// Complains of a file of fuzzy inputs that lacks its evaluator.
+void check_for_plan(const std::string& file) {
+  std::string text = read_file(file);
+  if (text.starts_with("\xEF\xBB\xBF")) text = text.substr(3);
+  product::Node document;
+  try {
+    document = product::parse_document(text, file);
+  } catch (const InputError&) {
+    return;  // who reads the plan says why
+  }
+  for (const product::Entry& e : document.entries)
+    if (e.key == "inputs")
+      throw InputError({{Severity::Error,
+                         "E801",
+                         {file, e.place.line, e.place.column},
+                         static_cast<int>(e.key.size()),
+                         "this is a file of fuzzy inputs, and no --evaluator is given",
+                         "name the model: --evaluator \"command\"; a plan has its fuzzy values in [fuzzy]"}});
+}
+
 }  // namespace
 
 double read_seconds(const std::string& text, const char* option, double fallback) {
@@ -63,15 +84,30 @@ double read_seconds(const std::string& text, const char* option, double fallback
   return *q.value;
 }
 
+void make_study_folder(const std::string& folder) {
+  try {
+    make_folder(folder);
+  } catch (const std::runtime_error& e) { throw InputError("E801", std::string("--output: ") + e.what()); }
+}
+
 StudyPlace make_place(const Arguments& a) {
-  make_folder(a.output);
+  make_study_folder(a.output);
   const fs::path folder = a.output;
   StudyPlace place;
+  const bool is_on_server = fs::exists(folder / place_file);
+  const auto refuse = [&a](const std::string& what) {
+    throw InputError("E822", fmt::format("{} holds {}", a.output, what), "choose another folder or name, or delete it");
+  };
   if (a.study.store.empty()) {
+    if (!is_on_server && !a.study.name.empty())
+      throw InputError("E801", "--name: only a study on a server has a name", "leave it out, or give --store too");
+    if (!is_on_server) {
+      place.store = (folder / store_file).string();
+      return place;
+    }
     // a folder that was begun on a server goes on there
-    if (fs::exists(folder / place_file)) return find_place(a.output);
-    if (!a.study.name.empty()) place.name = a.study.name;
-    place.store = (folder / store_file).string();
+    place = find_place(a.output);
+    if (!a.study.name.empty() && a.study.name != place.name) refuse(fmt::format("the study \"{}\"", place.name));
     return place;
   }
   if (!study::is_server(a.study.store))
@@ -81,9 +117,32 @@ StudyPlace make_place(const Arguments& a) {
   place.name = a.study.name;
   if (place.name.empty()) place.name = fs::absolute(folder).lexically_normal().filename().string();
   if (place.name.empty()) place.name = fs::absolute(folder).lexically_normal().parent_path().filename().string();
-  const json written{{"store", study::hide_password(place.store)}, {"name", place.name}};
-  replace_file((folder / place_file).string(), written.dump(1) + "\n");
+  if (is_on_server) {
+    const StudyPlace there = find_place(a.output);
+    const std::string store = study::hide_password(place.store);
+    if (there.name != place.name || study::hide_password(there.store) != store)
+      refuse(fmt::format("the study \"{}\" of {}, not \"{}\" of {}", there.name, there.store, place.name, store));
+  } else if (fs::exists(folder / store_file)) {
+    refuse("a study in a file");
+  }
   return place;
+}
+
+void keep_place(const std::string& folder, const StudyPlace& place) {
+  if (!study::is_server(place.store)) return;
+  const json written{{"store", study::hide_password(place.store)}, {"name", place.name}};
+  replace_file((fs::path(folder) / place_file).string(), written.dump(1) + "\n");
+}
+
+void remove_unused(const StudyPlace& place, const std::string& model) {
+  if (study::is_server(place.store) || !fs::exists(place.store)) return;
+  {
+    study::Store store(place.store);
+    const study::Counts c = store.count(model);
+    if (c.done + c.failed > 0 || store.count_studies().first > 1) return;
+  }
+  std::error_code failure;
+  for (const char* end : {"", "-wal", "-shm"}) fs::remove(place.store + end, failure);
 }
 
 StudyPlace find_place(const std::string& where) {
@@ -117,6 +176,7 @@ study::Problem read_problem(const Arguments& a, std::string& text) {
   const StudyArguments& y = a.study;
   study::Problem p;
   if (y.evaluator.empty()) {
+    check_for_plan(a.input);
     std::vector<Diagnostic> warnings;
     const product::Plan plan = product::read_plan_file(a.input, warnings, text);
     for (const Diagnostic& d : warnings) std::fputs(render(d, text, has_colour(stderr)).c_str(), stderr);
@@ -129,6 +189,8 @@ study::Problem read_problem(const Arguments& a, std::string& text) {
     if (y.confirm > 0) p.confirm = y.confirm;
   } else {
     if (y.condensed) throw InputError("E801", "--condensed: an evaluator is not condensed", "leave it out");
+    if (!a.knowledge.empty())
+      throw InputError("E801", "--knowledge: an evaluator has no rules; they are of a plan", "leave it out");
     text = read_file(a.input);
     if (text.starts_with("\xEF\xBB\xBF")) text = text.substr(3);
     p = study::read_inputs_text(text, a.input);

@@ -16,8 +16,15 @@ struct StudyPlace {
   std::string name = "main";
 };
 
-/// For a new study, or one to go on with; makes the folder. Throws InputError E820.
+/// Throws InputError E801 if there is no folder that can be written to.
+void make_study_folder(const std::string& folder);
+/// For a new study, or one to go on with; makes the folder. Throws InputError E801, E820, E822 (another study is
+/// there).
 StudyPlace make_place(const Arguments&);
+/// Notes in the folder on which server its study is.
+void keep_place(const std::string& folder, const StudyPlace&);
+/// Removes the file of a store in which nothing was found.
+void remove_unused(const StudyPlace&, const std::string& model);
 /// Of a study that is there: its folder, or a server. Throws InputError E820.
 StudyPlace find_place(const std::string& folder_or_server);
 

@@ -78,7 +78,11 @@ struct Reader {
       return refuse(at, "this is not JSON",
                     "each line of its output must be one JSON object; other words belong on standard error");
     } catch (const json::out_of_range& e) {
-      return refuse(0, "a number is too large for 64 bits",
+      // the exception quotes the number
+      const std::string what = e.what();
+      const std::size_t begin = what.find('\'') + 1, end = what.rfind('\'');
+      const std::size_t at = begin > 0 && end > begin ? line.find(what.substr(begin, end - begin)) : std::string::npos;
+      return refuse(at == std::string::npos ? 0 : at, "a number is too large for 64 bits",
                     "give null where there is no value: the run counts as failed");
     }
     const char* form = "an answer looks like {\"outputs\": {\"z\": 1.5}, \"outcome\": \"stands\"}";
@@ -321,9 +325,19 @@ std::vector<std::string> list_outputs(const Answer& a) {
   return names;
 }
 
-Answer compare_outputs(const Answer& a, const std::vector<std::string>& elsewhere) {
-  const std::vector<std::string> here = list_outputs(a);
-  if (a.kind != Answer::Kind::Done || here == elsewhere) return a;
+AnswerForm form_of(const Answer& a) { return {list_outputs(a), a.trajectory.size()}; }
+
+Answer compare_form(const Answer& a, const AnswerForm& form) {
+  if (a.kind != Answer::Kind::Done) return a;
+  const std::vector<std::string> here = list_outputs(a), &elsewhere = form.outputs;
+  if (here == elsewhere) {
+    if (a.trajectory.empty() || form.ordinates == 0 || a.trajectory.size() == form.ordinates) return a;
+    return Reader{a.line, a.source}.make_refused(
+        "E823", find_member(a.line, "trajectory"),
+        fmt::format("the model gave a trajectory of the length {} at this point and of the length {} at others",
+                    a.trajectory.size(), form.ordinates),
+        "give values over the same grid at every point (null where there is none), or leave the trajectory out");
+  }
   const auto join = [](const std::vector<std::string>& names) {
     return names.empty() ? std::string("none") : fmt::format("{}", fmt::join(names, ", "));
   };

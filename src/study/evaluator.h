@@ -26,8 +26,9 @@ Refusal read_refusal(const std::string& text);
 
 /// Names of an answer's outputs, sorted.
 std::vector<std::string> list_outputs(const Answer&);
-/// The answer, or Refused (E823) where its outputs are not those of the other points.
-Answer compare_outputs(const Answer&, const std::vector<std::string>& elsewhere);
+AnswerForm form_of(const Answer&);
+/// The answer, or Refused (E823) where its outputs or the length of its trajectory are not those of the other points.
+Answer compare_form(const Answer&, const AnswerForm& elsewhere);
 
 /// Factory of the kind "evaluator". Of the definition: inputs; identity.command; settings.timeout [s],
 /// settings.one_shot (a process for each call, whose input is closed behind the points).

@@ -27,9 +27,7 @@ std::vector<CurveFan> calc_fans(const Problem& p, const StudyResult& r) {
   else
     levels = make_alpha_options(p).levels;
   std::vector<int> outcomes = {uncertainty::all_outcomes};
-  int classes = 0;
-  for (const auto& c : r.alpha.classes) classes += c.outcome != uncertainty::failed_outcome;
-  if (classes > 1)
+  if (count_outcomes(r.alpha) > 1)
     for (const auto& c : r.alpha.classes)
       if (c.outcome != uncertainty::failed_outcome) outcomes.push_back(c.outcome);
   for (const int outcome : outcomes) {

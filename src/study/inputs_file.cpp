@@ -139,8 +139,13 @@ struct Reader {
 
   void read_inputs(TableReader& root) {
     const Node* node = root.table("inputs");
-    if (!node || node->entries.empty()) {
+    if (!node) {
       root.missing("inputs", "add a table [inputs] with a line such as fc = { triangular = [10, 25, 45] }");
+      return;
+    }
+    if (node->entries.empty()) {
+      complaints.error("E203", node->place, "there is no input in [inputs]",
+                       "add a line such as fc = { triangular = [10, 25, 45] }");
       return;
     }
     if (node->entries.size() > most_inputs)
@@ -288,11 +293,25 @@ struct Reader {
   }
 };
 
+Node parse(const std::string& text, const std::string& name) {
+  try {
+    return product::parse_document(text, name);
+  } catch (const InputError& e) {
+    std::vector<Diagnostic> all = e.diagnostics();
+    for (Diagnostic& d : all)
+      if (d.code == "E104") {
+        d.message = "the file of fuzzy inputs is empty";
+        d.help = "add a table [inputs] with a line such as fc = { triangular = [10, 25, 45] }";
+      }
+    throw InputError(all);
+  }
+}
+
 }  // namespace
 
 Problem read_inputs_text(const std::string& text, const std::string& name) {
   Problem out;
-  const Node document = product::parse_document(text, name);
+  const Node document = parse(text, name);
   Complaints complaints(name);
   TableReader root(document, "", complaints);
   Reader reader{out, complaints, {}, {}, {}, {}, {}, {}, {}, {}};

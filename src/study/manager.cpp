@@ -55,6 +55,13 @@ class Names {
       if (found == a.outputs.end()) complain();
       r.values.push_back(found->second);
     }
+    if (ordinates_ == 0) ordinates_ = a.trajectory.size();
+    if (!a.trajectory.empty() && a.trajectory.size() != ordinates_)
+      throw InputError("E823",
+                       fmt::format("the model gave a trajectory of the length {} at one point and of the length {} at "
+                                   "another",
+                                   ordinates_, a.trajectory.size()),
+                       "give values over the same grid at every point, then give the command again");
     const auto [place, is_new] = numbers_.try_emplace(a.outcome, static_cast<int>(outcomes.size()));
     if (is_new) outcomes.push_back(a.outcome);
     r.outcome = place->second;
@@ -67,6 +74,7 @@ class Names {
  private:
   std::map<std::string, int> numbers_;
   bool has_outputs_ = false;
+  std::size_t ordinates_ = 0;  // of trajectories; 0: none so far
 };
 
 Point complete(const Problem& p, const Point& x) {
@@ -101,20 +109,27 @@ std::string make_study_definition(const Problem& p, const StudyOptions& options)
   return d.dump();
 }
 
-/// Hashes of the answers whose outputs are not those of most others: an older version kept one before it stopped.
+/// Hashes of the answers whose outputs, or the length of whose trajectories, are not those of most others: an older
+/// version kept them.
 std::vector<std::string> find_strangers(const std::vector<StoredResult>& results) {
-  std::map<std::vector<std::string>, int> counts;
-  const std::vector<std::string>* usual = nullptr;
+  const auto most = [](const auto& counts) {
+    return std::max_element(counts.begin(), counts.end(),
+                            [](const auto& a, const auto& b) { return a.second < b.second; });
+  };
+  std::map<std::vector<std::string>, int> names;
+  std::map<std::size_t, int> lengths;
+  for (const StoredResult& r : results)
+    if (r.answer.kind == Answer::Kind::Done) {
+      ++names[list_outputs(r.answer)];
+      if (!r.answer.trajectory.empty()) ++lengths[r.answer.trajectory.size()];
+    }
+  std::vector<std::string> strangers;
+  if (names.size() < 2 && lengths.size() < 2) return strangers;
   for (const StoredResult& r : results) {
     if (r.answer.kind != Answer::Kind::Done) continue;
-    const auto place = counts.try_emplace(list_outputs(r.answer), 0).first;
-    ++place->second;
-    if (!usual || place->second > counts.at(*usual)) usual = &place->first;
+    const bool has_other_length = !r.answer.trajectory.empty() && r.answer.trajectory.size() != most(lengths)->first;
+    if (has_other_length || list_outputs(r.answer) != most(names)->first) strangers.push_back(r.hash);
   }
-  std::vector<std::string> strangers;
-  if (counts.size() < 2) return strangers;
-  for (const StoredResult& r : results)
-    if (r.answer.kind == Answer::Kind::Done && list_outputs(r.answer) != *usual) strangers.push_back(r.hash);
   return strangers;
 }
 
@@ -184,6 +199,7 @@ class Manager {
     store_.put_model(model_, make_model_definition(problem));
     row_ = {options.name, model_, make_study_definition(problem, options), "open", ""};
     store_.put_study(row_);
+    if (options.accepted) options.accepted();
     release_dead_workers(store_);
     store_.forget_refusals(model_);
     if (options.rerun_failed) store_.rerun_failed(model_);
@@ -230,7 +246,7 @@ class Manager {
       try {
         out[i] = names_.translate(found->second);
       } catch (const InputError&) {
-        store_.rerun({hashes[i]});  // workers in two places began with different outputs
+        store_.rerun({hashes[i]});  // workers in two places began with different forms
         throw;
       }
       ++asked_;
@@ -412,9 +428,11 @@ class Manager {
         }
     };
     keep(from.outputs, to.outputs);
+    // nobody searched for bounds of a class that alone has numbers: they are those of all runs
+    const bool is_alone = count_outcomes(to) == 1;
     for (auto& c : to.classes)
       for (const auto& d : from.classes)
-        if (c.outcome == d.outcome) keep(d.outputs, c.outputs);
+        if (c.outcome == d.outcome) keep(is_alone && !d.outputs.empty() ? from.outputs : d.outputs, c.outputs);
     to.run = from.run, to.batches = from.batches, to.searches = from.searches;
     to.rounds = from.rounds, to.rechecks = from.rechecks;
   }
@@ -513,6 +531,11 @@ class Manager {
 };
 
 }  // namespace
+
+int count_outcomes(const uncertainty::AlphaResult& r) {
+  return static_cast<int>(std::count_if(r.classes.begin(), r.classes.end(),
+                                        [](const auto& c) { return c.outcome != uncertainty::failed_outcome; }));
+}
 
 uncertainty::AlphaOptions make_alpha_options(const Problem& p) {
   uncertainty::AlphaOptions options;

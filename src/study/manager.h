@@ -24,6 +24,7 @@ struct StudyOptions {
   std::string source_name;
   PoolOptions pool;  // own workers; no jobs: only those of other processes
   bool rerun_failed = false;
+  std::function<void()> accepted;  // called once the store holds the study, before anything is run; may be empty
 };
 
 /// Where a study is.
@@ -53,12 +54,16 @@ struct StudyResult {
 /// Runs the study, or goes on with it. Ends early when `progress.cancel` is set; the same call goes on later.
 ///   watch  called from this thread a few times a second
 /// Throws InputError: E804, E807 (inputs), E822 (the store holds a study of another model under this name), E823 (other
-/// outputs at another point), E824 (an answer that cannot be understood); ConnectionLost.
+/// outputs or a trajectory of another length at another point), E824 (an answer that cannot be understood);
+/// ConnectionLost.
 StudyResult run_study(const Problem&, const RunnerFactories&, const StudyOptions&, const Progress&,
                       const std::function<void(const StudyState&)>& watch);
 
 /// What the store knows of a study, without a run. Bounds of a study that is under way are those so far.
 StudyResult read_study(const Problem&, Store&, const StudyRow&);
+
+/// Outcome classes that have numbers: all but that of failed runs.
+int count_outcomes(const uncertainty::AlphaResult&);
 
 /// Options of the analysis that follow from a problem.
 uncertainty::AlphaOptions make_alpha_options(const Problem&);

@@ -35,6 +35,12 @@ struct Answer {
   std::string line{}, source{};                         // as an evaluator gave it, for complaints; not kept
 };
 
+/// What the answers to all points of a model have in common.
+struct AnswerForm {
+  std::vector<std::string> outputs;  // names, sorted
+  std::size_t ordinates = 0;         // of each trajectory; 0: none was given so far
+};
+
 /// Answers points, in any order, each at most once; a point without an answer counts as cancelled. Called by one
 /// thread.
 ///   points  coordinates of each: fuzzy inputs, then what follows from them

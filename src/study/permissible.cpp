@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "base/error.h"
@@ -56,7 +57,8 @@ PermissibleLimit read_limit(const std::string& part, std::size_t sign, const Pro
   limit.output = unquoted(trim(part.substr(0, sign)));
   limit.is_most = part[sign] == '<';
   std::size_t at = sign + 1;
-  if (at < part.size() && part[at] == '=') ++at;
+  limit.is_strict = at >= part.size() || part[at] != '=';
+  if (!limit.is_strict) ++at;
   const std::string right = trim(part.substr(at));
   const auto [end, fault] = std::from_chars(right.data(), right.data() + right.size(), limit.value);
   if (fault != std::errc() || !std::isfinite(limit.value))
@@ -118,18 +120,22 @@ uncertainty::Requirement make_requirement(const Permissible& p, const std::vecto
   struct Rule {
     std::size_t output;
     double sign, value, size;
+    bool is_strict;
   };
   std::vector<Rule> rules;
   for (const PermissibleLimit& l : p.limits) {
     const auto found = std::find(outputs.begin(), outputs.end(), l.output);
     rules.push_back({static_cast<std::size_t>(found - outputs.begin()), l.is_most ? 1.0 : -1.0, l.value,
-                     l.value == 0 ? 1.0 : std::abs(l.value)});
+                     l.value == 0 ? 1.0 : std::abs(l.value), l.is_strict});
   }
   return [has_outcomes = !p.outcomes.empty(), allowed, rules](const uncertainty::Result& r) {
     if (has_outcomes && std::find(allowed.begin(), allowed.end(), r.outcome) == allowed.end()) return -1.0;
     double margin = 1;
-    for (const Rule& rule : rules)
-      margin = std::min(margin, rule.sign * (rule.value - r.values[rule.output]) / rule.size);
+    for (const Rule& rule : rules) {
+      const double room = rule.sign * (rule.value - r.values[rule.output]) / rule.size;
+      // what lies on a strict limit violates it by next to nothing
+      margin = std::min(margin, rule.is_strict && room == 0 ? -std::numeric_limits<double>::min() : room);
+    }
     return margin;
   };
 }

@@ -114,11 +114,13 @@ void Pool::work(const std::string& name) {
 
 Answer Pool::compare(Store& store, const std::string& model, const Answer& a) {
   if (a.kind != Answer::Kind::Done) return a;
-  const std::lock_guard lock(outputs_mutex_);
-  auto known = outputs_.find(model);
-  if (known == outputs_.end())
-    known = outputs_.emplace(model, store.find_outputs(model).value_or(list_outputs(a))).first;
-  return compare_outputs(a, known->second);
+  const std::lock_guard lock(forms_mutex_);
+  auto known = forms_.find(model);
+  if (known == forms_.end()) known = forms_.emplace(model, store.find_form(model).value_or(form_of(a))).first;
+  Answer compared = compare_form(a, known->second);
+  if (compared.kind == Answer::Kind::Done && known->second.ordinates == 0)
+    known->second.ordinates = compared.trajectory.size();
+  return compared;
 }
 
 void Pool::run_jobs(Store& store, const std::string& name, std::vector<Job> jobs,

@@ -48,7 +48,7 @@ class Pool {
   void work(const std::string& name);
   void keep_alive();
   void sleep(double seconds);
-  /// The answer, or Refused where its outputs are not those of the model's other points.
+  /// The answer, or Refused where its form is not that of the model's other points.
   Answer compare(Store&, const std::string& model, const Answer&);
   void run_jobs(Store&, const std::string& name, std::vector<Job>, std::map<std::string, Runner>&);
 
@@ -64,8 +64,8 @@ class Pool {
   std::condition_variable news_, wakes_;
   long seen_ = 0, wake_count_ = 0;
   std::exception_ptr failure_;
-  std::mutex outputs_mutex_;
-  std::map<std::string, std::vector<std::string>> outputs_;  // sorted names, by model
+  std::mutex forms_mutex_;
+  std::map<std::string, AnswerForm> forms_;  // by model
   std::vector<std::thread> threads_;
 };
 

@@ -5,6 +5,7 @@
 
 #include <unordered_map>
 
+#include "base/error.h"
 #include "study/database.h"
 
 namespace topple::study {
@@ -85,6 +86,11 @@ class PostgresqlDatabase final : public Database {
     const std::string why = trim(PQerrorMessage(db_));
     PQfinish(db_);
     db_ = nullptr;
+    // libpq has no codes for this; waiting does not help
+    for (const char* known : {"\" does not exist", "authentication failed", "no pg_hba.conf entry"})
+      if (why.find("FATAL:") != std::string::npos && why.find(known) != std::string::npos)
+        throw InputError("E820", fmt::format("{} lets nobody in so: {}", hide_password(url_), why),
+                         "`createdb` makes a database; see docs/study.md, \"Many machines\"");
     throw ConnectionLost(why);
   }
 

@@ -7,6 +7,9 @@
 #include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <stdexcept>
+#include <system_error>
 
 #include "base/error.h"
 #include "base/file.h"
@@ -228,7 +231,11 @@ json quantities_json(const std::vector<Quantity>& list) {
 }  // namespace
 
 std::string name_of_outcome(const StudyResult& r, int outcome) {
-  if (outcome == uncertainty::failed_outcome) return failed_name;
+  if (outcome == uncertainty::failed_outcome) {
+    // a model may have an outcome of this name
+    const bool is_taken = std::find(r.outcomes.begin(), r.outcomes.end(), failed_name) != r.outcomes.end();
+    return is_taken ? "failed run" : failed_name;
+  }
   const auto i = static_cast<std::size_t>(outcome);
   return i < r.outcomes.size() ? r.outcomes[i] : fmt::format("{}", outcome);
 }
@@ -340,7 +347,7 @@ std::string write_membership_csv(const Problem& p, const StudyResult& r) {
                             cell(l.upper.value / unit_of(p, r.outputs[i])), l.lower.converged, l.upper.converged);
   };
   add(r.alpha.outputs, "");
-  if (r.alpha.classes.size() > 1)
+  if (count_outcomes(r.alpha) > 1)
     for (const auto& c : r.alpha.classes) add(c.outputs, name_of_outcome(r, c.outcome));
   return text;
 }
@@ -354,12 +361,18 @@ std::string write_outcomes_csv(const StudyResult& r) {
 }
 
 std::string write_samples_csv(const Problem& p, const StudyResult& r) {
-  std::string text = "sample";
+  // inputs have names of their own; those of outputs are the model's, and may be any
+  std::set<std::string> titles = {"sample", "membership", "outcome", "failure"};
+  std::string text;
+  const auto add_title = [&](std::string title, const char* kind) {
+    while (!titles.insert(title).second) title += kind;
+    text += "," + cell(title);
+  };
   for (const auto* list : {&p.inputs, &p.derived})
-    for (const Quantity& q : *list) text += "," + cell(title_of(q));
+    for (const Quantity& q : *list) add_title(title_of(q), " (input)");
   text += ",membership,outcome";
-  for (const std::string& name : r.outputs) text += "," + cell(title_of(find_output(p, name)));
-  text += ",failure\n";
+  for (const std::string& name : r.outputs) add_title(title_of(find_output(p, name)), " (output)");
+  text = "sample" + text + ",failure\n";
   for (std::size_t i = 0; i < r.alpha.archive.size(); ++i) {
     const uncertainty::Sample& s = r.alpha.archive.samples()[i];
     text += std::to_string(i);
@@ -493,12 +506,23 @@ std::string write_confirmation_csv(const Problem& p, const StudyResult& r) {
   return text;
 }
 
+void remove_result(const std::string& path) {
+  std::error_code failure;
+  if (std::filesystem::is_directory(path, failure)) return;
+  std::filesystem::remove(path, failure);
+  if (failure) throw std::runtime_error(path + " holds no longer and cannot be removed: " + failure.message());
+}
+
 std::vector<std::string> write_results(const std::string& folder, const Problem& p, const StudyResult& r) {
   std::vector<std::string> paths;
   const auto write = [&](const char* name, const std::string& text) {
-    if (text.empty()) return;
-    paths.push_back((std::filesystem::path(folder) / name).string());
-    replace_file(paths.back(), text);
+    const std::string path = (std::filesystem::path(folder) / name).string();
+    if (text.empty()) {
+      remove_result(path);  // of earlier settings
+      return;
+    }
+    paths.push_back(path);
+    replace_file(path, text);
   };
   write("results.json", write_results_json(p, r));
   write("membership.csv", write_membership_csv(p, r));

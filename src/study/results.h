@@ -11,7 +11,8 @@ namespace topple::study {
 
 inline constexpr const char* failed_name = "failed";
 
-/// Name of an outcome class of a result; failed runs are one.
+/// Name of an outcome class of a result; failed runs are one: "failed", or "failed run" where an outcome of the model
+/// has that name.
 std::string name_of_outcome(const StudyResult&, int outcome);
 /// The same for readers: "(no name)" where a model gives none.
 std::string words_of_outcome(const StudyResult&, int outcome);
@@ -19,7 +20,8 @@ std::string words_of_outcome(const StudyResult&, int outcome);
 /// Everything but the samples, in the units of the file that was read; outputs in those of Problem::outputs.
 nlohmann::ordered_json make_results_json(const Problem&, const StudyResult&);
 std::string write_results_json(const Problem&, const StudyResult&);
-/// Bounds of all outputs: output, outcome (empty: any), alpha, lower, upper, and whether searches converged there.
+/// Bounds of all outputs: output, outcome (empty: any), alpha, lower, upper, and whether searches converged there. Of
+/// each outcome by itself where there are several.
 std::string write_membership_csv(const Problem&, const StudyResult&);
 /// Outcome classes: runs, possibility, necessity.
 std::string write_outcomes_csv(const StudyResult&);
@@ -46,7 +48,10 @@ double calc_robustness_of(const Problem&, const StudyResult&, std::size_t output
 /// What whole runs say of a condensed study's bounds and outcomes, one row each; empty without such runs.
 std::string write_confirmation_csv(const Problem&, const StudyResult&);
 
-/// Writes all of them into a folder; returns the paths.
+/// Removes a file of results that no longer holds, if it is there. Throws std::runtime_error.
+void remove_result(const std::string& path);
+/// Writes all of them into a folder, in the place of those of an earlier call: what there is no more is removed.
+/// Returns the paths.
 std::vector<std::string> write_results(const std::string& folder, const Problem&, const StudyResult&);
 
 }  // namespace topple::study

@@ -23,6 +23,8 @@ class SqliteDatabase final : public Database {
       try {
         run("PRAGMA journal_mode = WAL");
         run("PRAGMA synchronous = NORMAL");
+      } catch (const InputError&) {
+        throw;  // it says all
       } catch (const std::exception& e) { refuse(e.what()); }
     }
     dialect_.now = "((julianday('now') - 2440587.5) * 86400.0)";

@@ -442,16 +442,20 @@ void Store::forget_refusals(const std::string& model) {
   });
 }
 
-std::optional<std::vector<std::string>> Store::find_outputs(const std::string& model) {
+std::optional<AnswerForm> Store::find_form(const std::string& model) {
   return transact(
-      [&](bool) -> std::optional<std::vector<std::string>> {
+      [&](bool) -> std::optional<AnswerForm> {
         const Rows rows = db_->run("SELECT outputs FROM result WHERE model = $1 AND status = 'done' LIMIT 1", {model});
         if (rows.empty()) return std::nullopt;
-        std::vector<std::string> names;
+        AnswerForm form;
         const json outputs = json::parse(rows[0][0].value_or("{}"));
-        for (const auto& [name, value] : outputs.items()) names.push_back(name);
-        std::sort(names.begin(), names.end());
-        return names;
+        for (const auto& [name, value] : outputs.items()) form.outputs.push_back(name);
+        std::sort(form.outputs.begin(), form.outputs.end());
+        const Rows curves = db_->run(
+            "SELECT trajectory FROM result WHERE model = $1 AND status = 'done' AND trajectory <> '[]' LIMIT 1",
+            {model});
+        if (!curves.empty()) form.ordinates = to_numbers(curves[0][0].value_or("[]")).size();
+        return form;
       },
       true);
 }

@@ -92,8 +92,8 @@ class Store {
   /// What was said of a refused job of the model.
   std::optional<std::string> find_refusal(const std::string& model);
   void forget_refusals(const std::string& model);
-  /// Sorted names of the outputs of any point of the model that was done; none: there is no such point.
-  std::optional<std::vector<std::string>> find_outputs(const std::string& model);
+  /// That of the points of the model that were done; none: there is no such point.
+  std::optional<AnswerForm> find_form(const std::string& model);
   /// Results are taken out and their jobs wait again.
   void rerun(const std::vector<std::string>& hashes);
   /// Failed results are taken out and their jobs wait again. Returns how many.

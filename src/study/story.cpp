@@ -30,6 +30,21 @@ const uncertainty::Sample* find_core(const Problem& p, const uncertainty::Archiv
   return i < 0 ? nullptr : &archive[i];
 }
 
+int count_runs(const StudyResult& r, int outcome) {
+  for (const auto& c : r.alpha.classes)
+    if (c.outcome == outcome) return c.count;
+  return 0;
+}
+
+/// What was found, but by no run that is possible to more than 0.
+///   is_searched  nothing more possible was found by a search for it
+std::string tell_impossible(const std::string& what, long runs, std::size_t of_runs, bool is_searched) {
+  std::string text = fmt::format("{} was found only where the inputs are not possible (membership 0): {} of {} runs.",
+                                 what, runs, of_runs);
+  if (!is_searched) text += " Its possibility was not searched to the end: it is at least 0.00.";
+  return text;
+}
+
 void tell_outcomes(const Problem& p, const StudyResult& r, std::vector<Sentence>& out) {
   const uncertainty::Sample* core = find_core(p, r.alpha.archive);
   std::vector<uncertainty::Possibility> classes = r.possibilities.classes;
@@ -44,6 +59,12 @@ void tell_outcomes(const Problem& p, const StudyResult& r, std::vector<Sentence>
     if (named == 1 && name.empty()) continue;  // the model tells no outcomes
     Sentence s;
     s.id = "outcome." + name;
+    if (!(c.possibility > 0)) {
+      s.text = tell_impossible(quoted(name), count_runs(r, c.outcome), r.alpha.archive.size(), c.converged);
+      if (!p.asked.empty()) s.status = name == p.asked || !c.converged ? Status::Warning : Status::Info;
+      out.push_back(std::move(s));
+      continue;
+    }
     s.text = fmt::format("{} is {}: possibility {}{:.2f}, necessity at most {:.2f}.", quoted(name),
                          words_of_possibility(c.possibility), c.possibility >= 1 ? "" : "at least ", c.possibility,
                          necessity);
@@ -80,7 +101,7 @@ void tell_limits(const Problem& p, const StudyResult& r, std::vector<Sentence>& 
     const auto index = static_cast<std::size_t>(at - r.outputs.begin());
     const Quantity q = find_output(p, limit.output);
     double possibility = 0, low = std::numeric_limits<double>::infinity(), high = 0;
-    int runs = 0;
+    int runs = 0, reaching = 0;
     for (int i = 0; i < static_cast<int>(r.alpha.archive.size()); ++i) {
       const uncertainty::Sample& s = r.alpha.archive[i];
       if (index >= s.result.values.size()) continue;
@@ -88,7 +109,9 @@ void tell_limits(const Problem& p, const StudyResult& r, std::vector<Sentence>& 
       if (!(degree >= 0) || !std::isfinite(value)) continue;
       ++runs;
       low = std::min(low, value), high = std::max(high, value);
-      if (value >= limit.least) possibility = std::max(possibility, degree);
+      if (value < limit.least) continue;
+      ++reaching;
+      possibility = std::max(possibility, degree);
     }
     if (runs == 0) continue;
     Sentence s;
@@ -103,9 +126,10 @@ void tell_limits(const Problem& p, const StudyResult& r, std::vector<Sentence>& 
         limit.source);
     s.text += possibility > 0 ? fmt::format("It is {} that the band reaches the limit: possibility at least {:.2f}.",
                                             words_of_possibility(possibility), possibility)
+              : reaching > 0  ? tell_impossible("Reaching the limit", reaching, static_cast<std::size_t>(runs), false)
                               : std::string("No run reaches the limit.");
     s.text += " This is a screening, no prediction.";
-    s.status = possibility >= 0.5 ? Status::Bad : possibility > 0 ? Status::Warning : Status::Good;
+    s.status = possibility >= 0.5 ? Status::Bad : reaching > 0 ? Status::Warning : Status::Good;
     out.push_back(std::move(s));
   }
 }
@@ -141,9 +165,11 @@ void tell_requirement(const Problem& p, const StudyResult& r, std::vector<Senten
   using State = uncertainty::Result::State;
   const auto is_kept = [&](const uncertainty::Result& x) { return x.state == State::Done && requirement(x) >= 0; };
   double broken = 0;
+  long breaking = 0;
   const uncertainty::Sample* worst = nullptr;
   for (const uncertainty::Sample& s : r.alpha.archive.samples()) {
     if (s.result.state == State::NotRun || is_kept(s.result)) continue;
+    ++breaking;
     const double degree = uncertainty::calc_membership(p.space, s.x);
     if (degree > broken) broken = degree, worst = &s;
   }
@@ -163,6 +189,10 @@ void tell_requirement(const Problem& p, const StudyResult& r, std::vector<Senten
           core ? "it" : "the requirement " + p.permissible, words_of_possibility(broken), broken, 1 - broken,
           words_of_point(p, worst->x));
       s.status = broken >= 0.5 ? Status::Bad : Status::Warning;
+    } else if (breaking > 0) {
+      s.text += tell_impossible(core ? "Breaking it" : "Breaking the requirement " + p.permissible, breaking,
+                                r.alpha.archive.size(), false);
+      s.status = Status::Warning;
     } else {
       s.text += fmt::format("None of {} runs broke it.", r.alpha.archive.size());
       s.status = Status::Good;
@@ -295,8 +325,7 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
   }
   const uncertainty::Sample* core = find_core(p, r.alpha.archive);
   const int at_core = core ? uncertainty::outcome_of(core->result) : failed_outcome;
-  int classes = 0;
-  for (const auto& c : r.alpha.classes) classes += c.outcome != failed_outcome;
+  const int classes = count_outcomes(r.alpha);
   const bool has_names = classes > 1 || (at_core != failed_outcome && !name_of_outcome(r, at_core).empty());
   if (!core) {
     add("verdict", "The core values have not been run yet.");
@@ -305,8 +334,14 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
   } else if (has_names) {
     const std::string name = name_of_outcome(r, at_core);
     double others = 0;
-    for (const auto& c : r.possibilities.classes)
-      if (c.outcome != at_core) others = std::max(others, c.possibility);
+    long of_others = 0;
+    bool is_searched = true;
+    for (const auto& c : r.possibilities.classes) {
+      if (c.outcome == at_core) continue;
+      others = std::max(others, c.possibility);
+      of_others += count_runs(r, c.outcome);
+      is_searched = is_searched && c.converged;
+    }
     std::string text = fmt::format("With the core values the outcome is {}", quoted(name));
     Status status = Status::Info;
     if (!p.asked.empty()) {
@@ -319,6 +354,9 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
           "is at most {:.2f}.",
           words_of_possibility(others), others, 1 - others);
       if (status != Status::Bad) status = others >= 0.5 ? Status::Bad : Status::Warning;
+    } else if (of_others > 0) {
+      text += ". " + tell_impossible("Another outcome", of_others, runs, is_searched);
+      if (status != Status::Bad && !is_searched) status = Status::Warning;
     } else {
       const int of_search = r.alpha.coverage.empty() ? 0 : r.alpha.coverage.front().space_points;
       const double spread = std::max({1, of_search, static_cast<int>(r.spread.size())});

@@ -186,6 +186,31 @@ TEST(Evaluator, RefusesNumbersBeyondItsRange) {
             1.7976931348623157e308);
 }
 
+TEST(Evaluator, PointsAtANumberBeyondItsRange) {
+  int id = 0;
+  const Answer a = read_answer_line(R"({"outputs": {"z": 1, "big": -1e999}})", "model", id);
+  ASSERT_EQ(a.kind, Kind::Refused);
+  EXPECT_EQ(read_refusal(a.text).diagnostic.where.column, 29);
+}
+
+TEST(Evaluator, RefusesATrajectoryOfAnotherLength) {
+  const auto make = [](std::vector<double> trajectory) {
+    Answer a{Kind::Done, {{"z", 1}}, "", std::move(trajectory), "", 0};
+    a.line = R"({"z": 1, "trajectory": [1, 2, 3]})";
+    return a;
+  };
+  const AnswerForm two{{"z"}, 2}, none{{"z"}, 0};
+  EXPECT_EQ(compare_form(make({1, 2}), two).kind, Kind::Done);
+  EXPECT_EQ(compare_form(make({}), two).kind, Kind::Done) << "it may be left out";
+  EXPECT_EQ(compare_form(make({1, 2, 3}), none).kind, Kind::Done);
+  const Answer refused = compare_form(make({1, 2, 3}), two);
+  ASSERT_EQ(refused.kind, Kind::Refused);
+  const Diagnostic d = read_refusal(refused.text).diagnostic;
+  EXPECT_EQ(d.code, "E823");
+  EXPECT_EQ(d.where.column, 10);
+  EXPECT_EQ(d.message, "the model gave a trajectory of the length 3 at this point and of the length 2 at others");
+}
+
 TEST(Evaluator, NeverTakesADoubledAnswerForAnotherPoint) {
   Model m(shell(R"(echo "{\"id\":$id,\"z\":$x}"; echo "{\"id\":$id,\"z\":$x}")"));
   ASSERT_EQ(m.ask({{1, 0}})[0].kind, Kind::Done);

@@ -96,7 +96,19 @@ TEST(InputsFile, PointsAtEveryMistake) {
   }
 }
 
-TEST(InputsFile, WantsInputs) { EXPECT_THROW(read_inputs_text("title = \"x\"\n", "f"), InputError); }
+TEST(InputsFile, WantsInputs) {
+  const auto complaint_of = [](const char* text) {
+    try {
+      read_inputs_text(text, "f");
+    } catch (const InputError& e) { return e.diagnostics().front(); }
+    return Diagnostic{};
+  };
+  EXPECT_NE(complaint_of("title = \"x\"\n").message.find("missing table"), std::string::npos);
+  EXPECT_EQ(complaint_of("").message, "the file of fuzzy inputs is empty");
+  const Diagnostic none = complaint_of("title = \"x\"\n[inputs]\n");
+  EXPECT_EQ(none.message, "there is no input in [inputs]");
+  EXPECT_EQ(none.where.line, 2);
+}
 
 }  // namespace
 }  // namespace topple::study

@@ -1,9 +1,12 @@
 #include "study/insights.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <atomic>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "../uncertainty/reference_cases.h"
@@ -148,6 +151,8 @@ TEST(Permissible, ReadsOutcomesAndLimits) {
   EXPECT_TRUE(a.limits[0].is_most);
   EXPECT_EQ(a.limits[0].value, 20);
   EXPECT_FALSE(a.limits[1].is_most);
+  EXPECT_FALSE(a.limits[0].is_strict);
+  EXPECT_TRUE(a.limits[1].is_strict);
   EXPECT_DOUBLE_EQ(a.limits[1].value, 0.03) << "in what results hold";
   const auto g = make_requirement(a, {"reach", "tilt_1.7"}, {"stands", "topple"});
   const auto margin = [&g](double reach, double tilt, int outcome) {
@@ -157,6 +162,47 @@ TEST(Permissible, ReadsOutcomesAndLimits) {
   EXPECT_LT(margin(21, 0.06, 1), 0);
   EXPECT_LT(margin(15, 0.02, 1), 0);
   EXPECT_EQ(margin(15, 0.06, 0), -1);
+  EXPECT_EQ(margin(20, 0.06, 1), 0) << "at most 20 holds at 20";
+  EXPECT_LT(margin(15, a.limits[1].value, 1), 0) << "above 3 does not hold at 3";
+  EXPECT_GT(margin(15, std::nextafter(a.limits[1].value, 1), 1), 0);
+  const auto below = make_requirement(read_permissible("reach < 0", p), {"reach"}, {});
+  EXPECT_LT(below({uncertainty::Result::State::Done, {0}, 0, {}, ""}), 0);
+  EXPECT_GT(below({uncertainty::Result::State::Done, {-1e-300}, 0, {}, ""}), 0);
+}
+
+// n = floor(4 x) on x = <0, 0.5, 1>: n > 1 holds on the half x >= 0.5, n < 2 on the other, n >= 1 on three quarters.
+TEST(InsightsReference, BoxesKeepStrictLimits) {
+  const Folder folder;
+  Problem p = make_problem({make_triangular(0, 0.3, 1), make_triangular(0, 0.5, 1)}, 1500);
+  const RunnerFactories model = make_factories([](const Point& x) { return done({{"n", std::floor(4 * x[0])}}, ""); });
+  struct Case {
+    const char* text;
+    double part, lower, upper;
+  };
+  for (const Case& c : {Case{"n > 1", 0.5, 0.5, 1}, Case{"n < 2", 0.5, 0, 0.5}, Case{"n >= 1", 0.75, 0.25, 1}}) {
+    p.permissible = c.text;
+    const StudyResult r = run(p, folder, c.text, model);
+    const uncertainty::DesignResult& d = r.insights.boxes;
+    EXPECT_NEAR(d.fraction, c.part, 3 * d.fraction_error) << c.text;
+    ASSERT_FALSE(d.boxes.empty());
+    const uncertainty::PermissibleBox& b = d.boxes.front();
+    ASSERT_TRUE(b.kept) << c.text;
+    EXPECT_GE(b.box.lower[0], c.lower) << c.text;
+    EXPECT_LE(b.box.upper[0], c.upper) << c.text;
+    for (const auto& s : r.alpha.archive.samples()) {
+      const double n = s.result.values[0];
+      if (c.text == std::string("n > 1") ? n > 1 : c.text == std::string("n < 2") ? n < 2 : n >= 1) continue;
+      EXPECT_FALSE(b.box.contains(s.x)) << c.text << " " << s.x[0];
+    }
+    EXPECT_NEAR(b.volume, c.part, 0.05) << c.text;
+    std::string told;
+    for (const Sentence& s : tell(p, r)) told += s.text;
+    // n = 1 at the core
+    EXPECT_NE(
+        told.find(std::string("core values ") + (c.lower == 0.5 ? "break" : "keep") + " the requirement " + c.text),
+        std::string::npos)
+        << told;
+  }
 }
 
 TEST(Permissible, ComplainsWithTheNamesThatAreThere) {
@@ -344,6 +390,62 @@ TEST(Story, WeighsARequirementOnNumbers) {
   EXPECT_NE(none.text.find("runs broke it"), std::string::npos) << none.text;
 }
 
+std::map<std::string, Sentence> tell_by_id(const Problem& p, const StudyResult& r) {
+  std::map<std::string, Sentence> by_id;
+  for (const Sentence& s : tell(p, r)) by_id[s.id] = s;
+  return by_id;
+}
+
+// Another outcome, failure, violation or limit at the very end of the support, at x1 = 1: possible to 0, but not
+// unseen.
+TEST(Story, NamesWhatWasFoundOnlyAtInputsThatAreNotPossible) {
+  const Folder folder;
+  Problem p = make_problem({make_triangular(0, 0.5, 1), make_triangular(0, 0.5, 1)}, 2500);
+  p.permissible = "stands, f <= 1.7";
+  p.limits = {{"x", "House", 1, 1, "a table"}};
+  const RunnerFactories model = make_factories([](const Point& x) {
+    return done({{"f", x[0] >= 1 ? 2 : 1}, {"x", x[0]}}, x[0] >= 1 ? "collapse" : "stands");
+  });
+  const StudyResult r = run(p, folder, "a", model);
+  int edge = 0;
+  for (const auto& s : r.alpha.archive.samples()) edge += s.x[0] >= 1;
+  ASSERT_GT(edge, 0);
+  const std::string only = fmt::format(
+      " was found only where the inputs are not possible (membership 0): {} of {} runs.", edge, r.alpha.archive.size());
+  auto told = tell_by_id(p, r);
+  EXPECT_EQ(told["verdict"].text, "With the core values the outcome is \"stands\". Another outcome" + only);
+  EXPECT_EQ(told["outcome.collapse"].text, "\"collapse\"" + only);
+  EXPECT_NE(told["requirement"].text.find("Breaking it" + only), std::string::npos) << told["requirement"].text;
+  EXPECT_EQ(told["requirement"].status, record::Status::Warning);
+  EXPECT_NE(told["limit.x"].text.find("Reaching the limit" + only), std::string::npos) << told["limit.x"].text;
+  // a failure instead
+  const StudyResult failing = run(p, folder, "b", make_factories([](const Point& x) {
+                                    if (x[0] >= 1) return Answer{Answer::Kind::Failed, {}, "", {}, "broke", 0};
+                                    return done({{"f", 1}, {"x", x[0]}}, "stands");
+                                  }));
+  told = tell_by_id(p, failing);
+  EXPECT_NE(told["verdict"].text.find("Another outcome was found only"), std::string::npos) << told["verdict"].text;
+  EXPECT_NE(told["requirement"].text.find("Breaking it was found only"), std::string::npos);
+}
+
+// x1 >= 0.9 is possible to 0.2, but runs came to an end when all that were seen there were possible to 0.
+TEST(Story, GivesALowerBoundWhereThePossibilityWasNotSearched) {
+  const Folder folder;
+  Problem p = make_problem({make_triangular(0, 0.5, 1), make_triangular(0, 0.5, 1)}, 10);
+  p.asked = "stands";
+  p.has_drivers = false;
+  const StudyResult r = run(p, folder, "a", make_factories([](const Point& x) {
+                              return done({{"f", x[0]}}, x[0] >= 0.9 ? "collapse" : "stands");
+                            }));
+  ASSERT_EQ(r.alpha.classes.size(), 2u);
+  ASSERT_EQ(r.possibilities.classes[1].possibility, 0);
+  auto told = tell_by_id(p, r);
+  for (const char* id : {"verdict", "outcome.collapse"}) {
+    EXPECT_NE(told[id].text.find("not searched to the end: it is at least 0.00."), std::string::npos) << told[id].text;
+    EXPECT_EQ(told[id].status, record::Status::Warning);
+  }
+}
+
 TEST(Story, OfNothingOfFailuresAndOfOneOutcome) {
   const Folder folder;
   Problem p = make_problem({make_triangular(0, 1, 2)}, 40);
@@ -410,6 +512,39 @@ TEST(StudyPage, ThinsRunsAndSaysWhichAreThere) {
     EXPECT_NE(std::find(shown.begin(), shown.end(), n.sample), shown.end()) << n.why;
   for (const char* key : {"inputs", "outputs", "membership", "outcome"})
     EXPECT_EQ(page["run_table"][key].size(), shown.size());
+}
+
+TEST(Results, ReplaceThoseOfEarlierSettings) {
+  const Folder folder;
+  Problem p = make_small_problem(400);
+  p.permissible = "stands";
+  const std::string there = folder / "out";
+  const auto exists = [&](const char* name) { return std::filesystem::exists(there + "/" + name); };
+  const auto list_written = [&](const char* store) {
+    return write_results(there, p, run(p, folder, store, make_small_factories()));
+  };
+  EXPECT_EQ(list_written("a").size(), 6u);
+  EXPECT_TRUE(exists("boxes.csv") && exists("drivers.csv"));
+  std::ofstream(there + "/mine.csv") << "1\n";
+  p.permissible.clear();
+  p.has_drivers = false;
+  EXPECT_EQ(list_written("b").size(), 4u);
+  EXPECT_FALSE(exists("boxes.csv") || exists("drivers.csv"));
+  EXPECT_TRUE(exists("mine.csv") && exists("results.json"));
+}
+
+TEST(Results, NameEveryColumnAndOutcomeOnce) {
+  const Folder folder;
+  const Problem p = make_problem({make_triangular(0, 1, 2)}, 60);
+  const StudyResult r = run(p, folder, "a", make_factories([](const Point& x) {
+                              if (x[0] > 1.5) return Answer{Answer::Kind::Failed, {}, "", {}, "broke", 0};
+                              return done({{"membership", 1}, {"x1", x[0]}, {"y", 1}}, x[0] < 0.5 ? "failed" : "good");
+                            }));
+  const std::string csv = write_samples_csv(p, r);
+  EXPECT_EQ(csv.substr(0, csv.find('\n')), "sample,x1,membership,outcome,membership (output),x1 (output),y,failure");
+  const std::string outcomes = write_outcomes_csv(r);
+  EXPECT_NE(outcomes.find("\nfailed,"), std::string::npos) << outcomes;
+  EXPECT_NE(outcomes.find("\nfailed run,"), std::string::npos) << outcomes;
 }
 
 TEST(Results, RobustnessComparesRelativeUncertainty) {

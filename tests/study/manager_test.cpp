@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "server.h"
 #include "small_study.h"
+#include "study/results.h"
 
 namespace topple::study {
 namespace {
@@ -103,6 +104,40 @@ TEST(StudyReplay, ReadsBackWhatItFound) {
   EXPECT_EQ(again.ending, r.ending);
   for (std::size_t k = 0; k < r.alpha.outputs[0].levels.size(); ++k)
     EXPECT_EQ(again.alpha.outputs[0].levels[k].upper.converged, r.alpha.outputs[0].levels[k].upper.converged);
+}
+
+// y = x1 + x2, which fails at the core: bounds are those at the corners of each cut, but for the core's own.
+TEST(StudyReference, MarksBoundsAroundACoreThatFails) {
+  const Folder folder;
+  Problem p = make_small_problem(3000);
+  RunnerFactories factories = {{"small", [](const std::string&) -> Runner {
+                                  return [](auto points, const auto& give, const auto&) {
+                                    for (std::size_t i = 0; i < points.size(); ++i) {
+                                      const Point& x = points[i];
+                                      if (std::abs(x[0] - 25) < 0.5)
+                                        give(i, {Answer::Kind::Failed, {}, "", {}, "core", 0});
+                                      else
+                                        give(i, {Answer::Kind::Done, {{"y", x[0] + x[1]}}, "", {}, "", 0});
+                                    }
+                                  };
+                                }}};
+  const StudyResult r = run(p, make_options(folder / "a"), factories);
+  ASSERT_EQ(r.ending, uncertainty::Ending::Complete);
+  ASSERT_EQ(r.alpha.classes.size(), 2u);
+  for (const auto* outputs : {&r.alpha.outputs, &r.alpha.classes[1].outputs})
+    for (const auto& l : outputs->at(0).levels) {
+      const bool is_core = l.alpha == 1;
+      EXPECT_EQ(l.lower.converged, !is_core) << l.alpha;
+      EXPECT_EQ(l.upper.converged, !is_core) << l.alpha;
+      if (is_core) continue;
+      EXPECT_NEAR(l.lower.value, 43.6 + 45.4 * l.alpha, 1e-9);
+      EXPECT_NEAR(l.upper.value, 133 - 44 * l.alpha, 1e-9);
+    }
+  // one row for each level: of the only outcome that has numbers there is nothing else to say
+  const std::string csv = write_membership_csv(p, r);
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 5) << csv;
+  Store store(folder / "a");
+  EXPECT_EQ(write_results_json(p, read_study(p, store, *store.find_study("main"))), write_results_json(p, r));
 }
 
 /// Many basins of like depth: no limit is enough for a proper search.
@@ -243,6 +278,48 @@ TEST(Study, KeepsAStrangeAnswerOutAndGoesOnBehindIt) {
   EXPECT_NO_THROW(read_study(p, store, *store.find_study("main")));
   runs = 1000;
   EXPECT_EQ(write_bits(run(p, make_options(folder / "b"), make_strange_factories(0, runs))), write_bits(whole));
+}
+
+/// Trajectories of two values, or none, and one of three at the run of that number.
+RunnerFactories make_curved_factories(int at, std::atomic<int>& runs) {
+  return {{"small", [at, &runs](const std::string&) -> Runner {
+             return [at, &runs](auto points, const auto& give, const auto&) {
+               for (std::size_t i = 0; i < points.size(); ++i) {
+                 Answer a{Answer::Kind::Done, {{"y", points[i][0]}}, "", {}, "", 0};
+                 if (points[i][1] > 40) a.trajectory = {1, 2};
+                 if (++runs == at) a.trajectory = {1, 2, 3};
+                 a.line = R"({"y": 1, "trajectory": [1, 2, 3]})";
+                 give(i, a);
+               }
+             };
+           }}};
+}
+
+TEST(Study, RefusesTrajectoriesThatChangeTheirLength) {
+  const Folder folder;
+  const Problem p = make_small_problem(100);
+  std::atomic<int> runs = 0;
+  const StudyResult whole = run(p, make_options(folder / "a"), make_curved_factories(0, runs));
+  runs = 0;
+  try {
+    run(p, make_options(folder / "b"), make_curved_factories(40, runs));
+    FAIL() << "accepted";
+  } catch (const InputError& e) {
+    EXPECT_EQ(e.diagnostics().front().code, "E823");
+    EXPECT_EQ(e.diagnostics().front().where.column, 10);
+  }
+  EXPECT_EQ(write_bits(run(p, make_options(folder / "b"), make_curved_factories(0, runs))), write_bits(whole));
+  // an older version kept them
+  Store store(folder / "a");
+  StudyRow row = *store.find_study("main");
+  row.state = "open", row.summary = "";
+  store.put_study(row);
+  store.rerun({store.load_results(row.model).at(40).hash});
+  const std::vector<Job> jobs = store.claim("w", 1, 100, row.model);
+  ASSERT_EQ(jobs.size(), 1u);
+  ASSERT_TRUE(store.finish(jobs[0], "w", {Answer::Kind::Done, {{"y", jobs[0].inputs[0]}}, "", {1, 2, 3}, "", 0}));
+  EXPECT_EQ(read_study(p, store, row).alpha.archive.size() + 1, whole.alpha.archive.size());
+  EXPECT_EQ(write_bits(run(p, make_options(folder / "a"), make_curved_factories(0, runs))), write_bits(whole));
 }
 
 TEST(Study, TakesAStrangeAnswerOutOfAnOldStore) {

@@ -274,6 +274,34 @@ TEST(Store, SaysWhichFileIsDamaged) {
     }
 }
 
+TEST(Store, SaysOnceThatTheHeadOfAFileIsDamaged) {
+  const Folder folder;
+  const std::string path = folder / "s.sqlite";
+  { Store store(path); }
+  std::fstream(path, std::ios::in | std::ios::out | std::ios::binary).seekp(100) << std::string(3000, 'y');
+  for (const bool is_read_only : {true, false}) try {
+      Store(path, nullptr, 1, is_read_only);
+      ADD_FAILURE() << "read";
+    } catch (const InputError& e) {
+      const std::string message = e.diagnostics().front().message;
+      EXPECT_NE(message.find("is damaged"), std::string::npos) << message;
+      EXPECT_EQ(message.find("E820"), std::string::npos) << message;
+    }
+}
+
+TEST(Store, SaysAtOnceThatADatabaseIsMissing) {
+  const auto server = Server::make();
+  if (!server) GTEST_SKIP() << "PostgreSQL is not installed";
+  const std::string url = server->url();
+  try {
+    Store store(url.substr(0, url.rfind('/')) + "/nobody_made_it", nullptr, 5);
+    FAIL() << "opened";
+  } catch (const InputError& e) {
+    EXPECT_EQ(e.diagnostics().front().code, "E820");
+    EXPECT_NE(e.diagnostics().front().message.find("nobody_made_it"), std::string::npos);
+  }
+}
+
 TEST(Store, RefusesAFileThatIsNone) {
   const Folder folder;
   std::ofstream(folder / "notes.txt") << std::string(5000, 'x');
