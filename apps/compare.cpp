@@ -18,6 +18,7 @@
 #include "commands.h"
 #include "engines/engine.h"
 #include "mbs/model_json.h"
+#include "results.h"
 #include "terminal.h"
 
 namespace topple::apps {
@@ -273,6 +274,7 @@ int compare_engines(const Arguments& a, const std::atomic<bool>& cancel) {
                    a.skip_unsupported ? "" : " With --skip-unsupported the other engines are compared.");
       return kBadInput;
     }
+    if (!a.output.empty()) make_folder(a.output, {"compare.csv", "compare.svg"});
     const bool shows = has_colour(stderr);
     const Comparison c = engines::compare(model, options, list, [&](const std::string& name) {
       if (shows) std::fprintf(stderr, "\r\x1b[2K%s ...", name.c_str());
