@@ -94,9 +94,36 @@ void System::evaluate_dampers() {
   if (rows.empty()) return;
   find_damper_bounds();
   const double half = 0.5 * step;
+  // half a kick of what acts on each body: at the start of a run with what it is without dampers
+  const bool is_first = state.step_index == 1;
+  std::vector<std::pair<Vec3, Vec3>> other;
+  const auto kick_of = [&](size_t b) -> std::pair<Vec3, Vec3> {
+    return {half * (force[b] + body_reaction[b]), half * (torque[b] + body_reaction_turn[b])};
+  };
+  if (is_first) {
+    if (forces.damps_jointed) calc_reactions();
+    for (size_t b = 0; b < B; ++b) other.push_back(kick_of(b));
+  }
   // velocities at the time of the positions, the last pulls of the dampers standing for the present ones
   for (const DamperRow& d : rows) pull(d.a, d.b, d.row, d.state->damper);
   if (forces.damps_jointed) calc_reactions();
+  if (is_first) {
+    // what the first half kick takes, which no way of a step shows (docs/theory/multibody.md, eq. F5)
+    double braked = 0, weights = 0;
+    for (size_t b = 0; b < B; ++b) {
+      if (fixed[b]) continue;
+      const auto [push, turn] = kick_of(b);
+      const double inverse_mass = state.body[b].inverse_mass;
+      const Vec3 weight = inverse_mass > 0 ? (half / inverse_mass) * model.gravity : Vec3{};
+      const auto stored = [&](const Vec3& p, const Vec3& l) {
+        return 0.5 * (inverse_mass * dot(p, p) + dot(l, calc_world_inverse_inertia(b) * l));
+      };
+      braked += stored(push + weight, turn) - stored(other[b].first + weight, other[b].second);
+    }
+    for (const DamperRow& d : rows) weights += d.bound * d.state->damper * d.state->damper;
+    if (weights > 0)
+      for (const DamperRow& d : rows) *d.damping += braked * d.bound * d.state->damper * d.state->damper / weights;
+  }
   for (DampedBody& d : forces.damped) {
     const size_t b = static_cast<size_t>(d.body);
     d.velocity =
