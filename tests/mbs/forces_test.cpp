@@ -184,8 +184,8 @@ TEST(DampedOscillatorPhysics, DampersOnJointsCostNoStep) {
   }
 }
 
-TEST(DampedOscillatorPhysics, DampersOnJointsHaveOrderTwo) {
-  // a bar let go from the horizontal with a damper that nearly stops it
+/// A bar on a hinge at its end, horizontal at first and turning.
+Model make_hinged_bar(double spring, double damper) {
   Model m;
   m.contact.ground = m.contact.bodies = false;
   Body bar = make_box("bar", 1, {1, 0.05, 0.05}, {1, 0, 0});
@@ -200,9 +200,15 @@ TEST(DampedOscillatorPhysics, DampersOnJointsHaveOrderTwo) {
   j.X_CM.p = {-1, 0, 0};
   RotationalSpring r;
   r.joint = add_joint(m, j);
-  r.spring = linear(10);
-  r.damper = linear(20);
+  r.spring = linear(spring);
+  r.damper = linear(damper);
   m.rotational_springs.push_back(r);
+  return m;
+}
+
+TEST(DampedOscillatorPhysics, DampersOnJointsHaveOrderTwo) {
+  // a bar let go from the horizontal with a damper that nearly stops it
+  const Model m = make_hinged_bar(10, 20);
   double angle[3], residual[3];
   for (int i = 0; i < 3; ++i) {
     Options o = options_of(1, 2e-3 / (1 << i));
@@ -219,25 +225,9 @@ TEST(DampedOscillatorPhysics, DampersOnJointsHaveOrderTwo) {
 
 TEST(DampedOscillatorPhysics, WhatADamperStopsAtOnceIsBooked) {
   // far faster than the step: all energy goes in the first half of it
-  Model free = make_oscillator(1, 0, 1, linear(100), linear(1e5));
-  Model jointed;
+  const Model free = make_oscillator(1, 0, 1, linear(100), linear(1e5));
+  Model jointed = make_hinged_bar(10, 1e5);
   jointed.gravity = {};
-  jointed.contact.ground = jointed.contact.bodies = false;
-  Body bar = make_box("bar", 1, {1, 0.05, 0.05}, {1, 0, 0});
-  bar.w_WB = {0, -0.5, 0};
-  bar.v_WB = {0, 0, 0.5};
-  add_body(jointed, bar);
-  Joint j;
-  j.kind = Joint::Kind::Revolute;
-  j.parent = kGround;
-  j.child = {0};
-  j.X_PF.q = j.X_CM.q = to_quat(Mat3::from_columns({1, 0, 0}, {0, 0, -1}, {0, 1, 0}));
-  j.X_CM.p = {-1, 0, 0};
-  RotationalSpring r;
-  r.joint = add_joint(jointed, j);
-  r.spring = linear(10);
-  r.damper = linear(1e5);
-  jointed.rotational_springs.push_back(r);
   for (const Model& m : {free, jointed})
     for (const double step : {1e-3, 2e-4}) {
       Options o = options_of(0.2, step);
