@@ -91,6 +91,7 @@ void begin_switch(const ZoneParameters& p, const CompiledLaws& laws, const LawSw
   z.ramp_begin = to.time;
   z.ramp = to.ramp;
   z.next_share = to.stiffness_share;
+  z.safe_force[0] = 1, z.safe_force[1] = -1;  // the bounds are those of the law that goes
   const double ratio = laws[static_cast<size_t>(to.law)].rotation_ratio;
   for (int s = 0; s < p.stations; ++s) {
     StationState& st = z.station[s];

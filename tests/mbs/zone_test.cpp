@@ -190,6 +190,19 @@ TEST(Zone, AnotherLawCountsRotationsItsOwnWay) {
   EXPECT_NEAR(st.strained, st.reached, 1e-12);
 }
 
+TEST(Zone, AnotherLawsLimitsHoldAtOnce) {
+  ZoneLaw half = make_law();
+  for (double& m : half.moment_z.positive) m *= 0.5;
+  Walk w;
+  w.laws.push_back(compile_law(half));
+  const auto turn = [&](double moment) { advance_zone(w.p, w.laws, deform(0, 0, moment / kStiff), 0, 1e-4, w.z); };
+  for (const double moment : {30e3, 31e3, 32e3}) turn(moment);  // far enough inside its limits to get bounds
+  ASSERT_TRUE(is_bounded(w.z, false));
+  begin_switch(w.p, w.laws, {.law = 1, .time = 0, .ramp = 0, .stiffness_share = 1}, w.z);
+  for (const double moment : {33e3, 34e3, 58e3}) turn(moment);
+  EXPECT_NEAR(w.z.elastic_force[5], 50e3, 100);  // and 1 kNm more for each 0.01 rad
+}
+
 TEST(Zone, UnloadsElasticallyAndKeepsItsPlasticRotation) {
   Walk w;
   w.go(deform(0, 0, 0.01 + 120e3 / kStiff));
