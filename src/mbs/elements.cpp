@@ -184,23 +184,15 @@ void System::pack_element(size_t e, bool has_moved) {
   }
   const ActiveComponents active = components_of(c.zone.plane);
   const int first = first_bending(c.zone.plane), last = last_bending(c.zone.plane);
-  const auto each = [&active](auto&& put_one) {
-    for (int i = 0; i < active.count; ++i) put_one(active.at[i]);
-  };
-  each([&](int i) { put(kStiffness + i, z.share * c.zone.stiffness[i]); });
+  for (int i = 0; i < active.count; ++i) put(kStiffness + active.at[i], z.share * c.zone.stiffness[active.at[i]]);
   if (has_moved) {
     put(kViscous, c.zone.viscous);
     put(kRelaxation, c.zone.relaxation);
     put(kStation, c.zone.x[0]), put(kStation + 1, c.zone.x[c.zone.stations > 1 ? 1 : 0]);
     put(kMostTurn, kLargestTurn);
   }
-  put(kTorsionScale, 0);
-  const bool has_flow = l.field(slot, kFlows) > 0;  // its constants are there
-  put(kFlows, 0);
+  const bool had_flow = l.field(slot, kFlows) > 0;  // its constants are there
   find_crack_bounds(c.zone, z);
-  for (int s = 0; s < 2; ++s)
-    for (int q = 0; q < 2; ++q)
-      for (int side : {0, 1}) put(kCrackScale + 4 * s + 2 * q + side, z.crack_scale[s][q][side]);
   const bool free = c.zone.stations == 0;
   double fields[kFlowFields];
   // near its bounds a zone is better served by the law itself
@@ -208,15 +200,20 @@ void System::pack_element(size_t e, bool has_moved) {
   const bool flows = !free && in_lanes && (!is_bounded(z, false) || calc_bound_utilisation(c.zone, z) > kNearBounds) &&
                      write_flow(c.zone, laws, z, state.time, fields);
   const bool bounded = !flows && in_lanes && is_bounded(z, free);
+  put(kFlows, flows ? 1 : 0);
   put(kLeastForce, !bounded ? 1 : free ? -kUnlimited : z.safe_force[0]);
   put(kMostForce, !bounded ? -1 : free ? kUnlimited : z.safe_force[1]);
-  if (!bounded && !flows) return;
+  put(kTorsionScale, bounded && !free ? z.safe_torsion : 0);
+  if (!bounded && !flows) {
+    pack_crack_bounds(slot, z);
+    return;
+  }
   if (flows) {
     l.open_flows();
     const auto copy = [&](int from, int to) {
       for (int f = from; f < to; ++f) l.flow(slot, f) = fields[f];
     };
-    if (has_flow) {
+    if (had_flow) {
       fields[kIdle] = kLongestIdle - kLongestIdleAgain;  // the full law has found no bounds
       copy(kAxial, kShearOwn), copy(kSlipped, kSlipped + 1), copy(kTwisted, kTwisted + 1), copy(kBefore, kStations);
       for (int station = 0; station < c.zone.stations; ++station) {
@@ -230,25 +227,40 @@ void System::pack_element(size_t e, bool has_moved) {
     } else {
       copy(0, kFlowFields);
     }
-    put(kFlows, 1);
     z.safe_force[0] = 1, z.safe_force[1] = -1;  // void as soon as it flows
   } else {
     for (int q = first; q <= last; ++q) {
       put(kMomentScale + q, free ? 0 : z.safe_moment[q]);
       put(kShearScale + 1 - q, free ? 0 : z.safe_shear[1 - q]);
     }
-    put(kTorsionScale, free ? 0 : z.safe_torsion);
     put(kExponent, floor_exponent(z.safe_exponent));
   }
-  each([&](int i) {
+  pack_springs(e, slot, flows);
+}
+
+void System::pack_crack_bounds(size_t slot, const ZoneState& z) {
+  for (int s = 0; s < 2; ++s)
+    for (int q = 0; q < 2; ++q)
+      for (int side : {0, 1}) lanes->set(slot, kCrackScale + 4 * s + 2 * q + side, z.crack_scale[s][q][side]);
+}
+
+void System::pack_springs(size_t e, size_t slot, bool flows) {
+  ZoneState& z = state.element[e];
+  Lanes& l = *lanes;
+  const Plane in = elements[e].zone.plane;
+  const ActiveComponents active = components_of(in);
+  const auto put = [&](int f, double x) { l.set(slot, f, x); };
+  pack_crack_bounds(slot, z);
+  for (int c = 0; c < active.count; ++c) {
+    const int i = active.at[c];
     put(kOffset + i, flows ? 0 : z.offset[i]);
-    put(kStretch + i, flows ? z.elastic[i] : z.deformation[i] - z.offset[i]);
-    put(kBehind + i, z.elastic[i] - z.flowed[i]);
-  });
-  put(kDamped, 0);
-  put(kBled, 0);
+    l.set_state(slot, kStretch + i, flows ? z.elastic[i] : z.deformation[i] - z.offset[i]);
+    l.set_state(slot, kBehind + i, z.elastic[i] - z.flowed[i]);
+  }
+  l.set_state(slot, kDamped, 0);
+  l.set_state(slot, kBled, 0);
   z.packed_damping = z.damping, z.packed_plastic = z.plastic, z.packed_behind = z.damper_energy;
-  for (int plane = first; plane <= last; ++plane) {
+  for (int plane = first_bending(in); plane <= last_bending(in); ++plane) {
     const int shear = plane == 0 ? 2 : 1, bend = plane == 0 ? 4 : 5, at = kSoft + 4 * plane;
     const double ks = l.field(slot, kStiffness + shear), kb = l.field(slot, kStiffness + bend);
     const bool soft = !flows && z.is_softened;
@@ -403,7 +415,8 @@ void System::limit_element(size_t e, double compression) {
 }
 
 void System::evaluate_outside(size_t slot) {
-  const size_t e = lanes->is_batch ? slot / lanes->W : lanes->element_of[slot];
+  Lanes& l = *lanes;
+  const size_t e = l.is_batch ? slot / l.W : l.element_of[slot];
   unpack_element(e);
   const ZoneState& z = state.element[e];
   const double elongated = z.elongated;
@@ -412,11 +425,16 @@ void System::evaluate_outside(size_t slot) {
   if (z.live && (was_switching || z.elongated != elongated)) {
     // The full law keeps what flows in tension, for it will do so in the next step, and what has just got another
     // stiffness: the damper's force is still that of the one before.
-    lanes->set(slot, kFlows, 0);
-    lanes->set(slot, kLeastForce, 1);
-    lanes->set(slot, kMostForce, -1);
+    l.set(slot, kFlows, 0);
+    l.set(slot, kLeastForce, 1);
+    l.set(slot, kMostForce, -1);
     return;
   }
+  // a spring that has only cracked keeps its limits
+  if (z.live && !(l.field(slot, kFlows) > 0) && l.field(slot, kLeastForce) <= l.field(slot, kMostForce) &&
+      is_bounded(z, false) && z.safe_force[0] == l.field(slot, kLeastForce) &&
+      z.safe_force[1] == l.field(slot, kMostForce) && calc_bound_utilisation(elements[e].zone, z) <= kNearBounds)
+    return pack_springs(e, slot, false);
   pack_element(e, false);
 }
 

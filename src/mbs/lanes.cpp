@@ -151,13 +151,8 @@ void Lanes::move_slots(const std::vector<std::uint32_t>& from) {
   shared = uses.size();
 }
 
-void Lanes::set(size_t slot, int f, double x) {
-  if (f < kernel::kStateFields) {
-    states[state_at(slot, f)] = x;
-    return;
-  }
+void Lanes::set_constant(size_t slot, int f, double x) {
   std::uint32_t& entry = constants[constant_at(slot, f)];
-  if (pool[size_t{entry} * W + slot % W] == x) return;
   if (uses[entry] > 1) {
     // a vector of its own
     --uses[entry];

@@ -64,7 +64,13 @@ struct Lanes {
     return f < kernel::kStateFields ? states[state_at(slot, f)]
                                     : pool[size_t{constants[constant_at(slot, f)]} * W + slot % W];
   }
-  void set(size_t slot, int f, double x);
+  void set_state(size_t slot, int f, double x) { states[state_at(slot, f)] = x; }
+  void set(size_t slot, int f, double x) {
+    if (f < kernel::kStateFields)
+      set_state(slot, f, x);
+    else if (pool[size_t{constants[constant_at(slot, f)]} * W + slot % W] != x)
+      set_constant(slot, f, x);
+  }
   /// Lets blocks share what is equal in all lanes.
   void share_constants();
   /// The same when many vectors have been added.
@@ -127,6 +133,7 @@ struct Lanes {
   AlignedVector<double> moved_states_, moved_forces_, moved_flows_, moved_pool_;  // scratch of move_slots()
   std::vector<std::uint32_t> moved_constants_;
   void drop_dead_entries();
+  void set_constant(size_t slot, int f, double x);
   size_t state_at(size_t slot, int f) const {
     return (slot / W * kernel::kStateFields + static_cast<size_t>(f)) * W + slot % W;
   }

@@ -354,6 +354,9 @@ class System {
   /// From the state of the zones to the slots, and back.
   /// Markers and constants are written only if they may have changed.
   void pack_element(size_t element, bool has_moved = true);
+  void pack_crack_bounds(size_t slot, const ZoneState&);
+  /// Of a zone in lanes what follows it through deformations, cracks and damage, its limits aside.
+  void pack_springs(size_t element, size_t slot, bool flows);
   void unpack_element(size_t element);
   void pack_elements();
   void unpack_elements();

@@ -170,6 +170,30 @@ bool cracks_grow(const ZoneState& z, int station, int axis, double moment) {
   return std::max(moment * scale[0], -moment * scale[1]) > 1;
 }
 
+/// Whether resultants at the marker are inside the safe bounds of a zone that has any; of cracks they say nothing.
+template <Plane In>
+bool is_inside_bounds(const ZoneParameters& p, const ZoneState& z, const double f[6]) {
+  if (f[0] < z.safe_force[0] || f[0] > z.safe_force[1]) return false;
+  if constexpr (In == Plane::Space) {
+    if (std::abs(f[3]) * z.safe_torsion > 1) return false;
+    const double vy = f[1] * z.safe_shear[0], vz = f[2] * z.safe_shear[1];
+    if (vy * vy + vz * vz > 1) return false;
+    for (int s = 0; s < p.stations; ++s) {
+      const double my = std::abs(f[4] + p.x[s] * f[2]) * z.safe_moment[0];
+      const double mz = std::abs(f[5] - p.x[s] * f[1]) * z.safe_moment[1];
+      if (my + mz > 1 && raised(my, z.safe_exponent) + raised(mz, z.safe_exponent) > 1) return false;
+    }
+  } else {
+    constexpr ActiveComponents active = components_of(In);
+    constexpr int q = first_bending(In), shear = active.at[1], bend = active.at[2];
+    constexpr double sign = q == 0 ? 1 : -1;
+    if (std::abs(f[shear]) * z.safe_shear[shear - 1] > 1) return false;
+    for (int s = 0; s < p.stations; ++s)
+      if (std::abs(f[bend] + sign * p.x[s] * f[shear]) * z.safe_moment[q] > 1) return false;
+  }
+  return true;
+}
+
 /// The common case: a zone whose forces stay inside its safe bounds is a spring with a damper. False if it is not so.
 template <Plane In>
 bool advance_inside_bounds(const ZoneParameters& p, const Six& d, double h, ZoneState& z) {
@@ -196,26 +220,12 @@ bool advance_inside_bounds(const ZoneParameters& p, const Six& d, double h, Zone
       e[bend] = k[bend] > 0 ? f[bend] / k[bend] : 0;
     }
   }
-  if (f[0] < z.safe_force[0] || f[0] > z.safe_force[1]) return false;
-  if constexpr (In == Plane::Space) {
-    if (std::abs(f[3]) * z.safe_torsion > 1) return false;
-    const double vy = f[1] * z.safe_shear[0], vz = f[2] * z.safe_shear[1];
-    if (vy * vy + vz * vz > 1) return false;
-    for (int s = 0; s < p.stations; ++s) {
-      const double about_y = f[4] + p.x[s] * f[2], about_z = f[5] - p.x[s] * f[1];
-      if (cracks_grow(z, s, 0, about_y) || cracks_grow(z, s, 1, about_z)) return false;
-      const double my = std::abs(about_y) * z.safe_moment[0], mz = std::abs(about_z) * z.safe_moment[1];
-      if (my + mz > 1 && raised(my, z.safe_exponent) + raised(mz, z.safe_exponent) > 1) return false;
+  if (!is_inside_bounds<In>(p, z, f)) return false;
+  for (int s = 0; s < p.stations; ++s)
+    for (int q = first; q <= last; ++q) {
+      const double sign = q == 0 ? 1 : -1;
+      if (cracks_grow(z, s, q, f[4 + q] + sign * p.x[s] * f[2 - q])) return false;
     }
-  } else {
-    constexpr int shear = active.at[1], bend = active.at[2];
-    constexpr double sign = first == 0 ? 1 : -1;
-    if (std::abs(f[shear]) * z.safe_shear[shear - 1] > 1) return false;
-    for (int s = 0; s < p.stations; ++s) {
-      const double about = f[bend] + sign * p.x[s] * f[shear];
-      if (cracks_grow(z, s, first, about) || std::abs(about) * z.safe_moment[first] > 1) return false;
-    }
-  }
   double energy = 0, damper_energy = 0, damped = 0, bled = 0;
   for (int c = 0; c < active.count; ++c) {
     const int i = active.at[c];
@@ -704,7 +714,8 @@ struct Evaluation {
   }
 
   /// Splits what is new of the inelastic rotations into a plastic part and added flexibility.
-  void keep_rotations(const Limits (&limits)[2]) {
+  ///   laws  of the stations
+  void keep_rotations(const CompiledLaw* const laws[2]) {
     for (int q = first; q <= last; ++q) {
       force[shear_of(q)] = planes[q].shear(p.x, phi[q], n);
       force[bend_of(q)] = planes[q].moment(phi[q], n);
@@ -712,7 +723,7 @@ struct Evaluation {
         StationState& st = z.station[s];
         m[q][s] = Bending::at(force[bend_of(q)], force[shear_of(q)], p.x[s], planes[q].sign);
         const double added = phi[q][s] - st.phi[q] - st.soft[q] * m[q][s];
-        const double share = limits[s].law().damage_share;
+        const double share = laws[s]->damage_share;
         if (share > 0 && added * m[q][s] > 0) {
           const double top = std::min(st.crack[q] + share * std::abs(beyond_cracks(phi, m, q, s)) / std::abs(m[q][s]),
                                       kMostDamage / station_stiffness[q][s]);
@@ -787,16 +798,29 @@ struct Evaluation {
     z.safe_force[0] = 1, z.safe_force[1] = -1;
   }
 
+  /// A bounded zone that no more happens to than that it cracks: inside the bounds there is no limit to ask. False, and
+  /// nothing but cracks changed, if that is not all.
+  bool crack_inside_bounds(const CompiledLaws& laws) {
+    if (!cracked || !is_bounded(z, false) || z.is_adjusted || !is_inside_bounds<In>(p, z, force)) return false;
+    const CompiledLaw* of[2];
+    for (int s = 0; s < 2; ++s) of[s] = &laws[static_cast<size_t>(z.base_law < 0 ? p.law[s < n ? s : 0] : z.base_law)];
+    z.crushed = 0;
+    keep_rotations(of);
+    if (!find_springs(p, z)) z.safe_force[0] = 1, z.safe_force[1] = -1;
+    return true;
+  }
+
   /// All flow of this step, and what breaks the zone.
   ///   h  since the last evaluation [s]
   void flow(const CompiledLaws& laws, double time, double h) {
+    crack_stations(h);
+    if (crack_inside_bounds(laws)) return;
     const Limits first_limits(laws, p.law[0], z, time);
     const double integrity = flow_axially(first_limits);
     const Limits limits[2] = {first_limits, n > 1 ? Limits(laws, p.law[1], z, time) : first_limits};
     // what is left of the section carries both the force and the moment
     const double axial = integrity > 0 ? force[0] / integrity : 0;
     find_limits(limits, axial, integrity);
-    crack_stations(h);
     turn_stations(limits, h == 0);
     const double elongation = lengthen(limits, axial);
     for (int s = 0; s < n; ++s) {
@@ -811,7 +835,8 @@ struct Evaluation {
       if (st.reached >= (force[0] < 0 || was_far ? law.rupture_rotation_pressed : law.rupture_rotation))
         broke = BreakReason::Rotation;
     }
-    if (flowed || cracked) keep_rotations(limits);
+    const CompiledLaw* const of[2] = {&limits[0].law(), &limits[1].law()};
+    if (flowed || cracked) keep_rotations(of);
     z.lifted += elongation;
     const double longer = elongation + take_back_crushing(elongation, z);
     z.axial += longer;

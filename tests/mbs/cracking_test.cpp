@@ -135,6 +135,36 @@ TEST(Cracking, EndsWhereTheStationYields) {
   EXPECT_NEAR(t.moment(), 0, 0.01 * kYield);
 }
 
+TEST(Cracking, InsideItsBoundsIsThatOfTheWholeLaw) {
+  for (const int stations : {1, 2}) {
+    const ZoneParameters p = make_zone(stations);
+    const CompiledLaws laws{compile_law(make_law())};
+    ZoneState bounded, whole;
+    int growths = 0;
+    for (int i = 1; i <= 3000; ++i) {
+      const double t = 1e-3 * i;
+      const Six d{
+          {-1e-3 * t, 2e-4 * t * std::sin(3 * t), 1e-4 * t, 0, 4e-4 * t * std::sin(9 * t), 6e-4 * t * std::cos(7 * t)}};
+      const double before = bounded.station[0].crack[1];
+      const bool had_bounds = is_bounded(bounded, false);
+      advance_zone(p, laws, d, t, 1e-3, bounded);
+      whole.safe_force[0] = 1, whole.safe_force[1] = -1;
+      advance_zone(p, laws, d, t, 1e-3, whole);
+      growths += had_bounds && bounded.station[0].crack[1] != before ? 1 : 0;
+      for (int c = 0; c < 6; ++c)
+        ASSERT_NEAR(bounded.resultant.c[c], whole.resultant.c[c], 1e-9 * kYield) << i << " " << c;
+      for (int s = 0; s < stations; ++s)
+        for (int q = 0; q < 2; ++q) {
+          ASSERT_NEAR(bounded.station[s].crack[q], whole.station[s].crack[q], 1e-12 * kFlexibility) << i;
+          ASSERT_NEAR(bounded.station[s].phi[q], whole.station[s].phi[q], 1e-15) << i;
+        }
+      ASSERT_NEAR(bounded.plastic, whole.plastic, 1e-9 * (bounded.plastic + bounded.energy)) << i;
+    }
+    EXPECT_GT(growths, 50);
+    EXPECT_FALSE(bounded.yielded);
+  }
+}
+
 TEST(Cracking, InMotionIsALittleBesideItsLine) {
   Turned t;
   int growths = 0;
