@@ -153,7 +153,7 @@ void print_table(std::FILE* out, const record::RccReport& r) {
                  cell(c.stiffness_effective, 1e6, 2).c_str(), point(c.yield).c_str(), point(c.peak).c_str(),
                  point(c.ultimate).c_str(), point(c.residual).c_str());
   }
-  std::fprintf(out, "\n  Without bending it crushes at %.3f MN and tears at %.3f MN. Compression is positive.\n",
+  std::fprintf(out, "\n  Strained evenly it crushes at %.3f MN and tears at %.3f MN. Compression is positive.\n",
                r.crushing_force / unit::MN, r.rupture_force / unit::MN);
 }
 

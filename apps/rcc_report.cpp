@@ -35,9 +35,11 @@ double round_to_two_digits(double v) {
 std::string ending_of(const nearfield::MomentCurve& c, const nearfield::Rcc& rcc) {
   const double crushing = -rcc.y_pos.normal_force.front(), rupture = rcc.y_pos.normal_force.back();
   if (c.rotation.empty() && c.N < 0)
-    return fmt::format("cannot be carried: the section crushes at {:.3g} MN without any bending", crushing / unit::MN);
+    return fmt::format("cannot be carried: strained evenly the section crushes at {:.3g} MN", crushing / unit::MN);
   if (c.rotation.empty())
-    return fmt::format("cannot be carried: the section tears at {:.3g} MN without any bending", rupture / unit::MN);
+    return fmt::format("cannot be carried: strained evenly the section tears at {:.3g} MN", rupture / unit::MN);
+  if (!c.is_balanced && !(*std::max_element(c.moment.begin(), c.moment.end()) > 0))
+    return "no moment: the normal force is carried only with one in the other direction";
   if (c.carried_to > c.rotation.back())
     return fmt::format("no moment is left beyond {:.4g} rad; the normal force is carried up to {:.4g} rad{}",
                        c.rotation.back(), c.carried_to, c.loses_force ? "" : ", as far as was computed");

@@ -423,15 +423,22 @@ March march_curvature(const Fibres& f, double N, int direction, const std::vecto
   Resultants r;
   if (!find(packed, search, 0, eps_0, r)) return out;
 
-  // An unsymmetric section bends under N alone: start where M = 0.
+  // An unsymmetric section bends under N alone: start where M = 0, or at no curvature if it carries N with a moment
+  // only.
   double origin = 0;
   const double moment_scale = calc_force_scale(f) * f.half_depth;
   if (std::abs(r.M) > 1e-9 * moment_scale) {
+    const double even_eps_0 = eps_0;
+    const Resultants even = r;
     double k0 = 0, M0 = r.M, k1 = (r.M > 0 ? -1 : 1) * 1e-5 / f.half_depth;
     for (int i = 0; i < 40; ++i) {
       Resultants r1;
       double e1 = eps_0;
-      if (!find(packed, search, k1, e1, r1)) return out;
+      if (!find(packed, search, k1, e1, r1)) {
+        k1 = 0.5 * (k0 + k1);
+        if (std::abs(k1 - k0) < 1e-9 / f.half_depth) break;
+        continue;
+      }
       eps_0 = e1, origin = k1, r = r1;
       if (std::abs(r1.M) <= 1e-9 * moment_scale) break;
       const double slope = (r1.M - M0) / (k1 - k0);
@@ -439,6 +446,8 @@ March march_curvature(const Fibres& f, double N, int direction, const std::vecto
       step = std::clamp(step, -5e-4 / f.half_depth, 5e-4 / f.half_depth);
       k0 = k1, M0 = r1.M, k1 += step;
     }
+    out.is_balanced = std::abs(r.M) <= 1e-4 * moment_scale;
+    if (!out.is_balanced) origin = 0, eps_0 = even_eps_0, r = even;
   }
 
   out.origin = origin;
@@ -486,6 +495,10 @@ March march_curvature(const Fibres& f, double N, int direction, const std::vecto
     }
     previous_slope = slope, previous_step = ahead;
     previous_eps = e;
+  }
+  if (!out.is_balanced) {
+    out.yield_kappa = out.yield_moment = 0;  // no moment is that of an elastic zone
+    return out;
   }
   const double peak = *std::max_element(out.moment.begin(), out.moment.end());
   for (size_t j = 1; j < kappa.size() && peak > 0; ++j) {

@@ -53,12 +53,14 @@ Resultants calc_resultants(const Fibres&, double eps_0, double kappa, const BarS
 /// under a constant force would move. False: no equilibrium on that way; the section can no longer carry N.
 bool find_equilibrium(const Fibres&, double N, double kappa, double& eps_0, const BarStates& = {});
 
-/// One march at constant N from M = 0 on.
+/// One march at constant N from M = 0 on; from no curvature on, without a first yield, if N is carried with a moment to
+/// one side only.
 struct March {
   std::vector<double> moment;  // magnitude for each of the given curvatures (from the one at M = 0), 0 after the loss
   int last = -1;               // index of the last curvature that could be carried, -1: none
   double yield_kappa = 0, yield_moment = 0;
-  double origin = 0;          // curvature at M = 0; curvatures count from it, in the direction of the march [1/m]
+  double origin = 0;          // where it begins; curvatures count from it, in the direction of the march [1/m]
+  bool is_balanced = true;    // N can be carried with M = 0
   std::vector<double> eps_0;  // mean strain at each curvature held (last + 1)
   BarStates bars;             // histories at each curvature held (last + 1 times R)
 

@@ -62,6 +62,7 @@ MomentCurve make_moment_curve(const Fibres& fibres, Axis axis, double N, int dir
     out.loses_force = true;
     return out;
   }
+  out.is_balanced = march.is_balanced;
   const size_t held = static_cast<size_t>(march.last) + 1;
   for (size_t j = 0; j < held; ++j) {
     out.rotation.push_back(rotation[j]);

@@ -13,7 +13,8 @@ namespace topple::nearfield {
 /// Rotations of a family with every interval cut in `parts`, so that curves are smooth and hold the family's points.
 std::vector<double> refine_rotations(const MomentFamily&, int parts);
 
-/// One curve, from the state without moment to the last rotation at which the section carries N and resists. J points.
+/// One curve, from the state without moment (see March) to the last rotation at which the section carries N and
+/// resists. J points.
 struct MomentCurve {
   Axis axis = Axis::Y;
   int direction = 1;                            // +1 or -1 about that axis of the section
@@ -23,6 +24,7 @@ struct MomentCurve {
   std::vector<double> eps_0, kappa;             // the section at each point [-], [1/m] (J)
   std::vector<BarStates> bars;                  // histories of its rows of bars (J)
   double yield_rotation = 0, yield_moment = 0;  // as in MomentFamily
+  bool is_balanced = true;                      // N can be carried without a moment
   bool loses_force = false;                     // beyond `carried_to` N cannot be carried
   double carried_to = 0;  // last rotation at which N is carried; beyond the last point if no moment was left [rad]
   double first_torn = std::numeric_limits<double>::infinity();  // rotation at which the first bar tears [rad]

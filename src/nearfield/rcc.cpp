@@ -134,26 +134,30 @@ Rcc make_rcc(const ZoneInput& in) {
   Rcc out;
   out.length = in.length;
 
-  double area = 0, first = 0;
-  for (size_t i = 0; i < about_y.at.size(); ++i) {
-    const double a = about_y.core_area[i] + about_y.cover_area[i];
-    area += a, first += a * about_y.at[i];
-  }
-  const double centre = in.flange.breadth > 0 && area > 0 ? first / area : 0;
-  for (size_t i = 0; i < about_y.at.size(); ++i) {
-    const double z = about_y.at[i] - centre;
-    out.EI_y += about_y.cover.Ec * (about_y.core_area[i] + about_y.cover_area[i]) * z * z;
-  }
-  for (size_t i = 0; i < about_z.at.size(); ++i)
-    out.EI_z += about_z.cover.Ec * (about_z.core_area[i] + about_z.cover_area[i]) * about_z.at[i] * about_z.at[i];
+  double area = 0;
+  for (size_t i = 0; i < about_y.at.size(); ++i) area += about_y.core_area[i] + about_y.cover_area[i];
   const double n = in.steel.Es - (area > 0 ? about_y.cover.Ec : 0);
+  const auto calc_EI = [n, has_flange = in.flange.breadth > 0](const Fibres& f) {
+    // about the centroid; that of a section with a flange is its concrete's
+    double A = 0, S = 0, EI = 0;
+    for (size_t i = 0; i < f.at.size(); ++i) {
+      const double a = f.core_area[i] + f.cover_area[i];
+      A += a, S += a * f.at[i];
+    }
+    for (size_t i = 0; i < f.bar_at.size() && !has_flange; ++i) {
+      const double a = n / f.cover.Ec * f.bar_area[i];
+      A += a, S += a * f.bar_at[i];
+    }
+    // of a symmetric section only round-off
+    const double centre = A > 0 && std::abs(S) > 1e-9 * A * f.half_depth ? S / A : 0;
+    const auto add = [&EI, centre](double EA, double at) { EI += EA * (at - centre) * (at - centre); };
+    for (size_t i = 0; i < f.at.size(); ++i) add(f.cover.Ec * (f.core_area[i] + f.cover_area[i]), f.at[i]);
+    for (size_t i = 0; i < f.bar_at.size(); ++i) add(n * f.bar_area[i], f.bar_at[i]);
+    return EI;
+  };
+  out.EI_y = calc_EI(about_y), out.EI_z = calc_EI(about_z);
   out.EA = about_y.cover.Ec * area;
-  for (size_t i = 0; i < about_y.bar_at.size(); ++i) {
-    out.EA += n * about_y.bar_area[i];
-    out.EI_y += n * about_y.bar_area[i] * (about_y.bar_at[i] - centre) * (about_y.bar_at[i] - centre);
-  }
-  for (size_t i = 0; i < about_z.bar_at.size(); ++i)
-    out.EI_z += n * about_z.bar_area[i] * about_z.bar_at[i] * about_z.bar_at[i];
+  for (const double a : about_y.bar_area) out.EA += n * a;
   if (!(out.EA > 0)) throw InputError("E612", "section '" + in.section.name + "': nothing is left of it");
 
   const Peak peak = find_crushing(about_y);

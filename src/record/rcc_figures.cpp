@@ -209,7 +209,7 @@ void add_interaction(const RccReport& r, char axis, std::vector<Figure>& out) {
   f.id = fmt::format("interaction_{}", axis);
   f.heading = fmt::format("Bending about {}", axis);
   f.caption = fmt::format(
-      "Without bending the section crushes at {} and tears at {} of tension. Between, a moment inside the dashed line "
+      "Strained evenly the section crushes at {} and tears at {} of tension. Between, a moment inside the dashed line "
       "leaves it elastic, one outside the full line is not resisted.",
       force_text(r.crushing_force), force_text(r.rupture_force));
   f.drawing = draw(p);
