@@ -70,10 +70,16 @@ void add_mechanism(const Context& c, const Mechanism& m) {
         "rad", status);
 }
 
-bool add_stability(const Context& c) {
+/// Whether the building stood until each next stage, as far as frames tell.
+struct Standing {
+  bool fell = false;
+  bool is_open = false;  // of some interval it cannot be said
+};
+
+Standing add_stability(const Context& c) {
   // each interval of standing: its last frame before the next stage, and what happened in it
-  const auto stages = c.stage_times();
-  bool stood = true;
+  const auto stages = find_stage_times(c.map, true);
+  Standing out;
   const auto& block = c.recorder.block_frames();
   const auto& zones = c.recorder.zone_frames();
   const auto describe = [&](const std::string& id, const std::string& title, size_t i, bool settled) {
@@ -112,17 +118,41 @@ bool add_stability(const Context& c) {
     c.add(id, "Stability", title, text, margin, "1", status);
     return is_standing;
   };
-  if (block.empty()) return true;
+  if (block.empty()) return out;
   describe("stability.start", "Before the first charge", 0, false);
   for (size_t s = 0; s + 1 < stages.size(); ++s) {
-    if (stages[s + 1].first > block.back().time) break;
-    const size_t i = find_frame(block, stages[s + 1].first);
-    stood &= describe(
-        fmt::format("stability.stage_{}", s + 1),
-        fmt::format("Between \"{}\" and \"{}\"", c.stage_name(stages[s].stage), c.stage_name(stages[s + 1].stage)), i,
-        true);
+    const double begin = stages[s].last, end = stages[s + 1].first;
+    const size_t i = find_frame(block, end);
+    const std::string id = fmt::format("stability.stage_{}", s + 1),
+                      title = fmt::format("Between \"{}\" and \"{}\"", c.stage_name(stages[s].stage),
+                                          c.stage_name(stages[s + 1].stage));
+    const auto leave_open = [&](const std::string& why) {
+      if (!c.is_under_way) c.add(id, "Stability", title, "Not judged: " + why + ".", kNone, "");
+      out.is_open = true;
+    };
+    const std::string next = c.stage_name(stages[s + 1].stage);
+    const BlockFrame& last = block[i];
+    if (stands(last, c.k)) {
+      // no part falls faster than freely
+      const double gap = end - last.time, way = last.fastest * gap + 0.5 * norm(c.model.gravity) * gap * gap;
+      if (end > c.r.time.back() + 1e-9) {
+        leave_open(fmt::format("the run ends at {:.2f} s, before \"{}\"", c.r.time.back(), next));
+        break;
+      }
+      if (begin >= end) {
+        leave_open(fmt::format("\"{}\" begins before all charges of the stage before it have fired", next));
+        continue;
+      }
+      if (last.time < begin || norm(last.displacement) + way >= c.k.stands_displacement) {
+        leave_open(fmt::format("the last frame before \"{}\" ({:.3f} s) is of {:.3f} s; a higher frame_rate keeps more",
+                               next, end, last.time));
+        continue;
+      }
+    }
+    out.fell |= !describe(id, title, i, true);
+    if (end > c.r.time.back() + 1e-9) break;
   }
-  return stood;
+  return out;
 }
 
 Reach add_debris(const Context& c, const Mechanism& m) {
@@ -388,10 +418,16 @@ void add_rigid_block(const Context& c) {
 void add_events(const Context& c) {
   std::map<std::string, int> n;
   for (const record::Event& e : c.r.events) ++n[e.kind];
-  c.add("events", "Events", "Events",
-        fmt::format("{} charges, {} zones yielded, {} broke, {} joints came off, {} parts touched the ground.",
-                    n["charge"], n["yield"], n["rupture"], n["release"], n["touchdown"]),
-        static_cast<double>(c.r.events.size()), "1");
+  const auto late = std::count_if(c.map.schedule.begin(), c.map.schedule.end(),
+                                  [&c](const Firing& f) { return !f.fails && f.time > c.r.time.back() + 1e-9; });
+  const bool has_late = late > 0 && !c.is_under_way;
+  std::string text =
+      fmt::format("{} charges, {} zones yielded, {} broke, {} joints came off, {} parts touched the ground.",
+                  n["charge"], n["yield"], n["rupture"], n["release"], n["touchdown"]);
+  if (has_late)
+    text += fmt::format(" {} had not fired when the run ended.", count_words(late, "", "charge", "charges"));
+  c.add("events", "Events", "Events", text, static_cast<double>(c.r.events.size()), "1",
+        has_late ? Status::Warning : Status::Info);
   size_t i = 0;
   for (const std::string& note : c.map.notes)
     c.add("note." + std::to_string(++i), "Events", "Note", note, kNone, "", Status::Warning);
@@ -417,7 +453,7 @@ void add_stubs(const Context& c) {
         text + fmt::format(". Most: {} by {:.2f} of {:.2f} m.", most->member, by(*most), most->length), by(*most), "m");
 }
 
-void add_criteria(const Context& c, const Mechanism& m, bool stood, const Reach& reach) {
+void add_criteria(const Context& c, const Mechanism& m, const Standing& standing, const Reach& reach) {
   const product::Criteria& want = c.plan.criteria;
   const auto judge_one = [&](const std::string& id, const std::string& title, bool met, const std::string& text,
                              double value, const std::string& unit) {
@@ -440,11 +476,16 @@ void add_criteria(const Context& c, const Mechanism& m, bool stood, const Reach&
     judge_one("debris_reach", "Reach of the debris", reach.largest <= *want.debris_reach,
               fmt::format("Asked: at most {:.1f} m; found: {:.1f} m.", *want.debris_reach, reach.largest),
               reach.largest, "m");
-  if (want.stands_between_stages)
-    judge_one("stands_between_stages", "Standing between stages", stood == *want.stands_between_stages,
+  if (want.stands_between_stages) {
+    const bool is_known = standing.fell || !standing.is_open;
+    judge_one("stands_between_stages", "Standing between stages",
+              is_known && standing.fell != *want.stands_between_stages,
               fmt::format("Asked: {}; found: {}.", *want.stands_between_stages ? "stands" : "falls",
-                          stood ? "stands" : "falls"),
+                          standing.fell ? "falls"
+                          : is_known    ? "stands"
+                                        : "not judged"),
               kNone, "");
+  }
 }
 
 void add_verification(const Context& c) {
@@ -543,7 +584,7 @@ bool add_findings(const product::Plan& plan, const mbs::Model& model, const Mode
   const Mechanism m = judge_run(plan, model, map, k, recorder, summary, is_under_way);
   add_mechanism(c, m);
   add_rigid_block(c);
-  const bool stood = add_stability(c);
+  const Standing standing = add_stability(c);
   if (c.is_cancelled()) return false;
   const Reach reach = add_debris(c, m);
   add_clearances(c);
@@ -552,7 +593,7 @@ bool add_findings(const product::Plan& plan, const mbs::Model& model, const Mode
   add_stubs(c);
   add_vibration(c);
   add_events(c);
-  if (r.ending == "at_rest" || r.ending == "time_limit") add_criteria(c, m, stood, reach);
+  if (r.ending == "at_rest" || r.ending == "time_limit") add_criteria(c, m, standing, reach);
   add_not_modelled();
   add_verification(c);
   return true;

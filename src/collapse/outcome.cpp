@@ -6,10 +6,10 @@
 
 namespace topple::collapse {
 
-std::vector<StageTimes> find_stage_times(const ModelMap& map) {
+std::vector<StageTimes> find_stage_times(const ModelMap& map, bool all) {
   std::map<int, StageTimes> times;
   for (const Firing& f : map.schedule) {
-    if (f.fails) continue;
+    if (f.fails && !all) continue;
     const auto [it, is_new] = times.emplace(f.stage, StageTimes{static_cast<size_t>(f.stage), f.time, f.time});
     it->second.first = std::min(it->second.first, f.time);
     it->second.last = std::max(it->second.last, f.time);

@@ -14,8 +14,8 @@ struct StageTimes {
   size_t stage = 0;            // index into the plan's
   double first = 0, last = 0;  // [s]
 };
-/// Of the stages that fire at all, rising.
-std::vector<StageTimes> find_stage_times(const ModelMap&);
+/// Of the stages that fire at all, rising; with `all`, charges that fail count as if they fired.
+std::vector<StageTimes> find_stage_times(const ModelMap&, bool all = false);
 
 /// How it came down, or how things stand in a run that goes on. There is at least one frame.
 Mechanism judge_run(const product::Plan&, const mbs::Model&, const ModelMap&, const Knowledge&, const Recorder&,

@@ -157,7 +157,7 @@ void fill(Sample& s, const Knowledge& k, const SampleRunOptions& options, Sample
   out.tilt = series("tilt_angle");
   out.mechanism = judge_run(s.plan, s.model, s.map, k, *s.recorder, s.summary);
   const std::vector<BlockFrame>& block = s.recorder->block_frames();
-  const std::vector<StageTimes> stages = find_stage_times(s.map);
+  const std::vector<StageTimes> stages = find_stage_times(s.map, true);
   const size_t before = find_frame(block, stages.empty() ? out.time.back() : stages.back().first);
   out.stood = stages.size() < 2 || stands(block[before], k);
   out.utilisation = out.stood ? s.recorder->zone_frames()[before].utilisation : 1;

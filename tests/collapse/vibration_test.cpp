@@ -179,6 +179,44 @@ TEST(StabilityRunPhysics, WhatGivesWayUsesItsResistanceAndWhatFallsHasNoMargin) 
   EXPECT_EQ(pause.status, record::Status::Bad);
 }
 
+std::string staged(const std::string& row, const std::string& later, const std::string& analysis,
+                   const std::string& more = "") {
+  return house(charge(row, "0 s") + charge("C-B3-1", later, more), "1.2 s") + analysis +
+         "\n[criteria]\nstands_between_stages = true\n";
+}
+const record::Finding& judge(record::Record& r, const std::string& text) {
+  r = run_plan(read(text), default_knowledge(), {}, {});
+  return finding(r, "criterion.stands_between_stages");
+}
+
+TEST(StabilityRunPhysics, APauseWhoseNextStageFailsIsJudged) {
+  record::Record r;
+  EXPECT_THAT(judge(r, staged("C-A*-0", "0.9 s", "")).text, HasSubstr("found: falls"));
+  EXPECT_THAT(judge(r, staged("C-A*-0", "0.9 s", "", "fails = true")).text, HasSubstr("found: falls"));
+  EXPECT_EQ(finding(r, "criterion.stands_between_stages").status, record::Status::Bad);
+}
+
+TEST(StabilityRunPhysics, APauseThatIsNotSeenIsNotJudged) {
+  record::Record r;
+  // a second between frames, at the first of which it still stands
+  EXPECT_THAT(judge(r, staged("C-A*-0", "0.9 s", "frame_rate = \"1 Hz\"")).text, HasSubstr("found: not judged"));
+  EXPECT_EQ(finding(r, "criterion.stands_between_stages").status, record::Status::Bad);
+  EXPECT_THAT(finding(r, "stability.stage_1").text, HasSubstr("Not judged: the last frame before"));
+  EXPECT_THAT(judge(r, staged("C-A*-0", "5 ms", "")).text, HasSubstr("found: not judged"));
+}
+
+TEST(StabilityRunPhysics, ARunThatEndsInAPauseTellsAFallOnly) {
+  const auto judge_until = [](const std::string& row, double until) {
+    product::Plan plan = read(staged(row, "0.9 s", ""));
+    plan.analysis.duration = until;
+    const record::Record r = run_plan(plan, default_knowledge(), {}, {});
+    EXPECT_THAT(finding(r, "events").text, HasSubstr("1 charge had not fired when the run ended."));
+    return finding(r, "criterion.stands_between_stages").text;
+  };
+  EXPECT_THAT(judge_until("C-A*-0", 0.8), HasSubstr("found: falls"));
+  EXPECT_THAT(judge_until("C-A*-0", 0.05), HasSubstr("found: not judged"));
+}
+
 TEST(StabilityRunPhysics, TheMarginsOfAPauseAreSaid) {
   const record::Record r =
       run_plan(read(house(charge("C-A1-0", "0.1 s") + charge("C-B*-0", "1 s"), "1.2 s")), default_knowledge(), {}, {});

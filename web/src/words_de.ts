@@ -53,6 +53,10 @@ export const german: readonly (readonly [string, string])[] = [
   ["It does not stand", "Es steht nicht"],
   ["Lowest margins: {} of {} members.", "Kleinste Reserven: {} (von {} Bauteilen)."],
   ["It stands still.", "Es steht still."],
+  ["not judged", "nicht beurteilt"],
+  ["Not judged: the run ends at {:.2f} s, before \"{}\".", "Nicht beurteilt: Die Rechnung endet bei {} s, vor „{}“."],
+  ["Not judged: \"{}\" begins before all charges of the stage before it have fired.", "Nicht beurteilt: „{}“ beginnt, bevor alle Ladungen der Zündstufe davor gezündet haben."],
+  ["Not judged: the last frame before \"{}\" ({:.3f} s) is of {:.3f} s; a higher frame_rate keeps more.", "Nicht beurteilt: Das letzte Bild vor „{}“ ({} s) ist von {} s; eine höhere frame_rate behält mehr."],
   ["It still sways (still: below {:.2f} m/s).", "Es schwankt noch (still: unter {} m/s)."],
   // debris
   ["Fall and debris", "Fall und Trümmer"],
@@ -112,6 +116,8 @@ export const german: readonly (readonly [string, string])[] = [
   ["{} at {:.2f} s at ({:.1f}, {:.1f}) m with {:.2f} MJ and {:.2f} MN s", "{} bei {} s an ({}, {}) m mit {} MJ und {} MN s"],
   // events
   ["Events", "Ereignisse"],
+  ["{} charge had not fired when the run ended.", "{} Ladung hatte am Ende der Rechnung noch nicht gezündet."],
+  ["{} charges had not fired when the run ended.", "{} Ladungen hatten am Ende der Rechnung noch nicht gezündet."],
   ["{} charges, {} zones yielded, {} broke, {} joints came off, {} parts touched the ground.", "{} Ladungen, {} Zonen haben zu fließen begonnen, {} sind gebrochen, {} Verbindungen haben sich gelöst, {} Teile haben den Boden berührt."],
   ["Note", "Hinweis"],
   ["{} fired, {:.1f} t of concrete thrown out", "{} gezündet, {} t Beton ausgeworfen"],
