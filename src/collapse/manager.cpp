@@ -1,11 +1,14 @@
 #include "collapse/manager.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
 #include "base/error.h"
 #include "collapse/builder.h"
 #include "collapse/frequency_limit.h"
+#include "product/place_in_text.h"
 
 namespace topple::collapse {
 
@@ -144,6 +147,28 @@ Vec3 Builder::half_of_node(const GridPoint& at) const {
 }
 
 void Builder::make_columns() {
+  // charges too high for their columns: once for those of one table
+  struct TooHigh {
+    const product::Charge* charge = nullptr;
+    double clear_height = 0;
+    int more = 0;
+  };
+  std::vector<TooHigh> too_high;
+  const auto note_too_high = [&](int index, double position, double clear_height) {
+    for (const product::Stage& stage : plan.stages)
+      for (const product::Charge& c : stage.charges) {
+        if (c.member != index || c.position != position) continue;
+        const auto same = std::find_if(too_high.begin(), too_high.end(), [&c](const TooHigh& t) {
+          return t.charge->where.line == c.where.line && t.charge->where.column == c.where.column;
+        });
+        if (same != too_high.end()) {
+          ++same->more;
+        } else {
+          too_high.push_back({&c, clear_height, 0});
+        }
+        return;
+      }
+  };
   for (const auto& [at, index] : columns) {
     const Member& m = member(index);
     const product::Section& s = section_of(index);
@@ -171,8 +196,7 @@ void Builder::make_columns() {
     const auto charged = lowest_charge.find(index);
     double split = charged == lowest_charge.end() ? 0 : charged->second;
     if (split > 0 && split >= low - m.start.z - 0.02) {
-      complain(index, "a charge lies in the joint above the clear height of " + std::to_string(low - m.start.z) + " m",
-               "place it lower");
+      note_too_high(index, split, low - m.start.z);
       continue;
     }
     if (split < 0.02) split = 0;
@@ -192,6 +216,21 @@ void Builder::make_columns() {
       }
       node_body[at] = add_assembly({m.name, "column", at.storey, false, {slice(split, height)}});
     }
+  }
+  std::vector<SourcePosition> tables;
+  for (const TooHigh& t : too_high) tables.push_back(t.charge->where);
+  const std::vector<product::Place> places = product::find_values(plan, tables, "position");
+  for (size_t i = 0; i < too_high.size(); ++i) {
+    const TooHigh& t = too_high[i];
+    const product::Place& place = places[i];
+    complaints.push_back({Severity::Error,
+                          "E621",
+                          {t.charge->where.file, place.line, place.column},
+                          place.width,
+                          fmt::format("{}{}: a charge lies in the joint above the clear height of {:.4g} m",
+                                      member(t.charge->member).name,
+                                      t.more > 0 ? fmt::format(" and {} more", t.more) : "", t.clear_height),
+                          "place it lower"});
   }
 }
 

@@ -12,6 +12,7 @@ namespace {
 constexpr double pi = 3.14159265358979323846;
 constexpr size_t most_stages = 1000;
 constexpr size_t most_charges = 20000;  // over all stages
+constexpr double largest_scatter = 3;   // deviations, as in the rule charge.scatter_limit
 constexpr const char* no_support = "nothing removes a support; the building will stand";
 
 std::string in_metres(double length) {
@@ -144,6 +145,23 @@ void check_times(Reading& reading, const std::vector<const Node*>& nodes, const 
     } else if (has_next && stages[firing.stage + 1].time > time && next >= stages[firing.stage + 1].time) {
       complaints.warn("W506", firing.place, "the charge's delay lasts until the next stage or longer");
     }
+  }
+  for (size_t i = 0; i < stages.size(); ++i) {
+    size_t late = 0;
+    double latest = 0;
+    for (const Charge& c : stages[i].charges) {
+      const double time = stages[i].time + c.delay, last = time + largest_scatter * c.scatter;
+      if (c.fails || !(time < duration && last >= duration)) continue;
+      ++late, latest = std::max(latest, last);
+    }
+    if (late == 0) continue;
+    char until[32];
+    std::snprintf(until, sizeof until, "%.4g s", latest);
+    complaints.warn("W509", place_of_time(i),
+                    "time: the scatter of " + std::to_string(late) + (late == 1 ? " charge" : " charges") +
+                        " may lead past the end of the analysis; what is late does not fire",
+                    std::string("they fire until ") + until +
+                        "; raise duration in [analysis], or fire earlier or with less scatter");
   }
 }
 

@@ -94,7 +94,101 @@ void check_shape(const TableReader& table, const Shaft& s) {
   }
 }
 
+constexpr double slack = 1e-9;  // round-off of sums of lengths [m]
+
+/// Room that a member takes, upright prisms of rectangles [m].
+struct Box {
+  Vec3 low, high;
+};
+
+Box calc_box(const Plan& plan, const Member& m) {
+  Vec3 half, low = m.start, high = m.end;
+  const bool is_along_x = m.row_a != m.row_b;
+  if (m.kind == MemberKind::Column || m.kind == MemberKind::Beam) {
+    const Section& s = plan.sections[static_cast<size_t>(m.section)];
+    if (m.kind == MemberKind::Column)
+      half = {s.width / 2, s.height / 2, 0};
+    else
+      half = {is_along_x ? 0 : s.width / 2, is_along_x ? s.width / 2 : 0, s.height / 2};
+  } else {
+    const double t = plan.panels[static_cast<size_t>(m.panel)].thickness;
+    if (m.kind == MemberKind::Slab)
+      half.z = t / 2;
+    else
+      half = {is_along_x ? 0 : t / 2, is_along_x ? t / 2 : 0, 0}, high.z += m.height;
+  }
+  return {low - half, high + half};
+}
+
+/// A shaft and where it stands.
+struct Standing {
+  const Member& member;
+  const Shaft& shaft;
+  double outer(double z) const { return shaft.outer((z - member.start.z) / (member.end.z - member.start.z)); }
+  double inner(double z) const {
+    const double share = (z - member.start.z) / (member.end.z - member.start.z);
+    return shaft.outer(share) - shaft.thickness(share) - shaft.lining_thickness;
+  }
+};
+
+enum class Meeting { Apart, Inside, Overlaps };
+
+/// Whether a box is apart from a shaft, inside its hollow, or neither.
+Meeting compare(const Standing& s, const Box& b) {
+  const double low = std::max(b.low.z, s.member.start.z), high = std::min(b.high.z, s.member.end.z);
+  if (!(high - low > slack)) return Meeting::Apart;
+  const Vec3& axis = s.member.start;
+  const double near =
+      std::hypot(axis.x - std::clamp(axis.x, b.low.x, b.high.x), axis.y - std::clamp(axis.y, b.low.y, b.high.y));
+  if (!(near < std::max(s.outer(low), s.outer(high)) - slack)) return Meeting::Apart;
+  const double far =
+      std::hypot(std::max(axis.x - b.low.x, b.high.x - axis.x), std::max(axis.y - b.low.y, b.high.y - axis.y));
+  return far <= std::min(s.inner(low), s.inner(high)) + slack ? Meeting::Inside : Meeting::Overlaps;
+}
+
+/// Whether shaft `a` is apart from `b`, inside its hollow, or neither; radii are linear, so the ends of the height that
+/// they share decide.
+Meeting compare(const Standing& a, const Standing& b) {
+  const double low = std::max(a.member.start.z, b.member.start.z), high = std::min(a.member.end.z, b.member.end.z);
+  const double apart = std::hypot(a.member.start.x - b.member.start.x, a.member.start.y - b.member.start.y);
+  if (!(apart < std::max(a.outer(low) + b.outer(low), a.outer(high) + b.outer(high)) - slack)) return Meeting::Apart;
+  for (const double z : {low, high})
+    if (!(apart + a.outer(z) <= b.inner(z) + slack)) return Meeting::Overlaps;
+  return Meeting::Inside;
+}
+
 }  // namespace
+
+void check_shafts(Reading& reading) {
+  const Plan& plan = reading.plan;
+  const auto standing = [&](const Member& m) { return Standing{m, plan.shafts[static_cast<size_t>(m.shaft)]}; };
+  for (const Member& m : plan.members) {
+    if (m.kind != MemberKind::Shaft || m.removed) continue;
+    std::vector<std::string> overlapped, held;
+    const Member* holder = nullptr;
+    for (const Member& other : plan.members) {
+      if (&other == &m || other.removed) continue;
+      if (other.kind != MemberKind::Shaft) {
+        if (other.section < 0 && other.panel < 0) continue;
+        const Meeting meeting = compare(standing(m), calc_box(plan, other));
+        if (meeting == Meeting::Overlaps) overlapped.push_back(other.name);
+        if (meeting == Meeting::Inside) held.push_back(other.name);
+        continue;
+      }
+      const Meeting meeting = compare(standing(m), standing(other));
+      if (meeting == Meeting::Inside) holder = &other;
+      // of two shafts the later one is at fault
+      if (meeting == Meeting::Overlaps && &other < &m && compare(standing(other), standing(m)) == Meeting::Overlaps)
+        overlapped.push_back(other.name);
+    }
+    const Place place = reading.shaft_places[static_cast<size_t>(m.shaft)];
+    if (!overlapped.empty())
+      reading.complaints.error("E408", place, m.name + ": stands where others stand: " + list_of(overlapped),
+                               "move it, or leave out what is not there");
+    if (holder) reading.complaints.warn("W510", place, m.name + ": stands inside " + holder->name);
+    if (!held.empty()) reading.complaints.warn("W510", place, list_of(held) + ": inside " + m.name);
+  }
+}
 
 void read_shafts(Reading& reading, TableReader& root) {
   const std::vector<const Node*> nodes = root.tables("shafts");
@@ -138,6 +232,7 @@ void read_shafts(Reading& reading, TableReader& root) {
     table.finish();
     if (table.is_table()) check_shape(table, s);
     m.shaft = static_cast<int>(reading.plan.shafts.size());
+    reading.shaft_places.push_back(table.place_of("position"));
     reading.plan.shafts.push_back(std::move(s));
     reading.plan.members.push_back(std::move(m));
   }

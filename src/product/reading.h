@@ -25,6 +25,7 @@ struct Reading {
   bool knows_members = true;  // every rule says clearly where its members stand
   std::vector<bool> section_is_used, panel_is_used;
   std::vector<Place> section_places, panel_places;
+  std::vector<Place> shaft_places;  // of the shafts' positions
 };
 
 /// The bytes of a file of at most 8 MB; `what` it should be stands in the complaints. Throws InputError E106, E107.
@@ -39,6 +40,8 @@ void read_grid(Reading&, TableReader& root);
 void check_neighbours(Reading&);
 /// Shafts, which stand off the grid: behind the other members.
 void read_shafts(Reading&, TableReader& root);
+/// Complains of shafts that stand where other members stand; what is removed stands no more.
+void check_shafts(Reading&);
 /// Columns, beams, slabs, walls, overrides; checks that nothing hangs in the air.
 void read_members(Reading&, TableReader& root);
 void read_preparation(Reading&, TableReader& root);

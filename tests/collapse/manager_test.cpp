@@ -185,6 +185,25 @@ TEST(Manager, ABeamWithoutColumnBelowEndsInAJointOfItsOwn) {
       std::any_of(b.map.bodies.begin(), b.map.bodies.end(), [](const BodyEntry& e) { return e.name == "N-B1-0"; }));
 }
 
+TEST(Manager, SaysOnceOfAChargeThatItLiesTooHighAndWhere) {
+  std::string text = house(charge("C-A*-0"));
+  text.replace(text.find("position = \"1 m\""), 16, "position = \"2.5 m\"");
+  const product::Plan plan = read(text);
+  ModelMap map;
+  std::vector<Diagnostic> found;
+  try {
+    make_model(plan, default_knowledge(), map);
+  } catch (const InputError& e) { found = e.diagnostics(); }
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].code, "E621");
+  // storeys of 3 m above beams of 0.5 m
+  EXPECT_EQ(found[0].message, "C-A1-0 and 2 more: a charge lies in the joint above the clear height of 2.5 m");
+  const size_t at = text.find("\"2.5 m\"");
+  EXPECT_EQ(found[0].where.line, 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
+  EXPECT_EQ(found[0].where.column, static_cast<int>(at - text.rfind('\n', at)));
+  EXPECT_EQ(found[0].width, 7);
+}
+
 TEST(Manager, NamesMembersThatCannotBeBuilt) {
   product::Plan plan = read(house(charge("C-A*-0")));
   plan.stages[0].charges[0].member = plan.find_member("S-A1B2-0");

@@ -222,6 +222,8 @@ const Mistake blasting_mistakes[] = {
     {"W506", "destroyed_length = \"1.2 m\"", "destroyed_length = \"1.2 m\"\ndelay = \"2.5 s\"",
      "lasts until the next stage", "", "[[stage.charge]]\nmembers = [\"C-A*-0\"]",
      "«[[stage.charge]]»\nmembers = [\"C-A*-0\"]"},
+    {"W509", "destroyed_length = \"1 m\"", "destroyed_length = \"1 m\"\nscatter = \"1 s\"",
+     "the scatter of 1 charge may lead past the end", "they fire until 5 s", "time = \"2 s\"", "time = «\"2 s\"»"},
 };
 
 INSTANTIATE_TEST_SUITE_P(Syntax, OneMistake, testing::ValuesIn(syntax_mistakes));
@@ -391,6 +393,21 @@ TEST(Charges, ThatAllFailAreAWarning) {
   ASSERT_EQ(complaints.size(), 1u);
   EXPECT_EQ(complaints[0].code, "W504");
   EXPECT_THAT(complaints[0].message, HasSubstr("the building will stand"));
+}
+
+TEST(Charges, ThatMayScatterPastTheEndAreAWarningOfTheirStage) {
+  EXPECT_TRUE(complaints_about(with_charges_on("\"C-A1-0\"", "scatter = \"1 s\"\ndelay = \"1.9 s\"\n")).empty());
+  EXPECT_EQ(complaints_about(with_charges_on("\"C-A1-0\"", "scatter = \"1 s\"\ndelay = \"2 s\"\n")).size(), 1u);
+  const std::vector<Diagnostic> late =
+      complaints_about(with_charges_on("\"C-A*-0\"", "scatter = \"1 s\"\ndelay = \"2.1 s\"\n"));
+  ASSERT_EQ(late.size(), 1u);
+  EXPECT_EQ(late[0].code, "W509");
+  EXPECT_THAT(late[0].message, HasSubstr("the scatter of 3 charges may lead past the end"));
+  EXPECT_THAT(late[0].help, HasSubstr("they fire until 5.1 s"));
+  const std::vector<Diagnostic> failing =
+      complaints_about(with_charges_on("\"C-A1-0\"", "scatter = \"1 s\"\ndelay = \"2 s\"\nfails = true\n"));
+  ASSERT_EQ(failing.size(), 1u);
+  EXPECT_EQ(failing[0].code, "W504");
 }
 
 TEST(Charges, AreNotNeededForAStandingCheck) {
