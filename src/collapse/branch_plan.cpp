@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "base/error.h"
 #include "product/edited_text.h"
@@ -64,25 +65,46 @@ std::vector<product::Stage> lay_out_stages(const LiveModel& live) {
   return stages;
 }
 
+/// What a text that is no plan is refused for; warnings may stand before it.
+std::string find_error(const InputError& e) {
+  const std::vector<Diagnostic>& all = e.diagnostics();
+  const auto error =
+      std::find_if(all.begin(), all.end(), [](const Diagnostic& d) { return d.severity == Severity::Error; });
+  return (error == all.end() ? all.front() : *error).message;
+}
+
+void add_changes(const product::PlanChanges& more, product::PlanChanges& changes) {
+  if (more.stages) changes.stages = more.stages;
+  if (more.friction) changes.friction = more.friction;
+  changes.cuts.insert(changes.cuts.end(), more.cuts.begin(), more.cuts.end());
+  changes.cables.insert(changes.cables.end(), more.cables.begin(), more.cables.end());
+}
+
 }  // namespace
 
 BranchPlan write_branch_plan(const LiveModel& live) {
   BranchPlan out;
   out.text = live.plan().text;
-  product::PlanChanges changes;
-  bool changes_charges = false;
+  struct Change {
+    std::string words;
+    product::PlanChanges changes;
+  };
+  std::vector<Change> sayable;
+  std::optional<std::vector<product::Stage>> stages;  // with all edits of charges
   size_t cable = live.plan().cables.size();
   for (const LiveModel::Applied& a : live.applied()) cable -= a.edit.kind == Kind::AddCable;
   for (const LiveModel::Applied& a : live.applied()) {
     const bool is_early = a.time <= 0;
     const char* later = "acts from a moment of the run on, which a plan cannot say";
     std::string why;
+    product::PlanChanges changes;
     switch (a.edit.kind) {
       case Kind::Fire:
       case Kind::SetDelay:
       case Kind::AddCharge:
       case Kind::RemoveCharge:
-        changes_charges = true;
+        if (!stages) stages = lay_out_stages(live);
+        changes.stages = stages;
         break;
       case Kind::AddPreCut:
         if (is_early)
@@ -114,17 +136,29 @@ BranchPlan write_branch_plan(const LiveModel& live) {
         break;
     }
     if (why.empty())
-      out.taken.push_back(a.text);
+      sayable.push_back({a.text, std::move(changes)});
     else
       out.left_out.push_back(a.text + ": " + why);
   }
-  if (out.taken.empty()) return out;
-  if (changes_charges) changes.stages = lay_out_stages(live);
+  if (sayable.empty()) return out;
+  product::PlanChanges all;
+  for (const Change& c : sayable) add_changes(c.changes, all);
   try {
-    out.text = product::write_changes(live.plan(), changes);
-  } catch (const InputError& e) {
-    for (const std::string& text : out.taken) out.left_out.push_back(text + ": " + e.diagnostics().front().message);
-    out.taken.clear();
+    out.text = product::write_changes(live.plan(), all);
+    for (const Change& c : sayable) out.taken.push_back(c.words);
+    return out;
+  } catch (const InputError&) {
+    // below, one after the other
+  }
+  product::PlanChanges kept;
+  for (const Change& c : sayable) {
+    product::PlanChanges tried = kept;
+    add_changes(c.changes, tried);
+    try {
+      out.text = product::write_changes(live.plan(), tried);
+      out.taken.push_back(c.words);
+      kept = std::move(tried);
+    } catch (const InputError& e) { out.left_out.push_back(c.words + ": " + find_error(e)); }
   }
   return out;
 }

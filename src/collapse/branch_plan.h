@@ -15,8 +15,9 @@ struct BranchPlan {
 };
 
 /// Times of charges, charges more and less are always in the text; pre-cuts, cables and friction if they were made at
-/// the very beginning: a plan knows no later moment for them. A charge that was taken out fails. Where the changed text
-/// would be no plan, all are left out. Firing times scatter anew.
+/// the very beginning: a plan knows no later moment for them. A charge that was taken out fails. An edit with which the
+/// text would be no plan is left out, with the first error as the reason; edits of charges are taken or left out
+/// together. Firing times scatter anew.
 BranchPlan write_branch_plan(const LiveModel&);
 
 }  // namespace topple::collapse

@@ -239,6 +239,15 @@ std::string LiveModel::add_charge(const Edit& e, double time, double next) {
         "E933",
         fmt::format("{} stands on a stump up to {:.3g} m, which cannot be cut while it runs", m.name, it->second),
         "write the charge into the plan and apply it");
+  constexpr double slack = 1e-9;  // round-off, as in plans [m]
+  for (const LiveCharge& c : charges_) {
+    const product::Charge& other = charge(c);
+    if (c.is_removed || other.member != index) continue;
+    if (std::abs(other.position - e.position) < 0.5 * (other.destroyed_length + e.destroyed_length) - slack)
+      refuse(fmt::format("has another charge on the same length, {:.3g} to {:.3g} m",
+                         other.position - 0.5 * other.destroyed_length, other.position + 0.5 * other.destroyed_length),
+             "take that one out first, or move this one away from it");
+  }
   const double t = e.time.value_or(next);
   demand(t > time, "the charge would have to fire in the past");
   size_t stage = 0;
@@ -329,6 +338,9 @@ std::string LiveModel::add_cable(const Edit& e) {
   demand(e.stiffness > 0 && std::isfinite(e.stiffness), "stiffness must be > 0 N/m");
   demand(e.pretension >= 0 && std::isfinite(e.pretension), "pretension must be >= 0 N");
   demand(e.strength >= 0, "strength must be >= 0 N; 0: it never breaks");
+  demand(e.strength == 0 || e.strength > e.pretension,
+         fmt::format("strength, {:g} N, must be above the pretension, {:g} N", e.strength, e.pretension),
+         "0: it never breaks");
   demand(is_finite(e.anchor), "anchor must be three numbers");
   product::Cable c;
   c.name = fmt::format("added {}", plan_.cables.size() + 1);

@@ -11,6 +11,7 @@
 #include "base/hash.h"
 #include "collapse/branch_plan.h"
 #include "collapse/edit_json.h"
+#include "product/document.h"
 #include "product/import.h"
 #include "product/templates.h"
 #include "record/page.h"
@@ -51,6 +52,32 @@ std::optional<int> read_id(const std::string& text) {
   const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), id);
   if (fault != std::errc() || end != text.data() + text.size() || id < 1) return std::nullopt;
   return id;
+}
+
+/// Lines before the first table, where the keys of the plan itself stand.
+std::string find_head(const std::string& text) {
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t word = text.find_first_not_of(" \t", at);
+    if (word != std::string::npos && text[word] == '[') return text.substr(0, at);
+    at = std::min(text.find('\n', at), text.size() - 1) + 1;
+  }
+  return text;
+}
+
+/// Of a plan that may have errors; empty: none that can be read.
+std::string read_title(std::string text) {
+  if (text.starts_with("\xEF\xBB\xBF")) text.erase(0, 3);
+  // the whole where a value of the head has lines that begin as tables do
+  for (const std::string& part : {find_head(text), text}) {
+    try {
+      const product::Node root = product::parse_document(part, "");
+      const product::Entry* title = root.find("title");
+      return title != nullptr && title->value.kind == product::Node::Kind::String ? title->value.text : "";
+    } catch (const InputError&) {
+      // no TOML
+    }
+  }
+  return {};
 }
 
 Reply make_nothing(const std::string& what) { return make_error_reply(404, "E903", what); }
@@ -171,9 +198,7 @@ Json Hub::list_plans() const {
   for (const fs::path& p : found) {
     std::string title;
     try {
-      const std::string text = read_file(p.string());
-      const std::size_t at = text.find("title = \"");
-      if (at != std::string::npos) title = text.substr(at + 9, text.find('"', at + 9) - at - 9);
+      title = read_title(read_file(p.string()));
     } catch (const std::exception&) { continue; }
     list.push_back({{"path", fs::relative(p, options_.plans, fault).string()}, {"title", title.substr(0, 200)}});
   }

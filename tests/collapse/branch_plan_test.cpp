@@ -171,5 +171,67 @@ TEST(BranchPlan, LeavesOutWhatWouldBeNoPlan) {
   EXPECT_EQ(write_branch_plan(edited(staged(), none)).taken.size(), 6U);
 }
 
+TEST(BranchPlan, LeavesOutTheEditThatAPlanRefusesAndSaysWhy) {
+  // a section that nothing has: its warning comes before the error
+  const product::Plan plan = staged(
+      "[section.spare]\nwidth = \"30 cm\"\nheight = \"40 cm\"\nconcrete = \"C25\"\nsteel = \"S\"\ncover = \"3 cm\"\n"
+      "ties = { diameter = \"8 mm\", spacing = \"20 cm\" }\nbars = { count_y = 2, count_z = 2, diameter = \"20 mm\" "
+      "}\n");
+  // plans have anchors within 10 km
+  const std::string far = R"({"command": "add_cable", "member": "C-A2-1", "position": 1.5, "anchor": [-20e3, 4, 0],
+                              "stiffness": 2e6, "strength": 9e5})",
+                    near = R"({"command": "add_cable", "member": "C-A2-1", "position": 1.5, "anchor": [-15, 4, 0],
+                               "stiffness": 2e6, "strength": 9e5})",
+                    delay = R"({"command": "set_delay", "stage": 1, "time": 0.5})";
+  const BranchPlan b = write_branch_plan(edited(plan, {{0, far}, {0, delay}, {0, near}}));
+  EXPECT_EQ(b.taken.size(), 2U);
+  ASSERT_EQ(b.left_out.size(), 1U);
+  EXPECT_THAT(b.left_out[0], HasSubstr("cable added 1"));
+  EXPECT_THAT(b.left_out[0], HasSubstr("anchor"));
+  const product::Plan again = read(b.text);
+  EXPECT_EQ(again.stages.at(1).time, 0.5);
+  ASSERT_EQ(again.cables.size(), 1U);
+  EXPECT_EQ(again.cables[0].anchor.x, -15);
+}
+
+/// What an edit at a time is refused for, or nothing.
+std::string code_of(LiveModel live, double time, const std::string& text) {
+  try {
+    (void)live.apply(read_edit(Json::parse(text)), time, time + 1e-3);
+    return {};
+  } catch (const InputError& e) { return e.diagnostics().front().code; }
+}
+
+TEST(LiveModel, RefusesAChargeOnTheLengthOfAnother) {
+  // both have 0.5 to 1.5 m; one of them fires, the other fails
+  const product::Plan plan =
+      read(house(charge("C-A*-0", "0.2 s") + charge("C-B1-0", "0.6 s") + charge("C-B2-0", "0.8 s", "fails = true")));
+  const auto add = [](const char* member, double position) {
+    return fmt::format(
+        R"({{"command": "add_charge", "member": "{}", "position": {}, "destroyed_length": 0.5, "time": 0.9}})", member,
+        position);
+  };
+  for (const char* member : {"C-A1-0", "C-B1-0", "C-B2-0"}) {
+    EXPECT_EQ(code_of(edited(plan, {}), 0.3, add(member, 1.7)), "E932") << member;
+    EXPECT_EQ(code_of(edited(plan, {}), 0.3, add(member, 1.75)), "") << member << ": they touch";
+  }
+  EXPECT_EQ(code_of(edited(plan, {{0.3, add("C-B3-0", 1)}}), 0.3, add("C-B3-0", 1.2)), "E932");
+  const std::string remove = R"({"command": "remove_charge", "charge": 3})";
+  EXPECT_EQ(code_of(edited(plan, {{0.3, remove}}), 0.3, add("C-B1-0", 1.7)), "");
+}
+
+TEST(LiveModel, RefusesACableThatItsPretensionWouldBreak) {
+  const product::Plan plan = staged();
+  const auto add = [](double strength) {
+    return fmt::format(R"({{"command": "add_cable", "member": "C-A2-1", "position": 1.5, "anchor": [-15, 4, 0],
+                          "stiffness": 2e6, "pretension": 5e4, "strength": {}}})",
+                       strength);
+  };
+  EXPECT_EQ(code_of(edited(plan, {}), 0, add(4e4)), "E912");
+  EXPECT_EQ(code_of(edited(plan, {}), 0, add(5e4)), "E912");
+  EXPECT_EQ(code_of(edited(plan, {}), 0, add(6e4)), "");
+  EXPECT_EQ(code_of(edited(plan, {}), 0, add(0)), "") << "never breaks";
+}
+
 }  // namespace
 }  // namespace topple::collapse

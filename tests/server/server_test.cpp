@@ -188,6 +188,38 @@ TEST_F(ServerTest, NoPathLeadsToFiles) {
   EXPECT_EQ(plans["plans"][0]["title"], "Test building");
 }
 
+TEST_F(ServerTest, ReadsTitlesAsTomlDoes) {
+  start(two_stages());
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"title=\"Mill\"", "Mill"},
+      {"title = 'Mill'", "Mill"},
+      {"title  =  \"Mill\"  # old\n[site]\n", "Mill"},
+      {"\"title\" = \"Mill\"", "Mill"},
+      {"\xEF\xBB\xBFtitle = \"Mill\"\r\n[site]\r\n", "Mill"},
+      {"# title = \"Old\"\ntitle = \"Mill\"", "Mill"},
+      {"# title = \"Old\"\n", ""},
+      {"subtitle = \"Old\"\n[site]\ntitle = \"Ground\"", ""},
+      {"title = \"The \\\"Old\\\" Mill\"", "The \"Old\" Mill"},
+      {"title = \"\"\"\nMill\"\"\"", "Mill"},
+      {"list = [\n[1],\n[2]]\ntitle = \"Mill\"", "Mill"},
+      {"title = \"Mill\"\n[site]\nfriction = \n", "Mill"},  // of a plan with errors
+      {"title = 3", ""},
+      {"title = \"Mill", ""},
+      {"", ""}};
+  for (std::size_t i = 0; i < cases.size(); ++i)
+    std::ofstream(folder_ / "plans" / ("case" + std::to_string(i) + ".toml"), std::ios::binary) << cases[i].first;
+  TestClient h(port());
+  const TestJson plans = h.get(at("/api/plans")).json();
+  ASSERT_EQ(plans["plans"].size(), cases.size() + 1);
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    const std::string name = "case" + std::to_string(i) + ".toml";
+    for (const auto& p : plans["plans"]) {
+      if (p["path"] != name) continue;
+      EXPECT_EQ(p["title"], cases[i].second) << cases[i].first;
+    }
+  }
+}
+
 TEST_F(ServerTest, ComparesABranchWithWhatItsParentLacks) {
   start(two_stages());
   const auto c = watcher();
