@@ -49,6 +49,9 @@ void demand(bool holds, const std::string& what, const std::string& help = {}) {
 
 bool is_share(double x) { return x >= 0 && x <= 1; }
 
+/// Whether what is due at t lies behind a time of a run; what is due at the start does not before the first step.
+bool is_past(double t, double time) { return time > 0 ? t <= time : t < time; }
+
 /// A time with no more digits than it needs.
 std::string words_of_time(double t) { return fmt::format("{:.6g} s", t); }
 
@@ -121,12 +124,16 @@ int LiveModel::member_named(const std::string& name) const {
   throw InputError("E920", "there is no member \"" + name + "\"", near.empty() ? "" : "did you mean \"" + near + "\"?");
 }
 
+bool LiveModel::has_fired(const LiveCharge& c, double time) {
+  return is_past(c.time, time) && !c.fails && !c.is_removed;
+}
+
 LiveCharge& LiveModel::unfired(int charge, double time) {
   if (charge < 0 || charge >= static_cast<int>(charges_.size()))
     throw InputError("E920", fmt::format("there is no charge {}; there are {}", charge, charges_.size()));
   LiveCharge& c = charges_[static_cast<size_t>(charge)];
   if (c.is_removed) throw InputError("E931", "the charge on " + member_of(c) + " is taken out");
-  if (c.time <= time && !c.fails)
+  if (has_fired(c, time))
     throw InputError("E931", fmt::format("the charge on {} has fired at {}", member_of(c), words_of_time(c.time)),
                      "rewind to a time before that");
   return c;
@@ -179,7 +186,7 @@ std::string LiveModel::set_delay(const Edit& e, double time) {
   const auto check = [&](double t, const std::string& what) {
     demand(std::isfinite(t) && t >= 0, what + " must be a number from 0 on");
     demand(
-        t > time,
+        !is_past(t, time),
         fmt::format("{} would have to fire at {}, and it is {} already", what, words_of_time(t), words_of_time(time)),
         "fire it now, or rewind");
   };
@@ -204,7 +211,7 @@ std::string LiveModel::set_delay(const Edit& e, double time) {
   check(t, stage.name);
   int moved = 0;
   for (LiveCharge& c : charges_) {
-    if (c.stage != e.stage || c.is_removed || c.time <= time) continue;
+    if (c.stage != e.stage || c.is_removed || is_past(c.time, time)) continue;
     c.time = std::max(t, t + (c.time - stage.time));
     ++moved;
   }
@@ -249,7 +256,7 @@ std::string LiveModel::add_charge(const Edit& e, double time, double next) {
              "take that one out first, or move this one away from it");
   }
   const double t = e.time.value_or(next);
-  demand(t > time, "the charge would have to fire in the past");
+  demand(!is_past(t, time), "the charge would have to fire in the past");
   size_t stage = 0;
   if (plan_.stages.empty()) plan_.stages.push_back({"added", t, {}, {}});
   for (size_t s = 0; s < plan_.stages.size(); ++s)
@@ -295,11 +302,10 @@ std::string LiveModel::add_pre_cut(const Edit& e, double time) {
   demand(e.position >= 0 && e.position <= length, fmt::format("{}: at must be 0 to {:.3g} m", m.name, length));
   const size_t which = std::abs(e.position - z.station[1].at) < std::abs(e.position - z.station[0].at) ? 1 : 0;
   const int element = z.element[which];
-  if (element >= 0 && map_.elements[static_cast<size_t>(element)].firing_time <= time)
+  if (element >= 0 && is_past(map_.elements[static_cast<size_t>(element)].firing_time, time))
     refuse("its charge has fired there");
   for (const LiveCharge& c : charges_)
-    if (charge(c).member == index && c.time <= time && !c.fails && !c.is_removed)
-      refuse("its charge has fired already");
+    if (charge(c).member == index && has_fired(c, time)) refuse("its charge has fired already");
   m.weakenings.push_back({e.position, e.cut_bars, e.cut_concrete});
 
   Builder builder(std::move(built_), plan_, *k_, map_);

@@ -37,6 +37,8 @@ class LiveModel {
   const std::string& member_of(const LiveCharge& c) const {
     return plan_.members[static_cast<size_t>(charge(c).member)].name;
   }
+  /// Whether it has fired at a time of a run. At the start nothing has: what is due then fires with the first step.
+  static bool has_fired(const LiveCharge&, double time);
   /// The edits, in their order.
   struct Applied {
     Edit edit;
@@ -49,6 +51,7 @@ class LiveModel {
   int law_of_zone(size_t zone) const;
 
   /// Makes an edit at a time of the run and says it in words.
+  ///   time  at 0, before the first step, what is due at the start can be changed too; the run must then begin anew [s]
   ///   next  time of the step after it, when what is to happen now happens [s]
   /// Throws InputError E912, E931, E932, E933; the model may then be used no longer.
   std::string apply(const Edit&, double time, double next);

@@ -14,6 +14,19 @@ namespace {
 
 constexpr size_t kLongestName = 80;
 
+void tell_edit(const Edit& e, const std::string& text, double time, LiveRun& run) {
+  run.tell({time, "edit", e.member.empty() ? e.cable : e.member, text});
+}
+
+/// Whether an edit changes what the first evaluation of forces has acted upon already, before the first step.
+bool changes_start(const Edit& e, const mbs::Moment& moment, const mbs::Model& model) {
+  if (moment.steps > 0) return false;
+  using Kind = Edit::Kind;
+  if (e.kind == Kind::AddCable || e.kind == Kind::RemoveCable || e.kind == Kind::SetFriction) return false;
+  const auto is_due = [&](const mbs::Event& event) { return event.time <= moment.time; };
+  return !moment.fired.empty() || std::any_of(model.events.begin(), model.events.end(), is_due);
+}
+
 }  // namespace
 
 size_t Branch::frames() const {
@@ -223,8 +236,8 @@ Steering::Made Steering::edit(const Edit& e, const std::string& name, bool in_pl
   const Piece& last = base.back();
   const bool stays = cursor_.is_live && (in_place || last.run->steps() == last.run->start_steps());
   const std::string new_name = stays ? from.name : free_name(name);
-  if (base.size() >= options_.most_edits)
-    throw InputError("E905", fmt::format("the branch has {} edits, which is the limit", base.size()));
+  if (const size_t edits = std::max(base.size(), last.run->model().applied().size()); edits >= options_.most_edits)
+    throw InputError("E905", fmt::format("the branch has {} edits, which is the limit", edits));
 
   const mbs::Moment moment = last.run->moment_at(last.step);
   auto model = std::make_shared<LiveModel>(last.run->model());
@@ -232,10 +245,21 @@ Steering::Made Steering::edit(const Edit& e, const std::string& name, bool in_pl
   made.text = model->apply(e, moment.time, moment.next_time);
   made.time = moment.time;
   made.step = moment.steps;
-  auto run = std::make_shared<LiveRun>(std::move(model), options_.run, options_.moment_interval, moment, true,
-                                       last.run->recorder());
+  const bool is_anew = changes_start(e, moment, model->model());
+  std::shared_ptr<LiveRun> run;
+  if (is_anew) {
+    run = std::make_shared<LiveRun>(std::move(model), options_.run, options_.moment_interval);
+    if (!run->begin()) throw InputError("E932", made.text + ": " + run->summary().message);
+    // those before it were told by runs that the branch has no more
+    const std::vector<LiveModel::Applied>& applied = run->model().applied();
+    for (size_t i = 0; i + 1 < applied.size(); ++i) tell_edit(applied[i].edit, applied[i].text, applied[i].time, *run);
+  } else {
+    run = std::make_shared<LiveRun>(std::move(model), options_.run, options_.moment_interval, moment, true,
+                                    last.run->recorder());
+  }
   const EditEntry entry{e, made.text, made.time, !stays, base};
-  std::vector<Piece> pieces = base;
+  std::vector<Piece> pieces;
+  if (!is_anew) pieces = base;
   pieces.push_back({run, 0, 0, 0});
   if (stays) {
     from.run().rest();
@@ -255,7 +279,7 @@ Steering::Made Steering::edit(const Edit& e, const std::string& name, bool in_pl
     b.sample = from.sample;
     made.branch = &add_branch(std::move(b));
   }
-  run->tell({made.time, "edit", e.member.empty() ? e.cable : e.member, made.text});
+  tell_edit(e, made.text, made.time, *run);
   if (stays && callbacks_.on_branch) callbacks_.on_branch(from);
   return made;
 }

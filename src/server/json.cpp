@@ -88,7 +88,7 @@ Json describe_branch(const collapse::Steering& s, const Branch& b, const std::st
                        {"destroyed_length", p.destroyed_length},
                        {"residual_bars", p.residual_bars},
                        {"time", c.time},
-                       {"fired", c.time <= now && !c.fails && !c.is_removed},
+                       {"fired", collapse::LiveModel::has_fired(c, now)},
                        {"fails", c.fails},
                        {"removed", c.is_removed}});
   }

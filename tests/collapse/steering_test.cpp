@@ -163,6 +163,108 @@ TEST(SteeringReplay, ThePastTakesAnEditAsTheFrontierDid) {
   expect_same_words(a, b);
 }
 
+/// Columns of row A go at once, those of B at a time.
+product::Plan at_once(const std::string& first = "0 s") {
+  return read(house(charge("C-A*-0", first, "") + charge("C-B*-0", "0.6 s", "")));
+}
+
+size_t count_fired(const record::Record& r, double until) {
+  return static_cast<size_t>(std::count_if(r.events.begin(), r.events.end(), [&](const record::Event& e) {
+    return e.kind == "charge" && e.text.find(" fired, ") != std::string::npos && e.time <= until;
+  }));
+}
+
+TEST(SteeringReplay, WithoutAnEditIsTheRunOfAPlanThatFiresAtOnce) {
+  RunOptions run;
+  run.program_version = "test";
+  const record::Record whole = run_plan(at_once(), default_knowledge(), run, {});
+  Steering s(default_knowledge(), options());
+  ASSERT_TRUE(s.begin(s.add_root(at_once(), "main")));
+  advance_until(s, 10);
+  const record::Record steered = s.make_record(s.active());
+  expect_same_motion(whole, steered);
+  expect_same_words(whole, steered);
+}
+
+TEST(SteeringReplay, WhatFiresAtOnceCanBeMovedBeforeTheFirstStep) {
+  Steering s(default_knowledge(), options());
+  ASSERT_TRUE(s.begin(s.add_root(at_once(), "main")));
+  for (const LiveCharge& c : s.active().run().model().charges()) EXPECT_FALSE(LiveModel::has_fired(c, 0));
+  EXPECT_EQ(s.edit(delay_of_stage(0, 0.2)).branch->id, 1);
+  EXPECT_EQ(s.active().frames(), 1U);
+  advance_until(s, 0.1);
+  EXPECT_EQ(count_fired(s.make_record(s.active()), 0.19), 0U);
+  for (const LiveCharge& c : s.active().run().model().charges()) EXPECT_FALSE(LiveModel::has_fired(c, 0.1));
+  advance_until(s, 10);
+  // to the bit what the plan that says so does
+  Steering other(default_knowledge(), options());
+  ASSERT_TRUE(other.begin(other.add_root(at_once("0.2 s"), "main")));
+  advance_until(other, 10);
+  const record::Record a = s.make_record(s.active());
+  expect_same_motion(a, other.make_record(other.active()));
+  EXPECT_EQ(count_fired(a, 10), 6U);
+  // and what is done from the past
+  s.rewind(0);
+  const Steering::Made back = s.edit(delay_of_stage(0, 0));
+  EXPECT_EQ(back.branch->id, 2);
+  advance_until(s, 10);
+  Steering plain(default_knowledge(), options());
+  ASSERT_TRUE(plain.begin(plain.add_root(at_once(), "main")));
+  advance_until(plain, 10);
+  expect_same_motion(s.make_record(s.active()), plain.make_record(plain.active()));
+}
+
+TEST(SteeringReplay, WhatFiresAtOnceCanBeTakenOutBeforeTheFirstStep) {
+  Steering s(default_knowledge(), options());
+  ASSERT_TRUE(s.begin(s.add_root(at_once(), "main")));
+  Edit out;
+  out.kind = Edit::Kind::RemoveCharge;
+  for (out.charge = 0; out.charge < 3; ++out.charge) s.edit(out);
+  EXPECT_EQ(s.active().edits.size(), 3U);
+  advance_until(s, 0.5);
+  const record::Record r = s.make_record(s.active());
+  EXPECT_EQ(count_fired(r, 0.5), 0U);
+  EXPECT_EQ(std::count_if(r.events.begin(), r.events.end(), [](const record::Event& e) { return e.kind == "edit"; }),
+            3);
+  EXPECT_EQ(std::count(r.zone_state.begin(), r.zone_state.end(), static_cast<std::uint8_t>(record::ZoneState::Fired)),
+            0);
+  // nothing has fallen: less than a millimetre
+  const size_t stride = 3 * r.bodies.size(), last = r.position.size() - stride;
+  for (size_t b = 0; b < r.bodies.size(); ++b)
+    EXPECT_NEAR(r.position[last + 3 * b + 2], r.position[3 * b + 2], 1e-3) << r.bodies[b].name;
+}
+
+TEST(ActionLogReplay, EditsBeforeTheFirstStepGiveTheSameBits) {
+  LoggedSteering first(at_once(), default_knowledge(), options(), {}, "");
+  Steering& s = first.steering();
+  ASSERT_TRUE(s.begin(s.active()));
+  first.perform(Json::parse(R"({"command": "set_delay", "stage": 0, "time": 0.2})"));
+  first.perform(Json::parse(R"({"command": "remove_charge", "charge": 0})"));
+  advance_until(s, 0.7);
+  first.note_reached();
+  std::string log;
+  for (const std::string& line : first.lines()) log += line + "\n";
+  const ReplayResult again = replay(log, "log", default_knowledge(), options(), {});
+  Steering& t = again.steering->steering();
+  EXPECT_EQ(t.active().steps(), s.active().steps());
+  for (Steering* both : {&s, &t}) advance_until(*both, 10);
+  const record::Record a = s.make_record(s.active()), b = t.make_record(t.active());
+  expect_same_motion(a, b);
+  expect_same_words(a, b);
+}
+
+TEST(Steering, WhatFiresAtOnceIsTooLateToChangeAfterTheFirstStep) {
+  Steering s(default_knowledge(), options());
+  ASSERT_TRUE(s.begin(s.add_root(at_once(), "main")));
+  s.edit(delay_of_stage(0, 0.2));
+  s.undo();
+  EXPECT_EQ(s.active().run().model().charges().front().time, 0) << "taken back";
+  ASSERT_TRUE(s.advance());
+  EXPECT_THROW(s.edit(delay_of_stage(0, 0.2)), InputError);
+  for (const LiveCharge& c : s.active().run().model().charges())
+    EXPECT_EQ(LiveModel::has_fired(c, s.active().frontier()), c.stage == 0);
+}
+
 TEST(Steering, AnEditAtTheStartGivesThePlanThatHasIt) {
   Steering s(default_knowledge(), options());
   ASSERT_TRUE(s.begin(s.add_root(two_stages(), "main")));

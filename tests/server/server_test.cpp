@@ -188,6 +188,26 @@ TEST_F(ServerTest, NoPathLeadsToFiles) {
   EXPECT_EQ(plans["plans"][0]["title"], "Test building");
 }
 
+TEST_F(ServerTest, WhatFiresAtOnceCanBeMovedBeforeTheFirstStep) {
+  start(collapse::house(collapse::charge("C-A*-0", "0 s", "") + collapse::charge("C-B*-0", "0.6 s", "")));
+  const auto c = watcher();
+  const auto fired = [&] {
+    int n = 0;
+    TestClient h(port());
+    const TestJson session = h.get(at("/api/sessions/1")).json();
+    EXPECT_EQ(session["branches"][0]["charges"].size(), 6U);
+    for (const TestJson& charge : session["branches"][0]["charges"]) n += charge["fired"].get<bool>();
+    return n;
+  };
+  EXPECT_EQ(fired(), 0);
+  EXPECT_EQ(c->result("set_delay", {{"stage", 0}, {"time", 0.2}})["branch"], 1);
+  EXPECT_EQ(c->result("remove_charge", {{"charge", 0}})["branch"], 1);
+  EXPECT_EQ(fired(), 0);
+  c->result("run", {{"until", 0.3}});
+  c->wait_for([](const TestJson& j) { return j["type"] == "state" && j["phase"] == "paused" && j["time"] > 0.2; });
+  EXPECT_EQ(fired(), 2);
+}
+
 TEST_F(ServerTest, ReadsTitlesAsTomlDoes) {
   start(two_stages());
   const std::vector<std::pair<std::string, std::string>> cases = {
