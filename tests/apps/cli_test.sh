@@ -386,8 +386,8 @@ rcc)
   is_json a/b/rcc.json; lacks a/b/rcc.html "http"; has a/b/rcc.html "Not modelled"
   expect 0 "$topple" rcc "$zone" --normal-force "3.7 MN" --normal-force 0 --json; is_json out; has err "residual"
   cmp out a/b/rcc.json || failures=$((failures + 1))
-  expect 0 "$topple" rcc "$zone" --normal-force "20 MN"; has out "cannot be carried: the section crushes at 8.91 MN"
-  expect 0 "$topple" rcc "$zone" --normal-force "-9 MN"; has out "cannot be carried: the section tears at 3.2 MN"
+  expect 0 "$topple" rcc "$zone" --normal-force "20 MN"; has out "cannot be carried: strained evenly the section crushes at 8.91 MN"
+  expect 0 "$topple" rcc "$zone" --normal-force "-9 MN"; has out "cannot be carried: strained evenly the section tears at 3.2 MN"
   expect 2 "$topple" rcc "$zone" --normal-force "3 apples"; has err "--normal-force"; has err "units: N, kN, MN"
   expect 2 "$topple" rcc "$zone" --zone top; expect 2 "$topple" rcc "$zone" --zone middle --member C-A1-0
   # mistakes stand at their places
