@@ -425,7 +425,10 @@ void add_events(const Context& c) {
       fmt::format("{} charges, {} zones yielded, {} broke, {} joints came off, {} parts touched the ground.",
                   n["charge"], n["yield"], n["rupture"], n["release"], n["touchdown"]);
   if (has_late)
-    text += fmt::format(" {} had not fired when the run ended.", count_words(late, "", "charge", "charges"));
+    text +=
+        " " +
+        count_words(late, "", "charge had not fired when the run ended", "charges had not fired when the run ended") +
+        ".";
   c.add("events", "Events", "Events", text, static_cast<double>(c.r.events.size()), "1",
         has_late ? Status::Warning : Status::Info);
   size_t i = 0;

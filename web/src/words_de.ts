@@ -369,10 +369,13 @@ export const german: readonly (readonly [string, string])[] = [
   // what cannot be built of a plan
   ["must go from one grid line to the next", "muss von einer Rasterlinie zur nächsten gehen"],
   ["needs a section with reinforcement", "braucht einen Querschnitt mit Bewehrung"],
+  ["{n}: stands where others stand: {*}", "{}: steht, wo andere stehen: {}"],
   ["stands in the same place as {n}", "steht am selben Ort wie {}"],
   ["has a charge but was taken out before", "hat eine Ladung, wurde aber vorher herausgenommen"],
   ["charges act on columns and beams only", "Ladungen wirken nur auf Stützen und Balken"],
   ["no clear height is left below its beams", "unter seinen Balken bleibt keine lichte Höhe"],
+  ["{n} and {:d} more: a charge lies in the joint above the clear height of {:f} m", "{} und {} weitere: eine Ladung liegt im Knoten über der lichten Höhe von {} m"],
+  ["place it lower", "weiter unten anordnen"],
   ["a charge lies in the joint above the clear height of {:f} m", "eine Ladung liegt im Knoten über der lichten Höhe von {} m"],
   ["no clear length is left between its columns", "zwischen seinen Stützen bleibt keine lichte Länge"],
   ["no clear span is left between its columns", "zwischen seinen Stützen bleibt keine lichte Weite"],
