@@ -73,17 +73,23 @@ double largest_residual(const record::Record& r, double until) {
   return residual / released;
 }
 
+/// Columns of row A go at once, those of B at a time.
+product::Plan at_once(const std::string& first = "0 s") {
+  return read(house(charge("C-A*-0", first, "") + charge("C-B*-0", "0.6 s", "")));
+}
+
 TEST(SteeringReplay, WithoutAnEditIsTheRunOfThePlan) {
-  const product::Plan plan = two_stages();
-  RunOptions run;
-  run.program_version = "test";
-  const record::Record whole = run_plan(plan, default_knowledge(), run, {});
-  Steering s(default_knowledge(), options());
-  ASSERT_TRUE(s.begin(s.add_root(plan, "main")));
-  advance_until(s, 10);
-  const record::Record steered = s.make_record(s.active());
-  expect_same_motion(whole, steered);
-  expect_same_words(whole, steered);
+  for (const product::Plan& plan : {two_stages(), at_once()}) {
+    RunOptions run;
+    run.program_version = "test";
+    const record::Record whole = run_plan(plan, default_knowledge(), run, {});
+    Steering s(default_knowledge(), options());
+    ASSERT_TRUE(s.begin(s.add_root(plan, "main")));
+    advance_until(s, 10);
+    const record::Record steered = s.make_record(s.active());
+    expect_same_motion(whole, steered);
+    expect_same_words(whole, steered);
+  }
 }
 
 TEST(SteeringReplay, ABranchWithoutAnEditGoesOnWithTheSameBits) {
@@ -163,27 +169,10 @@ TEST(SteeringReplay, ThePastTakesAnEditAsTheFrontierDid) {
   expect_same_words(a, b);
 }
 
-/// Columns of row A go at once, those of B at a time.
-product::Plan at_once(const std::string& first = "0 s") {
-  return read(house(charge("C-A*-0", first, "") + charge("C-B*-0", "0.6 s", "")));
-}
-
 size_t count_fired(const record::Record& r, double until) {
   return static_cast<size_t>(std::count_if(r.events.begin(), r.events.end(), [&](const record::Event& e) {
     return e.kind == "charge" && e.text.find(" fired, ") != std::string::npos && e.time <= until;
   }));
-}
-
-TEST(SteeringReplay, WithoutAnEditIsTheRunOfAPlanThatFiresAtOnce) {
-  RunOptions run;
-  run.program_version = "test";
-  const record::Record whole = run_plan(at_once(), default_knowledge(), run, {});
-  Steering s(default_knowledge(), options());
-  ASSERT_TRUE(s.begin(s.add_root(at_once(), "main")));
-  advance_until(s, 10);
-  const record::Record steered = s.make_record(s.active());
-  expect_same_motion(whole, steered);
-  expect_same_words(whole, steered);
 }
 
 TEST(SteeringReplay, WhatFiresAtOnceCanBeMovedBeforeTheFirstStep) {
