@@ -63,7 +63,7 @@ struct Model {
               out[i] = one(to_zone(product::make_sample(section, file, batch[i])));
             } catch (const InputError& e) {
               out[i].state = Result::State::Failed;
-              out[i].text = e.diagnostics().front().message;
+              out[i].text = e.first_error().message;
             }
           },
           &cancel);

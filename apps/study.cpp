@@ -80,7 +80,7 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
                          [&](const StudyState& s) { line.say(describe_state(problem, s)); });
   } catch (const InputError& e) {
     line.clear();
-    const std::string& code = e.diagnostics().front().code;
+    const std::string& code = e.first_error().code;
     const std::string model = study::calc_model_hash(problem);
     if (code == "E823" || code == "E824" || code == "E827") {
       const auto refusal = study::Store(place.store).find_refusal(model);

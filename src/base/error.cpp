@@ -38,6 +38,12 @@ InputError::InputError(std::vector<Diagnostic> diagnostics)
 InputError::InputError(std::string code, std::string message, std::string help)
     : InputError({Diagnostic{Severity::Error, std::move(code), {}, 1, std::move(message), std::move(help)}}) {}
 
+const Diagnostic& InputError::first_error() const {
+  const auto error = std::find_if(diagnostics_.begin(), diagnostics_.end(),
+                                  [](const Diagnostic& d) { return d.severity == Severity::Error; });
+  return error == diagnostics_.end() ? diagnostics_.front() : *error;
+}
+
 std::string render(const Diagnostic& d, const std::string& text, bool colour) {
   const bool error = d.severity == Severity::Error;
   const char* bold = colour ? "\x1b[1m" : "";

@@ -33,6 +33,8 @@ class InputError : public std::runtime_error {
   /// One complaint without a position.
   InputError(std::string code, std::string message, std::string help = {});
   const std::vector<Diagnostic>& diagnostics() const { return diagnostics_; }
+  /// What the input is refused for; warnings may stand before it.
+  const Diagnostic& first_error() const;
 
  private:
   std::vector<Diagnostic> diagnostics_;

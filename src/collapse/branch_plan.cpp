@@ -65,14 +65,6 @@ std::vector<product::Stage> lay_out_stages(const LiveModel& live) {
   return stages;
 }
 
-/// What a text that is no plan is refused for; warnings may stand before it.
-std::string find_error(const InputError& e) {
-  const std::vector<Diagnostic>& all = e.diagnostics();
-  const auto error =
-      std::find_if(all.begin(), all.end(), [](const Diagnostic& d) { return d.severity == Severity::Error; });
-  return (error == all.end() ? all.front() : *error).message;
-}
-
 void add_changes(const product::PlanChanges& more, product::PlanChanges& changes) {
   if (more.stages) changes.stages = more.stages;
   if (more.friction) changes.friction = more.friction;
@@ -158,7 +150,7 @@ BranchPlan write_branch_plan(const LiveModel& live) {
       out.text = product::write_changes(live.plan(), tried);
       out.taken.push_back(c.words);
       kept = std::move(tried);
-    } catch (const InputError& e) { out.left_out.push_back(c.words + ": " + find_error(e)); }
+    } catch (const InputError& e) { out.left_out.push_back(c.words + ": " + e.first_error().message); }
   }
   return out;
 }

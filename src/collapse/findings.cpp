@@ -501,19 +501,26 @@ void add_verification(const Context& c) {
   const double scale = c.map.moving_mass * norm(c.model.gravity) * std::max(c.map.ground_storey_height, 1.0);
   const bool negligible =
       residual <= 1e-5 * scale;  // as if the building were lifted by some hundredths of a millimetre
-  c.add("verification.energy", "Verification", "Energy balance",
-        negligible
-            ? fmt::format(
-                  "The largest error of the energy balance is {:.1e} J, the work of lifting the building by {:.2g} mm.",
-                  residual, residual / (c.map.moving_mass * norm(c.model.gravity)) * 1e3)
-            : fmt::format("The largest error of the energy balance is {:.2g} % of the released potential energy "
-                          "(accepted: {:.2g} %){}.",
-                          100 * s.energy_error, 100 * c.k.verification_energy_error,
-                          s.energy_error > c.k.verification_energy_error
-                              ? fmt::format("; a step of {:.2g} ms shows whether it is the step's", s.step * 500)
-                              : ""),
-        negligible ? 0 : s.energy_error, "1",
-        negligible || s.energy_error <= c.k.verification_energy_error ? Status::Good : Status::Bad);
+  const auto add_balance = [&c](const std::string& text, double error, Status status) {
+    c.add("verification.energy", "Verification", "Energy balance", text, error, std::isnan(error) ? "" : "1", status);
+  };
+  if (s.ending == mbs::Summary::Ending::Diverged)
+    add_balance(fmt::format("The computation failed at {:.3f} s; the balance says nothing about that.", s.time), kNone,
+                Status::Bad);
+  else if (negligible)
+    add_balance(
+        fmt::format(
+            "The largest error of the energy balance is {:.1e} J, the work of lifting the building by {:.2g} mm.",
+            residual, residual / (c.map.moving_mass * norm(c.model.gravity)) * 1e3),
+        0, Status::Good);
+  else
+    add_balance(fmt::format("The largest error of the energy balance is {:.2g} % of the released potential energy "
+                            "(accepted: {:.2g} %){}.",
+                            100 * s.energy_error, 100 * c.k.verification_energy_error,
+                            s.energy_error > c.k.verification_energy_error
+                                ? fmt::format("; a step of {:.2g} ms shows whether it is the step's", s.step * 500)
+                                : ""),
+                s.energy_error, s.energy_error <= c.k.verification_energy_error ? Status::Good : Status::Bad);
   const double reaction = c.recorder.start_reaction_error();
   // charges that fire at the very beginning are already at work in the first frame
   const bool early = !c.map.events.empty() && c.model.events.front().time <= 0;

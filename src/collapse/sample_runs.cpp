@@ -187,7 +187,7 @@ std::vector<SampleRun> run_samples(std::span<const product::Plan> plans, const K
   const auto fail = [&out](size_t i, const std::exception& e) {
     const auto* input = dynamic_cast<const InputError*>(&e);
     out[i].state = SampleRun::State::Failed;
-    out[i].text = input ? input->diagnostics().front().message : e.what();
+    out[i].text = input ? input->first_error().message : e.what();
   };
   const auto make = [&](size_t i) -> std::unique_ptr<Sample> {
     const double begin = now();

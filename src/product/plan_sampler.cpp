@@ -96,7 +96,7 @@ void try_samples(const Plan& plan, const Node& document, Complaints& complaints)
     try {
       read_sample(fuzzy, document, plan.path, point);
       return {};
-    } catch (const InputError& e) { return e.diagnostics().front().message; }
+    } catch (const InputError& e) { return e.first_error().message; }
   };
   const auto place_of = [](const FuzzyValue& v) {
     return Place{v.where.line, v.where.column, static_cast<int>(v.name.size())};

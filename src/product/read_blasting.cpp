@@ -76,7 +76,9 @@ class Blasting {
       for (const Fired& other : fired_[static_cast<size_t>(index)]) {
         if (!(low < other.high - slack && other.low < high - slack) || is_overlapping) continue;
         const double apart = std::abs(std::remainder(other.azimuth - charge.azimuth, 2 * pi));
-        if (m.kind == MemberKind::Shaft && apart >= 0.5 * (other.opening + charge.opening) - 1e-9) {
+        const double least = 0.5 * (other.opening + charge.opening);
+        if (std::isnan(apart - least)) continue;  // complained of
+        if (m.kind == MemberKind::Shaft && apart >= least - 1e-9) {
           if (std::abs(low - other.low) < slack && std::abs(high - other.high) < slack) continue;
           is_overlapping = true;
           table.error("E404", table.place_of("position"),

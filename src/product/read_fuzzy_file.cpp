@@ -178,7 +178,7 @@ void Reader::try_samples(std::vector<Diagnostic>& warnings) {
     try {
       make_sample(section, out, point);
       return {};
-    } catch (const InputError& e) { return e.diagnostics().front().message; }
+    } catch (const InputError& e) { return e.first_error().message; }
   };
   if (const std::string why = refusal(centre_of(out.inputs)); !why.empty())
     complaints.error("E207", {}, "the section is refused in the middle of the fuzzy inputs: " + why);

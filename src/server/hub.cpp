@@ -630,8 +630,8 @@ void Hub::get(const std::string& path, std::function<void(Reply)> answer) {
       try {
         answer(make(s));
       } catch (const InputError& e) {
-        const std::string& code = e.diagnostics().front().code;
-        answer(make_error_reply(code == "E920" ? 404 : 409, code, e.diagnostics().front().message));
+        const std::string& code = e.first_error().code;
+        answer(make_error_reply(code == "E920" ? 404 : 409, code, e.first_error().message));
       }
     });
   };
@@ -670,8 +670,8 @@ void Hub::get(const std::string& path, std::function<void(Reply)> answer) {
     RecordRequest request;
     request.branches = {b};
     request.refuse = [answer](const InputError& e) {
-      const std::string& code = e.diagnostics().front().code;
-      answer(make_error_reply(code == "E920" ? 404 : 409, code, e.diagnostics().front().message));
+      const std::string& code = e.first_error().code;
+      answer(make_error_reply(code == "E920" ? 404 : 409, code, e.first_error().message));
     };
     request.use = [this, what, answer](const JudgedBranches& judged) {
       run_errand([this, judged, what, answer] {

@@ -35,7 +35,7 @@ Json make_ack(std::int64_t id, Json result) { return {{"type", "ack"}, {"id", id
 Json make_error(Json id, Json error) { return {{"type", "error"}, {"id", std::move(id)}, {"error", std::move(error)}}; }
 
 Json describe_error(const InputError& e) {
-  const Diagnostic& d = e.diagnostics().front();
+  const Diagnostic& d = e.first_error();
   return {{"code", d.code},
           {"message", d.message},
           {"help", d.help},

@@ -521,13 +521,13 @@ void Session::work() {
     if (plan_.goes_on && earlier_) {
       try {
         (void)go_on_from_log(Json::object());
-      } catch (const InputError& e) { diagnostics_.push_back(e.diagnostics().front()); }
+      } catch (const InputError& e) { diagnostics_.push_back(e.first_error()); }
     }
   } catch (const InputError& e) {
     steering_.reset();
     phase_ = Phase::Failed;
     failure_kind_ = "plan";
-    failure_ = e.diagnostics().front().message;
+    failure_ = e.first_error().message;
     diagnostics_ = e.diagnostics();
     publish_state(true);
   } catch (const std::exception& e) {

@@ -200,7 +200,7 @@ void PlanMapping::Impl::evaluate_chunk(std::span<const Point> points, std::span<
       index.push_back(i);
     } catch (const InputError& e) {
       out[i].state = Result::State::Failed;
-      out[i].text = e.diagnostics().front().message;
+      out[i].text = e.first_error().message;
     }
   }
   spent.plans += now() - begin;

@@ -90,6 +90,13 @@ TEST(InputErrorTest, CarriesEveryComplaint) {
   EXPECT_THAT(error.what(), HasSubstr("E204"));
 }
 
+TEST(InputErrorTest, OffersItsFirstErrorAndNoWarning) {
+  Diagnostic warning = sample(), second = sample();
+  warning.severity = Severity::Warning, warning.code = "W510";
+  second.code = "E204";
+  EXPECT_EQ(InputError({warning, second, sample()}).first_error().code, "E204");
+}
+
 TEST(InputErrorTest, MayHaveNoPlace) {
   const InputError error("E701", "cannot read x", "check it");
   ASSERT_EQ(error.diagnostics().size(), 1u);

@@ -50,6 +50,16 @@ TEST(Run, ARecordIsWhole) {
   EXPECT_LT(r.provenance.step, 1e-3);
 }
 
+TEST(Run, WhatFailedIsNotVerifiedByItsBalance) {
+  RunOptions o;
+  o.step = 0.02;
+  const record::Record r = run_plan(read(house(charge("C-A*-0", "0.1 s"), "0.5 s")), default_knowledge(), o, {});
+  EXPECT_EQ(r.ending, "failed");
+  const record::Finding& balance = finding(r, "verification.energy");
+  EXPECT_EQ(balance.status, record::Status::Bad);
+  EXPECT_TRUE(std::isnan(balance.value));
+}
+
 TEST(Run, FindingsComeInTheOrderOfTheirWeight) {
   const record::Record r = run_plan(read(house(charge("C-A*-0", "0.1 s"), "0.5 s")), default_knowledge(), {}, {});
   std::vector<std::string> headings;

@@ -86,6 +86,9 @@ TEST(Shafts, MistakesAreComplaints) {
       "[[stage.charge]]\nmembers = \"stack\"\nposition = \"2 m\"\ndestroyed_length = \"1.5 m\"\nazimuth = \"0 deg\"\n";
   EXPECT_EQ(codes_of(with("[analysis]", (second + "opening = \"90 deg\"\n[analysis]").c_str())), "");
   EXPECT_EQ(codes_of(with("[analysis]", (second + "opening = \"190 deg\"\n[analysis]").c_str())), "E404");
+  // nothing false beside what is wrong
+  const std::string wrong = replaced(second, "0 deg", "400 deg") + "opening = \"90 deg\"\n";
+  EXPECT_EQ(codes_of(with("[analysis]", (wrong + "[analysis]").c_str())), "E205");
 }
 
 TEST(Shafts, SectorsBelongToShafts) {

@@ -159,6 +159,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["There is no equilibrium under dead load before the first charge: {*}.", "Vor der ersten Ladung gibt es kein Gleichgewicht unter Eigengewicht: {}."],
   ["There is no equilibrium under dead load before the first charge: {}.", "Vor der ersten Ladung gibt es kein Gleichgewicht unter Eigengewicht: {}."],
   ["There is no equilibrium under dead load: {*}.", "Es gibt kein Gleichgewicht unter Eigengewicht: {}."],
+  ["The computation failed at {:.3f} s; the balance says nothing about that.", "Die Rechnung ist bei {} s gescheitert; die Bilanz sagt darüber nichts."],
   ["The computation failed at {:.3f} s: {*}.", "Die Rechnung ist bei {} s gescheitert: {}."],
   ["There is no equilibrium under dead load: {}.", "Es gibt kein Gleichgewicht unter Eigengewicht: {}."],
   ["The computation failed at {:.3f} s: {}.", "Die Rechnung ist bei {} s gescheitert: {}."],
