@@ -251,15 +251,16 @@ struct CellForce {
   }
 };
 
-/// Normal force of a zone that may flow in compression, and how far it does (docs/theory/zones.md, eq. 5).
+/// Normal force of a zone that may flow in compression or be slack, and how far it does (docs/theory/zones.md, eq. 5).
 template <class D>
 struct Pressing {
-  Num<D> force;       // elastic, within the limit
-  Num<D> shortening;  // plastic, of this step
-  Num<D> whole;       // section that is left, and over what was left when the cells were written
-  Num<D> share;       //
-  Num<D> per_share;   //
-  hn::Mask<D> flows;
+  Num<D> force;           // elastic, within the limit
+  Num<D> shortening;      // plastic, of this step
+  Num<D> unfolding;       // what has buckled becomes straight by, of this step
+  Num<D> whole;           // section that is left, and over what was left when the cells were written
+  Num<D> share;           //
+  Num<D> per_share;       //
+  hn::Mask<D> flows;      // shortens or unfolds
   hn::Mask<D> is_known;   // what the slot has of the limits holds here
   hn::Mask<D> is_within;  // then the numbers are the whole truth: it neither flows in tension nor breaks
 
@@ -285,7 +286,7 @@ struct Pressing {
     is_known = hn::And(
         hn::Le(strained.v, load<D>(flow, kTurnedFar).v),
         hn::And(hn::Ge(shortened.v, load<D>(flow, kCurveFrom).v), hn::Le(shortened.v, load<D>(flow, kCurveFar).v)));
-    force = trial, shortening = zero;
+    force = trial, shortening = unfolding = zero;
     if (!hn::AllFalse(tag, flows)) {
       // the curve falls while the zone shortens: one more look at it after the first estimate
       N left;
@@ -295,10 +296,23 @@ struct Pressing {
       whole = select(flows, left, whole);
       force = select(flows, maximum(trial, zero - then), trial);
     }
+    // slack as long as it is not straight
+    auto slack = hn::And(hn::Gt(trial.v, zero.v), hn::Gt(load<D>(flow, kBuckles).v, zero.v));
+    if (!hn::AllFalse(tag, slack)) {
+      N left;
+      const N by = trial / k, then = shortened - by;
+      (void)calc_limit(then, left);
+      slack = hn::And(slack, hn::And(hn::Gt(then.v, zero.v), hn::Ge(then.v, load<D>(flow, kCurveFrom).v)));
+      unfolding = select(slack, by, zero);
+      whole = select(slack, left, whole);
+      force = select(slack, zero, force);
+      flows = hn::Or(flows, slack);
+    }
     const N written = load<D>(flow, kWrittenWhole);
     share = whole / written, per_share = written / whole;
-    is_within = hn::And(hn::And(hn::Or(flows, hn::Le(over.v, zero.v)), hn::Le(trial.v, load<D>(flow, kFlowMost).v)),
-                        hn::Lt((shortened + shortening).v, load<D>(flow, kCrushLength).v));
+    is_within = hn::And(
+        hn::And(hn::Or(flows, hn::Le(over.v, zero.v)), hn::Or(slack, hn::Le(trial.v, load<D>(flow, kFlowMost).v))),
+        hn::Lt((shortened + shortening).v, load<D>(flow, kCrushLength).v));
   }
   /// As the cells have it.
   HWY_INLINE Num<D> in_cells() const { return force * per_share; }
@@ -775,9 +789,9 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
   // nothing in an elastic step, unless the zone was lengthened from outside before it
   store_where<D>(good, load<D>(flow, kPlastic) + lost, flow, kPlastic);
   const N crushed = pressing.shortening - back;
-  store_where<D>(flowed, load<D>(flow, kAxial) + (longer - pressing.shortening), flow, kAxial);
+  store_where<D>(flowed, load<D>(flow, kAxial) + (longer - pressing.shortening + pressing.unfolding), flow, kAxial);
   store_where<D>(flowed, load<D>(flow, kLifted) + elongation, flow, kLifted);
-  store_where<D>(flowed, load<D>(flow, kShortened) + crushed, flow, kShortened);
+  store_where<D>(flowed, load<D>(flow, kShortened) + (crushed - pressing.unfolding), flow, kShortened);
   store_where<D>(good, crushed, flow, kCrushed);
   for (int a = 1 - last; a <= 1 - first; ++a) store_where<D>(flowed, slip[a] + slid[a], flow, kSlip + a);
   store_where<D>(flowed, slipped, flow, kSlipped);

@@ -64,8 +64,8 @@ enum Slot : int {
 };
 inline constexpr double kLargestTurn = 0.25;  // kMostTurn of a live element: 60 degrees
 
-/// Fields of the slot of a zone that may flow in bending, shear, torsion and compression; for tension the full law is
-/// asked.
+/// Fields of the slot of a zone that may flow in bending, shear, torsion and compression, or be slack once it has
+/// buckled; for tension the full law is asked.
 enum Flow : int {
   kAxial = 0,           // plastic elongation
   kSlip = 1,            // along y, z (2)
@@ -88,20 +88,21 @@ enum Flow : int {
   kWholePerForce = 22,  // ... so much for each newton of that limit
   kWrittenWhole = 23,   // what was left when the cells were written
   kCrushLength = 24,    //
-  kShearOwn = 25,       // limits without normal force and slip, along y, z (2)
-  kShearFriction = 27,  //
-  kSlipped = 28,        // so far
-  kSlipSoftening = 29,  // one over the slip at which nothing of the own limits is left
-  kSlipRupture = 30,    //
-  kTwisted = 31,        // so far
-  kTwistRupture = 32,   //
-  kTorsion = 33,        // limit
-  kFlexibility = 34,    // one over the stiffness, 0 for none (6)
-  kBefore = 40,         // deformation at the step before (6)
-  kStored = 46,         // elastic energy at the step before
-  kPlastic = 47,        // dissipated since the slot was written
-  kIdle = 48,           // steps without flow
-  kStations = 49,       // both stations, kStationFields each
+  kBuckles = 25,        // 1: what has been shortened becomes straight before it pulls
+  kShearOwn = 26,       // limits without normal force and slip, along y, z (2)
+  kShearFriction = 28,  //
+  kSlipped = 29,        // so far
+  kSlipSoftening = 30,  // one over the slip at which nothing of the own limits is left
+  kSlipRupture = 31,    //
+  kTwisted = 32,        // so far
+  kTwistRupture = 33,   //
+  kTorsion = 34,        // limit
+  kFlexibility = 35,    // one over the stiffness, 0 for none (6)
+  kBefore = 41,         // deformation at the step before (6)
+  kStored = 47,         // elastic energy at the step before
+  kPlastic = 48,        // dissipated since the slot was written
+  kIdle = 49,           // steps without flow
+  kStations = 50,       // both stations, kStationFields each
   kStationFields = 59,
   kFlowFields = kStations + 2 * kStationFields
 };

@@ -279,7 +279,8 @@ bool write_flow(const ZoneParameters& p, const CompiledLaws& laws, ZoneState& z,
   const CompiledLaw& law = limits.law();
   out[kLifted] = z.lifted, out[kShortened] = z.shortened, out[kCrushed] = z.crushed;
   out[kCrushLength] = calc_crush_length(p.crush_through, law);
-  // what buckles is slack until it is straight, which a cell does not know
+  out[kBuckles] = law.buckles ? 1 : 0;
+  // what pulls once it is straight is for the full law
   out[kFlowMost] = is_pressed ? -kTiny : law.buckles ? 0 : limits.tension(z.elongated, z.shortened);
   for (int axis = 0; axis < 2; ++axis)
     out[kShearOwn + axis] = law.slip_softening > 0 ? std::min(law.shear[axis], kMostLimit) : 0;
