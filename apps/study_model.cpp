@@ -85,9 +85,9 @@ double read_seconds(const std::string& text, const char* option, double fallback
 }
 
 void make_study_folder(const std::string& folder) {
-  try {
-    make_folder(folder);
-  } catch (const std::runtime_error& e) { throw InputError("E801", std::string("--output: ") + e.what()); }
+  if (std::error_code none; fs::exists(folder, none) && !fs::is_directory(folder, none))
+    throw InputError("E801", fmt::format("--output: {} is a file; a folder is wanted", folder));
+  make_folder(folder);
 }
 
 StudyPlace make_place(const Arguments& a) {

@@ -134,6 +134,8 @@ struct Builder : BuilderState {
                  int floor);
   void connect_shaft(int member);
   void connect_cables();
+  /// Which bodies stand by themselves, on which of these charges act, and what is their upper block.
+  void find_structures();
   /// Whether a frame's members are connected; whether those to the next frame are.
   bool has_frame(int frame) const;
   bool has_link(int frame) const;

@@ -12,7 +12,6 @@ namespace topple::collapse {
 
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kLeastStiffnessShare = 1e-3;  // of a fired zone, so that its forces die out smoothly
 
 }  // namespace
@@ -89,7 +88,7 @@ void Builder::add_events(std::vector<Firing> schedule) {
       fire_shaft(firing, event, lighter);
       applies = [&c, &m](const Part& p) {
         const double at = std::atan2(p.centre.y - m.start.y, p.centre.x - m.start.x);
-        return p.is_solid && std::abs(std::remainder(at - c.azimuth, 2 * kPi)) < 0.5 * c.opening;
+        return p.is_solid && product::is_in_sector(at, c.azimuth, c.opening);
       };
     } else if (const auto it = residual.find(element); it == residual.end() || c.residual_bars < it->second) {
       residual[element] = c.residual_bars;

@@ -349,7 +349,7 @@ void Builder::connect_ground_column(const GridPoint& at, int index) {
   hinge.loose_bending = 6 * (hinge_about_y ? s.EI_y : s.EI_z) / L;
   z.rotational = static_cast<int>(model.rotational_elements.size());
   model.rotational_elements.push_back(hinge);
-  map.ground_columns.push_back({m.name, m.start, top, false, z.normal_force, hinge});
+  map.ground_columns.push_back({m.name, m.start, top, false, z.normal_force, hinge, joint.child.index});
 }
 
 void Builder::connect_column(const GridPoint& at, int index) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <utility>
 
 namespace topple::collapse {
 
@@ -27,6 +28,23 @@ double point_segment(const Point2& p, const Point2& a, const Point2& b) {
   const double dx = b[0] - a[0], dy = b[1] - a[1], l2 = dx * dx + dy * dy;
   const double t = l2 > 0 ? std::clamp(((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / l2, 0.0, 1.0) : 0;
   return std::hypot(p[0] - a[0] - t * dx, p[1] - a[1] - t * dy);
+}
+
+/// Heights at which a plumb line at p enters and leaves a box; the first is not below the second where it misses it.
+std::pair<double, double> find_plumb(const PlacedBox& box, const Mat3& R_WS, const Point2& p) {
+  const Vec3 o = transpose_times(R_WS, Vec3{p[0] - box.X_WS.p.x, p[1] - box.X_WS.p.y, -box.X_WS.p.z});
+  const Vec3 d = transpose_times(R_WS, Vec3{0, 0, 1});
+  double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
+  for (int c = 0; c < 3; ++c) {
+    if (std::abs(d[c]) < 1e-12) {
+      if (std::abs(o[c]) > box.half[c]) high = low = std::numeric_limits<double>::quiet_NaN();
+      continue;
+    }
+    const double a = (-box.half[c] - o[c]) / d[c], b = (box.half[c] - o[c]) / d[c];
+    low = std::max(low, std::min(a, b));
+    high = std::min(high, std::max(a, b));
+  }
+  return {low, high};
 }
 
 bool segments_cross(const Point2& a, const Point2& b, const Point2& c, const Point2& d) {
@@ -68,6 +86,15 @@ double calc_distance(const Polygon& a, const Polygon& b) {
   return least;
 }
 
+double calc_distance(const Point2& p, const Polygon& polygon) {
+  if (polygon.empty()) return std::numeric_limits<double>::infinity();
+  if (contains(polygon, p)) return 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (size_t i = 0; i < polygon.size(); ++i)
+    least = std::min(least, point_segment(p, polygon[i], polygon[(i + 1) % polygon.size()]));
+  return least;
+}
+
 double calc_area(const Polygon& p) {
   double twice = 0;
   for (size_t i = 0; i < p.size(); ++i) {
@@ -88,6 +115,34 @@ Polygon calc_outline(const PlacedBox& box) {
   return calc_hull(std::move(points));
 }
 
+double calc_lowest_over(const PlacedBox& box, const Polygon& polygon) {
+  const Mat3 R = to_matrix(box.X_WS.q);
+  std::array<Vec3, 8> corner;
+  for (size_t i = 0; i < 8; ++i)
+    corner[i] = box.X_WS.p + R * Vec3{i & 1 ? box.half.x : -box.half.x, i & 2 ? box.half.y : -box.half.y,
+                                      i & 4 ? box.half.z : -box.half.z};
+  // the lowest point is a corner over the area, a place of an edge over the area's edge, or over a corner of the area
+  double lowest = std::numeric_limits<double>::infinity();
+  for (const Vec3& p : corner)
+    if (p.z < lowest && contains(polygon, {p.x, p.y})) lowest = p.z;
+  for (size_t i = 0; i < 8; ++i)
+    for (const size_t bit : {1UL, 2UL, 4UL}) {
+      if (i & bit) continue;
+      const Vec3 &a = corner[i], &b = corner[i | bit];
+      for (size_t k = 0; k < polygon.size(); ++k) {
+        const Point2 &c = polygon[k], &d = polygon[(k + 1) % polygon.size()];
+        if (!segments_cross({a.x, a.y}, {b.x, b.y}, c, d)) continue;
+        const double from = cross2(c, d, {a.x, a.y}), to = cross2(c, d, {b.x, b.y});
+        lowest = std::min(lowest, a.z + from / (from - to) * (b.z - a.z));
+      }
+    }
+  for (const Point2& p : polygon) {
+    const auto [low, high] = find_plumb(box, R, p);
+    if (high > low) lowest = std::min(lowest, low);
+  }
+  return lowest;
+}
+
 Heap calc_heap(const std::vector<PlacedBox>& boxes, double cell) {
   Heap heap;
   std::map<std::pair<std::int64_t, std::int64_t>, double> top;
@@ -100,20 +155,8 @@ Heap calc_heap(const std::vector<PlacedBox>& boxes, double cell) {
     const auto first = [&](double v) { return static_cast<std::int64_t>(std::floor(v / cell)); };
     for (std::int64_t i = first(box.X_WS.p.x - reach.x); i <= first(box.X_WS.p.x + reach.x); ++i)
       for (std::int64_t j = first(box.X_WS.p.y - reach.y); j <= first(box.X_WS.p.y + reach.y); ++j) {
-        // where a plumb line through the cell's middle leaves the box
-        const Vec3 p{(static_cast<double>(i) + 0.5) * cell - box.X_WS.p.x,
-                     (static_cast<double>(j) + 0.5) * cell - box.X_WS.p.y, -box.X_WS.p.z};
-        const Vec3 o = transpose_times(R, p), d = transpose_times(R, Vec3{0, 0, 1});
-        double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
-        for (int c = 0; c < 3; ++c) {
-          if (std::abs(d[c]) < 1e-12) {
-            if (std::abs(o[c]) > box.half[c]) high = low = std::numeric_limits<double>::quiet_NaN();
-            continue;
-          }
-          const double a = (-box.half[c] - o[c]) / d[c], b = (box.half[c] - o[c]) / d[c];
-          low = std::max(low, std::min(a, b));
-          high = std::min(high, std::max(a, b));
-        }
+        const auto [low, high] =
+            find_plumb(box, R, {(static_cast<double>(i) + 0.5) * cell, (static_cast<double>(j) + 0.5) * cell});
         if (!(high > low) || high <= 0) continue;
         double& z = top[{i, j}];
         z = std::max(z, high);

@@ -16,6 +16,8 @@ using Polygon = std::vector<Point2>;
 Polygon calc_hull(std::vector<Point2> points);
 /// Distance between the areas of two simple polygons; 0 where they overlap.
 double calc_distance(const Polygon&, const Polygon&);
+/// Distance of a point from the area of a simple polygon; 0 within.
+double calc_distance(const Point2&, const Polygon&);
 double calc_area(const Polygon&);
 
 /// A box as it lies in W.
@@ -25,6 +27,9 @@ struct PlacedBox {
 };
 /// Hull of a box seen from above.
 Polygon calc_outline(const PlacedBox&);
+
+/// Height of the lowest point of a box over the area of a simple polygon; infinity if none of it is there.
+double calc_lowest_over(const PlacedBox&, const Polygon&);
 
 /// Heap of boxes above the ground: bulk volume under their upper surface, and its highest point.
 struct Heap {

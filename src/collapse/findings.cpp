@@ -24,6 +24,7 @@ using record::Status;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kHeapCell = 0.25;  // [m]
+constexpr double kOnGround = 0.1;   // height of what lies on the ground or on what lies there [m]
 constexpr size_t kShownMargins = 5;
 constexpr size_t kShownTouchdowns = 5;
 
@@ -55,10 +56,18 @@ std::string count_words(long n, const char* none, const char* one, const char* m
   return n == 0 ? none : fmt::format("{} {}", n, n == 1 ? one : many);
 }
 
-std::string azimuth_words(double azimuth) {
+std::string azimuth_words(double azimuth, int digits = 0) {
   double degrees = azimuth / unit::deg;
   if (degrees < -0.5) degrees += 360;
-  return fmt::format("{:.0f} deg", degrees);
+  return fmt::format("{:.{}f} deg", degrees, digits);
+}
+
+/// A number and its limit, with as many digits as show which is larger.
+std::pair<std::string, std::string> tell_apart(double value, double limit, int digits = 1) {
+  constexpr int most = 6;
+  const auto tell = [&digits](double v) { return fmt::format("{:.{}f}", v, digits); };
+  while (value != limit && tell(value) == tell(limit) && digits < most) ++digits;
+  return {tell(value), tell(limit)};
 }
 
 void add_mechanism(const Context& c, const Mechanism& m) {
@@ -80,7 +89,7 @@ Standing add_stability(const Context& c) {
   // each interval of standing: its last frame before the next stage, and what happened in it
   const auto stages = find_stage_times(c.map, true);
   Standing out;
-  const auto& block = c.recorder.block_frames();
+  const std::vector<BlockFrame> block = c.recorder.farthest_block_frames();
   const auto& zones = c.recorder.zone_frames();
   const auto describe = [&](const std::string& id, const std::string& title, size_t i, bool settled) {
     const ZoneFrame& z = zones[i];
@@ -179,9 +188,10 @@ Reach add_debris(const Context& c, const Mechanism& m) {
       "Beyond the footprint: {:.1f} m towards -x, {:.1f} m towards +x, {:.1f} m towards -y, {:.1f} m towards +y; the "
       "outline of all parts encloses {:.0f} m2.",
       reach.side[0], reach.side[1], reach.side[2], reach.side[3], reach.area);
-  if (reach.farthest >= 0 && reach.largest > 0)
-    text += fmt::format(" 95 % of the mass lies within {:.1f} m of it; the farthest part is {}.", reach.most_mass,
-                        c.r.bodies[static_cast<size_t>(reach.farthest)].name);
+  if (reach.farthest >= 0 && reach.largest >= 0.05)
+    text += fmt::format(
+        " The farthest part, {}, lies {:.1f} m from the footprint; 95 % of the mass lies within {:.1f} m of it.",
+        c.r.bodies[static_cast<size_t>(reach.farthest)].name, reach.largest, reach.most_mass);
   text += fmt::format(
       " Towards each of these sides 95 % of the mass lies within {:.1f}, {:.1f}, {:.1f} and {:.1f} m of it.",
       reach.side_most[0], reach.side_most[1], reach.side_most[2], reach.side_most[3]);
@@ -204,37 +214,64 @@ Reach add_debris(const Context& c, const Mechanism& m) {
   return reach;
 }
 
+/// What comes how near to a neighbour, seen from above, and how low it comes there.
+struct Approach {
+  double least = std::numeric_limits<double>::infinity(), when = 0;  // distance in plan
+  std::string who;
+  double lowest = std::numeric_limits<double>::infinity(), lowest_when = 0;  // height over its area
+  std::string lowest_who;
+};
+
+/// Ends where the first part is down on the neighbour's area.
+Approach find_approach(const Context& c, const product::Neighbour& n) {
+  Approach out;
+  double nlow[2] = {1e30, 1e30}, nhigh[2] = {-1e30, -1e30};
+  for (const auto& p : n.footprint)
+    for (size_t i : {0UL, 1UL}) nlow[i] = std::min(nlow[i], p[i]), nhigh[i] = std::max(nhigh[i], p[i]);
+  for (size_t f = 0; f < c.r.time.size() && !c.is_cancelled(); ++f) {
+    for (size_t b = 0; b < c.r.bodies.size(); ++b) {
+      if (f > 0 && c.r.bodies[b].fixed) continue;
+      const Pose X_WB = c.pose(f, b);
+      for (size_t i = 0; i < c.r.bodies[b].shapes.size(); ++i) {
+        const record::BoxShape s = record::shape_at(c.r, f, b, i);
+        const PlacedBox box{X_WB * s.X_BS, s.half};
+        const double radius = norm(s.half);
+        const double gap[2] = {std::max({nlow[0] - box.X_WS.p.x - radius, box.X_WS.p.x - radius - nhigh[0], 0.0}),
+                               std::max({nlow[1] - box.X_WS.p.y - radius, box.X_WS.p.y - radius - nhigh[1], 0.0})};
+        const double at_least = std::hypot(gap[0], gap[1]);
+        if (at_least > 0 && at_least >= out.least) continue;
+        const double d = calc_distance(calc_outline(box), n.footprint);
+        if (d < out.least) out.least = d, out.when = c.r.time[f], out.who = c.r.bodies[b].name;
+        if (d > 0) continue;
+        const double height = calc_lowest_over(box, n.footprint);
+        if (height < out.lowest)
+          out.lowest = height, out.lowest_when = c.r.time[f], out.lowest_who = c.r.bodies[b].name;
+      }
+    }
+    if (out.lowest <= kOnGround) break;
+  }
+  return out;
+}
+
 void add_clearances(const Context& c) {
   for (const product::Neighbour& n : c.plan.neighbours) {
-    double nlow[2] = {1e30, 1e30}, nhigh[2] = {-1e30, -1e30};
-    for (const auto& p : n.footprint)
-      for (size_t i : {0UL, 1UL}) nlow[i] = std::min(nlow[i], p[i]), nhigh[i] = std::max(nhigh[i], p[i]);
-    double least = std::numeric_limits<double>::infinity(), when = 0;
-    std::string who;
-    for (size_t f = 0; f < c.r.time.size() && !c.is_cancelled(); ++f)
-      for (size_t b = 0; b < c.r.bodies.size(); ++b) {
-        if (f > 0 && c.r.bodies[b].fixed) continue;
-        const Pose X_WB = c.pose(f, b);
-        for (size_t i = 0; i < c.r.bodies[b].shapes.size(); ++i) {
-          const record::BoxShape s = record::shape_at(c.r, f, b, i);
-          const PlacedBox box{X_WB * s.X_BS, s.half};
-          const double radius = norm(s.half);
-          const double gap[2] = {std::max({nlow[0] - box.X_WS.p.x - radius, box.X_WS.p.x - radius - nhigh[0], 0.0}),
-                                 std::max({nlow[1] - box.X_WS.p.y - radius, box.X_WS.p.y - radius - nhigh[1], 0.0})};
-          if (std::hypot(gap[0], gap[1]) >= least) continue;
-          const double d = calc_distance(calc_outline(box), n.footprint);
-          if (d < least) least = d, when = c.r.time[f], who = c.r.bodies[b].name;
-        }
-      }
+    const Approach a = find_approach(c, n);
     const bool asked = n.clearance > 0;
-    std::string text = fmt::format("The nearest part, {}, comes to {:.1f} m at {:.2f} s", who, least, when);
-    if (least <= 0) text = fmt::format("{} lands on it at {:.2f} s", who, when);
-    if (asked) text += fmt::format("; the limit is {:.1f} m", n.clearance);
-    const Status status = !asked                ? (least > 0 ? Status::Info : Status::Warning)
-                          : least < n.clearance ? Status::Bad
-                          : c.is_under_way      ? Status::Info
-                                                : Status::Good;
-    c.add("clearance." + n.name, "Clearance", n.name, text + ".", least, "m", status);
+    const auto [distance, limit] = tell_apart(a.least, asked ? n.clearance : kNone);
+    std::string text = fmt::format("The nearest part, {}, comes to {} m at {:.2f} s", a.who, distance, a.when);
+    if (a.lowest <= kOnGround)
+      text = a.lowest_when <= c.r.time.front() ? fmt::format("{} stands on it from the start", a.lowest_who)
+                                               : fmt::format("{} lands on it at {:.2f} s", a.lowest_who, a.lowest_when);
+    else if (a.least <= 0)
+      text = fmt::format(
+          "Nothing lands on it, but parts are over it: {} comes down to {:.1f} m above the ground there, at {:.2f} s",
+          a.lowest_who, a.lowest, a.lowest_when);
+    if (asked) text += fmt::format("; the limit is {} m", limit);
+    const Status status = !asked                  ? (a.least > 0 ? Status::Info : Status::Warning)
+                          : a.least < n.clearance ? Status::Bad
+                          : c.is_under_way        ? Status::Info
+                                                  : Status::Good;
+    c.add("clearance." + n.name, "Clearance", n.name, text + ".", a.least, "m", status);
   }
 }
 
@@ -344,14 +381,25 @@ void add_rigid_block(const Context& c) {
   const auto stages = c.stage_times();
   if (stages.empty()) return;
   const Vec3 d = c.map.fall_direction, axis = c.map.hinge_axis;
+  // one block over one level of hinges: that of a mouth, or of the ground storey if charges act there
+  if (c.map.structures.size() > 1) return;
+  std::vector<const GroundColumn*> hinges;
+  bool is_fired = false, is_shaft = false;
+  for (const GroundColumn& g : c.map.ground_columns) {
+    const BodyEntry& carried = c.map.bodies[static_cast<size_t>(g.body)];
+    if (carried.structure < 0) continue;
+    is_fired |= g.is_fired;
+    is_shaft |= carried.kind == "shaft";
+    if (!g.is_fired) hinges.push_back(&g);
+  }
+  if (hinges.empty() || !(is_fired || is_shaft)) return;
+  if (is_shaft && hinges.size() > 1) return;
   // the block pivots over the foremost row that keeps standing
   double foremost = -1e30;
-  for (const GroundColumn& g : c.map.ground_columns)
-    if (!g.is_fired) foremost = std::max(foremost, dot(g.p_top, d));
+  for (const GroundColumn* g : hinges) foremost = std::max(foremost, dot(g->p_top, d));
   std::vector<const GroundColumn*> row;
-  for (const GroundColumn& g : c.map.ground_columns)
-    if (!g.is_fired && dot(g.p_top, d) > foremost - 0.5) row.push_back(&g);
-  if (row.empty()) return;
+  for (const GroundColumn* g : hinges)
+    if (dot(g->p_top, d) > foremost - 0.5) row.push_back(g);
   RigidBlock block;
   block.gravity = norm(c.model.gravity);
   block.release = stages.back().last;
@@ -415,9 +463,21 @@ void add_rigid_block(const Context& c) {
   c.r.series.insert(c.r.series.begin() + 1, std::move(series));
 }
 
+const std::string& member_of(const Context& c, const Firing& f) {
+  const product::Charge& charge = c.plan.stages[static_cast<size_t>(f.stage)].charges[static_cast<size_t>(f.charge)];
+  return c.plan.members[static_cast<size_t>(charge.member)].name;
+}
+
 void add_events(const Context& c) {
-  std::map<std::string, int> n;
-  for (const record::Event& e : c.r.events) ++n[e.kind];
+  std::map<std::string, long> n;
+  // events of charges that fail say so
+  long failed = 0;
+  for (const record::Event& e : c.r.events) {
+    const bool fails = std::any_of(c.map.schedule.begin(), c.map.schedule.end(), [&](const Firing& f) {
+      return f.fails && f.time == e.time && e.kind == "charge" && member_of(c, f) == e.subject;
+    });
+    ++(fails ? failed : n[e.kind]);
+  }
   const auto late = std::count_if(c.map.schedule.begin(), c.map.schedule.end(),
                                   [&c](const Firing& f) { return !f.fails && f.time > c.r.time.back() + 1e-9; });
   const bool has_late = late > 0 && !c.is_under_way;
@@ -429,6 +489,8 @@ void add_events(const Context& c) {
         " " +
         count_words(late, "", "charge had not fired when the run ended", "charges had not fired when the run ended") +
         ".";
+  if (failed > 0)
+    text += " " + count_words(failed, "", "charge fails, as the plan says", "charges fail, as the plan says") + ".";
   c.add("events", "Events", "Events", text, static_cast<double>(c.r.events.size()), "1",
         has_late ? Status::Warning : Status::Info);
   size_t i = 0;
@@ -468,17 +530,23 @@ void add_criteria(const Context& c, const Mechanism& m, const Standing& standing
   if (want.azimuth) {
     const double off = std::abs(std::remainder(m.azimuth - *want.azimuth, 2 * kPi));
     const double tolerance = want.azimuth_tolerance.value_or(c.k.mechanism_direction_tolerance);
+    // as many digits as show whether it is within the tolerance
+    int digits = 0;
+    while (std::isfinite(off) && off > tolerance && digits < 6 &&
+           fmt::format("{:.{}f}", off / unit::deg, digits) == fmt::format("{:.{}f}", tolerance / unit::deg, digits))
+      ++digits;
     judge_one("azimuth", "Direction", off <= tolerance,
               std::isnan(m.azimuth) ? fmt::format("Asked: {} +- {:.0f} deg; nothing fell to any side.",
                                                   azimuth_words(*want.azimuth), tolerance / unit::deg)
                                     : fmt::format("Asked: {} +- {:.0f} deg; found: {}.", azimuth_words(*want.azimuth),
-                                                  tolerance / unit::deg, azimuth_words(m.azimuth)),
+                                                  tolerance / unit::deg, azimuth_words(m.azimuth, digits)),
               off, "rad");
   }
-  if (want.debris_reach)
+  if (want.debris_reach) {
+    const auto [found, limit] = tell_apart(reach.largest, *want.debris_reach);
     judge_one("debris_reach", "Reach of the debris", reach.largest <= *want.debris_reach,
-              fmt::format("Asked: at most {:.1f} m; found: {:.1f} m.", *want.debris_reach, reach.largest),
-              reach.largest, "m");
+              fmt::format("Asked: at most {} m; found: {} m.", limit, found), reach.largest, "m");
+  }
   if (want.stands_between_stages) {
     const bool is_known = standing.fell || !standing.is_open;
     judge_one("stands_between_stages", "Standing between stages",

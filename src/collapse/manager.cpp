@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/unit.h"
 #include "collapse/builder.h"
 #include "collapse/frequency_limit.h"
 #include "product/place_in_text.h"
@@ -14,6 +15,8 @@ namespace topple::collapse {
 
 using product::Member;
 using product::MemberKind;
+
+constexpr double kUnderJoint = 0.02;  // a charge in a column is at least so far below its joint [m]
 
 Mat3 column_axes() { return Mat3::from_columns({0, 0, 1}, {1, 0, 0}, {0, 1, 0}); }
 Mat3 x_beam_axes() { return Mat3::identity(); }
@@ -55,7 +58,8 @@ void Builder::find_direction() {
   } else {
     for (const product::Stage& s : plan.stages)
       for (const product::Charge& c : s.charges)
-        if (member(c.member).kind == MemberKind::Shaft && c.opening < 6.283 && !c.fails) azimuth = c.azimuth;
+        if (member(c.member).kind == MemberKind::Shaft && !product::is_all_around(c.opening) && !c.fails)
+          azimuth = c.azimuth;
     // away from the ground columns that keep standing, along the grid
     Vec3 all, standing;
     int n_all = 0, n_standing = 0;
@@ -195,7 +199,7 @@ void Builder::make_columns() {
     };
     const auto charged = lowest_charge.find(index);
     double split = charged == lowest_charge.end() ? 0 : charged->second;
-    if (split > 0 && split >= low - m.start.z - 0.02) {
+    if (split > 0 && split >= low - m.start.z - kUnderJoint) {
       note_too_high(index, split, low - m.start.z);
       continue;
     }
@@ -230,7 +234,8 @@ void Builder::make_columns() {
                           fmt::format("{}{}: a charge lies in the joint above the clear height of {:.4g} m",
                                       member(t.charge->member).name,
                                       t.more > 0 ? fmt::format(" and {} more", t.more) : "", t.clear_height),
-                          "place it lower"});
+                          fmt::format("its position must be below {:.4g} m, {:g} cm under the joint",
+                                      t.clear_height - kUnderJoint, kUnderJoint / unit::cm)});
   }
 }
 
@@ -466,6 +471,7 @@ void Builder::build() {
   for (auto& [index, shaft] : shafts) connect_shaft(index);
   connect_cables();
   stop_if_wrong();
+  find_structures();
   for (size_t s = 0; s < plan.storey_loads.size(); ++s) {
     const bool has_slab = std::any_of(slabs.begin(), slabs.end(),
                                       [&](const auto& entry) { return entry.first.storey == static_cast<int>(s); });

@@ -17,9 +17,10 @@ namespace topple::collapse {
 struct BodyEntry {
   std::string name, kind;  // as in record::BodyInfo
   int storey = 0;
-  bool is_upper = false;                 // belongs to the upper block: everything that moves but the ground storey's
-                                         // columns and walls
+  bool is_upper = false;                 // belongs to the upper block of its structure: everything that moves but the
+                                         // ground storey's columns and walls, and a shaft below its lowest mouth
   std::vector<record::BoxShape> shapes;  // members as built, in B
+  int structure = 0;                     // index into ModelMap::structures; -1: no charge acts on it
 };
 
 /// What a connection of the model is in the plan.
@@ -57,6 +58,13 @@ struct GroundColumn {
   bool is_fired = false;           // a charge on it fires in this plan
   double normal_force = 0;         // estimate under dead load, tension positive [N]
   mbs::RotationalElement element;  // of zone II
+  int body = -1;                   // that it carries
+};
+
+/// What stands by itself, joined to nothing else but the ground, and is judged by itself.
+struct StructureEntry {
+  std::string name;  // of a shaft, or of the first of its members
+  double mass = 0;   // that moves [kg]
 };
 
 /// What a charge leaves of a ground column under its joint, once the concrete is thrown out.
@@ -78,11 +86,12 @@ struct ModelMap {
   std::vector<DebrisEntry> debris;
   std::vector<StubEntry> stubs;
   std::vector<GroundColumn> ground_columns;
-  std::vector<std::string> stages;  // a line for each stage of the plan
-  std::vector<Firing> schedule;     // failing charges included
-  std::vector<std::string> notes;   // what the manager had to decide, in sentences
-  Vec3 fall_direction{-1, 0, 0};    // planned, horizontal unit vector; away from the remaining supports if unplanned
-  Vec3 hinge_axis{0, -1, 0};        // rotation about it by a positive angle leans towards fall_direction
+  std::vector<StructureEntry> structures{{}};  // that charges act on, or all if none does; the heaviest first
+  std::vector<std::string> stages;             // a line for each stage of the plan
+  std::vector<Firing> schedule;                // failing charges included
+  std::vector<std::string> notes;              // what the manager had to decide, in sentences
+  Vec3 fall_direction{-1, 0, 0};  // planned, horizontal unit vector; away from the remaining supports if unplanned
+  Vec3 hinge_axis{0, -1, 0};      // rotation about it by a positive angle leans towards fall_direction
   bool is_direction_planned = false;
   double ground_storey_height = 0;  // [m]
   double mass = 0;                  // of all bodies [kg]

@@ -126,4 +126,27 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
   return out;
 }
 
+Mechanism join_mechanisms(const std::vector<std::string>& names, const std::vector<Mechanism>& verdicts,
+                          const std::vector<double>& masses) {
+  if (verdicts.size() == 1) return verdicts.front();
+  // the one that falls where it must not, else the heaviest
+  const auto wrong =
+      std::find_if(verdicts.begin(), verdicts.end(), [](const Mechanism& m) { return m.name == "wrong direction"; });
+  const size_t lead = wrong == verdicts.end() ? 0 : static_cast<size_t>(wrong - verdicts.begin());
+  Mechanism out = verdicts[lead];
+  double moved = 0, mass = 0;
+  bool do_agree = true;
+  std::string all;
+  for (size_t i = 0; i < verdicts.size(); ++i) {
+    moved += masses[i] * verdicts[i].moved, mass += masses[i];
+    do_agree &= verdicts[i].name == out.name;
+    all += fmt::format(" Verdict on {}: {}.", names[i], verdicts[i].name);
+  }
+  out.moved = mass > 0 ? moved / mass : 0;
+  if (!do_agree && wrong == verdicts.end()) out.name = "partial";
+  out.text = fmt::format("Separate structures are judged one by one.{} In detail, of {}: {}", all, names[lead],
+                         verdicts[lead].text);
+  return out;
+}
+
 }  // namespace topple::collapse

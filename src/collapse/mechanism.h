@@ -9,18 +9,20 @@
 
 namespace topple::collapse {
 
-/// Motion of the upper block at one frame. The block is the largest group of upper bodies that are still connected.
+/// Motion of a structure's upper block at one frame. The block is the largest group of upper bodies that are still
+/// connected.
 struct BlockFrame {
   double time = 0;       // [s]
   Quat rotation;         // mass-weighted mean rotation of the block since the start
   Vec3 displacement;     // of the block's mass centre since the start [m]
   double connected = 1;  // mass of the block over the mass of all upper bodies
-  double moved = 0;      // share of all moving mass that has come down
+  double moved = 0;      // share of all moving mass of the structure that has come down
   double forward = 0;    // share of the upper mass that turned by more than mechanism.fold_rotation about the axis
   double backward = 0;   // the same against it
-  double height = 0;     // of the mass centre of all moving mass [m]
+  double height = 0;     // of the mass centre of all moving mass of the structure [m]
   Vec3 centre;           // that mass centre [m]
   double fastest = 0;    // largest speed of an upper body [m/s]
+  double beside = 0;     // of the mass of what no charge acts on, the share that has come down
 };
 
 struct MechanismInput {
@@ -54,5 +56,12 @@ double calc_tilt(const Quat& rotation, const Vec3& fall_direction);
 
 /// Judges frames; there is at least one.
 Mechanism judge_mechanism(const MechanismInput&, const Knowledge&);
+
+/// What was found of structures that stand apart, one verdict for all: "wrong direction" if one falls there, else that
+/// in which all agree, else "partial". Numbers are those of the one that falls in the wrong direction, else of the
+/// first.
+///   names, verdicts, masses  of the structures, as long as each other
+Mechanism join_mechanisms(const std::vector<std::string>& names, const std::vector<Mechanism>& verdicts,
+                          const std::vector<double>& masses);
 
 }  // namespace topple::collapse

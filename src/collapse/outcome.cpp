@@ -1,5 +1,7 @@
 #include "collapse/outcome.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -22,32 +24,43 @@ std::vector<StageTimes> find_stage_times(const ModelMap& map, bool all) {
 Mechanism judge_run(const product::Plan& plan, const mbs::Model& model, const ModelMap& map, const Knowledge& k,
                     const Recorder& recorder, const mbs::Summary& summary, bool is_under_way) {
   MechanismInput in;
-  in.frames = recorder.block_frames();
-  in.touchdown = recorder.first_touchdown();
   in.fall_direction = map.fall_direction;
   in.is_direction_planned = map.is_direction_planned;
   in.direction_tolerance = plan.criteria.azimuth_tolerance.value_or(0);
   in.storey_height = map.ground_storey_height;
   in.came_to_rest = summary.ending == mbs::Summary::Ending::AtRest;
   in.is_under_way = is_under_way;
-  double mass = 0, centre = 0, front = -1e30, rear = 1e30;
+  const size_t S = map.structures.size();
+  std::vector<double> mass(S, 0), centre(S, 0), front(S, -1e30), rear(S, 1e30);
   for (size_t b = 0; b < model.bodies.size(); ++b) {
     if (!map.bodies[b].is_upper) continue;
+    const size_t structure = static_cast<size_t>(map.bodies[b].structure);
     const mbs::Body& body = model.bodies[b];
-    mass += body.mass;
-    centre += body.mass * dot(body.X_WB.p, in.fall_direction);
+    mass[structure] += body.mass;
+    centre[structure] += body.mass * dot(body.X_WB.p, in.fall_direction);
     for (const record::BoxShape& s : map.bodies[b].shapes)
       for (const Point2& p : calc_outline({body.X_WB * s.X_BS, s.half})) {
         const double along = p[0] * in.fall_direction.x + p[1] * in.fall_direction.y;
-        front = std::max(front, along);
-        rear = std::min(rear, along);
+        front[structure] = std::max(front[structure], along);
+        rear[structure] = std::min(rear[structure], along);
       }
   }
-  if (mass > 0) {
-    in.front = front - centre / mass;
-    in.rear = centre / mass - rear;
+  std::vector<std::string> names;
+  std::vector<Mechanism> verdicts;
+  std::vector<double> masses;
+  for (size_t s = 0; s < S; ++s) {
+    in.frames = recorder.block_frames(s);
+    in.touchdown = recorder.first_touchdown(s);
+    in.front = mass[s] > 0 ? front[s] - centre[s] / mass[s] : 0;
+    in.rear = mass[s] > 0 ? centre[s] / mass[s] - rear[s] : 0;
+    names.push_back(map.structures[s].name);
+    verdicts.push_back(judge_mechanism(in, k));
+    masses.push_back(map.structures[s].mass);
   }
-  return judge_mechanism(in, k);
+  Mechanism out = join_mechanisms(names, verdicts, masses);
+  if (const double beside = recorder.block_frames().back().beside; beside >= k.mechanism_stands_share)
+    out.text += fmt::format(" Of what no charge acts on {:.0f} % of the mass has come down too.", 100 * beside);
+  return out;
 }
 
 bool stands(const BlockFrame& block, const Knowledge& k) {
@@ -84,12 +97,12 @@ std::vector<PlacedBox> find_moving_boxes(const record::Record& r, size_t frame) 
 
 namespace {
 
-/// How far a part lies beyond the box around the footprint.
+/// How far a part lies beyond the footprint.
 struct PartReach {
   size_t body = 0;
   double mass = 0;
-  std::array<double, 4> side{};  // 0: not beyond [m]
-  double way = 0;                // largest of them [m]
+  std::array<double, 4> side{};  // beyond the box around it; 0: not beyond [m]
+  double way = 0;                // distance of its farthest point in plan [m]
   std::vector<Point2> corners;   // of its boxes, seen from above
 };
 std::vector<PartReach> find_part_reaches(const record::Record& r, size_t frame) {
@@ -107,13 +120,13 @@ std::vector<PartReach> find_part_reaches(const record::Record& r, size_t frame) 
       const record::BoxShape s = record::shape_at(r, frame, b, shape);
       for (const Point2& p : calc_outline({X_WB * s.X_BS, s.half})) {
         part.corners.push_back(p);
+        if (!r.building_outline.empty()) part.way = std::max(part.way, calc_distance(p, r.building_outline));
         for (size_t i : {0UL, 1UL}) {
           part.side[2 * i] = std::max(part.side[2 * i], low[i] - p[i]);
           part.side[2 * i + 1] = std::max(part.side[2 * i + 1], p[i] - high[i]);
         }
       }
     }
-    part.way = *std::max_element(part.side.begin(), part.side.end());
     parts.push_back(std::move(part));
   }
   std::stable_sort(parts.begin(), parts.end(), [](const PartReach& a, const PartReach& b) { return a.way < b.way; });
@@ -149,11 +162,12 @@ Reach calc_reach(const record::Record& r, size_t frame) {
     ways.emplace_back(part.way, part.mass);
   }
   for (size_t i = 0; i < 4; ++i) out.side_most[i] = find_within(std::move(sides[i]), most);
-  out.largest = *std::max_element(out.side.begin(), out.side.end());
   out.most_mass = find_within(std::move(ways), most);
   out.outline = calc_hull(std::move(corners));
   out.area = calc_area(out.outline);
-  if (!parts.empty()) out.farthest = static_cast<int>(parts.back().body);
+  if (parts.empty()) return out;
+  out.farthest = static_cast<int>(parts.back().body);
+  out.largest = parts.back().way;
   return out;
 }
 

@@ -32,12 +32,12 @@ Polygon calc_building_outline(const mbs::Model&, const ModelMap&);
 /// Boxes of all bodies that can move, as crushing has left them.
 std::vector<PlacedBox> find_moving_boxes(const record::Record&, size_t frame);
 
-/// How far parts lie beyond the building's footprint (the box around its outline along W's axes).
+/// How far parts lie beyond the building's footprint, the convex outline of what stood before the first charge.
 struct Reach {
-  std::array<double, 4> side{};       // towards -x, +x, -y, +y; 0: not beyond [m]
+  std::array<double, 4> side{};       // along -x, +x, -y, +y beyond the box around it; 0: not beyond [m]
   std::array<double, 4> side_most{};  // the same, within which 95 % of the mass lie [m]
-  double largest = 0;                 // of the sides [m]
-  double most_mass = 0;               // within which 95 % of the mass lie [m]
+  double largest = 0;                 // distance in plan of the farthest point from it [m]
+  double most_mass = 0;               // distance in plan from it within which 95 % of the mass lie [m]
   int farthest = -1;                  // body, -1: no moving one
   Polygon outline;                    // around all parts, convex, counter-clockwise
   double area = 0;                    // of the outline [m²]

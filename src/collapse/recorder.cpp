@@ -34,7 +34,7 @@ int find_root(std::vector<int>& parent, int i) {
 
 Recorder::Recorder(const mbs::Model& model, const ModelMap& map, const Knowledge& k, record::Record& record,
                    const RunCallbacks& callbacks)
-    : model_(model), map_(map), k_(k), record_(record), callbacks_(callbacks) {
+    : model_(model), map_(map), k_(k), record_(record), callbacks_(callbacks), block_(map.structures.size()) {
   for (size_t b = 0; b < model.bodies.size(); ++b) {
     record::BodyInfo info;
     info.name = map.bodies[b].name;
@@ -162,10 +162,9 @@ const StubEntry* Recorder::find_crushed_stub(size_t zone, const mbs::View& v) co
   return nullptr;
 }
 
-BlockFrame Recorder::calc_block(const mbs::View& v) const {
-  BlockFrame out;
-  out.time = v.time;
-  const size_t B = model_.bodies.size();
+std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) const {
+  const size_t B = model_.bodies.size(), S = map_.structures.size();
+  std::vector<BlockFrame> out(S);
   std::vector<int> parent(B);
   std::iota(parent.begin(), parent.end(), 0);
   const auto is_upper = [&](int b) { return b >= 0 && map_.bodies[static_cast<size_t>(b)].is_upper; };
@@ -178,43 +177,83 @@ BlockFrame Recorder::calc_block(const mbs::View& v) const {
   for (size_t j = 0; j < model_.joints.size(); ++j)
     if (!v.joint_released[j]) link(model_.joints[j].parent, model_.joints[j].child);
   std::vector<double> group(B, 0);
-  double upper = 0, moving = 0, moved = 0, forward = 0, backward = 0;
+  std::vector<double> upper(S, 0), moving(S, 0);
+  double beside = 0, beside_moved = 0;
   const double far =
       k_.mechanism_moved_displacement * (map_.ground_storey_height > 0 ? map_.ground_storey_height : 1.0);
   for (size_t b = 0; b < B; ++b) {
     if (model_.bodies[b].fixed) continue;
     const double m = v.mass[b];
-    moving += m;
-    out.centre += m * v.X_WB[b].p;
-    if (norm(v.X_WB[b].p - start_[b].p) > far) moved += m;
+    const bool has_moved = norm(v.X_WB[b].p - start_[b].p) > far;
+    if (map_.bodies[b].structure < 0) {
+      beside += m;
+      if (has_moved) beside_moved += m;
+      continue;
+    }
+    const size_t s = static_cast<size_t>(map_.bodies[b].structure);
+    BlockFrame& f = out[s];
+    moving[s] += m;
+    f.centre += m * v.X_WB[b].p;
+    if (has_moved) f.moved += m;
     if (!map_.bodies[b].is_upper) continue;
-    upper += m;
+    upper[s] += m;
     group[static_cast<size_t>(find_root(parent, static_cast<int>(b)))] += m;
     const double turn = calc_tilt(v.X_WB[b].q * conjugate(start_[b].q), map_.fall_direction);
-    if (turn > k_.mechanism_fold_rotation) forward += m;
-    if (turn < -k_.mechanism_fold_rotation) backward += m;
-    out.fastest = std::max(out.fastest, norm(v.v_WB[b]));
+    if (turn > k_.mechanism_fold_rotation) f.forward += m;
+    if (turn < -k_.mechanism_fold_rotation) f.backward += m;
+    f.fastest = std::max(f.fastest, norm(v.v_WB[b]));
   }
-  if (moving > 0) {
-    out.centre *= 1 / moving;
-    out.height = out.centre.z;
-    out.moved = moved / moving;
+  for (size_t s = 0; s < S; ++s) {
+    BlockFrame& f = out[s];
+    f.time = v.time;
+    if (beside > 0) f.beside = beside_moved / beside;
+    if (moving[s] > 0) {
+      f.centre *= 1 / moving[s];
+      f.height = f.centre.z;
+      f.moved = f.moved / moving[s];
+    }
+    if (!(upper[s] > 0)) continue;
+    f.forward = f.forward / upper[s];
+    f.backward = f.backward / upper[s];
+    size_t largest = B;
+    for (size_t b = 0; b < B; ++b)
+      if (group[b] > 0 && map_.bodies[b].structure == static_cast<int>(s) &&
+          (largest == B || group[b] > group[largest]))
+        largest = b;
+    f.connected = group[largest] / upper[s];
+    std::vector<FitBody> block;
+    Vec3 shift;
+    for (size_t b = 0; b < B; ++b) {
+      if (!is_upper(static_cast<int>(b)) || find_root(parent, static_cast<int>(b)) != static_cast<int>(largest))
+        continue;
+      block.push_back({v.mass[b], model_.bodies[b].inertia, start_[b], v.X_WB[b]});
+      shift += v.mass[b] * (v.X_WB[b].p - start_[b].p);
+    }
+    f.rotation = fit_rotation(block);
+    f.displacement = (1 / group[largest]) * shift;
   }
-  if (!(upper > 0)) return out;
-  out.forward = forward / upper;
-  out.backward = backward / upper;
-  const int largest = static_cast<int>(std::max_element(group.begin(), group.end()) - group.begin());
-  out.connected = group[static_cast<size_t>(largest)] / upper;
-  std::vector<FitBody> block;
-  Vec3 shift;
-  for (size_t b = 0; b < B; ++b) {
-    if (!is_upper(static_cast<int>(b)) || find_root(parent, static_cast<int>(b)) != largest) continue;
-    block.push_back({v.mass[b], model_.bodies[b].inertia, start_[b], v.X_WB[b]});
-    shift += v.mass[b] * (v.X_WB[b].p - start_[b].p);
-  }
-  out.rotation = fit_rotation(block);
-  out.displacement = (1 / group[static_cast<size_t>(largest)]) * shift;
   return out;
+}
+
+std::vector<BlockFrame> Recorder::farthest_block_frames() const {
+  std::vector<BlockFrame> out = block_.front();
+  for (size_t i = 0; i < out.size(); ++i)
+    for (size_t s = 1; s < block_.size(); ++s) {
+      const BlockFrame& other = block_[s][i];
+      const double fastest = std::max(out[i].fastest, other.fastest);
+      if (norm(other.displacement) > norm(out[i].displacement)) out[i] = other;
+      out[i].fastest = fastest;
+    }
+  return out;
+}
+
+double Recorder::first_touchdown(size_t structure) const {
+  double first = std::numeric_limits<double>::quiet_NaN();
+  for (const Touchdown& t : touchdowns_) {
+    const BodyEntry& body = map_.bodies[static_cast<size_t>(t.body)];
+    if (body.is_upper && body.structure == static_cast<int>(structure)) first = std::fmin(first, t.time);
+  }
+  return first;
 }
 
 void Recorder::put_pose(const Pose& X) {
@@ -299,7 +338,7 @@ void Recorder::append(const Recorder& from, size_t frames, double until) {
   copy(record_.zone_state, r.zone_state, frames * Z);
   copy(record_.zone_utilisation, r.zone_utilisation, frames * Z);
   for (size_t s = 0; s < record_.series.size(); ++s) copy(record_.series[s].value, r.series[s].value, frames);
-  copy(block_, from.block_, frames);
+  for (size_t s = 0; s < block_.size(); ++s) copy(block_[s], from.block_[s], frames);
   copy(zone_frames_, from.zone_frames_, frames);
   for (const record::Event& e : r.events)
     if (e.time <= until) record_.events.push_back(e);
@@ -383,8 +422,9 @@ void Recorder::add_frame(const mbs::View& v) {
   look(v);
   put_crushed_ends();
 
-  const BlockFrame block = calc_block(v);
-  block_.push_back(block);
+  const std::vector<BlockFrame> blocks = calc_blocks(v);
+  for (size_t s = 0; s < block_.size(); ++s) block_[s].push_back(blocks[s]);
+  const BlockFrame& block = blocks.front();
   const mbs::Energy& e = v.energy;
   const double ground_force = dot(v.ground_force, model_.contact.normal);
   // in the order of the list that the constructor makes

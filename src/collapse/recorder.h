@@ -41,9 +41,13 @@ class Recorder {
   /// this one's map.
   void append(const Recorder& from, size_t frames, double until);
 
-  const std::vector<BlockFrame>& block_frames() const { return block_; }
+  /// Of a structure of the map, the heaviest unless said otherwise.
+  const std::vector<BlockFrame>& block_frames(size_t structure = 0) const { return block_[structure]; }
+  /// At each frame that of the structure whose block is farthest from its place, with the fastest part of all.
+  std::vector<BlockFrame> farthest_block_frames() const;
   const std::vector<ZoneFrame>& zone_frames() const { return zone_frames_; }
   double first_touchdown() const { return touchdown_; }  // of an upper body; NaN if none [s]
+  double first_touchdown(size_t structure) const;        // of an upper body of it
   std::string first_touchdown_body() const { return touchdown_body_; }
   const std::vector<Touchdown>& touchdowns() const { return touchdowns_; }  // one of each moving part, as they happen
   double start_reaction_error() const { return reaction_error_; }  // |reaction - weight| / weight at the first frame
@@ -58,7 +62,7 @@ class Recorder {
  private:
   record::Series& series(size_t i) { return record_.series[i]; }
   Touchdown calc_touchdown(int body, double time, double speed) const;
-  BlockFrame calc_block(const mbs::View&) const;
+  std::vector<BlockFrame> calc_blocks(const mbs::View&) const;
   /// Ends of what is drawn that recede as members are crushed.
   void find_crushed_ends();
   void let_ends_recede(const mbs::View&);
@@ -77,7 +81,7 @@ class Recorder {
   record::Record& record_;
   const RunCallbacks& callbacks_;
   std::vector<Pose> start_;
-  std::vector<BlockFrame> block_;
+  std::vector<std::vector<BlockFrame>> block_;  // of each structure
   std::vector<ZoneFrame> zone_frames_;
   std::vector<double> shortening_;        // of the last frame
   std::vector<mbs::CrushedBox> crushed_;  // of the last frame, as Record::crushed_ends; shapes as drawn

@@ -126,7 +126,6 @@ bool can_share_lanes(const Sample& a, const Sample& b, const Knowledge& k, const
 /// The debris of a slice over the whole length of the building: nothing falls sideways.
 void spread(Reach& reach, const product::Plan& plan) {
   reach.side[2] = reach.side[3] = 0;
-  reach.largest = std::max(reach.side[0], reach.side[1]);
   if (reach.outline.empty() || plan.frame_offsets.empty()) return;
   double low = reach.outline.front()[0], high = low;
   for (const Point2& p : reach.outline) low = std::min(low, p[0]), high = std::max(high, p[0]);
@@ -156,7 +155,7 @@ void fill(Sample& s, const Knowledge& k, const SampleRunOptions& options, Sample
   out.time = s.record.time;
   out.tilt = series("tilt_angle");
   out.mechanism = judge_run(s.plan, s.model, s.map, k, *s.recorder, s.summary);
-  const std::vector<BlockFrame>& block = s.recorder->block_frames();
+  const std::vector<BlockFrame> block = s.recorder->farthest_block_frames();
   const std::vector<StageTimes> stages = find_stage_times(s.map, true);
   const size_t before = find_frame(block, stages.empty() ? out.time.back() : stages.back().first);
   out.stood = stages.size() < 2 || stands(block[before], k);

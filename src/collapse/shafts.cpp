@@ -56,18 +56,13 @@ double wrap(double angle) {
 std::vector<double> find_edges(const std::vector<std::pair<double, double>>& sectors, double azimuth) {
   std::vector<double> edges;
   for (const auto& [middle, opening] : sectors) {
-    if (opening > 2 * kPi - 1e-6) continue;
+    if (product::is_all_around(opening)) continue;
     for (const double side : {-0.5, 0.5}) edges.push_back(wrap(middle + side * opening - azimuth));
   }
   std::sort(edges.begin(), edges.end());
   edges.erase(std::unique(edges.begin(), edges.end(), [](double a, double b) { return b - a < 1e-6; }), edges.end());
   if (edges.size() > 1 && edges.front() + 2 * kPi - edges.back() < 1e-6) edges.pop_back();
   return edges;
-}
-
-/// Whether an angle in W lies in a sector.
-bool is_within(double angle, double middle, double opening) {
-  return std::abs(std::remainder(angle - middle, 2 * kPi)) < 0.5 * opening;
 }
 
 product::Concrete concrete_of_shaft(const product::Plan& plan, const Shaft& s) {
@@ -119,7 +114,7 @@ void Builder::make_shaft(int index) {
     for (const product::Charge& c : stage.charges) {
       if (c.member != index) continue;
       sectors.emplace_back(c.azimuth, c.opening);
-      if (!has_mouth && c.opening < 2 * kPi - 1e-6) shaft.azimuth = c.azimuth, has_mouth = true;
+      if (!has_mouth && !product::is_all_around(c.opening)) shaft.azimuth = c.azimuth, has_mouth = true;
     }
   for (const product::Weakening& w : m.weakenings) sectors.emplace_back(w.azimuth, w.opening);
 
@@ -220,7 +215,8 @@ void Builder::make_shaft(int index) {
   for (const product::Weakening& w : m.weakenings) {
     if (w.cut_concrete < 1) continue;
     const auto applies = [&](const Part& p) {
-      return p.is_solid && is_within(std::atan2(p.centre.y - m.start.y, p.centre.x - m.start.x), w.azimuth, w.opening);
+      return p.is_solid &&
+             product::is_in_sector(std::atan2(p.centre.y - m.start.y, p.centre.x - m.start.x), w.azimuth, w.opening);
     };
     for (Assembly& a : assemblies)
       if (std::any_of(a.parts.begin(), a.parts.end(), [&](const Part& p) { return p.member == index; }))
@@ -255,7 +251,7 @@ void Builder::make_shaft(int index) {
       nearfield::RingSector sector{from, to, 1, 1};
       for (const product::Weakening& w : m.weakenings) {
         if (std::abs(w.at - joint.at) > std::max(0.5 * joint.height, 0.5 * w.height) + 0.01) continue;
-        if (!is_within(angle, w.azimuth, w.opening)) continue;
+        if (!product::is_in_sector(angle, w.azimuth, w.opening)) continue;
         sector.concrete = std::min(sector.concrete, 1 - w.cut_concrete);
         sector.bars = std::min(sector.bars, 1 - w.cut_bars);
       }
@@ -265,7 +261,7 @@ void Builder::make_shaft(int index) {
         for (size_t c = 0; c < plan.stages[stage].charges.size(); ++c) {
           const product::Charge& charge = plan.stages[stage].charges[c];
           if (charge.member != index || std::abs(charge.position - joint.at) > 1e-6) continue;
-          if (!is_within(angle, charge.azimuth, charge.opening)) continue;
+          if (!product::is_in_sector(angle, charge.azimuth, charge.opening)) continue;
           const auto found = std::find_if(owners.begin(), owners.end(), [&](const Owner& o) {
             return o.stage == static_cast<int>(stage) && o.charge == static_cast<int>(c);
           });
@@ -331,6 +327,7 @@ void Builder::connect_shaft(int index) {
       hinge.normal_force = -weight;
       hinge.element.name = name;
       hinge.element.law = id;
+      hinge.body = joint.above;
       map.ground_columns.push_back(hinge);
       const double overturning = -weight * e.whole.y, resistance = find_resistance(law.moment_z, -weight);
       double left = 0;

@@ -1,6 +1,7 @@
 #include "product/plan.h"
 
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 
 namespace topple::product {
@@ -103,6 +104,12 @@ double calc_mass(const Plan& plan, const Member& m) {
       return calc_shaft_mass(plan, plan.shafts[static_cast<size_t>(m.shaft)], norm(m.end - m.start), 0, 1);
   }
   return 0;
+}
+
+bool is_all_around(double opening) { return opening > 2 * pi - 1e-6; }
+
+bool is_in_sector(double angle, double azimuth, double opening) {
+  return is_all_around(opening) || std::abs(std::remainder(angle - azimuth, 2 * pi)) < 0.5 * opening;
 }
 
 double calc_shaft_mass(const Plan& plan, const Shaft& s, double height, double from, double to) {

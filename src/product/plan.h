@@ -271,6 +271,11 @@ Plan read_plan(const std::string& text, const std::string& name, std::vector<Dia
 /// error.
 Plan read_plan_file(const std::string& path, std::vector<Diagnostic>& warnings, std::string& text_out);
 
+/// Whether the sector of a shaft goes all around, to round-off.
+bool is_all_around(double opening);
+/// Whether a direction lies in the sector of a shaft, all angles in W [rad]. One that goes all around has all of them.
+bool is_in_sector(double angle, double azimuth, double opening);
+
 /// Mass of a member's own material without openings [kg]; pieces that members share are counted once (docs/plan.md).
 /// The plan's members must be in the order of read_plan.
 double calc_mass(const Plan&, const Member&);

@@ -154,6 +154,12 @@ void read_site(Reading& reading, TableReader& root) {
                                                        : BuildingClass::Sensitive;
       }
       n.is_utility = is_utility;
+      if (const auto other = std::find_if(plan.neighbours.begin(), plan.neighbours.end(),
+                                          [&n](const Neighbour& o) { return o.name == n.name; });
+          !n.name.empty() && other != plan.neighbours.end())
+        table.error("E208", table.place_of("name"),
+                    "name: " + quoted(n.name) + " is the name of another neighbour or utility",
+                    "each has findings of its own name; the other one is in line " + std::to_string(other->where.line));
       n.where = reading.complaints.position(tables[i]->place);
       table.finish();
       plan.neighbours.push_back(std::move(n));

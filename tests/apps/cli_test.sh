@@ -108,6 +108,8 @@ TEXT
   expect 2 "$topple" study in.toml --evaluator "$model" --seed 9223372036854775808 -o e; has err "2^63"
   expect 2 "$topple" study in.toml --evaluator "$model" -o in.toml; has err "E801"; has err "in.toml"
   expect 2 "$topple" study export s -o in.toml; has err "E801"
+  # results that cannot be written
+  expect 1 "$topple" study in.toml --evaluator "$model" -o in.toml/e; has err "the folder cannot be made"
   expect 2 "$topple" study in.toml --evaluator /nowhere/model -o e; has err "E827"
   [ ! -e e/study.sqlite ] || { echo "a store without a run"; failures=$((failures + 1)); }
   expect 0 "$topple" study in.toml --evaluator "$model" -o e --samples 20

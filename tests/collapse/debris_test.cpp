@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "collapse/debris_tables.h"
 #include "collapse/outcome.h"
@@ -90,6 +91,55 @@ TEST(DebrisTables, HoldEverySquareAndEveryCorner) {
   const std::string outlines = make_outline_table(make_three());
   EXPECT_EQ(std::count(outlines.begin(), outlines.end(), '\n'), 1 + 4 * 4);  // four rectangles
   EXPECT_EQ(make_height_table({}, 0.5), "x [m],y [m],height [m]\r\n");
+}
+
+/// One part of 1 m x 1 m over a corner or a side of a footprint of 4 m x 4 m.
+record::Record make_one(double x, double y) {
+  record::Record r = make_three();
+  r.bodies.resize(1);
+  r.position = {static_cast<float>(x), static_cast<float>(y), 1};
+  r.orientation.resize(4);
+  return r;
+}
+
+TEST(Reach, IsTheDistanceFromTheFootprintInPlan) {
+  const Reach corner = calc_reach(make_one(6.5, 7.5), 0);  // its farthest corner 3 m and 4 m beyond
+  EXPECT_NEAR(corner.side[1], 3, 1e-6);
+  EXPECT_NEAR(corner.side[3], 4, 1e-6);
+  EXPECT_NEAR(corner.largest, 5, 1e-6);
+  EXPECT_NEAR(corner.most_mass, 5, 1e-6);
+  EXPECT_NEAR(calc_reach(make_one(6.5, 2), 0).largest, 3, 1e-6);
+  EXPECT_EQ(calc_reach(make_one(2, 2), 0).largest, 0);
+}
+
+TEST(Reach, IsTheSameWhicheverWaySomethingLies) {
+  // a round footprint of 2 m, a part that reaches from it to 10 m along a direction
+  for (const double azimuth : {0.0, 0.3, 0.785, 1.2}) {
+    record::Record r = make_one(0, 0);
+    r.building_outline.clear();
+    for (int i = 0; i < 64; ++i) {
+      const double a = azimuth + i * std::acos(-1.0) / 32;
+      r.building_outline.push_back({2 * std::cos(a), 2 * std::sin(a)});
+    }
+    r.bodies[0].shapes = {{{}, {4, 0, 0.5}, "concrete"}};
+    r.position = {static_cast<float>(6 * std::cos(azimuth)), static_cast<float>(6 * std::sin(azimuth)), 0.5F};
+    r.orientation = {static_cast<float>(std::cos(azimuth / 2)), 0, 0, static_cast<float>(std::sin(azimuth / 2))};
+    EXPECT_NEAR(calc_reach(r, 0).largest, 8, 1e-5) << azimuth;
+  }
+}
+
+TEST(Debris, LowestPointOverAnArea) {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  const PlacedBox flat{{{0, 0, 5}, {}}, {2, 1, 0.5}};
+  EXPECT_NEAR(calc_lowest_over(flat, kSquare), 4.5, 1e-12);                                       // within the box
+  EXPECT_NEAR(calc_lowest_over(flat, {{-9, -9}, {9, -9}, {9, 9}, {-9, 9}}), 4.5, 1e-12);          // around it
+  EXPECT_NEAR(calc_lowest_over(flat, {{-0.1, -9}, {0.1, -9}, {0.1, 9}, {-0.1, 9}}), 4.5, 1e-12);  // across it
+  EXPECT_EQ(calc_lowest_over(flat, {{3, 0}, {4, 0}, {4, 1}}), infinity);
+  // one end of a leaning bar is on the ground, the other one over the square: z = x there
+  const double eighth = std::acos(-1.0) / 4, length = 2 * std::sqrt(2.0);
+  const PlacedBox bar{{{-1, 0.5, 2}, exp_rotation({0, -eighth, 0})}, {length, 0.1, 0}};
+  EXPECT_NEAR(calc_lowest_over(bar, kSquare), 3, 1e-12);
+  EXPECT_NEAR(calc_lowest_over(bar, {{-4, 0}, {4, 0}, {4, 1}, {-4, 1}}), 0, 1e-12);
 }
 
 }  // namespace

@@ -198,6 +198,7 @@ TEST(Manager, SaysOnceOfAChargeThatItLiesTooHighAndWhere) {
   EXPECT_EQ(found[0].code, "E621");
   // storeys of 3 m above beams of 0.5 m
   EXPECT_EQ(found[0].message, "C-A1-0 and 2 more: a charge lies in the joint above the clear height of 2.5 m");
+  EXPECT_EQ(found[0].help, "its position must be below 2.48 m, 2 cm under the joint");
   const size_t at = text.find("\"2.5 m\"");
   EXPECT_EQ(found[0].where.line, 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
   EXPECT_EQ(found[0].where.column, static_cast<int>(at - text.rfind('\n', at)));

@@ -135,5 +135,25 @@ TEST(Mechanism, TiltIsSignedTowardsTheDirection) {
   EXPECT_NEAR(calc_tilt(exp_rotation({-0.3, 0, 0}), {0, 1, 0}), 0.3, 1e-12);
 }
 
+TEST(Mechanism, StructuresThatStandApartHaveOneVerdictIfTheyAgree) {
+  const auto verdict = [](const std::string& name, double tilt, double moved) {
+    Mechanism m;
+    m.name = name, m.text = "It is " + name + ".", m.tilt = tilt, m.moved = moved;
+    return m;
+  };
+  const Mechanism topple = verdict("topple", 1, 1), stands = verdict("stands", 0, 0),
+                  wrong = verdict("wrong direction", 2, 1);
+  const auto join = [](const std::vector<Mechanism>& all) { return join_mechanisms({"K", "L"}, all, {3, 1}); };
+  EXPECT_EQ(join_mechanisms({""}, {topple}, {1}).text, "It is topple.");
+  EXPECT_EQ(join({topple, topple}).name, "topple");
+  EXPECT_EQ(join({topple, topple}).text,
+            "Separate structures are judged one by one. Verdict on K: topple. Verdict on L: topple. In detail, of K: "
+            "It is topple.");
+  EXPECT_EQ(join({topple, stands}).name, "partial");
+  EXPECT_EQ(join({topple, stands}).moved, 0.75);
+  EXPECT_EQ(join({topple, wrong}).name, "wrong direction");
+  EXPECT_EQ(join({topple, wrong}).tilt, 2);
+}
+
 }  // namespace
 }  // namespace topple::collapse

@@ -180,5 +180,48 @@ TEST(RunReplay, ThreadsDoNotChangeTheResult) {
   }
 }
 
+std::string neighbour(const std::string& name, const std::string& x0, const std::string& x1,
+                      const std::string& more = "") {
+  return "[[site.neighbour]]\nname = \"" + name + "\"\nfootprint = [[\"" + x0 + "\", \"0 m\"], [\"" + x1 +
+         "\", \"0 m\"], [\"" + x1 + "\", \"1 m\"], [\"" + x0 + "\", \"1 m\"]]\n" + more;
+}
+
+TEST(Run, ANeighbourIsSaidToBeUnderWhatDoesNotComeDownThere) {
+  const record::Record r =
+      run_plan(read(house(neighbour("under", "2 m", "3 m") + neighbour("foot", "-1 m", "1 m"), "0.05 s")),
+               default_knowledge(), {}, {});
+  EXPECT_THAT(finding(r, "clearance.under").text, testing::StartsWith("Nothing lands on it, but parts are over it: "));
+  EXPECT_THAT(finding(r, "clearance.under").text, testing::HasSubstr(" comes down to 2.5 m above the ground there"));
+  EXPECT_EQ(finding(r, "clearance.foot").text, "C-A1-0 stands on it from the start.");
+}
+
+TEST(Run, ALimitThatIsJustBrokenShowsIt) {
+  // columns reach to 5.15 m
+  const record::Record r =
+      run_plan(read(house(neighbour("near", "9.99 m", "20 m", "clearance = \"4.849 m\"\n"), "0.05 s")),
+               default_knowledge(), {}, {});
+  EXPECT_EQ(finding(r, "clearance.near").status, record::Status::Bad);
+  EXPECT_THAT(finding(r, "clearance.near").text, testing::HasSubstr(" comes to 4.84 m at "));
+  EXPECT_THAT(finding(r, "clearance.near").text, testing::HasSubstr("the limit is 4.85 m."));
+}
+
+TEST(Run, ChargesThatFailAreNotCountedAsFired) {
+  const record::Record r =
+      run_plan(read(house(charge("C-A1-0", "0 s") + charge("C-A2-0", "0.02 s", "fails = true"), "0.05 s")),
+               default_knowledge(), {}, {});
+  EXPECT_THAT(finding(r, "events").text, testing::StartsWith("1 charges, "));
+  EXPECT_THAT(finding(r, "events").text, testing::EndsWith(" 1 charge fails, as the plan says."));
+}
+
+TEST(Run, NoRigidBlockStandsBesideChargesAboveTheGroundStorey) {
+  const auto has_block = [](const std::string& members) {
+    const record::Record r = run_plan(read(house(charge(members), "0.05 s")), default_knowledge(), {}, {});
+    return std::any_of(r.series.begin(), r.series.end(),
+                       [](const auto& s) { return s.id == "tilt_angle_rigid_block"; });
+  };
+  EXPECT_TRUE(has_block("C-A*-0"));
+  EXPECT_FALSE(has_block("C-A*-1"));
+}
+
 }  // namespace
 }  // namespace topple::collapse

@@ -234,7 +234,11 @@ TEST(ShaftPhysics, ItFallsWhereItsMouthPointsAndReachesItsHeight) {
   const std::string text =
       tower(slender + "as_outer = \"6 cm2/m\"\n",
             "[[stage]]\ntime = \"0.2 s\"\n[[stage.charge]]\nmembers = \"tower\"\nposition = \"2 m\"\n"
-            "destroyed_length = \"1.5 m\"\nazimuth = \"50 deg\"\nopening = \"220 deg\"\n",
+            "destroyed_length = \"1.5 m\"\nazimuth = \"50 deg\"\nopening = \"220 deg\"\n"
+            // 25 to 33 m along the fall
+            "[[site.neighbour]]\nname = \"House\"\nfootprint = [[\"16 m\", \"19 m\"], [\"21 m\", \"19 m\"], [\"21 m\", "
+            "\"25 m\"], "
+            "[\"16 m\", \"25 m\"]]\n",
             "10 s");
   const record::Record r = run_plan(read(text), default_knowledge(), {}, {});
   const auto finding = [&](const std::string& id) {
@@ -256,6 +260,13 @@ TEST(ShaftPhysics, ItFallsWhereItsMouthPointsAndReachesItsHeight) {
   }
   EXPECT_GT(farthest, 0.8 * 40);
   EXPECT_GT(within / mass, 0.65);
+  // it is over the neighbour long before it lies there
+  const auto on_it =
+      std::find_if(r.findings.begin(), r.findings.end(), [](const auto& f) { return f.title == "House"; });
+  ASSERT_NE(on_it, r.findings.end());
+  const size_t at = on_it->text.find(" lands on it at ");
+  ASSERT_NE(at, std::string::npos) << on_it->text;
+  EXPECT_GT(std::stod(on_it->text.substr(at + 16)), finding("touchdown.first").value - 0.1);
 }
 
 TEST(ShaftPhysics, ASmallMouthLeavesItStanding) {
@@ -282,6 +293,125 @@ TEST(Shaft, WhatIsNotModelledSaysSo) {
       "destroyed_length = \"2 m\"\nazimuth = \"0 deg\"\nopening = \"200 deg\"\n";
   ModelMap map;
   EXPECT_THROW(make_model(read(tower(slender, near_each_other, "1 s")), default_knowledge(), map), InputError);
+}
+
+/// A charge or a cut in the middle of the lower part, with a sector or all around.
+std::string sector(const std::string& azimuth, const std::string& opening) {
+  if (azimuth.empty()) return "";
+  return "azimuth = \"" + azimuth + " deg\"\nopening = \"" + opening + " deg\"\n";
+}
+
+TEST(Shaft, AChargeTakesItsShareOfTheRingWhereverItsMiddleLies) {
+  const auto share = [](const std::string& where) {
+    const Built b(tower(slender,
+                        "[[stage]]\ntime = \"0.2 s\"\n[[stage.charge]]\nmembers = \"tower\"\nposition = \"2.5 m\"\n"
+                        "destroyed_length = \"2 m\"\n" +
+                            where,
+                        "1 s"));
+    double mass = 0;
+    for (const DebrisEntry& d : b.map.debris) mass += d.mass;
+    return mass / (b.mass() * 2 / 40);
+  };
+  EXPECT_NEAR(share(""), 1, 1e-9);
+  for (const char* azimuth : {"0", "10", "45", "90", "135", "180", "-180", "225", "270", "-90", "359", "360", "-360"})
+    for (const double opening : {20.0, 120.0, 180.0, 270.0, 359.0, 360.0})
+      EXPECT_NEAR(share(sector(azimuth, std::to_string(opening))), opening / 360, 1e-9) << azimuth << " " << opening;
+}
+
+TEST(Shaft, ACutAllAroundWeakensTheRingBehindAMouthAsItsHalvesDo) {
+  const auto cut = [](const std::string& more) {
+    return "[[preparation.weaken]]\nmembers = \"tower\"\nat = \"2.5 m\"\nheight = \"2 m\"\ncut_concrete = 0.5\n"
+           "cut_bars = 0.5\n" +
+           more;
+  };
+  const auto resistance = [](const std::string& cuts) {
+    const Built b(tower(slender + strong, cuts + mouth("2 m", "200 deg"), "1 s"));
+    const mbs::LawId law = b.map.ground_columns.at(0).element.law;
+    const std::vector<double>& m = b.model.laws[static_cast<size_t>(law.index)].moment_z.positive;
+    return *std::max_element(m.begin(), m.end());
+  };
+  const double halves = resistance(cut(sector("90", "180")) + cut(sector("270", "180")));
+  EXPECT_LT(halves, 0.6 * resistance(""));
+  // the halves' fibres lie elsewhere
+  EXPECT_NEAR(resistance(cut("")), halves, 1e-4 * halves);
+  EXPECT_NEAR(resistance(cut(sector("180", "360"))), halves, 1e-4 * halves);
+}
+
+TEST(Shaft, NothingHoldsWhereACutGoesAllAround) {
+  for (const char* azimuth : {"", "0", "90", "180"}) {
+    const std::string cut =
+        "[[preparation.weaken]]\nmembers = \"tower\"\nat = \"2.5 m\"\ncut_concrete = 1\ncut_bars = 1\n" +
+        sector(azimuth, "360");
+    ModelMap map;
+    EXPECT_THROW(
+        make_model(read(tower(slender + strong, cut + mouth("2 m", "200 deg"), "1 s")), default_knowledge(), map),
+        InputError)
+        << azimuth;
+  }
+}
+
+/// A second, lower shaft far from the first.
+const std::string second =
+    "[[shafts]]\nname = \"low\"\nposition = [\"100 m\", \"0 m\"]\nconcrete = \"C\"\nsteel = \"S\"\nheight = \"20 m\"\n"
+    "diameter = \"3 m\"\nthickness = \"20 cm\"\n";
+
+TEST(Structures, WhatNoChargeActsOnIsNotJudged) {
+  const Built b(tower(slender, second + mouth("2 m", "200 deg"), "1 s"));
+  ASSERT_EQ(b.map.structures.size(), 1u);
+  EXPECT_EQ(b.map.structures[0].name, "tower");
+  for (const BodyEntry& body : b.map.bodies) {
+    if (body.kind == "stump") continue;
+    const bool is_low = body.name.substr(0, 3) == "low";
+    EXPECT_EQ(body.structure, is_low ? -1 : 0) << body.name;
+    EXPECT_EQ(body.is_upper, !is_low) << body.name;
+  }
+  ASSERT_FALSE(b.map.notes.empty());
+  EXPECT_EQ(b.map.notes.back(),
+            "No charge acts on 1 of 2 separate structures (low): the mechanism is judged without what stands there.");
+}
+
+TEST(Structures, ThoseThatChargesActOnAreJudgedOneByOneTheHeaviestFirst) {
+  std::string fired = mouth("2 m", "200 deg");
+  fired +=
+      "[[stage.charge]]\nmembers = \"low\"\nposition = \"2.5 m\"\ndestroyed_length = \"2 m\"\n"
+      "azimuth = \"0 deg\"\nopening = \"200 deg\"\n";
+  const Built b(tower(slender, second + fired, "1 s"));
+  ASSERT_EQ(b.map.structures.size(), 2u);
+  EXPECT_EQ(b.map.structures[0].name, "tower");
+  EXPECT_EQ(b.map.structures[1].name, "low");
+  EXPECT_NEAR(b.map.structures[0].mass / b.map.structures[1].mass, 37.5 / 17.5, 1e-6);
+  EXPECT_NE(b.map.notes.back().find("Charges act on 2 separate structures (tower, low)"), std::string::npos);
+}
+
+TEST(Structures, TheUpperBlockOfAShaftStandsOnItsLowestMouth) {
+  std::string high = mouth("2 m", "200 deg");
+  high.replace(high.find("2.5 m"), 5, "30 m");
+  const Built b(tower(slender, high, "1 s"));
+  double upper = 0;
+  for (size_t i = 0; i < b.model.bodies.size(); ++i)
+    if (b.map.bodies[i].is_upper) upper += b.model.bodies[i].mass;
+  EXPECT_NEAR(upper, b.mass() / 4, 1e-9 * b.mass());
+}
+
+std::string text_of(const record::Record& r, const std::string& id) {
+  for (const record::Finding& f : r.findings)
+    if (f.id == id) return f.text;
+  return "";
+}
+
+TEST(ShaftPhysics, TheRigidBlockHasTheMassAboveItsMouth) {
+  const std::string stiff = slender + strong;
+  const std::string low =
+      text_of(run_plan(read(tower(stiff, second + mouth("2 m", "200 deg"), "1.3 s")), default_knowledge(), {}, {}),
+              "rigid_block");
+  const double t = 2500 * kPi * (1.5 * 1.5 - 1.3 * 1.3) * 1e-3;  // per metre
+  // a fixed stump below the middle of the mouth; of the mouth's upper half 160 of 360 degrees stay
+  EXPECT_NE(low.find(std::to_string(std::lround(37.5 * t)) + " t on 1 plastic hinges"), std::string::npos) << low;
+  std::string high = mouth("2 m", "200 deg");
+  high.replace(high.find("2.5 m"), 5, "30 m");
+  const std::string top =
+      text_of(run_plan(read(tower(stiff, high, "1.3 s")), default_knowledge(), {}, {}), "rigid_block");
+  EXPECT_NE(top.find(std::to_string(std::lround(10 * t)) + " t on 1 plastic hinges"), std::string::npos) << top;
 }
 
 }  // namespace

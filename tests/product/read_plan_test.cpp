@@ -545,6 +545,22 @@ TEST(PlanContents, FloorLoadsAreMasses) {
   EXPECT_NEAR(plan.storey_loads[1], 1000 / 9.81, 1e-9);
 }
 
+TEST(PlanContents, NeighboursAndUtilitiesHaveNamesOfTheirOwn) {
+  const std::string more =
+      "[[site.utility]]\nname = \"House\"\nfootprint = [[\"40 m\", \"0 m\"], [\"41 m\", \"0 m\"], [\"41 m\", \"9 "
+      "m\"]]\n";
+  const std::string doubled = small_plan() + more;
+  const std::string name = taken(small_plan()).neighbours.at(0).name;
+  const std::string same =
+      replaced(doubled, "name = \"House\"\nfootprint = [[\"40 m\"", "name = \"" + name + "\"\nfootprint = [[\"40 m\"");
+  const std::vector<Diagnostic> all = complaints_about(same);
+  ASSERT_EQ(all.size(), 1u);
+  EXPECT_EQ(all[0].code, "E208");
+  EXPECT_THAT(all[0].message, testing::HasSubstr("is the name of another neighbour or utility"));
+  const size_t at = same.find("name = \"" + name + "\"\nfootprint = [[\"40 m\"");
+  EXPECT_EQ(all[0].where.line, 1 + std::count(same.begin(), same.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
+}
+
 TEST(PlanContents, FootprintsTurnCounterClockwise) {
   const std::string text = replaced(small_plan(), "[[\"0 m\", \"20 m\"], [\"10 m\", \"20 m\"], [\"10 m\", \"30 m\"]]",
                                     "[[\"10 m\", \"30 m\"], [\"10 m\", \"20 m\"], [\"0 m\", \"20 m\"]]");

@@ -100,7 +100,7 @@ describe("the German table", () => {
 
   it("knows every sentence that findings, events, values, notes and studies tell", async () => {
     const tellers = {
-      collapse: ["findings", "mechanism", "recorder", "plan_record", "vibration", "shafts", "live_model", "manager", "run"],
+      collapse: ["findings", "mechanism", "outcome", "structures", "recorder", "plan_record", "vibration", "shafts", "live_model", "manager", "run"],
       farfield: ["run", "fragments", "whole", "motion"],
       study: ["story", "plan_model"],
       fem: ["relaxation"],
