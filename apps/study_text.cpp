@@ -120,17 +120,21 @@ void print_drivers(std::FILE* out, const Problem& p, const StudyResult& r) {
   }
   if (in.knowing.empty()) return;
   print_heading(out, "If an input were known to have its core value, possibilities would be (at least)");
+  bool has_open = false;
   for (const auto& f : in.knowing) {
     std::string text = study::make_short_names(p.inputs)[static_cast<std::size_t>(f.input)] + ":";
     for (const auto& c : r.alpha.classes) {
       double degree = 0;
+      bool is_converged = true;
       for (const auto& k : f.classes)
-        if (k.outcome == c.outcome) degree = k.possibility;
-      text += fmt::format(" {} {:.2f},", study::words_of_outcome(r, c.outcome), degree);
+        if (k.outcome == c.outcome) degree = k.possibility, is_converged = k.converged;
+      text += fmt::format(" {} {:.2f}{},", study::words_of_outcome(r, c.outcome), degree, is_converged ? "" : "*");
+      has_open = has_open || !is_converged;
     }
     text.pop_back();
     print_line(out, text);
   }
+  if (has_open) print_line(out, "* no search has ended there; it may be higher");
 }
 
 void print_boxes(std::FILE* out, const Problem& p, const StudyResult& r) {
@@ -145,8 +149,9 @@ void print_boxes(std::FILE* out, const Problem& p, const StudyResult& r) {
     std::string text = fmt::format("box {}, {} % of the support: ", k + 1, words_of_percent(100 * b.volume));
     for (std::size_t i = 0; i < p.inputs.size(); ++i)
       text += fmt::format("{}{} {} to {}", i ? ", " : "", study::make_short_names(p.inputs)[i],
-                          study::words_of_number(b.box.lower[i] / p.inputs[i].unit_value),
-                          study::words_of_value(p.inputs[i], b.box.upper[i]));
+                          study::words_of_number(b.box.lower[i] / p.inputs[i].unit_value,
+                                                 p.space.inputs[i].width() / p.inputs[i].unit_value),
+                          study::words_of_value(p.inputs[i], b.box.upper[i], p.space.inputs[i].width()));
     print_line(out, text);
     print_line(out, study::tell_guarantee(b, p.space.has_interaction()));
   }

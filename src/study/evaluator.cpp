@@ -24,6 +24,15 @@ int count_characters(const std::string& text, std::size_t offset) {
   return count;
 }
 
+/// Whether a line is the beginning of a JSON text.
+bool breaks_off(const std::string& line) {
+  try {
+    return json::parse(line).is_discarded();
+  } catch (const json::parse_error& e) { return e.byte > line.size(); } catch (const json::exception&) {
+  }
+  return false;
+}
+
 /// Where a member stands in the line, for the caret.
 std::size_t find_member(const std::string& line, const std::string& name) {
   const std::size_t found = line.find(json(name).dump(-1, ' ', false, json::error_handler_t::replace));
@@ -224,6 +233,7 @@ class Evaluator {
         return;
       }
       if (line.find_first_not_of(" \t") == std::string::npos) continue;
+      if (!process_.is_whole() && breaks_off(line)) continue;  // it ended while it wrote
       while (next < points.size() && is_answered[next]) ++next;
       int id = first_ + static_cast<int>(next);
       Answer a = read_answer_line(line, command_, id);

@@ -281,7 +281,7 @@ class Manager {
       r.possibilities = uncertainty::find_possibilities(problem_.space, asker, p);
       if (!asker.is_cancelled() && budget.knowing > 0) {
         asker.set_limit(budget.outcomes);
-        r.insights.knowing = uncertainty::find_outcomes_of_knowing(problem_.space, asker, p, budget.knowing);
+        find_knowing(r, asker, p);
       }
       has_more = true;
     }
@@ -339,8 +339,16 @@ class Manager {
   }
 
  private:
+  /// Outcomes with an input known: the runs that are there are shared evenly.
+  void find_knowing(StudyResult& r, uncertainty::Asker& asker, const uncertainty::PossibilityOptions& options) {
+    const auto axes = std::count_if(problem_.space.inputs.begin(), problem_.space.inputs.end(),
+                                    [](const auto& f) { return f.width() > 0; });
+    const int each = asker.rest() / std::max(1, static_cast<int>(axes));
+    r.insights.knowing = uncertainty::find_outcomes_of_knowing(problem_.space, asker, options, each);
+  }
+
   /// What was kept for others and not used up goes to searches that had to end: half of it to possibilities, which take
-  /// what they need, the rest to bounds. True if there was any.
+  /// what they need, then to outcomes with an input known, the rest to bounds. True if there was any.
   bool give_back(StudyResult& r, uncertainty::Asker& asker, uncertainty::AlphaSearch& search,
                  const uncertainty::PossibilityOptions& options, int limit) {
     using uncertainty::Ending;
@@ -356,7 +364,16 @@ class Manager {
     };
     asker.set_limit(limit);
     find_more_possibilities((asker.rest() + 1) / 2);
-    if (r.alpha.ending == Ending::LimitReached && asker.can_go_on()) {
+    const bool is_open = std::any_of(r.insights.knowing.begin(), r.insights.knowing.end(), [](const auto& f) {
+      return std::any_of(f.classes.begin(), f.classes.end(), [](const auto& c) { return !c.converged; });
+    });
+    if (is_open && asker.can_go_on()) {
+      if (r.alpha.can_go_on) asker.set_limit(limit - asker.rest() / 2);
+      find_knowing(r, asker, options);
+      asker.set_limit(limit);
+      has_more = true;
+    }
+    if (r.alpha.can_go_on && asker.can_go_on()) {
       r.alpha = search.go_on();
       has_more = true;
     }

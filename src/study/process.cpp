@@ -107,6 +107,7 @@ Process::Event Process::next_line(std::string& line, double seconds, const std::
   const auto start = Clock::now();
   constexpr int patience = 50;  // for a cancellation [ms]
   for (;;) {
+    is_whole_ = true;
     if (take_line(line)) return Event::Line;
     if (read_.size() > longest_line) {
       line = read_.substr(0, 100);
@@ -116,6 +117,7 @@ Process::Event Process::next_line(std::string& line, double seconds, const std::
       // a last line without its end
       if (read_.empty()) return Event::Closed;
       line = std::exchange(read_, {});
+      is_whole_ = false;
       searched_ = 0;
       return Event::Line;
     }

@@ -29,6 +29,8 @@ class Process {
   /// Waits for the next line of its output; `seconds` <= 0: for ever. Closed: it ended, or closed its output. TooLong:
   /// more than longest_line bytes without an end; `line` has the first hundred of them.
   Event next_line(std::string& line, double seconds, const std::atomic<bool>& cancel);
+  /// Whether the last line had an end: output may break off within one.
+  bool is_whole() const { return is_whole_; }
   /// How it ended, after Closed: "exit code 3", "signal 11 (Segmentation fault)", with the end of what it wrote on
   /// standard error. Empty for exit code 0 without words. It is not running any more.
   std::string find_ending();
@@ -44,7 +46,7 @@ class Process {
   int in_ = -1, out_ = -1, error_ = -1;
   std::string to_write_, read_, said_;
   std::size_t searched_ = 0;  // bytes of read_ without an end of a line
-  bool close_after_ = false;
+  bool close_after_ = false, is_whole_ = true;
 };
 
 }  // namespace topple::study

@@ -102,9 +102,11 @@ json insights_json(const Problem& p, const StudyResult& r) {
     json classes = json::array();
     for (const auto& c : r.alpha.classes) {
       double degree = 0;
+      bool is_converged = true;
       for (const auto& k : f.classes)
-        if (k.outcome == c.outcome) degree = k.possibility;
-      classes.push_back({{"name", name_of_outcome(r, c.outcome)}, {"possibility", degree}});
+        if (k.outcome == c.outcome) degree = k.possibility, is_converged = k.converged;
+      classes.push_back(
+          {{"name", name_of_outcome(r, c.outcome)}, {"possibility", degree}, {"converged", is_converged}});
     }
     out["known"].push_back({{"input", p.inputs.at(static_cast<std::size_t>(f.input)).name}, {"outcomes", classes}});
   }

@@ -84,10 +84,11 @@ std::string tell_outputs(const Problem& p, const StudyResult& r, const uncertain
     const auto& levels = r.alpha.outputs[o].levels;
     if (o >= core.result.values.size() || levels.empty() || levels.front().lower.sample < 0) continue;
     const Quantity q = find_output(p, r.outputs[o]);
+    const double width = levels.front().upper.value - levels.front().lower.value;
     text += fmt::format("{}With the core values {} is {}; over the whole support it lies between {} and {}.",
-                        text.empty() ? "" : " ", q.name, words_of_value(q, core.result.values[o]),
-                        words_of_number(levels.front().lower.value / q.unit_value),
-                        words_of_value(q, levels.front().upper.value));
+                        text.empty() ? "" : " ", q.name, words_of_value(q, core.result.values[o], width),
+                        words_of_number(levels.front().lower.value / q.unit_value, width / q.unit_value),
+                        words_of_value(q, levels.front().upper.value, width));
   }
   if (r.outputs.size() > most) text += fmt::format(" And {} more outputs.", r.outputs.size() - most);
   return text;
@@ -143,13 +144,14 @@ void tell_splits(const Problem& p, const StudyResult& r, std::vector<Sentence>& 
     const Quantity& q = p.inputs[static_cast<std::size_t>(s.input)];
     const bool is_below = s.below > s.above;
     const double more = std::max(s.below, s.above), less = std::min(s.below, s.above);
-    out.push_back(
-        {"split." + name_of_outcome(r, s.outcome),
-         fmt::format("{} goes with {} {} {}: {} of the {} spread runs there, {} of the {} others.",
-                     quoted(name_of_outcome(r, s.outcome)), names[static_cast<std::size_t>(s.input)],
-                     is_below ? "below" : "above", words_of_value(q, s.value), percent(more),
-                     is_below ? s.below_runs : s.above_runs, percent(less), is_below ? s.above_runs : s.below_runs),
-         Status::Info});
+    out.push_back({"split." + name_of_outcome(r, s.outcome),
+                   fmt::format("{} goes with {} {} {}: {} of the {} spread runs there, {} of the {} others.",
+                               quoted(name_of_outcome(r, s.outcome)), names[static_cast<std::size_t>(s.input)],
+                               is_below ? "below" : "above",
+                               words_of_value(q, s.value, p.space.inputs[static_cast<std::size_t>(s.input)].width()),
+                               percent(more), is_below ? s.below_runs : s.above_runs, percent(less),
+                               is_below ? s.above_runs : s.below_runs),
+                   Status::Info});
   }
 }
 
@@ -237,7 +239,12 @@ std::string words_of_possibility(double degree) {
   return "not found";
 }
 
-std::string words_of_number(double value) {
+std::string words_of_number(double value, double width) {
+  // a thousandth of the width
+  if (width > 0 && value != 0) {
+    const int digits = static_cast<int>(std::floor(std::log10(std::abs(value))) - std::floor(std::log10(width))) + 4;
+    if (digits > 4) return fmt::format("{:.{}g}", value, std::min(digits, 17));
+  }
   // four digits; no powers of ten for what people write without
   if (std::abs(value) >= 1e4 && std::abs(value) < 1e7) {
     const double unit = std::pow(10, std::floor(std::log10(std::abs(value))) - 3);
@@ -246,8 +253,8 @@ std::string words_of_number(double value) {
   return fmt::format("{:.4g}", value);
 }
 
-std::string words_of_value(const Quantity& q, double value) {
-  const std::string number = words_of_number(value / q.unit_value);
+std::string words_of_value(const Quantity& q, double value, double width) {
+  const std::string number = words_of_number(value / q.unit_value, width / q.unit_value);
   return q.unit.empty() ? number : number + " " + q.unit;
 }
 
@@ -258,8 +265,9 @@ std::string words_of_point(const Problem& p, const Point& x) {
     const uncertainty::FuzzyNumber& f = p.space.inputs[i];
     const double away = std::max({x[i] - f.core().right, f.core().left - x[i], 0.0});
     if (!(away > 0.01 * f.width())) continue;
-    text += fmt::format("{}{} {} (core {})", text.empty() ? "" : ", ", names[i], words_of_value(p.inputs[i], x[i]),
-                        words_of_number(f.centre() / p.inputs[i].unit_value));
+    text += fmt::format("{}{} {} (core {})", text.empty() ? "" : ", ", names[i],
+                        words_of_value(p.inputs[i], x[i], f.width()),
+                        words_of_number(f.centre() / p.inputs[i].unit_value, f.width() / p.inputs[i].unit_value));
   }
   return text.empty() ? "values within a hundredth of the core" : text;
 }
@@ -408,9 +416,10 @@ std::vector<NotableRun> list_notable_runs(const Problem& p, const StudyResult& r
     if (r.alpha.outputs[o].levels.empty()) continue;
     const auto& support = r.alpha.outputs[o].levels.front();
     const Quantity q = find_output(p, r.outputs[o]);
+    const double width = support.upper.value - support.lower.value;
     for (const auto& [bound, word] : {std::pair(&support.lower, "least"), std::pair(&support.upper, "largest")})
       if (bound->sample >= 0)
-        runs.push_back({bound->sample, fmt::format("{} {}: {}", word, q.name, words_of_value(q, bound->value))});
+        runs.push_back({bound->sample, fmt::format("{} {}: {}", word, q.name, words_of_value(q, bound->value, width))});
   }
   return runs;
 }

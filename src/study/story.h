@@ -30,10 +30,10 @@ struct Split {
 /// Of each outcome class among spread samples, by outcome. A side holds at least a tenth of the runs.
 std::vector<Split> find_splits(const uncertainty::Space&, const uncertainty::Archive&, const std::vector<int>& spread);
 
-/// Four digits of a number for people.
-std::string words_of_number(double);
+/// Four digits of a number for people, or as many as tell values apart that lie within `width`, if it is given.
+std::string words_of_number(double, double width = 0);
 /// A value and its unit for people, from what results hold.
-std::string words_of_value(const Quantity&, double value);
+std::string words_of_value(const Quantity&, double value, double width = 0);
 /// "fc 20.1 N/mm2 (core 25), fy 400 N/mm2 (core 420)": the fuzzy inputs that lie off their core by more than a
 /// hundredth of their support, or "the core values".
 std::string words_of_point(const Problem&, const Point&);

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "base/error.h"
+#include "uncertainty/kink_search.h"
 #include "uncertainty/local_search.h"
 
 namespace topple::uncertainty {
@@ -17,6 +18,8 @@ namespace {
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr int any_class = -2;
+constexpr int most_in_vain = 5;           // searches along kinks that neither end nor gain
+constexpr double least_edge_gain = 1e-6;  // along a kink, as a part of an output's width
 
 std::vector<double> check_levels(std::vector<double> levels) {
   for (const double a : levels)
@@ -61,10 +64,8 @@ class Optimisation {
     explore();
     check_faces(false);
     search_from_best(false);
-    if (has_many_inputs()) {
-      recheck(false);
-      restart_until_settled(asker_.limit() / 5);
-    }
+    if (has_many_inputs() || !edges_.empty()) recheck(false);
+    if (has_many_inputs()) { restart_until_settled(asker_.limit() / 5); }
     return search_on(true);
   }
 
@@ -80,15 +81,19 @@ class Optimisation {
   AlphaResult search_on(bool is_first) {
     const int limit = asker_.limit();
     if (options_.search_classes && !make_goals(true).empty()) asker_.set_limit(limit - asker_.rest() / 7);
-    for (int idle = 0; asker_.can_go_on() && idle < options_.patience;) {
+    if (!kinked_.empty()) asker_.set_limit(asker_.limit() - asker_.rest() / 10);
+    for (int idle = 0; asker_.can_go_on() && idle < (has_valleys() ? 2 : 1) * options_.patience;) {
       const std::vector<double> before = calc_bounds();
       if (rounds_ > 0) spread(0.25);
-      if (!has_many_inputs()) scan();
+      if (!has_many_inputs()) scan(), share_optima();
       for (int k = 0; k < 2; ++k) restart_faces(true);
-      search_dispersed();
+      const bool has_starts = search_dispersed();
       recheck(false);
       idle = has_gained(before) ? 0 : idle + 1;
+      if (idle >= options_.patience && !unfinished_) is_done_ = true;
       ++rounds_;
+      // no sample is left that stands out among its neighbours
+      if (idle >= options_.patience && !has_starts) break;
     }
     if (has_many_inputs()) {
       restart_until_settled(0);
@@ -96,12 +101,16 @@ class Optimisation {
       unfinished_ = unfinished_ || asker_.rest() == 0;
     }
     asker_.set_limit(limit);
+    if (!kinked_.empty()) recheck(false);
     if (options_.search_classes) {
       if (is_first) search_from_best(true);
       recheck(true);
     }
+    const bool is_cut = unfinished_;
+    if (is_done_ && !has_many_inputs()) unfinished_ = !is_all_settled();
     show(true);
     AlphaResult result = collect();
+    result.can_go_on = is_cut;
     result.ending = asker_.is_cancelled() ? Ending::Cancelled : unfinished_ ? Ending::LimitReached : Ending::Complete;
     return result;
   }
@@ -233,18 +242,41 @@ class Optimisation {
     const Region& r = regions_[goal.level];
     auto& used = starts_[key_of(goal)];
     const double least = 0.2 * std::pow(0.7, rounds_);
-    for (const auto& c : all) {
-      if (static_cast<int>(starts.size()) == count) break;
-      const bool apart = std::all_of(used.begin(), used.end(), [&](int other) {
-        double distance = 0;
-        for (const int i : r.axes)
-          distance = std::max(distance, std::abs(asker_.archive()[other].x[i] - asker_.archive()[c.sample].x[i]) /
-                                            (r.box.upper[i] - r.box.lower[i]));
-        return distance > least;
-      });
-      if (!apart) continue;
-      starts.push_back(c);
-      used.push_back(c.sample);
+    // in widths of the cut, one sample behind the other
+    const std::size_t n = r.axes.size();
+    std::vector<double> at;
+    const auto add_place = [&](std::vector<double>& list, int sample) {
+      for (const int i : r.axes) list.push_back(asker_.archive()[sample].x[i] / (r.box.upper[i] - r.box.lower[i]));
+    };
+    for (const auto& c : all) add_place(at, c.sample);
+    const auto distance_of = [n](const double* a, const double* b) {
+      double distance = 0;
+      for (std::size_t i = 0; i < n; ++i) distance = std::max(distance, std::abs(a[i] - b[i]));
+      return distance;
+    };
+    std::vector<double> used_at;
+    for (const int sample : used) add_place(used_at, sample);
+    // better than its neighbours: the flank of a valley that is known is no start
+    const auto is_bottom = [&](std::size_t k) {
+      const double* here = &at[k * n];
+      double nearest = infinite;
+      for (std::size_t j = 0; j < k; ++j) nearest = std::min(nearest, distance_of(&at[j * n], here));
+      std::size_t nearer = 0;
+      for (std::size_t j = k + 1; j < all.size() && nearer < 2 * n; ++j)
+        nearer += distance_of(&at[j * n], here) < nearest;
+      return nearer >= 2 * n;
+    };
+    for (const bool only_bottoms : {true, false}) {
+      if (only_bottoms ? has_many_inputs() : rounds_ >= options_.patience && !has_many_inputs()) continue;
+      for (std::size_t k = 0; k < all.size() && static_cast<int>(starts.size()) < count; ++k) {
+        bool is_apart = true;
+        for (std::size_t j = 0; j < used.size() && is_apart; ++j)
+          is_apart = distance_of(&used_at[j * n], &at[k * n]) > least;
+        if (!is_apart || (only_bottoms && !is_bottom(k))) continue;
+        starts.push_back(all[k]);
+        used.push_back(all[k].sample);
+        add_place(used_at, all[k].sample);
+      }
     }
     return starts;
   }
@@ -275,6 +307,50 @@ class Optimisation {
     return high > low ? high - low : 0;
   }
 
+  /// A local optimum: other starts keep a distance from it, and it is tried in the other cuts.
+  void note_end(const Goal& goal, int sample) {
+    if (goal.outcome != any_class) return;
+    starts_[key_of(goal)].push_back(sample);
+    auto& all = optima_[{goal.output, goal.sign > 0}];
+    if (std::find(all.begin(), all.end(), sample) == all.end()) all.push_back(sample);
+  }
+
+  /// Where an output has kinks, no model search tells that nothing better is near.
+  bool has_kinks(int output) const { return kinked_.contains(output); }
+  void note_kinks(int output) {
+    if (!kinked_.insert(output).second) return;
+    for (const auto& [key, end] : ends_)
+      if (key[0] == output) edges_.try_emplace(key, infinite).first->second = end;
+    std::erase_if(ends_, [output](const auto& e) { return e.first[0] == output; });
+  }
+
+  /// Whether searches for a bound ended at places of different values.
+  bool has_valleys() const {
+    return !has_many_inputs() && std::any_of(optima_.begin(), optima_.end(), [this](const auto& of) {
+      const auto& [key, all] = of;
+      const double least = 1e-3 * width_of(key.first);
+      for (const int a : all)
+        for (const int b : all)
+          if (depth_[a] == depth_[b] && std::abs(asker_.archive()[a].result.values[key.first] -
+                                                 asker_.archive()[b].result.values[key.first]) > least)
+            return true;
+      return false;
+    });
+  }
+
+  /// Local optima of each cut, clipped, in the others: what is an optimum of a wide cut may be missed in a narrow one
+  /// and the other way round.
+  void share_optima() {
+    std::vector<Point> points;
+    for (auto& [key, all] : optima_)
+      for (const int sample : all)
+        for (const Region& r : regions_) {
+          Point x = clip(r.box, asker_.archive()[sample].x);
+          if (!space_.has_interaction() || r.contains(x)) points.push_back(std::move(x));
+        }
+    ask(points);
+  }
+
   std::vector<Goal> make_goals(bool of_classes) const {
     std::vector<Goal> goals;
     std::set<int> classes = {any_class};
@@ -298,6 +374,7 @@ class Optimisation {
     std::unique_ptr<LocalSearch> search;
     bool over_faces = false;
     bool of_restart = false;  // refines where a search over the faces ended
+    double start = search ? search->value() : infinite;
   };
 
   std::unique_ptr<LocalSearch> make_model_search(const Goal& goal, const Candidate& start, double radius, int probes) {
@@ -305,9 +382,23 @@ class Optimisation {
     o.radius = radius;
     o.probes = probes;
     o.tolerance = options_.tolerance * width_of(goal.output);
+    if (seeks_edges()) o.edge = 1e-3;
     o.seed = options_.seed + ++searches_;
     return std::make_unique<ModelSearch>(regions_[goal.level], asker_.archive()[start.sample].x,
                                          tell_of(goal, start.sample), o);
+  }
+
+  /// Whether kinks are followed: along constraints and for many inputs the planes would take too many runs.
+  bool seeks_edges() const { return !has_many_inputs() && !space_.has_interaction(); }
+
+  std::unique_ptr<LocalSearch> make_kink_search(const Goal& goal, const Candidate& start) {
+    KinkSearch::Options o;
+    o.tolerance = least_edge_gain * width_of(goal.output);
+    constexpr double radii[] = {0.03, 0.2, 0.003};
+    o.radius = radii[in_vain_[key_of(goal)] % 3];
+    o.seed = options_.seed + ++searches_;
+    return std::make_unique<KinkSearch>(regions_[goal.level], asker_.archive()[start.sample].x,
+                                        tell_of(goal, start.sample), o);
   }
 
   FaceSearch::Options make_face_options(const Goal& goal) {
@@ -347,6 +438,14 @@ class Optimisation {
     }
     for (const auto& r : all) {
       if (!r.search->is_done()) unfinished_ = true;
+      const bool is_kink = dynamic_cast<const KinkSearch*>(r.search.get()) != nullptr;
+      if (is_kink && r.search->is_done() && !r.search->is_converged()) {
+        // goes on from there, unless it moves no more
+        const bool moves = r.search->value() < r.start - 1e-5 * width_of(r.goal.output);
+        const bool is_over = !moves && ++in_vain_[key_of(r.goal)] > most_in_vain;
+        double& end = (is_over ? ends_ : edges_).try_emplace(key_of(r.goal), infinite).first->second;
+        end = std::min(end, r.search->value());
+      }
       if (!r.search->is_converged()) continue;
       if (r.over_faces) {
         note_faces(r.goal, static_cast<const FaceSearch&>(*r.search));
@@ -356,7 +455,11 @@ class Optimisation {
         Faces& f = faces_[key_of(r.goal)];
         f.last = r.search->value(), f.last_at = r.search->best();
       }
-      double& end = ends_.try_emplace(key_of(r.goal), infinite).first->second;
+      if (const int at = asker_.archive().find(r.search->best()); at >= 0 && !has_many_inputs()) note_end(r.goal, at);
+      const auto* model = dynamic_cast<const ModelSearch*>(r.search.get());
+      if (seeks_edges() && model && model->is_at_edge() && !model->has_met_walls()) note_kinks(r.goal.output);
+      const bool is_open = model && has_kinks(r.goal.output);
+      double& end = (is_open ? edges_ : ends_).try_emplace(key_of(r.goal), infinite).first->second;
       end = std::min(end, r.search->value());
     }
     all.clear();
@@ -375,6 +478,15 @@ class Optimisation {
     if (!is_converged(goal, best)) return false;
     if (!is_open(goal.level)) return true;
     return is_checked(goal, best) && (goal.outcome != any_class || is_confirmed(goal, best));
+  }
+
+  bool is_all_settled() const {
+    for (const bool of_classes : {false, true})
+      for (const Goal& goal : make_goals(of_classes && options_.search_classes)) {
+        const Candidate best = find_best(goal);
+        if (best.sample >= 0 && !regions_[goal.level].axes.empty() && !is_settled(goal, best)) return false;
+      }
+    return true;
   }
 
   // ---- more inputs than all corners can be run of
@@ -593,16 +705,31 @@ class Optimisation {
   }
 
   /// Model searches from other good places; in the first round evolution from the best.
-  void search_dispersed() {
+  bool search_dispersed() {
     std::vector<Running> all;
+    bool has_starts = false;
     for (const Goal& goal : make_goals(false)) {
       if (regions_[goal.level].axes.empty()) continue;
       for (const auto& start : find_starts(goal, has_many_inputs() ? 1 : options_.starts))
-        all.push_back({goal, make_model_search(goal, start, 0.1, 1)});
+        all.push_back({goal, make_model_search(goal, start, 0.1, 1)}), has_starts = true;
       if (const Candidate best = find_best(goal); best.sample >= 0 && rounds_ == 0 && !has_many_inputs())
         for (int k = 0; k < options_.evolutions; ++k) all.push_back({goal, make_evolution(goal, best)});
     }
+    std::vector<std::pair<Goal, std::size_t>> known;  // optima before
+    for (const Goal& goal : make_goals(false)) known.push_back({goal, starts_[key_of(goal)].size()});
     advance(all);
+    // an end at a kink that is nearly as good as the best one may be a better valley
+    for (const auto& [goal, count] : known) {
+      if (!has_kinks(goal.output)) continue;
+      const Candidate best = find_best(goal);
+      const std::vector<int>& samples = starts_[key_of(goal)];
+      for (std::size_t k = count; k < samples.size(); ++k)
+        if (const double v = value_of(goal, samples[k]);
+            samples[k] != best.sample && v < best.value + 0.02 * width_of(goal.output))
+          all.push_back({goal, make_kink_search(goal, {v, samples[k]})});
+    }
+    advance(all);
+    return has_starts;
   }
 
   /// Every sample against every cut: a best one that no search ended at is a new start, until nothing changes.
@@ -615,7 +742,11 @@ class Optimisation {
         const Candidate best = find_best(goal);
         if (regions_[goal.level].axes.empty() || best.sample < 0 || is_converged(goal, best)) continue;
         if (!tried.insert({key_of(goal), best.sample}).second) continue;
-        all.push_back({goal, make_model_search(goal, best, 0.05, of_classes ? 3 : 8)});
+        const auto edge = edges_.find(key_of(goal));
+        const bool is_at_edge =
+            edge != edges_.end() && edge->second <= best.value + least_edge_gain * width_of(goal.output);
+        all.push_back({goal, is_at_edge ? make_kink_search(goal, best)
+                                        : make_model_search(goal, best, 0.05, of_classes ? 3 : 8)});
       }
       if (all.empty()) break;
       ++rechecks_;
@@ -654,12 +785,17 @@ class Optimisation {
   std::vector<int> depth_;                  // per sample: in how many levels it lies
   std::vector<int> space_points_;           // per level
   std::map<Key, double> ends_;              // best value at which a search converged
-  std::map<Key, std::vector<int>> starts_;  // samples from which dispersed searches began
+  std::set<int> kinked_;                    // outputs
+  std::map<Key, int> in_vain_;              // searches along kinks that did not end, nor gain
+  std::map<Key, double> edges_;             // at which one stopped before a kink
+  std::map<Key, std::vector<int>> starts_;  // samples from which searches began and, with few inputs, ended
+  std::map<std::pair<int, bool>, std::vector<int>> optima_;  // samples, by output and sign
   std::map<Key, Faces> faces_;
   int next_spread_ = 1;
   std::uint64_t searches_ = 0;
   int rechecks_ = 0, rounds_ = 0, shown_ = 0, restarts_ = 0, restart_rounds_ = 0;
   bool unfinished_ = false;
+  bool is_done_ = false;  // but for rounds that only make surer
 };
 
 OutputBounds make_empty_bounds(const std::vector<double>& levels) {

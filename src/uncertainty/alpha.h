@@ -71,13 +71,14 @@ struct AlphaResult {
   std::vector<Coverage> coverage;    // one per level
   Archive archive;
   Ending ending = Ending::Complete;
-  int run = 0;       // points sent to the model; the archive's others came from the earlier one
-  int failed = 0;    // runs that failed
-  int batches = 0;   // calls of the model
-  int searches = 0;  // local searches
-  int rounds = 0;    // of spread points and dispersed searches
-  int rechecks = 0;  // of best samples at which no search had ended
-  int restarts = 0;  // searches over the faces from other places, where there are more than `corner_inputs`
+  bool can_go_on = false;  // the limit cut searches off, even if all bounds have converged
+  int run = 0;             // points sent to the model; the archive's others came from the earlier one
+  int failed = 0;          // runs that failed
+  int batches = 0;         // calls of the model
+  int searches = 0;        // local searches
+  int rounds = 0;          // of spread points and dispersed searches
+  int rechecks = 0;        // of best samples at which no search had ended
+  int restarts = 0;        // searches over the faces from other places, where there are more than `corner_inputs`
 };
 
 struct AlphaOptions {
@@ -98,7 +99,7 @@ struct AlphaOptions {
   /// Evolution searches per bound, in the first round.
   int evolutions = 1;
   /// Further rounds of spread points and searches from other places go on until so many in a row gained less than 1e-4
-  /// of an output's width.
+  /// of an output's width; twice as many where searches ended at places of different values.
   int patience = 3;
   /// Own searches for the bounds of each outcome class, for which a seventh of the limit is kept; without them these
   /// bounds are read off the archive.

@@ -303,6 +303,7 @@ void ModelSearch::note(std::span<const Told> told) {
       next_ = pending_[k], next_value_ = told[k].value, next_outcome_ = told[k].outcome;
     } else if (told[k].outcome != outcome_ && told[k].value >= value_) {
       walls_.push_back(pending_[k]);
+      has_met_walls_ = true;
       if (walls_.size() > 200) walls_.erase(walls_.begin());
     }
   }
@@ -316,12 +317,14 @@ void ModelSearch::read_star(std::span<const Told> told) {
   together_.assign(n, 0.0);
   for (std::size_t i = 0; i < n; ++i) {
     Axis& axis = axes_[i];
-    axis.slope = axis.curvature = 0;
+    axis.before = axis.curvature, axis.reach_before = axis.reach;
+    axis.slope = axis.curvature = axis.reach = 0;
     const double fa = value_at(axis.at_a), fb = value_at(axis.at_b);
     const bool has_a = std::isfinite(fa), has_b = std::isfinite(fb);
     if (has_a && has_b) {
       axis.curvature = 2 * ((fb - value_) / axis.b - (fa - value_) / axis.a) / (axis.b - axis.a);
       axis.slope = (fb - value_) / axis.b - 0.5 * axis.curvature * axis.b;
+      axis.reach = std::max(std::abs(axis.a), std::abs(axis.b));
     } else if (has_a || has_b) {
       axis.slope = has_a ? (fa - value_) / axis.a : (fb - value_) / axis.b;
     }
@@ -336,6 +339,15 @@ void ModelSearch::read_star(std::span<const Told> told) {
     if (std::isfinite(mixed)) hessian_[p.i * n + p.j] = hessian_[p.j * n + p.i] = mixed / (p.di * p.dj);
   }
   read_aside(told);
+}
+
+/// Whether there is a kink in the valley along an axis: the curvature that a nearer star saw is much larger.
+bool ModelSearch::is_bent() const {
+  return std::any_of(axes_.begin(), axes_.end(), [this](const Axis& axis) {
+    return axis.free && axis.reach > 0 && axis.reach < 0.6 * axis.reach_before &&
+           axis.curvature > 1.5 * std::abs(axis.before) &&
+           axis.curvature * axis.reach * axis.reach > 100 * options_.tolerance;
+  });
 }
 
 /// Whether trials met another outcome that is worse, and what the model promised did not come.
@@ -442,8 +454,10 @@ void ModelSearch::finish_iteration() {
   // a plane is no more than the boundary's tangent
   const double tolerance = walled ? 1000 * options_.tolerance : options_.tolerance;
   const bool small = promised_ <= tolerance && gained <= tolerance;
-  if ((small && radius_ <= (any_free ? 0.01 : 0.03)) || radius_ < options_.smallest) {
+  const bool settled = small && radius_ <= (any_free ? 0.01 : 0.03);
+  if (settled || radius_ < (has_met_walls_ ? options_.smallest : std::max(options_.smallest, options_.edge))) {
     converged_ = true;
+    at_edge_ = !settled || is_bent();
     pending_.clear();
     return;
   }

@@ -64,12 +64,16 @@ class ModelSearch : public LocalSearch {
     double radius = 0.1;      // of the first star, as a part of the support's width
     double tolerance = 1e-8;  // of the value, absolute; decides when it has converged
     double smallest = 1e-5;   // radius at which it ends anyway
+    double edge = 0;          // the same where no other outcome was met
     int iterations = 60;      // at most
     int probes = 8;           // of the boundary of another outcome, at most
     std::uint64_t seed = 1;   // for the subproblem under constraints
   };
   ModelSearch(Region region, Point start, const Told& at_start, const Options& options);
   void tell(std::span<const Told> told) override;
+  /// Whether it ended where the mapping is not smooth: the radius became too small, or curvatures grew as it did.
+  bool is_at_edge() const { return at_edge_; }
+  bool has_met_walls() const { return has_met_walls_; }
 
  private:
   struct Axis {
@@ -77,6 +81,7 @@ class ModelSearch : public LocalSearch {
     double a = 0, b = 0;       // offsets of the star's two points, 0: none
     int at_a = -1, at_b = -1;  // among the pending points
     double slope = 0, curvature = 0;
+    double reach = 0, before = 0, reach_before = 0;  // of the star; curvature and reach of the star before
     bool free = false;
   };
   struct Pair {
@@ -89,6 +94,7 @@ class ModelSearch : public LocalSearch {
   std::vector<double> find_step(bool mixed, double push = 0) const;
   std::vector<double> find_walled_step(double distance) const;
   void note(std::span<const Told> told);
+  bool is_bent() const;
   bool is_blocked(std::span<const Told> told) const;
   bool ask_probe();
   std::vector<double> to_widths(const std::vector<double>& step) const;
@@ -114,6 +120,7 @@ class ModelSearch : public LocalSearch {
   double radius_, trust_;
   double promised_ = 0;
   int iteration_ = 0, probes_ = 0;
+  bool at_edge_ = false, has_met_walls_ = false;
   enum class Stage { Star, Probe, Trial } stage_ = Stage::Star;
   std::vector<Point> walls_;  // places of other outcomes, latest last
   std::optional<WallProbe> wall_;

@@ -344,6 +344,17 @@ PossibilityResult find_possibilities(const Space& space, Asker& asker, const Pos
   return result;
 }
 
+std::vector<Point> make_ray(const Space& space, const Point& x, int count) {
+  const double from = 1 - std::clamp(calc_membership(space, x), 0.0, 1.0);
+  const Ray ray = find_ray(space, x, from);
+  std::vector<Point> points;
+  for (int k = 0; k < count; ++k) {
+    const double t = from + (1 - from) * k / std::max(1, count - 1);
+    points.push_back(t > 0 ? calc_place(space, ray, t) : x);
+  }
+  return points;
+}
+
 double calc_possibility_of(const PossibilityResult& r, const std::vector<int>& outcomes) {
   double most = 0;
   for (const auto& p : r.classes)

@@ -34,6 +34,9 @@ struct PossibilityResult {
 /// (`optimise`).
 PossibilityResult find_possibilities(const Space&, Asker&, const PossibilityOptions&);
 
+/// Places at the same part of the cuts of lower levels as x, from its own on outwards to that of level 0.
+std::vector<Point> make_ray(const Space&, const Point& x, int count);
+
 /// 1 - the largest possibility of any other class.
 double calc_necessity(const PossibilityResult&, int outcome);
 /// The largest possibility among several classes ("any collapse"); 0 for none.

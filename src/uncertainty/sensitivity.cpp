@@ -207,13 +207,19 @@ std::vector<Fixed> find_outcomes_of_knowing(const Space& space, Asker& asker, co
     asker.set_limit(std::min(whole_limit, asker.asked() + limit));
     // of each class the samples that would be the most possible ones there
     std::map<int, std::vector<std::pair<double, int>>> best;
+    std::map<int, std::pair<double, int>> most;  // of all samples
     for (int k = 0; k < asker.asked(); ++k) {
       Point x = asker.archive()[k].x;
       x[i] = core;
-      best[outcome_of(asker.archive()[k].result)].emplace_back(-calc_membership(known, x), k);
+      const int outcome = outcome_of(asker.archive()[k].result);
+      best[outcome].emplace_back(-calc_membership(known, x), k);
+      auto& top = most.try_emplace(outcome, -1.0, -1).first->second;
+      if (const double mu = calc_membership(space, asker.archive()[k].x); mu > top.first) top = {mu, k};
     }
     std::vector<Point> points = {calc_centre(known)};
-    const std::size_t each = std::max<std::size_t>(2, static_cast<std::size_t>(limit) / (4 * best.size() + 1));
+    // the search from the best of them finds more than all of them do
+    const std::size_t each = std::clamp<std::size_t>(static_cast<std::size_t>(limit) / (4 * best.size() + 1), 2,
+                                                     4 * static_cast<std::size_t>(space.size()));
     for (auto& [outcome, list] : best) {
       std::stable_sort(list.begin(), list.end());
       for (std::size_t k = 0; k < std::min(each, list.size()); ++k) {
@@ -221,11 +227,18 @@ std::vector<Fixed> find_outcomes_of_knowing(const Space& space, Asker& asker, co
         points.back()[i] = core;
       }
     }
+    // where a class is most possible with all inputs fuzzy it often is so here, farther out
+    for (const auto& [outcome, top] : most)
+      if (top.first < 1)
+        for (Point& x : make_ray(space, asker.archive()[top.second].x, 9)) {
+          x[i] = core;
+          if (!space.has_interaction() || calc_membership(known, x) > 0) points.push_back(std::move(x));
+        }
     asker.ask(points);
     Fixed f;
     f.input = i;
     for (auto& c : find_possibilities(known, asker, options).classes)
-      if (c.possibility > 0) f.classes.push_back(c);
+      if (c.possibility > 0 || !c.converged) f.classes.push_back(c);
     effects.push_back(std::move(f));
   }
   asker.set_limit(whole_limit);

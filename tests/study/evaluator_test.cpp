@@ -91,6 +91,31 @@ TEST(Evaluator, TellsHowItCrashed) {
   EXPECT_EQ(recovers.ask({{1, 1}})[0].kind, Kind::Done);
 }
 
+TEST(Evaluator, TakesALineThatBreaksOffForNoAnswer) {
+  for (const char* text : {R"({"id":0,"outputs":{"z":1.)", R"({"outputs":{"z":1})", R"({"z": tr)", R"({"outc)", "{"}) {
+    Model m(std::string("read line; printf '") + text + "'; exit 3");
+    const Answer a = m.ask({{1, 1}})[0];
+    EXPECT_EQ(a.kind, Kind::Crashed) << text << ": " << a.text;
+    EXPECT_NE(a.text.find("exit code 3"), std::string::npos) << a.text;
+  }
+  // whole answers need no end of the line, and what is no answer stays that
+  Model whole("read line; printf '{\"z\": 1}'");
+  EXPECT_EQ(whole.ask({{1, 1}})[0].kind, Kind::Done);
+  Model words("read line; printf 'done it'");
+  EXPECT_EQ(words.ask({{1, 1}})[0].kind, Kind::Refused);
+  Model ended("read line; echo '{\"z\": 1'");
+  EXPECT_EQ(ended.ask({{1, 1}})[0].kind, Kind::Refused) << "a line that was ended is one";
+}
+
+TEST(Evaluator, AsksForNumbersOnly) {
+  for (const char* text : {R"({"id":0,"y":1,"note":"text"})", R"({"outputs":{"y":"3"}})", R"({"y":[1]})"}) {
+    int id = 0;
+    const Answer a = read_answer_line(text, "model", id);
+    ASSERT_EQ(a.kind, Kind::Refused) << text;
+    EXPECT_EQ(read_refusal(a.text).diagnostic.code, "E824");
+  }
+}
+
 TEST(Evaluator, RefusesACommandThatCannotBeStarted) {
   for (const char* command : {"/nowhere/model --fast", "/etc/passwd"}) {
     Model m(command);

@@ -120,7 +120,8 @@ TEST(InsightsPhysics, DriversOfASumHaveClosedForms) {
   EXPECT_EQ(ranks[1].best, 2);
   // "far" is possible to 0.5 unless a is known
   ASSERT_EQ(r.insights.knowing.size(), 2u);
-  EXPECT_EQ(r.insights.knowing[0].classes.size(), 1u);
+  for (const uncertainty::Possibility& c : r.insights.knowing[0].classes)
+    EXPECT_EQ(c.possibility, name_of_outcome(r, c.outcome) == "far" ? 0 : 1);
   ASSERT_EQ(r.insights.knowing[1].classes.size(), 2u);
   for (const uncertainty::Possibility& c : r.insights.knowing[1].classes)
     EXPECT_NEAR(c.possibility, name_of_outcome(r, c.outcome) == "far" ? 0.5 : 1, 1e-3);
@@ -349,6 +350,32 @@ TEST(Story, UsesShortNamesAndRoundNumbers) {
   EXPECT_EQ(words_of_number(27187.4), "27190");
   EXPECT_EQ(words_of_number(-3.14159), "-3.142");
   EXPECT_EQ(words_of_number(2e8), "2e+08");
+}
+
+TEST(Story, WritesAsManyDigitsAsASupportNeeds) {
+  EXPECT_EQ(words_of_number(1000001.8534, 2), "1000001.853");
+  EXPECT_EQ(words_of_number(27187.4, 30000), "27190");
+  EXPECT_EQ(words_of_number(27187.43, 300), "27187.4");
+  EXPECT_EQ(words_of_number(-2.00000123456, 1e-6), "-2.000001235");
+  EXPECT_EQ(words_of_value({"a", "mm", 1e-3}, 1000.0018534, 0.002), "1000001.853 mm");
+  Problem p;
+  p.inputs = {{"a", "", 1}};
+  p.space.inputs = {uncertainty::make_triangular(1000000, 1000001, 1000002)};
+  EXPECT_EQ(words_of_point(p, {1000001.75}), "a 1000001.75 (core 1000001)");
+}
+
+TEST(Insights, SaysWhichOutcomesWithAnInputKnownAreNotSettled) {
+  Problem p;
+  p.inputs = {{"a", "", 1}};
+  p.space.inputs = {uncertainty::make_triangular(-1, 0, 1)};
+  StudyResult r;
+  r.outcomes = {"stands", "falls", "tilts"};
+  r.insights.knowing = {{0, {}, {}, {{0, 1, 0, 0, 0, true}, {1, 0.25, 0.1, 1, 0, false}}}};
+  for (int outcome = 0; outcome < 3; ++outcome) r.alpha.classes.push_back({outcome, 1, 0, 0, {}});
+  const auto known = nlohmann::json::parse(write_results_json(p, r)).at("known").at(0).at("outcomes");
+  EXPECT_TRUE(known.at(0).at("converged"));
+  EXPECT_FALSE(known.at(1).at("converged"));
+  EXPECT_TRUE(known.at(2).at("converged")) << "a search came to its end and found nothing";
 }
 
 TEST(Story, SaysWhatIsPossibleAndWhatTurnsIt) {

@@ -258,6 +258,127 @@ TEST(AlphaPhysics, BoundsAtAJumpAreSharp) {
     }
 }
 
+// ---- several hills and kinks
+
+double calc_hills(const Point& x) {
+  constexpr double hills[][6] = {
+      {.2, .3, .8, .6, 1.0, 9}, {.8, .7, .2, .3, 1.1, 14}, {.5, .9, .9, .1, .9, 7}, {.1, .1, .3, .9, 1.15, 25}};
+  double sum = 0;
+  for (const auto& h : hills) {
+    double square = 0;
+    for (int i = 0; i < 4; ++i) square += (x[i] - h[i]) * (x[i] - h[i]);
+    sum += h[4] * std::exp(-h[5] * square);
+  }
+  return sum;
+}
+
+TEST(AlphaPhysics, AHillAtTheRimOfACutIsFound) {
+  // by 600 evolution searches a cut
+  const double want = 1.136999;
+  const FuzzyNumber f = make_triangular(0, .5, 1);
+  const auto model = make_evaluate_values([](const Point& x) { return std::vector{calc_hills(x)}; });
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    AlphaOptions options;
+    options.seed = seed;
+    const AlphaResult r = optimise(std::vector<FuzzyNumber>(4, f), model, options, {});
+    EXPECT_NEAR(r.outputs[0].levels[1].upper.value, want, 2e-6) << seed;
+    EXPECT_LE(r.archive.size(), 10000u);
+  }
+}
+
+TEST(AlphaPhysics, EveryHillIsLookedFor) {
+  // a narrow hill whose height is known stands among broad ones, which hide it from starts at the best samples
+  for (const int n : {3, 4, 5})
+    for (const std::uint64_t seed : {1, 2, 3}) {
+      Random random(10 * seed + n);
+      Point narrow;
+      std::vector<Point> broad(3);
+      for (int i = 0; i < n; ++i) narrow.push_back(random.next(.2, .3) + (random.next() < .5 ? .5 : 0));
+      for (Point& p : broad)
+        for (int i = 0; i < n; ++i) p.push_back(random.next(.1, .9));
+      const auto calc = [&](const Point& x) {
+        const auto square = [&x](const Point& p) {
+          double sum = 0;
+          for (std::size_t i = 0; i < x.size(); ++i) sum += (x[i] - p[i]) * (x[i] - p[i]);
+          return sum;
+        };
+        double most = 0;
+        for (const Point& p : broad) most = std::max(most, std::exp(-5 * square(p)));
+        return std::max(most, 1.2 * std::exp(-20 * square(narrow)));
+      };
+      AlphaOptions options;
+      options.seed = seed;
+      const AlphaResult r =
+          optimise(std::vector<FuzzyNumber>(n, make_triangular(0, .5, 1)),
+                   make_evaluate_values([&](const Point& x) { return std::vector{calc(x)}; }), options, {});
+      EXPECT_NEAR(r.outputs[0].levels[0].upper.value, 1.2, 1e-4) << n << " inputs, seed " << seed;
+      EXPECT_LE(r.archive.size(), 10000u);
+    }
+}
+
+TEST(AlphaPhysics, EnvelopesOfPlanesAreExact) {
+  // max_j |c_j·(x - p)| + d·x has its least value at p, if the c_j hold d in their hull
+  for (const int n : {3, 4, 6})
+    for (const std::uint64_t seed : {1, 2, 3}) {
+      Random random(10 * seed + n);
+      std::vector<Point> slopes(n);
+      Point p;
+      for (int i = 0; i < n; ++i) p.push_back(random.next(-.4, .4));
+      for (int j = 0; j < n; ++j)
+        for (int i = 0; i < n; ++i) slopes[j].push_back((i == j ? 1 : 0) + random.next(-.4, .4));
+      const auto calc = [&](const Point& x) {
+        double sum = 0, most = 0;
+        for (int j = 0; j < n; ++j) {
+          double t = 0;
+          for (int i = 0; i < n; ++i) t += slopes[j][i] * (x[i] - p[i]);
+          most = std::max(most, std::abs(t)), sum += t / (2 * n);
+        }
+        return most + sum;
+      };
+      AlphaOptions options;
+      options.seed = seed;
+      const AlphaResult r =
+          optimise(std::vector<FuzzyNumber>(n, make_triangular(-1, .1, 1)),
+                   make_evaluate_values([&](const Point& x) { return std::vector{calc(x)}; }), options, {});
+      const auto& wide = r.outputs[0].levels[0];
+      EXPECT_NEAR(wide.lower.value, 0, 1e-5 * (wide.upper.value - wide.lower.value)) << n << " inputs, seed " << seed;
+      EXPECT_LE(r.archive.size(), 10000u);
+    }
+}
+
+TEST(AlphaPhysics, EdgesThatCrossAreFollowedToTheirEnd) {
+  // y = a where both edges meet: a = bc, b = .2 - ca, largest at c of the cut's end or where b is
+  const auto calc = [](const Point& x) {
+    return -8 * std::abs(x[0] - x[1] * x[2]) - 5 * std::abs(x[1] + x[2] * x[0] - .2) + x[0];
+  };
+  const FuzzyNumber f = make_triangular(-1, .3, 1);
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    AlphaOptions options;
+    options.seed = seed;
+    const AlphaResult r =
+        optimise({f, f, f}, make_evaluate_values([&](const Point& x) { return std::vector{calc(x)}; }), options, {});
+    const double width = r.outputs[0].levels[0].upper.value - r.outputs[0].levels[0].lower.value;
+    for (int k = 0; k < 4; ++k) {
+      // on the edges a = .2 c/(1 + c²)
+      const double c = f.cut(r.outputs[0].levels[k].alpha).right;
+      EXPECT_NEAR(r.outputs[0].levels[k].upper.value, .2 * c / (1 + c * c), 1e-4 * width) << seed << " level " << k;
+    }
+  }
+}
+
+TEST(AlphaPhysics, CuspsCountByTheValue) {
+  const auto model = make_evaluate_values([](const Point& x) {
+    return std::vector{std::sqrt(std::abs(x[0] - .3 * x[1])) + std::sqrt(std::abs(x[1] + .2))};
+  });
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    AlphaOptions options;
+    options.seed = seed;
+    const AlphaResult r = optimise({make_triangular(-1, .3, 1), make_triangular(-1, .4, 1)}, model, options, {});
+    const auto& wide = r.outputs[0].levels[0];
+    EXPECT_NEAR(wide.lower.value, 0, 1e-4 * (wide.upper.value - wide.lower.value)) << seed;
+  }
+}
+
 // ---- more inputs than all corners are run of
 
 struct Ends {
@@ -491,8 +612,18 @@ cases::Case make_chain_case() {
           0};
 }
 
+cases::Case make_edge_case() {
+  return {"edges",
+          std::vector<FuzzyNumber>(3, make_triangular(-1, .3, 1)),
+          make_evaluate_values([](const Point& x) {
+            return std::vector{std::max({x[0] + x[1], x[1] - x[2], .5 * x[2] - x[0]}) + .1 * x[0] * x[0]};
+          }),
+          {},
+          0};
+}
+
 TEST(AlphaReplay, ResumedEqualsUninterrupted) {
-  for (const auto& c : {cases::make_all()[2], cases::make_all()[4], make_chain_case()}) {
+  for (const auto& c : {cases::make_all()[2], cases::make_all()[4], make_chain_case(), make_edge_case()}) {
     const AlphaResult whole = optimise(c.inputs, c.model, {}, {});
     for (const int batches : {0, 1, 3, 7, 13}) {
       // stops in the middle of a batch, as an interrupted study does
@@ -512,7 +643,7 @@ TEST(AlphaReplay, ResumedEqualsUninterrupted) {
       AlphaOptions options;
       options.earlier = &part.archive;
       const AlphaResult resumed = optimise(c.inputs, c.model, options, {});
-      EXPECT_EQ(resumed.ending, Ending::Complete);
+      EXPECT_EQ(resumed.ending, whole.ending);
       EXPECT_EQ(resumed.run + part.run, whole.run) << "nothing is run twice";
       expect_same(whole, resumed);
     }

@@ -1,11 +1,12 @@
-#include "uncertainty/local_search.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
+
+#include "uncertainty/kink_search.h"
+#include "uncertainty/random.h"
 
 namespace topple::uncertainty {
 namespace {
@@ -91,6 +92,59 @@ TEST(ModelSearch, StaysBeforeAWall) {
   // on the wall y = (1 - x)/2: x² - x/2 - 1/2 is least at x = 1/4
   EXPECT_NEAR(search.value(), -0.5625, 1e-5);
   EXPECT_EQ(model(search.best()).outcome, 0);
+}
+
+// An envelope of planes is least at a vertex, which a search over the vertices of a grid cannot miss by much.
+TEST(KinkSearch, FindsTheLowestPlaceOfPlanes) {
+  for (int k = 0; k < 20; ++k) {
+    Random random(k);
+    const std::size_t planes = 7, n = 2;
+    std::vector<double> at(planes);
+    std::vector<std::vector<double>> slopes(planes, std::vector<double>(n));
+    for (double& v : at) v = -random.next();
+    for (auto& s : slopes)
+      for (double& v : s) v = random.next(-1, 1);
+    const std::vector<double> lower = {-0.5, -1}, upper = {1, 0.25};
+    const auto calc = [&](double x, double y) {
+      double most = -10;
+      for (std::size_t j = 0; j < planes; ++j) most = std::max(most, at[j] + slopes[j][0] * x + slopes[j][1] * y);
+      return most;
+    };
+    const std::vector<double> found = find_lowest(at, slopes, lower, upper);
+    double least = 10;
+    for (int i = 0; i <= 400; ++i)
+      for (int j = 0; j <= 400; ++j) least = std::min(least, calc(lower[0] + 1.5 * i / 400, lower[1] + 1.25 * j / 400));
+    EXPECT_LE(calc(found[0], found[1]), least + 1e-12) << k;
+    EXPECT_TRUE(found[0] >= lower[0] && found[0] <= upper[0] && found[1] >= lower[1] && found[1] <= upper[1]);
+  }
+}
+
+TEST(KinkSearch, FollowsAnEdgeThatNoAxisImproves) {
+  const Space space = make_cube(3);
+  const Model model = [](const Point& x) {
+    return Told{5 * std::abs(x[0] - x[1] * x[2]) + 3 * std::abs(x[1] + x[2] - 0.2) + x[0], 0};
+  };
+  const Point start = {-0.03, 0.3, -0.1};  // on both edges
+  ModelSearch::Options options;
+  options.edge = 1e-3;
+  ModelSearch stuck(make_region(space, 0), start, model(start), options);
+  drive(stuck, model);
+  EXPECT_TRUE(stuck.is_at_edge());
+  KinkSearch::Options more;
+  more.iterations = 300;
+  KinkSearch search(make_region(space, 0), stuck.best(), model(stuck.best()), more);
+  EXPECT_LE(drive(search, model), 1505);
+  // on the edges x0 = x1 (0.2 - x1), which is least at an end
+  EXPECT_NEAR(search.value(), -2, 1e-3) << "not " << stuck.value();
+}
+
+TEST(KinkSearch, EndsInACornerAtOnce) {
+  const Space space = make_cube(4);
+  const Model model = [](const Point& x) { return Told{x[0] + x[1] + x[2] + x[3], 0}; };
+  const Point corner = {-2, -2, -2, -2};
+  KinkSearch search(make_region(space, 0), corner, model(corner), {});
+  EXPECT_EQ(drive(search, model), 6);
+  EXPECT_TRUE(search.is_converged());
 }
 
 TEST(EvolutionSearch, LeavesASmallBasin) {

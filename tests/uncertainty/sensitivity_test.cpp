@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "reference_cases.h"
+#include "uncertainty/random.h"
 
 namespace topple::uncertainty {
 namespace {
@@ -195,6 +196,49 @@ TEST(Sensitivity, OutcomesOfKnowingAnInputTakeFewRuns) {
   ASSERT_EQ(effects[0].classes.size(), 1u) << "with a known nothing but outcome 0";
   ASSERT_EQ(effects[1].classes.size(), 2u);
   EXPECT_NEAR(effects[1].classes[1].possibility, 0.5, 1e-3);
+}
+
+// Half spaces g·x > d on triangles <-1, 0, 1>: with x_i known 1 - d / Σ |g_k| over the others.
+TEST(SensitivityPhysics, OutcomesOfKnowingAnInputHaveClosedForms) {
+  for (int n = 2; n <= 6; ++n)
+    for (int k = 0; k < 3; ++k) {
+      Random random(100 * n + k);
+      Point normal;
+      double sum = 0;
+      for (int i = 0; i < n; ++i) {
+        normal.push_back(random.next(.3, 2) * (random.next() < .5 ? -1 : 1));
+        sum += std::abs(normal.back());
+      }
+      const double d = sum * random.next(.35, .6);
+      const Evaluate model = make_evaluate([&](const Point& x) {
+        Result r;
+        r.state = Result::State::Done;
+        double at = 0;
+        for (int i = 0; i < n; ++i) at += normal[i] * x[i];
+        r.outcome = at > d ? 1 : 0;
+        r.values = {x[0]};
+        return r;
+      });
+      const Space space{std::vector<FuzzyNumber>(n, make_triangular(-1, 0, 1)), {}, {}};
+      const Progress progress;
+      Asker asker(model, progress, nullptr, 8000);
+      (void)optimise(space, asker, {});
+      asker.set_limit(100000);
+      (void)find_possibilities(space, asker, {});
+      for (const int limit : {250, 1500}) {
+        const auto effects = find_outcomes_of_knowing(space, asker, {}, limit);
+        ASSERT_EQ(effects.size(), static_cast<std::size_t>(n));
+        for (const Fixed& f : effects) {
+          double found = 0;
+          bool is_converged = true;
+          for (const Possibility& c : f.classes)
+            if (c.outcome == 1) found = c.possibility, is_converged = c.converged;
+          const double want = std::max(0.0, 1 - d / (sum - std::abs(normal[f.input])));
+          EXPECT_NEAR(found, want, 1e-3) << n << " inputs, case " << k << ", known " << f.input;
+          EXPECT_TRUE(is_converged || limit < 1500);
+        }
+      }
+    }
 }
 
 TEST(Sensitivity, RefusesInteraction) {

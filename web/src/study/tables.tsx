@@ -63,10 +63,14 @@ export function Drivers(props: { state: State }) {
             <tbody>
               <tr><th scope="row">nothing</th>{study.outcomes.map((o) => <td>{formatNumber(o.possibility, 3)}</td>)}</tr>
               {study.known.map((k) => (
-                <tr><th scope="row">{k.input}</th>{study.outcomes.map((o) => <td>{formatNumber(k.outcomes.find((c) => c.name === o.name)?.possibility ?? 0, 3)}</td>)}</tr>
+                <tr><th scope="row">{k.input}</th>{study.outcomes.map((o) => {
+                  const c = k.outcomes.find((other) => other.name === o.name);
+                  return <td>{formatNumber(c?.possibility ?? 0, 3) + (c?.converged === false ? "*" : "")}</td>;
+                })}</tr>
               ))}
             </tbody>
           </table>
+          {study.known.some((k) => k.outcomes.some((c) => c.converged === false)) && <p class="quiet">* No search has ended there: it may be higher.</p>}
         </>
       )}
     </section>
