@@ -131,9 +131,7 @@ struct Reader {
         list.items = {*given};
         if (const auto v = read_numbers(list, label, 1)) return FuzzyNumber((*v)[0]);
       }
-    } catch (const InputError& e) {
-      complaints.error("E207", given->place, label + ": " + e.first_error().message);
-    }
+    } catch (const InputError& e) { complaints.error("E207", given->place, label + ": " + e.first_error().message); }
     return std::nullopt;
   }
 
