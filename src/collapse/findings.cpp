@@ -433,10 +433,17 @@ void add_rigid_block(const Context& c) {
   record::Series series{"tilt_angle_rigid_block", "Tilt angle of a rigid block", "rad", "angle",
                         calc_rigid_block(block, c.r.time)};
   const double when = block.release + 1;
-  const std::string model_words = fmt::format(
-      "a rigid block in its place ({:.0f} t on {} plastic hinges of {:.2f} MNm in all, its mass centre "
-      "{:.2f} m ahead of them)",
-      block.mass / unit::t, row.size(), block.plastic_moment * 1e-6, block.ahead);
+  const double tons = block.mass / unit::t, moment = block.plastic_moment * 1e-6;  // [t, MNm]
+  const std::string model_words =
+      row.size() == 1
+          ? fmt::format(
+                "a rigid block in its place ({:.0f} t on a plastic hinge of {:.2f} MNm, its mass centre {:.2f} m ahead "
+                "of it)",
+                tons, moment, block.ahead)
+          : fmt::format(
+                "a rigid block in its place ({:.0f} t on {} plastic hinges of {:.2f} MNm in all, its mass centre "
+                "{:.2f} m ahead of them)",
+                tons, row.size(), moment, block.ahead);
   // a block that has already left its place is not released from rest
   bool rests = true;
   for (const BlockFrame& f : c.recorder.block_frames())

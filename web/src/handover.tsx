@@ -19,7 +19,8 @@ export function listConditions(run: Run): string[] {
   const broken = run.findings.filter((f) => f.status === "bad" && f !== verdict && /^(criterion|clearance|stability)\./.test(f.id));
   for (const f of broken) out.push(`It fails already: ${f.title}.`);
   const charges = run.events.filter((e) => e.kind === "charge").length;
-  if (charges > 0) out.push(`One of the ${charges} charges does not fire, or not when the plan says.`);
+  if (charges === 1) out.push("The charge does not fire, or not when the plan says.");
+  if (charges > 1) out.push(`One of the ${charges} charges does not fire, or not when the plan says.`);
   const margins = run.findings.filter((f) => f.id.startsWith("stability.") && f.value !== null && f.value > 1 && f.status !== "bad");
   margins.sort((a, b) => (a.value as number) - (b.value as number));
   for (const f of margins.slice(0, 3)) out.push(`${f.title}: the most loaded zone resists ${percent(1 - 1 / (f.value as number))} % less than the plan says.`);
