@@ -448,6 +448,36 @@ void System::write_cells(size_t slot, double axial) {
   (void)write_flow_cells(zone, laws, z, axial, l.flow(slot, kShortened), strained, &l.flow(slot, 0), l.W);
 }
 
+bool System::grow_cracks(size_t slot, const double* deformation, size_t stride) {
+  Lanes& l = *lanes;
+  const size_t e = l.is_batch ? slot / l.W : l.element_of[slot];
+  const ZoneParameters& zone = elements[e].zone;
+  ZoneState& z = state.element[e];
+  Six d;
+  for (size_t i = 0; i < 6; ++i) d.c[i] = deformation[i * stride];
+  const int first = first_bending(zone.plane), last = last_bending(zone.plane);
+  for (int a = 1 - last; a <= 1 - first; ++a) z.slip[a] = l.flow(slot, kSlip + a);
+  for (int s = 0; s < zone.stations; ++s) {
+    const int at = kStations + s * kStationFields;
+    StationState& station = z.station[s];
+    station.reached = l.flow(slot, at + kReached);
+    for (int q = first; q <= last; ++q)
+      station.phi[q] = l.flow(slot, at + kPhi + q), station.soft[q] = l.flow(slot, at + kSoftness + q);
+  }
+  const bool has_grown = mbs::grow_cracks(zone, d, state.time, z);
+  find_crack_bounds(zone, z);
+  for (int s = 0; s < zone.stations; ++s) {
+    const int at = kStations + s * kStationFields;
+    const StationState& station = z.station[s];
+    for (int q = first; q <= last; ++q) {
+      l.flow(slot, at + kPhi + q) = station.phi[q], l.flow(slot, at + kSoftness + q) = station.soft[q];
+      l.flow(slot, at + kCracked + q) = station.crack[q], l.flow(slot, at + kBow + q) = station.bow[q];
+      for (int side : {0, 1}) l.flow(slot, at + kGrowth + 2 * q + side) = z.crack_scale[s][q][side];
+    }
+  }
+  return has_grown;
+}
+
 void System::evaluate_elements_fully(double h) {
   for (size_t i = 0; i < elements.size(); ++i) evaluate_element(i, h);
   sum_element_forces();
@@ -457,18 +487,22 @@ void System::evaluate_elements() {
   Lanes& l = *lanes;
   l.outside.clear();
   l.lay_poses();
-  const CellWriter cells{
-      [](void* owner, size_t slot, double axial) { static_cast<System*>(owner)->write_cells(slot, axial); }, this};
+  const FlowWriter writer{
+      [](void* owner, size_t slot, double axial) { static_cast<System*>(owner)->write_cells(slot, axial); },
+      [](void* owner, size_t slot, const double* deformation, size_t stride) {
+        return static_cast<System*>(owner)->grow_cracks(slot, deformation, stride);
+      },
+      this};
   if (options.threads > 1 && l.element_blocks >= kBlocksForThreads) {
     // every block writes its own places only; reports follow in order, so threads change no bit
     const size_t chunks = (l.element_blocks + kChunk - 1) / kChunk;
     std::vector<std::vector<std::uint32_t>> beyond(chunks);
     (void)parallel_for(chunks, options.threads, [&](size_t c) {
-      l.evaluate_elements(c * kChunk, std::min(l.element_blocks, (c + 1) * kChunk), cells, beyond[c]);
+      l.evaluate_elements(c * kChunk, std::min(l.element_blocks, (c + 1) * kChunk), writer, beyond[c]);
     });
     for (const auto& list : beyond) l.outside.insert(l.outside.end(), list.begin(), list.end());
   } else {
-    l.evaluate_elements(0, l.element_blocks, cells, l.outside);
+    l.evaluate_elements(0, l.element_blocks, writer, l.outside);
   }
   // where they lie says nothing about what is told first
   std::sort(l.outside.begin(), l.outside.end(),

@@ -218,16 +218,12 @@ struct BendingPlane {
   }
 };
 
-/// One over the bounds of cracks, for moments > 0 and < 0 [1/(N·m)].
-template <class D, int Hinges>
-struct CrackScales {
-  Num<D> of[Hinges][2][2];  // [station][axis][sign]
-
-  HWY_INLINE auto grow(int station, int axis, Num<D> moment) const {
-    const Num<D>* scale = of[station][axis];
-    return hn::Gt(maximum(moment * scale[0], (num<D>(0) - moment) * scale[1]).v, num<D>(1).v);
-  }
-};
+/// Where a moment lets cracks grow.
+///   positive, negative  one over the bounds of moments > 0 and < 0 [1/(N·m)]
+template <class D>
+HWY_INLINE auto find_growth(Num<D> moment, Num<D> positive, Num<D> negative) {
+  return hn::Gt(maximum(moment * positive, (num<D>(0) - moment) * negative).v, num<D>(1).v);
+}
 
 /// Where a normal force stands in a cell: how far from its middle force, and on which side.
 template <class D>
@@ -357,7 +353,7 @@ HWY_INLINE M enter_cells(const ElementJob& job, size_t block, M wanted, Num<D> k
     hn::Store((pressing.force / pressing.whole).v, tag, forces);
     hn::Store(hn::IfThenElseZero(stale, one.v), tag, is_stale);
     for (size_t l = 0; l < W; ++l)
-      if (is_stale[l] != 0) job.cells.write(job.cells.owner, block * W + l, forces[l]);
+      if (is_stale[l] != 0) job.writer.write_cells(job.writer.owner, block * W + l, forces[l]);
     at = find();
   }
   return hn::And(hn::And(wanted, at.is_within), hn::And(at.is_in_cells, at.is_known));
@@ -367,14 +363,15 @@ HWY_INLINE M enter_cells(const ElementJob& job, size_t block, M wanted, Num<D> k
 /// cells. Sets the elastic resultants f; gives the lanes among `wanted` for which that is the whole truth and moves
 /// their history; the others keep theirs. `flowed` are those of them that have passed a limit in this step.
 template <class D, Plane In, int Hinges, class M>
-HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& pressing, const Num<D> x[2],
-                       const Num<D> k[6], const Num<D> d[6], const Num<D> e_before[6],
-                       const CrackScales<D, Hinges>& cracks, Num<D> f[6], M& flowed) {
+HWY_INLINE M flow_zone(const ElementJob& job, size_t block, M wanted, const Pressing<D>& pressing, const Num<D> x[2],
+                       const Num<D> k[6], const Num<D> d[6], const Num<D> e_before[6], Num<D> f[6], M& flowed) {
   using N = Num<D>;
   constexpr int first = first_bending(In), last = last_bending(In);
   constexpr bool is_plane = In != Plane::Space;
   constexpr ActiveComponents active = components_of(In);
   const D tag;
+  const size_t W = hn::Lanes(tag);
+  double* flow = job.flows + static_cast<size_t>(kFlowFields) * W * block;
   const N zero = num<D>(0), one = num<D>(1), half = num<D>(0.5), tiny = num<D>(1e-290);
   M good = wanted;
   const auto demand = [&](M condition) { good = hn::And(good, condition); };
@@ -386,37 +383,55 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
   if constexpr (!is_plane) f[3] = k[3] * (d[3] - twist);
 
   BendingPlane<D, Hinges> plane[2];
-  for (int q = first; q <= last; ++q) {
-    BendingPlane<D, Hinges>& P = plane[q];
-    const int shear = q == 0 ? 2 : 1, bend = q == 0 ? 4 : 5;
-    P.shear_stiffness = k[shear], P.bending_stiffness = k[bend];
-    P.shift = d[shear] - slip[shear - 1];
-    P.rotation = d[bend];
-    for (int s = 0; s < Hinges; ++s) {
-      P.lever[s] = q == 0 ? x[s] : zero - x[s];
-      P.stiffness[s] = fma(x[s] * x[s], k[shear], k[bend]);
-      P.phi[s] = load<D>(flow, kStations + s * kStationFields + kPhi + q);
-      P.soft[s] = load<D>(flow, kStations + s * kStationFields + kSoftness + q);
-      P.crack[s] = load<D>(flow, kStations + s * kStationFields + kCracked + q);
-      P.bow[s] = load<D>(flow, kStations + s * kStationFields + kBow + q);
+  const auto find_trial = [&]() -> M {
+    M grows = hn::FirstN(tag, 0);  // cracks
+    for (int q = first; q <= last; ++q) {
+      BendingPlane<D, Hinges>& P = plane[q];
+      const int shear = q == 0 ? 2 : 1, bend = q == 0 ? 4 : 5;
+      P.shear_stiffness = k[shear], P.bending_stiffness = k[bend];
+      P.shift = d[shear] - slip[shear - 1];
+      P.rotation = d[bend];
+      for (int s = 0; s < Hinges; ++s) {
+        const int station = kStations + s * kStationFields;
+        P.lever[s] = q == 0 ? x[s] : zero - x[s];
+        P.stiffness[s] = fma(x[s] * x[s], k[shear], k[bend]);
+        P.phi[s] = load<D>(flow, station + kPhi + q);
+        P.soft[s] = load<D>(flow, station + kSoftness + q);
+        P.crack[s] = load<D>(flow, station + kCracked + q);
+        P.bow[s] = load<D>(flow, station + kBow + q);
+      }
+      // damage adds flexibility at the stations: (1 + S C) m = m0
+      P.measure();
+      if constexpr (Hinges == 1) {
+        const N s11 = fma(P.stiffness[0], P.soft[0], one);
+        P.m[0] = is_plane ? P.m[0] / s11 : P.m[0] * (one / s11);
+      } else {
+        P.cross = fma(x[0] * x[1], k[shear], k[bend]);
+        const N s11 = fma(P.stiffness[0], P.soft[0], one), s22 = fma(P.stiffness[1], P.soft[1], one);
+        const N s12 = P.cross * P.soft[1], s21 = P.cross * P.soft[0];
+        const N scale = one / fms(s11, s22, s12 * s21);
+        const N m0 = fms(P.m[0], s22, P.m[1] * s12) * scale, m1 = fms(P.m[1], s11, P.m[0] * s21) * scale;
+        P.m[0] = m0, P.m[1] = m1;
+      }
+      for (int s = 0; s < Hinges; ++s) {
+        const int growth = kStations + s * kStationFields + kGrowth + 2 * q;
+        P.phi[s] = fma(P.soft[s], P.m[s], P.phi[s]);
+        grows = hn::Or(grows, find_growth<D>(P.m[s], load<D>(flow, growth), load<D>(flow, growth + 1)));
+      }
     }
-    // damage adds flexibility at the stations: (1 + S C) m = m0
-    P.measure();
-    if constexpr (Hinges == 1) {
-      const N s11 = fma(P.stiffness[0], P.soft[0], one);
-      P.m[0] = is_plane ? P.m[0] / s11 : P.m[0] * (one / s11);
-    } else {
-      P.cross = fma(x[0] * x[1], k[shear], k[bend]);
-      const N s11 = fma(P.stiffness[0], P.soft[0], one), s22 = fma(P.stiffness[1], P.soft[1], one);
-      const N s12 = P.cross * P.soft[1], s21 = P.cross * P.soft[0];
-      const N scale = one / fms(s11, s22, s12 * s21);
-      const N m0 = fms(P.m[0], s22, P.m[1] * s12) * scale, m1 = fms(P.m[1], s11, P.m[0] * s21) * scale;
-      P.m[0] = m0, P.m[1] = m1;
-    }
-    for (int s = 0; s < Hinges; ++s) {
-      P.phi[s] = fma(P.soft[s], P.m[s], P.phi[s]);
-      demand(hn::Not(cracks.grow(s, q, P.m[s])));
-    }
+    return hn::And(wanted, grows);
+  };
+  M cracks = find_trial();
+  if (HWY_UNLIKELY(!hn::AllFalse(tag, cracks))) {
+    alignas(64) double at[6 * kMostLanes] = {}, is_cracking[kMostLanes];
+    for (int c = 0; c < active.count; ++c)
+      hn::Store(d[active.at[c]].v, tag, at + static_cast<size_t>(active.at[c]) * W);
+    hn::Store(hn::IfThenElseZero(cracks, one.v), tag, is_cracking);
+    for (size_t l = 0; l < W; ++l)
+      if (is_cracking[l] != 0 && !job.writer.grow_cracks(job.writer.owner, block * W + l, at + l, W))
+        is_cracking[l] = 0;
+    cracks = hn::Gt(hn::Load(tag, is_cracking), zero.v);
+    (void)find_trial();
   }
 
   // (|My|/Ly)^1.5 + (|Mz|/Lz)^1.5 of a station, in a plane |M|/L; an axis without any limit left stands apart
@@ -744,7 +759,7 @@ HWY_INLINE M flow_zone(M wanted, double* HWY_RESTRICT flow, const Pressing<D>& p
   }
   // torsion
   N twisted = zero, over = zero;
-  flowed = hn::Or(hn::Or(bends, slides), pressing.flows);
+  flowed = hn::Or(hn::Or(bends, slides), hn::Or(pressing.flows, cracks));
   if constexpr (!is_plane) {
     const N torsion = load<D>(flow, kTorsion);
     const M twists = hn::And(good, hn::Gt(abs(f[3]).v, torsion.v));
@@ -946,10 +961,10 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
     k[i] = constant(kStiffness + i);
     f[i] = k[i] * e[i];
   }
-  CrackScales<D, Hinges> cracks;
-  for (int station = 0; station < Hinges; ++station)
-    for (int axis = first_bending(In); axis <= last_bending(In); ++axis)
-      for (int side : {0, 1}) cracks.of[station][axis][side] = constant(kCrackScale + 4 * station + 2 * axis + side);
+  const auto cracks_grow = [&](int station, int axis, N moment) {
+    const int scale = kCrackScale + 4 * station + 2 * axis;
+    return find_growth<D>(moment, constant(scale), constant(scale + 1));
+  };
   // is every resultant inside the bounds for sure?
   outside = hn::Or(outside,
                    hn::Not(hn::And(hn::Ge(f[0].v, constant(kLeastForce).v), hn::Le(f[0].v, constant(kMostForce).v))));
@@ -959,7 +974,7 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
     const N scale = constant(kMomentScale + q);
     for (int station = 0; station < Hinges; ++station) {
       const N m = q == 0 ? fma(x[station], f[shear], f[bend]) : fnma(x[station], f[shear], f[bend]);
-      outside = hn::Or(outside, hn::Or(hn::Gt((abs(m) * scale).v, one.v), cracks.grow(station, q, m)));
+      outside = hn::Or(outside, hn::Or(hn::Gt((abs(m) * scale).v, one.v), cracks_grow(station, q, m)));
     }
   } else {
     const N vy = f[1] * constant(kShearScale), vz = f[2] * constant(kShearScale + 1);
@@ -970,7 +985,7 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
     const N scale_y = constant(kMomentScale), scale_z = constant(kMomentScale + 1);
     for (int station = 0; station < Hinges; ++station) {
       const N about_y = fma(x[station], f[2], f[4]), about_z = fnma(x[station], f[1], f[5]);
-      outside = hn::Or(outside, hn::Or(cracks.grow(station, 0, about_y), cracks.grow(station, 1, about_z)));
+      outside = hn::Or(outside, hn::Or(cracks_grow(station, 0, about_y), cracks_grow(station, 1, about_z)));
       const N my = abs(about_y) * scale_y, mz = abs(about_z) * scale_z;
       const auto linear = hn::Gt((my + mz).v, one.v);
       if (HWY_LIKELY(hn::AllFalse(tag, linear))) continue;
@@ -997,11 +1012,11 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
     Pressing<D> pressing;
     if (!hn::AllFalse(tag, flows)) flows = enter_cells<D, In, Hinges>(job, block, flows, k[0], d[0], pressing);
     if (!hn::AllFalse(tag, flows)) {
-      double* HWY_RESTRICT flow = job.flows + static_cast<size_t>(kFlowFields) * W * block;
+      const double* flow = job.flows + static_cast<size_t>(kFlowFields) * W * block;
       N f_flow[6], d_before[6];
       for (int c = 0; c < active.count; ++c) d_before[active.at[c]] = load<D>(flow, kBefore + active.at[c]);
       auto flowed = flows;
-      const auto good = flow_zone<D, In, Hinges>(flows, flow, pressing, x, k, d, was, cracks, f_flow, flowed);
+      const auto good = flow_zone<D, In, Hinges>(job, block, flows, pressing, x, k, d, was, f_flow, flowed);
       for (int c = 0; c < active.count; ++c) {
         const int i = active.at[c];
         f[i] = select(good, f_flow[i], f[i]);

@@ -103,7 +103,7 @@ enum Flow : int {
   kPlastic = 48,        // dissipated since the slot was written
   kIdle = 49,           // steps without flow
   kStations = 50,       // both stations, kStationFields each
-  kStationFields = 59,
+  kStationFields = 63,
   kFlowFields = kStations + 2 * kStationFields
 };
 /// Fields of a station: inelastic rotations, damage, and the cell of the moment family about each axis.
@@ -117,7 +117,8 @@ enum FlowStation : int {
   kBow = 9,             // of the plastic rotation, that of cracks (2)
   kStrained = 11,       // rotation about y that strains the edges as what was reached does
   kRotationRatio = 12,  // that of a rotation about z
-  kCell = 13,           // about y, about z: kCellFields each
+  kGrowth = 13,         // one over the moments beyond which cracks grow, about y, z, for moments > 0 and < 0 (2 x 2)
+  kCell = 17,           // about y, about z: kCellFields each
   kCellFields = 23
 };
 /// Fields of a cell, which is two intervals of normal force and one of rotation: the middle force, one over the widths
@@ -165,11 +166,13 @@ struct BodyJob {
   std::vector<std::uint32_t>* spins;  // slots that turn too fast for the series, left where they were
 };
 
-/// Writes the cells of a zone that flows anew, around a normal force that has left them or a rotation that has, while
-/// the kernel waits; leaves them as they are where no cell has that force. `force` is that over the section that is
-/// left.
-struct CellWriter {
-  void (*write)(void* owner, size_t slot, double force) = nullptr;
+/// What is done to the slot of a zone that flows while the kernel waits.
+struct FlowWriter {
+  /// Writes its cells anew, around a normal force that has left them or a rotation that has; leaves them as they are
+  /// where no cell has that force. `force` is that over the section that is left.
+  void (*write_cells)(void* owner, size_t slot, double force) = nullptr;
+  /// Lets its cracks grow to where they hold at a deformation: six components, `stride` apart. False if they do not.
+  bool (*grow_cracks)(void* owner, size_t slot, const double* deformation, size_t stride) = nullptr;
   void* owner = nullptr;
 };
 
@@ -189,7 +192,7 @@ struct ElementJob {
   const std::uint32_t *body_a, *body_b;  // batch: body of each block
   const double *p, *q;                   // batch: of the bodies
   const double* poses;                   // of the bodies, kPoseRow numbers each
-  CellWriter cells;
+  FlowWriter writer;
   std::vector<std::uint32_t>* outside;  // slots that need the full law, untouched
 };
 

@@ -339,7 +339,7 @@ void Lanes::lay_poses() {
   }
 }
 
-void Lanes::evaluate_elements(size_t first, size_t last, const kernel::CellWriter& cells,
+void Lanes::evaluate_elements(size_t first, size_t last, const kernel::FlowWriter& writer,
                               std::vector<std::uint32_t>& beyond) {
   kernel::ElementJob job;
   job.first = first, job.last = last;
@@ -350,7 +350,7 @@ void Lanes::evaluate_elements(size_t first, size_t last, const kernel::CellWrite
   job.a = is_batch ? nullptr : body_a.data(), job.b = is_batch ? nullptr : body_b.data();
   job.body_a = body_a.data(), job.body_b = body_b.data();
   job.p = p.data(), job.q = q.data(), job.poses = poses.data();
-  job.cells = cells;
+  job.writer = writer;
   job.outside = &beyond;
   if (W == kernel::lanes()) {
     kernel::evaluate_elements(job);

@@ -122,7 +122,7 @@ struct Lanes {
   /// Where the bodies are now, for evaluate_elements() of a run of its own.
   void lay_poses();
   /// Forces of the elements in blocks [first, last).
-  void evaluate_elements(size_t first, size_t last, const kernel::CellWriter& cells,
+  void evaluate_elements(size_t first, size_t last, const kernel::FlowWriter& writer,
                          std::vector<std::uint32_t>& beyond);
   /// Forces of the elements on every body; batch only.
   void sum_forces();

@@ -665,12 +665,17 @@ void advance_together(Lanes& lanes, std::span<System* const> systems) {
       const Lanes& lanes;
       std::span<System* const> systems;
     } batch{lanes, systems};
-    const kernel::CellWriter cells{[](void* owner, size_t slot, double force) {
-                                     const Batch& all = *static_cast<const Batch*>(owner);
-                                     if (System* s = all.systems[slot % all.lanes.W]) s->write_cells(slot, force);
-                                   },
-                                   &batch};
-    lanes.evaluate_elements(0, lanes.element_blocks, cells, lanes.outside);
+    const kernel::FlowWriter writer{[](void* owner, size_t slot, double force) {
+                                      const Batch& all = *static_cast<const Batch*>(owner);
+                                      if (System* s = all.systems[slot % all.lanes.W]) s->write_cells(slot, force);
+                                    },
+                                    [](void* owner, size_t slot, const double* deformation, size_t stride) {
+                                      const Batch& all = *static_cast<const Batch*>(owner);
+                                      System* s = all.systems[slot % all.lanes.W];
+                                      return s && s->grow_cracks(slot, deformation, stride);
+                                    },
+                                    &batch};
+    lanes.evaluate_elements(0, lanes.element_blocks, writer, lanes.outside);
     for (const std::uint32_t slot : lanes.outside)
       if (System* s = systems[slot % lanes.W]) s->evaluate_outside(slot);
     lanes.share_again();

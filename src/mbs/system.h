@@ -370,6 +370,8 @@ class System {
   void evaluate_elements();
   /// For the kernel: cells of a zone that flows, around a normal force [N].
   void write_cells(size_t slot, double axial);
+  /// For the kernel: lets the cracks of a zone that flows grow at a deformation; false if they do not.
+  bool grow_cracks(size_t slot, const double* deformation, size_t stride);
   void sum_element_forces();
   Vec3 calc_element_reaction() const;
   void save_slot(size_t slot, std::vector<double>& to) const;

@@ -813,7 +813,8 @@ struct Evaluation {
   /// All flow of this step, and what breaks the zone.
   ///   h  since the last evaluation [s]
   void flow(const CompiledLaws& laws, double time, double h) {
-    crack_stations(h);
+    cracked = z.cracked_at == time;  // then once is enough
+    if (!cracked) crack_stations(h);
     if (crack_inside_bounds(laws)) return;
     const Limits first_limits(laws, p.law[0], z, time);
     const double integrity = flow_axially(first_limits);
@@ -927,6 +928,19 @@ void advance_in(const ZoneParameters& p, const CompiledLaws& laws, const Six& d,
 }
 
 }  // namespace
+
+bool grow_cracks(const ZoneParameters& p, const Six& d, double time, ZoneState& z) {
+  const auto grow = [&](auto now) {
+    constexpr double in_motion = 1;  // [s]
+    now.crack_stations(in_motion);
+    return now.cracked;
+  };
+  const bool has_grown = p.plane == Plane::Space    ? grow(Evaluation<Plane::Space>(p, d, z))
+                         : p.plane == Plane::AboutY ? grow(Evaluation<Plane::AboutY>(p, d, z))
+                                                    : grow(Evaluation<Plane::AboutZ>(p, d, z));
+  if (has_grown) z.cracked_at = time;
+  return has_grown;
+}
 
 void advance_zone(const ZoneParameters& p, const CompiledLaws& laws, const Six& d, double time, double h,
                   ZoneState& z) {

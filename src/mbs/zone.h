@@ -63,6 +63,7 @@ struct ZoneState {
   bool yielded = false;                          // has ever passed a limit in the full law
   bool is_told = false;                          // that it has yielded
   bool is_adjusted = false;                      // lengthened from outside since the last evaluation
+  double cracked_at = -kUnlimited;               // when cracks have last grown from outside [s]
   // Bounds within which no limit is passed whatever the combination, for normal forces in a range; renewed when the
   // force leaves the range, void (an empty range) after any inelastic step. With them goes the inelastic part of the
   // deformation at the marker: inside the bounds the zone is a spring from there.
@@ -119,13 +120,13 @@ inline bool is_crushed_by_shortening(const ZoneParameters& p, const CompiledLaws
 ///   time  of the evaluation [s]; h  since the last one [s], 0 when there is none
 void advance_zone(const ZoneParameters&, const CompiledLaws&, const Six& deformation, double time, double h,
                   ZoneState&);
-/// Whether the zone is a spring with a damper for as long as its forces stay inside its safe bounds.
 /// Whether it has ever passed a limit, in lanes as well.
 inline bool has_yielded(const ZoneState& z) {
   return z.yielded || z.station[0].reached > 0 || z.station[1].reached > 0 || z.shortened > 0 || z.slipped > 0 ||
          z.twisted > 0;
 }
 
+/// Whether the zone is a spring with a damper for as long as its forces stay inside its safe bounds.
 inline bool is_bounded(const ZoneState& z, bool unlimited) {
   return z.live && z.has_elastic && z.next_law < 0 && (unlimited || z.safe_force[0] <= z.safe_force[1]);
 }
@@ -144,6 +145,9 @@ bool write_flow(const ZoneParameters&, const CompiledLaws&, ZoneState&, double t
 ///   stride  between the fields
 bool write_flow_cells(const ZoneParameters&, const CompiledLaws&, ZoneState&, double axial, double shortened,
                       const double strained[2], double* fields, size_t stride);
+/// Lets the cracks of a live zone grow to where they hold at a deformation, whatever else happens to it then; the full
+/// law books what that loses if it is asked at the same time [s]. False if nothing has grown.
+bool grow_cracks(const ZoneParameters&, const Six& deformation, double time, ZoneState&);
 /// Another law for all stations of a zone, which takes over from a time on [s] within a ramp [s]; the stiffness follows
 /// once that is over.
 struct LawSwitch {

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "mbs/kernel.h"
 #include "mbs/zone_limits.h"
@@ -212,10 +213,10 @@ bool write_flow_cells(const ZoneParameters& p, const CompiledLaws& laws, ZoneSta
       const bool is_low = axial - forces[k] < forces[k + 1] - axial;
       const size_t middle = (is_low && k > 0) || k + 1 == last ? k : k + 1;
       const size_t row[3] = {middle > 0 ? middle - 1 : middle, middle, std::min(middle + 1, last)};
-      put(kCellForce, whole * forces[middle]);
       // no width: nothing but the full law beyond
-      put(kCellForce + 1, row[0] < middle ? 1 / (whole * (forces[middle] - forces[row[0]])) : kMostLimit);
-      put(kCellForce + 2, row[2] > middle ? 1 / (whole * (forces[row[2]] - forces[middle])) : kMostLimit);
+      const double force[3] = {whole * forces[middle],
+                               row[0] < middle ? 1 / (whole * (forces[middle] - forces[row[0]])) : kMostLimit,
+                               row[2] > middle ? 1 / (whole * (forces[row[2]] - forces[middle])) : kMostLimit};
       size_t j[2] = {family.rotation.size() - 1, family.rotation.size() - 1};
       double lowest = strained[s], per_width = 0;
       if (strained[s] < family.rotation.back()) {
@@ -224,7 +225,15 @@ bool write_flow_cells(const ZoneParameters& p, const CompiledLaws& laws, ZoneSta
         lowest = family.rotation[j[0]];
         per_width = 1 / (family.rotation[j[1]] - family.rotation[j[0]]);
       }
-      put(kCellRotation, lowest), put(kCellRotation + 1, per_width);
+      const double rotation[2] = {lowest, per_width};
+      const auto has = [&](size_t field, std::span<const double> x) {
+        for (size_t i = 0; i < x.size(); ++i)
+          if (cell[(field + i) * stride] != x[i]) return false;
+        return true;
+      };
+      if (has(kCellForce, force) && has(kCellRotation, rotation)) continue;  // of another station, or the curve
+      for (size_t i = 0; i < 3; ++i) put(kCellForce + i, force[i]);
+      for (size_t i = 0; i < 2; ++i) put(kCellRotation + i, rotation[i]);
       for (size_t c = 0; c < 6; ++c) {
         const double* limit = &family.limit[family.place(row[c / 2], j[c % 2])];
         put(kCellPositive + c, whole * limit[0]);
@@ -259,6 +268,8 @@ bool write_flow(const ZoneParameters& p, const CompiledLaws& laws, ZoneState& z,
       for (int q = 0; q < 2; ++q)
         station[kPhi + q] = z.station[s].phi[q], station[kSoftness + q] = z.station[s].soft[q],
                        station[kCracked + q] = z.station[s].crack[q], station[kBow + q] = z.station[s].bow[q];
+      for (int q = 0; q < 2; ++q)
+        for (int side : {0, 1}) station[kGrowth + 2 * q + side] = z.crack_scale[s][q][side];
       station[kReached] = z.station[s].reached;
       station[kStrained] = z.station[s].strained;
       station[kRotationRatio] = law->rotation_ratio;
