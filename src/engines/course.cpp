@@ -136,13 +136,14 @@ bool Course::start(double step) {
 
 double Course::next_stop() const {
   double stop = options_.duration;
-  stop = std::min({stop, static_cast<double>(frame_) * options_.frame_interval, sampler_.next()});
+  stop = std::min(
+      {stop, static_cast<double>(frame_) * calc_frame_interval(), sampler_.next(), forces_.next_corner(time_)});
   if (next_event_ < timed_.size()) stop = std::min(stop, std::max(time_, model_.events[timed_[next_event_]].time));
   return stop;
 }
 
 bool Course::is_frame_due() const {
-  return time_ >= static_cast<double>(frame_) * std::max(options_.frame_interval, step_) - calc_early();
+  return time_ >= static_cast<double>(frame_) * calc_frame_interval() - calc_early();
 }
 
 Course::Verdict Course::accept(double time, const Motion& motion, const Work& work, const Touch& touch,

@@ -104,6 +104,7 @@ class Course {
   void measure_joints();
   bool is_at_rest();
   bool is_frame_due() const;
+  double calc_frame_interval() const { return std::max(options_.frame_interval, step_); }
   double calc_early() const { return step_ > 0 ? 0.5 * step_ : 1e-12 * (1 + time_); }
   void show();
   const mbs::View& calc_view();

@@ -602,6 +602,16 @@ void Forces::apply_load(size_t i, double time) {
   if (!load_[i].has_begun || load_[i].is_over) load_[i] = {true, false, time};
 }
 
+double Forces::next_corner(double time) const {
+  double next = std::numeric_limits<double>::infinity();
+  for (size_t i = 0; i < load_.size(); ++i) {
+    if (!load_[i].has_begun || load_[i].is_over) continue;
+    for (const double t : model_.loads[i].time)
+      if (load_[i].begin + t > time + 1e-12 * (1 + time)) next = std::min(next, load_[i].begin + t);
+  }
+  return next;
+}
+
 // --- what is seen
 
 ElementEnergy Forces::calc_energy() const {

@@ -68,6 +68,8 @@ class Forces {
   void remove_bushing(size_t);
   void remove_load(size_t);
   void apply_load(size_t, double time);
+  /// The next time at which a load's table has a corner; infinite behind the last [s].
+  double next_corner(double time) const;
 
   ElementEnergy calc_energy() const;
   /// What the view shows of elements, cables, springs and bushings at the last accepted state.

@@ -557,7 +557,10 @@ class MujocoEngine : public Engine {
     using Verdict = Course::Verdict;
     const double h = course.step();
     Built built(course, overlaps, h);
-    if (built.touches()) course.note("contact is MuJoCo's own: soft, with friction and restitution like topple's");
+    if (built.touches())
+      course.note(
+          "contact is MuJoCo's own: soft, with friction and restitution like topple's; what slides fast is thrown up, "
+          "without restitution, too");
     const auto accept = [&] {
       const double time = static_cast<double>(steps) * h;
       return course.accept(time, built.motion(), sum(before, built.work()), built.touch(),

@@ -77,6 +77,10 @@ int System::find_pair_law(int a, int b) const {
 
 int System::calc_contact_interval() const {
   if (options.contact_interval > 0) return options.contact_interval;
+  // between looks points turn with their body, and those of a sphere do not
+  if (std::any_of(state.shapes.begin(), state.shapes.end(),
+                  [](const CompiledShape& s) { return s.kind == Shape::Kind::Sphere; }))
+    return 1;
   const double frequency = calc_contact_frequency();
   if (options.step > 0 || frequency <= 0) return 1;
   return std::clamp(static_cast<int>(kLookAngle / (frequency * step)), 1, kMostContactInterval);

@@ -78,6 +78,7 @@ void Course::show() {
       now_.softened[i] = true;
       s_.say({Happening::Kind::ElementSoftening, s_.state.time, static_cast<int>(i), -1, {}, 0});
     }
+  if (!std::isfinite(v.energy.residual) && s_.trouble.empty()) s_.trouble = "its energy is no longer finite";
   s_.state.largest_residual = std::max(s_.state.largest_residual, std::abs(v.energy.residual));
   s_.state.released = v.energy.released;
   if (s_.options.on_frame) s_.options.on_frame(v);
@@ -158,6 +159,7 @@ double Course::calc_singular_play() const {
 bool Course::end() {
   constexpr double near = 1.5;  // steps behind the last frame
   if (s_.summary.ending == Summary::Ending::AtRest || s_.state.time - now_.shown > near * s_.step) show();
+  if (!s_.trouble.empty()) s_.summary.ending = Summary::Ending::Diverged;
   const std::string lost = describe_lost_energy(calc_energy_error());
   if (!lost.empty() && s_.state.largest_residual > calc_singular_play()) {
     s_.summary.ending = Summary::Ending::Diverged;

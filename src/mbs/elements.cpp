@@ -1,6 +1,8 @@
 /// Zone elements of a running system: their slots in the kernel's lanes, the full law for those outside their bounds,
 /// and the sums of their forces over the bodies (docs/theory/zones.md, multibody.md).
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -344,6 +346,19 @@ ElementGeometry System::measure_zone(const CompiledElement& e) const {
                          e.zone.span());
 }
 
+void System::note_turned_over(size_t i, const Six& d, const ZoneState& before) {
+  const Vec3 now{d.c[3], d.c[4], d.c[5]}, then{before.deformation[3], before.deformation[4], before.deformation[5]};
+  constexpr double far = 2;  // [rad]; a rotation vector ends at a half turn
+  if (!(dot(now, then) < -far * far) || std::find(turned_over.begin(), turned_over.end(), i) != turned_over.end())
+    return;
+  turned_over.push_back(i);
+  if (turned_over.size() == 1)
+    summary.notes.push_back(
+        fmt::format("element \"{}\" is turned by more than half a turn at {:.4g} s, where its "
+                    "rotations end: they go on from the other side, and so does its moment",
+                    model.elements[i].name, state.time));
+}
+
 /// By the full law, from the state of the zone; the force goes to the slot.
 void System::evaluate_element(size_t i, double h) {
   ZoneState& z = state.element[i];
@@ -351,6 +366,7 @@ void System::evaluate_element(size_t i, double h) {
   if (!z.live || slot == Lanes::kNoSlot) return;
   const CompiledElement& e = elements[i];
   const ElementGeometry g = measure_zone(e);
+  if (h > 0) note_turned_over(i, g.deformation, z);
   if (ignores_limits) {
     ZoneParameters elastic = e.zone;
     elastic.stations = 0;

@@ -480,7 +480,7 @@ double System::calc_own_step() const {
 }
 
 void System::set_step(double h) {
-  if (h == step) return;
+  if (h == step && h > 0) return;
   if (!(options.duration <= kMostSteps * h) && trouble.empty())
     trouble = fmt::format(
         "the fastest mode has {:.4g} rad/s and contact {:.4g} rad/s, and {:.6g} s in steps of {:.3g} s are more steps "

@@ -331,6 +331,12 @@ double JsonNode::positive() const {
 
 int JsonNode::integer(int low) const {
   constexpr int high = 100'000'000;
+  if (json_->is_number_float()) {  // 2.0
+    const double x = json_->get<double>();
+    if (x != std::floor(x)) fail("must be a whole number");
+    if (!(x >= low && x <= high)) fail(fmt::format("is out of range: {:g}", x));
+    return static_cast<int>(x);
+  }
   if (!json_->is_number_integer()) fail("must be a whole number");
   if (json_->is_number_unsigned() && json_->get<std::uint64_t>() > high) fail("is out of range");
   const auto x = json_->get<std::int64_t>();

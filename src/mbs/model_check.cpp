@@ -368,11 +368,13 @@ void Checker::check_lines() {
   for (size_t i = 0; i < m_.cables.size(); ++i) {
     const Cable& c = m_.cables[i];
     const Place p = at("cables", i, c.name);
-    two_bodies(p, c.a, c.b);
+    const bool known = two_bodies(p, c.a, c.b);
     finite(p, "p_A", c.p_A);
     finite(p, "p_B", c.p_B);
     positive(p, "stiffness", c.stiffness);
     finite_not_negative(p, "pretension", c.pretension);
+    if (known && c.pretension > 0 && norm(pose_of(c.b) * c.p_B - pose_of(c.a) * c.p_A) == 0)
+      fail(p, "pretension", "its ends are at the same place at the start: the line between them has no direction");
     not_negative(p, "strength", c.strength);
   }
   for (size_t i = 0; i < m_.springs.size(); ++i) {

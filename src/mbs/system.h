@@ -237,11 +237,14 @@ class System {
   std::vector<JointCluster> clusters;
   bool clusters_due = true;
   std::vector<std::pair<int, int>> joint_notes;  // first joint and situation of those made
-  std::vector<std::uint32_t> pair_slot;          // of each joint (J)
-  std::vector<int> paired;                       // joints that have one
-  std::vector<unsigned char> joint_over;         // passes a limit, of those (J)
-  bool joint_sums_due = true;                    // those of bodies without joints are to be cleared
-  std::string identity;                          // of the model, for snapshots
+  std::vector<size_t> turned_over;               // elements past half a turn
+  /// Notes an element whose rotation vector has just changed over to the other side.
+  void note_turned_over(size_t element, const Six& deformation, const ZoneState& before);
+  std::vector<std::uint32_t> pair_slot;   // of each joint (J)
+  std::vector<int> paired;                // joints that have one
+  std::vector<unsigned char> joint_over;  // passes a limit, of those (J)
+  bool joint_sums_due = true;             // those of bodies without joints are to be cleared
+  std::string identity;                   // of the model, for snapshots
   std::vector<JointRow> joint_rows;
   std::vector<double> joint_gaps, joint_rhs, joint_impulse, joint_linear, joint_answer, joint_change;
   std::vector<Vec3> v_before, L_before, w_before;       // of jointed bodies (B)

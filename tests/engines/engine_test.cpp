@@ -40,6 +40,26 @@ TEST(Engine, NativeRunsAFallingBody) {
   EXPECT_NEAR(c.frames[2].X_WB[0].p.z, 100 + 1 - 0.5 * 9.81, 1e-9);
 }
 
+TEST(Simbody, EndsWithAStepLongerThanItsFrames) {
+  if (!test::is_available("simbody")) GTEST_SKIP() << "not built in";
+  const auto c = test::run(*make_engine("simbody"), make_stone(), make_options(0.3, 0.01, 0.017));
+  EXPECT_EQ(c.summary.ending, mbs::Summary::Ending::TimeLimit);
+  EXPECT_NEAR(c.frames.back().X_WB[0].p.x, 0.9, 0.06);
+}
+
+TEST(SimbodyPhysics, SeesAPulseShorterThanItsSteps) {
+  if (!test::is_available("simbody")) GTEST_SKIP() << "not built in";
+  mbs::Model m = test::make_empty({});
+  mbs::add_body(m, test::make_body("b", 2, {1, 1, 1}, {}));
+  mbs::Load l;
+  l.body = {0};
+  l.force = {2000, 0, 0};
+  l.time = {0, 0.123, 0.12301, 0.12302, 1}, l.factor = {0, 0, 1, 0, 0};
+  m.loads.push_back(l);
+  const auto c = test::run(*make_engine("simbody"), m, make_options(1, 1, 0));
+  EXPECT_NEAR(c.frames.back().v_WB[0].x, 0.01, 1e-8);
+}
+
 TEST(Engine, UnknownNamesAreRefusedWithAGuess) {
   const std::string message = message_of([] { make_engine("simbodi"); });
   EXPECT_NE(message.find("there is no engine \"simbodi\""), std::string::npos);

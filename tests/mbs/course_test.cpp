@@ -40,6 +40,45 @@ Model make_hanging() {
   return m;
 }
 
+TEST(Course, TellsAnEnergyThatIsNoNumber) {
+  Model m;
+  m.contact.ground = m.contact.bodies = false;
+  Body fast = make_box("fast", 1, {0.5, 0.5, 0.5}, {0, 0, 10});
+  fast.v_WB = {1e200, 0, 0};
+  add_body(m, fast);
+  Options o;
+  o.duration = 0.1, o.step = 1e-3, o.equilibrium = false;
+  const Summary s = run(m, o);
+  EXPECT_EQ(s.ending, Summary::Ending::Diverged);
+  EXPECT_THAT(s.message, testing::HasSubstr("energy is no longer finite"));
+}
+
+TEST(Course, RefusesAContactOfNoStep) {
+  Model m;
+  m.contact.contact_frequency = 1e200;
+  add_body(m, make_box("b", 1, {0.5, 0.5, 0.5}, {0, 0, 0.5}));
+  Options o;
+  o.duration = 0.1, o.equilibrium = false;
+  const Summary s = run(m, o);
+  EXPECT_EQ(s.ending, Summary::Ending::Diverged);
+  EXPECT_THAT(s.message, testing::HasSubstr("more steps than"));
+}
+
+TEST(Course, NotesAnElementThatIsTurnedOver) {
+  Model m = make_hanging();
+  m.events.clear();
+  m.gravity = {};
+  m.elements[0].rotational_stiffness = {1e-3, 1e-3, 1e-3};
+  m.bodies[0].w_WB = {0, 0, 4};
+  Options o;
+  o.duration = 0.7, o.step = 1e-3, o.equilibrium = false;
+  EXPECT_TRUE(run(m, o).notes.empty()) << "2.8 rad";
+  o.duration = 2;
+  const Summary s = run(m, o);
+  ASSERT_EQ(s.notes.size(), 1u);
+  EXPECT_THAT(s.notes[0], testing::HasSubstr("element \"hanger\" is turned by more than half a turn at 0.78"));
+}
+
 TEST(PassQuietPhysics, GoesOnAtTheEventAsIfItHadWaited) {
   Model m = make_hanging();
   std::vector<View> waited, passed;

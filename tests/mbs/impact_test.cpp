@@ -35,6 +35,38 @@ Body make_ball(double mass, double radius, const Vec3& p) {
   return b;
 }
 
+// ------------------------------------------------------------------------------------------------------ spheres
+
+// What slides without spin rolls at last with 5/7 of its speed; contact points of a sphere do not turn with it.
+TEST(SphereContact, ABallThatSlidesRollsAtLastInTheEnginesOwnSteps) {
+  for (const bool on_box : {false, true}) {
+    SCOPED_TRACE(on_box ? "on a box" : "on the ground");
+    Model m;
+    m.contact.ground = !on_box, m.contact.bodies = on_box;
+    m.contact.restitution = m.contact.body_restitution = 0;
+    m.contact.friction = m.contact.body_friction = 0.3;
+    Body ball = make_ball(2, 0.1, {0, 0, 0.1});
+    ball.v_WB = {3, 0, 0};
+    add_body(m, ball);
+    if (on_box) {
+      Body floor = make_box("floor", 1e4, {20, 2, 1}, {0, 0, -1});
+      floor.fixed = true;
+      add_body(m, floor);
+    }
+    Options o = free_options(3, 0);
+    o.frame_interval = 0.1;
+    View last;
+    o.on_frame = [&](const View& v) { last = v; };
+    const Summary s = run(m, o);
+    EXPECT_EQ(s.ending, Summary::Ending::TimeLimit) << s.message;
+    EXPECT_LT(s.energy_error, 1e-6);
+    // it sinks in by g / ω², 0.9e-4 of its radius
+    EXPECT_NEAR(last.v_WB[0].x, 15.0 / 7, 15.0 / 7 * 1e-4);
+    EXPECT_NEAR(last.w_WB[0].y, 150.0 / 7, 150.0 / 7 * 1e-4);
+    EXPECT_NEAR(last.X_WB[0].p.z, 0.1, 2e-5);
+  }
+}
+
 // ------------------------------------------------------------------------------------------------------ corners
 
 /// Motion in the plane x z: speeds of the mass centre and spin about y.

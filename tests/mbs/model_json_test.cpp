@@ -474,6 +474,14 @@ TEST(CheckModel, FindsEachMistake) {
          m.springs[0].p_A = {4, 0, 0};
        },
        "at the same place at the start"},
+      {[](Model& m) {
+         Cable c;
+         c.a = kGround, c.b = {0};
+         c.p_A = pose_of(m, c.b) * c.p_B;
+         c.stiffness = 1, c.pretension = 5;
+         m.cables = {c};
+       },
+       "cables[0].pretension: its ends are at the same place at the start"},
       {[=](Model& m) { m.elements.push_back(crushed(-1)); }, "crush_through: must be finite and not negative"},
       {[=](Model& m) { m.elements.push_back(crushed(1)); }, "crush_through: needs a station"},
       {[](Model& m) { m.springs[0].free_length = -1; }, "free_length: must be finite and not negative"},
