@@ -177,6 +177,10 @@ study::Problem read_problem(const Arguments& a, std::string& text) {
   study::Problem p;
   if (y.evaluator.empty()) {
     check_for_plan(a.input);
+    for (const auto& [is_given, option] :
+         {std::pair(!y.timeout.empty(), "--timeout"), std::pair(y.one_shot, "--one-shot")})
+      if (is_given)
+        throw InputError("E801", std::string(option) + ": is for an evaluator, not for a plan", "leave it out");
     std::vector<Diagnostic> warnings;
     const product::Plan plan = product::read_plan_file(a.input, warnings, text);
     for (const Diagnostic& d : warnings) std::fputs(render(d, text, has_colour(stderr)).c_str(), stderr);

@@ -630,8 +630,8 @@ std::string describe_step_needed(const mbs::Summary& s) {
                      s.step_needed * 1e3);
 }
 
-const std::vector<std::string>& not_modelled() {
-  static const std::vector<std::string> list = {
+std::vector<std::string> not_modelled(const product::Plan& plan) {
+  std::vector<std::string> list = {
       "fragments thrown by the charges",
       "air overpressure",
       "dust",
@@ -640,16 +640,16 @@ const std::vector<std::string>& not_modelled() {
       "cracking and crushing of slabs within a bay, of walls within a panel and of beams between their end zones; room "
       "that rubble takes",
       "infill and finishes beyond their weight"};
+  if (!plan.shafts.empty())
+    list.emplace_back(
+        "rings that flatten as they land: single pieces of a shaft may roll and tumble farther than real ones");
   return list;
 }
 
 bool add_findings(const product::Plan& plan, const mbs::Model& model, const ModelMap& map, const Knowledge& k,
                   const Recorder& recorder, const mbs::Summary& summary, record::Record& r,
                   const std::atomic<bool>* cancel) {
-  r.not_modelled = not_modelled();
-  if (!plan.shafts.empty())
-    r.not_modelled.emplace_back(
-        "rings that flatten as they land: single pieces of a shaft may roll and tumble farther than real ones");
+  r.not_modelled = not_modelled(plan);
   // what was cancelled says how far it came
   const bool is_under_way = r.ending == "under_way" || r.ending == "cancelled";
   const Context c{plan, model, map, k, recorder, summary, r, is_under_way, cancel};

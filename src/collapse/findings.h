@@ -9,8 +9,8 @@
 
 namespace topple::collapse {
 
-/// What no run tells, for people.
-const std::vector<std::string>& not_modelled();
+/// What no run of a plan tells, for people.
+std::vector<std::string> not_modelled(const product::Plan&);
 
 /// The steps of a run, and what the fastest mode asked of a set step that was too long for it.
 std::string describe_steps(const mbs::Summary&);

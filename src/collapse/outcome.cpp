@@ -127,6 +127,11 @@ std::vector<PartReach> find_part_reaches(const record::Record& r, size_t frame) 
         }
       }
     }
+    // poses are kept as floats
+    constexpr double rounding = 1e-5;  // [m]
+    const auto is_none = [](double x) { return x < rounding; };
+    std::replace_if(part.side.begin(), part.side.end(), is_none, 0.0);
+    if (is_none(part.way)) part.way = 0;
     parts.push_back(std::move(part));
   }
   std::stable_sort(parts.begin(), parts.end(), [](const PartReach& a, const PartReach& b) { return a.way < b.way; });

@@ -67,7 +67,7 @@ void add_frame(Sample& s, const Knowledge& k, const SampleRunOptions& options, c
   constexpr double early_after = 1;  // [s]
   if (s.is_over) return;
   s.recorder->add_frame(v);
-  if (!options.condensation || v.time >= calc_release(s.plan)) return;
+  if (!options.condensation || !options.ends_early || v.time >= calc_release(s.plan)) return;
   const double touchdown = s.recorder->first_touchdown();
   s.is_over = v.time >= touchdown + early_after && !stands(s.recorder->block_frames().back(), k);
 }

@@ -17,8 +17,9 @@
 namespace topple::collapse {
 
 struct SampleRunOptions {
-  double after = 1.7;     // simulated after the last stage's time; without stages from the start [s]
-  double frame_rate = 0;  // 0: the plan's [1/s]
+  double after = 1.7;       // simulated after the last stage's time; without stages from the start [s]
+  double frame_rate = 0;    // 0: the plan's [1/s]
+  bool ends_early = false;  // a condensed sample is over once the building has come down before its last stage
   const Condensation* condensation = nullptr;  // samples run condensed; null: whole
   const KnownCurves* known = nullptr;          // of condensed ones; may be null
   double pass_speed = 0.1, pass_share = 2e-3;  // mbs::Options, of condensed samples

@@ -50,6 +50,7 @@ struct FuzzySearch {
   std::vector<double> levels;  // given ones; empty: left to the program
   int limit = 0;               // of samples; 0: left to the program
   std::uint64_t seed = 1;
+  double after = 0;  // of a plan: runs end so long after its last stage; 0: with its analysis [s]
 };
 
 }  // namespace topple::product

@@ -38,7 +38,7 @@ void set_value(Node& document, const DocumentPath& place, const std::string& tex
 Plan read_sample(const FuzzyPlan& fuzzy, const Node& document, const std::string& path, std::span<const double> point) {
   Node changed = document;
   const auto put = [&](size_t i, double value) {
-    const std::string text = fmt::format("{:.17g} {}", value, fuzzy.si[i]);
+    const std::string text = fmt::format("{} {}", value, fuzzy.si[i]);
     for (const DocumentPath& place : fuzzy.places[i]) set_value(changed, place, text);
   };
   for (size_t i = 0; i < fuzzy.inputs.size(); ++i) put(i, point[i]);
@@ -96,7 +96,10 @@ void try_samples(const Plan& plan, const Node& document, Complaints& complaints)
     try {
       read_sample(fuzzy, document, plan.path, point);
       return {};
-    } catch (const InputError& e) { return e.first_error().message; }
+    } catch (const InputError& e) {
+      const Diagnostic& first = e.first_error();
+      return first.help.empty() ? first.message : first.message + " (" + first.help + ")";
+    }
   };
   const auto place_of = [](const FuzzyValue& v) {
     return Place{v.where.line, v.where.column, static_cast<int>(v.name.size())};

@@ -108,6 +108,13 @@ bool leads_to(const std::vector<std::string>& path, const Target& t) {
   return true;
 }
 
+/// What is judged or shown, and never felt by a run.
+bool is_without_effect(const Target& t) {
+  const std::string &group = t.words.front().front(), &key = t.words.back().front();
+  return group == "criteria" || (group == "analysis" && (key == "duration" || key == "frame_rate")) ||
+         (group == "site" && (key == "clearance" || key == "vibration_limit"));
+}
+
 struct FuzzyReader {
   FuzzyPlan& out;
   Complaints& complaints;
@@ -162,6 +169,11 @@ void FuzzyReader::read_entry(const Entry& entry, std::vector<std::string>& path)
 
 /// A value may be fuzzy once.
 bool FuzzyReader::take(size_t target, Place where, const std::string& path) {
+  if (is_without_effect(targets[target])) {
+    complaints.error("E207", where, "fuzzy: " + path_of(targets[target]) + ": no run depends on it",
+                     "it is judged or shown afterwards; leave it out");
+    return false;
+  }
   for (const auto& [t, position] : taken) {
     if (t != target) continue;
     complaints.error("E207", where, "fuzzy: " + path + ": " + path_of(targets[t]) + " is given a second time",
@@ -330,7 +342,7 @@ void read_fuzzy(Reading& reading, TableReader& root, const Node& document, const
   FuzzyPlan& out = reading.plan.fuzzy;
   const int errors_before = complaints.error_count();
   TableReader table(*node, "fuzzy", complaints);
-  out.search = read_search(table);
+  out.search = read_search(table, true);
   FuzzyReader reader{out, complaints, TargetFinder(document, asked).targets, is_whole, {}, {}, {}, {}, {}, {}};
   std::vector<std::string> path;
   for (const Entry& entry : node->entries)

@@ -209,7 +209,7 @@ RefusedCorners try_corners(const std::vector<FuzzyValue>& values, const FuzzyRef
   return out;
 }
 
-FuzzySearch read_search(TableReader& parent) {
+FuzzySearch read_search(TableReader& parent, bool is_of_plan) {
   FuzzySearch out;
   const Node* node = parent.table("search");
   if (!node) return out;
@@ -225,6 +225,7 @@ FuzzySearch read_search(TableReader& parent) {
   out.limit = static_cast<int>(table.find_integer("samples", 10, most_samples).value_or(0));
   out.seed =
       static_cast<std::uint64_t>(table.find_integer("seed", 0, std::numeric_limits<std::int64_t>::max()).value_or(1));
+  if (is_of_plan) out.after = table.quantity("after", Dimension::Time, {0.01, 600}, 0);
   table.finish();
   return out;
 }

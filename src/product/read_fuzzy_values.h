@@ -37,7 +37,8 @@ struct RefusedCorners {
 };
 RefusedCorners try_corners(const std::vector<FuzzyValue>&, const FuzzyRefusal&);
 /// The table [search].
-FuzzySearch read_search(TableReader& parent);
+///   is_of_plan  runs of a plan: `after` may say when they end
+FuzzySearch read_search(TableReader& parent, bool is_of_plan = false);
 /// Parses a formula at `node`; a fault becomes a complaint at its character.
 Expression read_formula(const Node& node, const std::string& path, const std::vector<std::string>& names, Complaints&);
 

@@ -29,9 +29,9 @@ double now() {
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-int find_outcome(const collapse::SampleRun& r) {
+int find_outcome(const collapse::SampleRun& r, bool is_early_bad) {
   const std::vector<std::string>& names = plan_outcomes();
-  const std::string& name = r.stood ? r.mechanism.name : names.back();
+  const std::string& name = r.stood || !is_early_bad ? r.mechanism.name : names.back();
   return static_cast<int>(std::find(names.begin(), names.end(), name) - names.begin());
 }
 
@@ -41,6 +41,11 @@ const std::vector<std::string>& plan_outcomes() {
   static const std::vector<std::string> names{"topple", "vertical",    "partial",         "stands",
                                               "fold",   "progressive", "wrong direction", "early"};
   return names;
+}
+
+double find_after(const product::Plan& plan) {
+  if (plan.fuzzy.search.after > 0) return plan.fuzzy.search.after;
+  return plan.analysis.duration - (plan.stages.empty() ? 0 : plan.stages.back().time);
 }
 
 bool has_screening(const product::Plan& plan, const PlanMappingOptions& o) {
@@ -76,6 +81,7 @@ struct PlanMapping::Impl {
   collapse::Condensation condensation;
   collapse::KnownCurves known;
   double vibration_factor = 0;  // of the band's upper end; 0: no screening
+  bool is_early_bad = false;    // the plan asks the building to stand between its stages
 
   collapse::SampleRunOptions run_options() const {
     collapse::SampleRunOptions o;
@@ -83,6 +89,7 @@ struct PlanMapping::Impl {
     if (options.condensed) o.condensation = &condensation, o.known = &known;
     if (!options.passes_quiet) o.pass_speed = 0;
     o.step_share = options.step_share, o.full_law = options.full_law;
+    o.ends_early = is_early_bad;
     return o;
   }
   Result to_result(const collapse::SampleRun&) const;
@@ -90,23 +97,51 @@ struct PlanMapping::Impl {
                       PlanMappingTimes& spent) const;
 };
 
+void PlanMapping::check_firing(const product::Plan& plan, const Impl& impl) {
+  const auto check = [&](const product::Plan& sample, const std::string& with) {
+    const double release = sample.stages.empty() ? 0 : sample.stages.back().time;
+    for (size_t i = 0; i < sample.stages.size(); ++i)
+      for (const product::Charge& c : sample.stages[i].charges) {
+        const double late = sample.stages[i].time + c.delay - release;
+        if (c.fails || late < impl.options.after) continue;
+        throw InputError("E407",
+                         fmt::format("{}: a charge of stage {} fires {:g} s after the last stage{}, when the runs of a "
+                                     "study have ended ({:g} s)",
+                                     plan.path, i + 1, late, with, impl.options.after),
+                         plan.fuzzy.search.after > 0 ? "raise after in [fuzzy.search], or leave it out"
+                                                     : "raise duration in [analysis]");
+      }
+  };
+  check(plan, "");
+  const std::vector<double> centre = product::calc_centre(plan.fuzzy);
+  for (size_t i = 0; i < centre.size(); ++i) {
+    std::vector<double> point = centre;
+    point[i] = plan.fuzzy.inputs[i].corners.back().first;
+    try {
+      check(product::make_sample(impl.sampler, point), " with " + product::text_of(plan.fuzzy.inputs[i], point[i]));
+    } catch (const InputError& e) {
+      if (e.first_error().code == "E407") throw;  // anything else is a failed run
+    }
+  }
+}
+
 PlanMapping::PlanMapping(const product::Plan& plan, const collapse::Knowledge& k, PlanMappingOptions options) {
   if (plan.fuzzy.inputs.empty())
     throw InputError("E201", plan.path + ": the plan has no fuzzy values", "add a table [fuzzy] (docs/plan.md)");
+  if (options.after == 0) options.after = find_after(plan);
   if (!(options.after > 0) || !(options.tilt_interval > 0) || !std::isfinite(options.after))
     throw InputError("E205", "the time after the last stage and its interval must be above 0");
   if (options.directions < 3 || options.directions > 3600)
     throw InputError("E205", fmt::format("{} directions of the debris outline: 3 to 3600", options.directions));
-  for (const double t : options.tilt_times)
-    if (!(t >= 0) || t > options.after)
-      throw InputError("E205",
-                       fmt::format("tilt at {:g} s: the runs end {:g} s after the last stage", t, options.after));
-  auto impl = std::make_unique<Impl>(Impl{product::make_sampler(plan), k, options, {}, {}, {}, {}, {}, {}, 0});
+  std::erase_if(options.tilt_times, [&](double t) { return t > options.after; });
+  auto impl = std::make_unique<Impl>(Impl{product::make_sampler(plan), k, options, {}, {}, {}, {}, {}, {}, 0, false});
+  impl->is_early_bad = plan.criteria.stands_between_stages.value_or(false);
   for (const product::FuzzyValue& v : plan.fuzzy.inputs) {
     impl->inputs.push_back({v.path, v.symbol, v.unit});
     impl->space.inputs.push_back(uncertainty::make_polygonal(v.corners));
   }
   uncertainty::check_space(impl->space);
+  check_firing(plan, *impl);
   for (const double t : options.tilt_times) impl->outputs.push_back({fmt::format("tilt_{:g}", t), "deg", unit::deg});
   for (const PlanQuantity& q : std::vector<PlanQuantity>{{"touchdown", "s", 1},
                                                          {"tilt_touchdown", "deg", unit::deg},
@@ -161,7 +196,7 @@ Result PlanMapping::Impl::to_result(const collapse::SampleRun& r) const {
   out.state = r.state == State::Done ? Result::State::Done : Result::State::Failed;
   out.text = r.text;
   if (r.state == State::Failed) return out;
-  out.outcome = find_outcome(r);
+  out.outcome = find_outcome(r, is_early_bad);
   for (const double t : options.tilt_times) out.values.push_back(interpolate(r.time, r.tilt, r.release + t));
   const bool touched = r.touchdown <= r.release + options.after;
   for (const double x : {touched ? r.touchdown - r.release : options.after,

@@ -15,8 +15,8 @@
 namespace topple::study {
 
 struct PlanMappingOptions {
-  double after = 1.7;                           // simulated after the last stage's time [s]
-  std::vector<double> tilt_times{0.5, 1, 1.7};  // of outputs, after the last stage's time, at most `after` [s]
+  double after = 0;  // simulated after the last stage's time, if it does not come to rest before; 0: find_after [s]
+  std::vector<double> tilt_times{0.5, 1, 1.7};  // of outputs, after the last stage's time; those until `after` [s]
   double tilt_interval = 0.1;                   // of the trajectory [s]
   int directions = 24;                          // in which the debris outline is taken, from W's x counter-clockwise
   double frame_rate = 0;                        // at which runs are looked at; 0: the plan's [1/s]
@@ -30,6 +30,9 @@ struct PlanMappingOptions {
   bool vibration = true;
 };
 
+/// How long samples of a plan are simulated after its last stage: what its fuzzy.search says, or until its analysis
+/// ends [s].
+double find_after(const product::Plan&);
 /// Whether runs of the plan tell a screening of ground vibration.
 bool has_screening(const product::Plan&, const PlanMappingOptions&);
 /// Output with the upper end of the screening band at a neighbour: "vibration_workshop" of "Workshop".
@@ -51,13 +54,15 @@ struct PlanQuantity {
   double unit = 1;           // SI value of one of it
 };
 
-/// Outcome classes: those of collapse::Mechanism, and "early" where the building does not stand until its last stage.
+/// Outcome classes: those of collapse::Mechanism, and "early" where the building does not stand until its last stage
+/// and the plan asks it to.
 const std::vector<std::string>& plan_outcomes();
 
 /// A plan, ready to be sampled. Constant: several threads may evaluate it.
 class PlanMapping {
  public:
-  /// Throws InputError if the plan has no fuzzy values, or options outside their range.
+  /// Throws InputError if the plan has no fuzzy values, a charge that fires when its runs are over, or options outside
+  /// their range.
   PlanMapping(const product::Plan&, const collapse::Knowledge&, PlanMappingOptions);
   ~PlanMapping();
   PlanMapping(PlanMapping&&) noexcept;
@@ -82,6 +87,8 @@ class PlanMapping {
 
  private:
   struct Impl;
+  /// No charge may fire when its run is over. Throws InputError E407.
+  static void check_firing(const product::Plan&, const Impl&);
   std::unique_ptr<const Impl> impl_;
 };
 

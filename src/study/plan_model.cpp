@@ -63,14 +63,16 @@ Definition read_definition(const std::string& text) {
   return out;
 }
 
-/// Seen from above, as the plan has it: around columns, slabs and walls.
+/// Seen from above, as the plan has it: around columns, slabs, walls and the feet of shafts.
 Site make_site(const product::Plan& plan) {
   Site site;
   double low[2] = {1e30, 1e30}, high[2] = {-1e30, -1e30};
   for (const product::Member& m : plan.members) {
     const bool is_column = m.kind == product::MemberKind::Column && m.section >= 0;
     const product::Section* s = is_column ? &plan.sections[static_cast<std::size_t>(m.section)] : nullptr;
-    const double half[2] = {s ? s->width / 2 : 0, s ? s->height / 2 : 0};
+    const product::Shaft* shaft = m.shaft >= 0 ? &plan.shafts[static_cast<std::size_t>(m.shaft)] : nullptr;
+    const double round = shaft ? shaft->diameter_foot / 2 : 0;
+    const double half[2] = {s ? s->width / 2 : round, s ? s->height / 2 : round};
     for (const Vec3& p : {m.start, m.end}) {
       const double at[2] = {p.x, p.y};
       for (int i = 0; i < 2; ++i) {
@@ -82,6 +84,15 @@ Site make_site(const product::Plan& plan) {
   if (low[0] <= high[0]) site.footprint = {{low[0], low[1]}, {high[0], low[1]}, {high[0], high[1]}, {low[0], high[1]}};
   for (const product::Neighbour& n : plan.neighbours) site.neighbours.push_back({n.name, n.footprint, n.is_utility});
   return site;
+}
+
+/// What a plan asks for and a study does not compare with its runs, for people.
+std::vector<std::string> list_not_judged(const product::Plan& plan) {
+  std::vector<std::string> out;
+  if (plan.criteria.debris_reach) out.emplace_back("debris_reach");
+  for (const product::Neighbour& n : plan.neighbours)
+    if (n.clearance > 0) out.push_back("clearance: \"" + n.name + "\"");
+  return out;
 }
 
 /// Limits of ground vibration at the neighbours' foundations, over the frequencies in which the ground answers.
@@ -103,14 +114,11 @@ std::vector<Limit> list_limits(const product::Plan& plan) {
   return out;
 }
 
-constexpr double screening_after = 6;  // runs of a plan with a screening, after the last stage [s]
-
 }  // namespace
 
 Problem make_plan_problem(const product::Plan& plan, const PlanMappingOptions& given, const std::string& rules) {
   PlanMappingOptions options = given;
-  // what shakes the ground comes down after the block has touched it
-  if (has_screening(plan, options)) options.after = std::max(options.after, screening_after);
+  if (options.after == 0) options.after = find_after(plan);
   const PlanMapping mapping(plan, read_rules(rules), options);
   Problem p;
   p.title = plan.title;
@@ -123,7 +131,9 @@ Problem make_plan_problem(const product::Plan& plan, const PlanMappingOptions& g
   for (int k = 0; k < options.directions; ++k) p.curves.back().at.push_back(360.0 * k / options.directions);
   p.asked = plan.criteria.mechanism.value_or("");
   p.site = make_site(plan);
-  p.not_modelled = collapse::not_modelled();
+  p.not_modelled = collapse::not_modelled(plan);
+  p.not_judged = list_not_judged(plan);
+  p.horizon = {"touchdown", "stands", options.after};
   p.space = mapping.space();
   if (!p.derived.empty())
     p.calc_derived = [fuzzy = plan.fuzzy](const Point& x) { return product::calc_derived(fuzzy, x); };

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -48,6 +49,13 @@ struct Limit {
   std::string source;          // of the limit
 };
 
+/// When runs of a plan end. One whose `output` says just that time, and whose outcome is not `unless`, ended before
+/// anything had happened that its numbers are about.
+struct Horizon {
+  std::string output, unless;
+  double after = 0;  // behind the last stage [s]
+};
+
 struct Problem {
   std::string title;
   std::vector<Quantity> inputs;   // fuzzy; as many as space.inputs
@@ -73,6 +81,8 @@ struct Problem {
   Site site;                              // of a plan
   std::vector<Limit> limits;              // of a plan
   std::vector<std::string> not_modelled;  // sentences
+  std::vector<std::string> not_judged;    // what is asked for and not looked at
+  std::optional<Horizon> horizon;         // of a plan
   /// The model that the one above stands for, at a fraction of its cost: a study ends with runs of it. Null: none.
   std::shared_ptr<const Problem> whole;
   int confirm = 0;  // whole runs at most; not part of the model

@@ -94,6 +94,28 @@ std::string tell_outputs(const Problem& p, const StudyResult& r, const uncertain
   return text;
 }
 
+/// Runs that ended before anything had come down, though it was about to.
+int count_unfinished(const Problem& p, const StudyResult& r) {
+  if (!p.horizon) return 0;
+  const auto at = std::find(r.outputs.begin(), r.outputs.end(), p.horizon->output);
+  if (at == r.outputs.end()) return 0;
+  const auto index = static_cast<std::size_t>(at - r.outputs.begin());
+  const auto is_unfinished = [&](const uncertainty::Sample& s) {
+    return index < s.result.values.size() && s.result.values[index] >= p.horizon->after &&
+           name_of_outcome(r, uncertainty::outcome_of(s.result)) != p.horizon->unless;
+  };
+  const std::vector<uncertainty::Sample>& all = r.alpha.archive.samples();
+  return static_cast<int>(std::count_if(all.begin(), all.end(), is_unfinished));
+}
+
+/// A sentence that says that all is well does not, where runs ended in the middle.
+void doubt(const Problem& p, const StudyResult& r, Sentence& s) {
+  const int unfinished = count_unfinished(p, r);
+  if (unfinished == 0 || s.status != Status::Good) return;
+  s.text += fmt::format(" But {} of the runs ended before anything had touched down.", unfinished);
+  s.status = Status::Warning;
+}
+
 /// How possible it is that an output reaches its limit: the most possible run that does.
 void tell_limits(const Problem& p, const StudyResult& r, std::vector<Sentence>& out) {
   for (const Limit& limit : p.limits) {
@@ -131,6 +153,7 @@ void tell_limits(const Problem& p, const StudyResult& r, std::vector<Sentence>& 
                               : std::string("No run reaches the limit.");
     s.text += " This is a screening, no prediction.";
     s.status = possibility >= 0.5 ? Status::Bad : reaching > 0 ? Status::Warning : Status::Good;
+    doubt(p, r, s);
     out.push_back(std::move(s));
   }
 }
@@ -203,6 +226,7 @@ void tell_requirement(const Problem& p, const StudyResult& r, std::vector<Senten
   for (const std::string& name : read_permissible(p.permissible, p).outcomes)
     if (std::find(r.outcomes.begin(), r.outcomes.end(), name) == r.outcomes.end())
       s.text += fmt::format(" No run had the outcome {}.", quoted(name));
+  doubt(p, r, s);
   out.push_back(std::move(s));
 }
 
@@ -383,6 +407,17 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
     tell_splits(p, r, out);
   }
   tell_limits(p, r, out);
+  if (const int unfinished = count_unfinished(p, r); unfinished > 0)
+    add("unfinished",
+        fmt::format("In {} of {} runs nothing of the upper block had touched down when they ended, {:.4g} s after the "
+                    "last stage or at rest: their outcome, energy and reach are those of that time.",
+                    unfinished, runs, p.horizon->after),
+        Status::Warning);
+  if (!p.not_judged.empty()) {
+    std::string list;
+    for (const std::string& what : p.not_judged) list += (list.empty() ? "" : ", ") + what;
+    add("not_judged", fmt::format("Not judged here, but by topple run: {}.", list));
+  }
   if (r.alpha.failed > 0) {
     const auto found = std::find_if(r.possibilities.classes.begin(), r.possibilities.classes.end(),
                                     [](const auto& c) { return c.outcome == failed_outcome; });

@@ -106,6 +106,9 @@ TEXT
   expect 2 "$topple" study in.toml --evaluator "$model" --knowledge rules.json -o e; has err "--knowledge"; has err "E801"
   expect 2 "$topple" study in.toml --evaluator "$model" --name x -o e; has err "--name"; has err "E801"
   expect 2 "$topple" study in.toml --evaluator "$model" --seed 9223372036854775808 -o e; has err "2^63"
+  for option in "--timeout 5s" --one-shot; do
+    expect 2 "$topple" study "$source/examples/weida/plan-fuzzy.toml" $option -o e; has err "E801"; has err "not for a plan"
+  done
   expect 2 "$topple" study in.toml --evaluator "$model" -o in.toml; has err "E801"; has err "in.toml"
   expect 2 "$topple" study export s -o in.toml; has err "E801"
   # results that cannot be written

@@ -28,7 +28,7 @@ concrete.C25.fct = { formula = "1.4 * ((fc - 8) / 10)^(2/3)" }
 TEST(FuzzyPlan, TiesNumbersToAnyQuantityByItsPath) {
   const Plan plan = read(R"toml([fuzzy]
 site.friction = { trapezoidal = [0.4, 0.5, 0.7, "80 %"] }
-site.neighbour.House.clearance = { triangular = ["2 m", "3 m", "4 m"] }
+site.neighbour.House.footprint.3.2 = { triangular = ["28 m", "30 m", "31 m"] }
 storeys.load = { triangular = ["0 kN/m2", "1 kN/m2", "2 kN/m2"] }
 grid.rows.B = { triangular = ["4.9 m", "5 m", "5.1 m"] }
 stage.front.charge.1.destroyed_length = { tabulated = [[0, "1 m", "1.4 m"], [0.5, "1.1 m", "1.4 m"], [1, "1.2 m", "1.2 m"]] }
@@ -42,9 +42,9 @@ ties.spacing = { triangular = ["15 cm", "20 cm", "25 cm"] }
   EXPECT_EQ(plan.fuzzy.inputs[3].path, "grid.rows.B");
   EXPECT_EQ(text_of(plan.fuzzy.inputs[2], 1500), "load = 1.5 kN/m2");
   const PlanSampler sampler = make_sampler(plan);
-  const Plan s = make_sample(sampler, std::vector<double>{0.45, 2.5, 1500, 5.05, 1.3, 0.02, -35, 28e-4, 0.18});
+  const Plan s = make_sample(sampler, std::vector<double>{0.45, 29.5, 1500, 5.05, 1.3, 0.02, -35, 28e-4, 0.18});
   EXPECT_EQ(s.ground.friction, 0.45);
-  EXPECT_EQ(s.neighbours[0].clearance, 2.5);
+  EXPECT_EQ(s.neighbours[0].footprint[2][1], 29.5);
   EXPECT_DOUBLE_EQ(s.storey_loads[1], 1500 / unit::gravity);
   EXPECT_EQ(s.row_offsets[1], 5.05);
   EXPECT_EQ(s.stages[0].charges[0].destroyed_length, 1.3);
@@ -142,6 +142,8 @@ TEST(FuzzyPlan, ComplainsWhereTheFaultStands) {
       {"[fuzzy]\nconcrete.C25.fc = { triangular = [\"20 N/mm2\", \"25 N/mm2\", \"45 N/mm2\"] }\n"
        "concrete.\"*\".«fc» = { triangular = [\"20 N/mm2\", \"25 N/mm2\", \"45 N/mm2\"] }\n",
        "E207", "second time", "first on line"},
+      {"[fuzzy]\nanalysis.«duration» = { triangular = [\"1 s\", \"2 s\", \"3 s\"] }\n", "E207", "no run depends on it",
+       "leave it out"},
       {"«[fuzzy]»\n", "E201", "nothing is fuzzy", ""},
       {"[fuzzy]\nsite.friction = { triangular = [0.5, 0.6, 0.7] }\nsearch = { levels = «[]» }\n", "E202", "levels", ""},
       {"[fuzzy]\nsite.«friction» = { triangular = [0.7, 0.8, 0.9] }\n", "W508",

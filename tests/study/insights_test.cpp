@@ -423,6 +423,32 @@ std::map<std::string, Sentence> tell_by_id(const Problem& p, const StudyResult& 
   return by_id;
 }
 
+TEST(Story, DoubtsWhatRunsSayThatEndedInTheMiddle) {
+  const Folder folder;
+  Problem p = make_problem({make_triangular(0, 0.5, 1)}, 200);
+  p.asked = "topple";
+  p.permissible = "topple, reach <= 5";
+  p.not_judged = {"the reach of debris", "the clearance of \"Shed\""};
+  p.horizon = {"touchdown", "stands", 1.7};
+  // lands in time, or not, or never
+  const auto factories = make_factories([](const Point& x) {
+    return done({{"reach", 1}, {"touchdown", x[0] < 0.4 ? 0.5 : 1.7}}, "topple");
+  });
+  const StudyResult r = run(p, folder, "s", factories);
+  std::map<std::string, Sentence> by_id = tell_by_id(p, r);
+  EXPECT_NE(by_id["unfinished"].text.find("nothing of the upper block had touched down when they ended, 1.7 s after"),
+            std::string::npos);
+  EXPECT_EQ(by_id["unfinished"].status, record::Status::Warning);
+  EXPECT_EQ(by_id["requirement"].status, record::Status::Warning);
+  EXPECT_NE(by_id["requirement"].text.find("ended before anything had touched down"), std::string::npos);
+  EXPECT_EQ(by_id["not_judged"].text,
+            "Not judged here, but by topple run: the reach of debris, the clearance of \"Shed\".");
+  p.horizon->unless = "topple";  // what is meant to stay up
+  by_id = tell_by_id(p, r);
+  EXPECT_EQ(by_id.count("unfinished"), 0u);
+  EXPECT_EQ(by_id["requirement"].status, record::Status::Good);
+}
+
 // Another outcome, failure, violation or limit at the very end of the support, at x1 = 1: possible to 0, but not
 // unseen.
 TEST(Story, NamesWhatWasFoundOnlyAtInputsThatAreNotPossible) {

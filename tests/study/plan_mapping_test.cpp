@@ -205,9 +205,75 @@ TEST(PlanMapping, NamesScreeningsApart) {
 
 TEST(PlanMapping, RefusesPlansWithoutFuzzyValues) {
   EXPECT_THROW(PlanMapping(read_small(""), collapse::default_knowledge(), quick()), InputError);
-  PlanMappingOptions o = quick();
-  o.tilt_times = {0.5};
-  EXPECT_THROW(PlanMapping(read_small(strengths), collapse::default_knowledge(), o), InputError);
+}
+
+std::vector<std::string> name_outputs(const PlanMapping& m) {
+  std::vector<std::string> names;
+  for (const PlanQuantity& q : m.outputs()) names.push_back(q.name);
+  return names;
+}
+
+TEST(PlanMapping, FollowsRunsUntilTheAnalysisEndsOrAsTheSearchSays) {
+  const product::Plan plan = read_small(strengths);
+  EXPECT_EQ(find_after(plan), plan.analysis.duration - 0.1);
+  const product::Plan shorter = read_small(std::string(strengths) + "[fuzzy.search]\nafter = \"0.6 s\"\n");
+  EXPECT_EQ(find_after(shorter), 0.6);
+  const PlanMapping m(shorter, collapse::default_knowledge(), {});
+  EXPECT_THAT(name_outputs(m), testing::Contains("tilt_0.5"));
+  EXPECT_THAT(name_outputs(m), testing::Not(testing::Contains("tilt_1"))) << "the run is over";
+  EXPECT_DOUBLE_EQ(m.trajectory_times().back(), 0.6);
+}
+
+TEST(PlanMapping, EndsWithRunsOfThePlan) {
+  const product::Plan plan = read_small(strengths);
+  const PlanMapping m(plan, collapse::default_knowledge(), {});
+  const Point core{25e6, 1.2, 1e3};
+  const Result mapped = evaluate(m, {core})[0];
+  const record::Record r = collapse::run_plan(product::make_sample(product::make_sampler(plan), core),
+                                              collapse::default_knowledge(), {}, {});
+  const std::vector<std::string> names = name_outputs(m);
+  double reach = 0;
+  for (const char* side : {"reach_neg_x", "reach_pos_x", "reach_neg_y", "reach_pos_y"})
+    reach = std::max(reach,
+                     mapped.values[static_cast<size_t>(std::find(names.begin(), names.end(), side) - names.begin())]);
+  const auto found = std::find_if(r.findings.begin(), r.findings.end(),
+                                  [](const record::Finding& f) { return f.id == "debris.reach"; });
+  ASSERT_NE(found, r.findings.end());
+  EXPECT_GT(found->value, 1);
+  EXPECT_NEAR(reach, found->value, 1e-6 * reach) << "towards one side, at rest";
+}
+
+TEST(PlanMapping, RefusesChargesThatFireWhenRunsAreOver) {
+  std::string text = product::small_plan() + strengths + "[fuzzy.search]\nafter = \"0.6 s\"\n";
+  text = product::replaced(text, "time = \"2 s\"", "time = \"0.1 s\"\n");
+  const auto refuse = [](const std::string& with) {
+    std::vector<Diagnostic> warnings;
+    try {
+      const PlanMapping m(product::read_plan(with, "plan.toml", warnings), collapse::default_knowledge(), {});
+    } catch (const InputError& e) { return e.first_error().code + " " + e.first_error().message; }
+    return std::string();
+  };
+  EXPECT_EQ(refuse(text), "");
+  const std::string late =
+      product::replaced(text, "destroyed_length = \"1.2 m\"", "destroyed_length = \"1.2 m\"\ndelay = \"0.8 s\"");
+  EXPECT_THAT(refuse(late), testing::HasSubstr("E407 plan.toml: a charge of stage 1 fires 0.7 s after the last stage"));
+  const std::string maybe = product::replaced(
+      text,
+      "storeys.load =", "stage.1.charge.1.delay = { triangular = [\"0 s\", \"0 s\", \"0.9 s\"] }\nstoreys.load =");
+  EXPECT_THAT(refuse(maybe), testing::HasSubstr("fires 0.8 s after the last stage with delay = 0.9 s"));
+}
+
+TEST(PlanMapping, FallsEarlyOnlyWhereThePlanAsksItToStand) {
+  const auto classify = [](const std::string& criteria) {
+    // the rear column fires long after the front row has brought all down
+    std::string text = product::replaced(product::small_plan() + strengths, "time = \"2 s\"", "time = \"4 s\"");
+    text = product::replaced(text, "mechanism = ", criteria + "mechanism = ");
+    std::vector<Diagnostic> warnings;
+    const PlanMapping m(product::read_plan(text, "plan.toml", warnings), collapse::default_knowledge(), {});
+    return plan_outcomes()[static_cast<size_t>(evaluate(m, {{25e6, 1.2, 1e3}})[0].outcome)];
+  };
+  EXPECT_EQ(classify("stands_between_stages = true\n"), "early");
+  EXPECT_NE(classify(""), "early");
 }
 
 /// A house whose front row fires and, soon after, its rear row.

@@ -229,6 +229,8 @@ export function DebrisPlan(props: { state: State }) {
   const x = (v: number): number => width / 2 + (v - middle) * factor;
   const y = makeScale(ys[0], ys[1], height - margin, height - margin - factor * (ys[1] - ys[0])).to;
   const toPicture = (corners: readonly Point[]): Point[] => corners.map((p) => [x(p[0]), y(p[1])]);
+  // as many as their numbers have room for, in a narrow plan as well
+  const countTicks = (range: readonly [number, number]): number => Math.max(1, Math.min(8, Math.floor((factor * (range[1] - range[0])) / 45)));
   const outlines = findOutlines(debris.levels.map((l) => ({ alpha: l.alpha, corners: toPicture(l.corners) })));
   const labels = label(outlines, study.site.neighbours.map((n) => ({ name: n.name, corners: toPicture(n.footprint) })), toPicture(study.site.footprint));
   const places = placeLabels(labels, { left: margin, right: width, top: 0, foot: height - margin });
@@ -240,13 +242,13 @@ export function DebrisPlan(props: { state: State }) {
       </div>
       <svg class="chart site-plan" viewBox={`0 0 ${width} ${height}`} role="img" aria-label="Site plan with the outline of parts by degree of possibility">
         <g class="grid">
-          {makeTicks(xs[0], xs[1], 8).map((t) => (
+          {makeTicks(xs[0], xs[1], countTicks(xs)).map((t) => (
             <>
               <line x1={x(t)} x2={x(t)} y1={margin} y2={height - margin} />
               <text x={x(t)} y={height - margin + 16} text-anchor="middle">{tickText(t)}</text>
             </>
           ))}
-          {makeTicks(ys[0], ys[1], 8).map((t) => (
+          {makeTicks(ys[0], ys[1], countTicks(ys)).map((t) => (
             <>
               <line x1={margin} x2={width - margin} y1={y(t)} y2={y(t)} />
               <text x={margin - 5} y={y(t) + 4} text-anchor="end">{tickText(t)}</text>
@@ -266,7 +268,7 @@ export function DebrisPlan(props: { state: State }) {
       </svg>
       <p class="quiet plot-note">
         Seen from above; the strong line is the building. Outside the outline of a degree no part of any run that is possible to that degree lay at the end of its
-        run. Runs of a plan end shortly after the last stage, while parts still move: this is no final reach, and no safe distance.
+        run. Runs of a plan end at rest or with their time, and parts may still move then: this is no final reach, and no safe distance.
         Fragments of the charges are not modelled.
       </p>
       <ValueTable label="debris" head={["degree", "runs", "from x [m]", "to x [m]", "from y [m]", "to y [m]"]} rows={() =>
