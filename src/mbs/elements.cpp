@@ -19,6 +19,9 @@ constexpr size_t kBlocksForThreads = 256;  // below, waking threads costs more t
 constexpr size_t kChunk = 32;              // blocks a thread takes at once
 constexpr long kLayoutInterval = 64;       // steps between looks whether zones that flow still lie side by side
 
+/// The element in a slot of a system's lanes or of a batch's.
+size_t element_at(const Lanes& l, size_t slot) { return l.is_batch ? slot / l.W : l.element_of[slot]; }
+
 /// Spring behind the damper of a slot times the stiffness.
 double calc_rate(const Lanes& l, size_t slot, int i) { return l.field(slot, kViscous) * l.field(slot, kStiffness + i); }
 
@@ -432,7 +435,7 @@ void System::limit_element(size_t e, double compression) {
 
 void System::evaluate_outside(size_t slot) {
   Lanes& l = *lanes;
-  const size_t e = l.is_batch ? slot / l.W : l.element_of[slot];
+  const size_t e = element_at(l, slot);
   unpack_element(e);
   const ZoneState& z = state.element[e];
   const double elongated = z.elongated;
@@ -456,7 +459,7 @@ void System::evaluate_outside(size_t slot) {
 
 void System::write_cells(size_t slot, double axial) {
   Lanes& l = *lanes;
-  const size_t e = l.is_batch ? slot / l.W : l.element_of[slot];
+  const size_t e = element_at(l, slot);
   const ZoneParameters& zone = elements[e].zone;
   ZoneState& z = state.element[e];
   double strained[2] = {0, 0};
@@ -466,7 +469,7 @@ void System::write_cells(size_t slot, double axial) {
 
 bool System::grow_cracks(size_t slot, const double* deformation, size_t stride) {
   Lanes& l = *lanes;
-  const size_t e = l.is_batch ? slot / l.W : l.element_of[slot];
+  const size_t e = element_at(l, slot);
   const ZoneParameters& zone = elements[e].zone;
   ZoneState& z = state.element[e];
   Six d;
