@@ -58,11 +58,7 @@ Lanes make_batch(const System& build, size_t W) {
     l.body_a.push_back(body(e.a));
     l.body_b.push_back(body(e.b));
   }
-  l.first_entry.assign(1, 0);
-  for (size_t b = 0; b < build.B; ++b) {
-    for (const int entry : build.incidence[b]) l.entries.push_back(static_cast<std::uint32_t>(entry));
-    l.first_entry.push_back(static_cast<std::uint32_t>(l.entries.size()));
-  }
+  l.list_entries(build.incidence);
   for (size_t slot = 0; slot < l.element_blocks * W; ++slot) l.clear_slot(slot);
   return l;
 }
@@ -74,10 +70,12 @@ void check_planes(const Lanes& lanes, const System& s, size_t sample) {
                      "all variations of a planar model move in its planes, or none");
   for (size_t e = 0; e < s.elements.size(); ++e)
     if (s.elements[e].zone.plane != lanes.planes[e])
-      throw InputError("E602",
-                       "variation " + std::to_string(sample) + " turns elements[" + std::to_string(e) +
-                           "] out of its plane or into it",
-                       "all variations of a planar model have it in its plane, or none");
+      throw InputError(
+          "E602",
+          "variation " + std::to_string(sample) + " turns " +
+              (e < s.E ? "elements[" + std::to_string(e) : "rotational_elements[" + std::to_string(e - s.E)) +
+              "] out of its plane or into it",
+          "all variations of a planar model have it in its plane, or none");
 }
 
 /// Runs the samples [first, last), one in each lane.

@@ -43,7 +43,7 @@ std::string describe_lost_energy(double error) {
   return words;
 }
 
-Course::Course(System& s) : Course(s, {0, -1, std::vector<bool>(s.elements.size() + s.rotationals.size(), false)}) {}
+Course::Course(System& s) : Course(s, {0, -1, std::vector<bool>(s.elements.size(), false)}) {}
 
 Course::Course(System& s, const CourseState& state) : s_(s), sampler_(s.options.samplings), now_(state) {
   interval_ = std::max(s.options.frame_interval, s.summary.step);

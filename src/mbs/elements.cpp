@@ -67,23 +67,36 @@ void System::kill_slot(size_t e) {
   --state.live_elements;
 }
 
+void System::add_slot(size_t e) {
+  ++state.live_elements;
+  Lanes& l = *lanes;
+  if (!l.is_batch) {
+    lay_out_elements();
+  } else if (l.live[e]++ == 0) {
+    l.list_entries(incidence);
+  }
+  pack_element(e);
+}
+
 void System::lay_out_elements() {
   Lanes& l = *lanes;
-  const size_t E = elements.size(), W = l.W;
+  const size_t W = l.W;
   std::vector<std::uint32_t> kept;  // kNoSlot: a gap
   std::vector<Plane> planes;        // of blocks
   std::vector<unsigned char> single;
   size_t live = 0;
   const bool first = l.slot_of.empty();
-  std::vector<Work> work(E, Work::None);
-  for (size_t e = 0; e < E; ++e)
-    work[e] = first ? Work::Springs : l.slot_of[e] == Lanes::kNoSlot ? Work::None : find_work(l.slot_of[e]);
+  std::vector<Work> work(elements.size(), Work::None);
+  for (size_t e = 0; e < elements.size(); ++e) {
+    const bool has_slot = !first && l.slot_of[e] != Lanes::kNoSlot;
+    work[e] = has_slot ? find_work(l.slot_of[e]) : state.element[e].live ? Work::Springs : Work::None;
+  }
   // blocks of one plane each, with one station or two; in them elements of like work side by side
   constexpr std::pair<Plane, bool> kinds[] = {{Plane::Space, true},   {Plane::Space, false}, {Plane::AboutY, true},
                                               {Plane::AboutY, false}, {Plane::AboutZ, true}, {Plane::AboutZ, false}};
   for (const auto& [plane, is_single] : kinds) {
     for (const Work here : {Work::Flows, Work::MayFlow, Work::Springs}) {
-      for (size_t e = 0; e < E; ++e) {
+      for (size_t e = 0; e < elements.size(); ++e) {
         const ZoneParameters& zone = elements[e].zone;
         if (work[e] != here || zone.plane != plane || (zone.stations < 2) != is_single) continue;
         if (kept.size() % W == 0) planes.push_back(plane), single.push_back(is_single);
@@ -110,7 +123,7 @@ void System::lay_out_elements() {
   l.single = single;
   l.live.assign(l.element_blocks, 0);
   l.softened.assign(l.element_blocks, 0);
-  l.slot_of.assign(E, Lanes::kNoSlot);
+  l.slot_of.assign(elements.size(), Lanes::kNoSlot);
   l.element_of.assign(slots, Lanes::kNoSlot);
   l.body_a.assign(slots, static_cast<std::uint32_t>(B));
   l.body_b.assign(slots, static_cast<std::uint32_t>(B));
@@ -359,7 +372,7 @@ void System::note_turned_over(size_t i, const Six& d, const ZoneState& before) {
     summary.notes.push_back(
         fmt::format("element \"{}\" is turned by more than half a turn at {:.4g} s, where its "
                     "rotations end: they go on from the other side, and so does its moment",
-                    model.elements[i].name, state.time));
+                    i < E ? model.elements[i].name : model.rotational_elements[i - E].name, state.time));
 }
 
 /// By the full law, from the state of the zone; the force goes to the slot.

@@ -279,22 +279,14 @@ class Assembly {
     };
     const auto each_row = [&](auto&& f) {
       for (size_t i = 0; i < s_.rotationals.size(); ++i) {
+        if (!s_.state.rotational[i].live) continue;
         const CompiledRotational& r = s_.rotationals[i];
         const CompiledJoint& j = s_.joints[static_cast<size_t>(r.joint)];
         const double factor = fast ? 1 + r.zone.viscous : 1;
-        const bool is_loose = s_.is_loose(i);
-        const double share = is_loose ? s_.state.rotational[i].share : 1;
         double plane[3];  // about z; the station is at the marker, so nothing couples
-        soften_plane(r.zone, share, 1,
-                     flexibility_of(s_.state.rotational[i], 1, added, &Flexibility::rotational, i).data(), plane);
-        if (!is_loose) {
-          f(rotational_row(j), factor * plane[2]);
-          continue;
-        }
-        KinematicRow rows[6];
-        element_rows(j.parent, j.child, r.q_F, j.p_CM, rows);
-        for (int k = 0; k < 5; ++k) f(rows[k], factor * share * r.loose.stiffness[k]);
-        f(rows[5], factor * plane[2]);
+        soften_plane(r.zone, 1, 1, flexibility_of(s_.state.rotational[i], 1, added, &Flexibility::rotational, i).data(),
+                     plane);
+        f(rotational_row(j), factor * plane[2]);
       }
       for (const StiffRow& r : springs)
         f(KinematicRow{place(r.a), place(r.b), -r.row.line, -r.row.turn_a, r.row.line, r.row.turn_b}, r.stiffness);
@@ -497,7 +489,7 @@ void System::adopt_step() {
   contact_interval = calc_contact_interval();
   summary.shortest_step = summary.shortest_step > 0 ? std::min(summary.shortest_step, step) : step;
   const double relaxation = 1 - std::exp(-step * model.damping_frequency);
-  for (CompiledRotational& r : rotationals) r.zone.relaxation = r.loose.relaxation = relaxation;
+  for (CompiledRotational& r : rotationals) r.zone.relaxation = relaxation;
   for (size_t e = 0; e < elements.size(); ++e) {
     elements[e].zone.relaxation = relaxation;
     const size_t slot = slot_of(e);
@@ -540,7 +532,7 @@ bool System::bears_set_step(double& longest) {
 
 void System::choose_step() {
   highest_frequency = find_highest_frequency();
-  state.live_elements = state.live_at_review = elements.size();
+  state.live_elements = state.live_at_review = E;
   set_step(options.step > 0 ? options.step : calc_own_step());
   if (double longest = 0; !bears_set_step(longest)) {
     char words[160];
@@ -998,7 +990,7 @@ bool System::find_equilibrium(std::string& message) {
   const auto report = std::exchange(options.on_happening, nullptr);
   const auto keep_lengths = [this](bool held) {
     for (CompiledElement& e : elements) e.zone.keeps_length = held;
-    for (CompiledRotational& r : rotationals) r.zone.keeps_length = r.loose.keeps_length = held;
+    for (CompiledRotational& r : rotationals) r.zone.keeps_length = held;
   };
   keep_lengths(true);
   const bool is_found = load.find(message) && !find_overload(message);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "mbs/joint_rows.h"
 #include "mbs/system.h"
@@ -583,19 +584,29 @@ void System::drop_joint(size_t i) {
 }
 
 void System::loosen_joint(size_t i) {
-  const int r = joints[i].rotational;
-  ZoneState& z = state.rotational[static_cast<size_t>(r)];
+  const size_t r = static_cast<size_t>(joints[i].rotational);
+  ZoneState& z = state.rotational[r];
   if (!state.joint[i].live || !z.live) return;  // one that turns freely stays a joint
   drop_joint(i);
-  free_zone(rotationals[static_cast<size_t>(r)].zone, z);
+  free_zone(rotationals[r].zone, z);
+  state.element[E + r] = std::exchange(z, {});
+  z.live = false;
+  add_slot(E + r);
 }
 
 void System::release_joint(size_t i, const char* reason) {
-  const int r = joints[i].rotational;
-  const bool has_element = r >= 0 && state.rotational[static_cast<size_t>(r)].live;
+  const size_t r = static_cast<size_t>(joints[i].rotational);
+  const bool is_loosened = joints[i].rotational >= 0 && is_loose(r);
+  const bool has_element = is_loosened || (joints[i].rotational >= 0 && state.rotational[r].live);
   if (!state.joint[i].live && !has_element) return;  // neither it nor what has taken over from it
   drop_joint(i);
-  if (has_element) break_zone(state.rotational[static_cast<size_t>(r)], BreakReason::Removed);
+  if (is_loosened) {
+    unpack_element(E + r);
+    break_zone(state.element[E + r], BreakReason::Removed);
+    pack_element(E + r);
+  } else if (has_element) {
+    break_zone(state.rotational[r], BreakReason::Removed);
+  }
   say({Happening::Kind::JointReleased, state.time, static_cast<int>(i), -1, reason, 0});
 }
 

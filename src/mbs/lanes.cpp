@@ -169,6 +169,16 @@ void Lanes::open_flows() {
   if (flows.empty()) flows.assign(element_blocks * kernel::kFlowFields * W, 0);
 }
 
+void Lanes::list_entries(const std::vector<std::vector<int>>& incidence) {
+  first_entry.assign(1, 0);
+  entries.clear();
+  for (const std::vector<int>& of_body : incidence) {
+    entries.insert(entries.end(), of_body.begin(), of_body.end());
+    first_entry.push_back(static_cast<std::uint32_t>(entries.size()));
+  }
+  has_dead_entries = true;
+}
+
 void Lanes::drop_dead_entries() {
   size_t kept = 0;
   std::uint32_t from = 0;

@@ -124,6 +124,8 @@ struct Lanes {
   /// Forces of the elements in blocks [first, last).
   void evaluate_elements(size_t first, size_t last, const kernel::FlowWriter& writer,
                          std::vector<std::uint32_t>& beyond);
+  /// Elements that meet in each body, 2 * element + side; batch only.
+  void list_entries(const std::vector<std::vector<int>>& incidence);
   /// Forces of the elements on every body; batch only.
   void sum_forces();
   /// Memory for flows, before the first is written.

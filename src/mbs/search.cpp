@@ -96,8 +96,6 @@ void System::find_links() {
       if (s.bushing[i].live) f(forces.bushings[i].a, forces.bushings[i].b);
     for (size_t j = 0; j < joints.size(); ++j)
       if (s.joint[j].live) f(joints[j].parent, joints[j].child);
-    for (size_t r = 0; r < rotationals.size(); ++r)
-      if (const CompiledJoint& j = joints[static_cast<size_t>(rotationals[r].joint)]; is_loose(r)) f(j.parent, j.child);
   };
   search.first_link.assign(B + 2, 0);
   each_link([&](int a, int b) {

@@ -19,7 +19,7 @@ std::array<size_t, 11> count_items(const System& s) {
   size_t moving = 0;
   for (const unsigned char f : s.fixed) moving += f == 0;
   return {s.B,
-          s.elements.size(),
+          s.E,
           s.rotationals.size(),
           s.joints.size(),
           s.state.spring.size(),

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "mbs/joint_rows.h"
 #include "mbs/model_check.h"
@@ -118,7 +119,7 @@ void System::compile() {
     }
     elements.push_back(c);
   }
-  s.element.resize(elements.size());
+  E = elements.size();
 
   for (const Joint& j : model.joints) {
     CompiledJoint c;
@@ -159,19 +160,25 @@ void System::compile() {
       c.zone.stations = 1;
       c.zone.law[0] = r.law.index;
     }
-    c.loose = c.zone;
-    c.loose.external_axial = false;
-    c.loose.relief = 0;
-    for (int i = 0; i < 3; ++i) c.loose.stiffness[i] = r.loose_translational[i];
-    c.loose.stiffness[3] = r.loose_torsion;
-    c.loose.stiffness[4] = r.loose_bending;
     const Joint& frames = model.joints[static_cast<size_t>(c.joint)];
-    c.q_F = normalized(frames.X_PF.q), c.q_M = normalized(frames.X_CM.q);
-    if (find_plane(j.parent, j.child, {j.p_PF, c.q_F}, {j.p_CM, c.q_M}) == kernel::Plane::AboutZ)
-      c.zone.plane = c.loose.plane = kernel::Plane::AboutZ;
+    CompiledElement loose;
+    loose.a = j.parent, loose.b = j.child;
+    loose.p_AF = j.p_PF, loose.p_BM = j.p_CM;
+    loose.q_AF = normalized(frames.X_PF.q), loose.q_BM = normalized(frames.X_CM.q);
+    if (find_plane(loose.a, loose.b, {loose.p_AF, loose.q_AF}, {loose.p_BM, loose.q_BM}) == kernel::Plane::AboutZ)
+      c.zone.plane = kernel::Plane::AboutZ;
+    loose.zone = c.zone;
+    loose.zone.external_axial = false;
+    loose.zone.relief = 0;
+    for (int i = 0; i < 3; ++i) loose.zone.stiffness[i] = r.loose_translational[i];
+    loose.zone.stiffness[3] = r.loose_torsion;
+    loose.zone.stiffness[4] = r.loose_bending;
     rotationals.push_back(c);
+    elements.push_back(loose);
   }
   s.rotational.resize(rotationals.size());
+  s.element.resize(elements.size());
+  for (ZoneState& z : std::span(s.element).subspan(E)) z.live = false;
 
   s.cable.resize(model.cables.size());
   for (size_t i = 0; i < model.cables.size(); ++i) {
@@ -327,20 +334,12 @@ void System::evaluate_rotationals(double h) {
     const CompiledRotational& c = rotationals[i];
     const CompiledJoint& j = joints[static_cast<size_t>(c.joint)];
     const JointState& js = state.joint[static_cast<size_t>(c.joint)];
-    const bool loose = is_loose(i);
-    FrameDeformation between;
-    Vec3 axis;
+    const Mat3 R = rotation_of(j.parent);
+    const Vec3 axis = R * j.R_PF.column(2);
     Six d;
-    if (loose) {
-      between = measure_frames(j.parent, j.child, j.p_PF, c.q_F, j.p_CM, c.q_M);
-      d = {{between.u.x, between.u.y, between.u.z, between.r.x, between.r.y, between.r.z}};
-    } else {
-      const Mat3 R = rotation_of(j.parent);
-      axis = R * j.R_PF.column(2);
-      d.c[0] = -dot(R * j.R_PF.column(0), js.force);
-      d.c[5] = js.angle;
-    }
-    const ZoneParameters& zone = loose ? c.loose : c.zone;
+    d.c[0] = -dot(R * j.R_PF.column(0), js.force);
+    d.c[5] = js.angle;
+    const ZoneParameters& zone = c.zone;
     const double elongated = z.axial, turned = z.station[0].reached;
     if (ignores_limits) {
       ZoneParameters elastic = zone;
@@ -349,17 +348,15 @@ void System::evaluate_rotationals(double h) {
     } else {
       advance_zone(zone, laws, d, state.time, h, z);
     }
-    tell_yield(elements.size() + i, z);
-    if (!loose && c.axial_element >= 0 && h > 0) {
+    tell_yield(E + i, z);
+    if (c.axial_element >= 0 && h > 0) {
       const auto along = static_cast<size_t>(c.axial_element);
       if (z.axial != elongated) elongate_element(along, z.axial - elongated);
       const bool is_known = z.station[0].reached == turned && state.element[along].hinge_bears < kUnlimited;
       if (z.live && turned > 0 && !is_known) limit_element(along, calc_hinge_bearing(zone, laws, state.time, z));
     }
     if (!z.live) {
-      break_element(elements.size() + i, z.reason);
-    } else if (loose) {
-      load_frames(j.parent, j.child, between, z.resultant.c);
+      break_element(E + i, z.reason);
     } else {
       const Vec3 t = z.resultant.c[5] * axis;
       if (j.child >= 0) torque[static_cast<size_t>(j.child)] -= t;
@@ -441,14 +438,17 @@ void System::act(const Event& event) {
         break;
       }
       case Action::Kind::SwitchLaw: {
-        if (a.rotational < 0) unpack_element(static_cast<size_t>(a.element.index));
-        ZoneState& z = a.rotational >= 0 ? state.rotational[static_cast<size_t>(a.rotational)]
-                                         : state.element[static_cast<size_t>(a.element.index)];
-        begin_switch(a.rotational >= 0 ? rotationals[static_cast<size_t>(a.rotational)].zone
-                                       : elements[static_cast<size_t>(a.element.index)].zone,
-                     laws, {a.law.index, time, a.ramp, a.stiffness_share}, z);
+        const LawSwitch to{a.law.index, time, a.ramp, a.stiffness_share};
+        const size_t r = static_cast<size_t>(a.rotational);
+        if (a.rotational >= 0 && !was_loosened(r)) {
+          begin_switch(rotationals[r].zone, laws, to, state.rotational[r]);
+        } else {
+          const size_t e = a.rotational >= 0 ? E + r : static_cast<size_t>(a.element.index);
+          unpack_element(e);
+          begin_switch(elements[e].zone, laws, to, state.element[e]);
+          pack_element(e);
+        }
         state.review_times.push_back(time + a.ramp);
-        if (a.rotational < 0) pack_element(static_cast<size_t>(a.element.index));
         break;
       }
       case Action::Kind::ReleaseJoint:
@@ -755,7 +755,7 @@ const View& System::calc_view() {
   calc_reactions();
   View& v = view;
   const State& s = state;
-  const size_t E = elements.size(), R = rotationals.size();
+  const size_t R = rotationals.size();
   v.time = s.time;
   v.X_WB.resize(B);
   v.v_WB.resize(B);
@@ -797,7 +797,12 @@ const View& System::calc_view() {
     v.element_translation[i] = {d[0], d[1], d[2]};
     v.element_rotation[i] = {d[3], d[4], d[5]};
   }
-  for (size_t i = 0; i < R; ++i) fill(E + i, is_loose(i) ? rotationals[i].loose : rotationals[i].zone, s.rotational[i]);
+  for (size_t i = 0; i < R; ++i) {
+    if (was_loosened(i))
+      fill(E + i, elements[E + i].zone, s.element[E + i]);
+    else
+      fill(E + i, rotationals[i].zone, s.rotational[i]);
+  }
   v.joint_force.resize(joints.size());
   v.joint_moment.resize(joints.size());
   v.joint_released.resize(joints.size());
@@ -812,7 +817,7 @@ const View& System::calc_view() {
     v.joint_released[j] = !s.joint[j].live;
     if (const size_t r = static_cast<size_t>(c.rotational); c.rotational >= 0 && is_loose(r)) {
       // of a on b is minus the resultant
-      const double* f = s.rotational[r].resultant.c;
+      const double* f = s.element[E + r].resultant.c;
       v.joint_force[j] = -Vec3{f[0], f[1], f[2]};
       v.joint_moment[j] = -Vec3{f[3], f[4], f[5]};
       v.joint_released[j] = false;

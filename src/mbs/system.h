@@ -52,9 +52,6 @@ struct CompiledRotational {
   int joint = -1;
   int axial_element = -1;  // that takes its elongation
   ZoneParameters zone;
-  // once its joint is loosened: a six-component element between the joint's frames
-  ZoneParameters loose;
-  Quat q_F, q_M;  // in the bodies' frames
 };
 
 struct JointState {
@@ -102,8 +99,8 @@ struct State {
   std::vector<unsigned char> touched_ground;
   std::vector<unsigned char> ground_clear;  // no point touches the ground or remembers that it did (B)
   // connections
-  std::vector<ZoneState> element;
-  std::vector<ZoneState> rotational;
+  std::vector<ZoneState> element;     // (E + R)
+  std::vector<ZoneState> rotational;  // not live and without a reason once its joint is loosened (R)
   std::vector<JointState> joint;
   std::vector<CableState> cable;
   std::vector<SpringState> spring, torsion;  // spring-dampers, rotational springs
@@ -200,7 +197,10 @@ class System {
 
   // constant after compilation
   size_t B = 0;
+  // (E + R): behind those of the model one for each rotational element, of six components between the frames of its
+  // joint, that lives from when the joint is loosened
   std::vector<CompiledElement> elements;
+  size_t E = 0;
   CompiledLaws laws;
   std::vector<CompiledJoint> joints;
   std::vector<CompiledRotational> rotationals;
@@ -357,6 +357,8 @@ class System {
   /// From the state of the zones to the slots, and back.
   /// Markers and constants are written only if they may have changed.
   void pack_element(size_t element, bool has_moved = true);
+  /// Gives an element that begins to live its place in the lanes.
+  void add_slot(size_t element);
   void pack_crack_bounds(size_t slot, const ZoneState&);
   /// Of a zone in lanes what follows it through deformations, cracks and damage, its limits aside.
   void pack_springs(size_t element, size_t slot, bool flows);
@@ -385,8 +387,11 @@ class System {
   void pack_body(size_t body);
   void evaluate_rotationals(double h);
   /// Whether a rotational element has taken over from its joint and still holds.
-  bool is_loose(size_t rotational) const {
-    return !state.joint[static_cast<size_t>(rotationals[rotational].joint)].live && state.rotational[rotational].live;
+  bool is_loose(size_t rotational) const { return state.element[E + rotational].live; }
+  /// The same whether it still holds or not.
+  bool was_loosened(size_t rotational) const {
+    const ZoneState& z = state.rotational[rotational];
+    return !z.live && z.reason == BreakReason::None;
   }
   /// Lets the joint's rotational element take over; one whose element has broken stays a joint.
   void loosen_joint(size_t j);
