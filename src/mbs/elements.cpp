@@ -30,6 +30,18 @@ Quat turn_in_plane(Plane plane, const Quat& q) {
   return plane == Plane::AboutZ ? q * Quat{std::sqrt(0.5), std::sqrt(0.5), 0, 0} : q;
 }
 
+/// What a spring leaves of its deformations as elastic ones: of each bending plane two by two, shear and bending.
+void find_softness(const ZoneParameters& p, const ZoneState& z, bool is_softened, double soft[8]) {
+  for (int q = 0; q < 2; ++q) {
+    const double ks = z.share * p.stiffness[q == 0 ? 2 : 1], kb = z.share * p.stiffness[q == 0 ? 4 : 5];
+    double* at = soft + 4 * q;
+    at[0] = is_softened && ks > 0 ? z.plane[q][0] / ks : 1;
+    at[1] = is_softened && ks > 0 ? z.plane[q][1] / ks : 0;
+    at[2] = is_softened && kb > 0 ? z.plane[q][1] / kb : 0;
+    at[3] = is_softened && kb > 0 ? z.plane[q][2] / kb : 1;
+  }
+}
+
 /// What the kernel may use of a biaxial exponent.
 double floor_exponent(double e) { return e >= 2 ? 2 : e >= 1.5 ? 1.5 : 1; }
 
@@ -278,16 +290,41 @@ void System::pack_springs(size_t e, size_t slot, bool flows) {
   l.set_state(slot, kDamped, 0);
   l.set_state(slot, kBled, 0);
   z.packed_damping = z.damping, z.packed_plastic = z.plastic, z.packed_behind = z.damper_energy;
-  for (int plane = first_bending(in); plane <= last_bending(in); ++plane) {
-    const int shear = plane == 0 ? 2 : 1, bend = plane == 0 ? 4 : 5, at = kSoft + 4 * plane;
-    const double ks = l.field(slot, kStiffness + shear), kb = l.field(slot, kStiffness + bend);
-    const bool soft = !flows && z.is_softened;
-    put(at, soft && ks > 0 ? z.plane[plane][0] / ks : 1);
-    put(at + 1, soft && ks > 0 ? z.plane[plane][1] / ks : 0);
-    put(at + 2, soft && kb > 0 ? z.plane[plane][1] / kb : 0);
-    put(at + 3, soft && kb > 0 ? z.plane[plane][2] / kb : 1);
-  }
+  double soft[8];
+  find_softness(elements[e].zone, z, !flows && z.is_softened, soft);
+  for (int plane = first_bending(in); plane <= last_bending(in); ++plane)
+    for (int i = 4 * plane; i < 4 * plane + 4; ++i) put(kSoft + i, soft[i]);
   if (!flows && z.is_softened) l.softened[slot / l.W] = 1;
+}
+
+SpringCracks System::crack_spring(size_t slot, const double* deformation, size_t stride, double* spring) {
+  const size_t e = element_at(*lanes, slot);
+  const ZoneParameters& zone = elements[e].zone;
+  ZoneState& z = state.element[e];
+  Six d;
+  for (size_t i = 0; i < 6; ++i) d.c[i] = deformation[i * stride];
+  const SpringCracks cracks = mbs::crack_spring(zone, laws, d, state.time, z);
+  if (cracks != SpringCracks::Grown) return cracks;
+  double soft[8];
+  find_softness(zone, z, z.is_softened, soft);
+  for (size_t i = 0; i < 6; ++i) spring[(kSpringOffset + i) * stride] = z.offset[i];
+  for (size_t i = 0; i < 8; ++i) spring[(kSpringSoft + i) * stride] = soft[i];
+  return cracks;
+}
+
+void System::keep_spring(size_t slot) {
+  Lanes& l = *lanes;
+  const size_t e = element_at(l, slot);
+  const ZoneParameters& zone = elements[e].zone;
+  const ZoneState& z = state.element[e];
+  pack_crack_bounds(slot, z);
+  const ActiveComponents active = components_of(zone.plane);
+  for (int c = 0; c < active.count; ++c) l.set(slot, kOffset + active.at[c], z.offset[active.at[c]]);
+  double soft[8];
+  find_softness(zone, z, z.is_softened, soft);
+  for (int plane = first_bending(zone.plane); plane <= last_bending(zone.plane); ++plane)
+    for (int i = 4 * plane; i < 4 * plane + 4; ++i) l.set(slot, kSoft + i, soft[i]);
+  if (z.is_softened) l.softened[slot / l.W] = 1;
 }
 
 void System::unpack_element(size_t e) {
@@ -518,24 +555,30 @@ void System::evaluate_elements_fully(double h) {
 void System::evaluate_elements() {
   Lanes& l = *lanes;
   l.outside.clear();
+  l.cracked.clear();
   l.lay_poses();
   const FlowWriter writer{
       [](void* owner, size_t slot, double axial) { static_cast<System*>(owner)->write_cells(slot, axial); },
       [](void* owner, size_t slot, const double* deformation, size_t stride) {
         return static_cast<System*>(owner)->grow_cracks(slot, deformation, stride);
       },
+      [](void* owner, size_t slot, const double* deformation, size_t stride, double* spring) {
+        return static_cast<System*>(owner)->crack_spring(slot, deformation, stride, spring);
+      },
       this};
   if (options.threads > 1 && l.element_blocks >= kBlocksForThreads) {
     // every block writes its own places only; reports follow in order, so threads change no bit
     const size_t chunks = (l.element_blocks + kChunk - 1) / kChunk;
-    std::vector<std::vector<std::uint32_t>> beyond(chunks);
+    std::vector<std::vector<std::uint32_t>> beyond(chunks), cracked(chunks);
     (void)parallel_for(chunks, options.threads, [&](size_t c) {
-      l.evaluate_elements(c * kChunk, std::min(l.element_blocks, (c + 1) * kChunk), writer, beyond[c]);
+      l.evaluate_elements(c * kChunk, std::min(l.element_blocks, (c + 1) * kChunk), writer, beyond[c], cracked[c]);
     });
     for (const auto& list : beyond) l.outside.insert(l.outside.end(), list.begin(), list.end());
+    for (const auto& list : cracked) l.cracked.insert(l.cracked.end(), list.begin(), list.end());
   } else {
-    l.evaluate_elements(0, l.element_blocks, writer, l.outside);
+    l.evaluate_elements(0, l.element_blocks, writer, l.outside, l.cracked);
   }
+  for (const std::uint32_t slot : l.cracked) keep_spring(slot);
   // where they lie says nothing about what is told first
   std::sort(l.outside.begin(), l.outside.end(),
             [&](std::uint32_t x, std::uint32_t y) { return l.element_of[x] < l.element_of[y]; });

@@ -297,6 +297,7 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
     return find_growth<D>(moment, constant(scale), constant(scale + 1));
   };
   // is every resultant inside the bounds for sure?
+  auto cracks = hn::FirstN(tag, 0);
   outside = hn::Or(outside,
                    hn::Not(hn::And(hn::Ge(f[0].v, constant(kLeastForce).v), hn::Le(f[0].v, constant(kMostForce).v))));
   if constexpr (is_plane) {
@@ -305,7 +306,8 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
     const N scale = constant(kMomentScale + q);
     for (int station = 0; station < Hinges; ++station) {
       const N m = q == 0 ? fma(x[station], f[shear], f[bend]) : fnma(x[station], f[shear], f[bend]);
-      outside = hn::Or(outside, hn::Or(hn::Gt((abs(m) * scale).v, one.v), cracks_grow(station, q, m)));
+      outside = hn::Or(outside, hn::Gt((abs(m) * scale).v, one.v));
+      cracks = hn::Or(cracks, cracks_grow(station, q, m));
     }
   } else {
     const N vy = f[1] * constant(kShearScale), vz = f[2] * constant(kShearScale + 1);
@@ -316,7 +318,7 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
     const N scale_y = constant(kMomentScale), scale_z = constant(kMomentScale + 1);
     for (int station = 0; station < Hinges; ++station) {
       const N about_y = fma(x[station], f[2], f[4]), about_z = fnma(x[station], f[1], f[5]);
-      outside = hn::Or(outside, hn::Or(cracks_grow(station, 0, about_y), cracks_grow(station, 1, about_z)));
+      cracks = hn::Or(cracks, hn::Or(cracks_grow(station, 0, about_y), cracks_grow(station, 1, about_z)));
       const N my = abs(about_y) * scale_y, mz = abs(about_z) * scale_z;
       const auto linear = hn::Gt((my + mz).v, one.v);
       if (HWY_LIKELY(hn::AllFalse(tag, linear))) continue;
@@ -328,6 +330,7 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
       outside = hn::Or(outside, hn::Gt((raised(my) + raised(mz)).v, one.v));
     }
   }
+  cracks = hn::AndNot(outside, cracks);
   // what the damper does on the part of the deformation that is not elastic
   N slid[6] = {zero, zero, zero, zero, zero, zero};
   const auto slide = [&] {
@@ -365,6 +368,24 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
   } else if (softened) {
     slide();
   }
+  N torn = zero;  // twice what cracks that grow lose
+  if (HWY_UNLIKELY(!hn::AllFalse(tag, cracks))) {
+    N u_now[6], e_now[6];
+    auto beyond = cracks;
+    const auto done = crack_springs<D, In>(job, block, cracks, d, u_now, e_now, beyond);
+    for (int c = 0; c < active.count; ++c) {
+      const int i = active.at[c];
+      const N way = u[i] - was[i], held = k[i] * before[i], holds = k[i] * e_now[i];
+      torn = torn + (fma(held + holds, way, held * was[i]) - holds * u_now[i]);
+      const N driven = drive_damper(e_now[i] - before[i], way);
+      before[i] = select(done, e_now[i] - driven, before[i]);
+      slid[i] = select(done, way - driven, slid[i]);
+      u[i] = select(done, u_now[i], u[i]), e[i] = select(done, e_now[i], e[i]), f[i] = select(done, holds, f[i]);
+    }
+    torn = select(done, torn, zero);
+    books_slid = true;
+    outside = hn::Or(outside, beyond);
+  }
 
   // standard linear solid: the damper follows the mean of the step
   const N viscous = constant(kViscous), keep = one - constant(kRelaxation);
@@ -383,7 +404,7 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
     store_where<D>(inside, u[i], state, kStretch + i);
   }
   store_where<D>(inside, fma(half, work, load<D>(state, kDamped)), state, kDamped);
-  if (books_slid) store_where<D>(inside, fma(half, lost, load<D>(state, kBled)), state, kBled);
+  if (books_slid) store_where<D>(inside, fma(half, lost + torn, load<D>(state, kBled)), state, kBled);
 
   if constexpr (is_plane) {
     N across = In == Plane::AboutY ? g[2] : zero - g[1], torque_a = g[active.at[2]], torque_b = torque_a;

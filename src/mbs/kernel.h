@@ -166,13 +166,27 @@ struct BodyJob {
   std::vector<std::uint32_t>* spins;  // slots that turn too fast for the series, left where they were
 };
 
-/// What is done to the slot of a zone that flows while the kernel waits.
+/// What a spring is whose cracks have grown: where it is without force, and the two by two elastic parts of the shear
+/// and bending deformations of both planes.
+enum SpringField { kSpringOffset = 0, kSpringSoft = kSpringOffset + 6, kSpringFields = kSpringSoft + 8 };
+
+/// What the cracks of a spring do whose moments are at their bounds.
+enum class SpringCracks {
+  Hold,    // nothing, and nothing has changed
+  Grown,   // it is another spring
+  Beyond,  // the full law is to be asked
+};
+
+/// What is done to a slot while the kernel waits: to that of a zone that flows, but for the last.
 struct FlowWriter {
   /// Writes its cells anew, around a normal force that has left them or a rotation that has; leaves them as they are
   /// where no cell has that force. `force` is that over the section that is left.
   void (*write_cells)(void* owner, size_t slot, double force) = nullptr;
   /// Lets its cracks grow to where they hold at a deformation: six components, `stride` apart. False if they do not.
   bool (*grow_cracks)(void* owner, size_t slot, const double* deformation, size_t stride) = nullptr;
+  /// The same of a spring; another one that it becomes goes to kSpringFields numbers, `stride` apart.
+  SpringCracks (*crack_spring)(void* owner, size_t slot, const double* deformation, size_t stride,
+                               double* spring) = nullptr;
   void* owner = nullptr;
 };
 
@@ -194,6 +208,7 @@ struct ElementJob {
   const double* poses;                   // of the bodies, kPoseRow numbers each
   FlowWriter writer;
   std::vector<std::uint32_t>* outside;  // slots that need the full law, untouched
+  std::vector<std::uint32_t>* cracked;  // whose constants are no longer those of the spring that they are
 };
 
 /// Poses from blocks of bodies to a row for each, so that elements read whole rows: p (3), q (4), 0.

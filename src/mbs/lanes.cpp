@@ -350,7 +350,7 @@ void Lanes::lay_poses() {
 }
 
 void Lanes::evaluate_elements(size_t first, size_t last, const kernel::FlowWriter& writer,
-                              std::vector<std::uint32_t>& beyond) {
+                              std::vector<std::uint32_t>& beyond, std::vector<std::uint32_t>& cracking) {
   kernel::ElementJob job;
   job.first = first, job.last = last;
   job.live = live.data(), job.softened = softened.data(), job.planes = planes.data();
@@ -362,6 +362,7 @@ void Lanes::evaluate_elements(size_t first, size_t last, const kernel::FlowWrite
   job.p = p.data(), job.q = q.data(), job.poses = poses.data();
   job.writer = writer;
   job.outside = &beyond;
+  job.cracked = &cracking;
   if (W == kernel::lanes()) {
     kernel::evaluate_elements(job);
   } else {

@@ -54,7 +54,7 @@ struct Lanes {
   AlignedVector<double> nx, ny, nz, offset;            // of the ground
   AlignedVector<double> search_x, search_y, search_z;  // State::search_velocity
   // reports of the kernel
-  std::vector<std::uint32_t> outside, spins, landed;
+  std::vector<std::uint32_t> outside, cracked, spins, landed;
 
   static constexpr std::uint32_t kNoSlot = 0xffffffff;
 
@@ -123,7 +123,7 @@ struct Lanes {
   void lay_poses();
   /// Forces of the elements in blocks [first, last).
   void evaluate_elements(size_t first, size_t last, const kernel::FlowWriter& writer,
-                         std::vector<std::uint32_t>& beyond);
+                         std::vector<std::uint32_t>& beyond, std::vector<std::uint32_t>& cracking);
   /// Elements that meet in each body, 2 * element + side; batch only.
   void list_entries(const std::vector<std::vector<int>>& incidence);
   /// Forces of the elements on every body; batch only.

@@ -652,6 +652,7 @@ void advance_together(Lanes& lanes, std::span<System* const> systems) {
     s.begin_forces();
   });
   lanes.outside.clear();
+  lanes.cracked.clear();
   const auto any = [&](auto&& is) {
     return std::any_of(systems.begin(), systems.end(), [&](const System* s) { return s != nullptr && is(*s); });
   };
@@ -674,8 +675,15 @@ void advance_together(Lanes& lanes, std::span<System* const> systems) {
                                       System* s = all.systems[slot % all.lanes.W];
                                       return s && s->grow_cracks(slot, deformation, stride);
                                     },
+                                    [](void* owner, size_t slot, const double* deformation, size_t stride, double* to) {
+                                      const Batch& all = *static_cast<const Batch*>(owner);
+                                      System* s = all.systems[slot % all.lanes.W];
+                                      return s ? s->crack_spring(slot, deformation, stride, to)
+                                               : kernel::SpringCracks::Hold;
+                                    },
                                     &batch};
-    lanes.evaluate_elements(0, lanes.element_blocks, writer, lanes.outside);
+    lanes.evaluate_elements(0, lanes.element_blocks, writer, lanes.outside, lanes.cracked);
+    for (const std::uint32_t slot : lanes.cracked) systems[slot % lanes.W]->keep_spring(slot);
     for (const std::uint32_t slot : lanes.outside)
       if (System* s = systems[slot % lanes.W]) s->evaluate_outside(slot);
     lanes.share_again();

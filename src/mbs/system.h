@@ -377,6 +377,10 @@ class System {
   void write_cells(size_t slot, double axial);
   /// For the kernel: lets the cracks of a zone that flows grow at a deformation; false if they do not.
   bool grow_cracks(size_t slot, const double* deformation, size_t stride);
+  /// For the kernel: lets those of a spring grow; see kernel::FlowWriter.
+  kernel::SpringCracks crack_spring(size_t slot, const double* deformation, size_t stride, double* spring);
+  /// Writes to the constants of a slot what its spring has become.
+  void keep_spring(size_t slot);
   void sum_element_forces();
   Vec3 calc_element_reaction() const;
   void save_slot(size_t slot, std::vector<double>& to) const;

@@ -17,6 +17,7 @@ using kernel::first_bending;
 using kernel::kMostDamage;
 using kernel::last_bending;
 using kernel::Plane;
+using kernel::SpringCracks;
 
 constexpr double kTiny = 1e-300;
 
@@ -476,6 +477,14 @@ struct Evaluation {
     }
   }
 
+  /// The same from outside, in motion. False if nothing has grown.
+  bool grow_cracks(double time) {
+    constexpr double in_motion = 1;  // [s]
+    crack_stations(in_motion);
+    if (cracked) z.cracked_at = time;
+    return cracked;
+  }
+
   /// m + S φ(m) = m of the plastic rotations alone, where φ(m) is straight in pieces.
   void crack_plane(int q, const std::array<Cracks, 2>& cracks) {
     double plastic[2] = {0, 0}, m0[2] = {0, 0}, other[2] = {0, 0};
@@ -929,17 +938,37 @@ void advance_in(const ZoneParameters& p, const CompiledLaws& laws, const Six& d,
 
 }  // namespace
 
+namespace {
+
+/// Answer of `f` to an evaluation in the zone's plane.
+template <class F>
+auto evaluate_in_plane(const ZoneParameters& p, const Six& d, ZoneState& z, F&& f) {
+  switch (p.plane) {
+    case Plane::AboutY:
+      return f(Evaluation<Plane::AboutY>(p, d, z));
+    case Plane::AboutZ:
+      return f(Evaluation<Plane::AboutZ>(p, d, z));
+    case Plane::Space:
+      break;
+  }
+  return f(Evaluation<Plane::Space>(p, d, z));
+}
+
+}  // namespace
+
 bool grow_cracks(const ZoneParameters& p, const Six& d, double time, ZoneState& z) {
-  const auto grow = [&](auto now) {
-    constexpr double in_motion = 1;  // [s]
-    now.crack_stations(in_motion);
-    return now.cracked;
-  };
-  const bool has_grown = p.plane == Plane::Space    ? grow(Evaluation<Plane::Space>(p, d, z))
-                         : p.plane == Plane::AboutY ? grow(Evaluation<Plane::AboutY>(p, d, z))
-                                                    : grow(Evaluation<Plane::AboutZ>(p, d, z));
-  if (has_grown) z.cracked_at = time;
-  return has_grown;
+  return evaluate_in_plane(p, d, z, [&](auto now) { return now.grow_cracks(time); });
+}
+
+SpringCracks crack_spring(const ZoneParameters& p, const CompiledLaws& laws, const Six& d, double time, ZoneState& z) {
+  return evaluate_in_plane(p, d, z, [&](auto now) {
+    if (!now.grow_cracks(time)) return SpringCracks::Hold;
+    if (calc_bound_utilisation(p, z, now.force) > kNearBounds) {
+      z.safe_force[0] = 1, z.safe_force[1] = -1;  // near its bounds the full law finds others
+      return SpringCracks::Beyond;
+    }
+    return now.crack_inside_bounds(laws) && is_bounded(z, false) ? SpringCracks::Grown : SpringCracks::Beyond;
+  });
 }
 
 void advance_zone(const ZoneParameters& p, const CompiledLaws& laws, const Six& d, double time, double h,

@@ -134,6 +134,8 @@ inline bool is_bounded(const ZoneState& z, bool unlimited) {
 inline constexpr double kNearBounds = 0.9;
 /// Largest demand over the safe bounds of a bounded zone at its last evaluation, moments added; 0 without limits.
 double calc_bound_utilisation(const ZoneParameters&, const ZoneState&);
+/// The same of elastic resultants at the marker.
+double calc_bound_utilisation(const ZoneParameters&, const ZoneState&, const double resultants[6]);
 /// Sets `crack_scale`.
 void find_crack_bounds(const ZoneParameters&, ZoneState&);
 /// Writes what the kernel needs to let a zone flow in bending, kernel::kFlowFields values; false if it cannot: a law on
@@ -148,6 +150,9 @@ bool write_flow_cells(const ZoneParameters&, const CompiledLaws&, ZoneState&, do
 /// Lets the cracks of a live zone grow to where they hold at a deformation, whatever else happens to it then; the full
 /// law books what that loses if it is asked at the same time [s]. False if nothing has grown.
 bool grow_cracks(const ZoneParameters&, const Six& deformation, double time, ZoneState&);
+/// The same of a zone inside its bounds whose moments let them grow, perhaps; its energies are left to the caller.
+kernel::SpringCracks crack_spring(const ZoneParameters&, const CompiledLaws&, const Six& deformation, double time,
+                                  ZoneState&);
 /// Another law for all stations of a zone, which takes over from a time on [s] within a ramp [s]; the stiffness follows
 /// once that is over.
 struct LawSwitch {

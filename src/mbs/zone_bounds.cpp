@@ -122,8 +122,11 @@ void find_safe_bounds(const ZoneParameters& p, const CompiledLaws& laws, const L
 }
 
 double calc_bound_utilisation(const ZoneParameters& p, const ZoneState& z) {
+  return calc_bound_utilisation(p, z, z.elastic_force);
+}
+
+double calc_bound_utilisation(const ZoneParameters& p, const ZoneState& z, const double f[6]) {
   if (p.stations == 0) return 0;
-  const double* f = z.elastic_force;
   const double vy = f[1] * z.safe_shear[0], vz = f[2] * z.safe_shear[1];
   double u = std::max(std::abs(f[3]) * z.safe_torsion, std::sqrt(vy * vy + vz * vz));
   for (int s = 0; s < p.stations; ++s) {
