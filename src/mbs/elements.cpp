@@ -79,15 +79,16 @@ void System::kill_slot(size_t e) {
   --state.live_elements;
 }
 
-void System::add_slot(size_t e) {
-  ++state.live_elements;
+void System::add_slots(const std::vector<size_t>& begun) {
+  if (begun.empty()) return;
   Lanes& l = *lanes;
-  if (!l.is_batch) {
-    lay_out_elements();
-  } else if (l.live[e]++ == 0) {
-    l.list_entries(incidence);
+  if (!l.is_batch) lay_out_elements();
+  for (const size_t e : begun) {
+    if (!state.element[e].live) continue;
+    ++state.live_elements;
+    if (l.is_batch && l.live[e]++ == 0) l.list_entries(incidence);
+    pack_element(e);
   }
-  pack_element(e);
 }
 
 void System::lay_out_elements() {
@@ -332,6 +333,7 @@ void System::unpack_element(size_t e) {
   const size_t slot = slot_of(e);
   if (!z.live || slot == Lanes::kNoSlot) return;
   const Lanes& l = *lanes;
+  if (l.field(slot, kMostTurn) == kUnlimited) return;  // not there yet
   const bool flows = l.field(slot, kFlows) > 0;
   if (!flows && l.field(slot, kLeastForce) > l.field(slot, kMostForce)) return;  // the full law has it
   const Plane in = elements[e].zone.plane;

@@ -591,7 +591,7 @@ void System::loosen_joint(size_t i) {
   free_zone(rotationals[r].zone, z);
   state.element[E + r] = std::exchange(z, {});
   z.live = false;
-  add_slot(E + r);
+  begun_elements.push_back(E + r);
 }
 
 void System::release_joint(size_t i, const char* reason) {

@@ -419,6 +419,8 @@ void System::fire_events() {
     say({Happening::Kind::EventFired, state.time, index, -1, event.name, 0});
     state.quiet_steps = 0;
   }
+  add_slots(begun_elements);
+  begun_elements.clear();
 }
 
 void System::act(const Event& event) {

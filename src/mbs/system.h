@@ -253,10 +253,11 @@ class System {
   std::vector<Vec3> body_reaction, body_reaction_turn;  // their sums on bodies (B)
   Vec3 ground_reaction, ground_contact;
   int body_contacts = 0;
-  size_t other_on_ground = 0;   // moving bodies with shapes that are not the kernel's on the ground
-  int contact_interval = 1;     // steps from one look for touching points to the next
-  std::string trouble;          // why the run cannot go on; empty: nothing
-  std::vector<int> due_events;  // of this step
+  size_t other_on_ground = 0;          // moving bodies with shapes that are not the kernel's on the ground
+  int contact_interval = 1;            // steps from one look for touching points to the next
+  std::string trouble;                 // why the run cannot go on; empty: nothing
+  std::vector<int> due_events;         // of this step
+  std::vector<size_t> begun_elements;  // in it
   ContactScratch contact;
   View view;
 
@@ -357,8 +358,8 @@ class System {
   /// From the state of the zones to the slots, and back.
   /// Markers and constants are written only if they may have changed.
   void pack_element(size_t element, bool has_moved = true);
-  /// Gives an element that begins to live its place in the lanes.
-  void add_slot(size_t element);
+  /// Gives elements that begin to live their places in the lanes.
+  void add_slots(const std::vector<size_t>& elements);
   void pack_crack_bounds(size_t slot, const ZoneState&);
   /// Of a zone in lanes what follows it through deformations, cracks and damage, its limits aside.
   void pack_springs(size_t element, size_t slot, bool flows);

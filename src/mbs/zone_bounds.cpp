@@ -348,7 +348,7 @@ double calc_utilisation(const ZoneParameters& p, const CompiledLaws& laws, doubl
 }
 
 bool is_softening(const ZoneParameters& p, const CompiledLaws& laws, double time, const ZoneState& z) {
-  if (!z.live || p.stations == 0) return false;
+  if (!z.live || p.stations == 0 || (z.shortened == 0 && most_strained(z) == 0)) return false;
   const Limits limits(laws, p.law[0], z, time);
   const double integrity = limits.integrity(z.shortened);
   if (integrity < 0.95) return true;
