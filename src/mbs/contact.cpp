@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <span>
 
 #include "mbs/contact_kernel.h"
@@ -17,9 +16,8 @@ namespace topple::mbs {
 namespace {
 
 constexpr int kMostContactInterval = 2;
-constexpr double kLookAngle =
-    std::numbers::pi / 10;          // of a contact's swing from one look for points to the next, at most [rad]
-constexpr int kMembersOfNode = 15;  // shapes of a body; more are pieces of one surface
+constexpr double kLookAngle = 0.12;  // of a contact's swing from one look for points to the next, at most [rad]
+constexpr int kMembersOfNode = 15;   // shapes of a body; more are pieces of one surface
 
 /// Component of a vector in a block of lanes.
 Vec3 read3(const double* slot, int field, size_t W) {
