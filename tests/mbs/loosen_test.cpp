@@ -1,6 +1,8 @@
 // Joints that go over to their rotational elements. g = 9.81.
 #include <gtest/gtest.h>
 
+#include "mbs/batch.h"
+#include "mbs/system.h"
 #include "models.h"
 
 namespace topple::mbs {
@@ -174,6 +176,56 @@ TEST(LoosenJointReplay, GoesOnFromASnapshotWithTheSameBits) {
     for (int i = k == 0 ? 600 : 5000; i < 6000; ++i) ASSERT_TRUE(other.advance_step());
     EXPECT_EQ(hash_of(other.calc_view()), end) << k;
   }
+}
+
+TEST(LoosenJointReplay, InABatchASampleHasTheBitsOfItsRunAlone) {
+  // an element between two boxes beside it is cut before, in the middle or never, so that sums are made anew without it
+  Model base = make_falling_block();
+  const BodyId left = add_body(base, make_box("left", 10, {0.1, 0.1, 0.1}, {5, 0, 3}));
+  ZoneElement e;
+  e.name = "beside";
+  e.a = left;
+  e.b = add_body(base, make_box("right", 10, {0.1, 0.1, 0.1}, {6, 0, 3}));
+  e.X_AF.p = {0.5, 0, 0}, e.X_BM.p = {-0.5, 0, 0};
+  e.translational_stiffness = {1e5, 1e5, 1e5}, e.rotational_stiffness = {1e3, 1e3, 1e3};
+  add_element(base, e);
+  base.events.push_back(make_event(0.02, Action::Kind::RemoveElement, 0, "cut"));
+  std::vector<Variation> variations;
+  for (int i = 0; i < 9; ++i)
+    variations.push_back([i](Model& m) {
+      m.events[0].time = 0.03 + 0.06 * i;
+      m.bodies[1].mass *= 1 + 0.01 * i;
+      if (i >= 7) m.events[1].time = 0.1 * (i - 4);
+    });
+  Options o = options_of(0.7, 2e-4);
+  o.frame_interval = 0.01;
+  std::vector<std::vector<std::uint64_t>> alone(variations.size()), together(variations.size());
+  for (size_t i = 0; i < variations.size(); ++i) {
+    Model m = base;
+    variations[i](m);
+    o.on_frame = [&](const View& v) { alone[i].push_back(hash_of(v)); };
+    EXPECT_EQ(run(m, o).ending, Summary::Ending::TimeLimit);
+  }
+  EXPECT_NE(alone[0].back(), alone[1].back());
+  BatchOptions b;
+  b.run = o;
+  b.on_frame = [&](size_t i, const View& v) { together[i].push_back(hash_of(v)); };
+  (void)run_batch(base, variations, b);
+  EXPECT_EQ(together, alone);
+}
+
+TEST(LoosenJoint, TheKernelCrushesIt) {
+  System s(make_falling_block(), options_of(0.75, 1e-4), 0);
+  s.start();
+  long outside = 0, steps = 0;
+  while (s.state.time < 0.75) {
+    ASSERT_TRUE(s.advance_step());
+    ++steps;
+    outside += static_cast<long>(s.lanes->outside.size());
+  }
+  s.unpack_elements();
+  EXPECT_GT(s.state.element[s.E].shortened, 0.05);
+  EXPECT_LT(outside, steps / 50);
 }
 
 }  // namespace
