@@ -34,7 +34,7 @@ Quat turn_in_plane(Plane plane, const Quat& q) {
 void find_softness(const ZoneParameters& p, const ZoneState& z, bool is_softened, double soft[8]) {
   for (int q = 0; q < 2; ++q) {
     const double ks = z.share * p.stiffness[q == 0 ? 2 : 1], kb = z.share * p.stiffness[q == 0 ? 4 : 5];
-    double* at = soft + 4 * q;
+    double* at = soft + (q == 0 ? 0 : 4);
     at[0] = is_softened && ks > 0 ? z.plane[q][0] / ks : 1;
     at[1] = is_softened && ks > 0 ? z.plane[q][1] / ks : 0;
     at[2] = is_softened && kb > 0 ? z.plane[q][1] / kb : 0;
