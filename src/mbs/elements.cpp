@@ -275,27 +275,33 @@ void System::pack_crack_bounds(size_t slot, const ZoneState& z) {
       for (int side : {0, 1}) lanes->set(slot, kCrackScale + 4 * s + 2 * q + side, z.crack_scale[s][q][side]);
 }
 
+void System::pack_spring_constants(size_t e, size_t slot, bool flows) {
+  const ZoneState& z = state.element[e];
+  Lanes& l = *lanes;
+  const Plane in = elements[e].zone.plane;
+  pack_crack_bounds(slot, z);
+  const ActiveComponents active = components_of(in);
+  for (int c = 0; c < active.count; ++c) l.set(slot, kOffset + active.at[c], flows ? 0 : z.offset[active.at[c]]);
+  double soft[8];
+  find_softness(elements[e].zone, z, !flows && z.is_softened, soft);
+  for (int plane = first_bending(in); plane <= last_bending(in); ++plane)
+    for (int i = 4 * plane; i < 4 * plane + 4; ++i) l.set(slot, kSoft + i, soft[i]);
+  if (!flows && z.is_softened) l.softened[slot / l.W] = 1;
+}
+
 void System::pack_springs(size_t e, size_t slot, bool flows) {
   ZoneState& z = state.element[e];
   Lanes& l = *lanes;
-  const Plane in = elements[e].zone.plane;
-  const ActiveComponents active = components_of(in);
-  const auto put = [&](int f, double x) { l.set(slot, f, x); };
-  pack_crack_bounds(slot, z);
+  pack_spring_constants(e, slot, flows);
+  const ActiveComponents active = components_of(elements[e].zone.plane);
   for (int c = 0; c < active.count; ++c) {
     const int i = active.at[c];
-    put(kOffset + i, flows ? 0 : z.offset[i]);
     l.set_state(slot, kStretch + i, flows ? z.elastic[i] : z.deformation[i] - z.offset[i]);
     l.set_state(slot, kBehind + i, z.elastic[i] - z.flowed[i]);
   }
   l.set_state(slot, kDamped, 0);
   l.set_state(slot, kBled, 0);
   z.packed_damping = z.damping, z.packed_plastic = z.plastic, z.packed_behind = z.damper_energy;
-  double soft[8];
-  find_softness(elements[e].zone, z, !flows && z.is_softened, soft);
-  for (int plane = first_bending(in); plane <= last_bending(in); ++plane)
-    for (int i = 4 * plane; i < 4 * plane + 4; ++i) put(kSoft + i, soft[i]);
-  if (!flows && z.is_softened) l.softened[slot / l.W] = 1;
 }
 
 SpringCracks System::crack_spring(size_t slot, const double* deformation, size_t stride, double* spring) {
@@ -313,20 +319,7 @@ SpringCracks System::crack_spring(size_t slot, const double* deformation, size_t
   return cracks;
 }
 
-void System::keep_spring(size_t slot) {
-  Lanes& l = *lanes;
-  const size_t e = element_at(l, slot);
-  const ZoneParameters& zone = elements[e].zone;
-  const ZoneState& z = state.element[e];
-  pack_crack_bounds(slot, z);
-  const ActiveComponents active = components_of(zone.plane);
-  for (int c = 0; c < active.count; ++c) l.set(slot, kOffset + active.at[c], z.offset[active.at[c]]);
-  double soft[8];
-  find_softness(zone, z, z.is_softened, soft);
-  for (int plane = first_bending(zone.plane); plane <= last_bending(zone.plane); ++plane)
-    for (int i = 4 * plane; i < 4 * plane + 4; ++i) l.set(slot, kSoft + i, soft[i]);
-  if (z.is_softened) l.softened[slot / l.W] = 1;
-}
+void System::keep_spring(size_t slot) { pack_spring_constants(element_at(*lanes, slot), slot, false); }
 
 void System::unpack_element(size_t e) {
   ZoneState& z = state.element[e];

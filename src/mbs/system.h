@@ -361,6 +361,8 @@ class System {
   /// Gives elements that begin to live their places in the lanes.
   void add_slots(const std::vector<size_t>& elements);
   void pack_crack_bounds(size_t slot, const ZoneState&);
+  /// Where a spring is without force, what of its deformations is elastic, and where its cracks grow.
+  void pack_spring_constants(size_t element, size_t slot, bool flows);
   /// Of a zone in lanes what follows it through deformations, cracks and damage, its limits aside.
   void pack_springs(size_t element, size_t slot, bool flows);
   void unpack_element(size_t element);

@@ -936,10 +936,6 @@ void advance_in(const ZoneParameters& p, const CompiledLaws& laws, const Six& d,
   if (is_switched && z.next_share != z.share) soften(p, z);
 }
 
-}  // namespace
-
-namespace {
-
 /// Answer of `f` to an evaluation in the zone's plane.
 template <class F>
 auto evaluate_in_plane(const ZoneParameters& p, const Six& d, ZoneState& z, F&& f) {
