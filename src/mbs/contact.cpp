@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <span>
 
 #include "mbs/contact_kernel.h"
@@ -16,8 +17,9 @@ namespace topple::mbs {
 namespace {
 
 constexpr int kMostContactInterval = 2;
-constexpr double kLookAngle = 0.12;  // of a contact's swing from one look for points to the next, at most [rad]
-constexpr int kMembersOfNode = 15;   // shapes of a body; more are pieces of one surface
+// of a contact's swing from one look for points to the next, at most [rad]
+constexpr double kLookAngle = std::numbers::pi / 10;
+constexpr int kMembersOfNode = 15;  // shapes of a body; more are pieces of one surface
 
 /// Component of a vector in a block of lanes.
 Vec3 read3(const double* slot, int field, size_t W) {
@@ -91,12 +93,11 @@ void System::evaluate_contact(double h) {
   if (!has_other_contacts()) return;
   Touching& t = state.touching;
   const bool follows = h > 0 && !is_look_due();
-  const int passed = t.steps;
   if (!follows) {
     find_contacts(h);
     t.steps = 0;
   }
-  resolve_contacts(h, follows, passed);
+  resolve_contacts(h, follows);
   ++t.steps;
 }
 
@@ -145,11 +146,12 @@ Earnings System::calc_earnings(const ContactGroup& g, double h) const {
           slot[kernel::kSpent * W] - 0.5 * h * damped};
 }
 
-void System::add_contact_point(const Vec3& at, double depth, double stiffness) {
+void System::add_contact_point(const Vec3& at, double depth, double stiffness, double unseen) {
   ContactPoint& p = contact.point.emplace_back();
   p.at = at;
   p.depth = depth;
   p.stiffness = stiffness;
+  p.unseen = unseen;
 }
 
 int System::touch(size_t b) {
@@ -247,8 +249,8 @@ void System::fill_contact_blocks() {
     for (int i = 0; i < g.count; ++i) {
       const ContactPoint& p = contact.point[static_cast<size_t>(g.first + i)];
       const double fields[] = {
-          p.at.x, p.at.y, p.at.z, p.depth, p.stiffness, p.slip.x, p.slip.y, p.slip.z, p.is_fresh ? 1.0 : 0.0};
-      static_assert(std::size(fields) == kernel::kFresh + 1);
+          p.at.x, p.at.y, p.at.z, p.depth, p.stiffness, p.slip.x, p.slip.y, p.slip.z, p.is_fresh ? 1.0 : 0.0, p.unseen};
+      static_assert(std::size(fields) == kernel::kMet + 1);
       double* at = t.points.data() + (t.rows[block] + static_cast<size_t>(i)) * kernel::kPointFields * W + place;
       for (const double x : fields) *at = x, at += W;
     }
@@ -259,7 +261,7 @@ void System::fill_contact_blocks() {
   for (size_t i = 0; i < contact.groups.size(); ++i) t.share[i] = contact.groups[i];
 }
 
-void System::resolve_contacts(double h, bool follows, int passed) {
+void System::resolve_contacts(double h, bool follows) {
   State& s = state;
   Touching& t = s.touching;
   s.contact_energy = s.stick_energy = 0;
@@ -303,7 +305,6 @@ void System::resolve_contacts(double h, bool follows, int passed) {
     job.points = t.points.data();
     job.h = h;
     job.follows = follows;
-    job.longest = follows ? 1 : std::max(1, passed);
     const auto push = [&] {
       kernel::sum_wrenches(job);
       kernel::update_touched(bodies);

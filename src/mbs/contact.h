@@ -47,6 +47,7 @@ struct CompiledShape {
 struct GroundPoint {
   double born = 0;      // penetration allowed because it was there when contact became possible [m]
   bool active = false;  // contact is possible
+  bool touches = false;
 };
 
 /// What a body of one box remembers of the ground where it touches nothing else; fields as kernel::GroundState.
@@ -109,6 +110,7 @@ struct ContactPoint {
   double stiffness = 0;  // k [N/m]
   Vec3 slip;             // displacement of the friction spring [m]
   bool is_fresh = true;  // not touched in the step before
+  double unseen = 0;     // steps within which it may have been met, at its speed now; 0: it touched before
 };
 
 /// Energy that a pair's points leave to those that are found after them [J].
@@ -148,8 +150,9 @@ struct PairSearch {
   std::vector<int> first_in_slab, in_slab, unbounded, near, hits;
   std::vector<ShapeBounds> here;  // of one slab
   std::vector<double> extents, ways, speeds;
-  std::vector<std::uint64_t> found, held;  // ranks of both shapes
-  std::vector<int> first_old, old;         // old pairs of each shape
+  std::vector<std::uint64_t> found, held, sorted;  // ranks of both shapes
+  std::vector<std::uint32_t> next;
+  std::vector<int> first_old, old;  // old pairs of each shape
   std::vector<PairState> pairs;
   std::vector<PairDue> due;
   std::vector<double> clock;

@@ -188,13 +188,17 @@ HWY_INLINE void press_block(const ContactJob& job, size_t block) {
   V3<D> apart = load3<D>(g, kApart);
   const Num<D> h = num<D>(job.h);
   V3<D> turned = zeros<D>();  // of a in the step
+  const Num<D> zero = num<D>(0), half = num<D>(0.5), one = num<D>(1);
+  Num<D> along_between = zero;  // with the levers of the middle of the step, as the forces of both its ends work
   if (job.follows) {
-    apart = fma(h, V3<D>{A[0], A[1], A[2]} - V3<D>{B[0], B[1], B[2]}, apart);
+    const V3<D> way = V3<D>{A[0], A[1], A[2]} - V3<D>{B[0], B[1], B[2]};
+    along_between = dot(n, calc_motion<D>(A, B, fma(half * h, way, apart)).v);
+    apart = fma(h, way, apart);
     store3<D>(apart, g, kApart);
     turned = h * V3<D>{A[3], A[4], A[5]};
   }
   const Motion<D> m = calc_motion<D>(A, B, apart);
-  const Num<D> zero = num<D>(0), half = num<D>(0.5), one = num<D>(1), along = dot(n, m.v);
+  const Num<D> along = dot(n, m.v);
   if (job.follows) {
     const V3<D> v = load3<D>(g, kMotion) + m.v, w = load3<D>(g, kMotion + 3) + m.w;
     const Num<D> power = dot(load3<D>(g, kDamp), v) + dot(load3<D>(g, kDamp + 3), w);
@@ -213,18 +217,23 @@ HWY_INLINE void press_block(const ContactJob& job, size_t block) {
   const auto plain = hn::Ge(damping.v, hn::Zero(d));
   Num<D> energy = zero, impedance = zero, total = zero, held = zero, stores = zero;
   V3<D> torque = zeros<D>(), held_torque = torque;
+  auto some_meet = hn::FirstN(d, 0);
   for (size_t row = job.rows[block]; row < job.rows[block + 1]; ++row) {
     double* p = job.points + row * kPointFields * W;
     V3<D> place = load3<D>(p, kPlace);
+    Num<D> between = zero;
     if (job.follows) {
-      place = place + cross(turned, place);
+      const V3<D> by = cross(turned, place);
+      between = along_between + dot(cross(fma(half, by, place), n), m.w);
+      place = place + by;
       store3<D>(place, p, kPlace);
     }
     const V3<D> la = cross(place, n), lb = la + to_b;
     const Num<D> k = load<D>(p, kPointStiffness), speed = along + dot(la, m.w), way = h * abs(speed);
-    Num<D> depth = load<D>(p, kDepth);
+    Num<D> depth = load<D>(p, kDepth), unseen = load<D>(p, kMet);
     if (job.follows) {
-      depth = fma(h, speed, depth);
+      unseen = select(hn::Le(depth.v, hn::Zero(d)), num<D>(kSlowed), zero);
+      depth = fma(h, between, depth);
       store<D>(depth, p, kDepth);
     }
     const auto here = hn::And(hn::Gt(k.v, hn::Zero(d)), hn::Gt(depth.v, hn::Zero(d)));
@@ -238,16 +247,18 @@ HWY_INLINE void press_block(const ContactJob& job, size_t block) {
     held = held + plain_force;
     held_torque = fma(zero - plain_force, la, held_torque);
     // of a step in which the surfaces meet or part, only a share is in touch; they may have met before they were seen
-    const auto passes = hn::Gt(way.v, depth.v), meets = hn::Gt(speed.v, hn::Zero(d));
     const Num<D> share = depth / select(hn::Gt(way.v, hn::Zero(d)), way, one);
-    const auto was_late = hn::And(meets, hn::Le(share.v, hn::Set(d, job.longest)));
+    const auto meets = hn::And(hn::And(here, hn::Gt(speed.v, hn::Zero(d))), hn::Le(share.v, unseen.v));
+    const auto parts = hn::And(hn::Lt(speed.v, hn::Zero(d)), hn::Gt(way.v, depth.v));
+    some_meet = hn::Or(some_meet, meets);
+    store<D>(select(meets, share, zero), p, kMet);
     // what has been met since has its energy from (4)
-    stores = stores + select(was_late, zero, half * plain_force * fnma(h, speed, depth));
-    full = select(hn::Or(passes, was_late), full * fma(half, share, half), full);
+    stores = stores + select(meets, zero, half * plain_force * fnma(h, speed, depth));
+    full = select(hn::Or(meets, parts), full * fma(half, share, half), full);
     Num<D> rate = twice_zeta * z;
     if (HWY_UNLIKELY(!hn::AllFalse(d, plain))) {
       // a plain dashpot begins with a jump: for half a step, and the share of the one before
-      const Num<D> steady = select(hn::And(passes, meets), (half + share) * damping, damping);
+      const Num<D> steady = select(meets, (half + share) * damping, damping);
       rate = select(hn::And(plain, here), steady, rate);
     }
     const Num<D> force = mean * full;
@@ -278,6 +289,7 @@ HWY_INLINE void press_block(const ContactJob& job, size_t block) {
     }
   }
   store<D>(impedance, g, kImpedance);
+  store<D>(select(some_meet, one, zero), g, kMeets);
   write_wrench<D>(job, block, apart, (zero - total) * n, torque);
   store<D>(half * mean * energy, g, kPressEnergy);
   store<D>(held, g, kHeldForce), store3<D>(held_torque, g, kHeldTorque);
@@ -353,6 +365,33 @@ HWY_INLINE void damp_block(const ContactJob& job, size_t block) {
   write_wrench<D>(job, block, apart, damping + rub, damping_torque + rub_torque);
 }
 
+/// What points that have just been met lack to the force of (4), once it is known what the step leaves of their speed.
+/// The lack itself slows them further: a few turns.
+template <class D>
+HWY_NOINLINE Wrench<D> calc_lack(const ContactJob& job, size_t block, const Motion<D>& change) {
+  const size_t W = hn::Lanes(D());
+  const double* g = job.groups + block * kGroupFields * W;
+  const V3<D> n = load3<D>(g, kNormal), apart = load3<D>(g, kApart);
+  const Num<D> zero = num<D>(0), h = num<D>(job.h), mean = load<D>(g, kMean);
+  Wrench<D> lack{zeros<D>(), zeros<D>()};
+  for (int turn = 0; turn < kLackTurns; ++turn) {
+    const V3<D> turn_b = times<D>(g, kInertiaB, h * (lack.torque + cross(apart, lack.force)));
+    const V3<D> dv = change.v + (h * (load<D>(g, kMassA) + load<D>(g, kMassB))) * lack.force + cross(turn_b, apart);
+    const V3<D> dw = change.w + (times<D>(g, kInertiaA, h * lack.torque) + turn_b);
+    const Num<D> along = dot(n, dv);
+    lack = {zeros<D>(), zeros<D>()};
+    for (size_t row = job.rows[block]; row < job.rows[block + 1]; ++row) {
+      const double* p = job.points + row * kPointFields * W;
+      const V3<D> la = cross(load3<D>(p, kPlace), n);
+      const Num<D> lacking = calc_lacking_share<D>(load<D>(p, kMet), load<D>(p, kApproach), along + dot(la, dw));
+      const Num<D> f = mean * load<D>(p, kFull) * lacking;
+      lack.force = lack.force - f * n;
+      lack.torque = fma(zero - f, la, lack.torque);
+    }
+  }
+  return lack;
+}
+
 template <class D>
 HWY_INLINE void rub_block(const ContactJob& job, size_t block) {
   const D d;
@@ -394,7 +433,10 @@ HWY_INLINE void rub_block(const ContactJob& job, size_t block) {
     force = force + f;
     torque = torque + cross(r, f);
   }
-  write_wrench<D>(job, block, apart, force - load3<D>(g, kRub), torque - load3<D>(g, kRub + 3));
+  Wrench<D> more{force - load3<D>(g, kRub), torque - load3<D>(g, kRub + 3)};
+  if (HWY_UNLIKELY(!hn::AllFalse(d, hn::Gt(load<D>(g, kMeets).v, hn::Zero(d)))))
+    more = more + calc_lack<D>(job, block, change);
+  write_wrench<D>(job, block, apart, more.force, more.torque);
   store3<D>(force, g, kRub), store3<D>(torque, g, kRub + 3);
 }
 

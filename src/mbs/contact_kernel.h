@@ -62,8 +62,9 @@ enum Group : int {
   kHeldTorque = 56,     // and its torque on a (3)
   kEarned = 59,         // energy of the pair's points before, and their work since; below 0: there were none [J]
   kSpent = 60,          // work of the pair's dashpots since points were looked for [J]
-  kLost = 61,  // of what was earned, that which the points that are found cannot store, less what they took [J]
-  kGroupFields = 62
+  kLost = 61,   // of what was earned, that which the points that are found cannot store, less what they took [J]
+  kMeets = 62,  // 1: it has points that have just been met
+  kGroupFields = 63
 };
 
 /// Fields of a point; a place without a point has no stiffness.
@@ -73,13 +74,16 @@ enum Point : int {
   kPointStiffness = 4,  // [N/m]
   kSpringSlip = 5,      // displacement of the friction spring (3) [m]
   kFresh = 8,           // 1: did not touch in the step before
-  kApproach = 9,        // speed of approach, half a step ago
-  kFull = 10,           // spring force at the rate k [N]
-  kRate = 11,           // of the dashpot [N·s/m]
-  kNormalForce = 12,    // normal force [N]
-  kSlide = 13,          // speed across the normal (3)
-  kPointFields = 16
+  kMet = 9,             // steps within which it may have been met; press leaves s of (4), 0: it touched before
+  kApproach = 10,       // speed of approach, half a step ago
+  kFull = 11,           // spring force at the rate k [N]
+  kRate = 12,           // of the dashpot [N·s/m]
+  kNormalForce = 13,    // normal force [N]
+  kSlide = 14,          // speed across the normal (3)
+  kPointFields = 17
 };
+/// How much faster a point that has just been met may have been while it came.
+inline constexpr double kSlowed = 1.5;
 /// Stiffness of a friction spring over the mean normal stiffness of a corner.
 inline constexpr double kStickStiffness = 1.2;
 // NOLINTEND(readability-identifier-naming)
@@ -139,7 +143,6 @@ struct ContactJob {
   double* points;                  // kPointFields a row
   double h = 0;
   bool follows = false;  // the points are those of the step before, moved with the bodies
-  double longest = 1;    // steps since points were looked for before
 };
 
 /// Springs: speeds, forces and the wrench of all.

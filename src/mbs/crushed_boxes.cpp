@@ -155,8 +155,8 @@ double System::crush_ends(size_t a, int shape_a, size_t b, int shape_b, const Ve
     fastest = std::max(fastest, std::abs(speed));
   }
   if (!(pressed > bears)) return 0;
-  // What is deeper than its elastic part is crushed; but as much stays as no point can have been met since the last
-  // look, see (4) of the theory, and springs are soft enough for the mean force until the next one.
+  // What is deeper than its elastic part is crushed; but as much stays as no point of before can have been met since
+  // the last look, see (4) of the theory, and springs are soft enough for the mean force until the next one.
   const double steps = contact_interval, seen = std::max(1, state.touching.steps);
   const double kept = std::max(deepest * bears / pressed, kMoreThanMet * seen * h * fastest);
   double by = 0;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "mbs/contact_kernel.h"
 #include "mbs/system.h"
 
 namespace topple::mbs {
@@ -68,6 +69,7 @@ void System::find_ground_points(double h) {
   const State& now = state;
   const Contact& c = model.contact;
   const Vec3 n = c.normal;
+  const int passed = std::max(1, s.touching.steps);
   const LaneLayout layout = lanes->body_layout(lane);
   for (size_t b = 0; b < B; ++b) {
     if (is_ground_box(b)) continue;
@@ -132,9 +134,11 @@ void System::find_ground_points(double h) {
         g.born = std::max(0.0, std::min(g.born, penetration));
         const double depth = penetration - g.born;
         if (g.born > 0 || depth > 0) shape.is_clear = false, s.ground_clear[b] = 0;
+        const bool is_new = !std::exchange(g.touches, depth > 0);
         if (depth <= 0) continue;
         const Vec3 at = box || hull ? centre + R * local : centre - shape.radius * n;
-        add_contact_point(at, depth, hull ? polyhedron->weights[static_cast<size_t>(corner)] * stiffness : stiffness);
+        add_contact_point(at, depth, hull ? polyhedron->weights[static_cast<size_t>(corner)] * stiffness : stiffness,
+                          is_new ? kernel::kSlowed * passed : 0);
       }
       const int earned = std::exchange(shape.group, -1);
       if (contact.point.size() == first) {

@@ -38,16 +38,7 @@ HWY_INLINE Symmetric<D> turn_tensor(const M33<D>& R, const Symmetric<D>& I) {
   return {dot(R.r0, x), dot(R.r1, x), dot(R.r2, x), dot(R.r1, y), dot(R.r2, y), dot(R.r2, z)};
 }
 
-/// A force and its torque about the centre of mass.
-template <class D>
-struct Wrench {
-  V3<D> force, torque;
-};
-template <class D>
-HWY_INLINE Wrench<D> operator+(const Wrench<D>& a, const Wrench<D>& b) {
-  return {a.force + b.force, a.torque + b.torque};
-}
-/// Its power on a motion.
+/// The power of a wrench on a motion.
 template <class D>
 HWY_INLINE Num<D> power_of(const Wrench<D>& on, const V3<D>& v, const V3<D>& w) {
   return dot(on.force, v) + dot(on.torque, w);
@@ -59,7 +50,8 @@ struct Corner {
   V3<D> place;  // from the centre of mass
   V3<D> slip, slide;
   Num<D> depth, approach, full, rate, normal;
-  hn::Mask<D> touches, is_fresh;
+  Num<D> met;  // the share of (4) where it has just been met, else 0
+  hn::Mask<D> touches, is_new, is_fresh;
 };
 
 /// Displacements of the friction springs that corners take over from the step before: their own, or that of the nearest
@@ -73,7 +65,7 @@ HWY_INLINE void take_over_slips(const double* HWY_RESTRICT state, const Place& p
     Corner<D>& c = corner[i];
     const V3<D> own = load3<D>(state, kCornerSlip + 3 * number[i]);
     const auto is_new = hn::Eq(own.x.v, none);
-    c.is_fresh = is_new;
+    c.is_new = c.is_fresh = is_new;
     c.slip = {select(is_new, num<D>(0), own.x), select(is_new, num<D>(0), own.y), select(is_new, num<D>(0), own.z)};
     if (HWY_LIKELY(hn::AllFalse(d, hn::And(is_new, c.touches)))) continue;
     Num<D> least = {none};
@@ -179,6 +171,7 @@ HWY_INLINE void press_ground_block(const GroundJob& job, size_t block) {
   N along = dot(n, v), energy = zero, impedance = zero, total = zero;
   const V3<D> nothing{zero, zero, zero};
   Wrench<D> press{nothing, nothing}, damp = press, rub = press;
+  M some_meet = hn::FirstN(d, 0);
   for (int i = 0; i < count; ++i) {
     Corner<D>& c = corner[i];
     const V3<D> lever = cross(c.place, n);
@@ -188,16 +181,17 @@ HWY_INLINE void press_ground_block(const GroundJob& job, size_t block) {
     N full = k * c.depth;
     energy = fma(full, c.depth, energy);
     // of a step in which the surfaces meet or part, only a share is in touch
-    const M passes = hn::And(c.touches, hn::Ge(way.v, c.depth.v));
-    N rate = twice_zeta * root, share = one;
-    if (!hn::AllFalse(d, passes)) {
-      share = select(passes, c.depth / select(passes, way, one), one);
-      full = select(passes, full * fma(half, share, half), full);
-    }
+    const N share = c.depth / select(hn::Gt(way.v, zero.v), way, one);
+    const M meets =
+        hn::And(hn::And(c.touches, c.is_new), hn::And(hn::Gt(speed.v, zero.v), hn::Le(share.v, hn::Set(d, kSlowed))));
+    const M parts = hn::And(c.touches, hn::And(hn::Lt(speed.v, zero.v), hn::Gt(way.v, c.depth.v)));
+    some_meet = hn::Or(some_meet, meets);
+    c.met = select(meets, share, zero);
+    full = select(hn::Or(meets, parts), full * fma(half, share, half), full);
+    N rate = twice_zeta * root;
     if (HWY_UNLIKELY(!hn::AllFalse(d, plain))) {
       // a plain dashpot begins with a jump: for half a step, and the share of the one before
-      const M begins = hn::And(hn::And(passes, hn::Gt(way.v, c.depth.v)), hn::Gt(speed.v, zero.v));
-      const N steady = select(begins, (half + share) * damping, damping);
+      const N steady = select(meets, (half + share) * damping, damping);
       rate = select(hn::And(plain, c.touches), steady, rate);
     }
     const N force = mean * full;
@@ -296,6 +290,24 @@ HWY_INLINE void press_ground_block(const GroundJob& job, size_t block) {
       limit(f, friction * c.normal);
       rub = {rub.force + f, rub.torque + cross(c.place, f)};
     }
+  }
+
+  // what corners that have just been met lack to the force of (4), once it is known what the step leaves of their speed
+  if (HWY_UNLIKELY(!hn::AllFalse(d, some_meet))) {
+    Wrench<D> lack{nothing, nothing};
+    for (int turn = 0; turn < kLackTurns; ++turn) {
+      along = dot(n, fma(h * mass, lack.force, dv));
+      const V3<D> turned = dw + inertia * (h * lack.torque);
+      lack = {nothing, nothing};
+      for (int i = 0; i < count; ++i) {
+        const Corner<D>& c = corner[i];
+        const V3<D> lever = cross(c.place, n);
+        const N f = mean * c.full * calc_lacking_share<D>(c.met, c.approach, along + dot(lever, turned));
+        lack.force = lack.force - f * n;
+        lack.torque = fma(zero - f, lever, lack.torque);
+      }
+    }
+    press = press + lack;
   }
 
   // forces do their work over the half steps before and after

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "mbs/box_kernel.h"
+#include "mbs/contact_kernel.h"
 #include "mbs/system.h"
 
 namespace topple::mbs {
@@ -98,12 +99,17 @@ void System::find_pair_points(double h) {
       {blocks, contact.boxes.data(), contact.box_a.data(), contact.box_b.data(), contact.box_answers.data()});
 
   BoxContact points;
+  const int passed = std::max(1, s.touching.steps);
   for (const PairLook& look : looks) {
     const double way = look.way;
     PairState& pair = s.pairs[look.pair];
     PairDue& due = s.pair_due[look.pair];
     const size_t a = static_cast<size_t>(due.a), b = static_cast<size_t>(due.b);
     points.count = 0;
+    const auto approach_at = [&](const Vec3& at) {
+      return dot(points.normal,
+                 now.v[a] + cross(now.w[a], at - Vec3{now.p[a]}) - now.v[b] - cross(now.w[b], at - Vec3{now.p[b]}));
+    };
     if (due.are_boxes) {
       read_box_contact(&contact.box_answers[look.slot / W * kernel::kBoxAnswerFields * W + look.slot % W], W, points);
     } else {
@@ -117,7 +123,7 @@ void System::find_pair_points(double h) {
     }
     // a depth that the bodies cannot have come to since the last look, because another axis counts or because they
     // overlap at birth, is allowed
-    const double possible = pair.depth + way - pair.way;
+    double possible = pair.depth + way - pair.way;
     pair.way = way;
     const Earnings earnings = pair.group >= 0 ? contact.earnings[static_cast<size_t>(pair.group)] : Earnings{};
     pair.group = -1;
@@ -132,6 +138,11 @@ void System::find_pair_points(double h) {
     }
     double deepest = 0;
     for (int i = 0; i < points.count; ++i) deepest = std::max(deepest, points.depth[i]);
+    if (!due.touching) {
+      double approach = 0;
+      for (int i = 0; i < points.count; ++i) approach = std::max(approach, approach_at(points.p[i]));
+      possible = std::min(possible, kernel::kSlowed * approach * h * passed);
+    }
     pair.allowed = std::max(std::min(pair.allowed, deepest), deepest - std::max(0.0, possible));
     pair.depth = deepest - pair.allowed;
     if (pair.depth <= 0) {
@@ -144,21 +155,22 @@ void System::find_pair_points(double h) {
     const double stiffness = law.stiffness > 0 ? law.stiffness
                                                : c.contact_frequency * c.contact_frequency /
                                                      (s.body[a].inverse_mass + s.body[b].inverse_mass);
-    const Vec3 p_a = now.p[a], p_b = now.p[b];
+    const Vec3 p_a = now.p[a];
     if (!due.touching) {
       const int low = std::min(due.a, due.b), high = std::max(due.a, due.b);
       const long number = static_cast<long>(low) * static_cast<long>(B) + high;
       const auto at = std::lower_bound(s.touched_pairs.begin(), s.touched_pairs.end(), number);
       if (at == s.touched_pairs.end() || *at != number) {
         s.touched_pairs.insert(at, number);
-        const Vec3 v = now.v[a] + cross(now.w[a], points.p[0] - p_a) - now.v[b] - cross(now.w[b], points.p[0] - p_b);
-        say({Happening::Kind::BodyContact, s.time, low, high, {}, std::max(0.0, dot(points.normal, v))});
+        say({Happening::Kind::BodyContact, s.time, low, high, {}, std::max(0.0, approach_at(points.p[0]))});
       }
     }
     const size_t first = contact.point.size();
     for (int i = 0; i < points.count; ++i) {
       const double depth = points.depth[i] - pair.allowed;
-      if (depth > 0) add_contact_point(points.p[i] - p_a, depth, points.weight[i] * stiffness);
+      if (depth > 0)
+        add_contact_point(points.p[i] - p_a, depth, points.weight[i] * stiffness,
+                          (due.touching ? 1 : kernel::kSlowed) * passed);
     }
     pair.depth -= crush_ends(a, due.shape_a, b, due.shape_b, points.normal, law, first, h);
     body_contacts += static_cast<int>(contact.point.size() - first);

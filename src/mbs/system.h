@@ -434,7 +434,7 @@ class System {
   /// Whether something else touches anything.
   bool has_other_contacts() const { return model.contact.bodies || other_on_ground > 0; }
   void find_pair_points(double h);
-  void add_contact_point(const Vec3& at, double depth, double stiffness);
+  void add_contact_point(const Vec3& at, double depth, double stiffness, double unseen);
   /// Counts a group of a body; its place among those touched.
   int touch(size_t body);
   /// Makes the points from `first` on a group. Each takes over the friction spring of the nearest one of the step
@@ -451,7 +451,7 @@ class System {
   /// As a step of h ends; none on the ground, where corners stay what they are.
   Earnings calc_earnings(const ContactGroup&, double h) const;
   /// Forces at the points found, on the bodies and in the ledger.
-  void resolve_contacts(double h, bool follows, int passed);
+  void resolve_contacts(double h, bool follows);
   /// Moves a body from its pose at the beginning of the step to the end of it.
   void drift(size_t body, double h, const Vec3& p0, const Quat& q0, const Mat3& R0);
   void build_clusters();
