@@ -189,6 +189,24 @@ void System::find_bounds() {
   });
 }
 
+namespace {
+
+/// Puts keys of two ranks below `n` in order: by the second, then, those alike kept in order, by the first.
+void sort_ranks(std::vector<std::uint64_t>& keys, size_t n, PairSearch& search) {
+  std::vector<std::uint64_t>& sorted = search.sorted;
+  std::vector<std::uint32_t>& next = search.next;
+  sorted.resize(keys.size());
+  for (const int shift : {0, 32}) {
+    next.assign(n + 1, 0);
+    for (const std::uint64_t key : keys) ++next[static_cast<std::uint32_t>(key >> shift) + 1];
+    for (size_t i = 1; i < n; ++i) next[i] += next[i - 1];
+    for (const std::uint64_t key : keys) sorted[next[static_cast<std::uint32_t>(key >> shift)]++] = key;
+    keys.swap(sorted);
+  }
+}
+
+}  // namespace
+
 void System::find_pairs() {
   State& s = state;
   PairSearch& search = contact.search;
@@ -285,8 +303,7 @@ void System::find_pairs() {
   for (const int u : search.unbounded)
     for (size_t i = 0; i < n; ++i)
       if (std::isfinite(bounds[i].low[0])) look(static_cast<size_t>(u), i);
-  std::sort(search.found.begin(), search.found.end());
-  std::sort(search.held.begin(), search.held.end());
+  for (std::vector<std::uint64_t>* keys : {&search.found, &search.held}) sort_ranks(*keys, n, search);
   s.held_pairs.clear();
   for (const std::uint64_t key : search.held) {
     const ShapeBounds &x = bounds[key >> 32], &y = bounds[key & 0xffffffffU];
