@@ -95,7 +95,7 @@ inline constexpr double kMostSteps = 1e9;
 struct Options {
   double duration = 1;  // [s]
   double step = 0;      // 0: step_safety times the limit of the stiffest mode; else at least duration / kMostSteps
-  double step_safety = 0.85;
+  double step_safety = 0.9;
   /// The engine's own step lets no free body turn by more than this at its present rate [rad], and there are at least
   /// so many in the duration; 0: it does not ask.
   double most_turn = 0;
