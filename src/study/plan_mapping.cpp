@@ -9,6 +9,7 @@
 #include <mutex>
 #include <numbers>
 
+#include "base/heap.h"
 #include "base/interpolate.h"
 #include "base/parallel.h"
 #include "base/unit.h"
@@ -126,6 +127,7 @@ void PlanMapping::check_firing(const product::Plan& plan, const Impl& impl) {
 }
 
 PlanMapping::PlanMapping(const product::Plan& plan, const collapse::Knowledge& k, PlanMappingOptions options) {
+  keep_freed_memory();  // a sample takes and gives back some 20 MB
   if (plan.fuzzy.inputs.empty())
     throw InputError("E201", plan.path + ": the plan has no fuzzy values", "add a table [fuzzy] (docs/plan.md)");
   if (options.after == 0) options.after = find_after(plan);
