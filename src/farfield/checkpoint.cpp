@@ -6,12 +6,13 @@
 
 #include "base/error.h"
 #include "base/file.h"
+#include "base/hash.h"
 
 namespace topple::farfield {
 
 namespace {
 
-constexpr char kMagic[] = "topple-fe-checkpoint-3";
+constexpr char kMagic[] = "topple-fe-checkpoint-4";
 
 class Writer {
  public:
@@ -138,16 +139,21 @@ void write_checkpoint(const std::string& path, const std::string& key, const Run
   out(s.foot_forces.size());
   for (const std::vector<double>& f : s.foot_forces) out(f);
   out(system);
-  replace_file(path, out.bytes);
+  replace_file(path, out.bytes + calc_sha256(out.bytes));
 }
 
 RunState read_checkpoint(const std::string& path, const std::string& key, std::vector<std::byte>& system) {
-  const std::string bytes = read_file(path);
+  std::string bytes = read_file(path);
   Reader in(bytes, path);
   std::string magic, found;
   if (bytes.size() < sizeof kMagic + sizeof(size_t)) in.fail("this is not a checkpoint");
   in(magic);
   if (magic != kMagic) in.fail("this is not a checkpoint of this version");
+  constexpr size_t kHash = 64;  // digits of calc_sha256 at the end
+  if (bytes.size() < kHash) in.fail("the checkpoint is cut off");
+  const std::string hash = bytes.substr(bytes.size() - kHash);
+  bytes.resize(bytes.size() - kHash);
+  if (calc_sha256(bytes) != hash) in.fail("the checkpoint is cut off or damaged");
   in(found);
   if (found != key) in.fail("the checkpoint is of another plan, mesh, step or version");
   RunState s;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/error.h"
 #include "base/hash.h"
 #include "base/unit.h"
 #include "farfield/checkpoint.h"
@@ -88,6 +89,11 @@ class Course {
       std::vector<std::byte> bytes;
       state_ = read_checkpoint(fe_.checkpoint, key_, bytes);
       system_.read_snapshot(bytes);
+      if (options_.duration + 0.5 * system_.step() < time())
+        throw InputError("E674",
+                         fmt::format("{}: the run has come to {:.4g} s, and is to end at {:.4g} s", fe_.checkpoint,
+                                     time(), options_.duration),
+                         "go on to a later time, or start without --resume");
       for (const auto& entry : state_.shown) {
         if (const mbs::View* v = std::get_if<mbs::View>(&entry)) options_.on_frame(*v);
         if (const mbs::Happening* h = std::get_if<mbs::Happening>(&entry)) options_.on_happening(*h);

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <numeric>
 
+#include "base/file.h"
 #include "farfield/checkpoint.h"
 #include "farfield/fragments.h"
 #include "farfield/motion.h"
@@ -440,6 +441,40 @@ TEST_F(FarfieldReplay, RefusesACheckpointOfSomethingElse) {
   EXPECT_NO_THROW(resume_with(rules(), kept));
   kept.checkpoint = folder + "missing.bin";
   EXPECT_THROW((void)run(with_duration(portal(), "20 ms"), kept), InputError);
+}
+
+TEST_F(FarfieldReplay, RefusesACheckpointThatIsDamagedOrLaterThanTheEnd) {
+  FeOptions kept = coarse();
+  kept.checkpoint = folder + "checkpoint.bin";
+  kept.checkpoint_interval = 1e-9;  // after every frame
+  (void)run(with_duration(portal(), "20 ms"), kept);
+  kept.resume = true;
+  const auto complaint = [&](double until) -> std::string {
+    collapse::RunOptions options;
+    options.duration = until;
+    try {
+      (void)run_plan(read(with_duration(portal(), "20 ms")), rules(), options, kept, {}, {});
+    } catch (const InputError& e) {
+      EXPECT_EQ(e.diagnostics()[0].code, "E674");
+      return e.diagnostics()[0].message;
+    }
+    return "";
+  };
+  EXPECT_THAT(complaint(5e-3), testing::HasSubstr("s, and is to end at 0.005 s"));
+  const std::string whole = read_file(kept.checkpoint);
+  const auto damage = [&](size_t place) {
+    std::string bytes = whole;
+    bytes[place] = static_cast<char>(bytes[place] ^ 1);
+    replace_file(kept.checkpoint, bytes);
+  };
+  for (const size_t place : {whole.size() / 3, whole.size() / 2, whole.size() - 1}) {
+    damage(place);
+    EXPECT_THAT(complaint(0), testing::HasSubstr("damaged")) << place;
+  }
+  replace_file(kept.checkpoint, whole.substr(0, whole.size() - 100));
+  EXPECT_THAT(complaint(0), testing::HasSubstr("cut off"));
+  replace_file(kept.checkpoint, whole);
+  EXPECT_EQ(complaint(0), "");
 }
 
 }  // namespace
