@@ -50,7 +50,7 @@ record::RccCurve to_curve(const nearfield::SolidMarch& march, const SolidTask& t
   c.end = {c.rotation.back(), c.moment.back()};
   const double largest = *std::max_element(c.moment.begin(), c.moment.end());
   constexpr double falls = 0.97;  // of the largest moment: from there on it counts as a peak
-  if (!march.complete && c.moment.back() > falls * largest) {
+  if (c.moment.back() > falls * largest) {
     c.ending += fmt::format("; largest moment up to there {:.4g} kNm", largest / unit::kNm);
     return c;
   }
@@ -59,8 +59,9 @@ record::RccCurve to_curve(const nearfield::SolidMarch& march, const SolidTask& t
   c.yield = to_record(p.yield), c.peak = to_record(p.peak);
   // behind a march that stopped early nothing is known
   const bool fell = c.moment.back() <= 0.8 * p.peak.moment;
-  if (march.complete || fell) c.ultimate = to_record(p.ultimate);
-  if (march.complete || p.residual.rotation >= 2 * p.ultimate.rotation) c.residual = to_record(p.residual);
+  if (fell) c.ultimate = to_record(p.ultimate);
+  if (fell && (c.moment.back() <= 0 || p.residual.rotation >= 2 * p.ultimate.rotation))
+    c.residual = to_record(p.residual);
   if (yield.rotation > 0) c.stiffness_effective = yield.moment / yield.rotation * length;
   return c;
 }

@@ -108,14 +108,29 @@ MomentCurve make_moment_curve(const Fibres& fibres, Axis axis, double N, int dir
     const double after = calc_tearing(fibres, out.eps_0[j], out.kappa[j]);
     if (after <= 1) continue;
     const double s = after > before ? std::clamp((1 - before) / (after - before), 0.0, 1.0) : 0;
-    out.first_torn = out.rotation[j - 1] + s * (out.rotation[j] - out.rotation[j - 1]);
+    out.first_torn = {out.rotation[j - 1] + s * (out.rotation[j] - out.rotation[j - 1]), 0};
+    // the last equilibrium with all bars
+    double low = out.rotation[j - 1], high = out.rotation[j], eps_0 = out.eps_0[j - 1];
+    out.first_torn.moment = out.moment[j - 1];
+    const double origin = out.kappa[j - 1] - side * low / length;
+    while (high - low > 1e-4 * high) {
+      const double middle = 0.5 * (low + high), k = origin + side * middle / length;
+      BarStates bars = out.bars[j - 1];
+      double e = eps_0;
+      if (!find_equilibrium(fibres, N, k, e, bars) || calc_tearing(fibres, e, k) > 1) {
+        high = middle;
+        continue;
+      }
+      low = middle, eps_0 = e;
+      out.first_torn = {low, std::max(0.0, side * calc_resultants(fibres, e, k, bars).M)};
+    }
     break;
   }
   return out;
 }
 
 CurvePoints find_points(const std::vector<double>& rotation, const std::vector<double>& moment, CurvePoint yield,
-                        double first_torn) {
+                        CurvePoint first_torn) {
   CurvePoints out;
   if (rotation.empty()) return out;
   const size_t top = static_cast<size_t>(std::max_element(moment.begin(), moment.end()) - moment.begin());
@@ -130,16 +145,26 @@ CurvePoints find_points(const std::vector<double>& rotation, const std::vector<d
     const double s = (phi - rotation[j - 1]) / (rotation[j] - rotation[j - 1]);
     return moment[j - 1] + s * (moment[j] - moment[j - 1]);
   };
-  double end = rotation.back();
+  double end = rotation.back(), left = moment.back();
+  const double level = 0.8 * moment[top];
   for (size_t j = top + 1; j < rotation.size(); ++j) {
-    const double level = 0.8 * moment[top];
-    if (moment[j] > level) continue;
-    const double s = (moment[j - 1] - level) / (moment[j - 1] - moment[j]);
-    end = rotation[j - 1] + s * (rotation[j] - rotation[j - 1]);
-    break;
+    const CurvePoint before{rotation[j - 1], moment[j - 1]};
+    CurvePoint after{rotation[j], moment[j]};
+    // where a bar tears the moment drops at once: what the section bears until then is not on the line between
+    const bool tears = first_torn.rotation >= before.rotation && first_torn.rotation <= after.rotation;
+    if (tears) after = first_torn;
+    if (after.moment <= level && after.moment < before.moment) {
+      end = before.rotation +
+            (before.moment - level) / (before.moment - after.moment) * (after.rotation - before.rotation);
+      left = level;
+      break;
+    }
+    if (tears) {
+      end = first_torn.rotation, left = first_torn.moment;
+      break;
+    }
   }
-  if (first_torn < end && first_torn >= rotation[top]) end = first_torn;
-  out.ultimate = {end, at(end)};
+  out.ultimate = {end, left};
   const double last = std::min(rotation.back(), 2 * end);
   out.residual = {last, at(last)};
   return out;

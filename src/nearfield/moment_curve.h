@@ -13,6 +13,10 @@ namespace topple::nearfield {
 /// Rotations of a family with every interval cut in `parts`, so that curves are smooth and hold the family's points.
 std::vector<double> refine_rotations(const MomentFamily&, int parts);
 
+struct CurvePoint {
+  double rotation = std::numeric_limits<double>::quiet_NaN(), moment = std::numeric_limits<double>::quiet_NaN();
+};
+
 /// One curve, from the state without moment (see March) to the last rotation at which the section carries N and
 /// resists. J points.
 struct MomentCurve {
@@ -27,17 +31,13 @@ struct MomentCurve {
   bool is_balanced = true;                      // N can be carried without a moment
   bool loses_force = false;                     // beyond `carried_to` N cannot be carried
   double carried_to = 0;  // last rotation at which N is carried; beyond the last point if no moment was left [rad]
-  double first_torn = std::numeric_limits<double>::infinity();  // rotation at which the first bar tears [rad]
+  CurvePoint first_torn{std::numeric_limits<double>::infinity(), 0};  // last equilibrium before the first bar tears
 };
 
 /// The march of make_rcc with the rotations given, its loss of N sought to 1e-3 of the rotation.
 ///   direction  of the member's rotation: +1 or -1; about z a positive one pulls at -y
 MomentCurve make_moment_curve(const Fibres&, Axis, double N, int direction, double length,
                               const std::vector<double>& rotation);
-
-struct CurvePoint {
-  double rotation = std::numeric_limits<double>::quiet_NaN(), moment = std::numeric_limits<double>::quiet_NaN();
-};
 
 /// What an engineer reads off a curve. NaN where a curve has no such point.
 struct CurvePoints {
@@ -47,7 +47,7 @@ struct CurvePoints {
   CurvePoint residual;  // what is left where the curve ends or, earlier, at twice the ultimate rotation
 };
 CurvePoints find_points(const std::vector<double>& rotation, const std::vector<double>& moment, CurvePoint yield,
-                        double first_torn = std::numeric_limits<double>::infinity());
+                        CurvePoint first_torn = {std::numeric_limits<double>::infinity(), 0});
 CurvePoints find_points(const MomentCurve&);
 
 /// Resistance over normal force in one direction: first yield and largest moment. K forces, both ends without moment.

@@ -103,9 +103,16 @@ TEST(MomentCurve, PointsAreThoseOfAPolygon) {
   EXPECT_DOUBLE_EQ(p.ultimate.moment, 8);
   EXPECT_DOUBLE_EQ(p.residual.rotation, 7) << "twice the ultimate rotation";
   EXPECT_DOUBLE_EQ(p.residual.moment, 4);
-  const CurvePoints torn = find_points(rotation, moment, {1, 8}, 2.5);
+  const CurvePoints torn = find_points(rotation, moment, {1, 8}, {2.5, 9.5});
   EXPECT_DOUBLE_EQ(torn.ultimate.rotation, 2.5) << "a bar tears before";
   EXPECT_DOUBLE_EQ(torn.ultimate.moment, 9.5);
+  // the line from 3 to 4 passes 0.8 of the peak at 3.5, but the moment drops at once when the bar tears
+  const CurvePoints dropped = find_points(rotation, moment, {1, 8}, {3.8, 8.5});
+  EXPECT_DOUBLE_EQ(dropped.ultimate.rotation, 3.8);
+  EXPECT_DOUBLE_EQ(dropped.ultimate.moment, 8.5);
+  const CurvePoints crushed = find_points(rotation, moment, {1, 8}, {3.8, 7});
+  EXPECT_DOUBLE_EQ(crushed.ultimate.rotation, 3.4) << "fallen to 0.8 before it tears";
+  EXPECT_DOUBLE_EQ(crushed.ultimate.moment, 8);
   const CurvePoints rising = find_points({0, 1, 2}, {0, 1, 2}, {1, 1});
   EXPECT_EQ(rising.ultimate.rotation, 2) << "the curve ends";
   EXPECT_TRUE(std::isnan(find_points({}, {}, {}).peak.moment));
