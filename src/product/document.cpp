@@ -4,6 +4,8 @@
 #include <cmath>
 #include <string_view>
 
+#include "base/utf8.h"
+
 namespace {
 /// A demand inside the parser that does not hold: hostile text reaches some of them.
 struct ParserDoubt {};
@@ -56,28 +58,12 @@ constexpr int deepest_key = 16;
 /// The first byte of a character.
 bool is_lead(char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; }
 
-/// Length of the well-formed UTF-8 sequence at the front of `text`, 0 if there is none.
-size_t sequence_length(std::string_view text) {
-  const auto byte = [&](size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u; };
-  const auto follows = [&](size_t i, unsigned low, unsigned high) { return byte(i) >= low && byte(i) <= high; };
-  const unsigned lead = byte(0);
-  if (lead < 0x80) return 1;
-  if (lead >= 0xC2 && lead <= 0xDF) return follows(1, 0x80, 0xBF) ? 2 : 0;
-  if (lead >= 0xE0 && lead <= 0xEF) {
-    const unsigned low = lead == 0xE0 ? 0xA0 : 0x80, high = lead == 0xED ? 0x9F : 0xBF;
-    return follows(1, low, high) && follows(2, 0x80, 0xBF) ? 3 : 0;
-  }
-  if (lead >= 0xF0 && lead <= 0xF4) {
-    const unsigned low = lead == 0xF0 ? 0x90 : 0x80, high = lead == 0xF4 ? 0x8F : 0xBF;
-    return follows(1, low, high) && follows(2, 0x80, 0xBF) && follows(3, 0x80, 0xBF) ? 4 : 0;
-  }
-  return 0;
-}
-
 void check_encoding(const std::string& text, const std::string& file) {
   Place place;
+  if (text.starts_with("\x89HDF"))
+    fail(file, "E103", place, "this is a record, not a plan", "give the plan.toml it was made of");
   for (size_t i = 0; i < text.size();) {
-    const size_t length = sequence_length(std::string_view(text).substr(i, 4));
+    const size_t length = utf8_length(std::string_view(text).substr(i, 4));
     if (length == 0) fail(file, "E103", place, "the text is not UTF-8 here", "save the plan as UTF-8 text");
     if (text[i] == '\0') fail(file, "E103", place, "a zero byte: this is not a text file", "a plan is a TOML text");
     if (text[i] == '\n') {

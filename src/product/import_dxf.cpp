@@ -6,8 +6,10 @@
 #include <map>
 #include <regex>
 #include <sstream>
+#include <string_view>
 
 #include "base/error.h"
+#include "base/utf8.h"
 #include "product/import.h"
 
 namespace topple::product {
@@ -18,7 +20,22 @@ namespace {
 struct Pair {
   int code = 0;
   std::string value;
+  int line = 1;  // of the value
 };
+
+[[noreturn]] void fail(const std::string& name, int line, const std::string& why, const std::string& help) {
+  throw InputError(std::vector<Diagnostic>{{Severity::Error, "E113", {name, line, line > 0 ? 1 : 0}, 1, why, help}});
+}
+
+/// A length in the drawing's unit. Throws InputError E113.
+double read_length(const Pair& p, const std::string& name) {
+  char* end = nullptr;
+  const double x = std::strtod(p.value.c_str(), &end);
+  if (p.value.empty() || *end != '\0' || !(std::abs(x) < 1e12))
+    fail(name, p.line, "a coordinate is wanted, there is \"" + p.value.substr(0, 20) + "\"",
+         "numbers below 1e12 in size");
+  return x;
+}
 
 std::vector<Pair> read_pairs(const std::string& text, const std::string& name) {
   std::vector<Pair> out;
@@ -34,14 +51,9 @@ std::vector<Pair> read_pairs(const std::string& text, const std::string& name) {
     const std::string word = trimmed(code);
     const long number = std::strtol(word.c_str(), &end, 10);
     if (word.empty() || *end != '\0')
-      throw InputError(
-          std::vector<Diagnostic>{{Severity::Error,
-                                   "E113",
-                                   {name, line, 1},
-                                   1,
-                                   "is no DXF text: a group code is wanted, there is \"" + word.substr(0, 20) + "\"",
-                                   "save the drawing as DXF in ASCII"}});
-    out.push_back({static_cast<int>(number), trimmed(value)});
+      fail(name, line, "is no DXF text: a group code is wanted, there is \"" + word.substr(0, 20) + "\"",
+           "save the drawing as DXF in ASCII");
+    out.push_back({static_cast<int>(number), trimmed(value), line + 1});
   }
   return out;
 }
@@ -61,6 +73,10 @@ double unit_of(int code) {
       return 1;
     case 7:
       return 1e3;
+    case 10:
+      return 0.9144;
+    case 14:
+      return 0.1;
     default:
       return 0;
   }
@@ -68,18 +84,27 @@ double unit_of(int code) {
 
 struct Outline {
   std::string layer;
-  bool is_closed = false, has_arcs = false;
+  bool is_closed = false, has_arcs = false, is_from_below = false;
   std::vector<std::array<double, 2>> corners;
 };
 
-std::vector<Outline> find_outlines(const std::vector<Pair>& pairs) {
+/// `others` counts the entities that are no polylines, by kind.
+std::vector<Outline> find_outlines(const std::vector<Pair>& pairs, const std::string& name,
+                                   std::map<std::string, int>& others) {
   std::vector<Outline> out;
   std::string section;
   bool in_polyline = false, in_vertex = false;
   Outline now;
   std::string entity;
   const auto finish = [&] {
-    if (entity == "LWPOLYLINE" || entity == "POLYLINE") out.push_back(now);
+    if (entity == "LWPOLYLINE" || entity == "POLYLINE") {
+      // drawn on a plane that is seen from below: its x axis is the other way round
+      if (now.is_from_below)
+        for (auto& corner : now.corners) corner[0] = -corner[0];
+      out.push_back(now);
+    } else if (!entity.empty() && entity != "ENDSEC" && entity != "EOF") {
+      ++others[entity];
+    }
     now = {};
     entity.clear();
   };
@@ -106,13 +131,13 @@ std::vector<Outline> find_outlines(const std::vector<Pair>& pairs) {
       continue;
     }
     if (entity.empty()) continue;
-    const double x = std::atof(p.value.c_str());
     const bool has_corner = entity == "LWPOLYLINE" || in_vertex;
     if (p.code == 8 && !in_vertex) now.layer = p.value;
     if (p.code == 70 && !in_vertex) now.is_closed = (std::atoi(p.value.c_str()) & 1) != 0;
-    if (p.code == 10 && has_corner) now.corners.push_back({x, 0});
-    if (p.code == 20 && has_corner && !now.corners.empty()) now.corners.back()[1] = x;
-    if (p.code == 42 && has_corner && x != 0) now.has_arcs = true;
+    if (p.code == 10 && has_corner) now.corners.push_back({read_length(p, name), 0});
+    if (p.code == 20 && has_corner && !now.corners.empty()) now.corners.back()[1] = read_length(p, name);
+    if (p.code == 42 && has_corner && read_length(p, name) != 0) now.has_arcs = true;
+    if (p.code == 230 && !in_vertex) now.is_from_below = read_length(p, name) < 0;
   }
   return out;
 }
@@ -120,8 +145,11 @@ std::vector<Outline> find_outlines(const std::vector<Pair>& pairs) {
 }  // namespace
 
 Import make_site_text(const std::string& dxf, const std::string& file_name, double unit) {
-  const std::vector<Pair> pairs = read_pairs(dxf, file_name);
   Import out;
+  const bool is_latin = !is_utf8(dxf);
+  if (is_latin)
+    out.report.guessed.push_back("names are not UTF-8; they were read as those of Western Europe (ISO 8859-1)");
+  const std::vector<Pair> pairs = read_pairs(is_latin ? latin1_to_utf8(dxf) : dxf, file_name);
   if (unit <= 0) {
     for (size_t i = 0; i + 1 < pairs.size(); ++i)
       if (pairs[i].code == 9 && pairs[i].value == "$INSUNITS") unit = unit_of(std::atoi(pairs[i + 1].value.c_str()));
@@ -136,8 +164,9 @@ Import make_site_text(const std::string& dxf, const std::string& file_name, doub
       "utilit|gas|water|wasser|power|strom|kabel|cable|sewer|kanal|pipe|leitung|fernw|telek", std::regex::icase);
   std::map<std::string, int> count;
   std::string neighbours, utilities;
+  std::map<std::string, int> others;
   int open = 0, arcs = 0, small = 0, taken = 0;
-  for (Outline& o : find_outlines(pairs)) {
+  for (Outline& o : find_outlines(pairs, file_name, others)) {
     if (o.corners.size() > 1 &&
         std::hypot(o.corners.front()[0] - o.corners.back()[0], o.corners.front()[1] - o.corners.back()[1]) * unit <
             1e-3) {
@@ -166,18 +195,17 @@ Import make_site_text(const std::string& dxf, const std::string& file_name, doub
     to += "]\nclearance = \"?\"\n";
     ++taken;
   }
-  if (taken == 0)
-    throw InputError(std::vector<Diagnostic>{{Severity::Error,
-                                              "E113",
-                                              {file_name, 0, 0},
-                                              1,
-                                              "has no closed outlines",
-                                              "neighbours are closed LWPOLYLINE or POLYLINE entities"}});
+  if (taken == 0) fail(file_name, 0, "has no closed outlines", "neighbours are closed LWPOLYLINE or POLYLINE entities");
   out.report.taken.push_back(fmt::format("{} closed outlines", taken));
   if (!utilities.empty()) out.report.guessed.push_back("outlines on layers named like pipes and cables are utilities");
   if (open > 0) out.report.missing.push_back(fmt::format("{} open polylines are left out", open));
   if (small > 0)
     out.report.missing.push_back(fmt::format("{} outlines of fewer than three corners are left out", small));
+  if (!others.empty()) {
+    std::string list;
+    for (const auto& [kind, number] : others) list += fmt::format("{}{} {}", list.empty() ? "" : ", ", number, kind);
+    out.report.missing.push_back("entities that are no polylines, blocks among them, are left out: " + list);
+  }
   if (arcs > 0) out.report.guessed.push_back(fmt::format("arcs of {} outlines became straight lines", arcs));
   out.report.guessed.push_back("x and y of the drawing are those of the plan: its origin is row A, frame 1");
   out.report.missing.push_back("the clearance that each of them asks for");

@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "base/error.h"
+#include "base/utf8.h"
 
 namespace topple::product {
 
@@ -13,26 +14,9 @@ namespace {
 
 constexpr int deepest = 64;
 
-void append_utf8(std::string& out, std::uint32_t c) {
-  if (c < 0x80) {
-    out += static_cast<char>(c);
-  } else if (c < 0x800) {
-    out += static_cast<char>(0xC0 | c >> 6);
-    out += static_cast<char>(0x80 | (c & 0x3F));
-  } else if (c < 0x10000) {
-    out += static_cast<char>(0xE0 | c >> 12);
-    out += static_cast<char>(0x80 | (c >> 6 & 0x3F));
-    out += static_cast<char>(0x80 | (c & 0x3F));
-  } else {
-    out += static_cast<char>(0xF0 | c >> 18);
-    out += static_cast<char>(0x80 | (c >> 12 & 0x3F));
-    out += static_cast<char>(0x80 | (c >> 6 & 0x3F));
-    out += static_cast<char>(0x80 | (c & 0x3F));
-  }
-}
-
-/// \X2\00E4\X0\, \X4\...\X0\, \X\E4, \S\d
-std::string decode(const std::string& raw) {
+/// \X2\00E4\X0\, \X4\...\X0\, \X\E4, \S\d. Old files hold bytes of ISO 8859-1.
+std::string decode(std::string raw) {
+  if (!is_utf8(raw)) raw = latin1_to_utf8(raw);
   std::string out;
   const auto hex = [&raw](size_t at, size_t digits) {
     return static_cast<std::uint32_t>(std::strtoul(raw.substr(at, digits).c_str(), nullptr, 16));
@@ -40,7 +24,15 @@ std::string decode(const std::string& raw) {
   for (size_t i = 0; i < raw.size();) {
     const size_t width = raw.compare(i, 4, "\\X2\\") == 0 ? 4 : raw.compare(i, 4, "\\X4\\") == 0 ? 8 : 0;
     if (width > 0) {
-      for (i += 4; i + width <= raw.size() && raw[i] != '\\'; i += width) append_utf8(out, hex(i, width));
+      for (i += 4; i + width <= raw.size() && raw[i] != '\\'; i += width) {
+        std::uint32_t c = hex(i, width);
+        // two halves of UTF-16 are one character
+        if (width == 4 && (c & 0xFC00) == 0xD800 && i + 8 <= raw.size() && (hex(i + 4, 4) & 0xFC00) == 0xDC00) {
+          c = 0x10000 + ((c & 0x3FF) << 10 | (hex(i + 4, 4) & 0x3FF));
+          i += 4;
+        }
+        append_utf8(out, c);
+      }
       i = std::min(raw.size(), raw.compare(i, 4, "\\X0\\") == 0 ? i + 4 : i + 1);
     } else if (raw.compare(i, 3, "\\X\\") == 0 && i + 5 <= raw.size()) {
       append_utf8(out, hex(i + 3, 2));

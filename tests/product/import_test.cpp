@@ -259,6 +259,32 @@ TEST(ImportDxf, TakesClosedOutlinesInTheUnitOfTheHeader) {
   EXPECT_THAT(make_site_text(dxf("", polyline("H", 1)), "s.dxf", 0).report.guessed, Contains(HasSubstr("are metres")));
   EXPECT_THROW(make_site_text(dxf("", ""), "s.dxf", 0), InputError);
   EXPECT_THROW(make_site_text("AutoCAD Binary DXF\n\x1a\n", "s.dxf", 0), InputError);
+  EXPECT_THAT(made.report.missing, Contains(HasSubstr("left out: 1 LINE")));
+}
+
+TEST(ImportDxf, RefusesCoordinatesThatAreNone) {
+  for (const char* wrong : {"abc", "1.0x", "nan", "1e300", ""}) {
+    std::string text = dxf("", polyline("H", 1));
+    text.replace(text.find("30000.0"), 7, wrong);
+    try {
+      (void)make_site_text(text, "s.dxf", 0);
+      FAIL() << wrong;
+    } catch (const InputError& e) {
+      EXPECT_EQ(e.diagnostics().front().code, "E113");
+      EXPECT_EQ(e.diagnostics().front().where.line, 24) << wrong;
+    }
+  }
+}
+
+TEST(ImportDxf, ReadsNamesOfOldDrawingsAndPlanesSeenFromBelow) {
+  const Import latin = make_site_text(dxf("", polyline("Geb\xE4ude", 1)), "s.dxf", 0);
+  EXPECT_THAT(latin.text, HasSubstr("name = \"Gebäude 1\""));
+  EXPECT_THAT(latin.report.guessed, Contains(HasSubstr("ISO 8859-1")));
+  EXPECT_THAT(make_site_text(dxf("", polyline("Gebäude", 1)), "s.dxf", 0).text, HasSubstr("name = \"Gebäude 1\""));
+  std::string below = polyline("H", 1);
+  below.insert(below.find("10\n20000.0"), "210\n0\n220\n0\n230\n-1\n");
+  EXPECT_THAT(make_site_text(dxf("", below), "s.dxf", 1e-3).text,
+              HasSubstr("footprint = [[\"-20.000 m\", \"0.000 m\"], [\"-30.000 m\", \"0.000 m\"]"));
 }
 
 }  // namespace
