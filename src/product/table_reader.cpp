@@ -1,5 +1,6 @@
 #include "product/table_reader.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -108,7 +109,7 @@ namespace {
 
 /// The usual example, or where that is not allowed one with a single digit from within what is.
 std::string example_of(Dimension dimension, const Range& range) {
-  const std::string usual = example_of(dimension);
+  std::string usual = example_of(dimension);
   const auto value =
       dimension == Dimension::Number ? 0.5 : parse_quantity(usual.substr(1, usual.size() - 2), dimension).value;
   if (value && is_within(*value, range)) return usual;
@@ -243,6 +244,11 @@ std::string TableReader::text(const std::string& key, std::string fallback) {
   if (node->text.empty() || node->text.size() > longest_text) {
     error("E205", node->place, key + (node->text.empty() ? ": is empty" : ": is too long"),
           "allowed: 1 to " + std::to_string(longest_text) + " characters");
+    return {};
+  }
+  const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; };
+  if (std::any_of(node->text.begin(), node->text.end(), is_control)) {
+    error("E205", node->place, key + ": holds a control character, such as a line break", "one line of text");
     return {};
   }
   return node->text;
