@@ -93,6 +93,13 @@ int refuse(const InputError& e, const std::vector<Diagnostic>& warnings, const s
   return kBadInput;
 }
 
+void check_own_input(const std::string& output, const std::string& input) {
+  std::error_code none;
+  if (fs::equivalent(output, input, none))
+    throw InputError("E801", fmt::format("{} is what is read, and would be written over", output),
+                     "give another name to -o");
+}
+
 double read_quantity(const std::string& text, Dimension dimension, const char* option) {
   if (text.empty()) return 0;
   Quantity q = parse_quantity(text, dimension);
@@ -106,9 +113,9 @@ double read_quantity(const std::string& text, Dimension dimension, const char* o
   return *q.value;
 }
 
-collapse::RunOptions make_options(const Arguments& a) {
+collapse::RunOptions make_options(const Arguments& a, const char* duration) {
   collapse::RunOptions o;
-  o.duration = read_quantity(a.duration, Dimension::Time, "--duration");
+  o.duration = read_quantity(a.duration, Dimension::Time, duration);
   o.step = read_quantity(a.step, Dimension::Time, "--step");
   o.step_share = a.step_share;
   o.frame_rate = read_quantity(a.frame_rate, Dimension::Frequency, "--frame-rate");
@@ -379,6 +386,9 @@ std::string read_study(std::string path) {
 
 int write_report_file(const Arguments& a) {
   try {
+    check_own_input(a.output, a.input);
+    for (const std::string& path : a.other_records) check_own_input(a.output, path);
+    if (!a.study_results.empty()) check_own_input(a.output, a.study_results);
     const record::Record r = record::read_hdf5(a.input);
     record::ReportExtras extras;
     if (!a.study_results.empty()) extras.study = read_study(a.study_results);

@@ -19,11 +19,18 @@ namespace {
 int export_adams(const Arguments& a) {
   const std::string text = read_file(a.input);
   try {
+    if (text.starts_with("\x89HDF"))
+      throw InputError("E611", a.input + " is a record",
+                       "--adams wants the model.json that topple run writes beside it");
     mbs::RunSettings settings;
     const mbs::Model model = mbs::model_from_json(text, a.input, &settings);
     const engines::AdamsFiles files =
         engines::to_adams(model, settings, std::filesystem::path(a.output).stem().string());
     const std::string commands = std::filesystem::path(a.output).replace_extension(".acf").string();
+    if (commands == a.output)
+      throw InputError("E801", a.output + ": commands go into the .acf beside the dataset",
+                       "give -o a name that ends in .adm");
+    for (const std::string& path : {a.output, commands}) check_own_input(path, a.input);
     replace_file(a.output, files.dataset);
     replace_file(commands, files.commands);
     std::printf("Wrote %s\nWrote %s\n", a.output.c_str(), commands.c_str());
@@ -37,6 +44,7 @@ int export_lsdyna(const Arguments& a) {
   std::vector<Diagnostic> warnings;
   std::string text;
   try {
+    check_own_input(a.output, a.input);
     farfield::GridOptions grid;
     grid.size = read_quantity(a.fe.size, Dimension::Length, "--size");
     grid.least_across = a.fe.across;

@@ -30,7 +30,10 @@ int print_diagnostics(const std::vector<Diagnostic>&, const std::string& text);
 collapse::Knowledge load_knowledge(const Arguments&);
 
 /// Throws InputError for quantities that cannot be read.
-collapse::RunOptions make_options(const Arguments&);
+collapse::RunOptions make_options(const Arguments&, const char* duration = "--duration");
+
+/// Refuses to write over what is read. Throws InputError E801.
+void check_own_input(const std::string& output, const std::string& input);
 
 /// A quantity from the command line, greater than 0; a bare number counts in SI, an empty text is 0. Throws InputError
 /// (E801) that names the option.

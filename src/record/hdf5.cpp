@@ -700,6 +700,8 @@ void write_hdf5(const Record& record, const std::string& path) {
 
 Record read_hdf5(const std::string& path) {
   std::string bytes = read_file(path);
+  if (!bytes.starts_with("\x89HDF\r\n\x1a\n"))
+    throw InputError("E702", path + " is not a topple record", "give the record.h5 that `topple run` wrote");
   Record r;
   Flat flat;
   try {

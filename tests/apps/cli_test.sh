@@ -166,6 +166,7 @@ fe)
   expect 2 "$topple" fe "$plan"; has err "--output is required"
   expect 2 "$topple" fe "$plan" --size "4 apples" -o none; has err "--size"
   expect 2 "$topple" fe "$plan" --resume -o none2; has err "checkpoint.bin"
+  expect 2 "$topple" fe "$plan" --until "0 s" -o none2; has err "--until"
   expect 2 "$topple" fe missing.toml -o none; [ ! -e none ] || { echo "a folder for nothing"; failures=$((failures + 1)); }
   # an interrupt leaves a record and a checkpoint from which it goes on
   "$topple" fe "$plan" --size "20 cm" --checkpoint -o cut >out 2>err &
@@ -176,6 +177,7 @@ fe)
   expect 2 "$topple" fe "$plan" --size "30 cm" --resume -o cut; has err "another plan, mesh, step or version"
   # the keyword file
   expect 0 "$topple" export "$plan" --lsdyna --size "40 cm" -o model.k; has out "Wrote model.k"
+  cp "$plan" own.toml; expect 2 "$topple" export own.toml --lsdyna -o own.toml; has err "written over"; cmp "$plan" own.toml || failures=$((failures + 1))
   has model.k "*ELEMENT_SOLID"; has model.k "*MAT_PLASTICITY_COMPRESSION_TENSION"; has model.k "*END"
   ;;
 records)
@@ -188,6 +190,8 @@ records)
   expect 2 "$topple" compare r/record.h5 r/record.h5 -o none --photos photos.csv; has err "photos.csv:1:1: error E681"
   expect 2 "$topple" compare r/record.h5 missing.h5 -o none; expect 2 "$topple" compare r/record.h5 -o none
   [ ! -e none ] || { echo "a folder was made for wrong records"; failures=$((failures + 1)); }
+  cp r/record.h5 own.h5; expect 2 "$topple" report own.h5 -o own.h5; has err "written over"
+  expect 2 "$topple" report r/record.h5 --compare own.h5 -o own.h5; cmp r/record.h5 own.h5 || failures=$((failures + 1))
   # a study and another computation in the report
   mkdir s
   echo '{"title":"T","runs":2,"failed":0,"verdict":[{"id":"verdict","status":"good","text":"It is sure."}],"inputs":[],
@@ -219,8 +223,12 @@ export)
   expect 2 "$topple" export r/record.h5 -o t; has err "say what for"
   expect 2 "$topple" export r/record.h5 --csv --adams -o t
   expect 2 "$topple" export r/record.h5 --csv --frame-rate "5 m" -o t; has err "--frame-rate"
-  expect 2 "$topple" export r/model.json --csv -o t; has err "E702"
-  expect 2 "$topple" export r/record.h5 --adams -o t/x.adm
+  expect 2 "$topple" export r/model.json --csv -o t; has err "E702"; has err "is not a topple record"
+  expect 2 "$topple" export r/record.h5 --adams -o t/x.adm; has err "model.json that topple run writes"
+  expect 2 "$topple" export r/record.h5 --lsdyna -o t/x.k; has err "a record, not a plan"
+  cp r/model.json own.json; expect 2 "$topple" export own.json --adams -o own.json; has err "written over"
+  expect 2 "$topple" export own.json --adams -o own.acf; has err "ends in .adm"
+  cmp r/model.json own.json || failures=$((failures + 1))
   expect 2 "$topple" export nowhere.h5 --csv -o t; has err "nowhere.h5"
   ;;
 check)
