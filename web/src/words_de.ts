@@ -337,6 +337,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["{n}: {} is out of range", "{}: {} liegt außerhalb des erlaubten Bereichs"],
   ["{n}: is empty", "{}: ist leer"],
   ["{n}: is too long", "{}: ist zu lang"],
+  ["{n}: holds a control character, such as a line break", "{}: enthält ein Steuerzeichen, etwa einen Zeilenumbruch"],
   ["{n}: is an empty list", "{}: ist eine leere Liste"],
   ["{n}: holds an empty string", "{}: enthält einen leeren Text"],
   ["{n}: holds a very long string", "{}: enthält einen sehr langen Text"],
