@@ -20,6 +20,7 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr int kLeastStaves = 16;
 constexpr int kPieces = 12;                    // a shaft without a given spacing has about so many
 constexpr double kFixedStump = 1.5;            // a mouth lower than so many diameters stands on a rigid stump
+constexpr double kLeastRing = 0.3;             // between mouths, cuts and the ends of the shaft [m]
 constexpr double kLeastStiffnessShare = 1e-3;  // of a fired sector, so that its forces die out smoothly
 constexpr double kCrushing = 0.25;             // of the thickness: shortening after which the pieces meet as a contact
 constexpr double kClosing = 0.8;               // share of a mouth's height whose closing ends what still connects it
@@ -121,7 +122,7 @@ void Builder::make_shaft(int index) {
   // levels: the foot or a mouth above a rigid stump, other mouths and cuts, and between them as far apart as wanted
   const std::vector<Level> levels = find_levels(plan, index);
   for (size_t i = 1; i < levels.size(); ++i)
-    if (levels[i].low() < levels[i - 1].high() + 0.3) {
+    if (levels[i].low() < levels[i - 1].high() + kLeastRing) {
       complain(index,
                fmt::format("the mouths or cuts at {:.2f} m and {:.2f} m are too near to each other", levels[i - 1].at,
                            levels[i].at),
@@ -133,7 +134,7 @@ void Builder::make_shaft(int index) {
   std::vector<double> fixed;
   if (!has_stump) fixed.push_back(0);
   for (const Level& l : levels) {
-    if (l.high() > H - 0.3 || (!has_stump && l.low() < 0.1)) {
+    if (l.high() > H - kLeastRing || (!has_stump && l.low() < 0.1)) {
       complain(index, fmt::format("a cut at {:.2f} m leaves nothing of the shaft on one side", l.at));
       return;
     }
@@ -141,11 +142,20 @@ void Builder::make_shaft(int index) {
   }
   fixed.push_back(H);
   const double spacing = s.joint_spacing > 0 ? s.joint_spacing : std::max(H / kPieces, 0.8 * s.diameter_foot);
+  // a piece within a mouth would be left without mass, and its zones without what the charge does to the ring
+  const double margin = std::max(kLeastRing, 0.25 * spacing);
+  const auto is_free = [&](double height) {
+    return std::none_of(levels.begin(), levels.end(), [&](const Level& l) {
+      return l.is_mouth && height > l.low() - margin && height < l.high() + margin;
+    });
+  };
   std::vector<double> at;
   for (size_t i = 0; i + 1 < fixed.size(); ++i) {
     const double length = fixed[i + 1] - fixed[i];
     const int n = std::max(1, static_cast<int>(std::lround(length / spacing)));
-    for (int j = 0; j < n; ++j) at.push_back(fixed[i] + length * j / n);
+    at.push_back(fixed[i]);
+    for (int j = 1; j < n; ++j)
+      if (const double height = fixed[i] + length * j / n; is_free(height)) at.push_back(height);
   }
 
   // staves between the edges of sectors, the same at every height

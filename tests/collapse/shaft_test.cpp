@@ -318,6 +318,32 @@ TEST(Shaft, AChargeTakesItsShareOfTheRingWhereverItsMiddleLies) {
       EXPECT_NEAR(share(sector(azimuth, std::to_string(opening))), opening / 360, 1e-9) << azimuth << " " << opening;
 }
 
+TEST(Shaft, NoPieceLiesWithinAMouth) {
+  const std::string all_around =
+      "[[stage]]\ntime = \"0.2 s\"\n[[stage.charge]]\nmembers = \"tower\"\nposition = \"15 m\"\n"
+      "destroyed_length = \"10 m\"\n";
+  for (const char* spacing : {"1 m", "2 m", "3 m", "4 m", "15 m"}) {
+    SCOPED_TRACE(spacing);
+    const Built b(tower(slender + "joint_spacing = \"" + spacing + "\"\n", all_around, "1 s"));
+    const double per_metre = b.mass() / 40;
+    double removed = 0;
+    for (const mbs::Event& e : b.model.events)
+      for (const mbs::Action& act : e.actions) {
+        if (act.kind != mbs::Action::Kind::ReplaceBody) continue;
+        EXPECT_GT(act.replacement.mass, 0.2999 * per_metre);
+        removed += b.model.bodies[static_cast<size_t>(act.body.index)].mass - act.replacement.mass;
+      }
+    EXPECT_NEAR(removed, 10 * per_metre, 1e-6 * removed);
+    int in_mouth = 0;
+    for (const ZoneEntry& z : b.map.elements) {
+      const bool is_near = z.p_W.z > 9.7001 && z.p_W.z < 20.2999;
+      in_mouth += is_near;
+      EXPECT_TRUE(!is_near || std::abs(z.p_W.z - 15) < 1e-6) << z.p_W.z;
+    }
+    EXPECT_EQ(in_mouth, 1);
+  }
+}
+
 TEST(Shaft, ACutAllAroundWeakensTheRingBehindAMouthAsItsHalvesDo) {
   const auto cut = [](const std::string& more) {
     return "[[preparation.weaken]]\nmembers = \"tower\"\nat = \"2.5 m\"\nheight = \"2 m\"\ncut_concrete = 0.5\n"
