@@ -35,6 +35,18 @@ BlockFrame find_block(const std::vector<BlockFrame>& frames, double time) {
   return at;
 }
 
+/// Distance from the origin to where a ray leaves a convex polygon around it, counter-clockwise; 0 without one.
+double calc_reach(const Polygon& outline, const Vec3& direction) {
+  double reach = std::numeric_limits<double>::infinity();
+  for (size_t i = 0; i < outline.size(); ++i) {
+    const Point2 &a = outline[i], &b = outline[(i + 1) % outline.size()];
+    const double nx = b[1] - a[1], ny = a[0] - b[0];  // outwards
+    const double along = nx * direction.x + ny * direction.y;
+    if (along > 0) reach = std::min(reach, (nx * a[0] + ny * a[1]) / along);
+  }
+  return std::isfinite(reach) ? std::max(0.0, reach) : 0;
+}
+
 }  // namespace
 
 Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
@@ -56,9 +68,8 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
   out.tilt = norm(Vec3{turned.x, turned.y, 0});
   const Mat3 R = to_matrix(at.rotation);
   const auto drop_of = [&](const Vec3& arm) { return -(at.displacement + R * arm - arm).z; };
-  const double along = std::abs(dot(direction, in.fall_direction)) > 0.5 ? dot(direction, in.fall_direction) : 1;
-  const double front_reach = along > 0 ? in.front : in.rear, rear_reach = along > 0 ? in.rear : in.front;
-  const double front = drop_of(front_reach * direction), rear = drop_of(-rear_reach * direction);
+  const double front = drop_of(calc_reach(in.outline, direction) * direction);
+  const double rear = drop_of(-calc_reach(in.outline, -direction) * direction);
   out.drop = -at.displacement.z;
   out.rear_share = front > 1e-3 ? std::max(0.0, rear) / front : 1;
   double off = std::atan2(direction.y, direction.x) - std::atan2(in.fall_direction.y, in.fall_direction.x);

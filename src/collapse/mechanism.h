@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "base/linalg.h"
+#include "collapse/debris.h"
 #include "collapse/knowledge.h"
 
 namespace topple::collapse {
@@ -31,7 +32,7 @@ struct MechanismInput {
   Vec3 fall_direction{-1, 0, 0};  // planned, or expected
   bool is_direction_planned = false;
   double direction_tolerance = 0;  // [rad]
-  double front = 0, rear = 0;      // reach of the upper block from its mass centre along and against the direction [m]
+  Polygon outline;                 // of the upper block seen from above, from its mass centre; convex [m]
   double storey_height = 0;        // of the ground storey [m]
   bool came_to_rest = false;
   bool is_under_way = false;  // the run goes on; for the words

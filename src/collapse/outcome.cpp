@@ -31,19 +31,17 @@ Mechanism judge_run(const product::Plan& plan, const mbs::Model& model, const Mo
   in.came_to_rest = summary.ending == mbs::Summary::Ending::AtRest;
   in.is_under_way = is_under_way;
   const size_t S = map.structures.size();
-  std::vector<double> mass(S, 0), centre(S, 0), front(S, -1e30), rear(S, 1e30);
+  std::vector<double> mass(S, 0);
+  std::vector<Vec3> centre(S);
+  std::vector<std::vector<Point2>> corners(S);
   for (size_t b = 0; b < model.bodies.size(); ++b) {
     if (!map.bodies[b].is_upper) continue;
     const size_t structure = static_cast<size_t>(map.bodies[b].structure);
     const mbs::Body& body = model.bodies[b];
     mass[structure] += body.mass;
-    centre[structure] += body.mass * dot(body.X_WB.p, in.fall_direction);
+    centre[structure] += body.mass * body.X_WB.p;
     for (const record::BoxShape& s : map.bodies[b].shapes)
-      for (const Point2& p : calc_outline({body.X_WB * s.X_BS, s.half})) {
-        const double along = p[0] * in.fall_direction.x + p[1] * in.fall_direction.y;
-        front[structure] = std::max(front[structure], along);
-        rear[structure] = std::min(rear[structure], along);
-      }
+      for (const Point2& p : calc_outline({body.X_WB * s.X_BS, s.half})) corners[structure].push_back(p);
   }
   std::vector<std::string> names;
   std::vector<Mechanism> verdicts;
@@ -51,8 +49,9 @@ Mechanism judge_run(const product::Plan& plan, const mbs::Model& model, const Mo
   for (size_t s = 0; s < S; ++s) {
     in.frames = recorder.block_frames(s);
     in.touchdown = recorder.first_touchdown(s);
-    in.front = mass[s] > 0 ? front[s] - centre[s] / mass[s] : 0;
-    in.rear = mass[s] > 0 ? centre[s] / mass[s] - rear[s] : 0;
+    if (mass[s] > 0) centre[s] = (1 / mass[s]) * centre[s];
+    for (Point2& p : corners[s]) p = {p[0] - centre[s].x, p[1] - centre[s].y};
+    in.outline = calc_hull(std::move(corners[s]));
     names.push_back(map.structures[s].name);
     verdicts.push_back(judge_mechanism(in, k));
     masses.push_back(map.structures[s].mass);

@@ -15,7 +15,7 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 MechanismInput synthetic(double tilt_at_touchdown, double drop_of_rear, double moved) {
   MechanismInput in;
   in.touchdown = 1;
-  in.front = in.rear = 6;
+  in.outline = {{-6, -9.5}, {6, -9.5}, {6, 9.5}, {-6, 9.5}};
   in.storey_height = 3;
   in.fall_direction = {-1, 0, 0};
   for (int i = 0; i <= 2; ++i) {
@@ -88,6 +88,30 @@ TEST(Mechanism, TurningToTheOtherSideIsTheWrongDirection) {
   EXPECT_EQ(name_of(in), "wrong direction");
   in.is_direction_planned = false;
   EXPECT_EQ(name_of(in), "topple");
+}
+
+TEST(Mechanism, ThePlannedWayDoesNotChangeHowFarTheEdgesComeDown) {
+  MechanismInput in = synthetic(0.2, 2.3, 1);
+  const Mechanism planned = judge_mechanism(in, default_knowledge());
+  for (const double azimuth : {0.0, 0.8, 1.6, 2.4, 4.0, 5.5}) {
+    in.fall_direction = {std::cos(azimuth), std::sin(azimuth), 0};
+    const Mechanism m = judge_mechanism(in, default_knowledge());
+    EXPECT_EQ(m.name, "topple");
+    EXPECT_NEAR(m.rear_share, planned.rear_share, 1e-12) << azimuth;
+  }
+}
+
+TEST(Mechanism, EdgesAreWhereItsLeanLeavesTheOutline) {
+  // it turns about a diagonal of a square of 10 m, its mass centre a third nearer to the corner that goes down
+  MechanismInput in = synthetic(0, 0, 1);
+  in.outline = {{-6, -6}, {4, -6}, {4, 4}, {-6, 4}};
+  const Vec3 down = (1 / std::sqrt(2.0)) * Vec3{1, 1, 0};
+  for (BlockFrame& f : in.frames) {
+    f.rotation = exp_rotation(0.1 * f.time * cross({0, 0, 1}, down));
+    f.displacement = {0, 0, -1.0 * f.time};
+  }
+  const double front = 1 + 4 * std::sqrt(2.0) * std::sin(0.1), rear = 1 - 6 * std::sqrt(2.0) * std::sin(0.1);
+  EXPECT_NEAR(judge_mechanism(in, default_knowledge()).rear_share, rear / front, 1e-12);
 }
 
 TEST(Mechanism, WhatTopplesFallsTheWayItLeans) {
