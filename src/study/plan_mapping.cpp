@@ -53,6 +53,8 @@ bool has_screening(const product::Plan& plan, const PlanMappingOptions& o) {
   return o.vibration && !o.condensed && plan.vibration && !plan.neighbours.empty();
 }
 
+bool has_sides(const PlanMappingOptions& o) { return o.sideways && !o.condensed; }
+
 std::string name_of_screening(const product::Plan& plan, size_t neighbour) {
   const auto slug = [&plan](size_t i) {
     std::string out;
@@ -156,7 +158,7 @@ PlanMapping::PlanMapping(const product::Plan& plan, const collapse::Knowledge& k
                                                          {"reach_mass_95", "m", 1},
                                                          {"rear_share", "%", 0.01},
                                                          {"utilisation", "%", 0.01}})
-    impl->outputs.push_back(q);
+    if (has_sides(options) || (q.name != "reach_neg_y" && q.name != "reach_pos_y")) impl->outputs.push_back(q);
   if (has_screening(plan, options)) {
     impl->vibration_factor = plan.vibration->factor;
     for (size_t n = 0; n < plan.neighbours.size(); ++n)
@@ -203,9 +205,10 @@ Result PlanMapping::Impl::to_result(const collapse::SampleRun& r) const {
   const bool touched = r.touchdown <= r.release + options.after;
   for (const double x : {touched ? r.touchdown - r.release : options.after,
                          interpolate(r.time, r.tilt, touched ? r.touchdown : r.time.back()), r.touchdown_energy,
-                         r.largest_energy, r.reach.side[0], r.reach.side[1], r.reach.side[2], r.reach.side[3],
-                         r.reach.most_mass, r.mechanism.rear_share, r.utilisation})
+                         r.largest_energy, r.reach.side[0], r.reach.side[1]})
     out.values.push_back(x);
+  if (has_sides(options)) out.values.insert(out.values.end(), {r.reach.side[2], r.reach.side[3]});
+  out.values.insert(out.values.end(), {r.reach.most_mass, r.mechanism.rear_share, r.utilisation});
   if (vibration_factor > 0)
     for (const double v : r.shaking) out.values.push_back(vibration_factor * v);
   for (const double t : trajectory_times) out.trajectory.push_back(interpolate(r.time, r.tilt, r.release + t));

@@ -28,6 +28,8 @@ struct PlanMappingOptions {
   bool full_law = false;     // no zone in lanes, to check them; slow
   /// Screening of ground vibration at each neighbour, where the plan has the site's law; not of condensed runs.
   bool vibration = true;
+  /// Reach of parts across the frames; not of condensed runs, in which nothing falls sideways.
+  bool sideways = true;
 };
 
 /// How long samples of a plan are simulated after its last stage: what its fuzzy.search says, or until its analysis
@@ -35,6 +37,8 @@ struct PlanMappingOptions {
 double find_after(const product::Plan&);
 /// Whether runs of the plan tell a screening of ground vibration.
 bool has_screening(const product::Plan&, const PlanMappingOptions&);
+/// Whether runs tell how far parts lie across the frames.
+bool has_sides(const PlanMappingOptions&);
 /// Output with the upper end of the screening band at a neighbour: "vibration_workshop" of "Workshop".
 std::string name_of_screening(const product::Plan&, size_t neighbour);
 
@@ -71,10 +75,10 @@ class PlanMapping {
   const std::vector<PlanQuantity>& inputs() const;
   /// tilt_T towards the planned fall at each of tilt_times; touchdown: of the upper block's first part, after the last
   /// stage's time, and `after` if there is none by then; tilt and energy in motion then (at the end without one) and at
-  /// most; reach of parts beyond the footprint to each side and of 95 % of the mass, at the end; rear_share: drop of
-  /// the rear edge over that of the front edge; utilisation: largest use of a zone's resistance before the last stage
-  /// (the margin is its inverse), 1 if it did not stand until then; vibration_NAME: upper end of the screening band at
-  /// a neighbour by what has touched down at the end of the run.
+  /// most; reach of parts beyond the footprint to each side (has_sides) and of 95 % of the mass, at the end;
+  /// rear_share: drop of the rear edge over that of the front edge; utilisation: largest use of a zone's resistance
+  /// before the last stage (the margin is its inverse), 1 if it did not stand until then; vibration_NAME: upper end of
+  /// the screening band at a neighbour by what has touched down at the end of the run.
   const std::vector<PlanQuantity>& outputs() const;
   /// The trajectory is the tilt at these times after the last stage's [s], then how far parts extend from W's origin
   /// towards each of `directions` at the end [m].

@@ -55,6 +55,7 @@ Definition read_definition(const std::string& text) {
   out.options.directions = identity.at("directions");
   out.options.condensed = identity.contains("condensed");
   out.options.vibration = identity.value("vibration", false);
+  out.options.sideways = !identity.contains("in_plane");
   out.options.threads = 1;
   out.rules = identity.at("rules").get<std::string>();
   std::vector<Diagnostic> warnings;
@@ -91,7 +92,7 @@ std::vector<std::string> list_not_judged(const product::Plan& plan) {
   std::vector<std::string> out;
   if (plan.criteria.debris_reach) out.emplace_back("debris_reach");
   for (const product::Neighbour& n : plan.neighbours)
-    if (n.clearance > 0) out.push_back("clearance: \"" + n.name + "\"");
+    if (n.clearance) out.push_back("clearance: \"" + n.name + "\"");
   return out;
 }
 
@@ -146,6 +147,11 @@ Problem make_plan_problem(const product::Plan& plan, const PlanMappingOptions& g
                     {"frame_rate", options.frame_rate},
                     {"directions", options.directions}}
                    .dump();
+  if (!has_sides(options)) {
+    json identity = json::parse(p.identity);
+    identity["in_plane"] = true;
+    p.identity = identity.dump();
+  }
   p.settings = json{{"path", plan.path}}.dump();
   if (has_screening(plan, options)) {
     json identity = json::parse(p.identity);
@@ -155,7 +161,7 @@ Problem make_plan_problem(const product::Plan& plan, const PlanMappingOptions& g
   }
   if (options.condensed) {
     PlanMappingOptions whole = options;
-    whole.condensed = whole.vibration = false;
+    whole.condensed = whole.vibration = whole.sideways = false;
     p.whole = std::make_shared<const Problem>(make_plan_problem(plan, whole, rules));
     p.confirm = default_confirm;
     p.not_modelled.push_back("Frames that are alike move as one, in their plane: nothing falls sideways.");
