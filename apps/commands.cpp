@@ -21,6 +21,7 @@
 #include "collapse/step_check.h"
 #include "mbs/model_json.h"
 #include "product/plan.h"
+#include "product/table_reader.h"
 #include "product/templates.h"
 #include "program.h"
 #include "record/compare.h"
@@ -122,6 +123,19 @@ collapse::RunOptions make_options(const Arguments& a, const char* duration) {
   o.threads = a.threads;
   o.engine = a.engine;
   o.program_version = program_version();
+  return o;
+}
+
+collapse::RunOptions make_plan_options(const Arguments& a, const char* duration) {
+  collapse::RunOptions o = make_options(a, duration);
+  const auto check = [](double value, const std::string& text, product::Range range, Dimension d, const char* option) {
+    if (value != 0 && !(value >= range.low && value <= range.high))
+      throw InputError("E801",
+                       fmt::format("{} \"{}\": must be {}, as in a plan", option, text, product::describe(range, d)));
+  };
+  check(o.duration, a.duration, product::analysis_duration, Dimension::Time, duration);
+  check(o.step, a.step, product::analysis_step, Dimension::Time, "--step");
+  check(o.frame_rate, a.frame_rate, product::analysis_frame_rate, Dimension::Frequency, "--frame-rate");
   return o;
 }
 
@@ -317,7 +331,7 @@ int run_plan_file(const Arguments& a, const std::atomic<bool>& cancel) {
   std::string text;
   std::FILE* out = a.json ? stderr : stdout;
   try {
-    const collapse::RunOptions options = make_options(a);
+    const collapse::RunOptions options = make_plan_options(a);
     const product::Plan plan = product::read_plan_file(a.input, warnings, text);
     const collapse::Knowledge knowledge = load_knowledge(a);
     print_diagnostics(warnings, text);

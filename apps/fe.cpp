@@ -68,7 +68,7 @@ int run_finite_elements(const Arguments& a, const std::atomic<bool>& cancel) {
   std::string text;
   std::FILE* out = a.json ? stderr : stdout;
   try {
-    const collapse::RunOptions options = make_options(a, "--until");
+    const collapse::RunOptions options = make_plan_options(a, "--until");
     const farfield::FeOptions fe = make_fe_options(a);
     const product::Plan plan = product::read_plan_file(a.input, warnings, text);
     const collapse::Knowledge knowledge = load_knowledge(a);

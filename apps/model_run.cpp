@@ -86,9 +86,10 @@ void print_summary(std::FILE* out, const mbs::Model& m, const mbs::Summary& s, c
             : fmt::format("{:.4g} ms", s.step * 1e3);
     rows.emplace_back(
         "Time", fmt::format("{:.6g} s in {} steps of {}, computed in {:.2g} s", s.time, s.steps, step, s.wall_time));
-    rows.emplace_back(
-        "Energy error",
-        fmt::format("{:.1e} of the potential energy released, or of the energy at the start", s.energy_error));
+    if (s.ending != mbs::Summary::Ending::Diverged)
+      rows.emplace_back(
+          "Energy error",
+          fmt::format("{:.1e} of the potential energy released, or of the energy at the start", s.energy_error));
     if (!m.joints.empty()) rows.emplace_back("Joint drift", fmt::format("{:.1e} m or rad", s.joint_drift));
   }
   if (s.step_needed > 0) rows.emplace_back("Note", collapse::describe_step_needed(s));

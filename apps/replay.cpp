@@ -23,7 +23,7 @@ int replay_log(const Arguments& a, const std::atomic<bool>& cancel) {
     text = read_file(a.input);
     const collapse::Knowledge knowledge = load_knowledge(a);
     collapse::SteeringOptions options;
-    options.run = make_options(a);
+    options.run = make_plan_options(a);
     make_folder(a.output);
     ProgressLine line;
     Progress progress;

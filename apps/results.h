@@ -31,6 +31,8 @@ collapse::Knowledge load_knowledge(const Arguments&);
 
 /// Throws InputError for quantities that cannot be read.
 collapse::RunOptions make_options(const Arguments&, const char* duration = "--duration");
+/// For runs of plans: what is given keeps to the limits of a plan. Throws InputError E801.
+collapse::RunOptions make_plan_options(const Arguments&, const char* duration = "--duration");
 
 /// Refuses to write over what is read. Throws InputError E801.
 void check_own_input(const std::string& output, const std::string& input);

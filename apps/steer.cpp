@@ -54,7 +54,7 @@ int steer(const Arguments& a, const std::atomic<bool>& cancel) {
     server::HubOptions options;
     options.session.knowledge = load_knowledge(a);
     if (!a.knowledge.empty()) options.session.rules = read_file(a.knowledge);
-    options.session.steering.run = make_options(a);
+    options.session.steering.run = make_plan_options(a);
     options.session.folder = fs::absolute(a.output.empty() ? "steer" : a.output).string();
     const fs::path plan = a.input.empty() ? fs::path() : fs::absolute(a.input);
     options.plans = (a.input.empty() ? fs::current_path() : plan.parent_path()).string();

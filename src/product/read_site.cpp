@@ -144,7 +144,7 @@ void read_site(Reading& reading, TableReader& root) {
       Neighbour n;
       n.name = table.text("name");
       n.footprint = read_footprint(table);
-      n.clearance = table.quantity("clearance", Dimension::Length, {0, 1000}, 0);
+      n.clearance = table.find_quantity("clearance", Dimension::Length, {0, 1000});
       n.vibration_limit = table.quantity("vibration_limit", Dimension::Velocity, {0, 1, true}, 0);
       if (!is_utility) {
         const auto known = table.find_choice("building_class", {"commercial", "residential", "sensitive"});
@@ -217,9 +217,9 @@ void read_analysis(Reading& reading, TableReader& root) {
   }
   TableReader table(*node, "analysis", reading.complaints);
   Analysis& a = reading.plan.analysis;
-  a.duration = table.quantity("duration", Dimension::Time, {0.01, 600});
-  a.step = table.quantity("step", Dimension::Time, {1e-7, 0.01}, 0);
-  a.frame_rate = table.quantity("frame_rate", Dimension::Frequency, {1, 1000}, a.frame_rate);
+  a.duration = table.quantity("duration", Dimension::Time, analysis_duration);
+  a.step = table.quantity("step", Dimension::Time, analysis_step, 0);
+  a.frame_rate = table.quantity("frame_rate", Dimension::Frequency, analysis_frame_rate, a.frame_rate);
   a.gravity = table.quantity("gravity", Dimension::Acceleration, {0, 100, true}, a.gravity);
   a.seed =
       static_cast<std::uint64_t>(table.find_integer("seed", 0, std::numeric_limits<std::int64_t>::max()).value_or(1));

@@ -34,6 +34,8 @@ usage)
   expect 2 "$topple" run "$plan" -o a --threads 0
   expect 2 "$topple" run "$plan" -o a --duration "3 apples"; has err "--duration"
   expect 2 "$topple" run "$plan" -o a --duration "-3 s"
+  expect 2 "$topple" run "$plan" -o a --duration "11 min"; has err '--duration "11 min": must be between 0.01 and 600 s, as in a plan'
+  expect 2 "$topple" run "$plan" -o a --step 2; has err '--step "2": must be between 1e-07 and 0.01 s'
   expect 2 "$topple" run "$plan" -o a --engine adams; has err "there is no engine"
   expect 0 "$topple" rules; has out "zone.rupture_rotation = 0.35 rad"; has out "because:"
   expect 0 "$topple" rules --json; is_json out; cp out rules.json
