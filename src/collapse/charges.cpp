@@ -1,5 +1,7 @@
 /// Charges as events of the model (docs/theory/manager.md, section 5).
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -52,7 +54,8 @@ void Builder::add_events(std::vector<Firing> schedule) {
   std::vector<Assembly> current = assemblies;  // as they are after the events so far
   std::vector<Vec3> centre;                    // their centres of mass at the start, in W
   for (const mbs::Body& b : model.bodies) centre.push_back(b.X_WB.p);
-  std::map<int, double> residual;  // element -> least share of bars left by charges so far
+  std::set<std::string> without_zone;  // members with damage beside a charge that no zone has
+  std::map<int, double> residual;      // element -> least share of bars left by charges so far
 
   for (const Firing& firing : map.schedule) {
     if (firing.fails) continue;
@@ -147,6 +150,7 @@ void Builder::add_events(std::vector<Firing> schedule) {
       for (GroundColumn& g : map.ground_columns) g.is_fired |= g.member == m.name;
 
     // transition zones
+    bool weakens = is_shaft || (z.rotational >= 0 && z.station[1].damaged >= 0);
     for (int other : {0, 1}) {
       if (is_shaft) break;
       const MemberStation& station = z.station[static_cast<size_t>(other)];
@@ -158,8 +162,10 @@ void Builder::add_events(std::vector<Firing> schedule) {
         act.ramp = k.charge_release_time;
         act.law = law_of(station.damaged, calc_stiffness(z), m.name + "/transition");
         event.actions.push_back(act);
+        weakens = true;
       }
     }
+    if (c.transition_damage > 0 && !weakens) without_zone.insert(m.name);
     if (z.rotational >= 0) make_stub(c, z, event, lighter);
     model.events.push_back(std::move(event));
     map.events.push_back(entry);
@@ -168,6 +174,12 @@ void Builder::add_events(std::vector<Firing> schedule) {
     entry.is_aftermath = true;
     map.events.push_back(entry);
   }
+
+  if (!without_zone.empty())
+    map.notes.push_back(fmt::format(
+        "Members in which the damage beside charges (transition_damage) changes nothing, as no other zone of theirs is "
+        "near enough: {} (the first is {}).",
+        without_zone.size(), *without_zone.begin()));
 
   // a record's body has one set of shapes: what remains; what is thrown out is drawn as debris
   for (size_t b = 0; b < current.size(); ++b)

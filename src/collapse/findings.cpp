@@ -23,8 +23,9 @@ using record::Status;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kHeapCell = 0.25;  // [m]
-constexpr double kOnGround = 0.1;   // height of what lies on the ground or on what lies there [m]
+constexpr double kHeapCell = 0.25;     // [m]
+constexpr double kOnGround = 0.1;      // height of what lies on the ground or on what lies there [m]
+constexpr double kFramesApart = 0.04;  // more is told [s]
 constexpr size_t kShownMargins = 5;
 constexpr size_t kShownTouchdowns = 5;
 
@@ -91,7 +92,11 @@ Standing add_stability(const Context& c) {
   Standing out;
   const std::vector<BlockFrame> block = c.recorder.farthest_block_frames();
   const auto& zones = c.recorder.zone_frames();
-  const auto describe = [&](const std::string& id, const std::string& title, size_t i, bool settled) {
+  const auto least_margin = [&](size_t from, size_t to) {
+    const auto used = [](const ZoneFrame& a, const ZoneFrame& b) { return a.utilisation < b.utilisation; };
+    return std::max_element(zones.begin() + static_cast<long>(from), zones.begin() + static_cast<long>(to) + 1, used);
+  };
+  const auto describe = [&](const std::string& id, const std::string& title, size_t i, bool settled, double begin) {
     const ZoneFrame& z = zones[i];
     const auto margins = find_margins(c.r, i);
     // margins are those of a building that stands
@@ -120,6 +125,12 @@ Standing add_stability(const Context& c) {
       is_still = block[i].fastest < c.k.rest_speed;
       text +=
           is_still ? " It stands still." : fmt::format(" It still sways (still: below {:.2f} m/s).", c.k.rest_speed);
+      size_t first = i;
+      while (first > 0 && zones[first - 1].time >= begin - 1e-9) --first;
+      const auto worst = least_margin(first, i);
+      if (has && !is_still && worst->utilisation > z.utilisation)
+        text += fmt::format(" This is the margin of one instant: the least in the pause is {:.2f}, at {:.2f} s.",
+                            1 / worst->utilisation, worst->time);
     }
     const Status status = !is_standing                                 ? Status::Bad
                           : z.yielded > 0 || z.broken > 0 || !is_still ? Status::Warning
@@ -128,7 +139,7 @@ Standing add_stability(const Context& c) {
     return is_standing;
   };
   if (block.empty()) return out;
-  describe("stability.start", "Before the first charge", 0, false);
+  describe("stability.start", "Before the first charge", 0, false, 0);
   for (size_t s = 0; s + 1 < stages.size(); ++s) {
     const double begin = stages[s].last, end = stages[s + 1].first;
     const size_t i = find_frame(block, end);
@@ -158,7 +169,7 @@ Standing add_stability(const Context& c) {
         continue;
       }
     }
-    out.fell |= !describe(id, title, i, true);
+    out.fell |= !describe(id, title, i, true, begin);
     if (end > c.r.time.back() + 1e-9) break;
   }
   return out;
@@ -256,8 +267,8 @@ Approach find_approach(const Context& c, const product::Neighbour& n) {
 void add_clearances(const Context& c) {
   for (const product::Neighbour& n : c.plan.neighbours) {
     const Approach a = find_approach(c, n);
-    const bool asked = n.clearance > 0;
-    const auto [distance, limit] = tell_apart(a.least, asked ? n.clearance : kNone);
+    const bool asked = n.clearance.has_value();
+    const auto [distance, limit] = tell_apart(a.least, n.clearance.value_or(kNone));
     std::string text = fmt::format("The nearest part, {}, comes to {} m at {:.2f} s", a.who, distance, a.when);
     if (a.lowest <= kOnGround)
       text = a.lowest_when <= c.r.time.front() ? fmt::format("{} stands on it from the start", a.lowest_who)
@@ -267,10 +278,12 @@ void add_clearances(const Context& c) {
           "Nothing lands on it, but parts are over it: {} comes down to {:.1f} m above the ground there, at {:.2f} s",
           a.lowest_who, a.lowest, a.lowest_when);
     if (asked) text += fmt::format("; the limit is {} m", limit);
-    const Status status = !asked                  ? (a.least > 0 ? Status::Info : Status::Warning)
-                          : a.least < n.clearance ? Status::Bad
-                          : c.is_under_way        ? Status::Info
-                                                  : Status::Good;
+    const bool is_reached = a.least <= 0, lands = a.lowest <= kOnGround;
+    const Status status = !asked                            ? (is_reached ? Status::Warning : Status::Info)
+                          : a.least < *n.clearance || lands ? Status::Bad
+                          : is_reached                      ? Status::Warning
+                          : c.is_under_way                  ? Status::Info
+                                                            : Status::Good;
     c.add("clearance." + n.name, "Clearance", n.name, text + ".", a.least, "m", status);
   }
 }
@@ -609,6 +622,13 @@ void add_verification(const Context& c) {
         std::max(s.equilibrium_residual, early ? 0.0 : reaction) <= c.k.verification_equilibrium_residual
             ? Status::Good
             : Status::Bad);
+  if (const double apart = c.r.time.size() > 1 ? c.r.time[1] - c.r.time[0] : 0; apart > kFramesApart)
+    c.add(
+        "verification.frames", "Verification", "Rate of frames",
+        fmt::format("Frames are {:.3g} s apart: leans, energies and distances between them are interpolated, and peaks "
+                    "between them are not seen. A higher frame_rate keeps more.",
+                    apart),
+        apart, "s", Status::Warning);
   c.add("verification.step", "Verification", "Time step",
         describe_steps(s) + fmt::format(" Joints drift by at most {:.1e} m or rad.", s.joint_drift), s.step, "s",
         s.step_needed > 0 ? Status::Warning : Status::Info);

@@ -232,7 +232,7 @@ std::string LiveModel::add_charge(const Edit& e, double time, double next) {
   if (!is_column && m.kind != MemberKind::Beam) refuse("charges act on columns and beams only");
   const MemberZones& z = built_.zones[index];
   if (z.element[0] < 0) refuse("has no zone of its own");
-  demand(e.destroyed_length > 0, "destroyed_length must be > 0 m");
+  demand(e.destroyed_length >= 0.01, "destroyed_length must be 0.01 m at least");
   demand(is_share(e.residual_bars), "residual_bars must be 0 to 1");
   demand(is_share(e.transition_damage), "transition_damage must be 0 to 1");
   const double low = e.position - 0.5 * e.destroyed_length, high = e.position + 0.5 * e.destroyed_length;

@@ -204,7 +204,7 @@ struct VibrationLaw {
 struct Neighbour {
   std::string name;
   std::vector<std::array<double, 2>> footprint;  // [m]
-  double clearance = 0;                          // least distance of debris that is asked for [m]
+  std::optional<double> clearance;               // least distance of debris that is asked for [m]
   double vibration_limit = 0;                    // peak particle velocity, 0: none given [m/s]
   BuildingClass building_class = BuildingClass::Unknown;
   bool is_utility = false;

@@ -33,7 +33,7 @@ ChargeTable read_charge(TableReader& table) {
   c.place = table.place();
   c.words = table.required_words("members", "[\"C-A*-0\"]");
   c.charge.position = table.quantity("position", Dimension::Length, {0, 1000});
-  c.charge.destroyed_length = table.quantity("destroyed_length", Dimension::Length, {0, 100, true});
+  c.charge.destroyed_length = table.quantity("destroyed_length", Dimension::Length, {0.01, 100});
   c.charge.residual_bars = table.quantity("residual_bars", Dimension::Number, fraction, 0);
   c.charge.transition_damage = table.quantity("transition_damage", Dimension::Number, fraction, 0);
   const Sector sector = read_sector(table);
@@ -254,6 +254,9 @@ void read_cables(Reading& reading, TableReader& root) {
         } else if (c.position > calc_length(m)) {
           table.error("E306", table.place_of("position"), "position: lies beyond the end of " + m.name,
                       "it is " + in_metres(calc_length(m)) + " long");
+        } else if (anchor && norm(m.start + (c.position / calc_length(m)) * (m.end - m.start) - c.anchor) < unit::mm) {
+          table.error("E207", anchor->place, "anchor: is where the cable is tied to " + m.name,
+                      "a cable without length pulls in no direction");
         }
       }
     }

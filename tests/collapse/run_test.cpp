@@ -195,6 +195,45 @@ TEST(Run, ANeighbourIsSaidToBeUnderWhatDoesNotComeDownThere) {
   EXPECT_EQ(finding(r, "clearance.foot").text, "C-A1-0 stands on it from the start.");
 }
 
+TEST(Run, ANeighbourThatAsksForNothingOnItIsBrokenByWhatLands) {
+  const std::string none = "clearance = \"0 m\"\n";
+  const record::Record r =
+      run_plan(read(house(neighbour("under", "2 m", "3 m", none) + neighbour("foot", "-1 m", "1 m", none) +
+                              neighbour("beside", "30 m", "31 m", none) + neighbour("silent", "-1 m", "1 m"),
+                          "0.05 s")),
+               default_knowledge(), {}, {});
+  EXPECT_EQ(finding(r, "clearance.under").status, record::Status::Warning);
+  EXPECT_EQ(finding(r, "clearance.foot").status, record::Status::Bad);
+  EXPECT_EQ(finding(r, "clearance.beside").status, record::Status::Good);
+  EXPECT_EQ(finding(r, "clearance.silent").status, record::Status::Warning);
+}
+
+TEST(Run, TellsThatFramesAreFarApart) {
+  const auto run_at = [](double rate) {
+    RunOptions o;
+    o.frame_rate = rate;
+    return run_plan(read(house(charge("C-A*-0", "0.05 s"), "0.3 s")), default_knowledge(), o, {});
+  };
+  EXPECT_THAT(finding(run_at(10), "verification.frames").text, testing::StartsWith("Frames are 0.1 s apart: "));
+  const record::Record close = run_at(60);
+  for (const record::Finding& f : close.findings) EXPECT_NE(f.id, "verification.frames");
+}
+
+TEST(Run, TellsWhereDamageBesideChargesChangesNothing) {
+  const auto note = [](const std::string& position, const std::string& length) {
+    const record::Record r =
+        run_plan(read(house("[[stage]]\ntime = \"0 s\"\n[[stage.charge]]\nmembers = \"C-A*-0\"\nposition = \"" +
+                                position + "\"\ndestroyed_length = \"" + length + "\"\ntransition_damage = 0.5\n",
+                            "0.05 s")),
+                 default_knowledge(), {}, {});
+    for (const record::Finding& f : r.findings)
+      if (f.text.find("transition_damage") != std::string::npos) return f.text;
+    return std::string();
+  };
+  EXPECT_THAT(note("0.5 m", "0.4 m"), testing::HasSubstr("near enough: 3 (the first is C-A1-0)."));
+  EXPECT_EQ(note("1.9 m", "0.8 m"), "");
+}
+
 TEST(Run, ALimitThatIsJustBrokenShowsIt) {
   // columns reach to 5.15 m
   const record::Record r =

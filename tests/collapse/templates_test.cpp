@@ -55,6 +55,7 @@ TEST(TemplatePhysics, TheChimneyFallsInTheTimeOfARigidBody) {
     if (!b.fixed) mass += b.mass, centre += b.mass * b.X_WB.p;
   centre *= 1 / mass;
   const double ahead = 2.3 * std::cos(71 * kPi / 180), above = centre.z - 2.5;
+  EXPECT_NEAR(above, 25, 0.1);
   for (const mbs::Body& b : model.bodies) {
     if (b.fixed) continue;
     const Vec3 d = b.X_WB.p - Vec3{ahead, 0, 2.5};

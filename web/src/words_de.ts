@@ -64,6 +64,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["Not judged: the run ends at {:.2f} s, before \"{}\".", "Nicht beurteilt: Die Rechnung endet bei {} s, vor „{}“."],
   ["Not judged: \"{}\" begins before all charges of the stage before it have fired.", "Nicht beurteilt: „{}“ beginnt, bevor alle Ladungen der Zündstufe davor gezündet haben."],
   ["Not judged: the last frame before \"{}\" ({:.3f} s) is of {:.3f} s; a higher frame_rate keeps more.", "Nicht beurteilt: Das letzte Bild vor „{}“ ({} s) ist von {} s; eine höhere frame_rate behält mehr."],
+  ["This is the margin of one instant: the least in the pause is {:.2f}, at {:.2f} s.", "Das ist die Reserve eines Augenblicks: Die kleinste in der Pause ist {}, bei {} s."],
   ["It still sways (still: below {:.2f} m/s).", "Es schwankt noch (still: unter {} m/s)."],
   // debris
   ["Fall and debris", "Fall und Trümmer"],
@@ -190,6 +191,9 @@ export const german: readonly (readonly [string, string])[] = [
   ["The mouth of {} at {:.1f} m leaves {:.0f} deg of the ring. The weight of {:.2f} MN above it turns with {:.2f} MNm about the centroid of what is left, {:.2f} m behind the axis, which resists with {:.2f} MNm at most: it {}.", "Das Sprengmaul von {} bei {} m lässt {} deg des Rings stehen. Das Gewicht von {} MN darüber dreht mit {} MNm um den Schwerpunkt des Rests, {} m hinter der Achse; der Rest widersteht höchstens mit {} MNm: {}."],
   ["turns over", "Er kippt"],
   ["does not turn over by its weight alone", "Er kippt nicht allein durch sein Gewicht"],
+  ["Members in which the damage beside charges (transition_damage) changes nothing, as no other zone of theirs is near enough: {} (the first is {}).", "Bauteile, in denen die Schädigung neben Ladungen (transition_damage) nichts ändert, weil keine andere Zone von ihnen nahe genug ist: {} (das erste ist {})."],
+  ["Rate of frames", "Bildrate"],
+  ["Frames are {:.3g} s apart: leans, energies and distances between them are interpolated, and peaks between them are not seen. A higher frame_rate keeps more.", "Die Bilder liegen {} s auseinander: Neigungen, Energien und Abstände dazwischen sind interpoliert, Spitzen dazwischen sind nicht zu sehen. Eine höhere frame_rate behält mehr."],
   ["The fall is across the rows; walls in the rows count with their weight only.", "Es fällt quer zu den Reihen; Wände in den Reihen zählen nur mit ihrem Gewicht."],
   // criteria
   ["Criteria", "Vorgaben"],
@@ -368,6 +372,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["time: the stage fires after the end of the analysis", "time: Die Zündstufe zündet nach dem Ende der Rechnung"],
   ["the charge fires after the end of the analysis", "die Ladung zündet nach dem Ende der Rechnung"],
   ["strength: must be above the pretension", "strength: muss größer als die Vorspannung sein"],
+  ["anchor: is where the cable is tied to {}", "anchor: ist dort, wo das Seil an {} befestigt ist"],
   ["position: lies beyond the end of {n}", "position: liegt hinter dem Ende von {}"],
   ["at: lies beyond the end of {n}", "at: liegt hinter dem Ende von {}"],
   ["at: lies above the top of the shaft", "at: liegt über dem Kopf des Schafts"],
