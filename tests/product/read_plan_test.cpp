@@ -186,7 +186,7 @@ const Mistake member_mistakes[] = {
      "overlaps opening[0]", ""},
     {"E306", "at = \"1 m\"", "at = «\"3.1 m\"»", "beyond the end of C-B1-0", "3 m long"},
     {"E306", "position = \"1 m\"\nanchor", "position = «\"3.5 m\"»\nanchor", "beyond the end of C-A2-1", "3 m long"},
-    {"E207", "anchor = [\"-40 m\", \"10 m\", \"0 m\"]", "anchor = «[\"0 m\", \"4 m\", \"4 m\"]»",
+    {"E207", "anchor = [\"-40 m\", \"5 m\", \"0 m\"]", "anchor = «[\"0 m\", \"4 m\", \"4 m\"]»",
      "anchor: is where the cable is tied to C-A2-1", "no direction"},
     {"E307", "members = \"C-B2-0\"\nsection = \"column\"", "members = \"S-A1B2-0\"\nsection = «\"column\"»",
      "section: is nothing that S-A1B2-0 has", ""},
