@@ -67,6 +67,7 @@ void LiveRun::add_frame(const mbs::View& v) {
   recorder_->add_frame(v);
   if (record_->time.size() == before) return;
   frame_steps_.push_back(simulation_->steps());
+  cable_force_ = v.cable_force;
   if (keeps_paths_)
     for (size_t e = 0; e < v.element_force.size(); ++e)
       for (const double x : {v.element_force[e].x, v.element_moment[e].y, v.element_moment[e].z,

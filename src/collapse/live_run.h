@@ -39,6 +39,8 @@ class LiveRun {
   const Recorder& recorder() const { return *recorder_; }
   const std::vector<long>& frame_steps() const { return frame_steps_; }  // of each frame
   const std::vector<float>& zone_path() const { return zone_path_; }     // (frames x zones x kZonePath), or empty
+  /// Of each cable of the model at the last frame of this run [N]; empty before the first one.
+  const std::vector<double>& cable_force() const { return cable_force_; }
   double time() const { return time_; }
   long steps() const { return steps_; }
   double next_time() const { return next_time_; }  // of the step after the last one [s]
@@ -76,6 +78,7 @@ class LiveRun {
   std::vector<mbs::Moment> moments_;  // by step; the first is the start
   std::vector<long> frame_steps_;
   std::vector<float> zone_path_;
+  std::vector<double> cable_force_;
   bool keeps_paths_ = false;
   double moment_interval_;
   double time_ = 0, next_time_ = 0, start_time_ = 0, last_moment_ = 0;

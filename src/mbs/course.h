@@ -30,6 +30,7 @@ class Course {
   /// After a step of the system. False if the run has ended.
   bool follow();
   Summary finish();
+  double calc_energy_error() const;  // so far, as Summary::energy_error
   const CourseState& state() const { return now_; }
 
  private:
@@ -38,7 +39,6 @@ class Course {
   /// The end has been reached: its frame, and whether the balance of energy can be believed at all. Returns false.
   bool end();
   double calc_weight() const;  // of all that moves [N]
-  double calc_energy_error() const;
   /// What the play of joints in singular positions may make of weight and loads; 0 if there were none [J].
   double calc_singular_play() const;
   /// Looks at a frame for whether nothing happens any more.

@@ -66,6 +66,7 @@ Moment keep_moment(System& s, const Course& course) {
   m.course = course.state();
   m.summary = s.summary;
   m.summary.joint_drift = s.state.largest_drift;
+  m.summary.energy_error = course.calc_energy_error();
   m.joint_notes = s.joint_notes;
   m.counts = count_items(s);
   for (size_t i = 0; i < s.state.next_event; ++i) {
