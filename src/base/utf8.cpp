@@ -1,5 +1,7 @@
 #include "base/utf8.h"
 
+#include <algorithm>
+
 namespace topple {
 
 std::size_t utf8_length(std::string_view text) {
@@ -26,6 +28,12 @@ bool is_utf8(std::string_view text) {
     text.remove_prefix(length);
   }
   return true;
+}
+
+std::size_t count_characters(std::string_view text) {
+  // bytes that begin one
+  return static_cast<std::size_t>(
+      std::count_if(text.begin(), text.end(), [](unsigned char c) { return (c & 0xC0) != 0x80; }));
 }
 
 void append_utf8(std::string& text, std::uint32_t c) {

@@ -14,6 +14,9 @@ std::size_t utf8_length(std::string_view text);
 /// Whether all of it is well-formed.
 bool is_utf8(std::string_view text);
 
+/// Characters of a well-formed text.
+std::size_t count_characters(std::string_view text);
+
 /// Appends a character by its code point; U+FFFD for what is none, such as a half of a surrogate pair.
 void append_utf8(std::string& text, std::uint32_t code_point);
 

@@ -61,14 +61,14 @@ std::optional<LogSummary> summarise(const std::string& path, const std::string& 
   try {
     const std::vector<std::string> lines = whole_lines(read_file(path));
     if (lines.size() < 2) return std::nullopt;
-    const Json head = Json::parse(lines.front());
+    const Json head = parse_command(lines.front());
     if (head.at("topple_log") != 1 || head.at("program") != program || head.at("plan_sha256") != plan_sha256)
       return std::nullopt;
     for (const auto& [key, value] : setting.items())
       if (head.at(key) != value) return std::nullopt;
     s.created = head.at("created");
     for (size_t i = 1; i < lines.size(); ++i) {
-      const Json entry = Json::parse(lines[i]);
+      const Json entry = parse_command(lines[i]);
       if (entry.at("action") != "reached") ++s.actions;
       s.time = std::max(s.time, entry.at("time").get<double>());
       if (entry.contains("made")) s.branches = std::max(s.branches, entry.at("made").get<int>());
@@ -118,15 +118,32 @@ LoggedSteering::~LoggedSteering() {
   if (file_ >= 0) close(file_);
 }
 
+void LoggedSteering::reserve(const Json& command) const {
+  constexpr off_t beside = 1024;  // the rest of a line, and a line with what was reached
+  if (file_ < 0) return;
+  const off_t end = lseek(file_, 0, SEEK_END), length = static_cast<off_t>(dump(command).size()) + beside;
+  // file systems that cannot reserve find out as they write
+  if (end >= 0 && fallocate(file_, FALLOC_FL_KEEP_SIZE, end, length) != 0 &&
+      (errno == ENOSPC || errno == EDQUOT || errno == EFBIG))
+    throw std::runtime_error(path_ + ": the action log has no room for the action: " + std::strerror(errno));
+}
+
 void LoggedSteering::write(const Json& entry) {
   const std::string line = dump(entry);
   if (file_ >= 0) {
     const std::string whole = line + "\n";
+    const off_t begin = lseek(file_, 0, SEEK_END);
     size_t done = 0;
     while (done < whole.size()) {
       const ssize_t n = ::write(file_, whole.data() + done, whole.size() - done);
       if (n < 0 && errno == EINTR) continue;
-      if (n <= 0) throw std::runtime_error(path_ + ": the action log cannot be written: " + std::strerror(errno));
+      if (n <= 0) {
+        const std::string why = std::strerror(errno);
+        // half a line would spoil what comes after it
+        is_broken_ = true;
+        if (done > 0 && begin >= 0 && ftruncate(file_, begin) != 0) {}
+        throw std::runtime_error(path_ + ": the action log cannot be written: " + why);
+      }
       done += static_cast<size_t>(n);
     }
   }
@@ -146,6 +163,11 @@ Steering::Made LoggedSteering::perform(const Json& command) {
   const long step = s.active().run().has_begun() ? s.cursor_step() : 0;
   const double time = s.active().run().has_begun() ? s.cursor_time() : 0;
   const Cursor cursor = s.cursor();
+  if (is_broken_)
+    throw std::runtime_error(path_ + ": the action log could not take an action, so none can be done any more");
+  reserve(command);
+  // what was computed beyond a cursor in the past is done again, too
+  if (!cursor.is_live && word != "rename") note_reached();
   Steering::Made made;
   if (is_edit(word)) {
     made = s.edit(read_edit(command), read_text(command, "name", ""), read_flag(command, "in_place", false));
@@ -250,9 +272,10 @@ ReplayResult replay(const std::string& log, const std::string& name, const Knowl
   };
   for (const std::string& text : lines) {
     ++line;
-    const Json entry = Json::parse(text, nullptr, false);
-    if (!entry.is_object()) fail("E942", "this line is not a JSON object", "an action log is written by topple steer");
     try {
+      const Json entry = parse_command(text);
+      if (!entry.is_object())
+        fail("E942", "this line is not a JSON object", "an action log is written by topple steer");
       if (line == 1) {
         if (!entry.contains("topple_log")) fail("E942", "this is not an action log of topple steer");
         if (entry.at("topple_log") != 1) fail("E942", "this program reads action logs of version 1");
@@ -299,7 +322,13 @@ ReplayResult replay(const std::string& log, const std::string& name, const Knowl
         if (made.branch->id != entry.at("made").get<int>()) fail("E943", "the action makes another branch than it did");
       }
       ++result.actions;
-    } catch (const Json::exception& e) { fail("E942", std::string("this line lacks something: ") + e.what()); }
+    } catch (const Json::exception& e) {
+      fail("E942", std::string("this line lacks something, or has something else in its place: ") + e.what());
+    } catch (const InputError& e) {
+      // what an action is refused for has no place of its own
+      if (const Diagnostic& d = e.first_error(); d.where.file.empty()) fail(d.code, d.message, d.help);
+      throw;
+    }
   }
   if (result.steering == nullptr) {
     line = 1;

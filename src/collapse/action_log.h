@@ -34,7 +34,7 @@ class LoggedSteering {
   const Steering& steering() const { return *steering_; }
 
   /// Edits, `branch`, `rename`, `switch`, `undo`, `plan.apply`, `sample`: commands of the protocol, at the cursor of
-  /// the active branch. Throws InputError; then nothing has changed and nothing is written.
+  /// the active branch. Throws InputError, and std::runtime_error if the log has no room; then nothing has changed.
   Steering::Made perform(const nlohmann::ordered_json& command);
   static bool is_action(const std::string& command);
 
@@ -47,12 +47,15 @@ class LoggedSteering {
 
  private:
   void write(const nlohmann::ordered_json&);
+  /// Room for an action in the file, so that none is done that cannot be written down. Throws std::runtime_error.
+  void reserve(const nlohmann::ordered_json& command) const;
 
   product::Plan plan_;
   std::unique_ptr<Steering> steering_;
   SamplePlan sample_plan_;
   std::string path_;
   int file_ = -1;
+  bool is_broken_ = false;  // an action was done and could not be written
   long seq_ = 0;
   std::vector<std::string> lines_;
   std::map<int, long> reached_;  // step of each branch

@@ -27,8 +27,14 @@ BranchRecord::BranchRecord(const Branch& b, const Knowledge& k, const RunOptions
 }
 
 std::optional<record::Record> BranchRecord::finish(const std::atomic<bool>* cancel) {
-  end_record(summary_, " before the first charge", *recorder_, record_);
-  if (!has_ended_) {
+  if (has_ended_) {
+    end_record(summary_, " before the first charge", *recorder_, record_);
+  } else {
+    record_.provenance.step = summary_.step;
+    record_.provenance.wall_time = summary_.wall_time;
+    // charges that are going to fail were told at the start
+    std::erase_if(record_.events, [this](const record::Event& e) { return e.time > time_; });
+    recorder_->finish();
     record_.ending = "under_way";
     record_.ending_text = fmt::format("The run is under way: computed up to {:.2f} s so far.", time_);
   }

@@ -18,6 +18,7 @@ using Kind = Edit::Kind;
 constexpr Kind kKinds[] = {Kind::Fire,      Kind::SetDelay, Kind::AddCharge,   Kind::RemoveCharge,
                            Kind::AddPreCut, Kind::AddCable, Kind::RemoveCable, Kind::SetFriction};
 constexpr int kMostItems = 1000000;
+constexpr int kDeepest = 32;  // copies of what is nested go as deep
 
 [[noreturn]] void refuse(const std::string& message, const std::string& help = {}) {
   throw InputError("E912", message, help);
@@ -48,6 +49,16 @@ std::optional<double> read_optional(const Json& command, const char* key) {
 }
 
 }  // namespace
+
+Json parse_command(const std::string& text) {
+  return Json::parse(
+      text,
+      [](int depth, Json::parse_event_t, Json&) {
+        if (depth > kDeepest) throw InputError("E910", fmt::format("nested more than {} levels deep", kDeepest));
+        return true;
+      },
+      false);
+}
 
 double read_number(const Json& command, const char* key) { return number_of(demand(command, key), key); }
 

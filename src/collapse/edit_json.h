@@ -16,6 +16,10 @@ std::vector<std::string> edit_words();
 /// Keys of every command (id, session, branch, name, in_place) are passed over.
 Edit read_edit(const nlohmann::ordered_json&);
 
+/// A text of a client or a log. Throws InputError E910 if it is nested deeper than a command ever is; discarded if it
+/// is no JSON.
+nlohmann::ordered_json parse_command(const std::string& text);
+
 // For readers of other commands; all throw InputError E912.
 double read_number(const nlohmann::ordered_json& command, const char* key);
 double read_number(const nlohmann::ordered_json& command, const char* key, double otherwise);

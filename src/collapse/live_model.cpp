@@ -47,6 +47,8 @@ void demand(bool holds, const std::string& what, const std::string& help = {}) {
   if (!holds) refuse_value(what, help);
 }
 
+constexpr double kLongestTime = 600;  // of a plan's analysis [s]
+
 bool is_share(double x) { return x >= 0 && x <= 1; }
 
 /// Whether what is due at t lies behind a time of a run; what is due at the start does not before the first step.
@@ -184,7 +186,7 @@ std::string LiveModel::set_delay(const Edit& e, double time) {
   demand((e.charge >= 0) != (e.stage >= 0), "set_delay wants either a charge or a stage");
   demand(e.delay.has_value() != e.time.has_value(), "set_delay wants either a delay or a time");
   const auto check = [&](double t, const std::string& what) {
-    demand(std::isfinite(t) && t >= 0, what + " must be a number from 0 on");
+    demand(t >= 0 && t <= kLongestTime, fmt::format("{} must fire at 0 to {:g} s", what, kLongestTime));
     demand(
         !is_past(t, time),
         fmt::format("{} would have to fire at {}, and it is {} already", what, words_of_time(t), words_of_time(time)),
@@ -192,6 +194,7 @@ std::string LiveModel::set_delay(const Edit& e, double time) {
   };
   if (e.charge >= 0) {
     LiveCharge& c = unfired(e.charge, time);
+    demand(!e.delay || *e.delay >= 0, "delay must be >= 0 s");
     product::Stage& stage = plan_.stages[static_cast<size_t>(c.stage)];
     product::Charge& charge = stage.charges[static_cast<size_t>(c.index)];
     const double scatter = c.time - std::max(stage.time, stage.time + charge.delay);
@@ -257,6 +260,7 @@ std::string LiveModel::add_charge(const Edit& e, double time, double next) {
   }
   const double t = e.time.value_or(next);
   demand(!is_past(t, time), "the charge would have to fire in the past");
+  demand(t <= kLongestTime, fmt::format("the charge must fire before {:g} s", kLongestTime));
   size_t stage = 0;
   if (plan_.stages.empty()) plan_.stages.push_back({"added", t, {}, {}});
   for (size_t s = 0; s < plan_.stages.size(); ++s)
@@ -341,13 +345,15 @@ std::string LiveModel::add_cable(const Edit& e) {
   const Member& m = plan_.members[static_cast<size_t>(index)];
   const double length = norm(m.end - m.start);
   demand(e.position >= 0 && e.position <= length, fmt::format("{}: position must be 0 to {:.3g} m", m.name, length));
-  demand(e.stiffness > 0 && std::isfinite(e.stiffness), "stiffness must be > 0 N/m");
-  demand(e.pretension >= 0 && std::isfinite(e.pretension), "pretension must be >= 0 N");
+  demand(e.stiffness > 0 && e.stiffness <= 1e12, "stiffness must be > 0 N/m, at most 1e12");
+  demand(e.pretension >= 0 && e.pretension <= 1e9, "pretension must be 0 to 1e9 N");
   demand(e.strength >= 0, "strength must be >= 0 N; 0: it never breaks");
   demand(e.strength == 0 || e.strength > e.pretension,
          fmt::format("strength, {:g} N, must be above the pretension, {:g} N", e.strength, e.pretension),
          "0: it never breaks");
-  demand(is_finite(e.anchor), "anchor must be three numbers");
+  demand(is_finite(e.anchor) && norm(e.anchor) <= 20e3, "anchor must be three numbers, within 20 km");
+  demand(norm(m.start + (length > 0 ? e.position / length : 0) * (m.end - m.start) - e.anchor) >= 1e-3,
+         "anchor is where the cable is tied to " + m.name, "a cable without length pulls in no direction");
   product::Cable c;
   c.name = fmt::format("added {}", plan_.cables.size() + 1);
   c.member = index;
@@ -364,11 +370,15 @@ std::string LiveModel::add_cable(const Edit& e) {
   return fmt::format("cable {} from {} pulls with {:.3g} kN", c.name, m.name, e.pretension / unit::kN);
 }
 
+bool LiveModel::lets_go(const std::string& cable) const {
+  return std::find(cables_off_.begin(), cables_off_.end(), cable) != cables_off_.end();
+}
+
 std::string LiveModel::remove_cable(const Edit& e, double next) {
   const std::vector<mbs::Cable>& cables = built_.model.cables;
   for (size_t i = 0; i < cables.size(); ++i) {
     if (cables[i].name != e.cable) continue;
-    if (std::count(cables_off_.begin(), cables_off_.end(), e.cable)) break;
+    if (lets_go(e.cable)) throw InputError("E931", "cable \"" + e.cable + "\" is let go already");
     cables_off_.push_back(e.cable);
     Extra x;
     x.event.time = next;
@@ -384,7 +394,8 @@ std::string LiveModel::remove_cable(const Edit& e, double next) {
     return x.entry.note;
   }
   std::vector<std::string> known;
-  for (const mbs::Cable& c : cables) known.push_back(c.name);
+  for (const mbs::Cable& c : cables)
+    if (!lets_go(c.name)) known.push_back(c.name);
   const std::string near = nearest_name(e.cable, known);
   throw InputError("E920", "there is no cable \"" + e.cable + "\" that holds",
                    near.empty() ? "" : "did you mean \"" + near + "\"?");

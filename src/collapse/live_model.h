@@ -49,6 +49,8 @@ class LiveModel {
   /// Law that a zone of the map follows before it is fired: of an element, or of a rotational one behind them; -1:
   /// none.
   int law_of_zone(size_t zone) const;
+  /// Whether an edit lets a cable go.
+  bool lets_go(const std::string& cable) const;
 
   /// Makes an edit at a time of the run and says it in words.
   ///   time  at 0, before the first step, what is due at the start can be changed too; the run must then begin anew [s]

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "base/error.h"
+#include "base/utf8.h"
 #include "collapse/branch_record.h"
 
 namespace topple::collapse {
@@ -53,16 +54,22 @@ Branch& Steering::branch(int id) const {
   throw InputError("E920", fmt::format("there is no branch {}", id));
 }
 
-std::string Steering::free_name(const std::string& wanted) const {
+std::string Steering::name_of_new(const std::string& wanted) const {
   if (branches_.size() >= options_.most_branches)
     throw InputError("E905", fmt::format("there are {} branches, which is the limit", branches_.size()),
                      "go on in a session of its own");
+  return free_name(wanted);
+}
+
+std::string Steering::free_name(const std::string& wanted) const {
   const auto is_taken = [this](const std::string& name) {
     return std::any_of(branches_.begin(), branches_.end(), [&](const auto& b) { return b->name == name; });
   };
   if (!wanted.empty()) {
-    if (wanted.size() > kLongestName)
+    if (count_characters(wanted) > kLongestName)
       throw InputError("E912", fmt::format("a name has at most {} characters", kLongestName));
+    if (std::any_of(wanted.begin(), wanted.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
+      throw InputError("E912", "a name holds no line breaks or other control characters");
     if (is_taken(wanted)) throw InputError("E912", "there is a branch \"" + wanted + "\" already");
     return wanted;
   }
@@ -94,7 +101,7 @@ void Steering::watch(Branch& b) {
 
 Branch& Steering::add_root(const product::Plan& plan, const std::string& name) {
   Branch b;
-  b.name = free_name(name);
+  b.name = name_of_new(name);
   const auto model = std::make_shared<const LiveModel>(plan, k_, options_.run.threads);
   b.pieces.push_back({std::make_shared<LiveRun>(model, options_.run, options_.moment_interval), 0, 0, 0});
   return add_branch(std::move(b));
@@ -235,9 +242,11 @@ Steering::Made Steering::edit(const Edit& e, const std::string& name, bool in_pl
   const std::vector<Piece> base = cut(from, cursor_);
   const Piece& last = base.back();
   const bool stays = cursor_.is_live && (in_place || last.run->steps() == last.run->start_steps());
-  const std::string new_name = stays ? from.name : free_name(name);
-  if (const size_t edits = std::max(base.size(), last.run->model().applied().size()); edits >= options_.most_edits)
+  const std::string new_name = stays ? from.name : name_of_new(name);
+  if (const size_t edits = last.run->model().applied().size(); edits >= options_.most_edits)
     throw InputError("E905", fmt::format("the branch has {} edits, which is the limit", edits));
+  if (base.size() >= options_.most_edits)
+    throw InputError("E905", fmt::format("the branch has come from {} others, which is the limit", base.size()));
 
   const mbs::Moment moment = last.run->moment_at(last.step);
   auto model = std::make_shared<LiveModel>(last.run->model());
@@ -257,7 +266,7 @@ Steering::Made Steering::edit(const Edit& e, const std::string& name, bool in_pl
     run = std::make_shared<LiveRun>(std::move(model), options_.run, options_.moment_interval, moment, true,
                                     last.run->recorder());
   }
-  const EditEntry entry{e, made.text, made.time, !stays, base};
+  const EditEntry entry{e, made.text, made.time, !stays, from.id, base};
   std::vector<Piece> pieces;
   if (!is_anew) pieces = base;
   pieces.push_back({run, 0, 0, 0});
@@ -289,7 +298,7 @@ Steering::Made Steering::fork(const std::string& name) {
   if (!from.run().has_begun() || from.run().moments().empty())
     throw InputError("E930", "the branch has no equilibrium to go on from");
   Branch b;
-  b.name = free_name(name);
+  b.name = name_of_new(name);
   b.parent = from.id;
   b.pieces = cut(from, cursor_);
   b.time = b.pieces.back().time;
@@ -314,7 +323,7 @@ Steering::Made Steering::undo() {
   made.time = entry.time;
   made.step = entry.before.back().step;
   if (entry.made_branch) {
-    switch_to(from.parent);
+    switch_to(entry.from);
     made.branch = &active();
     return made;
   }
@@ -328,7 +337,7 @@ Steering::Made Steering::undo() {
     return made;
   }
   Branch b;
-  b.name = free_name({});
+  b.name = name_of_new({});
   b.parent = from.id;
   b.time = entry.time;
   b.pieces = entry.before;

@@ -27,6 +27,7 @@ struct EditEntry {
   std::string text;
   double time = 0;            // [s]
   bool made_branch = false;   // by itself
+  int from = 0;               // branch on which it was made
   std::vector<Piece> before;  // the branch's pieces without it
 };
 
@@ -123,7 +124,10 @@ class Steering {
  private:
   Branch& add_branch(Branch);
   void thin_out();
+  /// A name that no branch has: the wanted one, or "what-if N". Throws InputError E912.
   std::string free_name(const std::string& wanted) const;
+  /// The same for one more branch. Throws InputError E905 where there are too many.
+  std::string name_of_new(const std::string& wanted) const;
   /// The pieces of a branch up to a frame's step, or to the frontier.
   std::vector<Piece> cut(const Branch&, const Cursor&) const;
   /// A run that goes on at the end of the pieces with a model.

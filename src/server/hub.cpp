@@ -315,8 +315,10 @@ void Hub::receive(const std::shared_ptr<Client>& client, const std::string& text
   };
   Json command;
   try {
-    command = Json::parse(text, nullptr, false);
-  } catch (const std::exception&) { command = Json(Json::value_t::discarded); }
+    command = collapse::parse_command(text);
+  } catch (const InputError& e) { return refuse(nullptr, e); } catch (const std::exception&) {
+    command = Json(Json::value_t::discarded);
+  }
   if (!command.is_object()) return refuse(nullptr, InputError("E910", "a message must be a JSON object"));
   const auto it = command.find("id");
   const bool has_id = it != command.end() && it->is_number_integer() &&

@@ -96,13 +96,17 @@ Json describe_branch(const collapse::Steering& s, const Branch& b, const std::st
   for (std::size_t i = 0; i < plan.stages.size(); ++i)
     stages.push_back({{"index", i}, {"name", plan.stages[i].name}, {"time", plan.stages[i].time}});
   Json& cables = j["cables"] = Json::array();
-  for (const mbs::Cable& c : live.model().cables)
+  const std::vector<double>& force = run.cable_force();
+  for (std::size_t i = 0; i < live.model().cables.size(); ++i) {
+    const mbs::Cable& c = live.model().cables[i];
     cables.push_back({{"name", c.name},
                       {"body", c.a.index},
                       {"point", {c.p_A.x, c.p_A.y, c.p_A.z}},
                       {"anchor", {c.p_B.x, c.p_B.y, c.p_B.z}},
-                      {"force", nullptr},
-                      {"pretension", c.pretension}});
+                      {"force", i < force.size() ? number(force[i]) : Json(nullptr)},
+                      {"pretension", c.pretension},
+                      {"let_go", live.lets_go(c.name)}});
+  }
   j["friction"] = {{"ground", live.model().contact.friction}, {"bodies", live.model().contact.body_friction}};
   Json& edits = j["edits"] = Json::array();
   for (const collapse::EditEntry& e : b.edits)

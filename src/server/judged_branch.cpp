@@ -8,19 +8,23 @@ namespace topple::server {
 
 namespace {
 
-/// Value of a series of a branch at a time, between frames on a straight line.
-double value_at(const std::vector<double>& time, const std::vector<double>& value, double t) {
+/// Frames around a time, and the share of the later one.
+struct Between {
+  std::size_t before = 0, after = 0;
+  double share = 0;
+};
+Between find_frames(const std::vector<double>& time, double t) {
   const auto after = std::lower_bound(time.begin(), time.end(), t);
-  if (after == time.begin()) return value.front();
-  if (after == time.end()) return value.back();
+  if (after == time.begin()) return {0, 0, 0};
+  if (after == time.end()) return {time.size() - 1, time.size() - 1, 0};
   const auto i = static_cast<std::size_t>(after - time.begin());
-  const double s = (t - time[i - 1]) / (time[i] - time[i - 1]);
-  return (1 - s) * value[i - 1] + s * value[i];
+  return {i - 1, i, (t - time[i - 1]) / (time[i] - time[i - 1])};
 }
 
-std::size_t frame_at(const std::vector<double>& time, double t) {
-  const auto after = std::upper_bound(time.begin(), time.end(), t + 1e-9);
-  return after == time.begin() ? 0 : static_cast<std::size_t>(after - time.begin()) - 1;
+/// Value of a series of a branch at a time, between frames on a straight line.
+double value_at(const std::vector<double>& time, const std::vector<double>& value, double t) {
+  const Between f = find_frames(time, t);
+  return (1 - f.share) * value[f.before] + f.share * value[f.after];
 }
 
 Json describe_edits(const JudgedBranch& b) {
@@ -67,6 +71,10 @@ Json compare(const JudgedBranch& first, const JudgedBranch& second, int n) {
     const float* p = &r[side]->position[3 * (frame * r[side]->bodies.size() + body)];
     return Vec3{p[0], p[1], p[2]};
   };
+  const auto place_at = [&](std::size_t side, double t, std::size_t body) {
+    const Between f = find_frames(r[side]->time, t);
+    return (1 - f.share) * place(side, f.before, body) + f.share * place(side, f.after, body);
+  };
   std::map<std::string, std::size_t> index;
   for (std::size_t b = 0; b < r[1]->bodies.size(); ++b) index[r[1]->bodies[b].name] = b;
   std::vector<std::pair<std::size_t, std::size_t>> pairs;
@@ -75,8 +83,8 @@ Json compare(const JudgedBranch& first, const JudgedBranch& second, int n) {
       pairs.emplace_back(b, it->second);
   const auto distances = [&](double t) {
     std::vector<std::pair<double, std::string>> list;
-    const std::size_t fa = frame_at(r[0]->time, t), fb = frame_at(r[1]->time, t);
-    for (const auto& [a, b] : pairs) list.emplace_back(norm(place(0, fa, a) - place(1, fb, b)), r[0]->bodies[a].name);
+    for (const auto& [a, b] : pairs)
+      list.emplace_back(norm(place_at(0, t, a) - place_at(1, t, b)), r[0]->bodies[a].name);
     return list;
   };
   Json& largest = out["largest"] = {{"time", times}, {"distance", Json::array()}};

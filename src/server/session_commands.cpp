@@ -160,6 +160,9 @@ Json Session::run_clock(const std::string& word, const Json& command) {
     check_keys(command, {"until"});
     std::optional<double> until;
     if (has(command, "until")) until = read_number(command, "until");
+    if (until && !(*until > s.active().frontier()))
+      throw InputError(
+          "E912", fmt::format("\"until\" must be later than {:.6g} s, where the branch is", s.active().frontier()));
     start();
     until_ = until;
     frames_left_ = steps_left_ = -1;
@@ -217,6 +220,7 @@ Json Session::change(const std::string& word, Json command) {
     command.erase("branch");
   }
   const bool was_running = phase_ == Phase::Running;
+  const collapse::Cursor cursor = s.cursor();
   if (word == "branch" && has(command, "time")) s.rewind(read_number(command, "time"));
   if (word == "switch" || word == "plan.apply" || word == "sample") pause();
   if (word == "plan.apply") {
@@ -228,6 +232,10 @@ Json Session::change(const std::string& word, Json command) {
   try {
     made = steering_->perform(command);
   } catch (...) {
+    if (cursor.is_live)
+      s.go_live();
+    else
+      s.rewind_to_frame(cursor.frame);
     if (!was_running || word == "plan.apply") settle_phase();
     if (was_running && word != "plan.apply") phase_ = Phase::Running;
     publish_state(true);
@@ -339,7 +347,9 @@ Json Session::save_plan(const Json& command) {
     if (!disk.empty() && sha != read_text(command, "base_sha256", "") && !read_flag(command, "force", false)) {
       Diagnostic d;
       d.code = "E941";
-      d.message = std::filesystem::path(path).filename().string() + " has changed on the disk since";
+      d.message = std::filesystem::path(path).filename().string() +
+                  (has(command, "base_sha256") ? " has changed on the disk since"
+                                               : " is on the disk, and no \"base_sha256\" says which one was read");
       d.help = "look at the difference; force writes over it";
       throw Conflict({d}, sha, disk);
     }

@@ -1,10 +1,14 @@
 #include "collapse/steering.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
+#include <csignal>
+#include <filesystem>
 #include <thread>
 
 #include "base/error.h"
+#include "base/file.h"
 #include "collapse/action_log.h"
 #include "collapse/branch_record.h"
 #include "collapse/edit_json.h"
@@ -332,6 +336,69 @@ TEST(Steering, UndoComesBackToWhereTheEditWas) {
   expect_same_motion(straight.make_record(straight.active()), s.make_record(s.active()));
 }
 
+TEST(Steering, UndoesOneEditAfterTheOther) {
+  Steering s(default_knowledge(), options());
+  ASSERT_TRUE(s.begin(s.add_root(two_stages(), "main")));
+  advance_until(s, 0.3);
+  s.edit(delay_of_stage(1, 0.9));
+  advance_until(s, 0.35);
+  s.edit(delay_of_stage(1, 0.8), {}, true);
+  advance_until(s, 0.4);
+  ASSERT_EQ(s.active().id, 2);
+  s.undo();
+  EXPECT_EQ(s.active().id, 3);
+  EXPECT_EQ(s.active().edits.size(), 1U);
+  s.undo();
+  EXPECT_EQ(s.active().id, 1) << "where the first edit was made, not the branch that has both";
+  EXPECT_THROW(s.undo(), InputError);
+}
+
+TEST(Steering, ABranchThatRestsKeepsItsBalanceOfEnergy) {
+  Steering s(default_knowledge(), options());
+  ASSERT_TRUE(s.begin(s.add_root(two_stages(), "main")));
+  advance_until(s, 0.9);
+  const auto error_of = [&s] {
+    for (const record::Finding& f : s.make_record(s.branch(1)).findings)
+      if (f.id == "verification.energy") return f.value;
+    return -1.0;
+  };
+  const double active = error_of();
+  EXPECT_GT(active, 0);
+  s.rewind(0.3);
+  s.fork("other");
+  EXPECT_EQ(error_of(), active);
+}
+
+TEST(Steering, ARunUnderWayTellsNothingThatIsStillToCome) {
+  Steering s(default_knowledge(), options());
+  ASSERT_TRUE(
+      s.begin(s.add_root(read(house(charge("C-A*-0", "0.2 s") + charge("C-B*-0", "0.6 s", "fails = true"))), "main")));
+  advance_until(s, 0.4);
+  const auto texts = [&s] {
+    std::string all;
+    for (const record::Event& e : s.make_record(s.active()).events) all += e.text + "\n";
+    return all;
+  };
+  EXPECT_EQ(texts().find("does not fire"), std::string::npos) << texts();
+  EXPECT_EQ(texts().find("Cancelled"), std::string::npos) << texts();
+  advance_until(s, 0.7);
+  EXPECT_NE(texts().find("does not fire"), std::string::npos);
+}
+
+TEST(Steering, NamesAreChangedWhereNoMoreBranchesFit) {
+  SteeringOptions o = options();
+  o.most_branches = 1;
+  Steering s(default_knowledge(), o);
+  ASSERT_TRUE(s.begin(s.add_root(two_stages(), "main")));
+  EXPECT_THROW(s.fork("more"), InputError);
+  std::string longest;
+  for (int i = 0; i < 80; ++i) longest += "\u00e4";
+  s.rename(1, longest);
+  EXPECT_EQ(s.branch(1).name, longest);
+  EXPECT_THROW(s.rename(1, longest + "a"), InputError);
+  EXPECT_THROW(s.rename(1, "two\nlines"), InputError);
+}
+
 TEST(Steering, ChargesFireNowAndCanBeTakenOut) {
   Steering s(default_knowledge(), options());
   ASSERT_TRUE(s.begin(s.add_root(two_stages("0.9 s"), "main")));
@@ -405,7 +472,13 @@ TEST(Steering, ACableComesAndGoes) {
   } catch (const InputError& error) { EXPECT_EQ(error.diagnostics().front().help, "did you mean \"added 1\"?"); }
   e.cable = "added 1";
   s.edit(e);
-  EXPECT_THROW(s.edit(e), InputError) << "it is let go already";
+  EXPECT_TRUE(s.active().run().model().lets_go("added 1"));
+  try {
+    s.edit(e);
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_STREQ(error.diagnostics().front().message.c_str(), "cable \"added 1\" is let go already");
+  }
   advance_until(s, 10);
   EXPECT_LT(largest_residual(s.make_record(s.active()), 10), default_knowledge().verification_energy_error);
 }
@@ -425,6 +498,11 @@ TEST(Steering, RefusedEditsChangeNothing) {
       R"({"command": "set_delay", "charge": 0})",
       R"({"command": "add_pre_cut", "member": "C-B1-1", "at": 1, "cut_bars": 2})",
       R"({"command": "add_cable", "member": "C-B1-1", "position": 1, "anchor": [0, 0, 0], "stiffness": 0})",
+      R"({"command": "add_cable", "member": "C-B1-1", "position": 1, "anchor": [5, 0, 4], "stiffness": 1e6})",
+      R"({"command": "add_cable", "member": "C-B1-1", "position": 1, "anchor": [9, 0, 0], "stiffness": 1e30})",
+      R"({"command": "add_cable", "member": "C-B1-1", "position": 1, "anchor": [9e9, 0, 0], "stiffness": 1e6})",
+      R"({"command": "set_delay", "charge": 3, "delay": -1})",
+      R"({"command": "set_delay", "charge": 3, "time": 1e300})",
       R"({"command": "set_friction", "ground": -1})",
       R"({"command": "remove_cable", "cable": "none"})"};
   for (const char* text : wrong) EXPECT_THROW(s.edit(read_edit(Json::parse(text))), InputError) << text;
@@ -497,6 +575,65 @@ TEST(ActionLogReplay, GivesTheSameBits) {
   EXPECT_EQ(cut.steering->steering().branches().size(), 2U);
   expect_same_motion(s.make_record(s.branch(2)),
                      cut.steering->steering().make_record(cut.steering->steering().branch(2)));
+}
+
+TEST(ActionLogReplay, ComputesAgainWhatLiesBeyondAnEditInThePast) {
+  LoggedSteering logged(two_stages(), default_knowledge(), options(), {}, "");
+  Steering& s = logged.steering();
+  ASSERT_TRUE(s.begin(s.active()));
+  advance_until(s, 0.7);
+  s.rewind(0.25);
+  logged.perform(Json::parse(R"({"command": "set_delay", "stage": 1, "time": 0.45})"));
+  ASSERT_EQ(s.active().id, 2);
+  std::string log;
+  for (const std::string& line : logged.lines()) log += line + "\n";
+  const ReplayResult again = replay(log, "log", default_knowledge(), options(), {});
+  Steering& t = again.steering->steering();
+  EXPECT_EQ(t.branch(1).steps(), s.branch(1).steps());
+  for (int id : {1, 2}) expect_same_motion(s.make_record(s.branch(id)), t.make_record(t.branch(id)));
+}
+
+TEST(ActionLogReplay, ALineThatCannotBeWrittenSpoilsNothing) {
+  const std::string path = testing::TempDir() + "full.jsonl";
+  std::filesystem::remove(path);
+  LoggedSteering logged(two_stages(), default_knowledge(), options(), {}, path);
+  Steering& s = logged.steering();
+  ASSERT_TRUE(s.begin(s.active()));
+  advance_until(s, 0.1);
+  const Json friction = Json::parse(R"({"command": "set_friction", "ground": 0.3, "in_place": true})");
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const auto old = std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit tight{std::filesystem::file_size(path) + 20, before.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &tight);
+  EXPECT_THROW(logged.perform(friction), std::runtime_error);
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, old);
+  EXPECT_THROW(logged.perform(friction), std::runtime_error) << "the log lacks what was done";
+  const ReplayResult again = replay(read_file(path), path, default_knowledge(), options(), {});
+  EXPECT_FALSE(again.was_cut);
+  EXPECT_TRUE(again.steering->steering().active().edits.empty());
+}
+
+TEST(ActionLog, SaysInWhichLineAnActionIsRefused) {
+  LoggedSteering logged(two_stages(), default_knowledge(), options(), {}, "");
+  const std::string head = logged.lines().front() + "\n";
+  const auto complaint = [&head](const std::string& line) {
+    try {
+      (void)replay(head + line + "\n", "my.log", default_knowledge(), options(), {});
+    } catch (const InputError& e) {
+      const Diagnostic& d = e.first_error();
+      return d.code + " " + d.where.file + " " + std::to_string(d.where.line);
+    }
+    return std::string();
+  };
+  EXPECT_EQ(complaint(R"({"action": "reached", "branch": 9, "step": 0, "time": 0})"), "E920 my.log 2");
+  EXPECT_EQ(
+      complaint(
+          R"({"action": "set_friction", "branch": 1, "step": 0, "time": 0, "made": 2, "command": {"command": "set_friction", "ground": -1}})"),
+      "E912 my.log 2");
+  EXPECT_EQ(complaint(R"({"action": "undo", "branch": 1, "step": "0", "time": 0})"), "E942 my.log 2");
+  EXPECT_EQ(complaint(std::string(100000, '[')), "E910 my.log 2");
 }
 
 TEST(ActionLog, RefusesWhatIsNoLog) {

@@ -270,6 +270,30 @@ TEST_F(ServerTest, ComparesABranchWithWhatItsParentLacks) {
   }
 }
 
+TEST_F(ServerTest, ABranchThatIsRefusedLeavesTheCursorWhereItIs) {
+  start(two_stages());
+  const auto c = watcher();
+  c->result("run", {{"until", 0.3}});
+  c->wait_for([](const TestJson& j) { return j["type"] == "state" && j["phase"] == "paused" && j["time"] > 0.25; });
+  EXPECT_EQ(c->code("branch", {{"name", "main"}, {"time", 0.1}}), "E912");
+  EXPECT_GT(c->result("set_friction", {{"ground", 0.4}})["edit"]["time"], 0.25);
+}
+
+TEST_F(ServerTest, TellsWhatCablesHold) {
+  start(two_stages());
+  const auto c = watcher();
+  c->result(
+      "add_cable",
+      {{"member", "C-A2-1"}, {"position", 1.5}, {"anchor", {-15, 4, 0}}, {"stiffness", 2e6}, {"pretension", 5e4}});
+  c->result("run", {{"until", 0.1}});
+  c->wait_for([](const TestJson& j) { return j["type"] == "state" && j["phase"] == "paused" && j["time"] > 0.08; });
+  c->forget();
+  c->result("remove_cable", {{"cable", "added 1"}, {"in_place", true}});
+  const auto is_told = [](const TestJson& j) { return j["type"] == "branch" && j["branch"]["cables"].size() == 1; };
+  const TestJson cable = c->wait_for(is_told)["branch"]["cables"][0];
+  EXPECT_EQ(cable["let_go"], true) << cable;
+}
+
 TEST_F(ServerTest, SteersAPlanToItsEnd) {
   start(two_stages());
   const auto c = watcher();
@@ -423,11 +447,15 @@ TEST_F(ServerTest, AnswersMessagesThatAreWrong) {
     EXPECT_EQ(e["error"]["code"], "E910") << text;
   }
   EXPECT_TRUE(c->is_cut_off());
+  const auto nested = watcher();
+  ASSERT_TRUE(nested->send_text(R"({"id": 1, "command": "x", "a": )" + std::string(200000, '[')));
+  EXPECT_EQ(nested->wait_for_type("error")["error"]["code"], "E910");
   const auto d = watcher();
   EXPECT_EQ(d->code("rnu"), "E911");
   EXPECT_EQ(d->command("paus")["error"]["help"], "did you mean \"pause\"?");
   EXPECT_EQ(d->code("run", {{"untill", 3}}), "E912");
   EXPECT_EQ(d->code("run", {{"until", "3"}}), "E912");
+  EXPECT_EQ(d->code("run", {{"until", -5}}), "E912");
   EXPECT_EQ(d->code("speed", {{"factor", 0}}), "E912");
   EXPECT_EQ(d->code("rewind"), "E912");
   EXPECT_EQ(d->code("switch", {{"branch", 7}}), "E920");

@@ -115,7 +115,7 @@ function Preparation(props: { s: SteerState; branch: Branch }) {
             <li class="stage-row">
               <span class="grow">{c.name}{c.body === "" ? "" : ` to ${typeof c.body === "number" ? (s.view.value?.run.bodies[c.body]?.name ?? c.body) : c.body}`}</span>
               <span class="number quiet">{`${formatNumber((c.force ?? c.pretension ?? NaN) / 1000, 3)} kN`}</span>
-              <button type="button" class="small" aria-label={`Let ${c.name} go`} title="Let it go" data-test="remove-cable" onClick={() => void s.edit("remove_cable", { cable: c.name })}>×</button>
+              {c.let_go ? <span class="quiet">let go</span> : <button type="button" class="small" aria-label={`Let ${c.name} go`} title="Let it go" data-test="remove-cable" onClick={() => void s.edit("remove_cable", { cable: c.name })}>×</button>}
             </li>
           ))}
           {cuts.map((e) => <li>{prettify(e.text)}</li>)}

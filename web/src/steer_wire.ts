@@ -29,6 +29,7 @@ export interface Cable {
   anchor: [number, number, number];
   force: number | null;
   pretension?: number;
+  let_go: boolean;
 }
 export interface Edit {
   kind: string;
