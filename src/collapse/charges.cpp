@@ -48,6 +48,7 @@ void Builder::make_stub(const product::Charge& c, const MemberZones& z, mbs::Eve
 
 void Builder::add_events(std::vector<Firing> schedule) {
   map.schedule = std::move(schedule);
+  map.remarks.clear();
   for (size_t s = 0; s < plan.stages.size(); ++s)
     map.stages.push_back("stage " + std::to_string(s + 1) + " \"" + plan.stages[s].name +
                          "\": " + std::to_string(plan.stages[s].charges.size()) + " charges");
@@ -175,12 +176,11 @@ void Builder::add_events(std::vector<Firing> schedule) {
     map.events.push_back(entry);
   }
 
-  // an edit of a run lays the events out anew
-  constexpr const char* begin = "Members in which the damage beside charges (transition_damage) changes nothing";
-  std::erase_if(map.notes, [](const std::string& note) { return note.rfind(begin, 0) == 0; });
   if (!without_zone.empty())
-    map.notes.push_back(fmt::format("{}, as no other zone of theirs is near enough: {} (the first is {}).", begin,
-                                    without_zone.size(), *without_zone.begin()));
+    map.remarks.push_back(fmt::format(
+        "Members in which the damage beside charges (transition_damage) changes nothing, as no other zone of theirs is "
+        "near enough: {} (the first is {}).",
+        without_zone.size(), *without_zone.begin()));
 
   // a record's body has one set of shapes: what remains; what is thrown out is drawn as debris
   for (size_t b = 0; b < current.size(); ++b)

@@ -516,6 +516,8 @@ void add_events(const Context& c) {
   size_t i = 0;
   for (const std::string& note : c.map.notes)
     c.add("note." + std::to_string(++i), "Events", "Note", note, kNone, "", Status::Warning);
+  for (const std::string& remark : c.map.remarks)
+    c.add("note." + std::to_string(++i), "Events", "Note", remark, kNone, "", Status::Info);
 }
 
 /// How far what came down has crushed what charges left of columns.

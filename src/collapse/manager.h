@@ -90,6 +90,7 @@ struct ModelMap {
   std::vector<std::string> stages;             // a line for each stage of the plan
   std::vector<Firing> schedule;                // failing charges included
   std::vector<std::string> notes;              // what the manager had to decide, in sentences
+  std::vector<std::string> remarks;            // what of the plan's charges has no effect, in sentences
   Vec3 fall_direction{-1, 0, 0};  // planned, horizontal unit vector; away from the remaining supports if unplanned
   Vec3 hinge_axis{0, -1, 0};      // rotation about it by a positive angle leans towards fall_direction
   bool is_direction_planned = false;
