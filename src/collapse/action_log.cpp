@@ -138,10 +138,10 @@ void LoggedSteering::write(const Json& entry) {
       const ssize_t n = ::write(file_, whole.data() + done, whole.size() - done);
       if (n < 0 && errno == EINTR) continue;
       if (n <= 0) {
-        const std::string why = std::strerror(errno);
-        // half a line would spoil what comes after it
+        std::string why = std::strerror(errno);
         is_broken_ = true;
-        if (done > 0 && begin >= 0 && ftruncate(file_, begin) != 0) {}
+        // half a line would spoil what comes after it
+        if (done > 0 && (begin < 0 || ftruncate(file_, begin) != 0)) why += "; its last line is not whole";
         throw std::runtime_error(path_ + ": the action log cannot be written: " + why);
       }
       done += static_cast<size_t>(n);
