@@ -11,6 +11,7 @@ namespace {
 constexpr double kReach = 0.05;        // how far a bar may lie outside the element that it lies in [m]
 constexpr double kUnder = 0.3;         // and below its foot, in a lap [m]
 constexpr double kSameLine = 0.6;      // bars whose axes differ by less diameters lie in one line
+constexpr double kFlat = 4;            // diameters: a tie that is less thick lies in a plane
 constexpr double kMiddle = 0.25;       // of a beam's height from its middle: bars of no layer
 constexpr double kEnd = 0.1;           // where a beam's section is looked at, over its length
 constexpr double kLargestCover = 0.2;  // more is no cover [m]
@@ -37,6 +38,13 @@ Axes axes_of(const IfcElement& e) {
   if (e.type == "IFCCOLUMN") return {&Vec3::z, &Vec3::x, &Vec3::y};
   if (e.high.x - e.low.x > e.high.y - e.low.y) return {&Vec3::x, &Vec3::y, &Vec3::z};
   return {&Vec3::y, &Vec3::x, &Vec3::z};
+}
+
+/// Whether a tie may be one of this element: it lies in the plane of its section or winds along it. Ties of a beam that
+/// reach into a column stand upright in it.
+bool lies_across(const IfcBar& tie, const Axes& axes) {
+  const auto is_flat = [&](Component c) { return tie.high.*c - tie.low.*c < kFlat * tie.diameter; };
+  return !tie.has_axis || is_flat(axes.along) || (!is_flat(axes.width) && !is_flat(axes.height));
 }
 
 /// Bars that pass the section at `where` along the axis; those without an axis of their own pass everywhere.
@@ -129,7 +137,10 @@ MemberBars find_bars(const IfcElement& e, const std::vector<IfcBar>& all) {
   std::vector<const IfcBar*> bars, ties;
   for (const IfcBar& bar : all) {
     if (bar.host != 0 ? bar.host != e.id : !lies_in(bar, e)) continue;
-    (bar.is_main ? bars : ties).push_back(&bar);
+    if (bar.is_main)
+      bars.push_back(&bar);
+    else if (bar.host != 0 || lies_across(bar, axes))
+      ties.push_back(&bar);
   }
   MemberBars out;
   for (const IfcBar* tie : ties) add(out.ties, *tie);
