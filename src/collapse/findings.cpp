@@ -25,6 +25,7 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kHeapCell = 0.25;     // [m]
 constexpr double kOnGround = 0.1;      // height of what lies on the ground or on what lies there [m]
+constexpr double kSkew = 0.1;          // sine of the azimuth against the grid from which it lies askew
 constexpr double kFramesApart = 0.04;  // more is told [s]
 constexpr size_t kShownMargins = 5;
 constexpr size_t kShownTouchdowns = 5;
@@ -407,6 +408,13 @@ void add_rigid_block(const Context& c) {
   }
   if (hinges.empty() || !(is_fired || is_shaft)) return;
   if (is_shaft && hinges.size() > 1) return;
+  if (!is_shaft && std::min(std::abs(d.x), std::abs(d.y)) > kSkew) {
+    c.add("rigid_block", "Mechanism", "Beside a rigid block",
+          "No comparison: the heads of the columns turn about an axis of the grid, and the planned azimuth lies askew "
+          "to it.",
+          kNone, "rad");
+    return;
+  }
   // the block pivots over the foremost row that keeps standing
   double foremost = -1e30;
   for (const GroundColumn* g : hinges) foremost = std::max(foremost, dot(g->p_top, d));

@@ -208,6 +208,18 @@ TEST(Run, ANeighbourThatAsksForNothingOnItIsBrokenByWhatLands) {
   EXPECT_EQ(finding(r, "clearance.silent").status, record::Status::Warning);
 }
 
+TEST(Run, ComparesNoRigidBlockAskewToItsHinges) {
+  const auto block = [](const std::string& azimuth) {
+    const record::Record r = run_plan(read(house(charge("C-A*-0", "0 s") + "[criteria]\nazimuth = \"" + azimuth +
+                                                     "\"\nazimuth_tolerance = \"90 deg\"\n",
+                                                 "1.2 s")),
+                                      default_knowledge(), {}, {});
+    return finding(r, "rigid_block").text;
+  };
+  EXPECT_THAT(block("180 deg"), testing::HasSubstr("a rigid block in its place ("));
+  EXPECT_THAT(block("136 deg"), testing::StartsWith("No comparison: the heads of the columns turn about an axis"));
+}
+
 TEST(Run, TellsThatFramesAreFarApart) {
   const auto run_at = [](double rate) {
     RunOptions o;

@@ -192,6 +192,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["turns over", "Er kippt"],
   ["does not turn over by its weight alone", "Er kippt nicht allein durch sein Gewicht"],
   ["Members in which the damage beside charges (transition_damage) changes nothing, as no other zone of theirs is near enough: {} (the first is {}).", "Bauteile, in denen die Schädigung neben Ladungen (transition_damage) nichts ändert, weil keine andere Zone von ihnen nahe genug ist: {} (das erste ist {})."],
+  ["No comparison: the heads of the columns turn about an axis of the grid, and the planned azimuth lies askew to it.", "Kein Vergleich: Die Köpfe der Stützen drehen sich um eine Achse des Rasters, und die geplante Richtung liegt schräg dazu."],
   ["Rate of frames", "Bildrate"],
   ["Frames are {:.3g} s apart: leans, energies and distances between them are interpolated, and peaks between them are not seen. A higher frame_rate keeps more.", "Die Bilder liegen {} s auseinander: Neigungen, Energien und Abstände dazwischen sind interpoliert, Spitzen dazwischen sind nicht zu sehen. Eine höhere frame_rate behält mehr."],
   ["The fall is across the rows; walls in the rows count with their weight only.", "Es fällt quer zu den Reihen; Wände in den Reihen zählen nur mit ihrem Gewicht."],
