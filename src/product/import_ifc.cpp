@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <regex>
 #include <set>
 
@@ -59,6 +60,43 @@ std::string key_of(const std::string& text) {
   std::string out;
   for (const char c : text) out += std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '_';
   return out.substr(0, 40);
+}
+
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+bool is_letter(char c) { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z'); }
+
+/// A class of Eurocode 2.
+struct ConcreteClass {
+  std::string name;  // "C20/25"
+  int fck = 0;       // [N/mm2]
+};
+
+/// The first class in the name of a material: C8/10 to C100/115, LC likewise. Numbers beyond are no class.
+std::optional<ConcreteClass> find_class(const std::string& name) {
+  size_t at = 0;
+  const auto skip_blanks = [&] { at = std::min(name.size(), name.find_first_not_of(" \t", at)); };
+  const auto read_number = [&] {
+    const size_t from = at;
+    int number = 0;
+    for (; at < name.size() && is_digit(name[at]); ++at)
+      if (at - from < 3) number = 10 * number + (name[at] - '0');
+    return at - from > 3 ? 0 : number;
+  };
+  for (size_t c = name.find('C'); c != std::string::npos; c = name.find('C', c + 1)) {
+    const size_t first = c > 0 && name[c - 1] == 'L' ? c - 1 : c;
+    if (first > 0 && is_letter(name[first - 1])) continue;
+    at = c + 1;
+    skip_blanks();
+    const int fck = read_number();
+    skip_blanks();
+    if (at == name.size() || name[at] != '/') continue;
+    ++at;
+    skip_blanks();
+    const int cube = read_number();
+    if (fck < 8 || fck > 100 || cube < fck || cube > 130) continue;
+    return ConcreteClass{fmt::format("{}C{}/{}", first < c ? "L" : "", fck, cube), fck};
+  }
+  return std::nullopt;
 }
 
 class Planner {
@@ -385,24 +423,27 @@ class Planner {
   }
 
   void write_concretes(std::string& out) {
-    static const std::regex eurocode(R"((?:^|[^A-Za-z])L?C\s*([0-9]+)\s*/\s*([0-9]+))");
     for (const auto& [key, name] : concretes_) {
-      std::smatch m;
       out += fmt::format("[concrete.{}]  # \"{}\" in the file\n", key, clean(name));
-      if (std::regex_search(name, m, eurocode) && std::stod(m[1]) >= 8) {
-        const double fck = std::stod(m[1]);
+      if (const auto found = find_class(name)) {
+        const int fck = found->fck;
         out += fmt::format(
             "# characteristic value of the class: the real strength is mostly higher, and a higher strength can be "
             "the\n"
-            "# unsafe side (a column that was to crush holds); measure it, or make it fuzzy\nfc = \"{:g} N/mm2\"\n",
+            "# unsafe side (a column that was to crush holds); measure it, or make it fuzzy\nfc = \"{} N/mm2\"\n",
             fck);
-        out += fmt::format("Ec = \"{:.1f} GPa\"  # 22 GPa ((fck + 8) / 10)^0.3\n", 22 * std::pow((fck + 8) / 10, 0.3));
-        taken(fmt::format("concrete {}: class {}, fc = {:g} N/mm2, its characteristic value", key, m[0].str(), fck));
+        out +=
+            fmt::format("Ec = \"{:.1f} GPa\"  # 22 GPa ((fck + 8) / 10)^0.3\n", 22 * std::pow((fck + 8) / 10.0, 0.3));
+        taken(fmt::format("concrete {}: class {}, fc = {} N/mm2, its characteristic value", key, found->name, fck));
         guessed(
             fmt::format("concrete {}: fc is the characteristic value of a class; the real strength is mostly higher, "
                         "and that can be the unsafe side",
                         key));
         guessed(fmt::format("concrete {}: Ec from the class", key));
+        if (fck == 8) {  // no formula gives it
+          out += "fct = \"?\"\n";
+          missing(fmt::format("concrete {}: fct", key));
+        }
       } else {
         out += "fc = \"?\"\nEc = \"?\"\n";
         missing(fmt::format("concrete {}: fc and Ec{}", key, name == "unknown" ? " (the file names no material)" : ""));
