@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/utf8.h"
+#include "product/foreign_text.h"
 #include "product/import.h"
 
 namespace topple::product {
@@ -182,13 +183,12 @@ Import make_site_text(const std::string& dxf, const std::string& file_name, doub
       continue;
     }
     arcs += o.has_arcs;
-    std::string layer;
-    for (const char c : o.layer)
-      if (c != '"' && c != '\\' && static_cast<unsigned char>(c) >= 32) layer += c;
+    std::string layer = clean_text(o.layer);
+    if (layer.empty()) layer = "outline";
     const bool is_utility = std::regex_search(layer, utility);
     std::string& to = is_utility ? utilities : neighbours;
-    to += fmt::format("[[site.{}]]\nname = \"{} {}\"\nfootprint = [", is_utility ? "utility" : "neighbour",
-                      layer.empty() ? "outline" : layer, ++count[layer]);
+    to += fmt::format("[[site.{}]]\nname = \"{} {}\"\nfootprint = [", is_utility ? "utility" : "neighbour", layer,
+                      ++count[layer]);
     for (size_t i = 0; i < o.corners.size(); ++i)
       to += fmt::format("{}[\"{:.3f} m\", \"{:.3f} m\"]", i > 0 ? ", " : "", o.corners[i][0] * unit,
                         o.corners[i][1] * unit);
@@ -209,7 +209,8 @@ Import make_site_text(const std::string& dxf, const std::string& file_name, doub
   if (arcs > 0) out.report.guessed.push_back(fmt::format("arcs of {} outlines became straight lines", arcs));
   out.report.guessed.push_back("x and y of the drawing are those of the plan: its origin is row A, frame 1");
   out.report.missing.push_back("the clearance that each of them asks for");
-  out.text = "# From " + file_name + ". Every \"?\" is a gap to fill.\n" + neighbours + utilities;
+  out.text = "# From " + clean_text(file_name) + ". Every \"?\" is a gap to fill.\n" + neighbours + utilities;
+  check_import(out.text, "E113", file_name);
   return out;
 }
 

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "base/unit.h"
+#include "product/foreign_text.h"
 #include "product/ifc_reinforcement.h"
 #include "product/import.h"
 
@@ -17,14 +18,6 @@ namespace {
 
 constexpr double kLeastSpacing = 0.3;  // of grid lines [m]
 constexpr double kOff = 0.6;           // how far an element may lie off its place [m]
-
-/// Quotes and control characters of a foreign text do not belong into a plan.
-std::string clean(const std::string& text) {
-  std::string out;
-  for (const char c : text)
-    if (c != '"' && c != '\\' && static_cast<unsigned char>(c) >= 32) out += c;
-  return out.substr(0, 80);
-}
 
 /// Middles of groups of values that lie closer together than the spacing of grid lines.
 std::vector<double> find_lines(std::vector<double> values) {
@@ -54,13 +47,6 @@ std::string letters(int i) {
 std::string metres(double x) { return fmt::format("\"{:.3f} m\"", std::abs(x) < 5e-4 ? 0.0 : x); }
 std::string centimetres(double x) { return fmt::format("\"{:g} cm\"", std::round(x * 1000) / 10); }
 std::string millimetres(double x) { return fmt::format("\"{:g} mm\"", std::round(x * 1e4) / 10); }
-
-/// A name that a plan can use as a key.
-std::string key_of(const std::string& text) {
-  std::string out;
-  for (const char c : text) out += std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '_';
-  return out.substr(0, 40);
-}
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 bool is_letter(char c) { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z'); }
@@ -99,6 +85,24 @@ std::optional<ConcreteClass> find_class(const std::string& name) {
   return std::nullopt;
 }
 
+/// Names of materials as keys of a plan, each of its own.
+class Keys {
+ public:
+  const std::string& of(const std::string& name) {
+    const auto [known, is_new] = keys_.try_emplace(name);
+    if (!is_new) return known->second;
+    std::string key;
+    for (const char c : name.substr(0, 40)) key += is_letter(c) || is_digit(c) ? c : '_';
+    const std::string first = key;
+    for (int i = 2; !taken_.insert(key).second; ++i) key = first + "_" + std::to_string(i);
+    return known->second = key;
+  }
+
+ private:
+  std::map<std::string, std::string> keys_;
+  std::set<std::string> taken_;
+};
+
 class Planner {
  public:
   Planner(const IfcBuilding& b, const std::string& file) : b_(b), file_(file) {}
@@ -115,6 +119,7 @@ class Planner {
         meshes > 0)
       guessed(fmt::format("{} elements are meshes of faces: their boxes were taken, as they fill them", meshes));
     write();
+    check_import(text_, "E112", file_);
     return {std::move(text_), std::move(report_)};
   }
 
@@ -329,9 +334,8 @@ class Planner {
   }
 
   std::string concrete_key(const std::string& name) {
-    std::string key = key_of(name);
-    concretes_[key] = name;
-    return key;
+    concretes_[keys_.of(name)] = name;
+    return keys_.of(name);
   }
 
   void write_list(const std::map<int, std::vector<std::string>>& places, const char* rule, const char* what,
@@ -424,7 +428,7 @@ class Planner {
 
   void write_concretes(std::string& out) {
     for (const auto& [key, name] : concretes_) {
-      out += fmt::format("[concrete.{}]  # \"{}\" in the file\n", key, clean(name));
+      out += fmt::format("[concrete.{}]  # \"{}\" in the file\n", key, clean_text(name));
       if (const auto found = find_class(name)) {
         const int fck = found->fck;
         out += fmt::format(
@@ -456,8 +460,8 @@ class Planner {
     std::smatch m;
     out += "[steel.bars]\n";
     if (std::regex_search(grade_, m, number)) {
-      out += fmt::format("fy = \"{} N/mm2\"  # characteristic value of {}\n", m[1].str(), clean(grade_));
-      taken("steel: fy = " + m[1].str() + " N/mm2 from the grade " + clean(grade_));
+      out += fmt::format("fy = \"{} N/mm2\"  # characteristic value of {}\n", m[1].str(), clean_text(grade_));
+      taken("steel: fy = " + m[1].str() + " N/mm2 from the grade " + clean_text(grade_));
       missing("steel: fu and eps_u");
     } else {
       out += "fy = \"?\"\n";
@@ -474,9 +478,9 @@ class Planner {
   void write() {
     text_.clear();
     std::string rules;
-    const auto name_of = [](const char* kind, const Group& g, bool panel) {
-      return panel ? fmt::format("{}_{:.0f}_{}", kind, 1000 * g.width, key_of(g.concrete))
-                   : fmt::format("{}_{:.0f}x{:.0f}_{}", kind, 1000 * g.width, 1000 * g.height, key_of(g.concrete));
+    const auto name_of = [this](const char* kind, const Group& g, bool panel) {
+      return panel ? fmt::format("{}_{:.0f}_{}", kind, 1000 * g.width, keys_.of(g.concrete))
+                   : fmt::format("{}_{:.0f}x{:.0f}_{}", kind, 1000 * g.width, 1000 * g.height, keys_.of(g.concrete));
     };
     std::string sections;
     for (const Group& g : columns_) write_section(name_of("column", g, false), g, true);
@@ -506,10 +510,13 @@ class Planner {
     for (const Group& g : walls_) write_list(g.places, "walls", "panel", name_of("wall", g, true));
     rules.swap(text_);
 
+    std::string title = clean_text(b_.name);
+    if (title.empty()) title = clean_text(file_);
+    if (title.empty()) title = "building";
     std::string out = fmt::format(
         "# From {} ({}). Every \"?\" is a gap: `topple check` names it, nothing runs before it is filled.\n"
         "title = \"{}\"\n",
-        clean(file_), clean(b_.schema), b_.name.empty() ? clean(file_) : clean(b_.name));
+        clean_text(file_), clean_text(b_.schema), title);
     write_concretes(out);
     write_steel(out);
     out += sections + "[grid]\nrows = { ";
@@ -535,7 +542,8 @@ class Planner {
   std::vector<double> rows_, frames_, levels_;
   std::vector<Group> columns_, beams_, slabs_, walls_;
   std::map<std::string, int> left_out_;
-  std::map<std::string, std::string> concretes_;
+  std::map<std::string, std::string> concretes_;  // names by their keys
+  Keys keys_;
 };
 
 }  // namespace
