@@ -32,6 +32,7 @@ const std::set<std::string>& element_types() {
 
 /// Of its box, what the volume of a mesh has to fill to be taken for it. Walls have openings.
 constexpr double kFilled = 0.9, kFilledWall = 0.5;
+constexpr double kFarthest = 1e8;  // coordinate of an element [m]
 constexpr double kStraight = 0.8;  // distance of a bar's ends over its length; ties are bent round
 
 /// What a body is made of. Points in world axes [m].
@@ -385,6 +386,11 @@ class Reader {
         const Vec3 p = turn(c);
         for (int k = 0; k < 3; ++k) e.low[k] = std::min(e.low[k], p[k]), e.high[k] = std::max(e.high[k], p[k]);
       }
+    const Vec3 reach{std::max(-e.low.x, e.high.x), std::max(-e.low.y, e.high.y), std::max(-e.low.z, e.high.z)};
+    if (!(reach.x < kFarthest && reach.y < kFarthest && reach.z < kFarthest)) {
+      e.why = "its place or its size is out of range";
+      return;
+    }
     e.has_box = true;
     if (!e.is_mesh || !body.corners.empty()) return;
     const Vec3 size = e.high - e.low;

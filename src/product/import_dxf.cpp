@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdlib>
@@ -12,6 +13,7 @@
 #include "base/utf8.h"
 #include "product/foreign_text.h"
 #include "product/import.h"
+#include "product/plan_limits.h"
 
 namespace topple::product {
 
@@ -84,6 +86,7 @@ double unit_of(int code) {
 }
 
 struct Outline {
+  int line = 1;  // where it begins
   std::string layer;
   bool is_closed = false, has_arcs = false, is_from_below = false;
   std::vector<std::array<double, 2>> corners;
@@ -128,6 +131,7 @@ std::vector<Outline> find_outlines(const std::vector<Pair>& pairs, const std::st
       }
       if (p.value == "ENDSEC") section.clear();
       entity = p.value;
+      now.line = p.line;
       in_polyline = p.value == "POLYLINE";
       continue;
     }
@@ -166,7 +170,7 @@ Import make_site_text(const std::string& dxf, const std::string& file_name, doub
   std::map<std::string, int> count;
   std::string neighbours, utilities;
   std::map<std::string, int> others;
-  int open = 0, arcs = 0, small = 0, taken = 0;
+  size_t open = 0, arcs = 0, small = 0, large = 0, taken = 0;
   for (Outline& o : find_outlines(pairs, file_name, others)) {
     if (o.corners.size() > 1 &&
         std::hypot(o.corners.front()[0] - o.corners.back()[0], o.corners.front()[1] - o.corners.back()[1]) * unit <
@@ -182,6 +186,14 @@ Import make_site_text(const std::string& dxf, const std::string& file_name, doub
       ++small;
       continue;
     }
+    if (o.corners.size() > limits::corners) {
+      ++large;
+      continue;
+    }
+    for (const auto& corner : o.corners)
+      if (const double far = std::max(std::abs(corner[0]), std::abs(corner[1])) * unit; far > limits::site.high)
+        fail(file_name, o.line, fmt::format("an outline lies {:.0f} km from the origin", far / 1000),
+             "a plan reaches 10 km: move the drawing so that its origin is row A, frame 1, or give its unit");
     arcs += o.has_arcs;
     std::string layer = clean_text(o.layer);
     if (layer.empty()) layer = "outline";
@@ -196,11 +208,14 @@ Import make_site_text(const std::string& dxf, const std::string& file_name, doub
     ++taken;
   }
   if (taken == 0) fail(file_name, 0, "has no closed outlines", "neighbours are closed LWPOLYLINE or POLYLINE entities");
+  if (taken > limits::neighbours)
+    fail(file_name, 0, fmt::format("has {} closed outlines", taken), "a plan holds 1000; leave out what is not near");
   out.report.taken.push_back(fmt::format("{} closed outlines", taken));
   if (!utilities.empty()) out.report.guessed.push_back("outlines on layers named like pipes and cables are utilities");
   if (open > 0) out.report.missing.push_back(fmt::format("{} open polylines are left out", open));
   if (small > 0)
     out.report.missing.push_back(fmt::format("{} outlines of fewer than three corners are left out", small));
+  if (large > 0) out.report.missing.push_back(fmt::format("{} outlines of more than 200 corners are left out", large));
   if (!others.empty()) {
     std::string list;
     for (const auto& [kind, number] : others) list += fmt::format("{}{} {}", list.empty() ? "" : ", ", number, kind);

@@ -7,29 +7,45 @@
 #include <regex>
 #include <set>
 
+#include "base/error.h"
 #include "base/unit.h"
 #include "product/foreign_text.h"
 #include "product/ifc_reinforcement.h"
 #include "product/import.h"
+#include "product/plan_limits.h"
+#include "product/reading.h"
 
 namespace topple::product {
 
 namespace {
 
-constexpr double kLeastSpacing = 0.3;  // of grid lines [m]
-constexpr double kOff = 0.6;           // how far an element may lie off its place [m]
+constexpr double kSpacing = limits::line_spacing + 1e-3;  // of grid lines, which are rounded [m]
+const double kRound = std::sqrt(std::acos(-1.0) / 4);     // side of a square over the diameter of a circle of its area
+constexpr double kOff = 0.6;                              // how far an element may lie off its place [m]
 
 /// Middles of groups of values that lie closer together than the spacing of grid lines.
 std::vector<double> find_lines(std::vector<double> values) {
+  struct Group {
+    double first = 0, sum = 0;
+    int count = 0;
+    double middle() const { return sum / count; }
+  };
   std::sort(values.begin(), values.end());
-  std::vector<double> lines;
-  for (size_t i = 0; i < values.size();) {
-    size_t k = i;
-    double sum = 0;
-    while (k < values.size() && values[k] - values[i] < kLeastSpacing) sum += values[k++];
-    lines.push_back(sum / static_cast<double>(k - i));
-    i = k;
+  std::vector<Group> groups;
+  for (const double v : values) {
+    if (groups.empty() || v - groups.back().first >= kSpacing) groups.push_back({v, 0, 0});
+    groups.back().sum += v, ++groups.back().count;
   }
+  std::vector<Group> apart;
+  for (const Group& g : groups) {
+    apart.push_back(g);
+    for (size_t n = apart.size(); n > 1 && apart[n - 1].middle() - apart[n - 2].middle() < kSpacing; --n) {
+      apart[n - 2].sum += apart[n - 1].sum, apart[n - 2].count += apart[n - 1].count;
+      apart.pop_back();
+    }
+  }
+  std::vector<double> lines;
+  for (const Group& g : apart) lines.push_back(g.middle());
   return lines;
 }
 int nearest(const std::vector<double>& lines, double value) {
@@ -108,6 +124,7 @@ class Planner {
   Planner(const IfcBuilding& b, const std::string& file) : b_(b), file_(file) {}
 
   Import make() {
+    gather();
     find_grid();
     place_columns();
     place_beams();
@@ -137,23 +154,45 @@ class Planner {
   void missing(std::string s) { report_.missing.push_back(std::move(s)); }
   void left_out(const IfcElement& e, const std::string& why) { ++left_out_[e.type.substr(3) + ": " + why]; }
 
-  std::vector<const IfcElement*> all(const std::string& type) {
-    std::vector<const IfcElement*> out;
+  [[noreturn]] void fail(const std::string& what, const std::string& help) const {
+    throw InputError(std::vector<Diagnostic>{{Severity::Error, "E112", {file_, 0, 0}, 1, what, help}});
+  }
+
+  /// Elements with a body of a size that a plan can hold, by type.
+  void gather() {
+    const auto fits = [](double low, double high, const Range& range) {
+      return low > range.low - 1e-6 && high < range.high + 1e-6;
+    };
     for (const IfcElement& e : b_.elements) {
-      if (e.type != type) continue;
-      if (e.has_box) {
-        out.push_back(&e);
-      } else {
+      const bool is_column = e.type == "IFCCOLUMN", is_slab = e.type == "IFCSLAB";
+      if (!is_column && !is_slab && e.type != "IFCBEAM" && e.type != "IFCWALL") continue;
+      const Vec3 size = e.high - e.low;
+      const double across = std::min(size.x, size.y), thickness = is_slab ? size.z : across;
+      const double low = is_column ? across * (e.is_round ? kRound : 1) : std::min(across, size.z);
+      const double high = is_column ? std::max(size.x, size.y) : std::max(across, size.z);
+      if (!e.has_box) {
         left_out(e, e.why.empty() ? "its body is no extruded profile" : e.why);
+      } else if (is_slab || e.type == "IFCWALL") {
+        if (fits(thickness, thickness, limits::panel_thickness)) {
+          fit_[e.type].push_back(&e);
+        } else {
+          left_out(e, "its thickness is not between 3 cm and 3 m");
+        }
+      } else if (fits(low, high, limits::section_size)) {
+        fit_[e.type].push_back(&e);
+      } else {
+        left_out(e, "the sides of its section are not between 5 cm and 10 m");
       }
     }
-    return out;
+    if (fit_["IFCCOLUMN"].empty())
+      fail("it has no column of 5 cm to 10 m in section",
+           "a plan's grid is made from its columns; look at the unit of the file");
   }
 
   void find_grid() {
     std::vector<double> xs, ys, tops;
     double bottom = 1e30, top = -1e30;
-    for (const IfcElement* e : all("IFCCOLUMN")) {
+    for (const IfcElement* e : fit_["IFCCOLUMN"]) {
       xs.push_back(0.5 * (e->low.x + e->high.x));
       ys.push_back(0.5 * (e->low.y + e->high.y));
       bottom = std::min(bottom, e->low.z);
@@ -172,12 +211,40 @@ class Planner {
       if (levels_.size() > 1) guessed("the file has no storeys where its columns stand: floors are where columns end");
     }
     levels_.push_back(top);
+    check_grid();
     taken(fmt::format("{} rows by {} frames and {} storeys, from the places of {} columns and {} storeys of the file",
                       rows_.size(), frames_.size(), levels_.size() - 1, xs.size(), b_.storeys.size()));
     if (std::abs(b_.angle) > 1e-4)
       guessed(fmt::format("the building's own axes, turned by {:.1f} deg against the file's x, are those of the plan",
                           b_.angle / unit::deg));
     guessed("the ground lies at the feet of the lowest columns; check it against the terrain");
+  }
+  /// Refuses a grid that no plan can hold.
+  void check_grid() {
+    for (const bool is_x : {true, false}) {
+      const std::vector<double>& lines = is_x ? rows_ : frames_;
+      const double reach = lines.back() - lines.front();
+      if (reach > limits::line_offset.high) {
+        const double middle = lines[lines.size() / 2];
+        const auto distance = [&](const IfcElement* e) {
+          return std::abs(0.5 * (is_x ? e->low.x + e->high.x : e->low.y + e->high.y) - middle);
+        };
+        const auto& columns = fit_["IFCCOLUMN"];
+        const IfcElement* far = *std::max_element(
+            columns.begin(), columns.end(), [&](const auto* a, const auto* b) { return distance(a) < distance(b); });
+        fail(fmt::format("its columns stand over {:.0f} m; the grid of a plan reaches over 1000 m", reach),
+             fmt::format("#{} stands far from the others; look at it and at the unit of the file", far->id));
+      }
+    }
+    if (rows_.size() > limits::lines || frames_.size() > limits::lines || storeys() > most_storeys ||
+        rows_.size() * frames_.size() * static_cast<size_t>(storeys()) > most_members)
+      fail(fmt::format("its columns give {} rows by {} frames and {} storeys, too many for a plan", rows_.size(),
+                       frames_.size(), storeys()),
+           "give a file of one building");
+    for (size_t s = 0; s + 1 < levels_.size(); ++s)
+      if (const double h = levels_[s + 1] - levels_[s]; !(h > 0.9996 && h < 50.0004))
+        fail(fmt::format("storey {} would be {:.3f} m high; those of a plan are 1 m to 50 m", s, h),
+             "look at the unit of the file, at its storeys and at the heights of its columns");
   }
   int storeys() const { return static_cast<int>(levels_.size()) - 1; }
   std::string point(int row, int frame) const { return letters(row) + std::to_string(frame + 1); }
@@ -192,9 +259,9 @@ class Planner {
 
   void place_columns() {
     int placed = 0;
-    for (const IfcElement* e : all("IFCCOLUMN")) {
+    for (const IfcElement* e : fit_["IFCCOLUMN"]) {
       double w = e->high.x - e->low.x, h = e->high.y - e->low.y;
-      if (e->is_round) w = h = std::sqrt(std::acos(-1.0) / 4) * w;
+      if (e->is_round) w = h = kRound * w;
       Group& g = group_of(columns_, *e, w, h);
       g.is_round |= e->is_round;
       bool any = false;
@@ -225,6 +292,8 @@ class Planner {
     return -1;
   }
 
+  double storey_height(int s) const { return levels_[static_cast<size_t>(s) + 1] - levels_[static_cast<size_t>(s)]; }
+
   /// Edges of the grid that an element runs along.
   std::vector<std::string> edges_of(const IfcElement& e) const {
     std::vector<std::string> out;
@@ -246,12 +315,14 @@ class Planner {
 
   void place_beams() {
     int placed = 0;
-    for (const IfcElement* e : all("IFCBEAM")) {
+    for (const IfcElement* e : fit_["IFCBEAM"]) {
       const double width = std::min(e->high.x - e->low.x, e->high.y - e->low.y), height = e->high.z - e->low.z;
       const int s = storey_below(e->high.z);
       const auto edges = edges_of(*e);
       if (s < 0) {
         left_out(*e, "its top is not level with a floor");
+      } else if (height >= storey_height(s)) {
+        left_out(*e, "is as deep as its storey is high");
       } else if (edges.empty()) {
         left_out(*e, "does not run between columns of the grid");
       } else {
@@ -266,10 +337,14 @@ class Planner {
 
   void place_slabs() {
     int placed = 0;
-    for (const IfcElement* e : all("IFCSLAB")) {
+    for (const IfcElement* e : fit_["IFCSLAB"]) {
       const int s = storey_below(e->high.z);
       if (s < 0) {
         left_out(*e, "is not level with a floor above a storey (a base slab lies on the ground)");
+        continue;
+      }
+      if (e->high.z - e->low.z >= storey_height(s)) {
+        left_out(*e, "is as thick as its storey is high");
         continue;
       }
       Group& g = group_of(slabs_, *e, e->high.z - e->low.z, 0);
@@ -299,7 +374,7 @@ class Planner {
 
   void place_walls() {
     int placed = 0;
-    for (const IfcElement* e : all("IFCWALL")) {
+    for (const IfcElement* e : fit_["IFCWALL"]) {
       const double thickness = std::min(e->high.x - e->low.x, e->high.y - e->low.y);
       const auto edges = edges_of(*e);
       Group& g = group_of(walls_, *e, thickness, 0);
@@ -371,7 +446,9 @@ class Planner {
     if (bars.has_cover && bars.largest_cover - bars.cover > 5e-3)
       guessed(fmt::format("section {}: its cover is {:.0f} to {:.0f} mm; the least one was taken", name,
                           1000 * bars.cover, 1000 * bars.largest_cover));
-    const double diameter = bars.ties.diameter, spacing = bars.tie_spacing;
+    // what a plan cannot hold is a gap
+    const double diameter = limits::holds(limits::tie_diameter, bars.ties.diameter) ? bars.ties.diameter : 0;
+    const double spacing = limits::holds(limits::tie_spacing, bars.tie_spacing) ? bars.tie_spacing : 0;
     text_ += fmt::format("ties = {{ diameter = {}, spacing = {} }}\n", diameter > 0 ? millimetres(diameter) : "\"?\"",
                          spacing > 0 ? millimetres(spacing) : "\"?\"");
     if (!(diameter > 0)) add_gap("diameter of ties");
@@ -384,8 +461,18 @@ class Planner {
     if (!gaps.empty()) missing(fmt::format("section {}: {}", name, gaps));
   }
 
+  static bool fits(const BarGroup& bars) {
+    return bars.count <= limits::bars && limits::holds(limits::bar_diameter, bars.diameter);
+  }
+
   void write_column_bars(const std::string& name, const MemberBars& bars) {
     const int count = bars.all.count;
+    if (count > 0 && !fits(bars.all)) {
+      text_ += "bars = { count_y = \"?\", count_z = \"?\", diameter = \"?\" }\n";
+      missing(fmt::format("section {}: its {} bars of {:g} mm, which a plan cannot hold", name, count,
+                          1000 * bars.all.diameter));
+      return;
+    }
     if (bars.count_y == 0 && (count < 4 || count % 4 != 0)) {
       text_ += "bars = { count_y = \"?\", count_z = \"?\", diameter = \"?\" }\n";
       missing(fmt::format("section {}: {}", name,
@@ -403,7 +490,7 @@ class Planner {
   void write_beam_bars(const std::string& name, const MemberBars& bars) {
     if (bars.middle > 0)
       missing(fmt::format("section {}: {} bars at the middle of its height are left out", name, bars.middle));
-    if (bars.top.count == 0 || bars.bottom.count == 0) {
+    if (bars.top.count == 0 || bars.bottom.count == 0 || !fits(bars.top) || !fits(bars.bottom)) {
       text_ += "top = \"?\"\nbottom = \"?\"\n";
       missing(fmt::format("section {}: its bars", name));
       return;
@@ -541,6 +628,7 @@ class Planner {
   ImportReport report_;
   std::vector<double> rows_, frames_, levels_;
   std::vector<Group> columns_, beams_, slabs_, walls_;
+  std::map<std::string, std::vector<const IfcElement*>> fit_;
   std::map<std::string, int> left_out_;
   std::map<std::string, std::string> concretes_;  // names by their keys
   Keys keys_;

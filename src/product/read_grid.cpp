@@ -1,13 +1,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "product/plan_limits.h"
 #include "product/reading.h"
 
 namespace topple::product {
 
 namespace {
-
-constexpr size_t most_lines = 500;
 
 bool is_letter(char c) { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z'); }
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
@@ -22,9 +21,9 @@ bool read_lines(TableReader& grid, const std::string& key, bool letters, std::ve
     if (!grid.has(key)) grid.missing(key, help);
     return false;
   }
-  if (node->entries.empty() || node->entries.size() > most_lines) {
+  if (node->entries.empty() || node->entries.size() > limits::lines) {
     grid.error("E209", node->place, key + ": has " + std::to_string(node->entries.size()) + " lines",
-               "allowed: between 1 and " + std::to_string(most_lines));
+               "allowed: between 1 and " + std::to_string(limits::lines));
     return false;
   }
   const int errors_before = grid.complaints().error_count();
@@ -35,8 +34,8 @@ bool read_lines(TableReader& grid, const std::string& key, bool letters, std::ve
       grid.error("E208", entry.place, key + ": " + quoted(entry.key) + " cannot name a " + (letters ? "row" : "frame"),
                  letters ? "rows are named by 1 to 6 letters" : "frames are named by 1 to 6 digits");
     const double offset = read_quantity(entry.value, grid.label() + ": " + key + "." + entry.key, Dimension::Length,
-                                        {-1000, 1000}, grid.complaints());
-    if (!offsets.empty() && offset < offsets.back() + 0.3)
+                                        limits::line_offset, grid.complaints());
+    if (!offsets.empty() && offset < offsets.back() + limits::line_spacing)
       grid.error("E210", entry.value.place, key + "." + entry.key + ": is not at least 0.3 m beyond " + names.back(),
                  "the lines of a grid are given in rising order");
     names.push_back(entry.key);
@@ -44,8 +43,6 @@ bool read_lines(TableReader& grid, const std::string& key, bool letters, std::ve
   }
   return grid.complaints().error_count() == errors_before && !grid.complaints().is_full();
 }
-
-constexpr Range heights{1, 50};
 
 /// A dead load on a floor, given as a weight [N/m²], as the mass [kg/m²] that has this weight on Earth.
 double calc_floor_mass(double weight) { return weight / unit::gravity; }
@@ -74,11 +71,11 @@ bool read_storeys(Reading& reading, TableReader& root) {
     } else {
       for (const Node& item : list->items)
         plan.storey_heights.push_back(
-            read_quantity(item, "storeys: heights", Dimension::Length, heights, reading.complaints));
+            read_quantity(item, "storeys: heights", Dimension::Length, limits::storey_height, reading.complaints));
     }
   } else {
     const auto count = static_cast<size_t>(table.integer("count", 1, most_storeys));
-    plan.storey_heights.assign(count, table.quantity("height", Dimension::Length, heights));
+    plan.storey_heights.assign(count, table.quantity("height", Dimension::Length, limits::storey_height));
     table.find("heights");
   }
   constexpr Range loads{0, 100e3};

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "product/plan_limits.h"
 #include "product/reading.h"
 
 namespace topple::product {
@@ -88,9 +89,6 @@ struct Layer {
   double diameter = nan;
 };
 
-constexpr Range bar_diameters{4 * unit::mm, 80 * unit::mm};
-constexpr int most_bars = 100;
-
 Layer read_layer(TableReader& table, const std::string& key) {
   const Node* node = table.find(key);
   if (!node) return {};
@@ -111,15 +109,15 @@ Layer read_layer(TableReader& table, const std::string& key) {
     table.error("E208", node->place, key + ": " + quoted(text) + " does not name bars", help);
     return {};
   }
-  if (count < 1 || count > most_bars) {
+  if (count < 1 || count > limits::bars) {
     table.error("E205", node->place, key + ": " + std::to_string(count) + " bars are out of range",
-                "allowed: between 1 and " + std::to_string(most_bars));
+                "allowed: between 1 and " + std::to_string(limits::bars));
     return {};
   }
   Node diameter = *node;
   diameter.text = text.substr(at + times);
-  return {count,
-          read_quantity(diameter, table.label() + ": " + key, Dimension::Length, bar_diameters, table.complaints())};
+  return {count, read_quantity(diameter, table.label() + ": " + key, Dimension::Length, limits::bar_diameter,
+                               table.complaints())};
 }
 
 double circle(double diameter) { return pi * diameter * diameter / 4; }
@@ -148,9 +146,9 @@ void read_bars(TableReader& table, Section& s) {
     const Node* node = table.table("bars");
     if (!node) return;
     TableReader bars(*node, table.label() + ".bars", table.complaints());
-    const int count_y = static_cast<int>(bars.integer("count_y", 2, most_bars));
-    const int count_z = static_cast<int>(bars.integer("count_z", 2, most_bars));
-    const double diameter = bars.quantity("diameter", Dimension::Length, bar_diameters);
+    const int count_y = static_cast<int>(bars.integer("count_y", 2, limits::bars));
+    const int count_z = static_cast<int>(bars.integer("count_z", 2, limits::bars));
+    const double diameter = bars.quantity("diameter", Dimension::Length, limits::bar_diameter);
     bars.finish();
     const double y = s.width / 2 - inset - diameter / 2, z = s.height / 2 - inset - diameter / 2;
     check_room(table, node->place, count_y, diameter, y, "width");
@@ -182,15 +180,15 @@ Section read_section(Reading& reading, const Entry& entry) {
   TableReader table(entry.value, "section." + entry.key, reading.complaints);
   Section s;
   s.name = entry.key;
-  s.width = table.quantity("width", Dimension::Length, {0.05, 10});
-  s.height = table.quantity("height", Dimension::Length, {0.05, 10});
+  s.width = table.quantity("width", Dimension::Length, limits::section_size);
+  s.height = table.quantity("height", Dimension::Length, limits::section_size);
   s.concrete = find_named(reading.concretes, table, "concrete", table.text("concrete"), "concrete");
   s.steel = find_named(reading.steels, table, "steel", table.text("steel"), "steel");
   s.cover = table.quantity("cover", Dimension::Length, {0, 0.5});
   if (const Node* node = table.table("ties")) {
     TableReader ties(*node, table.label() + ".ties", reading.complaints);
-    s.tie_diameter = ties.quantity("diameter", Dimension::Length, {2 * unit::mm, 40 * unit::mm});
-    s.tie_spacing = ties.quantity("spacing", Dimension::Length, {10 * unit::mm, 2});
+    s.tie_diameter = ties.quantity("diameter", Dimension::Length, limits::tie_diameter);
+    s.tie_spacing = ties.quantity("spacing", Dimension::Length, limits::tie_spacing);
     const std::int64_t legs = ties.find_integer("legs", 2, 50).value_or(2);
     s.tie_legs_y = static_cast<int>(ties.find_integer("legs_y", 2, 50).value_or(legs));
     s.tie_legs_z = static_cast<int>(ties.find_integer("legs_z", 2, 50).value_or(legs));
@@ -215,7 +213,7 @@ Panel read_panel(Reading& reading, const Entry& entry, bool is_wall) {
   TableReader table(entry.value, (is_wall ? "wall." : "slab.") + entry.key, reading.complaints);
   Panel p;
   p.name = entry.key;
-  p.thickness = table.quantity("thickness", Dimension::Length, {0.03, 3});
+  p.thickness = table.quantity("thickness", Dimension::Length, limits::panel_thickness);
   const bool is_masonry = is_wall && !table.has("concrete");
   if (is_masonry) {
     table.find("concrete");

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <limits>
 
+#include "product/plan_limits.h"
 #include "product/reading.h"
 
 namespace topple::product {
@@ -9,10 +10,6 @@ namespace topple::product {
 namespace {
 
 using Point = std::array<double, 2>;
-
-constexpr Range anywhere{-10e3, 10e3};  // coordinates around a site [m]
-constexpr size_t most_corners = 200;
-constexpr size_t most_neighbours = 1000;
 
 double cross(const Point& a, const Point& b, const Point& c) {
   return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
@@ -51,9 +48,9 @@ std::vector<Point> read_footprint(TableReader& table) {
     table.error("E202", node->place, "footprint: is " + name_of(node->kind) + "; a list of corners is wanted", help);
     return corners;
   }
-  if (node->items.size() < 3 || node->items.size() > most_corners) {
+  if (node->items.size() < 3 || node->items.size() > limits::corners) {
     table.error("E205", node->place, "footprint: has " + std::to_string(node->items.size()) + " corners",
-                "allowed: between 3 and " + std::to_string(most_corners));
+                "allowed: between 3 and " + std::to_string(limits::corners));
     return corners;
   }
   bool is_readable = true;
@@ -64,13 +61,13 @@ std::vector<Point> read_footprint(TableReader& table) {
       continue;
     }
     const std::string label = table.label() + ": footprint";
-    corners.push_back({read_quantity(item.items[0], label, Dimension::Length, anywhere, table.complaints()),
-                       read_quantity(item.items[1], label, Dimension::Length, anywhere, table.complaints())});
+    corners.push_back({read_quantity(item.items[0], label, Dimension::Length, limits::site, table.complaints()),
+                       read_quantity(item.items[1], label, Dimension::Length, limits::site, table.complaints())});
     is_readable = is_readable && std::isfinite(corners.back()[0]) && std::isfinite(corners.back()[1]);
   }
   if (!is_readable) return {};
   const double area = calc_signed_area(corners);
-  if (std::abs(area) < 0.01) {
+  if (std::abs(area) < limits::footprint) {
     table.error("E308", node->place, "footprint: encloses no area", "give the corners in order around the footprint");
   } else if (crosses_itself(corners)) {
     table.error("E308", node->place, "footprint: its edges cross", "give the corners in order around the footprint");
@@ -135,8 +132,9 @@ void read_site(Reading& reading, TableReader& root) {
   for (const bool is_utility : {false, true}) {
     const std::string key = is_utility ? "utility" : "neighbour";
     const std::vector<const Node*> tables = site.tables(key);
-    if (tables.size() > most_neighbours) {
-      site.error("E209", tables[most_neighbours]->place, "more than " + std::to_string(most_neighbours) + " of " + key);
+    if (tables.size() > limits::neighbours) {
+      site.error("E209", tables[limits::neighbours]->place,
+                 "more than " + std::to_string(limits::neighbours) + " of " + key);
       continue;
     }
     for (size_t i = 0; i < tables.size(); ++i) {

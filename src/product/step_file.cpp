@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <cstdint>
 #include <cstdlib>
 
@@ -180,6 +181,7 @@ class Parser {
       v.kind = StepValue::Kind::Number;
       v.number = std::strtod(from, &end);
       if (end == from) fail("a value is wanted here");
+      if (!std::isfinite(v.number)) fail("a number is out of range");
       at_ += static_cast<size_t>(end - from);
     }
     return v;

@@ -2,6 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
 #include "base/error.h"
 #include "ifc_writer.h"
 #include "product/plan.h"
@@ -102,6 +106,108 @@ TEST(ImportDxfNames, HoldNoControlsAndAreOnesOwn) {
   EXPECT_THAT(faults(text), testing::IsEmpty());
   for (const char* name : {"outline 1", "outline 2", "a 1", "a 2", "a 1 1"})
     EXPECT_THAT(text, HasSubstr(std::string("name = \"") + name + "\"")) << name;
+}
+
+std::string complaint(const std::function<void()>& run) {
+  try {
+    run();
+  } catch (const InputError& e) {
+    const Diagnostic& d = e.diagnostics()[0];
+    return d.code + ":" + std::to_string(d.where.line) + " " + d.message;
+  }
+  return "none";
+}
+
+/// A column of 0.4 m x 0.4 m, 3 m high unless said.
+std::string add_column(Writer& w, double x, double y, double size = 0.4, double height = 3) {
+  return w.element("IFCCOLUMN", w.placement("$", x, y, 0),
+                   w.shape("SweptSolid", w.extrusion(w.rectangle(size, size), height)));
+}
+
+TEST(ImportIfcNumbers, BeyondAllRangesAreRefusedWithTheirLine) {
+  for (const char* number : {"1E400", "-1E400", "-inf"}) {
+    Writer w;
+    w.metres();
+    add_column(w, 0, 0);
+    w.add(std::string("IFCCARTESIANPOINT((0.,") + number + "))");
+    const std::string text = ifc_file("IFC4", w.str());
+    const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<long>(text.find(number)), '\n');
+    EXPECT_EQ(complaint([&] { (void)read_ifc(text, "b.ifc"); }),
+              "E111:" + std::to_string(line) + " a number is out of range");
+  }
+}
+
+TEST(ImportIfcSizes, ThatAPlanCannotHoldAreLeftOutOrRefused) {
+  Writer w;
+  w.metres();
+  for (const double x : {0.0, 6.0})
+    for (const double y : {0.0, 5.0}) add_column(w, x, y);
+  add_column(w, 1e300, 0);
+  add_column(w, 3, 0, 0.04);
+  add_column(w, 3, 5, 30);
+  w.element("IFCSLAB", w.placement("$", 3, 2.5, 2.98), w.shape("SweptSolid", w.extrusion(w.rectangle(6, 5), 0.02)));
+  w.element("IFCBEAM", w.placement("$", 3, 0, 0), w.shape("SweptSolid", w.extrusion(w.rectangle(6, 0.3), 3)));
+  const Import made = import("IFC4", w);
+  EXPECT_THAT(made.text, HasSubstr("rows = { A = \"0.000 m\", B = \"6.000 m\" }"));
+  EXPECT_THAT(made.report.missing, Contains("1 x COLUMN: its place or its size is out of range"));
+  EXPECT_THAT(made.report.missing, Contains("2 x COLUMN: the sides of its section are not between 5 cm and 10 m"));
+  EXPECT_THAT(made.report.missing, Contains("1 x SLAB: its thickness is not between 3 cm and 3 m"));
+  EXPECT_THAT(made.report.missing, Contains("1 x BEAM: is as deep as its storey is high"));
+  const auto refused = [](double x, double size, double height) {
+    return complaint([&] {
+      Writer f;
+      f.metres();
+      for (const double at : {0.0, x}) add_column(f, at, 0, size, height);
+      (void)import("IFC4", f);
+    });
+  };
+  EXPECT_THAT(refused(2000, 0.4, 3), HasSubstr("E112:0 its columns stand over 2000 m"));
+  EXPECT_THAT(refused(5, 0.4, 0.3), HasSubstr("storey 0 would be 0.300 m high"));
+  EXPECT_THAT(refused(5, 0.4, 60), HasSubstr("storey 0 would be 60.000 m high"));
+  EXPECT_THAT(refused(5, 0.01, 3), HasSubstr("no column of 5 cm to 10 m"));
+}
+
+TEST(ImportIfcGrid, KeepsItsLinesApart) {
+  // groups from 0 m and from 0.31 m, whose middles are 0.16 m apart
+  Writer w;
+  w.metres();
+  for (const double x : {0.0, 0.29, 0.31, 0.32, 6.0}) add_column(w, x, 0, 0.1);
+  EXPECT_THAT(import("IFC4", w).text, HasSubstr("rows = { A = \"0.000 m\", B = \"5.770 m\" }"));
+}
+
+TEST(ImportIfcBars, ThatAPlanCannotHoldAreGaps) {
+  Writer w;
+  w.metres();
+  const std::string column = add_column(w, 0, 0);
+  for (const double x : {-0.15, 0.15})
+    for (const double y : {-0.15, 0.15})
+      w.add("IFCREINFORCINGBAR('g',$,'bar',$,$," + w.placement("$", x, y, 0.1) + ",$,$,'B500B',0.2,0.03,3.,.MAIN.,$)");
+  w.add("IFCREINFORCINGBAR('g',$,'tie',$,$," + w.placement("$", 0, 0, 0.1) + ",$,$,'B500B',0.1,0.03,3.,.LIGATURE.,$)");
+  const Import made = import("IFC4", w);
+  EXPECT_THAT(made.text, HasSubstr("bars = { count_y = \"?\", count_z = \"?\", diameter = \"?\" }"));
+  EXPECT_THAT(made.text, HasSubstr("ties = { diameter = \"?\", spacing = \"?\" }"));
+  EXPECT_THAT(made.report.missing, Contains(HasSubstr("its 4 bars of 200 mm, which a plan cannot hold")));
+}
+
+TEST(ImportDxfSizes, ThatAPlanCannotHoldAreLeftOutOrRefused) {
+  const auto drawing = [](const std::string& outlines) {
+    return "0\nSECTION\n2\nENTITIES\n" + outlines + "0\nENDSEC\n0\nEOF\n";
+  };
+  const auto outline = [](double x, int corners) {
+    std::string out = "0\nLWPOLYLINE\n8\nH\n70\n1\n";
+    for (int i = 0; i < corners; ++i)
+      out += "10\n" + std::to_string(x + 5 * std::cos(6.28 * i / corners)) + "\n20\n" +
+             std::to_string(5 * std::sin(6.28 * i / corners)) + "\n";
+    return out;
+  };
+  const Import made = make_site_text(drawing(outline(50, 200) + outline(50, 201)), "s.dxf", 0);
+  EXPECT_THAT(made.report.taken, Contains("1 closed outlines"));
+  EXPECT_THAT(made.report.missing, Contains("1 outlines of more than 200 corners are left out"));
+  EXPECT_EQ(complaint([&] { (void)make_site_text(drawing(outline(50, 4) + outline(3.5e6, 4)), "s.dxf", 0); }),
+            "E113:28 an outline lies 3500 km from the origin");
+  std::string many;
+  for (int i = 0; i < 1001; ++i) many += outline(50, 4);
+  EXPECT_EQ(complaint([&] { (void)make_site_text(drawing(many), "s.dxf", 0); }), "E113:0 has 1001 closed outlines");
 }
 
 }  // namespace

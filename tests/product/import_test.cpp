@@ -256,7 +256,10 @@ TEST(ImportDxf, TakesClosedOutlinesInTheUnitOfTheHeader) {
   EXPECT_THAT(made.report.missing, Contains(HasSubstr("1 open polylines")));
   // another unit, as the caller wants it
   EXPECT_THAT(make_site_text(dxf("", polyline("H", 1)), "s.dxf", 1e-2).text, HasSubstr("\"200.000 m\""));
-  EXPECT_THAT(make_site_text(dxf("", polyline("H", 1)), "s.dxf", 0).report.guessed, Contains(HasSubstr("are metres")));
+  EXPECT_THAT(
+      make_site_text(dxf("", "0\nLWPOLYLINE\n8\nH\n70\n1\n10\n20\n20\n0\n10\n30\n20\n0\n10\n30\n20\n9\n"), "s.dxf", 0)
+          .report.guessed,
+      Contains(HasSubstr("are metres")));
   EXPECT_THROW(make_site_text(dxf("", ""), "s.dxf", 0), InputError);
   EXPECT_THROW(make_site_text("AutoCAD Binary DXF\n\x1a\n", "s.dxf", 0), InputError);
   EXPECT_THAT(made.report.missing, Contains(HasSubstr("left out: 1 LINE")));
@@ -277,10 +280,10 @@ TEST(ImportDxf, RefusesCoordinatesThatAreNone) {
 }
 
 TEST(ImportDxf, ReadsNamesOfOldDrawingsAndPlanesSeenFromBelow) {
-  const Import latin = make_site_text(dxf("", polyline("Geb\xE4ude", 1)), "s.dxf", 0);
+  const Import latin = make_site_text(dxf("", polyline("Geb\xE4ude", 1)), "s.dxf", 1e-3);
   EXPECT_THAT(latin.text, HasSubstr("name = \"Gebäude 1\""));
   EXPECT_THAT(latin.report.guessed, Contains(HasSubstr("ISO 8859-1")));
-  EXPECT_THAT(make_site_text(dxf("", polyline("Gebäude", 1)), "s.dxf", 0).text, HasSubstr("name = \"Gebäude 1\""));
+  EXPECT_THAT(make_site_text(dxf("", polyline("Gebäude", 1)), "s.dxf", 1e-3).text, HasSubstr("name = \"Gebäude 1\""));
   std::string below = polyline("H", 1);
   below.insert(below.find("10\n20000.0"), "210\n0\n220\n0\n230\n-1\n");
   EXPECT_THAT(make_site_text(dxf("", below), "s.dxf", 1e-3).text,
