@@ -40,6 +40,7 @@ double read_length(const Pair& p, const std::string& name) {
   return x;
 }
 
+/// All pairs up to that of the end, `0 EOF`, which a file that was cut off does not have.
 std::vector<Pair> read_pairs(const std::string& text, const std::string& name) {
   std::vector<Pair> out;
   std::istringstream in(text);
@@ -57,8 +58,10 @@ std::vector<Pair> read_pairs(const std::string& text, const std::string& name) {
       fail(name, line, "is no DXF text: a group code is wanted, there is \"" + word.substr(0, 20) + "\"",
            "save the drawing as DXF in ASCII");
     out.push_back({static_cast<int>(number), trimmed(value), line + 1});
+    if (number == 0 && out.back().value == "EOF") return out;
   }
-  return out;
+  fail(name, out.empty() ? 1 : out.back().line, "ends before its EOF",
+       "the drawing was cut off; save or copy it again");
 }
 
 /// Metres of a unit of $INSUNITS; 0: not said.
@@ -115,6 +118,8 @@ std::vector<Outline> find_outlines(const std::vector<Pair>& pairs, const std::st
   for (size_t i = 0; i < pairs.size(); ++i) {
     const Pair& p = pairs[i];
     if (p.code == 0) {
+      if (p.value == "EOF" && section == "ENTITIES")
+        fail(name, p.line, "its entities have no ENDSEC", "the drawing was cut off; save or copy it again");
       if (in_polyline && (p.value == "VERTEX" || p.value == "SEQEND")) {
         in_vertex = p.value == "VERTEX";
         if (!in_vertex) {

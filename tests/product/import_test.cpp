@@ -279,6 +279,28 @@ TEST(ImportDxf, RefusesCoordinatesThatAreNone) {
   }
 }
 
+TEST(ImportDxf, RefusesDrawingsThatAreCutOff) {
+  const std::string whole = dxf("", polyline("A", 1) + polyline("B", 1)), end = "0\nENDSEC\n0\nEOF\n";
+  const auto place = [](const std::string& text) {
+    try {
+      (void)make_site_text(text, "s.dxf", 1e-3);
+    } catch (const InputError& e) {
+      return e.diagnostics()[0].code + ":" + std::to_string(e.diagnostics()[0].where.line);
+    }
+    return std::string("none");
+  };
+  EXPECT_EQ(place(whole), "none");
+  EXPECT_EQ(place(whole + "0"), "none") << "what stands behind the end";
+  const std::string entities = whole.substr(0, whole.size() - end.size());
+  EXPECT_EQ(place(entities), "E113:58");
+  EXPECT_EQ(place(entities + "0\nENDSEC\n"), "E113:60");
+  EXPECT_EQ(place(entities + "0\nEOF\n"), "E113:60");
+  // inside an outline, and between a group code and its value
+  EXPECT_EQ(place(whole.substr(0, whole.rfind("\n20000.0") + 1)), "E113:54");
+  EXPECT_EQ(place(whole.substr(0, whole.rfind("\n20\n9000.0"))), "E113:56");
+  EXPECT_EQ(place(""), "E113:1");
+}
+
 TEST(ImportDxf, ReadsNamesOfOldDrawingsAndPlanesSeenFromBelow) {
   const Import latin = make_site_text(dxf("", polyline("Geb\xE4ude", 1)), "s.dxf", 1e-3);
   EXPECT_THAT(latin.text, HasSubstr("name = \"Gebäude 1\""));
