@@ -32,6 +32,7 @@ const std::set<std::string>& element_types() {
 
 /// Of its box, what the volume of a mesh has to fill to be taken for it. Walls have openings.
 constexpr double kFilled = 0.9, kFilledWall = 0.5;
+constexpr double kLine = 0.3;      // columns less far apart stand in one line [m]
 constexpr double kFarthest = 1e8;  // coordinate of an element [m]
 constexpr double kStraight = 0.8;  // distance of a bar's ends over its length; ties are bent round
 
@@ -433,21 +434,81 @@ class Reader {
     return {};
   }
 
-  /// The direction that most of the plan's edges have, modulo a right angle, by their length.
+  /// Of the directions of the building's edges, modulo a right angle, the one along which its columns stand in the
+  /// fewest rows and frames: what stands askew beside them does not turn it. Else that of most edges, by their length.
   void find_angle(const std::vector<Body>& bodies) {
-    double c = 0, s = 0;
+    std::vector<Edge> edges;
     const auto add = [&](const Vec3& d) {
-      const double length = std::hypot(d.x, d.y), a = 4 * std::atan2(d.y, d.x);
-      c += length * std::cos(a), s += length * std::sin(a);
+      const double length = std::hypot(d.x, d.y), a = std::atan2(d.y, d.x);
+      if (length > 1e-6 && length < kFarthest) edges.push_back({a - kRight * std::floor(a / kRight), length});
     };
-    for (const Body& body : bodies) {
-      for (size_t i = 0; i + 2 < body.corners.size(); i += 2) add(body.corners[i + 2] - body.corners[i]);
+    std::vector<Vec3> columns;
+    for (size_t b = 0; b < bodies.size(); ++b) {
+      const std::vector<Vec3>& c = bodies[b].corners;
+      for (size_t i = 0; i + 1 < c.size(); i += 2) add(c[(i + 2) % c.size()] - c[i]), add(c[i + 1] - c[i]);
       // upright faces, as triangles have diagonals
-      for (const Vec3& n : body.faces)
+      for (const Vec3& n : bodies[b].faces)
         if (std::abs(n.z) < 1e-3 * norm(n)) add(n);
+      if (out_.elements[b].type != "IFCCOLUMN") continue;
+      Vec3 sum;
+      for (const auto* list : {&c, &bodies[b].points})
+        for (const Vec3& p : *list) sum += p;
+      const size_t n = c.size() + bodies[b].points.size();
+      if (n > 0 && std::hypot(sum.x, sum.y) < kFarthest) columns.push_back((1.0 / static_cast<double>(n)) * sum);
     }
-    out_.angle = std::hypot(c, s) > 0 ? std::atan2(s, c) / 4 : 0;
-    if (std::abs(out_.angle) < 1e-4) out_.angle = 0;
+    std::sort(edges.begin(), edges.end());
+    Alignment best;
+    for (int i = 0; i < 12 && !edges.empty(); ++i) {
+      const double angle = take_direction(edges);
+      const Alignment found = align(columns, angle);
+      if (i > 0 && (found.lines > best.lines || (found.lines == best.lines && found.spread > best.spread - 1e-3)))
+        continue;
+      best = found;
+      out_.angle = std::abs(angle) < 1e-4 ? 0 : angle;
+    }
+  }
+  static constexpr double kRight = 90 * unit::deg;
+  struct Edge {
+    double angle = 0, length = 0;  // angle from 0 to kRight
+    bool operator<(const Edge& o) const { return angle < o.angle; }
+  };
+  /// The median of the degree that holds the longest edges; they are taken out. Edges are sorted.
+  static double take_direction(std::vector<Edge>& edges) {
+    constexpr double width = 1 * unit::deg;
+    const size_t n = edges.size();
+    const auto at = [&](size_t i) { return edges[i % n].angle + (i < n ? 0 : kRight); };
+    size_t from = 0, to = 0;
+    double most = 0, held = 0;
+    for (size_t i = 0, end = 0; i < n; held -= edges[i++].length) {
+      for (; end < i + n && at(end) <= at(i) + width; ++end) held += edges[end % n].length;
+      if (held > most * (1 + 1e-9)) most = held, from = i, to = end;
+    }
+    double passed = 0, median = 0;
+    for (size_t k = from; k < to && passed < 0.5 * most; ++k) passed += edges[k % n].length, median = at(k);
+    std::erase_if(edges, [median](const Edge& e) {
+      const double off = e.angle - median;
+      return std::abs(off - kRight * std::round(off / kRight)) <= width;
+    });
+    return median - kRight * std::round(median / kRight);
+  }
+  /// Rows and frames of columns along a direction, and how far they stand off them.
+  struct Alignment {
+    int lines = 0;
+    double spread = 0;  // [m]
+  };
+  static Alignment align(const std::vector<Vec3>& columns, double angle) {
+    Alignment out;
+    const double c = std::cos(angle), s = std::sin(angle);
+    for (const bool is_x : {true, false}) {
+      std::vector<double> places;
+      for (const Vec3& p : columns) places.push_back(is_x ? c * p.x + s * p.y : c * p.y - s * p.x);
+      std::sort(places.begin(), places.end());
+      for (size_t i = 0, first = 0; i < places.size(); ++i) {
+        if (i == 0 || places[i] - places[first] >= kLine) first = i, ++out.lines;
+        out.spread += places[i] - places[first];
+      }
+    }
+    return out;
   }
   Vec3 turn(const Vec3& p) const {
     const double c = std::cos(out_.angle), s = std::sin(out_.angle);
