@@ -36,12 +36,41 @@ constexpr double kLine = 0.3;      // columns less far apart stand in one line [
 constexpr double kFarthest = 1e8;  // coordinate of an element [m]
 constexpr double kStraight = 0.8;  // distance of a bar's ends over its length; ties are bent round
 
+using Loop = std::vector<Vec3>;
+
+/// Normal of a flat loop, as long as twice its area.
+Vec3 calc_normal(const Loop& loop) {
+  Vec3 sum;
+  for (size_t i = 2; i < loop.size(); ++i) sum += cross(loop[i - 1] - loop[0], loop[i] - loop[0]);
+  return sum;
+}
+
+/// An extruded profile. Points in world axes [m].
+struct Solid {
+  std::vector<Loop> loops;  // its outline and its holes, at the foot
+  Vec3 way;                 // from foot to head
+
+  double volume() const {
+    double sum = 0;
+    for (size_t i = 0; i < loops.size(); ++i) sum += (i == 0 ? 0.5 : -0.5) * std::abs(dot(calc_normal(loops[i]), way));
+    return sum;
+  }
+  /// Normals of all its faces but those of holes, as long as twice their areas.
+  std::vector<Vec3> faces() const {
+    const Loop& outline = loops.front();
+    std::vector<Vec3> out{calc_normal(outline), calc_normal(outline)};
+    for (size_t i = 0; i < outline.size(); ++i)
+      out.push_back(2 * cross(outline[(i + 1) % outline.size()] - outline[i], way));
+    return out;
+  }
+};
+
 /// What a body is made of. Points in world axes [m].
 struct Body {
-  std::vector<Vec3> corners;  // of extrusions: foot and head of each corner of the profile in turn
-  std::vector<Vec3> points;   // of meshes
-  std::vector<Vec3> faces;    // their normals, as long as twice the area [m²]
-  double volume = 0;          // of meshes [m³]
+  std::vector<Solid> solids;
+  std::vector<Vec3> points;  // of meshes
+  std::vector<Vec3> faces;   // their normals, as long as twice the area [m²]
+  double volume = 0;         // of meshes [m³]
   bool is_round = false;
   std::string why;  // what was not understood
 };
@@ -239,33 +268,46 @@ class Reader {
     return true;
   }
 
-  /// Corners of a profile's box in its own plane.
-  bool find_profile(const StepValue& v, std::vector<Vec3>& out, bool& is_round, std::string& why) const {
+  /// Outline and holes of a profile in its own plane; a circle as a polygon.
+  bool find_profile(const StepValue& v, std::vector<Loop>& out, bool& is_round, std::string& why) const {
     const StepEntity* e = get(v);
     if (e == nullptr) return false;
     const double u = out_.length_unit;
     why = "its profile is " + e->type;
-    double x = 0, y = 0;
     if (e->type == "IFCRECTANGLEPROFILEDEF" || e->type == "IFCROUNDEDRECTANGLEPROFILEDEF") {
-      x = 0.5 * e->at(3).number * u, y = 0.5 * e->at(4).number * u;
-    } else if (e->type == "IFCCIRCLEPROFILEDEF") {
-      x = y = e->at(3).number * u;
-      is_round = true;
-    } else if (e->type == "IFCARBITRARYCLOSEDPROFILEDEF" || e->type == "IFCARBITRARYPROFILEDEFWITHVOIDS") {
-      is_round |= is(get(e->at(2)), "IFCCIRCLE");
-      return find_points(e->at(2), out) && out.size() >= 3;
-    } else if (e->type == "IFCDERIVEDPROFILEDEF" || e->type == "IFCMIRROREDPROFILEDEF") {
-      const StepEntity* moved = get(e->at(3));
-      std::vector<Vec3> parent;
-      if (!find_profile(e->at(2), parent, is_round, why)) return false;
-      for (const Vec3& p : parent) out.push_back(moved == nullptr ? Vec3{-p.x, p.y, p.z} : transform(*moved) * p);
-      return true;
-    } else {
-      return false;
+      const Pose at = axis_placement(e->at(2));
+      const double x = 0.5 * e->at(3).number * u, y = 0.5 * e->at(4).number * u;
+      out.push_back({at * Vec3{-x, -y, 0}, at * Vec3{x, -y, 0}, at * Vec3{x, y, 0}, at * Vec3{-x, y, 0}});
+      return x > 0 && y > 0;
     }
-    const Pose at = axis_placement(e->at(2));
-    for (const Vec3& c : {Vec3{-x, -y, 0}, Vec3{x, -y, 0}, Vec3{x, y, 0}, Vec3{-x, y, 0}}) out.push_back(at * c);
-    return x > 0 && y > 0;
+    if (e->type == "IFCCIRCLEPROFILEDEF") {
+      const Pose at = axis_placement(e->at(2));
+      constexpr int corners = 72;
+      const double radius = e->at(3).number * u, step = 2 * std::acos(-1.0) / corners;
+      out.emplace_back();
+      for (int i = 0; i < corners; ++i)
+        out.back().push_back(at * Vec3{radius * std::cos(i * step), radius * std::sin(i * step), 0});
+      is_round = true;
+      return radius > 0;
+    }
+    if (e->type == "IFCARBITRARYCLOSEDPROFILEDEF" || e->type == "IFCARBITRARYPROFILEDEFWITHVOIDS") {
+      is_round |= is(get(e->at(2)), "IFCCIRCLE");
+      out.emplace_back();
+      if (!find_points(e->at(2), out.back()) || out.back().size() < 3) return false;
+      for (const StepValue& hole : e->at(3).items) {
+        out.emplace_back();
+        if (!find_points(hole, out.back())) return false;
+      }
+      return true;
+    }
+    if (e->type == "IFCDERIVEDPROFILEDEF" || e->type == "IFCMIRROREDPROFILEDEF") {
+      const StepEntity* moved = get(e->at(3));
+      if (!find_profile(e->at(2), out, is_round, why)) return false;
+      for (Loop& loop : out)
+        for (Vec3& p : loop) p = moved == nullptr ? Vec3{-p.x, p.y, p.z} : transform(*moved) * p;
+      return true;
+    }
+    return false;
   }
 
   /// IfcCartesianTransformationOperator; scales and mirrors are not understood.
@@ -338,14 +380,14 @@ class Reader {
     const StepEntity* e = get(v);
     if (e == nullptr || depth > 10) return false;
     if (e->type == "IFCEXTRUDEDAREASOLID") {
-      std::vector<Vec3> profile;
-      if (!find_profile(e->at(0), profile, out.is_round, out.why)) return false;
+      Solid solid;
+      if (!find_profile(e->at(0), solid.loops, out.is_round, out.why)) return false;
       const Pose X_WP = X * axis_placement(e->at(1));
       const Vec3 way = e->at(3).number * out_.length_unit * direction(e->at(2), {0, 0, 1});
-      for (const Vec3& p : profile) {
-        out.corners.push_back(X_WP * p);
-        out.corners.push_back(X_WP * (p + way));
-      }
+      for (Loop& loop : solid.loops)
+        for (Vec3& p : loop) p = X_WP * p;
+      solid.way = X_WP * way - X_WP.p;
+      out.solids.push_back(std::move(solid));
       return true;
     }
     if (e->type == "IFCBOOLEANCLIPPINGRESULT" || e->type == "IFCBOOLEANRESULT")
@@ -379,27 +421,79 @@ class Reader {
   void find_box(const Body& body, IfcElement& e) const {
     e.is_mesh = !body.points.empty();
     e.why = body.why;
-    if (body.corners.size() + body.points.size() < 6) return;
+    if (body.solids.empty() && body.points.size() < 6) return;
     e.low = {1e30, 1e30, 1e30};
     e.high = {-1e30, -1e30, -1e30};
-    for (const auto* list : {&body.corners, &body.points})
-      for (const Vec3& c : *list) {
-        const Vec3 p = turn(c);
-        for (int k = 0; k < 3; ++k) e.low[k] = std::min(e.low[k], p[k]), e.high[k] = std::max(e.high[k], p[k]);
-      }
+    const auto add = [&e, this](const Vec3& c) {
+      const Vec3 p = turn(c);
+      for (int k = 0; k < 3; ++k) e.low[k] = std::min(e.low[k], p[k]), e.high[k] = std::max(e.high[k], p[k]);
+    };
+    for (const Solid& solid : body.solids)
+      for (const Vec3& p : solid.loops.front()) add(p), add(p + solid.way);
+    for (const Vec3& p : body.points) add(p);
     const Vec3 reach{std::max(-e.low.x, e.high.x), std::max(-e.low.y, e.high.y), std::max(-e.low.z, e.high.z)};
     if (!(reach.x < kFarthest && reach.y < kFarthest && reach.z < kFarthest)) {
       e.why = "its place or its size is out of range";
       return;
     }
-    e.has_box = true;
-    if (!e.is_mesh || !body.corners.empty()) return;
     const Vec3 size = e.high - e.low;
-    const double filled = std::abs(body.volume) / (size.x * size.y * size.z);
-    const double round = std::acos(-1.0) / 4;
-    e.is_round = e.type == "IFCCOLUMN" && std::abs(size.x - size.y) < 0.02 * size.x && std::abs(filled - round) < 0.04;
-    e.has_box = e.is_round || filled >= (e.type == "IFCWALL" ? kFilledWall : kFilled);
-    if (!e.has_box) e.why = "its body is a mesh that is no upright box";
+    double volume = std::abs(body.volume);
+    for (const Solid& solid : body.solids) volume += solid.volume();
+    const double filled = volume / (size.x * size.y * size.z), round = std::acos(-1.0) / 4;
+    if (body.solids.empty()) {
+      e.is_round =
+          e.type == "IFCCOLUMN" && std::abs(size.x - size.y) < 0.02 * size.x && std::abs(filled - round) < 0.04;
+      e.has_box = e.is_round || filled >= (e.type == "IFCWALL" ? kFilledWall : kFilled);
+      if (!e.has_box) e.why = "its body is a mesh that is no upright box";
+      return;
+    }
+    const bool is_panel = e.type == "IFCWALL" || e.type == "IFCSLAB";
+    if (e.type == "IFCSLAB") find_outlines(body, e);
+    if (!(is_panel ? lies_flat(body, e) : filled >= kFilled * (e.is_round ? round : 1))) {
+      e.why = "it is turned against the grid, or inclined";
+      if (!is_panel && !e.is_round && lies_along_axes(body)) e.why = "its profile does not fill its box";
+    } else if (is_panel && e.outlines.empty() && !(filled >= (e.type == "IFCWALL" ? kFilledWall : kFilled))) {
+      e.why = "its profile does not fill its box";
+    } else {
+      e.has_box = true;
+    }
+  }
+  /// Whether a wall or a slab is as thick as its box.
+  bool lies_flat(const Body& body, const IfcElement& e) const {
+    Vec3 across;
+    for (const Solid& solid : body.solids)
+      for (const Vec3& n : solid.faces())
+        if (norm(n) > norm(across) && (e.type == "IFCSLAB" || std::abs(n.z) < 0.5 * norm(n))) across = n;
+    if (!(norm(across) > 0)) return false;
+    double low = 1e30, high = -1e30;
+    for (const Solid& solid : body.solids)
+      for (const Vec3& p : solid.loops.front())
+        for (const double d : {dot(p, across) / norm(across), dot(p + solid.way, across) / norm(across)})
+          low = std::min(low, d), high = std::max(high, d);
+    const Vec3 size = e.high - e.low;
+    return high - low >= kFilled * (e.type == "IFCSLAB" ? size.z : std::min(size.x, size.y));
+  }
+  /// Whether nearly all of its faces do.
+  bool lies_along_axes(const Body& body) const {
+    double along = 0, all = 0;
+    for (const Solid& solid : body.solids)
+      for (const Vec3& n : solid.faces()) {
+        const Vec3 own = turn(n);
+        all += norm(n);
+        if (std::max({std::abs(own.x), std::abs(own.y), std::abs(own.z)}) > 0.999 * norm(n)) along += norm(n);
+      }
+    return along >= kFilled * all;
+  }
+  /// Outlines of a slab whose solids are upright.
+  void find_outlines(const Body& body, IfcElement& e) const {
+    for (const Solid& solid : body.solids)
+      if (std::hypot(solid.way.x, solid.way.y) > 1e-3 * std::abs(solid.way.z)) return;
+    for (const Solid& solid : body.solids) {
+      std::vector<Loop> loops = solid.loops;
+      for (Loop& loop : loops)
+        for (Vec3& p : loop) p = turn(p);
+      e.outlines.push_back(std::move(loops));
+    }
   }
 
   void read_materials() {
@@ -444,17 +538,22 @@ class Reader {
     };
     std::vector<Vec3> columns;
     for (size_t b = 0; b < bodies.size(); ++b) {
-      const std::vector<Vec3>& c = bodies[b].corners;
-      for (size_t i = 0; i + 1 < c.size(); i += 2) add(c[(i + 2) % c.size()] - c[i]), add(c[i + 1] - c[i]);
-      // upright faces, as triangles have diagonals
-      for (const Vec3& n : bodies[b].faces)
-        if (std::abs(n.z) < 1e-3 * norm(n)) add(n);
-      if (out_.elements[b].type != "IFCCOLUMN") continue;
       Vec3 sum;
-      for (const auto* list : {&c, &bodies[b].points})
-        for (const Vec3& p : *list) sum += p;
-      const size_t n = c.size() + bodies[b].points.size();
-      if (n > 0 && std::hypot(sum.x, sum.y) < kFarthest) columns.push_back((1.0 / static_cast<double>(n)) * sum);
+      size_t n = 0;
+      for (const Solid& solid : bodies[b].solids) {
+        const Loop& c = solid.loops.front();
+        for (size_t i = 0; i < c.size(); ++i) {
+          sum += c[i] + 0.5 * solid.way, ++n;
+          if (!bodies[b].is_round) add(c[(i + 1) % c.size()] - c[i]), add(solid.way);
+        }
+      }
+      for (const Vec3& p : bodies[b].points) sum += p, ++n;
+      // upright faces, as triangles have diagonals
+      for (const Vec3& f : bodies[b].faces)
+        if (std::abs(f.z) < 1e-3 * norm(f)) add(f);
+      if (n > 0 && out_.elements[b].type == "IFCCOLUMN" &&
+          std::hypot(sum.x, sum.y) < kFarthest * static_cast<double>(n))
+        columns.push_back((1.0 / static_cast<double>(n)) * sum);
     }
     std::sort(edges.begin(), edges.end());
     Alignment best;

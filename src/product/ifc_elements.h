@@ -10,8 +10,8 @@
 
 namespace topple::product {
 
-/// An element whose body is an extruded profile, or a mesh that fills its box; world axes turned by IfcBuilding::angle
-/// about z.
+/// An element whose body, extruded profiles or a mesh, fills its box; of slabs its outline. World axes turned by
+/// IfcBuilding::angle about z.
 struct IfcElement {
   std::string type;      // "IFCCOLUMN"
   std::string name;      // as the file has it
@@ -22,6 +22,8 @@ struct IfcElement {
   bool is_round = false;
   std::string why;
   Vec3 low, high;  // box [m]
+  // of upright slabs, outline and holes of each of its parts; none: its box [m]
+  std::vector<std::vector<std::vector<Vec3>>> outlines;
 };
 
 struct IfcBar {

@@ -335,6 +335,19 @@ class Planner {
     if (placed > 0) taken(fmt::format("{} beams in {} sections", placed, beams_.size()));
   }
 
+  static bool covers(const IfcElement& slab, double x, double y) {
+    if (slab.outlines.empty()) return x >= slab.low.x && x <= slab.high.x && y >= slab.low.y && y <= slab.high.y;
+    return std::any_of(slab.outlines.begin(), slab.outlines.end(), [&](const auto& part) {
+      bool is_inside = false;
+      for (const std::vector<Vec3>& loop : part)
+        for (size_t i = 0, j = loop.size() - 1; i < loop.size(); j = i++) {
+          const Vec3 &a = loop[i], &b = loop[j];
+          if ((a.y > y) != (b.y > y) && x < a.x + (b.x - a.x) * (y - a.y) / (b.y - a.y)) is_inside = !is_inside;
+        }
+      return is_inside;
+    });
+  }
+
   void place_slabs() {
     int placed = 0;
     for (const IfcElement* e : fit_["IFCSLAB"]) {
@@ -352,7 +365,7 @@ class Planner {
       for (size_t i = 0; i + 1 < rows_.size(); ++i)
         for (size_t k = 0; k + 1 < frames_.size(); ++k) {
           const double x = 0.5 * (rows_[i] + rows_[i + 1]), y = 0.5 * (frames_[k] + frames_[k + 1]);
-          if (x < e->low.x || x > e->high.x || y < e->low.y || y > e->high.y) continue;
+          if (!covers(*e, x, y)) continue;
           g.places[s].push_back(point(static_cast<int>(i), static_cast<int>(k)) +
                                 point(static_cast<int>(i) + 1, static_cast<int>(k) + 1));
           any = true;
@@ -367,8 +380,8 @@ class Planner {
     if (placed > 0) {
       taken(fmt::format("{} slabs in {} thicknesses", placed, slabs_.size()));
       guessed(
-          "a slab covers every cell of the grid whose middle lies in the box around it: holes and cut corners are not "
-          "seen");
+          "a slab covers every cell of the grid whose middle lies in its outline, or in the box of a mesh: smaller "
+          "holes and cut corners are not seen");
     }
   }
 

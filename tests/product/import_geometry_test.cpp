@@ -61,5 +61,92 @@ TEST(ImportIfcAngle, OfFewColumnsIsTheBestFittingOne) {
   EXPECT_THAT(import("IFC4", one).text, HasSubstr("width = \"50 cm\"\nheight = \"30 cm\""));
 }
 
+/// Four columns of 30 cm x 30 cm, 3 m high, at the corners of 5 m x 4 m.
+void add_bay(Writer& w) {
+  for (const double x : {0.0, 5.0})
+    for (const double y : {0.0, 4.0}) block(w, "IFCCOLUMN", w.placement("$", x, y, 0), 0.3, 0.3, 3);
+}
+std::string loop(Writer& w, const std::vector<std::array<double, 2>>& corners) {
+  std::string points;
+  for (const auto& c : corners) points += (points.empty() ? "" : ",") + w.point(c[0], c[1], 0);
+  return w.add("IFCPOLYLINE((" + points + "," + w.point(corners[0][0], corners[0][1], 0) + "))");
+}
+std::string slanted(Writer& w, const std::string& profile, const Vec3& way) {
+  return w.add("IFCEXTRUDEDAREASOLID(" + profile + ",$," +
+               w.add("IFCDIRECTION(" + Writer::tuple({way.x, way.y, way.z}) + ")") + "," + std::to_string(norm(way)) +
+               ")");
+}
+
+TEST(ImportIfcBoxes, LeaveOutWhatIsTurnedOrInclined) {
+  Writer w;
+  w.metres();
+  add_bay(w);
+  block(w, "IFCCOLUMN", turned(w, 10, 0, 0, 45 * unit::deg), 0.3, 0.3, 3);
+  w.element("IFCCOLUMN", w.placement("$", 10, 4, 0),
+            w.shape("SweptSolid", slanted(w, w.rectangle(0.3, 0.3), {1, 0, 3})));
+  block(w, "IFCBEAM", turned(w, 2.5, 2, 2.5, std::atan2(4, 5)), 6.4, 0.3, 0.5);
+  block(w, "IFCWALL", turned(w, 2.5, 0, 0, 3 * unit::deg), 5, 0.24, 3);
+  // a slab of 20 cm, its profile tilted by 0.2 rad
+  const std::string tilt = w.add("IFCDIRECTION((0.,-0.198669,0.980067))");
+  const std::string place = w.add("IFCLOCALPLACEMENT($," +
+                                  w.add("IFCAXIS2PLACEMENT3D(" + w.point(2.5, 0, 2.2) + "," + tilt + "," +
+                                        w.add("IFCDIRECTION((1.,0.,0.))") + ")") +
+                                  ")");
+  block(w, "IFCSLAB", place, 5, 8, 0.2);
+  const Import made = import("IFC4", w);
+  EXPECT_THAT(made.text, HasSubstr("rows = { A = \"0.000 m\", B = \"5.000 m\" }"));
+  EXPECT_THAT(made.report.taken, Contains("4 columns in 1 sections"));
+  EXPECT_THAT(made.report.missing, Contains("2 x COLUMN: it is turned against the grid, or inclined"));
+  for (const char* kind : {"BEAM", "WALL", "SLAB"}) {
+    EXPECT_THAT(made.report.missing,
+                Contains("1 x " + std::string(kind) + ": it is turned against the grid, or inclined"));
+    EXPECT_THAT(made.text, Not(HasSubstr(kind == std::string("BEAM")   ? "[[beams]]"
+                                         : kind == std::string("WALL") ? "[[walls]]"
+                                                                       : "[[slabs]]")));
+  }
+}
+
+TEST(ImportIfcBoxes, LeaveOutProfilesThatDoNotFillThem) {
+  Writer w;
+  w.metres();
+  add_bay(w);
+  const std::string outer = loop(w, {{-0.5, -0.5}, {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}});
+  const std::string inner = loop(w, {{-0.4, -0.4}, {0.4, -0.4}, {0.4, 0.4}, {-0.4, 0.4}});
+  const std::string angle = loop(w, {{-0.5, -0.5}, {0.5, -0.5}, {0.5, -0.4}, {-0.4, -0.4}, {-0.4, 0.5}, {-0.5, 0.5}});
+  for (const std::string& profile : {"IFCARBITRARYPROFILEDEFWITHVOIDS(.AREA.,$," + outer + ",(" + inner + "))",
+                                     "IFCARBITRARYCLOSEDPROFILEDEF(.AREA.,$," + angle + ")"})
+    w.element("IFCCOLUMN", w.placement("$", 10, 0, 0), w.shape("SweptSolid", w.extrusion(w.add(profile), 3)));
+  const Import made = import("IFC4", w);
+  EXPECT_THAT(made.report.taken, Contains("4 columns in 1 sections"));
+  EXPECT_THAT(made.report.missing, Contains("2 x COLUMN: its profile does not fill its box"));
+}
+
+TEST(ImportIfcBoxes, OfRoundColumnsDoNotDependOnTheirTurn) {
+  Writer w;
+  w.metres();
+  add_bay(w);
+  w.element("IFCCOLUMN", turned(w, 10, 0, 0, 45 * unit::deg),
+            w.shape("SweptSolid", w.extrusion(w.add("IFCCIRCLEPROFILEDEF(.AREA.,$,$,0.2)"), 3)));
+  // sqrt(pi) 20 cm = 35.4 cm
+  EXPECT_THAT(import("IFC4", w).text, HasSubstr("width = \"35.4 cm\"\nheight = \"35.4 cm\""));
+}
+
+TEST(ImportIfcBoxes, GiveWayToTheOutlinesOfSlabs) {
+  Writer w;
+  w.metres();
+  for (const double x : {0.0, 5.0, 10.0})
+    for (const double y : {0.0, 4.0, 8.0}) block(w, "IFCCOLUMN", w.placement("$", x, y, 0), 0.3, 0.3, 3);
+  // without the cell from 5 m, 4 m, and with a hole in that from 0 m, 4 m
+  const std::string outline = loop(w, {{0, 0}, {10, 0}, {10, 4}, {5, 4}, {5, 8}, {0, 8}});
+  const std::string hole = loop(w, {{1, 5}, {4, 5}, {4, 7}, {1, 7}});
+  w.element(
+      "IFCSLAB", w.placement("$", 0, 0, 2.8),
+      w.shape("SweptSolid",
+              w.extrusion(w.add("IFCARBITRARYPROFILEDEFWITHVOIDS(.AREA.,$," + outline + ",(" + hole + "))"), 0.2)));
+  const Import made = import("IFC4", w);
+  EXPECT_THAT(made.text, HasSubstr("thickness = \"20 cm\""));
+  EXPECT_THAT(made.text, HasSubstr("at = [\"A1B2\", \"B1C2\"]"));
+}
+
 }  // namespace
 }  // namespace topple::product
