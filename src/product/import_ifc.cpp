@@ -21,6 +21,7 @@ namespace {
 
 constexpr double kSpacing = limits::line_spacing + 1e-3;  // of grid lines, which are rounded [m]
 const double kRound = std::sqrt(std::acos(-1.0) / 4);     // side of a square over the diameter of a circle of its area
+constexpr double kOverlap = 0.1;                          // of heights in which two elements stand side by side [m]
 constexpr double kOff = 0.6;                              // how far an element may lie off its place [m]
 
 /// Middles of groups of values that lie closer together than the spacing of grid lines.
@@ -249,40 +250,97 @@ class Planner {
   int storeys() const { return static_cast<int>(levels_.size()) - 1; }
   std::string point(int row, int frame) const { return letters(row) + std::to_string(frame + 1); }
 
-  Group& group_of(std::vector<Group>& groups, const IfcElement& e, double width, double height) {
+  static size_t group_of(std::vector<Group>& groups, const IfcElement& e, double width, double height) {
     const std::string concrete = e.material.empty() ? "unknown" : e.material;
-    for (Group& g : groups)
-      if (g.concrete == concrete && std::abs(g.width - width) < 2e-3 && std::abs(g.height - height) < 2e-3) return g;
-    groups.push_back({concrete, width, height, e.is_round, {}, {}});
-    return groups.back();
+    for (size_t i = 0; i < groups.size(); ++i)
+      if (groups[i].concrete == concrete && std::abs(groups[i].width - width) < 2e-3 &&
+          std::abs(groups[i].height - height) < 2e-3)
+        return i;
+    groups.push_back({concrete, width, height, false, {}, {}});
+    return groups.size() - 1;
+  }
+
+  /// Who stands where in which storey: of several the larger one.
+  struct Claim {
+    const IfcElement* element = nullptr;
+    size_t group = 0;
+    double size = 0;
+  };
+  struct Claims {
+    std::vector<Claim> all;
+    std::map<std::pair<int, std::string>, Claim> at;
+    std::set<std::pair<int, std::string>> contested;
+    std::multimap<std::pair<int, std::string>, Claim> parts;  // go on where another one of their group ends
+
+    void add(const Claim& claim, int storey, const std::string& place) {
+      const auto [known, is_new] = at.try_emplace({storey, place}, claim);
+      if (is_new) return;
+      Claim& held = known->second;
+      const IfcElement &a = *held.element, &b = *claim.element;
+      if (held.group == claim.group && (a.type == "IFCCOLUMN" || a.type == "IFCWALL") &&
+          std::min(a.high.z, b.high.z) - std::max(a.low.z, b.low.z) < kOverlap) {
+        parts.emplace(known->first, claim);
+        return;
+      }
+      contested.insert(known->first);
+      if (claim.size > held.size + 1e-9) held = claim;
+    }
+  };
+  /// Gives the groups their elements and places; says how many there are and who is left out.
+  int settle(std::vector<Group>& groups, const Claims& claims, const char* kind, const char* which) {
+    std::set<const IfcElement*> standing;
+    for (const auto& [where, claim] : claims.at) {
+      groups[claim.group].places[where.first].push_back(where.second);
+      standing.insert(claim.element);
+    }
+    for (const auto& [where, part] : claims.parts)
+      if (claims.at.at(where).group == part.group) standing.insert(part.element);
+    int placed = 0;
+    for (const Claim& claim : claims.all)
+      if (standing.count(claim.element) > 0) {
+        Group& g = groups[claim.group];
+        g.elements.push_back(claim.element);
+        g.is_round |= claim.element->is_round;
+        ++placed;
+      } else {
+        left_out(*claim.element, "another one stands in its place");
+      }
+    std::erase_if(groups, [](const Group& g) { return g.elements.empty(); });
+    if (!claims.contested.empty())
+      guessed(fmt::format("{} places have several {}: the {} one was taken", claims.contested.size(), kind, which));
+    return placed;
   }
 
   void place_columns() {
-    int placed = 0;
+    Claims claims;
     for (const IfcElement* e : fit_["IFCCOLUMN"]) {
       double w = e->high.x - e->low.x, h = e->high.y - e->low.y;
       if (e->is_round) w = h = kRound * w;
-      Group& g = group_of(columns_, *e, w, h);
-      g.is_round |= e->is_round;
+      const Claim claim{e, group_of(columns_, *e, w, h), w * h};
+      const std::string place =
+          point(nearest(rows_, 0.5 * (e->low.x + e->high.x)), nearest(frames_, 0.5 * (e->low.y + e->high.y)));
       bool any = false;
       for (int s = 0; s < storeys(); ++s) {
-        const double low = levels_[static_cast<size_t>(s)], high = levels_[static_cast<size_t>(s) + 1];
-        if (std::min(e->high.z, high) - std::max(e->low.z, low) < 0.5 * (high - low)) continue;
-        g.places[s].push_back(
-            point(nearest(rows_, 0.5 * (e->low.x + e->high.x)), nearest(frames_, 0.5 * (e->low.y + e->high.y))));
+        if (!reaches_over(*e, s)) continue;
+        claims.add(claim, s, place);
         any = true;
       }
       if (any) {
-        ++placed;
-        g.elements.push_back(e);
+        claims.all.push_back(claim);
       } else {
         left_out(*e, "reaches over less than half of every storey");
       }
     }
+    const int placed = settle(columns_, claims, "columns", "larger");
     taken(fmt::format("{} columns in {} sections", placed, columns_.size()));
     for (const Group& g : columns_)
       if (g.is_round)
         guessed(fmt::format("round columns became square ones of the same area, {:.0f} cm wide", 100 * g.width));
+  }
+  /// Whether an upright element takes half of a storey's height.
+  bool reaches_over(const IfcElement& e, int s) const {
+    const double low = levels_[static_cast<size_t>(s)], high = levels_[static_cast<size_t>(s) + 1];
+    return std::min(e.high.z, high) - std::max(e.low.z, low) >= 0.5 * (high - low);
   }
 
   /// Storey whose upper floor is nearest to a height; -1 if none is near.
@@ -314,7 +372,7 @@ class Planner {
   }
 
   void place_beams() {
-    int placed = 0;
+    Claims claims;
     for (const IfcElement* e : fit_["IFCBEAM"]) {
       const double width = std::min(e->high.x - e->low.x, e->high.y - e->low.y), height = e->high.z - e->low.z;
       const int s = storey_below(e->high.z);
@@ -326,12 +384,11 @@ class Planner {
       } else if (edges.empty()) {
         left_out(*e, "does not run between columns of the grid");
       } else {
-        Group& g = group_of(beams_, *e, width, height);
-        g.places[s].insert(g.places[s].end(), edges.begin(), edges.end());
-        g.elements.push_back(e);
-        ++placed;
+        claims.all.push_back({e, group_of(beams_, *e, width, height), width * height});
+        for (const std::string& edge : edges) claims.add(claims.all.back(), s, edge);
       }
     }
+    const int placed = settle(beams_, claims, "beams", "larger");
     if (placed > 0) taken(fmt::format("{} beams in {} sections", placed, beams_.size()));
   }
 
@@ -349,34 +406,36 @@ class Planner {
   }
 
   void place_slabs() {
-    int placed = 0;
+    Claims claims;
     for (const IfcElement* e : fit_["IFCSLAB"]) {
       const int s = storey_below(e->high.z);
+      const double thickness = e->high.z - e->low.z;
       if (s < 0) {
         left_out(*e, "is not level with a floor above a storey (a base slab lies on the ground)");
         continue;
       }
-      if (e->high.z - e->low.z >= storey_height(s)) {
+      if (thickness >= storey_height(s)) {
         left_out(*e, "is as thick as its storey is high");
         continue;
       }
-      Group& g = group_of(slabs_, *e, e->high.z - e->low.z, 0);
+      const Claim claim{e, group_of(slabs_, *e, thickness, 0), thickness};
       bool any = false;
       for (size_t i = 0; i + 1 < rows_.size(); ++i)
         for (size_t k = 0; k + 1 < frames_.size(); ++k) {
           const double x = 0.5 * (rows_[i] + rows_[i + 1]), y = 0.5 * (frames_[k] + frames_[k + 1]);
           if (!covers(*e, x, y)) continue;
-          g.places[s].push_back(point(static_cast<int>(i), static_cast<int>(k)) +
-                                point(static_cast<int>(i) + 1, static_cast<int>(k) + 1));
+          claims.add(claim, s,
+                     point(static_cast<int>(i), static_cast<int>(k)) +
+                         point(static_cast<int>(i) + 1, static_cast<int>(k) + 1));
           any = true;
         }
       if (any) {
-        ++placed;
-        g.elements.push_back(e);
+        claims.all.push_back(claim);
       } else {
         left_out(*e, "covers no cell of the grid");
       }
     }
+    const int placed = settle(slabs_, claims, "slabs", "thicker");
     if (placed > 0) {
       taken(fmt::format("{} slabs in {} thicknesses", placed, slabs_.size()));
       guessed(
@@ -386,27 +445,24 @@ class Planner {
   }
 
   void place_walls() {
-    int placed = 0;
+    Claims claims;
     for (const IfcElement* e : fit_["IFCWALL"]) {
       const double thickness = std::min(e->high.x - e->low.x, e->high.y - e->low.y);
       const auto edges = edges_of(*e);
-      Group& g = group_of(walls_, *e, thickness, 0);
+      const Claim claim{e, group_of(walls_, *e, thickness, 0), thickness};
       bool any = false;
       for (int s = 0; s < storeys() && !edges.empty(); ++s) {
-        const double low = levels_[static_cast<size_t>(s)], high = levels_[static_cast<size_t>(s) + 1];
-        if (std::min(e->high.z, high) - std::max(e->low.z, low) < 0.5 * (high - low)) continue;
-        g.places[s].insert(g.places[s].end(), edges.begin(), edges.end());
+        if (!reaches_over(*e, s)) continue;
+        for (const std::string& edge : edges) claims.add(claim, s, edge);
         any = true;
       }
       if (any) {
-        ++placed;
-        g.elements.push_back(e);
+        claims.all.push_back(claim);
       } else {
         left_out(*e, "does not stand between columns of the grid");
       }
     }
-    walls_.erase(std::remove_if(walls_.begin(), walls_.end(), [](const Group& g) { return g.places.empty(); }),
-                 walls_.end());
+    const int placed = settle(walls_, claims, "walls", "thicker");
     if (placed > 0) {
       taken(fmt::format("{} walls in {} thicknesses", placed, walls_.size()));
       missing("openings of walls: they are not read");

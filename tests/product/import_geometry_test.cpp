@@ -148,5 +148,50 @@ TEST(ImportIfcBoxes, GiveWayToTheOutlinesOfSlabs) {
   EXPECT_THAT(made.text, HasSubstr("at = [\"A1B2\", \"B1C2\"]"));
 }
 
+TEST(ImportIfcPlaces, HoldTheLargerOfTwoElements) {
+  Writer w;
+  w.metres();
+  add_bay(w);
+  block(w, "IFCCOLUMN", w.placement("$", 0.1, 0.1, 0), 0.4, 0.4, 3);   // larger than the one there
+  block(w, "IFCCOLUMN", w.placement("$", 5.05, 0, 0), 0.25, 0.25, 3);  // smaller
+  block(w, "IFCSLAB", w.placement("$", 2.5, 2, 2.8), 5, 4, 0.2);
+  block(w, "IFCSLAB", w.placement("$", 2.5, 2, 3), 5, 4, 0.08);  // screed
+  block(w, "IFCWALL", w.placement("$", 2.5, 0, 0), 5, 0.115, 3);
+  block(w, "IFCWALL", w.placement("$", 2.5, 0.2, 0), 5, 0.24, 3);
+  block(w, "IFCBEAM", w.placement("$", 2.5, 4, 2.5), 5, 0.3, 0.5);
+  block(w, "IFCBEAM", w.placement("$", 2.5, 4.3, 2.5), 5, 0.3, 0.5);  // as large
+  const Import made = import("IFC4", w);
+  EXPECT_THAT(made.report.taken, Contains("4 columns in 2 sections"));
+  EXPECT_THAT(made.report.taken, Contains("1 slabs in 1 thicknesses"));
+  EXPECT_THAT(made.report.taken, Contains("1 walls in 1 thicknesses"));
+  EXPECT_THAT(made.report.taken, Contains("1 beams in 1 sections"));
+  EXPECT_THAT(made.report.guessed, Contains("2 places have several columns: the larger one was taken"));
+  EXPECT_THAT(made.report.guessed, Contains("1 places have several slabs: the thicker one was taken"));
+  EXPECT_THAT(made.report.guessed, Contains("1 places have several walls: the thicker one was taken"));
+  EXPECT_THAT(made.report.guessed, Contains("1 places have several beams: the larger one was taken"));
+  EXPECT_THAT(made.report.missing, Contains("2 x COLUMN: another one stands in its place"));
+  for (const char* kind : {"SLAB", "WALL", "BEAM"})
+    EXPECT_THAT(made.report.missing, Contains("1 x " + std::string(kind) + ": another one stands in its place"));
+  EXPECT_THAT(made.text, HasSubstr("section = \"column_400x400_unknown\"\nstoreys = 0\nat = [\"A1\"]"));
+  EXPECT_THAT(made.text, Not(HasSubstr("250x250")));
+  EXPECT_THAT(made.text, HasSubstr("[slab.slab_200"));
+  EXPECT_THAT(made.text, Not(HasSubstr("[slab.slab_80")));
+  EXPECT_THAT(made.text, HasSubstr("[wall.wall_240"));
+  EXPECT_THAT(made.text, Not(HasSubstr("[wall.wall_115")));
+}
+
+TEST(ImportIfcPlaces, TakeColumnsThatGoOnWhereOthersEnd) {
+  Writer w;
+  w.metres();
+  for (const double z : {0.0, 1.5})
+    for (const double x : {0.0, 5.0}) block(w, "IFCCOLUMN", w.placement("$", x, 0, z), 0.3, 0.3, 1.5);
+  w.add("IFCBUILDINGSTOREY('g',$,'S',$,$," + w.placement("$", 0, 0, 0) + ",$,$,.ELEMENT.,0.)");
+  w.add("IFCBUILDINGSTOREY('g',$,'S',$,$," + w.placement("$", 0, 0, 3) + ",$,$,.ELEMENT.,3.)");
+  block(w, "IFCCOLUMN", w.placement("$", 10, 0, 0), 0.3, 0.3, 6);
+  const Import made = import("IFC4", w);
+  EXPECT_THAT(made.report.taken, Contains("5 columns in 1 sections"));
+  EXPECT_THAT(made.report.guessed, Not(Contains(HasSubstr("several columns"))));
+}
+
 }  // namespace
 }  // namespace topple::product
