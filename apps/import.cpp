@@ -32,6 +32,8 @@ int import_file(const Arguments& a) {
       throw InputError("E114", a.input + " is neither .ifc nor .dxf", "give a building (IFC) or a site (DXF)");
     if (fs::exists(a.output))
       throw InputError("E802", a.output + " exists already and is left as it is", "choose another name");
+    if (kind == ".ifc" && !a.unit.empty())
+      throw InputError("E801", "--unit: is for drawings; an IFC file names its own", "leave it out");
     const std::string text = read_file(a.input), name = path.filename().string();
     const double unit = read_quantity(a.unit, Dimension::Length, "--unit");
     const product::Import made = kind == ".ifc" ? product::make_plan_text(product::read_ifc(text, a.input), name)

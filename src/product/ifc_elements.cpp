@@ -1,5 +1,7 @@
 #include "product/ifc_elements.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -77,7 +79,7 @@ struct Body {
 
 class Reader {
  public:
-  Reader(const StepFile& file) : file_(file) {}
+  Reader(const StepFile& file, const std::string& name) : file_(file), name_(name) {}
 
   IfcBuilding read() {
     out_.schema = file_.schema;
@@ -112,27 +114,42 @@ class Reader {
   const StepEntity* get(const StepValue& v) const { return v.kind == Kind::Reference ? file_.find(v.id()) : nullptr; }
   bool is(const StepEntity* e, const char* type) const { return e != nullptr && e->type == type; }
 
+  [[noreturn]] void fail(const std::string& what, const std::string& help) const {
+    throw InputError(std::vector<Diagnostic>{{Severity::Error, "E112", {name_, 0, 0}, 1, what, help}});
+  }
+
+  /// The units of the project; of a file without one, of all assignments.
   void read_units() {
-    for (const StepEntity* a : file_.of_type("IFCUNITASSIGNMENT"))
+    std::vector<const StepEntity*> assignments = file_.of_type("IFCUNITASSIGNMENT");
+    for (const StepEntity* project : file_.of_type("IFCPROJECT"))
+      if (const StepEntity* own = get(project->at(8)); is(own, "IFCUNITASSIGNMENT")) assignments = {own};
+    for (const StepEntity* a : assignments)
       for (const StepValue& v : a->at(0).items) {
         const StepEntity* u = get(v);
         if (u != nullptr && u->at(1).text == "PLANEANGLEUNIT" && u->type == "IFCCONVERSIONBASEDUNIT")
           if (const StepEntity* measure = get(u->at(3))) angle_unit_ = measure->at(0).number;
         if (u == nullptr || u->at(1).text != "LENGTHUNIT") continue;
-        if (u->type == "IFCSIUNIT") {
-          const std::string prefix = u->at(2).text;
-          out_.length_unit = prefix == "MILLI"   ? 1e-3
-                             : prefix == "CENTI" ? 1e-2
-                             : prefix == "DECI"  ? 0.1
-                             : prefix == "KILO"  ? 1e3
-                                                 : 1.0;
-        } else if (u->type == "IFCCONVERSIONBASEDUNIT") {
-          const StepEntity* measure = get(u->at(3));
-          const StepEntity* base = measure == nullptr ? nullptr : get(measure->at(1));
-          if (measure == nullptr) continue;
-          out_.length_unit = measure->at(0).number * (base != nullptr && base->at(2).text == "MILLI" ? 1e-3 : 1.0);
-        }
+        out_.length_unit = unit_of(u, 0);
+        out_.has_unit = true;
+        if (!(out_.length_unit > 0))
+          fail(fmt::format("its unit of length, #{}, is not understood", u->id),
+               "metres with a prefix are, and what is a multiple of them");
       }
+  }
+  /// Metres of a unit of length; 0: not understood.
+  double unit_of(const StepEntity* u, int depth) const {
+    static const std::map<std::string, double> prefixes{
+        {"EXA", 1e18},  {"PETA", 1e15},  {"TERA", 1e12},   {"GIGA", 1e9},   {"MEGA", 1e6},   {"KILO", 1e3},
+        {"HECTO", 1e2}, {"DECA", 1e1},   {"DECI", 1e-1},   {"CENTI", 1e-2}, {"MILLI", 1e-3}, {"MICRO", 1e-6},
+        {"NANO", 1e-9}, {"PICO", 1e-12}, {"FEMTO", 1e-15}, {"ATTO", 1e-18}, {"", 1}};
+    if (u == nullptr || depth > 5) return 0;
+    if (u->type == "IFCSIUNIT") {
+      const auto prefix = prefixes.find(u->at(2).text);
+      return u->at(3).text == "METRE" && prefix != prefixes.end() ? prefix->second : 0;
+    }
+    if (u->type != "IFCCONVERSIONBASEDUNIT") return 0;
+    const StepEntity* measure = get(u->at(3));
+    return measure == nullptr ? 0 : measure->at(0).number * unit_of(get(measure->at(1)), depth + 1);
   }
 
   Vec3 point(const StepValue& v) const {
@@ -701,6 +718,7 @@ class Reader {
   }
 
   const StepFile& file_;
+  const std::string& name_;
   IfcBuilding out_;
   double angle_unit_ = 1;  // of parameters of circles [rad]
   std::map<int, std::string> material_;
@@ -716,7 +734,7 @@ IfcBuilding read_ifc(const std::string& text, const std::string& name) {
   };
   if (file.schema.rfind("IFC2X3", 0) != 0 && file.schema.rfind("IFC4", 0) != 0)
     fail("its schema is \"" + file.schema + "\"", "IFC2X3 and IFC4 are understood");
-  IfcBuilding out = Reader(file).read();
+  IfcBuilding out = Reader(file, name).read();
   if (std::none_of(out.elements.begin(), out.elements.end(),
                    [](const IfcElement& e) { return e.type == "IFCCOLUMN" && e.has_box; })) {
     std::string help = "a plan's grid is made from its columns";

@@ -39,6 +39,7 @@ struct IfcBar {
 struct IfcBuilding {
   std::string schema, name;
   double length_unit = 1;                               // [m]
+  bool has_unit = false;                                // the file names one
   double angle = 0;                                     // of the building's own axes against the file's x [rad]
   std::vector<std::pair<std::string, double>> storeys;  // name, elevation [m], rising
   std::vector<IfcElement> elements;

@@ -64,28 +64,35 @@ std::vector<Pair> read_pairs(const std::string& text, const std::string& name) {
        "the drawing was cut off; save or copy it again");
 }
 
-/// Metres of a unit of $INSUNITS; 0: not said.
-double unit_of(int code) {
-  switch (code) {
-    case 1:
-      return 0.0254;
-    case 2:
-      return 0.3048;
-    case 4:
-      return 1e-3;
-    case 5:
-      return 1e-2;
-    case 6:
-      return 1;
-    case 7:
-      return 1e3;
-    case 10:
-      return 0.9144;
-    case 14:
-      return 0.1;
-    default:
-      return 0;
-  }
+/// Metres of a unit of $INSUNITS; 0: none of its codes.
+double unit_of(const std::string& code) {
+  constexpr double foot = 1200.0 / 3937;  // of the US survey
+  static const std::map<std::string, double> units{{"1", 0.0254},
+                                                   {"2", 0.3048},
+                                                   {"3", 1609.344},
+                                                   {"4", 1e-3},
+                                                   {"5", 1e-2},
+                                                   {"6", 1},
+                                                   {"7", 1e3},
+                                                   {"8", 0.0254e-6},
+                                                   {"9", 0.0254e-3},
+                                                   {"10", 0.9144},
+                                                   {"11", 1e-10},
+                                                   {"12", 1e-9},
+                                                   {"13", 1e-6},
+                                                   {"14", 0.1},
+                                                   {"15", 10},
+                                                   {"16", 100},
+                                                   {"17", 1e9},
+                                                   {"18", 149597870700.0},
+                                                   {"19", 9460730472580800.0},
+                                                   {"20", 3.0856775814913673e16},
+                                                   {"21", foot},
+                                                   {"22", foot / 12},
+                                                   {"23", 3 * foot},
+                                                   {"24", 5280 * foot}};
+  const auto found = units.find(code);
+  return found == units.end() ? 0 : found->second;
 }
 
 struct Outline {
@@ -162,7 +169,13 @@ Import make_site_text(const std::string& dxf, const std::string& file_name, doub
   const std::vector<Pair> pairs = read_pairs(is_latin ? latin1_to_utf8(dxf) : dxf, file_name);
   if (unit <= 0) {
     for (size_t i = 0; i + 1 < pairs.size(); ++i)
-      if (pairs[i].code == 9 && pairs[i].value == "$INSUNITS") unit = unit_of(std::atoi(pairs[i + 1].value.c_str()));
+      if (pairs[i].code == 9 && pairs[i].value == "$INSUNITS" && pairs[i + 1].value != "0") {
+        unit = unit_of(pairs[i + 1].value);
+        if (!(unit > 0))
+          fail(file_name, pairs[i + 1].line,
+               "$INSUNITS is \"" + pairs[i + 1].value.substr(0, 20) + "\", which is no unit",
+               "give the unit of the drawing, such as --unit \"1 mm\"");
+      }
     if (unit > 0) {
       out.report.taken.push_back(fmt::format("the drawing's unit is {:g} m, from its header", unit));
     } else {

@@ -125,6 +125,11 @@ class Planner {
   Planner(const IfcBuilding& b, const std::string& file) : b_(b), file_(file) {}
 
   Import make() {
+    if (b_.has_unit) {
+      taken(fmt::format("the file's unit is {:g} m", b_.length_unit));
+    } else {
+      guessed("the file's numbers are metres: it names no unit of length");
+    }
     gather();
     find_grid();
     place_columns();
@@ -155,7 +160,8 @@ class Planner {
   void missing(std::string s) { report_.missing.push_back(std::move(s)); }
   void left_out(const IfcElement& e, const std::string& why) { ++left_out_[e.type.substr(3) + ": " + why]; }
 
-  [[noreturn]] void fail(const std::string& what, const std::string& help) const {
+  [[noreturn]] void fail(const std::string& what, std::string help) const {
+    if (!b_.has_unit) help += "; it names none of length, and was taken in metres";
     throw InputError(std::vector<Diagnostic>{{Severity::Error, "E112", {file_, 0, 0}, 1, what, help}});
   }
 
@@ -241,7 +247,7 @@ class Planner {
         rows_.size() * frames_.size() * static_cast<size_t>(storeys()) > most_members)
       fail(fmt::format("its columns give {} rows by {} frames and {} storeys, too many for a plan", rows_.size(),
                        frames_.size(), storeys()),
-           "give a file of one building");
+           "give a file of one building, and look at its unit");
     for (size_t s = 0; s + 1 < levels_.size(); ++s)
       if (const double h = levels_[s + 1] - levels_[s]; !(h > 0.9996 && h < 50.0004))
         fail(fmt::format("storey {} would be {:.3f} m high; those of a plan are 1 m to 50 m", s, h),

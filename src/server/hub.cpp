@@ -386,6 +386,7 @@ void Hub::import_plan(const std::shared_ptr<Client>& client, std::int64_t id, co
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (kind != ".ifc" && kind != ".dxf")
     throw InputError("E114", name + " is neither .ifc nor .dxf", "give a building (IFC) or a site (DXF)");
+  if (kind == ".ifc" && unit > 0) throw InputError("E912", "\"unit\" is for drawings; an IFC file names its own");
   run_errand([client, id, name, text, unit, is_building = kind == ".ifc"] {
     try {
       const product::Import made = is_building ? product::make_plan_text(product::read_ifc(text, name), name)

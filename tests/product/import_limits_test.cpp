@@ -210,5 +210,84 @@ TEST(ImportDxfSizes, ThatAPlanCannotHoldAreLeftOutOrRefused) {
   EXPECT_EQ(complaint([&] { (void)make_site_text(drawing(many), "s.dxf", 0); }), "E113:0 has 1001 closed outlines");
 }
 
+/// Columns at 6 and 5 of a unit, 0.4 wide.
+Import import_in(const std::function<std::string(Writer&)>& add_unit, double metres) {
+  Writer w;
+  if (const std::string unit = add_unit(w); !unit.empty()) w.add("IFCUNITASSIGNMENT((" + unit + "))");
+  for (const double x : {0.0, 6.0})
+    w.element("IFCCOLUMN", w.placement("$", x / metres, 0, 0),
+              w.shape("SweptSolid", w.extrusion(w.rectangle(0.4 / metres, 0.4 / metres), 3 / metres)));
+  return import("IFC4", w);
+}
+std::string conversion(Writer& w, const std::string& value, const std::string& base) {
+  return w.add("IFCCONVERSIONBASEDUNIT($,.LENGTHUNIT.,'U'," +
+               w.add("IFCMEASUREWITHUNIT(IFCLENGTHMEASURE(" + value + ")," + base + ")") + ")");
+}
+
+TEST(ImportIfcUnits, AreThoseOfTheFile) {
+  const auto prefixed = [](const char* prefix) {
+    return [prefix](Writer& w) { return w.add("IFCSIUNIT(*,.LENGTHUNIT.," + std::string(prefix) + ",.METRE.)"); };
+  };
+  const auto inches = [&](Writer& w) { return conversion(w, "2.54", prefixed(".CENTI.")(w)); };
+  const auto feet = [&](Writer& w) { return conversion(w, "12.", inches(w)); };
+  const auto is_right = [](const Import& made, const char* unit) {
+    EXPECT_THAT(made.text, HasSubstr("rows = { A = \"0.000 m\", B = \"6.000 m\" }")) << unit;
+    EXPECT_THAT(made.text, HasSubstr("width = \"40 cm\"")) << unit;
+    EXPECT_THAT(made.report.taken, Contains("the file's unit is " + std::string(unit) + " m"));
+  };
+  is_right(import_in(prefixed(".MICRO."), 1e-6), "1e-06");
+  is_right(import_in(prefixed(".MILLI."), 1e-3), "0.001");
+  is_right(import_in(prefixed(".DECA."), 10), "10");
+  is_right(import_in(prefixed(".HECTO."), 100), "100");
+  is_right(import_in(prefixed("$"), 1), "1");
+  is_right(import_in(inches, 0.0254), "0.0254");
+  is_right(import_in(feet, 0.3048), "0.3048");
+  EXPECT_EQ(complaint([] { (void)import_in([](Writer&) { return std::string(); }, 1e-3); }),
+            "E112:0 it has no column of 5 cm to 10 m in section");
+  const Import none = import_in([](Writer&) { return std::string(); }, 1);
+  EXPECT_THAT(none.report.guessed, Contains("the file's numbers are metres: it names no unit of length"));
+}
+
+TEST(ImportIfcUnits, ThatAreNotUnderstoodAreRefused) {
+  for (const char* unit :
+       {"IFCSIUNIT(*,.LENGTHUNIT.,.LIGHT.,.METRE.)", "IFCSIUNIT(*,.LENGTHUNIT.,$,.GRAM.)",
+        "IFCCONTEXTDEPENDENTUNIT($,.LENGTHUNIT.,'CUBIT')", "IFCCONVERSIONBASEDUNIT($,.LENGTHUNIT.,'FOOT',$)"})
+    EXPECT_THAT(complaint([unit] { (void)import_in([unit](Writer& w) { return w.add(unit); }, 1); }),
+                HasSubstr("E112:0 its unit of length, #1, is not understood"))
+        << unit;
+}
+
+TEST(ImportIfcUnits, OfTheProjectGoBeforeOthers) {
+  const Import made = import_in(
+      [](Writer& w) {
+        const std::string metre = w.add("IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.)");
+        w.add("IFCPROJECT('g',$,'P',$,$,$,$,$," + w.add("IFCUNITASSIGNMENT((" + metre + "))") + ")");
+        return w.add("IFCSIUNIT(*,.LENGTHUNIT.,.MILLI.,.METRE.)");
+      },
+      1);
+  EXPECT_THAT(made.text, HasSubstr("width = \"40 cm\""));
+}
+
+TEST(ImportDxfUnits, AreAllThoseOfTheHeader) {
+  const auto drawing = [](const std::string& unit) {
+    return "0\nSECTION\n2\nHEADER\n9\n$INSUNITS\n70\n" + unit +
+           "\n0\nENDSEC\n0\nSECTION\n2\nENTITIES\n0\nLWPOLYLINE\n8\nH\n70\n1\n10\n0\n20\n0\n10\n3937\n20\n0\n10\n3937\n"
+           "20\n"
+           "3937\n0\nENDSEC\n0\nEOF\n";
+  };
+  const auto at = [&](const char* unit) { return make_site_text(drawing(unit), "s.dxf", 0).text; };
+  EXPECT_THAT(at("21"), HasSubstr("[\"1200.000 m\", \"0.000 m\"]"));
+  EXPECT_THAT(at("22"), HasSubstr("[\"100.000 m\", \"0.000 m\"]"));
+  EXPECT_THAT(at("9"), HasSubstr("[\"0.100 m\", \"0.000 m\"]"));
+  EXPECT_THAT(at("4"), HasSubstr("[\"3.937 m\", \"0.000 m\"]"));
+  EXPECT_THAT(complaint([&] { (void)at("3"); }), HasSubstr("E113:16 an outline lies 6336 km"));
+  for (const char* unit : {"25", "-1", "abc"}) {
+    EXPECT_THAT(complaint([&] { (void)at(unit); }),
+                "E113:8 $INSUNITS is \"" + std::string(unit) + "\", which is no unit");
+    EXPECT_THAT(make_site_text(drawing(unit), "s.dxf", 1e-3).text, HasSubstr("3.937 m"));
+  }
+  EXPECT_THAT(make_site_text(drawing("0"), "s.dxf", 0).report.guessed, Contains(HasSubstr("its header does not say")));
+}
+
 }  // namespace
 }  // namespace topple::product

@@ -729,6 +729,7 @@ TEST_F(ServerTest, ImportsAndShowsADemoWithNothingOpen) {
   EXPECT_FALSE(site["taken"].empty());
   EXPECT_EQ(c->code("plan.import", {{"name", "site.txt"}, {"text", square}}), "E114");
   EXPECT_EQ(c->code("plan.import", {{"name", "b.ifc"}, {"text", "nonsense"}})[0], 'E');
+  EXPECT_EQ(c->code("plan.import", {{"name", "b.ifc"}, {"text", "nonsense"}, {"unit", 1}}), "E912");
   EXPECT_EQ(c->code("plan.import", {{"name", "site.dxf"}, {"text", square}, {"unit", -1}}), "E912");
   TestClient http(port());
   const TestJson templates = http.get(at("/api/templates")).json();
