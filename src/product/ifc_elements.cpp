@@ -77,6 +77,17 @@ struct Body {
   std::string why;  // what was not understood
 };
 
+/// Turn, scale or mirror, and shift.
+struct Map {
+  Vec3 p;
+  Mat3 M;
+
+  Map(const Vec3& shift, const Mat3& matrix) : p(shift), M(matrix) {}
+  Map(const Pose& X) : p(X.p), M(to_matrix(X.q)) {}
+  Vec3 operator*(const Vec3& v) const { return p + M * v; }
+  Map operator*(const Map& X) const { return {p + M * X.p, M * X.M}; }
+};
+
 class Reader {
  public:
   Reader(const StepFile& file, const std::string& name) : file_(file), name_(name) {}
@@ -319,6 +330,7 @@ class Reader {
     }
     if (e->type == "IFCDERIVEDPROFILEDEF" || e->type == "IFCMIRROREDPROFILEDEF") {
       const StepEntity* moved = get(e->at(3));
+      if (moved == nullptr && e->type == "IFCDERIVEDPROFILEDEF") return false;
       if (!find_profile(e->at(2), out, is_round, why)) return false;
       for (Loop& loop : out)
         for (Vec3& p : loop) p = moved == nullptr ? Vec3{-p.x, p.y, p.z} : transform(*moved) * p;
@@ -327,13 +339,29 @@ class Reader {
     return false;
   }
 
-  /// IfcCartesianTransformationOperator; scales and mirrors are not understood.
-  Pose transform(const StepEntity& e) const {
-    const Vec3 x = direction(e.at(0), {1, 0, 0});
-    Vec3 y = direction(e.at(1), std::abs(x.y) < 0.9 ? Vec3{0, 1, 0} : Vec3{-1, 0, 0});
-    y = y - dot(x, y) * x;
-    const Vec3 z = cross(x, norm(y) > 1e-9 ? (1 / norm(y)) * y : Vec3{0, 1, 0});
-    return {out_.length_unit * point(e.at(2)), to_quat(Mat3::from_columns(x, cross(z, x), z))};
+  /// IfcCartesianTransformationOperator, 2D or 3D, of one scale or several. Mirrors have left-handed axes.
+  Map transform(const StepEntity& e) const {
+    const bool is_3d = e.type.find("3D") != std::string::npos;
+    const Vec3 z = is_3d ? direction(e.at(4), {0, 0, 1}) : Vec3{0, 0, 1};
+    const auto across = [](Vec3 v, const Vec3& a, const Vec3& b) {
+      v = v - dot(v, a) * a;
+      v = v - dot(v, b) * b;
+      return norm(v) > 1e-6 ? (1 / norm(v)) * v : Vec3{};
+    };
+    Vec3 x = across(direction(e.at(0), {1, 0, 0}), z, {});
+    if (!is_3d && get(e.at(0)) == nullptr && get(e.at(1)) != nullptr)
+      x = cross(across(direction(e.at(1), {0, 1, 0}), z, {}), z);
+    if (!(norm(x) > 0)) x = across({0, 1, 0}, z, {});
+    Vec3 y = across(direction(e.at(1), is_3d ? Vec3{0, 1, 0} : cross(z, x)), z, x);
+    if (!(norm(y) > 0)) y = cross(z, x);
+    const auto scale = [&e](size_t i, double otherwise) {
+      return e.at(i).kind == Kind::Number ? e.at(i).number : otherwise;
+    };
+    const double first = scale(3, 1);
+    const bool has_several = e.type.find("NONUNIFORM") != std::string::npos;
+    const double second = has_several ? scale(is_3d ? 5 : 4, first) : first;
+    const double third = has_several && is_3d ? scale(6, first) : first;
+    return {out_.length_unit * point(e.at(2)), Mat3::from_columns(first * x, second * y, third * z)};
   }
 
   /// A face with its corners in turn; volumes add up to that of a closed mesh.
@@ -348,8 +376,9 @@ class Reader {
     }
     out.faces.push_back(normal);
   }
-  bool find_mesh(const StepEntity& e, const Pose& X, Body& out) const {
+  bool find_mesh(const StepEntity& e, const Map& X, Body& out) const {
     const size_t before = out.points.size();
+    const bool is_mirrored = determinant(X.M) < 0;
     const auto add_loops = [&](const StepValue& shell) {
       const StepEntity* faces = get(shell);
       if (faces == nullptr) return;
@@ -361,13 +390,14 @@ class Reader {
             if (!is(loop, "IFCPOLYLOOP")) continue;
             std::vector<Vec3> corners;
             for (const StepValue& p : loop->at(0).items) corners.push_back(X * (out_.length_unit * point(p)));
-            if (bound->at(1).text == "F") std::reverse(corners.begin(), corners.end());
+            if ((bound->at(1).text == "F") != is_mirrored) std::reverse(corners.begin(), corners.end());
             add_face(corners, out);
           }
     };
     const auto add_indexed = [&](const StepEntity& list, const StepValue& indices) {
       std::vector<Vec3> corners;
       for (const StepValue& i : indices.items) corners.push_back(X * listed(list, i.number));
+      if (is_mirrored) std::reverse(corners.begin(), corners.end());
       add_face(corners, out);
     };
     if (e.type == "IFCFACETEDBREP") {
@@ -385,25 +415,25 @@ class Reader {
 
   /// Calls use(item, its pose) for every item of the representation that a mapped item places.
   template <typename Use>
-  void for_mapped_items(const StepEntity& mapped, const Pose& X, const Use& use) const {
+  void for_mapped_items(const StepEntity& mapped, const Map& X, const Use& use) const {
     const StepEntity *map = get(mapped.at(0)), *target = get(mapped.at(1));
     const StepEntity* body = map == nullptr ? nullptr : get(map->at(1));
     if (body == nullptr || target == nullptr) return;
-    const Pose X_WI = X * transform(*target) * inverse(axis_placement(map->at(0)));
+    const Map X_WI = X * transform(*target) * inverse(axis_placement(map->at(0)));
     for (const StepValue& item : body->at(3).items) use(item, X_WI);
   }
 
-  bool find_item(const StepValue& v, const Pose& X, Body& out, int depth) const {
+  bool find_item(const StepValue& v, const Map& X, Body& out, int depth) const {
     const StepEntity* e = get(v);
     if (e == nullptr || depth > 10) return false;
     if (e->type == "IFCEXTRUDEDAREASOLID") {
       Solid solid;
       if (!find_profile(e->at(0), solid.loops, out.is_round, out.why)) return false;
-      const Pose X_WP = X * axis_placement(e->at(1));
+      const Map X_WP = X * axis_placement(e->at(1));
       const Vec3 way = e->at(3).number * out_.length_unit * direction(e->at(2), {0, 0, 1});
       for (Loop& loop : solid.loops)
         for (Vec3& p : loop) p = X_WP * p;
-      solid.way = X_WP * way - X_WP.p;
+      solid.way = X_WP.M * way;
       out.solids.push_back(std::move(solid));
       return true;
     }
@@ -412,7 +442,7 @@ class Reader {
     if (e->type == "IFCMAPPEDITEM") {
       bool any = false;
       for_mapped_items(*e, X,
-                       [&](const StepValue& item, const Pose& X_WI) { any |= find_item(item, X_WI, out, depth + 1); });
+                       [&](const StepValue& item, const Map& X_WI) { any |= find_item(item, X_WI, out, depth + 1); });
       return any;
     }
     out.why = "its body is " + e->type;
@@ -632,7 +662,7 @@ class Reader {
   }
 
   /// Axes of bars, in world axes before the turn.
-  void find_disks(const StepValue& v, const Pose& X, std::vector<std::vector<Vec3>>& out, double& radius,
+  void find_disks(const StepValue& v, const Map& X, std::vector<std::vector<Vec3>>& out, double& radius,
                   int depth) const {
     const StepEntity* e = get(v);
     if (e == nullptr || depth > 10) return;
@@ -641,16 +671,16 @@ class Reader {
       if (!find_points(e->at(0), line)) return;
       for (Vec3& p : line) p = X * p;
       out.push_back(std::move(line));
-      radius = e->at(1).number * out_.length_unit;
+      radius = e->at(1).number * out_.length_unit * std::cbrt(std::abs(determinant(X.M)));
     } else if (e->type == "IFCEXTRUDEDAREASOLID") {
       const StepEntity* profile = get(e->at(0));
       if (!is(profile, "IFCCIRCLEPROFILEDEF")) return;
-      const Pose X_WP = X * axis_placement(e->at(1));
+      const Map X_WP = X * axis_placement(e->at(1));
       out.push_back({X_WP.p, X_WP * (e->at(3).number * out_.length_unit * direction(e->at(2), {0, 0, 1}))});
-      radius = profile->at(3).number * out_.length_unit;
+      radius = profile->at(3).number * out_.length_unit * std::cbrt(std::abs(determinant(X.M)));
     } else if (e->type == "IFCMAPPEDITEM") {
-      for_mapped_items(
-          *e, X, [&](const StepValue& item, const Pose& X_WI) { find_disks(item, X_WI, out, radius, depth + 1); });
+      for_mapped_items(*e, X,
+                       [&](const StepValue& item, const Map& X_WI) { find_disks(item, X_WI, out, radius, depth + 1); });
     }
   }
 

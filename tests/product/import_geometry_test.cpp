@@ -193,5 +193,51 @@ TEST(ImportIfcPlaces, TakeColumnsThatGoOnWhereOthersEnd) {
   EXPECT_THAT(made.report.guessed, Not(Contains(HasSubstr("several columns"))));
 }
 
+/// A column whose body is mapped by the given operator.
+void add_mapped(Writer& w, double x, double y, const std::string& body, const std::string& target) {
+  const std::string map = w.add("IFCREPRESENTATIONMAP(" + w.add("IFCAXIS2PLACEMENT3D(" + w.point(0, 0, 0) + ",$,$)") +
+                                "," + w.add("IFCSHAPEREPRESENTATION($,'Body','SweptSolid',(" + body + "))") + ")");
+  w.element("IFCCOLUMN", w.placement("$", x, y, 0),
+            w.shape("MappedRepresentation", w.add("IFCMAPPEDITEM(" + map + "," + w.add(target) + ")")));
+}
+
+TEST(ImportIfcMaps, ScaleAndMirrorBodies) {
+  Writer w;
+  w.metres();
+  const std::string zero = w.point(0, 0, 0);
+  const auto body = [&w](double h) { return w.extrusion(w.rectangle(0.3, 0.2), h); };
+  add_mapped(w, 0, 0, body(1.5), "IFCCARTESIANTRANSFORMATIONOPERATOR3D($,$," + zero + ",2.,$)");
+  add_mapped(w, 5, 0, body(3), "IFCCARTESIANTRANSFORMATIONOPERATOR3DNONUNIFORM($,$," + zero + ",1.,$,3.,1.)");
+  // mirrored: x to -x; the body lies beside its origin
+  const std::string left = w.add("IFCDIRECTION((-1.,0.,0.))"), back = w.add("IFCDIRECTION((0.,1.,0.))"),
+                    up = w.add("IFCDIRECTION((0.,0.,1.))");
+  const std::string beside = w.add("IFCRECTANGLEPROFILEDEF(.AREA.,$," +
+                                   w.add("IFCAXIS2PLACEMENT2D(" + w.point(1, 0, 0) + ",$)") + ",0.4,0.4)");
+  add_mapped(w, 11, 4, w.extrusion(beside, 3),
+             "IFCCARTESIANTRANSFORMATIONOPERATOR3D(" + left + "," + back + "," + zero + ",1.," + up + ")");
+  // and a mirrored mesh
+  add_mapped(w, 0, 4, w.triangulated(0.5, 0.5, 3),
+             "IFCCARTESIANTRANSFORMATIONOPERATOR3D(" + left + "," + back + "," + zero + ",$," + up + ")");
+  const Import made = import("IFC4", w);
+  EXPECT_THAT(made.text, HasSubstr("rows = { A = \"0.000 m\", B = \"5.000 m\", C = \"10.000 m\" }"));
+  EXPECT_THAT(made.text, HasSubstr("heights = [\"3.000 m\"]"));
+  for (const char* at :
+       {"600x400_unknown\"\nstoreys = 0\nat = [\"A1\"]", "300x600_unknown\"\nstoreys = 0\nat = [\"B1\"]",
+        "400x400_unknown\"\nstoreys = 0\nat = [\"C2\"]", "500x500_unknown\"\nstoreys = 0\nat = [\"A2\"]"})
+    EXPECT_THAT(made.text, HasSubstr(at));
+}
+
+TEST(ImportIfcMaps, ScaleAndMirrorProfiles) {
+  Writer w;
+  w.metres();
+  add_bay(w);
+  const std::string profile = w.rectangle(0.2, 0.3), zero = w.add("IFCCARTESIANPOINT((0.,0.))");
+  const std::string twice = w.add("IFCCARTESIANTRANSFORMATIONOPERATOR2D($,$," + zero + ",2.)");
+  w.element(
+      "IFCCOLUMN", w.placement("$", 10, 0, 0),
+      w.shape("SweptSolid", w.extrusion(w.add("IFCDERIVEDPROFILEDEF(.AREA.,$," + profile + "," + twice + ",$)"), 3)));
+  EXPECT_THAT(import("IFC4", w).text, HasSubstr("width = \"40 cm\"\nheight = \"60 cm\""));
+}
+
 }  // namespace
 }  // namespace topple::product
