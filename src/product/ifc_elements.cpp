@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 
 #include "base/error.h"
@@ -94,6 +95,7 @@ class Reader {
 
   IfcBuilding read() {
     out_.schema = file_.schema;
+    check_coordinates();
     read_units();
     for (const StepEntity* b : file_.of_type("IFCBUILDING")) out_.name = b->at(2).text;
     read_storeys();
@@ -127,6 +129,29 @@ class Reader {
 
   [[noreturn]] void fail(const std::string& what, const std::string& help) const {
     throw InputError(std::vector<Diagnostic>{{Severity::Error, "E112", {name_, 0, 0}, 1, what, help}});
+  }
+
+  /// Coordinates that are no numbers would be zeros.
+  void check_coordinates() const {
+    const auto is_tuple = [](const StepValue& v, size_t least) {
+      return v.kind == Kind::List && v.items.size() >= least && v.items.size() <= 3 &&
+             std::all_of(v.items.begin(), v.items.end(), [](const StepValue& x) { return x.kind == Kind::Number; });
+    };
+    for (const auto& [id, e] : file_.entities) {
+      bool is_right = true;
+      if (e.type == "IFCCARTESIANPOINT") is_right = is_tuple(e.at(0), 1);
+      if (e.type == "IFCDIRECTION") is_right = is_tuple(e.at(0), 2);
+      if (e.type == "IFCCARTESIANPOINTLIST2D" || e.type == "IFCCARTESIANPOINTLIST3D")
+        is_right =
+            std::all_of(e.at(0).items.begin(), e.at(0).items.end(), [&](const StepValue& v) { return is_tuple(v, 2); });
+      if (!is_right)
+        throw InputError(std::vector<Diagnostic>{{Severity::Error,
+                                                  "E111",
+                                                  {name_, e.line, 0},
+                                                  1,
+                                                  fmt::format("a coordinate of #{} is no number", id),
+                                                  "two or three numbers are wanted"}});
+    }
   }
 
   /// The units of the project; of a file without one, of all assignments.
@@ -189,10 +214,18 @@ class Reader {
     x = (1 / norm(x)) * x;
     return {p, to_quat(Mat3::from_columns(x, cross(z, x), z))};
   }
-  Pose placement(const StepValue& v, int depth = 0) const {
+  bool has_axes(const StepValue& v) const {
     const StepEntity* e = get(v);
-    if (!is(e, "IFCLOCALPLACEMENT") || depth > 50) return {};
-    return placement(e->at(0), depth + 1) * axis_placement(e->at(1));
+    return (is(e, "IFCAXIS2PLACEMENT3D") || is(e, "IFCAXIS2PLACEMENT2D")) && is(get(e->at(0)), "IFCCARTESIANPOINT");
+  }
+  /// Of local placements one on another; grids are not understood.
+  std::optional<Pose> find_placement(const StepValue& v, int depth = 0) const {
+    const StepEntity* e = get(v);
+    if (!is(e, "IFCLOCALPLACEMENT") || depth > 50 || !has_axes(e->at(1))) return std::nullopt;
+    if (e->at(0).kind == Kind::Null) return axis_placement(e->at(1));
+    const std::optional<Pose> parent = find_placement(e->at(0), depth + 1);
+    if (!parent) return std::nullopt;
+    return *parent * axis_placement(e->at(1));
   }
 
   /// Heights of storeys: those of their placements, which know where site and building lie; of files that place all
@@ -200,14 +233,17 @@ class Reader {
   void read_storeys() {
     double low = 1e30, high = -1e30;
     const auto storeys = file_.of_type("IFCBUILDINGSTOREY");
+    for (const StepEntity* s : storeys)
+      if (const auto X = find_placement(s->at(5))) low = std::min(low, X->p.z), high = std::max(high, X->p.z);
+    const double ground = low <= high ? low : 0;
     for (const StepEntity* s : storeys) {
-      const double z = placement(s->at(5)).p.z;
-      low = std::min(low, z), high = std::max(high, z);
-    }
-    for (const StepEntity* s : storeys) {
-      const bool is_placed = high - low > 1e-3 || s->at(9).kind != Kind::Number;
-      out_.storeys.emplace_back(s->at(2).text,
-                                is_placed ? placement(s->at(5)).p.z : low + s->at(9).number * out_.length_unit);
+      const auto X = find_placement(s->at(5));
+      const bool has_elevation = s->at(9).kind == Kind::Number;
+      if (X && (high - low > 1e-3 || !has_elevation)) {
+        out_.storeys.emplace_back(s->at(2).text, X->p.z);
+      } else if (has_elevation) {
+        out_.storeys.emplace_back(s->at(2).text, ground + s->at(9).number * out_.length_unit);
+      }
     }
   }
 
@@ -456,11 +492,15 @@ class Reader {
       out.why = "it has no body";
       return out;
     }
-    const Pose X = placement(e.at(5));
+    const std::optional<Pose> X = find_placement(e.at(5));
+    if (!X) {
+      out.why = "its placement is not understood";
+      return out;
+    }
     for (const StepValue& v : shape->at(2).items) {
       const StepEntity* r = get(v);
       if (r == nullptr || (r->at(1).kind == Kind::Text && r->at(1).text != "Body")) continue;
-      for (const StepValue& item : r->at(3).items) find_item(item, X, out, 0);
+      for (const StepValue& item : r->at(3).items) find_item(item, *X, out, 0);
     }
     return out;
   }
@@ -710,11 +750,12 @@ class Reader {
       if (role.empty() && type != nullptr) role = type->at(9).text;
       if (bar.diameter <= 0 && type != nullptr) bar.diameter = type->at(10).number * out_.length_unit;
       bar.host = host_of(e->id);
-      const Pose X = placement(e->at(5));
-      bar.has_place = e->at(5).kind == Kind::Reference;
+      const std::optional<Pose> placed = find_placement(e->at(5));
+      const Pose X = placed.value_or(Pose{});
+      bar.has_place = placed.has_value();
       std::vector<std::vector<Vec3>> axes;
       double radius = 0;
-      if (const StepEntity* shape = get(e->at(6)))
+      if (const StepEntity* shape = get(e->at(6)); shape != nullptr && placed)
         for (const StepValue& v : shape->at(2).items)
           if (const StepEntity* r = get(v); r != nullptr && r->at(1).text != "Axis")
             for (const StepValue& item : r->at(3).items) find_disks(item, X, axes, radius, 0);

@@ -62,9 +62,16 @@ class Parser {
     const size_t data = text_.find("DATA;");
     if (data == std::string::npos) fail("has no DATA section");
     at_ = data + 5;
+    size_t counted = 0;
+    int line = 1;
     for (skip(); at_ < text_.size() && text_[at_] == '#'; skip()) {
       StepEntity e;
+      e.line = line += static_cast<int>(std::count(text_.begin() + static_cast<std::ptrdiff_t>(counted),
+                                                   text_.begin() + static_cast<std::ptrdiff_t>(at_), '\n'));
+      counted = at_;
       e.id = read_id();
+      if (const StepEntity* first = file.find(e.id))
+        fail("#" + std::to_string(e.id) + " is given twice, first in line " + std::to_string(first->line));
       skip();
       expect('=');
       skip();

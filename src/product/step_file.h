@@ -19,6 +19,7 @@ struct StepValue {
 
 struct StepEntity {
   int id = 0;
+  int line = 1;      // where it begins
   std::string type;  // upper case
   std::vector<StepValue> arguments;
   /// The i-th argument; Null beyond the last.

@@ -239,5 +239,38 @@ TEST(ImportIfcMaps, ScaleAndMirrorProfiles) {
   EXPECT_THAT(import("IFC4", w).text, HasSubstr("width = \"40 cm\"\nheight = \"60 cm\""));
 }
 
+TEST(ImportIfcPlacements, ThatAreNotUnderstoodLeaveTheirElementsOut) {
+  Writer w;
+  w.metres();
+  add_bay(w);
+  const std::string grid = w.add("IFCGRIDPLACEMENT(#9999,$)");
+  const std::string axes = w.add("IFCAXIS2PLACEMENT3D(" + w.point(1, 1, 0) + ",$,$)");
+  for (const std::string& place : {std::string("$"), grid, std::string("#99999"), w.add("IFCLOCALPLACEMENT($,#99999)"),
+                                   w.add("IFCLOCALPLACEMENT(" + grid + "," + axes + ")"),
+                                   w.add("IFCLOCALPLACEMENT($," + w.add("IFCAXIS2PLACEMENT3D($,$,$)") + ")")})
+    block(w, "IFCCOLUMN", place, 0.5, 0.5, 3);
+  const Import made = import("IFC4", w);
+  EXPECT_THAT(made.report.taken, Contains("4 columns in 1 sections"));
+  EXPECT_THAT(made.report.missing, Contains("6 x COLUMN: its placement is not understood"));
+  EXPECT_THAT(made.text, HasSubstr("rows = { A = \"0.000 m\", B = \"5.000 m\" }"));
+}
+
+TEST(ImportIfcCoordinates, ThatAreNoNumbersAreRefusedWithTheirLine) {
+  for (const char* wrong : {"IFCCARTESIANPOINT(('1.',0.,0.))", "IFCCARTESIANPOINT(($,0.,0.))", "IFCCARTESIANPOINT($)",
+                            "IFCDIRECTION((.X.,0.,1.))", "IFCCARTESIANPOINTLIST3D(((0.,0.,0.),(0.,'a',0.)),$)"}) {
+    Writer w;
+    w.metres();
+    w.add(wrong);
+    try {
+      (void)import("IFC4", w);
+      ADD_FAILURE() << wrong;
+    } catch (const InputError& e) {
+      EXPECT_EQ(e.diagnostics()[0].code, "E111") << wrong;
+      EXPECT_EQ(e.diagnostics()[0].where.line, 8) << wrong;
+      EXPECT_EQ(e.diagnostics()[0].message, "a coordinate of #3 is no number") << wrong;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace topple::product

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "base/error.h"
+
 namespace topple::product {
 namespace {
 
@@ -24,6 +26,18 @@ TEST(StepFile, ReadsTextsOfEveryKind) {
       << "half a character";
   EXPECT_EQ(read("St\xFCtze"), "Stütze") << "ISO 8859-1";
   EXPECT_EQ(read("Stütze"), "Stütze");
+}
+
+TEST(StepFile, RefusesIdsThatAreGivenTwice) {
+  const std::string head = "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('IFC4'));\nENDSEC;\nDATA;\n";
+  try {
+    (void)read_step(head + "#1=A();\n/* a\nremark */ #2=B();\n\n#1=C();\nENDSEC;\n", "f.ifc");
+    FAIL() << "one of two was taken";
+  } catch (const InputError& e) {
+    EXPECT_EQ(e.diagnostics()[0].code, "E111");
+    EXPECT_EQ(e.diagnostics()[0].where.line, 10);
+    EXPECT_EQ(e.diagnostics()[0].message, "#1 is given twice, first in line 6");
+  }
 }
 
 }  // namespace
