@@ -208,16 +208,27 @@ class Planner {
     }
     rows_ = find_lines(xs);
     frames_ = find_lines(ys);
-    // floors: the storeys between the feet and the tops of columns
-    levels_.push_back(bottom);
+    // the last floor: the storey nearest to the tops of columns, which may end below its slab or in a parapet
+    double roof = top, off = 1;
     for (const auto& [name, z] : b_.storeys)
-      if (z > levels_.back() + 1 && z < top - 1) levels_.push_back(z);
+      if (z > bottom + 1 && z < top + kOff && std::abs(z - top) < off) roof = z, off = std::abs(z - top);
+    // the others: the storeys between it and the feet of columns
+    levels_.push_back(bottom);
+    int close = 0;
+    for (const auto& [name, z] : b_.storeys) {
+      if (z > levels_.back() + 1 && z < roof - 1) {
+        levels_.push_back(z);
+      } else if (z > levels_.back() + 0.05 && z < roof - 0.05) {
+        ++close;
+      }
+    }
+    if (close > 0) guessed(fmt::format("{} storeys of the file lie less than 1 m from a floor and are left out", close));
     if (levels_.size() == 1) {
       for (const double z : find_lines(tops))
-        if (z > levels_.back() + 1 && z < top - 1) levels_.push_back(z);
+        if (z > levels_.back() + 1 && z < roof - 1) levels_.push_back(z);
       if (levels_.size() > 1) guessed("the file has no storeys where its columns stand: floors are where columns end");
     }
-    levels_.push_back(top);
+    levels_.push_back(roof);
     check_grid();
     taken(fmt::format("{} rows by {} frames and {} storeys, from the places of {} columns and {} storeys of the file",
                       rows_.size(), frames_.size(), levels_.size() - 1, xs.size(), b_.storeys.size()));

@@ -272,5 +272,26 @@ TEST(ImportIfcCoordinates, ThatAreNoNumbersAreRefusedWithTheirLine) {
   }
 }
 
+TEST(ImportIfcStoreys, EndAtTheLastFloorNotAtParapetsOrBelowSlabs) {
+  const auto heights = [](double top, const std::vector<double>& storeys) {
+    Writer w;
+    w.metres();
+    for (const double z : storeys)
+      w.add("IFCBUILDINGSTOREY('g',$,'S',$,$," + w.placement("$", 0, 0, z) + ",$,$,.ELEMENT.," + std::to_string(z) +
+            ")");
+    for (const double x : {0.0, 5.0}) block(w, "IFCCOLUMN", w.placement("$", x, 0, 0), 0.3, 0.3, top);
+    block(w, "IFCBEAM", w.placement("$", 2.5, 0, 5.5), 5, 0.3, 0.5);
+    const Import made = import("IFC4", w);
+    const size_t at = made.text.find("heights = "), beams = made.text.find("[[beams]]");
+    return made.text.substr(at + 10, made.text.find("\n", at) - at - 10) +
+           (beams == std::string::npos ? " no beam" : "");
+  };
+  EXPECT_EQ(heights(6, {0, 3, 6}), "[\"3.000 m\", \"3.000 m\"]");
+  EXPECT_EQ(heights(6.9, {0, 3, 6}), "[\"3.000 m\", \"3.000 m\"]") << "a parapet";
+  EXPECT_EQ(heights(5.8, {0, 3, 6}), "[\"3.000 m\", \"3.000 m\"]") << "the slab lies on the columns";
+  EXPECT_EQ(heights(6, {0, 3}), "[\"3.000 m\", \"3.000 m\"]") << "no storey at the roof";
+  EXPECT_EQ(heights(6, {0, 3, 3.4, 9}), "[\"3.000 m\", \"3.000 m\"]");
+}
+
 }  // namespace
 }  // namespace topple::product
