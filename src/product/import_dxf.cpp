@@ -11,6 +11,7 @@
 
 #include "base/error.h"
 #include "base/utf8.h"
+#include "product/footprint.h"
 #include "product/foreign_text.h"
 #include "product/import.h"
 #include "product/plan_limits.h"
@@ -98,7 +99,8 @@ double unit_of(const std::string& code) {
 struct Outline {
   int line = 1;  // where it begins
   std::string layer;
-  bool is_closed = false, has_arcs = false, is_from_below = false;
+  bool is_closed = false, has_arcs = false, is_on_paper = false, is_mesh = false, lacks_y = false;
+  std::array<double, 3> extrusion{0, 0, 1};
   std::vector<std::array<double, 2>> corners;
 };
 
@@ -107,13 +109,18 @@ std::vector<Outline> find_outlines(const std::vector<Pair>& pairs, const std::st
                                    std::map<std::string, int>& others) {
   std::vector<Outline> out;
   std::string section;
-  bool in_polyline = false, in_vertex = false;
+  bool in_polyline = false, in_vertex = false, has_y = true;
   Outline now;
   std::string entity;
+  const auto end_corner = [&] {
+    now.lacks_y |= !has_y;
+    has_y = true;
+  };
   const auto finish = [&] {
+    end_corner();
     if (entity == "LWPOLYLINE" || entity == "POLYLINE") {
       // drawn on a plane that is seen from below: its x axis is the other way round
-      if (now.is_from_below)
+      if (now.extrusion[2] < 0)
         for (auto& corner : now.corners) corner[0] = -corner[0];
       out.push_back(now);
     } else if (!entity.empty() && entity != "ENDSEC" && entity != "EOF") {
@@ -128,6 +135,7 @@ std::vector<Outline> find_outlines(const std::vector<Pair>& pairs, const std::st
       if (p.value == "EOF" && section == "ENTITIES")
         fail(name, p.line, "its entities have no ENDSEC", "the drawing was cut off; save or copy it again");
       if (in_polyline && (p.value == "VERTEX" || p.value == "SEQEND")) {
+        end_corner();
         in_vertex = p.value == "VERTEX";
         if (!in_vertex) {
           finish();
@@ -150,13 +158,47 @@ std::vector<Outline> find_outlines(const std::vector<Pair>& pairs, const std::st
     if (entity.empty()) continue;
     const bool has_corner = entity == "LWPOLYLINE" || in_vertex;
     if (p.code == 8 && !in_vertex) now.layer = p.value;
-    if (p.code == 70 && !in_vertex) now.is_closed = (std::atoi(p.value.c_str()) & 1) != 0;
-    if (p.code == 10 && has_corner) now.corners.push_back({read_length(p, name), 0});
-    if (p.code == 20 && has_corner && !now.corners.empty()) now.corners.back()[1] = read_length(p, name);
+    if (p.code == 67 && !in_vertex) now.is_on_paper = p.value != "0";
+    if (p.code == 70 && !in_vertex) {
+      const int flags = std::atoi(p.value.c_str());
+      now.is_closed = (flags & 1) != 0;
+      now.is_mesh = entity == "POLYLINE" && (flags & (16 | 64)) != 0;
+    }
+    if (p.code == 70 && in_vertex && (std::atoi(p.value.c_str()) & 16) != 0 && !now.corners.empty())
+      now.corners.pop_back();  // of the frame that a spline follows
+    if (p.code == 10 && has_corner) {
+      end_corner();
+      now.corners.push_back({read_length(p, name), 0});
+      has_y = false;
+    }
+    if (p.code == 20 && has_corner && !now.corners.empty()) {
+      now.corners.back()[1] = read_length(p, name);
+      has_y = true;
+    }
     if (p.code == 42 && has_corner && read_length(p, name) != 0) now.has_arcs = true;
-    if (p.code == 230 && !in_vertex) now.is_from_below = read_length(p, name) < 0;
+    if ((p.code == 210 || p.code == 220 || p.code == 230) && !in_vertex)
+      now.extrusion[static_cast<size_t>(p.code / 10 - 21)] = read_length(p, name);
   }
   return out;
+}
+
+}  // namespace
+
+namespace {
+
+/// Why an outline is no footprint, as the kind that it is counted as; empty: it is one. Corners in metres.
+std::string why_not(const Outline& o) {
+  const auto& [x, y, z] = o.extrusion;
+  if (o.is_on_paper) return "outlines in paper space";
+  if (o.is_mesh) return "polygon meshes";
+  if (!(std::hypot(x, y) < 1e-6 * std::abs(z))) return "outlines that do not lie flat";
+  if (!o.is_closed) return "open polylines";
+  if (o.lacks_y) return "outlines with a corner without y";
+  if (o.corners.size() < 3) return "outlines of fewer than three corners";
+  if (o.corners.size() > limits::corners) return fmt::format("outlines of more than {} corners", limits::corners);
+  if (std::abs(calc_signed_area(o.corners)) < limits::footprint) return "outlines without area";
+  if (crosses_itself(o.corners)) return "outlines whose edges cross";
+  return {};
 }
 
 }  // namespace
@@ -187,31 +229,26 @@ Import make_site_text(const std::string& dxf, const std::string& file_name, doub
       "utilit|gas|water|wasser|power|strom|kabel|cable|sewer|kanal|pipe|leitung|fernw|telek", std::regex::icase);
   std::map<std::string, int> count;
   std::string neighbours, utilities;
-  std::map<std::string, int> others;
-  size_t open = 0, arcs = 0, small = 0, large = 0, taken = 0;
+  std::map<std::string, int> others, left_out;
+  size_t arcs = 0, taken = 0;
   for (Outline& o : find_outlines(pairs, file_name, others)) {
-    if (o.corners.size() > 1 &&
-        std::hypot(o.corners.front()[0] - o.corners.back()[0], o.corners.front()[1] - o.corners.back()[1]) * unit <
-            1e-3) {
+    double far = 0;
+    for (auto& corner : o.corners)
+      for (double& x : corner) {
+        x = std::round(x * unit * 1000) / 1000;  // as it is written
+        far = std::max(far, std::abs(x));
+      }
+    if (o.corners.size() > 1 && o.corners.front() == o.corners.back()) {
       o.is_closed = true;
       o.corners.pop_back();
     }
-    if (!o.is_closed) {
-      ++open;
+    if (const std::string why = why_not(o); !why.empty()) {
+      ++left_out[why];
       continue;
     }
-    if (o.corners.size() < 3) {
-      ++small;
-      continue;
-    }
-    if (o.corners.size() > limits::corners) {
-      ++large;
-      continue;
-    }
-    for (const auto& corner : o.corners)
-      if (const double far = std::max(std::abs(corner[0]), std::abs(corner[1])) * unit; far > limits::site.high)
-        fail(file_name, o.line, fmt::format("an outline lies {:.0f} km from the origin", far / 1000),
-             "a plan reaches 10 km: move the drawing so that its origin is row A, frame 1, or give its unit");
+    if (far > limits::site.high)
+      fail(file_name, o.line, fmt::format("an outline lies {:.0f} km from the origin", far / 1000),
+           "a plan reaches 10 km: move the drawing so that its origin is row A, frame 1, or give its unit");
     arcs += o.has_arcs;
     std::string layer = clean_text(o.layer);
     if (layer.empty()) layer = "outline";
@@ -220,22 +257,22 @@ Import make_site_text(const std::string& dxf, const std::string& file_name, doub
     to += fmt::format("[[site.{}]]\nname = \"{} {}\"\nfootprint = [", is_utility ? "utility" : "neighbour", layer,
                       ++count[layer]);
     for (size_t i = 0; i < o.corners.size(); ++i)
-      to += fmt::format("{}[\"{:.3f} m\", \"{:.3f} m\"]", i > 0 ? ", " : "", o.corners[i][0] * unit,
-                        o.corners[i][1] * unit);
+      to += fmt::format("{}[\"{:.3f} m\", \"{:.3f} m\"]", i > 0 ? ", " : "", o.corners[i][0], o.corners[i][1]);
     to += "]\nclearance = \"?\"\n";
     ++taken;
   }
-  if (taken == 0) fail(file_name, 0, "has no closed outlines", "neighbours are closed LWPOLYLINE or POLYLINE entities");
+  std::string list;
+  for (const auto& [kind, number] : left_out) list += fmt::format("; {} {} are left out", number, kind);
+  if (taken == 0)
+    fail(file_name, 0, "has no closed outlines", "neighbours are closed LWPOLYLINE or POLYLINE entities" + list);
   if (taken > limits::neighbours)
     fail(file_name, 0, fmt::format("has {} closed outlines", taken), "a plan holds 1000; leave out what is not near");
   out.report.taken.push_back(fmt::format("{} closed outlines", taken));
   if (!utilities.empty()) out.report.guessed.push_back("outlines on layers named like pipes and cables are utilities");
-  if (open > 0) out.report.missing.push_back(fmt::format("{} open polylines are left out", open));
-  if (small > 0)
-    out.report.missing.push_back(fmt::format("{} outlines of fewer than three corners are left out", small));
-  if (large > 0) out.report.missing.push_back(fmt::format("{} outlines of more than 200 corners are left out", large));
+  for (const auto& [kind, number] : left_out)
+    out.report.missing.push_back(fmt::format("{} {} are left out", number, kind));
   if (!others.empty()) {
-    std::string list;
+    list.clear();
     for (const auto& [kind, number] : others) list += fmt::format("{}{} {}", list.empty() ? "" : ", ", number, kind);
     out.report.missing.push_back("entities that are no polylines, blocks among them, are left out: " + list);
   }

@@ -222,7 +222,8 @@ class Planner {
         ++close;
       }
     }
-    if (close > 0) guessed(fmt::format("{} storeys of the file lie less than 1 m from a floor and are left out", close));
+    if (close > 0)
+      guessed(fmt::format("{} storeys of the file lie less than 1 m from a floor and are left out", close));
     if (levels_.size() == 1) {
       for (const double z : find_lines(tops))
         if (z > levels_.back() + 1 && z < roof - 1) levels_.push_back(z);

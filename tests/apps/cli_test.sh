@@ -544,7 +544,7 @@ examples)
   # the examples of --help, in one folder: what takes seconds at most is run, the rest is read (arguments_test.cpp)
   cp "$source/examples/rcc/zone_I.toml" section.toml
   { cat "$source/examples/rcc/zone_I_fuzzy.toml"; printf '[search]\nlevels = [0, 1]\nsamples = 200\n'; } >fuzzy.toml
-  printf '%s\n' 0 SECTION 2 ENTITIES 0 LWPOLYLINE 8 Houses 70 1 10 20 20 0 10 30 20 0 10 30 20 9 0 ENDSEC 0 EOF >site.dxf
+  printf '%s\n' 0 SECTION 2 ENTITIES 0 LWPOLYLINE 8 Houses 70 1 10 2000 20 0 10 3000 20 0 10 3000 20 900 0 ENDSEC 0 EOF >site.dxf
   ran=0
   run_examples() {
     "$topple" "$@" --help | sed -n '/^Examples:/,$p' | grep '^  topple ' | sed 's/   .*//; s/^ *topple //' >lines || true

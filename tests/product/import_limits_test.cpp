@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <regex>
 
 #include "base/error.h"
 #include "ifc_writer.h"
@@ -278,7 +279,8 @@ TEST(ImportDxfUnits, AreAllThoseOfTheHeader) {
   const auto at = [&](const char* unit) { return make_site_text(drawing(unit), "s.dxf", 0).text; };
   EXPECT_THAT(at("21"), HasSubstr("[\"1200.000 m\", \"0.000 m\"]"));
   EXPECT_THAT(at("22"), HasSubstr("[\"100.000 m\", \"0.000 m\"]"));
-  EXPECT_THAT(at("9"), HasSubstr("[\"0.100 m\", \"0.000 m\"]"));
+  const std::string larger = std::regex_replace(drawing("9"), std::regex("3937"), "39370");
+  EXPECT_THAT(make_site_text(larger, "s.dxf", 0).text, HasSubstr("[\"1.000 m\", \"0.000 m\"]"));
   EXPECT_THAT(at("4"), HasSubstr("[\"3.937 m\", \"0.000 m\"]"));
   EXPECT_THAT(complaint([&] { (void)at("3"); }), HasSubstr("E113:16 an outline lies 6336 km"));
   for (const char* unit : {"25", "-1", "abc"}) {

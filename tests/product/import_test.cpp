@@ -312,5 +312,37 @@ TEST(ImportDxf, ReadsNamesOfOldDrawingsAndPlanesSeenFromBelow) {
               HasSubstr("footprint = [[\"-20.000 m\", \"0.000 m\"], [\"-30.000 m\", \"0.000 m\"]"));
 }
 
+TEST(ImportDxf, CountsWhatIsNoFootprintByKind) {
+  const auto light = [](const std::string& head, const std::string& corners) {
+    return "0\nLWPOLYLINE\n8\nH\n70\n1\n" + head + corners;
+  };
+  const std::string square = "10\n20\n20\n0\n10\n30\n20\n0\n10\n30\n20\n10\n10\n20\n20\n10\n";
+  const auto heavy = [](int flags, int vertex_flags) {
+    std::string out = "0\nPOLYLINE\n8\nH\n66\n1\n70\n" + std::to_string(flags) + "\n";
+    for (const char* corner : {"10\n40\n20\n0\n", "10\n50\n20\n0\n", "10\n50\n20\n10\n"})
+      out += std::string("0\nVERTEX\n8\nH\n") + corner + "30\n0\n70\n" + std::to_string(vertex_flags) + "\n";
+    return out + "0\nSEQEND\n";
+  };
+  const Import made =
+      make_site_text(dxf("", light("", square) + light("67\n1\n", square) + light("210\n1\n220\n0\n230\n0\n", square) +
+                                 light("210\n0\n220\n0\n230\n1\n", square) + heavy(17, 0) + heavy(65, 64) +
+                                 heavy(1, 0) + heavy(5, 16) + light("", "10\n0\n20\n0\n10\n5\n10\n5\n20\n5\n") +
+                                 light("", "10\n0\n20\n0\n10\n5\n20\n5\n10\n5\n") +
+                                 light("", "10\n0\n20\n0\n10\n5\n20\n0\n10\n9\n20\n0\n") +
+                                 light("", "10\n0\n20\n0\n10\n6\n20\n5\n10\n5\n20\n0\n10\n0\n20\n9\n")),
+                     "s.dxf", 1);
+  EXPECT_THAT(made.report.taken, Contains("3 closed outlines"));
+  for (const char* left : {"1 outlines in paper space", "1 outlines that do not lie flat", "2 polygon meshes",
+                           "2 outlines with a corner without y", "1 outlines of fewer than three corners",
+                           "1 outlines without area", "1 outlines whose edges cross"})
+    EXPECT_THAT(made.report.missing, Contains(std::string(left) + " are left out")) << left;
+  try {
+    (void)make_site_text(dxf("", light("67\n1\n", square)), "s.dxf", 1);
+    FAIL() << "a frame of paper was taken";
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.diagnostics()[0].help, HasSubstr("1 outlines in paper space are left out"));
+  }
+}
+
 }  // namespace
 }  // namespace topple::product
