@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 #include <set>
+#include <string_view>
 
 #include "base/error.h"
 #include "base/unit.h"
@@ -27,9 +28,40 @@ const std::set<std::string>& element_types() {
                                            "IFCCOLUMNSTANDARDCASE",
                                            "IFCBEAMSTANDARDCASE",
                                            "IFCSLABSTANDARDCASE",
+                                           "IFCSLABELEMENTEDCASE",
+                                           "IFCWALLELEMENTEDCASE",
                                            "IFCPILE",
                                            "IFCSTAIR",
                                            "IFCROOF"};
+  return types;
+}
+
+/// Parts of buildings that are only counted.
+const std::set<std::string>& other_types() {
+  static const std::set<std::string> types{"IFCBEARING",
+                                           "IFCBUILDINGELEMENTCOMPONENT",
+                                           "IFCBUILDINGELEMENTPART",
+                                           "IFCBUILDINGELEMENTPROXY",
+                                           "IFCCAISSONFOUNDATION",
+                                           "IFCCHIMNEY",
+                                           "IFCCOVERING",
+                                           "IFCCURTAINWALL",
+                                           "IFCDEEPFOUNDATION",
+                                           "IFCDOOR",
+                                           "IFCDOORSTANDARDCASE",
+                                           "IFCMEMBERSTANDARDCASE",
+                                           "IFCPLATE",
+                                           "IFCPLATESTANDARDCASE",
+                                           "IFCRAILING",
+                                           "IFCRAMP",
+                                           "IFCRAMPFLIGHT",
+                                           "IFCREINFORCINGMESH",
+                                           "IFCSHADINGDEVICE",
+                                           "IFCSTAIRFLIGHT",
+                                           "IFCTENDON",
+                                           "IFCTENDONANCHOR",
+                                           "IFCWINDOW",
+                                           "IFCWINDOWSTANDARDCASE"};
   return types;
 }
 
@@ -108,8 +140,7 @@ class Reader {
     for (const auto& [id, e] : file_.entities) {
       if (element_types().count(e.type) == 0) continue;
       IfcElement element;
-      element.type = e.type;
-      if (const size_t tail = element.type.find("STANDARDCASE"); tail != std::string::npos) element.type.resize(tail);
+      element.type = without_case(e.type);
       element.name = e.at(2).text;
       element.id = id;
       element.material = material_of(id);
@@ -117,6 +148,7 @@ class Reader {
       element.is_round = bodies.back().is_round;
       out_.elements.push_back(std::move(element));
     }
+    count_others();
     find_angle(bodies);
     for (size_t i = 0; i < bodies.size(); ++i) find_box(bodies[i], out_.elements[i]);
     read_bars();
@@ -129,6 +161,26 @@ class Reader {
 
   [[noreturn]] void fail(const std::string& what, const std::string& help) const {
     throw InputError(std::vector<Diagnostic>{{Severity::Error, "E112", {name_, 0, 0}, 1, what, help}});
+  }
+
+  /// IFCWALL of IFCWALLSTANDARDCASE.
+  static std::string without_case(const std::string& type) {
+    for (const char* tail : {"STANDARDCASE", "ELEMENTEDCASE"})
+      if (type.ends_with(tail)) return type.substr(0, type.size() - std::string_view(tail).size());
+    return type;
+  }
+  /// What else the building is made of, and what stands in its storeys.
+  void count_others() {
+    static const std::set<std::string> no_parts{"IFCANNOTATION", "IFCGRID", "IFCREINFORCINGBAR", "IFCELEMENTASSEMBLY"};
+    std::set<int> ids;
+    for (const auto& [id, e] : file_.entities)
+      if (other_types().count(e.type) > 0) ids.insert(id);
+    for (const StepEntity* r : file_.of_type("IFCRELCONTAINEDINSPATIALSTRUCTURE"))
+      for (const StepValue& v : r->at(4).items)
+        if (const StepEntity* e = get(v);
+            e != nullptr && element_types().count(e->type) == 0 && no_parts.count(e->type) == 0)
+          ids.insert(e->id);
+    for (const int id : ids) ++out_.others[without_case(file_.find(id)->type)];
   }
 
   /// Coordinates that are no numbers would be zeros.

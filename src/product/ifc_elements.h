@@ -44,6 +44,7 @@ struct IfcBuilding {
   std::vector<std::pair<std::string, double>> storeys;  // name, elevation [m], rising
   std::vector<IfcElement> elements;
   std::vector<IfcBar> bars;
+  std::map<std::string, int> others;  // entities of other kinds, "IFCRAMP"
 };
 
 /// Reads a file of IFC2X3 or IFC4. Throws InputError: E111 no STEP file, E112 another schema or no elements.

@@ -158,7 +158,8 @@ class Planner {
   void taken(std::string s) { report_.taken.push_back(std::move(s)); }
   void guessed(std::string s) { report_.guessed.push_back(std::move(s)); }
   void missing(std::string s) { report_.missing.push_back(std::move(s)); }
-  void left_out(const IfcElement& e, const std::string& why) { ++left_out_[e.type.substr(3) + ": " + why]; }
+  void left_out(const IfcElement& e, const std::string& why) { ++left_out_[kind_of(e.type) + ": " + why]; }
+  static std::string kind_of(const std::string& type) { return type.starts_with("IFC") ? type.substr(3) : type; }
 
   [[noreturn]] void fail(const std::string& what, std::string help) const {
     if (!b_.has_unit) help += "; it names none of length, and was taken in metres";
@@ -492,6 +493,7 @@ class Planner {
       if (e.type != "IFCCOLUMN" && e.type != "IFCBEAM" && e.type != "IFCSLAB" && e.type != "IFCWALL")
         left_out(e,
                  e.type == "IFCFOOTING" || e.type == "IFCPILE" ? "foundations belong to the ground" : "is not taken");
+    for (const auto& [type, n] : b_.others) left_out_[kind_of(type) + ": is not taken"] += n;
     for (const auto& [what, n] : left_out_) missing(fmt::format("{} x {}", n, what));
   }
 

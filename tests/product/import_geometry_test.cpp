@@ -293,5 +293,27 @@ TEST(ImportIfcStoreys, EndAtTheLastFloorNotAtParapetsOrBelowSlabs) {
   EXPECT_EQ(heights(6, {0, 3, 3.4, 9}), "[\"3.000 m\", \"3.000 m\"]");
 }
 
+TEST(ImportIfcKinds, ThatAreNotTakenAreCounted) {
+  Writer w;
+  w.metres();
+  add_bay(w);
+  block(w, "IFCBUILDINGELEMENTPROXY", w.placement("$", 0, 0, 0), 1, 1, 1);
+  block(w, "IFCPLATE", w.placement("$", 0, 0, 0), 1, 1, 1);
+  block(w, "IFCPLATESTANDARDCASE", w.placement("$", 0, 0, 0), 1, 1, 1);
+  w.element("IFCRAMP", w.placement("$", 0, 0, 0), "$");
+  const std::string desk = w.element("IFCFURNISHINGELEMENT", "$", "$"), grid = w.element("IFCGRID", "$", "$");
+  const std::string door = w.element("IFCDOOR", "$", "$"), member = w.element("IFCMEMBER", "$", "$");
+  w.add("IFCRELCONTAINEDINSPATIALSTRUCTURE('g',$,$,$,(" + desk + "," + grid + "," + door + "," + member + "),#99999)");
+  block(w, "IFCWALLELEMENTEDCASE", w.placement("$", 2.5, 0, 0), 5, 0.24, 3);
+  block(w, "IFCCOLUMN", "$", 0.5, 0.5, 3);
+  const Import made = import("IFC4", w);
+  for (const char* kind :
+       {"1 x BUILDINGELEMENTPROXY", "2 x PLATE", "1 x RAMP", "1 x FURNISHINGELEMENT", "1 x DOOR", "1 x MEMBER"})
+    EXPECT_THAT(made.report.missing, Contains(std::string(kind) + ": is not taken"));
+  EXPECT_THAT(made.report.missing, Not(Contains(HasSubstr("GRID"))));
+  EXPECT_THAT(made.report.missing, Contains("1 x COLUMN: its placement is not understood")) << "once";
+  EXPECT_THAT(made.report.taken, Contains("1 walls in 1 thicknesses"));
+}
+
 }  // namespace
 }  // namespace topple::product
