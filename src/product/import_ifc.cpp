@@ -72,6 +72,7 @@ bool is_letter(char c) { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z')
 struct ConcreteClass {
   std::string name;  // "C20/25"
   int fck = 0;       // [N/mm2]
+  bool is_light = false;
 };
 
 /// The first class in the name of a material: C8/10 to C100/115, LC likewise. Numbers beyond are no class.
@@ -97,7 +98,7 @@ std::optional<ConcreteClass> find_class(const std::string& name) {
     skip_blanks();
     const int cube = read_number();
     if (fck < 8 || fck > 100 || cube < fck || cube > 130) continue;
-    return ConcreteClass{fmt::format("{}C{}/{}", first < c ? "L" : "", fck, cube), fck};
+    return ConcreteClass{fmt::format("{}C{}/{}", first < c ? "L" : "", fck, cube), fck, first < c};
   }
   return std::nullopt;
 }
@@ -612,13 +613,23 @@ class Planner {
             "the\n"
             "# unsafe side (a column that was to crush holds); measure it, or make it fuzzy\nfc = \"{} N/mm2\"\n",
             fck);
-        out +=
-            fmt::format("Ec = \"{:.1f} GPa\"  # 22 GPa ((fck + 8) / 10)^0.3\n", 22 * std::pow((fck + 8) / 10.0, 0.3));
         taken(fmt::format("concrete {}: class {}, fc = {} N/mm2, its characteristic value", key, found->name, fck));
         guessed(
             fmt::format("concrete {}: fc is the characteristic value of a class; the real strength is mostly higher, "
                         "and that can be the unsafe side",
                         key));
+        const double modulus = 22 * std::pow((fck + 8) / 10.0, 0.3);
+        if (found->is_light) {
+          const double tension = fck <= 50 ? 0.3 * std::pow(fck, 2.0 / 3) : 2.12 * std::log(1 + (fck + 8) / 10.0);
+          out += fmt::format(
+              "# lightweight: Ec = {:.1f} GPa (density / 2200 kg/m3)^2, fct = {:.1f} N/mm2 (0.4 + 0.6 density / 2200 "
+              "kg/m3)\n"
+              "Ec = \"?\"\nfct = \"?\"\ndensity = \"?\"\n",
+              modulus, tension);
+          missing(fmt::format("concrete {}: density, Ec and fct of lightweight concrete", key));
+          continue;
+        }
+        out += fmt::format("Ec = \"{:.1f} GPa\"  # 22 GPa ((fck + 8) / 10)^0.3\n", modulus);
         guessed(fmt::format("concrete {}: Ec from the class", key));
         if (fck == 8) {  // no formula gives it
           out += "fct = \"?\"\n";

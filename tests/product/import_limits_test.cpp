@@ -49,6 +49,17 @@ TEST(ImportIfcClasses, LeaveAGapForATensileStrengthThatHasNoFormula) {
   EXPECT_THAT(import_of("C12/15").text, Not(HasSubstr("fct")));
 }
 
+TEST(ImportIfcClasses, OfLightweightConcreteLeaveGapsForWhatHangsOnItsDensity) {
+  const Import made = import_of("LC25/28");
+  EXPECT_THAT(made.text, HasSubstr("fc = \"25 N/mm2\""));
+  // Eurocode 2, table 11.3.1: 22 GPa 3.3^0.3 = 31.5 GPa, 0.3 N/mm2 25^(2/3) = 2.6 N/mm2
+  EXPECT_THAT(made.text, HasSubstr("Ec = 31.5 GPa (density / 2200 kg/m3)^2, fct = 2.6 N/mm2 (0.4 + 0.6 density"));
+  EXPECT_THAT(made.text, HasSubstr("\nEc = \"?\"\nfct = \"?\"\ndensity = \"?\"\n"));
+  EXPECT_THAT(made.report.taken, Contains(HasSubstr("class LC25/28")));
+  EXPECT_THAT(made.report.missing, Contains(HasSubstr("density, Ec and fct of lightweight concrete")));
+  EXPECT_THAT(made.report.guessed, Not(Contains(HasSubstr("Ec from the class"))));
+}
+
 /// Complaints of a plan that are no gaps.
 std::vector<std::string> faults(const std::string& plan) {
   std::vector<std::string> out;
