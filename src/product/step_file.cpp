@@ -54,14 +54,11 @@ class Parser {
 
   StepFile read() {
     StepFile file;
+    if (text_.starts_with("\xEF\xBB\xBF")) at_ = 3;
     skip();
     if (text_.compare(at_, 12, "ISO-10303-21") != 0) fail("is no STEP file: it does not begin with ISO-10303-21");
-    const size_t schema = text_.find("FILE_SCHEMA");
-    const size_t quote = schema == std::string::npos ? schema : text_.find('\'', schema);
-    if (quote != std::string::npos) file.schema = text_.substr(quote + 1, text_.find('\'', quote + 1) - quote - 1);
-    const size_t data = text_.find("DATA;");
-    if (data == std::string::npos) fail("has no DATA section");
-    at_ = data + 5;
+    skip_statement();
+    while (!read_header_statement(file)) {}
     size_t counted = 0;
     int line = 1;
     for (skip(); at_ < text_.size() && text_[at_] == '#'; skip()) {
@@ -88,6 +85,32 @@ class Parser {
   }
 
  private:
+  /// One statement in front of the data: what it says of the schema; true if the data begin behind it.
+  bool read_header_statement(StepFile& file) {
+    skip();
+    if (at_ >= text_.size()) fail("has no DATA section");
+    const std::string name = std::isalpha(static_cast<unsigned char>(peek())) != 0 ? read_name() : std::string();
+    skip();
+    if (name == "FILE_SCHEMA") {
+      const std::vector<StepValue> schemas = read_list(0);
+      if (!schemas.empty() && !schemas[0].items.empty()) file.schema = schemas[0].items[0].text;
+    } else if (name == "DATA") {
+      if (peek() == '(') read_list(0);
+      skip();
+      expect(';');
+      return true;
+    }
+    skip_statement();
+    return false;
+  }
+  /// To behind the next semicolon outside of texts and remarks.
+  void skip_statement() {
+    for (skip(); at_ < text_.size(); skip()) {
+      const char c = text_[at_++];
+      if (c == ';') return;
+      if (c == '\'') at_ = std::min(text_.find('\'', at_), text_.size() - 1) + 1;
+    }
+  }
   [[noreturn]] void fail(const std::string& what) const {
     const int line =
         1 + static_cast<int>(std::count(

@@ -40,5 +40,26 @@ TEST(StepFile, RefusesIdsThatAreGivenTwice) {
   }
 }
 
+TEST(StepFile, FindsSchemaAndDataWhateverHeadersHold) {
+  const std::string schema = "FILE_SCHEMA(('IFC4'));\n", data = "DATA;\n#1=A(2);\nENDSEC;\n";
+  for (const std::string& text :
+       {"\xEF\xBB\xBFISO-10303-21;\nHEADER;\n" + schema + "ENDSEC;\n" + data,
+        "ISO-10303-21;\nHEADER;\nFILE_NAME('it''s; DATA;','',(''),(''),'','','');\n" + schema + "ENDSEC;\n" + data,
+        "ISO-10303-21;\nHEADER;\n/* FILE_SCHEMA(('IFC2X3')); DATA; */\n" + schema + "ENDSEC;\n" + data,
+        "ISO-10303-21 ;\nHEADER ;\nFILE_DESCRIPTION(('FILE_SCHEMA'),'2;1');\nfile_schema ( ( 'IFC4' ) ) ;\nENDSEC ;\n" +
+            data,
+        "ISO-10303-21;\nHEADER;\n" + schema + "ENDSEC;\nDATA /* one */ ;\n#1=A(2);\nENDSEC;\n",
+        "ISO-10303-21;\nHEADER;\n" + schema +
+            "ENDSEC;\nANCHOR;\n<a>=#1;\nENDSEC;\nDATA('x',('IFC4'));\n#1=A(2);\nENDSEC;\n"}) {
+    const StepFile file = read_step(text, "f.ifc");
+    EXPECT_EQ(file.schema, "IFC4") << text;
+    ASSERT_EQ(file.entities.size(), 1u) << text;
+    EXPECT_EQ(file.entities.at(1).at(0).number, 2) << text;
+  }
+  for (const char* broken : {"ISO-10303-21;\nHEADER;\n", "ISO-10303-21;\nHEADER;\nFILE_NAME('", "ISO-10303-21",
+                             "ISO-10303-21;\nFILE_SCHEMA", "ISO-10303-21;\nDATA", "ISO-10303-21;\nX('a''"})
+    EXPECT_THROW((void)read_step(broken, "f.ifc"), InputError) << broken;
+}
+
 }  // namespace
 }  // namespace topple::product
