@@ -584,6 +584,10 @@ class Reader {
           e.type == "IFCCOLUMN" && std::abs(size.x - size.y) < 0.02 * size.x && std::abs(filled - round) < 0.04;
       e.has_box = e.is_round || filled >= (e.type == "IFCWALL" ? kFilledWall : kFilled);
       if (!e.has_box) e.why = "its body is a mesh that is no upright box";
+      if (e.has_box && e.type == "IFCWALL" && !lies_flat(body, e)) {
+        e.has_box = false;
+        e.why = "it is turned against the grid, or inclined";
+      }
       return;
     }
     const bool is_panel = e.type == "IFCWALL" || e.type == "IFCSLAB";
@@ -600,15 +604,21 @@ class Reader {
   /// Whether a wall or a slab is as thick as its box.
   bool lies_flat(const Body& body, const IfcElement& e) const {
     Vec3 across;
+    const auto look = [&](const Vec3& n) {
+      if (norm(n) > norm(across) && (e.type == "IFCSLAB" || std::abs(n.z) < 0.5 * norm(n))) across = n;
+    };
     for (const Solid& solid : body.solids)
-      for (const Vec3& n : solid.faces())
-        if (norm(n) > norm(across) && (e.type == "IFCSLAB" || std::abs(n.z) < 0.5 * norm(n))) across = n;
+      for (const Vec3& n : solid.faces()) look(n);
+    for (const Vec3& n : body.faces) look(n);
     if (!(norm(across) > 0)) return false;
     double low = 1e30, high = -1e30;
+    const auto measure = [&](const Vec3& p) {
+      const double d = dot(p, across) / norm(across);
+      low = std::min(low, d), high = std::max(high, d);
+    };
     for (const Solid& solid : body.solids)
-      for (const Vec3& p : solid.loops.front())
-        for (const double d : {dot(p, across) / norm(across), dot(p + solid.way, across) / norm(across)})
-          low = std::min(low, d), high = std::max(high, d);
+      for (const Vec3& p : solid.loops.front()) measure(p), measure(p + solid.way);
+    for (const Vec3& p : body.points) measure(p);
     const Vec3 size = e.high - e.low;
     return high - low >= kFilled * (e.type == "IFCSLAB" ? size.z : std::min(size.x, size.y));
   }

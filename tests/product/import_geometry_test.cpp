@@ -106,6 +106,19 @@ TEST(ImportIfcBoxes, LeaveOutWhatIsTurnedOrInclined) {
   }
 }
 
+TEST(ImportIfcBoxes, LeaveOutMeshesOfWallsThatAreTurned) {
+  // at 2 deg a wall of 24 cm fills a box of 41 cm to 58 %
+  for (const double angle : {0.0, 2 * unit::deg}) {
+    Writer w;
+    w.metres();
+    add_bay(w);
+    w.element("IFCWALL", turned(w, 2.5, 0, 0, angle), w.shape("Brep", w.brep(5, 0.24, 3)));
+    const Import made = import("IFC4", w);
+    EXPECT_EQ(made.text.find("[wall.wall_240") != std::string::npos, angle == 0);
+    EXPECT_EQ(made.text.find("[wall.") != std::string::npos, angle == 0);
+  }
+}
+
 TEST(ImportIfcBoxes, LeaveOutProfilesThatDoNotFillThem) {
   Writer w;
   w.metres();
