@@ -21,7 +21,7 @@
 #include "collapse/step_check.h"
 #include "mbs/model_json.h"
 #include "product/plan.h"
-#include "product/table_reader.h"
+#include "product/plan_limits.h"
 #include "product/templates.h"
 #include "program.h"
 #include "record/compare.h"
@@ -129,13 +129,13 @@ collapse::RunOptions make_options(const Arguments& a, const char* duration) {
 collapse::RunOptions make_plan_options(const Arguments& a, const char* duration) {
   collapse::RunOptions o = make_options(a, duration);
   const auto check = [](double value, const std::string& text, product::Range range, Dimension d, const char* option) {
-    if (value != 0 && !(value >= range.low && value <= range.high))
+    if (value != 0 && !product::limits::holds(range, value))
       throw InputError("E801",
                        fmt::format("{} \"{}\": must be {}, as in a plan", option, text, product::describe(range, d)));
   };
-  check(o.duration, a.duration, product::analysis_duration, Dimension::Time, duration);
-  check(o.step, a.step, product::analysis_step, Dimension::Time, "--step");
-  check(o.frame_rate, a.frame_rate, product::analysis_frame_rate, Dimension::Frequency, "--frame-rate");
+  check(o.duration, a.duration, product::limits::duration, Dimension::Time, duration);
+  check(o.step, a.step, product::limits::step, Dimension::Time, "--step");
+  check(o.frame_rate, a.frame_rate, product::limits::frame_rate, Dimension::Frequency, "--frame-rate");
   return o;
 }
 

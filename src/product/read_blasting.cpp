@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "product/plan_limits.h"
 #include "product/reading.h"
 
 namespace topple::product {
@@ -33,7 +34,7 @@ ChargeTable read_charge(TableReader& table) {
   c.place = table.place();
   c.words = table.required_words("members", "[\"C-A*-0\"]");
   c.charge.position = table.quantity("position", Dimension::Length, {0, 1000});
-  c.charge.destroyed_length = table.quantity("destroyed_length", Dimension::Length, {0.01, 100});
+  c.charge.destroyed_length = table.quantity("destroyed_length", Dimension::Length, limits::destroyed_length);
   c.charge.residual_bars = table.quantity("residual_bars", Dimension::Number, fraction, 0);
   c.charge.transition_damage = table.quantity("transition_damage", Dimension::Number, fraction, 0);
   const Sector sector = read_sector(table);
@@ -231,10 +232,10 @@ void read_cables(Reading& reading, TableReader& root) {
     } else {
       for (int k = 0; k < 3; ++k)
         c.anchor[k] = read_quantity(anchor->items[static_cast<size_t>(k)], table.label() + ": anchor",
-                                    Dimension::Length, {-10e3, 10e3}, reading.complaints);
+                                    Dimension::Length, limits::site, reading.complaints);
     }
-    c.stiffness = table.quantity("stiffness", Dimension::StiffnessPerLength, {0, 1e12, true});
-    c.pretension = table.quantity("pretension", Dimension::Force, {0, 1e9}, 0);
+    c.stiffness = table.quantity("stiffness", Dimension::StiffnessPerLength, limits::cable_stiffness);
+    c.pretension = table.quantity("pretension", Dimension::Force, limits::cable_pretension, 0);
     c.strength = table.quantity("strength", Dimension::Force, {0, 1e9, true});
     table.finish();
     if (c.strength <= c.pretension)

@@ -192,9 +192,9 @@ void read_analysis(Reading& reading, TableReader& root) {
   }
   TableReader table(*node, "analysis", reading.complaints);
   Analysis& a = reading.plan.analysis;
-  a.duration = table.quantity("duration", Dimension::Time, analysis_duration);
-  a.step = table.quantity("step", Dimension::Time, analysis_step, 0);
-  a.frame_rate = table.quantity("frame_rate", Dimension::Frequency, analysis_frame_rate, a.frame_rate);
+  a.duration = table.quantity("duration", Dimension::Time, limits::duration);
+  a.step = table.quantity("step", Dimension::Time, limits::step, 0);
+  a.frame_rate = table.quantity("frame_rate", Dimension::Frequency, limits::frame_rate, a.frame_rate);
   a.gravity = table.quantity("gravity", Dimension::Acceleration, {0, 100, true}, a.gravity);
   a.seed =
       static_cast<std::uint64_t>(table.find_integer("seed", 0, std::numeric_limits<std::int64_t>::max()).value_or(1));

@@ -19,8 +19,6 @@ struct Range {
 };
 
 inline constexpr Range fraction{0, 1};
-// of [analysis], and of what a command line puts in their place
-inline constexpr Range analysis_duration{0.01, 600}, analysis_step{1e-7, 0.01}, analysis_frame_rate{1, 1000};
 
 /// A string of the plan and its place.
 struct Word {
