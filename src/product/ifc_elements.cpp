@@ -516,6 +516,10 @@ class Reader {
     if (e == nullptr || depth > 10) return false;
     if (e->type == "IFCEXTRUDEDAREASOLID") {
       Solid solid;
+      if (e->at(1).kind != Kind::Null && !has_axes(e->at(1))) {
+        out.why = "the placement of its body is not understood";
+        return false;
+      }
       if (!find_profile(e->at(0), solid.loops, out.is_round, out.why)) return false;
       const Map X_WP = X * axis_placement(e->at(1));
       const Vec3 way = e->at(3).number * out_.length_unit * direction(e->at(2), {0, 0, 1});
@@ -588,6 +592,10 @@ class Reader {
         e.has_box = false;
         e.why = "it is turned against the grid, or inclined";
       }
+      return;
+    }
+    if (!(volume > 0)) {
+      e.why = "its body has no volume";
       return;
     }
     const bool is_panel = e.type == "IFCWALL" || e.type == "IFCSLAB";

@@ -268,6 +268,20 @@ TEST(ImportIfcPlacements, ThatAreNotUnderstoodLeaveTheirElementsOut) {
   EXPECT_THAT(made.text, HasSubstr("rows = { A = \"0.000 m\", B = \"5.000 m\" }"));
 }
 
+TEST(ImportIfcPlacements, OfBodiesHaveToBeUnderstoodToo) {
+  Writer w;
+  w.metres();
+  add_bay(w);
+  const std::string up = w.add("IFCDIRECTION((0.,0.,1.))"), profile = w.rectangle(0.5, 0.5);
+  for (const std::string& rest : {"#99999," + up + ",3.", "$," + up + ",0.", "$," + up + ",'3.'"})
+    w.element("IFCCOLUMN", w.placement("$", 1, 1, 0),
+              w.shape("SweptSolid", w.add("IFCEXTRUDEDAREASOLID(" + profile + "," + rest + ")")));
+  const Import made = import("IFC4", w);
+  EXPECT_THAT(made.report.taken, Contains("4 columns in 1 sections"));
+  EXPECT_THAT(made.report.missing, Contains("1 x COLUMN: the placement of its body is not understood"));
+  EXPECT_THAT(made.report.missing, Contains("2 x COLUMN: its body has no volume"));
+}
+
 TEST(ImportIfcCoordinates, ThatAreNoNumbersAreRefusedWithTheirLine) {
   for (const char* wrong : {"IFCCARTESIANPOINT(('1.',0.,0.))", "IFCCARTESIANPOINT(($,0.,0.))", "IFCCARTESIANPOINT($)",
                             "IFCDIRECTION((.X.,0.,1.))", "IFCCARTESIANPOINTLIST3D(((0.,0.,0.),(0.,'a',0.)),$)"}) {
