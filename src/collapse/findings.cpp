@@ -667,8 +667,8 @@ std::vector<std::string> not_modelled(const product::Plan& plan) {
       "dust",
       "ground vibration as such (at most a screening with the site's own law)",
       "wind, and people's behaviour; no distance given here is a safe distance",
-      "cracking and crushing of slabs within a bay, of walls within a panel and of beams between their end zones; room "
-      "that rubble takes",
+      ("cracking and crushing of slabs within a bay, of walls within a panel and of beams between their end zones; room "
+       "that rubble takes"),
       "infill and finishes beyond their weight"};
   if (!plan.shafts.empty())
     list.emplace_back(
