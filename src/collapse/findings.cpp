@@ -661,15 +661,14 @@ std::string describe_step_needed(const mbs::Summary& s) {
 }
 
 std::vector<std::string> not_modelled(const product::Plan& plan) {
-  std::vector<std::string> list = {
-      "fragments thrown by the charges",
-      "air overpressure",
-      "dust",
-      "ground vibration as such (at most a screening with the site's own law)",
-      "wind, and people's behaviour; no distance given here is a safe distance",
-      ("cracking and crushing of slabs within a bay, of walls within a panel and of beams between their end zones; room "
-       "that rubble takes"),
-      "infill and finishes beyond their weight"};
+  std::vector<std::string> list = {"fragments thrown by the charges",
+                                   "air overpressure",
+                                   "dust",
+                                   "ground vibration as such (at most a screening with the site's own law)",
+                                   "wind, and people's behaviour; no distance given here is a safe distance",
+                                   ("cracking and crushing of slabs within a bay, of walls within a panel and of beams "
+                                    "between their end zones; room that rubble takes"),
+                                   "infill and finishes beyond their weight"};
   if (!plan.shafts.empty())
     list.emplace_back(
         "rings that flatten as they land: single pieces of a shaft may roll and tumble farther than real ones");
