@@ -252,6 +252,8 @@ void Checker::check_bodies() {
     pose(p, "X_WB", b.X_WB);
     finite(p, "v_WB", b.v_WB);
     finite(p, "w_WB", b.w_WB);
+    if (b.fixed && norm(b.v_WB) > 0) fail(p, "v_WB", "is not 0, and a fixed body does not move");
+    if (b.fixed && norm(b.w_WB) > 0) fail(p, "w_WB", "is not 0, and a fixed body does not turn");
     if (m_.is_planar && b.v_WB.y != 0)
       fail(p, "v_WB", fmt::format("has {:g} m/s along y, across which nothing of a planar model moves", b.v_WB.y));
     if (m_.is_planar && (b.w_WB.x != 0 || b.w_WB.z != 0))
@@ -428,6 +430,9 @@ void Checker::check_loads() {
     const Load& l = m_.loads[i];
     const Place p = at("loads", i, l.name);
     body(p, "body", l.body, false);
+    if (l.body.index >= 0 && l.body.index < static_cast<int>(m_.bodies.size()) &&
+        m_.bodies[static_cast<size_t>(l.body.index)].fixed)
+      fail(p, "body", "is fixed: the load would do nothing");
     finite(p, "p_B", l.p_B);
     finite(p, "force", l.force);
     finite(p, "torque", l.torque);
