@@ -430,9 +430,6 @@ void Checker::check_loads() {
     const Load& l = m_.loads[i];
     const Place p = at("loads", i, l.name);
     body(p, "body", l.body, false);
-    if (l.body.index >= 0 && l.body.index < static_cast<int>(m_.bodies.size()) &&
-        m_.bodies[static_cast<size_t>(l.body.index)].fixed)
-      fail(p, "body", "is fixed: the load would do nothing");
     finite(p, "p_B", l.p_B);
     finite(p, "force", l.force);
     finite(p, "torque", l.torque);
