@@ -30,6 +30,11 @@ bool is_utf8(std::string_view text) {
   return true;
 }
 
+std::string_view without_mark(std::string_view text) {
+  constexpr std::string_view mark = "\xEF\xBB\xBF";
+  return text.starts_with(mark) ? text.substr(mark.size()) : text;
+}
+
 std::size_t count_characters(std::string_view text) {
   // bytes that begin one
   return static_cast<std::size_t>(

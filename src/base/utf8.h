@@ -14,6 +14,9 @@ std::size_t utf8_length(std::string_view text);
 /// Whether all of it is well-formed.
 bool is_utf8(std::string_view text);
 
+/// What stands behind the byte order mark, of a text that begins with one.
+std::string_view without_mark(std::string_view text);
+
 /// Characters of a well-formed text.
 std::size_t count_characters(std::string_view text);
 

@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "base/utf8.h"
 #include "product/document.h"
 
 namespace topple::product {
@@ -49,8 +50,7 @@ std::string quantity(double value, const char* unit) { return fmt::format("\"{} 
 class Editor {
  public:
   Editor(const Plan& plan, const PlanChanges& changes) : plan_(plan), changes_(changes) {
-    static const std::string mark = "\xEF\xBB\xBF";
-    text_ = plan.text.starts_with(mark) ? plan.text.substr(mark.size()) : plan.text;
+    text_ = without_mark(plan.text);
     root_ = parse_document(text_, plan.path);
     lines_ = split(text_);
     if (!lines_.empty() && !lines_.back().ends_with('\n')) lines_.back() += '\n';

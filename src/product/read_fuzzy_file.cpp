@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/utf8.h"
 #include "product/fuzzy_file.h"
 #include "product/read_fuzzy_values.h"
 #include "product/reading.h"
@@ -265,8 +266,7 @@ FuzzyFile read_fuzzy_text(const std::string& text, const std::string& name, cons
 FuzzyFile read_fuzzy_file(const std::string& path, const SectionFile& section, std::vector<Diagnostic>& warnings,
                           std::string& text_out) {
   text_out.clear();
-  text_out = read_input(path, "fuzzy input");
-  if (text_out.starts_with("\xEF\xBB\xBF")) text_out = text_out.substr(3);
+  text_out = without_mark(read_input(path, "fuzzy input"));
   return read_fuzzy_text(text_out, path, section, warnings);
 }
 

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <system_error>
 
+#include "base/utf8.h"
 #include "product/reading.h"
 
 namespace topple::product {
@@ -57,11 +58,10 @@ Plan read_plan_document(const Node& document, const std::string& name, Complaint
 }
 
 Plan read_plan(const std::string& text, const std::string& name, std::vector<Diagnostic>& warnings) {
-  constexpr const char* byte_order_mark = "\xEF\xBB\xBF";
   if (text.size() > largest_file)
     throw InputError(std::vector<Diagnostic>{
         {Severity::Error, "E107", {name, 1, 1}, 1, "the plan is larger than 8 MB", "a plan describes one building"}});
-  std::string bytes = text.starts_with(byte_order_mark) ? text.substr(3) : text;
+  std::string bytes(without_mark(text));
   const Node document = parse_document(bytes, name);
   Complaints complaints(name);
   find_gaps(document, "", complaints);
@@ -102,7 +102,7 @@ std::string read_input(const std::string& path, const std::string& what) {
 Plan read_plan_file(const std::string& path, std::vector<Diagnostic>& warnings, std::string& text_out) {
   text_out.clear();
   const std::string bytes = read_input(path, "plan");
-  text_out = bytes.starts_with("\xEF\xBB\xBF") ? bytes.substr(3) : bytes;
+  text_out = without_mark(bytes);
   return read_plan(bytes, path, warnings);
 }
 

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/utf8.h"
 #include "product/reading.h"
 #include "product/section_file.h"
 
@@ -9,9 +10,6 @@ namespace topple::product {
 namespace {
 
 constexpr size_t most_forces = 50;
-constexpr const char* byte_order_mark = "\xEF\xBB\xBF";
-
-std::string without_mark(const std::string& text) { return text.starts_with(byte_order_mark) ? text.substr(3) : text; }
 
 /// Compression is positive in the file.
 std::vector<double> read_forces(TableReader& zone) {
@@ -55,7 +53,7 @@ void read_zone(const Reading& reading, TableReader& root, SectionFile& out) {
 
 SectionFile read_section_file_text(const std::string& text, const std::string& name,
                                    std::vector<Diagnostic>& warnings) {
-  const std::string bytes = without_mark(text);
+  const std::string bytes(without_mark(text));
   SectionFile out = read_section_document(parse_document(bytes, name), name, warnings);
   out.text = bytes;
   return out;

@@ -54,7 +54,7 @@ class Parser {
 
   StepFile read() {
     StepFile file;
-    if (text_.starts_with("\xEF\xBB\xBF")) at_ = 3;
+    at_ = text_.size() - without_mark(text_).size();
     skip();
     if (text_.compare(at_, 12, "ISO-10303-21") != 0) fail("is no STEP file: it does not begin with ISO-10303-21");
     skip_statement();

@@ -279,6 +279,11 @@ TEST(ImportDxf, RefusesCoordinatesThatAreNone) {
   }
 }
 
+TEST(ImportDxf, ReadsBehindAByteOrderMark) {
+  const std::string whole = dxf("", polyline("A", 1));
+  EXPECT_EQ(make_site_text("\xEF\xBB\xBF" + whole, "s.dxf", 1e-3).text, make_site_text(whole, "s.dxf", 1e-3).text);
+}
+
 TEST(ImportDxf, RefusesDrawingsThatAreCutOff) {
   const std::string whole = dxf("", polyline("A", 1) + polyline("B", 1)), end = "0\nENDSEC\n0\nEOF\n";
   const auto place = [](const std::string& text) {
