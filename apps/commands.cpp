@@ -129,7 +129,7 @@ collapse::RunOptions make_options(const Arguments& a, const char* duration) {
 collapse::RunOptions make_plan_options(const Arguments& a, const char* duration) {
   collapse::RunOptions o = make_options(a, duration);
   const auto check = [](double value, const std::string& text, product::Range range, Dimension d, const char* option) {
-    if (value != 0 && !product::limits::holds(range, value))
+    if (value != 0 && !product::is_within(value, range))
       throw InputError("E801",
                        fmt::format("{} \"{}\": must be {}, as in a plan", option, text, product::describe(range, d)));
   };

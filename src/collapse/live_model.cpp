@@ -237,7 +237,7 @@ std::string LiveModel::add_charge(const Edit& e, double time, double next) {
   if (!is_column && m.kind != MemberKind::Beam) refuse("charges act on columns and beams only");
   const MemberZones& z = built_.zones[index];
   if (z.element[0] < 0) refuse("has no zone of its own");
-  demand(limits::holds(limits::destroyed_length, e.destroyed_length), "destroyed_length must be 0.01 to 100 m");
+  demand(product::is_within(e.destroyed_length, limits::destroyed_length), "destroyed_length must be 0.01 to 100 m");
   demand(is_share(e.residual_bars), "residual_bars must be 0 to 1");
   demand(is_share(e.transition_damage), "transition_damage must be 0 to 1");
   const double low = e.position - 0.5 * e.destroyed_length, high = e.position + 0.5 * e.destroyed_length;
@@ -347,14 +347,15 @@ std::string LiveModel::add_cable(const Edit& e) {
   const Member& m = plan_.members[static_cast<size_t>(index)];
   const double length = norm(m.end - m.start);
   demand(e.position >= 0 && e.position <= length, fmt::format("{}: position must be 0 to {:.3g} m", m.name, length));
-  demand(limits::holds(limits::cable_stiffness, e.stiffness), "stiffness must be > 0 N/m, at most 1e12");
-  demand(limits::holds(limits::cable_pretension, e.pretension), "pretension must be 0 to 1e9 N");
+  demand(product::is_within(e.stiffness, limits::cable_stiffness), "stiffness must be > 0 N/m, at most 1e12");
+  demand(product::is_within(e.pretension, limits::cable_pretension), "pretension must be 0 to 1e9 N");
   demand(e.strength >= 0, "strength must be >= 0 N; 0: it never breaks");
   demand(e.strength == 0 || e.strength > e.pretension,
          fmt::format("strength, {:g} N, must be above the pretension, {:g} N", e.strength, e.pretension),
          "0: it never breaks");
   for (int i = 0; i < 3; ++i)
-    demand(limits::holds(limits::site, e.anchor[i]), "anchor must be three numbers, each within 10 km of the origin");
+    demand(product::is_within(e.anchor[i], limits::site),
+           "anchor must be three numbers, each within 10 km of the origin");
   demand(norm(m.start + (length > 0 ? e.position / length : 0) * (m.end - m.start) - e.anchor) >= 1e-3,
          "anchor is where the cable is tied to " + m.name, "a cable without length pulls in no direction");
   product::Cable c;

@@ -537,8 +537,8 @@ class Planner {
       guessed(fmt::format("section {}: its cover is {:.0f} to {:.0f} mm; the least one was taken", name,
                           1000 * bars.cover, 1000 * bars.largest_cover));
     // what a plan cannot hold is a gap
-    const double diameter = limits::holds(limits::tie_diameter, bars.ties.diameter) ? bars.ties.diameter : 0;
-    const double spacing = limits::holds(limits::tie_spacing, bars.tie_spacing) ? bars.tie_spacing : 0;
+    const double diameter = is_within(bars.ties.diameter, limits::tie_diameter) ? bars.ties.diameter : 0;
+    const double spacing = is_within(bars.tie_spacing, limits::tie_spacing) ? bars.tie_spacing : 0;
     text_ += fmt::format("ties = {{ diameter = {}, spacing = {} }}\n", diameter > 0 ? millimetres(diameter) : "\"?\"",
                          spacing > 0 ? millimetres(spacing) : "\"?\"");
     if (!(diameter > 0)) add_gap("diameter of ties");
@@ -552,7 +552,7 @@ class Planner {
   }
 
   static bool fits(const BarGroup& bars) {
-    return bars.count <= limits::bars && limits::holds(limits::bar_diameter, bars.diameter);
+    return bars.count <= limits::bars && is_within(bars.diameter, limits::bar_diameter);
   }
 
   void write_column_bars(const std::string& name, const MemberBars& bars) {

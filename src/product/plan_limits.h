@@ -23,8 +23,4 @@ inline constexpr Range duration{0.01, 600}, step{1e-7, 0.01}, frame_rate{1, 1000
 inline constexpr Range destroyed_length{0.01, 100};
 inline constexpr Range cable_stiffness{0, 1e12, true}, cable_pretension{0, 1e9};
 
-inline bool holds(const Range& range, double value) {
-  return value >= range.low && value <= range.high && (value > range.low || !range.above_low);
-}
-
 }  // namespace topple::product::limits

@@ -86,11 +86,11 @@ std::string unit_help(Dimension dimension) {
   return "write it as a string with a unit, such as " + example_of(dimension) + "; units: " + units_of(dimension);
 }
 
+}  // namespace
+
 bool is_within(double value, const Range& range) {
   return (range.above_low ? value > range.low : value >= range.low) && value <= range.high;
 }
-
-}  // namespace
 
 std::string describe(const Range& range, Dimension dimension, const std::string& written) {
   auto [name, size] = usual_unit(dimension);

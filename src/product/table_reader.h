@@ -20,6 +20,8 @@ struct Range {
 
 inline constexpr Range fraction{0, 1};
 
+bool is_within(double value, const Range&);
+
 /// A string of the plan and its place.
 struct Word {
   std::string text;
