@@ -93,10 +93,6 @@ Standing add_stability(const Context& c) {
   Standing out;
   const std::vector<BlockFrame> block = c.recorder.farthest_block_frames();
   const auto& zones = c.recorder.zone_frames();
-  const auto least_margin = [&](size_t from, size_t to) {
-    const auto used = [](const ZoneFrame& a, const ZoneFrame& b) { return a.utilisation < b.utilisation; };
-    return std::max_element(zones.begin() + static_cast<long>(from), zones.begin() + static_cast<long>(to) + 1, used);
-  };
   const auto describe = [&](const std::string& id, const std::string& title, size_t i, bool settled, double begin) {
     const ZoneFrame& z = zones[i];
     const auto margins = find_margins(c.r, i);
@@ -126,12 +122,12 @@ Standing add_stability(const Context& c) {
       is_still = block[i].fastest < c.k.rest_speed;
       text +=
           is_still ? " It stands still." : fmt::format(" It still sways (still: below {:.2f} m/s).", c.k.rest_speed);
-      size_t first = i;
-      while (first > 0 && zones[first - 1].time >= begin - 1e-9) --first;
-      const auto worst = least_margin(first, i);
-      if (has && !is_still && worst->utilisation > z.utilisation)
+      size_t worst = i;  // of the frames of the pause
+      for (size_t f = i; f-- > 0 && zones[f].time >= begin - 1e-9;)
+        if (zones[f].utilisation > zones[worst].utilisation) worst = f;
+      if (has && !is_still && worst != i)
         text += fmt::format(" This is the margin of one instant: the least in the pause is {:.2f}, at {:.2f} s.",
-                            1 / worst->utilisation, worst->time);
+                            1 / zones[worst].utilisation, zones[worst].time);
     }
     const Status status = !is_standing                                 ? Status::Bad
                           : z.yielded > 0 || z.broken > 0 || !is_still ? Status::Warning

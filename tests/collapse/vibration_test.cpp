@@ -227,5 +227,18 @@ TEST(StabilityRunPhysics, TheMarginsOfAPauseAreSaid) {
                                          HasSubstr("It does not stand")));
 }
 
+TEST(StabilityRunPhysics, ASwayingBuildingTellsTheLeastMarginOfItsPause) {
+  const record::Record r = run_plan(read(house(charge("C-A1-0", "0.1 s") + charge("C-B*-0", "0.35 s"), "0.4 s")),
+                                    default_knowledge(), {}, {});
+  const record::Finding& pause = finding(r, "stability.stage_1");
+  ASSERT_THAT(pause.text, HasSubstr("It still sways"));
+  const std::string words = "This is the margin of one instant: the least in the pause is ";
+  const size_t at = pause.text.find(words);
+  ASSERT_NE(at, std::string::npos) << pause.text;
+  const double least = std::stod(pause.text.substr(at + words.size()));
+  EXPECT_LT(least, pause.value);
+  EXPECT_GE(least, 1) << "a zone that has yielded uses all of its resistance";
+}
+
 }  // namespace
 }  // namespace topple::collapse
