@@ -140,7 +140,7 @@ void System::find_fast_bodies() {
 }
 
 /// Boxes around the shapes, grown by the way their bodies may make until the next search, sorted by place: that of the
-/// lower ends, the axis along which the shapes reach farthest first.
+/// lower ends, then of the upper ones, the axis along which the shapes reach farthest first.
 void System::find_bounds() {
   State& s = state;
   PairSearch& search = contact.search;
@@ -185,6 +185,8 @@ void System::find_bounds() {
   std::sort(search.bounds.begin(), search.bounds.end(), [](const ShapeBounds& x, const ShapeBounds& y) {
     for (int k = 0; k < 3; ++k)
       if (x.low[k] != y.low[k]) return x.low[k] < y.low[k];
+    for (int k = 0; k < 3; ++k)
+      if (x.high[k] != y.high[k]) return x.high[k] < y.high[k];
     return x.shape < y.shape;
   });
 }
