@@ -18,6 +18,7 @@ namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 constexpr double kLeastShare = 0.05;  // of its stiffness that a pair keeps whatever it has earned
+constexpr double kBegun = 0.1;        // of what its points hold, what a pair that has hardly begun measures lacks by
 
 template <class D>
 HWY_INLINE V3<D> zeros() {
@@ -215,7 +216,7 @@ HWY_INLINE void press_block(const ContactJob& job, size_t block) {
                damping = load<D>(g, kDamping), twice_zeta = num<D>(2) * load<D>(g, kZeta);
   const V3<D> to_b = cross(apart, n);
   const auto plain = hn::Ge(damping.v, hn::Zero(d));
-  Num<D> energy = zero, impedance = zero, total = zero, held = zero, stores = zero;
+  Num<D> energy = zero, impedance = zero, total = zero, held = zero, stores = zero, holds = zero;
   V3<D> torque = zeros<D>(), held_torque = torque;
   auto some_meet = hn::FirstN(d, 0);
   for (size_t row = job.rows[block]; row < job.rows[block + 1]; ++row) {
@@ -254,6 +255,7 @@ HWY_INLINE void press_block(const ContactJob& job, size_t block) {
     store<D>(select(meets, share, zero), p, kMet);
     // what has been met since has its energy from (4)
     stores = stores + select(meets, zero, half * plain_force * fnma(h, speed, depth));
+    holds = holds + select(meets, zero, half * plain_force * depth);
     full = select(hn::Or(meets, parts), full * fma(half, share, half), full);
     Num<D> rate = twice_zeta * z;
     if (HWY_UNLIKELY(!hn::AllFalse(d, plain))) {
@@ -271,7 +273,11 @@ HWY_INLINE void press_block(const ContactJob& job, size_t block) {
     const Num<D> earned = load<D>(g, kEarned);
     const auto is_known = hn::And(hn::Ge(earned.v, hn::Zero(d)), hn::Gt(stores.v, hn::Zero(d)));
     const Num<D> given = minimum(maximum(load<D>(g, kSpent), zero), maximum(stores - earned, zero));
-    const Num<D> ratio = (earned + given) / select(is_known, stores, one);
+    // where all but nothing was stored before this step, the turn of the normal within it is no small share of that
+    const Num<D> least = num<D>(kBegun) * holds;
+    const auto begins = hn::And(is_known, hn::Lt(stores.v, least.v));
+    const Num<D> ratio = select(begins, one - (stores - earned - given) / select(begins, least, one),
+                                (earned + given) / select(is_known, stores, one));
     const Num<D> kept = select(is_known, minimum(maximum(ratio, num<D>(kLeastShare)), one), one);
     store<D>(select(is_known, maximum(earned - stores, zero) - given, maximum(earned, zero)), g, kLost);
     store<D>(zero, g, kSpent);
