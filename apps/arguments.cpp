@@ -531,7 +531,7 @@ std::variant<Arguments, int> parse_arguments(int argc, char** argv) {
   topple replay steer/storehouse.steer.jsonl -o out/again
                                                    do what was done there once more
 
-Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterion of the plan is violated.)");
+Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterion of the plan is violated or not judged.)");
 
   for (const auto add : {add_new, add_check, add_run, add_rules, add_mbs, add_report, add_export, add_import, add_rcc,
                          add_fe, add_compare, add_steer, add_replay, add_study, add_worker, add_demo, add_doctor})

@@ -127,7 +127,7 @@ the run failed or was cancelled
 bad input
 .TP
 .B 3
-a criterion of the plan is violated
+a criterion of the plan is violated, or the run ended too early to judge it
 .SH ENVIRONMENT
 .TP
 .B NO_COLOR

@@ -17,6 +17,7 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "base/unit.h"
+#include "collapse/findings.h"
 #include "collapse/run.h"
 #include "collapse/step_check.h"
 #include "mbs/model_json.h"
@@ -223,15 +224,6 @@ void print_leftovers(std::FILE* out, const Arguments& a, const Files& files) {
   if (!words.empty()) std::fprintf(out, "Left from before, not of this run: %s\n", words.c_str());
 }
 
-namespace {
-
-/// A finding that makes the exit code 3.
-bool is_violated(const record::Finding& f) {
-  return f.status == record::Status::Bad && (f.id.rfind("criterion.", 0) == 0 || f.id.rfind("clearance.", 0) == 0);
-}
-
-}  // namespace
-
 json summary_json(const record::Record& r, const Files& files, int exit_code) {
   json out;
   out["title"] = r.provenance.title;
@@ -252,6 +244,7 @@ json summary_json(const record::Record& r, const Files& files, int exit_code) {
                    {"mass", r.counts.mass}};
   out["findings"] = json::array();
   out["violated"] = json::array();
+  out["not_judged"] = json::array();
   for (const record::Finding& f : r.findings) {
     out["findings"].push_back({{"id", f.id},
                                {"heading", f.heading},
@@ -260,7 +253,8 @@ json summary_json(const record::Record& r, const Files& files, int exit_code) {
                                {"value", std::isfinite(f.value) ? json(f.value) : json(nullptr)},
                                {"unit", f.unit},
                                {"status", word_of(f.status)}});
-    if (is_violated(f)) out["violated"].push_back(f.id);
+    if (collapse::is_violated(f)) out["violated"].push_back(f.id);
+    if (collapse::is_not_judged(f)) out["not_judged"].push_back(f.id);
   }
   out["files"] = json::object();
   for (const auto& [what, path] : files) out["files"][what] = path;
@@ -269,14 +263,17 @@ json summary_json(const record::Record& r, const Files& files, int exit_code) {
 
 int exit_code_of(const record::Record& r, bool failed_report) {
   if (r.ending == "failed" || r.ending == "cancelled" || failed_report) return kRunFailed;
-  return collapse::violates_criteria(r) ? kCriterionViolated : kOk;
+  const auto is_open = [](const record::Finding& f) { return collapse::is_violated(f) || collapse::is_not_judged(f); };
+  return std::any_of(r.findings.begin(), r.findings.end(), is_open) ? kCriterionViolated : kOk;
 }
 
 int close_run(const record::Record& r, const Arguments& a, std::FILE* out, Files files) {
   print_findings(out, r);
   std::fprintf(out, "\n%s Computed in %.1f s.\n", r.ending_text.c_str(), r.provenance.wall_time);
   for (const record::Finding& f : r.findings)
-    if (is_violated(f)) std::fprintf(out, "Violated: %s (%s)\n", f.title.c_str(), f.heading.c_str());
+    if (collapse::is_violated(f) || collapse::is_not_judged(f))
+      std::fprintf(out, "%s: %s (%s)\n", collapse::is_violated(f) ? "Violated" : "Not judged", f.title.c_str(),
+                   f.heading.c_str());
   bool failed_report = false;
   for (auto& f : write_files(r, a, failed_report)) files.push_back(std::move(f));
   const int code = exit_code_of(r, failed_report);
@@ -376,7 +373,8 @@ int show_rules(const Arguments& a) {
 namespace {
 
 /// Of a study's results what a report tells: verdict, outcomes, bounds. Throws InputError E682.
-std::string read_study(std::string path) {
+///   title  of the run that it is told beside
+std::string read_study(std::string path, const std::string& title) {
   if (std::filesystem::is_directory(path)) path = (std::filesystem::path(path) / "results.json").string();
   const json whole = json::parse(read_file(path), nullptr, false);
   const auto refuse_file = [&path](const std::string& why) {
@@ -393,6 +391,9 @@ std::string read_study(std::string path) {
       if (!entry.is_object()) refuse_file(fmt::format("not the results of a study (\"{}\")", key));
       if (std::string_view(key) == "outcomes") entry.erase("outputs");
     }
+  if (out["title"] != title)
+    std::fprintf(stderr, "topple: the study is of \"%s\", the run of \"%s\": see that both are of one building\n",
+                 out["title"].is_string() ? out["title"].get<std::string>().c_str() : "", title.c_str());
   return out.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
@@ -405,10 +406,13 @@ int write_report_file(const Arguments& a) {
     if (!a.study_results.empty()) check_own_input(a.output, a.study_results);
     const record::Record r = record::read_hdf5(a.input);
     record::ReportExtras extras;
-    if (!a.study_results.empty()) extras.study = read_study(a.study_results);
+    if (!a.study_results.empty()) extras.study = read_study(a.study_results, r.provenance.title);
     for (const std::string& path : a.other_records) {
       const record::Record other = record::read_hdf5(path);
       const record::Comparison c = record::compare(r, other);
+      if (other.provenance.title != r.provenance.title)
+        std::fprintf(stderr, "topple: %s is of \"%s\", the run of \"%s\": see that both are of one building\n",
+                     path.c_str(), other.provenance.title.c_str(), r.provenance.title.c_str());
       extras.others.push_back({c.name_b, other.provenance.title, record::summarise(c)});
     }
     const auto bundle = find_bundle("report.html");

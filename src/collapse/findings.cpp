@@ -27,6 +27,8 @@ constexpr double kHeapCell = 0.25;     // [m]
 constexpr double kOnGround = 0.1;      // height of what lies on the ground or on what lies there [m]
 constexpr double kSkew = 0.1;          // sine of the azimuth against the grid from which it lies askew
 constexpr double kFramesApart = 0.04;  // more is told [s]
+constexpr double kStill = 0.2;         // speed below which a part counts as lying [m/s]
+constexpr const char* kNotJudged = " Not judged: ";
 constexpr size_t kShownMargins = 5;
 constexpr size_t kShownTouchdowns = 5;
 
@@ -41,6 +43,7 @@ struct Context {
   record::Record& r;
   bool is_under_way = false;
   const std::atomic<bool>* cancel = nullptr;
+  std::vector<OpenPart> open = {};  // of a run that ended with its time
 
   bool is_cancelled() const { return cancel != nullptr && *cancel; }
 
@@ -52,6 +55,34 @@ struct Context {
   std::string stage_name(size_t s) const { return plan.stages[s].name; }
   Pose pose(size_t frame, size_t body) const { return record::pose_at(r, frame, body); }
 };
+
+/// Why a limit that is kept so far is not judged; empty: nothing that still moved could break it.
+///   breaks  whether a part on its way would
+template <class Breaks>
+std::string find_what_is_open(const Context& c, const Breaks& breaks) {
+  const OpenPart* fastest = nullptr;
+  for (const OpenPart& part : c.open)
+    if ((fastest == nullptr || part.speed > fastest->speed) && breaks(part)) fastest = &part;
+  return fastest == nullptr
+             ? std::string()
+             : fmt::format("{}{} still moved at {:.1f} m/s when the run ended, and may break this limit.", kNotJudged,
+                           c.r.bodies[fastest->body].name, fastest->speed);
+}
+
+/// Distances of the nearest and the farthest point of a part from an area in the last frame, seen from above; 0: over
+/// it [m].
+std::pair<double, double> calc_distances_at_end(const Context& c, size_t body, const Polygon& area) {
+  double least = std::numeric_limits<double>::infinity(), most = 0;
+  const size_t last = c.r.time.size() - 1;
+  const Pose X_WB = c.pose(last, body);
+  for (size_t i = 0; i < c.r.bodies[body].shapes.size(); ++i) {
+    const record::BoxShape s = record::shape_at(c.r, last, body, i);
+    const Polygon outline = calc_outline({X_WB * s.X_BS, s.half});
+    least = std::min(least, calc_distance(outline, area));
+    for (const Point2& p : outline) most = std::max(most, calc_distance(p, area));
+  }
+  return {least, most};
+}
 
 /// "no zone has yielded", "1 zone has yielded", "2 zones have yielded".
 std::string count_words(long n, const char* none, const char* one, const char* many) {
@@ -77,6 +108,7 @@ void add_mechanism(const Context& c, const Mechanism& m) {
   if (m.name == "wrong direction") status = Status::Bad;
   if (c.plan.criteria.mechanism) status = *c.plan.criteria.mechanism == m.name ? Status::Good : Status::Bad;
   if (c.is_under_way) status = Status::Info;
+  if (status == Status::Good && !m.is_final) status = Status::Warning;
   c.add("mechanism", "Mechanism", (c.is_under_way ? "Mechanism so far: " : "Mechanism: ") + m.name, m.text, m.tilt,
         "rad", status);
 }
@@ -276,16 +308,20 @@ void add_clearances(const Context& c) {
           a.lowest_who, a.lowest, a.lowest_when);
     if (asked) text += fmt::format("; the limit is {} m", limit);
     const bool is_reached = a.least <= 0, lands = a.lowest <= kOnGround;
-    const Status status = !asked                            ? (is_reached ? Status::Warning : Status::Info)
-                          : a.least < *n.clearance || lands ? Status::Bad
-                          : is_reached                      ? Status::Warning
-                          : c.is_under_way                  ? Status::Info
-                                                            : Status::Good;
-    c.add("clearance." + n.name, "Clearance", n.name, text + ".", a.least, "m", status);
+    const bool is_broken = asked && (a.least < *n.clearance || lands);
+    const std::string why = !asked || is_broken ? "" : find_what_is_open(c, [&](const OpenPart& part) {
+      return calc_distances_at_end(c, part.body, n.footprint).first - part.way < *n.clearance;
+    });
+    const Status status = !asked                       ? (is_reached ? Status::Warning : Status::Info)
+                          : is_broken                  ? Status::Bad
+                          : is_reached || !why.empty() ? Status::Warning
+                          : c.is_under_way             ? Status::Info
+                                                       : Status::Good;
+    c.add("clearance." + n.name, "Clearance", n.name, text + "." + why, a.least, "m", status);
   }
 }
 
-void add_vibration(const Context& c) {
+void add_vibration(const Context& c, const Mechanism& m) {
   const char* heading = "Ground vibration";
   if (!c.plan.vibration) {
     c.add("vibration", heading, "Ground vibration",
@@ -332,7 +368,7 @@ void add_vibration(const Context& c) {
       text += status == Status::Good  ? ": the band stays below it"
               : status == Status::Bad ? ": the band lies above it"
                                       : ": the band reaches it";
-      if (c.is_under_way && status == Status::Good) status = Status::Info;
+      if (status == Status::Good && (c.is_under_way || !m.is_final)) status = Status::Info;
     }
     c.add("vibration." + n.name, heading, n.name, text + ".", high, "m/s", status);
   }
@@ -546,13 +582,19 @@ void add_stubs(const Context& c) {
 
 void add_criteria(const Context& c, const Mechanism& m, const Standing& standing, const Reach& reach) {
   const product::Criteria& want = c.plan.criteria;
+  // why: what was asked is so as yet, but may change
   const auto judge_one = [&](const std::string& id, const std::string& title, bool met, const std::string& text,
-                             double value, const std::string& unit) {
-    c.add("criterion." + id, "Criteria", title, text, value, unit, met ? Status::Good : Status::Bad);
+                             double value, const std::string& unit, const std::string& why = "") {
+    c.add("criterion." + id, "Criteria", title, met ? text + why : text, value, unit,
+          !met           ? Status::Bad
+          : !why.empty() ? Status::Warning
+                         : Status::Good);
   };
+  const std::string falls_on =
+      m.is_final ? "" : fmt::format("{}it still came down or swayed when the run ended.", kNotJudged);
   if (want.mechanism)
     judge_one("mechanism", "Mechanism", m.name == *want.mechanism,
-              fmt::format("Asked: {}; found: {}.", *want.mechanism, m.name), kNone, "");
+              fmt::format("Asked: {}; found: {}.", *want.mechanism, m.name), kNone, "", falls_on);
   if (want.azimuth) {
     const double off = std::abs(std::remainder(m.azimuth - *want.azimuth, 2 * kPi));
     const double tolerance = want.azimuth_tolerance.value_or(c.k.mechanism_direction_tolerance);
@@ -566,12 +608,15 @@ void add_criteria(const Context& c, const Mechanism& m, const Standing& standing
                                                   azimuth_words(*want.azimuth), tolerance / unit::deg)
                                     : fmt::format("Asked: {} +- {:.0f} deg; found: {}.", azimuth_words(*want.azimuth),
                                                   tolerance / unit::deg, azimuth_words(m.azimuth, digits)),
-              off, "rad");
+              off, "rad", falls_on);
   }
   if (want.debris_reach) {
     const auto [found, limit] = tell_apart(reach.largest, *want.debris_reach);
     judge_one("debris_reach", "Reach of the debris", reach.largest <= *want.debris_reach,
-              fmt::format("Asked: at most {} m; found: {} m.", limit, found), reach.largest, "m");
+              fmt::format("Asked: at most {} m; found: {} m.", limit, found), reach.largest, "m",
+              find_what_is_open(c, [&](const OpenPart& part) {
+                return calc_distances_at_end(c, part.body, c.r.building_outline).second + part.way > *want.debris_reach;
+              }));
   }
   if (want.stands_between_stages) {
     const bool is_known = standing.fell || !standing.is_open;
@@ -638,16 +683,27 @@ void add_verification(const Context& c) {
   c.add("verification.step", "Verification", "Time step",
         describe_steps(s) + fmt::format(" Joints drift by at most {:.1e} m or rad.", s.joint_drift), s.step, "s",
         s.step_needed > 0 ? Status::Warning : Status::Info);
+  for (size_t i = 0; i < s.notes.size(); ++i)
+    c.add(fmt::format("verification.note.{}", i + 1), "Verification", "Note of the engine", s.notes[i], kNone, "",
+          Status::Warning);
 }
 
+bool is_limit(const record::Finding& f) { return f.id.rfind("criterion.", 0) == 0 || f.id.rfind("clearance.", 0) == 0; }
+
 }  // namespace
+
+bool is_violated(const record::Finding& f) { return is_limit(f) && f.status == Status::Bad; }
+
+bool is_not_judged(const record::Finding& f) {
+  return is_limit(f) && f.status == Status::Warning && f.text.find(kNotJudged) != std::string::npos;
+}
 
 std::string describe_steps(const mbs::Summary& s) {
   std::string text = s.shortest_step < 0.995 * s.step
                          ? fmt::format("{:.3g} ms at first, {:.3g} ms at the shortest, {} steps in all.", s.step * 1e3,
                                        s.shortest_step * 1e3, s.steps)
                          : fmt::format("{:.3g} ms in {} steps.", s.step * 1e3, s.steps);
-  text += fmt::format(" The fastest mode has {:.0f} rad/s.", s.highest_frequency);
+  if (s.highest_frequency > 0) text += fmt::format(" The fastest mode has {:.0f} rad/s.", s.highest_frequency);
   return s.step_needed > 0 ? text + " " + describe_step_needed(s) : text;
 }
 
@@ -677,7 +733,8 @@ bool add_findings(const product::Plan& plan, const mbs::Model& model, const Mode
   r.not_modelled = not_modelled(plan);
   // what was cancelled says how far it came
   const bool is_under_way = r.ending == "under_way" || r.ending == "cancelled";
-  const Context c{plan, model, map, k, recorder, summary, r, is_under_way, cancel};
+  Context c{plan, model, map, k, recorder, summary, r, is_under_way, cancel};
+  if (r.ending == "time_limit") c.open = find_open_parts(r, norm(model.gravity), plan.ground.friction, kStill);
   const auto add_not_modelled = [&] {
     std::string list;
     for (const std::string& s : r.not_modelled) list += (list.empty() ? "" : "; ") + s;
@@ -701,7 +758,7 @@ bool add_findings(const product::Plan& plan, const mbs::Model& model, const Mode
   if (c.is_cancelled()) return false;
   add_touchdown(c);
   add_stubs(c);
-  add_vibration(c);
+  add_vibration(c, m);
   add_events(c);
   if (r.ending == "at_rest" || r.ending == "time_limit") add_criteria(c, m, standing, reach);
   add_not_modelled();

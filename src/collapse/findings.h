@@ -22,4 +22,9 @@ std::string describe_step_needed(const mbs::Summary&);
 bool add_findings(const product::Plan&, const mbs::Model&, const ModelMap&, const Knowledge&, const Recorder&,
                   const mbs::Summary&, record::Record&, const std::atomic<bool>* cancel = nullptr);
 
+/// Whether a finding says that a criterion or a clearance of the plan is violated.
+bool is_violated(const record::Finding&);
+/// Whether it says that one is kept so far, but could not be judged as parts still moved when the run ended.
+bool is_not_judged(const record::Finding&);
+
 }  // namespace topple::collapse

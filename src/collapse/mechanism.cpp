@@ -126,6 +126,7 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
     out.name = "topple";
     out.text = fmt::format("It topples: {}.", motion);
   }
+  out.is_final = in.came_to_rest || (touched && out.moved >= k.mechanism_partial_share && height_left <= 0.5);
   out.is_azimuth_of_lean = out.name == "topple" || out.name == "wrong direction";
   const Vec3& way = out.is_azimuth_of_lean ? direction : out.run;
   const bool has_way = out.is_azimuth_of_lean || norm(out.run) >= kLeastRun;
@@ -147,6 +148,7 @@ Mechanism join_mechanisms(const std::vector<std::string>& names, const std::vect
   Mechanism out = verdicts[lead];
   double moved = 0, mass = 0;
   bool do_agree = true;
+  out.is_final = std::all_of(verdicts.begin(), verdicts.end(), [](const Mechanism& m) { return m.is_final; });
   std::string all;
   for (size_t i = 0; i < verdicts.size(); ++i) {
     moved += masses[i] * verdicts[i].moved, mass += masses[i];

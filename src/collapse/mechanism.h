@@ -50,6 +50,8 @@ struct Mechanism {
   double azimuth = 0;
   bool is_azimuth_of_lean = false;
   Vec3 run;  // of the mass centre until the end, horizontal [m]
+  // at rest, or so far down that what is still to come does not change the name
+  bool is_final = false;
 };
 
 /// Rotation about the axis that leans by a positive angle towards the direction [rad].

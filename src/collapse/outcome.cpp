@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 namespace topple::collapse {
@@ -172,6 +173,23 @@ Reach calc_reach(const record::Record& r, size_t frame) {
   if (parts.empty()) return out;
   out.farthest = static_cast<int>(parts.back().body);
   out.largest = parts.back().way;
+  return out;
+}
+
+std::vector<OpenPart> find_open_parts(const record::Record& r, double gravity, double friction, double least_speed) {
+  std::vector<OpenPart> out;
+  if (r.time.size() < 2) return out;
+  const size_t last = r.time.size() - 1;
+  const double interval = r.time[last] - r.time[last - 1];
+  for (size_t b = 0; b < r.bodies.size(); ++b) {
+    if (r.bodies[b].fixed) continue;
+    const Vec3 p = record::pose_at(r, last, b).p;
+    const double v = norm(p - record::pose_at(r, last - 1, b).p) / interval;
+    if (v > least_speed)
+      out.push_back({b, v,
+                     friction * gravity > 0 ? (0.5 * v * v + gravity * std::max(0.0, p.z)) / (friction * gravity)
+                                            : std::numeric_limits<double>::infinity()});
+  }
   return out;
 }
 

@@ -44,6 +44,17 @@ struct Reach {
 };
 Reach calc_reach(const record::Record&, size_t frame);
 
+/// A part that was still moving in the last frame.
+struct OpenPart {
+  size_t body = 0;
+  double speed = 0;  // over the last interval between frames [m/s]
+  double way = 0;    // that it may still go: (v²/2 + g z) / (μ g), as if it slid until nothing is left [m]
+};
+/// None where there is one frame only.
+///   least_speed  below which a part rests [m/s]
+///   friction     on the ground
+std::vector<OpenPart> find_open_parts(const record::Record&, double gravity, double friction, double least_speed);
+
 /// Convex outline of the moving parts that lie nearest to the footprint and hold at least `share` of the mass.
 Polygon calc_share_outline(const record::Record&, size_t frame, double share);
 

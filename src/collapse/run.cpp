@@ -169,10 +169,4 @@ record::Record run_model(const mbs::Model& model, const RunOptions& options, con
   return r;
 }
 
-bool violates_criteria(const record::Record& r) {
-  return std::any_of(r.findings.begin(), r.findings.end(), [](const record::Finding& f) {
-    return f.status == record::Status::Bad && (f.id.rfind("criterion.", 0) == 0 || f.id.rfind("clearance.", 0) == 0);
-  });
-}
-
 }  // namespace topple::collapse

@@ -53,8 +53,6 @@ mbs::RunSettings settings_of(const product::Plan&, const Knowledge&, const RunOp
 /// findings about a building.
 record::Record run_model(const mbs::Model&, const RunOptions&, const RunCallbacks&);
 
-/// Whether a finding says that the plan's criteria or clearances are not met.
-bool violates_criteria(const record::Record&);
 
 record::Counts count(const mbs::Model&);
 

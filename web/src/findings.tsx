@@ -54,14 +54,15 @@ function Summary(props: { run: Run }) {
   const { findings } = props.run;
   const verdict = findVerdict(props.run);
   const criteria = findings.filter((f) => f.id.startsWith("criterion.") || f.id.startsWith("clearance."));
-  const met = criteria.filter((f) => f.status !== "bad").length;
+  const unjudged = criteria.filter((f) => f.status === "warning" && f.text.includes("Not judged:")).length;
+  const met = criteria.filter((f) => f.status !== "bad").length - unjudged;
   const open = findings.filter((f) => f !== verdict && (f.status === "bad" || f.status === "warning"));
   open.sort((a, b) => Number(b.status === "bad") - Number(a.status === "bad"));
   const most = 4;
   return (
     <>
       <p class="verdict-title">
-        {props.run.ending.kind === "failed" ? "The limits of the plan were not examined" : criteria.length === 0 ? "The plan sets no limits" : props.run.ending.kind === "under_way" || props.run.ending.kind === "cancelled" ? `${criteria.length - met} of ${criteria.length} limits broken so far` : met === criteria.length ? (met === 1 ? "The one limit of the plan kept" : `All ${met} limits of the plan kept`) : `${met} of ${criteria.length} limits of the plan kept`}
+        {props.run.ending.kind === "failed" ? "The limits of the plan were not examined" : criteria.length === 0 ? "The plan sets no limits" : props.run.ending.kind === "under_way" || props.run.ending.kind === "cancelled" ? `${criteria.length - met - unjudged} of ${criteria.length} limits broken so far` : unjudged > 0 ? `${met} of ${criteria.length} limits of the plan kept, ${unjudged} not judged` : met === criteria.length ? (met === 1 ? "The one limit of the plan kept" : `All ${met} limits of the plan kept`) : `${met} of ${criteria.length} limits of the plan kept`}
       </p>
       {open.slice(0, most).map((f) => (
         <a class="open-finding" href={`#finding-${f.id}`} data-test="open-finding">
