@@ -59,6 +59,8 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
   study::Problem problem;
   StudyPlace place;
   study::StudyOptions options;
+  std::error_code failure;
+  const bool is_new_folder = !std::filesystem::exists(a.output, failure);
   try {
     problem = read_problem(a, text);
     options.pool = make_pool_options(a.study);
@@ -75,9 +77,17 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
   progress.cancel = &cancel;
   ProgressLine line;
   StudyResult r;
+  long answers = 0;
+  const auto remove_new = [&] {
+    if (!is_new || !remove_unused(place, study::calc_model_hash(problem), answers)) return false;
+    if (is_new_folder) std::filesystem::remove(a.output, failure);  // what holds something stays
+    return true;
+  };
   try {
-    r = study::run_study(problem, make_factories(), options, progress,
-                         [&](const StudyState& s) { line.say(describe_state(problem, s)); });
+    r = study::run_study(problem, make_factories(), options, progress, [&](const StudyState& s) {
+      answers = s.run_here;
+      line.say(describe_state(problem, s));
+    });
   } catch (const InputError& e) {
     line.clear();
     const std::string& code = e.first_error().code;
@@ -90,11 +100,17 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
     } else {
       complain(e, text);
     }
-    if (is_new) remove_unused(place, model);
+    remove_new();
     return kBadInput;
   } catch (const study::ConnectionLost& e) {
     line.clear();
     std::fprintf(stderr, "topple: the store is away: %s\nGive the same command again to go on.\n", e.what());
+    return kRunFailed;
+  } catch (const study::DiskFailed& e) {
+    line.clear();
+    std::fprintf(stderr, "topple: %s\n", e.what());
+    if (!remove_new())
+      std::fprintf(stderr, "What was run before is kept. Make room and give the same command again to go on.\n");
     return kRunFailed;
   }
   line.clear();

@@ -134,15 +134,20 @@ void keep_place(const std::string& folder, const StudyPlace& place) {
   replace_file((fs::path(folder) / place_file).string(), written.dump(1) + "\n");
 }
 
-void remove_unused(const StudyPlace& place, const std::string& model) {
-  if (study::is_server(place.store) || !fs::exists(place.store)) return;
-  {
-    study::Store store(place.store);
-    const study::Counts c = store.count(model);
-    if (c.done + c.failed > 0 || store.count_studies().first > 1) return;
-  }
+bool remove_unused(const StudyPlace& place, const std::string& model, long answers) {
   std::error_code failure;
-  for (const char* end : {"", "-wal", "-shm"}) fs::remove(place.store + end, failure);
+  if (study::is_server(place.store) || !fs::exists(place.store, failure)) return false;
+  try {
+    study::Store store(place.store, nullptr, 10, true);
+    const study::Counts c = store.count(model);
+    if (c.done + c.failed > 0 || store.count_studies().first > 1) return false;
+  } catch (const InputError&) {
+    // it did not come to its tables
+  } catch (const study::DiskFailed&) {
+    if (answers > 0) return false;
+  }
+  for (const char* end : {"", "-wal", "-shm", "-journal"}) fs::remove(place.store + end, failure);
+  return true;
 }
 
 StudyPlace find_place(const std::string& where) {

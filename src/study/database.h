@@ -35,10 +35,16 @@ struct Dialect {
   std::string pairs;           // rows (a, b) of the JSON array $1 of pairs, in its order
 };
 
+/// The disk is full, or does not take or give what is written: nothing of the statement is kept.
+struct DiskFailed : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
 class Database {
  public:
   virtual ~Database() = default;
-  /// Runs one statement; parameters are $1, $2, ... as text. Throws ConnectionLost, TryAgain, std::runtime_error.
+  /// Runs one statement; parameters are $1, $2, ... as text. Throws ConnectionLost, TryAgain,
+  /// DiskFailed, std::runtime_error.
   virtual Rows run(const std::string& sql, const std::vector<Value>& parameters = {}) = 0;
   virtual const Dialect& dialect() const = 0;
   /// Connects anew, if it can be lost. Throws ConnectionLost.
@@ -50,8 +56,8 @@ bool is_server(const std::string& address);
 /// The address without its password, for people to read.
 std::string hide_password(const std::string& address);
 
-/// Connects. Throws InputError E820 if the file cannot be opened, E821 if this program was built without PostgreSQL;
-/// ConnectionLost if the server does not answer.
+/// Connects. Throws InputError E820 if the file cannot be opened, DiskFailed if it cannot be begun, E821 if this
+/// program was built without PostgreSQL; ConnectionLost if the server does not answer.
 ///   is_read_only  of a file: it may lie where nothing can be written
 std::unique_ptr<Database> open_database(const std::string& address, bool is_read_only = false);
 std::unique_ptr<Database> open_sqlite(const std::string& path, bool is_read_only = false);

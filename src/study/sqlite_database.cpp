@@ -25,6 +25,9 @@ class SqliteDatabase final : public Database {
         run("PRAGMA synchronous = NORMAL");
       } catch (const InputError&) {
         throw;  // it says all
+      } catch (const DiskFailed&) {
+        close();
+        throw;
       } catch (const std::exception& e) { refuse(e.what()); }
     }
     dialect_.now = "((julianday('now') - 2440587.5) * 86400.0)";
@@ -116,7 +119,9 @@ class SqliteDatabase final : public Database {
       return !run("SELECT 1 FROM sqlite_master WHERE name = 'study'").empty();
     } catch (const InputError&) { throw; } catch (const TryAgain&) {
       throw;
-    } catch (const std::exception& e) { refuse(e.what()); }
+    } catch (const DiskFailed&) { throw; } catch (const std::exception& e) {
+      refuse(e.what());
+    }
   }
 
   [[noreturn]] void refuse(const std::string& why) {
@@ -133,6 +138,8 @@ class SqliteDatabase final : public Database {
           "folder");
     if (code == SQLITE_READONLY)
       throw InputError("E820", fmt::format("{} may not be written to: {}", path_, why), "topple study show reads it");
+    if (code == SQLITE_FULL) throw DiskFailed(fmt::format("{} could not be written: {}", path_, why));
+    if (code == SQLITE_IOERR) throw DiskFailed(fmt::format("{} could not be written or read: {}", path_, why));
     throw std::runtime_error(fmt::format("SQLite: {}: {}", path_, why));
   }
 

@@ -117,7 +117,21 @@ TEXT
   expect 1 "$topple" study in.toml --evaluator "$model" -o in.toml/e; has err "the folder cannot be made"
   expect 2 "$topple" study in.toml --evaluator /nowhere/model -o e; has err "E827"
   [ ! -e e/study.sqlite ] || { echo "a store without a run"; failures=$((failures + 1)); }
+  expect 2 "$topple" study in.toml --evaluator /nowhere/model -o fresh; [ ! -e fresh ] || { echo "a folder without a run"; failures=$((failures + 1)); }
+  mkdir mine; expect 2 "$topple" study in.toml --evaluator /nowhere/model -o mine
+  [ -d mine ] && [ ! -e mine/study.sqlite ] || { echo "not as it was: mine"; failures=$((failures + 1)); }
   expect 0 "$topple" study in.toml --evaluator "$model" -o e --samples 20
+  # a full disk: said once, and no store without an answer
+  mkdir -p full
+  if unshare -m mount -t tmpfs -o size=64k none full 2>mount.txt; then
+    for room in 0 3 12 50; do
+      expect 1 unshare -m sh -c 'mount -t tmpfs -o size=64k none full && head -c ${1}k /dev/zero >full/fill && "$2" study in.toml --evaluator "$3" -o full/s; code=$?; find full/s >left.txt 2>&1; exit $code' sh $((64 - room)) "$topple" "$model"
+      has err "could not be written"; lacks err "is no study"; has left.txt "No such file"
+      [ "$(grep -c study.sqlite err)" -eq 1 ] || { cat err; echo "not said once"; failures=$((failures + 1)); }
+    done
+    expect 1 unshare -m sh -c 'mount -t tmpfs -o size=300k none full && "$1" study in.toml --evaluator "$2" -o full/s --samples 300; code=$?; find full/s >left.txt 2>&1; exit $code' sh "$topple" "$model"
+    has err "could not be written"; has err "What was run before is kept"; has left.txt study.sqlite
+  fi
   # all runs fail: told, not hidden
   expect 0 "$topple" study in.toml --evaluator "exit 3" -o f --samples 10; has out "exit code 3"; has out "failed"
   ;;
