@@ -76,9 +76,9 @@ int main(int argc, char** argv) {
   std::signal(SIGTERM, on_interrupt);  // batch systems
   std::signal(SIGXFSZ, SIG_IGN);       // a file that may not grow is an error of its own
   const auto arguments = topple::apps::parse_arguments(argc, argv);
-  if (const int* code = std::get_if<int>(&arguments)) return *code;
   try {
-    const int code = dispatch(std::get<topple::apps::Arguments>(arguments));
+    const int* stop = std::get_if<int>(&arguments);
+    const int code = stop ? *stop : dispatch(std::get<topple::apps::Arguments>(arguments));
     if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return code;
     std::fprintf(stderr, "topple: standard output could not be written\n");
     return code == topple::apps::kOk ? topple::apps::kRunFailed : code;

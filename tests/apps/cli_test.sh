@@ -27,6 +27,11 @@ usage)
   expect 0 "$topple" run --help; has out "--json"
   expect 0 "$topple" --version; has out "topple "
   expect 0 "$topple" version; has out "topple "
+  if [ -c /dev/full ]; then
+    for words in --help --version "run --help" "help run" "completion bash" manual version; do
+      expect 1 sh -c '"$@" >/dev/full' sh "$topple" $words; has err "standard output could not be written"
+    done
+  fi
   expect 2 "$topple"
   expect 2 "$topple" rnu; has err 'did you mean "run"?'
   expect 2 "$topple" run
