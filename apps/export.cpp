@@ -2,6 +2,7 @@
 
 #include <cstdio>
 #include <filesystem>
+#include <utility>
 
 #include "base/file.h"
 #include "collapse/debris_tables.h"
@@ -81,11 +82,15 @@ int export_file(const Arguments& a) {
     if (a.vtk) say(record::export_vtk(r, a.output));
     if (a.gltf) say(record::export_gltf(r, a.output));
     if (a.csv) {
-      say(record::export_csv(r, a.output));
+      std::vector<std::string> paths = record::export_csv(r, a.output);
       constexpr double cell = 0.25;  // [m]
       const std::filesystem::path where(a.output);
-      replace_file((where / "debris_heights.csv").string(), collapse::make_height_table(r, cell));
-      replace_file((where / "debris_outlines.csv").string(), collapse::make_outline_table(r));
+      for (const auto& [name, table] : {std::pair("debris_heights.csv", collapse::make_height_table(r, cell)),
+                                        std::pair("debris_outlines.csv", collapse::make_outline_table(r))}) {
+        paths.push_back((where / name).string());
+        replace_file(paths.back(), table);
+      }
+      say(paths);
     }
     if (a.json) say(record::export_json(r, a.output));
     return kOk;

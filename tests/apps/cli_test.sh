@@ -239,7 +239,8 @@ import)
   ;;
 export)
   expect 0 "$topple" run "$plan" -o r --no-report
-  expect 0 "$topple" export r/record.h5 --csv --json --frame-rate "5 Hz" -o t; has out "Wrote t/series.csv and 5 more"
+  expect 0 "$topple" export r/record.h5 --csv --json --frame-rate "5 Hz" -o t; has out "Wrote t/series.csv and 7 more"
+  [ "$(ls t/*.csv | wc -l)" -eq 8 ] || { echo "not 8 tables"; failures=$((failures + 1)); }
   is_json t/record.json; exists t/poses.csv
   expect 0 "$topple" export r/model.json --adams -o t/model.adm; exists t/model.adm; exists t/model.acf; has out "note: "
   expect 2 "$topple" export r/record.h5 -o t; has err "say what for"
