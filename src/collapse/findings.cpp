@@ -717,14 +717,22 @@ std::vector<std::string> not_modelled(const product::Plan& plan) {
                                    "air overpressure",
                                    "dust",
                                    "ground vibration as such (at most a screening with the site's own law)",
-                                   "wind, and people's behaviour; no distance given here is a safe distance",
+                                   "wind, and people's behaviour",
                                    ("cracking and crushing of slabs within a bay, of walls within a panel and of beams "
                                     "between their end zones; room that rubble takes"),
                                    "infill and finishes beyond their weight"};
   if (!plan.shafts.empty())
     list.emplace_back(
         "rings that flatten as they land: single pieces of a shaft may roll and tumble farther than real ones");
+  list.emplace_back(kNoSafeDistance);
   return list;
+}
+
+std::string tell_not_modelled(const std::vector<std::string>& list) {
+  std::string text;
+  for (const std::string& s : list)
+    if (s != kNoSafeDistance) text += (text.empty() ? "" : "; ") + s;
+  return text + ".";
 }
 
 bool add_findings(const product::Plan& plan, const mbs::Model& model, const ModelMap& map, const Knowledge& k,
@@ -736,9 +744,8 @@ bool add_findings(const product::Plan& plan, const mbs::Model& model, const Mode
   Context c{plan, model, map, k, recorder, summary, r, is_under_way, cancel};
   if (r.ending == "time_limit") c.open = find_open_parts(r, norm(model.gravity), plan.ground.friction, kStill);
   const auto add_not_modelled = [&] {
-    std::string list;
-    for (const std::string& s : r.not_modelled) list += (list.empty() ? "" : "; ") + s;
-    c.add("not_modelled", "Not modelled", "Not modelled", list + ".", kNone, "");
+    c.add("not_modelled", "Not modelled", "Not modelled", tell_not_modelled(r.not_modelled), kNone, "");
+    c.add("not_modelled.distances", "Not modelled", "Not modelled", kNoSafeDistance, kNone, "");
   };
   if (r.time.empty() || r.ending == "failed") {
     c.add("mechanism", "Mechanism", "No result", r.ending_text, kNone, "", Status::Bad);

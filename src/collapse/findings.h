@@ -9,8 +9,11 @@
 
 namespace topple::collapse {
 
-/// What no run of a plan tells, for people.
+/// What no run of a plan tells, for people; kNoSafeDistance is the last.
 std::vector<std::string> not_modelled(const product::Plan&);
+inline constexpr const char* kNoSafeDistance = "No distance given here is a safe distance.";
+/// The list as the text of a finding, without kNoSafeDistance, which is one of its own.
+std::string tell_not_modelled(const std::vector<std::string>& list);
 
 /// The steps of a run, and what the fastest mode asked of a set step that was too long for it.
 std::string describe_steps(const mbs::Summary&);

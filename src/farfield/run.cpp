@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "base/hash.h"
 #include "base/unit.h"
+#include "collapse/findings.h"
 #include "farfield/checkpoint.h"
 #include "farfield/fragments.h"
 #include "farfield/motion.h"
@@ -518,10 +519,8 @@ void say_what_is_not_modelled(record::Record& r) {
       "material)";
   for (std::string& s : r.not_modelled)
     if (s.rfind("cracking and crushing of slabs", 0) == 0) s = here;
-  std::string list;
-  for (const std::string& s : r.not_modelled) list += (list.empty() ? "" : "; ") + s;
   for (record::Finding& f : r.findings)
-    if (f.id == "not_modelled") f.text = list + ".";
+    if (f.id == "not_modelled") f.text = collapse::tell_not_modelled(r.not_modelled);
 }
 
 }  // namespace

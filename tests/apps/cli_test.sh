@@ -271,6 +271,7 @@ run)
   expect 0 "$topple" run "$plan" -o a/b --csv --no-report
   has out "rigid bodies"; has out "revolute joints"; has out "force elements"
   has out "Mechanism"; has out "Not modelled"; has out "Verification"; has out "Wrote a/b/record.h5"
+  grep -qE '^ +No distance given here is a safe distance\.$' out || { echo "no line of its own on distances"; failures=$((failures + 1)); }
   for f in record.h5 model.json series.csv events.csv bodies.csv findings.csv; do exists a/b/$f; done
   [ ! -e a/b/report.html ] || { echo "a report although --no-report"; failures=$((failures + 1)); }
   [ "$(grep -n '^Mechanism' out | cut -d: -f1)" -lt "$(grep -n '^Stability' out | cut -d: -f1)" ] || failures=$((failures + 1))

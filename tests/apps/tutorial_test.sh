@@ -21,6 +21,8 @@ exists() { [ -s "$1" ] || { echo "no file $1"; failures=$((failures + 1)); }; }
 says 'wrong.toml:112:1: error E203: charge[0]: unknown key "destoryed_length"'
 says 'wrong.toml:124:1: error E203: charge[0]: unknown key "destoryed_length"'; says "2 errors. Nothing was run."; says "exit code 2"
 says "Mechanism"; says "Shed"; says "necessity"
+# what step 8 recalls
+says "No distance given here is a safe distance."
 for file in demo/record.h5 out/record.h5 near/record.h5 bars/record.h5 both/compare.json study/results.json; do exists $file; done
 [ ! -s "$source/web/dist/report.html" ] || grep -q '<html lang="de">' bericht.html || { echo "bericht.html is not German"; failures=$((failures + 1)); }
 exit $((failures > 0))

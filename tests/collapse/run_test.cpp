@@ -71,6 +71,14 @@ TEST(Run, FindingsComeInTheOrderOfTheirWeight) {
   EXPECT_LT(finding(r, "verification.equilibrium").value, 1e-6);
 }
 
+TEST(Run, SaysInALineOfItsOwnThatNoDistanceIsSafe) {
+  const record::Record r = run_plan(read(house(charge("C-A*-0", "0.1 s"), "0.2 s")), default_knowledge(), {}, {});
+  EXPECT_EQ(r.not_modelled.back(), "No distance given here is a safe distance.");
+  EXPECT_EQ(finding(r, "not_modelled.distances").text, r.not_modelled.back());
+  EXPECT_THAT(finding(r, "not_modelled").text, testing::Not(testing::HasSubstr("distance")));
+  EXPECT_THAT(finding(r, "not_modelled").text, testing::EndsWith("beyond their weight."));
+}
+
 TEST(RunPhysics, AHouseOnItsColumnsStands) {
   const record::Record r = run_plan(read(house("", "0.5 s")), default_knowledge(), {}, {});
   EXPECT_EQ(finding(r, "mechanism").title, "Mechanism: stands");

@@ -256,6 +256,8 @@ TEST(Farfield, SaysWhatWasTakenAway) {
   EXPECT_THAT(find(r, "farfield.removed").text, testing::HasSubstr(" by charges, 0 torn, 0 crushed"));
   EXPECT_THAT(find(r, "farfield.fragments").text, testing::HasSubstr("sound parts"));
   EXPECT_THAT(find(r, "not_modelled").text, testing::HasSubstr("cracks that close again"));
+  EXPECT_THAT(find(r, "not_modelled").text, testing::Not(testing::HasSubstr("distance")));
+  EXPECT_EQ(find(r, "not_modelled.distances").text, "No distance given here is a safe distance.");
 }
 
 TEST(Farfield, PassesOverTheTimeInWhichNothingMoves) {

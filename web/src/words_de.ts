@@ -459,6 +459,9 @@ export const german: readonly (readonly [string, string])[] = [
   ["air overpressure", "Luftstoß"],
   ["dust", "Staub"],
   ["ground vibration as such (at most a screening with the site's own law)", "Erschütterungen selbst (höchstens eine Abschätzung mit dem Gesetz des Standorts)"],
+  ["wind, and people's behaviour", "Wind und das Verhalten von Menschen"],
+  ["No distance given here is a safe distance.", "Keine Entfernung auf dieser Seite ist ein Sicherheitsabstand."],
+  // of records of earlier versions
   ["wind, and people's behaviour; no distance given here is a safe distance", "Wind und das Verhalten von Menschen; keine Entfernung auf dieser Seite ist ein Sicherheitsabstand"],
   ["cracking and crushing of slabs within a bay, of walls within a panel and of beams between their end zones; room that rubble takes", "Risse und zerdrückter Beton in Decken innerhalb eines Feldes, in Wänden innerhalb einer Scheibe und in Balken zwischen ihren Endzonen; Raum, den Schutt einnimmt"],
   ["rings that flatten as they land: single pieces of a shaft may roll and tumble farther than real ones", "Ringe, die beim Aufschlag flach werden: Einzelne Stücke eines Schafts können weiter rollen als wirkliche"],
