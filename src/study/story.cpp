@@ -413,6 +413,10 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
                     "last stage or at rest: their outcome, energy and reach are those of that time.",
                     unfinished, runs, p.horizon->after),
         Status::Warning);
+  if (p.horizon)
+    add("clock", fmt::format("Times count from the last stage. Runs end at rest or {:.4g} s behind it, when parts may "
+                             "still move: reaches are those of that time.",
+                             p.horizon->after));
   if (!p.not_judged.empty()) {
     std::string list;
     for (const std::string& what : p.not_judged) list += (list.empty() ? "" : ", ") + what;

@@ -439,6 +439,10 @@ TEST(Story, DoubtsWhatRunsSayThatEndedInTheMiddle) {
   EXPECT_NE(by_id["unfinished"].text.find("nothing of the upper block had touched down when they ended, 1.7 s after"),
             std::string::npos);
   EXPECT_EQ(by_id["unfinished"].status, record::Status::Warning);
+  EXPECT_EQ(by_id["clock"].text,
+            "Times count from the last stage. Runs end at rest or 1.7 s behind it, when parts may "
+            "still move: reaches are those of that time.");
+  EXPECT_EQ(by_id["clock"].status, record::Status::Info);
   EXPECT_EQ(by_id["requirement"].status, record::Status::Warning);
   EXPECT_NE(by_id["requirement"].text.find("ended before anything had touched down"), std::string::npos);
   EXPECT_EQ(by_id["not_judged"].text,

@@ -819,6 +819,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["{:g} mm/s to {:g} mm/s, by frequency", "{} mm/s bis {} mm/s, je nach Frequenz"],
   ["of the plan", "des Plans"],
   ["It is {w} that the band reaches the limit: possibility at least {:.2f}.", "Dass das Band den Anhaltswert erreicht, ist {}: Möglichkeit mindestens {}."],
+  ["Times count from the last stage. Runs end at rest or {:g} s behind it, when parts may still move: reaches are those of that time.", "Zeiten zählen ab der letzten Zündstufe. Rechnungen enden in Ruhe oder {} s danach, wenn sich Teile noch bewegen können: Reichweiten gelten für diese Zeit."],
   ["But {:d} of the runs ended before anything had touched down.", "Doch {} der Rechnungen endeten, bevor etwas aufgeschlagen war."],
   ["In {:d} of {:d} runs nothing of the upper block had touched down when they ended, {} s after the last stage or at rest: their outcome, energy and reach are those of that time.", "In {} von {} Rechnungen war vom oberen Block nichts aufgeschlagen, als sie endeten, {} s nach der letzten Zündstufe oder in Ruhe: Ausgang, Energie und Reichweite sind die dieses Zeitpunkts."],
   ["element \"{}\" is turned by more than half a turn at {} s, where its rotations end: they go on from the other side, and so does its moment", "Das Element „{}“ ist bei {} s um mehr als eine halbe Umdrehung gedreht, wo seine Drehungen enden: Sie gehen von der anderen Seite weiter, und sein Moment ebenso"],
