@@ -120,30 +120,34 @@ Json describe_branch(const collapse::Steering& s, const Branch& b, const std::st
   return j;
 }
 
-Json describe_scene(const record::Record& part, std::size_t frame) {
+Json describe_scene(const record::Record& own, const record::Record& before, std::size_t bodies,
+                    const std::vector<Pose>& others) {
   // everything but the other frames
   record::Record one;
-  one.provenance = part.provenance;
-  one.counts = part.counts;
-  one.plan_values = part.plan_values;
-  one.bodies = part.bodies;
-  one.zones = part.zones;
-  one.crushed_ends = part.crushed_ends;
-  one.neighbours = part.neighbours;
-  one.building_outline = part.building_outline;
-  for (const record::Series& s : part.series) one.series.push_back({s.id, s.title, s.unit, s.group, {}});
-  if (frame < part.time.size()) {
-    const auto keep = [frame](const auto& from, auto& to, std::size_t width) {
-      const auto begin = from.begin() + static_cast<std::ptrdiff_t>(frame * width);
-      to.assign(begin, begin + static_cast<std::ptrdiff_t>(width));
+  one.provenance = own.provenance;
+  one.counts = own.counts;
+  one.plan_values = own.plan_values;
+  one.bodies = own.bodies;
+  one.zones = own.zones;
+  one.crushed_ends = own.crushed_ends;
+  one.neighbours = own.neighbours;
+  one.building_outline = own.building_outline;
+  for (const record::Series& s : own.series) one.series.push_back({s.id, s.title, s.unit, s.group, {}});
+  if (!before.time.empty()) {
+    const auto keep = [](const auto& from, auto& to, std::size_t width) {
+      to.assign(from.begin(), from.begin() + static_cast<std::ptrdiff_t>(width));
     };
-    keep(part.time, one.time, 1);
-    keep(part.position, one.position, 3 * part.bodies.size());
-    keep(part.orientation, one.orientation, 4 * part.bodies.size());
-    keep(part.zone_state, one.zone_state, part.zones.size());
-    keep(part.zone_utilisation, one.zone_utilisation, part.zones.size());
-    keep(part.crushed_length, one.crushed_length, part.crushed_ends.size());
-    for (std::size_t i = 0; i < part.series.size(); ++i) one.series[i].value = {part.series[i].value[frame]};
+    keep(before.time, one.time, 1);
+    keep(before.position, one.position, 3 * bodies);
+    keep(before.orientation, one.orientation, 4 * bodies);
+    for (const Pose& X : others) {
+      for (const double c : {X.p.x, X.p.y, X.p.z}) one.position.push_back(static_cast<float>(c));
+      for (const double c : {X.q.w, X.q.x, X.q.y, X.q.z}) one.orientation.push_back(static_cast<float>(c));
+    }
+    keep(before.zone_state, one.zone_state, own.zones.size());
+    keep(before.zone_utilisation, one.zone_utilisation, own.zones.size());
+    one.crushed_length.resize(own.crushed_ends.size());  // none has receded at the start
+    for (std::size_t i = 0; i < own.series.size(); ++i) one.series[i].value = {before.series[i].value[0]};
   }
   return Json::parse(record::to_report_json(one));
 }

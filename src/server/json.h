@@ -29,8 +29,10 @@ Json describe_diagnostics(const std::vector<Diagnostic>&);
 Json describe_event(const record::Event&);
 Json describe_finding(const record::Finding&);
 Json describe_branch(const collapse::Steering&, const collapse::Branch&, const std::string& plan_sha256);
-/// Report data with one frame of a branch, or none.
-Json describe_scene(const record::Record& part, std::size_t frame);
+/// Report data of a branch with its first frame, or none. `before` holds that frame (as make_frame_body's record): the
+/// branch's own record may begin later.
+Json describe_scene(const record::Record& own, const record::Record& before, std::size_t bodies,
+                    const std::vector<Pose>& others);
 /// Moment families of a zone's law.
 Json describe_law(const mbs::ZoneLaw&);
 

@@ -146,16 +146,8 @@ Json Session::make_hello(const Client& client) const {
   hello["frame"] = nullptr;
   if (steering_) {
     const Branch& b = steering_->steering().active();
-    const std::size_t n = b.frames();
-    if (n > 0) {
-      const auto [piece, row] = b.find_frame(n - 1);
-      // right behind an edit there is no frame with its bodies yet: the frame before it follows as binary
-      const bool is_own = piece->run.get() == &b.run();
-      hello["scene"] = describe_scene(b.run().record(), is_own ? row : b.run().record().time.size());
-      hello["frame"] = n - 1;
-    } else {
-      hello["scene"] = describe_scene(b.run().record(), 0);
-    }
+    hello["scene"] = make_scene(b);
+    if (b.frames() > 0) hello["frame"] = 0;
   }
   hello["plan"] = {{"text", plan_.text}, {"path", plan_.path}, {"sha256", calc_sha256(plan_.text)}};
   hello["limits"] = {
@@ -237,23 +229,38 @@ std::vector<std::string> Session::log_lines() const {
   return steering_ ? steering_->lines() : std::vector<std::string>{};
 }
 
+namespace {
+
+/// Bodies of a piece's record that are those of the branch, and poses of the branch's others: charges may have been
+/// added since, whose debris is the branch's alone.
+std::pair<std::size_t, std::vector<Pose>> find_bodies(const Branch& b, const collapse::Piece& piece, double time) {
+  if (piece.run.get() == &b.run()) return {piece.run->record().bodies.size(), {}};
+  const collapse::LiveModel& live = b.run().model();
+  std::vector<Pose> debris;
+  for (const collapse::DebrisEntry& d : live.map().debris)
+    debris.push_back(collapse::calc_debris_pose(d, norm(live.model().gravity), time));
+  return {live.model().bodies.size(), std::move(debris)};
+}
+
+}  // namespace
+
 std::shared_ptr<FrameBody> Session::make_frame(const Branch& b, std::size_t frame) const {
   const auto [piece, row] = b.find_frame(frame);
   const record::Record& r = piece->run->record();
-  std::size_t bodies = r.bodies.size();
-  std::vector<Pose> debris;
-  if (piece->run.get() != &b.run()) {
-    // charges may have been added since: debris is that of the branch
-    const collapse::LiveModel& live = b.run().model();
-    bodies = live.model().bodies.size();
-    for (const collapse::DebrisEntry& d : live.map().debris)
-      debris.push_back(collapse::calc_debris_pose(d, norm(live.model().gravity), r.time[row]));
-  }
+  const auto [bodies, debris] = find_bodies(b, *piece, r.time[row]);
   auto body = std::make_shared<FrameBody>(make_frame_body(r, row, bodies, debris));
   body->session = static_cast<std::uint32_t>(id_);
   body->branch = static_cast<std::uint32_t>(b.id);
   body->frame = static_cast<std::uint32_t>(frame);
   return body;
+}
+
+Json Session::make_scene(const Branch& b) const {
+  const record::Record& own = b.run().record();
+  if (b.frames() == 0) return describe_scene(own, own, 0, {});
+  const collapse::Piece& first = *b.find_frame(0).first;
+  const auto [bodies, debris] = find_bodies(b, first, first.run->record().time[0]);
+  return describe_scene(own, first.run->record(), bodies, debris);
 }
 
 void Session::send_frame(const std::shared_ptr<const FrameBody>& body) {

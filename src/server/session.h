@@ -104,6 +104,7 @@ class Session {
   Json make_hello(const Client&) const;
   std::vector<std::shared_ptr<Client>> watchers() const;
   std::shared_ptr<FrameBody> make_frame(const collapse::Branch&, std::size_t frame) const;
+  Json make_scene(const collapse::Branch&) const;
   void send_frame(const std::shared_ptr<const FrameBody>&);
 
   struct Task {

@@ -89,9 +89,7 @@ std::optional<Json> Session::perform(const Task& task) {
   if (collapse::LoggedSteering::is_action(word)) return change(word, command);
   if (word == "scene") {
     check_keys(command, {});
-    const Branch& b = branch_of(command);
-    return Json{{"scene", describe_scene(b.run().record(),
-                                         b.run().record().time.empty() ? 0 : b.run().record().time.size() - 1)}};
+    return Json{{"scene", make_scene(branch_of(command))}};
   }
   if (word == "frames") return send_frames(client, command);
   if (word == "series") return read_series(command);

@@ -395,6 +395,38 @@ TEST_F(ServerTest, FramesHoldWhatTheRecordHolds) {
   EXPECT_EQ(c->result("frames", {{"from", 99999}, {"count", 3}})["count"], 0);
 }
 
+/// Places of zones are those at the start: with a later frame a page would put their signs beside the members.
+TEST_F(ServerTest, AScenesFrameIsTheStart) {
+  start(two_stages("0.8 s"));
+  const auto first = watcher();
+  first->result("run");
+  first->wait_for_phase("finished");
+  TestClient http(port());
+  const TestJson record = http.get(at("/api/sessions/1/branches/1/record.json")).json();
+  // debris of an added charge stands among the others of its branch
+  const auto B = static_cast<std::size_t>(std::count_if(record["bodies"].begin(), record["bodies"].end(),
+                                                        [](const TestJson& b) { return b["kind"] != "debris"; }));
+  const auto c = watcher();
+  const auto starts = [&](const TestJson& scene) {
+    ASSERT_EQ(scene["time"].size(), 1U);
+    EXPECT_EQ(scene["time"][0], record["time"][0]);
+    // base64 of whole triples of bytes
+    EXPECT_EQ(scene["position"].get<std::string>().substr(0, 16 * B),
+              record["position"].get<std::string>().substr(0, 16 * B));
+    EXPECT_EQ(scene["zone_state"].get<std::string>().find_first_not_of("A="), std::string::npos) << "all elastic";
+  };
+  EXPECT_EQ(hello_["frame"], 0);
+  starts(hello_["scene"]);
+  starts(c->result("scene", {{"branch", 1}})["scene"]);
+
+  // also of a branch whose own frames begin later and whose bodies are more
+  c->result("rewind", {{"time", 0.4}});
+  c->result("add_charge", {{"member", "C-B2-1"}, {"position", 1}, {"destroyed_length", 0.6}, {"time", 0.5}});
+  const TestJson scene = c->result("scene", {{"branch", 2}})["scene"];
+  EXPECT_GT(scene["bodies"].size(), record["bodies"].size());
+  starts(scene);
+}
+
 TEST_F(ServerTest, ARunHeldToASpeedTellsHowFarItIs) {
   start(one_stage("1 s"));
   const auto c = watcher();
