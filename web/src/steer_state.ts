@@ -94,9 +94,24 @@ export function makeSteerState(address: string) {
   const branch = computed(() => branches.value.find((b) => b.id === active.value));
   const phase = computed(() => progress.value?.phase ?? session.value?.phase ?? "paused");
   const frontier = computed(() => progress.value?.time ?? branch.value?.frontier ?? 0);
-  /// The branch's charges: the server tells of a branch when it is changed, not when a charge fires.
-  const lastFiring = computed(() => Math.max(-Infinity, ...(branch.value?.charges ?? []).map((c) => c.time).filter((t) => t <= frontier.value)));
-  const charges = computed(() => (branch.value?.charges ?? []).map((c) => ({ ...c, fired: c.fired || (!c.removed && !c.fails && c.time <= lastFiring.value) })));
+  const moment = computed(() => (following.value ? frontier.value : (view.value?.state.timeSlowly.value ?? 0)));
+  /// The branch whose plan holds at the view: before its first frame that of the one it parts from, on which an edit there acts.
+  const holding = computed(() => {
+    const run = view.value;
+    let one = branch.value;
+    if (following.value || run === null) return one;
+    const row = run.rows[run.state.frame.value] ?? -1;
+    while (row >= 0 && one !== undefined && row < one.first_frame) {
+      const { parent } = one;
+      const before = branches.value.find((b) => b.id === parent);
+      if (before === undefined) break;
+      one = before;
+    }
+    return one;
+  });
+  /// Its charges at the view. What fires at the start has not fired at 0, before the first step.
+  const lastFiring = computed(() => Math.max(-Infinity, ...(holding.value?.charges ?? []).map((c) => c.time).filter((t) => moment.value > 0 && t <= moment.value)));
+  const charges = computed(() => (holding.value?.charges ?? []).map((c) => ({ ...c, fired: !c.removed && !c.fails && c.time <= lastFiring.value })));
   /// The end of the time axis: what the plan asks for, or how far the run came.
   const span = computed(() => Math.max(branch.value?.duration ?? 0, frontier.value, view.value?.state.end.value ?? 0, 1e-3));
   /// Neither at its end nor failed: what is found so far may change.
@@ -510,7 +525,7 @@ export function makeSteerState(address: string) {
   return {
     ...look,
     connection, status: connection.status, ask, notify, dismiss, notices, welcomed,
-    session, sessions, branches, branch, charges, active, view, plan, progress, phase, frontier, span, following, editTime, isUnderWay, earlier, log, findings,
+    session, sessions, branches, branch, holding, charges, active, view, plan, progress, phase, frontier, span, following, editTime, isUnderWay, earlier, log, findings,
     studies, samples, watchedStudy, zone, comparison, tab, tall, dialog, hiddenStoreys, section, showDebris, planCheck, editedText, imported, draws,
     edit, tryEdit, arrive, show, fill, runs,
 

@@ -171,6 +171,7 @@ function Storeys(props: { s: SteerState }) {
 export function Tree(props: { s: SteerState }) {
   const { s } = props;
   const branch = s.branch.value;
+  const holding = s.holding.value;
   const run = s.view.value?.run;
   return (
     <nav class="tree" aria-label="Model and plan">
@@ -184,7 +185,7 @@ export function Tree(props: { s: SteerState }) {
           <button type="button" class="small" title="Take back the last edit (Ctrl+Z)" data-test="undo" onClick={() => void s.undo()}>Undo</button>
         </span>
       </details>
-      {branch !== undefined && <Charges s={s} branch={branch} />}
+      {holding !== undefined && <Charges s={s} branch={holding} />}
       {branch !== undefined && <Preparation s={s} branch={branch} />}
       <Storeys s={s} />
       {run !== undefined && (

@@ -83,6 +83,17 @@ describe("steering page", () => {
     assert.equal(await page.locator("[data-test=delay-stage-1]").count(), 1);
   });
 
+  it("lists charges as they are where it looks", async () => {
+    const stage = page.locator(".stage-row", { hasText: "Rows A and B" });
+    await d.scrub(0.4);
+    await page.waitForSelector("[data-test=delay-stage-0]");
+    assert.match(await stage.textContent(), / charges0\.500 s/);
+    await d.scrub(0.6);
+    await page.waitForSelector("[data-test=delay-stage-0]", { state: "detached" });
+    assert.match(await stage.textContent(), /done/);
+    await d.click("live");
+  });
+
   it("keeps the two clocks apart: scrubbing does not change the run", async () => {
     const frontier = await d.frontier();
     const log = server.sessions[0].log.length;
