@@ -7,10 +7,25 @@ import { unitWord } from "./study/data";
 import { makeScale, makeTicks, tickText } from "./study/chart";
 import { formatNumber, prettify } from "./units";
 
-const percent = (part: number): string => String(Math.max(1, Math.round(100 * part)));
+/// Never more than there is: what is spare is rounded down.
+const roundDown = (value: number, decimals: number): string => (Math.floor(value * 10 ** decimals + 1e-6) / 10 ** decimals).toFixed(decimals);
 
 /// The distance that the plan asks for, as a clearance finding ends with it in either language; undefined if it asks for none.
 const findLimit = (f: Finding): string | undefined => /; (?:the limit is|der Grenzwert ist) (\d+(?:[.,]\d+)?) m\.$/.exec(f.text)?.[1]?.replace(",", ".");
+
+/// What a stability finding says beside the margin at its end, in either language: how many zones have yielded or broken,
+/// and the least margin on the way.
+function readMargin(f: Finding): { yielded: number; broken: number; least: number } {
+  const numberOf = (pattern: RegExp): number | undefined => {
+    const found = pattern.exec(f.text)?.[1];
+    return found === undefined ? undefined : Number(found.replace(",", "."));
+  };
+  return {
+    yielded: numberOf(/(\d+) (?:zones? ha(?:s|ve) yielded|Zonen? fließ(?:t|en))/) ?? 0,
+    broken: numberOf(/(\d+) (?:(?:is|are) broken|(?:ist|sind) gebrochen)/) ?? 0,
+    least: Math.min(f.value ?? Infinity, numberOf(/(?:the least in the pause is|Die kleinste in der Pause ist) (\d+[.,]\d+)/) ?? Infinity),
+  };
+}
 
 /// What would have to be otherwise for the findings not to hold, the nearest first.
 export function listConditions(run: Run): string[] {
@@ -21,9 +36,19 @@ export function listConditions(run: Run): string[] {
   const charges = run.events.filter((e) => e.kind === "charge").length;
   if (charges === 1) out.push("The charge does not fire, or not when the plan says.");
   if (charges > 1) out.push(`One of the ${charges} charges does not fire, or not when the plan says.`);
-  const margins = run.findings.filter((f) => f.id.startsWith("stability.") && f.value !== null && f.value > 1 && f.status !== "bad");
-  margins.sort((a, b) => (a.value as number) - (b.value as number));
-  for (const f of margins.slice(0, 3)) out.push(`${f.title}: the most loaded zone resists ${percent(1 - 1 / (f.value as number))} % less than the plan says.`);
+  const standing = run.findings.filter((f) => f.id.startsWith("stability.") && f.value !== null && f.status !== "bad");
+  const margins = standing.map((f) => {
+    const { yielded, broken, least } = readMargin(f);
+    const spare = 100 * (1 - 1 / least); // [%]
+    return { title: f.title, yielded, broken, spare: yielded + broken > 0 || spare < 0.1 ? 0 : spare };
+  });
+  margins.sort((a, b) => a.spare - b.spare);
+  for (const { title, yielded, broken, spare } of margins.slice(0, 3)) {
+    if (spare > 0) out.push(`${title}: the most loaded zone resists ${roundDown(spare, spare < 1 ? 1 : 0)} % less than the plan says.`);
+    else if (broken > 0) out.push(`${title}: zones resist less than the plan says. No margin is left: ${broken} ${broken === 1 ? "zone has" : "zones have"} broken already.`);
+    else if (yielded > 0) out.push(`${title}: zones resist less than the plan says. No margin is left: ${yielded} ${yielded === 1 ? "zone has" : "zones have"} yielded already.`);
+    else out.push(`${title}: zones resist less than the plan says. No margin is left.`);
+  }
   const near = run.findings.filter((f) => f.id.startsWith("clearance.") && f.value !== null && f.value > 0 && f.status !== "bad");
   const ways = near.map((f) => {
     const limit = findLimit(f);
@@ -31,8 +56,8 @@ export function listConditions(run: Run): string[] {
   });
   ways.sort((a, b) => a.left - b.left);
   for (const { title, limit, left } of ways.slice(0, 3)) {
-    if (limit === undefined) out.push(`${title}: parts come ${formatNumber(left, 2)} m farther than in this run; they then reach it.`);
-    else out.push(`${title}: parts come ${formatNumber(left, 2)} m farther than in this run; the limit of ${limit} m is then broken.`);
+    if (limit === undefined) out.push(`${title}: parts come ${roundDown(left, left < 1 ? 2 : 1)} m farther than in this run; they then reach it.`);
+    else out.push(`${title}: parts come ${roundDown(left, left < 1 ? 2 : 1)} m farther than in this run; the limit of ${limit} m is then broken.`);
   }
   out.push("Strengths, bars, weights or friction are not those of the plan. What other values do, a fuzzy study of the plan shows.");
   return out;

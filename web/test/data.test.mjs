@@ -304,6 +304,28 @@ describe("what would make it fail", () => {
       ["Hall: parts come 5.6 m farther than in this run; the limit of 4.0 m is then broken."]);
   });
 
+  it("rounds what is left down, with a digit behind the point", () => {
+    const fuel = clearance("Fuel", 17.66, "The nearest part, C-A1-0, comes to 17.7 m at 4.10 s; the limit is 4.0 m.", "good");
+    const wall = clearance("Wall", 4.098, "The nearest part, C-A1-0, comes to 4.1 m at 4.10 s; the limit is 4.0 m.", "good");
+    assert.deepEqual(tell(fuel, wall), [
+      "Wall: parts come 0.09 m farther than in this run; the limit of 4.0 m is then broken.",
+      "Fuel: parts come 13.6 m farther than in this run; the limit of 4.0 m is then broken.",
+    ]);
+  });
+
+  it("names no margin where it is used up", () => {
+    const pause = (value, text) => ({ id: "stability.stage_1", heading: "Stability", title: "Between A and B", text, value, unit: "1", status: "warning" });
+    const zone = "Zone B-1/end is nearest to its resistance and uses 75 % of it (margin 1.34)";
+    const used = "Between A and B: zones resist less than the plan says. No margin is left";
+    assert.deepEqual(tell(pause(1.34, `${zone}; 39 zones have yielded, none is broken. It still sways.`)), [`${used}: 39 zones have yielded already.`]);
+    assert.deepEqual(tell(pause(1.34, `${zone}; 1 zone has yielded, 2 are broken.`)), [`${used}: 2 zones have broken already.`]);
+    assert.deepEqual(tell(pause(1.34, "…; 1 Zone fließt, keine ist gebrochen.")), [`${used}: 1 zone has yielded already.`]);
+    assert.deepEqual(tell(pause(1, `${zone}; no zone has yielded, none is broken.`)), [`${used}.`]);
+    // the least on the way counts, not that of the end; 9.91 % are not 10
+    const sways = `${zone}; no zone has yielded, none is broken. This is the margin of one instant: the least in the pause is 1.11, at 0.38 s.`;
+    assert.deepEqual(tell(pause(1.34, sways)), ["Between A and B: the most loaded zone resists 9 % less than the plan says."]);
+  });
+
   it("tells of no way that is left where a limit is broken", () => {
     assert.deepEqual(tell(clearance("Hall", 3.2, "The nearest part, C-A1-0, comes to 3.2 m at 4.10 s; the limit is 4.0 m.", "bad")), ["It fails already: Hall."]);
   });
