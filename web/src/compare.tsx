@@ -4,10 +4,11 @@ import "./style.css";
 import { effect, signal } from "@preact/signals";
 import { Building } from "./building";
 import { readComparison, type Comparison, type Compared, type Photo } from "./compare_data";
+import type { Triple } from "./data";
 import { Help, listenToKeys } from "./keys";
 import { NoWebGl } from "./no_webgl";
 import { Plots } from "./plots";
-import { Scene } from "./scene";
+import { Scene, type View } from "./scene";
 import { useSceneView } from "./scene_view";
 import { makeState, runClock, type State } from "./state";
 import { Timeline } from "./timeline";
@@ -35,10 +36,18 @@ class OverlaidScene extends Scene {
     this.building.setGhost(colourOfA, 1);
     this.other.setGhost(colourOfB, 0.5);
     this.stage.scene.add(this.other.group);
-    this.stage.setFitPoints([...this.building.fitPoints, ...this.other.fitPoints]);
     this.setLook("kind", "none", -1);
     this.other.setLook("kind", "none", -1);
     this.fit("side");
+  }
+
+  /// Both of them.
+  override fit(view?: View | Triple): void {
+    if (this.other === undefined) return super.fit(view);
+    for (const one of [this.building, this.other]) one.collectFitPoints();
+    this.stage.setFitPoints([...this.building.fitPoints, ...this.other.fitPoints]);
+    this.site.resetAxes();
+    this.stage.fit(view);
   }
 
   override setTime(t: number): void {
@@ -82,6 +91,7 @@ function Overlay(props: { state: State; compared: Compared; fitRef: { current: (
           {(["oblique", "side", "front", "top"] as const).map((view) => (
             <button type="button" onClick={() => sceneRef.current?.fit(view)}>{view}</button>
           ))}
+          <button type="button" title="Fit to the window (F)" onClick={() => sceneRef.current?.fit()}>Fit</button>
         </span>
       </div>
       <div class="canvas-frame" ref={frameRef}>

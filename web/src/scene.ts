@@ -95,6 +95,7 @@ export class Scene implements SceneLike {
     this.stage.setDark(dark);
   }
   resize(width: number, height: number): void {
+    if (this.stage.isFitted) this.site.resetAxes();
     this.stage.resize(width, height);
   }
   /// Looks at all of what is there now: a run may have grown.
@@ -137,7 +138,7 @@ export class Scene implements SceneLike {
   /// Pictures of the run at given times, on a light ground so that they print well.
   makeStills(times: readonly number[], width: number, height: number): string[] {
     const { time, selected, colouring, zoneMarks, stage } = this;
-    const { dark, renderer, camera, controls } = stage;
+    const { dark, renderer, camera, controls, isFitted } = stage;
     const changed = this.onChange;
     const ratio = renderer.getPixelRatio();
     const eye = camera.position.clone();
@@ -165,6 +166,7 @@ export class Scene implements SceneLike {
     this.site.showLabels(true);
     renderer.setPixelRatio(ratio);
     this.setDark(dark);
+    stage.isFitted = isFitted;
     this.resize(stage.width, stage.height);
     controls.update();
     this.setLook(colouring, zoneMarks, selected);

@@ -70,6 +70,7 @@ export class Stage implements SceneLike {
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.enableDamping = false;
     this.controls.maxPolarAngle = Math.PI * 0.55;
+    this.controls.addEventListener("start", () => (this.isFitted = false));
     this.controls.addEventListener("change", () => {
       this.onView();
       this.onChange();
@@ -89,6 +90,7 @@ export class Stage implements SceneLike {
     this.height = Math.max(1, height);
     this.renderer.setSize(this.width, this.height, false);
     this.useAspect(this.width, this.height);
+    if (this.isFitted) this.fit();
     this.onChange();
   }
 
@@ -113,6 +115,8 @@ export class Stage implements SceneLike {
     return this.centre;
   }
 
+  /// Whether the picture is as it was fitted: then a new size fits it anew. Who has moved the camera keeps it.
+  isFitted = false;
   /// Looks at all of the fit points from one side, as near as the picture allows.
   fit(view?: View | Triple): void {
     const from =
@@ -147,6 +151,7 @@ export class Stage implements SceneLike {
     this.camera.far = distance * 12;
     this.camera.updateProjectionMatrix();
     this.controls.update();
+    this.isFitted = true;
     this.onView();
     this.onChange();
   }

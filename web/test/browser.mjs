@@ -46,3 +46,15 @@ export async function openPage(place, { webgl = true, ...options } = {}) {
   await page.waitForSelector("html[data-ready=yes]");
   return { page, problems, close };
 }
+
+/// Whether the picture is fitted after the window has become so wide: then Fit changes nothing.
+export async function isFittedAt(page, width) {
+  const settle = () => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done)))));
+  const canvas = page.locator("[data-test=canvas]");
+  await page.setViewportSize({ width, height: page.viewportSize().height });
+  await settle();
+  const before = await canvas.screenshot();
+  await page.getByRole("button", { name: "Fit", exact: true }).click();
+  await settle();
+  return before.equals(await canvas.screenshot());
+}

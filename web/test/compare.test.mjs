@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { mkdir, readFile, writeFile } from "node:fs/promises";
 import { resolve } from "node:path";
 import { fileURLToPath } from "node:url";
-import { openPage } from "./browser.mjs";
+import { isFittedAt, openPage } from "./browser.mjs";
 import { after, before, describe, it } from "./harness.mjs";
 import { load } from "./load.mjs";
 import { makeSynthetic } from "./synthetic.mjs";
@@ -94,6 +94,14 @@ describe("the page of two runs", () => {
     await browser.page.waitForSelector("text=first.png");
     await scrub(5.8);
     await browser.page.waitForSelector("text=second.png");
+  });
+
+  it("keeps both buildings in a narrow picture", async () => {
+    const { page } = browser;
+    assert.ok(await isFittedAt(page, 400));
+    await page.screenshot({ path: `${out}phone.png`, fullPage: true });
+    assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth));
+    await page.setViewportSize({ width: 1440, height: 900 });
   });
 
   it("runs without an error and without asking for anything else", () => assert.deepEqual(browser.problems, []));

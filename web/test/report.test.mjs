@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { mkdir, readFile } from "node:fs/promises";
 import { resolve } from "node:path";
 import { fileURLToPath } from "node:url";
-import { openPage } from "./browser.mjs";
+import { isFittedAt, openPage } from "./browser.mjs";
 import { after, before, describe, it } from "./harness.mjs";
 import { load } from "./load.mjs";
 import { hostile, makeEmpty, makeSynthetic, writePage } from "./synthetic.mjs";
@@ -254,6 +254,16 @@ describe("report page", () => {
     for (const text of [p.plan_sha256, p.program_version, p.seed, p.engine, p.machine, String(counts.bodies), String(counts.force_elements)])
       assert.ok(details.includes(text), text);
     for (const v of data.plan_values) assert.ok((await page.textContent(".plan-values")).includes(prettify(v.value)));
+  });
+
+  it("keeps the building in a narrower picture, unless the camera was moved", async () => {
+    await page.getByRole("button", { name: "Fit", exact: true }).click();
+    assert.ok(await isFittedAt(page, 400));
+    await page.setViewportSize({ width: 1440, height: 900 });
+    await page.locator("[data-test=canvas]").hover();
+    await page.mouse.wheel(0, -300);
+    assert.ok(!(await isFittedAt(page, 400)), "the eye was moved");
+    await page.setViewportSize({ width: 1440, height: 900 });
   });
 
   it("fits wide, narrow, dark and printed", async () => {
