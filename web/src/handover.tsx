@@ -45,8 +45,10 @@ export function listConditions(run: Run): string[] {
   margins.sort((a, b) => a.spare - b.spare);
   for (const { title, yielded, broken, spare } of margins.slice(0, 3)) {
     if (spare > 0) out.push(`${title}: the most loaded zone resists ${roundDown(spare, spare < 1 ? 1 : 0)} % less than the plan says.`);
-    else if (broken > 0) out.push(`${title}: zones resist less than the plan says. No margin is left: ${broken} ${broken === 1 ? "zone has" : "zones have"} broken already.`);
-    else if (yielded > 0) out.push(`${title}: zones resist less than the plan says. No margin is left: ${yielded} ${yielded === 1 ? "zone has" : "zones have"} yielded already.`);
+    else if (broken === 1) out.push(`${title}: zones resist less than the plan says. No margin is left: 1 zone has broken already.`);
+    else if (broken > 0) out.push(`${title}: zones resist less than the plan says. No margin is left: ${broken} zones have broken already.`);
+    else if (yielded === 1) out.push(`${title}: zones resist less than the plan says. No margin is left: 1 zone has yielded already.`);
+    else if (yielded > 0) out.push(`${title}: zones resist less than the plan says. No margin is left: ${yielded} zones have yielded already.`);
     else out.push(`${title}: zones resist less than the plan says. No margin is left.`);
   }
   const near = run.findings.filter((f) => f.id.startsWith("clearance.") && f.value !== null && f.value > 0 && f.status !== "bad");

@@ -739,7 +739,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["{}: zones resist less than the plan says. No margin is left: {:d} zones have yielded already.", "{}: Zonen tragen weniger, als der Plan sagt. Eine Reserve ist nicht mehr da: {} Zonen fließen schon."],
   ["{}: zones resist less than the plan says. No margin is left: {:d} zone has yielded already.", "{}: Zonen tragen weniger, als der Plan sagt. Eine Reserve ist nicht mehr da: {} Zone fließt schon."],
   ["{}: zones resist less than the plan says. No margin is left: {:d} zones have broken already.", "{}: Zonen tragen weniger, als der Plan sagt. Eine Reserve ist nicht mehr da: {} Zonen sind schon gebrochen."],
-  ["{}: zones resist less than the plan says. No margin is left: {:d} zone has broken already.", "{}: Zonen tragen weniger, als der Plan sagt. Eine Reserve ist nicht mehr da: {} Zone ist schon gebrochen."],
+  ["{}: zones resist less than the plan says. No margin is left: 1 zone has broken already.", "{}: Zonen tragen weniger, als der Plan sagt. Eine Reserve ist nicht mehr da: 1 Zone ist schon gebrochen."],
   ["{}: zones resist less than the plan says. No margin is left.", "{}: Zonen tragen weniger, als der Plan sagt. Eine Reserve ist nicht mehr da."],
   ["{}: parts come {:g} m farther than in this run; the limit of {:g} m is then broken.", "{}: Teile kommen {} m weiter als in dieser Rechnung; der Grenzwert von {} m ist dann unterschritten."],
   ["{}: parts come {:g} m farther than in this run; they then reach it.", "{}: Teile kommen {} m weiter als in dieser Rechnung; dann erreichen sie es."],
