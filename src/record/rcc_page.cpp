@@ -23,6 +23,7 @@ p{margin:6px 0}
 section,figure{background:var(--ink-panel);border:1px solid var(--edge);border-radius:6px;margin:0 0 14px;padding:12px 14px}
 figcaption{margin:4px 0 6px}
 .drawing text{font-family:inherit}
+@media screen and (max-width:760px){.wide .drawing{min-width:800px}}
 table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:13px}
 th,td{padding:3px 9px;border-bottom:1px solid var(--ink-faint);text-align:right;white-space:nowrap}
 th{color:var(--ink-quiet);font-weight:600;vertical-align:bottom}
@@ -126,8 +127,8 @@ std::string figures_html(const std::vector<Figure>& figures) {
       out += is_folded ? fmt::format("<details><summary>{}</summary>\n", escape_html(heading))
                        : fmt::format("<h2>{}</h2>\n", escape_html(heading));
     }
-    out += fmt::format("<figure id=\"{}\">\n{}\n<figcaption>{}</figcaption>\n", f.id, to_svg(f.drawing),
-                       escape_html(f.caption));
+    out += fmt::format("<figure id=\"{}\">\n<div class=\"wide\" tabindex=\"0\">{}</div>\n<figcaption>{}</figcaption>\n",
+                       f.id, to_svg(f.drawing), escape_html(f.caption));
     if (!f.table.rows.empty())
       out += fmt::format(
           "<details><summary>Table of values</summary><div class=\"scroller\" tabindex=\"0\">{}</div></details>\n",

@@ -4,8 +4,8 @@ import { calcPose, type Finding, type Point, type Quadruple, rotate, type Run, s
 import { FindingRow, findVerdict } from "./findings";
 import { StatusSign } from "./signs";
 import { unitWord } from "./study/data";
-import { makeScale, makeTicks, tickText } from "./study/chart";
-import { formatNumber, prettify } from "./units";
+import { makeScale, makeTicks, tickText, useChartWidth } from "./study/chart";
+import { atLeast, atMost, formatNumber, prettify } from "./units";
 
 /// Never more than there is: what is spare is rounded down.
 const roundDown = (value: number, decimals: number): string => (Math.floor(value * 10 ** decimals + 1e-6) / 10 ** decimals).toFixed(decimals);
@@ -118,12 +118,13 @@ export function findFallenParts(run: Run): Point[][] {
 
 export function SitePlan(props: { run: Run }) {
   const { run } = props;
+  const width = useChartWidth(640);
   const parts = findFallenParts(run);
   const points = [...run.building_outline, ...run.neighbours.flatMap((n) => n.footprint), ...parts.flat()].filter((p) => Number.isFinite(p[0] + p[1]));
   if (points.length === 0) return null;
   const lows = [0, 1].map((k) => points.reduce((least, p) => Math.min(least, p[k] as number), Infinity)) as [number, number];
   const highs = [0, 1].map((k) => points.reduce((most, p) => Math.max(most, p[k] as number), -Infinity)) as [number, number];
-  const width = 640, most = 460, margin = 34;
+  const most = 460, margin = 34;
   const spans = [Math.max(1, highs[0] - lows[0]), Math.max(1, highs[1] - lows[1])] as const;
   const factor = Math.min((width - 2 * margin) / spans[0], (most - 2 * margin) / spans[1]);
   const height = factor * spans[1] + 2 * margin;
@@ -136,7 +137,7 @@ export function SitePlan(props: { run: Run }) {
       <h2>The site from above</h2>
       <svg class="chart site-plan" viewBox={`0 0 ${width} ${height.toFixed(0)}`} role="img" aria-label="Site plan: building, neighbours, and where all parts lie at the end">
         <g class="grid">
-          {makeTicks(lows[0], highs[0], 8).map((t) => (
+          {makeTicks(lows[0], highs[0], width / 80).map((t) => (
             <>
               <line x1={x(t)} x2={x(t)} y1={margin} y2={height - margin} />
               <text x={x(t)} y={height - margin + 16} text-anchor="middle">{tickText(t)}</text>

@@ -531,6 +531,7 @@ describe("steering page", () => {
       await d.settle();
       await page.screenshot({ path: `${out}${name}.png`, fullPage: name === "phone" });
       assert.deepEqual(await findOverflow(page), [], name);
+      if (name === "phone") assert.ok(await page.locator(".legend-line").evaluate((e) => e.scrollHeight <= e.clientHeight), "the legend is cut off");
     }
     await page.setViewportSize({ width: 1440, height: 900 });
     await page.emulateMedia({ colorScheme: "dark" });

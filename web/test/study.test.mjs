@@ -231,10 +231,14 @@ describe("the page of a study", () => {
   });
 
   it("fits wide, narrow, dark and printed, and gives every control a name", async () => {
-    for (const [name, width] of [["wide", 1440], ["narrow", 900], ["phone", 420]]) {
+    for (const [name, width] of [["wide", 1440], ["narrow", 900], ["phone", 400]]) {
       await page.setViewportSize({ width, height: 900 });
       await page.waitForTimeout(100);
       assert.deepEqual(await findOverflow(page), [], name);
+      const least = await page.evaluate(() =>
+        Math.min(...[...document.querySelectorAll("svg.chart")].filter((svg) => svg.getClientRects().length > 0)
+          .map((svg) => (parseFloat(getComputedStyle(svg.querySelector("text")).fontSize) * svg.getBoundingClientRect().width) / svg.viewBox.baseVal.width)));
+      assert.ok(least >= 8.5, `${name}: texts of plots are ${least} px high`);
       await page.screenshot({ path: `${out}study-${name}.png`, fullPage: true });
     }
     await page.setViewportSize({ width: 1440, height: 900 });

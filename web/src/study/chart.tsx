@@ -1,6 +1,6 @@
 /// Plots as SVG: axes with round numbers, a place for marks, and a table of the values beside them.
 import type { ComponentChildren } from "preact";
-import { useState } from "preact/hooks";
+import { useEffect, useState } from "preact/hooks";
 import { formatNumber } from "../units";
 
 export interface Scale {
@@ -38,6 +38,22 @@ export function findRange(values: Iterable<number | null | undefined>, withZero 
   return [low - margin, high + margin];
 }
 
+const narrowQuery = "(max-width: 560px)";
+const phoneWidth = 360;
+
+/// The units that a picture has from left to right: fewer in a narrow window, so that its texts stay as large as they are.
+export function useChartWidth(wide: number): number {
+  const [narrow, setNarrow] = useState(() => matchMedia(narrowQuery).matches);
+  useEffect(() => {
+    const query = matchMedia(narrowQuery);
+    const follow = (): void => setNarrow(query.matches);
+    follow();
+    query.addEventListener("change", follow);
+    return () => query.removeEventListener("change", follow);
+  }, []);
+  return narrow ? Math.min(wide, phoneWidth) : wide;
+}
+
 interface ChartProps {
   label: string;
   x: [number, number];
@@ -50,7 +66,9 @@ interface ChartProps {
 }
 
 export function Chart(props: ChartProps) {
-  const { width = 560, height = 260 } = props;
+  const wide = props.width ?? 560;
+  const width = useChartWidth(wide);
+  const height = width < wide ? Math.min(props.height ?? 260, 0.8 * width) : (props.height ?? 260);
   const left = 52, right = 14, top = 10, bottom = 42;
   const x = makeScale(props.x[0], props.x[1], left, width - right);
   const y = makeScale(props.y[0], props.y[1], height - bottom, top);

@@ -1,7 +1,7 @@
 import { useState } from "preact/hooks";
 import { formatNumber } from "../units";
 import type { Point } from "../data";
-import { Chart, ValueTable, findRange, makePath, makeScale, makeTicks, tickText } from "./chart";
+import { Chart, ValueTable, findRange, makePath, makeScale, makeTicks, tickText, useChartWidth } from "./chart";
 import { titleOf, unitWord, type Fan, type Level, type Output, type Study } from "./data";
 import { calcWidth, placeLabels, walk, type Label } from "./labels";
 import { lookOf, nameOf, type State } from "./state";
@@ -217,11 +217,12 @@ function label(outlines: readonly Outline[], neighbours: readonly { name: string
 export function DebrisPlan(props: { state: State }) {
   const { study } = props.state;
   const [chosen, setChosen] = useState(0);
+  const width = useChartWidth(700);
   const debris = study.debris[Math.min(chosen, study.debris.length - 1)];
   if (debris === undefined) return null;
   const points = [...study.site.footprint, ...study.site.neighbours.flatMap((n) => n.footprint), ...study.debris.flatMap((d) => d.levels.flatMap((l) => l.corners))];
   const xs = findRange(points.map((p) => p[0])), ys = findRange(points.map((p) => p[1]));
-  const width = 700, margin = 34;
+  const margin = 34;
   const scale = (width - 2 * margin) / (xs[1] - xs[0]);
   const height = Math.min(700, scale * (ys[1] - ys[0]) + 2 * margin);
   const factor = Math.min(scale, (height - 2 * margin) / (ys[1] - ys[0]));
