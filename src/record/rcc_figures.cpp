@@ -193,7 +193,7 @@ void add_interaction(const RccReport& r, char axis, std::vector<Figure>& out) {
       peak.y.insert(peak.y.end(), N.begin(), N.end());
     }
     const std::string where = routes.size() > 1 ? ", " + routes[k] : "";
-    yield.name = "at first yield" + where, peak.name = "ultimate (largest)" + where;
+    yield.name = "at first yield" + where, peak.name = "largest moment (peak)" + where;
     yield.ink = Ink::Series2, peak.ink = Ink::Series0;
     yield.dash = k == 0 ? std::vector<double>{7, 4} : std::vector<double>{2, 3};
     if (k > 0) peak.dash = {12, 3, 2, 3};

@@ -142,6 +142,11 @@ TEST(RccPage, HasEveryPlotOnceWithItsTable) {
     EXPECT_TRUE(ids.insert(f.id).second) << f.id << " twice";
     EXPECT_FALSE(f.drawing.title.empty()) << f.id;
     EXPECT_FALSE(f.caption.empty()) << f.id;
+    if (f.id == "interaction_y") {
+      const std::string svg = to_svg(f.drawing);
+      EXPECT_NE(svg.find("largest moment (peak)"), std::string::npos);
+      EXPECT_EQ(svg.find("ultimate"), std::string::npos) << "which lies behind the peak";
+    }
     if (f.id == "axial") continue;  // its table stands beside the whole curve
     EXPECT_FALSE(f.table.rows.empty()) << f.id;
     for (const auto& row : f.table.rows) EXPECT_EQ(row.size(), f.table.heads.size()) << f.id;
