@@ -177,10 +177,11 @@ void Builder::add_events(std::vector<Firing> schedule) {
   }
 
   if (!without_zone.empty())
-    map.remarks.push_back(fmt::format(
-        "Members in which the damage beside charges (transition_damage) changes nothing, as no other zone of theirs is "
-        "near enough: {} (the first is {}).",
-        without_zone.size(), *without_zone.begin()));
+    map.remarks.push_back(
+        {"Damage without effect", fmt::format("Members in which the damage beside charges (transition_damage) changes "
+                                              "nothing, as no other zone of theirs is "
+                                              "near enough: {} (the first is {}).",
+                                              without_zone.size(), *without_zone.begin())});
 
   // a record's body has one set of shapes: what remains; what is thrown out is drawn as debris
   for (size_t b = 0; b < current.size(); ++b)

@@ -554,10 +554,10 @@ void add_events(const Context& c) {
   c.add("events", "Events", "Events", text, static_cast<double>(c.r.events.size()), "1",
         has_late ? Status::Warning : Status::Info);
   size_t i = 0;
-  for (const std::string& note : c.map.notes)
-    c.add("note." + std::to_string(++i), "Events", "Note", note, kNone, "", Status::Warning);
-  for (const std::string& remark : c.map.remarks)
-    c.add("note." + std::to_string(++i), "Events", "Note", remark, kNone, "", Status::Info);
+  for (const ModelNote& note : c.map.notes)
+    c.add("note." + std::to_string(++i), "Events", note.title, note.text, kNone, "", Status::Warning);
+  for (const ModelNote& remark : c.map.remarks)
+    c.add("note." + std::to_string(++i), "Events", remark.title, remark.text, kNone, "", Status::Info);
 }
 
 /// How far what came down has crushed what charges left of columns.

@@ -282,7 +282,8 @@ std::string LiveModel::add_charge(const Edit& e, double time, double next) {
   builder.library.compute(1);
   built_ = std::move(static_cast<BuilderState&>(builder));
   if (is_column && !built_.lowest_charge.count(index))
-    map_.notes.push_back(m.name + " was built without a charge: what lies below the added one leaves with it.");
+    map_.notes.push_back(
+        {"Added charge", m.name + " was built without a charge: what lies below the added one leaves with it."});
   return fmt::format("a charge on {} at {:.3g} m, destroying {:.3g} m, fires at {}", m.name, e.position,
                      e.destroyed_length, words_of_time(t));
 }

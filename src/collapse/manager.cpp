@@ -476,11 +476,19 @@ void Builder::build() {
     const bool has_slab = std::any_of(slabs.begin(), slabs.end(),
                                       [&](const auto& entry) { return entry.first.storey == static_cast<int>(s); });
     if (plan.storey_loads[s] > 0 && !has_slab)
-      map.notes.push_back("The floor load above storey " + std::to_string(s) +
-                          " is left out: there is no slab to carry it.");
+      map.notes.push_back({"Floor load without a slab", "The floor load above storey " + std::to_string(s) +
+                                                            " is left out: there is no slab to carry it."});
   }
   if (!hinge_about_y && !y_walls.empty())
-    map.notes.push_back("The fall is across the rows; walls in the rows count with their weight only.");
+    map.notes.push_back(
+        {"Walls in the rows", "The fall is across the rows; walls in the rows count with their weight only."});
+}
+
+std::vector<std::string> ModelMap::note_texts() const {
+  std::vector<std::string> out;
+  out.reserve(notes.size());
+  for (const ModelNote& note : notes) out.push_back(note.text);
+  return out;
 }
 
 mbs::Model make_model(const product::Plan& plan, const Knowledge& knowledge, ModelMap& map, int threads) {

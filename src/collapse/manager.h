@@ -77,6 +77,10 @@ struct StubEntry {
 };
 
 /// Ties between plan and model. B bodies, E zone elements, R rotational elements, J joints.
+struct ModelNote {
+  std::string title, text;  // a sentence or two
+};
+
 struct ModelMap {
   std::vector<BodyEntry> bodies;       // (B)
   std::vector<ZoneEntry> elements;     // (E)
@@ -89,14 +93,15 @@ struct ModelMap {
   std::vector<StructureEntry> structures{{}};  // that charges act on, or all if none does; the heaviest first
   std::vector<std::string> stages;             // a line for each stage of the plan
   std::vector<Firing> schedule;                // failing charges included
-  std::vector<std::string> notes;              // what the manager had to decide, in sentences
-  std::vector<std::string> remarks;            // what of the plan's charges has no effect, in sentences
+  std::vector<ModelNote> notes;                // what the manager had to decide
+  std::vector<ModelNote> remarks;              // what of the plan's charges has no effect
   Vec3 fall_direction{-1, 0, 0};  // planned, horizontal unit vector; away from the remaining supports if unplanned
   Vec3 hinge_axis{0, -1, 0};      // rotation about it by a positive angle leans towards fall_direction
   bool is_direction_planned = false;
   double ground_storey_height = 0;  // [m]
   double mass = 0;                  // of all bodies [kg]
   double moving_mass = 0;           // without fixed ones [kg]
+  std::vector<std::string> note_texts() const;
 };
 
 /// Builds the model. Throws InputError for plans that cannot be built, naming the member.

@@ -342,13 +342,16 @@ void Builder::connect_shaft(int index) {
       const double overturning = -weight * e.whole.y, resistance = find_resistance(law.moment_z, -weight);
       double left = 0;
       for (const nearfield::RingSector& x : e.ring.sectors) left += x.concrete > 0 ? x.angle() : 0;
-      map.notes.push_back(fmt::format(
-          "The mouth of {} at {:.1f} m leaves {:.0f} deg of the ring. The weight of {:.2f} MN above it turns with "
-          "{:.2f} "
-          "MNm about the centroid of what is left, {:.2f} m behind the axis, which resists with {:.2f} MNm at most: it "
-          "{}.",
-          m.name, joint.at, left / unit::deg, weight * 1e-6, overturning * 1e-6, -e.whole.y, resistance * 1e-6,
-          overturning > resistance ? "turns over" : "does not turn over by its weight alone"));
+      map.notes.push_back(
+          {"The mouth of " + m.name,
+           fmt::format(
+               "The mouth of {} at {:.1f} m leaves {:.0f} deg of the ring. The weight of {:.2f} MN above it turns with "
+               "{:.2f} "
+               "MNm about the centroid of what is left, {:.2f} m behind the axis, which resists with {:.2f} MNm at "
+               "most: it "
+               "{}.",
+               m.name, joint.at, left / unit::deg, weight * 1e-6, overturning * 1e-6, -e.whole.y, resistance * 1e-6,
+               overturning > resistance ? "turns over" : "does not turn over by its weight alone")});
     }
   }
 }

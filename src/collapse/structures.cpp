@@ -99,15 +99,15 @@ void Builder::find_structures() {
     if (body.structure >= 0) map.structures[static_cast<size_t>(body.structure)].mass += model.bodies[b].mass;
   }
   if (!left.empty())
-    map.notes.push_back(
-        fmt::format("No charge acts on {} of {} separate structures ({}): the mechanism is judged "
-                    "without what stands there.",
-                    left.size(), order.size(), join(left)));
+    map.notes.push_back({"Structures without a charge",
+                         fmt::format("No charge acts on {} of {} separate structures ({}): the mechanism is judged "
+                                     "without what stands there.",
+                                     left.size(), order.size(), join(left))});
   if (judged.size() > 1 && has_charges)
-    map.notes.push_back(
-        fmt::format("Charges act on {} separate structures ({}): the mechanism of each is judged by "
-                    "itself. Curves of tilt and height are those of {}.",
-                    judged.size(), join(judged), judged.front()));
+    map.notes.push_back({"Separate structures",
+                         fmt::format("Charges act on {} separate structures ({}): the mechanism of each is judged by "
+                                     "itself. Curves of tilt and height are those of {}.",
+                                     judged.size(), join(judged), judged.front())});
 }
 
 }  // namespace topple::collapse

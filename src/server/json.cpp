@@ -111,7 +111,7 @@ Json describe_branch(const collapse::Steering& s, const Branch& b, const std::st
   Json& edits = j["edits"] = Json::array();
   for (const collapse::EditEntry& e : b.edits)
     edits.push_back({{"kind", collapse::word_of(e.edit.kind)}, {"time", e.time}, {"text", e.text}});
-  j["notes"] = live.map().notes;
+  j["notes"] = live.map().note_texts();
   j["snapshots"] = numbers(s.moments(b));
   j["bodies"] = run.record().bodies.size();
   j["zones"] = run.record().zones.size();

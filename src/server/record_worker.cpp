@@ -82,7 +82,7 @@ void RecordWorker::finish(Job& job) {
     for (Copy& c : job.copies) {
       auto record = c.record->finish(&cancel_);
       if (!record) return refuse(make_cancelled());
-      list->push_back({c.record->branch(), c.record->time(), std::move(*record), c.record->model().map().notes,
+      list->push_back({c.record->branch(), c.record->time(), std::move(*record), c.record->model().map().note_texts(),
                        std::move(c.edits)});
       c.record.reset();
     }
