@@ -12,8 +12,6 @@
 
 namespace topple::collapse {
 
-namespace {
-
 void fill_ending(const mbs::Summary& s, const char* when, record::Record& record) {
   using Ending = mbs::Summary::Ending;
   switch (s.ending) {
@@ -39,6 +37,8 @@ void fill_ending(const mbs::Summary& s, const char* when, record::Record& record
       break;
   }
 }
+
+namespace {
 
 void fill_plan_values(const product::Plan& plan, const ModelMap& map, record::Record& r) {
   const auto add = [&r](const char* group, const std::string& key, const std::string& value) {

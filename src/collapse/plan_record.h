@@ -16,6 +16,9 @@ void tell_failing_charges(const product::Plan&, const ModelMap&, Recorder&, doub
 mbs::Options make_mbs_options(const mbs::RunSettings&, const Knowledge&, int threads, const Progress&);
 /// Frames and happenings go to the recorder, which must outlive the run.
 void record_into(Recorder&, mbs::Options&);
+/// How it ended, as a word and a sentence.
+///   when  the equilibrium is that of the start, for the words
+void fill_ending(const mbs::Summary&, const char* when, record::Record&);
 /// Ending and last event; the recorder is finished.
 ///   when  the equilibrium is that of the start, for the words
 void end_record(const mbs::Summary&, const char* when, Recorder&, record::Record&);

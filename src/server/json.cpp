@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "collapse/plan_record.h"
+
 namespace topple::server {
 
 using collapse::Branch;
@@ -70,12 +72,9 @@ Json describe_branch(const collapse::Steering& s, const Branch& b, const std::st
   j["duration"] = plan.analysis.duration;
   j["ending"] = nullptr;
   if (run.has_ended()) {
-    using Ending = mbs::Summary::Ending;
-    const mbs::Summary summary = run.summary();
-    const char* kind = summary.ending == Ending::AtRest      ? "at_rest"
-                       : summary.ending == Ending::TimeLimit ? "time_limit"
-                                                             : "failed";
-    j["ending"] = {{"kind", kind}, {"text", summary.message}};
+    record::Record words;
+    collapse::fill_ending(run.summary(), "", words);
+    j["ending"] = {{"kind", words.ending}, {"text", words.ending_text}};
   }
   Json& charges = j["charges"] = Json::array();
   for (std::size_t i = 0; i < live.charges().size(); ++i) {

@@ -317,6 +317,7 @@ TEST_F(ServerTest, SteersAPlanToItsEnd) {
   const TestJson end = c->wait_for_phase("finished");
   EXPECT_EQ(end["branch"], 2);
   EXPECT_EQ(end["ending"]["kind"], "time_limit");
+  EXPECT_EQ(end["ending"]["text"], "Stopped by the time limit of 1.00 s.") << "as the report says it";
 
   // both branches side by side, once the first has come as far
   c->result("switch", {{"branch", 1}});
