@@ -868,7 +868,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["largest {}", "größter Wert von {}"],
   ["Outcomes", "Ausgänge"],
   ["outcome", "Ausgang"],
-  ["possibility, and in dark what is necessary", "Möglichkeit, und dunkel, was notwendig ist"],
+  ["possibility, and as a narrow bar what is necessary", "Möglichkeit, und als schmaler Balken, was notwendig ist"],
   ["possibility", "Möglichkeit"],
   ["necessity", "Notwendigkeit"],
   ["runs", "Rechnungen"],

@@ -61,7 +61,7 @@ export function Outcomes(props: { state: State }) {
         <thead>
           <tr>
             <th scope="col">outcome</th>
-            <th scope="col" class="wide">possibility, and in dark what is necessary</th>
+            <th scope="col" class="wide">possibility, and as a narrow bar what is necessary</th>
             <th scope="col">possibility</th>
             <th scope="col">necessity</th>
             <th scope="col">runs</th>
