@@ -39,7 +39,9 @@ std::string words_of_percent(double percent) {
 
 void print_outcomes(std::FILE* out, const StudyResult& r) {
   if (r.alpha.classes.size() < 2 && (r.outcomes.empty() || r.outcomes[0].empty())) return;
-  std::fprintf(out, "\nOutcomes                     possibility  necessity    runs\n");
+  std::fprintf(out,
+               "\nOutcomes                    possibility   necessity\n                               at least     at "
+               "most    runs\n");
   for (const auto& c : r.alpha.classes) {
     std::fprintf(out, "  %-26s %11.5f %10.5f %7d\n", study::words_of_outcome(r, c.outcome).c_str(),
                  study::possibility_of(r, c), uncertainty::calc_necessity(r.possibilities, c.outcome), c.count);

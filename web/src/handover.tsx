@@ -233,7 +233,7 @@ function StudyResults(props: { study: StudySummary }) {
         <thead><tr><th scope="col">Outcome</th><th scope="col" class="number">Possibility</th><th scope="col" class="number">Necessity</th><th scope="col" class="number">Runs</th></tr></thead>
         <tbody>
           {study.outcomes.map((o) => (
-            <tr><td>{o.is_failure ? "failed" : o.name}</td><td class="number">{formatNumber(o.possibility, 2)}</td><td class="number">{formatNumber(o.necessity, 2)}</td><td class="number">{o.runs}</td></tr>
+            <tr><td>{o.is_failure ? "failed" : o.name}</td><td class="number">{atLeast(o.possibility, 3)}</td><td class="number">{atMost(o.necessity, 3)}</td><td class="number">{o.runs}</td></tr>
           ))}
         </tbody>
       </table>

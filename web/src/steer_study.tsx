@@ -3,7 +3,7 @@ import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { EditList, useBranchPlan } from "./steer_plan";
 import type { SteerState } from "./steer_state";
 import type { Bounds, Sample, Study } from "./steer_wire";
-import { formatDuration, formatNumber, formatTime, prettify, toReadable } from "./units";
+import { atLeast, atMost, formatDuration, formatNumber, formatTime, prettify, toReadable } from "./units";
 import { seriesColours } from "./vocabulary";
 
 /// One fuzzy output so far: membership over the value.
@@ -192,8 +192,8 @@ function Possibilities(props: { study: Study }) {
         {study.possibilities.map((p) => (
           <tr>
             <th scope="row">{prettify(p.outcome)}</th>
-            <td><span class="possibility"><i style={{ width: `${100 * (p.possibility ?? 0)}%` }} /></span> {formatNumber(p.possibility, 3)}</td>
-            <td>{formatNumber(p.necessity, 3)}</td>
+            <td><span class="possibility"><i style={{ width: `${100 * (p.possibility ?? 0)}%` }} /></span> {atLeast(p.possibility, 3)}</td>
+            <td>{atMost(p.necessity, 3)}</td>
           </tr>
         ))}
       </tbody>

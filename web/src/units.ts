@@ -39,6 +39,11 @@ export function formatNumber(value: number | null | undefined, digits = 4): stri
   return value.toFixed(decimals).replace("-", "−");
 }
 
+/// A possibility that was found can only be higher, a necessity only lower.
+export const atLeast = (possibility: number | null, digits: number): string =>
+  possibility === null || possibility >= 1 ? formatNumber(possibility, 1) : `≥ ${formatNumber(possibility, digits)}`;
+export const atMost = (necessity: number | null, digits: number): string => (necessity === null || necessity <= 0 ? formatNumber(necessity, 1) : `≤ ${formatNumber(necessity, digits)}`);
+
 /// The largest size of all numbers.
 export function findLargest(values: (number | null)[][]): number {
   let largest = 0;

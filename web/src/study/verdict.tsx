@@ -1,5 +1,5 @@
 import { Sign, StatusSign, StatusWord } from "../signs";
-import { formatDate, formatNumber, prettify } from "../units";
+import { atLeast, atMost, formatDate, prettify } from "../units";
 import type { Study } from "./data";
 import { lookOf, nameOf, type State } from "./state";
 
@@ -80,8 +80,8 @@ export function Outcomes(props: { state: State }) {
                   <b style={{ width: wide(o.necessity) }} />
                 </span>
               </td>
-              <td>{o.possibility >= 1 ? "1" : `≥ ${formatNumber(o.possibility, 3)}`}</td>
-              <td>{o.necessity <= 0 ? "0" : `≤ ${formatNumber(o.necessity, 3)}`}</td>
+              <td>{atLeast(o.possibility, 3)}</td>
+              <td>{atMost(o.necessity, 3)}</td>
               <td>{o.runs}</td>
             </tr>
           ))}
