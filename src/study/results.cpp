@@ -85,6 +85,7 @@ json insights_json(const Problem& p, const StudyResult& r) {
   json& drivers = out["drivers"];
   drivers["from"] = in.source == Insights::Source::Design   ? "rows of Sobol's design"
                     : in.source == Insights::Source::Spread ? "spread runs"
+                    : !p.has_drivers                        ? "not asked for"
                                                             : "nothing";
   drivers["runs"] = in.source == Insights::Source::Design ? in.drivers.rows * (static_cast<int>(p.inputs.size()) + 2)
                                                           : in.drivers.rows;
