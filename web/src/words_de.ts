@@ -937,7 +937,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["File", "Datei"],
   ["{:d}, {:d} failed", "{}, davon {} gescheitert"],
   ["Runs that are possible to {:g}", "Rechnungen, die zu {} möglich sind"],
-  ["{:d}, {:d} of them spread", "{}, davon {} gestreut"],
+  ["{:d}; the search of bounds spread {:d} of them", "{}; davon hat die Suche nach den Grenzen {} gestreut"],
   ["Permissible values", "Zulässige Werte"],
   ["No box of inputs was found that keeps it.", "Kein Quader von Eingangswerten wurde gefunden, der es einhält."],
   ["Confirmation by whole runs", "Bestätigung durch ganze Rechnungen"],

@@ -243,7 +243,7 @@ export function Origin(props: { study: Study }) {
     ["File", origin.source_name || "–"],
     ["Seed", String(study.seed)],
     ["Runs", `${study.runs}, ${study.failed} failed`],
-    ...study.coverage.map((c): [string, string] => [`Runs that are possible to ${c.alpha}`, `${c.samples}, ${c.spread} of them spread`]),
+    ...study.coverage.map((c): [string, string] => [`Runs that are possible to ${c.alpha}`, `${c.samples}; the search of bounds spread ${c.spread} of them`]),
   ];
   return (
     <section class="panel details" aria-label="Where this comes from">
