@@ -241,13 +241,13 @@ std::string tell_guarantee(const uncertainty::PermissibleBox& b, bool has_intera
       text += fmt::format(": with a confidence of 95 % at most {:.1f} % of the box violates it", 100 * b.violating);
     text += ". It is not proven, and smaller islands may exist.";
   } else if (b.samples == 0 || b.volume < uncertainty::DesignOptions{}.smallest) {
-    text = "Not kept: what violates the requirement leaves next to no room around these runs.";
+    text = "This box was dropped: what violates the requirement leaves next to no room around these runs.";
   } else if (b.broken < 0) {  // of an older version
-    text = "Not kept: it is too small, or its check was not finished.";
+    text = "This box was dropped: it is too small, or its check was not finished.";
   } else {
-    text = b.broken > 0
-               ? fmt::format("Not kept: {} of the {} runs inside violate the requirement.", b.broken, b.samples)
-               : std::string("Not kept: its check at fresh random points was not finished.");
+    text = b.broken > 0 ? fmt::format("This box was dropped: {} of the {} runs inside violate the requirement.",
+                                      b.broken, b.samples)
+                        : std::string("This box was dropped: its check at fresh random points was not finished.");
     text += " More runs may find a box.";
   }
   if (has_interaction) text += " The constraints take away a part of it, which its share of the support does not show.";

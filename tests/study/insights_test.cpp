@@ -545,7 +545,7 @@ TEST(Story, GuaranteesNothingOfABoxThatIsBroken) {
   uncertainty::PermissibleBox b;
   b.volume = 0.3, b.samples = 3135, b.broken = 3, b.fresh = 149, b.tries = 4, b.violating = 0.03;
   EXPECT_EQ(tell_guarantee(b),
-            "Not kept: 3 of the 3135 runs inside violate the requirement. More runs may find a box.");
+            "This box was dropped: 3 of the 3135 runs inside violate the requirement. More runs may find a box.");
   b.broken = 0;
   EXPECT_NE(tell_guarantee(b).find("not finished"), std::string::npos);
   b.volume = 0;
