@@ -6,8 +6,11 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
 
 #include "study/process.h"
 
@@ -36,6 +39,49 @@ bool breaks_off(const std::string& line) {
 /// Where a member stands in the line, for the caret.
 std::size_t find_member(const std::string& line, const std::string& name) {
   const std::size_t found = line.find(json(name).dump(-1, ' ', false, json::error_handler_t::replace));
+  return found == std::string::npos ? 0 : found;
+}
+
+/// Takes note of the first key that an object has twice.
+class KeyWatch {
+ public:
+  bool note(json::parse_event_t event, const json& parsed) {
+    switch (event) {
+      case json::parse_event_t::object_start:
+        open_.emplace_back();
+        break;
+      case json::parse_event_t::object_end:
+        open_.pop_back();
+        break;
+      case json::parse_event_t::key: {
+        const auto& name = parsed.get_ref<const std::string&>();
+        ++seen_[name];
+        if (!open_.back().insert(name).second && !twice) twice = name, count = seen_[name];
+        break;
+      }
+      default:
+        break;
+    }
+    return true;
+  }
+  std::optional<std::string> twice;
+  int count = 0;  // so many keys of this name stand in the line up to there
+
+ private:
+  std::vector<std::set<std::string>> open_;
+  std::map<std::string, int> seen_;
+};
+
+/// Where the key of this name begins that is the `count`-th of all objects.
+std::size_t find_key(const std::string& line, const std::string& name, int count) {
+  const std::string token = json(name).dump(-1, ' ', false, json::error_handler_t::replace);
+  std::size_t found = line.find(token);
+  for (std::size_t at = found; at != std::string::npos; at = line.find(token, at + 1)) {
+    const std::size_t next = line.find_first_not_of(" \t", at + token.size());
+    if (next == std::string::npos || line[next] != ':') continue;
+    found = at;
+    if (--count == 0) break;
+  }
   return found == std::string::npos ? 0 : found;
 }
 
@@ -77,8 +123,9 @@ struct Reader {
 
   Answer read(int& id) const {
     json j;
+    KeyWatch keys;
     try {
-      j = json::parse(line);
+      j = json::parse(line, [&keys](int, json::parse_event_t event, json& parsed) { return keys.note(event, parsed); });
     } catch (const json::parse_error& e) {
       const std::size_t at = e.byte > 0 ? e.byte - 1 : 0;
       if (const std::string word = find_no_number(at); !word.empty())
@@ -94,6 +141,9 @@ struct Reader {
       return refuse(at == std::string::npos ? 0 : at, "a number is too large for 64 bits",
                     "give null where there is no value: the run counts as failed");
     }
+    if (keys.twice)
+      return refuse(find_key(line, *keys.twice, keys.count), fmt::format("the key \"{}\" is given twice", *keys.twice),
+                    "each key stands once in an object");
     const char* form = "an answer looks like {\"outputs\": {\"z\": 1.5}, \"outcome\": \"stands\"}";
     if (!j.is_object()) return refuse(0, "a JSON object is wanted", form);
     if (j.contains("id")) {

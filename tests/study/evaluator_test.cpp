@@ -141,6 +141,23 @@ TEST(Evaluator, GivesUpAfterItsTime) {
   EXPECT_EQ(m.ask({{1, 1}, {2, 2}})[1].kind, Kind::Crashed) << "either may be to blame";
 }
 
+TEST(Evaluator, RefusesAKeyThatIsGivenTwice) {
+  const auto column_of = [](const std::string& line) {
+    int id = 0;
+    const Answer a = read_answer_line(line, "model", id);
+    EXPECT_EQ(a.kind, Kind::Refused) << line;
+    const Refusal r = read_refusal(a.text);
+    EXPECT_EQ(r.diagnostic.code, "E824");
+    EXPECT_NE(r.diagnostic.message.find("is given twice"), std::string::npos) << r.diagnostic.message;
+    return r.diagnostic.where.column;
+  };
+  EXPECT_EQ(column_of(R"({"id":0,"outputs":{"z":1,"z":5,"w":1}})"), 26);
+  EXPECT_EQ(column_of(R"({"id":0,"outputs":{"id":1,"z":5}, "id" : 1})"), 35);
+  EXPECT_EQ(column_of(R"({"outcome":"z","z":1,"z":2})"), 22);
+  int id = 0;
+  EXPECT_EQ(read_answer_line(R"({"id":0,"outputs":{"id":1,"z":5}})", "model", id).kind, Kind::Done);
+}
+
 TEST(Evaluator, StopsWhenCancelled) {
   Model m("read line; sleep 100");
   std::thread later([&] {
