@@ -11,7 +11,9 @@
 #include <cerrno>
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 
@@ -23,6 +25,21 @@ constexpr std::size_t most_said = 2000;  // of standard error that is kept
 void close_end(int& fd) {
   if (fd >= 0) close(fd);
   fd = -1;
+}
+
+/// Whether the command is one program with its arguments. A shell that waits for it would hold its output open.
+bool is_program(const std::string& command) {
+  if (command.find_first_of(";|&()`\n") != std::string::npos) return false;
+  const std::size_t begin = command.find_first_not_of(' ');
+  if (begin == std::string::npos) return false;
+  const std::string name = command.substr(begin, command.find(' ', begin) - begin);
+  if (name.find_first_of("='\"$~\\{}!<>*?[]#") != std::string::npos) return false;
+  if (name.find('/') != std::string::npos) return true;
+  const char* path = std::getenv("PATH");
+  std::istringstream folders(path ? path : "");
+  for (std::string folder; std::getline(folders, folder, ':');)
+    if (access((folder + "/" + name).c_str(), X_OK) == 0) return true;
+  return false;
 }
 
 }  // namespace
@@ -43,7 +60,8 @@ void Process::start(const std::string& command) {
   sigemptyset(&broken);
   sigaddset(&broken, SIGPIPE);
   pthread_sigmask(SIG_BLOCK, &broken, nullptr);
-  const char* words[] = {"/bin/sh", "-c", command.c_str(), nullptr};
+  const std::string line = is_program(command) ? "exec " + command : command;
+  const char* words[] = {"/bin/sh", "-c", line.c_str(), nullptr};
   const pid_t parent = getpid(), pid = fork();
   if (pid == 0) {
     setpgid(0, 0);

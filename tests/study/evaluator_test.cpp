@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "server.h"
@@ -279,6 +280,13 @@ TEST(Evaluator, TellsWhenItClosedItsOutputAndWentOn) {
   const Answer a = m.ask({{1, 1}})[0];
   EXPECT_EQ(a.kind, Kind::Crashed);
   EXPECT_NE(a.text.find("closed its output and went on"), std::string::npos) << a.text;
+  // nor does the shell that started it hold it open
+  const Folder folder;
+  std::ofstream(folder / "model.sh") << "read -r line\nexec >&-\nexec sleep 100\n";
+  Model script("sh " + (folder / "model.sh"));
+  const Answer b = script.ask({{1, 1}})[0];
+  EXPECT_EQ(b.kind, Kind::Crashed);
+  EXPECT_NE(b.text.find("closed its output and went on"), std::string::npos) << b.text;
 }
 
 TEST(Evaluator, WritesToAProgramThatDoesNotRead) {
