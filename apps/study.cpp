@@ -92,7 +92,9 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
     line.clear();
     const std::string& code = e.first_error().code;
     const std::string model = study::calc_model_hash(problem);
-    if (code == "E823" || code == "E824" || code == "E827") {
+    // nothing has ever answered: those runs say nothing of the model
+    if (code == study::no_answer_code) study::Store(place.store).rerun_failed(model);
+    if (code == "E823" || code == "E824" || code == "E827" || code == study::no_answer_code) {
       const auto refusal = study::Store(place.store).find_refusal(model);
       complain(e, refusal ? study::read_refusal(*refusal).line : "");
       std::fprintf(stderr,

@@ -245,16 +245,21 @@ class Evaluator {
     };
     while (open > 0) {
       std::string line;
-      const Process::Event event = process_.next_line(line, timeout_, cancel);
+      const double patience = find_patience(is_fresh && open == points.size());
+      const Process::Event event = process_.next_line(line, patience, cancel);
       if (event == Process::Event::Cancelled) {
         process_.end();
         return;
       }
       if (event == Process::Event::TimeOut) {
         process_.end();
-        // among several nobody knows which one hangs; they will be asked one by one
-        give_open(points.size() == 1 ? Answer::Kind::Failed : Answer::Kind::Crashed,
-                  fmt::format("no answer within {} s", timeout_));
+        const std::string what = fmt::format("no answer within {} s", patience);
+        if (!has_answered_ && ++waits_in_vain_ >= most_waits)
+          give_open(Answer::Kind::Refused,
+                    write_refusal(make_silent(fmt::format("was started {} times and gave {}", waits_in_vain_, what),
+                                              "--timeout gives it more time")));
+        else  // among several nobody knows which one hangs; they will be asked one by one
+          give_open(points.size() == 1 ? Answer::Kind::Failed : Answer::Kind::Crashed, what);
         return;
       }
       if (event == Process::Event::Closed) {
@@ -268,6 +273,14 @@ class Evaluator {
         // a shell's way to say so; a program that has answered is there
         if (!has_answered_ && (ending.starts_with("exit code 127") || ending.starts_with("exit code 126"))) {
           give_open(Answer::Kind::Refused, write_refusal(make_missing(ending)));
+          return;
+        }
+        if (!has_answered_ && ++starts_in_vain_ >= most_starts) {
+          give_open(
+              Answer::Kind::Refused,
+              write_refusal(make_silent(fmt::format("was started {} times and ended without an answer each time{}",
+                                                    starts_in_vain_, ending.empty() ? "" : ": " + ending),
+                                        "give it a point by hand to see what it says")));
           return;
         }
         give_open(Answer::Kind::Crashed,
@@ -298,6 +311,7 @@ class Evaluator {
       const auto now = Clock::now();
       a.seconds = std::chrono::duration<double>(now - last).count();
       a.line = std::move(line), a.source = command_;
+      if (is_fresh && open == points.size()) start_time_ = std::max(start_time_, a.seconds);
       last = now;
       const bool is_refused = a.kind == Answer::Kind::Refused;
       has_answered_ = has_answered_ || !is_refused;
@@ -332,6 +346,20 @@ class Evaluator {
     return r;
   }
 
+  Refusal make_silent(const std::string& what, std::string help) const {
+    Refusal r;
+    r.diagnostic = {Severity::Error, no_answer_code, {}, 1, fmt::format("the command \"{}\" {}", command_, what),
+                    std::move(help)};
+    return r;
+  }
+
+  /// How long to wait for the next answer [s]: the first one behind a start has what the program needed to start before
+  /// on top, and the very first one ten times as long as others. Not where every answer needs a start.
+  double find_patience(bool is_first) const {
+    if (!is_first || is_one_shot_ || timeout_ <= 0) return timeout_;
+    return has_answered_ ? timeout_ + start_time_ : 10 * timeout_;
+  }
+
   /// A line that it has written although nothing was open.
   bool find_surplus(std::string& line) {
     process_.look();
@@ -347,6 +375,9 @@ class Evaluator {
   double timeout_ = 0;
   bool is_one_shot_ = false;
   bool has_answered_ = false;
+  double start_time_ = 0;  // longest time from a start to its first answer [s]
+  static constexpr int most_starts = 10, most_waits = 3;
+  int starts_in_vain_ = 0, waits_in_vain_ = 0;  // before the first answer of all
   Process process_;
 };
 

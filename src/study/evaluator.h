@@ -16,6 +16,10 @@ std::string write_request(int id, const std::vector<std::string>& names, const P
 /// Refused, with a text for `read_refusal`.
 Answer read_answer_line(const std::string& line, const std::string& command, int& id);
 
+/// Of a program that has never answered, though it was started many times. Where its model has answers from elsewhere,
+/// it counts as crashed.
+constexpr const char* no_answer_code = "E828";
+
 /// The complaint of a refused answer, and the line that it points into.
 struct Refusal {
   Diagnostic diagnostic;

@@ -113,6 +113,13 @@ void Pool::work(const std::string& name) {
 }
 
 Answer Pool::compare(Store& store, const std::string& model, const Answer& a) {
+  if (a.kind == Answer::Kind::Refused) {
+    const Diagnostic d = read_refusal(a.text).diagnostic;
+    if (d.code != no_answer_code || !store.find_form(model)) return a;
+    Answer crashed = a;
+    crashed.kind = Answer::Kind::Crashed, crashed.text = d.message;
+    return crashed;
+  }
   if (a.kind != Answer::Kind::Done) return a;
   const std::lock_guard lock(forms_mutex_);
   auto known = forms_.find(model);

@@ -138,7 +138,11 @@ TEXT
     has err "could not be written"; has err "What was run before is kept"; has left.txt study.sqlite
   fi
   # all runs fail: told, not hidden
-  expect 0 "$topple" study in.toml --evaluator "exit 3" -o f --samples 10; has out "exit code 3"; has out "failed"
+  expect 0 "$topple" study in.toml --evaluator "while read l; do echo '{\"failed\": \"no balance\"}'; done" -o f --samples 10
+  has out "no balance"; has out "All 10 runs failed"
+  # a model that never answers: told at once, and nothing stays that a mended one would have to clear away
+  expect 2 "$topple" study in.toml --evaluator "echo why >&2; exit 3" -o g --samples 1000; has err "E828"; has err "exit code 3: why"
+  [ ! -e g/study.sqlite ] || { echo "a store of a model that never answered"; failures=$((failures + 1)); }
   ;;
 readme)
   # every command in the shell blocks of these pages exists

@@ -135,11 +135,42 @@ TEST(Evaluator, RefusesACommandThatCannotBeStarted) {
 }
 
 TEST(Evaluator, GivesUpAfterItsTime) {
-  Model m("read line; sleep 100 & wait", 0.2);
-  const Answer a = m.ask({{1, 1}})[0];
+  Model m(shell(R"([ $x = 9.0 ] && sleep 100; echo '{"z":1}')"), 0.2);
+  EXPECT_EQ(m.ask({{1, 1}})[0].kind, Kind::Done);
+  const Answer a = m.ask({{9, 1}})[0];
   EXPECT_EQ(a.kind, Kind::Failed);
   EXPECT_EQ(a.text, "no answer within 0.2 s");
-  EXPECT_EQ(m.ask({{1, 1}, {2, 2}})[1].kind, Kind::Crashed) << "either may be to blame";
+  EXPECT_EQ(m.ask({{1, 1}})[0].kind, Kind::Done);
+  EXPECT_EQ(m.ask({{9, 1}, {9, 2}})[1].kind, Kind::Crashed) << "either may be to blame";
+}
+
+TEST(Evaluator, GivesAProgramTimeToStart) {
+  Model slow("sleep 0.5; while read -r line; do echo '{\"z\": 1}'; done", 0.2);
+  EXPECT_EQ(slow.ask({{1, 1}})[0].kind, Kind::Done);
+  Model again("sleep 0.5; read -r line; echo '{\"z\": 1}'", 0.2);  // a start for each point
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(again.ask({{1, 1}})[0].kind, Kind::Done) << i;
+  Model ever("read -r line; case $line in *9*) sleep 0.6;; esac; echo '{\"z\": 1}'", 0);
+  EXPECT_EQ(ever.ask({{1, 1}})[0].kind, Kind::Done);
+  EXPECT_EQ(ever.ask({{9, 1}})[0].kind, Kind::Done) << "no time-out at all";
+}
+
+TEST(Evaluator, RefusesAProgramThatNeverAnswers) {
+  Model dead("echo 'no licence' >&2; exit 1");
+  for (int i = 1; i < 10; ++i) EXPECT_EQ(dead.ask({{1, 1}})[0].kind, Kind::Crashed) << i;
+  const Answer a = dead.ask({{1, 1}})[0];
+  ASSERT_EQ(a.kind, Kind::Refused);
+  EXPECT_EQ(read_refusal(a.text).diagnostic.code, "E828");
+  EXPECT_NE(read_refusal(a.text).diagnostic.message.find("10 times"), std::string::npos);
+  EXPECT_NE(read_refusal(a.text).diagnostic.message.find("no licence"), std::string::npos);
+  Model silent("read line; sleep 100", 0.02);
+  for (int i = 1; i < 3; ++i) EXPECT_EQ(silent.ask({{1, 1}})[0].kind, Kind::Failed) << i;
+  const Answer b = silent.ask({{1, 1}})[0];
+  ASSERT_EQ(b.kind, Kind::Refused);
+  EXPECT_NE(read_refusal(b.text).diagnostic.message.find("no answer within 0.2 s"), std::string::npos) << b.text;
+  // what has answered once is there
+  Model once(shell(R"([ $x = 9.0 ] && exit 1; echo '{"z":1}')"));
+  EXPECT_EQ(once.ask({{1, 1}})[0].kind, Kind::Done);
+  for (int i = 0; i < 12; ++i) EXPECT_EQ(once.ask({{9, 1}})[0].kind, Kind::Crashed) << i;
 }
 
 TEST(Evaluator, RefusesAKeyThatIsGivenTwice) {
