@@ -254,6 +254,8 @@ std::optional<record::RccFuzzyReport> make_fuzzy_report(const product::SectionFi
     fan.ending = searched_for.ending == uncertainty::Ending::LimitReached ||
                          possibilities.ending == uncertainty::Ending::LimitReached
                      ? "The search ended at its limit of runs; bounds may lie inside of the true ones."
+                 : searched_for.ending == uncertainty::Ending::NotConverged
+                     ? "Some searches have not converged; bounds may lie inside of the true ones."
                      : "The search found nothing better.";
     fan.crushing_possibility = calc_possibility_below(r.crushing, -N);
     fan.outcomes[Crushed].possibility = std::max(fan.outcomes[Crushed].possibility, fan.crushing_possibility);

@@ -636,8 +636,8 @@ StudyResult read_study(const Problem& problem, Store& store, const StudyRow& row
     r.outcomes = names.outcomes;
   }
   if (r.is_finished) r.ending = uncertainty::Ending::Complete;
-  if (summary.value("ending", "") == uncertainty::to_text(uncertainty::Ending::LimitReached))
-    r.ending = uncertainty::Ending::LimitReached;
+  for (const auto ending : {uncertainty::Ending::LimitReached, uncertainty::Ending::NotConverged})
+    if (summary.value("ending", "") == uncertainty::to_text(ending)) r.ending = ending;
   r.alpha.ending = r.ending;
   return r;
 }

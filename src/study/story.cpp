@@ -441,6 +441,11 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
         "possibilities "
         "higher than shown.",
         Status::Warning);
+  else if (r.ending == uncertainty::Ending::NotConverged)
+    add("not_converged",
+        "Some searches have not converged, though runs were left: bounds may be wider and possibilities higher than "
+        "shown.",
+        Status::Warning);
   return out;
 }
 

@@ -111,7 +111,10 @@ class Optimisation {
     show(true);
     AlphaResult result = collect();
     result.can_go_on = is_cut;
-    result.ending = asker_.is_cancelled() ? Ending::Cancelled : unfinished_ ? Ending::LimitReached : Ending::Complete;
+    result.ending = asker_.is_cancelled()      ? Ending::Cancelled
+                    : !unfinished_             ? Ending::Complete
+                    : is_cut || !asker_.rest() ? Ending::LimitReached
+                                               : Ending::NotConverged;
     return result;
   }
 
@@ -827,6 +830,8 @@ std::string to_text(Ending e) {
       return "limit of evaluations reached";
     case Ending::Cancelled:
       return "cancelled";
+    case Ending::NotConverged:
+      return "some searches have not converged";
   }
   return {};
 }

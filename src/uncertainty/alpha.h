@@ -62,7 +62,8 @@ struct Coverage {
 /// Probability that the spread points of a level all miss an island of the volume fraction v: (1-v)^N.
 double calc_miss_probability(const Coverage&, double v);
 
-enum class Ending { Complete, LimitReached, Cancelled };
+/// NotConverged: nothing more is found to be tried, and yet not all searches have converged.
+enum class Ending { Complete, LimitReached, Cancelled, NotConverged };
 std::string to_text(Ending);
 
 struct AlphaResult {
