@@ -446,7 +446,7 @@ class Optimisation {
         // goes on from there, unless it moves no more
         const bool moves = r.search->value() < r.start - 1e-5 * width_of(r.goal.output);
         const bool is_over = !moves && ++in_vain_[key_of(r.goal)] > most_in_vain;
-        double& end = (is_over ? ends_ : edges_).try_emplace(key_of(r.goal), infinite).first->second;
+        double& end = (is_over ? given_up_ : edges_).try_emplace(key_of(r.goal), infinite).first->second;
         end = std::min(end, r.search->value());
       }
       if (!r.search->is_converged()) continue;
@@ -471,11 +471,13 @@ class Optimisation {
   using Key = std::vector<int>;
   static Key key_of(const Goal& g) { return {g.output, g.level, g.sign > 0, g.outcome}; }
 
-  /// Whether a search for this goal has converged at a value that is as good as the best one.
-  bool is_converged(const Goal& goal, const Candidate& best) const {
-    const auto end = ends_.find(key_of(goal));
-    return end != ends_.end() && end->second <= best.value + 2 * options_.tolerance * width_of(goal.output);
+  /// Whether a value is noted for this goal that is as good as the best one.
+  bool is_noted(const std::map<Key, double>& values, const Goal& goal, const Candidate& best) const {
+    const auto end = values.find(key_of(goal));
+    return end != values.end() && end->second <= best.value + 2 * options_.tolerance * width_of(goal.output);
   }
+  /// Whether a search has converged there.
+  bool is_converged(const Goal& goal, const Candidate& best) const { return is_noted(ends_, goal, best); }
   /// What a bound is marked with.
   bool is_settled(const Goal& goal, const Candidate& best) const {
     if (!is_converged(goal, best)) return false;
@@ -744,6 +746,7 @@ class Optimisation {
       for (const Goal& goal : make_goals(of_classes)) {
         const Candidate best = find_best(goal);
         if (regions_[goal.level].axes.empty() || best.sample < 0 || is_converged(goal, best)) continue;
+        if (is_noted(given_up_, goal, best)) continue;
         if (!tried.insert({key_of(goal), best.sample}).second) continue;
         const auto edge = edges_.find(key_of(goal));
         const bool is_at_edge =
@@ -789,6 +792,7 @@ class Optimisation {
   std::vector<int> space_points_;           // per level
   std::map<Key, double> ends_;              // best value at which a search converged
   std::set<int> kinked_;                    // outputs
+  std::map<Key, double> given_up_;          // at which searches along kinks neither ended nor gained any more
   std::map<Key, int> in_vain_;              // searches along kinks that did not end, nor gain
   std::map<Key, double> edges_;             // at which one stopped before a kink
   std::map<Key, std::vector<int>> starts_;  // samples from which searches began and, with few inputs, ended
