@@ -42,10 +42,17 @@ void print_outcomes(std::FILE* out, const StudyResult& r) {
   std::fprintf(out,
                "\nOutcomes                    possibility   necessity\n                               at least     at "
                "most    runs\n");
+  bool has_open = false;
   for (const auto& c : r.alpha.classes) {
-    std::fprintf(out, "  %-26s %11.5f %10.5f %7d\n", study::words_of_outcome(r, c.outcome).c_str(),
-                 study::possibility_of(r, c), uncertainty::calc_necessity(r.possibilities, c.outcome), c.count);
+    const bool is_open = !study::is_possibility_converged(r, c);
+    const bool may_be_less = !uncertainty::is_necessity_converged(r.possibilities, c.outcome);
+    std::fprintf(out, "  %-26s %11.5f%s %9.5f%s %6d\n", study::words_of_outcome(r, c.outcome).c_str(),
+                 study::possibility_of(r, c), is_open ? "*" : " ",
+                 uncertainty::calc_necessity(r.possibilities, c.outcome), may_be_less ? "*" : " ", c.count);
+    has_open = has_open || is_open || may_be_less;
   }
+  if (has_open && r.is_finished)
+    print_line(out, "* no search has ended there: a possibility may be higher, a necessity lower");
 }
 
 /// Some levels of each output; files hold all of them.
@@ -127,7 +134,7 @@ void print_drivers(std::FILE* out, const Problem& p, const StudyResult& r) {
     std::string text = study::make_short_names(p.inputs)[static_cast<std::size_t>(f.input)] + ":";
     for (const auto& c : r.alpha.classes) {
       double degree = 0;
-      bool is_converged = true;
+      bool is_converged = false;
       for (const auto& k : f.classes)
         if (k.outcome == c.outcome) degree = k.possibility, is_converged = k.converged;
       text += fmt::format(" {} {:.2f}{},", study::words_of_outcome(r, c.outcome), degree, is_converged ? "" : "*");

@@ -73,8 +73,9 @@ Budget calc_budget(const Problem& p, int limit) {
     b.knowing = each >= least_knowing ? each : 0;
   }
   b.outcomes = rest;
-  b.possibilities = rest - b.knowing * axes;
-  b.bounds = b.possibilities - rest / 10;
+  // possibilities take what they need of that, but for a half
+  b.possibilities = rest - b.knowing * axes / 2;
+  b.bounds = rest - b.knowing * axes - rest / 10;
   return b;
 }
 

@@ -145,29 +145,31 @@ std::vector<std::string> list_failures(const uncertainty::Archive& archive) {
 }
 
 /// What the samples alone tell.
-std::vector<uncertainty::Possibility> list_possibilities(const uncertainty::AlphaResult& r) {
+std::vector<uncertainty::Possibility> list_possibilities(const uncertainty::Space& space,
+                                                         const uncertainty::AlphaResult& r,
+                                                         const uncertainty::Archive& archive) {
   std::vector<uncertainty::Possibility> list;
-  for (const auto& c : r.classes) {
-    uncertainty::Possibility p;
-    p.outcome = c.outcome, p.possibility = c.possibility, p.sample = c.sample;
-    list.push_back(p);
-  }
+  for (const auto& c : r.classes) list.push_back(uncertainty::read_possibility(space, archive, c.outcome));
   return list;
 }
 
-/// Runs behind the search of possibilities may have found more.
-void raise_possibilities(StudyResult& r) {
-  for (const uncertainty::Possibility& seen : list_possibilities(r.alpha)) {
-    auto& known = r.possibilities.classes;
-    const auto found =
-        std::find_if(known.begin(), known.end(), [&](const auto& c) { return c.outcome == seen.outcome; });
-    if (found == known.end())
-      known.push_back(seen);
-    else if (seen.possibility > found->possibility)
-      *found = seen;
-  }
-  std::stable_sort(r.possibilities.classes.begin(), r.possibilities.classes.end(),
-                   [](const auto& a, const auto& b) { return a.outcome < b.outcome; });
+/// Runs behind the search of possibilities may have found more: then it has not come to its end.
+void raise_possibilities(const uncertainty::Space& space, const uncertainty::Archive& archive, StudyResult& r) {
+  constexpr double tolerance = uncertainty::PossibilityOptions{}.tolerance;
+  std::vector<uncertainty::Possibility> all = list_possibilities(space, r.alpha, archive);
+  for (uncertainty::Possibility& seen : all)
+    for (const uncertainty::Possibility& known : r.possibilities.classes)
+      if (known.outcome == seen.outcome && seen.possibility <= known.possibility + tolerance)
+        seen.resolution = known.resolution, seen.converged = known.converged || seen.converged;
+  r.possibilities.classes = std::move(all);
+}
+
+/// Whether a search for an outcome that was found with an input known has not come to its end.
+bool has_open_knowing(const Insights& in) {
+  return std::any_of(in.knowing.begin(), in.knowing.end(), [](const auto& f) {
+    return std::any_of(f.classes.begin(), f.classes.end(),
+                       [](const auto& c) { return c.possibility > 0 && !c.converged; });
+  });
 }
 
 /// All bounds in a fixed order: of all runs, then of each class.
@@ -273,43 +275,39 @@ class Manager {
     ask_for_drivers(problem_, budget, asker);
     uncertainty::AlphaSearch search(problem_.space, asker, options);
     r.alpha = search.run();
-    bool has_more = false;
-    uncertainty::PossibilityOptions p;
-    p.seed = problem_.seed;
-    if (!asker.is_cancelled() && r.alpha.classes.size() > 1) {
+    const int asked_by_bounds = asker.asked();
+    const auto has_classes = [&r] { return r.alpha.classes.size() > 1; };
+    if (!asker.is_cancelled() && has_classes()) {
       asker.set_limit(budget.possibilities);
-      r.possibilities = uncertainty::find_possibilities(problem_.space, asker, p);
+      find_possibilities(r, asker);
       if (!asker.is_cancelled() && budget.knowing > 0) {
         asker.set_limit(budget.outcomes);
-        find_knowing(r, asker, p);
+        find_knowing(r, asker);
       }
-      has_more = true;
     }
     if (!asker.is_cancelled() && !problem_.permissible.empty()) {
       asker.set_limit(budget.limit);
       find_boxes(r.insights, problem_, budget, asker, options.levels, names_.outputs, names_.outcomes);
-      has_more = true;
     }
-    has_more = give_back(r, asker, search, p, budget.limit) || has_more;
+    asker.set_limit(budget.limit);
+    give_back(r, asker, search);
     review_boxes(r.insights, problem_, asker.archive(), options.levels, names_.outputs, names_.outcomes);
-    r.ending = r.alpha.ending;
-    if (r.ending == uncertainty::Ending::Complete && !r.possibilities.classes.empty())
-      r.ending = r.possibilities.ending;
-    if (has_more) {
+    if (asker.asked() > asked_by_bounds || has_classes()) {
       // further runs may have moved bounds
       std::vector<int> space_points;
       for (const auto& c : r.alpha.coverage) space_points.push_back(c.space_points);
-      const std::vector<double> levels = options.levels;
-      uncertainty::AlphaResult again = uncertainty::read_archive(problem_.space, asker.archive(), levels, space_points);
+      uncertainty::AlphaResult again =
+          uncertainty::read_archive(problem_.space, asker.archive(), options.levels, space_points);
+      again.ending = r.alpha.ending;
       keep_marks(r.alpha, again);
       r.alpha = std::move(again);
-      raise_possibilities(r);
     }
+    raise_possibilities(problem_.space, asker.archive(), r);
+    r.ending = find_ending(r, asker);
     read_drivers(r.insights, problem_, budget, asker.archive());
     r.spread = find_spread_samples(problem_, budget, asker.archive());
     r.alpha.archive = asker.archive();
     r.alpha.ending = r.ending;
-    if (r.possibilities.classes.empty()) r.possibilities.classes = list_possibilities(r.alpha);
     r.outputs = names_.outputs;
     r.outcomes = names_.outcomes;
     r.failures = list_failures(r.alpha.archive);
@@ -339,46 +337,60 @@ class Manager {
   }
 
  private:
-  /// Outcomes with an input known: the runs that are there are shared evenly.
-  void find_knowing(StudyResult& r, uncertainty::Asker& asker, const uncertainty::PossibilityOptions& options) {
-    const auto axes = std::count_if(problem_.space.inputs.begin(), problem_.space.inputs.end(),
-                                    [](const auto& f) { return f.width() > 0; });
-    const int each = asker.rest() / std::max(1, static_cast<int>(axes));
-    r.insights.knowing = uncertainty::find_outcomes_of_knowing(problem_.space, asker, options, each);
+  /// From where the last search ended; what has converged and still holds takes no runs.
+  void find_possibilities(StudyResult& r, uncertainty::Asker& asker) const {
+    uncertainty::PossibilityOptions o;
+    o.seed = problem_.seed;
+    o.known = r.possibilities.classes;
+    r.possibilities = uncertainty::find_possibilities(problem_.space, asker, o);
   }
 
-  /// What was kept for others and not used up goes to searches that had to end: half of it to possibilities, which take
-  /// what they need, then to outcomes with an input known, the rest to bounds. True if there was any.
-  bool give_back(StudyResult& r, uncertainty::Asker& asker, uncertainty::AlphaSearch& search,
-                 const uncertainty::PossibilityOptions& options, int limit) {
-    using uncertainty::Ending;
-    bool has_more = false;
-    const auto find_more_possibilities = [&](int runs) {
-      const bool is_open =
-          r.possibilities.ending == Ending::LimitReached || r.possibilities.classes.size() < r.alpha.classes.size();
-      if (r.alpha.classes.size() < 2 || !is_open || !asker.can_go_on()) return;
-      asker.set_limit(asker.asked() + runs);
-      r.possibilities = uncertainty::find_possibilities(problem_.space, asker, options);
+  /// Outcomes with an input known: the runs that are there are shared evenly. Later passes look in other places.
+  void find_knowing(StudyResult& r, uncertainty::Asker& asker, int pass = 0) const {
+    const auto axes = std::count_if(problem_.space.inputs.begin(), problem_.space.inputs.end(),
+                                    [](const auto& f) { return f.width() > 0; });
+    uncertainty::PossibilityOptions o;
+    o.seed = problem_.seed + 1000 * static_cast<std::uint64_t>(pass);
+    if (pass > 0) o.spread = 100;
+    const int each = asker.rest() / std::max(1, static_cast<int>(axes));
+    r.insights.knowing = uncertainty::find_outcomes_of_knowing(problem_.space, asker, o, each, r.insights.knowing);
+  }
+
+  /// What was kept for others and not used up goes to searches that had to end: first to possibilities, which take what
+  /// they need, then to outcomes with an input known, the rest to bounds; and where those found a more possible run, to
+  /// possibilities again.
+  void give_back(StudyResult& r, uncertainty::Asker& asker, uncertainty::AlphaSearch& search) const {
+    constexpr int most_passes = 3;
+    const int limit = asker.limit();
+    const auto settle = [&] {
       asker.set_limit(limit);
-      has_more = true;
+      if (asker.can_go_on() && r.alpha.classes.size() > 1) find_possibilities(r, asker);
     };
-    asker.set_limit(limit);
-    find_more_possibilities((asker.rest() + 1) / 2);
-    const bool is_open = std::any_of(r.insights.knowing.begin(), r.insights.knowing.end(), [](const auto& f) {
-      return std::any_of(f.classes.begin(), f.classes.end(), [](const auto& c) { return !c.converged; });
-    });
-    if (is_open && asker.can_go_on()) {
-      if (r.alpha.can_go_on) asker.set_limit(limit - asker.rest() / 2);
-      find_knowing(r, asker, options);
-      asker.set_limit(limit);
-      has_more = true;
+    settle();
+    for (int pass = 1; pass <= most_passes && !r.insights.knowing.empty() && asker.can_go_on(); ++pass) {
+      if (pass > 1 && !has_open_knowing(r.insights)) break;
+      asker.set_limit(limit - (r.alpha.can_go_on ? asker.rest() / 2 : asker.rest() / 10));
+      find_knowing(r, asker, pass);
+      settle();
     }
-    if (r.alpha.can_go_on && asker.can_go_on()) {
+    for (const int part : {10, 0, 0, 0}) {
+      if (!r.alpha.can_go_on || !asker.can_go_on()) break;
+      if (part > 0 && r.alpha.classes.size() > 1) asker.set_limit(limit - asker.rest() / part);
       r.alpha = search.go_on();
-      has_more = true;
+      settle();
     }
-    find_more_possibilities(asker.rest());
-    return has_more;
+  }
+
+  static uncertainty::Ending find_ending(const StudyResult& r, const uncertainty::Asker& asker) {
+    using uncertainty::Ending;
+    if (asker.is_cancelled()) return Ending::Cancelled;
+    const bool is_open = r.alpha.ending != Ending::Complete || has_open_knowing(r.insights) ||
+                         std::any_of(r.possibilities.classes.begin(), r.possibilities.classes.end(),
+                                     [](const auto& c) { return !c.converged; });
+    if (!is_open) return Ending::Complete;
+    // a search of bounds keeps a few runs for its last steps
+    const bool is_cut = asker.rest() == 0 || r.alpha.ending == Ending::LimitReached;
+    return is_cut ? Ending::LimitReached : Ending::NotConverged;
   }
 
   [[noreturn]] void refuse(const StudyRow& there) {
@@ -607,7 +619,7 @@ StudyResult read_study(const Problem& problem, Store& store, const StudyRow& row
       ++k;
     });
   }
-  r.possibilities.classes = list_possibilities(r.alpha);
+  r.possibilities.classes = list_possibilities(problem.space, r.alpha, archive);
   for (uncertainty::Possibility& p : r.possibilities.classes)
     for (const json& m : marks.value("classes", json::array()))
       if (m.at("outcome") == p.outcome) {

@@ -103,7 +103,7 @@ json insights_json(const Problem& p, const StudyResult& r) {
     json classes = json::array();
     for (const auto& c : r.alpha.classes) {
       double degree = 0;
-      bool is_converged = true;
+      bool is_converged = false;
       for (const auto& k : f.classes)
         if (k.outcome == c.outcome) degree = k.possibility, is_converged = k.converged;
       classes.push_back(
@@ -254,6 +254,11 @@ double possibility_of(const StudyResult& r, const uncertainty::ClassBounds& c) {
   return c.possibility;
 }
 
+bool is_possibility_converged(const StudyResult& r, const uncertainty::ClassBounds& c) {
+  return std::any_of(r.possibilities.classes.begin(), r.possibilities.classes.end(),
+                     [&c](const auto& p) { return p.outcome == c.outcome && p.converged; });
+}
+
 double calc_robustness_of(const Problem& p, const StudyResult& r, std::size_t output) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   std::vector<double> entropies;
@@ -314,6 +319,7 @@ json make_results_json(const Problem& p, const StudyResult& r) {
            {"runs", c.count},
            {"possibility", possibility_of(r, c)},
            {"necessity", necessity_of(r, c.outcome)},
+           {"necessity_converged", uncertainty::is_necessity_converged(r.possibilities, c.outcome)},
            {"sample", c.sample}};
     for (const auto& found : r.possibilities.classes)
       if (found.outcome == c.outcome) {

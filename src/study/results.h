@@ -42,6 +42,8 @@ std::string write_debris_csv(const Problem&, const StudyResult&);
 
 /// The largest possibility that is known of a class.
 double possibility_of(const StudyResult&, const uncertainty::ClassBounds&);
+/// Whether a search for it came to its end there.
+bool is_possibility_converged(const StudyResult&, const uncertainty::ClassBounds&);
 /// Entropies of all inputs over that of an output, each part of the size of its core value (theory, equation (12)); NaN
 /// where one of them is 0 or the output has a level without value.
 double calc_robustness_of(const Problem&, const StudyResult&, std::size_t output);

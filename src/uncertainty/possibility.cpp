@@ -51,28 +51,51 @@ struct Bracket {
   bool found = true;  // whether `in` is known to be of the class
 };
 
+/// Runs that are more possible.
+int count_above(const Space& space, const Archive& archive, double possibility) {
+  return static_cast<int>(std::count_if(archive.samples().begin(), archive.samples().end(),
+                                        [&](const Sample& s) { return calc_membership(space, s.x) > possibility; }));
+}
+
 /// The search for one class; every step names points for the common batch and then reads the archive.
 class Climb {
  public:
   Climb(const Space& space, int outcome, const PossibilityOptions& options)
-      : space_(space), outcome_(outcome), options_(options), random_(options.seed + 31 * (outcome + 2)) {
+      : space_(space),
+        outcome_(outcome),
+        options_(options),
+        random_(options.seed + 31 * (outcome + 2)),
+        support_(make_box(space, 0)) {
     for (int i = 0; i < space.size(); ++i)
       if (space.inputs[i].width() > 0) axes_.push_back(i);
   }
 
   bool is_done() const { return stage_ == Stage::Done; }
   Possibility result(const Archive& archive) const {
-    Possibility p{outcome_, best_, resolution_, sample_, 0, converged_};
-    for (const auto& s : archive.samples()) p.above += calc_membership(space_, s.x) > best_;
-    return p;
+    return {outcome_,  best_, std::min(resolution_, 1 - best_), sample_, count_above(space_, archive, best_),
+            converged_};
+  }
+  /// Whether nothing better than what is known has turned up: then there is nothing left to do.
+  bool take_known(const Archive& archive, const Possibility& known) {
+    refresh(archive);
+    if (!known.converged || best_ > known.possibility + options_.tolerance) return false;
+    resolution_ = known.resolution, converged_ = true;
+    stage_ = Stage::Done;
+    return true;
   }
 
   /// Takes notice of new samples.
   void refresh(const Archive& archive) {
     for (; seen_ < static_cast<int>(archive.size()); ++seen_) {
       if (outcome_of(archive[seen_].result) != outcome_) continue;
-      const double mu = calc_membership(space_, archive[seen_].x);
-      if (mu > best_ || sample_ < 0) best_ = mu, sample_ = seen_, best_x_ = archive[seen_].x;
+      const Point& x = archive[seen_].x;
+      if (support_.contains(x)) {
+        const double mu = calc_membership(space_, x);
+        if (mu > best_ || sample_ < 0) best_ = mu, sample_ = seen_, best_x_ = x;
+      } else if (sample_ < 0) {
+        Point moved = clip(support_, x);
+        if (const double mu = calc_membership(space_, moved); mu > beside_) beside_ = mu, best_x_ = std::move(moved);
+      }
     }
   }
 
@@ -97,6 +120,9 @@ class Climb {
         case Stage::Look:
           points = ask_look();
           break;
+        case Stage::Move:
+          points = ask_moved(archive);
+          break;
         case Stage::Done:
           return {};
       }
@@ -107,6 +133,7 @@ class Climb {
   /// After the points were run.
   void tell(const Archive& archive) {
     const double before = best_;
+    const bool had_sample = sample_ >= 0;
     refresh(archive);
     switch (stage_) {
       case Stage::Bisect:
@@ -122,14 +149,19 @@ class Climb {
         stage_ = best_ > before + options_.tolerance ? Stage::Start : Stage::Look;
         break;
       case Stage::Look:
-        if (best_ > before) {
+        if (best_ > before || (sample_ >= 0 && !had_sample)) {
           stage_ = Stage::Start;
+          if (!had_sample) slide_ = 0.25;
         } else if (slide_ > 0.02 && axes_.size() > 1) {
           stage_ = Stage::Slide;  // once more, nearer
         } else {
-          converged_ = true;
-          stage_ = Stage::Done;
+          stage_ = Stage::Move;
         }
+        break;
+      case Stage::Move:
+        stage_ = best_ > before || (sample_ >= 0 && !had_sample) ? Stage::Start : Stage::Done;
+        converged_ = stage_ == Stage::Done && sample_ >= 0;
+        slide_ = 0.25;
         break;
       case Stage::Start:
       case Stage::Done:
@@ -138,7 +170,7 @@ class Climb {
   }
 
  private:
-  enum class Stage { Start, Bisect, Slide, Try, Look, Done };
+  enum class Stage { Start, Bisect, Slide, Try, Look, Move, Done };
 
   bool is_ours(const Archive& archive, const Point& x) const {
     const int i = archive.find(x);
@@ -146,7 +178,7 @@ class Climb {
   }
 
   void begin() {
-    if (best_ >= 1 || axes_.empty() || sample_ < 0 || round_++ >= options_.rounds) {
+    if (best_ >= 1 || axes_.empty() || round_++ >= options_.rounds) {
       converged_ = best_ >= 1;
       stage_ = Stage::Done;
       return;
@@ -283,7 +315,43 @@ class Climb {
         // a free axis changed, the surface kept: the nearest better cut
         add_ray(k % 2 == 0 ? to_surface(r) : r, t);
       }
-    if (points.empty()) converged_ = true, stage_ = Stage::Done;
+    if (points.empty()) stage_ = Stage::Move;
+    return points;
+  }
+
+  /// Runs of the class elsewhere, pulled into the cut that would be the next better one, and the best ones with one
+  /// input anywhere in it: other islands of the class; and more spread points.
+  std::vector<Point> ask_moved(const Archive& archive) {
+    const int n = static_cast<int>(axes_.size());
+    const Box box = make_box(space_, std::min(best_ + options_.tolerance, 1.0));
+    std::vector<std::pair<double, int>> ours;
+    for (int i = 0; i < seen_; ++i)
+      if (outcome_of(archive[i].result) == outcome_) ours.emplace_back(-calc_membership(space_, archive[i].x), i);
+    std::stable_sort(ours.begin(), ours.end());
+    std::vector<Point> points;
+    // the best ones, and as many of the others
+    const std::size_t most = 10 * static_cast<std::size_t>(n), rest = ours.size() > most ? ours.size() - most : 0;
+    for (std::size_t k = 0; k < std::min(most, ours.size()); ++k) add(points, clip(box, archive[ours[k].second].x));
+    for (std::size_t k = 0; k < std::min(most, rest); ++k)
+      add(points, clip(box, archive[ours[most + k * rest / std::min(most, rest)].second].x));
+    constexpr int parts = 8;
+    const std::size_t others = std::min<std::size_t>(2, ours.size() / 4);
+    for (std::size_t k = 0; k <= others && k < ours.size(); ++k) {
+      const Point x = clip(box, archive[ours[k * (ours.size() - 1) / 4].second].x);
+      for (const int i : axes_)
+        for (int part = 0; part < parts; ++part) {
+          Point y = x;
+          y[i] = box.lower[i] + (part + random_.next()) / parts * (box.upper[i] - box.lower[i]);
+          add(points, std::move(y));
+        }
+    }
+    const int spread = options_.spread * n;
+    for (const auto& u : make_sobol_points(n, 1 + spread * round_, spread, options_.seed + 1)) {
+      Point fractions(space_.inputs.size(), 0.0);
+      for (int i = 0; i < n; ++i) fractions[axes_[i]] = u[i];
+      add(points, place_in(box, fractions));
+    }
+    if (points.empty()) converged_ = sample_ >= 0, stage_ = Stage::Done;
     return points;
   }
 
@@ -295,11 +363,13 @@ class Climb {
   int outcome_;
   const PossibilityOptions& options_;
   Random random_;
+  Box support_;
   std::vector<int> axes_;
   Stage stage_ = Stage::Start;
   std::vector<Bracket> brackets_;
   Point best_x_;
-  double best_ = 0, resolution_ = 0, slide_ = 0.25;
+  double best_ = 0, resolution_ = 1, slide_ = 0.25;
+  double beside_ = -1;  // largest μ of runs outside the support, moved there, as long as none lies inside
   int sample_ = -1, seen_ = 0, round_ = 0;
   bool around_ = false, converged_ = false;
 };
@@ -318,6 +388,8 @@ PossibilityResult find_possibilities(const Space& space, Asker& asker, const Pos
     }
   };
   note_classes();
+  for (const Possibility& p : options.known)
+    if (const auto climb = climbs.find(p.outcome); climb != climbs.end()) climb->second.take_known(asker.archive(), p);
   PossibilityResult result;
   for (;;) {
     std::vector<Point> points;
@@ -344,6 +416,21 @@ PossibilityResult find_possibilities(const Space& space, Asker& asker, const Pos
   return result;
 }
 
+Possibility read_possibility(const Space& space, const Archive& archive, int outcome) {
+  Possibility p;
+  p.outcome = outcome;
+  const Box support = make_box(space, 0);
+  for (int i = 0; i < static_cast<int>(archive.size()); ++i) {
+    if (outcome_of(archive[i].result) != outcome || !support.contains(archive[i].x)) continue;
+    const double mu = calc_membership(space, archive[i].x);
+    if (mu > p.possibility || p.sample < 0) p.possibility = mu, p.sample = i;
+  }
+  p.above = count_above(space, archive, p.possibility);
+  p.converged = p.possibility >= 1;
+  p.resolution = 1 - p.possibility;
+  return p;
+}
+
 std::vector<Point> make_ray(const Space& space, const Point& x, int count) {
   const double from = 1 - std::clamp(calc_membership(space, x), 0.0, 1.0);
   const Ray ray = find_ray(space, x, from);
@@ -360,6 +447,12 @@ double calc_possibility_of(const PossibilityResult& r, const std::vector<int>& o
   for (const auto& p : r.classes)
     if (std::find(outcomes.begin(), outcomes.end(), p.outcome) != outcomes.end()) most = std::max(most, p.possibility);
   return most;
+}
+
+bool is_necessity_converged(const PossibilityResult& r, int outcome) {
+  return calc_necessity(r, outcome) <= 0 || std::all_of(r.classes.begin(), r.classes.end(), [outcome](const auto& p) {
+           return p.outcome == outcome || p.converged;
+         });
 }
 
 double calc_necessity(const PossibilityResult& r, int outcome) {

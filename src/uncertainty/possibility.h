@@ -12,9 +12,11 @@ struct Possibility {
   int outcome = 0;         // failed_outcome for failed runs
   double possibility = 0;  // μ of a run of this class: an inner estimate
   double resolution = 0;   // towards the core on the last ray, the next run of another class lies so much higher in μ
-  int sample = -1;         // the run that has it, in the archive
+  int sample = -1;         // the run that has it, in the archive; -1: none in the support
   int above = 0;  // runs with a larger μ, all of other classes: an island of the volume fraction v of that cut
                   // is missed by so many spread points with a probability of (1-v)^above
+  /// A search ended there because it saw nothing higher. Never where no run of the class was found from which one could
+  /// begin.
   bool converged = false;
 };
 
@@ -22,6 +24,9 @@ struct PossibilityOptions {
   double tolerance = 1e-4;  // of μ
   int rounds = 30;          // of bisecting, sliding and looking around, per class at most
   std::uint64_t seed = 1;
+  int spread = 40;  // points per input above what was found, at last
+  /// Found before: a class that has converged and of which no run is more possible by now is not searched again.
+  std::vector<Possibility> known = {};
 };
 
 struct PossibilityResult {
@@ -30,15 +35,20 @@ struct PossibilityResult {
 };
 
 /// Starts from the archive's best samples of each class: bisects towards the core, slides along the boundary of the
-/// class, looks around above what was found, until nothing higher is seen. Needs an archive that holds points
-/// (`optimise`).
+/// class, looks around above what was found, moves the class's other runs there, until nothing higher is seen. Needs an
+/// archive that holds points (`optimise`).
 PossibilityResult find_possibilities(const Space&, Asker&, const PossibilityOptions&);
+
+/// What the runs of one class show, without a search: its best one, those above it; towards the core nothing is known.
+Possibility read_possibility(const Space&, const Archive&, int outcome);
 
 /// Places at the same part of the cuts of lower levels as x, from its own on outwards to that of level 0.
 std::vector<Point> make_ray(const Space&, const Point& x, int count);
 
 /// 1 - the largest possibility of any other class.
 double calc_necessity(const PossibilityResult&, int outcome);
+/// Whether no other class may turn out to be more possible, so that the necessity is no less.
+bool is_necessity_converged(const PossibilityResult&, int outcome);
 /// The largest possibility among several classes ("any collapse"); 0 for none.
 double calc_possibility_of(const PossibilityResult&, const std::vector<int>& outcomes);
 

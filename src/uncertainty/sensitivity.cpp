@@ -196,7 +196,7 @@ std::vector<Rank> calc_ranks(const std::vector<Driver>& drivers) {
 }
 
 std::vector<Fixed> find_outcomes_of_knowing(const Space& space, Asker& asker, const PossibilityOptions& options,
-                                            int limit) {
+                                            int limit, const std::vector<Fixed>& earlier) {
   check_space(space);
   std::vector<Fixed> effects;
   const int whole_limit = asker.limit();
@@ -217,13 +217,18 @@ std::vector<Fixed> find_outcomes_of_knowing(const Space& space, Asker& asker, co
       if (const double mu = calc_membership(space, asker.archive()[k].x); mu > top.first) top = {mu, k};
     }
     std::vector<Point> points = {calc_centre(known)};
-    // the search from the best of them finds more than all of them do
+    // the search from the best of them finds more than all of them do; where none is of the class, others may be
     const std::size_t each = std::clamp<std::size_t>(static_cast<std::size_t>(limit) / (4 * best.size() + 1), 2,
                                                      4 * static_cast<std::size_t>(space.size()));
     for (auto& [outcome, list] : best) {
       std::stable_sort(list.begin(), list.end());
       for (std::size_t k = 0; k < std::min(each, list.size()); ++k) {
         points.push_back(asker.archive()[list[k].second].x);
+        points.back()[i] = core;
+      }
+      const std::size_t others = list.size() > each ? std::min(each, list.size() - each) : 0;
+      for (std::size_t k = 0; k < others; ++k) {
+        points.push_back(asker.archive()[list[each + k * (list.size() - each) / others].second].x);
         points.back()[i] = core;
       }
     }
@@ -237,8 +242,10 @@ std::vector<Fixed> find_outcomes_of_knowing(const Space& space, Asker& asker, co
     asker.ask(points);
     Fixed f;
     f.input = i;
-    for (auto& c : find_possibilities(known, asker, options).classes)
-      if (c.possibility > 0 || !c.converged) f.classes.push_back(c);
+    PossibilityOptions o = options;
+    for (const Fixed& before : earlier)
+      if (before.input == i) o.known = before.classes;
+    f.classes = find_possibilities(known, asker, o).classes;
     effects.push_back(std::move(f));
   }
   asker.set_limit(whole_limit);

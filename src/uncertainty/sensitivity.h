@@ -71,9 +71,11 @@ std::vector<Fixed> find_effects_of_knowing(const Space&, Asker&, const AlphaResu
                                            int limit);
 
 /// How possible each outcome is when one input is known (fixed at the middle of its core), without bounds of outputs:
-/// the best samples of each class are moved to that value, places farther out along the rays of its most possible ones
-/// are run, and the search of possibility.h goes on from there. At most `limit` further points per input; possibilities
-/// are inner estimates. A class that is left out is not possible, as far as a search that came to its end can tell.
-std::vector<Fixed> find_outcomes_of_knowing(const Space&, Asker&, const PossibilityOptions&, int limit);
+/// samples of each class are moved to that value, places farther out along the rays of its most possible ones are run,
+/// and the search of possibility.h goes on from there. At most `limit` further points per input; possibilities are
+/// inner estimates. A class of which no run was found there has the possibility 0 and has not converged.
+///   earlier  of a call before: what has converged there and still holds is not searched again
+std::vector<Fixed> find_outcomes_of_knowing(const Space&, Asker&, const PossibilityOptions&, int limit,
+                                            const std::vector<Fixed>& earlier = {});
 
 }  // namespace topple::uncertainty

@@ -71,7 +71,7 @@ TEST(Budget, SharesRunsOutAndNeverPassesTheLimit) {
         const Budget b = calc_budget(p, limit);
         EXPECT_LE(4 * b.rows + b.spread, b.bounds) << limit;
         EXPECT_LE(b.bounds, b.possibilities);
-        EXPECT_EQ(b.possibilities + 2 * b.knowing, b.outcomes);
+        EXPECT_EQ(b.possibilities + b.knowing, b.outcomes);
         EXPECT_LE(b.outcomes, b.limit);
         EXPECT_EQ(b.outcomes == b.limit, !has_boxes);
         EXPECT_EQ(b.rows + b.spread + b.knowing > 0, has_drivers);

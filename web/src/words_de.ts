@@ -980,6 +980,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["Robustness {:g}; distance to the limits {:g} of their range.", "Robustheit {}; Abstand zu den Grenzen {} ihres Bereichs."],
   ["If one input were known", "Wenn eine Eingangsgröße bekannt wäre"],
   ["Possibility of each outcome with all inputs fuzzy, and with one of them fixed at the middle of its core. At least so much was found.", "Möglichkeit jedes Ausgangs mit allen Eingangsgrößen unscharf, und mit einer davon fest in der Mitte ihres Kerns. Mindestens so viel wurde gefunden."],
+  ["* No search has ended there: a possibility may be higher, a necessity lower.", "* Dort ist keine Suche zu Ende gekommen: Eine Möglichkeit kann höher sein, eine Notwendigkeit niedriger."],
   ["* No search has ended there: it may be higher.", "* Dort ist keine Suche zu Ende gekommen: Sie kann höher sein."],
   ["known", "bekannt"],
   ["spread runs", "gestreuten Rechnungen"],

@@ -22,6 +22,8 @@ export interface Outcome {
   runs: number;
   possibility: number;
   necessity: number;
+  converged?: boolean; // the search for its possibility; not known of old studies
+  necessity_converged?: boolean;
   outputs: Output[];
 }
 export interface Input {

@@ -61,7 +61,7 @@ export function Drivers(props: { state: State }) {
               <tr><th scope="col">known</th>{study.outcomes.map((o, i) => <th scope="col"><OutcomeName study={study} index={i} /><span hidden>{o.name}</span></th>)}</tr>
             </thead>
             <tbody>
-              <tr><th scope="row">nothing</th>{study.outcomes.map((o) => <td>{formatNumber(o.possibility, 3)}</td>)}</tr>
+              <tr><th scope="row">nothing</th>{study.outcomes.map((o) => <td>{formatNumber(o.possibility, 3) + (o.converged === false ? "*" : "")}</td>)}</tr>
               {study.known.map((k) => (
                 <tr><th scope="row">{k.input}</th>{study.outcomes.map((o) => {
                   const c = k.outcomes.find((other) => other.name === o.name);

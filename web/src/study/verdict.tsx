@@ -80,13 +80,15 @@ export function Outcomes(props: { state: State }) {
                   <b style={{ width: wide(o.necessity) }} />
                 </span>
               </td>
-              <td>{atLeast(o.possibility, 3)}</td>
-              <td>{atMost(o.necessity, 3)}</td>
+              <td>{atLeast(o.possibility, 3) + (o.converged === false ? "*" : "")}</td>
+              <td>{atMost(o.necessity, 3) + (o.necessity_converged === false ? "*" : "")}</td>
               <td>{o.runs}</td>
             </tr>
           ))}
         </tbody>
       </table>
+      {study.outcomes.some((o) => o.converged === false || o.necessity_converged === false) &&
+        <p class="quiet">* No search has ended there: a possibility may be higher, a necessity lower.</p>}
       <p class="quiet plot-note">
         Possibility is the highest degree at which inputs were found that lead to the outcome; it can only be higher. Necessity is what is left
         for no other outcome. Numbers of runs are no probabilities: runs gather where something was looked for.
