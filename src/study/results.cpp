@@ -362,10 +362,11 @@ std::string write_membership_csv(const Problem& p, const StudyResult& r) {
 }
 
 std::string write_outcomes_csv(const StudyResult& r) {
-  std::string text = "outcome,runs,possibility,necessity\n";
+  std::string text = "outcome,runs,possibility,necessity,possibility_converged,necessity_converged\n";
   for (const auto& c : r.alpha.classes)
-    text += fmt::format("{},{},{},{}\n", cell(name_of_outcome(r, c.outcome)), c.count, cell(possibility_of(r, c)),
-                        cell(necessity_of(r, c.outcome)));
+    text += fmt::format("{},{},{},{},{:d},{:d}\n", cell(name_of_outcome(r, c.outcome)), c.count,
+                        cell(possibility_of(r, c)), cell(necessity_of(r, c.outcome)), is_possibility_converged(r, c),
+                        uncertainty::is_necessity_converged(r.possibilities, c.outcome));
   return text;
 }
 
@@ -415,7 +416,8 @@ std::string write_drivers_csv(const Problem& p, const StudyResult& r) {
   const Insights& in = r.insights;
   if (in.source == Insights::Source::None && in.knowing.empty()) return {};
   std::string text =
-      "kind,name,input,first,first_error,total,total_error,best_place,worst_place,possibility,possibility_known\n";
+      "kind,name,input,first,first_error,total,total_error,best_place,worst_place,possibility,possibility_known,"
+      "known_converged\n";
   const auto add = [&](const char* kind, const std::string& name, const std::vector<uncertainty::Driver>& drivers,
                        const uncertainty::ClassBounds* c) {
     const std::vector<uncertainty::Rank> ranks = uncertainty::calc_ranks(drivers);
@@ -427,12 +429,12 @@ std::string write_drivers_csv(const Problem& p, const StudyResult& r) {
       else
         text += ",,,,,,";
       text += c ? "," + cell(possibility_of(r, *c)) : ",";
-      std::string known;
+      std::string known = ",";
       for (const uncertainty::Fixed& f : in.knowing)
         if (c && f.input == static_cast<int>(i)) {
-          known = "0";
+          known = "0,0";
           for (const auto& k : f.classes)
-            if (k.outcome == c->outcome) known = cell(k.possibility);
+            if (k.outcome == c->outcome) known = fmt::format("{},{:d}", cell(k.possibility), k.converged);
         }
       text += "," + known + "\n";
     }

@@ -375,7 +375,10 @@ TEST(Insights, SaysWhichOutcomesWithAnInputKnownAreNotSettled) {
   const auto known = nlohmann::json::parse(write_results_json(p, r)).at("known").at(0).at("outcomes");
   EXPECT_TRUE(known.at(0).at("converged"));
   EXPECT_FALSE(known.at(1).at("converged"));
-  EXPECT_TRUE(known.at(2).at("converged")) << "a search came to its end and found nothing";
+  EXPECT_FALSE(known.at(2).at("converged")) << "nothing was found from which a search could begin";
+  const std::string csv = write_drivers_csv(p, r);
+  EXPECT_NE(csv.find("possibility_known,known_converged\n"), std::string::npos) << csv;
+  for (const char* end : {",1,1\n", ",0.25,0\n", ",0,0\n"}) EXPECT_NE(csv.find(end), std::string::npos) << csv;
 }
 
 TEST(Story, SaysWhatIsPossibleAndWhatTurnsIt) {

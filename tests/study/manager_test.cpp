@@ -140,6 +140,47 @@ TEST(StudyReference, MarksBoundsAroundACoreThatFails) {
   EXPECT_EQ(write_results_json(p, read_study(p, store, *store.find_study("main"))), write_results_json(p, r));
 }
 
+/// Islands of the class "in" in 2 inputs: valleys of one cross valleys of the other.
+RunnerFactories make_island_factories() {
+  return {{"small", [](const std::string&) -> Runner {
+             return [](auto points, const auto& give, const auto&) {
+               for (std::size_t i = 0; i < points.size(); ++i) {
+                 const double a = (points[i][0] - 25) / 10, b = (points[i][1] - 64) / 12;
+                 const bool in = std::sin(5 * a) + std::cos(3 * b + 1) + 0.2 * b < -1.9;
+                 give(i, {Answer::Kind::Done, {{"z", in ? 1.0 : 0.0}}, in ? "in" : "out", {}, "", 0});
+               }
+             };
+           }}};
+}
+
+TEST(Study, IsCompleteOnlyWhereSearchesOfPossibilitiesAre) {
+  const Folder folder;
+  for (const int limit : {200, 1000, 3000, 10000}) {
+    const Problem p = make_small_problem(limit);
+    const std::string name = folder / std::to_string(limit);
+    const StudyResult r = run(p, make_options(name), make_island_factories());
+    ASSERT_EQ(r.possibilities.classes.size(), 2u) << limit;
+    bool all = true;
+    for (const auto& c : r.possibilities.classes) {
+      const auto seen = uncertainty::read_possibility(p.space, r.alpha.archive, c.outcome);
+      EXPECT_EQ(c.possibility, seen.possibility) << limit;
+      EXPECT_EQ(c.sample, seen.sample) << limit;
+      EXPECT_EQ(c.above, seen.above) << limit;
+      EXPECT_TRUE(c.resolution > 0 || c.possibility >= 1) << limit;
+      all = all && c.converged;
+    }
+    EXPECT_TRUE(all || r.ending != uncertainty::Ending::Complete) << limit;
+    EXPECT_TRUE(all || limit < 10000);
+    EXPECT_EQ(r.alpha.archive.size() < static_cast<std::size_t>(limit) && !all,
+              r.ending == uncertainty::Ending::NotConverged && !all);
+    const std::string csv = write_outcomes_csv(r);
+    EXPECT_NE(csv.find("necessity,possibility_converged,necessity_converged\nout,"), std::string::npos) << csv;
+    EXPECT_EQ(csv.ends_with(all ? ",1,1\n" : ",0,1\n"), true) << csv;
+    Store store(name);
+    EXPECT_EQ(write_results_json(p, read_study(p, store, *store.find_study("main"))), write_results_json(p, r));
+  }
+}
+
 /// Many basins of like depth: no limit is enough for a proper search.
 RunnerFactories make_wavy_factories(bool has_outcomes) {
   return {{"small", [has_outcomes](const std::string&) -> Runner {
