@@ -17,13 +17,21 @@ Mat3 world_tensor(const Mat3& R, const Mat3& in_body) { return R * in_body * tra
 /// In a plane a body is so hard to turn out of it that it stays, yet no row of a joint is without mass.
 constexpr double kOutOfPlane = 1e6;
 
-BodyConstants constants_of(const Body& body, bool is_planar) {
+/// Of a body of a plane whose normal it sees as n: what it has about n, and hard to turn otherwise.
+Mat3 make_planar_inertia(const Mat3& inertia, const Vec3& n) {
+  constexpr double round_off = 1e-12;
+  if (std::hypot(n.x, n.z) < round_off)
+    return Mat3::diagonal({kOutOfPlane * inertia(0, 0), inertia(1, 1), kOutOfPlane * inertia(2, 2)});
+  const Mat3 along = Mat3::from_columns(n.x * n, n.y * n, n.z * n), across = Mat3::identity() + (-1) * along;
+  return dot(n, inertia * n) * along + kOutOfPlane * (across * inertia * across);
+}
+
+///   q_WB  its orientation at the start: in a plane the body sees the same normal ever after
+BodyConstants constants_of(const Body& body, bool is_planar, const Quat& q_WB) {
   BodyConstants c;
   c.mass = body.mass;
   c.inertia = body.inertia;
-  if (is_planar)
-    c.inertia =
-        Mat3::diagonal({kOutOfPlane * body.inertia(0, 0), body.inertia(1, 1), kOutOfPlane * body.inertia(2, 2)});
+  if (is_planar) c.inertia = make_planar_inertia(body.inertia, transpose_times(to_matrix(q_WB), {0, 1, 0}));
   if (!body.fixed) {
     c.inverse_mass = 1 / body.mass;
     c.inverse_inertia = inverse(c.inertia);
@@ -78,7 +86,7 @@ void System::compile() {
   compile_hulls();
   for (size_t b = 0; b < B; ++b) {
     const Body& body = model.bodies[b];
-    s.body[b] = constants_of(body, model.is_planar);
+    s.body[b] = constants_of(body, model.is_planar, normalized(body.X_WB.q));
     append_shapes(body, s.body[b]);
     fixed[b] = body.fixed;
     s.p[b] = body.X_WB.p;
@@ -503,7 +511,7 @@ void System::replace_body(size_t b, const Body& replacement) {
   s.p_offset[b] += moved;
   clusters_due = true;  // levers and masses have changed
   forget_crushed_boxes_of(b);
-  s.body[b] = constants_of(replacement, model.is_planar);
+  s.body[b] = constants_of(replacement, model.is_planar, normalized(model.bodies[b].X_WB.q));
   s.L[b] = world_tensor(s.R[b], s.body[b].inertia) * s.w[b];
   pack_body(b);
   for (const int entry : incidence[b]) {

@@ -98,6 +98,59 @@ TEST(PlanarPhysics, PlacesAlongTheNormalChangeNothing) {
     EXPECT_LT(norm(far.element_force[i] - near.element_force[i]), 1e-3) << i;
 }
 
+TEST(PlanarPhysics, BodiesTurnAboutYAsTheirInertiaSays) {
+  const Mat3 inertia{{{0.1, 0.02, 0}, {0.02, 0.2, 0.03}, {0, 0.03, 0.3}}};
+  const double quarter = 1.5707963267948966;
+  for (const Vec3& turn : {Vec3{0.1, 0, 0}, Vec3{0.5, 0, 0}, Vec3{0, 0, quarter}, Vec3{2, 0, 0}, Vec3{0.3, 1, -0.7}}) {
+    Model m;
+    m.is_planar = true;
+    m.contact.ground = m.contact.bodies = false;
+    Body body = make_box("b", 2, {1, 0.5, 0.2}, {0, 1, 5});
+    body.inertia = inertia;
+    body.X_WB.q = exp_rotation(turn);
+    body.w_WB = {0, 2, 0};
+    const BodyId b = add_body(m, body);
+    Load l;
+    l.name = "torque", l.body = b;
+    l.torque = {3, 0.5, -2};
+    m.loads.push_back(l);
+    std::vector<View> views;
+    const Summary s = run(m, look(1, views));
+    ASSERT_EQ(s.ending, Summary::Ending::TimeLimit) << s.message;
+    const Vec3 n = transpose_times(to_matrix(body.X_WB.q), {0, 1, 0});
+    const View& v = views.back();
+    EXPECT_NEAR(v.w_WB[0].y, 2 + 0.5 * v.time / dot(n, inertia * n), 1e-9) << turn.x;
+    EXPECT_LT(std::hypot(v.w_WB[0].x, v.w_WB[0].z), 1e-9) << turn.x;
+    EXPECT_LT(norm(transpose_times(to_matrix(v.X_WB[0].q), {0, 1, 0}) - n), 1e-9) << turn.x;
+    EXPECT_LT(s.energy_error, 1e-5) << turn.x;
+  }
+}
+
+TEST(PlanarPhysics, ReplacedBodiesTurnAboutYAsTheirInertiaSays) {
+  Model m;
+  m.is_planar = true;
+  m.contact.ground = m.contact.bodies = false;
+  Body body = make_box("b", 2, {1, 0.5, 0.2}, {0, 1, 5});
+  body.X_WB.q = exp_rotation({0.5, 0, 0});
+  const BodyId b = add_body(m, body);
+  Load l;
+  l.name = "torque", l.body = b;
+  l.torque = {0, 0.5, 0};
+  m.loads.push_back(l);
+  Action replace;
+  replace.kind = Action::Kind::ReplaceBody;
+  replace.body = b;
+  replace.replacement = make_box("c", 1, {0.3, 0.2, 0.1}, {});
+  replace.replacement.inertia = Mat3::diagonal({0.1, 0.2, 0.3});
+  Event e;
+  e.actions.push_back(replace);
+  m.events.push_back(e);
+  std::vector<View> views;
+  ASSERT_EQ(run(m, look(0.5, views)).ending, Summary::Ending::TimeLimit);
+  const double c = std::cos(0.5), s = std::sin(0.5);
+  EXPECT_NEAR(views.back().w_WB[0].y, 0.5 * views.back().time / (0.2 * c * c + 0.3 * s * s), 1e-9);
+}
+
 TEST(PlanarPhysics, PendulumSwingsAsInSpace) {
   Model m;
   m.contact.ground = m.contact.bodies = false;
