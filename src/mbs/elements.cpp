@@ -48,7 +48,7 @@ double floor_exponent(double e) { return e >= 2 ? 2 : e >= 1.5 ? 1.5 : 1; }
 }  // namespace
 
 bool System::keeps_planes() const {
-  if (!model.is_planar || model.gravity.y != 0) return false;
+  if (!model.is_planar) return false;
   for (size_t b = 0; b < B; ++b) {
     const Quat q = state.q[b];
     const Vec3 v = state.v[b], w = state.w[b];

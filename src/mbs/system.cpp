@@ -39,6 +39,12 @@ BodyConstants constants_of(const Body& body, bool is_planar, const Quat& q_WB) {
   return c;
 }
 
+/// Nothing along y has an effect in a plane.
+Model with_gravity_in_plane(Model m) {
+  if (m.is_planar) m.gravity.y = 0;
+  return m;
+}
+
 /// Spring behind the damper over the elastic spring, so that the loss at the damping frequency is that of the ratio:
 /// loss factor 2ζ = (r/2) / (1 + r/2).
 double viscous_share(double damping_ratio) { return 4 * damping_ratio / (1 - 2 * damping_ratio); }
@@ -46,8 +52,8 @@ double viscous_share(double damping_ratio) { return 4 * damping_ratio / (1 - 2 *
 }  // namespace
 
 System::System(const Model& m, const Options& o, size_t width, bool has_moment)
-    : model(m), options(o), own_lanes(std::make_unique<Lanes>()), lanes(own_lanes.get()) {
-  check_model(model);
+    : model(with_gravity_in_plane(m)), options(o), own_lanes(std::make_unique<Lanes>()), lanes(own_lanes.get()) {
+  check_model(m);
   check_step(options.step, options.duration);
   lanes->W = width > 0 ? width : kernel::lanes();
   compile();

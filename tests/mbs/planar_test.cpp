@@ -151,6 +151,29 @@ TEST(PlanarPhysics, ReplacedBodiesTurnAboutYAsTheirInertiaSays) {
   EXPECT_NEAR(views.back().w_WB[0].y, 0.5 * views.back().time / (0.2 * c * c + 0.3 * s * s), 1e-9);
 }
 
+TEST(PlanarPhysics, GravityAcrossThePlaneDoesNothing) {
+  const auto fall = [](double across, double tilt) {
+    Model m;
+    m.is_planar = true;
+    m.gravity = {1, across, -9.81};
+    m.contact.ground = m.contact.bodies = false;
+    Body body = make_box("b", 2, {1, 0.5, 0.2}, {0, 3, 0});
+    body.X_WB.q = exp_rotation({tilt, 0, 0});
+    body.w_WB = {0, 2, 0};
+    add_body(m, body);
+    std::vector<View> views;
+    EXPECT_LT(run(m, look(0.5, views)).energy_error, 1e-9);
+    return views;
+  };
+  for (const double tilt : {0.0, 0.4}) {
+    const View with = fall(5, tilt).back(), without = fall(0, tilt).back();
+    EXPECT_EQ(with.X_WB[0].p.y, 3);
+    EXPECT_EQ(with.X_WB[0].p, without.X_WB[0].p);
+    EXPECT_EQ(with.X_WB[0].q, without.X_WB[0].q);
+    EXPECT_EQ(with.energy.gravity, without.energy.gravity);
+  }
+}
+
 TEST(PlanarPhysics, PendulumSwingsAsInSpace) {
   Model m;
   m.contact.ground = m.contact.bodies = false;
