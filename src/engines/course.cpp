@@ -211,11 +211,15 @@ mbs::Summary Course::finish(long steps) {
     summary_.wall_time = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
     summary_.time = time_;
     summary_.steps = steps;
-    double mass = 0;
+    mbs::EnergyScale scale;
+    scale.released = released_;
+    scale.brought = options_.equilibrium ? 0 : total_at_start_;
     for (size_t b = 0; b < body_.size(); ++b)
-      if (!model_.bodies[b].fixed) mass += body_[b].mass;
-    summary_.energy_error = mbs::calc_energy_error(
-        largest_residual_, released_, options_.equilibrium ? 0 : total_at_start_, mass * norm(model_.gravity));
+      if (!model_.bodies[b].fixed) scale.force += body_[b].mass * norm(model_.gravity);
+    for (size_t i = 0; i < model_.loads.size(); ++i)
+      if (forces_.has_begun(i)) scale.force += mbs::calc_largest_force(model_.loads[i]);
+    scale.round_off = mbs::calc_round_off(model_, time_ / static_cast<double>(std::max(steps, 1L)), steps);
+    summary_.energy_error = mbs::calc_energy_error(largest_residual_, scale);
     const bool is_run =
         summary_.ending == mbs::Summary::Ending::TimeLimit || summary_.ending == mbs::Summary::Ending::AtRest;
     if (const std::string lost = mbs::describe_lost_energy(summary_.energy_error); is_run && !lost.empty()) fail(lost);

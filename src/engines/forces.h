@@ -68,6 +68,7 @@ class Forces {
   void remove_bushing(size_t);
   void remove_load(size_t);
   void apply_load(size_t, double time);
+  bool has_begun(size_t load) const { return load_[load].has_begun; }
   /// The next time at which a load's table has a corner; infinite behind the last [s].
   double next_corner(double time) const;
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 namespace topple::mbs {
 
@@ -24,12 +25,47 @@ const char* words_of(Summary::Ending e) {
   return "";
 }
 
+double find_largest_factor(const Load& l) {
+  double most = l.factor.empty() ? 1 : 0;
+  for (const double f : l.factor) most = std::max(most, std::abs(f));
+  return most;
+}
+
+/// Of coordinates in W and in bodies [m].
+double find_farthest(const Model& m) {
+  double most = 0;
+  const auto see = [&](const Vec3& p) { most = std::max(most, norm(p)); };
+  for (const Body& b : m.bodies) see(b.X_WB.p);
+  for (const Joint& j : m.joints) see(j.X_PF.p), see(j.X_CM.p);
+  for (const ZoneElement& e : m.elements) see(e.X_AF.p), see(e.X_BM.p);
+  for (const Bushing& b : m.bushings) see(b.X_AF.p), see(b.X_BM.p);
+  for (const SpringDamper& s : m.springs) see(s.p_A), see(s.p_B);
+  for (const Cable& c : m.cables) see(c.p_A), see(c.p_B);
+  return most;
+}
+
 }  // namespace
 
-double calc_energy_error(double residual, double released, double brought, double weight) {
-  constexpr double lift = 1e-6;  // of everything, the least that an error is measured by [m]
-  const double reference = std::max({released, brought, lift * weight});
-  return reference > 0 ? residual / reference : 0;
+double calc_energy_error(double residual, const EnergyScale& s) {
+  constexpr double way = 1e-6;  // of everything, the least that an error is measured by [m]
+  const double reference = std::max({s.released, s.brought, way * s.force});
+  return reference > 0 && residual > s.round_off ? residual / reference : 0;
+}
+
+double calc_largest_force(const Load& l) { return find_largest_factor(l) * (norm(l.force) + norm(l.torque)); }
+
+double calc_round_off(const Model& m, double step, long steps) {
+  if (!(step > 0)) return 0;
+  constexpr double epsilon = std::numeric_limits<double>::epsilon();
+  const double farthest = find_farthest(m);
+  double sum = 0;
+  for (const Body& b : m.bodies) {
+    if (b.fixed) continue;
+    // of a stable step the springs store no more than this
+    sum += b.mass * farthest * farthest + b.inertia(0, 0) + b.inertia(1, 1) + b.inertia(2, 2);
+  }
+  const double rate = epsilon / step;
+  return static_cast<double>(steps) * rate * rate * sum;
 }
 
 std::string describe_lost_energy(double error) {
@@ -141,18 +177,19 @@ double Course::calc_weight() const {
 
 double Course::calc_energy_error() const {
   const double brought = s_.options.equilibrium ? 0 : s_.state.total_at_start;
-  return mbs::calc_energy_error(s_.state.largest_residual, s_.state.released, brought, calc_weight());
+  double force = calc_weight();
+  for (size_t i = 0; i < s_.model.loads.size(); ++i)
+    if (s_.state.load[i].begin != kUnlimited) force += calc_largest_force(s_.model.loads[i]);
+  return mbs::calc_energy_error(
+      s_.state.largest_residual,
+      {s_.state.released, brought, force, calc_round_off(s_.model, s_.summary.shortest_step, s_.state.step_index)});
 }
 
 double Course::calc_singular_play() const {
   if (s_.joint_notes.empty()) return 0;
   constexpr double lift = 1e-3;  // [m]
   double force = calc_weight();
-  for (const Load& l : s_.model.loads) {
-    double most = l.factor.empty() ? 1 : 0;
-    for (const double f : l.factor) most = std::max(most, std::abs(f));
-    force += most * norm(l.force);
-  }
+  for (const Load& l : s_.model.loads) force += find_largest_factor(l) * norm(l.force);
   return lift * force;
 }
 

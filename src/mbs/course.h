@@ -10,6 +10,21 @@
 
 namespace topple::mbs {
 
+/// What an error of the balance of energy is measured by.
+struct EnergyScale {
+  double released = 0;   // so far [J]
+  double brought = 0;    // at the start, 0 of what rests in equilibrium: nothing sets free what that stores [J]
+  double force = 0;      // weight of all that moves, with the loads that have begun [N]
+  double round_off = 0;  // what round-off of places makes of the balance [J]
+};
+
+/// What Summary::energy_error says of the largest |residual| [J], for engines that keep books of their own.
+double calc_energy_error(double residual, const EnergyScale&);
+/// The most that a load is over its table, torques at a metre [N].
+double calc_largest_force(const Load&);
+/// What round-off of places comes to in so many steps, as a motion of all bodies [J].
+double calc_round_off(const Model&, double step, long steps);
+
 /// Why a balance of energy cannot be believed, by the largest error of it (Summary::energy_error); empty if it can.
 std::string describe_lost_energy(double error);
 

@@ -138,7 +138,7 @@ struct Summary {
   int equilibrium_iterations = 0;
   double equilibrium_residual = 0;  // largest unbalanced force over the weight
   /// Largest |residual| over the potential energy released, or the energy there was at the start if that is more; both
-  /// at least what lifts everything by a micrometre.
+  /// at least what moves everything by a micrometre against weight and loads. What round-off makes of it is no error.
   double energy_error = 0;
   double joint_drift = 0;          // largest violation of a joint [m, rad]
   std::vector<std::string> notes;  // redundant constraints, singular positions: what was done about them
@@ -148,12 +148,6 @@ struct Summary {
 /// Runs the model from its start to its end. Throws InputError if check_model does, and for a set step
 /// that is too short; everything else is in the summary.
 Summary run(const Model&, const Options&);
-
-/// What Summary::energy_error says, for engines that keep books of their own.
-///   residual, released  largest |residual|, energy released so far [J]
-///   brought             energy at the start, 0 of what rests in equilibrium: nothing sets free what that stores [J]
-///   weight              of all that moves [N]
-double calc_energy_error(double residual, double released, double brought, double weight);
 
 class System;  // compiled model and state
 class Course;

@@ -64,6 +64,96 @@ TEST(Course, RefusesAContactOfNoStep) {
   EXPECT_THAT(s.message, testing::HasSubstr("more steps than"));
 }
 
+Model make_unmoved() {
+  Model m;
+  m.gravity = {};
+  m.contact.ground = m.contact.bodies = false;
+  Body b = make_box("b", 2, {0.1, 0.2, 0.3}, {8.3, -3.1, 5.7});
+  b.X_WB.q = exp_rotation({0.3, -0.9, 0.4});
+  add_body(m, b);
+  return m;
+}
+
+TEST(Course, WhatNothingMovesKeepsItsEnergyToRoundOff) {
+  // gravity 0: work and energy of what stands still are round-off themselves
+  Model held = make_unmoved();
+  Joint j;
+  j.name = "weld", j.kind = Joint::Kind::Fixed;
+  j.parent = kGround, j.child = {0};
+  j.X_PF = held.bodies[0].X_WB;
+  add_joint(held, j);
+  Load ramp;
+  ramp.name = "ramp", ramp.body = {0};
+  ramp.force = {-100, 3, 4}, ramp.torque = {1, 2, 3};
+  ramp.time = {0, 1}, ramp.factor = {0, 1};
+  held.loads.push_back(ramp);
+  Model balanced = make_unmoved();
+  ZoneElement e;
+  e.name = "e", e.a = kGround, e.b = {0};
+  e.X_AF.p = balanced.bodies[0].X_WB.p + Vec3{0.3, 0.1, 0.2};
+  e.X_BM.p = transpose_times(to_matrix(balanced.bodies[0].X_WB.q), {0.3, 0.1, 0.2});
+  e.X_BM.q = conjugate(balanced.bodies[0].X_WB.q);
+  e.translational_stiffness = {5e7, 3e5, 3e5};
+  e.rotational_stiffness = {5e4, 1e5, 1e5};
+  add_element(balanced, e);
+  const Model unloaded = balanced;
+  ramp.time = ramp.factor = {};
+  balanced.loads.push_back(ramp);
+  struct Case {
+    const Model& model;
+    bool equilibrium;
+  };
+  for (const Case& c : {Case{held, false}, Case{balanced, true}, Case{unloaded, false}, Case{unloaded, true}}) {
+    Options o;
+    o.duration = 1, o.equilibrium = c.equilibrium;
+    const Summary s = run(c.model, o);
+    EXPECT_EQ(s.ending, Summary::Ending::TimeLimit) << s.message;
+    EXPECT_LT(s.energy_error, 1e-6);
+  }
+}
+
+TEST(Course, MeasuresTheEnergyByWhatActs) {
+  const double most = 1e-6;  // [m]
+  EXPECT_EQ(calc_energy_error(2, {4, 1, 0, 0}), 0.5);
+  EXPECT_EQ(calc_energy_error(2, {4, 8, 0, 0}), 0.25);
+  EXPECT_EQ(calc_energy_error(2, {0, 0, 100, 0}), 2 / (most * 100));
+  EXPECT_EQ(calc_energy_error(2, {1, 0, 0, 1.9}), 2) << "more than round-off";
+  EXPECT_EQ(calc_energy_error(2, {1, 0, 0, 2.1}), 0);
+  Load l;
+  l.force = {0, 3, 4}, l.torque = {2, 0, 0};
+  EXPECT_EQ(calc_largest_force(l), 7);
+  l.time = {0, 1, 2}, l.factor = {0, -3, 1};
+  EXPECT_EQ(calc_largest_force(l), 21);
+  // a body of 2 kg at 10 m in 1000 steps of a millisecond: far below what such a body does
+  Model m = make_unmoved();
+  EXPECT_LT(calc_round_off(m, 1e-3, 1000), 1e-17);
+  EXPECT_GT(calc_round_off(m, 1e-3, 1000), 0);
+}
+
+TEST(Course, TellsALostBalanceWithoutGravity) {
+  // the spring's body becomes so light that its step is too long: thrown about
+  Model m = make_unmoved();
+  SpringDamper s;
+  s.name = "s", s.a = kGround, s.b = {0};
+  s.p_A = m.bodies[0].X_WB.p + Vec3{1, 0, 0};
+  s.free_length = 0.999;
+  s.spring.kind = Characteristic::Kind::Linear;
+  s.spring.rate = 1e6;
+  m.springs.push_back(s);
+  Action a;
+  a.kind = Action::Kind::ReplaceBody;
+  a.body = {0};
+  a.replacement = make_box("light", 0.1, {0.1, 0.2, 0.3}, {});
+  Event lighter;
+  lighter.time = 0.01, lighter.actions = {a};
+  m.events = {lighter};
+  Options o;
+  o.duration = 0.1, o.step = 1e-3, o.equilibrium = false;
+  const Summary lost = run(m, o);
+  EXPECT_EQ(lost.ending, Summary::Ending::Diverged) << lost.energy_error;
+  EXPECT_THAT(lost.message, testing::HasSubstr("balance of energy"));
+}
+
 TEST(Course, NotesAnElementThatIsTurnedOver) {
   Model m = make_hanging();
   m.events.clear();
