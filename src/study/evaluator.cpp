@@ -243,6 +243,9 @@ class Evaluator {
         give(i, a);
       }
     };
+    const auto refuse_silent = [&](const std::string& all, const std::string& last_one, const char* help) {
+      give_open(Answer::Kind::Refused, write_refusal(make_silent(all, last_one, help)));
+    };
     while (open > 0) {
       std::string line;
       const double patience = find_patience(is_fresh && open == points.size());
@@ -254,12 +257,13 @@ class Evaluator {
       if (event == Process::Event::TimeOut) {
         process_.end();
         const std::string what = fmt::format("no answer within {} s", patience);
-        if (!has_answered_ && ++waits_in_vain_ >= most_waits)
-          give_open(Answer::Kind::Refused,
-                    write_refusal(make_silent(fmt::format("was started {} times and gave {}", waits_in_vain_, what),
-                                              "--timeout gives it more time")));
-        else  // among several nobody knows which one hangs; they will be asked one by one
+        if (!has_answered_ && ++waits_in_vain_ >= most_waits) {
+          const std::string all = fmt::format("was started {} times and gave {}", waits_in_vain_, what);
+          refuse_silent(all, what, "--timeout gives it more time");
+        } else {
+          // among several nobody knows which one hangs; they will be asked one by one
           give_open(points.size() == 1 ? Answer::Kind::Failed : Answer::Kind::Crashed, what);
+        }
         return;
       }
       if (event == Process::Event::Closed) {
@@ -275,16 +279,14 @@ class Evaluator {
           give_open(Answer::Kind::Refused, write_refusal(make_missing(ending)));
           return;
         }
+        const std::string words = ending.empty() ? "" : ": " + ending;
         if (!has_answered_ && ++starts_in_vain_ >= most_starts) {
-          give_open(
-              Answer::Kind::Refused,
-              write_refusal(make_silent(fmt::format("was started {} times and ended without an answer each time{}",
-                                                    starts_in_vain_, ending.empty() ? "" : ": " + ending),
-                                        "give it a point by hand to see what it says")));
-          return;
+          const std::string all =
+              fmt::format("was started {} times and ended without an answer each time", starts_in_vain_);
+          refuse_silent(all + words, ended_without_answer + words, "give it a point by hand to see what it says");
+        } else {
+          give_open(Answer::Kind::Crashed, ended_without_answer + words);
         }
-        give_open(Answer::Kind::Crashed,
-                  "the evaluator ended without an answer" + (ending.empty() ? "" : ": " + ending));
         return;
       }
       if (event == Process::Event::TooLong) {
@@ -346,10 +348,11 @@ class Evaluator {
     return r;
   }
 
-  Refusal make_silent(const std::string& what, std::string help) const {
+  /// `last` is what the last point's failure would have been.
+  Refusal make_silent(const std::string& what, const std::string& last, const char* help) const {
     Refusal r;
-    r.diagnostic = {Severity::Error, no_answer_code, {}, 1, fmt::format("the command \"{}\" {}", command_, what),
-                    std::move(help)};
+    r.line = last;
+    r.diagnostic = {Severity::Error, no_answer_code, {}, 1, fmt::format("the command \"{}\" {}", command_, what), help};
     return r;
   }
 
@@ -368,6 +371,7 @@ class Evaluator {
     return false;
   }
 
+  const std::string ended_without_answer = "the evaluator ended without an answer";
   static constexpr int most_points = 1'000'000'000 / 2;
   std::vector<std::string> names_;
   int first_ = 0;  // number of the first point of a call

@@ -114,10 +114,10 @@ void Pool::work(const std::string& name) {
 
 Answer Pool::compare(Store& store, const std::string& model, const Answer& a) {
   if (a.kind == Answer::Kind::Refused) {
-    const Diagnostic d = read_refusal(a.text).diagnostic;
-    if (d.code != no_answer_code || !store.find_form(model)) return a;
+    const Refusal r = read_refusal(a.text);
+    if (r.diagnostic.code != no_answer_code || !store.find_form(model)) return a;
     Answer crashed = a;
-    crashed.kind = Answer::Kind::Crashed, crashed.text = d.message;
+    crashed.kind = Answer::Kind::Crashed, crashed.text = r.line;
     return crashed;
   }
   if (a.kind != Answer::Kind::Done) return a;

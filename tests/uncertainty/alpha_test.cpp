@@ -673,5 +673,21 @@ TEST(Alpha, ReportsBoundsSoFar) {
   EXPECT_EQ(done, static_cast<double>(r.archive.size()));
 }
 
+// Steps whose edges no search can follow to an end: told as that, not as a limit that was not reached.
+TEST(Alpha, SaysThatSearchesHaveNotConvergedWhereRunsAreLeft) {
+  const Space space{{make_triangular(0, 4.7, 10)}, {}, {}};
+  AlphaOptions options;
+  options.limit = 100000;
+  const AlphaResult r = optimise(space, make_evaluate_values([](const Point& x) {
+                                   return Point{std::floor(3 * x[0]) / 3 + 0.1 * std::sin(5 * x[0])};
+                                 }),
+                                 options, {});
+  EXPECT_LT(r.archive.size(), 100000u);
+  EXPECT_EQ(r.ending, Ending::NotConverged);
+  bool all = true;
+  for (const auto& l : r.outputs.at(0).levels) all = all && l.lower.converged && l.upper.converged;
+  EXPECT_FALSE(all);
+}
+
 }  // namespace
 }  // namespace topple::uncertainty
