@@ -911,7 +911,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["· searches have not converged at every level: the true shape may be wider", "· nicht auf jeder Stufe kam die Suche zum Ende: Die wahre Form kann weiter sein"],
   ["Drivers", "Einflüsse"],
   ["What drives what", "Was wovon abhängt"],
-  ["Not asked for (--no-drivers).", "Nicht verlangt (--no-drivers)."],
+  ["Not asked for.", "Nicht verlangt."],
   ["Not known: there are too few spread runs.", "Nicht bekannt: Es gibt zu wenige gestreute Rechnungen."],
   ["nothing", "nichts"],
   ["Runs", "Rechnungen"],

@@ -30,7 +30,7 @@ export function Drivers(props: { state: State }) {
     <section class="panel" aria-label="Drivers" data-test="drivers">
       <h2>What drives what</h2>
       {rows.length === 0 ? (
-        <p class="quiet">{drivers.from === "not asked for" ? "Not asked for (--no-drivers)." : "Not known: there are too few spread runs."}</p>
+        <p class="quiet">{drivers.from === "not asked for" ? "Not asked for." : "Not known: there are too few spread runs."}</p>
       ) : (
         <>
           <p class="quiet">
