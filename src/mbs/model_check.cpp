@@ -44,7 +44,8 @@ class Checker {
     if (!is_finite(v)) fail(p, key, "is not finite");
   }
   void positive(const Place& p, const char* key, double x) {
-    if (!(x > 0) || !std::isfinite(x)) fail(p, key, fmt::format("must be > 0, is {:g}", x));
+    if (!(x > 0) || !std::isfinite(x)) return fail(p, key, fmt::format("must be > 0, is {:g}", x));
+    if (!std::isnormal(x)) fail(p, key, fmt::format("is {:g}, too small to compute with", x));
   }
   /// Infinite is allowed: unlimited.
   void not_negative(const Place& p, const char* key, double x) {
@@ -248,7 +249,10 @@ void Checker::check_bodies() {
   for (size_t i = 0; i < m_.bodies.size(); ++i) {
     const Body& b = m_.bodies[i];
     const Place p = at("bodies", i, b.name);
-    if (!b.fixed) mass_and_inertia(p, b);
+    if (!b.fixed)
+      mass_and_inertia(p, b);
+    else
+      finite_not_negative(p, "mass", b.mass);
     pose(p, "X_WB", b.X_WB);
     finite(p, "v_WB", b.v_WB);
     finite(p, "w_WB", b.w_WB);

@@ -764,7 +764,9 @@ Model Reader::read_model(RunSettings* run) {
       const RunSettings settings = run_from(root_["run"]);
       if (run) *run = settings;
     });
-  attempt([&] { static_cast<void>(root_["bodies"]); });
+  attempt([&] {
+    if (root_["bodies"].items().empty()) root_["bodies"].fail("is empty: a model has at least one body");
+  });
   // the others' places are worked out from the bodies' poses
   each("bodies", m.bodies, [](const Node& n) { return body_from(n); });
   each("joints", m.joints, [this](const Node& n) { return joint_from(n); });

@@ -453,6 +453,8 @@ TEST(CheckModel, FindsEachMistake) {
          m.bodies[2].w_WB = {0, 0, 1};
        },
        "is not 0, and a fixed body does not turn"},
+      {[](Model& m) { m.bodies[2].mass = -3; }, "bodies[2].mass \"plane\": must be finite and not negative, is -3"},
+      {[](Model& m) { m.bodies[0].mass = 1e-320; }, "bodies[0].mass \"a\": is 9.99989e-321, too small to compute"},
       {[](Model& m) { m.bodies[0].shapes[1].vertices.pop_back(); }, "at least 4 vertices, has 3"},
       {[](Model& m) {
          m.bodies[0].shapes[1].vertices[3] = {1, 1, 1e-9};
