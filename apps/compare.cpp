@@ -267,6 +267,7 @@ int compare_engines(const Arguments& a, const std::atomic<bool>& cancel) {
     const mbs::Model model = mbs::model_from_json(text, a.input, &run);
     const auto list = make_engines(a);
     mbs::Options options = make_options(a, run);
+    if (options.equilibrium) mbs::refuse_velocities(model, text, a.input);
     options.progress.cancel = &cancel;
     const int refusing = print_unsupported(model, options, list);
     if (refusing > 0 && (!a.skip_unsupported || refusing == static_cast<int>(list.size()))) {

@@ -114,6 +114,7 @@ int run_model_file(const Arguments& a, const std::atomic<bool>& cancel) {
     options.stability_share = settings.stability_share;
     if (!(options.frame_rate > 0) && settings.frame_interval > 0) options.frame_rate = 1 / settings.frame_interval;
     options.equilibrium = a.equilibrium.value_or(settings.equilibrium.value_or(true));
+    if (options.equilibrium) mbs::refuse_velocities(model, text, a.input);
     options.rest_speed = settings.rest_speed.value_or(0);
     make_run_folder(a.output);
     print_model(out, model);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "base/error.h"
@@ -800,6 +801,24 @@ void choose_steps(const RunSettings& run, Options& o) {
 
 Model model_from_json(const std::string& text, const std::string& name, RunSettings* run) {
   return Reader(text, name).read_model(run);
+}
+
+void refuse_velocities(const Model& m, const std::string& text, const std::string& name) {
+  std::vector<Diagnostic> found;
+  std::optional<JsonDocument> document;
+  for (size_t i = 0; i < m.bodies.size() && found.size() < kMostComplaints; ++i) {
+    const Body& b = m.bodies[i];
+    for (const auto& [key, v] : {std::pair{"v_WB", b.v_WB}, {"w_WB", b.w_WB}}) {
+      if (norm(v) == 0) continue;
+      if (!document) document.emplace(text, name);
+      const Complaint c{fmt::format("bodies[{}].{}", i, key), b.name,
+                        "would be lost, because the run begins with the equilibrium, at rest"};
+      found.push_back(document->make_diagnostic(
+          "E601", c.path, c.message(),
+          "\"run\": {\"equilibrium\": false} in the file, or mbs run --no-equilibrium, begins with it"));
+    }
+  }
+  if (!found.empty()) throw InputError(std::move(found));
 }
 
 }  // namespace topple::mbs

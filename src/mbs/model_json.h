@@ -31,6 +31,10 @@ std::string to_json(const Model&, const RunSettings& = {});
 /// its path, line and column; `name` stands for the file. Settings of the run go to `run` if that is given.
 Model model_from_json(const std::string& text, const std::string& name, RunSettings* run = nullptr);
 
+/// Throws InputError (E601), placed in the text the model is of, where bodies have velocities: a run that begins with
+/// the equilibrium would lose them.
+void refuse_velocities(const Model&, const std::string& text, const std::string& name);
+
 /// The keys that an object of the file may have, by the name of the object in docs/mbs-model.schema.json; "model" is
 /// the file itself.
 struct KeyList {

@@ -340,6 +340,13 @@ mbs)
     expect 1 sh -c '"$1" mbs run "$2" -o f --no-report --json --duration 0.1s >/dev/full' sh "$topple" "$pendulum"
     has err "standard output could not be written"
   fi
+  # velocities do not go with the equilibrium
+  sed 's/"X_WB": {"p": \[1.5, 0, 0\]}/&, "v_WB": [0, 0, 1]/' "$pendulum" >thrown.json
+  grep -q v_WB thrown.json || { echo "nothing is thrown"; failures=$((failures + 1)); }
+  expect 0 "$topple" mbs run thrown.json -o f --no-report --duration 0.1s
+  expect 2 "$topple" mbs run thrown.json -o g --no-report --duration 0.1s --equilibrium; has err 'bodies[1].v_WB "lower": would be lost'; has err "--no-equilibrium"
+  sed -i 's/"equilibrium": false/"equilibrium": true/' thrown.json
+  expect 2 "$topple" mbs compare thrown.json --engines native --duration 0.1s; has err "would be lost"
   # a mistake is shown where it stands
   sed 's/"child": "lower"/"child": "lwoer"/' "$pendulum" >typo.json
   expect 2 "$topple" mbs run typo.json -o g

@@ -349,6 +349,35 @@ TEST(ModelJson, ActionsHaveTheKeysOfTheirKind) {
   EXPECT_THAT(action(R"({"do": "remove_lode"})"), HasSubstr("did you mean \"remove_load\"?"));
 }
 
+TEST(ModelJson, RefusesModelsOfNothing) {
+  try {
+    (void)model_from_json(R"({"format": "topple-mbs", "version": 2, "bodies": []})", "m.json");
+    ADD_FAILURE() << "no complaint";
+  } catch (const InputError& e) { EXPECT_THAT(e.what(), HasSubstr("bodies: is empty: a model has at least one body")); }
+}
+
+TEST(ModelJson, VelocitiesDoNotGoWithTheEquilibrium) {
+  const std::string text = R"({"format": "topple-mbs", "version": 2, "bodies": [
+  {"name": "still", "mass": 1, "inertia": [1, 1, 1], "X_WB": {}},
+  {"name": "thrown", "mass": 1, "inertia": [1, 1, 1], "X_WB": {}, "v_WB": [1, 0, 0],
+   "w_WB": [0, 0, 5]}]})";
+  Model m = model_from_json(text, "m.json");
+  try {
+    refuse_velocities(m, text, "m.json");
+    ADD_FAILURE() << "no complaint";
+  } catch (const InputError& e) {
+    ASSERT_EQ(e.diagnostics().size(), 2u);
+    const Diagnostic& d = e.diagnostics()[0];
+    EXPECT_EQ(d.code, "E601");
+    EXPECT_THAT(d.message, HasSubstr("bodies[1].v_WB \"thrown\": would be lost"));
+    EXPECT_THAT(d.help, HasSubstr("\"equilibrium\": false"));
+    EXPECT_EQ(d.where.line, 3);
+    EXPECT_EQ(e.diagnostics()[1].where.line, 4);
+  }
+  m.bodies[1].v_WB = m.bodies[1].w_WB = {};
+  EXPECT_NO_THROW(refuse_velocities(m, text, "m.json"));
+}
+
 TEST(ModelJson, NamesHoldNoControlCharacters) {
   EXPECT_THAT(complaints(R"("name": "a\u001b[2Jb")"), HasSubstr("holds a control character"));
 }
