@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <numeric>
@@ -68,7 +69,10 @@ std::vector<std::unique_ptr<engines::Engine>> make_engines(const Arguments& a) {
   std::vector<std::string> names;
   for (size_t begin = 0; begin <= a.engines.size();) {
     const size_t end = std::min(a.engines.find(',', begin), a.engines.size());
-    if (end > begin) names.push_back(a.engines.substr(begin, end - begin));
+    const size_t first = std::min(a.engines.find_first_not_of(" \t", begin), end);
+    size_t last = end;
+    while (last > first && std::strchr(" \t", a.engines[last - 1])) --last;
+    if (last > first) names.push_back(a.engines.substr(first, last - first));
     begin = end + 1;
   }
   if (a.engines.empty()) names = engines::engine_names();

@@ -362,6 +362,7 @@ compare)
   expect 1 "$topple" mbs compare "$model" --engines native --duration 0.2s -o no_folder; has err "no_folder"; lacks out "energy error"
   expect 2 "$topple" mbs compare "$model" --engines nativ; has err 'did you mean "native"?'
   expect 2 "$topple" mbs compare "$model" --engines native,native; has err "twice"
+  expect 0 "$topple" mbs compare "$model" --engines " native ," --duration 0.01s
   expect 2 "$topple" mbs compare missing.json
   expect 2 "$topple" mbs compare "$model" --step "3 apples"; has err "--step"
   expect 0 "$topple" mbs compare "$model" --duration 0.2s --frames 10 --json; is_json out; has out '"energy_error"'
