@@ -157,6 +157,50 @@ void System::evaluate_dampers() {
   for (const DamperRow& d : rows) pull(d.a, d.b, d.row, d.state->damper - d.last);
 }
 
+void System::look_at_start() {
+  const auto springs = state.spring, torsions = state.torsion;
+  const auto bushings = state.bushing;
+  const Vec3 ground = ground_reaction;
+  std::vector<std::pair<Vec3, Vec3>> before;
+  for (size_t b = 0; b < B; ++b) before.emplace_back(force[b], torque[b]);
+  const auto correct = [&](int a, int b, const ForceRow& row, const CompiledCharacteristic& law, ComponentState& c) {
+    if (law.is_zero) return;
+    const double now = calc_force(law, calc_row_rate(a, b, row));
+    pull(a, b, row, now - c.damper);
+    c.damper = now;
+  };
+  ForceRow row, rows[6];
+  for (size_t i = 0; i < forces.springs.size(); ++i) {
+    const CompiledSpring& k = forces.springs[i];
+    if (!state.spring[i].live) continue;
+    (void)measure_spring(k, row);
+    correct(k.a, k.b, row, k.damper, state.spring[i].component);
+  }
+  for (size_t i = 0; i < forces.torsions.size(); ++i) {
+    const CompiledTorsion& k = forces.torsions[i];
+    if (!state.torsion[i].live) continue;
+    (void)measure_torsion(k, row);
+    const CompiledJoint& j = joints[static_cast<size_t>(k.joint)];
+    correct(j.parent, j.child, row, k.damper, state.torsion[i].component);
+  }
+  for (size_t i = 0; i < forces.bushings.size(); ++i) {
+    const CompiledBushing& k = forces.bushings[i];
+    if (!state.bushing[i].live || !k.is_damped) continue;
+    find_bushing_rows(k, measure_bushing(i), rows);
+    for (int c = 0; c < 6; ++c) correct(k.a, k.b, rows[c], k.damper[c], state.bushing[i].component[c]);
+  }
+  if (model.is_planar) drop_forces_across();
+  look();
+  state.spring = springs;
+  state.torsion = torsions;
+  state.bushing = bushings;
+  ground_reaction = ground;
+  for (size_t b = 0; b < B; ++b) {
+    force[b] = before[b].first;
+    torque[b] = before[b].second;
+  }
+}
+
 void System::note_fast_dampers() {
   if (forces.damped.empty()) return;
   const auto springs = state.spring, torsions = state.torsion;

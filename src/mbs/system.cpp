@@ -570,12 +570,14 @@ void System::finish_forces(double h) {
   if (!state.crushed_boxes.empty()) shorten_boxes();
   if (model.contact.ground || model.contact.bodies) evaluate_contact(h);
   evaluate_dampers();
-  if (model.is_planar) {
-    const LaneLayout layout = lanes->body_layout(lane);
-    for (size_t b = 0; b < B; ++b) {
-      lanes->force[layout.at(b, 1, 3)] = 0;
-      lanes->torque[layout.at(b, 0, 3)] = lanes->torque[layout.at(b, 2, 3)] = 0;
-    }
+  if (model.is_planar) drop_forces_across();
+}
+
+void System::drop_forces_across() {
+  const LaneLayout layout = lanes->body_layout(lane);
+  for (size_t b = 0; b < B; ++b) {
+    lanes->force[layout.at(b, 1, 3)] = 0;
+    lanes->torque[layout.at(b, 0, 3)] = lanes->torque[layout.at(b, 2, 3)] = 0;
   }
 }
 
@@ -775,6 +777,14 @@ Energy System::calc_energy() const {
 }
 
 const View& System::calc_view() {
+  if (state.first_kick && !forces.damped.empty())
+    look_at_start();
+  else
+    look();
+  return view;
+}
+
+void System::look() {
   unpack_elements();
   calc_reactions();
   View& v = view;
@@ -860,7 +870,6 @@ const View& System::calc_view() {
   v.ground_force = calc_element_reaction() + ground_reaction + v.contact_force_ground + joints_on_ground;
   v.body_contacts = body_contacts;
   v.energy = calc_energy();
-  return v;
 }
 
 }  // namespace topple::mbs

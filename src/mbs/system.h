@@ -189,10 +189,13 @@ class System {
   void begin_forces();
   void push_bodies(double h);
   void finish_forces(double h);
+  /// Of a planar model.
+  void drop_forces_across();
   bool is_finite() const;
   /// Goes over to a lane of a batch.
   void join_batch(Lanes& batch, size_t lane);
   const View& calc_view();
+  void look();  // into the view
   Summary summary;
 
   // constant after compilation
@@ -304,6 +307,9 @@ class System {
   /// Share of a load's force in the next kick.
   double find_load_factor(const CompiledLoad&, LoadState&) const;
   void evaluate_dampers();
+  /// As look(), with the pulls that dampers have at the velocities of the start: what moves the bodies then is already
+  /// that of the end of the first half step.
+  void look_at_start();
   void find_damper_bounds();
   void add_damper(int a, int b, const ForceRow&, const CompiledCharacteristic& law, ComponentState&, double& damping,
                   const std::string& name);

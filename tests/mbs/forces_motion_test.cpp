@@ -350,6 +350,61 @@ TEST(LoadPhysics, FollowsItsBody) {
   EXPECT_NEAR(std::log2(off[0] / off[1]), 2, 0.1);
 }
 
+TEST(DamperPhysics, TheFirstRowHasTheVelocitiesOfTheStart) {
+  // a spring, a bushing that turns and the hinge behind it, with dampers that stop their bodies within some steps
+  Model m;
+  m.gravity = {};
+  m.contact.ground = m.contact.bodies = false;
+  Body ball = make_box("ball", 1, {0.1, 0.1, 0.1}, {1, 0, 0});
+  ball.v_WB = {1, 0, 0};
+  ball.w_WB = {0, 0, 2};
+  add_body(m, ball);
+  Body door = make_box("door", 2, {0.5, 0.1, 0.1}, {0.5, 3, 0});
+  door.w_WB = {0, 0, 3};
+  door.v_WB = {0, 1.5, 0};
+  add_body(m, door);
+  SpringDamper s;
+  s.a = kGround, s.b = {0};
+  s.free_length = 1;
+  s.damper.rate = 5000;
+  m.springs.push_back(s);
+  Bushing k;
+  k.a = kGround, k.b = {0};
+  k.X_AF.p = {1, 0, 0};
+  k.damper[5].rate = 40;
+  m.bushings.push_back(k);
+  Joint j;
+  j.kind = Joint::Kind::Revolute;
+  j.parent = kGround, j.child = {1};
+  j.X_PF.p = {0, 3, 0}, j.X_CM.p = {-0.5, 0, 0};
+  add_joint(m, j);
+  RotationalSpring r;
+  r.joint = {0};
+  r.damper.rate = 300;
+  m.rotational_springs.push_back(r);
+  Options o = options_of(0.01, 1e-3);
+  std::vector<View> views;
+  o.on_frame = [&](const View& v) { views.push_back(v); };
+  (void)run(m, o);
+  const View& v = views.front();
+  EXPECT_EQ(v.time, 0);
+  EXPECT_EQ(v.spring_force[0], 5000);
+  EXPECT_NEAR(v.bushing_moment[0].z, -80, 1e-12);
+  EXPECT_NEAR(v.torsion_torque[0], 900, 1e-12);
+  // Newton of the door: its spin falls by 900 N·m over the inertia about the hinge, half a metre from its centre
+  const double turn = -900 / (m.bodies[1].inertia(2, 2) + 2 * 0.25);
+  EXPECT_NEAR(v.joint_force[0].x, -2 * 0.5 * 9, 1e-9);
+  EXPECT_NEAR(v.joint_force[0].y, 2 * 0.5 * turn, 1e-9);
+  EXPECT_NEAR(v.ground_force.x, -5000 + v.joint_force[0].x, 1e-9);
+  // looking changes nothing
+  Simulation unseen(m, options_of(0.01, 1e-3)), seen(m, options_of(0.01, 1e-3));
+  (void)seen.calc_view();
+  for (int i = 0; i < 5; ++i) unseen.advance_step(), seen.advance_step();
+  EXPECT_EQ(seen.calc_view().v_WB[0], unseen.calc_view().v_WB[0]);
+  EXPECT_EQ(seen.calc_view().w_WB[1], unseen.calc_view().w_WB[1]);
+  EXPECT_EQ(seen.calc_view().energy.residual, unseen.calc_view().energy.residual);
+}
+
 TEST(LoadPhysics, OnTheGroundIsItsReaction) {
   Load l;
   l.force = {0, 0, -70};
