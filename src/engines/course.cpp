@@ -480,9 +480,11 @@ const mbs::View& Course::calc_view() {
   v.time = time_;
   v.X_WB = motion_.X_WB;
   v.w_WB = motion_.w_WB;
+  v.centre.resize(B);
   v.v_WB.resize(B);
   v.mass.resize(B);
   for (size_t b = 0; b < B; ++b) {
+    v.centre[b] = motion_.X_WB[b] * body_[b].p_BBcm;
     v.v_WB[b] = calc_velocity_of_centre(b);
     v.mass[b] = body_[b].mass;
   }

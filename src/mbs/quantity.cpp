@@ -54,7 +54,7 @@ double calc_scalar(const Quantity& q, const View& v) {
 Vec3 calc_vector(const Quantity& q, const View& v) {
   switch (q.kind) {
     case Kind::Position:
-      return pose_at(v, q.index).p;
+      return vector_at(v.centre, q.index);
     case Kind::Velocity:
       return vector_at(v.v_WB, q.index);
     case Kind::AngularVelocity:

@@ -37,6 +37,7 @@ enum class ElementState : std::uint8_t { Elastic, Yielded, Softening, Broken, Re
 struct View {
   double time = 0;
   std::vector<Pose> X_WB;
+  std::vector<Vec3> centre;                    // of mass, in W; the origin of B until an event replaces the body [m]
   std::vector<Vec3> v_WB, w_WB;                // of the centre of mass, of the body; in W
   std::vector<double> mass;                    // current [kg]
   std::vector<ElementState> element_state;     // zone elements, then rotational elements

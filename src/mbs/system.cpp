@@ -792,11 +792,13 @@ void System::look() {
   const size_t R = rotationals.size();
   v.time = s.time;
   v.X_WB.resize(B);
+  v.centre.resize(B);
   v.v_WB.resize(B);
   v.w_WB.resize(B);
   v.mass.resize(B);
   for (size_t b = 0; b < B; ++b) {
     v.X_WB[b] = {s.p[b] - s.R[b] * s.p_offset[b], s.q[b]};
+    v.centre[b] = s.p[b];
     v.v_WB[b] = calc_velocity(b, body_reaction[b]);
     v.w_WB[b] = calc_angular_velocity(b, body_reaction_turn[b]);
     v.mass[b] = s.body[b].mass;

@@ -20,7 +20,7 @@ double System::calc_component(const Quantity& q, int component) {
   const State& s = state;
   switch (q.kind) {
     case Quantity::Kind::Position:
-      return component_of(s.p[i] - s.R[i] * s.p_offset[i], component);
+      return component_of(Vec3(s.p[i]), component);
     case Quantity::Kind::Velocity:
       return component_of(calc_velocity(i), component);
     case Quantity::Kind::AngularVelocity:
