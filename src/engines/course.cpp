@@ -108,8 +108,9 @@ bool Course::find_start() {
   return true;
 }
 
-bool Course::start(double step) {
+bool Course::start(double step, bool ends_on_instants) {
   step_ = step;
+  ends_on_instants_ = ends_on_instants || step == 0;
   summary_.step = summary_.shortest_step = step;
   if (!find_start()) {
     is_over_ = true;

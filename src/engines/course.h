@@ -62,8 +62,9 @@ class Course {
 
   /// Poses and velocities at the start (of the native engine's equilibrium, if that is asked for) and events at time 0.
   /// False if there is no equilibrium; the summary says so. The engine then builds its system and accepts time 0.
-  ///   step  that the engine takes; 0: variable [s]
-  bool start(double step);
+  ///   step              that the engine takes; 0: variable [s]
+  ///   ends_on_instants  its steps end on next_stop(), as variable ones do; else the one nearest to an instant counts
+  bool start(double step, bool ends_on_instants = false);
   /// The next instant at which a state is wanted: a frame, a sample, an event or the end [s].
   double next_stop() const;
   /// A state that the engine has accepted; the first one at time 0. `find_reactions` is called if they are needed.
@@ -105,7 +106,7 @@ class Course {
   bool is_at_rest();
   bool is_frame_due() const;
   double calc_frame_interval() const { return std::max(options_.frame_interval, step_); }
-  double calc_early() const { return step_ > 0 ? 0.5 * step_ : 1e-12 * (1 + time_); }
+  double calc_early() const { return ends_on_instants_ ? 1e-12 * (1 + time_) : 0.5 * step_; }
   void show();
   const mbs::View& calc_view();
   Vec3 calc_velocity_of_centre(size_t body) const;
@@ -132,7 +133,8 @@ class Course {
   size_t next_event_ = 0;
   double time_ = 0, step_ = 0, last_event_ = 0, quiet_since_ = -1, shown_ = -1;
   long frame_ = 0;
-  bool is_started_ = false, is_over_ = false, must_rebuild_ = false, needs_reactions_ = false, is_viewed_ = false;
+  bool ends_on_instants_ = false, is_started_ = false, is_over_ = false, must_rebuild_ = false,
+       needs_reactions_ = false, is_viewed_ = false;
   double removed_ = 0, gravity_at_start_ = 0, total_at_start_ = 0, released_ = 0, largest_residual_ = 0;  // [J]
   std::chrono::steady_clock::time_point begin_;
 };

@@ -258,7 +258,7 @@ class SimbodyEngine : public Engine {
     settings.accuracy = accuracy_.relative > 0 ? accuracy_.relative
                         : settings.step > 0    ? kFixedStepAccuracy
                                                : kDefaultAccuracy;
-    if (!course.start(settings.step)) return course.finish(0);
+    if (!course.start(settings.step, true)) return course.finish(0);
     long steps = 0;
     try {
       if (settings.step == 0 && has_history(model)) settings.longest_step = choose_step(model, options);

@@ -47,6 +47,26 @@ TEST(Simbody, EndsWithAStepLongerThanItsFrames) {
   EXPECT_NEAR(c.frames.back().X_WB[0].p.x, 0.9, 0.06);
 }
 
+TEST(Simbody, SamplesAtTheInstantsThatItsStepsEndOn) {
+  if (!test::is_available("simbody")) GTEST_SKIP() << "not built in";
+  // what is cut off the grid by an event is back on the instants of outputs, the end among them
+  mbs::Model m = make_stone();
+  mbs::Action a;
+  a.kind = mbs::Action::Kind::ReplaceBody;
+  a.body = {0};
+  a.replacement = test::make_body("stone", 1, {1, 1, 1}, {0.1, 0, 0});
+  mbs::Event e;
+  e.time = 0.10017;
+  e.actions = {a};
+  m.events = {e};
+  mbs::Options o = make_options(0.3, 0.1, 5e-4);
+  std::vector<double> times;
+  o.samplings.push_back({1e-3, [&](const mbs::View& v) { times.push_back(v.time); }});
+  (void)make_engine("simbody")->run(m, o);
+  ASSERT_EQ(times.size(), 301u);
+  for (size_t i = 0; i < times.size(); ++i) EXPECT_NEAR(times[i], 1e-3 * static_cast<double>(i), 1e-11);
+}
+
 TEST(SimbodyPhysics, SeesAPulseShorterThanItsSteps) {
   if (!test::is_available("simbody")) GTEST_SKIP() << "not built in";
   mbs::Model m = test::make_empty({});
