@@ -53,7 +53,6 @@ mbs::RunSettings settings_of(const product::Plan&, const Knowledge&, const RunOp
 /// findings about a building.
 record::Record run_model(const mbs::Model&, const RunOptions&, const RunCallbacks&);
 
-
 record::Counts count(const mbs::Model&);
 
 }  // namespace topple::collapse

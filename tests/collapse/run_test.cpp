@@ -237,9 +237,9 @@ TEST(Run, WhatMayStillBeBrokenWhenTheTimeIsOverIsNotJudged) {
 }
 
 TEST(Run, AMechanismIsNotJudgedBeforeItIsFinal) {
-  const record::Record r = run_plan(
-      read(house("[criteria]\nmechanism = \"stands\"\n" + charge("C-A*-0", "0.05 s"), "0.2 s")),
-      default_knowledge(), {}, {});
+  const record::Record r =
+      run_plan(read(house("[criteria]\nmechanism = \"stands\"\n" + charge("C-A*-0", "0.05 s"), "0.2 s")),
+               default_knowledge(), {}, {});
   EXPECT_TRUE(is_not_judged(finding(r, "criterion.mechanism"))) << finding(r, "criterion.mechanism").text;
   EXPECT_EQ(finding(r, "mechanism").status, record::Status::Warning);
 }
