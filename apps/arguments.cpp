@@ -1,5 +1,7 @@
 #include "arguments.h"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
@@ -484,8 +486,8 @@ std::string find_unknown(const CLI::App& app) {
   for (const std::string& word : app.remaining(true)) {
     if (!word.starts_with('-')) continue;
     const std::string near = nearest_name(word.substr(0, word.find('=')), known);
-    return name + ": there is no option " + word + (near.empty() ? "" : "; did you mean " + near + "?") + "\nRun " +
-           name + " --help for its options.\n";
+    return fmt::format("{}: there is no option {}{}\nRun {} --help for its options.\n", name, word,
+                       near.empty() ? "" : fmt::format("; did you mean {}?", near), name);
   }
   return "";
 }

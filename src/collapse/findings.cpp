@@ -317,7 +317,7 @@ void add_clearances(const Context& c) {
                           : is_reached || !why.empty() ? Status::Warning
                           : c.is_under_way             ? Status::Info
                                                        : Status::Good;
-    c.add("clearance." + n.name, "Clearance", n.name, text + "." + why, a.least, "m", status);
+    c.add("clearance." + n.name, "Clearance", n.name, fmt::format("{}.{}", text, why), a.least, "m", status);
   }
 }
 

@@ -283,9 +283,10 @@ class Evaluator {
         if (!has_answered_ && ++starts_in_vain_ >= most_starts) {
           const std::string all =
               fmt::format("was started {} times and ended without an answer each time", starts_in_vain_);
-          refuse_silent(all + words, ended_without_answer + words, "give it a point by hand to see what it says");
+          refuse_silent(all + words, fmt::format("{}{}", ended_without_answer, words),
+                        "give it a point by hand to see what it says");
         } else {
-          give_open(Answer::Kind::Crashed, ended_without_answer + words);
+          give_open(Answer::Kind::Crashed, fmt::format("{}{}", ended_without_answer, words));
         }
         return;
       }
@@ -371,7 +372,7 @@ class Evaluator {
     return false;
   }
 
-  const std::string ended_without_answer = "the evaluator ended without an answer";
+  static constexpr const char* ended_without_answer = "the evaluator ended without an answer";
   static constexpr int most_points = 1'000'000'000 / 2;
   std::vector<std::string> names_;
   int first_ = 0;  // number of the first point of a call
@@ -408,7 +409,7 @@ Refusal read_refusal(const std::string& text) {
   const json j = json::parse(text);
   Refusal r;
   r.diagnostic = {Severity::Error, j.at("code"), {}, 1, j.at("message"), j.at("help")};
-  if (j.at("file") != "") r.diagnostic.where = {j.at("file"), 1, j.at("column")};
+  if (const std::string file = j.at("file"); !file.empty()) r.diagnostic.where = {file, 1, j.at("column")};
   r.line = j.at("line");
   return r;
 }

@@ -629,7 +629,7 @@ class Optimisation {
     std::vector<Point> points;
     if (!has_many_inputs() || !asker_.can_go_on()) return false;
     const int kind = restart_rounds_ % 4;
-    Random random(options_.seed + 104729 * ++restart_rounds_);
+    Random random(options_.seed + 104729 * static_cast<size_t>(++restart_rounds_));
     for (const Goal& goal : make_goals(false)) {
       const Candidate best = find_best(goal);
       if (!is_open(goal.level) || best.sample < 0 || (!of_all && is_confirmed(goal, best))) continue;

@@ -64,7 +64,7 @@ class Climb {
       : space_(space),
         outcome_(outcome),
         options_(options),
-        random_(options.seed + 31 * (outcome + 2)),
+        random_(options.seed + 31 * static_cast<size_t>(outcome + 2)),
         support_(make_box(space, 0)) {
     for (int i = 0; i < space.size(); ++i)
       if (space.inputs[i].width() > 0) axes_.push_back(i);
