@@ -49,12 +49,15 @@ export function Header(props: { run: Run }) {
   );
 }
 
+/// A limit that is kept so far, but that what still moved when the run ended may break; told in either language.
+const isUnjudged = (f: Finding): boolean => / (?:Not judged|Nicht beurteilt): /.test(f.text);
+
 /// What is not as it should be, each with a way to its finding.
 function Summary(props: { run: Run }) {
   const { findings } = props.run;
   const verdict = findVerdict(props.run);
   const criteria = findings.filter((f) => f.id.startsWith("criterion.") || f.id.startsWith("clearance."));
-  const unjudged = criteria.filter((f) => f.status === "warning" && f.text.includes("Not judged:")).length;
+  const unjudged = criteria.filter((f) => f.status === "warning" && isUnjudged(f)).length;
   const met = criteria.filter((f) => f.status !== "bad").length - unjudged;
   const open = findings.filter((f) => f !== verdict && (f.status === "bad" || f.status === "warning"));
   open.sort((a, b) => Number(b.status === "bad") - Number(a.status === "bad"));

@@ -10,8 +10,8 @@ import { atLeast, atMost, formatNumber, prettify } from "./units";
 /// Never more than there is: what is spare is rounded down.
 const roundDown = (value: number, decimals: number): string => (Math.floor(value * 10 ** decimals + 1e-6) / 10 ** decimals).toFixed(decimals);
 
-/// The distance that the plan asks for, as a clearance finding ends with it in either language; undefined if it asks for none.
-const findLimit = (f: Finding): string | undefined => /; (?:the limit is|der Grenzwert ist) (\d+(?:[.,]\d+)?) m\.$/.exec(f.text)?.[1]?.replace(",", ".");
+/// The distance that the plan asks for, as a clearance finding tells it in either language; undefined if it asks for none.
+const findLimit = (f: Finding): string | undefined => /; (?:the limit is|der Grenzwert ist) (\d+(?:[.,]\d+)?) m\.(?= |$)/.exec(f.text)?.[1]?.replace(",", ".");
 
 /// What a stability finding says beside the margin at its end, in either language: how many zones have yielded or broken,
 /// and the least margin on the way.

@@ -302,6 +302,9 @@ describe("what would make it fail", () => {
     // a page that is in German already
     assert.deepEqual(tell({ ...hall, text: "Das nächste Teil, C-A1-0, kommt bei 4,10 s auf 9,6 m heran; der Grenzwert ist 4,0 m." }),
       ["Hall: parts come 5.6 m farther than in this run; the limit of 4.0 m is then broken."]);
+    // what still moved may break it
+    assert.deepEqual(tell({ ...hall, status: "warning", text: `${hall.text} Not judged: chimney/12 still moved at 4.6 m/s when the run ended, and may break this limit.` }),
+      ["Hall: parts come 5.6 m farther than in this run; the limit of 4.0 m is then broken."]);
   });
 
   it("rounds what is left down, with a digit behind the point", () => {
