@@ -39,20 +39,6 @@ using json = nlohmann::ordered_json;
 
 namespace {
 
-const char* word_of(record::Status s) {
-  switch (s) {
-    case record::Status::Info:
-      return "info";
-    case record::Status::Good:
-      return "good";
-    case record::Status::Warning:
-      return "warning";
-    case record::Status::Bad:
-      return "bad";
-  }
-  return "";
-}
-
 json to_json(const Diagnostic& d) {
   return {{"severity", d.severity == Severity::Error ? "error" : "warning"},
           {"code", d.code},
@@ -252,7 +238,7 @@ json summary_json(const record::Record& r, const Files& files, int exit_code) {
                                {"text", f.text},
                                {"value", std::isfinite(f.value) ? json(f.value) : json(nullptr)},
                                {"unit", f.unit},
-                               {"status", word_of(f.status)}});
+                               {"status", record::name_of(f.status)}});
     if (collapse::is_violated(f)) out["violated"].push_back(f.id);
     if (collapse::is_not_judged(f)) out["not_judged"].push_back(f.id);
   }

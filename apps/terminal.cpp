@@ -176,6 +176,9 @@ void print_findings(std::FILE* out, const record::Record& r) {
       case record::Status::Bad:
         mark = "X ", tint = "\x1b[31m";
         break;
+      case record::Status::NotJudged:
+        mark = "? ", tint = "\x1b[33m";
+        break;
     }
     // "Mechanism: topple" under "Mechanism" says what its text says
     const std::string title = f.title == heading || f.title.rfind(heading + ": ", 0) == 0 ? "" : f.title + ": ";

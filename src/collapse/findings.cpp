@@ -108,7 +108,7 @@ void add_mechanism(const Context& c, const Mechanism& m) {
   if (m.name == "wrong direction") status = Status::Bad;
   if (c.plan.criteria.mechanism) status = *c.plan.criteria.mechanism == m.name ? Status::Good : Status::Bad;
   if (c.is_under_way) status = Status::Info;
-  if (status == Status::Good && !m.is_final) status = Status::Warning;
+  if (status == Status::Good && !m.is_final) status = Status::NotJudged;
   c.add("mechanism", "Mechanism", (c.is_under_way ? "Mechanism so far: " : "Mechanism: ") + m.name, m.text, m.tilt,
         "rad", status);
 }
@@ -176,7 +176,7 @@ Standing add_stability(const Context& c) {
                       title = fmt::format("Between \"{}\" and \"{}\"", c.stage_name(stages[s].stage),
                                           c.stage_name(stages[s + 1].stage));
     const auto leave_open = [&](const std::string& why) {
-      if (!c.is_under_way) c.add(id, "Stability", title, "Not judged: " + why + ".", kNone, "");
+      if (!c.is_under_way) c.add(id, "Stability", title, "Not judged: " + why + ".", kNone, "", Status::NotJudged);
       out.is_open = true;
     };
     const std::string next = c.stage_name(stages[s + 1].stage);
@@ -312,11 +312,12 @@ void add_clearances(const Context& c) {
     const std::string why = !asked || is_broken ? "" : find_what_is_open(c, [&](const OpenPart& part) {
       return calc_distances_at_end(c, part.body, n.footprint).first - part.way < *n.clearance;
     });
-    const Status status = !asked                       ? (is_reached ? Status::Warning : Status::Info)
-                          : is_broken                  ? Status::Bad
-                          : is_reached || !why.empty() ? Status::Warning
-                          : c.is_under_way             ? Status::Info
-                                                       : Status::Good;
+    const Status status = !asked           ? (is_reached ? Status::Warning : Status::Info)
+                          : is_broken      ? Status::Bad
+                          : !why.empty()   ? Status::NotJudged
+                          : is_reached     ? Status::Warning
+                          : c.is_under_way ? Status::Info
+                                           : Status::Good;
     c.add("clearance." + n.name, "Clearance", n.name, fmt::format("{}.{}", text, why), a.least, "m", status);
   }
 }
@@ -587,7 +588,7 @@ void add_criteria(const Context& c, const Mechanism& m, const Standing& standing
                              double value, const std::string& unit, const std::string& why = "") {
     c.add("criterion." + id, "Criteria", title, met ? text + why : text, value, unit,
           !met           ? Status::Bad
-          : !why.empty() ? Status::Warning
+          : !why.empty() ? Status::NotJudged
                          : Status::Good);
   };
   const std::string falls_on =
@@ -620,13 +621,15 @@ void add_criteria(const Context& c, const Mechanism& m, const Standing& standing
   }
   if (want.stands_between_stages) {
     const bool is_known = standing.fell || !standing.is_open;
-    judge_one("stands_between_stages", "Standing between stages",
-              is_known && standing.fell != *want.stands_between_stages,
-              fmt::format("Asked: {}; found: {}.", *want.stands_between_stages ? "stands" : "falls",
-                          standing.fell ? "falls"
-                          : is_known    ? "stands"
-                                        : "not judged"),
-              kNone, "");
+    c.add("criterion.stands_between_stages", "Criteria", "Standing between stages",
+          fmt::format("Asked: {}; found: {}.", *want.stands_between_stages ? "stands" : "falls",
+                      standing.fell ? "falls"
+                      : is_known    ? "stands"
+                                    : "not judged"),
+          kNone, "",
+          !is_known                                      ? Status::NotJudged
+          : standing.fell != *want.stands_between_stages ? Status::Good
+                                                         : Status::Bad);
   }
 }
 
@@ -694,9 +697,7 @@ bool is_limit(const record::Finding& f) { return f.id.rfind("criterion.", 0) == 
 
 bool is_violated(const record::Finding& f) { return is_limit(f) && f.status == Status::Bad; }
 
-bool is_not_judged(const record::Finding& f) {
-  return is_limit(f) && f.status == Status::Warning && f.text.find(kNotJudged) != std::string::npos;
-}
+bool is_not_judged(const record::Finding& f) { return is_limit(f) && f.status == Status::NotJudged; }
 
 std::string describe_steps(const mbs::Summary& s) {
   std::string text = s.shortest_step < 0.995 * s.step

@@ -606,7 +606,8 @@ void transfer(Archive& a, Record& r, Flat& flat) {
   a.column("findings/text", r.findings, &Finding::text, {});
   a.column("findings/value", r.findings, &Finding::value, {.meaning = "see findings/unit; NaN: no number"});
   a.column("findings/unit", r.findings, &Finding::unit, {});
-  a.column("findings/status", r.findings, &Finding::status, {.meaning = "0 info, 1 good, 2 warning, 3 bad"});
+  a.column("findings/status", r.findings, &Finding::status,
+           {.meaning = "0 info, 1 good, 2 warning, 3 bad, 4 not judged"});
 
   a.first_column("not_modelled", r.not_modelled, std::identity{}, {});
   a.scalar("ending/kind", r.ending, {});
@@ -671,7 +672,7 @@ void check_contents(const Reader& reader, const Record& r) {
   for (const std::uint8_t state : r.zone_state)
     if (state > static_cast<std::uint8_t>(ZoneState::Crushed)) reader.damaged("frames/zone_state has an unknown state");
   for (const Finding& finding : r.findings)
-    if (finding.status > Status::Bad) reader.damaged("findings/status has an unknown status");
+    if (finding.status > Status::NotJudged) reader.damaged("findings/status has an unknown status");
 }
 
 }  // namespace

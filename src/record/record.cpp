@@ -15,6 +15,8 @@ std::string_view name_of(Status status) {
       return "warning";
     case Status::Bad:
       return "bad";
+    case Status::NotJudged:
+      return "not_judged";
   }
   throw std::logic_error("record: unknown status");
 }

@@ -71,8 +71,9 @@ struct Output {
   std::vector<double> value;         // NaN: the engine does not say        (T x C)
 };
 
-enum class Status { Info, Good, Warning, Bad };
-/// "info", "good", "warning", "bad": the words in files.
+/// NotJudged: kept so far, but what still moved when the run ended may change that.
+enum class Status { Info, Good, Warning, Bad, NotJudged };
+/// "info", "good", "warning", "bad", "not_judged": the words in files.
 std::string_view name_of(Status);
 
 /// One line of the answer, in the order shown to the user.

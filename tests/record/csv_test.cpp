@@ -119,10 +119,11 @@ TEST_F(Csv, BodiesWithoutFramesHaveNoPlace) {
 TEST_F(Csv, FindingsNameTheirStatusAndLeaveNoNumberEmpty) {
   write_csv(make_sample(), folder_);
   const Rows table = rows("findings.csv");
-  ASSERT_EQ(table.size(), 4u);
+  ASSERT_EQ(table.size(), 5u);
   EXPECT_THAT(table[1], ElementsAre("mechanism", "Mechanism", "Mechanism", "The building topples to 12°.", "0.21",
                                     "rad", "good"));
   EXPECT_THAT(table[2], ElementsAre("reach", "Debris", "Reach", "", "", "", "bad"));
+  EXPECT_EQ(table[4].back(), "not_judged");
 }
 
 TEST_F(Csv, EachOutputIsATableOfItsOwn) {

@@ -92,7 +92,8 @@ inline Record make_sample() {
               {inf, "rest", "", ""}};
   r.findings = {{"mechanism", "Mechanism", "Mechanism", "The building topples to 12°.", 0.21, "rad", Status::Good},
                 {"reach", "Debris", "Reach", "", std::nan(""), "", Status::Bad},
-                {"stand", "Stages", "Stands", "Yes.", -0.0, "m", Status::Warning}};
+                {"stand", "Stages", "Stands", "Yes.", -0.0, "m", Status::Warning},
+                {"criterion.azimuth", "Criteria", "Direction", "", 0.1, "rad", Status::NotJudged}};
   r.not_modelled = {"air blast", "", "dust"};
   r.ending = "time_limit";
   r.ending_text = "The time limit of 10 s was reached.";

@@ -3,7 +3,7 @@
 export type Point = [number, number];
 export type Triple = [number, number, number];
 export type Quadruple = [number, number, number, number];
-export type Status = "info" | "good" | "warning" | "bad";
+export type Status = "info" | "good" | "warning" | "bad" | "not_judged";
 
 export interface Shape {
   centre: Triple; // in the body's frame [m]

@@ -1,4 +1,4 @@
-import type { Finding, Run } from "./data";
+import type { Finding, Run, Status } from "./data";
 import { StatusSign, StatusWord } from "./signs";
 import { formatDate, formatDuration, prettify } from "./units";
 import { endingWord } from "./vocabulary";
@@ -49,18 +49,18 @@ export function Header(props: { run: Run }) {
   );
 }
 
-/// A limit that is kept so far, but that what still moved when the run ended may break; told in either language.
-const isUnjudged = (f: Finding): boolean => / (?:Not judged|Nicht beurteilt): /.test(f.text);
+/// What is worst first.
+export const openStatuses: readonly Status[] = ["bad", "not_judged", "warning"];
 
 /// What is not as it should be, each with a way to its finding.
 function Summary(props: { run: Run }) {
   const { findings } = props.run;
   const verdict = findVerdict(props.run);
   const criteria = findings.filter((f) => f.id.startsWith("criterion.") || f.id.startsWith("clearance."));
-  const unjudged = criteria.filter((f) => f.status === "warning" && isUnjudged(f)).length;
+  const unjudged = criteria.filter((f) => f.status === "not_judged").length;
   const met = criteria.filter((f) => f.status !== "bad").length - unjudged;
-  const open = findings.filter((f) => f !== verdict && (f.status === "bad" || f.status === "warning"));
-  open.sort((a, b) => Number(b.status === "bad") - Number(a.status === "bad"));
+  const open = findings.filter((f) => f !== verdict && openStatuses.includes(f.status));
+  open.sort((a, b) => openStatuses.indexOf(a.status) - openStatuses.indexOf(b.status));
   const most = 4;
   return (
     <>

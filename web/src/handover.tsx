@@ -33,6 +33,7 @@ export function listConditions(run: Run): string[] {
   const verdict = findVerdict(run);
   const broken = run.findings.filter((f) => f.status === "bad" && f !== verdict && /^(criterion|clearance|stability)\./.test(f.id));
   for (const f of broken) out.push(`It fails already: ${f.title}.`);
+  for (const f of run.findings.filter((g) => g.status === "not_judged" && g !== verdict)) out.push(`What the run did not show is otherwise: ${f.title}.`);
   const charges = run.events.filter((e) => e.kind === "charge").length;
   if (charges === 1) out.push("The charge does not fire, or not when the plan says.");
   if (charges > 1) out.push(`One of the ${charges} charges does not fire, or not when the plan says.`);

@@ -26,12 +26,14 @@ const statusPaths: Record<Status, string> = {
   good: "M3.9 8.3 5.3 6.9l1.9 1.9 3.9-4 1.4 1.4-5.3 5.4Z",
   warning: "M7.1 5.6h1.8v4.2H7.1zM7.1 10.9h1.8v1.8H7.1z",
   bad: "M4.4 5.8 5.8 4.4 8 6.6l2.2-2.2 1.4 1.4L9.4 8l2.2 2.2-1.4 1.4L8 9.4l-2.2 2.2-1.4-1.4L6.6 8Z",
+  not_judged: "M5.2 6.2a2.8 2.8 0 1 1 4.1 2.5c-.6.3-.6.5-.6 1.1H7.2c0-1.2.2-1.7 1.2-2.3.6-.4.8-.7.8-1.2a1.2 1.2 0 0 0-2.4 0ZM7.2 10.8h1.6v1.7H7.2z",
 };
 const statusGround: Record<Status, string> = {
   info: "M8 0a8 8 0 1 0 .01 0Z",
   good: "M8 0a8 8 0 1 0 .01 0Z",
   warning: "M8 .6 16 15H0Z",
   bad: "M4.7 0h6.6L16 4.7v6.6L11.3 16H4.7L0 11.3V4.7Z",
+  not_judged: "M0 0h16v16H0Z",
 };
 
 export function StatusSign(props: { status: Status; size?: number }) {

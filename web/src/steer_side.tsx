@@ -1,6 +1,7 @@
 /// Right side: the chosen member with its zones and the path of one of them on its curves; below it the verdict.
 import { useEffect, useRef, useState } from "preact/hooks";
 import uPlot from "uplot";
+import { openStatuses } from "./findings";
 import { Inspector } from "./inspector";
 import { axis, cssColour, namePlot, niceRange } from "./plots";
 import { StatusSign, StatusWord } from "./signs";
@@ -213,7 +214,7 @@ function Verdict(props: { s: SteerState }) {
   const result = s.findings.value;
   const list = result?.findings ?? [];
   const first = list.find((f) => f.id === "mechanism") ?? list[0];
-  const others = list.filter((f) => f !== first && (f.status === "bad" || f.status === "warning" || f.id.startsWith("clearance.")));
+  const others = list.filter((f) => f !== first && (openStatuses.includes(f.status) || f.id.startsWith("clearance.")));
   others.sort((a, b) => Number(b.status === "bad") - Number(a.status === "bad"));
   const ending = s.progress.value?.ending ?? s.branch.value?.ending ?? null;
   return (

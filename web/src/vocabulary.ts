@@ -2,7 +2,7 @@
 /// a shape always stands beside them.
 import type { Status } from "./data";
 
-export const statusWord: Record<Status, string> = { info: "Note", good: "OK", warning: "Caution", bad: "Problem" };
+export const statusWord: Record<Status, string> = { info: "Note", good: "OK", warning: "Caution", bad: "Problem", not_judged: "Not judged" };
 
 export interface ZoneStateWords {
   word: string;

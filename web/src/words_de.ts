@@ -532,6 +532,8 @@ export const german: readonly (readonly [string, string])[] = [
   ["Note", "Hinweis"],
   ["OK", "in Ordnung"],
   ["Caution", "Vorsicht"],
+  ["Not judged", "Nicht beurteilt"],
+  ["What the run did not show is otherwise: {*}.", "Was die Rechnung nicht gezeigt hat, ist anders: {}."],
   ["Problem", "Problem"],
   ["Verdict", "Urteil"],
   ["Limits and ending", "Vorgaben und Ende"],
