@@ -78,7 +78,7 @@ Recorder::Recorder(const mbs::Model& model, const ModelMap& map, const Knowledge
                    {"energy_contact_loss", "Dissipated by impact", "J", "energy", {}},
                    {"energy_removed", "Taken away with debris", "J", "energy", {}},
                    {"energy_residual", "Error of the balance", "J", "energy", {}},
-                   {"broken_zones", "Broken zones", "1", "count", {}},
+                   {"broken_zones", "Broken zones and joints", "1", "count", {}},
                    {"connected_share", "Connected share of the upper block", "1", "share", {}}};
   if (!model.loads.empty()) record.series.push_back({"energy_loads", "Work of loads", "J", "energy", {}});
 }

@@ -401,7 +401,7 @@ class Manager {
     const auto take_build = [](json& definition) {
       json& identity = definition["identity"];
       if (!identity.is_object()) identity = json::object();
-      const std::string build = identity.value("topple", "");
+      std::string build = identity.value("topple", "");
       identity.erase("topple"), definition.erase("settings");
       return build;
     };

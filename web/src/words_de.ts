@@ -518,7 +518,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["Taken away with debris", "Mit Auswurf entfernt"],
   ["Error of the balance", "Fehler der Bilanz"],
   ["Work of loads", "Arbeit der Lasten"],
-  ["Broken zones", "Gebrochene Zonen"],
+  ["Broken zones and joints", "Gebrochene Zonen und Gelenke"],
   ["Connected share of the upper block", "Zusammenhängender Teil des oberen Blocks"],
   ["Energies", "Energien"],
   ["Load on row {}", "Last auf Reihe {}"],
