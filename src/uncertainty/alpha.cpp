@@ -197,7 +197,7 @@ class Optimisation {
   /// mappings whose inputs act on their own.
   void scan() {
     std::vector<Point> points;
-    Random random(options_.seed + 7919 * (rounds_ + 1));
+    Random random(options_.seed + 7919 * static_cast<std::uint64_t>(rounds_ + 1));
     std::set<std::pair<int, int>> done;  // sample and level
     for (const Goal& goal : make_goals(false)) {
       const Candidate best = find_best(goal);
