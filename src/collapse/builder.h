@@ -108,6 +108,7 @@ struct Builder : BuilderState {
   void make_columns();
   void make_loose_nodes();
   void make_beams();
+  double mass_of_slab(const GridPoint&, int index) const;  // with its floor load [kg]
   void make_slabs();
   void make_walls();
   void make_shaft(int member);

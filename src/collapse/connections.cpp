@@ -377,7 +377,9 @@ void Builder::connect_x_beam(const GridPoint& at, int index) {
   const Stiffness s = calc_stiffness(z);
   const double L = z.clear_length;
   const int body = own_body.at(index);
-  const Vec3 translational{2 * s.EA / L, 2 * s.GA / L, 2 * s.GA / L};
+  // a slab pushes sideways all along it: its mean deflection between ends that are held is p L^4 / (720 EI)
+  const double sideways = 1 / (L / (2 * s.GA) + L * L * L / (360 * s.uncracked_EI_z));
+  const Vec3 translational{2 * s.EA / L, sideways, 2 * s.GA / L};
   const Vec3 rotational{2 * s.GJ / L, 6 * s.uncracked_EI_y / L, 6 * s.uncracked_EI_z / L};
   const std::array<mbs::Cracking, 2> cracking = calc_cracking(z, s, L / 6, L / 6);
   // fixed-end moments of the weight it carries: at rest the ends are turned so that they pull at the top
@@ -431,7 +433,7 @@ void Builder::connect_slab(const GridPoint& at, int index) {
   const Vec3 middle = 0.5 * (m.start + m.end);
   // a strip as a prismatic member, concentrated at its middle; in its plane a deep beam with shear
   const auto join = [&](const std::string& name, int a, int b, const Vec3& p_W, const Mat3& axes, double width,
-                        double span, bool has_ends) {
+                        double span, bool has_ends, double mid_moment = 0) {
     if (a < 0 || b < 0 || a == b) return;
     if (!(span > 0)) return complain(index, "no clear span is left between its columns");
     const double EA = rcc.EA * width * kept, EI = rcc.EI * width * kept;
@@ -440,6 +442,8 @@ void Builder::connect_slab(const GridPoint& at, int index) {
     if (has_ends) stations = {{-0.5 * span, law}, {0.5 * span, law}};
     add_element(name, index, a, b, p_W, axes, {EA / span, EA / 2.4 / 1.2 / span, 12 * EI / (span * span * span)},
                 {EI / span, EI / span, EA * width * width / 12 / span}, std::move(stations));
+    mbs::ZoneElement& e = model.elements.back();
+    e.X_BM.q = e.X_BM.q * exp_rotation({0, -mid_moment * span / EI, 0});
   };
   // on each side a beam carries it, or the two joints at its corners do
   std::array<int, 2> beam{};
@@ -456,8 +460,9 @@ void Builder::connect_slab(const GridPoint& at, int index) {
   }
   if (beam[0] >= 0 && beam[1] >= 0) {
     const double width = span_x - half[0][0].x - half[0][1].x;
+    // between edges that do not turn its middle bears w s^2 / 24 of its weight, the edges w s^2 / 12
     join(m.name, beam[0], beam[1], {m.start.x + half[0][0].x + 0.5 * width, middle.y, middle.z}, y_beam_axes(), width,
-         span_y, false);
+         span_y, false, plan.analysis.gravity * mass_of_slab(at, index) * span_y / 24);
     return;
   }
   // between joints it is held at their faces and turns there

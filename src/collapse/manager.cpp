@@ -312,12 +312,17 @@ void Builder::make_beams() {
     }
 }
 
+double Builder::mass_of_slab(const GridPoint& at, int index) const {
+  const Member& m = plan.members[static_cast<size_t>(index)];
+  const double load = plan.storey_loads[static_cast<size_t>(at.storey)];
+  return product::calc_mass(plan, m) + load * std::abs((m.end.x - m.start.x) * (m.end.y - m.start.y));
+}
+
 void Builder::make_slabs() {
   for (const auto& [at, index] : slabs) {
     const Member& m = member(index);
     const double thickness = panel_of(index).thickness;
-    const double load = plan.storey_loads[static_cast<size_t>(at.storey)];
-    const double mass = product::calc_mass(plan, m) + load * std::abs((m.end.x - m.start.x) * (m.end.y - m.start.y));
+    const double mass = mass_of_slab(at, index);
     // the strips keep clear of the joints and of the beams across
     const auto edge = [&, at = at](int row) {
       double half = 0;

@@ -9,7 +9,6 @@
 #include <set>
 #include <span>
 
-#include "base/interpolate.h"
 #include "base/rotation_fit.h"
 #include "base/unit.h"
 #include "mbs/zone.h"
@@ -469,10 +468,15 @@ Touchdown Recorder::calc_touchdown(int body, double time, double speed) const {
   return out;
 }
 
-double Recorder::kinetic_at(double time) const {
-  for (const record::Series& s : record_.series)
-    if (s.id == "energy_kinetic") return interpolate(record_.time, s.value, time);
-  return 0;
+double Recorder::kinetic_before(double time) const {
+  const auto series = std::find_if(record_.series.begin(), record_.series.end(),
+                                   [](const record::Series& s) { return s.id == "energy_kinetic"; });
+  const std::vector<double>& t = record_.time;
+  const size_t i = static_cast<size_t>(std::lower_bound(t.begin(), t.end(), time) - t.begin());
+  if (series == record_.series.end() || i == 0) return 0;
+  const std::vector<double>& k = series->value;
+  if (i == 1) return k[0];
+  return std::max(0.0, k[i - 1] + (k[i - 1] - k[i - 2]) / (t[i - 1] - t[i - 2]) * (time - t[i - 1]));
 }
 
 void Recorder::add_event(record::Event event) {

@@ -53,7 +53,7 @@ class Recorder {
   double start_reaction_error() const { return reaction_error_; }  // |reaction - weight| / weight at the first frame
   double largest_ground_force() const { return largest_ground_force_; }
   double largest_ground_force_time() const { return largest_ground_force_time_; }
-  double kinetic_at(double time) const;  // on the way from one frame to the next [J]
+  double kinetic_before(double time) const;  // carried on from the two frames before it: an impact takes it at once [J]
   /// Plastic shortening of a zone at the last frame; that of a stub never falls [m].
   double shortening_of(int zone) const {
     return zone < 0 || static_cast<size_t>(zone) >= shortening_.size() ? 0 : shortening_[static_cast<size_t>(zone)];
