@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <map>
-#include <regex>
+#include <set>
 #include <sstream>
 #include <string_view>
 
@@ -14,6 +14,7 @@
 #include "product/footprint.h"
 #include "product/foreign_text.h"
 #include "product/import.h"
+#include "product/layer_names.h"
 #include "product/plan_limits.h"
 
 namespace topple::product {
@@ -157,7 +158,7 @@ std::vector<Outline> find_outlines(const std::vector<Pair>& pairs, const std::st
     }
     if (entity.empty()) continue;
     const bool has_corner = entity == "LWPOLYLINE" || in_vertex;
-    if (p.code == 8 && !in_vertex) now.layer = p.value;
+    if (p.code == 8 && !in_vertex) now.layer = decode_dxf_text(p.value);
     if (p.code == 67 && !in_vertex) now.is_on_paper = p.value != "0";
     if (p.code == 70 && !in_vertex) {
       const int flags = std::atoi(p.value.c_str());
@@ -225,8 +226,6 @@ Import make_site_text(const std::string& dxf, const std::string& file_name, doub
       out.report.guessed.push_back("the drawing's numbers are metres: its header does not say");
     }
   }
-  static const std::regex utility(
-      "utilit|gas|water|wasser|power|strom|kabel|cable|sewer|kanal|pipe|leitung|fernw|telek", std::regex::icase);
   std::map<std::string, int> count;
   std::string neighbours, utilities;
   std::map<std::string, int> others, left_out;
@@ -252,7 +251,8 @@ Import make_site_text(const std::string& dxf, const std::string& file_name, doub
     arcs += o.has_arcs;
     std::string layer = clean_text(o.layer);
     if (layer.empty()) layer = "outline";
-    const bool is_utility = std::regex_search(layer, utility);
+    const bool is_utility = names_utility(layer);
+    if (is_utility) utility_layers.insert(layer);
     std::string& to = is_utility ? utilities : neighbours;
     to += fmt::format("[[site.{}]]\nname = \"{} {}\"\nfootprint = [", is_utility ? "utility" : "neighbour", layer,
                       ++count[layer]);
@@ -268,7 +268,11 @@ Import make_site_text(const std::string& dxf, const std::string& file_name, doub
   if (taken > limits::neighbours)
     fail(file_name, 0, fmt::format("has {} closed outlines", taken), "a plan holds 1000; leave out what is not near");
   out.report.taken.push_back(fmt::format("{} closed outlines", taken));
-  if (!utilities.empty()) out.report.guessed.push_back("outlines on layers named like pipes and cables are utilities");
+  if (!utilities.empty()) {
+    list.clear();
+    for (const std::string& layer : utility_layers) list += (list.empty() ? "" : ", ") + layer;
+    out.report.guessed.push_back("outlines on layers named like pipes and cables are utilities: " + list);
+  }
   for (const auto& [kind, number] : left_out)
     out.report.missing.push_back(fmt::format("{} {} are left out", number, kind));
   if (!others.empty()) {
@@ -285,3 +289,4 @@ Import make_site_text(const std::string& dxf, const std::string& file_name, doub
 }
 
 }  // namespace topple::product
+  std::set<std::string> utility_layers;
