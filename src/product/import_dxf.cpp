@@ -100,10 +100,67 @@ double unit_of(const std::string& code) {
 struct Outline {
   int line = 1;  // where it begins
   std::string layer;
-  bool is_closed = false, has_arcs = false, is_on_paper = false, is_mesh = false, lacks_y = false;
+  bool is_closed = false, is_on_paper = false, is_mesh = false, lacks_y = false;
   std::array<double, 3> extrusion{0, 0, 1};
   std::vector<std::array<double, 2>> corners;
+  std::vector<double> bulges;  // of the edge behind each corner: tan of a quarter of its arc's angle; 0: straight
 };
+
+constexpr double kArcError = 0.01;            // of chords of an arc [m]
+const double kFinest = std::acos(-1.0) / 36;  // angle of a chord where that would take more
+const double kCoarsest = std::acos(-1.0) / 4;
+
+bool has_arcs(const Outline& o) {
+  return std::any_of(o.bulges.begin(), o.bulges.end(), [](double b) { return b != 0; });
+}
+
+/// Corners with chords for arcs, all of whose area they hold: arcs bent outwards lie within them, those bent inwards
+/// are cut off. Chords of `finest` or more. Corners in metres.
+std::vector<std::array<double, 2>> flatten(const Outline& o, double finest) {
+  const size_t n = o.corners.size();
+  double area = calc_signed_area(o.corners);
+  const auto arc = [&](size_t i) {
+    const auto &a = o.corners[i], &b = o.corners[(i + 1) % n];
+    const double angle = 4 * std::atan(o.bulges[i]), chord = std::hypot(b[0] - a[0], b[1] - a[1]);
+    return std::pair(angle, angle == 0 ? 0 : 0.5 * chord / std::abs(std::sin(0.5 * angle)));
+  };
+  for (size_t i = 0; i < n; ++i) {
+    const auto [angle, radius] = arc(i);
+    area += 0.5 * radius * radius * (angle - std::sin(angle));
+  }
+  std::vector<std::array<double, 2>> out;
+  for (size_t i = 0; i < n; ++i) {
+    const auto &a = o.corners[i], &b = o.corners[(i + 1) % n];
+    out.push_back(a);
+    const auto [angle, radius] = arc(i);
+    if (!(radius > 1e-6)) continue;
+    // as many as the error asks for
+    const double least = 2 * std::acos(radius / (radius + kArcError));
+    const int pieces =
+        std::max(1, static_cast<int>(std::ceil(std::abs(angle) / std::clamp(least, finest, kCoarsest) - 1e-9)));
+    const double step = angle / pieces, side = angle > 0 ? 1 : -1;
+    // the centre lies to the left of an arc that runs counterclockwise
+    const double chord = std::hypot(b[0] - a[0], b[1] - a[1]), off = side * radius * std::cos(0.5 * angle) / chord;
+    const double x = 0.5 * (a[0] + b[0]) - off * (b[1] - a[1]), y = 0.5 * (a[1] + b[1]) + off * (b[0] - a[0]);
+    const double from = std::atan2(a[1] - y, a[0] - x);
+    const bool is_outward = (angle > 0) == (area > 0);
+    for (int k = 0; k < pieces; ++k) {
+      // corners of tangents, or points of the arc
+      const double r = is_outward ? radius / std::cos(0.5 * step) : radius,
+                   at = from + (k + (is_outward ? 0.5 : 1)) * step;
+      if (is_outward || k + 1 < pieces) out.push_back({x + r * std::cos(at), y + r * std::sin(at)});
+    }
+  }
+  return out;
+}
+/// The same with chords as fine as the corners of a footprint allow.
+void flatten(Outline& o) {
+  double finest = kFinest;
+  std::vector<std::array<double, 2>> corners = flatten(o, finest);
+  while (corners.size() > limits::corners && finest < kCoarsest)
+    corners = flatten(o, finest = std::min(1.25 * finest, kCoarsest));
+  o.corners = std::move(corners);
+}
 
 /// `others` counts the entities that are no polylines, by kind.
 std::vector<Outline> find_outlines(const std::vector<Pair>& pairs, const std::string& name,
@@ -112,6 +169,8 @@ std::vector<Outline> find_outlines(const std::vector<Pair>& pairs, const std::st
   std::string section;
   bool in_polyline = false, in_vertex = false, has_y = true;
   Outline now;
+  std::array<double, 2> centre{};  // of a circle
+  double radius = 0;
   std::string entity;
   const auto end_corner = [&] {
     now.lacks_y |= !has_y;
@@ -119,15 +178,24 @@ std::vector<Outline> find_outlines(const std::vector<Pair>& pairs, const std::st
   };
   const auto finish = [&] {
     end_corner();
-    if (entity == "LWPOLYLINE" || entity == "POLYLINE") {
+    if (entity == "CIRCLE") {  // two halves
+      now.is_closed = true;
+      now.corners = {{centre[0] - radius, centre[1]}, {centre[0] + radius, centre[1]}};
+      now.bulges = {1, 1};
+      now.lacks_y = false;
+    }
+    if (entity == "LWPOLYLINE" || entity == "POLYLINE" || entity == "CIRCLE") {
       // drawn on a plane that is seen from below: its x axis is the other way round
       if (now.extrusion[2] < 0)
-        for (auto& corner : now.corners) corner[0] = -corner[0];
+        for (size_t i = 0; i < now.corners.size(); ++i)
+          now.corners[i][0] = -now.corners[i][0], now.bulges[i] = -now.bulges[i];
       out.push_back(now);
     } else if (!entity.empty() && entity != "ENDSEC" && entity != "EOF") {
       ++others[entity];
     }
     now = {};
+    centre = {};
+    radius = 0;
     entity.clear();
   };
   for (size_t i = 0; i < pairs.size(); ++i) {
@@ -166,17 +234,20 @@ std::vector<Outline> find_outlines(const std::vector<Pair>& pairs, const std::st
       now.is_mesh = entity == "POLYLINE" && (flags & (16 | 64)) != 0;
     }
     if (p.code == 70 && in_vertex && (std::atoi(p.value.c_str()) & 16) != 0 && !now.corners.empty())
-      now.corners.pop_back();  // of the frame that a spline follows
+      now.corners.pop_back(), now.bulges.pop_back();  // of the frame that a spline follows
     if (p.code == 10 && has_corner) {
       end_corner();
       now.corners.push_back({read_length(p, name), 0});
+      now.bulges.push_back(0);
       has_y = false;
     }
     if (p.code == 20 && has_corner && !now.corners.empty()) {
       now.corners.back()[1] = read_length(p, name);
       has_y = true;
     }
-    if (p.code == 42 && has_corner && read_length(p, name) != 0) now.has_arcs = true;
+    if (p.code == 42 && has_corner && !now.corners.empty()) now.bulges.back() = read_length(p, name);
+    if (entity == "CIRCLE" && (p.code == 10 || p.code == 20)) centre[p.code == 20] = read_length(p, name);
+    if (entity == "CIRCLE" && p.code == 40) radius = std::abs(read_length(p, name));
     if ((p.code == 210 || p.code == 220 || p.code == 230) && !in_vertex)
       now.extrusion[static_cast<size_t>(p.code / 10 - 21)] = read_length(p, name);
   }
@@ -229,18 +300,29 @@ Import make_site_text(const std::string& dxf, const std::string& file_name, doub
   std::map<std::string, int> count;
   std::string neighbours, utilities;
   std::map<std::string, int> others, left_out;
+  std::set<std::string> utility_layers;
   size_t arcs = 0, taken = 0;
   for (Outline& o : find_outlines(pairs, file_name, others)) {
     double far = 0;
+    const auto round_corners = [&] {
+      far = 0;
+      for (auto& corner : o.corners)
+        for (double& x : corner) {
+          x = std::round(x * 1000) / 1000;  // as it is written
+          far = std::max(far, std::abs(x));
+        }
+    };
     for (auto& corner : o.corners)
-      for (double& x : corner) {
-        x = std::round(x * unit * 1000) / 1000;  // as it is written
-        far = std::max(far, std::abs(x));
-      }
-    if (o.corners.size() > 1 && o.corners.front() == o.corners.back()) {
+      for (double& x : corner) x *= unit;
+    const bool is_arced = has_arcs(o);
+    if (const auto near = [](double a, double b) { return std::abs(a - b) < 5e-4; };
+        o.corners.size() > 1 && near(o.corners.front()[0], o.corners.back()[0]) &&
+        near(o.corners.front()[1], o.corners.back()[1])) {
       o.is_closed = true;
-      o.corners.pop_back();
+      o.corners.pop_back(), o.bulges.pop_back();
     }
+    if (is_arced && o.is_closed && o.corners.size() > 1) flatten(o);
+    round_corners();
     if (const std::string why = why_not(o); !why.empty()) {
       ++left_out[why];
       continue;
@@ -248,7 +330,7 @@ Import make_site_text(const std::string& dxf, const std::string& file_name, doub
     if (far > limits::site.high)
       fail(file_name, o.line, fmt::format("an outline lies {:.0f} km from the origin", far / 1000),
            "a plan reaches 10 km: move the drawing so that its origin is row A, frame 1, or give its unit");
-    arcs += o.has_arcs;
+    arcs += is_arced;
     std::string layer = clean_text(o.layer);
     if (layer.empty()) layer = "outline";
     const bool is_utility = names_utility(layer);
@@ -264,7 +346,8 @@ Import make_site_text(const std::string& dxf, const std::string& file_name, doub
   std::string list;
   for (const auto& [kind, number] : left_out) list += fmt::format("; {} {} are left out", number, kind);
   if (taken == 0)
-    fail(file_name, 0, "has no closed outlines", "neighbours are closed LWPOLYLINE or POLYLINE entities" + list);
+    fail(file_name, 0, "has no closed outlines",
+         "neighbours are closed LWPOLYLINE or POLYLINE entities, or CIRCLE" + list);
   if (taken > limits::neighbours)
     fail(file_name, 0, fmt::format("has {} closed outlines", taken), "a plan holds 1000; leave out what is not near");
   out.report.taken.push_back(fmt::format("{} closed outlines", taken));
@@ -278,9 +361,12 @@ Import make_site_text(const std::string& dxf, const std::string& file_name, doub
   if (!others.empty()) {
     list.clear();
     for (const auto& [kind, number] : others) list += fmt::format("{}{} {}", list.empty() ? "" : ", ", number, kind);
-    out.report.missing.push_back("entities that are no polylines, blocks among them, are left out: " + list);
+    out.report.missing.push_back("entities that are neither polylines nor circles, blocks among them, are left out: " +
+                                 list);
   }
-  if (arcs > 0) out.report.guessed.push_back(fmt::format("arcs of {} outlines became straight lines", arcs));
+  if (arcs > 0)
+    out.report.guessed.push_back(
+        fmt::format("arcs of {} outlines became chords; the outlines hold all that is within the arcs", arcs));
   out.report.guessed.push_back("x and y of the drawing are those of the plan: its origin is row A, frame 1");
   out.report.missing.push_back("the clearance that each of them asks for");
   out.text = "# From " + clean_text(file_name) + ". Every \"?\" is a gap to fill.\n" + neighbours + utilities;
@@ -289,4 +375,3 @@ Import make_site_text(const std::string& dxf, const std::string& file_name, doub
 }
 
 }  // namespace topple::product
-  std::set<std::string> utility_layers;

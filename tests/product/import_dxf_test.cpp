@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <regex>
 #include <string>
 
 #include "product/import.h"
@@ -12,6 +14,9 @@ namespace {
 
 using testing::Contains;
 using testing::HasSubstr;
+using testing::Not;
+
+constexpr double kPi = 3.14159265358979323846;
 
 std::string drawing(const std::string& entities) {
   return "0\nSECTION\n2\nENTITIES\n" + entities + "0\nENDSEC\n0\nEOF\n";
@@ -28,6 +33,31 @@ std::string outline(const std::string& layer, const std::vector<Corner>& corners
   return out;
 }
 const std::vector<Corner> kSquare{{0, 0}, {4, 0}, {4, 4}, {0, 4}};
+
+/// Corners of the first footprint of a site.
+std::vector<Corner> corners_of(const std::string& text) {
+  std::vector<Corner> out;
+  static const std::regex corner(R"re(\["(-?[0-9.]+) m", "(-?[0-9.]+) m"\])re");
+  const std::string line = text.substr(text.find("footprint"), text.find("clearance") - text.find("footprint"));
+  for (std::sregex_iterator at(line.begin(), line.end(), corner), end; at != end; ++at)
+    out.push_back({std::stod((*at)[1]), std::stod((*at)[2])});
+  return out;
+}
+double area_of(const std::vector<Corner>& c) {
+  double sum = 0;
+  for (size_t i = 0; i < c.size(); ++i) {
+    const Corner &a = c[i], &b = c[(i + 1) % c.size()];
+    sum += 0.5 * (a.x * b.y - b.x * a.y);
+  }
+  return sum;
+}
+bool holds(const std::vector<Corner>& c, double x, double y) {
+  bool is_inside = false;
+  for (size_t i = 0, j = c.size() - 1; i < c.size(); j = i++)
+    if ((c[i].y > y) != (c[j].y > y) && x < c[j].x + (c[i].x - c[j].x) * (y - c[j].y) / (c[i].y - c[j].y))
+      is_inside = !is_inside;
+  return is_inside;
+}
 
 TEST(ImportDxfLayers, NameUtilitiesByWholeWords) {
   for (const char* layer : {"GAS",
@@ -78,6 +108,55 @@ TEST(ImportDxfLayers, DecodeCharactersByTheirCode) {
   EXPECT_EQ(decode_dxf_text("\\U+00DCbung \\U+20ac \\U+12 \\U"), "Übung € \\U+12 \\U");
   EXPECT_THAT(make_site_text(drawing(outline("M\\U+00FChle", kSquare)), "s.dxf", 1).text,
               HasSubstr("name = \"Mühle 1\""));
+}
+
+TEST(ImportDxfArcs, CirclesLieWithinTheirOutlines) {
+  const std::string circle = "0\nCIRCLE\n8\nTank\n10\n10.0\n20\n20.0\n30\n0.0\n40\n5.0\n";
+  for (const std::string& entity :
+       {circle, outline("Tank", {{5, 20, 1}, {15, 20, 1}}), outline("Tank", {{5, 20, -1}, {15, 20, -1}}),
+        outline("Tank", {{5, 20, 1}, {15, 20, 1}, {5, 20, 0}})}) {
+    const Import made = make_site_text(drawing(entity), "s.dxf", 1);
+    const std::vector<Corner> c = corners_of(made.text);
+    ASSERT_GT(c.size(), 30u);
+    EXPECT_LE(c.size(), 80u);
+    for (int i = 0; i < 360; ++i) {
+      const double a = i * kPi / 180;
+      EXPECT_TRUE(holds(c, 10 + 4.998 * std::cos(a), 20 + 4.998 * std::sin(a))) << i;
+      EXPECT_FALSE(holds(c, 10 + 5.012 * std::cos(a), 20 + 5.012 * std::sin(a))) << i;
+    }
+    EXPECT_THAT(made.report.guessed, Contains(HasSubstr("arcs of 1 outlines became chords")));
+    EXPECT_THAT(made.report.missing, Not(Contains(HasSubstr("CIRCLE"))));
+  }
+}
+
+TEST(ImportDxfArcs, BentInwardsAreCutOff) {
+  // a square with a half circle out of one side and one into another, in both directions of going round
+  const double exact = 16;
+  for (const bool is_turned : {false, true}) {
+    std::vector<Corner> corners{{0, 0, 0}, {4, 0, 1}, {4, 4, 0}, {0, 4, -1}};
+    if (is_turned) corners = {{0, 0, 1}, {0, 4, 0}, {4, 4, -1}, {4, 0, 0}};
+    const std::vector<Corner> c = corners_of(make_site_text(drawing(outline("H", corners)), "s.dxf", 1).text);
+    EXPECT_GT(std::abs(area_of(c)), exact) << is_turned;
+    EXPECT_LT(std::abs(area_of(c)), exact + 0.15) << is_turned;
+    for (int i = -85; i < 86; ++i) {
+      const double a = i * kPi / 180;
+      EXPECT_TRUE(holds(c, 4 + 1.998 * std::cos(a), 2 + 1.998 * std::sin(a))) << i;
+      EXPECT_TRUE(holds(c, 2.002 * std::cos(a), 2 + 2.002 * std::sin(a))) << i;
+    }
+  }
+}
+
+TEST(ImportDxfArcs, KeepToTheCornersOfAPlanAndToPlanesSeenFromBelow) {
+  std::vector<Corner> scallops;  // 60 bays around
+  for (int i = 0; i < 60; ++i) scallops.push_back({100 * std::cos(i * kPi / 30), 100 * std::sin(i * kPi / 30), 0.4});
+  const std::vector<Corner> c = corners_of(make_site_text(drawing(outline("H", scallops)), "s.dxf", 1).text);
+  EXPECT_GT(c.size(), 119u);
+  EXPECT_LE(c.size(), 200u);
+  std::string below = outline("H", {{2, 0, 1}, {6, 0, 0}});
+  below.insert(below.find("10\n2"), "210\n0\n220\n0\n230\n-1\n");
+  const std::vector<Corner> half = corners_of(make_site_text(drawing(below), "s.dxf", 1).text);
+  EXPECT_TRUE(holds(half, -4, -1.99));
+  EXPECT_FALSE(holds(half, -4, 0.1));
 }
 
 }  // namespace
