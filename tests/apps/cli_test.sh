@@ -212,7 +212,7 @@ records)
   for f in compare.txt compare.csv; do exists c/$f; done
   expect 0 "$topple" compare r/record.h5 r/record.h5 -o c --json; is_json out
   printf '0.5,missing.png\n' >photos.csv
-  expect 2 "$topple" compare r/record.h5 r/record.h5 -o none --photos photos.csv; has err "photos.csv:1:1: error E681"
+  expect 2 "$topple" compare r/record.h5 r/record.h5 -o none --photos photos.csv; has err "photos.csv:1:5: error E681"
   expect 2 "$topple" compare r/record.h5 missing.h5 -o none; expect 2 "$topple" compare r/record.h5 -o none
   [ ! -e none ] || { echo "a folder was made for wrong records"; failures=$((failures + 1)); }
   cp r/record.h5 own.h5; expect 2 "$topple" report own.h5 -o own.h5; has err "written over"

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "../base/own_folder.h"
@@ -182,7 +183,8 @@ TEST_F(Photos, AreReadFromATableBesideThem) {
 
 TEST_F(Photos, ThatAreWrongAreRefusedWithTheirLine) {
   write("text.png", "not a picture");
-  for (const char* line : {"1.25 one.png", "soon,one.png", "1,missing.png", "1,text.png"}) {
+  for (const char* line : {"1.25 one.png", "soon,one.png", "nan,text.png", "inf,text.png", "1e999,text.png",
+                           "1,missing.png", "1,text.png", "1,\"text.png", "1,text.png,2"}) {
     const std::string table = write("table.csv", std::string("time,file\n") + line + "\n");
     try {
       (void)read_photos(table);
@@ -192,6 +194,38 @@ TEST_F(Photos, ThatAreWrongAreRefusedWithTheirLine) {
       EXPECT_EQ(e.diagnostics()[0].where.line, 2) << line;
     }
   }
+}
+
+TEST_F(Photos, AreReadFromTablesOfSpreadsheets) {
+  write("a, \"b\".png", "\x89PNG\r\n");
+  const auto photos = read_photos(write(
+      "table.csv", "\xEF\xBB\xBF\"time\",\"file\"\r\n\"0.5\",\"a, \"\"b\"\".png\"\r\n 1 , \"a, \"\"b\"\".png\" \r\n"));
+  ASSERT_EQ(photos.size(), 2u);
+  EXPECT_EQ(photos[0].name, "a, \"b\".png");
+  EXPECT_EQ(photos[1].time, 1);
+  write("c, d.png", "\x89PNG\r\n");
+  EXPECT_EQ(read_photos(write("table.csv", "2,c, d.png\n")).at(0).name, "c, d.png") << "without quotes";
+}
+
+TEST_F(Photos, OutsideOfTheFolderAreRefused) {
+  namespace fs = std::filesystem;
+  write("outside.png", "\x89PNG\r\n");
+  write("in/below/one.png", "\x89PNG\r\n");
+  const fs::path outside = folder / "outside.png";
+  fs::create_symlink(outside, folder / "in/link.png");
+  fs::create_symlink("below/one.png", folder / "in/inner.png");
+  for (const std::string& name : {std::string("../outside.png"), outside.string(), std::string("link.png"),
+                                  std::string("below/../../outside.png")}) {
+    try {
+      (void)read_photos(write("in/table.csv", "1," + name + "\n"));
+      ADD_FAILURE() << name;
+    } catch (const InputError& e) {
+      EXPECT_EQ(e.diagnostics()[0].code, "E681");
+      EXPECT_EQ(e.diagnostics()[0].where.column, 3);
+      EXPECT_THAT(e.diagnostics()[0].message, HasSubstr("outside of the table's folder")) << name;
+    }
+  }
+  EXPECT_EQ(read_photos(write("in/table.csv", "1,below/one.png\n2,inner.png\n3,below/../inner.png\n")).size(), 3u);
 }
 
 }  // namespace
