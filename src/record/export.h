@@ -1,6 +1,7 @@
 #pragma once
 /// A record in the formats of other programs (docs/exports.md). SI, z up, unless a format asks for something else.
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -17,8 +18,10 @@ Record keep_frames(const Record&, double interval);
 std::vector<std::string> export_csv(const Record&, const std::string& folder);
 
 /// Writes record.pvd, which ParaView opens, and vtk/*.vtu: for each frame the parts as hexahedra and the zones as
-/// vertices, once the outlines of the building and of the neighbours. Returns the paths, record.pvd first.
-std::vector<std::string> export_vtk(const Record&, const std::string& folder);
+/// vertices, once the outlines of the building and of the neighbours. Files of an earlier export are taken away first.
+/// Returns the paths, record.pvd first; none where `is_cancelled` says so between two frames, and leaves nothing then.
+std::vector<std::string> export_vtk(const Record&, const std::string& folder,
+                                    const std::function<bool()>& is_cancelled = {});
 
 /// The record as one binary glTF 2.0 file (y up, as that format has it) with its motion as an animation.
 std::string to_gltf(const Record&);

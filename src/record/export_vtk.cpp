@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <regex>
 #include <span>
 #include <string>
 #include <string_view>
@@ -170,10 +171,25 @@ std::string make_site(const Record& r) {
   return grid.to_vtu();
 }
 
+/// Files of an export, which may have had more frames, and the folder if nothing else is in it.
+void remove_earlier(const std::filesystem::path& where) {
+  static const std::regex name("((parts|zones)_[0-9]{5,}|site)\\.vtu");
+  std::error_code ignored;
+  std::filesystem::remove(where / "record.pvd", ignored);
+  std::vector<std::filesystem::path> files;
+  for (std::filesystem::directory_iterator at(where / "vtk", ignored), end; !ignored && at != end;
+       at.increment(ignored))
+    if (std::regex_match(at->path().filename().string(), name)) files.push_back(at->path());
+  for (const auto& file : files) std::filesystem::remove(file, ignored);
+  std::filesystem::remove(where / "vtk", ignored);
+}
+
 }  // namespace
 
-std::vector<std::string> export_vtk(const Record& r, const std::string& folder) {
+std::vector<std::string> export_vtk(const Record& r, const std::string& folder,
+                                    const std::function<bool()>& is_cancelled) {
   const std::filesystem::path where(folder);
+  remove_earlier(where);
   std::vector<std::string> paths{(where / "record.pvd").string()};
   std::string list;
   const auto put = [&](const std::string& name, const std::string& text) {
@@ -182,6 +198,10 @@ std::vector<std::string> export_vtk(const Record& r, const std::string& folder) 
   };
   put("site.vtu", make_site(r));
   for (std::size_t s = 0; s < r.time.size(); ++s) {
+    if (is_cancelled && is_cancelled()) {
+      remove_earlier(where);
+      return {};
+    }
     const std::string parts = fmt::format("parts_{:05}.vtu", s), zones = fmt::format("zones_{:05}.vtu", s);
     put(parts, make_parts(r, s));
     put(zones, make_zones(r, s));

@@ -154,6 +154,23 @@ TEST(CrushedEnds, TakeTheirPartOfABox) {
   EXPECT_NEAR(norm(turned.X_BS.p - Vec3{1 + 0.2 * std::cos(0.5), 0.2 * std::sin(0.5), 0}), 0, 1e-7);
 }
 
+TEST(ExportVtk, LeavesNoFramesOfAnEarlierExport) {
+  const OwnFolder folder;
+  const Record r = make_two();
+  const auto paths = export_vtk(r, folder.str());
+  const fs::path last = fs::path(paths.back()), own = last.parent_path() / "parts_of_mine.vtu";
+  std::ofstream(own) << "mine";
+  export_vtk(keep_frames(r, 1e6), folder.str());
+  EXPECT_FALSE(fs::exists(last));
+  EXPECT_TRUE(fs::exists(own));
+  // what is cancelled between two frames leaves nothing
+  int asked = 0;
+  EXPECT_TRUE(export_vtk(r, folder.str(), [&] { return ++asked > 2; }).empty());
+  EXPECT_EQ(asked, 3);
+  EXPECT_FALSE(fs::exists(folder.path() / "record.pvd"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(last.parent_path()), {}), 1) << "but the file of another";
+}
+
 TEST(ExportVtk, DrawsWhatCrushingLeaves) {
   const OwnFolder folder;
   export_vtk(make_crushed(), folder.str());
