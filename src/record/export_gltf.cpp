@@ -215,7 +215,7 @@ std::string to_gltf(const Record& r) {
   std::vector<std::pair<int, Crushing>> crushed;
   for (std::size_t b = 0; b < r.bodies.size(); ++b) {
     const BodyInfo& body = r.bodies[b];
-    if (body.shapes.empty() || r.time.empty()) continue;
+    if (r.time.empty()) continue;
     Path path = find_path(r, b);
     json shapes = json::array();
     for (std::size_t i = 0; i < body.shapes.size(); ++i) {
@@ -231,8 +231,8 @@ std::string to_gltf(const Record& r) {
     const int node = d.put("nodes", {{"name", body.name},
                                      {"translation", to_list(path.start.p)},
                                      {"rotation", to_list(path.start.q)},
-                                     {"children", std::move(shapes)},
                                      {"extras", {{"kind", body.kind}, {"storey", body.storey}, {"mass", body.mass}}}});
+    if (!shapes.empty()) d.root["nodes"][static_cast<size_t>(node)]["children"] = std::move(shapes);
     children.push_back(node);
     if (path.moves) moving.emplace_back(node, std::move(path));
   }

@@ -171,6 +171,23 @@ TEST(ExportVtk, LeavesNoFramesOfAnEarlierExport) {
   EXPECT_EQ(std::distance(fs::directory_iterator(last.parent_path()), {}), 1) << "but the file of another";
 }
 
+TEST(ExportGltf, HasANodeForBodiesWithoutBoxes) {
+  Record r = make_two();
+  r.bodies[1].shapes.clear();
+  const std::string glb = to_gltf(r);
+  const std::size_t length = *reinterpret_cast<const std::uint32_t*>(glb.data() + 12);
+  const auto j = nlohmann::json::parse(glb.substr(20, length));
+  int found = 0;
+  for (const auto& node : j["nodes"])
+    if (node.value("name", "") == r.bodies[1].name) {
+      ++found;
+      EXPECT_FALSE(node.contains("mesh"));
+      EXPECT_FALSE(node.contains("children"));
+      EXPECT_EQ(node["extras"]["mass"], r.bodies[1].mass);
+    }
+  EXPECT_EQ(found, 1);
+}
+
 TEST(ExportVtk, DrawsWhatCrushingLeaves) {
   const OwnFolder folder;
   export_vtk(make_crushed(), folder.str());
