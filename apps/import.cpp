@@ -23,6 +23,7 @@ void print_list(const char* heading, const std::vector<std::string>& list) {
 
 int import_file(const Arguments& a) {
   namespace fs = std::filesystem;
+  std::string text;
   try {
     const fs::path path(a.input);
     std::string kind = path.extension().string();
@@ -34,7 +35,8 @@ int import_file(const Arguments& a) {
       throw InputError("E802", a.output + " exists already and is left as it is", "choose another name");
     if (kind == ".ifc" && !a.unit.empty())
       throw InputError("E801", "--unit: is for drawings; an IFC file names its own", "leave it out");
-    const std::string text = read_file(a.input), name = path.filename().string();
+    text = read_file(a.input);
+    const std::string name = path.filename().string();
     const double unit = read_quantity(a.unit, Dimension::Length, "--unit");
     const product::Import made = kind == ".ifc" ? product::make_plan_text(product::read_ifc(text, a.input), name)
                                                 : product::make_site_text(text, a.input, unit);
@@ -47,7 +49,7 @@ int import_file(const Arguments& a) {
     for (size_t at = 0; (at = made.text.find("\"?\"", at)) != std::string::npos; ++at) ++gaps;
     std::printf("\n%d gaps are marked \"?\"; topple check names them.\n", gaps);
     return kOk;
-  } catch (const InputError& e) { return refuse(e, {}, {}, false); }
+  } catch (const InputError& e) { return refuse(e, {}, text, false); }
 }
 
 }  // namespace topple::apps

@@ -199,7 +199,7 @@ class Reader {
       if (!is_right)
         throw InputError(std::vector<Diagnostic>{{Severity::Error,
                                                   "E111",
-                                                  {name_, e.line, 0},
+                                                  {name_, e.line, e.column},
                                                   1,
                                                   fmt::format("a coordinate of #{} is no number", id),
                                                   "two or three numbers are wanted"}});

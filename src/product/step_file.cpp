@@ -56,19 +56,28 @@ class Parser {
     StepFile file;
     at_ = text_.size() - without_mark(text_).size();
     skip();
-    if (text_.compare(at_, 12, "ISO-10303-21") != 0) fail("is no STEP file: it does not begin with ISO-10303-21");
+    if (text_.compare(at_, 12, "ISO-10303-21") != 0)
+      fail("is no STEP file: it does not begin with ISO-10303-21", "give an IFC file in STEP form (.ifc)");
     skip_statement();
     while (!read_header_statement(file)) {}
     size_t counted = 0;
-    int line = 1;
+    int line = 1, column = 1;
     for (skip(); at_ < text_.size() && text_[at_] == '#'; skip()) {
       StepEntity e;
-      e.line = line += static_cast<int>(std::count(text_.begin() + static_cast<std::ptrdiff_t>(counted),
-                                                   text_.begin() + static_cast<std::ptrdiff_t>(at_), '\n'));
-      counted = at_;
+      for (; counted < at_; ++counted) {
+        if (text_[counted] == '\n') {
+          ++line, column = 1;
+        } else if ((static_cast<unsigned char>(text_[counted]) & 0xC0) != 0x80) {
+          ++column;
+        }
+      }
+      e.line = line, e.column = column;
       e.id = read_id();
-      if (const StepEntity* first = file.find(e.id))
-        fail("#" + std::to_string(e.id) + " is given twice, first in line " + std::to_string(first->line));
+      if (const StepEntity* first = file.find(e.id)) {
+        at_ = counted;
+        fail("#" + std::to_string(e.id) + " is given twice, first in line " + std::to_string(first->line),
+             "every entity has an id of its own");
+      }
       skip();
       expect('=');
       skip();
@@ -80,7 +89,9 @@ class Parser {
       const int id = e.id;
       file.entities[id] = std::move(e);
     }
-    if (text_.compare(at_, 6, "ENDSEC") != 0) fail("an entity such as #12=IFCCOLUMN(...); is wanted");
+    if (text_.compare(at_, 6, "ENDSEC") != 0)
+      fail("an entity such as #12=IFCCOLUMN(...); is wanted",
+           "the data end with ENDSEC; the file may have been cut off");
     return file;
   }
 
@@ -88,7 +99,8 @@ class Parser {
   /// One statement in front of the data: what it says of the schema; true if the data begin behind it.
   bool read_header_statement(StepFile& file) {
     skip();
-    if (at_ >= text_.size()) fail("has no DATA section");
+    if (at_ >= text_.size())
+      fail("has no DATA section", "the file was cut off, or is no IFC file in STEP form (.ifc); export it again");
     const std::string name = std::isalpha(static_cast<unsigned char>(peek())) != 0 ? read_name() : std::string();
     skip();
     if (name == "FILE_SCHEMA") {
@@ -111,12 +123,21 @@ class Parser {
       if (c == '\'') at_ = std::min(text_.find('\'', at_), text_.size() - 1) + 1;
     }
   }
-  [[noreturn]] void fail(const std::string& what) const {
+  [[noreturn]] void fail(const std::string& what,
+                         const std::string& help = "the file is damaged here, or was edited; export it again") const {
     const int line =
         1 + static_cast<int>(std::count(
                 text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(std::min(at_, text_.size())), '\n'));
-    throw InputError(std::vector<Diagnostic>{
-        {Severity::Error, "E111", {name_, line, 0}, 1, what, "give an IFC file in STEP form (.ifc)"}});
+    throw InputError(std::vector<Diagnostic>{{Severity::Error, "E111", {name_, line, find_column()}, 1, what, help}});
+  }
+  /// Of the place, in characters.
+  int find_column() const {
+    const size_t at = std::min(at_, text_.size());
+    size_t from = at == 0 ? std::string::npos : text_.rfind('\n', at - 1);
+    from = from == std::string::npos ? 0 : from + 1;
+    return 1 + static_cast<int>(std::count_if(text_.begin() + static_cast<std::ptrdiff_t>(from),
+                                              text_.begin() + static_cast<std::ptrdiff_t>(at),
+                                              [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; }));
   }
   void skip() {
     while (at_ < text_.size()) {
@@ -173,7 +194,7 @@ class Parser {
       v.kind = StepValue::Kind::Text;
       std::string raw;
       for (++at_;; ++at_) {
-        if (at_ >= text_.size()) fail("a text has no end");
+        if (at_ >= text_.size()) fail("a text has no end", "close it with '; the file may have been cut off");
         if (text_[at_] == '\'') {
           if (at_ + 1 < text_.size() && text_[at_ + 1] == '\'') {
             ++at_;
@@ -211,7 +232,7 @@ class Parser {
       v.kind = StepValue::Kind::Number;
       v.number = std::strtod(from, &end);
       if (end == from) fail("a value is wanted here");
-      if (!std::isfinite(v.number)) fail("a number is out of range");
+      if (!std::isfinite(v.number)) fail("a number is out of range", "numbers below 1.8e308 in size");
       at_ += static_cast<size_t>(end - from);
     }
     return v;

@@ -20,6 +20,7 @@ struct StepValue {
 struct StepEntity {
   int id = 0;
   int line = 1;      // where it begins
+  int column = 1;
   std::string type;  // upper case
   std::vector<StepValue> arguments;
   /// The i-th argument; Null beyond the last.
@@ -34,7 +35,7 @@ struct StepFile {
   std::vector<const StepEntity*> of_type(const std::string& type) const;
 };
 
-/// Typed values such as IFCLABEL('x') read as what is inside. Throws InputError E111 with the line.
+/// Typed values such as IFCLABEL('x') read as what is inside. Throws InputError E111 with line and column.
 StepFile read_step(const std::string& text, const std::string& name);
 
 }  // namespace topple::product

@@ -237,7 +237,7 @@ import)
   expect 2 "$topple" check gaps.toml; has err "E211"; has err "site.neighbour[1].clearance"; has err "^"
   expect 2 "$topple" run gaps.toml -o never; has err "E211"; [ ! -e never ] || failures=$((failures + 1))
   expect 2 "$topple" import "$plan" -o x.toml; has err "neither"
-  echo hello >b.ifc; expect 2 "$topple" import b.ifc -o x.toml; has err "b.ifc:1"; has err "E111"
+  echo hello >b.ifc; expect 2 "$topple" import b.ifc -o x.toml; has err "b.ifc:1:1"; has err "E111"; has err "| hello"
   expect 2 "$topple" import b.ifc -o x.toml --unit "1 mm"; has err "E801"; has err "--unit"
   expect 2 "$topple" import nowhere.ifc -o x.toml
   ;;

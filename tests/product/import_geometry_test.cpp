@@ -294,6 +294,7 @@ TEST(ImportIfcCoordinates, ThatAreNoNumbersAreRefusedWithTheirLine) {
     } catch (const InputError& e) {
       EXPECT_EQ(e.diagnostics()[0].code, "E111") << wrong;
       EXPECT_EQ(e.diagnostics()[0].where.line, 8) << wrong;
+      EXPECT_EQ(e.diagnostics()[0].where.column, 1) << wrong;
       EXPECT_EQ(e.diagnostics()[0].message, "a coordinate of #3 is no number") << wrong;
     }
   }

@@ -36,8 +36,25 @@ TEST(StepFile, RefusesIdsThatAreGivenTwice) {
   } catch (const InputError& e) {
     EXPECT_EQ(e.diagnostics()[0].code, "E111");
     EXPECT_EQ(e.diagnostics()[0].where.line, 10);
+    EXPECT_EQ(e.diagnostics()[0].where.column, 1);
     EXPECT_EQ(e.diagnostics()[0].message, "#1 is given twice, first in line 6");
   }
+}
+
+TEST(StepFile, ColumnsCountCharactersFromOne) {
+  const std::string head = "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('IFC4'));\nENDSEC;\nDATA;\n";
+  const auto column = [&](const std::string& text) {
+    try {
+      (void)read_step(text, "f.ifc");
+    } catch (const InputError& e) { return e.diagnostics()[0].where.column; }
+    return 0;
+  };
+  EXPECT_EQ(column(head + "#1=A('Stütze',?);\nENDSEC;\n"), 15);
+  EXPECT_EQ(column(head + "#1=A(1); #1=A(2);\nENDSEC;\n"), 10);
+  EXPECT_EQ(column("hello"), 1);
+  const StepFile file = read_step(head + "#1=A(1); /* ü */ #2=A(2);\n  #3=A(3);\nENDSEC;\n", "f.ifc");
+  EXPECT_EQ(file.entities.at(2).column, 18);
+  EXPECT_EQ(file.entities.at(3).column, 3);
 }
 
 TEST(StepFile, FindsSchemaAndDataWhateverHeadersHold) {
