@@ -873,8 +873,11 @@ IfcBuilding read_ifc(const std::string& text, const std::string& name) {
   const auto fail = [&](const std::string& what, const std::string& help) {
     throw InputError(std::vector<Diagnostic>{{Severity::Error, "E112", {name, 0, 0}, 1, what, help}});
   };
-  if (file.schema.rfind("IFC2X3", 0) != 0 && file.schema.rfind("IFC4", 0) != 0)
-    fail("its schema is \"" + file.schema + "\"", "IFC2X3 and IFC4 are understood");
+  // IFC2X3, also as IFC2X3_TC1, and IFC4 with its addenda
+  static const std::set<std::string, std::less<>> known{"IFC2X3",    "IFC2X3_TC1", "IFC2X3_FINAL", "IFC4",
+                                                        "IFC4_ADD1", "IFC4_ADD2",  "IFC4_ADD2_TC1"};
+  if (known.count(file.schema) == 0)
+    fail("its schema is \"" + file.schema + "\"", "IFC2X3 and IFC4 are read; export it as one of them");
   IfcBuilding out = Reader(file, name).read();
   if (std::none_of(out.elements.begin(), out.elements.end(),
                    [](const IfcElement& e) { return e.type == "IFCCOLUMN" && e.has_box; })) {
