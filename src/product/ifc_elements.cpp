@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/unit.h"
+#include "product/clip.h"
 
 namespace topple::product {
 
@@ -69,45 +70,18 @@ const std::set<std::string>& other_types() {
 constexpr double kFilled = 0.9, kFilledWall = 0.5;
 constexpr double kLine = 0.3;      // columns less far apart stand in one line [m]
 constexpr double kFarthest = 1e8;  // coordinate of an element [m]
+constexpr double kNear = 1e-3;     // what a boundary has to lie around may stand out as far [m]
 constexpr double kStraight = 0.8;  // distance of a bar's ends over its length; ties are bent round
-
-using Loop = std::vector<Vec3>;
-
-/// Normal of a flat loop, as long as twice its area.
-Vec3 calc_normal(const Loop& loop) {
-  Vec3 sum;
-  for (size_t i = 2; i < loop.size(); ++i) sum += cross(loop[i - 1] - loop[0], loop[i] - loop[0]);
-  return sum;
-}
-
-/// An extruded profile. Points in world axes [m].
-struct Solid {
-  std::vector<Loop> loops;  // its outline and its holes, at the foot
-  Vec3 way;                 // from foot to head
-
-  double volume() const {
-    double sum = 0;
-    for (size_t i = 0; i < loops.size(); ++i) sum += (i == 0 ? 0.5 : -0.5) * std::abs(dot(calc_normal(loops[i]), way));
-    return sum;
-  }
-  /// Normals of all its faces but those of holes, as long as twice their areas.
-  std::vector<Vec3> faces() const {
-    const Loop& outline = loops.front();
-    std::vector<Vec3> out{calc_normal(outline), calc_normal(outline)};
-    for (size_t i = 0; i < outline.size(); ++i)
-      out.push_back(2 * cross(outline[(i + 1) % outline.size()] - outline[i], way));
-    return out;
-  }
-};
 
 /// What a body is made of. Points in world axes [m].
 struct Body {
-  std::vector<Solid> solids;
-  std::vector<Vec3> points;  // of meshes
-  std::vector<Vec3> faces;   // their normals, as long as twice the area [m²]
-  double volume = 0;         // of meshes [m³]
+  Shape shape;
+  std::vector<Vec3> points;   // of meshes
+  std::vector<Vec3> normals;  // of their faces, as long as twice the area [m²]
+  double volume = 0;          // of meshes [m³]
   bool is_round = false;
-  std::string why;  // what was not understood
+  bool is_cut = false, is_whole = false;  // along planes that were read; by bodies that were not
+  std::string why;                        // what was not understood
 };
 
 /// Turn, scale or mirror, and shift.
@@ -452,20 +426,17 @@ class Reader {
     return {out_.length_unit * point(e.at(2)), Mat3::from_columns(first * x, second * y, third * z)};
   }
 
-  /// A face with its corners in turn; volumes add up to that of a closed mesh.
-  void add_face(const std::vector<Vec3>& corners, Body& out) const {
-    Vec3 normal;
-    for (size_t i = 0; i < corners.size(); ++i) {
-      out.points.push_back(corners[i]);
-      if (i < 2) continue;
-      const Vec3 o = out.points.front(), fan = cross(corners[i - 1] - corners[0], corners[i] - corners[0]);
-      out.volume += dot(corners[0] - o, fan) / 6;
-      normal += fan;
+  /// Points, normals and volume of a mesh, which add up to that of a closed one.
+  static void measure_mesh(Body& out) {
+    for (const Loop& face : out.shape.faces) {
+      out.points.insert(out.points.end(), face.begin(), face.end());
+      const Vec3 normal = calc_normal(face);
+      if (!face.empty()) out.volume += dot(face.front() - out.points.front(), normal) / 6;
+      out.normals.push_back(normal);
     }
-    out.faces.push_back(normal);
   }
   bool find_mesh(const StepEntity& e, const Map& X, Body& out) const {
-    const size_t before = out.points.size();
+    const size_t before = out.shape.faces.size();
     const bool is_mirrored = determinant(X.M) < 0;
     const auto add_loops = [&](const StepValue& shell) {
       const StepEntity* faces = get(shell);
@@ -479,14 +450,14 @@ class Reader {
             std::vector<Vec3> corners;
             for (const StepValue& p : loop->at(0).items) corners.push_back(X * (out_.length_unit * point(p)));
             if ((bound->at(1).text == "F") != is_mirrored) std::reverse(corners.begin(), corners.end());
-            add_face(corners, out);
+            out.shape.faces.push_back(std::move(corners));
           }
     };
     const auto add_indexed = [&](const StepEntity& list, const StepValue& indices) {
       std::vector<Vec3> corners;
       for (const StepValue& i : indices.items) corners.push_back(X * listed(list, i.number));
       if (is_mirrored) std::reverse(corners.begin(), corners.end());
-      add_face(corners, out);
+      out.shape.faces.push_back(std::move(corners));
     };
     if (e.type == "IFCFACETEDBREP") {
       add_loops(e.at(0));
@@ -498,7 +469,9 @@ class Reader {
       for (const StepValue& f : e.at(2).items)
         if (const StepEntity* face = get(f)) add_indexed(*list, face->at(0));
     }
-    return out.points.size() > before + 5;
+    size_t corners = 0;
+    for (size_t i = before; i < out.shape.faces.size(); ++i) corners += out.shape.faces[i].size();
+    return corners > 5;
   }
 
   /// Calls use(item, its pose) for every item of the representation that a mapped item places.
@@ -515,6 +488,7 @@ class Reader {
     const StepEntity* e = get(v);
     if (e == nullptr || depth > 10) return false;
     if (e->type == "IFCEXTRUDEDAREASOLID") {
+    if (depth > 10) out.why = "its body is nested too deeply";
       Solid solid;
       if (e->at(1).kind != Kind::Null && !has_axes(e->at(1))) {
         out.why = "the placement of its body is not understood";
@@ -526,11 +500,10 @@ class Reader {
       for (Loop& loop : solid.loops)
         for (Vec3& p : loop) p = X_WP * p;
       solid.way = X_WP.M * way;
-      out.solids.push_back(std::move(solid));
+      out.shape.solids.push_back(std::move(solid));
       return true;
     }
-    if (e->type == "IFCBOOLEANCLIPPINGRESULT" || e->type == "IFCBOOLEANRESULT")
-      return find_item(e->at(1), X, out, depth + 1);
+    if (is_boolean(e)) return find_boolean(e, X, out, depth);
     if (e->type == "IFCMAPPEDITEM") {
       bool any = false;
       for_mapped_items(*e, X,
@@ -543,6 +516,108 @@ class Reader {
 
   Body find_body(const StepEntity& e) const {
     Body out;
+  static bool is_boolean(const StepEntity* e) {
+    return e != nullptr && (e->type == "IFCBOOLEANCLIPPINGRESULT" || e->type == "IFCBOOLEANRESULT");
+  }
+  /// Unions, and what half spaces cut off; what else cuts is not read.
+  bool find_boolean(const StepEntity* e, const Map& X, Body& out, int depth) const {
+    std::vector<const StepEntity*> cuts;  // the last one first, as they are nested
+    for (; is_boolean(e) && e->at(0).text != "UNION" && cuts.size() < 1000; e = get(e->at(1))) cuts.push_back(e);
+    Body part;
+    if (e == nullptr || cuts.size() == 1000) {
+      out.why = "its body is nested too deeply, or incomplete";
+      return false;
+    }
+    bool is_read = false;
+    if (is_boolean(e)) {
+      is_read = find_item(e->at(1), X, part, depth + 1);
+      is_read &= find_item(e->at(2), X, part, depth + 1);
+    } else {
+      StepValue base;
+      base.kind = Kind::Reference, base.number = e->id;
+      is_read = find_item(base, X, part, depth + 1);
+    }
+    for (auto cut = cuts.rbegin(); cut != cuts.rend() && is_read; ++cut)
+      if (!clip_by((*cut)->at(2), (*cut)->at(0).text == "INTERSECTION", X, part)) part.is_whole = true;
+    if (!part.why.empty()) out.why = part.why;
+    if (!is_read) return false;
+    const auto append = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
+    append(out.shape.solids, part.shape.solids);
+    append(out.shape.faces, part.shape.faces);
+    out.is_round |= part.is_round, out.is_cut |= part.is_cut, out.is_whole |= part.is_whole;
+    if (part.is_cut && part.shape.solids.empty() && part.shape.faces.empty()) out.why = "nothing is left of its body";
+    return true;
+  }
+  /// Cuts off a half space, or all but it; false: that is not understood.
+  bool clip_by(const StepValue& v, bool keeps, const Map& X, Body& part) const {
+    const StepEntity* space = get(v);
+    const bool is_bounded = is(space, "IFCPOLYGONALBOUNDEDHALFSPACE");
+    if (!is_bounded && !is(space, "IFCHALFSPACESOLID") && !is(space, "IFCBOXEDHALFSPACE")) return false;
+    const StepEntity* surface = get(space->at(0));
+    if (!is(surface, "IFCPLANE") || !has_axes(surface->at(0))) return false;
+    const Map X_WP = X * axis_placement(surface->at(0));
+    const auto column = [](const Mat3& M, int k) { return Vec3{M(0, k), M(1, k), M(2, k)}; };
+    Vec3 normal = cross(column(X_WP.M, 0), column(X_WP.M, 1));
+    const double size = norm(normal);
+    if (!(size > 0)) return false;
+    // the normal points away from the half space if its flag is true
+    const bool is_against = (space->at(1).text != "F") != (determinant(X_WP.M) < 0);
+    normal = ((is_against != keeps ? -1 : 1) / size) * normal;
+    if (is_bounded) {
+      Shape off = part.shape;
+      clip(off, {X_WP.p, -normal});
+      if (off.solids.empty() && off.faces.empty()) return true;
+      if (keeps || !is_bounded_around(*space, X, off)) return false;
+    }
+    const auto measure = [&part] {
+      std::vector<double> areas;
+      for (const Solid& solid : part.shape.solids) areas.push_back(norm(calc_normal(solid.loops.front())));
+      return areas;
+    };
+    const std::vector<double> before = measure();
+    part.is_cut |= clip(part.shape, {X_WP.p, normal});
+    const std::vector<double> after = measure();  // a part of a circle is round no more
+    part.is_round = part.is_round && std::equal(before.begin(), before.end(), after.begin(), after.end(),
+                                                [](double x, double y) { return std::abs(x - y) < 1e-6 * x; });
+    return true;
+  }
+  /// Whether the boundary of a half space lies around a shape: no corner outside, none of its own within.
+  bool is_bounded_around(const StepEntity& space, const Map& X, const Shape& shape) const {
+    Loop bound;
+    if (!has_axes(space.at(2)) || !find_points(space.at(3), bound) || bound.size() < 3) return false;
+    const Map X_WB = X * axis_placement(space.at(2));
+    if (std::abs(determinant(X_WB.M)) < 1e-12) return false;
+    const Mat3 back = inverse(X_WB.M);
+    double x_low = 1e30, x_high = -1e30, y_low = 1e30, y_high = -1e30;
+    bool is_around = true;
+    const auto look = [&](const Vec3& world) {
+      const Vec3 p = back * (world - X_WB.p);
+      x_low = std::min(x_low, p.x), x_high = std::max(x_high, p.x);
+      y_low = std::min(y_low, p.y), y_high = std::max(y_high, p.y);
+      bool is_inside = false;
+      for (size_t i = 0, j = bound.size() - 1; i < bound.size(); j = i++) {
+        const Vec3 &a = bound[i], &b = bound[j];
+        if ((a.y > p.y) != (b.y > p.y) && p.x < a.x + (b.x - a.x) * (p.y - a.y) / (b.y - a.y)) is_inside = !is_inside;
+        // on an edge
+        const Vec3 edge{b.x - a.x, b.y - a.y, 0}, to{p.x - a.x, p.y - a.y, 0};
+        const double length = norm(edge), along = length > 1e-9 ? dot(edge, to) / length : -1;
+        if (along > -kNear && along < length + kNear && norm(cross(edge, to)) < kNear * length) {
+          is_inside = true;
+          break;
+        }
+      }
+      is_around &= is_inside;
+    };
+    for (const Solid& solid : shape.solids)
+      for (const Loop& loop : solid.loops)
+        for (const Vec3& p : loop) look(p), look(p + solid.way);
+    for (const Loop& face : shape.faces)
+      for (const Vec3& p : face) look(p);
+    return is_around && std::none_of(bound.begin(), bound.end(), [&](const Vec3& p) {
+             return p.x > x_low + kNear && p.x < x_high - kNear && p.y > y_low + kNear && p.y < y_high - kNear;
+           });
+  }
+
     const StepEntity* shape = get(e.at(6));
     if (shape == nullptr) {
       out.why = "it has no body";
@@ -560,18 +635,21 @@ class Reader {
     }
     return out;
   }
+    measure_mesh(out);
 
   void find_box(const Body& body, IfcElement& e) const {
     e.is_mesh = !body.points.empty();
     e.why = body.why;
-    if (body.solids.empty() && body.points.size() < 6) return;
+    if (body.shape.solids.empty() && body.points.size() < 6) return;
+    e.is_cut = body.is_cut;
+    e.is_whole = body.is_whole;
     e.low = {1e30, 1e30, 1e30};
     e.high = {-1e30, -1e30, -1e30};
     const auto add = [&e, this](const Vec3& c) {
       const Vec3 p = turn(c);
       for (int k = 0; k < 3; ++k) e.low[k] = std::min(e.low[k], p[k]), e.high[k] = std::max(e.high[k], p[k]);
     };
-    for (const Solid& solid : body.solids)
+    for (const Solid& solid : body.shape.solids)
       for (const Vec3& p : solid.loops.front()) add(p), add(p + solid.way);
     for (const Vec3& p : body.points) add(p);
     const Vec3 reach{std::max(-e.low.x, e.high.x), std::max(-e.low.y, e.high.y), std::max(-e.low.z, e.high.z)};
@@ -581,9 +659,9 @@ class Reader {
     }
     const Vec3 size = e.high - e.low;
     double volume = std::abs(body.volume);
-    for (const Solid& solid : body.solids) volume += solid.volume();
+    for (const Solid& solid : body.shape.solids) volume += solid.volume();
     const double filled = volume / (size.x * size.y * size.z), round = std::acos(-1.0) / 4;
-    if (body.solids.empty()) {
+    if (body.shape.solids.empty()) {
       e.is_round =
           e.type == "IFCCOLUMN" && std::abs(size.x - size.y) < 0.02 * size.x && std::abs(filled - round) < 0.04;
       e.has_box = e.is_round || filled >= (e.type == "IFCWALL" ? kFilledWall : kFilled);
@@ -615,16 +693,16 @@ class Reader {
     const auto look = [&](const Vec3& n) {
       if (norm(n) > norm(across) && (e.type == "IFCSLAB" || std::abs(n.z) < 0.5 * norm(n))) across = n;
     };
-    for (const Solid& solid : body.solids)
+    for (const Solid& solid : body.shape.solids)
       for (const Vec3& n : solid.faces()) look(n);
-    for (const Vec3& n : body.faces) look(n);
+    for (const Vec3& n : body.normals) look(n);
     if (!(norm(across) > 0)) return false;
     double low = 1e30, high = -1e30;
     const auto measure = [&](const Vec3& p) {
       const double d = dot(p, across) / norm(across);
       low = std::min(low, d), high = std::max(high, d);
     };
-    for (const Solid& solid : body.solids)
+    for (const Solid& solid : body.shape.solids)
       for (const Vec3& p : solid.loops.front()) measure(p), measure(p + solid.way);
     for (const Vec3& p : body.points) measure(p);
     const Vec3 size = e.high - e.low;
@@ -633,7 +711,7 @@ class Reader {
   /// Whether nearly all of its faces do.
   bool lies_along_axes(const Body& body) const {
     double along = 0, all = 0;
-    for (const Solid& solid : body.solids)
+    for (const Solid& solid : body.shape.solids)
       for (const Vec3& n : solid.faces()) {
         const Vec3 own = turn(n);
         all += norm(n);
@@ -643,9 +721,10 @@ class Reader {
   }
   /// Outlines of a slab whose solids are upright.
   void find_outlines(const Body& body, IfcElement& e) const {
-    for (const Solid& solid : body.solids)
+    if (!body.points.empty()) return;
+    for (const Solid& solid : body.shape.solids)
       if (std::hypot(solid.way.x, solid.way.y) > 1e-3 * std::abs(solid.way.z)) return;
-    for (const Solid& solid : body.solids) {
+    for (const Solid& solid : body.shape.solids) {
       std::vector<Loop> loops = solid.loops;
       for (Loop& loop : loops)
         for (Vec3& p : loop) p = turn(p);
@@ -697,7 +776,7 @@ class Reader {
     for (size_t b = 0; b < bodies.size(); ++b) {
       Vec3 sum;
       size_t n = 0;
-      for (const Solid& solid : bodies[b].solids) {
+      for (const Solid& solid : bodies[b].shape.solids) {
         const Loop& c = solid.loops.front();
         for (size_t i = 0; i < c.size(); ++i) {
           sum += c[i] + 0.5 * solid.way, ++n;
@@ -706,7 +785,7 @@ class Reader {
       }
       for (const Vec3& p : bodies[b].points) sum += p, ++n;
       // upright faces, as triangles have diagonals
-      for (const Vec3& f : bodies[b].faces)
+      for (const Vec3& f : bodies[b].normals)
         if (std::abs(f.z) < 1e-3 * norm(f)) add(f);
       if (n > 0 && out_.elements[b].type == "IFCCOLUMN" &&
           std::hypot(sum.x, sum.y) < kFarthest * static_cast<double>(n))

@@ -17,8 +17,10 @@ struct IfcElement {
   std::string name;      // as the file has it
   std::string material;  // empty: none given
   int id = 0;
-  bool has_box = false;  // false: its body is not understood, for the reason `why`
-  bool is_mesh = false;  // the box was found around faces
+  bool has_box = false;   // false: its body is not understood, for the reason `why`
+  bool is_mesh = false;   // the box was found around faces
+  bool is_cut = false;    // along planes
+  bool is_whole = false;  // what cuts it is not read
   bool is_round = false;
   std::string why;
   Vec3 low, high;  // box [m]

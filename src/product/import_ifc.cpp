@@ -141,7 +141,16 @@ class Planner {
     if (const auto meshes = std::count_if(b_.elements.begin(), b_.elements.end(),
                                           [](const IfcElement& e) { return e.is_mesh && e.has_box; });
         meshes > 0)
-      guessed(fmt::format("{} elements are meshes of faces: their boxes were taken, as they fill them", meshes));
+      guessed(fmt::format(
+          "{} elements are meshes of faces, or cut obliquely: their boxes were taken, as they fill them", meshes));
+    if (const auto cut = std::count_if(b_.elements.begin(), b_.elements.end(),
+                                       [](const IfcElement& e) { return e.is_cut && e.has_box; });
+        cut > 0)
+      taken(fmt::format("{} elements are cut along planes: what is left of them was taken", cut));
+    if (const auto whole = std::count_if(b_.elements.begin(), b_.elements.end(),
+                                         [](const IfcElement& e) { return e.is_whole && e.has_box; });
+        whole > 0)
+      missing(fmt::format("{} elements are cut by bodies that are not read: they are taken whole", whole));
     write();
     check_import(text_, "E112", file_);
     return {std::move(text_), std::move(report_)};
