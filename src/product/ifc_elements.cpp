@@ -110,6 +110,7 @@ class Reader {
     read_materials();
     for (const StepEntity* r : file_.of_type("IFCRELAGGREGATES"))
       for (const StepValue& part : r->at(5).items) whole_of_[part.id()] = r->at(4).id();
+    for (const StepEntity* r : file_.of_type("IFCRELVOIDSELEMENT")) opened_.insert(r->at(4).id());
     std::vector<Body> bodies;
     for (const auto& [id, e] : file_.entities) {
       if (element_types().count(e.type) == 0) continue;
@@ -118,6 +119,7 @@ class Reader {
       element.name = e.at(2).text;
       element.id = id;
       element.material = material_of(id);
+      element.has_opening = opened_.count(id) > 0;
       bodies.push_back(find_body(e));
       element.is_round = bodies.back().is_round;
       out_.elements.push_back(std::move(element));
@@ -486,9 +488,9 @@ class Reader {
 
   bool find_item(const StepValue& v, const Map& X, Body& out, int depth) const {
     const StepEntity* e = get(v);
+    if (depth > 10) out.why = "its body is nested too deeply";
     if (e == nullptr || depth > 10) return false;
     if (e->type == "IFCEXTRUDEDAREASOLID") {
-    if (depth > 10) out.why = "its body is nested too deeply";
       Solid solid;
       if (e->at(1).kind != Kind::Null && !has_axes(e->at(1))) {
         out.why = "the placement of its body is not understood";
@@ -514,8 +516,6 @@ class Reader {
     return find_mesh(*e, X, out);
   }
 
-  Body find_body(const StepEntity& e) const {
-    Body out;
   static bool is_boolean(const StepEntity* e) {
     return e != nullptr && (e->type == "IFCBOOLEANCLIPPINGRESULT" || e->type == "IFCBOOLEANRESULT");
   }
@@ -618,6 +618,8 @@ class Reader {
            });
   }
 
+  Body find_body(const StepEntity& e) const {
+    Body out;
     const StepEntity* shape = get(e.at(6));
     if (shape == nullptr) {
       out.why = "it has no body";
@@ -633,16 +635,16 @@ class Reader {
       if (r == nullptr || (r->at(1).kind == Kind::Text && r->at(1).text != "Body")) continue;
       for (const StepValue& item : r->at(3).items) find_item(item, *X, out, 0);
     }
+    measure_mesh(out);
     return out;
   }
-    measure_mesh(out);
 
   void find_box(const Body& body, IfcElement& e) const {
     e.is_mesh = !body.points.empty();
-    e.why = body.why;
-    if (body.shape.solids.empty() && body.points.size() < 6) return;
     e.is_cut = body.is_cut;
     e.is_whole = body.is_whole;
+    e.why = body.why;
+    if (body.shape.solids.empty() && body.points.size() < 6) return;
     e.low = {1e30, 1e30, 1e30};
     e.high = {-1e30, -1e30, -1e30};
     const auto add = [&e, this](const Vec3& c) {
@@ -943,6 +945,7 @@ class Reader {
   double angle_unit_ = 1;  // of parameters of circles [rad]
   std::map<int, std::string> material_;
   std::map<int, int> type_of_, whole_of_;
+  std::set<int> opened_;
 };
 
 }  // namespace

@@ -22,6 +22,7 @@ struct IfcElement {
   bool is_cut = false;    // along planes
   bool is_whole = false;  // what cuts it is not read
   bool is_round = false;
+  bool has_opening = false;
   std::string why;
   Vec3 low, high;  // box [m]
   // of upright slabs, outline and holes of each of its parts; none: its box [m]

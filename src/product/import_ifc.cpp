@@ -467,6 +467,10 @@ class Planner {
     const int placed = settle(slabs_, claims, "slabs", "thicker");
     if (placed > 0) {
       taken(fmt::format("{} slabs in {} thicknesses", placed, slabs_.size()));
+      int opened = 0;
+      for (const Group& g : slabs_)
+        for (const IfcElement* e : g.elements) opened += e->has_opening;
+      if (opened > 0) missing(fmt::format("openings of {} slabs: they are not read", opened));
       guessed(
           "a slab covers every cell of the grid whose middle lies in its outline, or in the box of a mesh: smaller "
           "holes and cut corners are not seen");
@@ -488,7 +492,8 @@ class Planner {
       if (any) {
         claims.all.push_back(claim);
       } else {
-        left_out(*e, "does not stand between columns of the grid");
+        left_out(*e, edges.empty() ? "does not stand between columns of the grid"
+                                   : "reaches over less than half of every storey");
       }
     }
     const int placed = settle(walls_, claims, "walls", "thicker");

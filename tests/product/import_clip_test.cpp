@@ -171,6 +171,20 @@ TEST(ImportIfcClip, ChainsOfCutsAreLongAndCirclesEnd) {
   }
 }
 
+TEST(ImportIfcClip, TellsOpeningsOfSlabsAndLowWalls) {
+  Writer w;
+  w.metres();
+  add_columns(w, "$", [&] { return w.shape("SweptSolid", w.extrusion(w.rectangle(0.4, 0.4), 3)); });
+  const std::string slab =
+      w.element("IFCSLAB", w.placement("$", 3, 2.5, 2.8), w.shape("SweptSolid", w.extrusion(w.rectangle(6, 5), 0.2)));
+  w.element("IFCWALL", w.placement("$", 3, 0, 0), w.shape("SweptSolid", w.extrusion(w.rectangle(6, 0.2), 1)));
+  const Import closed = import("IFC4", w);
+  EXPECT_THAT(closed.report.missing, Not(Contains(HasSubstr("openings of"))));
+  EXPECT_THAT(closed.report.missing, Contains("1 x WALL: reaches over less than half of every storey"));
+  w.add("IFCRELVOIDSELEMENT('g',$,$,$," + slab + ",#1)");
+  EXPECT_THAT(import("IFC4", w).report.missing, Contains("openings of 1 slabs: they are not read"));
+}
+
 TEST(ImportIfc, RefusesSchemasByTheirWholeNames) {
   Writer w;
   w.metres();
