@@ -179,11 +179,13 @@ int examine(const Arguments& a, const std::atomic<bool>& cancel) {
     std::fflush(stdout);
   }
   const Scratch scratch;
-  const std::vector<SelfCheck> checks = run_self_checks(make_self_checks(scratch.path()), cancel);
-  const bool ok = all_ok(checks);
+  const std::vector<SelfCheckCase> cases = make_self_checks(scratch.path());
+  const std::vector<SelfCheck> checks = run_self_checks(cases, cancel);
+  const bool is_cancelled = checks.size() < cases.size(), ok = !is_cancelled && all_ok(checks);
   const int code = ok ? kOk : kRunFailed;
   if (a.json) {
     json out{{"exit_code", code},
+             {"cancelled", is_cancelled},
              {"version", program_version()},
              {"build", build},
              {"compiler", describe_compiler()},
@@ -220,9 +222,12 @@ int examine(const Arguments& a, const std::atomic<bool>& cancel) {
   double seconds = 0;
   size_t failed = 0;
   for (const SelfCheck& c : checks) seconds += c.seconds, failed += !c.is_ok();
+  if (is_cancelled)
+    std::printf("\nCancelled: %zu of %zu checks were done; nothing is said of the others.\n", checks.size(),
+                cases.size());
   if (ok)
     std::printf("\nAll %zu checks are ok (%.1f s).\n", checks.size(), seconds);
-  else
+  else if (failed > 0)
     std::printf("\n%zu of %zu checks FAILED (%.1f s): do not trust results of this installation.\n", failed,
                 checks.size(), seconds);
   return code;

@@ -36,7 +36,8 @@ struct SelfCheckCase {
 ///   scratch  existing folder for files, which are taken away again
 std::vector<SelfCheckCase> make_self_checks(const std::filesystem::path& scratch);
 
-/// Runs them in order; an exception is a failure of its case. Stops where `cancel` is set: what was not done failed.
+/// Runs them in order; an exception is a failure of its case. Stops where `cancel` is set: what was not done is
+/// left out.
 std::vector<SelfCheck> run_self_checks(const std::vector<SelfCheckCase>&, const std::atomic<bool>& cancel);
 
 bool all_ok(const std::vector<SelfCheck>&);

@@ -538,6 +538,14 @@ SH
   mkdir folder; echo >plan.toml
   offers "topple " run check doctor demo steer study
   offers "topple ru" only run rules
+  # what was not done is not said to have failed
+  for signal in INT TERM; do
+    "$topple" doctor >out 2>err &
+    pid=$!; for _ in $(seq 100); do grep -q "Self-check" out && break; sleep 0.02; done
+    kill -$signal $pid; wait $pid; code=$?
+    [ $code -eq 1 ] || { echo "exit code $code after an interrupt"; cat out err; failures=$((failures + 1)); }
+    has out "Cancelled: "; has out "nothing is said of the others"; lacks out "FAILED"; lacks out "do not trust"
+  done
   offers "topple mbs " only run compare verify
   offers "topple run --fr" only
   offers "topple mbs run --fr" only --frame-rate
