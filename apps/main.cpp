@@ -81,7 +81,7 @@ int main(int argc, char** argv) {
     const int code = stop ? *stop : dispatch(std::get<topple::apps::Arguments>(arguments));
     if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return code;
     std::fprintf(stderr, "topple: standard output could not be written\n");
-    return code == topple::apps::kOk ? topple::apps::kRunFailed : code;
+    return code == topple::apps::kBadInput ? code : topple::apps::kRunFailed;
   } catch (const topple::InputError& e) {
     std::fprintf(stderr, "%s\n", e.what());
     return topple::apps::kBadInput;

@@ -305,6 +305,19 @@ json)
 mbs)
   expect 0 "$topple" run "$plan" -o a --no-report
   expect 0 "$topple" mbs run a/model.json -o b --csv --no-report --duration 0.8s; exists b/record.h5
+  if [ -c /dev/full ]; then
+    expect 1 sh -c '"$1" run stands.toml -o d --no-report --json >/dev/full' sh "$topple"
+    has err "standard output could not be written"
+  fi
+  # bad input is told on all verbs
+  echo junk >junk
+  told() { expect 2 "$topple" "$@" --json; is_json out; has out '"exit_code": 2'; has out '"code": "E'; }
+  told replay junk -o x; told study "$plan" -o x; told study nowhere -o x; told study show nowhere; told mbs compare junk
+  told check "$plan" --bogus; has out "there is no option --bogus"
+  for words in "run p -o x" "mbs run p -o x" "mbs compare p" "rcc p -o x" "fe p -o x" "compare p p -o x" "replay p -o x" \
+    "study p -o x" demo doctor run fe; do
+    told $words --bogus
+  done
   has out "Bodies"; has out "Equilibrium"; has out "Energy error"; has out "Stopped by the time limit of 0.80 s"
   # the file says how its plan was run
   expect 0 "$topple" mbs run a/model.json -o b2 --csv --no-report
