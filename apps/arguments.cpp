@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <charconv>
 #include <iostream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string_view>
 
 #include "arguments_completion.h"
 #include "arguments_manual.h"
@@ -511,6 +514,39 @@ std::variant<Arguments, int> parse_arguments(int argc, char** argv) {
   topple demo                                      see one building come down
   topple doctor                                    what is installed, and whether it calculates what is known
   topple new storehouse.toml                       write a commented plan to begin with
+namespace {
+
+/// Says what is wrong with the words of a command; in front of it, the JSON object if that was asked for.
+int refuse_words(const CLI::App& app, int argc, char** argv, const std::string& text) {
+  std::cerr << text;
+  const CLI::App* verb = &app;
+  while (!verb->get_subcommands().empty()) verb = verb->get_subcommands().front();
+  const CLI::Option* flag = verb->get_option_no_throw("--json");
+  const std::string name = verb->get_name();
+  // of export and rules it is a format
+  const bool as_json =
+      flag != nullptr && flag->get_items_expected_max() == 0 && name != "export" && name != "rules" &&
+      std::any_of(argv, argv + argc, [](const char* word) { return std::string_view(word) == "--json"; });
+  if (!as_json) return kBadInput;
+  const size_t end = text.find('\n');
+  std::string help = end == std::string::npos ? "" : text.substr(end + 1);
+  while (!help.empty() && help.back() == '\n') help.pop_back();
+  std::cout << nlohmann::ordered_json{{"exit_code", kBadInput},
+                                      {"diagnostics",
+                                       {{{"severity", "error"},
+                                         {"code", "E801"},
+                                         {"file", ""},
+                                         {"line", 0},
+                                         {"column", 0},
+                                         {"message", text.substr(0, end)},
+                                         {"help", help}}}}}
+                   .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace)
+            << std::endl;
+  return kBadInput;
+}
+
+}  // namespace
+
   topple check storehouse.toml                     report everything that is wrong with it
   topple run storehouse.toml -o out                simulate; findings, out/record.h5, out/report.html
   topple run storehouse.toml -o out --json         the same for programs (docs/run.md)
@@ -564,13 +600,13 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   try {
     app.parse(argc, argv);
   } catch (const CLI::ExtrasError& e) {
-    const std::string unknown = find_unknown(app);
-    if (unknown.empty()) return app.exit(e, std::cout, std::cerr) == 0 ? kOk : kBadInput;
-    std::cerr << unknown;
-    return kBadInput;
+    std::ostringstream said;
+    if (find_unknown(app).empty()) app.exit(e, std::cout, said);
+    return refuse_words(app, argc, argv, find_unknown(app) + said.str());
   } catch (const CLI::ParseError& e) {
-    const int code = app.exit(e, std::cout, std::cerr);
-    return code == 0 ? kOk : kBadInput;
+    std::ostringstream said;
+    if (app.exit(e, std::cout, said) == 0) return kOk;
+    return refuse_words(app, argc, argv, said.str());
   }
   if (completion->parsed()) {
     std::cout << make_completion(app, shell);
@@ -580,10 +616,7 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
     std::cout << make_manual(app);
     return kOk;
   }
-  if (const std::string missing = find_missing(a); !missing.empty()) {
-    std::cerr << missing;
-    return kBadInput;
-  }
+  if (const std::string missing = find_missing(a); !missing.empty()) { return refuse_words(app, argc, argv, missing); }
   return a;
 }
 

@@ -73,12 +73,14 @@ int refuse(const InputError& e, const std::vector<Diagnostic>& warnings, const s
   all.insert(all.end(), warnings.begin(), warnings.end());
   const int errors = print_diagnostics(all, text);
   std::fprintf(stderr, "%s. Nothing was run.\n", count_words(errors, "error").c_str());
-  if (as_json) {
-    json out{{"exit_code", kBadInput}, {"diagnostics", json::array()}};
-    for (const Diagnostic& d : all) out["diagnostics"].push_back(to_json(d));
-    std::printf("%s\n", dump(out).c_str());
-  }
+  if (as_json) print_refusal(all);
   return kBadInput;
+}
+
+void print_refusal(const std::vector<Diagnostic>& list) {
+  json out{{"exit_code", kBadInput}, {"diagnostics", json::array()}};
+  for (const Diagnostic& d : list) out["diagnostics"].push_back(to_json(d));
+  std::printf("%s\n", dump(out).c_str());
 }
 
 void check_own_input(const std::string& output, const std::string& input) {

@@ -239,14 +239,20 @@ json to_json(const mbs::Model& model, const Comparison& c) {
 }
 
 /// What engines cannot express, the first few of each; how many engines there are.
-int print_unsupported(const mbs::Model& model, const mbs::Options& options,
-                      const std::vector<std::unique_ptr<engines::Engine>>& list) {
+std::vector<Diagnostic> print_unsupported(const mbs::Model& model, const mbs::Options& options,
+                                          const std::vector<std::unique_ptr<engines::Engine>>& list) {
   constexpr size_t shown = 5;
-  int refusing = 0;
+  std::vector<Diagnostic> refusing;
   for (const auto& engine : list) {
     const auto unsupported = engine->find_unsupported(model, options);
     if (unsupported.empty()) continue;
-    ++refusing;
+    refusing.push_back(
+        {Severity::Error,
+         "E801",
+         {},
+         1,
+         fmt::format("{} cannot express {}: {}", engine->name(), unsupported[0].place, unsupported[0].what),
+         "--skip-unsupported compares the other engines"});
     std::fprintf(stderr, "%s cannot express\n", engine->name().c_str());
     for (size_t i = 0; i < std::min(shown, unsupported.size()); ++i)
       std::fprintf(stderr, "  %s: %s\n", unsupported[i].place.c_str(), unsupported[i].what.c_str());
@@ -255,9 +261,10 @@ int print_unsupported(const mbs::Model& model, const mbs::Options& options,
   return refusing;
 }
 
-int refuse(const InputError& e, const std::string& text) {
+int refuse(const InputError& e, const std::string& text, bool as_json) {
   for (const Diagnostic& d : e.diagnostics()) std::fputs(render(d, text, has_colour(stderr)).c_str(), stderr);
   std::fprintf(stderr, "Nothing was run.\n");
+  if (as_json) print_refusal(e.diagnostics());
   return kBadInput;
 }
 
@@ -273,10 +280,11 @@ int compare_engines(const Arguments& a, const std::atomic<bool>& cancel) {
     mbs::Options options = make_options(a, run);
     if (options.equilibrium) mbs::refuse_velocities(model, text, a.input);
     options.progress.cancel = &cancel;
-    const int refusing = print_unsupported(model, options, list);
-    if (refusing > 0 && (!a.skip_unsupported || refusing == static_cast<int>(list.size()))) {
+    const std::vector<Diagnostic> refusing = print_unsupported(model, options, list);
+    if (!refusing.empty() && (!a.skip_unsupported || refusing.size() == list.size())) {
       std::fprintf(stderr, "Nothing was run.%s\n",
                    a.skip_unsupported ? "" : " With --skip-unsupported the other engines are compared.");
+      if (a.json) print_refusal(refusing);
       return kBadInput;
     }
     if (!a.output.empty()) make_folder(a.output, {"compare.csv", "compare.svg"});
@@ -314,7 +322,7 @@ int compare_engines(const Arguments& a, const std::atomic<bool>& cancel) {
       return !r.has_run() || r.summary.ending == Ending::TimeLimit || r.summary.ending == Ending::AtRest;
     });
     return all_ended && c.runs.size() == list.size() ? kOk : kRunFailed;
-  } catch (const InputError& e) { return refuse(e, text); }
+  } catch (const InputError& e) { return refuse(e, text, a.json); }
 }
 
 }  // namespace topple::apps

@@ -10,6 +10,7 @@
 
 namespace {
 
+#include "results.h"
 std::atomic<bool> cancel = false;
 
 /// The first interrupt ends the run at its next step with its record written; the second one ends the program.
@@ -90,3 +91,6 @@ int main(int argc, char** argv) {
     return topple::apps::kRunFailed;
   }
 }
+    const auto* given = std::get_if<topple::apps::Arguments>(&arguments);
+    if (given && given->json && given->verb != topple::apps::Arguments::Verb::Export)
+      topple::apps::print_refusal(e.diagnostics());

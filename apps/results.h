@@ -23,6 +23,9 @@ using Files = std::vector<std::pair<std::string, std::string>>;
 /// All complaints of an InputError, and the JSON object if that was asked for; `text` is the input.
 int refuse(const InputError&, const std::vector<Diagnostic>& warnings, const std::string& text, bool as_json);
 
+/// The JSON object of bad input, on standard output.
+void print_refusal(const std::vector<Diagnostic>&);
+
 /// Complaints on standard error; the number of errors among them. `text` is the input.
 int print_diagnostics(const std::vector<Diagnostic>&, const std::string& text);
 

@@ -49,8 +49,9 @@ void write_all(std::FILE* out, const std::string& folder, const study::Problem& 
 }
 
 /// Complaints, with the line of a file or of an answer that they point into.
-int complain(const InputError& e, const std::string& text) {
+int complain(const InputError& e, const std::string& text, bool as_json) {
   for (const Diagnostic& d : e.diagnostics()) std::fputs(render(d, text, has_colour(stderr)).c_str(), stderr);
+  if (as_json) print_refusal(e.diagnostics());
   return kBadInput;
 }
 
@@ -65,7 +66,7 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
     problem = read_problem(a, text);
     options.pool = make_pool_options(a.study);
     place = make_place(a);
-  } catch (const InputError& e) { return complain(e, text); }
+  } catch (const InputError& e) { return complain(e, text, a.json); }
   options.store = place.store;
   options.name = place.name;
   options.source = text;
@@ -96,11 +97,11 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
     if (code == study::no_answer_code) study::Store(place.store).rerun_failed(model);
     if (code == "E823" || code == "E824" || code == "E827" || code == study::no_answer_code) {
       const auto refusal = study::Store(place.store).find_refusal(model);
-      complain(e, refusal ? study::read_refusal(*refusal).line : "");
+      complain(e, refusal ? study::read_refusal(*refusal).line : "", a.json);
       std::fprintf(stderr,
                    "The study stopped; what was run before is kept. Mend the evaluator and give the command again.\n");
     } else {
-      complain(e, text);
+      complain(e, text, a.json);
     }
     remove_new();
     return kBadInput;
@@ -152,7 +153,7 @@ int run_study_command(const Arguments& a, const std::atomic<bool>& cancel) {
       if (!r.is_finished) std::printf("\nwaiting %ld, running %ld\n", c.waiting, c.running);
     }
     return kOk;
-  } catch (const InputError& e) { return complain(e, ""); }
+  } catch (const InputError& e) { return complain(e, "", a.json); }
 }
 
 }  // namespace topple::apps

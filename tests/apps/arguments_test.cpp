@@ -5,6 +5,7 @@
 
 #include <fstream>
 #include <iostream>
+#include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
 
@@ -124,6 +125,22 @@ TEST(Arguments, CompletionKnowsEveryVerbAndOption) {
 }
 
 TEST(Arguments, ZshIsToldOfOneRestOfArgumentsAtMost) {
+TEST(Arguments, AreRefusedInJsonWhereThatIsAskedFor) {
+  const auto refusal = [](const std::vector<std::string>& words) {
+    const auto [text, code] = said(words);
+    EXPECT_EQ(code, kBadInput);
+    return text;
+  };
+  const auto j = nlohmann::json::parse(refusal({"run", "p.toml", "-o", "x", "--json", "--duratoin", "1 s"}));
+  EXPECT_EQ(j["exit_code"], kBadInput);
+  EXPECT_EQ(j["diagnostics"][0]["code"], "E801");
+  EXPECT_EQ(j["diagnostics"][0]["message"], "topple run: there is no option --duratoin; did you mean --duration?");
+  EXPECT_TRUE(nlohmann::json::accept(refusal({"run", "--json"})));
+  EXPECT_TRUE(nlohmann::json::accept(refusal({"fe", "p.toml", "--json"})));
+  EXPECT_EQ(refusal({"run", "p.toml", "-o", "x", "--duratoin", "1 s"}), "");
+  EXPECT_EQ(refusal({"export", "r.h5", "--json", "-o", "x", "--bogus"}), "") << "a format";
+}
+
   const std::string script = said({"completion", "zsh"}).first;
   std::istringstream in(script);
   int count = 0;
