@@ -15,7 +15,7 @@ int run_model_file(const Arguments&, const std::atomic<bool>& cancel);
 int compare_engines(const Arguments&, const std::atomic<bool>& cancel);
 int verify_engine(const Arguments&, const std::atomic<bool>& cancel);
 int write_report_file(const Arguments&);
-int export_file(const Arguments&);
+int export_file(const Arguments&, const std::atomic<bool>& cancel);
 int import_file(const Arguments&);
 int compute_rcc(const Arguments&, const std::atomic<bool>& cancel);
 int run_study_command(const Arguments&, const std::atomic<bool>& cancel);

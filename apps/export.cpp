@@ -66,7 +66,7 @@ int export_lsdyna(const Arguments& a) {
 
 }  // namespace
 
-int export_file(const Arguments& a) {
+int export_file(const Arguments& a, const std::atomic<bool>& cancel) {
   if (a.adams) return export_adams(a);
   if (a.fe.lsdyna) return export_lsdyna(a);
   try {
@@ -74,13 +74,25 @@ int export_file(const Arguments& a) {
     if (!a.frame_rate.empty())
       r = record::keep_frames(r, 1 / read_quantity(a.frame_rate, Dimension::Frequency, "--frame-rate"));
     make_folder(a.output);
+    const auto is_cancelled = [&cancel] { return cancel.load(std::memory_order_relaxed); };
+    const auto end = [] {
+      std::fprintf(stderr, "Cancelled.\n");
+      return kRunFailed;
+    };
+    if (is_cancelled()) return end();
     const auto say = [](const std::vector<std::string>& paths) {
       std::printf("Wrote %s", paths.front().c_str());
       if (paths.size() > 1) std::printf(" and %zu more", paths.size() - 1);
       std::printf("\n");
     };
-    if (a.vtk) say(record::export_vtk(r, a.output));
+    if (a.vtk) {
+      const std::vector<std::string> paths = record::export_vtk(r, a.output, is_cancelled);
+      if (paths.empty()) return end();
+      say(paths);
+    }
+    if (a.gltf && is_cancelled()) return end();
     if (a.gltf) say(record::export_gltf(r, a.output));
+    if (a.csv && is_cancelled()) return end();
     if (a.csv) {
       std::vector<std::string> paths = record::export_csv(r, a.output);
       constexpr double cell = 0.25;  // [m]
@@ -92,6 +104,7 @@ int export_file(const Arguments& a) {
       }
       say(paths);
     }
+    if (a.json && is_cancelled()) return end();
     if (a.json) say(record::export_json(r, a.output));
     return kOk;
   } catch (const InputError& e) { return refuse(e, {}, {}, false); }

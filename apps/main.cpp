@@ -1,3 +1,5 @@
+#include <unistd.h>
+
 #include <atomic>
 #include <csignal>
 #include <cstdio>
@@ -5,12 +7,13 @@
 
 #include "arguments.h"
 #include "base/error.h"
+#include "base/unfinished_file.h"
 #include "commands.h"
 #include "program.h"
+#include "results.h"
 
 namespace {
 
-#include "results.h"
 std::atomic<bool> cancel = false;
 
 /// The first interrupt ends the run at its next step with its record written; the second one ends the program.
@@ -20,7 +23,40 @@ extern "C" void on_interrupt(int) {
   std::signal(SIGTERM, SIG_DFL);
 }
 
+/// Of verbs that write whole files at their end: the program ends at once.
+extern "C" void on_interrupt_of_short(int) {
+  constexpr char words[] = "Cancelled.\n";
+  topple::remove_unfinished_file();
+  if (write(STDERR_FILENO, words, sizeof words - 1) < 0) _exit(topple::apps::kRunFailed);
+  _exit(topple::apps::kRunFailed);
+}
+
+/// Whether a verb looks at `cancel` while it works.
+bool heeds_cancel(const topple::apps::Arguments& a) {
+  using Verb = topple::apps::Arguments::Verb;
+  switch (a.verb) {
+    case Verb::New:
+    case Verb::Check:
+    case Verb::Rules:
+    case Verb::Report:
+    case Verb::Import:
+    case Verb::Compare:
+      return false;
+    case Verb::Export:
+      return !a.adams && !a.fe.lsdyna;
+    case Verb::Fe:
+      return !a.fe.mesh_only;
+    default:
+      return true;
+  }
+}
+
 int dispatch(const topple::apps::Arguments& a) {
+  if (!heeds_cancel(a)) {
+    std::signal(SIGINT, on_interrupt_of_short);
+    std::signal(SIGTERM, on_interrupt_of_short);
+    if (cancel) on_interrupt_of_short(SIGINT);
+  }
   using topple::apps::Arguments;
   switch (a.verb) {
     case Arguments::Verb::New:
@@ -40,7 +76,7 @@ int dispatch(const topple::apps::Arguments& a) {
     case Arguments::Verb::Report:
       return topple::apps::write_report_file(a);
     case Arguments::Verb::Export:
-      return topple::apps::export_file(a);
+      return topple::apps::export_file(a, cancel);
     case Arguments::Verb::Import:
       return topple::apps::import_file(a);
     case Arguments::Verb::Rcc:
@@ -85,12 +121,12 @@ int main(int argc, char** argv) {
     return code == topple::apps::kBadInput ? code : topple::apps::kRunFailed;
   } catch (const topple::InputError& e) {
     std::fprintf(stderr, "%s\n", e.what());
+    const auto* given = std::get_if<topple::apps::Arguments>(&arguments);
+    if (given && given->json && given->verb != topple::apps::Arguments::Verb::Export)
+      topple::apps::print_refusal(e.diagnostics());
     return topple::apps::kBadInput;
   } catch (const std::exception& e) {
     std::fprintf(stderr, "topple: %s\n", e.what());
     return topple::apps::kRunFailed;
   }
 }
-    const auto* given = std::get_if<topple::apps::Arguments>(&arguments);
-    if (given && given->json && given->verb != topple::apps::Arguments::Verb::Export)
-      topple::apps::print_refusal(e.diagnostics());

@@ -48,6 +48,10 @@ int replay_log(const Arguments& a, const std::atomic<bool>& cancel) {
     bool failed_report = false;
     for (const auto& b : s.branches()) {
       if (b->frames() == 0) continue;
+      if (progress.is_cancelled()) {
+        std::fprintf(stderr, "Cancelled.\n");
+        return kRunFailed;
+      }
       Arguments place = a;
       place.output = (std::filesystem::path(a.output) / fmt::format("branch-{}", b->id)).string();
       make_folder(place.output);

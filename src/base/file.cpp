@@ -3,16 +3,45 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <stdexcept>
 #include <system_error>
 
 #include "base/error.h"
+#include "base/unfinished_file.h"
 
 namespace topple {
 
 namespace {
+
+/// The name under which a file is being written, for signal handlers; of several at once, one.
+class UnfinishedName {
+ public:
+  explicit UnfinishedName(const std::string& path) {
+    bool is_taken = false;
+    if (path.size() >= sizeof name_ || !taken_.compare_exchange_strong(is_taken, true)) return;
+    std::memcpy(name_, path.c_str(), path.size() + 1);
+    is_own_ = true;
+    shown_ = true;
+  }
+  ~UnfinishedName() {
+    if (!is_own_) return;
+    shown_ = false;
+    taken_ = false;
+  }
+  UnfinishedName(const UnfinishedName&) = delete;
+  UnfinishedName& operator=(const UnfinishedName&) = delete;
+  static const char* get() { return shown_ ? name_ : nullptr; }
+
+ private:
+  inline static char name_[4096] = {};
+  inline static std::atomic<bool> taken_ = false, shown_ = false;
+  static_assert(std::atomic<bool>::is_always_lock_free);
+  bool is_own_ = false;
+};
 
 /// Closes its descriptor.
 class Descriptor {
@@ -78,12 +107,17 @@ std::string read_file(const std::string& path) {
   return bytes;
 }
 
+void remove_unfinished_file() {
+  if (const char* name = UnfinishedName::get()) ::unlink(name);
+}
+
 void replace_file(const std::string& path, std::string_view bytes) {
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
   std::error_code error;
   if (!folder.empty()) std::filesystem::create_directories(folder, error);
   if (error) fail(path, error.message());
   const std::string beside = path + ".part";
+  const UnfinishedName unfinished(beside);
   if (const int number = write_whole(beside, bytes); number != 0) {
     ::unlink(beside.c_str());
     fail(path, reason_of(number));

@@ -421,6 +421,19 @@ cancel)
 steer)
   "$topple" new plan.toml >/dev/null
   "$topple" steer plan.toml --no-open -o logs >out 2>err &
+  # exports and what else takes its time end, and leave nothing behind that is not whole
+  for words in "export a/record.h5 --vtk -o v" "fe $source/examples/weida/plan.toml --mesh-only --size 0.1m" \
+    "export $source/examples/weida/plan.toml --lsdyna --size 0.1m -o v/model.k"; do
+    for delay in 0.1 0.2 0.4 0.8; do  # 143: before the program had begun
+      "$topple" $words >out 2>err &
+      pid=$!; sleep $delay; kill -TERM $pid; wait $pid; code=$?
+      [ $code -eq 143 ] || break
+    done
+    if [ $code -eq 0 ]; then has out "Wrote"; rm -rf v; continue; fi  # it was done before
+    [ $code -eq 1 ] || { echo "exit code $code after an interrupt of $words"; head out err; failures=$((failures + 1)); }
+    has err "Cancelled."
+    [ -z "$(find v -type f 2>/dev/null)" ] || { echo "$words leaves $(find v -type f | head -3)"; failures=$((failures + 1)); }
+  done
   pid=$!
   for _ in $(seq 600); do [ -s out ] && [ -s logs/plan.steer.jsonl ] && break; sleep 0.1; done
   port=$(sed -n 's|http://127.0.0.1:\([0-9]*\)/.*|\1|p' out); token=$(sed -n 's|.*/\([0-9a-f]\{32\}\)/$|\1|p' out)
