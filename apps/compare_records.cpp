@@ -14,6 +14,9 @@ int compare_records(const Arguments& a) {
     const record::Record first = record::read_hdf5(a.input), second = record::read_hdf5(a.fe.second);
     std::vector<record::Photo> photos;
     if (!a.fe.photos.empty()) photos = record::read_photos(a.fe.photos);
+    if (second.provenance.title != first.provenance.title)
+      std::fprintf(stderr, "topple: %s is of \"%s\", the run of \"%s\": see that both are of one building\n",
+                   a.fe.second.c_str(), second.provenance.title.c_str(), first.provenance.title.c_str());
     const record::Comparison c = record::compare(first, second);
     make_folder(a.output);
     const auto in = [&a](const char* name) { return (std::filesystem::path(a.output) / name).string(); };
@@ -29,7 +32,7 @@ int compare_records(const Arguments& a) {
       std::fprintf(stderr, "The page is not built, so there is no compare.html (npm ci && npm run build in web/).\n");
     }
     std::FILE* out = a.json ? stderr : stdout;
-    std::fprintf(out, "%s\n", text.c_str());
+    if (!a.json) std::fprintf(out, "%s\n", text.c_str());
     for (const auto& [what, path] : files) std::fprintf(out, "Wrote %s\n", path.c_str());
     if (a.json) std::printf("%s\n", data.c_str());
     return kOk;

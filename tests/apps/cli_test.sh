@@ -210,7 +210,11 @@ records)
   expect 0 "$topple" compare r/record.h5 r/record.h5 -o c
   has out "A  native (first)"; has out "Mass centres up to then: at most 0.00 m apart"; is_json c/compare.json
   for f in compare.txt compare.csv; do exists c/$f; done
-  expect 0 "$topple" compare r/record.h5 r/record.h5 -o c --json; is_json out
+  lacks err "of one building"
+  expect 0 "$topple" compare r/record.h5 r/record.h5 -o c --json; is_json out; lacks err "Mass centres"
+  sed 's/^title = .*/title = "Another"/' "$plan" >another.toml
+  expect 0 "$topple" run another.toml -o other --no-report --duration "0.1 s"
+  expect 0 "$topple" compare r/record.h5 other/record.h5 -o c; has err 'other/record.h5 is of "Another"'; has err "of one building"
   printf '0.5,missing.png\n' >photos.csv
   expect 2 "$topple" compare r/record.h5 r/record.h5 -o none --photos photos.csv; has err "photos.csv:1:5: error E681"
   expect 2 "$topple" compare r/record.h5 missing.h5 -o none; expect 2 "$topple" compare r/record.h5 -o none
