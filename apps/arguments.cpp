@@ -13,6 +13,8 @@
 #include "arguments_completion.h"
 #include "arguments_manual.h"
 #include "base/error.h"
+#include "engines/engine.h"
+#include "product/templates.h"
 #include "program.h"
 
 namespace topple::apps {
@@ -21,6 +23,18 @@ namespace {
 
 void add_language(CLI::App* verb, Arguments& a) {
   verb->add_option("--language", a.language, "of the page: en (default) or de")->check(CLI::IsMember({"en", "de"}));
+}
+
+/// Name of a type whose values completion offers; what is not among them has an error of its own.
+std::string choose_from(const std::vector<std::string>& names) {
+  std::string out;
+  for (const std::string& name : names) out += (out.empty() ? "NAME:{" : ",") + name;
+  return out + "}";
+}
+std::vector<std::string> names_of_templates() {
+  std::vector<std::string> out;
+  for (const product::Template& t : product::templates()) out.push_back(t.name);
+  return out;
 }
 
 /// Of what runs a multibody model.
@@ -36,7 +50,8 @@ void add_run_options(CLI::App* verb, Arguments& a) {
       ->check(
           [](const std::string& word) { return word.find_first_of("nN") == std::string::npos ? "" : "is no number"; });
   verb->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
-  verb->add_option("--engine", a.engine, "program that solves the multibody model");
+  verb->add_option("--engine", a.engine, "program that solves the multibody model")
+      ->type_name(choose_from(engines::engine_names()));
   verb->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
   verb->add_flag("--csv", a.csv, "also write tables for spreadsheets");
   add_language(verb, a);
@@ -65,7 +80,8 @@ void add_new(CLI::App& app, Arguments& a) {
   CLI::Option* new_file =
       verb_new->add_option("file", a.input, "file to write; an existing one is left alone")->type_name("FILE");
   verb_new->add_option("-o,--output", a.input, "the same")->type_name("FILE")->excludes(new_file);
-  verb_new->add_option("--template", a.plan_template, "kind of structure, as --list shows them (frame)");
+  verb_new->add_option("--template", a.plan_template, "kind of structure, as --list shows them (frame)")
+      ->type_name(choose_from(names_of_templates()));
   verb_new->add_flag("--list", a.list, "show the templates");
   verb_new->callback([&a] { a.verb = Arguments::Verb::New; });
   add_examples(verb_new, R"(  topple new plan.toml
@@ -145,7 +161,8 @@ void add_mbs_compare(CLI::App& mbs, Arguments& a) {
 
 void add_mbs_verify(CLI::App& mbs, Arguments& a) {
   CLI::App* mbs_verify = mbs.add_subcommand("verify", "Check an engine against models whose answers are known.");
-  mbs_verify->add_option("--engine", a.engine, "program that solves the multibody models");
+  mbs_verify->add_option("--engine", a.engine, "program that solves the multibody models")
+      ->type_name(choose_from(engines::engine_names()));
   mbs_verify->add_option("--markdown", a.markdown, "page to write (docs/verification.md is one)")->type_name("FILE");
   mbs_verify->add_option("--json", a.json_file, "the same for programs: file to write")->type_name("FILE");
   mbs_verify->callback([&a] { a.verb = Arguments::Verb::MbsVerify; });
@@ -497,23 +514,6 @@ std::string find_unknown(const CLI::App& app) {
 
 }  // namespace topple::apps
 
-std::variant<Arguments, int> parse_arguments(int argc, char** argv) {
-  Arguments a;
-  // topple help run: topple run --help
-  std::vector<char*> words(argv, argv + argc);
-  char flag[] = "--help";
-  if (argc > 1 && std::string_view(argv[1]) == "help") {
-    words.erase(words.begin() + 1);
-    words.push_back(flag);
-    argv = words.data();
-  }
-  CLI::App app{"topple shows a demolition engineer how a building will come down.", "topple"};
-  app.require_subcommand(1);
-  app.set_version_flag("--version", "topple " + program_version());
-  app.footer(R"(Examples:
-  topple demo                                      see one building come down
-  topple doctor                                    what is installed, and whether it calculates what is known
-  topple new storehouse.toml                       write a commented plan to begin with
 namespace {
 
 /// Says what is wrong with the words of a command; in front of it, the JSON object if that was asked for.
@@ -547,6 +547,23 @@ int refuse_words(const CLI::App& app, int argc, char** argv, const std::string& 
 
 }  // namespace
 
+std::variant<Arguments, int> parse_arguments(int argc, char** argv) {
+  Arguments a;
+  // topple help run: topple run --help
+  std::vector<char*> words(argv, argv + argc);
+  char flag[] = "--help";
+  if (argc > 1 && std::string_view(argv[1]) == "help") {
+    words.erase(words.begin() + 1);
+    words.push_back(flag);
+    argv = words.data();
+  }
+  CLI::App app{"topple shows a demolition engineer how a building will come down.", "topple"};
+  app.require_subcommand(1);
+  app.set_version_flag("--version", "topple " + program_version());
+  app.footer(R"(Examples:
+  topple demo                                      see one building come down
+  topple doctor                                    what is installed, and whether it calculates what is known
+  topple new storehouse.toml                       write a commented plan to begin with
   topple check storehouse.toml                     report everything that is wrong with it
   topple run storehouse.toml -o out                simulate; findings, out/record.h5, out/report.html
   topple run storehouse.toml -o out --json         the same for programs (docs/run.md)

@@ -120,11 +120,11 @@ TEST(Arguments, CompletionKnowsEveryVerbAndOption) {
     for (const char* option : {"frame-rate", "normal-force", "rerun-failed", "no-open", "scaled-step"})
       EXPECT_THAT(script, HasSubstr(option)) << shell;
     EXPECT_THAT(script, HasSubstr("layered solid both"));
+    EXPECT_THAT(script, HasSubstr("native"));
   }
   EXPECT_EQ(said({"completion", "csh"}).second, kBadInput);
 }
 
-TEST(Arguments, ZshIsToldOfOneRestOfArgumentsAtMost) {
 TEST(Arguments, AreRefusedInJsonWhereThatIsAskedFor) {
   const auto refusal = [](const std::vector<std::string>& words) {
     const auto [text, code] = said(words);
@@ -141,6 +141,7 @@ TEST(Arguments, AreRefusedInJsonWhereThatIsAskedFor) {
   EXPECT_EQ(refusal({"export", "r.h5", "--json", "-o", "x", "--bogus"}), "") << "a format";
 }
 
+TEST(Arguments, ZshIsToldOfOneRestOfArgumentsAtMost) {
   const std::string script = said({"completion", "zsh"}).first;
   std::istringstream in(script);
   int count = 0;

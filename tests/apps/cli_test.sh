@@ -305,10 +305,6 @@ json)
   expect 3 "$topple" run stands.toml -o c --no-report --json; is_json out; has out '"criterion.mechanism"'
   printf 'title = 3\n' >wrong.toml
   expect 2 "$topple" run wrong.toml -o c --json; is_json out; has out '"diagnostics"'
-  ;;
-mbs)
-  expect 0 "$topple" run "$plan" -o a --no-report
-  expect 0 "$topple" mbs run a/model.json -o b --csv --no-report --duration 0.8s; exists b/record.h5
   if [ -c /dev/full ]; then
     expect 1 sh -c '"$1" run stands.toml -o d --no-report --json >/dev/full' sh "$topple"
     has err "standard output could not be written"
@@ -322,6 +318,10 @@ mbs)
     "study p -o x" demo doctor run fe; do
     told $words --bogus
   done
+  ;;
+mbs)
+  expect 0 "$topple" run "$plan" -o a --no-report
+  expect 0 "$topple" mbs run a/model.json -o b --csv --no-report --duration 0.8s; exists b/record.h5
   has out "Bodies"; has out "Equilibrium"; has out "Energy error"; has out "Stopped by the time limit of 0.80 s"
   # the file says how its plan was run
   expect 0 "$topple" mbs run a/model.json -o b2 --csv --no-report
@@ -421,10 +421,6 @@ cancel)
   wait $pid; code=$?
   [ $code -eq 1 ] || { echo "exit code $code after an interrupt"; head out err; failures=$((failures + 1)); }
   exists a/record.h5; has out "Cancelled at"
-  ;;
-steer)
-  "$topple" new plan.toml >/dev/null
-  "$topple" steer plan.toml --no-open -o logs >out 2>err &
   # exports and what else takes its time end, and leave nothing behind that is not whole
   for words in "export a/record.h5 --vtk -o v" "fe $source/examples/weida/plan.toml --mesh-only --size 0.1m" \
     "export $source/examples/weida/plan.toml --lsdyna --size 0.1m -o v/model.k"; do
@@ -438,6 +434,10 @@ steer)
     has err "Cancelled."
     [ -z "$(find v -type f 2>/dev/null)" ] || { echo "$words leaves $(find v -type f | head -3)"; failures=$((failures + 1)); }
   done
+  ;;
+steer)
+  "$topple" new plan.toml >/dev/null
+  "$topple" steer plan.toml --no-open -o logs >out 2>err &
   pid=$!
   for _ in $(seq 600); do [ -s out ] && [ -s logs/plan.steer.jsonl ] && break; sleep 0.1; done
   port=$(sed -n 's|http://127.0.0.1:\([0-9]*\)/.*|\1|p' out); token=$(sed -n 's|.*/\([0-9a-f]\{32\}\)/$|\1|p' out)
@@ -538,6 +538,14 @@ PY
   expect 1 env TMPDIR="$work/nowhere" "$topple" doctor
   has out "FAILED  Record written"; has out "FAILED  Study written"; has out "2 of"; has out "do not trust"; has out "ok      Pendulum"
   expect 1 env TMPDIR="$work/nowhere" "$topple" doctor --json; is_json out; has out '"exit_code": 1'
+  # what was not done is not said to have failed
+  for signal in INT TERM; do
+    "$topple" doctor >out 2>err &
+    pid=$!; for _ in $(seq 100); do grep -q "Self-check" out && break; sleep 0.02; done
+    kill -$signal $pid; wait $pid; code=$?
+    [ $code -eq 1 ] || { echo "exit code $code after an interrupt"; cat out err; failures=$((failures + 1)); }
+    has out "Cancelled: "; has out "nothing is said of the others"; lacks out "FAILED"; lacks out "do not trust"
+  done
   ;;
 demo)
   expect 2 "$topple" demo here; expect 1 "$topple" demo -o /proc/nowhere
@@ -568,14 +576,6 @@ SH
   mkdir folder; echo >plan.toml
   offers "topple " run check doctor demo steer study
   offers "topple ru" only run rules
-  # what was not done is not said to have failed
-  for signal in INT TERM; do
-    "$topple" doctor >out 2>err &
-    pid=$!; for _ in $(seq 100); do grep -q "Self-check" out && break; sleep 0.02; done
-    kill -$signal $pid; wait $pid; code=$?
-    [ $code -eq 1 ] || { echo "exit code $code after an interrupt"; cat out err; failures=$((failures + 1)); }
-    has out "Cancelled: "; has out "nothing is said of the others"; lacks out "FAILED"; lacks out "do not trust"
-  done
   offers "topple mbs " only run compare verify
   offers "topple run --fr" only
   offers "topple mbs run --fr" only --frame-rate
@@ -586,6 +586,8 @@ SH
   offers "topple rcc plan.toml --zone " only foot top start end
   offers "topple rcc plan.toml --zone = t" only top
   offers "topple completion " only bash zsh fish
+  offers "topple run --engine " native
+  offers "topple new --template fr" only frame
   offers "topple study " show export plan.toml
   offers "topple study show " plan.toml folder
   expect 0 "$topple" completion zsh; cp out _topple
