@@ -19,7 +19,7 @@ struct StepValue {
 
 struct StepEntity {
   int id = 0;
-  int line = 1;      // where it begins
+  int line = 1;  // where it begins
   int column = 1;
   std::string type;  // upper case
   std::vector<StepValue> arguments;
