@@ -426,7 +426,7 @@ cancel)
     "export $source/examples/weida/plan.toml --lsdyna --size 0.1m -o v/model.k"; do
     for delay in 0.1 0.2 0.4 0.8; do  # 143: before the program had begun
       "$topple" $words >out 2>err &
-      pid=$!; sleep $delay; kill -TERM $pid; wait $pid; code=$?
+      pid=$!; sleep $delay; kill -TERM $pid 2>/dev/null; wait $pid; code=$?
       [ $code -eq 143 ] || break
     done
     if [ $code -eq 0 ]; then has out "Wrote"; rm -rf v; continue; fi  # it was done before
