@@ -103,12 +103,18 @@ std::pair<std::string, std::string> tell_apart(double value, double limit, int d
   return {tell(value), tell(limit)};
 }
 
+/// Whether it is asked to stand, and leans as far as it does only because it sways.
+bool may_stand(const Context& c, const Mechanism& m) {
+  return c.plan.criteria.mechanism == "stands" && m.may_swing_back;
+}
+
 void add_mechanism(const Context& c, const Mechanism& m) {
   Status status = Status::Info;
   if (m.name == "wrong direction") status = Status::Bad;
   if (c.plan.criteria.mechanism) status = *c.plan.criteria.mechanism == m.name ? Status::Good : Status::Bad;
   if (c.is_under_way) status = Status::Info;
   if (status == Status::Good && !m.is_final) status = Status::NotJudged;
+  if (status == Status::Bad && may_stand(c, m)) status = Status::NotJudged;
   c.add("mechanism", "Mechanism", (c.is_under_way ? "Mechanism so far: " : "Mechanism: ") + m.name, m.text, m.tilt,
         "rad", status);
 }
@@ -192,7 +198,7 @@ Standing add_stability(const Context& c) {
         leave_open(fmt::format("\"{}\" begins before all charges of the stage before it have fired", next));
         continue;
       }
-      if (last.time < begin || norm(last.displacement) + way >= c.k.stands_displacement) {
+      if (last.time < begin || calc_away(last, c.k) + way / c.k.stands_displacement >= 1) {
         leave_open(fmt::format("the last frame before \"{}\" ({:.3f} s) is of {:.3f} s; a higher frame_rate keeps more",
                                next, end, last.time));
         continue;
@@ -594,7 +600,7 @@ void add_criteria(const Context& c, const Mechanism& m, const Standing& standing
   const std::string falls_on =
       m.is_final ? "" : fmt::format("{}it still came down or swayed when the run ended.", kNotJudged);
   if (want.mechanism)
-    judge_one("mechanism", "Mechanism", m.name == *want.mechanism,
+    judge_one("mechanism", "Mechanism", m.name == *want.mechanism || may_stand(c, m),
               fmt::format("Asked: {}; found: {}.", *want.mechanism, m.name), kNone, "", falls_on);
   if (want.azimuth) {
     const double off = std::abs(std::remainder(m.azimuth - *want.azimuth, 2 * kPi));

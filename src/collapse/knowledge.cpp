@@ -53,6 +53,7 @@ const std::map<std::string, Field>& fields() {
       {"rest.speed", &Knowledge::rest_speed},
       {"rest.time", &Knowledge::rest_time},
       {"stands.displacement", &Knowledge::stands_displacement},
+      {"stands.drift", &Knowledge::stands_drift},
       {"mechanism.moved_displacement", &Knowledge::mechanism_moved_displacement},
       {"mechanism.stands_share", &Knowledge::mechanism_stands_share},
       {"mechanism.partial_share", &Knowledge::mechanism_partial_share},

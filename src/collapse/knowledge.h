@@ -27,7 +27,7 @@ struct Knowledge {
   double body_least_radius_of_gyration, body_highest_frequency;
   double contact_gap, contact_body_friction, contact_body_restitution, contact_frequency;
   double rest_speed, rest_time;
-  double stands_displacement;
+  double stands_displacement, stands_drift;
   double mechanism_moved_displacement, mechanism_stands_share, mechanism_partial_share, mechanism_topple_rear_share;
   double mechanism_topple_rotation;
   double mechanism_coherent_share, mechanism_fold_share, mechanism_fold_rotation, mechanism_direction_tolerance;

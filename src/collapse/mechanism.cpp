@@ -49,6 +49,13 @@ double calc_reach(const Polygon& outline, const Vec3& direction) {
 
 }  // namespace
 
+double calc_away(const BlockFrame& block, const Knowledge& k) {
+  const Vec3& u = block.displacement;
+  const double down = -u.z / k.stands_displacement,
+               aside = std::hypot(u.x, u.y) / std::max(k.stands_displacement, k.stands_drift * block.height);
+  return std::isfinite(down + aside) ? std::max(down, aside) : std::numeric_limits<double>::quiet_NaN();
+}
+
 Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
   constexpr double pi = 3.14159265358979323846;
   Mechanism out;
@@ -86,20 +93,26 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
   const double height_left = in.frames.front().height > 0 ? last.height / in.frames.front().height : 1;
   const double final_tilt = norm(log_rotation(last.rotation));
   // of the largest connected part of the upper block, not of pieces that came off
-  const double sunk = norm(last.displacement);
-  const bool has_sunk = sunk > k.stands_displacement && last.connected >= k.mechanism_coherent_share;
-  if (out.moved < k.mechanism_stands_share && !has_sunk) {
+  const double sunk = -last.displacement.z, aside = std::hypot(last.displacement.x, last.displacement.y);
+  const bool has_left = !(calc_away(last, k) < 1) && last.connected >= k.mechanism_coherent_share;
+  const bool has_sunk = has_left && !(sunk < k.stands_displacement);
+  if (out.moved < k.mechanism_stands_share && !has_left) {
     out.name = "stands";
     out.text = fmt::format("The building stands: {:.1f} % of its mass came down.", 100 * out.moved);
   } else if (out.moved < k.mechanism_stands_share && !in.came_to_rest) {
     out.name = "partial";
-    out.text = fmt::format("It has begun to sink: the upper block has moved by {:.2f} m.", sunk);
-  } else if (in.came_to_rest && has_sunk && final_tilt < k.mechanism_aborted_rotation && height_left > 0.5) {
+    out.may_swing_back = !has_sunk;
+    out.text =
+        has_sunk ? fmt::format("It has begun to sink: the upper block has come down by {:.2f} m.", sunk)
+                 : fmt::format("It leans: the mass centre of the upper block has moved to a side by {:.2f} m.", aside);
+  } else if (in.came_to_rest && has_left && final_tilt < k.mechanism_aborted_rotation && height_left > 0.5) {
     out.name = "partial";
     out.text = fmt::format(
-        "Aborted collapse: the upper block has sunk by {:.2f} m and stands, leaning by {:.1f} deg, its mass centre at "
-        "{:.0f} % of its height.",
-        -last.displacement.z, final_tilt / unit::deg, 100 * height_left);
+        "Aborted collapse: the upper block has {} and stands, leaning by {:.1f} deg, its mass centre at {:.0f} % of "
+        "its "
+        "height.",
+        has_sunk ? fmt::format("sunk by {:.2f} m", sunk) : fmt::format("moved to a side by {:.2f} m", aside),
+        final_tilt / unit::deg, 100 * height_left);
   } else if (out.moved < k.mechanism_partial_share) {
     out.name = "partial";
     out.text = fmt::format("Partial collapse: {}.", motion);
@@ -156,6 +169,10 @@ Mechanism join_mechanisms(const std::vector<std::string>& names, const std::vect
     all += fmt::format(" Verdict on {}: {}.", names[i], verdicts[i].name);
   }
   out.moved = mass > 0 ? moved / mass : 0;
+  out.may_swing_back =
+      std::any_of(verdicts.begin(), verdicts.end(), [](const Mechanism& m) { return m.may_swing_back; }) &&
+      std::all_of(verdicts.begin(), verdicts.end(),
+                  [](const Mechanism& m) { return m.may_swing_back || m.name == "stands"; });
   if (!do_agree && wrong == verdicts.end()) out.name = "partial";
   out.text = fmt::format("Separate structures are judged one by one.{} In detail, of {}: {}", all, names[lead],
                          verdicts[lead].text);

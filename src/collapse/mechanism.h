@@ -52,10 +52,15 @@ struct Mechanism {
   Vec3 run;  // of the mass centre until the end, horizontal [m]
   // at rest, or so far down that what is still to come does not change the name
   bool is_final = false;
+  bool may_swing_back = false;  // it only leans, and still moves
 };
 
 /// Rotation about the axis that leans by a positive angle towards the direction [rad].
 double calc_tilt(const Quat& rotation, const Vec3& fall_direction);
+
+/// How far the block is from its place: below 1 it stands. Of its way down over stands.displacement, and its way to a
+/// side over that or, if more, over stands.drift of its height, the larger; NaN if it is nowhere.
+double calc_away(const BlockFrame&, const Knowledge&);
 
 /// Judges frames; there is at least one.
 Mechanism judge_mechanism(const MechanismInput&, const Knowledge&);

@@ -64,8 +64,7 @@ Mechanism judge_run(const product::Plan& plan, const mbs::Model& model, const Mo
 }
 
 bool stands(const BlockFrame& block, const Knowledge& k) {
-  const double away = norm(block.displacement);
-  return away < k.stands_displacement && std::isfinite(away);
+  return calc_away(block, k) < 1;
 }
 
 size_t find_frame(const std::vector<BlockFrame>& block, double time) {

@@ -21,7 +21,7 @@ std::vector<StageTimes> find_stage_times(const ModelMap&, bool all = false);
 Mechanism judge_run(const product::Plan&, const mbs::Model&, const ModelMap&, const Knowledge&, const Recorder&,
                     const mbs::Summary&, bool is_under_way = false);
 
-/// Whether the upper block is where it was, to stands_displacement.
+/// Whether the upper block is where it was: calc_away.
 bool stands(const BlockFrame&, const Knowledge&);
 /// The last frame not after a time.
 size_t find_frame(const std::vector<BlockFrame>&, double time);

@@ -240,7 +240,7 @@ std::vector<BlockFrame> Recorder::farthest_block_frames() const {
     for (size_t s = 1; s < block_.size(); ++s) {
       const BlockFrame& other = block_[s][i];
       const double fastest = std::max(out[i].fastest, other.fastest);
-      if (norm(other.displacement) > norm(out[i].displacement)) out[i] = other;
+      if (calc_away(other, k_) > calc_away(out[i], k_)) out[i] = other;
       out[i].fastest = fastest;
     }
   return out;

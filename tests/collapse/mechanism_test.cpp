@@ -71,6 +71,50 @@ TEST(Mechanism, LittleMassDownMeansStandingOrPartial) {
   EXPECT_EQ(name_of(synthetic(0.2, 0, 0.3)), "partial");
 }
 
+/// A shaft of 40 m on a mouth, at one instant of its swing.
+MechanismInput swaying(double aside, double down) {
+  MechanismInput in = synthetic(0, 0, 0);
+  in.touchdown = kNaN;
+  for (BlockFrame& f : in.frames) f.height = f.centre.z = 21.5;
+  in.frames.back().displacement = {-aside, 0, -down};
+  return in;
+}
+
+TEST(Mechanism, WhatSwaysStandsInWhicheverPartOfItsSwing) {
+  for (const double aside : {0.0, 0.09, 0.11, 0.185, 0.42}) {
+    const Mechanism m = judge_mechanism(swaying(aside, 0.075 * aside), default_knowledge());
+    EXPECT_EQ(m.name, "stands") << aside;
+    EXPECT_FALSE(m.is_final);
+  }
+}
+
+TEST(Mechanism, WhatLeansIsNotSaidToSink) {
+  const Mechanism leans = judge_mechanism(swaying(0.44, 0.033), default_knowledge());
+  EXPECT_EQ(leans.name, "partial");
+  EXPECT_THAT(leans.text,
+              testing::StartsWith("It leans: the mass centre of the upper block has moved to a side by 0.44 m."));
+  EXPECT_TRUE(leans.may_swing_back);
+  const Mechanism sinks = judge_mechanism(swaying(0.2, 0.11), default_knowledge());
+  EXPECT_THAT(sinks.text, testing::StartsWith("It has begun to sink: the upper block has come down by 0.11 m."));
+  EXPECT_FALSE(sinks.may_swing_back);
+  MechanismInput at_rest = swaying(0.44, 0.033);
+  at_rest.came_to_rest = true;
+  EXPECT_THAT(judge_mechanism(at_rest, default_knowledge()).text,
+              testing::StartsWith("Aborted collapse: the upper block has moved to a side by 0.44 m and stands"));
+}
+
+TEST(Mechanism, HowFarABlockIsFromItsPlaceIsAShareOfWhatItMay) {
+  const Knowledge& k = default_knowledge();
+  BlockFrame f;
+  f.height = 4;  // lower than 5 m: to a side as down
+  f.displacement = {0.03, 0.04, -0.02};
+  EXPECT_NEAR(calc_away(f, k), 0.5, 1e-12);
+  f.height = 20;
+  EXPECT_NEAR(calc_away(f, k), 0.2, 1e-12);
+  f.displacement.z = kNaN;
+  EXPECT_TRUE(std::isnan(calc_away(f, k)));
+}
+
 TEST(Mechanism, AtRestWhileLeaningIsAborted) {
   MechanismInput in = synthetic(0.1, 0, 1);
   in.came_to_rest = true;
