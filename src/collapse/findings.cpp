@@ -402,14 +402,13 @@ void add_touchdown(const Context& c) {
       if (series->value[i] > largest) largest = series->value[i], when = c.r.time[i];
     c.add("touchdown.energy", "Touchdown", "Largest energy in motion",
           fmt::format("{:.1f} MJ at {:.2f} s.", largest * 1e-6, when), largest, "J");
-    c.add(
-        "touchdown.force", "Touchdown", "Largest ground force",
-        fmt::format("{:.1f} MN at {:.2f} s, {:.1f} times the weight; read every {:.3f} s, so that shorter peaks can be "
-                    "higher.",
-                    c.recorder.largest_ground_force() * 1e-6, c.recorder.largest_ground_force_time(),
-                    c.recorder.largest_ground_force() / (c.map.moving_mass * std::max(norm(c.model.gravity), 1e-9)),
-                    c.r.time.size() > 1 ? c.r.time[1] - c.r.time[0] : 0.0),
-        c.recorder.largest_ground_force(), "N");
+    const MeanForce mean = c.recorder.find_largest_ground_force();
+    c.add("touchdown.force", "Touchdown", "Largest ground force",
+          fmt::format(
+              "{:.1f} MN at {:.2f} s, {:.1f} times the weight, as a mean over {:.3g} s; shorter peaks are higher.",
+              mean.force * 1e-6, mean.time, mean.force / (c.map.moving_mass * std::max(norm(c.model.gravity), 1e-9)),
+              mean.window),
+          mean.force, "N");
   }
   const std::vector<Touchdown>& all = c.recorder.touchdowns();
   if (!all.empty()) {

@@ -31,6 +31,23 @@ int find_root(std::vector<int>& parent, int i) {
 
 }  // namespace
 
+MeanForce find_largest_mean(const std::vector<double>& time, const std::vector<double>& impulse) {
+  MeanForce out;
+  if (time.size() < 2) return out;
+  out.window = kForceWindow;
+  for (size_t i = 1; i < time.size(); ++i) out.window = std::max(out.window, time[i] - time[i - 1]);
+  out.window = std::min(out.window, time.back() - time.front());
+  constexpr double rounding = 1e-9;  // [s]
+  // straight lines: the largest mean begins or ends at one of the times
+  for (const double t : time)
+    for (const double begin : {t - out.window, t}) {
+      if (begin < time.front() - rounding || begin + out.window > time.back() + rounding) continue;
+      const double change = interpolate(time, impulse, begin + out.window) - interpolate(time, impulse, begin);
+      if (change / out.window > out.force) out.force = change / out.window, out.time = begin + 0.5 * out.window;
+    }
+  return out;
+}
+
 Recorder::Recorder(const mbs::Model& model, const ModelMap& map, const Knowledge& k, record::Record& record,
                    const RunCallbacks& callbacks)
     : model_(model), map_(map), k_(k), record_(record), callbacks_(callbacks), block_(map.structures.size()) {
@@ -276,6 +293,12 @@ void Recorder::put_debris(double time) {
 }
 
 void Recorder::look(const mbs::View& v) {
+  // what changes the momentum of the masses that are there now, but for their weight
+  if (last_v_.size() == model_.bodies.size())
+    for (size_t b = 0; b < model_.bodies.size(); ++b)
+      if (!model_.bodies[b].fixed)
+        impulse_until_now_ +=
+            v.mass[b] * dot(v.v_WB[b] - last_v_[b] - (v.time - last_time_) * model_.gravity, model_.contact.normal);
   last_time_ = v.time;
   last_pose_ = v.X_WB;
   last_v_ = v.v_WB;
@@ -300,6 +323,9 @@ void Recorder::follow(const Recorder& before, double until) {
     last_w_ = before.last_w_;
     last_mass_ = before.last_mass_;
     shortening_ = before.shortening_;
+    impulse_until_now_ = before.impulse_until_now_;
+  } else if (!before.impulse_.empty()) {
+    impulse_until_now_ = interpolate(before.record_.time, before.impulse_, until);
   }
   for (const Touchdown& t : before.touchdowns_)
     if (t.time <= until) touchdowns_.push_back(t);
@@ -323,8 +349,6 @@ void Recorder::append(const Recorder& from, size_t frames, double until) {
     record_.position.insert(record_.position.end(), p, p + static_cast<std::ptrdiff_t>(3 * B));
     record_.orientation.insert(record_.orientation.end(), q, q + static_cast<std::ptrdiff_t>(4 * B));
     put_debris(r.time[i]);
-    const double force = r.series[1].value[i];
-    if (force > largest_ground_force_) largest_ground_force_ = force, largest_ground_force_time_ = r.time[i];
   }
   const auto copy = [](auto& to, const auto& source, size_t n) {
     to.insert(to.end(), source.begin(), source.begin() + static_cast<std::ptrdiff_t>(n));
@@ -339,6 +363,7 @@ void Recorder::append(const Recorder& from, size_t frames, double until) {
   for (size_t s = 0; s < record_.series.size(); ++s) copy(record_.series[s].value, r.series[s].value, frames);
   for (size_t s = 0; s < block_.size(); ++s) copy(block_[s], from.block_[s], frames);
   copy(zone_frames_, from.zone_frames_, frames);
+  copy(impulse_, from.impulse_, frames);
   for (const record::Event& e : r.events)
     if (e.time <= until) record_.events.push_back(e);
 }
@@ -419,6 +444,7 @@ void Recorder::add_frame(const mbs::View& v) {
   }
   zone_frames_.push_back(zf);
   look(v);
+  impulse_.push_back(impulse_until_now_);
   put_crushed_ends();
 
   const std::vector<BlockFrame> blocks = calc_blocks(v);
@@ -444,10 +470,6 @@ void Recorder::add_frame(const mbs::View& v) {
                            block.connected};
   for (size_t i = 0; i < std::size(values); ++i) series(i).value.push_back(values[i]);
   if (!model_.loads.empty()) record_.series.back().value.push_back(e.loads);
-  if (ground_force > largest_ground_force_) {
-    largest_ground_force_ = ground_force;
-    largest_ground_force_time_ = v.time;
-  }
 }
 
 /// From the last frame on in free fall, which adds at most g times the frame's length to the speed.

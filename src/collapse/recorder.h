@@ -14,6 +14,19 @@
 
 namespace topple::collapse {
 
+/// Forces on the ground are means over so long: single peaks of rigid parts on rigid ground mean nothing [s].
+inline constexpr double kForceWindow = 0.05;
+
+/// Mean force over a window.
+struct MeanForce {
+  double force = 0;   // [N]
+  double time = 0;    // middle of the window [s]
+  double window = 0;  // kForceWindow, or the longest interval between frames if that is more [s]
+};
+/// The largest mean over a window of a force whose impulse since the start is known at some times, on straight lines
+/// between. All 0 with fewer than two.
+MeanForce find_largest_mean(const std::vector<double>& time, const std::vector<double>& impulse);
+
 /// State of the zones at one frame, for the margins.
 struct ZoneFrame {
   double time = 0;
@@ -51,8 +64,8 @@ class Recorder {
   std::string first_touchdown_body() const { return touchdown_body_; }
   const std::vector<Touchdown>& touchdowns() const { return touchdowns_; }  // one of each moving part, as they happen
   double start_reaction_error() const { return reaction_error_; }  // |reaction - weight| / weight at the first frame
-  double largest_ground_force() const { return largest_ground_force_; }
-  double largest_ground_force_time() const { return largest_ground_force_time_; }
+  /// Of the ground on what moves, along its normal, from the balance of momentum; loads of the model are part of it.
+  MeanForce find_largest_ground_force() const { return find_largest_mean(record_.time, impulse_); }
   double kinetic_before(double time) const;  // carried on from the two frames before it: an impact takes it at once [J]
   /// Plastic shortening of a zone at the last frame; that of a stub never falls [m].
   double shortening_of(int zone) const {
@@ -94,7 +107,9 @@ class Recorder {
   std::vector<Touchdown> touchdowns_;
   double touchdown_ = std::numeric_limits<double>::quiet_NaN();
   std::string touchdown_body_;
-  double reaction_error_ = 0, largest_ground_force_ = 0, largest_ground_force_time_ = 0;
+  double reaction_error_ = 0;
+  double impulse_until_now_ = 0;       // of the ground, until the last view [N·s]
+  std::vector<double> impulse_;        // at each frame
   std::vector<double> contacts_told_;  // when [s]
 };
 

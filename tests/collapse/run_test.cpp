@@ -136,6 +136,52 @@ TEST(Run, EnergyAtTheTouchdownHangsLittleOnFrames) {
   for (const double rate : {30, 40, 60}) EXPECT_NEAR(energy(rate), fine, 0.05 * fine) << rate;
 }
 
+TEST(Run, TheLargestGroundForceHangsLittleOnFrames) {
+  const product::Plan plan = read(house(charge("C-*-0", "0.05 s"), "1.2 s"));
+  const auto force = [&plan](double rate) {
+    RunOptions o;
+    o.frame_rate = rate;
+    return finding(run_plan(plan, default_knowledge(), o, {}), "touchdown.force").value;
+  };
+  const double fine = force(2000);
+  EXPECT_GT(fine, 0);
+  EXPECT_NEAR(force(200), fine, 0.02 * fine);
+  EXPECT_NEAR(force(60), fine, 0.05 * fine);
+}
+
+TEST(Recorder, MeansOfAForceAreThoseOfItsImpulse) {
+  // 300 N all the time, and a blow of 100 N s within a millisecond
+  for (const double rate : {60.0, 200.0, 1000.0}) {
+    std::vector<double> time, impulse;
+    for (int i = 0; i <= rate; ++i) {
+      time.push_back(i / rate);
+      impulse.push_back(300 * time.back() + 100 * std::clamp((time.back() - 0.5004) / 0.001, 0.0, 1.0));
+    }
+    const MeanForce mean = find_largest_mean(time, impulse);
+    EXPECT_EQ(mean.window, 0.05);
+    EXPECT_NEAR(mean.force, 2300, 1e-6) << rate;
+    EXPECT_NEAR(mean.time, 0.5, 0.035) << rate;
+  }
+  const MeanForce coarse = find_largest_mean({0, 0.2, 0.4, 0.6}, {0, 60, 220, 280});
+  EXPECT_DOUBLE_EQ(coarse.window, 0.2);
+  EXPECT_NEAR(coarse.force, 800, 1e-9);
+  EXPECT_NEAR(coarse.time, 0.3, 1e-12);
+  EXPECT_EQ(find_largest_mean({0}, {0}).force, 0);
+}
+
+TEST(Run, AFrameHasTheVolumeOfItsMaterial) {
+  ModelMap map;
+  const mbs::Model model = make_model(read(house("", "0.1 s")), default_knowledge(), map);
+  double volume = 0;
+  for (const BodyEntry& b : map.bodies) volume += b.volume;
+  // slabs between the axes but for the columns, beams below them between the columns, walls below the beams
+  const double columns = 6 * 0.3 * 0.4 * 6, slabs = 2 * 2 * (5 * 4 - 0.3 * 0.4) * 0.15;
+  const double beams = 2 * 0.3 * (4.7 * (2 * 0.425 + 0.35) + 4 * 3.6 * 0.425);
+  const double walls = 0.1 * (2 * (4.7 * 2.5 - 1.2) + 4 * (3.6 * 2.5 - 1.2));
+  EXPECT_NEAR(volume, columns + slabs + beams + walls, 1e-9);
+  EXPECT_GT(map.mass, 1.05 * 2500 * volume) << "floor loads have none";
+}
+
 TEST(RunReplay, TheModelFileRunsAgainToTheSamePoses) {
   const product::Plan plan = read(house(charge("C-A*-0", "0.05 s"), "0.6 s"));
   std::string file;

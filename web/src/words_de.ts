@@ -124,7 +124,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["Largest energy in motion", "Größte Bewegungsenergie"],
   ["{:.1f} MJ at {:.2f} s.", "{} MJ bei {} s."],
   ["Largest ground force", "Größte Bodenkraft"],
-  ["{:.1f} MN at {:.2f} s, {:.1f} times the weight; read every {:.3f} s, so that shorter peaks can be higher.", "{} MN bei {} s, das {}-Fache des Gewichts; alle {} s abgelesen, kürzere Spitzen können höher sein."],
+  ["{:.1f} MN at {:.2f} s, {:.1f} times the weight, as a mean over {:.3g} s; shorter peaks are higher.", "{} MN bei {} s, das {}-Fache des Gewichts, im Mittel über {} s; kürzere Spitzen sind höher."],
   ["Touchdown of the parts", "Aufschlag der Teile"],
   ["{} parts touch the ground for the first time between {:.2f} s and {:.2f} s, with {:.1f} MJ and {:.2f} MN s downwards in all (each part alone, as it touches). Largest: {*}.", "{} Teile berühren den Boden zum ersten Mal zwischen {} s und {} s, mit zusammen {} MJ und {} MN s nach unten (jedes Teil für sich, wenn es aufschlägt). Die größten: {}."],
   ["{} at {:.2f} s at ({:.1f}, {:.1f}) m with {:.2f} MJ and {:.2f} MN s", "{} bei {} s an ({}, {}) m mit {} MJ und {} MN s"],
