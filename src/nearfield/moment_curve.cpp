@@ -133,10 +133,15 @@ CurvePoints find_points(const std::vector<double>& rotation, const std::vector<d
                         CurvePoint first_torn) {
   CurvePoints out;
   if (rotation.empty()) return out;
-  const size_t top = static_cast<size_t>(std::max_element(moment.begin(), moment.end()) - moment.begin());
+  size_t top = static_cast<size_t>(std::max_element(moment.begin(), moment.end()) - moment.begin());
   if (!(moment[top] > 0)) return out;
   out.yield = yield;
   out.peak = {rotation[top], moment[top]};
+  if (first_torn.rotation <= rotation.back() && first_torn.moment > moment[top]) {
+    out.peak = first_torn;
+    const auto behind = std::upper_bound(rotation.begin(), rotation.end(), first_torn.rotation);
+    top = static_cast<size_t>(behind - rotation.begin()) - 1;
+  }
   const auto at = [&](double phi) {
     const auto above = std::lower_bound(rotation.begin(), rotation.end(), phi);
     if (above == rotation.end()) return moment.back();
@@ -146,7 +151,7 @@ CurvePoints find_points(const std::vector<double>& rotation, const std::vector<d
     return moment[j - 1] + s * (moment[j] - moment[j - 1]);
   };
   double end = rotation.back(), left = moment.back();
-  const double level = 0.8 * moment[top];
+  const double level = 0.8 * out.peak.moment;
   for (size_t j = top + 1; j < rotation.size(); ++j) {
     const CurvePoint before{rotation[j - 1], moment[j - 1]};
     CurvePoint after{rotation[j], moment[j]};

@@ -113,6 +113,12 @@ TEST(MomentCurve, PointsAreThoseOfAPolygon) {
   const CurvePoints crushed = find_points(rotation, moment, {1, 8}, {3.8, 7});
   EXPECT_DOUBLE_EQ(crushed.ultimate.rotation, 3.4) << "fallen to 0.8 before it tears";
   EXPECT_DOUBLE_EQ(crushed.ultimate.moment, 8);
+  // the moment rises until the bar tears, between two points of the curve
+  const CurvePoints risen = find_points({0, 1, 2, 3, 4}, {0, 8, 10, 7, 6}, {1, 8}, {2.4, 10.5});
+  EXPECT_EQ(risen.peak.rotation, 2.4);
+  EXPECT_EQ(risen.peak.moment, 10.5);
+  EXPECT_EQ(risen.ultimate.rotation, 2.4) << "it tears at the peak";
+  EXPECT_EQ(risen.ultimate.moment, 10.5);
   const CurvePoints rising = find_points({0, 1, 2}, {0, 1, 2}, {1, 1});
   EXPECT_EQ(rising.ultimate.rotation, 2) << "the curve ends";
   EXPECT_TRUE(std::isnan(find_points({}, {}, {}).peak.moment));
