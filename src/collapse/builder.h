@@ -78,7 +78,8 @@ struct BuilderState {
   std::map<GridPoint, double> core_low;  // underside of the joint in W [m]
   std::map<int, MemberZones> zones;      // columns and beams
   std::map<std::tuple<int, double, double, Bending>, mbs::LawId> laws;
-  std::map<int, ShaftModel> shafts;  // by member
+  std::map<int, ShaftModel> shafts;       // by member
+  std::map<int, double> volume_per_mass;  // member: of its material over the mass of its parts, floor loads included
   bool hinge_about_y = true;
   // of charges, which may be laid out anew while the model runs: laws are never taken out, so that their ids stay
   std::map<std::tuple<int, double, double, double>, mbs::LawId> cage_laws;  // by element, length, bars and place
@@ -113,6 +114,9 @@ struct Builder : BuilderState {
   void make_walls();
   void make_shaft(int member);
   void finish_bodies();
+  /// Of its material [m³].
+  double volume_of(const Part&) const;
+  double volume_of(const Assembly&) const;
   Vec3 half_of_node(const GridPoint&) const;
   int node_at(const GridPoint&) const;
   int find_at(const std::map<GridPoint, int>&, const GridPoint&) const;

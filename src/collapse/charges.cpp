@@ -127,7 +127,7 @@ void Builder::add_events(std::vector<Firing> schedule) {
       if (removed.empty()) continue;
       for (const Part& p : removed) {
         entry.debris_mass += p.mass;
-        map.debris.push_back({m.name, m.storey, p.mass, p.centre, p.half, firing.time, p.turn});
+        map.debris.push_back({m.name, m.storey, p.mass, p.centre, p.half, firing.time, p.turn, volume_of(p)});
       }
       mbs::Body replacement = make_body(a, k);
       const Vec3 p_WB = replacement.X_WB.p;
@@ -184,9 +184,11 @@ void Builder::add_events(std::vector<Firing> schedule) {
                                               without_zone.size(), *without_zone.begin())});
 
   // a record's body has one set of shapes: what remains; what is thrown out is drawn as debris
-  for (size_t b = 0; b < current.size(); ++b)
+  for (size_t b = 0; b < current.size(); ++b) {
+    map.bodies[b].volume = volume_of(current[b]);
     if (current[b].mass() != assemblies[b].mass())
       map.bodies[b].shapes = make_shapes(current[b], model.bodies[b].X_WB.p);
+  }
 }
 
 }  // namespace topple::collapse

@@ -247,9 +247,9 @@ Reach add_debris(const Context& c, const Mechanism& m) {
   c.add("debris.reach", "Fall and debris", "Reach of the debris", text, reach.largest, "m");
   const Heap heap = calc_heap(find_moving_boxes(c.r, last), kHeapCell);
   double solid = 0;  // what is crushed included
-  for (const record::BodyInfo& b : c.r.bodies)
-    if (!b.fixed)
-      for (const record::BoxShape& s : b.shapes) solid += 8 * s.half.x * s.half.y * s.half.z;
+  for (size_t b = 0; b < c.map.bodies.size(); ++b)
+    if (!c.model.bodies[b].fixed) solid += c.map.bodies[b].volume;
+  for (const DebrisEntry& d : c.map.debris) solid += d.volume;
   c.add("debris.height", "Fall and debris", "Height of the hill",
         fmt::format("The highest point of all parts lies {:.1f} m above the ground.", heap.height), heap.height, "m");
   c.add("debris.volume", "Fall and debris", "Volume of the hill",

@@ -412,7 +412,50 @@ bool Builder::is_cast_on_beam(int index) const {
   return assemblies[static_cast<size_t>(wall->second)].kind == "beam" && member(index).kind == MemberKind::Wall;
 }
 
+namespace {
+
+/// Of a member's own material without openings, pieces that members share once [m³].
+double calc_volume(const product::Plan& plan, const Member& m) {
+  const double mass = product::calc_mass(plan, m);
+  switch (m.kind) {
+    case MemberKind::Column:
+    case MemberKind::Beam: {
+      const product::Section& s = plan.sections[static_cast<size_t>(m.section)];
+      return mass / plan.concretes[static_cast<size_t>(s.concrete)].density;
+    }
+    case MemberKind::Slab:
+    case MemberKind::Wall:
+      return mass / plan.panels[static_cast<size_t>(m.panel)].density;
+    case MemberKind::Shaft: {
+      product::Shaft s = plan.shafts[static_cast<size_t>(m.shaft)];
+      s.concrete = -1;
+      s.density = s.lining_density = 1;  // [kg/m³]
+      s.loads.clear();
+      return product::calc_shaft_mass(plan, s, norm(m.end - m.start), 0, 1);
+    }
+  }
+  return 0;
+}
+
+}  // namespace
+
+double Builder::volume_of(const Part& p) const {
+  const auto found = volume_per_mass.find(p.member);
+  return found == volume_per_mass.end() || !p.is_solid ? 0 : p.mass * found->second;
+}
+
+double Builder::volume_of(const Assembly& a) const {
+  double volume = 0;
+  for (const Part& p : a.parts) volume += volume_of(p);
+  return volume;
+}
+
 void Builder::finish_bodies() {
+  // boxes overlap, of a ring's pieces and of slabs with the beams under them: volumes are those of members' masses
+  for (const Assembly& a : assemblies)
+    for (const Part& p : a.parts)
+      if (p.member >= 0 && p.is_solid) volume_per_mass[p.member] += p.mass;
+  for (auto& [index, mass] : volume_per_mass) mass = calc_volume(plan, member(index)) / mass;
   for (const Assembly& a : assemblies) {
     if (!(a.mass() > 0)) {
       complaints.push_back({Severity::Error, "E622", {}, 1, a.name + ": a joint without mass", ""});
@@ -421,6 +464,7 @@ void Builder::finish_bodies() {
     mbs::Body body = make_body(a, k);
     BodyEntry entry{a.name, a.kind, a.storey, false, make_shapes(a, body.X_WB.p)};
     entry.is_upper = !a.fixed && !(a.storey == 0 && (a.kind == "column" || a.kind == "wall"));
+    entry.volume = volume_of(a);
     map.mass += body.mass;
     if (!a.fixed) map.moving_mass += body.mass;
     map.bodies.push_back(std::move(entry));

@@ -21,6 +21,7 @@ struct BodyEntry {
                                          // ground storey's columns and walls, and a shaft below its lowest mouth
   std::vector<record::BoxShape> shapes;  // members as built, in B
   int structure = 0;                     // index into ModelMap::structures; -1: no charge acts on it
+  double volume = 0;                     // of its material, without what charges throw out [m³]
 };
 
 /// What a connection of the model is in the plan.
@@ -49,6 +50,7 @@ struct DebrisEntry {
   Vec3 centre, half;  // box before that, along W's axes but for ... [m]
   double time = 0;    // [s]
   double turn = 0;    // ... its turn about W's z [rad]
+  double volume = 0;  // of its material; boxes of a ring overlap [m³]
 };
 
 /// A ground-storey column as a hinge for the block above it.

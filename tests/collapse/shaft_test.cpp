@@ -70,6 +70,33 @@ TEST(Shaft, ItsBodiesHaveTheMassCentreAndInertiaOfTheRing) {
 }
 
 TEST(Shaft, ATaperedOneHasTheMassOfItsCone) {
+TEST(Shaft, ItsBodiesHaveTheVolumeOfTheRing) {
+  // 50 kN of a platform have none
+  const Built b(
+      tower(slender + strong + "load = [{ at = \"30 m\", weight = \"50 kN\" }]\n", mouth("2 m", "200 deg"), "1 s"));
+  double moving = 0, boxes = 0, thrown = 0;
+  for (size_t i = 0; i < b.map.bodies.size(); ++i) {
+    if (b.model.bodies[i].fixed) continue;
+    moving += b.map.bodies[i].volume;
+    for (const record::BoxShape& s : b.map.bodies[i].shapes) boxes += 8 * s.half.x * s.half.y * s.half.z;
+  }
+  for (const DebrisEntry& d : b.map.debris) thrown += d.volume;
+  const double area = kPi * (1.5 * 1.5 - 1.3 * 1.3), mouth_share = 200.0 / 360;
+  EXPECT_NEAR(moving, area * (37.5 - 1 * mouth_share), 1e-9);
+  EXPECT_NEAR(thrown, area * 2 * mouth_share, 1e-9);
+  EXPECT_GT(boxes, 1.05 * moving) << "boxes overlap";
+}
+
+TEST(Shaft, TheNoteOnItsMouthCountsWhatIsLeftOfTheRing) {
+  const Built b(tower(slender + strong, mouth("2 m", "200 deg"), "1 s"));
+  const double area = kPi * (1.5 * 1.5 - 1.3 * 1.3), per_metre = 2500 * 9.81 * area;
+  ASSERT_FALSE(b.map.notes.empty());
+  const std::string& text = b.map.notes.front().text;
+  EXPECT_THAT(text,
+              testing::HasSubstr("The weight of " + fmt::format("{:.2f}", (37.5 - 200.0 / 360) * per_metre * 1e-6) +
+                                 " MN above it"));
+}
+
   const Built b(
       tower("height = \"60 m\"\ndiameter = \"5 m\"\ndiameter_top = \"3 m\"\nthickness = \"40 cm\"\n"
             "thickness_top = \"20 cm\"\nlining = { thickness = \"12 cm\", density = \"1800 kg/m3\" }\n"
