@@ -339,7 +339,23 @@ void Builder::connect_shaft(int index) {
       hinge.element.law = id;
       hinge.body = joint.above;
       map.ground_columns.push_back(hinge);
-      const double overturning = -weight * e.whole.y, resistance = find_resistance(law.moment_z, -weight);
+      // once the concrete is out
+      Shaft bare = s;
+      bare.loads.clear();
+      double stays = weight, overturning = -weight * e.whole.y;
+      for (const ShaftElement& mouth : joint.elements) {
+        if (mouth.charge < 0) continue;
+        const product::Charge& c =
+            plan.stages[static_cast<size_t>(mouth.stage)].charges[static_cast<size_t>(mouth.charge)];
+        double share = 0;  // of the ring
+        for (const nearfield::RingSector& x : mouth.ring.sectors) share += x.angle() / (2 * kPi);
+        const double out = c.fails ? 0
+                                   : plan.analysis.gravity * share *
+                                         product::calc_shaft_mass(plan, bare, H, joint.at / H,
+                                                                  (joint.at + 0.5 * c.destroyed_length) / H);
+        stays -= out, overturning -= out * (mouth.whole.y - e.whole.y);
+      }
+      const double resistance = find_resistance(law.moment_z, -stays);
       double left = 0;
       for (const nearfield::RingSector& x : e.ring.sectors) left += x.concrete > 0 ? x.angle() : 0;
       map.notes.push_back(
@@ -350,7 +366,7 @@ void Builder::connect_shaft(int index) {
                "MNm about the centroid of what is left, {:.2f} m behind the axis, which resists with {:.2f} MNm at "
                "most: it "
                "{}.",
-               m.name, joint.at, left / unit::deg, weight * 1e-6, overturning * 1e-6, -e.whole.y, resistance * 1e-6,
+               m.name, joint.at, left / unit::deg, stays * 1e-6, overturning * 1e-6, -e.whole.y, resistance * 1e-6,
                overturning > resistance ? "turns over" : "does not turn over by its weight alone")});
     }
   }

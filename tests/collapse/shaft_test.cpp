@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -69,7 +70,6 @@ TEST(Shaft, ItsBodiesHaveTheMassCentreAndInertiaOfTheRing) {
   EXPECT_NEAR(about_axis, mass * (ro * ro + ri * ri) / 2, 1e-6 * about_axis);
 }
 
-TEST(Shaft, ATaperedOneHasTheMassOfItsCone) {
 TEST(Shaft, ItsBodiesHaveTheVolumeOfTheRing) {
   // 50 kN of a platform have none
   const Built b(
@@ -97,6 +97,7 @@ TEST(Shaft, TheNoteOnItsMouthCountsWhatIsLeftOfTheRing) {
                                  " MN above it"));
 }
 
+TEST(Shaft, ATaperedOneHasTheMassOfItsCone) {
   const Built b(
       tower("height = \"60 m\"\ndiameter = \"5 m\"\ndiameter_top = \"3 m\"\nthickness = \"40 cm\"\n"
             "thickness_top = \"20 cm\"\nlining = { thickness = \"12 cm\", density = \"1800 kg/m3\" }\n"
