@@ -547,9 +547,8 @@ void add_events(const Context& c) {
   const auto late = std::count_if(c.map.schedule.begin(), c.map.schedule.end(),
                                   [&c](const Firing& f) { return !f.fails && f.time > c.r.time.back() + 1e-9; });
   const bool has_late = late > 0 && !c.is_under_way;
-  std::string text =
-      fmt::format("{} charges, {} zones yielded, {} broke, {} joints came off, {} parts touched the ground.",
-                  n["charge"], n["yield"], n["rupture"], n["release"], n["touchdown"]);
+  std::string text = fmt::format("Charges: {}; zones yielded: {}, broken: {}; joints off: {}; parts on the ground: {}.",
+                                 n["charge"], n["yield"], n["rupture"], n["release"], n["touchdown"]);
   if (has_late)
     text +=
         " " +

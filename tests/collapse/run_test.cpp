@@ -342,7 +342,7 @@ TEST(Run, ChargesThatFailAreNotCountedAsFired) {
   const record::Record r =
       run_plan(read(house(charge("C-A1-0", "0 s") + charge("C-A2-0", "0.02 s", "fails = true"), "0.05 s")),
                default_knowledge(), {}, {});
-  EXPECT_THAT(finding(r, "events").text, testing::StartsWith("1 charges, "));
+  EXPECT_THAT(finding(r, "events").text, testing::StartsWith("Charges: 1; "));
   EXPECT_THAT(finding(r, "events").text, testing::EndsWith(" 1 charge fails, as the plan says."));
 }
 

@@ -134,7 +134,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["{} charge fails, as the plan says.", "{} Ladung versagt, wie es der Plan sagt."],
   ["{} charges fail, as the plan says.", "{} Ladungen versagen, wie es der Plan sagt."],
   ["{} charges had not fired when the run ended.", "{} Ladungen hatten am Ende der Rechnung noch nicht gezündet."],
-  ["{} charges, {} zones yielded, {} broke, {} joints came off, {} parts touched the ground.", "{} Ladungen, {} Zonen haben zu fließen begonnen, {} sind gebrochen, {} Verbindungen haben sich gelöst, {} Teile haben den Boden berührt."],
+  ["Charges: {}; zones yielded: {}, broken: {}; joints off: {}; parts on the ground: {}.", "Ladungen: {}; Zonen im Fließen: {}, gebrochen: {}; Verbindungen gelöst: {}; Teile am Boden: {}."],
   ["Note", "Hinweis"],
   ["The mouth of {}", "Das Sprengmaul von {}"],
   ["Floor load without a slab", "Deckenlast ohne Decke"],
