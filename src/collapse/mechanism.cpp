@@ -107,12 +107,15 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
                  : fmt::format("It leans: the mass centre of the upper block has moved to a side by {:.2f} m.", aside);
   } else if (in.came_to_rest && has_left && final_tilt < k.mechanism_aborted_rotation && height_left > 0.5) {
     out.name = "partial";
-    out.text = fmt::format(
-        "Aborted collapse: the upper block has {} and stands, leaning by {:.1f} deg, its mass centre at {:.0f} % of "
-        "its "
-        "height.",
-        has_sunk ? fmt::format("sunk by {:.2f} m", sunk) : fmt::format("moved to a side by {:.2f} m", aside),
-        final_tilt / unit::deg, 100 * height_left);
+    out.text = has_sunk
+                   ? fmt::format(
+                         "Aborted collapse: the upper block has sunk by {:.2f} m and stands, leaning by {:.1f} deg, "
+                         "its mass centre at {:.0f} % of its height.",
+                         sunk, final_tilt / unit::deg, 100 * height_left)
+                   : fmt::format(
+                         "Aborted collapse: the upper block has moved to a side by {:.2f} m and stands, leaning by "
+                         "{:.1f} deg, its mass centre at {:.0f} % of its height.",
+                         aside, final_tilt / unit::deg, 100 * height_left);
   } else if (out.moved < k.mechanism_partial_share) {
     out.name = "partial";
     out.text = fmt::format("Partial collapse: {}.", motion);
