@@ -63,9 +63,7 @@ Mechanism judge_run(const product::Plan& plan, const mbs::Model& model, const Mo
   return out;
 }
 
-bool stands(const BlockFrame& block, const Knowledge& k) {
-  return calc_away(block, k) < 1;
-}
+bool stands(const BlockFrame& block, const Knowledge& k) { return calc_away(block, k) < 1; }
 
 size_t find_frame(const std::vector<BlockFrame>& block, double time) {
   size_t i = 0;

@@ -41,9 +41,10 @@ MomentCurve make_moment_curve(const Fibres&, Axis, double N, int direction, doub
 
 /// What an engineer reads off a curve. NaN where a curve has no such point.
 struct CurvePoints {
-  CurvePoint yield;     // as given
-  CurvePoint peak;      // largest moment, that at which the first bar tears included
-  CurvePoint ultimate;  // at or behind the peak: the moment has fallen to 0.8 of it, the first bar tears, or the curve ends
+  CurvePoint yield;  // as given
+  CurvePoint peak;   // largest moment, that at which the first bar tears included
+  CurvePoint
+      ultimate;  // at or behind the peak: the moment has fallen to 0.8 of it, the first bar tears, or the curve ends
   CurvePoint residual;  // what is left where the curve ends or, earlier, at twice the ultimate rotation
 };
 CurvePoints find_points(const std::vector<double>& rotation, const std::vector<double>& moment, CurvePoint yield,
