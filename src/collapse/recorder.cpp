@@ -9,6 +9,7 @@
 #include <set>
 #include <span>
 
+#include "base/interpolate.h"
 #include "base/rotation_fit.h"
 #include "base/unit.h"
 #include "mbs/zone.h"
