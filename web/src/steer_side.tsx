@@ -217,10 +217,13 @@ function Verdict(props: { s: SteerState }) {
   const others = list.filter((f) => f !== first && (openStatuses.includes(f.status) || f.id.startsWith("clearance.")));
   others.sort((a, b) => Number(b.status === "bad") - Number(a.status === "bad"));
   const ending = s.progress.value?.ending ?? s.branch.value?.ending ?? null;
+  // the run may be further on, or at its end, before its findings come
+  const isSoFar = result === null ? ending === null : result.ending?.kind === "under_way" || result.branch !== s.active.value;
+  const of = result === null || result.branch === s.active.value ? undefined : s.branches.value.find((b) => b.id === result.branch)?.name;
   return (
     <section class="verdict-panel" aria-label="Verdict" data-test="verdict-panel">
-      <h2>Verdict {ending === null ? <span class="quiet">so far, at {formatTime(s.frontier.value)}</span> : null}</h2>
-      {first === undefined || (ending === null && s.frontier.value < 1e-9) ? (
+      <h2>Verdict {isSoFar && <span class="quiet" data-test="verdict-time">so far{result?.time !== undefined && `, at ${formatTime(result.time)}`}{of !== undefined && ` of “${of}”`}</span>}</h2>
+      {first === undefined || (isSoFar && (result?.time ?? 0) < 1e-9) ? (
         <p class="quiet">Nothing yet: findings come as the run goes on.</p>
       ) : (
         <div class={`verdict ${first.status}`}>

@@ -402,24 +402,31 @@ export function makeSteerState(address: string) {
       });
   }
   setInterval(fill, 1000);
-  // The verdict so far, while there is news. It takes a processor beside the run: at most a tenth of the time.
+  // The verdict so far, while there is news. It takes a processor beside the run: at most a fifth of the time.
   let judgedAt = 0, judging = 0; // [ms]
   setInterval(() => {
-    if (phase.value === "running" && connection.status.value === "open" && performance.now() - judgedAt > 10 * judging) void readFindings();
-  }, 3000);
+    if (phase.value === "running" && connection.status.value === "open" && performance.now() - judgedAt > Math.max(1500, 4 * judging)) void readFindings();
+  }, 500);
 
-  let reading = false;
+  let reading = false, readsAgain = false;
   async function readFindings(): Promise<void> {
     const id = active.value;
-    if (reading || id === 0) return;
+    if (id === 0) return;
+    // what is being read may be of before the end or the pause that is asked for now
+    if (reading) {
+      readsAgain = true;
+      return;
+    }
     reading = true;
+    readsAgain = false;
     const begin = performance.now();
     const result = await connection.command<FindingsSoFar>("findings", { branch: id }).catch(() => undefined);
     reading = false;
     judgedAt = performance.now();
     judging = judgedAt - begin;
     if (active.value !== id) return readFindings();
-    if (result === undefined || active.value !== id) return;
+    if (readsAgain) void readFindings();
+    if (result === undefined) return;
     findings.value = result;
     const run = runs.get(id);
     if (run === undefined) return;

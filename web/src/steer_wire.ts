@@ -173,6 +173,7 @@ export interface Comparison {
   edits?: unknown;
 }
 export interface FindingsSoFar {
+  branch: number;
   time?: number;
   ending: Ending | null;
   findings: Finding[];

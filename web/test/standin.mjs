@@ -176,7 +176,7 @@ class Session {
     const now = data.time[b.own.row];
     const fell = now > 6;
     return {
-      ending: b.ending ?? { kind: "", text: "" }, events: data.events.filter((e) => e.time <= now), not_modelled: data.not_modelled, notes: b.notes,
+      branch: b.id, time: now, ending: b.ending ?? { kind: "under_way", text: "" }, events: data.events.filter((e) => e.time <= now), not_modelled: data.not_modelled, notes: b.notes,
       findings: fell ? data.findings : [{ id: "mechanism", heading: "Mechanism", title: "Mechanism", text: now < 4 ? "The building stands." : "The building leans by 3 deg and goes on.", value: null, unit: "", status: "info" }, data.findings[1]],
     };
   }
@@ -494,7 +494,7 @@ export class Standin {
         for (let row = m.from; row <= b().own.row && count < m.count; row += m.stride ?? 1, ++count) s.sendFrame(b(), row, 2, client);
         return { count };
       }
-      case "findings": return s.findings(b());
+      case "findings": return { ...s.findings(b()), ...this.judged };
       case "zone":
         s.zone = m.zone;
         // the path so far comes as the first event

@@ -61,10 +61,20 @@ describe("steering page", () => {
     await d.untilViewed(frontier);
     assert.equal(await d.frontier(), frontier, "it went on after the pause");
     assert.ok(frontier < 9);
+    await d.until("verdict-time", `at ${frontier.toFixed(3)} s`);
     await d.tab("findings");
     await d.until("so-far", "under way");
     await shot("under-way");
     await d.tab("plots");
+  });
+
+  it("says the time that its verdict is of", async () => {
+    server.judged = { time: 0.125 };
+    await d.run();
+    await d.until("verdict-time", "so far, at 0.125 s");
+    await d.pause();
+    server.judged = {};
+    assert.notEqual(await d.frontier(), 0.125);
   });
 
   it("steps one frame", async () => {
