@@ -16,6 +16,8 @@ BranchRecord::BranchRecord(const Branch& b, const Knowledge& k, const RunOptions
       time_(b.frontier()),
       has_ended_(b.run().has_ended()),
       summary_(b.run().summary()) {
+  for (const Piece& p : b.pieces)
+    if (&p != &b.pieces.back()) summary_.wall_time += p.seconds;
   fill_provenance(options, "native", record_);
   fill_from_plan(live_->plan(), live_->model(), live_->map(), record_);
   recorder_.emplace(live_->model(), live_->map(), k_, record_, nobody_);

@@ -67,6 +67,7 @@ void LiveRun::add_frame(const mbs::View& v) {
   recorder_->add_frame(v);
   if (record_->time.size() == before) return;
   frame_steps_.push_back(simulation_->steps());
+  frame_seconds_.push_back(seconds());
   cable_force_ = v.cable_force;
   if (keeps_paths_)
     for (size_t e = 0; e < v.element_force.size(); ++e)
@@ -87,8 +88,24 @@ void LiveRun::keep_moment() {
   last_moment_ = time_;
 }
 
-bool LiveRun::begin() {
-  if (begun_) return !ended_;
+double LiveRun::seconds() const {
+  if (!called_) return seconds_;
+  return seconds_ + std::chrono::duration<double>(std::chrono::steady_clock::now() - *called_).count();
+}
+
+bool LiveRun::count_time(bool (LiveRun::*compute)()) {
+  called_ = std::chrono::steady_clock::now();
+  const bool goes_on = (this->*compute)();
+  seconds_ = seconds();
+  called_.reset();
+  return goes_on;
+}
+
+bool LiveRun::begin() { return begun_ ? !ended_ : count_time(&LiveRun::compute_beginning); }
+
+bool LiveRun::advance() { return !ended_ && count_time(&LiveRun::compute_step); }
+
+bool LiveRun::compute_beginning() {
   begun_ = true;
   simulation_ = std::make_unique<mbs::Simulation>(model_->model(), make_options());
   const bool goes_on = simulation_->begin();
@@ -104,8 +121,7 @@ bool LiveRun::begin() {
   return goes_on;
 }
 
-bool LiveRun::advance() {
-  if (ended_) return false;
+bool LiveRun::compute_step() {
   if (simulation_ == nullptr) {
     simulation_ = std::make_unique<mbs::Simulation>(model_->model(), make_options(), moments_.back());
     note_state();
@@ -123,10 +139,11 @@ bool LiveRun::advance() {
 }
 
 mbs::Summary LiveRun::summary() const {
-  if (ended_) return summary_;
-  mbs::Summary s = simulation_ != nullptr ? simulation_->finish()
-                   : moments_.empty()     ? summary_
-                                          : moments_.back().summary;
+  mbs::Summary s = ended_ || (simulation_ == nullptr && moments_.empty()) ? summary_
+                   : simulation_ != nullptr                               ? simulation_->finish()
+                                                                          : moments_.back().summary;
+  s.wall_time = seconds();
+  if (ended_) return s;
   s.ending = mbs::Summary::Ending::Cancelled;
   s.time = time_;
   s.steps = steps_;

@@ -1,8 +1,10 @@
 #pragma once
 /// A stretch of a run that is computed step by step, keeps moments to go on from, and records itself.
 
+#include <chrono>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "collapse/live_model.h"
@@ -37,8 +39,11 @@ class LiveRun {
   const std::shared_ptr<const LiveModel>& model_pointer() const { return model_; }
   const record::Record& record() const { return *record_; }
   const Recorder& recorder() const { return *recorder_; }
-  const std::vector<long>& frame_steps() const { return frame_steps_; }  // of each frame
-  const std::vector<float>& zone_path() const { return zone_path_; }     // (frames x zones x kZonePath), or empty
+  const std::vector<long>& frame_steps() const { return frame_steps_; }        // of each frame
+  const std::vector<double>& frame_seconds() const { return frame_seconds_; }  // spent computing until each frame
+  /// Spent computing this run so far; pauses are none of it [s].
+  double seconds() const;
+  const std::vector<float>& zone_path() const { return zone_path_; }  // (frames x zones x kZonePath), or empty
   /// Of each cable of the model at the last frame of this run [N]; empty before the first one.
   const std::vector<double>& cable_force() const { return cable_force_; }
   double time() const { return time_; }
@@ -63,6 +68,10 @@ class LiveRun {
 
  private:
   LiveRun(std::shared_ptr<const LiveModel>, const RunOptions&, double moment_interval, int);
+  bool compute_beginning();
+  bool compute_step();
+  /// Counts the time of a call that computes.
+  bool count_time(bool (LiveRun::*compute)());
   mbs::Options quiet_options() const;
   mbs::Options make_options();
   void note_state();
@@ -77,6 +86,7 @@ class LiveRun {
   std::unique_ptr<mbs::Simulation> simulation_;
   std::vector<mbs::Moment> moments_;  // by step; the first is the start
   std::vector<long> frame_steps_;
+  std::vector<double> frame_seconds_;
   std::vector<float> zone_path_;
   std::vector<double> cable_force_;
   bool keeps_paths_ = false;
@@ -84,6 +94,8 @@ class LiveRun {
   double time_ = 0, next_time_ = 0, start_time_ = 0, last_moment_ = 0;
   long steps_ = 0, start_steps_ = 0;
   bool begun_ = false, ended_ = false;
+  double seconds_ = 0;  // of calls that are over
+  std::optional<std::chrono::steady_clock::time_point> called_;
   mbs::Summary summary_;
 };
 

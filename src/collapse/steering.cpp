@@ -214,6 +214,7 @@ std::vector<Piece> Steering::cut(const Branch& b, const Cursor& cursor) const {
     last.frames = last.run->record().time.size();
     last.step = last.run->steps();
     last.time = last.run->time();
+    last.seconds = last.run->seconds();
     return pieces;
   }
   const auto [piece, i] = b.find_frame(cursor.frame);
@@ -223,6 +224,7 @@ std::vector<Piece> Steering::cut(const Branch& b, const Cursor& cursor) const {
     pieces.back().frames = i + 1;
     pieces.back().step = p.run->frame_steps()[i];
     pieces.back().time = p.run->record().time[i];
+    pieces.back().seconds = p.run->frame_seconds()[i];
     return pieces;
   }
   return pieces;

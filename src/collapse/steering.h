@@ -17,9 +17,10 @@ class BranchRecord;
 /// A stretch of a run that a branch goes through: its first frames, until a step.
 struct Piece {
   std::shared_ptr<LiveRun> run;
-  size_t frames = 0;  // of the run, that the branch has; of the last piece: all of them
-  long step = 0;      // of the fork at its end, counted from the start of the plan
-  double time = 0;    // of that [s]
+  size_t frames = 0;   // of the run, that the branch has; of the last piece: all of them
+  long step = 0;       // of the fork at its end, counted from the start of the plan
+  double time = 0;     // of that [s]
+  double seconds = 0;  // that computing the run took until there; of the last piece: see the run
 };
 
 struct EditEntry {

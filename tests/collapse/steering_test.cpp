@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <thread>
@@ -367,6 +368,34 @@ TEST(Steering, ABranchThatRestsKeepsItsBalanceOfEnergy) {
   s.rewind(0.3);
   s.fork("other");
   EXPECT_EQ(error_of(), active);
+}
+
+TEST(Steering, TellsTheTimeSpentComputing) {
+  using Clock = std::chrono::steady_clock;
+  const auto since = [](Clock::time_point t) { return std::chrono::duration<double>(Clock::now() - t).count(); };
+  constexpr std::chrono::milliseconds pause(300);
+  Steering s(default_knowledge(), options());
+  auto begin = Clock::now();
+  ASSERT_TRUE(s.begin(s.add_root(two_stages(), "main")));
+  advance_until(s, 0.3);
+  double most = since(begin);
+  std::this_thread::sleep_for(pause);
+  const double first = s.make_record(s.active()).provenance.wall_time;
+  EXPECT_GT(first, 0);
+  EXPECT_LE(first, most);
+  s.edit(delay_of_stage(1, 0.7), {}, true);
+  std::this_thread::sleep_for(pause);
+  begin = Clock::now();
+  advance_until(s, 10);
+  most += since(begin);
+  const double whole = s.make_record(s.active()).provenance.wall_time;
+  EXPECT_GT(whole, first);
+  EXPECT_LE(whole, most);
+  // a branch from the past has what computing that took
+  s.rewind(0.2);
+  s.fork("again");
+  EXPECT_GT(s.make_record(s.active()).provenance.wall_time, 0);
+  EXPECT_LT(s.make_record(s.active()).provenance.wall_time, first);
 }
 
 TEST(Steering, ARunUnderWayTellsNothingThatIsStillToCome) {
