@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <map>
 
 namespace topple::server {
 
 namespace {
+
+constexpr double kSameTime = 1e-9;  // [s]
 
 /// Frames around a time, and the share of the later one.
 struct Between {
@@ -18,13 +21,29 @@ Between find_frames(const std::vector<double>& time, double t) {
   if (after == time.begin()) return {0, 0, 0};
   if (after == time.end()) return {time.size() - 1, time.size() - 1, 0};
   const auto i = static_cast<std::size_t>(after - time.begin());
+  if (time[i] - t < kSameTime) return {i, i, 0};
+  if (t - time[i - 1] < kSameTime) return {i - 1, i - 1, 0};
   return {i - 1, i, (t - time[i - 1]) / (time[i] - time[i - 1])};
 }
 
 /// Value of a series of a branch at a time, between frames on a straight line.
 double value_at(const std::vector<double>& time, const std::vector<double>& value, double t) {
   const Between f = find_frames(time, t);
-  return (1 - f.share) * value[f.before] + f.share * value[f.after];
+  return f.share == 0 ? value[f.before] : (1 - f.share) * value[f.before] + f.share * value[f.after];
+}
+
+/// Frames of either within the time that both have, at most n of them.
+std::vector<double> find_times(const std::vector<double>& a, const std::vector<double>& b, std::size_t n) {
+  const double begin = std::max(a.front(), b.front()), end = std::min(a.back(), b.back());
+  std::vector<double> all, times;
+  std::merge(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(all));
+  std::erase_if(all, [&](double t) { return t < begin || t > end; });
+  const auto is_same = [](double x, double y) { return y - x < kSameTime; };
+  all.erase(std::unique(all.begin(), all.end(), is_same), all.end());
+  if (all.empty()) all.push_back(end);
+  if (all.size() <= n) return all;
+  for (std::size_t i = 0; i < n; ++i) times.push_back(all[i * (all.size() - 1) / (n - 1)]);
+  return times;
 }
 
 Json describe_edits(const JudgedBranch& b) {
@@ -49,9 +68,8 @@ Json describe_findings(const JudgedBranch& b) {
 
 Json compare(const JudgedBranch& first, const JudgedBranch& second, int n) {
   const std::array<const record::Record*, 2> r{&first.record, &second.record};
-  const double end = std::min(r[0]->time.back(), r[1]->time.back());
-  std::vector<double> times;
-  for (int i = 0; i < n; ++i) times.push_back(end * i / (n - 1));
+  const std::vector<double> times = find_times(r[0]->time, r[1]->time, static_cast<std::size_t>(n));
+  const double end = times.back();
   Json out{{"a", first.branch}, {"b", second.branch}, {"time", numbers(times)}, {"series", Json::array()}};
   // those that both have: a branch that has ended has more
   for (const record::Series& s : r[0]->series) {

@@ -26,6 +26,7 @@ using collapse::Steering;
 namespace {
 
 constexpr int kMostIds = 1 << 30;
+constexpr int kMostCompared = 10000;  // instants
 constexpr std::size_t kMostFrames = 4000, kMostFrameBytes = std::size_t{32} << 20;
 
 bool has(const Json& command, const char* key) {
@@ -95,7 +96,7 @@ std::optional<Json> Session::perform(const Task& task) {
   if (word == "series") return read_series(command);
   if (word == "compare") {
     check_keys(command, {"a", "b", "frames"});
-    const int count = has(command, "frames") ? read_integer(command, "frames", 2, 10000) : 200;
+    const int count = has(command, "frames") ? read_integer(command, "frames", 2, kMostCompared) : kMostCompared;
     answer_from_records(task, {read_integer(command, "a", 1, kMostIds), read_integer(command, "b", 1, kMostIds)},
                         [count](const JudgedBranches& b) { return compare(b->front(), b->back(), count); });
     return std::nullopt;

@@ -186,8 +186,9 @@ function Touchdowns(props: { state: State; comparison: Comparison }) {
   );
 }
 
-function Page(props: { state: State; compared: Compared; titles: Record<string, string>; fitRef: { current: () => void } }) {
-  const { state, compared, titles, fitRef } = props;
+function Page(props: { state: State; compared: Compared; fitRef: { current: () => void } }) {
+  const { state, compared, fitRef } = props;
+  const { titles, notes } = compared.plotted;
   const { names } = compared.comparison;
   return (
     <>
@@ -201,7 +202,7 @@ function Page(props: { state: State; compared: Compared; titles: Record<string, 
         <div class="stage">
           <Overlay state={state} compared={compared} fitRef={fitRef} />
           <Timeline state={state} />
-          <Plots state={state} titles={titles} />
+          <Plots state={state} titles={titles} notes={notes} />
         </div>
         <div class="side">
           <Summary comparison={compared.comparison} />
@@ -216,10 +217,10 @@ function Page(props: { state: State; compared: Compared; titles: Record<string, 
 
 startPage("comparison", readComparison, (compared) => {
   document.title = `${compared.a.provenance.title || "Runs"} – topple compare`;
-  const { run, titles } = compared.plotted;
+  const { run } = compared.plotted;
   const state = makeState(run);
   const fitRef = { current: (): void => undefined };
   runClock(state);
   listenToKeys(state, () => fitRef.current());
-  return <Page state={state} compared={compared} titles={titles} fitRef={fitRef} />;
+  return <Page state={state} compared={compared} fitRef={fitRef} />;
 }, "drawn");

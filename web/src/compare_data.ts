@@ -1,4 +1,6 @@
 /// Two runs and what sets them apart: docs/compare.md. T instants.
+import { cutAt, findBreakUp } from "./plots";
+import { formatTime } from "./units";
 import { makeRun, type Frame, type Run, type Series } from "./data";
 
 export interface ComparedSeries {
@@ -35,7 +37,7 @@ export interface Compared {
   b: Run;
   photos: Photo[];
   /// A run of the common instants with what is plotted, and the headings of its plots.
-  plotted: { run: Run; titles: Record<string, string> };
+  plotted: { run: Run; titles: Record<string, string>; notes: Record<string, string> };
 }
 
 const asked = ["tilt_angle", "lean_compared", "mass_centre_height", "ground_force"];
@@ -52,15 +54,21 @@ export function readComparison(text: string): Compared {
 
 /// Each quantity of both runs in a plot of its own.
 export function makePlotted(comparison: Comparison, a: Run): Compared["plotted"] {
-  const titles: Record<string, string> = {};
+  const titles: Record<string, string> = {}, notes: Record<string, string> = {};
+  const shares = comparison.series.find((s) => s.id === "connected_share");
+  const ends = [findBreakUp(shares?.a), findBreakUp(shares?.b)];
   const series: Series[] = [];
   const [nameA, nameB] = comparison.names;
   const rank = (id: string): number => (asked.includes(id) ? asked.indexOf(id) : asked.length);
   const wanted = comparison.series.filter((s) => asked.includes(s.id) || s.group === "energy" || s.group === "force");
   for (const s of wanted.sort((x, y) => rank(x.id) - rank(y.id))) {
     titles[s.id] = s.group === "energy" ? `Energy: ${s.title.charAt(0).toLowerCase()}${s.title.slice(1)}` : s.title;
-    series.push({ id: `${s.id} A`, title: `A ${nameA}`, unit: s.unit, group: s.id, value: s.a });
-    series.push({ id: `${s.id} B`, title: `B ${nameB}`, unit: s.unit, group: s.id, value: s.b });
+    // the lean is that of all bodies, whether they hang together or not
+    const ofBlock = s.group === "angle" && s.id !== "lean_compared";
+    series.push({ id: `${s.id} A`, title: `A ${nameA}`, unit: s.unit, group: s.id, value: ofBlock ? cutAt(s.a, ends[0]) : s.a });
+    series.push({ id: `${s.id} B`, title: `B ${nameB}`, unit: s.unit, group: s.id, value: ofBlock ? cutAt(s.b, ends[1]) : s.b });
+    const words = ends.map((end, k) => (end === undefined ? "" : `${"AB"[k]} ends at ${formatTime(comparison.time[end] ?? 0)}`)).filter((w) => w !== "");
+    if (ofBlock && words.length > 0) notes[s.id] = `${words.join(", ")}, when less than half of the upper block holds together.`;
   }
   const { rms, largest, centre } = comparison.distance;
   titles["distance"] = "How far the same parts are apart";
@@ -69,5 +77,5 @@ export function makePlotted(comparison: Comparison, a: Run): Compared["plotted"]
     { id: "largest", title: "largest", unit: "m", group: "distance", value: largest },
     { id: "centre", title: "mass centres", unit: "m", group: "distance", value: centre });
   const none: Frame = { pose: new Float32Array(7 * a.bodies.length), utilisation: new Float32Array(a.zones.length), state: new Uint8Array(a.zones.length), crushed: [] };
-  return { run: { ...a, time: comparison.time, series, frames: comparison.time.map(() => none) }, titles };
+  return { run: { ...a, time: comparison.time, series, frames: comparison.time.map(() => none) }, titles, notes };
 }

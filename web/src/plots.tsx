@@ -30,11 +30,16 @@ export function makeGroups(series: readonly Series[], titles: Record<string, str
   return groups.map((g, i) => ({ g, i })).sort((a, b) => rank(a.g) - rank(b.g) || a.i - b.i).map(({ g }) => g);
 }
 
-/// First frame in which less than half of the upper block holds together: from there on its angle means nothing.
-export function findCoherent(run: Run): number | undefined {
-  const first = run.series.find((s) => s.id === "connected_share")?.value.findIndex((v) => v !== null && v < 0.5) ?? -1;
+/// First moment at which less than half of the upper block holds together: from there on its angle means nothing.
+export function findBreakUp(connectedShare: readonly (number | null)[] | undefined): number | undefined {
+  const first = connectedShare?.findIndex((v) => v !== null && v < 0.5) ?? -1;
   return first < 0 ? undefined : first;
 }
+export const findCoherent = (run: Run): number | undefined => findBreakUp(run.series.find((s) => s.id === "connected_share")?.value);
+
+/// The series until there.
+export const cutAt = (values: readonly (number | null)[], end: number | undefined): (number | null)[] =>
+  values.map((v, i) => (i >= (end ?? Infinity) ? null : v));
 
 export const cssColour = (name: string): string => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
@@ -66,7 +71,7 @@ function calcValues(run: Run, group: Group): (number | null)[][] {
   return group.series.map((s) => s.value.map((v, i) => (v === null || i >= (coherent ?? Infinity) ? null : v * group.factor)));
 }
 
-export function PlotPanel(props: { state: State; group: Group; onSeek?: (time: number) => void; height?: number }) {
+export function PlotPanel(props: { state: State; group: Group; note?: string | undefined; onSeek?: (time: number) => void; height?: number }) {
   const { state, group } = props;
   const { run } = state;
   const holder = useRef<HTMLDivElement>(null);
@@ -172,6 +177,7 @@ export function PlotPanel(props: { state: State; group: Group; onSeek?: (time: n
           Ends at {formatTime(run.time[coherent] ?? 0)}, when less than half of the upper block holds together.
         </p>
       )}
+      {props.note !== undefined && <p class="quiet plot-note">{props.note}</p>}
       <DataTable state={state} group={group} values={values} />
     </section>
   );
@@ -243,14 +249,14 @@ function DataTable(props: { state: State; group: Group; values: (number | null)[
   );
 }
 
-export function Plots(props: { state: State; onSeek?: (time: number) => void; height?: number; titles?: Record<string, string> }) {
+export function Plots(props: { state: State; onSeek?: (time: number) => void; height?: number; titles?: Record<string, string>; notes?: Record<string, string> }) {
   const groups = makeGroups(props.state.run.series, props.titles);
   if (groups.length === 0 || props.state.run.time.length === 0)
     return <section class="panel"><h2>Plots</h2><p class="quiet">The record holds no series.</p></section>;
   return (
     <div class={`plots ${groups.length === 1 ? "one" : ""}`}>
       {groups.map((group) => (
-        <PlotPanel key={`${group.id} ${group.unit}`} {...props} group={group} />
+        <PlotPanel key={`${group.id} ${group.unit}`} {...props} group={group} note={props.notes?.[group.id]} />
       ))}
     </div>
   );

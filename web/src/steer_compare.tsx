@@ -1,7 +1,7 @@
 /// Two branches: their series in one plot each, where they are farthest apart, what their findings say.
 import { useEffect, useRef, useState } from "preact/hooks";
 import uPlot from "uplot";
-import { axis, cssColour, namePlot, niceRange } from "./plots";
+import { axis, cssColour, cutAt, findBreakUp, namePlot, niceRange } from "./plots";
 import type { SteerState } from "./steer_state";
 import type { Comparison } from "./steer_wire";
 import { compareView, type CompareView } from "./steer_view";
@@ -10,7 +10,10 @@ import { formatNumber, formatTime, prettify, toReadable } from "./units";
 const dashOfB = [7, 4];
 
 function Pair(props: { s: SteerState; result: Comparison; series: Comparison["series"][number]; names: [string, string] }) {
-  const { s, result, series, names } = props;
+  const { s, result, names } = props;
+  const shares = props.series.group === "angle" ? result.series.find((x) => x.id === "connected_share") : undefined;
+  const ends = [findBreakUp(shares?.a), findBreakUp(shares?.b)];
+  const series = { ...props.series, a: cutAt(props.series.a, ends[0]), b: cutAt(props.series.b, ends[1]) };
   const holder = useRef<HTMLDivElement>(null);
   const [open, setOpen] = useState(false);
   const { unit, factor } = toReadable(series.unit);
@@ -43,6 +46,9 @@ function Pair(props: { s: SteerState; result: Comparison; series: Comparison["se
     <section class="plot panel" aria-label={series.title}>
       <h2>{series.title}</h2>
       <div ref={holder} />
+      {ends.map((end, k) => end !== undefined && (
+        <p class="quiet plot-note">{names[k]} ends at {formatTime(result.time[end] ?? 0)}, when less than half of the upper block holds together.</p>
+      ))}
       <details class="data-table" onToggle={(e) => setOpen(e.currentTarget.open)}>
         <summary>Table of values</summary>
         {open && (

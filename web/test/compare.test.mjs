@@ -45,6 +45,17 @@ describe("the data of two runs", () => {
     assert.ok(run.series.some((s) => s.group === "distance" && s.id === "rms"));
     for (const s of run.series) assert.equal(s.value.length, run.time.length);
   });
+
+  it("ends tilts where less than half of a block holds together, and says so", () => {
+    const { comparison, a } = makeCompared();
+    const whole = a.time.map(() => 1);
+    comparison.series.push({ id: "connected_share", title: "Share", unit: "1", group: "share", a: whole, b: whole.map((_, i) => (i < 50 ? 1 : 0.4)) });
+    const { run, notes } = makePlotted(comparison, a);
+    const [first, second] = run.series.filter((s) => s.group === "tilt_angle");
+    assert.equal(second.value[50], null);
+    assert.equal(first.value[50], comparison.series.find((s) => s.id === "tilt_angle").a[50]);
+    assert.match(notes.tilt_angle, /^B ends at .* s, when less than half of the upper block holds together\.$/);
+  });
 });
 
 describe("the page of two runs", () => {
