@@ -177,8 +177,13 @@ void StudyTask::look(const study::StudyState* state) {
     if (!levels.empty())
       for (const uncertainty::FanLevel& f : uncertainty::calc_fan(problem_.space, r.alpha.archive, levels)) {
         fans["alpha"].push_back(f.alpha);
-        fans["low"].push_back(numbers(f.lower));
-        fans["high"].push_back(numbers(f.upper));
+        // behind the angles stands the outline of debris [m]
+        const auto angles = [T = fans["time"].size()](std::vector<double> curve) {
+          curve.resize(std::min(T, curve.size()));
+          return numbers(curve);
+        };
+        fans["low"].push_back(angles(f.lower));
+        fans["high"].push_back(angles(f.upper));
       }
   }
   on_news_(describe(), news);

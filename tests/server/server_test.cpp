@@ -805,6 +805,8 @@ TEST_F(ServerTest, AStudyGrowsAndASampleIsPlayed) {
   EXPECT_FALSE(study["bounds"].empty());
   EXPECT_FALSE(study["possibilities"].empty());
   EXPECT_EQ(study["fans"]["alpha"].size(), study["fans"]["low"].size());
+  for (const char* key : {"low", "high"})
+    for (const TestJson& row : study["fans"][key]) EXPECT_EQ(row.size(), study["fans"]["time"].size());
   const TestJson watched = c->result("study.watch", {{"study", 1}});
   EXPECT_EQ(watched["samples"].size(), 12U);
   const TestJson played = c->result("study.play", {{"study", 1}, {"sample", 3}});

@@ -46,8 +46,7 @@ function Membership(props: { bounds: Bounds; unit: string }) {
 function Fan(props: { fans: NonNullable<Study["fans"]> }) {
   const { fans } = props;
   const width = 520, height = 170, left = 44, bottom = 22;
-  // Behind the angles the rows may hold more, which is none of this picture.
-  const all = [...fans.low, ...fans.high].flatMap((row) => row.slice(0, fans.time.length)).filter((v): v is number => v !== null);
+  const all = [...fans.low, ...fans.high].flat().filter((v): v is number => v !== null);
   if (all.length === 0 || fans.time.length < 2) return null;
   const turn = 180 / Math.PI;
   const least = Math.min(0, ...all) * turn, most = Math.max(0, ...all) * turn;
