@@ -289,6 +289,8 @@ std::shared_ptr<Client> Hub::connect(std::shared_ptr<Outlet> outlet, const std::
     else if (!sessions_.empty())
       session = sessions_.begin()->second;
   }
+  // commands that come before hello are of it, too
+  if (session) client->session = session->id();
   client->attach(std::move(outlet));
   if (!session) {
     client->send(std::make_shared<const std::string>(

@@ -521,6 +521,16 @@ TEST_F(ServerTest, AnswersMessagesThatAreWrong) {
   EXPECT_TRUE(d->result("ping").contains("time")) << "the others go on";
 }
 
+TEST_F(ServerTest, DoesCommandsThatComeBeforeHello) {
+  start(two_stages());
+  (void)watcher();
+  for (int i = 0; i < 20; ++i) {
+    TestClient c(port());
+    ASSERT_TRUE(c.upgrade(server_->token()));
+    EXPECT_TRUE(c.result("log").contains("entries"));
+  }
+}
+
 TEST_F(ServerTest, DoesACommandOnce) {
   start(two_stages());
   const auto c = watcher();
