@@ -66,6 +66,8 @@ std::string Steering::free_name(const std::string& wanted) const {
     return std::any_of(branches_.begin(), branches_.end(), [&](const auto& b) { return b->name == name; });
   };
   if (!wanted.empty()) {
+    if (wanted.find_first_not_of(' ') == std::string::npos)
+      throw InputError("E912", "a name has at least one character that is no blank");
     if (count_characters(wanted) > kLongestName)
       throw InputError("E912", fmt::format("a name has at most {} characters", kLongestName));
     if (std::any_of(wanted.begin(), wanted.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
@@ -247,8 +249,9 @@ Steering::Made Steering::edit(const Edit& e, const std::string& name, bool in_pl
   const std::string new_name = stays ? from.name : name_of_new(name);
   if (const size_t edits = last.run->model().applied().size(); edits >= options_.most_edits)
     throw InputError("E905", fmt::format("the branch has {} edits, which is the limit", edits));
-  if (base.size() >= options_.most_edits)
-    throw InputError("E905", fmt::format("the branch has come from {} others, which is the limit", base.size()));
+  // the edits along it and the branches that it has come from
+  if (base.size() > options_.most_edits)
+    throw InputError("E905", fmt::format("the branch consists of {} stretches, which is the limit", base.size()));
 
   const mbs::Moment moment = last.run->moment_at(last.step);
   auto model = std::make_shared<LiveModel>(last.run->model());

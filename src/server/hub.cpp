@@ -216,7 +216,12 @@ Json Hub::list_templates() const {
 
 SessionPlan Hub::read_plan_of(const Json& command) const {
   check_keys(command, {"path", "text", "title", "template", "demo"});
-  if (read_flag(command, "demo", false)) {
+  const bool is_demo = read_flag(command, "demo", false);
+  const int ways = has(command, "path") + has(command, "text") + has(command, "template") + is_demo;
+  if (ways > 1 || (has(command, "title") && !has(command, "text")))
+    throw InputError("E912",
+                     "session.open wants one of \"path\", \"text\" (with \"title\"), \"template\" and \"demo\"");
+  if (is_demo) {
     if (options_.demo.text.empty()) throw InputError("E920", "there is no demo here");
     return options_.demo;
   }
@@ -320,6 +325,15 @@ void Hub::receive(const std::shared_ptr<Client>& client, const std::string& text
     command = collapse::parse_command(text);
   } catch (const InputError& e) { return refuse(nullptr, e); } catch (const std::exception&) {
     command = Json(Json::value_t::discarded);
+  }
+  if (command.is_discarded()) {
+    try {
+      command = Json::parse(text);
+    } catch (const Json::out_of_range&) {
+      return refuse(nullptr, InputError("E910", "a number is larger than any (1.8e308)"));
+    } catch (const std::exception&) {
+      // no JSON
+    }
   }
   if (!command.is_object()) return refuse(nullptr, InputError("E910", "a message must be a JSON object"));
   const auto it = command.find("id");

@@ -169,6 +169,7 @@ Json Session::run_clock(const std::string& word, const Json& command) {
   }
   if (word == "step") {
     check_keys(command, {"frames", "steps"});
+    if (has(command, "frames") && has(command, "steps")) throw InputError("E912", "step wants either frames or steps");
     const int steps = has(command, "steps") ? read_integer(command, "steps", 1, 1000000) : -1;
     const int frames = has(command, "frames") ? read_integer(command, "frames", 1, 100000) : steps > 0 ? -1 : 1;
     start();

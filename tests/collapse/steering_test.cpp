@@ -428,6 +428,24 @@ TEST(Steering, NamesAreChangedWhereNoMoreBranchesFit) {
   EXPECT_THROW(s.rename(1, "two\nlines"), InputError);
 }
 
+TEST(Steering, SaysThatABranchHasTooManyEdits) {
+  SteeringOptions o = options();
+  o.most_edits = 3;
+  Steering s(default_knowledge(), o);
+  ASSERT_TRUE(s.begin(s.add_root(two_stages(), "main")));
+  const auto edit = [&s](double time) {
+    s.advance();
+    s.edit(delay_of_stage(1, time), {}, true);
+  };
+  for (const double time : {0.7, 0.8, 0.9}) edit(time);
+  try {
+    edit(0.95);
+    FAIL();
+  } catch (const InputError& e) {
+    EXPECT_STREQ(e.first_error().message.c_str(), "the branch has 3 edits, which is the limit");
+  }
+}
+
 TEST(Steering, ChargesFireNowAndCanBeTakenOut) {
   Steering s(default_knowledge(), options());
   ASSERT_TRUE(s.begin(s.add_root(two_stages("0.9 s"), "main")));

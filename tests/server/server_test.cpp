@@ -496,6 +496,12 @@ TEST_F(ServerTest, AnswersMessagesThatAreWrong) {
   ASSERT_TRUE(nested->send_text(R"({"id": 1, "command": "x", "a": )" + std::string(200000, '[')));
   EXPECT_EQ(nested->wait_for_type("error")["error"]["code"], "E910");
   const auto d = watcher();
+  ASSERT_TRUE(d->send_text(R"({"id": 1, "command": "run", "until": 1e999})"));
+  EXPECT_EQ(d->wait_for_type("error")["error"]["message"], "a number is larger than any (1.8e308)");
+  EXPECT_EQ(d->code("step", {{"frames", 1}, {"steps", 1}}), "E912");
+  EXPECT_EQ(d->code("session.open", {{"template", "tower"}, {"demo", true}}), "E912");
+  EXPECT_EQ(d->code("session.open", {{"demo", true}, {"title", "x"}}), "E912");
+  EXPECT_EQ(d->code("rename", {{"branch", 1}, {"name", "   "}}), "E912");
   EXPECT_EQ(d->code("rnu"), "E911");
   EXPECT_EQ(d->command("paus")["error"]["help"], "did you mean \"pause\"?");
   EXPECT_EQ(d->code("run", {{"untill", 3}}), "E912");
