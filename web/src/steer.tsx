@@ -78,9 +78,13 @@ function Banner(props: { s: SteerState }) {
   const { s } = props;
   const p = s.progress.value;
   const ending = p?.ending ?? s.branch.value?.ending ?? null;
+  const again = <>Start <code>topple steer</code> again and open the address that it prints: it offers to go on where the log ends. What is shown here is the last state.</>;
+  if (s.status.value === "lost" && s.connection.unanswered.value)
+    return <div class="banner bad" role="alert" data-test="banner"><strong>No answer from the server.</strong> If it has ended: {again} This page still tries to reconnect.</div>;
+  if (s.status.value === "gone") return <div class="banner bad" role="alert" data-test="banner"><strong>This server is gone;</strong> another one has its address. {again}</div>;
   if (s.status.value === "lost")
     return <div class="banner warning" role="status" data-test="banner"><strong>No connection.</strong> The run goes on without this page; reconnecting…</div>;
-  if (s.status.value === "ended") return <div class="banner bad" role="alert" data-test="banner"><strong>The server has ended.</strong> Start <code>topple steer</code> again; what is shown here is the last state.</div>;
+  if (s.status.value === "ended") return <div class="banner bad" role="alert" data-test="banner"><strong>The server has ended.</strong> {again}</div>;
   if (s.phase.value === "failed" && s.view.value === null)
     return <div class="banner bad" role="alert" data-test="banner"><strong>This plan cannot be run as it is.</strong> {prettify(ending?.text ?? "")} Mend the text below; “Run as a new branch” tries again.</div>;
   if (s.phase.value === "failed") {

@@ -29,13 +29,16 @@ export interface Listener {
   onFrame(bytes: ArrayBuffer): void;
 }
 
-export type Status = "connecting" | "open" | "lost" | "ended";
+export type Status = "connecting" | "open" | "lost" | "ended" | "gone";
 
 const silenceLimit = 20000; // then a ping asks whether the server is there [ms]
 const answerLimit = 10000;
+const manyTries = 6; // some ten seconds without an answer
 
 export class Connection {
   readonly status = signal<Status>("connecting");
+  /// Nobody has answered for a while: there may be no server any more.
+  readonly unanswered = signal(false);
   private socket: WebSocket | undefined;
   private readonly pending = new Map<number, Pending>();
   private nextId = 1;
@@ -73,7 +76,7 @@ export class Connection {
 
   private open(): void {
     clearTimeout(this.retry);
-    if (this.status.value === "ended") return;
+    if (this.isOver()) return;
     this.socket?.close();
     const socket = new WebSocket(this.resume === "" ? this.address : `${this.address}?resume=${this.resume}&seq=${this.seq}`);
     socket.binaryType = "arraybuffer";
@@ -94,10 +97,24 @@ export class Connection {
   private lose(): void {
     this.socket = undefined;
     this.greeted = false;
-    if (this.status.value === "ended") return;
+    if (this.isOver()) return;
     this.status.value = "lost";
     clearTimeout(this.retry);
     this.retry = setTimeout(() => this.open(), Math.min(4000, 250 * 2 ** this.tries++));
+    if (this.tries > 1) void this.askWhetherItIsKnown();
+    this.unanswered.value = this.tries >= manyTries;
+  }
+
+  private isOver(): boolean {
+    return this.status.value === "ended" || this.status.value === "gone";
+  }
+
+  /// Another server at the same address does not know this page's token: the one that did will not come back.
+  private async askWhetherItIsKnown(): Promise<void> {
+    const answer = await fetch("api/server").catch(() => undefined);
+    if (answer?.status !== 403 || this.status.value !== "lost") return;
+    clearTimeout(this.retry);
+    this.status.value = "gone";
   }
 
   private watch(): void {
@@ -126,6 +143,7 @@ export class Connection {
       case "hello":
       case "resumed":
         this.tries = 0;
+        this.unanswered.value = false;
         if (message.type === "hello") {
           this.resume = String(message["resume"] ?? "");
           this.seq = Number(message["seq"] ?? 0);

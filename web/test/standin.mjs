@@ -273,6 +273,7 @@ export class Standin {
   barrier = Infinity; // a run goes no further than this row, but stays a running one
   studyBarrier = Infinity; // and a study no further than so many samples
   refuse = false; // new connections
+  isOther = false; // as another server at the same address answers
   resume = new Map();
 
   constructor() {
@@ -316,6 +317,8 @@ export class Standin {
     const send = (type, body) => response.writeHead(200, { "content-type": type }).end(body);
     const json = (value) => send("application/json", JSON.stringify(value));
     const session = this.sessions[Number(/^\/api\/sessions\/(\d+)/.exec(path)?.[1]) - 1];
+    if (this.isOther) return response.writeHead(403, { "content-type": "application/json" }).end(JSON.stringify({ error: { code: "E901", message: "wrong token", help: "" } }));
+    if (path === "/api/server") return json({ protocol: 1 });
     if (path === "/") return send("text/html; charset=utf-8", await this.page);
     if (path === "/api/templates") return json({ templates: [{ name: "frame", title: "Frame of three storeys", text: planText }, { name: "chimney", title: "Chimney of 40 m", description: "A chimney that falls to one side", text: planText }], demo: { title: "Storehouse in Weida, 1998" } });
     if (path === "/api/plans") return json({ folder: "/plans", plans: [{ path: "storehouse.toml", title: "Storehouse of seven storeys" }, { path: "silo.toml", title: "Silo" }] });

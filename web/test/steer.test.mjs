@@ -645,6 +645,18 @@ describe("steering page with nothing open", () => {
     await browser.close();
   });
 
+  it("says that its server is gone when another one has the address", async () => {
+    const server = await new Standin().start();
+    const browser = await openPage(server.url);
+    const d = makeDriver(browser.page);
+    await d.until("phase", "Paused");
+    server.refuse = server.isOther = true;
+    server.cut();
+    await d.until("banner", "This server is gone");
+    await look(browser.page, "gone");
+    await browser.close();
+  });
+
   it("shows that a plan is built, and what is wrong if it cannot be", async () => {
     const server = await new Standin().start();
     const end = server.startBuilding(server.sessions[0]);
