@@ -89,6 +89,26 @@ export function makeSteerState(address: string) {
   effect(() => {
     if (editedText.value === null) planBase = plan.value.sha256;
   });
+  // Text that is not saved outlives a reload.
+  const sessionId = computed(() => session.value?.id);
+  const draftKey = (): string => `topple draft ${address} ${sessionId.value}`;
+  effect(() => {
+    const text = editedText.value;
+    if (sessionId.value === undefined) return;
+    try {
+      if (text === null) sessionStorage.removeItem(draftKey());
+      else sessionStorage.setItem(draftKey(), JSON.stringify({ text, base: planBase }));
+    } catch {
+      /* a browser without storage forgets */
+    }
+  });
+  const readDraft = (): { text: string; base: string } | undefined => {
+    try {
+      return JSON.parse(sessionStorage.getItem(draftKey()) ?? "null") ?? undefined;
+    } catch {
+      return undefined;
+    }
+  };
 
   const branches = computed(() => session.value?.branches ?? []);
   const branch = computed(() => branches.value.find((b) => b.id === active.value));
@@ -217,6 +237,11 @@ export function makeSteerState(address: string) {
     if (!sessions.value.some((s) => s.id === next.id)) sessions.value = [...sessions.value, next];
     progress.value = (message["state"] as StateEvent | null | undefined) ?? null;
     plan.value = message["plan"] as typeof plan.value;
+    if (!known) {
+      const draft = readDraft();
+      editedText.value = draft?.text ?? null;
+      if (draft !== undefined) planBase = draft.base;
+    }
     if (next.diagnostics !== undefined && editedText.value === null) planCheck.value = { diagnostics: next.diagnostics, title: next.title, notes: [] };
     if (next.active === null || message["scene"] === null || message["scene"] === undefined) {
       // Not built yet, or it cannot be: another hello follows when it is.
@@ -228,7 +253,6 @@ export function makeSteerState(address: string) {
     if (!known) {
       comparison.value = null;
       zone.value = null;
-      editedText.value = null;
       hiddenStoreys.value = new Set();
       look.selected.value = -1;
     }

@@ -508,6 +508,22 @@ describe("steering page", () => {
     await d.scrub(3);
   });
 
+  it("keeps text that is not saved over a reload", async () => {
+    await d.tab("plan");
+    const before = await page.inputValue("[data-test=plan-text]");
+    await page.fill("[data-test=plan-text]", `${before}# mine\n`);
+    await page.reload();
+    await page.waitForSelector("html[data-ready=yes]");
+    await d.tab("plan");
+    assert.equal(await page.inputValue("[data-test=plan-text]"), `${before}# mine\n`);
+    await page.getByRole("button", { name: "Discard" }).click();
+    await page.reload();
+    await page.waitForSelector("html[data-ready=yes]");
+    await d.tab("plan");
+    assert.equal(await page.inputValue("[data-test=plan-text]"), before);
+    await d.tab("plots");
+  });
+
   it("opens another plan beside, and goes back", async () => {
     await page.selectOption("[data-test=sessions]", "open");
     await page.waitForSelector("[data-test=open-plan] [data-test=open-template]");
