@@ -89,21 +89,30 @@ interface Axis {
   value: (s: Sample) => number | null | undefined;
 }
 
+const mostAxes = 14;
+
+/// Those that have room; half of it is kept for outputs.
+export function chooseAxes<A extends { name: string }>(inputs: A[], outputs: A[]): { axes: A[]; left: string[] } {
+  const taken = Math.min(inputs.length, Math.max(mostAxes / 2, mostAxes - outputs.length));
+  const rest = mostAxes - taken;
+  return { axes: [...inputs.slice(0, taken), ...outputs.slice(0, rest)], left: [...inputs.slice(taken), ...outputs.slice(rest)].map((a) => a.name) };
+}
+
 /// A line for each run through all its inputs and outputs. A click plays the nearest one.
 function Parallel(props: { study: Study; samples: Sample[]; chosen: number; onChoose: (index: number) => void; onPlay: (index: number) => void }) {
   const { study, samples } = props;
   const canvas = useRef<HTMLCanvasElement>(null);
   const width = 900, height = 220, top = 34, bottom = 20, side = 50;
-  const axes = useMemo(() => {
+  const { axes, left } = useMemo(() => {
     const make = (name: string, unit: string, value: Axis["value"]): Axis => {
       const r = toReadable(unit);
       const values = samples.map(value).filter((v): v is number => v !== null && v !== undefined && Number.isFinite(v));
       return { name, unit: r.unit, factor: r.factor, least: Math.min(...values), most: Math.max(...values), value };
     };
-    return [
-      ...study.inputs.map((one, k) => make(one.name, one.unit, (s) => s.inputs[k])),
-      ...study.outputs.map((one, k) => make(one.name, one.unit, (s) => s.outputs[k])),
-    ].filter((a) => Number.isFinite(a.least) && a.most > a.least).slice(0, 14);
+    const spreads = (a: Axis): boolean => Number.isFinite(a.least) && a.most > a.least;
+    const inputs = study.inputs.map((one, k) => make(one.name, one.unit, (s) => s.inputs[k])).filter(spreads);
+    const outputs = study.outputs.map((one, k) => make(one.name, one.unit, (s) => s.outputs[k])).filter(spreads);
+    return chooseAxes(inputs, outputs);
   }, [study.inputs, study.outputs, samples]);
   const x = (k: number): number => side + (k * (width - 2 * side)) / Math.max(1, axes.length - 1);
   const y = (a: Axis, v: number): number => top + (1 - (v - a.least) / (a.most - a.least)) * (height - top - bottom);
@@ -155,7 +164,7 @@ function Parallel(props: { study: Study; samples: Sample[]; chosen: number; onCh
   return (
     <figure class="parallel">
       <figcaption>
-        Each line is a run; a click plays that collapse.{" "}
+        Each line is a run; a click plays that collapse.{left.length > 0 && ` There is room for ${mostAxes} axes; in the table only: ${left.join(", ")}.`}{" "}
         {outcomes.map((o, k) => <span class="with-sign"><i class="line-swatch" style={{ background: seriesColours[k % seriesColours.length] }} /> {prettify(o)}</span>)}
       </figcaption>
       <div class="parallel-frame" style={{ aspectRatio: `${width} / ${height}` }}>
@@ -169,7 +178,7 @@ function Parallel(props: { study: Study; samples: Sample[]; chosen: number; onCh
           {axes.map((a, k) => (
             <g>
               <line x1={x(k)} x2={x(k)} y1={top} y2={height - bottom} stroke="var(--text-quiet)" />
-              <text x={x(k)} y={k % 2 === 0 ? 10 : 21} text-anchor="middle">{a.name.length > 18 ? `${a.name.slice(0, 17)}…` : a.name}{a.unit === "" ? "" : ` [${a.unit}]`}</text>
+              <text x={k === 0 ? 0 : k === axes.length - 1 ? width : x(k)} y={k % 2 === 0 ? 10 : 21} text-anchor={k === 0 ? "start" : k === axes.length - 1 ? "end" : "middle"}>{a.name.length > 18 ? `${a.name.slice(0, 17)}…` : a.name}{a.unit === "" ? "" : ` [${a.unit}]`}</text>
               <text x={x(k) + 3} y={top - 1}>{formatNumber(a.most * a.factor, 3)}</text>
               <text x={x(k)} y={height - 6} text-anchor="middle">{formatNumber(a.least * a.factor, 3)}</text>
             </g>
@@ -275,7 +284,7 @@ export function StudyPanel(props: { s: SteerState }) {
               </div>
             )}
           </details>
-          <p class="quiet">Running for {formatTime(study.seconds)}.</p>
+          <p class="quiet">{study.state === "running" ? "Running for" : "It ran for"} {formatTime(study.seconds)}.</p>
         </div>
       )}
     </div>

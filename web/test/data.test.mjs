@@ -8,6 +8,7 @@ import { makeSynthetic } from "./synthetic.mjs";
 const { decodeFloats, findFrame, slerp, readRun, calcPose } = await load("data.ts");
 const { dropRoundOff, findLargest, formatNumber, formatValue, toReadable, formatDuration, formatDate, formatMass, prettify } = await load("units.ts");
 const { findCoherent } = await load("plots.tsx");
+const { chooseAxes } = await load("steer_study.tsx");
 const { listConditions } = await load("handover.tsx");
 const { chooseMoments } = await load("stills.tsx");
 const { findZonesOfBodies, findBody, partOfShape } = await load("zones.ts");
@@ -15,6 +16,18 @@ const { colourOfUtilisation } = await load("vocabulary.ts");
 const { BranchRun } = await load("steer_branch.ts");
 const { makeLook } = await load("state.ts");
 const { toScreen, linear } = await load("colour.ts");
+
+describe("axes of parallel coordinates", () => {
+  it("always have room for outputs, and say what is left", () => {
+    const make = (count, word) => Array.from({ length: count }, (_, k) => ({ name: `${word} ${k}` }));
+    assert.equal(chooseAxes(make(3, "in"), make(4, "out")).axes.length, 7);
+    const { axes, left } = chooseAxes(make(20, "in"), make(5, "out"));
+    assert.equal(axes.length, 14);
+    assert.equal(axes.filter((a) => a.name.startsWith("out")).length, 5);
+    assert.equal(left.length, 11);
+    assert.equal(chooseAxes(make(3, "in"), make(20, "out")).left.length, 9);
+  });
+});
 
 describe("data", () => {
   it("reads little-endian floats", () => {
