@@ -27,6 +27,9 @@ interface FormProps {
   onDone: (values: Record<string, number | string | undefined>) => Promise<unknown>;
 }
 
+/// The form that closes has done its work: then the picture takes the keyboard, not the button that opened it.
+let isDone = false;
+
 function Form(props: FormProps) {
   const { s } = props;
   const [values, setValues] = useState<Record<string, string>>(Object.fromEntries(props.fields.map((f) => [f.key, f.value])));
@@ -50,6 +53,7 @@ function Form(props: FormProps) {
     setBusy(true);
     try {
       await props.onDone(out);
+      isDone = true;
       s.dialog.value = null;
     } catch (error) {
       setProblem(error instanceof CommandError ? `${error.error.message} ${error.error.help ?? ""}` : String(error));
@@ -219,7 +223,10 @@ export function Dialogs(props: { s: SteerState }) {
     const e = element.current;
     if (e === null) return;
     if (dialog !== null && !e.open) e.showModal();
-    if (dialog === null && e.open) e.close();
+    if (dialog !== null || !e.open) return;
+    e.close();
+    if (isDone) document.querySelector<HTMLElement>("[data-test=canvas]")?.focus();
+    isDone = false;
   }, [dialog]);
   return (
     <dialog ref={element} class={`help ${dialog?.kind === "open" ? "wide" : ""}`} aria-label="Change" data-test="dialog" onClose={() => (s.dialog.value = null)}>
