@@ -23,8 +23,8 @@ export function Drivers(props: { state: State }) {
   const { study } = props.state;
   const { drivers } = study;
   const rows = [
-    ...(drivers.outcomes.length > 1 ? drivers.outcomes.map((o) => ({ name: `outcome ${o.name}`, inputs: o.inputs })) : []),
-    ...drivers.outputs.map((o) => ({ name: o.name, inputs: o.inputs })),
+    ...(drivers.outcomes.length > 1 ? drivers.outcomes.map((o) => ({ name: `outcome ${o.name}`, isName: false, inputs: o.inputs })) : []),
+    ...drivers.outputs.map((o) => ({ name: o.name, isName: true, inputs: o.inputs })), // names of outputs are those of the other tables
   ];
   return (
     <section class="panel" aria-label="Drivers" data-test="drivers">
@@ -45,7 +45,7 @@ export function Drivers(props: { state: State }) {
               </thead>
               <tbody>
                 {rows.map((row) => (
-                  <tr><th scope="row">{row.name}</th>{study.inputs.map((_, k) => <Share driver={row.inputs[k]} />)}</tr>
+                  <tr><th scope="row" {...(row.isName ? { "data-name": row.name } : {})}>{row.name}</th>{study.inputs.map((_, k) => <Share driver={row.inputs[k]} />)}</tr>
                 ))}
               </tbody>
             </table>
