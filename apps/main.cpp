@@ -11,6 +11,7 @@
 #include "commands.h"
 #include "program.h"
 #include "results.h"
+#include "study/store.h"
 
 namespace {
 
@@ -112,6 +113,9 @@ int main(int argc, char** argv) {
   std::signal(SIGINT, on_interrupt);
   std::signal(SIGTERM, on_interrupt);  // batch systems
   std::signal(SIGXFSZ, SIG_IGN);       // a file that may not grow is an error of its own
+  topple::study::on_waiting([](const std::string& what) {
+    std::fprintf(stderr, "%stopple: %s\n", isatty(fileno(stderr)) != 0 ? "\r\x1b[K" : "", what.c_str());
+  });
   const auto arguments = topple::apps::parse_arguments(argc, argv);
   try {
     const int* stop = std::get_if<int>(&arguments);

@@ -16,8 +16,15 @@ std::string hide_password(const std::string& address) {
   const std::size_t end = std::min(address.find_first_of("/?", host), address.size());
   const std::size_t at = address.rfind('@', end);
   const std::size_t colon = address.find(':', host);
-  if (at == std::string::npos || at < host || colon == std::string::npos || colon > at) return address;
-  return address.substr(0, colon) + address.substr(at);
+  std::string shown = address;
+  if (at != std::string::npos && at >= host && colon != std::string::npos && colon < at) shown.erase(colon, at - colon);
+  // also as a parameter behind the name
+  for (const char* key : {"?password=", "&password=", "?sslpassword=", "&sslpassword="})
+    if (const std::size_t found = shown.find(key); found != std::string::npos) {
+      const std::size_t value = found + std::string(key).size();
+      shown.replace(value, std::min(shown.find('&', value), shown.size()) - value, "...");
+    }
+  return shown;
 }
 
 std::unique_ptr<Database> open_database(const std::string& address, bool is_read_only) {

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <libpq-fe.h>
 
+#include <algorithm>
+#include <initializer_list>
 #include <unordered_map>
 
 #include "base/error.h"
@@ -81,17 +83,37 @@ class PostgresqlDatabase final : public Database {
           db_, [](void*, const char*) {}, nullptr);  // "exists already"
       // a process that is stopped within a transaction must not hold its rows
       run("SET idle_in_transaction_session_timeout = 5000");
+      was_there_ = true;
       return;
     }
-    const std::string why = trim(PQerrorMessage(db_));
+    std::string why = trim(PQerrorMessage(db_));
     PQfinish(db_);
     db_ = nullptr;
-    // libpq has no codes for this; waiting does not help
-    for (const char* known : {"\" does not exist", "authentication failed", "no pg_hba.conf entry"})
-      if (why.find("FATAL:") != std::string::npos && why.find(known) != std::string::npos)
-        throw InputError("E820", fmt::format("{} lets nobody in so: {}", hide_password(url_), why),
-                         "`createdb` makes a database; see docs/study.md, \"Many machines\"");
+    if (const std::size_t at = why.find(url_); at != std::string::npos)
+      why.replace(at, url_.size(), hide_password(url_));
+    if (is_refused(why))
+      throw InputError("E820", fmt::format("{} lets nobody in so: {}", hide_password(url_), why),
+                       "`createdb` makes a database; see docs/study.md, \"Many machines\"");
+    if (!was_there_ && is_misspelt(why))
+      throw InputError("E820", fmt::format("{} leads nowhere: {}", hide_password(url_), why),
+                       "an address is postgresql://user@host:port/name?setting=value");
     throw ConnectionLost(why);
+  }
+
+  // libpq has no codes for why it does not connect; waiting helps against neither
+  static bool has_one_of(const std::string& text, std::initializer_list<const char*> words) {
+    return std::any_of(words.begin(), words.end(), [&](const char* w) { return text.find(w) != std::string::npos; });
+  }
+  static bool is_refused(const std::string& why) {
+    if (has_one_of(why, {"no password supplied", "does not support SSL", "certificate"})) return true;
+    return has_one_of(why, {"FATAL:"}) &&
+           has_one_of(why, {"\" does not exist", "authentication failed", "no pg_hba.conf entry", "permission denied",
+                            "is not permitted to log in"});
+  }
+  /// What is said before any server is spoken to; a name that cannot be looked up just now may come back.
+  static bool is_misspelt(const std::string& why) {
+    return !has_one_of(
+        why, {"connection to server", "could not connect", "timeout expired", "Temporary failure", "out of memory"});
   }
 
   [[noreturn]] void fail(const PGresult* r) {
@@ -107,6 +129,7 @@ class PostgresqlDatabase final : public Database {
 
   std::string url_;
   PGconn* db_ = nullptr;
+  bool was_there_ = false;  // once connected, the address is right
   std::unordered_map<std::string, std::string> statements_;
   Dialect dialect_;
 };

@@ -7,7 +7,9 @@
 #include <chrono>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <limits>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -114,18 +116,53 @@ void roll_back(Database& db) {
   }
 }
 
+/// Tells once that a server is waited for, until it is there again.
+class Waiting {
+ public:
+  void listen(std::function<void(const std::string&)> tell) {
+    const std::lock_guard lock(mutex_);
+    tell_ = std::move(tell);
+  }
+  void begin(const std::string& address, std::string why) {
+    const std::lock_guard lock(mutex_);
+    if (is_told_ || !tell_) return;
+    is_told_ = true;
+    std::erase(why, '\t');
+    std::replace(why.begin(), why.end(), '\n', ' ');
+    tell_("waiting for " + hide_password(address) + ": " + why);
+  }
+  void end() {
+    const std::lock_guard lock(mutex_);
+    is_told_ = false;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::function<void(const std::string&)> tell_;
+  bool is_told_ = false;
+};
+Waiting& waiting() {
+  static Waiting one;
+  return one;
+}
+
 std::unique_ptr<Database> open_patiently(const std::string& address, const std::atomic<bool>* cancel, double patience,
                                          bool is_read_only) {
   const auto start = Clock::now();
   for (;;) try {
-      return open_database(address, is_read_only);
-    } catch (const ConnectionLost&) {
+      auto db = open_database(address, is_read_only);
+      waiting().end();
+      return db;
+    } catch (const ConnectionLost& e) {
       if ((cancel && cancel->load()) || std::chrono::duration<double>(Clock::now() - start).count() > patience) throw;
+      waiting().begin(address, e.what());
       std::this_thread::sleep_for(std::chrono::milliseconds(200));
     }
 }
 
 }  // namespace
+
+void on_waiting(std::function<void(const std::string&)> tell) { waiting().listen(std::move(tell)); }
 
 std::string calc_job_hash(const std::string& model, const Point& x) {
   std::string bytes = model;
@@ -162,12 +199,14 @@ auto Store::transact(F work, bool is_one_statement) {
     } catch (const TryAgain&) {
       if (!is_one_statement) roll_back(*db_);
       if (std::chrono::duration<double>(Clock::now() - start).count() > patience_) throw;
-    } catch (const ConnectionLost&) {
+    } catch (const ConnectionLost& e) {
       for (;;) {
         if ((cancel_ && cancel_->load()) || std::chrono::duration<double>(Clock::now() - start).count() > patience_)
           throw;
+        waiting().begin(address_, e.what());
         try {
           db_->reconnect();
+          waiting().end();
           break;
         } catch (const ConnectionLost&) { std::this_thread::sleep_for(std::chrono::milliseconds(200)); }
       }
@@ -179,7 +218,10 @@ auto Store::transact(F work, bool is_one_statement) {
 }
 
 Store::Store(const std::string& address, const std::atomic<bool>* cancel, double patience, bool is_read_only)
-    : db_(open_patiently(address, cancel, patience, is_read_only)), cancel_(cancel), patience_(patience) {
+    : address_(address),
+      db_(open_patiently(address, cancel, patience, is_read_only)),
+      cancel_(cancel),
+      patience_(patience) {
   if (is_read_only) return;
   // making what is there would wait for others, and let others wait
   const char* find = is_server(address) ? "SELECT 1 WHERE to_regclass('job_refused') IS NOT NULL"

@@ -4,6 +4,7 @@
 /// a lease on the database's clock, and each has exactly one result.
 
 #include <atomic>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -48,6 +49,9 @@ std::string calc_job_hash(const std::string& model, const Point&);
 /// Numbers as a JSON array, back with the same bits (but for the payload of NaN).
 std::string to_text(const std::vector<double>&);
 std::vector<double> to_numbers(const std::string&);
+
+/// Hears, once until it is back and in any thread, that a server is away and why.
+void on_waiting(std::function<void(const std::string&)>);
 
 /// One connection; belongs to one thread. Operations wait for a server that is away, up to `patience`, and are repeated
 /// where that is safe; then they throw ConnectionLost.
@@ -103,6 +107,7 @@ class Store {
   template <class F>
   auto transact(F work, bool is_one_statement = false);
 
+  std::string address_;
   std::unique_ptr<Database> db_;
   const std::atomic<bool>* cancel_;
   double patience_;

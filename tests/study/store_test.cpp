@@ -225,6 +225,8 @@ TEST(Store, NamesAJobByTheBitsOfItsPoint) {
 TEST(Store, HidesPasswords) {
   EXPECT_EQ(hide_password("postgresql://me:secret@host:5432/db"), "postgresql://me@host:5432/db");
   EXPECT_EQ(hide_password("postgresql://host:5432/db?a=b@c"), "postgresql://host:5432/db?a=b@c");
+  EXPECT_EQ(hide_password("postgresql://me@host/db?password=secret&sslmode=disable"),
+            "postgresql://me@host/db?password=...&sslmode=disable");
   EXPECT_EQ(hide_password("folder/a:b@c"), "folder/a:b@c");
 }
 
@@ -301,6 +303,28 @@ TEST(Store, SaysAtOnceThatADatabaseIsMissing) {
     EXPECT_NE(e.diagnostics().front().message.find("nobody_made_it"), std::string::npos);
   }
 }
+
+#ifdef TOPPLE_POSTGRESQL
+TEST(Store, SaysAtOnceThatSettingsAreWrong) {
+  for (const char* rest : {":1/db?sslmode=never", ":1x/db", ":1/db?nothing=1"}) try {
+      Store store(std::string("postgresql://me:secret@127.0.0.1") + rest, nullptr, 5);
+      FAIL() << "opened";
+    } catch (const InputError& e) {
+      EXPECT_EQ(e.first_error().code, "E820");
+      EXPECT_EQ(std::string(e.what()).find("secret"), std::string::npos) << e.what();
+    }
+}
+
+TEST(Store, SaysOnceThatItWaitsForAServer) {
+  std::vector<std::string> told;
+  on_waiting([&](const std::string& what) { told.push_back(what); });
+  EXPECT_THROW(Store("postgresql://me:secret@127.0.0.1:1/db", nullptr, 0.5), ConnectionLost);
+  on_waiting(nullptr);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].rfind("waiting for postgresql://me@127.0.0.1:1/db: ", 0), 0U) << told[0];
+  EXPECT_NE(told[0].find("refused"), std::string::npos) << told[0];
+}
+#endif
 
 TEST(Store, RefusesAFileThatIsNone) {
   const Folder folder;
