@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -78,6 +79,15 @@ std::optional<LogSummary> summarise(const std::string& path, const std::string& 
   return s;
 }
 
+/// Whether a session that lives writes it.
+bool is_held(const std::string& path) {
+  const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return false;
+  const bool held = flock(file, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+  close(file);
+  return held;
+}
+
 int open_new(std::string& path) {
   const std::filesystem::path wanted(path);
   for (int n = 1; n < 100000; ++n) {
@@ -89,6 +99,7 @@ int open_new(std::string& path) {
     const int file = open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644);
     if (file >= 0) {
       path = name;
+      (void)flock(file, LOCK_EX | LOCK_NB);  // for as long as the session lives
       return file;
     }
     if (errno != EEXIST) break;
@@ -245,7 +256,9 @@ std::optional<LogSummary> find_earlier_log(const std::string& path, const std::s
   }
   std::sort(found.rbegin(), found.rend());
   for (const auto& [time, name] : found)
-    if (auto s = summarise(name, plan_sha256, describe_setting(k, run), "topple " + run.program_version)) return s;
+    if (auto s = summarise(name, plan_sha256, describe_setting(k, run), "topple " + run.program_version);
+        s && !is_held(name))
+      return s;
   return std::nullopt;
 }
 

@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/file.h"
+#include "base/hash.h"
 #include "collapse/action_log.h"
 #include "collapse/branch_record.h"
 #include "collapse/edit_json.h"
@@ -660,6 +661,24 @@ TEST(ActionLogReplay, ALineThatCannotBeWrittenSpoilsNothing) {
   const ReplayResult again = replay(read_file(path), path, default_knowledge(), options(), {});
   EXPECT_FALSE(again.was_cut);
   EXPECT_TRUE(again.steering->steering().active().edits.empty());
+}
+
+TEST(ActionLog, ALiveSessionIsNotOfferedToOthers) {
+  const std::string path = testing::TempDir() + "held.jsonl";
+  std::filesystem::remove(path);
+  const product::Plan plan = two_stages();
+  const auto find = [&] {
+    return find_earlier_log(path, calc_sha256(plan.text), default_knowledge(), options().run).has_value();
+  };
+  {
+    LoggedSteering logged(plan, default_knowledge(), options(), {}, path);
+    ASSERT_TRUE(logged.steering().begin(logged.steering().active()));
+    advance_until(logged.steering(), 0.05);
+    logged.note_reached();
+    EXPECT_FALSE(find());
+  }
+  EXPECT_TRUE(find());
+  std::filesystem::remove(path);
 }
 
 TEST(ActionLog, SaysInWhichLineAnActionIsRefused) {
