@@ -70,8 +70,10 @@ int steer(const Arguments& a, const std::atomic<bool>& cancel) {
     if (!a.input.empty()) {
       text = read_file(plan.string());
       first = {a.input, plan.string(), text, a.goes_on};
-      tell_of_earlier_session(options, first);
     }
+    // logs and studies lie there
+    if (!a.output.empty() || !a.input.empty()) make_folder(options.session.folder, {});
+    if (!a.input.empty()) tell_of_earlier_session(options, first);
     server::Hub hub(std::move(options));
     server::ServerOptions serving;
     serving.port = port;

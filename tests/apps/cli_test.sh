@@ -455,6 +455,7 @@ steer)
   expect 2 "$topple" replay plan.toml -o again; has err E942
   expect 2 "$topple" steer missing.toml --no-open
   expect 2 "$topple" steer plan.toml --no-open --port 99999; has err "1 to 65535"
+  expect 1 "$topple" steer plan.toml --no-open -o plan.toml; has err "the folder cannot be made"
   ;;
 rcc)
   zone=$source/examples/rcc/zone_I.toml
