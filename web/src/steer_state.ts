@@ -170,7 +170,7 @@ export function makeSteerState(address: string) {
           const before = progress.value;
           progress.value = next;
           if (next.branch !== active.value && branches.value.some((b) => b.id === next.branch)) void show(next.branch);
-          if (before !== null && before.phase === "running" && next.phase !== "running") void readFindings();
+          if (before !== null && next.phase !== "running" && (before.phase === "running" || before.time !== next.time)) void readFindings();
           break;
         }
         case "happenings":
