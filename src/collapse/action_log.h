@@ -70,7 +70,8 @@ struct LogSummary {
 };
 
 /// The latest log beside `path` (its name, or one with a number behind it) of the same plan, program, rules and run
-/// options in which something was computed or changed, and that no session holds; none if there is none. Files that are no logs are passed over.
+/// options in which something was computed or changed, and that no session holds; none if there is none. Files that are
+/// no logs are passed over.
 std::optional<LogSummary> find_earlier_log(const std::string& path, const std::string& plan_sha256, const Knowledge&,
                                            const RunOptions&);
 

@@ -24,7 +24,8 @@ struct JudgedBranch {
 /// The answer of `findings` (docs/protocol.md).
 Json describe_findings(const JudgedBranch&);
 
-/// The answer of `compare`: both at the frames of either within the time they share, at most `count`. Each has at least one frame.
+/// The answer of `compare`: both at the frames of either within the time they share, at most `count`. Each has at least
+/// one frame.
 Json compare(const JudgedBranch& a, const JudgedBranch& b, int count);
 
 }  // namespace topple::server
