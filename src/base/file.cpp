@@ -21,24 +21,24 @@ namespace {
 class UnfinishedName {
  public:
   explicit UnfinishedName(const std::string& path) {
-    bool is_taken = false;
-    if (path.size() >= sizeof name_ || !taken_.compare_exchange_strong(is_taken, true)) return;
-    std::memcpy(name_, path.c_str(), path.size() + 1);
+    bool expected = false;
+    if (path.size() >= sizeof shown_name || !is_taken.compare_exchange_strong(expected, true)) return;
+    std::memcpy(shown_name, path.c_str(), path.size() + 1);
     is_own_ = true;
-    shown_ = true;
+    is_shown = true;
   }
   ~UnfinishedName() {
     if (!is_own_) return;
-    shown_ = false;
-    taken_ = false;
+    is_shown = false;
+    is_taken = false;
   }
   UnfinishedName(const UnfinishedName&) = delete;
   UnfinishedName& operator=(const UnfinishedName&) = delete;
-  static const char* get() { return shown_ ? name_ : nullptr; }
+  static const char* get() { return is_shown ? shown_name : nullptr; }
 
  private:
-  inline static char name_[4096] = {};
-  inline static std::atomic<bool> taken_ = false, shown_ = false;
+  inline static char shown_name[4096] = {};
+  inline static std::atomic<bool> is_taken = false, is_shown = false;
   static_assert(std::atomic<bool>::is_always_lock_free);
   bool is_own_ = false;
 };
