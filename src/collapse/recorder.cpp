@@ -35,9 +35,7 @@ int find_root(std::vector<int>& parent, int i) {
 MeanForce find_largest_mean(const std::vector<double>& time, const std::vector<double>& impulse) {
   MeanForce out;
   if (time.size() < 2) return out;
-  out.window = kForceWindow;
-  for (size_t i = 1; i < time.size(); ++i) out.window = std::max(out.window, time[i] - time[i - 1]);
-  out.window = std::min(out.window, time.back() - time.front());
+  out.window = std::min(kForceWindow, time.back() - time.front());
   constexpr double rounding = 1e-9;  // [s]
   // straight lines: the largest mean begins or ends at one of the times
   for (const double t : time)
@@ -46,6 +44,12 @@ MeanForce find_largest_mean(const std::vector<double>& time, const std::vector<d
       const double change = interpolate(time, impulse, begin + out.window) - interpolate(time, impulse, begin);
       if (change / out.window > out.force) out.force = change / out.window, out.time = begin + 0.5 * out.window;
     }
+  // on one straight line: of the whole interval
+  const size_t i = static_cast<size_t>(std::upper_bound(time.begin(), time.end(), out.time) - time.begin());
+  if (i > 0 && i < time.size() && time[i] - time[i - 1] > out.window) {
+    out.window = time[i] - time[i - 1];
+    out.time = 0.5 * (time[i] + time[i - 1]);
+  }
   return out;
 }
 

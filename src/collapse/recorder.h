@@ -21,7 +21,7 @@ inline constexpr double kForceWindow = 0.05;
 struct MeanForce {
   double force = 0;   // [N]
   double time = 0;    // middle of the window [s]
-  double window = 0;  // kForceWindow, or the longest interval between frames if that is more [s]
+  double window = 0;  // kForceWindow, or the interval between frames there if that is more [s]
 };
 /// The largest mean over a window of a force whose impulse since the start is known at some times, on straight lines
 /// between. All 0 with fewer than two.

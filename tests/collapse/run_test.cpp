@@ -167,6 +167,10 @@ TEST(Recorder, MeansOfAForceAreThoseOfItsImpulse) {
   EXPECT_NEAR(coarse.force, 800, 1e-9);
   EXPECT_NEAR(coarse.time, 0.3, 1e-12);
   EXPECT_EQ(find_largest_mean({0}, {0}).force, 0);
+  // a wait that is passed over says nothing of the landing behind it
+  const MeanForce landing = find_largest_mean({0, 4, 4.02, 4.05, 4.07, 4.1}, {0, 400, 402, 420, 422, 424});
+  EXPECT_EQ(landing.window, 0.05);
+  EXPECT_NEAR(landing.force, 20 / 0.05, 1e-9);
 }
 
 TEST(Run, AFrameHasTheVolumeOfItsMaterial) {
