@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <charconv>
 #include <iostream>
-#include <nlohmann/json.hpp>
 #include <sstream>
 #include <string_view>
 
@@ -16,6 +15,7 @@
 #include "engines/engine.h"
 #include "product/templates.h"
 #include "program.h"
+#include "refusal.h"
 
 namespace topple::apps {
 
@@ -516,7 +516,7 @@ std::string find_unknown(const CLI::App& app) {
 
 namespace {
 
-/// Says what is wrong with the words of a command; in front of it, the JSON object if that was asked for.
+/// Says what is wrong with the words of a command, with the JSON object if that was asked for.
 int refuse_words(const CLI::App& app, int argc, char** argv, const std::string& text) {
   std::cerr << text;
   const CLI::App* verb = &app;
@@ -531,17 +531,7 @@ int refuse_words(const CLI::App& app, int argc, char** argv, const std::string& 
   const size_t end = text.find('\n');
   std::string help = end == std::string::npos ? "" : text.substr(end + 1);
   while (!help.empty() && help.back() == '\n') help.pop_back();
-  std::cout << nlohmann::ordered_json{{"exit_code", kBadInput},
-                                      {"diagnostics",
-                                       {{{"severity", "error"},
-                                         {"code", "E801"},
-                                         {"file", ""},
-                                         {"line", 0},
-                                         {"column", 0},
-                                         {"message", text.substr(0, end)},
-                                         {"help", help}}}}}
-                   .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace)
-            << std::endl;
+  print_refusal({{Severity::Error, "E801", {}, 1, text.substr(0, end), help}});
   return kBadInput;
 }
 
@@ -617,9 +607,11 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   try {
     app.parse(argc, argv);
   } catch (const CLI::ExtrasError& e) {
+    const std::string unknown = find_unknown(app);
+    if (!unknown.empty()) return refuse_words(app, argc, argv, unknown);
     std::ostringstream said;
-    if (find_unknown(app).empty()) app.exit(e, std::cout, said);
-    return refuse_words(app, argc, argv, find_unknown(app) + said.str());
+    app.exit(e, std::cout, said);
+    return refuse_words(app, argc, argv, said.str());
   } catch (const CLI::ParseError& e) {
     std::ostringstream said;
     if (app.exit(e, std::cout, said) == 0) return kOk;
@@ -633,7 +625,7 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
     std::cout << make_manual(app);
     return kOk;
   }
-  if (const std::string missing = find_missing(a); !missing.empty()) { return refuse_words(app, argc, argv, missing); }
+  if (const std::string missing = find_missing(a); !missing.empty()) return refuse_words(app, argc, argv, missing);
   return a;
 }
 

@@ -37,20 +37,6 @@ namespace topple::apps {
 namespace fs = std::filesystem;
 using json = nlohmann::ordered_json;
 
-namespace {
-
-json to_json(const Diagnostic& d) {
-  return {{"severity", d.severity == Severity::Error ? "error" : "warning"},
-          {"code", d.code},
-          {"file", d.where.file},
-          {"line", d.where.line},
-          {"column", d.where.column},
-          {"message", d.message},
-          {"help", d.help}};
-}
-
-}  // namespace
-
 int print_diagnostics(const std::vector<Diagnostic>& list, const std::string& text) {
   int errors = 0;
   for (const Diagnostic& d : list) {
@@ -66,8 +52,6 @@ std::string count_words(int n, const char* what) { return fmt::format("{} {}{}",
 
 }  // namespace
 
-std::string dump(const json& j) { return j.dump(2, ' ', false, json::error_handler_t::replace); }
-
 int refuse(const InputError& e, const std::vector<Diagnostic>& warnings, const std::string& text, bool as_json) {
   std::vector<Diagnostic> all = e.diagnostics();
   all.insert(all.end(), warnings.begin(), warnings.end());
@@ -77,10 +61,10 @@ int refuse(const InputError& e, const std::vector<Diagnostic>& warnings, const s
   return kBadInput;
 }
 
-void print_refusal(const std::vector<Diagnostic>& list) {
-  json out{{"exit_code", kBadInput}, {"diagnostics", json::array()}};
-  for (const Diagnostic& d : list) out["diagnostics"].push_back(to_json(d));
-  std::printf("%s\n", dump(out).c_str());
+void tell_of_other_title(const std::string& what, const std::string& title, const std::string& title_of_run) {
+  if (title != title_of_run)
+    std::fprintf(stderr, "topple: %s is of \"%s\", the run of \"%s\": see that both are of one building\n",
+                 what.c_str(), title.c_str(), title_of_run.c_str());
 }
 
 void check_own_input(const std::string& output, const std::string& input) {
@@ -379,9 +363,7 @@ std::string read_study(std::string path, const std::string& title) {
       if (!entry.is_object()) refuse_file(fmt::format("not the results of a study (\"{}\")", key));
       if (std::string_view(key) == "outcomes") entry.erase("outputs");
     }
-  if (out["title"] != title)
-    std::fprintf(stderr, "topple: the study is of \"%s\", the run of \"%s\": see that both are of one building\n",
-                 out["title"].is_string() ? out["title"].get<std::string>().c_str() : "", title.c_str());
+  tell_of_other_title("the study", out["title"].is_string() ? out["title"].get<std::string>() : "", title);
   return out.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
@@ -398,9 +380,7 @@ int write_report_file(const Arguments& a) {
     for (const std::string& path : a.other_records) {
       const record::Record other = record::read_hdf5(path);
       const record::Comparison c = record::compare(r, other);
-      if (other.provenance.title != r.provenance.title)
-        std::fprintf(stderr, "topple: %s is of \"%s\", the run of \"%s\": see that both are of one building\n",
-                     path.c_str(), other.provenance.title.c_str(), r.provenance.title.c_str());
+      tell_of_other_title(path, other.provenance.title, r.provenance.title);
       extras.others.push_back({c.name_b, other.provenance.title, record::summarise(c)});
     }
     const auto bundle = find_bundle("report.html");

@@ -238,7 +238,7 @@ json to_json(const mbs::Model& model, const Comparison& c) {
   return out;
 }
 
-/// What engines cannot express, the first few of each; how many engines there are.
+/// Says what engines cannot express, the first few of each; one complaint for each engine.
 std::vector<Diagnostic> print_unsupported(const mbs::Model& model, const mbs::Options& options,
                                           const std::vector<std::unique_ptr<engines::Engine>>& list) {
   constexpr size_t shown = 5;

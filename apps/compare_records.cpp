@@ -14,9 +14,7 @@ int compare_records(const Arguments& a) {
     const record::Record first = record::read_hdf5(a.input), second = record::read_hdf5(a.fe.second);
     std::vector<record::Photo> photos;
     if (!a.fe.photos.empty()) photos = record::read_photos(a.fe.photos);
-    if (second.provenance.title != first.provenance.title)
-      std::fprintf(stderr, "topple: %s is of \"%s\", the run of \"%s\": see that both are of one building\n",
-                   a.fe.second.c_str(), second.provenance.title.c_str(), first.provenance.title.c_str());
+    tell_of_other_title(a.fe.second, second.provenance.title, first.provenance.title);
     const record::Comparison c = record::compare(first, second);
     make_folder(a.output);
     const auto in = [&a](const char* name) { return (std::filesystem::path(a.output) / name).string(); };

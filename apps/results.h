@@ -14,6 +14,7 @@
 #include "collapse/knowledge.h"
 #include "collapse/run.h"
 #include "record/record.h"
+#include "refusal.h"
 
 namespace topple::apps {
 
@@ -23,8 +24,8 @@ using Files = std::vector<std::pair<std::string, std::string>>;
 /// All complaints of an InputError, and the JSON object if that was asked for; `text` is the input.
 int refuse(const InputError&, const std::vector<Diagnostic>& warnings, const std::string& text, bool as_json);
 
-/// The JSON object of bad input, on standard output.
-void print_refusal(const std::vector<Diagnostic>&);
+/// Says where something beside a run has another title than it.
+void tell_of_other_title(const std::string& what, const std::string& title, const std::string& title_of_run);
 
 /// Complaints on standard error; the number of errors among them. `text` is the input.
 int print_diagnostics(const std::vector<Diagnostic>&, const std::string& text);
@@ -63,7 +64,6 @@ void print_leftovers(std::FILE* out, const Arguments&, const Files& of_this_run)
 int close_run(const record::Record&, const Arguments&, std::FILE* out, Files files);
 
 nlohmann::ordered_json summary_json(const record::Record&, const Files&, int exit_code);
-std::string dump(const nlohmann::ordered_json&);
 int exit_code_of(const record::Record&, bool failed_report);
 
 }  // namespace topple::apps

@@ -1,0 +1,29 @@
+#include "refusal.h"
+
+#include <iostream>
+
+#include "arguments.h"
+
+namespace topple::apps {
+
+using json = nlohmann::ordered_json;
+
+std::string dump(const json& j) { return j.dump(2, ' ', false, json::error_handler_t::replace); }
+
+json to_json(const Diagnostic& d) {
+  return {{"severity", d.severity == Severity::Error ? "error" : "warning"},
+          {"code", d.code},
+          {"file", d.where.file},
+          {"line", d.where.line},
+          {"column", d.where.column},
+          {"message", d.message},
+          {"help", d.help}};
+}
+
+void print_refusal(const std::vector<Diagnostic>& list) {
+  json out{{"exit_code", kBadInput}, {"diagnostics", json::array()}};
+  for (const Diagnostic& d : list) out["diagnostics"].push_back(to_json(d));
+  std::cout << dump(out) << std::endl;
+}
+
+}  // namespace topple::apps
