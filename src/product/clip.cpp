@@ -105,6 +105,15 @@ bool clip_solid(const Solid& solid, const CutPlane& plane, Shape& out) {
 
 }  // namespace
 
+bool lies_within(const Loop& loop, double x, double y) {
+  bool is_inside = false;
+  for (size_t i = 0, j = loop.size() - 1; i < loop.size(); j = i++) {
+    const Vec3 &a = loop[i], &b = loop[j];
+    if ((a.y > y) != (b.y > y) && x < a.x + (b.x - a.x) * (y - a.y) / (b.y - a.y)) is_inside = !is_inside;
+  }
+  return is_inside;
+}
+
 Vec3 calc_normal(const Loop& loop) {
   Vec3 sum;
   for (size_t i = 2; i < loop.size(); ++i) sum += cross(loop[i - 1] - loop[0], loop[i] - loop[0]);

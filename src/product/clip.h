@@ -9,6 +9,9 @@ namespace topple::product {
 
 using Loop = std::vector<Vec3>;
 
+/// Whether a place lies within a loop that is seen along z.
+bool lies_within(const Loop&, double x, double y);
+
 /// Normal of a flat loop, as long as twice its area.
 Vec3 calc_normal(const Loop& loop);
 

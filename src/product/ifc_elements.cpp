@@ -594,18 +594,14 @@ class Reader {
       const Vec3 p = back * (world - X_WB.p);
       x_low = std::min(x_low, p.x), x_high = std::max(x_high, p.x);
       y_low = std::min(y_low, p.y), y_high = std::max(y_high, p.y);
-      bool is_inside = false;
-      for (size_t i = 0, j = bound.size() - 1; i < bound.size(); j = i++) {
-        const Vec3 &a = bound[i], &b = bound[j];
-        if ((a.y > p.y) != (b.y > p.y) && p.x < a.x + (b.x - a.x) * (p.y - a.y) / (b.y - a.y)) is_inside = !is_inside;
-        // on an edge
+      const auto is_on_edge = [&](const Vec3& a, const Vec3& b) {
         const Vec3 edge{b.x - a.x, b.y - a.y, 0}, to{p.x - a.x, p.y - a.y, 0};
         const double length = norm(edge), along = length > 1e-9 ? dot(edge, to) / length : -1;
-        if (along > -kNear && along < length + kNear && norm(cross(edge, to)) < kNear * length) {
-          is_inside = true;
-          break;
-        }
-      }
+        return along > -kNear && along < length + kNear && norm(cross(edge, to)) < kNear * length;
+      };
+      bool is_inside = lies_within(bound, p.x, p.y);
+      for (size_t i = 0; i < bound.size() && !is_inside; ++i)
+        is_inside = is_on_edge(bound[i], bound[(i + 1) % bound.size()]);
       is_around &= is_inside;
     };
     for (const Solid& solid : shape.solids)

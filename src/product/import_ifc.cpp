@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/unit.h"
+#include "product/clip.h"
 #include "product/foreign_text.h"
 #include "product/ifc_reinforcement.h"
 #include "product/import.h"
@@ -425,11 +426,7 @@ class Planner {
     if (slab.outlines.empty()) return x >= slab.low.x && x <= slab.high.x && y >= slab.low.y && y <= slab.high.y;
     return std::any_of(slab.outlines.begin(), slab.outlines.end(), [&](const auto& part) {
       bool is_inside = false;
-      for (const std::vector<Vec3>& loop : part)
-        for (size_t i = 0, j = loop.size() - 1; i < loop.size(); j = i++) {
-          const Vec3 &a = loop[i], &b = loop[j];
-          if ((a.y > y) != (b.y > y) && x < a.x + (b.x - a.x) * (y - a.y) / (b.y - a.y)) is_inside = !is_inside;
-        }
+      for (const Loop& loop : part) is_inside ^= lies_within(loop, x, y);
       return is_inside;
     });
   }

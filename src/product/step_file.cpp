@@ -135,9 +135,7 @@ class Parser {
     const size_t at = std::min(at_, text_.size());
     size_t from = at == 0 ? std::string::npos : text_.rfind('\n', at - 1);
     from = from == std::string::npos ? 0 : from + 1;
-    return 1 + static_cast<int>(std::count_if(text_.begin() + static_cast<std::ptrdiff_t>(from),
-                                              text_.begin() + static_cast<std::ptrdiff_t>(at),
-                                              [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; }));
+    return 1 + static_cast<int>(count_characters(text_.substr(from, at - from)));
   }
   void skip() {
     while (at_ < text_.size()) {
