@@ -51,13 +51,15 @@ std::optional<double> read_optional(const Json& command, const char* key) {
 }  // namespace
 
 Json parse_command(const std::string& text) {
-  return Json::parse(
-      text,
-      [](int depth, Json::parse_event_t, Json&) {
-        if (depth > kDeepest) throw InputError("E910", fmt::format("nested more than {} levels deep", kDeepest));
-        return true;
-      },
-      false);
+  const auto check_depth = [](int depth, Json::parse_event_t, Json&) {
+    if (depth > kDeepest) throw InputError("E910", fmt::format("nested more than {} levels deep", kDeepest));
+    return true;
+  };
+  try {
+    return Json::parse(text, check_depth);
+  } catch (const Json::out_of_range&) {
+    throw InputError("E910", "a number is larger than any (1.8e308)");
+  } catch (const Json::parse_error&) { return Json(Json::value_t::discarded); }
 }
 
 double read_number(const Json& command, const char* key) { return number_of(demand(command, key), key); }

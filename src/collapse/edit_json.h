@@ -16,8 +16,8 @@ std::vector<std::string> edit_words();
 /// Keys of every command (id, session, branch, name, in_place) are passed over.
 Edit read_edit(const nlohmann::ordered_json&);
 
-/// A text of a client or a log. Throws InputError E910 if it is nested deeper than a command ever is; discarded if it
-/// is no JSON.
+/// A text of a client or a log. Throws InputError E910 if it is nested deeper than a command ever is, or a number of it
+/// is out of range; discarded if it is no JSON.
 nlohmann::ordered_json parse_command(const std::string& text);
 
 // For readers of other commands; all throw InputError E912.

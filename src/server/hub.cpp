@@ -326,15 +326,6 @@ void Hub::receive(const std::shared_ptr<Client>& client, const std::string& text
   } catch (const InputError& e) { return refuse(nullptr, e); } catch (const std::exception&) {
     command = Json(Json::value_t::discarded);
   }
-  if (command.is_discarded()) {
-    try {
-      command = Json::parse(text);
-    } catch (const Json::out_of_range&) {
-      return refuse(nullptr, InputError("E910", "a number is larger than any (1.8e308)"));
-    } catch (const std::exception&) {
-      // no JSON
-    }
-  }
   if (!command.is_object()) return refuse(nullptr, InputError("E910", "a message must be a JSON object"));
   const auto it = command.find("id");
   const bool has_id = it != command.end() && it->is_number_integer() &&
