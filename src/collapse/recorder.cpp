@@ -503,7 +503,7 @@ double Recorder::kinetic_before(double time) const {
   if (series == record_.series.end() || i == 0) return 0;
   const std::vector<double>& k = series->value;
   if (i == 1) return k[0];
-  return k[i - 1] + std::max(0.0, k[i - 1] - k[i - 2]) / (t[i - 1] - t[i - 2]) * (time - t[i - 1]);
+  return k[i - 1] + (k[i - 1] - k[i - 2]) / (t[i - 1] - t[i - 2]) * (time - t[i - 1]);
 }
 
 void Recorder::add_event(record::Event event) {

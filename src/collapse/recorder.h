@@ -66,7 +66,7 @@ class Recorder {
   double start_reaction_error() const { return reaction_error_; }  // |reaction - weight| / weight at the first frame
   /// Of the ground on what moves, along its normal, from the balance of momentum; loads of the model are part of it.
   MeanForce find_largest_ground_force() const { return find_largest_mean(record_.time, impulse_); }
-  /// Carried on from the two frames before it, as an impact takes it at once; that of the last one if it fell [J].
+  /// Carried on from the two frames before it, as an impact takes it at once [J].
   double kinetic_before(double time) const;
   /// Plastic shortening of a zone at the last frame; that of a stub never falls [m].
   double shortening_of(int zone) const {
