@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include <cstdlib>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -44,9 +45,12 @@ int compare(const Settings& settings) {
   const product::Plan plan = product::read_plan_file(TOPPLE_EXAMPLES "/weida/plan-fuzzy.toml", warnings, text);
   study::PlanMappingOptions options = settings.mapping;
   options.threads = 0;
+  options.vibration = options.sideways = false;  // condensed runs have neither
   const study::PlanMapping whole(plan, settings.knowledge, options);
   options.condensed = true;
   const study::PlanMapping condensed(plan, settings.knowledge, options);
+  if (condensed.outputs().size() != whole.outputs().size())
+    throw std::logic_error("condensed and whole runs have other outputs");
   const uncertainty::Box support = uncertainty::make_box(whole.space(), 0);
   std::vector<uncertainty::Point> points;
   for (const uncertainty::Point& p :
