@@ -389,7 +389,7 @@ void add_touchdown(const Context& c) {
                       c.is_under_way ? " so far" : ""),
           kNone, "s");
   } else {
-    const double kinetic = c.recorder.kinetic_before(t);
+    const double kinetic = c.recorder.first_touchdown_kinetic();
     c.add(
         "touchdown.first", "Touchdown", "First touchdown",
         fmt::format("{} is the first part of the upper block on the ground, at {:.2f} s, when {:.1f} MJ are in motion.",

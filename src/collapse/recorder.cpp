@@ -305,10 +305,7 @@ void Recorder::look(const mbs::View& v) {
         impulse_until_now_ +=
             v.mass[b] * dot(v.v_WB[b] - last_v_[b] - (v.time - last_time_) * model_.gravity, model_.contact.normal);
   last_time_ = v.time;
-  last_pose_ = v.X_WB;
   last_v_ = v.v_WB;
-  last_w_ = v.w_WB;
-  last_mass_ = v.mass;
   shortening_ = v.shortening;
   let_ends_recede(v);
 }
@@ -323,10 +320,7 @@ void Recorder::follow(const Recorder& before, double until) {
     if (t <= until) contacts_told_.push_back(t);
   if (before.last_time_ <= until) {
     last_time_ = before.last_time_;
-    last_pose_ = before.last_pose_;
     last_v_ = before.last_v_;
-    last_w_ = before.last_w_;
-    last_mass_ = before.last_mass_;
     shortening_ = before.shortening_;
     impulse_until_now_ = before.impulse_until_now_;
   } else if (!before.impulse_.empty()) {
@@ -334,10 +328,7 @@ void Recorder::follow(const Recorder& before, double until) {
   }
   for (const Touchdown& t : before.touchdowns_)
     if (t.time <= until) touchdowns_.push_back(t);
-  if (before.touchdown_ <= until) {
-    touchdown_ = before.touchdown_;
-    touchdown_body_ = before.touchdown_body_;
-  }
+  if (before.first_.time <= until) first_ = before.first_;
 }
 
 void Recorder::append(const Recorder& from, size_t frames, double until) {
@@ -477,35 +468,6 @@ void Recorder::add_frame(const mbs::View& v) {
   if (!model_.loads.empty()) record_.series.back().value.push_back(e.loads);
 }
 
-/// From the last frame on in free fall, which adds at most g times the frame's length to the speed.
-Touchdown Recorder::calc_touchdown(int body, double time, double speed) const {
-  Touchdown out;
-  out.time = time;
-  out.body = body;
-  out.speed = speed;
-  const size_t b = static_cast<size_t>(body);
-  if (b >= last_v_.size()) return out;
-  const double since = time - last_time_;
-  const Vec3 v = last_v_[b] + since * model_.gravity;
-  const Vec3 p = last_pose_[b].p + since * last_v_[b];
-  out.place = {p.x, p.y};
-  const Vec3 w_B = transpose_times(to_matrix(last_pose_[b].q), last_w_[b]);
-  out.energy = 0.5 * last_mass_[b] * dot(v, v) + 0.5 * dot(w_B, model_.bodies[b].inertia * w_B);
-  out.momentum = -last_mass_[b] * dot(v, model_.contact.normal);
-  return out;
-}
-
-double Recorder::kinetic_before(double time) const {
-  const auto series = std::find_if(record_.series.begin(), record_.series.end(),
-                                   [](const record::Series& s) { return s.id == "energy_kinetic"; });
-  const std::vector<double>& t = record_.time;
-  const size_t i = static_cast<size_t>(std::lower_bound(t.begin(), t.end(), time) - t.begin());
-  if (series == record_.series.end() || i == 0) return 0;
-  const std::vector<double>& k = series->value;
-  if (i == 1) return k[0];
-  return k[i - 1] + (k[i - 1] - k[i - 2]) / (t[i - 1] - t[i - 2]) * (time - t[i - 1]);
-}
-
 void Recorder::add_event(record::Event event) {
   record::add_event(record_, std::move(event));
   if (callbacks_.on_event) callbacks_.on_event(record_.events.back());
@@ -599,11 +561,10 @@ void Recorder::add_happening(const mbs::Happening& h) {
     }
     case Kind::GroundContact: {
       const bool upper = map_.bodies[static_cast<size_t>(h.index)].is_upper;
-      touchdowns_.push_back(calc_touchdown(h.index, h.time, h.speed));
-      if (upper && !std::isfinite(touchdown_)) {
-        touchdown_ = h.time;
-        touchdown_body_ = body(h.index);
-      }
+      const mbs::Landing& with = h.landing;
+      touchdowns_.push_back(
+          {h.time, h.index, {with.p_WB.x, with.p_WB.y}, h.speed, with.energy, with.momentum, with.kinetic});
+      if (upper && !std::isfinite(first_.time)) first_ = touchdowns_.back();
       add_event({h.time, "touchdown", body(h.index),
                  fmt::format("{} touches the ground at {:.1f} m/s ({:.2f} MJ, {:.2f} MN s)", body(h.index), h.speed,
                              touchdowns_.back().energy * 1e-6, touchdowns_.back().momentum * 1e-6)});

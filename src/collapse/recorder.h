@@ -59,15 +59,16 @@ class Recorder {
   /// At each frame that of the structure whose block is farthest from its place, with the fastest part of all.
   std::vector<BlockFrame> farthest_block_frames() const;
   const std::vector<ZoneFrame>& zone_frames() const { return zone_frames_; }
-  double first_touchdown() const { return touchdown_; }  // of an upper body; NaN if none [s]
-  double first_touchdown(size_t structure) const;        // of an upper body of it
-  std::string first_touchdown_body() const { return touchdown_body_; }
+  double first_touchdown() const { return first_.time; }  // of an upper body; NaN if none [s]
+  double first_touchdown(size_t structure) const;         // of an upper body of it
+  std::string first_touchdown_body() const {
+    return first_.body < 0 ? std::string() : map_.bodies[static_cast<size_t>(first_.body)].name;
+  }
+  double first_touchdown_kinetic() const { return first_.kinetic; }         // energy of all that moves [J]
   const std::vector<Touchdown>& touchdowns() const { return touchdowns_; }  // one of each moving part, as they happen
   double start_reaction_error() const { return reaction_error_; }  // |reaction - weight| / weight at the first frame
   /// Of the ground on what moves, along its normal, from the balance of momentum; loads of the model are part of it.
   MeanForce find_largest_ground_force() const { return find_largest_mean(record_.time, impulse_); }
-  /// Carried on from the two frames before it, as an impact takes it at once [J].
-  double kinetic_before(double time) const;
   /// Plastic shortening of a zone at the last frame; that of a stub never falls [m].
   double shortening_of(int zone) const {
     return zone < 0 || static_cast<size_t>(zone) >= shortening_.size() ? 0 : shortening_[static_cast<size_t>(zone)];
@@ -75,7 +76,6 @@ class Recorder {
 
  private:
   record::Series& series(size_t i) { return record_.series[i]; }
-  Touchdown calc_touchdown(int body, double time, double speed) const;
   std::vector<BlockFrame> calc_blocks(const mbs::View&) const;
   /// Ends of what is drawn that recede as members are crushed.
   void find_crushed_ends();
@@ -101,13 +101,10 @@ class Recorder {
   std::vector<mbs::CrushedBox> crushed_;  // of the last frame, as Record::crushed_ends; shapes as drawn
   std::vector<int> fixed_joints_;
   std::vector<std::pair<double, int>> stages_told_;  // when, which
-  std::vector<Pose> last_pose_;                      // of the bodies at the last frame, for what happens after it
-  std::vector<Vec3> last_v_, last_w_;
-  std::vector<double> last_mass_;
+  std::vector<Vec3> last_v_;                         // of the bodies at the last frame
   double last_time_ = 0;
   std::vector<Touchdown> touchdowns_;
-  double touchdown_ = std::numeric_limits<double>::quiet_NaN();
-  std::string touchdown_body_;
+  Touchdown first_{std::numeric_limits<double>::quiet_NaN()};  // of an upper body
   double reaction_error_ = 0;
   double impulse_until_now_ = 0;       // of the ground, until the last view [N·s]
   std::vector<double> impulse_;        // at each frame

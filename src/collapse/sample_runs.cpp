@@ -162,7 +162,7 @@ void fill(Sample& s, const Knowledge& k, const SampleRunOptions& options, Sample
   out.utilisation = out.stood ? s.recorder->zone_frames()[before].utilisation : 1;
   out.touchdown = s.recorder->first_touchdown();
   const std::vector<double>& kinetic = series("energy_kinetic");
-  out.touchdown_energy = out.touchdown <= out.time.back() ? s.recorder->kinetic_before(out.touchdown) : kinetic.back();
+  out.touchdown_energy = out.touchdown <= out.time.back() ? s.recorder->first_touchdown_kinetic() : kinetic.back();
   out.largest_energy = *std::max_element(kinetic.begin(), kinetic.end());
   out.reach = calc_reach(s.record, out.time.size() - 1);
   if (options.condensation) {

@@ -18,6 +18,7 @@ struct Touchdown {
   double speed = 0;     // with which its first point approaches the ground [m/s]
   double energy = 0;    // kinetic, of the part alone [J]
   double momentum = 0;  // vertical, of the part alone, downwards positive [N·s]
+  double kinetic = 0;   // energy of all parts that move then [J]
 };
 
 /// Largest velocity that the law gives at a footprint.

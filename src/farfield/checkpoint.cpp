@@ -12,7 +12,7 @@ namespace topple::farfield {
 
 namespace {
 
-constexpr char kMagic[] = "topple-fe-checkpoint-4";
+constexpr char kMagic[] = "topple-fe-checkpoint-5";
 
 class Writer {
  public:
@@ -100,7 +100,7 @@ void pass_view(Io& io, View& v) {
 
 template <class Io, class Happening>
 void pass_happening(Io& io, Happening& h) {
-  io(h.kind), io(h.time), io(h.index), io(h.other), io(h.reason), io(h.speed);
+  io(h.kind), io(h.time), io(h.index), io(h.other), io(h.reason), io(h.speed), io(h.landing);
 }
 
 template <class Io, class State>

@@ -209,6 +209,23 @@ class Course {
     state_.foot_forces.push_back(motion_.calc_foot_forces(system_));
   }
 
+  /// A landing between frames: from the last one on in free fall, which adds at most g times the frame's length to the
+  /// speed; the energy of all bodies as it grew between the last two, as the impact takes some of it at once.
+  mbs::Landing carry_on(size_t b, double time) const {
+    const mbs::View *last = nullptr, *before = nullptr;
+    for (auto entry = state_.shown.rbegin(); entry != state_.shown.rend() && !before; ++entry)
+      if (const mbs::View* v = std::get_if<mbs::View>(&*entry)) (last ? before : last) = v;
+    if (!last) return {};
+    const double since = time - last->time;
+    const Vec3 v = last->v_WB[b] + since * model_.gravity;
+    const Vec3 w_B = transpose_times(to_matrix(last->X_WB[b].q), last->w_WB[b]);
+    const double k = last->energy.kinetic;
+    return {last->X_WB[b].p + since * last->v_WB[b],
+            0.5 * last->mass[b] * dot(v, v) + 0.5 * dot(w_B, model_.bodies[b].inertia * w_B),
+            -last->mass[b] * dot(v, model_.contact.normal),
+            before ? k + (k - before->energy.kinetic) / (last->time - before->time) * since : k};
+  }
+
   /// Touchdowns and changes of zones since the last frame.
   void show_changes(const mbs::View& v) {
     const std::vector<double>& touchdowns = system_.touchdowns();
@@ -221,6 +238,7 @@ class Course {
       h.time = touchdowns[b] + state_.offset;
       h.index = static_cast<int>(b);
       h.speed = norm(v.v_WB[b]);
+      h.landing = carry_on(b, h.time);
       list.push_back(h);
     }
     std::stable_sort(list.begin(), list.end(),

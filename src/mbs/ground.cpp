@@ -61,7 +61,16 @@ void System::note_landing(std::uint32_t slot) {
                    corner & 4 ? shape.half.z : -shape.half.z};
   const Mat3 R_WB = s.R[b];
   const double approach = -dot(model.contact.normal, s.v[b] + cross(s.w[b], R_WB * (shape.p_BS + shape.R_BS * local)));
-  say({Happening::Kind::GroundContact, s.time, static_cast<int>(b), -1, {}, std::max(0.0, approach)});
+  say_landing(b, approach);
+}
+
+void System::say_landing(size_t b, double approach) const {
+  const State& s = state;
+  const auto energy_of = [&s](size_t i) { return 0.5 * (s.body[i].mass * dot(s.v[i], s.v[i]) + dot(s.w[i], s.L[i])); };
+  Landing landing{s.p[b], energy_of(b), -s.body[b].mass * dot(s.v[b], model.contact.normal), 0};
+  for (size_t i = 0; i < B; ++i)
+    if (!fixed[i]) landing.kinetic += energy_of(i);
+  say({Happening::Kind::GroundContact, s.time, static_cast<int>(b), -1, {}, std::max(0.0, approach), landing});
 }
 
 void System::find_ground_points(double h) {
@@ -149,8 +158,7 @@ void System::find_ground_points(double h) {
       }
       if (!shape.is_touching && !s.touched_ground[b]) {
         s.touched_ground[b] = 1;
-        const double approach = -dot(n, now.v[b] + cross(now.w[b], contact.point[first].at));
-        say({Happening::Kind::GroundContact, s.time, static_cast<int>(b), -1, {}, std::max(0.0, approach)});
+        say_landing(b, -dot(n, now.v[b] + cross(now.w[b], contact.point[first].at)));
       }
       (void)crush_ends(b, i, B, -1, -n, law, first, h);
       add_contact_group(b, B, -n, first, ground_law[b], stiffness, shape.sticks);

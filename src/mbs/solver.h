@@ -62,6 +62,14 @@ struct View {
 };
 
 /// Something that happened between two frames.
+/// What a body brings to the ground when it touches it first: velocities half a step before.
+struct Landing {
+  Vec3 p_WB{};          // of its mass centre [m]
+  double energy = 0;    // kinetic, of the body alone [J]
+  double momentum = 0;  // of the body alone, against the ground's normal [N·s]
+  double kinetic = 0;   // kinetic energy of all bodies [J]
+};
+
 struct Happening {
   enum class Kind {
     EventFired,
@@ -82,6 +90,7 @@ struct Happening {
   int other = -1;      // second body of a BodyContact
   std::string reason;  // of a break: "tension", "crushing", "shear", "rotation", "torsion"
   double speed = 0;    // of a first contact, normal approach [m/s]
+  Landing landing{};   // of a GroundContact
 };
 
 /// Who wants to look at the running system at a rate of its own. The course of the run does not depend on it.

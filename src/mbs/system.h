@@ -437,6 +437,7 @@ class System {
   void count_other_bodies();
   /// Tells of boxes that the kernel has found to touch the ground (its slots).
   void note_landing(std::uint32_t slot);
+  void say_landing(size_t b, double approach) const;
   /// Whether something else touches anything.
   bool has_other_contacts() const { return model.contact.bodies || other_on_ground > 0; }
   void find_pair_points(double h);

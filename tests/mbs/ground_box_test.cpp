@@ -192,5 +192,40 @@ TEST(GroundBox, LeavesTheKernelWhenItBecomesSomethingElse) {
   EXPECT_LT(residual, 0.01 * released);  // error of the step
 }
 
+TEST(GroundBox, TellsWhatABodyBringsToTheGround) {
+  for (const bool any_shapes : {false, true}) {
+    Model m;
+    m.contact.bodies = any_shapes;
+    const double fall[] = {1, 2};
+    for (int i = 0; i < 2; ++i) {
+      Body b = test::make_box("b", 100.0 + 50 * i, {0.5, 0.4, 0.3}, {20.0 * i, 3, 0.3 + fall[i]});
+      b.v_WB = {2, 0, 0};
+      b.w_WB = {0, 0, 3};
+      add_body(m, b);
+    }
+    Options o = make_options();
+    o.duration = 1;
+    std::vector<Happening> landed;
+    o.on_happening = [&](const Happening& h) {
+      if (h.kind == Happening::Kind::GroundContact) landed.push_back(h);
+    };
+    EXPECT_EQ(run(m, o).ending, Summary::Ending::TimeLimit);
+    ASSERT_EQ(landed.size(), 2U);
+    const Landing& first = landed[0].landing;
+    EXPECT_EQ(landed[0].index, 0);
+    const double g = norm(m.gravity), t = std::sqrt(2 * fall[0] / g), thrown[] = {0.5 * 100 * 4, 0.5 * 150 * 4};
+    const auto turning = [&](size_t i) { return 0.5 * m.bodies[i].inertia.m[2][2] * 9; };
+    const double own = 100 * g * fall[0] + thrown[0] + turning(0);
+    EXPECT_NEAR(landed[0].time, t, 2 * o.step);
+    EXPECT_NEAR(first.p_WB.x, 2 * t, 4 * o.step);
+    EXPECT_NEAR(first.momentum, 100 * g * t, 100 * g * o.step);
+    EXPECT_NEAR(first.energy, own, 100 * g * g * t * o.step);
+    EXPECT_NEAR(first.kinetic, own + 150 * g * fall[0] + thrown[1] + turning(1), 250 * g * g * t * o.step);
+    // the other one has come to lie meanwhile, or slides
+    EXPECT_NEAR(landed[1].landing.momentum, 150 * std::sqrt(2 * g * fall[1]), 150 * g * o.step);
+    EXPECT_LT(landed[1].landing.kinetic - landed[1].landing.energy, own);
+  }
+}
+
 }  // namespace
 }  // namespace topple::mbs

@@ -376,6 +376,8 @@ TEST(CondensedMappingPhysics, StorehouseFallsAsItDoesWhole) {
     EXPECT_EQ(a.outcome, b.outcome);
     EXPECT_NEAR(a.values[0], b.values[0], c.tilt * unit::deg);
     EXPECT_NEAR(a.values[3], b.values[3], 0.015);
+    EXPECT_EQ(condensed.outputs()[5].name, "touchdown_energy");
+    EXPECT_NEAR(a.values[5], b.values[5], 0.1 * a.values[5]);
   }
 }
 
