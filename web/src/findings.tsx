@@ -52,11 +52,18 @@ export function Header(props: { run: Run }) {
 /// What is worst first.
 export const openStatuses: readonly Status[] = ["bad", "not_judged", "warning"];
 
+/// The distance that the plan asks for, as a clearance finding tells it in either language; undefined if it asks for none.
+export const findLimit = (f: Finding): string | undefined => (f.id.startsWith("clearance.") ? /; (?:the limit is|der Grenzwert ist) (\d+(?:[.,]\d+)?) m\.(?= |$)/.exec(f.text)?.[1]?.replace(",", ".") : undefined);
+
+/// Whether its title is the name of a neighbour or a utility, which does not say what of it is told.
+export const isOfPlace = (f: Finding): boolean => /^(clearance|vibration)\./.test(f.id);
+
 /// What is not as it should be, each with a way to its finding.
 function Summary(props: { run: Run }) {
   const { findings } = props.run;
   const verdict = findVerdict(props.run);
-  const criteria = findings.filter((f) => f.id.startsWith("criterion.") || f.id.startsWith("clearance."));
+  const criteria = findings.filter((f) => f.id.startsWith("criterion.") || findLimit(f) !== undefined);
+  const screened = findings.filter((f) => f.id.startsWith("vibration.") && f.status === "bad").length;
   const unjudged = criteria.filter((f) => f.status === "not_judged").length;
   const met = criteria.filter((f) => f.status !== "bad").length - unjudged;
   const open = findings.filter((f) => f !== verdict && openStatuses.includes(f.status));
@@ -67,12 +74,13 @@ function Summary(props: { run: Run }) {
       <p class="verdict-title">
         {props.run.ending.kind === "failed" ? "The limits of the plan were not examined" : criteria.length === 0 ? "The plan sets no limits" : props.run.ending.kind === "under_way" || props.run.ending.kind === "cancelled" ? `${criteria.length - met - unjudged} of ${criteria.length} limits broken so far` : unjudged > 0 ? `${met} of ${criteria.length} limits of the plan kept, ${unjudged} not judged` : met === criteria.length ? (met === 1 ? "The one limit of the plan kept" : `All ${met} limits of the plan kept`) : `${met} of ${criteria.length} limits of the plan kept`}
       </p>
+      {screened > 0 && <p class="verdict-title">{screened === 1 ? "The screening of ground vibration lies above one limit" : `The screening of ground vibration lies above ${screened} limits`}</p>}
       {open.slice(0, most).map((f) => (
         <a class="open-finding" href={`#finding-${f.id}`} data-test="open-finding">
-          <StatusSign status={f.status} size={14} /> <StatusWord status={f.status} /> <span>{f.title}</span>
+          <StatusSign status={f.status} size={14} /> <StatusWord status={f.status} /> <span>{isOfPlace(f) ? `${f.heading}: ${f.title}` : f.title}</span>
         </a>
       ))}
-      {open.length > most && <p class="ending-text">and {open.length - most} more below</p>}
+      {open.length > most && <p class="ending-text">{`and ${open.length - most} more below`}</p>}
     </>
   );
 }

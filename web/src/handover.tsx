@@ -1,7 +1,7 @@
 /// What the report hands over beside the findings: when they would not hold, the site from above, assumptions,
 /// verification, what fuzzy values do, and the words it uses.
 import { calcPose, type Finding, type Point, type Quadruple, rotate, type Run, shorten, type StudySummary, type Triple } from "./data";
-import { FindingRow, findVerdict } from "./findings";
+import { FindingRow, findLimit, findVerdict, isOfPlace } from "./findings";
 import { StatusSign } from "./signs";
 import { unitWord } from "./study/data";
 import { makeScale, makeTicks, tickText, useChartWidth } from "./study/chart";
@@ -9,9 +9,6 @@ import { atLeast, atMost, formatNumber, prettify } from "./units";
 
 /// Never more than there is: what is spare is rounded down.
 const roundDown = (value: number, decimals: number): string => (Math.floor(value * 10 ** decimals + 1e-6) / 10 ** decimals).toFixed(decimals);
-
-/// The distance that the plan asks for, as a clearance finding tells it in either language; undefined if it asks for none.
-const findLimit = (f: Finding): string | undefined => /; (?:the limit is|der Grenzwert ist) (\d+(?:[.,]\d+)?) m\.(?= |$)/.exec(f.text)?.[1]?.replace(",", ".");
 
 /// What a stability finding says beside the margin at its end, in either language: how many zones have yielded or broken,
 /// and the least margin on the way.
@@ -31,9 +28,11 @@ function readMargin(f: Finding): { yielded: number; broken: number; least: numbe
 export function listConditions(run: Run): string[] {
   const out: string[] = [];
   const verdict = findVerdict(run);
-  const broken = run.findings.filter((f) => f.status === "bad" && f !== verdict && /^(criterion|clearance|stability)\./.test(f.id));
-  for (const f of broken) out.push(`It fails already: ${f.title}.`);
-  for (const f of run.findings.filter((g) => g.status === "not_judged" && g !== verdict)) out.push(`What the run did not show is otherwise: ${f.title}.`);
+  const broken = run.findings.filter((f) => f.status === "bad" && f !== verdict && /^(criterion|clearance|stability|vibration)\./.test(f.id));
+  const name = (f: Finding): string => (isOfPlace(f) ? `${f.heading}, ${f.title}` : f.title);
+  for (const f of broken) out.push(`It fails already: ${name(f)}.`);
+  for (const f of run.findings.filter((g) => g.id.startsWith("clearance.") && g.status === "warning" && g.value !== null && g.value <= 0)) out.push(`Parts are over it already: ${f.title}.`);
+  for (const f of run.findings.filter((g) => g.status === "not_judged" && g !== verdict)) out.push(`What the run did not show is otherwise: ${name(f)}.`);
   const charges = run.events.filter((e) => e.kind === "charge").length;
   if (charges === 1) out.push("The charge does not fire, or not when the plan says.");
   if (charges > 1) out.push(`One of the ${charges} charges does not fire, or not when the plan says.`);
@@ -52,6 +51,7 @@ export function listConditions(run: Run): string[] {
     else if (yielded > 0) out.push(`${title}: zones resist less than the plan says. No margin is left: ${yielded} zones have yielded already.`);
     else out.push(`${title}: zones resist less than the plan says. No margin is left.`);
   }
+  for (const f of run.findings.filter((g) => g.id.startsWith("vibration.") && g.status === "warning")) out.push(`${f.title}: the ground shakes more than the middle of the screening's band, which reaches the limit.`);
   const near = run.findings.filter((f) => f.id.startsWith("clearance.") && f.value !== null && f.value > 0 && f.status !== "bad");
   const ways = near.map((f) => {
     const limit = findLimit(f);

@@ -343,7 +343,29 @@ describe("what would make it fail", () => {
   });
 
   it("tells of no way that is left where a limit is broken", () => {
-    assert.deepEqual(tell(clearance("Hall", 3.2, "The nearest part, C-A1-0, comes to 3.2 m at 4.10 s; the limit is 4.0 m.", "bad")), ["It fails already: Hall."]);
+    assert.deepEqual(tell(clearance("Hall", 3.2, "The nearest part, C-A1-0, comes to 3.2 m at 4.10 s; the limit is 4.0 m.", "bad")), ["It fails already: Clearance, Hall."]);
+  });
+});
+
+describe("limits of the plan", () => {
+  const finding = (id, heading, text, status) => ({ id: `${id}.Main`, heading, title: "Main", text, value: 0, unit: "m", status });
+  const lands = finding("clearance", "Clearance", "chimney/8 lands on it at 8.63 s.", "warning");
+  const shaken = (status) => finding("vibration", "Ground vibration", "Screening: 28 to 110 mm/s.", status);
+  const mechanism = { id: "mechanism", heading: "Mechanism", title: "Mechanism: topple", text: "", value: 0.2, unit: "rad", status: "good" };
+
+  it("are those that the plan sets", async () => {
+    const { findLimit } = await load("findings.tsx");
+    assert.equal(findLimit(lands), undefined);
+    assert.equal(findLimit({ ...lands, text: "chimney/8 lands on it at 8.63 s; the limit is 4.0 m." }), "4.0");
+    assert.equal(findLimit({ ...shaken("bad"), text: "; the limit is 4.0 m." }), undefined);
+  });
+
+  it("fail where parts lie on a neighbour or the ground shakes too much", async () => {
+    const { listConditions } = await load("handover.tsx");
+    const tell = (...findings) => listConditions({ findings: [mechanism, ...findings], events: [] }).slice(0, -1);
+    assert.deepEqual(tell(lands, shaken("bad")), ["It fails already: Ground vibration, Main.", "Parts are over it already: Main."]);
+    assert.deepEqual(tell(shaken("warning")), ["Main: the ground shakes more than the middle of the screening's band, which reaches the limit."]);
+    assert.deepEqual(tell(shaken("good")), []);
   });
 });
 
