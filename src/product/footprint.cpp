@@ -1,6 +1,8 @@
 #include "product/footprint.h"
 
+#include <cmath>
 #include <cstddef>
+#include <utility>
 
 namespace topple::product {
 
@@ -10,6 +12,27 @@ using Point = std::array<double, 2>;
 
 double cross(const Point& a, const Point& b, const Point& c) {
   return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+}
+
+/// Whether a point lies on the edge from a to b, its ends left out.
+bool is_within(const Point& a, const Point& b, const Point& p) {
+  return cross(a, b, p) == 0 && (p[0] - a[0]) * (p[0] - b[0]) + (p[1] - a[1]) * (p[1] - b[1]) < 0;
+}
+
+/// Whether an edge from b goes back on the one from a to b.
+bool goes_back(const Point& a, const Point& b, const Point& c) {
+  return cross(a, b, c) == 0 && (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1]) < 0;
+}
+
+/// Whether p, seen from a corner, lies between the directions to `from` and, counterclockwise, `to`.
+bool is_in_sector(const Point& corner, const Point& from, const Point& to, const Point& p) {
+  const double turn_p = cross(corner, from, p), turn_to = cross(corner, from, to), left = cross(corner, p, to);
+  return turn_to >= 0 ? turn_p > 0 && left > 0 : turn_p > 0 || left > 0;
+}
+
+/// Whether edges of two ways through a corner lie on each other.
+bool shares(const Point& a, const Point& b, const Point& c, const Point& d) {
+  return a == c || a == d || b == c || b == d;
 }
 
 }  // namespace
@@ -23,15 +46,45 @@ double calc_signed_area(const std::vector<Point>& corners) {
   return twice / 2;
 }
 
-bool crosses_itself(const std::vector<Point>& corners) {
+bool crosses_itself(const std::vector<Point>& all) {
+  std::vector<Point> corners;  // without those that are given twice in turn
+  for (const Point& p : all)
+    if (corners.empty() || corners.back() != p) corners.push_back(p);
+  while (corners.size() > 1 && corners.front() == corners.back()) corners.pop_back();
   const std::size_t n = corners.size();
-  for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t j = i + 2; j < n; ++j) {
-      if (i == 0 && j == n - 1) continue;  // neighbours share a corner
-      const Point &a = corners[i], &b = corners[i + 1], &c = corners[j], &d = corners[(j + 1) % n];
+  const auto at = [&](std::size_t i) -> const Point& { return corners[i % n]; };
+  for (std::size_t i = 0; i < n; ++i) {
+    const Point &before = at(i + n - 1), &a = at(i), &b = at(i + 1);
+    if (goes_back(before, a, b)) return true;
+    for (std::size_t j = 0; j < n; ++j) {
+      const Point &c = at(j), &d = at(j + 1), &next = at(j + 2);
       if (cross(a, b, c) * cross(a, b, d) < 0 && cross(c, d, a) * cross(c, d, b) < 0) return true;
+      // through a corner that lies on an edge or on another corner
+      if (is_within(a, b, d) && cross(a, b, c) * cross(a, b, next) < 0) return true;
+      if (a == d && is_in_sector(a, b, before, c) != is_in_sector(a, b, before, next) && !shares(before, b, c, next))
+        return true;
     }
+  }
   return false;
+}
+
+double calc_overlap(std::vector<Point> outline, const std::vector<Point>& convex) {
+  // Sutherland and Hodgman: what is left of the outline on the inner side of each edge in turn
+  for (std::size_t i = 0; i < convex.size() && !outline.empty(); ++i) {
+    const Point &a = convex[i], &b = convex[(i + 1) % convex.size()];
+    std::vector<Point> inside;
+    for (std::size_t k = 0; k < outline.size(); ++k) {
+      const Point &p = outline[k], &q = outline[(k + 1) % outline.size()];
+      const double side_p = cross(a, b, p), side_q = cross(a, b, q);
+      if (side_p >= 0) inside.push_back(p);
+      if ((side_p > 0 && side_q < 0) || (side_p < 0 && side_q > 0)) {
+        const double s = side_p / (side_p - side_q);
+        inside.push_back({p[0] + s * (q[0] - p[0]), p[1] + s * (q[1] - p[1])});
+      }
+    }
+    outline = std::move(inside);
+  }
+  return std::abs(calc_signed_area(outline));
 }
 
 }  // namespace topple::product

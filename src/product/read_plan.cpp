@@ -38,11 +38,11 @@ Plan read_plan_document(const Node& document, const std::string& name, Complaint
   read_sections(reading, root);
   read_panels(reading, root);
   read_grid(reading, root);
-  check_neighbours(reading);
   read_members(reading, root);
   read_shafts(reading, root);
   read_preparation(reading, root);
   check_shafts(reading);
+  check_neighbours(reading);
   read_analysis(reading, root);
   read_stages(reading, root);
   read_cables(reading, root);

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "product/footprint.h"
 #include "product/plan_limits.h"
@@ -146,23 +147,28 @@ void read_site(Reading& reading, TableReader& root) {
 
 void check_neighbours(Reading& reading) {
   const Plan& plan = reading.plan;
-  if (!reading.has_grid || plan.row_offsets.empty()) return;
-  const double x0 = plan.row_offsets.front(), x1 = plan.row_offsets.back();
-  const double y0 = plan.frame_offsets.front(), y1 = plan.frame_offsets.back();
-  const Point middle{(x0 + x1) / 2, (y0 + y1) / 2};
-  for (const Neighbour& n : plan.neighbours) {
-    bool overlaps = false, holds_middle = false;
-    for (size_t i = 0, j = n.footprint.size() - 1; i < n.footprint.size(); j = i++) {
-      const Point &a = n.footprint[i], &b = n.footprint[j];
-      overlaps = overlaps || (a[0] > x0 && a[0] < x1 && a[1] > y0 && a[1] < y1);
-      if ((a[1] > middle[1]) != (b[1] > middle[1]) &&
-          middle[0] < a[0] + (b[0] - a[0]) * (middle[1] - a[1]) / (b[1] - a[1]))
-        holds_middle = !holds_middle;
+  std::vector<std::vector<Point>> buildings;
+  if (reading.has_grid && !plan.row_offsets.empty() && !plan.frame_offsets.empty()) {
+    const double x0 = plan.row_offsets.front(), x1 = plan.row_offsets.back();
+    const double y0 = plan.frame_offsets.front(), y1 = plan.frame_offsets.back();
+    buildings.push_back({{x0, y0}, {x1, y0}, {x1, y1}, {x0, y1}});
+  }
+  for (const Member& m : plan.members) {
+    if (m.shaft < 0) continue;
+    const double radius = plan.shafts[static_cast<size_t>(m.shaft)].diameter_foot / 2;
+    std::vector<Point>& ring = buildings.emplace_back();
+    constexpr int corners = 48;
+    for (int i = 0; i < corners; ++i) {
+      const double a = 2 * std::numbers::pi * i / corners;
+      ring.push_back({m.start.x + radius * std::cos(a), m.start.y + radius * std::sin(a)});
     }
-    if (overlaps || holds_middle)
+  }
+  constexpr double least = 1e-4;  // walls that touch have nothing in common [m²]
+  for (const Neighbour& n : plan.neighbours)
+    if (std::any_of(buildings.begin(), buildings.end(),
+                    [&n](const std::vector<Point>& b) { return calc_overlap(n.footprint, b) > least; }))
       reading.complaints.warn("W505", {n.where.line, n.where.column, n.is_utility ? 16 : 18},
                               quoted(n.name) + ": its footprint overlaps the building");
-  }
 }
 
 void read_criteria(Reading& reading, TableReader& root) {

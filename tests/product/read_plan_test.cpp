@@ -197,10 +197,19 @@ const Mistake member_mistakes[] = {
     {"E308", "[[\"0 m\", \"20 m\"], [\"10 m\", \"20 m\"], [\"10 m\", \"30 m\"]]",
      "«[[\"0 m\", \"20 m\"], [\"10 m\", \"30 m\"], [\"10 m\", \"20 m\"], [\"0 m\", \"29 m\"]]»", "its edges cross",
      "in order"},
+    {"E308", "[[\"0 m\", \"20 m\"], [\"10 m\", \"20 m\"], [\"10 m\", \"30 m\"]]",
+     "«[[\"0 m\", \"20 m\"], [\"4 m\", \"20 m\"], [\"4 m\", \"24 m\"], [\"2 m\", \"20 m\"], [\"2 m\", \"16 m\"], [\"0 m\", \"16 m\"]]»",
+     "its edges cross", "in order"},
+    {"E308", "[[\"0 m\", \"20 m\"], [\"10 m\", \"20 m\"], [\"10 m\", \"30 m\"]]",
+     "«[[\"0 m\", \"20 m\"], [\"10 m\", \"20 m\"], [\"10 m\", \"40 m\"], [\"10 m\", \"30 m\"], [\"0 m\", \"30 m\"]]»",
+     "its edges cross", "in order"},
     {"W503", "[slab.floor]", "[slab.«roof»]\nthickness = \"16 cm\"\nconcrete = \"C25\"\n[slab.floor]",
      "roof: no member has this panel", ""},
     {"W505", "footprint = [[\"0 m\", \"20 m\"]", "footprint = [[\"3 m\", \"3 m\"]", "overlaps the building", "",
      "[[site.neighbour]]", "«[[site.neighbour]]»"},
+    {"W505", "footprint = [[\"0 m\", \"20 m\"], [\"10 m\", \"20 m\"], [\"10 m\", \"30 m\"]]",
+     "footprint = [[\"-5 m\", \"3 m\"], [\"50 m\", \"3 m\"], [\"50 m\", \"4 m\"], [\"-5 m\", \"4 m\"]]",
+     "overlaps the building", "", "[[site.neighbour]]", "«[[site.neighbour]]»"},
 };
 
 const Mistake blasting_mistakes[] = {
