@@ -44,6 +44,7 @@ struct Context {
   bool is_under_way = false;
   const std::atomic<bool>* cancel = nullptr;
   std::vector<OpenPart> open = {};  // of a run that ended with its time
+  long charges_left = 0;            // that had not fired by then
 
   bool is_cancelled() const { return cancel != nullptr && *cancel; }
 
@@ -56,10 +57,22 @@ struct Context {
   Pose pose(size_t frame, size_t body) const { return record::pose_at(r, frame, body); }
 };
 
-/// Why a limit that is kept so far is not judged; empty: nothing that still moved could break it.
+/// "no zone has yielded", "1 zone has yielded", "2 zones have yielded".
+std::string count_words(long n, const char* none, const char* one, const char* many) {
+  return n == 0 ? none : fmt::format("{} {}", n, n == 1 ? one : many);
+}
+
+std::string tell_charges_left(const Context& c) {
+  return count_words(c.charges_left, "", "charge had not fired when the run ended",
+                     "charges had not fired when the run ended") +
+         ".";
+}
+
+/// Why a limit that is kept so far is not judged; empty: nothing that still moved could break it, and all has fired.
 ///   breaks  whether a part on its way would
 template <class Breaks>
 std::string find_what_is_open(const Context& c, const Breaks& breaks) {
+  if (c.charges_left > 0) return kNotJudged + tell_charges_left(c);
   const OpenPart* fastest = nullptr;
   for (const OpenPart& part : c.open)
     if ((fastest == nullptr || part.speed > fastest->speed) && breaks(part)) fastest = &part;
@@ -82,11 +95,6 @@ std::pair<double, double> calc_distances_at_end(const Context& c, size_t body, c
     for (const Point2& p : outline) most = std::max(most, calc_distance(p, area));
   }
   return {least, most};
-}
-
-/// "no zone has yielded", "1 zone has yielded", "2 zones have yielded".
-std::string count_words(long n, const char* none, const char* one, const char* many) {
-  return n == 0 ? none : fmt::format("{} {}", n, n == 1 ? one : many);
 }
 
 std::string azimuth_words(double azimuth, int digits = 0) {
@@ -544,20 +552,13 @@ void add_events(const Context& c) {
     });
     ++(fails ? failed : n[e.kind]);
   }
-  const auto late = std::count_if(c.map.schedule.begin(), c.map.schedule.end(),
-                                  [&c](const Firing& f) { return !f.fails && f.time > c.r.time.back() + 1e-9; });
-  const bool has_late = late > 0 && !c.is_under_way;
   std::string text = fmt::format("Charges: {}; zones yielded: {}, broken: {}; joints off: {}; parts on the ground: {}.",
                                  n["charge"], n["yield"], n["rupture"], n["release"], n["touchdown"]);
-  if (has_late)
-    text +=
-        " " +
-        count_words(late, "", "charge had not fired when the run ended", "charges had not fired when the run ended") +
-        ".";
+  if (c.charges_left > 0) text += " " + tell_charges_left(c);
   if (failed > 0)
     text += " " + count_words(failed, "", "charge fails, as the plan says", "charges fail, as the plan says") + ".";
   c.add("events", "Events", "Events", text, static_cast<double>(c.r.events.size()), "1",
-        has_late ? Status::Warning : Status::Info);
+        c.charges_left > 0 ? Status::Warning : Status::Info);
   size_t i = 0;
   for (const ModelNote& note : c.map.notes)
     c.add("note." + std::to_string(++i), "Events", note.title, note.text, kNone, "", Status::Warning);
@@ -595,8 +596,10 @@ void add_criteria(const Context& c, const Mechanism& m, const Standing& standing
           : !why.empty() ? Status::NotJudged
                          : Status::Good);
   };
-  const std::string falls_on =
-      m.is_final ? "" : fmt::format("{}it still came down or swayed when the run ended.", kNotJudged);
+  const std::string falls_on = c.charges_left > 0 ? kNotJudged + tell_charges_left(c)
+                               : m.is_final
+                                   ? ""
+                                   : fmt::format("{}it still came down or swayed when the run ended.", kNotJudged);
   if (want.mechanism)
     judge_one("mechanism", "Mechanism", m.name == *want.mechanism || may_stand(c, m),
               fmt::format("Asked: {}; found: {}.", *want.mechanism, m.name), kNone, "", falls_on);
@@ -620,7 +623,8 @@ void add_criteria(const Context& c, const Mechanism& m, const Standing& standing
     judge_one("debris_reach", "Reach of the debris", reach.largest <= *want.debris_reach,
               fmt::format("Asked: at most {} m; found: {} m.", limit, found), reach.largest, "m",
               find_what_is_open(c, [&](const OpenPart& part) {
-                return calc_distances_at_end(c, part.body, c.r.building_outline).second + part.way > *want.debris_reach;
+                return calc_distances_at_end(c, part.body, find_start_outline(c.r, part.body)).second + part.way >
+                       *want.debris_reach;
               }));
   }
   if (want.stands_between_stages) {
@@ -747,6 +751,9 @@ bool add_findings(const product::Plan& plan, const mbs::Model& model, const Mode
   // what was cancelled says how far it came
   const bool is_under_way = r.ending == "under_way" || r.ending == "cancelled";
   Context c{plan, model, map, k, recorder, summary, r, is_under_way, cancel};
+  if (!is_under_way && !r.time.empty())
+    c.charges_left = std::count_if(map.schedule.begin(), map.schedule.end(),
+                                   [&r](const Firing& f) { return !f.fails && f.time > r.time.back() + 1e-9; });
   if (r.ending == "time_limit") c.open = find_open_parts(r, norm(model.gravity), plan.ground.friction, kStill);
   const auto add_not_modelled = [&] {
     c.add("not_modelled", "Not modelled", "Not modelled", tell_not_modelled(r.not_modelled), kNone, "");

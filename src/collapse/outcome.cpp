@@ -73,10 +73,26 @@ size_t find_frame(const std::vector<BlockFrame>& block, double time) {
 
 Polygon calc_building_outline(const mbs::Model& model, const ModelMap& map) {
   std::vector<Point2> corners;
-  for (size_t b = 0; b < model.bodies.size(); ++b)
+  for (size_t b = 0; b < model.bodies.size(); ++b) {
+    if (map.bodies[b].structure < 0) continue;
     for (const record::BoxShape& s : map.bodies[b].shapes)
       for (const Point2& p : calc_outline({model.bodies[b].X_WB * s.X_BS, s.half})) corners.push_back(p);
+  }
   return calc_hull(std::move(corners));
+}
+
+Polygon find_start_outline(const record::Record& r, size_t body) {
+  constexpr double rounding = 1e-3;  // of poses that are kept as floats [m]
+  std::vector<Point2> corners;
+  const Pose X_WB = record::pose_at(r, 0, body);
+  for (size_t i = 0; i < r.bodies[body].shapes.size(); ++i) {
+    const record::BoxShape s = record::shape_at(r, 0, body, i);
+    for (const Point2& p : calc_outline({X_WB * s.X_BS, s.half})) corners.push_back(p);
+  }
+  const bool is_beside = !r.building_outline.empty() &&
+                         std::any_of(corners.begin(), corners.end(),
+                                     [&](const Point2& p) { return calc_distance(p, r.building_outline) > rounding; });
+  return is_beside ? calc_hull(std::move(corners)) : r.building_outline;
 }
 
 std::vector<PlacedBox> find_moving_boxes(const record::Record& r, size_t frame) {
@@ -94,6 +110,8 @@ std::vector<PlacedBox> find_moving_boxes(const record::Record& r, size_t frame) 
 
 namespace {
 
+constexpr double kStays = 0.05;  // [m]
+
 /// How far a part lies beyond the footprint.
 struct PartReach {
   size_t body = 0;
@@ -103,9 +121,6 @@ struct PartReach {
   std::vector<Point2> corners;   // of its boxes, seen from above
 };
 std::vector<PartReach> find_part_reaches(const record::Record& r, size_t frame) {
-  double low[2] = {1e30, 1e30}, high[2] = {-1e30, -1e30};
-  for (const auto& p : r.building_outline)
-    for (size_t i : {0UL, 1UL}) low[i] = std::min(low[i], p[i]), high[i] = std::max(high[i], p[i]);
   std::vector<PartReach> parts;
   for (size_t b = 0; b < r.bodies.size(); ++b) {
     if (r.bodies[b].fixed) continue;
@@ -113,11 +128,15 @@ std::vector<PartReach> find_part_reaches(const record::Record& r, size_t frame) 
     part.body = b;
     part.mass = r.bodies[b].mass;
     const Pose X_WB = record::pose_at(r, frame, b);
+    const Polygon from = find_start_outline(r, b);
+    double low[2] = {1e30, 1e30}, high[2] = {-1e30, -1e30};
+    for (const Point2& p : from)
+      for (size_t i : {0UL, 1UL}) low[i] = std::min(low[i], p[i]), high[i] = std::max(high[i], p[i]);
     for (size_t shape = 0; shape < r.bodies[b].shapes.size(); ++shape) {
       const record::BoxShape s = record::shape_at(r, frame, b, shape);
       for (const Point2& p : calc_outline({X_WB * s.X_BS, s.half})) {
         part.corners.push_back(p);
-        if (!r.building_outline.empty()) part.way = std::max(part.way, calc_distance(p, r.building_outline));
+        if (!from.empty()) part.way = std::max(part.way, calc_distance(p, from));
         for (size_t i : {0UL, 1UL}) {
           part.side[2 * i] = std::max(part.side[2 * i], low[i] - p[i]);
           part.side[2 * i + 1] = std::max(part.side[2 * i + 1], p[i] - high[i]);
@@ -129,6 +148,8 @@ std::vector<PartReach> find_part_reaches(const record::Record& r, size_t frame) 
     const auto is_none = [](double x) { return x < rounding; };
     std::replace_if(part.side.begin(), part.side.end(), is_none, 0.0);
     if (is_none(part.way)) part.way = 0;
+    // what stands beside the building and stays there is no debris
+    if (from != r.building_outline && part.way < kStays) continue;
     parts.push_back(std::move(part));
   }
   std::stable_sort(parts.begin(), parts.end(), [](const PartReach& a, const PartReach& b) { return a.way < b.way; });

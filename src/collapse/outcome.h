@@ -29,6 +29,9 @@ size_t find_frame(const std::vector<BlockFrame>&, double time);
 /// Outline of the model as it stands at the start, seen from above.
 Polygon calc_building_outline(const mbs::Model&, const ModelMap&);
 
+/// From where the reach of a part counts: the building's outline, or where the part stood if that is beside it.
+Polygon find_start_outline(const record::Record&, size_t body);
+
 /// Boxes of all bodies that can move, as crushing has left them.
 std::vector<PlacedBox> find_moving_boxes(const record::Record&, size_t frame);
 

@@ -98,6 +98,15 @@ void Builder::find_structures() {
     body.is_upper &= body.structure >= 0;
     if (body.structure >= 0) map.structures[static_cast<size_t>(body.structure)].mass += model.bodies[b].mass;
   }
+  // what stands fast belongs to what hangs on it
+  const auto follow = [&](mbs::BodyId a, mbs::BodyId b) {
+    if (a == mbs::kGround || b == mbs::kGround) return;
+    const size_t i = static_cast<size_t>(a.index), j = static_cast<size_t>(b.index);
+    if (model.bodies[i].fixed && !model.bodies[j].fixed) map.bodies[i].structure = map.bodies[j].structure;
+    if (model.bodies[j].fixed && !model.bodies[i].fixed) map.bodies[j].structure = map.bodies[i].structure;
+  };
+  for (const mbs::ZoneElement& e : model.elements) follow(e.a, e.b);
+  for (const mbs::Joint& j : model.joints) follow(j.parent, j.child);
   if (!left.empty())
     map.notes.push_back({"Structures without a charge",
                          fmt::format("No charge acts on {} of {} separate structures ({}): the mechanism is judged "

@@ -50,27 +50,36 @@ TEST(Debris, HeapCountsWhatLiesUnderItsSurface) {
   EXPECT_NEAR(roof.volume, 2 * (2 * half * half + half * half), 0.05 * 2 * 2 * half);
 }
 
-/// Three parts of 1, 1 and 2 t on a footprint of 4 m x 4 m: one inside, one 1 m and one 5 m beyond it towards +x.
+/// Puts a frame behind the others: the bodies at x, y, 1 m high and turned about z.
+void add_frame(record::Record& r, const std::vector<std::array<double, 3>>& x_y_turn) {
+  for (const auto& [x, y, turn] : x_y_turn) {
+    for (const double p : {x, y, 1.0}) r.position.push_back(static_cast<float>(p));
+    for (const double q : {std::cos(turn / 2), 0.0, 0.0, std::sin(turn / 2)})
+      r.orientation.push_back(static_cast<float>(q));
+  }
+  r.time.push_back(static_cast<double>(r.time.size()));
+}
+
+/// Three parts of 1, 1 and 2 t on a footprint of 4 m x 4 m: in the end one inside, one 1 m and one 5 m beyond it
+/// towards +x.
 record::Record make_three() {
   record::Record r;
   r.building_outline = {{0, 0}, {4, 0}, {4, 4}, {0, 4}};
-  const double x[] = {2, 4.5, 8.5};
   for (int b = 0; b < 3; ++b) {
     record::BodyInfo body;
     body.name = std::to_string(b);
     body.mass = b == 0 ? 2000 : 1000;
     body.shapes = {{{}, {0.5, 0.5, 1}, "concrete"}};
     r.bodies.push_back(body);
-    for (const double p : {x[b], 2.0, 1.0}) r.position.push_back(static_cast<float>(p));
-    for (const double q : {1.0, 0.0, 0.0, 0.0}) r.orientation.push_back(static_cast<float>(q));
   }
-  r.time = {0};
+  add_frame(r, {{2, 2, 0}, {2, 2, 0}, {2, 2, 0}});
+  add_frame(r, {{2, 2, 0}, {4.5, 2, 0}, {8.5, 2, 0}});
   return r;
 }
 
 TEST(Reach, CountsTheMassTowardsEachSide) {
   const record::Record r = make_three();
-  const Reach reach = calc_reach(r, 0);
+  const Reach reach = calc_reach(r, 1);
   EXPECT_NEAR(reach.largest, 5, 1e-6);
   EXPECT_NEAR(reach.side[1], 5, 1e-6);
   EXPECT_EQ(reach.side[0], 0);
@@ -78,9 +87,9 @@ TEST(Reach, CountsTheMassTowardsEachSide) {
   EXPECT_EQ(reach.side_most[2], 0);
   EXPECT_EQ(reach.farthest, 2);
   // outlines from the nearest part on: 1 m2, then from x = 1.5 to 5 m
-  EXPECT_NEAR(calc_area(calc_share_outline(r, 0, 0.5)), 1, 1e-6);
-  EXPECT_NEAR(calc_area(calc_share_outline(r, 0, 0.7)), 3.5, 1e-6);
-  EXPECT_NEAR(calc_area(calc_share_outline(r, 0, 1)), 7.5, 1e-6);
+  EXPECT_NEAR(calc_area(calc_share_outline(r, 1, 0.5)), 1, 1e-6);
+  EXPECT_NEAR(calc_area(calc_share_outline(r, 1, 0.7)), 3.5, 1e-6);
+  EXPECT_NEAR(calc_area(calc_share_outline(r, 1, 1)), 7.5, 1e-6);
 }
 
 TEST(DebrisTables, HoldEverySquareAndEveryCorner) {
@@ -94,38 +103,54 @@ TEST(DebrisTables, HoldEverySquareAndEveryCorner) {
 }
 
 /// One part of 1 m x 1 m over a corner or a side of a footprint of 4 m x 4 m.
-record::Record make_one(double x, double y) {
+record::Record make_one(double x, double y, double turn = 0) {
   record::Record r = make_three();
   r.bodies.resize(1);
-  r.position = {static_cast<float>(x), static_cast<float>(y), 1};
-  r.orientation.resize(4);
+  r.time.clear(), r.position.clear(), r.orientation.clear();
+  add_frame(r, {{2, 2, 0}});
+  add_frame(r, {{x, y, turn}});
   return r;
 }
 
 TEST(Reach, IsTheDistanceFromTheFootprintInPlan) {
-  const Reach corner = calc_reach(make_one(6.5, 7.5), 0);  // its farthest corner 3 m and 4 m beyond
+  const Reach corner = calc_reach(make_one(6.5, 7.5), 1);  // its farthest corner 3 m and 4 m beyond
   EXPECT_NEAR(corner.side[1], 3, 1e-6);
   EXPECT_NEAR(corner.side[3], 4, 1e-6);
   EXPECT_NEAR(corner.largest, 5, 1e-6);
   EXPECT_NEAR(corner.most_mass, 5, 1e-6);
-  EXPECT_NEAR(calc_reach(make_one(6.5, 2), 0).largest, 3, 1e-6);
-  EXPECT_EQ(calc_reach(make_one(2, 2), 0).largest, 0);
+  EXPECT_NEAR(calc_reach(make_one(6.5, 2), 1).largest, 3, 1e-6);
+  EXPECT_EQ(calc_reach(make_one(2, 2), 1).largest, 0);
 }
 
 TEST(Reach, IsTheSameWhicheverWaySomethingLies) {
   // a round footprint of 2 m, a part that reaches from it to 10 m along a direction
   for (const double azimuth : {0.0, 0.3, 0.785, 1.2}) {
-    record::Record r = make_one(0, 0);
+    record::Record r = make_one(6 * std::cos(azimuth), 6 * std::sin(azimuth), azimuth);
+    r.position[0] = r.position[1] = 0;  // it stood upright within
     r.building_outline.clear();
     for (int i = 0; i < 64; ++i) {
       const double a = azimuth + i * std::acos(-1.0) / 32;
       r.building_outline.push_back({2 * std::cos(a), 2 * std::sin(a)});
     }
     r.bodies[0].shapes = {{{}, {4, 0, 0.5}, "concrete"}};
-    r.position = {static_cast<float>(6 * std::cos(azimuth)), static_cast<float>(6 * std::sin(azimuth)), 0.5F};
-    r.orientation = {static_cast<float>(std::cos(azimuth / 2)), 0, 0, static_cast<float>(std::sin(azimuth / 2))};
-    EXPECT_NEAR(calc_reach(r, 0).largest, 8, 1e-5) << azimuth;
+    r.orientation[0] = r.orientation[2] = static_cast<float>(std::sqrt(0.5));
+    EXPECT_NEAR(calc_reach(r, 1).largest, 8, 1e-5) << azimuth;
   }
+}
+
+TEST(Reach, LeavesOutWhatStandsBesideTheBuilding) {
+  record::Record r = make_one(6.5, 2);
+  record::BodyInfo post = r.bodies[0];
+  r.bodies.push_back(post);
+  r.time.clear(), r.position.clear(), r.orientation.clear();
+  add_frame(r, {{2, 2, 0}, {-60, 2, 0}});
+  add_frame(r, {{6.5, 2, 0}, {-60, 2, 0}});
+  add_frame(r, {{6.5, 2, 0}, {-62, 2, 0}});  // pushed over
+  EXPECT_NEAR(calc_reach(r, 1).largest, 3, 1e-5);
+  EXPECT_NEAR(calc_reach(r, 1).area, 1, 1e-5);
+  EXPECT_NEAR(calc_reach(r, 2).largest, 3, 1e-5);
+  EXPECT_NEAR(calc_reach(r, 2).side[0], 2, 1e-5);
+  EXPECT_GT(calc_reach(r, 2).area, 60);
 }
 
 TEST(Debris, LowestPointOverAnArea) {

@@ -109,6 +109,21 @@ TEST(Run, CriteriaThatAreNotMetAreSaid) {
   EXPECT_FALSE(is_violated(finding(r, "criterion.debris_reach")));
 }
 
+TEST(Run, ChargesThatAreLeftLeaveLimitsOpen) {
+  const std::string text = house(
+      "[criteria]\nmechanism = \"stands\"\ndebris_reach = \"100 m\"\n[[site.neighbour]]\nname = \"Hall\"\n"
+      "footprint = [[\"60 m\", \"0 m\"], [\"70 m\", \"0 m\"], [\"70 m\", \"10 m\"]]\nclearance = \"1 m\"\n" +
+          charge("C-A*-0", "0.5 s"),
+      "1.5 s");
+  RunOptions o;
+  o.duration = 0.2;
+  const record::Record r = run_plan(read(text), default_knowledge(), o, {});
+  for (const char* id : {"criterion.mechanism", "criterion.debris_reach", "clearance.Hall"}) {
+    EXPECT_EQ(finding(r, id).status, record::Status::NotJudged) << id;
+    EXPECT_THAT(finding(r, id).text, testing::EndsWith("had not fired when the run ended.")) << id;
+  }
+}
+
 TEST(Run, CancellingEndsAtAStepWithARecord) {
   std::atomic<bool> cancel = false;
   RunCallbacks callbacks;
