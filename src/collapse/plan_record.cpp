@@ -49,9 +49,18 @@ void fill_plan_values(const product::Plan& plan, const ModelMap& map, record::Re
     for (size_t i = 0; i < names.size(); ++i) out += fmt::format("{}{} at {:g} m", i ? ", " : "", names[i], at[i]);
     return out;
   };
-  add("Building", "Rows", joined(plan.row_names, plan.row_offsets));
-  add("Building", "Frames", joined(plan.frame_names, plan.frame_offsets));
-  add("Building", "Storeys", std::to_string(plan.storey_heights.size()));
+  if (!plan.row_names.empty()) add("Building", "Rows", joined(plan.row_names, plan.row_offsets));
+  if (!plan.frame_names.empty()) add("Building", "Frames", joined(plan.frame_names, plan.frame_offsets));
+  if (!plan.storey_heights.empty()) add("Building", "Storeys", std::to_string(plan.storey_heights.size()));
+  for (const product::Member& m : plan.members) {
+    if (m.shaft < 0) continue;
+    const product::Shaft& s = plan.shafts[static_cast<size_t>(m.shaft)];
+    add("Building", "Shaft " + m.name,
+        fmt::format(
+            "{:.2f} m high, outer diameter {:.2f} m at the foot and {:.2f} m at the top, shell {:.3g} and {:.3g} cm",
+            m.end.z - m.start.z, s.diameter_foot, s.diameter_top, s.thickness_foot / unit::cm,
+            s.thickness_top / unit::cm));
+  }
   if (!plan.storey_heights.empty())
     add("Building", "Height", fmt::format("{:.2f} m", plan.level(static_cast<int>(plan.storey_heights.size()) - 1)));
   add("Building", "Mass", fmt::format("{:.0f} t", calc_standing_mass(plan) / unit::t));
@@ -72,6 +81,9 @@ void fill_plan_values(const product::Plan& plan, const ModelMap& map, record::Re
     std::string members;
     for (const product::Charge& c : s.charges)
       members += (members.empty() ? "" : ", ") + plan.members[static_cast<size_t>(c.member)].name +
+                 (c.opening > 0 ? fmt::format(" ({:.3g} deg at azimuth {:.3g} deg, {:.2f} m up)", c.opening / unit::deg,
+                                              c.azimuth / unit::deg, c.position)
+                                : "") +
                  (c.fails ? " (fails)" : "");
     add("Blasting", fmt::format("{} at {:g} s", s.name, s.time), members);
   }
@@ -80,6 +92,25 @@ void fill_plan_values(const product::Plan& plan, const ModelMap& map, record::Re
         fmt::format("on {}, pretension {:.0f} kN", plan.members[static_cast<size_t>(c.member)].name,
                     c.pretension / unit::kN));
   add("Site", "Friction and restitution", fmt::format("{:g}, {:g}", plan.ground.friction, plan.ground.restitution));
+  if (plan.vibration)
+    add("Site", "Attenuation of vibration",
+        fmt::format("{:g} mm/s at {:g} MJ and {:g} m, exponents {:g} and {:g}, factor {:g}",
+                    plan.vibration->velocity / unit::mm, plan.vibration->energy * 1e-6, plan.vibration->distance,
+                    plan.vibration->energy_exponent, plan.vibration->distance_exponent, plan.vibration->factor));
+  const product::Criteria& want = plan.criteria;
+  if (want.mechanism) add("Limits", "Mechanism", *want.mechanism);
+  if (want.azimuth)
+    add("Limits", "Direction of fall",
+        fmt::format("{:.4g} deg +- {:.4g} deg", *want.azimuth / unit::deg,
+                    want.azimuth_tolerance.value_or(0) / unit::deg));
+  if (want.debris_reach) add("Limits", "Reach of the debris", fmt::format("at most {:.4g} m", *want.debris_reach));
+  if (want.stands_between_stages)
+    add("Limits", "Between the stages", *want.stands_between_stages ? "it stands" : "it falls");
+  for (const product::Neighbour& n : plan.neighbours) {
+    if (n.clearance) add("Limits", "Clearance of " + n.name, fmt::format("{:.4g} m", *n.clearance));
+    if (n.vibration_limit > 0)
+      add("Limits", "Vibration of " + n.name, fmt::format("{:.4g} mm/s", n.vibration_limit / unit::mm));
+  }
   add("Planned fall", "Azimuth",
       map.is_direction_planned
           ? fmt::format("{:.0f} deg", std::atan2(map.fall_direction.y, map.fall_direction.x) / unit::deg)

@@ -9,6 +9,7 @@
 #include "collapse/findings.h"
 #include "mbs/model_json.h"
 #include "plans.h"
+#include "product/templates.h"
 
 namespace topple::collapse {
 namespace {
@@ -122,6 +123,28 @@ TEST(Run, ChargesThatAreLeftLeaveLimitsOpen) {
     EXPECT_EQ(finding(r, id).status, record::Status::NotJudged) << id;
     EXPECT_THAT(finding(r, id).text, testing::EndsWith("had not fired when the run ended.")) << id;
   }
+}
+
+TEST(Run, TellsTheValuesOfAPlanWithAShaft) {
+  std::vector<Diagnostic> warnings;
+  std::string text = product::find_template("chimney").text;
+  text +=
+      "\n[[site.utility]]\nname = \"Main\"\nfootprint = [[\"-40 m\", \"0 m\"], [\"-38 m\", \"0 m\"], [\"-38 m\", "
+      "\"9 m\"]]\nvibration_limit = \"10 mm/s\"\n";
+  RunOptions o;
+  o.duration = 0.01;
+  const record::Record r = run_plan(product::read_plan(text, "chimney.toml", warnings), default_knowledge(), o, {});
+  const auto value = [&r](const std::string& key) {
+    const auto it =
+        std::find_if(r.plan_values.begin(), r.plan_values.end(), [&key](const auto& v) { return v.key == key; });
+    return it == r.plan_values.end() ? std::string("none") : it->value;
+  };
+  EXPECT_EQ(value("Rows"), "none");
+  EXPECT_EQ(value("Storeys"), "none");
+  EXPECT_THAT(value("Shaft chimney"), testing::StartsWith("60.00 m high, outer diameter 5.00 m at the foot"));
+  EXPECT_THAT(value("Mouth at 0.5 s"), testing::HasSubstr(" deg at azimuth 180 deg, 2.50 m up)"));
+  EXPECT_EQ(value("Vibration of Main"), "10 mm/s");
+  EXPECT_EQ(value("Mechanism"), "topple");
 }
 
 TEST(Run, CancellingEndsAtAStepWithARecord) {
