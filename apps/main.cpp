@@ -17,11 +17,19 @@ namespace {
 
 std::atomic<bool> cancel = false;
 
+bool ignores_hangup = false;  // nohup: the program goes on when its terminal is gone
+
+/// By a terminal, a batch system and a connection that is lost.
+extern "C" void set_endings(void (*handler)(int)) {
+  std::signal(SIGINT, handler);
+  std::signal(SIGTERM, handler);
+  if (!ignores_hangup) std::signal(SIGHUP, handler);
+}
+
 /// The first interrupt ends the run at its next step with its record written; the second one ends the program.
 extern "C" void on_interrupt(int) {
   cancel.store(true, std::memory_order_relaxed);
-  std::signal(SIGINT, SIG_DFL);
-  std::signal(SIGTERM, SIG_DFL);
+  set_endings(SIG_DFL);
 }
 
 /// Of verbs that write whole files at their end: the program ends at once.
@@ -54,8 +62,7 @@ bool heeds_cancel(const topple::apps::Arguments& a) {
 
 int dispatch(const topple::apps::Arguments& a) {
   if (!heeds_cancel(a)) {
-    std::signal(SIGINT, on_interrupt_of_short);
-    std::signal(SIGTERM, on_interrupt_of_short);
+    set_endings(on_interrupt_of_short);
     if (cancel) on_interrupt_of_short(SIGINT);
   }
   using topple::apps::Arguments;
@@ -110,9 +117,9 @@ int dispatch(const topple::apps::Arguments& a) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  std::signal(SIGINT, on_interrupt);
-  std::signal(SIGTERM, on_interrupt);  // batch systems
-  std::signal(SIGXFSZ, SIG_IGN);       // a file that may not grow is an error of its own
+  if (std::signal(SIGHUP, SIG_IGN) == SIG_IGN) ignores_hangup = true;
+  set_endings(on_interrupt);
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of its own
   topple::study::on_waiting([](const std::string& what) {
     std::fprintf(stderr, "%stopple: %s\n", isatty(fileno(stderr)) != 0 ? "\r\x1b[K" : "", what.c_str());
   });

@@ -540,13 +540,18 @@ PY
   has out "FAILED  Record written"; has out "FAILED  Study written"; has out "2 of"; has out "do not trust"; has out "ok      Pendulum"
   expect 1 env TMPDIR="$work/nowhere" "$topple" doctor --json; is_json out; has out '"exit_code": 1'
   # what was not done is not said to have failed
-  for signal in INT TERM; do
+  for signal in INT TERM HUP; do
     "$topple" doctor >out 2>err &
     pid=$!; for _ in $(seq 100); do grep -q "Self-check" out && break; sleep 0.02; done
     kill -$signal $pid; wait $pid; code=$?
     [ $code -eq 1 ] || { echo "exit code $code after an interrupt"; cat out err; failures=$((failures + 1)); }
     has out "Cancelled: "; has out "nothing is said of the others"; lacks out "FAILED"; lacks out "do not trust"
   done
+  # under nohup it goes on when the terminal is gone
+  nohup "$topple" doctor >out 2>err </dev/null &
+  pid=$!; for _ in $(seq 100); do grep -q "Self-check" out && break; sleep 0.02; done
+  kill -HUP $pid; wait $pid; code=$?
+  [ $code -eq 0 ] || { echo "exit code $code under nohup"; cat out err; failures=$((failures + 1)); }
   ;;
 demo)
   expect 2 "$topple" demo here; expect 1 "$topple" demo -o /proc/nowhere
