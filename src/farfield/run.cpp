@@ -237,8 +237,8 @@ class Course {
       h.kind = mbs::Happening::Kind::GroundContact;
       h.time = touchdowns[b] + state_.offset;
       h.index = static_cast<int>(b);
-      h.speed = norm(v.v_WB[b]);
       h.landing = carry_on(b, h.time);
+      if (v.mass[b] > 0) h.speed = std::max(0.0, h.landing.momentum / v.mass[b]);  // of its mass centre
       list.push_back(h);
     }
     std::stable_sort(list.begin(), list.end(),
