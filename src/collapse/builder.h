@@ -3,6 +3,7 @@
 
 #include <array>
 #include <map>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -40,8 +41,9 @@ struct MemberZones {
 
 /// Sectors of a shaft that hold together at a level, about their own centroid.
 struct ShaftElement {
-  nearfield::RingInput ring;        // angles from the shaft's azimuth
+  nearfield::RingInput ring;        // angles from its azimuth
   nearfield::RingProperties whole;  // of it
+  double azimuth = 0;               // of local y, a principal axis of it [rad]
   int stage = -1, charge = -1;      // that destroys it; -1: it stays
   int element = -1;                 // in the model
 };
@@ -55,8 +57,17 @@ struct ShaftJoint {
   std::vector<ShaftElement> elements;
 };
 
+/// What charges that fire leave of a shaft's ring at a level.
+struct MouthLeft {
+  double angle = 0;            // [rad]
+  double azimuth = 0;          // away from its centroid [rad]
+  bool has_direction = false;  // its centroid lies off the axis
+};
+/// None where no charge fires.
+std::optional<MouthLeft> find_mouth_left(const product::Plan&, int member, double at);
+
 struct ShaftModel {
-  double azimuth = 0;              // of local y, towards the first mouth or the planned fall [rad]
+  double azimuth = 0;              // from which angles of sectors count, towards the fall [rad]
   std::vector<ShaftJoint> joints;  // rising
 };
 
@@ -138,6 +149,8 @@ struct Builder : BuilderState {
   void join_wall(int member, const nearfield::PanelRcc&, const Vec3& base, double low, double high, double width,
                  int floor);
   void connect_shaft(int member);
+  void note_mouth(const product::Member&, const product::Shaft&, const ShaftModel&, const ShaftJoint&);
+  const product::Charge& charge_of(const ShaftElement&) const;
   void connect_cables();
   /// Which bodies stand by themselves, on which of these charges act, and what is their upper block.
   void find_structures();

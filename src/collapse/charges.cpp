@@ -91,7 +91,8 @@ void Builder::add_events(std::vector<Firing> schedule) {
     if (is_shaft) {
       fire_shaft(firing, event, lighter);
       applies = [&c, &m](const Part& p) {
-        const double at = std::atan2(p.centre.y - m.start.y, p.centre.x - m.start.x);
+        // a stave in the middle of two charges belongs to one
+        const double at = std::atan2(p.centre.y - m.start.y, p.centre.x - m.start.x) - 1e-7;
         return p.is_solid && product::is_in_sector(at, c.azimuth, c.opening);
       };
     } else if (const auto it = residual.find(element); it == residual.end() || c.residual_bars < it->second) {

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <tuple>
 
 #include "base/error.h"
 #include "base/unit.h"
@@ -56,10 +58,16 @@ void Builder::find_direction() {
     azimuth = *plan.criteria.azimuth;
     map.is_direction_planned = true;
   } else {
+    // where the mouth opens that leaves least of its ring, of those alike the lowest of the first shaft
+    std::optional<std::tuple<double, int, double>> weakest;
     for (const product::Stage& s : plan.stages)
-      for (const product::Charge& c : s.charges)
-        if (member(c.member).kind == MemberKind::Shaft && !product::is_all_around(c.opening) && !c.fails)
-          azimuth = c.azimuth;
+      for (const product::Charge& c : s.charges) {
+        if (member(c.member).kind != MemberKind::Shaft) continue;
+        const std::optional<MouthLeft> left = find_mouth_left(plan, c.member, c.position);
+        if (!left || !left->has_direction) continue;
+        const std::tuple<double, int, double> rank{std::round(left->angle * 1e6), c.member, c.position};
+        if (!weakest || rank < *weakest) weakest = rank, azimuth = left->azimuth;
+      }
     // away from the ground columns that keep standing, along the grid
     Vec3 all, standing;
     int n_all = 0, n_standing = 0;

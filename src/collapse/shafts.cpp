@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <tuple>
 
+#include "base/interpolate.h"
 #include "base/unit.h"
 #include "collapse/builder.h"
 #include "nearfield/shell.h"
@@ -33,13 +36,20 @@ struct Level {
   double high() const { return at + 0.5 * height; }
 };
 
+constexpr double kSameLevel = 1e-6;  // [m]
+
 std::vector<Level> find_levels(const product::Plan& plan, int index) {
   std::vector<Level> out;
   for (const product::Stage& s : plan.stages)
-    for (const product::Charge& c : s.charges)
-      if (c.member == index &&
-          std::none_of(out.begin(), out.end(), [&](const Level& l) { return std::abs(l.at - c.position) < 1e-6; }))
+    for (const product::Charge& c : s.charges) {
+      if (c.member != index) continue;
+      const auto same = std::find_if(out.begin(), out.end(),
+                                     [&](const Level& l) { return std::abs(l.at - c.position) < kSameLevel; });
+      if (same == out.end())
         out.push_back({c.position, c.destroyed_length, true});
+      else
+        same->height = std::max(same->height, c.destroyed_length);
+    }
   for (const product::Weakening& w : plan.members[static_cast<size_t>(index)].weakenings) {
     const auto is_in = [&](const Level& l) { return w.at >= l.low() - 0.01 && w.at <= l.high() + 0.01; };
     if (std::none_of(out.begin(), out.end(), is_in)) out.push_back({w.at, w.height, false});
@@ -66,6 +76,40 @@ std::vector<double> find_edges(const std::vector<std::pair<double, double>>& sec
   return edges;
 }
 
+/// Sectors of a shaft's charges, middle and opening; those that touch and act as one (at a level, in a stage, after a
+/// delay, of one height) as one.
+std::vector<std::pair<double, double>> find_mouths(const product::Plan& plan, int index) {
+  struct Mouth {
+    std::tuple<size_t, double, double, double, bool> alike;
+    double middle = 0, opening = 0;
+  };
+  std::vector<Mouth> mouths;
+  for (size_t stage = 0; stage < plan.stages.size(); ++stage)
+    for (const product::Charge& c : plan.stages[stage].charges)
+      if (c.member == index)
+        mouths.push_back({{stage, c.delay, c.position, c.destroyed_length, c.fails}, c.azimuth, c.opening});
+  const auto join = [&mouths](size_t i, size_t j) {
+    Mouth& a = mouths[i];
+    const Mouth& b = mouths[j];
+    const double apart = std::remainder(b.middle - a.middle, 2 * kPi);
+    if (a.alike != b.alike || std::abs(apart) > 0.5 * (a.opening + b.opening) + 1e-6) return false;
+    const double from = std::min(-0.5 * a.opening, apart - 0.5 * b.opening);
+    const double to = std::max(0.5 * a.opening, apart + 0.5 * b.opening);
+    a.middle += 0.5 * (from + to), a.opening = std::min(to - from, 2 * kPi);
+    mouths.erase(mouths.begin() + static_cast<std::ptrdiff_t>(j));
+    return true;
+  };
+  bool has_joined = true;
+  while (has_joined) {
+    has_joined = false;
+    for (size_t i = 0; i < mouths.size() && !has_joined; ++i)
+      for (size_t j = i + 1; j < mouths.size() && !has_joined; ++j) has_joined = join(i, j);
+  }
+  std::vector<std::pair<double, double>> out;
+  for (const Mouth& m : mouths) out.emplace_back(m.middle, m.opening);
+  return out;
+}
+
 product::Concrete concrete_of_shaft(const product::Plan& plan, const Shaft& s) {
   return s.concrete >= 0 ? plan.concretes[static_cast<size_t>(s.concrete)]
                          : nearfield::make_masonry(s.strength, s.modulus);
@@ -88,20 +132,81 @@ void end_at_contact(mbs::ZoneLaw& law, const nearfield::Rcc& rcc, const nearfiel
   if (height > 0) law.rupture_rotation = std::min(law.rupture_rotation, kClosing * height / (2 * ring.outer));
 }
 
-/// Largest moment about z that presses the side of positive y, under a normal force.
-double find_resistance(const mbs::MomentFamily& f, double N) {
+/// Moments over plastic rotations under a normal force; none outside of the family.
+std::vector<double> find_row(const mbs::MomentFamily& f, bool is_positive, double N) {
   const size_t J = f.plastic_rotation.size();
-  double most = 0;
+  const std::vector<double>& M = is_positive ? f.positive : f.negative;
+  std::vector<double> row(J, 0.0);
   for (size_t n = 0; n + 1 < f.normal_force.size(); ++n) {
     if (N < f.normal_force[n] || N > f.normal_force[n + 1]) continue;
     const double s = (N - f.normal_force[n]) / (f.normal_force[n + 1] - f.normal_force[n]);
-    for (size_t j = 0; j < J; ++j)
-      most = std::max(most, (1 - s) * f.positive[n * J + j] + s * f.positive[(n + 1) * J + j]);
+    for (size_t j = 0; j < J; ++j) row[j] = (1 - s) * M[n * J + j] + s * M[(n + 1) * J + j];
+    break;
   }
-  return most;
+  return row;
+}
+
+/// What resists tipping to one side, under a normal force.
+struct Tipping {
+  std::vector<double> rotation, moment;  // plastic; [N·m]
+  double most() const { return *std::max_element(moment.begin(), moment.end()); }
+};
+
+/// Both moments together, as a zone's limits join them.
+///   angle  of the side that goes down, from local y [rad]
+Tipping find_tipping(const mbs::ZoneLaw& law, double angle, double N) {
+  const double c = std::cos(angle), s = std::sin(angle), p = law.biaxial_exponent;
+  const std::vector<double> about_z = find_row(law.moment_z, c > 0, N), about_y = find_row(law.moment_y, s < 0, N);
+  Tipping out;
+  out.rotation = std::abs(c) > std::abs(s) ? law.moment_z.plastic_rotation : law.moment_y.plastic_rotation;
+  for (const double r : out.rotation) {
+    double use = 0;
+    for (const auto& [part, f, row] :
+         {std::make_tuple(std::abs(c), &law.moment_z, &about_z), std::make_tuple(std::abs(s), &law.moment_y, &about_y)})
+      if (part > 1e-9) use += std::pow(part / std::max(interpolate(f->plastic_rotation, *row, r), 1e-3), p);
+    out.moment.push_back(std::pow(use, -1 / p));
+  }
+  return out;
+}
+
+/// Whether what is let go at once comes to a stop while its zone holds: there its weight has done no more work than the
+/// zone took.
+///   moment, growth  of the weight at the start [N·m] and with the rotation [N·m/rad]
+///   stiffness       of the zone before it yields [N·m/rad]
+///   end             last plastic rotation [rad]
+bool comes_to_a_stop(const Tipping& t, double moment, double growth, double stiffness, double end) {
+  double taken = 0;
+  for (size_t j = 0; j < t.rotation.size() && t.rotation[j] <= end; ++j) {
+    if (j > 0) taken += 0.5 * (t.moment[j] + t.moment[j - 1]) * (t.rotation[j] - t.rotation[j - 1]);
+    const double elastic = t.moment[j] / stiffness, all = t.rotation[j] + elastic;
+    if (taken + 0.5 * t.moment[j] * elastic >= moment * all + 0.5 * growth * all * all) return true;
+  }
+  return false;
 }
 
 }  // namespace
+
+std::optional<MouthLeft> find_mouth_left(const product::Plan& plan, int member, double at) {
+  std::vector<std::pair<double, double>> sectors;
+  for (const product::Stage& s : plan.stages)
+    for (const product::Charge& c : s.charges)
+      if (c.member == member && !c.fails && std::abs(c.position - at) < kSameLevel)
+        sectors.emplace_back(c.azimuth, c.opening);
+  if (sectors.empty()) return std::nullopt;
+  MouthLeft out;
+  double x = 0, y = 0;
+  const std::vector<double> edges = find_edges(sectors, 0);
+  for (size_t i = 0; i < edges.size(); ++i) {
+    const double from = edges[i], to = i + 1 < edges.size() ? edges[i + 1] : edges.front() + 2 * kPi;
+    const auto is_out = [&](const auto& s) { return product::is_in_sector(0.5 * (from + to), s.first, s.second); };
+    if (std::any_of(sectors.begin(), sectors.end(), is_out)) continue;
+    out.angle += to - from;
+    x += std::sin(to) - std::sin(from), y += std::cos(from) - std::cos(to);
+  }
+  out.has_direction = std::hypot(x, y) > 1e-6;
+  if (out.has_direction) out.azimuth = std::atan2(-y, -x);
+  return out;
+}
 
 void Builder::make_shaft(int index) {
   const Member& m = member(index);
@@ -110,13 +215,9 @@ void Builder::make_shaft(int index) {
   ShaftModel& shaft = shafts[index];
   shaft.azimuth = std::atan2(map.fall_direction.y, map.fall_direction.x);
   std::vector<std::pair<double, double>> sectors;  // middle and opening, in W
-  bool has_mouth = false;
   for (const product::Stage& stage : plan.stages)
-    for (const product::Charge& c : stage.charges) {
-      if (c.member != index) continue;
-      sectors.emplace_back(c.azimuth, c.opening);
-      if (!has_mouth && !product::is_all_around(c.opening)) shaft.azimuth = c.azimuth, has_mouth = true;
-    }
+    for (const product::Charge& c : stage.charges)
+      if (c.member == index) sectors.emplace_back(c.azimuth, c.opening);
   for (const product::Weakening& w : m.weakenings) sectors.emplace_back(w.azimuth, w.opening);
 
   // levels: the foot or a mouth above a rigid stump, other mouths and cuts, and between them as far apart as wanted
@@ -158,14 +259,17 @@ void Builder::make_shaft(int index) {
       if (const double height = fixed[i] + length * j / n; is_free(height)) at.push_back(height);
   }
 
-  // staves between the edges of sectors, the same at every height
+  // staves between the edges of mouths and cuts, the same at every height
   std::vector<double> bounds;
   const std::vector<double> edges = find_edges(sectors, shaft.azimuth);
-  if (edges.empty()) {
+  std::vector<std::pair<double, double>> mouths = find_mouths(plan, index);
+  for (const product::Weakening& w : m.weakenings) mouths.emplace_back(w.azimuth, w.opening);
+  const std::vector<double> ends = find_edges(mouths, shaft.azimuth);
+  if (ends.empty()) {
     for (int i = 0; i <= kLeastStaves; ++i) bounds.push_back((i - 0.5) * 2 * kPi / kLeastStaves);
   } else {
-    for (size_t i = 0; i < edges.size(); ++i) {
-      const double from = edges[i], to = i + 1 < edges.size() ? edges[i + 1] : edges.front() + 2 * kPi;
+    for (size_t i = 0; i < ends.size(); ++i) {
+      const double from = ends[i], to = i + 1 < ends.size() ? ends[i + 1] : ends.front() + 2 * kPi;
       const int n = std::max(1, static_cast<int>(std::ceil((to - from) / (2 * kPi / kLeastStaves) - 1e-6)));
       for (int j = 0; j < n; ++j) bounds.push_back(from + (to - from) * j / n);
     }
@@ -266,22 +370,17 @@ void Builder::make_shaft(int index) {
         sector.bars = std::min(sector.bars, 1 - w.cut_bars);
       }
       if (!(sector.concrete > 0) && !(sector.bars > 0 && (s.as_outer > 0 || s.as_inner > 0))) continue;
-      Owner* owner = &owners.front();
+      Owner by;
       for (size_t stage = 0; stage < plan.stages.size(); ++stage)
         for (size_t c = 0; c < plan.stages[stage].charges.size(); ++c) {
           const product::Charge& charge = plan.stages[stage].charges[c];
-          if (charge.member != index || std::abs(charge.position - joint.at) > 1e-6) continue;
-          if (!product::is_in_sector(angle, charge.azimuth, charge.opening)) continue;
-          const auto found = std::find_if(owners.begin(), owners.end(), [&](const Owner& o) {
-            return o.stage == static_cast<int>(stage) && o.charge == static_cast<int>(c);
-          });
-          if (found != owners.end()) {
-            owner = &*found;
-          } else {
-            owners.push_back({static_cast<int>(stage), static_cast<int>(c), {}});
-            owner = &owners.back();
-          }
+          if (charge.member != index || std::abs(charge.position - joint.at) > kSameLevel) continue;
+          if (product::is_in_sector(angle, charge.azimuth, charge.opening))
+            by = {static_cast<int>(stage), static_cast<int>(c), {}};
         }
+      auto owner = std::find_if(owners.begin(), owners.end(),
+                                [&](const Owner& o) { return o.stage == by.stage && o.charge == by.charge; });
+      if (owner == owners.end()) owner = owners.insert(owners.end(), by);
       owner->sectors.push_back(sector);
     }
     for (Owner& o : owners) {
@@ -295,6 +394,7 @@ void Builder::make_shaft(int index) {
       double around = 0;
       for (const nearfield::RingSector& x : e.ring.sectors) around += x.concrete == 1 && x.bars == 1 ? x.angle() : 0;
       if (around > 2 * kPi - 1e-6) e.ring.sectors.clear();
+      e.azimuth = shaft.azimuth + nearfield::turn_to_principal_axes(e.ring);
       e.whole = nearfield::calc_ring_properties(e.ring);
       joint.elements.push_back(std::move(e));
     }
@@ -307,14 +407,19 @@ void Builder::connect_shaft(int index) {
   const Shaft& s = plan.shafts[static_cast<size_t>(m.shaft)];
   const double H = m.end.z - m.start.z;
   ShaftModel& shaft = shafts[index];
-  const Vec3 up{0, 0, 1}, along{std::cos(shaft.azimuth), std::sin(shaft.azimuth), 0}, across = cross(up, along);
-  const Mat3 axes = Mat3::from_columns(up, along, across);
+  const Vec3 up{0, 0, 1};
   for (ShaftJoint& joint : shaft.joints) {
     const double weight = plan.analysis.gravity * product::calc_shaft_mass(plan, s, H, joint.at / H, 1);
     double EA = 0;
-    for (const ShaftElement& e : joint.elements) EA += e.whole.EA;
+    const bool is_mouth = joint.elements.size() > 1;
+    bool fails = false;
+    for (const ShaftElement& e : joint.elements) {
+      EA += e.whole.EA;
+      fails |= e.charge >= 0 && charge_of(e).fails;
+    }
     int number = 0;
     for (ShaftElement& e : joint.elements) {
+      const Vec3 along{std::cos(e.azimuth), std::sin(e.azimuth), 0}, across = cross(up, along);
       const nearfield::Rcc rcc = nearfield::make_ring_rcc(e.ring);
       const double N = -weight * e.whole.EA / EA, l = joint.length;
       // a closed ring bends alike about all axes
@@ -326,11 +431,11 @@ void Builder::connect_shaft(int index) {
       end_at_contact(law, rcc, e.ring, joint.height);
       const Vec3 p_W = m.start + joint.at * up + e.whole.y * along + e.whole.z * across;
       const mbs::LawId id = mbs::add_law(model, law);
-      e.element = add_element(name, index, joint.below, joint.above, p_W, axes, {rcc.EA / l, rcc.GA / l, rcc.GA / l},
-                              {rcc.GJ / l, EI_y / l, EI_z / l}, {{0, id}})
+      e.element = add_element(name, index, joint.below, joint.above, p_W, Mat3::from_columns(up, along, across),
+                              {rcc.EA / l, rcc.GA / l, rcc.GA / l}, {rcc.GJ / l, EI_y / l, EI_z / l}, {{0, id}})
                       .index;
-      const bool is_mouth = joint.elements.size() > 1;
-      if (!is_mouth || e.charge >= 0) continue;
+      // a block turns over one hinge, on what is left of the ring if all charges fire
+      if (!is_mouth || e.charge >= 0 || fails) continue;
       GroundColumn hinge;
       hinge.member = m.name;
       hinge.p_foot = hinge.p_top = p_W;
@@ -339,44 +444,95 @@ void Builder::connect_shaft(int index) {
       hinge.element.law = id;
       hinge.body = joint.above;
       map.ground_columns.push_back(hinge);
-      // once the concrete is out
-      Shaft bare = s;
-      bare.loads.clear();
-      double stays = weight, overturning = -weight * e.whole.y;
-      for (const ShaftElement& mouth : joint.elements) {
-        if (mouth.charge < 0) continue;
-        const product::Charge& c =
-            plan.stages[static_cast<size_t>(mouth.stage)].charges[static_cast<size_t>(mouth.charge)];
-        double share = 0;  // of the ring
-        for (const nearfield::RingSector& x : mouth.ring.sectors) share += x.angle() / (2 * kPi);
-        const double out = c.fails ? 0
-                                   : plan.analysis.gravity * share *
-                                         product::calc_shaft_mass(plan, bare, H, joint.at / H,
-                                                                  (joint.at + 0.5 * c.destroyed_length) / H);
-        stays -= out, overturning -= out * (mouth.whole.y - e.whole.y);
-      }
-      const double resistance = find_resistance(law.moment_z, -stays);
-      double left = 0;
-      for (const nearfield::RingSector& x : e.ring.sectors) left += x.concrete > 0 ? x.angle() : 0;
-      map.notes.push_back(
-          {"The mouth of " + m.name,
-           fmt::format(
-               "The mouth of {} at {:.1f} m leaves {:.0f} deg of the ring. The weight of {:.2f} MN above it turns with "
-               "{:.2f} "
-               "MNm about the centroid of what is left, {:.2f} m behind the axis, which resists with {:.2f} MNm at "
-               "most: it "
-               "{}.",
-               m.name, joint.at, left / unit::deg, stays * 1e-6, overturning * 1e-6, -e.whole.y, resistance * 1e-6,
-               overturning > resistance ? "turns over" : "does not turn over by its weight alone")});
     }
+    note_mouth(m, s, shaft, joint);
   }
+}
+
+/// What the charges at a level leave of the ring, and whether it bears what is above.
+void Builder::note_mouth(const Member& m, const Shaft& s, const ShaftModel& shaft, const ShaftJoint& joint) {
+  const double H = m.end.z - m.start.z, g = plan.analysis.gravity;
+  nearfield::RingInput left;
+  std::vector<nearfield::RingSector> sectors;  // angles from the shaft's azimuth
+  Shaft bare = s;
+  bare.loads.clear();
+  const double weight = g * product::calc_shaft_mass(plan, s, H, joint.at / H, 1);
+  double stays = weight;
+  Vec3 thrown;  // moment of what is thrown out about the shaft's axis [N·m]
+  for (const ShaftElement& e : joint.elements) {
+    left = e.ring;
+    if (e.charge < 0 || charge_of(e).fails) {
+      for (nearfield::RingSector x : e.ring.sectors) {
+        const double from = wrap(x.from + e.azimuth - shaft.azimuth);
+        x.to = from + x.angle(), x.from = from;
+        sectors.push_back(x);
+      }
+      continue;
+    }
+    double share = 0;  // of the ring
+    for (const nearfield::RingSector& x : e.ring.sectors) share += x.angle() / (2 * kPi);
+    const double out =
+        g * share *
+        product::calc_shaft_mass(plan, bare, H, joint.at / H, (joint.at + 0.5 * charge_of(e).destroyed_length) / H);
+    const double c = std::cos(e.azimuth), d = std::sin(e.azimuth);
+    stays -= out, thrown += out * Vec3{e.whole.y * c - e.whole.z * d, e.whole.y * d + e.whole.z * c, 0};
+  }
+  if (stays == weight || sectors.empty()) return;
+  left.sectors = sectors;
+  const double azimuth = shaft.azimuth + nearfield::turn_to_principal_axes(left);
+  // beside charges the concrete is weaker
+  for (const ShaftElement& e : joint.elements)
+    if (e.charge >= 0 && !charge_of(e).fails)
+      left.concrete_loss = std::max(left.concrete_loss, charge_of(e).transition_damage);
+  const nearfield::RingProperties p = nearfield::calc_ring_properties(left);
+  const double c = std::cos(azimuth), d = std::sin(azimuth);
+  const Vec3 centroid{p.y * c - p.z * d, p.y * d + p.z * c, 0};
+  const Vec3 tips = -stays * centroid - thrown;  // towards where what is above goes [N·m]
+  const double moment = norm(tips), way = std::atan2(tips.y, tips.x), off = std::hypot(p.y, p.z);
+
+  const nearfield::Rcc rcc = nearfield::make_ring_rcc(left);
+  double EA = 0;
+  for (const ShaftElement& e : joint.elements) EA += e.whole.EA;
+  const double N = -weight * p.EA / EA;  // before, as of the zone itself
+  const double EI_z = rcc.calc_EI_effective_z(N), EI_y = rcc.calc_EI_effective_y(N);
+  mbs::ZoneLaw law = make_zone_law(rcc, EI_y, EI_z, m.name, k);
+  law.biaxial_exponent = std::clamp(rcc.biaxial_exponent, 1.0, 4.0);
+  end_at_contact(law, rcc, left, joint.height);
+  const Tipping tipping = find_tipping(law, way - azimuth, -stays);
+  const double along_y = std::cos(way - azimuth), along_z = std::sin(way - azimuth);
+  const double stiffness = 1 / (joint.length * (along_y * along_y / EI_z + along_z * along_z / EI_y));
+  const double middle = m.start.z + joint.at;
+  double lever = 0;  // of the weight above, over this level [N·m]
+  for (const ShaftJoint& above : shaft.joints)
+    if (above.at >= joint.at)
+      for (const Part& part : assemblies[static_cast<size_t>(above.above)].parts)
+        lever += g * part.mass * (part.centre.z - middle);
+  const char* verdict = "does not turn over, nor does a rigid block that is let go at once on such a hinge";
+  if (moment > tipping.most())
+    verdict = "turns over";
+  else if (!comes_to_a_stop(tipping, moment, lever, stiffness, law.rupture_rotation))
+    verdict = "does not turn over by its weight alone, but a rigid block that is let go at once on such a hinge does";
+  double degrees = 0;
+  for (const nearfield::RingSector& x : left.sectors) degrees += x.concrete > 0 ? x.angle() / unit::deg : 0;
+  const double towards = std::abs(std::round(wrap(way + 1e-9) / unit::deg));
+  map.notes.push_back(
+      {"The mouth of " + m.name,
+       fmt::format(
+           "The mouth of {} at {:.1f} m leaves {:.0f} deg of the ring. The weight of {:.2f} MN above it turns "
+           "with {:.2f} MNm towards {:.0f} deg about the centroid of what is left, {:.2f} m off the axis, which "
+           "resists with {:.2f} MNm at most: it {}.",
+           m.name, joint.at, degrees, stays * 1e-6, moment * 1e-6, towards, off, tipping.most() * 1e-6, verdict)});
+}
+
+const product::Charge& Builder::charge_of(const ShaftElement& e) const {
+  return plan.stages[static_cast<size_t>(e.stage)].charges[static_cast<size_t>(e.charge)];
 }
 
 void Builder::fire_shaft(const Firing& firing, mbs::Event& event, mbs::Event& lighter) {
   const product::Charge& c = plan.stages[static_cast<size_t>(firing.stage)].charges[static_cast<size_t>(firing.charge)];
   const Member& m = member(c.member);
   for (ShaftJoint& joint : shafts[c.member].joints) {
-    const bool is_here = std::abs(joint.at - c.position) < 1e-6;
+    const bool is_here = std::abs(joint.at - c.position) < kSameLevel;
     for (ShaftElement& e : joint.elements) {
       if (e.element < 0 || !is_here) continue;
       const auto switch_to = [&](mbs::LawId law, double share) {
@@ -417,10 +573,18 @@ void Builder::fire_shaft(const Firing& firing, mbs::Event& event, mbs::Event& li
         ZoneEntry& zone = map.elements[static_cast<size_t>(e.element)];
         zone.firing_time = std::min(zone.firing_time, firing.time);
       } else if (e.charge < 0 && c.transition_damage > 0) {
-        const auto damaged = std::make_tuple(e.element, -1.0, c.transition_damage, c.position);
+        double damage = 0;  // of the charges so far
+        for (const Firing& f : map.schedule) {
+          const product::Charge& other =
+              plan.stages[static_cast<size_t>(f.stage)].charges[static_cast<size_t>(f.charge)];
+          if (!f.fails && f.time <= firing.time && other.member == c.member &&
+              std::abs(other.position - joint.at) < kSameLevel)
+            damage = std::max(damage, other.transition_damage);
+        }
+        const auto damaged = std::make_tuple(e.element, -1.0, damage, c.position);
         if (!cage_laws.count(damaged)) {
           nearfield::RingInput in = e.ring;
-          in.concrete_loss = c.transition_damage;
+          in.concrete_loss = damage;
           const mbs::ZoneElement& was = model.elements[static_cast<size_t>(e.element)];
           const nearfield::Rcc rcc = nearfield::make_ring_rcc(in);
           mbs::ZoneLaw law = make_zone_law(rcc, was.rotational_stiffness.y * joint.length,

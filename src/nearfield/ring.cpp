@@ -156,9 +156,9 @@ RingProperties calc_ring_properties(const RingInput& in) {
   check_ring(in);
   RingProperties p;
   const double E = make_concrete_input(plain_zone(in)).Ec;
-  double weight = 0, my = 0, mz = 0, yy = 0, zz = 0;
+  double weight = 0, my = 0, mz = 0, yy = 0, zz = 0, yz = 0;
   const auto add = [&](double y, double z, double e) {
-    weight += e, my += e * y, mz += e * z, yy += e * y * y, zz += e * z * z;
+    weight += e, my += e * y, mz += e * z, yy += e * y * y, zz += e * z * z, yz += e * y * z;
   };
   bool has_concrete_left = false;
   for (const RingSector& s : sectors_of(in)) has_concrete_left |= s.concrete > 0;
@@ -170,6 +170,7 @@ RingProperties calc_ring_properties(const RingInput& in) {
   p.EA = weight;
   p.y = my / weight, p.z = mz / weight;
   p.EI_y = zz - weight * p.z * p.z, p.EI_z = yy - weight * p.y * p.y;
+  p.EI_yz = yz - weight * p.y * p.z;
   // what is exact round-off of a symmetric section
   if (std::abs(p.y) < 1e-9 * in.outer) p.y = 0;
   if (std::abs(p.z) < 1e-9 * in.outer) p.z = 0;
@@ -177,6 +178,44 @@ RingProperties calc_ring_properties(const RingInput& in) {
   for (const RingSector& s : sectors_of(in)) around += s.concrete > 0 ? s.angle() : 0;
   p.is_closed = around > 2 * pi - 1e-6;
   return p;
+}
+
+std::vector<RingSector> join_sectors(std::vector<RingSector> sectors) {
+  constexpr double touching = 1e-6;  // [rad]
+  std::sort(sectors.begin(), sectors.end(), [](const RingSector& a, const RingSector& b) { return a.from < b.from; });
+  const auto is_alike = [](const RingSector& a, const RingSector& b) {
+    return a.concrete == b.concrete && a.bars == b.bars;
+  };
+  std::vector<RingSector> out;
+  for (const RingSector& s : sectors) {
+    if (!out.empty() && is_alike(out.back(), s) && std::abs(out.back().to - s.from) < touching)
+      out.back().to = s.to;
+    else
+      out.push_back(s);
+  }
+  if (out.size() > 1 && is_alike(out.front(), out.back()) &&
+      std::abs(out.front().from + 2 * pi - out.back().to) < touching) {
+    out.back().to = out.front().to + 2 * pi;
+    out.erase(out.begin());
+  }
+  return out;
+}
+
+double turn_to_principal_axes(RingInput& in) {
+  constexpr double round_off = 1e-9;
+  in.sectors = join_sectors(std::move(in.sectors));
+  const RingProperties p = calc_ring_properties(in);
+  const double line = std::hypot(p.y, p.z) > round_off * in.outer ? std::atan2(p.z, p.y) : 0;
+  double angle = line;
+  const double apart = p.EI_z - p.EI_y;
+  if (std::hypot(2 * p.EI_yz, apart) > round_off * (p.EI_y + p.EI_z)) {
+    const double principal = 0.5 * std::atan2(2 * p.EI_yz, apart);
+    const double off = std::remainder(principal - line, 0.5 * pi);
+    if (std::abs(off) > 1e-6) angle += off;
+  }
+  if (std::cos(angle) < -round_off) angle -= std::copysign(pi, angle);
+  for (RingSector& s : in.sectors) s.from -= angle, s.to -= angle;
+  return angle;
 }
 
 Fibres make_ring_fibres(const RingInput& in, Axis axis, int direction, double y, double z) {

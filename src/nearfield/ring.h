@@ -36,10 +36,19 @@ struct RingProperties {
   double y = 0, z = 0;              // centroid of the transformed section [m]
   double EA = 0;                    // [N]
   double EI_y = 0, EI_z = 0;        // about axes through the centroid along y and z [N·m²]
+  double EI_yz = 0;                 // ∫ E y z dA about the centroid; 0: y and z are principal axes [N·m²]
   bool is_closed = false;           // a whole ring
 };
 /// Throws InputError for a ring that cannot be computed, or nothing left of it.
 RingProperties calc_ring_properties(const RingInput&);
+
+/// Sectors in rising order, neighbours that are alike as one, also across the beginning of the circle.
+std::vector<RingSector> join_sectors(std::vector<RingSector>);
+
+/// Turns local y into the principal axis of what is left that is nearest to the line through its centroid and the
+/// ring's centre (of a symmetric arc, its axis of symmetry; of a whole ring, as it is), pointing forward as before, and
+/// says by how much [rad]. Sectors become joined ones. Throws InputError as calc_ring_properties.
+double turn_to_principal_axes(RingInput&);
 
 /// Layers across y (Axis::Z) or z (Axis::Y), measured from (y, z) of the ring's centre; `direction` +1 pulls at
 /// positive `at`: half_depth is the distance of the compressed edge.

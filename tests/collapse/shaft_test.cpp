@@ -469,5 +469,100 @@ TEST(ShaftPhysics, TheRigidBlockHasTheMassAboveItsMouth) {
   EXPECT_NE(top.find(std::to_string(std::lround(10 * t)) + " t on a plastic hinge"), std::string::npos) << top;
 }
 
+/// Charges of a tower at a level, in the order given: azimuth and opening [deg], and what else they have.
+std::string charges(const std::vector<std::pair<double, double>>& sectors, const std::string& at = "2 m",
+                    const std::string& more = "") {
+  std::string text;
+  for (const auto& [azimuth, opening] : sectors)
+    text += fmt::format(
+        "[[stage.charge]]\nmembers = \"tower\"\nposition = \"{}\"\ndestroyed_length = \"1.5 m\"\nazimuth = \"{} "
+        "deg\"\nopening = \"{} deg\"\n{}",
+        at, azimuth, opening, more);
+  return text;
+}
+
+const std::string one_stage = "[[stage]]\ntime = \"0.2 s\"\n";
+const std::string wide = "height = \"40 m\"\ndiameter = \"4 m\"\nthickness = \"30 cm\"\nas_outer = \"6 cm2/m\"\n";
+
+/// A mouth of 184 deg towards 37 deg as one charge and as several.
+const std::vector<std::vector<std::pair<double, double>>> splits = {{{37, 184}},
+                                                                    {{-9, 92}, {83, 92}},
+                                                                    {{83, 92}, {-9, 92}},
+                                                                    {{-32, 46}, {106, 46}, {60, 46}, {14, 46}},
+                                                                    {{-29, 52}, {37, 80}, {103, 52}}};
+
+TEST(Shaft, AMouthIsTheSameInHoweverManyChargesItIsListed) {
+  const Built whole(tower(wide, one_stage + charges(splits[0]), "1 s"));
+  ASSERT_EQ(whole.map.ground_columns.size(), 1u);
+  const auto law_of = [](const Built& b) -> const mbs::ZoneLaw& {
+    return b.model.laws[static_cast<size_t>(b.map.ground_columns[0].element.law.index)];
+  };
+  const auto most = [](const std::vector<double>& m) { return *std::max_element(m.begin(), m.end()); };
+  for (const auto& split : splits) {
+    const Built b(tower(wide, one_stage + charges(split), "1 s"));
+    EXPECT_EQ(b.map.notes.front().text, whole.map.notes.front().text);
+    EXPECT_NEAR(norm(b.map.ground_columns[0].p_top - whole.map.ground_columns[0].p_top), 0, 1e-9);
+    for (const auto family : {&mbs::ZoneLaw::moment_y, &mbs::ZoneLaw::moment_z})
+      EXPECT_NEAR(most((law_of(b).*family).positive), most((law_of(whole).*family).positive),
+                  1e-6 * most((law_of(whole).*family).positive));
+    EXPECT_NEAR(b.map.fall_direction.y / b.map.fall_direction.x, std::tan(37 * unit::deg), 1e-9);
+    ASSERT_EQ(b.map.bodies.size(), whole.map.bodies.size());
+    for (size_t i = 0; i < b.map.bodies.size(); ++i)
+      EXPECT_EQ(b.map.bodies[i].shapes.size(), whole.map.bodies[i].shapes.size()) << b.map.bodies[i].name;
+    double thrown = 0, all = 0;
+    for (const DebrisEntry& d : b.map.debris) thrown += d.mass;
+    for (const DebrisEntry& d : whole.map.debris) all += d.mass;
+    EXPECT_NEAR(thrown, all, 1e-9 * all);
+  }
+}
+
+TEST(ShaftPhysics, AMouthThatIsSplitIntoChargesFallsAsOne) {
+  const auto lean = [](const std::vector<std::pair<double, double>>& split) {
+    const Built b(tower(wide, one_stage + charges(split), "9 s"));
+    const Fall f = fall(b.model, 6.5, 0.1);
+    return std::abs(f.angle.back());
+  };
+  const double whole = lean(splits[0]);
+  EXPECT_GT(whole, 0.3) << "it does not fall";
+  for (size_t i : {1UL, 3UL}) EXPECT_NEAR(lean(splits[i]), whole, 1e-3 * whole) << i;
+}
+
+TEST(Shaft, EachMouthIsJudgedTowardsItsOwnSide) {
+  const std::string low = charges({{0, 190}}, "2 m"), high = charges({{90, 220}}, "20 m");
+  const Built b(tower(wide, one_stage + low + high, "1 s")), other(tower(wide, one_stage + high + low, "1 s"));
+  ASSERT_GE(b.map.notes.size(), 2u);
+  EXPECT_THAT(b.map.notes[0].text, testing::HasSubstr("MNm towards 0 deg"));
+  EXPECT_THAT(b.map.notes[1].text, testing::HasSubstr("MNm towards 90 deg"));
+  EXPECT_THAT(b.map.notes[1].text, testing::Not(testing::HasSubstr(" 0.00 MNm")));
+  for (size_t i : {0UL, 1UL}) EXPECT_EQ(other.map.notes[i].text, b.map.notes[i].text);
+  // each alone says the same
+  EXPECT_EQ(Built(tower(wide, one_stage + low, "1 s")).map.notes[0].text, b.map.notes[0].text);
+  EXPECT_EQ(Built(tower(wide, one_stage + high, "1 s")).map.notes[0].text, b.map.notes[1].text);
+}
+
+TEST(Shaft, ChargesThatFailOpenNoMouth) {
+  const Built none(tower(wide, one_stage + charges({{0, 220}}, "2 m", "fails = true\n"), "1 s"));
+  for (const ModelNote& note : none.map.notes)
+    EXPECT_THAT(note.text, testing::Not(testing::StartsWith("The mouth of")));
+  const Built half(
+      tower(wide, one_stage + charges({{-55, 110}}) + charges({{55, 110}}, "2 m", "fails = true\n"), "1 s"));
+  EXPECT_EQ(half.map.notes.front().text,
+            Built(tower(wide, one_stage + charges({{-55, 110}}), "1 s")).map.notes.front().text);
+}
+
+TEST(Shaft, TheNoteOnItsMouthSaysWhatAReleaseAtOnceDoes) {
+  // in runs it stands over 205 deg and turns over 210 deg
+  const auto note = [](double opening) {
+    return Built(tower("height = \"20 m\"\ndiameter = \"6 m\"\nthickness = \"30 cm\"\nas_outer = \"8 cm2/m\"\n"
+                       "as_inner = \"8 cm2/m\"\n",
+                       one_stage + charges({{0, opening}}), "1 s"))
+        .map.notes.front()
+        .text;
+  };
+  EXPECT_THAT(note(190), testing::HasSubstr("it does not turn over, nor does a rigid block that is let go at once"));
+  EXPECT_THAT(note(225), testing::HasSubstr("does not turn over by its weight alone, but a rigid block"));
+  EXPECT_THAT(note(245), testing::HasSubstr("at most: it turns over."));
+}
+
 }  // namespace
 }  // namespace topple::collapse

@@ -170,5 +170,29 @@ TEST(Ring, BarsLeftByAChargeAreTheirShareOfThePull) {
   EXPECT_LT(cage.compression.force.front(), 0.1 * cage.tension.force.front());  // 2 m of 12 mm buckle
 }
 
+TEST(Ring, TurnsToThePrincipalAxesOfWhatIsLeft) {
+  // an arc, in pieces and across the beginning of the circle
+  RingInput arc = chimney_ring();
+  arc.sectors = {{0, 0.9, 1, 1}, {0.9, 1.2, 1, 1}, {2 * pi - 1, 2 * pi, 1, 1}};
+  const RingProperties before = calc_ring_properties(arc);
+  EXPECT_GT(std::abs(before.EI_yz), 0.01 * before.EI_y);
+  EXPECT_NEAR(turn_to_principal_axes(arc), 0.1, 1e-9);
+  ASSERT_EQ(arc.sectors.size(), 1u);
+  EXPECT_NEAR(arc.sectors[0].angle(), 2.2, 1e-12);
+  const RingProperties p = calc_ring_properties(arc);
+  EXPECT_NEAR(p.EI_yz, 0, 1e-9 * p.EI_y);
+  EXPECT_NEAR(p.z, 0, 1e-9);
+  EXPECT_NEAR(p.y, std::hypot(before.y, before.z), 1e-6);
+  // a mouth beside a gap: no axis of symmetry
+  RingInput two = chimney_ring();
+  two.sectors = {{0.9, 1.2, 1, 1}, {2.0, 5.5, 1, 0.5}};
+  turn_to_principal_axes(two);
+  const RingProperties q = calc_ring_properties(two);
+  EXPECT_NEAR(q.EI_yz, 0, 1e-9 * q.EI_y);
+  EXPECT_GT(std::abs(q.z), 0.01);
+  RingInput whole = chimney_ring();
+  EXPECT_EQ(turn_to_principal_axes(whole), 0);
+}
+
 }  // namespace
 }  // namespace topple::nearfield
