@@ -63,7 +63,7 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
   const bool touched = std::isfinite(in.touchdown);
   const BlockFrame at = touched ? find_block(in.frames, in.touchdown) : last;
   out.time = touched ? in.touchdown : last.time;
-  out.moved = last.moved;
+  out.moved = last.down;
   out.run = last.centre - in.frames.front().centre;
   out.run.z = 0;
 
@@ -75,10 +75,18 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
   out.tilt = norm(Vec3{turned.x, turned.y, 0});
   const Mat3 R = to_matrix(at.rotation);
   const auto drop_of = [&](const Vec3& arm) { return -(at.displacement + R * arm - arm).z; };
-  const double front = drop_of(calc_reach(in.outline, direction) * direction);
-  const double rear = drop_of(-calc_reach(in.outline, -direction) * direction);
+  const auto share_at = [&](double below) {
+    const Vec3 down{0, 0, -below};
+    const double front = drop_of(calc_reach(in.outline, direction) * direction + down);
+    const double rear = drop_of(-calc_reach(in.outline, -direction) * direction + down);
+    return front > 1e-3 ? std::max(0.0, rear) / front : 1;
+  };
   out.drop = -at.displacement.z;
-  out.rear_share = front > 1e-3 ? std::max(0.0, rear) / front : 1;
+  out.rear_share = share_at(0);
+  out.foot_share = share_at(std::max(0.0, at.above - in.foot));
+  // a slender block that turns about its foot lowers both edges alike at its mass centre
+  const bool drops = out.rear_share >= k.mechanism_topple_rear_share && out.tilt < k.mechanism_topple_rotation;
+  const bool turns_about_foot = drops && out.foot_share < k.mechanism_topple_rear_share;
   double off = std::atan2(direction.y, direction.x) - std::atan2(in.fall_direction.y, in.fall_direction.x);
   off = std::remainder(off, 2 * pi);
 
@@ -131,7 +139,7 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
     out.name = "progressive";
     out.text = fmt::format("Progressive collapse: the largest connected part holds {:.0f} % of the upper mass; {}.",
                            100 * at.connected, motion);
-  } else if (out.rear_share >= k.mechanism_topple_rear_share && out.tilt < k.mechanism_topple_rotation) {
+  } else if (drops && !turns_about_foot) {
     out.name = "vertical";
     out.text = fmt::format("It comes down vertically (telescoping): {}.", motion);
   } else if (std::abs(off) > (in.direction_tolerance > 0 ? in.direction_tolerance : k.mechanism_direction_tolerance) &&
@@ -142,6 +150,10 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
     out.name = "topple";
     out.text = fmt::format("It topples: {}.", motion);
   }
+  if (turns_about_foot && (out.name == "topple" || out.name == "wrong direction"))
+    out.text += fmt::format(
+        " At its foot the rear edge has come down {:.0f} % as far as the front edge: it turns about its foot.",
+        100 * out.foot_share);
   out.is_final = in.came_to_rest || (touched && out.moved >= k.mechanism_partial_share && height_left <= 0.5);
   out.is_azimuth_of_lean = out.name == "topple" || out.name == "wrong direction";
   const Vec3& way = out.is_azimuth_of_lean ? direction : out.run;

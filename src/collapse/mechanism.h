@@ -16,8 +16,10 @@ struct BlockFrame {
   double time = 0;       // [s]
   Quat rotation;         // mass-weighted mean rotation of the block since the start
   Vec3 displacement;     // of the block's mass centre since the start [m]
+  double above = 0;      // height of the block's mass centre at the start [m]
   double connected = 1;  // mass of the block over the mass of all upper bodies
-  double moved = 0;      // share of all moving mass of the structure that has come down
+  double moved = 0;      // share of all moving mass of the structure that has gone farther than it may, to any side
+  double down = 0;       // share of it that has come down
   double forward = 0;    // share of the upper mass that turned by more than mechanism.fold_rotation about the axis
   double backward = 0;   // the same against it
   double height = 0;     // of the mass centre of all moving mass of the structure [m]
@@ -33,6 +35,7 @@ struct MechanismInput {
   bool is_direction_planned = false;
   double direction_tolerance = 0;  // [rad]
   Polygon outline;                 // of the upper block seen from above, from its mass centre; convex [m]
+  double foot = 0;                 // height of the upper block's underside at the start [m]
   double storey_height = 0;        // of the ground storey [m]
   bool came_to_rest = false;
   bool is_under_way = false;  // the run goes on; for the words
@@ -44,8 +47,9 @@ struct Mechanism {
   double time = 0;        // of judgement: first touchdown of the upper block, else the end [s]
   double tilt = 0;        // then, towards the direction [rad]
   double rear_share = 0;  // then, drop of the rear edge over that of the front edge
+  double foot_share = 0;  // the same at the block's underside, which rotation about a foot does not bring down
   double drop = 0;        // then, of the block's mass centre [m]
-  double moved = 0;       // at the end, share of the moving mass
+  double moved = 0;       // at the end, share of the moving mass that has come down
   // the way the block leans then, if it topples; else the way the mass centre moved, NaN below half a metre [rad]
   double azimuth = 0;
   bool is_azimuth_of_lean = false;

@@ -35,14 +35,20 @@ Mechanism judge_run(const product::Plan& plan, const mbs::Model& model, const Mo
   std::vector<double> mass(S, 0);
   std::vector<Vec3> centre(S);
   std::vector<std::vector<Point2>> corners(S);
+  std::vector<double> foot(S, std::numeric_limits<double>::infinity());
   for (size_t b = 0; b < model.bodies.size(); ++b) {
     if (!map.bodies[b].is_upper) continue;
     const size_t structure = static_cast<size_t>(map.bodies[b].structure);
     const mbs::Body& body = model.bodies[b];
     mass[structure] += body.mass;
     centre[structure] += body.mass * body.X_WB.p;
-    for (const record::BoxShape& s : map.bodies[b].shapes)
-      for (const Point2& p : calc_outline({body.X_WB * s.X_BS, s.half})) corners[structure].push_back(p);
+    for (const record::BoxShape& s : map.bodies[b].shapes) {
+      const PlacedBox box{body.X_WB * s.X_BS, s.half};
+      for (const Point2& p : calc_outline(box)) corners[structure].push_back(p);
+      const Mat3 R = to_matrix(box.X_WS.q);
+      foot[structure] = std::min(foot[structure], box.X_WS.p.z - std::abs(R(2, 0)) * s.half.x -
+                                                      std::abs(R(2, 1)) * s.half.y - std::abs(R(2, 2)) * s.half.z);
+    }
   }
   std::vector<std::string> names;
   std::vector<Mechanism> verdicts;
@@ -53,6 +59,7 @@ Mechanism judge_run(const product::Plan& plan, const mbs::Model& model, const Mo
     if (mass[s] > 0) centre[s] = (1 / mass[s]) * centre[s];
     for (Point2& p : corners[s]) p = {p[0] - centre[s].x, p[1] - centre[s].y};
     in.outline = calc_hull(std::move(corners[s]));
+    in.foot = std::isfinite(foot[s]) ? foot[s] : 0;
     names.push_back(map.structures[s].name);
     verdicts.push_back(judge_mechanism(in, k));
     masses.push_back(map.structures[s].mass);

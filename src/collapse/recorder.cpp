@@ -205,10 +205,13 @@ std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) const {
   for (size_t b = 0; b < B; ++b) {
     if (model_.bodies[b].fixed) continue;
     const double m = v.mass[b];
+    const double fall = start_[b].p.z - v.X_WB[b].p.z;
     const bool has_moved = norm(v.X_WB[b].p - start_[b].p) > far;
+    // what is low cannot fall far: half of its height
+    const bool is_down = has_moved && fall > std::min(far, 0.5 * start_[b].p.z);
     if (map_.bodies[b].structure < 0) {
       beside += m;
-      if (has_moved) beside_moved += m;
+      if (is_down) beside_moved += m;
       continue;
     }
     const size_t s = static_cast<size_t>(map_.bodies[b].structure);
@@ -216,6 +219,7 @@ std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) const {
     moving[s] += m;
     f.centre += m * v.X_WB[b].p;
     if (has_moved) f.moved += m;
+    if (is_down) f.down += m;
     if (!map_.bodies[b].is_upper) continue;
     upper[s] += m;
     group[static_cast<size_t>(find_root(parent, static_cast<int>(b)))] += m;
@@ -232,6 +236,7 @@ std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) const {
       f.centre *= 1 / moving[s];
       f.height = f.centre.z;
       f.moved = f.moved / moving[s];
+      f.down = f.down / moving[s];
     }
     if (!(upper[s] > 0)) continue;
     f.forward = f.forward / upper[s];
@@ -244,14 +249,17 @@ std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) const {
     f.connected = group[largest] / upper[s];
     std::vector<FitBody> block;
     Vec3 shift;
+    double above = 0;
     for (size_t b = 0; b < B; ++b) {
       if (!is_upper(static_cast<int>(b)) || find_root(parent, static_cast<int>(b)) != static_cast<int>(largest))
         continue;
       block.push_back({v.mass[b], model_.bodies[b].inertia, start_[b], v.X_WB[b]});
       shift += v.mass[b] * (v.X_WB[b].p - start_[b].p);
+      above += v.mass[b] * start_[b].p.z;
     }
     f.rotation = fit_rotation(block);
     f.displacement = (1 / group[largest]) * shift;
+    f.above = above / group[largest];
   }
   return out;
 }

@@ -25,7 +25,7 @@ MechanismInput synthetic(double tilt_at_touchdown, double drop_of_rear, double m
     f.rotation = exp_rotation({0, -a, 0});
     // the rear edge 6 m behind the mass centre comes down by drop_of_rear
     f.displacement = {-6 * (1 - std::cos(a)), 0, -6 * std::sin(a) - drop_of_rear * i};
-    f.moved = moved * i / 2;
+    f.moved = f.down = moved * i / 2;
     f.height = 12 - 4 * i;
     f.centre = {6 - 3.0 * i * (tilt_at_touchdown != 0), 0, f.height};
     in.frames.push_back(f);
@@ -174,6 +174,37 @@ TEST(Mechanism, WhatDropsFallsTheWayItsMassGoes) {
   EXPECT_NEAR(judge_mechanism(in, default_knowledge()).azimuth, std::acos(0.0), 1e-12);
   in.frames.back().centre.y = 0.4;
   EXPECT_TRUE(std::isnan(judge_mechanism(in, default_knowledge()).azimuth));
+}
+
+/// A rod that turns about its foot, 20 m below its mass centre and 1.4 m behind its axis, then comes down by `drop`.
+MechanismInput turning_rod(double tilt, double drop) {
+  MechanismInput in = synthetic(0, 0, 1);
+  in.outline = {{-2, -2}, {2, -2}, {2, 2}, {-2, 2}};
+  in.foot = 1;
+  for (BlockFrame& f : in.frames) {
+    const double a = tilt * f.time, c = std::cos(a), s = std::sin(a);
+    f.rotation = exp_rotation({0, -a, 0});
+    f.above = 21;
+    f.displacement = {1.4 * (1 - c) - 20 * s, 0, -20 * (1 - c) - 1.4 * s - drop * f.time};
+  }
+  return in;
+}
+
+TEST(Mechanism, ASlenderBlockThatTurnsAboutItsFootTopples) {
+  const Mechanism m = judge_mechanism(turning_rod(0.7, 0), default_knowledge());
+  EXPECT_GT(m.rear_share, 0.5) << "its mass centre comes down with both edges";
+  EXPECT_EQ(m.foot_share, 0);
+  EXPECT_EQ(m.name, "topple");
+  EXPECT_THAT(m.text, testing::HasSubstr("it turns about its foot"));
+  // the same lean while it drops through its foot
+  EXPECT_EQ(judge_mechanism(turning_rod(0.7, 6), default_knowledge()).name, "vertical");
+  EXPECT_EQ(judge_mechanism(turning_rod(0.02, 3), default_knowledge()).name, "vertical");
+}
+
+TEST(Mechanism, WhatSwaysFarHasNotComeDown) {
+  MechanismInput in = swaying(1.5, 0.02);
+  for (BlockFrame& f : in.frames) f.height = f.centre.z = 100, f.moved = 0.3;
+  EXPECT_EQ(name_of(in), "stands");
 }
 
 TEST(Mechanism, TwoPartsTurningAgainstEachOtherFold) {

@@ -564,5 +564,27 @@ TEST(Shaft, TheNoteOnItsMouthSaysWhatAReleaseAtOnceDoes) {
   EXPECT_THAT(note(245), testing::HasSubstr("at most: it turns over."));
 }
 
+TEST(ShaftPhysics, WhatOnlyLeansHasNotComeDown) {
+  const record::Record r = run_plan(read(tower(slender + "as_outer = \"6 cm2/m\"\n", mouth("2 m", "220 deg"), "2.5 s")),
+                                    default_knowledge(), {}, {});
+  double farthest = 0;
+  for (size_t b = 0; b < r.bodies.size(); ++b)
+    farthest = std::max(farthest, norm(record::pose_at(r, r.time.size() - 1, b).p - record::pose_at(r, 0, b).p));
+  EXPECT_GT(farthest, 0.6);
+  for (const record::Finding& f : r.findings)
+    if (f.id == "mechanism") {
+      EXPECT_THAT(f.text, testing::Not(testing::HasSubstr("of the mass has come down"))) << farthest;
+    }
+}
+
+TEST(ShaftPhysics, AShaftThatTurnsOverAMouthAtItsFootTopples) {
+  std::string foot = mouth("2 m", "220 deg");
+  foot.replace(foot.find("2.5 m"), 5, "1 m");
+  const record::Record r =
+      run_plan(read(tower(wide + "as_inner = \"6 cm2/m\"\n", foot, "8 s")), default_knowledge(), {}, {});
+  for (const record::Finding& f : r.findings)
+    if (f.id == "mechanism") { EXPECT_EQ(f.title, "Mechanism: topple") << f.text; }
+}
+
 }  // namespace
 }  // namespace topple::collapse

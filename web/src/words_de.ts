@@ -21,6 +21,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["The run is under way: this is how it stands at {:.2f} s.", "Die Rechnung läuft noch: So steht es bei {} s."],
   ["at the end, {:.2f} s", "Am Ende, bei {} s"],
   ["{*}, it leans by {:.1f} deg, its mass centre has come down by {:.2f} m, and its rear edge {:.0f} % as far as its front edge. {} {:.0f} % of the mass has come down", "{}, neigt er sich um {} deg, sein Schwerpunkt ist um {} m gefallen und seine hintere Kante um {} % so weit wie seine vordere. {} sind {} % der Masse heruntergekommen"],
+  ["At its foot the rear edge has come down {:.0f} % as far as the front edge: it turns about its foot.", "An seinem Fuß ist die hintere Kante um {} % so weit heruntergekommen wie die vordere: Er dreht sich um seinen Fuß."],
   ["The building stands: {:.1f} % of its mass came down.", "Das Gebäude bleibt stehen: {} % seiner Masse kamen herunter."],
   ["It has begun to sink: the upper block has come down by {:.2f} m.", "Es hat begonnen zu sinken: Der obere Block ist um {} m heruntergekommen."],
   ["It leans: the mass centre of the upper block has moved to a side by {:.2f} m.", "Es neigt sich: Der Schwerpunkt des oberen Blocks hat sich um {} m zur Seite bewegt."],
