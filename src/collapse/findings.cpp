@@ -97,6 +97,18 @@ std::pair<double, double> calc_distances_at_end(const Context& c, size_t body, c
   return {least, most};
 }
 
+/// Decimals that an angle that was asked for needs.
+int find_digits(double angle) {
+  constexpr int most = 6;
+  int digits = 0;
+  const double degrees = angle / unit::deg;
+  for (double scale = 1; digits < most && std::abs(std::round(degrees * scale) / scale - degrees) > 1e-9; scale *= 10)
+    ++digits;
+  return digits;
+}
+
+std::string fixed_words(double value, int digits) { return fmt::format("{:.{}f}", value, digits); }
+
 std::string azimuth_words(double azimuth, int digits = 0) {
   double degrees = azimuth / unit::deg;
   if (degrees < -0.5) degrees += 360;
@@ -111,9 +123,11 @@ std::pair<std::string, std::string> tell_apart(double value, double limit, int d
   return {tell(value), tell(limit)};
 }
 
-/// Whether it is asked to stand, and leans as far as it does only because it sways.
-bool may_stand(const Context& c, const Mechanism& m) {
-  return c.plan.criteria.mechanism == "stands" && m.may_swing_back;
+/// Whether what is not as it was asked may still become so: not what is over, has gone the wrong way, or was to stand
+/// and does not.
+bool may_become(const Context& c, const Mechanism& m) {
+  if (m.is_final || m.name == "wrong direction") return false;
+  return c.plan.criteria.mechanism != "stands" || m.name == "stands" || m.may_swing_back;
 }
 
 void add_mechanism(const Context& c, const Mechanism& m) {
@@ -122,7 +136,7 @@ void add_mechanism(const Context& c, const Mechanism& m) {
   if (c.plan.criteria.mechanism) status = *c.plan.criteria.mechanism == m.name ? Status::Good : Status::Bad;
   if (c.is_under_way) status = Status::Info;
   if (status == Status::Good && !m.is_final) status = Status::NotJudged;
-  if (status == Status::Bad && may_stand(c, m)) status = Status::NotJudged;
+  if (status == Status::Bad && c.plan.criteria.mechanism && may_become(c, m)) status = Status::NotJudged;
   c.add("mechanism", "Mechanism", (c.is_under_way ? "Mechanism so far: " : "Mechanism: ") + m.name, m.text, m.tilt,
         "rad", status);
 }
@@ -231,7 +245,8 @@ Reach add_debris(const Context& c, const Mechanism& m) {
                                                           azimuth_words(m.azimuth))
                                             : "The mass centre moved towards " + azimuth_words(m.azimuth);
     if (c.map.is_direction_planned)
-      text += fmt::format(", {:.0f} deg from the planned {}", std::abs(off) / unit::deg, azimuth_words(planned));
+      text += fmt::format(", {} deg from the planned {}", fixed_words(std::abs(off) / unit::deg, find_digits(planned)),
+                          azimuth_words(planned, find_digits(planned)));
     text += " (0 deg is +x, counter-clockwise).";
     if (m.is_azimuth_of_lean)
       text += fmt::format(" The mass centre moved by {:.1f} m towards {}.", norm(m.run),
@@ -588,44 +603,50 @@ void add_stubs(const Context& c) {
 
 void add_criteria(const Context& c, const Mechanism& m, const Standing& standing, const Reach& reach) {
   const product::Criteria& want = c.plan.criteria;
-  // why: what was asked is so as yet, but may change
+  // why: it may still change
   const auto judge_one = [&](const std::string& id, const std::string& title, bool met, const std::string& text,
-                             double value, const std::string& unit, const std::string& why = "") {
-    c.add("criterion." + id, "Criteria", title, met ? text + why : text, value, unit,
-          !met           ? Status::Bad
-          : !why.empty() ? Status::NotJudged
-                         : Status::Good);
+                             double value, const std::string& unit, const std::string& why) {
+    c.add("criterion." + id, "Criteria", title, text + why, value, unit,
+          !why.empty() ? Status::NotJudged
+          : met        ? Status::Good
+                       : Status::Bad);
   };
-  const std::string falls_on = c.charges_left > 0 ? kNotJudged + tell_charges_left(c)
-                               : m.is_final
-                                   ? ""
-                                   : fmt::format("{}it still came down or swayed when the run ended.", kNotJudged);
-  if (want.mechanism)
-    judge_one("mechanism", "Mechanism", m.name == *want.mechanism || may_stand(c, m),
-              fmt::format("Asked: {}; found: {}.", *want.mechanism, m.name), kNone, "", falls_on);
+  const auto falls_on = [&](bool met) -> std::string {
+    if (met ? m.is_final && c.charges_left == 0 : !may_become(c, m)) return "";
+    if (c.charges_left > 0) return kNotJudged + tell_charges_left(c);
+    return fmt::format("{}it still came down or swayed when the run ended.", kNotJudged);
+  };
+  if (want.mechanism) {
+    const bool met = m.name == *want.mechanism;
+    judge_one("mechanism", "Mechanism", met, fmt::format("Asked: {}; found: {}.", *want.mechanism, m.name), kNone, "",
+              falls_on(met));
+  }
   if (want.azimuth) {
     const double off = std::abs(std::remainder(m.azimuth - *want.azimuth, 2 * kPi));
     const double tolerance = want.azimuth_tolerance.value_or(c.k.mechanism_direction_tolerance);
     // as many digits as show whether it is within the tolerance
-    int digits = 0;
+    const int asked = find_digits(*want.azimuth), about = find_digits(tolerance);
+    int digits = asked;
     while (std::isfinite(off) && off > tolerance && digits < 6 &&
            fmt::format("{:.{}f}", off / unit::deg, digits) == fmt::format("{:.{}f}", tolerance / unit::deg, digits))
       ++digits;
     judge_one("azimuth", "Direction", off <= tolerance,
-              std::isnan(m.azimuth) ? fmt::format("Asked: {} +- {:.0f} deg; nothing fell to any side.",
-                                                  azimuth_words(*want.azimuth), tolerance / unit::deg)
-                                    : fmt::format("Asked: {} +- {:.0f} deg; found: {}.", azimuth_words(*want.azimuth),
-                                                  tolerance / unit::deg, azimuth_words(m.azimuth, digits)),
-              off, "rad", falls_on);
+              std::isnan(m.azimuth)
+                  ? fmt::format("Asked: {} +- {} deg; nothing fell to any side.", azimuth_words(*want.azimuth, asked),
+                                fixed_words(tolerance / unit::deg, about))
+                  : fmt::format("Asked: {} +- {} deg; found: {}.", azimuth_words(*want.azimuth, asked),
+                                fixed_words(tolerance / unit::deg, about), azimuth_words(m.azimuth, digits)),
+              off, "rad", falls_on(off <= tolerance));
   }
   if (want.debris_reach) {
     const auto [found, limit] = tell_apart(reach.largest, *want.debris_reach);
-    judge_one("debris_reach", "Reach of the debris", reach.largest <= *want.debris_reach,
-              fmt::format("Asked: at most {} m; found: {} m.", limit, found), reach.largest, "m",
-              find_what_is_open(c, [&](const OpenPart& part) {
-                return calc_distances_at_end(c, part.body, find_start_outline(c.r, part.body)).second + part.way >
-                       *want.debris_reach;
-              }));
+    const bool met = reach.largest <= *want.debris_reach;
+    const std::string why = !met ? "" : find_what_is_open(c, [&](const OpenPart& part) {
+      return calc_distances_at_end(c, part.body, find_start_outline(c.r, part.body)).second + part.way >
+             *want.debris_reach;
+    });
+    judge_one("debris_reach", "Reach of the debris", met,
+              fmt::format("Asked: at most {} m; found: {} m.", limit, found), reach.largest, "m", why);
   }
   if (want.stands_between_stages) {
     const bool is_known = standing.fell || !standing.is_open;

@@ -330,6 +330,27 @@ TEST(Run, AMechanismIsNotJudgedBeforeItIsFinal) {
   EXPECT_EQ(finding(r, "mechanism").status, record::Status::NotJudged);
 }
 
+TEST(Run, WhatWasAskedIsNotBrokenBeforeItIsFinal) {
+  const auto run_for = [](const std::string& fired, double duration) {
+    product::Plan plan =
+        read(house("[criteria]\nmechanism = \"topple\"\nazimuth = \"169.9 deg\"\nazimuth_tolerance = \"7.5 deg\"\n" +
+                       charge("C-A*-0", fired),
+                   "1 s"));
+    plan.analysis.duration = duration;
+    return run_plan(plan, default_knowledge(), {}, {});
+  };
+  const record::Record before = run_for("0.5 s", 0.2), falling = run_for("0.05 s", 0.2);
+  for (const std::string id : {"criterion.mechanism", "criterion.azimuth"}) {
+    EXPECT_TRUE(is_not_judged(finding(before, id))) << finding(before, id).text;
+    EXPECT_THAT(finding(before, id).text, testing::EndsWith("Not judged: the run ended before all charges had fired."));
+    EXPECT_TRUE(is_not_judged(finding(falling, id))) << finding(falling, id).text;
+    EXPECT_THAT(finding(falling, id).text,
+                testing::EndsWith("Not judged: it still came down or swayed when the run ended."));
+  }
+  EXPECT_EQ(finding(before, "mechanism").status, record::Status::NotJudged);
+  EXPECT_THAT(finding(before, "criterion.azimuth").text, testing::StartsWith("Asked: 169.9 deg +- 7.5 deg; "));
+}
+
 TEST(Run, ComparesNoRigidBlockAskewToItsHinges) {
   const auto block = [](const std::string& azimuth) {
     const record::Record r = run_plan(read(house(charge("C-A*-0", "0 s") + "[criteria]\nazimuth = \"" + azimuth +
