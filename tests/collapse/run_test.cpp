@@ -333,7 +333,8 @@ TEST(Run, AMechanismIsNotJudgedBeforeItIsFinal) {
 TEST(Run, WhatWasAskedIsNotBrokenBeforeItIsFinal) {
   const auto run_for = [](const std::string& fired, double duration) {
     product::Plan plan =
-        read(house("[criteria]\nmechanism = \"topple\"\nazimuth = \"169.9 deg\"\nazimuth_tolerance = \"7.5 deg\"\n" +
+        read(house("[criteria]\nmechanism = \"topple\"\nazimuth = \"169.9 deg\"\nazimuth_tolerance = \"7.5 "
+                   "deg\"\ndebris_reach = \"50 m\"\n" +
                        charge("C-A*-0", fired),
                    "1 s"));
     plan.analysis.duration = duration;
@@ -342,12 +343,13 @@ TEST(Run, WhatWasAskedIsNotBrokenBeforeItIsFinal) {
   const record::Record before = run_for("0.5 s", 0.2), falling = run_for("0.05 s", 0.2);
   for (const std::string id : {"criterion.mechanism", "criterion.azimuth"}) {
     EXPECT_TRUE(is_not_judged(finding(before, id))) << finding(before, id).text;
-    EXPECT_THAT(finding(before, id).text, testing::EndsWith("Not judged: the run ended before all charges had fired."));
+    EXPECT_THAT(finding(before, id).text, testing::EndsWith("Not judged: 1 charge had not fired when the run ended."));
     EXPECT_TRUE(is_not_judged(finding(falling, id))) << finding(falling, id).text;
     EXPECT_THAT(finding(falling, id).text,
                 testing::EndsWith("Not judged: it still came down or swayed when the run ended."));
   }
   EXPECT_EQ(finding(before, "mechanism").status, record::Status::NotJudged);
+  EXPECT_TRUE(is_not_judged(finding(before, "criterion.debris_reach"))) << "nothing has come down that could reach it";
   EXPECT_THAT(finding(before, "criterion.azimuth").text, testing::StartsWith("Asked: 169.9 deg +- 7.5 deg; "));
 }
 
