@@ -423,6 +423,8 @@ void add_touchdown(const Context& c) {
                                      [](const record::Series& s) { return s.id == "energy_kinetic"; });
     for (size_t i = 0; i < c.r.time.size(); ++i)
       if (series->value[i] > largest) largest = series->value[i], when = c.r.time[i];
+    // the impact takes some of it before the next frame
+    if (kinetic > largest) largest = kinetic, when = t;
     c.add("touchdown.energy", "Touchdown", "Largest energy in motion",
           fmt::format("{:.1f} MJ at {:.2f} s.", largest * 1e-6, when), largest, "J");
     const MeanForce mean = c.recorder.find_largest_ground_force();

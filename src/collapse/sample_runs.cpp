@@ -163,7 +163,7 @@ void fill(Sample& s, const Knowledge& k, const SampleRunOptions& options, Sample
   out.touchdown = s.recorder->first_touchdown();
   const std::vector<double>& kinetic = series("energy_kinetic");
   out.touchdown_energy = out.touchdown <= out.time.back() ? s.recorder->first_touchdown_kinetic() : kinetic.back();
-  out.largest_energy = *std::max_element(kinetic.begin(), kinetic.end());
+  out.largest_energy = std::max(*std::max_element(kinetic.begin(), kinetic.end()), out.touchdown_energy);
   out.reach = calc_reach(s.record, out.time.size() - 1);
   if (options.condensation) {
     spread(out.reach, s.plan);

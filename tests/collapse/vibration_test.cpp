@@ -128,6 +128,15 @@ TEST(VibrationRunPhysics, EveryNeighbourIsScreenedAndTheWordIsThere) {
   for (const record::Finding* f : {&far, &near, &main}) { EXPECT_THAT(f->text, HasSubstr("Screening")); }
 }
 
+TEST(TouchdownRunPhysics, TheLargestEnergyInMotionIsAtLeastThatAtTheFirstTouchdown) {
+  // ten frames a second show no frame near the touchdown
+  const record::Record r =
+      run_plan(read(house(charge("C-*-0", "0.1 s"), "2 s") + "frame_rate = \"10 Hz\"\n"), default_knowledge(), {}, {});
+  const std::string first = finding(r, "touchdown.first").text, words = ", when ";
+  const double then = 1e6 * std::stod(first.substr(first.find(words) + words.size()));
+  EXPECT_GE(finding(r, "touchdown.energy").value, then - 0.05e6) << first;
+}
+
 TEST(TouchdownRunPhysics, EnergyOfPartsIsThatOfTheirFall) {
   const record::Record r = run_plan(read(house(charge("C-*-0", "0.1 s"), "2 s")), default_knowledge(), {}, {});
   double released = 0;
