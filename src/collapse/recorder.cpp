@@ -87,7 +87,7 @@ Recorder::Recorder(const mbs::Model& model, const ModelMap& map, const Knowledge
   }
   find_crushed_ends();
   record.series = {{"tilt_angle", "Tilt angle", "rad", "angle", {}},
-                   {"ground_force", "Ground force", "N", "force", {}},
+                   {"ground_force", "Force at the instant of each frame", "N", "force", {}},
                    {"mass_centre_height", "Height of the mass centre", "m", "height", {}},
                    {"energy_kinetic", "Kinetic", "J", "energy", {}},
                    {"energy_gravity", "Potential", "J", "energy", {}},

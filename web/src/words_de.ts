@@ -526,6 +526,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["Lean of all bodies compared", "Neigung aller verglichenen Körper"],
   ["Tilt angle of a rigid block", "Kippwinkel eines starren Blocks"],
   ["Ground force", "Bodenkraft"],
+  ["Force at the instant of each frame", "Kraft im Augenblick jedes Bildes"],
   ["Height of the mass centre", "Höhe des Schwerpunkts"],
   ["Height of the centre of mass", "Höhe des Schwerpunkts"],
   ["Kinetic", "Bewegung"],
