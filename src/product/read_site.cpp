@@ -85,13 +85,13 @@ void read_vibration(Reading& reading, TableReader& site) {
   TableReader table(*node, "vibration", reading.complaints);
   VibrationLaw law;
   law.velocity = table.quantity("velocity", Dimension::Velocity, {0, 10, true});
-  law.energy = table.quantity("energy", Dimension::Energy, {0, 1e12, true});
-  law.distance = table.quantity("distance", Dimension::Length, {0, 1e4, true});
+  law.energy = table.quantity("energy", Dimension::Energy, {1, 1e12});
+  law.distance = table.quantity("distance", Dimension::Length, {0.1, 1e4});
   law.energy_exponent = table.quantity("energy_exponent", Dimension::Number, {0.1, 2});
   law.distance_exponent = table.quantity("distance_exponent", Dimension::Number, {0, 5});
   law.factor = table.quantity("factor", Dimension::Number, {1, 100});
   law.window = table.quantity("window", Dimension::Time, {0, 60}, law.window);
-  law.least_distance = table.quantity("least_distance", Dimension::Length, {0, 1000, true}, law.least_distance);
+  law.least_distance = table.quantity("least_distance", Dimension::Length, {0.1, 1000}, law.least_distance);
   law.source = table.text("source");
   read_frequencies(table, law);
   table.finish();

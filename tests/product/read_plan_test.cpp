@@ -709,5 +709,15 @@ TEST(ReadPlan, RefusesFrequenciesThatAreNoRange) {
     EXPECT_NE(rendered(complaints_about(with_vibration(wrong)), "").find("frequency"), std::string::npos) << wrong;
 }
 
+TEST(ReadPlan, RefusesLawsThatLeadBeyondAllNumbers) {
+  const std::string text = with_vibration("[\"5 Hz\", \"25 Hz\"]");
+  for (const auto& [old, wrong] : {std::pair{"\"1 MJ\"", "\"1e-300 J\""},
+                                   {"distance = \"10 m\"", "distance = \"1e-9 m\""},
+                                   {"factor = 2", "factor = 2\nleast_distance = \"1e-9 m\""}}) {
+    const std::string said = rendered(complaints_about(replaced(text, old, wrong)), "");
+    EXPECT_NE(said.find("E205"), std::string::npos) << wrong << said;
+  }
+}
+
 }  // namespace
 }  // namespace topple::product
