@@ -21,6 +21,7 @@ BranchRecord::BranchRecord(const Branch& b, const Knowledge& k, const RunOptions
   fill_provenance(options, "native", record_);
   fill_from_plan(live_->plan(), live_->model(), live_->map(), record_);
   recorder_.emplace(live_->model(), live_->map(), k_, record_, nobody_);
+  if (has_screening(live_->plan())) recorder_->keep_speeds();
   for (const Piece& p : b.pieces) {
     const bool is_last = &p == &b.pieces.back();
     recorder_->append(p.run->recorder(), is_last ? p.run->record().time.size() : p.frames,

@@ -123,6 +123,16 @@ std::pair<std::string, std::string> tell_apart(double value, double limit, int d
   return {tell(value), tell(limit)};
 }
 
+/// Significant digits without an exponent: "0.0026", "1.3", "360".
+std::string tell_briefly(double value, int digits = 2) {
+  if (!(value > 0) || !std::isfinite(value)) return fmt::format("{:g}", value);
+  int places = digits - 1 - static_cast<int>(std::floor(std::log10(value)));
+  // of the rounded value: 0.996 is 1.0
+  if (std::round(value * std::pow(10, places)) >= std::pow(10, digits)) --places;
+  if (places >= 0) return fmt::format("{:.{}f}", value, places);
+  return fmt::format("{:.0f}", std::round(value * std::pow(10, places)) * std::pow(10, -places));
+}
+
 /// Whether what is not as it was asked may still become so: not what is over, has gone the wrong way, or was to stand
 /// and does not.
 bool may_become(const Context& c, const Mechanism& m) {
@@ -351,54 +361,99 @@ void add_clearances(const Context& c) {
   }
 }
 
+/// Limits of a neighbour over the frequencies in which the ground answers; 0: none [m/s].
+std::pair<double, double> find_vibration_limits(const product::Neighbour& n, const product::VibrationLaw& law) {
+  if (n.vibration_limit > 0) return {n.vibration_limit, n.vibration_limit};
+  if (n.building_class == product::BuildingClass::Unknown) return {0, 0};
+  return {calc_vibration_limit(n.building_class, law.low_frequency),
+          calc_vibration_limit(n.building_class, law.high_frequency)};
+}
+
+/// Why a band that stays below its limit is not judged; empty: nothing that still moved could bring it there, if all
+/// its energy came down at once as near as it may go.
+std::string find_what_may_shake(const Context& c, const product::Neighbour& n, const Shaking& s, double limit) {
+  const product::VibrationLaw& law = *c.plan.vibration;
+  const double a = law.energy_exponent, gravity = norm(c.model.gravity);
+  const OpenPart* fastest = nullptr;
+  double sum = std::pow(s.end_velocity, 1 / a);
+  for (const OpenPart& part : c.open) {
+    const double energy =
+        c.r.bodies[part.body].mass *
+        (0.5 * part.speed * part.speed + gravity * std::max(0.0, c.pose(c.r.time.size() - 1, part.body).p.z));
+    const double distance = calc_distances_at_end(c, part.body, n.footprint).first - part.way;
+    sum += std::pow(calc_velocity(law, energy, distance), 1 / a);
+    if (fastest == nullptr || part.speed > fastest->speed) fastest = &part;
+  }
+  if (fastest == nullptr || law.factor * std::pow(sum, a) < limit) return {};
+  return fmt::format("{}{} still moved at {:.1f} m/s when the run ended, and what has yet to come down may reach it",
+                     kNotJudged, c.r.bodies[fastest->body].name, fastest->speed);
+}
+
 void add_vibration(const Context& c, const Mechanism& m) {
   const char* heading = "Ground vibration";
   if (!c.plan.vibration) {
     c.add("vibration", heading, "Ground vibration",
           "Not given: a screening needs the site's attenuation law ([site.vibration]).", kNone, "");
+    for (const product::Neighbour& n : c.plan.neighbours)
+      if (n.vibration_limit > 0 || n.building_class != product::BuildingClass::Unknown)
+        c.add("vibration." + n.name, heading, n.name,
+              n.vibration_limit > 0
+                  ? fmt::format("Not judged: the limit of {:g} mm/s needs the site's attenuation law "
+                                "([site.vibration]).",
+                                n.vibration_limit / unit::mm)
+                  : "Not judged: the limits of its class need the site's attenuation law ([site.vibration]).",
+              kNone, "m/s", Status::NotJudged);
     return;
   }
   const product::VibrationLaw& law = *c.plan.vibration;
-  c.add(
-      "vibration", heading, "Screening, not a prediction",
-      fmt::format("v = {:g} mm/s (E / {:g} MJ)^{:g} (r / {:g} m)^-{:g}, between 1/{:g} and {:g} times that, with E the "
-                  "energy of touchdowns within {:g} s; source of these numbers: {}. What the ground really does is for "
-                  "measurements on site to show.",
-                  law.velocity / unit::mm, law.energy * 1e-6, law.energy_exponent, law.distance, law.distance_exponent,
-                  law.factor, law.factor, law.window, law.source),
-      kNone, "");
+  c.add("vibration", heading, "Screening, not a prediction",
+        fmt::format("v = {:g} mm/s (E / {:g} MJ)^{:g} (r / {:g} m)^-{:g}, between 1/{:g} and {:g} times that, with E "
+                    "the energy that moving parts lose within {:g} s, whatever takes it, so that it is an upper end; "
+                    "source of these numbers: {}. What the ground really does is for measurements on site to show.",
+                    law.velocity / unit::mm, law.energy * 1e-6, law.energy_exponent, law.distance,
+                    law.distance_exponent, law.factor, law.factor, law.window, law.source),
+        kNone, "");
+  // what round-off makes of a building that stands is no energy
+  const double least_energy = 1e-6 * c.map.moving_mass * norm(c.model.gravity);
   for (const product::Neighbour& n : c.plan.neighbours) {
-    const Shaking s = find_shaking(law, c.recorder.touchdowns(), n.footprint);
-    if (!(s.velocity > 0)) {
-      c.add("vibration." + n.name, heading, n.name, "Nothing touches the ground.", 0, "m/s");
-      continue;
-    }
-    const double low = s.velocity / law.factor, high = s.velocity * law.factor;
-    std::string text = fmt::format(
-        "Screening: {:.2g} to {:.2g} mm/s, {:.2g} in the middle, around {:.2f} s from touchdowns of {:.1f} MJ, most of "
-        "it "
-        "by {} at {:.0f} m",
-        low / unit::mm, high / unit::mm, s.velocity / unit::mm, s.time, s.energy * 1e-6,
-        c.r.bodies[static_cast<size_t>(s.body)].name, s.distance);
-    // limits over the frequencies in which the ground answers
-    double least = 0, most = 0;
-    if (n.vibration_limit > 0) {
-      least = most = n.vibration_limit;
+    const Shaking s = find_shaking(law, c.r, c.recorder.speeds(), c.model.gravity, n.footprint);
+    const bool is_shaken = s.energy > least_energy;
+    const double low = is_shaken ? s.velocity / law.factor : 0, high = is_shaken ? s.velocity * law.factor : 0;
+    const auto [least, most] = find_vibration_limits(n, law);
+    // as many digits as show on which side of a limit an end lies
+    int digits = 2;
+    const auto looks_like = [&digits](double end, double limit) {
+      return end != limit && tell_briefly(end / unit::mm, digits) == tell_briefly(limit / unit::mm, digits);
+    };
+    while (digits < 6 && (looks_like(high, least) || looks_like(low, most))) ++digits;
+    std::string text = "No moving part loses energy";
+    if (is_shaken)
+      text = fmt::format(
+          "Screening: {} to {} mm/s, {} in the middle, around {:.2f} s from {} MJ lost within {:.2f} s, most of it by "
+          "{} at {:.0f} m",
+          tell_briefly(low / unit::mm, digits), tell_briefly(high / unit::mm, digits),
+          tell_briefly(s.velocity / unit::mm), s.time, tell_briefly(s.energy * 1e-6), s.window,
+          c.r.bodies[static_cast<size_t>(s.body)].name, s.distance);
+    if (n.vibration_limit > 0)
       text += fmt::format(". Limit of the plan: {:g} mm/s", least / unit::mm);
-    } else if (n.building_class != product::BuildingClass::Unknown) {
-      least = calc_vibration_limit(n.building_class, law.low_frequency);
-      most = calc_vibration_limit(n.building_class, law.high_frequency);
+    else if (least > 0)
       text += fmt::format(". Limit at the foundation between {:g} Hz and {:g} Hz: {:.3g} to {:.3g} mm/s ({}, {})",
                           law.low_frequency, law.high_frequency, least / unit::mm, most / unit::mm, kVibrationSource,
                           describe_vibration_limit(n.building_class));
-    }
     Status status = Status::Info;
     if (least > 0) {
       status = high < least ? Status::Good : low > most ? Status::Bad : Status::Warning;
       text += status == Status::Good  ? ": the band stays below it"
               : status == Status::Bad ? ": the band lies above it"
                                       : ": the band reaches it";
-      if (status == Status::Good && (c.is_under_way || !m.is_final)) status = Status::Info;
+      if (status == Status::Good && c.is_under_way) {
+        status = Status::Info;
+      } else if (status == Status::Good) {
+        const std::string why = m.is_final
+                                    ? find_what_may_shake(c, n, s, least)
+                                    : fmt::format("{}it still came down or swayed when the run ended", kNotJudged);
+        if (!why.empty()) text += "." + why, status = Status::NotJudged;
+      }
     }
     c.add("vibration." + n.name, heading, n.name, text + ".", high, "m/s", status);
   }

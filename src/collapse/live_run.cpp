@@ -26,6 +26,7 @@ LiveRun::LiveRun(std::shared_ptr<const LiveModel> model, const RunOptions& optio
   fill_provenance(options_, "native", *record_);
   fill_from_plan(model_->plan(), m, model_->map(), *record_);
   recorder_ = std::make_unique<Recorder>(m, model_->map(), model_->knowledge(), *record_, callbacks_);
+  if (has_screening(model_->plan())) recorder_->keep_speeds();
 }
 
 LiveRun::LiveRun(std::shared_ptr<const LiveModel> model, const RunOptions& options, double moment_interval)

@@ -137,6 +137,8 @@ mbs::Options make_mbs_options(const mbs::RunSettings& settings, const Knowledge&
   return o;
 }
 
+bool has_screening(const product::Plan& plan) { return plan.vibration && !plan.neighbours.empty(); }
+
 void record_into(Recorder& recorder, mbs::Options& o) {
   o.on_frame = [&recorder](const mbs::View& v) { recorder.add_frame(v); };
   o.on_happening = [&recorder](const mbs::Happening& h) { recorder.add_happening(h); };

@@ -14,6 +14,8 @@ void fill_from_plan(const product::Plan&, const mbs::Model&, const ModelMap&, re
 void tell_failing_charges(const product::Plan&, const ModelMap&, Recorder&, double after = -1);
 /// Options of the engine; nobody looks at the run yet.
 mbs::Options make_mbs_options(const mbs::RunSettings&, const Knowledge&, int threads, const Progress&);
+/// Whether the plan asks for a screening of ground vibration: its recorder has to keep speeds then.
+bool has_screening(const product::Plan&);
 /// Frames and happenings go to the recorder, which must outlive the run.
 void record_into(Recorder&, mbs::Options&);
 /// How it ended, as a word and a sentence.

@@ -370,6 +370,10 @@ void Recorder::append(const Recorder& from, size_t frames, double until) {
   for (size_t s = 0; s < block_.size(); ++s) copy(block_[s], from.block_[s], frames);
   copy(zone_frames_, from.zone_frames_, frames);
   copy(impulse_, from.impulse_, frames);
+  if (keeps_speeds_) {
+    copy(speeds_.velocity, from.speeds_.velocity, 3 * frames * B);
+    copy(speeds_.spin, from.speeds_.spin, 3 * frames * B);
+  }
   for (const record::Event& e : r.events)
     if (e.time <= until) record_.events.push_back(e);
 }
@@ -449,6 +453,14 @@ void Recorder::add_frame(const mbs::View& v) {
     }
   }
   zone_frames_.push_back(zf);
+  if (keeps_speeds_)
+    for (size_t b = 0; b < B; ++b) {
+      // finite elements have no centre but their bodies' origin
+      const Vec3 lever = v.centre.size() == B ? v.X_WB[b].p - v.centre[b] : Vec3{};
+      const Vec3 velocity = v.v_WB[b] + cross(v.w_WB[b], lever);
+      for (const double c : {velocity.x, velocity.y, velocity.z}) speeds_.velocity.push_back(static_cast<float>(c));
+      for (const double c : {v.w_WB[b].x, v.w_WB[b].y, v.w_WB[b].z}) speeds_.spin.push_back(static_cast<float>(c));
+    }
   look(v);
   impulse_.push_back(impulse_until_now_);
   put_crushed_ends();

@@ -40,6 +40,8 @@ class Recorder {
   /// `map` must belong to the model; for a bare model see describe_model.
   Recorder(const mbs::Model&, const ModelMap&, const Knowledge&, record::Record&, const RunCallbacks&);
 
+  /// Keeps the velocities of the bodies at all frames, which find_shaking needs; before the first frame.
+  void keep_speeds() { keeps_speeds_ = true; }
   void add_frame(const mbs::View&);
   void add_happening(const mbs::Happening&);
   void add_event(record::Event);
@@ -66,6 +68,7 @@ class Recorder {
   }
   double first_touchdown_kinetic() const { return first_.kinetic; }         // energy of all that moves [J]
   const std::vector<Touchdown>& touchdowns() const { return touchdowns_; }  // one of each moving part, as they happen
+  const Speeds& speeds() const { return speeds_; }                          // empty unless kept
   double start_reaction_error() const { return reaction_error_; }  // |reaction - weight| / weight at the first frame
   /// Of the ground on what moves, along its normal, from the balance of momentum; loads of the model are part of it.
   MeanForce find_largest_ground_force() const { return find_largest_mean(record_.time, impulse_); }
@@ -105,6 +108,8 @@ class Recorder {
   double last_time_ = 0;
   std::vector<Touchdown> touchdowns_;
   Touchdown first_{std::numeric_limits<double>::quiet_NaN()};  // of an upper body
+  bool keeps_speeds_ = false;
+  Speeds speeds_;
   double reaction_error_ = 0;
   double impulse_until_now_ = 0;       // of the ground, until the last view [N·s]
   std::vector<double> impulse_;        // at each frame

@@ -109,6 +109,7 @@ record::Record run_plan(const product::Plan& plan, const Knowledge& k, const Run
   fill_from_plan(plan, model, map, r);
 
   Recorder recorder(model, map, k, r, callbacks);
+  if (has_screening(plan)) recorder.keep_speeds();
   tell_failing_charges(plan, map, recorder);
   mbs::Options o = make_mbs_options(settings_of(plan, k, options), k, options.threads, callbacks.progress);
   o.step_share = options.step_share;

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "collapse/manager.h"
+#include "collapse/plan_record.h"
 #include "collapse/recorder.h"
 #include "collapse/vibration.h"
 #include "mbs/batch.h"
@@ -29,6 +30,7 @@ struct Sample {
         model(o.condensation ? make_condensed_model(p, k, *o.condensation, o.known, map) : make_model(p, k, map)) {
     record.building_outline = calc_building_outline(model, map);
     recorder = std::make_unique<Recorder>(model, map, k, record, callbacks);
+    if (!o.condensation && has_screening(p)) recorder->keep_speeds();
   }
 
   const product::Plan& plan;
@@ -169,7 +171,8 @@ void fill(Sample& s, const Knowledge& k, const SampleRunOptions& options, Sample
     spread(out.reach, s.plan);
   } else if (s.plan.vibration) {
     for (const product::Neighbour& n : s.plan.neighbours)
-      out.shaking.push_back(find_shaking(*s.plan.vibration, s.recorder->touchdowns(), n.footprint).velocity);
+      out.shaking.push_back(
+          find_shaking(*s.plan.vibration, s.record, s.recorder->speeds(), s.model.gravity, n.footprint).velocity);
   }
 }
 

@@ -52,7 +52,7 @@ struct SampleRun {
   double touchdown_energy = 0;                                  // in motion then; at the end if there was none [J]
   double largest_energy = 0;                                    // in motion [J]
   Reach reach;                                                  // at the end
-  /// Screening of ground vibration by what touched down in the run: middle of the band at each neighbour [m/s]; empty
+  /// Screening of ground vibration by what parts lost in the run: middle of the band at each neighbour [m/s]; empty
   /// without the site's law, and of condensed samples, whose parts stand for many.
   std::vector<double> shaking;
 };

@@ -1,5 +1,5 @@
 #pragma once
-/// Screening of ground vibration from parts that hit the ground (docs/theory/findings.md, section 6). The attenuation
+/// Screening of ground vibration by the energy of what comes down (docs/theory/findings.md, section 6). The attenuation
 /// law is the user's; nothing here predicts a vibration.
 
 #include <string>
@@ -7,6 +7,7 @@
 
 #include "collapse/debris.h"
 #include "product/plan.h"
+#include "record/record.h"
 
 namespace topple::collapse {
 
@@ -21,17 +22,37 @@ struct Touchdown {
   double kinetic = 0;   // energy of all parts that move then [J]
 };
 
+/// Velocities of the model's bodies, the first B of a record, at its frames.
+struct Speeds {
+  std::vector<float> velocity;  // of their origins, in W (S x B x 3) [m/s]
+  std::vector<float> spin;      // in W                   (S x B x 3) [rad/s]
+};
+
 /// Largest velocity that the law gives at a footprint.
 struct Shaking {
-  double velocity = 0;  // middle of the band [m/s]
-  double time = 0;      // end of the window in which it is reached [s]
-  double energy = 0;    // of the touchdowns in it [J]
-  double distance = 0;  // of the one among them that counts most [m]
-  int body = -1;        // that one
+  double velocity = 0;      // middle of the band [m/s]
+  double time = 0;          // end of the window in which it is reached [s]
+  double window = 0;        // its length: at most the law's, or the interval between frames there if that is more [s]
+  double energy = 0;        // lost in it [J]
+  double distance = 0;      // of what counts most of it [m]
+  int body = -1;            // the part that it belongs to
+  double end_velocity = 0;  // as `velocity`, by the last window of the record alone [m/s]
 };
-/// Touchdowns within the law's window add up their energies, each weighed by its distance, so that a single one gives
-/// v_0 (E/E_0)^a (r/r_0)^-b. Velocity 0 without touchdowns.
-Shaking find_shaking(const product::VibrationLaw&, const std::vector<Touchdown>&, const Polygon& footprint);
+/// What counts is the kinetic and potential energy that moving parts lose within the law's window, wherever it goes:
+/// what zones, contacts and dampers take and store of it, by the record's series of energies. The loss of each interval
+/// between frames is shared out over the parts, in pieces of at most kPieceLength, by what each of them loses of its
+/// own; each share is weighed by its outline's distance, so that a single one gives v_0 (E/E_0)^a (r/r_0)^-b. The
+/// largest of all windows; velocity 0 where nothing is lost.
+///   gravity   [m/s²]
+Shaking find_shaking(const product::VibrationLaw&, const record::Record&, const Speeds&, const Vec3& gravity,
+                     const Polygon& footprint);
+/// Parts count in pieces no longer than this, so that results do not hang on how members are cut into parts [m].
+inline constexpr double kPieceLength = 3;
+/// What the law makes of an energy at a distance, which least_distance limits [J, m] -> [m/s].
+double calc_velocity(const product::VibrationLaw&, double energy, double distance);
+
+/// Energy that moving parts have lost until each frame of a record, loads' work on them included [J].
+std::vector<double> calc_lost_energy(const record::Record&);
 
 /// Limit at a building's foundation for short vibrations of a frequency [Hz] -> [m/s]: DIN 4150-3:1999-02, Table 1.
 double calc_vibration_limit(product::BuildingClass, double frequency);

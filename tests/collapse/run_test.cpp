@@ -343,7 +343,7 @@ TEST(Run, WhatWasAskedIsNotBrokenBeforeItIsFinal) {
   const record::Record before = run_for("0.5 s", 0.2), falling = run_for("0.05 s", 0.2);
   for (const std::string id : {"criterion.mechanism", "criterion.azimuth"}) {
     EXPECT_TRUE(is_not_judged(finding(before, id))) << finding(before, id).text;
-    EXPECT_THAT(finding(before, id).text, testing::EndsWith("Not judged: 1 charge had not fired when the run ended."));
+    EXPECT_THAT(finding(before, id).text, testing::EndsWith("Not judged: 3 charges had not fired when the run ended."));
     EXPECT_TRUE(is_not_judged(finding(falling, id))) << finding(falling, id).text;
     EXPECT_THAT(finding(falling, id).text,
                 testing::EndsWith("Not judged: it still came down or swayed when the run ended."));

@@ -182,7 +182,7 @@ TEST(PlanMapping, ScreensTheGroundVibrationAsARunDoes) {
                                   [](const record::Finding& f) { return f.id == "vibration.House"; });
   ASSERT_NE(found, r.findings.end());
   EXPECT_GT(found->value, 0);
-  EXPECT_NEAR(mapped.values.back(), found->value, 1e-12);  // the upper end of the band; the same touchdowns
+  EXPECT_NEAR(mapped.values.back(), found->value, 1e-12);  // the upper end of the band, of the same losses
   // nothing of it in plans without the law, and where it is not wanted
   options.vibration = false;
   const PlanMapping not_wanted(plan, collapse::default_knowledge(), options);
