@@ -24,10 +24,12 @@ bool contains(const Polygon& polygon, const Point2& p) {
   return inside;
 }
 
+/// Square of the distance [m²].
 double point_segment(const Point2& p, const Point2& a, const Point2& b) {
   const double dx = b[0] - a[0], dy = b[1] - a[1], l2 = dx * dx + dy * dy;
   const double t = l2 > 0 ? std::clamp(((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / l2, 0.0, 1.0) : 0;
-  return std::hypot(p[0] - a[0] - t * dx, p[1] - a[1] - t * dy);
+  const double x = p[0] - a[0] - t * dx, y = p[1] - a[1] - t * dy;
+  return x * x + y * y;
 }
 
 /// Heights at which a plumb line at p enters and leaves a box; the first is not below the second where it misses it.
@@ -83,7 +85,7 @@ double calc_distance(const Polygon& a, const Polygon& b) {
       if (segments_cross(a0, a1, b0, b1)) return 0;
       least = std::min({least, point_segment(a0, b0, b1), point_segment(b0, a0, a1)});
     }
-  return least;
+  return std::sqrt(least);
 }
 
 double calc_distance(const Point2& p, const Polygon& polygon) {
@@ -92,7 +94,7 @@ double calc_distance(const Point2& p, const Polygon& polygon) {
   double least = std::numeric_limits<double>::infinity();
   for (size_t i = 0; i < polygon.size(); ++i)
     least = std::min(least, point_segment(p, polygon[i], polygon[(i + 1) % polygon.size()]));
-  return least;
+  return std::sqrt(least);
 }
 
 double calc_area(const Polygon& p) {
