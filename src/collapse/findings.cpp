@@ -416,7 +416,8 @@ void add_vibration(const Context& c, const Mechanism& m) {
   // what round-off makes of a building that stands is no energy
   const double least_energy = 1e-6 * c.map.moving_mass * norm(c.model.gravity);
   for (const product::Neighbour& n : c.plan.neighbours) {
-    const Shaking s = find_shaking(law, c.r, c.recorder.speeds(), c.model.gravity, n.footprint);
+    const Shaking s =
+        find_shaking(law, c.r, c.recorder.speeds(), c.model.gravity, c.model.contact.restitution, n.footprint);
     const bool is_shaken = s.energy > least_energy;
     const double low = is_shaken ? s.velocity / law.factor : 0, high = is_shaken ? s.velocity * law.factor : 0;
     const auto [least, most] = find_vibration_limits(n, law);

@@ -171,8 +171,9 @@ void fill(Sample& s, const Knowledge& k, const SampleRunOptions& options, Sample
     spread(out.reach, s.plan);
   } else if (s.plan.vibration) {
     for (const product::Neighbour& n : s.plan.neighbours)
-      out.shaking.push_back(
-          find_shaking(*s.plan.vibration, s.record, s.recorder->speeds(), s.model.gravity, n.footprint).velocity);
+      out.shaking.push_back(find_shaking(*s.plan.vibration, s.record, s.recorder->speeds(), s.model.gravity,
+                                         s.model.contact.restitution, n.footprint)
+                                .velocity);
   }
 }
 

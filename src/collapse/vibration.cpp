@@ -182,13 +182,15 @@ Window find_largest(const std::vector<double>& time, const std::vector<double>& 
 
 }  // namespace
 
-std::vector<double> calc_lost_energy(const record::Record& r) {
+std::vector<double> calc_lost_energy(const record::Record& r, double restitution) {
   std::vector<double> out(r.time.size(), 0);
+  // where they give back all, they take nothing that could tell of them
+  const double brought = restitution < 1 ? 1 / (1 - restitution * restitution) : 1;
   for (const char* id : {"energy_elastic", "energy_contact", "energy_plastic", "energy_damping", "energy_friction",
                          "energy_contact_loss"})
     for (const record::Series& s : r.series)
       if (s.id == id)
-        for (size_t i = 0; i < out.size(); ++i) out[i] += s.value[i];
+        for (size_t i = 0; i < out.size(); ++i) out[i] += (s.id == "energy_contact_loss" ? brought : 1) * s.value[i];
   return out;
 }
 
@@ -198,12 +200,12 @@ double calc_velocity(const product::VibrationLaw& law, double energy, double dis
 }
 
 Shaking find_shaking(const product::VibrationLaw& law, const record::Record& r, const Speeds& speeds,
-                     const Vec3& gravity, const Polygon& footprint) {
+                     const Vec3& gravity, double restitution, const Polygon& footprint) {
   Shaking out;
   const size_t S = r.time.size();
   if (S < 2) return out;
   (void)speeds.velocity.at(0);  // throws where the recorder was not asked to keep them
-  const std::vector<double> lost = calc_lost_energy(r);
+  const std::vector<double> lost = calc_lost_energy(r, restitution);
   Losses losses(law, r, speeds, gravity, footprint);
   const auto nobody = [](size_t, double, double, double) {};
   std::vector<double> weighed(S, 0);

@@ -43,16 +43,18 @@ struct Shaking {
 /// between frames is shared out over the parts, in pieces of at most kPieceLength, by what each of them loses of its
 /// own; each share is weighed by its outline's distance, so that a single one gives v_0 (E/E_0)^a (r/r_0)^-b. The
 /// largest of all windows; velocity 0 where nothing is lost.
-///   gravity   [m/s²]
+///   gravity      [m/s²]
+///   restitution  of impacts, at most 1
 Shaking find_shaking(const product::VibrationLaw&, const record::Record&, const Speeds&, const Vec3& gravity,
-                     const Polygon& footprint);
+                     double restitution, const Polygon& footprint);
 /// Parts count in pieces no longer than this, so that results do not hang on how members are cut into parts [m].
 inline constexpr double kPieceLength = 3;
 /// What the law makes of an energy at a distance, which least_distance limits [J, m] -> [m/s].
 double calc_velocity(const product::VibrationLaw&, double energy, double distance);
 
 /// Energy that moving parts have lost until each frame of a record, loads' work on them included [J].
-std::vector<double> calc_lost_energy(const record::Record&);
+///   restitution  impacts count with what they bring: they take 1 - restitution² of it and give back the rest
+std::vector<double> calc_lost_energy(const record::Record&, double restitution = 0);
 
 /// Limit at a building's foundation for short vibrations of a frequency [Hz] -> [m/s]: DIN 4150-3:1999-02, Table 1.
 double calc_vibration_limit(product::BuildingClass, double frequency);

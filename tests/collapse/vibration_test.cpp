@@ -75,7 +75,7 @@ struct Motion {
     for (const float q : {1.0F, 0.0F, 0.0F, 0.0F}) r.orientation.push_back(q);
   }
   Shaking shake(const product::VibrationLaw& v = law()) const {
-    return find_shaking(v, r, speeds, kGravity, house_at_zero);
+    return find_shaking(v, r, speeds, kGravity, 0, house_at_zero);
   }
   record::Record r;
   Speeds speeds;
@@ -169,9 +169,10 @@ mbs::Body cube(double x, double z) {
   return b;
 }
 /// Shaking by what falls, and the energy of all at the first touchdown.
-std::pair<Shaking, double> drop(const std::vector<mbs::Body>& bodies, double frame_rate, double duration) {
+std::pair<Shaking, double> drop(const std::vector<mbs::Body>& bodies, double frame_rate, double duration,
+                                double restitution = 0) {
   mbs::Model model;
-  model.contact.restitution = model.contact.body_restitution = 0;
+  model.contact.restitution = model.contact.body_restitution = restitution;
   for (const mbs::Body& b : bodies) mbs::add_body(model, b);
   const ModelMap map = describe_model(model);
   const RunCallbacks none;
@@ -186,7 +187,7 @@ std::pair<Shaking, double> drop(const std::vector<mbs::Body>& bodies, double fra
   (void)mbs::run(model, o);
   recorder.finish();
   const double energy = recorder.touchdowns().empty() ? 0 : recorder.touchdowns().back().energy;
-  return {find_shaking(law(), r, recorder.speeds(), model.gravity, house_at_zero), energy};
+  return {find_shaking(law(), r, recorder.speeds(), model.gravity, restitution, house_at_zero), energy};
 }
 
 TEST(VibrationPhysics, AFallingBoxGivesTheLawAtItsEnergyAtAnyRateOfFrames) {
@@ -194,6 +195,13 @@ TEST(VibrationPhysics, AFallingBoxGivesTheLawAtItsEnergyAtAnyRateOfFrames) {
     const auto [s, energy] = drop({cube(20.5, 5.5)}, rate, 1.3);
     EXPECT_NEAR(energy, kMass * 9.81 * 5, 0.01 * energy);
     EXPECT_NEAR(s.velocity, calc_velocity(law(), energy, 20), 0.01 * s.velocity) << rate;
+  }
+}
+
+TEST(VibrationPhysics, WhatSpringsBackHasShakenTheGroundToo) {
+  for (const double restitution : {0.1, 0.5, 0.8}) {
+    const auto [s, energy] = drop({cube(20.5, 5.5)}, 60, 1.3, restitution);
+    EXPECT_NEAR(s.velocity, calc_velocity(law(), energy, 20), 0.02 * s.velocity) << restitution;
   }
 }
 
