@@ -57,11 +57,14 @@ record::RccCurve to_record(const nearfield::MomentCurve& c, const nearfield::Rcc
   out.axis = letter_of(c.axis), out.direction = c.direction, out.normal_force = -c.N;
   out.rotation = c.rotation, out.moment = c.moment;
   const nearfield::CurvePoints p = nearfield::find_points(c);
-  out.yield = to_record(p.yield), out.peak = to_record(p.peak);
+  // none where N is carried with a moment only, or makes the bars yield by itself
+  const bool yields = c.is_balanced && p.yield.rotation > 1e-6 * p.peak.rotation;
+  if (yields) out.yield = to_record(p.yield);
+  out.peak = to_record(p.peak);
   out.ultimate = to_record(p.ultimate), out.residual = to_record(p.residual);
   if (!c.rotation.empty()) out.end = {c.rotation.back(), c.moment.back()};
   out.stiffness_uncracked = EI;
-  if (c.yield_rotation > 0) out.stiffness_effective = c.yield_moment / c.yield_rotation * c.length;
+  if (yields) out.stiffness_effective = c.yield_moment / c.yield_rotation * c.length;
   out.ending = ending_of(c, rcc);
   return out;
 }
@@ -90,28 +93,86 @@ record::RccState make_state(const nearfield::ZoneInput& in, const nearfield::Fib
   return out;
 }
 
-/// One line for each normal force, from bending about y to bending about z.
+/// Forces in words, at most three of them.
+std::string list_forces(const std::vector<double>& forces) {
+  std::string out;
+  for (size_t i = 0; i < forces.size() && i < 3; ++i)
+    out += fmt::format("{}{:.4g}", i > 0 ? ", " : "", -forces[i] / unit::MN);
+  return out + (forces.size() > 3 ? fmt::format(" MN and {} more", forces.size() - 3) : " MN");
+}
+
+/// One line for each normal force, from a moment about y alone to one about z alone.
 void add_biaxial(const nearfield::ZoneInput& in, const std::vector<double>& normal_forces, record::RccReport& r) {
-  constexpr double pi = 3.14159265358979323846;
-  constexpr int skews = 12;
-  std::vector<double> skew;
-  for (int i = 1; i < skews; ++i) skew.push_back(0.5 * pi * i / skews);
+  constexpr int steps = 12;
   std::vector<nearfield::BiaxialPoint> all;
+  std::vector<double> open, bulging;
   for (const double N : normal_forces) {
-    double peak_y = 0, peak_z = 0;
-    for (const record::RccCurve& c : r.curves)
-      if (c.normal_force == -N && c.direction > 0 && std::isfinite(c.peak.moment))
-        (c.axis == 'y' ? peak_y : peak_z) = c.peak.moment;
-    if (!(peak_y > 0) || !(peak_z > 0)) continue;
-    record::RccBiaxial line{-N, {peak_y}, {0}};
-    for (const nearfield::BiaxialPoint& p : nearfield::calc_biaxial_points(in, skew, {-N / r.crushing_force})) {
-      line.moment_y.push_back(p.y * peak_y), line.moment_z.push_back(p.z * peak_z);
-      all.push_back(p);
-    }
-    line.moment_y.push_back(0), line.moment_z.push_back(peak_z);
-    r.biaxial.push_back(std::move(line));
+    if (N <= -r.crushing_force || N >= r.rupture_force) continue;
+    nearfield::BiaxialLine line = nearfield::make_biaxial_line(in, N, steps);
+    if (!line.ends_at_z) open.push_back(N);
+    if (line.y.size() < 2) continue;
+    // beyond an end no power law goes; half a percent is the grid of rotations
+    const auto is_beyond = [](const nearfield::BiaxialPoint& q) { return std::max(q.y, q.z) > 1.005; };
+    if (std::any_of(line.inside.begin(), line.inside.end(), is_beyond))
+      bulging.push_back(N);
+    else
+      all.insert(all.end(), line.inside.begin(), line.inside.end());
+    r.biaxial.push_back({-N, std::move(line.y), std::move(line.z)});
   }
-  r.biaxial_exponent = nearfield::fit_biaxial(all).exponent;
+  if (!all.empty()) r.biaxial_exponent = nearfield::fit_biaxial(all).exponent;
+  if (!open.empty())
+    r.notes.push_back(
+        fmt::format("Under {} there is no moment about z alone, or none about y alone: the curve of both axes does not "
+                    "reach it, and the exponent leaves it out.",
+                    list_forces(open)));
+  if (!bulging.empty())
+    r.notes.push_back(
+        fmt::format("Under {} more moment about one axis is resisted together with one about the other than without "
+                    "it: no exponent meets that curve, and it is left out.",
+                    list_forces(bulging)));
+}
+
+/// Effective stiffness of a zone that "yields" before it has cracked.
+void add_uncracked(record::RccReport& r) {
+  std::string list;
+  int more = 0;
+  for (const auto& [curve, about] : record::group_curves(r)) {
+    constexpr double uncracked = 0.8, far = 10;  // of EI; peak over yield rotation: it is no compressed, brittle one
+    if (!(curve->stiffness_effective > uncracked * curve->stiffness_uncracked) ||
+        !(curve->peak.rotation > far * curve->yield.rotation))
+      continue;
+    if (list.empty())
+      list = fmt::format("{} under {:.4g} MN ({:.4g} MNm2)", about, curve->normal_force / unit::MN,
+                         curve->stiffness_effective / 1e6);
+    else
+      ++more;
+  }
+  if (!list.empty())
+    r.notes.push_back(fmt::format(
+        "EI eff is that before cracking about {}{}: 0.75 of the peak lies below the moment that cracks it; cracked it "
+        "is softer.",
+        list, more > 0 ? fmt::format(" and in {} more", more) : ""));
+}
+
+/// What comes with the moments of an unsymmetric section that turns about one axis alone.
+void add_crossed(const nearfield::ZoneInput& in, const std::vector<double>& normal_forces, record::RccReport& r) {
+  for (const auto axis : {Axis::Y, Axis::Z}) {
+    if (axis == Axis::Y && in.flange.breadth > 0) continue;  // only webs are known about oblique axes
+    for (const double N : normal_forces) {
+      if (N <= -r.crushing_force || N >= r.rupture_force) continue;
+      const nearfield::CrossedPeak p = nearfield::find_crossed_peak(in, axis, 1, N);
+      constexpr double worth_telling = 0.01;
+      if (!(std::abs(p.across) > worth_telling * std::abs(p.moment))) continue;
+      const char about = letter_of(axis), other = axis == Axis::Y ? 'z' : 'y';
+      r.notes.push_back(fmt::format(
+          "Curves and interaction about {0} are those of turning about {0} alone: with the largest moment under "
+          "{1:.4g} "
+          "MN, {2:.4g} kNm, come {3:.4g} kNm about {4}. What it resists without these is the end of the curve of both "
+          "axes.",
+          about, -N / unit::MN, p.moment / unit::kNm, p.across / unit::kNm, other));
+      break;  // one force shows it
+    }
+  }
 }
 
 /// Both axial curves as one, with the elastic part that make_rcc takes out.
@@ -221,7 +282,11 @@ record::RccReport make_rcc_report(const nearfield::ZoneInput& in, const nearfiel
         if (std::isfinite(point->rotation)) r.states.push_back(make_state(in, *b.fibres, curve, name, *point));
     }
   }
+  add_uncracked(r);
+  add_crossed(in, normal_forces, r);
   add_biaxial(in, normal_forces, r);
+  if (in.flange.breadth > 0 && !r.biaxial.empty())
+    r.notes.push_back("The curve of both axes is that of the web alone, without the slabs beside it.");
   r.axial.push_back(make_axial(rcc));
   if (is_same(rcc.y_pos, rcc.y_neg) && is_same(rcc.z_pos, rcc.z_neg))
     r.notes.push_back("The section is symmetric: both directions of each axis give the same curve.");

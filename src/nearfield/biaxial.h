@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "nearfield/fibres.h"
 #include "nearfield/rcc.h"
 
 namespace topple::nearfield {
@@ -30,6 +31,24 @@ struct BiaxialFit {
   double exponent = 0, least = 1, greatest = 1;
 };
 BiaxialFit fit_biaxial(const std::vector<BiaxialPoint>&);
+
+/// Largest moments about both axes at once under one normal force [N·m] while the zone turns about oblique axes: true
+/// points, from the resistance to a moment about y alone to that to one about z alone, positive directions. A section
+/// that is not symmetric reaches these by turning about an oblique axis, too.
+struct BiaxialLine {
+  std::vector<double> y, z;  // (P); none: no positive moment about y alone is resisted
+  bool ends_at_z = false;    // with y = 0; otherwise there is no moment about z alone and the last axis is known
+  std::vector<BiaxialPoint> inside;  // without both ends, as shares of them; none unless it ends at z
+};
+/// `steps` of skew between both ends, each on the grid of rotations of the report's curves. Throws InputError.
+BiaxialLine make_biaxial_line(const ZoneInput&, double N, int steps);
+
+/// The largest moment while the zone turns about one principal axis alone, and the moment that comes with it about the
+/// other one: signed, positive directions [N·m].
+struct CrossedPeak {
+  double moment = 0, across = 0;
+};
+CrossedPeak find_crossed_peak(const ZoneInput&, Axis, int direction, double N);
 
 /// The exponent of a zone whose families are known: skew π/4, forces of 0, 0.2, 0.4 and 0.6 of crushing; 1.5 if none of
 /// them leaves a moment.

@@ -239,9 +239,9 @@ void add_biaxial(const RccReport& r, std::vector<Figure>& out) {
   f.id = "biaxial";
   f.heading = "Bending about both axes";
   f.caption = fmt::format(
-      "Largest moments while the zone turns about an oblique axis, positive directions. A building's model joins both "
-      "by "
-      "(My/My,max)^p + (Mz/Mz,max)^p = 1; these points are met best by p = {}.",
+      "Largest moments while the zone turns about an oblique axis, positive directions, from a moment about y alone to "
+      "one about z alone. (My/My,end)^p + (Mz/Mz,end)^p = 1 with the ends of each curve meets these points best with "
+      "p = {}. A building's model joins both axes in this way, with the exponent of its rules.",
       shown(r.biaxial_exponent, 1, 3));
   f.drawing = draw(p);
   out.push_back(std::move(f));

@@ -23,12 +23,13 @@ struct RccCurve {
   double normal_force = 0;               // [N]
   std::vector<double> rotation, moment;  // magnitudes [rad], [N·m] (J)
   RccPoint yield, peak, ultimate, residual, end;
-  double stiffness_uncracked = 0;  // EI [N·m²]
-  double stiffness_effective = 0;  // to first yield [N·m²]
-  std::string ending;              // a sentence
+  double stiffness_uncracked = 0;                                         // EI [N·m²]
+  double stiffness_effective = std::numeric_limits<double>::quiet_NaN();  // to first yield; none: no yield [N·m²]
+  std::string ending;                                                     // a sentence
 };
 
-/// Resistance over the normal force; K forces.
+/// Resistance over the normal force; K forces. A peak below 0: N is carried only with a moment to the other side, at
+/// least this one; such forces have no yield (NaN).
 struct RccInteraction {
   std::string route = "layered";
   char axis = 'y';
@@ -37,8 +38,8 @@ struct RccInteraction {
   std::vector<double> yield_moment, peak_moment;  // [N·m] (K)
 };
 
-/// Largest moments about y and z when the zone turns about an oblique axis, positive directions, from bending about y
-/// alone to bending about z alone. P points.
+/// Largest moments about y and z when the zone turns about an oblique axis, positive directions, from a moment about y
+/// alone to one about z alone (which may not be there). P points.
 struct RccBiaxial {
   double normal_force = 0;                 // [N]
   std::vector<double> moment_y, moment_z;  // [N·m] (P)
@@ -109,7 +110,7 @@ struct RccReport {
   std::vector<RccCurve> curves;
   std::vector<RccInteraction> interactions;
   std::vector<RccBiaxial> biaxial;
-  double biaxial_exponent = 0;  // of the power law that a building's model uses, fitted to these points
+  double biaxial_exponent = std::numeric_limits<double>::quiet_NaN();  // of the power law that fits these points
   std::vector<RccAxial> axial;
   std::vector<RccState> states;
   std::vector<RccSolidState> solid_states;

@@ -123,6 +123,64 @@ TEST(Biaxial, PowerLawFitsTheFibres) {
   }
 }
 
+ZoneInput make_beam() {
+  // four bars of 25 mm below, two of 12 mm above
+  ZoneInput in = make_column(0.3, 0.6, 4, 2, 0.025, 30);
+  std::erase_if(in.section.bars, [](const product::Bar& b) { return b.z > 0 && std::abs(b.y) < 0.05; });
+  for (product::Bar& bar : in.section.bars)
+    if (bar.z > 0) bar.diameter = 0.012, bar.area = 0.25 * pi * 0.012 * 0.012;
+  in.length = 0.3;
+  return in;
+}
+
+TEST(BiaxialLine, EndsWhereOneMomentVanishes) {
+  const ZoneInput in = make_beam();
+  const BiaxialLine line = make_biaxial_line(in, 0, 12);
+  ASSERT_TRUE(line.ends_at_z);
+  EXPECT_EQ(line.z.front(), 0);
+  EXPECT_EQ(line.y.back(), 0);
+  for (size_t i = 1; i < line.y.size(); ++i) EXPECT_LT(line.y[i], 1.03 * line.y[i - 1]);
+  for (size_t i = 0; i < line.y.size(); ++i) EXPECT_GE(line.y[i], 0);
+  // turned about z alone it resists more, but with a moment about y
+  const CrossedPeak alone = find_crossed_peak(in, Axis::Z, 1, 0);
+  EXPECT_LT(alone.across, -0.5 * alone.moment);
+  EXPECT_LT(line.z.back(), 0.95 * alone.moment);
+  // the points next to the end lie on a straight way to it
+  const size_t n = line.y.size();
+  const double slope = (line.z[n - 2] - line.z[n - 3]) / (line.y[n - 2] - line.y[n - 3]);
+  EXPECT_NEAR(line.z[n - 2] - slope * line.y[n - 2], line.z.back(), 0.1 * line.z.back());
+  for (const BiaxialPoint& q : line.inside) {
+    EXPECT_LT(q.y, 1.005);
+    EXPECT_LT(q.z, 1.005);
+  }
+}
+
+TEST(BiaxialLine, ForcesCarriedToOneSideHaveNoOtherEnd) {
+  const ZoneInput in = make_beam();
+  const double crushing = find_crushing(make_fibres(in, Axis::Y)).force;
+  const BiaxialLine line = make_biaxial_line(in, -0.93 * crushing, 12);
+  EXPECT_FALSE(line.ends_at_z);
+  EXPECT_TRUE(line.inside.empty());
+  for (const double y : line.y) EXPECT_GT(y, 0);
+}
+
+TEST(BiaxialLine, ShareTheGridOfTheirEnds) {
+  // a square column at 45 degrees: on the coarse grid the corner's peak was missed by 2 %
+  const ZoneInput in = make_column(0.5, 0.5, 3, 3, 0.032, 25);
+  const BiaxialLine line = make_biaxial_line(in, -3.7e6, 12);
+  ASSERT_EQ(line.y.size(), 13u);
+  EXPECT_NEAR(line.y[6], line.z[6], 1e-6 * line.y[6]);
+  const Fibres f = make_fibres(in, 0.25 * pi);
+  const double last = 0.03;
+  std::vector<double> kappa;
+  for (int i = 0; i <= 2000; ++i) kappa.push_back(last / in.length * i / 2000);
+  const March fine = march_curvature(f, -3.7e6, 1, kappa);
+  const double peak = *std::max_element(fine.moment.begin(), fine.moment.end());
+  EXPECT_NEAR(std::hypot(line.y[6], line.z[6]), peak, 2e-3 * peak);
+  for (int i = 0; i <= 12; ++i)
+    EXPECT_NEAR(line.y[static_cast<size_t>(i)], line.z[static_cast<size_t>(12 - i)], 2e-3 * peak);
+}
+
 /// Rotation at which a family has no moment left under a normal force, a force of its grid [rad].
 double find_loss(const MomentFamily& f, size_t k) {
   const size_t J = f.rotation.size();
