@@ -51,7 +51,9 @@ CurvePoints find_points(const std::vector<double>& rotation, const std::vector<d
                         CurvePoint first_torn = {std::numeric_limits<double>::infinity(), 0});
 CurvePoints find_points(const MomentCurve&);
 
-/// Resistance over normal force in one direction: first yield and largest moment. K forces, both ends without moment.
+/// Resistance over normal force in one direction: first yield and largest moment; both ends are strained evenly, with
+/// the moment that this needs. Where N is carried with a moment to one side only there is no yield (NaN), and a largest
+/// moment below 0 is the least one to the other side that carries it. K forces.
 struct Interaction {
   std::vector<double> normal_force, yield_moment, peak_moment;  // rising [N], [N·m] (K)
 };

@@ -171,6 +171,7 @@ void add_interaction(const RccReport& r, char axis, std::vector<Figure>& out) {
       const std::string where = routes.size() > 1 ? ", " + i.route : "";
       std::vector<std::string> names{fmt::format("yield M{} [kNm]{}", i.direction < 0 ? "-" : "+", where),
                                      fmt::format("largest M{} [kNm]{}", i.direction < 0 ? "-" : "+", where)};
+  bool is_one_sided = false;
       f.table.heads.insert(f.table.heads.end(), names.begin(), names.end());
       rows = std::max(rows, i.normal_force.size());
       f.table.rows.resize(rows);
@@ -184,11 +185,12 @@ void add_interaction(const RccReport& r, char axis, std::vector<Figure>& out) {
         row.push_back(shown(i.yield_moment[j], unit::kNm));
         row.push_back(shown(i.peak_moment[j], unit::kNm));
       }
+        is_one_sided = is_one_sided || !std::isfinite(i.yield_moment[j]);
       if (i.direction < 0)
         for (auto* list : {&N, &My, &Mp}) std::reverse(list->begin(), list->end());
       // up on the right side, down on the left one
-      yield.x.insert(yield.x.end(), My.begin(), My.end());
-      yield.y.insert(yield.y.end(), N.begin(), N.end());
+      for (size_t j = 0; j < N.size(); ++j)
+        if (std::isfinite(My[j])) yield.x.push_back(My[j]), yield.y.push_back(N[j]);
       peak.x.insert(peak.x.end(), Mp.begin(), Mp.end());
       peak.y.insert(peak.y.end(), N.begin(), N.end());
     }
@@ -219,6 +221,10 @@ void add_interaction(const RccReport& r, char axis, std::vector<Figure>& out) {
 void add_biaxial(const RccReport& r, std::vector<Figure>& out) {
   Plot p;
   p.title = "Bending about both axes: largest moments";
+  if (is_one_sided)
+    f.caption +=
+        " Near both ends, where the dashed line is missing, the section is not symmetric enough to carry N without a "
+        "moment: it needs one between both sides of the full line.";
   p.x_title = "moment about y [kNm]", p.y_title = "moment about z [kNm]";
   p.legend_title = "normal force N";
   p.width = 720, p.height = 560;

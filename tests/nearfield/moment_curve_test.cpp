@@ -141,6 +141,35 @@ TEST(MomentCurve, InteractionEndsAtCrushingAndRupture) {
   for (size_t k = 0; k < i.normal_force.size(); ++k) EXPECT_LE(i.yield_moment[k], i.peak_moment[k] * (1 + 1e-12));
 }
 
+TEST(MomentCurve, InteractionOfAnUnsymmetricSectionIsOneLoop) {
+  ZoneInput in = make_zone();
+  for (product::Bar& bar : in.section.bars)
+    if (bar.z > 0) bar.area *= 0.2;
+  const Rcc rcc = make_rcc(in);
+  const Fibres f = make_fibres(in, Axis::Y);
+  const Interaction up = make_interaction(f, Axis::Y, 1, rcc.y_pos, in.length, 61);
+  const Interaction down = make_interaction(f, Axis::Y, -1, rcc.y_neg, in.length, 61);
+  const double scale = *std::max_element(down.peak_moment.begin(), down.peak_moment.end());
+  for (const size_t end : {size_t{0}, size_t{60}}) {
+    EXPECT_GT(std::abs(up.peak_moment[end]), 0.05 * scale) << "strained evenly it bears a moment";
+    EXPECT_NEAR(up.peak_moment[end], -down.peak_moment[end], 1e-3 * scale) << "both sides meet at one point";
+    EXPECT_TRUE(std::isnan(up.yield_moment[end]));
+  }
+  int one_sided = 0;
+  for (size_t k = 0; k < 61; ++k) {
+    EXPECT_GE(up.peak_moment[k], -down.peak_moment[k] - 1e-3 * scale) << "the right side is on the right";
+    if (up.peak_moment[k] < 0 || down.peak_moment[k] < 0) {
+      ++one_sided;
+      EXPECT_TRUE(std::isnan(up.yield_moment[k])) << k;
+    }
+    if (k == 0 || k == 60) continue;
+    const auto leap = [&](const Interaction& i) { return std::abs(i.peak_moment[k] - i.peak_moment[k - 1]); };
+    EXPECT_LT(leap(up), 0.3 * scale) << k;
+    EXPECT_LT(leap(down), 0.3 * scale) << k;
+  }
+  EXPECT_GT(one_sided, 4);
+}
+
 TEST(SectionState, ItsStressesIntegrateToTheResultants) {
   const ZoneInput in = make_zone();
   const Rcc rcc = make_rcc(in);
