@@ -16,7 +16,14 @@ namespace {
 
 constexpr double mrad = 1e-3;
 
-const std::vector<std::vector<double>> dashes{{}, {9, 4}, {2, 3}, {12, 3, 2, 3}, {5, 2}, {1, 2, 6, 2}};
+const std::vector<std::vector<double>> dashes{{},           {9, 4},        {2, 3},  {12, 3, 2, 3},      {5, 2},
+                                              {1, 2, 6, 2}, {16, 4, 6, 4}, {18, 5}, {12, 3, 2, 3, 2, 3}};
+constexpr size_t inks = 6;
+
+/// Routes share the ink of their force; 24 forces on two routes differ.
+const std::vector<double>& dash_of_route(size_t k, size_t route, size_t routes) {
+  return routes > 1 ? dashes[(route + routes * (k / inks)) % dashes.size()] : dash_of(k);
+}
 
 std::string force_text(double N) { return fmt::format("{} MN", shown(N, unit::MN)); }
 
@@ -70,7 +77,7 @@ Plot make_moment_plot(const RccReport& r, char axis, double last, bool both) {
     for (size_t route = 0; route < routes.size(); ++route) {
       PlotLine line;
       line.ink = series_ink(k);
-      line.dash = dashes[(routes.size() > 1 ? route : k) % dashes.size()];
+      line.dash = dash_of_route(k, route, routes.size());
       for (const int direction : {-1, 1}) {
         const RccCurve* c = find_curve(r, routes[route], axis, direction, forces[k]);
         if (!c || c->rotation.empty() || (direction < 0 && !both)) continue;
@@ -164,6 +171,7 @@ void add_interaction(const RccReport& r, char axis, std::vector<Figure>& out) {
   Figure f;
   f.table.heads.push_back("N [MN]");
   size_t rows = 0;
+  bool is_one_sided = false;
   for (size_t k = 0; k < routes.size(); ++k) {
     PlotLine yield, peak;
     for (const RccInteraction& i : r.interactions) {
@@ -171,13 +179,13 @@ void add_interaction(const RccReport& r, char axis, std::vector<Figure>& out) {
       const std::string where = routes.size() > 1 ? ", " + i.route : "";
       std::vector<std::string> names{fmt::format("yield M{} [kNm]{}", i.direction < 0 ? "-" : "+", where),
                                      fmt::format("largest M{} [kNm]{}", i.direction < 0 ? "-" : "+", where)};
-  bool is_one_sided = false;
       f.table.heads.insert(f.table.heads.end(), names.begin(), names.end());
       rows = std::max(rows, i.normal_force.size());
       f.table.rows.resize(rows);
       std::vector<double> N, My, Mp;
       for (size_t j = 0; j < i.normal_force.size(); ++j) {
         N.push_back(i.normal_force[j] / unit::MN);
+        is_one_sided = is_one_sided || !std::isfinite(i.yield_moment[j]);
         My.push_back(i.direction * i.yield_moment[j] / unit::kNm);
         Mp.push_back(i.direction * i.peak_moment[j] / unit::kNm);
         std::vector<std::string>& row = f.table.rows[j];
@@ -185,7 +193,6 @@ void add_interaction(const RccReport& r, char axis, std::vector<Figure>& out) {
         row.push_back(shown(i.yield_moment[j], unit::kNm));
         row.push_back(shown(i.peak_moment[j], unit::kNm));
       }
-        is_one_sided = is_one_sided || !std::isfinite(i.yield_moment[j]);
       if (i.direction < 0)
         for (auto* list : {&N, &My, &Mp}) std::reverse(list->begin(), list->end());
       // up on the right side, down on the left one
@@ -214,6 +221,10 @@ void add_interaction(const RccReport& r, char axis, std::vector<Figure>& out) {
       "Strained evenly the section crushes at {} and tears at {} of tension. Between, a moment inside the dashed line "
       "leaves it elastic, one outside the full line is not resisted.",
       force_text(r.crushing_force), force_text(r.rupture_force));
+  if (is_one_sided)
+    f.caption +=
+        " Near both ends, where the dashed line is missing, the section is not symmetric enough to carry N without a "
+        "moment: it needs one between both sides of the full line.";
   f.drawing = draw(p);
   out.push_back(std::move(f));
 }
@@ -221,10 +232,6 @@ void add_interaction(const RccReport& r, char axis, std::vector<Figure>& out) {
 void add_biaxial(const RccReport& r, std::vector<Figure>& out) {
   Plot p;
   p.title = "Bending about both axes: largest moments";
-  if (is_one_sided)
-    f.caption +=
-        " Near both ends, where the dashed line is missing, the section is not symmetric enough to carry N without a "
-        "moment: it needs one between both sides of the full line.";
   p.x_title = "moment about y [kNm]", p.y_title = "moment about z [kNm]";
   p.legend_title = "normal force N";
   p.width = 720, p.height = 560;
@@ -233,7 +240,7 @@ void add_biaxial(const RccReport& r, std::vector<Figure>& out) {
   for (size_t k = 0; k < r.biaxial.size(); ++k) {
     const RccBiaxial& b = r.biaxial[k];
     PlotLine line;
-    line.name = force_text(b.normal_force), line.ink = series_ink(k), line.dash = dashes[k % dashes.size()];
+    line.name = force_text(b.normal_force), line.ink = series_ink(k), line.dash = dash_of(k);
     for (size_t j = 0; j < b.moment_y.size(); ++j) {
       line.x.push_back(b.moment_y[j] / unit::kNm), line.y.push_back(b.moment_z[j] / unit::kNm);
       f.table.rows.push_back(
@@ -268,7 +275,7 @@ void add_axial(const RccReport& r, std::vector<Figure>& out) {
     Figure f;
     for (size_t k = 0; k < r.axial.size(); ++k) {
       PlotLine line;
-      line.name = r.axial[k].route, line.ink = series_ink(k), line.dash = dashes[k % dashes.size()];
+      line.name = r.axial[k].route, line.ink = series_ink(k), line.dash = dash_of(k);
       if (r.axial.size() == 1) line.name.clear();
       for (size_t j = 0; j < r.axial[k].shortening.size(); ++j) {
         line.x.push_back(r.axial[k].shortening[j] / unit::mm);
@@ -341,6 +348,8 @@ bool has_other_direction(const RccReport& r, char axis) {
 }
 
 }  // namespace
+
+const std::vector<double>& dash_of(size_t k) { return dashes[(k + k / inks) % dashes.size()]; }
 
 std::string shown(double value, double unit, int digits) {
   if (!std::isfinite(value)) return "-";

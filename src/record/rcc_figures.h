@@ -26,6 +26,9 @@ struct Figure {
 
 std::vector<Figure> make_figures(const RccReport&);
 
+/// Dash of the k-th line: inks come again after six lines, but never with the same dash; 54 lines differ.
+const std::vector<double>& dash_of(size_t k);
+
 /// A number for people: `digits` significant ones, "-" if there is none.
 std::string shown(double value, double unit, int digits = 4);
 

@@ -156,6 +156,32 @@ TEST(RccPage, HasEveryPlotOnceWithItsTable) {
     EXPECT_TRUE(ids.count(id)) << id;
 }
 
+TEST(RccPage, ManyForcesCanBeToldApart) {
+  RccReport r = sample_report();
+  r.curves.clear();
+  for (int i = 0; i < 50; ++i) r.curves.push_back(sample_curve('y', 1, 1e5 * i));
+  std::set<std::pair<size_t, std::vector<double>>> seen;
+  for (size_t k = 0; k < 50; ++k) EXPECT_TRUE(seen.insert({k % 6, dash_of(k)}).second) << k;
+  const std::vector<Figure> figures = make_figures(r);
+  std::set<std::pair<int, std::vector<double>>> drawn;
+  for (const Shape& s : figures.front().drawing.shapes)
+    if (s.kind == Shape::Kind::Line && s.dots.size() == 4) drawn.insert({static_cast<int>(s.stroke), s.dash});
+  EXPECT_GE(drawn.size(), 50u);
+}
+
+TEST(RccPage, EndsOfUnsymmetricSectionsAreDrawnWhereTheyAre) {
+  RccReport r = sample_report();
+  r.interactions = {{"layered", 'y', 1, {-1e6, 0, 5e6}, {std::nan(""), 3e5, std::nan("")}, {-1e5, 5e5, 2e5}},
+                    {"layered", 'y', -1, {-1e6, 0, 5e6}, {std::nan(""), 3e5, std::nan("")}, {1e5, 5e5, -2e5}}};
+  for (const Figure& f : make_figures(r))
+    if (f.id == "interaction_y") {
+      EXPECT_NE(f.caption.find("without a moment"), std::string::npos);
+      EXPECT_EQ(f.table.rows.back()[1], "-");
+      EXPECT_EQ(f.table.rows.back()[4], "-200");
+      EXPECT_EQ(to_svg(f.drawing).find("nan"), std::string::npos);
+    }
+}
+
 TEST(RccPage, PicturesHoldSectionsOfAnyShape) {
   for (const auto& [width, height] : {std::pair{0.3, 1.5}, {1.5, 0.3}, {5.0, 0.2}}) {
     RccReport r = sample_report();
