@@ -8,7 +8,9 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/unit.h"
+#include "nearfield/family.h"
 #include "nearfield/moment_curve.h"
+#include "rcc_report.h"
 #include "uncertainty/alpha.h"
 #include "uncertainty/fan.h"
 #include "uncertainty/possibility.h"
@@ -21,19 +23,22 @@ using nearfield::Axis;
 using uncertainty::Result;
 
 /// Outcome classes of a run.
-enum Outcome { Carries, LosesForce, LosesMoment, Crushed };
-constexpr const char* outcome_words[] = {"carries the force and resists", "loses the force while it is turned",
-                                         "loses its moment while it is turned", "crushed by the force alone"};
-
-constexpr double longest_share = 0.9;  // of the length over which the concrete can soften
+enum Outcome { Carries, LosesForce, LosesMoment, NotCarried };
+std::string words_of(int outcome, double N) {
+  constexpr const char* words[] = {"carries the force and resists", "loses the force while it is turned",
+                                   "loses its moment while it is turned"};
+  if (outcome != NotCarried) return words[outcome];
+  return N > 0 ? "torn by the force alone" : "crushed by the force alone";
+}
 
 nearfield::ZoneInput to_zone(const product::SectionFile& f) {
   nearfield::ZoneInput in;
   in.section = f.section, in.concrete = f.concrete, in.steel = f.steel, in.length = f.length;
   in.cut_bars = f.cut_bars, in.cut_concrete = f.cut_concrete;
   in.concrete_loss = f.concrete_loss, in.cover_lost = f.cover_lost;
-  // as the manager of a building does: what is stiffly strong cannot soften over the whole length
-  in.length = std::min(in.length, longest_share * nearfield::calc_largest_zone_length(in.concrete));
+  // what is stiffly strong cannot soften over the whole length; other runs keep it, as the crisp curve does
+  const double longest = nearfield::calc_largest_zone_length(in.concrete);
+  if (!(in.length < longest)) in.length = longest_zone_share * longest;
   return in;
 }
 
@@ -131,7 +136,7 @@ record::RccFan make_fan(const product::FuzzyFile& file, const uncertainty::Space
     const std::vector<double> derived = product::calc_derived(file, s.x);
     o.values.insert(o.values.end(), derived.begin(), derived.end());
     if (s.result.state == Result::State::Done) {
-      o.outcome = outcome_words[s.result.outcome];
+      o.outcome = words_of(s.result.outcome, N);
       o.peak = s.result.values[0];
       o.moment = s.result.trajectory;
     } else {
@@ -150,7 +155,7 @@ record::RccFan make_fan(const product::FuzzyFile& file, const uncertainty::Space
     fan.ordinates.push_back({fmt::format("M at {:.3g} mrad", phi / 1e-3), phi, to_cuts(result.outputs[k + 1])});
   }
   for (int outcome = 0; outcome < 4; ++outcome) {
-    record::RccOutcome o{outcome_words[outcome], 0, 0, -1};
+    record::RccOutcome o{words_of(outcome, N), 0, 0, -1};
     for (const uncertainty::ClassBounds& c : result.classes)
       if (c.outcome == outcome) o.count = c.count;
     for (const uncertainty::Possibility& p : possibilities.classes)
@@ -196,17 +201,24 @@ std::optional<record::RccFuzzyReport> make_fuzzy_report(const product::SectionFi
   crushing.levels.clear();
   constexpr int crushing_levels = 20;
   for (int i = 0; i <= crushing_levels; ++i) crushing.levels.push_back(static_cast<double>(i) / crushing_levels);
-  crushing.watch = watched("crushing force");
+  const bool is_pulled =
+      std::any_of(task.normal_forces.begin(), task.normal_forces.end(), [](double N) { return N > 0; });
+  crushing.watch = watched(is_pulled ? "crushing and tearing force" : "crushing force");
   const uncertainty::AlphaResult crush =
-      uncertainty::optimise(space, model.make([axis](const nearfield::ZoneInput& in) {
+      uncertainty::optimise(space, model.make([axis, is_pulled](const nearfield::ZoneInput& in) {
         Result out;
-        out.values = {nearfield::find_crushing(nearfield::make_fibres(in, axis)).force};
+        const nearfield::Fibres fibres = nearfield::make_fibres(in, axis);
+        out.values = {nearfield::find_crushing(fibres).force};
+        double area = 0;
+        for (size_t i = 0; i < fibres.at.size(); ++i) area += fibres.core_area[i] + fibres.cover_area[i];
+        if (is_pulled) out.values.push_back(nearfield::calc_rupture_force(in, area, fibres.cover, out.values.front()));
         out.state = Result::State::Done;
         return out;
       }),
                             crushing, progress);
   if (crush.ending == uncertainty::Ending::Cancelled) return std::nullopt;
   r.crushing = to_cuts(crush.outputs[0]);
+  if (is_pulled) r.tearing = to_cuts(crush.outputs[1]);
 
   const nearfield::ZoneInput core = to_zone(product::make_sample(section, file, uncertainty::calc_centre(space)));
   const nearfield::Rcc rcc = nearfield::make_rcc(core);
@@ -217,10 +229,12 @@ std::optional<record::RccFuzzyReport> make_fuzzy_report(const product::SectionFi
     const nearfield::CurvePoints points = nearfield::find_points(nearfield::make_moment_curve(
         core_fibres, axis, N, task.direction, core.length, nearfield::refine_rotations(family, 4)));
     // as far as the core's residual; a force that crushes the core itself is shown up to its yield of bending alone
-    double last = std::isfinite(points.ultimate.rotation) ? 2 * points.ultimate.rotation
-                                                          : 10 * core.steel.fy / core.steel.Es * core.length /
-                                                                std::min(core.section.width, core.section.height);
-    last = std::min(last, family.rotation.back());
+    const bool has_end = std::isfinite(points.ultimate.rotation);
+    double last =
+        has_end ? 2 * points.ultimate.rotation
+                : 10 * core.steel.fy / core.steel.Es * core.length / std::min(core.section.width, core.section.height);
+    std::string window = has_end ? "twice the ultimate rotation of the core" : "the core has no curve";
+    if (last > family.rotation.back()) last = family.rotation.back(), window = "as far as families go";
     const std::vector<double> rotation = make_grid(last);
     std::vector<size_t> searched;
     for (const double share : {0.05, 0.1, 0.25, 0.5, 0.75, 1.0})
@@ -237,7 +251,7 @@ std::optional<record::RccFuzzyReport> make_fuzzy_report(const product::SectionFi
       out.trajectory = march.moment;
       out.values.push_back(*std::max_element(march.moment.begin(), march.moment.end()));
       for (const size_t j : searched) out.values.push_back(march.moment[j]);
-      out.outcome = march.last < 0                                       ? Crushed
+      out.outcome = march.last < 0                                       ? NotCarried
                     : static_cast<size_t>(march.last) + 1 < kappa.size() ? LosesForce
                     : march.moment.back() <= 0                           ? LosesMoment
                                                                          : Carries;
@@ -258,7 +272,10 @@ std::optional<record::RccFuzzyReport> make_fuzzy_report(const product::SectionFi
                      ? "Some searches have not converged; bounds may lie inside of the true ones."
                      : "The search found nothing better.";
     fan.crushing_possibility = calc_possibility_below(r.crushing, -N);
-    fan.outcomes[Crushed].possibility = std::max(fan.outcomes[Crushed].possibility, fan.crushing_possibility);
+    if (N > 0) fan.tearing_possibility = calc_possibility_below(r.tearing, N);
+    double& alone = fan.outcomes[NotCarried].possibility;
+    alone = std::max({alone, fan.crushing_possibility, fan.tearing_possibility});
+    fan.window = window;
     r.fans.push_back(std::move(fan));
   }
   // shortest zone of all runs
@@ -277,9 +294,8 @@ std::optional<record::RccFuzzyReport> make_fuzzy_report(const product::SectionFi
     }
   if (shortened > 0)
     r.notes.push_back(fmt::format(
-        "In {} of {} runs the zone is shorter than given, down to {:.3g} m: strong concrete of a low modulus would "
-        "give "
-        "back more than its crushing or fracture energy over the whole length. A building's model does the same.",
+        "In {} of {} runs, and in no other, the zone is shorter than given, down to {:.3g} m: strong concrete of a low "
+        "modulus would give back more than its crushing or fracture energy over the whole length.",
         shortened, runs, shortest));
   return r;
 }

@@ -42,7 +42,9 @@ json to_json(const RccFuzzyReport& r, const RccFan& f) {
   for (const RccOutcome& o : f.outcomes)
     j["outcomes"].push_back(
         {{"name", o.name}, {"runs", o.count}, {"possibility", number(o.possibility)}, {"sample", o.sample}});
+  j["turned_to"] = number(f.rotation.back());
   j["crushing_possibility"] = number(f.crushing_possibility);
+  j["tearing_possibility"] = number(f.tearing_possibility);
   j["runs"] = f.originals.size();
   j["failed"] = f.failed;
   j["ending"] = f.ending;
@@ -173,7 +175,7 @@ Figure make_scatter(const RccFuzzyReport& r, const RccFan& f, size_t k) {
     const RccOriginal& o = f.originals[i];
     if (o.outcome == "failed") continue;
     const bool carries = o.outcome == f.outcomes.front().name;
-    const bool is_crushed = o.outcome.rfind("crushed", 0) == 0;
+    const bool is_crushed = o.outcome == f.outcomes.back().name;
     const bool is_force = o.outcome.rfind("loses the force", 0) == 0;
     p.marks.push_back({o.outcome, o.values[input] / in.unit, o.peak / unit::kNm,
                        carries      ? Mark::Circle
@@ -214,14 +216,31 @@ Figure make_crushing(const RccFuzzyReport& r) {
     line.x.push_back(r.crushing[i].right / unit::MN), line.y.push_back(r.crushing[i].alpha);
   p.x_low = 0, p.x_high = 1.05 * *std::max_element(line.x.begin(), line.x.end());
   p.lines.push_back(std::move(line));
+  if (!r.tearing.empty()) {
+    p.title = "Force that crushes or tears the section without bending";
+    p.x_title = "force [MN], compression positive";
+    p.x_low = -1.05 * r.tearing.front().right / unit::MN;
+    PlotLine torn;
+    torn.name = "tearing force", torn.ink = Ink::Series0, torn.width = 2.5, torn.dash = {9, 4};
+    for (const RccInterval& i : r.tearing) {
+      torn.x.push_back(-i.right / unit::MN), torn.y.push_back(i.alpha);
+      out.table.rows.push_back({fmt::format("{:g}", i.alpha), shown(-i.right, unit::MN), shown(-i.left, unit::MN)});
+    }
+    for (size_t i = r.tearing.size(); i-- > 0;)
+      torn.x.push_back(-r.tearing[i].left / unit::MN), torn.y.push_back(r.tearing[i].alpha);
+    p.lines.push_back(std::move(torn));
+  }
   for (size_t k = 0; k < r.fans.size(); ++k) {
     const RccFan& f = r.fans[k];
     PlotLine at;
-    at.name = fmt::format("N = {}: Π = {}", force_text(f.normal_force), possibility_text(f.crushing_possibility));
+    at.name = fmt::format("N = {}: Π = {}", force_text(f.normal_force),
+                          possibility_text(std::max(f.crushing_possibility, f.tearing_possibility)));
+    p.x_low = std::min(p.x_low, 1.05 * f.normal_force / unit::MN);
     at.x = {f.normal_force / unit::MN, f.normal_force / unit::MN}, at.y = {0, 1.08};
-    at.ink = series_ink(k + 1), at.dash = k % 2 == 0 ? std::vector<double>{6, 3} : std::vector<double>{2, 3};
+    at.ink = series_ink(k + 1), at.dash = dash_of(k + 1);
     p.lines.push_back(std::move(at));
-    p.marks.push_back({"possibility that N crushes it", f.normal_force / unit::MN, f.crushing_possibility, Mark::Circle,
+    p.marks.push_back({r.tearing.empty() ? "possibility that N crushes it" : "possibility that N crushes or tears it",
+                       f.normal_force / unit::MN, std::max(f.crushing_possibility, f.tearing_possibility), Mark::Circle,
                        series_ink(k + 1)});
   }
   out.id = "crushing";
@@ -276,14 +295,17 @@ Figure make_inputs(const RccFuzzyReport& r) {
 
 std::string outcomes_html(const RccFuzzyReport& r) {
   std::string out =
-      "<div class=\"wide\"><table><thead><tr><th>N [MN]</th><th class=\"words\">outcome</th><th>possibility "
+      "<div class=\"wide\"><table><thead><tr><th>N [MN]</th><th>turned to [mrad]</th><th "
+      "class=\"words\">outcome</th><th>possibility "
       "Π</th><th>runs</th><th class=\"words\">most possible inputs</th></tr></thead><tbody>\n";
   for (const RccFan& f : r.fans)
     for (const RccOutcome& o : f.outcomes)
       out += fmt::format(
-          "<tr><td>{}</td><td class=\"words\">{}</td><td>{}</td><td>{}</td><td class=\"words\">{}</td></tr>\n",
-          shown(f.normal_force, unit::MN), escape_html(o.name), o.count > 0 ? possibility_text(o.possibility) : "0",
-          o.count, o.sample >= 0 ? escape_html(values_text(r, f.originals[static_cast<size_t>(o.sample)])) : "");
+          "<tr><td>{}</td><td>{}</td><td class=\"words\">{}</td><td>{}</td><td>{}</td><td "
+          "class=\"words\">{}</td></tr>\n",
+          shown(f.normal_force, unit::MN), shown(f.rotation.back(), mrad), escape_html(o.name),
+          possibility_text(o.possibility), o.count,
+          o.sample >= 0 ? escape_html(values_text(r, f.originals[static_cast<size_t>(o.sample)])) : "");
   return out + "</tbody></table></div>\n";
 }
 
@@ -307,23 +329,31 @@ std::string ordinates_html(const RccFuzzyReport& r) {
 
 std::vector<std::string> describe_switch(const RccFuzzyReport& r, const RccFan& f) {
   std::vector<std::string> out;
-  const std::string N = force_text(f.normal_force);
+  const std::string N = force_text(f.normal_force), to = fmt::format("{} mrad", shown(f.rotation.back(), mrad));
+  const auto say = [&](const RccOutcome& o) {
+    if (&o == &f.outcomes.back()) return "is " + o.name;
+    return fmt::format("{} {}{}", o.name, &o == &f.outcomes.front() ? "up to " : "to ", to);
+  };
   const RccOutcome* core = nullptr;
   for (const RccOutcome& o : f.outcomes)
     if (o.name == f.originals[static_cast<size_t>(f.core)].outcome) core = &o;
-  if (core) out.push_back(fmt::format("With the core values the section under {} {}.", N, core->name));
-  if (f.crushing_possibility > 0) {
-    out.push_back(fmt::format(
-        "To the possibility {} it is crushed by the force alone, without any rotation: then the zone gives way "
-        "downwards instead of turning.",
-        possibility_text(f.crushing_possibility)));
+  if (core) out.push_back(fmt::format("With the core values the section under {} {}.", N, say(*core)));
+  const bool is_pulled = f.normal_force < 0;
+  const double alone = is_pulled ? f.tearing_possibility : f.crushing_possibility;
+  if (alone > 0) {
+    out.push_back(
+        fmt::format("To the possibility {} it is {} by the force alone, without any rotation: then the zone {}.",
+                    possibility_text(alone), is_pulled ? "torn" : "crushed",
+                    is_pulled ? "comes apart" : "gives way downwards instead of turning"));
   } else {
-    out.push_back("No set of inputs lets the force crush it without rotation.");
+    out.push_back(fmt::format("No set of inputs lets the force {} it without rotation.", is_pulled ? "tear" : "crush"));
   }
   for (const RccOutcome& o : f.outcomes)
     if (o.name.rfind("loses", 0) == 0 && o.possibility > 0 && o.sample >= 0)
       out.push_back(fmt::format("To the possibility {} it {}, most possibly at {}.", possibility_text(o.possibility),
-                                o.name, values_text(r, f.originals[static_cast<size_t>(o.sample)])));
+                                say(o), values_text(r, f.originals[static_cast<size_t>(o.sample)])));
+  out.push_back(fmt::format("All this holds for a zone that is turned to {}{}; beyond, more of the runs may give way.",
+                            to, f.window.empty() ? "" : " (" + f.window + ")"));
   return out;
 }
 
@@ -353,6 +383,8 @@ std::string to_json(const RccFuzzyReport& r) {
   }
   j["crushing_force"] = json::array();
   for (const RccInterval& i : r.crushing) j["crushing_force"].push_back(to_json(i));
+  j["tearing_force"] = json::array();
+  for (const RccInterval& i : r.tearing) j["tearing_force"].push_back(to_json(i));
   j["fans"] = json::array();
   for (const RccFan& f : r.fans) j["fans"].push_back(to_json(r, f));
   j["notes"] = r.notes;

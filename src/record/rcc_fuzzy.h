@@ -62,6 +62,8 @@ struct RccFan {
   std::vector<RccOriginal> originals;  // every run, in its order
   int core = 0;                        // the run at the middle of the inputs
   double crushing_possibility = 0;     // that the section cannot carry the force at all
+  double tearing_possibility = 0;      // the same under tension
+  std::string window;                  // why the outcomes are those of a zone turned to the last rotation
   int failed = 0;
   std::string failure, ending;  // of the first failed run; of the search
 };
@@ -74,6 +76,7 @@ struct RccFuzzyReport {
   std::uint64_t seed = 1;
   std::vector<RccFuzzyInput> inputs;  // fuzzy ones, then derived ones
   std::vector<RccInterval> crushing;  // force that crushes the section without bending [N]
+  std::vector<RccInterval> tearing;   // that tears it, tension positive; none: no fan is of tension [N]
   std::vector<RccFan> fans;
   std::vector<KeyValue> section;
   std::vector<std::string> notes, not_modelled;

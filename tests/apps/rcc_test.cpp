@@ -26,11 +26,12 @@ namespace fs = std::filesystem;
 
 const std::string section = TOPPLE_SOURCE_DIR "/examples/rcc/zone_I.toml";
 
-fs::path run(const std::string& name, const std::string& more) {
+fs::path run(const std::string& name, const std::string& more, const std::string& file = section,
+             bool is_again = false) {
   const fs::path folder = fs::path(testing::TempDir()) / "topple_rcc" / name;
-  fs::remove_all(folder);
+  if (!is_again) fs::remove_all(folder);
   const std::string command =
-      std::string(TOPPLE_PROGRAM) + " rcc " + section + " " + more + " -o " + folder.string() + " >/dev/null";
+      std::string(TOPPLE_PROGRAM) + " rcc " + file + " " + more + " -o " + folder.string() + " >/dev/null";
   EXPECT_EQ(std::system(command.c_str()), 0) << command;
   return folder;
 }
@@ -128,6 +129,90 @@ TEST(RccCommand, PicturesArePngsOfTheStatedSize) {
   EXPECT_GE(pictures, 8);
 }
 
+const char* const beam =
+    "[concrete.c]\nfc = \"30 N/mm2\"\nEc = \"31 GPa\"\n[steel.s]\nfy = \"500 N/mm2\"\nfu = \"550 N/mm2\"\neps_u = \"5 "
+    "%\"\n"
+    "[section.beam]\nwidth = \"30 cm\"\nheight = \"60 cm\"\nconcrete = \"c\"\nsteel = \"s\"\ncover = \"3 cm\"\n"
+    "ties = { diameter = \"8 mm\", spacing = \"15 cm\" }\ntop = \"2 x 12 mm\"\nbottom = \"4 x 25 mm\"\n"
+    "[zone]\nlength = \"30 cm\"\n";
+
+TEST(RccCommand, ForcesCarriedToOneSideHaveNoYield) {
+  const OwnFolder own;
+  replace_file(own / "beam.toml", beam);
+  const fs::path folder = run("one_side", "--normal-force \"5.7 MN\"", own / "beam.toml");
+  const auto j = nlohmann::json::parse(read_file((folder / "rcc.json").string()));
+  const auto& c = j["curves"][0];
+  EXPECT_GT(c["peak"]["moment"].get<double>(), 250e3);
+  EXPECT_TRUE(c["yield"]["rotation"].is_null());
+  EXPECT_TRUE(c["yield"]["moment"].is_null());
+  EXPECT_TRUE(c["stiffness_effective"].is_null());
+  for (const auto& s : j["states"]) EXPECT_FALSE(s["axis"] == "y" && s["point"] == "yield");
+  EXPECT_TRUE(j["biaxial_exponent"].is_null());
+  EXPECT_NE(j["notes"].dump().find("5.7 MN there is no moment about z alone"), std::string::npos);
+}
+
+TEST(RccCommand, NotesTellWhatStiffnessAndMomentsAreWorth) {
+  const OwnFolder own;
+  replace_file(own / "beam.toml", beam);
+  const fs::path folder = run("notes", "--normal-force 0", own / "beam.toml");
+  const auto j = nlohmann::json::parse(read_file((folder / "rcc.json").string()));
+  const std::string notes = j["notes"].dump();
+  EXPECT_NE(notes.find("EI eff is that before cracking about +y under 0 MN"), std::string::npos) << notes;
+  EXPECT_NE(notes.find("turning about z alone"), std::string::npos) << notes;
+  const auto& line = j["biaxial"][0];
+  EXPECT_EQ(line["moment_y"].back().get<double>(), 0);
+  EXPECT_NEAR(line["moment_z"].back().get<double>(), 107e3, 1.5e3);
+}
+
+TEST(RccCommand, LeavesNothingOfAnEarlierRun) {
+  const fs::path folder = run("again", "--normal-force \"1 MN\" --normal-force \"2 MN\"");
+  EXPECT_TRUE(fs::exists(folder / "section_y_pos_2.png"));
+  replace_file((folder / "section_y_pos_2b.png").string(), "mine");
+  replace_file((folder / "fan_1.png").string(), "of a fuzzy run");
+  run("again", "--normal-force \"1 MN\"", section, true);
+  EXPECT_TRUE(fs::exists(folder / "section_y_pos_1.png"));
+  EXPECT_FALSE(fs::exists(folder / "section_y_pos_2.png"));
+  EXPECT_FALSE(fs::exists(folder / "fan_1.png"));
+  EXPECT_TRUE(fs::exists(folder / "section_y_pos_2b.png"));
+}
+
+TEST(RccFuzzyCommand, CoreIsTheCrispCurveOfLongZonesToo) {
+  const OwnFolder own;
+  std::string text = read_file(section);
+  const std::string length = "length = \"39 cm\"";
+  text.replace(text.find(length), length.size(), "length = \"94 cm\"");  // 0.97 of the longest
+  replace_file(own / "long.toml", text);
+  replace_file(own / "fuzzy.toml",
+               "steel.fy = { triangular = [\"400 N/mm2\", \"420 N/mm2\", \"440 N/mm2\"] }\n[search]\nlevels = [0, "
+               "1]\nsamples = 60\n");
+  const fs::path folder = run("long", "--normal-force \"2.9 MN\" --fuzzy " + (own / "fuzzy.toml"), own / "long.toml");
+  const auto crisp = nlohmann::json::parse(read_file((folder / "rcc.json").string()));
+  const auto j = nlohmann::json::parse(read_file((folder / "fuzzy.json").string()));
+  const auto core = j["fans"][0]["core"].get<std::vector<double>>();
+  const double peak = crisp["curves"][0]["peak"]["moment"].get<double>();
+  EXPECT_NEAR(*std::max_element(core.begin(), core.end()), peak, 2e-3 * peak);
+  EXPECT_TRUE(j["notes"].empty());
+  // twice the ultimate rotation, and the page says so
+  const double turned = j["fans"][0]["turned_to"].get<double>();
+  EXPECT_NEAR(turned, 2 * crisp["curves"][0]["ultimate"]["rotation"].get<double>(), 1e-6);
+  EXPECT_NE(read_file((folder / "fuzzy.html").string()).find("turned to 35."), std::string::npos);
+}
+
+TEST(RccFuzzyCommand, TensionTears) {
+  const OwnFolder own;
+  replace_file(own / "fuzzy.toml",
+               "steel.fu = { triangular = [\"480 N/mm2\", \"500 N/mm2\", \"540 N/mm2\"] }\n[search]\nlevels = [0, "
+               "1]\nsamples = 60\n");
+  const fs::path folder = run("tension", "--normal-force=\"-3.3 MN\" --fuzzy " + (own / "fuzzy.toml"));
+  const auto j = nlohmann::json::parse(read_file((folder / "fuzzy.json").string()));
+  EXPECT_NEAR(j["tearing_force"].back()["left"].get<double>(), 3.2e6, 1e3);
+  EXPECT_EQ(j["fans"][0]["outcomes"][3]["name"], "torn by the force alone");
+  EXPECT_EQ(j["fans"][0]["outcomes"][3]["possibility"].get<double>(), 1);
+  EXPECT_EQ(j["fans"][0]["tearing_possibility"].get<double>(), 1);
+  EXPECT_EQ(j["fans"][0]["crushing_possibility"].get<double>(), 0);
+  EXPECT_EQ(read_file((folder / "fuzzy.html").string()).find("crushed by the force alone"), std::string::npos);
+}
+
 std::vector<std::vector<std::string>> read_table(const fs::path& path) {
   std::vector<std::vector<std::string>> rows;
   std::istringstream lines(read_file(path.string()));
@@ -218,7 +303,8 @@ TEST(RccFuzzyCommand, EveryOriginalIsTheCurveOfItsInputs) {
     const product::SectionFile s = product::make_sample(file, fuzzy, point);
     nearfield::ZoneInput in;
     in.section = s.section, in.concrete = s.concrete, in.steel = s.steel;
-    in.length = std::min(s.length, 0.9 * nearfield::calc_largest_zone_length(s.concrete));
+    const double longest = nearfield::calc_largest_zone_length(s.concrete);
+    in.length = s.length < longest ? s.length : 0.9 * longest;
     std::vector<double> kappa(rotation);
     for (double& k : kappa) k /= in.length;
     const auto march = nearfield::march_curvature(nearfield::make_fibres(in, nearfield::Axis::Y), -2.9e6, 1, kappa);

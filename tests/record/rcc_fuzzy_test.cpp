@@ -43,9 +43,9 @@ TEST(RccFuzzy, PageStandsAloneAndSaysWhatCanHappen) {
     EXPECT_EQ(page.find(outside), std::string::npos) << outside;
   for (const char* text :
        {"Fuzzy &lt;column&gt;", "To the possibility 0.17 it is crushed by the force alone",
-        "To the possibility 0.4 it loses the force while it is turned, most possibly at fc = 16 N/mm2",
-        "With the core values the section under 4 MN carries the force", "1.4 * ((fc - 8) / 10)^(2/3)",
-        "Table of values", "fuzzy.toml", "9.9.9", "A note.", "Slip.", "seed 1"})
+        "To the possibility 0.4 it loses the force while it is turned to 10 mrad, most possibly at fc = 16 N/mm2",
+        "With the core values the section under 4 MN carries the force and resists up to 10 mrad",
+        "1.4 * ((fc - 8) / 10)^(2/3)", "Table of values", "fuzzy.toml", "9.9.9", "A note.", "Slip.", "seed 1"})
     EXPECT_NE(page.find(text), std::string::npos) << text;
   for (const char* id : {"crushing", "fan_1", "switch_1", "inputs"})
     EXPECT_NE(page.find(std::string("<figure id=\"") + id + "\">\n<div class=\"wide\" tabindex=\"0\"><svg"),
