@@ -102,14 +102,14 @@ Task read_member_task(const Arguments& a, std::vector<Diagnostic>& warnings, std
   return task;
 }
 
-/// Forces of the command line, tension positive; a bare number counts in newtons.
+/// Forces of the command line, tension positive; only 0 needs no unit.
 std::vector<double> read_forces(const std::vector<std::string>& typed) {
   std::vector<double> out;
   for (const std::string& text : typed) {
     Quantity q = parse_quantity(text, Dimension::Force);
     if (!q.value) {
       const Quantity bare = parse_quantity(text, Dimension::Number);
-      if (bare.value) q = bare;
+      if (bare.value && *bare.value == 0) q = bare;
     }
     if (!q.value)
       throw InputError("E801", fmt::format("--normal-force \"{}\": {}", text, q.problem),

@@ -469,6 +469,12 @@ rcc)
   expect 0 "$topple" rcc "$zone" --normal-force "20 MN"; has out "cannot be carried: strained evenly the section crushes at 8.91 MN"
   expect 0 "$topple" rcc "$zone" --normal-force "-9 MN"; has out "cannot be carried: strained evenly the section tears at 3.2 MN"
   expect 2 "$topple" rcc "$zone" --normal-force "3 apples"; has err "--normal-force"; has err "units: N, kN, MN"
+  expect 2 "$topple" rcc "$zone" --normal-force 3.7; has err "has no unit"; expect 0 "$topple" rcc "$zone" --normal-force 0
+  for idle in "--rotation 1deg" "--element-size 5cm" "--axis z" "--direction -" "--knowledge rules.json"; do
+    expect 2 "$topple" rcc "$zone" $idle; has err "has no effect"
+  done
+  sed 's/^length = .*//; s/"50 cm"/"110 cm"/g' "$zone" >deep.toml; expect 0 "$topple" rcc deep.toml --normal-force 0
+  has out "shorter than one depth of the section (1.1 m)"
   expect 2 "$topple" rcc "$zone" --zone top; expect 2 "$topple" rcc "$zone" --zone middle --member C-A1-0
   # mistakes stand at their places
   sed 's/^eps_u/esp_u/' "$zone" >wrong.toml; expect 2 "$topple" rcc wrong.toml -o none
