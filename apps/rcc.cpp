@@ -62,14 +62,20 @@ Task read_section_task(const Arguments& a, std::vector<Diagnostic>& warnings, st
   task.name = f.section.name;
   task.file = f;
   const double longest = nearfield::calc_largest_zone_length(f.concrete);
-  if (!(f.length < longest))
+  if (f.length < longest) return task;
+  if (f.has_length)
     throw InputError(std::vector<Diagnostic>{
         {Severity::Error, "E611", f.where_length, 1,
          fmt::format(
              "zone: length: {:.4g} m is too long for this concrete: it would give back more than its crushing or "
              "fracture energy",
              f.length),
-         fmt::format("allowed: below {:.4g} m; without [zone] it is one depth of the section", longest)}});
+         fmt::format("allowed: below {:.4g} m; without it the program chooses", longest)}});
+  task.zone.length = longest_zone_share * longest;
+  task.notes.push_back(
+      fmt::format("The zone is {:.3g} m long, shorter than one depth of the section ({:.3g} m): over that length the "
+                  "concrete would give back more than its crushing or fracture energy.",
+                  task.zone.length, f.length));
   return task;
 }
 
