@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <optional>
+#include <regex>
 #include <string>
 #include <vector>
 
@@ -178,6 +179,32 @@ struct Writer {
   }
 };
 
+/// Names that this command gives to its files.
+bool is_own_name(const std::string& name) {
+  static const std::regex own(
+      R"((points|curves|interaction|biaxial|axial|states|solid_states|fan|samples|originals)\.csv|(rcc|fuzzy)\.(json|html)|)"
+      R"(moment_[yz](_beginning)?\.png|interaction_[yz]\.png|(biaxial|axial|axial_whole|crushing|inputs)\.png|)"
+      R"((solid|fan|switch)_[0-9]+\.png|section_[yz]_(pos|neg)_[0-9]+\.png)");
+  return std::regex_match(name, own);
+}
+
+/// Takes away what an earlier run left in a folder and this one has not written anew; how many files.
+int remove_earlier(const std::string& folder, const Files& written) {
+  std::vector<fs::path> earlier;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const auto is_it = [&](const auto& file) { return fs::path(file.second).filename() == entry.path().filename(); };
+    if (entry.is_regular_file() && is_own_name(entry.path().filename().string()) &&
+        std::none_of(written.begin(), written.end(), is_it))
+      earlier.push_back(entry.path());
+  }
+  int removed = 0;
+  for (const fs::path& path : earlier) {
+    std::error_code error;
+    removed += fs::remove(path, error);
+  }
+  return removed;
+}
+
 void write_rcc_files(const record::RccReport& r, Writer& out) {
   const auto write = [&out](const char* what, const char* name, const std::string& bytes) {
     out.write(what, name, bytes);
@@ -324,10 +351,13 @@ int compute_rcc(const Arguments& a, const std::atomic<bool>& cancel) {
       print_fuzzy(out, *fans);
     }
     if (!a.output.empty()) {
+      const bool is_again = fs::exists(fs::path(a.output) / "rcc.json");
       make_folder(a.output);
       Writer writer{a.output, {}};
       write_rcc_files(report, writer);
       if (fans) write_fuzzy_files(*fans, writer);
+      const int removed = is_again ? remove_earlier(a.output, writer.files) : 0;
+      if (removed > 0) std::fprintf(out, "Took away %d files of an earlier run.\n", removed);
       for (const auto& [what, path] : writer.files) std::fprintf(out, "Wrote %s\n", path.c_str());
     }
     if (a.json) std::printf("%s\n", (fans ? record::to_json(*fans) : record::to_json(report)).c_str());
