@@ -136,6 +136,25 @@ double read_positive(const std::string& text, Dimension dimension, const char* o
   return *q.value;
 }
 
+/// Options that would be read and have no effect.
+void refuse_idle_options(const Arguments& a) {
+  const auto refuse = [](const std::string& option, const char* of, const char* help) {
+    throw InputError("E801", fmt::format("{} has no effect: {}", option, of), help);
+  };
+  if (a.route == "layered") {
+    const char* help = "add --route solid or --route both";
+    if (!a.rotation.empty()) refuse("--rotation", "it is of the solid route", help);
+    if (!a.element_size.empty()) refuse("--element-size", "it is of the solid route", help);
+    const char* more = "leave it out: layered curves are of both axes and directions; or add --fuzzy or --route solid";
+    if (a.fuzzy.empty() && a.axis != "y")
+      refuse("--axis " + a.axis, "it is of fuzzy curves and of the solid route", more);
+    if (a.fuzzy.empty() && a.direction != "+")
+      refuse("--direction " + a.direction, "it is of fuzzy curves and of the solid route", more);
+  }
+  if (a.member.empty() && !a.knowledge.empty())
+    refuse("--knowledge", "its rules are for the members of a plan", "add --member NAME");
+}
+
 std::string cell(double value, double scale, int digits) {
   return std::isfinite(value) ? fmt::format("{:.{}f}", value / scale, digits) : "-";
 }
@@ -305,6 +324,7 @@ int compute_rcc(const Arguments& a, const std::atomic<bool>& cancel) {
     const std::vector<double> typed = read_forces(a.normal_forces);
     read_positive(a.rotation, Dimension::Angle, "--rotation");  // before any work
     read_positive(a.element_size, Dimension::Length, "--element-size");
+    refuse_idle_options(a);
     Task task = a.member.empty() ? read_section_task(a, warnings, text) : read_member_task(a, warnings, text);
     std::optional<product::FuzzyFile> fuzzy;
     if (!a.fuzzy.empty()) {
