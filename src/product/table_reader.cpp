@@ -133,9 +133,10 @@ double read_value(const Node& node, const std::string& label, Dimension dimensio
     }
     value = *quantity.value;
     written = quoted(node.text);
-    // samples are written to the last digit in SI
+    // samples are written in SI, to the last digit
     constexpr size_t longest_by_hand = 20;
-    if (const auto [unit, size] = usual_unit(dimension); node.text.size() > longest_by_hand)
+    const bool is_sample = node.text.size() > longest_by_hand || node.text.ends_with(" Pa");
+    if (const auto [unit, size] = usual_unit(dimension); is_sample)
       written = quoted(number_text(value / size) + (*unit ? std::string(" ") + unit : ""));
   } else if (node.kind == Node::Kind::Integer || node.kind == Node::Kind::Float) {
     if (dimension != Dimension::Number) {

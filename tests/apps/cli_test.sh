@@ -483,6 +483,9 @@ rcc)
   has err "long.toml:30:10: error E611: zone: length"
   expect 2 "$topple" rcc wrong.toml --json; is_json out; has out '"line": 16'
   expect 2 "$topple" rcc missing.toml; expect 2 "$topple" rcc .; : >empty.toml; expect 2 "$topple" rcc empty.toml
+  has err "the section file is empty"; expect 2 "$topple" rcc "$zone" --fuzzy empty.toml; has err "the file of fuzzy inputs is empty"
+  { echo 'concrete.fc = { triangular = ["20 N/mm2", "25 N/mm2", "40 N/mm2"] }'; echo 'concrete.fct = { formula = "(fc - 26) / 30" }'; } >negative.toml
+  expect 2 "$topple" rcc "$zone" --fuzzy negative.toml; has err '-0.0333333 N/mm2'; lacks err ' Pa"'
   [ ! -e none ] || { echo "a folder was made for a wrong section"; failures=$((failures + 1)); }
   # the solid route
   coarse=(--element-size "15 cm" --rotation "0.002 rad")
