@@ -138,7 +138,7 @@ TEST(FuzzyPlan, ComplainsWhereTheFaultStands) {
       {"[fuzzy]\nconcrete.C25.Gcl = { formula = \"2 * «fz»\" }\nsite.friction = { triangular = [0.5, 0.6, 0.7] }\n",
        "E208", "fz", ""},
       {"[fuzzy]\nconcrete.C25.«fc» = { triangular = [\"0.1 N/mm2\", \"25 N/mm2\", \"45 N/mm2\"] }\n", "E205",
-       "fc = 0.1 N/mm2 is not possible: concrete.C25: fc: \"100000 Pa\" is out of range", ""},
+       "fc = 0.1 N/mm2 is not possible: concrete.C25: fc: \"0.1 N/mm2\" is out of range", ""},
       {"[fuzzy]\nconcrete.C25.fc = { triangular = [\"20 N/mm2\", \"25 N/mm2\", \"45 N/mm2\"] }\n"
        "concrete.\"*\".«fc» = { triangular = [\"20 N/mm2\", \"25 N/mm2\", \"45 N/mm2\"] }\n",
        "E207", "second time", "first on line"},
