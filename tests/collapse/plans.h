@@ -55,6 +55,20 @@ inline std::string grid(const std::string& rows, const std::string& frames, int 
          "\nheight = \"3 m\"\n" + (load.empty() ? "" : "load = \"" + load + "\"\n");
 }
 
+/// A site's law of vibration.
+inline std::string vibration_law() {
+  return R"toml([site.vibration]
+velocity = "2 mm/s"
+energy = "1 MJ"
+distance = "10 m"
+energy_exponent = 0.5
+distance_exponent = 1.2
+factor = 2
+frequency = ["8 Hz", "30 Hz"]
+source = "drop tests on the site"
+)toml";
+}
+
 inline std::string analysis(const std::string& duration = "1 s") {
   return "[analysis]\nduration = \"" + duration + "\"\n";
 }

@@ -24,16 +24,7 @@ using Json = nlohmann::ordered_json;
 
 /// Both columns of row A go at 0.2 s; the row of B at 0.6 s. Beside a house, with the site's law of vibration.
 product::Plan two_stages(const std::string& second = "0.6 s", const std::string& duration = "1 s") {
-  const std::string site = R"toml([site.vibration]
-velocity = "2 mm/s"
-energy = "1 MJ"
-distance = "10 m"
-energy_exponent = 0.5
-distance_exponent = 1.2
-factor = 2
-frequency = ["8 Hz", "30 Hz"]
-source = "made up"
-[[site.neighbour]]
+  const std::string site = vibration_law() + R"toml([[site.neighbour]]
 name = "House"
 footprint = [["-8 m", "0 m"], ["-6 m", "0 m"], ["-6 m", "8 m"]]
 vibration_limit = "5 mm/s"

@@ -238,16 +238,7 @@ const record::Finding& finding(const record::Record& r, const std::string& id) {
 }
 
 std::string site() {
-  return R"toml([site.vibration]
-velocity = "2 mm/s"
-energy = "1 MJ"
-distance = "10 m"
-energy_exponent = 0.5
-distance_exponent = 1.2
-factor = 2
-frequency = ["8 Hz", "30 Hz"]
-source = "drop tests on the site"
-[[site.neighbour]]
+  return vibration_law() + R"toml([[site.neighbour]]
 name = "Far"
 footprint = [["-900 m", "0 m"], ["-890 m", "0 m"], ["-890 m", "8 m"]]
 building_class = "residential"
