@@ -65,6 +65,7 @@ void System::note_landing(std::uint32_t slot) {
 }
 
 void System::say_landing(size_t b, double approach) const {
+  if (!options.on_happening) return;
   const State& s = state;
   const auto energy_of = [&s](size_t i) { return 0.5 * (s.body[i].mass * dot(s.v[i], s.v[i]) + dot(s.w[i], s.L[i])); };
   Landing landing{s.p[b], energy_of(b), -s.body[b].mass * dot(s.v[b], model.contact.normal), 0};
