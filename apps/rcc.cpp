@@ -72,7 +72,7 @@ Task read_section_task(const Arguments& a, std::vector<Diagnostic>& warnings, st
              "fracture energy",
              f.length),
          fmt::format("allowed: below {:.4g} m; without it the program chooses", longest)}});
-  task.zone.length = longest_zone_share * longest;
+  task.zone.length = nearfield::kLongestZoneShare * longest;
   task.notes.push_back(
       fmt::format("The zone is {:.3g} m long, shorter than one depth of the section ({:.3g} m): over that length the "
                   "concrete would give back more than its crushing or fracture energy.",

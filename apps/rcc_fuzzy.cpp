@@ -10,7 +10,7 @@
 #include "base/unit.h"
 #include "nearfield/family.h"
 #include "nearfield/moment_curve.h"
-#include "rcc_report.h"
+#include "nearfield/rcc.h"
 #include "uncertainty/alpha.h"
 #include "uncertainty/fan.h"
 #include "uncertainty/possibility.h"
@@ -38,7 +38,7 @@ nearfield::ZoneInput to_zone(const product::SectionFile& f) {
   in.concrete_loss = f.concrete_loss, in.cover_lost = f.cover_lost;
   // what is stiffly strong cannot soften over the whole length; other runs keep it, as the crisp curve does
   const double longest = nearfield::calc_largest_zone_length(in.concrete);
-  if (!(in.length < longest)) in.length = longest_zone_share * longest;
+  if (!(in.length < longest)) in.length = nearfield::kLongestZoneShare * longest;
   return in;
 }
 

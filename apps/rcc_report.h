@@ -9,9 +9,6 @@
 
 namespace topple::apps {
 
-/// Of the length over which the concrete can soften: zones that would be too long, as a building's are cut.
-inline constexpr double longest_zone_share = 0.9;
-
 /// Normal forces when none are asked for: shares of the crushing force, rounded to two digits; tension positive [N].
 std::vector<double> choose_forces(const nearfield::Rcc&);
 

@@ -361,7 +361,7 @@ double calc_zone_length(const product::Section& section, const product::Concrete
       std::max(k.zone_length_by_depth * depth,
                k.zone_length_by_span * 0.5 * clear_length + k.zone_length_by_bar * (steel.fy / unit::MPa) * diameter);
   // a zone that is longer than this would release more than the crushing energy at once
-  const double longest = 0.9 * nearfield::calc_largest_zone_length(concrete);
+  const double longest = nearfield::kLongestZoneShare * nearfield::calc_largest_zone_length(concrete);
   return std::min({wanted, k.zone_length_at_most * clear_length, longest});
 }
 

@@ -208,9 +208,10 @@ std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) const {
     const double fall = start_[b].p.z - v.X_WB[b].p.z;
     const bool has_moved = norm(v.X_WB[b].p - start_[b].p) > far;
     // what is low cannot fall far: half of its height, or it has turned over
-    const Mat3 turn_over = to_matrix(v.X_WB[b].q * conjugate(start_[b].q));
-    const bool is_down = has_moved && (fall > std::min(far, 0.5 * start_[b].p.z) ||
-                                       turn_over(2, 2) < std::cos(k_.mechanism_topple_rotation));
+    const auto has_turned_over = [&] {
+      return to_matrix(v.X_WB[b].q * conjugate(start_[b].q))(2, 2) < std::cos(k_.mechanism_topple_rotation);
+    };
+    const bool is_down = has_moved && (fall > std::min(far, 0.5 * start_[b].p.z) || has_turned_over());
     if (map_.bodies[b].structure < 0) {
       beside += m;
       if (is_down) beside_moved += m;

@@ -349,7 +349,7 @@ void Builder::make_shaft(int index) {
     ring.bar_diameter = s.bar_diameter, ring.cover = s.cover;
     ring.hoop_diameter = s.hoop_diameter, ring.hoop_spacing = s.hoop_spacing;
     ring.length = std::min({k.zone_length_by_depth * 2 * ring.outer, joint.length,
-                            0.9 * nearfield::calc_largest_zone_length(ring.concrete)});
+                            nearfield::kLongestZoneShare * nearfield::calc_largest_zone_length(ring.concrete)});
     if (joint.height > 0) ring.length = std::min(ring.length, joint.height);
 
     struct Owner {

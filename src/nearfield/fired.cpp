@@ -169,12 +169,12 @@ FiredZone make_fired_zone(const ZoneInput& intact, const LocalDamage& damage) {
   ZoneInput beside = intact;
   beside.concrete_loss = std::max(intact.concrete_loss, damage.transition_damage);
   beside.cover_lost = true;
-  beside.length = std::min(std::max(s.width, s.height), 0.9 * calc_largest_zone_length(intact.concrete));
+  beside.length = std::min(std::max(s.width, s.height), kLongestZoneShare * calc_largest_zone_length(intact.concrete));
   out.transition = make_rcc(beside);
 
   if (damage.residual_concrete > 0) {
     ZoneInput left = beside;
-    left.length = std::min(h, 0.9 * calc_largest_zone_length(intact.concrete));
+    left.length = std::min(h, kLongestZoneShare * calc_largest_zone_length(intact.concrete));
     left.cut_concrete = 1 - (1 - intact.cut_concrete) * damage.residual_concrete;
     left.cut_bars = 1 - share;
     left.section.tie_spacing = 0;

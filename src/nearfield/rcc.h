@@ -85,6 +85,9 @@ Rcc make_rcc(const ZoneInput&);
 /// energy [m]. Losses of strength do not change it.
 double calc_largest_zone_length(const product::Concrete&);
 
+/// Zones that would be longer are cut to this share of it.
+inline constexpr double kLongestZoneShare = 0.9;
+
 /// What a fired charge leaves: a bare cage of η_s of the bars over the destroyed length. No concrete.
 struct ResidualCage {
   AxialCurve compression, tension;    // bars buckle in compression, yield in tension

@@ -16,18 +16,6 @@ double side(const CutPlane& plane, const Vec3& p) {
   return std::abs(d) < kOn ? 0 : d;
 }
 
-/// What is left of a loop; of bent-in ones the parts hang together along the plane.
-Loop clip_loop(const Loop& loop, const CutPlane& plane) {
-  Loop out;
-  for (size_t i = 0; i < loop.size(); ++i) {
-    const Vec3 &a = loop[i], &b = loop[(i + 1) % loop.size()];
-    const double da = side(plane, a), db = side(plane, b);
-    if (da <= 0) out.push_back(a);
-    if (da * db < 0) out.push_back(a + (da / (da - db)) * (b - a));
-  }
-  return out;
-}
-
 /// Faces of a prism, those of holes turned inwards.
 std::vector<Loop> faces_of(const Solid& solid) {
   std::vector<Loop> out;
@@ -55,7 +43,7 @@ bool clip_faces(std::vector<Loop>& faces, const CutPlane& plane) {
   std::vector<std::pair<Vec3, Vec3>> rim;  // edges of what closes the cut
   for (const Loop& face : faces) {
     if (std::all_of(face.begin(), face.end(), [&](const Vec3& p) { return side(plane, p) == 0; })) continue;
-    Loop left = clip_loop(face, plane);
+    Loop left = clip(face, plane);
     if (left.size() < 3) continue;
     for (size_t i = 0; i < left.size(); ++i) {
       const Vec3 &a = left[i], &b = left[(i + 1) % left.size()];
@@ -84,7 +72,7 @@ bool clip_solid(const Solid& solid, const CutPlane& plane, Shape& out) {
   if (low > -kOn) return true;
   Solid left = solid;
   if (std::abs(rise) < kOn) {  // along its sides
-    for (Loop& loop : left.loops) loop = clip_loop(loop, plane);
+    for (Loop& loop : left.loops) loop = clip(loop, plane);
     if (!(norm(calc_normal(left.loops.front())) > kNoArea)) return true;
     std::erase_if(left.loops, [](const Loop& loop) { return !(norm(calc_normal(loop)) > kNoArea); });
     out.solids.push_back(std::move(left));
@@ -131,6 +119,17 @@ std::vector<Vec3> Solid::faces() const {
   std::vector<Vec3> out{calc_normal(outline), calc_normal(outline)};
   for (size_t i = 0; i < outline.size(); ++i)
     out.push_back(2 * cross(outline[(i + 1) % outline.size()] - outline[i], way));
+  return out;
+}
+
+Loop clip(const Loop& loop, const CutPlane& plane) {
+  Loop out;
+  for (size_t i = 0; i < loop.size(); ++i) {
+    const Vec3 &a = loop[i], &b = loop[(i + 1) % loop.size()];
+    const double da = side(plane, a), db = side(plane, b);
+    if (da <= 0) out.push_back(a);
+    if (da * db < 0) out.push_back(a + (da / (da - db)) * (b - a));
+  }
   return out;
 }
 

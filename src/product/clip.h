@@ -36,6 +36,9 @@ struct CutPlane {
   Vec3 p, normal;  // [m]; of length 1
 };
 
+/// What is left of a loop; of bent-in ones the parts hang together along the plane.
+Loop clip(const Loop&, const CutPlane&);
+
 /// Cuts along the plane: what stays a prism stays a solid, the rest become meshes. Whether anything was cut off.
 bool clip(Shape&, const CutPlane&);
 

@@ -284,9 +284,9 @@ std::string name_of(Node::Kind kind) {
   return "a value";
 }
 
-Node parse_document(const std::string& text, const std::string& file) {
-  if (text.find_first_not_of(" \t\r\n") == std::string::npos)
-    fail(file, "E104", {}, "the plan is empty", "`topple new` writes a commented plan to begin with");
+Node parse_document(const std::string& text, const std::string& file, const std::string& what,
+                    const std::string& help) {
+  if (text.find_first_not_of(" \t\r\n") == std::string::npos) fail(file, "E104", {}, what + " is empty", help);
   check_encoding(text, file);
   check_key_depth(text, file);
   try {

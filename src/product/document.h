@@ -41,6 +41,8 @@ struct Entry {
 std::string name_of(Node::Kind);
 
 /// Parses a text without a byte order mark. Throws InputError E101 to E105 with one complaint.
-Node parse_document(const std::string& text, const std::string& file);
+///   what, help  what is said of a text without anything in it: which file that is, and what to do
+Node parse_document(const std::string& text, const std::string& file, const std::string& what = "the plan",
+                    const std::string& help = "`topple new` writes a commented plan to begin with");
 
 }  // namespace topple::product

@@ -2,7 +2,8 @@
 
 #include <cmath>
 #include <cstddef>
-#include <utility>
+
+#include "product/clip.h"
 
 namespace topple::product {
 
@@ -25,7 +26,7 @@ bool goes_back(const Point& a, const Point& b, const Point& c) {
 }
 
 /// Whether p, seen from a corner, lies between the directions to `from` and, counterclockwise, `to`.
-bool is_in_sector(const Point& corner, const Point& from, const Point& to, const Point& p) {
+bool lies_between(const Point& corner, const Point& from, const Point& to, const Point& p) {
   const double turn_p = cross(corner, from, p), turn_to = cross(corner, from, to), left = cross(corner, p, to);
   return turn_to >= 0 ? turn_p > 0 && left > 0 : turn_p > 0 || left > 0;
 }
@@ -61,30 +62,22 @@ bool crosses_itself(const std::vector<Point>& all) {
       if (cross(a, b, c) * cross(a, b, d) < 0 && cross(c, d, a) * cross(c, d, b) < 0) return true;
       // through a corner that lies on an edge or on another corner
       if (is_within(a, b, d) && cross(a, b, c) * cross(a, b, next) < 0) return true;
-      if (a == d && is_in_sector(a, b, before, c) != is_in_sector(a, b, before, next) && !shares(before, b, c, next))
+      if (a == d && lies_between(a, b, before, c) != lies_between(a, b, before, next) && !shares(before, b, c, next))
         return true;
     }
   }
   return false;
 }
 
-double calc_overlap(std::vector<Point> outline, const std::vector<Point>& convex) {
-  // Sutherland and Hodgman: what is left of the outline on the inner side of each edge in turn
-  for (std::size_t i = 0; i < convex.size() && !outline.empty(); ++i) {
+double calc_overlap(const std::vector<Point>& outline, const std::vector<Point>& convex) {
+  Loop left;
+  for (const Point& p : outline) left.push_back({p[0], p[1], 0});
+  for (std::size_t i = 0; i < convex.size() && !left.empty(); ++i) {
     const Point &a = convex[i], &b = convex[(i + 1) % convex.size()];
-    std::vector<Point> inside;
-    for (std::size_t k = 0; k < outline.size(); ++k) {
-      const Point &p = outline[k], &q = outline[(k + 1) % outline.size()];
-      const double side_p = cross(a, b, p), side_q = cross(a, b, q);
-      if (side_p >= 0) inside.push_back(p);
-      if ((side_p > 0 && side_q < 0) || (side_p < 0 && side_q > 0)) {
-        const double s = side_p / (side_p - side_q);
-        inside.push_back({p[0] + s * (q[0] - p[0]), p[1] + s * (q[1] - p[1])});
-      }
-    }
-    outline = std::move(inside);
+    const double x = b[0] - a[0], y = b[1] - a[1], length = std::hypot(x, y);
+    if (length > 0) left = clip(left, {{a[0], a[1], 0}, {y / length, -x / length, 0}});
   }
-  return std::abs(calc_signed_area(outline));
+  return 0.5 * norm(calc_normal(left));
 }
 
 }  // namespace topple::product

@@ -14,6 +14,7 @@ double calc_signed_area(const std::vector<std::array<double, 2>>& corners);
 bool crosses_itself(const std::vector<std::array<double, 2>>& corners);
 
 /// What an outline has in common with a convex one; corners of both counterclockwise [m²].
-double calc_overlap(std::vector<std::array<double, 2>> outline, const std::vector<std::array<double, 2>>& convex);
+double calc_overlap(const std::vector<std::array<double, 2>>& outline,
+                    const std::vector<std::array<double, 2>>& convex);
 
 }  // namespace topple::product

@@ -242,14 +242,10 @@ FuzzyFile read_fuzzy_text(const std::string& text, const std::string& name, cons
   FuzzyFile out;
   out.path = name;
   out.text = text;
-  if (text.find_first_not_of(" \t\r\n") == std::string::npos) {
-    Complaints empty(name);
-    empty.error("E104", {}, "the file of fuzzy inputs is empty",
-                "add a line such as concrete.fc = { triangular = [\"10 N/mm2\", \"25 N/mm2\", \"45 N/mm2\"] }");
-    throw InputError(empty.all());
-  }
+  const Node document =
+      parse_document(text, name, "the file of fuzzy inputs",
+                     "add a line such as concrete.fc = { triangular = [\"10 N/mm2\", \"25 N/mm2\", \"45 N/mm2\"] }");
   out.section = parse_document(section.text, section.path);
-  const Node document = parse_document(text, name);
   Complaints complaints(name);
   TableReader root(document, "", complaints);
   out.title = root.text("title", section.title);

@@ -54,13 +54,10 @@ void read_zone(const Reading& reading, TableReader& root, SectionFile& out) {
 SectionFile read_section_file_text(const std::string& text, const std::string& name,
                                    std::vector<Diagnostic>& warnings) {
   const std::string bytes(without_mark(text));
-  if (bytes.find_first_not_of(" \t\r\n") == std::string::npos) {
-    Complaints complaints(name);
-    complaints.error("E104", {}, "the section file is empty",
+  const Node document =
+      parse_document(bytes, name, "the section file",
                      "it wants [concrete.NAME], [steel.NAME] and [section.NAME]; docs/rcc.md has one");
-    throw InputError(complaints.all());
-  }
-  SectionFile out = read_section_document(parse_document(bytes, name), name, warnings);
+  SectionFile out = read_section_document(document, name, warnings);
   out.text = bytes;
   return out;
 }

@@ -13,6 +13,7 @@
 #include "base/interpolate.h"
 #include "base/parallel.h"
 #include "base/unit.h"
+#include "collapse/plan_record.h"
 #include "collapse/sample_runs.h"
 #include "product/plan_sampler.h"
 
@@ -50,7 +51,7 @@ double find_after(const product::Plan& plan) {
 }
 
 bool has_screening(const product::Plan& plan, const PlanMappingOptions& o) {
-  return o.vibration && !o.condensed && plan.vibration && !plan.neighbours.empty();
+  return o.vibration && !o.condensed && collapse::has_screening(plan);
 }
 
 bool has_sides(const PlanMappingOptions& o) { return o.sideways && !o.condensed; }
