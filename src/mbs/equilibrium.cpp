@@ -743,7 +743,7 @@ void DeadLoad::find_unbalanced() {
       double& held = multiplier_[j][static_cast<size_t>(i)];
       held -= share_ * penalty_ * gap[i];
       pushed_back_[static_cast<Eigen::Index>(6 * j) + i] = -share_ * penalty_ * gap[i];
-      gap_left_ = std::max(gap_left_, std::abs(gap[i]));
+      gap_left_ = std::isfinite(gap[i]) ? std::max(gap_left_, std::abs(gap[i])) : kUnlimited;
       const auto load = [&](Vector& on, double f) {
         for (int k = 0; k < u_.each; ++k) {
           const int c = u_.coordinate(k);
@@ -759,7 +759,8 @@ void DeadLoad::find_unbalanced() {
   }
   Eigen::Index most = 0;
   r.cwiseAbs().maxCoeff(&most);
-  unbalanced_ = r.lpNorm<Eigen::Infinity>() / weight_;
+  // a largest one does not see what is no number
+  unbalanced_ = r.allFinite() ? r.lpNorm<Eigen::Infinity>() / weight_ : kUnlimited;
   most_unbalanced_ = static_cast<size_t>(assembly_.free_bodies()[static_cast<size_t>(most / u_.each)]);
 }
 
