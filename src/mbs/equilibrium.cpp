@@ -908,6 +908,7 @@ DeadLoad::End DeadLoad::search(double good_enough, std::string& message) {
   constexpr int fresh_by_cracks = 60;
   constexpr int patience = 8;            // slow rounds before the stiffness stays and steps are accelerated
   constexpr int most_accelerated = 400;  // then on as before, from where that began
+  constexpr double thrown = 1e3;  // of the weight is unbalanced: a pivot that vanishes there tells of no mechanism
   constexpr double quick = 0.03;  // of the unbalanced force is left after an iteration with a stiffness that still fits
   int idle = 0, factorised = 0, secants = 0, slow = 0;
   bool by_tangents = false;
@@ -966,7 +967,11 @@ DeadLoad::End DeadLoad::search(double good_enough, std::string& message) {
         (factorised < (has_cracks_ ? fresh_by_cracks : fresh) && unbalanced_ > good_enough &&
          unbalanced_ > quick * last_unbalanced)) {
       ++factorised;
-      if (!factorise(message)) return End::None;
+      if (!factorise(message)) {
+        if (unbalanced_ <= thrown) return End::None;
+        message = describe_failure(true);
+        return End::Diverged;
+      }
     }
     last_unbalanced = unbalanced_;
     if (steps == Steps::Accelerated) {

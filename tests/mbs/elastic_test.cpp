@@ -278,6 +278,74 @@ TEST(Equilibrium, OfALoadedFrameStaysStill) {
   EXPECT_LT(moved, 1e-9);
 }
 
+/// Two bodies, one on seven springs of which one stiffens, the other held by the first: the first ways of the search
+/// throw them kilometres away.
+Model make_thrown() {
+  Model m;
+  m.contact.ground = m.contact.bodies = false;
+  const auto add = [&](const char* name, double mass, const Vec3& inertia, const Vec3& p) {
+    Body b;
+    b.name = name, b.mass = mass, b.inertia = Mat3::diagonal(inertia), b.X_WB.p = p;
+    return add_body(m, b);
+  };
+  const BodyId first = add("first", 8.8, {0.9, 1.1, 1.3}, {0, -0.5, 0.1});
+  const BodyId second = add("second", 19.5, {2, 2.3, 2.9}, {1, -0.6, -0.6});
+  const Vec3 ends[][2] = {
+      {{-1.1, -1.8, 2.4}, {-0.1, -0.6, 0.1}}, {{-1, 1.8, 2.6}, {-0.1, -0.4, 0.2}},   {{0, 0, 2.2}, {-0.2, -0.6, 0}},
+      {{-0.1, -1.2, 2.3}, {0, -0.2, 0.1}},    {{1.6, -1.1, 1.1}, {-0.1, -0.3, 0.3}}, {{-1.5, 2, 2.4}, {0.2, -0.4, 0}},
+      {{0.9, -0.1, 1.4}, {-0.1, -0.3, -0.1}},
+  };
+  for (const auto& [on_ground, on_body] : ends) {
+    SpringDamper s;
+    s.name = "s" + std::to_string(m.springs.size());
+    s.a = kGround, s.b = first;
+    s.p_A = on_ground, s.p_B = on_body - m.bodies[0].X_WB.p;
+    s.free_length = norm(on_body - on_ground);
+    s.spring.rate = 3000;
+    if (m.springs.size() == 2) {
+      s.spring.kind = Characteristic::Kind::Polynomial;
+      s.spring.coefficients = {5.4, 3000, 0, 3000};
+    }
+    m.springs.push_back(s);
+  }
+  ZoneElement e;
+  e.name = "arm";
+  e.a = first, e.b = second;
+  const Vec3 x = (1 / norm(Vec3{-0.1, 0.1, 1})) * Vec3{-0.1, 0.1, 1};
+  const Vec3 y = (1 / norm(cross({0, 0, 1}, x))) * cross({0, 0, 1}, x), p{0.8, -0.4, -0.5};
+  const Quat q = to_quat(Mat3::from_columns(x, y, cross(x, y)));
+  e.X_AF = {p - m.bodies[0].X_WB.p, q}, e.X_BM = {p - m.bodies[1].X_WB.p, q};
+  e.translational_stiffness = {1e5, 8e4, 7e4};
+  e.rotational_stiffness = {5e3, 6e3, 7e3};
+  add_element(m, e);
+  return m;
+}
+
+TEST(Equilibrium, OfWhatTheFirstWaysThrowFarIsFoundOnShorterOnes) {
+  const Model m = make_thrown();
+  Options o;
+  o.duration = 0.3;
+  std::vector<Pose> start;
+  double moved = 0;
+  o.on_frame = [&](const View& v) {
+    if (start.empty()) start = v.X_WB;
+    for (size_t b = 0; b < 2; ++b) moved = std::max(moved, norm(v.X_WB[b].p - start[b].p));
+  };
+  const Summary s = run(m, o);
+  ASSERT_EQ(s.ending, Summary::Ending::TimeLimit) << s.message;
+  EXPECT_LT(moved, 1e-7);
+  for (size_t b = 0; b < 2; ++b) EXPECT_LT(norm(start[b].p - m.bodies[b].X_WB.p), 3);
+}
+
+TEST(Equilibrium, TellsAMechanismThatIsOne) {
+  // what hangs on two springs of a line turns about it
+  Model m = make_thrown();
+  m.springs.erase(m.springs.begin() + 2, m.springs.end());
+  const Summary s = run(m, {});
+  EXPECT_EQ(s.ending, Summary::Ending::NoEquilibrium);
+  EXPECT_NE(s.message.find("mechanism"), std::string::npos) << s.message;
+}
+
 TEST(Equilibrium, NamesABodyThatHangsOnNothing) {
   Model m = make_portal(true);
   add_body(m, make_box("orphan", 1, {0.1, 0.1, 0.1}, {9, 9, 9}));
