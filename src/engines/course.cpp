@@ -30,6 +30,14 @@ bool has_reaction_limit(const mbs::Joint& j) {
   return j.tension_limit < mbs::kUnlimited || j.shear_limit < mbs::kUnlimited || j.moment_limit < mbs::kUnlimited;
 }
 
+/// How long what an event does goes on after it [s].
+double find_longest_ramp(const mbs::Event& e) {
+  double longest = 0;
+  for (const mbs::Action& a : e.actions)
+    if (a.kind == mbs::Action::Kind::SwitchLaw) longest = std::max(longest, a.ramp);
+  return longest;
+}
+
 const char* words_of(mbs::Summary::Ending e) {
   using Ending = mbs::Summary::Ending;
   return e == Ending::AtRest ? "came to rest" : e == Ending::Cancelled ? "cancelled" : "stopped by the time limit";
@@ -62,7 +70,8 @@ Course::Course(const mbs::Model& model, const mbs::Options& options)
   distance_.assign(J, 0);
   for (size_t i = 0; i < model.events.size(); ++i) {
     (model.events[i].triggers.empty() ? timed_ : waiting_).push_back(i);
-    last_event_ = std::max(last_event_, model.events[i].time);
+    const double ramp = model.events[i].triggers.empty() ? find_longest_ramp(model.events[i]) : 0;
+    last_event_ = std::max(last_event_, model.events[i].time + ramp);
     needs_reactions_ |= waits_for_joint(model.events[i]);
   }
   std::stable_sort(timed_.begin(), timed_.end(),
@@ -305,7 +314,7 @@ bool Course::fire_events() {
   const auto fire = [&](size_t i) {
     for (const mbs::Action& a : model_.events[i].actions) act(model_.events[i], a);
     say({mbs::Happening::Kind::EventFired, time_, static_cast<int>(i), -1, model_.events[i].name, 0});
-    last_event_ = std::max(last_event_, time_);
+    last_event_ = std::max(last_event_, time_ + find_longest_ramp(model_.events[i]));
     fired = true;
   };
   const double late = step_ > 0 ? 1e-9 * step_ : 1e-12 * (1 + time_);

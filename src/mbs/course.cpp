@@ -153,6 +153,9 @@ void Course::pass_quiet() {
 bool Course::is_at_rest() {
   State& state = s_.state;
   if (s_.options.rest_speed <= 0 || state.time <= last_event_) return false;
+  // a law that still goes over to another one is an event that lasts
+  const auto is_ahead = [&](double t) { return t > state.time; };
+  if (std::any_of(state.review_times.begin(), state.review_times.end(), is_ahead)) return false;
   const double limit2 = s_.options.rest_speed * s_.options.rest_speed;
   bool quiet = true;
   double twice_kinetic = 0, mass = 0;

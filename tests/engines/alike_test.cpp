@@ -435,6 +435,40 @@ TEST_P(EnginesAlikeReference, BoxesOfCrushedMembers) {
   }
 }
 
+TEST_P(EnginesAlikeReference, RestWaitsForLawsThatStillGoOver) {
+  NEEDS_ENGINE();
+  // a bar that a law holds which goes over to a twentieth of it within 2 s, at a time or by a limit
+  mbs::Model m = test::make_empty({0, 0, -9.81});
+  const auto a = add_brick(m, "a", {0, 0, 0});
+  for (const double bears : {1e3, 50.0}) {
+    mbs::ZoneLaw law;
+    law.compression = {{0, 0.1}, {bears, bears}};
+    law.tension = law.compression;
+    mbs::add_law(m, law);
+  }
+  mbs::ZoneElement e;
+  e.a = mbs::kGround, e.b = a;
+  e.X_AF.q = e.X_BM.q = to_quat(Mat3::from_columns({0, 0, 1}, {1, 0, 0}, {0, 1, 0}));
+  e.translational_stiffness = {1e6, 1e6, 1e6};
+  e.rotational_stiffness = {1e5, 1e5, 1e5};
+  e.stations = {{0, {0}}};
+  mbs::add_element(m, e);
+  mbs::Action weaken;
+  weaken.kind = mbs::Action::Kind::SwitchLaw;
+  weaken.element = {0}, weaken.law = {1}, weaken.ramp = 2;
+  mbs::Event event;
+  event.time = 0.1, event.actions = {weaken};
+  mbs::Options o = test::make_options(2.3, 2.3, 1e-3);
+  o.equilibrium = true, o.rest_speed = 1e-3, o.rest_time = 0.3;
+  for (const bool is_triggered : {false, true}) {
+    if (is_triggered) event.triggers = {{{mbs::Quantity::Kind::Position, 0}, 2, -1, true}};
+    m.events = {event};
+    const auto c = test::run(*make_engine(GetParam()), m, o);
+    EXPECT_EQ(c.summary.ending, mbs::Summary::Ending::TimeLimit) << c.summary.message;
+    EXPECT_LT(c.frames.back().X_WB[0].p.z, -0.02);
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Each, EnginesAlikeReference, testing::Values("simbody", "mujoco"),
                          [](const testing::TestParamInfo<std::string>& subject) { return subject.param; });
 

@@ -219,6 +219,48 @@ TEST(Rest, TakesAsLongAsItsTimeHoweverLongThatIs) {
   EXPECT_EQ(run(m, o).ending, Summary::Ending::TimeLimit);
 }
 
+/// A column on a zone whose law goes over to one of a twentieth within 5 s.
+Model make_weakened(double triggered_at = 0) {
+  Model m = make_hanging();
+  m.events.clear();
+  m.elements[0].X_AF = {{0, 0, 9.5}, test::upright()};
+  m.elements[0].X_BM = {{0, 0, -0.5}, test::upright()};
+  for (const double bears : {1e5, 5e3}) {
+    ZoneLaw law;
+    law.compression = {{0, 0.1}, {bears, bears}};
+    add_law(m, law);
+  }
+  m.elements[0].stations = {{0, {0}}};
+  Action a;
+  a.kind = Action::Kind::SwitchLaw;
+  a.element = {0}, a.law = {1}, a.ramp = 5;
+  Event weaken;
+  weaken.name = "weaken";
+  weaken.time = 0.2, weaken.actions = {a};
+  if (triggered_at > 0) {
+    weaken.time = triggered_at;
+    weaken.triggers = {{{Quantity::Kind::Position, 0}, 2, 0, true}};
+  }
+  m.events = {weaken};
+  return m;
+}
+
+TEST(Rest, WaitsForLawsThatStillGoOver) {
+  // it bears 1.02 of its weight when 0.95 of the ramp is over
+  for (const double triggered_at : {0.0, 0.3}) {
+    Options o;
+    o.duration = 5.6, o.step = 1e-3;
+    double z = 0;
+    o.on_frame = [&](const View& v) { z = v.X_WB[0].p.z; };
+    (void)run(make_weakened(triggered_at), o);
+    const double fallen = z;
+    EXPECT_LT(fallen, 9.9);
+    o.rest_speed = 0.001;
+    EXPECT_EQ(run(make_weakened(triggered_at), o).ending, Summary::Ending::TimeLimit) << triggered_at;
+    EXPECT_EQ(z, fallen);
+  }
+}
+
 TEST(Step, IsRefusedWhereTheRunWouldHaveNoEnd) {
   Model m = make_hanging();
   Options o;
