@@ -449,7 +449,11 @@ mbs::Energy Course::calc_energy() const {
 }
 
 bool Course::is_at_rest() {
-  if (!(options_.rest_speed > 0) || time_ <= last_event_) return false;
+  if (!(options_.rest_speed > 0)) return false;
+  if (time_ <= std::max(last_event_, forces_.calc_last_load_change())) {
+    quiet_since_ = -1;
+    return false;
+  }
   double twice_kinetic = 0, mass = 0, fastest2 = 0;
   for (size_t b = 0; b < body_.size(); ++b) {
     if (model_.bodies[b].fixed) continue;

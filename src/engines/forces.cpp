@@ -612,6 +612,14 @@ double Forces::next_corner(double time) const {
   return next;
 }
 
+double Forces::calc_last_load_change() const {
+  double last = 0;
+  for (size_t i = 0; i < load_.size(); ++i)
+    if (load_[i].has_begun && !load_[i].is_over && !model_.loads[i].time.empty())
+      last = std::max(last, load_[i].begin + model_.loads[i].time.back());
+  return last;
+}
+
 // --- what is seen
 
 ElementEnergy Forces::calc_energy() const {

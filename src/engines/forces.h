@@ -74,6 +74,8 @@ class Forces {
 
   ElementEnergy calc_energy() const;
   /// What the view shows of elements, cables, springs and bushings at the last accepted state.
+  /// When the last table ends of loads that act; 0 without any [s].
+  double calc_last_load_change() const;
   void fill(double time, const Motion&, mbs::View&) const;
   /// Of the ground and fixed bodies on everything, through elements, at the last accepted state [N].
   Vec3 ground_force() const { return -1 * on_ground_; }

@@ -469,6 +469,41 @@ TEST_P(EnginesAlikeReference, RestWaitsForLawsThatStillGoOver) {
   }
 }
 
+TEST_P(EnginesAlikeReference, RestWaitsForLoadsToCome) {
+  NEEDS_ENGINE();
+  mbs::Model m = test::make_empty({});
+  const auto a = add_brick(m, "a", {0, 0, 0});
+  mbs::Load l;
+  l.body = a;
+  l.force = {10, 0, 0};
+  l.time = {0, 2, 2.5}, l.factor = {0, 0, 1};
+  m.loads = {l};
+  mbs::Options o = test::make_options(4, 4, 1e-3);
+  o.rest_speed = 1e-3;
+  const auto c = test::run(*make_engine(GetParam()), m, o);
+  EXPECT_EQ(c.summary.ending, mbs::Summary::Ending::TimeLimit) << c.summary.message;
+  // 1 m/s² within half a second, then on for 1.5 s
+  EXPECT_NEAR(c.frames.back().v_WB[0].x, 0.25 + 1.5, 1e-6);
+}
+
+TEST_P(EnginesAlikeReference, RestBeginsAnewAfterAnEventByALimit) {
+  NEEDS_ENGINE();
+  // it drifts below the rest speed to a limit; what happens there resets the time
+  mbs::Model m = test::make_empty({});
+  const auto a = add_brick(m, "a", {0, 0, 0});
+  m.bodies[0].v_WB = {0.01, 0, 0};
+  mbs::Event event;
+  event.triggers = {{{mbs::Quantity::Kind::Position, a.index}, 0, 0.004, true}};
+  m.events = {event};
+  mbs::Options o = test::make_options(4, 4, 1e-3);
+  o.rest_speed = 0.1, o.rest_time = 0.5;
+  for (const std::string& engine : {std::string("native"), GetParam()}) {
+    const auto c = test::run(*make_engine(engine), m, o);
+    EXPECT_EQ(c.summary.ending, mbs::Summary::Ending::AtRest) << engine;
+    EXPECT_NEAR(c.summary.time, 0.4 + 0.5, 0.01) << engine;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Each, EnginesAlikeReference, testing::Values("simbody", "mujoco"),
                          [](const testing::TestParamInfo<std::string>& subject) { return subject.param; });
 
