@@ -516,7 +516,12 @@ const mbs::View& Course::calc_view() {
   for (size_t j = 0; j < J; ++j) {
     using Kind = mbs::Joint::Kind;
     const mbs::Joint& x = model_.joints[j];
-    v.joint_released[j] = !joint_live_[j] && !forces_.is_loose(j);
+    const mbs::Six* loose = joint_live_[j] ? nullptr : forces_.find_loose(j);
+    v.joint_released[j] = !joint_live_[j] && loose == nullptr;
+    if (loose != nullptr && knows_reactions) {
+      v.joint_force[j] = -Vec3{loose->c[0], loose->c[1], loose->c[2]};
+      v.joint_moment[j] = -Vec3{loose->c[3], loose->c[4], loose->c[5]};
+    }
     if (!joint_live_[j]) continue;
     const JointFrames f = frames_of(x);
     if (x.kind == Kind::Revolute || x.kind == Kind::Cylindrical) v.joint_angle[j] = angle_[j];

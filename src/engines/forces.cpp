@@ -555,11 +555,11 @@ bool Forces::loosen_joint(size_t j) {
   return false;
 }
 
-bool Forces::is_loose(size_t j) const {
+const mbs::Six* Forces::find_loose(size_t j) const {
   for (size_t i = 0; i < rotational_.size(); ++i)
     if (model_.rotational_elements[i].joint.index == static_cast<int>(j))
-      return rotational_[i].is_loose && rotational_[i].state.live;
-  return false;
+      return rotational_[i].is_loose && rotational_[i].state.live ? &rotational_[i].state.resultant : nullptr;
+  return nullptr;
 }
 
 void Forces::release_joint(size_t j, double time) {

@@ -60,7 +60,10 @@ class Forces {
   /// Lets the joint's rotational element take over; false if it has none that holds.
   bool loosen_joint(size_t joint);
   /// Whether it has, and still holds.
-  bool is_loose(size_t joint) const;
+  bool is_loose(size_t joint) const { return find_loose(joint) != nullptr; }
+  /// Force and moment that this element puts on the parent at the last accepted state, in F; null: there is none
+  /// [N, N·m].
+  const mbs::Six* find_loose(size_t joint) const;
   void release_joint(size_t, double time);
   void release_cable(size_t);
   void remove_spring(size_t);
@@ -71,11 +74,11 @@ class Forces {
   bool has_begun(size_t load) const { return load_[load].has_begun; }
   /// The next time at which a load's table has a corner; infinite behind the last [s].
   double next_corner(double time) const;
+  /// When the last table ends of loads that act; 0 without any [s].
+  double calc_last_load_change() const;
 
   ElementEnergy calc_energy() const;
   /// What the view shows of elements, cables, springs and bushings at the last accepted state.
-  /// When the last table ends of loads that act; 0 without any [s].
-  double calc_last_load_change() const;
   void fill(double time, const Motion&, mbs::View&) const;
   /// Of the ground and fixed bodies on everything, through elements, at the last accepted state [N].
   Vec3 ground_force() const { return -1 * on_ground_; }

@@ -1,5 +1,6 @@
 /// Events that wait for a limit. Places, lengths and angles are those of the present step; forces, moments and
-/// velocities those of the evaluation before, as joints are judged by their last reaction.
+/// velocities those of the evaluation before, as joints are judged by their last reaction. Of what is released or
+/// loosened they see what System::look() shows.
 
 #include <algorithm>
 #include <cmath>
@@ -29,13 +30,20 @@ double System::calc_component(const Quantity& q, int component) {
       return component_of(log_rotation(s.q[i]), component);
     case Quantity::Kind::JointForce:
     case Quantity::Kind::JointMoment: {
+      const bool is_force = q.kind == Quantity::Kind::JointForce;
+      if (const int r = joints[i].rotational; r >= 0 && is_loose(static_cast<size_t>(r))) {
+        const size_t e = E + static_cast<size_t>(r);
+        unpack_element(e);
+        const double* f = s.element[e].resultant.c + (is_force ? 0 : 3);
+        return component_of(-Vec3{f[0], f[1], f[2]}, component);
+      }
       const Mat3 F = rotation_of(joints[i].parent) * joints[i].R_PF;
-      return component_of(
-          transpose_times(F, q.kind == Quantity::Kind::JointForce ? s.joint[i].force : s.joint[i].moment), component);
+      return component_of(transpose_times(F, is_force ? s.joint[i].force : s.joint[i].moment), component);
     }
     case Quantity::Kind::JointAngle:
-      return component_of(s.joint[i].angle, component);
+      return s.joint[i].live ? component_of(s.joint[i].angle, component) : 0;
     case Quantity::Kind::JointDisplacement: {
+      if (!s.joint[i].live) return 0;
       const CompiledJoint& j = joints[i];
       const Vec3 gap = calc_point(j.child, j.p_CM) - calc_point(j.parent, j.p_PF);
       return component_of(dot((rotation_of(j.parent) * j.R_PF).column(2), gap), component);

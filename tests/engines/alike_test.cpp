@@ -504,6 +504,43 @@ TEST_P(EnginesAlikeReference, RestBeginsAnewAfterAnEventByALimit) {
   }
 }
 
+TEST_P(EnginesAlikeReference, ALoosenedJointGoesOnToTellItsForce) {
+  NEEDS_ENGINE();
+  // the weight of a bar before and after, and an event waits for it
+  mbs::Model m = test::make_bar(Kind::Revolute, test::z_along_y());
+  m.damping_frequency = 300;
+  mbs::RotationalElement e;
+  e.joint = {0};
+  e.stiffness = 1e5;
+  e.damping_ratio = 0.2;
+  e.loose_translational = {1e5, 1e5, 1e5};
+  e.loose_torsion = e.loose_bending = 1e5;
+  m.rotational_elements.push_back(e);
+  mbs::Event loosen;
+  loosen.time = 0.1;
+  loosen.actions.resize(1);
+  loosen.actions[0].kind = mbs::Action::Kind::LoosenJoint;
+  loosen.actions[0].joint = {0};
+  mbs::Event pressed;
+  pressed.name = "pressed";
+  pressed.time = 0.4;
+  pressed.triggers = {{{mbs::Quantity::Kind::JointForce, 0}, 3, 5, true}};
+  mbs::Event free = pressed;
+  free.name = "free";
+  free.triggers[0].limit = 1, free.triggers[0].rising = false;
+  m.events = {loosen, pressed, free};
+  mbs::Options o = test::make_options(0.5, 0.5, kStep);
+  o.equilibrium = true;
+  for (const std::string& engine : {std::string("native"), GetParam()}) {
+    const auto c = test::run(*make_engine(engine), m, o);
+    std::vector<std::string> fired;
+    for (const auto& h : c.happenings)
+      if (h.kind == mbs::Happening::Kind::EventFired && h.index > 0) fired.push_back(h.reason);
+    EXPECT_EQ(fired, std::vector<std::string>{"pressed"}) << engine;
+    EXPECT_NEAR(norm(c.frames.back().joint_force[0]), test::kAdamsGravity, 0.02 * test::kAdamsGravity) << engine;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Each, EnginesAlikeReference, testing::Values("simbody", "mujoco"),
                          [](const testing::TestParamInfo<std::string>& subject) { return subject.param; });
 

@@ -284,6 +284,45 @@ TEST(Trigger, FiresInTheOrderOfTheModelWithinAStep) {
   EXPECT_EQ(order, "cabde");
 }
 
+TEST(Trigger, OfAReleasedJointSeesWhatOutputsShow) {
+  // no angle and no displacement, however the body falls
+  for (const bool slides : {false, true}) {
+    Model m;
+    m.contact.ground = m.contact.bodies = false;
+    Body b = make_box("b", 1, {0.1, 0.1, 0.1}, {slides ? 0.0 : 1.0, 0, 0});
+    add_body(m, b);
+    Joint j;
+    j.kind = slides ? Joint::Kind::Prismatic : Joint::Kind::Revolute;
+    j.parent = kGround, j.child = {0};
+    if (!slides) j.X_PF.q = j.X_CM.q = to_quat(Mat3::from_columns({1, 0, 0}, {0, 0, -1}, {0, 1, 0}));
+    j.X_CM.p = -m.bodies[0].X_WB.p;
+    add_joint(m, j);
+    Event release;
+    release.time = 0.2;
+    Action a;
+    a.kind = Action::Kind::ReleaseJoint;
+    a.joint = {0};
+    release.actions = {a};
+    const Quantity q{slides ? Quantity::Kind::JointDisplacement : Quantity::Kind::JointAngle, 0};
+    Event far, none;
+    far.name = "far", far.time = 0.3;
+    far.triggers = {{q, 3, 0.15, true}};
+    none.name = "none", none.time = 0.3;
+    none.triggers = {{q, 3, 1e-9, false}};
+    m.events = {release, far, none};
+    std::vector<std::string> fired;
+    Options o = options_of(1, 1e-3);
+    o.on_happening = [&](const Happening& h) {
+      if (h.kind == Happening::Kind::EventFired && h.index > 0) fired.push_back(h.reason);
+    };
+    o.on_frame = [&](const View& v) {
+      if (v.time > 0.3) { EXPECT_EQ((slides ? v.joint_displacement : v.joint_angle)[0], 0); }
+    };
+    (void)run(m, o);
+    EXPECT_EQ(fired, std::vector<std::string>{"none"}) << slides;
+  }
+}
+
 TEST(Trigger, ThatNeverFiresLetsARunComeToRest) {
   Model m;
   m.contact.ground = m.contact.bodies = false;
