@@ -90,6 +90,16 @@ void System::shorten_shape(CrushedBox& box, double shortening) {
   if (shorten_box(shortening, box, shape.p_BS, shape.R_BS, shape.half)) shape.reach = norm(shape.half);
 }
 
+const Hull* System::hull_of(int shape) {
+  const CompiledShape& s = state.shapes[static_cast<size_t>(shape)];
+  if (s.hull < 0) return nullptr;
+  const size_t whole = static_cast<size_t>(s.hull);
+  if (s.kind != Shape::Kind::Box || hull_shapes[whole].half == s.half) return &hulls[whole];
+  ShortHull& own = short_hulls[shape];
+  if (own.hull.vertices.empty() || !(own.half == s.half)) own = {s.half, make_box_hull(s.half)};
+  return &own.hull;
+}
+
 void System::shorten_boxes() {
   State& s = state;
   if (s.step_index % kStepsBetween != 0) return;

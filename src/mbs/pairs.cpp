@@ -45,7 +45,7 @@ void System::find_pair_points(double h) {
             c_shape.half,
             c_shape.radius,
             c_shape.reach,
-            c_shape.hull >= 0 ? &hulls[static_cast<size_t>(c_shape.hull)] : nullptr};
+            hull_of(shape)};
   };
   const auto write = [&](size_t body, int shape) {
     const size_t i = static_cast<size_t>(shape);

@@ -3,6 +3,7 @@
 /// B bodies, E zone elements, R rotational elements, J joints, C cables, P contact pairs.
 
 #include <cstddef>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -163,6 +164,12 @@ struct JointCluster {
   BlockCholesky geometry;            // J Jᵀ, where rows may depend on others
 };
 
+/// The polyhedron of a box that was shortened.
+struct ShortHull {
+  Vec3 half;  // of that box [m]
+  Hull hull;
+};
+
 class StiffnessFactor;  // of the dead-load equilibrium: its pattern, order of elimination and factor
 std::shared_ptr<StiffnessFactor> make_stiffness_factor();
 
@@ -209,7 +216,8 @@ class System {
   std::vector<CompiledRotational> rotationals;
   ForceElements forces;
   std::vector<Hull> hulls;
-  std::vector<Shape> hull_shapes;  // what each was made of
+  std::vector<Shape> hull_shapes;        // what each was made of
+  std::map<int, ShortHull> short_hulls;  // of shapes that are shorter than those; scratch
   std::vector<size_t> event_order;
   std::vector<ContactLaw> contact_laws;  // of the ground, of bodies, and of each of Contact::pairs
   std::vector<int> ground_law;           // of each body, into contact_laws (B)
@@ -515,6 +523,8 @@ class System {
   void number_crushed_boxes();
   /// As short as an element's shortening leaves it [m].
   void shorten_shape(CrushedBox&, double shortening);
+  /// The polyhedron of a shape as it is now; null where it needs none.
+  const Hull* hull_of(int shape);
   /// What the end of a member bears against a surface with this normal out of body b [N]; unlimited for other shapes
   /// and where the member is not met head on.
   double calc_end_bearing(size_t b, int shape, const Vec3& outward) const;
