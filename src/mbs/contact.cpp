@@ -128,8 +128,12 @@ void System::find_contacts(double h) {
 }
 
 Earnings System::calc_earnings(const ContactGroup& g, double h) const {
-  const State& s = state;
   if (!g.hands_on) return {};
+  return calc_energies(g, h);
+}
+
+Earnings System::calc_energies(const ContactGroup& g, double h) const {
+  const State& s = state;
   const size_t W = kernel::lanes();
   const auto speed_of = [&](int touched) {  // none of what is fixed
     const size_t body = static_cast<size_t>(s.touching.body[static_cast<size_t>(touched)]);
@@ -144,6 +148,22 @@ Earnings System::calc_earnings(const ContactGroup& g, double h) const {
                         dot(read3(slot, kernel::kDamp + 3, W), w + read3(slot, kernel::kMotion + 3, W));
   return {std::max(0.0, slot[kernel::kPressEnergy * W] - 0.5 * h * (dot(f, v) + dot(turn, w))),
           slot[kernel::kSpent * W] - 0.5 * h * damped};
+}
+
+double System::take_pressed(size_t b, double h) {
+  Touching& t = state.touching;
+  const size_t W = kernel::lanes();
+  double pressed = 0;
+  for (const ContactGroup& g : t.group) {
+    const auto is_of = [&](int touched) { return t.body[static_cast<size_t>(touched)] == static_cast<int>(b); };
+    if (!is_of(g.a) && !is_of(g.b)) continue;
+    pressed += calc_energies(g, h).stored;
+    // only once, whatever else is replaced in this step
+    double* slot = t.groups.data() + g.slot / W * kernel::kGroupFields * W + g.slot % W;
+    slot[kernel::kPressEnergy * W] = slot[kernel::kHeldForce * W] = 0;
+    for (int i = 0; i < 3; ++i) slot[static_cast<size_t>(kernel::kHeldTorque + i) * W] = 0;
+  }
+  return pressed + calc_pressed_box(b, h);
 }
 
 void System::add_contact_point(const Vec3& at, double depth, double stiffness, double unseen) {

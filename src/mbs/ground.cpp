@@ -9,6 +9,15 @@
 
 namespace topple::mbs {
 
+namespace {
+
+/// Of a box, in its frame [m].
+Vec3 corner_of(const Vec3& half, int corner) {
+  return {corner & 1 ? half.x : -half.x, corner & 2 ? half.y : -half.y, corner & 4 ? half.z : -half.z};
+}
+
+}  // namespace
+
 bool System::is_ground_box(size_t b) const {
   const BodyConstants& body = state.body[b];
   return model.contact.ground && !model.contact.bodies && !fixed[b] && body.shapes == 1 &&
@@ -47,6 +56,29 @@ void System::pack_ground_box(size_t b) {
   put(kernel::kPossible, !state.tied_to_ground[b] && law.touches ? 1 : 0);
 }
 
+double System::calc_pressed_box(size_t b, double h) const {
+  if (!is_ground_box(b)) return 0;
+  const State& s = state;
+  const BodyConstants& body = s.body[b];
+  const CompiledShape& shape = s.shapes[static_cast<size_t>(body.first_shape)];
+  const ContactLaw& law = contact_laws[static_cast<size_t>(ground_law[b])];
+  const double frequency = model.contact.contact_frequency;
+  const double stiffness = law.stiffness > 0 ? law.stiffness : body.mass * frequency * frequency;
+  const GroundBox box = s.ground_box[b];
+  const Vec3 n = model.contact.normal;
+  const Mat3 R_WB = s.R[b];
+  double sum = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    if (!(box.slip[corner].x < kUnlimited)) continue;  // did not touch
+    const Vec3 at = R_WB * (shape.p_BS + shape.R_BS * corner_of(shape.half, corner));
+    const double penetration = model.contact.offset - dot(n, s.p[b] + at);
+    const double approach = -dot(n, s.v[b] + cross(s.w[b], at));
+    const double depth = std::max(0.0, penetration - 0.5 * h * approach - box.born[corner]);
+    sum += depth * depth;
+  }
+  return 0.5 * law.mean * stiffness * sum;
+}
+
 void System::note_landing(std::uint32_t slot) {
   const size_t b = lanes->is_batch ? slot / lanes->W : slot;
   State& s = state;
@@ -57,8 +89,7 @@ void System::note_landing(std::uint32_t slot) {
   const GroundBox box = s.ground_box[b];
   size_t corner = 0;
   while (corner < 7 && !(box.slip[corner].x < kUnlimited)) ++corner;
-  const Vec3 local{corner & 1 ? shape.half.x : -shape.half.x, corner & 2 ? shape.half.y : -shape.half.y,
-                   corner & 4 ? shape.half.z : -shape.half.z};
+  const Vec3 local = corner_of(shape.half, static_cast<int>(corner));
   const Mat3 R_WB = s.R[b];
   const double approach = -dot(model.contact.normal, s.v[b] + cross(s.w[b], R_WB * (shape.p_BS + shape.R_BS * local)));
   say_landing(b, approach);
@@ -131,11 +162,9 @@ void System::find_ground_points(double h) {
           g = {};
           continue;
         }
-        const Vec3 local =
-            box ? Vec3{corner & 1 ? shape.half.x : -shape.half.x, corner & 2 ? shape.half.y : -shape.half.y,
-                       corner & 4 ? shape.half.z : -shape.half.z}
-            : hull ? polyhedron->vertices[static_cast<size_t>(corner)]
-                   : Vec3{};
+        const Vec3 local = box    ? corner_of(shape.half, corner)
+                           : hull ? polyhedron->vertices[static_cast<size_t>(corner)]
+                                  : Vec3{};
         const double penetration = above_centre - dot(down, local) + shape.radius;
         if (!g.active) {
           g.active = true;

@@ -510,7 +510,7 @@ void System::replace_body(size_t b, const Body& replacement) {
     return 0.5 * s.body[b].mass * dot(s.v[b], s.v[b]) + 0.5 * dot(s.w[b], I * s.w[b]) -
            s.body[b].mass * dot(model.gravity, s.p[b]);
   };
-  const double before = energy();
+  const double before = energy() + take_pressed(b, step);
   const Vec3 moved = replacement.X_WB.p;  // from the old centre to the new one, in B
   s.v[b] += cross(s.w[b], s.R[b] * moved);
   s.p[b] += s.R[b] * moved;

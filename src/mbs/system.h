@@ -469,6 +469,11 @@ class System {
   void resolve_contacts(double h, bool follows);
   /// Moves a body from its pose at the beginning of the step to the end of it.
   void drift(size_t body, double h, const Vec3& p0, const Quat& q0, const Mat3& R0);
+  Earnings calc_energies(const ContactGroup&, double h) const;  // the same of any group
+  /// Takes away what springs of a body's contacts store half a step of h before now [J].
+  double take_pressed(size_t body, double h);
+  /// The same of a box that the kernel has on the ground.
+  double calc_pressed_box(size_t body, double h) const;
   void build_clusters();
   /// Reads the joints of a cluster at the present poses: rows, gaps, matrix and its factor; rows below the tolerance
   /// count as dependent.

@@ -192,6 +192,56 @@ TEST(GroundBox, LeavesTheKernelWhenItBecomesSomethingElse) {
   EXPECT_LT(residual, 0.01 * released);  // error of the step
 }
 
+TEST(ContactPhysics, WhatAReplacedBodyHasPressedIsBooked) {
+  // when it has nearly stopped on the ground, or on a body of half its mass, contact has all of its energy
+  enum class Floor { Ground, GroundAmongBodies, Plane, Body };
+  for (const Floor floor : {Floor::Ground, Floor::GroundAmongBodies, Floor::Plane, Floor::Body})
+    for (const bool is_sphere : {false, true})
+      for (const int times : {1, 2}) {
+        Model m;
+        m.contact.ground = floor == Floor::Ground || floor == Floor::GroundAmongBodies;
+        m.contact.bodies = floor != Floor::Ground;
+        m.contact.restitution = m.contact.body_restitution = 0.9;
+        m.contact.contact_frequency = 250;
+        Body b = test::make_box("b", 2, {0.25, 0.25, 0.25}, {0, 0, 1.25});
+        if (is_sphere) b.shapes[0].kind = Shape::Kind::Sphere, b.shapes[0].radius = 0.25;
+        add_body(m, b);
+        if (floor == Floor::Plane) {
+          Body plane;
+          plane.fixed = true;
+          plane.shapes.resize(1);
+          plane.shapes[0].kind = Shape::Kind::Plane;
+          add_body(m, plane);
+        }
+        if (floor == Floor::Body) add_body(m, test::make_box("floor", 1, {0.25, 0.25, 0.25}, {0, 0, -2}));
+        if (floor == Floor::Body) m.gravity = {}, m.bodies[0].v_WB.z = -4.5;
+        Event replace;
+        replace.time = 0.2;
+        // of the body against the other one, which is thrown to 2/3 of its speed
+        replace.triggers = {{{Quantity::Kind::Velocity, 0}, 2, floor == Floor::Body ? -3.1 : -0.1, true}};
+        for (int i = 0; i < times; ++i) {
+          Action a;
+          a.kind = Action::Kind::ReplaceBody;
+          a.body = {0};
+          a.replacement = b;
+          a.replacement.X_WB = {};
+          replace.actions.push_back(a);
+        }
+        m.events = {replace};
+        Options o;
+        o.duration = 0.8, o.equilibrium = false, o.frame_interval = 1e-3;
+        Energy e;
+        double most = 0;
+        o.on_frame = [&](const View& v) {
+          e = v.energy;
+          most = std::max(most, e.removed);
+        };
+        const Summary s = run(m, o);
+        EXPECT_GT(most, 4) << s.message;
+        EXPECT_LT(std::abs(e.residual), 0.01 * most) << static_cast<int>(floor) << is_sphere << times;
+      }
+}
+
 TEST(GroundBox, TellsWhatABodyBringsToTheGround) {
   for (const bool any_shapes : {false, true}) {
     Model m;
