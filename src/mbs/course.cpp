@@ -127,17 +127,17 @@ void Course::watch(const View& v) {
     if (!s_.fixed[b]) mass += v.mass[b];
   const Options& o = s_.options;
   const bool is_slow = 2 * v.energy.kinetic < o.pass_speed * o.pass_speed * mass;
-  const bool is_held = v.energy.plastic - plastic_then_ <= o.pass_share * v.energy.released;
+  const bool is_held = v.energy.plastic - now_.plastic_then <= o.pass_share * v.energy.released;
   if (!is_slow || !is_held) {
-    quiet_since_ = v.time;
-    plastic_then_ = v.energy.plastic;
+    now_.quiet_since = v.time;
+    now_.plastic_then = v.energy.plastic;
   }
-  is_quiet_ = v.time - quiet_since_ >= o.pass_time;
+  now_.is_quiet = v.time - now_.quiet_since >= o.pass_time;
 }
 
 void Course::pass_quiet() {
   State& s = s_.state;
-  if (!is_quiet_ || s.next_event >= s_.event_order.size() || !s.waiting.empty() || !s.review_times.empty() ||
+  if (!now_.is_quiet || s.next_event >= s_.event_order.size() || !s.waiting.empty() || !s.review_times.empty() ||
       !s_.model.loads.empty())
     return;
   const double next = s_.model.events[s_.event_order[s.next_event]].time;
@@ -145,8 +145,8 @@ void Course::pass_quiet() {
   if (!(steps >= 1)) return;
   s.time_base += steps * s_.step;
   s.time = s.time_base + static_cast<double>(s.step_index - s.index_base) * s_.step;
-  is_quiet_ = false;
-  quiet_since_ = s.time;
+  now_.is_quiet = false;
+  now_.quiet_since = s.time;
   show();
 }
 

@@ -33,6 +33,9 @@ struct CourseState {
   long frame = 0;              // the next one
   double shown = -1;           // time of the last frame [s]
   std::vector<bool> softened;  // elements of which it was told
+  double quiet_since = 0;      // of the frames, see Options::pass_speed [s]
+  double plastic_then = 0;     // dissipated until then [J]
+  bool is_quiet = false;
 };
 
 class Course {
@@ -65,9 +68,6 @@ class Course {
   Sampler sampler_;
   CourseState now_;
   double last_event_ = 0, interval_ = 0;
-  double quiet_since_ = 0;   // of the frames [s]
-  double plastic_then_ = 0;  // dissipated until then [J]
-  bool is_quiet_ = false;
   std::chrono::steady_clock::time_point begin_;
 };
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "mbs/moment.h"
 #include "models.h"
 #include "views.h"
 
@@ -251,6 +252,33 @@ TEST(Rest, WaitsForLawsThatStillGoOver) {
     Options o;
     o.duration = 5.6, o.step = 1e-3;
     double z = 0;
+TEST(Course, GoesOnFromAMomentOfQuietToTheSameBits) {
+  Model m = make_hanging();
+  m.bodies[0].v_WB = {0, 0, 0.5};
+  m.elements[0].damping_ratio = 0.2;
+  Options o;
+  o.duration = 3.5, o.step = 1e-3, o.equilibrium = false, o.frame_interval = 0.01;
+  o.pass_speed = 0.1, o.pass_time = 0.5, o.pass_share = 1;
+  Simulation whole(m, o);
+  ASSERT_TRUE(whole.begin());
+  double passed_from = 0;
+  std::vector<Moment> moments;
+  for (double time = 0; whole.advance(); time = whole.time()) {
+    if (whole.steps() % 100 == 0) moments.push_back(whole.keep());
+    if (whole.time() > time + 0.5) passed_from = time;
+  }
+  EXPECT_GT(passed_from, 0.5);
+  EXPECT_LT(passed_from, 2);
+  const Summary a = whole.finish();
+  for (const Moment& moment : moments) {
+    Simulation rest(m, o, moment);
+    while (rest.advance()) {}
+    const Summary b = rest.finish();
+    EXPECT_EQ(b.steps, a.steps) << moment.time;
+    EXPECT_EQ(rest.calc_view().X_WB[0].p.z, whole.calc_view().X_WB[0].p.z);
+  }
+}
+
     o.on_frame = [&](const View& v) { z = v.X_WB[0].p.z; };
     (void)run(make_weakened(triggered_at), o);
     const double fallen = z;
