@@ -101,7 +101,7 @@ void visit(Archive& ar, S& s, C& sys) {
   ar(sys.ground_reaction), ar(sys.ground_contact), ar(sys.body_contacts);
 }
 
-constexpr std::uint64_t kMagic = 0x44534e41504f54ULL;  // "TOPANSD"
+constexpr std::uint64_t kMagic = 0x45534e41504f54ULL;  // "TOPANSE"
 
 /// What of the system's scratch the next step takes over, under the same names.
 struct Carried {
@@ -146,6 +146,7 @@ void read_state(Reader& r, System& system) {
   system.contact.boxes.clear();
   system.contact.search.has_links = false;
   system.started = true;
+  system.trouble.clear();
 }
 
 }  // namespace
@@ -166,6 +167,12 @@ std::vector<std::byte> write_snapshot(System& system) {
   w(kMagic);
   const std::string& identity = identity_of(system);
   w(std::vector<char>(identity.begin(), identity.end()));
+  w(system.joint_notes.size());
+  for (const auto& [joint, situation] : system.joint_notes) w(joint), w(situation);
+  const Summary& s = system.summary;
+  w(s.notes.size());
+  for (const std::string& note : s.notes) w(std::vector<char>(note.begin(), note.end()));
+  w(s.shortest_step), w(s.step_needed), w(s.highest_frequency);
   write_state(w, system);
   return std::move(w.bytes);
 }
@@ -178,7 +185,24 @@ void read_snapshot(const std::vector<std::byte>& bytes, System& system) {
   if (magic != kMagic) Reader::fail();
   r(identity);
   if (std::string(identity.begin(), identity.end()) != identity_of(system)) Reader::fail();
+  std::vector<std::pair<int, int>> joint_notes;
+  std::vector<std::string> notes;
+  Summary s = system.summary;
+  size_t count = 0;
+  for (r(count); count > 0; --count) {
+    auto& [joint, situation] = joint_notes.emplace_back();
+    r(joint), r(situation);
+  }
+  for (r(count); count > 0; --count) {
+    std::vector<char> note;
+    r(note);
+    notes.emplace_back(note.begin(), note.end());
+  }
+  r(s.shortest_step), r(s.step_needed), r(s.highest_frequency);
   read_state(r, system);
+  s.notes = std::move(notes);
+  system.summary = std::move(s);
+  system.joint_notes = std::move(joint_notes);
 }
 
 }  // namespace topple::mbs
