@@ -10,10 +10,17 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "mbs/course.h"
+#include "mbs/joint_rows.h"
 
 namespace topple::mbs {
 
 namespace {
+
+/// Whether the kernel of hinges in a plane has it: about y, not about -y.
+bool is_planar_hinge(const Joint& j) {
+  return j.kind == Joint::Kind::Revolute && is_about_y(to_matrix(normalized(j.X_PF.q))) &&
+         is_about_y(to_matrix(normalized(j.X_CM.q)));
+}
 
 /// What differs in the build; empty if nothing does.
 std::string find_difference(const Model& base, const Model& varied) {
@@ -30,7 +37,13 @@ std::string find_difference(const Model& base, const Model& varied) {
     const Joint &a = base.joints[i], &b = varied.joints[i];
     if (a.kind != b.kind) return "the kind of joints[" + std::to_string(i) + "]";
     if (a.parent != b.parent || a.child != b.child) return "the bodies of joints[" + std::to_string(i) + "]";
+    if (base.is_planar && varied.is_planar && is_planar_hinge(a) != is_planar_hinge(b))
+      return "the direction of the axis of joints[" + std::to_string(i) + "]";
   }
+  if (varied.rotational_elements.size() != base.rotational_elements.size()) return "the number of rotational elements";
+  for (size_t i = 0; i < base.rotational_elements.size(); ++i)
+    if (varied.rotational_elements[i].joint != base.rotational_elements[i].joint)
+      return "the joint of rotational_elements[" + std::to_string(i) + "]";
   return {};
 }
 

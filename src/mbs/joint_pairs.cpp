@@ -14,7 +14,6 @@ namespace {
 using kernel::PairKind;
 
 PairKind kind_of(const CompiledJoint& j, bool is_planar) {
-  const auto is_normal = [](const Mat3& R) { return norm(R.column(2) - Vec3{0, 1, 0}) < 1e-12; };
   switch (j.kind) {
     case Joint::Kind::Fixed:
       return PairKind::Weld;
@@ -23,7 +22,7 @@ PairKind kind_of(const CompiledJoint& j, bool is_planar) {
     case Joint::Kind::Universal:
       return PairKind::Universal;
     case Joint::Kind::Revolute:
-      return is_planar && is_normal(j.R_PF) && is_normal(j.R_CM) ? PairKind::PlanarHinge : PairKind::Hinge;
+      return is_planar && is_about_y(j.R_PF) && is_about_y(j.R_CM) ? PairKind::PlanarHinge : PairKind::Hinge;
     case Joint::Kind::Prismatic:
     case Joint::Kind::Cylindrical:
     case Joint::Kind::Distance:

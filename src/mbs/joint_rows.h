@@ -12,6 +12,9 @@ struct RowCount {
 };
 RowCount row_count(Joint::Kind);
 
+/// Whether z of a frame is y of its body.
+inline bool is_about_y(const Mat3& R) { return norm(R.column(2) - Vec3{0, 1, 0}) < 1e-12; }
+
 /// A joint's frames F and M at the present poses; vectors in W.
 struct JointFrames {
   Mat3 F, M;                       // axes in W as columns

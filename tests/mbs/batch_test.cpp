@@ -147,6 +147,53 @@ TEST(Batch, ConstantsAreSharedAgainAndStayWhatTheyAre) {
   EXPECT_TRUE(std::isinf(l.field(5, kernel::kMostTurn)));
 }
 
+Model make_hinged(bool is_planar, bool about_y) {
+  Model m;
+  m.is_planar = is_planar;
+  m.contact.ground = m.contact.bodies = false;
+  add_body(m, test::make_box("bar", 1, {0.5, 0.1, 0.1}, {1, 0, 0}));
+  Joint j;
+  j.kind = Joint::Kind::Revolute;
+  j.parent = kGround, j.child = {0};
+  j.X_PF.q = j.X_CM.q = to_quat(about_y ? Mat3::from_columns({1, 0, 0}, {0, 0, -1}, {0, 1, 0})
+                                        : Mat3::from_columns({1, 0, 0}, {0, 0, 1}, {0, -1, 0}));
+  j.X_CM.p = {-1, 0, 0};
+  add_joint(m, j);
+  return m;
+}
+
+TEST(Batch, RefusesVariationsThatAddOrTurnWhatLanesShare) {
+  const auto added = [](Model& m) {
+    RotationalElement r;
+    r.joint = {0};
+    r.stiffness = 100;
+    m.rotational_elements.push_back(r);
+  };
+  const auto turned = [](Model& m) { m.joints = make_hinged(true, false).joints; };
+  const auto same = [](Model&) {};
+  BatchOptions o;
+  o.run = make_options();
+  o.run.duration = 0.1;
+  for (const bool is_planar : {false, true}) {
+    const Model m = make_hinged(is_planar, true);
+    EXPECT_THROW((void)run_batch(m, {same, added}, o), InputError);
+    EXPECT_THROW((void)run_batch(m, {added, same}, o), InputError);
+    // in a plane the kernel of hinges about y is another one
+    if (is_planar) {
+      EXPECT_THROW((void)run_batch(m, {same, turned}, o), InputError);
+    } else {
+      EXPECT_EQ(run_batch(m, {same, turned}, o).size(), 2U);
+    }
+  }
+  // the elements of rotational ones have places in the lanes, too
+  Model m = make_hinged(false, true);
+  added(m);
+  m.joints.push_back(m.joints[0]);
+  m.joints[1].child = add_body(m, m.bodies[0]);
+  const auto other_joint = [](Model& varied) { varied.rotational_elements[0].joint = {1}; };
+  EXPECT_THROW((void)run_batch(m, {same, other_joint}, o), InputError);
+}
+
 TEST(Batch, SampleThatEndsEarlyDisturbsNoOther) {
   const Model base = test::make_tower();
   std::vector<Variation> variations(3);
