@@ -86,6 +86,7 @@ struct LoadState {
   double from = 0, until = 0;                   // what the last kick was to give the impulse of [s]
   double factor = 0, kick = 0;                  // its share of the force, and how long it was to last [s]
   double last_kick = 0;                         // State::last_kick then [s]
+  double owed = 0;                              // by a presence that is over, over the force [s]
   Vec3 point;                                   // of the evaluation before, in W
   Quat q;                                       // of the body then
   Vec3 force, torque;                           // of the evaluation before, in W

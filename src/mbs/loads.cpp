@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "mbs/forces.h"
 #include "mbs/system.h"
@@ -32,8 +33,12 @@ void System::apply_load(size_t i, double time) {
   LoadState& l = state.load[i];
   const bool is_over = l.begin != kUnlimited && l.end <= time;
   if (l.begin != kUnlimited && !is_over) return;
+  if (is_over) {
+    const CompiledLoad& k = forces.loads[i];
+    l.owed += calc_owed_impulse(k, l) + calc_load_impulse(k, l, l.until, l.end);
+    l.end = kUnlimited, l.kick = 0;
+  }
   l.begin = l.from = l.until = time;
-  if (is_over) l.end = kUnlimited, l.kick = 0;
 }
 
 void System::remove_load(size_t i, double time) {
@@ -42,20 +47,21 @@ void System::remove_load(size_t i, double time) {
   l.end = std::min(l.end, time);
 }
 
-double System::find_load_factor(const CompiledLoad& k, LoadState& l) const {
-  // integral of the factor, which runs either way
-  const auto impulse = [&](double from, double to) {
-    if (to == from) return 0.0;
-    return (to - from) * (k.is_constant ? 1 : calc_mean(k.factor, from - l.begin, to - l.begin));
-  };
-  if (l.begin == kUnlimited) return 0;
-  double owed = 0;
+double System::calc_load_impulse(const CompiledLoad& k, const LoadState& l, double from, double to) const {
+  if (to == from) return 0.0;
+  return (to - from) * (k.is_constant ? 1 : calc_mean(k.factor, from - l.begin, to - l.begin));
+}
+
+double System::calc_owed_impulse(const CompiledLoad& k, LoadState& l) const {
   const double kick = 0.5 * (l.last_kick + state.last_kick);  // how long the last one was
-  if (state.step_index > 0 && l.kick > 0 && std::abs(kick - l.kick) > 1e-9 * l.kick) {
-    // the step has changed after the forces were taken
-    if (l.until != l.end) l.until = std::min(state.time - 0.5 * state.last_kick, l.end);
-    owed = impulse(l.from, l.until) - l.factor * kick;
-  }
+  if (!(state.step_index > 0 && l.kick > 0 && std::abs(kick - l.kick) > 1e-9 * l.kick)) return 0;
+  if (l.until != l.end) l.until = std::min(state.time - 0.5 * state.last_kick, l.end);
+  return calc_load_impulse(k, l, l.from, l.until) - l.factor * kick;
+}
+
+double System::find_load_factor(const CompiledLoad& k, LoadState& l) const {
+  if (l.begin == kUnlimited) return 0;
+  const double owed = calc_owed_impulse(k, l) + std::exchange(l.owed, 0.0);
   // the impulse up to half a step from now that the body has not had yet; less than nothing for a load that an event of
   // this step ended before the last step's impulse did
   l.from = l.until;
@@ -67,7 +73,7 @@ double System::find_load_factor(const CompiledLoad& k, LoadState& l) const {
     // times are known to round-off
     l.factor = k.is_constant ? 1 : calc_mean(k.factor, l.from - l.begin, l.until - l.begin);
   } else {
-    l.factor = (owed + impulse(l.from, l.until)) / l.kick;
+    l.factor = (owed + calc_load_impulse(k, l, l.from, l.until)) / l.kick;
   }
   return l.factor;
 }

@@ -314,6 +314,10 @@ class System {
   void evaluate_loads(bool at_rest);
   /// Share of a load's force in the next kick.
   double find_load_factor(const CompiledLoad&, LoadState&) const;
+  /// Integral of a load's factor, which runs either way [s].
+  double calc_load_impulse(const CompiledLoad&, const LoadState&, double from, double to) const;
+  /// What the last kick lacks where the step has changed after its forces were taken [s].
+  double calc_owed_impulse(const CompiledLoad&, LoadState&) const;
   void evaluate_dampers();
   /// As look(), with the pulls that dampers have at the velocities of the start: what moves the bodies then is already
   /// that of the end of the first half step.
@@ -465,15 +469,15 @@ class System {
   void find_contacts(double h);
   /// As a step of h ends; none on the ground, where corners stay what they are.
   Earnings calc_earnings(const ContactGroup&, double h) const;
-  /// Forces at the points found, on the bodies and in the ledger.
-  void resolve_contacts(double h, bool follows);
-  /// Moves a body from its pose at the beginning of the step to the end of it.
-  void drift(size_t body, double h, const Vec3& p0, const Quat& q0, const Mat3& R0);
   Earnings calc_energies(const ContactGroup&, double h) const;  // the same of any group
   /// Takes away what springs of a body's contacts store half a step of h before now [J].
   double take_pressed(size_t body, double h);
   /// The same of a box that the kernel has on the ground.
   double calc_pressed_box(size_t body, double h) const;
+  /// Forces at the points found, on the bodies and in the ledger.
+  void resolve_contacts(double h, bool follows);
+  /// Moves a body from its pose at the beginning of the step to the end of it.
+  void drift(size_t body, double h, const Vec3& p0, const Quat& q0, const Mat3& R0);
   void build_clusters();
   /// Reads the joints of a cluster at the present poses: rows, gaps, matrix and its factor; rows below the tolerance
   /// count as dependent.
@@ -519,6 +523,8 @@ class System {
   /// Polyhedra of the model and of what events put in place of bodies.
   void compile_hulls();
   int find_hull(const Shape&) const;
+  /// The polyhedron of a shape as it is now; null where it needs none.
+  const Hull* hull_of(int shape);
   /// Appends a body's shapes in its frame.
   void append_shapes(const Body&, BodyConstants&);
   /// Appends those of a body's shapes, as given, that its elements shorten.
@@ -528,8 +534,6 @@ class System {
   void number_crushed_boxes();
   /// As short as an element's shortening leaves it [m].
   void shorten_shape(CrushedBox&, double shortening);
-  /// The polyhedron of a shape as it is now; null where it needs none.
-  const Hull* hull_of(int shape);
   /// What the end of a member bears against a surface with this normal out of body b [N]; unlimited for other shapes
   /// and where the member is not met head on.
   double calc_end_bearing(size_t b, int shape, const Vec3& outward) const;

@@ -415,5 +415,55 @@ TEST(LoadPhysics, OnTheGroundIsItsReaction) {
   (void)run(m, o);
 }
 
+TEST(LoadPhysics, GoneAndBackWithinAStepHasTheWholeImpulse) {
+  // 1 N on 1 kg from 0.1003 s on, gone from 0.2507 to 0.3001 s, from 0.3002 to 0.3003 s and from 0.8 s on; the spring
+  // that goes with it makes the step longer
+  for (const bool has_table : {false, true})
+    for (const double step : {1e-2, 3.3e-3, 1e-3, 0.0}) {
+      Model m;
+      m.gravity = {};
+      m.contact.ground = m.contact.bodies = false;
+      add_body(m, test::make_box("a", 1, {0.1, 0.1, 0.1}, {0, 0, 0}));
+      add_body(m, test::make_box("b", 1, {0.1, 0.1, 0.1}, {0, 3, 0}));
+      SpringDamper s;
+      s.a = kGround, s.b = {1};
+      s.p_A = {0, 4, 0};
+      s.free_length = 1;
+      s.spring.rate = 1e4;
+      m.springs.push_back(s);
+      Load l;
+      l.body = {0};
+      l.force = {1, 0, 0};
+      if (has_table) l.time = {0, 1}, l.factor = {1, 3};
+      m.loads.push_back(l);
+      const double times[] = {0.1003, 0.2507, 0.3001, 0.3002, 0.3003, 0.8};
+      double expected = 0;
+      for (int i = 0; i < 6; ++i) {
+        Event e;
+        e.time = times[i];
+        e.actions.resize(1);
+        e.actions[0].kind = i % 2 == 0 ? Action::Kind::ApplyLoad : Action::Kind::RemoveLoad;
+        e.actions[0].index = 0;
+        if (i == 1) {
+          Action a;
+          a.kind = Action::Kind::RemoveSpring;
+          a.index = 0;
+          e.actions.push_back(a);
+        }
+        m.events.push_back(e);
+        if (i % 2 == 0) {
+          const double lasts = times[i + 1] - times[i];
+          expected += has_table ? lasts + lasts * lasts : lasts;
+        }
+      }
+      Options o;
+      o.duration = 1, o.step = step, o.equilibrium = false;
+      double v = 0;
+      o.on_frame = [&](const View& view) { v = view.v_WB[0].x; };
+      (void)run(m, o);
+      EXPECT_NEAR(v, expected, 1e-12) << has_table << " " << step;
+    }
+}
+
 }  // namespace
 }  // namespace topple::mbs
