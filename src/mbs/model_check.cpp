@@ -314,6 +314,9 @@ void Checker::check_elements() {
     if (e.crush_through > 0 && e.stations.empty()) fail(p, "crush_through", "needs a station whose law is crushed");
     cracking(p, "cracking_y", e.cracking[0]);
     cracking(p, "cracking_z", e.cracking[1]);
+    for (int k : {0, 1})
+      if (e.cracking[k].flexibility > 0 && e.stations.empty())
+        fail(p, k == 0 ? "cracking_y" : "cracking_z", "needs a station that cracks");
     if (e.stations.size() > 2) fail(p, "stations", "has more than two stations");
     for (size_t k = 0; k < e.stations.size(); ++k) {
       const Place in{fmt::format("{}.stations[{}]", p.path, k), p.name};
@@ -362,6 +365,7 @@ void Checker::check_rotational_elements() {
     if (r.axial_element.is_valid()) index(p, "axial_element", r.axial_element.index, m_.elements);
     finite_not_negative(p, "stiffness", r.stiffness);
     cracking(p, "cracking", r.cracking);
+    if (r.cracking.flexibility > 0 && !r.law.is_valid()) fail(p, "cracking", "needs a law");
     share(p, "damping_ratio", r.damping_ratio, 0, 0.2);
     for (int k = 0; k < 3; ++k) finite_not_negative(p, "loose_translational", r.loose_translational[k]);
     finite_not_negative(p, "loose_torsion", r.loose_torsion);

@@ -619,6 +619,33 @@ TEST(CheckModel, RefusesLengthsOfRuptureThatAreZero) {
   }
 }
 
+TEST(CheckModel, RefusesCrackingOfWhatDoesNotCrack) {
+  Model m;
+  add_body(m, make_box("b", 1, {0.1, 0.1, 0.1}, {0, 0, 1}));
+  ZoneElement e;
+  e.a = kGround, e.b = {0};
+  e.X_AF.p = {0, 0, 1};
+  e.cracking[1] = {{10, 10}, {20, 20}, 1e-6};
+  add_element(m, e);
+  Joint j;
+  j.kind = Joint::Kind::Revolute;
+  j.parent = kGround, j.child = {0};
+  j.X_PF.p = {0, 0, 1};
+  RotationalElement r;
+  r.joint = add_joint(m, j);
+  r.stiffness = 1;
+  r.cracking = e.cracking[1];
+  m.rotational_elements.push_back(r);
+  const std::string said = complaint_of([&] { check_model(m); });
+  EXPECT_NE(said.find("elements[0].cracking_z"), std::string::npos) << said;
+  EXPECT_EQ(said.find("cracking_y"), std::string::npos) << said;
+  EXPECT_NE(said.find("rotational_elements[0].cracking"), std::string::npos) << said;
+  add_law(m, {});
+  m.elements[0].stations = {{0, {0}}};
+  m.rotational_elements[0].law = {0};
+  EXPECT_NO_THROW(check_model(m));
+}
+
 TEST(CheckModel, RefusesAReplacementThatIsTurnedOrFixed) {
   Column c = make_column();
   Action a;
