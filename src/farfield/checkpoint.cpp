@@ -12,7 +12,7 @@ namespace topple::farfield {
 
 namespace {
 
-constexpr char kMagic[] = "topple-fe-checkpoint-5";
+constexpr char kMagic[] = "topple-fe-checkpoint-6";
 
 class Writer {
  public:
@@ -106,7 +106,8 @@ void pass_happening(Io& io, Happening& h) {
 template <class Io, class State>
 void pass_state(Io& io, State& s) {
   io(s.next_frame), io(s.offset), io(s.quiet_since), io(s.swings_since), io(s.swing.most_speed), io(s.swing.path),
-      io(s.swing.has_turned), io(s.swing.is_short), io(s.next_firing), io(s.zone_state), io(s.has_touched);
+      io(s.swing.has_turned), io(s.swing.is_short), io(s.next_firing), io(s.is_settling), io(s.zone_state),
+      io(s.has_touched);
   io(s.skipped), io(s.unsettled), io(s.relaxation.converged), io(s.relaxation.steps), io(s.relaxation.residual);
   io(s.relaxation.settlement), io(s.relaxation.text), io(s.ledger), io(s.energy_error), io(s.released), io(s.wall_time);
   io(s.has_fragments), io(s.fragments_time), io(s.fragments.damaged_strain), io(s.fragments.reach);

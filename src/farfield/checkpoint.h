@@ -39,6 +39,7 @@ struct RunState {
   double quiet_since = -1, swings_since = -1;                  // negative: not so [s]
   Swing swing;
   size_t next_firing = 0;                      // in the schedule
+  bool is_settling = false;                    // interrupted while a wait was settled: that comes first
   std::vector<unsigned char> zone_state;       // mbs::ElementState of the last frame
   std::vector<unsigned char> has_touched;      // (bodies)
   std::vector<std::array<double, 3>> skipped;  // quiet waits passed over, from and to [s], and how far

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "base/error.h"
 #include "base/hash.h"
@@ -143,40 +144,50 @@ class Course {
   mbs::Summary::Ending advance() {
     using Ending = mbs::Summary::Ending;
     Clock::time_point kept = Clock::now();
-    Progress progress;
-    progress.cancel = options_.progress.cancel;
     for (;;) {
-      const double frame = frame_time(state_.next_frame);
-      const bool has_firing = state_.next_firing < schedule_.size();
-      const double firing = has_firing ? schedule_[state_.next_firing].time : std::numeric_limits<double>::infinity();
-      const double until = std::min({frame, firing, options_.duration});
-      const double half_step = 0.5 * system_.step();
-      if (until > time() + half_step) {
-        switch (system_.advance(until - state_.offset, progress)) {
-          case fem::ExplicitEnding::ReachedTime:
-            break;
-          case fem::ExplicitEnding::Cancelled:
-            keep();
-            return Ending::Cancelled;
-          case fem::ExplicitEnding::Diverged:
-            return Ending::Diverged;
-        }
-      }
-      if (frame <= until) {
-        show_frame(frame);
-        ++state_.next_frame;
-        if (options_.progress.report) options_.progress.report(frame, options_.duration);
-      }
-      if (until >= options_.duration) return Ending::TimeLimit;
-      if (firing <= until) fire(schedule_[state_.next_firing++]);
-      if (is_at_rest()) return Ending::AtRest;
+      if (!state_.is_settling)
+        if (const std::optional<Ending> ending = go_to_next_stop()) return *ending;
+      state_.is_settling = true;
       if (!skip_quiet()) {
         keep();
         return Ending::Cancelled;
       }
+      state_.is_settling = false;
       const bool due = std::chrono::duration<double>(Clock::now() - kept).count() >= fe_.checkpoint_interval;
       if (due) keep(), kept = Clock::now();
     }
+  }
+
+  /// To the next frame, charge or the end; nothing if the run goes on from there.
+  std::optional<mbs::Summary::Ending> go_to_next_stop() {
+    using Ending = mbs::Summary::Ending;
+    Progress progress;
+    progress.cancel = options_.progress.cancel;
+    const double frame = frame_time(state_.next_frame);
+    const bool has_firing = state_.next_firing < schedule_.size();
+    const double firing = has_firing ? schedule_[state_.next_firing].time : std::numeric_limits<double>::infinity();
+    const double until = std::min({frame, firing, options_.duration});
+    const double half_step = 0.5 * system_.step();
+    if (until > time() + half_step) {
+      switch (system_.advance(until - state_.offset, progress)) {
+        case fem::ExplicitEnding::ReachedTime:
+          break;
+        case fem::ExplicitEnding::Cancelled:
+          keep();
+          return Ending::Cancelled;
+        case fem::ExplicitEnding::Diverged:
+          return Ending::Diverged;
+      }
+    }
+    if (frame <= until) {
+      show_frame(frame);
+      ++state_.next_frame;
+      if (options_.progress.report) options_.progress.report(frame, options_.duration);
+    }
+    if (until >= options_.duration) return Ending::TimeLimit;
+    if (firing <= until) fire(schedule_[state_.next_firing++]);
+    if (is_at_rest()) return Ending::AtRest;
+    return std::nullopt;
   }
 
   void keep() {

@@ -384,6 +384,28 @@ TEST_F(FarfieldReplay, GoesOnFromACheckpointAsIfNothingHadHappened) {
   expect_same(whole, rest);
 }
 
+TEST_F(FarfieldReplay, GoesOnWhereAWaitWasBeingSettled) {
+  FeOptions kept = coarse();
+  kept.skip_quiet = true;
+  const std::string text = overhanging("1 s");
+  collapse::RunOptions o;
+  o.duration = 1.1;
+  const record::Record whole = run_plan(read(text), rules(), o, kept, {}, {});
+  kept.checkpoint = folder + "checkpoint.bin";
+  std::atomic<bool> cancel{false};
+  bool moves = false;
+  collapse::RunCallbacks callbacks;
+  callbacks.progress.cancel = &cancel;
+  callbacks.progress.report = [&](double, double) { moves = true; };
+  FeCallbacks fe_callbacks;
+  fe_callbacks.on_settling = [&](int) { cancel = moves; };
+  const record::Record part = run_plan(read(text), rules(), o, kept, callbacks, fe_callbacks);
+  ASSERT_EQ(part.ending, "cancelled");
+  ASSERT_LT(part.time.back(), 0.9);
+  kept.resume = true;
+  expect_same(whole, run_plan(read(text), rules(), o, kept, {}, {}));
+}
+
 TEST(Farfield, SaysWhenAddedMassMakesItAnotherBuilding) {
   const std::string text = with_duration(portal(), "20 ms");
   for (const double step : {0.02e-3, 0.04e-3}) {
