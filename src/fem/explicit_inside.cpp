@@ -155,6 +155,8 @@ ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
   for (const std::uint32_t row : loaded) push_load(s, row);
   s.ground_forces.assign(model.grounds.size(), {}), s.debris_forces = s.ground_forces;
   s.touchdowns.assign(static_cast<size_t>(parts), -1);
+  s.whole_mass.assign(static_cast<size_t>(parts), 0), s.debris_mass = s.whole_mass;
+  for (size_t e = 0; e < E; ++e) s.whole_mass[static_cast<size_t>(model.elements[e].part)] += element_mass[e];
   for (size_t row = 0; row < rows; ++row)
     for (const ExplicitGround& g : model.grounds) {
       const double* r = s.rows.data() + 8 * row;

@@ -108,6 +108,7 @@ struct ExplicitState {
   ContactState contact;
   std::vector<Vec3> ground_forces, debris_forces;  // on grounds: of all, of particles at their last forces
   std::vector<double> touchdowns;                  // by part
+  std::vector<double> whole_mass, debris_mass;     // of elements left, of particles; by part [kg]
   double removed_internal = 0, removed_kinetic = 0, removed_gravity = 0;
   std::vector<Removal> removals;
   std::vector<BarState> bars;

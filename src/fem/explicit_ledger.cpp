@@ -99,6 +99,12 @@ void ExplicitSystem::Inside::press_grounds(ExplicitState& state, bool debris) co
   for (const GroundShare& share : shares) {
     state.ground_touching += share.sums;
     for (size_t i = 0; i < share.forces.size(); ++i) state.debris_forces[i] += share.forces[i];
+    for (const GroundTouch& t : share.touches) {
+      const auto part =
+          static_cast<size_t>(model.elements[static_cast<size_t>(state.particle_makes[t.row].element)].part);
+      double& first = state.touchdowns[part];
+      if (first < 0 && state.debris_mass[part] > state.whole_mass[part]) first = static_cast<double>(state.steps) * h;
+    }
   }
   state.ground_touching.normal *= debris_steps, state.ground_touching.friction *= debris_steps;
   add_debris_forces();
@@ -256,6 +262,9 @@ void ExplicitSystem::Inside::remove_element(ExplicitState& state, int element, R
   removal.mass = element_mass[e], removal.internal = calc_elastic(state, element)[0];
   state.removals.push_back(removal);
   state.removed_internal += removal.internal;
+  const auto part = static_cast<size_t>(model.elements[e].part);
+  state.whole_mass[part] -= element_mass[e];
+  if (cause != RemovalCause::Charge && options.debris) state.debris_mass[part] += element_mass[e];
 
   const double share = element_mass[e] / 8;
   std::array<Vec3, 8> v;

@@ -9,7 +9,7 @@ namespace topple::fem {
 
 namespace {
 
-constexpr std::uint64_t kMark = 0x7470'6578'0000'0012;  // name and version of the layout
+constexpr std::uint64_t kMark = 0x7470'6578'0000'0013;  // name and version of the layout
 
 class Writer {
  public:
@@ -70,6 +70,7 @@ void pass_state(Archive& archive, State& s) {
   archive.list(s.touches), archive.value(s.ground_touching), archive.value(s.ground_work),
       archive.value(s.surface_work), archive.list(s.held), archive.value(s.held_work);
   archive.list(s.ground_forces), archive.list(s.debris_forces), archive.list(s.touchdowns), archive.list(s.removals);
+  archive.list(s.whole_mass), archive.list(s.debris_mass);
   archive.value(s.removed_internal), archive.value(s.removed_kinetic), archive.value(s.removed_gravity);
   archive.list(s.bars), archive.list(s.releases), archive.value(s.bar_work);
   auto& c = s.contact;

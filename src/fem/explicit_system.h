@@ -150,7 +150,8 @@ class ExplicitSystem {
   Vec3 ground_force(int ground) const;
   /// The same by its touching nodes: whether a node pressed on any ground at the last step.
   bool touches_ground(int node) const;
-  /// First time at which a node of each part pressed on a ground; negative: never (largest part + 1).
+  /// First time at which a node of each part pressed on a ground, or a piece of its debris once that outweighs its
+  /// elements; negative: never (largest part + 1).
   const std::vector<double>& touchdowns() const;
   int contacts() const;        // points that press on segments or debris at the last step
   double calc_mass() const;    // of what is left, debris included [kg]

@@ -322,6 +322,34 @@ TEST(ExplicitDebrisPhysics, RubbleBetweenBlockAndGroundCarriesLoadAndKeepsVolume
   }
 }
 
+TEST(ExplicitDebrisPhysics, WhatIsDebrisLandsWithIt) {
+  // a weak layer between a foot that stays and a heavy plate
+  ExplicitModel model = make_pillar();
+  for (ExplicitElement& e : model.elements) {
+    double z = 0;
+    for (const int n : e.node) z += model.nodes[static_cast<size_t>(n)].z / 8;
+    e.part = z < 0.4 ? 0 : z < 0.8 ? 1 : 2, e.material = e.part == 1 ? 0 : 1;
+  }
+  ExplicitSystem system(model, {});
+  system.set_velocity({0, 0, -6});
+  double lands = -1;
+  while (lands < 0 && system.time() < 3) {
+    ASSERT_EQ(system.advance(system.time() + 1e-3), ExplicitEnding::ReachedTime);
+    double whole = 0, debris = 0;
+    for (const ExplicitElement& e : model.elements)
+      if (const auto i = static_cast<int>(&e - model.elements.data()); e.part == 1 && system.is_alive(i)) whole += 19.2;
+    bool touches = false;
+    for (const DebrisParticle& q : system.debris()) {
+      if (model.elements[static_cast<size_t>(q.element)].part != 1) continue;
+      debris += q.mass, touches |= q.p.z < q.radius;
+    }
+    if (touches && debris > whole) lands = system.time();
+  }
+  ASSERT_GT(lands, 0);
+  EXPECT_NEAR(system.touchdowns()[1], lands, 2e-3);
+  EXPECT_LT(system.touchdowns()[2], 0);
+}
+
 TEST(ExplicitDebrisPhysics, BallsStoreNoMoreThanWhatTheyBear) {
   const ExplicitModel model = make_pillar();
   ExplicitOptions options;
