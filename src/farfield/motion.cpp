@@ -43,7 +43,6 @@ Motion::Motion(const Whole& whole, const mbs::Model& model, const collapse::Mode
     element_mass_.push_back(fem::calc_hex_volume(corners) *
                             fe.materials[static_cast<size_t>(element.material)].density * element.mass_factor);
     body_elements_[static_cast<size_t>(element.part)].push_back(static_cast<int>(e));
-    if (model.bodies[static_cast<size_t>(element.part)].fixed) fixed_weight_ += element_mass_.back() * norm(fe.gravity);
   }
   const auto gather = [&](const collapse::ZoneEntry& z) {
     ZoneElements out;
@@ -141,7 +140,9 @@ mbs::View Motion::calc_view(const fem::ExplicitSystem& system, double time) cons
   for (const double f : calc_foot_forces(system)) v.ground_force.z += f;
   v.contact_force_ground = -system.ground_force(0);
   v.ground_force += v.contact_force_ground;
-  v.ground_force.z -= fixed_weight_;
+  // what is left of bodies that belong to the ground
+  for (size_t b = 0; b < B; ++b)
+    if (model_.bodies[b].fixed) v.ground_force.z -= v.mass[b] * norm(fe.gravity);
   v.body_contacts = system.contacts();
   const fem::ExplicitEnergy e = system.calc_energy();
   v.energy.kinetic = e.kinetic + e.debris_kinetic;

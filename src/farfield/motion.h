@@ -38,7 +38,6 @@ class Motion {
   std::vector<ZoneElements> zones_;              // zone elements, then rotational elements
   std::vector<ZoneElements> joints_;             // (joints)
   std::vector<Vec3> centre_;                     // of elements at the start (elements)
-  double fixed_weight_ = 0;                      // of bodies that belong to the ground [N]
 };
 
 /// Largest von Mises stress over the yield stress at its pressure, before hardening (eq. 12 of

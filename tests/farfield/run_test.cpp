@@ -249,6 +249,39 @@ TEST(FarfieldPhysics, PlacesBodiesWithTheirDebris) {
   EXPECT_NEAR(norm(momentum - expected), 0, 1e-6 * norm(expected) + 1e-6 * mass);
 }
 
+TEST(FarfieldPhysics, CountsTheWeightOfStumpsAsLongAsTheyAreThere) {
+  const product::Plan plan = read(dropped());
+  collapse::ModelMap map;
+  const mbs::Model model = collapse::make_model(plan, rules(), map);
+  const FeOptions fe = coarse();
+  const Whole whole = make_whole(plan, rules(), fe.grid, model, map);
+  fem::ExplicitSystem system(whole.fe, {});
+  const Motion motion(whole, model, map, fe.grid.size);
+  std::vector<int> fixed;
+  for (size_t e = 0; e < whole.fe.elements.size(); ++e)
+    if (model.bodies[static_cast<size_t>(whole.fe.elements[e].part)].fixed) fixed.push_back(static_cast<int>(e));
+  ASSERT_GT(fixed.size(), 8u);
+  for (const bool taken : {false, true}) {
+    if (taken) system.remove(fixed);
+    const mbs::View v = motion.calc_view(system, 0);
+    double borne = 0, stumps = 0;
+    for (const double f : motion.calc_foot_forces(system)) borne += f;
+    for (size_t b = 0; b < model.bodies.size(); ++b)
+      if (model.bodies[b].fixed) stumps += 9.81 * v.mass[b];
+    EXPECT_EQ(stumps > 0, !taken);
+    EXPECT_NEAR(borne - v.ground_force.z, stumps, 1e-9 * 9.81 * 1e4);
+  }
+}
+
+TEST(FarfieldPhysics, FindsReactionsInBalanceWithCellsLargerThanStumps) {
+  FeOptions fe = coarse();
+  fe.grid.size = 1.3;
+  const record::Record r = run(with_duration(dropped(), "60 ms"), fe);
+  const record::Finding& f = find(r, "verification.equilibrium");
+  EXPECT_LT(f.value, 0.01) << f.text;
+  EXPECT_EQ(f.status, record::Status::Good);
+}
+
 TEST(Farfield, SaysWhatWasTakenAway) {
   const record::Record r = run(with_duration(dropped(), "100 ms"), coarse());
   EXPECT_EQ(r.provenance.engine, "finite elements");
