@@ -415,9 +415,10 @@ void add_vibration(const Context& c, const Mechanism& m) {
         kNone, "");
   // what round-off makes of a building that stands is no energy
   const double least_energy = 1e-6 * c.map.moving_mass * norm(c.model.gravity);
+  // contacts of finite elements have no restitution: what is booked is what they take
+  const double restitution = c.r.provenance.engine == "finite elements" ? 0 : c.model.contact.restitution;
   for (const product::Neighbour& n : c.plan.neighbours) {
-    const Shaking s =
-        find_shaking(law, c.r, c.recorder.speeds(), c.model.gravity, c.model.contact.restitution, n.footprint);
+    const Shaking s = find_shaking(law, c.r, c.recorder.speeds(), c.model.gravity, restitution, n.footprint);
     const bool is_shaken = s.energy > least_energy;
     const double low = is_shaken ? s.velocity / law.factor : 0, high = is_shaken ? s.velocity * law.factor : 0;
     const auto [least, most] = find_vibration_limits(n, law);

@@ -282,6 +282,19 @@ TEST(FarfieldPhysics, FindsReactionsInBalanceWithCellsLargerThanStumps) {
   EXPECT_EQ(f.status, record::Status::Good);
 }
 
+TEST(FarfieldPhysics, ShakesTheGroundWhateverTheRestitutionOfTheSite) {
+  const auto shaking = [](const std::string& restitution) {
+    const record::Record r =
+        run("[site]\nrestitution = " + restitution + "\n[[site.neighbour]]\nname = \"N\"\nfootprint = [[\"-12 m\", \"0 m\"], " +
+                "[\"-8 m\", \"0 m\"], [\"-8 m\", \"4 m\"]]\nvibration_limit = \"5 mm/s\"\n" + collapse::vibration_law() +
+                with_duration(dropped(), "900 ms"),
+            coarse());
+    return find(r, "vibration.N").text;
+  };
+  EXPECT_THAT(shaking("0.9"), testing::HasSubstr("MJ lost"));
+  EXPECT_EQ(shaking("0.9"), shaking("0.1"));
+}
+
 TEST(Farfield, SaysWhatWasTakenAway) {
   const record::Record r = run(with_duration(dropped(), "100 ms"), coarse());
   EXPECT_EQ(r.provenance.engine, "finite elements");
