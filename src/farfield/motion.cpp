@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <set>
 
 #include "base/rotation_fit.h"
+#include "farfield/boxes.h"
 
 namespace topple::farfield {
 
@@ -25,7 +28,8 @@ double calc_utilisation(const fem::ExplicitMaterial& m, const std::array<double,
   return yield > 0 ? std::min(1.0, q / yield) : 1.0;
 }
 
-Motion::Motion(const Whole& whole, const mbs::Model& model, const collapse::ModelMap& map, double size)
+Motion::Motion(const product::Plan& plan, const Whole& whole, const mbs::Model& model, const collapse::ModelMap& map,
+               double size)
     : whole_(whole), model_(model) {
   const fem::ExplicitModel& fe = whole.fe;
   body_elements_.resize(model.bodies.size());
@@ -44,6 +48,27 @@ Motion::Motion(const Whole& whole, const mbs::Model& model, const collapse::Mode
                             fe.materials[static_cast<size_t>(element.material)].density * element.mass_factor);
     body_elements_[static_cast<size_t>(element.part)].push_back(static_cast<int>(e));
   }
+  std::set<int> charged;
+  for (const ChargeElements& c : whole.charges) charged.insert(c.elements.begin(), c.elements.end());
+  std::multimap<int, int> elements_of;
+  for (size_t e = 0; e < fe.elements.size(); ++e) elements_of.emplace(whole.grid.cells[e].member, static_cast<int>(e));
+  // cells of one cross-section lie at the same place along the member, to a thousandth of a millimetre
+  const auto gather_sections = [&](const collapse::ZoneEntry& z) {
+    std::vector<std::vector<int>> out;
+    const int member = plan.find_member(z.member);
+    if (member < 0 || plan.members[static_cast<size_t>(member)].section < 0) return out;
+    const int axis = axis_of(plan.members[static_cast<size_t>(member)]);
+    std::map<long, std::vector<int>> at;
+    const auto [first, last] = elements_of.equal_range(member);
+    for (auto it = first; it != last; ++it) {
+      const double place = centre_[static_cast<size_t>(it->second)][axis];
+      if (std::abs(place - z.p_W[axis]) <= size) at[std::lround(1e6 * place)].push_back(it->second);
+    }
+    for (auto& [place, cells] : at)
+      if (std::none_of(cells.begin(), cells.end(), [&](int e) { return charged.count(e) != 0; }))
+        out.push_back(std::move(cells));
+    return out;
+  };
   const auto gather = [&](const collapse::ZoneEntry& z) {
     ZoneElements out;
     for (const int b : {z.body_a, z.body_b}) {
@@ -53,6 +78,7 @@ Motion::Motion(const Whole& whole, const mbs::Model& model, const collapse::Mode
         if (std::max({std::abs(d.x), std::abs(d.y), std::abs(d.z)}) <= size) out.elements.push_back(e);
       }
     }
+    out.sections = gather_sections(z);
     return out;
   };
   for (const auto* list : {&map.elements, &map.rotationals})
@@ -119,7 +145,10 @@ mbs::View Motion::calc_view(const fem::ExplicitSystem& system, double time) cons
       limit = std::max(limit, system.damage(e));
       utilisation = std::max(utilisation, calc_utilisation(m, system.stress(e)));
     }
-    if (gone > 0 && 2 * gone >= z.elements.size()) return mbs::ElementState::Broken;
+    const auto is_gone = [&](int e) { return !system.is_alive(e); };
+    const auto is_cut = [&](const std::vector<int>& s) { return std::all_of(s.begin(), s.end(), is_gone); };
+    if (gone > 0 && (2 * gone >= z.elements.size() || std::any_of(z.sections.begin(), z.sections.end(), is_cut)))
+      return mbs::ElementState::Broken;
     if (gone > 0 || limit > 0.5) return mbs::ElementState::Softening;
     return plastic > kYielded ? mbs::ElementState::Yielded : mbs::ElementState::Elastic;
   };

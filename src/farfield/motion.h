@@ -12,11 +12,13 @@ namespace topple::farfield {
 /// A zone of the manager and the elements around its place.
 struct ZoneElements {
   std::vector<int> elements;  // of both its bodies, with their centres within one size of the zone's place
+  /// Of its column or beam, whole cross-sections that have their centres as near along it and that no charge takes.
+  std::vector<std::vector<int>> sections;
 };
 
 class Motion {
  public:
-  Motion(const Whole&, const mbs::Model&, const collapse::ModelMap&, double size);
+  Motion(const product::Plan&, const Whole&, const mbs::Model&, const collapse::ModelMap&, double size);
 
   /// The manager's bodies with the mass centre of their elements and debris, turned as least squares turn the elements
   /// (without any, not at all); its zones by what their elements have come through, the ledger of energies.

@@ -62,7 +62,7 @@ class Course {
         whole_(make_whole(plan, k, fe.grid, model, map)),
         mesh_(calc_mesh_report(plan, whole_)),
         system_(whole_.fe, make_options(fe, run)),
-        motion_(whole_, model, map, fe.grid.size) {
+        motion_(plan, whole_, model, map, fe.grid.size) {
     check_added_mass();
     if (callbacks.on_mesh) callbacks.on_mesh(mesh_, describe_added_mass());
     std::string rules;

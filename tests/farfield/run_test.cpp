@@ -229,7 +229,7 @@ TEST(FarfieldPhysics, PlacesBodiesWithTheirDebris) {
   system.set_velocity({2, 0, -25});  // into its feet
   ASSERT_EQ(system.advance(0.5), fem::ExplicitEnding::ReachedTime);
   ASSERT_GT(system.debris().size(), 50u);
-  const Motion motion(whole, model, map, fe.grid.size);
+  const Motion motion(plan, whole, model, map, fe.grid.size);
   const mbs::View v = motion.calc_view(system, system.time());
   // the bodies' potential and momentum against those of the ledger and of the nodes
   double gravity = 0, scale = 0, mass = 0;
@@ -256,7 +256,7 @@ TEST(FarfieldPhysics, CountsTheWeightOfStumpsAsLongAsTheyAreThere) {
   const FeOptions fe = coarse();
   const Whole whole = make_whole(plan, rules(), fe.grid, model, map);
   fem::ExplicitSystem system(whole.fe, {});
-  const Motion motion(whole, model, map, fe.grid.size);
+  const Motion motion(plan, whole, model, map, fe.grid.size);
   std::vector<int> fixed;
   for (size_t e = 0; e < whole.fe.elements.size(); ++e)
     if (model.bodies[static_cast<size_t>(whole.fe.elements[e].part)].fixed) fixed.push_back(static_cast<int>(e));
@@ -293,6 +293,40 @@ TEST(FarfieldPhysics, ShakesTheGroundWhateverTheRestitutionOfTheSite) {
   };
   EXPECT_THAT(shaking("0.9"), testing::HasSubstr("MJ lost"));
   EXPECT_EQ(shaking("0.9"), shaking("0.1"));
+}
+
+TEST(Farfield, BreaksAZoneWhoseCrossSectionHasGone) {
+  const product::Plan plan = read(portal());
+  collapse::ModelMap map;
+  const mbs::Model model = collapse::make_model(plan, rules(), map);
+  const FeOptions fe = coarse();
+  const Whole whole = make_whole(plan, rules(), fe.grid, model, map);
+  const Motion motion(plan, whole, model, map, fe.grid.size);
+  int tried = 0;
+  for (size_t z = 0; z < map.elements.size(); ++z) {
+    const collapse::ZoneEntry& zone = map.elements[z];
+    const int member = plan.find_member(zone.member);
+    if (plan.members[static_cast<size_t>(member)].kind != product::MemberKind::Beam) continue;
+    // the layer of the beam next to the zone
+    double least = 1e9;
+    const auto away = [&](const Cell& c) { return std::abs(c.centre.x - zone.p_W.x); };
+    for (const Cell& c : whole.grid.cells)
+      if (c.member == member) least = std::min(least, away(c));
+    std::vector<int> layer;
+    for (size_t c = 0; c < whole.grid.cells.size(); ++c)
+      if (whole.grid.cells[c].member == member && away(whole.grid.cells[c]) < least + 1e-6)
+        layer.push_back(static_cast<int>(c));
+    ASSERT_GE(layer.size(), 4u);
+    const int last = layer.back();
+    layer.pop_back();
+    fem::ExplicitSystem system(whole.fe, {});
+    system.remove(layer);
+    EXPECT_EQ(motion.calc_view(system, 0).element_state[z], mbs::ElementState::Softening) << zone.name;
+    system.remove(std::vector<int>{last});
+    EXPECT_EQ(motion.calc_view(system, 0).element_state[z], mbs::ElementState::Broken) << zone.name;
+    ++tried;
+  }
+  EXPECT_GT(tried, 1);
 }
 
 TEST(Farfield, SaysWhatWasTakenAway) {
