@@ -104,6 +104,8 @@ int run_finite_elements(const Arguments& a, const std::atomic<bool>& cancel) {
     };
     fem::ExplicitSystem::Timing timing;
     fe_callbacks.on_timing = [&](const fem::ExplicitSystem::Timing& t) { timing = t; };
+    bool has_checkpoint = fe.resume;  // none is written while the dead load is put on
+    fe_callbacks.on_checkpoint = [&] { has_checkpoint = true; };
     const record::Record r = farfield::run_plan(plan, knowledge, options, fe, callbacks, fe_callbacks);
     progress.clear();
     const int code = close_run(r, a, out, {});
@@ -111,7 +113,7 @@ int run_finite_elements(const Arguments& a, const std::atomic<bool>& cancel) {
     if (elements > 0)
       std::fprintf(out, "Elements and nodes took %.1f s, contact and debris %.1f s: %.2f of that.\n", elements, contact,
                    contact / elements);
-    if (r.ending == "cancelled" && !fe.checkpoint.empty())
+    if (r.ending == "cancelled" && has_checkpoint)
       std::fprintf(out, "Go on with: topple fe %s%s -o %s --resume\n", quote_word(a.input).c_str(),
                    write_options(a).c_str(), quote_word(a.output).c_str());
     return code;

@@ -77,6 +77,7 @@ class Course {
     state_.has_touched.assign(model.bodies.size(), 0);
     on_relaxed_ = callbacks.on_relaxed;
     on_timing_ = callbacks.on_timing;
+    on_checkpoint_ = callbacks.on_checkpoint;
     settle_.cancel = options_.progress.cancel;
     if (callbacks.on_settling)
       settle_.report = [call = callbacks.on_settling](double steps, double) { call(static_cast<int>(steps)); };
@@ -195,6 +196,7 @@ class Course {
     RunState now = state_;
     now.wall_time += calc_seconds();
     write_checkpoint(fe_.checkpoint, key_, now, system_.write_snapshot());
+    if (on_checkpoint_) on_checkpoint_();
   }
 
   void show(const mbs::Happening& h) {
@@ -437,6 +439,7 @@ class Course {
   Progress settle_;
   std::function<void(const fem::RelaxationSummary&)> on_relaxed_;
   std::function<void(const fem::ExplicitSystem::Timing&)> on_timing_;
+  std::function<void()> on_checkpoint_;
 };
 
 void Course::check_added_mass() const {

@@ -200,6 +200,12 @@ fe)
   [ $code -eq 1 ] || { echo "exit code $code after an interrupt"; cat out err; failures=$((failures + 1)); }
   has out "Cancelled at"; has out "--resume"; exists cut/checkpoint.bin; exists cut/record.h5
   expect 2 "$topple" fe "$plan" --size "30 cm" --resume -o cut; has err "another plan, mesh, step or version"
+  # there is nothing to go on from while the dead load is put on
+  "$topple" fe "$plan" --size "10 cm" --checkpoint -o early >out 2>err &
+  pid=$!; for _ in $(seq 600); do grep -q "Putting on" out && break; sleep 0.1; done
+  kill -INT $pid; wait $pid; code=$?
+  [ $code -eq 1 ] || { echo "exit code $code after an early interrupt"; cat out err; failures=$((failures + 1)); }
+  lacks out "--resume"; [ ! -e early/checkpoint.bin ] || { echo "a checkpoint of nothing"; failures=$((failures + 1)); }
   # the keyword file
   expect 0 "$topple" export "$plan" --lsdyna --size "40 cm" -o model.k; has out "Wrote model.k"
   cp "$plan" own.toml; expect 2 "$topple" export own.toml --lsdyna -o own.toml; has err "written over"; cmp "$plan" own.toml || failures=$((failures + 1))
