@@ -15,6 +15,32 @@ namespace {
 /// Plastic strain from which a zone counts as yielded: that of bars at their yield stress, about f_y / E_s.
 constexpr double kYielded = 2e-3;
 
+struct MovingPoint {
+  double mass = 0;
+  Vec3 p, v;
+};
+
+/// Angular velocity of the rigid body with the points' angular momentum about their mass centre; 0 where they lie on a
+/// line or there are none [rad/s].
+Vec3 calc_spin(const std::vector<MovingPoint>& points) {
+  double mass = 0;
+  Vec3 centre, velocity;
+  for (const MovingPoint& x : points) mass += x.mass, centre += x.mass * x.p, velocity += x.mass * x.v;
+  if (!(mass > 0)) return {};
+  centre = (1 / mass) * centre, velocity = (1 / mass) * velocity;
+  Vec3 momentum;
+  Mat3 inertia;
+  for (const MovingPoint& x : points) {
+    const Vec3 r = x.p - centre;
+    momentum += x.mass * cross(r, x.v - velocity);
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) inertia.m[i][j] += x.mass * ((i == j ? dot(r, r) : 0) - r[i] * r[j]);
+  }
+  const double size = inertia.m[0][0] + inertia.m[1][1] + inertia.m[2][2];
+  const double determinant = dot(inertia.row(0), cross(inertia.row(1), inertia.row(2)));
+  return determinant > 1e-12 * size * size * size ? inverse(inertia) * momentum : Vec3{};
+}
+
 }  // namespace
 
 double calc_utilisation(const fem::ExplicitMaterial& m, const std::array<double, 6>& s) {
@@ -95,9 +121,10 @@ mbs::View Motion::calc_view(const fem::ExplicitSystem& system, double time) cons
   for (const fem::DebrisParticle& d : system.debris())
     debris[static_cast<size_t>(fe.elements[static_cast<size_t>(d.element)].part)].push_back(&d);
   std::vector<FitPoint> points;
+  std::vector<MovingPoint> moving;
   for (size_t b = 0; b < B; ++b) {
     const Pose start = model_.bodies[b].X_WB;
-    points.clear();
+    points.clear(), moving.clear();
     Vec3 momentum;
     double mass = 0;
     for (const int e : body_elements_[b]) {
@@ -105,6 +132,7 @@ mbs::View Motion::calc_view(const fem::ExplicitSystem& system, double time) cons
       const double share = 0.125 * element_mass_[static_cast<size_t>(e)];
       for (const int n : fe.elements[static_cast<size_t>(e)].node) {
         points.push_back({share, fe.nodes[static_cast<size_t>(n)], system.p(n)});
+        moving.push_back({share, system.p(n), system.v(n)});
         momentum += share * system.v(n);
         mass += share;
       }
@@ -127,7 +155,7 @@ mbs::View Motion::calc_view(const fem::ExplicitSystem& system, double time) cons
     }
     v.X_WB.push_back(X);
     v.v_WB.push_back(velocity);
-    v.w_WB.emplace_back();
+    v.w_WB.push_back(calc_spin(moving));
     v.mass.push_back(mass);
   }
 

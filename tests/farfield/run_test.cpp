@@ -329,6 +329,28 @@ TEST(Farfield, BreaksAZoneWhoseCrossSectionHasGone) {
   EXPECT_GT(tried, 1);
 }
 
+TEST(FarfieldPhysics, TurnsBodiesAsTheirElementsDo) {
+  const product::Plan plan = read(portal());
+  collapse::ModelMap map;
+  const mbs::Model model = collapse::make_model(plan, rules(), map);
+  const FeOptions fe = coarse();
+  const Whole whole = make_whole(plan, rules(), fe.grid, model, map);
+  fem::ExplicitSystem system(whole.fe, {});
+  const Vec3 w{0.3, -0.7, 1.1}, about{1, 2, 3};
+  std::vector<Vec3> v;
+  for (const Vec3& p : whole.fe.nodes) v.push_back(Vec3{5, 0, 0} + cross(w, p - about));
+  for (const fem::ExplicitSupport& s : whole.fe.supports) v[static_cast<size_t>(s.node)] = {};
+  system.set_velocities(v);
+  const mbs::View view = Motion(plan, whole, model, map, fe.grid.size).calc_view(system, 0);
+  int turning = 0;
+  for (size_t b = 0; b < model.bodies.size(); ++b) {
+    if (map.bodies[b].name != "B-A1B1-0") continue;
+    EXPECT_NEAR(norm(view.w_WB[b] - w), 0, 1e-9);
+    ++turning;
+  }
+  EXPECT_EQ(turning, 1);
+}
+
 TEST(Farfield, SaysWhatWasTakenAway) {
   const record::Record r = run(with_duration(dropped(), "100 ms"), coarse());
   EXPECT_EQ(r.provenance.engine, "finite elements");
