@@ -61,7 +61,7 @@ class Course {
         map_(map),
         whole_(make_whole(plan, k, fe.grid, model, map)),
         mesh_(calc_mesh_report(plan, whole_)),
-        system_(whole_.fe, make_options(fe, run)),
+        system_(whole_.fe, make_options(k, fe, run)),
         motion_(plan, whole_, model, map, fe.grid.size) {
     check_added_mass();
     if (callbacks.on_mesh) callbacks.on_mesh(mesh_, describe_added_mass());
@@ -131,8 +131,10 @@ class Course {
   void add_findings(record::Record& r) const;
 
  private:
-  static fem::ExplicitOptions make_options(const FeOptions& fe, const collapse::RunOptions& run) {
+  static fem::ExplicitOptions make_options(const collapse::Knowledge& k, const FeOptions& fe,
+                                           const collapse::RunOptions& run) {
     fem::ExplicitOptions o;
+    o.friction = k.contact_body_friction;
     o.scaled_step = fe.scaled_step;
     o.threads = run.threads;
     return o;

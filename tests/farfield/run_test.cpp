@@ -351,6 +351,16 @@ TEST(FarfieldPhysics, TurnsBodiesAsTheirElementsDo) {
   EXPECT_EQ(turning, 1);
 }
 
+TEST(FarfieldPhysics, RubsWithTheFrictionOfTheRules) {
+  collapse::Knowledge slippery = rules();
+  slippery.contact_body_friction = 0;
+  const product::Plan plan = read(with_duration(dropped(), "900 ms"));
+  const record::Record rough = run_plan(plan, rules(), {}, coarse(), {}, {});
+  const record::Record smooth = run_plan(plan, slippery, {}, coarse(), {}, {});
+  EXPECT_NE(rough.position, smooth.position);
+  EXPECT_LT(series(smooth, "energy_friction").back(), series(rough, "energy_friction").back());
+}
+
 TEST(Farfield, SaysWhatWasTakenAway) {
   const record::Record r = run(with_duration(dropped(), "100 ms"), coarse());
   EXPECT_EQ(r.provenance.engine, "finite elements");
