@@ -565,6 +565,10 @@ void say_what_is_not_modelled(record::Record& r) {
       "material)";
   for (std::string& s : r.not_modelled)
     if (s.rfind("cracking and crushing of slabs", 0) == 0) s = here;
+  // of zones alone: elements beside a charge are weakened wherever they are
+  r.findings.erase(std::remove_if(r.findings.begin(), r.findings.end(),
+                                  [](const record::Finding& f) { return f.title == "Damage without effect"; }),
+                   r.findings.end());
   for (record::Finding& f : r.findings)
     if (f.id == "not_modelled") f.text = collapse::tell_not_modelled(r.not_modelled);
 }

@@ -361,6 +361,17 @@ TEST(FarfieldPhysics, RubsWithTheFrictionOfTheRules) {
   EXPECT_LT(series(smooth, "energy_friction").back(), series(rough, "energy_friction").back());
 }
 
+TEST(Farfield, LeavesOutWhatZonesAloneLack) {
+  const std::string text =
+      with_duration(portal(charge("C-A1-0", "50 ms", "transition_damage = 0.4")), "60 ms");
+  const auto tells = [](const record::Record& r) {
+    return std::any_of(r.findings.begin(), r.findings.end(),
+                       [](const record::Finding& f) { return f.title == "Damage without effect"; });
+  };
+  EXPECT_TRUE(tells(run_bodies(text)));
+  EXPECT_FALSE(tells(run(text, coarse())));
+}
+
 TEST(Farfield, SaysWhatWasTakenAway) {
   const record::Record r = run(with_duration(dropped(), "100 ms"), coarse());
   EXPECT_EQ(r.provenance.engine, "finite elements");
