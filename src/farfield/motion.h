@@ -21,7 +21,8 @@ class Motion {
   Motion(const product::Plan&, const Whole&, const mbs::Model&, const collapse::ModelMap&, double size);
 
   /// The manager's bodies with the mass centre of their elements and debris, turned as least squares turn the elements
-  /// (without any, not at all), and their angular momentum says; its zones by what their elements have come through, the ledger of energies.
+  /// (without any, not at all), and their angular momentum says; its zones by what their elements have come through,
+  /// the ledger of energies.
   ///   time  of the plan [s]
   mbs::View calc_view(const fem::ExplicitSystem&, double time) const;
   /// Vertical force of the ground on each foot, upwards [N]. (feet)

@@ -24,7 +24,7 @@ struct FeCallbacks {
   std::function<void(const MeshReport&, const std::string& added_mass)> on_mesh;
   std::function<void(int steps)> on_settling;  // now and then while a load is put on without motion
   std::function<void(const fem::RelaxationSummary&)> on_relaxed;
-  std::function<void()> on_checkpoint;  // when one has been written
+  std::function<void()> on_checkpoint;                                // when one has been written
   std::function<void(const fem::ExplicitSystem::Timing&)> on_timing;  // at the end, since the run was begun or resumed
 };
 

@@ -285,9 +285,9 @@ TEST(FarfieldPhysics, FindsReactionsInBalanceWithCellsLargerThanStumps) {
 TEST(FarfieldPhysics, ShakesTheGroundWhateverTheRestitutionOfTheSite) {
   const auto shaking = [](const std::string& restitution) {
     const record::Record r =
-        run("[site]\nrestitution = " + restitution + "\n[[site.neighbour]]\nname = \"N\"\nfootprint = [[\"-12 m\", \"0 m\"], " +
-                "[\"-8 m\", \"0 m\"], [\"-8 m\", \"4 m\"]]\nvibration_limit = \"5 mm/s\"\n" + collapse::vibration_law() +
-                with_duration(dropped(), "900 ms"),
+        run(with_duration(dropped(), "900 ms") + "[site]\nrestitution = " + restitution +
+                "\n[[site.neighbour]]\nname = \"N\"\nfootprint = [[\"-12 m\", \"0 m\"], [\"-8 m\", \"0 m\"], " +
+                "[\"-8 m\", \"4 m\"]]\nvibration_limit = \"5 mm/s\"\n" + collapse::vibration_law(),
             coarse());
     return find(r, "vibration.N").text;
   };
@@ -362,8 +362,7 @@ TEST(FarfieldPhysics, RubsWithTheFrictionOfTheRules) {
 }
 
 TEST(Farfield, LeavesOutWhatZonesAloneLack) {
-  const std::string text =
-      with_duration(portal(charge("C-A1-0", "50 ms", "transition_damage = 0.4")), "60 ms");
+  const std::string text = with_duration(portal(charge("C-A1-0", "50 ms", "transition_damage = 0.4")), "60 ms");
   const auto tells = [](const record::Record& r) {
     return std::any_of(r.findings.begin(), r.findings.end(),
                        [](const record::Finding& f) { return f.title == "Damage without effect"; });
