@@ -85,7 +85,7 @@ struct BuilderState {
   std::map<GridPoint, int> node_body;    // assembly that holds the joint of beams and columns
   std::map<int, int> own_body;           // member -> assembly: shafts of the ground storey, x beams, walls
   std::map<int, int> stump_body;         // member -> assembly
-  std::map<int, double> lowest_charge;   // charged column -> centre of its lowest charge [m]
+  std::map<int, double> lowest_charge;   // column -> centre of its lowest charge that fires [m]
   std::map<GridPoint, double> core_low;  // underside of the joint in W [m]
   std::map<int, MemberZones> zones;      // columns and beams
   std::map<std::tuple<int, double, double, Bending>, mbs::LawId> laws;
@@ -188,6 +188,11 @@ struct Builder : BuilderState {
   // events
   /// Adds the events of charges to model and map, in order of the schedule.
   void add_events(std::vector<Firing> schedule);
+  /// Charges that fire, in order of time; those of a member in one instant in an order that is not the plan's.
+  std::vector<Firing> order_firings() const;
+  const product::Charge& charge_of(const Firing& f) const {
+    return plan.stages[static_cast<size_t>(f.stage)].charges[static_cast<size_t>(f.charge)];
+  }
   /// Takes resistance away from the sector of a shaft: limits now, what is left of nothing when the ramp is over.
   void fire_shaft(const Firing&, mbs::Event& event, mbs::Event& lighter);
 

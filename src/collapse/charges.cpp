@@ -16,16 +16,43 @@ namespace {
 
 constexpr double kLeastStiffnessShare = 1e-3;  // of a fired zone, so that its forces die out smoothly
 
+/// Upper end of what a charge destroys, from the member's start [m].
+double upper_end(const product::Charge& c) { return c.position + 0.5 * c.destroyed_length; }
+
+/// Whether a charge leaves less of a zone: fewer bars, or as few over a greater length.
+bool leaves_less(const product::Charge& a, const product::Charge& b) {
+  return a.residual_bars != b.residual_bars ? a.residual_bars < b.residual_bars
+                                            : a.destroyed_length > b.destroyed_length;
+}
+
 }  // namespace
 
 using product::Member;
 using product::MemberKind;
 
+std::vector<Firing> Builder::order_firings() const {
+  std::vector<Firing> out;
+  for (const Firing& f : map.schedule)
+    if (!f.fails) out.push_back(f);
+  // those of a member in one instant: the one that leaves least of it comes first, then the higher one
+  const auto is_before = [this](const Firing& a, const Firing& b) {
+    const product::Charge &first = charge_of(a), &second = charge_of(b);
+    if (leaves_less(first, second) || leaves_less(second, first)) return leaves_less(first, second);
+    return first.position > second.position;
+  };
+  for (size_t i = 0; i < out.size(); ++i)
+    for (size_t j = i + 1; j < out.size() && out[j].time == out[i].time; ++j)
+      if (charge_of(out[i]).member == charge_of(out[j]).member &&
+          member(charge_of(out[i]).member).kind != MemberKind::Shaft && is_before(out[j], out[i]))
+        std::swap(out[i], out[j]);
+  return out;
+}
+
 /// What is above a charge in a column of the ground storey becomes a stub under its joint: whatever it meets can crush
 /// it, shear it off or turn it.
 void Builder::make_stub(const product::Charge& c, const MemberZones& z, mbs::Event& event, mbs::Event& lighter) {
   const MemberStation& top = z.station[1];
-  const double length = z.clear_length - (c.position + 0.5 * c.destroyed_length);
+  const double length = z.clear_length - upper_end(c);
   if (!(length > 0)) return;
   mbs::Action act;
   act.kind = mbs::Action::Kind::SwitchLaw;
@@ -55,13 +82,20 @@ void Builder::add_events(std::vector<Firing> schedule) {
   std::vector<Assembly> current = assemblies;  // as they are after the events so far
   std::vector<Vec3> centre;                    // their centres of mass at the start, in W
   for (const mbs::Body& b : model.bodies) centre.push_back(b.X_WB.p);
-  std::set<std::string> without_zone;  // members with damage beside a charge that no zone has
-  std::map<int, double> residual;      // element -> least share of bars left by charges so far
+  std::set<std::string> without_zone;             // members with damage beside a charge that no zone has
+  std::map<int, const product::Charge*> weakest;  // element -> charge so far that leaves least of it
+  std::map<int, double> highest;                  // column -> upper end of what charges so far destroyed [m]
+  const std::vector<Firing> firings = order_firings();
+  // a higher charge makes the stub if it fires in the same instant
+  const auto is_highest = [&](const Firing& f) {
+    return std::none_of(firings.begin(), firings.end(), [&](const Firing& other) {
+      return other.time == f.time && charge_of(other).member == charge_of(f).member &&
+             charge_of(other).position > charge_of(f).position;
+    });
+  };
 
-  for (const Firing& firing : map.schedule) {
-    if (firing.fails) continue;
-    const product::Charge& c =
-        plan.stages[static_cast<size_t>(firing.stage)].charges[static_cast<size_t>(firing.charge)];
+  for (const Firing& firing : firings) {
+    const product::Charge& c = charge_of(firing);
     const Member& m = member(c.member);
     // a beam between frames has no zones of its own in a condensed model and is refused before
     if (!has_frame(m.frame_a)) continue;
@@ -95,8 +129,8 @@ void Builder::add_events(std::vector<Firing> schedule) {
         const double at = std::atan2(p.centre.y - m.start.y, p.centre.x - m.start.x) - 1e-7;
         return p.is_solid && product::is_in_sector(at, c.azimuth, c.opening);
       };
-    } else if (const auto it = residual.find(element); it == residual.end() || c.residual_bars < it->second) {
-      residual[element] = c.residual_bars;
+    } else if (const auto it = weakest.find(element); it == weakest.end() || leaves_less(c, *it->second)) {
+      weakest[element] = &c;
       mbs::Action act;
       act.kind = mbs::Action::Kind::SwitchLaw;
       act.element = mbs::ElementId{element};
@@ -115,16 +149,19 @@ void Builder::add_events(std::vector<Firing> schedule) {
       zone.firing_time = std::min(zone.firing_time, firing.time);
     }
 
-    // the destroyed length is thrown out
+    // the destroyed length is thrown out, and with it what it cuts off from the part of a column above it
+    const int below = stump_body.count(c.member) ? stump_body.at(c.member) : -1;
+    const double loose_from = below < 0 ? from : std::min(from, m.start.z + lowest_charge.at(c.member));
     std::set<int> touched;
     for (size_t b = 0; b < current.size(); ++b)
       for (const Part& p : current[b].parts)
-        if (p.member == c.member && (!applies || applies(p)) && p.centre[axis] + p.half[axis] > from &&
+        if (p.member == c.member && (!applies || applies(p)) &&
+            p.centre[axis] + p.half[axis] > (static_cast<int>(b) == below ? from : loose_from) &&
             p.centre[axis] - p.half[axis] < to)
           touched.insert(static_cast<int>(b));
     for (const int b : touched) {
       Assembly& a = current[static_cast<size_t>(b)];
-      const std::vector<Part> removed = cut_member(a, c.member, axis, from, to, applies);
+      const std::vector<Part> removed = cut_member(a, c.member, axis, b == below ? from : loose_from, to, applies);
       if (removed.empty()) continue;
       for (const Part& p : removed) {
         entry.debris_mass += p.mass;
@@ -168,7 +205,9 @@ void Builder::add_events(std::vector<Firing> schedule) {
       }
     }
     if (c.transition_damage > 0 && !weakens) without_zone.insert(m.name);
-    if (z.rotational >= 0) make_stub(c, z, event, lighter);
+    const auto top = highest.try_emplace(c.member, 0).first;
+    if (z.rotational >= 0 && upper_end(c) > top->second && is_highest(firing)) make_stub(c, z, event, lighter);
+    top->second = std::max(top->second, upper_end(c));
     model.events.push_back(std::move(event));
     map.events.push_back(entry);
     if (lighter.actions.empty()) continue;

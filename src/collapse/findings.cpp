@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 
 #include "base/interpolate.h"
 #include "base/unit.h"
@@ -645,7 +646,9 @@ void add_stubs(const Context& c) {
   std::map<std::string, const StubEntry*> crushed;  // by member
   const StubEntry* most = nullptr;
   const auto by = [&c](const StubEntry& s) { return c.recorder.shortening_of(s.zone); };
+  std::set<std::string> stubs;  // by member, which a higher charge may shorten
   for (const StubEntry& s : c.map.stubs) {
+    stubs.insert(s.member);
     if (!(by(s) > s.peak)) continue;
     crushed[s.member] = &s;
     if (!most || by(s) > by(*most)) most = &s;
@@ -654,7 +657,7 @@ void add_stubs(const Context& c) {
   const auto first =
       std::find_if(c.r.events.begin(), c.r.events.end(), [](const auto& e) { return e.kind == "crushing"; });
   std::string text = fmt::format("Of {} stubs that charges left under joints what came down has crushed {}",
-                                 c.map.stubs.size(), crushed.size());
+                                 stubs.size(), crushed.size());
   if (first != c.r.events.end()) text += fmt::format(", the first at {:.2f} s ({})", first->time, first->subject);
   c.add("stubs", "Touchdown", "Crushed stubs",
         text + fmt::format(". Most: {} by {:.2f} of {:.2f} m.", most->member, by(*most), most->length), by(*most), "m");

@@ -176,10 +176,28 @@ std::string LiveModel::apply(const Edit& e, double time, double next) {
   return text;
 }
 
+void LiveModel::refuse_in_stump(int member, double position) const {
+  const auto it = built_.lowest_charge.find(member);
+  if (it == built_.lowest_charge.end() || position >= it->second) return;
+  throw InputError("E933",
+                   fmt::format("{} stands on a stump up to {:.3g} m, which cannot be cut while it runs",
+                               plan_.members[static_cast<size_t>(member)].name, it->second),
+                   "write the charge into the plan and apply it");
+}
+
+void LiveModel::note_without_stump(int member) {
+  const Member& m = plan_.members[static_cast<size_t>(member)];
+  if (m.kind == MemberKind::Column && !built_.lowest_charge.count(member))
+    map_.notes.push_back(
+        {"Added charge", m.name + " was built without a charge: what lies below the added one leaves with it."});
+}
+
 std::string LiveModel::fire(const Edit& e, double time, double next) {
   LiveCharge& c = unfired(e.charge, time);
+  refuse_in_stump(charge(c).member, charge(c).position);
   c.time = next;
   c.offset = 0;
+  if (c.fails) note_without_stump(charge(c).member);
   c.fails = false;
   return fmt::format("{} fires now, at {}", member_of(c), words_of_time(next));
 }
@@ -245,12 +263,7 @@ std::string LiveModel::add_charge(const Edit& e, double time, double next) {
   demand(low >= from && high <= to,
          fmt::format("{}: a charge at {:.3g} m that destroys {:.3g} m must lie between {:.3g} and {:.3g} m", m.name,
                      e.position, e.destroyed_length, from, to));
-  if (const auto it = built_.lowest_charge.find(index);
-      is_column && it != built_.lowest_charge.end() && e.position < it->second)
-    throw InputError(
-        "E933",
-        fmt::format("{} stands on a stump up to {:.3g} m, which cannot be cut while it runs", m.name, it->second),
-        "write the charge into the plan and apply it");
+  refuse_in_stump(index, e.position);
   constexpr double slack = 1e-9;  // round-off, as in plans [m]
   for (const LiveCharge& c : charges_) {
     const product::Charge& other = charge(c);
@@ -281,9 +294,7 @@ std::string LiveModel::add_charge(const Edit& e, double time, double next) {
   for (int which : {0, 1}) builder.request_station(index, which);
   builder.library.compute(1);
   built_ = std::move(static_cast<BuilderState&>(builder));
-  if (is_column && !built_.lowest_charge.count(index))
-    map_.notes.push_back(
-        {"Added charge", m.name + " was built without a charge: what lies below the added one leaves with it."});
+  note_without_stump(index);
   return fmt::format("a charge on {} at {:.3g} m, destroying {:.3g} m, fires at {}", m.name, e.position,
                      e.destroyed_length, words_of_time(t));
 }

@@ -59,6 +59,9 @@ class LiveModel {
   std::string apply(const Edit&, double time, double next);
 
  private:
+  /// Below the lowest charge a column is a stump that stays (E933).
+  void refuse_in_stump(int member, double position) const;
+  void note_without_stump(int member);
   std::string fire(const Edit&, double time, double next);
   std::string set_delay(const Edit&, double time);
   std::string add_charge(const Edit&, double time, double next);

@@ -137,7 +137,7 @@ void Builder::index_members() {
       if (m.kind != MemberKind::Column && m.kind != MemberKind::Beam && m.kind != MemberKind::Shaft)
         complain(c.member, "charges act on columns and beams only",
                  "walls and slabs can be taken out in [preparation]");
-      if (m.kind != MemberKind::Column) continue;
+      if (m.kind != MemberKind::Column || c.fails) continue;
       const auto [it, is_new] = lowest_charge.emplace(c.member, c.position);
       if (!is_new) it->second = std::min(it->second, c.position);
     }
