@@ -432,17 +432,18 @@ TEST(Manager, AFailingChargeDoesNothing) {
   EXPECT_EQ(b.map.events[0].member, "C-B1-0");
 }
 
-/// A charge of 0.1 of the bars on a column of the ground storey of the portal, which is 2.5 m high in the clear.
+/// One stage of the portal, whose columns are 2.5 m high in the clear, with such charges.
+std::string stage_of(const std::string& charges) { return "[[stage]]\nname = \"s\"\ntime = \"0.1 s\"\n" + charges; }
 std::string charge_at(const std::string& position, const std::string& length, const std::string& more = "",
-                      const std::string& time = "0 s") {
-  return "[[stage]]\nname = \"s\"\ntime = \"" + time + "\"\n[[stage.charge]]\nmembers = [\"C-A1-0\"]\nposition = \"" +
-         position + "\"\ndestroyed_length = \"" + length + "\"\nresidual_bars = 0.1\n" + more;
+                      const std::string& member = "C-A1-0") {
+  return "[[stage.charge]]\nmembers = [\"" + member + "\"]\nposition = \"" + position + "\"\ndestroyed_length = \"" +
+         length + "\"\nresidual_bars = 0.1\n" + more;
 }
 
 TEST(Manager, AFailingChargeOfSeveralLeavesTheColumnAsItIs) {
-  const product::Plan alone = read(portal(charge_at("1.7 m", "0.6 m"))),
-                      with_failing =
-                          read(portal(charge_at("1.7 m", "0.6 m") + charge_at("0.3 m", "0.3 m", "fails = true\n")));
+  const std::string high = charge_at("1.7 m", "0.6 m");
+  const product::Plan alone = read(portal(stage_of(high))),
+                      with_failing = read(portal(stage_of(high + charge_at("0.3 m", "0.3 m", "fails = true\n"))));
   const Built a = build(alone), b = build(with_failing);
   ASSERT_EQ(a.model.bodies.size(), b.model.bodies.size());
   for (size_t i = 0; i < a.model.bodies.size(); ++i) {
@@ -454,18 +455,19 @@ TEST(Manager, AFailingChargeOfSeveralLeavesTheColumnAsItIs) {
   EXPECT_EQ(a.map.stubs[0].length, b.map.stubs[0].length);
   EXPECT_EQ(a.map.events[0].debris_mass, b.map.events[0].debris_mass);
   // one that fails alone: as without a charge
-  const Built whole = build(read(portal(charge("C-B1-0"))));
-  const Built fails = build(read(portal(charge("C-B1-0") + charge_at("0.5 m", "0.4 m", "fails = true\n"))));
+  const std::string other = charge_at("1 m", "0.5 m", "", "C-B1-0");
+  const Built whole = build(read(portal(stage_of(other))));
+  const Built fails = build(read(portal(stage_of(other + charge_at("0.5 m", "0.4 m", "fails = true\n")))));
   EXPECT_EQ(whole.model.bodies.size(), fails.model.bodies.size());
 }
 
 TEST(Manager, TheHighestOfSeveralChargesMakesTheStubInAnyOrder) {
-  const std::string low = charge_at("0.4 m", "0.4 m"), high = charge_at("1.7 m", "0.6 m"),
-                    later = charge_at("1.7 m", "0.6 m", "", "0.5 s"), sooner = charge_at("0.4 m", "0.4 m", "", "0.5 s");
-  const product::Plan plan = read(portal(low + high));
+  const std::string late = "delay = \"0.5 s\"\n", low = charge_at("0.4 m", "0.4 m"), high = charge_at("1.7 m", "0.6 m"),
+                    low_late = charge_at("0.4 m", "0.4 m", late), high_late = charge_at("1.7 m", "0.6 m", late);
+  const product::Plan plan = read(portal(stage_of(low + high)));
   const double per_metre = plan.concretes[0].density * 0.12;
-  for (const std::string& charges : {low + high, high + low, low + later, high + sooner}) {
-    const Built b = build(read(portal(charges)));
+  for (const std::string& charges : {low + high, high + low, low + high_late, high + low_late}) {
+    const Built b = build(read(portal(stage_of(charges))));
     ASSERT_FALSE(b.map.stubs.empty());
     // from 2 m to the underside of the beam
     EXPECT_NEAR(b.map.stubs.back().length, 0.5, 1e-9) << charges;
@@ -482,7 +484,7 @@ TEST(Manager, TheHighestOfSeveralChargesMakesTheStubInAnyOrder) {
     ASSERT_GE(hinge, 0);
     EXPECT_NEAR(b.model.laws[static_cast<size_t>(hinge)].crush_length, 0.5, 1e-9) << charges;
     // of as many bars the longer ones are the weaker
-    const Built alone = build(read(portal(high)));
+    const Built alone = build(read(portal(stage_of(high))));
     const mbs::Action& act = alone.model.events[0].actions[0];
     EXPECT_EQ(b.model.laws[static_cast<size_t>(cage)].compression.f,
               alone.model.laws[static_cast<size_t>(act.law.index)].compression.f)
