@@ -66,7 +66,6 @@ std::vector<record::BoxShape> make_shapes(const Assembly& assembly, const Vec3& 
 
 std::vector<Part> cut_member(Assembly& assembly, int member, int axis, double from, double to,
                              const std::function<bool(const Part&)>& applies) {
-  constexpr double sliver = 0.01;  // [m]; shorter pieces go with the cut
   std::vector<Part> kept, removed;
   const auto piece_of = [axis](const Part& p, double low, double high) {
     Part piece = p;
@@ -82,8 +81,8 @@ std::vector<Part> cut_member(Assembly& assembly, int member, int axis, double fr
       kept.push_back(p);
       continue;
     }
-    if (a - low < sliver) a = low;
-    if (high - b < sliver) b = high;
+    if (a - low < kSliver) a = low;
+    if (high - b < kSliver) b = high;
     if (a > low) kept.push_back(piece_of(p, low, a));
     if (b < high) kept.push_back(piece_of(p, b, high));
     removed.push_back(piece_of(p, a, b));
@@ -92,7 +91,7 @@ std::vector<Part> cut_member(Assembly& assembly, int member, int axis, double fr
     // a thin piece at the end away from the middle of the cut stays
     Part& last = removed.back();
     const double low = last.centre[axis] - last.half[axis], high = last.centre[axis] + last.half[axis];
-    const double keep = std::min(sliver, 0.5 * (high - low));
+    const double keep = std::min(kSliver, 0.5 * (high - low));
     const bool at_low = last.centre[axis] < 0.5 * (from + to);
     kept.push_back(at_low ? piece_of(last, low, low + keep) : piece_of(last, high - keep, high));
     last = at_low ? piece_of(last, low + keep, high) : piece_of(last, low, high - keep);

@@ -44,6 +44,8 @@ mbs::Body make_body(const Assembly&, const Knowledge&);
 /// The parts as they are drawn, in the frame of a body at p_WB along W.
 std::vector<record::BoxShape> make_shapes(const Assembly&, const Vec3& p_WB);
 
+constexpr double kSliver = 0.01;  // shorter pieces of a member go with a cut beside them [m]
+
 /// Takes the length [from, to] along W's axis `axis` (0..2) out of the parts of a member and returns what was taken. A
 /// hundredth of a metre is left of a body that would vanish.
 ///   applies  which of the member's parts; none given: all

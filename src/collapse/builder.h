@@ -120,6 +120,7 @@ struct Builder : BuilderState {
   void make_columns();
   void make_loose_nodes();
   void make_beams();
+  void complain_of_charges_in_joints();
   double mass_of_slab(const GridPoint&, int index) const;  // with its floor load [kg]
   void make_slabs();
   void make_walls();

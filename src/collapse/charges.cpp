@@ -110,6 +110,11 @@ void Builder::add_events(std::vector<Firing> schedule) {
     int which = 0;
     if (m.kind == MemberKind::Beam && std::abs(c.position - z.station[1].at) < std::abs(c.position - z.station[0].at))
       which = 1;
+    const bool is_beam = m.kind == MemberKind::Beam;
+    // a piece between a gap and a joint that is no longer than those that cut_member takes along
+    const auto reaches = [&](int end) {
+      return std::abs(c.position - z.station[static_cast<size_t>(end)].at) < 0.5 * c.destroyed_length + kSliver;
+    };
 
     mbs::Event event;
     event.name = m.name;
@@ -129,23 +134,28 @@ void Builder::add_events(std::vector<Firing> schedule) {
         const double at = std::atan2(p.centre.y - m.start.y, p.centre.x - m.start.x) - 1e-7;
         return p.is_solid && product::is_in_sector(at, c.azimuth, c.opening);
       };
-    } else if (const auto it = weakest.find(element); it == weakest.end() || leaves_less(c, *it->second)) {
-      weakest[element] = &c;
+    }
+    for (const int end : {0, 1}) {
+      const int reached = z.element[end];
+      if (is_shaft || (end != which && !(is_beam && reached != element && reaches(end)))) continue;
+      const auto it = weakest.find(reached);
+      if (it != weakest.end() && !leaves_less(c, *it->second)) continue;
+      weakest[reached] = &c;
       mbs::Action act;
       act.kind = mbs::Action::Kind::SwitchLaw;
-      act.element = mbs::ElementId{element};
+      act.element = mbs::ElementId{reached};
       act.ramp = k.charge_release_time;
-      const nearfield::ZoneInput& in = library.input(z.station[static_cast<size_t>(which)].zone);
+      const nearfield::ZoneInput& in = library.input(z.station[static_cast<size_t>(end)].zone);
       const nearfield::ResidualCage cage = make_residual_cage(in, c.destroyed_length, c.residual_bars);
-      const auto key = std::make_tuple(element, c.destroyed_length, c.residual_bars, c.position);
+      const auto key = std::make_tuple(reached, c.destroyed_length, c.residual_bars, c.position);
       if (!cage_laws.count(key))
         cage_laws[key] = mbs::add_law(model, make_cage_law(cage, c.destroyed_length, m.name + "/charge", k));
       act.law = cage_laws[key];
       // bars alone are as soft as they are long
-      const double before = model.elements[static_cast<size_t>(element)].translational_stiffness.x;
+      const double before = model.elements[static_cast<size_t>(reached)].translational_stiffness.x;
       act.stiffness_share = std::clamp(cage.EA / (c.destroyed_length * before), kLeastStiffnessShare, 1.0);
       event.actions.push_back(act);
-      ZoneEntry& zone = map.elements[static_cast<size_t>(element)];
+      ZoneEntry& zone = map.elements[static_cast<size_t>(reached)];
       zone.firing_time = std::min(zone.firing_time, firing.time);
     }
 
@@ -195,13 +205,14 @@ void Builder::add_events(std::vector<Firing> schedule) {
       const MemberStation& station = z.station[static_cast<size_t>(other)];
       if (other == which || station.damaged < 0) continue;
       if (z.element[other] >= 0 && z.element[other] != element) {
+        weakens = true;
+        if (weakest.count(z.element[other])) continue;  // it has fired, and stays
         mbs::Action act;
         act.kind = mbs::Action::Kind::SwitchLaw;
         act.element = mbs::ElementId{z.element[other]};
         act.ramp = k.charge_release_time;
         act.law = law_of(station.damaged, calc_stiffness(z), m.name + "/transition");
         event.actions.push_back(act);
-        weakens = true;
       }
     }
     if (c.transition_damage > 0 && !weakens) without_zone.insert(m.name);

@@ -276,6 +276,33 @@ void Builder::put_on_nodes(const std::vector<Part>& parts, int axis, double midd
   }
 }
 
+void Builder::complain_of_charges_in_joints() {
+  std::vector<const product::Charge*> wrong;
+  std::vector<SourcePosition> tables;
+  for (const product::Stage& stage : plan.stages)
+    for (const product::Charge& c : stage.charges) {
+      if (member(c.member).kind != MemberKind::Beam || !zones.count(c.member)) continue;
+      const MemberZones& z = zones.at(c.member);
+      if (c.position >= z.clear_start && c.position <= z.clear_start + z.clear_length) continue;
+      const auto is_same = [&c](const SourcePosition& p) {
+        return p.line == c.where.line && p.column == c.where.column;
+      };
+      if (std::any_of(tables.begin(), tables.end(), is_same)) continue;  // once for those of one table
+      wrong.push_back(&c), tables.push_back(c.where);
+    }
+  const std::vector<product::Place> places = product::find_values(plan, tables, "position");
+  for (size_t i = 0; i < wrong.size(); ++i) {
+    const MemberZones& z = zones.at(wrong[i]->member);
+    complaints.push_back({Severity::Error,
+                          "E621",
+                          {tables[i].file, places[i].line, places[i].column},
+                          places[i].width,
+                          fmt::format("{}: a charge lies in the joint at its end", member(wrong[i]->member).name),
+                          fmt::format("its position must be between {:.4g} m and {:.4g} m, the faces of the joints",
+                                      z.clear_start, z.clear_start + z.clear_length)});
+  }
+}
+
 void Builder::make_beams() {
   for (const auto* beams : {&x_beams, &y_beams})
     for (const auto& [at, index] : *beams) {
@@ -318,6 +345,7 @@ void Builder::make_beams() {
         put_on_nodes({make_part(low, high, kept, index)}, axis, 0.5 * (low[axis] + high[axis]), a, b);
       }
     }
+  complain_of_charges_in_joints();
 }
 
 double Builder::mass_of_slab(const GridPoint& at, int index) const {

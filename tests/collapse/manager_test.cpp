@@ -495,6 +495,62 @@ TEST(Manager, TheHighestOfSeveralChargesMakesTheStubInAnyOrder) {
   }
 }
 
+TEST(Manager, ABeamDestroyedOverItsClearLengthHangsFromNoEnd) {
+  // 4.7 m are clear between the columns; on the way to one end, 1 cm short of it, and all of them
+  const auto switched = [](const Built& b) {
+    std::set<std::string> names;
+    for (const mbs::Action& act : b.model.events[0].actions)
+      if (act.kind == mbs::Action::Kind::SwitchLaw && act.rotational < 0)
+        names.insert(b.model.elements[static_cast<size_t>(act.element.index)].name);
+    return names;
+  };
+  const auto blast = [](const std::string& position, const std::string& length) {
+    return build(read(portal(
+        stage_of(charge_at(position, length, "", "B-A1B1-0") + charge_at("1 m", "0.5 m", "delay = \"0.5 s\"\n")))));
+  };
+  EXPECT_EQ(switched(blast("2.5 m", "4.7 m")), (std::set<std::string>{"B-A1B1-0/start", "B-A1B1-0/end"}));
+  EXPECT_EQ(switched(blast("2.5 m", "4.9 m")), (std::set<std::string>{"B-A1B1-0/start", "B-A1B1-0/end"}));
+  EXPECT_EQ(switched(blast("2.4 m", "4.5 m")), (std::set<std::string>{"B-A1B1-0/start"}));
+  const Built all = blast("2.5 m", "4.7 m");
+  for (const char* name : {"B-A1B1-0/start", "B-A1B1-0/end"}) {
+    const auto zone = std::find_if(all.map.elements.begin(), all.map.elements.end(),
+                                   [&](const ZoneEntry& z) { return z.name == name; });
+    EXPECT_EQ(zone->firing_time, 0.1) << name;
+  }
+}
+
+TEST(Manager, DamageBesideALaterChargeBringsNoFiredEndBack) {
+  // the start is gone before the end fires, whose damage reaches the start
+  const std::string damage = "transition_damage = 0.3\n";
+  const Built b = build(read(materials() + grid("A = \"0 m\", B = \"2.5 m\"", "1 = \"0 m\"", 1) +
+                             "[[columns]]\nsection = \"column\"\n[[beams]]\nsection = \"beam\"\nalong = \"x\"\n" +
+                             stage_of(charge_at("0.4 m", "0.3 m", damage, "B-A1B1-0") +
+                                      charge_at("1.5 m", "1.6 m", damage + "delay = \"0.2 s\"\n", "B-A1B1-0") +
+                                      charge_at("1 m", "0.5 m", "delay = \"0.5 s\"\n")) +
+                             analysis()));
+  std::string last;  // law of the start
+  int times = 0;
+  for (const mbs::Event& e : b.model.events)
+    for (const mbs::Action& act : e.actions)
+      if (act.kind == mbs::Action::Kind::SwitchLaw && act.rotational < 0 &&
+          b.model.elements[static_cast<size_t>(act.element.index)].name == "B-A1B1-0/start")
+        last = b.model.laws[static_cast<size_t>(act.law.index)].name, ++times;
+  EXPECT_EQ(last, "B-A1B1-0/charge");
+  EXPECT_EQ(times, 1);
+}
+
+TEST(Manager, SaysWhereAChargeLiesInTheJointAtABeamsEnd) {
+  const auto beam = [](const std::string& position, const std::string& length) {
+    return read(portal(stage_of(charge_at("1 m", "0.5 m") + charge_at(position, length, "", "B-A1B1-0"))));
+  };
+  EXPECT_THAT(complaint_of(beam("0.05 m", "0.1 m")),
+              testing::AllOf(testing::HasSubstr("error E621: B-A1B1-0: a charge lies in "
+                                                "the joint at its end"),
+                             testing::HasSubstr("between 0.15 m and 4.85 m")));
+  EXPECT_THAT(complaint_of(beam("4.9 m", "0.2 m")), testing::HasSubstr("error E621"));
+  EXPECT_EQ(complaint_of(beam("0.2 m", "0.4 m")), "");
+}
+
 TEST(Manager, CutBarsWeakenTheNearestZoneOnly) {
   const Built whole = build(read(portal(charge("C-A1-0"))));
   const Built cut = build(read(
