@@ -12,14 +12,14 @@ constexpr double pi = 3.14159265358979323846;
 
 auto key_of(const Member& m) { return std::make_tuple(m.kind, m.storey, m.row_a, m.frame_a, m.row_b, m.frame_b); }
 
-/// read_plan sorts the members, so that a neighbour is found by halving.
+/// A member that stands. read_plan sorts the members, so that a neighbour is found by halving.
 const Member* find_at(const Plan& plan, MemberKind kind, int storey, int row_a, int frame_a, int row_b, int frame_b) {
   Member wanted;
   wanted.kind = kind, wanted.storey = storey;
   wanted.row_a = row_a, wanted.frame_a = frame_a, wanted.row_b = row_b, wanted.frame_b = frame_b;
   const auto it = std::lower_bound(plan.members.begin(), plan.members.end(), wanted,
                                    [](const Member& a, const Member& b) { return key_of(a) < key_of(b); });
-  return it != plan.members.end() && key_of(*it) == key_of(wanted) ? &*it : nullptr;
+  return it != plan.members.end() && key_of(*it) == key_of(wanted) && !it->removed ? &*it : nullptr;
 }
 
 const Section& section_of(const Plan& plan, const Member& m) { return plan.sections[static_cast<size_t>(m.section)]; }

@@ -551,6 +551,16 @@ TEST(Manager, SaysWhereAChargeLiesInTheJointAtABeamsEnd) {
   EXPECT_EQ(complaint_of(beam("0.2 m", "0.4 m")), "");
 }
 
+TEST(Manager, WhatWasTakenOutCoversNoMember) {
+  const std::string frame = materials() + grid("A = \"0 m\", B = \"5 m\"", "1 = \"0 m\", 2 = \"4 m\"", 1) +
+                            "[[columns]]\nsection = \"column\"\n[[beams]]\nsection = \"beam\"\n";
+  const std::string slabs = "[[slabs]]\npanel = \"floor\"\n", out = "[preparation]\nremoved = [\"S-*\"]\n";
+  const double none = build(read(frame + analysis())).map.mass, with = build(read(frame + slabs + analysis())).map.mass,
+               removed = build(read(frame + slabs + out + analysis())).map.mass;
+  EXPECT_NEAR(removed / none, 1, 1e-12);
+  EXPECT_GT(with, none);
+}
+
 TEST(Manager, CutBarsWeakenTheNearestZoneOnly) {
   const Built whole = build(read(portal(charge("C-A1-0"))));
   const Built cut = build(read(
