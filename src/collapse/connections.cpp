@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "base/error.h"
 #include "collapse/builder.h"
@@ -22,6 +23,23 @@ double largest_moment(const mbs::MomentFamily& f) {
   for (double v : f.positive) m = std::max(m, v);
   for (double v : f.negative) m = std::max(m, v);
   return m;
+}
+
+/// Length along a wall over which there are openings, those above each other counted once [m].
+///   at_base  only those that reach the floor
+double calc_open_length(const Member& m, bool at_base) {
+  std::vector<std::pair<double, double>> spans;
+  for (const product::Opening& o : m.openings)
+    if (!at_base || o.sill < 1e-6) spans.emplace_back(o.left, o.left + o.width);
+  std::sort(spans.begin(), spans.end());
+  double open = 0, upto = -1e30;
+  for (const auto& [from, to] : spans) {
+    if (to <= upto) continue;
+    // all of one that stands alone, without round-off
+    open += from >= upto ? to - from : to - upto;
+    upto = to;
+  }
+  return open;
 }
 
 /// The same law by a name.
@@ -69,6 +87,12 @@ void Builder::estimate_normal_forces() {
 nearfield::Flange Builder::find_flange(const GridPoint& at, int beam) const {
   nearfield::Flange out;
   const product::Section& web = section_of(beam);
+  const auto add_bars = [](nearfield::Flange::Bars& to, double bars, double depth) {
+    if (!(bars > 0)) return;
+    // of two slabs at the depth that has their first moment
+    if (to.depth != depth) to.depth = (to.area * to.depth + bars * depth) / (to.area + bars);
+    to.area += bars;
+  };
   for (const int side : {-1, 0}) {
     const int slab = find_at(slabs, {at.row, at.frame + side, at.storey});
     if (slab < 0 || panel_of(slab).concrete < 0) continue;
@@ -85,10 +109,15 @@ nearfield::Flange Builder::find_flange(const GridPoint& at, int beam) const {
     if (panel.steel < 0) continue;
     // it spans from beam to beam, so what lies along this one only distributes
     const double bars = k.slab_distribution_share * breadth;
-    out.top = {panel.cover, out.top.area + bars * panel.as_top};
-    out.bottom = {panel.thickness - panel.cover, out.bottom.area + bars * panel.as_bottom};
-    out.steel = plan.steels[static_cast<size_t>(panel.steel)];
+    add_bars(out.top, bars * panel.as_top, panel.cover);
+    add_bars(out.bottom, bars * panel.as_bottom, panel.thickness - panel.cover);
+    // and of the weaker steel
+    const product::Steel& steel = plan.steels[static_cast<size_t>(panel.steel)];
+    if (!(out.steel.fy > 0) ||
+        std::tie(steel.fy, steel.fu, steel.eps_u) < std::tie(out.steel.fy, out.steel.fu, out.steel.eps_u))
+      out.steel = steel;
   }
+  for (nearfield::Flange::Bars* bars : {&out.top, &out.bottom}) bars->depth = std::min(bars->depth, out.thickness);
   return out;
 }
 
@@ -491,14 +520,14 @@ void Builder::connect_wall(const GridPoint& at, int index, bool along_x) {
       panel, panel.concrete < 0 ? nullptr : &plan.concretes[static_cast<size_t>(panel.concrete)],
       panel.steel < 0 ? nullptr : &plan.steels[static_cast<size_t>(panel.steel)]);
   const int axis = along_x ? 0 : 1;
-  double low = 1e30, high = -1e30, open = 0;
+  double low = 1e30, high = -1e30;
   for (const Part& p : assemblies[static_cast<size_t>(body)].parts) {
     if (p.member != index) continue;
     low = std::min(low, p.centre[axis] - p.half[axis]);
     high = std::max(high, p.centre[axis] + p.half[axis]);
   }
-  for (const product::Opening& o : m.openings) open += o.width;
-  const double width = std::max(high - low - open, 0.05 * (high - low)), kept = kept_of(index), height = m.height;
+  const double width = std::max(high - low - calc_open_length(m, false), 0.05 * (high - low)), kept = kept_of(index),
+               height = m.height;
   const int floor = at.storey == 0 ? -1 : own_body.at(find_at(x_beams, {at.row, at.frame, at.storey - 1}));
   Vec3 base = m.start;
   base[axis] = 0.5 * (low + high);
@@ -534,10 +563,7 @@ void Builder::join_wall(int index, const nearfield::PanelRcc& rcc, const Vec3& b
   joint.X_PF = frame_in(floor, base, column_axes());
   joint.X_CM = frame_in(body, base, column_axes());
   // openings seldom reach the floor, so the base is longer than the wall above it
-  double open_base = 0;
-  for (const product::Opening& o : m.openings)
-    if (o.sill < 1e-6) open_base += o.width;
-  const double base_width = std::max(high - low - open_base, width);
+  const double base_width = std::max(high - low - calc_open_length(m, true), width);
   joint.tension_limit = rcc.tension * base_width * kept;
   joint.shear_limit = rcc.shear_in_plane * base_width * kept;
   // the shear flow of a panel runs around its edges, so the joint bears the couple of the largest shear at the head

@@ -551,6 +551,52 @@ TEST(Manager, SaysWhereAChargeLiesInTheJointAtABeamsEnd) {
   EXPECT_EQ(complaint_of(beam("0.2 m", "0.4 m")), "");
 }
 
+TEST(Manager, OpeningsAboveEachOtherCountOnce) {
+  const auto wall = [](const std::string& openings) {
+    return build(read(materials() + grid("A = \"0 m\", B = \"5 m\"", "1 = \"0 m\"", 1) +
+                      "[[columns]]\nsection = \"column\"\n[[beams]]\nsection = \"beam\"\nalong = \"x\"\n"
+                      "[[walls]]\npanel = \"thin\"\nat = \"A1B1\"\nopening = [" +
+                      openings + "]\n" + analysis()));
+  };
+  const std::string one = "{ left = \"1 m\", sill = \"0 m\", width = \"1.4 m\", height = \"2 m\" }",
+                    low = "{ left = \"1 m\", sill = \"0 m\", width = \"1.4 m\", height = \"0.9 m\" }",
+                    high = "{ left = \"1 m\", sill = \"0.9 m\", width = \"1.4 m\", height = \"1.1 m\" }";
+  const Built a = wall(one), b = wall(low + ", " + high);
+  const auto head = [](const Built& x) {
+    return *std::find_if(x.model.elements.begin(), x.model.elements.end(),
+                         [](const mbs::ZoneElement& e) { return e.name == "W-A1B1-0/head"; });
+  };
+  const auto base = [](const Built& x) {
+    return *std::find_if(x.model.joints.begin(), x.model.joints.end(),
+                         [](const mbs::Joint& j) { return j.name == "W-A1B1-0/base"; });
+  };
+  EXPECT_NEAR(head(a).translational_stiffness.y / head(b).translational_stiffness.y, 1, 1e-12);
+  EXPECT_NEAR(base(a).shear_limit / base(b).shear_limit, 1, 1e-12);
+}
+
+TEST(Manager, TheOrderOfTwoSlabsBesideABeamChangesNothing) {
+  // mirrored in the beam of frame 2: a thin slab beside a thick one whose bars lie deeper
+  const auto beams = [](const char* first, const char* second) {
+    const Built b =
+        build(read(materials() +
+                   "[slab.thick]\nthickness = \"26 cm\"\nconcrete = \"C25\"\nsteel = \"S\"\nas_top = \"10 cm2/m\"\n"
+                   "as_bottom = \"10 cm2/m\"\ncover = \"6 cm\"\n" +
+                   grid("A = \"0 m\", B = \"5 m\"", "1 = \"0 m\", 2 = \"4 m\", 3 = \"8 m\"", 1) +
+                   "[[columns]]\nsection = \"column\"\n[[beams]]\nsection = \"beam\"\n[[slabs]]\npanel = \"" + first +
+                   "\"\nat = \"A1B2\"\n[[slabs]]\npanel = \"" + second + "\"\nat = \"A2B3\"\n" + analysis()));
+    const auto e = std::find_if(b.model.elements.begin(), b.model.elements.end(),
+                                [](const mbs::ZoneElement& x) { return x.name == "B-A2B2-0/start"; });
+    return b.model.laws[static_cast<size_t>(e->stations[0].law.index)].moment_y;
+  };
+  const mbs::MomentFamily a = beams("floor", "thick"), b = beams("thick", "floor");
+  ASSERT_EQ(a.positive.size(), b.positive.size());
+  const double most = *std::max_element(a.negative.begin(), a.negative.end());
+  for (size_t i = 0; i < a.positive.size(); ++i) {
+    EXPECT_NEAR(a.positive[i], b.positive[i], 1e-9 * most);
+    EXPECT_NEAR(a.negative[i], b.negative[i], 1e-9 * most);
+  }
+}
+
 TEST(Manager, WhatWasTakenOutCoversNoMember) {
   const std::string frame = materials() + grid("A = \"0 m\", B = \"5 m\"", "1 = \"0 m\", 2 = \"4 m\"", 1) +
                             "[[columns]]\nsection = \"column\"\n[[beams]]\nsection = \"beam\"\n";
