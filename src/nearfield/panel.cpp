@@ -46,7 +46,9 @@ PanelRcc make_panel_rcc(const product::Panel& panel, const product::Concrete* co
     const double as = std::min(top, bottom) > 0 ? std::min(top, bottom) : both;
     const double n = Es / E;
     const double x = n * as * (std::sqrt(1 + 2 * d / (n * as)) - 1);
-    out.EI = std::min(out.EI, E * (x * x * x / 3 + n * as * (d - x) * (d - x)));
+    // bars that bear less than the concrete does before it cracks leave the panel uncracked up to its resistance
+    const double by_bars = as * fy * (d - 0.5 * std::min(as * fy / (0.85 * fc), d));
+    if (by_bars > cracking) out.EI = std::min(out.EI, E * (x * x * x / 3 + n * as * (d - x) * (d - x)));
     const double block = std::min(as * fu / (0.85 * fc * 0.8), 0.5 * d);
     out.ultimate_rotation = steel->eps_u / (d - block) * t;
     out.elongation_at_rupture = steel->eps_u * t;

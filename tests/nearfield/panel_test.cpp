@@ -33,6 +33,21 @@ TEST(PanelRcc, SlabYieldsLikeABeamOfOneMetre) {
   EXPECT_GT(r.EI, 0.03 * 30e9 * std::pow(0.15, 3) / 12);
 }
 
+TEST(PanelRcc, BarsTooFewToBearTheCrackingMomentLeaveItUncracked) {
+  product::Panel p;
+  p.thickness = 0.15, p.cover = 0.02;
+  const product::Concrete c = make_concrete();
+  const double whole = 30e9 * std::pow(0.15, 3) / 12, cracking = 2e6 * 0.15 * 0.15 / 6;
+  for (const double top : {1e-300, 1e-5, 5e-5}) {
+    p.as_bottom = 5e-4, p.as_top = top;
+    const PanelRcc r = make_panel_rcc(p, &c, &steel);
+    EXPECT_NEAR(r.moment_neg, cracking, 1e-9 * cracking) << top;
+    EXPECT_NEAR(r.EI, whole, 1e-9 * whole) << top;
+  }
+  p.as_top = 3e-4;
+  EXPECT_LT(make_panel_rcc(p, &c, &steel).EI, 0.5 * whole);
+}
+
 TEST(PanelRcc, PlainConcreteAndMasonryAreBrittle) {
   product::Panel p;
   p.thickness = 0.25;
