@@ -282,7 +282,7 @@ Reach add_debris(const Context& c, const Mechanism& m) {
   const Heap heap = calc_heap(find_moving_boxes(c.r, last), kHeapCell);
   double solid = 0;  // what is crushed included
   for (size_t b = 0; b < c.map.bodies.size(); ++b)
-    if (!c.model.bodies[b].fixed) solid += c.map.bodies[b].volume;
+    if (!c.model.bodies[b].fixed && !stays_beside(c.r, b, last)) solid += c.map.bodies[b].volume;
   for (const DebrisEntry& d : c.map.debris) solid += d.volume;
   c.add("debris.height", "Fall and debris", "Height of the hill",
         fmt::format("The highest point of all parts lies {:.1f} m above the ground.", heap.height), heap.height, "m");
@@ -537,11 +537,15 @@ void add_rigid_block(const Context& c) {
     return;
   }
   // the block pivots over the foremost row that keeps standing
+  // rows follow the grid, also where the fall lies a little askew to it
+  const Vec3 across = is_shaft                         ? d
+                      : std::abs(d.x) >= std::abs(d.y) ? Vec3{std::copysign(1.0, d.x), 0, 0}
+                                                       : Vec3{0, std::copysign(1.0, d.y), 0};
   double foremost = -1e30;
-  for (const GroundColumn* g : hinges) foremost = std::max(foremost, dot(g->p_top, d));
+  for (const GroundColumn* g : hinges) foremost = std::max(foremost, dot(g->p_top, across));
   std::vector<const GroundColumn*> row;
   for (const GroundColumn* g : hinges)
-    if (dot(g->p_top, d) > foremost - 0.5) row.push_back(g);
+    if (dot(g->p_top, across) > foremost - 0.5) row.push_back(g);
   RigidBlock block;
   block.gravity = norm(c.model.gravity);
   block.release = stages.back().last;

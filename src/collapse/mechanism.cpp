@@ -142,7 +142,7 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
   } else if (drops && !turns_about_foot) {
     out.name = "vertical";
     out.text = fmt::format("It comes down vertically (telescoping): {}.", motion);
-  } else if (std::abs(off) > (in.direction_tolerance > 0 ? in.direction_tolerance : k.mechanism_direction_tolerance) &&
+  } else if (std::abs(off) > in.direction_tolerance.value_or(k.mechanism_direction_tolerance) &&
              in.is_direction_planned) {
     out.name = "wrong direction";
     out.text = fmt::format("It topples in the wrong direction, {:.0f} deg off the plan: {}.", off / unit::deg, motion);

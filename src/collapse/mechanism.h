@@ -1,6 +1,7 @@
 #pragma once
 /// How it came down: classes of collapse from the motion of the upper block (docs/theory/findings.md, section 1).
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,10 +34,10 @@ struct MechanismInput {
   double touchdown = 0;           // first touchdown of an upper body; NaN if there was none [s]
   Vec3 fall_direction{-1, 0, 0};  // planned, or expected
   bool is_direction_planned = false;
-  double direction_tolerance = 0;  // [rad]
-  Polygon outline;                 // of the upper block seen from above, from its mass centre; convex [m]
-  double foot = 0;                 // height of the upper block's underside at the start [m]
-  double storey_height = 0;        // of the ground storey [m]
+  std::optional<double> direction_tolerance;  // [rad]; not given: the rule's
+  Polygon outline;                            // of the upper block seen from above, from its mass centre; convex [m]
+  double foot = 0;                            // height of the upper block's underside at the start [m]
+  double storey_height = 0;                   // of the ground storey [m]
   bool came_to_rest = false;
   bool is_under_way = false;  // the run goes on; for the words
 };

@@ -27,7 +27,7 @@ Mechanism judge_run(const product::Plan& plan, const mbs::Model& model, const Mo
   MechanismInput in;
   in.fall_direction = map.fall_direction;
   in.is_direction_planned = map.is_direction_planned;
-  in.direction_tolerance = plan.criteria.azimuth_tolerance.value_or(0);
+  in.direction_tolerance = plan.criteria.azimuth_tolerance;
   in.storey_height = map.ground_storey_height;
   in.came_to_rest = summary.ending == mbs::Summary::Ending::AtRest;
   in.is_under_way = is_under_way;
@@ -102,10 +102,24 @@ Polygon find_start_outline(const record::Record& r, size_t body) {
   return is_beside ? calc_hull(std::move(corners)) : r.building_outline;
 }
 
+constexpr double kStays = 0.05;  // [m]
+
+bool stays_beside(const record::Record& r, size_t body, size_t frame) {
+  const Polygon from = find_start_outline(r, body);
+  if (from == r.building_outline || from.empty()) return false;
+  const Pose X_WB = record::pose_at(r, frame, body);
+  for (size_t i = 0; i < r.bodies[body].shapes.size(); ++i) {
+    const record::BoxShape s = record::shape_at(r, frame, body, i);
+    for (const Point2& p : calc_outline({X_WB * s.X_BS, s.half}))
+      if (calc_distance(p, from) >= kStays) return false;
+  }
+  return true;
+}
+
 std::vector<PlacedBox> find_moving_boxes(const record::Record& r, size_t frame) {
   std::vector<PlacedBox> boxes;
   for (size_t b = 0; b < r.bodies.size(); ++b) {
-    if (r.bodies[b].fixed) continue;
+    if (r.bodies[b].fixed || stays_beside(r, b, frame)) continue;
     const Pose X_WB = record::pose_at(r, frame, b);
     for (size_t i = 0; i < r.bodies[b].shapes.size(); ++i) {
       const record::BoxShape s = record::shape_at(r, frame, b, i);
@@ -116,8 +130,6 @@ std::vector<PlacedBox> find_moving_boxes(const record::Record& r, size_t frame) 
 }
 
 namespace {
-
-constexpr double kStays = 0.05;  // [m]
 
 /// How far a part lies beyond the footprint.
 struct PartReach {

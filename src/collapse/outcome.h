@@ -32,7 +32,10 @@ Polygon calc_building_outline(const mbs::Model&, const ModelMap&);
 /// From where the reach of a part counts: the building's outline, or where the part stood if that is beside it.
 Polygon find_start_outline(const record::Record&, size_t body);
 
-/// Boxes of all bodies that can move, as crushing has left them.
+/// Whether a part that stood beside the building is where it was, and no debris.
+bool stays_beside(const record::Record&, size_t body, size_t frame);
+
+/// Boxes of all bodies that can move, as crushing has left them, without those that stay beside the building.
 std::vector<PlacedBox> find_moving_boxes(const record::Record&, size_t frame);
 
 /// How far parts lie beyond the building's footprint, the convex outline of what stood before the first charge.

@@ -151,6 +151,12 @@ TEST(Reach, LeavesOutWhatStandsBesideTheBuilding) {
   EXPECT_NEAR(calc_reach(r, 2).largest, 3, 1e-5);
   EXPECT_NEAR(calc_reach(r, 2).side[0], 2, 1e-5);
   EXPECT_GT(calc_reach(r, 2).area, 60);
+  // nor does it belong to the hill, until it is pushed over
+  EXPECT_FALSE(stays_beside(r, 0, 1));
+  EXPECT_TRUE(stays_beside(r, 1, 1));
+  EXPECT_FALSE(stays_beside(r, 1, 2));
+  EXPECT_EQ(find_moving_boxes(r, 1).size(), 1u);
+  EXPECT_EQ(find_moving_boxes(r, 2).size(), 2u);
 }
 
 TEST(Debris, LowestPointOverAnArea) {

@@ -50,6 +50,15 @@ TEST(Mechanism, ComingDownWithoutTurningIsVertical) {
   EXPECT_TRUE(std::isnan(m.azimuth));
 }
 
+TEST(Mechanism, AToleranceOfZeroIsOne) {
+  MechanismInput in = synthetic(0.2, 0, 1);
+  in.is_direction_planned = true;
+  in.fall_direction = {-std::cos(0.03), std::sin(0.03), 0};  // 1.7 degrees off
+  EXPECT_EQ(name_of(in), "topple");
+  in.direction_tolerance = 0;
+  EXPECT_EQ(name_of(in), "wrong direction");
+}
+
 TEST(Mechanism, TheRearEdgeDecidesBetweenBoth) {
   // front edge: 12 sin 0.2 = 2.38 m more than the rear one
   EXPECT_EQ(name_of(synthetic(0.2, 2.3, 1)), "topple");
@@ -130,6 +139,8 @@ TEST(Mechanism, TurningToTheOtherSideIsTheWrongDirection) {
   EXPECT_EQ(name_of(in), "topple");
   in.fall_direction = {0, 1, 0};  // planned to the side
   EXPECT_EQ(name_of(in), "wrong direction");
+  in.direction_tolerance = 3;
+  EXPECT_EQ(name_of(in), "topple");
   in.is_direction_planned = false;
   EXPECT_EQ(name_of(in), "topple");
 }
