@@ -52,7 +52,13 @@ std::vector<Level> find_levels(const product::Plan& plan, int index) {
     }
   for (const product::Weakening& w : plan.members[static_cast<size_t>(index)].weakenings) {
     const auto is_in = [&](const Level& l) { return w.at >= l.low() - 0.01 && w.at <= l.high() + 0.01; };
-    if (std::none_of(out.begin(), out.end(), is_in)) out.push_back({w.at, w.height, false});
+    if (std::any_of(out.begin(), out.end(), [&](const Level& l) { return l.is_mouth && is_in(l); })) continue;
+    const auto same =
+        std::find_if(out.begin(), out.end(), [&](const Level& l) { return std::abs(l.at - w.at) < kSameLevel; });
+    if (same != out.end())
+      same->height = std::max(same->height, w.height);
+    else if (std::none_of(out.begin(), out.end(), is_in))
+      out.push_back({w.at, w.height, false});
   }
   std::sort(out.begin(), out.end(), [](const Level& a, const Level& b) { return a.at < b.at; });
   return out;

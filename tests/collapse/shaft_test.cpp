@@ -70,6 +70,22 @@ TEST(Shaft, ItsBodiesHaveTheMassCentreAndInertiaOfTheRing) {
   EXPECT_NEAR(about_axis, mass * (ro * ro + ri * ri) / 2, 1e-6 * about_axis);
 }
 
+TEST(Shaft, TheOrderOfTwoCutsAtALevelChangesNothing) {
+  const auto cut = [](const std::string& azimuth, const std::string& height) {
+    return "[[preparation.weaken]]\nmembers = \"tower\"\nat = \"20 m\"\nazimuth = \"" + azimuth +
+           "\"\nopening = \"60 deg\"\nheight = \"" + height + "\"\ncut_concrete = 0.5\ncut_bars = 0.5\n";
+  };
+  const std::string low = cut("0 deg", "0.2 m"), high = cut("180 deg", "1.5 m");
+  const Built a(tower(slender + strong, low + high, "1 s")), b(tower(slender + strong, high + low, "1 s"));
+  ASSERT_EQ(a.model.elements.size(), b.model.elements.size());
+  for (size_t e = 0; e < a.model.elements.size(); ++e) {
+    const mbs::ZoneLaw &x = a.model.laws[static_cast<size_t>(a.model.elements[e].stations[0].law.index)],
+                       &y = b.model.laws[static_cast<size_t>(b.model.elements[e].stations[0].law.index)];
+    EXPECT_NEAR(x.crush_length, y.crush_length, 1e-9) << a.model.elements[e].name;
+    EXPECT_NEAR(x.rupture_rotation, y.rupture_rotation, 1e-9) << a.model.elements[e].name;
+  }
+}
+
 TEST(Shaft, ItsBodiesHaveTheVolumeOfTheRing) {
   // 50 kN of a platform have none
   const Built b(
