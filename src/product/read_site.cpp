@@ -183,6 +183,17 @@ void read_criteria(Reading& reading, TableReader& root) {
   c.debris_reach = table.find_quantity("debris_reach", Dimension::Length, {0, 1000});
   c.stands_between_stages = table.find_flag("stands_between_stages");
   table.finish();
+  if (c.azimuth && std::abs(std::sin(*c.azimuth)) > std::abs(std::cos(*c.azimuth))) {
+    const auto& members = reading.plan.members;
+    const auto along = std::count_if(members.begin(), members.end(), [](const Member& m) {
+      return m.kind == MemberKind::Wall && !m.removed && m.row_a == m.row_b;
+    });
+    if (along > 0)
+      table.complaints().warn("W511", table.place_of("azimuth"),
+                              "azimuth: the fall is along y, and " + std::to_string(along) +
+                                  (along == 1 ? " wall" : " walls") + " along y count with their weight only",
+                              "walls along x alone resist; lay the grid so that the fall is along x");
+  }
   if (c.azimuth && !c.azimuth_tolerance)
     table.missing("azimuth_tolerance", "add a line such as azimuth_tolerance = \"15 deg\"");
   if (c.azimuth_tolerance && !c.azimuth)

@@ -112,7 +112,7 @@ std::string names_of(const std::vector<std::string>& names) {
 void check_support(const Plan& plan, const std::vector<Draft>& drafts, Complaints& complaints) {
   Carriers carriers = collect(drafts);
   find_held(carriers);
-  Gathering hanging, carried;
+  Gathering hanging, carried, idle;
   const auto point_name = [&](const Node3& n) {
     return plan.row_names[static_cast<size_t>(std::get<1>(n))] + plan.frame_names[static_cast<size_t>(std::get<2>(n))];
   };
@@ -158,6 +158,9 @@ void check_support(const Plan& plan, const std::vector<Draft>& drafts, Complaint
             !(stands_below(carriers, below_a) && stands_below(carriers, below_b)))
           hanging.add(draft, "hangs in the air: no beam, slab or wall below",
                       "add what carries it, or leave the wall out with except");
+        if (m.row_a != m.row_b && !carriers.beams.count({m.storey, m.row_a, m.frame_a, m.row_b, m.frame_b}))
+          idle.add(draft, "bears and stiffens nothing: no beam lies on it",
+                   "a wall along x takes shear from the beam above it; add one, or let columns carry what is above");
         break;
       case MemberKind::Shaft:
         break;
@@ -167,6 +170,8 @@ void check_support(const Plan& plan, const std::vector<Draft>& drafts, Complaint
     complaints.error("E304", group.place, names_of(group.names) + ": " + std::get<2>(key), group.help);
   for (const auto& [key, group] : carried.groups())
     complaints.warn("W502", group.place, names_of(group.names) + ": " + std::get<2>(key), group.help);
+  for (const auto& [key, group] : idle.groups())
+    complaints.warn("W511", group.place, names_of(group.names) + ": " + std::get<2>(key), group.help);
 }
 
 }  // namespace topple::product
