@@ -191,7 +191,8 @@ void read_criteria(Reading& reading, TableReader& root) {
     if (along > 0)
       table.complaints().warn("W511", table.place_of("azimuth"),
                               "azimuth: the fall is along y, and " + std::to_string(along) +
-                                  (along == 1 ? " wall" : " walls") + " along y count with their weight only",
+                                  (along == 1 ? " wall along y counts with its" : " walls along y count with their") +
+                                  " weight only",
                               "walls along x alone resist; lay the grid so that the fall is along x");
   }
   if (c.azimuth && !c.azimuth_tolerance)

@@ -336,6 +336,30 @@ TEST(HangingMembers, ColumnOnABeamIsAWarning) {
             "W502 line 8: B-A1A2-0, B-A2A3-0: ends at A2 on other beams, with no column below\n");
 }
 
+TEST(IdleWalls, AreWarnedOf) {
+  // walls along x take shear from the beam that lies on them
+  const auto idle = [](const std::string& text) {
+    std::vector<std::string> said;
+    for (const Diagnostic& d : complaints_about(text))
+      if (d.code == "W511") said.push_back(std::to_string(d.where.line) + ": " + d.message);
+    return said;
+  };
+  const std::string plan = small_plan(), along_x = replaced(plan, "at = \"A1A2\"\nstoreys", "at = \"A2B2\"\nstoreys");
+  EXPECT_THAT(idle(plan), testing::IsEmpty());
+  EXPECT_THAT(idle(along_x), testing::IsEmpty());
+  const std::string without =
+      replaced(along_x, "[[beams]]\nsection = \"beam\"", "[[beams]]\nsection = \"beam\"\nalong = \"y\"");
+  EXPECT_THAT(idle(without),
+              testing::ElementsAre(testing::HasSubstr(": W-A2B2-0: bears and stiffens nothing: no beam lies on it")));
+  // and walls along y resist nothing, which matters where the fall is along them
+  const std::string along_y = replaced(plan, "azimuth = \"180 deg\"", "azimuth = \"90 deg\"");
+  EXPECT_THAT(idle(along_y), testing::IsEmpty()) << "it is taken out before";
+  const std::string stays = replaced(along_y, "removed = [\"W-A1A2-0\"]\n", "");
+  EXPECT_THAT(idle(stays),
+              testing::ElementsAre(testing::HasSubstr("azimuth: the fall is along y, and 1 wall along y counts")));
+  EXPECT_THAT(idle(replaced(stays, "90 deg", "0 deg")), testing::IsEmpty());
+}
+
 TEST(HangingMembers, BeamWithAFreeEnd) {
   EXPECT_EQ(said_about_frame("[[columns]]\nsection = \"column\"\nexcept = \"A2\"\n"
                              "[[beams]]\nsection = \"beam\"\nat = \"A1A2\"\n"),
