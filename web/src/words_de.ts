@@ -417,6 +417,8 @@ export const german: readonly (readonly [string, string])[] = [
   ["no clear height is left below its beams", "unter seinen Balken bleibt keine lichte Höhe"],
   ["{n} and {:d} more: a charge lies in the joint above the clear height of {:f} m", "{} und {} weitere: eine Ladung liegt im Knoten über der lichten Höhe von {} m"],
   ["its position must be below {:f} m, {:f} cm under the joint", "seine Stelle muss unter {} m liegen, {} cm unter dem Knoten"],
+  ["a charge lies in the joint at its end", "eine Ladung liegt im Knoten an seinem Ende"],
+  ["its position must be between {:f} m and {:f} m, the faces of the joints", "seine Stelle muss zwischen {} m und {} m liegen, den Rändern der Knoten"],
   ["a charge lies in the joint above the clear height of {:f} m", "eine Ladung liegt im Knoten über der lichten Höhe von {} m"],
   ["no clear length is left between its columns", "zwischen seinen Stützen bleibt keine lichte Länge"],
   ["no clear span is left between its columns", "zwischen seinen Stützen bleibt keine lichte Weite"],
