@@ -35,8 +35,9 @@ struct MemberZones {
   double clear_start = 0;   // from the member's start to the face [m]
   double normal_force = 0;  // estimate under dead load, tension positive [N]
   std::array<MemberStation, 2> station;
-  int element[2] = {-1, -1};  // of each station; the same twice for a whole member
-  int rotational = -1;        // of station 1 of a ground column
+  std::array<Lever, 2> lever;  // of each station of a ground column that turns above its stump
+  int element[2] = {-1, -1};   // of each station; the same twice for a whole member
+  int rotational = -1;         // of station 1 of a ground column
 };
 
 /// Sectors of a shaft that hold together at a level, about their own centroid.
@@ -88,7 +89,7 @@ struct BuilderState {
   std::map<int, double> lowest_charge;   // column -> centre of its lowest charge that fires [m]
   std::map<GridPoint, double> core_low;  // underside of the joint in W [m]
   std::map<int, MemberZones> zones;      // columns and beams
-  std::map<std::tuple<int, double, double, Bending>, mbs::LawId> laws;
+  std::map<std::tuple<int, double, double, Lever, Bending>, mbs::LawId> laws;
   std::map<int, ShaftModel> shafts;       // by member
   std::map<int, double> volume_per_mass;  // member: of its material over the mass of its parts, floor loads included
   bool hinge_about_y = true;
@@ -138,6 +139,8 @@ struct Builder : BuilderState {
   // connections
   void estimate_normal_forces();
   void request_zones();
+  /// Of a ground column that turns above its stump over this share of its clear length.
+  void set_lever(MemberZones&, double share) const;
   void request_station(int member, int which);
   /// What of the slabs beside a beam along x works with it.
   nearfield::Flange find_flange(const GridPoint&, int beam) const;
@@ -168,14 +171,14 @@ struct Builder : BuilderState {
   std::array<mbs::Cracking, 2> calc_cracking(const MemberZones&, const Stiffness&, double length_y,
                                              double length_z) const;
   /// One that is known keeps its name.
-  mbs::SharedLaw make_law(int zone, const Stiffness&, const std::string& name, Bending);
-  mbs::LawId law_of(int zone, const Stiffness&, const std::string& member, Bending = Bending::Both);
+  mbs::SharedLaw make_law(int zone, const Stiffness&, const std::string& name, Bending, const Lever& = {});
+  mbs::LawId law_of(int zone, const Stiffness&, const std::string& member, Bending = Bending::Both, const Lever& = {});
   /// A condensed model stays in its plane, so that members of a frame bend about one axis alone.
   Bending bending_of_column() const { return condensation ? Bending::Z : Bending::Both; }
   Bending bending_of_x_beam() const { return condensation ? Bending::Y : Bending::Both; }
   /// Law of a rotational element: bending about the hinge axis is that about z of its frame.
-  mbs::SharedLaw make_hinge_law(int zone, const Stiffness&, const std::string& name);
-  mbs::LawId hinge_law_of(int zone, const Stiffness&, const std::string& name);
+  mbs::SharedLaw make_hinge_law(int zone, const Stiffness&, const std::string& name, const Lever& = {});
+  mbs::LawId hinge_law_of(int zone, const Stiffness&, const std::string& name, const Lever& = {});
   ///   length  of the stub [m]
   mbs::LawId stub_law_of(int zone, const Stiffness&, int member, double length);
   void make_stub(const product::Charge&, const MemberZones&, mbs::Event& event, mbs::Event& lighter);

@@ -58,6 +58,7 @@ void Builder::make_stub(const product::Charge& c, const MemberZones& z, mbs::Eve
   act.kind = mbs::Action::Kind::SwitchLaw;
   act.rotational = z.rotational;
   act.ramp = k.charge_release_time;
+  act.stiffness_share = 1 / (z.lever[1].moment_z * z.lever[1].rotation);  // it turns about its own end alone
   act.law = stub_law_of(top.damaged >= 0 ? top.damaged : top.zone, calc_stiffness(z), c.member, length);
   event.actions.push_back(act);
   act = {};

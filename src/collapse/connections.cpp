@@ -17,6 +17,7 @@ namespace {
 constexpr const char* kSixComponents = "six-component element";
 constexpr const char* kHinge = "revolute joint + rotational element";
 constexpr const char* kRigid = "rigid joint";
+constexpr double kLeastFootShare = 0.2;  // of the head's moment, at a charge near or above the middle of a column
 
 double largest_moment(const mbs::MomentFamily& f) {
   double m = 0;
@@ -159,13 +160,23 @@ void Builder::request_station(int index, int which) {
     }
 }
 
+void Builder::set_lever(MemberZones& z, double share) const {
+  // of the head's moment what the foot has at the charge, as in a column whose ends do not turn
+  const double foot = std::max(2 * share - 1, kLeastFootShare), head = 2 * share / (1 + foot);
+  z.lever[0] = {share, foot * head, share};
+  if (!hinge_about_y) std::swap(z.lever[0].moment_y, z.lever[0].moment_z);
+  z.lever[1] = {head, head, share};
+}
+
 void Builder::request_zones() {
   for (const auto& [at, index] : columns) {
     MemberZones& z = zones[index];
     z.clear_length = core_low[at] - member(index).start.z;
     const auto charged = lowest_charge.find(index);
-    if (at.storey == 0 && charged != lowest_charge.end()) z.station[0].at = charged->second;
     z.station[1].at = z.clear_length;
+    if (at.storey > 0 || charged == lowest_charge.end() || stump_body.count(index) == 0) continue;
+    z.station[0].at = charged->second;
+    set_lever(z, 1 - charged->second / z.clear_length);
   }
   for (const auto* beams : {&x_beams, &y_beams})
     for (const auto& [at, index] : *beams) {
@@ -230,28 +241,31 @@ std::array<mbs::Cracking, 2> Builder::calc_cracking(const MemberZones& z, const 
           make_cracking(rcc.z_pos, rcc.z_neg, rcc.length, z.normal_force, s.uncracked_EI_z, s.EI_z, length_z)};
 }
 
-mbs::SharedLaw Builder::make_law(int zone, const Stiffness& s, const std::string& name, Bending bending) {
-  if (const auto same = laws.find({zone, s.EI_y, s.EI_z, bending}); same != laws.end())
+mbs::SharedLaw Builder::make_law(int zone, const Stiffness& s, const std::string& name, Bending bending,
+                                 const Lever& lever) {
+  if (const auto same = laws.find({zone, s.EI_y, s.EI_z, lever, bending}); same != laws.end())
     return model.laws.shared(static_cast<size_t>(same->second.index));
   std::string key = library.key(zone);
   append_bytes(key, s.EI_y), append_bytes(key, s.EI_z), append_bytes(key, static_cast<double>(bending));
+  append_bytes(key, lever.moment_y), append_bytes(key, lever.moment_z), append_bytes(key, lever.rotation);
   if (known)
     if (const auto found = known->laws.find(key); found != known->laws.end()) return found->second;
-  mbs::SharedLaw law = make_zone_law(library.rcc(zone), s.EI_y, s.EI_z, name, k, PlasticFrom::Yield, bending);
+  mbs::SharedLaw law =
+      scale_lever(make_zone_law(library.rcc(zone), s.EI_y, s.EI_z, name, k, PlasticFrom::Yield, bending), lever);
   if (made) made->laws.emplace(std::move(key), law);
   return law;
 }
 
-mbs::LawId Builder::law_of(int zone, const Stiffness& s, const std::string& name, Bending bending) {
-  const auto key = std::make_tuple(zone, s.EI_y, s.EI_z, bending);
+mbs::LawId Builder::law_of(int zone, const Stiffness& s, const std::string& name, Bending bending, const Lever& lever) {
+  const auto key = std::make_tuple(zone, s.EI_y, s.EI_z, lever, bending);
   if (const auto it = laws.find(key); it != laws.end()) return it->second;
-  const mbs::LawId id = mbs::add_law(model, named(make_law(zone, s, name, bending), name));
+  const mbs::LawId id = mbs::add_law(model, named(make_law(zone, s, name, bending, lever), name));
   laws[key] = id;
   return id;
 }
 
-mbs::SharedLaw Builder::make_hinge_law(int zone, const Stiffness& s, const std::string& name) {
-  mbs::SharedLaw same = make_law(zone, s, name, bending_of_column());
+mbs::SharedLaw Builder::make_hinge_law(int zone, const Stiffness& s, const std::string& name, const Lever& lever) {
+  mbs::SharedLaw same = make_law(zone, s, name, bending_of_column(), lever);
   if (hinge_about_y) return same;
   // y of the joint is -z of the column, its z is y of the column
   mbs::ZoneLaw law = *same;
@@ -262,10 +276,10 @@ mbs::SharedLaw Builder::make_hinge_law(int zone, const Stiffness& s, const std::
   return law;
 }
 
-mbs::LawId Builder::hinge_law_of(int zone, const Stiffness& s, const std::string& name) {
+mbs::LawId Builder::hinge_law_of(int zone, const Stiffness& s, const std::string& name, const Lever& lever) {
   const auto key = std::make_tuple(zone, s.EI_y, s.EI_z, name);
   if (const auto it = hinge_laws.find(key); it != hinge_laws.end()) return it->second;
-  return hinge_laws[key] = mbs::add_law(model, named(make_hinge_law(zone, s, name), name));
+  return hinge_laws[key] = mbs::add_law(model, named(make_hinge_law(zone, s, name, lever), name));
 }
 
 mbs::LawId Builder::stub_law_of(int zone, const Stiffness& s, int index, double length) {
@@ -330,11 +344,18 @@ void Builder::connect_ground_column(const GridPoint& at, int index) {
   if (stump >= 0) foot.z += z.station[0].at;
   // both ends of the column turn about the hinge axis, only its foot about the other one
   const double ends_y = hinge_about_y ? 3 : 6, ends_z = hinge_about_y ? 6 : 3;
-  const Vec3 rotational{s.GJ / L, ends_y * s.uncracked_EI_y / L, ends_z * s.uncracked_EI_z / L};
-  z.element[0] = add_element(m.name + "/foot", index, stump, shaft, foot, column_axes(), {s.EA / L, s.GA / L, s.GA / L},
-                             rotational, {{0, law_of(z.station[0].zone, s, m.name + "/foot", bending_of_column())}},
-                             calc_cracking(z, s, L / ends_y, L / ends_z))
-                     .index;
+  // docs/theory/manager.md (1d)
+  const Lever &foot_lever = z.lever[0], &top_lever = z.lever[1];
+  const double soft_y = foot_lever.moment_y * foot_lever.rotation, soft_z = foot_lever.moment_z * foot_lever.rotation;
+  const Vec3 rotational{s.GJ / L, soft_y * ends_y * s.uncracked_EI_y / L, soft_z * ends_z * s.uncracked_EI_z / L};
+  std::array<mbs::Cracking, 2> cracking_foot = calc_cracking(z, s, L / ends_y, L / ends_z);
+  cracking_foot[0] = scale_lever(cracking_foot[0], foot_lever.moment_y, foot_lever.rotation);
+  cracking_foot[1] = scale_lever(cracking_foot[1], foot_lever.moment_z, foot_lever.rotation);
+  z.element[0] =
+      add_element(m.name + "/foot", index, stump, shaft, foot, column_axes(), {s.EA / L, s.GA / L, s.GA / L},
+                  rotational, {{0, law_of(z.station[0].zone, s, m.name + "/foot", bending_of_column(), foot_lever)}},
+                  cracking_foot)
+          .index;
   model.elements.back().crush_through = L;
 
   mbs::Joint joint;
@@ -348,9 +369,11 @@ void Builder::connect_ground_column(const GridPoint& at, int index) {
   joint.X_PF = frame_in(shaft, top, axes);
   joint.X_CM = frame_in(node, top, axes);
   const nearfield::Rcc& rcc = library.rcc(z.station[1].zone);
-  const mbs::LawId law_id = hinge_law_of(z.station[1].zone, s, m.name + "/top");
+  const mbs::LawId law_id = hinge_law_of(z.station[1].zone, s, m.name + "/top", top_lever);
   const mbs::ZoneLaw& law = model.laws[static_cast<size_t>(law_id.index)];
-  const double stiffness = 6 * (hinge_about_y ? s.uncracked_EI_z : s.uncracked_EI_y) / L;
+  const double stiffness =
+      top_lever.moment_z * top_lever.rotation * 6 * (hinge_about_y ? s.uncracked_EI_z : s.uncracked_EI_y) / L;
+  // the stub's, which it becomes: no cracking changes with a law
   const mbs::Cracking cracking = calc_cracking(z, s, L / 6, L / 6)[hinge_about_y ? 1 : 0];
   joint.tension_limit = *std::max_element(rcc.tension.force.begin(), rcc.tension.force.end());
   // the limit that follows the normal force is the foot's, which carries the same shear; here the largest possible one

@@ -530,6 +530,24 @@ mbs::ZoneLaw make_cage_law(const nearfield::ResidualCage& cage, double destroyed
   return law;
 }
 
+mbs::SharedLaw scale_lever(const mbs::SharedLaw& one, const Lever& lever) {
+  if (lever == Lever{}) return one;
+  mbs::ZoneLaw law = *one;
+  for (const auto& [family, share] : {std::pair{&law.moment_y, lever.moment_y}, {&law.moment_z, lever.moment_z}}) {
+    for (std::vector<double>* moments : {&family->positive, &family->negative})
+      for (double& m : *moments) m *= share;
+    for (double& phi : family->plastic_rotation) phi /= lever.rotation;
+  }
+  law.rupture_rotation /= lever.rotation, law.rupture_rotation_pressed /= lever.rotation;
+  return law;
+}
+
+mbs::Cracking scale_lever(mbs::Cracking c, double moment, double rotation) {
+  for (int side : {0, 1}) c.begin[side] *= moment, c.end[side] *= moment;
+  c.flexibility /= moment * rotation;
+  return c;
+}
+
 mbs::ZoneLaw make_slab_law(const nearfield::PanelRcc& rcc, double width, double kept, const std::string& name,
                            const Knowledge& k) {
   mbs::ZoneLaw law;

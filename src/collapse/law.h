@@ -80,6 +80,17 @@ mbs::Cracking make_cracking(const nearfield::MomentFamily& positive, const nearf
 /// Rotation that cracks add at a moment > 0 that grows for the first time [rad].
 double calc_crack_rotation(const mbs::Cracking&, double moment);
 
+/// What a zone's moments about y and z are times, and its rotations over (docs/theory/manager.md (1d)).
+struct Lever {
+  double moment_y = 1, moment_z = 1, rotation = 1;
+  auto operator<=>(const Lever&) const = default;
+};
+
+/// The law of a zone that bends with this lever. What is not bending stays.
+mbs::SharedLaw scale_lever(const mbs::SharedLaw&, const Lever&);
+///   moment, rotation  of the lever, about the axis of the cracks
+mbs::Cracking scale_lever(mbs::Cracking, double moment, double rotation);
+
 /// Law of the bars that a charge leaves; nothing at all if there are none.
 mbs::ZoneLaw make_cage_law(const nearfield::ResidualCage&, double destroyed_length, const std::string& name,
                            const Knowledge&);

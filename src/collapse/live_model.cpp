@@ -340,14 +340,14 @@ std::string LiveModel::add_pre_cut(const Edit& e, double time) {
     const Bending bending = m.kind == MemberKind::Column ? builder.bending_of_column()
                             : is_y_beam                  ? Bending::Both
                                                          : builder.bending_of_x_beam();
-    const mbs::LawId law = builder.law_of(zone, stiffness, m.name + "/cut", bending);
+    const mbs::LawId law = builder.law_of(zone, stiffness, m.name + "/cut", bending, zones.lever[which]);
     size_t station = 0;
     // of a whole member, the station on the cut's side
     if (el.stations.size() == 2) station = (el.stations[0].x < 0) == (which == 0) ? 0 : 1;
     el.stations[station].law = law;
   } else {
     builder.model.rotational_elements[static_cast<size_t>(z.rotational)].law =
-        builder.hinge_law_of(zone, stiffness, m.name + "/cut");
+        builder.hinge_law_of(zone, stiffness, m.name + "/cut", zones.lever[1]);
   }
   built_ = std::move(static_cast<BuilderState&>(builder));
   return fmt::format("{} is cut at {:.3g} m: {:.3g} % of the bars, {:.3g} % of the concrete", m.name, e.position,

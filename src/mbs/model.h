@@ -276,7 +276,7 @@ struct Action {
   int rotational = -1;  // SwitchLaw: a rotational element instead of an element
   LawId law;
   double ramp = 0;             // [s]
-  double stiffness_share = 1;  // SwitchLaw: what is left of the element's stiffness after the ramp, (0, 1]
+  double stiffness_share = 1;  // SwitchLaw: of the element's own stiffness after the ramp, (0, 1000]
   Body replacement;
 };
 

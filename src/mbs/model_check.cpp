@@ -514,8 +514,8 @@ void Checker::check_action(const Place& p, const Action& a) {
       }
       index(p, "law", a.law.index, m_.laws);
       finite_not_negative(p, "ramp", a.ramp);
-      if (!(a.stiffness_share > 0 && a.stiffness_share <= 1))
-        fail(p, "stiffness_share", fmt::format("must lie in (0, 1], is {:g}", a.stiffness_share));
+      if (!(a.stiffness_share > 0 && a.stiffness_share <= 1000))
+        fail(p, "stiffness_share", fmt::format("must lie in (0, 1000], is {:g}", a.stiffness_share));
       break;
     }
     case Action::Kind::ReleaseJoint:

@@ -45,7 +45,7 @@ TEST(StepCheckPhysics, AHouseThatTopplesDoesSoWithHalfTheStep) {
     EXPECT_EQ(check->status, Status::Good) << check->text;
     EXPECT_THAT(check->text, HasSubstr("the same verdict. "));
     EXPECT_THAT(check->text, HasSubstr(fmt::format("With {:.3g} ms", 500 * plain.provenance.step)));
-    EXPECT_LT(check->value, 0.02);
+    EXPECT_LT(check->value, 0.03);  // stubs of 1 m: as in AStubIsCrushedByWhatComesDownOnIt
     EXPECT_GT(last, 0.9);
     if (threads == 1) {
       text = check->text;
