@@ -15,7 +15,7 @@ export function Header(props: { run: Run }) {
   return (
     <header class="header">
       <div class="title-row">
-        <h1>{provenance.title || "Untitled plan"}</h1>
+        {provenance.title === "" ? <h1>Untitled plan</h1> : <h1 data-name>{provenance.title}</h1>}
         <p class="subtitle">
           {`topple ${provenance.program_version} · `}
           {formatDate(provenance.created) || "date unknown"}
@@ -31,7 +31,7 @@ export function Header(props: { run: Run }) {
               <StatusSign status={verdict.status} size={30} />
               <div>
                 <p class="verdict-title">
-                  {verdict.title} <StatusWord status={verdict.status} />
+                  <span data-name>{verdict.title}</span> <StatusWord status={verdict.status} />
                 </p>
                 <p class="verdict-text" data-test="verdict">{prettify(verdict.text)}</p>
               </div>
@@ -77,7 +77,7 @@ function Summary(props: { run: Run }) {
       {screened > 0 && <p class="verdict-title">{screened === 1 ? "The screening of ground vibration lies above one limit" : `The screening of ground vibration lies above ${screened} limits`}</p>}
       {open.slice(0, most).map((f) => (
         <a class="open-finding" href={`#finding-${f.id}`} data-test="open-finding">
-          <StatusSign status={f.status} size={14} /> <StatusWord status={f.status} /> <span>{isOfPlace(f) ? `${f.heading}: ${f.title}` : f.title}</span>
+          <StatusSign status={f.status} size={14} /> <StatusWord status={f.status} /> <span data-name>{isOfPlace(f) ? `${f.heading}: ${f.title}` : f.title}</span>
         </a>
       ))}
       {open.length > most && <p class="ending-text">{`and ${open.length - most} more below`}</p>}
@@ -91,7 +91,7 @@ export function FindingRow(props: { finding: Finding; heading: string }) {
     <div class="finding" data-finding={finding.id} id={`finding-${finding.id}`}>
       <StatusSign status={finding.status} />
       <div>
-        {finding.title !== props.heading && <p class="finding-title">{finding.title}</p>}
+        {finding.title !== props.heading && <p class="finding-title" data-name>{finding.title}</p>}
         <p>{prettify(finding.text)}</p>
       </div>
       <StatusWord status={finding.status} />

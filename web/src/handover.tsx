@@ -155,12 +155,12 @@ export function SitePlan(props: { run: Run }) {
         </g>
         <path class="fallen" d={parts.map(path).join("")} />
         {run.neighbours.map((n) => (
-          <path class={n.is_utility ? "utility-area" : "neighbour-area"} d={path(n.footprint)}><title>{n.name}</title></path>
+          <path class={n.is_utility ? "utility-area" : "neighbour-area"} d={path(n.footprint)}><title data-name>{n.name}</title></path>
         ))}
         <path class="footprint" d={path(run.building_outline)} />
         {run.neighbours.map((n) => {
           const corner = n.footprint[0];
-          return corner === undefined ? null : <text class="level-text" x={x(corner[0])} y={y(corner[1]) - 4} text-anchor={x(corner[0]) > 0.7 * width ? "end" : "start"}>{n.name}</text>;
+          return corner === undefined ? null : <text class="level-text" x={x(corner[0])} y={y(corner[1]) - 4} text-anchor={x(corner[0]) > 0.7 * width ? "end" : "start"} data-name>{n.name}</text>;
         })}
       </svg>
       <p class="quiet plot-note">Strong line: the building before the first charge. Grey: all parts at the end of the run. No distance on this plan is a safe distance.</p>
@@ -198,7 +198,7 @@ export function Verification(props: { run: Run }) {
       {others.map((other) => (
         <div data-test="second-opinion">
           <h3>Beside another computation</h3>
-          <p class="quiet"><span>A is this run, B is by</span> <span>{other.engine}</span>: <span>{other.title}</span></p>
+          <p class="quiet"><span>A is this run, B is by</span> <span>{other.engine}</span>: <span data-name>{other.title}</span></p>
           <ul>{other.sentences.map((text) => <li>{prettify(text)}</li>)}</ul>
         </div>
       ))}
@@ -228,7 +228,7 @@ function StudyResults(props: { study: StudySummary }) {
   return (
     <section class="panel fuzzy-results" aria-label="Fuzzy results" data-test="fuzzy-results">
       <h2>Fuzzy results</h2>
-      <p class="quiet"><span>{study.title}</span>: <span class="number">{study.runs}</span> <span>runs</span>, <span class="number">{study.failed}</span> <span>failed</span></p>
+      <p class="quiet"><span data-name>{study.title}</span>: <span class="number">{study.runs}</span> <span>runs</span>, <span class="number">{study.failed}</span> <span>failed</span></p>
       {study.verdict.map((s) => <p data-sentence={s.id}><StatusSign status={s.status} size={15} /> {prettify(s.text)}</p>)}
       <table>
         <thead><tr><th scope="col">Outcome</th><th scope="col" class="number">Possibility</th><th scope="col" class="number">Necessity</th><th scope="col" class="number">Runs</th></tr></thead>

@@ -32,7 +32,7 @@ export function Inspector(props: { state: State }) {
   return (
     <aside class="panel inspector" aria-label="Member" data-test="inspector">
       <div class="inspector-head">
-        <h2 data-test="member-name">{body.name}</h2>
+        <h2 data-test="member-name" data-name>{body.name}</h2>
         <button type="button" class="close" aria-label="Close" title="Close (Esc)" onClick={() => (state.selected.value = -1)}>
           ×
         </button>
@@ -61,7 +61,7 @@ export function Inspector(props: { state: State }) {
         return (
           <div class="zone">
             <p class="zone-head">
-              <strong>{zone.name}</strong>
+              <strong data-name>{zone.name}</strong>
               {now !== undefined && <ZoneStateWord state={now.state[z] as number} />}
             </p>
             <p class="quiet">{zone.subsystem}</p>

@@ -85,7 +85,7 @@ export function SceneCanvas(props: SceneCanvasProps) {
       />
       {problem !== "" && <NoWebGl problem={problem} />}
       {props.children}
-      {hover !== undefined && <span class="hover-name" style={{ left: `${hover.x + 12}px`, top: `${hover.y + 12}px` }}>{hover.name}</span>}
+      {hover !== undefined && <span class="hover-name" data-name style={{ left: `${hover.x + 12}px`, top: `${hover.y + 12}px` }}>{hover.name}</span>}
     </div>
   );
 }

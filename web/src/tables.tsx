@@ -105,7 +105,7 @@ export function PlanValues(props: { run: Run }) {
               )}
               {plan_values.filter((v) => v.group === group).map((v) => (
                 <tr>
-                  <th scope="row">{v.key}</th>
+                  <th scope="row" data-name>{v.key}</th>
                   <td>{prettify(v.value)}</td>
                 </tr>
               ))}

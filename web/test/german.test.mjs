@@ -7,10 +7,10 @@ import { openPage } from "./browser.mjs";
 import { describe, it } from "./harness.mjs";
 import { load } from "./load.mjs";
 import { makeStudy, writeStudy } from "./study-data.mjs";
-import { hostile } from "./synthetic.mjs";
+import { hostile, makeSynthetic, writePage } from "./synthetic.mjs";
 
 const { german } = await load("words_de.ts");
-const { translate, commas } = await load("translate.ts");
+const { translate, translateLoosely, commas } = await load("translate.ts");
 const { prettify } = await load("units.ts");
 const { titleOf, unitWord } = await load("study/data.ts");
 const root = fileURLToPath(new URL("../../", import.meta.url));
@@ -167,6 +167,38 @@ describe("the German table", () => {
       assert.equal(translate(english), expected);
   });
 
+  it("says in German when the findings would not hold", async () => {
+    const { listConditions } = await load("handover.tsx");
+    const name = "Haus 3.5; Hof: links. Nr. 2";
+    const finding = (id, status, more) => ({ id, status, title: name, heading: "Abstände", text: "", value: null, unit: "", time: null, ...more });
+    const pause = 'Zwischen „Row 1.5 (0.5 s)“ und „B“', limited = "Nichts; der Grenzwert ist 4,0 m.";
+    const findings = [
+      finding("mechanism", "good"), finding("clearance.0", "bad"), finding("criterion.mechanism", "bad", { title: "Mechanismus: Kippen" }),
+      finding("clearance.1", "warning", { value: 0 }), finding("criterion.fall", "not_judged", { title: "Mechanismus: Kippen" }), finding("clearance.2", "not_judged"),
+      finding("vibration.0", "warning"), finding("clearance.3", "good", { value: 6.25 }), finding("clearance.4", "good", { value: 6.25, text: limited }),
+    ];
+    const stability = (text, value) => [...findings, finding("stability.0", "good", { title: pause, text, value })];
+    const runs = [stability("", 1.25), stability("1 Zone fließt", 1.25), stability("3 Zonen fließen", 1.25), stability("1 ist gebrochen", 1.25), stability("3 sind gebrochen", 1.25), stability("", 1)];
+    const told = new Set();
+    for (const [i, list] of runs.entries())
+      for (const sentence of listConditions({ findings: list, events: Array.from({ length: i }, () => ({ kind: "charge" })) })) told.add(sentence);
+    assert.equal(told.size, 20);
+    for (const sentence of told) {
+      const said = translate(sentence);
+      assert.ok(said !== undefined && said !== sentence, sentence);
+      for (const kept of [name, pause, "Mechanismus: Kippen"]) assert.equal(said.includes(kept), sentence.includes(kept), said);
+    }
+  });
+
+  it("leaves names as people gave them", async () => {
+    const name = "Haus 3.5; Hof: links. Nr. 2.5", stage = "Row 1.5; (0.5 s). B: x";
+    assert.equal(translate(`stage 1 "${stage}": 2 charges`), `Zündstufe 1 „${stage}“: 2 Ladungen`);
+    assert.equal(translate(`Clearance of ${name}`), `Abstand von ${name}`);
+    assert.equal(translateLoosely(`${name} hits Gas 2.5 bar at 3.5 m/s`), `${name} trifft Gas 2.5 bar mit 3,5 m/s`);
+    assert.equal(translateLoosely(`Everything came to rest at 3.50 s. The nearest part, ${name}, comes to 26.1 m at 4.00 s; the limit is 5.0 m. It still sways (still: below 0.05 m/s).`),
+      `Bei 3,50 s kam alles zur Ruhe. Das nächste Teil, ${name}, kommt bei 4,00 s auf 26,1 m heran; der Grenzwert ist 5,0 m. Es schwankt noch (still: unter 0,05 m/s).`);
+  });
+
   it("writes decimal commas and leaves versions and dates alone", () => {
     assert.equal(commas("1.5 m at -0.25 s, 3.0e-12, (1.0, 2.5)"), "1,5 m at -0,25 s, 3,0e-12, (1,0, 2,5)");
     for (const text of ["topple 0.1.0", "2026-11-20", "record.h5", "C20.5x"]) assert.equal(commas(text), text);
@@ -270,6 +302,31 @@ if (study !== undefined)
   describe("the German page of a study", () => {
     it("has no English left", { timeout: 240000 }, async () => {
       assert.match(await compareLanguages(study, "study", namesOfStudy), /topple-Studie$/);
+    });
+  });
+
+if (run === undefined && study === undefined)
+  describe("names on a German page", () => {
+    it("are those of the plan", { timeout: 120000 }, async () => {
+      await mkdir(out, { recursive: true });
+      const data = makeSynthetic(3);
+      const title = "Gas 2.5 bar; Hof: links. Nr. 3.5", stage = 'Row 1.5 (0.5 s)';
+      data.provenance.title = title;
+      data.neighbours[0].name = title;
+      data.bodies[0].name = "C 1.5";
+      Object.assign(data.findings[0], { title, text: `The nearest part, C 1.5, comes to 26.1 m at 4.00 s; the limit is 5.0 m.` });
+      Object.assign(data.findings[5], { title });
+      data.events[0].text = `stage 1 "${stage}": 2 charges`;
+      data.plan_values[0] = { group: "Site", key: `Clearance of ${title}`, value: "at most 2.5 m" };
+      await writePage(data, `${out}names.en.html`);
+      const english = await readFile(`${out}names.en.html`, "utf8");
+      await writeFile(`${out}names.html`, english.replace('<html lang="en">', '<html lang="de">'));
+      const { page, close } = await openPage(`${out}names.html`);
+      const texts = await collect(page);
+      await close();
+      assert.deepEqual([...new Set(texts.filter((text) => /[23],5 bar|Nr\. 3,5|Row 1,5|0,5 s\)|C 1,5/.test(text)))], []);
+      for (const text of [title, `Zündstufe 1 „${stage}“: 2 Ladungen`, `Abstand von ${title}`, "höchstens 2,5\u00a0m", "Das nächste Teil, C 1.5, kommt bei 4,00\u00a0s auf 26,1\u00a0m heran; der Grenzwert ist 5,0\u00a0m."])
+        assert.ok(texts.includes(text), text);
     });
   });
 

@@ -259,7 +259,7 @@ export function DebrisPlan(props: { state: State }) {
           <text class="axis-title" x={4} y={margin - 12}>y [m]</text>
         </g>
         {study.site.neighbours.map((n) => (
-          <path class={n.is_utility ? "utility-area" : "neighbour-area"} d={pathOf(n.footprint, x, y)}><title>{n.name}</title></path>
+          <path class={n.is_utility ? "utility-area" : "neighbour-area"} d={pathOf(n.footprint, x, y)}><title data-name>{n.name}</title></path>
         ))}
         {debris.levels.map((l) => <path class="debris" d={pathOf(l.corners, x, y)} />)}
         <path class="footprint" d={pathOf(study.site.footprint, x, y)} />

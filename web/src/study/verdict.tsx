@@ -10,7 +10,7 @@ export function Header(props: { study: Study }) {
   return (
     <header class="header">
       <div class="title-row">
-        <h1>{study.title || "Untitled study"}</h1>
+        {study.title === "" ? <h1>Untitled study</h1> : <h1 data-name>{study.title}</h1>}
         <p class="subtitle">
           fuzzy study · topple {study.origin.program_version} · {formatDate(study.origin.created) || "date unknown"} · <span class="number" data-test="runs">{study.runs}</span> runs, {study.failed} failed, {level}
         </p>
