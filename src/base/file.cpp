@@ -1,6 +1,7 @@
 #include "base/file.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -70,19 +71,47 @@ std::string reason_of(int error) { return std::generic_category().message(error)
   throw std::runtime_error("cannot write " + path + ": " + reason);
 }
 
-/// The file's new bytes, on disk under another name; errno, 0 when all is well.
-int write_whole(const std::string& path, std::string_view bytes) {
-  Descriptor file(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
-  if (file.number() < 0) return errno;
+/// All of `bytes` into an open file, on disk, which is then closed; errno, 0 when all is well.
+int write_whole(Descriptor& file, std::string_view bytes) {
   while (!bytes.empty()) {
     const ssize_t count = ::write(file.number(), bytes.data(), bytes.size());
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) return errno;
     bytes.remove_prefix(static_cast<std::size_t>(count));
   }
-  // a file system without fsync says EINVAL, which is not a failure to write
+  // a file system without fsync, a device and a pipe say EINVAL, which is not a failure to write
   if (::fsync(file.number()) != 0 && errno != EINVAL) return errno;
   return file.close() == 0 ? 0 : errno;
+}
+
+/// What a link stands for, whether that is there or not; a link still if there is no end to it.
+std::filesystem::path resolve_links(std::filesystem::path path) {
+  std::error_code error;
+  if (const std::filesystem::path whole = std::filesystem::canonical(path, error); !error) return whole;
+  constexpr int most = 40;  // as the system does
+  for (int i = 0; i < most && std::filesystem::is_symlink(path, error); ++i) {
+    const std::filesystem::path next = std::filesystem::read_symlink(path, error);
+    if (error) break;
+    path = path.parent_path() / next;  // an absolute one stands alone
+  }
+  return path;
+}
+
+/// Writes to `beside`, a name that nobody has, and renames it to `target`; with the rights of `old`, if there is one.
+int write_beside(const std::string& beside, const std::string& target, std::string_view bytes, const struct stat* old) {
+  const UnfinishedName unfinished(beside);
+  Descriptor file(::open(beside.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+  if (file.number() < 0) return errno;
+  int error = 0;
+  if (old != nullptr) {
+    // only root can give a file away
+    if (::fchown(file.number(), old->st_uid, old->st_gid) != 0) error = 0;
+    if (::fchmod(file.number(), old->st_mode & 07777) != 0) error = errno;
+  }
+  if (error == 0) error = write_whole(file, bytes);
+  if (error == 0 && ::rename(beside.c_str(), target.c_str()) != 0) error = errno;
+  if (error != 0) ::unlink(beside.c_str());
+  return error;
 }
 
 }  // namespace
@@ -112,21 +141,29 @@ void remove_unfinished_file() {
 }
 
 void replace_file(const std::string& path, std::string_view bytes) {
-  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  struct stat old {};
+  const bool is_there = ::stat(path.c_str(), &old) == 0;
+  if (is_there && S_ISDIR(old.st_mode)) fail(path, reason_of(EISDIR));
+  if (is_there && !S_ISREG(old.st_mode)) {  // a device or a pipe is written to
+    Descriptor file(::open(path.c_str(), O_WRONLY | O_CLOEXEC | O_NOCTTY));
+    if (const int number = file.number() < 0 ? errno : write_whole(file, bytes); number != 0)
+      fail(path, reason_of(number));
+    return;
+  }
+  const std::filesystem::path target = resolve_links(path), folder = target.parent_path();
   std::error_code error;
+  if (std::filesystem::is_symlink(target, error)) fail(path, reason_of(ELOOP));
+  error.clear();
   if (!folder.empty()) std::filesystem::create_directories(folder, error);
   if (error) fail(path, error.message());
-  const std::string beside = path + ".part";
-  const UnfinishedName unfinished(beside);
-  if (const int number = write_whole(beside, bytes); number != 0) {
-    ::unlink(beside.c_str());
-    fail(path, reason_of(number));
+  static std::atomic<unsigned> count = 0;
+  constexpr int most = 100;  // names that others may have
+  int number = EEXIST;
+  for (int i = 0; i < most && number == EEXIST; ++i) {
+    const std::string name = ".topple-" + std::to_string(::getpid()) + "-" + std::to_string(count++) + ".part";
+    number = write_beside(folder / name, target, bytes, is_there ? &old : nullptr);
   }
-  std::filesystem::rename(beside, path, error);
-  if (error) {
-    ::unlink(beside.c_str());
-    fail(path, error.message());
-  }
+  if (number != 0) fail(path, reason_of(number));
 }
 
 }  // namespace topple

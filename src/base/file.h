@@ -10,7 +10,9 @@ namespace topple {
 std::string read_file(const std::string& path);
 
 /// Writes `bytes` beside `path` and renames the result over it, so that a failure leaves an old file as it was.
-/// Missing parent folders are made. Throws std::runtime_error that names the path and the reason.
+/// A link stays, and what it stands for is replaced; an old file's rights stay, too. Devices and pipes are written to.
+/// The name beside is nobody else's. Missing parent folders are made. Throws std::runtime_error that names the path and
+/// the reason.
 void replace_file(const std::string& path, std::string_view bytes);
 
 }  // namespace topple

@@ -415,6 +415,12 @@ report)
     expect 0 "$topple" run "$plan" -o b; has err "report page is not built"
     expect 1 "$topple" run "$plan" -o b --report
   fi
+  if [ -s "$source/web/dist/report.html" ]; then
+    # what is no file stays what it is
+    ln -s /dev/null nothing; mkfifo pipe; cat pipe >through.html &
+    expect 0 "$topple" report a/record.h5 -o nothing; [ -c nothing ] && [ -L nothing ] || { echo "a device was replaced"; failures=$((failures + 1)); }
+    expect 0 "$topple" report a/record.h5 -o pipe; wait; [ -p pipe ] && cmp r.html through.html || { echo "a pipe was replaced"; failures=$((failures + 1)); }
+  fi
   echo nonsense >wrong.h5
   expect 2 "$topple" report wrong.h5 -o r2.html
   expect 2 "$topple" report missing.h5 -o r2.html

@@ -3,9 +3,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 
+#include <atomic>
 #include <csignal>
 #include <filesystem>
+#include <string>
+#include <thread>
+#include <vector>
 
 #include "base/error.h"
 #include "own_folder.h"
@@ -61,6 +66,75 @@ TEST_F(File, KeepsTheOldOneWhenTheDiskIsFull) {
   setrlimit(RLIMIT_FSIZE, &before);
   std::signal(SIGXFSZ, handler);
   EXPECT_EQ(read_file(path("a")), "old");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_.path()), {}), 1);
+}
+
+TEST_F(File, KeepsLinksAndWritesWhatTheyStandFor) {
+  replace_file(path("there/plan"), "old");
+  fs::create_symlink("there/plan", path("link"));
+  fs::create_symlink("link", path("second"));
+  fs::create_symlink("there/none", path("dangling"));
+  replace_file(path("second"), "new");
+  replace_file(path("dangling"), "first");
+  EXPECT_TRUE(fs::is_symlink(path("link")) && fs::is_symlink(path("second")) && fs::is_symlink(path("dangling")));
+  EXPECT_EQ(read_file(path("there/plan")), "new");
+  EXPECT_EQ(read_file(path("there/none")), "first");
+  fs::create_symlink("round", path("round"));
+  EXPECT_THROW(replace_file(path("round"), "x"), std::runtime_error);
+}
+
+TEST_F(File, KeepsTheRightsOfAnOldFile) {
+  replace_file(path("a"), "old");
+  for (const fs::perms rights : {fs::perms{0600}, fs::perms{0640}, fs::perms{0755}, fs::perms{0444}}) {
+    fs::permissions(path("a"), rights);
+    replace_file(path("a"), "new");
+    EXPECT_EQ(fs::status(path("a")).permissions(), rights);
+  }
+  const mode_t before = umask(027);
+  replace_file(path("b"), "x");
+  umask(before);
+  EXPECT_EQ(fs::status(path("b")).permissions(), fs::perms{0640});
+}
+
+TEST_F(File, WritesToPipesAndDevices) {
+  ASSERT_EQ(mkfifo(path("pipe").c_str(), 0600), 0);
+  std::string got;
+  std::thread reader([&] { got = read_file(path("pipe")); });
+  replace_file(path("pipe"), "through");
+  reader.join();
+  EXPECT_EQ(got, "through");
+  EXPECT_TRUE(fs::is_fifo(path("pipe")));
+  fs::create_symlink("/dev/null", path("nothing"));
+  replace_file(path("nothing"), "x");
+  EXPECT_TRUE(fs::is_symlink(path("nothing")) && fs::is_character_file(path("nothing")));
+  EXPECT_THROW(replace_file("/dev/full", "x"), std::runtime_error);
+}
+
+TEST_F(File, LeavesOthersBesideItAlone) {
+  replace_file(path("a.part"), "mine");
+  replace_file(path("a"), "x");
+  EXPECT_EQ(read_file(path("a.part")), "mine");
+  // writers of one file do not meet: it is always one of theirs, whole
+  std::vector<std::thread> writers;
+  std::atomic<int> failed = 0;
+  for (const char letter : {'p', 'q', 'r', 's'})
+    writers.emplace_back([&, letter] {
+      for (int i = 0; i < 50; ++i) try {
+          replace_file(path("a"), std::string(200000, letter));
+        } catch (const std::runtime_error&) { ++failed; }
+    });
+  for (std::thread& writer : writers) writer.join();
+  EXPECT_EQ(failed, 0);
+  const std::string text = read_file(path("a"));
+  EXPECT_EQ(text, std::string(200000, text.at(0)));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_.path()), {}), 2);
+}
+
+TEST_F(File, TakesTheLongestNames) {
+  const std::string longest(255, 'n');
+  replace_file(path(longest), "x");
+  EXPECT_EQ(read_file(path(longest)), "x");
+  EXPECT_THROW(replace_file(path(longest + "n"), "x"), std::runtime_error);
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_.path()), {}), 1);
 }
 
