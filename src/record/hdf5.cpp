@@ -1,7 +1,10 @@
+#include "record/hdf5.h"
+
 #include <hdf5.h>
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <iterator>
@@ -16,7 +19,6 @@
 
 #include "base/error.h"
 #include "base/file.h"
-#include "record/record.h"
 
 namespace topple::record {
 
@@ -24,6 +26,7 @@ namespace {
 
 constexpr std::string_view format_name = "topple-record";
 constexpr std::int32_t format_version = 1;
+constexpr std::size_t most_attribute_bytes = 60000;  // of a text; the format's own limit is 64 KiB with its head
 
 /// What the library answers with a negative number; the callers turn it into their own words.
 struct LibraryError {
@@ -245,7 +248,16 @@ class Writer {
     return {H5Fcreate("record", H5F_ACC_TRUNC, H5P_DEFAULT, access), H5Fclose, "file"};
   }
 
+  /// As many whole characters of it as an attribute takes.
+  static std::string_view shorten(std::string_view text) {
+    if (text.size() <= most_attribute_bytes) return text;
+    std::size_t end = most_attribute_bytes;
+    while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xc0U) == 0x80U) --end;
+    return text.substr(0, end);
+  }
+
   static void put_text_attribute(hid_t object, const std::string& name, std::string_view text) {
+    text = shorten(text);
     const Handle type = text_type(text.size(), name);
     const Handle space(H5Screate(H5S_SCALAR), H5Sclose, name);
     const Handle attribute(H5Acreate2(object, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose, name);
@@ -393,7 +405,7 @@ class Reader {
     const Handle type(H5Aget_type(attribute), H5Tclose, name);
     const Handle space(H5Aget_space(attribute), H5Sclose, name);
     const std::size_t size = H5Tget_size(type);
-    if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) != 0 || size == 0 || size > 1024 ||
+    if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) != 0 || size == 0 || size > most_attribute_bytes ||
         H5Sget_simple_extent_npoints(space) != 1)
       throw LibraryError{name};
     std::string text(size, '\0');
@@ -649,6 +661,8 @@ void read_outputs(Reader& reader, Record& r) {
     reader.rows_of(group + "/value", o.value, o.time.size(), o.columns.size());
     for (std::size_t i = 1; i < o.time.size(); ++i)
       if (!(o.time[i] > o.time[i - 1])) reader.damaged(group + "/time does not rise");
+    for (const double t : o.time)
+      if (!std::isfinite(t)) reader.damaged(group + "/time has a value that is not finite");
     r.outputs.push_back(std::move(o));
   }
 }
@@ -657,6 +671,8 @@ void read_outputs(Reader& reader, Record& r) {
 void check_contents(const Reader& reader, const Record& r) {
   for (std::size_t i = 1; i < r.time.size(); ++i)
     if (!(r.time[i] > r.time[i - 1])) reader.damaged("frames/time does not rise");
+  for (const double t : r.time)
+    if (!std::isfinite(t)) reader.damaged("frames/time has a value that is not finite");
   const int bodies = static_cast<int>(r.bodies.size());
   for (const ZoneInfo& zone : r.zones)
     for (const int body : {zone.body_a, zone.body_b})
@@ -677,7 +693,7 @@ void check_contents(const Reader& reader, const Record& r) {
 
 }  // namespace
 
-void write_hdf5(const Record& record, const std::string& path) {
+std::string to_hdf5(const Record& record) {
   Record r = record;
   Flat flat{flatten(r.bodies, &BodyInfo::shapes), flatten(r.neighbours, &Neighbour::footprint), {}};
   for (const Series& series : r.series) {
@@ -686,16 +702,20 @@ void write_hdf5(const Record& record, const std::string& path) {
                              " values for " + std::to_string(r.time.size()) + " frames");
     flat.series.insert(flat.series.end(), series.value.begin(), series.value.end());
   }
-  std::string bytes;
   try {
     const Session session;
     Writer writer;
     transfer(writer, r, flat);
     write_outputs(writer, r);
-    bytes = writer.bytes();
-  } catch (const LibraryError& error) {
-    throw std::runtime_error("cannot write " + path + ": the HDF5 library refuses " + error.subject);
-  }
+    return writer.bytes();
+  } catch (const LibraryError& error) { throw std::runtime_error("the HDF5 library refuses " + error.subject); }
+}
+
+void write_hdf5(const Record& record, const std::string& path) {
+  std::string bytes;
+  try {
+    bytes = to_hdf5(record);
+  } catch (const std::runtime_error& error) { throw std::runtime_error("cannot write " + path + ": " + error.what()); }
   replace_file(path, bytes);
 }
 

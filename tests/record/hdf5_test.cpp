@@ -6,12 +6,14 @@
 #include <bit>
 #include <chrono>
 #include <filesystem>
+#include <limits>
 #include <random>
 #include <thread>
 
 #include "../base/own_folder.h"
 #include "base/error.h"
 #include "base/file.h"
+#include "base/utf8.h"
 #include "record/record.h"
 #include "sample.h"
 
@@ -315,7 +317,7 @@ TEST_F(Hdf5, RefusesContradictions) {
   EXPECT_TRUE(refused_after("shapes/body", H5T_NATIVE_INT, std::vector{1, 2, 2, 5}));
   EXPECT_TRUE(refused_after("shapes/body", H5T_NATIVE_INT, std::vector{2, 1, 2, 4}));
   EXPECT_TRUE(refused_after("shapes/body", H5T_NATIVE_INT, std::vector{-1, 1, 2, 4}));
-  EXPECT_TRUE(refused_after("findings/status", H5T_NATIVE_UINT8, std::vector<std::uint8_t>{0, 4, 0}));
+  EXPECT_TRUE(refused_after("findings/status", H5T_NATIVE_UINT8, std::vector<std::uint8_t>{0, 5, 0, 0}));
   EXPECT_TRUE(refused_after("outputs/reaction [top]/time", H5T_NATIVE_DOUBLE, std::vector<double>{1, 1}));
   EXPECT_TRUE(refused_after("crushed_ends/body", H5T_NATIVE_INT, std::vector{2, 1}));
   EXPECT_TRUE(refused_after("crushed_ends/body", H5T_NATIVE_INT, std::vector{1, 5}));
@@ -371,6 +373,33 @@ TEST_F(Hdf5, RefusesOutputsThatDoNotFit) {
   H5Ldelete(file, "outputs/reaction [top]/time", H5P_DEFAULT);
   H5Lcopy(file, "outputs/tilt/time", file, "outputs/reaction [top]/time", H5P_DEFAULT, H5P_DEFAULT);
   H5Fclose(file);
+  EXPECT_EQ(code_of_reading("record.h5"), "E704");
+}
+
+TEST_F(Hdf5, KeepsWhatIsSaidOfOutputsAtAnyLength) {
+  Record r = make_sample();
+  r.outputs[0].quantity = "position of " + std::string(2000, 'B');
+  r.outputs[1].frame = "body " + std::string(50000, 'C');
+  write_hdf5(r, path("record.h5"));
+  expect_same(read_hdf5(path("record.h5")), r);
+  // what the format cannot hold ends at a whole character
+  std::string longest = "of";
+  while (longest.size() < 200000) longest += "ü€";
+  r.outputs[0].quantity = longest;
+  write_hdf5(r, path("record.h5"));
+  const std::string read = read_hdf5(path("record.h5")).outputs[0].quantity;
+  EXPECT_GT(read.size(), 50000U);
+  EXPECT_TRUE(longest.starts_with(read) && is_utf8(read));
+}
+
+TEST_F(Hdf5, RefusesTimesThatAreNotFinite) {
+  Record r = make_sample();
+  r.time.back() = std::numeric_limits<double>::infinity();
+  write_hdf5(r, path("record.h5"));
+  EXPECT_EQ(code_of_reading("record.h5"), "E704");
+  r = make_sample();
+  r.outputs[1].time.back() = std::numeric_limits<double>::infinity();
+  write_hdf5(r, path("record.h5"));
   EXPECT_EQ(code_of_reading("record.h5"), "E704");
 }
 
