@@ -20,14 +20,21 @@ int compare_records(const Arguments& a) {
     const auto in = [&a](const char* name) { return (std::filesystem::path(a.output) / name).string(); };
     const std::string text = record::describe(c, first, second), data = record::to_json(c, first);
     Files files{{"text", in("compare.txt")}, {"csv", in("compare.csv")}, {"json", in("compare.json")}};
-    replace_file(files[0].second, text);
-    replace_file(files[1].second, record::to_csv(c, first));
-    replace_file(files[2].second, data);
-    if (const auto bundle = find_bundle("compare.html")) {
-      record::write_compare_page(c, first, second, photos, *bundle, in("compare.html"));
-      files.emplace_back("page", in("compare.html"));
-    } else {
-      std::fprintf(stderr, "The page is not built, so there is no compare.html (npm ci && npm run build in web/).\n");
+    try {
+      replace_file(files[0].second, text);
+      replace_file(files[1].second, record::to_csv(c, first));
+      replace_file(files[2].second, data);
+      if (const auto bundle = find_bundle("compare.html")) {
+        record::write_compare_page(c, first, second, photos, *bundle, in("compare.html"));
+        files.emplace_back("page", in("compare.html"));
+      } else {
+        std::fprintf(stderr, "The page is not built, so there is no compare.html (npm ci && npm run build in web/).\n");
+      }
+    } catch (...) {  // e.g. a full disk: files that do not belong together are none
+      std::error_code ignored;
+      for (const char* name : {"compare.txt", "compare.csv", "compare.json", "compare.html"})
+        if (std::filesystem::is_regular_file(in(name), ignored)) std::filesystem::remove(in(name), ignored);
+      throw;
     }
     std::FILE* out = a.json ? stderr : stdout;
     if (!a.json) std::fprintf(out, "%s\n", text.c_str());

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/rotation_fit.h"
 #include "base/unit.h"
+#include "record/csv_text.h"
 
 namespace topple::record {
 
@@ -82,7 +83,10 @@ const SeriesPair* find_series(const Comparison& c, const std::string& id) {
   return nullptr;
 }
 
-std::string seconds(double t) { return std::isfinite(t) ? fmt::format("{:.2f} s", t) : "never"; }
+/// When something happened; of a record that ends without it, up to when it did not.
+std::string seconds(double t, double end) {
+  return std::isfinite(t) ? fmt::format("{:.2f} s", t) : fmt::format("not up to {:.2f} s", end);
+}
 
 json number(double v) { return std::isfinite(v) ? json(v) : json(nullptr); }
 
@@ -182,15 +186,17 @@ Comparison compare(const Record& a, const Record& b) {
   });
   c.touchdown_a = value_of(a, "touchdown.first");
   c.touchdown_b = value_of(b, "touchdown.first");
+  c.end_a = a.time.back(), c.end_b = b.time.back();
   c.until = std::fmin(c.time.back(), std::fmin(c.touchdown_a, c.touchdown_b));
-  c.tilt_share = kNone;
+  c.tilt_share = c.tilt_difference = c.tilt_time = kNone;
   const SeriesPair* tilt = find_series(c, "tilt_angle");
   double scale = 0;
   for (size_t i = 0; i < c.time.size() && c.time[i] <= c.until; ++i) {
     c.centre_difference = std::max(c.centre_difference, c.centre[i]);
     if (!tilt) continue;
     const double d = std::abs(tilt->a[i] - tilt->b[i]);
-    if (d > c.tilt_difference) c.tilt_difference = d, c.tilt_time = c.time[i];
+    if (!std::isfinite(d)) continue;
+    if (!(d <= c.tilt_difference)) c.tilt_difference = d, c.tilt_time = c.time[i];
     scale = std::max(std::abs(tilt->a[i]), std::abs(tilt->b[i]));
   }
   if (scale > 1e-4) c.tilt_share = c.tilt_difference / scale;
@@ -199,15 +205,18 @@ Comparison compare(const Record& a, const Record& b) {
 
 std::vector<std::string> summarise(const Comparison& c) {
   std::vector<std::string> out = {
-      fmt::format("First touchdown of the upper block: A {}, B {}{}.", seconds(c.touchdown_a), seconds(c.touchdown_b),
+      fmt::format("First touchdown of the upper block: A {}, B {}{}.", seconds(c.touchdown_a, c.end_a),
+                  seconds(c.touchdown_b, c.end_b),
                   std::isfinite(c.touchdown_a) && std::isfinite(c.touchdown_b)
                       ? fmt::format(", difference {:+.3f} s", c.touchdown_b - c.touchdown_a)
                       : std::string()),
-      fmt::format("Tilt up to {:.2f} s: largest difference {:.2f} deg at {:.2f} s{}.", c.until,
-                  c.tilt_difference / unit::deg, c.tilt_time,
-                  std::isfinite(c.tilt_share)
-                      ? fmt::format(", {:.0f} % of the larger tilt at the end of this time", 100 * c.tilt_share)
-                      : std::string()),
+      std::isfinite(c.tilt_difference)
+          ? fmt::format("Tilt up to {:.2f} s: largest difference {:.2f} deg at {:.2f} s{}.", c.until,
+                        c.tilt_difference / unit::deg, c.tilt_time,
+                        std::isfinite(c.tilt_share)
+                            ? fmt::format(", {:.0f} % of the larger tilt at the end of this time", 100 * c.tilt_share)
+                            : std::string())
+          : fmt::format("Tilt up to {:.2f} s: not known of both.", c.until),
       fmt::format("Mass centres up to then: at most {:.2f} m apart.", c.centre_difference)};
   // the tilt of a record is that of what hangs together there
   if (const SeriesPair* lean = find_series(c, kLean))
@@ -243,21 +252,22 @@ std::string describe(const Comparison& c, const Record& a, const Record& b) {
   }
   if (!c.touchdowns.empty()) line(fmt::format("\nTouchdowns, the first of {}:", c.touchdowns.size()));
   for (size_t i = 0; i < std::min<size_t>(10, c.touchdowns.size()); ++i)
-    line(fmt::format("  {:24} A {:>8}  B {:>8}", c.touchdowns[i].body, seconds(c.touchdowns[i].a),
-                     seconds(c.touchdowns[i].b)));
+    line(fmt::format("  {:24} A {:>8}  B {:>8}", c.touchdowns[i].body, seconds(c.touchdowns[i].a, c.end_a),
+                     seconds(c.touchdowns[i].b, c.end_b)));
   return out;
 }
 
 std::string to_csv(const Comparison& c, const Record& a) {
   std::string out = "time [s]";
-  for (const SeriesPair& s : c.series) out += fmt::format(",{0} A [{1}],{0} B [{1}],{0} B - A [{1}]", s.id, s.unit);
+  for (const SeriesPair& s : c.series)
+    for (const char* of : {"A", "B", "B - A"}) out += "," + quote_csv(fmt::format("{} {} [{}]", s.id, of, s.unit));
   out += ",distance rms [m],distance largest [m],farthest,distance of mass centres [m]\r\n";
   const auto field = [](double v) { return std::isfinite(v) ? fmt::format(",{}", v) : std::string(","); };
   for (size_t i = 0; i < c.time.size(); ++i) {
     out += fmt::format("{}", c.time[i]);
     for (const SeriesPair& s : c.series) out += field(s.a[i]) + field(s.b[i]) + field(s.b[i] - s.a[i]);
     out += field(c.rms[i]) + field(c.largest[i]);
-    out += "," + (c.farthest[i] < 0 ? std::string() : a.bodies[static_cast<size_t>(c.farthest[i])].name);
+    out += "," + (c.farthest[i] < 0 ? std::string() : quote_csv(a.bodies[static_cast<size_t>(c.farthest[i])].name));
     out += field(c.centre[i]) + "\r\n";
   }
   return out;
@@ -271,6 +281,7 @@ std::string to_json(const Comparison& c, const Record& a) {
   j["points"] = c.points;
   j["matched"] = c.matched;
   j["touchdown"] = {number(c.touchdown_a), number(c.touchdown_b)};
+  j["end"] = {number(c.end_a), number(c.end_b)};
   j["until"] = number(c.until);
   j["tilt_difference"] = number(c.tilt_difference);
   j["tilt_time"] = number(c.tilt_time);

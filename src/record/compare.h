@@ -14,7 +14,7 @@ struct SeriesPair {
   std::vector<double> a, b;  // (T)
 };
 
-/// When a body first touches the ground; NaN: never.
+/// When a body first touches the ground; NaN: not up to the end of the record.
 struct TouchdownPair {
   std::string body;
   double a = 0, b = 0;  // [s]
@@ -34,9 +34,10 @@ struct Comparison {
   std::vector<TouchdownPair> touchdowns;  // bodies that touch the ground in either, in the order of time
   // up to the earlier first touchdown of the upper block, or the end of the common time
   double touchdown_a = 0, touchdown_b = 0;  // NaN: none [s]
+  double end_a = 0, end_b = 0;              // of the records [s]
   double until = 0;                         // [s]
-  double tilt_difference = 0;               // largest |a - b| [rad]
-  double tilt_time = 0;                     // when [s]
+  double tilt_difference = 0;               // largest |a - b| [rad]; NaN: not known of both
+  double tilt_time = 0;                     // when [s]; NaN likewise
   double tilt_share = 0;                    // over the larger of both tilts at `until`; NaN: nothing tilts
   double centre_difference = 0;             // largest distance of mass centres [m]
 };

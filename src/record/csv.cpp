@@ -8,15 +8,13 @@
 #include <string_view>
 
 #include "base/file.h"
+#include "record/csv_text.h"
 #include "record/export.h"
 #include "record/record.h"
 
 namespace topple::record {
 
-namespace {
-
-/// A text as RFC 4180 asks for it: in quotes if it needs them, quotes inside doubled.
-std::string quoted(std::string_view text) {
+std::string quote_csv(std::string_view text) {
   if (text.find_first_of("\",\r\n") == std::string_view::npos) return std::string(text);
   std::string out = "\"";
   for (const char c : text) {
@@ -25,6 +23,8 @@ std::string quoted(std::string_view text) {
   }
   return out + '"';
 }
+
+namespace {
 
 /// The shortest digits that give the same number back; not a number is an empty field.
 template <class Number>
@@ -39,7 +39,7 @@ std::string with_unit(const std::string& name, const std::string& unit) {
 /// Lines of fields, ended as RFC 4180 asks.
 class Table {
  public:
-  Table& text(std::string_view value) { return field(quoted(value)); }
+  Table& text(std::string_view value) { return field(quote_csv(value)); }
   template <class Number>
   Table& number(Number value) {
     return field(digits(value));

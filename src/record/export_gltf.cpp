@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -71,6 +72,8 @@ class Document {
     root["buffers"] = json::array({{{"byteLength", bytes_.size()}}});
     std::string text = root.dump(-1, ' ', false, json::error_handler_t::replace);
     while (text.size() % 4 != 0) text += ' ';
+    if (12 + 8 + text.size() + 8 + bytes_.size() > std::numeric_limits<std::uint32_t>::max())
+      throw std::runtime_error("a file of glTF holds 4 GB at most; export fewer frames (--frame-rate)");
     std::vector<std::uint8_t> out;
     const auto word = [&out](std::size_t value) { append_little_endian(out, static_cast<std::uint32_t>(value)); };
     word(kMagic), word(2), word(12 + 8 + text.size() + 8 + bytes_.size());

@@ -196,23 +196,28 @@ std::vector<std::string> export_vtk(const Record& r, const std::string& folder,
     paths.push_back((where / "vtk" / name).string());
     replace_file(paths.back(), text);
   };
-  put("site.vtu", make_site(r));
-  for (std::size_t s = 0; s < r.time.size(); ++s) {
-    if (is_cancelled && is_cancelled()) {
-      remove_earlier(where);
-      return {};
+  try {
+    put("site.vtu", make_site(r));
+    for (std::size_t s = 0; s < r.time.size(); ++s) {
+      if (is_cancelled && is_cancelled()) {
+        remove_earlier(where);
+        return {};
+      }
+      const std::string parts = fmt::format("parts_{:05}.vtu", s), zones = fmt::format("zones_{:05}.vtu", s);
+      put(parts, make_parts(r, s));
+      put(zones, make_zones(r, s));
+      for (int part = 0; const std::string& name : {parts, zones, std::string("site.vtu")})
+        list +=
+            fmt::format("<DataSet timestep=\"{}\" group=\"\" part=\"{}\" file=\"vtk/{}\"/>\n", r.time[s], part++, name);
     }
-    const std::string parts = fmt::format("parts_{:05}.vtu", s), zones = fmt::format("zones_{:05}.vtu", s);
-    put(parts, make_parts(r, s));
-    put(zones, make_zones(r, s));
-    for (int part = 0; const std::string& name : {parts, zones, std::string("site.vtu")})
-      list +=
-          fmt::format("<DataSet timestep=\"{}\" group=\"\" part=\"{}\" file=\"vtk/{}\"/>\n", r.time[s], part++, name);
+    replace_file(paths.front(),
+                 "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n"
+                 "<Collection>\n" +
+                     list + "</Collection>\n</VTKFile>\n");
+  } catch (...) {  // e.g. a full disk: half of an export is none
+    remove_earlier(where);
+    throw;
   }
-  replace_file(paths.front(),
-               "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n"
-               "<Collection>\n" +
-                   list + "</Collection>\n</VTKFile>\n");
   return paths;
 }
 

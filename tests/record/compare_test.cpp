@@ -96,6 +96,30 @@ TEST(Compare, JudgesTheTiltUpToTheEarlierTouchdown) {
   EXPECT_THAT(describe(c, a, b), HasSubstr("A 1.50 s, B 1.75 s, difference +0.250 s"));
 }
 
+TEST(Compare, OfARecordThatEndsEarlierSaysUpToWhen) {
+  Record a = make_run("a", 0.25, 9, 1, 0, 1), b = make_run("b", 0.25, 3, 1, 0, 1);
+  a.findings.push_back({"touchdown.first", "", "", "", 1.5, "s", Status::Info});
+  a.events = {{1.5, "touchdown", "C-A1-0", ""}};
+  const Comparison c = compare(a, b);
+  EXPECT_THAT(describe(c, a, b), HasSubstr("of the upper block: A 1.50 s, B not up to 0.50 s."));
+  EXPECT_THAT(describe(c, a, b), HasSubstr("A   1.50 s  B not up to 0.50 s\n"));
+  EXPECT_EQ(nlohmann::json::parse(to_json(c, a))["end"], (nlohmann::json{2.0, 0.5}));
+}
+
+TEST(Compare, OfNoTiltKnowsNoDifference) {
+  Record a = make_run("a", 0.25, 5, 1, 0, 1), b = make_run("b", 0.25, 5, 1, 0, 1);
+  const auto expect_none = [&] {
+    const Comparison c = compare(a, b);
+    EXPECT_THAT(describe(c, a, b), HasSubstr("Tilt up to 1.00 s: not known of both."));
+    EXPECT_TRUE(nlohmann::json::parse(to_json(c, a))["tilt_difference"].is_null());
+    EXPECT_TRUE(nlohmann::json::parse(to_json(c, a))["tilt_time"].is_null());
+  };
+  for (double& v : b.series[0].value) v = std::nan("");
+  expect_none();
+  std::erase_if(b.series, [](const Series& s) { return s.id == "tilt_angle"; });
+  expect_none();
+}
+
 TEST(Compare, FindsTheLeanOfAllBodiesOfBoth) {
   // four bodies in a tetrahedron; those of A turn about y by 0.2 rad a second, those of B about x by half of it; all
   // fall
@@ -143,6 +167,12 @@ TEST(Compare, OfUnlikeBodiesKeepsToMassCentresAndSaysSo) {
   EXPECT_THAT(c.points, HasSubstr("no body in common"));
   EXPECT_TRUE(std::isnan(c.rms[0]));
   EXPECT_NEAR(c.centre[2], 2, 4 * kSingle);
+}
+
+TEST(Compare, QuotesNamesInItsTable) {
+  Record a = make_run("a", 0.25, 3, 1, 0, 1), b = make_run("b", 0.25, 3, 1, 0.5, 1);
+  for (Record* r : {&a, &b}) r->bodies[0].name = "C, \"1\"";
+  EXPECT_THAT(to_csv(compare(a, b), a), HasSubstr(",\"C, \"\"1\"\"\",0.5\r\n"));
 }
 
 TEST(Compare, WritesTablesThatHoldTheNumbers) {

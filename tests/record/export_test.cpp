@@ -1,10 +1,12 @@
 #include "record/export.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -169,6 +171,24 @@ TEST(ExportVtk, LeavesNoFramesOfAnEarlierExport) {
   EXPECT_EQ(asked, 3);
   EXPECT_FALSE(fs::exists(folder.path() / "record.pvd"));
   EXPECT_EQ(std::distance(fs::directory_iterator(last.parent_path()), {}), 1) << "but the file of another";
+}
+
+TEST(ExportVtk, LeavesNothingOnAFullDisk) {
+  const OwnFolder folder;
+  Record r = make_sample();
+  export_vtk(r, folder.str());
+  const auto size = std::filesystem::file_size(folder / "vtk/site.vtu"),
+             parts = std::filesystem::file_size(folder / "vtk/parts_00000.vtu");
+  ASSERT_GT(parts, size + 1);
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit small{size, before.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &small);
+  EXPECT_THROW(export_vtk(r, folder.str()), std::runtime_error);
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 0);
 }
 
 TEST(ExportGltf, HasANodeForBodiesWithoutBoxes) {

@@ -136,14 +136,14 @@ function Photos(props: { state: State; photos: Photo[] }) {
 }
 
 const degrees = (angle: number | null): string => (angle === null ? "–" : `${((angle * 180) / Math.PI).toFixed(2)}°`);
-const instant = (t: number | null): string => (t === null ? "never" : formatTime(t));
+const instant = (t: number | null, end?: number | null): string => (t !== null ? formatTime(t) : end === undefined || end === null ? "never" : `not up to ${formatTime(end)}`);
 
 function Summary(props: { comparison: Comparison }) {
   const { comparison: c } = props;
   const [a, b] = c.touchdown;
   const rows: [string, string][] = [
-    ["First touchdown of the upper block", `A ${instant(a)}, B ${instant(b)}${a === null || b === null ? "" : `, difference ${(b - a).toFixed(3)} s`}`],
-    ["Largest difference of the tilt until then", `${degrees(c.tilt_difference)} at ${formatTime(c.tilt_time ?? 0)}${c.tilt_share === null ? "" : `, ${(100 * c.tilt_share).toFixed(0)} % of the larger tilt at the end of this time`}`],
+    ["First touchdown of the upper block", `A ${instant(a, c.end?.[0])}, B ${instant(b, c.end?.[1])}${a === null || b === null ? "" : `, difference ${(b - a).toFixed(3)} s`}`],
+    ["Largest difference of the tilt until then", c.tilt_difference === null ? "not known of both" : `${degrees(c.tilt_difference)} at ${formatTime(c.tilt_time ?? 0)}${c.tilt_share === null ? "" : `, ${(100 * c.tilt_share).toFixed(0)} % of the larger tilt at the end of this time`}`],
     ["Mass centres until then", c.centre_difference === null ? "–" : `at most ${c.centre_difference.toFixed(2)} m apart`],
     ["Compared", c.points],
   ];

@@ -17,6 +17,7 @@ export interface Comparison {
   matched: number;
   touchdown: [number | null, number | null]; // [s]
   until: number | null;
+  end?: [number | null, number | null]; // of the records [s]
   tilt_difference: number | null; // [rad]
   tilt_time: number | null;
   tilt_share: number | null;

@@ -207,8 +207,10 @@ describe("the German table", () => {
     assert.match(translate("It topples: when the upper block first touches the ground, at 1.23 s, it leans by 15.7 deg, its mass centre has come down by 1.47 m, and its rear edge 2 % as far as its front edge. In the end 100 % of the mass has come down. Parts were still moving when the run ended."),
       /^Es kippt: Wenn der obere Block zuerst den Boden berührt, bei 1,23 s, neigt er sich .* herunter\w+\. Als die Rechnung endete/);
     assert.equal(translate("Nobody ever says this."), undefined);
-    assert.equal(translate("First touchdown of the upper block: A 4.80 s, B never."), "Erstes Aufsetzen des oberen Blocks: A 4,80 s, B nie.");
-    assert.equal(translate("First touchdown of the upper block: A never, B never."), "Erstes Aufsetzen des oberen Blocks: A nie, B nie.");
+    assert.equal(translate("First touchdown of the upper block: A 4.80 s, B not up to 0.50 s."), "Erstes Aufsetzen des oberen Blocks: A 4,80 s, B nicht bis 0,50 s.");
+    assert.equal(translate("native (second)"), "native (zweite)");
+    assert.equal(translate("finite elements (second)"), "finiten Elementen (zweite)");
+    assert.equal(translate("First touchdown of the upper block: A not up to 0.50 s, B not up to 1.00 s."), "Erstes Aufsetzen des oberen Blocks: A nicht bis 0,50 s, B nicht bis 1,00 s.");
     assert.equal(translate("First touchdown of the upper block: A 4.80 s, B 4.85 s, difference +0.050 s."), "Erstes Aufsetzen des oberen Blocks: A 4,80 s, B 4,85 s, Unterschied +0,050 s.");
     assert.equal(translate("Hall: parts come 5.6 m farther than in this run; the limit of 4.0 m is then broken."), "Hall: Teile kommen 5,6 m weiter als in dieser Rechnung; der Grenzwert von 4,0 m ist dann unterschritten.");
     assert.equal(translate("The nearest part, C-A1-0, comes to 9.6 m at 4.10 s; the limit is 4.0 m."), "Das nächste Teil, C-A1-0, kommt bei 4,10 s auf 9,6 m heran; der Grenzwert ist 4,0 m.");
