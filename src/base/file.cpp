@@ -87,7 +87,7 @@ int write_whole(Descriptor& file, std::string_view bytes) {
 /// What a link stands for, whether that is there or not; a link still if there is no end to it.
 std::filesystem::path resolve_links(std::filesystem::path path) {
   std::error_code error;
-  if (const std::filesystem::path whole = std::filesystem::canonical(path, error); !error) return whole;
+  if (std::filesystem::path whole = std::filesystem::canonical(path, error); !error) return whole;
   constexpr int most = 40;  // as the system does
   for (int i = 0; i < most && std::filesystem::is_symlink(path, error); ++i) {
     const std::filesystem::path next = std::filesystem::read_symlink(path, error);

@@ -360,6 +360,19 @@ describe("unusual reports", () => {
     await browser.close();
   });
 
+  it("keeps long names without blanks within a narrow page", async () => {
+    const data = makeSynthetic(3), long = "Haus".repeat(40);
+    data.provenance.title = long;
+    data.neighbours[0].name = long;
+    for (const f of data.findings) f.title = long;
+    data.plan_values.push({ group: "Sections", key: long, value: long }, { group: long, key: "Height", value: "1 m" });
+    const browser = await open("long", data, { viewport: { width: 400, height: 900 } });
+    const { page } = browser;
+    const wide = await page.evaluate(() => [document.documentElement.scrollWidth, [...document.querySelectorAll("body *")].filter((e) => !e.closest("svg, .scroller") && e.getBoundingClientRect().right > 400.5).map((e) => `${e.tagName}.${e.className}`).slice(0, 9)]);
+    assert.ok(wide[0] <= 400, String(wide));
+    await browser.close();
+  });
+
   it("plays in still pictures where reduced motion is asked for", async () => {
     const browser = await open("reduced", makeSynthetic(50), { reducedMotion: "reduce" });
     const { page } = browser;
