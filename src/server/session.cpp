@@ -328,6 +328,7 @@ void Session::publish_zones() {
   const Branch& b = steering_->steering().active();
   for (const auto& c : watchers()) {
     if (c->zone < 0 || c->zone_branch != b.id || c->zone_frame >= b.frames()) continue;
+    if (!c->outlet()) continue;  // it may come back, and hears then what it missed
     Json points = Json::array();
     const auto zone = static_cast<std::size_t>(c->zone.load());
     for (std::size_t f = c->zone_frame; f < b.frames(); ++f) {

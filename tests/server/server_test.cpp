@@ -5,8 +5,10 @@
 
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "../collapse/plans.h"
 #include "../product/plan_text.h"
@@ -68,7 +70,7 @@ class ServerTest : public ::testing::Test {
     o.session.steering.run.program_version = "test";
     o.session.folder = (folder_ / "out").string();
     o.plans = (folder_ / "plans").string();
-    o.page = "<!doctype html><title>steer</title>";
+    o.page = page_;
     o.report = "<html><!--TOPPLE-DATA--></html>";
     o.demo = {"A house", "", one_stage("0.3 s")};
     o.study = "<title>study</title><!--TOPPLE-DATA-->";
@@ -90,7 +92,7 @@ class ServerTest : public ::testing::Test {
   }
 
   fs::path folder_;
-  std::string plan_path_;
+  std::string plan_path_, page_ = "<!doctype html><title>steer</title>";
   std::unique_ptr<Hub> hub_;
   std::unique_ptr<Server> server_;
   TestJson hello_;
@@ -476,6 +478,30 @@ TEST_F(ServerTest, TellsAZonesPath) {
     points += e["points"].size();
   }
   EXPECT_EQ(c->code("zone", {{"zone", "none"}}), "E920");
+}
+
+TEST_F(ServerTest, AZonesPathWaitsForWhoComesBack) {
+  start(one_stage("0.4 s"));
+  auto c = watcher();
+  const std::string resume = hello_["resume"], zone = hello_["scene"]["zones"][0]["name"];
+  c->result("zone", {{"zone", zone}});
+  const TestJson first = c->wait_for_type("zone");
+  const long seq = c->last_seq;
+  c->close();
+  const auto other = watcher();
+  other->result("run");
+  other->wait_for_phase("finished");
+  const std::size_t frames = other->result("series", {{"branch", 1}, {"from", 0}})["time"].size();
+  TestClient back(port());
+  ASSERT_TRUE(back.upgrade(server_->token(), "?resume=" + resume + "&seq=" + std::to_string(seq)));
+  ASSERT_TRUE(back.wait_for_type("resumed").is_object());
+  std::size_t points = first["points"].size();
+  while (points < frames) {
+    const TestJson e = back.wait_for_type("zone");
+    ASSERT_TRUE(e.is_object()) << points << " of " << frames;
+    points += e["points"].size();
+  }
+  EXPECT_EQ(points, frames);
 }
 
 TEST_F(ServerTest, AnswersMessagesThatAreWrong) {

@@ -27,6 +27,12 @@ export interface Notice {
   help?: string;
 }
 
+/// Points of a zone behind those before them; what is told twice stands once.
+export const joinPath = (path: (number | null)[][], points: (number | null)[][]): (number | null)[][] => {
+  const first = points[0]?.[0];
+  return first === undefined || first === null ? path : [...path.filter((p) => (p[0] ?? 0) < first), ...points];
+};
+
 export function makeSteerState(address: string) {
   const look = makeLook();
   const session = signal<Session | null>(null);
@@ -164,6 +170,7 @@ export function makeSteerState(address: string) {
           break;
         case "resumed":
           notify("good", "The connection is back. The run went on meanwhile.");
+          catchUp();
           break;
         case "state": {
           const next = message as unknown as StateEvent;
@@ -190,7 +197,7 @@ export function makeSteerState(address: string) {
           break;
         case "zone":
           if (zone.value !== null && zone.value.zone === message["zone"])
-            zone.value = { ...zone.value, path: [...zone.value.path, ...(message["points"] as number[][])] };
+            zone.value = { ...zone.value, path: joinPath(zone.value.path, message["points"] as number[][]) };
           break;
         case "study":
           putStudy(message["study"] as Study, (message["samples"] ?? []) as Sample[]);
@@ -208,6 +215,20 @@ export function makeSteerState(address: string) {
           break;
       }
     });
+  }
+
+  /// What is told without a number is not told again: asked for once more.
+  function catchUp(): void {
+    ask<{ studies: Study[] }>("study.list").then((r) => r?.studies.forEach((s) => putStudy(s, [])));
+    if (watchedStudy.value !== 0) void watchStudy(watchedStudy.value);
+    if (zone.value !== null) void watchZone(zone.value.zone);
+  }
+
+  async function watchStudy(id: number): Promise<void> {
+    if (watchedStudy.value !== 0 && watchedStudy.value !== id) void ask("study.unwatch", { study: watchedStudy.value });
+    watchedStudy.value = id;
+    const result = await ask<{ study: Study; samples: Sample[] }>("study.watch", { study: id });
+    if (result !== undefined) putStudy(result.study, result.samples);
   }
 
   function leave(): void {
@@ -647,12 +668,7 @@ export function makeSteerState(address: string) {
         queueMicrotask(() => stop());
       });
     },
-    async watchStudy(id: number): Promise<void> {
-      if (watchedStudy.value !== 0 && watchedStudy.value !== id) void ask("study.unwatch", { study: watchedStudy.value });
-      watchedStudy.value = id;
-      const result = await ask<{ study: Study; samples: Sample[] }>("study.watch", { study: id });
-      if (result !== undefined) putStudy(result.study, result.samples);
-    },
+    watchStudy,
     complain,
     readPlan,
     savePlan,

@@ -414,7 +414,13 @@ describe("steering page", () => {
     await d.click("study-start");
     await page.waitForFunction(() => parseInt(document.querySelector("[data-test=study-state]")?.textContent.split(", ")[1] ?? "0") >= 5);
     const early = await page.getAttribute(".membership svg", "aria-label");
+    // it ends while the connection is away
+    server.refuse = true;
+    server.cut();
+    await d.until("banner", "No connection");
     server.studyBarrier = Infinity;
+    while (server.sessions[0].studies.some((s) => s.state === "running")) await new Promise((resolve) => setTimeout(resolve, 50));
+    server.refuse = false;
     await d.until("study-state", "finished, 40 of 40");
     assert.notEqual(await page.getAttribute(".membership svg", "aria-label"), early, "the membership did not grow");
     assert.ok((await page.locator(".fan polygon").count()) === 3);
