@@ -14,6 +14,7 @@
 #include "product/document.h"
 #include "product/import.h"
 #include "product/templates.h"
+#include "record/hdf5.h"
 #include "record/page.h"
 #include "server/server.h"
 
@@ -524,11 +525,23 @@ void Hub::start_study(const std::shared_ptr<Client>& client, std::int64_t id, co
         std::vector<Diagnostic> warnings;
         const product::Plan plan = product::read_plan(text, path, warnings);
         int number = 0;
+        std::shared_ptr<StudyTask> ended;  // let go without the lock: it waits for its thread
         {
           const std::lock_guard lock(mutex_);
-          if (studies_.size() >= kMostStudies) throw InputError("E905", "too many studies are open");
+          if (studies_.size() >= kMostStudies) {
+            const auto oldest = std::find_if(studies_.begin(), studies_.end(), [](const auto& one) {
+              return one.second->describe()["state"] != "running";
+            });
+            if (oldest == studies_.end())
+              throw InputError("E905", fmt::format("{} studies are running", kMostStudies),
+                               "cancel one, or wait until one has ended");
+            ended = std::move(oldest->second);
+            study_watchers_.erase(oldest->first);
+            studies_.erase(oldest);
+          }
           number = ++last_study_;
         }
+        ended.reset();
         // the same plan, limit and seed go on where they were
         setting.folder = (fs::path(options_.session.folder) /
                           ("study-" + calc_sha256(text + std::to_string(setting.seed)).substr(0, 12)))
@@ -578,14 +591,7 @@ Reply Hub::write_record(const JudgedBranch& judged, const std::string& what) con
     return {200, "text/html; charset=utf-8", record::make_page(record::to_report_json(r), options_.report),
             "report.html"};
   if (what == "findings") return {200, "application/json", dump(describe_findings(judged)), ""};
-  std::string name = (fs::temp_directory_path() / "topple-record-XXXXXX").string();
-  const int file = mkstemp(name.data());
-  if (file < 0) throw std::runtime_error("no temporary file can be made");
-  ::close(file);
-  record::write_hdf5(r, name);
-  std::string bytes = read_file(name);
-  fs::remove(name);
-  return {200, "application/x-hdf5", std::move(bytes), "record.h5"};
+  return {200, "application/x-hdf5", record::to_hdf5(r), "record.h5"};
 }
 
 void Hub::get(const std::string& path, std::function<void(Reply)> answer) {

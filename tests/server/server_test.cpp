@@ -359,7 +359,12 @@ TEST_F(ServerTest, SteersAPlanToItsEnd) {
   EXPECT_EQ(
       http.get(at("/api/sessions/1/branches/2/report.html")).body.rfind("<html><script type=\"application/json\"", 0),
       0U);
+  // it goes through no other file
+  const char* const folder = std::getenv("TMPDIR");
+  const std::string before = folder == nullptr ? "/tmp" : folder;
+  setenv("TMPDIR", (folder_ / "none").c_str(), 1);
   EXPECT_EQ(http.get(at("/api/sessions/1/branches/2/record.h5")).body.substr(1, 3), "HDF");
+  setenv("TMPDIR", before.c_str(), 1);
   EXPECT_EQ(http.get(at("/api/sessions/1/branches/7/findings")).status, 404);
   const TestJson series = c->result("series", {{"branch", 2}, {"from", 3}});
   EXPECT_EQ(series["time"].size(), record["time"].size() - 3);
@@ -871,6 +876,23 @@ TEST_F(ServerTest, AStudyGrowsAndASampleIsPlayed) {
   EXPECT_NE(page.head.find("text/html"), std::string::npos);
   EXPECT_EQ(page.body.rfind("<title>study</title><script type=\"application/json\"", 0), 0U) << page.body.substr(0, 99);
   EXPECT_NE(page.body.find("membership"), std::string::npos);
+}
+
+TEST_F(ServerTest, StudiesThatHaveEndedGiveWay) {
+  start(product::small_plan() + study::strengths);
+  const auto c = watcher();
+  for (int k = 1; k <= 18; ++k) {
+    const TestJson started = c->result("study.start", {{"samples", 2}, {"seed", k}});
+    ASSERT_EQ(started["study"], k) << started;
+    c->result("study.cancel", {{"study", k}});
+    c->wait_for([&](const TestJson& j) {
+      return j["type"] == "study" && j["study"]["id"] == k && j["study"]["state"] != "running";
+    });
+  }
+  const TestJson list = c->result("study.list")["studies"];
+  ASSERT_EQ(list.size(), 16U);
+  EXPECT_EQ(list.front()["id"], 3);
+  EXPECT_EQ(c->code("study.watch", {{"study", 1}}), "E920");
 }
 
 TEST_F(ServerTest, AStudyTakesTheEditsOfTheBranch) {
