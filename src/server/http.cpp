@@ -34,7 +34,6 @@ namespace {
 constexpr std::size_t kMostHeader = 8192, kMostMessage = std::size_t{2} << 20;
 constexpr int kMostWaiting = 256;  // commands of a connection that are not answered
 constexpr int kMostFrames = 4;     // live frames that wait to be sent
-constexpr double kLongest = 30;    // a reply may take to be taken [s]
 
 std::chrono::milliseconds milliseconds(double seconds) {
   return std::chrono::milliseconds(static_cast<long>(1000 * seconds));
@@ -351,8 +350,15 @@ class Connection : public std::enable_shared_from_this<Connection> {
 
   void write(Response out) {
     response_.emplace(std::move(out));
-    stream_.expires_after(milliseconds(kLongest));
-    http::async_write(stream_, *response_, [self = shared_from_this()](beast::error_code e, std::size_t) {
+    serializer_.emplace(*response_);
+    write_some();
+  }
+
+  /// As much as the connection takes; a reply may last as long as it gets on.
+  void write_some() {
+    stream_.expires_after(milliseconds(context_->options.standstill));
+    http::async_write_some(stream_, *serializer_, [self = shared_from_this()](beast::error_code e, std::size_t) {
+      if (!e && !self->serializer_->is_done()) return self->write_some();
       if (e || !self->response_->keep_alive()) return self->finish();
       self->read();
     });
@@ -370,6 +376,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   std::optional<http::request_parser<http::empty_body>> parser_;
   Request request_;
   std::optional<Response> response_;
+  std::optional<http::response_serializer<http::string_body>> serializer_;  // of the response
   bool is_too_many_ = false, has_moved_ = false;
 };
 

@@ -15,6 +15,7 @@ struct ServerOptions {
   std::string token;       // empty: a random one
   std::size_t most_connections = 64;
   double request_timeout = 10;                      // for a whole header [s]
+  double standstill = 30;                           // of a reply that nobody takes [s]
   double silence = 45;                              // a WebSocket without a sign of life is closed [s]
   double ping = 15;                                 // [s]
   std::size_t most_unsent = std::size_t{64} << 20;  // of one connection [bytes]

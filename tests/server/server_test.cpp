@@ -509,6 +509,23 @@ TEST_F(ServerTest, AZonesPathWaitsForWhoComesBack) {
   EXPECT_EQ(points, frames);
 }
 
+TEST_F(ServerTest, AReplyLastsAsLongAsItGetsOn) {
+  page_ = std::string(std::size_t{24} << 20, 'x');
+  ServerOptions serving;
+  serving.standstill = 0.5;
+  start(one_stage("0.3 s"), serving);
+  TestClient slow(port());
+  slow.read_slowly(std::chrono::milliseconds(5));  // 64 kB each: 24 MB take 2 s
+  const HttpAnswer all = slow.get(at("/"));
+  EXPECT_EQ(all.status, 200);
+  EXPECT_EQ(all.body.size(), page_.size());
+  TestClient stuck(port());
+  stuck.read_slowly(std::chrono::milliseconds(5));
+  stuck.send_raw("GET " + at("/") + " HTTP/1.1\r\nHost: " + stuck.host() + "\r\n\r\n");
+  std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+  EXPECT_EQ(stuck.read_answer().status, 0) << "who takes nothing is let go";
+}
+
 TEST_F(ServerTest, AnswersMessagesThatAreWrong) {
   start(two_stages());
   const auto c = watcher();

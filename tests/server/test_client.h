@@ -15,6 +15,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 namespace topple::server {
@@ -43,6 +44,13 @@ class TestClient {
   void close() {
     if (socket_ >= 0) ::close(socket_);
     socket_ = -1;
+  }
+
+  /// From here on waits before it reads, and the system takes little for it meanwhile.
+  void read_slowly(std::chrono::milliseconds pause) {
+    const int size = 65536;
+    setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &size, sizeof size);
+    pause_ = pause;
   }
 
   /// False if the other side takes nothing any more.
@@ -221,6 +229,7 @@ class TestClient {
     if (socket_ < 0) return false;
     pollfd p{socket_, POLLIN, 0};
     if (poll(&p, 1, 60000) <= 0) return false;
+    if (pause_.count() > 0) std::this_thread::sleep_for(pause_);
     char buffer[65536];
     const ssize_t n = recv(socket_, buffer, sizeof buffer, 0);
     if (n <= 0) return false;
@@ -230,6 +239,7 @@ class TestClient {
 
   std::uint16_t port_;
   int socket_ = -1, last_id_ = 0;
+  std::chrono::milliseconds pause_{0};  // before each reading
   std::string input_;
   std::size_t at_ = 0;
   std::chrono::steady_clock::time_point heard_ = std::chrono::steady_clock::now();  // but for pings
