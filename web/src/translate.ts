@@ -1,7 +1,8 @@
 /// The page in the reader's language. English is what the sources and the record say; for German a table (words_de.ts)
 /// holds each text beside its translation. A text may hold places in the manner of the program's own format strings:
 /// `{}` a name or the like, within a sentence, in quotes whatever stands between them; `{w}` the same without commas, `{n}`
-/// without spaces too; `{a}` anything, which stays as it is; `{*}` sentences of this table; `{:.1f}`, `{:g}` a number. The texts of the record are made of such sentences, so that pages can be
+/// without spaces too; `{a}` anything, which stays as it is; `{v}` a
+/// name with a number behind it, `{l}` several; `{*}` sentences of this table; `{:.1f}`, `{:g}` a number. The texts of the record are made of such sentences, so that pages can be
 /// made from any record, also from an old one (docs/decisions/0054-german-pages.md).
 import { Fragment, options, type VNode } from "preact";
 import { german } from "./words_de";
@@ -16,6 +17,7 @@ interface Sentence {
   isNumber: boolean[]; // of each place
   isKnown: boolean[]; // of each place: in the table itself
   isKept: boolean[]; // of each place: stays as it is
+  isList: boolean[]; // of each place: names with numbers
   german: string;
   weight: number; // letters that are fixed
 }
@@ -24,10 +26,11 @@ const number = "[-−]?(?:\\d[\\d\\u202f]*(?:\\.\\d+)?(?:e[+-]?\\d+| ?[×·] ?10
 const escape = (text: string): string => text.replace(/[.*+?^${}()|[\]\\]/g, "\\$&");
 
 function makeSentence([english, translated]: readonly [string, string]): Sentence {
-  const pieces = english.split(/(\{(?:\*|a|w|n|:[^}]*)?\})/);
+  const pieces = english.split(/(\{(?:\*|a|l|v|w|n|:[^}]*)?\})/);
   const isNumber: boolean[] = [];
   const isKnown: boolean[] = [];
   const isKept: boolean[] = [];
+  const isList: boolean[] = [];
   let pattern = "", loose = "";
   let weight = 0;
   let fixed = "";
@@ -43,11 +46,12 @@ function makeSentence([english, translated]: readonly [string, string]): Sentenc
     isNumber.push(/:.*[fgde]\}$/.test(piece));
     const isQuoted = pieces[i - 1]?.endsWith('"') === true && pieces[i + 1]?.startsWith('"') === true;
     isKept.push(piece === "{a}");
-    const any = piece === "{*}" || piece === "{a}" || (isQuoted && piece === "{}") ? ".+?" : piece === "{w}" ? "[^,;]+?" : piece === "{n}" ? "[^\\s,;:]+" : "(?:(?![;.] ).)+?";
+    isList.push(piece === "{l}" || piece === "{v}");
+    const any = piece === "{*}" || piece === "{a}" || (isQuoted && piece === "{}") ? ".+?" : piece === "{w}" || piece === "{v}" ? "[^,;]+?" : piece === "{n}" ? "[^\\s,;:]+" : "(?:(?![;.] ).)+?";
     pattern += `(${isNumber[isNumber.length - 1] === true ? number : any})`;
     loose += `(${isNumber[isNumber.length - 1] === true ? number : piece === "{}" ? ".+?" : any})`;
   });
-  return { whole: new RegExp(`^${pattern}$`, "s"), loose: new RegExp(`^${loose}$`, "s"), fixed, isNumber, isKnown, isKept, german: translated, weight };
+  return { whole: new RegExp(`^${pattern}$`, "s"), loose: new RegExp(`^${loose}$`, "s"), fixed, isNumber, isKnown, isKept, isList, german: translated, weight };
 }
 
 const exact = new Map(german.filter(([english]) => !english.includes("{")));
@@ -81,7 +85,7 @@ function translateWhole(text: string, isLoose = false): string | undefined {
     let count = 0;
     const values = s.isNumber.map((isNumber, i) => {
       const value = found[i + 1] as string;
-      return s.isKept[i] === true ? value : isNumber ? commas(value) : translate(value.trim()) ?? commasOfMeasures(value);
+      return s.isKept[i] === true ? value : s.isList[i] === true ? value.replace(/(?<= )(-?\d+)\.(\d+(?:e[+-]?\d+)?)(?=(?: [^\s,]+)?(?:, |$))/g, "$1,$2") : isNumber ? commas(value) : translate(value.trim()) ?? commasOfMeasures(value);
     });
     return s.german.replace(/\{(\d*)\}/g, (_, index: string) => values[index === "" ? count++ : Number(index)] ?? "");
   }

@@ -190,6 +190,13 @@ describe("the German table", () => {
     }
   });
 
+  it("writes decimal commas at numbers behind names", () => {
+    assert.equal(translate("least touchdown: 0.75 s"), "kleinster Wert von touchdown: 0,75 s");
+    assert.equal(translate("largest z0: -14.64"), "größter Wert von z0: -14,64");
+    assert.equal(translate("It takes no more than x1 16.85 N/mm2 (core 25), x2 47.48 (core 64.5)."), "Dazu genügt x1 16,85 N/mm2 (Kern 25), x2 47,48 (Kern 64,5).");
+    assert.equal(translate("Lowest margins: S-B2C3-1 3.56, shaft 1.5/foot 13.57 of 75 members."), "Kleinste Reserven: S-B2C3-1 3,56, shaft 1.5/foot 13,57 (von 75 Bauteilen).");
+  });
+
   it("leaves names as people gave them", async () => {
     const name = "Haus 3.5; Hof: links. Nr. 2.5", stage = "Row 1.5; (0.5 s). B: x";
     assert.equal(translate(`stage 1 "${stage}": 2 charges`), `Zündstufe 1 „${stage}“: 2 Ladungen`);
