@@ -22,12 +22,17 @@ using json = nlohmann::ordered_json;
 /// Seven digits are enough to draw and to read.
 json number(double x) { return std::isfinite(x) ? json(std::stod(fmt::format("{:.7g}", x))) : json(nullptr); }
 
+/// Runs at places that do not count (beyond a constraint, or outside a support that was made smaller) are left out: their
+/// outcome may be none of the results'.
 std::vector<int> choose_runs(const Problem& p, const StudyResult& r, std::size_t most) {
-  const std::size_t count = r.alpha.archive.size();
+  const uncertainty::Box support = uncertainty::make_box(p.space, 0);
+  std::vector<int> all;
+  for (int i = 0; i < static_cast<int>(r.alpha.archive.size()); ++i)
+    if (uncertainty::is_in_cut(p.space, support, 0, r.alpha.archive[i].x)) all.push_back(i);
   std::set<int> chosen;
   for (const NotableRun& n : list_notable_runs(p, r)) chosen.insert(n.sample);
-  const std::size_t even = std::min(count, most);
-  for (std::size_t k = 0; k < even; ++k) chosen.insert(static_cast<int>(k * count / even));
+  const std::size_t even = std::min(all.size(), most);
+  for (std::size_t k = 0; k < even; ++k) chosen.insert(all[k * all.size() / even]);
   return {chosen.begin(), chosen.end()};
 }
 

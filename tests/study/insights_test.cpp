@@ -574,6 +574,32 @@ TEST(StudyPage, ThinsRunsAndSaysWhichAreThere) {
     EXPECT_EQ(page["run_table"][key].size(), shown.size());
 }
 
+// A class that was met beyond a constraint only, or in a support that has been made smaller, is none of the results'.
+TEST(StudyPage, LeavesRunsOutThatDoNotCount) {
+  const Folder folder;
+  Problem p = make_problem({make_triangular(0, 1, 2)}, 60);
+  StudyResult r = run(p, folder, "s", make_factories([](const Point& x) {
+                        return done({{"y", x[0]}}, x[0] > 1.5 ? "far" : "near");
+                      }));
+  const auto narrow = [&](Problem smaller) {
+    StudyResult s = r;
+    s.alpha = uncertainty::read_archive(smaller.space, r.alpha.archive, {0, 1}, {});
+    s.alpha.archive = r.alpha.archive;
+    s.possibilities = {};
+    ASSERT_EQ(s.alpha.classes.size(), 1u);
+    const json table = json::parse(to_page_json(smaller, s, {}))["run_table"];
+    std::size_t inside = 0;
+    for (const auto& one : r.alpha.archive.samples()) inside += one.x[0] <= 1.2;
+    EXPECT_EQ(table["sample"].size(), inside);
+    for (const json& outcome : table["outcome"]) EXPECT_EQ(outcome, 0);
+  };
+  Problem tied = p, small = p;
+  tied.space.constraints = {[](const Point& x) { return x[0] - 1.2; }};
+  narrow(tied);
+  small.space.inputs = {make_triangular(0, 1, 1.2)};
+  narrow(small);
+}
+
 TEST(Results, ReplaceThoseOfEarlierSettings) {
   const Folder folder;
   Problem p = make_small_problem(400);
