@@ -120,8 +120,9 @@ class PostgresqlDatabase final : public Database {
     const std::string why = trim(PQerrorMessage(db_));
     const char* found = PQresultErrorField(r, PG_DIAG_SQLSTATE);
     const std::string state = found ? found : "";
-    // 57P0x: the server stops or starts; 08: the connection
-    if (PQstatus(db_) != CONNECTION_OK || state.starts_with("57P") || state.starts_with("08"))
+    // 57P0x: the server stops or starts; 08: the connection; no code: libpq itself, which could not send and may still
+    // take the connection for whole because of what the server said before it went
+    if (PQstatus(db_) != CONNECTION_OK || state.empty() || state.starts_with("57P") || state.starts_with("08"))
       throw ConnectionLost(why);
     if (state.starts_with("40")) throw TryAgain(why);
     throw std::runtime_error("PostgreSQL: " + why);

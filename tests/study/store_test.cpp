@@ -357,6 +357,23 @@ TEST(Store, IsNotHeldUpByATransactionThatStandsStill) {
   EXPECT_FALSE(store.finish(a, "stopped", {Kind::Done, {{"z", 1}}, "", {}, "", 0}));
 }
 
+// A server that is stopped at once says so before it goes: whoever writes then has both a warning to read and a broken
+// connection.
+TEST(Store, SurvivesAServerThatIsStoppedAtOnce) {
+  const auto server = Server::make();
+  if (!server) GTEST_SKIP() << "PostgreSQL is not installed";
+  const std::string much(20000, 'x');  // sent in two pieces: the second one fails
+  for (int round = 0; round < 3; ++round) {
+    const auto db = open_database(server->url());
+    db->run("SELECT length($1)", {"little"});  // so that it is prepared
+    server->stop(SIGQUIT);
+    EXPECT_THROW(db->run("SELECT length($1)", {much}), ConnectionLost);
+    server->start();
+    db->reconnect();
+    EXPECT_EQ(db->run("SELECT length($1)", {much}).at(0).at(0), std::to_string(much.size()));
+  }
+}
+
 TEST(Store, SurvivesAServerThatIsKilled) {
   const auto server = Server::make();
   if (!server) GTEST_SKIP() << "PostgreSQL is not installed";
