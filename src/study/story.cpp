@@ -422,7 +422,7 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
     for (const std::string& what : p.not_judged) list += (list.empty() ? "" : ", ") + what;
     add("not_judged", fmt::format("Not judged here, but by topple run: {}.", list));
   }
-  if (r.alpha.failed > 0) {
+  if (const int failed = count_runs(r, failed_outcome); failed > 0) {
     const auto found = std::find_if(r.possibilities.classes.begin(), r.possibilities.classes.end(),
                                     [](const auto& c) { return c.outcome == failed_outcome; });
     const double degree = found == r.possibilities.classes.end() ? 0 : found->possibility;
@@ -430,7 +430,7 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
         fmt::format(
             "{} of {} runs failed; they are an outcome of their own, possible to at least {:.2f}. What would have "
             "happened there is not known.",
-            r.alpha.failed, runs, degree),
+            failed, runs, degree),
         Status::Warning);
   }
   if (!r.is_finished)

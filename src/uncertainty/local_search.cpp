@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "uncertainty/linear.h"
 #include "uncertainty/tangent.h"
@@ -369,7 +370,9 @@ bool ModelSearch::ask_probe() {
   }
   if (nearest == nullptr || axes_.size() < 2) return false;
   ++probes_;
-  wall_.emplace(region_.box, region_.scale, region_.axes, best_, *nearest, radius_);
+  WallProbe::Allow allow;
+  if (region_.space->has_interaction()) allow = [region = region_](const Point& x) { return region.contains(x); };
+  wall_.emplace(region_.box, region_.scale, region_.axes, best_, *nearest, radius_, std::move(allow));
   pending_ = wall_->pending();
   stage_ = Stage::Probe;
   return !pending_.empty();

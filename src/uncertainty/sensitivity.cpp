@@ -217,28 +217,24 @@ std::vector<Fixed> find_outcomes_of_knowing(const Space& space, Asker& asker, co
       if (const double mu = calc_membership(space, asker.archive()[k].x); mu > top.first) top = {mu, k};
     }
     std::vector<Point> points = {calc_centre(known)};
+    const auto add = [&](Point x) {
+      x[i] = core;
+      if (!space.has_interaction() || calc_membership(known, x) > 0) points.push_back(std::move(x));
+    };
     // the search from the best of them finds more than all of them do; where none is of the class, others may be
     const std::size_t each = std::clamp<std::size_t>(static_cast<std::size_t>(limit) / (4 * best.size() + 1), 2,
                                                      4 * static_cast<std::size_t>(space.size()));
     for (auto& [outcome, list] : best) {
       std::stable_sort(list.begin(), list.end());
-      for (std::size_t k = 0; k < std::min(each, list.size()); ++k) {
-        points.push_back(asker.archive()[list[k].second].x);
-        points.back()[i] = core;
-      }
+      for (std::size_t k = 0; k < std::min(each, list.size()); ++k) add(asker.archive()[list[k].second].x);
       const std::size_t others = list.size() > each ? std::min(each, list.size() - each) : 0;
-      for (std::size_t k = 0; k < others; ++k) {
-        points.push_back(asker.archive()[list[each + k * (list.size() - each) / others].second].x);
-        points.back()[i] = core;
-      }
+      for (std::size_t k = 0; k < others; ++k)
+        add(asker.archive()[list[each + k * (list.size() - each) / others].second].x);
     }
     // where a class is most possible with all inputs fuzzy it often is so here, farther out
     for (const auto& [outcome, top] : most)
       if (top.first < 1)
-        for (Point& x : make_ray(space, asker.archive()[top.second].x, 9)) {
-          x[i] = core;
-          if (!space.has_interaction() || calc_membership(known, x) > 0) points.push_back(std::move(x));
-        }
+        for (Point& x : make_ray(space, asker.archive()[top.second].x, 9)) add(std::move(x));
     asker.ask(points);
     Fixed f;
     f.input = i;

@@ -14,13 +14,14 @@ constexpr int sections = 4, rounds = 4;
 }  // namespace
 
 WallProbe::WallProbe(const Box& box, std::vector<double> scale, std::vector<int> axes, Point inside, Point outside,
-                     double radius)
+                     double radius, Allow allow)
     : box_(box),
       scale_(std::move(scale)),
       axes_(std::move(axes)),
       anchor_(std::move(inside)),
       outside_(std::move(outside)),
-      radius_(radius) {
+      radius_(radius),
+      allow_(std::move(allow)) {
   double length = 0;
   for (const int i : axes_) {
     direction_.push_back((outside_[i] - anchor_[i]) / scale_[i]);
@@ -33,8 +34,11 @@ WallProbe::WallProbe(const Box& box, std::vector<double> scale, std::vector<int>
   for (const double part : {0.25, 0.5, 1.0}) {
     Point x = anchor_;
     for (std::size_t k = 0; k < axes_.size(); ++k) x[axes_[k]] -= part * radius_ * direction_[k] * scale_[axes_[k]];
-    pending_.push_back(clip(box_, std::move(x)));
+    x = clip(box_, std::move(x));
+    if (!is_allowed(x)) break;
+    pending_.push_back(std::move(x));
   }
+  if (pending_.empty()) tell({});
 }
 
 Point WallProbe::blend(const Point& to, double t) const {
@@ -45,9 +49,16 @@ Point WallProbe::blend(const Point& to, double t) const {
 
 void WallProbe::ask_sections() {
   pending_.clear();
-  for (const auto& r : rays_)
-    for (int k = 1; k <= (round_ == 0 ? sections : sections - 1); ++k)
-      if (r.crosses) pending_.push_back(blend(r.to, r.in + (r.out - r.in) * k / sections));
+  for (auto& r : rays_) {
+    r.asked = 0;
+    for (int k = 1; r.crosses && k <= (round_ == 0 ? sections : sections - 1); ++k) {
+      Point x = blend(r.to, r.in + (r.out - r.in) * k / sections);
+      if (!is_allowed(x)) break;
+      pending_.push_back(std::move(x));
+      ++r.asked;
+    }
+    if (round_ == 0 && r.asked == 0) r.crosses = false;
+  }
 }
 
 void WallProbe::tell(const std::vector<bool>& is_inside) {
@@ -65,17 +76,21 @@ void WallProbe::tell(const std::vector<bool>& is_inside) {
         r.to[axes_[k]] += radius_ * step * scale_[axes_[k]];
       }
       r.to = clip(box_, std::move(r.to));
+      if (!is_allowed(r.to)) {
+        double in = 0, out = 1;
+        for (int k = 0; k < 40; ++k) (is_allowed(blend(r.to, 0.5 * (in + out))) ? in : out) = 0.5 * (in + out);
+        r.to = blend(r.to, in);
+      }
       rays_.push_back(std::move(r));
     }
   } else {
     std::size_t next = 0;
     for (auto& r : rays_) {
       if (!r.crosses) continue;
-      const int last = round_ == 0 ? sections : sections - 1;
       int k = 1;
-      while (k <= last && is_inside[next + k - 1]) ++k;
-      next += last;
-      if (k > last && round_ == 0) r.crosses = false;
+      while (k <= r.asked && is_inside[next + k - 1]) ++k;
+      next += r.asked;
+      if (k > r.asked && round_ == 0) r.crosses = false;
       const double width = r.out - r.in, from = r.in;
       r.in = from + width * (k - 1) / sections;
       r.out = from + width * k / sections;

@@ -2,6 +2,7 @@
 /// Where another outcome begins: the boundary near a point as a plane, from runs on both sides
 /// (docs/theory/uncertainty.md, section 3).
 
+#include <functional>
 #include <vector>
 
 #include "uncertainty/mapping.h"
@@ -12,9 +13,12 @@ namespace topple::uncertainty {
 /// Asks for points and is told which of them are of the inside's class, like a LocalSearch.
 class WallProbe {
  public:
-  /// `inside` and `outside` are known; lengths are measured in parts of `scale`, one per input; `axes` may vary.
+  /// Tells without a run whether a point counts at all; empty: all do.
+  using Allow = std::function<bool(const Point&)>;
+  /// `inside` and `outside` are known; lengths are measured in parts of `scale`, one per input; `axes` may vary. Rays end
+  /// where points no longer count.
   WallProbe(const Box& box, std::vector<double> scale, std::vector<int> axes, Point inside, Point outside,
-            double radius);
+            double radius, Allow allow = {});
   const std::vector<Point>& pending() const { return pending_; }
   void tell(const std::vector<bool>& is_inside);
   bool is_done() const { return pending_.empty(); }
@@ -30,7 +34,9 @@ class WallProbe {
     Point to;
     double in = 0, out = 1;
     bool crosses = true;
+    int asked = 0;  // sections, up to the first that does not count
   };
+  bool is_allowed(const Point& x) const { return !allow_ || allow_(x); }
   Point blend(const Point& to, double t) const;
   void ask_sections();
   void fit();
@@ -41,6 +47,7 @@ class WallProbe {
   Point anchor_, outside_;
   std::vector<double> direction_;
   double radius_;
+  Allow allow_;
   std::vector<Ray> rays_;
   std::vector<Point> pending_;
   std::vector<double> normal_;

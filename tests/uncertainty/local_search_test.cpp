@@ -255,5 +255,29 @@ TEST(WallProbe, FindsAPlane) {
   EXPECT_NEAR(probe.calc_distance({0.2, 0.1, 0.3}), (1.5 - 0.4 + 0.1 - 0.6) / 3, 5e-3);
 }
 
+// The same plane with half of what lies beyond it taken away: rays that leave what counts before they meet it say
+// nothing, and nothing is asked there.
+TEST(WallProbe, KeepsToWhatCounts) {
+  const Box box{{-2, -2, -2}, {2, 2, 2}};
+  const auto is_inside = [](const Point& x) { return 2 * x[0] - x[1] + 2 * x[2] < 1.5; };
+  const auto is_allowed = [](const Point& x) { return x[0] + 3 * x[1] + x[2] < 1.4; };
+  const Point inside{0.2, 0.1, 0.3}, outside{0.6, 0, 0.5};
+  WallProbe probe(box, {1, 1, 1}, {0, 1, 2}, inside, outside, 0.1, is_allowed);
+  int asked = 0;
+  while (!probe.is_done()) {
+    std::vector<bool> told;
+    for (const auto& x : probe.pending()) {
+      EXPECT_TRUE(is_allowed(x));
+      told.push_back(is_inside(x));
+      ++asked;
+    }
+    probe.tell(told);
+  }
+  EXPECT_GT(asked, 20);
+  ASSERT_TRUE(probe.found());
+  // whatever rays are left, crossings lie on the plane
+  EXPECT_NEAR(probe.calc_distance(inside), (1.5 - 0.4 + 0.1 - 0.6) / 3, 0.02);
+}
+
 }  // namespace
 }  // namespace topple::uncertainty

@@ -262,6 +262,35 @@ TEST(SensitivityPhysics, OutcomesOfKnowingAnInputHaveClosedForms) {
     }
 }
 
+// No search asks for a point that breaks a constraint, beside a failure as little as with an input known.
+TEST(Sensitivity, ModelIsNeverRunBeyondAConstraint) {
+  const Space space{std::vector<FuzzyNumber>(3, make_triangular(0, 1, 2)),
+                    {[](const Point& x) { return x[0] + x[1] + x[2] - 3.3; },
+                     [](const Point& x) { return 0.5 - x[0] * x[1]; }},
+                    {}};
+  int asked = 0, broken = 0;
+  const Evaluate model = make_evaluate([&](const Point& x) {
+    ++asked;
+    broken += !is_allowed(space, x);
+    Result r;
+    r.state = x[0] + x[1] - x[2] > 1.9 ? Result::State::Failed : Result::State::Done;
+    r.outcome = x[0] - x[2] > 0.7 ? 1 : 0;
+    r.values = {x[0] * x[1] + x[2] - (r.outcome == 1 ? 2 : 0)};
+    return r;
+  });
+  const Progress progress;
+  Asker asker(model, progress, nullptr, 6000);
+  AlphaOptions options;
+  options.limit = 3000;
+  asker.set_limit(3000);
+  (void)optimise(space, asker, options);
+  asker.set_limit(6000);
+  (void)find_possibilities(space, asker, {});
+  (void)find_outcomes_of_knowing(space, asker, {}, 500, {});
+  EXPECT_GT(asked, 2000);
+  EXPECT_EQ(broken, 0) << "of " << asked;
+}
+
 TEST(Sensitivity, RefusesInteraction) {
   const FuzzyNumber f = make_triangular(-1, 0, 1);
   const Space disc{{f, f}, {[](const Point& x) { return x[0] * x[0] + x[1] * x[1] - 1; }}, {}};
