@@ -48,6 +48,17 @@ double calc_part(const Box& box, const Box& support) {
   return part;
 }
 
+/// The inputs of a box with what ties them together; the degree of the joint membership does not count in a box.
+Space make_inner(const Space& space, const std::vector<FuzzyNumber>& inputs) {
+  Space inner{inputs, space.constraints, {}};
+  if (space.joint)
+    inner.constraints.emplace_back([joint = space.joint](const Point& x) {
+      const double mu = joint(x);
+      return mu > 0 ? -mu : 1.0;
+    });
+  return inner;
+}
+
 class Design {
  public:
   Design(const Space& space, Asker& asker, const Requirement& requirement, const DesignOptions& options)
@@ -76,6 +87,7 @@ class Design {
     for (PermissibleBox& b : boxes_) result_.boxes.push_back(std::move(b));
     review_boxes(space_, result_.boxes, requirement_, asker_.archive(), options_);
     for (int i = 0; i < asker_.asked(); ++i) {
+      if (!is_possible(i)) continue;
       const double m = margin_of(i);
       ++(m == -infinite ? result_.failed : m >= 0 ? result_.permissible : result_.forbidden);
     }
@@ -96,11 +108,19 @@ class Design {
     return margins_[sample];
   }
   bool is_good(int sample) { return sample >= 0 && margin_of(sample) >= 0; }
+  /// Whether a point counts: in the support, and nothing that ties the inputs excludes it.
+  bool is_possible(const Point& x) const { return is_in_cut(space_, support_, 0, x); }
+  bool is_possible(int sample) {
+    while (static_cast<int>(possible_.size()) <= sample)
+      possible_.push_back(is_possible(asker_.archive()[static_cast<int>(possible_.size())].x));
+    return possible_[sample];
+  }
+  bool is_violating(int sample) { return is_possible(sample) && !is_good(sample); }
 
   std::vector<int> find_samples(bool good) {
     std::vector<int> found;
     for (int i = 0; i < asker_.asked(); ++i)
-      if (support_.contains(asker_.archive()[i].x) && is_good(i) == good) found.push_back(i);
+      if (is_possible(i) && is_good(i) == good) found.push_back(i);
     return found;
   }
 
@@ -113,7 +133,7 @@ class Design {
       Point fractions(space_.inputs.size(), 0.0);
       for (int i = 0; i < n; ++i) fractions[axes_[i]] = u[i];
       Point x = place_in(support_, fractions);
-      if (is_allowed(space_, x)) points.push_back(std::move(x));
+      if (is_possible(x)) points.push_back(std::move(x));
     }
     int done = 0, good = 0;
     for (const int i : asker_.ask(points)) {
@@ -146,10 +166,16 @@ class Design {
     return find_groups(points, options_.clustering, options_.k_max);
   }
 
+  /// Points that do not count violate nothing and are not run.
   std::vector<Verdict> judge(const std::vector<Point>& points) {
-    std::vector<Verdict> verdicts;
-    for (const int i : asker_.ask(points))
-      verdicts.push_back(i < 0 ? Verdict::NotRun : is_good(i) ? Verdict::Permissible : Verdict::Violating);
+    std::vector<Verdict> verdicts(points.size(), Verdict::Permissible);
+    std::vector<Point> counting;
+    std::vector<std::size_t> place;
+    for (std::size_t k = 0; k < points.size(); ++k)
+      if (!space_.has_interaction() || is_possible(points[k])) counting.push_back(points[k]), place.push_back(k);
+    const std::vector<int> samples = asker_.ask(counting);
+    for (std::size_t k = 0; k < samples.size(); ++k)
+      if (!is_good(samples[k])) verdicts[place[k]] = samples[k] < 0 ? Verdict::NotRun : Verdict::Violating;
     return verdicts;
   }
 
@@ -162,13 +188,12 @@ class Design {
     const Point middle = asker_.archive()[centre].x;
     BoxGrowth growth(
         support_, middle, [this](const std::vector<Point>& points) { return judge(points); },
-        [this](const Point& x) { return is_allowed(space_, x); },
+        [this](const Point& x) { return is_possible(x); },
         {options_.edge, options_.smallest, options_.rounds,
          options_.seed + 104729 * static_cast<std::uint64_t>(g + 1)});
     for (int seen = 0; !b.kept;) {
       for (; seen < asker_.asked(); ++seen)
-        if (support_.contains(asker_.archive()[seen].x) && !is_good(seen))
-          growth.add_violating(asker_.archive()[seen].x);
+        if (is_violating(seen)) growth.add_violating(asker_.archive()[seen].x);
       const bool grown = growth.grow();
       b.box = growth.box();
       b.volume = growth.calc_part();
@@ -208,11 +233,11 @@ class Design {
     constexpr double coarse = 0.05, widest = 0.15;  // of the support's widths
     BoxGrowth corners(
         support_, middle, [this](const std::vector<Point>& points) { return judge(points); },
-        [this](const Point& x) { return is_allowed(space_, x); }, {coarse, options_.smallest, options_.rounds, 1});
+        [this](const Point& x) { return is_possible(x); }, {coarse, options_.smallest, options_.rounds, 1});
     const int start = asker_.asked();
     for (int seen = 0; !b.kept && asker_.can_go_on();) {
       for (; seen < asker_.asked(); ++seen)
-        if (support_.contains(asker_.archive()[seen].x) && !is_good(seen)) front.add(asker_.archive()[seen].x);
+        if (is_violating(seen)) front.add(asker_.archive()[seen].x);
       const double spent = std::min(1.0, (asker_.asked() - start) / std::max(1.0, double(share - options_.fresh)));
       for (double margin = options_.edge + widest * spent * spent;; margin = std::max(options_.edge, 0.5 * margin)) {
         b.box = find_largest_box(support_, front, margin, 4, options_.seed + static_cast<std::uint64_t>(b.tries));
@@ -274,7 +299,7 @@ class Design {
   /// Whether all corners of a box keep the requirement; looks for the boundary on the way in from some that do not.
   bool check_corners(const Box& box, BoxGrowth& search) {
     std::vector<Point> points = make_corners_of(box), broken;
-    std::erase_if(points, [this](const Point& x) { return !is_allowed(space_, x); });
+    std::erase_if(points, [this](const Point& x) { return !is_possible(x); });
     const std::vector<Verdict> verdicts = judge(points);
     for (std::size_t k = 0; k < points.size(); ++k)
       if (verdicts[k] == Verdict::Violating) broken.push_back(points[k]);
@@ -304,7 +329,7 @@ class Design {
       if (which.empty())
         for (std::size_t k = 0; k < all.size(); ++k) which.push_back(k);
       std::vector<Point> points;
-      std::erase_if(which, [&](std::size_t k) { return !is_allowed(space_, all[k]); });
+      std::erase_if(which, [&](std::size_t k) { return !is_possible(all[k]); });
       for (const std::size_t k : which) points.push_back(all[k]);
       const std::vector<Verdict> verdicts = judge(points);
       const bool was_all = broken.empty();
@@ -334,7 +359,7 @@ class Design {
           face += share * way;
           if (is_near_violation(wider)) continue;
           std::vector<Point> points = make_corners_of(wider);
-          std::erase_if(points, [&](const Point& x) { return x[i] != face || !is_allowed(space_, x); });
+          std::erase_if(points, [&](const Point& x) { return x[i] != face || !is_possible(x); });
           const std::vector<Verdict> verdicts = judge(points);
           if (std::all_of(verdicts.begin(), verdicts.end(), [](Verdict v) { return v == Verdict::Permissible; }))
             box = std::move(wider);
@@ -355,7 +380,7 @@ class Design {
     for (int attempt = 0; static_cast<int>(points.size()) < count && attempt < 1000 * count; ++attempt) {
       Point x = box.lower;
       for (const int i : axes_) x[i] = random.next(box.lower[i], box.upper[i]);
-      if (is_allowed(space_, x)) points.push_back(std::move(x));
+      if (is_possible(x)) points.push_back(std::move(x));
     }
     return points;
   }
@@ -374,13 +399,13 @@ class Design {
 
   bool has_violation(const Box& box) {
     for (int i = 0; i < asker_.asked(); ++i)
-      if (box.contains(asker_.archive()[i].x) && !is_good(i)) return true;
+      if (box.contains(asker_.archive()[i].x) && is_violating(i)) return true;
     return false;
   }
 
   /// The box as fuzzy input, with at most so many runs.
   void rerun(PermissibleBox& b, int runs) {
-    Space inner{b.inputs, space_.constraints, {}};
+    const Space inner = make_inner(space_, b.inputs);
     AlphaOptions o = make_thrifty_options();
     o.levels = options_.levels;
     o.seed = options_.seed;
@@ -397,6 +422,7 @@ class Design {
   Box support_;
   std::vector<int> axes_;
   std::vector<double> margins_;
+  std::vector<bool> possible_;  // of samples, as far as they were asked for
   std::vector<PermissibleBox> boxes_;
   DesignResult result_;
 };
@@ -411,6 +437,11 @@ class Review {
   Review(const Space& space, const Requirement& requirement, const Archive& archive, const DesignOptions& options)
       : space_(space), archive_(archive), options_(options), support_(make_box(space, 0)) {
     for (const Sample& s : archive.samples()) {
+      possible_.push_back(is_in_cut(space, support_, 0, s.x));
+      if (!possible_.back()) {
+        margins_.push_back(-infinite);
+        continue;
+      }
       const double m = s.result.state == Result::State::Done ? requirement(s.result) : -infinite;
       margins_.push_back(std::isnan(m) ? -infinite : m);
       if (margins_.back() == -infinite) continue;
@@ -431,7 +462,7 @@ class Review {
     b.kept = b.kept && b.broken == 0;
     double nearest = infinite;
     for (std::size_t i = 0; i < margins_.size(); ++i)
-      if (b.box.contains(archive_[static_cast<int>(i)].x)) nearest = std::min(nearest, margins_[i]);
+      if (is_inside(b, i)) nearest = std::min(nearest, margins_[i]);
     b.distance = high_ > low_ && nearest < infinite ? std::max(nearest, 0.0) / (high_ - low_) : 0;
     b.robustness = 0;
     const std::size_t o = static_cast<std::size_t>(options_.ranking_output);
@@ -445,10 +476,15 @@ class Review {
   }
 
  private:
+  /// Whether a run counts and lies in the box.
+  bool is_inside(const PermissibleBox& b, std::size_t sample) const {
+    return possible_[sample] && b.box.contains(archive_[static_cast<int>(sample)].x);
+  }
+
   void count(PermissibleBox& b) const {
     b.samples = b.broken = 0;
     for (std::size_t i = 0; i < margins_.size(); ++i)
-      if (b.box.contains(archive_[static_cast<int>(i)].x)) ++b.samples, b.broken += !(margins_[i] >= 0);
+      if (is_inside(b, i)) ++b.samples, b.broken += !(margins_[i] >= 0);
   }
 
   /// To what violations leave. Those of its fresh points that stay inside are as independent of the smaller box. False
@@ -457,7 +493,7 @@ class Review {
     const Point& core = archive_[b.centre].x;
     Front front(core);
     for (std::size_t i = 0; i < margins_.size(); ++i)
-      if (const Point& x = archive_[static_cast<int>(i)].x; !(margins_[i] >= 0) && b.box.contains(x)) front.add(x);
+      if (!(margins_[i] >= 0) && is_inside(b, i)) front.add(archive_[static_cast<int>(i)].x);
     const Box box = find_largest_box(b.box, front, options_.edge, 8, options_.seed);
     const double volume = calc_part(box, support_);
     std::vector<Point> fresh = b.fresh_points;
@@ -470,7 +506,7 @@ class Review {
     b.fresh = static_cast<int>(b.fresh_points.size());
     b.violating = bound_violating(b, options_.confidence);
     if (!b.outputs.empty())
-      b.outputs = read_archive({b.inputs, space_.constraints, {}}, archive_, options_.levels).outputs;
+      b.outputs = read_archive(make_inner(space_, b.inputs), archive_, options_.levels).outputs;
     return true;
   }
 
@@ -479,6 +515,7 @@ class Review {
   const DesignOptions& options_;
   const Box support_;
   std::vector<double> margins_;  // of samples, -infinite where the run failed
+  std::vector<bool> possible_;   // whether they count: nothing that ties the inputs excludes them
   double low_ = infinite, high_ = -infinite;
   std::vector<double> least_, most_;  // of each output over all runs
 };

@@ -301,6 +301,50 @@ TEST(Design, EverythingPermissibleIsOneBox) {
   EXPECT_TRUE(f.design.boxes[0].kept);
 }
 
+// What breaks a constraint takes nothing away, also where runs were made there: every possible point keeps the
+// requirement.
+TEST(Design, WhatConstraintsExcludeCutsNoBox) {
+  const Space space{{make_triangular(0, 1, 2), make_triangular(0, 1, 2)},
+                    {[](const Point& x) { return 0.5 - x[0] * x[1]; }},
+                    {}};
+  const Evaluate model = make_model([](const Point& x) { return x[0] * x[1] >= 0.5; });
+  const Progress progress;
+  Asker asker(model, progress, nullptr, 6000);
+  asker.ask({{0.1, 0.1}, {0.4, 0.4}, {0.2, 1.9}, {1.9, 0.2}, {0.6, 0.7}});
+  const DesignResult d = find_permissible_boxes(space, asker, outcome_0, {});
+  EXPECT_EQ(d.fraction, 1);
+  EXPECT_EQ(d.forbidden, 0);
+  ASSERT_EQ(d.boxes.size(), 1u);
+  EXPECT_TRUE(d.boxes[0].kept);
+  EXPECT_EQ(d.boxes[0].volume, 1);
+  EXPECT_EQ(d.boxes[0].broken, 0);
+}
+
+// x1 + x2 <= 1.5 holds wherever the joint membership, a cone of radius 1, is above 0 (the largest sum there is √2).
+TEST(Design, JointMembershipSaysWhatCounts) {
+  const Space space{{make_triangular(-2, 0, 2), make_triangular(-2, 0, 2)},
+                    {},
+                    [](const Point& x) { return std::max(0.0, 1 - std::hypot(x[0], x[1])); }};
+  int outside = 0;
+  const Evaluate model = make_evaluate([&](const Point& x) {
+    outside += std::hypot(x[0], x[1]) >= 1;
+    Result r;
+    r.state = Result::State::Done;
+    r.outcome = x[0] + x[1] <= 1.5 ? 0 : 1;
+    r.values = {x[0] + x[1]};
+    return r;
+  });
+  const Found f = find(space, model, outcome_0, {}, 6000);
+  EXPECT_EQ(f.design.fraction, 1);
+  EXPECT_EQ(outside, 0) << "runs that count for nothing";
+  ASSERT_GE(f.design.boxes.size(), 1u);
+  EXPECT_TRUE(f.design.boxes[0].kept);
+  EXPECT_EQ(f.design.boxes[0].volume, 1);
+  ASSERT_EQ(f.design.boxes[0].outputs.size(), 1u);
+  // over the disc alone
+  EXPECT_NEAR(f.design.boxes[0].outputs[0].levels[0].upper.value, std::sqrt(2), 1e-3);
+}
+
 TEST(DesignReplay, SameBits) {
   DesignOptions options;
   const auto run = [&] {
