@@ -22,8 +22,8 @@ using json = nlohmann::ordered_json;
 /// Seven digits are enough to draw and to read.
 json number(double x) { return std::isfinite(x) ? json(std::stod(fmt::format("{:.7g}", x))) : json(nullptr); }
 
-/// Runs at places that do not count (beyond a constraint, or outside a support that was made smaller) are left out: their
-/// outcome may be none of the results'.
+/// Runs at places that do not count (beyond a constraint, or outside a support that was made smaller) are left out:
+/// their outcome may be none of the results'.
 std::vector<int> choose_runs(const Problem& p, const StudyResult& r, std::size_t most) {
   const uncertainty::Box support = uncertainty::make_box(p.space, 0);
   std::vector<int> all;

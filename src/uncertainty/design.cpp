@@ -505,8 +505,7 @@ class Review {
     b.fresh_points = std::move(fresh);
     b.fresh = static_cast<int>(b.fresh_points.size());
     b.violating = bound_violating(b, options_.confidence);
-    if (!b.outputs.empty())
-      b.outputs = read_archive(make_inner(space_, b.inputs), archive_, options_.levels).outputs;
+    if (!b.outputs.empty()) b.outputs = read_archive(make_inner(space_, b.inputs), archive_, options_.levels).outputs;
     return true;
   }
 

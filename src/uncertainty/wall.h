@@ -15,8 +15,8 @@ class WallProbe {
  public:
   /// Tells without a run whether a point counts at all; empty: all do.
   using Allow = std::function<bool(const Point&)>;
-  /// `inside` and `outside` are known; lengths are measured in parts of `scale`, one per input; `axes` may vary. Rays end
-  /// where points no longer count.
+  /// `inside` and `outside` are known; lengths are measured in parts of `scale`, one per input; `axes` may vary. Rays
+  /// end where points no longer count.
   WallProbe(const Box& box, std::vector<double> scale, std::vector<int> axes, Point inside, Point outside,
             double radius, Allow allow = {});
   const std::vector<Point>& pending() const { return pending_; }

@@ -304,9 +304,8 @@ TEST(Design, EverythingPermissibleIsOneBox) {
 // What breaks a constraint takes nothing away, also where runs were made there: every possible point keeps the
 // requirement.
 TEST(Design, WhatConstraintsExcludeCutsNoBox) {
-  const Space space{{make_triangular(0, 1, 2), make_triangular(0, 1, 2)},
-                    {[](const Point& x) { return 0.5 - x[0] * x[1]; }},
-                    {}};
+  const Space space{
+      {make_triangular(0, 1, 2), make_triangular(0, 1, 2)}, {[](const Point& x) { return 0.5 - x[0] * x[1]; }}, {}};
   const Evaluate model = make_model([](const Point& x) { return x[0] * x[1] >= 0.5; });
   const Progress progress;
   Asker asker(model, progress, nullptr, 6000);
@@ -322,9 +321,9 @@ TEST(Design, WhatConstraintsExcludeCutsNoBox) {
 
 // x1 + x2 <= 1.5 holds wherever the joint membership, a cone of radius 1, is above 0 (the largest sum there is √2).
 TEST(Design, JointMembershipSaysWhatCounts) {
-  const Space space{{make_triangular(-2, 0, 2), make_triangular(-2, 0, 2)},
-                    {},
-                    [](const Point& x) { return std::max(0.0, 1 - std::hypot(x[0], x[1])); }};
+  const Space space{{make_triangular(-2, 0, 2), make_triangular(-2, 0, 2)}, {}, [](const Point& x) {
+                      return std::max(0.0, 1 - std::hypot(x[0], x[1]));
+                    }};
   int outside = 0;
   const Evaluate model = make_evaluate([&](const Point& x) {
     outside += std::hypot(x[0], x[1]) >= 1;

@@ -264,10 +264,10 @@ TEST(SensitivityPhysics, OutcomesOfKnowingAnInputHaveClosedForms) {
 
 // No search asks for a point that breaks a constraint, beside a failure as little as with an input known.
 TEST(Sensitivity, ModelIsNeverRunBeyondAConstraint) {
-  const Space space{std::vector<FuzzyNumber>(3, make_triangular(0, 1, 2)),
-                    {[](const Point& x) { return x[0] + x[1] + x[2] - 3.3; },
-                     [](const Point& x) { return 0.5 - x[0] * x[1]; }},
-                    {}};
+  const Space space{
+      std::vector<FuzzyNumber>(3, make_triangular(0, 1, 2)),
+      {[](const Point& x) { return x[0] + x[1] + x[2] - 3.3; }, [](const Point& x) { return 0.5 - x[0] * x[1]; }},
+      {}};
   int asked = 0, broken = 0;
   const Evaluate model = make_evaluate([&](const Point& x) {
     ++asked;
