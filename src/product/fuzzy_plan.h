@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "product/fuzzy_values.h"
+#include "product/interaction.h"
 
 namespace topple::product {
 
@@ -31,13 +32,18 @@ struct FuzzyPlan {
   std::vector<std::vector<DocumentPath>> places;    // of the inputs, then of the derived values; patterns have many
   std::vector<std::string> si;                      // name of the SI unit in files, the same order
   std::vector<std::vector<FuzzyOperand>> operands;  // of each derived value's formula
-  std::vector<double> derived_unit;                 // SI value of one unit of each formula's result
+  std::vector<double> input_unit, derived_unit;     // SI value of one unit of each value in formulas
+  Interaction interaction;                          // sees inputs, then derived values, in these units
 
   bool is_empty() const { return inputs.empty() && derived.empty(); }
 };
 
 /// The derived values of a point in SI; NaN or infinite outside a formula's range.
 std::vector<double> calc_derived(const FuzzyPlan&, std::span<const double> point);
+/// What the formulas of the interaction see of a point.
+std::vector<double> calc_interacting(const FuzzyPlan&, std::span<const double> point);
+/// Whether the interaction leaves the point possible: every constraint holds and the joint membership is above 0.
+bool is_possible(const FuzzyPlan&, std::span<const double> point);
 /// The middle of all fuzzy values.
 std::vector<double> calc_centre(const FuzzyPlan&);
 

@@ -73,6 +73,22 @@ std::vector<double> calc_derived(const FuzzyPlan& f, std::span<const double> poi
   return out;
 }
 
+std::vector<double> calc_interacting(const FuzzyPlan& f, std::span<const double> point) {
+  std::vector<double> values;
+  for (size_t i = 0; i < f.inputs.size(); ++i) values.push_back(point[i] / f.input_unit[i]);
+  const std::vector<double> derived = calc_derived(f, point);
+  for (size_t i = 0; i < derived.size(); ++i) values.push_back(derived[i] / f.derived_unit[i]);
+  return values;
+}
+
+bool is_possible(const FuzzyPlan& f, std::span<const double> point) {
+  if (f.interaction.is_empty()) return true;
+  const std::vector<double> values = calc_interacting(f, point);
+  for (size_t i = 0; i < f.interaction.constraints.size(); ++i)
+    if (calc_excess(f.interaction, i, values) > 0) return false;
+  return calc_joint(f.interaction, values) > 0;
+}
+
 std::vector<double> calc_centre(const FuzzyPlan& f) { return centre_of(f.inputs); }
 
 PlanSampler make_sampler(const Plan& plan) {
@@ -93,6 +109,7 @@ void try_samples(const Plan& plan, const Node& document, Complaints& complaints)
   const size_t n = fuzzy.inputs.size();
   const std::vector<double> centre = calc_centre(fuzzy);
   const auto refusal = [&](const std::vector<double>& point) -> std::string {
+    if (!is_possible(fuzzy, point)) return {};  // no sample is there
     try {
       read_sample(fuzzy, document, plan.path, point);
       return {};

@@ -13,6 +13,7 @@ namespace topple::product {
 namespace {
 
 constexpr double accepted_difference = 1e-3;  // between a value of the plan and the core
+constexpr double accepted_roundoff = 1e-12;   // of units, in constraints
 
 /// A quantity of the plan and the ways to write its path.
 struct Target {
@@ -45,6 +46,13 @@ std::string name_of(const Target& t) {
   std::vector<std::string> words;
   for (size_t i = t.owner; i < t.words.size(); ++i) words.push_back(t.words[i].front());
   return join(words, "_");
+}
+
+/// A path as a name in formulas.
+std::string word_of(std::string path) {
+  for (char& c : path)
+    if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+  return path;
 }
 
 bool has_named_tables(const std::string& group) {
@@ -137,6 +145,7 @@ struct FuzzyReader {
   bool take(size_t target, Place where, const std::string& path);
   void name_inputs();
   void parse_formula(size_t i);
+  void read_interaction(TableReader& table);
   void compare();
 };
 
@@ -244,6 +253,7 @@ void FuzzyReader::read_leaf(const Entry& entry, const std::vector<std::string>& 
   out.places.emplace_back();
   for (const size_t i : found) out.places.back().push_back(targets[i].place);
   out.si.emplace_back(units.si);
+  out.input_unit.push_back(units.formula);
   first_target.push_back(found.front());
   has_own_name.push_back(is_named);
 }
@@ -258,9 +268,7 @@ void FuzzyReader::name_inputs() {
       complaints.error("E102", {out.inputs[i].where.line, out.inputs[i].where.column, 1},
                        "fuzzy: " + out.inputs[i].path + ": the name " + quoted(names[i]) + " is given twice");
     } else {
-      std::string& name = out.inputs[i].name = path_of(targets[first_target[i]]);
-      for (char& c : name)
-        if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+      out.inputs[i].name = word_of(path_of(targets[first_target[i]]));
     }
   }
 }
@@ -299,6 +307,19 @@ void FuzzyReader::parse_formula(size_t i) {
     add(out.inputs[k].name, {static_cast<int>(k), 0, fuzzy_units(targets[first_target[k]].dimension).formula});
   out.derived[i].expression = read_formula(*formulas[i].node, "fuzzy: " + out.derived[i].path, names, complaints);
   out.operands.push_back(std::move(operands));
+}
+
+/// Constraints and the joint membership see fuzzy values and what follows from them.
+void FuzzyReader::read_interaction(TableReader& table) {
+  std::vector<std::string> names;
+  for (const FuzzyValue& v : out.inputs) names.push_back(v.name);
+  const size_t inputs = names.size();
+  for (const DerivedValue& d : out.derived) names.push_back(d.name);
+  const std::vector<std::string> own = names;
+  for (size_t i = inputs; i < names.size(); ++i)
+    if (std::count(own.begin(), own.end(), own[i]) > 1) names[i] = word_of(out.derived[i - inputs].path);
+  out.interaction = product::read_interaction(table, names);
+  out.interaction.slack = accepted_roundoff;
 }
 
 /// The plan as it stands is a run of its own; the analysis has its own middle. Both should be the same building.
@@ -346,7 +367,7 @@ void read_fuzzy(Reading& reading, TableReader& root, const Node& document, const
   FuzzyReader reader{out, complaints, TargetFinder(document, asked).targets, is_whole, {}, {}, {}, {}, {}, {}};
   std::vector<std::string> path;
   for (const Entry& entry : node->entries)
-    if (entry.key != "search") reader.read_entry(entry, path);
+    if (entry.key != "search" && entry.key != "interaction") reader.read_entry(entry, path);
   if (complaints.error_count() > errors_before || !is_whole) return;
   if (out.inputs.empty())
     complaints.error(
@@ -358,6 +379,11 @@ void read_fuzzy(Reading& reading, TableReader& root, const Node& document, const
   for (size_t i = 0; i < out.derived.size(); ++i) reader.parse_formula(i);
   out.places.insert(out.places.end(), reader.derived_places.begin(), reader.derived_places.end());
   out.si.insert(out.si.end(), reader.derived_si.begin(), reader.derived_si.end());
+  reader.read_interaction(table);
+  if (complaints.error_count() > errors_before) return;
+  const std::vector<double> values = calc_interacting(out, calc_centre(out));
+  if (std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); }))
+    check_interaction(out.interaction, values, "fuzzy: interaction", "the fuzzy values", complaints);
   if (complaints.error_count() == errors_before) reader.compare();
 }
 

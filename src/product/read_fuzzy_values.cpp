@@ -230,16 +230,23 @@ FuzzySearch read_search(TableReader& parent, bool is_of_plan) {
   return out;
 }
 
-Expression read_formula(const Node& node, const std::string& path, const std::vector<std::string>& names,
-                        Complaints& complaints) {
+std::optional<Expression> parse_formula(const Node& node, size_t first, size_t count, const std::string& label,
+                                        const std::vector<std::string>& names, Complaints& complaints) {
+  const std::string text = node.text.substr(first, count);
   ExpressionFault fault;
-  Expression e = Expression::parse(node.text, names, fault);
+  Expression e = Expression::parse(text, names, fault);
   if (fault.message.empty()) return e;
   Place place = node.place;
-  place.column += 1 + static_cast<int>(fault.offset);  // behind the quotation mark
-  place.width = std::max(1, place.width - 2 - static_cast<int>(fault.offset));
-  complaints.error("E208", place, path + ": formula: " + fault.message, fault.help);
-  return e;
+  place.column += 1 + static_cast<int>(first + fault.offset);  // behind the quotation mark
+  place.width = std::max(1, std::min(place.width - 2 - static_cast<int>(first), static_cast<int>(text.size())) -
+                                static_cast<int>(fault.offset));
+  complaints.error("E208", place, label + ": " + fault.message, fault.help);
+  return std::nullopt;
+}
+
+Expression read_formula(const Node& node, const std::string& path, const std::vector<std::string>& names,
+                        Complaints& complaints) {
+  return parse_formula(node, 0, std::string::npos, path + ": formula", names, complaints).value_or(Expression{});
 }
 
 }  // namespace topple::product

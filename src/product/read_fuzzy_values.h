@@ -2,6 +2,7 @@
 /// Reading of fuzzy values, shared by plans and section files.
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,7 +40,11 @@ RefusedCorners try_corners(const std::vector<FuzzyValue>&, const FuzzyRefusal&);
 /// The table [search].
 ///   is_of_plan  runs of a plan: `after` may say when they end
 FuzzySearch read_search(TableReader& parent, bool is_of_plan = false);
-/// Parses a formula at `node`; a fault becomes a complaint at its character.
+/// Parses `count` characters of the text at `node` from `first` on as a formula; a fault becomes a complaint at its
+/// character.
+std::optional<Expression> parse_formula(const Node& node, size_t first, size_t count, const std::string& label,
+                                        const std::vector<std::string>& names, Complaints&);
+/// The whole text at `node`; 0 after a complaint.
 Expression read_formula(const Node& node, const std::string& path, const std::vector<std::string>& names, Complaints&);
 
 }  // namespace topple::product

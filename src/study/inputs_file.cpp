@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "product/expression.h"
+#include "product/interaction.h"
 #include "product/read_fuzzy_values.h"
 #include "product/table_reader.h"
 
@@ -32,11 +32,7 @@ struct Reader {
   std::vector<std::string> names;    // inputs, then formulas that were read
   std::vector<Expression> formulas;  // each may use inputs and the formulas before it
   std::vector<Place> formula_places;
-  std::vector<Expression> differences;  // left and right sides of constraints, in pairs
-  std::vector<bool> is_at_least;        // per constraint
-  std::vector<Place> constraint_places;
-  std::optional<Expression> joint;
-  Place joint_place;
+  product::Interaction interaction;
 
   /// Numbers of a list, or nothing after a complaint.
   std::optional<std::vector<double>> read_numbers(const Node& node, const std::string& label, std::size_t count) {
@@ -163,25 +159,6 @@ struct Reader {
     }
   }
 
-  std::optional<Expression> parse(const Node& node, const std::string& label, const std::string& text,
-                                  std::size_t offset) {
-    ExpressionOrFault r = parse_text(text);
-    if (r.fault.message.empty()) return r.expression;
-    Place place = node.place;
-    place.column += 1 + static_cast<int>(offset + r.fault.offset);  // behind the quotation mark
-    complaints.error("E208", place, label + ": " + r.fault.message, r.fault.help);
-    return std::nullopt;
-  }
-  struct ExpressionOrFault {
-    Expression expression;
-    product::ExpressionFault fault;
-  };
-  ExpressionOrFault parse_text(const std::string& text) {
-    ExpressionOrFault r;
-    r.expression = Expression::parse(text, names, r.fault);
-    return r;
-  }
-
   void read_formulas(TableReader& root) {
     const Node* node = root.table("derived");
     if (!node) return;
@@ -201,49 +178,13 @@ struct Reader {
         complaints.error("E202", entry.value.place, label + ": a formula is wanted", "such as \"1.4 * fc^(2/3)\"");
         continue;
       }
-      if (auto e = parse(*text, label, text->text, 0)) {
+      if (auto e = product::parse_formula(*text, 0, std::string::npos, label, names, complaints)) {
         formulas.push_back(*e);
         formula_places.push_back(text->place);
         names.push_back(entry.key);
         out.derived.push_back({entry.key, unit, 1});
       }
     }
-  }
-
-  void read_interaction(TableReader& root) {
-    const Node* node = root.table("interaction");
-    if (!node) return;
-    TableReader table(*node, "interaction", complaints);
-    if (const Node* list = table.find("constraints")) {
-      if (list->kind != Node::Kind::Array) {
-        table.error("E202", list->place, "constraints: a list of texts is wanted", "such as [\"x1 + x2 <= 3\"]");
-      } else {
-        for (const Node& item : list->items) read_constraint(item);
-      }
-    }
-    if (const Node* text = table.find("membership")) {
-      joint_place = text->place;
-      if (text->kind != Node::Kind::String)
-        table.error("E202", text->place, "membership: a formula is wanted");
-      else
-        joint = parse(*text, "membership", text->text, 0);
-    }
-    table.finish();
-  }
-
-  void read_constraint(const Node& item) {
-    const std::size_t sign = item.kind == Node::Kind::String ? item.text.find_first_of("<>") : std::string::npos;
-    if (sign == std::string::npos || sign + 1 >= item.text.size() || item.text[sign + 1] != '=') {
-      complaints.error("E202", item.place, "constraints: a text with <= or >= is wanted", "such as \"x1 + x2 <= 3\"");
-      return;
-    }
-    const auto left = parse(item, "constraint", item.text.substr(0, sign), 0);
-    const auto right = parse(item, "constraint", item.text.substr(sign + 2), sign + 2);
-    if (!left || !right) return;
-    differences.push_back(*left);
-    differences.push_back(*right);
-    is_at_least.push_back(item.text[sign] == '>');
-    constraint_places.push_back(item.place);
   }
 
   /// Gives the problem its functions, and tries them at the middle.
@@ -263,31 +204,19 @@ struct Reader {
         for (const double v : calc(x)) values.push_back(v);
       return values;
     };
-    for (std::size_t i = 0; i < is_at_least.size(); ++i)
-      out.space.constraints.emplace_back([complete, left = differences[2 * i], right = differences[2 * i + 1],
-                                          turn = is_at_least[i] ? -1.0 : 1.0](const Point& x) {
-        const std::vector<double> values = complete(x);
-        const double g = turn * (left.evaluate(values) - right.evaluate(values));
-        return std::isnan(g) ? std::numeric_limits<double>::infinity() : g;
-      });
-    if (joint)
-      out.space.joint = [complete, formula = *joint](const Point& x) {
-        const double mu = formula.evaluate(complete(x));
-        return std::isnan(mu) ? 0.0 : std::clamp(mu, 0.0, 1.0);
-      };
+    const auto shared = std::make_shared<const product::Interaction>(interaction);
+    for (std::size_t i = 0; i < shared->constraints.size(); ++i)
+      out.space.constraints.emplace_back(
+          [complete, shared, i](const Point& x) { return product::calc_excess(*shared, i, complete(x)); });
+    if (shared->joint)
+      out.space.joint = [complete, shared](const Point& x) { return product::calc_joint(*shared, complete(x)); };
     const Point centre = uncertainty::calc_centre(out.space);
     const std::vector<double> values = complete(centre);
     for (std::size_t i = 0; i < out.derived.size(); ++i)
       if (!std::isfinite(values[centre.size() + i]))
         complaints.error("E207", formula_places[i],
                          out.derived[i].name + ": the formula has no value in the middle of the inputs");
-    for (std::size_t i = 0; i < out.space.constraints.size(); ++i)
-      if (out.space.constraints[i](centre) > 0)
-        complaints.error("E207", constraint_places[i], "the middle of the inputs breaks this constraint");
-    if (joint && joint->evaluate(values) != 1)
-      complaints.error("E207", joint_place,
-                       fmt::format("membership: {} in the middle of the inputs; 1 is wanted", joint->evaluate(values)),
-                       "a joint membership lies between 0 and 1");
+    product::check_interaction(interaction, values, "interaction", "the inputs", complaints);
   }
 };
 
@@ -312,12 +241,12 @@ Problem read_inputs_text(const std::string& text, const std::string& name) {
   const Node document = parse(text, name);
   Complaints complaints(name);
   TableReader root(document, "", complaints);
-  Reader reader{out, complaints, {}, {}, {}, {}, {}, {}, {}, {}};
+  Reader reader{out, complaints, {}, {}, {}, {}};
   out.title = root.text("title", "");
   reader.read_inputs(root);
   if (complaints.error_count() == 0) {
     reader.read_formulas(root);
-    reader.read_interaction(root);
+    reader.interaction = product::read_interaction(root, reader.names);
   } else {
     root.table("derived"), root.table("interaction");
   }

@@ -37,6 +37,20 @@ int find_outcome(const collapse::SampleRun& r, bool is_early_bad) {
   return static_cast<int>(std::find(names.begin(), names.end(), name) - names.begin());
 }
 
+/// The plan's constraints and joint membership.
+void tie(uncertainty::Space& space, const product::FuzzyPlan& plan) {
+  if (plan.interaction.is_empty()) return;
+  const auto shared = std::make_shared<const product::FuzzyPlan>(plan);
+  for (size_t i = 0; i < plan.interaction.constraints.size(); ++i)
+    space.constraints.emplace_back([shared, i](const Point& x) {
+      return product::calc_excess(shared->interaction, i, product::calc_interacting(*shared, x));
+    });
+  if (plan.interaction.joint)
+    space.joint = [shared](const Point& x) {
+      return product::calc_joint(shared->interaction, product::calc_interacting(*shared, x));
+    };
+}
+
 }  // namespace
 
 const std::vector<std::string>& plan_outcomes() {
@@ -121,6 +135,7 @@ void PlanMapping::check_firing(const product::Plan& plan, const Impl& impl) {
   for (size_t i = 0; i < centre.size(); ++i) {
     std::vector<double> point = centre;
     point[i] = plan.fuzzy.inputs[i].corners.back().first;
+    if (!product::is_possible(plan.fuzzy, point)) continue;
     try {
       check(product::make_sample(impl.sampler, point), " with " + product::text_of(plan.fuzzy.inputs[i], point[i]));
     } catch (const InputError& e) {
@@ -145,6 +160,7 @@ PlanMapping::PlanMapping(const product::Plan& plan, const collapse::Knowledge& k
     impl->inputs.push_back({v.path, v.symbol, v.unit});
     impl->space.inputs.push_back(uncertainty::make_polygonal(v.corners));
   }
+  tie(impl->space, plan.fuzzy);
   uncertainty::check_space(impl->space);
   check_firing(plan, *impl);
   for (const double t : options.tilt_times) impl->outputs.push_back({fmt::format("tilt_{:g}", t), "deg", unit::deg});

@@ -146,6 +146,24 @@ TEST(FuzzyPlan, ComplainsWhereTheFaultStands) {
        "leave it out"},
       {"«[fuzzy]»\n", "E201", "nothing is fuzzy", ""},
       {"[fuzzy]\nsite.friction = { triangular = [0.5, 0.6, 0.7] }\nsearch = { levels = «[]» }\n", "E202", "levels", ""},
+      {"[fuzzy]\nsite.friction = { triangular = [0.5, 0.6, 0.7] }\n"
+       "interaction.constraints = [\"2 * friction <= 1.3\", \"1 + «frictoin» <= 2\"]\n",
+       "E208", "fuzzy: interaction: constraint: ", "friction"},
+      {"[fuzzy]\nsite.friction = { triangular = [0.5, 0.6, 0.7] }\n"
+       "interaction.constraints = [\"friction <= 2 * «frictoin»\"]\n",
+       "E208", "fuzzy: interaction: constraint: ", "friction"},
+      {"[fuzzy]\nsite.friction = { triangular = [0.5, 0.6, 0.7] }\n"
+       "interaction.constraints = [«\"friction < 1\"»]\n",
+       "E202", "a text with <= or >= is wanted", ""},
+      {"[fuzzy]\nsite.friction = { triangular = [0.5, 0.6, 0.7] }\n"
+       "interaction.constraints = [\"friction <= 1\", «\"friction >= 0.65\"»]\n",
+       "E207", "the middle of the fuzzy values breaks this constraint", ""},
+      {"[fuzzy]\nsite.friction = { triangular = [0.5, 0.6, 0.7] }\n"
+       "interaction.membership = «\"1 - abs(friction - 0.5)\"»\n",
+       "E207", "0.9 in the middle of the fuzzy values; 1 is wanted", ""},
+      {"[fuzzy]\nsite.friction = { triangular = [0.5, 0.6, 0.7] }\n"
+       "interaction.«constraint» = [\"friction <= 1\"]\n",
+       "E203", "constraint", "constraints"},
       {"[fuzzy]\nsite.«friction» = { triangular = [0.7, 0.8, 0.9] }\n", "W508",
        "the plan says friction = 0.6, outside the core", ""},
       {"[fuzzy]\nsite.friction = { triangular = [0.5, 0.6, 0.7] }\nconcrete.C25.«Ec» = { formula = \"1e4 * fc^0.4\" "
@@ -177,6 +195,61 @@ stage.front.charge.1.destroyed_length = { triangular = ["1 m", "1.2 m", "1.8 m"]
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_EQ(warnings[0].code, "W507");
   EXPECT_THAT(warnings[0].message, testing::HasSubstr("1 of 4 corners"));
+}
+
+constexpr const char* tied = R"toml([fuzzy]
+concrete.C25.fc = { triangular = ["10 N/mm2", "25 N/mm2", "45 N/mm2"] }
+concrete.C25.fct = { formula = "1.4 * ((fc - 8) / 10)^(2/3)" }
+section.column.steel_area = { triangular = ["20 cm2", "25.13 cm2", "30 cm2"] }
+[fuzzy.interaction]
+constraints = ["steel_area <= 2513 + 30 * (fc - 25)", "fct <= 3"]
+membership = "max(0, 1 - abs(steel_area - 2513) / 1000)"
+)toml";
+
+// In N, mm and s, as formulas. The middle lies on a constraint: its 25.13 cm2 are 2513 mm2 but for round-off.
+TEST(FuzzyPlan, InteractionSeesValuesAndWhatFollowsFromThem) {
+  std::vector<Diagnostic> warnings;
+  const FuzzyPlan f = read(tied, &warnings).fuzzy;
+  for (const Diagnostic& d : warnings) EXPECT_EQ(d.code, "W508") << d.message << ": the plan has other bars";
+  ASSERT_EQ(f.interaction.constraints.size(), 2u);
+  const std::vector<double> values = calc_interacting(f, std::vector{18e6, 28e-4});
+  ASSERT_EQ(values.size(), 3u);
+  EXPECT_DOUBLE_EQ(values[0], 18);
+  EXPECT_DOUBLE_EQ(values[1], 2800);
+  EXPECT_DOUBLE_EQ(values[2], 1.4);
+  EXPECT_NEAR(calc_excess(f.interaction, 0, values), 2800 - (2513 - 210), 1e-8);
+  EXPECT_NEAR(calc_excess(f.interaction, 1, values), 1.4 - 3, 1e-8);
+  EXPECT_NEAR(calc_joint(f.interaction, values), 1 - 0.287, 1e-12);
+  EXPECT_EQ(calc_joint(f.interaction, calc_interacting(f, calc_centre(f))), 1);
+  EXPECT_TRUE(is_possible(f, calc_centre(f)));
+  EXPECT_FALSE(is_possible(f, std::vector{18e6, 28e-4}));
+  EXPECT_TRUE(is_possible(f, std::vector{35e6, 28e-4}));
+  EXPECT_FALSE(is_possible(f, std::vector{45e6, 28e-4})) << "fct = 3.35 N/mm2";
+  EXPECT_FALSE(is_possible(f, std::vector{7e6, 20e-4})) << "fct has no value";
+  EXPECT_FALSE(is_possible(f, std::vector{35e6, 10e-4})) << "joint membership 0";
+}
+
+TEST(FuzzyPlan, InteractionCallsWhatFollowsByItsPathWhereNamesAreTaken) {
+  const Plan plan = read(R"toml([fuzzy]
+stage."*".charge."*".destroyed_length = { triangular = ["0.8 m", "1.1 m", "1.3 m"], name = "gap" }
+stage."*".charge."*".position = { formula = "gap / 2 + 300" }
+[fuzzy.interaction]
+constraints = ["stage_1_charge_1_position + stage_2_charge_1_position <= gap + 601"]
+)toml");
+  const auto values = calc_interacting(plan.fuzzy, std::vector{1.0});
+  EXPECT_NEAR(calc_excess(plan.fuzzy.interaction, 0, values), -1, 1e-8);
+}
+
+// The only corner that is no plan is cut away.
+TEST(FuzzyPlan, AsksForNoPlanWhereTheInteractionLeavesNoSample) {
+  std::vector<Diagnostic> warnings;
+  read(R"toml([fuzzy]
+stage.front.charge.1.position = { triangular = ["0.75 m", "1 m", "1 m"] }
+stage.front.charge.1.destroyed_length = { triangular = ["1 m", "1.2 m", "1.8 m"] }
+interaction.constraints = ["destroyed_length <= 2 * position"]
+)toml",
+       &warnings);
+  EXPECT_TRUE(warnings.empty()) << rendered(warnings, "");
 }
 
 TEST(FuzzyPlan, RefusesSamplesThatAreNoPlan) {

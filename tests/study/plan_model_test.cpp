@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "small_fuzzy_plan.h"
+#include "uncertainty/alpha.h"
 
 namespace topple::study {
 namespace {
@@ -72,6 +73,49 @@ TEST(PlanModel, TakesTheAnalysisFromThePlan) {
   EXPECT_THAT(p.levels, testing::ElementsAre(0, 0.5, 1));
   EXPECT_EQ(p.limit, 500);
   EXPECT_EQ(p.seed, 7u);
+}
+
+constexpr const char* tied = R"toml([fuzzy]
+concrete.C25.fc = { triangular = ["10 N/mm2", "25 N/mm2", "45 N/mm2"] }
+stage.1.charge.1.destroyed_length = { triangular = ["1 m", "1.2 m", "1.4 m"] }
+[fuzzy.interaction]
+constraints = ["fc / 20 + destroyed_length / 1000 <= 3"]
+)toml";
+
+// y = fc / 20 + L is at most 3 where the cut passes the constraint, fc at most 40 (at the least L), and least where it
+// was; at 0.75 the whole cut keeps it.
+TEST(PlanModelPhysics, ConstraintCutsACornerOff) {
+  const Problem p = make_plan_problem(read_small(tied), quick());
+  ASSERT_EQ(p.space.constraints.size(), 1u);
+  EXPECT_NE(calc_model_hash(p),
+            calc_model_hash(make_plan_problem(read_small(product::replaced(tied, "<= 3", "<= 3.01")), quick())));
+  int runs = 0;
+  const uncertainty::Evaluate model = uncertainty::make_evaluate_values([&](const Point& x) {
+    ++runs;
+    const double y = x[0] / 20e6 + x[1];
+    EXPECT_LE(y, 3 + 1e-10);
+    return std::vector{y, x[0] / 1e6};
+  });
+  uncertainty::AlphaOptions options;
+  options.levels = {0, 0.5, 0.75, 1};
+  const uncertainty::AlphaResult r = uncertainty::optimise(p.space, model, options, {});
+  EXPECT_GT(runs, 100);
+  const auto& y = r.outputs[0].levels;
+  const double lower[] = {1.5, 1.975, 2.2125, 2.45}, upper[] = {3, 3, 2.75, 2.45};
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_NEAR(y[i].lower.value, lower[i], 1e-6) << i;
+    EXPECT_NEAR(y[i].upper.value, upper[i], 1e-6) << i;
+  }
+  EXPECT_NEAR(r.outputs[1].levels[0].upper.value, 40, 1e-4);
+}
+
+TEST(PlanModel, TakesTheJointMembershipOfThePlan) {
+  const std::string joint = product::replaced(tied, "constraints = [\"fc / 20 + destroyed_length / 1000 <= 3\"]",
+                                              "membership = \"max(0, 1 - abs(destroyed_length - 1200) / 100)\"");
+  const Problem p = make_plan_problem(read_small(joint), quick());
+  EXPECT_EQ(uncertainty::calc_membership(p.space, {25e6, 1.2}), 1);
+  EXPECT_NEAR(uncertainty::calc_membership(p.space, {25e6, 1.25}), 0.5, 1e-12);
+  EXPECT_EQ(uncertainty::calc_membership(p.space, {25e6, 1.35}), 0) << "0.25 without the joint membership";
 }
 
 TEST(PlanModel, StopsAtACancellation) {
