@@ -145,15 +145,32 @@ double calc_lowest_over(const PlacedBox& box, const Polygon& polygon) {
   return lowest;
 }
 
+namespace {
+
+/// Half of the upright box around a box [m].
+Vec3 calc_upright_half(const Mat3& R, const Vec3& half) {
+  Vec3 reach;
+  for (int i = 0; i < 3; ++i)
+    reach[i] = std::abs(R(i, 0)) * half.x + std::abs(R(i, 1)) * half.y + std::abs(R(i, 2)) * half.z;
+  return reach;
+}
+
+}  // namespace
+
+double calc_heap_height(const std::vector<PlacedBox>& boxes) {
+  double height = 0;
+  for (const PlacedBox& box : boxes)
+    height = std::max(height, box.X_WS.p.z + calc_upright_half(to_matrix(box.X_WS.q), box.half).z);
+  return height;
+}
+
 Heap calc_heap(const std::vector<PlacedBox>& boxes, double cell) {
   Heap heap;
+  heap.height = calc_heap_height(boxes);
   std::map<std::pair<std::int64_t, std::int64_t>, double> top;
   for (const PlacedBox& box : boxes) {
     const Mat3 R = to_matrix(box.X_WS.q);
-    Vec3 reach;
-    for (int i = 0; i < 3; ++i)
-      reach[i] = std::abs(R(i, 0)) * box.half.x + std::abs(R(i, 1)) * box.half.y + std::abs(R(i, 2)) * box.half.z;
-    heap.height = std::max(heap.height, box.X_WS.p.z + reach.z);
+    const Vec3 reach = calc_upright_half(R, box.half);
     const auto first = [&](double v) { return static_cast<std::int64_t>(std::floor(v / cell)); };
     for (std::int64_t i = first(box.X_WS.p.x - reach.x); i <= first(box.X_WS.p.x + reach.x); ++i)
       for (std::int64_t j = first(box.X_WS.p.y - reach.y); j <= first(box.X_WS.p.y + reach.y); ++j) {

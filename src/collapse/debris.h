@@ -44,5 +44,7 @@ struct Heap {
 };
 /// Heights are sampled on a grid of `cell` [m]; the volume's error is of the order of the outline times the cell.
 Heap calc_heap(const std::vector<PlacedBox>&, double cell);
+/// Its highest point alone, without a grid [m].
+double calc_heap_height(const std::vector<PlacedBox>&);
 
 }  // namespace topple::collapse

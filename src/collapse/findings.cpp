@@ -23,12 +23,8 @@ namespace {
 using record::Status;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-constexpr double kPi = 3.14159265358979323846;
-constexpr double kHeapCell = 0.25;     // [m]
-constexpr double kOnGround = 0.1;      // height of what lies on the ground or on what lies there [m]
 constexpr double kSkew = 0.1;          // sine of the azimuth against the grid from which it lies askew
 constexpr double kFramesApart = 0.04;  // more is told [s]
-constexpr double kStill = 0.2;         // speed below which a part counts as lying [m/s]
 constexpr const char* kNotJudged = " Not judged: ";
 constexpr size_t kShownMargins = 5;
 constexpr size_t kShownTouchdowns = 5;
@@ -251,12 +247,12 @@ Reach add_debris(const Context& c, const Mechanism& m) {
           "The mass centre moved by less than half a metre to any side.", kNone, "rad");
   } else {
     const double planned = std::atan2(c.map.fall_direction.y, c.map.fall_direction.x);
-    const double off = std::remainder(m.azimuth - planned, 2 * kPi);
     std::string text = m.is_azimuth_of_lean ? fmt::format("At {:.2f} s the upper block leans towards {}", m.time,
                                                           azimuth_words(m.azimuth))
                                             : "The mass centre moved towards " + azimuth_words(m.azimuth);
     if (c.map.is_direction_planned)
-      text += fmt::format(", {} deg from the planned {}", fixed_words(std::abs(off) / unit::deg, find_digits(planned)),
+      text += fmt::format(", {} deg from the planned {}",
+                          fixed_words(calc_deviation(m, planned) / unit::deg, find_digits(planned)),
                           azimuth_words(planned, find_digits(planned)));
     text += " (0 deg is +x, counter-clockwise).";
     if (m.is_azimuth_of_lean)
@@ -279,7 +275,7 @@ Reach add_debris(const Context& c, const Mechanism& m) {
     text += fmt::format(" The outline of the nearest {:.0f} % of the mass encloses {:.0f} m2.", 100 * share,
                         calc_area(calc_share_outline(c.r, last, share)));
   c.add("debris.reach", "Fall and debris", "Reach of the debris", text, reach.largest, "m");
-  const Heap heap = calc_heap(find_moving_boxes(c.r, last), kHeapCell);
+  const Heap heap = find_heap(c.r, last);
   double solid = 0;  // what is crushed included
   for (size_t b = 0; b < c.map.bodies.size(); ++b)
     if (!c.model.bodies[b].fixed && !stays_beside(c.r, b, last)) solid += c.map.bodies[b].volume;
@@ -294,58 +290,20 @@ Reach add_debris(const Context& c, const Mechanism& m) {
   return reach;
 }
 
-/// What comes how near to a neighbour, seen from above, and how low it comes there.
-struct Approach {
-  double least = std::numeric_limits<double>::infinity(), when = 0;  // distance in plan
-  std::string who;
-  double lowest = std::numeric_limits<double>::infinity(), lowest_when = 0;  // height over its area
-  std::string lowest_who;
-};
-
-/// Ends where the first part is down on the neighbour's area.
-Approach find_approach(const Context& c, const product::Neighbour& n) {
-  Approach out;
-  double nlow[2] = {1e30, 1e30}, nhigh[2] = {-1e30, -1e30};
-  for (const auto& p : n.footprint)
-    for (size_t i : {0UL, 1UL}) nlow[i] = std::min(nlow[i], p[i]), nhigh[i] = std::max(nhigh[i], p[i]);
-  for (size_t f = 0; f < c.r.time.size() && !c.is_cancelled(); ++f) {
-    for (size_t b = 0; b < c.r.bodies.size(); ++b) {
-      if (f > 0 && c.r.bodies[b].fixed) continue;
-      const Pose X_WB = c.pose(f, b);
-      for (size_t i = 0; i < c.r.bodies[b].shapes.size(); ++i) {
-        const record::BoxShape s = record::shape_at(c.r, f, b, i);
-        const PlacedBox box{X_WB * s.X_BS, s.half};
-        const double radius = norm(s.half);
-        const double gap[2] = {std::max({nlow[0] - box.X_WS.p.x - radius, box.X_WS.p.x - radius - nhigh[0], 0.0}),
-                               std::max({nlow[1] - box.X_WS.p.y - radius, box.X_WS.p.y - radius - nhigh[1], 0.0})};
-        const double at_least = std::hypot(gap[0], gap[1]);
-        if (at_least > 0 && at_least >= out.least) continue;
-        const double d = calc_distance(calc_outline(box), n.footprint);
-        if (d < out.least) out.least = d, out.when = c.r.time[f], out.who = c.r.bodies[b].name;
-        if (d > 0) continue;
-        const double height = calc_lowest_over(box, n.footprint);
-        if (height < out.lowest)
-          out.lowest = height, out.lowest_when = c.r.time[f], out.lowest_who = c.r.bodies[b].name;
-      }
-    }
-    if (out.lowest <= kOnGround) break;
-  }
-  return out;
-}
-
 void add_clearances(const Context& c) {
   for (const product::Neighbour& n : c.plan.neighbours) {
-    const Approach a = find_approach(c, n);
+    const Approach a = find_approach(c.r, n.footprint, c.cancel);
+    const std::string who = c.r.bodies[a.body].name, lowest_who = c.r.bodies[a.lowest_body].name;
     const bool asked = n.clearance.has_value();
     const auto [distance, limit] = tell_apart(a.least, n.clearance.value_or(kNone));
-    std::string text = fmt::format("The nearest part, {}, comes to {} m at {:.2f} s", a.who, distance, a.when);
+    std::string text = fmt::format("The nearest part, {}, comes to {} m at {:.2f} s", who, distance, a.when);
     if (a.lowest <= kOnGround)
-      text = a.lowest_when <= c.r.time.front() ? fmt::format("{} stands on it from the start", a.lowest_who)
-                                               : fmt::format("{} lands on it at {:.2f} s", a.lowest_who, a.lowest_when);
+      text = a.lowest_when <= c.r.time.front() ? fmt::format("{} stands on it from the start", lowest_who)
+                                               : fmt::format("{} lands on it at {:.2f} s", lowest_who, a.lowest_when);
     else if (a.least <= 0)
       text = fmt::format(
           "Nothing lands on it, but parts are over it: {} comes down to {:.1f} m above the ground there, at {:.2f} s",
-          a.lowest_who, a.lowest, a.lowest_when);
+          lowest_who, a.lowest, a.lowest_when);
     if (asked) text += fmt::format("; the limit is {} m", limit);
     const bool is_reached = a.least <= 0, lands = a.lowest <= kOnGround;
     const bool is_broken = asked && (a.least < *n.clearance || lands);
@@ -688,7 +646,7 @@ void add_criteria(const Context& c, const Mechanism& m, const Standing& standing
               falls_on(met));
   }
   if (want.azimuth) {
-    const double off = std::abs(std::remainder(m.azimuth - *want.azimuth, 2 * kPi));
+    const double off = calc_deviation(m, *want.azimuth);
     const double tolerance = want.azimuth_tolerance.value_or(c.k.mechanism_direction_tolerance);
     // as many digits as show whether it is within the tolerance
     const int asked = find_digits(*want.azimuth), about = find_digits(tolerance);

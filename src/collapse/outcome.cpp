@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numbers>
 
 namespace topple::collapse {
 
@@ -127,6 +128,44 @@ std::vector<PlacedBox> find_moving_boxes(const record::Record& r, size_t frame) 
     }
   }
   return boxes;
+}
+
+Heap find_heap(const record::Record& r, size_t frame) {
+  constexpr double cell = 0.25;  // [m]
+  return calc_heap(find_moving_boxes(r, frame), cell);
+}
+
+double calc_deviation(const Mechanism& m, double azimuth) {
+  return std::abs(std::remainder(m.azimuth - azimuth, 2 * std::numbers::pi));
+}
+
+Approach find_approach(const record::Record& r, const Polygon& area, const std::atomic<bool>* cancel) {
+  Approach out;
+  double nlow[2] = {1e30, 1e30}, nhigh[2] = {-1e30, -1e30};
+  for (const Point2& p : area)
+    for (size_t i : {0UL, 1UL}) nlow[i] = std::min(nlow[i], p[i]), nhigh[i] = std::max(nhigh[i], p[i]);
+  for (size_t f = 0; f < r.time.size() && !(cancel != nullptr && *cancel); ++f) {
+    for (size_t b = 0; b < r.bodies.size(); ++b) {
+      if (f > 0 && r.bodies[b].fixed) continue;
+      const Pose X_WB = record::pose_at(r, f, b);
+      for (size_t i = 0; i < r.bodies[b].shapes.size(); ++i) {
+        const record::BoxShape s = record::shape_at(r, f, b, i);
+        const PlacedBox box{X_WB * s.X_BS, s.half};
+        const double radius = norm(s.half);
+        const double gap[2] = {std::max({nlow[0] - box.X_WS.p.x - radius, box.X_WS.p.x - radius - nhigh[0], 0.0}),
+                               std::max({nlow[1] - box.X_WS.p.y - radius, box.X_WS.p.y - radius - nhigh[1], 0.0})};
+        const double at_least = std::hypot(gap[0], gap[1]);
+        if (at_least > 0 && at_least >= out.least) continue;
+        const double d = calc_distance(calc_outline(box), area);
+        if (d < out.least) out.least = d, out.when = r.time[f], out.body = b;
+        if (d > 0) continue;
+        const double height = calc_lowest_over(box, area);
+        if (height < out.lowest) out.lowest = height, out.lowest_when = r.time[f], out.lowest_body = b;
+      }
+    }
+    if (out.lowest <= kOnGround) break;
+  }
+  return out;
 }
 
 namespace {

@@ -2,6 +2,8 @@
 /// Numbers of a finished run that findings and studies share.
 
 #include <array>
+#include <atomic>
+#include <limits>
 #include <vector>
 
 #include "collapse/debris.h"
@@ -38,6 +40,24 @@ bool stays_beside(const record::Record&, size_t body, size_t frame);
 /// Boxes of all bodies that can move, as crushing has left them, without those that stay beside the building.
 std::vector<PlacedBox> find_moving_boxes(const record::Record&, size_t frame);
 
+/// The heap of all parts that can move, on a grid of 0.25 m.
+Heap find_heap(const record::Record&, size_t frame);
+
+/// Between the way it fell and an azimuth, 0 to π; NaN where nothing fell to any side [rad].
+double calc_deviation(const Mechanism&, double azimuth);
+
+inline constexpr double kOnGround = 0.1;  // height of what lies on the ground or on what lies there [m]
+
+/// What comes how near to an area, seen from above, and how low it comes there.
+struct Approach {
+  double least = std::numeric_limits<double>::infinity(), when = 0;  // distance in plan; 0: over it [m, s]
+  size_t body = 0;
+  double lowest = std::numeric_limits<double>::infinity(), lowest_when = 0;  // height over its area [m, s]
+  size_t lowest_body = 0;
+};
+/// Of all frames until the first part is down on the area (kOnGround), or until `cancel` is set.
+Approach find_approach(const record::Record&, const Polygon& area, const std::atomic<bool>* cancel = nullptr);
+
 /// How far parts lie beyond the building's footprint, the convex outline of what stood before the first charge.
 struct Reach {
   std::array<double, 4> side{};       // along -x, +x, -y, +y beyond the box around it; 0: not beyond [m]
@@ -56,6 +76,7 @@ struct OpenPart {
   double speed = 0;  // over the last interval between frames [m/s]
   double way = 0;    // that it may still go: (v²/2 + g z) / (μ g), as if it slid until nothing is left [m]
 };
+inline constexpr double kStill = 0.2;  // speed below which a part counts as lying [m/s]
 /// None where there is one frame only.
 ///   least_speed  below which a part rests [m/s]
 ///   friction     on the ground

@@ -1,6 +1,7 @@
 #include "collapse/sample_runs.h"
 
 #include <algorithm>
+#include <cmath>
 #include <ctime>
 #include <exception>
 #include <memory>
@@ -136,6 +137,17 @@ void spread(Reach& reach, const product::Plan& plan) {
   reach.area = calc_area(reach.outline);
 }
 
+/// What findings tell besides.
+void fill_findings(const Sample& s, SampleRun& out) {
+  out.volume = find_heap(s.record, s.record.time.size() - 1).volume;
+  out.deviation = calc_deviation(out.mechanism, std::atan2(s.map.fall_direction.y, s.map.fall_direction.x));
+  for (const product::Neighbour& n : s.plan.neighbours)
+    out.clearance.push_back(find_approach(s.record, n.footprint).least);
+  if (s.summary.ending != mbs::Summary::Ending::TimeLimit) return;
+  for (const OpenPart& part : find_open_parts(s.record, norm(s.model.gravity), s.plan.ground.friction, kStill))
+    out.way_left = std::max(out.way_left, part.way);
+}
+
 void fill(Sample& s, const Knowledge& k, const SampleRunOptions& options, SampleRun& out) {
   using Ending = mbs::Summary::Ending;
   s.recorder->finish();
@@ -166,7 +178,10 @@ void fill(Sample& s, const Knowledge& k, const SampleRunOptions& options, Sample
   const std::vector<double>& kinetic = series("energy_kinetic");
   out.touchdown_energy = out.touchdown <= out.time.back() ? s.recorder->first_touchdown_kinetic() : kinetic.back();
   out.largest_energy = std::max(*std::max_element(kinetic.begin(), kinetic.end()), out.touchdown_energy);
-  out.reach = calc_reach(s.record, out.time.size() - 1);
+  const size_t last = out.time.size() - 1;
+  out.reach = calc_reach(s.record, last);
+  out.height = calc_heap_height(find_moving_boxes(s.record, last));
+  if (options.findings && !options.condensation) fill_findings(s, out);
   if (options.condensation) {
     spread(out.reach, s.plan);
   } else if (s.plan.vibration) {

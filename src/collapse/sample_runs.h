@@ -25,6 +25,7 @@ struct SampleRunOptions {
   double pass_speed = 0.1, pass_share = 2e-3;  // mbs::Options, of condensed samples
   double step_share = 1;                       // mbs::Options
   bool full_law = false;                       // mbs::Options
+  bool findings = true;                        // SampleRun::volume and what follows it
   bool lanes = false;  // plans whose models are of one build run in the lanes of one batch; the same bits
 };
 
@@ -55,6 +56,13 @@ struct SampleRun {
   /// Screening of ground vibration by what parts lost in the run: middle of the band at each neighbour [m/s]; empty
   /// without the site's law, and of condensed samples, whose parts stand for many.
   std::vector<double> shaking;
+  double height = 0;  // of the heap at the end [m]
+  // as findings have them; 0 and empty without SampleRunOptions::findings, and of condensed samples, which know nothing
+  // across the frames
+  double volume = 0;              // of the heap [m³]
+  double deviation = 0;           // of the fall from the planned direction; NaN if nothing fell to any side [rad]
+  std::vector<double> clearance;  // least distance of a part from each neighbour in the run, in plan; 0: over it [m]
+  double way_left = 0;  // that a part which still moves may go on at most (OpenPart); infinite without friction [m]
 };
 
 /// Plans run together in lanes.

@@ -571,6 +571,8 @@ uncertainty::AlphaOptions make_alpha_options(const Problem& p) {
   if (!p.levels.empty()) options.levels = p.levels;
   if (p.limit > 0) options.limit = p.limit;
   options.seed = p.seed;
+  for (std::size_t o = 0; o < p.outputs.size(); ++o)
+    if (!p.outputs[o].is_searched) options.passive_outputs.push_back(static_cast<int>(o));
   return options;
 }
 

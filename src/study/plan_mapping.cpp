@@ -70,7 +70,12 @@ bool has_screening(const product::Plan& plan, const PlanMappingOptions& o) {
 
 bool has_sides(const PlanMappingOptions& o) { return o.sideways && !o.condensed; }
 
-std::string name_of_screening(const product::Plan& plan, size_t neighbour) {
+bool has_clearances(const PlanMappingOptions& o) { return o.findings && has_sides(o); }
+
+namespace {
+
+/// "workshop" of "Workshop", with a number where that is not unique.
+std::string name_of_neighbour(const product::Plan& plan, size_t neighbour) {
   const auto slug = [&plan](size_t i) {
     std::string out;
     for (const char c : plan.neighbours[i].name) {
@@ -86,7 +91,17 @@ std::string name_of_screening(const product::Plan& plan, size_t neighbour) {
   const std::string own = slug(neighbour);
   bool is_unique = !own.empty();
   for (size_t i = 0; i < plan.neighbours.size(); ++i) is_unique = is_unique && (i == neighbour || slug(i) != own);
-  return "vibration_" + (is_unique ? own : fmt::format("{}{}{}", own, own.empty() ? "" : "_", neighbour + 1));
+  return is_unique ? own : fmt::format("{}{}{}", own, own.empty() ? "" : "_", neighbour + 1);
+}
+
+}  // namespace
+
+std::string name_of_clearance(const product::Plan& plan, size_t neighbour) {
+  return "clearance_" + name_of_neighbour(plan, neighbour);
+}
+
+std::string name_of_screening(const product::Plan& plan, size_t neighbour) {
+  return "vibration_" + name_of_neighbour(plan, neighbour);
 }
 
 struct PlanMapping::Impl {
@@ -99,6 +114,7 @@ struct PlanMapping::Impl {
   collapse::Condensation condensation;
   collapse::KnownCurves known;
   double vibration_factor = 0;  // of the band's upper end; 0: no screening
+  bool has_direction = false;   // the plan has an azimuth of fall
   bool is_early_bad = false;    // the plan asks the building to stand between its stages
 
   collapse::SampleRunOptions run_options() const {
@@ -108,6 +124,7 @@ struct PlanMapping::Impl {
     if (!options.passes_quiet) o.pass_speed = 0;
     o.step_share = options.step_share, o.full_law = options.full_law;
     o.ends_early = is_early_bad;
+    o.findings = has_clearances(options);
     return o;
   }
   Result to_result(const collapse::SampleRun&) const;
@@ -154,7 +171,9 @@ PlanMapping::PlanMapping(const product::Plan& plan, const collapse::Knowledge& k
   if (options.directions < 3 || options.directions > 3600)
     throw InputError("E205", fmt::format("{} directions of the debris outline: 3 to 3600", options.directions));
   std::erase_if(options.tilt_times, [&](double t) { return t > options.after; });
-  auto impl = std::make_unique<Impl>(Impl{product::make_sampler(plan), k, options, {}, {}, {}, {}, {}, {}, 0, false});
+  auto impl =
+      std::make_unique<Impl>(Impl{product::make_sampler(plan), k, options, {}, {}, {}, {}, {}, {}, 0, false, false});
+  impl->has_direction = plan.criteria.azimuth.has_value();
   impl->is_early_bad = plan.criteria.stands_between_stages.value_or(false);
   for (const product::FuzzyValue& v : plan.fuzzy.inputs) {
     impl->inputs.push_back({v.path, v.symbol, v.unit});
@@ -176,6 +195,15 @@ PlanMapping::PlanMapping(const product::Plan& plan, const collapse::Knowledge& k
                                                          {"rear_share", "%", 0.01},
                                                          {"utilisation", "%", 0.01}})
     if (has_sides(options) || (q.name != "reach_neg_y" && q.name != "reach_pos_y")) impl->outputs.push_back(q);
+  if (options.findings) impl->outputs.push_back({"heap_height", "m", 1, false});
+  if (has_clearances(options)) {
+    impl->outputs.push_back({"heap_volume", "m3", 1, false});
+    impl->outputs.push_back({"debris_reach", "m", 1, false});
+    for (size_t n = 0; n < plan.neighbours.size(); ++n)
+      impl->outputs.push_back({name_of_clearance(plan, n), "m", 1, false});
+    if (impl->has_direction) impl->outputs.push_back({"azimuth_deviation", "deg", unit::deg, false});
+    impl->outputs.push_back({"way_left", "m", 1, false});
+  }
   if (has_screening(plan, options)) {
     impl->vibration_factor = plan.vibration->factor;
     for (size_t n = 0; n < plan.neighbours.size(); ++n)
@@ -226,6 +254,14 @@ Result PlanMapping::Impl::to_result(const collapse::SampleRun& r) const {
     out.values.push_back(x);
   if (has_sides(options)) out.values.insert(out.values.end(), {r.reach.side[2], r.reach.side[3]});
   out.values.insert(out.values.end(), {r.reach.most_mass, r.mechanism.rear_share, r.utilisation});
+  if (options.findings) out.values.push_back(r.height);
+  if (has_clearances(options)) {
+    out.values.insert(out.values.end(), {r.volume, r.reach.largest});
+    out.values.insert(out.values.end(), r.clearance.begin(), r.clearance.end());
+    // neither towards the planned direction nor against it
+    if (has_direction) out.values.push_back(std::isnan(r.deviation) ? std::numbers::pi / 2 : r.deviation);
+    out.values.push_back(std::min(r.way_left, kUnlimited));
+  }
   if (vibration_factor > 0)
     for (const double v : r.shaking) out.values.push_back(vibration_factor * v);
   for (const double t : trajectory_times) out.trajectory.push_back(interpolate(r.time, r.tilt, r.release + t));

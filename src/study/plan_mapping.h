@@ -30,6 +30,9 @@ struct PlanMappingOptions {
   bool vibration = true;
   /// Reach of parts across the frames; not of condensed runs, in which nothing falls sideways.
   bool sideways = true;
+  /// Numbers of findings: height and volume of the heap, reach of debris, deviation of the fall, clearances; of
+  /// condensed runs and those without `sideways` the height alone. Stores of earlier versions have runs without.
+  bool findings = true;
 };
 
 /// How long samples of a plan are simulated after its last stage: what its fuzzy.search says, or until its analysis
@@ -39,6 +42,10 @@ double find_after(const product::Plan&);
 bool has_screening(const product::Plan&, const PlanMappingOptions&);
 /// Whether runs tell how far parts lie across the frames.
 bool has_sides(const PlanMappingOptions&);
+/// Whether runs tell how far debris reaches to any side, its volume, and how near it comes to neighbours.
+bool has_clearances(const PlanMappingOptions&);
+/// Output with the clearance of a neighbour: "clearance_workshop" of "Workshop".
+std::string name_of_clearance(const product::Plan&, size_t neighbour);
 /// Output with the upper end of the screening band at a neighbour: "vibration_workshop" of "Workshop".
 std::string name_of_screening(const product::Plan&, size_t neighbour);
 
@@ -56,7 +63,11 @@ struct PlanMappingTimes {
 struct PlanQuantity {
   std::string name, symbol;  // unit for people
   double unit = 1;           // SI value of one of it
+  bool is_searched = true;   // runs are spent on its bounds; else they are those of the runs that there are
 };
+
+/// way_left of parts that nothing brings to rest [m].
+inline constexpr double kUnlimited = 1e4;
 
 /// Outcome classes: those of collapse::Mechanism, and "early" where the building does not stand until its last stage
 /// and the plan asks it to.
@@ -77,7 +88,11 @@ class PlanMapping {
   /// stage's time, and `after` if there is none by then; tilt and energy in motion then (at the end without one) and at
   /// most; reach of parts beyond the footprint to each side (has_sides) and of 95 % of the mass, at the end;
   /// rear_share: drop of the rear edge over that of the front edge; utilisation: largest use of a zone's resistance
-  /// before the last stage (the margin is its inverse), 1 if it did not stand until then; vibration_NAME: upper end of
+  /// before the last stage (the margin is its inverse), 1 if it did not stand until then;
+  /// heap_height at the end; has_clearances: heap_volume, debris_reach as the plan's criterion has it, clearance_NAME
+  /// of each neighbour as its finding has it, azimuth_deviation of the fall from the planned azimuth, where there is
+  /// one (π/2 where nothing fell to any side), and way_left, the longest way that a part which still moved at the end
+  /// may go on, at most kUnlimited; vibration_NAME: upper end of
   /// the screening band at a neighbour by what has touched down at the end of the run.
   const std::vector<PlanQuantity>& outputs() const;
   /// The trajectory is the tilt at these times after the last stage's [s], then how far parts extend from W's origin

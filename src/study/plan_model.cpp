@@ -56,6 +56,7 @@ Definition read_definition(const std::string& text) {
   out.options.condensed = identity.contains("condensed");
   out.options.vibration = identity.value("vibration", false);
   out.options.sideways = !identity.contains("in_plane");
+  out.options.findings = identity.contains("findings");
   out.options.threads = 1;
   out.rules = identity.at("rules").get<std::string>();
   std::vector<Diagnostic> warnings;
@@ -87,21 +88,29 @@ Site make_site(const product::Plan& plan) {
   return site;
 }
 
-/// What a plan asks for and a study does not compare with its runs, for people.
-std::vector<std::string> list_not_judged(const product::Plan& plan) {
-  std::vector<std::string> out;
-  if (plan.criteria.debris_reach) out.emplace_back("debris_reach");
-  for (const product::Neighbour& n : plan.neighbours)
-    if (n.clearance) out.push_back("clearance: \"" + n.name + "\"");
-  return out;
-}
-
-/// Limits of ground vibration at the neighbours' foundations, over the frequencies in which the ground answers.
-std::vector<Limit> list_limits(const product::Plan& plan) {
-  std::vector<Limit> out;
+/// Fills in what a plan asks of its debris: limits, and what a study does not compare with its runs.
+void list_debris_limits(const product::Plan& plan, const PlanMappingOptions& options, Problem& p) {
+  const bool is_judged = has_clearances(options);
+  if (const auto most = plan.criteria.debris_reach; most && is_judged)
+    p.limits.push_back({"debris_reach", "", *most, *most, "of the plan", Limit::Kind::Reach, "way_left"});
+  else if (most)
+    p.not_judged.emplace_back("debris_reach");
   for (std::size_t i = 0; i < plan.neighbours.size(); ++i) {
     const product::Neighbour& n = plan.neighbours[i];
-    Limit limit{name_of_screening(plan, i), n.name, 0, 0, ""};
+    // a clearance of 0 is broken by what lands on the neighbour, not by what is above it; the number is 0 for both
+    if (n.clearance && *n.clearance > 0 && is_judged)
+      p.limits.push_back({name_of_clearance(plan, i), n.name, *n.clearance, *n.clearance, "of the plan",
+                          Limit::Kind::Clearance, "way_left"});
+    else if (n.clearance)
+      p.not_judged.push_back("clearance: \"" + n.name + "\"");
+  }
+}
+
+/// Adds limits of ground vibration at the neighbours' foundations, over the frequencies in which the ground answers.
+void list_vibration_limits(const product::Plan& plan, std::vector<Limit>& out) {
+  for (std::size_t i = 0; i < plan.neighbours.size(); ++i) {
+    const product::Neighbour& n = plan.neighbours[i];
+    Limit limit{name_of_screening(plan, i), n.name, 0, 0, "", Limit::Kind::Screening};
     if (n.vibration_limit > 0) {
       limit.least = limit.most = n.vibration_limit;
       limit.source = "of the plan";
@@ -112,7 +121,6 @@ std::vector<Limit> list_limits(const product::Plan& plan) {
     }
     if (limit.least > 0) out.push_back(std::move(limit));
   }
-  return out;
 }
 
 }  // namespace
@@ -125,7 +133,7 @@ Problem make_plan_problem(const product::Plan& plan, const PlanMappingOptions& g
   p.title = plan.title;
   for (const PlanQuantity& q : mapping.inputs()) p.inputs.push_back({q.name, q.symbol, q.unit});
   for (const product::DerivedValue& d : plan.fuzzy.derived) p.derived.push_back({d.path, d.symbol, d.unit});
-  for (const PlanQuantity& q : mapping.outputs()) p.outputs.push_back({q.name, q.symbol, q.unit});
+  for (const PlanQuantity& q : mapping.outputs()) p.outputs.push_back({q.name, q.symbol, q.unit, q.is_searched});
   p.outcomes = plan_outcomes();
   p.curves.push_back({"tilt", "deg", unit::deg, "time after the last stage", "s", mapping.trajectory_times(), false});
   p.curves.push_back({"outline", "m", 1, "direction", "deg", {}, true});
@@ -133,7 +141,7 @@ Problem make_plan_problem(const product::Plan& plan, const PlanMappingOptions& g
   p.asked = plan.criteria.mechanism.value_or("");
   p.site = make_site(plan);
   p.not_modelled = collapse::not_modelled(plan);
-  p.not_judged = list_not_judged(plan);
+  list_debris_limits(plan, options, p);
   p.horizon = {"touchdown", "stands", options.after};
   p.space = mapping.space();
   if (!p.derived.empty())
@@ -153,11 +161,16 @@ Problem make_plan_problem(const product::Plan& plan, const PlanMappingOptions& g
     p.identity = identity.dump();
   }
   p.settings = json{{"path", plan.path}}.dump();
+  if (options.findings) {
+    json identity = json::parse(p.identity);
+    identity["findings"] = true;
+    p.identity = identity.dump();
+  }
   if (has_screening(plan, options)) {
     json identity = json::parse(p.identity);
     identity["vibration"] = true;
     p.identity = identity.dump();
-    p.limits = list_limits(plan);
+    list_vibration_limits(plan, p.limits);
   }
   if (options.condensed) {
     PlanMappingOptions whole = options;

@@ -18,7 +18,8 @@ namespace topple::study {
 /// Name and unit of a coordinate, for people and programs. Points hold values in `unit_value` (1: as they are shown).
 struct Quantity {
   std::string name, unit;
-  double unit_value = 1;  // of one unit, in what points hold
+  double unit_value = 1;    // of one unit, in what points hold
+  bool is_searched = true;  // of an output: runs are spent on its bounds; else they are those of the others' runs
 };
 
 /// What a part of each trajectory means.
@@ -41,12 +42,20 @@ struct Site {
   std::vector<Area> neighbours;
 };
 
-/// What an output should stay below, for sentences.
+/// What an output should keep, for sentences.
 struct Limit {
+  enum class Kind {
+    Screening,  // stays below it
+    Reach,      // is at most it
+    Clearance,  // is at least it
+  };
   std::string output;          // its name
-  std::string place;           // for people: a neighbour
+  std::string place;           // for people: a neighbour; empty: none
   double least = 0, most = 0;  // the limit, or the range in which it lies, in what outputs hold
   std::string source;          // of the limit
+  Kind kind = Kind::Screening;
+  /// Output by how much the value may still get worse behind the end of a run; empty: not at all.
+  std::string left = {};
 };
 
 /// When runs of a plan end. One whose `output` says just that time, and whose outcome is not `unless`, ended before

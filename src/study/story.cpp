@@ -116,7 +116,39 @@ void doubt(const Problem& p, const StudyResult& r, Sentence& s) {
   s.status = Status::Warning;
 }
 
-/// How possible it is that an output reaches its limit: the most possible run that does.
+/// Whether a value, which may still get worse by `left`, breaks a limit.
+bool is_broken(const Limit& limit, double value, double left = 0) {
+  switch (limit.kind) {
+    case Limit::Kind::Reach:
+      return value + left > limit.least;
+    case Limit::Kind::Clearance:
+      return value - left < limit.least;
+    case Limit::Kind::Screening:
+      break;
+  }
+  return value + left >= limit.least;
+}
+
+/// What lies between which values, how many runs keep it, and how possible it is that it is broken.
+Sentence tell_debris_limit(const Limit& limit, const Quantity& q, const std::pair<double, double>& range, int runs,
+                           int breaking, int open, double possibility) {
+  Sentence s;
+  const std::string what =
+      limit.kind == Limit::Kind::Reach ? "Reach of the debris" : "Clearance of " + quoted(limit.place);
+  s.text = fmt::format("{}: between {} and {}; {} of {} runs keep the limit of {} ({}). ", what,
+                       words_of_number(range.first / q.unit_value), words_of_value(q, range.second), runs - breaking,
+                       runs, words_of_value(q, limit.least), limit.source);
+  s.text += possibility > 0 ? fmt::format("It is {} that the limit is broken: possibility at least {:.2f}.",
+                                          words_of_possibility(possibility), possibility)
+            : breaking > 0  ? tell_impossible("Breaking the limit", breaking, static_cast<std::size_t>(runs), false)
+                            : std::string("No run breaks the limit.");
+  if (open > 0)
+    s.text += fmt::format(" In {} of the runs that keep it parts still moved when they ended, and may break it.", open);
+  s.status = possibility >= 0.5 ? Status::Bad : breaking > 0 || open > 0 ? Status::Warning : Status::Good;
+  return s;
+}
+
+/// How possible it is that an output breaks its limit: the most possible run that does.
 void tell_limits(const Problem& p, const StudyResult& r, std::vector<Sentence>& out) {
   for (const Limit& limit : p.limits) {
     const auto at = std::find(r.outputs.begin(), r.outputs.end(), limit.output);
@@ -124,7 +156,9 @@ void tell_limits(const Problem& p, const StudyResult& r, std::vector<Sentence>& 
     const auto index = static_cast<std::size_t>(at - r.outputs.begin());
     const Quantity q = find_output(p, limit.output);
     double possibility = 0, low = std::numeric_limits<double>::infinity(), high = 0;
-    int runs = 0, reaching = 0;
+    int runs = 0, reaching = 0, open = 0;
+    const auto left = std::find(r.outputs.begin(), r.outputs.end(), limit.left);
+    const auto left_index = static_cast<std::size_t>(left - r.outputs.begin());
     for (int i = 0; i < static_cast<int>(r.alpha.archive.size()); ++i) {
       const uncertainty::Sample& s = r.alpha.archive[i];
       if (index >= s.result.values.size()) continue;
@@ -132,12 +166,22 @@ void tell_limits(const Problem& p, const StudyResult& r, std::vector<Sentence>& 
       if (!(degree >= 0) || !std::isfinite(value)) continue;
       ++runs;
       low = std::min(low, value), high = std::max(high, value);
-      if (value < limit.least) continue;
+      if (!is_broken(limit, value)) {
+        open += left_index < s.result.values.size() && is_broken(limit, value, s.result.values[left_index]);
+        continue;
+      }
       ++reaching;
       possibility = std::max(possibility, degree);
     }
     if (runs == 0) continue;
     Sentence s;
+    if (limit.kind != Limit::Kind::Screening) {
+      s = tell_debris_limit(limit, q, {low, high}, runs, reaching, open, possibility);
+      s.id = "limit." + limit.output;
+      doubt(p, r, s);
+      out.push_back(std::move(s));
+      continue;
+    }
     s.id = "limit." + limit.output;
     s.text = fmt::format(
         "Screening of ground vibration at {}: the upper end of the band lies between {} and {} over {} runs; limit "

@@ -47,6 +47,7 @@ TEST(Debris, HeapCountsWhatLiesUnderItsSurface) {
   // a cube on its edge: a roof of slope 1, sampled in the middle of cells, within a cell of its outline
   const double eighth = std::acos(-1.0) / 4, half = std::sqrt(2.0);
   const Heap roof = calc_heap({{{{0, 0, half}, exp_rotation({0, eighth, 0})}, {1, 1, 1}}}, 0.05);
+  EXPECT_NEAR(roof.height, 2 * half, 1e-12);
   EXPECT_NEAR(roof.volume, 2 * (2 * half * half + half * half), 0.05 * 2 * 2 * half);
 }
 

@@ -671,5 +671,89 @@ TEST(Story, TellsHowPossibleItIsThatALimitIsReached) {
   EXPECT_EQ(told[1].status, record::Status::Good);
 }
 
+TEST(Story, TellsHowManyRunsKeepALimitOfTheDebris) {
+  // as above: more than 6 is possible to 0.5, less than 1 to 0.5 on the left branch, and less than 6 is the core's
+  const Folder folder;
+  Problem p = make_problem({make_triangular(0, 2, 10)}, 300);
+  p.outputs = {{"y", "m", 1}, {"left", "m", 1}};
+  using Kind = Limit::Kind;
+  p.limits = {{"y", "", 6, 6, "of the plan", Kind::Reach, "left"},
+              {"y", "House", 1, 1, "of the plan", Kind::Clearance, "left"},
+              {"y", "Works", 6, 6, "of the plan", Kind::Clearance, "left"},
+              {"y", "", 12, 12, "of the plan", Kind::Reach, ""},
+              {"y", "", 12, 12, "of the plan", Kind::Reach, "left"}};
+  p.horizon = {"y", "falls", 1e3};
+  const StudyResult r = run(p, folder, "debris", make_factories([](const Point& x) {
+                              return done({{"y", x[0]}, {"left", x[0] > 9 ? 5 : 0}}, "falls");
+                            }));
+  std::vector<Sentence> told;
+  for (const Sentence& s : tell(p, r))
+    if (s.id == "limit.y") told.push_back(s);
+  ASSERT_EQ(told.size(), 5u);
+  const long all = static_cast<long>(r.alpha.archive.size());
+  const auto count = [&](const auto& is) {
+    const auto& samples = r.alpha.archive.samples();
+    return std::count_if(samples.begin(), samples.end(), [&](const auto& s) { return is(s.result.values[0]); });
+  };
+  const auto possibility = [&](const Sentence& s) {
+    const size_t at = s.text.find("possibility at least ");
+    return at == std::string::npos ? -1 : std::stod(s.text.substr(at + 21));
+  };
+  EXPECT_EQ(
+      told[0].text.find(fmt::format("Reach of the debris: between 0 and 10 m; {} of {} runs keep the limit of 6 m "
+                                    "(of the plan). It is ",
+                                    count([](double y) { return y <= 6; }), all)),
+      0u)
+      << told[0].text;
+  EXPECT_NEAR(possibility(told[0]), 0.5, 0.05);
+  EXPECT_EQ(
+      told[1].text.find(fmt::format("Clearance of \"House\": between 0 and 10 m; {} of {} runs keep the limit of 1 m",
+                                    count([](double y) { return y >= 1; }), all)),
+      0u)
+      << told[1].text;
+  EXPECT_NEAR(possibility(told[1]), 0.5, 0.05);
+  EXPECT_EQ(possibility(told[2]), 1) << "the core breaks it";
+  EXPECT_EQ(told[2].status, record::Status::Bad);
+  EXPECT_NE(told[3].text.find("No run breaks the limit."), std::string::npos);
+  EXPECT_EQ(told[3].status, record::Status::Good);
+  EXPECT_NE(
+      told[4].text.find(fmt::format("No run breaks the limit. In {} of the runs that keep it parts still moved when "
+                                    "they ended, and may break it.",
+                                    count([](double y) { return y > 9; }))),
+      std::string::npos)
+      << told[4].text;
+  EXPECT_EQ(told[4].status, record::Status::Warning);
+  // nothing had touched down: nothing is good
+  p.horizon = {"y", "stands", 1};
+  for (const Sentence& s : tell(p, r)) EXPECT_FALSE(s.id == "limit.y" && s.status == record::Status::Good) << s.text;
+}
+
+TEST(Study, SpendsNoRunsOnBoundsThatAreNotSearched) {
+  const Folder folder;
+  Problem p = make_problem({make_triangular(0, 2, 10), make_triangular(0, 1, 3)}, 200);
+  p.outputs = {{"y", "", 1}};
+  const auto y = [](const Point& x) { return x[0] + x[1]; };
+  const auto z = [](const Point& x) { return std::hypot(x[0] - 3.3, x[1] - 1.7); };
+  const StudyResult alone = run(p, folder, "alone", make_factories([&](const Point& x) {
+                                  return done({{"y", y(x)}}, "");
+                                }));
+  p.outputs.push_back({"z", "", 1, false});
+  const StudyResult both = run(p, folder, "both", make_factories([&](const Point& x) {
+                                 return done({{"y", y(x)}, {"z", z(x)}}, "");
+                               }));
+  ASSERT_EQ(alone.alpha.archive.size(), both.alpha.archive.size());
+  for (int i = 0; i < static_cast<int>(alone.alpha.archive.size()); ++i)
+    EXPECT_EQ(alone.alpha.archive[i].x, both.alpha.archive[i].x);
+  // its bounds are those of these runs
+  double least = 1e9;
+  for (const auto& s : both.alpha.archive.samples()) least = std::min(least, s.result.values[1]);
+  EXPECT_EQ(both.alpha.outputs[1].levels[0].lower.value, least);
+  p.outputs[1].is_searched = true;
+  const StudyResult searched = run(p, folder, "searched", make_factories([&](const Point& x) {
+                                     return done({{"y", y(x)}, {"z", z(x)}}, "");
+                                   }));
+  EXPECT_LT(searched.alpha.outputs[1].levels[0].lower.value, least);
+}
+
 }  // namespace
 }  // namespace topple::study

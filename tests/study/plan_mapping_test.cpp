@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <numbers>
 #include <thread>
 
 #include "../collapse/plans.h"
@@ -145,6 +146,79 @@ TEST(PlanMapping, AgreesWithARunOfThePlan) {
   EXPECT_NEAR(output("tilt_0.4"), tilt[last - 1] + share * (tilt[last] - tilt[last - 1]), 1e-12);
 }
 
+/// The small plan with limits of its debris: a house, a yard before the front row that is hit, and a reach.
+product::Plan read_beside(const std::string& friction = "0.6", const std::string& clearance = "3 m") {
+  std::string text = product::small_plan() + strengths;
+  text = product::replaced(text, "time = \"2 s\"", "time = \"0.1 s\"");
+  text = product::replaced(text, "friction = 0.6", "friction = " + friction);
+  text = product::replaced(text, "clearance = \"3 m\"",
+                           "clearance = \"" + clearance +
+                               "\"\n[[site.utility]]\nname = \"Yard\"\nfootprint = [[\"-8 m\", \"-2 m\"], [\"-1 m\", "
+                               "\"-2 m\"], [\"-1 m\", \"10 m\"], [\"-8 m\", \"10 m\"]]\nclearance = \"0.5 m\"");
+  text = product::replaced(text, "azimuth_tolerance", "debris_reach = \"12 m\"\nazimuth_tolerance");
+  std::vector<Diagnostic> warnings;
+  return product::read_plan(text, "plan.toml", warnings);
+}
+
+TEST(PlanMapping, TellsWhatFindingsOfARunTell) {
+  const product::Plan plan = read_beside();
+  // in the middle of the fall, before the mass centre has moved by half a metre to a side, after it has landed, and
+  // until all lies
+  for (const double after : {0.2, 1.4, 0.0}) {
+    SCOPED_TRACE(after);
+    PlanMappingOptions options = quick();
+    options.after = after;
+    const PlanMapping m(plan, collapse::default_knowledge(), options);
+    const Result mapped = evaluate(m, {points[1]})[0];
+    ASSERT_EQ(mapped.state, Result::State::Done) << mapped.text;
+    collapse::RunOptions o;
+    if (after > 0) o.duration = 0.1 + after;
+    const record::Record r = collapse::run_plan(product::make_sample(product::make_sampler(plan), points[1]),
+                                                collapse::default_knowledge(), o, {});
+    const auto finding = [&](const std::string& id) {
+      const auto at =
+          std::find_if(r.findings.begin(), r.findings.end(), [&](const record::Finding& f) { return f.id == id; });
+      EXPECT_NE(at, r.findings.end()) << id;
+      return at == r.findings.end() ? record::Finding{} : *at;
+    };
+    const auto output = [&](const std::string& name) {
+      for (size_t i = 0; i < m.outputs().size(); ++i)
+        if (m.outputs()[i].name == name) return mapped.values[i];
+      ADD_FAILURE() << name;
+      return 0.0;
+    };
+    EXPECT_EQ(output("debris_reach"), finding("criterion.debris_reach").value);
+    EXPECT_EQ(output("clearance_house"), finding("clearance.House").value);
+    EXPECT_EQ(output("clearance_yard"), finding("clearance.Yard").value);
+    EXPECT_EQ(output("heap_height"), finding("debris.height").value);
+    EXPECT_EQ(output("heap_volume"), finding("debris.volume").value);
+    const double deviation = finding("criterion.azimuth").value;
+    EXPECT_EQ(std::isnan(deviation), after == 0.2) << "nothing has fallen to a side yet";
+    EXPECT_NEAR(output("azimuth_deviation"), std::isnan(deviation) ? std::numbers::pi / 2 : deviation, 1e-12);
+    EXPECT_EQ(r.ending, "time_limit");
+    EXPECT_EQ(output("way_left") > 0, after > 0) << "behind 5 s all lies";
+    EXPECT_GT(output("clearance_house"), 10) << "it falls to the front";
+    EXPECT_EQ(output("clearance_yard") > 0, after == 0.2) << "it lands there";
+  }
+}
+
+TEST(PlanMapping, StaysFiniteWhereNothingBringsPartsToRest) {
+  const PlanMapping m(read_beside("0"), collapse::default_knowledge(), quick());
+  const Result r = evaluate(m, {points[0]})[0];
+  ASSERT_EQ(r.state, Result::State::Done) << r.text;
+  ASSERT_EQ(m.outputs().back().name, "way_left");
+  EXPECT_EQ(r.values.back(), kUnlimited);
+}
+
+TEST(PlanMapping, SearchesNoBoundsOfNumbersOfFindings) {
+  const PlanMapping m(read_beside(), collapse::default_knowledge(), quick());
+  std::vector<std::string> names;
+  for (const PlanQuantity& q : m.outputs())
+    if (!q.is_searched) names.push_back(q.name);
+  EXPECT_THAT(names, testing::ElementsAre("heap_height", "heap_volume", "debris_reach", "clearance_house",
+                                          "clearance_yard", "azimuth_deviation", "way_left"));
+}
+
 constexpr const char* site_law = R"toml(
 [site.vibration]
 velocity = "4 mm/s"
@@ -201,6 +275,7 @@ TEST(PlanMapping, NamesScreeningsApart) {
   const char* wanted[] = {"vibration_gas_main_1", "vibration_house_7", "vibration_gas_main_3", "vibration_h_user",
                           "vibration_5"};
   for (size_t i = 0; i < 5; ++i) EXPECT_EQ(name_of_screening(plan, i), wanted[i]);
+  EXPECT_EQ(name_of_clearance(plan, 1), "clearance_house_7");
 }
 
 TEST(PlanMapping, RefusesPlansWithoutFuzzyValues) {
@@ -303,6 +378,12 @@ TEST(CondensedMappingReplay, GivesTheSameBitsInAnyBatchOnAnyThread) {
   const std::vector<std::string> names = name_outputs(m);
   EXPECT_EQ(all[0].values.size(), names.size());
   EXPECT_THAT(names, testing::Contains("reach_neg_x"));
+  const auto height = std::find(names.begin(), names.end(), "heap_height");
+  ASSERT_NE(height, names.end());
+  EXPECT_GT(all[0].values[static_cast<size_t>(height - names.begin())], 0);
+  // nothing that hangs on what lies across the frames
+  for (const char* across : {"debris_reach", "clearance_", "azimuth_deviation", "heap_volume", "way_left"})
+    EXPECT_THAT(names, testing::Each(testing::Not(testing::StartsWith(across))));
   EXPECT_THAT(names, testing::Not(testing::AnyOf(testing::Contains("reach_neg_y"), testing::Contains("reach_pos_y"))));
   for (const int threads : {1, 3})
     for (const bool lanes : {false, true}) {

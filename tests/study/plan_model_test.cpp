@@ -2,7 +2,11 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
 #include "small_fuzzy_plan.h"
+#include "study/permissible.h"
 #include "uncertainty/alpha.h"
 
 namespace topple::study {
@@ -116,6 +120,70 @@ TEST(PlanModel, TakesTheJointMembershipOfThePlan) {
   EXPECT_EQ(uncertainty::calc_membership(p.space, {25e6, 1.2}), 1);
   EXPECT_NEAR(uncertainty::calc_membership(p.space, {25e6, 1.25}), 0.5, 1e-12);
   EXPECT_EQ(uncertainty::calc_membership(p.space, {25e6, 1.35}), 0) << "0.25 without the joint membership";
+}
+
+product::Plan read_limited(const std::string& clearance) {
+  std::string text = product::small_plan() + strengths;
+  text = product::replaced(text, "time = \"2 s\"", "time = \"0.1 s\"");
+  text = product::replaced(text, "clearance = \"3 m\"", "clearance = \"" + clearance + "\"");
+  text = product::replaced(text, "azimuth_tolerance", "debris_reach = \"12 m\"\nazimuth_tolerance");
+  std::vector<Diagnostic> warnings;
+  return product::read_plan(text, "plan.toml", warnings);
+}
+
+TEST(PlanModel, JudgesReachAndClearances) {
+  const Problem p = make_plan_problem(read_limited("3 m"), quick());
+  ASSERT_EQ(p.limits.size(), 2u);
+  EXPECT_EQ(p.limits[0].output, "debris_reach");
+  EXPECT_EQ(p.limits[0].least, 12);
+  EXPECT_EQ(p.limits[0].kind, Limit::Kind::Reach);
+  EXPECT_EQ(p.limits[1].output, "clearance_house");
+  EXPECT_EQ(p.limits[1].least, 3);
+  EXPECT_EQ(p.limits[1].kind, Limit::Kind::Clearance);
+  EXPECT_THAT(p.not_judged, testing::IsEmpty());
+  for (const Limit& limit : p.limits)
+    for (const std::string& output : {limit.output, limit.left})
+      EXPECT_EQ(std::count_if(p.outputs.begin(), p.outputs.end(), [&](const Quantity& q) { return q.name == output; }),
+                1)
+          << output;
+  // whether something lands there is not in the number
+  const Problem zero = make_plan_problem(read_limited("0 m"), quick());
+  EXPECT_EQ(zero.limits.size(), 1u);
+  EXPECT_THAT(zero.not_judged, testing::ElementsAre("clearance: \"House\""));
+  // runs that know nothing across the frames
+  PlanMappingOptions in_plane = quick();
+  in_plane.sideways = false;
+  const Problem slice = make_plan_problem(read_limited("3 m"), in_plane);
+  EXPECT_THAT(slice.limits, testing::IsEmpty());
+  EXPECT_THAT(slice.not_judged, testing::ElementsAre("debris_reach", "clearance: \"House\""));
+}
+
+TEST(PlanModel, TakesLimitsOfClearances) {
+  const Problem p = make_plan_problem(read_limited("3 m"), quick());
+  std::vector<std::string> names;
+  for (const Quantity& q : p.outputs) names.push_back(q.name);
+  const uncertainty::Requirement keeps =
+      make_requirement(read_permissible("topple, clearance_house >= 3", p), names, p.outcomes);
+  uncertainty::Result r;
+  r.state = uncertainty::Result::State::Done;
+  r.values.assign(names.size(), 0);
+  double& clearance =
+      r.values[static_cast<std::size_t>(std::find(names.begin(), names.end(), "clearance_house") - names.begin())];
+  clearance = 3;
+  EXPECT_GE(keeps(r), 0);
+  clearance = 2.9;
+  EXPECT_LT(keeps(r), 0);
+}
+
+TEST(PlanModel, ReadsDefinitionsOfEarlierVersions) {
+  Problem p = make_plan_problem(read_limited("3 m"), quick());
+  auto identity = nlohmann::json::parse(p.identity);
+  ASSERT_EQ(identity.erase("findings"), 1u);
+  p.identity = identity.dump();
+  const Problem old = read_plan_problem(make_model_definition(p));
+  for (const Quantity& q : old.outputs) EXPECT_NE(q.name, "heap_height");
+  EXPECT_THAT(old.limits, testing::IsEmpty());
+  EXPECT_THAT(old.not_judged, testing::SizeIs(2));
 }
 
 TEST(PlanModel, StopsAtACancellation) {
