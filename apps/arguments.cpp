@@ -301,7 +301,8 @@ void add_fe(CLI::App& app, Arguments& a) {
   fe->add_option("--until", a.duration, "simulated time, such as \"6 s\"; the plan's duration if not given")
       ->type_name("QUANTITY");
   CLI::Option* checkpoint =
-      fe->add_flag("--checkpoint", f.checkpoint, "keep checkpoint.bin in the folder, to go on from with --resume");
+      fe->add_flag("--checkpoint", f.checkpoint, "keep checkpoint.bin in the folder, to go on from with --resume")
+          ->excludes(mesh_only);
   fe->add_option("--checkpoint-interval", f.checkpoint_interval, "of the clock (60 s)")
       ->type_name("QUANTITY")
       ->needs(checkpoint);
@@ -428,6 +429,15 @@ void add_study(CLI::App& app, Arguments& a) {
   study_export->callback([&y] { y.action = StudyArguments::Action::Export; });
   add_examples(study_show, R"(  topple study show study)");
   add_examples(study_export, R"(  topple study export study -o tables)");
+}
+
+/// A quantity that is given as "" is no quantity; one that is not given has its default.
+void refuse_empty_quantities(CLI::App& verb) {
+  for (CLI::Option* option : verb.get_options())
+    if (option->get_type_name() == "QUANTITY")
+      option->check(
+          [](const std::string& text) { return text.empty() ? std::string("a quantity is wanted") : std::string(); });
+  for (CLI::App* below : verb.get_subcommands([](CLI::App*) { return true; })) refuse_empty_quantities(*below);
 }
 
 void add_worker(CLI::App& app, Arguments& a) {
@@ -592,6 +602,7 @@ Exit codes: 0 done, 1 the run failed or was cancelled, 2 bad input, 3 a criterio
   CLI::App* manual = app.add_subcommand("manual", "Write the manual page, for man -l.");
   add_examples(manual, R"(  topple manual > topple.1                 then: man -l topple.1)");
   add_version(app, a);
+  refuse_empty_quantities(app);
 
   if (argc > 1 && argv[1][0] != '-') {
     std::vector<std::string> verbs;

@@ -141,6 +141,17 @@ TEST(Arguments, AreRefusedInJsonWhereThatIsAskedFor) {
   EXPECT_EQ(refusal({"export", "r.h5", "--json", "-o", "x", "--bogus"}), "") << "a format";
 }
 
+TEST(Arguments, AnEmptyQuantityIsRefused) {
+  EXPECT_EQ(std::get<int>(parse({"fe", "plan.toml", "--size", "", "-o", "out"})), kBadInput);
+  EXPECT_EQ(std::get<int>(parse({"run", "plan.toml", "--duration", "", "-o", "out"})), kBadInput);
+  EXPECT_EQ(std::get<int>(parse({"mbs", "run", "m.json", "--step=", "-o", "out"})), kBadInput);
+  EXPECT_EQ(std::get<Arguments>(parse({"fe", "plan.toml", "--size", "0.4 m", "-o", "out"})).fe.size, "0.4 m");
+}
+
+TEST(Arguments, WhatOnlyMakesAMeshKeepsNoCheckpoint) {
+  EXPECT_EQ(std::get<int>(parse({"fe", "plan.toml", "--mesh-only", "--checkpoint"})), kBadInput);
+}
+
 TEST(Arguments, ZshIsToldOfOneRestOfArgumentsAtMost) {
   const std::string script = said({"completion", "zsh"}).first;
   std::istringstream in(script);
