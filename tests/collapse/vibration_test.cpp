@@ -439,7 +439,7 @@ TEST(StabilityRunPhysics, TheMarginsOfAPauseAreSaid) {
 }
 
 TEST(StabilityRunPhysics, ASwayingBuildingTellsTheLeastMarginOfItsPause) {
-  const record::Record r = run_plan(read(house(charge("C-A1-0", "0.1 s") + charge("C-B*-0", "0.35 s"), "0.4 s")),
+  const record::Record r = run_plan(read(house(charge("C-A1-0", "0.1 s") + charge("C-B*-0", "0.3 s"), "0.4 s")),
                                     default_knowledge(), {}, {});
   const record::Finding& pause = finding(r, "stability.stage_1");
   ASSERT_THAT(pause.text, HasSubstr("It still sways"));

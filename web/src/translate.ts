@@ -18,6 +18,7 @@ interface Sentence {
   isKnown: boolean[]; // of each place: in the table itself
   isKept: boolean[]; // of each place: stays as it is
   isList: boolean[]; // of each place: names with numbers
+  isOpen: boolean; // ends with anything
   german: string;
   weight: number; // letters that are fixed
 }
@@ -51,7 +52,7 @@ function makeSentence([english, translated]: readonly [string, string]): Sentenc
     pattern += `(${isNumber[isNumber.length - 1] === true ? number : any})`;
     loose += `(${isNumber[isNumber.length - 1] === true ? number : piece === "{}" ? ".+?" : any})`;
   });
-  return { whole: new RegExp(`^${pattern}$`, "s"), loose: new RegExp(`^${loose}$`, "s"), fixed, isNumber, isKnown, isKept, isList, german: translated, weight };
+  return { whole: new RegExp(`^${pattern}$`, "s"), loose: new RegExp(`^${loose}$`, "s"), fixed, isNumber, isKnown, isKept, isList, isOpen: english.endsWith("{a}"), german: translated, weight };
 }
 
 const exact = new Map(german.filter(([english]) => !english.includes("{")));
@@ -68,19 +69,21 @@ const commasOfMeasures = (text: string): string => (/\d\.\d/.test(text) && (text
 
 /// The German of a text that is in the table as a whole or made of sentences that are; undefined if not.
 export function translate(text: string): string | undefined {
-  const said = translateWhole(text) ?? translateParts(text);
+  const said = translateWhole(text) ?? translateParts(text) ?? translateWhole(text, false, true);
   if (said !== undefined || !text.endsWith(".")) return said;
   const sentence = translate(text.slice(0, -1));
   return sentence === undefined ? undefined : `${sentence}.`;
 }
 
-function translateWhole(text: string, isLoose = false): string | undefined {
+///   isLoose  names may hold any sign
+///   isOpen   with those that end with anything, which may be further sentences
+function translateWhole(text: string, isLoose = false, isOpen = isLoose): string | undefined {
   const known = exact.get(text);
   if (known !== undefined) return known;
   for (const s of sentences) {
     const found = text.includes(s.fixed) ? (isLoose ? s.loose : s.whole).exec(text) : null;
     if (isLoose && s.weight < 10) break; // anything would be like it
-    if (found === null) continue;
+    if (found === null || (s.isOpen && !isOpen)) continue;
     if (s.isKnown.some((isKnown, i) => isKnown && translate((found[i + 1] as string).trim()) === undefined)) continue;
     let count = 0;
     const values = s.isNumber.map((isNumber, i) => {
