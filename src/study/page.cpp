@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -20,7 +21,9 @@ namespace {
 using json = nlohmann::ordered_json;
 
 /// Seven digits are enough to draw and to read.
-json number(double x) { return std::isfinite(x) ? json(std::stod(fmt::format("{:.7g}", x))) : json(nullptr); }
+json number(double x) {
+  return std::isfinite(x) ? json(std::strtod(fmt::format("{:.7g}", x).c_str(), nullptr)) : json(nullptr);
+}
 
 /// Runs at places that do not count (beyond a constraint, or outside a support that was made smaller) are left out:
 /// their outcome may be none of the results'.

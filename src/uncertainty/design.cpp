@@ -129,7 +129,7 @@ class Design {
     const int count = options_.space_points > 0 ? options_.space_points : 200 * n;
     std::vector<Point> points;
     if (n == 0) points.push_back(calc_centre(space_));
-    for (const auto& u : make_sobol_points(n, 1, count, options_.seed + 1)) {
+    for (const auto& u : n == 0 ? std::vector<Point>{} : make_sobol_points(n, 1, count, options_.seed + 1)) {
       Point fractions(space_.inputs.size(), 0.0);
       for (int i = 0; i < n; ++i) fractions[axes_[i]] = u[i];
       Point x = place_in(support_, fractions);

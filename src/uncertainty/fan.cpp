@@ -1,6 +1,7 @@
 #include "uncertainty/fan.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace topple::uncertainty {
@@ -27,6 +28,7 @@ std::vector<FanLevel> calc_fan(const Space& space, const Archive& archive, const
       ++f.curves;
       for (std::size_t t = 0; t < s.result.trajectory.size(); ++t) {
         const double v = s.result.trajectory[t];
+        if (!std::isfinite(v)) continue;  // none there
         if (f.at_lower[t] < 0 || v < f.lower[t]) f.lower[t] = v, f.at_lower[t] = i;
         if (f.at_upper[t] < 0 || v > f.upper[t]) f.upper[t] = v, f.at_upper[t] = i;
       }

@@ -293,6 +293,13 @@ TEST(Design, SaysWhenNothingIsPermissible) {
   EXPECT_EQ(f.design.permissible, 0);
 }
 
+TEST(Design, OnePointWithoutASpreadIsJudged) {
+  const Space crisp{{make_triangular(2, 2, 2)}, {}, {}};
+  const Evaluate model = make_evaluate_values([](const Point& x) { return std::vector{x[0]}; });
+  const Found f = find(crisp, model, [](const Result& r) { return 3 - r.values[0]; }, {});
+  EXPECT_EQ(f.design.fraction, 1);
+}
+
 TEST(Design, EverythingPermissibleIsOneBox) {
   const Found f = find(Space{cases::make_jump_inputs(), {}, {}}, make_evaluate(cases::calc_jump),
                        [](const Result&) { return 1.0; }, {});

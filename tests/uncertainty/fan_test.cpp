@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "uncertainty/alpha.h"
 
@@ -86,6 +87,22 @@ TEST(Fan, KeepsClassesApartAndTakesShortCurves) {
   const auto none = calc_fan(space, archive, {0}, 9);
   EXPECT_EQ(none[0].at_upper[0], -1);
   EXPECT_TRUE(std::isnan(none[0].upper[0]));
+}
+
+TEST(Fan, LeavesOutWhatACurveDoesNotHave) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  Archive archive;
+  for (const double middle : {nan, 2.0, 4.0}) {
+    Result r;
+    r.state = Result::State::Done;
+    r.trajectory = {0, middle, nan};
+    archive.add({{1 + 0.1 * static_cast<double>(archive.size())}, r});
+  }
+  const auto fan = calc_fan(Space{{make_triangular(0, 1, 2)}, {}, {}}, archive, {0});
+  EXPECT_EQ(fan[0].lower[1], 2);
+  EXPECT_EQ(fan[0].upper[1], 4);
+  EXPECT_EQ(fan[0].at_lower[2], -1);
+  EXPECT_TRUE(std::isnan(fan[0].upper[2]));
 }
 
 }  // namespace
