@@ -90,7 +90,8 @@ struct BuilderState {
   std::map<GridPoint, double> core_low;  // underside of the joint in W [m]
   std::map<int, MemberZones> zones;      // columns and beams
   std::map<std::tuple<int, double, double, Lever, Bending>, mbs::LawId> laws;
-  std::map<int, ShaftModel> shafts;       // by member
+  std::map<std::tuple<int, double, double, Bending>, mbs::SharedLaw> whole_laws;  // of which levers take shares
+  std::map<int, ShaftModel> shafts;                                               // by member
   std::map<int, double> volume_per_mass;  // member: of its material over the mass of its parts, floor loads included
   bool hinge_about_y = true;
   // of charges, which may be laid out anew while the model runs: laws are never taken out, so that their ids stay

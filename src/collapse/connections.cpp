@@ -250,8 +250,14 @@ mbs::SharedLaw Builder::make_law(int zone, const Stiffness& s, const std::string
   append_bytes(key, lever.moment_y), append_bytes(key, lever.moment_z), append_bytes(key, lever.rotation);
   if (known)
     if (const auto found = known->laws.find(key); found != known->laws.end()) return found->second;
-  mbs::SharedLaw law =
-      scale_lever(make_zone_law(library.rcc(zone), s.EI_y, s.EI_z, name, k, PlasticFrom::Yield, bending), lever);
+  mbs::SharedLaw law;
+  if (lever == Lever{}) {
+    law = make_zone_law(library.rcc(zone), s.EI_y, s.EI_z, name, k, PlasticFrom::Yield, bending);
+  } else {
+    const auto [whole, is_new] = whole_laws.try_emplace({zone, s.EI_y, s.EI_z, bending});
+    if (is_new) whole->second = make_law(zone, s, name, bending);
+    law = scale_lever(whole->second, lever);
+  }
   if (made) made->laws.emplace(std::move(key), law);
   return law;
 }

@@ -60,6 +60,18 @@ std::string with_duration(std::string text, const std::string& duration) {
   return text.replace(text.find(old), old.size(), "duration = \"" + duration + "\"");
 }
 
+/// A plan in elements, and their bodies.
+struct Building {
+  explicit Building(product::Plan p)
+      : plan(std::move(p)),
+        model(collapse::make_model(plan, rules(), map)),
+        whole(make_whole(plan, rules(), coarse().grid, model, map)) {}
+  product::Plan plan;
+  collapse::ModelMap map;
+  mbs::Model model;
+  Whole whole;
+};
+
 TEST(Whole, WeighsWhatThePlanWeighs) {
   for (const std::string& text : {portal(), house()}) {
     const product::Plan plan = read(text);
@@ -220,16 +232,13 @@ TEST(FarfieldPhysics, BooksItsEnergy) {
 }
 
 TEST(FarfieldPhysics, PlacesBodiesWithTheirDebris) {
-  const product::Plan plan = read(portal());
-  collapse::ModelMap map;
-  const mbs::Model model = collapse::make_model(plan, rules(), map);
-  const FeOptions fe = coarse();
-  const Whole whole = make_whole(plan, rules(), fe.grid, model, map);
+  const Building built(read(portal()));
+  const auto& [plan, map, model, whole] = built;
   fem::ExplicitSystem system(whole.fe, {});
   system.set_velocity({2, 0, -25});  // into its feet
   ASSERT_EQ(system.advance(0.5), fem::ExplicitEnding::ReachedTime);
   ASSERT_GT(system.debris().size(), 50u);
-  const Motion motion(plan, whole, model, map, fe.grid.size);
+  const Motion motion(plan, whole, model, map, coarse().grid.size);
   const mbs::View v = motion.calc_view(system, system.time());
   // the bodies' potential and momentum against those of the ledger and of the nodes
   double gravity = 0, scale = 0, mass = 0;
@@ -250,13 +259,10 @@ TEST(FarfieldPhysics, PlacesBodiesWithTheirDebris) {
 }
 
 TEST(FarfieldPhysics, CountsTheWeightOfStumpsAsLongAsTheyAreThere) {
-  const product::Plan plan = read(dropped());
-  collapse::ModelMap map;
-  const mbs::Model model = collapse::make_model(plan, rules(), map);
-  const FeOptions fe = coarse();
-  const Whole whole = make_whole(plan, rules(), fe.grid, model, map);
+  const Building built(read(dropped()));
+  const auto& [plan, map, model, whole] = built;
   fem::ExplicitSystem system(whole.fe, {});
-  const Motion motion(plan, whole, model, map, fe.grid.size);
+  const Motion motion(plan, whole, model, map, coarse().grid.size);
   std::vector<int> fixed;
   for (size_t e = 0; e < whole.fe.elements.size(); ++e)
     if (model.bodies[static_cast<size_t>(whole.fe.elements[e].part)].fixed) fixed.push_back(static_cast<int>(e));
@@ -296,12 +302,9 @@ TEST(FarfieldPhysics, ShakesTheGroundWhateverTheRestitutionOfTheSite) {
 }
 
 TEST(Farfield, BreaksAZoneWhoseCrossSectionHasGone) {
-  const product::Plan plan = read(portal());
-  collapse::ModelMap map;
-  const mbs::Model model = collapse::make_model(plan, rules(), map);
-  const FeOptions fe = coarse();
-  const Whole whole = make_whole(plan, rules(), fe.grid, model, map);
-  const Motion motion(plan, whole, model, map, fe.grid.size);
+  const Building built(read(portal()));
+  const auto& [plan, map, model, whole] = built;
+  const Motion motion(plan, whole, model, map, coarse().grid.size);
   int tried = 0;
   for (size_t z = 0; z < map.elements.size(); ++z) {
     const collapse::ZoneEntry& zone = map.elements[z];
@@ -330,18 +333,15 @@ TEST(Farfield, BreaksAZoneWhoseCrossSectionHasGone) {
 }
 
 TEST(FarfieldPhysics, TurnsBodiesAsTheirElementsDo) {
-  const product::Plan plan = read(portal());
-  collapse::ModelMap map;
-  const mbs::Model model = collapse::make_model(plan, rules(), map);
-  const FeOptions fe = coarse();
-  const Whole whole = make_whole(plan, rules(), fe.grid, model, map);
+  const Building built(read(portal()));
+  const auto& [plan, map, model, whole] = built;
   fem::ExplicitSystem system(whole.fe, {});
   const Vec3 w{0.3, -0.7, 1.1}, about{1, 2, 3};
   std::vector<Vec3> v;
   for (const Vec3& p : whole.fe.nodes) v.push_back(Vec3{5, 0, 0} + cross(w, p - about));
   for (const fem::ExplicitSupport& s : whole.fe.supports) v[static_cast<size_t>(s.node)] = {};
   system.set_velocities(v);
-  const mbs::View view = Motion(plan, whole, model, map, fe.grid.size).calc_view(system, 0);
+  const mbs::View view = Motion(plan, whole, model, map, coarse().grid.size).calc_view(system, 0);
   int turning = 0;
   for (size_t b = 0; b < model.bodies.size(); ++b) {
     if (map.bodies[b].name != "B-A1B1-0") continue;
