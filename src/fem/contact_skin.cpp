@@ -91,7 +91,8 @@ void make_skin(const double* HWY_RESTRICT rows, double depth_share, const FaceCo
     }
     const Vec3 from = least_of(low), until = most_of(high);
     double* box = skin.boxes.data() + run / 8 * 6 * 8 + run % 8;
-    for (int i = 0; i < 3; ++i) box[8 * i] = from[i], box[8 * (3 + i)] = until[i];
+    for (size_t i = 0; i < 3; ++i)
+      box[8 * i] = from[static_cast<int>(i)], box[8 * (3 + i)] = until[static_cast<int>(i)];
   }
   if (runs > 0) skin.box.low = least_of(all_low), skin.box.high = most_of(all_high);
 }
@@ -235,7 +236,7 @@ void find_faces(const Skin& skin, const Vec3& p, double near_by, double margin, 
   const V near = num(near_by), behind = num(-margin);
   const V3 at{num(p.x), num(p.y), num(p.z)};
   const V3 low = add(at, V3{near, near, near}), high = sub(at, V3{near, near, near});
-  for (size_t eight = 0; eight < skin.boxes.size() / (6 * 8); ++eight) {
+  for (size_t eight = 0; eight < skin.boxes.size() / (size_t{6} * 8); ++eight) {
     const double* HWY_RESTRICT box = skin.boxes.data() + eight * 6 * 8;
     unsigned runs = test_run([&](size_t l) HWY_ATTR {
       const auto is_in = [&](size_t i, V above, V below) HWY_ATTR {

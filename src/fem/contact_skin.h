@@ -60,7 +60,7 @@ struct Places {
   void add(const Vec3& p) {
     if (count % kFaceRun == 0) runs.resize(runs.size() + 3 * kFaceRun, 1e300);  // in no box
     double* at = runs.data() + count / kFaceRun * 3 * kFaceRun + count % kFaceRun;
-    for (int c = 0; c < 3; ++c) at[c * static_cast<int>(kFaceRun)] = p[c];
+    for (size_t c = 0; c < 3; ++c) at[c * kFaceRun] = p[static_cast<int>(c)];
     ++count;
   }
   Vec3 operator[](size_t i) const {
