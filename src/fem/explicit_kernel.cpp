@@ -779,11 +779,11 @@ HWY_INLINE void move_free(const Motion& motion, double* HWY_RESTRICT node, const
   for (size_t k = 0; k < 4 / kRowLanes; ++k) box.add(k, place[k]);
 }
 /// The same of neighbours; takes their forces away.
-template <size_t kNodes>
+template <size_t Nodes>
 HWY_INLINE void move_free(const Motion& motion, double* HWY_RESTRICT nodes, double* HWY_RESTRICT forces, Box& box) {
   const Row d;
-  hn::Vec<Row> place[kNodes][4 / kRowLanes];
-  for (size_t i = 0; i < kNodes; ++i) {
+  hn::Vec<Row> place[Nodes][4 / kRowLanes];
+  for (size_t i = 0; i < Nodes; ++i) {
     hn::Vec<Row> f[4 / kRowLanes], v[4 / kRowLanes];
     for (size_t c = 0; c < 4; c += kRowLanes) f[c / kRowLanes] = hn::Load(d, forces + 4 * i + c);
     for (size_t c = 0; c < 4; c += kRowLanes) hn::Store(hn::Zero(d), d, forces + 4 * i + c);
@@ -791,7 +791,7 @@ HWY_INLINE void move_free(const Motion& motion, double* HWY_RESTRICT nodes, doub
   }
   for (size_t k = 0; k < 4 / kRowLanes; ++k) {
     auto low = place[0][k], high = low;
-    for (size_t i = 1; i < kNodes; ++i) low = hn::Min(low, place[i][k]), high = hn::Max(high, place[i][k]);
+    for (size_t i = 1; i < Nodes; ++i) low = hn::Min(low, place[i][k]), high = hn::Max(high, place[i][k]);
     box.add(k, low, high);
   }
 }

@@ -164,7 +164,7 @@ void press_particles(const ExplicitOptions& options, double h, const ExplicitSta
     const double reach = a.radius + b.radius, square = dot(d, d);
     // every second one does, so no branch
     task.particles[touching] = near[i];
-    touching += (square < reach * reach) & (square > 0) ? 1 : 0;
+    touching += static_cast<size_t>((square < reach * reach) & (square > 0));
     for (const std::uint32_t number : near[i]) hwy::Prefetch(&s.particle_makes[number]);
   }
   task.particles.resize(touching);
