@@ -133,6 +133,16 @@ std::vector<std::string> find_strangers(const std::vector<StoredResult>& results
   return strangers;
 }
 
+/// Whether a stored point is one of this problem: formulas, numbers and constraints may have changed since it was run.
+bool belongs_to(const Problem& p, const uncertainty::Box& support, const Point& stored) {
+  const std::size_t n = p.inputs.size();
+  if (stored.size() < n) return false;
+  const Point x(stored.begin(), stored.begin() + static_cast<std::ptrdiff_t>(n));
+  if (!uncertainty::is_in_cut(p.space, support, 0, x)) return false;
+  return std::ranges::equal(stored, complete(p, x),
+                            [](double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); });
+}
+
 std::vector<std::string> list_failures(const uncertainty::Archive& archive) {
   std::map<std::string, int> counts;
   for (const auto& s : archive.samples())
@@ -596,6 +606,9 @@ StudyResult read_study(const Problem& problem, Store& store, const StudyRow& row
     std::erase_if(results, [&](const StoredResult& s) { return !place.contains(s.hash); });
     std::sort(results.begin(), results.end(),
               [&](const StoredResult& a, const StoredResult& b) { return place.at(a.hash) < place.at(b.hash); });
+  } else {
+    const uncertainty::Box support = uncertainty::make_box(problem.space, 0);
+    std::erase_if(results, [&](const StoredResult& s) { return !belongs_to(problem, support, s.inputs); });
   }
   Names names;
   const std::size_t n = problem.inputs.size();

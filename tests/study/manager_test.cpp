@@ -106,6 +106,58 @@ TEST(StudyReplay, ReadsBackWhatItFound) {
     EXPECT_EQ(again.alpha.outputs[0].levels[k].upper.converged, r.alpha.outputs[0].levels[k].upper.converged);
 }
 
+// What was run for other formulas, numbers or constraints stays in the store, but is not shown as found for these.
+TEST(StudyReplay, ShowsOnlyRunsOfItsOwnProblemWhileItIsOpen) {
+  const Folder folder;
+  const auto make = [](double factor) {
+    Problem p = make_small_problem(200);
+    p.derived = {{"d", "", 1}};
+    p.calc_derived = [factor](const Point& x) { return std::vector{x[0] < 12 ? std::nan("") : factor * x[0]}; };
+    return p;
+  };
+  const auto reopen = [](Store& store) {
+    StudyRow row = *store.find_study("main");
+    row.state = "open", row.summary = "";
+    store.put_study(row);
+    return row;
+  };
+  const auto is_new = [](const uncertainty::Sample& s) { return s.x[0] >= 12; };
+  run(make(1), make_options(folder / "a"));
+  const StudyResult r = run(make(2), make_options(folder / "a"));
+  Store store(folder / "a");
+  const StudyRow row = reopen(store);
+  EXPECT_GT(store.load_results(row.model).size(), r.alpha.archive.size()) << "the store keeps both";
+  const StudyResult seen = read_study(make(2), store, row);
+  EXPECT_EQ(seen.alpha.archive.size(), r.alpha.archive.size());
+  EXPECT_EQ(seen.alpha.failed, r.alpha.failed);
+  // of a third formula nothing is there but where none has a value
+  const StudyResult none = read_study(make(3), store, row);
+  EXPECT_GT(none.alpha.archive.size(), 0u);
+  EXPECT_TRUE(std::none_of(none.alpha.archive.samples().begin(), none.alpha.archive.samples().end(), is_new));
+  // narrower numbers, and a constraint
+  Problem narrow = make(2);
+  narrow.space.inputs[0] = uncertainty::make_triangular(20, 25, 30);
+  narrow.space.constraints = {[](const Point& x) { return x[0] + x[1] - 95; }};
+  const StudyResult part = read_study(narrow, store, row);
+  EXPECT_GT(part.alpha.archive.size(), 0u);
+  EXPECT_LT(part.alpha.archive.size(), r.alpha.archive.size());
+  for (const uncertainty::Sample& s : part.alpha.archive.samples()) {
+    EXPECT_TRUE(s.x[0] >= 20 && s.x[0] <= 30 && s.x[0] + s.x[1] <= 95) << s.x[0] << " " << s.x[1];
+  }
+  // nothing that was run for an interaction is left out
+  for (const bool is_joint : {false, true}) {
+    Problem tied = make_small_problem(600);
+    if (is_joint)
+      tied.space.joint = [](const Point& x) { return std::max(0.0, 1 - std::abs(x[0] - 25) / 8); };
+    else
+      tied.space.constraints = {[](const Point& x) { return x[0] + x[1] - 95; }};
+    const std::string name = folder / (is_joint ? "joint" : "constraint");
+    const StudyResult whole = run(tied, make_options(name));
+    Store own(name);
+    EXPECT_EQ(read_study(tied, own, reopen(own)).alpha.archive.size(), whole.alpha.archive.size()) << is_joint;
+  }
+}
+
 // y = x1 + x2, which fails at the core: bounds are those at the corners of each cut, but for the core's own.
 TEST(StudyReference, MarksBoundsAroundACoreThatFails) {
   const Folder folder;
