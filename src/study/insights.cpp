@@ -155,6 +155,10 @@ void read_drivers(Insights& out, const Problem& p, const Budget& b, const uncert
 void find_boxes(Insights& out, const Problem& p, const Budget& b, uncertainty::Asker& asker,
                 const std::vector<double>& levels, const std::vector<std::string>& outputs,
                 const std::vector<std::string>& outcomes) {
+  // nothing keeps a requirement, and no output has a name
+  if (std::ranges::none_of(asker.archive().samples(),
+                           [](const auto& s) { return s.result.state == uncertainty::Result::State::Done; }))
+    return;
   const uncertainty::Requirement requirement = make_requirement(read_permissible(p.permissible, p), outputs, outcomes);
   const int runs = b.limit - b.outcomes, axes = std::max(1, count_axes(p.space));
   uncertainty::DesignOptions o;

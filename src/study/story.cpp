@@ -397,6 +397,9 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
   }
   if (static_cast<std::size_t>(r.alpha.failed) == runs) {
     add("verdict", fmt::format("All {} runs failed: nothing is known of this model.", runs), Status::Bad);
+    if (!p.permissible.empty())
+      add("requirement", fmt::format("No box of permissible values can be looked for: all {} runs failed.", runs),
+          Status::Bad);
     return out;
   }
   const uncertainty::Sample* core = find_core(p, r.alpha.archive);

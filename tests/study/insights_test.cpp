@@ -258,6 +258,24 @@ TEST(Permissible, IsRefusedAfterTheFirstAnswerOrSaysThatItNeverHappened) {
   EXPECT_NE(told.find("No run had the outcome \"flies\"."), std::string::npos) << told;
 }
 
+TEST(Permissible, LooksForNoBoxWhereAllRunsFailed) {
+  const Folder folder;
+  const RunnerFactories factories =
+      make_factories([](const Point&) { return Answer{Answer::Kind::Failed, {}, "", {}, "broke", 0}; });
+  for (const char* text : {"z <= 3", "stands", "stands, z <= 3"}) {
+    Problem p = make_small_problem(200);
+    p.permissible = text;
+    const StudyResult r = run(p, folder, text, factories);
+    EXPECT_TRUE(r.is_finished) << text;
+    EXPECT_FALSE(r.insights.has_boxes) << text;
+    EXPECT_TRUE(r.alpha.archive.size() > 0 && static_cast<std::size_t>(r.alpha.failed) == r.alpha.archive.size());
+    ASSERT_EQ(tell(p, r).size(), 2u);
+    EXPECT_EQ(tell(p, r)[1].text, fmt::format("No box of permissible values can be looked for: all {} runs failed.",
+                                              r.alpha.archive.size()));
+    EXPECT_EQ(json::parse(write_results_json(p, r))["boxes"], nullptr);
+  }
+}
+
 // Reference case "jump": permissible part of R >= 8 is .879201442, the largest box 1200.224726 of 35 x 54.4.
 TEST(InsightsReference, BoxOfTheJump) {
   const Folder folder;

@@ -904,6 +904,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["Nothing has been run so far.", "Bisher wurde nichts gerechnet."],
   ["The core values have not been run yet.", "Die Kernwerte sind noch nicht gerechnet."],
   ["All {:d} runs failed: nothing is known of this model.", "Alle {} Rechnungen sind gescheitert: Von diesem Modell ist nichts bekannt."],
+  ["No box of permissible values can be looked for: all {:d} runs failed.", "Nach Quadern zulässiger Werte kann nicht gesucht werden: Alle {} Rechnungen sind gescheitert."],
   ["{:d} of {:d} runs failed; they are an outcome of their own, possible to at least {:.2f}. What would have happened there is not known.", "{} von {} Rechnungen sind gescheitert; sie sind ein eigener Ausgang, möglich zu mindestens {}. Was dort geschehen wäre, ist nicht bekannt."],
   ["most possible run with the outcome {w} ({:.2f})", "möglichste Rechnung mit dem Ausgang {} ({})"],
   ["least {v}", "kleinster Wert von {}"],
