@@ -527,7 +527,7 @@ class Manager {
           const Refusal r = read_refusal(*refusal);
           throw InputError({r.diagnostic});
         }
-        store_.quarantine();
+        store_.quarantine(pool_->name());
         running_ = store_.count_running(asked_model_);
       }
       pool_->wait_for_news(pause);

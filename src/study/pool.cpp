@@ -32,9 +32,8 @@ std::string make_name() {
 }  // namespace
 
 Pool::Pool(std::string address, const RunnerFactories& factories, const PoolOptions& options)
-    : address_(std::move(address)), factories_(factories), options_(options), last_work_(now()) {
-  const std::string name = make_name();
-  for (int i = 0; i < options.jobs; ++i) names_.push_back(fmt::format("{}:{}", name, i));
+    : address_(std::move(address)), name_(make_name()), factories_(factories), options_(options), last_work_(now()) {
+  for (int i = 0; i < options.jobs; ++i) names_.push_back(fmt::format("{}:{}", name_, i));
   for (const std::string& n : names_) threads_.emplace_back([this, n] { work(n); });
   if (!names_.empty()) threads_.emplace_back([this] { keep_alive(); });
 }
@@ -95,7 +94,7 @@ void Pool::work(const std::string& name) {
         continue;
       }
       if (now() - looked > 1) {
-        store.quarantine();
+        store.quarantine(name_);
         looked = now();
       }
       {

@@ -38,6 +38,8 @@ class Pool {
   /// Throws what ended one of the threads.
   void check();
 
+  /// Of this process and pool; those of workers have a number behind it.
+  const std::string& name() const { return name_; }
   int running() const { return running_; }
   long finished() const { return finished_; }  // results written
   long refused() const { return refused_; }    // results of jobs that others had taken over
@@ -52,7 +54,7 @@ class Pool {
   Answer compare(Store&, const std::string& model, const Answer&);
   void run_jobs(Store&, const std::string& name, std::vector<Job>, std::map<std::string, Runner>&);
 
-  std::string address_;
+  std::string address_, name_;
   const RunnerFactories& factories_;
   PoolOptions options_;
   std::vector<std::string> names_;

@@ -95,7 +95,7 @@ void make_schema(Database& db) {
                "NULL, state text NOT NULL, summary text NOT NULL)"),
            fmt::format("CREATE TABLE IF NOT EXISTS job(number {}, hash text NOT NULL UNIQUE, model text NOT NULL, "
                        "inputs text NOT NULL, state text NOT NULL, attempt integer NOT NULL DEFAULT 0, lease_until {}, "
-                       "worker text, message text)",
+                       "worker text, message text, vanished integer NOT NULL DEFAULT 0)",
                        d.number, d.real),
            fmt::format(
                "CREATE TABLE IF NOT EXISTS result(hash text PRIMARY KEY, model text NOT NULL, status text NOT "
@@ -106,6 +106,23 @@ void make_schema(Database& db) {
            std::string("CREATE INDEX IF NOT EXISTS job_refused ON job(model) WHERE state = 'refused'"),
        })
     db.run(sql);
+}
+
+/// Whether the last that make_schema makes is there.
+bool has_schema(Database& db, bool is_on_server) {
+  const char* find = is_on_server ? "SELECT 1 FROM pg_attribute WHERE attrelid = to_regclass('job') AND attname = "
+                                    "'vanished' AND to_regclass('job_refused') IS NOT NULL"
+                                  : "SELECT 1 FROM pragma_table_info('job') WHERE name = 'vanished' AND EXISTS "
+                                    "(SELECT 1 FROM sqlite_master WHERE name = 'job_refused')";
+  return !db.run(find).empty();
+}
+
+/// Of the process that a worker is a thread of: its name up to the last colon.
+std::string find_process(const std::string& worker) { return worker.substr(0, worker.rfind(':')); }
+
+/// That a job whose lease has run out is held by others than the process of the parameter.
+std::string is_of_others(const char* parameter) {
+  return fmt::format("substr(worker, 1, length(CAST({0} AS text))) <> CAST({0} AS text)", parameter);
 }
 
 void roll_back(Database& db) {
@@ -224,13 +241,14 @@ Store::Store(const std::string& address, const std::atomic<bool>* cancel, double
       patience_(patience) {
   if (is_read_only) return;
   // making what is there would wait for others, and let others wait
-  const char* find = is_server(address) ? "SELECT 1 WHERE to_regclass('job_refused') IS NOT NULL"
-                                        : "SELECT 1 FROM sqlite_master WHERE name = 'job_refused'";
-  const auto is_there = [&](bool) { return !db_->run(find).empty(); };
+  const bool is_on_server = is_server(address);
+  const auto is_there = [&](bool) { return has_schema(*db_, is_on_server); };
   if (transact(is_there, true)) return;
   transact([&](bool) {
-    if (is_server(address)) db_->run("SELECT pg_advisory_xact_lock(7086719)");  // two may create at once
+    if (is_on_server) db_->run("SELECT pg_advisory_xact_lock(7086719)");  // two may create at once
     make_schema(*db_);
+    // stores of earlier versions
+    if (!has_schema(*db_, is_on_server)) db_->run("ALTER TABLE job ADD COLUMN vanished integer NOT NULL DEFAULT 0");
     return 0;
   });
 }
@@ -310,7 +328,7 @@ void Store::add_impossible(const std::string& model, const std::vector<StoredRes
       db_->run(
           "INSERT INTO job(hash, model, inputs, state) VALUES ($1, $2, $3, 'impossible') ON CONFLICT (hash) DO NOTHING",
           {r.hash, model, to_text(r.inputs)});
-      insert_result(*db_, {r.hash, model, {}, 0}, "", r.answer);
+      insert_result(*db_, {r.hash, model, {}}, "", r.answer);
     }
     return 0;
   });
@@ -318,26 +336,31 @@ void Store::add_impossible(const std::string& model, const std::vector<StoredRes
 
 std::vector<Job> Store::claim(const std::string& worker, int count, double lease, const std::string& model) {
   const Dialect& d = db_->dialect();
+  constexpr const char* columns = "number, hash, model, inputs, attempt, vanished";
+  std::vector<Value> values = {worker, find_process(worker)};
+  if (!model.empty()) values.emplace_back(model);
   Rows rows = transact(
       [&](bool again) {
         if (again) {
           // the transaction that was lost may have been committed
-          Rows held = db_->run(
-              "SELECT number, hash, model, inputs, attempt FROM job WHERE state = 'running' AND worker = $1", {worker});
+          Rows held =
+              db_->run(fmt::format("SELECT {} FROM job WHERE state = 'running' AND worker = $1", columns), {worker});
           if (!held.empty()) return held;
         }
         return db_->run(
             fmt::format("WITH chosen AS MATERIALIZED (SELECT number FROM job WHERE state IN ('waiting', 'running') AND "
-                        "(state = 'waiting' OR lease_until < {0}) AND attempt < {1} {5} ORDER BY number LIMIT {2} {3}) "
-                        "UPDATE job SET state = 'running', attempt = attempt + 1, worker = $1, lease_until = {0} + {4} "
-                        "WHERE number IN (SELECT number FROM chosen) RETURNING number, hash, model, inputs, attempt",
-                        d.now, most_attempts, count, d.skip_locked, lease, model.empty() ? "" : "AND model = $2"),
-            model.empty() ? std::vector<Value>{worker} : std::vector<Value>{worker, model});
+                        "(state = 'waiting' OR (lease_until < {0} AND vanished + 1 < {1} AND {6})) {5} ORDER BY number "
+                        "LIMIT {2} {3}) UPDATE job SET vanished = vanished + CASE WHEN state = 'running' THEN 1 ELSE 0 "
+                        "END, state = 'running', attempt = attempt + 1, worker = $1, lease_until = {0} + {4} WHERE "
+                        "number IN (SELECT number FROM chosen) RETURNING {7}",
+                        d.now, most_vanished, count, d.skip_locked, lease, model.empty() ? "" : "AND model = $3",
+                        is_of_others("$2"), columns),
+            values);
       },
       true);
   std::sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) { return std::stoll(*a[0]) < std::stoll(*b[0]); });
   std::vector<Job> jobs;
-  for (const Row& r : rows) jobs.push_back({*r[1], *r[2], to_numbers(*r[3]), std::stoi(*r[4])});
+  for (const Row& r : rows) jobs.push_back({*r[1], *r[2], to_numbers(*r[3]), std::stoi(*r[4]), std::stoi(*r[5])});
   return jobs;
 }
 
@@ -366,7 +389,7 @@ std::vector<std::string> Store::list_workers() {
 
 bool Store::finish(const Job& job, const std::string& worker, const Answer& answer) {
   using Kind = Answer::Kind;
-  const bool is_lost = answer.kind == Kind::Crashed && job.attempt < most_attempts;
+  const bool is_lost = answer.kind == Kind::Crashed && job.attempt - job.vanished < most_attempts;
   const bool is_result =
       answer.kind == Kind::Done || answer.kind == Kind::Failed || (answer.kind == Kind::Crashed && !is_lost);
   std::string state = answer.kind == Kind::Done ? "done" : is_result ? "failed" : "waiting";
@@ -374,10 +397,14 @@ bool Store::finish(const Job& job, const std::string& worker, const Answer& answ
   const int attempt = answer.kind == Kind::Cancelled ? job.attempt - 1 : job.attempt;
   const std::vector<Value> change = {state,  std::to_string(attempt),    to_clean(answer.text), job.hash,
                                      worker, std::to_string(job.attempt)};
-  const std::string update =
-      "UPDATE job SET state = $1, attempt = $2, message = $3, lease_until = NULL WHERE hash = $4 AND state = 'running' "
-      "AND "
-      "worker = $5 AND attempt = $6 RETURNING hash, model";
+  // an answer is as good as another's; the last attempt of a crash is the holder's to tell
+  const char* held = answer.kind == Kind::Done || answer.kind == Kind::Failed
+                         ? "state IN ('waiting', 'running') AND attempt >= $6"
+                         : "state = 'running' AND worker = $5 AND attempt = $6";
+  const std::string update = fmt::format(
+      "UPDATE job SET state = $1, attempt = $2, message = $3, lease_until = NULL, worker = $5 WHERE hash = $4 AND {} "
+      "RETURNING hash, model",
+      held);
   if (!is_result) return transact([&](bool) { return !db_->run(update, change).empty(); }, true);
   if (!db_->dialect().writes_within) {
     return transact([&](bool) {
@@ -395,19 +422,21 @@ bool Store::finish(const Job& job, const std::string& worker, const Answer& answ
   return transact([&](bool) { return !db_->run(both, values).empty(); }, true);
 }
 
-int Store::quarantine() {
+int Store::quarantine(const std::string& process) {
   const Dialect& d = db_->dialect();
+  const std::vector<Value> values = process.empty() ? std::vector<Value>{} : std::vector<Value>{process};
   return transact([&](bool) {
     const Rows rows = db_->run(
         fmt::format("WITH chosen AS MATERIALIZED (SELECT number FROM job WHERE state IN ('waiting', 'running') AND "
-                    "(state = 'waiting' OR lease_until < {0}) AND attempt >= {1} ORDER BY number LIMIT 1000 {2}) "
-                    "UPDATE job SET state = 'failed' WHERE number IN (SELECT number FROM chosen) "
-                    "RETURNING hash, model, attempt, worker",
-                    d.now, most_attempts, d.skip_locked));
+                    "state = 'running' AND lease_until < {0} AND vanished + 1 >= {1} {3} ORDER BY number LIMIT 1000 "
+                    "{2}) UPDATE job SET state = 'failed', vanished = vanished + 1 WHERE number IN (SELECT number FROM "
+                    "chosen) RETURNING hash, model, attempt, worker, vanished",
+                    d.now, most_vanished, d.skip_locked, process.empty() ? "" : "AND " + is_of_others("$1")),
+        values);
     for (const Row& r : rows) {
       Answer a;
       a.kind = Answer::Kind::Failed;
-      a.text = fmt::format("its worker vanished {} times", *r[2]);
+      a.text = fmt::format("its worker vanished {} times", *r[4]);
       insert_result(*db_, {*r[0], *r[1], {}, std::stoi(*r[2])}, r[3].value_or(""), a);
     }
     return static_cast<int>(rows.size());
@@ -479,7 +508,8 @@ std::optional<std::string> Store::find_refusal(const std::string& model) {
 
 void Store::forget_refusals(const std::string& model) {
   transact([&](bool) {
-    db_->run("UPDATE job SET state = 'waiting', attempt = 0 WHERE model = $1 AND state = 'refused'", {model});
+    db_->run("UPDATE job SET state = 'waiting', attempt = 0, vanished = 0 WHERE model = $1 AND state = 'refused'",
+             {model});
     return 0;
   });
 }
@@ -506,10 +536,10 @@ void Store::rerun(const std::vector<std::string>& hashes) {
   const std::string list = json(hashes).dump();
   transact([&](bool) {
     db_->run(fmt::format("DELETE FROM result WHERE hash IN {}", db_->dialect().listed), {list});
-    db_->run(
-        fmt::format("UPDATE job SET state = 'waiting', attempt = 0, worker = NULL, message = NULL WHERE hash IN {}",
-                    db_->dialect().listed),
-        {list});
+    db_->run(fmt::format("UPDATE job SET state = 'waiting', attempt = 0, vanished = 0, worker = NULL, message = NULL "
+                         "WHERE hash IN {}",
+                         db_->dialect().listed),
+             {list});
     return 0;
   });
 }
@@ -518,7 +548,7 @@ int Store::rerun_failed(const std::string& model) {
   return transact([&](bool) {
     db_->run("DELETE FROM result WHERE hash IN (SELECT hash FROM job WHERE model = $1 AND state = 'failed')", {model});
     return static_cast<int>(
-        db_->run("UPDATE job SET state = 'waiting', attempt = 0, worker = NULL, message = NULL WHERE "
+        db_->run("UPDATE job SET state = 'waiting', attempt = 0, vanished = 0, worker = NULL, message = NULL WHERE "
                  "model = $1 AND state = 'failed' RETURNING hash",
                  {model})
             .size());

@@ -16,13 +16,17 @@
 
 namespace topple::study {
 
-/// Attempts after which a job counts as failed.
+/// Attempts that a model broke off after which a job counts as failed.
 inline constexpr int most_attempts = 3;
+/// Workers that vanished with a job after which it counts as failed: it may be what ends them, but healthy ones are
+/// killed too.
+inline constexpr int most_vanished = 10;
 
 struct Job {
   std::string hash, model;
   Point inputs;
-  int attempt = 0;  // this one, from 1
+  int attempt = 0;   // this one, from 1
+  int vanished = 0;  // so many of those before ended without a word
 };
 
 struct StoredResult {
@@ -74,18 +78,21 @@ class Store {
   /// Points that no model is asked for, with their (failed) results; `rerun_failed` leaves them alone.
   void add_impossible(const std::string& model, const std::vector<StoredResult>&);
   /// Takes up to `count` jobs that wait, or whose lease has run out, oldest first; raises their attempt before anything
-  /// is run. `worker` holds nothing else.
+  /// is run. `worker` holds nothing else. What threads of its process hold (names with the same part up to the last
+  /// colon) is left to them, whatever their leases say.
   ///   model  the only one that is wanted; empty: any
   std::vector<Job> claim(const std::string& worker, int count, double lease, const std::string& model = {});
   /// Leases of all jobs that these workers still hold.
   void renew(const std::vector<std::string>& workers, double lease);
   /// Who holds jobs.
   std::vector<std::string> list_workers();
-  /// Writes a result if the job is still the worker's; false if it has lost it. Crashed: the job waits again, or failed
-  /// after its last attempt. Refused: the job stops until `forget_refusals`. Cancelled: it waits again, not counted.
+  /// Writes a result if there is none, also of a job that was given to another since; false if it came too late. All
+  /// else counts only while the job is the worker's. Crashed: the job waits again, or failed after its last attempt.
+  /// Refused: the job stops until `forget_refusals`. Cancelled: it waits again, not counted.
   bool finish(const Job&, const std::string& worker, const Answer&);
   /// Jobs whose workers vanished too often become failed results. Returns how many.
-  int quarantine();
+  ///   process  what workers of this name and a number hold does not count
+  int quarantine(const std::string& process = {});
 
   std::vector<StoredResult> find_results(const std::vector<std::string>& hashes);
   /// All results of a model, in the order in which the jobs were added.

@@ -167,6 +167,29 @@ TEST_F(StudyFaults, LeaveAStudyInAFileAsItWouldBe) {
   EXPECT_EQ(results(*db), count);
 }
 
+// More kills than attempts of a model that breaks off.
+TEST_F(StudyFaults, LeaveARunThatIsKilledOftenAsItWouldBe) {
+  write_inputs(folder / "in.toml", cases::make_jump_inputs());
+  ASSERT_EQ(run(study("whole", "jump 0", {"--samples", "12"})), 0) << read(folder / "log");
+  const auto words = study("faulty", "jump 500", {"--samples", "12", "--jobs", "1"});
+  for (int kills = 0; kills < 5; ++kills) {
+    const pid_t manager = start(words);
+    wait_until([&] { return std::filesystem::exists(folder / "faulty/study.sqlite"); });
+    const auto db = open_database(folder / "faulty/study.sqlite");
+    wait_until([&] { return number(*db, "SELECT count(*) FROM sqlite_master WHERE name = 'job_refused'") == 1; });
+    const std::string held =
+        "SELECT count(*) FROM job WHERE state = 'running' AND worker LIKE '%:" + std::to_string(manager) + ":%'";
+    wait_until([&] { return number(*db, held) == 1; });
+    kill(manager, SIGKILL);
+    EXPECT_EQ(wait_for(manager), -SIGKILL);
+  }
+  EXPECT_EQ(run(words), 0) << read(folder / "log");
+  const auto db = open_database(folder / "faulty/study.sqlite");
+  EXPECT_EQ(number(*db, "SELECT max(vanished) FROM job"), 5) << "always the same run";
+  expect_one_result_each(*db);
+  expect_same("whole", "faulty");
+}
+
 TEST_F(StudyFaults, LeaveACondensedStudyOfAPlanAsItWouldBe) {
   std::ofstream(folder / "plan.toml") << collapse::house(
       collapse::charge("C-A*-0") + collapse::charge("C-B*-0", "0.2 s") +

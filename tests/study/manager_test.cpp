@@ -93,6 +93,39 @@ TEST(StudyReplay, GoesOnWhereItWasInterrupted) {
   EXPECT_EQ(counts.waiting + counts.running, 0);
 }
 
+// A clock that jumps lets every lease run out, again and again.
+TEST(StudyReplay, RunsNothingTwiceWhenTheClockJumps) {
+  const Folder folder;
+  const Problem p = make_small_problem(150);
+  const std::string whole = write_bits(run(p, make_options(folder / "a")));
+  std::atomic<long> runs = 0;
+  const RunnerFactories factories = {{"small", [&runs](const std::string&) -> Runner {
+                                        return [&runs](auto points, const auto& give, const auto& cancel) {
+                                          for (std::size_t i = 0; i < points.size() && !cancel; ++i) {
+                                            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+                                            ++runs;
+                                            give(i, calc_small(points[i]));
+                                          }
+                                        };
+                                      }}};
+  std::atomic<bool> is_over = false;
+  Store(folder / "b").count_studies();
+  std::thread clock([&] {
+    const auto db = open_database(folder / "b");
+    while (!is_over) {
+      db->run("UPDATE job SET lease_until = 1 WHERE state = 'running'");
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  });
+  StudyOptions o = make_options(folder / "b", 4);
+  o.pool.batch = 1;
+  const StudyResult r = run(p, o, factories);
+  is_over = true;
+  clock.join();
+  EXPECT_EQ(write_bits(r), whole);
+  EXPECT_EQ(runs, static_cast<long>(r.alpha.archive.size()));
+}
+
 TEST(StudyReplay, ReadsBackWhatItFound) {
   const Folder folder;
   const Problem p = make_small_problem();

@@ -94,18 +94,42 @@ TEST_P(Stores, GiveJobsOfOneModelToThoseWhoWantNoOther) {
   EXPECT_EQ(store.claim("x", 5, 60).at(0).hash, "a");
 }
 
-TEST_P(Stores, TakeAnExpiredLeaseAndRefuseItsFormerOwner) {
+TEST_P(Stores, TakeAnExpiredLeaseAndTheAnswerThatIsFirst) {
+  Store store(address);
+  store.add_jobs("m", {{"a", {1}}, {"b", {1}}});
+  const std::vector<Job> slow = store.claim("slow", 2, 0);
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  const std::vector<Job> quick = store.claim("quick", 2, 60);
+  ASSERT_EQ(quick.size(), 2u);
+  EXPECT_EQ(quick[0].attempt, 2);
+  EXPECT_EQ(quick[0].vanished, 1);
+  store.renew({"slow"}, 60);
+  EXPECT_TRUE(store.finish(quick[0], "quick", done(2)));
+  EXPECT_FALSE(store.finish(slow[0], "slow", done(1))) << "it came too late";
+  EXPECT_FALSE(store.finish(quick[0], "quick", done(3))) << "a second time";
+  EXPECT_EQ(store.find_results({"a"}).at(0).answer.outputs[0].second, 2);
+  // who was silent and is not dead
+  for (const Kind kind : {Kind::Cancelled, Kind::Crashed, Kind::Refused})
+    EXPECT_FALSE(store.finish(slow[1], "slow", {kind, {}, "", {}, "", 0})) << "it tells nothing";
+  EXPECT_EQ(store.count("m").running, 1);
+  EXPECT_TRUE(store.finish(slow[1], "slow", done(1)));
+  for (const Kind kind : {Kind::Cancelled, Kind::Crashed, Kind::Failed, Kind::Done})
+    EXPECT_FALSE(store.finish(quick[1], "quick", {kind, {}, "", {}, "", 0}));
+  EXPECT_EQ(store.find_results({"b"}).at(0).answer.outputs[0].second, 1);
+  EXPECT_EQ(store.count("m").done, 2);
+  // an answer to a question of before
+  store.rerun({"a"});
+  EXPECT_FALSE(store.finish(slow[0], "slow", done(1)));
+}
+
+// As a clock that jumps does it, or a machine that slept.
+TEST_P(Stores, LeaveAJobToItsThreadWhateverItsLeaseSays) {
   Store store(address);
   store.add_jobs("m", {{"a", {1}}});
-  const Job slow = store.claim("slow", 1, 0).at(0);
+  const Job job = store.claim("host:1:aa:0", 1, 0).at(0);
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  const Job quick = store.claim("quick", 1, 60).at(0);
-  EXPECT_EQ(quick.attempt, 2);
-  store.renew({"slow"}, 60);
-  EXPECT_FALSE(store.finish(slow, "slow", done(1)));
-  EXPECT_TRUE(store.finish(quick, "quick", done(2)));
-  EXPECT_FALSE(store.finish(quick, "quick", done(3))) << "a second time";
-  EXPECT_EQ(store.find_results({"a"}).at(0).answer.outputs[0].second, 2);
+  for (const char* mine : {"host:1:aa:0", "host:1:aa:1", "host:1:aa:10"}) EXPECT_TRUE(store.claim(mine, 1, 60).empty());
+  EXPECT_TRUE(store.finish(job, "host:1:aa:0", done(1)));
 }
 
 TEST_P(Stores, KeepALeaseThatIsRenewed) {
@@ -129,19 +153,69 @@ TEST_P(Stores, PutAsideWhatCrashesThreeTimes) {
   EXPECT_EQ(store.find_results({"a"}).at(0).answer.kind, Kind::Failed);
   EXPECT_EQ(store.find_results({"a"}).at(0).answer.text, "signal 11");
   // workers that vanish
-  for (int attempt = 1; attempt <= most_attempts; ++attempt) {
-    EXPECT_EQ(store.claim("gone", 1, 0).at(0).hash, "b");
+  for (int k = 1; k <= most_vanished; ++k) {
+    EXPECT_EQ(store.quarantine(), 0);
+    EXPECT_EQ(store.claim("gone:" + std::to_string(k) + ":0", 1, 0).at(0).hash, "b");
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
   EXPECT_TRUE(store.claim("w", 1, 60).empty());
-  EXPECT_EQ(store.quarantine(), 1);
+  EXPECT_EQ(store.quarantine("gone:" + std::to_string(most_vanished)), 0) << "it is there still";
+  EXPECT_EQ(store.quarantine("gone"), 0);
+  EXPECT_EQ(store.quarantine("elsewhere"), 1);
   EXPECT_EQ(store.quarantine(), 0);
-  EXPECT_EQ(store.find_results({"b"}).at(0).answer.text, "its worker vanished 3 times");
+  EXPECT_EQ(store.find_results({"b"}).at(0).answer.text, "its worker vanished 10 times");
   EXPECT_EQ(store.count("m").failed, 2);
   // a second chance
   EXPECT_EQ(store.rerun_failed("m"), 2);
   EXPECT_TRUE(store.find_results({"a", "b"}).empty());
   EXPECT_EQ(store.claim("w", 5, 60).size(), 2u);
+}
+
+// Workers that were killed say nothing of a model that breaks off, and the other way round.
+TEST_P(Stores, CountWorkersThatVanishApartFromCrashes) {
+  Store store(address);
+  store.add_jobs("m", {{"a", {1}}, {"b", {1}}});
+  int name = 0;
+  const auto vanish = [&] {
+    store.claim("gone:" + std::to_string(++name) + ":0", 1, 0);
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  };
+  for (int k = 0; k < most_attempts + 2; ++k) vanish();
+  EXPECT_EQ(store.quarantine(), 0);
+  Job job = store.claim("w", 1, 60).at(0);
+  EXPECT_EQ(job.vanished, most_attempts + 2);
+  EXPECT_TRUE(store.finish(job, "w", done(1)));
+  EXPECT_EQ(store.find_results({"a"}).at(0).answer.kind, Kind::Done);
+  for (int crash = 1; crash <= most_attempts; ++crash) {
+    EXPECT_TRUE(store.find_results({"b"}).empty());
+    vanish();
+    job = store.claim("w", 1, 60).at(0);
+    EXPECT_EQ(job.hash, "b");
+    EXPECT_TRUE(store.finish(job, "w", {Kind::Crashed, {}, "", {}, "signal 11", 0}));
+  }
+  EXPECT_EQ(store.find_results({"b"}).at(0).answer.text, "signal 11");
+}
+
+TEST_P(Stores, TakeTablesOfEarlierVersions) {
+  {
+    const auto db = open_database(address);
+    Store store(address);
+    store.add_jobs("m", {{"a", {1}}, {"b", {2}}});
+    EXPECT_TRUE(store.finish(store.claim("w", 1, 60).at(0), "w", done(1)));
+    db->run("ALTER TABLE job DROP COLUMN vanished");
+  }
+  {
+    Store seen(address, nullptr, 10, true);
+    EXPECT_EQ(seen.load_results("m").size(), 1u) << "it is read as it is";
+  }
+  for (int k = 0; k < 2; ++k) {
+    Store store(address);
+    EXPECT_EQ(store.load_results("m").size(), 1u);
+    const Job job = store.claim("w", 1, 60).at(0);
+    EXPECT_EQ(job.hash, "b");
+    EXPECT_EQ(job.vanished, 0);
+    EXPECT_TRUE(store.finish(job, "w", {}));
+  }
 }
 
 TEST_P(Stores, CountNoAttemptForACancelledRun) {
@@ -354,6 +428,7 @@ TEST(Store, IsNotHeldUpByATransactionThatStandsStill) {
   ASSERT_EQ(jobs.size(), 1u) << "the server ended that transaction";
   EXPECT_EQ(jobs[0].hash, "a");
   EXPECT_THROW(stopped->run("COMMIT"), ConnectionLost);
+  EXPECT_TRUE(other.finish(jobs[0], "w2", {Kind::Done, {{"z", 1}}, "", {}, "", 0}));
   EXPECT_FALSE(store.finish(a, "stopped", {Kind::Done, {{"z", 1}}, "", {}, "", 0}));
 }
 
