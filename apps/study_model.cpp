@@ -146,6 +146,7 @@ bool remove_unused(const StudyPlace& place, const std::string& model, long answe
   } catch (const study::DiskFailed&) {
     if (answers > 0) return false;
   }
+  if (study::is_open_elsewhere(place.store)) return false;  // workers wait for it to go on
   for (const char* end : {"", "-wal", "-shm", "-journal"}) fs::remove(place.store + end, failure);
   return true;
 }

@@ -23,7 +23,7 @@ void make_study_folder(const std::string& folder);
 StudyPlace make_place(const Arguments&);
 /// Notes in the folder on which server its study is.
 void keep_place(const std::string& folder, const StudyPlace&);
-/// Removes the file of a new store in which nothing was found; whether it did.
+/// Removes the file of a new store in which nothing was found, unless others work in it; whether it did.
 ///   answers  how many it must hold, should a full disk not let it be read
 bool remove_unused(const StudyPlace&, const std::string& model, long answers);
 /// Of a study that is there: its folder, or a server. Throws InputError E820.

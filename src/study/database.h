@@ -63,4 +63,8 @@ std::unique_ptr<Database> open_database(const std::string& address, bool is_read
 std::unique_ptr<Database> open_sqlite(const std::string& path, bool is_read_only = false);
 std::unique_ptr<Database> open_postgresql(const std::string& url);
 
+/// Whether another connection has the file of a store open, here or in another process. False where it cannot be told
+/// (no store, no room on the disk).
+bool is_open_elsewhere(const std::string& path);
+
 }  // namespace topple::study

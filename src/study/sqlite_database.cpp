@@ -171,4 +171,14 @@ std::unique_ptr<Database> open_sqlite(const std::string& path, bool is_read_only
   return std::make_unique<SqliteDatabase>(path, is_read_only);
 }
 
+bool is_open_elsewhere(const std::string& path) {
+  sqlite3* db = nullptr;
+  int code = sqlite3_open_v2(path.c_str(), &db, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX, nullptr);
+  // only who is alone may leave the write-ahead log, which the next one turns on again
+  for (const char* sql : {"SELECT 1 FROM sqlite_master", "PRAGMA journal_mode = DELETE"})
+    if (code == SQLITE_OK) code = sqlite3_exec(db, sql, nullptr, nullptr, nullptr);
+  sqlite3_close(db);
+  return code == SQLITE_BUSY || code == SQLITE_LOCKED;
+}
+
 }  // namespace topple::study

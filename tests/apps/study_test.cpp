@@ -190,6 +190,34 @@ TEST_F(StudyFaults, LeaveARunThatIsKilledOftenAsItWouldBe) {
   expect_same("whole", "faulty");
 }
 
+TEST_F(StudyFaults, LeaveTheStoreToWorkersWhenTheStudyStops) {
+  write_inputs(folder / "in.toml", cases::make_jump_inputs());
+  // answers that cannot be understood, until it is mended
+  std::ofstream(folder / "model.sh") << "while read -r line; do if [ -e " << folder / "mended"
+                                     << " ]; then echo '{\"z\": 1}'; else echo '{}'; fi; done\n";
+  const std::vector<std::string> words = {
+      TOPPLE_PROGRAM, "study", folder / "in.toml", "-o", folder / "out", "--evaluator", "sh " + (folder / "model.sh"),
+      "--samples",    "30"};
+  std::vector<std::string> manage = words;
+  manage.insert(manage.end(), {"--jobs", "0"});
+  // with nobody else nothing is left behind
+  EXPECT_EQ(run(words), 2);
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+  const pid_t manager = start(manage);
+  wait_until([&] { return std::filesystem::exists(folder / "out/study.sqlite"); });
+  {
+    const auto db = open_database(folder / "out/study.sqlite");
+    wait_until([&] { return number(*db, "SELECT count(*) FROM sqlite_master WHERE name = 'job_refused'") == 1; });
+    wait_until([&] { return number(*db, "SELECT count(*) FROM job") > 0; });
+  }
+  const pid_t worker = start({TOPPLE_PROGRAM, "worker", folder / "out", "--jobs", "1"});
+  EXPECT_EQ(wait_for(manager), 2) << read(folder / "log");
+  ASSERT_TRUE(std::filesystem::exists(folder / "out/study.sqlite")) << "the worker waits in it";
+  std::ofstream(folder / "mended") << "\n";
+  EXPECT_EQ(run(manage), 0) << read(folder / "log");
+  EXPECT_EQ(wait_for(worker), 0) << "it did the runs";
+}
+
 TEST_F(StudyFaults, LeaveACondensedStudyOfAPlanAsItWouldBe) {
   std::ofstream(folder / "plan.toml") << collapse::house(
       collapse::charge("C-A*-0") + collapse::charge("C-B*-0", "0.2 s") +

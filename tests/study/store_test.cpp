@@ -327,6 +327,25 @@ TEST(Store, IsReadWhereNothingCanBeWritten) {
   EXPECT_THROW(Store(folder / "none", nullptr, 1, true), InputError) << "nothing is made";
 }
 
+TEST(Store, KnowsWhoElseHasItOpen) {
+  const Folder folder;
+  const std::string path = folder / "s.sqlite";
+  EXPECT_FALSE(is_open_elsewhere(path)) << "there is none";
+  EXPECT_FALSE(std::filesystem::exists(path));
+  {
+    Store store(path);
+    store.put_study({"main", "m", "{}", "open", ""});
+    EXPECT_TRUE(is_open_elsewhere(path));
+    const pid_t other = fork();
+    if (other == 0) _exit(is_open_elsewhere(path) ? 1 : 0);
+    EXPECT_EQ(wait_for(other), 1);
+    store.put_study({"main", "m", "{}", "finished", ""});
+  }
+  EXPECT_FALSE(is_open_elsewhere(path));
+  EXPECT_EQ(Store(path).find_study("main")->state, "finished");
+  EXPECT_EQ(open_database(path)->run("PRAGMA journal_mode").at(0).at(0), "wal");
+}
+
 TEST(Store, SaysWhichFileIsDamaged) {
   const Folder folder;
   const std::string path = folder / "s.sqlite";
