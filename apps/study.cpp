@@ -50,7 +50,10 @@ void write_all(std::FILE* out, const std::string& folder, const study::Problem& 
 
 /// Complaints, with the line of a file or of an answer that they point into.
 int complain(const InputError& e, const std::string& text, bool as_json) {
-  for (const Diagnostic& d : e.diagnostics()) std::fputs(render(d, text, has_colour(stderr)).c_str(), stderr);
+  for (Diagnostic d : e.diagnostics()) {
+    d.message = to_printable(d.message), d.help = to_printable(d.help);
+    std::fputs(render(d, text, has_colour(stderr)).c_str(), stderr);
+  }
   if (as_json) print_refusal(e.diagnostics());
   return kBadInput;
 }
@@ -97,7 +100,7 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
     if (code == study::no_answer_code) study::Store(place.store).rerun_failed(model);
     if (code == "E823" || code == "E824" || code == "E827" || code == study::no_answer_code) {
       const auto refusal = study::Store(place.store).find_refusal(model);
-      complain(e, refusal ? study::read_refusal(*refusal).line : "", a.json);
+      complain(e, refusal ? to_printable(study::read_refusal(*refusal).line) : "", a.json);
       std::fprintf(stderr,
                    "The study stopped; what was run before is kept. Mend the evaluator and give the command again.\n");
     } else {

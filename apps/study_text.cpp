@@ -29,7 +29,7 @@ std::string words_of_time(double seconds) {
 void print_heading(std::FILE* out, const char* text) { std::fprintf(out, "\n%s\n", text); }
 
 void print_line(std::FILE* out, const std::string& text) {
-  std::fprintf(out, "  %s\n", wrap(text, find_width(out), 2).c_str());
+  std::fprintf(out, "  %s\n", wrap(to_printable(text), find_width(out), 2).c_str());
 }
 
 /// "0.031", "4.5", "37", "100": two digits, no powers of ten for whole percentages.
@@ -46,7 +46,7 @@ void print_outcomes(std::FILE* out, const StudyResult& r) {
   for (const auto& c : r.alpha.classes) {
     const bool is_open = !study::is_possibility_converged(r, c);
     const bool may_be_less = !uncertainty::is_necessity_converged(r.possibilities, c.outcome);
-    std::fprintf(out, "  %-26s %11.5f%s %9.5f%s %6d\n", study::words_of_outcome(r, c.outcome).c_str(),
+    std::fprintf(out, "  %-26s %11.5f%s %9.5f%s %6d\n", to_printable(study::words_of_outcome(r, c.outcome)).c_str(),
                  study::possibility_of(r, c), is_open ? "*" : " ",
                  uncertainty::calc_necessity(r.possibilities, c.outcome), may_be_less ? "*" : " ", c.count);
     has_open = has_open || is_open || may_be_less;
@@ -65,7 +65,7 @@ void print_outputs(std::FILE* out, const Problem& p, const StudyResult& r) {
   std::size_t width = 6;
   const auto title = [&](std::size_t o) {
     const study::Quantity q = study::find_output(p, r.outputs[o]);
-    return q.unit.empty() ? q.name : q.name + " [" + q.unit + "]";
+    return to_printable(q.unit.empty() ? q.name : q.name + " [" + q.unit + "]");
   };
   for (std::size_t o = 0; o < r.outputs.size(); ++o) width = std::max(width, title(o).size());
   std::string head = fmt::format("{:<{}}", "Output", width + 2);
@@ -208,14 +208,14 @@ std::string describe_state(const Problem& p, const study::StudyState& s) {
   for (std::size_t i = 0; i < std::min<std::size_t>(2, s.so_far->alpha.outputs.size()); ++i) {
     const auto& support = s.so_far->alpha.outputs[i].levels.front();
     const study::Quantity& q = study::find_output(p, s.so_far->outputs[i]);
-    text += fmt::format("; {} {:.5g} to {:.5g}{}{}", q.name, support.lower.value / q.unit_value,
+    text += fmt::format("; {} {:.5g} to {:.5g}{}{}", to_printable(q.name), support.lower.value / q.unit_value,
                         support.upper.value / q.unit_value, q.unit.empty() ? "" : " ", q.unit);
   }
   return text;
 }
 
 void print_study(std::FILE* out, const Problem& p, const StudyResult& r) {
-  if (!p.title.empty()) std::fprintf(out, "%s\n", p.title.c_str());
+  if (!p.title.empty()) std::fprintf(out, "%s\n", to_printable(p.title).c_str());
   std::fprintf(out, "%zu runs, %d failed; %s\n", r.alpha.archive.size(), r.alpha.failed,
                r.is_finished ? uncertainty::to_text(r.ending).c_str() : "not finished, bounds so far");
   const std::vector<study::Sentence> sentences = study::tell(p, r);

@@ -20,6 +20,10 @@ int find_width(std::FILE*);
 /// spaces; the first is printed after as many.
 std::string wrap(const std::string& text, int width, int indent);
 
+/// A text from elsewhere without what a terminal would obey: line breaks and tabs become spaces, other control
+/// characters question marks.
+std::string to_printable(const std::string&);
+
 /// A word as a shell takes it: in quotation marks where it needs them.
 std::string quote_word(const std::string&);
 

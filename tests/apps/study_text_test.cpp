@@ -54,6 +54,36 @@ TEST(StudyText, WritesWholePercentagesAndOutcomesWithoutAName) {
   EXPECT_NE(said.find("outcome (no name): a 0.90"), std::string::npos) << said;
 }
 
+TEST(StudyText, WritesNothingThatATerminalWouldObey) {
+  study::Problem p;
+  p.title = "title\x1b[2J";
+  p.inputs = {{"a", "", 1}};
+  p.space.inputs = {uncertainty::make_triangular(0, 1, 2)};
+  study::StudyResult r;
+  r.outputs = {"z\nwidth\x07"};
+  r.outcomes = {"stands", "falls\r\x1b]0;no\xC2\x9B"};
+  r.alpha.classes.resize(2);
+  r.alpha.classes[1].outcome = 1;
+  r.alpha.outputs.resize(1);
+  r.alpha.outputs[0].levels.resize(2);
+  r.failures = {"3 x exit code 1: line\none\tand two\x1b[31m"};
+  char* text = nullptr;
+  std::size_t size = 0;
+  std::FILE* out = open_memstream(&text, &size);
+  print_study(out, p, r);
+  study::StudyState s;
+  s.so_far = &r;
+  std::fputs(describe_state(p, s).c_str(), out);
+  std::fclose(out);
+  const std::string said(text, size);
+  std::free(text);
+  for (const char c : said) EXPECT_TRUE(c == '\n' || static_cast<unsigned char>(c) >= 0x20) << static_cast<int>(c);
+  EXPECT_EQ(said.find("\xC2\x9B"), std::string::npos);
+  for (const char* whole : {"z width?", "falls ?]0;no?", "3 x exit code 1: line one and two?[31m", "title?[2J"})
+    EXPECT_NE(said.find(whole), std::string::npos) << whole << " in " << said;
+  EXPECT_EQ(to_printable("büro 5 °, 3 €"), "büro 5 °, 3 €");
+}
+
 TEST(Terminal, QuotesWordsAsAShellTakesThem) {
   EXPECT_EQ(quote_word("out/plan.toml"), "out/plan.toml");
   EXPECT_EQ(quote_word("büro"), "büro");
