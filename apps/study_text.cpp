@@ -46,9 +46,10 @@ void print_outcomes(std::FILE* out, const StudyResult& r) {
   for (const auto& c : r.alpha.classes) {
     const bool is_open = !study::is_possibility_converged(r, c);
     const bool may_be_less = !uncertainty::is_necessity_converged(r.possibilities, c.outcome);
-    std::fprintf(out, "  %-26s %11.5f%s %9.5f%s %6d\n", to_printable(study::words_of_outcome(r, c.outcome)).c_str(),
-                 study::possibility_of(r, c), is_open ? "*" : " ",
-                 uncertainty::calc_necessity(r.possibilities, c.outcome), may_be_less ? "*" : " ", c.count);
+    std::fprintf(out, "  %-26s %11s%s %9s%s %6d\n", to_printable(study::words_of_outcome(r, c.outcome)).c_str(),
+                 study::words_of_least(study::possibility_of(r, c), 5).c_str(), is_open ? "*" : " ",
+                 study::words_of_most(uncertainty::calc_necessity(r.possibilities, c.outcome), 5).c_str(),
+                 may_be_less ? "*" : " ", c.count);
     has_open = has_open || is_open || may_be_less;
   }
   if (has_open && r.is_finished)
@@ -137,7 +138,8 @@ void print_drivers(std::FILE* out, const Problem& p, const StudyResult& r) {
       bool is_converged = false;
       for (const auto& k : f.classes)
         if (k.outcome == c.outcome) degree = k.possibility, is_converged = k.converged;
-      text += fmt::format(" {} {:.2f}{},", study::words_of_outcome(r, c.outcome), degree, is_converged ? "" : "*");
+      text += fmt::format(" {} {}{},", study::words_of_outcome(r, c.outcome), study::words_of_least(degree),
+                          is_converged ? "" : "*");
       has_open = has_open || !is_converged;
     }
     text.pop_back();

@@ -24,6 +24,14 @@ std::string quoted(const std::string& name) { return name.empty() ? "the outcome
 
 std::string percent(double part) { return fmt::format("{:.0f} %", 100 * part); }
 
+/// Rounded up or down to so many digits behind the point; what is a number of so many digits but for its last bits
+/// stays that number.
+std::string round_towards(double x, int digits, bool is_up) {
+  const double unit = std::pow(10, digits), y = x * unit;
+  const double whole = is_up ? std::ceil(y - 1e-9) : std::floor(y + 1e-9);
+  return fmt::format("{:.{}f}", whole / unit + 0.0, digits);
+}
+
 /// Class at the core; failed_outcome if that run failed, and nothing if it was not run.
 const uncertainty::Sample* find_core(const Problem& p, const uncertainty::Archive& archive) {
   const int i = archive.find(uncertainty::calc_centre(p.space));
@@ -65,9 +73,9 @@ void tell_outcomes(const Problem& p, const StudyResult& r, std::vector<Sentence>
       out.push_back(std::move(s));
       continue;
     }
-    s.text = fmt::format("{} is {}: possibility {}{:.2f}, necessity at most {:.2f}.", quoted(name),
-                         words_of_possibility(c.possibility), c.possibility >= 1 ? "" : "at least ", c.possibility,
-                         necessity);
+    s.text = fmt::format("{} is {}: possibility {}{}, necessity at most {}.", quoted(name),
+                         words_of_possibility(c.possibility), c.possibility >= 1 ? "" : "at least ",
+                         words_of_least(c.possibility), words_of_most(necessity));
     if (c.sample >= 0 && core && uncertainty::outcome_of(core->result) != c.outcome)
       s.text += fmt::format(" It takes no more than {}.", words_of_point(p, r.alpha.archive[c.sample].x));
     if (!p.asked.empty())
@@ -138,8 +146,8 @@ Sentence tell_debris_limit(const Limit& limit, const Quantity& q, const std::pai
   s.text = fmt::format("{}: between {} and {}; {} of {} runs keep the limit of {} ({}). ", what,
                        words_of_number(range.first / q.unit_value), words_of_value(q, range.second), runs - breaking,
                        runs, words_of_value(q, limit.least), limit.source);
-  s.text += possibility > 0 ? fmt::format("It is {} that the limit is broken: possibility at least {:.2f}.",
-                                          words_of_possibility(possibility), possibility)
+  s.text += possibility > 0 ? fmt::format("It is {} that the limit is broken: possibility at least {}.",
+                                          words_of_possibility(possibility), words_of_least(possibility))
             : breaking > 0  ? tell_impossible("Breaking the limit", breaking, static_cast<std::size_t>(runs), false)
                             : std::string("No run breaks the limit.");
   if (open > 0)
@@ -191,8 +199,8 @@ void tell_limits(const Problem& p, const StudyResult& r, std::vector<Sentence>& 
         words_of_value(q, limit.least),
         limit.most > limit.least ? fmt::format(" to {}, by frequency", words_of_value(q, limit.most)) : "",
         limit.source);
-    s.text += possibility > 0 ? fmt::format("It is {} that the band reaches the limit: possibility at least {:.2f}.",
-                                            words_of_possibility(possibility), possibility)
+    s.text += possibility > 0 ? fmt::format("It is {} that the band reaches the limit: possibility at least {}.",
+                                            words_of_possibility(possibility), words_of_least(possibility))
               : reaching > 0  ? tell_impossible("Reaching the limit", reaching, static_cast<std::size_t>(runs), false)
                               : std::string("No run reaches the limit.");
     s.text += " This is a screening, no prediction.";
@@ -252,11 +260,11 @@ void tell_requirement(const Problem& p, const StudyResult& r, std::vector<Senten
     if (core) s.text = fmt::format("The core values keep the requirement {}. ", p.permissible);
     if (worst) {
       s.text += fmt::format(
-          "Breaking {} is {}: possibility at least {:.2f}, so the necessity of keeping it is at most {:.2f}. It takes "
+          "Breaking {} is {}: possibility at least {}, so the necessity of keeping it is at most {}. It takes "
           "no "
           "more than {}.",
-          core ? "it" : "the requirement " + p.permissible, words_of_possibility(broken), broken, 1 - broken,
-          words_of_point(p, worst->x));
+          core ? "it" : "the requirement " + p.permissible, words_of_possibility(broken), words_of_least(broken),
+          words_of_most(1 - broken), words_of_point(p, worst->x));
       s.status = broken >= 0.5 ? Status::Bad : Status::Warning;
     } else if (breaking > 0) {
       s.text += tell_impossible(core ? "Breaking it" : "Breaking the requirement " + p.permissible, breaking,
@@ -282,7 +290,8 @@ std::string tell_guarantee(const uncertainty::PermissibleBox& b, bool has_intera
     text = fmt::format("No run violated the requirement in {} inside, {} of them at fresh random points", b.samples,
                        b.fresh);
     if (b.fresh > 0)
-      text += fmt::format(": with a confidence of 95 % at most {:.1f} % of the box violates it", 100 * b.violating);
+      text += fmt::format(": with a confidence of 95 % at most {} % of the box violates it",
+                          words_of_most(100 * b.violating, 1));
     text += ". It is not proven, and smaller islands may exist.";
   } else if (b.samples == 0 || b.volume < uncertainty::DesignOptions{}.smallest) {
     text = "This box was dropped: what violates the requirement leaves next to no room around these runs.";
@@ -297,6 +306,9 @@ std::string tell_guarantee(const uncertainty::PermissibleBox& b, bool has_intera
   if (has_interaction) text += " The constraints take away a part of it, which its share of the support does not show.";
   return text;
 }
+
+std::string words_of_least(double x, int digits) { return round_towards(x, digits, false); }
+std::string words_of_most(double x, int digits) { return round_towards(x, digits, true); }
 
 std::string words_of_possibility(double degree) {
   if (degree >= 1) return "fully possible";
@@ -429,9 +441,9 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
     }
     if (others > 0) {
       text += fmt::format(
-          ". It is not certain: another outcome is {} (possibility at least {:.2f}), so its necessity "
-          "is at most {:.2f}.",
-          words_of_possibility(others), others, 1 - others);
+          ". It is not certain: another outcome is {} (possibility at least {}), so its necessity "
+          "is at most {}.",
+          words_of_possibility(others), words_of_least(others), words_of_most(1 - others));
       if (status != Status::Bad) status = others >= 0.5 ? Status::Bad : Status::Warning;
     } else if (of_others > 0) {
       text += ". " + tell_impossible("Another outcome", of_others, runs, is_searched);
@@ -442,7 +454,7 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
       text += fmt::format(
           ". No other outcome was found in {} runs; an outcome that takes up {} of the inputs' support "
           "would have been missed with a probability of 5 %.",
-          runs, percent(1 - std::pow(0.05, 1.0 / spread)));
+          runs, words_of_most(100 * (1 - std::pow(0.05, 1.0 / spread)), 0) + " %");
     }
     add("verdict", std::move(text), status);
   } else if (std::string text = tell_outputs(p, r, *core); !text.empty()) {
@@ -474,10 +486,9 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
                                     [](const auto& c) { return c.outcome == failed_outcome; });
     const double degree = found == r.possibilities.classes.end() ? 0 : found->possibility;
     add("failed",
-        fmt::format(
-            "{} of {} runs failed; they are an outcome of their own, possible to at least {:.2f}. What would have "
-            "happened there is not known.",
-            failed, runs, degree),
+        fmt::format("{} of {} runs failed; they are an outcome of their own, possible to at least {}. What would have "
+                    "happened there is not known.",
+                    failed, runs, words_of_least(degree)),
         Status::Warning);
   }
   if (!r.is_finished)
@@ -501,8 +512,8 @@ std::vector<NotableRun> list_notable_runs(const Problem& p, const StudyResult& r
   const uncertainty::Sample* core = find_core(p, r.alpha.archive);
   for (const auto& c : r.possibilities.classes)
     if (c.sample >= 0 && (!core || uncertainty::outcome_of(core->result) != c.outcome))
-      runs.push_back({c.sample, fmt::format("most possible run with the outcome {} ({:.2f})",
-                                            words_of_outcome(r, c.outcome), c.possibility)});
+      runs.push_back({c.sample, fmt::format("most possible run with the outcome {} ({})",
+                                            words_of_outcome(r, c.outcome), words_of_least(c.possibility))});
   for (std::size_t o = 0; o < r.alpha.outputs.size() && o < r.outputs.size(); ++o) {
     if (r.alpha.outputs[o].levels.empty()) continue;
     const auto& support = r.alpha.outputs[o].levels.front();

@@ -18,6 +18,10 @@ struct Sentence {
 /// Of how much weight a degree is: "fully possible", ...
 std::string words_of_possibility(double degree);
 
+/// A degree or a part as a decimal that is at most, or at least, so large: "at least" and "at most" stay true of it.
+std::string words_of_least(double, int digits = 2);
+std::string words_of_most(double, int digits = 2);
+
 /// The value of one input that parts the runs of an outcome from the others best: of spread runs below `value` the part
 /// `below` has this outcome, of those above the part `above`.
 struct Split {

@@ -84,6 +84,29 @@ TEST(StudyText, WritesNothingThatATerminalWouldObey) {
   EXPECT_EQ(to_printable("büro 5 °, 3 €"), "büro 5 °, 3 €");
 }
 
+TEST(StudyText, RoundsDegreesSoThatTheyStayTrue) {
+  study::Problem p;
+  study::StudyResult r;
+  r.outcomes = {"stands", "falls"};
+  for (int k = 0; k < 2; ++k) {
+    uncertainty::ClassBounds c;
+    c.outcome = k, c.possibility = k == 0 ? 1 : 0.123456789;
+    r.alpha.classes.push_back(c);
+    uncertainty::Possibility found;
+    found.outcome = k, found.possibility = c.possibility, found.converged = true;
+    r.possibilities.classes.push_back(found);
+  }
+  char* text = nullptr;
+  std::size_t size = 0;
+  std::FILE* out = open_memstream(&text, &size);
+  print_study(out, p, r);
+  std::fclose(out);
+  const std::string said(text, size);
+  std::free(text);
+  EXPECT_NE(said.find("0.12345 "), std::string::npos) << said << "at least";
+  EXPECT_NE(said.find("0.87655 "), std::string::npos) << said << "at most";
+}
+
 TEST(Terminal, QuotesWordsAsAShellTakesThem) {
   EXPECT_EQ(quote_word("out/plan.toml"), "out/plan.toml");
   EXPECT_EQ(quote_word("büro"), "büro");

@@ -361,6 +361,38 @@ TEST(Fans, PartTrajectoriesByCurveAndOutcome) {
   EXPECT_NE(write_debris_csv(p, r).find("outcome,alpha,x [m],y [m]"), std::string::npos);
 }
 
+TEST(Story, RoundsDegreesSoThatTheyStayTrue) {
+  EXPECT_EQ(words_of_least(.456598936), "0.45");
+  EXPECT_EQ(words_of_most(1 - .456598936), "0.55");
+  EXPECT_EQ(words_of_least(0.999), "0.99");
+  EXPECT_EQ(words_of_most(1e-4), "0.01");
+  EXPECT_EQ(words_of_least(1), "1.00");
+  EXPECT_EQ(words_of_most(0), "0.00");
+  EXPECT_EQ(words_of_most(13.81, 1), "13.9");
+  // what has two digits keeps them, though no double is that number
+  for (int k = 0; k <= 100; ++k) {
+    const std::string text = fmt::format("{}.{:02}", k / 100, k % 100);
+    for (const double x : {k / 100.0, 1 - (1 - k / 100.0)}) {
+      EXPECT_EQ(words_of_least(x), text);
+      EXPECT_EQ(words_of_most(x), text);
+    }
+  }
+  const Folder folder;
+  const Problem p = make_problem(uncertainty::cases::make_jump_inputs(), 2000);
+  const StudyResult r = run(p, folder, "a", make_factories(calc_jump));
+  double falls = 0;
+  for (const auto& c : r.possibilities.classes)
+    if (name_of_outcome(r, c.outcome) == "falls") falls = c.possibility;
+  ASSERT_GT(falls, 0.455);
+  std::string told;
+  for (const Sentence& s : tell(p, r)) told += s.text + " ";
+  EXPECT_NE(told.find("another outcome is possible (possibility at least 0.45), so its necessity is at most 0.55."),
+            std::string::npos)
+      << told;
+  EXPECT_NE(told.find("possibility at least 0.45, necessity at most 0.00."), std::string::npos) << told;
+  EXPECT_NE(told.find("possibility 1.00, necessity at most 0.55."), std::string::npos) << told;
+}
+
 TEST(Story, UsesShortNamesAndRoundNumbers) {
   EXPECT_EQ(make_short_names({{"concrete.a.fc", "", 1}, {"concrete.b.fc", "", 1}, {"fy", "", 1}, {"x.Ec", "", 1}}),
             (std::vector<std::string>{"a.fc", "b.fc", "fy", "Ec"}));
