@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <unordered_map>
 
 #include "base/error.h"
@@ -208,15 +209,22 @@ class Manager {
         store_(options.store, progress.cancel, options.pool.patience) {
     const auto there = store_.find_study(options.name);
     if (there && there->model != model_) refuse(*there);
+    std::vector<StoredResult> results = store_.load_results(model_);
+    const std::vector<std::string> strangers = find_strangers(results);
+    // what is refused changes nothing
+    for (const StoredResult& r : results)
+      if (std::ranges::find(strangers, r.hash) == strangers.end()) check_request(r.answer);
+    if (there && there->state == "finished" && !options.rerun_failed && strangers.empty()) finished_ = *there;
     store_.put_model(model_, make_model_definition(problem));
     row_ = {options.name, model_, make_study_definition(problem, options), "open", ""};
     store_.put_study(row_);
     if (options.accepted) options.accepted();
     release_dead_workers(store_);
     store_.forget_refusals(model_);
-    if (options.rerun_failed) store_.rerun_failed(model_);
-    std::vector<StoredResult> results = store_.load_results(model_);
-    const std::vector<std::string> strangers = find_strangers(results);
+    if (options.rerun_failed) {
+      store_.rerun_failed(model_);
+      results = store_.load_results(model_);
+    }
     if (!strangers.empty()) store_.rerun(strangers);
     for (StoredResult& r : results) known_.emplace(std::move(r.hash), std::move(r.answer));
     for (const std::string& hash : strangers) known_.erase(hash);
@@ -344,6 +352,12 @@ class Manager {
     result_ = r;
     show(true);
     return r;
+  }
+
+  /// A study that was finished before a command that is refused stays finished: all that it found is there.
+  void keep_finished() {
+    pool_.reset();
+    if (finished_) store_.put_study(*finished_);
   }
 
  private:
@@ -558,6 +572,7 @@ class Manager {
   std::string model_, asked_model_;
   Store store_;
   StudyRow row_;
+  std::optional<StudyRow> finished_;               // as it was found, to be put back
   std::unordered_map<std::string, Answer> known_;  // by hash
   std::unique_ptr<Pool> pool_;
   Names names_;
@@ -589,7 +604,13 @@ uncertainty::AlphaOptions make_alpha_options(const Problem& p) {
 StudyResult run_study(const Problem& problem, const RunnerFactories& factories, const StudyOptions& options,
                       const Progress& progress, const std::function<void(const StudyState&)>& watch) {
   uncertainty::check_space(problem.space);
-  return Manager(problem, factories, options, progress, watch).run();
+  Manager manager(problem, factories, options, progress, watch);
+  try {
+    return manager.run();
+  } catch (const InputError&) {
+    manager.keep_finished();
+    throw;
+  }
 }
 
 StudyResult read_study(const Problem& problem, Store& store, const StudyRow& row) {

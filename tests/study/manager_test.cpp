@@ -345,6 +345,33 @@ TEST(Study, KeepsPointsWithoutAFormulaAsFailed) {
   EXPECT_EQ(write_bits(read_study(p, store, store.find_study("main").value())), write_bits(r));
 }
 
+TEST(Study, StaysFinishedWhenACommandIsRefused) {
+  const Folder folder;
+  const Problem p = make_small_problem(200);
+  const StudyResult r = run(p, make_options(folder / "a"));
+  Store store(folder / "a");
+  const StudyRow row = *store.find_study("main");
+  ASSERT_EQ(row.state, "finished");
+  Problem no_such_output = p, no_such_level = p, broken = p;
+  no_such_output.permissible = "zz <= 3";
+  no_such_level.levels = {0, 2};
+  broken.limit = 400;  // it comes to new points, whose answers cannot be understood
+  const RunnerFactories refusing = {{"small", [](const std::string&) -> Runner {
+                                       return [](auto points, const auto& give, const auto&) {
+                                         for (std::size_t i = 0; i < points.size(); ++i)
+                                           give(i, {Answer::Kind::Done, {{"other", 1}}, "", {}, "", 0});
+                                       };
+                                     }}};
+  for (const Problem& asked : {no_such_output, no_such_level, broken}) {
+    EXPECT_THROW(run(asked, make_options(folder / "a"), refusing), InputError);
+    const StudyRow now = *store.find_study("main");
+    EXPECT_EQ(now.state, "finished");
+    EXPECT_EQ(now.summary, row.summary);
+    EXPECT_EQ(now.definition, row.definition);
+    EXPECT_EQ(write_bits(read_study(p, store, now)), write_bits(r));
+  }
+}
+
 TEST(Study, RefusesAnotherModelInItsPlace) {
   const Folder folder;
   Problem p = make_small_problem(100);
