@@ -120,10 +120,17 @@ void Process::look() {
     read_.append(buffer, static_cast<std::size_t>(n));
 }
 
+bool Process::has_ended() const {
+  siginfo_t info{};
+  return pid_ > 0 && waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+         info.si_pid == pid_;
+}
+
 Process::Event Process::next_line(std::string& line, double seconds, const std::atomic<bool>& cancel) {
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
-  constexpr int patience = 50;  // for a cancellation [ms]
+  auto looked = start, heard = start;  // heard: it, or behind its end what it started
+  constexpr int patience = 50;         // for a cancellation [ms]
   for (;;) {
     is_whole_ = true;
     if (take_line(line)) return Event::Line;
@@ -140,14 +147,30 @@ Process::Event Process::next_line(std::string& line, double seconds, const std::
       return Event::Line;
     }
     if (cancel.load(std::memory_order_relaxed)) return Event::Cancelled;
-    if (seconds > 0 && std::chrono::duration<double>(Clock::now() - start).count() > seconds) return Event::TimeOut;
+    const auto now = Clock::now();
+    if (seconds > 0 && std::chrono::duration<double>(now - start).count() > seconds) {
+      look();  // it may have come while we were stopped
+      if (take_line(line)) return Event::Line;
+      return Event::TimeOut;
+    }
+    // what it started may hold its output open, and may have a last word
+    if (now - looked > std::chrono::milliseconds(patience)) {
+      looked = now;
+      if (!has_ended()) {
+        heard = now;
+      } else if (now - heard > std::chrono::seconds(1)) {
+        look();
+        close_end(out_);
+        continue;
+      }
+    }
     if (in_ >= 0 && to_write_.empty() && close_after_) close_end(in_);
     pollfd wanted[3] = {{out_, POLLIN, 0}, {error_, POLLIN, 0}, {to_write_.empty() ? -1 : in_, POLLOUT, 0}};
     if (poll(wanted, 3, patience) <= 0) continue;
     char buffer[65536];
     if (wanted[0].revents) {
       const ssize_t n = read(out_, buffer, sizeof buffer);
-      if (n > 0) read_.append(buffer, static_cast<std::size_t>(n));
+      if (n > 0) read_.append(buffer, static_cast<std::size_t>(n)), heard = Clock::now();
       if (n == 0 || (n < 0 && errno != EAGAIN && errno != EINTR)) close_end(out_);
     }
     if (wanted[1].revents) {

@@ -26,8 +26,9 @@ class Process {
   enum class Event { Line, Closed, TimeOut, Cancelled, TooLong };
   /// Text that will be written while we wait for lines. `close`: and then the end of the file.
   void send(const std::string& text, bool close);
-  /// Waits for the next line of its output; `seconds` <= 0: for ever. Closed: it ended, or closed its output. TooLong:
-  /// more than longest_line bytes without an end; `line` has the first hundred of them.
+  /// Waits for the next line of its output; `seconds` <= 0: for ever. Closed: it ended, whoever else holds its output
+  /// open and is silent, or closed its output. TooLong: more than longest_line bytes without an end; `line` has the
+  /// first hundred of them.
   Event next_line(std::string& line, double seconds, const std::atomic<bool>& cancel);
   /// Whether the last line had an end: output may break off within one.
   bool is_whole() const { return is_whole_; }
@@ -42,6 +43,8 @@ class Process {
   void look();
 
  private:
+  bool has_ended() const;
+
   pid_t pid_ = 0;
   int in_ = -1, out_ = -1, error_ = -1;
   std::string to_write_, read_, said_;

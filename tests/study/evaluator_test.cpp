@@ -144,6 +144,19 @@ TEST(Evaluator, GivesUpAfterItsTime) {
   EXPECT_EQ(m.ask({{9, 1}, {9, 2}})[1].kind, Kind::Crashed) << "either may be to blame";
 }
 
+TEST(Evaluator, SeesThatItEndedWhoeverHoldsItsOutput) {
+  const auto start = std::chrono::steady_clock::now();
+  // its child holds both streams open
+  Model m("sleep 300 & read -r line; exit 3");
+  const Answer a = m.ask({{1, 1}})[0];
+  EXPECT_EQ(a.kind, Kind::Crashed);
+  EXPECT_NE(a.text.find("exit code 3"), std::string::npos) << a.text;
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60));
+  // a last word of what it started counts
+  Model late("read -r line; (sleep 0.3; echo '{\"z\": 1}') & exit 0");
+  EXPECT_EQ(late.ask({{1, 1}})[0].kind, Kind::Done);
+}
+
 TEST(Evaluator, GivesAProgramTimeToStart) {
   Model slow("sleep 0.5; while read -r line; do echo '{\"z\": 1}'; done", 0.2);
   EXPECT_EQ(slow.ask({{1, 1}})[0].kind, Kind::Done);
@@ -211,6 +224,9 @@ TEST(Evaluator, ReadsFormsOfAnswers) {
   EXPECT_EQ(read(R"({"failed": "no balance"})").text, "no balance");
   EXPECT_EQ(read(R"({"failed": true})").kind, Kind::Failed);
   EXPECT_EQ(read(R"({"failed": false, "z": 1})").kind, Kind::Done);
+  EXPECT_EQ(read(R"({"failed": null, "z": 1})").kind, Kind::Done) << "it did not";
+  EXPECT_EQ(read(R"({"failed": null, "z": 1})").outputs.size(), 1u);
+  EXPECT_EQ(read(R"({"failed": ""})").kind, Kind::Failed);
   EXPECT_EQ(read(R"({"outputs": {"a": null}})").kind, Kind::Failed);
   EXPECT_EQ(read(R"({"outputs": {"a": null}})").text, "a is not finite");
 }
@@ -231,6 +247,9 @@ TEST(Evaluator, PointsAtWhatItCannotUnderstand) {
   EXPECT_EQ(read("3").diagnostic.message, "a JSON object is wanted");
   EXPECT_EQ(read("{}").diagnostic.message, "there are neither outputs nor an outcome");
   read(R"({"outcome": [1]})");
+  EXPECT_EQ(read(R"({"z": 1, "outcome": ""})").diagnostic.message, "outcome: the name is empty");
+  EXPECT_EQ(read(R"({"z": 1, "outcome": ""})").diagnostic.where.column, 10);
+  read(R"({"outcome": ""})");
   read(R"({"trajectory": 1, "z": 1})");
   read(R"({"id": "a", "z": 1})");
   read("\xff\xfe");
