@@ -155,7 +155,7 @@ struct Reader {
     }
     Answer a;
     a.kind = Answer::Kind::Done;
-    if (j.contains("failed") && !(j["failed"].is_boolean() && !j["failed"].get<bool>())) {
+    if (j.contains("failed") && !j["failed"].is_null() && !(j["failed"].is_boolean() && !j["failed"].get<bool>())) {
       a.kind = Answer::Kind::Failed;
       a.text = j["failed"].is_string() ? j["failed"].get<std::string>() : "the evaluator says so";
       return a;
