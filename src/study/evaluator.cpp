@@ -168,6 +168,8 @@ struct Reader {
         a.outcome = o.dump();
       else
         return refuse(find_member(line, "outcome"), "outcome: a text is wanted");
+      if (a.outcome.empty())
+        return refuse(find_member(line, "outcome"), "outcome: the name is empty", "leave it out where there is none");
     }
     if (j.contains("trajectory")) {
       if (!j["trajectory"].is_array()) return refuse(find_member(line, "trajectory"), "trajectory: a list is wanted");

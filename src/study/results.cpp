@@ -357,7 +357,7 @@ std::string write_membership_csv(const Problem& p, const StudyResult& r) {
   };
   add(r.alpha.outputs, "");
   if (count_outcomes(r.alpha) > 1)
-    for (const auto& c : r.alpha.classes) add(c.outputs, name_of_outcome(r, c.outcome));
+    for (const auto& c : r.alpha.classes) add(c.outputs, words_of_outcome(r, c.outcome));
   return text;
 }
 
@@ -474,7 +474,7 @@ std::string write_fans_csv(const Problem& p, const StudyResult& r) {
   for (const CurveFan& f : calc_fans(p, r)) {
     const Curve& c = curves[static_cast<std::size_t>(f.curve)];
     const std::string name = title_of({c.name, c.unit, 1});
-    const std::string outcome = f.outcome == uncertainty::all_outcomes ? "" : name_of_outcome(r, f.outcome);
+    const std::string outcome = f.outcome == uncertainty::all_outcomes ? "" : words_of_outcome(r, f.outcome);
     for (const auto& l : f.levels)
       for (std::size_t t = 0; t < l.lower.size() && t < c.at.size(); ++t)
         text += fmt::format("{},{},{},{},{},{}\n", cell(name), cell(outcome), cell(l.alpha), cell(c.at[t]),
@@ -489,7 +489,7 @@ std::string write_debris_csv(const Problem& p, const StudyResult& r) {
   for (const CurveFan& f : calc_fans(p, r)) {
     const Curve& c = curves[static_cast<std::size_t>(f.curve)];
     if (!c.is_outline) continue;
-    const std::string outcome = f.outcome == uncertainty::all_outcomes ? "" : name_of_outcome(r, f.outcome);
+    const std::string outcome = f.outcome == uncertainty::all_outcomes ? "" : words_of_outcome(r, f.outcome);
     for (const DebrisLevel& d : calc_debris(c, f))
       for (const auto& corner : d.corners)
         text += fmt::format("{},{},{},{}\n", cell(outcome), cell(d.alpha), cell(corner[0]), cell(corner[1]));

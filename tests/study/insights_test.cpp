@@ -361,6 +361,20 @@ TEST(Fans, PartTrajectoriesByCurveAndOutcome) {
   EXPECT_NE(write_debris_csv(p, r).find("outcome,alpha,x [m],y [m]"), std::string::npos);
 }
 
+TEST(Results, KeepAnOutcomeWithoutANameApartFromAll) {
+  const Folder folder;
+  const Problem p = make_problem({make_triangular(0, 1, 2)}, 200);
+  const StudyResult r = run(p, folder, "n", make_factories([](const Point& x) {
+                              return done({{"y", x[0]}}, x[0] > 1.2 ? "falls" : "", {x[0]});
+                            }));
+  // any, and each by itself
+  const std::string membership = write_membership_csv(p, r), fans = write_fans_csv(p, r);
+  EXPECT_NE(membership.find("y,(no name),0,"), std::string::npos) << membership;
+  EXPECT_NE(fans.find("trajectory,(no name),0,"), std::string::npos) << fans.substr(0, 300);
+  const std::string all = "\ny,,0,";
+  EXPECT_EQ(membership.find(all), membership.rfind(all)) << "one row for any";
+}
+
 TEST(Story, RoundsDegreesSoThatTheyStayTrue) {
   EXPECT_EQ(words_of_least(.456598936), "0.45");
   EXPECT_EQ(words_of_most(1 - .456598936), "0.55");
