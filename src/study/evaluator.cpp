@@ -251,16 +251,22 @@ class Evaluator {
     while (open > 0) {
       std::string line;
       const double patience = find_patience(is_fresh && open == points.size());
-      const Process::Event event = process_.next_line(line, patience, cancel);
+      const auto waited = [&last] { return std::chrono::duration<double>(Clock::now() - last).count(); };
+      // lines that say nothing give it no more time
+      Process::Event event = process_.next_line(line, patience > 0 ? std::max(patience - waited(), 1e-6) : 0, cancel);
+      const bool is_blank = event == Process::Event::Line && line.find_first_not_of(" \t") == std::string::npos;
+      if (is_blank && patience > 0 && waited() > patience) event = Process::Event::TimeOut;
       if (event == Process::Event::Cancelled) {
         process_.end();
         return;
       }
       if (event == Process::Event::TimeOut) {
         process_.end();
-        const std::string what = fmt::format("no answer within {} s", patience);
+        // the text stays with the results: nothing that was measured
+        const std::string what = fmt::format("no answer within {} s", timeout_);
         if (!has_answered_ && ++waits_in_vain_ >= most_waits) {
-          const std::string all = fmt::format("was started {} times and gave {}", waits_in_vain_, what);
+          const std::string all =
+              fmt::format("was started {} times and gave no answer within {} s", waits_in_vain_, patience);
           refuse_silent(all, what, "--timeout gives it more time");
         } else {
           // among several nobody knows which one hangs; they will be asked one by one
@@ -274,6 +280,7 @@ class Evaluator {
           // it ended after its last answer: programs may answer one point each
           is_fresh = prepare();
           send();
+          last = Clock::now();
           continue;
         }
         // a shell's way to say so; a program that has answered is there
@@ -300,7 +307,7 @@ class Evaluator {
                                  "each answer is one line; the end of the line is missing"));
         return;
       }
-      if (line.find_first_not_of(" \t") == std::string::npos) continue;
+      if (is_blank) continue;
       if (!process_.is_whole() && breaks_off(line)) continue;  // it ended while it wrote
       while (next < points.size() && is_answered[next]) ++next;
       int id = first_ + static_cast<int>(next);

@@ -144,6 +144,33 @@ TEST(Evaluator, GivesUpAfterItsTime) {
   EXPECT_EQ(m.ask({{9, 1}, {9, 2}})[1].kind, Kind::Crashed) << "either may be to blame";
 }
 
+TEST(Evaluator, CountsNoLineThatSaysNothing) {
+  const Folder folder;
+  std::ofstream(folder / "slow.sh")
+      << "while read -r line; do case $line in *'\"x\":9.0'*) while :; do echo; sleep 0.05; "
+         "done;; *) echo; echo '{\"z\": 1}';; esac; done\n";
+  Model slow("sh " + (folder / "slow.sh"), 0.5);
+  EXPECT_EQ(slow.ask({{1, 1}})[0].kind, Kind::Done);
+  const auto start = std::chrono::steady_clock::now();
+  EXPECT_EQ(slow.ask({{9, 1}})[0].text, "no answer within 0.5 s");
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(20));
+  // nor a flood of them
+  Model flood("read -r line; echo '{\"z\": 1}'; read -r line; yes ''", 0.3);
+  EXPECT_EQ(flood.ask({{1, 1}})[0].kind, Kind::Done);
+  EXPECT_EQ(flood.ask({{1, 1}})[0].text, "no answer within 0.3 s");
+}
+
+// What a failed run says is kept: it must not hang on how long a start took.
+TEST(Evaluator, TellsNoTimeThatWasMeasured) {
+  Model m(
+      "sleep 0.3; while read -r line; do case $line in *'\"x\":9.0'*) sleep 100;; *) echo '{\"z\": 1}';; esac; done",
+      0.2);
+  EXPECT_EQ(m.ask({{9, 1}})[0].text, "no answer within 0.2 s") << "ten times as long";
+  EXPECT_EQ(m.ask({{1, 1}})[0].kind, Kind::Done);
+  EXPECT_EQ(m.ask({{9, 1}})[0].text, "no answer within 0.2 s");
+  EXPECT_EQ(m.ask({{9, 1}})[0].text, "no answer within 0.2 s") << "behind a start that was measured";
+}
+
 TEST(Evaluator, SeesThatItEndedWhoeverHoldsItsOutput) {
   const auto start = std::chrono::steady_clock::now();
   // its child holds both streams open
