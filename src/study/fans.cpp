@@ -24,6 +24,8 @@ std::vector<CurveFan> calc_fans(const Problem& p, const StudyResult& r) {
   std::vector<double> levels;
   if (!r.alpha.outputs.empty())
     for (const auto& l : r.alpha.outputs.front().levels) levels.push_back(l.alpha);
+  else if (!r.alpha.coverage.empty())  // those that are asked for may lack 0 and 1
+    for (const auto& c : r.alpha.coverage) levels.push_back(c.alpha);
   else
     levels = make_alpha_options(p).levels;
   std::vector<int> outcomes = {uncertainty::all_outcomes};

@@ -361,6 +361,22 @@ TEST(Fans, PartTrajectoriesByCurveAndOutcome) {
   EXPECT_NE(write_debris_csv(p, r).find("outcome,alpha,x [m],y [m]"), std::string::npos);
 }
 
+TEST(Fans, ReachFromTheSupportToTheCoreWithoutOutputs) {
+  const Folder folder;
+  Problem p = make_problem({make_triangular(0, 1, 2)}, 200);
+  p.levels = {0.5};  // 0 and 1 are always there
+  const StudyResult r = run(p, folder, "f", make_factories([](const Point& x) {
+                              return done({}, "falls", {x[0], 2 * x[0]});
+                            }));
+  ASSERT_TRUE(r.alpha.outputs.empty());
+  const std::vector<CurveFan> fans = calc_fans(p, r);
+  ASSERT_EQ(fans.size(), 1u);
+  ASSERT_EQ(fans[0].levels.size(), 3u);
+  for (int k = 0; k < 3; ++k) EXPECT_EQ(fans[0].levels[static_cast<std::size_t>(k)].alpha, 0.5 * k);
+  EXPECT_EQ(fans[0].levels[2].upper, (std::vector<double>{1, 2})) << "the core's own";
+  EXPECT_GT(fans[0].levels[0].upper[1], 3);
+}
+
 TEST(Results, KeepAnOutcomeWithoutANameApartFromAll) {
   const Folder folder;
   const Problem p = make_problem({make_triangular(0, 1, 2)}, 200);
