@@ -109,7 +109,9 @@ Statistic make_empirical_quantile(int output, double q) {
     auto values = pick(runs, output);
     if (values.empty()) return nan;
     std::sort(values.begin(), values.end());
-    const double place = std::ceil(q * static_cast<double>(values.size())) - 1;
+    // 0.07 of 100 values are 7, which in floating point is a little more
+    const double count = q * static_cast<double>(values.size()), whole = std::round(count);
+    const double place = (std::abs(count - whole) <= 1e-12 * whole ? whole : std::ceil(count)) - 1;
     return values[static_cast<std::size_t>(std::clamp(place, 0.0, static_cast<double>(values.size() - 1)))];
   };
 }

@@ -77,6 +77,26 @@ TEST(FuzzyRandomnessPhysics, NormalHasClosedForms) {
   }
 }
 
+// The smallest value that q of all do not exceed: the k-th where q n is k, whatever floating point makes of it.
+TEST(FuzzyRandomness, QuantilesOfWholeNumbersOfRuns) {
+  const auto make_runs = [](int n) {
+    std::vector<Result> runs;
+    for (int i = 1; i <= n; ++i) {
+      runs.emplace_back().state = Result::State::Done;
+      runs.back().values = {static_cast<double>(i)};
+    }
+    return runs;
+  };
+  for (const int n : {1, 10, 100, 1000}) {
+    const std::vector<Result> runs = make_runs(n);
+    for (int k = 1; k <= n; ++k) EXPECT_EQ(make_empirical_quantile(0, static_cast<double>(k) / n)(runs), k) << n;
+    EXPECT_EQ(make_empirical_quantile(0, 0)(runs), 1);
+  }
+  EXPECT_GT(0.07 * 100, 7) << "what floating point makes of it";
+  EXPECT_EQ(make_empirical_quantile(0, 0.07)(make_runs(100)), 7);
+  EXPECT_EQ(make_empirical_quantile(0, 0.0701)(make_runs(100)), 8);
+}
+
 TEST(FuzzyRandomness, SameNumbersForEveryParameterSet) {
   MonteCarloOptions options;
   options.samples = 50;
