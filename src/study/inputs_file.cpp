@@ -125,7 +125,8 @@ struct Reader {
         list.kind = Node::Kind::Array;
         list.place = given->place;
         list.items = {*given};
-        if (const auto v = read_numbers(list, label, 1)) return FuzzyNumber((*v)[0]);
+        if (const auto v = read_numbers(list, label, 1))
+          return FuzzyNumber(std::vector<uncertainty::AlphaCut>{{0, (*v)[0], (*v)[0]}, {1, (*v)[0], (*v)[0]}});
       }
     } catch (const InputError& e) { complaints.error("E207", given->place, label + ": " + e.first_error().message); }
     return std::nullopt;

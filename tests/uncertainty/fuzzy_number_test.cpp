@@ -75,6 +75,11 @@ TEST(FuzzyNumber, RefusesWhatIsNone) {
   EXPECT_THROW(make_triangular(0, 4, 3), InputError);
   EXPECT_THROW(make_trapezoidal(0, 2, 1, 3), InputError);
   EXPECT_THROW(make_triangular(0, std::numeric_limits<double>::quiet_NaN(), 3), InputError);
+  EXPECT_THROW(make_triangular(1e308, 1.2e308, 1.7e308), InputError) << "its middle would be infinite";
+  EXPECT_THROW(make_triangular(-1e308, 0, 1e308), InputError) << "its width would be infinite";
+  const FuzzyNumber large = make_trapezoidal(-4e307, 3e307, 4e307, 4e307);
+  EXPECT_DOUBLE_EQ(large.centre(), 3.5e307);
+  EXPECT_DOUBLE_EQ(large.width(), 8e307);
   EXPECT_THROW(FuzzyNumber(std::vector<AlphaCut>{{0, 0, 1}}), InputError) << "one cut";
   EXPECT_THROW(FuzzyNumber(std::vector<AlphaCut>{{0.1, 0, 1}, {1, 0, 1}}), InputError) << "no support";
   EXPECT_THROW(FuzzyNumber(std::vector<AlphaCut>{{0, 0, 1}, {0.5, -1, 1}, {1, 0, 1}}), InputError) << "not nested";
