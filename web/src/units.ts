@@ -39,10 +39,18 @@ export function formatNumber(value: number | null | undefined, digits = 4): stri
   return value.toFixed(decimals).replace("-", "−");
 }
 
-/// A possibility that was found can only be higher, a necessity only lower.
+/// With so many significant digits, by `round`; what is such a number but for its last bits stays that number.
+function roundTo(value: number, digits: number, round: (x: number) => number, slack: number): number {
+  if (!(value > 0)) return value;
+  const decimals = digits - 1 - Math.floor(Math.log10(value));
+  return round(value * 10 ** decimals + slack) / 10 ** decimals;
+}
+
+/// A possibility that was found can only be higher, a necessity only lower: that stays true of what is written.
 export const atLeast = (possibility: number | null, digits: number): string =>
-  possibility === null || possibility >= 1 ? formatNumber(possibility, 1) : `≥ ${formatNumber(possibility, digits)}`;
-export const atMost = (necessity: number | null, digits: number): string => (necessity === null || necessity <= 0 ? formatNumber(necessity, 1) : `≤ ${formatNumber(necessity, digits)}`);
+  possibility === null || possibility >= 1 ? formatNumber(possibility, 1) : `≥ ${formatNumber(roundTo(possibility, digits, Math.floor, 1e-9), digits)}`;
+export const atMost = (necessity: number | null, digits: number): string =>
+  necessity === null || necessity <= 0 ? formatNumber(necessity, 1) : `≤ ${formatNumber(roundTo(necessity, digits, Math.ceil, -1e-9), digits)}`;
 
 /// The largest size of all numbers.
 export function findLargest(values: (number | null)[][]): number {

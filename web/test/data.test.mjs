@@ -6,7 +6,7 @@ import { load } from "./load.mjs";
 import { makeSynthetic } from "./synthetic.mjs";
 
 const { decodeFloats, findFrame, slerp, readRun, calcPose } = await load("data.ts");
-const { dropRoundOff, findLargest, formatNumber, formatValue, toReadable, formatDuration, formatDate, formatMass, prettify } = await load("units.ts");
+const { atLeast, atMost, dropRoundOff, findLargest, formatNumber, formatValue, toReadable, formatDuration, formatDate, formatMass, prettify } = await load("units.ts");
 const { findCoherent } = await load("plots.tsx");
 const { chooseAxes } = await load("steer_study.tsx");
 const { listConditions } = await load("handover.tsx");
@@ -85,6 +85,13 @@ describe("units", () => {
   it("keeps four digits from small to large", () => {
     assert.deepEqual([0, 0.00123456, 12.3456, 98765.4, 1.23456e9, null, NaN].map((v) => formatNumber(v)),
       ["0", "0.001235", "12.35", "98765", "1.235 × 10⁹", "–", "–"]);
+  });
+
+  it("rounds degrees so that at least and at most stay true", () => {
+    assert.deepEqual([0.456598936, 0.9999, 0.0012349, 0.29, 0.57, 0.5, 1, 0, null].map((v) => atLeast(v, 3)),
+      ["≥ 0.456", "≥ 0.999", "≥ 0.00123", "≥ 0.290", "≥ 0.570", "≥ 0.500", "1", "≥ 0", "–"]);
+    assert.deepEqual([1 - 0.456598936, 0.9999, 0.0012341, 0.29, 0.57, 0.5, 1, 0, null].map((v) => atMost(v, 3)),
+      ["≤ 0.544", "≤ 1.00", "≤ 0.00124", "≤ 0.290", "≤ 0.570", "≤ 0.500", "≤ 1.00", "0", "–"]);
   });
 
   it("shows no round-off of what cancels", () => {
