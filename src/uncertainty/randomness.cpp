@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 #include "base/error.h"
@@ -72,6 +73,10 @@ Quantile make_gumbel() {
   };
 }
 
+Quantile make_weibull() {
+  return [](double u, std::span<const double> p) { return p[0] * std::pow(-std::log1p(-u), 1 / p[1]); };
+}
+
 Statistic make_probability(int outcome) {
   return [outcome](std::span<const Result> runs) {
     const auto count =
@@ -80,12 +85,23 @@ Statistic make_probability(int outcome) {
   };
 }
 
-Statistic make_exceedance(int output, double limit) {
+Statistic make_share(int output, Side side, double limit) {
   return [=](std::span<const Result> runs) {
     const auto values = pick(runs, output);
-    if (values.empty()) return nan;
-    const auto count = std::count_if(values.begin(), values.end(), [&](double v) { return v > limit; });
-    return static_cast<double>(count) / static_cast<double>(values.size());
+    const auto count = std::count_if(values.begin(), values.end(), [&](double v) {
+      switch (side) {
+        case Side::Above:
+          return v > limit;
+        case Side::AtLeast:
+          return v >= limit;
+        case Side::Below:
+          return v < limit;
+        case Side::AtMost:
+          return v <= limit;
+      }
+      return false;
+    });
+    return static_cast<double>(count) / static_cast<double>(runs.size());
   };
 }
 
@@ -104,16 +120,28 @@ Statistic make_deviation(int output) {
   };
 }
 
-Statistic make_empirical_quantile(int output, double q) {
+Statistic make_quantile(int output, double q) {
   return [=](std::span<const Result> runs) {
     auto values = pick(runs, output);
     if (values.empty()) return nan;
     std::sort(values.begin(), values.end());
-    // 0.07 of 100 values are 7, which in floating point is a little more
-    const double count = q * static_cast<double>(values.size()), whole = std::round(count);
-    const double place = (std::abs(count - whole) <= 1e-12 * whole ? whole : std::ceil(count)) - 1;
-    return values[static_cast<std::size_t>(std::clamp(place, 0.0, static_cast<double>(values.size() - 1)))];
+    const double last = static_cast<double>(values.size() - 1);
+    const double place = std::clamp(q * static_cast<double>(values.size()) - 0.5, 0.0, last);
+    const auto below = static_cast<std::size_t>(std::floor(place));
+    const double part = place - std::floor(place);
+    return part > 0 ? values[below] + part * (values[below + 1] - values[below]) : values[below];
   };
+}
+
+std::vector<Point> make_strata(int n, int count, std::uint64_t seed) {
+  std::vector<Point> points = make_sobol_points(n, 1, count, seed);
+  std::vector<int> order(static_cast<std::size_t>(count));
+  for (int i = 0; i < n; ++i) {
+    std::iota(order.begin(), order.end(), 0);
+    std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return points[a][i] < points[b][i]; });
+    for (int k = 0; k < count; ++k) points[order[k]][i] = (k + 0.5) / count;
+  }
+  return points;
 }
 
 Evaluate with_monte_carlo(int outer_size, std::vector<RandomVariable> variables, Evaluate model,
@@ -127,51 +155,68 @@ Evaluate with_monte_carlo(int outer_size, std::vector<RandomVariable> variables,
   const int m = static_cast<int>(variables.size());
   std::vector<Point> numbers;
   if (options.spread) {
-    numbers = make_sobol_points(m, 1, options.samples, options.seed);
+    numbers = make_strata(m, options.samples, options.seed);
   } else {
     Random random(options.seed);
     numbers.assign(options.samples, Point(m));
     for (auto& u : numbers)
-      for (double& v : u) v = random.next();
+      for (double& v : u) v = std::max(random.next(), 0x1p-54);  // quantiles at 0 are not finite
   }
-  // the open interval: quantiles at 0 are not finite
-  for (auto& u : numbers)
-    for (double& v : u) v = std::max(v, 0x1p-54);
   return [=, variables = std::move(variables), model = std::move(model), statistics = std::move(statistics),
           numbers = std::move(numbers)](std::span<const Point> batch, std::span<Result> out) {
     const std::size_t each = numbers.size();
     const std::size_t sets = std::max<std::size_t>(1, static_cast<std::size_t>(std::max(options.batch, 1)) / each);
+    const auto parameters_of = [&](const RandomVariable& v, const Point& x) {
+      std::vector<double> p;
+      for (const int i : v.parameters) p.push_back(x[i]);
+      return p;
+    };
+    const auto find_fault = [&](const Point& x) -> std::string {
+      for (const RandomVariable& v : variables)
+        if (v.find_fault)
+          if (std::string fault = v.find_fault(parameters_of(v, x)); !fault.empty()) return fault;
+      return {};
+    };
     for (std::size_t first = 0; first < batch.size(); first += sets) {
       const std::size_t last = std::min(first + sets, batch.size());
       std::vector<Point> inner;
-      for (std::size_t k = first; k < last; ++k)
+      std::vector<std::size_t> run;  // outer points whose inner points these are
+      for (std::size_t k = first; k < last; ++k) {
+        out[k] = {};
+        if (std::string fault = find_fault(batch[k]); !fault.empty()) {
+          out[k].state = Result::State::Failed;
+          out[k].text = std::move(fault);
+          continue;
+        }
+        run.push_back(k);
+        std::vector<std::vector<double>> parameters;
+        for (const RandomVariable& v : variables) parameters.push_back(parameters_of(v, batch[k]));
         for (const auto& u : numbers) {
           Point x = batch[k];
-          for (int v = 0; v < m; ++v) {
-            std::vector<double> parameters;
-            for (const int p : variables[v].parameters) parameters.push_back(batch[k][p]);
-            x.push_back(variables[v].quantile(u[v], parameters));
-          }
+          for (int v = 0; v < m; ++v) x.push_back(variables[v].quantile(u[v], parameters[v]));
           inner.push_back(std::move(x));
         }
+      }
       std::vector<Result> results(inner.size());
-      model(inner, results);
-      for (std::size_t k = first; k < last; ++k) {
-        const std::span<const Result> runs(results.data() + (k - first) * each, each);
+      if (!inner.empty()) model(inner, results);
+      for (std::size_t i = 0; i < run.size(); ++i) {
+        Result& o = out[run[i]];
+        const std::span<const Result> runs(results.data() + i * each, each);
         const auto is = [&](Result::State s) {
           return std::count_if(runs.begin(), runs.end(), [s](const Result& r) { return r.state == s; });
         };
-        out[k] = {};
         if (is(Result::State::NotRun) > 0) continue;
-        const auto failed = is(Result::State::Failed);
-        if (failed == static_cast<long>(each)) {
-          out[k].state = Result::State::Failed;
-          out[k].text = "every inner run failed: " + runs[0].text;
+        const auto failed = static_cast<double>(is(Result::State::Failed)), all = static_cast<double>(each);
+        if (failed == all || failed > options.most_failed * all + 1e-9) {
+          const auto why =
+              std::find_if(runs.begin(), runs.end(), [](const Result& r) { return r.state == Result::State::Failed; });
+          o.state = Result::State::Failed;
+          o.text = fmt::format("{} of {} inner runs failed: {}", failed, each, why->text);
           continue;
         }
-        out[k].state = Result::State::Done;
-        for (const auto& s : statistics) out[k].values.push_back(s(runs));
-        out[k].values.push_back(static_cast<double>(failed) / static_cast<double>(each));
+        o.state = Result::State::Done;
+        for (const auto& s : statistics) o.values.push_back(s(runs));
+        o.values.push_back(failed / all);
       }
     }
   };

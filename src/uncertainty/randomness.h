@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "uncertainty/mapping.h"
@@ -23,37 +24,50 @@ Quantile make_lognormal();
 Quantile make_uniform();
 /// Largest values. Parameters: mean, standard deviation >= 0.
 Quantile make_gumbel();
+/// Parameters: scale > 0 and shape > 0; P(x > t) = exp(-(t / scale)^shape).
+Quantile make_weibull();
 /// Value of the standard normal distribution at the probability u in (0, 1); to round-off.
 double calc_normal_quantile(double u);
 
 struct RandomVariable {
   Quantile quantile;
   std::vector<int> parameters;  // indices of the outer (fuzzy) coordinates
+  /// Why these parameters give no distribution; empty: they do. May be left out.
+  std::function<std::string(std::span<const double> parameters)> find_fault = {};
 };
 
 /// A number from the runs of one parameter set; failed runs are among them.
 using Statistic = std::function<double(std::span<const Result> runs)>;
 /// Share of an outcome class (failed_outcome included) in all runs.
 Statistic make_probability(int outcome);
-/// Share of runs, of those that did not fail, whose output exceeds a limit.
-Statistic make_exceedance(int output, double limit);
+enum class Side { Above, AtLeast, Below, AtMost };
+/// Share of all runs whose output lies there; a failed run lies nowhere.
+Statistic make_share(int output, Side, double limit);
 /// Of an output over the runs that did not fail; not a number if there is none.
 Statistic make_mean(int output);
 Statistic make_deviation(int output);
-/// The smallest value that at least the share q of these runs does not exceed.
-Statistic make_empirical_quantile(int output, double q);
+/// Of N of these runs in the order of the output the k-th one is the quantile (k - 1/2)/N; straight between. That of
+/// the first or last one beyond them.
+Statistic make_quantile(int output, double q);
+
+/// `count` points in (0, 1)^n, one in the middle of each of `count` equal strata of every coordinate, in the order of
+/// Sobol points that are shifted by the seed. Means of what is linear in quantiles of symmetric distributions are
+/// exact.
+std::vector<Point> make_strata(int n, int count, std::uint64_t seed);
 
 struct MonteCarloOptions {
   int samples = 1000;  // runs for each parameter set
   int batch = 4096;    // inner points given to the model at once, at most, rounded up to whole parameter sets
   std::uint64_t seed = 1;
-  bool spread = true;  // Sobol points instead of independent ones: far less scatter for smooth statistics
+  bool spread = true;      // strata instead of independent points: far less scatter for smooth statistics
+  double most_failed = 0;  // share of inner runs that may fail; beyond it the outer run fails
 };
 
 /// The outer mapping: for each outer point (n fuzzy coordinates: parameters and other fuzzy inputs) the model is run at
 /// `samples` inner points, which hold the n outer coordinates and then one value per random variable. Outputs: the
-/// statistics, then the share of inner runs that failed. An outer run fails if all inner ones do, or a statistic is no
-/// number. Throws InputError E810: no samples, unknown parameters.
+/// statistics, then the share of inner runs that failed. An outer run fails if more inner ones do than may or all of
+/// them do, if a distribution's parameters are none, or a statistic is no number. Throws InputError E810: no samples,
+/// unknown parameters.
 Evaluate with_monte_carlo(int outer_size, std::vector<RandomVariable>, Evaluate model, std::vector<Statistic>,
                           const MonteCarloOptions&);
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -37,6 +38,11 @@ TEST(Distributions, HaveTheMomentsOfTheirParameters) {
     EXPECT_NEAR(std::sqrt(squares / count - sum * sum / count / count), deviation, 5e-3);
   }
   EXPECT_EQ(make_uniform()(0.25, std::vector{2.0, 6.0}), 3);
+  const Quantile weibull = make_weibull();
+  for (const double x : {0.1, 1.0, 5.0, 9.0}) {
+    const double u = 1 - std::exp(-std::pow(x / 4, 1.7));
+    EXPECT_NEAR(weibull(u, std::vector{4.0, 1.7}), x, 1e-13 * x / (1 - u));
+  }
 }
 
 /// Outcome 1 where the random variable exceeds 2; the output is the variable.
@@ -54,7 +60,7 @@ TEST(FuzzyRandomnessPhysics, NormalHasClosedForms) {
   options.samples = 4096;
   const Evaluate outer = with_monte_carlo(
       2, {{make_normal(), {0, 1}}}, inner,
-      {make_mean(0), make_deviation(0), make_probability(1), make_exceedance(0, 2), make_empirical_quantile(0, 0.9)},
+      {make_mean(0), make_deviation(0), make_probability(1), make_share(0, Side::Above, 2), make_quantile(0, 0.9)},
       options);
   AlphaOptions outside = make_thrifty_options();
   outside.levels = {0, 0.5, 1};
@@ -77,24 +83,20 @@ TEST(FuzzyRandomnessPhysics, NormalHasClosedForms) {
   }
 }
 
-// The smallest value that q of all do not exceed: the k-th where q n is k, whatever floating point makes of it.
+// The k-th of n values stands for the middle of its stratum, (k - 1/2) / n; between them it is linear.
 TEST(FuzzyRandomness, QuantilesOfWholeNumbersOfRuns) {
-  const auto make_runs = [](int n) {
+  for (const int n : {1, 10, 100, 1000}) {
     std::vector<Result> runs;
     for (int i = 1; i <= n; ++i) {
       runs.emplace_back().state = Result::State::Done;
       runs.back().values = {static_cast<double>(i)};
     }
-    return runs;
-  };
-  for (const int n : {1, 10, 100, 1000}) {
-    const std::vector<Result> runs = make_runs(n);
-    for (int k = 1; k <= n; ++k) EXPECT_EQ(make_empirical_quantile(0, static_cast<double>(k) / n)(runs), k) << n;
-    EXPECT_EQ(make_empirical_quantile(0, 0)(runs), 1);
+    const auto quantile = [&](double q) { return make_quantile(0, q)(runs); };
+    for (int k = 1; k <= n; ++k) EXPECT_NEAR(quantile((k - 0.5) / n), k, 1e-12 * n) << n;
+    for (int k = 1; k < n; ++k) EXPECT_NEAR(quantile(static_cast<double>(k) / n), k + 0.5, 1e-12 * n) << n;
+    EXPECT_EQ(quantile(0.1 / n), 1) << "below the first middle";
+    EXPECT_EQ(quantile(1 - 0.1 / n), n) << "above the last";
   }
-  EXPECT_GT(0.07 * 100, 7) << "what floating point makes of it";
-  EXPECT_EQ(make_empirical_quantile(0, 0.07)(make_runs(100)), 7);
-  EXPECT_EQ(make_empirical_quantile(0, 0.0701)(make_runs(100)), 8);
 }
 
 TEST(FuzzyRandomness, SameNumbersForEveryParameterSet) {
@@ -122,6 +124,7 @@ TEST(FuzzyRandomness, CountsFailedRuns) {
   });
   MonteCarloOptions options;
   options.samples = 1024;
+  options.most_failed = 1;
   const RandomVariable v{make_uniform(), {0, 0}};
   const Evaluate outer = with_monte_carlo(1, {{[](double u, std::span<const double> p) { return p[0] + u; }, {0}}},
                                           failing, {make_mean(0), make_probability(failed_outcome)}, options);
@@ -132,6 +135,57 @@ TEST(FuzzyRandomness, CountsFailedRuns) {
   EXPECT_NEAR(out[1].values[2], 0.25, 2e-3);
   EXPECT_EQ(out[1].values[1], out[1].values[2]);
   EXPECT_EQ(out[2].state, Result::State::Failed);
+  // a quarter of the inner runs fails, 256 of 1024
+  for (const auto& [most, state] : {std::pair{256.0, Result::State::Done}, {255.0, Result::State::Failed}}) {
+    options.most_failed = most / 1024;
+    const Evaluate strict = with_monte_carlo(1, {{[](double u, std::span<const double> p) { return p[0] + u; }, {0}}},
+                                             failing, {make_mean(0)}, options);
+    strict(points, out);
+    EXPECT_EQ(out[0].state, Result::State::Done);
+    EXPECT_EQ(out[1].state, state) << most;
+    if (state == Result::State::Failed) { EXPECT_EQ(out[1].text, "256 of 1024 inner runs failed: no"); }
+  }
+}
+
+TEST(FuzzyRandomness, StrataHoldOnePointEach) {
+  for (const int count : {2, 7, 64, 100}) {
+    const std::vector<Point> points = make_strata(5, count, 3);
+    for (int i = 0; i < 5; ++i) {
+      std::vector<double> u;
+      for (const Point& x : points) u.push_back(x[i]);
+      std::sort(u.begin(), u.end());
+      for (int k = 0; k < count; ++k) EXPECT_EQ(u[k], (k + 0.5) / count);
+    }
+    EXPECT_EQ(points, make_strata(5, count, 3));
+    if (count > 7) { EXPECT_NE(points, make_strata(5, count, 4)); }
+  }
+}
+
+TEST(FuzzyRandomness, QuantilesAreThoseOfTheMiddlesOfStrata) {
+  std::vector<Result> runs(5);
+  for (int k = 0; k < 5; ++k) runs[k].state = Result::State::Done, runs[k].values = {10.0 * ((k * 3) % 5)};
+  for (const auto& [q, value] : {std::pair{0.1, 0.0}, {0.5, 20.0}, {0.6, 25.0}, {0.9, 40.0}, {0.99, 40.0}})
+    EXPECT_DOUBLE_EQ(make_quantile(0, q)(runs), value) << q;
+  for (const auto& [side, share] :
+       {std::pair{Side::Above, 0.4}, {Side::AtLeast, 0.6}, {Side::Below, 0.4}, {Side::AtMost, 0.6}})
+    EXPECT_EQ(make_share(0, side, 20)(runs), share);
+  runs[0].state = Result::State::Failed;  // of all runs: neither above nor below
+  EXPECT_EQ(make_share(0, Side::AtLeast, 20)(runs), 0.6);
+  EXPECT_EQ(make_share(0, Side::Below, 20)(runs), 0.2);
+}
+
+TEST(FuzzyRandomness, FailsWhereParametersGiveNoDistribution) {
+  RandomVariable v{make_normal(), {0, 1}, [](std::span<const double> p) -> std::string {
+                     return p[1] < 0 ? "negative deviation" : "";
+                   }};
+  const Evaluate outer = with_monte_carlo(2, {v}, inner, {make_mean(0)}, {});
+  std::vector<Point> points = {{0, 1}, {0, -1}, {1, 1}};
+  std::vector<Result> out(3);
+  outer(points, out);
+  EXPECT_NEAR(out[0].values[0], 0, 1e-12) << "the strata are symmetric";
+  EXPECT_EQ(out[1].state, Result::State::Failed);
+  EXPECT_EQ(out[1].text, "negative deviation");
+  EXPECT_NEAR(out[2].values[0], 1, 1e-12);
 }
 
 TEST(FuzzyRandomness, RefusesWhatCannotBe) {
