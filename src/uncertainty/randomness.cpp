@@ -133,14 +133,88 @@ Statistic make_quantile(int output, double q) {
   };
 }
 
+namespace {
+
+/// Ranks of a column of numbers, from 0.
+std::vector<int> rank(const std::vector<double>& column) {
+  std::vector<int> order(column.size()), ranks(column.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return column[a] < column[b]; });
+  for (std::size_t k = 0; k < order.size(); ++k) ranks[order[k]] = static_cast<int>(k);
+  return ranks;
+}
+
+using Ranks = std::vector<std::vector<int>>;  // of each column
+
+/// Correlations of the columns' normal scores.
+std::vector<std::vector<double>> correlate(const Ranks& ranks, const std::vector<double>& scores) {
+  double all = 0;
+  for (const double z : scores) all += z * z;
+  std::vector<std::vector<double>> c(ranks.size(), std::vector<double>(ranks.size(), 1));
+  for (std::size_t i = 0; i < ranks.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      double sum = 0;
+      for (std::size_t k = 0; k < scores.size(); ++k) sum += scores[ranks[i][k]] * scores[ranks[j][k]];
+      c[i][j] = c[j][i] = sum / all;
+    }
+  return c;
+}
+
+double find_largest_of_others(const std::vector<std::vector<double>>& c) {
+  double largest = 0;
+  for (std::size_t i = 0; i < c.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) largest = std::max(largest, std::abs(c[i][j]));
+  return largest;
+}
+
+/// The columns in the order of their scores times the inverse of the correlation's Cholesky factor; empty where there
+/// is none.
+Ranks reorder(const Ranks& ranks, const std::vector<double>& scores, std::vector<std::vector<double>> c) {
+  const std::size_t n = ranks.size();
+  for (std::size_t j = 0; j < n; ++j)
+    for (std::size_t i = j; i < n; ++i) {
+      for (std::size_t k = 0; k < j; ++k) c[i][j] -= c[i][k] * c[j][k];
+      if (i == j && !(c[j][j] > 1e-6)) return {};
+      c[i][j] = i == j ? std::sqrt(c[j][j]) : c[i][j] / c[j][j];
+    }
+  std::vector<std::vector<double>> columns;
+  Ranks out;
+  for (std::size_t i = 0; i < n; ++i) {
+    std::vector<double> y(scores.size());
+    for (std::size_t k = 0; k < y.size(); ++k) {
+      y[k] = scores[ranks[i][k]];
+      for (std::size_t j = 0; j < i; ++j) y[k] -= c[i][j] * columns[j][k];
+      y[k] /= c[i][i];
+    }
+    out.push_back(rank(y));
+    columns.push_back(std::move(y));
+  }
+  return out;
+}
+
+}  // namespace
+
 std::vector<Point> make_strata(int n, int count, std::uint64_t seed) {
   std::vector<Point> points = make_sobol_points(n, 1, count, seed);
-  std::vector<int> order(static_cast<std::size_t>(count));
+  Ranks ranks;
   for (int i = 0; i < n; ++i) {
-    std::iota(order.begin(), order.end(), 0);
-    std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return points[a][i] < points[b][i]; });
-    for (int k = 0; k < count; ++k) points[order[k]][i] = (k + 0.5) / count;
+    std::vector<double> column;
+    for (const Point& x : points) column.push_back(x[i]);
+    ranks.push_back(rank(column));
   }
+  std::vector<double> scores;
+  for (int k = 0; k < count; ++k) scores.push_back(calc_normal_quantile((k + 0.5) / count));
+  std::vector<std::vector<double>> c = correlate(ranks, scores);
+  constexpr int most_passes = 20;
+  for (int pass = 0; pass < most_passes; ++pass) {
+    Ranks other = reorder(ranks, scores, c);
+    if (other.empty()) break;
+    const auto now = correlate(other, scores);
+    if (!(find_largest_of_others(now) < find_largest_of_others(c))) break;
+    ranks = std::move(other), c = now;
+  }
+  for (int i = 0; i < n; ++i)
+    for (int k = 0; k < count; ++k) points[k][i] = (ranks[i][k] + 0.5) / count;
   return points;
 }
 

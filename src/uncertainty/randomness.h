@@ -51,7 +51,8 @@ Statistic make_deviation(int output);
 Statistic make_quantile(int output, double q);
 
 /// `count` points in (0, 1)^n, one in the middle of each of `count` equal strata of every coordinate, in the order of
-/// Sobol points that are shifted by the seed. Means of what is linear in quantiles of symmetric distributions are
+/// Sobol points that are shifted by the seed, re-ordered until the coordinates' normal scores are hardly correlated
+/// (Iman and Conover, 1982). Means of what is linear in quantiles of symmetric distributions are
 /// exact.
 std::vector<Point> make_strata(int n, int count, std::uint64_t seed);
 

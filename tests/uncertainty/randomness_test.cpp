@@ -161,6 +161,23 @@ TEST(FuzzyRandomness, StrataHoldOnePointEach) {
   }
 }
 
+// Sobol points alone are correlated by about 0.1 at 100 points; a random order by 1/sqrt(count).
+TEST(FuzzyRandomness, StrataOfDifferentCoordinatesAreHardlyCorrelated) {
+  for (const auto& [n, count] : {std::pair{2, 20}, {2, 100}, {2, 400}, {5, 100}, {10, 200}})
+    for (const int seed : {1, 2, 3}) {
+      const std::vector<Point> points = make_strata(n, count, seed);
+      for (int i = 0; i < n; ++i)
+        for (int j = 0; j < i; ++j) {
+          double sum = 0, all = 0;
+          for (const Point& u : points) {
+            const double a = calc_normal_quantile(u[i]), b = calc_normal_quantile(u[j]);
+            sum += a * b, all += a * a;
+          }
+          EXPECT_LT(std::abs(sum / all), 1.1 / count) << n << " x " << count << " seed " << seed;
+        }
+    }
+}
+
 TEST(FuzzyRandomness, QuantilesAreThoseOfTheMiddlesOfStrata) {
   std::vector<Result> runs(5);
   for (int k = 0; k < 5; ++k) runs[k].state = Result::State::Done, runs[k].values = {10.0 * ((k * 3) % 5)};
