@@ -16,6 +16,7 @@
 #include "results.h"
 #include "study/evaluator.h"
 #include "study/page.h"
+#include "study/randomness.h"
 #include "study/results.h"
 #include "study_model.h"
 #include "study_text.h"
@@ -75,7 +76,10 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
   options.source = text;
   options.source_name = a.input;
   options.rerun_failed = a.study.rerun_failed;
-  options.accepted = [&] { keep_place(a.output, place); };
+  options.accepted = [&] {
+    keep_place(a.output, place);
+    if (problem.random) std::fprintf(stderr, "%s\n", study::tell_random_cost(problem).c_str());
+  };
   const bool is_new = !study::is_server(place.store) && !std::filesystem::exists(place.store);
   Progress progress;
   progress.cancel = &cancel;

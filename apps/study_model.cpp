@@ -20,6 +20,7 @@
 #include "study/inputs_file.h"
 #include "study/permissible.h"
 #include "study/plan_model.h"
+#include "study/randomness.h"
 #include "terminal.h"
 
 namespace topple::apps {
@@ -175,7 +176,12 @@ study::RunnerFactories make_factories() {
                        "only the same build gives the same bits: use one on all machines");
     return study::make_plan_runner(definition);
   };
-  return {{"evaluator", study::make_evaluator}, {"plan", make_plan_runner}};
+  const study::RunnerFactories models{{"evaluator", study::make_evaluator}, {"plan", make_plan_runner}};
+  study::RunnerFactories all = models;
+  all[study::random_kind] = [models](const std::string& definition) {
+    return study::make_random_runner(definition, models);
+  };
+  return all;
 }
 
 study::Problem read_problem(const Arguments& a, std::string& text) {
@@ -219,10 +225,11 @@ study::Problem read_problem(const study::StudyRow& row) {
   try {
     const json d = json::parse(row.definition);
     const std::string kind = d.at("kind");
+    const std::string model = kind == study::random_kind ? d.at("identity").at("random").at("of") : d.at("kind");
     study::Problem p;
-    if (kind == "evaluator") {
+    if (model == "evaluator") {
       p = study::read_inputs_text(d.at("text"), d.at("file"));
-    } else if (kind == "plan") {
+    } else if (model == "plan") {
       const json& identity = d.at("identity");
       p = study::read_plan_problem(json{{"identity", identity}, {"settings", {{"path", d.at("file")}}}}.dump());
     } else {

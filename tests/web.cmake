@@ -88,4 +88,12 @@ stage.1.charge.1.destroyed_length = { triangular = [\"0.8 m\", \"1.2 m\", \"1.6 
   set_tests_properties(web_short_study PROPERTIES LABELS web FIXTURES_SETUP short_study DEPENDS web_short_study_clean TIMEOUT 120)
   topple_web_test(web_study_run study.test.mjs BROWSER FIXTURES short_study ENVIRONMENT TOPPLE_STUDY=${short_study}/study.html)
   topple_web_test(web_german_study german.test.mjs BROWSER FIXTURES short_study ENVIRONMENT TOPPLE_STUDY=${short_study}/study.html)
+  # of statistics, with every distribution
+  set(random_study ${CMAKE_CURRENT_BINARY_DIR}/random_study)
+  add_test(NAME web_random_study_clean COMMAND ${CMAKE_COMMAND} -E rm -rf ${random_study})
+  add_test(NAME web_random_study COMMAND topple study ${CMAKE_CURRENT_SOURCE_DIR}/data/random.toml --evaluator "$<TARGET_FILE:study_model> jump"
+           --permissible "p(falls) <= 0.5" --samples 300 -o ${random_study})
+  set_tests_properties(web_random_study_clean PROPERTIES LABELS web FIXTURES_SETUP random_study TIMEOUT 60)
+  set_tests_properties(web_random_study PROPERTIES LABELS web FIXTURES_SETUP random_study DEPENDS web_random_study_clean TIMEOUT 120)
+  topple_web_test(web_german_random german.test.mjs BROWSER FIXTURES random_study ENVIRONMENT TOPPLE_STUDY=${random_study}/study.html)
 endif()

@@ -10,8 +10,10 @@
 
 #include "product/expression.h"
 #include "product/interaction.h"
+#include "product/random_values.h"
 #include "product/read_fuzzy_values.h"
 #include "product/table_reader.h"
+#include "study/randomness.h"
 
 namespace topple::study {
 namespace {
@@ -29,10 +31,14 @@ constexpr std::size_t most_inputs = 50, most_corners = 1000;
 struct Reader {
   Problem& out;
   Complaints& complaints;
-  std::vector<std::string> names;    // inputs, then formulas that were read
+  std::vector<std::string> names;    // inputs, random ones, then formulas that were read
   std::vector<Expression> formulas;  // each may use inputs and the formulas before it
   std::vector<Place> formula_places;
   product::Interaction interaction;
+  std::vector<product::RandomValue> randoms = {};
+  std::vector<Quantity> random_quantities = {}, formula_quantities = {};
+  std::vector<std::string> formula_texts = {};
+  std::vector<bool> is_random = {};  // of `names`: random, or follows from what is
 
   /// Numbers of a list, or nothing after a complaint.
   std::optional<std::vector<double>> read_numbers(const Node& node, const std::string& label, std::size_t count) {
@@ -69,10 +75,7 @@ struct Reader {
   }
 
   bool check_name(const std::string& name, Place place) {
-    const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; };
-    const bool is_name = !name.empty() && is_letter(name[0]) && std::all_of(name.begin(), name.end(), [&](char c) {
-      return is_letter(c) || (c >= '0' && c <= '9');
-    });
+    const bool is_name = product::is_plain_name(name);
     if (!is_name)
       complaints.error("E203", place, product::quoted(name) + " is no name of an input",
                        "a letter, then letters, digits and _");
@@ -160,6 +163,32 @@ struct Reader {
     }
   }
 
+  /// Distributions; their parameters are looked for when formulas are known.
+  void read_random(TableReader& root) {
+    is_random.assign(names.size(), false);
+    const Node* node = root.table("random");
+    if (!node) return;
+    if (node->entries.empty())
+      complaints.error("E203", node->place, "there is no random input in [random]",
+                       "add a line such as fc = { normal = [\"mean_fc\", 3] }, or leave the table out");
+    for (const Entry& entry : node->entries) {
+      const bool is_name = check_name(entry.key, entry.place);
+      TableReader table(entry.value, "random." + entry.key, complaints);
+      if (!table.is_table()) continue;
+      auto value = product::read_distribution(table, std::nullopt);
+      const std::string unit = table.text("unit", "");
+      table.finish();
+      if (!value || !is_name) continue;
+      value->name = entry.key;
+      randoms.push_back(std::move(*value));
+      random_quantities.push_back({entry.key, unit, 1});
+      names.push_back(entry.key);
+      is_random.push_back(true);
+    }
+    if (names.size() > most_inputs)
+      complaints.error("E209", node->place, fmt::format("more than {} inputs", most_inputs));
+  }
+
   void read_formulas(TableReader& root) {
     const Node* node = root.table("derived");
     if (!node) return;
@@ -182,29 +211,59 @@ struct Reader {
       if (auto e = product::parse_formula(*text, 0, std::string::npos, label, names, complaints)) {
         formulas.push_back(*e);
         formula_places.push_back(text->place);
+        formula_texts.push_back(text->text);
         names.push_back(entry.key);
-        out.derived.push_back({entry.key, unit, 1});
+        formula_quantities.push_back({entry.key, unit, 1});
+        const bool follows = uses_random(*e);
+        is_random.push_back(follows);
+        if (!follows) out.derived.push_back(formula_quantities.back());
       }
     }
   }
 
-  /// Gives the problem its functions, and tries them at the middle.
-  void finish() {
-    if (!formulas.empty())
-      out.calc_derived = [formulas = formulas](const Point& x) {
-        std::vector<double> values = x, derived;
-        for (const Expression& f : formulas) {
-          derived.push_back(f.evaluate(values));
-          values.push_back(derived.back());
-        }
-        return derived;
-      };
-    const auto complete = [calc = out.calc_derived](const Point& x) {
+  bool uses_random(const Expression& e) const {
+    return std::any_of(e.used().begin(), e.used().end(),
+                       [this](int i) { return is_random[static_cast<std::size_t>(i)]; });
+  }
+
+  /// The interaction ties fuzzy inputs, and what follows from them.
+  void check_interaction_names() {
+    const auto check = [&](const Expression& e, Place place, const char* what) {
+      for (const int i : e.used())
+        if (is_random[static_cast<std::size_t>(i)])
+          complaints.error("E207", place,
+                           fmt::format("interaction: {}: {} is random", what, names[static_cast<std::size_t>(i)]),
+                           "it may use fuzzy inputs and what follows from them");
+    };
+    for (const product::Constraint& c : interaction.constraints)
+      check(c.left, c.place, "constraint"), check(c.right, c.place, "constraint");
+    if (interaction.joint) check(*interaction.joint, interaction.joint_place, "membership");
+  }
+
+  /// Values of all names that are not random; the others are no numbers.
+  auto make_complete() const {
+    return [formulas = formulas, is_random = is_random, fuzzy = out.inputs.size(),
+            randoms = randoms.size()](const Point& x) {
       std::vector<double> values = x;
-      if (calc)
-        for (const double v : calc(x)) values.push_back(v);
+      values.resize(fuzzy + randoms, std::nan(""));
+      for (const Expression& f : formulas)
+        values.push_back(is_random[values.size()] ? std::nan("") : f.evaluate(values));
       return values;
     };
+  }
+
+  /// Gives the problem its functions, and tries them at the middle.
+  void finish() {
+    const auto complete = make_complete();
+    const std::size_t first = out.inputs.size() + randoms.size();
+    if (!out.derived.empty())
+      out.calc_derived = [complete, is_random = is_random, first](const Point& x) {
+        const std::vector<double> values = complete(x);
+        std::vector<double> derived;
+        for (std::size_t i = first; i < values.size(); ++i)
+          if (!is_random[i]) derived.push_back(values[i]);
+        return derived;
+      };
     const auto shared = std::make_shared<const product::Interaction>(interaction);
     for (std::size_t i = 0; i < shared->constraints.size(); ++i)
       out.space.constraints.emplace_back(
@@ -213,11 +272,65 @@ struct Reader {
       out.space.joint = [complete, shared](const Point& x) { return product::calc_joint(*shared, complete(x)); };
     const Point centre = uncertainty::calc_centre(out.space);
     const std::vector<double> values = complete(centre);
-    for (std::size_t i = 0; i < out.derived.size(); ++i)
-      if (!std::isfinite(values[centre.size() + i]))
+    for (std::size_t i = 0; i < formulas.size(); ++i)
+      if (!is_random[first + i] && !std::isfinite(values[first + i]))
         complaints.error("E207", formula_places[i],
-                         out.derived[i].name + ": the formula has no value in the middle of the inputs");
+                         formula_quantities[i].name + ": the formula has no value in the middle of the inputs");
     product::check_interaction(interaction, values, "interaction", "the inputs", complaints);
+  }
+
+  /// Turns a study with random inputs into one of statistics.
+  void finish_random(const product::RandomSettings& settings) {
+    Randomness r;
+    const std::vector<double> middle = make_complete()(uncertainty::calc_centre(out.space));
+    for (std::size_t k = 0; k < randoms.size(); ++k) {
+      const product::RandomValue& v = randoms[k];
+      RandomInput x{random_quantities[k], v.distribution, {}};
+      std::array<std::array<double, 2>, 2> ends{};
+      bool is_known = true;
+      for (std::size_t i = 0; i < 2; ++i) {
+        const product::RandomParameter& p = v.parameters[i];
+        x.parameters[i].value = p.value;
+        ends[i] = {p.value, p.value};
+        if (p.name.empty()) continue;
+        const auto found = std::find(names.begin(), names.end(), p.name);
+        const auto at = static_cast<std::size_t>(found - names.begin());
+        if (found == names.end() || is_random[at]) {
+          is_known = false;
+          complaints.error(
+              "E207", p.place,
+              fmt::format("random.{}: {}", v.name,
+                          found == names.end() ? "there is no input " + product::quoted(p.name)
+                                               : product::quoted(p.name) + " is random itself"),
+              product::did_you_mean(p.name, fuzzy_names(), "known here: " + product::list_of(fuzzy_names())));
+          continue;
+        }
+        const std::size_t first = out.inputs.size() + randoms.size();
+        x.parameters[i].place = static_cast<int>(at < first ? at : at - randoms.size() - count_random(first, at));
+        if (at < first)
+          ends[i] = {out.space.inputs[at].support().left, out.space.inputs[at].support().right};
+        else
+          ends[i] = {middle[at], middle[at]};  // elsewhere points fail
+      }
+      if (is_known) product::check_distribution(v, ends, "random." + v.name, complaints);
+      r.inputs.push_back(std::move(x));
+    }
+    for (std::size_t i = 0; i < formulas.size(); ++i)
+      r.formulas.push_back({formula_quantities[i].name, formula_texts[i]});
+    r.runs = settings.runs, r.seed = settings.seed, r.most_failed = settings.most_failed;
+    r.statistics = read_statistics(settings, out, complaints);
+    if (complaints.error_count() == 0) set_random(out, std::move(r));
+  }
+
+  std::vector<std::string> fuzzy_names() const {
+    std::vector<std::string> list;
+    for (std::size_t i = 0; i < names.size(); ++i)
+      if (!is_random[i]) list.push_back(names[i]);
+    return list;
+  }
+  std::size_t count_random(std::size_t from, std::size_t to) const {
+    return static_cast<std::size_t>(std::count(is_random.begin() + static_cast<std::ptrdiff_t>(from),
+                                               is_random.begin() + static_cast<std::ptrdiff_t>(to), true));
   }
 };
 
@@ -245,24 +358,38 @@ Problem read_inputs_text(const std::string& text, const std::string& name) {
   Reader reader{out, complaints, {}, {}, {}, {}};
   out.title = root.text("title", "");
   reader.read_inputs(root);
+  if (complaints.error_count() == 0) reader.read_random(root);
+  const product::RandomSettings randomness = product::read_random_settings(root);
   if (complaints.error_count() == 0) {
     reader.read_formulas(root);
     reader.interaction = product::read_interaction(root, reader.names);
   } else {
-    root.table("derived"), root.table("interaction");
+    root.table("random"), root.table("derived"), root.table("interaction");
   }
   const product::FuzzySearch search = product::read_search(root);
   out.levels = search.levels, out.limit = search.limit, out.seed = search.seed;
   root.finish();
+  const bool is_random = !reader.randoms.empty();
+  if (complaints.error_count() == 0 && is_random && !randomness.is_given)
+    root.missing("randomness", "such as runs = 100 and statistics = [\"mean(tilt)\", \"q95(tilt)\"] below it");
+  if (complaints.error_count() == 0 && !is_random && randomness.is_given)
+    complaints.error("E207", randomness.place, "randomness: no input is random",
+                     "add a table [random] with a line such as fc = { normal = [\"mean_fc\", 3] }");
+  if (complaints.error_count() == 0) reader.check_interaction_names();
   if (complaints.error_count() == 0) reader.finish();
+  if (complaints.error_count() == 0 && is_random) reader.finish_random(randomness);
   complaints.sort();
   if (complaints.error_count() > 0) throw InputError(complaints.all());
   return out;
 }
 
 void set_evaluator(Problem& p, const std::string& command, double timeout, bool is_one_shot) {
-  p.kind = "evaluator";
-  p.identity = nlohmann::ordered_json{{"command", command}}.dump();
+  nlohmann::ordered_json identity{{"command", command}};
+  if (p.random)
+    identity["random"] = nlohmann::ordered_json::parse(p.identity).at("random");
+  else
+    p.kind = "evaluator";
+  p.identity = identity.dump();
   p.settings = nlohmann::ordered_json{{"timeout", timeout}, {"one_shot", is_one_shot}}.dump();
 }
 

@@ -13,7 +13,7 @@ namespace topple::study {
 /// middle of the inputs. Throws InputError.
 Problem read_inputs_text(const std::string& text, const std::string& name);
 
-/// Makes "command" the model of a problem.
+/// Makes "command" the model of a problem, or the one that its random inputs run.
 void set_evaluator(Problem&, const std::string& command, double timeout, bool is_one_shot);
 
 }  // namespace topple::study

@@ -12,6 +12,7 @@
 
 #include "base/bytes.h"
 #include "study/fans.h"
+#include "study/randomness.h"
 #include "study/results.h"
 #include "study/story.h"
 
@@ -93,12 +94,9 @@ std::string to_page_json(const Problem& p, const StudyResult& r, const PageOrigi
     neighbours.push_back({{"name", a.name}, {"footprint", a.corners}, {"is_utility", a.is_utility}});
   out["site"] = {{"footprint", p.site.footprint}, {"neighbours", neighbours}};
   out["not_modelled"] = p.not_modelled;
-  out["origin"] = {{"program_version", origin.program_version},
-                   {"created", origin.created},
-                   {"model", calc_model_hash(p)},
-                   {"kind", p.kind},
-                   {"source_name", origin.source_name},
-                   {"source", origin.source}};
+  out["origin"] = {
+      {"program_version", origin.program_version}, {"created", origin.created},         {"model", calc_model_hash(p)},
+      {"kind", p.random ? p.random->of : p.kind},  {"source_name", origin.source_name}, {"source", origin.source}};
   return out.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 

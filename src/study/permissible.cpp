@@ -34,6 +34,17 @@ std::size_t find_outside(std::string_view s, std::string_view any, std::size_t f
   return std::string_view::npos;
 }
 
+/// The place of the sign of a limit; one within parentheses belongs to a name such as p(z > 3), if there is another.
+std::size_t find_sign(std::string_view s) {
+  const std::size_t first = find_outside(s, "<>");
+  int depth = 0;
+  for (std::size_t i = 0; first != std::string_view::npos && i < s.size(); ++i) {
+    depth += s[i] == '(' ? 1 : s[i] == ')' ? -1 : 0;
+    if (depth == 0 && find_outside(s, "<>", i) == i) return i;
+  }
+  return first;
+}
+
 [[noreturn]] void complain(const std::string& what, const std::string& help = form) {
   throw InputError("E825", "--permissible: " + what, help);
 }
@@ -88,7 +99,7 @@ Permissible read_permissible(const std::string& text, const Problem& p) {
     const std::string part = trim(std::string_view(text).substr(begin, end - begin));
     begin = end + 1;
     if (part.empty()) complain("a part is empty");
-    if (const std::size_t sign = find_outside(part, "<>"); sign != std::string::npos) {
+    if (const std::size_t sign = find_sign(part); sign != std::string::npos) {
       out.limits.push_back(read_limit(part, sign, p));
       continue;
     }

@@ -15,6 +15,8 @@
 
 namespace topple::study {
 
+struct Randomness;
+
 /// Name and unit of a coordinate, for people and programs. Points hold values in `unit_value` (1: as they are shown).
 struct Quantity {
   std::string name, unit;
@@ -95,6 +97,8 @@ struct Problem {
   /// The model that the one above stands for, at a fraction of its cost: a study ends with runs of it. Null: none.
   std::shared_ptr<const Problem> whole;
   int confirm = 0;  // whole runs at most; not part of the model
+  /// Random inputs: each point stands for many runs, outputs are statistics of them (randomness.h). Null: none.
+  std::shared_ptr<const Randomness> random;
 };
 
 /// The output of that name, without a unit if it is not known beforehand.

@@ -15,6 +15,7 @@
 #include "base/file.h"
 #include "study/fans.h"
 #include "study/permissible.h"
+#include "study/randomness.h"
 #include "study/story.h"
 #include "uncertainty/measures.h"
 
@@ -295,6 +296,7 @@ json make_results_json(const Problem& p, const StudyResult& r) {
     out["inputs"][i]["cuts"] = cuts;
   }
   out["derived"] = quantities_json(p.derived);
+  if (p.random) out["random"] = make_random_json(p);
   out["outputs"] = json::array();
   for (std::size_t i = 0; i < r.alpha.outputs.size() && i < r.outputs.size(); ++i) {
     const Quantity q = find_output(p, r.outputs[i]);

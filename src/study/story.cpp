@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "study/permissible.h"
+#include "study/randomness.h"
 #include "study/results.h"
 #include "uncertainty/measures.h"
 
@@ -466,6 +467,7 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
     tell_splits(p, r, out);
   }
   tell_limits(p, r, out);
+  if (p.random) add("random", tell_randomness(p));
   if (const int unfinished = count_unfinished(p, r); unfinished > 0)
     add("unfinished",
         fmt::format("In {} of {} runs nothing of the upper block had touched down when they ended, {:.4g} s after the "

@@ -82,6 +82,18 @@ TEXT
   expect 0 "$topple" study in.toml --evaluator "$model" -o b --samples 300 --permissible "stands, z <= 3" --no-drivers
   has out "Permissible values"; has out "z <= 3"; has out "fresh random points"; lacks out "Drivers"; exists b/boxes.csv
   expect 0 "$topple" study in.toml --evaluator "$model" -o b --samples 300 --permissible "falls"; has out 'No run had the outcome "falls"'; has out "no box"
+  # random inputs
+  printf '[random]\nx = { normal = ["a", 1] }\n[randomness]\nruns = 10\nstatistics = ["mean(z)", "p(stands)", "p(z > 2)"]\n' | cat in.toml - >random.toml
+  drawn='while read -r line; do number() { expr "$line" : ".*\"$1\":\([-0-9.e+]*\)"; }; echo "{\"z\": $(number x), \"outcome\": \"stands\"}"; done'
+  expect 0 "$topple" study random.toml --evaluator "$drawn" -o r --samples 40 --no-drivers --permissible "p(z > 2) <= 0.7, mean(z) < 3"
+  has err "each point takes 10 runs"; has out "mean(z)"; has out "x is distributed normally with the mean a and the standard deviation 1."; has out "p(z > 2) <= 0.7"
+  is_json r/results.json; has r/results.json '"distribution": "normal"'
+  expect 0 "$topple" study show r; has out "p(stands)"
+  expect 2 "$topple" study random.toml --evaluator "$drawn" -o r --seed 1 --condensed; has err "--condensed"
+  sed 's/"a", 1\]/"a", -1]/; s/p(z > 2)/p(z > much)/' random.toml >bad.toml
+  expect 2 "$topple" study bad.toml --evaluator "$drawn" -o r2; has err "bad.toml:6"; has err "standard deviation is below 0"; has err "bad.toml:9"; has err "a number is wanted"
+  sed 's/mean(z)/mean(y)/' random.toml >bad.toml
+  expect 2 "$topple" study bad.toml --evaluator "$drawn" -o r2; has err 'no output "y"'; has err "E825"
   # the page, where it is built
   if [ -e "$source/web/dist/study.html" ]; then
     exists tables/study.html; has tables/study.html topple-study; has tables/study.html "Sum"

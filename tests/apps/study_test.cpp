@@ -218,6 +218,43 @@ TEST_F(StudyFaults, LeaveTheStoreToWorkersWhenTheStudyStops) {
   EXPECT_EQ(wait_for(worker), 0) << "it did the runs";
 }
 
+// x2 is spread evenly between x1 and 90; the model crashes where x1 > 44 and x2 > 80.
+TEST_F(StudyFaults, LeaveAStudyWithRandomInputsAsItWouldBe) {
+  std::ofstream(folder / "in.toml") << R"toml([inputs]
+x1 = { triangular = [10, 25, 45] }
+[random]
+x2 = { uniform = ["x1", 90] }
+[randomness]
+runs = 20
+statistics = ["mean(z0)", "q90(z0)", "p(falls)"]
+)toml";
+  ASSERT_EQ(run(study("whole", "jump 0 crash", {"--samples", "150", "--jobs", "1"})), 0) << read(folder / "log");
+  EXPECT_NE(read(folder / "log").find("each point takes 20 runs of the model, 150 points take at most 3000 runs"),
+            std::string::npos);
+  EXPECT_NE(read(folder / "whole/results.json").find("4 of 20 inner runs failed: the evaluator ended"),
+            std::string::npos)
+      << "of x1 = 45 and the middles of strata of 2.25 those above 80";
+  const auto words = study("faulty", "jump 1 crash", {"--samples", "150", "--jobs", "1", "--lease", "1 s"});
+  pid_t manager = start(words);
+  wait_until([&] { return std::filesystem::exists(folder / "faulty/study.sqlite"); });
+  const auto db = open_database(folder / "faulty/study.sqlite");
+  wait_until([&] { return number(*db, "SELECT count(*) FROM sqlite_master WHERE name = 'result'") == 1; });
+  wait_until([&] { return results(*db) > 20; });
+  pid_t worker = start({TOPPLE_PROGRAM, "worker", folder / "faulty", "--jobs", "2", "--lease", "1 s"});
+  wait_until([&] { return results(*db) > 50; });
+  kill(worker, SIGKILL);
+  wait_for(worker);
+  kill(manager, SIGKILL);
+  wait_for(manager);
+  EXPECT_EQ(run(words), 0) << read(folder / "log");
+  expect_one_result_each(*db);
+  expect_same("whole", "faulty");
+  // another distribution is another study
+  std::ofstream(folder / "in.toml", std::ios::app) << "seed = 2\n";
+  EXPECT_EQ(run(words), 2);
+  EXPECT_NE(read(folder / "log").find("E822"), std::string::npos);
+}
+
 TEST_F(StudyFaults, LeaveACondensedStudyOfAPlanAsItWouldBe) {
   std::ofstream(folder / "plan.toml") << collapse::house(
       collapse::charge("C-A*-0") + collapse::charge("C-B*-0", "0.2 s") +

@@ -87,6 +87,13 @@ export interface Confirmation {
   bounds: { output: string; alpha: number; side: "lower" | "upper"; condensed: Maybe; whole: Maybe; state: string }[];
   outcomes: { outcome: string; sample: number; whole: string | null; state: string }[];
 }
+/// Random inputs, whose values each run takes many of.
+export interface Randomness {
+  inputs: { name: string; unit: string; distribution: string; parameters: { name: string; input?: string; value?: number }[] }[];
+  runs: number;
+  seed: number;
+  most_failed: number;
+}
 export interface Study {
   title: string;
   state: "open" | "finished";
@@ -98,6 +105,7 @@ export interface Study {
   seed: number;
   inputs: Input[];
   derived: { name: string; unit: string }[];
+  random?: Randomness; // of a study of statistics
   outputs: Output[];
   outcomes: Outcome[];
   coverage: { alpha: number; samples: number; spread: number }[];

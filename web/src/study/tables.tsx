@@ -215,6 +215,9 @@ export function Inputs(props: { study: Study }) {
             );
           })}
           {study.derived.map((q) => <tr><th scope="row">{titleOf(q)}</th><td colSpan={3}>follows from others</td></tr>)}
+          {(study.random?.inputs ?? []).map((q) => (
+            <tr><th scope="row">{titleOf(q)}</th><td colSpan={3}>{`random: ${q.distribution}(${q.parameters.map((x) => x.input ?? formatNumber(x.value)).join(", ")})`}</td></tr>
+          ))}
         </tbody>
       </table>
     </section>
@@ -243,6 +246,7 @@ export function Origin(props: { study: Study }) {
     ["File", origin.source_name || "–"],
     ["Seed", String(study.seed)],
     ["Runs", `${study.runs}, ${study.failed} failed`],
+    ...(study.random === undefined ? [] : [["Inner runs of each run", String(study.random.runs)] as [string, string]]),
     ...study.coverage.map((c): [string, string] => [`Runs that are possible to ${c.alpha}`, `${c.samples}; the search of bounds spread ${c.spread} of them`]),
   ];
   return (
