@@ -8,6 +8,7 @@
 
 #include "product/fuzzy_values.h"
 #include "product/interaction.h"
+#include "product/random_values.h"
 
 namespace topple::product {
 
@@ -26,7 +27,7 @@ struct FuzzyOperand {
 };
 
 struct FuzzyPlan {
-  std::vector<FuzzyValue> inputs;
+  std::vector<FuzzyValue> inputs;  // fuzzy values, parameters of random ones (without a place), random values
   std::vector<DerivedValue> derived;
   FuzzySearch search;
   std::vector<std::vector<DocumentPath>> places;    // of the inputs, then of the derived values; patterns have many
@@ -34,12 +35,18 @@ struct FuzzyPlan {
   std::vector<std::vector<FuzzyOperand>> operands;  // of each derived value's formula
   std::vector<double> input_unit, derived_unit;     // SI value of one unit of each value in formulas
   Interaction interaction;                          // sees inputs, then derived values, in these units
+  std::vector<RandomValue> random;                  // the last of the inputs, whose corners are one value
+  RandomSettings randomness;
 
   bool is_empty() const { return inputs.empty() && derived.empty(); }
+  /// Inputs that are not random.
+  std::size_t fuzzy_count() const { return inputs.size() - random.size(); }
 };
 
 /// The derived values of a point in SI; NaN or infinite outside a formula's range.
 std::vector<double> calc_derived(const FuzzyPlan&, std::span<const double> point);
+/// Whether a derived value follows from a random one.
+bool follows_from_random(const FuzzyPlan&, std::size_t derived);
 /// What the formulas of the interaction see of a point.
 std::vector<double> calc_interacting(const FuzzyPlan&, std::span<const double> point);
 /// Whether the interaction leaves the point possible: every constraint holds and the joint membership is above 0.

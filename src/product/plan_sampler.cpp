@@ -73,6 +73,13 @@ std::vector<double> calc_derived(const FuzzyPlan& f, std::span<const double> poi
   return out;
 }
 
+bool follows_from_random(const FuzzyPlan& f, std::size_t derived) {
+  const std::vector<int>& used = f.derived[derived].expression.used();
+  return std::any_of(used.begin(), used.end(), [&](int i) {
+    return f.operands[derived][static_cast<std::size_t>(i)].input >= static_cast<int>(f.fuzzy_count());
+  });
+}
+
 std::vector<double> calc_interacting(const FuzzyPlan& f, std::span<const double> point) {
   std::vector<double> values;
   for (size_t i = 0; i < f.inputs.size(); ++i) values.push_back(point[i] / f.input_unit[i]);

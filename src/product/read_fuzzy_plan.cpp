@@ -1,8 +1,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
+#include <optional>
 #include <unordered_map>
 
 #include "product/read_fuzzy_values.h"
@@ -139,10 +141,25 @@ struct FuzzyReader {
   std::vector<std::pair<size_t, SourcePosition>> taken;
   std::vector<std::vector<DocumentPath>> derived_places;
   std::vector<std::string> derived_si;
+  struct Random {
+    RandomValue random;
+    FuzzyValue value;
+    size_t target;
+    bool has_own_name;
+    std::vector<DocumentPath> places;
+  };
+  std::vector<Random> randoms = {};  // until they are put behind the other inputs
+  bool is_reading_random = false;    // the table is [fuzzy.random]
 
   void read_entry(const Entry&, std::vector<std::string>& path);
   void read_leaf(const Entry&, const std::vector<std::string>& path, const std::vector<size_t>& found);
   bool take(size_t target, Place where, const std::string& path);
+  bool take_all(const TableReader&, const std::vector<size_t>& found, Place where, const std::string& words);
+  FuzzyValue make_value(TableReader&, Place where, const std::string& words, const Target& first);
+  void read_random_leaf(TableReader&, const Entry&, const std::string& words, const std::vector<size_t>& found);
+  void read_parameters(TableReader& fuzzy);
+  void read_random(TableReader& fuzzy);
+  void check_interaction_names();
   void name_inputs();
   void parse_formula(size_t i);
   void read_interaction(TableReader& table);
@@ -159,8 +176,10 @@ void FuzzyReader::read_entry(const Entry& entry, std::vector<std::string>& path)
     leads_on = leads_on || path.size() < targets[i].words.size();
   }
   const bool is_table = entry.value.kind == Node::Kind::Table;
-  const bool says_how = is_table && std::any_of(std::begin(fuzzy_ways), std::end(fuzzy_ways),
-                                                [&](const char* way) { return entry.value.find(way) != nullptr; });
+  const bool says_how =
+      is_table && (is_reading_random ? says_distribution(entry.value)
+                                     : std::any_of(std::begin(fuzzy_ways), std::end(fuzzy_ways),
+                                                   [&](const char* way) { return entry.value.find(way) != nullptr; }));
   if (!found.empty() || says_how) {
     read_leaf(entry, path, found);
   } else if (is_table && (leads_on || !is_whole)) {
@@ -193,6 +212,160 @@ bool FuzzyReader::take(size_t target, Place where, const std::string& path) {
   return true;
 }
 
+/// All that a path leads to, which must have one unit.
+bool FuzzyReader::take_all(const TableReader& table, const std::vector<size_t>& found, Place where,
+                           const std::string& words) {
+  const Target& first = targets[found.front()];
+  for (const size_t i : found) {
+    if (!take(i, where, words)) return false;
+    if (targets[i].dimension != first.dimension) {
+      table.error("E207", where, path_of(first) + " and " + path_of(targets[i]) + " have different units");
+      return false;
+    }
+  }
+  return true;
+}
+
+/// With its name and units, without corners.
+FuzzyValue FuzzyReader::make_value(TableReader& table, Place where, const std::string& words, const Target& first) {
+  const FuzzyUnits units = fuzzy_units(first.dimension);
+  FuzzyValue v;
+  v.path = words, v.symbol = units.symbol, v.unit = units.shown;
+  v.where = complaints.position(where);
+  const bool is_named = table.has("name");
+  v.name = is_named ? table.text("name") : name_of(first);
+  if (is_named && !is_plain_name(v.name))
+    table.error("E208", table.place_of("name"), "name: " + quoted(v.name) + " cannot be a name in formulas",
+                "letters, digits and _, a letter first");
+  return v;
+}
+
+void FuzzyReader::read_random_leaf(TableReader& table, const Entry& entry, const std::string& words,
+                                   const std::vector<size_t>& found) {
+  const Target& first = targets[found.front()];
+  auto random = read_distribution(table, first.dimension);
+  if (!random || !take_all(table, found, entry.place, words)) return;
+  Random r{std::move(*random), {}, found.front(), table.has("name"), {}};
+  r.value = make_value(table, entry.place, words, first);
+  r.random.place = entry.place;
+  table.finish();
+  for (const size_t i : found) r.places.push_back(targets[i].place);
+  randoms.push_back(std::move(r));
+}
+
+/// Fuzzy parameters of random values have the units of the values.
+void FuzzyReader::read_parameters(TableReader& fuzzy) {
+  const Node* node = fuzzy.table("parameters");
+  if (!node) return;
+  for (const Entry& entry : node->entries) {
+    TableReader table(entry.value, "fuzzy: parameters." + entry.key, complaints);
+    if (!table.is_table()) continue;
+    if (!is_plain_name(entry.key)) {
+      complaints.error("E208", entry.place, "fuzzy: " + quoted(entry.key) + " cannot be the name of a parameter",
+                       "letters, digits and _, a letter first");
+      continue;
+    }
+    std::optional<Dimension> dimension;
+    for (const Random& r : randoms)
+      for (size_t i = 0; i < 2; ++i) {
+        if (r.random.parameters[i].name != entry.key) continue;
+        const bool is_shape = r.random.distribution->has_shape && i == 1;
+        const Dimension own = is_shape ? Dimension::Number : targets[r.target].dimension;
+        if (dimension && *dimension != own)
+          complaints.error("E207", r.random.parameters[i].place,
+                           "fuzzy: " + quoted(entry.key) + " is a parameter of values with different units");
+        dimension = own;
+      }
+    if (!dimension) {
+      complaints.error("E207", entry.place, "fuzzy: no random value has the parameter " + quoted(entry.key),
+                       "name it in a distribution of [fuzzy.random], or leave it out");
+      continue;
+    }
+    const FuzzyUnits units = fuzzy_units(*dimension);
+    FuzzyValue v;
+    v.path = v.name = entry.key, v.symbol = units.symbol, v.unit = units.shown;
+    v.where = complaints.position(entry.place);
+    read_corners(table, *dimension, v);
+    if (v.corners.empty() && complaints.error_count() == 0)
+      table.error("E207", entry.place, "one of triangular, trapezoidal, polygonal, tabulated is wanted", fuzzy_help);
+    table.finish();
+    out.inputs.push_back(std::move(v));
+    out.places.emplace_back();
+    out.si.emplace_back();
+    out.input_unit.push_back(units.formula);
+    first_target.push_back(0);
+    has_own_name.push_back(true);
+  }
+}
+
+/// Random values with their parameters, behind the other inputs.
+void FuzzyReader::read_random(TableReader& fuzzy) {
+  const size_t count = out.inputs.size();
+  std::vector<std::string> names;
+  for (size_t i = 0; i < count; ++i)
+    if (out.places[i].empty()) names.push_back(out.inputs[i].name);
+  for (Random& r : randoms) {
+    std::array<std::array<double, 2>, 2> ends{};
+    std::array<double, 2> middle{};
+    bool is_known = true;
+    for (size_t i = 0; i < 2; ++i) {
+      const RandomParameter& p = r.random.parameters[i];
+      ends[i] = {p.value, p.value}, middle[i] = p.value;
+      if (p.name.empty()) continue;
+      size_t k = 0;
+      while (k < count && (out.inputs[k].name != p.name || !out.places[k].empty())) ++k;
+      if (k == count) {
+        is_known = false;
+        complaints.error("E207", p.place, "fuzzy: random: there is no parameter " + quoted(p.name),
+                         did_you_mean(p.name, names,
+                                      "add it to a table [fuzzy.parameters], such as " + p.name +
+                                          " = { triangular = [left, core, right] }"));
+        continue;
+      }
+      const auto& corners = out.inputs[k].corners;
+      if (corners.empty()) return;
+      ends[i] = {corners.front().first, corners.back().first};
+      middle[i] = 0.5 * (core_of(out.inputs[k]).first + core_of(out.inputs[k]).second);
+    }
+    if (!is_known) continue;
+    check_distribution(r.random, ends, "fuzzy: random: " + r.value.path, complaints);
+    const double x = std::string(r.random.distribution->name) == "uniform" ? 0.5 * (middle[0] + middle[1]) : middle[0];
+    r.value.corners = {{x, 0}, {x, 1}, {x, 0}};
+    r.random.name = r.value.path;
+    const FuzzyUnits units = fuzzy_units(targets[r.target].dimension);
+    out.inputs.push_back(r.value);
+    out.places.push_back(r.places);
+    out.si.emplace_back(units.si);
+    out.input_unit.push_back(units.formula);
+    first_target.push_back(r.target);
+    has_own_name.push_back(r.has_own_name);
+    out.random.push_back(r.random);
+  }
+  out.randomness = read_random_settings(fuzzy);
+  if (!randoms.empty() && !out.randomness.is_given)
+    fuzzy.missing("randomness", "such as runs = 50 and statistics = [\"p(topple)\"] below it");
+  if (randoms.empty() && out.randomness.is_given)
+    complaints.error("E207", out.randomness.place, "fuzzy: randomness: no value is random",
+                     "add a table [fuzzy.random] with a line such as site.friction = { normal = [0.6, 0.05] }");
+}
+
+void FuzzyReader::check_interaction_names() {
+  const auto check = [&](const Expression& e, Place place, const char* what) {
+    for (const int used : e.used()) {
+      const auto i = static_cast<size_t>(used);
+      const bool is_input = i < out.inputs.size();
+      if (is_input ? i < out.fuzzy_count() : !follows_from_random(out, i - out.inputs.size())) continue;
+      complaints.error("E207", place,
+                       fmt::format("fuzzy: interaction: {}: {} is random", what,
+                                   is_input ? out.inputs[i].name : out.derived[i - out.inputs.size()].name),
+                       "it may use fuzzy values, parameters and what follows from them");
+    }
+  };
+  for (const Constraint& c : out.interaction.constraints)
+    check(c.left, c.place, "constraint"), check(c.right, c.place, "constraint");
+  if (out.interaction.joint) check(*out.interaction.joint, out.interaction.joint_place, "membership");
+}
+
 void FuzzyReader::read_leaf(const Entry& entry, const std::vector<std::string>& path,
                             const std::vector<size_t>& found) {
   const std::string words = join(path, ".");
@@ -206,20 +379,16 @@ void FuzzyReader::read_leaf(const Entry& entry, const std::vector<std::string>& 
   }
   if (entry.value.kind != Node::Kind::Table) {
     complaints.error("E202", entry.value.place,
-                     "fuzzy: " + words + ": is " + name_of(entry.value.kind) + "; a table is wanted", fuzzy_help);
+                     "fuzzy: " + words + ": is " + name_of(entry.value.kind) + "; a table is wanted",
+                     is_reading_random ? random_help : fuzzy_help);
     return;
   }
   TableReader table(entry.value, "fuzzy: " + words, complaints);
+  if (is_reading_random) return read_random_leaf(table, entry, words, found);
   const std::string way = find_fuzzy_way(table, entry.place);
   if (way.empty()) return;
   const Target& first = targets[found.front()];
-  for (const size_t i : found) {
-    if (!take(i, entry.place, words)) return;
-    if (targets[i].dimension != first.dimension) {
-      table.error("E207", entry.place, path_of(first) + " and " + path_of(targets[i]) + " have different units");
-      return;
-    }
-  }
+  if (!take_all(table, found, entry.place, words)) return;
   const FuzzyUnits units = fuzzy_units(first.dimension);
   if (way == "formula") {
     const std::string text = table.text("formula");
@@ -237,16 +406,8 @@ void FuzzyReader::read_leaf(const Entry& entry, const std::vector<std::string>& 
     }
     return;
   }
-  FuzzyValue v;
-  v.path = words, v.symbol = units.symbol, v.unit = units.shown;
-  v.where = complaints.position(entry.place);
   const bool is_named = table.has("name");
-  v.name = is_named ? table.text("name") : name_of(first);
-  const auto is_word = [](unsigned char c) { return std::isalnum(c) || c == '_'; };
-  if (is_named && (v.name.empty() || std::isdigit(static_cast<unsigned char>(v.name[0])) ||
-                   !std::all_of(v.name.begin(), v.name.end(), is_word)))
-    table.error("E208", table.place_of("name"), "name: " + quoted(v.name) + " cannot be a name in formulas",
-                "letters, digits and _, a letter first");
+  FuzzyValue v = make_value(table, entry.place, words, first);
   read_corners(table, first.dimension, v);
   table.finish();
   out.inputs.push_back(std::move(v));
@@ -303,8 +464,7 @@ void FuzzyReader::parse_formula(size_t i) {
     if (input < 0 && (std::isnan(t.value) || std::any_of(derived_places.begin(), derived_places.end(), has))) continue;
     add(name_of(t), {input, t.value, unit});
   }
-  for (size_t k = 0; k < out.inputs.size(); ++k)
-    add(out.inputs[k].name, {static_cast<int>(k), 0, fuzzy_units(targets[first_target[k]].dimension).formula});
+  for (size_t k = 0; k < out.inputs.size(); ++k) add(out.inputs[k].name, {static_cast<int>(k), 0, out.input_unit[k]});
   out.derived[i].expression = read_formula(*formulas[i].node, "fuzzy: " + out.derived[i].path, names, complaints);
   out.operands.push_back(std::move(operands));
 }
@@ -328,7 +488,7 @@ void FuzzyReader::compare() {
     return std::abs(a - b) > accepted_difference * std::max(std::abs(a), std::abs(b));
   };
   const std::string help = "topple run takes the plan's value, a study its fuzzy values";
-  for (size_t i = 0; i < out.inputs.size(); ++i) {
+  for (size_t i = 0; i < out.fuzzy_count(); ++i) {
     const FuzzyValue& v = out.inputs[i];
     const auto [left, right] = core_of(v);
     for (const auto& [t, where] : taken) {
@@ -367,9 +527,19 @@ void read_fuzzy(Reading& reading, TableReader& root, const Node& document, const
   FuzzyReader reader{out, complaints, TargetFinder(document, asked).targets, is_whole, {}, {}, {}, {}, {}, {}};
   std::vector<std::string> path;
   for (const Entry& entry : node->entries)
-    if (entry.key != "search" && entry.key != "interaction") reader.read_entry(entry, path);
+    if (entry.key != "search" && entry.key != "interaction" && entry.key != "random" && entry.key != "parameters" &&
+        entry.key != "randomness")
+      reader.read_entry(entry, path);
+  if (const Node* random = table.table("random")) {
+    reader.is_reading_random = true;
+    for (const Entry& entry : random->entries) reader.read_entry(entry, path);
+    reader.is_reading_random = false;
+  }
   if (complaints.error_count() > errors_before || !is_whole) return;
-  if (out.inputs.empty())
+  reader.read_parameters(table);
+  reader.read_random(table);
+  if (complaints.error_count() > errors_before) return;
+  if (out.fuzzy_count() == 0)
     complaints.error(
         "E201", node->place, "fuzzy: nothing is fuzzy",
         "add a line such as concrete.NAME.fc = { triangular = [\"10 N/mm2\", \"25 N/mm2\", \"45 N/mm2\"] }");
@@ -380,6 +550,7 @@ void read_fuzzy(Reading& reading, TableReader& root, const Node& document, const
   out.places.insert(out.places.end(), reader.derived_places.begin(), reader.derived_places.end());
   out.si.insert(out.si.end(), reader.derived_si.begin(), reader.derived_si.end());
   reader.read_interaction(table);
+  if (complaints.error_count() == errors_before) reader.check_interaction_names();
   if (complaints.error_count() > errors_before) return;
   const std::vector<double> values = calc_interacting(out, calc_centre(out));
   if (std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); }))

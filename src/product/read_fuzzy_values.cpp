@@ -190,10 +190,14 @@ void try_ends(const std::vector<FuzzyValue>& values, const FuzzyRefusal& refusal
 }
 
 RefusedCorners try_corners(const std::vector<FuzzyValue>& values, const FuzzyRefusal& refusal) {
-  const unsigned corners = 1U << values.size();
+  const auto is_crisp = [&](size_t i) { return values[i].corners.front().first == values[i].corners.back().first; };
+  unsigned crisp = 0;  // has one end only
+  for (size_t i = 0; i < values.size(); ++i) crisp |= is_crisp(i) ? 1U << i : 0;
   RefusedCorners out;
-  int refused = 0;
-  for (unsigned corner = 0; corner < corners; ++corner) {
+  int refused = 0, corners = 0;
+  for (unsigned corner = 0; corner < 1U << values.size(); ++corner) {
+    if (corner & crisp) continue;
+    ++corners;
     std::vector<double> point;
     std::string words;
     for (size_t i = 0; i < values.size(); ++i) {

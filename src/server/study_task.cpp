@@ -27,6 +27,9 @@ StudyTask::StudyTask(int id, const product::Plan& plan, const StudySetting& sett
   if (plan.fuzzy.inputs.empty())
     throw InputError("E950", "the plan has no fuzzy values",
                      "write a [fuzzy] table into it (docs/plan.md) and apply it");
+  if (!plan.fuzzy.random.empty())
+    throw InputError("E950", "the plan has random values, whose studies are not shown here",
+                     "study it with topple study, or leave [fuzzy.random] out");
   problem_ = study::make_plan_problem(plan, {}, setting.rules);
   Json identity = Json::parse(problem_.identity);
   identity["topple"] = setting.version;  // other programs give other answers

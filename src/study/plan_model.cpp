@@ -1,12 +1,17 @@
 #include "study/plan_model.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <nlohmann/json.hpp>
 
 #include "base/unit.h"
 #include "collapse/findings.h"
 #include "collapse/vibration.h"
+#include "product/plan_sampler.h"
+#include "study/randomness.h"
 
 namespace topple::study {
 namespace {
@@ -123,9 +128,117 @@ void list_vibration_limits(const product::Plan& plan, std::vector<Limit>& out) {
   }
 }
 
+/// Least and largest value of each parameter of a random value.
+std::array<std::array<double, 2>, 2> find_ends(const product::FuzzyPlan& fuzzy, const product::RandomValue& v) {
+  std::array<std::array<double, 2>, 2> ends{};
+  for (std::size_t i = 0; i < 2; ++i) {
+    ends[i] = {v.parameters[i].value, v.parameters[i].value};
+    for (std::size_t k = 0; k < fuzzy.fuzzy_count(); ++k)
+      if (fuzzy.places[k].empty() && fuzzy.inputs[k].name == v.parameters[i].name)
+        ends[i] = {fuzzy.inputs[k].corners.front().first, fuzzy.inputs[k].corners.back().first};
+  }
+  return ends;
+}
+
+/// Random values get the ends that runs give them, so that a mapping knows where they differ.
+product::Plan spread_random(product::Plan plan) {
+  product::FuzzyPlan& fuzzy = plan.fuzzy;
+  for (std::size_t k = 0; k < fuzzy.random.size(); ++k) {
+    auto& corners = fuzzy.inputs[fuzzy.fuzzy_count() + k].corners;
+    const auto [low, high] =
+        find_extremes(*fuzzy.random[k].distribution, find_ends(fuzzy, fuzzy.random[k]), fuzzy.randomness.runs);
+    const double middle = std::clamp(corners[1].first, low, high);
+    corners = {{low, 0}, {middle, 1}, {high, 0}};
+  }
+  return plan;
+}
+
+/// The least and the largest value of each random one must give a plan; else nearly every point would fail.
+void try_random(const product::Plan& plan) {
+  const product::FuzzyPlan& fuzzy = plan.fuzzy;
+  if (fuzzy.random.empty()) return;
+  const product::PlanSampler sampler = product::make_sampler(plan);
+  std::vector<Diagnostic> faults;
+  for (std::size_t i = fuzzy.fuzzy_count(); i < fuzzy.inputs.size(); ++i) {
+    const product::FuzzyValue& v = fuzzy.inputs[i];
+    for (const double x : {v.corners.front().first, v.corners.back().first}) {
+      std::vector<double> point = product::calc_centre(fuzzy);
+      point[i] = x;
+      try {
+        (void)product::make_sample(sampler, point);
+      } catch (const InputError& e) {
+        faults.push_back({Severity::Error, "E205", v.where, 1,
+                          fmt::format("fuzzy: random: {} comes to {} among {} runs, which is not possible: {}", v.path,
+                                      product::text_of(v, x), fuzzy.randomness.runs, e.first_error().message),
+                          "narrow the distribution, or take one that has no such values (lognormal, uniform)"});
+        break;
+      }
+    }
+  }
+  if (!faults.empty()) throw InputError(faults);
+}
+
+/// Makes a study of statistics of one whose inputs are all alike.
+void make_random(Problem& p, const product::Plan& plan) {
+  const product::FuzzyPlan& fuzzy = plan.fuzzy;
+  const std::size_t n = fuzzy.fuzzy_count();
+  product::Complaints complaints(plan.path);
+  Randomness r;
+  r.of = "plan";
+  r.runs = fuzzy.randomness.runs, r.seed = fuzzy.randomness.seed, r.most_failed = fuzzy.randomness.most_failed;
+  for (std::size_t k = 0; k < fuzzy.random.size(); ++k) {
+    RandomInput x{p.inputs[n + k], fuzzy.random[k].distribution, {}};
+    for (std::size_t i = 0; i < 2; ++i) {
+      const product::RandomParameter& given = fuzzy.random[k].parameters[i];
+      x.parameters[i].value = given.value;
+      for (std::size_t j = 0; j < n; ++j)
+        if (fuzzy.places[j].empty() && fuzzy.inputs[j].name == given.name) x.parameters[i].place = static_cast<int>(j);
+    }
+    r.inputs.push_back(std::move(x));
+  }
+  r.statistics = read_statistics(fuzzy.randomness, p, complaints);
+  if (complaints.error_count() > 0) throw InputError(complaints.all());
+  // constraints and what is shown beside the inputs use no random value: any will do
+  const std::vector<double> centre = product::calc_centre(fuzzy);
+  const auto complete =
+      [middle = std::vector<double>(centre.begin() + static_cast<std::ptrdiff_t>(n), centre.end())](const Point& x) {
+        Point all = x;
+        all.insert(all.end(), middle.begin(), middle.end());
+        return all;
+      };
+  p.inputs.resize(n);
+  p.space.inputs.resize(n);
+  for (auto& g : p.space.constraints) g = [complete, g](const Point& x) { return g(complete(x)); };
+  if (p.space.joint) p.space.joint = [complete, joint = p.space.joint](const Point& x) { return joint(complete(x)); };
+  std::vector<Quantity> derived;
+  std::vector<std::size_t> kept;
+  for (std::size_t i = 0; i < p.derived.size(); ++i)
+    if (!product::follows_from_random(fuzzy, i)) derived.push_back(p.derived[i]), kept.push_back(i);
+  p.derived = derived;
+  if (kept.empty()) p.calc_derived = nullptr;
+  if (p.calc_derived)
+    p.calc_derived = [complete, kept, calc = p.calc_derived](const Point& x) {
+      const std::vector<double> all = calc(complete(x));
+      std::vector<double> values;
+      for (const std::size_t i : kept) values.push_back(all[i]);
+      return values;
+    };
+  // what is told of single runs
+  p.curves.clear();
+  p.site = {};
+  p.horizon.reset();
+  p.asked.clear();
+  for (const Limit& l : p.limits) p.not_judged.push_back(l.output);
+  p.limits.clear();
+  set_random(p, std::move(r));
+  set_plan_identity(p, p.identity);
+}
+
 }  // namespace
 
-Problem make_plan_problem(const product::Plan& plan, const PlanMappingOptions& given, const std::string& rules) {
+Problem make_plan_problem(const product::Plan& asked, const PlanMappingOptions& given, const std::string& rules) {
+  const product::Plan plan = spread_random(asked);
+  try_random(plan);
   PlanMappingOptions options = given;
   if (options.after == 0) options.after = find_after(plan);
   const PlanMapping mapping(plan, read_rules(rules), options);
@@ -175,13 +288,14 @@ Problem make_plan_problem(const product::Plan& plan, const PlanMappingOptions& g
   if (options.condensed) {
     PlanMappingOptions whole = options;
     whole.condensed = whole.vibration = whole.sideways = false;
-    p.whole = std::make_shared<const Problem>(make_plan_problem(plan, whole, rules));
+    p.whole = std::make_shared<const Problem>(make_plan_problem(asked, whole, rules));
     p.confirm = default_confirm;
     p.not_modelled.push_back("Frames that are alike move as one, in their plane: nothing falls sideways.");
     json identity = json::parse(p.identity);
     identity["condensed"] = true;
     set_plan_identity(p, identity.dump());
   }
+  if (!plan.fuzzy.random.empty()) make_random(p, plan);
   p.levels = plan.fuzzy.search.levels;
   p.limit = plan.fuzzy.search.limit;
   p.seed = plan.fuzzy.search.seed;
@@ -205,7 +319,7 @@ Problem read_plan_problem(const std::string& definition) {
 
 Runner make_plan_runner(const std::string& definition) {
   const Definition d = read_definition(definition);
-  const auto mapping = std::make_shared<const PlanMapping>(d.plan, read_rules(d.rules), d.options);
+  const auto mapping = std::make_shared<const PlanMapping>(spread_random(d.plan), read_rules(d.rules), d.options);
   return [mapping](std::span<const Point> points, const std::function<void(std::size_t, Answer)>& give,
                    const std::atomic<bool>& cancel) {
     const std::size_t n = mapping->inputs().size();

@@ -94,6 +94,10 @@ TEXT
   expect 2 "$topple" study bad.toml --evaluator "$drawn" -o r2; has err "bad.toml:6"; has err "standard deviation is below 0"; has err "bad.toml:9"; has err "a number is wanted"
   sed 's/mean(z)/mean(y)/' random.toml >bad.toml
   expect 2 "$topple" study bad.toml --evaluator "$drawn" -o r2; has err 'no output "y"'; has err "E825"
+  "$topple" new frame.toml --template frame >/dev/null
+  printf '[fuzzy.parameters]\nm = { triangular = ["22 N/mm2", "25 N/mm2", "30 N/mm2"] }\n[fuzzy.random]\nconcrete.C25.fc = { lognormal = ["m", "4 N/mm2"] }\nsite.friction = { normal = [0.6, 0.05] }\n[fuzzy.search]\nafter = "1 s"\n[fuzzy.randomness]\nruns = 2\nstatistics = ["p(topple)", "mean(tilt_1)"]\n' >>frame.toml
+  expect 0 "$topple" study frame.toml -o rp --samples 10 --alpha 0,1 --no-drivers; has err "each point takes 2 runs"; has out "mean(tilt_1) [deg]"; has out "log-normally with the mean m and the standard deviation 4 N/mm2"
+  expect 0 "$topple" study export rp -o rp2; cmp rp/membership.csv rp2/membership.csv || failures=$((failures + 1))
   # the page, where it is built
   if [ -e "$source/web/dist/study.html" ]; then
     exists tables/study.html; has tables/study.html topple-study; has tables/study.html "Sum"
