@@ -54,6 +54,24 @@ std::vector<Include> includes_of(const std::string& text) {
   return found;
 }
 
+std::set<std::string> matches_of(const std::string& text, const std::regex& what) {
+  std::set<std::string> found;
+  for (std::sregex_iterator i(text.begin(), text.end(), what), end; i != end; ++i) found.insert((*i)[1]);
+  return found;
+}
+
+/// Codes of complaints that a source gives, "E203" in quotes.
+std::set<std::string> codes_given_in(const std::string& source) {
+  static const std::regex code(R"re("([EW][0-9]{3})")re");
+  return matches_of(source, code);
+}
+
+/// Codes of complaints that have a row in a table of a page.
+std::set<std::string> codes_explained_in(const std::string& page) {
+  static const std::regex row(R"(^\| ([EW][0-9]{3}) \|)", std::regex::multiline);
+  return matches_of(page, row);
+}
+
 /// Lines "module: others...".
 Graph parse_layers(const std::string& text) {
   Graph layers;
@@ -212,6 +230,24 @@ TEST(Documents, LinkToWhatIsThere) {
       EXPECT_TRUE(fs::exists(page.parent_path() / (*i)[1].str())) << page << " links to " << (*i)[1];
     }
   }
+}
+
+TEST(Documents, ExplainEveryCodeOfAComplaint) {
+  std::set<std::string> given, explained;
+  for (const auto* folder : {"src", "apps"})
+    for (const auto& path : sources_below(root / folder)) given.merge(codes_given_in(text_of(path)));
+  for (const auto& entry : fs::directory_iterator(root / "docs"))
+    if (entry.path().extension() == ".md") explained.merge(codes_explained_in(text_of(entry.path())));
+  ASSERT_TRUE(given.contains("E101"));
+  for (const auto& code : given) EXPECT_TRUE(explained.contains(code)) << code << " has no row in docs/errors.md";
+  for (const auto& code : explained) EXPECT_TRUE(given.contains(code)) << code << " is explained, but never given";
+}
+
+TEST(DocumentsOnSamples, FindCodes) {
+  EXPECT_EQ(codes_given_in("throw InputError(\"E673\", x);  // E674\n{\"W501\"}"),
+            (std::set<std::string>{"E673", "W501"}));
+  EXPECT_EQ(codes_explained_in("E670 to E672\n\n| E673 | nothing |\n| W501 | it |\n| x | E999 |\n"),
+            (std::set<std::string>{"E673", "W501"}));
 }
 
 }  // namespace
