@@ -254,7 +254,8 @@ void write_fuzzy_files(const record::RccFuzzyReport& r, Writer& out) {
 void print_fuzzy(std::FILE* out, const record::RccFuzzyReport& r) {
   const int width = find_width(out);
   for (const record::RccFan& f : r.fans) {
-    std::fprintf(out, "\n  N = %.4g MN, %zu runs\n", f.normal_force / unit::MN, f.originals.size());
+    std::fprintf(out, "\n  N = %.4g MN, %zu runs on the %s route\n", f.normal_force / unit::MN, f.originals.size(),
+                 r.route.c_str());
     for (const std::string& s : record::describe_switch(r, f)) std::fprintf(out, "    %s\n", wrap(s, width, 4).c_str());
     for (const record::RccOrdinate& o : f.ordinates) {
       std::string line = fmt::format("    {:<18}", o.name);

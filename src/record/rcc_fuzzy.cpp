@@ -146,9 +146,10 @@ Figure make_fan(const RccFuzzyReport& r, const RccFan& f, size_t k) {
   out.caption = fmt::format(
       "Every point between the bounds of a level is possible to at least the degree α. Each thin line is the curve of "
       "one "
-      "set of inputs; {} runs in all, the drawn ones hold a bound or fill the space evenly. The bounds are no curves: "
+      "set of inputs on the {} route; {} runs in all, the drawn ones hold a bound or fill the space evenly. The bounds "
+      "are no curves: "
       "they change from one set of inputs to another on the way.",
-      f.originals.size());
+      r.route, f.originals.size());
   out.drawing = draw(p);
   return out;
 }
@@ -368,6 +369,7 @@ std::string to_json(const RccFuzzyReport& r) {
                      {"inputs_sha256", r.inputs_sha256},
                      {"program_version", r.program_version},
                      {"seed", r.seed}};
+  j["route"] = r.route;
   j["axis"] = std::string(1, r.axis);
   j["direction"] = sign_of(r.direction);
   j["inputs"] = json::array();
@@ -445,9 +447,10 @@ std::vector<Figure> make_figures(const RccFuzzyReport& r) {
 std::string to_page(const RccFuzzyReport& r, const std::vector<Figure>& figures) {
   std::string out = page_head(r.title);
   out += fmt::format(
-      "<h1>{}</h1>\n<p class=\"quiet\">Fuzzy resistance curves about {}{}. {}. Normal forces are positive in "
-      "compression.</p>\n",
-      escape_html(r.title), sign_of(r.direction), r.axis, escape_html(r.zone));
+      "<h1>{}</h1>\n<p class=\"quiet\">Fuzzy resistance curves about {}{}, every one of them on the {} route. {}. "
+      "Normal "
+      "forces are positive in compression.</p>\n",
+      escape_html(r.title), sign_of(r.direction), r.axis, escape_html(r.route), escape_html(r.zone));
   for (const std::string& note : r.notes) out += fmt::format("<p>{}</p>\n", escape_html(note));
   out += "<h2>What can happen</h2>\n<section>";
   for (const RccFan& f : r.fans) {

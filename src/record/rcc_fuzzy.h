@@ -71,6 +71,7 @@ struct RccFan {
 struct RccFuzzyReport {
   std::string title, zone;
   std::string source, sha256, inputs_source, inputs_sha256, program_version;
+  std::string route = "layered";  // that every run's curve comes from, as in rcc_report.h
   char axis = 'y';
   int direction = 1;
   std::uint64_t seed = 1;

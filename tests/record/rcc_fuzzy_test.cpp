@@ -45,6 +45,7 @@ TEST(RccFuzzy, PageStandsAloneAndSaysWhatCanHappen) {
        {"Fuzzy &lt;column&gt;", "To the possibility 0.17 it is crushed by the force alone",
         "To the possibility 0.4 it loses the force while it is turned to 10 mrad, most possibly at fc = 16 N/mm2",
         "With the core values the section under 4 MN carries the force and resists up to 10 mrad",
+        "every one of them on the layered route", "the curve of one set of inputs on the layered route; 3 runs in all",
         "1.4 * ((fc - 8) / 10)^(2/3)", "Table of values", "fuzzy.toml", "9.9.9", "A note.", "Slip.", "seed 1"})
     EXPECT_NE(page.find(text), std::string::npos) << text;
   for (const char* id : {"crushing", "fan_1", "switch_1", "inputs"})
@@ -80,6 +81,7 @@ TEST(RccFuzzy, FilesHoldEveryRun) {
   EXPECT_NE(samples_csv(r).find("4000000,1,0.4,16000000,1000000,loses the force while it is turned,400000"),
             std::string::npos);
   const auto j = nlohmann::json::parse(to_json(r));
+  EXPECT_EQ(j["route"], "layered");
   EXPECT_EQ(j["fans"][0]["originals"].size(), 2u);
   EXPECT_EQ(j["fans"][0]["levels"][0]["upper"][1].get<double>(), 9e5);
   EXPECT_EQ(j["inputs"][1]["formula"], r.inputs[1].formula);
