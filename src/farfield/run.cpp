@@ -509,7 +509,7 @@ void Course::add_findings(record::Record& r) const {
   for (const auto& s : state_.skipped)
     add(fmt::format("farfield.skipped.{}", &s - state_.skipped.data() + 1), "Wait passed over",
         fmt::format("At {:.2f} s the building only swung about where it stands. It was settled without motion, and the "
-                    "clock was put forward to {:.2f} s; it stands within {:.1f} mm of where it was built.",
+                    "clock was put forward to {:.2f} s; it stands within {:.1f} mm of where it was last at rest.",
                     s[0], s[1], 1e3 * s[2]),
         s[1] - s[0], "s", Status::Info);
   for (size_t i = 0; i < state_.unsettled.size(); ++i)

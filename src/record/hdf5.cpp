@@ -596,7 +596,9 @@ void transfer(Archive& a, Record& r, Flat& flat) {
   a.block("frames/zone_state", r.zone_state, {frames, zones},
           {.meaning = "0 elastic, 1 yielded, 2 softening, 3 broken, 4 fired, 5 crushed (a stub that a charge left)"});
   a.block("frames/zone_utilisation", r.zone_utilisation, {frames, zones},
-          {.meaning = "demand over capacity, 1 at most of zones that are not elastic"});
+          {.meaning = p.engine == "finite elements"
+                          ? "stress over first yield stress at its pressure, largest of the zone's elements, 1 at most"
+                          : "demand over capacity, 1 at most of zones that are not elastic"});
   if (knows_crushing)
     a.block("frames/crushed_length", r.crushed_length, {frames, r.crushed_ends.size()},
             {.unit = "m", .meaning = "by which a crushed end has receded"});

@@ -127,8 +127,9 @@ struct Record {
   std::vector<float> position;           // p_WB of the frame of each body [m] (S x B x 3)
   std::vector<float> orientation;        // unit quaternion w x y z         (S x B x 4)
   std::vector<std::uint8_t> zone_state;  // ZoneState                       (S x Z)
-  std::vector<float> zone_utilisation;   // demand over capacity, 1 at most of zones that are not elastic (S x Z)
-  std::vector<float> crushed_length;     // by which each crushed end has receded, never falling [m] (S x C)
+  // demand over capacity, 1 at most of zones that are not elastic; of finite elements stress over first yield stress
+  std::vector<float> zone_utilisation;  // (S x Z)
+  std::vector<float> crushed_length;    // by which each crushed end has receded, never falling [m] (S x C)
   std::vector<Series> series;
   std::vector<Output> outputs;  // read back in the order of their names
   std::vector<Event> events;

@@ -214,19 +214,36 @@ TEST_F(Hdf5, PacksLargeDatasets) {
   expect_same(read_hdf5(path("record.h5")), r);
 }
 
+std::string read_attribute(hid_t file, const char* object, const char* name) {
+  const hid_t id = H5Aopen_by_name(file, object, name, H5P_DEFAULT, H5P_DEFAULT);
+  const hid_t type = H5Aget_type(id);
+  std::string text(H5Tget_size(type), '\0');
+  H5Aread(id, type, text.data());
+  H5Tclose(type);
+  H5Aclose(id);
+  return text;
+}
+
+TEST_F(Hdf5, SaysWhatUtilisationIs) {
+  Record r = make_sample();
+  for (const char* engine : {"native", "finite elements"}) {
+    r.provenance.engine = engine;
+    write_hdf5(r, path("record.h5"));
+    const hid_t file = H5Fopen(path("record.h5").c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+    ASSERT_GE(file, 0);
+    EXPECT_THAT(
+        read_attribute(file, "frames/zone_utilisation", "meaning"),
+        testing::StartsWith(engine == std::string("native") ? "demand over capacity" : "stress over first yield"));
+    H5Fclose(file);
+    expect_same(read_hdf5(path("record.h5")), r);
+  }
+}
+
 TEST_F(Hdf5, NamesUnitsAndFrames) {
   write_hdf5(make_sample(), path("record.h5"));
   const hid_t file = H5Fopen(path("record.h5").c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
   ASSERT_GE(file, 0);
-  const auto attribute = [&](const char* object, const char* name) {
-    const hid_t id = H5Aopen_by_name(file, object, name, H5P_DEFAULT, H5P_DEFAULT);
-    const hid_t type = H5Aget_type(id);
-    std::string text(H5Tget_size(type), '\0');
-    H5Aread(id, type, text.data());
-    H5Tclose(type);
-    H5Aclose(id);
-    return text;
-  };
+  const auto attribute = [&](const char* object, const char* name) { return read_attribute(file, object, name); };
   EXPECT_EQ(attribute("/", "format"), "topple-record");
   EXPECT_EQ(attribute("frames/position", "unit"), "m");
   EXPECT_EQ(attribute("frames/position", "frame"), "world");

@@ -268,7 +268,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["Elements that went", "Entfernte Elemente"],
   ["{} by charges, {} torn, {} crushed, {} out of shape; {:.1f} t in all. Of what was not charged {} pieces stay as debris.", "{} durch Ladungen, {} zerrissen, {} zerdrückt, {} entartet; zusammen {} t. Was nicht gesprengt wurde, bleibt als {} Trümmerstücke."],
   ["Wait passed over", "Übersprungene Wartezeit"],
-  ["At {:.2f} s the building only swung about where it stands. It was settled without motion, and the clock was put forward to {:.2f} s; it stands within {:.1f} mm of where it was built.", "Bei {} s schwang das Gebäude nur noch um seinen Stand. Es wurde ohne Bewegung zur Ruhe gebracht und die Uhr auf {} s vorgestellt; es steht höchstens {} mm neben seinem ursprünglichen Ort."],
+  ["At {:.2f} s the building only swung about where it stands. It was settled without motion, and the clock was put forward to {:.2f} s; it stands within {:.1f} mm of where it was last at rest.", "Bei {} s schwang das Gebäude nur noch um seinen Stand. Es wurde ohne Bewegung zur Ruhe gebracht und die Uhr auf {} s vorgestellt; es steht höchstens {} mm neben dem Ort, an dem es zuletzt ruhte."],
   ["Wait followed in time", "Wartezeit durchgerechnet"],
   ["At {:.2f} s the building seemed to swing about where it stands, but found no equilibrium there: {:.1e} of the load was out of balance after {} steps without motion. The wait was not passed over.", "Bei {} s schien das Gebäude nur um seinen Stand zu schwingen, fand dort aber kein Gleichgewicht: {} der Last war nach {} Schritten ohne Bewegung nicht ausgeglichen. Die Wartezeit wurde nicht übersprungen."],
   ["Left out", "Weggelassen"],
