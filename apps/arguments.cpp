@@ -25,6 +25,11 @@ void add_language(CLI::App* verb, Arguments& a) {
   verb->add_option("--language", a.language, "of the page: en (default) or de")->check(CLI::IsMember({"en", "de"}));
 }
 
+/// The answer for programs.
+void add_json(CLI::App* verb, Arguments& a) {
+  verb->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
+}
+
 /// Name of a type whose values completion offers; what is not among them has an error of its own.
 std::string choose_from(const std::vector<std::string>& names) {
   std::string out;
@@ -52,7 +57,7 @@ void add_run_options(CLI::App* verb, Arguments& a) {
   verb->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
   verb->add_option("--engine", a.engine, "program that solves the multibody model")
       ->type_name(choose_from(engines::engine_names()));
-  verb->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
+  add_json(verb, a);
   verb->add_flag("--csv", a.csv, "also write tables for spreadsheets");
   add_language(verb, a);
   verb->add_flag("--verbose", a.verbose, "show every event");
@@ -83,6 +88,7 @@ void add_new(CLI::App& app, Arguments& a) {
   verb_new->add_option("--template", a.plan_template, "kind of structure, as --list shows them (frame)")
       ->type_name(choose_from(names_of_templates()));
   verb_new->add_flag("--list", a.list, "show the templates");
+  add_json(verb_new, a);
   verb_new->callback([&a] { a.verb = Arguments::Verb::New; });
   add_examples(verb_new, R"(  topple new plan.toml
   topple new --list)");
@@ -189,6 +195,7 @@ void add_report(CLI::App& app, Arguments& a) {
   report->add_option("--compare", a.other_records, "also tell how other records differ, say one of topple fe")
       ->type_name("FILE");
   add_language(report, a);
+  add_json(report, a);
   report->callback([&a] { a.verb = Arguments::Verb::Report; });
   add_examples(report, R"(  topple report out/record.h5 -o report.html
   topple report out/record.h5 -o bericht.html --language de
@@ -241,6 +248,7 @@ void add_import(CLI::App& app, Arguments& a) {
       ->required();
   import->add_option("--unit", a.unit, "of a drawing's numbers, such as \"1 mm\", whatever its header says")
       ->type_name("QUANTITY");
+  add_json(import, a);
   import->callback([&a] { a.verb = Arguments::Verb::Import;
 });
 add_examples(import, R"(  topple import building.ifc -o building.toml
@@ -277,7 +285,7 @@ void add_rcc(CLI::App& app, Arguments& a) {
   rcc->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")
       ->type_name("FILE");
   rcc->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
-  rcc->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
+  add_json(rcc, a);
   rcc->callback([&a] { a.verb = Arguments::Verb::Rcc; });
   add_examples(rcc, R"(  topple rcc plan.toml --member C-A1-0 -o zone
   topple rcc plan.toml --member C-A1-0 --zone top --normal-force "300 kN"
@@ -309,7 +317,7 @@ void add_fe(CLI::App& app, Arguments& a) {
   fe->add_flag("--resume", f.resume, "go on from checkpoint.bin in the folder")->excludes(mesh_only);
   fe->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
   fe->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")->type_name("FILE");
-  fe->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
+  add_json(fe, a);
   add_language(fe, a);
   fe->add_flag("--csv", a.csv, "also write tables for spreadsheets");
   fe->add_flag("--verbose", a.verbose, "show every event");
@@ -345,6 +353,7 @@ void add_steer(CLI::App& app, Arguments& a) {
       ->type_name("FILE");
   steer->add_option("--threads", a.threads, "threads of the solver; results do not depend on it")
       ->check(CLI::Range(1, 1024));
+  steer->add_flag("--json", a.json, "the address in one line of JSON on standard output");
   steer->callback([&a] { a.verb = Arguments::Verb::Steer; });
   add_examples(steer, R"(  topple steer plan.toml                   opens the page
   topple steer plan.toml --no-open --port 8080)");
@@ -360,7 +369,7 @@ void add_replay(CLI::App& app, Arguments& a) {
       ->type_name("FILE");
   replay->add_option("--threads", a.threads, "threads of the solver; results do not depend on it")
       ->check(CLI::Range(1, 1024));
-  replay->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
+  add_json(replay, a);
   replay->add_flag("--csv", a.csv, "also write tables for spreadsheets");
   replay->add_flag("--no-report", a.no_report, "do not write report.html");
   replay->callback([&a] { a.verb = Arguments::Verb::Replay; });
@@ -410,7 +419,7 @@ void add_study(CLI::App& app, Arguments& a) {
   study->add_flag("--rerun-failed", y.rerun_failed, "run those again that failed");
   study->add_option("--knowledge", a.knowledge, "of a plan: file of knowledge rules instead of the built-in ones")
       ->type_name("FILE");
-  study->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
+  add_json(study, a);
   add_worker_options(study, y);
   CLI::App* study_show = study->add_subcommand("show", "Show what a study has found so far.");
   CLI::App* study_export = study->add_subcommand("export", "Write what a study has found so far: page, CSV and JSON.");
@@ -449,6 +458,7 @@ void add_worker(CLI::App& app, Arguments& a) {
   worker->add_option("--idle", y.idle, "end after so long without work, such as \"10 min\"; else when no study is open")
       ->type_name("QUANTITY");
   add_worker_options(worker, y);
+  add_json(worker, a);
   worker->callback([&a] { a.verb = Arguments::Verb::Worker; });
   add_examples(worker, R"(  topple worker study --jobs 4
   topple worker postgresql://user@host/studies --idle "10 min")");
@@ -460,7 +470,7 @@ void add_demo(CLI::App& app, Arguments& a) {
   add_language(demo, a);
   demo->add_flag("--open", a.open, "open the report in the desktop's browser");
   demo->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
-  demo->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
+  add_json(demo, a);
   demo->callback([&a] { a.verb = Arguments::Verb::Demo; });
   add_examples(demo, R"(  topple demo                              into the folder storehouse
   topple demo -o first --open              and open the report)");

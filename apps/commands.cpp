@@ -256,6 +256,13 @@ int close_run(const record::Record& r, const Arguments& a, std::FILE* out, Files
 }
 
 int write_template(const Arguments& a) {
+  if (a.list && a.json) {
+    json out{{"exit_code", kOk}, {"templates", json::array()}};
+    for (const product::Template& t : product::templates())
+      out["templates"].push_back({{"name", t.name}, {"title", t.title}, {"description", t.description}});
+    std::printf("%s\n", dump(out).c_str());
+    return kOk;
+  }
   if (a.list) {
     for (const product::Template& t : product::templates())
       std::printf("%-9s %s. %s\n", t.name.c_str(), t.title.c_str(), t.description.c_str());
@@ -264,12 +271,18 @@ int write_template(const Arguments& a) {
   try {
     const product::Template& chosen = product::find_template(a.plan_template);
     if (fs::exists(a.input)) {
-      std::fprintf(stderr, "%s exists already and is left as it is.\n", a.input.c_str());
+      const std::string words = a.input + " exists already and is left as it is";
+      std::fprintf(stderr, "%s.\n", words.c_str());
+      if (a.json) print_refusal({{Severity::Error, "E802", {}, 1, words, "choose another name"}});
       return kBadInput;
     }
     replace_file(a.input, chosen.text);
-  } catch (const InputError& e) { return refuse(e, {}, {}, false); }
-  std::printf("Wrote %s. Next: topple check %s\n", a.input.c_str(), quote_word(a.input).c_str());
+  } catch (const InputError& e) { return refuse(e, {}, {}, a.json); }
+  if (a.json)
+    std::printf("%s\n",
+                dump(json{{"exit_code", kOk}, {"template", a.plan_template}, {"files", {{"plan", a.input}}}}).c_str());
+  std::fprintf(a.json ? stderr : stdout, "Wrote %s. Next: topple check %s\n", a.input.c_str(),
+               quote_word(a.input).c_str());
   return kOk;
 }
 
@@ -389,9 +402,13 @@ int write_report_file(const Arguments& a) {
       return kRunFailed;
     }
     record::write_page(record::to_report_json(r, extras), *bundle, a.output, a.language);
-    std::printf("Wrote %s\n", a.output.c_str());
+    std::fprintf(a.json ? stderr : stdout, "Wrote %s\n", a.output.c_str());
+    if (a.json)
+      std::printf(
+          "%s\n",
+          dump(json{{"title", r.provenance.title}, {"exit_code", kOk}, {"files", {{"report", a.output}}}}).c_str());
     return kOk;
-  } catch (const InputError& e) { return refuse(e, {}, {}, false); }
+  } catch (const InputError& e) { return refuse(e, {}, {}, a.json); }
 }
 
 }  // namespace topple::apps

@@ -13,10 +13,10 @@ namespace topple::apps {
 
 namespace {
 
-void print_list(const char* heading, const std::vector<std::string>& list) {
+void print_list(std::FILE* out, const char* heading, const std::vector<std::string>& list) {
   if (list.empty()) return;
-  std::printf("\n%s\n", heading);
-  for (const std::string& s : list) std::printf("  %s\n", s.c_str());
+  std::fprintf(out, "\n%s\n", heading);
+  for (const std::string& s : list) std::fprintf(out, "  %s\n", s.c_str());
 }
 
 }  // namespace
@@ -41,15 +41,24 @@ int import_file(const Arguments& a) {
     const product::Import made = kind == ".ifc" ? product::make_plan_text(product::read_ifc(text, a.input), name)
                                                 : product::make_site_text(text, a.input, unit);
     replace_file(a.output, made.text);
-    std::printf("Wrote %s\n", a.output.c_str());
-    print_list("Taken", made.report.taken);
-    print_list("Guessed; look at it", made.report.guessed);
-    print_list("Missing", made.report.missing);
+    std::FILE* out = a.json ? stderr : stdout;
+    std::fprintf(out, "Wrote %s\n", a.output.c_str());
+    print_list(out, "Taken", made.report.taken);
+    print_list(out, "Guessed; look at it", made.report.guessed);
+    print_list(out, "Missing", made.report.missing);
     int gaps = -1;  // the first line has one too
     for (size_t at = 0; (at = made.text.find("\"?\"", at)) != std::string::npos; ++at) ++gaps;
-    std::printf("\n%d gaps are marked \"?\"; topple check names them.\n", gaps);
+    std::fprintf(out, "\n%d gaps are marked \"?\"; topple check names them.\n", gaps);
+    if (a.json)
+      std::printf("%s\n", dump(nlohmann::ordered_json{{"exit_code", kOk},
+                                                      {"taken", made.report.taken},
+                                                      {"guessed", made.report.guessed},
+                                                      {"missing", made.report.missing},
+                                                      {"gaps", gaps},
+                                                      {"files", {{"plan", a.output}}}})
+                              .c_str());
     return kOk;
-  } catch (const InputError& e) { return refuse(e, {}, text, false); }
+  } catch (const InputError& e) { return refuse(e, {}, text, a.json); }
 }
 
 }  // namespace topple::apps

@@ -74,12 +74,18 @@ int steer(const Arguments& a, const std::atomic<bool>& cancel) {
     // logs and studies lie there
     if (!a.output.empty() || !a.input.empty()) make_folder(options.session.folder, {});
     if (!a.input.empty()) tell_of_earlier_session(options, first);
+    const std::string folder = options.session.folder;
     server::Hub hub(std::move(options));
     server::ServerOptions serving;
     serving.port = port;
     const server::Server server(hub, serving);
     if (!a.input.empty()) hub.open(std::move(first));
-    std::printf("%s\n", server.url().c_str());
+    if (a.json)
+      std::printf("%s\n", nlohmann::ordered_json{{"url", server.url()}, {"folder", folder}}
+                              .dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace)
+                              .c_str());
+    else
+      std::printf("%s\n", server.url().c_str());
     std::fflush(stdout);
     std::fprintf(stderr,
                  "Open this address; it works on this machine only and for this start only. Ctrl-C ends the server.\n");
@@ -87,7 +93,7 @@ int steer(const Arguments& a, const std::atomic<bool>& cancel) {
     while (!cancel.load(std::memory_order_relaxed)) std::this_thread::sleep_for(std::chrono::milliseconds(100));
     std::fprintf(stderr, "The server ends.\n");
     return kOk;
-  } catch (const InputError& e) { return refuse(e, {}, text, false); }
+  } catch (const InputError& e) { return refuse(e, {}, text, a.json); }
 }
 
 }  // namespace topple::apps

@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "commands.h"
+#include "refusal.h"
 #include "study/pool.h"
 #include "study_model.h"
 #include "terminal.h"
@@ -24,6 +25,7 @@ int run_worker(const Arguments& a, const std::atomic<bool>& cancel) {
     idle = read_seconds(a.study.idle, "--idle", 0);
   } catch (const InputError& e) {
     for (const Diagnostic& d : e.diagnostics()) std::fputs(render(d, "", has_colour(stderr)).c_str(), stderr);
+    if (a.json) print_refusal(e.diagnostics());
     return kBadInput;
   }
   try {
@@ -50,6 +52,12 @@ int run_worker(const Arguments& a, const std::atomic<bool>& cancel) {
     line.clear();
     std::fprintf(stderr, "%ld runs done here%s; %s\n", pool.finished(),
                  pool.refused() > 0 ? fmt::format(", {} came too late", pool.refused()).c_str() : "", why.c_str());
+    if (a.json)
+      std::printf(
+          "%s\n",
+          dump(nlohmann::ordered_json{
+                   {"exit_code", kOk}, {"done", pool.finished()}, {"too_late", pool.refused()}, {"ending", why}})
+              .c_str());
     return kOk;
   } catch (const study::ConnectionLost& e) {
     std::fprintf(stderr, "topple: the store is away: %s\n", e.what());

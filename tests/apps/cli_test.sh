@@ -67,6 +67,7 @@ TEXT
   expect 0 "$topple" study export s -o tables; cmp s/samples.csv tables/samples.csv || failures=$((failures + 1))
   cmp s/results.json tables/results.json || failures=$((failures + 1))
   expect 0 "$topple" worker s; has err "every study is finished"
+  expect 0 "$topple" worker s --json; is_json out; has out '"done": 0'; has out '"ending": "every study is finished"'
   expect 2 "$topple" study in.toml --evaluator "other" -o s; has err "another model"
   expect 2 "$topple" study in.toml --evaluator "while read -r l; do echo '{\"z\": 1, oops}'; done" -o wrong
   has err "this is not JSON"; has err "^"; has err "oops"
@@ -76,6 +77,7 @@ TEXT
   expect 2 "$topple" study "$plan" -o a; has err "fuzzy"
   expect 2 "$topple" study show nowhere; has err "there is no study"
   expect 2 "$topple" worker nowhere; has err "there is no study"
+  expect 2 "$topple" worker nowhere --json; is_json out; has out '"code": "E820"'
   sed 's/\[1, 2, 4\]/[1, 5, 4]/' in.toml >bad.toml
   expect 2 "$topple" study bad.toml --evaluator "$model" -o a; has err "bad.toml:3"; has err "^"
   expect 2 "$topple" study in.toml --evaluator "$model" -o a --permissible "z << 3"; has err "a number is wanted"
@@ -193,6 +195,10 @@ new)
     cmp "$name.toml" "$source/examples/templates/$name.toml" || failures=$((failures + 1))
     expect 0 "$topple" check "$name.toml"; has out "no errors, 0 warnings"
   done
+  expect 0 "$topple" new --list --json; is_json out; has out '"name": "chimney"'
+  expect 0 "$topple" new json.toml --json; is_json out; has out '"plan": "json.toml"'; has err "Wrote json.toml"
+  expect 2 "$topple" new json.toml --json; is_json out; has out '"code": "E802"'; has err "exists already"
+  expect 2 "$topple" new --template fram -o none.toml --json; is_json out; has out '"code": "E920"'
   expect 2 "$topple" new --template fram -o none.toml; has err 'did you mean "frame"'
   [ ! -e none.toml ] || { echo "a plan for nothing"; failures=$((failures + 1)); }
   expect 2 "$topple" new --template frame; has err "a file to write is required"
@@ -263,6 +269,9 @@ import)
   printf '%s\n' 0 SECTION 2 ENTITIES 0 LWPOLYLINE 8 Houses 70 1 10 20 20 0 10 30 20 0 10 30 20 9 0 ENDSEC 0 EOF >site.dxf
   expect 0 "$topple" import site.dxf -o site.toml; has site.toml "[[site.neighbour]]"; has out "1 gaps are marked"; has out "Guessed"
   expect 2 "$topple" import site.dxf -o site.toml; has err "exists already"
+  expect 2 "$topple" import site.dxf -o site.toml --json; is_json out; has out '"code": "E802"'
+  expect 0 "$topple" import site.dxf -o json.toml --json; is_json out; has out '"gaps": 1'; has out '"plan": "json.toml"'; has err "Guessed"
+  cmp site.toml json.toml || failures=$((failures + 1))
   expect 2 "$topple" import site.dxf -o other.toml --unit "1 s"; has err "--unit"
   cat "$plan" site.toml >gaps.toml
   expect 2 "$topple" check gaps.toml; has err "E211"; has err "site.neighbour[1].clearance"; has err "^"
@@ -342,7 +351,7 @@ json)
   told replay junk -o x; told study "$plan" -o x; told study nowhere -o x; told study show nowhere; told mbs compare junk
   told check "$plan" --bogus; has out "there is no option --bogus"
   for words in "run p -o x" "mbs run p -o x" "mbs compare p" "rcc p -o x" "fe p -o x" "compare p p -o x" "replay p -o x" \
-    "study p -o x" demo doctor run fe; do
+    "study p -o x" "new p" "import p -o x" "report p -o x" "steer p" "worker p" demo doctor run fe; do
     told $words --bogus
   done
   ;;
@@ -430,6 +439,7 @@ report)
   expect 0 "$topple" run "$plan" -o a --no-report
   if [ -s "$source/web/dist/report.html" ]; then
     expect 0 "$topple" report a/record.h5 -o r.html; exists r.html; has r.html "Short run"
+    expect 0 "$topple" report a/record.h5 -o r2.html --json; is_json out; has out '"report": "r2.html"'; has out '"title"'; rm r2.html
     expect 0 "$topple" run "$plan" -o b; exists b/report.html
   else
     expect 1 "$topple" report a/record.h5 -o r.html; has err "report page is not built"
@@ -445,6 +455,7 @@ report)
   echo nonsense >wrong.h5
   expect 2 "$topple" report wrong.h5 -o r2.html
   expect 2 "$topple" report missing.h5 -o r2.html
+  expect 2 "$topple" report missing.h5 -o r2.html --json; is_json out; has out '"code": "E701"'
   ;;
 cancel)
   "$topple" run "$source/examples/weida/plan.toml" -o a --no-report --duration 500s >out 2>err &
@@ -487,6 +498,12 @@ steer)
   expect 0 "$topple" replay logs/plan.steer.jsonl -o again --no-report; has err "no end"; exists again/branch-1/record.h5
   expect 2 "$topple" replay plan.toml -o again; has err E942
   expect 2 "$topple" steer missing.toml --no-open
+  "$topple" steer --no-open --json >out 2>err &
+  pid=$!
+  for _ in $(seq 600); do [ -s out ] && break; sleep 0.1; done
+  kill -INT $pid; wait $pid
+  is_json out; has out '"url":"http://127.0.0.1:'; [ "$(wc -l <out)" -eq 1 ] || { echo "more than a line"; failures=$((failures + 1)); }
+  expect 2 "$topple" steer plan.toml --no-open --port 99999 --json; is_json out; has out '"code": "E801"'
   expect 2 "$topple" steer plan.toml --no-open --port 99999; has err "1 to 65535"
   expect 1 "$topple" steer plan.toml --no-open -o plan.toml; has err "the folder cannot be made"
   ;;
