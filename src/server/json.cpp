@@ -58,6 +58,61 @@ Json describe_finding(const record::Finding& f) {
           {"status", record::name_of(f.status)}};
 }
 
+Json describe_member(const product::Plan& plan, const product::Member& m) {
+  Json j{{"name", m.name}, {"kind", product::name_of(m.kind)}, {"storey", m.storey}};
+  j["length"] = number(norm(m.end - m.start));
+  j["removed"] = m.removed;
+  int concrete = -1, steel = -1;
+  const product::Panel* masonry = nullptr;
+  if (m.section >= 0) {
+    const product::Section& s = plan.sections[static_cast<std::size_t>(m.section)];
+    concrete = s.concrete, steel = s.steel;
+    Json bars = Json::array();
+    for (const product::Bar& b : s.bars) bars.push_back({{"y", b.y}, {"z", b.z}, {"diameter", b.diameter}});
+    j["section"] = {{"name", s.name},          {"width", s.width}, {"height", s.height},
+                    {"bars", std::move(bars)}, {"cover", s.cover}, {"steel_area", s.steel_area()},
+                    {"ties", Json(nullptr)}};
+    if (s.tie_diameter > 0)
+      j["section"]["ties"] = {
+          {"diameter", s.tie_diameter}, {"spacing", s.tie_spacing}, {"legs_y", s.tie_legs_y}, {"legs_z", s.tie_legs_z}};
+  }
+  if (m.panel >= 0) {
+    const product::Panel& p = plan.panels[static_cast<std::size_t>(m.panel)];
+    concrete = p.concrete, steel = p.steel;
+    if (p.concrete < 0) masonry = &p;
+    j["panel"] = {{"name", p.name},           {"thickness", p.thickness}, {"as_top", p.as_top},
+                  {"as_bottom", p.as_bottom}, {"cover", p.cover},         {"openings", m.openings.size()}};
+  }
+  if (m.shaft >= 0) {
+    const product::Shaft& s = plan.shafts[static_cast<std::size_t>(m.shaft)];
+    concrete = s.concrete, steel = s.steel;
+    j["shaft"] = {{"diameter_foot", s.diameter_foot},
+                  {"diameter_top", s.diameter_top},
+                  {"thickness_foot", s.thickness_foot},
+                  {"thickness_top", s.thickness_top},
+                  {"as_outer", s.as_outer},
+                  {"as_inner", s.as_inner},
+                  {"bar_diameter", s.bar_diameter},
+                  {"hoop_diameter", s.hoop_diameter},
+                  {"hoop_spacing", s.hoop_spacing},
+                  {"cover", s.cover}};
+  }
+  j["concrete"] = j["steel"] = j["masonry"] = nullptr;
+  if (concrete >= 0) {
+    const product::Concrete& c = plan.concretes[static_cast<std::size_t>(concrete)];
+    j["concrete"] = {{"name", c.name}, {"fc", c.fc}, {"fct", c.fct}, {"Ec", c.Ec}};
+  }
+  if (steel >= 0) {
+    const product::Steel& s = plan.steels[static_cast<std::size_t>(steel)];
+    j["steel"] = {{"name", s.name}, {"fy", s.fy}, {"fu", s.fu}};
+  }
+  if (masonry) j["masonry"] = {{"strength", masonry->strength}, {"density", masonry->density}};
+  j["cuts"] = Json::array();
+  for (const product::Weakening& w : m.weakenings)
+    j["cuts"].push_back({{"at", w.at}, {"cut_bars", w.cut_bars}, {"cut_concrete", w.cut_concrete}});
+  return j;
+}
+
 Json describe_branch(const collapse::Steering& s, const Branch& b, const std::string& plan_sha256) {
   const collapse::LiveRun& run = b.run();
   const collapse::LiveModel& live = run.model();

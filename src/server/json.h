@@ -33,6 +33,8 @@ Json describe_branch(const collapse::Steering&, const collapse::Branch&, const s
 /// branch's own record may begin later.
 Json describe_scene(const record::Record& own, const record::Record& before, std::size_t bodies,
                     const std::vector<Pose>& others);
+/// A member as the plan has it, with what edits have cut: section or build-up, reinforcement, materials. SI.
+Json describe_member(const product::Plan&, const product::Member&);
 /// Moment families of a zone's law.
 Json describe_law(const mbs::ZoneLaw&);
 

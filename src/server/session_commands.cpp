@@ -36,15 +36,13 @@ bool has(const Json& command, const char* key) {
 
 std::vector<std::string> command_words() {
   std::vector<std::string> words = collapse::edit_words();
-  for (const char* w : {"run",          "pause",          "step",          "speed",
-                        "rewind",       "live",           "undo",          "branch",
-                        "rename",       "switch",         "compare",       "scene",
-                        "frames",       "findings",       "series",        "zone",
-                        "log",          "plan.apply",     "plan.save",     "plan.text",
-                        "plan.check",   "plan.import",    "ping",          "session.list",
-                        "session.open", "session.attach", "session.close", "session.continue",
-                        "study.start",  "study.list",     "study.watch",   "study.unwatch",
-                        "study.cancel", "study.play"})
+  for (const char* w :
+       {"run",          "pause",        "step",           "speed",         "rewind",           "live",
+        "undo",         "branch",       "rename",         "switch",        "compare",          "scene",
+        "frames",       "findings",     "series",         "zone",          "member",           "log",
+        "plan.apply",   "plan.save",    "plan.text",      "plan.check",    "plan.import",      "ping",
+        "session.list", "session.open", "session.attach", "session.close", "session.continue", "study.start",
+        "study.list",   "study.watch",  "study.unwatch",  "study.cancel",  "study.play"})
     words.emplace_back(w);
   return words;
 }
@@ -102,6 +100,14 @@ std::optional<Json> Session::perform(const Task& task) {
     return std::nullopt;
   }
   if (word == "zone") return watch_zone(client, command);
+  if (word == "member") {
+    check_keys(command, {"member"});
+    const product::Plan& plan = branch_of(command).run().model().plan();
+    const int index = plan.find_member(read_text(command, "member"));
+    // joints and pieces between members are none
+    return Json{
+        {"member", index < 0 ? Json(nullptr) : describe_member(plan, plan.members[static_cast<std::size_t>(index)])}};
+  }
   if (word == "findings") {
     check_keys(command, {});
     answer_from_records(task, {branch_of(command).id},

@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <set>
 #include <thread>
 
 #include "../collapse/plans.h"
@@ -483,6 +484,31 @@ TEST_F(ServerTest, TellsAZonesPath) {
     points += e["points"].size();
   }
   EXPECT_EQ(c->code("zone", {{"zone", "none"}}), "E920");
+}
+
+TEST_F(ServerTest, TellsAMembersReinforcement) {
+  start(one_stage("0.4 s"));
+  const auto c = watcher();
+  const product::Plan plan = collapse::read(one_stage("0.4 s"));
+  std::set<std::string> kinds;
+  for (const product::Member& m : plan.members) {
+    const TestJson told = c->result("member", {{"member", m.name}})["member"];
+    ASSERT_EQ(told["name"], m.name);
+    kinds.insert(told["kind"].get<std::string>());
+    if (m.section < 0) continue;
+    const product::Section& s = plan.sections[static_cast<std::size_t>(m.section)];
+    EXPECT_EQ(told["section"]["width"], s.width);
+    EXPECT_EQ(told["section"]["bars"].size(), s.bars.size());
+    EXPECT_EQ(told["section"]["bars"][0]["diameter"], s.bars[0].diameter);
+    EXPECT_EQ(told["section"]["cover"], s.cover);
+    EXPECT_EQ(told["steel"]["fy"], plan.steels[static_cast<std::size_t>(s.steel)].fy);
+  }
+  EXPECT_TRUE(kinds.contains("column") && kinds.contains("beam"));
+  EXPECT_TRUE(c->result("member", {{"member", "N-A1-0"}})["member"].is_null());
+  EXPECT_EQ(c->code("member", {}), "E912");
+  // edits belong to the branch
+  c->result("add_pre_cut", {{"member", "C-B1-0"}, {"at", 0}, {"cut_bars", 0.5}, {"cut_concrete", 0}});
+  EXPECT_EQ(c->result("member", {{"member", "C-B1-0"}})["member"]["cuts"][0]["cut_bars"], 0.5);
 }
 
 TEST_F(ServerTest, AZonesPathWaitsForWhoComesBack) {

@@ -5,6 +5,7 @@ import { openStatuses } from "./findings";
 import { Inspector } from "./inspector";
 import { axis, cssColour, namePlot, niceRange } from "./plots";
 import { StatusSign, StatusWord } from "./signs";
+import { MemberFacts } from "./steer_member";
 import type { SteerState } from "./steer_state";
 import type { LawFamily, ZoneWatch } from "./steer_wire";
 import { endingWord, zoneStates } from "./vocabulary";
@@ -258,6 +259,7 @@ export function Side(props: { s: SteerState }) {
       {!nobody && <h2 class="visually-hidden">Member</h2>}
       {!nobody && <ZoneButtons s={s} />}
       {s.zone.value !== null && <ZonePlot s={s} zone={s.zone.value} />}
+      {!nobody && <MemberFacts s={s} />}
       {!nobody && <Inspector state={view.state} />}
       {!nobody && <Verdict s={s} />}
     </aside>

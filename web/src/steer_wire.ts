@@ -100,6 +100,33 @@ export interface ImportedPlan {
   guessed: string[];
   missing: string[];
 }
+export interface MemberSection {
+  name: string;
+  width: number;
+  height: number;
+  bars: { y: number; z: number; diameter: number }[];
+  cover: number;
+  steel_area: number;
+  ties: { diameter: number; spacing: number; legs_y: number; legs_z: number } | null;
+}
+/// A member as the branch's plan has it.
+export interface PlanMember {
+  name: string;
+  kind: string;
+  storey: number;
+  length: number;
+  removed: boolean;
+  section?: MemberSection;
+  panel?: { name: string; thickness: number; as_top: number; as_bottom: number; cover: number; openings: number };
+  shaft?: {
+    diameter_foot: number; diameter_top: number; thickness_foot: number; thickness_top: number;
+    as_outer: number; as_inner: number; bar_diameter: number; hoop_diameter: number; hoop_spacing: number; cover: number;
+  };
+  concrete: { name: string; fc: number; fct: number; Ec: number } | null;
+  steel: { name: string; fy: number; fu: number } | null;
+  masonry: { strength: number; density: number } | null;
+  cuts: { at: number; cut_bars: number; cut_concrete: number }[];
+}
 export interface StateEvent {
   phase: Phase;
   branch: number;

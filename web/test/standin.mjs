@@ -498,6 +498,20 @@ export class Standin {
         return { count };
       }
       case "findings": return { ...s.findings(b()), ...this.judged };
+      case "member": {
+        const [, name] = /^([CB]-[^/]*)$/.exec(m.member) ?? [];
+        if (name === undefined) return { member: null };
+        const at = [-0.2, 0, 0.2];
+        const bars = at.flatMap((y) => at.map((z) => ({ y, z, diameter: 0.032 }))).filter((b) => b.y !== 0 || b.z !== 0);
+        return {
+          member: {
+            name, kind: name.startsWith("C") ? "column" : "beam", storey: 0, length: 3, removed: false,
+            section: { name: "ground-column", width: 0.5, height: 0.5, bars, cover: 0.02, steel_area: 0.0064, ties: { diameter: 0.01, spacing: 0.2, legs_y: 2, legs_z: 2 } },
+            concrete: { name: "C25", fc: 25e6, fct: 2e6, Ec: 25e9 }, steel: { name: "old", fy: 420e6, fu: 500e6 }, masonry: null,
+            cuts: b().edits.filter((e) => e.kind === "add_pre_cut").map(() => ({ at: 0.5, cut_bars: 0.5, cut_concrete: 0 })),
+          },
+        };
+      }
       case "zone":
         s.zone = m.zone;
         // the path so far comes as the first event

@@ -165,6 +165,11 @@ describe("steering page", () => {
     assert.ok(found, `no click met a member; in the middle stands ${await page.evaluate(([x, y]) => document.elementFromPoint(x, y)?.outerHTML.slice(0, 120), [box.x + box.width / 2, box.y + box.height / 2])}`);
     await page.fill("[data-test=member-search]", "C-D1-0");
     assert.equal(await d.text("member-name"), "C-D1-0");
+    // what it is made of
+    await d.until("member-facts", "Column C-D1-0");
+    const facts = await page.locator("[data-test=member-facts]").first().innerText();
+    for (const words of ["ground-column, 50.0 × 50.0 cm", "8 × ⌀ 32 mm, 64.0 cm² (2.6 %)", "⌀ 10.0 mm every 20.0 cm", "20.0 mm to the ties", "C25", "420"]) assert.ok(facts.includes(words), `${words} is not in ${facts}`);
+    assert.equal(await page.locator("[data-test=member-facts]").first().locator("circle").count(), 8);
     await page.locator("[data-test=watch-zone]").first().click();
     await page.waitForSelector("[data-test=zone-plot] canvas");
     await d.until("zone-plot", "elastic");
