@@ -110,7 +110,7 @@ class Reader {
     read_materials();
     for (const StepEntity* r : file_.of_type("IFCRELAGGREGATES"))
       for (const StepValue& part : r->at(5).items) whole_of_[part.id()] = r->at(4).id();
-    for (const StepEntity* r : file_.of_type("IFCRELVOIDSELEMENT")) opened_.insert(r->at(4).id());
+    for (const StepEntity* r : file_.of_type("IFCRELVOIDSELEMENT")) opened_[r->at(4).id()].push_back(get(r->at(5)));
     std::vector<Body> bodies;
     for (const auto& [id, e] : file_.entities) {
       if (element_types().count(e.type) == 0) continue;
@@ -127,6 +127,7 @@ class Reader {
     count_others();
     find_angle(bodies);
     for (size_t i = 0; i < bodies.size(); ++i) find_box(bodies[i], out_.elements[i]);
+    for (IfcElement& e : out_.elements) find_openings(e);
     read_bars();
     return std::move(out_);
   }
@@ -685,6 +686,24 @@ class Reader {
       e.has_box = true;
     }
   }
+  /// Boxes of what is taken out of a wall. Cut, round and turned ones are not read.
+  void find_openings(IfcElement& wall) const {
+    if (wall.type != "IFCWALL" || !wall.has_opening) return;
+    for (const StepEntity* opening : opened_.at(wall.id)) {
+      IfcElement e;
+      e.type = "IFCOPENINGELEMENT";
+      if (opening != nullptr) {
+        const Body body = find_body(*opening);
+        e.is_round = body.is_round;
+        find_box(body, e);
+      }
+      if (e.has_box && !e.is_round && !e.is_cut && !e.is_whole) {
+        wall.openings.emplace_back(e.low, e.high);
+      } else {
+        ++wall.openings_not_read;
+      }
+    }
+  }
   /// Whether a wall or a slab is as thick as its box.
   bool lies_flat(const Body& body, const IfcElement& e) const {
     Vec3 across;
@@ -941,7 +960,7 @@ class Reader {
   double angle_unit_ = 1;  // of parameters of circles [rad]
   std::map<int, std::string> material_;
   std::map<int, int> type_of_, whole_of_;
-  std::set<int> opened_;
+  std::map<int, std::vector<const StepEntity*>> opened_;  // openings of elements
 };
 
 }  // namespace

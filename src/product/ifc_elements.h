@@ -3,6 +3,7 @@
 
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/linalg.h"
@@ -23,10 +24,12 @@ struct IfcElement {
   bool is_whole = false;  // what cuts it is not read
   bool is_round = false;
   bool has_opening = false;
+  int openings_not_read = 0;  // of a wall: those whose body is no upright box
   std::string why;
   Vec3 low, high;  // box [m]
   // of upright slabs, outline and holes of each of its parts; none: its box [m]
   std::vector<std::vector<std::vector<Vec3>>> outlines;
+  std::vector<std::pair<Vec3, Vec3>> openings;  // of a wall: lowest and highest corners of their boxes [m]
 };
 
 struct IfcBar {

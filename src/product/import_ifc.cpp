@@ -496,8 +496,135 @@ class Planner {
     const int placed = settle(walls_, claims, "walls", "thicker");
     if (placed > 0) {
       taken(fmt::format("{} walls in {} thicknesses", placed, walls_.size()));
-      missing("openings of walls: they are not read");
+      place_openings(claims);
     }
+  }
+
+  /// Half of what a column takes of a wall's length, and what lies on the wall, as the plan has them; 0: nothing.
+  double half_column(int s, const std::string& place, bool along_x) const {
+    for (const Group& g : columns_)
+      if (holds(g, s, place)) return 0.5 * (along_x ? g.width : g.height);
+    return 0;
+  }
+  double depth_above(int s, int row, int frame, bool along_x) const {
+    double depth = 0;
+    const auto look = [&](const std::vector<Group>& groups, const std::string& place, bool is_slab) {
+      for (const Group& g : groups)
+        if (holds(g, s, place)) depth = std::max(depth, is_slab ? g.width : g.height);
+    };
+    look(beams_, point(row, frame) + (along_x ? point(row + 1, frame) : point(row, frame + 1)), false);
+    for (const int side : {-1, 0}) {
+      const int r = row + (along_x ? 0 : side), f = frame + (along_x ? side : 0);
+      if (r >= 0 && f >= 0) look(slabs_, point(r, f) + point(r + 1, f + 1), true);
+    }
+    return depth;
+  }
+  static bool holds(const Group& g, int s, const std::string& place) {
+    const auto list = g.places.find(s);
+    return list != g.places.end() && std::find(list->second.begin(), list->second.end(), place) != list->second.end();
+  }
+
+  struct Hole {
+    double left, sill, right, top;  // from the grid point and the floor [m]
+  };
+
+  /// Openings of walls as each edge of the grid and storey has its part of them, within columns and below what lies on
+  /// the wall.
+  void place_openings(const Claims& claims) {
+    std::map<const IfcElement*, std::set<size_t>> used;
+    int clipped = 0, placed = 0;
+    const auto take = [&](const std::pair<int, std::string>& where, const Claim& claim) {
+      const IfcElement& e = *claim.element;
+      if (e.openings.empty()) return;
+      const int s = where.first;
+      const bool along_x = e.high.x - e.low.x >= e.high.y - e.low.y;
+      const int axis = along_x ? 0 : 1;
+      const std::vector<double>&lines = along_x ? rows_ : frames_, &across = along_x ? frames_ : rows_;
+      const size_t line = static_cast<size_t>(nearest(across, 0.5 * (e.low[1 - axis] + e.high[1 - axis])));
+      for (size_t i = 0; i + 1 < lines.size(); ++i) {
+        const int a = static_cast<int>(i), l = static_cast<int>(line);
+        const std::string from = along_x ? point(a, l) : point(l, a), to = along_x ? point(a + 1, l) : point(l, a + 1);
+        if (from + to != where.second) continue;
+        constexpr double slack = 1e-3;  // a plan has millimetres
+        const double length = lines[i + 1] - lines[i], first = half_column(s, from, along_x) + slack,
+                     last = length - half_column(s, to, along_x) - slack,
+                     room = storey_height(s) - depth_above(s, along_x ? a : l, along_x ? l : a, along_x) - slack;
+        std::vector<Hole>& holes = holes_[where];
+        for (size_t k = 0; k < e.openings.size(); ++k) {
+          const auto& [low, high] = e.openings[k];
+          const double thickness = e.high[1 - axis] - e.low[1 - axis];
+          const double through = std::min(high[1 - axis], e.high[1 - axis]) - std::max(low[1 - axis], e.low[1 - axis]);
+          const double floor = levels_[static_cast<size_t>(s)];
+          const Hole whole{low[axis] - lines[i], low.z - floor, high[axis] - lines[i], high.z - floor};
+          const Hole h{std::max(whole.left, first), std::max(whole.sill, 0.0), std::min(whole.right, last),
+                       std::min(whole.top, room)};
+          constexpr double least = 0.05;  // [m]
+          if (through < 0.9 * thickness || h.right - h.left < least || h.top - h.sill < least) continue;
+          const bool overlaps = std::any_of(holes.begin(), holes.end(), [&h](const Hole& o) {
+            return h.left < o.right && o.left < h.right && h.sill < o.top && o.sill < h.top;
+          });
+          if (overlaps || holes.size() == 100) continue;
+          const double lost =
+              std::max({h.left - whole.left, whole.right - h.right, h.sill - whole.sill, whole.top - h.top});
+          clipped += lost > 0.02;
+          holes.push_back(h);
+          used[&e].insert(k);
+          ++placed;
+        }
+        if (holes.empty()) holes_.erase(where);
+      }
+    };
+    for (const auto& [where, claim] : claims.at) take(where, claim);
+    for (const auto& [where, part] : claims.parts)
+      if (claims.at.at(where).group == part.group) take(where, part);
+    if (placed > 0) taken(fmt::format("{} openings of walls", placed));
+    if (clipped > 0)
+      guessed(fmt::format("{} openings of walls reach into columns, floors or beams: the part between them was taken",
+                          clipped));
+    std::set<const IfcElement*> seen;
+    int walls = 0;
+    constexpr int most_named = 20;
+    for (const Group& g : walls_)
+      for (const IfcElement* e : g.elements) {
+        const size_t all = e->openings.size() + static_cast<size_t>(e->openings_not_read);
+        const size_t left = all - used[e].size();
+        if (left == 0 || !seen.insert(e).second || ++walls > most_named) continue;
+        missing(fmt::format("wall {}: {} of its {} openings {} left out",
+                            clean_text(e->name.empty() ? fmt::format("#{}", e->id) : e->name), left, all,
+                            left == 1 ? "is" : "are"));
+      }
+    if (walls > most_named) missing(fmt::format("openings of {} more walls are left out", walls - most_named));
+  }
+
+  /// A rule for all places with the same openings: a plan holds a thousand.
+  void write_openings() {
+    std::map<std::pair<std::string, std::string>, std::map<int, std::vector<std::string>>> places;
+    for (const auto& [where, holes] : holes_)
+      for (const Group& g : walls_) {
+        if (!holds(g, where.first, where.second)) continue;
+        std::string list;
+        for (const Hole& h : holes)
+          list += fmt::format("  {{ left = {}, sill = {}, width = {}, height = {} }},\n", metres(h.left),
+                              metres(h.sill), metres(h.right - h.left), metres(h.top - h.sill));
+        places[{name_of("wall", g, true), list}][where.first].push_back(where.second);
+      }
+    constexpr size_t most = 900;
+    size_t rules = 0;
+    for (const auto& [what, by_storey] : places) {
+      std::map<std::vector<std::string>, std::vector<int>> alike;
+      for (const auto& [s, list] : by_storey) alike[list].push_back(s);
+      for (const auto& [list, in] : alike) {
+        if (++rules > most) continue;
+        text_ += fmt::format("[[walls]]\npanel = \"{}\"\nstoreys = [{}]\nat = [\"{}\"]\nopening = [\n{}]\n", what.first,
+                             fmt::join(in, ", "), fmt::join(list, "\", \""), what.second);
+      }
+    }
+    if (rules > most)
+      missing(fmt::format("openings of walls: {} kinds of them, {} more than a plan holds", rules, rules - most));
+  }
+  std::string name_of(const char* kind, const Group& g, bool panel) {
+    return panel ? fmt::format("{}_{:.0f}_{}", kind, 1000 * g.width, keys_.of(g.concrete))
+                 : fmt::format("{}_{:.0f}x{:.0f}_{}", kind, 1000 * g.width, 1000 * g.height, keys_.of(g.concrete));
   }
 
   void count_rest() {
@@ -676,10 +803,6 @@ class Planner {
   void write() {
     text_.clear();
     std::string rules;
-    const auto name_of = [this](const char* kind, const Group& g, bool panel) {
-      return panel ? fmt::format("{}_{:.0f}_{}", kind, 1000 * g.width, keys_.of(g.concrete))
-                   : fmt::format("{}_{:.0f}x{:.0f}_{}", kind, 1000 * g.width, 1000 * g.height, keys_.of(g.concrete));
-    };
     std::string sections;
     for (const Group& g : columns_) write_section(name_of("column", g, false), g, true);
     for (const Group& g : beams_) write_section(name_of("beam", g, false), g, false);
@@ -706,6 +829,7 @@ class Planner {
     for (const Group& g : beams_) write_list(g.places, "beams", "section", name_of("beam", g, false));
     for (const Group& g : slabs_) write_list(g.places, "slabs", "panel", name_of("slab", g, true));
     for (const Group& g : walls_) write_list(g.places, "walls", "panel", name_of("wall", g, true));
+    write_openings();
     rules.swap(text_);
 
     std::string title = clean_text(b_.name);
@@ -741,7 +865,8 @@ class Planner {
   std::vector<Group> columns_, beams_, slabs_, walls_;
   std::map<std::string, std::vector<const IfcElement*>> fit_;
   std::map<std::string, int> left_out_;
-  std::map<std::string, std::string> concretes_;  // names by their keys
+  std::map<std::pair<int, std::string>, std::vector<Hole>> holes_;  // of walls, by storey and edge
+  std::map<std::string, std::string> concretes_;                    // names by their keys
   Keys keys_;
 };
 

@@ -185,6 +185,54 @@ TEST(ImportIfcClip, TellsOpeningsOfSlabsAndLowWalls) {
   EXPECT_THAT(import("IFC4", w).report.missing, Contains("openings of 1 slabs: they are not read"));
 }
 
+TEST(ImportIfcClip, TakesOpeningsOfWallsBayByBay) {
+  Writer w;
+  w.metres();
+  for (int s = 0; s < 2; ++s)
+    for (const double x : {0.0, 6.0, 12.0})
+      for (const double y : {0.0, 5.0})
+        w.element("IFCCOLUMN", w.placement("$", x, y, 3 * s),
+                  w.shape("SweptSolid", w.extrusion(w.rectangle(0.4, 0.4), 3)));
+  // over two bays and two storeys
+  const std::string wall =
+      w.element("IFCWALL", w.placement("$", 6, 0, 0), w.shape("SweptSolid", w.extrusion(w.rectangle(12, 0.24), 6)));
+  const auto cut = [&](const std::string& wall_id, double x, double z, const std::string& profile, double height) {
+    const std::string hole =
+        w.element("IFCOPENINGELEMENT", w.placement("$", x, 0, z), w.shape("SweptSolid", w.extrusion(profile, height)));
+    w.add("IFCRELVOIDSELEMENT('g',$,$,$," + wall_id + "," + hole + ")");
+  };
+  cut(wall, 2, 1, w.rectangle(1, 0.5), 1.2);      // a window
+  cut(wall, 6, 0, w.rectangle(3, 0.24), 2.1);     // a gate on both sides of a column
+  cut(wall, 10, 2, w.rectangle(0.8, 0.3), 2.5);   // through the floor between the storeys
+  cut(wall, 9, 0.5, w.rectangle(0.5, 0.1), 0.5);  // a niche
+  cut(wall, 2.2, 1.1, w.rectangle(1, 0.5), 0.5);  // within the window
+  cut(wall, 4, 4, w.add("IFCCIRCLEPROFILEDEF(.AREA.,$,$,0.3)"), 1);
+  // one above the other
+  for (const double z : {0.0, 3.0}) {
+    const std::string rear =
+        w.element("IFCWALL", w.placement("$", 3, 5, z), w.shape("SweptSolid", w.extrusion(w.rectangle(6, 0.24), 3)));
+    const std::string hole = w.element("IFCOPENINGELEMENT", w.placement("$", 3, 5, z + 1),
+                                       w.shape("SweptSolid", w.extrusion(w.rectangle(1, 0.24), 1)));
+    w.add("IFCRELVOIDSELEMENT('g',$,$,$," + rear + "," + hole + ")");
+  }
+  const Import made = import("IFC4", w);
+  const auto expect = [&](const std::string& at, const std::string& storeys, const std::string& list) {
+    EXPECT_THAT(made.text, HasSubstr("storeys = [" + storeys + "]\nat = [" + at + "]\nopening = [\n" + list + "]\n"));
+  };
+  expect("\"A1B1\"", "0",
+         "  { left = \"1.500 m\", sill = \"1.000 m\", width = \"1.000 m\", height = \"1.200 m\" },\n"
+         "  { left = \"4.500 m\", sill = \"0.000 m\", width = \"1.299 m\", height = \"2.100 m\" },\n");
+  expect("\"B1C1\"", "0",
+         "  { left = \"0.201 m\", sill = \"0.000 m\", width = \"1.299 m\", height = \"2.100 m\" },\n"
+         "  { left = \"3.600 m\", sill = \"2.000 m\", width = \"0.800 m\", height = \"0.999 m\" },\n");
+  expect("\"B1C1\"", "1", "  { left = \"3.600 m\", sill = \"0.000 m\", width = \"0.800 m\", height = \"1.500 m\" },\n");
+  expect("\"A2B2\"", "0, 1",
+         "  { left = \"2.500 m\", sill = \"1.000 m\", width = \"1.000 m\", height = \"1.000 m\" },\n");
+  EXPECT_THAT(made.report.taken, Contains("7 openings of walls"));
+  EXPECT_THAT(made.report.missing, Contains("wall IFCWALL: 3 of its 6 openings are left out"));
+  EXPECT_THAT(made.report.guessed, Contains(HasSubstr("4 openings of walls reach into columns")));
+}
+
 TEST(ImportIfc, RefusesSchemasByTheirWholeNames) {
   Writer w;
   w.metres();

@@ -114,6 +114,8 @@ std::string make_building(const std::string& schema, double unit, double angle) 
   }
   const int wall = f.element("IFCWALLSTANDARDCASE", f.placement(10, 22, 0), f.shape(0.24, 3.6, 3), "$");
   f.material("Ziegelmauerwerk", {wall});
+  const int window = f.element("IFCOPENINGELEMENT", f.placement(10, 22, 1), f.shape(0.4, 1.2, 1.4), "$");
+  f.add("IFCRELVOIDSELEMENT('g',$,$,$," + f.ref(wall) + "," + f.ref(window) + ")");
   f.material("Concrete, C20/25", concrete);
   f.element("IFCFOOTING", f.placement(10, 20, -0.5), f.shape(1, 1, 0.5), "$,.PAD_FOOTING.");
   f.element("IFCSTAIR", f.placement(12, 22, 0), f.shape(1, 1, 3), "$,.NOTDEFINED.");
@@ -203,6 +205,12 @@ TEST(ImportedPlan, IsRefusedGapByGapAndReadsOnceTheyAreFilled) {
     beams += m.kind == MemberKind::Beam;
     slabs += m.kind == MemberKind::Slab;
     walls += m.kind == MemberKind::Wall;
+    if (m.kind != MemberKind::Wall) continue;
+    ASSERT_EQ(m.openings.size(), 1u);
+    EXPECT_NEAR(m.openings[0].left, 1.4, 1e-9);
+    EXPECT_NEAR(m.openings[0].sill, 1, 1e-9);
+    EXPECT_NEAR(m.openings[0].width, 1.2, 1e-9);
+    EXPECT_NEAR(m.openings[0].height, 1.4, 1e-9);
   }
   EXPECT_EQ(columns, 12);
   EXPECT_EQ(beams, 6);
