@@ -37,7 +37,7 @@ std::string words_of_percent(double percent) {
   return percent >= 9.95 ? fmt::format("{:.0f}", percent) : fmt::format("{:.2g}", percent);
 }
 
-void print_outcomes(std::FILE* out, const StudyResult& r) {
+void print_outcomes(std::FILE* out, const Problem& p, const StudyResult& r) {
   if (r.alpha.classes.size() < 2 && (r.outcomes.empty() || r.outcomes[0].empty())) return;
   std::fprintf(out,
                "\nOutcomes                    possibility   necessity\n                               at least     at "
@@ -51,6 +51,11 @@ void print_outcomes(std::FILE* out, const StudyResult& r) {
                  study::words_of_most(uncertainty::calc_necessity(r.possibilities, c.outcome), 5).c_str(),
                  may_be_less ? "*" : " ", c.count);
     has_open = has_open || is_open || may_be_less;
+  }
+  for (const std::string& name : study::list_unmet_outcomes(p, r)) {
+    has_open = true;
+    std::fprintf(out, "  %-26s %11.5f* %9.5f  %6d   not met in %zu runs\n", name.c_str(), 0.0, 0.0, 0,
+                 static_cast<std::size_t>(r.alpha.archive.size()));
   }
   if (has_open && r.is_finished)
     print_line(out, "* no search has ended there: a possibility may be higher, a necessity lower");
@@ -223,7 +228,7 @@ void print_study(std::FILE* out, const Problem& p, const StudyResult& r) {
   const std::vector<study::Sentence> sentences = study::tell(p, r);
   if (!sentences.empty()) std::fprintf(out, "\n");
   for (const study::Sentence& s : sentences) print_line(out, s.text);
-  print_outcomes(out, r);
+  print_outcomes(out, p, r);
   print_outputs(out, p, r);
   print_drivers(out, p, r);
   print_boxes(out, p, r);

@@ -244,6 +244,13 @@ std::string name_of_outcome(const StudyResult& r, int outcome) {
   return i < r.outcomes.size() ? r.outcomes[i] : fmt::format("{}", outcome);
 }
 
+std::vector<std::string> list_unmet_outcomes(const Problem& p, const StudyResult& r) {
+  std::vector<std::string> unmet;
+  for (const std::string& name : p.outcomes)
+    if (std::find(r.outcomes.begin(), r.outcomes.end(), name) == r.outcomes.end()) unmet.push_back(name);
+  return unmet;
+}
+
 std::string words_of_outcome(const StudyResult& r, int outcome) {
   const std::string name = name_of_outcome(r, outcome);
   return name.empty() ? "(no name)" : name;
@@ -332,6 +339,7 @@ json make_results_json(const Problem& p, const StudyResult& r) {
     o["outputs"] = outputs_json(p, r.outputs, c.outputs);
     out["outcomes"].push_back(o);
   }
+  out["not_met"] = list_unmet_outcomes(p, r);
   out["coverage"] = json::array();
   for (const auto& c : r.alpha.coverage)
     out["coverage"].push_back({{"alpha", c.alpha}, {"samples", c.samples}, {"spread", c.space_points}});

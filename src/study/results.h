@@ -16,6 +16,8 @@ inline constexpr const char* failed_name = "failed";
 std::string name_of_outcome(const StudyResult&, int outcome);
 /// The same for readers: "(no name)" where a model gives none.
 std::string words_of_outcome(const StudyResult&, int outcome);
+/// Classes that the problem knows beforehand and no run has had.
+std::vector<std::string> list_unmet_outcomes(const Problem&, const StudyResult&);
 
 /// Everything but the samples, in the units of the file that was read; outputs in those of Problem::outputs.
 nlohmann::ordered_json make_results_json(const Problem&, const StudyResult&);

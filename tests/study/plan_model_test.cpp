@@ -7,6 +7,7 @@
 
 #include "small_fuzzy_plan.h"
 #include "study/permissible.h"
+#include "study/results.h"
 #include "uncertainty/alpha.h"
 
 namespace topple::study {
@@ -61,6 +62,16 @@ TEST(PlanModel, IsAnotherModelForAnotherPlanOrAnotherQuestion) {
   PlanMappingOptions threads = quick();
   threads.threads = 7;
   EXPECT_EQ(calc_model_hash(a), calc_model_hash(make_plan_problem(read_small(strengths), threads)));
+}
+
+TEST(PlanModel, NamesClassesThatNoRunHasHad) {
+  const Problem problem = make_plan_problem(read_small(strengths), quick());
+  StudyResult r;
+  r.outcomes = {"early", "topple"};
+  const std::vector<std::string> unmet = list_unmet_outcomes(problem, r);
+  EXPECT_EQ(unmet.size(), plan_outcomes().size() - 2);
+  EXPECT_THAT(unmet, testing::IsSupersetOf({"vertical", "partial", "stands"}));
+  EXPECT_TRUE(list_unmet_outcomes(Problem{}, r).empty()) << "a program says no classes beforehand";
 }
 
 TEST(PlanModel, ComesBackFromItsDefinition) {

@@ -1006,6 +1006,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["exceeded", "überschritten"],
   ["not reached", "nicht erreicht"],
   ["not run", "nicht gerechnet"],
+  ["not met in {:d} runs", "in {} Rechnungen nicht vorgekommen"],
   ["Confirmed: whole runs in the cut come within {:g} % of the output's width of the bound. Exceeded: one lies farther out, the bound is too narrow. Not reached: none comes so far, the bound may be too wide. Not run: the limit of {:d} whole runs left it out.", "Bestätigt: Ganze Rechnungen im Schnitt kommen bis auf {} % der Breite der Ergebnisgröße an die Grenze heran. Überschritten: Eine liegt weiter außen, die Grenze ist zu eng. Nicht erreicht: Keine kommt so weit, die Grenze kann zu weit sein. Nicht gerechnet: Wegen der Höchstzahl von {} ganzen Rechnungen fehlt sie."],
   ["most possible run", "möglichste Rechnung"],
   ["whole", "ganz"],

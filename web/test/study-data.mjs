@@ -55,6 +55,7 @@ export function makeStudy(count = 60) {
       { name: "topple", is_failure: false, runs: count - 15, possibility: 1, necessity: 0.53, sample: 0, outputs: partOf(12, 19) },
       { name: "vertical", is_failure: false, runs: 14, possibility: 0.47, necessity: 0, sample: 3, outputs: partOf(-5, -3) },
     ],
+    not_met: ["partial", "stands"],
     coverage: alphas.map((alpha) => ({ alpha, samples: 30, spread: 10 })), failures: [`1 x ${hostile}`],
     notable: [{ sample: 3, why: "most possible run with the outcome vertical (0.47)" }, { sample: count - 1, why: "failed" }],
     drivers: {
@@ -123,7 +124,7 @@ export function makePlainStudy() {
   const study = makeStudy(20);
   const count = study.run_table.sample.length;
   return {
-    ...study, asked: "", failed: 0, outcomes: [{ ...study.outcomes[1], name: "", runs: count, possibility: 1, necessity: 1 }], failures: [], notable: [], known: [], boxes: null,
+    ...study, not_met: [], asked: "", failed: 0, outcomes: [{ ...study.outcomes[1], name: "", runs: count, possibility: 1, necessity: 1 }], failures: [], notable: [], known: [], boxes: null,
     drivers: { ...study.drivers, outcomes: [] }, curves: [], fans: [], debris: [], site: { footprint: [], neighbours: [] }, not_modelled: [],
     run_table: { ...study.run_table, outcome: study.run_table.outcome.map(() => 0), failure: {}, points: 0, trajectories: "" },
   };

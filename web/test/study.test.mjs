@@ -80,7 +80,9 @@ describe("the page of a study", () => {
     assert.equal(await page.textContent("[data-test=verdict]"), prettify(data.verdict[0].text));
     for (const s of data.verdict.slice(1)) assert.ok((await page.textContent(".sentences")).includes(prettify(s.text)), s.id);
     const rows = await page.$$eval(".outcomes tbody tr", (list) => list.map((e) => e.textContent));
-    assert.equal(rows.length, data.outcomes.length);
+    const unmet = data.not_met ?? [];
+    assert.equal(rows.length, data.outcomes.length + unmet.length);
+    unmet.forEach((name, i) => assert.equal(rows[data.outcomes.length + i], `${name}not met in ${data.runs} runs≥ 0*00`));
     data.outcomes.forEach((o, i) => {
       assert.ok(rows[i].includes(o.name) && rows[i].includes(String(o.runs)), o.name);
       assert.ok(rows[i].includes(o.possibility >= 1 ? "1" : "≥"), o.name);

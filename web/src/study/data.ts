@@ -108,6 +108,7 @@ export interface Study {
   random?: Randomness; // of a study of statistics
   outputs: Output[];
   outcomes: Outcome[];
+  not_met?: string[]; // classes that the model knows and no run has had; not known of old studies
   coverage: { alpha: number; samples: number; spread: number }[];
   failures: string[];
   notable: { sample: number; why: string }[];

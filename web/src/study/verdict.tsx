@@ -53,6 +53,7 @@ export function OutcomeName(props: { study: Study; index: number }) {
 export function Outcomes(props: { state: State }) {
   const { study } = props.state;
   if (study.outcomes.length === 0) return null;
+  const unmet = study.not_met ?? [];
   const wide = (part: number): string => `${(100 * Math.min(1, Math.max(0, part))).toFixed(1)}%`;
   return (
     <section class="panel" aria-label="Outcomes">
@@ -85,9 +86,18 @@ export function Outcomes(props: { state: State }) {
               <td>{o.runs}</td>
             </tr>
           ))}
+          {unmet.map((name) => (
+            <tr class="quiet" data-unmet={name}>
+              <th scope="row">{name}</th>
+              <td>{`not met in ${study.runs} runs`}</td>
+              <td>{`${atLeast(0, 3)}*`}</td>
+              <td>{atMost(0, 3)}</td>
+              <td>0</td>
+            </tr>
+          ))}
         </tbody>
       </table>
-      {study.outcomes.some((o) => o.converged === false || o.necessity_converged === false) &&
+      {(unmet.length > 0 || study.outcomes.some((o) => o.converged === false || o.necessity_converged === false)) &&
         <p class="quiet">* No search has ended there: a possibility may be higher, a necessity lower.</p>}
       <p class="quiet plot-note">
         Possibility is the highest degree at which inputs were found that lead to the outcome; it can only be higher. Necessity is what is left
