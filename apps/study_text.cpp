@@ -157,8 +157,8 @@ void print_boxes(std::FILE* out, const Problem& p, const StudyResult& r) {
   if (!r.insights.has_boxes) return;
   const uncertainty::DesignResult& d = r.insights.boxes;
   print_heading(out, "Permissible values");
-  print_line(out, fmt::format("asked: {}; kept by {:.1f} % of the support ({:.1f} % standard error)", p.permissible,
-                              100 * d.fraction, 100 * d.fraction_error));
+  print_line(out, fmt::format("asked: {}; kept by {:.1f} % of the support ({:.1f} % standard error, of {} spread runs)",
+                              p.permissible, 100 * d.fraction, 100 * d.fraction_error, d.spread));
   if (d.boxes.empty()) print_line(out, "no box was found");
   for (std::size_t k = 0; k < d.boxes.size(); ++k) {
     const uncertainty::PermissibleBox& b = d.boxes[k];

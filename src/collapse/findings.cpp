@@ -148,6 +148,28 @@ void add_mechanism(const Context& c, const Mechanism& m) {
         "rad", status);
 }
 
+/// Whether an upper block that moves at frame `last` has, since `begin` [s], not yet lost half of the speed that it had
+/// gained: so far it may fall as well as sway. Speeds are those of its mass centre from frame to frame.
+bool gains_speed(const Context& c, double begin, size_t last) {
+  for (size_t s = 0; s < c.map.structures.size(); ++s) {
+    const std::vector<BlockFrame>& block = c.recorder.block_frames(s);
+    if (block[last].fastest < c.k.rest_speed) continue;
+    double highest = 0;
+    bool has_slowed = false;
+    for (size_t f = 1; f <= last; ++f) {
+      const double dt = block[f].time - block[f - 1].time;
+      if (block[f].time <= begin + 1e-9 || !(dt > 0)) continue;
+      const double speed = norm(block[f].displacement - block[f - 1].displacement) / dt;
+      if (speed > highest)
+        highest = speed, has_slowed = false;
+      else if (speed <= 0.5 * highest)
+        has_slowed = true;
+    }
+    if (!has_slowed) return true;
+  }
+  return false;
+}
+
 /// Whether the building stood until each next stage, as far as frames tell.
 struct Standing {
   bool fell = false;
@@ -230,6 +252,13 @@ Standing add_stability(const Context& c) {
       if (last.time < begin || calc_away(last, c.k) + way / c.k.stands_displacement >= 1) {
         leave_open(fmt::format("the last frame before \"{}\" ({:.3f} s) is of {:.3f} s; a higher frame_rate keeps more",
                                next, end, last.time));
+        continue;
+      }
+      if (gains_speed(c, begin, i)) {
+        leave_open(
+            fmt::format("when \"{}\" begins the upper block has moved by {:.1f} cm, its fastest part moves at "
+                        "{:.3f} m/s, and it has not slowed down since the stage before: it may sway or fall",
+                        next, 100 * norm(last.displacement), last.fastest));
         continue;
       }
     }
@@ -552,6 +581,8 @@ void add_rigid_block(const Context& c) {
   bool rests = true;
   for (const BlockFrame& f : c.recorder.block_frames())
     rests &= f.time > block.release || norm(f.displacement) < c.k.stands_displacement;
+  if (stages.size() > 1)
+    rests &= !gains_speed(c, stages[stages.size() - 2].last, find_frame(c.recorder.block_frames(), block.release));
   if (!rests) {
     c.add("rigid_block", "Mechanism", "Beside a rigid block",
           "No comparison: the upper block was in motion before the last stage fired.", kNone, "rad");

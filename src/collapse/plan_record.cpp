@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "base/hash.h"
@@ -78,14 +79,26 @@ void fill_plan_values(const product::Plan& plan, const ModelMap& map, record::Re
                     s.height / unit::cm, s.steel_area() / unit::cm2, s.tie_diameter / unit::mm,
                     s.tie_spacing / unit::cm));
   for (const product::Stage& s : plan.stages) {
-    std::string members;
-    for (const product::Charge& c : s.charges)
-      members += (members.empty() ? "" : ", ") + plan.members[static_cast<size_t>(c.member)].name +
-                 (c.opening > 0 ? fmt::format(" ({:.3g} deg at azimuth {:.3g} deg, {:.2f} m up)", c.opening / unit::deg,
-                                              c.azimuth / unit::deg, c.position)
-                                : "") +
-                 (c.fails ? " (fails)" : "");
-    add("Blasting", fmt::format("{} at {:g} s", s.name, s.time), members);
+    // charges that are alike and fire together in one row
+    std::vector<std::pair<std::pair<double, std::string>, std::string>> rows;
+    for (const product::Charge& c : s.charges) {
+      const product::Member& m = plan.members[static_cast<size_t>(c.member)];
+      std::string what;
+      if (m.kind == product::MemberKind::Shaft)
+        what = fmt::format("mouth of {:.4g} deg at azimuth {:.4g} deg, ", c.opening / unit::deg, c.azimuth / unit::deg);
+      what += fmt::format("{:.2f} m destroyed around {:.2f} m, {:.3g} % of the bars left.", c.destroyed_length,
+                          c.position, 100 * c.residual_bars);
+      if (c.transition_damage > 0) what += fmt::format(" Damage beside it: {:.3g} %.", 100 * c.transition_damage);
+      if (c.fails) what += " It fails.";
+      const std::pair<double, std::string> key{s.time + c.delay, what};
+      const auto alike = std::find_if(rows.begin(), rows.end(), [&](const auto& row) { return row.first == key; });
+      if (alike == rows.end())
+        rows.emplace_back(key, m.name);
+      else
+        alike->second += ", " + m.name;
+    }
+    for (const auto& [key, names] : rows)
+      add("Blasting", fmt::format("{} at {:g} s", s.name, key.first), names + ": " + key.second);
   }
   for (const product::Cable& c : plan.cables)
     add("Blasting", "Cable " + c.name,

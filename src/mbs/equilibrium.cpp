@@ -845,7 +845,7 @@ std::string DeadLoad::describe_failure(bool has_diverged) const {
   if (has_diverged) {
     message += "grew without bound";
   } else {
-    std::snprintf(words, sizeof words, "is %.2g of the weight", unbalanced_);
+    std::snprintf(words, sizeof words, "is %.2g times the weight", unbalanced_);
     message = message + words + ", of body \"" + s_.model.bodies[most_unbalanced_].name.substr(0, 60) + "\"";
   }
   if (most_load_ > 0) {

@@ -55,7 +55,7 @@ void each_cell(const RingInput& in, Concrete concrete, Bars bars) {
   const std::vector<Circle> circles = circles_of(in);
   constexpr int rings = 4;
   for (const RingSector& s : sectors_of(in)) {
-    const int n = std::max(1, static_cast<int>(std::ceil(s.angle() / finest)));
+    const int n = std::max(1, static_cast<int>(std::ceil(s.angle() / finest - 1e-6)));
     const double step = s.angle() / n, chord = 2 * std::sin(0.5 * step) / step;
     for (int i = 0; i < n; ++i) {
       const double angle = s.from + (i + 0.5) * step, c = std::cos(angle), d = std::sin(angle);

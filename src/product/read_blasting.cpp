@@ -195,7 +195,8 @@ void read_stages(Reading& reading, TableReader& root) {
     for (size_t k = 0; k < charges.size() && !reading.complaints.is_full(); ++k) {
       TableReader charge(*charges[k], "charge[" + std::to_string(k) + "]", reading.complaints);
       const ChargeTable values = read_charge(charge);
-      firings.push_back({i, values.charge.delay, values.place});
+      const Entry* delay = charges[k]->find("delay");
+      firings.push_back({i, values.charge.delay, delay != nullptr ? delay->value.place : values.place});
       if (reading.has_grid && blasting.count() <= most_charges) blasting.spread(charge, values, stage);
     }
     table.finish();

@@ -1,7 +1,9 @@
 #include "product/support.h"
 
+#include <cmath>
 #include <map>
 #include <set>
+#include <sstream>
 #include <tuple>
 
 namespace topple::product {
@@ -107,6 +109,28 @@ std::string names_of(const std::vector<std::string>& names) {
   return text;
 }
 
+/// Slabs span along y. Where each of them does so the long way, the plan may be meant the other way round.
+void check_spans(const Plan& plan, const std::vector<Draft>& drafts, Complaints& complaints) {
+  constexpr double kLongWay = 1.5;
+  Gathering long_way;
+  for (const Draft& draft : drafts) {
+    const Member& m = draft.member;
+    if (m.kind != MemberKind::Slab) continue;
+    const auto gap = [](const std::vector<double>& offsets, int a, int b) {
+      return std::abs(offsets[static_cast<size_t>(b)] - offsets[static_cast<size_t>(a)]);
+    };
+    const double along = gap(plan.frame_offsets, m.frame_a, m.frame_b),
+                 across = gap(plan.row_offsets, m.row_a, m.row_b);
+    if (!(along > kLongWay * across)) return;
+    std::ostringstream words;
+    words << "spans along y, " << along << " m between beams along x, though its beams along y are " << across
+          << " m apart";
+    long_way.add(draft, words.str(), "slabs bear along y; exchange rows and frames if they bear the other way");
+  }
+  for (const auto& [key, group] : long_way.groups())
+    complaints.warn("W512", group.place, names_of(group.names) + ": " + std::get<2>(key), group.help);
+}
+
 }  // namespace
 
 void check_support(const Plan& plan, const std::vector<Draft>& drafts, Complaints& complaints) {
@@ -172,6 +196,7 @@ void check_support(const Plan& plan, const std::vector<Draft>& drafts, Complaint
     complaints.warn("W502", group.place, names_of(group.names) + ": " + std::get<2>(key), group.help);
   for (const auto& [key, group] : idle.groups())
     complaints.warn("W511", group.place, names_of(group.names) + ": " + std::get<2>(key), group.help);
+  check_spans(plan, drafts, complaints);
 }
 
 }  // namespace topple::product

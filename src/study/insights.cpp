@@ -199,8 +199,13 @@ json to_json(const Insights& in) {
   if (!in.has_boxes) return j;
   const uncertainty::DesignResult& d = in.boxes;
   json& boxes = j["boxes"];
-  boxes = {{"permissible", d.permissible}, {"forbidden", d.forbidden},           {"failed", d.failed},
-           {"fraction", d.fraction},       {"fraction_error", d.fraction_error}, {"ending", static_cast<int>(d.ending)},
+  boxes = {{"permissible", d.permissible},
+           {"forbidden", d.forbidden},
+           {"failed", d.failed},
+           {"fraction", d.fraction},
+           {"fraction_error", d.fraction_error},
+           {"spread", d.spread},
+           {"ending", static_cast<int>(d.ending)},
            {"list", json::array()}};
   for (const uncertainty::PermissibleBox& b : d.boxes) {
     json inputs = json::array();
@@ -241,6 +246,7 @@ void read_json(Insights& out, const json& j) {
   d.failed = boxes.at("failed");
   d.fraction = boxes.at("fraction");
   d.fraction_error = boxes.at("fraction_error");
+  d.spread = boxes.value("spread", 0);
   d.ending = static_cast<uncertainty::Ending>(boxes.at("ending").get<int>());
   for (const json& one : boxes.at("list")) {
     uncertainty::PermissibleBox b;

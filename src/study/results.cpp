@@ -119,6 +119,7 @@ json insights_json(const Problem& p, const StudyResult& r) {
   boxes = {{"requirement", p.permissible},
            {"permissible_part", d.fraction},
            {"permissible_part_error", d.fraction_error},
+           {"permissible_part_points", d.spread},
            {"permissible_runs", d.permissible},
            {"forbidden_runs", d.forbidden},
            {"failed_runs", d.failed},

@@ -141,8 +141,10 @@ class Design {
       good += is_good(i);
     }
     if (done > 0) {
-      const double p = result_.fraction = static_cast<double>(good) / done;
-      result_.fraction_error = std::sqrt(p * (1 - p) / done);
+      result_.fraction = static_cast<double>(good) / done;
+      result_.spread = done;
+      const double p = (good + 1.0) / (done + 2);  // four of four are no certainty
+      result_.fraction_error = std::sqrt(p * (1 - p) / (done + 2));
     }
   }
 

@@ -55,7 +55,9 @@ struct DesignResult {
   std::vector<PermissibleBox> boxes;               // ranked, those not kept behind
   int permissible = 0, forbidden = 0, failed = 0;  // samples
   double fraction = 0;                             // permissible part of the support, from the spread points
-  double fraction_error = 0;                       // its standard error for independent points; spread points do better
+  int spread = 0;                                  // how many those are
+  double fraction_error =
+      0;  // its standard error for independent points, one kept and one not counted besides (Laplace)
   Grouping permissible_groups, forbidden_groups;
   std::vector<int> permissible_samples, forbidden_samples;  // that were grouped, as samples of the archive
   Ending ending = Ending::Complete;

@@ -142,7 +142,7 @@ TEST(Run, TellsTheValuesOfAPlanWithAShaft) {
   EXPECT_EQ(value("Rows"), "none");
   EXPECT_EQ(value("Storeys"), "none");
   EXPECT_THAT(value("Shaft chimney"), testing::StartsWith("60.00 m high, outer diameter 5.00 m at the foot"));
-  EXPECT_THAT(value("Mouth at 0.5 s"), testing::HasSubstr(" deg at azimuth 180 deg, 2.50 m up)"));
+  EXPECT_THAT(value("Mouth at 0.5 s"), testing::HasSubstr(" deg at azimuth 180 deg, "));
   EXPECT_EQ(value("Vibration of Main"), "10 mm/s");
   EXPECT_EQ(value("Mechanism"), "topple");
 }

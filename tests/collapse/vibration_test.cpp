@@ -416,6 +416,15 @@ TEST(StabilityRunPhysics, APauseThatIsNotSeenIsNotJudged) {
   EXPECT_THAT(judge(r, staged("C-A*-0", "5 ms", "")).text, HasSubstr("found: not judged"));
 }
 
+// 0.12 s of free fall are 7 cm and 1.2 m/s: in its place still, and falling.
+TEST(StabilityRunPhysics, AFallThatHasJustBegunIsNotTakenForStanding) {
+  record::Record r;
+  EXPECT_THAT(judge(r, staged("C-*-0", "0.12 s", "")).text, HasSubstr("found: not judged"));
+  const record::Finding& pause = finding(r, "stability.stage_1");
+  EXPECT_TRUE(is_not_judged(pause)) << pause.text;
+  EXPECT_THAT(pause.text, HasSubstr("it may sway or fall"));
+}
+
 TEST(StabilityRunPhysics, ARunThatEndsInAPauseTellsAFallOnly) {
   const auto judge_until = [](const std::string& row, double until) {
     product::Plan plan = read(staged(row, "0.9 s", ""));

@@ -306,6 +306,10 @@ TEST(Design, EverythingPermissibleIsOneBox) {
   ASSERT_EQ(f.design.boxes.size(), 1u) << "the same box of all groups is kept once";
   EXPECT_EQ(f.design.boxes[0].volume, 1);
   EXPECT_TRUE(f.design.boxes[0].kept);
+  EXPECT_EQ(f.design.fraction, 1);
+  const double n = f.design.spread;
+  EXPECT_GT(n, 0);
+  EXPECT_NEAR(f.design.fraction_error, std::sqrt(n + 1) / std::pow(n + 2, 1.5), 1e-12) << "never certain";
 }
 
 // What breaks a constraint takes nothing away, also where runs were made there: every possible point keeps the

@@ -87,7 +87,7 @@ export function Boxes(props: { state: State }) {
       <h2>Permissible values</h2>
       <p>
         Asked: <strong>{boxes.requirement}</strong>
-        {`. It holds on ${formatNumber(100 * boxes.permissible_part, 3)} % of the support (± ${formatNumber(100 * boxes.permissible_part_error, 2)} %).`}
+        {`. It holds on ${formatNumber(100 * boxes.permissible_part, 3)} % of the support (± ${formatNumber(100 * boxes.permissible_part_error, 2)} %, of ${boxes.permissible_part_points} spread runs).`}
       </p>
       {boxes.list.length === 0 && <p class="quiet">No box of inputs was found that keeps it.</p>}
       {boxes.list.map((box, n) => (
