@@ -206,11 +206,14 @@ Standing add_stability(const Context& c) {
         text += fmt::format("{} {} {:.2f}", m > 0 ? "," : "", margins[m].member, margins[m].margin);
       text += fmt::format(" of {} members.", margins.size());
     }
-    bool is_still = true;
+    bool is_still = true, may_fall = false;
     if (settled && is_standing) {
       is_still = block[i].fastest < c.k.rest_speed;
-      text +=
-          is_still ? " It stands still." : fmt::format(" It still sways (still: below {:.2f} m/s).", c.k.rest_speed);
+      may_fall = !is_still && gains_speed(c, begin, i);
+      text += is_still   ? " It stands still."
+              : may_fall ? " It has not slowed down since the stage before, so that it may sway or fall: not judged."
+                         : fmt::format(" It still sways (still: below {:.2f} m/s).", c.k.rest_speed);
+      out.is_open |= may_fall;
       size_t worst = i;  // of the frames of the pause
       for (size_t f = i; f-- > 0 && zones[f].time >= begin - 1e-9;)
         if (zones[f].utilisation > zones[worst].utilisation) worst = f;
@@ -219,6 +222,7 @@ Standing add_stability(const Context& c) {
                             1 / zones[worst].utilisation, zones[worst].time);
     }
     const Status status = !is_standing                                 ? Status::Bad
+                          : may_fall                                   ? Status::NotJudged
                           : z.yielded > 0 || z.broken > 0 || !is_still ? Status::Warning
                                                                        : Status::Good;
     c.add(id, "Stability", title, text, margin, "1", status);
@@ -252,13 +256,6 @@ Standing add_stability(const Context& c) {
       if (last.time < begin || calc_away(last, c.k) + way / c.k.stands_displacement >= 1) {
         leave_open(fmt::format("the last frame before \"{}\" ({:.3f} s) is of {:.3f} s; a higher frame_rate keeps more",
                                next, end, last.time));
-        continue;
-      }
-      if (gains_speed(c, begin, i)) {
-        leave_open(
-            fmt::format("when \"{}\" begins the upper block has moved by {:.1f} cm, its fastest part moves at "
-                        "{:.3f} m/s, and it has not slowed down since the stage before: it may sway or fall",
-                        next, 100 * norm(last.displacement), last.fastest));
         continue;
       }
     }

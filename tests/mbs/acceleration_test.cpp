@@ -123,7 +123,7 @@ TEST(DeadLoad, SaysWhatIsLeftWhereThereIsNone) {
   EXPECT_NE(message.find("the largest unbalanced force"), std::string::npos) << message;
   EXPECT_NE(message.find("element \"column 0\" would be loaded to 160 % of its capacity"), std::string::npos)
       << message;
-  EXPECT_NE(message.find("of the weight, of body \"floor 0\";"), std::string::npos) << message;
+  EXPECT_NE(message.find("times the weight, of body \"floor 0\";"), std::string::npos) << message;
 }
 
 }  // namespace

@@ -149,7 +149,7 @@ describe("the German table", () => {
 
   it("says in German why runs failed", () => {
     for (const [english, expected] of [
-      ["There is no equilibrium under dead load before the first charge: no dead-load equilibrium after 200 iterations: the largest unbalanced force is 0.12 of the weight, of body \"C-A1-0\"; without limits element \"C-A1-0/foot\" would be loaded to 130 % of its capacity.",
+      ["There is no equilibrium under dead load before the first charge: no dead-load equilibrium after 200 iterations: the largest unbalanced force is 0.12 times the weight, of body \"C-A1-0\"; without limits element \"C-A1-0/foot\" would be loaded to 130 % of its capacity.",
         "Vor der ersten Ladung gibt es kein Gleichgewicht unter Eigengewicht: kein Gleichgewicht nach 200 Iterationen: Die größte nicht ausgeglichene Kraft ist das 0,12-Fache des Gewichts, an Körper „C-A1-0“; ohne Grenzen wäre Element „C-A1-0/foot“ zu 130 % seines Widerstands belastet."],
       ["The computation failed at 0.512 s: diverged at 0.512000 s: the pose of body \"node A1, storey 1\" is no longer finite.",
         "Die Rechnung ist bei 0,512 s gescheitert: divergiert bei 0,512000 s: die Lage von Körper „node A1, storey 1“ besteht nicht mehr aus endlichen Zahlen."],
