@@ -334,13 +334,16 @@ TEST(HangingMembers, ColumnOnABeamIsAWarning) {
             "W502 line 8: B-A1A2-0, B-A2A3-0: ends at A2 on other beams, with no column below\n");
 }
 
+/// "line: message" of each complaint with this code.
+std::vector<std::string> said_with(const std::string& code, const std::string& text) {
+  std::vector<std::string> said;
+  for (const Diagnostic& d : complaints_about(text))
+    if (d.code == code) said.push_back(std::to_string(d.where.line) + ": " + d.message);
+  return said;
+}
+
 TEST(LongSpans, AreWarnedOfWhereAllSlabsHaveThem) {
-  const auto said = [](const std::string& text) {
-    std::vector<std::string> out;
-    for (const Diagnostic& d : complaints_about(text))
-      if (d.code == "W512") out.push_back(std::to_string(d.where.line) + ": " + d.message);
-    return out;
-  };
+  const auto said = [](const std::string& text) { return said_with("W512", text); };
   const std::string plan = small_plan();
   EXPECT_THAT(said(plan), testing::IsEmpty());
   const std::string wide = replaced(plan, "2 = \"4 m\", 3 = \"8 m\"", "2 = \"8 m\", 3 = \"16 m\"");
@@ -353,12 +356,7 @@ TEST(LongSpans, AreWarnedOfWhereAllSlabsHaveThem) {
 
 TEST(IdleWalls, AreWarnedOf) {
   // walls along x take shear from the beam that lies on them
-  const auto idle = [](const std::string& text) {
-    std::vector<std::string> said;
-    for (const Diagnostic& d : complaints_about(text))
-      if (d.code == "W511") said.push_back(std::to_string(d.where.line) + ": " + d.message);
-    return said;
-  };
+  const auto idle = [](const std::string& text) { return said_with("W511", text); };
   const std::string plan = small_plan(), along_x = replaced(plan, "at = \"A1A2\"\nstoreys", "at = \"A2B2\"\nstoreys");
   EXPECT_THAT(idle(plan), testing::IsEmpty());
   EXPECT_THAT(idle(along_x), testing::IsEmpty());

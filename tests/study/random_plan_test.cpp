@@ -10,6 +10,7 @@
 #include "study/plan_model.h"
 #include "study/randomness.h"
 #include "uncertainty/randomness.h"
+#include "wrong_inputs.h"
 
 namespace topple::study {
 namespace {
@@ -20,19 +21,6 @@ double value_of(const Answer& a, const std::string& name) {
   ADD_FAILURE() << name << " is not among the outputs: " << a.text;
   return std::nan("");
 }
-
-/// The complaint with these words, else the first one.
-Diagnostic find(const InputError& e, const std::string& words) {
-  for (const Diagnostic& d : e.diagnostics())
-    if ((d.message + d.help).find(words) != std::string::npos) return d;
-  return e.first_error();
-}
-
-struct Wrong {
-  const char *from, *to;
-  int line, column;
-  const char *code, *words;
-};
 
 const std::string random_strengths = R"toml([fuzzy]
 stage.1.charge.1.destroyed_length = { triangular = ["1 m", "1.2 m", "2 m"] }

@@ -14,6 +14,7 @@
 #include "study/inputs_file.h"
 #include "study/results.h"
 #include "uncertainty/randomness.h"
+#include "wrong_inputs.h"
 
 namespace topple::study {
 namespace {
@@ -324,19 +325,6 @@ TEST(RandomInputs, RefuseAModelWithoutTheOutputs) {
   EXPECT_NE(a.text.find("no output \\\"y\\\""), std::string::npos) << a.text;
   EXPECT_NE(a.text.find("reach, tilt"), std::string::npos) << a.text;
 }
-
-/// The complaint with these words, else the first one.
-Diagnostic find(const InputError& e, const std::string& words) {
-  for (const Diagnostic& d : e.diagnostics())
-    if ((d.message + d.help).find(words) != std::string::npos) return d;
-  return e.first_error();
-}
-
-struct Wrong {
-  const char *from, *to;
-  int line, column;
-  const char *code, *words;
-};
 
 TEST(RandomInputs, PointAtEveryMistake) {
   const std::string text =
