@@ -9,6 +9,17 @@
 namespace topple::apps {
 namespace {
 
+std::string print(const study::Problem& p, const study::StudyResult& r) {
+  char* text = nullptr;
+  std::size_t size = 0;
+  std::FILE* out = open_memstream(&text, &size);
+  print_study(out, p, r);
+  std::fclose(out);
+  std::string said(text, size);
+  std::free(text);
+  return said;
+}
+
 TEST(StudyText, ShowsBoundsOfARunningStudyInTheUnitsOfItsResults) {
   study::Problem p;
   p.outputs = {{"lean", "deg", 0.0174532925199433}, {"share", "", 1}};
@@ -42,13 +53,7 @@ TEST(StudyText, WritesWholePercentagesAndOutcomesWithoutAName) {
   r.insights.boxes.boxes[1].volume = 0.0123;
   r.insights.source = study::Insights::Source::Spread;
   r.insights.drivers.outcomes = {{0, 0.5, {{0.9, 0.9, 0.01, 0.01}}}, {1, 0.5, {{0.9, 0.9, 0.01, 0.01}}}};
-  char* text = nullptr;
-  std::size_t size = 0;
-  std::FILE* out = open_memstream(&text, &size);
-  print_study(out, p, r);
-  std::fclose(out);
-  const std::string said(text, size);
-  std::free(text);
+  const std::string said = print(p, r);
   EXPECT_NE(said.find("box 1, 100 % of the support"), std::string::npos) << said;
   EXPECT_NE(said.find("box 2, 1.2 % of the support"), std::string::npos) << said;
   EXPECT_NE(said.find("outcome (no name): a 0.90"), std::string::npos) << said;
@@ -96,13 +101,7 @@ TEST(StudyText, RoundsDegreesSoThatTheyStayTrue) {
     found.outcome = k, found.possibility = c.possibility, found.converged = true;
     r.possibilities.classes.push_back(found);
   }
-  char* text = nullptr;
-  std::size_t size = 0;
-  std::FILE* out = open_memstream(&text, &size);
-  print_study(out, p, r);
-  std::fclose(out);
-  const std::string said(text, size);
-  std::free(text);
+  const std::string said = print(p, r);
   EXPECT_NE(said.find("0.12345 "), std::string::npos) << said << "at least";
   EXPECT_NE(said.find("0.87655 "), std::string::npos) << said << "at most";
 }
