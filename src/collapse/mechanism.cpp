@@ -48,6 +48,45 @@ double calc_reach(const Polygon& outline, const Vec3& direction) {
 }
 
 }  // namespace
+/// Last way from side to side of a block that sways, by its mass centre in plan [m]: of four turning points or more
+/// since the last charge the last two are no farther to either side than those before. Else none.
+std::optional<double> find_last_swing(const MechanismInput& in) {
+  constexpr double least = 0.2;  // way between turning points, of the way in all
+  const auto begin =
+      std::find_if(in.frames.begin(), in.frames.end(), [&in](const BlockFrame& f) { return f.time >= in.last_charge; });
+  if (begin == in.frames.end()) return {};
+  Vec3 axis;
+  for (auto f = begin; f != in.frames.end(); ++f) {
+    const Vec3 way{f->displacement.x - begin->displacement.x, f->displacement.y - begin->displacement.y, 0};
+    if (!(norm(way) <= norm(axis))) axis = way;
+  }
+  const double length = norm(axis);
+  if (!(length > 0) || !std::isfinite(length)) return {};
+  std::vector<double> along;
+  for (auto f = begin; f != in.frames.end(); ++f) along.push_back(dot(f->displacement, axis) / length);
+  const auto [low, high] = std::minmax_element(along.begin(), along.end());
+  const double enough = least * (*high - *low);
+  std::vector<double> turns;
+  double side = 0, extreme = along.front();  // side: +1 while it goes up, -1 down, 0 not known
+  for (const double u : along) {
+    if (side == 0 && std::abs(u - along.front()) >= enough) side = u > along.front() ? 1 : -1;
+    if (side == 0) continue;
+    if (side * (u - extreme) > 0) {
+      extreme = u;
+    } else if (side * (extreme - u) >= enough) {
+      turns.push_back(extreme);
+      extreme = u, side = -side;
+    }
+  }
+  const size_t n = turns.size();
+  if (n < 4) return {};
+  const auto [from, to] = std::minmax_element(turns.begin(), turns.end() - 2);
+  const double swing = std::abs(turns[n - 1] - turns[n - 2]), room = 0.01 * (*to - *from);
+  for (const double turn : {turns[n - 2], turns[n - 1]})
+    if (turn < *from - room || turn > *to + room) return {};
+  return swing;
+}
+
 
 double calc_away(const BlockFrame& block, const Knowledge& k) {
   const Vec3& u = block.displacement;
@@ -105,10 +144,17 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
   const bool has_left = !(calc_away(last, k) < 1) && last.connected >= k.mechanism_coherent_share;
   const bool has_sunk = has_left && !(sunk < k.stands_displacement);
   if (out.moved < k.mechanism_stands_share && !has_left) {
+  bool sways_less = false;
     out.name = "stands";
     out.text = fmt::format("The building stands: {:.1f} % of its mass came down.", 100 * out.moved);
   } else if (out.moved < k.mechanism_stands_share && !in.came_to_rest) {
     out.name = "partial";
+    if (const auto swing = in.came_to_rest ? std::nullopt : find_last_swing(in)) {
+      sways_less = true;
+      out.text += fmt::format(
+          " It sways on, less than it did: its upper block went {:.1f} cm from side to side in the last swing.",
+          100 * *swing);
+    }
     out.may_swing_back = !has_sunk;
     out.text =
         has_sunk ? fmt::format("It has begun to sink: the upper block has come down by {:.2f} m.", sunk)
@@ -154,7 +200,8 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
     out.text += fmt::format(
         " At its foot the rear edge has come down {:.0f} % as far as the front edge: it turns about its foot.",
         100 * out.foot_share);
-  out.is_final = in.came_to_rest || (touched && out.moved >= k.mechanism_partial_share && height_left <= 0.5);
+  out.is_final =
+      in.came_to_rest || sways_less || (touched && out.moved >= k.mechanism_partial_share && height_left <= 0.5);
   out.is_azimuth_of_lean = out.name == "topple" || out.name == "wrong direction";
   const Vec3& way = out.is_azimuth_of_lean ? direction : out.run;
   const bool has_way = out.is_azimuth_of_lean || norm(out.run) >= kLeastRun;

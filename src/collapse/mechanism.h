@@ -31,6 +31,7 @@ struct BlockFrame {
 
 struct MechanismInput {
   std::vector<BlockFrame> frames;
+  double last_charge = 0;         // [s]
   double touchdown = 0;           // first touchdown of an upper body; NaN if there was none [s]
   Vec3 fall_direction{-1, 0, 0};  // planned, or expected
   bool is_direction_planned = false;
@@ -55,7 +56,7 @@ struct Mechanism {
   double azimuth = 0;
   bool is_azimuth_of_lean = false;
   Vec3 run;  // of the mass centre until the end, horizontal [m]
-  // at rest, or so far down that what is still to come does not change the name
+  // at rest, or so far down that what is still to come does not change the name, or swaying less than it did
   bool is_final = false;
   bool may_swing_back = false;  // it only leans, and still moves
 };

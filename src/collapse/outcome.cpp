@@ -36,6 +36,7 @@ Mechanism judge_run(const product::Plan& plan, const mbs::Model& model, const Mo
   std::vector<double> mass(S, 0);
   std::vector<Vec3> centre(S);
   std::vector<std::vector<Point2>> corners(S);
+  for (const StageTimes& t : find_stage_times(map)) in.last_charge = std::max(in.last_charge, t.last);
   std::vector<double> foot(S, std::numeric_limits<double>::infinity());
   for (size_t b = 0; b < model.bodies.size(); ++b) {
     if (!map.bodies[b].is_upper) continue;

@@ -97,6 +97,38 @@ TEST(Mechanism, WhatSwaysStandsInWhicheverPartOfItsSwing) {
   }
 }
 
+/// Mass centre of a shaft that swings about `lean` with e^(-decay t) cos(2 π t / 4 s), from the charge at 1 s to `end`.
+MechanismInput swinging(double lean, double decay, double end) {
+  MechanismInput in = swaying(0, 0);
+  in.last_charge = 1;
+  const BlockFrame start = in.frames.front();
+  in.frames.clear();
+  for (double t = 0; t <= end; t += 0.05) {
+    BlockFrame f = start;
+    f.time = t;
+    if (t > 1)
+      f.displacement.x = lean * (t - 1) - 0.1 * (1 - std::exp(-decay * (t - 1)) * std::cos(std::acos(0.0) * (t - 1)));
+    in.frames.push_back(f);
+  }
+  return in;
+}
+
+TEST(Mechanism, WhatSwaysLessAndLessStands) {
+  const auto is_final = [](const MechanismInput& in) {
+    const Mechanism m = judge_mechanism(in, default_knowledge());
+    EXPECT_EQ(m.name, "stands");
+    return m.is_final;
+  };
+  EXPECT_TRUE(is_final(swinging(0, 0.05, 12)));
+  EXPECT_TRUE(is_final(swinging(0, 0, 12)));
+  EXPECT_FALSE(is_final(swinging(0, 0.05, 5)));         // not yet turned often enough
+  EXPECT_FALSE(is_final(swinging(0, -0.05, 10)));       // more and more
+  EXPECT_FALSE(is_final(swinging(-0.02, 0.05, 10.5)));  // leans farther from swing to swing
+  // the last turning points are at 7 and 9 s: 0.1 (e^(-0.3) + e^(-0.4)) m
+  EXPECT_THAT(judge_mechanism(swinging(0, 0.05, 10.5), default_knowledge()).text,
+              testing::EndsWith("its upper block went 14.1 cm from side to side in the last swing."));
+}
+
 TEST(Mechanism, WhatLeansIsNotSaidToSink) {
   const Mechanism leans = judge_mechanism(swaying(0.44, 0.033), default_knowledge());
   EXPECT_EQ(leans.name, "partial");

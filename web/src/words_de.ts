@@ -23,6 +23,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["{*}, it leans by {:.1f} deg, its mass centre has come down by {:.2f} m, and its rear edge {:.0f} % as far as its front edge. {} {:.0f} % of the mass has come down", "{}, neigt er sich um {} deg, sein Schwerpunkt ist um {} m gefallen und seine hintere Kante um {} % so weit wie seine vordere. {} sind {} % der Masse heruntergekommen"],
   ["At its foot the rear edge has come down {:.0f} % as far as the front edge: it turns about its foot.", "An seinem Fuß ist die hintere Kante um {} % so weit heruntergekommen wie die vordere: Er dreht sich um seinen Fuß."],
   ["The building stands: {:.1f} % of its mass came down.", "Das Gebäude bleibt stehen: {} % seiner Masse kamen herunter."],
+  ["It sways on, less than it did: its upper block went {:.1f} cm from side to side in the last swing.", "Es schwankt weiter, weniger als zuvor: Sein oberer Block ging im letzten Schwung {} cm von Seite zu Seite."],
   ["It has begun to sink: the upper block has come down by {:.2f} m.", "Es hat begonnen zu sinken: Der obere Block ist um {} m heruntergekommen."],
   ["It leans: the mass centre of the upper block has moved to a side by {:.2f} m.", "Es neigt sich: Der Schwerpunkt des oberen Blocks hat sich um {} m zur Seite bewegt."],
   ["Aborted collapse: the upper block has sunk by {:.2f} m and stands, leaning by {:.1f} deg, its mass centre at {:.0f} % of its height.", "Steckengebliebener Einsturz: Der obere Block ist um {} m abgesackt und steht, um {} deg geneigt, sein Schwerpunkt auf {} % der Höhe."],
