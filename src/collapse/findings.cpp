@@ -148,6 +148,27 @@ void add_mechanism(const Context& c, const Mechanism& m) {
         "rad", status);
 }
 
+/// What it might have been called instead.
+void add_near_verdicts(const Context& c, const Mechanism& m) {
+  std::string text;
+  for (const NearVerdict& near : find_near_verdicts(c.plan, c.model, c.map, c.k, c.recorder, c.summary)) {
+    if (!text.empty()) text += " ";
+    if (near.later != 0) {
+      text += near.later > 0 ? fmt::format("Judged {:.2f} s later it would be \"{}\".", near.later, near.as.name)
+                             : fmt::format("Judged {:.2f} s earlier it would be \"{}\".", -near.later, near.as.name);
+      text += fmt::format(
+          " The largest connected part then holds {:.0f} % of the upper mass instead of {:.0f} %, it leans by {:.1f} "
+          "deg, and its rear edge has come down {:.0f} % as far as its front edge.",
+          100 * near.as.connected, 100 * m.connected, near.as.tilt / unit::deg, 100 * near.as.rear_share);
+    } else {
+      text += fmt::format("With {:g} times the bound of {} it would be \"{}\".", near.times, near.rule, near.as.name);
+    }
+  }
+  if (text.empty()) return;
+  text += " Changes as small as a charge's scatter may decide which it is.";
+  c.add("mechanism.near", "Mechanism", "Near another verdict", text, kNone, "", Status::Warning);
+}
+
 /// Whether an upper block that moves at frame `last` has, since `begin` [s], not yet lost half of the speed that it had
 /// gained: so far it may fall as well as sway. Speeds are those of its mass centre from frame to frame.
 bool gains_speed(const Context& c, double begin, size_t last) {
@@ -842,6 +863,7 @@ bool add_findings(const product::Plan& plan, const mbs::Model& model, const Mode
   }
   const Mechanism m = judge_run(plan, model, map, k, recorder, summary, is_under_way);
   add_mechanism(c, m);
+  if (!is_under_way) add_near_verdicts(c, m);
   add_rigid_block(c);
   const Standing standing = add_stability(c);
   if (c.is_cancelled()) return false;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "base/unit.h"
 
@@ -47,7 +48,6 @@ double calc_reach(const Polygon& outline, const Vec3& direction) {
   return std::isfinite(reach) ? std::max(0.0, reach) : 0;
 }
 
-}  // namespace
 /// Last way from side to side of a block that sways, by its mass centre in plan [m]: of four turning points or more
 /// since the last charge the last two are no farther to either side than those before. Else none.
 std::optional<double> find_last_swing(const MechanismInput& in) {
@@ -87,6 +87,7 @@ std::optional<double> find_last_swing(const MechanismInput& in) {
   return swing;
 }
 
+}  // namespace
 
 double calc_away(const BlockFrame& block, const Knowledge& k) {
   const Vec3& u = block.displacement;
@@ -121,6 +122,7 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
     return front > 1e-3 ? std::max(0.0, rear) / front : 1;
   };
   out.drop = -at.displacement.z;
+  out.connected = at.connected;
   out.rear_share = share_at(0);
   out.foot_share = share_at(std::max(0.0, at.above - in.foot));
   // a slender block that turns about its foot lowers both edges alike at its mass centre
@@ -142,19 +144,19 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
   // of the largest connected part of the upper block, not of pieces that came off
   const double sunk = -last.displacement.z, aside = std::hypot(last.displacement.x, last.displacement.y);
   const bool has_left = !(calc_away(last, k) < 1) && last.connected >= k.mechanism_coherent_share;
+  bool sways_less = false;
   const bool has_sunk = has_left && !(sunk < k.stands_displacement);
   if (out.moved < k.mechanism_stands_share && !has_left) {
-  bool sways_less = false;
     out.name = "stands";
     out.text = fmt::format("The building stands: {:.1f} % of its mass came down.", 100 * out.moved);
-  } else if (out.moved < k.mechanism_stands_share && !in.came_to_rest) {
-    out.name = "partial";
     if (const auto swing = in.came_to_rest ? std::nullopt : find_last_swing(in)) {
       sways_less = true;
       out.text += fmt::format(
           " It sways on, less than it did: its upper block went {:.1f} cm from side to side in the last swing.",
           100 * *swing);
     }
+  } else if (out.moved < k.mechanism_stands_share && !in.came_to_rest) {
+    out.name = "partial";
     out.may_swing_back = !has_sunk;
     out.text =
         has_sunk ? fmt::format("It has begun to sink: the upper block has come down by {:.2f} m.", sunk)
@@ -210,6 +212,53 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
     out.text += fmt::format(" The run is under way: this is how it stands at {:.2f} s.", last.time);
   else if (out.name != "stands" && !in.came_to_rest)
     out.text += " Parts were still moving when the run ended.";
+  return out;
+}
+
+std::vector<NearVerdict> find_near_verdicts(const MechanismInput& in, const Knowledge& k) {
+  constexpr double window = 0.1;  // [s]
+  const Mechanism found = judge_mechanism(in, k);
+  std::vector<NearVerdict> out;
+  if (in.is_under_way || (!found.is_final && !std::isfinite(in.touchdown))) return out;
+  const auto add = [&](NearVerdict near) {
+    if (near.as.name == found.name) return;
+    if (std::none_of(out.begin(), out.end(), [&](const NearVerdict& n) { return n.as.name == near.as.name; }))
+      out.push_back(std::move(near));
+  };
+  if (std::isfinite(in.touchdown)) {
+    std::vector<double> ways;
+    for (const BlockFrame& f : in.frames)
+      if (std::abs(f.time - in.touchdown) <= window + 1e-9) ways.push_back(f.time - in.touchdown);
+    std::stable_sort(ways.begin(), ways.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
+    MechanismInput then = in;
+    for (const double way : ways) {
+      then.touchdown = in.touchdown + way;
+      add({judge_mechanism(then, k), way, "", 1});
+    }
+  }
+  static constexpr std::pair<const char*, double Knowledge::*> bounds[] = {
+      {"mechanism.topple_rear_share", &Knowledge::mechanism_topple_rear_share},
+      {"mechanism.topple_rotation", &Knowledge::mechanism_topple_rotation},
+      {"mechanism.coherent_share", &Knowledge::mechanism_coherent_share},
+      {"mechanism.together_share", &Knowledge::mechanism_together_share},
+      {"mechanism.fold_share", &Knowledge::mechanism_fold_share},
+      {"mechanism.direction_tolerance", &Knowledge::mechanism_direction_tolerance},
+      {"mechanism.partial_share", &Knowledge::mechanism_partial_share},
+      {"mechanism.stands_share", &Knowledge::mechanism_stands_share},
+      {"mechanism.aborted_rotation", &Knowledge::mechanism_aborted_rotation},
+      {"stands.displacement", &Knowledge::stands_displacement},
+      {"stands.drift", &Knowledge::stands_drift},
+  };
+  for (const auto& [rule, bound] : bounds) {
+    for (const double times : {0.9, 1.1}) {
+      Knowledge other = k;
+      other.*bound *= times;
+      MechanismInput then = in;
+      if (bound == &Knowledge::mechanism_direction_tolerance && then.direction_tolerance)
+        *then.direction_tolerance *= times;
+      add({judge_mechanism(then, other), 0, rule, times});
+    }
+  }
   return out;
 }
 

@@ -50,6 +50,7 @@ struct Mechanism {
   double tilt = 0;        // then, towards the direction [rad]
   double rear_share = 0;  // then, drop of the rear edge over that of the front edge
   double foot_share = 0;  // the same at the block's underside, which rotation about a foot does not bring down
+  double connected = 1;   // then, mass of the block over the mass of all upper bodies
   double drop = 0;        // then, of the block's mass centre [m]
   double moved = 0;       // at the end, share of the moving mass that has come down
   // the way the block leans then, if it topples; else the way the mass centre moved, NaN below half a metre [rad]
@@ -70,6 +71,18 @@ double calc_away(const BlockFrame&, const Knowledge&);
 
 /// Judges frames; there is at least one.
 Mechanism judge_mechanism(const MechanismInput&, const Knowledge&);
+
+/// A verdict that would have been, had little been otherwise.
+struct NearVerdict {
+  Mechanism as;
+  double later = 0;  // judged by so much later, negative: earlier; 0: by another bound [s]
+  std::string rule;  // whose bound, and how often its value
+  double times = 1;
+};
+
+/// Other verdicts near one at a touchdown or at rest, each name once: judged up to 0.1 s earlier or later, as frames
+/// tell, nearest first; else with the bound of one rule a tenth lower or higher.
+std::vector<NearVerdict> find_near_verdicts(const MechanismInput&, const Knowledge&);
 
 /// What was found of structures that stand apart, one verdict for all: "wrong direction" if one falls there, else that
 /// in which all agree, else "partial". Numbers are those of the one that falls in the wrong direction, else of the

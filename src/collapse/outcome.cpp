@@ -23,8 +23,12 @@ std::vector<StageTimes> find_stage_times(const ModelMap& map, bool all) {
   return out;
 }
 
-Mechanism judge_run(const product::Plan& plan, const mbs::Model& model, const ModelMap& map, const Knowledge& k,
-                    const Recorder& recorder, const mbs::Summary& summary, bool is_under_way) {
+namespace {
+
+/// Of each structure.
+std::vector<MechanismInput> make_mechanism_inputs(const product::Plan& plan, const mbs::Model& model,
+                                                  const ModelMap& map, const Recorder& recorder,
+                                                  const mbs::Summary& summary, bool is_under_way) {
   MechanismInput in;
   in.fall_direction = map.fall_direction;
   in.is_direction_planned = map.is_direction_planned;
@@ -32,11 +36,11 @@ Mechanism judge_run(const product::Plan& plan, const mbs::Model& model, const Mo
   in.storey_height = map.ground_storey_height;
   in.came_to_rest = summary.ending == mbs::Summary::Ending::AtRest;
   in.is_under_way = is_under_way;
+  for (const StageTimes& t : find_stage_times(map)) in.last_charge = std::max(in.last_charge, t.last);
   const size_t S = map.structures.size();
   std::vector<double> mass(S, 0);
   std::vector<Vec3> centre(S);
   std::vector<std::vector<Point2>> corners(S);
-  for (const StageTimes& t : find_stage_times(map)) in.last_charge = std::max(in.last_charge, t.last);
   std::vector<double> foot(S, std::numeric_limits<double>::infinity());
   for (size_t b = 0; b < model.bodies.size(); ++b) {
     if (!map.bodies[b].is_upper) continue;
@@ -52,9 +56,7 @@ Mechanism judge_run(const product::Plan& plan, const mbs::Model& model, const Mo
                                                       std::abs(R(2, 1)) * s.half.y - std::abs(R(2, 2)) * s.half.z);
     }
   }
-  std::vector<std::string> names;
-  std::vector<Mechanism> verdicts;
-  std::vector<double> masses;
+  std::vector<MechanismInput> out;
   for (size_t s = 0; s < S; ++s) {
     in.frames = recorder.block_frames(s);
     in.touchdown = recorder.first_touchdown(s);
@@ -62,14 +64,34 @@ Mechanism judge_run(const product::Plan& plan, const mbs::Model& model, const Mo
     for (Point2& p : corners[s]) p = {p[0] - centre[s].x, p[1] - centre[s].y};
     in.outline = calc_hull(std::move(corners[s]));
     in.foot = std::isfinite(foot[s]) ? foot[s] : 0;
-    names.push_back(map.structures[s].name);
+    out.push_back(in);
+  }
+  return out;
+}
+
+}  // namespace
+
+Mechanism judge_run(const product::Plan& plan, const mbs::Model& model, const ModelMap& map, const Knowledge& k,
+                    const Recorder& recorder, const mbs::Summary& summary, bool is_under_way) {
+  std::vector<std::string> names;
+  std::vector<Mechanism> verdicts;
+  std::vector<double> masses;
+  for (const MechanismInput& in : make_mechanism_inputs(plan, model, map, recorder, summary, is_under_way)) {
+    const StructureEntry& structure = map.structures[names.size()];
+    names.push_back(structure.name);
     verdicts.push_back(judge_mechanism(in, k));
-    masses.push_back(map.structures[s].mass);
+    masses.push_back(structure.mass);
   }
   Mechanism out = join_mechanisms(names, verdicts, masses);
   if (const double beside = recorder.block_frames().back().beside; beside >= k.mechanism_stands_share)
     out.text += fmt::format(" Of what no charge acts on {:.0f} % of the mass has come down too.", 100 * beside);
   return out;
+}
+
+std::vector<NearVerdict> find_near_verdicts(const product::Plan& plan, const mbs::Model& model, const ModelMap& map,
+                                            const Knowledge& k, const Recorder& recorder, const mbs::Summary& summary) {
+  const std::vector<MechanismInput> inputs = make_mechanism_inputs(plan, model, map, recorder, summary, false);
+  return inputs.size() == 1 ? find_near_verdicts(inputs.front(), k) : std::vector<NearVerdict>{};
 }
 
 bool stands(const BlockFrame& block, const Knowledge& k) { return calc_away(block, k) < 1; }

@@ -23,6 +23,10 @@ std::vector<StageTimes> find_stage_times(const ModelMap&, bool all = false);
 Mechanism judge_run(const product::Plan&, const mbs::Model&, const ModelMap&, const Knowledge&, const Recorder&,
                     const mbs::Summary&, bool is_under_way = false);
 
+/// What else a run that is over might have been called: see there. None where structures stand apart.
+std::vector<NearVerdict> find_near_verdicts(const product::Plan&, const mbs::Model&, const ModelMap&, const Knowledge&,
+                                            const Recorder&, const mbs::Summary&);
+
 /// Whether the upper block is where it was: calc_away.
 bool stands(const BlockFrame&, const Knowledge&);
 /// The last frame not after a time.

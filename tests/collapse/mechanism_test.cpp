@@ -97,6 +97,43 @@ TEST(Mechanism, WhatSwaysStandsInWhicheverPartOfItsSwing) {
   }
 }
 
+TEST(Mechanism, TellsWhichOtherVerdictIsNear) {
+  const Knowledge& k = default_knowledge();
+  MechanismInput in = synthetic(0.2, 0, 1);
+  EXPECT_TRUE(find_near_verdicts(in, k).empty());
+
+  // it breaks up behind its touchdown
+  BlockFrame f = in.frames[1];
+  f.time = 1.05, f.connected = 0.4, f.moved = 0.3;
+  in.frames.insert(in.frames.begin() + 2, f);
+  std::vector<NearVerdict> near = find_near_verdicts(in, k);
+  ASSERT_EQ(near.size(), 1U);
+  EXPECT_EQ(near[0].as.name, "progressive");
+  EXPECT_NEAR(near[0].later, 0.05, 1e-12);
+  EXPECT_EQ(near[0].as.connected, 0.4);
+  in.frames[2].time = 1.2;
+  EXPECT_TRUE(find_near_verdicts(in, k).empty());
+
+  // front edge: 12 sin 0.2 = 2.38 m more than the rear one, whose share is 0.47 and 0.42
+  near = find_near_verdicts(synthetic(0.2, 2.1, 1), k);
+  ASSERT_EQ(near.size(), 1U);
+  EXPECT_EQ(near[0].as.name, "vertical");
+  EXPECT_EQ(near[0].rule, "mechanism.topple_rear_share");
+  EXPECT_EQ(near[0].times, 0.9);
+  EXPECT_TRUE(find_near_verdicts(synthetic(0.2, 1.7, 1), k).empty());
+
+  // a tolerance of the plan takes the place of the rule's
+  in = synthetic(0.2, 0, 1);
+  in.is_direction_planned = true;
+  in.direction_tolerance = 0.032;
+  in.fall_direction = {-std::cos(0.03), std::sin(0.03), 0};
+  near = find_near_verdicts(in, k);
+  ASSERT_EQ(near.size(), 1U);
+  EXPECT_EQ(near[0].as.name, "wrong direction");
+  in.is_under_way = true;
+  EXPECT_TRUE(find_near_verdicts(in, k).empty());
+}
+
 /// Mass centre of a shaft that swings about `lean` with e^(-decay t) cos(2 π t / 4 s), from the charge at 1 s to `end`.
 MechanismInput swinging(double lean, double decay, double end) {
   MechanismInput in = swaying(0, 0);
