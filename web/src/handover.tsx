@@ -33,6 +33,7 @@ export function listConditions(run: Run): string[] {
   for (const f of broken) out.push(`It fails already: ${name(f)}.`);
   for (const f of run.findings.filter((g) => g.id.startsWith("clearance.") && g.status === "warning" && g.value !== null && g.value <= 0)) out.push(`Parts are over it already: ${f.title}.`);
   for (const f of run.findings.filter((g) => g.status === "not_judged" && g !== verdict)) out.push(`What the run did not show is otherwise: ${name(f)}.`);
+  if (run.findings.some((f) => f.id === "mechanism.near")) out.push("Little is otherwise than planned: the verdict is near another one, as the findings say.");
   const charges = run.events.filter((e) => e.kind === "charge").length;
   if (charges === 1) out.push("The charge does not fire, or not when the plan says.");
   if (charges > 1) out.push(`One of the ${charges} charges does not fire, or not when the plan says.`);

@@ -782,6 +782,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["When this fails", "Wann es nicht gelingt"],
   ["This fails if", "Es gelingt nicht, wenn"],
   ["It fails already: {a}.", "Schon jetzt nicht eingehalten: {}."],
+  ["Little is otherwise than planned: the verdict is near another one, as the findings say.", "Wenig ist anders als geplant: Das Urteil liegt nahe an einem anderen, wie die Befunde sagen."],
   ["Parts are over it already: {a}.", "Schon jetzt liegen oder ragen Teile darüber: {}."],
   ["{a}: the ground shakes more than the middle of the screening's band, which reaches the limit.", "{}: Der Boden schwingt stärker als die Mitte der Abschätzung, deren Band den Grenzwert erreicht."],
   ["The charge does not fire, or not when the plan says.", "Die Ladung zündet nicht, oder nicht, wenn der Plan es sagt."],

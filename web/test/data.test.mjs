@@ -351,6 +351,9 @@ describe("what would make it fail", () => {
 
   it("tells of no way that is left where a limit is broken", () => {
     assert.deepEqual(tell(clearance("Hall", 3.2, "The nearest part, C-A1-0, comes to 3.2 m at 4.10 s; the limit is 4.0 m.", "bad")), ["It fails already: Clearance, Hall."]);
+    assert.deepEqual(tell({ id: "mechanism.near", heading: "Mechanism", title: "Near another verdict", text: "", value: null, unit: "", status: "warning" }), [
+      "Little is otherwise than planned: the verdict is near another one, as the findings say.",
+    ]);
   });
 });
 
