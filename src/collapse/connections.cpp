@@ -569,11 +569,14 @@ void Builder::connect_wall(const GridPoint& at, int index, bool along_x) {
   const double shear = k.wall_stiffness_share * E_t / 2.4 * width / height;
   const double axial = k.wall_axial_share * E_t * width / height;
   const double across = 3 * rcc.EI * width / (height * height * height);
+  // an open bed joint without bars bears no more of a moment across the wall than its axial stiffness gives
+  const bool has_open_joint = panel.concrete < 0 && !(panel.steel >= 0 && panel.as_top + panel.as_bottom > 0);
+  const double bending = has_open_joint ? axial * panel.thickness * panel.thickness / 12 : 3 * rcc.EI * width / height;
   Vec3 head = base;
   head.z += height;
   const double span = high - low;
   add_element(m.name + "/head", index, body, own_body.at(beam), head, column_axes(), {axial, shear, across},
-              {across * span * span / 12, 3 * rcc.EI * width / height, axial * span * span / 12},
+              {across * span * span / 12, bending, axial * span * span / 12},
               {{0, mbs::add_law(model, make_wall_law(rcc, width, height, kept, m.name + "/head", k))}});
 }
 

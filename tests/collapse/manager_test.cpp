@@ -577,6 +577,24 @@ TEST(Manager, OpeningsAboveEachOtherCountOnce) {
   EXPECT_NEAR(base(a).shear_limit / base(b).shear_limit, 1, 1e-12);
 }
 
+TEST(Manager, HeadsOfMasonryBendAcrossAsOpenJoints) {
+  const auto head = [](const std::string& panel, const std::string& more = "") {
+    const Built b =
+        build(read(portal(brick(more) + "[[walls]]\npanel = \"" + panel + "\"\nat = \"A1B1\"\n")), without_limit());
+    return *std::find_if(b.model.elements.begin(), b.model.elements.end(),
+                         [](const mbs::ZoneElement& e) { return e.name == "W-A1B1-0/head"; });
+  };
+  const double length = 4.7, height = 2.5, thickness = 0.24, EI = 2.5e9 * std::pow(thickness, 3) / 12;
+  const double open = head("brick").rotational_stiffness.y;
+  EXPECT_NEAR(open / (default_knowledge().wall_axial_share * EI * length / height), 1, 1e-12);
+  // bars cross the joint, and concrete is cast to its beam
+  EXPECT_NEAR(
+      head("brick", "steel = \"S\"\nas_faces = \"1 mm2/m\"\n").rotational_stiffness.y / (3 * EI * length / height), 1,
+      1e-12);
+  const mbs::ZoneElement thin = head("thin");
+  EXPECT_NEAR(thin.rotational_stiffness.y / (thin.translational_stiffness.z * height * height), 1, 1e-12);
+}
+
 TEST(Manager, TheOrderOfTwoSlabsBesideABeamChangesNothing) {
   // mirrored in the beam of frame 2: a thin slab beside a thick one whose bars lie deeper
   const auto beams = [](const char* first, const char* second) {

@@ -50,6 +50,13 @@ cover = "2 cm"
 )toml";
 }
 
+/// A wall of masonry for them, `more` its bars.
+inline std::string brick(const std::string& more = "") {
+  return "[wall.brick]\nthickness = \"24 cm\"\ndensity = \"1400 kg/m3\"\nstrength = \"4 N/mm2\"\nmodulus = \"2.5 "
+         "GPa\"\n" +
+         more;
+}
+
 inline std::string grid(const std::string& rows, const std::string& frames, int storeys, const std::string& load = "") {
   return "[grid]\nrows = { " + rows + " }\nframes = { " + frames + " }\n[storeys]\ncount = " + std::to_string(storeys) +
          "\nheight = \"3 m\"\n" + (load.empty() ? "" : "load = \"" + load + "\"\n");

@@ -89,6 +89,23 @@ TEST(RunPhysics, AHouseOnItsColumnsStands) {
   EXPECT_NEAR(force.front() / (calc_standing_mass(read(house())) * 9.81), 1, 1e-6);
 }
 
+TEST(RunPhysics, BeamsThatTwistDoNotMakeMasonryYield) {
+  // slabs lie on one side of the gable beams; what masonry between them bears is no part of the building's margin
+  const auto start = [](const std::string& walls) {
+    return finding(run_plan(read(materials() + brick() +
+                                 grid("A = \"0 m\", B = \"5 m\"", "1 = \"0 m\", 2 = \"5 m\"", 2, "1 kN/m2") +
+                                 "[[columns]]\nsection = \"column\"\n[[beams]]\nsection = \"beam\"\n[[slabs]]\npanel = "
+                                 "\"floor\"\n" +
+                                 walls + analysis("0.05 s")),
+                            default_knowledge(), {}, {}),
+                   "stability.start");
+  };
+  const record::Finding with = start("[[walls]]\npanel = \"brick\"\nalong = \"x\"\nstoreys = 1\n");
+  EXPECT_EQ(with.status, record::Status::Good) << with.text;
+  EXPECT_THAT(with.text, testing::HasSubstr("no zone has yielded"));
+  EXPECT_NEAR(with.value / start("").value, 1, 0.03);
+}
+
 TEST(RunPhysics, WithoutItsFrontRowAHouseTopplesToTheFront) {
   const record::Record r =
       run_plan(read(house("[criteria]\nmechanism = \"topple\"\n" + charge("C-A*-0", "0.1 s"), "2.5 s")),
