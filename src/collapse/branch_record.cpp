@@ -4,17 +4,20 @@
 
 #include <limits>
 
-#include "collapse/findings.h"
+#include "collapse/heads_across.h"
 #include "collapse/plan_record.h"
+#include "engines/engine.h"
 
 namespace topple::collapse {
 
 BranchRecord::BranchRecord(const Branch& b, const Knowledge& k, const RunOptions& options)
     : live_(b.run().model_pointer()),
+      start_(b.pieces.front().run->model_pointer()),
       k_(k),
       branch_(b.id),
       time_(b.frontier()),
       has_ended_(b.run().has_ended()),
+      options_(options),
       summary_(b.run().summary()) {
   for (const Piece& p : b.pieces)
     if (&p != &b.pieces.back()) summary_.wall_time += p.seconds;
@@ -41,8 +44,14 @@ std::optional<record::Record> BranchRecord::finish(const std::atomic<bool>* canc
     record_.ending = "under_way";
     record_.ending_text = fmt::format("The run is under way: computed up to {:.2f} s so far.", time_);
   }
-  if (!record_.time.empty() &&
-      !add_findings(live_->plan(), live_->model(), live_->map(), k_, *recorder_, summary_, record_, cancel))
+  std::optional<HeadsAcross> across;
+  if (!start_->map().ground_columns.empty() && (record_.ending == "at_rest" || record_.ending == "time_limit"))
+    across = find_heads_across(start_->plan(), k_, options_, cancel,
+                               [](const mbs::Model& model, const ModelMap&, const mbs::Options& o) {
+                                 return engines::make_engine("native")->run(model, o);
+                               });
+  if (!record_.time.empty() && !add_findings(live_->plan(), live_->model(), live_->map(), k_, *recorder_, summary_,
+                                             record_, cancel, across ? &*across : nullptr))
     return std::nullopt;
   return std::move(record_);
 }

@@ -27,11 +27,12 @@ class BranchRecord {
   [[nodiscard]] std::optional<record::Record> finish(const std::atomic<bool>* cancel = nullptr);
 
  private:
-  std::shared_ptr<const LiveModel> live_;
+  std::shared_ptr<const LiveModel> live_, start_;  // at its end, and before any edit
   const Knowledge& k_;
   int branch_;
   double time_;
   bool has_ended_;
+  RunOptions options_;
   mbs::Summary summary_;
   record::Record record_;
   RunCallbacks nobody_;

@@ -94,6 +94,7 @@ struct BuilderState {
   std::map<int, ShaftModel> shafts;                                               // by member
   std::map<int, double> volume_per_mass;  // member: of its material over the mass of its parts, floor loads included
   bool hinge_about_y = true;
+  Heads heads = Heads::OfTheFall;
   // of charges, which may be laid out anew while the model runs: laws are never taken out, so that their ids stay
   std::map<std::tuple<int, double, double, double>, mbs::LawId> cage_laws;  // by element, length, bars and place
   std::map<std::tuple<int, double, double, std::string>, mbs::LawId> hinge_laws;

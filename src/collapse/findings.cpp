@@ -42,6 +42,7 @@ struct Context {
   const std::atomic<bool>* cancel = nullptr;
   std::vector<OpenPart> open = {};  // of a run that ended with its time
   long charges_left = 0;            // that had not fired by then
+  const HeadsAcross* across = nullptr;
 
   bool is_cancelled() const { return cancel != nullptr && *cancel; }
 
@@ -191,6 +192,17 @@ bool gains_speed(const Context& c, double begin, size_t last) {
   return false;
 }
 
+/// About which axis heads of ground columns turn in what was said before the first charge, and what the other one
+/// leaves.
+std::string tell_heads(const Context& c, bool is_across) {
+  const bool is_about_y = c.map.hinge_about_y != is_across;
+  const std::string text = fmt::format(" Heads of ground columns turn about {} here; about {} ", is_about_y ? "y" : "x",
+                                       is_about_y ? "x" : "y");
+  if (c.across->zones.empty()) return text + "there is no equilibrium under dead load.";
+  const double used = (is_across ? c.recorder.zone_frames() : c.across->zones)[0].utilisation;
+  return text + (used > 0 ? fmt::format("the margin is {:.2f}.", 1 / used) : "no zone is loaded.");
+}
+
 /// Whether the building stood until each next stage, as far as frames tell.
 struct Standing {
   bool fell = false;
@@ -204,8 +216,13 @@ Standing add_stability(const Context& c) {
   const std::vector<BlockFrame> block = c.recorder.farthest_block_frames();
   const auto& zones = c.recorder.zone_frames();
   const auto describe = [&](const std::string& id, const std::string& title, size_t i, bool settled, double begin) {
-    const ZoneFrame& z = zones[i];
-    const auto margins = find_margins(c.r, i);
+    // before the first charge the smaller margin of both axes about which heads of ground columns may turn
+    const HeadsAcross* across = settled ? nullptr : c.across;
+    const bool is_across =
+        across != nullptr && !across->zones.empty() && across->zones[0].utilisation > zones[i].utilisation;
+    const record::Record& r = is_across ? across->record : c.r;
+    const ZoneFrame& z = is_across ? across->zones[0] : zones[i];
+    const auto margins = find_margins(r, is_across ? 0 : i);
     // margins are those of a building that stands
     const bool is_standing = stands(block[i], c.k);
     const bool has = is_standing && z.zone >= 0 && z.utilisation > 0;
@@ -213,7 +230,7 @@ Standing add_stability(const Context& c) {
     std::string text = !is_standing ? "It does not stand"
                        : has
                            ? fmt::format("Zone {} is nearest to its resistance and uses {:.0f} % of it (margin {:.2f})",
-                                         c.r.zones[static_cast<size_t>(z.zone)].name, 100 * z.utilisation, margin)
+                                         r.zones[static_cast<size_t>(z.zone)].name, 100 * z.utilisation, margin)
                            : "No zone is loaded";
     text += "; " + count_words(z.yielded, "no zone has yielded", "zone has yielded", "zones have yielded");
     if (settled)
@@ -227,6 +244,7 @@ Standing add_stability(const Context& c) {
         text += fmt::format("{} {} {:.2f}", m > 0 ? "," : "", margins[m].member, margins[m].margin);
       text += fmt::format(" of {} members.", margins.size());
     }
+    if (across != nullptr && is_standing) text += tell_heads(c, is_across);
     bool is_still = true, may_fall = false;
     if (settled && is_standing) {
       is_still = block[i].fastest < c.k.rest_speed;
@@ -245,6 +263,7 @@ Standing add_stability(const Context& c) {
     const Status status = !is_standing                                 ? Status::Bad
                           : may_fall                                   ? Status::NotJudged
                           : z.yielded > 0 || z.broken > 0 || !is_still ? Status::Warning
+                          : across != nullptr && across->zones.empty() ? Status::Warning
                                                                        : Status::Good;
     c.add(id, "Stability", title, text, margin, "1", status);
     return is_standing;
@@ -840,11 +859,12 @@ std::string tell_not_modelled(const std::vector<std::string>& list) {
 
 bool add_findings(const product::Plan& plan, const mbs::Model& model, const ModelMap& map, const Knowledge& k,
                   const Recorder& recorder, const mbs::Summary& summary, record::Record& r,
-                  const std::atomic<bool>* cancel) {
+                  const std::atomic<bool>* cancel, const HeadsAcross* across) {
   r.not_modelled = not_modelled(plan);
   // what was cancelled says how far it came
   const bool is_under_way = r.ending == "under_way" || r.ending == "cancelled";
   Context c{plan, model, map, k, recorder, summary, r, is_under_way, cancel};
+  c.across = across;
   if (!is_under_way && !r.time.empty())
     c.charges_left = std::count_if(map.schedule.begin(), map.schedule.end(),
                                    [&r](const Firing& f) { return !f.fails && f.time > r.time.back() + 1e-9; });

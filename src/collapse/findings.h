@@ -19,11 +19,20 @@ std::string tell_not_modelled(const std::vector<std::string>& list);
 std::string describe_steps(const mbs::Summary&);
 std::string describe_step_needed(const mbs::Summary&);
 
+/// The building under dead load if its ground columns turn in their heads about the other axis of the grid: its zones
+/// at one frame, none where it has no equilibrium then.
+struct HeadsAcross {
+  record::Record record;
+  std::vector<ZoneFrame> zones;
+};
+
 /// Fills findings, not_modelled and the rigid block's series of a record. Where its ending is "under_way" they say how
 /// things stand so far, and nothing that may still change is called good or bad. False if `cancel` was seen set; then
 /// they are not complete.
+///   across  for the margin before the first charge, which is then the smaller one of both; null: not looked at
 bool add_findings(const product::Plan&, const mbs::Model&, const ModelMap&, const Knowledge&, const Recorder&,
-                  const mbs::Summary&, record::Record&, const std::atomic<bool>* cancel = nullptr);
+                  const mbs::Summary&, record::Record&, const std::atomic<bool>* cancel = nullptr,
+                  const HeadsAcross* across = nullptr);
 
 /// Whether a finding says that a criterion or a clearance of the plan is violated.
 bool is_violated(const record::Finding&);

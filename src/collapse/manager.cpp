@@ -88,7 +88,8 @@ void Builder::find_direction() {
   }
   map.fall_direction = {std::cos(azimuth), std::sin(azimuth), 0};
   map.hinge_axis = cross({0, 0, 1}, map.fall_direction);
-  hinge_about_y = std::abs(map.fall_direction.x) >= std::abs(map.fall_direction.y);
+  hinge_about_y = (std::abs(map.fall_direction.x) >= std::abs(map.fall_direction.y)) == (heads == Heads::OfTheFall);
+  map.hinge_about_y = hinge_about_y;
 }
 
 void Builder::index_members() {
@@ -576,9 +577,10 @@ std::vector<std::string> ModelMap::note_texts() const {
   return out;
 }
 
-mbs::Model make_model(const product::Plan& plan, const Knowledge& knowledge, ModelMap& map, int threads) {
+mbs::Model make_model(const product::Plan& plan, const Knowledge& knowledge, ModelMap& map, int threads, Heads heads) {
   map = {};
   Builder builder(plan, knowledge, map, threads);
+  builder.heads = heads;
   builder.build();
   limit_frequency(builder.model, knowledge.body_highest_frequency);
   builder.add_events(make_schedule(plan, knowledge));

@@ -100,15 +100,19 @@ struct ModelMap {
   Vec3 fall_direction{-1, 0, 0};  // planned, horizontal unit vector; away from the remaining supports if unplanned
   Vec3 hinge_axis{0, -1, 0};      // rotation about it by a positive angle leans towards fall_direction
   bool is_direction_planned = false;
+  bool hinge_about_y = true;        // heads of ground columns turn about W's y, else about its x
   double ground_storey_height = 0;  // [m]
   double mass = 0;                  // of all bodies [kg]
   double moving_mass = 0;           // without fixed ones [kg]
   std::vector<std::string> note_texts() const;
 };
 
+/// About which axis of the grid the heads of ground columns turn: that of the fall, or the other one.
+enum class Heads { OfTheFall, Across };
+
 /// Builds the model. Throws InputError for plans that cannot be built, naming the member.
 ///   threads  for the resistance curves; the model does not depend on it
-mbs::Model make_model(const product::Plan&, const Knowledge&, ModelMap& map, int threads = 1);
+mbs::Model make_model(const product::Plan&, const Knowledge&, ModelMap& map, int threads = 1, Heads = Heads::OfTheFall);
 
 /// Mass of everything that stands before the first charge: members and floor loads [kg].
 double calc_standing_mass(const product::Plan&);

@@ -8,6 +8,7 @@
 
 #include "base/unit.h"
 #include "collapse/findings.h"
+#include "collapse/heads_across.h"
 #include "collapse/outcome.h"
 #include "collapse/plan_record.h"
 #include "collapse/recorder.h"
@@ -88,18 +89,10 @@ void add_checks(const mbs::Model& model, const mbs::Summary& s, bool equilibrium
     add(fmt::format("note.{}", i + 1), "Note", s.notes[i], std::numeric_limits<double>::quiet_NaN(), "", Status::Info);
 }
 
-}  // namespace
-
-record::Record run_plan(const product::Plan& plan, const Knowledge& k, const RunOptions& options,
-                        const RunCallbacks& callbacks) {
-  const std::unique_ptr<engines::Engine> engine = engines::make_engine(options.engine);
-  return run_plan(
-      plan, k, options, callbacks, engine->name(),
-      [&engine](const mbs::Model& model, const ModelMap&, const mbs::Options& o) { return engine->run(model, o); });
-}
-
-record::Record run_plan(const product::Plan& plan, const Knowledge& k, const RunOptions& options,
-                        const RunCallbacks& callbacks, const std::string& engine, const Mover& move) {
+/// run_plan; `looks_across`: an equilibrium of its own says what heads of ground columns bear about the other axis.
+record::Record run_with(const product::Plan& plan, const Knowledge& k, const RunOptions& options,
+                        const RunCallbacks& callbacks, const std::string& engine, const Mover& move,
+                        bool looks_across) {
   ModelMap map;
   const mbs::Model model = make_model(plan, k, map, options.threads);
   record::Record r;
@@ -116,9 +109,30 @@ record::Record run_plan(const product::Plan& plan, const Knowledge& k, const Run
   record_into(recorder, o);
   const mbs::Summary summary = move(model, map, o);
   end_record(summary, " before the first charge", recorder, r);
-  add_findings(plan, model, map, k, recorder, summary, r);
+  const std::atomic<bool>* cancel = callbacks.progress.cancel;
+  std::optional<HeadsAcross> across;
+  if (looks_across && !map.ground_columns.empty() && (r.ending == "at_rest" || r.ending == "time_limit"))
+    across = find_heads_across(plan, k, options, cancel, move);
+  add_findings(plan, model, map, k, recorder, summary, r, nullptr,
+               across && !callbacks.progress.is_cancelled() ? &*across : nullptr);
   if (callbacks.on_summary) callbacks.on_summary(summary);
   return r;
+}
+
+}  // namespace
+
+record::Record run_plan(const product::Plan& plan, const Knowledge& k, const RunOptions& options,
+                        const RunCallbacks& callbacks) {
+  const std::unique_ptr<engines::Engine> engine = engines::make_engine(options.engine);
+  return run_with(
+      plan, k, options, callbacks, engine->name(),
+      [&engine](const mbs::Model& model, const ModelMap&, const mbs::Options& o) { return engine->run(model, o); },
+      true);
+}
+
+record::Record run_plan(const product::Plan& plan, const Knowledge& k, const RunOptions& options,
+                        const RunCallbacks& callbacks, const std::string& engine, const Mover& move) {
+  return run_with(plan, k, options, callbacks, engine, move, false);
 }
 
 mbs::RunSettings settings_of(const product::Plan& plan, const Knowledge& k, const RunOptions& options) {

@@ -89,6 +89,26 @@ TEST(RunPhysics, AHouseOnItsColumnsStands) {
   EXPECT_NEAR(force.front() / (calc_standing_mass(read(house())) * 9.81), 1, 1e-6);
 }
 
+TEST(RunPhysics, TheMarginAtTheStartIsTheSmallerOfBothAxesOfTheHeads) {
+  const auto start = [](const std::string& azimuth) {
+    const record::Record r =
+        run_plan(read(portal("[criteria]\nazimuth = \"" + azimuth + "\"\nazimuth_tolerance = \"20 deg\"\n")),
+                 default_knowledge(), {}, {});
+    // of the run itself, whose heads turn about one axis
+    const double used = *std::max_element(r.zone_utilisation.begin(),
+                                          r.zone_utilisation.begin() + static_cast<std::ptrdiff_t>(r.zones.size()));
+    return std::make_pair(finding(r, "stability.start"), 1 / used);
+  };
+  const auto [along, own_along] = start("180 deg");
+  const auto [across, own_across] = start("90 deg");
+  // the girder's ends bend the columns about y, whatever the fall is
+  EXPECT_EQ(along.value, across.value);
+  EXPECT_EQ(along.text, across.text);
+  EXPECT_NEAR(along.value / own_along, 1, 1e-6);
+  EXPECT_GT(own_across, 1.5 * along.value);
+  EXPECT_THAT(along.text, testing::HasSubstr("Heads of ground columns turn about y here; about x the margin is"));
+}
+
 TEST(RunPhysics, BeamsThatTwistDoNotMakeMasonryYield) {
   // slabs lie on one side of the gable beams; what masonry between them bears is no part of the building's margin
   const auto start = [](const std::string& walls) {

@@ -195,6 +195,10 @@ describe("the German table", () => {
     assert.equal(translate("largest z0: -14.64"), "größter Wert von z0: -14,64");
     assert.equal(translate("It takes no more than x1 16.85 N/mm2 (core 25), x2 47.48 (core 64.5)."), "Dazu genügt x1 16,85 N/mm2 (Kern 25), x2 47,48 (Kern 64,5).");
     assert.equal(translate("Lowest margins: S-B2C3-1 3.56, shaft 1.5/foot 13.57 of 75 members."), "Kleinste Reserven: S-B2C3-1 3,56, shaft 1.5/foot 13,57 (von 75 Bauteilen).");
+    assert.equal(
+      translate("Lowest margins: C-A1-0 1.86, C-B1-0 1.90 of 3 members. Heads of ground columns turn about y here; about x the margin is 2.24."),
+      "Kleinste Reserven: C-A1-0 1,86, C-B1-0 1,90 (von 3 Bauteilen). Köpfe der Erdgeschossstützen drehen sich hier um y; um x ist die Reserve 2,24.",
+    );
   });
 
   it("leaves names as people gave them", async () => {

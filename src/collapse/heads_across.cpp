@@ -1,0 +1,22 @@
+#include "collapse/heads_across.h"
+
+#include "collapse/plan_record.h"
+
+namespace topple::collapse {
+
+HeadsAcross find_heads_across(const product::Plan& plan, const Knowledge& k, const RunOptions& options,
+                              const std::atomic<bool>* cancel, const Mover& move) {
+  ModelMap map;
+  const mbs::Model model = make_model(plan, k, map, options.threads, Heads::Across);
+  HeadsAcross out;
+  const RunCallbacks nobody;
+  Recorder recorder(model, map, k, out.record, nobody);
+  mbs::RunSettings settings = settings_of(plan, k, options);
+  settings.duration = settings.step = 1e-6;  // the first frame alone matters
+  mbs::Options o = make_mbs_options(settings, k, options.threads, {{}, cancel});
+  record_into(recorder, o);
+  if (move(model, map, o).ending != mbs::Summary::Ending::NoEquilibrium) out.zones = recorder.zone_frames();
+  return out;
+}
+
+}  // namespace topple::collapse
