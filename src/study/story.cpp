@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <set>
@@ -157,8 +158,19 @@ Sentence tell_debris_limit(const Limit& limit, const Quantity& q, const std::pai
   return s;
 }
 
+/// How many limits of a plan have been looked at, and how they fare.
+struct LimitCount {
+  int all = 0;
+  int at_core = 0;         // broken with the core values
+  int elsewhere = 0;       // of the others: broken by a run that is possible
+  int open = 0;            // of the others: parts that still moved may break it
+  double possibility = 0;  // of breaking one of `elsewhere`
+};
+
 /// How possible it is that an output breaks its limit: the most possible run that does.
-void tell_limits(const Problem& p, const StudyResult& r, std::vector<Sentence>& out) {
+LimitCount tell_limits(const Problem& p, const StudyResult& r, std::vector<Sentence>& out) {
+  LimitCount count;
+  const uncertainty::Sample* core = find_core(p, r.alpha.archive);
   for (const Limit& limit : p.limits) {
     const auto at = std::find(r.outputs.begin(), r.outputs.end(), limit.output);
     if (at == r.outputs.end()) continue;
@@ -183,6 +195,15 @@ void tell_limits(const Problem& p, const StudyResult& r, std::vector<Sentence>& 
       possibility = std::max(possibility, degree);
     }
     if (runs == 0) continue;
+    ++count.all;
+    if (core && index < core->result.values.size() && is_broken(limit, core->result.values[index])) {
+      ++count.at_core;
+    } else if (possibility > 0) {
+      ++count.elsewhere;
+      count.possibility = std::max(count.possibility, possibility);
+    } else {
+      count.open += open > 0;
+    }
     Sentence s;
     if (limit.kind != Limit::Kind::Screening) {
       s = tell_debris_limit(limit, q, {low, high}, runs, reaching, open, possibility);
@@ -209,6 +230,25 @@ void tell_limits(const Problem& p, const StudyResult& r, std::vector<Sentence>& 
     doubt(p, r, s);
     out.push_back(std::move(s));
   }
+  return count;
+}
+
+/// An outcome as planned is no good verdict where limits of the plan are broken.
+void weigh_limits(const Problem& p, const LimitCount& limits, Sentence& verdict) {
+  const auto add = [&](int count, const std::string& text, Status status) {
+    if (count == 0) return;
+    verdict.text += fmt::format(" {}: {} of {}.", text, count, limits.all);
+    if (verdict.status != Status::Bad) verdict.status = status;
+  };
+  add(limits.at_core, "Limits of the plan that are broken with the core values", Status::Bad);
+  add(limits.elsewhere,
+      fmt::format("Limits of the plan that other values break, possible to at least {}",
+                  words_of_least(limits.possibility)),
+      limits.possibility >= 0.5 ? Status::Bad : Status::Warning);
+  add(limits.open, "Limits of the plan that parts may break which still moved", Status::Warning);
+  if (p.not_judged.empty()) return;
+  verdict.text += fmt::format(" Limits of the plan that are not judged here: {}.", p.not_judged.size());
+  if (verdict.status == Status::Good) verdict.status = Status::Info;
 }
 
 void tell_splits(const Problem& p, const StudyResult& r, std::vector<Sentence>& out) {
@@ -461,12 +501,15 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
   } else if (std::string text = tell_outputs(p, r, *core); !text.empty()) {
     add("verdict", std::move(text));
   }
+  std::vector<Sentence> of_limits;
+  const LimitCount limits = tell_limits(p, r, of_limits);
+  if (core && at_core != failed_outcome && !out.empty()) weigh_limits(p, limits, out.front());
   tell_requirement(p, r, out);
   if (has_names && classes > 1) {
     tell_outcomes(p, r, out);
     tell_splits(p, r, out);
   }
-  tell_limits(p, r, out);
+  std::move(of_limits.begin(), of_limits.end(), std::back_inserter(out));
   if (p.random) add("random", tell_randomness(p));
   if (const int unfinished = count_unfinished(p, r); unfinished > 0)
     add("unfinished",

@@ -751,6 +751,46 @@ TEST(Story, TellsHowPossibleItIsThatALimitIsReached) {
   EXPECT_EQ(told[1].status, record::Status::Good);
 }
 
+TEST(Story, CallsNoVerdictGoodWhereLimitsAreBroken) {
+  // y = x1 over the triangle (0, 2, 10), always "falls" as planned: more than 1 at the core, more than 6 to 0.5, more
+  // than 8 to 0.25, more than 12 nowhere
+  const Folder folder;
+  Problem p = make_problem({make_triangular(0, 2, 10)}, 300);
+  p.outputs = {{"y", "m", 1}, {"left", "m", 1}};
+  p.asked = "falls";
+  const StudyResult r = run(p, folder, "verdict", make_factories([](const Point& x) {
+                              return done({{"y", x[0]}, {"left", x[0] > 9 ? 5 : 0}}, "falls");
+                            }));
+  using record::Status;
+  const auto verdict = [&](const std::vector<double>& most, const std::string& left = "") {
+    p.limits.clear();
+    for (const double m : most) p.limits.push_back({"y", "", m, m, "of the plan", Limit::Kind::Reach, left});
+    const Sentence s = tell(p, r).front();
+    EXPECT_EQ(s.id, "verdict");
+    EXPECT_NE(s.text.find("\"falls\", as planned"), std::string::npos) << s.text;
+    return s;
+  };
+  const auto says = [](const Sentence& s, const char* text) { return s.text.find(text) != std::string::npos; };
+  EXPECT_EQ(verdict({}).status, Status::Good);
+  EXPECT_EQ(verdict({12}).status, Status::Good);
+  EXPECT_FALSE(says(verdict({12}), "Limits"));
+  const Sentence broken = verdict({1, 12});
+  EXPECT_EQ(broken.status, Status::Bad);
+  EXPECT_TRUE(says(broken, " Limits of the plan that are broken with the core values: 1 of 2.")) << broken.text;
+  EXPECT_EQ(verdict({5}).status, Status::Bad) << "well possible";
+  const Sentence possible = verdict({8});
+  EXPECT_EQ(possible.status, Status::Warning);
+  EXPECT_TRUE(says(possible, "that other values break, possible to at least 0.2")) << possible.text;
+  const Sentence open = verdict({12}, "left");
+  EXPECT_EQ(open.status, Status::Warning);
+  EXPECT_TRUE(says(open, " Limits of the plan that parts may break which still moved: 1 of 1.")) << open.text;
+  p.not_judged = {"debris_reach"};
+  const Sentence not_judged = verdict({12});
+  EXPECT_EQ(not_judged.status, Status::Info);
+  EXPECT_TRUE(says(not_judged, " Limits of the plan that are not judged here: 1.")) << not_judged.text;
+  EXPECT_EQ(verdict({1}).status, Status::Bad);
+}
+
 TEST(Story, TellsHowManyRunsKeepALimitOfTheDebris) {
   // as above: more than 6 is possible to 0.5, less than 1 to 0.5 on the left branch, and less than 6 is the core's
   const Folder folder;

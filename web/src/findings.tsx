@@ -4,13 +4,28 @@ import { formatDate, formatDuration, prettify } from "./units";
 import { endingWord } from "./vocabulary";
 
 /// The finding that says what happens: the mechanism, else the first one.
-export function findVerdict(run: Run): Finding | undefined {
+export function findVerdict(run: { findings: readonly Finding[] }): Finding | undefined {
   return run.findings.find((f) => f.id === "mechanism") ?? run.findings[0];
+}
+
+/// The worst of the limits that the plan sets, and of what is bad at neighbours.
+export function findStatusOfLimits(findings: readonly Finding[]): Status | undefined {
+  const limits = findings.filter((f) => isCriterion(f) || (f.status === "bad" && isOfPlace(f)));
+  return openStatuses.find((status) => limits.some((f) => f.status === status));
+}
+
+/// The status of the headline: a mechanism as planned is not good where a limit of the plan is broken.
+export function findHeadline(findings: readonly Finding[]): Status {
+  const own = findVerdict({ findings })?.status ?? "info";
+  const limits = findStatusOfLimits(findings);
+  return limits === undefined || (openStatuses.includes(own) && openStatuses.indexOf(own) < openStatuses.indexOf(limits)) ? own : limits;
 }
 
 export function Header(props: { run: Run }) {
   const { run } = props;
   const verdict = findVerdict(run);
+  const headline = findHeadline(run.findings);
+  const ofLimits = findStatusOfLimits(run.findings);
   const { provenance, ending } = run;
   return (
     <header class="header">
@@ -23,15 +38,16 @@ export function Header(props: { run: Run }) {
         </p>
       </div>
       <div class="verdict-row">
-        <section class={`verdict ${verdict?.status ?? "info"}`} aria-label="Verdict">
+        <section class={`verdict ${headline}`} aria-label="Verdict">
           {verdict === undefined ? (
             <p class="verdict-text">This run has no findings.</p>
           ) : (
             <>
-              <StatusSign status={verdict.status} size={30} />
+              <StatusSign status={headline} size={30} />
               <div>
                 <p class="verdict-title">
                   <span data-name>{verdict.title}</span> <StatusWord status={verdict.status} />
+                  {ofLimits !== undefined && <span class="verdict-limits" data-test="verdict-limits">Limits <StatusWord status={ofLimits} /></span>}
                 </p>
                 <p class="verdict-text" data-test="verdict">{prettify(verdict.text)}</p>
               </div>
@@ -55,6 +71,9 @@ export const openStatuses: readonly Status[] = ["bad", "not_judged", "warning"];
 /// The distance that the plan asks for, as a clearance finding tells it in either language; undefined if it asks for none.
 export const findLimit = (f: Finding): string | undefined => (f.id.startsWith("clearance.") ? /; (?:the limit is|der Grenzwert ist) (\d+(?:[.,]\d+)?) m\.(?= |$)/.exec(f.text)?.[1]?.replace(",", ".") : undefined);
 
+/// Whether it is about a limit of the plan.
+const isCriterion = (f: Finding): boolean => f.id.startsWith("criterion.") || findLimit(f) !== undefined;
+
 /// Whether its title is the name of a neighbour or a utility, which does not say what of it is told.
 export const isOfPlace = (f: Finding): boolean => /^(clearance|vibration)\./.test(f.id);
 
@@ -62,7 +81,7 @@ export const isOfPlace = (f: Finding): boolean => /^(clearance|vibration)\./.tes
 function Summary(props: { run: Run }) {
   const { findings } = props.run;
   const verdict = findVerdict(props.run);
-  const criteria = findings.filter((f) => f.id.startsWith("criterion.") || findLimit(f) !== undefined);
+  const criteria = findings.filter(isCriterion);
   const screened = findings.filter((f) => f.id.startsWith("vibration.") && f.status === "bad").length;
   const unjudged = criteria.filter((f) => f.status === "not_judged").length;
   const met = criteria.filter((f) => f.status !== "bad").length - unjudged;

@@ -1,7 +1,7 @@
 /// Right side: the chosen member with its zones and the path of one of them on its curves; below it the verdict.
 import { useEffect, useRef, useState } from "preact/hooks";
 import uPlot from "uplot";
-import { openStatuses } from "./findings";
+import { findHeadline, findStatusOfLimits, findVerdict, openStatuses } from "./findings";
 import { Inspector } from "./inspector";
 import { axis, cssColour, namePlot, niceRange } from "./plots";
 import { StatusSign, StatusWord } from "./signs";
@@ -214,7 +214,9 @@ function Verdict(props: { s: SteerState }) {
   const { s } = props;
   const result = s.findings.value;
   const list = result?.findings ?? [];
-  const first = list.find((f) => f.id === "mechanism") ?? list[0];
+  const first = findVerdict({ findings: list });
+  const headline = findHeadline(list);
+  const ofLimits = findStatusOfLimits(list);
   const others = list.filter((f) => f !== first && (openStatuses.includes(f.status) || f.id.startsWith("clearance.")));
   others.sort((a, b) => Number(b.status === "bad") - Number(a.status === "bad"));
   const ending = s.progress.value?.ending ?? s.branch.value?.ending ?? null;
@@ -227,10 +229,13 @@ function Verdict(props: { s: SteerState }) {
       {first === undefined || (isSoFar && (result?.time ?? 0) < 1e-9) ? (
         <p class="quiet">Nothing yet: findings come as the run goes on.</p>
       ) : (
-        <div class={`verdict ${first.status}`}>
-          <StatusSign status={first.status} size={24} />
+        <div class={`verdict ${headline}`}>
+          <StatusSign status={headline} size={24} />
           <div>
-            <p class="verdict-title">{first.title} <StatusWord status={first.status} /></p>
+            <p class="verdict-title">
+              {first.title} <StatusWord status={first.status} />
+              {ofLimits !== undefined && <span class="verdict-limits">Limits <StatusWord status={ofLimits} /></span>}
+            </p>
             <p data-test="verdict">{prettify(first.text)}</p>
           </div>
         </div>

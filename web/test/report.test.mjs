@@ -80,6 +80,15 @@ describe("report page", () => {
     const open = data.findings.filter((f) => f !== verdict && f.status === "bad").slice(0, 4);
     const shown = await page.$$eval("[data-test=open-finding]", (list) => list.map((e) => e.textContent));
     open.forEach((f, i) => assert.ok(shown[i].includes(f.title) && shown[i].includes("Problem"), f.id));
+    // nor its colour: the headline has that of the worst limit
+    const colour = open.some((f) => /^(criterion|clearance|vibration)\./.test(f.id)) ? "bad" : undefined;
+    const headline = (await page.getAttribute("section.verdict", "class")).split(" ")[1];
+    if (colour !== undefined) assert.equal(headline, colour);
+    if (given === undefined) {
+      assert.equal(verdict.status, "good");
+      assert.equal(colour, "bad");
+      assert.match(await page.textContent(".verdict .verdict-title"), /Mechanism\s*OK\s*Limits\s*Problem/);
+    }
     await page.screenshot({ path: `${out}start.png` });
   });
 
