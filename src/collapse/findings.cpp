@@ -812,6 +812,30 @@ void add_verification(const Context& c) {
           Status::Warning);
 }
 
+/// Of what finds no equilibrium: the members that would bear more than they can, the most loaded first.
+void add_overloads(const Context& c) {
+  constexpr size_t most = 20;
+  constexpr double countless = 100;  // hardly any capacity is left
+  std::vector<std::pair<std::string, double>> members;
+  for (const mbs::Overload& o : c.summary.overloads) {
+    const std::string& name = c.map.elements[o.element].member;
+    if (std::none_of(members.begin(), members.end(), [&](const auto& m) { return m.first == name; }))
+      members.emplace_back(name, o.used);
+  }
+  if (members.empty()) return;
+  std::string list;
+  for (size_t i = 0; i < std::min(most, members.size()); ++i)
+    list += fmt::format("{}{} {}", i > 0 ? ", " : "", members[i].first,
+                        members[i].second < countless ? fmt::format("{:.0f} %", 100 * members[i].second)
+                                                      : fmt::format("> {:.0f} %", 100 * countless));
+  if (members.size() > most) list += fmt::format(", and {} more", members.size() - most);
+  c.add("overloads", "Stability", "Overloaded members",
+        fmt::format("Members that would be loaded beyond their capacity if they had no limits: {}. Share of the "
+                    "capacity, the most loaded first: {}.",
+                    members.size(), list),
+        members.front().second, "1", Status::Bad);
+}
+
 bool is_limit(const record::Finding& f) { return f.id.rfind("criterion.", 0) == 0 || f.id.rfind("clearance.", 0) == 0; }
 
 }  // namespace
@@ -875,6 +899,7 @@ bool add_findings(const product::Plan& plan, const mbs::Model& model, const Mode
   };
   if (r.time.empty() || r.ending == "failed") {
     c.add("mechanism", "Mechanism", "No result", r.ending_text, kNone, "", Status::Bad);
+    if (summary.ending == mbs::Summary::Ending::NoEquilibrium) add_overloads(c);
     if (r.time.empty()) return true;
     add_events(c);
     add_not_modelled();

@@ -99,6 +99,7 @@ bool Course::find_start() {
     mbs::Simulation native(model_, make_silent(options_));
     if (!native.find_equilibrium(summary_.message)) {
       summary_.ending = mbs::Summary::Ending::NoEquilibrium;
+      summary_.overloads = native.summary().overloads;
       return false;
     }
     const mbs::Summary found = native.summary();

@@ -618,7 +618,7 @@ class DeadLoad {
   void find_most_loaded();
   /// Of the last evaluation: tangents where they lead nearer, else secants, which go there slowly but surely.
   void find_cracks(bool by_tangents);
-  std::string describe_failure(bool has_diverged) const;
+  std::string describe_failure(bool has_diverged);
   enum class End { Found, None, Diverged };
   /// Iterates from where the bodies are.
   End search(double good_enough, std::string& message);
@@ -641,6 +641,7 @@ class DeadLoad {
   Vector pushed_;                         // unbalanced, and gaps pushed back
   double unbalanced_ = 0, gap_left_ = 0;  // over the weight; [m, rad]
   size_t most_unbalanced_ = 0;            // body
+  std::vector<Overload> overloads_;       // without limits, the largest first
   size_t most_loaded_ = 0;                // element, without limits
   double most_load_ = 0;
   Acceleration acceleration_;
@@ -816,9 +817,14 @@ void DeadLoad::move_accelerated() {
 }
 
 void DeadLoad::find_most_loaded() {
-  for (size_t i = 0; i < s_.elements.size(); ++i)
-    if (const double used = calc_utilisation(s_.elements[i].zone, s_.laws, 0, s_.state.element[i]); used > most_load_)
-      most_load_ = used, most_loaded_ = i;
+  overloads_.clear();
+  for (size_t i = 0; i < s_.elements.size(); ++i) {
+    const double used = calc_utilisation(s_.elements[i].zone, s_.laws, 0, s_.state.element[i]);
+    if (used > most_load_) most_load_ = used, most_loaded_ = i;
+    if (used > 1) overloads_.push_back({i, used});
+  }
+  std::stable_sort(overloads_.begin(), overloads_.end(),
+                   [](const Overload& a, const Overload& b) { return a.used > b.used; });
 }
 
 void DeadLoad::find_cracks(bool by_tangents) {
@@ -837,11 +843,12 @@ void DeadLoad::find_cracks(bool by_tangents) {
   copy(s_.state.rotational, cracks_.rotational);
 }
 
-std::string DeadLoad::describe_failure(bool has_diverged) const {
+std::string DeadLoad::describe_failure(bool has_diverged) {
   char words[240];
   std::snprintf(words, sizeof words, "no dead-load equilibrium after %d iterations: the largest unbalanced force ",
                 s_.summary.equilibrium_iterations);
   std::string message = words;
+  s_.summary.overloads = overloads_;
   if (has_diverged) {
     message += "grew without bound";
   } else {
@@ -893,8 +900,10 @@ bool DeadLoad::find(std::string& message) {
       pushed_back_.setZero();
       acceleration_ = {};
       most_load_ = 0;
+      overloads_.clear();
     }
     const End end = search(good_enough, message);
+    if (end == End::Found) s_.summary.overloads.clear();
     if (end != End::Diverged) return end == End::Found;
   }
   return false;

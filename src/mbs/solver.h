@@ -135,6 +135,12 @@ struct Options {
   Progress progress;
 };
 
+/// An element that the dead load asks more of than it can bear.
+struct Overload {
+  size_t element = 0;  // index into Model::elements
+  double used = 0;     // of its capacity, as if it had no limits; more than 1
+};
+
 struct Summary {
   enum class Ending { TimeLimit, AtRest, Cancelled, NoEquilibrium, Diverged };
   Ending ending = Ending::TimeLimit;
@@ -147,6 +153,7 @@ struct Summary {
   double highest_frequency = 0;  // largest of the elastic system on the way [rad/s]
   int equilibrium_iterations = 0;
   double equilibrium_residual = 0;  // largest unbalanced force over the weight
+  std::vector<Overload> overloads;  // where there is no equilibrium, the largest first; empty if nothing is known
   /// Largest |residual| over the potential energy released, or the energy there was at the start if that is more; both
   /// at least what moves everything by a micrometre against weight and loads. What round-off makes of it is no error.
   double energy_error = 0;

@@ -1,5 +1,6 @@
 #include "collapse/run.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -60,6 +61,27 @@ TEST(Run, WhatFailedIsNotVerifiedByItsBalance) {
   const record::Finding& balance = finding(r, "verification.energy");
   EXPECT_EQ(balance.status, record::Status::Bad);
   EXPECT_TRUE(std::isnan(balance.value));
+}
+
+TEST(Run, ListsTheMembersThatTheDeadLoadOverloads) {
+  std::string plan = house(charge("C-A*-0", "0.1 s"), "0.5 s");
+  const std::string load = "\"1 kN/m2\"";
+  plan.replace(plan.find(load), load.size(), "\"90 kN/m2\"");
+  const record::Record r = run_plan(read(plan), default_knowledge(), {}, {});
+  ASSERT_EQ(r.ending, "failed");
+  ASSERT_TRUE(r.time.empty());
+  const record::Finding& f = finding(r, "overloads");
+  EXPECT_EQ(f.status, record::Status::Bad);
+  EXPECT_GT(f.value, 1);
+  // the element that the ending names is of the first member, and its load is the largest
+  const size_t at = r.ending_text.find("element \"");
+  ASSERT_NE(at, std::string::npos) << r.ending_text;
+  const std::string element = r.ending_text.substr(at + 9, r.ending_text.find('"', at + 9) - at - 9);
+  const std::string worst = element.substr(0, element.find('/'));
+  EXPECT_NE(f.text.find(fmt::format("the most loaded first: {} {:.0f} %, ", worst, 100 * f.value)), std::string::npos)
+      << f.text;
+  EXPECT_NE(r.ending_text.find(fmt::format("loaded to {:.0f} %", 100 * f.value)), std::string::npos) << r.ending_text;
+  EXPECT_EQ(f.text.find(worst), f.text.rfind(worst)) << "named once: " << f.text;
 }
 
 TEST(Run, FindingsComeInTheOrderOfTheirWeight) {

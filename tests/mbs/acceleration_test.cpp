@@ -112,6 +112,7 @@ TEST(DeadLoad, IsFoundWhereHardlyAnyStiffnessIsLeft) {
   EXPECT_NEAR(Vec3(s.state.p[0]).z, 10 - 0.5, 1e-4) << "what is beyond 1 MN presses the soft column";
   EXPECT_LT(s.summary.equilibrium_iterations, 100);
   EXPECT_LT(s.summary.equilibrium_residual, 1e-8);
+  EXPECT_TRUE(s.summary.overloads.empty()) << "it stands";
 }
 
 TEST(DeadLoad, SaysWhatIsLeftWhereThereIsNone) {
@@ -124,6 +125,9 @@ TEST(DeadLoad, SaysWhatIsLeftWhereThereIsNone) {
   EXPECT_NE(message.find("element \"column 0\" would be loaded to 160 % of its capacity"), std::string::npos)
       << message;
   EXPECT_NE(message.find("times the weight, of body \"floor 0\";"), std::string::npos) << message;
+  ASSERT_EQ(s.summary.overloads.size(), 1u) << "column 1 carries 0.8 MN of 1 MN";
+  EXPECT_EQ(s.summary.overloads[0].element, 0u);
+  EXPECT_NEAR(s.summary.overloads[0].used, 1.6, 1e-3);
 }
 
 }  // namespace
