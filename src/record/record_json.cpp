@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/bytes.h"
+#include "record/building_plan.h"
 
 namespace topple::record {
 namespace {
@@ -134,6 +135,8 @@ json make_json(const Record& record, Packing packing) {
   for (const Neighbour& n : record.neighbours)
     neighbours.push_back({{"name", n.name}, {"footprint", to_json(n.footprint)}, {"is_utility", n.is_utility}});
   j["building_outline"] = to_json(record.building_outline);
+  json& plan = j["building_plan"] = json::array();
+  for (const auto& outline : calc_building_plan(record)) plan.push_back(to_json(outline));
   json& bodies = j["bodies"] = json::array();
   for (const BodyInfo& body : record.bodies) bodies.push_back(to_json(body));
   json& zones = j["zones"] = json::array();

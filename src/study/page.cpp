@@ -92,7 +92,7 @@ std::string to_page_json(const Problem& p, const StudyResult& r, const PageOrigi
   json neighbours = json::array();
   for (const Site::Area& a : p.site.neighbours)
     neighbours.push_back({{"name", a.name}, {"footprint", a.corners}, {"is_utility", a.is_utility}});
-  out["site"] = {{"footprint", p.site.footprint}, {"neighbours", neighbours}};
+  out["site"] = {{"footprint", p.site.footprint}, {"outlines", p.site.outlines}, {"neighbours", neighbours}};
   out["not_modelled"] = p.not_modelled;
   out["origin"] = {
       {"program_version", origin.program_version}, {"created", origin.created},         {"model", calc_model_hash(p)},

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "base/union_outline.h"
 #include "base/unit.h"
 #include "collapse/findings.h"
 #include "collapse/vibration.h"
@@ -70,6 +72,42 @@ Definition read_definition(const std::string& text) {
   return out;
 }
 
+/// Of what stands before the first charge, seen from above.
+std::vector<std::vector<std::array<double, 2>>> calc_outlines(const product::Plan& plan) {
+  std::vector<Rectangle> rectangles;
+  std::vector<std::vector<std::array<double, 2>>> rings;
+  for (const product::Member& m : plan.members) {
+    if (m.removed) continue;
+    if (m.shaft >= 0) {
+      constexpr int corners = 48;
+      auto& ring = rings.emplace_back();
+      const double radius = plan.shafts[static_cast<std::size_t>(m.shaft)].diameter_foot / 2;
+      for (int i = 0; i < corners; ++i) {
+        const double a = 2 * M_PI * i / corners;
+        ring.push_back({m.start.x + radius * std::cos(a), m.start.y + radius * std::sin(a)});
+      }
+      continue;
+    }
+    // half of its width, to the sides on which it has one
+    double half[2] = {0, 0};
+    const bool is_along_x = std::abs(m.end.x - m.start.x) > std::abs(m.end.y - m.start.y);
+    if (m.section >= 0) {
+      const product::Section& s = plan.sections[static_cast<std::size_t>(m.section)];
+      if (m.kind == product::MemberKind::Column)
+        half[0] = s.width / 2, half[1] = s.height / 2;
+      else
+        half[is_along_x ? 1 : 0] = s.width / 2;
+    } else if (m.kind == product::MemberKind::Wall && m.panel >= 0) {
+      half[is_along_x ? 1 : 0] = plan.panels[static_cast<std::size_t>(m.panel)].thickness / 2;
+    }
+    rectangles.push_back({{std::min(m.start.x, m.end.x) - half[0], std::min(m.start.y, m.end.y) - half[1]},
+                          {std::max(m.start.x, m.end.x) + half[0], std::max(m.start.y, m.end.y) + half[1]}});
+  }
+  std::vector<std::vector<std::array<double, 2>>> outlines = calc_union_outlines(rectangles);
+  outlines.insert(outlines.end(), rings.begin(), rings.end());
+  return outlines;
+}
+
 /// Seen from above, as the plan has it: around columns, slabs, walls and the feet of shafts.
 Site make_site(const product::Plan& plan) {
   Site site;
@@ -89,6 +127,7 @@ Site make_site(const product::Plan& plan) {
     }
   }
   if (low[0] <= high[0]) site.footprint = {{low[0], low[1]}, {high[0], low[1]}, {high[0], high[1]}, {low[0], high[1]}};
+  site.outlines = calc_outlines(plan);
   for (const product::Neighbour& n : plan.neighbours) site.neighbours.push_back({n.name, n.footprint, n.is_utility});
   return site;
 }

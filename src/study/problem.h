@@ -40,7 +40,8 @@ struct Site {
     std::vector<std::array<double, 2>> corners;  // counter-clockwise in W [m]
     bool is_utility = false;
   };
-  std::vector<std::array<double, 2>> footprint;  // of the building
+  std::vector<std::array<double, 2>> footprint;  // of the building: the rectangle around it, from which reaches count
+  std::vector<std::vector<std::array<double, 2>>> outlines;  // of its parts, without inner yards, counter-clockwise
   std::vector<Area> neighbours;
 };
 

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/file.h"
+#include "record/building_plan.h"
 #include "record/record.h"
 
 namespace topple::record {
@@ -85,6 +86,33 @@ json data_of_page(const std::string& page) {
   const std::string open = R"(<script type="application/json" id="topple-data">)";
   const std::size_t begin = page.find(open) + open.size();
   return json::parse(page.substr(begin, page.find("</script", begin) - begin));
+}
+
+TEST(ReportJson, OutlinesTheBuildingAsItIs) {
+  // an L of two slabs, the second turned by a quarter and settled by a millimetre; a shaft of two staves; later frames
+  // change nothing
+  Record r = make_record();
+  const Quat quarter{std::sqrt(0.5), 0, 0, std::sqrt(0.5)};
+  const Quat eighth{std::cos(M_PI / 8), 0, 0, std::sin(M_PI / 8)};
+  r.bodies.resize(3);
+  r.bodies[0] = {"S-A1B2-0", "slab", 0, 1, false, {{{{2, 1, 0}, {}}, {2, 1, 0.1}, "concrete"}}};
+  r.bodies[1] = {"S-A2B3-0", "slab", 0, 1, false, {{{}, {2, 0.5, 0.1}, "concrete"}}};
+  r.bodies[2] = {"tower/1", "shaft", 0, 1, false, {{{{0, 0, 0}, eighth}, {1, 1, 2}, "concrete"}}};
+  r.position = {0, 0, 3, 0.5F, 3.999F, 3, 20, 0, 2, 9, 9, 0, 9, 9, 0, 9, 9, 0};
+  r.orientation.clear();
+  for (int frame = 0; frame < 2; ++frame)
+    for (const Quat& q : {Quat{}, quarter, Quat{}})
+      for (const double c : {q.w, q.x, q.y, q.z}) r.orientation.push_back(static_cast<float>(c));
+  const json plan = json::parse(to_report_json(r))["building_plan"];
+  ASSERT_EQ(plan.size(), 2U) << plan;
+  const double l[6][2] = {{0, 0}, {4, 0}, {4, 2}, {1, 2}, {1, 6}, {0, 6}};
+  ASSERT_EQ(plan[0].size(), 6U) << plan;
+  for (size_t i = 0; i < 6; ++i)
+    for (size_t k = 0; k < 2; ++k) EXPECT_NEAR(plan[0][i][k].get<double>(), l[i][k], 0.002) << i;
+  ASSERT_EQ(plan[1].size(), 4U) << "a square on its corner";
+  EXPECT_NEAR(plan[1][0][0].get<double>(), 20 - std::sqrt(2), 1e-6);
+  r.time.clear();
+  EXPECT_TRUE(calc_building_plan(r).empty()) << "nothing is known of where it stood";
 }
 
 TEST(ReportJson, CarriesEveryPartOfTheRecord) {

@@ -142,6 +142,29 @@ product::Plan read_limited(const std::string& clearance) {
   return product::read_plan(text, "plan.toml", warnings);
 }
 
+TEST(PlanModel, OutlinesTheBuildingAsItIs) {
+  // of 5 x 8 m, without the bay at B3: a slab of 5 x 4 m with beams of 0.3 m and columns of 0.4 x 0.5 m on its edges,
+  // and the row's last bay as a strip of a beam
+  product::Plan plan = read_small(strengths);
+  const std::size_t whole = make_plan_problem(plan, quick()).site.outlines.size();
+  EXPECT_EQ(whole, 1u);
+  for (product::Member& m : plan.members)
+    m.removed = m.removed || (m.row_b == 1 && m.frame_b == 2) || m.kind == product::MemberKind::Wall;
+  const Site site = make_plan_problem(plan, quick()).site;
+  ASSERT_EQ(site.outlines.size(), 1u);
+  double area = 0;
+  const auto& loop = site.outlines[0];
+  for (std::size_t i = 0; i < loop.size(); ++i) {
+    const auto &a = loop[i], &b = loop[(i + 1) % loop.size()];
+    area += 0.5 * (a[0] * b[1] - b[0] * a[1]);
+  }
+  // slab; beams on its four edges and along the strip; what columns cover beside both
+  const double beams = 2 * 5 * 0.15 + 2 * 4 * 0.15 + 4 * 0.3;
+  EXPECT_GT(area, 5 * 4 + beams - 0.3);
+  EXPECT_LT(area, 5 * 4 + beams + 5 * 0.4 * 0.5);
+  for (const auto& p : loop) EXPECT_TRUE(p[0] < 0.21 || p[1] < 4.26) << p[0] << ", " << p[1];
+}
+
 TEST(PlanModel, JudgesReachAndClearances) {
   const Problem p = make_plan_problem(read_limited("3 m"), quick());
   ASSERT_EQ(p.limits.size(), 2u);

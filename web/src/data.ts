@@ -84,7 +84,8 @@ export interface Run {
   plan_values: { group: string; key: string; value: string }[];
   events: RunEvent[];
   neighbours: Neighbour[];
-  building_outline: Point[];
+  building_outline: Point[]; // convex
+  building_plan?: Point[][]; // of its parts, as they are; none in pages of earlier versions
   bodies: Body[];
   zones: Zone[];
   time: number[]; // (S)
@@ -92,6 +93,22 @@ export interface Run {
   frames: Frame[]; // (S)
   study?: StudySummary; // of the same building
   others?: { engine: string; title: string; sentences: string[] }[]; // other computations of it; A is this run
+}
+
+function calcArea(corners: readonly Point[]): number {
+  return corners.reduce((sum, [x, y], i) => {
+    const [nx, ny] = corners[(i + 1) % corners.length] as Point;
+    return sum + (x * ny - nx * y) / 2;
+  }, 0);
+}
+
+/// The lines of the building on the ground: its parts as they are, and the convex outline from which reaches count
+/// where that is another one; empty where it is not.
+export function findBuildingLines(run: Pick<Run, "building_outline" | "building_plan">): { plans: Point[][]; hull: Point[] } {
+  const plans = (run.building_plan ?? []).filter((p) => p.length > 2);
+  const hull = run.building_outline, area = calcArea(hull);
+  const isSame = plans.some((p) => Math.abs(calcArea(p) - area) <= 0.02 * area);
+  return { plans, hull: hull.length > 1 && !isSame ? hull : [] };
 }
 
 /// What a fuzzy study found, as its results.json says it.

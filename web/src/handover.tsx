@@ -1,6 +1,6 @@
 /// What the report hands over beside the findings: when they would not hold, the site from above, assumptions,
 /// verification, what fuzzy values do, and the words it uses.
-import { calcPose, type Finding, type Point, type Quadruple, rotate, type Run, shorten, type StudySummary, type Triple } from "./data";
+import { calcPose, type Finding, findBuildingLines, type Point, type Quadruple, rotate, type Run, shorten, type StudySummary, type Triple } from "./data";
 import { FindingRow, findLimit, findVerdict, isOfPlace } from "./findings";
 import { StatusSign } from "./signs";
 import { unitWord } from "./study/data";
@@ -122,7 +122,8 @@ export function SitePlan(props: { run: Run }) {
   const { run } = props;
   const width = useChartWidth(640);
   const parts = findFallenParts(run);
-  const points = [...run.building_outline, ...run.neighbours.flatMap((n) => n.footprint), ...parts.flat()].filter((p) => Number.isFinite(p[0] + p[1]));
+  const { plans, hull } = findBuildingLines(run);
+  const points = [...run.building_outline, ...plans.flat(), ...run.neighbours.flatMap((n) => n.footprint), ...parts.flat()].filter((p) => Number.isFinite(p[0] + p[1]));
   if (points.length === 0) return null;
   const lows = [0, 1].map((k) => points.reduce((least, p) => Math.min(least, p[k] as number), Infinity)) as [number, number];
   const highs = [0, 1].map((k) => points.reduce((most, p) => Math.max(most, p[k] as number), -Infinity)) as [number, number];
@@ -158,13 +159,14 @@ export function SitePlan(props: { run: Run }) {
         {run.neighbours.map((n) => (
           <path class={n.is_utility ? "utility-area" : "neighbour-area"} d={path(n.footprint)}><title data-name>{n.name}</title></path>
         ))}
-        <path class="footprint" d={path(run.building_outline)} />
+        {hull.length > 0 && <path class="reach-line" d={path(hull)} />}
+        <path class="footprint" d={plans.map(path).join("")} />
         {run.neighbours.map((n) => {
           const corner = n.footprint[0];
           return corner === undefined ? null : <text class="level-text" x={x(corner[0])} y={y(corner[1]) - 4} text-anchor={x(corner[0]) > 0.7 * width ? "end" : "start"} data-name>{n.name}</text>;
         })}
       </svg>
-      <p class="quiet plot-note">Strong line: the building before the first charge. Grey: all parts at the end of the run. No distance on this plan is a safe distance.</p>
+      <p class="quiet plot-note">{plans.length > 0 ? "Strong line: the building before the first charge." : ""} {hull.length > 0 ? "Thin line: the convex outline around what charges act on, from which reaches count." : ""} Grey: all parts at the end of the run. No distance on this plan is a safe distance.</p>
     </section>
   );
 }

@@ -1,6 +1,6 @@
 /// What stands still: ground, grid, outline of the building, neighbours, axes.
 import * as THREE from "three";
-import type { Point, Run } from "./data";
+import { findBuildingLines, type Point, type Run } from "./data";
 
 export interface Theme {
   background: string;
@@ -107,8 +107,9 @@ export class Site {
     };
     this.addGround(area);
     const width = Math.max(0.12, height * 0.008);
-    if (run.building_outline.length >= 2)
-      this.group.add(new THREE.Mesh(makeRibbon(run.building_outline, true, width, 0.03), this.materials.outline));
+    const { plans, hull } = findBuildingLines(run);
+    for (const plan of plans) this.group.add(new THREE.Mesh(makeRibbon(plan, true, width, 0.03), this.materials.outline));
+    if (hull.length >= 2) this.group.add(new THREE.Mesh(makeRibbon(hull, true, width / 3, 0.03), this.materials.outline));
     for (const neighbour of run.neighbours) this.addNeighbour(neighbour.name, neighbour.footprint, neighbour.is_utility, height, width);
     const outline = new THREE.Box3();
     for (const [x, y] of run.building_outline) outline.expandByPoint(new THREE.Vector3(x, y, 0));

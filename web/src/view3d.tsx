@@ -1,5 +1,6 @@
 import { effect } from "@preact/signals";
 import { useMemo, useState } from "preact/hooks";
+import { findBuildingLines } from "./data";
 import { Scene, type View } from "./scene";
 import { LookChoices, SceneCanvas } from "./scene_canvas";
 import { useSceneView } from "./scene_view";
@@ -22,6 +23,7 @@ export function Legend(props: { state: State; gridStep: number }) {
   const materials = useMemo(() => findMaterials(run), [run]);
   const colouring = state.colouring.value;
   const marks = state.zoneMarks.value;
+  const { plans, hull } = useMemo(() => findBuildingLines(run), [run]);
   const buildings = run.neighbours.some((n) => !n.is_utility);
   const utilities = run.neighbours.some((n) => n.is_utility);
   return (
@@ -65,9 +67,14 @@ export function Legend(props: { state: State; gridStep: number }) {
       )}
       <div class="legend-row quiet">
         <span>Grid {props.gridStep} m</span>
-        {run.building_outline.length > 1 && (
+        {plans.length > 0 && (
           <span class="with-sign">
             <i class="line-swatch outline" /> outline before the first charge
+          </span>
+        )}
+        {hull.length > 0 && (
+          <span class="with-sign">
+            <i class="line-swatch outline thin" /> convex outline, from which reaches count
           </span>
         )}
         {buildings && (

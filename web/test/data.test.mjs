@@ -379,6 +379,18 @@ describe("limits of the plan", () => {
   });
 });
 
+describe("lines of the building", () => {
+  it("are its parts, and the convex outline where that is another one", async () => {
+    const { findBuildingLines } = await load("data.ts");
+    const hull = [[0, 0], [4, 0], [4, 2], [1, 6], [0, 6]];
+    const l = [[0, 0], [4, 0], [4, 2], [1, 2], [1, 6], [0, 6]];
+    assert.deepEqual(findBuildingLines({ building_outline: hull, building_plan: [l] }), { plans: [l], hull });
+    assert.deepEqual(findBuildingLines({ building_outline: hull, building_plan: [hull] }), { plans: [hull], hull: [] });
+    assert.deepEqual(findBuildingLines({ building_outline: hull }), { plans: [], hull }, "a page of an earlier version");
+    assert.deepEqual(findBuildingLines({ building_outline: [], building_plan: [] }), { plans: [], hull: [] });
+  });
+});
+
 describe("axes on the ground", () => {
   it("stand at a corner where the picture shows them whole, and stay there while it does", async () => {
     const { Site } = await load("site.ts");

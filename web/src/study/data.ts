@@ -125,7 +125,7 @@ export interface Study {
   fans: Fan[];
   debris: Debris[];
   run_table: RunTable;
-  site: { footprint: Point[]; neighbours: { name: string; footprint: Point[]; is_utility: boolean }[] };
+  site: { footprint: Point[]; outlines?: Point[][]; neighbours: { name: string; footprint: Point[]; is_utility: boolean }[] };
   not_modelled: string[];
   origin: { program_version: string; created: string; model: string; kind: string; source_name: string; source: string };
 }

@@ -195,9 +195,9 @@ function findOutlines(levels: readonly { alpha: number; corners: Point[] }[]): O
 }
 
 /// Names above, below or within the neighbours, degrees on their outlines. In units of the picture.
-function label(outlines: readonly Outline[], neighbours: readonly { name: string; corners: Point[] }[], footprint: readonly Point[]): Label[] {
+function label(outlines: readonly Outline[], neighbours: readonly { name: string; corners: Point[] }[], buildings: readonly (readonly Point[])[]): Label[] {
   const lines = outlines.map((o) => walk(o.corners, 8));
-  const building = walk(footprint, 8);
+  const building = buildings.flatMap((b) => walk(b, 8));
   const areas = neighbours.flatMap((n) => walk(n.corners, 8));
   return [
     ...neighbours.map(({ name, corners }): Label => {
@@ -220,6 +220,8 @@ export function DebrisPlan(props: { state: State }) {
   const width = useChartWidth(700);
   const debris = study.debris[Math.min(chosen, study.debris.length - 1)];
   if (debris === undefined) return null;
+  // pages of earlier versions have the rectangle around it
+  const buildings = study.site.outlines !== undefined && study.site.outlines.length > 0 ? study.site.outlines : [study.site.footprint];
   const points = [...study.site.footprint, ...study.site.neighbours.flatMap((n) => n.footprint), ...study.debris.flatMap((d) => d.levels.flatMap((l) => l.corners))];
   const xs = findRange(points.map((p) => p[0])), ys = findRange(points.map((p) => p[1]));
   const margin = 34;
@@ -233,7 +235,7 @@ export function DebrisPlan(props: { state: State }) {
   // as many as their numbers have room for, in a narrow plan as well
   const countTicks = (range: readonly [number, number]): number => Math.max(1, Math.min(8, Math.floor((factor * (range[1] - range[0])) / 45)));
   const outlines = findOutlines(debris.levels.map((l) => ({ alpha: l.alpha, corners: toPicture(l.corners) })));
-  const labels = label(outlines, study.site.neighbours.map((n) => ({ name: n.name, corners: toPicture(n.footprint) })), toPicture(study.site.footprint));
+  const labels = label(outlines, study.site.neighbours.map((n) => ({ name: n.name, corners: toPicture(n.footprint) })), buildings.map(toPicture));
   const places = placeLabels(labels, { left: margin, right: width, top: 0, foot: height - margin });
   return (
     <section class="panel plot" aria-label="Debris" data-test="debris">
@@ -262,7 +264,7 @@ export function DebrisPlan(props: { state: State }) {
           <path class={n.is_utility ? "utility-area" : "neighbour-area"} d={pathOf(n.footprint, x, y)}><title data-name>{n.name}</title></path>
         ))}
         {debris.levels.map((l) => <path class="debris" d={pathOf(l.corners, x, y)} />)}
-        <path class="footprint" d={pathOf(study.site.footprint, x, y)} />
+        <path class="footprint" d={buildings.map((b) => pathOf(b, x, y)).join("")} />
         {places.map((place, i) => place !== undefined && (
           <text class="level-text" x={place[0]} y={place[1] + 4} text-anchor="middle">{labels[i]?.text}</text>
         ))}
