@@ -392,7 +392,7 @@ int write_report_file(const Arguments& a) {
     if (!a.study_results.empty()) extras.study = read_study(a.study_results, r.provenance.title);
     for (const std::string& path : a.other_records) {
       const record::Record other = record::read_hdf5(path);
-      const record::Comparison c = record::compare(r, other);
+      const record::Comparison c = record::compare(r, other, a.input, path);
       tell_of_other_title(path, other.provenance.title, r.provenance.title);
       extras.others.push_back({c.name_b, other.provenance.title, record::summarise(c)});
     }

@@ -15,7 +15,7 @@ int compare_records(const Arguments& a) {
     std::vector<record::Photo> photos;
     if (!a.fe.photos.empty()) photos = record::read_photos(a.fe.photos);
     tell_of_other_title(a.fe.second, second.provenance.title, first.provenance.title);
-    const record::Comparison c = record::compare(first, second);
+    const record::Comparison c = record::compare(first, second, a.input, a.fe.second);
     make_folder(a.output);
     const auto in = [&a](const char* name) { return (std::filesystem::path(a.output) / name).string(); };
     const std::string text = record::describe(c, first, second), data = record::to_json(c, first);

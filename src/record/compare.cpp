@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -96,18 +97,49 @@ json numbers(const std::vector<double>& values) {
   return list;
 }
 
-/// "native (multibody)" would be wrong for others: the engine's name, numbered where both are alike.
-void name_both(const Record& a, const Record& b, Comparison& c) {
+/// "native (multibody)" would be wrong for others: the engine's name, with the file's or a number where both are alike.
+void name_both(const Record& a, const Record& b, const std::string& path_a, const std::string& path_b, Comparison& c) {
   c.name_a = a.provenance.engine.empty() ? "A" : a.provenance.engine;
   c.name_b = b.provenance.engine.empty() ? "B" : b.provenance.engine;
-  if (c.name_a == c.name_b) c.name_a += " (first)", c.name_b += " (second)";
+  if (c.name_a != c.name_b) return;
+  const auto [of_a, of_b] = tell_files_apart(path_a, path_b);
+  const bool is_known = !of_a.empty() && !of_b.empty();
+  c.name_a += is_known ? fmt::format(" ({})", of_a) : " (first)";
+  c.name_b += is_known ? fmt::format(" ({})", of_b) : " (second)";
+}
+
+/// A number in a column, "-" where there is none.
+std::string cell(double value, int width, int digits) {
+  if (!std::isfinite(value)) return fmt::format("{:>{}}", "-", width);
+  const double unit = std::pow(10, digits);
+  return fmt::format("{:{}.{}f}", std::round(value * unit) / unit + 0.0, width, digits);  // no -0.00
 }
 
 }  // namespace
 
-Comparison compare(const Record& a, const Record& b) {
+std::pair<std::string, std::string> tell_files_apart(const std::string& a, const std::string& b) {
+  namespace fs = std::filesystem;
+  const auto split = [](const std::string& path) {
+    std::error_code unknown;
+    fs::path whole = fs::weakly_canonical(path, unknown);
+    if (unknown) whole = fs::path(path).lexically_normal();
+    std::vector<std::string> parts;
+    for (const fs::path& p : whole) parts.push_back(p.string());
+    return parts;
+  };
+  if (a.empty() || b.empty()) return {};
+  std::vector<std::string> of_a = split(a), of_b = split(b);
+  const bool are_files_alike = of_a.back() == of_b.back();
+  while (!of_a.empty() && !of_b.empty() && of_a.back() == of_b.back()) of_a.pop_back(), of_b.pop_back();
+  if (of_a.empty() || of_b.empty()) return {};
+  if (are_files_alike) return {of_a.back(), of_b.back()};
+  const std::string stem_a = fs::path(of_a.back()).stem().string(), stem_b = fs::path(of_b.back()).stem().string();
+  return stem_a == stem_b ? std::pair{of_a.back(), of_b.back()} : std::pair{stem_a, stem_b};
+}
+
+Comparison compare(const Record& a, const Record& b, const std::string& path_a, const std::string& path_b) {
   Comparison c;
-  name_both(a, b, c);
+  name_both(a, b, path_a, path_b, c);
   if (!a.time.empty() && !b.time.empty())
     for (const double t : a.time)
       if (t >= b.time.front() && t <= b.time.back()) c.time.push_back(t);
@@ -245,10 +277,10 @@ std::string describe(const Comparison& c, const Record& a, const Record& b) {
   const size_t rows = std::min<size_t>(12, c.time.size());
   for (size_t k = 0; k < rows; ++k) {
     const size_t i = rows > 1 ? k * (c.time.size() - 1) / (rows - 1) : 0;
-    line(fmt::format("{:6.2f} {:10.2f} {:8.2f} {:10.2f} {:10.2f} {:9.2f} {:9.2f} {:12.3f} {:8.2f}", c.time[i],
-                     at(tilt, true, i, unit::deg), at(tilt, false, i, unit::deg), at(kinetic, true, i, 1e6),
-                     at(kinetic, false, i, 1e6), at(force, true, i, 1e6), at(force, false, i, 1e6), c.rms[i],
-                     c.largest[i]));
+    line(fmt::format("{:6.2f} {} {} {} {} {} {} {} {}", c.time[i], cell(at(tilt, true, i, unit::deg), 10, 2),
+                     cell(at(tilt, false, i, unit::deg), 8, 2), cell(at(kinetic, true, i, 1e6), 10, 2),
+                     cell(at(kinetic, false, i, 1e6), 10, 2), cell(at(force, true, i, 1e6), 9, 2),
+                     cell(at(force, false, i, 1e6), 9, 2), cell(c.rms[i], 12, 3), cell(c.largest[i], 8, 2)));
   }
   if (!c.touchdowns.empty()) line(fmt::format("\nTouchdowns, the first of {}:", c.touchdowns.size()));
   for (size_t i = 0; i < std::min<size_t>(10, c.touchdowns.size()); ++i)

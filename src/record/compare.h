@@ -2,6 +2,7 @@
 /// Two records of one building beside each other, e.g. of the multibody model and of finite elements (docs/compare.md).
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "record/record.h"
@@ -21,8 +22,9 @@ struct TouchdownPair {
 };
 
 struct Comparison {
-  std::string name_a, name_b;  // what moved the building: "native", "finite elements"
-  std::vector<double> time;    // frames of A within the time that both have [s]       (T)
+  // what moved the building: "native", "finite elements"; where both are alike with what tells their files apart
+  std::string name_a, name_b;
+  std::vector<double> time;  // frames of A within the time that both have [s]       (T)
   // with three bodies in common also "lean_compared", the angle from the vertical of all of them by least squares
   std::vector<SeriesPair> series;
   std::string points;                     // a sentence: what was compared by position
@@ -42,8 +44,13 @@ struct Comparison {
   double centre_difference = 0;             // largest distance of mass centres [m]
 };
 
+/// Of two paths the last parts that differ, without extension: "left", "right" of left/record.h5 and right/record.h5.
+/// Both empty where they are one file.
+std::pair<std::string, std::string> tell_files_apart(const std::string& a, const std::string& b);
+
 /// Throws InputError E680: records without a frame in common time.
-Comparison compare(const Record& a, const Record& b);
+///   path_a, path_b  where they come from, for names; may be empty
+Comparison compare(const Record& a, const Record& b, const std::string& path_a = {}, const std::string& path_b = {});
 
 /// How they differ, in a sentence each: touchdown, tilt, mass centres, lean at the end.
 std::vector<std::string> summarise(const Comparison&);

@@ -238,6 +238,8 @@ records)
   expect 0 "$topple" compare r/record.h5 r/record.h5 -o c
   has out "A  native (first)"; has out "Mass centres up to then: at most 0.00 m apart"; is_json c/compare.json
   for f in compare.txt compare.csv; do exists c/$f; done
+  mkdir -p twin; cp r/record.h5 twin/record.h5
+  expect 0 "$topple" compare r/record.h5 twin/record.h5 -o c; has out "A  native (r)"; has out "B  native (twin)"
   lacks err "of one building"
   if [ -s "$source/web/dist/compare.html" ]; then
     # a disk that is full before the page, which is the largest

@@ -191,6 +191,33 @@ TEST(Compare, WritesTablesThatHoldTheNumbers) {
   EXPECT_TRUE(j["touchdown"][0].is_null());
 }
 
+TEST(Compare, NamesRecordsOfOneEngineByTheirFiles) {
+  const auto apart = [](const char* a, const char* b) { return tell_files_apart(a, b); };
+  using Names = std::pair<std::string, std::string>;
+  EXPECT_EQ(apart("left/record.h5", "right/record.h5"), Names("left", "right"));
+  EXPECT_EQ(apart("left/out/record.h5", "right/./out/record.h5"), Names("left", "right"));
+  EXPECT_EQ(apart("out/v1.5.h5", "out/v1.6.h5"), Names("v1.5", "v1.6"));
+  EXPECT_EQ(apart("out/run.h5", "out/run.hdf5"), Names("run.h5", "run.hdf5"));
+  EXPECT_EQ(apart("out/../left/record.h5", "left/record.h5"), Names());
+  EXPECT_EQ(apart("", "left/record.h5"), Names());
+  const Record a = make_run("native", 0.25, 3, 1, 0, 1), b = make_run("native", 0.25, 3, 1, 0.5, 1);
+  const Comparison c = compare(a, b, "left/record.h5", "right/record.h5");
+  EXPECT_EQ(c.name_a, "native (left)");
+  EXPECT_EQ(c.name_b, "native (right)");
+  const Record other = make_run("finite elements", 0.25, 3, 1, 0.5, 1);
+  EXPECT_EQ(compare(a, other, "left/record.h5", "right/record.h5").name_b, "finite elements");
+}
+
+TEST(Compare, PrintsNoNumberWhereThereIsNone) {
+  Record a = make_run("a", 0.25, 3, 1, 0, 1), b = make_run("b", 0.25, 3, 1, 2, 1);
+  b.bodies[0].name = "piece 1", b.bodies[1].name = "piece 2";
+  b.series.clear();
+  const std::string text = describe(compare(a, b), a, b);
+  EXPECT_EQ(text.find("nan"), std::string::npos) << text;
+  EXPECT_THAT(
+      text, HasSubstr("  0.00          -        -          -          -         -         -            -        -\n"));
+}
+
 class Photos : public testing::Test {
  protected:
   std::string write(const std::string& name, const std::string& text) const {
