@@ -51,7 +51,7 @@ mbs::Body make_body(const Assembly& assembly, const Knowledge& k) {
   return body;
 }
 
-std::vector<record::BoxShape> make_shapes(const Assembly& assembly, const Vec3& p_WB) {
+std::vector<record::BoxShape> make_shapes(const Assembly& assembly, const Vec3& p_WB, const product::Plan& plan) {
   std::vector<record::BoxShape> shapes;
   for (const Part& p : assembly.parts) {
     if (!p.is_solid) continue;
@@ -59,6 +59,11 @@ std::vector<record::BoxShape> make_shapes(const Assembly& assembly, const Vec3& 
     s.X_BS = {p.centre - p_WB, turn_of(p)};
     s.half = p.half;
     s.material = p.material;
+    s.part = assembly.kind;
+    if (p.member >= 0) {
+      const product::MemberKind kind = plan.members[static_cast<size_t>(p.member)].kind;
+      if (kind == product::MemberKind::Slab || kind == product::MemberKind::Wall) s.part = product::name_of(kind);
+    }
     shapes.push_back(s);
   }
   return shapes;

@@ -42,7 +42,7 @@ Part make_part(const Vec3& low, const Vec3& high, double mass, int member, const
 mbs::Body make_body(const Assembly&, const Knowledge&);
 
 /// The parts as they are drawn, in the frame of a body at p_WB along W.
-std::vector<record::BoxShape> make_shapes(const Assembly&, const Vec3& p_WB);
+std::vector<record::BoxShape> make_shapes(const Assembly&, const Vec3& p_WB, const product::Plan&);
 
 constexpr double kSliver = 0.01;  // shorter pieces of a member go with a cut beside them [m]
 

@@ -239,7 +239,7 @@ void Builder::add_events(std::vector<Firing> schedule) {
   for (size_t b = 0; b < current.size(); ++b) {
     map.bodies[b].volume = volume_of(current[b]);
     if (current[b].mass() != assemblies[b].mass())
-      map.bodies[b].shapes = make_shapes(current[b], model.bodies[b].X_WB.p);
+      map.bodies[b].shapes = make_shapes(current[b], model.bodies[b].X_WB.p, plan);
   }
 }
 

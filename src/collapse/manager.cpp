@@ -499,7 +499,7 @@ void Builder::finish_bodies() {
       continue;
     }
     mbs::Body body = make_body(a, k);
-    BodyEntry entry{a.name, a.kind, a.storey, false, make_shapes(a, body.X_WB.p)};
+    BodyEntry entry{a.name, a.kind, a.storey, false, make_shapes(a, body.X_WB.p, plan)};
     entry.is_upper = !a.fixed && !(a.storey == 0 && (a.kind == "column" || a.kind == "wall"));
     entry.volume = volume_of(a);
     map.mass += body.mass;

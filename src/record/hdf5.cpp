@@ -563,6 +563,8 @@ void transfer(Archive& a, Record& r, Flat& flat) {
   a.column("shapes/half", flat.shapes, [](auto& row) -> auto& { return row.value.half; },
            {.unit = "m", .frame = "shape", .meaning = "half edges"});
   a.column("shapes/material", flat.shapes, [](auto& row) -> auto& { return row.value.material; }, {});
+  if (a.has("shapes/part"))  // not in records of earlier versions
+    a.column("shapes/part", flat.shapes, [](auto& row) -> auto& { return row.value.part; }, {});
 
   a.first_column("zones/name", r.zones, &ZoneInfo::name, {});
   a.column("zones/member", r.zones, &ZoneInfo::member, {});

@@ -12,9 +12,10 @@
 namespace topple::record {
 
 struct BoxShape {
-  Pose X_BS;             // centre of the box in the body's frame
-  Vec3 half;             // half edges [m]
-  std::string material;  // "concrete", "masonry", "ground"; chooses the colour
+  Pose X_BS;              // centre of the box in the body's frame
+  Vec3 half;              // half edges [m]
+  std::string material;   // "concrete", "masonry", "ground"; chooses the colour
+  std::string part = {};  // as BodyInfo::kind: what it is of a body that carries slabs and walls; empty: not known
 };
 
 struct BodyInfo {

@@ -43,7 +43,8 @@ json to_json(const BodyInfo& body) {
     shapes.push_back({{"centre", to_json(shape.X_BS.p)},
                       {"orientation", {number(q.w), number(q.x), number(q.y), number(q.z)}},
                       {"half", to_json(shape.half)},
-                      {"material", shape.material}});
+                      {"material", shape.material},
+                      {"part", shape.part}});
   }
   return {{"name", body.name},         {"kind", body.kind},   {"storey", body.storey},
           {"mass", number(body.mass)}, {"fixed", body.fixed}, {"shapes", std::move(shapes)}};

@@ -137,6 +137,34 @@ TEST(Manager, ShapesOfPartsThatAreNotJoinedKeepApart) {
         }
 }
 
+TEST(Manager, ShapesSayWhatTheyAre) {
+  // walls of 27 cm on all sides: those along x are bodies of their own, those along y belong to the joints; nothing
+  // else is as thick, nor as the slabs are
+  std::string text = house(charge("C-A*-0"));
+  const std::string thin = "[wall.thin]\nthickness = \"10 cm\"";
+  text.replace(text.find(thin), thin.size(), "[wall.thin]\nthickness = \"27 cm\"");
+  const product::Plan plan = read(text);
+  double slab = 0;
+  for (const product::Panel& p : plan.panels)
+    if (p.name == "floor") slab = p.thickness;
+  const Built b = build(plan);
+  int in_walls = 0, in_joints = 0, slabs = 0;
+  for (const BodyEntry& body : b.map.bodies)
+    for (const record::BoxShape& s : body.shapes) {
+      const bool is_wall = std::abs(2 * std::min(s.half.x, s.half.y) - 0.27) < 1e-9;
+      EXPECT_EQ(s.part == "wall", is_wall) << body.name << " " << s.part;
+      const bool is_slab = std::abs(2 * s.half.z - slab) < 1e-9;
+      EXPECT_EQ(s.part == "slab", is_slab) << body.name << " " << s.part;
+      EXPECT_TRUE(is_wall || is_slab || s.part == body.kind) << body.name << " " << s.part;
+      in_walls += s.part == "wall" && body.kind == "wall";
+      in_joints += s.part == "wall" && body.kind == "node";
+      slabs += s.part == "slab";
+    }
+  EXPECT_GT(in_walls, 0);
+  EXPECT_GT(in_joints, 0);
+  EXPECT_GT(slabs, 0);
+}
+
 TEST(Manager, MassIsExactForEveryKindOfPlan) {
   const std::string front = charge("C-A*-0");
   for (const std::string& text :

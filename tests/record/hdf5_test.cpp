@@ -33,7 +33,8 @@ bool same(const std::array<double, 2>& a, const std::array<double, 2>& b) {
   return same(a[0], b[0]) && same(a[1], b[1]);
 }
 bool same(const BoxShape& a, const BoxShape& b) {
-  return same(a.X_BS.p, b.X_BS.p) && same(a.X_BS.q, b.X_BS.q) && same(a.half, b.half) && a.material == b.material;
+  return same(a.X_BS.p, b.X_BS.p) && same(a.X_BS.q, b.X_BS.q) && same(a.half, b.half) && a.material == b.material &&
+         a.part == b.part;
 }
 template <class T>
 bool same(const std::vector<T>& a, const std::vector<T>& b) {

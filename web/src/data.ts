@@ -10,6 +10,7 @@ export interface Shape {
   orientation: Quadruple; // w x y z
   half: Triple; // half edges [m]
   material: string;
+  part?: string; // what it is of a body that carries slabs and walls; empty or none: not known
 }
 export interface Body {
   name: string;

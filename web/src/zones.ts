@@ -25,9 +25,10 @@ export function findBody(run: Run, subject: string): number {
   return member >= 0 ? member : Math.max(zone.body_a, zone.body_b);
 }
 
-/// What a shape of a column or beam is: members carry the panels that are cast to them. A shape of at most 20 cm is a
-/// slab if it lies and a wall if it stands.
+/// What a shape of a column or beam is: members carry the panels that are cast to them. Where the record does not say, a
+/// shape of at most 20 cm is a slab if it lies and a wall if it stands.
 export function partOfShape(body: Body, shape: Shape): string {
+  if (shape.part !== undefined && shape.part !== "") return shape.part;
   if (body.kind !== "column" && body.kind !== "beam" && body.kind !== "node") return body.kind;
   const least = Math.min(...shape.half);
   if (!(2 * least <= 0.2001)) return body.kind;

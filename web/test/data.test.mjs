@@ -158,6 +158,10 @@ describe("parts", () => {
     assert.equal(partOfShape({ kind: "column" }, shape([0.05, 0.9, 0.4])), "wall");
     // a quarter turn about y lays the thin direction of a standing panel upright
     assert.equal(partOfShape(beam, shape([0.05, 0.9, 0.4], [Math.SQRT1_2, 0, Math.SQRT1_2, 0])), "slab");
+    // a record that says so: walls along y belong to joints, and may be thick
+    assert.equal(partOfShape({ kind: "node" }, { ...shape([0.12, 0.9, 0.4]), part: "wall" }), "wall");
+    assert.equal(partOfShape({ kind: "column" }, { ...shape([0.09, 0.09, 1.2]), part: "column" }), "column", "a slender one");
+    assert.equal(partOfShape({ kind: "column" }, { ...shape([0.05, 0.9, 0.4]), part: "" }), "wall", "not known");
     assert.equal(partOfShape({ kind: "debris" }, shape([0.05, 0.9, 0.4])), "debris");
   });
 });
