@@ -181,7 +181,7 @@ void tell_failing_charges(const product::Plan& plan, const ModelMap& map, Record
     if (!f.fails || f.time <= after) continue;
     const product::Charge& c = plan.stages[static_cast<size_t>(f.stage)].charges[static_cast<size_t>(f.charge)];
     const std::string& name = plan.members[static_cast<size_t>(c.member)].name;
-    recorder.add_event({f.time, "charge", name, fmt::format("the charge of {} does not fire", name)});
+    recorder.add_coming_event({f.time, "charge", name, fmt::format("the charge of {} does not fire", name)});
   }
 }
 

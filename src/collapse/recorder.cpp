@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <optional>
 #include <set>
@@ -492,8 +493,22 @@ void Recorder::add_frame(const mbs::View& v) {
 }
 
 void Recorder::add_event(record::Event event) {
+  tell_coming(event.time);
   record::add_event(record_, std::move(event));
   if (callbacks_.on_event) callbacks_.on_event(record_.events.back());
+}
+
+void Recorder::add_coming_event(record::Event event) {
+  const auto at = std::upper_bound(coming_.begin(), coming_.end(), event,
+                                   [](const record::Event& a, const record::Event& b) { return a.time < b.time; });
+  coming_.insert(at, event);
+  record::add_event(record_, std::move(event));
+}
+
+void Recorder::tell_coming(double until) {
+  const auto end = std::find_if(coming_.begin(), coming_.end(), [&](const auto& e) { return e.time > until; });
+  if (callbacks_.on_event) std::for_each(coming_.begin(), end, callbacks_.on_event);
+  coming_.erase(coming_.begin(), end);
 }
 
 void Recorder::add_happening(const mbs::Happening& h) {
@@ -603,6 +618,7 @@ void Recorder::add_happening(const mbs::Happening& h) {
 }
 
 void Recorder::finish() {
+  tell_coming(std::numeric_limits<double>::infinity());
   std::stable_sort(record_.events.begin(), record_.events.end(),
                    [](const record::Event& a, const record::Event& b) { return a.time < b.time; });
 }

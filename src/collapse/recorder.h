@@ -45,6 +45,8 @@ class Recorder {
   void add_frame(const mbs::View&);
   void add_happening(const mbs::Happening&);
   void add_event(record::Event);
+  /// One that is known beforehand: the callback is told of it in its turn.
+  void add_coming_event(record::Event);
   /// Series and events are complete after this.
   void finish();
   /// Goes on where another recorder of the same bodies was at a time; its frames and events stay there.
@@ -78,6 +80,8 @@ class Recorder {
   }
 
  private:
+  /// To the callback.
+  void tell_coming(double until);
   record::Series& series(size_t i) { return record_.series[i]; }
   std::vector<BlockFrame> calc_blocks(const mbs::View&) const;
   /// Ends of what is drawn that recede as members are crushed.
@@ -97,6 +101,7 @@ class Recorder {
   const Knowledge& k_;
   record::Record& record_;
   const RunCallbacks& callbacks_;
+  std::vector<record::Event> coming_;  // not told yet, in the order of time
   std::vector<Pose> start_;
   std::vector<std::vector<BlockFrame>> block_;  // of each structure
   std::vector<ZoneFrame> zone_frames_;

@@ -53,6 +53,19 @@ TEST(Run, ARecordIsWhole) {
   EXPECT_LT(r.provenance.step, 1e-3);
 }
 
+TEST(Run, TellsChargesThatFailInTheirTurn) {
+  const std::string stages = charge("C-A*-0", "0.1 s") + charge("C-B2-0", "0.2 s", "fails = true");
+  const product::Plan plan = read(house(stages, "0.5 s"));
+  std::vector<double> live;
+  std::vector<std::string> texts;
+  RunCallbacks callbacks;
+  callbacks.on_event = [&](const record::Event& e) { live.push_back(e.time), texts.push_back(e.text); };
+  const record::Record r = run_plan(plan, default_knowledge(), {}, callbacks);
+  EXPECT_THAT(texts, testing::Contains("the charge of C-B2-0 does not fire"));
+  EXPECT_TRUE(std::is_sorted(live.begin(), live.end())) << testing::PrintToString(texts);
+  EXPECT_EQ(live.size(), r.events.size());
+}
+
 TEST(Run, WhatFailedIsNotVerifiedByItsBalance) {
   RunOptions o;
   o.step = 0.02;
