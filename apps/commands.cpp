@@ -324,7 +324,7 @@ int run_plan_file(const Arguments& a, const std::atomic<bool>& cancel) {
     collapse::RunCallbacks callbacks;
     callbacks.on_model = [&](const mbs::Model& model, const collapse::ModelMap& map, const record::Counts& counts) {
       std::fprintf(out, "%s\n", plan.title.c_str());
-      print_counts(out, counts, map.mass);
+      std::fprintf(out, "%s\n", tell_counts(counts, map.mass).c_str());
       const std::string path = (fs::path(a.output) / "model.json").string();
       replace_file(path, mbs::to_json(model, collapse::settings_of(plan, knowledge, options)));
       files.emplace_back("model", path);

@@ -64,6 +64,6 @@ class EventPrinter {
 };
 
 void print_findings(std::FILE*, const record::Record&);
-void print_counts(std::FILE*, const record::Counts&, double standing_mass);
+std::string tell_counts(const record::Counts&, double standing_mass);
 
 }  // namespace topple::apps

@@ -322,6 +322,9 @@ run)
   [ ! -e a/b/report.html ] || { echo "a report although --no-report"; failures=$((failures + 1)); }
   [ "$(grep -n '^Mechanism' out | cut -d: -f1)" -lt "$(grep -n '^Stability' out | cut -d: -f1)" ] || failures=$((failures + 1))
   lacks out $'\x1b'
+  expect 0 "$topple" new frame.toml; expect 0 "$topple" run frame.toml -o frame --no-report --json
+  moving=$(python3 -c 'import json; print(round(json.load(open("out"))["counts"]["mass"] / 1000))')
+  has err " t, $moving t of it in motion ("; has err " t of stumps stay)"
   printf '\n[criteria]\nmechanism = "stands"\n' | cat "$plan" - >stands.toml
   expect 3 "$topple" run stands.toml -o c --no-report; has out "Asked: stands"; has out "Violated: Mechanism (Criteria)"
   expect 1 "$topple" run "$plan" -o /proc/nowhere --no-report
