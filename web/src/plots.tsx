@@ -4,7 +4,7 @@ import uPlot from "uplot";
 import type { Run, Series } from "./data";
 import type { State } from "./state";
 import { say } from "./translate";
-import { dropRoundOff, findLargest, formatNumber, formatTime, formatValue, toReadable } from "./units";
+import { calcTimeRange, dropRoundOff, findLargest, formatNumber, formatTime, formatValue, toReadable } from "./units";
 import { dashOfSeries, groupOrder, groupWord, seriesColours } from "./vocabulary";
 
 interface Group {
@@ -95,7 +95,7 @@ export function PlotPanel(props: { state: State; group: Group; note?: string | u
         padding: [10, 12, 0, 0],
         legend: { show: false },
         cursor: { drag: { x: false, y: false }, y: false, points: { size: 6 } },
-        scales: { x: { time: false, range: (_, low, high) => (low === null ? [0, 1] : high > low ? [low, high] : [low, low + (state.limit.value || 1)]) }, y: { range: (_, low, high) => niceRange(low, high) } },
+        scales: { x: { time: false, range: () => calcTimeRange(run.time, state.limit.value) }, y: { range: (_, low, high) => niceRange(low, high) } },
         axes: [axis("time [s]", true), axis(group.unit === "" ? "" : `[${group.unit}]`, false)],
         series: [
           {},

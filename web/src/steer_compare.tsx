@@ -5,7 +5,7 @@ import { axis, cssColour, cutAt, findBreakUp, namePlot, niceRange } from "./plot
 import type { SteerState } from "./steer_state";
 import type { Comparison } from "./steer_wire";
 import { compareView, type CompareView } from "./steer_view";
-import { formatNumber, formatTime, prettify, toReadable } from "./units";
+import { calcTimeRange, formatNumber, formatTime, prettify, toReadable } from "./units";
 
 const dashOfB = [7, 4];
 
@@ -26,7 +26,7 @@ function Pair(props: { s: SteerState; result: Comparison; series: Comparison["se
       {
         width: Math.max(200, element.clientWidth), height: 150, padding: [8, 10, 0, 0], legend: { show: false },
         cursor: { drag: { x: false, y: false }, y: false },
-        scales: { x: { time: false }, y: { range: (_, low, high) => niceRange(low, high) } },
+        scales: { x: { time: false, range: (u) => calcTimeRange(u.data[0], 0) }, y: { range: (_, low, high) => niceRange(low, high) } },
         axes: [axis("time [s]", true), axis(unit === "" ? "" : `[${unit}]`, false)],
         series: [{}, line(names[0], 0, []), line(names[1], 1, dashOfB)],
       },

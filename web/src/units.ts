@@ -106,3 +106,10 @@ export function formatDuration(seconds: number | null): string {
   const minutes = Math.floor((whole % 3600) / 60);
   return hours > 0 ? `${hours} h ${minutes} min` : `${minutes} min ${whole % 60} s`;
 }
+
+/// Of an axis of time: what there is of it [s]; before there is more than one instant, the time that is asked for (0: not
+/// known). uPlot's own is 0 to 100 then.
+export function calcTimeRange(time: ArrayLike<number>, asked: number): [number, number] {
+  const first = time[0] ?? 0, last = time[time.length - 1] ?? first;
+  return last > first ? [first, last] : [first, first + (asked > 0 ? asked : 1)];
+}

@@ -431,3 +431,13 @@ describe("axes on the ground", () => {
     assert.ok(isSeen(look(60, 55, 35)));
   });
 });
+
+describe("axis of time", () => {
+  it("is that of the run, and what is asked for before there is more than a frame", async () => {
+    const { calcTimeRange } = await load("units.ts");
+    assert.deepEqual(calcTimeRange([0.5, 1, 4], 10), [0.5, 4]);
+    assert.deepEqual(calcTimeRange([0], 4), [0, 4]);
+    assert.deepEqual(calcTimeRange([], 0), [0, 1]);
+    assert.deepEqual(calcTimeRange([2], 0), [2, 3]);
+  });
+});
