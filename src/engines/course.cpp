@@ -276,7 +276,10 @@ bool Course::check_joints() {
     if (!joint_live_[i] || !has_limit(j)) continue;
     const char* reason = nullptr;
     if (!reactions_.force.empty()) {
-      const Vec3 x = to_matrix(frames_of(j).X_WF.q).column(0), force = reactions_.force[i];
+      const JointFrames f = frames_of(j);
+      const Vec3 between = f.X_WM.p - f.X_WF.p, force = reactions_.force[i];
+      const Vec3 x =
+          j.kind == mbs::Joint::Kind::Distance ? (1 / norm(between)) * between : to_matrix(f.X_WF.q).column(0);
       const double along = dot(x, force);
       if (-along > j.tension_limit)
         reason = "tension";

@@ -553,8 +553,12 @@ void System::check_joints() {
     JointState& js = state.joint[i];
     if (!js.live) continue;
     if (pair_slot[i] != Lanes::kNoSlot && !joint_over[i] && !(std::abs(js.angle) > j.rotation_limit)) continue;
-    const Mat3 F = rotation_of(j.parent) * j.R_PF;
-    const double along = dot(F.column(0), js.force);
+    Vec3 axis = (rotation_of(j.parent) * j.R_PF).column(0);
+    if (j.kind == Joint::Kind::Distance) {
+      const Vec3 line = calc_joint_frames(state, j).gap;
+      axis = (1 / norm(line)) * line;
+    }
+    const double along = dot(axis, js.force);
     const double across2 = dot(js.force, js.force) - along * along;
     if (-along > j.tension_limit) {
       release_joint(i, "tension");

@@ -96,8 +96,8 @@ struct Joint {
   BodyId parent, child;
   Pose X_PF, X_CM;
   // The joint is released for good when its reaction in F passes one of these.
-  double tension_limit = kUnlimited;   // pull along x of F [N]
-  double shear_limit = kUnlimited;     // resultant across x of F [N]
+  double tension_limit = kUnlimited;   // pull along x of F, of a distance joint along its line [N]
+  double shear_limit = kUnlimited;     // resultant across that [N]
   double moment_limit = kUnlimited;    // resultant of the constrained moments [N·m]
   double rotation_limit = kUnlimited;  // |angle| of a revolute or cylindrical joint [rad]
 };

@@ -206,6 +206,34 @@ TEST(FixedJoint, BreaksAtItsLimit) {
   EXPECT_TRUE(released);
 }
 
+TEST(DistanceJoint, ComesOffByThePullAlongItsOwnLine) {
+  // a mass on a rod of 1 m that begins level is pulled by 3 m g sin θ
+  constexpr double mass = 2, g = 9.81, limit = 40;
+  for (const bool limits_shear : {false, true}) {
+    Model m;
+    m.contact.ground = m.contact.bodies = false;
+    add_body(m, make_box("mass", mass, {0.05, 0.05, 0.05}, {1, 0, 0}));
+    Joint j;
+    j.kind = Joint::Kind::Distance;
+    j.parent = kGround;
+    j.child = {0};
+    j.tension_limit = limit;
+    if (limits_shear) j.shear_limit = 1;  // there is none
+    add_joint(m, j);
+    double angle = 0, last = 0;
+    std::string reason;
+    Options o = options_of(1, 1e-4);
+    o.frame_interval = 1e-4;
+    o.on_frame = [&](const View& v) { last = std::atan2(-v.X_WB[0].p.z, v.X_WB[0].p.x); };
+    o.on_happening = [&](const Happening& h) {
+      if (h.kind == Happening::Kind::JointReleased) angle = last, reason = h.reason;
+    };
+    (void)run(m, o);
+    EXPECT_EQ(reason, "tension");
+    EXPECT_NEAR(angle, std::asin(limit / (3 * mass * g)), 2e-3);
+  }
+}
+
 TEST(FreeBody, TorqueFreeTopTurnsAsInTheReference) {
   // I = (1, 2, 3), ω0 = (0.1, 1, 0.1) in the body's axes; angular velocity in body axes at t = 10 (computed
   // independently)
