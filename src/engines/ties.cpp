@@ -38,6 +38,7 @@ Ties find_ties(const mbs::Model& model, const Forces& forces, const std::vector<
   for (size_t a = 0; a < B; ++a)
     for (const int n : held[a]) {
       add(static_cast<int>(a), n);
+      if (is_ground(model, n)) continue;
       for (const int m : held[static_cast<size_t>(n)]) add(static_cast<int>(a), m);
     }
   std::sort(ties.pairs.begin(), ties.pairs.end());

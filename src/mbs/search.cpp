@@ -15,10 +15,12 @@ constexpr double kAllowedTime = 0.05;     // [s]; more for fast bodies
 constexpr double kMostAllowance = 0.6;    // [m]
 constexpr double kSlowShare = 0.8;        // of the bodies
 
-/// Who is joined to a body, or joined to the same third body: what joins them governs instead of contact.
+/// Who is joined to a body, or joined to the same third body that can move: what joins them governs instead of contact.
 class NearBodies {
  public:
-  NearBodies(PairSearch& search, size_t bodies) : search_(search) { search_.near.assign(bodies, -1); }
+  NearBodies(PairSearch& search, const std::vector<unsigned char>& fixed) : search_(search), fixed_(fixed) {
+    search_.near.assign(fixed.size(), -1);
+  }
 
   /// Quick for the same a in turn.
   bool operator()(int a, int b) {
@@ -29,6 +31,7 @@ class NearBodies {
       near[static_cast<size_t>(a)] = a;
       for (const int i : holders(a)) {
         near[static_cast<size_t>(i)] = a;
+        if (fixed_[static_cast<size_t>(i)]) continue;  // as the ground
         for (const int j : holders(i)) near[static_cast<size_t>(j)] = a;
       }
     }
@@ -42,6 +45,7 @@ class NearBodies {
             static_cast<size_t>(search_.first_link[i + 1] - search_.first_link[i])};
   }
   PairSearch& search_;
+  const std::vector<unsigned char>& fixed_;
   int marked_ = -1;  // whose neighbours are marked
 };
 
@@ -270,7 +274,7 @@ void System::find_pairs() {
       search.in_slab[static_cast<size_t>(search.first_in_slab[static_cast<size_t>(k) + 1]++)] = static_cast<int>(i);
   }
 
-  NearBodies are_near(search, B);
+  NearBodies are_near(search, fixed);
   search.found.clear();
   search.held.clear();
   const auto look = [&](size_t i, size_t j) {
@@ -369,7 +373,7 @@ PairDue System::make_pair_due(const HeldPair& pair) const {
 void System::release_pairs() {
   State& s = state;
   find_links();
-  NearBodies are_near(contact.search, B);
+  NearBodies are_near(contact.search, fixed);
   size_t kept = 0;
   const std::vector<unsigned char>& relinked = contact.search.relinked;
   for (const HeldPair& pair : s.held_pairs) {

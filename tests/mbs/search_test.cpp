@@ -117,6 +117,47 @@ TEST(Search, MissesNoPairWhereLinksEnd) {
   EXPECT_LT(searches, 200);  // breaks alone ask for none
 }
 
+TEST(Search, WhatHangsOnAFixedBodyMeetsAsOnTheGround) {
+  // two balls of one mass on rods of 1 m, side by side: one falls against the other
+  const auto swing_of = [](bool on_beam) {
+    Model m;
+    m.contact.ground = false;
+    m.contact.body_restitution = 1;
+    m.contact.body_friction = 0;
+    Shape ball;
+    ball.kind = Shape::Kind::Sphere;
+    ball.radius = 0.1;
+    Body beam;
+    beam.name = "beam";
+    beam.X_WB.p = {0, 0, 2};
+    beam.fixed = true;
+    const BodyId held = on_beam ? add_body(m, beam) : kGround;
+    for (const double angle : {0.5, 0.0}) {
+      Body b;
+      b.inertia = Mat3::diagonal({0.004, 0.004, 0.004});
+      const double x = angle > 0 ? 0 : -0.2;  // of the hinge
+      b.X_WB.p = {x + std::sin(angle), 0, 2 - std::cos(angle)};
+      b.shapes.push_back(ball);
+      const BodyId id = add_body(m, b);
+      Joint j;
+      j.kind = Joint::Kind::Distance;
+      j.parent = held;
+      j.child = id;
+      j.X_PF.p = on_beam ? Vec3{x, 0, 0} : Vec3{x, 0, 2};
+      add_joint(m, j);
+    }
+    double farthest = 0;
+    Options o;
+    o.duration = 1.2;
+    o.equilibrium = false;
+    o.on_frame = [&](const View& v) { farthest = std::min(farthest, v.X_WB.back().p.x + 0.2); };
+    (void)run(m, o);
+    return -farthest;
+  };
+  EXPECT_NEAR(swing_of(true), std::sin(0.5), 0.02);
+  EXPECT_NEAR(swing_of(true), swing_of(false), 1e-9);
+}
+
 TEST(Search, EndsWhereABodyIsNowhere) {
   for (const double nowhere : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     Options o;
