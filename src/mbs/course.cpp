@@ -48,7 +48,7 @@ double find_farthest(const Model& m) {
 
 double calc_energy_error(double residual, const EnergyScale& s) {
   constexpr double way = 1e-6;  // of everything, the least that an error is measured by [m]
-  const double reference = std::max({s.released, s.brought, way * s.force});
+  const double reference = std::max({s.released, s.brought, way * s.force, s.step_ways});
   return reference > 0 && residual > s.round_off ? residual / reference : 0;
 }
 
@@ -185,7 +185,28 @@ double Course::calc_energy_error() const {
     if (s_.state.load[i].begin != kUnlimited) force += calc_largest_force(s_.model.loads[i]);
   return mbs::calc_energy_error(
       s_.state.largest_residual,
-      {s_.state.released, brought, force, calc_round_off(s_.model, s_.summary.shortest_step, s_.state.step_index)});
+      {s_.state.released, brought, force, calc_round_off(s_.model, s_.summary.shortest_step, s_.state.step_index),
+       calc_step_ways()});
+}
+
+double Course::calc_step_ways() const {
+  const double h = s_.step, g = norm(s_.model.gravity);
+  std::vector<double> force(s_.B, 0), torque(s_.B, 0);
+  for (size_t i = 0; i < s_.model.loads.size(); ++i) {
+    const Load& l = s_.model.loads[i];
+    if (s_.state.load[i].begin == kUnlimited || l.body.index < 0) continue;
+    const double most = find_largest_factor(l);
+    force[static_cast<size_t>(l.body.index)] += most * norm(l.force);
+    torque[static_cast<size_t>(l.body.index)] += most * norm(l.torque);
+  }
+  double sum = 0;
+  for (size_t b = 0; b < s_.B; ++b) {
+    if (s_.fixed[b]) continue;
+    const Mat3& I = s_.model.bodies[b].inertia;
+    const double mass = s_.state.body[b].mass, f = force[b] + mass * g;
+    sum += f * f / mass + torque[b] * torque[b] / std::min({I(0, 0), I(1, 1), I(2, 2)});
+  }
+  return 2 * h * h * sum;
 }
 
 double Course::calc_singular_play() const {

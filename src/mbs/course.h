@@ -16,6 +16,7 @@ struct EnergyScale {
   double brought = 0;    // at the start, 0 of what rests in equilibrium: nothing sets free what that stores [J]
   double force = 0;      // weight of all that moves, with the loads that have begun [N]
   double round_off = 0;  // what round-off of places makes of the balance [J]
+  double step_ways = 0;  // what weight and loads do to bodies at rest in two steps [J]
 };
 
 /// What Summary::energy_error says of the largest |residual| [J], for engines that keep books of their own.
@@ -56,7 +57,8 @@ class Course {
   bool is_at_rest();
   /// The end has been reached: its frame, and whether the balance of energy can be believed at all. Returns false.
   bool end();
-  double calc_weight() const;  // of all that moves [N]
+  double calc_weight() const;     // of all that moves [N]
+  double calc_step_ways() const;  // EnergyScale::step_ways
   /// What the play of joints in singular positions may make of weight and loads; 0 if there were none [J].
   double calc_singular_play() const;
   /// Looks at a frame for whether nothing happens any more.
