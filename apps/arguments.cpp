@@ -148,8 +148,11 @@ void add_mbs_run(CLI::App& mbs, Arguments& a) {
 void add_mbs_compare(CLI::App& mbs, Arguments& a) {
   CLI::App* mbs_compare = mbs.add_subcommand("compare", "Run a multibody model on several engines and compare.");
   mbs_compare->add_option("model", a.input, "multibody model (JSON)")->type_name("FILE")->required();
-  mbs_compare->add_option("--engines", a.engines,
-                          "names between commas, such as native,simbody,mujoco; all if left out");
+  mbs_compare
+      ->add_option("--engines", a.engines, "names between commas, such as native,simbody,mujoco; all if left out")
+      ->check([](const std::string& s) {
+        return s.find_first_not_of(" \t,") == std::string::npos ? std::string("names no engine") : std::string();
+      });
   mbs_compare->add_option("-o,--output", a.output, "folder for compare.csv and compare.svg")->type_name("FOLDER");
   mbs_compare->add_option("--duration", a.duration, "simulated time, such as \"10 s\"")->type_name("QUANTITY");
   mbs_compare->add_option("--step", a.step, "fixed step of all engines, such as \"0.1 ms\"")->type_name("QUANTITY");

@@ -1,5 +1,7 @@
 #include "engines/requirements.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Eigenvalues>
 #include <string>
 
@@ -62,9 +64,9 @@ std::vector<Unsupported> find_opening_joints(const mbs::Model& model, const mbs:
     look(j.child, j.X_CM, f.X_WM, f.v_M, f.w_M);
     const JointGap gap = calc_gap_velocity(j.kind, f);
     if (gap.length > 1e-9 * (1e-3 + speed) || gap.angle > 1e-9 * (1e-3 + spin))
-      out.push_back({place_of("joints", i, j.name), "velocities at the start that open a joint (" +
-                                                        std::to_string(gap.length) + " m/s, " +
-                                                        std::to_string(gap.angle) + " rad/s)"});
+      out.push_back(
+          {place_of("joints", i, j.name),
+           fmt::format("velocities at the start that open a joint ({:.3g} m/s, {:.3g} rad/s)", gap.length, gap.angle)});
   }
   return out;
 }
