@@ -15,7 +15,8 @@ constexpr int most_wait = 60000;  // for other writers [ms]
 
 class SqliteDatabase final : public Database {
  public:
-  SqliteDatabase(const std::string& path, bool is_read_only) : path_(path) {
+  // behind the other constructor the destructor closes what this one leaves by an error
+  SqliteDatabase(const std::string& path, bool is_read_only) : SqliteDatabase(path) {
     if (is_read_only) {
       open_to_read();
     } else {
@@ -25,10 +26,9 @@ class SqliteDatabase final : public Database {
         run("PRAGMA synchronous = NORMAL");
       } catch (const InputError&) {
         throw;  // it says all
-      } catch (const DiskFailed&) {
-        close();
-        throw;
-      } catch (const std::exception& e) { refuse(e.what()); }
+      } catch (const DiskFailed&) { throw; } catch (const std::exception& e) {
+        refuse(e.what());
+      }
     }
     dialect_.now = "((julianday('now') - 2440587.5) * 86400.0)";
     dialect_.begin = "BEGIN IMMEDIATE";
@@ -76,6 +76,8 @@ class SqliteDatabase final : public Database {
   void reconnect() override {}
 
  private:
+  explicit SqliteDatabase(const std::string& path) : path_(path) {}
+
   void open(const std::string& name, int flags) {
     if (sqlite3_open_v2(name.c_str(), &db_, flags | SQLITE_OPEN_NOMUTEX, nullptr) != SQLITE_OK) {
       const std::string why = db_ ? sqlite3_errmsg(db_) : "out of memory";
