@@ -456,15 +456,20 @@ double System::calc_step_limit() const {
   return fastest > 0 ? 2 / fastest : 1e-3 / options.step_safety;
 }
 
+double System::find_fastest_spin() const {
+  double fastest = 0;
+  for (size_t b = 0; b < B; ++b)
+    if (!fixed[b]) fastest = std::max(fastest, norm(state.w[b]));
+  return fastest;
+}
+
 double System::calc_own_step() const {
   const double share = options.step_share, step_of_limit = share * options.step_safety * calc_step_limit();
   // steps in which bodies meet or part shall not change their energy much (docs/theory/contact.md)
   const double corner = calc_contact_frequency();
   double h = corner > 0 ? std::min(step_of_limit, share * kContactAngle / corner) : step_of_limit;
   if (options.most_turn > 0) {
-    double fastest = 0;
-    for (size_t b = 0; b < B; ++b)
-      if (!fixed[b]) fastest = std::max(fastest, norm(state.w[b]));
+    const double fastest = find_fastest_spin();
     if (h * fastest > share * options.most_turn) h = share * options.most_turn / fastest;
   }
   if (options.least_steps > 0 && options.duration > 0) h = std::min(h, share * options.duration / options.least_steps);
@@ -501,6 +506,9 @@ void System::review_step() {
   std::vector<double>& due = state.review_times;
   const bool is_due = std::any_of(due.begin(), due.end(), [&](double t) { return t <= state.time; });
   if (!is_due && 4 * state.live_elements >= 3 * state.live_at_review) {
+    constexpr double too_far = 4;  // 16 times the error of most_turn
+    if (options.step <= 0 && options.most_turn > 0 && step * find_fastest_spin() > too_far * options.most_turn)
+      set_step(calc_own_step());
     // many shapes of two bodies that touch at once are stiffer together than the four corners of calc_step_limit
     if (options.step > 0 || state.touching.steps != 1) return;
     const double touching = find_touching_frequency(state);

@@ -106,8 +106,9 @@ struct Options {
   double duration = 1;  // [s]
   double step = 0;      // 0: step_safety times the limit of the stiffest mode; else at least duration / kMostSteps
   double step_safety = 0.9;
-  /// The engine's own step lets no free body turn by more than this at its present rate [rad], and there are at least
-  /// so many in the duration; 0: it does not ask.
+  /// The engine's own step lets no free body turn by more than this at its present rate [rad] when it is chosen, and is
+  /// chosen anew where one turns by four times as much; and there are at least so many in the duration; 0: it does not
+  /// ask.
   double most_turn = 0;
   int least_steps = 0;
   double step_share = 1;  // of the engine's own step, for studies of convergence; without effect on a set step

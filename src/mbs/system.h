@@ -289,6 +289,7 @@ class System {
   /// The engine's own, without Options::step [s].
   double calc_own_step() const;
   void choose_step();
+  double find_fastest_spin() const;  // of what moves [rad/s]
   /// Whether the fastest mode bears the step that was set; else how long one it bears. Joints count.
   bool bears_set_step(double& longest);
   /// After events, and when a quarter of the elements is gone: a step for the model as it is now.
