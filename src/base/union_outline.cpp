@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "base/polygon.h"
+
 namespace topple {
 namespace {
-
-using Point = std::array<double, 2>;
 
 /// Rising, each at least `rounding` behind the one before it.
 std::vector<double> collect_edges(const std::vector<Rectangle>& rectangles, size_t axis, double rounding) {
@@ -60,21 +60,11 @@ Cells cover(const std::vector<Rectangle>& rectangles, double rounding, int most_
   return cells;
 }
 
-double calc_doubled_area(const std::vector<Point>& loop) {
-  double area = 0;
-  for (size_t i = 0; i < loop.size(); ++i) {
-    const Point &a = loop[i], &b = loop[(i + 1) % loop.size()];
-    area += a[0] * b[1] - b[0] * a[1];
-  }
-  return area;
-}
-
 }  // namespace
 
-std::vector<std::vector<Point>> calc_union_outlines(const std::vector<Rectangle>& rectangles, double rounding,
-                                                    int most_edges) {
+std::vector<Polygon> calc_union_outlines(const std::vector<Rectangle>& rectangles, double rounding, int most_edges) {
   const Cells cells = cover(rectangles, rounding, most_edges);
-  std::vector<std::vector<Point>> loops;
+  std::vector<Polygon> loops;
   if (cells.covered.empty()) return loops;
   // from each corner of cells, to which of the four directions (+x, +y, -x, -y) an edge goes that has what is covered
   // on its left
@@ -96,7 +86,7 @@ std::vector<std::vector<Point>> calc_union_outlines(const std::vector<Rectangle>
     for (int i = 0; i < nx; ++i)
       for (unsigned first = 0; first < 4; ++first) {
         if ((open[corner(i, j)] >> first & 1U) == 0) continue;
-        std::vector<Point> loop;
+        Polygon loop;
         int a = i, b = j;
         for (unsigned k = first, before = 4;;) {
           if (k != before) loop.push_back({cells.x[static_cast<size_t>(a)], cells.y[static_cast<size_t>(b)]});
@@ -109,7 +99,7 @@ std::vector<std::vector<Point>> calc_union_outlines(const std::vector<Rectangle>
           open[corner(a, b)] = static_cast<unsigned char>(open[corner(a, b)] & ~(1U << k));
         }
         open[corner(i, j)] = static_cast<unsigned char>(open[corner(i, j)] & ~(1U << first));
-        if (calc_doubled_area(loop) > 0) loops.push_back(std::move(loop));
+        if (calc_signed_area(loop) > 0) loops.push_back(std::move(loop));
       }
   return loops;
 }

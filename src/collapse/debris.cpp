@@ -56,25 +56,6 @@ bool segments_cross(const Point2& a, const Point2& b, const Point2& c, const Poi
 
 }  // namespace
 
-Polygon calc_hull(std::vector<Point2> points) {
-  std::sort(points.begin(), points.end());
-  points.erase(std::unique(points.begin(), points.end()), points.end());
-  if (points.size() < 3) return points;
-  Polygon hull(2 * points.size());
-  size_t n = 0;
-  for (size_t pass = 0; pass < 2; ++pass) {
-    const size_t start = n;
-    for (size_t i = 0; i < points.size(); ++i) {
-      const Point2& p = pass == 0 ? points[i] : points[points.size() - 1 - i];
-      while (n >= start + 2 && cross2(hull[n - 2], hull[n - 1], p) <= 0) --n;
-      hull[n++] = p;
-    }
-    --n;
-  }
-  hull.resize(n);
-  return hull;
-}
-
 double calc_distance(const Polygon& a, const Polygon& b) {
   if (a.empty() || b.empty()) return std::numeric_limits<double>::infinity();
   if (contains(a, b.front()) || contains(b, a.front())) return 0;
@@ -95,15 +76,6 @@ double calc_distance(const Point2& p, const Polygon& polygon) {
   for (size_t i = 0; i < polygon.size(); ++i)
     least = std::min(least, point_segment(p, polygon[i], polygon[(i + 1) % polygon.size()]));
   return std::sqrt(least);
-}
-
-double calc_area(const Polygon& p) {
-  double twice = 0;
-  for (size_t i = 0; i < p.size(); ++i) {
-    const Point2 &a = p[i], &b = p[(i + 1) % p.size()];
-    twice += a[0] * b[1] - a[1] * b[0];
-  }
-  return 0.5 * std::abs(twice);
 }
 
 Polygon calc_outline(const PlacedBox& box) {

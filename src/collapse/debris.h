@@ -6,19 +6,14 @@
 #include <vector>
 
 #include "base/linalg.h"
+#include "base/polygon.h"
 
 namespace topple::collapse {
 
-using Point2 = std::array<double, 2>;
-using Polygon = std::vector<Point2>;
-
-/// Convex hull, counter-clockwise, without points on its edges.
-Polygon calc_hull(std::vector<Point2> points);
 /// Distance between the areas of two simple polygons; 0 where they overlap.
 double calc_distance(const Polygon&, const Polygon&);
 /// Distance of a point from the area of a simple polygon; 0 within.
 double calc_distance(const Point2&, const Polygon&);
-double calc_area(const Polygon&);
 
 /// A box as it lies in W.
 struct PlacedBox {

@@ -268,7 +268,7 @@ Result PlanMapping::Impl::to_result(const collapse::SampleRun& r) const {
   for (int k = 0; k < options.directions; ++k) {
     const double angle = 2 * std::numbers::pi * k / options.directions;
     double farthest = -std::numeric_limits<double>::infinity();
-    for (const collapse::Point2& p : r.reach.outline)
+    for (const Point2& p : r.reach.outline)
       farthest = std::max(farthest, p[0] * std::cos(angle) + p[1] * std::sin(angle));
     out.trajectory.push_back(std::isfinite(farthest) ? farthest : std::nan(""));
   }
