@@ -131,11 +131,16 @@ struct Poses {
   Q4<D> q;
 };
 
-/// Poses of the bodies of a block of elements; `bodies` one a lane.
+/// Poses of the bodies of a block of elements.
+///   slots   of bodies, W a block; null: batch
+///   bodies  of blocks, of a batch
 template <class D>
-HWY_INLINE Poses<D> read_poses(const double* HWY_RESTRICT poses, const std::uint32_t* HWY_RESTRICT bodies) {
+HWY_INLINE Poses<D> read_poses(const ElementJob& job, const std::uint32_t* slots, const std::uint32_t* bodies,
+                               size_t block) {
+  const size_t W = hn::Lanes(D());
+  if (slots == nullptr) return {load3<D>(job.p + 3 * W * bodies[block], 0), load4<D>(job.q + 4 * W * bodies[block], 0)};
   Num<D> field[kPoseRow];
-  read_rows<D, kPoseRow>(poses, bodies, field);
+  read_rows<D, kPoseRow>(job.poses, slots + block * W, field);
   return {{field[0], field[1], field[2]}, {field[3], field[4], field[5], field[6]}};
 }
 
@@ -163,23 +168,84 @@ HWY_INLINE void lay_pose_block(const PoseJob& job, size_t block) {
   write_rows<D, kPoseRow>(field, job.poses + kPoseRow * W * block);
 }
 
+/// A block some lanes of which pass their bounds or crack. What seldom happens is kept out of the way of springs:
+/// inlined there it costs them a third of their time, by what the compiler keeps in memory for its sake.
+template <class D>
+struct Yielding {
+  Num<D> x[2], k[6], d[6], was[6];              // stations, stiffness, deformation, stretch before
+  Num<D> u[6], e[6], f[6], before[6], slid[6];  // stretch, its elastic part, force; that part before; none of it
+  Num<D> torn;                                  // twice what cracks that grow lose
+  hn::Mask<D> outside;                          // of the lanes that the full law must look at
+};
+
+/// Lets zones flow.
+template <class D, Plane In, int Hinges>
+HWY_NOINLINE void let_flow(const ElementJob& job, size_t block, hn::Mask<D> flows, Yielding<D>& z) {
+  using N = Num<D>;
+  constexpr ActiveComponents active = components_of(In);
+  const D tag;
+  Pressing<D> pressing;
+  flows = enter_cells<D, In, Hinges>(job, block, flows, z.k[0], z.d[0], pressing);
+  if (hn::AllFalse(tag, flows)) return;
+  const double* flow = job.flows + static_cast<size_t>(kFlowFields) * hn::Lanes(tag) * block;
+  N f_flow[6], d_before[6];
+  for (int c = 0; c < active.count; ++c) d_before[active.at[c]] = load<D>(flow, kBefore + active.at[c]);
+  auto flowed = flows;
+  const auto good = flow_zone<D, In, Hinges>(job, block, flows, pressing, z.x, z.k, z.d, z.was, f_flow, flowed);
+  for (int c = 0; c < active.count; ++c) {
+    const int i = active.at[c];
+    z.f[i] = select(good, f_flow[i], z.f[i]);
+    const N stretch = f_flow[i] * load<D>(flow, kFlexibility + i);
+    z.e[i] = select(good, stretch, z.e[i]);
+    z.u[i] = select(good, stretch, z.u[i]);
+    const N way = z.d[i] - d_before[i], stretched = stretch - z.was[i];
+    const N driven = select(flowed, drive_damper(stretched, way), stretched);
+    z.before[i] = select(good, select(flowed, stretch - driven, z.was[i]), z.before[i]);
+    z.slid[i] = select(good, way - driven, z.slid[i]);
+  }
+  z.outside = hn::AndNot(good, z.outside);
+}
+
+/// Lets springs crack.
+template <class D, Plane In>
+HWY_NOINLINE void let_crack(const ElementJob& job, size_t block, hn::Mask<D> cracks, Yielding<D>& z) {
+  using N = Num<D>;
+  constexpr ActiveComponents active = components_of(In);
+  N u_now[6], e_now[6], torn = num<D>(0);
+  auto beyond = cracks;
+  const auto done = crack_springs<D, In>(job, block, cracks, z.d, u_now, e_now, beyond);
+  for (int c = 0; c < active.count; ++c) {
+    const int i = active.at[c];
+    const N way = z.u[i] - z.was[i], held = z.k[i] * z.before[i], holds = z.k[i] * e_now[i];
+    torn = torn + (fma(held + holds, way, held * z.was[i]) - holds * u_now[i]);
+    const N driven = drive_damper(e_now[i] - z.before[i], way);
+    z.before[i] = select(done, e_now[i] - driven, z.before[i]);
+    z.slid[i] = select(done, way - driven, z.slid[i]);
+    z.u[i] = select(done, u_now[i], z.u[i]), z.e[i] = select(done, e_now[i], z.e[i]);
+    z.f[i] = select(done, holds, z.f[i]);
+  }
+  z.torn = select(done, torn, num<D>(0));
+  z.outside = hn::Or(z.outside, beyond);
+}
+
 /// Forces of one block of elements (docs/theory/zones.md, eq. 1 to 12, and multibody.md, eq. 4).
 template <class D, Plane In, int Hinges>
-HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, const Poses<D>& A, const Poses<D>& B) {
+HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block) {
   using N = Num<D>;
   constexpr bool is_plane = In != Plane::Space;
   constexpr ActiveComponents active = components_of(In);
   const D tag;
   const size_t W = hn::Lanes(tag);
+  const Poses<D> A = read_poses<D>(job, job.a, job.body_a, block), B = read_poses<D>(job, job.b, job.body_b, block);
   double* HWY_RESTRICT state = job.states + static_cast<size_t>(kStateFields) * W * block;
   const std::uint32_t* HWY_RESTRICT constants = job.constants + static_cast<size_t>(kConstants) * block;
-  const auto constant = [&](int field) -> N {
+  const auto constant = [&](int field) TOPPLE_INLINED -> N {
     return {hn::Load(tag, job.pool + size_t{constants[field - kStateFields]} * W)};
   };
-  const auto constant3 = [&](int field) -> V3<D> {
+  const auto constant3 = [&](int field) TOPPLE_INLINED -> V3<D> {
     return {constant(field), constant(field + 1), constant(field + 2)};
   };
-  const auto constant4 = [&](int field) -> Q4<D> {
+  const auto constant4 = [&](int field) TOPPLE_INLINED -> Q4<D> {
     return {constant(field), constant(field + 1), constant(field + 2), constant(field + 3)};
   };
   double* HWY_RESTRICT out = job.forces + static_cast<size_t>(kForceFields) * W * block;
@@ -194,7 +260,7 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
   N s2, over_sine, coefficient;
   // a member: x of the stations on a and on b, the chord in the axes of a, the turn from there to the chord
   N x_a, x_b, over_length, chord_x, chord_y, chord_z, swing_w, swing_y, swing_z, s2_a, over_sine_a, coefficient_a;
-  const auto measure_chord = [&](V3<D> chord) {
+  const auto measure_chord = [&](V3<D> chord) TOPPLE_INLINED {
     x_a = minimum(x[0], x[1]), x_b = maximum(x[0], x[1]);
     // an empty lane has none
     over_length = one / N{hn::Sqrt(maximum(dot(chord, chord), num<D>(1e-60)).v)};
@@ -292,7 +358,7 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
     k[i] = constant(kStiffness + i);
     f[i] = k[i] * e[i];
   }
-  const auto cracks_grow = [&](int station, int axis, N moment) {
+  const auto cracks_grow = [&](int station, int axis, N moment) TOPPLE_INLINED {
     const int scale = kCrackScale + 4 * station + 2 * axis;
     return find_growth<D>(moment, constant(scale), constant(scale + 1));
   };
@@ -324,7 +390,7 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
       if (HWY_LIKELY(hn::AllFalse(tag, linear))) continue;
       const auto is_square = hn::Ge(exponent.v, hn::Set(tag, 2.0)),
                  is_three_halves = hn::Ge(exponent.v, hn::Set(tag, 1.5));
-      const auto raised = [&](N m) -> N {
+      const auto raised = [&](N m) TOPPLE_INLINED -> N {
         return select(is_square, m * m, select(is_three_halves, m * N{hn::Sqrt(m.v)}, m));
       };
       outside = hn::Or(outside, hn::Gt((raised(my) + raised(mz)).v, one.v));
@@ -333,58 +399,30 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
   cracks = hn::AndNot(outside, cracks);
   // what the damper does on the part of the deformation that is not elastic
   N slid[6] = {zero, zero, zero, zero, zero, zero};
-  const auto slide = [&] {
+  if (softened)
     for (int c = 0; c < active.count; ++c) {
       const int i = active.at[c];
       slid[i] = (u[i] - was[i]) - (e[i] - before[i]);
     }
-  };
   bool books_slid = softened;
-  if (HWY_UNLIKELY(!hn::AllFalse(tag, outside))) {
-    auto flows = hn::AndNot(too_far, hn::And(outside, hn::Gt(constant(kFlows).v, zero.v)));
-    if (softened) slide();
-    Pressing<D> pressing;
-    if (!hn::AllFalse(tag, flows)) flows = enter_cells<D, In, Hinges>(job, block, flows, k[0], d[0], pressing);
-    if (!hn::AllFalse(tag, flows)) {
-      const double* flow = job.flows + static_cast<size_t>(kFlowFields) * W * block;
-      N f_flow[6], d_before[6];
-      for (int c = 0; c < active.count; ++c) d_before[active.at[c]] = load<D>(flow, kBefore + active.at[c]);
-      auto flowed = flows;
-      const auto good = flow_zone<D, In, Hinges>(job, block, flows, pressing, x, k, d, was, f_flow, flowed);
-      for (int c = 0; c < active.count; ++c) {
-        const int i = active.at[c];
-        f[i] = select(good, f_flow[i], f[i]);
-        const N stretch = f_flow[i] * load<D>(flow, kFlexibility + i);
-        e[i] = select(good, stretch, e[i]);
-        u[i] = select(good, stretch, u[i]);
-        const N way = d[i] - d_before[i], stretched = stretch - was[i];
-        const N driven = select(flowed, drive_damper(stretched, way), stretched);
-        before[i] = select(good, select(flowed, stretch - driven, was[i]), before[i]);
-        slid[i] = select(good, way - driven, slid[i]);
-      }
-      books_slid = true;
-      outside = hn::AndNot(good, outside);
-    }
-  } else if (softened) {
-    slide();
-  }
-  N torn = zero;  // twice what cracks that grow lose
-  if (HWY_UNLIKELY(!hn::AllFalse(tag, cracks))) {
-    N u_now[6], e_now[6];
-    auto beyond = cracks;
-    const auto done = crack_springs<D, In>(job, block, cracks, d, u_now, e_now, beyond);
+  N torn = zero;
+  const auto flows = hn::AndNot(too_far, hn::And(outside, hn::Gt(constant(kFlows).v, zero.v)));
+  const bool is_flowing = !hn::AllFalse(tag, flows), is_cracking = !hn::AllFalse(tag, cracks);
+  if (HWY_UNLIKELY(is_flowing || is_cracking)) {
+    Yielding<D> z;
+    z.x[0] = x[0], z.x[1] = x[1], z.torn = zero, z.outside = outside;
     for (int c = 0; c < active.count; ++c) {
       const int i = active.at[c];
-      const N way = u[i] - was[i], held = k[i] * before[i], holds = k[i] * e_now[i];
-      torn = torn + (fma(held + holds, way, held * was[i]) - holds * u_now[i]);
-      const N driven = drive_damper(e_now[i] - before[i], way);
-      before[i] = select(done, e_now[i] - driven, before[i]);
-      slid[i] = select(done, way - driven, slid[i]);
-      u[i] = select(done, u_now[i], u[i]), e[i] = select(done, e_now[i], e[i]), f[i] = select(done, holds, f[i]);
+      z.k[i] = k[i], z.d[i] = d[i], z.was[i] = was[i];
+      z.u[i] = u[i], z.e[i] = e[i], z.f[i] = f[i], z.before[i] = before[i], z.slid[i] = slid[i];
     }
-    torn = select(done, torn, zero);
-    books_slid = true;
-    outside = hn::Or(outside, beyond);
+    if (is_flowing) let_flow<D, In, Hinges>(job, block, flows, z);
+    if (is_cracking) let_crack<D, In>(job, block, cracks, z);
+    for (int c = 0; c < active.count; ++c) {
+      const int i = active.at[c];
+      u[i] = z.u[i], e[i] = z.e[i], f[i] = z.f[i], before[i] = z.before[i], slid[i] = z.slid[i];
+    }
+    torn = z.torn, outside = z.outside, books_slid = true;
   }
 
   // standard linear solid: the damper follows the mean of the step
@@ -446,41 +484,25 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block, cons
 }
 
 template <class D>
-HWY_INLINE void evaluate_block_of(const ElementJob& job, size_t block, const Poses<D>& a, const Poses<D>& b) {
+HWY_INLINE void evaluate_block_of(const ElementJob& job, size_t block) {
   const bool is_single = job.single[block] != 0;
   switch (job.planes[block]) {
     case Plane::Space:
-      return is_single ? evaluate_element_block<D, Plane::Space, 1>(job, block, a, b)
-                       : evaluate_element_block<D, Plane::Space, 2>(job, block, a, b);
+      return is_single ? evaluate_element_block<D, Plane::Space, 1>(job, block)
+                       : evaluate_element_block<D, Plane::Space, 2>(job, block);
     case Plane::AboutY:
-      return is_single ? evaluate_element_block<D, Plane::AboutY, 1>(job, block, a, b)
-                       : evaluate_element_block<D, Plane::AboutY, 2>(job, block, a, b);
+      return is_single ? evaluate_element_block<D, Plane::AboutY, 1>(job, block)
+                       : evaluate_element_block<D, Plane::AboutY, 2>(job, block);
     case Plane::AboutZ:
-      return is_single ? evaluate_element_block<D, Plane::AboutZ, 1>(job, block, a, b)
-                       : evaluate_element_block<D, Plane::AboutZ, 2>(job, block, a, b);
+      return is_single ? evaluate_element_block<D, Plane::AboutZ, 1>(job, block)
+                       : evaluate_element_block<D, Plane::AboutZ, 2>(job, block);
   }
 }
 
 template <class D>
 HWY_INLINE void evaluate_all(const ElementJob& job) {
-  const D d;
-  const size_t W = hn::Lanes(d);
-  const auto find_next = [&](size_t from) {
-    while (from < job.last && job.live[from] == 0) ++from;
-    return from;
-  };
-  size_t next = find_next(job.first);
-  if (job.a != nullptr) {
-    for (; next < job.last; next = find_next(next + 1))
-      evaluate_block_of<D>(job, next, read_poses<D>(job.poses, job.a + next * W),
-                           read_poses<D>(job.poses, job.b + next * W));
-  } else {
-    for (; next < job.last; next = find_next(next + 1)) {
-      const size_t a = job.body_a[next], b = job.body_b[next];
-      evaluate_block_of<D>(job, next, {load3<D>(job.p + 3 * W * a, 0), load4<D>(job.q + 4 * W * a, 0)},
-                           {load3<D>(job.p + 3 * W * b, 0), load4<D>(job.q + 4 * W * b, 0)});
-    }
-  }
+  for (size_t block = job.first; block < job.last; ++block)
+    if (job.live[block] != 0) evaluate_block_of<D>(job, block);
 }
 
 template <class D>
