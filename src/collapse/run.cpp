@@ -169,6 +169,7 @@ record::Record run_model(const mbs::Model& model, const RunOptions& options, con
   record_into(recorder, o);
   o.equilibrium = options.equilibrium;
   o.rest_speed = options.rest_speed.value_or(k.rest_speed);
+  o.tells_lost_contact = true;
   o.samplings = make_samplings(model, r);
   mbs::Summary summary = engine->run(model, o);
   if (const auto odd = engines::find_impossible_inertias(model); !model.is_planar && !odd.empty())

@@ -130,6 +130,7 @@ Comparison compare(const mbs::Model& model, mbs::Options options, const std::vec
   Comparison out;
   const bool is_step_given = options.step > 0;
   options = make_silent(options);
+  options.tells_lost_contact = true;
   out.interval = options.frame_interval;
   double wanted = choose_step(model, options);
   constexpr int most_rounds = 4;

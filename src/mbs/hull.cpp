@@ -39,6 +39,12 @@ void complete(Hull& hull) {
     };
     std::sort(face.loop.begin(), face.loop.end(), [&](int i, int j) { return angle(i) < angle(j); });
   }
+  hull.thickness = 2 * size;
+  for (const Hull::Face& face : hull.faces) {
+    double width = 0;
+    for (const Vec3& v : hull.vertices) width = std::max(width, face.offset - dot(face.normal, v));
+    hull.thickness = std::min(hull.thickness, width);
+  }
   // half of the edges that meet at a vertex over all of the face's, times 4: a face stands on 4 in all
   hull.weights.assign(hull.vertices.size(), 4);
   for (const Hull::Face& face : hull.faces) {

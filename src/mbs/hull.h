@@ -22,6 +22,7 @@ struct Hull {
   std::vector<Vec3> directions;           // of the edges, unit, parallel ones once
   std::vector<int> direction_of;          // of each edge
   double reach = 0;                       // largest distance of a vertex from the origin of S [m]
+  double thickness = 0;                   // least width between a face and the vertex farthest behind it [m]
 };
 
 /// Most corners of one face.

@@ -248,6 +248,7 @@ class System {
   std::vector<JointCluster> clusters;
   bool clusters_due = true;
   std::vector<std::pair<int, int>> joint_notes;  // first joint and situation of those made
+  std::vector<std::pair<int, int>> noted_pairs;  // bodies that contact was told not to keep apart
   std::vector<size_t> turned_over;               // elements past half a turn
   /// Notes an element whose rotation vector has just changed over to the other side.
   void note_turned_over(size_t element, const Six& deformation, const ZoneState& before);
@@ -511,6 +512,13 @@ class System {
   void note_speed(const JointCluster&, double speed);
   /// True the first time for a cluster and a situation.
   bool note_once(const JointCluster&, int situation);
+  /// Tells once of two bodies that one has sunk into the other by more than half of the thinner one, or that they move
+  /// by more than that one's thickness between two looks.
+  ///   depth     of the deepest point, or minus the gap [m]
+  ///   interval  time between looks [s]
+  void note_lost_contact(const PairDue&, double depth, double interval);
+  /// Of the shape at its thinnest, infinite for a plane [m].
+  double thickness_of(const CompiledShape&) const;
   /// Whether more rows were told to depend on others than do now, or to do so for a while.
   bool was_singular(const JointCluster&) const;
   void break_element(size_t e, BreakReason reason);

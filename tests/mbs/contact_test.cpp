@@ -355,5 +355,50 @@ TEST(BodyContact, BeginsWhenTheLinkBetweenThemEnds) {
   EXPECT_NEAR(least, 0.9, 0.003);  // at 1500 rad/s they press each other by 1.3 mm
 }
 
+/// What the summary notes of bodies that contact did not keep apart.
+std::vector<std::string> note_lost_contacts(const Model& m, double duration, double step) {
+  Options o = free_options(duration, step);
+  o.tells_lost_contact = true;
+  return run(m, o).notes;
+}
+
+TEST(BodyContact, NotesABodyThatSinksThroughALightOne) {
+  Model m;
+  add_body(m, make_box("light", 1, {0.5, 0.5, 0.25}, {0, 0, 0.25}));
+  add_body(m, make_box("heavy", 1e5, {0.5, 0.5, 0.5}, {0, 0, 1.0}));
+  const std::vector<std::string> notes = note_lost_contacts(m, 0.4, 5e-5);
+  ASSERT_EQ(notes.size(), 1u);
+  // it falls by half of the light one's half metre, hardly held: sqrt(2 * 0.25 / 9.81) = 0.226 s at the least
+  EXPECT_TRUE(notes[0].starts_with("bodies \"light\" and \"heavy\": one has sunk 0.25")) << notes[0];
+  const double time = std::stod(notes[0].substr(notes[0].find(" at ") + 4));
+  EXPECT_GT(time, 0.226);
+  EXPECT_LT(time, 0.4);
+
+  m.contact.pairs.push_back({});
+  m.contact.pairs[0].a = {0}, m.contact.pairs[0].b = {1}, m.contact.pairs[0].stiffness = 1e8;
+  EXPECT_TRUE(note_lost_contacts(m, 0.4, 2e-6).empty());
+  // and nothing is said unless it is asked for
+  m.contact.pairs.clear();
+  EXPECT_TRUE(run(m, free_options(0.4, 5e-5)).notes.empty());
+}
+
+TEST(BodyContact, NotesBodiesThatMayPassBetweenTwoLooks) {
+  Model m;
+  m.gravity = {};
+  m.contact.ground = false;
+  Body plate = make_box("plate", 1, {0.02, 2, 2}, {0.5, 0, 5});
+  plate.fixed = true;
+  add_body(m, plate);
+  Body bullet = make_box("bullet", 1, {0.01, 0.01, 0.01}, {-0.025, 0, 5});
+  bullet.v_WB = {1000, 0, 0};
+  add_body(m, bullet);
+  const std::vector<std::string> notes = note_lost_contacts(m, 0.002, 5e-5);
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_TRUE(notes[0].starts_with("bodies \"plate\" and \"bullet\": they move 0.05 m against each other")) << notes[0];
+  // that flies by at a distance of more than it moves
+  m.bodies[1].X_WB.p.y = 2.2;
+  EXPECT_TRUE(note_lost_contacts(m, 0.002, 5e-5).empty());
+}
+
 }  // namespace
 }  // namespace topple::mbs
