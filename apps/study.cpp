@@ -105,8 +105,9 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
     if (code == "E823" || code == "E824" || code == "E827" || code == study::no_answer_code) {
       const auto refusal = study::Store(place.store).find_refusal(model);
       complain(e, refusal ? to_printable(study::read_refusal(*refusal).line) : "", a.json);
-      std::fprintf(stderr,
-                   "The study stopped; what was run before is kept. Mend the evaluator and give the command again.\n");
+      std::fprintf(stderr, answers > 0 ? "The study stopped; what was run before is kept. Mend the evaluator and give "
+                                         "the command again.\n"
+                                       : "The study stopped. Mend the evaluator and give the command again.\n");
     } else {
       complain(e, text, a.json);
     }

@@ -74,7 +74,7 @@ class Design {
     result_.permissible_groups = group(result_.permissible_samples);
     result_.forbidden_groups = group(result_.forbidden_samples);
     std::vector<int> centres;
-    for (const int c : result_.permissible_groups.centre) centres.push_back(result_.permissible_samples[c]);
+    for (std::size_t g = 0; g < result_.permissible_groups.centre.size(); ++g) centres.push_back(find_start(g, bad));
     const int n = static_cast<int>(axes_.size());
     const int wanted = options_.growth_points > 0 ? options_.growth_points : 100 * n * n;
     for (std::size_t g = 0; g < centres.size(); ++g) {
@@ -122,6 +122,32 @@ class Design {
     for (int i = 0; i < asker_.asked(); ++i)
       if (is_possible(i) && is_good(i) == good) found.push_back(i);
     return found;
+  }
+
+  /// The sample of a group of permissible runs at which a box begins: its medoid, unless a violating run lies within
+  /// `edge` of it, where no box has room; then the one that is farthest from all violating runs.
+  int find_start(std::size_t g, const std::vector<int>& bad) const {
+    const Grouping& groups = result_.permissible_groups;
+    const auto clearance_of = [&](int sample) {
+      double least = infinite;
+      for (const int other : bad) {
+        double apart = 0;  // along the axis along which they are farthest, of the support's width
+        for (const int i : axes_)
+          apart = std::max(apart, std::abs(asker_.archive()[sample].x[i] - asker_.archive()[other].x[i]) /
+                                      (support_.upper[i] - support_.lower[i]));
+        least = std::min(least, apart);
+      }
+      return least;
+    };
+    int start = result_.permissible_samples[static_cast<std::size_t>(groups.centre[g])];
+    double most = clearance_of(start);
+    if (most > options_.edge) return start;
+    for (std::size_t k = 0; k < result_.permissible_samples.size(); ++k) {
+      if (groups.group[k] != static_cast<int>(g)) continue;
+      if (const double clearance = clearance_of(result_.permissible_samples[k]); clearance > most)
+        most = clearance, start = result_.permissible_samples[k];
+    }
+    return start;
   }
 
   void spread() {

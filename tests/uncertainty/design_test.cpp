@@ -312,6 +312,26 @@ TEST(Design, EverythingPermissibleIsOneBox) {
   EXPECT_NEAR(f.design.fraction_error, std::sqrt(n + 1) / std::pow(n + 2, 1.5), 1e-12) << "never certain";
 }
 
+// Searches for where an outcome changes leave most runs beside the boundary, so that the middle run of a group lies
+// there: a box has no room around it, and begins elsewhere.
+TEST(Design, BeginsWhereThereIsRoom) {
+  const Evaluate model = make_model([](const Point& x) { return x[0] < 0.3; });
+  const Progress progress;
+  Asker asker(model, progress, nullptr, 20000);
+  Random random(3);
+  std::vector<Point> beside;
+  for (int k = 0; k < 4000; ++k)
+    beside.push_back({0.3 + (k % 2 ? 1e-3 : -1e-3) * random.next(0, 1), random.next(0, 1)});
+  (void)asker.ask(beside);
+  const FuzzyNumber f = make_triangular(0, 0.5, 1);
+  const DesignResult design = find_permissible_boxes(Space{{f, f}, {}, {}}, asker, outcome_0, {});
+  double largest = 0;
+  for (const PermissibleBox& b : design.boxes)
+    if (b.kept) largest = std::max(largest, b.volume);
+  EXPECT_GT(largest, 0.28);
+  EXPECT_LT(largest, 0.3);
+}
+
 // What breaks a constraint takes nothing away, also where runs were made there: every possible point keeps the
 // requirement.
 TEST(Design, WhatConstraintsExcludeCutsNoBox) {
