@@ -73,6 +73,10 @@ int run_finite_elements(const Arguments& a, const std::atomic<bool>& cancel) {
     const product::Plan plan = product::read_plan_file(a.input, warnings, text);
     const collapse::Knowledge knowledge = load_knowledge(a);
     print_diagnostics(warnings, text);
+    if (plan.analysis.step > 0)
+      std::fprintf(stderr,
+                   "topple: \"step\" of [analysis] is that of the multibody model and has no effect here; "
+                   "--scaled-step sets that of the elements, a shorter one too.\n");
     if (a.fe.mesh_only) {
       const farfield::Whole whole = farfield::make_whole(plan, knowledge, fe.grid, a.threads);
       const farfield::MeshReport report = farfield::calc_mesh_report(plan, whole);

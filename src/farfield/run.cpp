@@ -15,6 +15,7 @@
 #include "farfield/checkpoint.h"
 #include "farfield/fragments.h"
 #include "farfield/motion.h"
+#include "farfield/rubble.h"
 #include "mbs/model_check.h"
 #include "record/told.h"
 
@@ -471,6 +472,7 @@ void Course::add_findings(record::Record& r) const {
     record::add_finding(r, {id, "Finite elements", title, text, value, unit, status});
   };
   add_fragment_findings(plan_, state_.fragments, state_.fragments_time, r);
+  judge_rubble(plan_, whole_.fe, system_.debris(), r);
   std::string text;
   for (const std::string& line : describe(mesh_)) text += (text.empty() ? "" : " ") + line;
   add("farfield.mesh", "Mesh", text, mesh_.mesh.elements, "1", Status::Info);
@@ -561,8 +563,9 @@ void Course::add_findings(record::Record& r) const {
 /// The elements crack within bays and panels, which the multibody model does not; what they lack is something else.
 void say_what_is_not_modelled(record::Record& r) {
   const std::string here =
-      "cracks that close again after bars have yielded, slip and buckling of single bars (concrete and bars are one "
-      "material)";
+      "cracks that close again after bars have yielded, slip and buckling of single bars, at which face the bars of a "
+      "section lie and which way they run (concrete and bars are one material: a beam with its bars at the wrong face "
+      "stands), failure by shear, buckling of members beyond what their elements do; rubble in reach and hill";
   for (std::string& s : r.not_modelled)
     if (s.rfind("cracking and crushing of slabs", 0) == 0) s = here;
   // of zones alone: elements beside a charge are weakened wherever they are

@@ -506,7 +506,11 @@ export const german: readonly (readonly [string, string])[] = [
   ["cracking and crushing of slabs within a bay, of walls within a panel and of beams between their end zones; room that rubble takes", "Risse und zerdrückter Beton in Decken innerhalb eines Feldes, in Wänden innerhalb einer Scheibe und in Balken zwischen ihren Endzonen; Raum, den Schutt einnimmt"],
   ["rings that flatten as they land: single pieces of a shaft may roll and tumble farther than real ones", "Ringe, die beim Aufschlag flach werden: Einzelne Stücke eines Schafts können weiter rollen als wirkliche"],
   ["infill and finishes beyond their weight", "Ausfachung und Ausbau über ihr Gewicht hinaus"],
-  ["cracks that close again after bars have yielded, slip and buckling of single bars (concrete and bars are one material)", "Risse, die sich schließen, nachdem der Stahl geflossen ist, Schlupf und Knicken einzelner Stäbe (Beton und Stahl sind ein Baustoff)"],
+  ["cracks that close again after bars have yielded, slip and buckling of single bars, at which face the bars of a section lie and which way they run (concrete and bars are one material: a beam with its bars at the wrong face stands), failure by shear, buckling of members beyond what their elements do; rubble in reach and hill", "Risse, die sich schließen, nachdem der Stahl geflossen ist, Schlupf und Knicken einzelner Stäbe, auf welcher Seite eines Querschnitts die Stäbe liegen und wohin sie laufen (Beton und Stahl sind ein Baustoff: ein Balken mit seinen Stäben auf der falschen Seite steht), Versagen durch Schub, Knicken von Bauteilen über das ihrer Elemente hinaus; Schutt in Reichweite und Haufen"],
+  ["Rubble lies {:.1f} m from it at the end, {:.0f} kg of it nearer than the limit.", "Schutt liegt am Ende {} m davon entfernt, {} kg davon näher als die Grenze."],
+  ["Rubble lies on it at the end, {:.0f} kg of it there or nearer than the limit.", "Schutt liegt am Ende darauf, {} kg davon dort oder näher als die Grenze."],
+  ["Rubble, which these numbers leave out, lies up to {:.1f} m from the footprint.", "Schutt, den diese Zahlen auslassen, liegt bis zu {} m vom Grundriss entfernt."],
+  ["Rubble lies up to {:.1f} m from the footprint, {:.0f} kg of it beyond the limit.", "Schutt liegt bis zu {} m vom Grundriss entfernt, {} kg davon jenseits der Grenze."],
   // values of the plan
   ["Building", "Gebäude"],
   ["Rows", "Reihen"],
