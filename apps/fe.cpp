@@ -67,6 +67,7 @@ int run_finite_elements(const Arguments& a, const std::atomic<bool>& cancel) {
   std::vector<Diagnostic> warnings;
   std::string text;
   std::FILE* out = a.json ? stderr : stdout;
+  bool is_new = false;  // the folder of results
   try {
     const collapse::RunOptions options = make_plan_options(a, "--until");
     const farfield::FeOptions fe = make_fe_options(a);
@@ -85,6 +86,7 @@ int run_finite_elements(const Arguments& a, const std::atomic<bool>& cancel) {
       if (a.json) std::printf("%s\n", dump({{"exit_code", kOk}, {"mesh", to_json(report)}}).c_str());
       return kOk;
     }
+    is_new = !std::filesystem::exists(a.output);
     make_run_folder(a.output);
     ProgressLine progress;
     EventPrinter events(out, a.verbose, progress);
@@ -121,7 +123,11 @@ int run_finite_elements(const Arguments& a, const std::atomic<bool>& cancel) {
       std::fprintf(out, "Go on with: topple fe %s%s -o %s --resume\n", quote_word(a.input).c_str(),
                    write_options(a).c_str(), quote_word(a.output).c_str());
     return code;
-  } catch (const InputError& e) { return refuse(e, warnings, text, a.json); }
+  } catch (const InputError& e) {
+    std::error_code ignored;  // what is not empty stays
+    if (is_new) std::filesystem::remove(a.output, ignored);
+    return refuse(e, warnings, text, a.json);
+  }
 }
 
 }  // namespace topple::apps

@@ -450,8 +450,8 @@ void Course::check_added_mass() const {
   throw InputError("E677",
                    fmt::format("a scaled step of {:.3g} ms would add {:.2g} times the building's mass to it",
                                1e3 * fe_.scaled_step, added_share()),
-                   fmt::format("give one that adds a per cent or two; without any the mesh bears {:.3g} ms",
-                               1e3 * mesh_.mesh.critical_step));
+                   fmt::format("give one that adds a per cent or two; without any the mesh bears {:.4g} ms",
+                               1e3 * fem::calc_step_share({}) * mesh_.mesh.critical_step));
 }
 
 bool Course::adds_much_mass() const { return added_share() > kMuchAddedMass; }

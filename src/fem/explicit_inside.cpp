@@ -59,6 +59,11 @@ double seconds() { return std::chrono::duration<double>(std::chrono::steady_cloc
 
 }  // namespace
 
+double calc_step_share(const ExplicitOptions& o) {
+  const double b = o.linear_viscosity;
+  return o.step_share * (std::sqrt(1 + b * b) - b);
+}
+
 ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
     : model(m), options(o), team(std::make_unique<Team>(o.threads)) {
   check_explicit_model(model);
@@ -84,8 +89,7 @@ ExplicitSystem::Inside::Inside(const ExplicitModel& m, const ExplicitOptions& o)
     steps[e] = calc_element_step(x, material, element.mass_factor);
     least = std::min(least, steps[e]);
   }
-  const double b = options.linear_viscosity;
-  const double share = options.step_share * (std::sqrt(1 + b * b) - b);
+  const double share = calc_step_share(options);
   h = options.scaled_step > 0 ? options.scaled_step : share * least;
   for (size_t e = 0; e < E; ++e) {
     if (share * steps[e] >= h * (1 - 1e-12)) continue;

@@ -92,6 +92,9 @@ struct DebrisParticle {
   int element = 0;  // that it was
 };
 
+/// What a step may have of the critical one of elements without viscosity (docs/theory/explicit.md, eq. 16).
+double calc_step_share(const ExplicitOptions&);
+
 enum class ExplicitEnding { ReachedTime, Cancelled, Diverged };
 
 class ExplicitSystem {

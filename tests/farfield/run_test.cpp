@@ -560,7 +560,16 @@ TEST(Farfield, RefusesAScaledStepThatAddsABuilding) {
       ADD_FAILURE() << step;
     } catch (const InputError& e) {
       EXPECT_EQ(e.diagnostics()[0].code, "E677");
-      EXPECT_THAT(e.diagnostics()[0].help, testing::HasSubstr("the mesh bears 0.0"));
+      const std::string& help = e.diagnostics()[0].help;
+      ASSERT_THAT(help, testing::HasSubstr("the mesh bears 0.0"));
+      // and that step adds none, but for its digits
+      FeOptions borne = fe;
+      borne.scaled_step = 1e-3 * std::stod(help.substr(help.find("bears ") + 6));
+      const record::Record r = run_plan(read(with_duration(portal(), "10 ms")), rules(), {}, borne, {}, {});
+      for (const record::Finding& f : r.findings)
+        if (f.id == "farfield.scaled") {
+          EXPECT_LT(f.value, 1) << f.text;  // [kg]
+        }
     }
   }
 }
