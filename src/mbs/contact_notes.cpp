@@ -36,7 +36,6 @@ double System::thickness_of(const CompiledShape& shape) const {
 }
 
 void System::note_lost_contact(const PairDue& due, double depth, double interval) {
-  if (!options.tells_lost_contact) return;
   const size_t a = static_cast<size_t>(due.a), b = static_cast<size_t>(due.b);
   const CompiledShape &shape_a = state.shapes[static_cast<size_t>(due.shape_a)],
                       &shape_b = state.shapes[static_cast<size_t>(due.shape_b)];

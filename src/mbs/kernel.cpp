@@ -173,7 +173,7 @@ HWY_INLINE void lay_pose_block(const PoseJob& job, size_t block) {
 template <class D>
 struct Yielding {
   Num<D> x[2], k[6], d[6], was[6];              // stations, stiffness, deformation, stretch before
-  Num<D> u[6], e[6], f[6], before[6], slid[6];  // stretch, its elastic part, force; that part before; none of it
+  Num<D> u[6], e[6], f[6], before[6], slid[6];  // stretch, its elastic part, force; that part before; the rest
   Num<D> torn;                                  // twice what cracks that grow lose
   hn::Mask<D> outside;                          // of the lanes that the full law must look at
 };

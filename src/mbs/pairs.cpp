@@ -128,7 +128,7 @@ void System::find_pair_points(double h) {
     const Earnings earnings = pair.group >= 0 ? contact.earnings[static_cast<size_t>(pair.group)] : Earnings{};
     pair.group = -1;
     if (points.count == 0) {
-      note_lost_contact(due, -points.gap, h * passed);
+      if (options.tells_lost_contact) note_lost_contact(due, -points.gap, h * passed);
       contact.lost += std::max(0.0, earnings.stored);
       due.way = way + points.gap;
       due.touching = false;
@@ -152,7 +152,7 @@ void System::find_pair_points(double h) {
       pair.sticks = {};
       continue;
     }
-    note_lost_contact(due, pair.depth, h * passed);
+    if (options.tells_lost_contact) note_lost_contact(due, pair.depth, h * passed);
     const ContactLaw& law = contact_laws[static_cast<size_t>(pair.law)];
     const double stiffness = law.stiffness > 0 ? law.stiffness
                                                : c.contact_frequency * c.contact_frequency /

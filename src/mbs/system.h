@@ -248,7 +248,7 @@ class System {
   std::vector<JointCluster> clusters;
   bool clusters_due = true;
   std::vector<std::pair<int, int>> joint_notes;  // first joint and situation of those made
-  std::vector<std::pair<int, int>> noted_pairs;  // bodies that contact was told not to keep apart
+  std::vector<std::pair<int, int>> noted_pairs;  // bodies of which a note says that contact did not keep them apart
   std::vector<size_t> turned_over;               // elements past half a turn
   /// Notes an element whose rotation vector has just changed over to the other side.
   void note_turned_over(size_t element, const Six& deformation, const ZoneState& before);
