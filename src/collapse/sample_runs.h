@@ -22,7 +22,7 @@ struct SampleRunOptions {
   bool ends_early = false;  // a condensed sample is over once the building has come down before its last stage
   const Condensation* condensation = nullptr;  // samples run condensed; null: whole
   const KnownCurves* known = nullptr;          // of condensed ones; may be null
-  double pass_speed = 0.1, pass_share = 2e-3;  // mbs::Options, of condensed samples
+  double pass_speed = 0.1, pass_share = 1e-2;  // mbs::Options, of condensed samples
   double step_share = 1;                       // mbs::Options
   bool full_law = false;                       // mbs::Options
   bool findings = true;                        // SampleRun::volume and what follows it

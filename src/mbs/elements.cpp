@@ -169,7 +169,7 @@ System::Work System::find_work(size_t slot) const {
   const Lanes& l = *lanes;
   if (l.field(slot, kMostTurn) == kUnlimited) return Work::None;
   if (!(l.field(slot, kFlows) > 0)) return Work::Springs;
-  return l.flow(slot, kIdle) > 0 ? Work::MayFlow : Work::Flows;
+  return l.flow(slot, kIdle) != 0 ? Work::MayFlow : Work::Flows;
 }
 
 bool System::is_work_scattered() const {

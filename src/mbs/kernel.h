@@ -133,8 +133,9 @@ enum FlowCell : int {
   kCellLiftPositive = 17,
   kCellLiftNegative = 20
 };
-/// Steps without flow after which the full law is asked for bounds, and after which again if it found none.
-inline constexpr double kLongestIdle = 20, kLongestIdleAgain = 200;
+/// Steps without flow after which the full law is asked for bounds as soon as forces are far below the limits, and
+/// after which again if it found none.
+inline constexpr double kLongestIdle = 50, kLongestIdleAgain = 200;
 /// Most flexibility that damage adds, over the elastic one: unloading keeps a twentieth of the stiffness.
 inline constexpr double kMostDamage = 19;
 
