@@ -190,6 +190,11 @@ std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) const {
   std::vector<int> parent(B);
   std::iota(parent.begin(), parent.end(), 0);
   const auto is_upper = [&](int b) { return b >= 0 && map_.bodies[static_cast<size_t>(b)].is_upper; };
+  const auto centre_of = [&](size_t b) { return v.centre.size() == B ? v.centre[b] : v.X_WB[b].p; };
+  // where the body had at the start what is its mass centre now
+  const auto start_of = [&](size_t b) {
+    return start_[b] * transpose_times(to_matrix(v.X_WB[b].q), centre_of(b) - v.X_WB[b].p);
+  };
   const auto link = [&](mbs::BodyId a, mbs::BodyId b) {
     if (is_upper(a.index) && is_upper(b.index))
       parent[static_cast<size_t>(find_root(parent, a.index))] = find_root(parent, b.index);
@@ -221,7 +226,7 @@ std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) const {
     const size_t s = static_cast<size_t>(map_.bodies[b].structure);
     BlockFrame& f = out[s];
     moving[s] += m;
-    f.centre += m * v.X_WB[b].p;
+    f.centre += m * centre_of(b);
     if (has_moved) f.moved += m;
     if (is_down) f.down += m;
     if (!map_.bodies[b].is_upper) continue;
@@ -258,8 +263,8 @@ std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) const {
       if (!is_upper(static_cast<int>(b)) || find_root(parent, static_cast<int>(b)) != static_cast<int>(largest))
         continue;
       block.push_back({v.mass[b], model_.bodies[b].inertia, start_[b], v.X_WB[b]});
-      shift += v.mass[b] * (v.X_WB[b].p - start_[b].p);
-      above += v.mass[b] * start_[b].p.z;
+      shift += v.mass[b] * (centre_of(b) - start_of(b));
+      above += v.mass[b] * start_of(b).z;
     }
     f.rotation = fit_rotation(block);
     f.displacement = (1 / group[largest]) * shift;
@@ -457,7 +462,6 @@ void Recorder::add_frame(const mbs::View& v) {
   zone_frames_.push_back(zf);
   if (keeps_speeds_)
     for (size_t b = 0; b < B; ++b) {
-      // finite elements have no centre but their bodies' origin
       const Vec3 lever = v.centre.size() == B ? v.X_WB[b].p - v.centre[b] : Vec3{};
       const Vec3 velocity = v.v_WB[b] + cross(v.w_WB[b], lever);
       for (const double c : {velocity.x, velocity.y, velocity.z}) speeds_.velocity.push_back(static_cast<float>(c));

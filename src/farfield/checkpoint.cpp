@@ -12,7 +12,7 @@ namespace topple::farfield {
 
 namespace {
 
-constexpr char kMagic[] = "topple-fe-checkpoint-6";
+constexpr char kMagic[] = "topple-fe-checkpoint-7";
 
 class Writer {
  public:
@@ -93,7 +93,8 @@ class Reader {
 /// The parts of a view that the finite elements fill.
 template <class Io, class View>
 void pass_view(Io& io, View& v) {
-  io(v.time), io(v.X_WB), io(v.v_WB), io(v.w_WB), io(v.mass), io(v.element_state), io(v.utilisation), io(v.rotation);
+  io(v.time), io(v.X_WB), io(v.centre), io(v.v_WB), io(v.w_WB), io(v.mass), io(v.element_state), io(v.utilisation),
+      io(v.rotation);
   io(v.shortening), io(v.joint_force), io(v.joint_moment), io(v.joint_released);
   io(v.ground_force), io(v.contact_force_ground), io(v.body_contacts), io(v.energy);
 }

@@ -72,7 +72,7 @@ Motion::Motion(const product::Plan& plan, const Whole& whole, const mbs::Model& 
     centre_.push_back(centre);
     element_mass_.push_back(fem::calc_hex_volume(corners) *
                             fe.materials[static_cast<size_t>(element.material)].density * element.mass_factor);
-    body_elements_[static_cast<size_t>(element.part)].push_back(static_cast<int>(e));
+    for (const int b : whole.bodies[e]) body_elements_[static_cast<size_t>(b)].push_back(static_cast<int>(e));
   }
   std::set<int> charged;
   for (const ChargeElements& c : whole.charges) charged.insert(c.elements.begin(), c.elements.end());
@@ -101,7 +101,9 @@ Motion::Motion(const product::Plan& plan, const Whole& whole, const mbs::Model& 
       if (b < 0) continue;
       for (const int e : body_elements_[static_cast<size_t>(b)]) {
         const Vec3 d = centre_[static_cast<size_t>(e)] - z.p_W;
-        if (std::max({std::abs(d.x), std::abs(d.y), std::abs(d.z)}) <= size) out.elements.push_back(e);
+        if (std::max({std::abs(d.x), std::abs(d.y), std::abs(d.z)}) > size) continue;
+        // both may share it
+        if (std::find(out.elements.begin(), out.elements.end(), e) == out.elements.end()) out.elements.push_back(e);
       }
     }
     out.sections = gather_sections(z);
@@ -118,8 +120,11 @@ mbs::View Motion::calc_view(const fem::ExplicitSystem& system, double time) cons
   v.time = time;
   const size_t B = model_.bodies.size();
   std::vector<std::vector<const fem::DebrisParticle*>> debris(B);
+  const auto share_of = [this](int e) {
+    return 1.0 / static_cast<double>(whole_.bodies[static_cast<size_t>(e)].size());
+  };
   for (const fem::DebrisParticle& d : system.debris())
-    debris[static_cast<size_t>(fe.elements[static_cast<size_t>(d.element)].part)].push_back(&d);
+    for (const int b : whole_.bodies[static_cast<size_t>(d.element)]) debris[static_cast<size_t>(b)].push_back(&d);
   std::vector<FitPoint> points;
   std::vector<MovingPoint> moving;
   for (size_t b = 0; b < B; ++b) {
@@ -129,7 +134,7 @@ mbs::View Motion::calc_view(const fem::ExplicitSystem& system, double time) cons
     double mass = 0;
     for (const int e : body_elements_[b]) {
       if (!system.is_alive(e)) continue;
-      const double share = 0.125 * element_mass_[static_cast<size_t>(e)];
+      const double share = 0.125 * share_of(e) * element_mass_[static_cast<size_t>(e)];
       for (const int n : fe.elements[static_cast<size_t>(e)].node) {
         points.push_back({share, fe.nodes[static_cast<size_t>(n)], system.p(n)});
         moving.push_back({share, system.p(n), system.v(n)});
@@ -141,19 +146,23 @@ mbs::View Motion::calc_view(const fem::ExplicitSystem& system, double time) cons
     PointFit fit = fit_points(points);
     fit.before *= mass, fit.after *= mass;
     for (const fem::DebrisParticle* d : debris[b]) {
-      fit.before += d->mass * centre_[static_cast<size_t>(d->element)];
-      fit.after += d->mass * d->p;
-      momentum += d->mass * d->v;
-      mass += d->mass;
+      const double share = share_of(d->element) * d->mass;
+      fit.before += share * centre_[static_cast<size_t>(d->element)];
+      fit.after += share * d->p;
+      momentum += share * d->v;
+      mass += share;
     }
     Pose X = start;
-    Vec3 velocity;
+    Vec3 velocity, centre = start.p;
     if (mass > 0) {
-      const Vec3 before = (1 / mass) * fit.before, after = (1 / mass) * fit.after;
-      X = {after + to_matrix(fit.rotation) * (start.p - before), fit.rotation * start.q};
+      const Vec3 before = (1 / mass) * fit.before;
+      centre = (1 / mass) * fit.after;
+      // the origin is not the elements' mass centre where they do not meet the body's bounds
+      X = {centre + to_matrix(fit.rotation) * (start.p - before), fit.rotation * start.q};
       velocity = (1 / mass) * momentum;
     }
     v.X_WB.push_back(X);
+    v.centre.push_back(centre);
     v.v_WB.push_back(velocity);
     v.w_WB.push_back(calc_spin(moving));
     v.mass.push_back(mass);

@@ -20,9 +20,9 @@ class Motion {
  public:
   Motion(const product::Plan&, const Whole&, const mbs::Model&, const collapse::ModelMap&, double size);
 
-  /// The manager's bodies with the mass centre of their elements and debris, turned as least squares turn the elements
-  /// (without any, not at all), and their angular momentum says; its zones by what their elements have come through,
-  /// the ledger of energies.
+  /// The manager's bodies carried as least squares carry their elements and debris, turned as they turn the elements
+  /// (without any, not at all), and their angular momentum says; the mass centres of both; its zones by what their
+  /// elements have come through, the ledger of energies.
   ///   time  of the plan [s]
   mbs::View calc_view(const fem::ExplicitSystem&, double time) const;
   /// Vertical force of the ground on each foot, upwards [N]. (feet)
@@ -36,7 +36,7 @@ class Motion {
   const Whole& whole_;
   const mbs::Model& model_;
   std::vector<size_t> upper_;                    // bodies of the upper block
-  std::vector<std::vector<int>> body_elements_;  // (bodies)
+  std::vector<std::vector<int>> body_elements_;  // also those that it shares with others (bodies)
   std::vector<double> element_mass_;             // (elements)
   std::vector<ZoneElements> zones_;              // zone elements, then rotational elements
   std::vector<ZoneElements> joints_;             // (joints)

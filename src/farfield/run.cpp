@@ -236,7 +236,7 @@ class Course {
     const Vec3 v = last->v_WB[b] + since * model_.gravity;
     const Vec3 w_B = transpose_times(to_matrix(last->X_WB[b].q), last->w_WB[b]);
     const double k = last->energy.kinetic;
-    return {last->X_WB[b].p + since * last->v_WB[b],
+    return {last->centre[b] + since * last->v_WB[b],
             0.5 * last->mass[b] * dot(v, v) + 0.5 * dot(w_B, model_.bodies[b].inertia * w_B),
             -last->mass[b] * dot(v, model_.contact.normal),
             before ? k + (k - before->energy.kinetic) / (last->time - before->time) * since : k};

@@ -136,6 +136,9 @@ std::vector<double> calc_zone_lengths(const product::Plan& plan, const collapse:
   return out;
 }
 
+/// Distances from two bodies that differ by less are the same but for round-off [m].
+constexpr double kSamePlace = 1e-6;
+
 /// Distance from a box along W's axes as it stands at the start; negative inside.
 double calc_distance(const Vec3& p, const Vec3& centre, const Vec3& half) {
   double outside = 0, inside = -std::numeric_limits<double>::infinity();
@@ -149,16 +152,21 @@ double calc_distance(const Vec3& p, const Vec3& centre, const Vec3& half) {
 
 }  // namespace
 
-std::vector<int> find_bodies(const Grid& grid, const mbs::Model& model, const collapse::ModelMap& map) {
-  std::vector<int> bodies(grid.cells.size(), -1);
+std::vector<std::vector<int>> find_bodies(const Grid& grid, const mbs::Model& model, const collapse::ModelMap& map) {
+  std::vector<std::vector<int>> bodies(grid.cells.size());
+  std::vector<double> away(map.bodies.size());
   for (size_t c = 0; c < grid.cells.size(); ++c) {
     double least = std::numeric_limits<double>::infinity();
-    for (size_t b = 0; b < map.bodies.size(); ++b)
+    for (size_t b = 0; b < map.bodies.size(); ++b) {
+      away[b] = std::numeric_limits<double>::infinity();
       for (const record::BoxShape& s : map.bodies[b].shapes) {
         const Vec3 centre = model.bodies[b].X_WB * s.X_BS.p;
-        const double d = calc_distance(grid.cells[c].centre, centre, s.half);
-        if (d < least) least = d, bodies[c] = static_cast<int>(b);
+        away[b] = std::min(away[b], calc_distance(grid.cells[c].centre, centre, s.half));
       }
+      least = std::min(least, away[b]);
+    }
+    for (size_t b = 0; b < away.size(); ++b)
+      if (away[b] < least + kSamePlace) bodies[c].push_back(static_cast<int>(b));
   }
   return bodies;
 }
@@ -204,7 +212,7 @@ Whole make_whole(const product::Plan& plan, const collapse::Knowledge& k, const 
 
   Materials materials(plan, fe.materials);
   const std::vector<double> zone_lengths = calc_zone_lengths(plan, k, map);
-  const std::vector<int> bodies = find_bodies(grid, model, map);
+  whole.bodies = find_bodies(grid, model, map);
   for (size_t c = 0; c < grid.cells.size(); ++c) {
     const Cell& cell = grid.cells[c];
     const product::Member& m = plan.members[static_cast<size_t>(cell.member)];
@@ -230,7 +238,7 @@ Whole make_whole(const product::Plan& plan, const collapse::Knowledge& k, const 
         add_once(release.weakened, std::pair(e.material, materials.of_section(m.section, damaged, {}, zone, length)));
       }
     }
-    e.part = bodies[c];
+    e.part = whole.bodies[c].front();
     const MemberFit& fit = grid.fits[static_cast<size_t>(cell.member)];
     e.mass_factor = calc_loaded_mass(plan, m) / (fit.volume * fe.materials[static_cast<size_t>(e.material)].density);
     fe.elements.push_back(e);

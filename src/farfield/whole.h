@@ -20,8 +20,9 @@ struct Foot {
 
 struct Whole {
   Grid grid;
-  fem::ExplicitModel fe;                // elements in the order of the grid's cells; their part is the manager's body
-  std::vector<ChargeElements> charges;  // in the order of fe.releases
+  fem::ExplicitModel fe;                 // elements in the order of the grid's cells; their part is the manager's body
+  std::vector<std::vector<int>> bodies;  // that share each element alike, its part first (elements)
+  std::vector<ChargeElements> charges;   // in the order of fe.releases
   std::vector<Foot> feet;
   std::vector<std::string> notes;  // what was left out, in sentences
 };
@@ -31,8 +32,9 @@ struct Whole {
 Whole make_whole(const product::Plan&, const collapse::Knowledge&, const GridOptions&, const mbs::Model& model,
                  const collapse::ModelMap& map);
 
-/// Body of the manager in which each cell lies: whose boxes hold its centre, or are nearest to it. (cells)
-std::vector<int> find_bodies(const Grid&, const mbs::Model&, const collapse::ModelMap&);
+/// Bodies of the manager in which each cell lies: whose boxes hold its centre, or are nearest to it. Several where the
+/// centre lies on their border: to give it to one of them would tell left from right. (cells)
+std::vector<std::vector<int>> find_bodies(const Grid&, const mbs::Model&, const collapse::ModelMap&);
 
 /// What is said of a mesh: counts, edges, step, and how its members fit the plan.
 struct MeshReport {
