@@ -111,7 +111,8 @@ void pass_state(Io& io, State& s) {
       io(s.has_touched);
   io(s.skipped), io(s.unsettled), io(s.relaxation.converged), io(s.relaxation.steps), io(s.relaxation.residual);
   io(s.relaxation.settlement), io(s.relaxation.text), io(s.ledger), io(s.energy_error), io(s.released), io(s.wall_time);
-  io(s.has_fragments), io(s.fragments_time), io(s.fragments.damaged_strain), io(s.fragments.reach);
+  io(s.early_damage.landing), io(s.early_damage.is_damaged), io(s.has_fragments), io(s.fragments_time),
+      io(s.fragments.damaged_strain), io(s.fragments.reach);
   io(s.fragments.zones), io(s.fragments.fragments);
 }
 

@@ -46,10 +46,11 @@ struct RunState {
                                                // the building settled in them [m]
   std::vector<UnsettledWait> unsettled;
   fem::RelaxationSummary relaxation;
-  mbs::Energy ledger;          // what the record holds beyond the elements' own ledger since they were settled last [J]
-  double energy_error = 0;     // largest residual [J]
-  double released = 0;         // largest potential energy set free [J]
-  double wall_time = 0;        // of the parts before [s]
+  mbs::Energy ledger;       // what the record holds beyond the elements' own ledger since they were settled last [J]
+  double energy_error = 0;  // largest residual [J]
+  double released = 0;      // largest potential energy set free [J]
+  double wall_time = 0;     // of the parts before [s]
+  EarlyDamage early_damage;
   bool has_fragments = false;  // from the first touchdown on
   Fragments fragments;
   double fragments_time = 0;  // [s]

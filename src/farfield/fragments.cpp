@@ -41,10 +41,24 @@ int find_root(std::vector<int>& parent, int i) {
   return i;
 }
 
+bool is_damaged(const fem::ExplicitSystem& system, size_t element) {
+  const int e = static_cast<int>(element);
+  return !system.is_alive(e) || system.plastic_strain(e) >= kDamagedStrain;
+}
+
+/// It lies in a stump, which only what lands on it breaks, or landing parts made it what it is.
+bool is_of_landing(const DamageZone& z) { return z.stump >= 0.5 || z.landed >= 0.5; }
+
 }  // namespace
 
+void EarlyDamage::note(const fem::ExplicitSystem& system, size_t elements) {
+  if (landing >= 0) return;
+  is_damaged.resize(elements);
+  for (size_t e = 0; e < elements; ++e) is_damaged[e] = farfield::is_damaged(system, e) ? 1 : 0;
+}
+
 Fragments find_fragments(const product::Plan& plan, const Whole& whole, const fem::ExplicitSystem& system,
-                         const std::vector<record::ZoneInfo>& zones, double size) {
+                         const std::vector<record::ZoneInfo>& zones, double size, const EarlyDamage& before_landing) {
   const fem::ExplicitModel& fe = whole.fe;
   const size_t E = fe.elements.size();
   Fragments out;
@@ -52,10 +66,13 @@ Fragments find_fragments(const product::Plan& plan, const Whole& whole, const fe
   enum class State { Sound, Damaged, Charged };
   std::vector<State> state(E, State::Sound);
   for (size_t e = 0; e < E; ++e)
-    if (!system.is_alive(static_cast<int>(e)) || system.plastic_strain(static_cast<int>(e)) >= out.damaged_strain)
-      state[e] = State::Damaged;
-  for (const fem::Removal& r : system.removals())
+    if (is_damaged(system, e)) state[e] = State::Damaged;
+  std::vector<unsigned char> is_early = before_landing.is_damaged;
+  is_early.resize(E, before_landing.landing < 0 ? 1 : 0);
+  for (const fem::Removal& r : system.removals()) {
     if (r.cause == fem::RemovalCause::Charge) state[static_cast<size_t>(r.element)] = State::Charged;
+    if (r.time < before_landing.landing) is_early[static_cast<size_t>(r.element)] = 1;
+  }
   std::vector<int> parent(E);
   std::iota(parent.begin(), parent.end(), 0);
   for (const auto& [a, b] : find_neighbours(fe)) {
@@ -107,12 +124,15 @@ Fragments find_fragments(const product::Plan& plan, const Whole& whole, const fe
       const double v = volume[static_cast<size_t>(e)];
       members[whole.grid.cells[static_cast<size_t>(e)].member] += v;
       all += v;
+      z.stump += whole.is_stump[static_cast<size_t>(e)] != 0 ? v : 0;
+      z.landed += is_early[static_cast<size_t>(e)] != 0 ? 0 : v;
       z.p_W += v * whole.grid.cells[static_cast<size_t>(e)].centre;
       z.gone += !system.is_alive(e);
     }
     z.p_W *= 1 / all;
     z.elements = static_cast<int>(elements.size());
     z.share = all / damaged_volume;
+    z.landed *= 1 / all, z.stump *= 1 / all;
     double most = 0;
     for (const auto& [member, v] : members)
       if (v > most) most = v, z.member = member;
@@ -155,14 +175,21 @@ void add_fragment_findings(const product::Plan& plan, const Fragments& f, double
         record::Status::Info);
   } else {
     const auto is_expected = [&](const DamageZone& z) { return z.zone >= 0 && z.distance <= f.reach; };
+    const auto is_landed = [&](const DamageZone& z) { return is_of_landing(z) && !is_expected(z); };
     const auto expected = std::count_if(f.zones.begin(), f.zones.end(), is_expected);
-    double share = 0;
-    for (const DamageZone& z : f.zones) share += is_expected(z) ? z.share : 0;
-    add("farfield.zones", "Zones of accumulated damage",
-        fmt::format("At {:.2f} s damage ({:.0f} % plastic strain and more) has gathered in {} zones; {} of them, with "
-                    "{:.0f} % of the damaged volume, lie within {:.1f} m of a zone of the multibody model.",
-                    when, 100 * f.damaged_strain, f.zones.size(), expected, 100 * share, f.reach),
-        share, "1", share >= 0.5 ? record::Status::Good : record::Status::Warning);
+    const auto landed = std::count_if(f.zones.begin(), f.zones.end(), is_landed);
+    double share = 0, landed_share = 0;
+    for (const DamageZone& z : f.zones)
+      share += is_expected(z) ? z.share : 0, landed_share += is_landed(z) ? z.share : 0;
+    std::string text = fmt::format(
+        "At {:.2f} s damage ({:.0f} % plastic strain and more) has gathered in {} zones; {} of them, with "
+        "{:.0f} % of the damaged volume, lie within {:.1f} m of a zone of the multibody model.",
+        when, 100 * f.damaged_strain, f.zones.size(), expected, 100 * share, f.reach);
+    if (landed > 0)
+      text += fmt::format(" Of the others {}, with {:.0f} %, lie in stumps or broke once parts had landed.", landed,
+                          100 * landed_share);
+    add("farfield.zones", "Zones of accumulated damage", text, share, "1",
+        share >= 0.5 * (1 - landed_share) ? record::Status::Good : record::Status::Warning);
   }
   for (size_t i = 0; i < std::min(most, f.zones.size()); ++i) {
     const DamageZone& z = f.zones[i];
@@ -174,6 +201,9 @@ void add_fragment_findings(const product::Plan& plan, const Fragments& f, double
     if (z.zone >= 0 && z.distance <= f.reach)
       text = fmt::format("Zone expected at {}, found {} away, at {}", r.zones[static_cast<size_t>(z.zone)].name,
                          fmt::format("{:.2f} m", z.distance), where);
+    else if (is_of_landing(z))
+      text = z.stump >= 0.5 ? fmt::format("Found at {}; it lies in a stump, which bears nothing", where)
+                            : fmt::format("Found at {}; it broke once parts had landed", where);
     else if (z.zone >= 0)
       text = fmt::format(
           "Found at {}; the nearest zone of the multibody model, {}, lies {:.2f} m away: a cut here would "
@@ -185,7 +215,9 @@ void add_fragment_findings(const product::Plan& plan, const Fragments& f, double
         fmt::format("{}; {} elements, {} gone, {:.0f} % of the damaged volume.", text, z.elements, z.gone,
                     100 * z.share),
         z.zone >= 0 ? z.distance : none, "m",
-        z.zone >= 0 && z.distance <= f.reach ? record::Status::Good : record::Status::Warning);
+        z.zone >= 0 && z.distance <= f.reach ? record::Status::Good
+        : is_of_landing(z)                   ? record::Status::Info
+                                             : record::Status::Warning);
   }
   double mass = 0;
   std::string list;

@@ -15,6 +15,8 @@ struct DamageZone {
   int member = -1;  // with most of its elements
   int elements = 0, gone = 0;
   double share = 0;         // of the damaged volume of the building
+  double stump = 0;         // share of its own volume in stumps
+  double landed = 0;        // share of its own volume that was not damaged before the first part landed
   Vec3 p_W;                 // middle at the start [m]
   double at = 0;            // along the member from its start, columns, beams and walls [m]
   double from = 0, to = 0;  // reach along it [m]
@@ -30,16 +32,30 @@ struct Fragment {
   int bodies = 0;   // of the manager of which at least half the elements lie in it
 };
 
+/// Plastic strain from which on an element counts as damaged.
+inline constexpr double kDamagedStrain = 0.01;  // NOLINT(readability-identifier-naming)
+
+/// Damage as it was until the first part landed. What is damaged then runs on through the whole building, and no cut
+/// would follow it.
+struct EarlyDamage {
+  double landing = -1;                    // of the elements' clock, negative: none has landed [s]
+  std::vector<unsigned char> is_damaged;  // as noted last; empty: never (elements)
+  /// Notes what is damaged now, for as long as nothing has landed.
+  void note(const fem::ExplicitSystem&, size_t elements);
+};
+
 struct Fragments {
-  double damaged_strain = 0.01;
+  double damaged_strain = kDamagedStrain;
   double reach = 0;                 // farther from every zone than this counts as unexpected [m]
   std::vector<DamageZone> zones;    // largest first
   std::vector<Fragment> fragments;  // largest first; at least a thousandth of the mass
 };
 
 /// What charges took away is neither. `zones` are those of the manager as in the record.
+///   before_landing  what of it was damaged when the first part landed
 Fragments find_fragments(const product::Plan&, const Whole&, const fem::ExplicitSystem&,
-                         const std::vector<record::ZoneInfo>& zones, double size);
+                         const std::vector<record::ZoneInfo>& zones, double size,
+                         const EarlyDamage& before_landing = {});
 
 /// Findings "farfield.zone.*", "farfield.fragments": "zone expected at ..., found at ...".
 ///   when  the state was looked at [s]

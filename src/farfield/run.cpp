@@ -218,6 +218,7 @@ class Course {
     state_.swing.most_speed = std::max(state_.swing.most_speed, speed);
     state_.swing.has_turned = speed < kTurned * state_.swing.most_speed;
     state_.swing.path.push_back(motion_.calc_upper_place(v));
+    note_early_damage();
     if (!state_.has_fragments && !state_.shown.empty()) look_at_fragments(false, at);
     show_changes(v);
     options_.on_frame(v);
@@ -395,6 +396,17 @@ class Course {
     return weight > 0 ? std::abs(norm(v->ground_force) - weight) / weight : 0;
   }
 
+  /// As of each frame until a part lands.
+  void note_early_damage() {
+    const std::vector<double>& touchdowns = system_.touchdowns();
+    double& landing = state_.early_damage.landing;
+    if (landing >= 0) return;
+    for (size_t b = 0; b < model_.bodies.size() && b < touchdowns.size(); ++b)
+      if (touchdowns[b] >= 0 && !model_.bodies[b].fixed)
+        landing = landing < 0 ? touchdowns[b] : std::min(landing, touchdowns[b]);
+    state_.early_damage.note(system_, whole_.fe.elements.size());
+  }
+
   /// When the upper block first touches down, and again at the end if it never did.
   void look_at_fragments(bool at_end, double at) {
     const std::vector<double>& touchdowns = system_.touchdowns();
@@ -404,7 +416,7 @@ class Course {
     if (!has_touched && !at_end) return;
     state_.has_fragments = true;
     state_.fragments_time = at;
-    state_.fragments = find_fragments(plan_, whole_, system_, list_zones(), fe_.grid.size);
+    state_.fragments = find_fragments(plan_, whole_, system_, list_zones(), fe_.grid.size, state_.early_damage);
   }
 
   /// The manager's zones as they stand in the record.

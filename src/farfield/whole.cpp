@@ -239,6 +239,7 @@ Whole make_whole(const product::Plan& plan, const collapse::Knowledge& k, const 
       }
     }
     e.part = whole.bodies[c].front();
+    whole.is_stump.push_back(model.bodies[static_cast<size_t>(e.part)].fixed ? 1 : 0);
     const MemberFit& fit = grid.fits[static_cast<size_t>(cell.member)];
     e.mass_factor = calc_loaded_mass(plan, m) / (fit.volume * fe.materials[static_cast<size_t>(e.material)].density);
     fe.elements.push_back(e);

@@ -22,6 +22,7 @@ struct Whole {
   Grid grid;
   fem::ExplicitModel fe;                 // elements in the order of the grid's cells; their part is the manager's body
   std::vector<std::vector<int>> bodies;  // that share each element alike, its part first (elements)
+  std::vector<unsigned char> is_stump;   // of what stands on the ground below a charge and bears nothing (elements)
   std::vector<ChargeElements> charges;   // in the order of fe.releases
   std::vector<Foot> feet;
   std::vector<std::string> notes;  // what was left out, in sentences

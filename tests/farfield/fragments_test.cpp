@@ -68,5 +68,53 @@ TEST_F(PortalWithoutALength, WhoseBeamIsCrushedHasAZoneThere) {
   EXPECT_THAT(r.findings.at(r.findings.size() - 2).text, testing::HasSubstr("a cut here would follow the damage"));
 }
 
+TEST_F(PortalWithoutALength, TellsDamageBehindTheFirstLandingApart) {
+  fem::ExplicitSystem system(whole.fe, {});
+  EarlyDamage early;
+  early.note(system, whole.fe.elements.size());
+  system.set_velocity({2, 0, -25});  // into its feet
+  ASSERT_EQ(system.advance(0.1), fem::ExplicitEnding::ReachedTime);
+  const auto damage_of_column = [&](const EarlyDamage& noted) {
+    record::ZoneInfo far{"C-B1-0/far", "C-B1-0", "", -1, -1, {5, 0, 300}};
+    const Fragments found = find_fragments(plan, whole, system, {far}, 0.5, noted);
+    record::Record r;
+    r.zones = {far};
+    add_fragment_findings(plan, found, 0.1, r);
+    for (const record::Finding& f : r.findings)
+      if (f.title == "C-B1-0") return f;
+    ADD_FAILURE() << "no zone";
+    return record::Finding{};
+  };
+  early.landing = 1;  // all of it went before
+  EXPECT_THAT(damage_of_column(early).text, testing::HasSubstr("a cut here would follow"));
+  EXPECT_EQ(damage_of_column(early).status, record::Status::Warning);
+  early.landing = 0;
+  EXPECT_THAT(damage_of_column(early).text, testing::HasSubstr("it broke once parts had landed"));
+  EXPECT_EQ(damage_of_column(early).status, record::Status::Info);
+}
+
+/// Four columns under a floor. What charges leave above comes down on what they leave below before the floor lands.
+TEST(Fragments, AdviseNoCutWhereAStubLanded) {
+  const std::string text =
+      collapse::materials() + grid("A = \"0 m\", B = \"4 m\"", "1 = \"0 m\", 2 = \"4 m\"", 1, "8 kN/m2") +
+      "[[columns]]\nsection = \"column\"\n[[beams]]\nsection = \"beam\"\n[[slabs]]\npanel = \"floor\"\n" +
+      "[[stage]]\nname = \"Front\"\ntime = \"50 ms\"\n[[stage.charge]]\nmembers = [\"C-A*\"]\n" +
+      "position = \"1.2 m\"\ndestroyed_length = \"1.2 m\"\nresidual_bars = 0.1\n" + analysis("800 ms");
+  FeOptions fe;
+  fe.grid.size = 0.3;
+  const record::Record r = run_plan(read(text), collapse::default_knowledge(), {}, fe, {}, {});
+  double touchdown = 0;
+  for (const record::Event& e : r.events)
+    if (e.kind == "touchdown" && e.subject == "C-A1-0") touchdown = e.time;
+  ASSERT_GT(touchdown, 0.1);
+  int landed = 0;
+  for (const record::Finding& f : r.findings) {
+    if (f.title != "C-A1-0" && f.title != "C-A2-0") continue;
+    EXPECT_THAT(f.text, testing::Not(testing::HasSubstr("a cut here would follow"))) << f.title;
+    landed += f.text.find("it lies in a stump, which bears nothing") != std::string::npos;
+  }
+  EXPECT_GT(landed, 0);
+}
+
 }  // namespace
 }  // namespace topple::farfield
