@@ -109,6 +109,7 @@ class Course {
         s.ending =
             options_.progress.is_cancelled() ? mbs::Summary::Ending::Cancelled : mbs::Summary::Ending::NoEquilibrium;
         s.message = state_.relaxation.text;
+        if (s.ending == mbs::Summary::Ending::NoEquilibrium) s.message += describe_overload();
       }
     }
     s.equilibrium_iterations = state_.relaxation.steps;
@@ -127,6 +128,8 @@ class Course {
   bool adds_much_mass() const;
   /// Empty: none was.
   std::string describe_added_mass() const;
+  /// Members and places that have moved farthest and yielded most, in clauses behind others.
+  std::string describe_overload() const;
   /// Throws E677.
   void check_added_mass() const;
   void add_findings(record::Record& r) const;
@@ -476,6 +479,28 @@ std::string Course::describe_added_mass() const {
   return adds_much_mass()
              ? text + " It has weight too: this is the answer of another building. Choose a shorter scaled step."
              : text;
+}
+
+std::string Course::describe_overload() const {
+  double farthest = 0, most = 0;
+  int moved = -1, yielded = -1;  // elements
+  for (size_t e = 0; e < whole_.fe.elements.size(); ++e) {
+    for (const int n : whole_.fe.elements[e].node) {
+      const double way = norm(system_.p(n) - whole_.fe.nodes[static_cast<size_t>(n)]);
+      if (way > farthest) farthest = way, moved = static_cast<int>(e);
+    }
+    const double strain = system_.plastic_strain(static_cast<int>(e));
+    if (strain > most) most = strain, yielded = static_cast<int>(e);
+  }
+  const auto place_of = [&](int e, const char* what) {
+    const Cell& c = whole_.grid.cells[static_cast<size_t>(e)];
+    return fmt::format("; {} {} ({:.1f}, {:.1f}, {:.1f}) m", plan_.members[static_cast<size_t>(c.member)].name, what,
+                       c.centre.x, c.centre.y, c.centre.z);
+  };
+  std::string text;
+  if (yielded >= 0) text += place_of(yielded, "yields most, at");
+  if (moved >= 0) text += place_of(moved, "has moved farthest, from");
+  return text;
 }
 
 void Course::add_findings(record::Record& r) const {

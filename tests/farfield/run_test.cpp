@@ -462,6 +462,18 @@ TEST(Farfield, FollowsInTimeWhatFindsNoEquilibrium) {
   EXPECT_EQ(r.ending, "time_limit");
 }
 
+TEST(Farfield, SaysWhereThereIsNoEquilibrium) {
+  // 150 kN/m over the beam's span of 5 m are 460 kNm in its middle, twice what its bars bear
+  std::string text = with_duration(portal(), "20 ms");
+  text.replace(text.find("duration = \"20 ms\""), 0, "gravity = \"98 m/s2\"\n");
+  text.replace(text.find("[steel.S]"), 0, "density = \"10000 kg/m3\"\n");
+  const record::Record r = run(text, coarse());
+  ASSERT_EQ(r.ending, "failed") << r.ending_text;
+  EXPECT_THAT(r.ending_text, testing::HasSubstr("dead load not in equilibrium after"));
+  EXPECT_THAT(r.ending_text, testing::HasSubstr(" yields most, at ("));
+  EXPECT_THAT(r.ending_text, testing::HasSubstr("; B-A1B1-0 has moved farthest, from (2."));
+}
+
 class FarfieldReplay : public testing::Test {
  protected:
   FarfieldReplay() : folder(testing::TempDir() + "topple_fe_" + name() + "/") {

@@ -321,6 +321,8 @@ export const german: readonly (readonly [string, string])[] = [
   ["Share of the capacity, the most loaded first: {l}, and {:d} more.", "Anteil am Widerstand, die am stärksten belasteten zuerst: {} und {} weitere."],
   ["without limits element \"{}\" would be loaded to {:.0f} % of its capacity", "ohne Grenzen wäre Element „{}“ zu {} % seines Widerstands belastet"],
   ["without limits element \"{}\" would be loaded to more than {:.0f} times its capacity", "ohne Grenzen wäre Element „{}“ zu mehr als dem {}-Fachen seines Widerstands belastet"],
+  ["{n} yields most, at ({:.1f}, {:.1f}, {:.1f}) m", "am meisten fließt {} bei ({}, {}, {}) m"],
+  ["{n} has moved farthest, from ({:.1f}, {:.1f}, {:.1f}) m", "am weitesten bewegt hat sich {} von ({}, {}, {}) m"],
   ["dead load not in equilibrium after {:d} steps: out of balance by {:.2g} of the load, settled by {:.3g} mm", "Eigengewicht nach {} Schritten nicht im Gleichgewicht: das {}-Fache der Last nicht ausgeglichen, um {} mm gesetzt"],
   ["positions are no longer finite", "Orte sind keine endlichen Zahlen mehr"],
   // runs of multibody models
