@@ -495,11 +495,10 @@ void add_touchdown(const Context& c) {
           kNone, "s");
   } else {
     const double kinetic = c.recorder.first_touchdown_kinetic();
-    c.add(
-        "touchdown.first", "Touchdown", "First touchdown",
-        fmt::format("{} is the first part of the upper block on the ground, at {:.2f} s, when {:.1f} MJ are in motion.",
-                    c.recorder.first_touchdown_body(), t, kinetic * 1e-6),
-        t, "s");
+    c.add("touchdown.first", "Touchdown", "First touchdown",
+          fmt::format("{} is the first part of the upper block on the ground, at {:.2f} s, when {} are in motion.",
+                      c.recorder.first_touchdown_body(), t, record::tell_measure(kinetic, "J", 1)),
+          t, "s");
     double largest = 0, when = 0;
     const auto series = std::find_if(c.r.series.begin(), c.r.series.end(),
                                      [](const record::Series& s) { return s.id == "energy_kinetic"; });
@@ -508,13 +507,12 @@ void add_touchdown(const Context& c) {
     // the impact takes some of it before the next frame
     if (kinetic > largest) largest = kinetic, when = t;
     c.add("touchdown.energy", "Touchdown", "Largest energy in motion",
-          fmt::format("{:.1f} MJ at {:.2f} s.", largest * 1e-6, when), largest, "J");
+          fmt::format("{} at {:.2f} s.", record::tell_measure(largest, "J", 1), when), largest, "J");
     const MeanForce mean = c.recorder.find_largest_ground_force();
     c.add("touchdown.force", "Touchdown", "Largest ground force",
-          fmt::format(
-              "{:.1f} MN at {:.2f} s, {:.1f} times the weight, as a mean over {:.3g} s; shorter peaks are higher.",
-              mean.force * 1e-6, mean.time, mean.force / (c.map.moving_mass * std::max(norm(c.model.gravity), 1e-9)),
-              mean.window),
+          fmt::format("{} at {:.2f} s, {:.1f} times the weight, as a mean over {:.3g} s; shorter peaks are higher.",
+                      record::tell_measure(mean.force, "N", 1), mean.time,
+                      mean.force / (c.map.moving_mass * std::max(norm(c.model.gravity), 1e-9)), mean.window),
           mean.force, "N");
   }
   const std::vector<Touchdown>& all = c.recorder.touchdowns();
@@ -525,13 +523,15 @@ void add_touchdown(const Context& c) {
     std::stable_sort(order.begin(), order.end(),
                      [](const Touchdown* a, const Touchdown* b) { return a->energy > b->energy; });
     std::string text = fmt::format(
-        "{} parts touch the ground for the first time between {:.2f} s and {:.2f} s, with {:.1f} MJ and {:.2f} MN s "
+        "{} parts touch the ground for the first time between {:.2f} s and {:.2f} s, with {} and {} "
         "downwards in all (each part alone, as it touches). Largest:",
-        all.size(), all.front().time, all.back().time, energy * 1e-6, momentum * 1e-6);
+        all.size(), all.front().time, all.back().time, record::tell_measure(energy, "J", 1),
+        record::tell_measure(momentum, "N s", 2));
     for (size_t i = 0; i < std::min(order.size(), kShownTouchdowns); ++i)
-      text += fmt::format("{} {} at {:.2f} s at ({:.1f}, {:.1f}) m with {:.2f} MJ and {:.2f} MN s", i > 0 ? ";" : "",
+      text += fmt::format("{} {} at {:.2f} s at ({:.1f}, {:.1f}) m with {} and {}", i > 0 ? ";" : "",
                           c.r.bodies[static_cast<size_t>(order[i]->body)].name, order[i]->time, order[i]->place[0],
-                          order[i]->place[1], order[i]->energy * 1e-6, order[i]->momentum * 1e-6);
+                          order[i]->place[1], record::tell_measure(order[i]->energy, "J", 2),
+                          record::tell_measure(order[i]->momentum, "N s", 2));
     c.add("touchdown.parts", "Touchdown", "Touchdown of the parts", text + ".", energy, "J");
   }
 }

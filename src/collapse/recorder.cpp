@@ -607,9 +607,10 @@ void Recorder::add_happening(const mbs::Happening& h) {
       touchdowns_.push_back(
           {h.time, h.index, {with.p_WB.x, with.p_WB.y}, h.speed, with.energy, with.momentum, with.kinetic});
       if (upper && !std::isfinite(first_.time)) first_ = touchdowns_.back();
-      add_event({h.time, "touchdown", body(h.index),
-                 fmt::format("{} touches the ground at {:.1f} m/s ({:.2f} MJ, {:.2f} MN s)", body(h.index), h.speed,
-                             touchdowns_.back().energy * 1e-6, touchdowns_.back().momentum * 1e-6)});
+      add_event(
+          {h.time, "touchdown", body(h.index),
+           fmt::format("{} touches the ground at {:.1f} m/s ({}, {})", body(h.index), h.speed,
+                       record::tell_measure(with.energy, "J", 2), record::tell_measure(with.momentum, "N s", 2))});
       break;
     }
     case Kind::BodyContact:

@@ -1,6 +1,9 @@
 #include "record/told.h"
 
+#include <fmt/format.h>
+
 #include <cctype>
+#include <cmath>
 #include <utility>
 
 namespace topple::record {
@@ -21,6 +24,14 @@ std::string drop_negative_zeros(const std::string& text) {
     out += text[i];
   }
   return out;
+}
+
+std::string tell_measure(double value, const char* unit, int digits) {
+  // from the first value on of which two digits show
+  const double least = 1e6 * std::pow(10.0, 1 - digits);
+  if (!(std::abs(value) < least) || value == 0) return fmt::format("{:.{}f} M{}", value * 1e-6, digits, unit);
+  if (std::abs(value) >= 100) return fmt::format("{:.1f} k{}", value * 1e-3, unit);
+  return fmt::format("{:.2g} {}", value, unit);
 }
 
 void add_finding(Record& r, Finding finding) {

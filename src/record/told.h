@@ -11,6 +11,12 @@ namespace topple::record {
 /// free: a minus behind a letter, digit or bracket belongs to a name or an exponent.
 std::string drop_negative_zeros(const std::string& text);
 
+/// A measure in millions of its unit, or in thousands or ones where at most one digit of it would show: "1.25 MJ",
+/// "84.3 kJ", "12 J".
+///   unit    "J", "N", "N s": that of the value
+///   digits  behind the point of millions
+std::string tell_measure(double value, const char* unit, int digits);
+
 void add_finding(Record&, Finding);
 void add_event(Record&, Event);
 

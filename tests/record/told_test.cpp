@@ -26,5 +26,16 @@ TEST(Told, CleansTextsOnTheirWayIntoTheRecord) {
   EXPECT_EQ(r.events[0].text, "C-A1-0 touches the ground (0.00 MN s)");
 }
 
+TEST(Told, GivesMeasuresInUnitsThatShowDigits) {
+  EXPECT_EQ(tell_measure(22.13e6, "J", 1), "22.1 MJ");
+  EXPECT_EQ(tell_measure(1e6, "J", 1), "1.0 MJ");
+  EXPECT_EQ(tell_measure(0.192e6, "J", 1), "192.0 kJ");
+  EXPECT_EQ(tell_measure(0.192e6, "J", 2), "0.19 MJ");
+  EXPECT_EQ(tell_measure(4321, "J", 2), "4.3 kJ");
+  EXPECT_EQ(tell_measure(1444, "N s", 2), "1.4 kN s");
+  EXPECT_EQ(tell_measure(7.25, "N s", 2), "7.2 N s");
+  EXPECT_EQ(tell_measure(0, "J", 2), "0.00 MJ");
+}
+
 }  // namespace
 }  // namespace topple::record
