@@ -142,6 +142,8 @@ constexpr const char* kNoBundle =
 
 void make_folder(const std::string& path, const std::vector<const char*>& files) {
   std::error_code failure;
+  if (fs::exists(path, failure) && !fs::is_directory(path, failure))
+    throw InputError("E801", fmt::format("--output: {} is a file; a folder is wanted", path));
   fs::create_directories(path, failure);
   if (failure) throw std::runtime_error(path + ": the folder cannot be made: " + failure.message());
   if (access(path.c_str(), W_OK | X_OK) != 0)

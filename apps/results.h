@@ -45,8 +45,8 @@ void check_own_input(const std::string& output, const std::string& input);
 /// (E801) that names the option.
 double read_quantity(const std::string& text, Dimension, const char* option);
 
-/// Throws std::runtime_error with the path if there is no folder that can be written to, or a folder in the place of
-/// one of the files that are to come.
+/// Throws InputError E801 if the path is that of a file, std::runtime_error with the path if there is no folder that
+/// can be written to, or a folder in the place of one of the files that are to come.
 void make_folder(const std::string& path, const std::vector<const char*>& files = {});
 /// The same for the files of a run.
 void make_run_folder(const std::string& path);

@@ -150,7 +150,7 @@ int run_study_command(const Arguments& a, const std::atomic<bool>& cancel) {
     const StudyResult r = study::read_study(problem, store, *row);
     if (a.study.action == StudyArguments::Action::Export) {
       const std::string folder = a.output.empty() ? a.input : a.output;
-      make_study_folder(folder);
+      make_folder(folder);
       const nlohmann::json definition = nlohmann::json::parse(row->definition);
       write_all(stdout, folder, problem, r, definition.value("text", ""), definition.value("file", ""), a.language);
     } else if (a.json) {

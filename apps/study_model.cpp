@@ -85,14 +85,8 @@ double read_seconds(const std::string& text, const char* option, double fallback
   return *q.value;
 }
 
-void make_study_folder(const std::string& folder) {
-  if (std::error_code none; fs::exists(folder, none) && !fs::is_directory(folder, none))
-    throw InputError("E801", fmt::format("--output: {} is a file; a folder is wanted", folder));
-  make_folder(folder);
-}
-
 StudyPlace make_place(const Arguments& a) {
-  make_study_folder(a.output);
+  make_folder(a.output);
   const fs::path folder = a.output;
   StudyPlace place;
   const bool is_on_server = fs::exists(folder / place_file);

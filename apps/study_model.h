@@ -16,8 +16,6 @@ struct StudyPlace {
   std::string name = "main";
 };
 
-/// Throws InputError E801 if it is a file, std::runtime_error if it cannot be made or written to.
-void make_study_folder(const std::string& folder);
 /// For a new study, or one to go on with; makes the folder. Throws InputError E801, E820, E822 (another study is
 /// there).
 StudyPlace make_place(const Arguments&);

@@ -214,6 +214,9 @@ fe)
   expect 2 "$topple" fe "$plan" --size "4 apples" -o none; has err "--size"
   expect 2 "$topple" fe "$plan" --resume -o none2; has err "checkpoint.bin"
   expect 2 "$topple" fe "$plan" --until "0 s" -o none2; has err "--until"
+  echo kept >taken
+  expect 2 "$topple" fe "$plan" -o taken; has err "E801"; has err "taken is a file; a folder is wanted"; has taken kept
+  expect 2 "$topple" run "$plan" -o taken --json; is_json out; has out '"code": "E801"'; has taken kept
   expect 2 "$topple" fe missing.toml -o none; [ ! -e none ] || { echo "a folder for nothing"; failures=$((failures + 1)); }
   # an interrupt leaves a record and a checkpoint from which it goes on
   "$topple" fe "$plan" --size "20 cm" --checkpoint -o cut >out 2>err &
@@ -510,7 +513,7 @@ steer)
   is_json out; has out '"url":"http://127.0.0.1:'; [ "$(wc -l <out)" -eq 1 ] || { echo "more than a line"; failures=$((failures + 1)); }
   expect 2 "$topple" steer plan.toml --no-open --port 99999 --json; is_json out; has out '"code": "E801"'
   expect 2 "$topple" steer plan.toml --no-open --port 99999; has err "1 to 65535"
-  expect 1 "$topple" steer plan.toml --no-open -o plan.toml; has err "the folder cannot be made"
+  expect 2 "$topple" steer plan.toml --no-open -o plan.toml; has err "plan.toml is a file; a folder is wanted"
   ;;
 rcc)
   zone=$source/examples/rcc/zone_I.toml
