@@ -311,12 +311,11 @@ void add_fe(CLI::App& app, Arguments& a) {
   fe->add_flag("--skip-quiet", f.skip_quiet, "do not wait through the time in which nothing moves before a charge");
   fe->add_option("--until", a.duration, "simulated time, such as \"6 s\"; the plan's duration if not given")
       ->type_name("QUANTITY");
-  CLI::Option* checkpoint =
-      fe->add_flag("--checkpoint", f.checkpoint, "keep checkpoint.bin in the folder, to go on from with --resume")
-          ->excludes(mesh_only);
-  fe->add_option("--checkpoint-interval", f.checkpoint_interval, "of the clock (60 s)")
-      ->type_name("QUANTITY")
-      ->needs(checkpoint);
+  fe->add_flag("--checkpoint", f.checkpoint, "keep checkpoint.bin in the folder, to go on from with --resume")
+      ->excludes(mesh_only);
+  fe->add_option("--checkpoint-interval", f.checkpoint_interval,
+                 "of the clock (60 s), with --checkpoint or --resume, which keeps one too")
+      ->type_name("QUANTITY");
   fe->add_flag("--resume", f.resume, "go on from checkpoint.bin in the folder")->excludes(mesh_only);
   fe->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
   fe->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")->type_name("FILE");
@@ -505,7 +504,10 @@ std::string find_missing(const Arguments& a) {
       if (a.vtk || a.gltf || a.csv || a.json || a.adams || a.fe.lsdyna) return "";
       return refuse("export", "say what for: --vtk, --gltf, --csv, --json, --adams or --lsdyna");
     case Arguments::Verb::Fe:
-      return a.output.empty() && !a.fe.mesh_only ? refuse("fe", "--output is required") : "";
+      if (a.output.empty() && !a.fe.mesh_only) return refuse("fe", "--output is required");
+      return a.fe.checkpoint_interval.empty() || a.fe.checkpoint || a.fe.resume
+                 ? ""
+                 : refuse("fe", "--checkpoint-interval requires --checkpoint or --resume");
     case Arguments::Verb::Study:
       if (a.study.action != StudyArguments::Action::Run || !(a.input.empty() || a.output.empty())) return "";
       return refuse("study",

@@ -24,7 +24,8 @@ farfield::FeOptions make_fe_options(const Arguments& a) {
   o.scaled_step = read_quantity(a.fe.scaled_step, Dimension::Time, "--scaled-step");
   o.skip_quiet = a.fe.skip_quiet;
   o.resume = a.fe.resume;
-  o.checkpoint_interval = read_quantity(a.fe.checkpoint_interval, Dimension::Time, "--checkpoint-interval");
+  const double interval = read_quantity(a.fe.checkpoint_interval, Dimension::Time, "--checkpoint-interval");
+  if (interval > 0) o.checkpoint_interval = interval;
   if (a.fe.checkpoint || a.fe.resume) o.checkpoint = (fs::path(a.output) / "checkpoint.bin").string();
   return o;
 }

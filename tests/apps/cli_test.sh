@@ -225,6 +225,11 @@ fe)
   [ $code -eq 1 ] || { echo "exit code $code after an interrupt"; cat out err; failures=$((failures + 1)); }
   has out "Cancelled at"; has out "--resume"; exists cut/checkpoint.bin; exists cut/record.h5
   expect 2 "$topple" fe "$plan" --size "30 cm" --resume -o cut; has err "another plan, mesh, step or version"
+  # at another interval, with the bits of a run that was not interrupted
+  expect 2 "$topple" fe "$plan" --checkpoint-interval "1 s" -o none2; has err "--checkpoint-interval requires --checkpoint or --resume"
+  expect 0 "$topple" fe "$plan" --size "20 cm" --until "500 ms" --resume --checkpoint-interval "0.1 s" --csv --no-report -o cut
+  expect 0 "$topple" fe "$plan" --size "20 cm" --until "500 ms" --csv --no-report -o whole
+  cmp cut/bodies.csv whole/bodies.csv && cmp cut/series.csv whole/series.csv || failures=$((failures + 1))
   # there is nothing to go on from while the dead load is put on
   "$topple" fe "$plan" --size "10 cm" --checkpoint -o early >out 2>err &
   pid=$!; for _ in $(seq 600); do grep -q "Putting on" out && break; sleep 0.1; done
