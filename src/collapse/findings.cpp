@@ -767,6 +767,10 @@ void add_verification(const Context& c) {
   const auto add_balance = [&c](const std::string& text, double error, Status status) {
     c.add("verification.energy", "Verification", "Energy balance", text, error, std::isnan(error) ? "" : "1", status);
   };
+  const bool has_elements = c.r.provenance.engine == "finite elements";
+  const std::string half_step =
+      has_elements ? fmt::format("; --scaled-step \"{:.2g} ms\" shows whether it is the step's", s.step * 500)
+                   : fmt::format("; a step of {:.2g} ms shows whether it is the step's", s.step * 500);
   if (s.ending == mbs::Summary::Ending::Diverged)
     add_balance(fmt::format("The computation failed at {:.3f} s; the balance says nothing about that.", s.time), kNone,
                 Status::Bad);
@@ -780,9 +784,7 @@ void add_verification(const Context& c) {
     add_balance(fmt::format("The largest error of the energy balance is {:.2g} % of the released potential energy "
                             "(accepted: {:.2g} %){}.",
                             100 * s.energy_error, 100 * c.k.verification_energy_error,
-                            s.energy_error > c.k.verification_energy_error
-                                ? fmt::format("; a step of {:.2g} ms shows whether it is the step's", s.step * 500)
-                                : ""),
+                            s.energy_error > c.k.verification_energy_error ? half_step : ""),
                 s.energy_error, s.energy_error <= c.k.verification_energy_error ? Status::Good : Status::Bad);
   const double reaction = c.recorder.start_reaction_error();
   // charges that fire at the very beginning are already at work in the first frame

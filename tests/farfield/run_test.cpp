@@ -231,6 +231,23 @@ TEST(FarfieldPhysics, BooksItsEnergy) {
   EXPECT_EQ(find(r, "verification.energy").status, record::Status::Good) << find(r, "verification.energy").text;
 }
 
+TEST(Farfield, NamesTheOptionOfAShorterStep) {
+  collapse::Knowledge strict = rules();
+  strict.verification_energy_error = 1e-12;
+  const record::Record r = run_plan(read(with_duration(dropped(), "900 ms")), strict, {}, coarse(), {}, {});
+  const record::Finding& f = find(r, "verification.energy");
+  ASSERT_EQ(f.status, record::Status::Bad) << f.text;
+  const size_t at = f.text.find("; --scaled-step \"");
+  ASSERT_NE(at, std::string::npos) << f.text;
+  // and half of the step comes of it, but for its two digits
+  FeOptions half = coarse();
+  half.scaled_step = 1e-3 * std::stod(f.text.substr(at + 17));
+  const double step = find(r, "verification.step").value;
+  EXPECT_NEAR(half.scaled_step, step / 2, 0.05 * step / 2);
+  const record::Record shorter = run_plan(read(with_duration(dropped(), "60 ms")), strict, {}, half, {}, {});
+  EXPECT_NEAR(find(shorter, "verification.step").value, half.scaled_step, 1e-9);
+}
+
 TEST(FarfieldPhysics, PlacesBodiesWithTheirDebris) {
   const Building built(read(portal()));
   const auto& [plan, map, model, whole] = built;
