@@ -82,9 +82,20 @@ int run_finite_elements(const Arguments& a, const std::atomic<bool>& cancel) {
     if (a.fe.mesh_only) {
       const farfield::Whole whole = farfield::make_whole(plan, knowledge, fe.grid, a.threads);
       const farfield::MeshReport report = farfield::calc_mesh_report(plan, whole);
+      json mesh = to_json(report);
+      std::string added_mass;
+      if (fe.scaled_step > 0) {
+        const farfield::MassScaling scaling = farfield::calc_mass_scaling(whole, report, knowledge, fe.scaled_step);
+        added_mass = scaling.mass > 0
+                         ? scaling.describe()
+                         : fmt::format("No element needs mass for a step of {:.4f} ms.", 1e3 * scaling.step);
+        mesh["added_mass"] = scaling.mass;
+        mesh["scaled_elements"] = scaling.elements;
+      }
       print_mesh(out, report);
+      if (!added_mass.empty()) std::fprintf(out, "%s\n", added_mass.c_str());
       for (const std::string& note : whole.notes) std::fprintf(out, "%s\n", note.c_str());
-      if (a.json) std::printf("%s\n", dump({{"exit_code", kOk}, {"mesh", to_json(report)}}).c_str());
+      if (a.json) std::printf("%s\n", dump({{"exit_code", kOk}, {"mesh", mesh}}).c_str());
       return kOk;
     }
     is_new = !std::filesystem::exists(a.output);

@@ -48,6 +48,30 @@ constexpr double kAbsurdAddedMass = 1;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
+fem::ExplicitOptions make_options(const collapse::Knowledge& k, double scaled_step, int threads) {
+  fem::ExplicitOptions o;
+  o.friction = k.contact_body_friction;
+  o.scaled_step = scaled_step;
+  o.threads = threads;
+  return o;
+}
+
+MassScaling find_scaling(const fem::ExplicitSystem& system, const MeshReport& mesh, double scaled_step) {
+  return {scaled_step, system.added_mass(), system.added_mass() / mesh.mesh.mass, system.scaled_elements()};
+}
+
+bool adds_much(const MassScaling& s) { return s.share > kMuchAddedMass; }
+
+/// Throws E677.
+void check_added_mass(const MassScaling& s, const MeshReport& mesh) {
+  if (s.share < kAbsurdAddedMass) return;
+  throw InputError(
+      "E677",
+      fmt::format("a scaled step of {:.3g} ms would add {:.2g} times the building's mass to it", 1e3 * s.step, s.share),
+      fmt::format("give one that adds a per cent or two; without any the mesh bears {:.4g} ms",
+                  1e3 * fem::calc_step_share({}) * mesh.mesh.critical_step));
+}
+
 /// Moves the elements and shows them as the manager's bodies.
 class Course {
  public:
@@ -62,10 +86,11 @@ class Course {
         map_(map),
         whole_(make_whole(plan, k, fe.grid, model, map)),
         mesh_(calc_mesh_report(plan, whole_)),
-        system_(whole_.fe, make_options(k, fe, run)),
+        system_(whole_.fe, make_options(k, fe.scaled_step, run.threads)),
+        scaling_(find_scaling(system_, mesh_, fe.scaled_step)),
         motion_(plan, whole_, model, map, fe.grid.size) {
-    check_added_mass();
-    if (callbacks.on_mesh) callbacks.on_mesh(mesh_, describe_added_mass());
+    check_added_mass(scaling_, mesh_);
+    if (callbacks.on_mesh) callbacks.on_mesh(mesh_, scaling_.describe());
     std::string rules;
     for (const collapse::Rule& rule : k.rules) rules += fmt::format("{} {}\n", rule.id, rule.value);
     key_ = calc_sha256(fmt::format("{}\n{}{} {} {} {} {} {} {}", plan.text, rules, run.program_version, fe.grid.size,
@@ -125,26 +150,12 @@ class Course {
     return s;
   }
 
-  bool adds_much_mass() const;
-  /// Empty: none was.
-  std::string describe_added_mass() const;
   /// Members and places that have moved farthest and yielded most, in clauses behind others.
   std::string describe_overload() const;
-  /// Throws E677.
-  void check_added_mass() const;
   void add_findings(record::Record& r) const;
 
  private:
-  static fem::ExplicitOptions make_options(const collapse::Knowledge& k, const FeOptions& fe,
-                                           const collapse::RunOptions& run) {
-    fem::ExplicitOptions o;
-    o.friction = k.contact_body_friction;
-    o.scaled_step = fe.scaled_step;
-    o.threads = run.threads;
-    return o;
-  }
   double time() const { return system_.time() + state_.offset; }
-  double added_share() const { return system_.added_mass() / mesh_.mesh.mass; }
   double calc_seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
   double frame_time(long long frame) const { return static_cast<double>(frame) * options_.frame_interval; }
 
@@ -448,6 +459,7 @@ class Course {
   Whole whole_;
   MeshReport mesh_;
   fem::ExplicitSystem system_;
+  MassScaling scaling_;
   Motion motion_;
   std::string key_;
   std::vector<collapse::Firing> schedule_;
@@ -459,27 +471,6 @@ class Course {
   std::function<void(const fem::ExplicitSystem::Timing&)> on_timing_;
   std::function<void()> on_checkpoint_;
 };
-
-void Course::check_added_mass() const {
-  if (added_share() < kAbsurdAddedMass) return;
-  throw InputError("E677",
-                   fmt::format("a scaled step of {:.3g} ms would add {:.2g} times the building's mass to it",
-                               1e3 * fe_.scaled_step, added_share()),
-                   fmt::format("give one that adds a per cent or two; without any the mesh bears {:.4g} ms",
-                               1e3 * fem::calc_step_share({}) * mesh_.mesh.critical_step));
-}
-
-bool Course::adds_much_mass() const { return added_share() > kMuchAddedMass; }
-
-std::string Course::describe_added_mass() const {
-  if (!(system_.added_mass() > 0)) return "";
-  const std::string text = fmt::format(
-      "{} elements got {:.2f} t more mass ({:.2g} % of all), so that they bear a step of {:.4f} ms.",
-      system_.scaled_elements(), system_.added_mass() / unit::t, 100 * added_share(), 1e3 * fe_.scaled_step);
-  return adds_much_mass()
-             ? text + " It has weight too: this is the answer of another building. Choose a shorter scaled step."
-             : text;
-}
 
 std::string Course::describe_overload() const {
   double farthest = 0, most = 0;
@@ -513,9 +504,9 @@ void Course::add_findings(record::Record& r) const {
   std::string text;
   for (const std::string& line : describe(mesh_)) text += (text.empty() ? "" : " ") + line;
   add("farfield.mesh", "Mesh", text, mesh_.mesh.elements, "1", Status::Info);
-  if (system_.added_mass() > 0)
-    add("farfield.scaled", "Mass scaling", describe_added_mass(), system_.added_mass(), "kg",
-        adds_much_mass() ? Status::Warning : Status::Info);
+  if (scaling_.mass > 0)
+    add("farfield.scaled", "Mass scaling", scaling_.describe(), scaling_.mass, "kg",
+        adds_much(scaling_) ? Status::Warning : Status::Info);
   add("farfield.settling", "Dead load",
       fmt::format("Put on without motion in {} steps: {:.1e} of the load is out of balance, the building settled by up "
                   "to {:.1f} mm.",
@@ -614,6 +605,23 @@ void say_what_is_not_modelled(record::Record& r) {
 }
 
 }  // namespace
+
+std::string MassScaling::describe() const {
+  if (!(mass > 0)) return "";
+  const std::string text =
+      fmt::format("{} elements got {:.2f} t more mass ({:.2g} % of all), so that they bear a step of {:.4f} ms.",
+                  elements, mass / unit::t, 100 * share, 1e3 * step);
+  return adds_much(*this)
+             ? text + " It has weight too: this is the answer of another building. Choose a shorter scaled step."
+             : text;
+}
+
+MassScaling calc_mass_scaling(const Whole& whole, const MeshReport& mesh, const collapse::Knowledge& k,
+                              double scaled_step) {
+  const MassScaling s = find_scaling({whole.fe, make_options(k, scaled_step, 1)}, mesh, scaled_step);
+  check_added_mass(s, mesh);
+  return s;
+}
 
 Whole make_whole(const product::Plan& plan, const collapse::Knowledge& k, const GridOptions& grid, int threads) {
   collapse::ModelMap map;

@@ -34,6 +34,17 @@ struct FeCallbacks {
 record::Record run_plan(const product::Plan&, const collapse::Knowledge&, const collapse::RunOptions&, const FeOptions&,
                         const collapse::RunCallbacks&, const FeCallbacks&);
 
+/// Mass that elements get so that they bear a step.
+struct MassScaling {
+  double step = 0;               // [s]
+  double mass = 0;               // added [kg]
+  double share = 0;              // of the building's
+  int elements = 0;              // that get some
+  std::string describe() const;  // a sentence or two; empty if none gets any
+};
+/// What FeOptions::scaled_step would do, without a run. Throws InputError E677 if it would add the building's own mass.
+MassScaling calc_mass_scaling(const Whole&, const MeshReport&, const collapse::Knowledge&, double scaled_step);
+
 /// The manager's model of the plan and the building in finite elements, without running either.
 Whole make_whole(const product::Plan&, const collapse::Knowledge&, const GridOptions&, int threads);
 

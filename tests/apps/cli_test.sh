@@ -206,6 +206,9 @@ new)
 fe)
   expect 0 "$topple" fe "$plan" --mesh-only --size "30 cm"; has out "553 elements"; has out "No face was moved"
   expect 0 "$topple" fe "$plan" --mesh-only --json; is_json out; has out '"critical_step"'
+  expect 0 "$topple" fe "$plan" --mesh-only --scaled-step "0.03 ms" --json; is_json out; has err "elements got"; has err "so that they bear a step of 0.0300 ms"; has out '"added_mass"'
+  expect 0 "$topple" fe "$plan" --mesh-only --scaled-step "0.01 ms"; has out "No element needs mass for a step of 0.0100 ms"
+  expect 2 "$topple" fe "$plan" --mesh-only --scaled-step "5 ms"; has err "E677"
   expect 0 "$topple" fe "$plan" --size "40 cm" --until "300 ms" -o r; has out "Putting on the dead load"
   has out "Rigid fragments"; has out "Wrote r/record.h5"; exists r/record.h5
   expect 0 "$topple" run "$plan" --no-report -o m; expect 0 "$topple" compare m/record.h5 r/record.h5 -o c

@@ -248,6 +248,23 @@ TEST(Farfield, NamesTheOptionOfAShorterStep) {
   EXPECT_NEAR(find(shorter, "verification.step").value, half.scaled_step, 1e-9);
 }
 
+TEST(Farfield, SaysWithoutARunWhatAScaledStepAdds) {
+  const product::Plan plan = read(with_duration(portal(), "20 ms"));
+  const Whole whole = make_whole(plan, rules(), coarse().grid, 1);
+  const MeshReport mesh = calc_mesh_report(plan, whole);
+  FeOptions fe = coarse();
+  fe.scaled_step = 0.04e-3;
+  std::string said;
+  FeCallbacks callbacks;
+  callbacks.on_mesh = [&](const MeshReport&, const std::string& added_mass) { said = added_mass; };
+  (void)run_plan(plan, rules(), {}, fe, {}, callbacks);
+  const MassScaling scaling = calc_mass_scaling(whole, mesh, rules(), fe.scaled_step);
+  EXPECT_GT(scaling.mass, 0);
+  EXPECT_EQ(scaling.describe(), said);
+  EXPECT_EQ(calc_mass_scaling(whole, mesh, rules(), 0.001e-3).describe(), "");
+  EXPECT_THROW((void)calc_mass_scaling(whole, mesh, rules(), 5e-3), InputError);
+}
+
 TEST(FarfieldPhysics, PlacesBodiesWithTheirDebris) {
   const Building built(read(portal()));
   const auto& [plan, map, model, whole] = built;
