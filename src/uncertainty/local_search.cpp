@@ -13,7 +13,8 @@ namespace {
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
-/// The point between `from`, which lies in the region, and `to` that is nearest to `to` and still inside.
+}  // namespace
+
 Point pull_inside(const Region& region, const Point& from, Point to) {
   to = clip(region.box, std::move(to));
   if (!region.space->has_interaction() || region.contains(to)) return to;
@@ -25,8 +26,6 @@ Point pull_inside(const Region& region, const Point& from, Point to) {
   }
   return inside;
 }
-
-}  // namespace
 
 Region make_region(const Space& space, double alpha) {
   Region r{&space, alpha, make_box(space, alpha), calc_scale(space), {}};
@@ -227,11 +226,16 @@ Point ModelSearch::slide(const std::vector<double>& from, std::vector<double> u,
     return moved(whole);
   };
   std::vector<double> seen = from;
-  for (int k = 0; k < 4; ++k) {
-    u = project(find_tangents(*region_.space, region_.alpha, best_, region_.axes, region_.scale, seen), lower, upper,
-                u);
+  // a hair inside: on the plane itself round-off decides, and a way along it would end anywhere
+  double inside = 0;
+  for (int k = 0; k < 5; ++k) {
+    std::vector<HalfSpace> planes =
+        find_tangents(*region_.space, region_.alpha, best_, region_.axes, region_.scale, seen);
+    for (HalfSpace& h : planes) h.b -= inside;
+    u = project(planes, lower, upper, u);
     if (region_.contains(place(u))) break;
     seen = u;  // the constraints bend
+    inside = k == 0 ? 1e-13 : 10 * inside;
   }
   return pull_inside(region_, place(from), place(u));
 }

@@ -24,6 +24,8 @@ struct Region {
   bool contains(const Point& x) const { return is_in_cut(*space, box, alpha, x); }
 };
 Region make_region(const Space&, double alpha);
+/// The point between `from`, which lies in the region, and `to` that is nearest to `to` and still inside.
+Point pull_inside(const Region&, const Point& from, Point to);
 
 /// What a search is told of a point.
 struct Told {

@@ -46,6 +46,29 @@ TEST(ModelSearch, FindsTheBottomOfAQuadraticValley) {
   EXPECT_LE(asked, 120) << "a Newton step or two";
 }
 
+// The product of two inputs of a simplex is largest in the middle of an edge, which a search has to go along: round-off
+// of the constraint stopped it up to 7e-3 off.
+TEST(ModelSearch, GoesAlongAConstraint) {
+  for (const int n : {3, 5, 8})
+    for (const double off : {.004, .02, .1})
+      for (const double slack : {0.0, 1e-4}) {
+        const Space space{std::vector<FuzzyNumber>(n, make_triangular(0, .1, 1)),
+                          {[](const Point& x) {
+                            double sum = -1;
+                            for (const double v : x) sum += v;
+                            return sum;
+                          }},
+                          {}};
+        const Model model = [](const Point& x) { return Told{-x[0] * x[1], 0}; };
+        Point start(n, 0.0);
+        start[0] = .5 + off - slack, start[1] = .5 - off;
+        ModelSearch search(make_region(space, 0), start, model(start), {});
+        drive(search, model);
+        EXPECT_TRUE(search.is_converged());
+        EXPECT_NEAR(search.value(), -.25, 1e-8) << n << " inputs, " << off << " off";
+      }
+}
+
 TEST(ModelSearch, FollowsRosenbrocksValley) {
   const Space space = make_cube(2);
   const Model model = [](const Point& x) {
