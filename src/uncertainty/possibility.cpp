@@ -261,7 +261,7 @@ class Climb {
       for (const int i : axes_) A.back().push_back((x[i] - centre[i]) / space_.inputs[i].width());
     }
     const Ray here = to_surface(find_ray(space_, best_x_, t));
-    std::vector<Ray> rays;
+    std::vector<Ray> rays, ways;
     if (A.size() == n && solve(A, slope)) {
       double largest = 0;
       for (const double a : slope) largest = std::max(largest, std::abs(a));
@@ -273,13 +273,22 @@ class Climb {
         for (const double way : {0.5, 0.1}) {
           Ray r = here;
           for (const int i : axes_) r.w[i] += way * (corner.w[i] - r.w[i]);
-          rays.push_back(to_surface(r));
+          ways.push_back(to_surface(r));
         }
       }
     }
+    // rays around the best place may all miss a small class: then the corners that it leans to
+    if (rays.empty())
+      for (const double part : {1e-3, 0.3, 0.6}) {
+        Ray corner = here;
+        for (const int i : axes_) corner.w[i] = std::clamp(corner.w[i] / part, -1.0, 1.0);
+        rays.push_back(std::move(corner));
+      }
     std::vector<Point> points;
     for (const auto& r : rays)
       for (const double part : {0.5, 0.8, 0.93, 0.98, 0.995, 0.999}) add(points, calc_place(space_, r, part * t));
+    for (const auto& r : ways)
+      for (const double part : {0.8, 0.95, 0.99}) add(points, calc_place(space_, r, part * t));
     if (points.empty()) stage_ = Stage::Look;
     return points;
   }

@@ -241,6 +241,30 @@ TEST(PossibilityReplay, ResumedEqualsUninterrupted) {
   }
 }
 
+// A ball far from the core, which rays around a place in it miss: the smallest cut touches it with a corner.
+TEST(PossibilityPhysics, SmallBallsAreTouchedByACorner) {
+  for (const int n : {4, 6, 8}) {
+    const Evaluate model = make_evaluate([](const Point& x) {
+      double square = 0;
+      for (const double v : x) square += (v - .75) * (v - .75);
+      Result r;
+      r.state = Result::State::Done;
+      r.outcome = square < .04 ? 1 : 0;
+      r.values = {x[0]};
+      return r;
+    });
+    const Space space{std::vector<FuzzyNumber>(n, make_triangular(-1, 0, 1)), {}, {}};
+    const Progress progress;
+    Asker asker(model, progress, nullptr, 600);
+    Point x(n, .7);
+    x[0] = .85, x[1] = .8;
+    asker.ask({calc_centre(space), x});
+    const PossibilityResult r = find_possibilities(space, asker, {});
+    ASSERT_EQ(r.classes.size(), 2u);
+    EXPECT_NEAR(r.classes[1].possibility, 1 - (.75 - .2 / std::sqrt(static_cast<double>(n))), 1e-3) << n << " inputs";
+  }
+}
+
 TEST(Possibility, StopsAtTheLimitAndSaysSo) {
   const Space space{cases::make_jump_inputs(), {}, {}};
   const Progress progress;
