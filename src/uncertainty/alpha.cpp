@@ -11,6 +11,7 @@
 
 #include "base/error.h"
 #include "uncertainty/kink_search.h"
+#include "uncertainty/line_search.h"
 #include "uncertainty/local_search.h"
 
 namespace topple::uncertainty {
@@ -20,6 +21,8 @@ constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr int any_class = -2;
 constexpr int most_in_vain = 5;           // searches along kinks that neither end nor gain
 constexpr double least_edge_gain = 1e-6;  // along a kink, as a part of an output's width
+constexpr double least_line_gain = 1e-5;  // along an axis
+constexpr int most_line_places = 6;       // of an axis, that other ends of searches propose
 
 std::vector<double> check_levels(std::vector<double> levels) {
   for (const double a : levels)
@@ -63,6 +66,7 @@ class Optimisation {
   AlphaResult run() {
     explore();
     check_faces(false);
+    if (has_line_searches()) search_lines(false);
     search_from_best(false);
     if (has_many_inputs() || !edges_.empty()) recheck(false);
     if (has_many_inputs()) { restart_until_settled(asker_.limit() / 5); }
@@ -81,7 +85,9 @@ class Optimisation {
   AlphaResult search_on(bool is_first) {
     const int limit = asker_.limit();
     if (options_.search_classes && !make_goals(true).empty()) asker_.set_limit(limit - asker_.rest() / 7);
-    if (!kinked_.empty()) asker_.set_limit(asker_.limit() - asker_.rest() / 10);
+    // lines and searches along kinks at the best places that there will be
+    const bool has_last_steps = has_line_searches() || !kinked_.empty();
+    if (has_last_steps) asker_.set_limit(asker_.limit() - asker_.rest() / 10);
     for (int idle = 0; asker_.can_go_on() && idle < (has_valleys() ? 2 : 1) * options_.patience;) {
       const std::vector<double> before = calc_bounds();
       if (rounds_ > 0) spread(0.25);
@@ -101,7 +107,10 @@ class Optimisation {
       unfinished_ = unfinished_ || asker_.rest() == 0;
     }
     asker_.set_limit(limit);
-    if (!kinked_.empty()) recheck(false);
+    if (has_last_steps) {
+      if (has_line_searches()) search_lines(false);
+      recheck(false);
+    }
     if (options_.search_classes) {
       if (is_first) search_from_best(true);
       recheck(true);
@@ -151,6 +160,9 @@ class Optimisation {
           x[i] = end;
           add(std::move(x), r);
         }
+    ask(points);
+    points.clear();
+    if (options_.lines > 0) join_lines();
     // a small limit must leave something for the searches
     std::size_t corners = 0;
     for (const auto& r : regions_) {
@@ -213,6 +225,106 @@ class Optimisation {
         }
     }
     ask(points);
+  }
+
+  /// Lines through the middle of the inputs along every axis, and for each goal the best place of every line at once:
+  /// where inputs act on their own, that lies in the basin of its bound.
+  void join_lines() {
+    std::vector<Point> points;
+    const Point centre = calc_centre(space_);
+    const Region& support = regions_.front();
+    const auto at = [&](int i, double value) {
+      Point x = centre;
+      x[i] = value;
+      return x;
+    };
+    const int steps = 2 * options_.lines;
+    for (const int i : support.axes)
+      for (int k = 1; k < steps; ++k) {
+        Point x = at(i, support.box.lower[i] + k * support.scale[i] / steps);
+        if (!space_.has_interaction() || support.contains(x)) points.push_back(std::move(x));
+      }
+    ask(points);
+    std::vector<Point> joined;
+    for (const Goal& goal : make_goals(false)) {
+      const Region& r = regions_[goal.level];
+      Point x = centre;
+      for (const int i : r.axes) {
+        double best = value_of(goal, asker_.archive().find(centre));
+        const auto look = [&](const Point& y) {
+          if (!r.contains(y)) return;
+          if (const double v = value_of(goal, asker_.archive().find(y)); v < best) best = v, x[i] = y[i];
+        };
+        for (int k = 1; k < steps; ++k) look(at(i, support.box.lower[i] + k * support.scale[i] / steps));
+        for (const auto& other : regions_)
+          for (const double end : {other.box.lower[i], other.box.upper[i]}) look(at(i, end));
+      }
+      if (!space_.has_interaction() || r.contains(x)) joined.push_back(std::move(x));
+    }
+    ask(joined);
+  }
+
+  // ---- lines through best samples
+
+  bool has_line_searches() const { return options_.lines > 0 && !has_many_inputs(); }
+
+  std::unique_ptr<LocalSearch> make_line_search(const Goal& goal, const Candidate& start) {
+    LineSearch::Options o;
+    o.places = options_.lines;
+    o.least_gain = least_line_gain * width_of(goal.output);
+    // where bounds of the other cuts lie, and ends of searches
+    const Region& r = regions_[goal.level];
+    std::vector<int> others;
+    for (int level = 0; level < static_cast<int>(levels_.size()); ++level)
+      if (level != goal.level)
+        if (const Candidate best = find_best({goal.output, level, goal.sign, goal.outcome}); best.sample >= 0)
+          others.push_back(best.sample);
+    if (const auto ends = optima_.find({goal.output, goal.sign > 0}); ends != optima_.end())
+      others.insert(others.end(), ends->second.begin(), ends->second.end());
+    const Point& x = asker_.archive()[start.sample].x;
+    for (const int i : r.axes) {
+      std::vector<double> places;
+      for (const int sample : others) {
+        const double at = asker_.archive()[sample].x[i];
+        const auto is_near = [&](double p) { return std::abs(p - at) < 0.01 * r.scale[i]; };
+        if (at < r.box.lower[i] || at > r.box.upper[i] || is_near(x[i]) || is_near(r.box.lower[i]) ||
+            is_near(r.box.upper[i]) || std::any_of(places.begin(), places.end(), is_near))
+          continue;
+        places.push_back(at);
+        if (static_cast<int>(places.size()) >= most_line_places) break;
+      }
+      o.more.push_back(std::move(places));
+    }
+    ++searches_;
+    return std::make_unique<LineSearch>(r, x, tell_of(goal, start.sample), o);
+  }
+
+  /// Whether lines through the best sample, or through one that is near, led to no better basin.
+  bool is_scanned(const Goal& goal, const Candidate& best) const {
+    if (!has_line_searches() || is_open(goal.level)) return true;
+    const auto found = scanned_.find(key_of(goal));
+    if (found == scanned_.end() || best.sample < 0) return false;
+    const Region& r = regions_[goal.level];
+    const Point& x = asker_.archive()[best.sample].x;
+    return std::any_of(found->second.begin(), found->second.end(), [&](int sample) {
+      const Point& y = asker_.archive()[sample].x;
+      return std::all_of(r.axes.begin(), r.axes.end(), [&](int i) {
+        return std::abs(x[i] - y[i]) <= std::min(0.03 * r.scale[i], 0.1 * (r.box.upper[i] - r.box.lower[i]));
+      });
+    });
+  }
+
+  /// Lines through the best samples that had none.
+  bool search_lines(bool of_classes) {
+    std::vector<Running> all;
+    for (const Goal& goal : make_goals(of_classes)) {
+      const Candidate best = find_best(goal);
+      if (regions_[goal.level].axes.empty() || best.sample < 0 || is_scanned(goal, best)) continue;
+      all.push_back({goal, make_line_search(goal, best)});
+    }
+    const bool has_any = !all.empty();
+    advance(all);
+    return has_any;
   }
 
   double value_of(const Goal& goal, int sample) const {
@@ -318,13 +430,14 @@ class Optimisation {
     if (std::find(all.begin(), all.end(), sample) == all.end()) all.push_back(sample);
   }
 
-  /// Where an output has kinks, no model search tells that nothing better is near.
-  bool has_kinks(int output) const { return kinked_.contains(output); }
-  void note_kinks(int output) {
-    if (!kinked_.insert(output).second) return;
+  /// Where an output has kinks that bound it on this side, no model search tells that nothing better is near.
+  bool has_kinks(const Goal& goal) const { return kinked_.contains({goal.output, goal.sign > 0}); }
+  void note_kinks(const Goal& goal) {
+    if (!kinked_.insert({goal.output, goal.sign > 0}).second) return;
+    const auto is_of = [&goal](const Key& key) { return key[0] == goal.output && key[2] == (goal.sign > 0); };
     for (const auto& [key, end] : ends_)
-      if (key[0] == output) edges_.try_emplace(key, infinite).first->second = end;
-    std::erase_if(ends_, [output](const auto& e) { return e.first[0] == output; });
+      if (is_of(key)) edges_.try_emplace(key, infinite).first->second = end;
+    std::erase_if(ends_, [&](const auto& e) { return is_of(e.first); });
   }
 
   /// Whether searches for a bound ended at places of different values.
@@ -450,6 +563,10 @@ class Optimisation {
         end = std::min(end, r.search->value());
       }
       if (!r.search->is_converged()) continue;
+      if (dynamic_cast<const LineSearch*>(r.search.get()) != nullptr) {
+        if (const int at = asker_.archive().find(r.search->best()); at >= 0) scanned_[key_of(r.goal)].push_back(at);
+        continue;
+      }
       if (r.over_faces) {
         note_faces(r.goal, static_cast<const FaceSearch&>(*r.search));
         continue;
@@ -460,8 +577,8 @@ class Optimisation {
       }
       if (const int at = asker_.archive().find(r.search->best()); at >= 0 && !has_many_inputs()) note_end(r.goal, at);
       const auto* model = dynamic_cast<const ModelSearch*>(r.search.get());
-      if (seeks_edges() && model && model->is_at_edge() && !model->has_met_walls()) note_kinks(r.goal.output);
-      const bool is_open = model && has_kinks(r.goal.output);
+      if (seeks_edges() && model && model->is_at_edge() && !model->has_met_walls()) note_kinks(r.goal);
+      const bool is_open = model && has_kinks(r.goal);
       double& end = (is_open ? edges_ : ends_).try_emplace(key_of(r.goal), infinite).first->second;
       end = std::min(end, r.search->value());
     }
@@ -481,7 +598,7 @@ class Optimisation {
   /// What a bound is marked with.
   bool is_settled(const Goal& goal, const Candidate& best) const {
     if (!is_converged(goal, best)) return false;
-    if (!is_open(goal.level)) return true;
+    if (!is_open(goal.level)) return is_scanned(goal, best);
     return is_checked(goal, best) && (goal.outcome != any_class || is_confirmed(goal, best));
   }
 
@@ -725,7 +842,7 @@ class Optimisation {
     advance(all);
     // an end at a kink that is nearly as good as the best one may be a better valley
     for (const auto& [goal, count] : known) {
-      if (!has_kinks(goal.output)) continue;
+      if (!has_kinks(goal)) continue;
       const Candidate best = find_best(goal);
       const std::vector<int>& samples = starts_[key_of(goal)];
       for (std::size_t k = count; k < samples.size(); ++k)
@@ -745,9 +862,14 @@ class Optimisation {
       std::vector<Running> all;
       for (const Goal& goal : make_goals(of_classes)) {
         const Candidate best = find_best(goal);
-        if (regions_[goal.level].axes.empty() || best.sample < 0 || is_converged(goal, best)) continue;
-        if (is_noted(given_up_, goal, best)) continue;
-        if (!tried.insert({key_of(goal), best.sample}).second) continue;
+        if (regions_[goal.level].axes.empty() || best.sample < 0) continue;
+        const bool is_at_end = is_converged(goal, best) || is_noted(given_up_, goal, best);
+        if (is_at_end && is_scanned(goal, best)) continue;
+        if (!tried.insert({key_of(goal), is_at_end ? -1 - best.sample : best.sample}).second) continue;
+        if (is_at_end) {
+          all.push_back({goal, make_line_search(goal, best)});
+          continue;
+        }
         const auto edge = edges_.find(key_of(goal));
         const bool is_at_edge =
             edge != edges_.end() && edge->second <= best.value + least_edge_gain * width_of(goal.output);
@@ -767,8 +889,10 @@ class Optimisation {
         for (int k = 0; k < static_cast<int>(levels_.size()); ++k) {
           auto& b = outputs[o].levels[k];
           const bool point = regions_[k].axes.empty();
-          b.lower.converged = b.lower.sample >= 0 && (point || is_settled({o, k, 1, outcome}, {b.lower.value}));
-          b.upper.converged = b.upper.sample >= 0 && (point || is_settled({o, k, -1, outcome}, {-b.upper.value}));
+          b.lower.converged =
+              b.lower.sample >= 0 && (point || is_settled({o, k, 1, outcome}, {b.lower.value, b.lower.sample}));
+          b.upper.converged =
+              b.upper.sample >= 0 && (point || is_settled({o, k, -1, outcome}, {-b.upper.value, b.upper.sample}));
         }
     };
     mark(result.outputs, any_class);
@@ -791,13 +915,14 @@ class Optimisation {
   std::vector<int> depth_;                  // per sample: in how many levels it lies
   std::vector<int> space_points_;           // per level
   std::map<Key, double> ends_;              // best value at which a search converged
-  std::set<int> kinked_;                    // outputs
+  std::set<std::pair<int, bool>> kinked_;   // output and sign
   std::map<Key, double> given_up_;          // at which searches along kinks neither ended nor gained any more
   std::map<Key, int> in_vain_;              // searches along kinks that did not end, nor gain
   std::map<Key, double> edges_;             // at which one stopped before a kink
   std::map<Key, std::vector<int>> starts_;  // samples from which searches began and, with few inputs, ended
   std::map<std::pair<int, bool>, std::vector<int>> optima_;  // samples, by output and sign
   std::map<Key, Faces> faces_;
+  std::map<Key, std::vector<int>> scanned_;  // samples through which lines led to no better basin
   int next_spread_ = 1;
   std::uint64_t searches_ = 0;
   int rechecks_ = 0, rounds_ = 0, shown_ = 0, restarts_ = 0, restart_rounds_ = 0;
@@ -822,6 +947,7 @@ AlphaOptions make_thrifty_options() {
   o.evolutions = 0;
   o.patience = 1;
   o.restarts = 2;
+  o.lines = 0;
   o.search_classes = false;
   return o;
 }

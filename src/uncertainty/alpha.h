@@ -102,6 +102,9 @@ struct AlphaOptions {
   /// Further rounds of spread points and searches from other places go on until so many in a row gained less than 1e-4
   /// of an output's width; twice as many where searches ended at places of different values.
   int patience = 3;
+  /// Steps over the support of lines along the axes, through the middle of the inputs (twice as many) and through the
+  /// best samples: a bound has converged only when none of them leads to a better one. 0: no lines.
+  int lines = 12;
   /// Own searches for the bounds of each outcome class, for which a seventh of the limit is kept; without them these
   /// bounds are read off the archive.
   bool search_classes = true;

@@ -55,7 +55,7 @@ int Archive::add(Sample s) {
 }
 
 Asker::Asker(Evaluate evaluate, const Progress& progress, const Archive* earlier, int limit)
-    : evaluate_(std::move(evaluate)), progress_(&progress), earlier_(earlier), limit_(limit) {}
+    : evaluate_(std::move(evaluate)), progress_(&progress), earlier_(earlier), limit_(limit), told_limit_(limit) {}
 
 std::vector<int> Asker::ask(const std::vector<Point>& points) {
   std::vector<int> indices(points.size(), -1);
@@ -107,7 +107,7 @@ std::vector<int> Asker::ask(const std::vector<Point>& points) {
   }
   for (std::size_t i = 0; i < points.size(); ++i)
     if (indices[i] < 0) indices[i] = archive_.find(points[i]);
-  if (progress_->report) progress_->report(asked(), limit_);
+  if (progress_->report) progress_->report(asked(), told_limit_);
   return indices;
 }
 

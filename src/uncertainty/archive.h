@@ -1,6 +1,7 @@
 #pragma once
 /// Every evaluated point, kept; and the one who asks the model for more (docs/theory/uncertainty.md, section 2).
 
+#include <algorithm>
 #include <cstddef>
 #include <unordered_map>
 #include <vector>
@@ -53,7 +54,8 @@ class Asker {
   int run() const { return run_; }                                 // of them sent to the model, not found in `earlier`
   int batches() const { return batches_; }                         // calls of the model
   int limit() const { return limit_; }
-  void set_limit(int limit) { limit_ = limit; }
+  /// Progress is told of the largest one so far: a part may be kept for later.
+  void set_limit(int limit) { limit_ = limit, told_limit_ = std::max(told_limit_, limit); }
   int rest() const { return limit_ > asked() ? limit_ - asked() : 0; }
   bool is_cancelled() const { return cancelled_ || progress_->is_cancelled(); }
   /// Neither cancelled nor out of evaluations.
@@ -66,7 +68,7 @@ class Asker {
   const Progress* progress_;
   const Archive* earlier_;
   Archive archive_;
-  int limit_;
+  int limit_, told_limit_;
   int run_ = 0, batches_ = 0, outputs_ = 0;
   bool cancelled_ = false;
 };

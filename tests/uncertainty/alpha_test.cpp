@@ -379,6 +379,60 @@ TEST(AlphaPhysics, CuspsCountByTheValue) {
   }
 }
 
+// A sum and a product of functions of one input each, with a kink and several hills: the bounds are those of the
+// functions, taken together.
+TEST(AlphaPhysics, InputsThatActAloneAreExactOrMarked) {
+  using Function = std::function<double(double)>;
+  const std::vector<Function> functions = {[](double x) { return (x - .37) * (x - .37); },
+                                           [](double x) { return std::sin(5 * x); },
+                                           [](double x) { return std::abs(x - .61); },
+                                           [](double x) { return x * x * x - x; },
+                                           [](double x) { return std::exp(-40 * (x - .2) * (x - .2)); },
+                                           [](double x) { return std::cos(7 * x + 1); }};
+  // where their extremes lie, whatever the cut; others are at its ends
+  const std::vector<std::vector<double>> extremes = {
+      {.37}, {std::acos(0.0) / 5, 3 * std::acos(0.0) / 5, std::acos(0.0)},
+      {.61}, {-1 / std::sqrt(3.0), 1 / std::sqrt(3.0)},
+      {.2},  {}};
+  std::vector<double> waves;
+  for (int k = -3; k < 6; ++k) waves.push_back((2 * k * std::acos(0.0) - 1) / 7);
+  const std::vector<FuzzyNumber> inputs = {make_triangular(-1, .1, 1.5), make_triangular(0, .4, 2),
+                                           make_triangular(-.5, .5, 1),  make_triangular(-1, 0, 1.2),
+                                           make_triangular(-1, .5, 1),   make_triangular(-1, -.2, 2)};
+  const auto model = make_evaluate_values([&](const Point& x) {
+    double sum = 0, product = 1;
+    for (std::size_t i = 0; i < x.size(); ++i) sum += functions[i](x[i]), product *= 2 + functions[i](x[i]);
+    return std::vector{sum, product};
+  });
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    AlphaOptions options;
+    options.seed = seed;
+    const AlphaResult r = optimise(inputs, model, options, {});
+    EXPECT_LE(r.archive.size(), 10000u);
+    int marked = 0;
+    for (int o = 0; o < 2; ++o)
+      for (const LevelBounds& l : r.outputs[o].levels) {
+        double lower = o, upper = o;
+        for (std::size_t i = 0; i < inputs.size(); ++i) {
+          const AlphaCut cut = inputs[i].cut(l.alpha);
+          double least = functions[i](cut.left), most = least;
+          std::vector<double> places = i == 5 ? waves : extremes[i];
+          places.push_back(cut.right);
+          for (const double at : places)
+            if (at >= cut.left && at <= cut.right)
+              least = std::min(least, functions[i](at)), most = std::max(most, functions[i](at));
+          lower = o == 0 ? lower + least : lower * (2 + least);
+          upper = o == 0 ? upper + most : upper * (2 + most);
+        }
+        const double width = r.outputs[o].levels[0].upper.value - r.outputs[o].levels[0].lower.value;
+        EXPECT_NEAR(l.lower.value, lower, 1e-4 * width) << "output " << o << ", alpha " << l.alpha << ", seed " << seed;
+        EXPECT_NEAR(l.upper.value, upper, 1e-4 * width) << "output " << o << ", alpha " << l.alpha << ", seed " << seed;
+        marked += !l.lower.converged + !l.upper.converged;
+      }
+    EXPECT_LE(marked, 8) << "of 20, seed " << seed;
+  }
+}
+
 // ---- more inputs than all corners are run of
 
 struct Ends {

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "uncertainty/kink_search.h"
+#include "uncertainty/line_search.h"
 #include "uncertainty/random.h"
 
 namespace topple::uncertainty {
@@ -67,6 +68,54 @@ TEST(ModelSearch, GoesAlongAConstraint) {
         EXPECT_TRUE(search.is_converged());
         EXPECT_NEAR(search.value(), -.25, 1e-8) << n << " inputs, " << off << " off";
       }
+}
+
+TEST(LineSearch, FindsTheBasinOfEachInputThatActsAlone) {
+  const Space space = make_cube(5);
+  const Model model = [](const Point& x) {
+    double sum = 0;
+    for (int i = 0; i < 5; ++i) sum += std::cos((2 + .7 * i) * x[i]) + .2 * x[i];
+    return Told{sum, 0};
+  };
+  double want = 0;
+  for (int i = 0; i < 5; ++i) {
+    double least = std::numeric_limits<double>::infinity();
+    for (int k = 0; k <= 400000; ++k)
+      least = std::min(least, std::cos((2 + .7 * i) * (-2 + 1e-5 * k)) + .2 * (-2 + 1e-5 * k));
+    want += least;
+  }
+  const Point start(5, 0.1);
+  LineSearch search(make_region(space, 0), start, model(start), {});
+  const int asked = drive(search, model);
+  EXPECT_TRUE(search.is_converged());
+  EXPECT_NEAR(search.value(), want, .02) << "of 10: searches on a model do the rest";
+  EXPECT_LE(asked, 250);
+  // from there nothing leads elsewhere
+  LineSearch again(make_region(space, 0), search.best(), model(search.best()), {});
+  EXPECT_LE(drive(again, model), 130);
+  EXPECT_TRUE(again.is_converged());
+  EXPECT_NEAR(again.value(), search.value(), .02);
+}
+
+TEST(LineSearch, LooksAtPlacesThatAreGivenAndKeepsInside) {
+  // a hole that no step of the grid meets, and a constraint
+  const Space space{
+      std::vector<FuzzyNumber>(2, make_triangular(-2, 0.1, 2)), {[](const Point& x) { return x[0] + x[1] - 1.5; }}, {}};
+  int outside = 0;
+  const Model model = [&](const Point& x) {
+    outside += x[0] + x[1] > 1.5;
+    return Told{std::abs(x[1] - .777) < 1e-3 ? -1.0 : 0.0, 0};
+  };
+  LineSearch::Options options;
+  const Point start = {0.1, 0.1};
+  LineSearch without(make_region(space, 0), start, model(start), options);
+  drive(without, model);
+  EXPECT_EQ(without.value(), 0);
+  options.more = {{}, {.777}};
+  LineSearch with(make_region(space, 0), start, model(start), options);
+  drive(with, model);
+  EXPECT_EQ(with.value(), -1);
+  EXPECT_EQ(outside, 0);
 }
 
 TEST(ModelSearch, FollowsRosenbrocksValley) {
