@@ -31,6 +31,13 @@ void add_json(CLI::App* verb, Arguments& a) {
 }
 
 /// Name of a type whose values completion offers; what is not among them has an error of its own.
+/// 0x20 and 020 would count as what few expect.
+std::string is_whole_number(const std::string& s) {
+  const bool is_whole =
+      !s.empty() && s.find_first_not_of("0123456789") == std::string::npos && (s == "0" || s[0] != '0');
+  return is_whole ? std::string() : "a whole number is wanted, not \"" + s + "\"";
+}
+
 std::string choose_from(const std::vector<std::string>& names) {
   std::string out;
   for (const std::string& name : names) out += (out.empty() ? "NAME:{" : ",") + name;
@@ -70,8 +77,11 @@ void add_worker_options(CLI::App* verb, StudyArguments& y) {
   verb->add_option_function<int>(
           "--jobs", [&y](int n) { y.jobs = n, y.is_jobs_given = true; },
           "runs at the same time here (default: as many as there are processors); 0: workers elsewhere do everything")
+      ->check(is_whole_number)
       ->check(CLI::Range(0, 4096));
-  verb->add_option("--batch", y.batch, "points that one evaluator gets at once (1)")->check(CLI::Range(1, 100000));
+  verb->add_option("--batch", y.batch, "points that one evaluator gets at once (1)")
+      ->check(is_whole_number)
+      ->check(CLI::Range(1, 100000));
   verb->add_option("--lease", y.lease,
                    "time without a sign of life after which a run is given to another, as --timeout (30 s)")
       ->type_name("QUANTITY");
@@ -393,8 +403,8 @@ void add_study(CLI::App& app, Arguments& a) {
       ->add_option("--evaluator", y.evaluator,
                    "command that is the model: reads points and writes answers as JSON lines (docs/study.md)")
       ->check(is_given("a command"));
-  study->add_option("--alpha", y.alpha, "levels between commas, such as 0,0.25,0.5,0.75,1");
-  study->add_option("--samples", y.samples, "runs at most")->check(CLI::Range(10, 100000000));
+  study->add_option("--alpha", y.alpha, "levels between commas, such as 0,0.25,0.5,0.75,1")->check(is_given("a level"));
+  study->add_option("--samples", y.samples, "runs at most")->check(is_whole_number)->check(CLI::Range(10, 100000000));
   study->add_option("--seed", y.seed, "of spread points and searches")->check([](const std::string& s) {
     const bool is_whole = !s.empty() && s.find_first_not_of("0123456789") == std::string::npos;
     if (!is_whole) return "a whole number from 0 on is wanted, not " + s;
@@ -416,6 +426,7 @@ void add_study(CLI::App& app, Arguments& a) {
       study->add_flag("--condensed", y.condensed,
                       "of a plan: run its like frames as one, at a tenth of the cost; whole runs confirm the bounds");
   study->add_option("--confirm", y.confirm, "whole runs at the end of a condensed study at most")
+      ->check(is_whole_number)
       ->check(CLI::Range(1, 1000000))
       ->needs(condensed);
   study->add_flag("--rerun-failed", y.rerun_failed, "run those again that failed");

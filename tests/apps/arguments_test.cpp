@@ -148,6 +148,18 @@ TEST(Arguments, AnEmptyQuantityIsRefused) {
   EXPECT_EQ(std::get<Arguments>(parse({"fe", "plan.toml", "--size", "0.4 m", "-o", "out"})).fe.size, "0.4 m");
 }
 
+TEST(Arguments, LevelsAndWholeNumbersOfAStudyAreRefused) {
+  const auto with = [](const std::string& option, const std::string& value) {
+    return parse({"study", "in.toml", "--evaluator", "model", "-o", "out", option, value});
+  };
+  EXPECT_EQ(std::get<int>(with("--alpha", "")), kBadInput);
+  EXPECT_EQ(std::get<int>(with("--alpha", " ")), kBadInput);
+  for (const char* number : {"0x20", "020", "+20", "1e3", "20.0", ""})
+    for (const char* option : {"--samples", "--jobs", "--batch"})
+      EXPECT_EQ(std::get<int>(with(option, number)), kBadInput) << option << number;
+  EXPECT_EQ(std::get<Arguments>(with("--samples", "20")).study.samples, 20);
+}
+
 TEST(Arguments, WhatOnlyMakesAMeshKeepsNoCheckpoint) {
   EXPECT_EQ(std::get<int>(parse({"fe", "plan.toml", "--mesh-only", "--checkpoint"})), kBadInput);
 }
