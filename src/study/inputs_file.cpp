@@ -277,6 +277,31 @@ struct Reader {
         complaints.error("E207", formula_places[i],
                          formula_quantities[i].name + ": the formula has no value in the middle of the inputs");
     product::check_interaction(interaction, values, "interaction", "the inputs", complaints);
+    if (interaction.joint && complaints.error_count() == 0) check_joint(complete);
+  }
+
+  /// A joint membership above 1 would count as 1 without a word. Looked at in corners and at spread points.
+  template <typename Complete>
+  void check_joint(const Complete& complete) {
+    const uncertainty::Box support = uncertainty::make_box(out.space, 0);
+    const int n = out.space.size();
+    std::vector<Point> points;
+    if (n <= 10) points = uncertainty::make_corners(support);
+    for (const Point& u : uncertainty::make_sobol_points(n, 1, 200, 1))
+      points.push_back(uncertainty::place_in(support, u));
+    for (const Point& x : points) {
+      if (!uncertainty::is_allowed(out.space, x)) continue;
+      const double mu = interaction.joint->evaluate(complete(x));
+      if (!(mu > 1 + 1e-9)) continue;
+      std::string place;
+      for (int i = 0; i < n; ++i)
+        place += fmt::format("{}{} = {:.4g}", i > 0 ? ", " : "", out.inputs[static_cast<std::size_t>(i)].name,
+                             x[static_cast<std::size_t>(i)]);
+      complaints.error("E207", interaction.joint_place,
+                       fmt::format("interaction: membership: {:.4g} at {}; 1 at most", mu, place),
+                       "a joint membership lies between 0 and 1; min(1, ...) holds it there");
+      return;
+    }
   }
 
   /// Turns a study with random inputs into one of statistics.

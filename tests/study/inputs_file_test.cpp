@@ -76,6 +76,7 @@ TEST(InputsFile, PointsAtEveryMistake) {
            {"a + b <= 6", "a + g <= 6", 12, "E208"},
            {"a + b <= 6", "a + b <= 3", 12, "E207"},
            {"abs(a - 2.5)", "abs(a - 2)", 13, "E207"},
+           {"1 - abs(a - 2.5)", "1 + abs(a - 2.5)", 13, "E207"},
            {"levels = [0, 0.5, 1]", "levels = [0, 1.5]", 15, "E205"},
            {"samples = 500", "samples = 5", 16, "E205"},
            {"seed = 3", "sed = 3", 17, "E203"},
