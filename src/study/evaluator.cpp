@@ -160,7 +160,8 @@ struct Reader {
       a.text = j["failed"].is_string() ? j["failed"].get<std::string>() : "the evaluator says so";
       return a;
     }
-    if (j.contains("outcome")) {
+    // null stands for what is left out
+    if (j.contains("outcome") && !j["outcome"].is_null()) {
       const json& o = j["outcome"];
       if (o.is_string())
         a.outcome = o.get<std::string>();
@@ -171,7 +172,7 @@ struct Reader {
       if (a.outcome.empty())
         return refuse(find_member(line, "outcome"), "outcome: the name is empty", "leave it out where there is none");
     }
-    if (j.contains("trajectory")) {
+    if (j.contains("trajectory") && !j["trajectory"].is_null()) {
       if (!j["trajectory"].is_array()) return refuse(find_member(line, "trajectory"), "trajectory: a list is wanted");
       for (const json& v : j["trajectory"]) {
         if (!v.is_number() && !v.is_null())
@@ -182,9 +183,17 @@ struct Reader {
     const bool is_nested = j.contains("outputs");
     if (is_nested && !j["outputs"].is_object())
       return refuse(find_member(line, "outputs"), "outputs: an object is wanted", form);
+    const auto is_known = [](const std::string& name) {
+      return name == "id" || name == "outcome" || name == "trajectory" || name == "failed";
+    };
+    if (is_nested)
+      for (const auto& [name, v] : j.items())
+        if (!is_known(name) && name != "outputs")
+          return refuse(find_member(line, name), fmt::format("\"{}\" means nothing beside outputs", name),
+                        "a number belongs into outputs; other members are id, outcome, trajectory and failed");
     const json& outputs = is_nested ? j["outputs"] : j;
     for (const auto& [name, v] : outputs.items()) {
-      if (!is_nested && (name == "id" || name == "outcome" || name == "trajectory" || name == "failed")) continue;
+      if (!is_nested && is_known(name)) continue;
       if (!v.is_number() && !v.is_null()) return refuse(find_member(line, name), name + ": a number is wanted", form);
       const double x = v.is_null() ? std::nan("") : v.get<double>();
       if (!std::isfinite(x)) {

@@ -248,6 +248,8 @@ TEST(Evaluator, ReadsFormsOfAnswers) {
   EXPECT_EQ(read(R"({"outputs": {"a": 1}, "trajectory": [1, null, 3]})").trajectory.size(), 3u);
   EXPECT_EQ(read(R"({"outcome": 2})").outcome, "2");
   EXPECT_EQ(read(R"({"outcome": true, "outputs": {}})").outcome, "true");
+  EXPECT_EQ(read(R"({"outputs": {"a": 1}, "outcome": null, "trajectory": null})").kind, Kind::Done) << "left out";
+  EXPECT_EQ(read(R"({"outputs": {"a": 1}, "outcome": null})").outcome, "");
   EXPECT_EQ(read(R"({"failed": "no balance"})").text, "no balance");
   EXPECT_EQ(read(R"({"failed": true})").kind, Kind::Failed);
   EXPECT_EQ(read(R"({"failed": false, "z": 1})").kind, Kind::Done);
@@ -271,6 +273,9 @@ TEST(Evaluator, PointsAtWhatItCannotUnderstand) {
   EXPECT_EQ(broken.line, R"({"ü": 1, oops})");
   EXPECT_NE(broken.diagnostic.where.file.find("model"), std::string::npos);
   EXPECT_EQ(read(R"({"outputs": {"a": 1, "b": "tall"}})").diagnostic.where.column, 22);
+  const Refusal misspelt = read(R"({"outputs": {"a": 1}, "outcom": "tilt"})");
+  EXPECT_EQ(misspelt.diagnostic.message, "\"outcom\" means nothing beside outputs");
+  EXPECT_EQ(misspelt.diagnostic.where.column, 23);
   EXPECT_EQ(read("3").diagnostic.message, "a JSON object is wanted");
   EXPECT_EQ(read("{}").diagnostic.message, "there are neither outputs nor an outcome");
   read(R"({"outcome": [1]})");
