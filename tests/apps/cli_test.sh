@@ -158,6 +158,10 @@ TEXT
   # all runs fail: told, not hidden
   expect 0 "$topple" study in.toml --evaluator "while read l; do echo '{\"failed\": \"no balance\"}'; done" -o f --samples 10
   has out "no balance"; has out "All 10 runs failed"
+  # a study that goes on and whose first new answer is refused: what earlier calls ran is kept, and told
+  mends="while read l; do [ -e broken ] && echo '{' || echo '{\"z\": 1}'; done"
+  expect 0 "$topple" study in.toml --evaluator "$mends" -o kept --samples 20; : >broken
+  expect 2 "$topple" study in.toml --evaluator "$mends" -o kept --samples 40; has err "E824"; has err "what was run before is kept"
   # a model that never answers: told at once, and nothing stays that a mended one would have to clear away
   expect 2 "$topple" study in.toml --evaluator "echo why >&2; exit 3" -o g --samples 1000; has err "E828"; has err "exit code 3: why"
   [ ! -e g/study.sqlite ] || { echo "a store of a model that never answered"; failures=$((failures + 1)); }
