@@ -160,9 +160,10 @@ void print_boxes(std::FILE* out, const Problem& p, const StudyResult& r) {
   print_line(out, fmt::format("asked: {}; kept by {:.1f} % of the support ({:.1f} % standard error, of {} spread runs)",
                               p.permissible, 100 * d.fraction, 100 * d.fraction_error, d.spread));
   if (d.boxes.empty()) print_line(out, "no box was found");
-  for (std::size_t k = 0; k < d.boxes.size(); ++k) {
-    const uncertainty::PermissibleBox& b = d.boxes[k];
-    std::string text = fmt::format("box {}, {} % of the support: ", k + 1, words_of_percent(100 * b.volume));
+  int kept = 0;
+  for (const uncertainty::PermissibleBox& b : d.boxes) {
+    std::string text = fmt::format("{}, {} % of the support: ", b.kept ? fmt::format("box {}", ++kept) : "dropped box",
+                                   words_of_percent(100 * b.volume));
     for (std::size_t i = 0; i < p.inputs.size(); ++i)
       text += fmt::format("{}{} {} to {}", i ? ", " : "", study::make_short_names(p.inputs)[i],
                           study::words_of_number(b.box.lower[i] / p.inputs[i].unit_value,

@@ -465,12 +465,13 @@ std::string write_drivers_csv(const Problem& p, const StudyResult& r) {
 std::string write_boxes_csv(const Problem& p, const StudyResult& r) {
   if (!r.insights.has_boxes) return {};
   std::string text = "box,kept,input,lower,core,upper,volume,runs,fresh,tries,violating,distance,robustness\n";
-  for (std::size_t k = 0; k < r.insights.boxes.boxes.size(); ++k) {
-    const uncertainty::PermissibleBox& b = r.insights.boxes.boxes[k];
+  int kept = 0, dropped = 0;
+  for (const uncertainty::PermissibleBox& b : r.insights.boxes.boxes) {
+    const std::string name = b.kept ? std::to_string(++kept) : fmt::format("dropped {}", ++dropped);
     for (std::size_t i = 0; i < p.inputs.size(); ++i) {
       const double unit = p.inputs[i].unit_value;
       const bool has_core = b.centre >= 0 && static_cast<std::size_t>(b.centre) < r.alpha.archive.size();
-      text += fmt::format("{},{:d},{},{},{},{},{},{},{},{},{},{},{}\n", k + 1, b.kept, cell(title_of(p.inputs[i])),
+      text += fmt::format("{},{:d},{},{},{},{},{},{},{},{},{},{},{}\n", name, b.kept, cell(title_of(p.inputs[i])),
                           cell(b.box.lower[i] / unit), has_core ? cell(r.alpha.archive[b.centre].x[i] / unit) : "",
                           cell(b.box.upper[i] / unit), cell(b.volume), b.samples, b.fresh, b.tries,
                           b.fresh > 0 ? cell(b.violating) : "", cell(b.distance), cell(b.robustness));

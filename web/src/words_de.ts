@@ -1071,7 +1071,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["Asked:", "Verlangt:"],
   [". It holds on {:g} % of the support (± {:g} %, of {:d} spread runs).", ". Das gilt auf {} % des Trägers (± {} %, aus {} verteilten Rechnungen)."],
   ["Box {:d}: {:g} % of the support", "Quader {}: {} % des Trägers"],
-  ["Box {:d} (dropped): {:g} % of the support", "Quader {} (verworfen): {} % des Trägers"],
+  ["Dropped box: {:g} % of the support", "Verworfener Quader: {} % des Trägers"],
   ["Robustness {:g}; distance to the limits {:g} of their range.", "Robustheit {}; Abstand zu den Grenzen {} ihres Bereichs."],
   ["If one input were known", "Wenn eine Eingangsgröße bekannt wäre"],
   ["Possibility of each outcome with all inputs fuzzy, and with one of them fixed at the middle of its core. At least so much was found.", "Möglichkeit jedes Ausgangs mit allen Eingangsgrößen unscharf, und mit einer davon fest in der Mitte ihres Kerns. Mindestens so viel wurde gefunden."],

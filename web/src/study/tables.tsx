@@ -92,7 +92,7 @@ export function Boxes(props: { state: State }) {
       {boxes.list.length === 0 && <p class="quiet">No box of inputs was found that keeps it.</p>}
       {boxes.list.map((box, n) => (
         <div class={`box ${box.kept ? "" : "not-kept"}`} data-box={n}>
-          <h3>{`Box ${n + 1}${box.kept ? "" : " (dropped)"}: ${formatNumber(100 * box.volume, 2)} % of the support`}</h3>
+          <h3>{`${box.kept ? `Box ${n + 1}` : "Dropped box"}: ${formatNumber(100 * box.volume, 2)} % of the support`}</h3>
           <table class="box-table">
             <thead><tr><th scope="col">input</th><th scope="col">inside its support</th><th scope="col">from</th><th scope="col">core</th><th scope="col">to</th></tr></thead>
             <tbody>
