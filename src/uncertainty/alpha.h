@@ -28,8 +28,8 @@ namespace topple::uncertainty {
 struct Bound {
   double value = 0;  // NaN if no run counts
   int sample = -1;   // in the archive, where it was found
-  /// A local search ended there because nothing better is near; with more than `corner_inputs` inputs, searches over
-  /// the faces as well, from other places too.
+  /// A local search ended there because nothing better is near, and lines along the axes led to nothing better; with
+  /// more than `corner_inputs` inputs, searches over the faces instead of lines, from other places too.
   bool converged = false;
 };
 
