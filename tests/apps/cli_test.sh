@@ -432,7 +432,7 @@ compare)
   expect 0 "$topple" mbs compare "$model" --engines native --duration 0.2s -o a
   has out "native"; has out "ending"; has out "Wrote a/compare.csv"
   : >no_folder
-  expect 1 "$topple" mbs compare "$model" --engines native --duration 0.2s -o no_folder; has err "no_folder"; lacks out "energy error"
+  expect 2 "$topple" mbs compare "$model" --engines native --duration 0.2s -o no_folder; has err "no_folder"; lacks out "energy error"
   expect 2 "$topple" mbs compare "$model" --engines nativ; has err 'did you mean "native"?'
   expect 2 "$topple" mbs compare "$model" --engines native,native; has err "twice"
   expect 0 "$topple" mbs compare "$model" --engines " native ," --duration 0.01s
