@@ -66,7 +66,7 @@ class Optimisation {
   AlphaResult run() {
     explore();
     check_faces(false);
-    if (has_line_searches()) search_lines(false);
+    if (has_line_searches() && has_room_for_lines()) search_lines(false);
     search_from_best(false);
     if (has_many_inputs() || !edges_.empty()) recheck(false);
     if (has_many_inputs()) { restart_until_settled(asker_.limit() / 5); }
@@ -162,7 +162,7 @@ class Optimisation {
         }
     ask(points);
     points.clear();
-    if (options_.lines > 0) join_lines();
+    if (options_.lines > 0 && has_room_for_lines()) join_lines();
     // a small limit must leave something for the searches
     std::size_t corners = 0;
     for (const auto& r : regions_) {
@@ -266,6 +266,11 @@ class Optimisation {
 
   // ---- lines through best samples
 
+  /// Whether lines through the middle take no more than a tenth of all runs. With fewer runs the spread ones tell more,
+  /// and lines come last.
+  bool has_room_for_lines() const {
+    return 20 * options_.lines * static_cast<int>(regions_.front().axes.size()) <= asker_.limit();
+  }
   bool has_line_searches() const { return options_.lines > 0 && !has_many_inputs(); }
 
   std::unique_ptr<LocalSearch> make_line_search(const Goal& goal, const Candidate& start) {
