@@ -30,7 +30,6 @@ void add_json(CLI::App* verb, Arguments& a) {
   verb->add_flag("--json", a.json, "one JSON object on standard output, everything else on standard error");
 }
 
-/// Name of a type whose values completion offers; what is not among them has an error of its own.
 /// 0x20 and 020 would count as what few expect.
 std::string is_whole_number(const std::string& s) {
   const bool is_whole =
@@ -38,6 +37,7 @@ std::string is_whole_number(const std::string& s) {
   return is_whole ? std::string() : "a whole number is wanted, not \"" + s + "\"";
 }
 
+/// Name of a type whose values completion offers; what is not among them has an error of its own.
 std::string choose_from(const std::vector<std::string>& names) {
   std::string out;
   for (const std::string& name : names) out += (out.empty() ? "NAME:{" : ",") + name;
@@ -406,8 +406,7 @@ void add_study(CLI::App& app, Arguments& a) {
   study->add_option("--alpha", y.alpha, "levels between commas, such as 0,0.25,0.5,0.75,1")->check(is_given("a level"));
   study->add_option("--samples", y.samples, "runs at most")->check(is_whole_number)->check(CLI::Range(10, 100000000));
   study->add_option("--seed", y.seed, "of spread points and searches")->check([](const std::string& s) {
-    const bool is_whole = !s.empty() && s.find_first_not_of("0123456789") == std::string::npos;
-    if (!is_whole) return "a whole number from 0 on is wanted, not " + s;
+    if (std::string problem = is_whole_number(s); !problem.empty()) return problem;
     long long number = 0;
     const bool is_small = std::from_chars(s.data(), s.data() + s.size(), number).ec == std::errc();
     return is_small ? std::string() : "a number below 2^63 is wanted, not " + s;
