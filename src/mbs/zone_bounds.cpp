@@ -238,14 +238,14 @@ bool write_flow_cells(const ZoneParameters& p, const CompiledLaws& laws, ZoneSta
       for (size_t i = 0; i < 3; ++i) put(kCellForce + i, force[i]);
       for (size_t i = 0; i < 2; ++i) put(kCellRotation + i, rotation[i]);
       for (size_t c = 0; c < 6; ++c) {
-        const double* limit = &family.limit[family.place(row[c / 2], j[c % 2])];
-        put(kCellPositive + c, whole * limit[0]);
-        put(kCellNegative + c, whole * limit[1]);
+        const FamilyPoint& point = *family.at(row[c / 2], j[c % 2]);
+        put(kCellPositive + c, whole * point.positive);
+        put(kCellNegative + c, whole * point.negative);
       }
-      for (size_t c = 0; c < 3 && !family.lift.empty(); ++c) {
-        const double* lift = &family.lift[family.place(row[c], j[0])];
-        put(kCellLiftPositive + c, lift[0]);
-        put(kCellLiftNegative + c, lift[1]);
+      for (size_t c = 0; c < 3 && family.lifts; ++c) {
+        const FamilyPoint& point = *family.at(row[c], j[0]);
+        put(kCellLiftPositive + c, point.lift_positive);
+        put(kCellLiftNegative + c, point.lift_negative);
       }
     }
   out[kWrittenWhole * stride] = whole;

@@ -25,32 +25,27 @@ CompiledLaw compile_law(const ZoneLaw& law) {
     to.rotation = from.plastic_rotation;
     if (axis == 1)
       for (double& r : to.rotation) r *= law.rotation_ratio;
-    to.limit.resize(from.positive.size() * 2);
+    const size_t J = from.plastic_rotation.size();
+    to.points.resize(from.positive.size());
+    to.lifts = !from.elongation_positive.empty();
     double largest = 0;
     for (size_t i = 0; i < from.positive.size(); ++i) {
-      const size_t at = to.place(i / from.plastic_rotation.size(), i % from.plastic_rotation.size());
-      to.limit[at] = from.positive[i];
-      to.limit[at + 1] = from.negative[i];
+      FamilyPoint& point = *to.at(i / J, i % J);
+      point = {from.positive[i], from.negative[i], 0, 0};
       largest = std::max({largest, from.positive[i], from.negative[i]});
-    }
-    if (!from.elongation_positive.empty()) {
-      const size_t J = from.plastic_rotation.size();
-      to.lift.resize(to.limit.size());
-      for (size_t i = 0; i < from.positive.size(); ++i) {
-        const size_t j = std::min(i % J, J - 2), row = i - i % J;  // the last interval goes on
-        const double step = to.rotation[j + 1] - to.rotation[j];
-        const size_t at = to.place(i / J, i % J);
-        to.lift[at] = (from.elongation_positive[row + j + 1] - from.elongation_positive[row + j]) / step;
-        to.lift[at + 1] = (from.elongation_negative[row + j + 1] - from.elongation_negative[row + j]) / step;
-      }
+      if (!to.lifts) continue;
+      const size_t j = std::min(i % J, J - 2), row = i - i % J;  // the last interval goes on
+      const double step = to.rotation[j + 1] - to.rotation[j];
+      point.lift_positive = (from.elongation_positive[row + j + 1] - from.elongation_positive[row + j]) / step;
+      point.lift_negative = (from.elongation_negative[row + j + 1] - from.elongation_negative[row + j]) / step;
     }
     // The capacity at a rotation is where the interpolated limit reaches zero on the side of compression.
     to.capacity.resize(static_cast<size_t>(to.J));
     for (int j = 0; j < to.J; ++j) {
       double capacity = 0;
       for (int k = 0; k < to.K; ++k) {
-        const size_t i = to.place(static_cast<size_t>(k), static_cast<size_t>(j));
-        if (std::max(to.limit[i], to.limit[i + 1]) > 1e-3 * largest) {
+        const FamilyPoint& point = *to.at(static_cast<size_t>(k), static_cast<size_t>(j));
+        if (std::max(point.positive, point.negative) > 1e-3 * largest) {
           capacity = -to.force[static_cast<size_t>(std::max(k - 1, 0))];
           break;
         }
@@ -62,7 +57,7 @@ CompiledLaw compile_law(const ZoneLaw& law) {
       to.capacity[static_cast<size_t>(j)] =
           std::min(to.capacity[static_cast<size_t>(j)], to.capacity[static_cast<size_t>(j) - 1]);
   }
-  c.elongates = !c.moment[0].lift.empty() || !c.moment[1].lift.empty();
+  c.elongates = c.moment[0].lifts || c.moment[1].lifts;
   c.compression = {law.compression.x, law.compression.f};
   c.tension = {law.tension.x, law.tension.f};
   if (!law.compression.f.empty()) {
@@ -129,9 +124,10 @@ MomentLimit calc_moment_limit(const CompiledFamily& family, double normal_force,
   const double t = (normal_force - family.force[K]) / (family.force[K + 1] - family.force[K]);
   const double s =
       std::clamp((rotation - family.rotation[J]) / (family.rotation[J + 1] - family.rotation[J]), 0.0, 1.0);
-  const double *a = &family.limit[family.place(K, J)], *b = &family.limit[family.place(K, J + 1)];
+  const FamilyPoint *a = family.at(K, J), *b = family.at(K, J + 1);
   const double w00 = (1 - t) * (1 - s), w01 = (1 - t) * s, w10 = t * (1 - s), w11 = t * s;
-  return {w00 * a[0] + w01 * b[0] + w10 * a[2] + w11 * b[2], w00 * a[1] + w01 * b[1] + w10 * a[3] + w11 * b[3]};
+  return {w00 * a[0].positive + w01 * b[0].positive + w10 * a[1].positive + w11 * b[1].positive,
+          w00 * a[0].negative + w01 * b[0].negative + w10 * a[1].negative + w11 * b[1].negative};
 }
 
 MomentLimit calc_moment_slope(const CompiledFamily& family, double normal_force, double rotation, int k, int j) {
@@ -142,13 +138,14 @@ MomentLimit calc_moment_slope(const CompiledFamily& family, double normal_force,
   const size_t J = static_cast<size_t>(find_interval(family.rotation, rotation, j));
   const double s =
       std::clamp((rotation - family.rotation[J]) / (family.rotation[J + 1] - family.rotation[J]), 0.0, 1.0);
-  const double *a = &family.limit[family.place(K, J)], *b = &family.limit[family.place(K, J + 1)];
+  const FamilyPoint *a = family.at(K, J), *b = family.at(K, J + 1);
   const double width = family.force[K + 1] - family.force[K];
-  return {((1 - s) * (a[2] - a[0]) + s * (b[2] - b[0])) / width, ((1 - s) * (a[3] - a[1]) + s * (b[3] - b[1])) / width};
+  return {((1 - s) * (a[1].positive - a[0].positive) + s * (b[1].positive - b[0].positive)) / width,
+          ((1 - s) * (a[1].negative - a[0].negative) + s * (b[1].negative - b[0].negative)) / width};
 }
 
 Lift calc_lift(const CompiledFamily& family, double normal_force, double rotation, int& k, int& j) {
-  if (family.lift.empty()) return {};
+  if (!family.lifts) return {};
   normal_force = put_on_edge(family, normal_force);
   if (!is_within(family, normal_force)) return {};
   k = find_interval(family.force, normal_force, k);
@@ -156,8 +153,8 @@ Lift calc_lift(const CompiledFamily& family, double normal_force, double rotatio
   const size_t K = static_cast<size_t>(k);
   const size_t J = static_cast<size_t>(rotation < family.rotation.back() ? j : family.J - 1);
   const double t = (normal_force - family.force[K]) / (family.force[K + 1] - family.force[K]);
-  const double* a = &family.lift[family.place(K, J)];
-  return {(1 - t) * a[0] + t * a[2], (1 - t) * a[1] + t * a[3]};
+  const FamilyPoint* a = family.at(K, J);
+  return {(1 - t) * a[0].lift_positive + t * a[1].lift_positive, (1 - t) * a[0].lift_negative + t * a[1].lift_negative};
 }
 
 double calc_compression_capacity(const CompiledFamily& family, double rotation, int j) {

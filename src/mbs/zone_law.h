@@ -9,18 +9,24 @@
 
 namespace topple::mbs {
 
+/// What a moment family says at a normal force and a rotation, for moments or rotations > 0 and < 0 each.
+struct FamilyPoint {
+  double positive, negative;            // limit [N·m]
+  double lift_positive, lift_negative;  // plastic elongation per growth of rotation, behind it [m/rad]
+};
+
 /// A moment family laid out for lookup: K forces by J rotations.
 struct CompiledFamily {
-  int K = 0, J = 0;              // K == 0: unlimited
-  std::vector<double> force;     // (K)
-  std::vector<double> rotation;  // (J)
-  std::vector<double> limit;     // positive and negative side by side, by rotation (J x K x 2)
-  std::vector<double> lift;      // plastic elongation per growth of rotation, behind each rotation, positive and
-                                 // negative side by side; empty: none [m/rad] (J x K x 2)
-  std::vector<double> capacity;  // compression beyond which no moment is left, per rotation (J)
+  int K = 0, J = 0;                 // K == 0: unlimited
+  std::vector<double> force;        // (K)
+  std::vector<double> rotation;     // (J)
+  std::vector<FamilyPoint> points;  // (J x K)
+  bool lifts = false;               // some point has an elongation
+  std::vector<double> capacity;     // compression beyond which no moment is left, per rotation (J)
 
-  /// In `limit` and `lift`, of force k and rotation j; the next force follows.
-  size_t place(size_t k, size_t j) const { return 2 * (j * static_cast<size_t>(K) + k); }
+  /// Of force k and rotation j; the next force follows.
+  const FamilyPoint* at(size_t k, size_t j) const { return &points[j * static_cast<size_t>(K) + k]; }
+  FamilyPoint* at(size_t k, size_t j) { return &points[j * static_cast<size_t>(K) + k]; }
 };
 
 struct CompiledCurve {
