@@ -72,6 +72,19 @@ void add_run_options(CLI::App* verb, Arguments& a) {
   verb->add_flag("--report", a.report, "fail if report.html cannot be written")->excludes(none);
 }
 
+/// Of runs that can go on later; `other`: an option that does not go with them.
+void add_checkpoint_options(CLI::App* verb, Arguments& a, CLI::Option* other = nullptr) {
+  CLI::Option* keep =
+      verb->add_flag("--checkpoint", a.checkpoint, "keep checkpoint.bin in the folder, to go on from with --resume");
+  verb->add_option("--checkpoint-interval", a.checkpoint_interval,
+                   "of the clock (60 s), with --checkpoint or --resume, which keeps one too")
+      ->type_name("QUANTITY");
+  CLI::Option* resume = verb->add_flag("--resume", a.resume, "go on from checkpoint.bin in the folder");
+  if (other == nullptr) return;
+  keep->excludes(other);
+  resume->excludes(other);
+}
+
 /// Of what runs models for studies.
 void add_worker_options(CLI::App* verb, StudyArguments& y) {
   verb->add_option_function<int>(
@@ -120,15 +133,17 @@ void add_run(CLI::App& app, Arguments& a) {
   run->add_option("plan", a.input, "plan (TOML)")->type_name("FILE")->required();
   run->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")
       ->type_name("FILE");
-  run->add_flag("--check-step", a.check_step,
-                "run also at half the step and say what differs; with --threads 2 both at once");
+  CLI::Option* check_step = run->add_flag(
+      "--check-step", a.check_step, "run also at half the step and say what differs; with --threads 2 both at once");
   add_run_options(run, a);
+  add_checkpoint_options(run, a, check_step);
   run->callback([&a] { a.verb = Arguments::Verb::Run; });
   add_examples(run, R"(  topple run plan.toml -o out              findings, out/record.h5, out/report.html
   topple run plan.toml -o out --csv        also tables for spreadsheets
   topple run plan.toml -o out --check-step --threads 2
                                            and what half the time step makes of it
-  topple run plan.toml -o half --duration "1 s" --no-report)");
+  topple run plan.toml -o half --duration "1 s" --no-report
+  topple run plan.toml -o out --checkpoint and, after an interruption, with --resume)");
 }
 
 void add_rules(CLI::App& app, Arguments& a) {
@@ -151,8 +166,11 @@ void add_mbs_run(CLI::App& mbs, Arguments& a) {
           "--no-equilibrium", [&a] { a.equilibrium = false; }, "begin with the poses and velocities of the file")
       ->excludes(with);
   add_run_options(mbs_run, a);
+  add_checkpoint_options(mbs_run, a);
   mbs_run->callback([&a] { a.verb = Arguments::Verb::MbsRun; });
-  add_examples(mbs_run, R"(  topple mbs run out/model.json -o again --duration "1 s")");
+  add_examples(mbs_run, R"(  topple mbs run out/model.json -o again --duration "1 s"
+  topple mbs run out/model.json -o again --checkpoint --duration "1 s"
+                                           and, after an interruption, with --resume)");
 }
 
 void add_mbs_compare(CLI::App& mbs, Arguments& a) {
@@ -321,12 +339,7 @@ void add_fe(CLI::App& app, Arguments& a) {
   fe->add_flag("--skip-quiet", f.skip_quiet, "do not wait through the time in which nothing moves before a charge");
   fe->add_option("--until", a.duration, "simulated time, such as \"6 s\"; the plan's duration if not given")
       ->type_name("QUANTITY");
-  fe->add_flag("--checkpoint", f.checkpoint, "keep checkpoint.bin in the folder, to go on from with --resume")
-      ->excludes(mesh_only);
-  fe->add_option("--checkpoint-interval", f.checkpoint_interval,
-                 "of the clock (60 s), with --checkpoint or --resume, which keeps one too")
-      ->type_name("QUANTITY");
-  fe->add_flag("--resume", f.resume, "go on from checkpoint.bin in the folder")->excludes(mesh_only);
+  add_checkpoint_options(fe, a, mesh_only);
   fe->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
   fe->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")->type_name("FILE");
   add_json(fe, a);
@@ -507,6 +520,11 @@ std::string find_missing(const Arguments& a) {
   const auto refuse = [](const std::string& verb, const std::string& what) {
     return "topple " + verb + ": " + what + "\nRun topple " + verb + " --help for more information.\n";
   };
+  const auto find_lone_interval = [&](const std::string& verb) {
+    return a.checkpoint_interval.empty() || a.checkpoint || a.resume
+               ? std::string()
+               : refuse(verb, "--checkpoint-interval requires --checkpoint or --resume");
+  };
   switch (a.verb) {
     case Arguments::Verb::New:
       return a.input.empty() && !a.list ? refuse("new", "a file to write is required") : "";
@@ -515,9 +533,11 @@ std::string find_missing(const Arguments& a) {
       return refuse("export", "say what for: --vtk, --gltf, --csv, --json, --adams or --lsdyna");
     case Arguments::Verb::Fe:
       if (a.output.empty() && !a.fe.mesh_only) return refuse("fe", "--output is required");
-      return a.fe.checkpoint_interval.empty() || a.fe.checkpoint || a.fe.resume
-                 ? ""
-                 : refuse("fe", "--checkpoint-interval requires --checkpoint or --resume");
+      return find_lone_interval("fe");
+    case Arguments::Verb::Run:
+      return find_lone_interval("run");
+    case Arguments::Verb::MbsRun:
+      return find_lone_interval("mbs run");
     case Arguments::Verb::Study:
       if (a.study.action != StudyArguments::Action::Run || !(a.input.empty() || a.output.empty())) return "";
       return refuse("study",

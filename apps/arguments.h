@@ -58,6 +58,8 @@ struct Arguments {
   std::string axis = "y", direction = "+";  // of fuzzy curves and of the solid route
   std::string rotation, element_size;       // of the solid route, as typed
   std::optional<bool> equilibrium;          // of a bare model; none: as its file says
+  bool checkpoint = false, resume = false;  // of runs
+  std::string checkpoint_interval;          // as typed; empty: the program's
   StudyArguments study;
   FeArguments fe;
   int threads = 1, frames = 0;

@@ -99,6 +99,37 @@ collapse::RunOptions make_options(const Arguments& a, const char* duration) {
   return o;
 }
 
+std::string find_checkpoint(const Arguments& a) {
+  std::string path = (fs::path(a.output) / "checkpoint.bin").string();
+  if (a.engine != "native")
+    throw InputError("E674", fmt::format("{} keeps no checkpoint and goes on from none", a.engine),
+                     "the native engine does");
+  if (a.resume && !fs::exists(path))
+    throw InputError("E674", fmt::format("{}: there is no checkpoint to go on from", path), "start without --resume");
+  return path;
+}
+
+namespace {
+
+std::string write_option(const char* name, const std::string& value) {
+  return value.empty() ? "" : fmt::format(" {} {}", name, quote_word(value));
+}
+
+}  // namespace
+
+void tell_how_to_go_on(std::FILE* out, const Arguments& a, const std::string& verb, const std::string& options) {
+  std::fprintf(out, "Go on with: topple %s %s%s%s%s -o %s --resume\n", verb.c_str(), quote_word(a.input).c_str(),
+               options.c_str(), write_option("--knowledge", a.knowledge).c_str(),
+               write_option(verb == "fe" ? "--until" : "--duration", a.duration).c_str(), quote_word(a.output).c_str());
+}
+
+std::string write_run_options(const Arguments& a) {
+  std::string out = write_option("--step", a.step) + write_option("--frame-rate", a.frame_rate);
+  if (a.step_share != 1) out += fmt::format(" --step-share {}", a.step_share);
+  if (a.equilibrium) out += *a.equilibrium ? " --equilibrium" : " --no-equilibrium";
+  return out;
+}
+
 collapse::RunOptions make_plan_options(const Arguments& a, const char* duration) {
   collapse::RunOptions o = make_options(a, duration);
   const auto check = [](double value, const std::string& text, product::Range range, Dimension d, const char* option) {
@@ -315,7 +346,8 @@ int run_plan_file(const Arguments& a, const std::atomic<bool>& cancel) {
   std::string text;
   std::FILE* out = a.json ? stderr : stdout;
   try {
-    const collapse::RunOptions options = make_plan_options(a);
+    collapse::RunOptions options = make_plan_options(a);
+    set_checkpoint(a, options);
     const product::Plan plan = product::read_plan_file(a.input, warnings, text);
     const collapse::Knowledge knowledge = load_knowledge(a);
     print_diagnostics(warnings, text);
@@ -328,16 +360,21 @@ int run_plan_file(const Arguments& a, const std::atomic<bool>& cancel) {
       std::fprintf(out, "%s\n", plan.title.c_str());
       std::fprintf(out, "%s\n", tell_counts(counts, map.mass).c_str());
       const std::string path = (fs::path(a.output) / "model.json").string();
-      replace_file(path, mbs::to_json(model, collapse::settings_of(plan, knowledge, options)));
+      // of a run that goes on it is there, and a checkpoint of another plan must not replace it
+      if (!options.resume || !fs::exists(path))
+        replace_file(path, mbs::to_json(model, collapse::settings_of(plan, knowledge, options)));
       files.emplace_back("model", path);
     };
     callbacks.on_event = [&](const record::Event& e) { events.print(e); };
+    callbacks.on_resume = [&](double time) { std::fprintf(out, "Going on from %.4g s.\n", time); };
     callbacks.progress.report = [&](double done, double whole) { progress.show(done, whole); };
     callbacks.progress.cancel = &cancel;
     const record::Record r = a.check_step ? collapse::run_plan_at_two_steps(plan, knowledge, options, callbacks)
                                           : collapse::run_plan(plan, knowledge, options, callbacks);
     progress.clear();
-    return close_run(r, a, out, std::move(files));
+    const int code = close_run(r, a, out, std::move(files));
+    if (r.ending == "cancelled" && !options.checkpoint.empty()) tell_how_to_go_on(out, a, "run", write_run_options(a));
+    return code;
   } catch (const InputError& e) { return refuse(e, warnings, text, a.json); }
 }
 

@@ -23,23 +23,16 @@ farfield::FeOptions make_fe_options(const Arguments& a) {
   o.grid.least_across = a.fe.across;
   o.scaled_step = read_quantity(a.fe.scaled_step, Dimension::Time, "--scaled-step");
   o.skip_quiet = a.fe.skip_quiet;
-  o.resume = a.fe.resume;
-  const double interval = read_quantity(a.fe.checkpoint_interval, Dimension::Time, "--checkpoint-interval");
-  if (interval > 0) o.checkpoint_interval = interval;
-  if (a.fe.checkpoint || a.fe.resume) o.checkpoint = (fs::path(a.output) / "checkpoint.bin").string();
+  set_checkpoint(a, o);
   return o;
 }
 
 /// Those that a run has to have again to go on.
 std::string write_options(const Arguments& a) {
-  const auto option = [](const char* name, const std::string& value) {
-    return value.empty() ? "" : fmt::format(" {} {}", name, quote_word(value));
-  };
-  std::string out = option("--size", a.fe.size);
+  std::string out = fmt::format(" --size {}", quote_word(a.fe.size));
   if (a.fe.across != FeArguments{}.across) out += fmt::format(" --across {}", a.fe.across);
-  out += option("--scaled-step", a.fe.scaled_step);
-  if (a.fe.skip_quiet) out += " --skip-quiet";
-  return out + option("--knowledge", a.knowledge) + option("--until", a.duration);
+  if (!a.fe.scaled_step.empty()) out += fmt::format(" --scaled-step {}", quote_word(a.fe.scaled_step));
+  return out + (a.fe.skip_quiet ? " --skip-quiet" : "");
 }
 
 void print_mesh(std::FILE* out, const farfield::MeshReport& report) {
@@ -131,9 +124,7 @@ int run_finite_elements(const Arguments& a, const std::atomic<bool>& cancel) {
     if (elements > 0)
       std::fprintf(out, "Elements and nodes took %.1f s, contact and debris %.1f s: %.2f of that.\n", elements, contact,
                    contact / elements);
-    if (r.ending == "cancelled" && has_checkpoint)
-      std::fprintf(out, "Go on with: topple fe %s%s -o %s --resume\n", quote_word(a.input).c_str(),
-                   write_options(a).c_str(), quote_word(a.output).c_str());
+    if (r.ending == "cancelled" && has_checkpoint) tell_how_to_go_on(out, a, "fe", write_options(a));
     return code;
   } catch (const InputError& e) {
     std::error_code ignored;  // what is not empty stays

@@ -106,6 +106,7 @@ int run_model_file(const Arguments& a, const std::atomic<bool>& cancel) {
   std::string text;
   try {
     collapse::RunOptions options = make_options(a);
+    set_checkpoint(a, options);
     text = read_file(a.input);
     mbs::RunSettings settings;
     const mbs::Model model = mbs::model_from_json(text, a.input, &settings);
@@ -125,6 +126,7 @@ int run_model_file(const Arguments& a, const std::atomic<bool>& cancel) {
     callbacks.on_event = [&](const record::Event& e) {
       if (e.kind != "rest" && e.kind != "failure") events.print(e);
     };
+    callbacks.on_resume = [&](double time) { std::fprintf(out, "Going on from %.4g s.\n", time); };
     callbacks.on_summary = [&](const mbs::Summary& s) { summary = s; };
     callbacks.progress.report = [&](double done, double whole) { progress.show(done, whole); };
     callbacks.progress.cancel = &cancel;
@@ -147,6 +149,8 @@ int run_model_file(const Arguments& a, const std::atomic<bool>& cancel) {
           {{"name", o.name}, {"quantity", o.quantity}, {"unit", o.unit}, {"samples", o.time.size()}, {"file", path}});
     }
     print_leftovers(out, a, all);
+    if (r.ending == "cancelled" && !options.checkpoint.empty())
+      tell_how_to_go_on(out, a, "mbs run", write_run_options(a));
     if (a.json) {
       json j = summary_json(r, files, code);
       j["steps"] = summary.steps;

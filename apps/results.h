@@ -33,17 +33,34 @@ int print_diagnostics(const std::vector<Diagnostic>&, const std::string& text);
 /// The built-in rules, or those of --knowledge.
 collapse::Knowledge load_knowledge(const Arguments&);
 
+/// A quantity from the command line, greater than 0; a bare number counts in SI, an empty text is 0. Throws InputError
+/// (E801) that names the option.
+double read_quantity(const std::string& text, Dimension, const char* option);
+
 /// Throws InputError for quantities that cannot be read.
 collapse::RunOptions make_options(const Arguments&, const char* duration = "--duration");
 /// For runs of plans: what is given keeps to the limits of a plan. Throws InputError E801.
 collapse::RunOptions make_plan_options(const Arguments&, const char* duration = "--duration");
 
+/// The checkpoint of a run's folder. Throws InputError E674 if the run is to go on from it and there is none.
+std::string find_checkpoint(const Arguments&);
+/// Where a run keeps its checkpoint, and whether it goes on from it. Throws InputError: E801, E674.
+template <class Options>
+void set_checkpoint(const Arguments& a, Options& o) {
+  o.resume = a.resume;
+  if (const double interval = read_quantity(a.checkpoint_interval, Dimension::Time, "--checkpoint-interval");
+      interval > 0)
+    o.checkpoint_interval = interval;
+  if (a.checkpoint || a.resume) o.checkpoint = find_checkpoint(a);
+}
+/// Says how a run that was cancelled goes on.
+///   verb, options  as typed, for the same run, options with a space before each
+void tell_how_to_go_on(std::FILE* out, const Arguments&, const std::string& verb, const std::string& options);
+/// Of topple run and topple mbs run, what else must be typed again.
+std::string write_run_options(const Arguments&);
+
 /// Refuses to write over what is read. Throws InputError E801.
 void check_own_input(const std::string& output, const std::string& input);
-
-/// A quantity from the command line, greater than 0; a bare number counts in SI, an empty text is 0. Throws InputError
-/// (E801) that names the option.
-double read_quantity(const std::string& text, Dimension, const char* option);
 
 /// Throws InputError E801 if the path is that of a file, std::runtime_error with the path if there is no folder that
 /// can be written to, or a folder in the place of one of the files that are to come.

@@ -9,6 +9,7 @@
 #include <optional>
 #include <set>
 #include <span>
+#include <type_traits>
 
 #include "base/interpolate.h"
 #include "base/rotation_fit.h"
@@ -384,6 +385,34 @@ void Recorder::append(const Recorder& from, size_t frames, double until) {
   for (const record::Event& e : r.events)
     if (e.time <= until) record_.events.push_back(e);
 }
+
+namespace {
+
+template <class Io, class Events>
+void pass_events(Io& io, Events& events) {
+  size_t count = events.size();
+  io(count);
+  if constexpr (!std::is_const_v<Events>) events.resize(count);
+  for (auto& e : events) io(e.time), io(e.kind), io(e.subject), io(e.text);
+}
+
+}  // namespace
+
+template <class Io, class R>
+void Recorder::pass(Io& io, R& r) {
+  auto& record = r.record_;
+  io(record.time), io(record.position), io(record.orientation), io(record.zone_state), io(record.zone_utilisation),
+      io(record.crushed_length);
+  for (auto& s : record.series) io(s.value);
+  for (auto& o : record.outputs) io(o.time), io(o.value);
+  pass_events(io, record.events), pass_events(io, r.coming_);
+  io(r.start_), io(r.block_), io(r.zone_frames_), io(r.shortening_), io(r.crushed_), io(r.stages_told_), io(r.last_v_),
+      io(r.last_time_), io(r.touchdowns_), io(r.first_), io(r.speeds_.velocity), io(r.speeds_.spin),
+      io(r.reaction_error_), io(r.impulse_until_now_), io(r.impulse_), io(r.contacts_told_);
+}
+
+void Recorder::write(ArchiveWriter& out) const { pass(out, *this); }
+void Recorder::read(ArchiveReader& in) { pass(in, *this); }
 
 void Recorder::add_frame(const mbs::View& v) {
   // an engine may show the last state twice

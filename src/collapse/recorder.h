@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/archive.h"
 #include "collapse/manager.h"
 #include "collapse/mechanism.h"
 #include "collapse/run.h"
@@ -57,6 +58,10 @@ class Recorder {
   /// Takes over the first frames of another recorder of the same bodies, and its events up to a time. Debris is that of
   /// this one's map.
   void append(const Recorder& from, size_t frames, double until);
+  /// Frames, events, samples of outputs and what else is known so far, for going on in another process with a recorder
+  /// of the same model.
+  void write(ArchiveWriter&) const;
+  void read(ArchiveReader&);
 
   /// Of a structure of the map, the heaviest unless said otherwise.
   const std::vector<BlockFrame>& block_frames(size_t structure = 0) const { return block_[structure]; }
@@ -80,6 +85,8 @@ class Recorder {
   }
 
  private:
+  template <class Io, class R>
+  static void pass(Io&, R&);
   /// To the callback.
   void tell_coming(double until);
   record::Series& series(size_t i) { return record_.series[i]; }

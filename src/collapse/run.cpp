@@ -9,6 +9,7 @@
 #include "base/unit.h"
 #include "collapse/findings.h"
 #include "collapse/heads_across.h"
+#include "collapse/keeper.h"
 #include "collapse/outcome.h"
 #include "collapse/plan_record.h"
 #include "collapse/recorder.h"
@@ -107,6 +108,10 @@ record::Record run_with(const product::Plan& plan, const Knowledge& k, const Run
   mbs::Options o = make_mbs_options(settings_of(plan, k, options), k, options.threads, callbacks.progress);
   o.step_share = options.step_share;
   record_into(recorder, o);
+  Keeper keeper(options, callbacks, recorder);
+  std::string of = plan.text;
+  for (const Rule& rule : k.rules) of += fmt::format("\n{} {}", rule.id, rule.value);
+  keeper.join(model, of, o);
   const mbs::Summary summary = move(model, map, o);
   end_record(summary, " before the first charge", recorder, r);
   const std::atomic<bool>* cancel = callbacks.progress.cancel;
@@ -171,6 +176,8 @@ record::Record run_model(const mbs::Model& model, const RunOptions& options, con
   o.rest_speed = options.rest_speed.value_or(k.rest_speed);
   o.tells_lost_contact = true;
   o.samplings = make_samplings(model, r);
+  Keeper keeper(options, callbacks, recorder);
+  keeper.join(model, "", o);
   mbs::Summary summary = engine->run(model, o);
   if (const auto odd = engines::find_impossible_inertias(model); !model.is_planar && !odd.empty())
     summary.notes.push_back(fmt::format("{}: {}, which no body has{}", odd[0].place, odd[0].what,

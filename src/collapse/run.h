@@ -23,6 +23,10 @@ struct RunOptions {
   int threads = 1;
   std::string engine = "native";
   std::string program_version;  // for the record
+  // of the native engine alone
+  std::string checkpoint;           // file to write now and then and when cancelled; empty: none
+  double checkpoint_interval = 60;  // of the clock [s]
+  bool resume = false;              // go on from the checkpoint
   // of bare models alone
   double stability_share = 0;        // mbs::RunSettings; 0: its default
   bool equilibrium = true;           // false: from the poses and velocities of the model
@@ -33,11 +37,13 @@ struct RunCallbacks {
   std::function<void(const mbs::Model&, const ModelMap&, const record::Counts&)> on_model;  // before the equilibrium
   std::function<void(const record::Event&)> on_event;                                       // as it happens
   std::function<void(const mbs::Summary&)> on_summary;                                      // of the engine, at the end
+  std::function<void(double time)> on_resume;                                               // it goes on from there [s]
+  std::function<void()> on_checkpoint;                                                      // one has been written
   Progress progress;  // done and whole in simulated seconds
 };
 
-/// Runs a plan. Throws InputError for what cannot be built; everything else is in the record: `ending` is "at_rest",
-/// "time_limit", "cancelled" or "failed", and the findings say which criteria are violated.
+/// Runs a plan. Throws InputError for what cannot be built or gone on from (E674); everything else is in the record:
+/// `ending` is "at_rest", "time_limit", "cancelled" or "failed", and the findings say which criteria are violated.
 record::Record run_plan(const product::Plan&, const Knowledge&, const RunOptions&, const RunCallbacks&);
 
 /// Who moves the plan's model and shows its frames: an engine, or another model of the same building.

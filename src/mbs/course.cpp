@@ -79,9 +79,9 @@ std::string describe_lost_energy(double error) {
   return words;
 }
 
-Course::Course(System& s) : Course(s, {0, -1, std::vector<bool>(s.elements.size(), false)}) {}
+Course::Course(System& s) : Course(s, {.softened = std::vector<bool>(s.elements.size(), false)}) {}
 
-Course::Course(System& s, const CourseState& state) : s_(s), sampler_(s.options.samplings), now_(state) {
+Course::Course(System& s, const CourseState& state) : s_(s), sampler_(s.options.samplings, state.sampled), now_(state) {
   interval_ = std::max(s.options.frame_interval, s.summary.step);
   for (const Event& e : s.model.events) last_event_ = std::max(last_event_, e.time);
   begin_ = std::chrono::steady_clock::now();
@@ -102,6 +102,17 @@ bool Course::begin() {
   if (sampler_.is_due(s_.state.time, slack)) sampler_.take(s_.calc_view(), slack);
   out.ending = Summary::Ending::TimeLimit;
   return s_.state.time < s_.options.duration - 1e-9 * s_.step;
+}
+
+CourseState Course::state() const {
+  CourseState now = now_;
+  now.sampled = sampler_.next_instants();
+  now.seconds = calc_seconds();
+  return now;
+}
+
+double Course::calc_seconds() const {
+  return now_.seconds + std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
 }
 
 void Course::show() {
@@ -246,23 +257,25 @@ bool Course::follow() {
     while (time >= static_cast<double>(now_.frame) * interval_ - slack) ++now_.frame;
     if (options.progress.report) options.progress.report(time, options.duration);
   }
-  if (options.progress.is_cancelled()) {
-    out.ending = Summary::Ending::Cancelled;
-    return false;
-  }
   if (!s_.model.loads.empty()) last_event_ = std::max(last_event_, s_.calc_last_load_change());
   if (is_at_rest()) {
     out.ending = Summary::Ending::AtRest;
     return end();
   }
-  return time < options.duration - 1e-9 * s_.step || end();
+  if (!(time < options.duration - 1e-9 * s_.step)) return end();
+  // behind all that a step is followed by, so that it goes on from here with the next one
+  if (options.progress.is_cancelled()) {
+    out.ending = Summary::Ending::Cancelled;
+    return false;
+  }
+  return true;
 }
 
 Summary Course::finish() {
   Summary& out = s_.summary;
   if (out.ending == Summary::Ending::NoEquilibrium) return out;
   const State& state = s_.state;
-  out.wall_time = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+  out.wall_time = calc_seconds();
   out.time = state.time;
   out.steps = state.step_index;
   out.energy_error = calc_energy_error();

@@ -31,12 +31,14 @@ std::string describe_lost_energy(double error);
 
 /// What a run knows beside the state of its system.
 struct CourseState {
-  long frame = 0;              // the next one
-  double shown = -1;           // time of the last frame [s]
-  std::vector<bool> softened;  // elements of which it was told
-  double quiet_since = 0;      // of the frames, see Options::pass_speed [s]
-  double plastic_then = 0;     // dissipated until then [J]
+  long frame = 0;                   // the next one
+  double shown = -1;                // time of the last frame [s]
+  std::vector<bool> softened = {};  // elements of which it was told
+  double quiet_since = 0;           // of the frames, see Options::pass_speed [s]
+  double plastic_then = 0;          // dissipated until then [J]
   bool is_quiet = false;
+  std::vector<double> sampled = {};  // next instants of the samplings, in units of their intervals
+  double seconds = 0;                // of the clock, that the run took before [s]
 };
 
 class Course {
@@ -50,10 +52,11 @@ class Course {
   bool follow();
   Summary finish();
   double calc_energy_error() const;  // so far, as Summary::energy_error
-  const CourseState& state() const { return now_; }
+  CourseState state() const;
 
  private:
   void show();
+  double calc_seconds() const;  // of the clock, so far [s]
   bool is_at_rest();
   /// The end has been reached: its frame, and whether the balance of energy can be believed at all. Returns false.
   bool end();

@@ -1,5 +1,5 @@
 #pragma once
-/// A place in a run: everything that the rest of the run follows from, in this process.
+/// A place in a run: everything that the rest of the run follows from, on this machine.
 
 #include <array>
 #include <cstddef>
@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/archive.h"
 #include "mbs/course.h"
 #include "mbs/solver.h"
 
@@ -20,6 +21,7 @@ struct Moment {
   CourseState course;
   Summary summary;                               // so far
   std::vector<std::pair<int, int>> joint_notes;  // made so far
+  std::vector<std::pair<int, int>> noted_pairs;  // bodies that contact has let through, likewise
   // what a successor must agree with
   std::array<std::size_t, 11> counts{};               // of items, as in succession.cpp
   std::vector<std::pair<double, std::string>> fired;  // events, in their order
@@ -27,5 +29,8 @@ struct Moment {
 
   std::size_t bytes() const { return sizeof(Moment) + state.size() + 4 * laws.size() + 48 * fired.size(); }
 };
+
+void write_moment(const Moment&, ArchiveWriter&);
+void read_moment(ArchiveReader&, Moment&);
 
 }  // namespace topple::mbs

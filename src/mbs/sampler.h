@@ -1,6 +1,7 @@
 #pragma once
 /// Serves Options::samplings: each at the step nearest to each of its instants, k times its interval.
 
+#include <utility>
 #include <vector>
 
 #include "mbs/solver.h"
@@ -10,7 +11,11 @@ namespace topple::mbs {
 class Sampler {
  public:
   /// The list must outlive it.
-  explicit Sampler(const std::vector<Sampling>& samplings) : samplings_(&samplings), next_(samplings.size(), 0) {}
+  ///   next  as next_instants() has it, to go on; empty: from the start
+  explicit Sampler(const std::vector<Sampling>& samplings, std::vector<double> next = {})
+      : samplings_(&samplings), next_(std::move(next)) {
+    next_.resize(samplings.size(), 0);
+  }
 
   /// The earliest instant that is not served; infinite if there are no samplings [s].
   double next() const;
@@ -18,12 +23,14 @@ class Sampler {
   bool is_due(double time, double early) const { return time >= next() - early; }
   /// Serves those due at the view's time.
   void take(const View&, double early);
+  /// Whole numbers of the next instants, in units of the intervals.
+  const std::vector<double>& next_instants() const { return next_; }
 
  private:
   double instant(size_t i) const { return next_[i] * (*samplings_)[i].interval; }
 
   const std::vector<Sampling>* samplings_;
-  std::vector<double> next_;  // whole numbers of the next instants, in units of the intervals
+  std::vector<double> next_;  // as next_instants()
 };
 
 }  // namespace topple::mbs

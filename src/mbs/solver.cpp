@@ -76,12 +76,25 @@ void System::evaluate_start() {
 }
 
 Summary run(const Model& model, const Options& options) {
-  System s(model, options);
-  Course course(s);
-  if (course.begin()) do {
-      (void)s.advance_step();
-    } while (course.follow());
-  return course.finish();
+  using Clock = std::chrono::steady_clock;
+  Simulation s = options.from ? Simulation(model, options, *options.from) : Simulation(model, options);
+  bool goes_on = options.from ? s.time() < options.duration - 1e-9 * s.step() : s.begin();
+  Clock::time_point kept = Clock::now();
+  const auto is_due = [&] {
+    return std::chrono::duration<double>(Clock::now() - kept).count() >= options.moment_interval;
+  };
+  while (goes_on) {
+    goes_on = s.advance();
+    if (goes_on && options.on_moment && is_due()) options.on_moment(s.keep()), kept = Clock::now();
+  }
+  const Summary summary = s.finish();
+  if (summary.ending == Summary::Ending::Cancelled && options.on_moment) {
+    Moment here = s.keep();
+    here.summary.ending = Summary::Ending::TimeLimit;  // it has not ended where it goes on
+    here.summary.message.clear();
+    options.on_moment(here);
+  }
+  return summary;
 }
 
 }  // namespace topple::mbs

@@ -99,6 +99,8 @@ struct Sampling {
   std::function<void(const View&)> on_sample;
 };
 
+struct Moment;  // mbs/moment.h
+
 /// A run that would take more steps is refused: no model that means anything needs so many.
 inline constexpr double kMostSteps = 1e9;
 
@@ -132,6 +134,12 @@ struct Options {
   double pass_time = 0.25;   // [s]
   double pass_share = 1e-4;  // [-]
   int threads = 1;           // used from 2,048 zone elements on; results do not depend on it
+  /// Of run() alone: is told of the place that the run has come to, so often by the clock and where it is cancelled;
+  /// and the place from which it goes on, with the same bits as if it had not been interrupted. It must outlive the
+  /// run.
+  std::function<void(const Moment&)> on_moment;
+  double moment_interval = 60;  // [s]
+  const Moment* from = nullptr;
   std::function<void(const View&)> on_frame;
   std::function<void(const Happening&)> on_happening;
   std::vector<Sampling> samplings;
@@ -171,7 +179,6 @@ Summary run(const Model&, const Options&);
 
 class System;  // compiled model and state
 class Course;
-struct Moment;  // mbs/moment.h
 struct SystemDeleter {
   void operator()(System*) const;
   void operator()(Course*) const;

@@ -68,6 +68,7 @@ Moment keep_moment(System& s, const Course& course) {
   m.summary.joint_drift = s.state.largest_drift;
   m.summary.energy_error = course.calc_energy_error();
   m.joint_notes = s.joint_notes;
+  m.noted_pairs = s.noted_pairs;
   m.counts = count_items(s);
   for (size_t i = 0; i < s.state.next_event; ++i) {
     const Event& e = s.model.events[s.event_order[i]];
@@ -96,6 +97,7 @@ void go_on(const Moment& m, System& s, bool is_successor) {
   if (!is_successor && s.state.cable.size() != compiled_cables) refuse("cables were added");
   s.summary = m.summary;
   s.joint_notes = m.joint_notes;
+  s.noted_pairs = m.noted_pairs;
   if (!is_successor) return;
 
   // a new cable is cut to length where its ends are now; what it stores comes from outside

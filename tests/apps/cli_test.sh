@@ -498,6 +498,29 @@ cancel)
     has err "Cancelled."
     [ -z "$(find v -type f 2>/dev/null)" ] || { echo "$words leaves $(find v -type f | head -3)"; failures=$((failures + 1)); }
   done
+  # killed without a word, it goes on from what it has kept, with the bits of a run that was not
+  storehouse=$source/examples/weida/plan.toml
+  kill_when_kept() {
+    "$topple" "$@" >out 2>err &
+    pid=$!; for _ in $(seq 1200); do [ -e kept/checkpoint.bin ] && break; sleep 0.05; done
+    kill -KILL $pid; wait $pid 2>/dev/null
+    exists kept/checkpoint.bin; [ ! -e kept/record.h5 ] || { echo "it was over"; failures=$((failures + 1)); }
+  }
+  kill_when_kept run "$storehouse" --checkpoint --checkpoint-interval "0.1 s" --csv --no-report -o kept
+  expect 2 "$topple" run "$plan" --resume -o kept; has err "E674"; has err "another plan or model"
+  expect 2 "$topple" run "$storehouse" --resume --duration "10 ms" -o kept; has err "E674"; has err "and is to end at 0.01 s"
+  expect 0 "$topple" run "$storehouse" --resume --csv --no-report -o kept; has out "Going on from"
+  expect 0 "$topple" run "$storehouse" --csv --no-report -o whole
+  for table in series bodies events findings; do cmp kept/$table.csv whole/$table.csv || failures=$((failures + 1)); done
+  rm -r kept
+  kill_when_kept mbs run whole/model.json --checkpoint --checkpoint-interval "0.1 s" --csv --no-report -o kept
+  expect 0 "$topple" mbs run whole/model.json --resume --csv --no-report -o kept; has out "Going on from"
+  expect 0 "$topple" mbs run whole/model.json --csv --no-report -o again
+  for table in series bodies events; do cmp kept/$table.csv again/$table.csv || failures=$((failures + 1)); done
+  expect 2 "$topple" run "$plan" --resume -o nowhere; has err "E674"; [ ! -e nowhere ] || { echo "a folder for nothing"; failures=$((failures + 1)); }
+  expect 2 "$topple" run "$plan" --checkpoint --engine simbody -o nowhere; has err "simbody keeps no checkpoint"
+  expect 2 "$topple" run "$plan" --checkpoint --check-step -o nowhere; has err "excludes"
+  expect 2 "$topple" mbs run "$plan" --checkpoint-interval "1 s" -o nowhere; has err "requires --checkpoint or --resume"
   ;;
 steer)
   "$topple" new plan.toml >/dev/null
