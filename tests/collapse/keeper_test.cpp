@@ -2,12 +2,13 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <filesystem>
 #include <functional>
 
+#include "../base/own_folder.h"
+#include "../record/same_record.h"
 #include "base/error.h"
 #include "base/file.h"
 #include "mbs/model_json.h"
@@ -16,19 +17,14 @@
 namespace topple::collapse {
 namespace {
 
+using record::expect_same;
+
 using Runner = std::function<record::Record(const RunOptions&, const RunCallbacks&)>;
 
 /// A folder of its own, and runs that are cancelled at the first frame behind a time.
 class KeeperReplay : public testing::Test {
  protected:
-  KeeperReplay() {
-    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = std::filesystem::temp_directory_path() /
-              ("topple-keeper-" + std::string(test->name()) + "-" + std::to_string(getpid()));
-    std::filesystem::create_directories(folder_);
-    kept_.checkpoint = (folder_ / "checkpoint.bin").string();
-  }
-  ~KeeperReplay() override { std::filesystem::remove_all(folder_); }
+  KeeperReplay() { kept_.checkpoint = folder_ / "checkpoint.bin"; }
 
   record::Record cancel_at(const Runner& run, double time, const RunOptions& options) {
     std::atomic<bool> cancel = false;
@@ -54,36 +50,11 @@ class KeeperReplay : public testing::Test {
     return "";
   }
 
-  std::filesystem::path folder_;
+  OwnFolder folder_;
   RunOptions kept_;
   int checkpoints_ = 0;
   double resumed_at_ = -1;
 };
-
-void expect_same(const record::Record& a, const record::Record& b) {
-  EXPECT_EQ(a.time, b.time);
-  EXPECT_EQ(a.position, b.position);
-  EXPECT_EQ(a.orientation, b.orientation);
-  EXPECT_EQ(a.zone_state, b.zone_state);
-  EXPECT_EQ(a.zone_utilisation, b.zone_utilisation);
-  EXPECT_EQ(a.crushed_length, b.crushed_length);
-  ASSERT_EQ(a.series.size(), b.series.size());
-  for (size_t i = 0; i < a.series.size(); ++i) EXPECT_EQ(a.series[i].value, b.series[i].value) << a.series[i].id;
-  ASSERT_EQ(a.outputs.size(), b.outputs.size());
-  for (size_t i = 0; i < a.outputs.size(); ++i) {
-    EXPECT_EQ(a.outputs[i].time, b.outputs[i].time) << a.outputs[i].name;
-    EXPECT_EQ(a.outputs[i].value, b.outputs[i].value) << a.outputs[i].name;
-  }
-  const auto texts = [](const record::Record& r) {
-    std::vector<std::string> out;
-    for (const record::Event& e : r.events) out.push_back(std::to_string(e.time) + " " + e.text);
-    for (const record::Finding& f : r.findings) out.push_back(f.id + " " + f.text);
-    return out;
-  };
-  EXPECT_EQ(texts(a), texts(b));
-  EXPECT_EQ(a.ending, b.ending);
-  EXPECT_EQ(a.ending_text, b.ending_text);
-}
 
 /// Columns shot, one charge that fails, neighbours that shake.
 std::string shot_house(const std::string& duration = "1.2 s") {

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <thread>
 
+#include "../record/same_record.h"
 #include "base/error.h"
 #include "base/file.h"
 #include "base/hash.h"
@@ -19,6 +20,9 @@
 
 namespace topple::collapse {
 namespace {
+
+using record::expect_same_motion;
+using record::expect_same_words;
 
 using Json = nlohmann::ordered_json;
 
@@ -48,29 +52,6 @@ Edit delay_of_stage(int stage, double time) {
   e.stage = stage;
   e.time = time;
   return e;
-}
-
-void expect_same_motion(const record::Record& a, const record::Record& b) {
-  EXPECT_EQ(a.time, b.time);
-  EXPECT_EQ(a.position, b.position);
-  EXPECT_EQ(a.orientation, b.orientation);
-  EXPECT_EQ(a.zone_state, b.zone_state);
-  EXPECT_EQ(a.zone_utilisation, b.zone_utilisation);
-  EXPECT_EQ(a.crushed_ends, b.crushed_ends);
-  EXPECT_EQ(a.crushed_length, b.crushed_length);
-  ASSERT_EQ(a.series.size(), b.series.size());
-  for (size_t i = 0; i < a.series.size(); ++i) EXPECT_EQ(a.series[i].value, b.series[i].value) << a.series[i].id;
-}
-
-void expect_same_words(const record::Record& a, const record::Record& b) {
-  ASSERT_EQ(a.events.size(), b.events.size());
-  for (size_t i = 0; i < a.events.size(); ++i) {
-    EXPECT_EQ(a.events[i].time, b.events[i].time);
-    EXPECT_EQ(a.events[i].text, b.events[i].text);
-  }
-  ASSERT_EQ(a.findings.size(), b.findings.size());
-  for (size_t i = 0; i < a.findings.size(); ++i) EXPECT_EQ(a.findings[i].text, b.findings[i].text) << a.findings[i].id;
-  EXPECT_EQ(a.ending_text, b.ending_text);
 }
 
 /// Largest error of the balance until a time, over what the fall has released in the end.

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <numeric>
 
+#include "../record/same_record.h"
 #include "base/file.h"
 #include "farfield/checkpoint.h"
 #include "farfield/fragments.h"
@@ -17,6 +18,8 @@
 
 namespace topple::farfield {
 namespace {
+
+using record::expect_same;
 
 const collapse::Knowledge& rules() { return collapse::default_knowledge(); }
 
@@ -515,19 +518,6 @@ class FarfieldReplay : public testing::Test {
   }
   ~FarfieldReplay() override { std::filesystem::remove_all(folder); }
   static std::string name() { return testing::UnitTest::GetInstance()->current_test_info()->name(); }
-  static void expect_same(const record::Record& a, const record::Record& b) {
-    EXPECT_EQ(a.time, b.time);
-    EXPECT_EQ(a.position, b.position);
-    EXPECT_EQ(a.orientation, b.orientation);
-    EXPECT_EQ(a.zone_state, b.zone_state);
-    EXPECT_EQ(a.zone_utilisation, b.zone_utilisation);
-    ASSERT_EQ(a.series.size(), b.series.size());
-    for (size_t i = 0; i < a.series.size(); ++i) EXPECT_EQ(a.series[i].value, b.series[i].value) << a.series[i].id;
-    ASSERT_EQ(a.events.size(), b.events.size());
-    for (size_t i = 0; i < a.events.size(); ++i) EXPECT_EQ(a.events[i].text, b.events[i].text);
-    ASSERT_EQ(a.findings.size(), b.findings.size());
-    for (size_t i = 0; i < a.findings.size(); ++i) EXPECT_EQ(a.findings[i].text, b.findings[i].text);
-  }
   std::string folder;
 };
 
