@@ -184,8 +184,9 @@ void add_mbs_compare(CLI::App& mbs, Arguments& a) {
   mbs_compare->add_option("-o,--output", a.output, "folder for compare.csv and compare.svg")->type_name("FOLDER");
   mbs_compare->add_option("--duration", a.duration, "simulated time, such as \"10 s\"")->type_name("QUANTITY");
   mbs_compare->add_option("--step", a.step, "fixed step of all engines, such as \"0.1 ms\"")->type_name("QUANTITY");
-  mbs_compare->add_option("--accuracy", a.accuracy,
-                          "relative, of engines that control their errors; 1e-9 without --step");
+  mbs_compare->add_option(
+      "--accuracy", a.accuracy,
+      "relative, of engines that control their errors and then choose their steps, --step or not; 1e-9 without --step");
   mbs_compare->add_option("--frames", a.frames, "instants that are compared (100)")->check(CLI::Range(1, 1000000));
   mbs_compare->add_flag("--bodies", a.bodies, "also list every body");
   mbs_compare->add_flag("--skip-unsupported", a.skip_unsupported,

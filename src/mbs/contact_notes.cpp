@@ -13,6 +13,7 @@ namespace {
 
 constexpr size_t kMostNoted = 6;     // pairs of bodies
 constexpr double kMostSunken = 0.5;  // share of the thinner shape that they may overlap by
+constexpr double kBegun = 0.01;      // share of it from which on an overlap at the start is told
 
 std::string name_of(const Model& model, size_t b) {
   const std::string& name = model.bodies[b].name;
@@ -62,6 +63,58 @@ void System::note_lost_contact(const PairDue& due, double depth, double interval
                                            "next at {:.4g} s, and the thinner one has {:.3g} m: they may pass through "
                                            "each other; a shorter step tells",
                                            way, state.time, thickness)));
+}
+
+void System::note_overlaps_at_start() {
+  const State& s = state;
+  size_t pairs = 0, sunken = 0;
+  double deepest = 0, lowest = 0;
+  std::string deepest_pair, lowest_body;
+  for (size_t i = 0; i < s.pairs.size(); ++i) {
+    const PairDue& due = s.pair_due[i];
+    const double depth = s.pairs[i].allowed;
+    if (!(depth > kBegun * std::min(thickness_of(s.shapes[static_cast<size_t>(due.shape_a)]),
+                                    thickness_of(s.shapes[static_cast<size_t>(due.shape_b)]))))
+      continue;
+    ++pairs;
+    if (depth <= deepest) continue;
+    deepest = depth;
+    deepest_pair = fmt::format("{} and {}", name_of(model, static_cast<size_t>(due.a)),
+                               name_of(model, static_cast<size_t>(due.b)));
+  }
+  if (pairs > 0)
+    summary.notes.push_back(fmt::format(
+        "{} at the start, {}those of bodies {} by {:.3g} m: contact lets them keep that until they have parted",
+        pairs == 1 ? "two shapes overlap" : fmt::format("{} pairs of shapes overlap", pairs),
+        pairs == 1 ? "" : "deepest ", deepest_pair, deepest));
+  if (!model.contact.ground) return;
+  for (size_t b = 0; b < B; ++b) {
+    const BodyConstants& body = s.body[b];
+    if (fixed[b] || s.tied_to_ground[b] || !contact_laws[static_cast<size_t>(ground_law[b])].touches) continue;
+    for (int i = body.first_shape; i < body.first_shape + body.shapes; ++i) {
+      const CompiledShape& shape = s.shapes[static_cast<size_t>(i)];
+      const Mat3 R = s.R[b];
+      const Vec3 down = transpose_times(shape.is_straight ? R : R * shape.R_BS, -1 * model.contact.normal);
+      double reach = 0;
+      if (shape.kind == Shape::Kind::Box) {
+        for (int k = 0; k < 3; ++k) reach += std::abs(down[k]) * shape.half[k];
+      } else if (shape.kind == Shape::Kind::Sphere) {
+        reach = shape.radius;
+      } else if (const Hull* hull = hull_of(i)) {
+        for (const Vec3& v : hull->vertices) reach = std::max(reach, dot(down, v));
+      }
+      const double depth = model.contact.offset - dot(model.contact.normal, Vec3{s.p[b]} + R * shape.p_BS) + reach;
+      if (!(depth > kBegun * thickness_of(shape))) continue;
+      ++sunken;
+      if (depth > lowest) lowest = depth, lowest_body = name_of(model, b);
+    }
+  }
+  if (sunken > 0)
+    summary.notes.push_back(fmt::format(
+        "{} below the ground at the start, {}{} by {:.3g} m: contact lets {} keep that until {} parted from it",
+        sunken == 1 ? "a shape reaches" : fmt::format("{} shapes reach", sunken),
+        sunken == 1 ? "that of body " : "deepest that of body ", lowest_body, lowest, sunken == 1 ? "it" : "them",
+        sunken == 1 ? "it has" : "they have"));
 }
 
 }  // namespace topple::mbs

@@ -73,6 +73,7 @@ void System::evaluate_start() {
   state.total_at_start = 0;
   const Energy e = calc_energy();
   state.total_at_start = e.residual;
+  if (options.tells_lost_contact) note_overlaps_at_start();
 }
 
 Summary run(const Model& model, const Options& options) {

@@ -119,7 +119,7 @@ struct Options {
   /// Steps from one look for touching points to the next; between them the points move with their bodies. 0: 2 where a
   /// contact swings slowly enough and the step is the engine's own, else 1.
   int contact_interval = 0;
-  /// Bodies that contact did not keep apart are told in the summary's notes.
+  /// Bodies that contact did not keep apart, or that overlap at the start, are told in the summary's notes.
   bool tells_lost_contact = false;
   double frame_interval = 1.0 / 60;  // of on_frame [s]; whole steps, the nearest at or after each instant
   bool equilibrium = true;           // start from the dead-load equilibrium; false: from the poses of the model

@@ -517,6 +517,8 @@ class System {
   ///   depth     of the deepest point, or minus the gap [m]
   ///   interval  time between looks [s]
   void note_lost_contact(const PairDue&, double depth, double interval);
+  /// Of bodies that overlap, and of such that reach below the ground, where contact begins.
+  void note_overlaps_at_start();
   /// Of the shape at its thinnest, infinite for a plane [m].
   double thickness_of(const CompiledShape&) const;
   /// Whether more rows were told to depend on others than do now, or to do so for a while.

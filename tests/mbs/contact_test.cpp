@@ -362,6 +362,35 @@ std::vector<std::string> note_lost_contacts(const Model& m, double duration, dou
   return run(m, o).notes;
 }
 
+TEST(BodyContact, NotesWhatOverlapsAtTheStart) {
+  Model m;
+  add_body(m, make_box("low", 1000, {0.5, 0.5, 0.5}, {0, 0, 0.5}));
+  add_body(m, make_box("high", 1000, {0.5, 0.5, 0.5}, {0, 0, 1.3}));
+  add_body(m, make_box("highest", 1000, {0.5, 0.5, 0.5}, {0, 0, 2.3}));
+  std::vector<std::string> notes = note_lost_contacts(m, 0.01, 1e-3);
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_EQ(notes[0],
+            "two shapes overlap at the start, those of bodies \"low\" and \"high\" by 0.2 m: contact lets them keep "
+            "that until they have parted");
+  m.bodies[2].X_WB.p.z = 1.9;
+  notes = note_lost_contacts(m, 0.01, 1e-3);
+  EXPECT_TRUE(
+      notes[0].starts_with("2 pairs of shapes overlap at the start, deepest those of bodies \"high\" and "
+                           "\"highest\" by 0.4 m"))
+      << notes[0];
+  // what touches does not overlap; a corner of what leans reaches below the ground
+  m.bodies[1].X_WB.p.z = 1.499, m.bodies[2].X_WB.p.z = 2.5;
+  EXPECT_TRUE(note_lost_contacts(m, 0.01, 1e-3).empty());
+  m.bodies.resize(1);
+  m.bodies[0].X_WB.q = exp_rotation({0, 0.2, 0});
+  notes = note_lost_contacts(m, 0.01, 1e-3);
+  ASSERT_EQ(notes.size(), 1u);
+  const double below = 0.5 * (std::cos(0.2) + std::sin(0.2)) - 0.5;
+  EXPECT_TRUE(notes[0].starts_with("a shape reaches below the ground at the start, that of body \"low\" by "))
+      << notes[0];
+  EXPECT_NEAR(std::stod(notes[0].substr(notes[0].find(" by ") + 4)), below, 1e-3);
+}
+
 TEST(BodyContact, NotesABodyThatSinksThroughALightOne) {
   Model m;
   add_body(m, make_box("light", 1, {0.5, 0.5, 0.25}, {0, 0, 0.25}));
