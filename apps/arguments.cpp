@@ -72,17 +72,13 @@ void add_run_options(CLI::App* verb, Arguments& a) {
   verb->add_flag("--report", a.report, "fail if report.html cannot be written")->excludes(none);
 }
 
-/// Of runs that can go on later; `other`: an option that does not go with them.
-void add_checkpoint_options(CLI::App* verb, Arguments& a, CLI::Option* other = nullptr) {
-  CLI::Option* keep =
-      verb->add_flag("--checkpoint", a.checkpoint, "keep checkpoint.bin in the folder, to go on from with --resume");
+/// Of runs that can go on later.
+void add_checkpoint_options(CLI::App* verb, Arguments& a) {
+  verb->add_flag("--checkpoint", a.checkpoint, "keep checkpoint.bin in the folder, to go on from with --resume");
   verb->add_option("--checkpoint-interval", a.checkpoint_interval,
                    "of the clock (60 s), with --checkpoint or --resume, which keeps one too")
       ->type_name("QUANTITY");
-  CLI::Option* resume = verb->add_flag("--resume", a.resume, "go on from checkpoint.bin in the folder");
-  if (other == nullptr) return;
-  keep->excludes(other);
-  resume->excludes(other);
+  verb->add_flag("--resume", a.resume, "go on from checkpoint.bin in the folder");
 }
 
 /// Of what runs models for studies.
@@ -133,17 +129,18 @@ void add_run(CLI::App& app, Arguments& a) {
   run->add_option("plan", a.input, "plan (TOML)")->type_name("FILE")->required();
   run->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")
       ->type_name("FILE");
-  CLI::Option* check_step = run->add_flag(
-      "--check-step", a.check_step, "run also at half the step and say what differs; with --threads 2 both at once");
+  run->add_flag("--check-step", a.check_step,
+                "run also at half the step and say what differs; with --threads 2 both at once");
   add_run_options(run, a);
-  add_checkpoint_options(run, a, check_step);
+  add_checkpoint_options(run, a);
   run->callback([&a] { a.verb = Arguments::Verb::Run; });
   add_examples(run, R"(  topple run plan.toml -o out              findings, out/record.h5, out/report.html
   topple run plan.toml -o out --csv        also tables for spreadsheets
   topple run plan.toml -o out --check-step --threads 2
                                            and what half the time step makes of it
   topple run plan.toml -o half --duration "1 s" --no-report
-  topple run plan.toml -o out --checkpoint and, after an interruption, with --resume)");
+  topple run plan.toml -o out --checkpoint
+                                           and, after an interruption, with --resume)");
 }
 
 void add_rules(CLI::App& app, Arguments& a) {
@@ -333,14 +330,14 @@ void add_fe(CLI::App& app, Arguments& a) {
       ->type_name("QUANTITY");
   fe->add_option("--across", f.across, "elements over the thickness of columns and beams, at least (2)")
       ->check(CLI::Range(2, 8));
-  CLI::Option* mesh_only = fe->add_flag("--mesh-only", f.mesh_only, "only make the mesh and say what it is like");
+  fe->add_flag("--mesh-only", f.mesh_only, "only make the mesh and say what it is like");
   fe->add_option("--scaled-step", f.scaled_step,
                  "give mass to elements that do not bear this step, such as \"0.02 ms\"")
       ->type_name("QUANTITY");
   fe->add_flag("--skip-quiet", f.skip_quiet, "do not wait through the time in which nothing moves before a charge");
   fe->add_option("--until", a.duration, "simulated time, such as \"6 s\"; the plan's duration if not given")
       ->type_name("QUANTITY");
-  add_checkpoint_options(fe, a, mesh_only);
+  add_checkpoint_options(fe, a);
   fe->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
   fe->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")->type_name("FILE");
   add_json(fe, a);
@@ -521,8 +518,12 @@ std::string find_missing(const Arguments& a) {
   const auto refuse = [](const std::string& verb, const std::string& what) {
     return "topple " + verb + ": " + what + "\nRun topple " + verb + " --help for more information.\n";
   };
-  const auto find_lone_interval = [&](const std::string& verb) {
-    return a.checkpoint_interval.empty() || a.checkpoint || a.resume
+  // `other`: what does not go with checkpoints, where it is given
+  const auto find_odd_checkpoint = [&](const std::string& verb, const std::string& other) {
+    const bool is_kept = a.checkpoint || a.resume;
+    if (is_kept && !other.empty())
+      return refuse(verb, other + " excludes " + (a.checkpoint ? "--checkpoint" : "--resume"));
+    return a.checkpoint_interval.empty() || is_kept
                ? std::string()
                : refuse(verb, "--checkpoint-interval requires --checkpoint or --resume");
   };
@@ -534,11 +535,11 @@ std::string find_missing(const Arguments& a) {
       return refuse("export", "say what for: --vtk, --gltf, --csv, --json, --adams or --lsdyna");
     case Arguments::Verb::Fe:
       if (a.output.empty() && !a.fe.mesh_only) return refuse("fe", "--output is required");
-      return find_lone_interval("fe");
+      return find_odd_checkpoint("fe", a.fe.mesh_only ? "--mesh-only" : "");
     case Arguments::Verb::Run:
-      return find_lone_interval("run");
+      return find_odd_checkpoint("run", a.check_step ? "--check-step" : "");
     case Arguments::Verb::MbsRun:
-      return find_lone_interval("mbs run");
+      return find_odd_checkpoint("mbs run", "");
     case Arguments::Verb::Study:
       if (a.study.action != StudyArguments::Action::Run || !(a.input.empty() || a.output.empty())) return "";
       return refuse("study",

@@ -104,8 +104,10 @@ std::string find_checkpoint(const Arguments& a) {
   if (a.engine != "native")
     throw InputError("E674", fmt::format("{} keeps no checkpoint and goes on from none", a.engine),
                      "the native engine does");
-  if (a.resume && !fs::exists(path))
+  if (!a.resume || fs::is_regular_file(a.output)) return path;
+  if (!fs::exists(path))
     throw InputError("E674", fmt::format("{}: there is no checkpoint to go on from", path), "start without --resume");
+  remove_unfinished_files(a.output);
   return path;
 }
 
@@ -117,10 +119,16 @@ std::string write_option(const char* name, const std::string& value) {
 
 }  // namespace
 
+void tell_lost_checkpoint(ProgressLine& progress, const std::string& why) {
+  progress.clear();
+  std::fprintf(stderr, "topple: %s. The run goes on; an older checkpoint is left as it was.\n", why.c_str());
+}
+
 void tell_how_to_go_on(std::FILE* out, const Arguments& a, const std::string& verb, const std::string& options) {
-  std::fprintf(out, "Go on with: topple %s %s%s%s%s -o %s --resume\n", verb.c_str(), quote_word(a.input).c_str(),
+  std::fprintf(out, "Go on with: topple %s %s%s%s%s%s%s -o %s --resume\n", verb.c_str(), quote_word(a.input).c_str(),
                options.c_str(), write_option("--knowledge", a.knowledge).c_str(),
-               write_option(verb == "fe" ? "--until" : "--duration", a.duration).c_str(), quote_word(a.output).c_str());
+               write_option(verb == "fe" ? "--until" : "--duration", a.duration).c_str(), a.csv ? " --csv" : "",
+               a.no_report ? " --no-report" : "", quote_word(a.output).c_str());
 }
 
 std::string write_run_options(const Arguments& a) {
@@ -366,6 +374,7 @@ int run_plan_file(const Arguments& a, const std::atomic<bool>& cancel) {
       files.emplace_back("model", path);
     };
     callbacks.on_event = [&](const record::Event& e) { events.print(e); };
+    callbacks.on_lost_checkpoint = [&](const std::string& why) { tell_lost_checkpoint(progress, why); };
     callbacks.on_resume = [&](double time) { std::fprintf(out, "Going on from %.4g s.\n", time); };
     callbacks.progress.report = [&](double done, double whole) { progress.show(done, whole); };
     callbacks.progress.cancel = &cancel;

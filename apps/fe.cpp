@@ -116,6 +116,7 @@ int run_finite_elements(const Arguments& a, const std::atomic<bool>& cancel) {
     fem::ExplicitSystem::Timing timing;
     fe_callbacks.on_timing = [&](const fem::ExplicitSystem::Timing& t) { timing = t; };
     bool has_checkpoint = fe.resume;  // none is written while the dead load is put on
+    fe_callbacks.on_lost_checkpoint = [&](const std::string& why) { tell_lost_checkpoint(progress, why); };
     fe_callbacks.on_checkpoint = [&] { has_checkpoint = true; };
     const record::Record r = farfield::run_plan(plan, knowledge, options, fe, callbacks, fe_callbacks);
     progress.clear();

@@ -126,6 +126,7 @@ int run_model_file(const Arguments& a, const std::atomic<bool>& cancel) {
     callbacks.on_event = [&](const record::Event& e) {
       if (e.kind != "rest" && e.kind != "failure") events.print(e);
     };
+    callbacks.on_lost_checkpoint = [&](const std::string& why) { tell_lost_checkpoint(progress, why); };
     callbacks.on_resume = [&](double time) { std::fprintf(out, "Going on from %.4g s.\n", time); };
     callbacks.on_summary = [&](const mbs::Summary& s) { summary = s; };
     callbacks.progress.report = [&](double done, double whole) { progress.show(done, whole); };

@@ -15,6 +15,7 @@
 #include "collapse/run.h"
 #include "record/record.h"
 #include "refusal.h"
+#include "terminal.h"
 
 namespace topple::apps {
 
@@ -53,6 +54,8 @@ void set_checkpoint(const Arguments& a, Options& o) {
     o.checkpoint_interval = interval;
   if (a.checkpoint || a.resume) o.checkpoint = find_checkpoint(a);
 }
+/// Says that a checkpoint could not be written.
+void tell_lost_checkpoint(ProgressLine&, const std::string& why);
 /// Says how a run that was cancelled goes on.
 ///   verb, options  as typed, for the same run, options with a space before each
 void tell_how_to_go_on(std::FILE* out, const Arguments&, const std::string& verb, const std::string& options);

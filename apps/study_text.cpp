@@ -110,7 +110,7 @@ std::string words_of_drivers(const Problem& p, const std::vector<uncertainty::Dr
     const uncertainty::Driver& d = drivers[i];
     if (study::is_share_known(d)) {
       known += fmt::format("{}{} {:.2f} +- {:.2f}", known.empty() ? "" : ", ", names[i], d.first, d.first_error);
-      if (std::isfinite(d.total)) known += fmt::format(" (with others {:.2f})", d.total);
+      if (std::isfinite(d.total)) known += fmt::format(" (with others {:.2f} +- {:.2f})", d.total, d.total_error);
     } else {
       unknown += fmt::format("{}{}", unknown.empty() ? "" : ", ", names[i]);
     }

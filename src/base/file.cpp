@@ -1,15 +1,18 @@
 #include "base/file.h"
 
 #include <fcntl.h>
+#include <signal.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <cerrno>
+#include <charconv>
 #include <cstring>
 #include <filesystem>
 #include <stdexcept>
 #include <system_error>
+#include <vector>
 
 #include "base/error.h"
 #include "base/unfinished_file.h"
@@ -17,6 +20,10 @@
 namespace topple {
 
 namespace {
+
+// .topple-PROCESS-NUMBER.part, beside what it will replace
+const std::string kUnfinished = ".topple-";
+constexpr std::string_view kUnfinishedEnd = ".part";
 
 /// The name under which a file is being written, for signal handlers; of several at once, one.
 class UnfinishedName {
@@ -160,10 +167,26 @@ void replace_file(const std::string& path, std::string_view bytes) {
   constexpr int most = 100;  // names that others may have
   int number = EEXIST;
   for (int i = 0; i < most && number == EEXIST; ++i) {
-    const std::string name = ".topple-" + std::to_string(::getpid()) + "-" + std::to_string(count++) + ".part";
+    const std::string name =
+        kUnfinished + std::to_string(::getpid()) + "-" + std::to_string(count++) + std::string(kUnfinishedEnd);
     number = write_beside(folder / name, target, bytes, is_there ? &old : nullptr);
   }
   if (number != 0) fail(path, reason_of(number));
+}
+
+void remove_unfinished_files(const std::string& folder) {
+  std::error_code ignored;
+  std::vector<std::filesystem::path> found;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with(kUnfinished) || !name.ends_with(kUnfinishedEnd)) continue;
+    pid_t process = 0;
+    const char *begin = name.data() + kUnfinished.size(), *end = name.data() + name.size();
+    const auto [behind, error] = std::from_chars(begin, end, process);
+    if (error != std::errc() || process <= 0 || behind == end || *behind != '-') continue;
+    if (::kill(process, 0) != 0 && errno == ESRCH) found.push_back(entry.path());
+  }
+  for (const std::filesystem::path& path : found) std::filesystem::remove(path, ignored);
 }
 
 }  // namespace topple

@@ -15,4 +15,7 @@ std::string read_file(const std::string& path);
 /// the reason.
 void replace_file(const std::string& path, std::string_view bytes);
 
+/// Takes away what replace_file of processes that are no more has left in a folder; nothing else.
+void remove_unfinished_files(const std::string& folder);
+
 }  // namespace topple

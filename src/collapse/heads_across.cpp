@@ -19,4 +19,12 @@ HeadsAcross find_heads_across(const product::Plan& plan, const Knowledge& k, con
   return out;
 }
 
+void tell_heads_left_out(record::Record& r) {
+  for (record::Finding& f : r.findings) {
+    if (f.id != "stability.start") continue;
+    f.text += " About the other axis of the columns' heads it was not computed: cancelled.";
+    if (f.status == record::Status::Good) f.status = record::Status::Warning;
+  }
+}
+
 }  // namespace topple::collapse

@@ -12,4 +12,7 @@ namespace topple::collapse {
 HeadsAcross find_heads_across(const product::Plan&, const Knowledge&, const RunOptions&,
                               const std::atomic<bool>* cancel, const Mover&);
 
+/// Says in the findings that it was cancelled: the margin before the first charge is that of one axis.
+void tell_heads_left_out(record::Record&);
+
 }  // namespace topple::collapse

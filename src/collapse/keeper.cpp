@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <stdexcept>
+
 #include "base/checkpoint.h"
 #include "base/error.h"
 #include "base/hash.h"
@@ -44,7 +46,12 @@ void Keeper::join(const mbs::Model& model, const std::string& of, mbs::Options& 
     ArchiveWriter out;
     mbs::write_moment(m, out);
     recorder_.write(out);
-    write_checkpoint_file(options_.checkpoint, kKind, key_, out);
+    try {
+      write_checkpoint_file(options_.checkpoint, kKind, key_, out);
+    } catch (const std::runtime_error& e) {  // a full disk takes no results
+      if (callbacks_.on_lost_checkpoint) callbacks_.on_lost_checkpoint(e.what());
+      return;
+    }
     if (callbacks_.on_checkpoint) callbacks_.on_checkpoint();
   };
 }

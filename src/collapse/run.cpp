@@ -120,6 +120,7 @@ record::Record run_with(const product::Plan& plan, const Knowledge& k, const Run
     across = find_heads_across(plan, k, options, cancel, move);
   add_findings(plan, model, map, k, recorder, summary, r, nullptr,
                across && !callbacks.progress.is_cancelled() ? &*across : nullptr);
+  if (across && callbacks.progress.is_cancelled()) tell_heads_left_out(r);
   if (callbacks.on_summary) callbacks.on_summary(summary);
   return r;
 }

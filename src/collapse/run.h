@@ -39,7 +39,8 @@ struct RunCallbacks {
   std::function<void(const mbs::Summary&)> on_summary;                                      // of the engine, at the end
   std::function<void(double time)> on_resume;                                               // it goes on from there [s]
   std::function<void()> on_checkpoint;                                                      // one has been written
-  Progress progress;  // done and whole in simulated seconds
+  std::function<void(const std::string&)> on_lost_checkpoint;  // it could not be, and why; the run goes on
+  Progress progress;                                           // done and whole in simulated seconds
 };
 
 /// Runs a plan. Throws InputError for what cannot be built or gone on from (E674); everything else is in the record:

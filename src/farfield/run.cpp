@@ -104,6 +104,7 @@ class Course {
     on_relaxed_ = callbacks.on_relaxed;
     on_timing_ = callbacks.on_timing;
     on_checkpoint_ = callbacks.on_checkpoint;
+    on_lost_checkpoint_ = callbacks.on_lost_checkpoint;
     settle_.cancel = options_.progress.cancel;
     if (callbacks.on_settling)
       settle_.report = [call = callbacks.on_settling](double steps, double) { call(static_cast<int>(steps)); };
@@ -212,7 +213,12 @@ class Course {
     if (fe_.checkpoint.empty()) return;
     RunState now = state_;
     now.wall_time += calc_seconds();
-    write_checkpoint(fe_.checkpoint, key_, now, system_.write_snapshot());
+    try {
+      write_checkpoint(fe_.checkpoint, key_, now, system_.write_snapshot());
+    } catch (const std::runtime_error& e) {  // a full disk takes no results
+      if (on_lost_checkpoint_) on_lost_checkpoint_(e.what());
+      return;
+    }
     if (on_checkpoint_) on_checkpoint_();
   }
 
@@ -470,6 +476,7 @@ class Course {
   std::function<void(const fem::RelaxationSummary&)> on_relaxed_;
   std::function<void(const fem::ExplicitSystem::Timing&)> on_timing_;
   std::function<void()> on_checkpoint_;
+  std::function<void(const std::string&)> on_lost_checkpoint_;
 };
 
 std::string Course::describe_overload() const {

@@ -25,6 +25,7 @@ struct FeCallbacks {
   std::function<void(int steps)> on_settling;  // now and then while a load is put on without motion
   std::function<void(const fem::RelaxationSummary&)> on_relaxed;
   std::function<void()> on_checkpoint;                                // when one has been written
+  std::function<void(const std::string&)> on_lost_checkpoint;         // it could not be, and why; the run goes on
   std::function<void(const fem::ExplicitSystem::Timing&)> on_timing;  // at the end, since the run was begun or resumed
 };
 

@@ -233,10 +233,10 @@ double Expression::evaluate(std::span<const double> values) const {
         stack.push_back(std::pow(a, b));
         break;
       case Code::Min:
-        stack.push_back(std::min(a, b));
+        stack.push_back(std::isnan(a) ? a : std::isnan(b) ? b : std::min(a, b));  // of no value there is no least
         break;
       case Code::Max:
-        stack.push_back(std::max(a, b));
+        stack.push_back(std::isnan(a) ? a : std::isnan(b) ? b : std::max(a, b));
         break;
       default:
         break;

@@ -139,17 +139,23 @@ void read_drivers(Insights& out, const Problem& p, const Budget& b, const uncert
     out.source = Insights::Source::Spread;
     return;
   }
-  // two estimates of one share from the same runs: the firmer one
-  const auto choose = [](std::vector<uncertainty::Driver>& mine, const std::vector<uncertainty::Driver>& other) {
-    for (std::size_t i = 0; i < std::min(mine.size(), other.size()); ++i)
-      if (other[i].first_error < mine[i].first_error)
+  // Two estimates of one share: the firmer one. Of an outcome that of more runs where they contradict each other: rows
+  // that miss a rare outcome have a small error as well.
+  constexpr double never = std::numeric_limits<double>::infinity(), least_apart = 0.1, errors_apart = 2;
+  const auto choose = [](std::vector<uncertainty::Driver>& mine, const std::vector<uncertainty::Driver>& other,
+                         double least) {
+    for (std::size_t i = 0; i < std::min(mine.size(), other.size()); ++i) {
+      const double errors = std::hypot(mine[i].first_error, other[i].first_error);
+      const bool is_other = std::abs(other[i].first - mine[i].first) > std::max(least, errors_apart * errors);
+      if (is_other || other[i].first_error < mine[i].first_error)
         mine[i].first = other[i].first, mine[i].first_error = other[i].first_error;
+    }
   };
   for (std::size_t o = 0; o < std::min(out.drivers.outputs.size(), by_bins.outputs.size()); ++o)
-    choose(out.drivers.outputs[o], by_bins.outputs[o]);
+    choose(out.drivers.outputs[o], by_bins.outputs[o], never);
   for (auto& c : out.drivers.outcomes)
     for (const auto& d : by_bins.outcomes)
-      if (c.outcome == d.outcome) choose(c.inputs, d.inputs);
+      if (c.outcome == d.outcome) choose(c.inputs, d.inputs, least_apart);
 }
 
 void find_boxes(Insights& out, const Problem& p, const Budget& b, uncertainty::Asker& asker,

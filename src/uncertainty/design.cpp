@@ -65,6 +65,7 @@ class Design {
       : space_(space), asker_(asker), requirement_(requirement), options_(options), support_(make_box(space, 0)) {
     for (int i = 0; i < space.size(); ++i)
       if (support_.upper[i] > support_.lower[i]) axes_.push_back(i);
+    smallest_ = calc_smallest(options.smallest, static_cast<int>(axes_.size()));
   }
 
   DesignResult run() {
@@ -217,8 +218,7 @@ class Design {
     BoxGrowth growth(
         support_, middle, [this](const std::vector<Point>& points) { return judge(points); },
         [this](const Point& x) { return is_possible(x); },
-        {options_.edge, options_.smallest, options_.rounds,
-         options_.seed + 104729 * static_cast<std::uint64_t>(g + 1)});
+        {options_.edge, smallest_, options_.rounds, options_.seed + 104729 * static_cast<std::uint64_t>(g + 1)});
     for (int seen = 0; !b.kept;) {
       for (; seen < asker_.asked(); ++seen)
         if (is_violating(seen)) growth.add_violating(asker_.archive()[seen].x);
@@ -261,7 +261,7 @@ class Design {
     constexpr double coarse = 0.05, widest = 0.15;  // of the support's widths
     BoxGrowth corners(
         support_, middle, [this](const std::vector<Point>& points) { return judge(points); },
-        [this](const Point& x) { return is_possible(x); }, {coarse, options_.smallest, options_.rounds, 1});
+        [this](const Point& x) { return is_possible(x); }, {coarse, smallest_, options_.rounds, 1});
     const int start = asker_.asked();
     for (int seen = 0; !b.kept && asker_.can_go_on();) {
       for (; seen < asker_.asked(); ++seen)
@@ -270,9 +270,9 @@ class Design {
       for (double margin = options_.edge + widest * spent * spent;; margin = std::max(options_.edge, 0.5 * margin)) {
         b.box = find_largest_box(support_, front, margin, 4, options_.seed + static_cast<std::uint64_t>(b.tries));
         b.volume = calc_part(b.box, support_);
-        if (b.volume >= options_.smallest || margin <= options_.edge) break;
+        if (b.volume >= smallest_ || margin <= options_.edge) break;
       }
-      if (b.volume < options_.smallest || asker_.rest() < options_.fresh) break;
+      if (b.volume < smallest_ || asker_.rest() < options_.fresh) break;
       // with very few runs all of them are for fresh points
       if (axes_.size() <= most_corner_axes && (12 << axes_.size()) <= share) {
         // first to learn where the boundary is, then to come to an end
@@ -281,7 +281,7 @@ class Design {
         if (is_good) spread_out(b.box, whole);
         b.volume = calc_part(b.box, support_);
         if (!is_good) continue;
-        if (b.volume < options_.smallest || asker_.rest() < options_.fresh) break;
+        if (b.volume < smallest_ || asker_.rest() < options_.fresh) break;
       }
       ++b.tries;
       constexpr int at_once = 8;
@@ -447,6 +447,7 @@ class Design {
   Asker& asker_;
   const Requirement& requirement_;
   const DesignOptions& options_;
+  double smallest_ = 0;  // part of the support's volume
   Box support_;
   std::vector<int> axes_;
   std::vector<double> margins_;
@@ -464,6 +465,9 @@ class Review {
  public:
   Review(const Space& space, const Requirement& requirement, const Archive& archive, const DesignOptions& options)
       : space_(space), archive_(archive), options_(options), support_(make_box(space, 0)) {
+    int sides = 0;
+    for (int k = 0; k < space.size(); ++k) sides += support_.upper[k] > support_.lower[k] ? 1 : 0;
+    smallest_ = calc_smallest(options.smallest, sides);
     for (const Sample& s : archive.samples()) {
       possible_.push_back(is_in_cut(space, support_, 0, s.x));
       if (!possible_.back()) {
@@ -526,7 +530,7 @@ class Review {
     const double volume = calc_part(box, support_);
     std::vector<Point> fresh = b.fresh_points;
     std::erase_if(fresh, [&box](const Point& x) { return !box.contains(x); });
-    if (volume < std::max(options_.smallest, 0.5 * b.volume) || 2 * fresh.size() < b.fresh_points.size()) return false;
+    if (volume < std::max(smallest_, 0.5 * b.volume) || 2 * fresh.size() < b.fresh_points.size()) return false;
     b.box = box;
     b.volume = volume;
     b.inputs = make_inputs(box, core);
@@ -540,6 +544,7 @@ class Review {
   const Space& space_;
   const Archive& archive_;
   const DesignOptions& options_;
+  double smallest_ = 0;  // part of the support's volume
   const Box support_;
   std::vector<double> margins_;  // of samples, -infinite where the run failed
   std::vector<bool> possible_;   // whether they count: nothing that ties the inputs excludes them
@@ -568,6 +573,11 @@ void review_boxes(const Space& space, std::vector<PermissibleBox>& boxes, const 
   std::vector<PermissibleBox> ordered;
   for (const auto& [places, k] : order) ordered.push_back(std::move(boxes[k]));
   boxes = std::move(ordered);
+}
+
+double calc_smallest(double smallest, int inputs) {
+  constexpr double few = 3;
+  return std::pow(smallest, std::max(1.0, inputs / few));
 }
 
 DesignResult find_permissible_boxes(const Space& space, Asker& asker, const Requirement& requirement,

@@ -20,9 +20,10 @@ struct DesignOptions {
   int space_points = 0;      // spread over the support beside what the archive holds; 0: 200 per input
   int cluster_points = 500;  // of each set that are grouped; the others count for the boxes alone
   double edge = 5e-3;        // how near a box may come to a violating run, part of the support's width
-  double smallest = 1e-3;    // boxes below this part of the support's volume are not kept
-  int rounds = 300;          // of growing and checking a box, at most
-  int fresh = 149;           // new random points that must all pass
+  double smallest = 1e-3;  // part of the support's volume below which boxes of up to three inputs are not kept; of more
+                           // inputs none with a smaller mean side (see calc_smallest)
+  int rounds = 300;        // of growing and checking a box, at most
+  int fresh = 149;         // new random points that must all pass
   double confidence = 0.95;  // of the stated bound
   int ranking_output = 0;    // whose robustness ranks the boxes
   int rerun_limit = 2000;    // points of the fuzzy analysis of one box, at most; 0: none, and no robustness
@@ -31,6 +32,9 @@ struct DesignOptions {
   std::vector<double> levels = {0, 0.25, 0.5, 0.75, 1};
   std::uint64_t seed = 1;
 };
+
+/// Part of the support's volume below which boxes of so many inputs are not kept.
+double calc_smallest(double smallest, int inputs);
 
 /// A box of inputs, inside which no run violated the requirement.
 struct PermissibleBox {

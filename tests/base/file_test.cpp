@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <csignal>
@@ -136,6 +138,22 @@ TEST_F(File, TakesTheLongestNames) {
   EXPECT_EQ(read_file(path(longest)), "x");
   EXPECT_THROW(replace_file(path(longest + "n"), "x"), std::runtime_error);
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_.path()), {}), 1);
+}
+
+TEST_F(File, TakesAwayWhatProcessesThatAreNoMoreHaveLeft) {
+  const std::string own = std::to_string(getpid());
+  const pid_t gone = fork();
+  if (gone == 0) _exit(0);
+  ASSERT_GT(gone, 0);
+  ASSERT_EQ(waitpid(gone, nullptr, 0), gone);
+  const std::vector<std::string> kept = {"checkpoint.bin", ".topple-" + own + "-0.part", ".topple-x-0.part",
+                                         ".topple-" + std::to_string(gone) + ".part", "topple-1-1.part"};
+  for (const std::string& name : kept) replace_file(path(name), "kept");
+  replace_file(path(".topple-" + std::to_string(gone) + "-17.part"), "half");
+  remove_unfinished_files(folder_.str());
+  EXPECT_FALSE(fs::exists(path(".topple-" + std::to_string(gone) + "-17.part")));
+  for (const std::string& name : kept) EXPECT_TRUE(fs::exists(path(name))) << name;
+  remove_unfinished_files(path("missing"));
 }
 
 TEST_F(File, RefusesToReadWhatIsNotAFile) {

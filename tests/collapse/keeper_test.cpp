@@ -138,6 +138,18 @@ TEST_F(KeeperReplay, AModelWithOutputsComesToRestAtTheSameStep) {
   expect_same(whole, resume(run, kept_));
 }
 
+TEST_F(KeeperReplay, ARunOutlivesCheckpointsThatCannotBeWritten) {
+  const auto run = run_mixed(0.1);
+  kept_.checkpoint = folder_.str();  // a folder
+  kept_.checkpoint_interval = 1e-9;
+  std::vector<std::string> told;
+  RunCallbacks callbacks;
+  callbacks.on_lost_checkpoint = [&](const std::string& why) { told.push_back(why); };
+  expect_same(run({}, {}), run(kept_, callbacks));
+  ASSERT_GT(told.size(), 10u);
+  EXPECT_THAT(told[0], testing::HasSubstr("cannot write " + folder_.str()));
+}
+
 TEST_F(KeeperReplay, GoesOnToALaterTime) {
   (void)cancel_at(run_of(shot_house("0.4 s")), 0.3, kept_);
   RunOptions later = kept_;

@@ -42,6 +42,9 @@ TEST(Expression, KnowsItsFunctions) {
   EXPECT_EQ(value("abs(1 - 3)"), 2);
   EXPECT_DOUBLE_EQ(value("ln(exp(3))"), 3);
   EXPECT_EQ(value("max(min(1, 2), max(0, x))"), 2);
+  // of what has no value there is neither a least nor a largest
+  for (const char* formula : {"min(1, sqrt(0 - 1))", "min(sqrt(0 - 1), 1)", "max(1, ln(0 - 1))", "max(ln(0 - 1), 1)"})
+    EXPECT_TRUE(std::isnan(value(formula))) << formula;
 }
 
 // Table 1 of the paper: f_ct from f_c by its equation (1), values of reference_cases to six digits.

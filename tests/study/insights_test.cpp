@@ -632,7 +632,7 @@ TEST(Story, GuaranteesNothingOfABoxThatIsBroken) {
   b.broken = 0;
   EXPECT_NE(tell_guarantee(b).find("not finished"), std::string::npos);
   b.volume = 0;
-  EXPECT_NE(tell_guarantee(b).find("no room"), std::string::npos);
+  EXPECT_NE(tell_guarantee(b).find("too little room"), std::string::npos);
   b.volume = 0.3, b.kept = true;
   EXPECT_NE(tell_guarantee(b).find("No run violated the requirement in 3135 inside, 149 of them"), std::string::npos);
   EXPECT_NE(tell_guarantee(b, true).find("constraints"), std::string::npos);

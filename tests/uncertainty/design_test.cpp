@@ -269,6 +269,28 @@ TEST(Design, LeavesForbiddenIslandsAndFailuresOut) {
   EXPECT_GE(right, 1);
 }
 
+TEST(Design, BoxesOfManyInputsMayBeSmall) {
+  EXPECT_DOUBLE_EQ(calc_smallest(1e-3, 1), 1e-3);
+  EXPECT_DOUBLE_EQ(calc_smallest(1e-3, 3), 1e-3);
+  EXPECT_NEAR(calc_smallest(1e-3, 5), 1e-5, 1e-18);  // a tenth of each side
+  // a cube with a quarter of each side: 0.08 % of the support
+  const auto is_good = [](const Point& x) {
+    return std::all_of(x.begin(), x.end(), [](double v) { return std::abs(v - 0.5) <= 0.12; });
+  };
+  const Space space{std::vector<FuzzyNumber>(5, make_triangular(0, 0.5, 1)), {}, {}};
+  DesignOptions options;
+  options.rerun_limit = 0;
+  const Found f = find(space, make_model(is_good), outcome_0, options, 6000);
+  ASSERT_FALSE(f.design.boxes.empty());
+  const PermissibleBox& b = f.design.boxes.front();
+  EXPECT_TRUE(b.kept);
+  EXPECT_GT(b.volume, 0.4 * std::pow(0.24, 5));
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_GE(b.box.lower[i], 0.38);
+    EXPECT_LE(b.box.upper[i], 0.62);
+  }
+}
+
 TEST(Design, RanksKeptBoxesFirst) {
   const Found f = find(Space{cases::make_jump_inputs(), {}, {}}, make_evaluate(cases::calc_jump), outcome_0, {});
   ASSERT_FALSE(f.design.boxes.empty());

@@ -71,7 +71,7 @@ export function makeStudy(count = 60) {
       requirement: "topple, reach <= 10", permissible_part: 0.62, permissible_part_error: 0.05, permissible_part_points: 60, permissible_runs: 40, forbidden_runs: 19, failed_runs: 1, ending: "complete",
       list: [
         { kept: true, guarantee: "No run violated the requirement in 25 inside, 20 of them at fresh random points: with a confidence of 95 % at most 14.0 % of the box violates it. It is not proven, and smaller islands may exist.", inputs: [{ name: "fc", lower: 20, upper: 40, core: 28 }, { name: hostile, lower: 0.3, upper: 1.7, core: 1 }], volume: 0.4, runs: 25, fresh: 20, tries: 1, violating: 0.14, distance: 0.1, robustness: 1.2, outputs: [] },
-        { kept: false, guarantee: "This box was dropped: what violates the requirement leaves next to no room around these runs.", inputs: [{ name: "fc", lower: 20, upper: 21, core: null }, { name: hostile, lower: 0.3, upper: 0.4, core: null }], volume: 0.001, runs: 2, fresh: 0, tries: 0, violating: null, distance: 0, robustness: null, outputs: [] },
+        { kept: false, guarantee: "This box was dropped: what violates the requirement leaves too little room around these runs (below a thousandth of the support; of more than three inputs, below a tenth of its width in the mean).", inputs: [{ name: "fc", lower: 20, upper: 21, core: null }, { name: hostile, lower: 0.3, upper: 0.4, core: null }], volume: 0.001, runs: 2, fresh: 0, tries: 0, violating: null, distance: 0, robustness: null, outputs: [] },
       ],
     },
     confirmation: {

@@ -13,7 +13,7 @@ function Share(props: { driver: Driver | undefined }) {
     <td class="share">
       <span class="degree" aria-hidden="true"><i style={{ width: percent(d.first) }} /></span>
       <span class="number">{d.first.toFixed(2)} ± {d.first_error.toFixed(2)}</span>
-      {d.total !== null && <span class="quiet">{` with others ${d.total.toFixed(2)}`}</span>}
+      {d.total !== null && <span class="quiet">{` with others ${d.total.toFixed(2)} ± ${(d.total_error ?? 0).toFixed(2)}`}</span>}
       <span class="quiet"> {d.places[0] === d.places[1] ? `place ${d.places[0]}` : `place ${d.places[0]} to ${d.places[1]}`}</span>
     </td>
   );
