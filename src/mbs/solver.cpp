@@ -88,7 +88,7 @@ Summary run(const Model& model, const Options& options) {
     goes_on = s.advance();
     if (goes_on && options.on_moment && is_due()) options.on_moment(s.keep()), kept = Clock::now();
   }
-  const Summary summary = s.finish();
+  Summary summary = s.finish();
   if (summary.ending == Summary::Ending::Cancelled && options.on_moment) {
     Moment here = s.keep();
     here.summary.ending = Summary::Ending::TimeLimit;  // it has not ended where it goes on
