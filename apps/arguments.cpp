@@ -527,6 +527,7 @@ std::string find_missing(const Arguments& a) {
                ? std::string()
                : refuse(verb, "--checkpoint-interval requires --checkpoint or --resume");
   };
+  const std::string other_engine = a.engine == "native" ? "" : "--engine " + a.engine;
   switch (a.verb) {
     case Arguments::Verb::New:
       return a.input.empty() && !a.list ? refuse("new", "a file to write is required") : "";
@@ -537,9 +538,9 @@ std::string find_missing(const Arguments& a) {
       if (a.output.empty() && !a.fe.mesh_only) return refuse("fe", "--output is required");
       return find_odd_checkpoint("fe", a.fe.mesh_only ? "--mesh-only" : "");
     case Arguments::Verb::Run:
-      return find_odd_checkpoint("run", a.check_step ? "--check-step" : "");
+      return find_odd_checkpoint("run", a.check_step ? "--check-step" : other_engine);
     case Arguments::Verb::MbsRun:
-      return find_odd_checkpoint("mbs run", "");
+      return find_odd_checkpoint("mbs run", other_engine);
     case Arguments::Verb::Study:
       if (a.study.action != StudyArguments::Action::Run || !(a.input.empty() || a.output.empty())) return "";
       return refuse("study",

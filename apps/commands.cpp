@@ -101,9 +101,6 @@ collapse::RunOptions make_options(const Arguments& a, const char* duration) {
 
 std::string find_checkpoint(const Arguments& a) {
   std::string path = (fs::path(a.output) / "checkpoint.bin").string();
-  if (a.engine != "native")
-    throw InputError("E674", fmt::format("{} keeps no checkpoint and goes on from none", a.engine),
-                     "the native engine does");
   if (!a.resume || fs::is_regular_file(a.output)) return path;
   if (!fs::exists(path))
     throw InputError("E674", fmt::format("{}: there is no checkpoint to go on from", path), "start without --resume");
@@ -111,13 +108,9 @@ std::string find_checkpoint(const Arguments& a) {
   return path;
 }
 
-namespace {
-
 std::string write_option(const char* name, const std::string& value) {
   return value.empty() ? "" : fmt::format(" {} {}", name, quote_word(value));
 }
-
-}  // namespace
 
 void tell_lost_checkpoint(ProgressLine& progress, const std::string& why) {
   progress.clear();
@@ -374,6 +367,8 @@ int run_plan_file(const Arguments& a, const std::atomic<bool>& cancel) {
       files.emplace_back("model", path);
     };
     callbacks.on_event = [&](const record::Event& e) { events.print(e); };
+    bool has_checkpoint = options.resume;
+    callbacks.on_checkpoint = [&] { has_checkpoint = true; };
     callbacks.on_lost_checkpoint = [&](const std::string& why) { tell_lost_checkpoint(progress, why); };
     callbacks.on_resume = [&](double time) { std::fprintf(out, "Going on from %.4g s.\n", time); };
     callbacks.progress.report = [&](double done, double whole) { progress.show(done, whole); };
@@ -382,7 +377,7 @@ int run_plan_file(const Arguments& a, const std::atomic<bool>& cancel) {
                                           : collapse::run_plan(plan, knowledge, options, callbacks);
     progress.clear();
     const int code = close_run(r, a, out, std::move(files));
-    if (r.ending == "cancelled" && !options.checkpoint.empty()) tell_how_to_go_on(out, a, "run", write_run_options(a));
+    if (r.ending == "cancelled" && has_checkpoint) tell_how_to_go_on(out, a, "run", write_run_options(a));
     return code;
   } catch (const InputError& e) { return refuse(e, warnings, text, a.json); }
 }

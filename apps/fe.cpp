@@ -29,10 +29,9 @@ farfield::FeOptions make_fe_options(const Arguments& a) {
 
 /// Those that a run has to have again to go on.
 std::string write_options(const Arguments& a) {
-  std::string out = fmt::format(" --size {}", quote_word(a.fe.size));
+  std::string out = write_option("--size", a.fe.size);
   if (a.fe.across != FeArguments{}.across) out += fmt::format(" --across {}", a.fe.across);
-  if (!a.fe.scaled_step.empty()) out += fmt::format(" --scaled-step {}", quote_word(a.fe.scaled_step));
-  return out + (a.fe.skip_quiet ? " --skip-quiet" : "");
+  return out + write_option("--scaled-step", a.fe.scaled_step) + (a.fe.skip_quiet ? " --skip-quiet" : "");
 }
 
 void print_mesh(std::FILE* out, const farfield::MeshReport& report) {

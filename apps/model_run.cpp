@@ -126,6 +126,8 @@ int run_model_file(const Arguments& a, const std::atomic<bool>& cancel) {
     callbacks.on_event = [&](const record::Event& e) {
       if (e.kind != "rest" && e.kind != "failure") events.print(e);
     };
+    bool has_checkpoint = options.resume;
+    callbacks.on_checkpoint = [&] { has_checkpoint = true; };
     callbacks.on_lost_checkpoint = [&](const std::string& why) { tell_lost_checkpoint(progress, why); };
     callbacks.on_resume = [&](double time) { std::fprintf(out, "Going on from %.4g s.\n", time); };
     callbacks.on_summary = [&](const mbs::Summary& s) { summary = s; };
@@ -150,8 +152,7 @@ int run_model_file(const Arguments& a, const std::atomic<bool>& cancel) {
           {{"name", o.name}, {"quantity", o.quantity}, {"unit", o.unit}, {"samples", o.time.size()}, {"file", path}});
     }
     print_leftovers(out, a, all);
-    if (r.ending == "cancelled" && !options.checkpoint.empty())
-      tell_how_to_go_on(out, a, "mbs run", write_run_options(a));
+    if (r.ending == "cancelled" && has_checkpoint) tell_how_to_go_on(out, a, "mbs run", write_run_options(a));
     if (a.json) {
       json j = summary_json(r, files, code);
       j["steps"] = summary.steps;

@@ -56,6 +56,8 @@ void set_checkpoint(const Arguments& a, Options& o) {
 }
 /// Says that a checkpoint could not be written.
 void tell_lost_checkpoint(ProgressLine&, const std::string& why);
+/// An option as it is typed, with a space before it; nothing without a value.
+std::string write_option(const char* name, const std::string& value);
 /// Says how a run that was cancelled goes on.
 ///   verb, options  as typed, for the same run, options with a space before each
 void tell_how_to_go_on(std::FILE* out, const Arguments&, const std::string& verb, const std::string& options);

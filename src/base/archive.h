@@ -4,8 +4,8 @@
 
 #include <cstddef>
 #include <cstring>
+#include <span>
 #include <string>
-#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -14,15 +14,17 @@
 
 namespace topple {
 
-class ArchiveWriter {
+/// Bytes: a string, or a vector of bytes.
+template <class Bytes>
+class BasicArchiveWriter {
  public:
   template <class T>
   void operator()(const T& x) {
     static_assert(std::is_trivially_copyable_v<T>);
     append(&x, sizeof x);
   }
-  template <class T>
-  void operator()(const std::vector<T>& x) {
+  template <class T, class A>
+  void operator()(const std::vector<T, A>& x) {
     (*this)(x.size());
     if constexpr (std::is_trivially_copyable_v<T>) {
       append(x.data(), x.size() * sizeof(T));
@@ -42,27 +44,29 @@ class ArchiveWriter {
   void operator()(const std::pair<A, B>& x) {
     (*this)(x.first), (*this)(x.second);
   }
-  std::string bytes;
+  Bytes bytes;
 
  private:
   void append(const void* from, size_t size) {
-    if (size > 0) bytes.append(static_cast<const char*>(from), size);
+    const auto* begin = static_cast<const typename Bytes::value_type*>(from);
+    if (size > 0) bytes.insert(bytes.end(), begin, begin + size);
   }
 };
+using ArchiveWriter = BasicArchiveWriter<std::string>;
 
 class ArchiveReader {
  public:
   /// The bytes must outlive it. Where they end too early it throws InputError with this code.
-  ///   path, hint  where they are from, and what to do without them
-  ArchiveReader(std::string_view bytes, std::string code, std::string path, std::string hint)
-      : bytes_(bytes), code_(std::move(code)), path_(std::move(path)), hint_(std::move(hint)) {}
+  ///   what, hint  the file, or what they are not then; and what to do without them
+  ArchiveReader(std::span<const std::byte> bytes, std::string code, std::string what, std::string hint = {})
+      : bytes_(bytes), code_(std::move(code)), what_(std::move(what)), hint_(std::move(hint)) {}
   template <class T>
   void operator()(T& x) {
     static_assert(std::is_trivially_copyable_v<T>);
     take(&x, sizeof x);
   }
-  template <class T>
-  void operator()(std::vector<T>& x) {
+  template <class T, class A>
+  void operator()(std::vector<T, A>& x) {
     if constexpr (std::is_trivially_copyable_v<T>) {
       x.resize(take_count(sizeof(T)));
       take(x.data(), x.size() * sizeof(T));
@@ -89,15 +93,18 @@ class ArchiveReader {
     (*this)(x.first), (*this)(x.second);
   }
   bool is_done() const { return at_ == bytes_.size(); }
-  [[noreturn]] void refuse(const std::string& why) const { throw InputError(code_, path_ + ": " + why, hint_); }
+  [[noreturn]] void refuse(const std::string& why) const { throw InputError(code_, what_ + ": " + why, hint_); }
 
- private:
+ protected:
+  /// Length of a list of items of so many bytes at least.
   size_t take_count(size_t size) {
     size_t count = 0;
     (*this)(count);
     if (count > (bytes_.size() - at_) / size) fail();
     return count;
   }
+
+ private:
   void take(void* to, size_t size) {
     if (size > bytes_.size() - at_) fail();
     if (size > 0) std::memcpy(to, bytes_.data() + at_, size);
@@ -105,8 +112,8 @@ class ArchiveReader {
   }
   [[noreturn]] void fail() const { refuse("it is cut off"); }
 
-  std::string_view bytes_;
-  std::string code_, path_, hint_;
+  std::span<const std::byte> bytes_;
+  std::string code_, what_, hint_;
   size_t at_ = 0;
 };
 

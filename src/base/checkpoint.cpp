@@ -5,18 +5,26 @@
 
 namespace topple {
 
+namespace {
+
+ArchiveReader read_from(const std::string& bytes, const std::string& path) {
+  return {std::as_bytes(std::span(bytes)), "E674", path, "start without --resume"};
+}
+
+}  // namespace
+
 void write_checkpoint_file(const std::string& path, const std::string& kind, const std::string& key,
-                           const ArchiveWriter& contents) {
+                           const std::function<void(ArchiveWriter&)>& write_contents) {
   ArchiveWriter out;
   out(kind), out(key);
-  out.bytes += contents.bytes;
+  write_contents(out);
   out.bytes += calc_sha256(out.bytes);
   replace_file(path, out.bytes);
 }
 
 CheckpointFile::CheckpointFile(const std::string& path, const std::string& kind, const std::string& key,
                                const std::string& made_of)
-    : bytes_(read_file(path)), in_(bytes_, "E674", path, "start without --resume") {
+    : bytes_(read_file(path)), in_(read_from(bytes_, path)) {
   constexpr size_t kHash = 64;  // digits of calc_sha256 at the end
   std::string found;
   if (bytes_.size() < kind.size() + sizeof(size_t) + kHash) in_.refuse("this is not a checkpoint");
@@ -24,7 +32,7 @@ CheckpointFile::CheckpointFile(const std::string& path, const std::string& kind,
   if (found != kind) in_.refuse("this is not a checkpoint of this version");
   const std::string hash = bytes_.substr(bytes_.size() - kHash);
   bytes_.resize(bytes_.size() - kHash);
-  in_ = ArchiveReader(bytes_, "E674", path, "start without --resume");
+  in_ = read_from(bytes_, path);
   if (calc_sha256(bytes_) != hash) in_.refuse("the checkpoint is cut off or damaged");
   in_(found);
   in_(found);

@@ -1,6 +1,7 @@
 #pragma once
 /// Files from which a run goes on: what they are, what they are of, the state, and a hash of it all.
 
+#include <functional>
 #include <string>
 
 #include "base/archive.h"
@@ -11,7 +12,7 @@ namespace topple {
 ///   kind  and version of the contents, such as "topple-checkpoint-1"
 ///   key   of what the run is made of: a checkpoint of something else is refused
 void write_checkpoint_file(const std::string& path, const std::string& kind, const std::string& key,
-                           const ArchiveWriter& contents);
+                           const std::function<void(ArchiveWriter&)>& write_contents);
 
 /// Its contents, of this kind and key. Throws InputError E674.
 class CheckpointFile {

@@ -22,8 +22,7 @@ namespace topple {
 namespace {
 
 // .topple-PROCESS-NUMBER.part, beside what it will replace
-const std::string kUnfinished = ".topple-";
-constexpr std::string_view kUnfinishedEnd = ".part";
+constexpr std::string_view kUnfinished = ".topple-", kUnfinishedEnd = ".part";
 
 /// The name under which a file is being written, for signal handlers; of several at once, one.
 class UnfinishedName {
@@ -167,8 +166,9 @@ void replace_file(const std::string& path, std::string_view bytes) {
   constexpr int most = 100;  // names that others may have
   int number = EEXIST;
   for (int i = 0; i < most && number == EEXIST; ++i) {
-    const std::string name =
-        kUnfinished + std::to_string(::getpid()) + "-" + std::to_string(count++) + std::string(kUnfinishedEnd);
+    std::string name(kUnfinished);
+    name += std::to_string(::getpid()) + "-" + std::to_string(count++);
+    name += kUnfinishedEnd;
     number = write_beside(folder / name, target, bytes, is_there ? &old : nullptr);
   }
   if (number != 0) fail(path, reason_of(number));

@@ -17,6 +17,12 @@ constexpr const char* kKind = "topple-checkpoint-1";
 
 }  // namespace
 
+std::string write_rules(const Knowledge& k) {
+  std::string text;
+  for (const Rule& rule : k.rules) text += fmt::format("{} {}\n", rule.id, rule.value);
+  return text;
+}
+
 Keeper::Keeper(const RunOptions& options, const RunCallbacks& callbacks, Recorder& recorder)
     : options_(options), callbacks_(callbacks), recorder_(recorder) {}
 
@@ -43,11 +49,11 @@ void Keeper::join(const mbs::Model& model, const std::string& of, mbs::Options& 
   }
   o.moment_interval = options_.checkpoint_interval;
   o.on_moment = [this](const mbs::Moment& m) {
-    ArchiveWriter out;
-    mbs::write_moment(m, out);
-    recorder_.write(out);
     try {
-      write_checkpoint_file(options_.checkpoint, kKind, key_, out);
+      write_checkpoint_file(options_.checkpoint, kKind, key_, [&](ArchiveWriter& out) {
+        mbs::write_moment(m, out);
+        recorder_.write(out);
+      });
     } catch (const std::runtime_error& e) {  // a full disk takes no results
       if (callbacks_.on_lost_checkpoint) callbacks_.on_lost_checkpoint(e.what());
       return;

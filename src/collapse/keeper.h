@@ -9,6 +9,9 @@
 
 namespace topple::collapse {
 
+/// Ids and values of all rules, as part of what a checkpoint is of.
+std::string write_rules(const Knowledge&);
+
 class Keeper {
  public:
   /// All must outlive it.

@@ -109,9 +109,7 @@ record::Record run_with(const product::Plan& plan, const Knowledge& k, const Run
   o.step_share = options.step_share;
   record_into(recorder, o);
   Keeper keeper(options, callbacks, recorder);
-  std::string of = plan.text;
-  for (const Rule& rule : k.rules) of += fmt::format("\n{} {}", rule.id, rule.value);
-  keeper.join(model, of, o);
+  keeper.join(model, plan.text + "\n" + write_rules(k), o);
   const mbs::Summary summary = move(model, map, o);
   end_record(summary, " before the first charge", recorder, r);
   const std::atomic<bool>* cancel = callbacks.progress.cancel;

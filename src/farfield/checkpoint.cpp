@@ -47,19 +47,19 @@ bool Swing::has_passed(const Vec3& place) const {
 
 void write_checkpoint(const std::string& path, const std::string& key, const RunState& s,
                       const std::vector<std::byte>& system) {
-  ArchiveWriter out;
-  pass_state(out, s);
-  out(s.shown.size());
-  for (const auto& entry : s.shown) {
-    out(entry.index());
-    if (const mbs::View* v = std::get_if<mbs::View>(&entry))
-      pass_view(out, *v);
-    else
-      pass_happening(out, std::get<mbs::Happening>(entry));
-  }
-  out(s.foot_forces);
-  out(system);
-  write_checkpoint_file(path, kKind, key, out);
+  write_checkpoint_file(path, kKind, key, [&](ArchiveWriter& out) {
+    pass_state(out, s);
+    out(s.shown.size());
+    for (const auto& entry : s.shown) {
+      out(entry.index());
+      if (const mbs::View* v = std::get_if<mbs::View>(&entry))
+        pass_view(out, *v);
+      else
+        pass_happening(out, std::get<mbs::Happening>(entry));
+    }
+    out(s.foot_forces);
+    out(system);
+  });
 }
 
 RunState read_checkpoint(const std::string& path, const std::string& key, std::vector<std::byte>& system) {

@@ -12,6 +12,7 @@
 #include "base/hash.h"
 #include "base/unit.h"
 #include "collapse/findings.h"
+#include "collapse/keeper.h"
 #include "farfield/checkpoint.h"
 #include "farfield/fragments.h"
 #include "farfield/motion.h"
@@ -91,11 +92,9 @@ class Course {
         motion_(plan, whole_, model, map, fe.grid.size) {
     check_added_mass(scaling_, mesh_);
     if (callbacks.on_mesh) callbacks.on_mesh(mesh_, scaling_.describe());
-    std::string rules;
-    for (const collapse::Rule& rule : k.rules) rules += fmt::format("{} {}\n", rule.id, rule.value);
-    key_ = calc_sha256(fmt::format("{}\n{}{} {} {} {} {} {} {}", plan.text, rules, run.program_version, fe.grid.size,
-                                   fe.grid.least_across, fe.grid.snap_share, fe.scaled_step, fe.skip_quiet,
-                                   options.frame_interval));
+    key_ = calc_sha256(fmt::format("{}\n{}{} {} {} {} {} {} {}", plan.text, collapse::write_rules(k),
+                                   run.program_version, fe.grid.size, fe.grid.least_across, fe.grid.snap_share,
+                                   fe.scaled_step, fe.skip_quiet, options.frame_interval));
     for (const collapse::Firing& f : map.schedule)
       if (!f.fails) schedule_.push_back(f);
     last_firing_ = schedule_.empty() ? 0 : schedule_.back().time;

@@ -1,9 +1,6 @@
 #include "mbs/snapshot.h"
 
-#include <cstring>
-#include <type_traits>
-
-#include "base/error.h"
+#include "base/archive.h"
 #include "base/hash.h"
 #include "mbs/model_json.h"
 #include "mbs/system.h"
@@ -12,71 +9,28 @@ namespace topple::mbs {
 
 namespace {
 
-class Writer {
- public:
-  template <class T>
-  void operator()(const T& x) {
-    static_assert(std::is_trivially_copyable_v<T>);
-    append(&x, sizeof x);
-  }
-  template <class T, class A>
-  void operator()(const std::vector<T, A>& x) {
-    static_assert(std::is_trivially_copyable_v<T>);
-    (*this)(x.size());
-    append(x.data(), x.size() * sizeof(T));
-  }
+struct Writer : BasicArchiveWriter<std::vector<std::byte>> {
+  using BasicArchiveWriter::operator();
   template <class T>
   void operator()(const LaneArray<T>& x) {
     (*this)(x.size());
     for (size_t i = 0; i < x.size(); ++i) (*this)(x[i]);
   }
-  std::vector<std::byte> bytes;
-
- private:
-  void append(const void* from, size_t size) {
-    const auto* p = static_cast<const std::byte*>(from);
-    bytes.insert(bytes.end(), p, p + size);
-  }
 };
 
-class Reader {
- public:
-  explicit Reader(const std::vector<std::byte>& bytes) : bytes_(bytes) {}
-  template <class T>
-  void operator()(T& x) {
-    take(&x, sizeof x);
-  }
-  template <class T, class A>
-  void operator()(std::vector<T, A>& x) {
-    size_t size = 0;
-    (*this)(size);
-    if (size > (bytes_.size() - at_) / sizeof(T)) fail();
-    x.resize(size);
-    take(x.data(), size * sizeof(T));
-  }
+struct Reader : ArchiveReader {
+  explicit Reader(const std::vector<std::byte>& bytes)
+      : ArchiveReader(bytes, "E620", "these bytes are not a snapshot of this model") {}
+  using ArchiveReader::operator();
   template <class T>
   void operator()(LaneArray<T>& x) {
-    size_t size = 0;
-    (*this)(size);
-    if (size > (bytes_.size() - at_) / sizeof(T)) fail();
-    x.resize(size);
-    for (size_t i = 0; i < size; ++i) {
+    x.resize(take_count(sizeof(T)));
+    for (size_t i = 0; i < x.size(); ++i) {
       T item;
       (*this)(item);
       x[i] = item;
     }
   }
-  bool is_at_end() const { return at_ == bytes_.size(); }
-  [[noreturn]] static void fail() { throw InputError("E620", "these bytes are not a snapshot of this model"); }
-
- private:
-  void take(void* to, size_t size) {
-    if (size > bytes_.size() - at_) fail();
-    if (size > 0) std::memcpy(to, bytes_.data() + at_, size);
-    at_ += size;
-  }
-  const std::vector<std::byte>& bytes_;
-  size_t at_ = 0;
 };
 
 /// Every member of the state and what the next step takes over from this one.
@@ -131,7 +85,7 @@ void read_state(Reader& r, System& system) {
   State state;
   Carried carried;
   visit(r, state, carried);
-  if (!r.is_at_end()) Reader::fail();
+  if (!r.is_done()) r.refuse("they are too many");
   system.state = std::move(state);
   system.force = std::move(carried.force);
   system.torque = std::move(carried.torque);
@@ -166,12 +120,10 @@ std::vector<std::byte> write_snapshot(System& system) {
   Writer w;
   w(kMagic);
   const std::string& identity = identity_of(system);
-  w(std::vector<char>(identity.begin(), identity.end()));
-  w(system.joint_notes.size());
-  for (const auto& [joint, situation] : system.joint_notes) w(joint), w(situation);
+  w(identity);
+  w(system.joint_notes);
   const Summary& s = system.summary;
-  w(s.notes.size());
-  for (const std::string& note : s.notes) w(std::vector<char>(note.begin(), note.end()));
+  w(s.notes);
   w(s.shortest_step), w(s.step_needed), w(s.highest_frequency);
   write_state(w, system);
   return std::move(w.bytes);
@@ -180,24 +132,15 @@ std::vector<std::byte> write_snapshot(System& system) {
 void read_snapshot(const std::vector<std::byte>& bytes, System& system) {
   Reader r(bytes);
   std::uint64_t magic = 0;
-  std::vector<char> identity;
+  std::string identity;
   r(magic);
-  if (magic != kMagic) Reader::fail();
+  if (magic != kMagic) r.refuse("they are of another kind");
   r(identity);
-  if (std::string(identity.begin(), identity.end()) != identity_of(system)) Reader::fail();
+  if (identity != identity_of(system)) r.refuse("they are of another model or step");
   std::vector<std::pair<int, int>> joint_notes;
-  std::vector<std::string> notes;
   Summary s = system.summary;
-  size_t count = 0;
-  for (r(count); count > 0; --count) {
-    auto& [joint, situation] = joint_notes.emplace_back();
-    r(joint), r(situation);
-  }
-  for (r(count); count > 0; --count) {
-    std::vector<char> note;
-    r(note);
-    notes.emplace_back(note.begin(), note.end());
-  }
+  std::vector<std::string> notes;
+  r(joint_notes), r(notes);
   r(s.shortest_step), r(s.step_needed), r(s.highest_frequency);
   read_state(r, system);
   s.notes = std::move(notes);

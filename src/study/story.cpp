@@ -325,16 +325,6 @@ void tell_requirement(const Problem& p, const StudyResult& r, std::vector<Senten
 
 }  // namespace
 
-namespace {
-
-int count_sides(const uncertainty::Box& box) {
-  int sides = 0;
-  for (std::size_t i = 0; i < box.lower.size(); ++i) sides += box.upper[i] > box.lower[i] ? 1 : 0;
-  return sides;
-}
-
-}  // namespace
-
 std::string tell_guarantee(const uncertainty::PermissibleBox& b, bool has_interaction) {
   std::string text;
   if (b.kept) {
@@ -344,8 +334,7 @@ std::string tell_guarantee(const uncertainty::PermissibleBox& b, bool has_intera
       text += fmt::format(": with a confidence of 95 % at most {} % of the box violates it",
                           words_of_most(100 * b.violating, 1));
     text += ". It is not proven, and smaller islands may exist.";
-  } else if (b.samples == 0 ||
-             b.volume < uncertainty::calc_smallest(uncertainty::DesignOptions{}.smallest, count_sides(b.box))) {
+  } else if (b.samples == 0 || b.volume < uncertainty::calc_smallest(uncertainty::DesignOptions{}.smallest, b.box)) {
     text =
         "This box was dropped: what violates the requirement leaves too little room around these runs (below a "
         "thousandth of the support; of more than three inputs, below a tenth of its width in the mean).";

@@ -65,7 +65,7 @@ class Design {
       : space_(space), asker_(asker), requirement_(requirement), options_(options), support_(make_box(space, 0)) {
     for (int i = 0; i < space.size(); ++i)
       if (support_.upper[i] > support_.lower[i]) axes_.push_back(i);
-    smallest_ = calc_smallest(options.smallest, static_cast<int>(axes_.size()));
+    smallest_ = calc_smallest(options.smallest, support_);
   }
 
   DesignResult run() {
@@ -465,9 +465,7 @@ class Review {
  public:
   Review(const Space& space, const Requirement& requirement, const Archive& archive, const DesignOptions& options)
       : space_(space), archive_(archive), options_(options), support_(make_box(space, 0)) {
-    int sides = 0;
-    for (int k = 0; k < space.size(); ++k) sides += support_.upper[k] > support_.lower[k] ? 1 : 0;
-    smallest_ = calc_smallest(options.smallest, sides);
+    smallest_ = calc_smallest(options.smallest, support_);
     for (const Sample& s : archive.samples()) {
       possible_.push_back(is_in_cut(space, support_, 0, s.x));
       if (!possible_.back()) {
@@ -575,9 +573,11 @@ void review_boxes(const Space& space, std::vector<PermissibleBox>& boxes, const 
   boxes = std::move(ordered);
 }
 
-double calc_smallest(double smallest, int inputs) {
+double calc_smallest(double smallest, const Box& box) {
+  int sides = 0;
+  for (std::size_t i = 0; i < box.lower.size(); ++i) sides += box.upper[i] > box.lower[i] ? 1 : 0;
   constexpr double few = 3;
-  return std::pow(smallest, std::max(1.0, inputs / few));
+  return std::pow(smallest, std::max(1.0, sides / few));
 }
 
 DesignResult find_permissible_boxes(const Space& space, Asker& asker, const Requirement& requirement,

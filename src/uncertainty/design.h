@@ -33,8 +33,8 @@ struct DesignOptions {
   std::uint64_t seed = 1;
 };
 
-/// Part of the support's volume below which boxes of so many inputs are not kept.
-double calc_smallest(double smallest, int inputs);
+/// Part of the support's volume below which boxes with as many sides as this one are not kept.
+double calc_smallest(double smallest, const Box&);
 
 /// A box of inputs, inside which no run violated the requirement.
 struct PermissibleBox {

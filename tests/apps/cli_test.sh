@@ -518,7 +518,7 @@ cancel)
   expect 0 "$topple" mbs run whole/model.json --csv --no-report -o again
   for table in series bodies events; do cmp kept/$table.csv again/$table.csv || failures=$((failures + 1)); done
   expect 2 "$topple" run "$plan" --resume -o nowhere; has err "E674"; [ ! -e nowhere ] || { echo "a folder for nothing"; failures=$((failures + 1)); }
-  expect 2 "$topple" run "$plan" --checkpoint --engine simbody -o nowhere; has err "simbody keeps no checkpoint"
+  expect 2 "$topple" run "$plan" --checkpoint --engine simbody -o nowhere; has err "--engine simbody excludes --checkpoint"
   expect 2 "$topple" run "$plan" --checkpoint --check-step -o nowhere; has err "excludes"
   expect 2 "$topple" mbs run "$plan" --checkpoint-interval "1 s" -o nowhere; has err "requires --checkpoint or --resume"
   ;;

@@ -270,9 +270,10 @@ TEST(Design, LeavesForbiddenIslandsAndFailuresOut) {
 }
 
 TEST(Design, BoxesOfManyInputsMayBeSmall) {
-  EXPECT_DOUBLE_EQ(calc_smallest(1e-3, 1), 1e-3);
-  EXPECT_DOUBLE_EQ(calc_smallest(1e-3, 3), 1e-3);
-  EXPECT_NEAR(calc_smallest(1e-3, 5), 1e-5, 1e-18);  // a tenth of each side
+  const auto unit_box = [](size_t n) { return Box{Point(n, 0.0), Point(n, 1.0)}; };
+  EXPECT_DOUBLE_EQ(calc_smallest(1e-3, unit_box(1)), 1e-3);
+  EXPECT_DOUBLE_EQ(calc_smallest(1e-3, unit_box(3)), 1e-3);
+  EXPECT_NEAR(calc_smallest(1e-3, unit_box(5)), 1e-5, 1e-18);  // a tenth of each side
   // a cube with a quarter of each side: 0.08 % of the support
   const auto is_good = [](const Point& x) {
     return std::all_of(x.begin(), x.end(), [](double v) { return std::abs(v - 0.5) <= 0.12; });
