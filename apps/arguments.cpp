@@ -37,6 +37,12 @@ std::string is_whole_number(const std::string& s) {
   return is_whole ? std::string() : "a whole number is wanted, not \"" + s + "\"";
 }
 
+void add_threads(CLI::App* verb, Arguments& a) {
+  verb->add_option("--threads", a.threads, "threads; results do not depend on it")
+      ->check(is_whole_number)
+      ->check(CLI::Range(1, 1024));
+}
+
 /// Name of a type whose values completion offers; what is not among them has an error of its own.
 std::string choose_from(const std::vector<std::string>& names) {
   std::string out;
@@ -61,7 +67,7 @@ void add_run_options(CLI::App* verb, Arguments& a) {
       ->check(CLI::Range(0.001, 1.0))
       ->check(
           [](const std::string& word) { return word.find_first_of("nN") == std::string::npos ? "" : "is no number"; });
-  verb->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
+  add_threads(verb, a);
   verb->add_option("--engine", a.engine, "program that solves the multibody model")
       ->type_name(choose_from(engines::engine_names()));
   add_json(verb, a);
@@ -184,7 +190,9 @@ void add_mbs_compare(CLI::App& mbs, Arguments& a) {
   mbs_compare->add_option(
       "--accuracy", a.accuracy,
       "relative, of engines that control their errors and then choose their steps, --step or not; 1e-9 without --step");
-  mbs_compare->add_option("--frames", a.frames, "instants that are compared (100)")->check(CLI::Range(1, 1000000));
+  mbs_compare->add_option("--frames", a.frames, "instants that are compared (100)")
+      ->check(is_whole_number)
+      ->check(CLI::Range(1, 1000000));
   mbs_compare->add_flag("--bodies", a.bodies, "also list every body");
   mbs_compare->add_flag("--skip-unsupported", a.skip_unsupported,
                         "go on without engines that cannot express the model");
@@ -254,6 +262,7 @@ void add_export(CLI::App& app, Arguments& a) {
       ->type_name("QUANTITY")
       ->needs(lsdyna);
   exports->add_option("--across", a.fe.across, "of these over the thickness of columns and beams, at least (2)")
+      ->check(is_whole_number)
       ->check(CLI::Range(2, 8))
       ->needs(lsdyna);
   exports->add_option("--until", a.duration, "time that --lsdyna asks for; the plan's duration if not given")
@@ -313,7 +322,7 @@ void add_rcc(CLI::App& app, Arguments& a) {
       ->type_name("QUANTITY");
   rcc->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")
       ->type_name("FILE");
-  rcc->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
+  add_threads(rcc, a);
   add_json(rcc, a);
   rcc->callback([&a] { a.verb = Arguments::Verb::Rcc; });
   add_examples(rcc, R"(  topple rcc plan.toml --member C-A1-0 -o zone
@@ -329,6 +338,7 @@ void add_fe(CLI::App& app, Arguments& a) {
   fe->add_option("--size", f.size, "edge of the elements (0.4 m); smaller ones cost more and shorten the step")
       ->type_name("QUANTITY");
   fe->add_option("--across", f.across, "elements over the thickness of columns and beams, at least (2)")
+      ->check(is_whole_number)
       ->check(CLI::Range(2, 8));
   fe->add_flag("--mesh-only", f.mesh_only, "only make the mesh and say what it is like");
   fe->add_option("--scaled-step", f.scaled_step,
@@ -338,7 +348,7 @@ void add_fe(CLI::App& app, Arguments& a) {
   fe->add_option("--until", a.duration, "simulated time, such as \"6 s\"; the plan's duration if not given")
       ->type_name("QUANTITY");
   add_checkpoint_options(fe, a);
-  fe->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
+  add_threads(fe, a);
   fe->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")->type_name("FILE");
   add_json(fe, a);
   add_language(fe, a);
@@ -374,8 +384,7 @@ void add_steer(CLI::App& app, Arguments& a) {
   steer->add_flag("--continue", a.goes_on, "go on with the latest session of this plan, from its action log");
   steer->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")
       ->type_name("FILE");
-  steer->add_option("--threads", a.threads, "threads of the solver; results do not depend on it")
-      ->check(CLI::Range(1, 1024));
+  add_threads(steer, a);
   steer->add_flag("--json", a.json, "the address in one line of JSON on standard output");
   steer->callback([&a] { a.verb = Arguments::Verb::Steer; });
   add_examples(steer, R"(  topple steer plan.toml                   opens the page
@@ -390,8 +399,7 @@ void add_replay(CLI::App& app, Arguments& a) {
       ->required();
   replay->add_option("--knowledge", a.knowledge, "file of knowledge rules instead of the built-in ones")
       ->type_name("FILE");
-  replay->add_option("--threads", a.threads, "threads of the solver; results do not depend on it")
-      ->check(CLI::Range(1, 1024));
+  add_threads(replay, a);
   add_json(replay, a);
   replay->add_flag("--csv", a.csv, "also write tables for spreadsheets");
   replay->add_flag("--no-report", a.no_report, "do not write report.html");
@@ -492,7 +500,7 @@ void add_demo(CLI::App& app, Arguments& a) {
   demo->add_option("-o,--output", a.output, "folder for the plan and the results (storehouse)")->type_name("FOLDER");
   add_language(demo, a);
   demo->add_flag("--open", a.open, "open the report in the desktop's browser");
-  demo->add_option("--threads", a.threads, "threads; results do not depend on it")->check(CLI::Range(1, 1024));
+  add_threads(demo, a);
   add_json(demo, a);
   demo->callback([&a] { a.verb = Arguments::Verb::Demo; });
   add_examples(demo, R"(  topple demo                              into the folder storehouse

@@ -30,6 +30,7 @@
 #include "record/record.h"
 #include "record/report.h"
 #include "results.h"
+#include "study/plan_model.h"
 #include "terminal.h"
 
 namespace topple::apps {
@@ -329,6 +330,8 @@ int check_plan(const Arguments& a) {
     collapse::ModelMap map;
     const mbs::Model model = collapse::make_model(plan, knowledge, map, a.threads);
     mbs::check_model(model);
+    if (!plan.fuzzy.inputs.empty())  // what only topple study would say
+      (void)study::make_plan_problem(plan, {}, a.knowledge.empty() ? std::string() : read_file(a.knowledge));
     print_diagnostics(warnings, text);
     if (a.json) {
       json out{{"exit_code", kOk}, {"diagnostics", json::array()}};

@@ -135,9 +135,9 @@ double read_value(const Node& node, const std::string& label, Dimension dimensio
     written = quoted(node.text);
     // samples are written in SI, to the last digit
     constexpr size_t longest_by_hand = 20;
-    const bool is_sample = node.text.size() > longest_by_hand || node.text.ends_with(" Pa");
+    const bool is_sample = node.text.size() > longest_by_hand || node.text.ends_with(" Pa") || node.text.ends_with(' ');
     if (const auto [unit, size] = usual_unit(dimension); is_sample)
-      written = quoted(number_text(value / size) + (*unit ? std::string(" ") + unit : ""));
+      written = *unit ? quoted(number_text(value / size) + " " + unit) : number_text(value);
   } else if (node.kind == Node::Kind::Integer || node.kind == Node::Kind::Float) {
     if (dimension != Dimension::Number) {
       complaints.error("E204", node.place,

@@ -327,6 +327,21 @@ check)
   expect 2 "$topple" check .
   : >empty.toml; expect 2 "$topple" check empty.toml
   NO_COLOR=1 expect 2 "$topple" check wrong.toml; lacks err $'\x1b'
+  # what only a study would refuse
+  write_random() {
+    cat "$plan" - >random.toml <<EOF
+[fuzzy.parameters]
+mu = { triangular = [0.5, 0.6, 0.7] }
+[fuzzy.random]
+site.friction = { normal = ["mu", $1] }
+[fuzzy.randomness]
+runs = 50
+statistics = ["$2"]
+EOF
+  }
+  write_random 0.01 "p(topple)"; expect 0 "$topple" check random.toml
+  write_random 0.5 "p(topple)"; expect 2 "$topple" check random.toml; has err "E205"; has err 'site: friction: -0.6'
+  write_random 0.01 "mean(reach)"; expect 2 "$topple" check random.toml; has err "E825"; has err "^"
   ;;
 run)
   expect 0 "$topple" run "$plan" -o a/b --csv --no-report
@@ -520,6 +535,7 @@ cancel)
   expect 2 "$topple" run "$plan" --resume -o nowhere; has err "E674"; [ ! -e nowhere ] || { echo "a folder for nothing"; failures=$((failures + 1)); }
   expect 2 "$topple" run "$plan" --checkpoint --engine simbody -o nowhere; has err "--engine simbody excludes --checkpoint"
   expect 2 "$topple" run "$plan" --checkpoint --check-step -o nowhere; has err "excludes"
+  expect 2 "$topple" run "$plan" --threads 0x2 -o nowhere; has err "a whole number is wanted"
   expect 2 "$topple" mbs run "$plan" --checkpoint-interval "1 s" -o nowhere; has err "requires --checkpoint or --resume"
   ;;
 steer)

@@ -161,6 +161,8 @@ describe("the German table", () => {
       ["C-A1-0: a charge lies in the joint above the clear height of 2.440000 m", "C-A1-0: eine Ladung liegt im Knoten über der lichten Höhe von 2,440000 m"],
       ["section 'ground-column': the bars fill more than a fifth of the section", "Querschnitt „ground-column“: die Stäbe füllen mehr als ein Fünftel des Querschnitts"],
       ["2 x the evaluator ended without an answer: exit code 3", "2 × das Programm endete ohne Antwort: Rückgabewert 3"],
+      ["2 x the evaluator ended without an answer: Segfault in my.model", "2 × das Programm endete ohne Antwort: Segfault in my.model"],
+      ["3 x 5 of 20 inner runs failed: my own words", "3 × 5 von 20 inneren Rechnungen sind gescheitert: my own words"],
       ["It does not stand; 84 zones have yielded, 528 are broken. The upper block has moved by 303.9 cm and its fastest part moves at 12.618 m/s.",
         "Es steht nicht; 84 Zonen fließen, 528 sind gebrochen. Der obere Block hat sich um 303,9 cm bewegt, sein schnellstes Teil bewegt sich mit 12,618 m/s."],
     ])

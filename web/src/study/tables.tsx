@@ -4,6 +4,14 @@ import type { State } from "./state";
 import { OutcomeName } from "./verdict";
 import { say } from "../translate";
 
+const distributions: Record<string, string> = {
+  normal: "random: normal distribution", lognormal: "random: lognormal distribution", gumbel: "random: gumbel distribution", weibull: "random: weibull distribution", uniform: "random: uniform distribution",
+};
+const parameters: Record<string, (value: string) => string> = {
+  mean: (value) => `mean = ${value}`, "standard deviation": (value) => `standard deviation = ${value}`, scale: (value) => `scale = ${value}`,
+  shape: (value) => `shape = ${value}`, "lower end": (value) => `lower end = ${value}`, "upper end": (value) => `upper end = ${value}`,
+};
+
 function Share(props: { driver: Driver | undefined }) {
   const d = props.driver;
   if (d === undefined || d.first === null || d.first_error === null) return <td class="share"><span class="quiet">unknown</span></td>;
@@ -216,7 +224,7 @@ export function Inputs(props: { study: Study }) {
           })}
           {study.derived.map((q) => <tr><th scope="row">{titleOf(q)}</th><td colSpan={3}>follows from others</td></tr>)}
           {(study.random?.inputs ?? []).map((q) => (
-            <tr><th scope="row">{titleOf(q)}</th><td colSpan={3}>{`random: ${q.distribution}(${q.parameters.map((x) => x.input ?? formatNumber(x.value)).join(", ")})`}</td></tr>
+            <tr><th scope="row">{titleOf(q)}</th><td colSpan={3}>{[distributions[q.distribution] ?? q.distribution, ...q.parameters.map((x) => parameters[x.name]?.(x.input ?? formatNumber(x.value)) ?? x.name)].map(say).join("; ")}</td></tr>
           ))}
         </tbody>
       </table>
