@@ -28,10 +28,12 @@ std::vector<double> make_rotations(double first, double yield, double last) {
 }
 
 std::vector<double> make_forces(double crushing, double rupture) {
+  // closest where members of buildings are: beams near 0, columns up to a half of crushing
   std::vector<double> out;
-  for (double share : {1.0, 0.97, 0.9, 0.8, 0.7, 0.6, 0.5, 0.45, 0.4, 0.35, 0.3, 0.2, 0.1, 0.05})
+  for (double share :
+       {1.0, 0.97, 0.9, 0.8, 0.7, 0.6, 0.5, 0.45, 0.4, 0.35, 0.3, 0.25, 0.2, 0.15, 0.1, 0.075, 0.05, 0.025})
     out.push_back(-share * crushing);
-  for (double share : {0.0, 0.4, 0.75, 1.0}) out.push_back(share * rupture);
+  for (double share : {0.0, 0.1, 0.25, 0.5, 0.75, 1.0}) out.push_back(share * rupture);
   return out;
 }
 

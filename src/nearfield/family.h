@@ -14,7 +14,7 @@ std::vector<double> make_rotations(double first, double yield, double last);
 /// The same for a zone, from a fraction of cracking to beyond rupture of the bars over the section's depth.
 std::vector<double> make_rotations(const ZoneInput&, double depth, const material::Concrete&);
 
-/// Normal forces from crushing (a magnitude) to rupture of the bars, 17 of them.
+/// Normal forces from crushing (a magnitude) to rupture of the bars, 24 of them.
 std::vector<double> make_forces(double crushing, double rupture);
 
 /// Largest force that the zone's bars, or its uncracked concrete, can pull with [N]; never zero.

@@ -15,7 +15,7 @@ struct Words {
 
 constexpr Words words[] = {
     {"frame", "Frame building", "Reinforced concrete frames of three storeys, toppled to the front by two stages."},
-    {"wall", "Wall building", "Large panels under five floors, brought down on themselves by two stages."},
+    {"wall", "Wall building", "Large panels under five floors, brought down on themselves by three stages."},
     {"hall", "Industrial hall", "Girders on two rows of columns, tilted about the rear row."},
     {"silo", "Silo on columns", "A box of reinforced concrete on nine columns, toppled over its rear row."},
     {"chimney", "Chimney", "60 m of reinforced concrete with a lining, felled over a notch with slits at its ends."},

@@ -451,8 +451,9 @@ TEST(ManagerPhysics, AStubIsCrushedByWhatComesDownOnIt) {
     EXPECT_GT(f->value, 0.1);
     EXPECT_LE(f->value, 1.01);
   }
-  // the peak of a stub's strength is 2 mm wide and passes in a step of 0.6 ms: 2.6 %, in smaller ones by turns
-  EXPECT_NEAR(drop[0], drop[1], 0.03 * drop[1]);
+  // the peak of a stub's strength is 2 mm wide and passes in a step of 0.6 ms, so steps of 0.66, 0.3, 0.2, 0.1 and 0.05
+  // ms give 1.410, 1.374, 1.374, 1.463 and 1.459 m
+  EXPECT_NEAR(drop[0], drop[1], 0.04 * drop[1]);
 }
 
 TEST(Manager, AFailingChargeDoesNothing) {

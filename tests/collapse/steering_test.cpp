@@ -256,21 +256,24 @@ TEST(Steering, AnEditAtTheStartGivesThePlanThatHasIt) {
   ASSERT_TRUE(other.begin(other.add_root(two_stages("0.5 s"), "main")));
   advance_until(other, 10);
   const record::Record a = s.make_record(s.active()), b = other.make_record(other.active());
-  // an edit looks at the step anew, so the yardstick is what a step of another length does
-  SteeringOptions shorter = options();
-  shorter.run.step = 0.9 * b.provenance.step;
-  Steering finer(default_knowledge(), shorter);
-  ASSERT_TRUE(finer.begin(finer.add_root(two_stages("0.5 s"), "main")));
-  advance_until(finer, 10);
-  const record::Record c = finer.make_record(finer.active());
-  ASSERT_EQ(a.position.size(), b.position.size());
-  ASSERT_EQ(c.position.size(), b.position.size());
-  float by_edit = 0, by_step = 0;
-  for (size_t i = 0; i < a.position.size(); ++i) {
-    by_edit = std::max(by_edit, std::abs(a.position[i] - b.position[i]));
-    by_step = std::max(by_step, std::abs(c.position[i] - b.position[i]));
+  // an edit looks at the step anew, so the yardstick is what steps of another length do
+  const auto largest_difference = [&b](const record::Record& r) {
+    EXPECT_EQ(r.position.size(), b.position.size());
+    float most = 0;
+    for (size_t i = 0; i < std::min(r.position.size(), b.position.size()); ++i)
+      most = std::max(most, std::abs(r.position[i] - b.position[i]));
+    return most;
+  };
+  float by_step = 0;
+  for (const double share : {0.9, 0.8}) {
+    SteeringOptions shorter = options();
+    shorter.run.step = share * b.provenance.step;
+    Steering finer(default_knowledge(), shorter);
+    ASSERT_TRUE(finer.begin(finer.add_root(two_stages("0.5 s"), "main")));
+    advance_until(finer, 10);
+    by_step = std::max(by_step, largest_difference(finer.make_record(finer.active())));
   }
-  EXPECT_LE(by_edit, by_step);
+  EXPECT_LE(largest_difference(a), by_step);
   // the charges fire when they would: the scatter of the firing times is the same stream
   const auto& edited = s.active().run().model().charges();
   const auto& planned = other.active().run().model().charges();

@@ -23,7 +23,9 @@ const record::Finding* check_of(const Record& r) {
 }
 
 TEST(StepCheckPhysics, AHouseThatTopplesDoesSoWithHalfTheStep) {
-  const product::Plan plan = read(house(charge("C-A*-0", "0.1 s"), "1.6 s"));
+  // with stubs of 1 m, crushed within a step or two, numbers hang on the step (AStubIsCrushedByWhatComesDownOnIt)
+  product::Plan plan = read(house(charge("C-A*-0", "0.1 s"), "1.6 s"));
+  for (product::Charge& c : plan.stages.front().charges) c.position = 1.3, c.destroyed_length = 1.6;
   RunOptions options;
   const Record plain = run_plan(plan, default_knowledge(), options, {});
   ASSERT_EQ(check_of(plain), nullptr);
@@ -45,7 +47,7 @@ TEST(StepCheckPhysics, AHouseThatTopplesDoesSoWithHalfTheStep) {
     EXPECT_EQ(check->status, Status::Good) << check->text;
     EXPECT_THAT(check->text, HasSubstr("the same verdict. "));
     EXPECT_THAT(check->text, HasSubstr(fmt::format("With {:.3g} ms", 500 * plain.provenance.step)));
-    EXPECT_LT(check->value, 0.03);  // stubs of 1 m: as in AStubIsCrushedByWhatComesDownOnIt
+    EXPECT_LT(check->value, 0.03);
     EXPECT_GT(last, 0.9);
     if (threads == 1) {
       text = check->text;
