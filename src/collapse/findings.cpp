@@ -66,7 +66,8 @@ std::string tell_charges_left(const Context& c) {
          ".";
 }
 
-/// Why a limit that is kept so far is not judged; empty: nothing that still moved could break it, and all has fired.
+/// Why a limit that is kept so far is not judged; empty: nothing that still moved or may fall could break it, and all
+/// has fired.
 ///   breaks  whether a part on its way would
 template <class Breaks>
 std::string find_what_is_open(const Context& c, const Breaks& breaks) {
@@ -74,10 +75,13 @@ std::string find_what_is_open(const Context& c, const Breaks& breaks) {
   const OpenPart* fastest = nullptr;
   for (const OpenPart& part : c.open)
     if ((fastest == nullptr || part.speed > fastest->speed) && breaks(part)) fastest = &part;
-  return fastest == nullptr
-             ? std::string()
-             : fmt::format("{}{} still moved at {:.1f} m/s when the run ended, and may break this limit.", kNotJudged,
-                           c.r.bodies[fastest->body].name, fastest->speed);
+  if (fastest == nullptr) return {};
+  const std::string& who = c.r.bodies[fastest->body].name;
+  return fastest->speed > kStill
+             ? fmt::format("{}{} still moved at {:.1f} m/s when the run ended, and may break this limit.", kNotJudged,
+                           who, fastest->speed)
+             : fmt::format("{}it still came down or swayed when the run ended, and {} may break this limit.",
+                           kNotJudged, who);
 }
 
 /// Distances of the nearest and the farthest point of a part from an area in the last frame, seen from above; 0: over
@@ -894,7 +898,6 @@ bool add_findings(const product::Plan& plan, const mbs::Model& model, const Mode
   if (!is_under_way && !r.time.empty())
     c.charges_left = std::count_if(map.schedule.begin(), map.schedule.end(),
                                    [&r](const Firing& f) { return !f.fails && f.time > r.time.back() + 1e-9; });
-  if (r.ending == "time_limit") c.open = find_open_parts(r, norm(model.gravity), plan.ground.friction, kStill);
   const auto add_not_modelled = [&] {
     c.add("not_modelled", "Not modelled", "Not modelled", tell_not_modelled(r.not_modelled), kNone, "");
     c.add("not_modelled.distances", "Not modelled", "Not modelled", kNoSafeDistance, kNone, "");
@@ -908,7 +911,9 @@ bool add_findings(const product::Plan& plan, const mbs::Model& model, const Mode
     add_verification(c);
     return true;
   }
-  const Mechanism m = judge_run(plan, model, map, k, recorder, summary, is_under_way);
+  const std::vector<Mechanism> verdicts = judge_structures(plan, model, map, k, recorder, summary, is_under_way);
+  const Mechanism m = judge_run(verdicts, map, k, recorder);
+  if (r.ending == "time_limit") c.open = find_open_parts(r, map, verdicts, norm(model.gravity), plan.ground.friction);
   add_mechanism(c, m);
   if (!is_under_way) add_near_verdicts(c, m);
   add_rigid_block(c);

@@ -71,15 +71,21 @@ std::vector<MechanismInput> make_mechanism_inputs(const product::Plan& plan, con
 
 }  // namespace
 
-Mechanism judge_run(const product::Plan& plan, const mbs::Model& model, const ModelMap& map, const Knowledge& k,
-                    const Recorder& recorder, const mbs::Summary& summary, bool is_under_way) {
-  std::vector<std::string> names;
+std::vector<Mechanism> judge_structures(const product::Plan& plan, const mbs::Model& model, const ModelMap& map,
+                                        const Knowledge& k, const Recorder& recorder, const mbs::Summary& summary,
+                                        bool is_under_way) {
   std::vector<Mechanism> verdicts;
-  std::vector<double> masses;
-  for (const MechanismInput& in : make_mechanism_inputs(plan, model, map, recorder, summary, is_under_way)) {
-    const StructureEntry& structure = map.structures[names.size()];
-    names.push_back(structure.name);
+  for (const MechanismInput& in : make_mechanism_inputs(plan, model, map, recorder, summary, is_under_way))
     verdicts.push_back(judge_mechanism(in, k));
+  return verdicts;
+}
+
+Mechanism judge_run(const std::vector<Mechanism>& verdicts, const ModelMap& map, const Knowledge& k,
+                    const Recorder& recorder) {
+  std::vector<std::string> names;
+  std::vector<double> masses;
+  for (const StructureEntry& structure : map.structures) {
+    names.push_back(structure.name);
     masses.push_back(structure.mass);
   }
   Mechanism out = join_mechanisms(names, verdicts, masses);
@@ -275,19 +281,25 @@ Reach calc_reach(const record::Record& r, size_t frame) {
   return out;
 }
 
-std::vector<OpenPart> find_open_parts(const record::Record& r, double gravity, double friction, double least_speed) {
+std::vector<OpenPart> find_open_parts(const record::Record& r, const ModelMap& map,
+                                      const std::vector<Mechanism>& verdicts, double gravity, double friction) {
   std::vector<OpenPart> out;
-  if (r.time.size() < 2) return out;
   const size_t last = r.time.size() - 1;
-  const double interval = r.time[last] - r.time[last - 1];
+  // what no charge has acted on rests in its equilibrium
+  const bool has_fired =
+      std::any_of(map.schedule.begin(), map.schedule.end(), [](const Firing& f) { return !f.fails; });
   for (size_t b = 0; b < r.bodies.size(); ++b) {
     if (r.bodies[b].fixed) continue;
+    // debris is of no structure
+    const int structure = b < map.bodies.size() ? map.bodies[b].structure : -1;
+    const bool may_fall = has_fired && structure >= 0 && !verdicts[static_cast<size_t>(structure)].is_final;
     const Vec3 p = record::pose_at(r, last, b).p;
-    const double v = norm(p - record::pose_at(r, last - 1, b).p) / interval;
-    if (v > least_speed)
-      out.push_back({b, v,
-                     friction * gravity > 0 ? (0.5 * v * v + gravity * std::max(0.0, p.z)) / (friction * gravity)
-                                            : std::numeric_limits<double>::infinity()});
+    const double v = last > 0 ? norm(p - record::pose_at(r, last - 1, b).p) / (r.time[last] - r.time[last - 1]) : 0.0;
+    if (!(v > kStill) && !may_fall) continue;
+    const double height = std::max(0.0, p.z);
+    const double slide = friction * gravity > 0 ? (0.5 * v * v + gravity * height) / (friction * gravity)
+                                                : std::numeric_limits<double>::infinity();
+    out.push_back({b, v, may_fall ? height + slide : slide});
   }
   return out;
 }

@@ -19,9 +19,11 @@ struct StageTimes {
 /// Of the stages that fire at all, rising; with `all`, charges that fail count as if they fired.
 std::vector<StageTimes> find_stage_times(const ModelMap&, bool all = false);
 
-/// How it came down, or how things stand in a run that goes on. There is at least one frame.
-Mechanism judge_run(const product::Plan&, const mbs::Model&, const ModelMap&, const Knowledge&, const Recorder&,
-                    const mbs::Summary&, bool is_under_way = false);
+/// How each structure of the map came down, or how things stand in a run that goes on. There is at least one frame.
+std::vector<Mechanism> judge_structures(const product::Plan&, const mbs::Model&, const ModelMap&, const Knowledge&,
+                                        const Recorder&, const mbs::Summary&, bool is_under_way = false);
+/// One verdict on all of them.
+Mechanism judge_run(const std::vector<Mechanism>& verdicts, const ModelMap&, const Knowledge&, const Recorder&);
 
 /// What else a run that is over might have been called: see there. None where structures stand apart.
 std::vector<NearVerdict> find_near_verdicts(const product::Plan&, const mbs::Model&, const ModelMap&, const Knowledge&,
@@ -74,17 +76,19 @@ struct Reach {
 };
 Reach calc_reach(const record::Record&, size_t frame);
 
-/// A part that was still moving in the last frame.
+/// A part that was still moving in the last frame, or of a structure whose verdict is not final.
 struct OpenPart {
   size_t body = 0;
   double speed = 0;  // over the last interval between frames [m/s]
-  double way = 0;    // that it may still go: (v²/2 + g z) / (μ g), as if it slid until nothing is left [m]
+  // that it may still go: (v²/2 + g z) / (μ g), as if it slid until nothing is left, and, where the verdict is not
+  // final, the z by which it may topple before [m]
+  double way = 0;
 };
 inline constexpr double kStill = 0.2;  // speed below which a part counts as lying [m/s]
-/// None where there is one frame only.
-///   least_speed  below which a part rests [m/s]
-///   friction     on the ground
-std::vector<OpenPart> find_open_parts(const record::Record&, double gravity, double friction, double least_speed);
+///   verdicts  on the structures of the map
+///   friction  on the ground
+std::vector<OpenPart> find_open_parts(const record::Record&, const ModelMap&, const std::vector<Mechanism>& verdicts,
+                                      double gravity, double friction);
 
 /// Convex outline of the moving parts that lie nearest to the footprint and hold at least `share` of the mass.
 Polygon calc_share_outline(const record::Record&, size_t frame, double share);

@@ -138,13 +138,13 @@ void spread(Reach& reach, const product::Plan& plan) {
 }
 
 /// What findings tell besides.
-void fill_findings(const Sample& s, SampleRun& out) {
+void fill_findings(const Sample& s, const std::vector<Mechanism>& verdicts, SampleRun& out) {
   out.volume = find_heap(s.record, s.record.time.size() - 1).volume;
   out.deviation = calc_deviation(out.mechanism, std::atan2(s.map.fall_direction.y, s.map.fall_direction.x));
   for (const product::Neighbour& n : s.plan.neighbours)
     out.clearance.push_back(find_approach(s.record, n.footprint).least);
   if (s.summary.ending != mbs::Summary::Ending::TimeLimit) return;
-  for (const OpenPart& part : find_open_parts(s.record, norm(s.model.gravity), s.plan.ground.friction, kStill))
+  for (const OpenPart& part : find_open_parts(s.record, s.map, verdicts, norm(s.model.gravity), s.plan.ground.friction))
     out.way_left = std::max(out.way_left, part.way);
 }
 
@@ -168,7 +168,8 @@ void fill(Sample& s, const Knowledge& k, const SampleRunOptions& options, Sample
   };
   out.time = s.record.time;
   out.tilt = series("tilt_angle");
-  out.mechanism = judge_run(s.plan, s.model, s.map, k, *s.recorder, s.summary);
+  const std::vector<Mechanism> verdicts = judge_structures(s.plan, s.model, s.map, k, *s.recorder, s.summary);
+  out.mechanism = judge_run(verdicts, s.map, k, *s.recorder);
   const std::vector<BlockFrame> block = s.recorder->farthest_block_frames();
   const std::vector<StageTimes> stages = find_stage_times(s.map, true);
   const size_t before = find_frame(block, stages.empty() ? out.time.back() : stages.back().first);
@@ -181,7 +182,7 @@ void fill(Sample& s, const Knowledge& k, const SampleRunOptions& options, Sample
   const size_t last = out.time.size() - 1;
   out.reach = calc_reach(s.record, last);
   out.height = calc_heap_height(find_moving_boxes(s.record, last));
-  if (options.findings && !options.condensation) fill_findings(s, out);
+  if (options.findings && !options.condensation) fill_findings(s, verdicts, out);
   if (options.condensation) {
     spread(out.reach, s.plan);
   } else if (s.plan.vibration) {

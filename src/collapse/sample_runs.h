@@ -62,7 +62,8 @@ struct SampleRun {
   double volume = 0;              // of the heap [m³]
   double deviation = 0;           // of the fall from the planned direction; NaN if nothing fell to any side [rad]
   std::vector<double> clearance;  // least distance of a part from each neighbour in the run, in plan; 0: over it [m]
-  double way_left = 0;  // that a part which still moves may go on at most (OpenPart); infinite without friction [m]
+  double way_left =
+      0;  // that a part which still moves or may fall may go at most (OpenPart); infinite without friction [m]
 };
 
 /// Plans run together in lanes.

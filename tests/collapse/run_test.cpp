@@ -389,6 +389,15 @@ TEST(Run, WhatMayStillBeBrokenWhenTheTimeIsOverIsNotJudged) {
     EXPECT_THAT(finding(early, id).text, testing::HasSubstr("m/s when the run ended, and may break this limit.")) << id;
   }
   EXPECT_EQ(finding(early, "clearance.far").status, record::Status::Good);
+  // it has just begun to fall: no part is fast yet
+  const record::Record at_once = run_for("0.06 s");
+  for (const std::string id : {"clearance.near", "criterion.debris_reach"}) {
+    EXPECT_TRUE(is_not_judged(finding(at_once, id))) << id;
+    EXPECT_THAT(finding(at_once, id).text, testing::HasSubstr("Not judged: it still came down or swayed when the run "
+                                                              "ended, and "))
+        << id;
+  }
+  EXPECT_EQ(finding(at_once, "clearance.far").status, record::Status::Good);
   const record::Record late = run_for("20 s");
   EXPECT_EQ(late.ending, "at_rest");
   for (const record::Finding& f : late.findings) EXPECT_FALSE(is_not_judged(f)) << f.id;

@@ -232,6 +232,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["{*} Not judged: {} still moved at {:.1f} m/s when the run ended, and may break this limit.", "{} Nicht beurteilt: {} bewegte sich am Ende der Rechnung noch mit {} m/s und kann diese Vorgabe verletzen."],
   ["{*} Not judged: {} charge had not fired when the run ended.", "{} Nicht beurteilt: {} Ladung hatte am Ende der Rechnung noch nicht gezündet."],
   ["{*} Not judged: {} charges had not fired when the run ended.", "{} Nicht beurteilt: {} Ladungen hatten am Ende der Rechnung noch nicht gezündet."],
+  ["{*} Not judged: it still came down or swayed when the run ended, and {} may break this limit.", "{} Nicht beurteilt: Am Ende der Rechnung kam es noch herab oder schwankte, und {} kann diese Vorgabe verletzen."],
   ["{*} Not judged: it still came down or swayed when the run ended.", "{} Nicht beurteilt: Am Ende der Rechnung kam es noch herab oder schwankte."],
   ["Asked: {}; found: {}.", "Verlangt: {}; gefunden: {}."],
   ["Asked: {:.0f} deg +- {:.0f} deg; found: {:.0f} deg.", "Verlangt: {} deg +- {} deg; gefunden: {} deg."],
