@@ -281,10 +281,35 @@ Reach calc_reach(const record::Record& r, size_t frame) {
   return out;
 }
 
+namespace {
+
+/// Of each body whether it hangs together with the ground in the last frame.
+std::vector<bool> find_standing(const record::Record& r) {
+  using record::ZoneState;
+  const size_t Z = r.zones.size();
+  std::vector<bool> out(r.bodies.size());
+  for (size_t b = 0; b < out.size(); ++b) out[b] = r.bodies[b].fixed;
+  const auto does_stand = [&out](int body) { return body < 0 || out[static_cast<size_t>(body)]; };
+  for (bool grows = true; grows;) {
+    grows = false;
+    for (size_t z = 0; z < Z; ++z) {
+      const auto state = static_cast<ZoneState>(r.zone_state[r.zone_state.size() - Z + z]);
+      const int a = r.zones[z].body_a, b = r.zones[z].body_b;
+      if (state == ZoneState::Broken || state == ZoneState::Fired || does_stand(a) == does_stand(b)) continue;
+      out[static_cast<size_t>(does_stand(a) ? b : a)] = true;
+      grows = true;
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
 std::vector<OpenPart> find_open_parts(const record::Record& r, const ModelMap& map,
                                       const std::vector<Mechanism>& verdicts, double gravity, double friction) {
   std::vector<OpenPart> out;
   const size_t last = r.time.size() - 1;
+  const std::vector<bool> is_standing = find_standing(r);
   // what no charge has acted on rests in its equilibrium
   const bool has_fired =
       std::any_of(map.schedule.begin(), map.schedule.end(), [](const Firing& f) { return !f.fails; });
@@ -292,7 +317,10 @@ std::vector<OpenPart> find_open_parts(const record::Record& r, const ModelMap& m
     if (r.bodies[b].fixed) continue;
     // debris is of no structure
     const int structure = b < map.bodies.size() ? map.bodies[b].structure : -1;
-    const bool may_fall = has_fired && structure >= 0 && !verdicts[static_cast<size_t>(structure)].is_final;
+    const Mechanism* verdict = structure >= 0 ? &verdicts[static_cast<size_t>(structure)] : nullptr;
+    // what sways about its place goes nowhere
+    if (verdict != nullptr && verdict->is_final && verdict->name == "stands" && is_standing[b]) continue;
+    const bool may_fall = has_fired && verdict != nullptr && !verdict->is_final;
     const Vec3 p = record::pose_at(r, last, b).p;
     const double v = last > 0 ? norm(p - record::pose_at(r, last - 1, b).p) / (r.time[last] - r.time[last - 1]) : 0.0;
     if (!(v > kStill) && !may_fall) continue;

@@ -76,7 +76,8 @@ struct Reach {
 };
 Reach calc_reach(const record::Record&, size_t frame);
 
-/// A part that was still moving in the last frame, or of a structure whose verdict is not final.
+/// A part that was still moving in the last frame, unless it sways with a structure that finally stands, or one of a
+/// structure whose verdict is not final.
 struct OpenPart {
   size_t body = 0;
   double speed = 0;  // over the last interval between frames [m/s]
