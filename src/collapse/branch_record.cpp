@@ -45,7 +45,7 @@ std::optional<record::Record> BranchRecord::finish(const std::atomic<bool>* canc
     record_.ending_text = fmt::format("The run is under way: computed up to {:.2f} s so far.", time_);
   }
   std::optional<HeadsAcross> across;
-  if (!start_->map().ground_columns.empty() && (record_.ending == "at_rest" || record_.ending == "time_limit"))
+  if (has_heads(start_->map()) && (record_.ending == "at_rest" || record_.ending == "time_limit"))
     across = find_heads_across(start_->plan(), k_, options_, cancel,
                                [](const mbs::Model& model, const ModelMap&, const mbs::Options& o) {
                                  return engines::make_engine("native")->run(model, o);

@@ -635,13 +635,13 @@ void add_rigid_block(const Context& c) {
   } else if (when <= c.r.time.back() + 1e-9) {
     const double here = interpolate(c.r.time, c.r.series.front().value, when),
                  there = interpolate(c.r.time, series.value, when);
-    c.add(
-        "rigid_block", "Mechanism", "Beside a rigid block",
-        fmt::format("1 s after the last stage the upper block leans by {:.1f} deg; {} would lean by {:.1f} deg. Unlike "
-                    "the model, that block has no yielding storeys, no swaying ground storey and no columns that "
-                    "shorten.",
-                    here / unit::deg, model_words, there / unit::deg),
-        here - there, "rad");
+    c.add("rigid_block", "Mechanism", "Beside a rigid block",
+          fmt::format("1 s after the last stage the upper block leans by {:.1f} deg; {} would lean by {:.1f} deg.",
+                      here / unit::deg, model_words, there / unit::deg) +
+              (is_shaft ? " Unlike the model, that block does not bend, yield or break above its mouth."
+                        : " Unlike the model, that block has no yielding storeys, no swaying ground storey and no "
+                          "columns that shorten."),
+          here - there, "rad");
   }
   c.r.series.insert(c.r.series.begin() + 1, std::move(series));
 }

@@ -1,8 +1,15 @@
 #include "collapse/heads_across.h"
 
+#include <algorithm>
+
 #include "collapse/plan_record.h"
 
 namespace topple::collapse {
+
+bool has_heads(const ModelMap& map) {
+  return std::any_of(map.ground_columns.begin(), map.ground_columns.end(),
+                     [&map](const GroundColumn& g) { return map.bodies[static_cast<size_t>(g.body)].kind != "shaft"; });
+}
 
 HeadsAcross find_heads_across(const product::Plan& plan, const Knowledge& k, const RunOptions& options,
                               const std::atomic<bool>* cancel, const Mover& move) {

@@ -8,6 +8,9 @@
 
 namespace topple::collapse {
 
+/// Whether any heads turn: mouths of shafts have none.
+bool has_heads(const ModelMap&);
+
 /// The equilibrium under dead load of a plan's building whose ground columns turn in their heads about the other axis.
 HeadsAcross find_heads_across(const product::Plan&, const Knowledge&, const RunOptions&,
                               const std::atomic<bool>* cancel, const Mover&);

@@ -114,7 +114,7 @@ record::Record run_with(const product::Plan& plan, const Knowledge& k, const Run
   end_record(summary, " before the first charge", recorder, r);
   const std::atomic<bool>* cancel = callbacks.progress.cancel;
   std::optional<HeadsAcross> across;
-  if (looks_across && !map.ground_columns.empty() && (r.ending == "at_rest" || r.ending == "time_limit"))
+  if (looks_across && has_heads(map) && (r.ending == "at_rest" || r.ending == "time_limit"))
     across = find_heads_across(plan, k, options, cancel, move);
   add_findings(plan, model, map, k, recorder, summary, r, nullptr,
                across && !callbacks.progress.is_cancelled() ? &*across : nullptr);

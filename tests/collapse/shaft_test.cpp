@@ -470,6 +470,27 @@ std::string text_of(const record::Record& r, const std::string& id) {
   return "";
 }
 
+TEST(ShaftPhysics, OneThatStandsAndSwaysLessAndLessBreaksNoLimitByIt) {
+  const std::string limits =
+      "[criteria]\nmechanism = \"stands\"\ndebris_reach = \"20 m\"\n[[site.neighbour]]\nname = \"Hut\"\n"
+      "footprint = [[\"30 m\", \"-5 m\"], [\"40 m\", \"-5 m\"], [\"40 m\", \"5 m\"]]\nclearance = \"10 m\"\n";
+  double fastest = 0;
+  for (const char* until : {"9 s", "9.3 s", "9.6 s"}) {
+    const record::Record r =
+        run_plan(read(tower(slender + strong, mouth("1 m", "200 deg") + limits, until)), default_knowledge(), {}, {});
+    ASSERT_EQ(r.ending, "time_limit");
+    const size_t last = r.time.size() - 1,
+                 tip = r.bodies.size() - 1 -
+                       static_cast<size_t>(std::count_if(r.bodies.begin(), r.bodies.end(),
+                                                         [](const record::BodyInfo&b) { return b.kind == "debris"; }));
+    fastest = std::max(fastest, norm(record::pose_at(r, last, tip).p - record::pose_at(r, last - 1, tip).p) /
+                                    (r.time[last] - r.time[last - 1]));
+    for (const record::Finding& f : r.findings) EXPECT_NE(f.status, record::Status::NotJudged) << until << f.text;
+    EXPECT_EQ(text_of(r, "stability.start").find("Heads of ground columns"), std::string::npos) << "it has none";
+  }
+  EXPECT_GT(fastest, 0.2) << "or nothing here is fast enough to be asked";
+}
+
 TEST(ShaftPhysics, TheRigidBlockHasTheMassAboveItsMouth) {
   const std::string stiff = slender + strong;
   const std::string low =
@@ -483,6 +504,9 @@ TEST(ShaftPhysics, TheRigidBlockHasTheMassAboveItsMouth) {
   const std::string top =
       text_of(run_plan(read(tower(stiff, high, "1.3 s")), default_knowledge(), {}, {}), "rigid_block");
   EXPECT_NE(top.find(std::to_string(std::lround(10 * t)) + " t on a plastic hinge"), std::string::npos) << top;
+  const std::string falls = text_of(
+      run_plan(read(tower(slender, mouth("4 m", "240 deg"), "1.3 s")), default_knowledge(), {}, {}), "rigid_block");
+  EXPECT_THAT(falls, testing::HasSubstr("that block does not bend, yield or break above its mouth."));
 }
 
 /// Charges of a tower at a level, in the order given: azimuth and opening [deg], and what else they have.
