@@ -163,6 +163,7 @@ void list_vibration_limits(const product::Plan& plan, std::vector<Limit>& out) {
       limit.most = collapse::calc_vibration_limit(n.building_class, plan.vibration->high_frequency);
       limit.source = collapse::kVibrationSource;
     }
+    limit.above = limit.most * plan.vibration->factor * plan.vibration->factor;
     if (limit.least > 0) out.push_back(std::move(limit));
   }
 }

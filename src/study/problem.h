@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -59,6 +60,8 @@ struct Limit {
   Kind kind = Kind::Screening;
   /// Output by how much the value may still get worse behind the end of a run; empty: not at all.
   std::string left = {};
+  /// Upper end of a screening's band from which the whole band lies above the limit.
+  double above = std::numeric_limits<double>::infinity();
 };
 
 /// When runs of a plan end. One whose `output` says just that time, and whose outcome is not `unless`, ended before

@@ -158,25 +158,29 @@ Sentence tell_debris_limit(const Limit& limit, const Quantity& q, const std::pai
   return s;
 }
 
-/// How many limits of a plan have been looked at, and how they fare.
+/// How many limits of a plan have been looked at, and how they fare; a screening's band reaches its limit.
 struct LimitCount {
   int all = 0;
   int at_core = 0;         // broken with the core values
   int elsewhere = 0;       // of the others: broken by a run that is possible
   int open = 0;            // of the others: parts that still moved may break it
   double possibility = 0;  // of breaking one of `elsewhere`
+  bool is_above = false;   // a whole band with the core values
+};
+struct LimitCounts {
+  LimitCount debris, screenings;
 };
 
 /// How possible it is that an output breaks its limit: the most possible run that does.
-LimitCount tell_limits(const Problem& p, const StudyResult& r, std::vector<Sentence>& out) {
-  LimitCount count;
+LimitCounts tell_limits(const Problem& p, const StudyResult& r, std::vector<Sentence>& out) {
+  LimitCounts counts;
   const uncertainty::Sample* core = find_core(p, r.alpha.archive);
   for (const Limit& limit : p.limits) {
     const auto at = std::find(r.outputs.begin(), r.outputs.end(), limit.output);
     if (at == r.outputs.end()) continue;
     const auto index = static_cast<std::size_t>(at - r.outputs.begin());
     const Quantity q = find_output(p, limit.output);
-    double possibility = 0, low = std::numeric_limits<double>::infinity(), high = 0;
+    double possibility = 0, above = 0, low = std::numeric_limits<double>::infinity(), high = 0;
     int runs = 0, reaching = 0, open = 0;
     const auto left = std::find(r.outputs.begin(), r.outputs.end(), limit.left);
     const auto left_index = static_cast<std::size_t>(left - r.outputs.begin());
@@ -193,11 +197,14 @@ LimitCount tell_limits(const Problem& p, const StudyResult& r, std::vector<Sente
       }
       ++reaching;
       possibility = std::max(possibility, degree);
+      if (value > limit.above) above = std::max(above, degree);
     }
     if (runs == 0) continue;
+    LimitCount& count = limit.kind == Limit::Kind::Screening ? counts.screenings : counts.debris;
     ++count.all;
     if (core && index < core->result.values.size() && is_broken(limit, core->result.values[index])) {
       ++count.at_core;
+      count.is_above |= core->result.values[index] > limit.above;
     } else if (possibility > 0) {
       ++count.elsewhere;
       count.possibility = std::max(count.possibility, possibility);
@@ -226,26 +233,34 @@ LimitCount tell_limits(const Problem& p, const StudyResult& r, std::vector<Sente
               : reaching > 0  ? tell_impossible("Reaching the limit", reaching, static_cast<std::size_t>(runs), false)
                               : std::string("No run reaches the limit.");
     s.text += " This is a screening, no prediction.";
-    s.status = possibility >= 0.5 ? Status::Bad : reaching > 0 ? Status::Warning : Status::Good;
+    // as a run has it: a band that reaches the limit is a warning, one that lies above it is more
+    s.status = above >= 0.5 ? Status::Bad : reaching > 0 ? Status::Warning : Status::Good;
     doubt(p, r, s);
     out.push_back(std::move(s));
   }
-  return count;
+  return counts;
 }
 
 /// An outcome as planned is no good verdict where limits of the plan are broken.
-void weigh_limits(const Problem& p, const LimitCount& limits, Sentence& verdict) {
-  const auto add = [&](int count, const std::string& text, Status status) {
+void weigh_limits(const Problem& p, const LimitCounts& limits, Sentence& verdict) {
+  const auto add = [&](int count, int all, const std::string& text, Status status) {
     if (count == 0) return;
-    verdict.text += fmt::format(" {}: {} of {}.", text, count, limits.all);
+    verdict.text += fmt::format(" {}: {} of {}.", text, count, all);
     if (verdict.status != Status::Bad) verdict.status = status;
   };
-  add(limits.at_core, "Limits of the plan that are broken with the core values", Status::Bad);
-  add(limits.elsewhere,
+  const LimitCount &debris = limits.debris, &screenings = limits.screenings;
+  add(debris.at_core, debris.all, "Limits of the plan that are broken with the core values", Status::Bad);
+  add(debris.elsewhere, debris.all,
       fmt::format("Limits of the plan that other values break, possible to at least {}",
-                  words_of_least(limits.possibility)),
-      limits.possibility >= 0.5 ? Status::Bad : Status::Warning);
-  add(limits.open, "Limits of the plan that parts may break which still moved", Status::Warning);
+                  words_of_least(debris.possibility)),
+      debris.possibility >= 0.5 ? Status::Bad : Status::Warning);
+  add(debris.open, debris.all, "Limits of the plan that parts may break which still moved", Status::Warning);
+  add(screenings.at_core, screenings.all, "Screenings of vibration whose band reaches the limit with the core values",
+      screenings.is_above ? Status::Bad : Status::Warning);
+  add(screenings.elsewhere, screenings.all,
+      fmt::format("Screenings of vibration whose band reaches the limit with other values, possible to at least {}",
+                  words_of_least(screenings.possibility)),
+      Status::Warning);
   if (p.not_judged.empty()) return;
   verdict.text += fmt::format(" Limits of the plan that are not judged here: {}.", p.not_judged.size());
   if (verdict.status == Status::Good) verdict.status = Status::Info;
@@ -504,7 +519,7 @@ std::vector<Sentence> tell(const Problem& p, const StudyResult& r) {
     add("verdict", std::move(text));
   }
   std::vector<Sentence> of_limits;
-  const LimitCount limits = tell_limits(p, r, of_limits);
+  const LimitCounts limits = tell_limits(p, r, of_limits);
   if (core && at_core != failed_outcome && !out.empty()) weigh_limits(p, limits, out.front());
   tell_requirement(p, r, out);
   if (has_names && classes > 1) {

@@ -784,6 +784,27 @@ TEST(Story, CallsNoVerdictGoodWhereLimitsAreBroken) {
   const Sentence open = verdict({12}, "left");
   EXPECT_EQ(open.status, Status::Warning);
   EXPECT_TRUE(says(open, " Limits of the plan that parts may break which still moved: 1 of 1.")) << open.text;
+  // a screening's band reaches its limit, which is no more than a warning unless all of it lies above
+  const auto screen = [&](double limit, double above) {
+    p.limits = {{"y", "House", limit, limit, "of the plan"}};
+    p.limits.front().above = above;
+    return tell(p, r);
+  };
+  const std::vector<Sentence> reached = screen(1, 4);
+  EXPECT_EQ(reached.front().status, Status::Warning);
+  EXPECT_TRUE(
+      says(reached.front(), " Screenings of vibration whose band reaches the limit with the core values: 1 of 1."))
+      << reached.front().text;
+  EXPECT_FALSE(says(reached.front(), "broken"));
+  const auto own = [](const std::vector<Sentence>& all) {
+    return std::find_if(all.begin(), all.end(), [](const Sentence& s) { return s.id == "limit.y"; })->status;
+  };
+  EXPECT_EQ(own(screen(1, 9)), Status::Warning);
+  EXPECT_EQ(own(screen(1, 4)), Status::Bad) << "well possible";
+  EXPECT_EQ(screen(1, 1.5).front().status, Status::Bad) << "the whole band lies above";
+  const Sentence may_reach = screen(8, 100).front();
+  EXPECT_EQ(may_reach.status, Status::Warning);
+  EXPECT_TRUE(says(may_reach, "reaches the limit with other values, possible to at least 0.2")) << may_reach.text;
   p.not_judged = {"debris_reach"};
   const Sentence not_judged = verdict({12});
   EXPECT_EQ(not_judged.status, Status::Info);
