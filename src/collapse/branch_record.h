@@ -22,6 +22,7 @@ class BranchRecord {
   int branch() const { return branch_; }
   double time() const { return time_; }  // of the frontier then [s]
   const LiveModel& model() const { return *live_; }
+  std::shared_ptr<const LiveModel> start() const { return start_; }  // before any edit
 
   /// The record with its findings, once; nothing where `cancel` was seen set.
   [[nodiscard]] std::optional<record::Record> finish(const std::atomic<bool>* cancel = nullptr);

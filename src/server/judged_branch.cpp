@@ -117,7 +117,9 @@ Json compare(const JudgedBranch& first, const JudgedBranch& second, int n) {
   for (std::size_t i = 0; i < std::min<std::size_t>(10, last.size()); ++i)
     out["bodies"].push_back({{"name", last[i].second}, {"distance", number(last[i].first)}});
   out["findings"] = Json::array();
+  const bool is_one_start = first.start != nullptr && first.start == second.start;
   for (const record::Finding& f : r[0]->findings) {
+    if (is_one_start && f.id == "stability.start") continue;
     const auto it =
         std::find_if(r[1]->findings.begin(), r[1]->findings.end(), [&](const auto& g) { return g.id == f.id; });
     const std::string other = it == r[1]->findings.end() ? "" : it->text;

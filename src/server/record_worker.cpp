@@ -83,7 +83,7 @@ void RecordWorker::finish(Job& job) {
       auto record = c.record->finish(&cancel_);
       if (!record) return refuse(make_cancelled());
       list->push_back({c.record->branch(), c.record->time(), std::move(*record), c.record->model().map().note_texts(),
-                       std::move(c.edits)});
+                       std::move(c.edits), c.record->start()});
       c.record.reset();
     }
     judged = std::move(list);

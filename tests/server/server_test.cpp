@@ -322,6 +322,13 @@ TEST_F(ServerTest, SteersAPlanToItsEnd) {
   EXPECT_EQ(end["ending"]["kind"], "time_limit");
   EXPECT_EQ(end["ending"]["text"], "Stopped by the time limit of 1.00 s.") << "as the report says it";
 
+  // what is known of the instant 0, which they share, does not hang on which of them has ended
+  const TestJson early = c->result("compare", {{"a", 1}, {"b", 2}, {"frames", 5}});
+  std::set<std::string> differ;
+  for (const TestJson& f : early["findings"]) differ.insert(f["id"].get<std::string>());
+  EXPECT_EQ(differ.count("mechanism"), 1U) << early["findings"];
+  EXPECT_EQ(differ.count("stability.start"), 0U) << early["findings"];
+
   // both branches side by side, once the first has come as far
   c->result("switch", {{"branch", 1}});
   c->result("run");
