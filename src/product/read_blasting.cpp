@@ -60,8 +60,8 @@ class Blasting {
       charge.member = index;
       if (m.kind != MemberKind::Column && m.kind != MemberKind::Beam && m.kind != MemberKind::Shaft) {
         if (!std::exchange(is_misplaced, true))
-          table.error("E307", table.place_of("members"), m.name + " is neither a column nor a beam",
-                      "charges fire in columns and beams; take walls out under [preparation]");
+          table.error("E307", table.place_of("members"), m.name + " is neither a column nor a beam nor a shaft",
+                      "charges fire in columns, beams and shafts; take walls out under [preparation]");
         continue;
       }
       if (!is_misplaced && !check_sector(table, m)) is_misplaced = true;
@@ -140,10 +140,10 @@ void check_times(Reading& reading, const std::vector<const Node*>& nodes, const 
     const double time = stages[firing.stage].time, next = time + firing.delay;
     const bool has_next = firing.stage + 1 < stages.size();
     if (time >= duration) {
-      complaints.error("E407", place_of_time(firing.stage), "time: the stage fires after the end of the analysis",
+      complaints.error("E407", place_of_time(firing.stage), "time: the stage fires at or after the end of the analysis",
                        "raise duration in [analysis], or fire earlier");
     } else if (next >= duration) {
-      complaints.error("E407", firing.place, "the charge fires after the end of the analysis",
+      complaints.error("E407", firing.place, "the charge fires at or after the end of the analysis",
                        "raise duration in [analysis], or shorten its delay");
     } else if (has_next && stages[firing.stage + 1].time > time && next >= stages[firing.stage + 1].time) {
       complaints.warn("W506", firing.place, "the charge's delay lasts until the next stage or longer");
@@ -250,7 +250,7 @@ void read_cables(Reading& reading, TableReader& root) {
         const Member& m = reading.plan.members[static_cast<size_t>(found[0])];
         c.member = found[0];
         if (m.kind != MemberKind::Column && m.kind != MemberKind::Beam && m.kind != MemberKind::Shaft) {
-          table.error("E307", table.place_of("member"), m.name + " is neither a column nor a beam");
+          table.error("E307", table.place_of("member"), m.name + " is neither a column nor a beam nor a shaft");
         } else if (m.removed) {
           table.error("E403", table.place_of("member"), m.name + " is taken out in the preparation");
         } else if (c.position > calc_length(m)) {

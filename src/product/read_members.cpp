@@ -498,7 +498,7 @@ void read_preparation(Reading& reading, TableReader& root) {
     for (const int index : find_members(reading, weaken, "members", words)) {
       Member& m = plan.members[static_cast<size_t>(index)];
       if (m.kind != MemberKind::Column && m.kind != MemberKind::Beam && m.kind != MemberKind::Shaft) {
-        weaken.error("E307", weaken.place_of("members"), m.name + " is neither a column nor a beam",
+        weaken.error("E307", weaken.place_of("members"), m.name + " is neither a column nor a beam nor a shaft",
                      "slabs and walls can be taken out under removed");
         break;
       }
