@@ -161,10 +161,11 @@ void add_near_verdicts(const Context& c, const Mechanism& m) {
     if (near.later != 0) {
       text += near.later > 0 ? fmt::format("Judged {:.2f} s later it would be \"{}\".", near.later, near.as.name)
                              : fmt::format("Judged {:.2f} s earlier it would be \"{}\".", -near.later, near.as.name);
+      const auto [then, now] = tell_apart(100 * near.as.connected, 100 * m.connected, 0);
       text += fmt::format(
-          " The largest connected part then holds {:.0f} % of the upper mass instead of {:.0f} %, it leans by {:.1f} "
-          "deg, and its rear edge has come down {:.0f} % as far as its front edge.",
-          100 * near.as.connected, 100 * m.connected, near.as.tilt / unit::deg, 100 * near.as.rear_share);
+          " The largest connected part then holds {} % of the upper mass instead of {} %, it leans by {:.1f} deg, and "
+          "its rear edge has come down {:.0f} % as far as its front edge.",
+          then, now, near.as.tilt / unit::deg, 100 * near.as.rear_share);
     } else {
       text += fmt::format("With {:g} times the bound of {} it would be \"{}\".", near.times, near.rule, near.as.name);
     }
@@ -360,16 +361,30 @@ Reach add_debris(const Context& c, const Mechanism& m) {
   return reach;
 }
 
+/// What a part that stands in its place at the start belongs to: "C-A1-0" for its stump, and for what a charge will
+/// throw out of it.
+std::string standing_name(const Context& c, size_t body) {
+  const std::string& name = c.r.bodies[body].name;
+  for (const product::Member& m : c.plan.members)
+    if (name.rfind(m.name + "/", 0) == 0) return m.name;
+  return name;
+}
+
 void add_clearances(const Context& c) {
   for (const product::Neighbour& n : c.plan.neighbours) {
     const Approach a = find_approach(c.r, n.footprint, c.cancel);
-    const std::string who = c.r.bodies[a.body].name, lowest_who = c.r.bodies[a.lowest_body].name;
+    const std::string lowest_who = c.r.bodies[a.lowest_body].name;
     const bool asked = n.clearance.has_value();
     const auto [distance, limit] = tell_apart(a.least, n.clearance.value_or(kNone));
-    std::string text = fmt::format("The nearest part, {}, comes to {} m at {:.2f} s", who, distance, a.when);
+    std::string text =
+        a.when <= c.r.time.front()
+            ? fmt::format("{} stands {} m away from the start, and nothing has come nearer", standing_name(c, a.body),
+                          distance)
+            : fmt::format("The nearest part, {}, comes to {} m at {:.2f} s", c.r.bodies[a.body].name, distance, a.when);
     if (a.lowest <= kOnGround)
-      text = a.lowest_when <= c.r.time.front() ? fmt::format("{} stands on it from the start", lowest_who)
-                                               : fmt::format("{} lands on it at {:.2f} s", lowest_who, a.lowest_when);
+      text = a.lowest_when <= c.r.time.front()
+                 ? fmt::format("{} stands on it from the start", standing_name(c, a.lowest_body))
+                 : fmt::format("{} lands on it at {:.2f} s", lowest_who, a.lowest_when);
     else if (a.least <= 0)
       text = fmt::format(
           "Nothing lands on it, but parts are over it: {} comes down to {:.1f} m above the ground there, at {:.2f} s",
@@ -811,8 +826,10 @@ void add_verification(const Context& c) {
                     apart),
         apart, "s", Status::Warning);
   c.add("verification.step", "Verification", "Time step",
-        describe_steps(s) + fmt::format(" Joints drift by at most {:.1e} m or rad.", s.joint_drift), s.step, "s",
-        s.step_needed > 0 ? Status::Warning : Status::Info);
+        describe_steps(s) + (c.model.joints.empty()
+                                 ? std::string()
+                                 : fmt::format(" Joints drift by at most {:.1e} m or rad.", s.joint_drift)),
+        s.step, "s", s.step_needed > 0 ? Status::Warning : Status::Info);
   for (size_t i = 0; i < s.notes.size(); ++i)
     c.add(fmt::format("verification.note.{}", i + 1), "Verification", "Note of the engine", s.notes[i], kNone, "",
           Status::Warning);

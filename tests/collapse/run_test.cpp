@@ -360,6 +360,16 @@ TEST(Run, ANeighbourIsSaidToBeUnderWhatDoesNotComeDownThere) {
   EXPECT_THAT(finding(r, "clearance.under").text, testing::StartsWith("Nothing lands on it, but parts are over it: "));
   EXPECT_THAT(finding(r, "clearance.under").text, testing::HasSubstr(" comes down to 2.5 m above the ground there"));
   EXPECT_EQ(finding(r, "clearance.foot").text, "C-A1-0 stands on it from the start.");
+  EXPECT_THAT(finding(r, "verification.step").text, testing::HasSubstr(" Joints drift by at most "));
+  // what a charge leaves and throws out is the column until then
+  const record::Record fired = run_plan(
+      read(house(neighbour("foot", "-1 m", "1 m") + neighbour("front", "-9 m", "-4 m") + charge("C-A*-0", "0.05 s"),
+                 "0.06 s")),
+      default_knowledge(), {}, {});
+  EXPECT_EQ(finding(fired, "clearance.foot").text, "C-A1-0 stands on it from the start.");
+  EXPECT_THAT(finding(fired, "clearance.front").text, testing::MatchesRegex("[A-Z]-[A-Z0-9]*-[01] stands 3.[0-9] m "
+                                                                            "away from the start, and nothing has come "
+                                                                            "nearer."));
 }
 
 TEST(Run, ANeighbourThatAsksForNothingOnItIsBrokenByWhatLands) {
@@ -482,7 +492,7 @@ TEST(Run, ALimitThatIsJustBrokenShowsIt) {
       run_plan(read(house(neighbour("near", "9.99 m", "20 m", "clearance = \"4.849 m\"\n"), "0.05 s")),
                default_knowledge(), {}, {});
   EXPECT_EQ(finding(r, "clearance.near").status, record::Status::Bad);
-  EXPECT_THAT(finding(r, "clearance.near").text, testing::HasSubstr(" comes to 4.84 m at "));
+  EXPECT_THAT(finding(r, "clearance.near").text, testing::HasSubstr(" stands 4.84 m away from the start"));
   EXPECT_THAT(finding(r, "clearance.near").text, testing::HasSubstr("the limit is 4.85 m."));
 }
 

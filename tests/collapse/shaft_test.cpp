@@ -487,6 +487,7 @@ TEST(ShaftPhysics, OneThatStandsAndSwaysLessAndLessBreaksNoLimitByIt) {
                                     (r.time[last] - r.time[last - 1]));
     for (const record::Finding& f : r.findings) EXPECT_NE(f.status, record::Status::NotJudged) << until << f.text;
     EXPECT_EQ(text_of(r, "stability.start").find("Heads of ground columns"), std::string::npos) << "it has none";
+    EXPECT_EQ(text_of(r, "verification.step").find("Joints drift"), std::string::npos) << "nor joints";
   }
   EXPECT_GT(fastest, 0.2) << "or nothing here is fast enough to be asked";
 }
