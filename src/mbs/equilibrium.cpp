@@ -627,9 +627,13 @@ class DeadLoad {
   /// Of the last evaluation: tangents where they lead nearer, else secants, which go there slowly but surely.
   void find_cracks(bool by_tangents);
   std::string describe_failure(bool has_diverged);
-  enum class End { Found, None, Diverged };
+  /// What the most loaded element would bear without limits.
+  std::string tell_most_loaded() const;
+  enum class End { Found, None, Diverged, Mechanism };
   /// Iterates from where the bodies are.
   End search(double good_enough, std::string& message);
+  /// Where there is no equilibrium: the loads without limits of elements that crack under them.
+  void find_cracked_loads(double good_enough);
 
   /// Zones forget what they were asked.
   void make_virgin() { s_.state.element = virgin_, s_.state.rotational = virgin_rotational_; }
@@ -650,6 +654,7 @@ class DeadLoad {
   double unbalanced_ = 0, gap_left_ = 0;  // over the weight; [m, rad]
   size_t most_unbalanced_ = 0;            // body
   std::vector<Overload> overloads_;       // without limits, the largest first
+  bool measures_loads_ = false;           // laws have no limits
   size_t most_loaded_ = 0;                // element, without limits
   double most_load_ = 0;
   Acceleration acceleration_;
@@ -825,6 +830,7 @@ void DeadLoad::move_accelerated() {
 }
 
 void DeadLoad::find_most_loaded() {
+  most_load_ = 0;
   overloads_.clear();
   for (size_t i = 0; i < s_.elements.size(); ++i) {
     const double used = calc_utilisation(s_.elements[i].zone, s_.laws, 0, s_.state.element[i]);
@@ -856,22 +862,24 @@ std::string DeadLoad::describe_failure(bool has_diverged) {
   std::snprintf(words, sizeof words, "no dead-load equilibrium after %d iterations: the largest unbalanced force ",
                 s_.summary.equilibrium_iterations);
   std::string message = words;
-  s_.summary.overloads = overloads_;
   if (has_diverged) {
     message += "grew without bound";
   } else {
     std::snprintf(words, sizeof words, "is %.2g times the weight", unbalanced_);
     message = message + words + ", of body \"" + s_.model.bodies[most_unbalanced_].name.substr(0, 60) + "\"";
   }
-  if (most_load_ > 0) {
-    constexpr double countless = 100;  // hardly any capacity is left
-    if (most_load_ < countless)
-      std::snprintf(words, sizeof words, "\" would be loaded to %.0f %% of its capacity", 100 * most_load_);
-    else
-      std::snprintf(words, sizeof words, "\" would be loaded to more than %.0f times its capacity", countless);
-    message += "; without limits element \"" + s_.model.elements[most_loaded_].name.substr(0, 60) + words;
-  }
   return message;
+}
+
+std::string DeadLoad::tell_most_loaded() const {
+  if (!(most_load_ > 0)) return {};
+  constexpr double countless = 100;  // hardly any capacity is left
+  char words[120];
+  if (most_load_ < countless)
+    std::snprintf(words, sizeof words, "\" would be loaded to %.0f %% of its capacity", 100 * most_load_);
+  else
+    std::snprintf(words, sizeof words, "\" would be loaded to more than %.0f times its capacity", countless);
+  return "; without limits element \"" + s_.model.elements[most_loaded_].name.substr(0, 60) + words;
 }
 
 bool DeadLoad::find(std::string& message) {
@@ -898,28 +906,57 @@ bool DeadLoad::find(std::string& message) {
 
   const Place begun = find_place();
   const std::vector<JointState> joints = s_.state.joint;  // their angles
+  const auto begin_again = [&] {
+    go_back(begun);
+    make_virgin();
+    s_.state.joint = joints;
+    pushed_back_.setZero();
+    acceleration_ = {};
+    most_load_ = 0;
+    overloads_.clear();
+  };
+  End end = End::Diverged;
   // what gravity bends further than its springs alone tell overshoots: then on shorter ways
   for (const double share : {1.0, 0.5, 0.2, 0.05}) {
     share_ = share;
-    if (share < 1) {
-      go_back(begun);
-      make_virgin();
-      s_.state.joint = joints;
-      pushed_back_.setZero();
-      acceleration_ = {};
-      most_load_ = 0;
-      overloads_.clear();
-    }
-    const End end = search(good_enough, message);
-    if (end == End::Found) s_.summary.overloads.clear();
-    if (end != End::Diverged) return end == End::Found;
+    if (share < 1) begin_again();
+    end = search(good_enough, message);
+    if (end != End::Diverged) break;
   }
+  if (end == End::Found || end == End::Mechanism) return end == End::Found;
+  const auto cracks = [](const auto& x) {
+    return x.zone.cracking[0].flexibility > 0 || x.zone.cracking[1].flexibility > 0;
+  };
+  if (std::any_of(s_.elements.begin(), s_.elements.end(), cracks) ||
+      std::any_of(s_.rotationals.begin(), s_.rotationals.end(), cracks)) {
+    begin_again();
+    find_cracked_loads(good_enough);
+  }
+  s_.summary.overloads = overloads_;
+  message += tell_most_loaded();
   return false;
+}
+
+void DeadLoad::find_cracked_loads(double good_enough) {
+  const int iterations = s_.summary.equilibrium_iterations;
+  const double residual = s_.summary.equilibrium_residual;
+  CompiledLaws other;
+  const auto endless = SharedLaw().compile();
+  for (size_t i = 0; i < s_.laws.size(); ++i) other.push_back(endless);
+  std::swap(s_.laws, other);
+  share_ = 1;
+  measures_loads_ = true;
+  std::string message;
+  const bool is_found = search(good_enough, message) == End::Found;
+  std::swap(s_.laws, other);
+  if (is_found) find_most_loaded();
+  s_.summary.equilibrium_iterations = iterations;
+  s_.summary.equilibrium_residual = residual;
 }
 
 DeadLoad::End DeadLoad::search(double good_enough, std::string& message) {
   // first without limits, so that an overloaded element can be named; then with them
-  s_.ignores_limits = true;
+  s_.ignores_limits = !measures_loads_;
   constexpr int most = 400;
   constexpr int fresh = 12;  // most iterations with a stiffness of their own; then the last one serves
   constexpr int fresh_by_cracks = 60;
@@ -954,6 +991,7 @@ DeadLoad::End DeadLoad::search(double good_enough, std::string& message) {
       ++round;
       continue;
     }
+    if (measures_loads_ && unbalanced_ < 1e-6 && gap_left_ < 1e-6) return End::Found;
     if (!s_.ignores_limits && unbalanced_ < 1e-11 && gap_left_ < 1e-11) break;
     // round-off ends the improvement of very stiff models earlier
     idle = unbalanced_ < 0.5 * best ? 0 : idle + 1;
@@ -985,7 +1023,7 @@ DeadLoad::End DeadLoad::search(double good_enough, std::string& message) {
          unbalanced_ > quick * last_unbalanced)) {
       ++factorised;
       if (!factorise(message)) {
-        if (unbalanced_ <= thrown) return End::None;
+        if (unbalanced_ <= thrown) return End::Mechanism;
         message = describe_failure(true);
         return End::Diverged;
       }

@@ -97,6 +97,35 @@ TEST(Run, ListsTheMembersThatTheDeadLoadOverloads) {
   EXPECT_EQ(f.text.find(worst), f.text.rfind(worst)) << "named once: " << f.text;
 }
 
+TEST(Run, OverloadsAreThoseOfMembersThatCrack) {
+  // ends of beams are turned by their cracks: uncracked they would be loaded by that alone
+  const auto run_with = [](const std::string& section) {
+    return run_plan(
+        read(materials() + R"toml([concrete.poor]
+fc = "9 N/mm2"
+Ec = "15 GPa"
+[section.thin]
+width = "10 cm"
+height = "10 cm"
+concrete = "poor"
+steel = "S"
+cover = "15 mm"
+ties = { diameter = "4 mm", spacing = "10 cm" }
+bars = { count_y = 2, count_z = 2, diameter = "4 mm" }
+)toml" + grid("A = \"0 m\", B = \"7 m\", C = \"14 m\"", "1 = \"0 m\", 2 = \"7 m\"", 2, "1 kN/m2") +
+             "[[columns]]\nsection = \"column\"\nat = [\"A1\", \"A2\", \"B1\", \"B2\"]\n[[columns]]\nsection = \"" +
+             section + "\"\nat = [\"C1\", \"C2\"]\n[[beams]]\nsection = \"beam\"\n[[slabs]]\npanel = \"floor\"\n" +
+             analysis("0.05 s")),
+        default_knowledge(), {}, {});
+  };
+  EXPECT_LT(1 / finding(run_with("column"), "stability.start").value, 1);
+  const record::Record r = run_with("thin");
+  ASSERT_EQ(r.ending, "failed");
+  const std::string list = finding(r, "overloads").text;
+  EXPECT_THAT(list, testing::HasSubstr("if they had no limits: 2. Share of the capacity, the most loaded first: C-C"));
+  for (const char* sound : {"C-A", "C-B", "B-", "S-"}) EXPECT_EQ(list.find(sound), std::string::npos) << list;
+}
+
 TEST(Run, FindingsComeInTheOrderOfTheirWeight) {
   const record::Record r = run_plan(read(house(charge("C-A*-0", "0.1 s"), "0.5 s")), default_knowledge(), {}, {});
   std::vector<std::string> headings;
