@@ -7,7 +7,7 @@ import { readComparison, type Comparison, type Compared, type Photo } from "./co
 import type { Triple } from "./data";
 import { Help, listenToKeys } from "./keys";
 import { NoWebGl } from "./no_webgl";
-import { Plots } from "./plots";
+import { cssColour, Plots } from "./plots";
 import { Scene, type View } from "./scene";
 import { useSceneView } from "./scene_view";
 import { makeState, runClock, type State } from "./state";
@@ -16,8 +16,8 @@ import { formatTime } from "./units";
 import { startPage } from "./start";
 
 type Shown = "both" | "a" | "b";
-const colourOfA = "#b0483c";
-const colourOfB = "#3c8f4e";
+/// Those of the plots.
+const colours = ["--series-0", "--series-1"] as const;
 
 const shows: [Shown, string][] = [
   ["both", "both"],
@@ -33,12 +33,21 @@ class OverlaidScene extends Scene {
   constructor(canvas: HTMLCanvasElement, { a, b }: Compared) {
     super(canvas, a);
     this.other = new Building(b);
-    this.building.setGhost(colourOfA, 1);
-    this.other.setGhost(colourOfB, 0.5);
+    this.paint();
     this.stage.scene.add(this.other.group);
     this.setLook("kind", "none", -1);
     this.other.setLook("kind", "none", -1);
     this.fit("side");
+  }
+
+  private paint(): void {
+    this.building.setGhost(cssColour(colours[0]), 1);
+    this.other.setGhost(cssColour(colours[1]), 0.5);
+  }
+
+  override setDark(dark: boolean): void {
+    super.setDark(dark);
+    if (this.other !== undefined) this.paint();
   }
 
   /// Both of them.
@@ -100,8 +109,8 @@ function Overlay(props: { state: State; compared: Compared; fitRef: { current: (
       </div>
       <div class="legend">
         <div class="legend-row">
-          {([[colourOfA, `A: ${names[0]}`], [colourOfB, `B: ${names[1]}`]] as const).map(([colour, word]) => (
-            <span class="with-sign"><i class="swatch" style={{ background: colour }} /> {word}</span>
+          {colours.map((colour, k) => (
+            <span class="with-sign"><i class="swatch" style={{ background: `var(${colour})` }} /> {`${"AB"[k]}: ${names[k]}`}</span>
           ))}
         </div>
       </div>

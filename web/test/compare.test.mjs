@@ -90,6 +90,38 @@ describe("the page of two runs", () => {
     await page.screenshot({ path: `${out}page.png`, fullPage: true });
   });
 
+  it("gives both runs the colours of their plots, which differ without red and green", { timeout: 120000 }, async () => {
+    const { page } = browser;
+    for (const colorScheme of ["light", "dark"]) {
+      await page.emulateMedia({ colorScheme });
+      const [picture, plots] = await page.evaluate(() => [
+        [...document.querySelectorAll(".legend .swatch")].map((e) => getComputedStyle(e).backgroundColor),
+        [...document.querySelectorAll("[data-plot=tilt_angle] .plot-legend line")].map((e) => getComputedStyle(e).stroke),
+      ]);
+      assert.equal(picture.length, 2);
+      assert.deepEqual(plots, picture);
+      // red less blue over the whole picture, with one run alone
+      const warmth = async (shown) => {
+        await page.click(`[data-test=show-${shown}]`);
+        const address = `data:image/png;base64,${(await page.locator("[data-test=canvas]").screenshot()).toString("base64")}`;
+        return page.evaluate(async (src) => {
+          const image = new Image();
+          image.src = src;
+          await image.decode();
+          const context = new OffscreenCanvas(image.width, image.height).getContext("2d");
+          context.drawImage(image, 0, 0);
+          const { data } = context.getImageData(0, 0, image.width, image.height);
+          let sum = 0;
+          for (let i = 0; i < data.length; i += 4) sum += data[i] - data[i + 2];
+          return sum;
+        }, address);
+      };
+      assert.ok((await warmth("a")) < (await warmth("b")), `${colorScheme}: A is blue, B orange`);
+      await page.click("[data-test=show-both]");
+    }
+    await page.emulateMedia({ colorScheme: "light" });
+  });
+
   it("says when the blocks touch down", async () => {
     const words = await browser.page.textContent("[data-test=touchdown]");
     assert.match(words, given === undefined ? /A 4\.90\d* s, B 5\.02\d* s, difference 0\.120 s/ : /^A /);
