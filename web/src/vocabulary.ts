@@ -83,18 +83,19 @@ export function colourOfUtilisation(utilisation: number): string {
 export interface EventWords {
   word: string;
   colour: string;
-  shape: "circle" | "triangle" | "diamond" | "cross" | "star" | "square" | "down";
+  shape: "circle" | "triangle" | "diamond" | "cross" | "star" | "square" | "down" | "ring";
   /// Many of these belong to one collapse; they are drawn small and can be hidden.
   small: boolean;
 }
+/// What is a state of zones too has its sign.
 const eventWords: Record<string, EventWords> = {
   stage: { word: "Stage", colour: "#0072b2", shape: "circle", small: false },
   charge: { word: "Charge", colour: "#cc79a7", shape: "star", small: true },
   yield: { word: "Yield", colour: "#e69f00", shape: "triangle", small: true },
-  softening: { word: "Softening", colour: "#b8860b", shape: "triangle", small: true },
+  softening: { word: "Softening", colour: "#d55e00", shape: "diamond", small: true },
   crushing: { word: "Crushing", colour: "var(--crushed)", shape: "square", small: true },
   rupture: { word: "Rupture", colour: "var(--broken)", shape: "cross", small: true },
-  release: { word: "Release", colour: "#d55e00", shape: "diamond", small: true },
+  release: { word: "Release", colour: "#8c6bb1", shape: "ring", small: true },
   touchdown: { word: "Touchdown", colour: "var(--touchdown)", shape: "down", small: false },
   contact: { word: "Contact", colour: "#8b97a3", shape: "square", small: true },
   rest: { word: "End", colour: "#009e73", shape: "square", small: false },

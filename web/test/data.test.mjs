@@ -12,7 +12,7 @@ const { chooseAxes } = await load("steer_study.tsx");
 const { listConditions } = await load("handover.tsx");
 const { chooseMoments } = await load("stills.tsx");
 const { findZonesOfBodies, findBody, partOfShape } = await load("zones.ts");
-const { colourOfUtilisation } = await load("vocabulary.ts");
+const { colourOfUtilisation, wordsOfEvent, zoneStates } = await load("vocabulary.ts");
 const { BranchRun } = await load("steer_branch.ts");
 const { makeLook } = await load("state.ts");
 const { toScreen, linear } = await load("colour.ts");
@@ -135,6 +135,18 @@ describe("what is shown", () => {
   it("keeps the ends of the colour ramp", () => {
     assert.equal(colourOfUtilisation(0), "rgb(251, 248, 234)");
     assert.equal(colourOfUtilisation(7), "rgb(92, 31, 5)");
+  });
+});
+
+describe("signs", () => {
+  const events = ["stage", "charge", "yield", "softening", "crushing", "rupture", "release", "touchdown", "contact", "rest", "cable", "edit", "failure"];
+  const signOf = ({ shape, colour, variable }) => `${shape} ${variable === undefined ? colour : `var(${variable})`}`;
+  it("have one meaning each, in the picture and among events", () => {
+    const states = new Map(zoneStates.map((z) => [signOf(z), z.word]));
+    const alike = { yield: "yielded", softening: "softening", rupture: "broken", crushing: "crushed stub", charge: "fired" };
+    const signs = events.map((kind) => signOf(wordsOfEvent(kind)));
+    assert.equal(new Set(signs).size, events.length);
+    events.forEach((kind, i) => assert.equal(states.get(signs[i]), alike[kind], kind));
   });
 });
 
