@@ -56,4 +56,32 @@ describe("the printed report", () => {
     assert.ok(pictures.filter((row) => row[0] === "1").length >= stills, "pictures of the sequence on the first page");
     assert.ok(pictures.length <= stills + plots, `${pictures.length} pictures of ${stills} stills and ${plots} plots`);
   });
+
+  it("leaves no page nearly empty behind a long first one, and breaks no word of its head", async () => {
+    const { page, close } = await openPage(process.env.TOPPLE_REPORT);
+    await page.setViewportSize({ width: 688, height: 900 }); // A4 within its margins
+    await page.emulateMedia({ media: "print" });
+    const broken = await page.evaluate(() => {
+      const link = document.querySelector("[data-test=open-finding]") ?? document.querySelector(".ending").appendChild(Object.assign(document.createElement("a"), { className: "open-finding" }));
+      link.innerHTML = '<span class="status-word">Nicht beurteilt</span> <span>Erschütterungen: Versorgungsleitung</span>';
+      const text = link.lastElementChild.firstChild, words = [...text.data.matchAll(/\S+/g)];
+      return words.filter((word) => {
+        const range = document.createRange();
+        range.setStart(text, word.index);
+        range.setEnd(text, word.index + word[0].length);
+        return range.getClientRects().length > 1;
+      }).map(String);
+    });
+    assert.deepEqual(broken, []);
+    const path = `${out}long.pdf`;
+    for (let more = 2; more <= 12; more += 2) {
+      await page.evaluate(() => {
+        for (let i = 0; i < 2; ++i) document.querySelector(".conditions ul").append(Object.assign(document.createElement("li"), { textContent: "One more thing that is not as planned." }));
+      });
+      await page.pdf({ path, preferCSSPageSize: true, printBackground: true });
+      const second = ask("pdftotext", "-f", "2", "-l", "2", path, "-");
+      assert.ok(second.length > 600, `${more} lines more leave ${second.length} letters on page 2`);
+    }
+    await close();
+  });
 });
