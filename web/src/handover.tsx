@@ -248,7 +248,7 @@ function StudyResults(props: { study: StudySummary }) {
             const all = level(o, 0), core = level(o, -1);
             if (all === undefined || core === undefined) return null;
             const middle = core.lower === core.upper ? bound(core.lower) : `${bound(core.lower)} … ${bound(core.upper)}`;
-            return <tr><td><span>{o.name}</span> {o.unit === "" ? "" : `[${unitWord(o.unit)}]`}</td><td class="number">{bound(all.lower)}</td><td class="number">{bound(all.upper)}</td><td class="number">{middle}</td></tr>;
+            return <tr><td><span data-name>{o.name}</span> {o.unit === "" ? "" : `[${unitWord(o.unit)}]`}</td><td class="number">{bound(all.lower)}</td><td class="number">{bound(all.upper)}</td><td class="number">{middle}</td></tr>;
           })}
         </tbody>
       </table>

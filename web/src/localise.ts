@@ -1,6 +1,6 @@
 /// Data of pages in the reader's language: what the program wrote in sentences. Names that people gave stay.
 import type { Run } from "./data";
-import type { Study } from "./study/data";
+import { titleOf, type Study } from "./study/data";
 import { language, say, settle } from "./translate";
 import { prettify } from "./units";
 
@@ -36,6 +36,9 @@ export function localiseRun(run: Run): Run {
 
 export function localiseStudy(study: Study): Study {
   if (language === "en") return study;
+  // names are those of samples.csv and trajectories.csv
+  for (const q of [...study.inputs, ...study.derived, ...study.outputs, ...study.curves]) settle(q.name, titleOf(q));
+  for (const q of study.inputs) settle(q.label, titleOf({ name: q.label, unit: q.unit }));
   for (const sentence of study.verdict) sentence.text = tell(sentence.text);
   for (const run of study.notable) run.why = tell(run.why);
   for (const box of study.boxes?.list ?? []) box.guarantee = tell(box.guarantee);

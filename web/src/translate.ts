@@ -67,6 +67,12 @@ const unit = /^(?:[numckMG]?m[23]?|m?s|[kM]?N|[kM]?Nm|[kM]?J|[kMG]?Pa|k?g|t|Hz|d
 /// Decimal commas in a number, or in several with their units; names keep their dots.
 const commasOfMeasures = (text: string): string => (/\d\.\d/.test(text) && (text.match(/(?<![\w.])[A-Za-z][\w/]*/g) ?? []).every((word) => unit.test(word)) ? commas(text) : text);
 
+const settled = new Set<string>();
+/// What is in the reader's language already, and names, from here on: they stay as they are, also within sentences.
+export function settle(...texts: string[]): void {
+  for (const text of texts) settled.add(text);
+}
+
 /// The German of a text that is in the table as a whole or made of sentences that are; undefined if not.
 export function translate(text: string): string | undefined {
   const said = translateWhole(text) ?? translateParts(text) ?? translateWhole(text, false, true);
@@ -88,7 +94,7 @@ function translateWhole(text: string, isLoose = false, isOpen = isLoose): string
     let count = 0;
     const values = s.isNumber.map((isNumber, i) => {
       const value = found[i + 1] as string;
-      return s.isKept[i] === true ? value : s.isList[i] === true ? value.replace(/(?<= )(-?\d+)\.(\d+(?:e[+-]?\d+)?)(?=(?: [^\s,]+)?(?:, |$))/g, "$1,$2") : isNumber ? commas(value) : translate(value.trim()) ?? commasOfMeasures(value);
+      return s.isKept[i] === true ? value : s.isList[i] === true ? value.replace(/(?<= )(-?\d+)\.(\d+(?:e[+-]?\d+)?)(?=(?: [^\s,]+)?(?:, |$))/g, "$1,$2") : isNumber ? commas(value) : settled.has(value.trim()) ? value : translate(value.trim()) ?? commasOfMeasures(value);
     });
     return s.german.replace(/\{(\d*)\}/g, (_, index: string) => values[index === "" ? count++ : Number(index)] ?? "");
   }
@@ -126,11 +132,6 @@ export function translateLoosely(text: string): string | undefined {
 }
 
 const kept = new Map<string, string>();
-const settled = new Set<string>();
-/// What is in the reader's language already, from here on: `say` leaves it as it is.
-export function settle(...texts: string[]): void {
-  for (const text of texts) settled.add(text);
-}
 
 /// A text in the reader's language; one that the table does not have stays as it is, but for its decimal points.
 export function say(text: string): string {

@@ -297,10 +297,10 @@ const namesOfRun = (data) => {
 };
 
 const namesOfStudy = (data) => {
-  const quantities = [...data.inputs.flatMap((q) => [q.name, q.label]), ...data.derived.map((q) => q.name), ...data.outputs.map((q) => q.name)];
+  const quantities = [...data.inputs.flatMap((q) => [q.name, q.label]), ...data.derived.map((q) => q.name), ...data.outputs.map((q) => q.name), ...data.curves.map((q) => q.name)];
   const units = [...data.inputs, ...data.derived, ...data.outputs].map((q) => q.unit);
   const alike = [...quantities, ...units, data.origin.source_name, data.origin.model, data.origin.program_version, "α", "Plan", "Problem"];
-  for (const q of [...data.inputs, ...data.derived, ...data.outputs]) alike.push(titleOf(q), titleOf({ name: q.label, unit: q.unit }), unitWord(q.unit), `[${unitWord(q.unit)}]`);
+  for (const q of [...data.inputs, ...data.derived, ...data.outputs, ...data.curves]) alike.push(titleOf(q), titleOf({ name: q.label, unit: q.unit }), unitWord(q.unit), `[${unitWord(q.unit)}]`);
   // what a program says of its own failures, and what was typed
   alike.push(...(data.origin.kind === "plan" ? [] : data.failures), data.boxes?.requirement, `topple ${data.origin.program_version}`);
   return { alike, named: [data.title, data.asked, ...quantities, ...data.site.neighbours.map((n) => n.name)] };
@@ -350,9 +350,34 @@ if (run === undefined && study === undefined)
     it("has no English left", { timeout: 240000 }, async () => {
       await mkdir(out, { recursive: true });
       // whatever people name: quotes and semicolons would be part of sentences
-      const made = JSON.parse(JSON.stringify(makeStudy()).replaceAll(JSON.stringify(hostile).slice(1, -1), "Kran"));
+      const made = JSON.parse(JSON.stringify(makeStudy()).replaceAll(JSON.stringify(hostile).slice(1, -1), "Kran").replaceAll('"reach"', '"utilisation"'));
       made.failures = ["2 x a value is not finite"];
       await writeStudy(made, `${out}made-up.en.html`);
       await compareLanguages(`${out}made-up.en.html`, "made-up", namesOfStudy);
+      const { page, close } = await openPage(`${out}made-up.html`);
+      const texts = await collect(page);
+      await close();
+      // an output has one name, that of samples.csv
+      assert.ok(texts.includes("Zugehörigkeit von utilisation"));
+      assert.deepEqual(texts.filter((text) => /Ausnutzung/.test(text)), []);
+    });
+    it("is that of a report with a study, which keeps the names of outputs", { timeout: 120000 }, async () => {
+      const data = makeSynthetic(3), { outcomes, verdict, runs, failed, title } = makeStudy();
+      data.study = { title, runs, failed, verdict, outcomes, outputs: [{ name: "utilisation", unit: "", levels: [{ alpha: 0, lower: 0.1, upper: 0.9 }, { alpha: 1, lower: 0.5, upper: 0.5 }] }] };
+      data.study.outputs.push({ ...data.study.outputs[0], name: "touchdown_energy_of_the_upper_block", unit: "MJ" });
+      await writePage(data, `${out}with-study.en.html`);
+      await writeFile(`${out}with-study.html`, (await readFile(`${out}with-study.en.html`, "utf8")).replace('<html lang="en">', '<html lang="de">'));
+      const { page, close } = await openPage(`${out}with-study.html`);
+      const first = await page.$$eval("[data-test=fuzzy-results] table:last-of-type tbody td:first-child", (list) => list.map((e) => e.innerText.trim()));
+      const broken = await page.$$eval(".fuzzy-results :is(th, td) :is(*, :scope)", (list) => list.flatMap((e) => [...e.childNodes].filter((n) => n.nodeType === 3)).flatMap((n) =>
+        [...n.data.matchAll(/[^\s-]+/g)].filter((word) => {
+          const range = document.createRange();
+          range.setStart(n, word.index);
+          range.setEnd(n, word.index + word[0].length);
+          return new Set([...range.getClientRects()].map((r) => Math.round(r.top))).size > 1;
+        }).map(String)));
+      await close();
+      assert.deepEqual(first, ["utilisation", "touchdown_energy_of_the_upper_block [MJ]"]);
+      assert.deepEqual(broken, []);
     });
   });
