@@ -11,7 +11,7 @@ import { hostile } from "./synthetic.mjs";
 
 const { prettify } = await load("units.ts");
 const { makeTicks, findRange } = await load("study/chart.tsx");
-const { placeLabels, calcWidth } = await load("study/labels.ts");
+const { placeLabels, calcWidth, layTitles } = await load("study/labels.ts");
 const { readStudy } = await load("study/data.ts");
 const out = fileURLToPath(new URL("out/", import.meta.url));
 const given = process.env.TOPPLE_STUDY;
@@ -54,6 +54,19 @@ describe("a study's parts", () => {
     }
     assert.deepEqual(placeLabels([{ text: "1", places: [[50, 50], [60, 50]], avoid: [[50, 52]] }], frame), [[60, 50]], "away from what is not its own");
     assert.deepEqual(placeLabels([{ text: "1", places: [[50, 50]] }, { text: "2", places: [[52, 50]] }], frame), [[50, 50], undefined]);
+  });
+
+  it("lays titles of axes in rows, none over another one and none cut off", () => {
+    const titles = ["fc [N/mm²]", "duration [s]", "possibility of the inputs", "tilt [deg]", "a name that is longer than all of the picture, of which the end has to be left out"];
+    const places = titles.map((_, k) => 60 + 62 * k), laid = layTitles(titles, places, 368);
+    const ends = laid.map(({ text, x, row }) => ({ row, low: x - calcWidth(text) / 2, high: x + calcWidth(text) / 2 }));
+    ends.forEach((a, i) => {
+      assert.ok(a.low >= 0 && a.high <= 368, titles[i]);
+      for (const b of ends.slice(0, i)) assert.ok(a.row !== b.row || a.low >= b.high || b.low >= a.high);
+    });
+    assert.deepEqual(laid.slice(0, 4).map((t) => t.text), titles.slice(0, 4));
+    assert.match(laid[4].text, /^a name that .*…$/);
+    assert.deepEqual(layTitles(["a", "b"], [60, 900], 960).map((t) => t.row), [0, 0]);
   });
 
   it("refuses data that are damaged or of another kind", () => {
@@ -252,6 +265,13 @@ describe("the page of a study", () => {
         .filter((e) => !(e.getAttribute("aria-label") || e.textContent.trim() || e.closest("label")?.textContent.trim())).map((e) => e.outerHTML.slice(0, 80)),
     );
     assert.deepEqual(nameless, []);
+    await page.emulateMedia({ media: "print" });
+    await page.setViewportSize({ width: 688, height: 900 }); // A4 within its margins, not measured again
+    const beyond = await page.$$eval("[data-test=coordinates]", ([holder]) =>
+      [...holder.querySelectorAll("svg, canvas, .axis-title")].filter((e) => e.getBoundingClientRect().right > holder.getBoundingClientRect().right + 1).map((e) => e.textContent));
+    assert.deepEqual(beyond, []);
+    assert.equal(await page.locator(".hint:visible").count(), 0);
+    await page.emulateMedia({ media: "screen" });
     const pdf = await page.pdf({ path: `${out}study.pdf`, preferCSSPageSize: true, printBackground: true });
     assert.ok(pdf.length > 20000);
   });

@@ -9,7 +9,8 @@ export interface Label {
   avoid?: readonly Point[];
 }
 
-const height = 14, letter = 6.7; // of text of 12 px
+export const height = 14;
+const letter = 6.7; // of text of 12 px
 const far = 12; // from what is to be avoided, as if the label were as high as wide; farther is no better
 
 export const calcWidth = (text: string): number => letter * [...text].length + 4;
@@ -42,5 +43,20 @@ export function placeLabels(labels: readonly Label[], frame: { left: number; rig
     }
     if (best !== undefined) taken.push({ x: best[0], y: best[1], width });
     return best;
+  });
+}
+
+/// Titles of axes at `places` in as few rows as they take, row 0 nearest to the lines; one that is wider than all of it is cut.
+export function layTitles(titles: readonly string[], places: readonly number[], width: number): { text: string; x: number; row: number }[] {
+  const edge = 4, ends: number[] = []; // of what each row holds
+  return titles.map((title, k) => {
+    const most = Math.floor((width - 2 * edge) / calcWidth("x".repeat(10)) * 10);
+    const text = title.length > most ? `${title.slice(0, Math.max(1, most - 1))}…` : title;
+    const half = calcWidth(text) / 2;
+    const x = Math.max(edge + half, Math.min(width - edge - half, places[k] as number));
+    let at = ends.findIndex((end) => end <= x - half);
+    if (at < 0) at = ends.length;
+    ends[at] = x + half;
+    return { text, x, row: at };
   });
 }

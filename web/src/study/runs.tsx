@@ -1,12 +1,17 @@
 /// All runs at once: parallel coordinates with brushes, the runs inside them as a table, one run with its values.
 import { useEffect, useRef, useState } from "preact/hooks";
 import { formatNumber } from "../units";
-import { makeScale, makeTicks, tickText } from "./chart";
+import { say } from "../translate";
+import { makePath, makeScale, makeTicks, tickText } from "./chart";
 import { titleOf } from "./data";
+import { height as titleHeight, layTitles } from "./labels";
 import { lookOf, nameOf, type Axis, type State } from "./state";
 import { OutcomeName } from "./verdict";
 
-const height = 330, top = 34, bottom = 24, side = 60;
+const high = 272, bottom = 24, side = 60; // of the lines, below them, beside them
+const paper = 700; // width of A4
+const pixels = makeScale(0, 1, 0, 1);
+const prints = ["beforeprint", "afterprint"];
 const mostRows = 200;
 
 /// The colour behind a look, for a canvas.
@@ -21,14 +26,21 @@ function Coordinates(props: { state: State }) {
   const table = study.run_table;
   const holder = useRef<HTMLDivElement>(null);
   const canvas = useRef<HTMLCanvasElement>(null);
-  const [width, setWidth] = useState(1000);
+  const [measured, setWidth] = useState(1000);
+  const [printed, setPrinted] = useState(false);
+  const width = printed ? paper : measured;
   const [dark, setDark] = useState(0); // counts changes of the colour scheme
   const axes = state.axes.filter((a) => state.shownAxes.value.has(a.id));
   const gap = axes.length > 1 ? (width - 2 * side) / (axes.length - 1) : 0;
   const placeOf = (k: number): number => (axes.length > 1 ? side + k * gap : width / 2);
+  const titles = layTitles(axes.map((a) => say(a.title)), axes.map((_, k) => placeOf(k)), width);
+  const top = 6 + titleHeight * (1 + titles.reduce((most, t) => Math.max(most, t.row), 0)), height = top + high + bottom;
   const scaleOf = (a: Axis) => makeScale(a.low, a.high, height - bottom, top);
   const inside = state.inside.value;
   const selected = state.selected.value;
+  const pathOf = (r: number): string => makePath(axes.map((a, k) => [placeOf(k), typeof a.value[r] === "number" ? scaleOf(a).to(a.value[r]) : null]), pixels, pixels);
+  const opacity = Math.min(0.8, Math.max(0.12, 60 / Math.max(1, inside.length)));
+  const dashOf = (dash: number[]): number[] => (inside.length > 300 ? [] : dash);
 
   useEffect(() => {
     const element = holder.current;
@@ -40,8 +52,11 @@ function Coordinates(props: { state: State }) {
     const scheme = matchMedia("(prefers-color-scheme: dark)");
     const change = (): void => setDark((n) => n + 1);
     scheme.addEventListener("change", change);
+    const print = (event: Event): void => setPrinted(event.type === "beforeprint");
+    for (const type of prints) addEventListener(type, print);
     return () => {
       observer.disconnect();
+      for (const type of prints) removeEventListener(type, print);
       scheme.removeEventListener("change", change);
     };
   }, []);
@@ -55,33 +70,17 @@ function Coordinates(props: { state: State }) {
     element.height = height * ratio;
     context.scale(ratio, ratio);
     context.clearRect(0, 0, width, height);
-    const scales = axes.map(scaleOf);
-    const line = (r: number): void => {
-      context.beginPath();
-      let isDown = false;
-      axes.forEach((a, k) => {
-        const v = a.value[r];
-        if (v === null || v === undefined) {
-          isDown = false;
-          return;
-        }
-        const y = (scales[k] as ReturnType<typeof makeScale>).to(v);
-        if (isDown) context.lineTo(placeOf(k), y);
-        else context.moveTo(placeOf(k), y);
-        isDown = true;
-      });
-      context.stroke();
-    };
+    const line = (r: number): void => context.stroke(new Path2D(pathOf(r)));
     const isInside = new Set(inside);
     context.lineWidth = 1;
     context.globalAlpha = 0.25;
     context.strokeStyle = colourOf(element, "var(--line)");
     if (isInside.size < table.sample.length) table.sample.forEach((_, r) => isInside.has(r) || line(r));
-    context.globalAlpha = Math.min(0.8, Math.max(0.12, 60 / Math.max(1, inside.length)));
+    context.globalAlpha = opacity;
     for (const r of inside) {
       const look = lookOf(study.outcomes, table.outcome[r] as number);
       context.strokeStyle = colourOf(element, look.colour);
-      context.setLineDash(inside.length > 300 ? [] : look.dash);
+      context.setLineDash(dashOf(look.dash));
       line(r);
     }
     if (selected >= 0) {
@@ -91,7 +90,7 @@ function Coordinates(props: { state: State }) {
       context.strokeStyle = colourOf(element, "var(--selection)");
       line(selected);
     }
-  }, [width, dark, axes.map((a) => a.id).join(), inside, selected]);
+  }, [width, height, dark, axes.map((a) => a.id).join(), inside, selected]);
 
   /// The run whose line passes nearest to a place.
   const pick = (px: number, py: number): void => {
@@ -113,26 +112,35 @@ function Coordinates(props: { state: State }) {
   const valueAt = (a: Axis, py: number): number => a.low + ((height - bottom - Math.min(height - bottom, Math.max(top, py))) / (height - bottom - top)) * (a.high - a.low);
   const placeIn = (event: PointerEvent): [number, number] => {
     const box = (holder.current as HTMLDivElement).getBoundingClientRect();
-    return [event.clientX - box.left, event.clientY - box.top];
+    const scale = width / box.width;
+    return [scale * (event.clientX - box.left), scale * (event.clientY - box.top)];
   };
   return (
     <div ref={holder} class="coordinates" data-test="coordinates">
-      <canvas ref={canvas} style={{ width: `${width}px`, height: `${height}px` }} aria-hidden="true" />
+      <canvas ref={canvas} aria-hidden="true" hidden={printed} />
       <svg
-        width={width} height={height} role="img" aria-label="Parallel coordinates of all runs; the limits below do the same as brushes, the table shows the runs"
+        viewBox={`0 0 ${width} ${height}`} role="img" aria-label="Parallel coordinates of all runs; the limits below do the same as brushes, the table shows the runs"
         onClick={(e) => {
           const [px, py] = placeIn(e as unknown as PointerEvent);
           if (!axes.some((_, k) => Math.abs(px - placeOf(k)) < 10)) pick(px, py);
         }}
       >
+        {printed && inside.map((r) => {
+          const look = lookOf(study.outcomes, table.outcome[r] as number);
+          return <path class="run-line" d={pathOf(r)} style={{ stroke: look.colour, strokeOpacity: opacity }} stroke-dasharray={dashOf(look.dash).join(" ")} />;
+        })}
+        {printed && selected >= 0 && <path class="chosen-line" d={pathOf(selected)} />}
         {axes.map((a, k) => {
           const s = scaleOf(a);
           const range = state.brushes.value.get(a.id);
+          const title = titles[k] as (typeof titles)[number];
+          const titleAt = top - 8 - titleHeight * title.row;
           return (
             <g class="axis" data-axis={a.id} key={a.id}>
               <line x1={placeOf(k)} x2={placeOf(k)} y1={top} y2={height - bottom} />
               {makeTicks(a.low, a.high, 5).map((t) => <text x={placeOf(k) + 5} y={s.to(t) + 4}>{tickText(t)}</text>)}
-              <text class="axis-title" x={placeOf(k)} y={k % 2 === 0 ? 12 : 26} text-anchor={k === 0 ? "start" : k === axes.length - 1 ? "end" : "middle"} dx={k === 0 ? -side + 4 : k === axes.length - 1 ? side - 4 : 0}>{a.title}</text>
+              {title.row > 0 && <line class="lead" x1={placeOf(k)} x2={placeOf(k)} y1={top} y2={titleAt + 3} />}
+              <text class="axis-title" x={title.x} y={titleAt} text-anchor="middle" data-name>{title.text}</text>
               {range !== undefined && <rect class="brush" x={placeOf(k) - 8} width={16} y={s.to(range[1])} height={Math.max(2, s.to(range[0]) - s.to(range[1]))} />}
               <rect
                 class="grip" x={placeOf(k) - 10} width={20} y={top} height={height - bottom - top}
@@ -207,7 +215,7 @@ function OneRun(props: { state: State }) {
   const { study } = state;
   const table = study.run_table;
   const r = state.selected.value;
-  if (r < 0) return <p class="quiet" id="run">Click a line, or a number in the table, to see a run with all its values.</p>;
+  if (r < 0) return <p class="quiet hint" id="run">Click a line, or a number in the table, to see a run with all its values.</p>;
   const sample = table.sample[r] as number;
   const failure = table.failure[String(sample)];
   const pairs: [string, string][] = [
@@ -253,7 +261,7 @@ export function Runs(props: { state: State }) {
       )}
       <Coordinates state={state} />
       <p class="quiet plot-note" data-test="inside">
-        {inside.length} of {table.sample.length} runs{table.sample.length < study.runs ? ` (an even choice of ${study.runs}; all are in samples.csv)` : ""} lie inside the limits. Drag along an axis to set them, click it to take them away.
+        {inside.length} of {table.sample.length} runs{table.sample.length < study.runs ? ` (an even choice of ${study.runs}; all are in samples.csv)` : ""} lie inside the limits. <span class="hint">Drag along an axis to set them, click it to take them away.</span>
       </p>
       <Limits state={state} />
       <div class="runs-row">
