@@ -111,7 +111,7 @@ std::vector<Photo> read_photos(const std::string& path) {
     photo.name = fs::path(name.text).filename().string();
     std::error_code unknown;
     const fs::path home = fs::weakly_canonical(folder.empty() ? fs::path(".") : folder, unknown);
-    const fs::path real = unknown ? fs::path() : fs::weakly_canonical(file, unknown);
+    const fs::path real = unknown ? fs::path() : fs::weakly_canonical(home / name.text, unknown);
     if (fs::path(name.text).is_absolute() || unknown ||
         std::mismatch(home.begin(), home.end(), real.begin(), real.end()).first != home.end())
       refuse_file(name.text + " lies outside of the table's folder", "pictures lie beside the table or below it");

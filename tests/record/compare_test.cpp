@@ -253,6 +253,20 @@ TEST_F(Photos, ThatAreWrongAreRefusedWithTheirLine) {
   }
 }
 
+TEST_F(Photos, ThatAreMissingAreSaidToBeSoHoweverTheTableIsNamed) {
+  namespace fs = std::filesystem;
+  write("table.csv", "1,none.png\n");
+  const fs::path before = fs::current_path();
+  for (const char* table : {"table.csv", "./table.csv"}) {
+    fs::current_path(folder.path());
+    try {
+      (void)read_photos(table);
+      ADD_FAILURE() << table;
+    } catch (const InputError& e) { EXPECT_EQ(e.diagnostics()[0].message, "none.png is not there") << table; }
+    fs::current_path(before);
+  }
+}
+
 TEST_F(Photos, AreReadFromTablesOfSpreadsheets) {
   write("a, \"b\".png", "\x89PNG\r\n");
   const auto photos = read_photos(write(
