@@ -84,6 +84,13 @@ const SeriesPair* find_series(const Comparison& c, const std::string& id) {
   return nullptr;
 }
 
+/// Of the values of a share of what holds together: the first instant with less than half; their number if there is
+/// none.
+size_t find_break_up(const std::vector<double>& share) {
+  const auto is_less = [](double v) { return v < 0.5; };
+  return static_cast<size_t>(std::find_if(share.begin(), share.end(), is_less) - share.begin());
+}
+
 /// When something happened; of a record that ends without it, up to when it did not.
 std::string seconds(double t, double end) {
   return std::isfinite(t) ? fmt::format("{:.2f} s", t) : fmt::format("not up to {:.2f} s", end);
@@ -274,14 +281,24 @@ std::string describe(const Comparison& c, const Record& a, const Record& b) {
   const auto at = [](const SeriesPair* s, bool first, size_t i, double scale) {
     return s ? (first ? s->a[i] : s->b[i]) / scale : kNone;
   };
+  const SeriesPair* share = find_series(c, "connected_share");
+  const size_t end_a = share ? find_break_up(share->a) : c.time.size(), end_b = share ? find_break_up(share->b) : end_a;
+  const auto tilt_at = [&](bool first, size_t i) {
+    return i < (first ? end_a : end_b) ? at(tilt, first, i, unit::deg) : kNone;
+  };
   const size_t rows = std::min<size_t>(12, c.time.size());
   for (size_t k = 0; k < rows; ++k) {
     const size_t i = rows > 1 ? k * (c.time.size() - 1) / (rows - 1) : 0;
-    line(fmt::format("{:6.2f} {} {} {} {} {} {} {} {}", c.time[i], cell(at(tilt, true, i, unit::deg), 10, 2),
-                     cell(at(tilt, false, i, unit::deg), 8, 2), cell(at(kinetic, true, i, 1e6), 10, 2),
+    line(fmt::format("{:6.2f} {} {} {} {} {} {} {} {}", c.time[i], cell(tilt_at(true, i), 10, 2),
+                     cell(tilt_at(false, i), 8, 2), cell(at(kinetic, true, i, 1e6), 10, 2),
                      cell(at(kinetic, false, i, 1e6), 10, 2), cell(at(force, true, i, 1e6), 9, 2),
                      cell(at(force, false, i, 1e6), 9, 2), cell(c.rms[i], 12, 3), cell(c.largest[i], 8, 2)));
   }
+  std::string ends;
+  for (const auto& [name, end] : {std::pair{"A", end_a}, {"B", end_b}})
+    if (tilt && end < c.time.size())
+      ends += fmt::format("{}{} ends at {:.2f} s", ends.empty() ? "" : ", ", name, c.time[end]);
+  if (!ends.empty()) line(fmt::format("Tilt: {}, when less than half of the upper block holds together.", ends));
   if (!c.touchdowns.empty()) line(fmt::format("\nTouchdowns, the first of {}:", c.touchdowns.size()));
   for (size_t i = 0; i < std::min<size_t>(10, c.touchdowns.size()); ++i)
     line(fmt::format("  {:24} A {:>8}  B {:>8}", c.touchdowns[i].body, seconds(c.touchdowns[i].a, c.end_a),

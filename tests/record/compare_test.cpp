@@ -208,6 +208,21 @@ TEST(Compare, NamesRecordsOfOneEngineByTheirFiles) {
   EXPECT_EQ(compare(a, other, "left/record.h5", "right/record.h5").name_b, "finite elements");
 }
 
+TEST(Compare, TellsNoTiltOfABlockThatHasBrokenUp) {
+  Record a = make_run("a", 0.25, 5, 1, 0, 1), b = make_run("b", 0.25, 5, 1, 0, 0.9);
+  a.series.push_back({"connected_share", "", "1", "", {1, 1, 1, 0.5, 0.4}});
+  b.series.push_back({"connected_share", "", "1", "", {1, 1, 0.4, 0.4, 0.6}});
+  const std::string text = describe(compare(a, b), a, b);
+  EXPECT_THAT(text, HasSubstr("  0.25       1.43     1.29"));
+  EXPECT_THAT(text, HasSubstr("  0.50       2.86        -"));
+  EXPECT_THAT(text, HasSubstr("  0.75       4.30        -"));
+  EXPECT_THAT(text, HasSubstr("  1.00          -        -"));
+  EXPECT_THAT(
+      text,
+      HasSubstr(
+          "\nTilt: A ends at 1.00 s, B ends at 0.50 s, when less than half of the upper block holds together.\n"));
+}
+
 TEST(Compare, PrintsNoNumberWhereThereIsNone) {
   Record a = make_run("a", 0.25, 3, 1, 0, 1), b = make_run("b", 0.25, 3, 1, 2, 1);
   b.bodies[0].name = "piece 1", b.bodies[1].name = "piece 2";
