@@ -41,6 +41,7 @@ nav a{color:var(--accent);margin-right:14px}
 @media print{
  body{max-width:none;padding:0;background:#fff;font-size:11px}
  figure,section{break-inside:avoid;border-color:#ccc}
+ h2,h3{break-after:avoid}
  details:not([open]){display:none}nav{display:none}
  .scroller{max-height:none;overflow:visible}
  table{font-size:9px}th,td{padding:1px 4px}

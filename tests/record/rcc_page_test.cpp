@@ -135,6 +135,11 @@ TEST(RccPage, StandsAloneAndSaysEverything) {
   EXPECT_EQ(page.find("nan"), std::string::npos);
 }
 
+TEST(RccPage, KeepsHeadingsWithWhatFollowsThemOnPaper) {
+  const std::string head = page_head("");
+  EXPECT_NE(head.find("h2,h3{break-after:avoid}", head.find("@media print")), std::string::npos);
+}
+
 TEST(RccPage, HasEveryPlotOnceWithItsTable) {
   const std::vector<Figure> figures = make_figures(sample_report());
   std::set<std::string> ids;
