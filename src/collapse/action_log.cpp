@@ -333,8 +333,8 @@ ReplayResult replay(const std::string& log, const std::string& name, const Knowl
       } else {
         const Steering::Made made = result.steering->perform(entry.at("command"));
         if (made.branch->id != entry.at("made").get<int>()) fail("E943", "the action makes another branch than it did");
+        ++result.actions;
       }
-      ++result.actions;
     } catch (const Json::exception& e) {
       fail("E942", std::string("this line lacks something, or has something else in its place: ") + e.what());
     } catch (const InputError& e) {

@@ -596,7 +596,7 @@ TEST(ActionLogReplay, GivesTheSameBits) {
   for (const std::string& line : logged.lines()) log += line + "\n";
   const ReplayResult again = replay(log, "log", default_knowledge(), options(), {});
   EXPECT_FALSE(again.was_cut);
-  EXPECT_EQ(again.actions, static_cast<long>(logged.lines().size()) - 1);
+  EXPECT_EQ(again.actions, 5) << "what a person did";
   ASSERT_EQ(again.steering->steering().branches().size(), 3U);
   for (int id : {1, 2, 3}) {
     const record::Record a = s.make_record(s.branch(id));
