@@ -51,6 +51,8 @@ int steer(const Arguments& a, const std::atomic<bool>& cancel) {
   std::string text;
   try {
     const std::uint16_t port = read_port(a.port);
+    if (a.goes_on && a.input.empty())
+      throw InputError("E801", "--continue needs the plan whose session goes on", "topple steer plan.toml --continue");
     server::HubOptions options;
     options.session.knowledge = load_knowledge(a);
     if (!a.knowledge.empty()) options.session.rules = read_file(a.knowledge);
