@@ -47,17 +47,14 @@ int print_diagnostics(const std::vector<Diagnostic>& list, const std::string& te
   return errors;
 }
 
-namespace {
+std::string count_words(long n, const char* what) { return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s"); }
 
-std::string count_words(int n, const char* what) { return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s"); }
-
-}  // namespace
-
-int refuse(const InputError& e, const std::vector<Diagnostic>& warnings, const std::string& text, bool as_json) {
+int refuse(const InputError& e, const std::vector<Diagnostic>& warnings, const std::string& text, bool as_json,
+           const char* then) {
   std::vector<Diagnostic> all = e.diagnostics();
   all.insert(all.end(), warnings.begin(), warnings.end());
   const int errors = print_diagnostics(all, text);
-  std::fprintf(stderr, "%s. Nothing was run.\n", count_words(errors, "error").c_str());
+  std::fprintf(stderr, "%s. %s\n", count_words(errors, "error").c_str(), then);
   if (as_json) print_refusal(all);
   return kBadInput;
 }

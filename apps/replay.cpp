@@ -19,11 +19,14 @@ namespace topple::apps {
 int replay_log(const Arguments& a, const std::atomic<bool>& cancel) {
   std::string text;
   std::FILE* out = a.json ? stderr : stdout;
+  bool is_new = false;
+  const char* then = "Nothing was written.";
   try {
     text = read_file(a.input);
     const collapse::Knowledge knowledge = load_knowledge(a);
     collapse::SteeringOptions options;
     options.run = make_plan_options(a);
+    is_new = !std::filesystem::exists(a.output);
     make_folder(a.output);
     ProgressLine line;
     Progress progress;
@@ -55,6 +58,7 @@ int replay_log(const Arguments& a, const std::atomic<bool>& cancel) {
       Arguments place = a;
       place.output = (std::filesystem::path(a.output) / fmt::format("branch-{}", b->id)).string();
       make_folder(place.output);
+      then = "What was written before is kept.";
       const record::Record record = s.make_record(*b);
       const Files files = write_files(record, place, failed_report);
       branches.push_back({{"id", b->id},
@@ -73,7 +77,11 @@ int replay_log(const Arguments& a, const std::atomic<bool>& cancel) {
                            {"exit_code", kOk}, {"actions", r.actions}, {"was_cut", r.was_cut}, {"branches", branches}})
                       .c_str());
     return kOk;
-  } catch (const InputError& e) { return refuse(e, {}, text, a.json); }
+  } catch (const InputError& e) {
+    std::error_code ignored;
+    if (is_new) std::filesystem::remove(a.output, ignored);  // what holds something stays
+    return refuse(e, {}, text, a.json, then);
+  }
 }
 
 }  // namespace topple::apps

@@ -555,7 +555,11 @@ steer)
   # killed in the middle of a line
   printf '{"seq": 9, "action": "set_del' >>logs/plan.steer.jsonl
   expect 0 "$topple" replay logs/plan.steer.jsonl -o again --no-report; has err "no end"; exists again/branch-1/record.h5
-  expect 2 "$topple" replay plan.toml -o again; has err E942
+  expect 2 "$topple" replay plan.toml -o never; has err E942; has err "Nothing was written."
+  { head -1 logs/plan.steer.jsonl; echo '{"seq": 1, "action": "undo", "branch": 1, "step": 40, "time": 0.01, "made": 1, "command": {"command": "set_delay"}}'; } >half.jsonl
+  expect 2 "$topple" replay half.jsonl -o never; has err "half.jsonl:2"; has err "Nothing was written."
+  [ ! -e never ] || { echo "a folder was left by a replay that was refused"; failures=$((failures + 1)); }
+  expect 2 "$topple" steer --continue --no-open -o logs; has err "E801"; has err "needs the plan"
   expect 2 "$topple" steer missing.toml --no-open
   "$topple" steer --no-open --json >out 2>err &
   pid=$!
