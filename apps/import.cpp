@@ -1,5 +1,7 @@
 #include "product/import.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cctype>
 #include <cstdio>
@@ -48,7 +50,8 @@ int import_file(const Arguments& a) {
     print_list(out, "Missing", made.report.missing);
     int gaps = -1;  // the first line has one too
     for (size_t at = 0; (at = made.text.find("\"?\"", at)) != std::string::npos; ++at) ++gaps;
-    std::fprintf(out, "\n%d gaps are marked \"?\"; topple check names them.\n", gaps);
+    std::fprintf(out, "\n%s marked \"?\"; topple check names them.\n",
+                 gaps == 1 ? "1 gap is" : fmt::format("{} gaps are", gaps).c_str());
     if (a.json)
       std::printf("%s\n", dump(nlohmann::ordered_json{{"exit_code", kOk},
                                                       {"taken", made.report.taken},

@@ -67,10 +67,10 @@ int replay_log(const Arguments& a, const std::atomic<bool>& cancel) {
                           {"steps", b->steps()},
                           {"ending", record.ending}});
       for (const auto& [what, path] : files) branches.back()["files"][what] = path;
-      std::fprintf(out, "Branch %d \"%s\" to %.3f s, %zu edits: %s\n", b->id, b->name.c_str(), b->frontier(),
-                   b->edits.size(), place.output.c_str());
+      std::fprintf(out, "Branch %d \"%s\" to %.3f s, %s: %s\n", b->id, b->name.c_str(), b->frontier(),
+                   count_words(static_cast<long>(b->edits.size()), "edit").c_str(), place.output.c_str());
     }
-    std::fprintf(out, "%ld actions done again.\n", r.actions);
+    std::fprintf(out, "%s done again.\n", count_words(r.actions, "action").c_str());
     if (a.json)
       std::printf("%s\n",
                   dump(nlohmann::ordered_json{

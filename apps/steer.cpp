@@ -37,8 +37,8 @@ void tell_of_earlier_session(const server::HubOptions& options, const server::Se
       collapse::find_earlier_log(server::log_path(options.session.folder, plan.path), calc_sha256(plan.text),
                                  options.session.knowledge, options.session.steering.run);
   if (earlier)
-    std::fprintf(stderr, "%s holds an earlier session of this plan (%ld actions, computed to %.3f s). %s\n",
-                 earlier->path.c_str(), earlier->actions, earlier->time,
+    std::fprintf(stderr, "%s holds an earlier session of this plan (%s, computed to %.3f s). %s\n",
+                 earlier->path.c_str(), count_words(earlier->actions, "action").c_str(), earlier->time,
                  plan.goes_on ? "It goes on from there." : "The page offers to go on with it; so does --continue.");
   else if (plan.goes_on)
     std::fprintf(stderr, "There is no earlier session of this plan, as it is now, in %s: it begins anew.\n",

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <concepts>
 #include <map>
 #include <optional>
 #include <regex>
@@ -50,6 +51,11 @@ std::vector<double> find_lines(std::vector<double> values) {
   for (const Group& g : apart) lines.push_back(g.middle());
   return lines;
 }
+/// "1 row", "2 rows", "2 thicknesses".
+std::string count_of(std::integral auto n, const std::string& one) {
+  return fmt::format("{} {}{}", n, one, n == 1 ? "" : one.ends_with("s") ? "es" : "s");
+}
+
 int nearest(const std::vector<double>& lines, double value) {
   int best = 0;
   for (size_t i = 1; i < lines.size(); ++i)
@@ -243,8 +249,9 @@ class Planner {
     }
     levels_.push_back(roof);
     check_grid();
-    taken(fmt::format("{} rows by {} frames and {} storeys, from the places of {} columns and {} storeys of the file",
-                      rows_.size(), frames_.size(), levels_.size() - 1, xs.size(), b_.storeys.size()));
+    taken(fmt::format("{} by {} and {}, from the places of {} and {} of the file", count_of(rows_.size(), "row"),
+                      count_of(frames_.size(), "frame"), count_of(levels_.size() - 1, "storey"),
+                      count_of(xs.size(), "column"), count_of(b_.storeys.size(), "storey")));
     if (std::abs(b_.angle) > 1e-4)
       guessed(fmt::format("the building's own axes, turned by {:.1f} deg against the file's x, are those of the plan",
                           b_.angle / unit::deg));
@@ -337,8 +344,15 @@ class Planner {
       }
     std::erase_if(groups, [](const Group& g) { return g.elements.empty(); });
     if (!claims.contested.empty())
-      guessed(fmt::format("{} places have several {}: the {} one was taken", claims.contested.size(), kind, which));
+      guessed(fmt::format(
+          "{} several {}: the {} one was taken",
+          claims.contested.size() == 1 ? "1 place has" : fmt::format("{} places have", claims.contested.size()), kind,
+          which));
     return placed;
+  }
+
+  void tell_placed(int placed, const char* kind, size_t groups, const char* group) {
+    taken(fmt::format("{} in {}", count_of(placed, kind), count_of(groups, group)));
   }
 
   void place_columns() {
@@ -362,7 +376,7 @@ class Planner {
       }
     }
     const int placed = settle(columns_, claims, "columns", "larger");
-    taken(fmt::format("{} columns in {} sections", placed, columns_.size()));
+    tell_placed(placed, "column", columns_.size(), "section");
     for (const Group& g : columns_)
       if (g.is_round)
         guessed(fmt::format("round columns became square ones of the same area, {:.0f} cm wide", 100 * g.width));
@@ -419,7 +433,7 @@ class Planner {
       }
     }
     const int placed = settle(beams_, claims, "beams", "larger");
-    if (placed > 0) taken(fmt::format("{} beams in {} sections", placed, beams_.size()));
+    if (placed > 0) tell_placed(placed, "beam", beams_.size(), "section");
   }
 
   static bool covers(const IfcElement& slab, double x, double y) {
@@ -463,11 +477,11 @@ class Planner {
     }
     const int placed = settle(slabs_, claims, "slabs", "thicker");
     if (placed > 0) {
-      taken(fmt::format("{} slabs in {} thicknesses", placed, slabs_.size()));
+      tell_placed(placed, "slab", slabs_.size(), "thickness");
       int opened = 0;
       for (const Group& g : slabs_)
         for (const IfcElement* e : g.elements) opened += e->has_opening;
-      if (opened > 0) missing(fmt::format("openings of {} slabs: they are not read", opened));
+      if (opened > 0) missing(fmt::format("openings of {}: they are not read", count_of(opened, "slab")));
       guessed(
           "a slab covers every cell of the grid whose middle lies in its outline, or in the box of a mesh: smaller "
           "holes and cut corners are not seen");
@@ -495,7 +509,7 @@ class Planner {
     }
     const int placed = settle(walls_, claims, "walls", "thicker");
     if (placed > 0) {
-      taken(fmt::format("{} walls in {} thicknesses", placed, walls_.size()));
+      tell_placed(placed, "wall", walls_.size(), "thickness");
       place_openings(claims);
     }
   }
@@ -577,7 +591,7 @@ class Planner {
     for (const auto& [where, claim] : claims.at) take(where, claim);
     for (const auto& [where, part] : claims.parts)
       if (claims.at.at(where).group == part.group) take(where, part);
-    if (placed > 0) taken(fmt::format("{} openings of walls", placed));
+    if (placed > 0) taken(fmt::format("{} of walls", count_of(placed, "opening")));
     if (clipped > 0)
       guessed(fmt::format("{} openings of walls reach into columns, floors or beams: the part between them was taken",
                           clipped));

@@ -284,7 +284,7 @@ records)
   ;;
 import)
   printf '%s\n' 0 SECTION 2 ENTITIES 0 LWPOLYLINE 8 Houses 70 1 10 20 20 0 10 30 20 0 10 30 20 9 0 ENDSEC 0 EOF >site.dxf
-  expect 0 "$topple" import site.dxf -o site.toml; has site.toml "[[site.neighbour]]"; has out "1 gaps are marked"; has out "Guessed"
+  expect 0 "$topple" import site.dxf -o site.toml; has site.toml "[[site.neighbour]]"; has out "1 gap is marked"; has out "Guessed"
   expect 2 "$topple" import site.dxf -o site.toml; has err "exists already"
   expect 2 "$topple" import site.dxf -o site.toml --json; is_json out; has out '"code": "E802"'
   expect 0 "$topple" import site.dxf -o json.toml --json; is_json out; has out '"gaps": 1'; has out '"plan": "json.toml"'; has err "Guessed"

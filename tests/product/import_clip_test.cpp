@@ -182,7 +182,7 @@ TEST(ImportIfcClip, TellsOpeningsOfSlabsAndLowWalls) {
   EXPECT_THAT(closed.report.missing, Not(Contains(HasSubstr("openings of"))));
   EXPECT_THAT(closed.report.missing, Contains("1 x WALL: reaches over less than half of every storey"));
   w.add("IFCRELVOIDSELEMENT('g',$,$,$," + slab + ",#1)");
-  EXPECT_THAT(import("IFC4", w).report.missing, Contains("openings of 1 slabs: they are not read"));
+  EXPECT_THAT(import("IFC4", w).report.missing, Contains("openings of 1 slab: they are not read"));
 }
 
 TEST(ImportIfcClip, TakesOpeningsOfWallsBayByBay) {

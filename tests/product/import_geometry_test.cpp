@@ -95,7 +95,7 @@ TEST(ImportIfcBoxes, LeaveOutWhatIsTurnedOrInclined) {
   block(w, "IFCSLAB", place, 5, 8, 0.2);
   const Import made = import("IFC4", w);
   EXPECT_THAT(made.text, HasSubstr("rows = { A = \"0.000 m\", B = \"5.000 m\" }"));
-  EXPECT_THAT(made.report.taken, Contains("4 columns in 1 sections"));
+  EXPECT_THAT(made.report.taken, Contains("4 columns in 1 section"));
   EXPECT_THAT(made.report.missing, Contains("2 x COLUMN: it is turned against the grid, or inclined"));
   for (const char* kind : {"BEAM", "WALL", "SLAB"}) {
     EXPECT_THAT(made.report.missing,
@@ -130,7 +130,7 @@ TEST(ImportIfcBoxes, LeaveOutProfilesThatDoNotFillThem) {
                                      "IFCARBITRARYCLOSEDPROFILEDEF(.AREA.,$," + angle + ")"})
     w.element("IFCCOLUMN", w.placement("$", 10, 0, 0), w.shape("SweptSolid", w.extrusion(w.add(profile), 3)));
   const Import made = import("IFC4", w);
-  EXPECT_THAT(made.report.taken, Contains("4 columns in 1 sections"));
+  EXPECT_THAT(made.report.taken, Contains("4 columns in 1 section"));
   EXPECT_THAT(made.report.missing, Contains("2 x COLUMN: its profile does not fill its box"));
 }
 
@@ -175,13 +175,13 @@ TEST(ImportIfcPlaces, HoldTheLargerOfTwoElements) {
   block(w, "IFCBEAM", w.placement("$", 2.5, 4.3, 2.5), 5, 0.3, 0.5);  // as large
   const Import made = import("IFC4", w);
   EXPECT_THAT(made.report.taken, Contains("4 columns in 2 sections"));
-  EXPECT_THAT(made.report.taken, Contains("1 slabs in 1 thicknesses"));
-  EXPECT_THAT(made.report.taken, Contains("1 walls in 1 thicknesses"));
-  EXPECT_THAT(made.report.taken, Contains("1 beams in 1 sections"));
+  EXPECT_THAT(made.report.taken, Contains("1 slab in 1 thickness"));
+  EXPECT_THAT(made.report.taken, Contains("1 wall in 1 thickness"));
+  EXPECT_THAT(made.report.taken, Contains("1 beam in 1 section"));
   EXPECT_THAT(made.report.guessed, Contains("2 places have several columns: the larger one was taken"));
-  EXPECT_THAT(made.report.guessed, Contains("1 places have several slabs: the thicker one was taken"));
-  EXPECT_THAT(made.report.guessed, Contains("1 places have several walls: the thicker one was taken"));
-  EXPECT_THAT(made.report.guessed, Contains("1 places have several beams: the larger one was taken"));
+  EXPECT_THAT(made.report.guessed, Contains("1 place has several slabs: the thicker one was taken"));
+  EXPECT_THAT(made.report.guessed, Contains("1 place has several walls: the thicker one was taken"));
+  EXPECT_THAT(made.report.guessed, Contains("1 place has several beams: the larger one was taken"));
   EXPECT_THAT(made.report.missing, Contains("2 x COLUMN: another one stands in its place"));
   for (const char* kind : {"SLAB", "WALL", "BEAM"})
     EXPECT_THAT(made.report.missing, Contains("1 x " + std::string(kind) + ": another one stands in its place"));
@@ -202,7 +202,7 @@ TEST(ImportIfcPlaces, TakeColumnsThatGoOnWhereOthersEnd) {
   w.add("IFCBUILDINGSTOREY('g',$,'S',$,$," + w.placement("$", 0, 0, 3) + ",$,$,.ELEMENT.,3.)");
   block(w, "IFCCOLUMN", w.placement("$", 10, 0, 0), 0.3, 0.3, 6);
   const Import made = import("IFC4", w);
-  EXPECT_THAT(made.report.taken, Contains("5 columns in 1 sections"));
+  EXPECT_THAT(made.report.taken, Contains("5 columns in 1 section"));
   EXPECT_THAT(made.report.guessed, Not(Contains(HasSubstr("several columns"))));
 }
 
@@ -263,7 +263,7 @@ TEST(ImportIfcPlacements, ThatAreNotUnderstoodLeaveTheirElementsOut) {
                                    w.add("IFCLOCALPLACEMENT($," + w.add("IFCAXIS2PLACEMENT3D($,$,$)") + ")")})
     block(w, "IFCCOLUMN", place, 0.5, 0.5, 3);
   const Import made = import("IFC4", w);
-  EXPECT_THAT(made.report.taken, Contains("4 columns in 1 sections"));
+  EXPECT_THAT(made.report.taken, Contains("4 columns in 1 section"));
   EXPECT_THAT(made.report.missing, Contains("6 x COLUMN: its placement is not understood"));
   EXPECT_THAT(made.text, HasSubstr("rows = { A = \"0.000 m\", B = \"5.000 m\" }"));
 }
@@ -277,7 +277,7 @@ TEST(ImportIfcPlacements, OfBodiesHaveToBeUnderstoodToo) {
     w.element("IFCCOLUMN", w.placement("$", 1, 1, 0),
               w.shape("SweptSolid", w.add("IFCEXTRUDEDAREASOLID(" + profile + "," + rest + ")")));
   const Import made = import("IFC4", w);
-  EXPECT_THAT(made.report.taken, Contains("4 columns in 1 sections"));
+  EXPECT_THAT(made.report.taken, Contains("4 columns in 1 section"));
   EXPECT_THAT(made.report.missing, Contains("1 x COLUMN: the placement of its body is not understood"));
   EXPECT_THAT(made.report.missing, Contains("2 x COLUMN: its body has no volume"));
 }
@@ -340,7 +340,7 @@ TEST(ImportIfcKinds, ThatAreNotTakenAreCounted) {
     EXPECT_THAT(made.report.missing, Contains(std::string(kind) + ": is not taken"));
   EXPECT_THAT(made.report.missing, Not(Contains(HasSubstr("GRID"))));
   EXPECT_THAT(made.report.missing, Contains("1 x COLUMN: its placement is not understood")) << "once";
-  EXPECT_THAT(made.report.taken, Contains("1 walls in 1 thicknesses"));
+  EXPECT_THAT(made.report.taken, Contains("1 wall in 1 thickness"));
 }
 
 }  // namespace

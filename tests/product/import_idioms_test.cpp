@@ -46,7 +46,7 @@ TEST(ImportIfcIdioms, FindsBoxesInMeshesAndStoreysByTheirPlacement) {
   EXPECT_THAT(made.text, HasSubstr("width = \"40 cm\"\nheight = \"30 cm\""));
   EXPECT_THAT(made.text, HasSubstr("thickness = \"20 cm\""));
   EXPECT_THAT(made.text, HasSubstr("at = [\"A1B1\"]"));
-  EXPECT_THAT(made.report.taken, Contains(HasSubstr("1 beams")));
+  EXPECT_THAT(made.report.taken, Contains(HasSubstr("1 beam in")));
   EXPECT_THAT(made.report.guessed, Contains(HasSubstr("9 elements are meshes")));
   EXPECT_THAT(made.report.missing, Contains(HasSubstr("1 x BEAM: its body is a mesh that is no upright box")));
 }

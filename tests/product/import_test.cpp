@@ -156,7 +156,7 @@ TEST_P(ImportIfc, FindsGridStoreysMembersAndBars) {
   EXPECT_THAT(t, HasSubstr("[[walls]]\npanel = \"wall_240_Ziegelmauerwerk\"\nstoreys = 0\nat = [\"A1A2\"]"));
   EXPECT_THAT(t, HasSubstr("density = \"?\"\nstrength = \"?\""));
   const ImportReport& r = made.report;
-  EXPECT_THAT(r.taken, Contains(HasSubstr("12 columns in 1 sections")));
+  EXPECT_THAT(r.taken, Contains(HasSubstr("12 columns in 1 section")));
   EXPECT_THAT(r.taken, Contains(HasSubstr("6 beams")));
   EXPECT_THAT(r.guessed, Contains(HasSubstr("can be the unsafe side")));
   EXPECT_THAT(r.missing, Contains(HasSubstr("FOOTING: foundations belong to the ground")));
