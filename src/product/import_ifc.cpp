@@ -357,12 +357,15 @@ class Planner {
 
   void place_columns() {
     Claims claims;
+    double most = 0;  // that one is moved to its place
+    const IfcElement* farthest = nullptr;
     for (const IfcElement* e : fit_["IFCCOLUMN"]) {
       double w = e->high.x - e->low.x, h = e->high.y - e->low.y;
       if (e->is_round) w = h = kRound * w;
       const Claim claim{e, group_of(columns_, *e, w, h), w * h};
-      const std::string place =
-          point(nearest(rows_, 0.5 * (e->low.x + e->high.x)), nearest(frames_, 0.5 * (e->low.y + e->high.y)));
+      const Vec3 middle = 0.5 * (e->low + e->high);
+      const int row = nearest(rows_, middle.x), frame = nearest(frames_, middle.y);
+      const std::string place = point(row, frame);
       bool any = false;
       for (int s = 0; s < storeys(); ++s) {
         if (!reaches_over(*e, s)) continue;
@@ -371,12 +374,20 @@ class Planner {
       }
       if (any) {
         claims.all.push_back(claim);
+        const double moved =
+            std::hypot(rows_[static_cast<size_t>(row)] - middle.x, frames_[static_cast<size_t>(frame)] - middle.y);
+        if (moved > most) most = moved, farthest = e;
       } else {
         left_out(*e, "reaches over less than half of every storey");
       }
     }
     const int placed = settle(columns_, claims, "columns", "larger");
     tell_placed(placed, "column", columns_.size(), "section");
+    if (most > 1e-3)
+      guessed(
+          fmt::format("rows and frames lie at the mean of the columns that stand beside each other: columns were "
+                      "moved by up to {:.1f} cm (#{})",
+                      100 * most, farthest->id));
     for (const Group& g : columns_)
       if (g.is_round)
         guessed(fmt::format("round columns became square ones of the same area, {:.0f} cm wide", 100 * g.width));

@@ -203,7 +203,22 @@ TEST(ImportIfcPlaces, TakeColumnsThatGoOnWhereOthersEnd) {
   block(w, "IFCCOLUMN", w.placement("$", 10, 0, 0), 0.3, 0.3, 6);
   const Import made = import("IFC4", w);
   EXPECT_THAT(made.report.taken, Contains("5 columns in 1 section"));
+  EXPECT_THAT(made.report.guessed, Not(Contains(HasSubstr("were moved"))));
   EXPECT_THAT(made.report.guessed, Not(Contains(HasSubstr("several columns"))));
+}
+
+TEST(ImportIfcPlaces, TellHowFarColumnsAreMovedToTheirRow) {
+  Writer w;
+  w.metres();
+  for (const double y : {0.0, 4.0}) {
+    block(w, "IFCCOLUMN", w.placement("$", 0, y, 0), 0.3, 0.3, 3);
+    block(w, "IFCCOLUMN", w.placement("$", y > 0 ? 6.1 : 6, y, 0), 0.3, 0.3, 3);
+  }
+  const Import made = import("IFC4", w);
+  EXPECT_THAT(made.text, HasSubstr("rows = { A = \"0.000 m\", B = \"6.050 m\" }"));
+  EXPECT_THAT(made.report.taken,
+              Contains("2 rows by 2 frames and 1 storey, from the places of 4 columns and 0 storeys of the file"));
+  EXPECT_THAT(made.report.guessed, Contains(HasSubstr("columns were moved by up to 5.0 cm (#")));
 }
 
 /// A column whose body is mapped by the given operator.
