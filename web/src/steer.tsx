@@ -18,7 +18,7 @@ import { Tree } from "./steer_tree";
 import { SteerView, picture } from "./steer_view";
 import { OpenPlan } from "./steer_welcome";
 import { Events } from "./tables";
-import { formatDate, formatDuration, formatTime, prettify } from "./units";
+import { describeValues, formatDate, formatDuration, formatTime, prettify } from "./units";
 import { endingWord } from "./vocabulary";
 
 const phaseWord: Record<string, string> = {
@@ -152,7 +152,7 @@ function Log(props: { s: SteerState }) {
             return (
               <tr>
                 <td>{e.seq}</td><td>{nameOf(e.branch)}{e.made !== undefined ? ` → ${nameOf(e.made)}` : ""}</td><td>{formatTime(e.time)}</td>
-                <td>{e.action.replace(/_/g, " ")}</td><td>{Object.entries(values).map(([k, v]) => `${k} ${JSON.stringify(v)}`).join(", ")}</td>
+                <td>{e.action.replace(/_/g, " ")}</td><td>{describeValues(values)}</td>
               </tr>
             );
           })}

@@ -113,3 +113,22 @@ export function calcTimeRange(time: ArrayLike<number>, asked: number): [number, 
   const first = time[0] ?? 0, last = time[time.length - 1] ?? first;
   return last > first ? [first, last] : [first, first + (asked > 0 ? asked : 1)];
 }
+
+/// Units of the values of actions, which are SI (docs/protocol.md).
+const unitOfValue: Record<string, Readable> = {
+  ...Object.fromEntries(["position", "destroyed_length", "at", "anchor", "point"].map((key) => [key, { unit: "m", factor: 1 }])),
+  ...Object.fromEntries(["residual_bars", "transition_damage", "cut_bars", "cut_concrete"].map((key) => [key, { unit: "%", factor: 100 }])),
+  time: { unit: "s", factor: 1 },
+  stiffness: { unit: "MN/m", factor: 1e-6 },
+  pretension: { unit: "kN", factor: 1e-3 },
+  strength: { unit: "kN", factor: 1e-3 },
+};
+/// "member \"C-A1-0\", position 1.1 m" of an action.
+export function describeValues(values: Record<string, unknown>): string {
+  const say = (v: unknown, factor: number): string => (typeof v === "number" ? String(Number((factor * v).toPrecision(6))) : JSON.stringify(v));
+  return Object.entries(values).map(([key, v]) => {
+    const { unit, factor } = unitOfValue[key] ?? { unit: "", factor: 1 };
+    const value = Array.isArray(v) ? `(${v.map((x) => say(x, factor)).join(", ")})` : say(v, factor);
+    return `${key.replace(/_/g, " ")} ${value}${unit === "" || v === null ? "" : ` ${unit}`}`;
+  }).join(", ");
+}

@@ -6,7 +6,7 @@ import { load } from "./load.mjs";
 import { makeSynthetic } from "./synthetic.mjs";
 
 const { decodeFloats, findFrame, slerp, readRun, calcPose } = await load("data.ts");
-const { atLeast, atMost, dropRoundOff, findLargest, formatNumber, formatValue, toReadable, formatDuration, formatDate, formatMass, prettify } = await load("units.ts");
+const { atLeast, atMost, dropRoundOff, findLargest, formatNumber, formatValue, toReadable, formatDuration, formatDate, formatMass, prettify, describeValues } = await load("units.ts");
 const { findCoherent } = await load("plots.tsx");
 const { chooseAxes } = await load("steer_study.tsx");
 const { listConditions } = await load("handover.tsx");
@@ -151,6 +151,10 @@ describe("signs", () => {
 });
 
 describe("words", () => {
+  it("tells the values of actions with their units", () => {
+    assert.equal(describeValues({ member: "C-A1-0", position: 1.1, anchor: [-40, 10, 0], stiffness: 1e6, pretension: 50000, residual_bars: 0.07, name: "soon", in_place: true }),
+      'member "C-A1-0", position 1.1 m, anchor (-40, 10, 0) m, stiffness 1 MN/m, pretension 50 kN, residual bars 7 %, name "soon", in place true');
+  });
   it("writes degrees, powers and signs as people do", () => {
     assert.equal(prettify("leans by 9.1 deg, 180 deg +- 15 deg"), "leans by 9.1°, 180° ± 15°");
     assert.equal(prettify("1435 m2. 2470 m3; 25 N/mm2, 64 cm2, 1800 kg/m3"), "1435\u00a0m². 2470\u00a0m³; 25\u00a0N/mm², 64\u00a0cm², 1800 kg/m³");
