@@ -160,7 +160,7 @@ export function Timeline(props: { state: State }) {
           Speed{" "}
           <select value={String(state.speed.value)} onChange={(e) => (state.speed.value = Number(e.currentTarget.value))}>
             {speeds.map((speed) => (
-              <option value={String(speed)}>{speed}×</option>
+              <option value={String(speed)}>{`${speed}×`}</option>
             ))}
           </select>
         </label>

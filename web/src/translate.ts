@@ -64,8 +64,10 @@ export const commas = (text: string): string => text.replace(/„[^“]*“|(?<!
 
 /// What a measure may hold beside numbers: units, and words between numbers.
 const unit = /^(?:[numckMG]?m[23]?|m?s|[kM]?N|[kM]?Nm|[kM]?J|[kMG]?Pa|k?g|t|Hz|deg|mm\/s|m\/s2?|k?N\/m[23]?|kg\/m3|N\/mm2|x|to|and|up|bis|und)$/;
+/// A list in which decimal commas stand has semicolons between its parts.
+const part = (text: string): string => (/\d,\d/.test(text) ? text.replaceAll(", ", "; ") : text);
 /// Decimal commas in a number, or in several with their units; names keep their dots.
-const commasOfMeasures = (text: string): string => (/\d\.\d/.test(text) && (text.match(/(?<![\w.])[A-Za-z][\w/]*/g) ?? []).every((word) => unit.test(word)) ? commas(text) : text);
+const commasOfMeasures = (text: string): string => (/\d\.\d/.test(text) && (text.match(/(?<![\w.])[A-Za-z][\w/]*/g) ?? []).every((word) => unit.test(word)) ? part(commas(text)) : text);
 
 const settled = new Set<string>();
 /// What is in the reader's language already, and names, from here on: they stay as they are, also within sentences.
@@ -94,7 +96,7 @@ function translateWhole(text: string, isLoose = false, isOpen = isLoose): string
     let count = 0;
     const values = s.isNumber.map((isNumber, i) => {
       const value = found[i + 1] as string;
-      return s.isKept[i] === true ? value : s.isList[i] === true ? value.replace(/(?<= )(-?\d+)\.(\d+(?:e[+-]?\d+)?)(?=(?: [^\s,]+)?(?:, |$))/g, "$1,$2") : isNumber ? commas(value) : settled.has(value.trim()) ? value : translate(value.trim()) ?? commasOfMeasures(value);
+      return s.isKept[i] === true ? value : s.isList[i] === true ? part(value.replace(/(?<= )(-?\d+)\.(\d+(?:e[+-]?\d+)?)(?=(?: [^\s,]+)?(?:, |$))/g, "$1,$2")) : isNumber ? commas(value) : settled.has(value.trim()) ? value : translate(value.trim()) ?? commasOfMeasures(value);
     });
     return s.german.replace(/\{(\d*)\}/g, (_, index: string) => values[index === "" ? count++ : Number(index)] ?? "");
   }

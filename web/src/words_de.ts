@@ -97,7 +97,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["Reach of the debris", "Reichweite der Trümmer"],
   ["Beyond the footprint: {:.1f} m towards -x, {:.1f} m towards +x, {:.1f} m towards -y, {:.1f} m towards +y; the outline of all parts encloses {:.0f} m2.", "Über den Grundriss hinaus: {} m nach -x, {} m nach +x, {} m nach -y, {} m nach +y; der Umriss aller Teile umschließt {} m2."],
   ["The farthest part, {}, lies {:.1f} m from the footprint; 95 % of the mass lies within {:.1f} m of it.", "Das fernste Teil, {}, liegt {} m vom Grundriss entfernt; 95 % der Masse liegen innerhalb von {} m davon."],
-  ["Towards each of these sides 95 % of the mass lies within {:.1f}, {:.1f}, {:.1f} and {:.1f} m of it.", "Nach diesen Seiten liegen je 95 % der Masse innerhalb von {}, {}, {} und {} m davon."],
+  ["Towards each of these sides 95 % of the mass lies within {:.1f}, {:.1f}, {:.1f} and {:.1f} m of it.", "Nach diesen Seiten liegen je 95 % der Masse innerhalb von {}; {}; {} und {} m davon."],
   ["The outline of the nearest {:.0f} % of the mass encloses {:.0f} m2.", "Der Umriss der nächsten {} % der Masse umschließt {} m2."],
   ["Height of the hill", "Höhe des Trümmerkegels"],
   ["The highest point of all parts lies {:.1f} m above the ground.", "Der höchste Punkt aller Teile liegt {} m über dem Boden."],
@@ -150,7 +150,7 @@ export const german: readonly (readonly [string, string])[] = [
   ["{} at {:.2f} s, {:.1f} times the weight, as a mean over {:.3g} s; shorter peaks are higher.", "{} bei {} s, das {}-Fache des Gewichts, im Mittel über {} s; kürzere Spitzen sind höher."],
   ["Touchdown of the parts", "Aufschlag der Teile"],
   ["{} parts touch the ground for the first time between {:.2f} s and {:.2f} s, with {} and {} downwards in all (each part alone, as it touches). Largest: {*}.", "{} Teile berühren den Boden zum ersten Mal zwischen {} s und {} s, mit zusammen {} und {} nach unten (jedes Teil für sich, wenn es aufschlägt). Die größten: {}."],
-  ["{} at {:.2f} s at ({:.1f}, {:.1f}) m with {} and {}", "{} bei {} s an ({}, {}) m mit {} und {}"],
+  ["{} at {:.2f} s at ({:.1f}, {:.1f}) m with {} and {}", "{} bei {} s an ({}; {}) m mit {} und {}"],
   // events
   ["Events", "Ereignisse"],
   ["{} charge had not fired when the run ended.", "{} Ladung hatte am Ende der Rechnung noch nicht gezündet."],
@@ -330,8 +330,8 @@ export const german: readonly (readonly [string, string])[] = [
   ["Share of the capacity, the most loaded first: {l}, and {:d} more.", "Anteil am Widerstand, die am stärksten belasteten zuerst: {} und {} weitere."],
   ["without limits element \"{}\" would be loaded to {:.0f} % of its capacity", "ohne Grenzen wäre Element „{}“ zu {} % seines Widerstands belastet"],
   ["without limits element \"{}\" would be loaded to more than {:.0f} times its capacity", "ohne Grenzen wäre Element „{}“ zu mehr als dem {}-Fachen seines Widerstands belastet"],
-  ["{n} yields most, at ({:.1f}, {:.1f}, {:.1f}) m", "am meisten fließt {} bei ({}, {}, {}) m"],
-  ["{n} has moved farthest, from ({:.1f}, {:.1f}, {:.1f}) m", "am weitesten bewegt hat sich {} von ({}, {}, {}) m"],
+  ["{n} yields most, at ({:.1f}, {:.1f}, {:.1f}) m", "am meisten fließt {} bei ({}; {}; {}) m"],
+  ["{n} has moved farthest, from ({:.1f}, {:.1f}, {:.1f}) m", "am weitesten bewegt hat sich {} von ({}; {}; {}) m"],
   ["dead load not in equilibrium after {:d} steps: out of balance by {:.2g} of the load, settled by {:.3g} mm", "Eigengewicht nach {} Schritten nicht im Gleichgewicht: das {}-Fache der Last nicht ausgeglichen, um {} mm gesetzt"],
   ["positions are no longer finite", "Orte sind keine endlichen Zahlen mehr"],
   // runs of multibody models
@@ -803,7 +803,6 @@ export const german: readonly (readonly [string, string])[] = [
   ["topple report", "topple-Bericht"],
   ["Run", "Rechnung"],
   ["stage {:d} \"{}\": {:d} charges", "Zündstufe {} „{}“: {} Ladungen"],
-  ["stage {:d} \"{}\": {:d} charge", "Zündstufe {} „{}“: {} Ladung"],
   ["Text of", "Text von"],
   ["Esc", "Esc"],
   // what the report hands over beside the findings

@@ -196,11 +196,16 @@ describe("the German table", () => {
     assert.equal(translate("least touchdown: 0.75 s"), "kleinster Wert von touchdown: 0,75 s");
     assert.equal(translate("largest z0: -14.64"), "größter Wert von z0: -14,64");
     assert.equal(translate("It takes no more than x1 16.85 N/mm2 (core 25), x2 47.48 (core 64.5)."), "Dazu genügt x1 16,85 N/mm2 (Kern 25), x2 47,48 (Kern 64,5).");
-    assert.equal(translate("Lowest margins: S-B2C3-1 3.56, shaft 1.5/foot 13.57 of 75 members."), "Kleinste Reserven: S-B2C3-1 3,56, shaft 1.5/foot 13,57 (von 75 Bauteilen).");
+    assert.equal(translate("Lowest margins: S-B2C3-1 3.56, shaft 1.5/foot 13.57 of 75 members."), "Kleinste Reserven: S-B2C3-1 3,56; shaft 1.5/foot 13,57 (von 75 Bauteilen).");
     assert.equal(
       translate("Lowest margins: C-A1-0 1.86, C-B1-0 1.90 of 3 members. Heads of ground columns turn about y here; about x the margin is 2.24."),
-      "Kleinste Reserven: C-A1-0 1,86, C-B1-0 1,90 (von 3 Bauteilen). Köpfe der Erdgeschossstützen drehen sich hier um y; um x ist die Reserve 2,24.",
+      "Kleinste Reserven: C-A1-0 1,86; C-B1-0 1,90 (von 3 Bauteilen). Köpfe der Erdgeschossstützen drehen sich hier um y; um x ist die Reserve 2,24.",
     );
+  });
+
+  it("parts numbers with decimal commas by semicolons", () => {
+    assert.equal(translate("Towards each of these sides 95 % of the mass lies within 58.9, 0.0, 0.0 and 0.0 m of it."), "Nach diesen Seiten liegen je 95 % der Masse innerhalb von 58,9; 0,0; 0,0 und 0,0 m davon.");
+    assert.equal(translate("C-A1-0 at 4.80 s at (-58.8, 0.0) m with 1.20 MJ and 0.20 MN s"), "C-A1-0 bei 4,80 s an (-58,8; 0,0) m mit 1,20 MJ und 0,20 MN s");
   });
 
   it("leaves names as people gave them", async () => {
@@ -369,6 +374,7 @@ if (run === undefined && study === undefined)
       await writeFile(`${out}with-study.html`, (await readFile(`${out}with-study.en.html`, "utf8")).replace('<html lang="en">', '<html lang="de">'));
       const { page, close } = await openPage(`${out}with-study.html`);
       const first = await page.$$eval("[data-test=fuzzy-results] table:last-of-type tbody td:first-child", (list) => list.map((e) => e.innerText.trim()));
+      const speeds = (await page.$$eval(".transport option", (list) => list.map((e) => e.textContent))).slice(0, 3);
       const broken = await page.$$eval(".fuzzy-results :is(th, td) :is(*, :scope)", (list) => list.flatMap((e) => [...e.childNodes].filter((n) => n.nodeType === 3)).flatMap((n) =>
         [...n.data.matchAll(/[^\s-]+/g)].filter((word) => {
           const range = document.createRange();
@@ -377,6 +383,7 @@ if (run === undefined && study === undefined)
           return new Set([...range.getClientRects()].map((r) => Math.round(r.top))).size > 1;
         }).map(String)));
       await close();
+      assert.deepEqual(speeds, ["0,1×", "0,25×", "0,5×"]);
       assert.deepEqual(first, ["utilisation", "touchdown_energy_of_the_upper_block [MJ]"]);
       assert.deepEqual(broken, []);
     });
