@@ -77,9 +77,11 @@ void Builder::make_stub(const product::Charge& c, const MemberZones& z, mbs::Eve
 void Builder::add_events(std::vector<Firing> schedule) {
   map.schedule = std::move(schedule);
   map.remarks.clear();
-  for (size_t s = 0; s < plan.stages.size(); ++s)
-    map.stages.push_back("stage " + std::to_string(s + 1) + " \"" + plan.stages[s].name +
-                         "\": " + std::to_string(plan.stages[s].charges.size()) + " charges");
+  for (size_t s = 0; s < plan.stages.size(); ++s) {
+    const size_t charges = plan.stages[s].charges.size();
+    map.stages.push_back(fmt::format("stage {} \"{}\": {} {}", s + 1, plan.stages[s].name, charges,
+                                     charges == 1 ? "charge" : "charges"));
+  }
   std::vector<Assembly> current = assemblies;  // as they are after the events so far
   std::vector<Vec3> centre;                    // their centres of mass at the start, in W
   for (const mbs::Body& b : model.bodies) centre.push_back(b.X_WB.p);

@@ -802,7 +802,9 @@ export const german: readonly (readonly [string, string])[] = [
   ["study", "Studie"],
   ["topple report", "topple-Bericht"],
   ["Run", "Rechnung"],
+  ["stage {:d} \"{}\": {:d} charge", "Zündstufe {} „{}“: {} Ladung"],
   ["stage {:d} \"{}\": {:d} charges", "Zündstufe {} „{}“: {} Ladungen"],
+  ["stage {:d} \"{}\": {:d} charge", "Zündstufe {} „{}“: {} Ladung"],
   ["Text of", "Text von"],
   ["Esc", "Esc"],
   // what the report hands over beside the findings

@@ -206,6 +206,7 @@ describe("the German table", () => {
   it("parts numbers with decimal commas by semicolons", () => {
     assert.equal(translate("Towards each of these sides 95 % of the mass lies within 58.9, 0.0, 0.0 and 0.0 m of it."), "Nach diesen Seiten liegen je 95 % der Masse innerhalb von 58,9; 0,0; 0,0 und 0,0 m davon.");
     assert.equal(translate("C-A1-0 at 4.80 s at (-58.8, 0.0) m with 1.20 MJ and 0.20 MN s"), "C-A1-0 bei 4,80 s an (-58,8; 0,0) m mit 1,20 MJ und 0,20 MN s");
+    assert.equal(translate('stage 1 "Row A": 1 charge'), "Zündstufe 1 „Row A“: 1 Ladung");
   });
 
   it("leaves names as people gave them", async () => {
