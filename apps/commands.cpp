@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -17,6 +18,7 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "base/unit.h"
+#include "base/words.h"
 #include "collapse/findings.h"
 #include "collapse/run.h"
 #include "collapse/step_check.h"
@@ -46,8 +48,6 @@ int print_diagnostics(const std::vector<Diagnostic>& list, const std::string& te
   }
   return errors;
 }
-
-std::string count_words(long n, const char* what) { return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s"); }
 
 int refuse(const InputError& e, const std::vector<Diagnostic>& warnings, const std::string& text, bool as_json,
            const char* then) {
@@ -336,7 +336,7 @@ int check_plan(const Arguments& a) {
       std::printf("%s\n", dump(out).c_str());
     } else {
       std::printf("%s: no errors, %s. Next: topple run %s -o out\n", a.input.c_str(),
-                  count_words(static_cast<int>(warnings.size()), "warning").c_str(), quote_word(a.input).c_str());
+                  count_words(std::ssize(warnings), "warning").c_str(), quote_word(a.input).c_str());
     }
     return kOk;
   } catch (const InputError& e) { return refuse(e, warnings, text, a.json); }

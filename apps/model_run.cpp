@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/file.h"
+#include "base/words.h"
 #include "collapse/findings.h"
 #include "commands.h"
 #include "mbs/model_json.h"
@@ -26,7 +27,7 @@ namespace {
 std::string count_all(const std::vector<std::pair<size_t, const char*>>& items) {
   std::string out;
   for (const auto& [n, what] : items)
-    if (n > 0) out += fmt::format("{}{} {}{}", out.empty() ? "" : ", ", n, what, n == 1 ? "" : "s");
+    if (n > 0) out += (out.empty() ? "" : ", ") + count_words(static_cast<long long>(n), what);
   return out.empty() ? "none" : out;
 }
 

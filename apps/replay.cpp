@@ -4,10 +4,12 @@
 
 #include <cstdio>
 #include <filesystem>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/file.h"
+#include "base/words.h"
 #include "collapse/action_log.h"
 #include "commands.h"
 #include "product/plan_sampler.h"
@@ -68,7 +70,7 @@ int replay_log(const Arguments& a, const std::atomic<bool>& cancel) {
                           {"ending", record.ending}});
       for (const auto& [what, path] : files) branches.back()["files"][what] = path;
       std::fprintf(out, "Branch %d \"%s\" to %.3f s, %s: %s\n", b->id, b->name.c_str(), b->frontier(),
-                   count_words(static_cast<long>(b->edits.size()), "edit").c_str(), place.output.c_str());
+                   count_words(std::ssize(b->edits), "edit").c_str(), place.output.c_str());
     }
     std::fprintf(out, "%s done again.\n", count_words(r.actions, "action").c_str());
     if (a.json)

@@ -22,9 +22,6 @@ namespace topple::apps {
 /// What was written: what it is, and its path.
 using Files = std::vector<std::pair<std::string, std::string>>;
 
-/// "1 edit", "2 edits".
-std::string count_words(long n, const char* what);
-
 /// All complaints of an InputError, and the JSON object if that was asked for; `text` is the input. `then` says what
 /// was not done.
 int refuse(const InputError&, const std::vector<Diagnostic>& warnings, const std::string& text, bool as_json,

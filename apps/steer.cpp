@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "base/hash.h"
+#include "base/words.h"
 #include "browser.h"
 #include "commands.h"
 #include "results.h"

@@ -8,6 +8,8 @@
 #include <map>
 #include <numbers>
 
+#include "base/disjoint_sets.h"
+
 namespace topple::collapse {
 
 std::vector<StageTimes> find_stage_times(const ModelMap& map, bool all) {
@@ -286,20 +288,19 @@ namespace {
 /// Of each body whether it hangs together with the ground in the last frame.
 std::vector<bool> find_standing(const record::Record& r) {
   using record::ZoneState;
-  const size_t Z = r.zones.size();
-  std::vector<bool> out(r.bodies.size());
-  for (size_t b = 0; b < out.size(); ++b) out[b] = r.bodies[b].fixed;
-  const auto does_stand = [&out](int body) { return body < 0 || out[static_cast<size_t>(body)]; };
-  for (bool grows = true; grows;) {
-    grows = false;
-    for (size_t z = 0; z < Z; ++z) {
-      const auto state = static_cast<ZoneState>(r.zone_state[r.zone_state.size() - Z + z]);
-      const int a = r.zones[z].body_a, b = r.zones[z].body_b;
-      if (state == ZoneState::Broken || state == ZoneState::Fired || does_stand(a) == does_stand(b)) continue;
-      out[static_cast<size_t>(does_stand(a) ? b : a)] = true;
-      grows = true;
-    }
+  const size_t Z = r.zones.size(), B = r.bodies.size();
+  const int ground = static_cast<int>(B);
+  DisjointSets linked(B + 1);
+  for (size_t b = 0; b < B; ++b)
+    if (r.bodies[b].fixed) linked.join(static_cast<int>(b), ground);
+  const auto body_of = [ground](int body) { return body < 0 ? ground : body; };
+  for (size_t z = 0; z < Z; ++z) {
+    const auto state = static_cast<ZoneState>(r.zone_state[r.zone_state.size() - Z + z]);
+    if (state != ZoneState::Broken && state != ZoneState::Fired)
+      linked.join(body_of(r.zones[z].body_a), body_of(r.zones[z].body_b));
   }
+  std::vector<bool> out(B);
+  for (size_t b = 0; b < B; ++b) out[b] = linked.find(static_cast<int>(b)) == linked.find(ground);
   return out;
 }
 

@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <optional>
 #include <set>
 #include <span>
 #include <type_traits>
 
+#include "base/disjoint_sets.h"
 #include "base/interpolate.h"
 #include "base/rotation_fit.h"
 #include "base/unit.h"
@@ -23,14 +23,6 @@ namespace {
 
 constexpr size_t kMostContacts = 300;  // events of parts hitting each other kept in a record
 constexpr double kLeastSpeed = 0.5;    // of a contact that is worth an event [m/s]
-
-int find_root(std::vector<int>& parent, int i) {
-  while (parent[static_cast<size_t>(i)] != i) {
-    parent[static_cast<size_t>(i)] = parent[static_cast<size_t>(parent[static_cast<size_t>(i)])];
-    i = parent[static_cast<size_t>(i)];
-  }
-  return i;
-}
 
 }  // namespace
 
@@ -188,8 +180,7 @@ const StubEntry* Recorder::find_crushed_stub(size_t zone, const mbs::View& v) co
 std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) const {
   const size_t B = model_.bodies.size(), S = map_.structures.size();
   std::vector<BlockFrame> out(S);
-  std::vector<int> parent(B);
-  std::iota(parent.begin(), parent.end(), 0);
+  DisjointSets linked(B);
   const auto is_upper = [&](int b) { return b >= 0 && map_.bodies[static_cast<size_t>(b)].is_upper; };
   const auto centre_of = [&](size_t b) { return v.centre.size() == B ? v.centre[b] : v.X_WB[b].p; };
   // where the body had at the start what is its mass centre now
@@ -197,8 +188,7 @@ std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) const {
     return start_[b] * transpose_times(to_matrix(v.X_WB[b].q), centre_of(b) - v.X_WB[b].p);
   };
   const auto link = [&](mbs::BodyId a, mbs::BodyId b) {
-    if (is_upper(a.index) && is_upper(b.index))
-      parent[static_cast<size_t>(find_root(parent, a.index))] = find_root(parent, b.index);
+    if (is_upper(a.index) && is_upper(b.index)) linked.join(a.index, b.index);
   };
   for (size_t e = 0; e < model_.elements.size(); ++e)
     if (v.element_state[e] < mbs::ElementState::Broken) link(model_.elements[e].a, model_.elements[e].b);
@@ -232,7 +222,7 @@ std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) const {
     if (is_down) f.down += m;
     if (!map_.bodies[b].is_upper) continue;
     upper[s] += m;
-    group[static_cast<size_t>(find_root(parent, static_cast<int>(b)))] += m;
+    group[static_cast<size_t>(linked.find(static_cast<int>(b)))] += m;
     const double turn = calc_tilt(v.X_WB[b].q * conjugate(start_[b].q), map_.fall_direction);
     if (turn > k_.mechanism_fold_rotation) f.forward += m;
     if (turn < -k_.mechanism_fold_rotation) f.backward += m;
@@ -261,8 +251,7 @@ std::vector<BlockFrame> Recorder::calc_blocks(const mbs::View& v) const {
     Vec3 shift;
     double above = 0;
     for (size_t b = 0; b < B; ++b) {
-      if (!is_upper(static_cast<int>(b)) || find_root(parent, static_cast<int>(b)) != static_cast<int>(largest))
-        continue;
+      if (!is_upper(static_cast<int>(b)) || linked.find(static_cast<int>(b)) != static_cast<int>(largest)) continue;
       block.push_back({v.mass[b], model_.bodies[b].inertia, start_[b], v.X_WB[b]});
       shift += v.mass[b] * (centre_of(b) - start_of(b));
       above += v.mass[b] * start_of(b).z;

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <limits>
 #include <map>
-#include <numeric>
 
+#include "base/disjoint_sets.h"
 #include "collapse/builder.h"
 
 namespace topple::collapse {
@@ -31,17 +31,11 @@ std::string join(const std::vector<std::string>& names) {
 void Builder::find_structures() {
   if (condensation) return;  // what stands for all frames is one building
   const size_t B = model.bodies.size();
-  std::vector<int> parent(B);
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto find_root = [&parent](int i) {
-    while (parent[static_cast<size_t>(i)] != i) i = parent[static_cast<size_t>(i)];
-    return i;
-  };
+  DisjointSets linked(B);
   const auto link = [&](mbs::BodyId a, mbs::BodyId b) {
     for (const mbs::BodyId id : {a, b})
       if (id == mbs::kGround || model.bodies[static_cast<size_t>(id.index)].fixed) return;
-    const int low = find_root(std::min(a.index, b.index)), high = find_root(std::max(a.index, b.index));
-    parent[static_cast<size_t>(std::max(low, high))] = std::min(low, high);
+    linked.join_under_lower(a.index, b.index);
   };
   for (const mbs::ZoneElement& e : model.elements) link(e.a, e.b);
   for (const mbs::Joint& j : model.joints) link(j.parent, j.child);
@@ -61,7 +55,7 @@ void Builder::find_structures() {
   std::map<int, Group> groups;  // by their first body
   for (size_t b = 0; b < B; ++b) {
     if (model.bodies[b].fixed) continue;
-    Group& g = groups[find_root(static_cast<int>(b))];
+    Group& g = groups[linked.find(static_cast<int>(b))];
     g.mass += model.bodies[b].mass;
     g.has_upper |= map.bodies[b].is_upper;
     g.is_shaft |= map.bodies[b].kind == "shaft";
@@ -92,7 +86,7 @@ void Builder::find_structures() {
   }
   for (size_t b = 0; b < B; ++b) {
     if (model.bodies[b].fixed) continue;
-    const auto it = structure_of.find(find_root(static_cast<int>(b)));
+    const auto it = structure_of.find(linked.find(static_cast<int>(b)));
     BodyEntry& body = map.bodies[b];
     body.structure = it == structure_of.end() ? of_frames : it->second;
     body.is_upper &= body.structure >= 0;

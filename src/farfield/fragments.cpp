@@ -7,8 +7,8 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
 
+#include "base/disjoint_sets.h"
 #include "base/unit.h"
 #include "record/told.h"
 
@@ -33,12 +33,6 @@ std::vector<std::pair<int, int>> find_neighbours(const fem::ExplicitModel& fe) {
   for (size_t i = 0; i + 1 < faces.size(); ++i)
     if (faces[i].first == faces[i + 1].first) pairs.emplace_back(faces[i].second, faces[i + 1].second);
   return pairs;
-}
-
-int find_root(std::vector<int>& parent, int i) {
-  while (parent[static_cast<size_t>(i)] != i)
-    i = parent[static_cast<size_t>(i)] = parent[static_cast<size_t>(parent[static_cast<size_t>(i)])];
-  return i;
 }
 
 bool is_damaged(const fem::ExplicitSystem& system, size_t element) {
@@ -73,17 +67,14 @@ Fragments find_fragments(const product::Plan& plan, const Whole& whole, const fe
     if (r.cause == fem::RemovalCause::Charge) state[static_cast<size_t>(r.element)] = State::Charged;
     if (r.time < before_landing.landing) is_early[static_cast<size_t>(r.element)] = 1;
   }
-  std::vector<int> parent(E);
-  std::iota(parent.begin(), parent.end(), 0);
+  DisjointSets pieces(E);
   for (const auto& [a, b] : find_neighbours(fe)) {
     if (state[static_cast<size_t>(a)] != state[static_cast<size_t>(b)]) continue;
-    // the smaller number leads, so that the order of pairs does not matter
-    const int ra = find_root(parent, a), rb = find_root(parent, b);
-    parent[static_cast<size_t>(std::max(ra, rb))] = std::min(ra, rb);
+    pieces.join_under_lower(a, b);
   }
   std::map<int, std::vector<int>> groups;
   for (size_t e = 0; e < E; ++e)
-    if (state[e] != State::Charged) groups[find_root(parent, static_cast<int>(e))].push_back(static_cast<int>(e));
+    if (state[e] != State::Charged) groups[pieces.find(static_cast<int>(e))].push_back(static_cast<int>(e));
 
   std::vector<double> volume(E);
   double damaged_volume = 0, whole_mass = 0;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "base/words.h"
 #include "mbs/system.h"
 
 namespace topple::mbs {
@@ -18,8 +19,6 @@ std::string number(double x) {
   std::snprintf(text, sizeof text, "%.3g", x);
   return text;
 }
-
-std::string times(int n, const char* word) { return std::to_string(n) + " " + word + (n == 1 ? "" : "s"); }
 
 /// Up to six joints by name, in the order of the model.
 std::string list_joints(const Model& model, std::vector<int> list) {
@@ -74,12 +73,12 @@ void System::note_dependence(const JointCluster& c, int usual) {
     if (joint == first && situation > 0) usual = std::min(usual, situation);
   if (c.dependent <= usual) {
     if (!note_once(c, c.dependent)) return;
-    summary.notes.push_back(list_joints(model, repeating(c)) + ": " + times(c.dependent, "constraint") + " of " +
+    summary.notes.push_back(list_joints(model, repeating(c)) + ": " + count_words(c.dependent, "constraint") + " of " +
                             std::to_string(c.matrix.rows()) + (c.dependent == 1 ? " repeats" : " repeat") +
                             " what the others hold; of all reactions that give the same motion the smallest are given");
   } else if (note_once(c, kSingular)) {
     summary.notes.push_back(list_joints(model, repeating(c)) + ": singular position at " + number(state.time) +
-                            " s, where " + times(c.dependent - usual, "further constraint") +
+                            " s, where " + count_words(c.dependent - usual, "further constraint") +
                             " cannot be told from the others; left out of the step, so that the motion goes on along "
                             "the branch it is on");
   }

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <concepts>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <regex>
@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/unit.h"
+#include "base/words.h"
 #include "product/clip.h"
 #include "product/foreign_text.h"
 #include "product/ifc_reinforcement.h"
@@ -51,11 +52,6 @@ std::vector<double> find_lines(std::vector<double> values) {
   for (const Group& g : apart) lines.push_back(g.middle());
   return lines;
 }
-/// "1 row", "2 rows", "2 thicknesses".
-std::string count_of(std::integral auto n, const std::string& one) {
-  return fmt::format("{} {}{}", n, one, n == 1 ? "" : one.ends_with("s") ? "es" : "s");
-}
-
 int nearest(const std::vector<double>& lines, double value) {
   int best = 0;
   for (size_t i = 1; i < lines.size(); ++i)
@@ -249,9 +245,10 @@ class Planner {
     }
     levels_.push_back(roof);
     check_grid();
-    taken(fmt::format("{} by {} and {}, from the places of {} and {} of the file", count_of(rows_.size(), "row"),
-                      count_of(frames_.size(), "frame"), count_of(levels_.size() - 1, "storey"),
-                      count_of(xs.size(), "column"), count_of(b_.storeys.size(), "storey")));
+    taken(fmt::format("{} by {} and {}, from the places of {} and {} of the file",
+                      count_words(std::ssize(rows_), "row"), count_words(std::ssize(frames_), "frame"),
+                      count_words(std::ssize(levels_) - 1, "storey"), count_words(std::ssize(xs), "column"),
+                      count_words(std::ssize(b_.storeys), "storey")));
     if (std::abs(b_.angle) > 1e-4)
       guessed(fmt::format("the building's own axes, turned by {:.1f} deg against the file's x, are those of the plan",
                           b_.angle / unit::deg));
@@ -352,7 +349,7 @@ class Planner {
   }
 
   void tell_placed(int placed, const char* kind, size_t groups, const char* group) {
-    taken(fmt::format("{} in {}", count_of(placed, kind), count_of(groups, group)));
+    taken(fmt::format("{} in {}", count_words(placed, kind), count_words(static_cast<long long>(groups), group)));
   }
 
   void place_columns() {
@@ -492,7 +489,7 @@ class Planner {
       int opened = 0;
       for (const Group& g : slabs_)
         for (const IfcElement* e : g.elements) opened += e->has_opening;
-      if (opened > 0) missing(fmt::format("openings of {}: they are not read", count_of(opened, "slab")));
+      if (opened > 0) missing(fmt::format("openings of {}: they are not read", count_words(opened, "slab")));
       guessed(
           "a slab covers every cell of the grid whose middle lies in its outline, or in the box of a mesh: smaller "
           "holes and cut corners are not seen");
@@ -602,7 +599,7 @@ class Planner {
     for (const auto& [where, claim] : claims.at) take(where, claim);
     for (const auto& [where, part] : claims.parts)
       if (claims.at.at(where).group == part.group) take(where, part);
-    if (placed > 0) taken(fmt::format("{} of walls", count_of(placed, "opening")));
+    if (placed > 0) taken(fmt::format("{} of walls", count_words(placed, "opening")));
     if (clipped > 0)
       guessed(fmt::format("{} openings of walls reach into columns, floors or beams: the part between them was taken",
                           clipped));
