@@ -51,6 +51,12 @@ mbs::SharedLaw named(const mbs::SharedLaw& from, const std::string& name) {
   return law;
 }
 
+/// Turns both ends by as much, apart about y, so that the element at rest has no force where M is turned by it [rad].
+void turn_apart(mbs::ZoneElement& e, double turn) {
+  e.X_AF.q = e.X_AF.q * exp_rotation({0, -0.5 * turn, 0});
+  e.X_BM.q = e.X_BM.q * exp_rotation({0, 0.5 * turn, 0});
+}
+
 }  // namespace
 
 double Builder::kept_of(int index) const {
@@ -458,7 +464,7 @@ void Builder::connect_x_beam(const GridPoint& at, int index) {
             .index;
     mbs::ZoneElement& e = model.elements.back();
     const double turn = fixed_end / rotational.y + calc_crack_rotation(cracking[0], fixed_end);
-    e.X_BM.q = e.X_BM.q * exp_rotation({0, turn, 0});
+    turn_apart(e, turn);
   }
 }
 
@@ -501,7 +507,7 @@ void Builder::connect_slab(const GridPoint& at, int index) {
     add_element(name, index, a, b, p_W, axes, {EA / span, EA / 2.4 / 1.2 / span, 12 * EI / (span * span * span)},
                 {EI / span, EI / span, EA * width * width / 12 / span}, std::move(stations));
     mbs::ZoneElement& e = model.elements.back();
-    e.X_BM.q = e.X_BM.q * exp_rotation({0, -mid_moment * span / EI, 0});
+    turn_apart(e, -mid_moment * span / EI);
   };
   // on each side a beam carries it, or the two joints at its corners do
   std::array<int, 2> beam{};

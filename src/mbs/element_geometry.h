@@ -29,10 +29,11 @@ struct Span {
 struct ElementGeometry {
   Span span;
   Six deformation;      // [m], [rad]
-  Mat3 axes;            // of the resultants, in W
+  Mat3 axes;            // of the resultants, in W; without a member halfway between F and M
   Vec3 p_a, p_b;        // where the force acts on a and on b, in W
-  Vec3 turn_a, turn_b;  // rotation vectors from a to `axes` (a member's) and on to b, in `axes`
-  Vec3 along_a;         // x of `axes` in those of a
+  Vec3 turn_a, turn_b;  // rotation vectors from a to `axes` and on to b, in `axes`
+  Vec3 way;             // without a member: from F to M, in `axes` [m]
+  Vec3 along_a;         // of a member: x of `axes` in those of a
   double length = 0;    // between the stations of a member [m]
 };
 
@@ -41,8 +42,9 @@ struct ElementForces {
   Vec3 force, torque_a, torque_b;
 };
 
-/// Of markers F on a and M on b. An element with one station or none deforms by M in F; a member by its chord: from
-/// its station on a to that on b, by what the chord lengthens and by the rotations of a and of b against it.
+/// Of markers F on a and M on b. An element with one station or none deforms by the way from F to M in axes halfway
+/// between both, and by the rotation vector from F to M; a member by its chord: from its station on a to that on b, by
+/// what the chord lengthens and by the rotations of a and of b against it.
 ElementGeometry measure_element(const Pose& X_WF, const Pose& X_WM, const Span&);
 
 /// The forces that do the work of the resultants on the rates of the deformations.

@@ -200,12 +200,11 @@ class Assembly {
   const std::vector<int>& free_bodies() const { return free_; }
   int place(int body) const { return body < 0 ? -1 : place_[static_cast<size_t>(body)]; }
 
-  /// Six rows of an element; a member's are of its chord, for small rotations against it.
+  /// Six rows of an element, in its axes at its middle; a member's are of its chord, for small rotations against it.
   void element_rows(const CompiledElement& e, KinematicRow rows[6]) const {
     const Span span = e.zone.span();
-    if (!span.is_member()) return element_rows(e.a, e.b, e.q_AF, e.p_BM, rows);
     const ElementGeometry g = s_.measure_zone(e);
-    const double slope = span.length() / g.length;
+    const double slope = span.is_member() ? span.length() / g.length : 1;
     for (int i = 0; i < 6; ++i) {
       const Vec3 axis = g.axes.column(i % 3);
       KinematicRow r{place(e.a), place(e.b), {}, -axis, {}, axis};
@@ -216,27 +215,11 @@ class Assembly {
         r.wa = -share * cross(g.p_a - centre(e.a), axis);
         r.wb = share * cross(g.p_b - centre(e.b), axis);
         // the rotations of both ends, with the levers of the stations
-        if (i > 0) {
+        if (i > 0 && span.is_member()) {
           const Vec3 about = cross(g.axes.column(0), axis);
           r.wa += span.a * about;
           r.wb -= span.b * about;
         }
-      }
-      rows[i] = r;
-    }
-  }
-  /// Six rows of an element at its marker M, in the axes of F.
-  void element_rows(int a, int b, const Quat& q_AF, const Vec3& p_BM, KinematicRow rows[6]) const {
-    const Mat3 F = to_matrix(s_.pose_of(a).q * q_AF);
-    const Vec3 p_M = point(b, p_BM);
-    for (int i = 0; i < 6; ++i) {
-      const Vec3 axis = F.column(i % 3);
-      KinematicRow r{place(a), place(b), {}, -axis, {}, axis};
-      if (i < 3) {
-        r.va = -axis;
-        r.vb = axis;
-        r.wa = -cross(p_M - centre(a), axis);
-        r.wb = cross(p_M - centre(b), axis);
       }
       rows[i] = r;
     }
@@ -352,11 +335,6 @@ class Assembly {
 
  private:
   Vec3 centre(int body) const { return body < 0 ? Vec3{} : s_.state.p[static_cast<size_t>(body)]; }
-  Vec3 point(int body, const Vec3& p) const {
-    if (body < 0) return p;
-    const size_t b = static_cast<size_t>(body);
-    return s_.state.p[b] + s_.state.R[b] * (p - s_.state.p_offset[b]);
-  }
   const System& s_;
   Unknowns unknowns_;
   std::vector<int> place_, free_;

@@ -98,30 +98,38 @@ HWY_INLINE void advance_planar_block(const BodyJob& job, size_t block, Num<D>& s
   sum = sum + ((x + z) + (vx + vz));
 }
 
-/// Rotation vector over the vector of its quaternion, 2 asin(s)/s, and the coefficient of eq. 4,
-/// 1/θ² - (1 + cos θ) / (2 θ sin θ), up to θ of 60 degrees. Each lane takes the series for small or large angles after
-/// its own s².
+/// What angle / sin(angle) is above 1, over s², of the half turn with the sine s.
+template <class D>
+HWY_INLINE Num<D> excess_of(Num<D> s2) {
+  const auto large = hn::Gt(s2.v, hn::Set(D(), 1e-3));
+  // Taylor, exact to round-off below s² = 1e-3
+  const Num<D> small = polynomial<D>({1.0 / 6, 3.0 / 40, 5.0 / 112, 35.0 / 1152, 63.0 / 2816}, s2);
+  if (HWY_LIKELY(hn::AllFalse(D(), large))) return small;
+  // fitted to 2e-17
+  const Num<D> fitted =
+      polynomial<D>({0.16666666666664942, 0.07500000000385201, 0.044642856805998936, 0.03038195969768514,
+                     0.022371749733164054, 0.01735977964134998, 0.01388484282640208, 0.012170138592391726,
+                     0.0065293020047365695, 0.019513468251252167, -0.016187392271599134, 0.03187962140081284},
+                    s2);
+  return select(large, fitted, small);
+}
+
+/// Of the half turn with the sine s: twice its angle over its sine, and κ of multibody.md, eq. 4.
 template <class D>
 HWY_INLINE void turning(Num<D> s2, Num<D>& angle_over_sine, Num<D>& coefficient) {
   const D d;
+  angle_over_sine = num<D>(2) * fma(s2, excess_of<D>(s2), num<D>(1));
+  const Num<D> angle2 = angle_over_sine * angle_over_sine * s2;
   // Taylor, exact to round-off below s² = 1e-3
-  angle_over_sine = polynomial<D>({2, 1.0 / 3, 3.0 / 20, 5.0 / 56, 35.0 / 576, 63.0 / 1408}, s2);
-  coefficient = polynomial<D>({1.0 / 12, 1.0 / 720, 1.0 / 30240, 1.0 / 1209600, 1.0 / 47900160},
-                              angle_over_sine * angle_over_sine * s2);
+  coefficient = polynomial<D>({1.0 / 12, 1.0 / 720, 1.0 / 30240, 1.0 / 1209600, 1.0 / 47900160}, angle2);
   const auto large = hn::Gt(s2.v, hn::Set(d, 1e-3));
   if (HWY_LIKELY(hn::AllFalse(d, large))) return;
   // fitted to 2e-17
-  const Num<D> x = polynomial<D>(
-      {2 * 1.0, 2 * 0.16666666666664942, 2 * 0.07500000000385201, 2 * 0.044642856805998936, 2 * 0.03038195969768514,
-       2 * 0.022371749733164054, 2 * 0.01735977964134998, 2 * 0.01388484282640208, 2 * 0.012170138592391726,
-       2 * 0.0065293020047365695, 2 * 0.019513468251252167, 2 * -0.016187392271599134, 2 * 0.03187962140081284},
-      s2);
   const Num<D> y =
       polynomial<D>({0.08333333333333333, 0.001388888888888962, 3.30687830673884e-05, 8.267195868407458e-07,
                      2.0876720971038434e-08, 5.284884495807743e-10, 1.3308714828735463e-11, 3.793809199423887e-13},
-                    x * x * s2);
-  angle_over_sine = {hn::IfThenElse(large, x.v, angle_over_sine.v)};
-  coefficient = {hn::IfThenElse(large, y.v, coefficient.v)};
+                    angle2);
+  coefficient = select(large, y, coefficient);
 }
 
 /// Places of the bodies of one block of elements, side by side.
@@ -258,6 +266,15 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block) {
   M33<D> axes;     // F, of a member those of its chord
   N sine, cosine;  // of their turn in the plane
   N s2, over_sine, coefficient;
+  // without a member: the way from F to M, the vectors of the quaternions of the turn and of its half
+  V3<D> way, v, v_half;
+  N excess, half_w, half_share;
+  const auto halve = [&](N w) TOPPLE_INLINED {
+    half_w = N{hn::Sqrt(fma(half, abs(w), half).v)};
+    half_share = half / half_w;
+    excess = excess_of<D>(s2);
+    over_sine = num<D>(2) * fma(s2, excess, one);
+  };
   // a member: x of the stations on a and on b, the chord in the axes of a, the turn from there to the chord
   N x_a, x_b, over_length, chord_x, chord_y, chord_z, swing_w, swing_y, swing_z, s2_a, over_sine_a, coefficient_a;
   const auto measure_chord = [&](V3<D> chord) TOPPLE_INLINED {
@@ -279,26 +296,32 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block) {
     const N along_x = (apart_x - at_a.lever_x) + at_b.lever_x, along_z = (apart_z - at_a.lever_z) + at_b.lever_z;
     lever_a = {at_a.lever_x, zero, at_a.lever_z};
     lever_b = {at_b.lever_x, zero, at_b.lever_z};
+    const auto across_of = [&] TOPPLE_INLINED { return fma(cosine, along_z, sine * along_x); };
+    const auto along_of = [&] TOPPLE_INLINED { return fms(cosine, along_x, sine * along_z); };
     sine = turned.sine(), cosine = turned.cosine();
-    const N along = fms(cosine, along_x, sine * along_z), across = fma(cosine, along_z, sine * along_x);
     if constexpr (is_member) {
-      measure_chord({along, zero, across});
+      measure_chord({along_of(), zero, across_of()});
       turned = turned.then({swing_w, swing_y});
-      sine = turned.sine(), cosine = turned.cosine();
-    } else {
-      lever_a = {apart_x + at_b.lever_x, zero, apart_z + at_b.lever_z};
     }
     const PlanarTurn<D> apart_by = turned.back().then(at_b.turn);
-    const N v = {hn::CopySign(apart_by.y.v, hn::Xor(apart_by.y.v, apart_by.w.v))};
-    s2 = v * v;
-    turning<D>(s2, over_sine, coefficient);
-    N moved = across, rotation = over_sine * v;
+    v.y = {hn::CopySign(apart_by.y.v, hn::Xor(apart_by.y.v, apart_by.w.v))};
+    s2 = v.y * v.y;
+    if constexpr (is_member) {
+      turning<D>(s2, over_sine, coefficient);
+    } else {
+      halve(apart_by.w);
+      turned = turned.then({half_w, half_share * v.y});
+      lever_a.x = fma(half, along_x, lever_a.x), lever_a.z = fma(half, along_z, lever_a.z);
+      lever_b.x = fnma(half, along_x, lever_b.x), lever_b.z = fnma(half, along_z, lever_b.z);
+    }
+    sine = turned.sine(), cosine = turned.cosine();
+    N moved = across_of(), rotation = over_sine * v.y;
     if constexpr (is_member) {
       const N turn_a = over_sine_a * swing_y;
       moved = fma(x_a, turn_a, x_b * rotation);
       rotation = turn_a + rotation;
     } else {
-      d[0] = along;
+      d[0] = along_of();
     }
     d[active.at[1]] = In == Plane::AboutY ? moved : zero - moved;
     d[active.at[2]] = rotation;
@@ -311,24 +334,30 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block) {
     if constexpr (is_member) {
       measure_chord(turn(Q4<D>{qF.w, zero - qF.x, zero - qF.y, zero - qF.z}, between));
       qF = qF * Q4<D>{swing_w, zero, swing_y, swing_z};
+    }
+    const Q4<D> q = conj_times(qF, qM);
+    v = {{hn::CopySign(q.x.v, hn::Xor(q.x.v, q.w.v))},
+         {hn::CopySign(q.y.v, hn::Xor(q.y.v, q.w.v))},
+         {hn::CopySign(q.z.v, hn::Xor(q.z.v, q.w.v))}};
+    s2 = dot(v, v);
+    if constexpr (is_member) {
+      turning<D>(s2, over_sine, coefficient);
     } else {
-      lever_a = apart + lever_b;
+      halve(q.w);
+      v_half = half_share * v;
+      qF = qF * Q4<D>{half_w, v_half.x, v_half.y, v_half.z};
+      const V3<D> to_middle = half * between;
+      lever_a = lever_a + to_middle, lever_b = lever_b - to_middle;
     }
     axes = to_matrix(qF);
-    const Q4<D> q = conj_times(qF, qM);
-    const V3<D> v{{hn::CopySign(q.x.v, hn::Xor(q.x.v, q.w.v))},
-                  {hn::CopySign(q.y.v, hn::Xor(q.y.v, q.w.v))},
-                  {hn::CopySign(q.z.v, hn::Xor(q.z.v, q.w.v))}};
-    s2 = dot(v, v);
-    turning<D>(s2, over_sine, coefficient);
     r = over_sine * v;
     if constexpr (is_member) {
       const N turn_y = over_sine_a * swing_y, turn_z = over_sine_a * swing_z;
       d[1] = zero - fma(x_a, turn_z, x_b * r.z), d[2] = fma(x_a, turn_y, x_b * r.y);
       d[3] = r.x, d[4] = turn_y + r.y, d[5] = turn_z + r.z;
     } else {
-      const V3<D> t = transpose_times(axes, between);
-      d[0] = t.x, d[1] = t.y, d[2] = t.z, d[3] = r.x, d[4] = r.y, d[5] = r.z;
+      way = transpose_times(axes, between);
+      d[0] = way.x, d[1] = way.y, d[2] = way.z, d[3] = r.x, d[4] = r.y, d[5] = r.z;
     }
   }
   auto too_far = hn::Gt(s2.v, constant(kMostTurn).v);
@@ -458,11 +487,11 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block) {
     store<D>(fms(lever_b.z, fx, lever_b.x * fz) + torque_b, out, 7);
   } else {
     // torques conjugate to the rates of the rotation vectors
-    V3<D> m{g[3], g[4], g[5]}, shear{g[0], g[1], g[2]}, torque_a;
-    if constexpr (is_member) m.y = fma(x_b, g[2], m.y), m.z = fnma(x_b, g[1], m.z);
-    const V3<D> rm = cross(r, m);
-    V3<D> torque_b = fma(coefficient, cross(r, rm), fma(half, rm, m));
+    V3<D> m{g[3], g[4], g[5]}, shear{g[0], g[1], g[2]}, torque_a, torque_b;
     if constexpr (is_member) {
+      m.y = fma(x_b, g[2], m.y), m.z = fnma(x_b, g[1], m.z);
+      const V3<D> rm = cross(r, m);
+      torque_b = fma(coefficient, cross(r, rm), fma(half, rm, m));
       const N turn_y = over_sine_a * swing_y, turn_z = over_sine_a * swing_z;
       const N m_y = fma(x_a, g[2], g[4]), m_z = fnma(x_a, g[1], g[5]);
       const N twist = fms(turn_y, m_z, turn_z * m_y), bent = coefficient_a * twist;
@@ -472,7 +501,8 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block) {
       shear.y = over_length * (torque_a.z - torque_b.z), shear.z = over_length * (torque_b.y - torque_a.y);
       torque_a = axes * torque_a, torque_b = axes * torque_b;
     } else {
-      torque_a = torque_b = axes * torque_b;
+      const V3<D> conjugate = m - excess * cross(v, cross(v, m));
+      torque_a = torque_b = axes * (conjugate + cross(cross(way, shear), half_share * v_half));
     }
     const V3<D> force = axes * shear;
     store3<D>(force, out, 0);

@@ -219,9 +219,9 @@ struct Quantity {
     JointMoment,         // joint, in F [N·m]
     JointAngle,          // revolute or cylindrical joint [rad]
     JointDisplacement,   // prismatic or cylindrical joint, along Fz [m]
-    ElementTranslation,  // zone element: of M against F, in F [m]
+    ElementTranslation,  // zone element: of M against F, in its axes [m]
     ElementRotation,     // zone element [rad]
-    ElementForce,        // zone element: of a on b at the marker, in F [N]
+    ElementForce,        // zone element: of a on b, in its axes [N]
     ElementMoment,       // zone element [N·m]
     BushingTranslation,  // bushing, as of a zone element
     BushingRotation,

@@ -45,12 +45,12 @@ struct View {
   std::vector<double> rotation;                // largest plastic rotation, same order [rad]
   std::vector<double> shortening;              // plastic shortening, same order [m]
   std::vector<std::array<double, 2>> crushed;  // of members, from their far ends on a and b [m]; zone elements only
-  std::vector<Vec3> element_force, element_moment;  // of a on b at the marker, in F; zone elements only
+  std::vector<Vec3> element_force, element_moment;  // of a on b, in the element's axes; zone elements only
   std::vector<Vec3> joint_force, joint_moment;      // reaction of the parent on the child, in F
   std::vector<double> joint_angle;                  // of revolute and cylindrical joints, else 0 [rad]
   std::vector<double> joint_displacement;           // of prismatic and cylindrical joints, else 0 [m]
   std::vector<bool> joint_released;
-  std::vector<Vec3> element_translation, element_rotation;  // deformation in F; zone elements only [m, rad]
+  std::vector<Vec3> element_translation, element_rotation;  // deformation in its axes; zone elements only [m, rad]
   std::vector<double> cable_force;
   std::vector<double> spring_length, spring_force;    // [m, N]
   std::vector<double> torsion_angle, torsion_torque;  // of rotational springs [rad, N·m]

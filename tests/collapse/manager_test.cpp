@@ -413,7 +413,7 @@ TEST(Manager, AChargeRemovesItsLengthFromTheShaft) {
 
 TEST(ManagerPhysics, AStubIsCrushedByWhatComesDownOnIt) {
   // the house tilts over row A, whose stubs of 1 m reach the ground at 0.71 s: they do not prop it up
-  const product::Plan plan = read(house(charge("C-A*-0", "0.1 s"), "1.1 s"));
+  const product::Plan plan = read(house(charge("C-A*-0", "0.1 s"), "1.2 s"));
   double drop[2];  // of the mass centre at 1 s
   for (const double step : {0.0, 1e-4}) {
     RunOptions o;
@@ -423,7 +423,7 @@ TEST(ManagerPhysics, AStubIsCrushedByWhatComesDownOnIt) {
       return e.kind == "touchdown" && (e.subject.starts_with("N-A") || e.subject.starts_with("B-A"));
     });
     ASSERT_NE(at, r.events.end()) << step;
-    EXPECT_LT(at->time, 1) << step;  // propped up until 1.5 s by a rigid one
+    EXPECT_LT(at->time, 1.1) << step;  // propped up until 1.5 s by a rigid one
     const auto height = std::find_if(r.series.begin(), r.series.end(),
                                      [](const record::Series& x) { return x.id == "mass_centre_height"; });
     ASSERT_NE(height, r.series.end());
@@ -452,7 +452,7 @@ TEST(ManagerPhysics, AStubIsCrushedByWhatComesDownOnIt) {
     EXPECT_LE(f->value, 1.01);
   }
   // the peak of a stub's strength is 2 mm wide and passes in a step of 0.6 ms, so steps of 0.66, 0.3, 0.2, 0.1 and 0.05
-  // ms give 1.410, 1.374, 1.374, 1.463 and 1.459 m
+  // ms give 1.390, 1.480, 1.481, 1.440 and 1.436 m
   EXPECT_NEAR(drop[0], drop[1], 0.04 * drop[1]);
 }
 

@@ -132,12 +132,11 @@ Poses make_poses(std::mt19937& random, double turn) {
   return p;
 }
 
-TEST(Member, ForcesDoTheWorkOfTheResultants) {
+void check_work(const Span& span, std::initializer_list<double> turns) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> share(-1, 1);
   const auto any = [&] { return Vec3{share(random), share(random), share(random)}; };
-  const Span span{-1.4, 1.7};
-  for (const double turn : {1e-3, 0.3, 0.8}) {
+  for (const double turn : turns) {
     for (int i = 0; i < 50; ++i) {
       const Poses p = make_poses(random, turn);
       const Six f{{share(random), share(random), share(random), share(random), share(random), share(random)}};
@@ -159,6 +158,36 @@ TEST(Member, ForcesDoTheWorkOfTheResultants) {
       // no force and no moment is left over
       const Vec3 left = on.torque_a - on.torque_b + cross(g.p_a - g.p_b, on.force);
       EXPECT_LT(norm(left), 1e-12) << turn << " " << i;
+    }
+  }
+}
+
+TEST(Member, ForcesDoTheWorkOfTheResultants) { check_work({-1.4, 1.7}, {1e-3, 0.3, 0.8}); }
+
+TEST(Zone, ForcesDoTheWorkOfTheResultants) { check_work({}, {1e-3, 0.3, 0.8, 1.7}); }
+
+/// The same in a mirror, of a vector and of a rotation; x, y and z of a marker there are again right-handed.
+Pose mirror(const Pose& X) { return {{X.p.x, -X.p.y, X.p.z}, {X.q.w, -X.q.x, X.q.y, -X.q.z}}; }
+
+TEST(Zone, IsTheSameInAMirrorAndFromItsOtherEnd) {
+  std::mt19937 random(5);
+  const Six f{{3, -5, 7, 2, -1, 4}};
+  const Quat back{0, 0, 0, 1};  // x the other way
+  for (const double turn : {1e-3, 0.3, 1.2}) {
+    for (int i = 0; i < 20; ++i) {
+      const Poses p = make_poses(random, turn);
+      const ElementForces on = calc_element_forces(measure_element(p.F, p.M, {}), f);
+      // shear along y, torsion and the moment about z change their sign in the mirror
+      const ElementGeometry seen = measure_element(mirror(p.F), mirror(p.M), {});
+      const ElementForces there = calc_element_forces(seen, {{3, 5, 7, -2, -1, -4}});
+      EXPECT_LT(norm(there.force - Vec3{on.force.x, -on.force.y, on.force.z}), 1e-12) << i;
+      EXPECT_LT(norm(there.torque_a - Vec3{-on.torque_a.x, on.torque_a.y, -on.torque_a.z}), 1e-12) << i;
+      // from b to a with x turned about: what is pulled stays pulled
+      const ElementGeometry g = measure_element({p.M.p, p.M.q * back}, {p.F.p, p.F.q * back}, {});
+      const ElementForces other = calc_element_forces(g, {{3, -5, -7, 2, -1, -4}});
+      EXPECT_LT(norm(other.force + on.force), 1e-12) << i;
+      EXPECT_LT(norm(other.torque_b + on.torque_a), 1e-12) << i;
+      EXPECT_LT(norm(g.p_a - measure_element(p.F, p.M, {}).p_a), 1e-12) << i;
     }
   }
 }
