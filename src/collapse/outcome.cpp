@@ -121,14 +121,18 @@ Polygon calc_building_outline(const mbs::Model& model, const ModelMap& map) {
 }
 
 Polygon find_start_outline(const record::Record& r, size_t body) {
-  constexpr double rounding = 1e-3;  // of poses that are kept as floats [m]
+  using record::Belonging;
+  const Belonging belongs = r.bodies[body].belongs;
+  if (belongs == Belonging::Building || r.building_outline.empty()) return r.building_outline;
   std::vector<Point2> corners;
   const Pose X_WB = record::pose_at(r, 0, body);
   for (size_t i = 0; i < r.bodies[body].shapes.size(); ++i) {
     const record::BoxShape s = record::shape_at(r, 0, body, i);
     for (const Point2& p : calc_outline({X_WB * s.X_BS, s.half})) corners.push_back(p);
   }
-  const bool is_beside = !r.building_outline.empty() &&
+  // of records that do not say it: what lies beyond the building's outline
+  constexpr double rounding = 1e-3;  // of poses that are kept as floats [m]
+  const bool is_beside = belongs == Belonging::Beside ||
                          std::any_of(corners.begin(), corners.end(),
                                      [&](const Point2& p) { return calc_distance(p, r.building_outline) > rounding; });
   return is_beside ? calc_hull(std::move(corners)) : r.building_outline;

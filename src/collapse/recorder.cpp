@@ -58,6 +58,7 @@ Recorder::Recorder(const mbs::Model& model, const ModelMap& map, const Knowledge
     info.mass = model.bodies[b].mass;
     info.fixed = model.bodies[b].fixed;
     info.shapes = map.bodies[b].shapes;
+    if (map.bodies[b].structure < 0) info.belongs = record::Belonging::Beside;
     record.bodies.push_back(std::move(info));
   }
   for (size_t d = 0; d < map.debris.size(); ++d) {

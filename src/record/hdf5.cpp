@@ -101,6 +101,13 @@ struct Cell<Status> {
   static void unpack(const Number* in, Status& value) { value = static_cast<Status>(*in); }
 };
 template <>
+struct Cell<Belonging> {
+  using Number = std::uint8_t;
+  static constexpr std::size_t count = 1;
+  static void pack(Belonging value, Number* out) { *out = static_cast<Number>(value); }
+  static void unpack(const Number* in, Belonging& value) { value = static_cast<Belonging>(*in); }
+};
+template <>
 struct Cell<Vec3> {
   using Number = double;
   static constexpr std::size_t count = 3;
@@ -554,6 +561,11 @@ void transfer(Archive& a, Record& r, Flat& flat) {
   a.column("bodies/storey", r.bodies, &BodyInfo::storey, {});
   a.column("bodies/mass", r.bodies, &BodyInfo::mass, {.unit = "kg"});
   a.column("bodies/fixed", r.bodies, &BodyInfo::fixed, {.meaning = "1: belongs to the ground"});
+  if (a.has("bodies/beside"))  // not in records of earlier versions
+    a.column("bodies/beside", r.bodies, &BodyInfo::belongs,
+             {.meaning = "0: of a structure that charges act on, 1: of one beside it, 2: not known"});
+  else
+    for (BodyInfo& body : r.bodies) body.belongs = Belonging::Unknown;
 
   a.first_column("shapes/body", flat.shapes, &ShapeRow::owner, {.meaning = "row of bodies"});
   a.column("shapes/centre", flat.shapes, [](auto& row) -> auto& { return row.value.X_BS.p; },
@@ -677,6 +689,8 @@ void check_contents(const Reader& reader, const Record& r) {
     if (!(r.time[i] > r.time[i - 1])) reader.damaged("frames/time does not rise");
   for (const double t : r.time)
     if (!std::isfinite(t)) reader.damaged("frames/time has a value that is not finite");
+  for (const BodyInfo& body : r.bodies)
+    if (body.belongs > Belonging::Unknown) reader.damaged("bodies/beside has an unknown value");
   const int bodies = static_cast<int>(r.bodies.size());
   for (const ZoneInfo& zone : r.zones)
     for (const int body : {zone.body_a, zone.body_b})

@@ -18,6 +18,9 @@ struct BoxShape {
   std::string part = {};  // as BodyInfo::kind: what it is of a body that carries slabs and walls; empty: not known
 };
 
+/// Whether a body is of a structure that charges act on (of any if there are none), or of one beside it.
+enum class Belonging : std::uint8_t { Building = 0, Beside = 1, Unknown = 2 };
+
 struct BodyInfo {
   std::string name;  // unique, e.g. "C-A1-0"
   std::string kind;  // "column", "beam", "slab", "wall", "node", "stump"
@@ -25,6 +28,7 @@ struct BodyInfo {
   double mass = 0;     // at the start [kg]
   bool fixed = false;  // belongs to the ground
   std::vector<BoxShape> shapes;
+  Belonging belongs = Belonging::Building;  // Unknown: read from a record of an earlier version
 };
 
 /// An end of a box that recedes as its member is crushed.

@@ -1,13 +1,18 @@
 #include "collapse/debris.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 
 #include "collapse/debris_tables.h"
 #include "collapse/outcome.h"
+#include "collapse/run.h"
+#include "plans.h"
 
 namespace topple::collapse {
 namespace {
@@ -142,6 +147,7 @@ TEST(Reach, IsTheSameWhicheverWaySomethingLies) {
 TEST(Reach, LeavesOutWhatStandsBesideTheBuilding) {
   record::Record r = make_one(6.5, 2);
   record::BodyInfo post = r.bodies[0];
+  post.belongs = record::Belonging::Beside;
   r.bodies.push_back(post);
   r.time.clear(), r.position.clear(), r.orientation.clear();
   add_frame(r, {{2, 2, 0}, {-60, 2, 0}});
@@ -158,6 +164,77 @@ TEST(Reach, LeavesOutWhatStandsBesideTheBuilding) {
   EXPECT_FALSE(stays_beside(r, 1, 2));
   EXPECT_EQ(find_moving_boxes(r, 1).size(), 1u);
   EXPECT_EQ(find_moving_boxes(r, 2).size(), 2u);
+  // records of earlier versions do not say what stands beside
+  for (record::BodyInfo& b : r.bodies) b.belongs = record::Belonging::Unknown;
+  EXPECT_NEAR(calc_reach(r, 1).largest, 3, 1e-5);
+  EXPECT_TRUE(stays_beside(r, 1, 1));
+}
+
+TEST(Reach, CountsPartsOfTheBuildingThatLeanBeyondItsOutlineAtRest) {
+  record::Record r = make_one(0.5, 2);
+  r.time.clear(), r.position.clear(), r.orientation.clear();
+  add_frame(r, {{3.52, 2, 0}});  // 2 cm beyond
+  add_frame(r, {{3.52, 2, 0}});
+  add_frame(r, {{-2.5, 2, 0}});
+  EXPECT_FALSE(stays_beside(r, 0, 1)) << "it may have come straight down";
+  EXPECT_EQ(find_moving_boxes(r, 1).size(), 1u);
+  EXPECT_NEAR(calc_reach(r, 1).largest, 0.02, 1e-6);
+  EXPECT_NEAR(calc_reach(r, 2).largest, 3, 1e-6) << "from the building's outline";
+}
+
+/// Four slender storeys of one bay that come down as they stand, and a stack on which no charge acts.
+product::Plan read_heavy_bay() {
+  return read(
+      materials() +
+      "[section.post]\nwidth = \"40 cm\"\nheight = \"40 cm\"\nconcrete = \"C25\"\nsteel = \"S\"\ncover = \"3 cm\"\n"
+      "ties = { diameter = \"8 mm\", spacing = \"20 cm\" }\nbars = { count_y = 3, count_z = 3, diameter = \"20 mm\" }\n"
+      "[section.girder]\nwidth = \"30 cm\"\nheight = \"50 cm\"\nconcrete = \"C25\"\nsteel = \"S\"\ncover = \"3 cm\"\n"
+      "ties = { diameter = \"8 mm\", spacing = \"15 cm\" }\ntop = \"4 x 20 mm\"\nbottom = \"4 x 20 mm\"\n"
+      "[slab.thick]\nthickness = \"20 cm\"\nconcrete = \"C25\"\nsteel = \"S\"\nas_top = \"4 cm2/m\"\n"
+      "as_bottom = \"4 cm2/m\"\n" +
+      grid("A = \"0 m\", B = \"5 m\"", "1 = \"0 m\", 2 = \"5 m\"", 4, "10 kN/m2") +
+      "[[columns]]\nsection = \"post\"\n[[beams]]\nsection = \"girder\"\n[[slabs]]\npanel = \"thick\"\n"
+      "[[shafts]]\nname = \"stack\"\nposition = [\"30 m\", \"2.5 m\"]\nconcrete = \"C25\"\nsteel = \"S\"\n"
+      "height = \"20 m\"\ndiameter = \"3 m\"\nthickness = \"20 cm\"\nas_outer = \"6 cm2/m\"\n" +
+      charge("C-*-0", "0 s", "scatter = \"0 ms\"") + analysis("0.8 s"));
+}
+
+TEST(Heap, HoldsAllOfTheBuildingAndNothingBesideIt) {
+  const product::Plan plan = read_heavy_bay();
+  ModelMap map;
+  const mbs::Model model = make_model(plan, default_knowledge(), map);
+  const record::Record run = run_plan(plan, default_knowledge(), {}, {});
+  const std::string path = testing::TempDir() + "topple-heap-" + std::to_string(getpid()) + ".h5";
+  record::write_hdf5(run, path);
+  const record::Record back = record::read_hdf5(path);
+  std::filesystem::remove(path);
+  const size_t last = run.time.size() - 1;
+  double volume = 0, most = 0, out = 0;
+  for (size_t b = 0; b < run.bodies.size(); ++b) {
+    const bool is_beside = run.bodies[b].name.rfind("stack", 0) == 0;
+    EXPECT_EQ(run.bodies[b].belongs == record::Belonging::Beside, is_beside) << run.bodies[b].name;
+    if (run.bodies[b].fixed || is_beside) continue;
+    volume += b < map.bodies.size() ? map.bodies[b].volume : 0;
+    for (size_t i = 0; i < run.bodies[b].shapes.size(); ++i)
+      for (const bool is_start : {true, false}) {
+        const record::BoxShape s = record::shape_at(run, is_start ? 0 : last, b, i);
+        const PlacedBox box{record::pose_at(run, is_start ? 0 : last, b) * s.X_BS, s.half};
+        if (is_start)
+          for (const Point2& p : calc_outline(box)) out = std::max(out, calc_distance(p, run.building_outline));
+        else
+          most = std::max(most, calc_heap_height({box}));
+      }
+  }
+  for (const DebrisEntry& d : map.debris) volume += d.volume;
+  EXPECT_GT(out, 1.2e-3) << "or no part leans beyond the outline at rest";
+  EXPECT_NEAR(find_heap(run, last).height, most, 1e-9);
+  EXPECT_EQ(find_heap(back, last).height, find_heap(run, last).height);
+  EXPECT_EQ(find_heap(back, last).volume, find_heap(run, last).volume);
+  EXPECT_EQ(calc_reach(back, last).largest, calc_reach(run, last).largest);
+  const auto found = std::find_if(run.findings.begin(), run.findings.end(),
+                                  [](const record::Finding& f) { return f.id == "debris.volume"; });
+  ASSERT_NE(found, run.findings.end());
+  EXPECT_NE(found->text.find(fmt::format("have {:.0f} m3", volume)), std::string::npos) << found->text << volume;
 }
 
 TEST(Debris, LowestPointOverAnArea) {

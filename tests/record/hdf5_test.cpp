@@ -75,6 +75,7 @@ void expect_same(const Record& a, const Record& b) {
     EXPECT_EQ(a.bodies[i].storey, b.bodies[i].storey);
     EXPECT_TRUE(same(a.bodies[i].mass, b.bodies[i].mass));
     EXPECT_EQ(a.bodies[i].fixed, b.bodies[i].fixed);
+    EXPECT_EQ(a.bodies[i].belongs, b.bodies[i].belongs);
     EXPECT_TRUE(same(a.bodies[i].shapes, b.bodies[i].shapes)) << i;
   }
   ASSERT_EQ(a.zones.size(), b.zones.size());
@@ -332,6 +333,7 @@ TEST_F(Hdf5, RefusesContradictions) {
   };
   EXPECT_TRUE(refused_after("zones/body_b", H5T_NATIVE_INT, std::vector{0, 1, 5}));
   EXPECT_TRUE(refused_after("zones/body_a", H5T_NATIVE_INT, std::vector{0, -2, 1}));
+  EXPECT_TRUE(refused_after("bodies/beside", H5T_NATIVE_UINT8, std::vector<std::uint8_t>{0, 0, 3, 0, 0}));
   EXPECT_TRUE(refused_after("shapes/body", H5T_NATIVE_INT, std::vector{1, 2, 2, 5}));
   EXPECT_TRUE(refused_after("shapes/body", H5T_NATIVE_INT, std::vector{2, 1, 2, 4}));
   EXPECT_TRUE(refused_after("shapes/body", H5T_NATIVE_INT, std::vector{-1, 1, 2, 4}));
@@ -365,6 +367,16 @@ TEST_F(Hdf5, ReadsRecordsWithoutOutputs) {
   H5Fclose(file);
   Record expected = make_sample();
   expected.outputs.clear();
+  expect_same(read_hdf5(path("record.h5")), expected);
+}
+
+TEST_F(Hdf5, ReadsRecordsThatDoNotSayWhatStandsBeside) {
+  write_hdf5(make_sample(), path("record.h5"));
+  const hid_t file = H5Fopen(path("record.h5").c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  H5Ldelete(file, "bodies/beside", H5P_DEFAULT);
+  H5Fclose(file);
+  Record expected = make_sample();
+  for (BodyInfo& body : expected.bodies) body.belongs = Belonging::Unknown;
   expect_same(read_hdf5(path("record.h5")), expected);
 }
 

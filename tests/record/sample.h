@@ -33,6 +33,7 @@ inline Record make_sample() {
     body.storey = b - 1;
     body.mass = 1000.0 / (b + 3);
     body.fixed = b == 4;
+    if (b == 2) body.belongs = Belonging::Beside;
     for (int k = 0; k < b % 3; ++k)  // none, one or two
       body.shapes.push_back({{{0.1 * b, -0.0, 1.0 / 3}, exp_rotation({0.1 * k, 0.2, 0.3})},
                              {0.2, 0.3 + b, 1.5 + k},
