@@ -633,6 +633,9 @@ void add_rigid_block(const Context& c) {
                 "a rigid block in its place ({:.0f} t on {} plastic hinges of {:.2f} MNm in all, its mass centre "
                 "{:.2f} m ahead of them)",
                 tons, row.size(), moment, block.ahead);
+  const std::string hinge_words = row.size() == 1
+                                      ? "Its hinge does not give before it yields, unlike a zone of the model."
+                                      : "Its hinges do not give before they yield, unlike zones of the model.";
   // a block that has already left its place is not released from rest
   bool rests = true;
   for (const BlockFrame& f : c.recorder.block_frames())
@@ -645,7 +648,9 @@ void add_rigid_block(const Context& c) {
     return;
   }
   if (block.mass * block.gravity * block.ahead <= block.plastic_moment) {
-    c.add("rigid_block", "Mechanism", "Beside a rigid block", "By comparison, " + model_words + " would not tilt.",
+    c.add("rigid_block", "Mechanism", "Beside a rigid block",
+          "By comparison, " + model_words + " would stay at rest: its weight alone does not turn it. " + hinge_words +
+              " What is let go at once on a hinge that gives first may turn over all the same.",
           kNone, "rad");
   } else if (when <= c.r.time.back() + 1e-9) {
     const double here = interpolate(c.r.time, c.r.series.front().value, when),
@@ -655,7 +660,8 @@ void add_rigid_block(const Context& c) {
                       here / unit::deg, model_words, there / unit::deg) +
               (is_shaft ? " Unlike the model, that block does not bend, yield or break above its mouth."
                         : " Unlike the model, that block has no yielding storeys, no swaying ground storey and no "
-                          "columns that shorten."),
+                          "columns that shorten.") +
+              " " + hinge_words,
           here - there, "rad");
   }
   c.r.series.insert(c.r.series.begin() + 1, std::move(series));

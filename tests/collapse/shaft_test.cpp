@@ -507,7 +507,23 @@ TEST(ShaftPhysics, TheRigidBlockHasTheMassAboveItsMouth) {
   EXPECT_NE(top.find(std::to_string(std::lround(10 * t)) + " t on a plastic hinge"), std::string::npos) << top;
   const std::string falls = text_of(
       run_plan(read(tower(slender, mouth("4 m", "240 deg"), "1.3 s")), default_knowledge(), {}, {}), "rigid_block");
-  EXPECT_THAT(falls, testing::HasSubstr("that block does not bend, yield or break above its mouth."));
+  EXPECT_THAT(falls,
+              testing::HasSubstr("that block does not bend, yield or break above its mouth. Its hinge does not give"));
+  // 120 deg stay: the weight alone does not turn it, and let go at once it turns over
+  std::string low_mouth = mouth("1.5 m", "240 deg");
+  low_mouth.replace(low_mouth.find("2.5 m"), 5, "1.5 m");
+  const record::Record both =
+      run_plan(read(tower("height = \"30 m\"\ndiameter = \"3 m\"\nthickness = \"30 cm\"\nas_outer = \"40 cm2/m\"\n"
+                          "as_inner = \"40 cm2/m\"\n",
+                          low_mouth, "1.3 s")),
+               default_knowledge(), {}, {});
+  std::string told;
+  for (const record::Finding& f : both.findings) told += f.text + "\n";
+  EXPECT_THAT(told, testing::HasSubstr("a rigid block that is let go at once on such a hinge does."));
+  EXPECT_THAT(text_of(both, "rigid_block"),
+              testing::HasSubstr("would stay at rest: its weight alone does not turn it."));
+  EXPECT_THAT(text_of(both, "rigid_block"),
+              testing::HasSubstr("on a hinge that gives first may turn over all the same."));
 }
 
 /// Charges of a tower at a level, in the order given: azimuth and opening [deg], and what else they have.
