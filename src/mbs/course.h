@@ -37,6 +37,9 @@ struct CourseState {
   double quiet_since = 0;           // of the frames, see Options::pass_speed [s]
   double plastic_then = 0;          // dissipated until then [J]
   bool is_quiet = false;
+  double doubted = 0;                // residual of a frame, the least that steps since have read [J]
+  int readings = 0;                  // of steps that are still to come, before it counts
+  double last_residual = 0;          // of the last frame [J]
   std::vector<double> sampled = {};  // next instants of the samplings, in units of their intervals
   double seconds = 0;                // of the clock, that the run took before [s]
 };
@@ -56,6 +59,10 @@ class Course {
 
  private:
   void show();
+  /// Takes the residual of a frame for an error of the balance, or doubts it.
+  void judge(const Energy&);
+  /// What is left of a doubted residual.
+  void read_again();
   double calc_seconds() const;  // of the clock, so far [s]
   bool is_at_rest();
   /// The end has been reached: its frame, and whether the balance of energy can be believed at all. Returns false.

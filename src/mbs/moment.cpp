@@ -13,8 +13,8 @@ void pass_summary(Io& io, S& s) {
 
 template <class Io, class C>
 void pass_course(Io& io, C& c) {
-  io(c.frame), io(c.shown), io(c.softened), io(c.quiet_since), io(c.plastic_then), io(c.is_quiet), io(c.sampled),
-      io(c.seconds);
+  io(c.frame), io(c.shown), io(c.softened), io(c.quiet_since), io(c.plastic_then), io(c.is_quiet), io(c.doubted),
+      io(c.readings), io(c.last_residual), io(c.sampled), io(c.seconds);
 }
 
 template <class Io, class M>

@@ -217,6 +217,61 @@ TEST(Course, TellsALostBalanceWithoutGravity) {
   EXPECT_THAT(lost.message, testing::HasSubstr("balance of energy"));
 }
 
+/// A heavy box that lands flat at 8 m/s.
+Model make_landing() {
+  Model m;
+  m.contact.restitution = 0.2;
+  Body b = make_box("b", 20e3, {2, 2, 0.3}, {0, 0, 1.1});
+  b.v_WB = {0, 0, -7};
+  add_body(m, b);
+  return m;
+}
+
+Options watch_each_step(double& largest, double& released) {
+  Options o;
+  o.duration = 0.5, o.equilibrium = false, o.frame_interval = 1e-9;
+  o.on_frame = [&](const View& v) {
+    largest = std::max(largest, std::abs(v.energy.residual));
+    released = std::max(released, v.energy.released);
+  };
+  return o;
+}
+
+TEST(Course, WhatTheNextStepPaysIsNoLostEnergy) {
+  double largest = 0, released = 0;
+  const Summary each = run(make_landing(), watch_each_step(largest, released));
+  Options rare = watch_each_step(largest, released);
+  rare.frame_interval = 0.1;
+  const double single = largest;
+  const Summary few = run(make_landing(), rare);
+  EXPECT_GT(single, 0.01 * released) << "or frames show nothing that is not there";
+  EXPECT_LT(each.energy_error, 2e-3);
+  EXPECT_NEAR(each.energy_error, few.energy_error, 1e-3) << "it hangs on the rate of frames";
+}
+
+TEST(Course, EnergyGainedInAnImpactStays) {
+  for (const double when : {0.07, 0.2}) {  // as it lands, and as it lands again
+    double largest = 0, released = 0;
+    const Options o = watch_each_step(largest, released);
+    const Model m = make_landing();
+    System s(m, o);
+    Course course(s);
+    ASSERT_TRUE(course.begin());
+    constexpr double gained = 2e4;  // [J]
+    double stored = 0;
+    for (bool has_gained = false, goes_on = true; goes_on; goes_on = course.follow()) {
+      s.advance_step();
+      if (has_gained || s.state.time < when || !(s.calc_view().energy.contact > 0)) continue;
+      s.state.removed += gained;
+      stored = s.calc_view().energy.contact;
+      has_gained = true;
+    }
+    EXPECT_GT(stored, 0) << when;
+    const double reference = std::max(s.state.released, s.state.total_at_start);
+    EXPECT_GT(course.finish().energy_error * reference, 0.98 * gained) << when;
+  }
+}
+
 TEST(Course, NotesAnElementThatIsTurnedOver) {
   Model m = make_hanging();
   m.events.clear();
