@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <set>
 
 #include "base/error.h"
@@ -74,14 +75,60 @@ void Builder::make_stub(const product::Charge& c, const MemberZones& z, mbs::Eve
   map.stubs.push_back(std::move(stub));
 }
 
+namespace {
+
+/// What charges destroy of columns in more than one place, as findings say it; empty: nothing.
+std::string tell_pieces_between_gaps(const product::Plan& plan) {
+  std::map<int, std::vector<const product::Charge*>> charges;  // by column
+  for (const product::Stage& s : plan.stages)
+    for (const product::Charge& c : s.charges)
+      if (!c.fails && plan.members[static_cast<size_t>(c.member)].kind == MemberKind::Column)
+        charges[c.member].push_back(&c);
+  std::vector<std::string> columns;
+  double falls = 0, gaps_alone = 0;  // of the first [m]
+  for (auto& [index, list] : charges) {
+    std::sort(list.begin(), list.end(),
+              [](const product::Charge* a, const product::Charge* b) { return a->position < b->position; });
+    const double low = list.front()->position - 0.5 * list.front()->destroyed_length;
+    double top = low, gaps = 0;
+    bool has_piece = false;
+    for (const product::Charge* charge : list) {
+      const double from = std::max(top, charge->position - 0.5 * charge->destroyed_length), to = upper_end(*charge);
+      has_piece |= from - top > kSliver;
+      gaps += std::max(0.0, to - from);
+      top = std::max(top, to);
+    }
+    if (!has_piece) continue;
+    if (columns.empty()) falls = top - low, gaps_alone = gaps;
+    columns.push_back(plan.members[static_cast<size_t>(index)].name);
+  }
+  if (columns.empty()) return {};
+  return fmt::format(
+      "Columns with two gaps, the piece between which is not modelled but leaves with the debris of a charge: {} (the "
+      "first is {}). What stands on {} falls by both gaps and the piece, {:.2f} m; the gaps alone have {:.2f} m.",
+      columns.size(), columns.front(), columns.front(), falls, gaps_alone);
+}
+
+/// "stage 1 "Rear": 5 charges, 1 fails".
+std::string tell_stage(const product::Stage& stage, size_t number) {
+  const size_t charges = stage.charges.size();
+  const auto failing = std::count_if(stage.charges.begin(), stage.charges.end(), [](const auto& c) { return c.fails; });
+  std::string text =
+      fmt::format("stage {} \"{}\": {} {}", number, stage.name, charges, charges == 1 ? "charge" : "charges");
+  if (failing > 0) text += fmt::format(", {} {}", failing, failing == 1 ? "fails" : "fail");
+  return text;
+}
+
+}  // namespace
+
 void Builder::add_events(std::vector<Firing> schedule) {
+  constexpr const char* between_gaps = "Piece between two gaps";
   map.schedule = std::move(schedule);
   map.remarks.clear();
-  for (size_t s = 0; s < plan.stages.size(); ++s) {
-    const size_t charges = plan.stages[s].charges.size();
-    map.stages.push_back(fmt::format("stage {} \"{}\": {} {}", s + 1, plan.stages[s].name, charges,
-                                     charges == 1 ? "charge" : "charges"));
-  }
+  // events may be added anew
+  std::erase_if(map.notes, [](const ModelNote& note) { return note.title == between_gaps; });
+  if (const std::string text = tell_pieces_between_gaps(plan); !text.empty()) map.notes.push_back({between_gaps, text});
+  for (size_t s = 0; s < plan.stages.size(); ++s) map.stages.push_back(tell_stage(plan.stages[s], s + 1));
   std::vector<Assembly> current = assemblies;  // as they are after the events so far
   std::vector<Vec3> centre;                    // their centres of mass at the start, in W
   for (const mbs::Body& b : model.bodies) centre.push_back(b.X_WB.p);

@@ -533,6 +533,41 @@ TEST(Run, ChargesThatFailAreNotCountedAsFired) {
   EXPECT_THAT(finding(r, "events").text, testing::EndsWith(" 1 charge fails, as the plan says."));
 }
 
+TEST(Run, StagesSayHowManyOfTheirChargesFail) {
+  const auto stage_of = [](const std::string& stage) {
+    for (const record::Event& e : run_plan(read(house(stage, "0.05 s")), default_knowledge(), {}, {}).events)
+      if (e.kind == "stage") return e.text;
+    return std::string();
+  };
+  const auto more = [](const std::string& members, const std::string& fails) {
+    return "[[stage.charge]]\nmembers = \"" + members +
+           "\"\nposition = \"1 m\"\ndestroyed_length = \"1 m\"\nfails = " + fails + "\n";
+  };
+  EXPECT_EQ(stage_of(charge("C-A1-0") + more("C-A2-0", "false")), "stage 1 \"Stage at 0 s\": 2 charges");
+  EXPECT_EQ(stage_of(charge("C-A1-0") + more("C-A2-0", "true")), "stage 1 \"Stage at 0 s\": 2 charges, 1 fails");
+  EXPECT_EQ(stage_of(charge("C-A1-0") + more("C-B*-0", "true")), "stage 1 \"Stage at 0 s\": 4 charges, 3 fail");
+}
+
+TEST(Run, TellsOfAPieceBetweenTwoGaps) {
+  const auto note = [](const std::string& second, const std::string& more = "") {
+    const std::string stage =
+        "[[stage]]\ntime = \"0 s\"\n[[stage.charge]]\nmembers = \"C-A2-0\"\nposition = \"0.6 m\"\n"
+        "destroyed_length = \"0.4 m\"\n[[stage.charge]]\nmembers = \"C-A2-0\"\nposition = \"" +
+        second + "\"\ndestroyed_length = \"0.4 m\"\n" + more;
+    for (const record::Finding& f : run_plan(read(house(stage, "0.05 s")), default_knowledge(), {}, {}).findings)
+      if (f.title == "Piece between two gaps") {
+        EXPECT_EQ(f.status, record::Status::Warning);
+        return f.text;
+      }
+    return std::string();
+  };
+  EXPECT_THAT(note("2 m"),
+              testing::EndsWith("1 (the first is C-A2-0). What stands on C-A2-0 falls by both gaps and the "
+                                "piece, 1.80 m; the gaps alone have 0.80 m."));
+  EXPECT_EQ(note("1 m"), "") << "one gap";
+  EXPECT_EQ(note("2 m", "fails = true\n"), "");
+}
+
 TEST(Run, NoRigidBlockStandsBesideChargesAboveTheGroundStorey) {
   const auto has_block = [](const std::string& members) {
     const record::Record r = run_plan(read(house(charge(members), "0.05 s")), default_knowledge(), {}, {});
