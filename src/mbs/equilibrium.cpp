@@ -1027,13 +1027,13 @@ bool System::find_equilibrium(std::string& message) {
   DeadLoad load(*this);
   if (!load.is_needed()) return true;
   const auto report = std::exchange(options.on_happening, nullptr);
-  const auto keep_lengths = [this](bool held) {
-    for (CompiledElement& e : elements) e.zone.keeps_length = held;
-    for (CompiledRotational& r : rotationals) r.zone.keeps_length = held;
+  const auto put_at_rest = [this](bool held) {
+    for (CompiledElement& e : elements) e.zone.is_at_rest = held;
+    for (CompiledRotational& r : rotationals) r.zone.is_at_rest = held;
   };
-  keep_lengths(true);
+  put_at_rest(true);
   const bool is_found = load.find(message) && !find_overload(message);
-  keep_lengths(false);
+  put_at_rest(false);
   options.on_happening = report;
   ignores_limits = false;
   if (!is_found) return false;

@@ -20,6 +20,7 @@ using kernel::Plane;
 using kernel::SpringCracks;
 
 constexpr double kTiny = 1e-300;
+constexpr double kRoundOff = 4e-16;
 
 /// Rotations and moments of the stations of one bending plane, and the resultants at the marker.
 ///   sign  +1 about y (shear along z), -1 about z (shear along y)
@@ -452,13 +453,12 @@ struct Evaluation {
   }
 
   /// Limit moments under this normal force of the whole section.
-  void find_limits(const Limits (&limits)[2], double axial, double integrity) {
-    for (int s = 0; s < n; ++s)
-      for (int q = first; q <= last; ++q) {
-        most[q][s] = limits[s].moment(q, axial, z.station[s]);
-        most[q][s].positive *= integrity;
-        most[q][s].negative *= integrity;
-      }
+  void find_limits(const Limits& limits, int s, double axial, double integrity, StationState& station) {
+    for (int q = first; q <= last; ++q) {
+      most[q][s] = limits.moment(q, axial, station);
+      most[q][s].positive *= integrity;
+      most[q][s].negative *= integrity;
+    }
   }
 
   /// Cracks grow where a station comes to a larger moment than they are known from (zones.md, eq. 7b).
@@ -539,8 +539,71 @@ struct Evaluation {
     return turns[q][s] - z.station[s].bow[q] - z.station[s].crack[q] * moments[q][s];
   }
 
+  /// Turns a station alone from where it was before until its moments stand on the limits of the rotation that it comes
+  /// to, the first one that does on the way.
+  void turn_onto_law(const Limits& limits, int s, double axial, double integrity) {
+    StationState ahead = z.station[s];
+    for (int q = first; q <= last; ++q) phi[q][s] = phi_trial[q][s];
+    turned[s] = false;
+    measure(s);
+    double start[2] = {0, 0}, scale[2];
+    for (int q = first; q <= last; ++q) start[q] = m[q][s];
+    // rotation that the station comes to under the limits of another one
+    const auto turn_under = [&](double rotation) {
+      for (int q = first; q <= last; ++q) phi[q][s] = phi_trial[q][s], m[q][s] = start[q];
+      turned[s] = false;
+      ahead.strained = rotation;
+      find_limits(limits, s, axial, integrity, ahead);
+      if (!is_outside(limits, s, scale)) return z.station[s].strained;
+      (void)turn(s, scale);
+      return std::max(z.station[s].strained, strain_of(phi, m, s, limits.law().rotation_ratio));
+    };
+    double low = ahead.strained, over = turn_under(low) - low;
+    if (!turned[s]) return;
+    double high = low, under = over;
+    while (under > 0) {  // limits are straight from row to row
+      low = high, over = under;
+      high = limits.next_row(low);
+      if (high == kUnlimited) {  // and stay as they are
+        (void)turn_under(low + over);
+        return;
+      }
+      under = turn_under(high) - high;
+    }
+    // the turn is straight in the rotation but about skew axes: secants, and halves where those leave one end where it
+    // is
+    constexpr int most_cuts = 100;
+    for (int cut = 0; cut < most_cuts && under < 0; ++cut) {
+      const double way = cut % 4 == 3 ? 0.5 : over / (over - under), at = low + way * (high - low);
+      if (!(at > low && at < high)) return;
+      const double left = turn_under(at) - at;
+      if (std::abs(left) <= kRoundOff * at) return;
+      if (left > 0)
+        low = at, over = left;
+      else
+        high = at, under = left;
+    }
+  }
+
+  /// All stations by turns until each stands on its law as the other one is.
+  void turn_onto_laws(const Limits (&limits)[2], double axial, double integrity) {
+    constexpr int most_sweeps = 200;
+    constexpr double still = 1e-13;  // share of a rotation
+    for (int sweep = 0; sweep < most_sweeps; ++sweep) {
+      bool changed = false;
+      for (int s = 0; s < n; ++s) {
+        double before[2] = {0, 0};
+        for (int q = first; q <= last; ++q) before[q] = phi[q][s];
+        turn_onto_law(limits[s], s, axial, integrity);
+        for (int q = first; q <= last; ++q)
+          changed = changed || std::abs(phi[q][s] - before[q]) > still * std::abs(phi[q][s]);
+      }
+      if (n == 1 || !changed) break;
+    }
+  }
+
   /// Bending at the stations: radial return on (|My|/Ly)^p + (|Mz|/Lz)^p = 1.
-  void turn_stations(const Limits (&limits)[2], bool is_at_rest) {
+  void turn_stations(const Limits (&limits)[2], double axial, double integrity) {
     for (int s = 0; s < n; ++s)
       for (int q = first; q <= last; ++q) phi_trial[q][s] = phi[q][s];
     double scale[2][2];  // [s][q]
@@ -549,6 +612,10 @@ struct Evaluation {
       measure(s);
       for (int q = first; q <= last; ++q) m_trial[q][s] = m[q][s];
       outside[s] = is_outside(limits[s], s, scale[s]);
+    }
+    if (p.is_at_rest) {
+      if (outside[0] || outside[1]) turn_onto_laws(limits, axial, integrity);
+      return;
     }
     if (n == 1) {
       if (outside[0]) (void)turn(0, scale[0]);
@@ -563,19 +630,14 @@ struct Evaluation {
       }
     }
     if (!outside[0] || !outside[1] || turn_both(scale)) return;
-    // in turns; at rest, where a whole deformation comes at once, each anew, so that it gives back what the other one
-    // has made needless
-    const int most_sweeps = is_at_rest ? 60 : 12;
-    const double still = is_at_rest ? 1e-9 : 1e-11;  // share of a rotation
+    // in turns
+    constexpr int most_sweeps = 12;
+    constexpr double still = 1e-11;  // share of a rotation
     for (int sweep = 0; sweep < most_sweeps; ++sweep) {
       bool changed = false;
       for (int s = 0; s < 2; ++s) {
         double before[2] = {0, 0};
-        for (int q = first; q <= last; ++q) {
-          before[q] = phi[q][s];
-          if (is_at_rest) phi[q][s] = phi_trial[q][s];
-        }
-        turned[s] = turned[s] && !is_at_rest;
+        for (int q = first; q <= last; ++q) before[q] = phi[q][s];
         measure(s);
         if (is_outside(limits[s], s, scale[s])) (void)turn(s, scale[s]);
         for (int q = first; q <= last; ++q)
@@ -631,7 +693,7 @@ struct Evaluation {
   /// What turns further lengthens or shortens. Returns by how much; stations then turn to the limit under the force
   /// that is left.
   double lengthen(const Limits (&limits)[2], double axial) {
-    if (p.keeps_length) {
+    if (p.is_at_rest) {
       for (int s = 0; s < n && (turned[0] || turned[1]); ++s) measure(s);
       return 0;
     }
@@ -830,8 +892,8 @@ struct Evaluation {
     const Limits limits[2] = {first_limits, n > 1 ? Limits(laws, p.law[1], z, time) : first_limits};
     // what is left of the section carries both the force and the moment
     const double axial = integrity > 0 ? force[0] / integrity : 0;
-    find_limits(limits, axial, integrity);
-    turn_stations(limits, h == 0);
+    for (int s = 0; s < n; ++s) find_limits(limits[s], s, axial, integrity, z.station[s]);
+    turn_stations(limits, axial, integrity);
     const double elongation = lengthen(limits, axial);
     for (int s = 0; s < n; ++s) {
       StationState& st = z.station[s];

@@ -92,11 +92,11 @@ struct ZoneParameters {
   double x[2] = {0, 0};
   int law[2] = {-1, -1};
   bool external_axial =
-      false;                  // the deformation's first component is the normal force itself; it follows no limit here
-  bool keeps_length = false;  // turning does not lengthen it: at rest
-  double crush_through = 0;   // as of a ZoneElement [m]
-  double relief = 0;          // of an external force: what it loses by a unit of the zone's elongation [N/m]
-  Cracking cracking[2];       // about y, z
+      false;                 // the deformation's first component is the normal force itself; it follows no limit here
+  bool is_at_rest = false;   // dead load: turning does not lengthen it, and its stations come to stand on their laws
+  double crush_through = 0;  // as of a ZoneElement [m]
+  double relief = 0;         // of an external force: what it loses by a unit of the zone's elongation [N/m]
+  Cracking cracking[2];      // about y, z
 
   /// Of a whole member: two stations.
   Span span() const { return stations == 2 ? Span{std::min(x[0], x[1]), std::max(x[0], x[1])} : Span{}; }

@@ -62,6 +62,16 @@ class Limits {
     if (share_ > 0) b = calc_moment_slope(to_.get().moment[axis], normal_force, s.strained, 0, 0);
     return {mix(a.positive, b.positive), mix(a.negative, b.negative)};
   }
+  /// The next rotation of a row of the limit moments, in those about y; unlimited behind the last one [rad].
+  double next_row(double rotation) const {
+    double next = kUnlimited;
+    for (const CompiledLaw* l : {&from_.get(), &to_.get()})
+      for (const CompiledFamily& family : l->moment) {
+        const auto row = std::upper_bound(family.rotation.begin(), family.rotation.end(), rotation);
+        if (row != family.rotation.end()) next = std::min(next, *row);
+      }
+    return next;
+  }
   bool elongates() const { return from_.get().elongates || to_.get().elongates; }
   Lift lift(int axis, double normal_force, double rotation, StationState& s) const {
     Lift a, b;
