@@ -204,8 +204,19 @@ std::string tell_heads(const Context& c, bool is_across) {
   const std::string text = fmt::format(" Heads of ground columns turn about {} here; about {} ", is_about_y ? "y" : "x",
                                        is_about_y ? "x" : "y");
   if (c.across->zones.empty()) return text + "there is no equilibrium under dead load.";
-  const double used = (is_across ? c.recorder.zone_frames() : c.across->zones)[0].utilisation;
-  return text + (used > 0 ? fmt::format("the margin is {:.2f}.", 1 / used) : "no zone is loaded.");
+  const ZoneFrame& other = (is_across ? c.recorder.zone_frames() : c.across->zones)[0];
+  if (!(other.utilisation > 0)) return text + "no zone is loaded.";
+  const std::string yielded = count_words(other.yielded, "", "zone has yielded", "zones have yielded");
+  return text + fmt::format("the margin is {:.2f}", 1 / other.utilisation) +
+         (yielded.empty() ? "" : ", and " + yielded) + ".";
+}
+
+/// Whether a state is nearer to its resistance than another: zones that have yielded stand on it.
+bool is_nearer(const ZoneFrame& a, const ZoneFrame& b) {
+  if ((a.yielded > 0) != (b.yielded > 0)) return a.yielded > 0;
+  constexpr double round_off = 1e-6;  // of zones that stand on their limits
+  if (a.yielded > 0 && std::abs(a.utilisation - b.utilisation) <= round_off) return a.yielded > b.yielded;
+  return a.utilisation > b.utilisation;
 }
 
 /// Whether the building stood until each next stage, as far as frames tell.
@@ -223,8 +234,7 @@ Standing add_stability(const Context& c) {
   const auto describe = [&](const std::string& id, const std::string& title, size_t i, bool settled, double begin) {
     // before the first charge the smaller margin of both axes about which heads of ground columns may turn
     const HeadsAcross* across = settled ? nullptr : c.across;
-    const bool is_across =
-        across != nullptr && !across->zones.empty() && across->zones[0].utilisation > zones[i].utilisation;
+    const bool is_across = across != nullptr && !across->zones.empty() && is_nearer(across->zones[0], zones[i]);
     const record::Record& r = is_across ? across->record : c.r;
     const ZoneFrame& z = is_across ? across->zones[0] : zones[i];
     const auto margins = find_margins(r, is_across ? 0 : i);

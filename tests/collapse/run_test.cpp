@@ -173,6 +173,38 @@ TEST(RunPhysics, TheMarginAtTheStartIsTheSmallerOfBothAxesOfTheHeads) {
   EXPECT_THAT(along.text, testing::HasSubstr("Heads of ground columns turn about y here; about x the margin is"));
 }
 
+TEST(RunPhysics, ZonesThatYieldUnderDeadLoadHaveNoMarginLeft) {
+  // heads that turn about one axis yield at another load than those that turn about the other one
+  double margin = 10;
+  for (const int load : {2, 3, 4, 6, 8}) {
+    const auto start = [load](const std::string& azimuth) {
+      return run_plan(
+          read(materials() +
+               grid("A = \"0 m\", B = \"9 m\"", "1 = \"0 m\", 2 = \"4 m\"", 1, std::to_string(load) + " kN/m2") +
+               "[[columns]]\nsection = \"column\"\n[[beams]]\nsection = \"beam\"\n[[slabs]]\npanel = "
+               "\"floor\"\n[criteria]\nazimuth = \"" +
+               azimuth + "\"\nazimuth_tolerance = \"20 deg\"\n" + analysis("0.05 s")),
+          default_knowledge(), {}, {});
+    };
+    long most = 0;
+    for (const char* azimuth : {"180 deg", "90 deg"}) {
+      const record::Record r = start(azimuth);
+      const record::Finding f = finding(r, "stability.start");
+      const auto yielded = std::count(r.zone_state.begin(), r.zone_state.begin() + static_cast<long>(r.zones.size()),
+                                      static_cast<std::uint8_t>(record::ZoneState::Yielded));
+      most = std::max<long>(most, yielded);
+      const bool none = f.text.find("; no zone has yielded.") != std::string::npos;
+      EXPECT_TRUE(!none || yielded == 0) << load << " " << azimuth << ": " << f.text;
+      EXPECT_EQ(none, load < 4) << f.text;
+      EXPECT_EQ(f.status, none ? record::Status::Good : record::Status::Warning) << f.text;
+      if (!none) { EXPECT_NEAR(f.value, 1, 1e-6) << f.text; }
+      EXPECT_LE(f.value, margin + 1e-6) << load << " " << azimuth;
+      margin = f.value;
+    }
+    EXPECT_EQ(most > 0, load >= 4) << load;
+  }
+}
+
 TEST(RunPhysics, BeamsThatTwistDoNotMakeMasonryYield) {
   // slabs lie on one side of the gable beams; what masonry between them bears is no part of the building's margin
   const auto start = [](const std::string& walls) {

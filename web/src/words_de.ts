@@ -75,6 +75,8 @@ export const german: readonly (readonly [string, string])[] = [
   ["It does not stand", "Es steht nicht"],
   ["Lowest margins: {l} of {} members.", "Kleinste Reserven: {} (von {} Bauteilen)."],
   ["Heads of ground columns turn about {} here; about {} the margin is {:.2f}.", "Köpfe der Erdgeschossstützen drehen sich hier um {}; um {} ist die Reserve {}."],
+  ["Heads of ground columns turn about {} here; about {} the margin is {:.2f}, and {} zone has yielded.", "Köpfe der Erdgeschossstützen drehen sich hier um {}; um {} ist die Reserve {}, und {} Zone fließt."],
+  ["Heads of ground columns turn about {} here; about {} the margin is {:.2f}, and {} zones have yielded.", "Köpfe der Erdgeschossstützen drehen sich hier um {}; um {} ist die Reserve {}, und {} Zonen fließen."],
   ["About the other axis of the columns' heads it was not computed: cancelled.", "Um die andere Achse der Stützenköpfe wurde nicht gerechnet: abgebrochen."],
   ["Heads of ground columns turn about {} here; about {} no zone is loaded.", "Köpfe der Erdgeschossstützen drehen sich hier um {}; um {} ist keine Zone belastet."],
   ["Heads of ground columns turn about {} here; about {} there is no equilibrium under dead load.", "Köpfe der Erdgeschossstützen drehen sich hier um {}; um {} gibt es unter Eigengewicht kein Gleichgewicht."],
