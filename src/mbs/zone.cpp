@@ -300,6 +300,37 @@ bool find_return(double m, const MomentLimit& most, double& scale) {
   return true;
 }
 
+/// Goes to the first place from `low` on where nothing is left over; the last call of `over` is there.
+///   over(x)      how far beyond x what flows comes under the limits at x; falls through 0, nearly straight between
+///   rows next_row(x)  of the limits, unlimited behind the last one
+template <class Over, class NextRow>
+void find_on_law(double low, const Over& over, const NextRow& next_row) {
+  double above = over(low);
+  if (!(above > 0)) return;
+  double high = low, below = above;
+  while (below > 0) {
+    low = high, above = below;
+    high = std::max(next_row(low), std::nextafter(low, kUnlimited));
+    if (high == kUnlimited) {  // limits stay as they are
+      (void)over(low + above);
+      return;
+    }
+    below = over(high);
+  }
+  // secants, and halves where those leave one end where it is
+  constexpr int most_cuts = 100;
+  for (int cut = 0; cut < most_cuts && below < 0; ++cut) {
+    const double way = cut % 4 == 3 ? 0.5 : above / (above - below), at = low + way * (high - low);
+    if (!(at > low && at < high)) return;
+    const double left = over(at);
+    if (std::abs(left) <= kRoundOff * at) return;
+    if (left > 0)
+      low = at, above = left;
+    else
+      high = at, below = left;
+  }
+}
+
 /// One evaluation of a zone by its full law, in space or what is left of it in a plane. Numbers of a bending plane q: 0
 /// bends about y with shear along z, 1 bends about z with shear along y; of a station s.
 template <Plane In>
@@ -394,11 +425,19 @@ struct Evaluation {
     } else if (force[0] < 0) {
       double limit = limits.compression(strained, z.shortened, integrity, z.station[0]);
       if (-force[0] > limit) {
+        double shortening = (-force[0] - limit) / k[0];
+        const auto shorten_under = [&](double by) {
+          integrity = limits.integrity(z.shortened + by);
+          limit = limits.compression(strained, z.shortened + by, integrity, z.station[0]);
+          shortening = std::max(0.0, (-force[0] - limit) / k[0]);
+          return shortening - by;
+        };
         // the curve falls while the zone shortens: one more look at it after the first estimate
-        const double guess = (-force[0] - limit) / k[0];
-        integrity = limits.integrity(z.shortened + guess);
-        limit = limits.compression(strained, z.shortened + guess, integrity, z.station[0]);
-        const double shortening = std::max(0.0, (-force[0] - limit) / k[0]);
+        if (!p.is_at_rest)
+          (void)shorten_under(shortening);
+        else
+          find_on_law(0, shorten_under,
+                      [&](double by) { return limits.next_shortening(z.shortened + by) - z.shortened; });
         z.axial -= shortening;
         z.shortened += shortening;
         z.crushed = shortening;
@@ -419,9 +458,17 @@ struct Evaluation {
       const bool is_far = std::max(z.station[0].reached, z.station[1].reached) >= limits.law().rupture_rotation;
       double limit = is_far ? 0 : limits.tension(z.elongated, z.shortened);
       if (force[0] > limit) {
-        const double guess = (force[0] - limit) / k[0];
-        if (!is_far) limit = limits.tension(z.elongated + guess, z.shortened);
-        const double elongation = (force[0] - limit) / k[0];
+        double elongation = (force[0] - limit) / k[0];
+        const auto elongate_under = [&](double by) {
+          if (!is_far) limit = limits.tension(z.elongated + by, z.shortened);
+          elongation = (force[0] - limit) / k[0];
+          return elongation - by;
+        };
+        if (!p.is_at_rest)
+          (void)elongate_under(elongation);
+        else
+          find_on_law(0, elongate_under,
+                      [&](double by) { return limits.next_elongation(z.elongated + by) - z.elongated; });
         z.axial += elongation;
         z.elongated += elongation;
         force[0] = limit;
@@ -558,31 +605,9 @@ struct Evaluation {
       (void)turn(s, scale);
       return std::max(z.station[s].strained, strain_of(phi, m, s, limits.law().rotation_ratio));
     };
-    double low = ahead.strained, over = turn_under(low) - low;
-    if (!turned[s]) return;
-    double high = low, under = over;
-    while (under > 0) {  // limits are straight from row to row
-      low = high, over = under;
-      high = limits.next_row(low);
-      if (high == kUnlimited) {  // and stay as they are
-        (void)turn_under(low + over);
-        return;
-      }
-      under = turn_under(high) - high;
-    }
-    // the turn is straight in the rotation but about skew axes: secants, and halves where those leave one end where it
-    // is
-    constexpr int most_cuts = 100;
-    for (int cut = 0; cut < most_cuts && under < 0; ++cut) {
-      const double way = cut % 4 == 3 ? 0.5 : over / (over - under), at = low + way * (high - low);
-      if (!(at > low && at < high)) return;
-      const double left = turn_under(at) - at;
-      if (std::abs(left) <= kRoundOff * at) return;
-      if (left > 0)
-        low = at, over = left;
-      else
-        high = at, under = left;
-    }
+    find_on_law(
+        ahead.strained, [&](double rotation) { return turn_under(rotation) - rotation; },
+        [&](double rotation) { return limits.next_row(rotation); });
   }
 
   /// All stations by turns until each stands on its law as the other one is.
@@ -806,23 +831,34 @@ struct Evaluation {
   }
 
   void slip(const Limits& limits) {
-    const double compression = -force[0];
-    double over2 = 0;  // square of the demand over the limits
-    for (int a = 1 - last; a <= 1 - first; ++a) {
-      const double limit = limits.shear(a, z.slipped, compression);
-      const double ratio = limit > 0 ? std::abs(force[1 + a]) / limit : (force[1 + a] != 0 ? kUnlimited : 0);
-      over2 += ratio * ratio;
-    }
-    if (const double r = std::sqrt(over2); r > 1) {
-      const double scale = std::isinf(r) ? 0 : 1 / r;
-      double way2 = 0;
+    const double compression = -force[0], trial[2] = {force[1], force[2]};
+    double by[2] = {0, 0}, way = 0;
+    bool is_beyond = false;
+    const auto slip_under = [&](double further) {
+      double over2 = 0, way2 = 0;  // square of the demand over the limits
       for (int a = 1 - last; a <= 1 - first; ++a) {
-        const double by = k[1 + a] > 0 ? force[1 + a] * (1 - scale) / k[1 + a] : 0;
-        z.slip[a] += by;
-        way2 += by * by;
-        force[1 + a] *= scale;
+        const double limit = limits.shear(a, z.slipped + further, compression);
+        const double ratio = limit > 0 ? std::abs(trial[a]) / limit : (trial[a] != 0 ? kUnlimited : 0);
+        over2 += ratio * ratio;
       }
-      z.slipped += std::sqrt(way2);
+      const double r = std::sqrt(over2);
+      is_beyond = r > 1;
+      const double scale = !is_beyond ? 1 : std::isinf(r) ? 0 : 1 / r;
+      for (int a = 1 - last; a <= 1 - first; ++a) {
+        by[a] = k[1 + a] > 0 ? trial[a] * (1 - scale) / k[1 + a] : 0;
+        way2 += by[a] * by[a];
+        force[1 + a] = trial[a] * scale;
+      }
+      way = std::sqrt(way2);
+      return way - further;
+    };
+    if (!p.is_at_rest)
+      (void)slip_under(0);
+    else
+      find_on_law(0, slip_under, [&](double further) { return limits.next_slip(z.slipped + further) - z.slipped; });
+    if (is_beyond) {
+      for (int a = 1 - last; a <= 1 - first; ++a) z.slip[a] += by[a];
+      z.slipped += way;
       flowed = true;
       for (int q = first; q <= last; ++q)
         for (int s = 0; s < n; ++s)

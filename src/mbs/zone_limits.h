@@ -64,14 +64,12 @@ class Limits {
   }
   /// The next rotation of a row of the limit moments, in those about y; unlimited behind the last one [rad].
   double next_row(double rotation) const {
-    double next = kUnlimited;
-    for (const CompiledLaw* l : {&from_.get(), &to_.get()})
-      for (const CompiledFamily& family : l->moment) {
-        const auto row = std::upper_bound(family.rotation.begin(), family.rotation.end(), rotation);
-        if (row != family.rotation.end()) next = std::min(next, *row);
-      }
-    return next;
+    return std::min(next_of(law().moment[0].rotation, rotation), next_of(law().moment[1].rotation, rotation));
   }
+  /// The next points of the curves, and where the softening by slip ends [m].
+  double next_shortening(double shortened) const { return next_of(law().compression.x, shortened); }
+  double next_elongation(double elongated) const { return next_of(law().tension.x, elongated); }
+  double next_slip(double slipped) const { return slipped < law().slip_softening ? law().slip_softening : kUnlimited; }
   bool elongates() const { return from_.get().elongates || to_.get().elongates; }
   Lift lift(int axis, double normal_force, double rotation, StationState& s) const {
     Lift a, b;
@@ -94,6 +92,11 @@ class Limits {
   }
 
  private:
+  /// The first beyond x of what rises, unlimited if there is none.
+  static double next_of(const std::vector<double>& rising, double x) {
+    const auto next = std::upper_bound(rising.begin(), rising.end(), x);
+    return next == rising.end() ? kUnlimited : *next;
+  }
   double mix(double a, double b) const { return share_ <= 0 ? a : share_ >= 1 ? b : (1 - share_) * a + share_ * b; }
   template <class F>
   double blend(F&& f) const {

@@ -143,6 +143,46 @@ TEST(YieldAtRest, DoesNotCreepOnceTheRunBegins) {
   }
 }
 
+/// What is pushed by 150 kN along an axis on a zone of 1 GN/m and a spring of 10 MN/m beside it [N].
+ZoneState find_pushed(const ZoneLaw& law, const Vec3& axis, double& used) {
+  Model m = make_turned(law, {});
+  m.loads[0].force = 150e3 * axis;
+  m.elements[1].translational_stiffness = {1e7, 1e7, 1e7};
+  System s(m, {}, 0);
+  std::string message;
+  EXPECT_TRUE(s.find_equilibrium(message)) << message;
+  used = calc_utilisation(s.elements[0].zone, s.laws, 0, s.state.element[0]);
+  return s.state.element[0];
+}
+
+TEST(YieldAtRest, SlipsUntilWhatIsLeftOfTheShearHolds) {
+  // V = 100 kN (1 - s/20 mm), and 10 MN/m (s + V/1 GN/m) beside it: 150 = 1.01 V + 10 s
+  ZoneLaw law;
+  law.shear_y = law.shear_z = 100e3;
+  law.slip_softening = 0.02, law.slip_rupture = 0.1;
+  double used = 0;
+  const ZoneState z = find_pushed(law, {0, 0.6, 0.8}, used);
+  const double slip = (150e3 - 1.01 * 100e3) / (1e7 - 1.01 * 5e6);
+  EXPECT_NEAR(z.slipped, slip, 1e-7 * slip);
+  EXPECT_NEAR(std::hypot(z.elastic_force[1], z.elastic_force[2]), 100e3 - 5e6 * slip, 1);
+  EXPECT_NEAR(used, 1, 1e-9);
+}
+
+TEST(YieldAtRest, IsCrushedAndTornToWhereItsCurvesAre) {
+  // C rises from 100 to 110 kN over 1 mm and falls to 50 kN over 20 mm more; the same pulled
+  for (const bool is_pushed : {true, false}) {
+    ZoneLaw law;
+    (is_pushed ? law.compression : law.tension) = {{0, 1e-3, 21e-3}, {100e3, 110e3, 50e3}};
+    double used = 0;
+    const ZoneState z = find_pushed(law, {is_pushed ? -1.0 : 1.0, 0, 0}, used);
+    const double gone = (150e3 - 1.01 * 113e3) / (1e7 - 1.01 * 3e6);
+    ASSERT_GT(gone, 1e-3);
+    EXPECT_NEAR(is_pushed ? z.shortened : z.elongated, gone, 1e-7 * gone);
+    EXPECT_NEAR(std::abs(z.elastic_force[0]), 113e3 - 3e6 * gone, 1);
+    EXPECT_NEAR(used, 1, 1e-9);
+  }
+}
+
 /// Two rigid halves of a beam of 10 m between held ends, a hinge at each end and one at its middle; weight at the
 /// middle.
 Model make_beam(double weight) {
