@@ -20,7 +20,7 @@ using kernel::Plane;
 using kernel::SpringCracks;
 
 constexpr double kTiny = 1e-300;
-constexpr double kRoundOff = 4e-16;
+constexpr double kFound = 1e-14;  // share of a way that may be left over
 
 /// Rotations and moments of the stations of one bending plane, and the resultants at the marker.
 ///   sign  +1 about y (shear along z), -1 about z (shear along y)
@@ -323,7 +323,7 @@ void find_on_law(double low, const Over& over, const NextRow& next_row) {
     const double way = cut % 4 == 3 ? 0.5 : above / (above - below), at = low + way * (high - low);
     if (!(at > low && at < high)) return;
     const double left = over(at);
-    if (std::abs(left) <= kRoundOff * at) return;
+    if (std::abs(left) <= kFound * at) return;
     if (left > 0)
       low = at, above = left;
     else
@@ -588,38 +588,52 @@ struct Evaluation {
 
   /// Turns a station alone from where it was before until its moments stand on the limits of the rotation that it comes
   /// to, the first one that does on the way.
-  void turn_onto_law(const Limits& limits, int s, double axial, double integrity) {
+  ///   peak  not less than limits at any rotation [q][s]
+  void turn_onto_law(const Limits& limits, int s, double axial, double integrity, const MomentLimit (&peak)[2][2]) {
     StationState ahead = z.station[s];
     for (int q = first; q <= last; ++q) phi[q][s] = phi_trial[q][s];
     turned[s] = false;
     measure(s);
     double start[2] = {0, 0}, scale[2];
     for (int q = first; q <= last; ++q) start[q] = m[q][s];
-    // rotation that the station comes to under the limits of another one
-    const auto turn_under = [&](double rotation) {
+    // rotation that the station comes to under the limits that are set
+    const auto turn_to_limits = [&] {
       for (int q = first; q <= last; ++q) phi[q][s] = phi_trial[q][s], m[q][s] = start[q];
       turned[s] = false;
-      ahead.strained = rotation;
-      find_limits(limits, s, axial, integrity, ahead);
       if (!is_outside(limits, s, scale)) return z.station[s].strained;
       (void)turn(s, scale);
       return std::max(z.station[s].strained, strain_of(phi, m, s, limits.law().rotation_ratio));
     };
-    find_on_law(
-        ahead.strained, [&](double rotation) { return turn_under(rotation) - rotation; },
-        [&](double rotation) { return limits.next_row(rotation); });
+    double begin = z.station[s].strained;
+    if (z.station[s].reached == 0) {  // it turns at least as far as there
+      for (int q = first; q <= last; ++q) most[q][s] = peak[q][s];
+      begin = turn_to_limits();
+    }
+    const auto turn_under = [&](double rotation) {
+      ahead.strained = rotation;
+      find_limits(limits, s, axial, integrity, ahead);
+      return turn_to_limits() - rotation;
+    };
+    find_on_law(begin, turn_under, [&](double rotation) { return limits.next_row(rotation); });
   }
 
   /// All stations by turns until each stands on its law as the other one is.
   void turn_onto_laws(const Limits (&limits)[2], double axial, double integrity) {
-    constexpr int most_sweeps = 200;
+    constexpr int most_sweeps = 60;
     constexpr double still = 1e-13;  // share of a rotation
+    MomentLimit peak[2][2];          // not less than limits at any rotation [q][s]
+    for (int s = 0; s < n; ++s)
+      for (int q = first; q <= last; ++q) {
+        peak[q][s] = limits[s].find_peak(q, axial, z.station[s]);
+        peak[q][s].positive *= integrity;
+        peak[q][s].negative *= integrity;
+      }
     for (int sweep = 0; sweep < most_sweeps; ++sweep) {
       bool changed = false;
       for (int s = 0; s < n; ++s) {
         double before[2] = {0, 0};
         for (int q = first; q <= last; ++q) before[q] = phi[q][s];
-        turn_onto_law(limits[s], s, axial, integrity);
+        turn_onto_law(limits[s], s, axial, integrity, peak);
         for (int q = first; q <= last; ++q)
           changed = changed || std::abs(phi[q][s] - before[q]) > still * std::abs(phi[q][s]);
       }

@@ -62,6 +62,19 @@ class Limits {
     if (share_ > 0) b = calc_moment_slope(to_.get().moment[axis], normal_force, s.strained, 0, 0);
     return {mix(a.positive, b.positive), mix(a.negative, b.negative)};
   }
+  /// Not less than the limits at any rotation: the largest ones under the forces of the table beside this one.
+  MomentLimit find_peak(int axis, double normal_force, const StationState& s) const {
+    const CompiledFamily& family = law().moment[axis];
+    if (family.K == 0) return {kUnlimited, kUnlimited};
+    const size_t k = static_cast<size_t>(find_interval(family.force, normal_force, s.k[axis]));
+    MomentLimit peak{0, 0};
+    for (size_t j = 0; j < family.rotation.size(); ++j)
+      for (const size_t beside : {k, k + 1}) {
+        const FamilyPoint& point = *family.at(beside, j);
+        peak = {std::max(peak.positive, point.positive), std::max(peak.negative, point.negative)};
+      }
+    return peak;
+  }
   /// The next rotation of a row of the limit moments, in those about y; unlimited behind the last one [rad].
   double next_row(double rotation) const {
     return std::min(next_of(law().moment[0].rotation, rotation), next_of(law().moment[1].rotation, rotation));
