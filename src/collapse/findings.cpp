@@ -320,6 +320,32 @@ Standing add_stability(const Context& c) {
   return out;
 }
 
+/// Rings of shafts without bars that lie farther from where the shaft stood than it was high.
+void add_rolling_rings(const Context& c) {
+  const size_t last = c.r.time.size() - 1;
+  for (const product::Member& m : c.plan.members) {
+    if (m.kind != product::MemberKind::Shaft || m.removed) continue;
+    const product::Shaft& s = c.plan.shafts[static_cast<size_t>(m.shaft)];
+    if (s.as_outer > 0 || s.as_inner > 0) continue;
+    const double height = m.end.z - m.start.z;
+    int count = 0;
+    for (size_t b = 0; b < c.r.bodies.size(); ++b) {
+      const float* at = &c.r.position[3 * (last * c.r.bodies.size() + b)];
+      if (c.r.bodies[b].name.starts_with(m.name + "/") &&
+          std::hypot(at[0] - m.start.x, at[1] - m.start.y) > height + s.diameter_foot)
+        ++count;
+    }
+    if (count == 0) continue;
+    std::string text = fmt::format("Rings of {} that lie farther from where it stood than it was high ({:.1f} m): {}.",
+                                   m.name, height, count);
+    text +=
+        " A shaft without bars comes apart as it falls, and its rings are rigid: they roll and tumble on where real "
+        "ones shatter.";
+    text += " How far hangs on the last digits: look what shorter steps make of it.";
+    c.add("debris.rings." + m.name, "Fall and debris", "Rings that roll", text, count, "", Status::Warning);
+  }
+}
+
 Reach add_debris(const Context& c, const Mechanism& m) {
   const size_t last = c.r.time.size() - 1;
   Reach reach = calc_reach(c.r, last);
@@ -356,6 +382,7 @@ Reach add_debris(const Context& c, const Mechanism& m) {
     text += fmt::format(" The outline of the nearest {:.0f} % of the mass encloses {:.0f} m2.", 100 * share,
                         calc_area(calc_share_outline(c.r, last, share)));
   c.add("debris.reach", "Fall and debris", "Reach of the debris", text, reach.largest, "m");
+  add_rolling_rings(c);
   const Heap heap = find_heap(c.r, last);
   double solid = 0;  // what is crushed included
   for (size_t b = 0; b < c.map.bodies.size(); ++b)

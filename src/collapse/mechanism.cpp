@@ -198,6 +198,9 @@ Mechanism judge_mechanism(const MechanismInput& in, const Knowledge& k) {
     out.name = "topple";
     out.text = fmt::format("It topples: {}.", motion);
   }
+  if (at.connected < k.mechanism_coherent_share && (drops || out.name == "topple" || out.name == "wrong direction"))
+    out.text += fmt::format(" These numbers are of its largest connected part, {:.0f} % of the upper mass.",
+                            100 * at.connected);
   if (turns_about_foot && (out.name == "topple" || out.name == "wrong direction"))
     out.text += fmt::format(
         " At its foot the rear edge has come down {:.0f} % as far as the front edge: it turns about its foot.",

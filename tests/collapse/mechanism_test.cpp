@@ -50,6 +50,16 @@ TEST(Mechanism, ComingDownWithoutTurningIsVertical) {
   EXPECT_TRUE(std::isnan(m.azimuth));
 }
 
+TEST(Mechanism, TellsHowMuchTheNumbersOfABrokenBlockAreOf) {
+  MechanismInput in = synthetic(0.2, 0, 1);
+  EXPECT_THAT(judge_mechanism(in, default_knowledge()).text,
+              testing::Not(testing::HasSubstr("largest connected part")));
+  for (BlockFrame& f : in.frames) f.connected = 0.3, f.moved = 1;
+  const Mechanism m = judge_mechanism(in, default_knowledge());
+  EXPECT_EQ(m.name, "topple");
+  EXPECT_THAT(m.text, testing::HasSubstr("These numbers are of its largest connected part, 30 % of the upper mass."));
+}
+
 TEST(Mechanism, AToleranceOfZeroIsOne) {
   MechanismInput in = synthetic(0.2, 0, 1);
   in.is_direction_planned = true;

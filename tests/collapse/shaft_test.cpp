@@ -643,5 +643,26 @@ TEST(ShaftPhysics, AShaftThatTurnsOverAMouthAtItsFootTopples) {
     if (f.id == "mechanism") { EXPECT_EQ(f.title, "Mechanism: topple") << f.text; }
 }
 
+TEST(ShaftPhysics, RingsWithoutBarsThatRollOnAreWarnedOf) {
+  const auto stack = [](const std::string& duration) {
+    return "[[shafts]]\nname = \"tower\"\nheight = \"20 m\"\ndiameter = \"2 m\"\ndiameter_top = \"1.6 m\"\n"
+           "thickness = \"25 cm\"\nthickness_top = \"20 cm\"\ndensity = \"1800 kg/m3\"\nstrength = \"8 N/mm2\"\n"
+           "modulus = \"5 GPa\"\n" +
+           mouth("1 m", "220 deg") + analysis(duration);
+  };
+  const auto told = [&](const std::string& duration) {
+    const record::Record r = run_plan(read(stack(duration)), default_knowledge(), {}, {});
+    const auto f = std::find_if(r.findings.begin(), r.findings.end(),
+                                [](const record::Finding& x) { return x.id == "debris.rings.tower"; });
+    return f == r.findings.end() ? record::Finding{} : *f;
+  };
+  EXPECT_EQ(told("1 s").text, "");
+  const record::Finding f = told("15 s");
+  EXPECT_EQ(f.status, record::Status::Warning);
+  EXPECT_THAT(f.text,
+              testing::StartsWith("Rings of tower that lie farther from where it stood than it was high (20.0 m): "));
+  EXPECT_GE(f.value, 1);
+}
+
 }  // namespace
 }  // namespace topple::collapse
