@@ -28,6 +28,7 @@ namespace {
 constexpr double kOverestimate = 1.01;  // of the highest frequency: the iteration stops a little below
 constexpr double kHeld = 1e6;           // inertia of what joints hold, over that of the heaviest body
 constexpr double kContactAngle = 0.18;  // of a contact's swing in a step, at most [rad]
+constexpr double kTouchingSafety = 0.9;  // of the limit of stability that what touches asks for
 
 using Sparse = Eigen::SparseMatrix<double>;
 using Triplets = std::vector<Eigen::Triplet<double>>;
@@ -487,11 +488,12 @@ void System::review_step() {
     constexpr double too_far = 4;  // 16 times the error of most_turn
     if (options.step <= 0 && options.most_turn > 0 && step * find_fastest_spin() > too_far * options.most_turn)
       set_step(calc_own_step());
-    // many shapes of two bodies that touch at once are stiffer together than the four corners of calc_step_limit
+    // many shapes that touch at once are stiffer together than the four corners of calc_step_limit; a step that changes
+    // in the midst of an impact changes its energy, so only where stability asks for it
     if (options.step > 0 || state.touching.steps != 1) return;
     const double touching = find_touching_frequency(state);
-    if (step * touching > 2 * options.step_safety)
-      set_step(2 * options.step_safety / std::hypot(find_highest_frequency(), touching));
+    if (step * touching > 2 * kTouchingSafety)
+      set_step(2 * kTouchingSafety / std::hypot(find_highest_frequency(), touching));
     return;
   }
   due.erase(std::remove_if(due.begin(), due.end(), [&](double t) { return t <= state.time; }), due.end());
