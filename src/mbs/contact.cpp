@@ -116,6 +116,7 @@ void System::find_contacts(double h) {
       contact.sticks.push_back({read3(at, kernel::kPlace, W), read3(at, kernel::kSpringSlip, W)});
     }
   }
+  begin_holding();
   contact.place.assign(B, -1);
   t.body.assign(1, static_cast<int>(B));
   contact.groups.assign(1, 0);
@@ -124,7 +125,9 @@ void System::find_contacts(double h) {
   body_contacts = 0;
   if (model.contact.ground) find_ground_points(h);
   if (model.contact.bodies) find_pair_points(h);
+  hold_contacts();
   fill_contact_blocks();
+  fill_held_blocks();
 }
 
 Earnings System::calc_earnings(const ContactGroup& g, double h) const {
@@ -210,7 +213,7 @@ void System::add_contact_group(size_t a, size_t b, const Vec3& n, size_t first, 
   g.hands_on = b != B;
   if (b != B) g.apart = s.p[a] - s.p[b];
   g.law = law;
-  g.stiffness = stiffness;
+  g.stiffness = g.stick = stiffness;
 }
 
 void System::fill_contact_blocks() {
@@ -259,7 +262,7 @@ void System::fill_contact_blocks() {
                             law.zeta,
                             law.damping,
                             law.friction,
-                            kernel::kStickStiffness * law.mean * g.stiffness};
+                            kernel::kStickStiffness * law.mean * g.stick};
     static_assert(std::size(known) == kernel::kStick + 1);
     double* earnings = t.groups.data() + (block * kernel::kGroupFields + kernel::kEarned) * W + place;
     earnings[0] = g.earnings.stored, earnings[W] = g.earnings.spent;
@@ -325,9 +328,11 @@ void System::resolve_contacts(double h, bool follows) {
     job.points = t.points.data();
     job.h = h;
     job.follows = follows;
+    if (!t.held_block.empty()) job.held = t.held_block.data(), job.held_fields = t.held_fields.data();
     const auto push = [&] {
       kernel::sum_wrenches(job);
       kernel::update_touched(bodies);
+      if (!t.jointed_pairs.empty()) hold_changes(h);
     };
     kernel::read_touched(bodies);
     kernel::press_contacts(job);
@@ -337,6 +342,7 @@ void System::resolve_contacts(double h, bool follows) {
     kernel::rub_contacts(job);
     push();
     kernel::book_contacts(job);
+    if (!t.held.empty()) keep_pushes();
 
     // forces do their work over the half steps before and after
     for (size_t slot = 0; slot < job.count; ++slot) {

@@ -123,10 +123,12 @@ struct Earnings {
 struct ContactGroup {
   int a = 0, b = 0;  // into the touched bodies
   int first = 0, count = 0;
-  Vec3 n;                 // from a to b
-  Vec3 apart;             // from b's mass centre to a's, 0 on the ground [m]
-  int law = 0;            // into System::contact_laws
-  double stiffness = 0;   // k of one corner of a box [N/m]
+  Vec3 n;                                 // from a to b
+  Vec3 apart;                             // from b's mass centre to a's, 0 on the ground [m]
+  int law = 0;                            // into System::contact_laws
+  double stiffness = 0;                   // k of one corner of a box [N/m]
+  double stick = 0;                       // the same for the friction spring [N/m]
+  double mobility_a = 0, mobility_b = 0;  // of bodies that joints hold, along n, 0: of others [1/kg]
   bool hands_on = false;  // its energy goes over to the points that are found next; corners on the ground stay what
                           // they are, unless they are those of a member that can be crushed
   Earnings earnings;
@@ -166,6 +168,27 @@ struct PairLook {
   size_t slot = 0;  // two boxes: in the kernel's blocks
 };
 
+/// A body with joints that touches something, or did in the step before.
+struct JointedBody {
+  int body = 0;
+  int place = -1;   // among the touched bodies
+  Vec3 push, turn;  // of contact on it in the last step [N, N·m]
+};
+
+/// What joints take of the motion that forces on one body, or on another one of its cluster, would give it.
+struct JointedPair {
+  int to = 0, from = 0;  // into Touching::held
+  double coupling = 1;   // how much one of them feels the other, 0 to 1
+  double less[36] = {};  // v, w over force, torque, row by row
+};
+
+/// What joints leave of the mobility of a body; scratch of a look.
+struct JointedMobility {
+  int body = 0, cluster = 0;
+  std::vector<double> rows, answers;  // six columns: J M⁻¹ of unit forces and torques, and (J M⁻¹ Jᵀ)⁺ of these
+  double less[36] = {}, left[36] = {};  // taken from the body's own, and what it has then
+};
+
 /// What touches, as the last look found it. T touched bodies; the first stands for the ground and all fixed ones.
 struct Touching {
   int steps = 0;          // since then
@@ -175,6 +198,11 @@ struct Touching {
   std::vector<std::uint32_t> rows, a, b;
   AlignedVector<double> groups, points;
   AlignedVector<double> share;  // groups of each body, filled up to blocks (T)
+  // of bodies that joints hold
+  std::vector<JointedBody> held;
+  std::vector<JointedPair> jointed_pairs;
+  std::vector<int> held_block;        // of each block, into held_fields; -1: none. Empty: nowhere any
+  AlignedVector<double> held_fields;  // kernel::kHeldFields a block
 };
 
 /// Scratch of contacts.
@@ -195,6 +223,11 @@ struct ContactScratch {
   std::vector<std::uint32_t> box_a, box_b;  // which of them, in the kernel's blocks of pairs of boxes
   AlignedVector<double> box_answers;
   PairSearch search;
+  std::vector<JointedMobility> mobility;
+  std::vector<int> mobility_of, held_at;  // of each body, -1: none (B)
+  std::vector<unsigned char> is_read;     // clusters, in this look
+  std::vector<int> first_of_cluster, next_of_cluster;
+  std::vector<JointedBody> held_before;
 };
 
 }  // namespace topple::mbs

@@ -167,14 +167,39 @@ HWY_INLINE void write_wrench(const ContactJob& job, size_t block, const V3<D>& a
   write_rows<D, 2 * kWrenchRow>(row, job.wrenches + block * W * 2 * kWrenchRow);
 }
 
+/// What joints take, of a block of groups; null: they hold none of its bodies.
+HWY_INLINE const double* held_of(const ContactJob& job, size_t block, size_t W) {
+  if (HWY_LIKELY(job.held == nullptr || job.held[block] < 0)) return nullptr;
+  return job.held_fields + static_cast<size_t>(job.held[block]) * kHeldFields * W;
+}
+
+/// The motion that joints take from a body under a wrench.
+template <class D>
+HWY_INLINE Motion<D> calc_less(const double* less, const V3<D>& force, const V3<D>& torque) {
+  const M33<D> turn{load3<D>(less, kHeldTurn), load3<D>(less, kHeldTurn + 3), load3<D>(less, kHeldTurn + 6)};
+  return {times<D>(less, 0, force) + turn * torque, transpose_times(turn, force) + times<D>(less, kHeldSpin, torque)};
+}
+/// The power of the wrench on that motion.
+template <class D>
+HWY_INLINE Num<D> calc_less_power(const double* less, const V3<D>& force, const V3<D>& torque) {
+  const Motion<D> m = calc_less<D>(less, force, torque);
+  return dot(force, m.v) + dot(torque, m.w);
+}
+
 /// The force times the speed that it makes, the groups of a body sharing its mass.
 template <class D>
-HWY_INLINE Num<D> calc_mobility(const double* HWY_RESTRICT g, const V3<D>& apart, const V3<D>& force,
-                                const V3<D>& torque) {
+HWY_INLINE Num<D> calc_mobility(const double* HWY_RESTRICT g, const double* held, const V3<D>& apart,
+                                const V3<D>& force, const V3<D>& torque) {
+  const size_t W = hn::Lanes(D());
   const V3<D> torque_b = torque + cross(apart, force);
   const Num<D> f2 = dot(force, force);
-  return fma(load<D>(g, kGroupsA), fma(load<D>(g, kMassA), f2, dot(torque, times<D>(g, kInertiaA, torque))),
-             load<D>(g, kGroupsB) * fma(load<D>(g, kMassB), f2, dot(torque_b, times<D>(g, kInertiaB, torque_b))));
+  Num<D> of_a = fma(load<D>(g, kMassA), f2, dot(torque, times<D>(g, kInertiaA, torque))),
+         of_b = fma(load<D>(g, kMassB), f2, dot(torque_b, times<D>(g, kInertiaB, torque_b)));
+  if (HWY_UNLIKELY(held != nullptr)) {
+    of_a = maximum(of_a - calc_less_power<D>(held, force, torque), num<D>(0));
+    of_b = maximum(of_b - calc_less_power<D>(held + kHeldBody * W, force, torque_b), num<D>(0));
+  }
+  return fma(load<D>(g, kGroupsA), of_a, load<D>(g, kGroupsB) * of_b);
 }
 
 template <class D>
@@ -215,6 +240,7 @@ HWY_INLINE void press_block(const ContactJob& job, size_t block) {
   const Num<D> inverse_mass = load<D>(g, kMassA) + load<D>(g, kMassB), mean = load<D>(g, kMean),
                damping = load<D>(g, kDamping), twice_zeta = num<D>(2) * load<D>(g, kZeta);
   const V3<D> to_b = cross(apart, n);
+  const double* less = held_of(job, block, W);
   const auto plain = hn::Ge(damping.v, hn::Zero(d));
   Num<D> energy = zero, impedance = zero, total = zero, held = zero, stores = zero, holds = zero;
   V3<D> torque = zeros<D>(), held_torque = torque;
@@ -239,7 +265,10 @@ HWY_INLINE void press_block(const ContactJob& job, size_t block) {
     }
     const auto here = hn::And(hn::Gt(k.v, hn::Zero(d)), hn::Gt(depth.v, hn::Zero(d)));
     depth = select(here, depth, zero);
-    const Num<D> w = (inverse_mass + dot(la, times<D>(g, kInertiaA, la))) + dot(lb, times<D>(g, kInertiaB, lb));
+    Num<D> w = (inverse_mass + dot(la, times<D>(g, kInertiaA, la))) + dot(lb, times<D>(g, kInertiaB, lb));
+    if (HWY_UNLIKELY(less != nullptr))
+      w = maximum(w - (calc_less_power<D>(less, n, la) + calc_less_power<D>(less + kHeldBody * W, n, lb)),
+                  num<D>(kLeastMobility) * inverse_mass);
     const Num<D> z = select(here, Num<D>{hn::Sqrt((k / w).v)}, zero);
     impedance = impedance + z;
     Num<D> full = k * depth;
@@ -322,7 +351,8 @@ HWY_INLINE void damp_block(const ContactJob& job, size_t block) {
     sum = sum + f;
     torque = fma(zero - f, la, torque);
   }
-  const Damper<D> damper(h, calc_mobility<D>(g, apart, (zero - sum) * n, torque), power);
+  const Damper<D> damper(num<D>(job.h), calc_mobility<D>(g, held_of(job, block, W), apart, (zero - sum) * n, torque),
+                         power);
   const Num<D> band = zero - load<D>(g, kBand), most = load<D>(g, kMost);
   Num<D> total = zero;
   sum = zero, torque = zeros<D>();
@@ -379,11 +409,19 @@ HWY_NOINLINE Wrench<D> calc_lack(const ContactJob& job, size_t block, const Moti
   const double* g = job.groups + block * kGroupFields * W;
   const V3<D> n = load3<D>(g, kNormal), apart = load3<D>(g, kApart);
   const Num<D> zero = num<D>(0), h = num<D>(job.h), mean = load<D>(g, kMean);
+  const double* held = held_of(job, block, W);
   Wrench<D> lack{zeros<D>(), zeros<D>()};
+  const Num<D> h_a = h, h_b = h;
   for (int turn = 0; turn < kLackTurns; ++turn) {
-    const V3<D> turn_b = times<D>(g, kInertiaB, h * (lack.torque + cross(apart, lack.force)));
-    const V3<D> dv = change.v + (h * (load<D>(g, kMassA) + load<D>(g, kMassB))) * lack.force + cross(turn_b, apart);
-    const V3<D> dw = change.w + (times<D>(g, kInertiaA, h * lack.torque) + turn_b);
+    const V3<D> torque_b = lack.torque + cross(apart, lack.force);
+    V3<D> turn_a = times<D>(g, kInertiaA, h_a * lack.torque), turn_b = times<D>(g, kInertiaB, h_b * torque_b);
+    V3<D> by = fma(h_a, load<D>(g, kMassA), h_b * load<D>(g, kMassB)) * lack.force;
+    if (held != nullptr) {
+      const Motion<D> a = calc_less<D>(held, h_a * lack.force, h_a * lack.torque),
+                      b = calc_less<D>(held + kHeldBody * W, h_b * lack.force, h_b * torque_b);
+      by = by - (a.v + b.v), turn_a = turn_a - a.w, turn_b = turn_b - b.w;
+    }
+    const V3<D> dv = change.v + by + cross(turn_b, apart), dw = change.w + (turn_a + turn_b);
     const Num<D> along = dot(n, dv);
     lack = {zeros<D>(), zeros<D>()};
     for (size_t row = job.rows[block]; row < job.rows[block + 1]; ++row) {
@@ -425,7 +463,7 @@ HWY_INLINE void rub_block(const ContactJob& job, size_t block) {
     force = force + f;
     torque = torque + cross(r, f);
   }
-  const Damper<D> damper(h, calc_mobility<D>(g, apart, force, torque), power);
+  const Damper<D> damper(h, calc_mobility<D>(g, held_of(job, block, W), apart, force, torque), power);
   const Num<D> friction = load<D>(g, kFriction), slowed = damper.share * rate;
   force = zeros<D>(), torque = force;
   for (size_t row = first; row < last; ++row) {

@@ -82,8 +82,14 @@ enum Point : int {
   kSlide = 14,          // speed across the normal (3)
   kPointFields = 17
 };
+/// What joints take of the motion that a wrench on a body gives it, a symmetric matrix of v, w over force, torque, of a
+/// body a and of b: vv as kInertiaA, vw (9), ww.
+inline constexpr int kHeldTurn = 6, kHeldSpin = 15, kHeldBody = 21, kHeldFields = 2 * kHeldBody;
+
 /// How much faster a point that has just been met may have been while it came.
 inline constexpr double kSlowed = 1.5;
+/// What a point keeps at least of its bodies' mobility, whatever joints take.
+inline constexpr double kLeastMobility = 1e-9;
 /// Stiffness of a friction spring over the mean normal stiffness of a corner.
 inline constexpr double kStickStiffness = 1.2;
 // NOLINTEND(readability-identifier-naming)
@@ -133,16 +139,18 @@ void update_touched(const TouchJob&);
 
 struct ContactJob {
   size_t blocks = 0;
-  const std::uint32_t* rows;       // block i has the points in rows[i] to rows[i + 1], W in each
-  size_t count = 0;                // groups; idle lanes are behind them
-  const std::uint32_t *a, *b;      // which of the touched bodies (W a block)
-  const double *bodies, *changes;  // rows of the touched bodies
-  double* sums;                    // the same
-  double* wrenches;                // what a stage adds on a and takes from b, two rows a group
-  double* groups;                  // kGroupFields a block
-  double* points;                  // kPointFields a row
-  double h = 0;
-  bool follows = false;  // the points are those of the step before, moved with the bodies
+  const std::uint32_t* rows;            // block i has the points in rows[i] to rows[i + 1], W in each
+  size_t count = 0;                     // groups; idle lanes are behind them
+  const std::uint32_t *a, *b;           // which of the touched bodies (W a block)
+  const double *bodies, *changes;       // rows of the touched bodies
+  double* sums;                         // the same
+  double* wrenches;                     // what a stage adds on a and takes from b, two rows a group
+  double* groups;                       // kGroupFields a block
+  double* points;                       // kPointFields a row
+  double h = 0;                         // the step that has led to the positions [s]
+  const int* held = nullptr;            // of each block, into held_fields, -1: joints hold none; null: nowhere
+  const double* held_fields = nullptr;  // kHeldFields a block
+  bool follows = false;                 // the points are those of the step before, moved with the bodies
 };
 
 /// Springs: speeds, forces and the wrench of all.

@@ -25,9 +25,9 @@ namespace topple::mbs {
 
 namespace {
 
-constexpr double kOverestimate = 1.01;  // of the highest frequency: the iteration stops a little below
-constexpr double kHeld = 1e6;           // inertia of what joints hold, over that of the heaviest body
-constexpr double kContactAngle = 0.18;  // of a contact's swing in a step, at most [rad]
+constexpr double kOverestimate = 1.01;   // of the highest frequency: the iteration stops a little below
+constexpr double kHeld = 1e6;            // inertia of what joints hold, over that of the heaviest body
+constexpr double kContactAngle = 0.18;   // of a contact's swing in a step, at most [rad]
 constexpr double kTouchingSafety = 0.9;  // of the limit of stability that what touches asks for
 
 using Sparse = Eigen::SparseMatrix<double>;
@@ -166,7 +166,7 @@ double find_touching_frequency(const State& s) {
   const Touching& t = s.touching;
   if (t.group.empty()) return 0;
   const size_t W = kernel::lanes();
-  std::vector<double> stiffness(t.body.size(), 0.0);
+  std::vector<double> stiffness(t.body.size(), 0.0), held(t.body.size(), 0.0);
   for (const ContactGroup& g : t.group) {
     const size_t block = g.slot / W, place = g.slot % W;
     const double mean = t.groups[(block * kernel::kGroupFields + kernel::kMean) * W + place];
@@ -175,12 +175,23 @@ double find_touching_frequency(const State& s) {
       sum += t.points[((t.rows[block] + i) * kernel::kPointFields + kernel::kPointStiffness) * W + place];
     // Gershgorin's bound: a partner that moves counts once more
     const double bound = (g.a == 0 || g.b == 0 ? 1 : 2) * mean * sum;
-    stiffness[static_cast<size_t>(g.a)] += bound;
-    stiffness[static_cast<size_t>(g.b)] += bound;
+    const auto add = [&](int body, double mobility) {
+      if (mobility > 0)
+        held[static_cast<size_t>(body)] += bound * mobility;
+      else
+        stiffness[static_cast<size_t>(body)] += bound;
+    };
+    add(g.a, g.mobility_a), add(g.b, g.mobility_b);
   }
   double most = 0;
   for (size_t i = 1; i < t.body.size(); ++i)  // the first is the ground
     most = std::max(most, stiffness[i] * s.body[static_cast<size_t>(t.body[i])].inverse_mass);
+  // bodies of a mechanism feel each other's points
+  std::vector<double> together(t.held.size(), 0.0);
+  for (const JointedPair& p : t.jointed_pairs)
+    if (const int place = t.held[static_cast<size_t>(p.from)].place; place >= 0)
+      together[static_cast<size_t>(p.to)] += p.coupling * held[static_cast<size_t>(place)];
+  for (const double omega2 : together) most = std::max(most, omega2);
   return std::sqrt(3 * most);  // a flat box rocks with the square root of 3 times what lifts it
 }
 

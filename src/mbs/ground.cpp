@@ -20,7 +20,7 @@ Vec3 corner_of(const Vec3& half, int corner) {
 
 bool System::is_ground_box(size_t b) const {
   const BodyConstants& body = state.body[b];
-  return model.contact.ground && !model.contact.bodies && !fixed[b] && body.shapes == 1 &&
+  return model.contact.ground && !model.contact.bodies && !fixed[b] && jointed[b] < 2 && body.shapes == 1 &&
          state.shapes[static_cast<size_t>(body.first_shape)].kind == Shape::Kind::Box &&
          state.shapes[static_cast<size_t>(body.first_shape)].crushed < 0;
 }
@@ -190,9 +190,13 @@ void System::find_ground_points(double h) {
         s.touched_ground[b] = 1;
         say_landing(b, -dot(n, now.v[b] + cross(now.w[b], contact.point[first].at)));
       }
+      ContactGroup fitted;
+      const bool is_held = fit_points(b, B, -n, first, law, fitted);
       (void)crush_ends(b, i, B, -1, -n, law, first, h);
-      add_contact_group(b, B, -n, first, ground_law[b], stiffness, shape.sticks);
-      if (shape.crushed >= 0) {
+      add_contact_group(b, B, -n, first, ground_law[b], is_held ? fitted.stiffness : stiffness, shape.sticks);
+      if (is_held) keep_mobility(fitted);
+      // its stiffness may be another one than before
+      if (shape.crushed >= 0 || is_held || earned >= 0) {
         ContactGroup& g = s.touching.group.back();
         g.hands_on = true;
         if (earned >= 0) g.earnings = contact.earnings[static_cast<size_t>(earned)];

@@ -195,13 +195,14 @@ void System::build_clusters() {
   for (size_t j = 0; j < joints.size(); ++j)
     if (state.joint[j].live && moving(joints[j].parent) && moving(joints[j].child))
       root[static_cast<size_t>(other_root(root, joints[j].parent))] = other_root(root, joints[j].child);
-  std::vector<int> cluster_of(B, -1);
+  cluster_of.assign(B, -1);
+  std::vector<int> cluster_at(B, -1);  // of each root
   size_t most_rows = 0;
   for (size_t j = 0; j < joints.size(); ++j) {
     if (!state.joint[j].live) continue;
     const int any = moving(joints[j].child) ? joints[j].child : joints[j].parent;
     if (!moving(any)) continue;
-    int& c = cluster_of[static_cast<size_t>(other_root(root, any))];
+    int& c = cluster_at[static_cast<size_t>(other_root(root, any))];
     if (c < 0) {
       c = static_cast<int>(clusters.size());
       clusters.emplace_back();
@@ -211,6 +212,7 @@ void System::build_clusters() {
     for (const int b : {joints[j].parent, joints[j].child})
       if (moving(b) && !in_cluster[static_cast<size_t>(b)]) {
         in_cluster[static_cast<size_t>(b)] = 1;
+        cluster_of[static_cast<size_t>(b)] = c;
         cluster.bodies.push_back(b);
       }
   }
@@ -223,6 +225,11 @@ void System::build_clusters() {
   for (std::vector<double>* x : {&joint_gaps, &joint_rhs, &joint_impulse, &joint_linear, &joint_answer, &joint_change})
     x->resize(most_rows);
   clusters_due = false;
+}
+
+void System::rebuild_clusters() {
+  build_clusters();
+  for (size_t b = 0; b < B; ++b) pack_body(b);
 }
 
 void System::read_cluster(JointCluster& c, double tolerance) {

@@ -174,9 +174,12 @@ void System::find_pair_points(double h) {
         add_contact_point(points.p[i] - p_a, depth, points.weight[i] * stiffness,
                           (due.touching ? 1 : kernel::kSlowed) * passed);
     }
+    ContactGroup fitted;
+    const bool is_held = fit_points(a, b, points.normal, first, law, fitted);
     pair.depth -= crush_ends(a, due.shape_a, b, due.shape_b, points.normal, law, first, h);
     body_contacts += static_cast<int>(contact.point.size() - first);
-    add_contact_group(a, b, points.normal, first, pair.law, stiffness, pair.sticks);
+    add_contact_group(a, b, points.normal, first, pair.law, is_held ? fitted.stiffness : stiffness, pair.sticks);
+    if (is_held) keep_mobility(fitted);
     pair.group = static_cast<int>(s.touching.group.size()) - 1;
     s.touching.group.back().earnings = earnings;
     due.touching = true;

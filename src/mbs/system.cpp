@@ -105,6 +105,15 @@ void System::compile() {
     }
   }
   layout_shapes();
+  jointed.assign(B, 0);
+  for (const Joint& j : model.joints) {
+    const auto moves = [&](BodyId id) { return id != kGround && !fixed[static_cast<size_t>(id.index)]; };
+    for (const BodyId id : {j.parent, j.child})
+      if (moves(id)) {
+        unsigned char& how = jointed[static_cast<size_t>(id.index)];
+        how = moves(j.parent) && moves(j.child) ? 2 : std::max<unsigned char>(how, 1);
+      }
+  }
   count_other_bodies();
   lanes->is_planar = keeps_planes();
 
@@ -599,10 +608,7 @@ void System::drift(size_t b, double h, const Vec3& p0, const Quat& q0, const Mat
 
 void System::prepare_step() {
   review_step();
-  if (clusters_due) {
-    build_clusters();
-    for (size_t b = 0; b < B; ++b) pack_body(b);
-  }
+  if (clusters_due) rebuild_clusters();
   if (joint_sums_due) {
     // bodies that joints have let go
     joint_force.fill({});

@@ -223,6 +223,7 @@ class System {
   std::vector<int> ground_law;           // of each body, into contact_laws (B)
   std::vector<PairRule> pair_rules;      // sorted
   std::vector<unsigned char> fixed;
+  std::vector<unsigned char> jointed;       // 1: the model joins it to what does not move, 2: to a body that does (B)
   std::vector<std::vector<int>> incidence;  // elements of each body: 2 * element + side
 
   bool ignores_limits = false;  // elements stay elastic (equilibrium's first phase)
@@ -245,6 +246,7 @@ class System {
   std::vector<Quat> q_before;
   std::vector<Mat3> R_before, world_inverse_inertia;  // of jointed bodies (B)
   std::vector<unsigned char> in_cluster;              // (B)
+  std::vector<int> cluster_of;                        // of those (B)
   std::vector<JointCluster> clusters;
   bool clusters_due = true;
   std::vector<std::pair<int, int>> joint_notes;  // first joint and situation of those made
@@ -461,12 +463,32 @@ class System {
   /// Makes the points from `first` on a group. Each takes over the friction spring of the nearest one of the step
   /// before.
   void add_contact_group(size_t a, size_t b, const Vec3& n, size_t first, int law, double stiffness, StickRange&);
+  // contact_joints.cpp
+  void begin_holding();
+  /// What joints leave of a body's mobility, into ContactScratch::mobility; -1: none hold it.
+  int find_mobility(size_t body);
+  /// Speed along an axis of a point of a body per force there; the lever is from the centre of mass [1/kg].
+  double calc_mobility_along(size_t body, int mobility, const Vec3& lever, const Vec3& axis) const;
+  /// Stiffness of the points from `first` on by what joints leave of the mobility of the two bodies, and what their
+  /// group shall know of it. False: none hold them.
+  bool fit_points(size_t a, size_t b, const Vec3& n, size_t first, const ContactLaw&, ContactGroup&);
+  /// Hands that on to the last group.
+  void keep_mobility(const ContactGroup& fitted);
+  /// Couples touched bodies that joints hold, once all groups are known.
+  void hold_contacts();
+  void fill_held_blocks();
+  /// Takes from the speeds that forces of contact change what joints take.
+  void hold_changes(double h);
+  void keep_pushes();
   /// Gives every group found a slot of the kernel.
   void fill_contact_blocks();
   /// Steps from one look for touching points to the next.
   int calc_contact_interval() const;
   /// Whether the next evaluation looks for touching points, rather than moving those of the one before.
-  bool is_look_due() const { return state.touching.steps == 0 || state.touching.steps >= contact_interval; }
+  bool is_look_due() const {
+    return state.touching.steps == 0 || state.touching.steps >= contact_interval ||
+           (clusters_due && !state.touching.held.empty());
+  }
   /// Finds the touching points; between looks they move with their bodies.
   void find_contacts(double h);
   /// As a step of h ends; none on the ground, where corners stay what they are.
@@ -481,6 +503,8 @@ class System {
   /// Moves a body from its pose at the beginning of the step to the end of it.
   void drift(size_t body, double h, const Vec3& p0, const Quat& q0, const Mat3& R0);
   void build_clusters();
+  /// With what the kernel reads of bodies in clusters and out of them.
+  void rebuild_clusters();
   /// Reads the joints of a cluster at the present poses: rows, gaps, matrix and its factor; rows below the tolerance
   /// count as dependent.
   void read_cluster(JointCluster&, double tolerance);

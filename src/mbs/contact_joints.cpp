@@ -1,0 +1,331 @@
+/// Bodies in contact that joints hold (docs/theory/contact.md, "Bodies that joints hold"): what joints leave of their
+/// mobility, and how they feel each other's contacts.
+
+#include <algorithm>
+#include <cmath>
+
+#include "mbs/contact_kernel.h"
+#include "mbs/joint_rows.h"
+#include "mbs/system.h"
+
+namespace topple::mbs {
+
+namespace {
+
+// along a line a corner of a free box moves at most so much more easily than its centre: 1 + 3 + 3 of a plate
+constexpr double kCornerOverCentre = 7;
+constexpr double kRidge = 1e-9;  // of the trace, so that what joints hold altogether has a factor
+
+/// Lower factor of a symmetric 6 x 6 matrix, its rotations measured with a length, with a ridge.
+struct Factor {
+  double L[36] = {};
+  double scale[6];
+
+  Factor(const double* A, double length) {
+    double trace = 0;
+    for (int i = 0; i < 6; ++i) {
+      scale[i] = i < 3 ? 1 : length;
+      trace += scale[i] * scale[i] * A[7 * i];
+    }
+    for (int i = 0; i < 6; ++i)
+      for (int j = 0; j <= i; ++j) {
+        double sum = scale[i] * scale[j] * A[6 * i + j] + (i == j ? kRidge * trace : 0);
+        for (int k = 0; k < j; ++k) sum -= L[6 * i + k] * L[6 * j + k];
+        L[6 * i + j] = i == j ? std::sqrt(std::max(sum, kRidge * trace)) : L[7 * j] > 0 ? sum / L[7 * j] : 0;
+      }
+  }
+  /// x = L⁻¹ x
+  void solve(double* x, int stride) const {
+    for (int i = 0; i < 6; ++i) {
+      double sum = x[i * stride];
+      for (int k = 0; k < i; ++k) sum -= L[6 * i + k] * x[k * stride];
+      x[i * stride] = L[7 * i] > 0 ? sum / L[7 * i] : 0;
+    }
+  }
+};
+
+/// Of the norm of L⁻¹ D L⁻ᵀ, which is 1 where two bodies move as one: no less than that, and at most 1.
+double calc_coupling(const Factor& to, const Factor& from, const double* between) {
+  double x[36];
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j) x[6 * i + j] = to.scale[i] * from.scale[j] * between[6 * i + j];
+  for (int j = 0; j < 6; ++j) to.solve(x + j, 6);
+  for (int i = 0; i < 6; ++i) from.solve(x + 6 * i, 1);
+  double sum = 0;
+  for (const double value : x) sum += value * value;
+  return std::min(1.0, std::sqrt(sum));
+}
+
+}  // namespace
+
+void System::begin_holding() {
+  // a joint that has just been released holds nothing in the step to come
+  if (clusters_due && !joints.empty()) rebuild_clusters();
+  contact.mobility.clear();
+  contact.mobility_of.clear();
+}
+
+int System::find_mobility(size_t b) {
+  if (b >= B || !jointed[b] || !in_cluster[b]) return -1;
+  if (contact.mobility_of.empty()) {
+    contact.mobility_of.assign(B, -1);
+    contact.is_read.assign(clusters.size(), 0);
+  }
+  int& at = contact.mobility_of[b];
+  if (at >= 0) return at;
+  at = static_cast<int>(contact.mobility.size());
+  JointedMobility& m = contact.mobility.emplace_back();
+  m.body = static_cast<int>(b), m.cluster = cluster_of[b];
+  JointCluster& c = clusters[static_cast<size_t>(m.cluster)];
+  unsigned char& is_read = contact.is_read[static_cast<size_t>(m.cluster)];
+  if (!is_read) read_cluster(c, kDependent);
+  is_read = 1;
+  const size_t n = static_cast<size_t>(c.matrix.rows());
+  const Mat3 W = calc_world_inverse_inertia(b);
+  const double inverse_mass = state.body[b].inverse_mass;
+  m.rows.assign(6 * n, 0);
+  const size_t k = static_cast<size_t>(std::find(c.bodies.begin(), c.bodies.end(), m.body) - c.bodies.begin());
+  for (int y = c.first_meeting[k]; y < c.first_meeting[k + 1]; ++y) {
+    const JointCluster::Meeting meeting = c.meetings[static_cast<size_t>(y)];
+    const CompiledJoint& j = joints[static_cast<size_t>(c.joints[static_cast<size_t>(meeting.place)])];
+    JointRow rows[6];
+    calc_joint_rows(j, calc_joint_frames(state, j), rows);
+    for (int r = 0; r < j.rows; ++r) {
+      const double length = r < j.lines ? 1 : c.length;
+      const Vec3 line = (meeting.is_child ? inverse_mass : -inverse_mass) * rows[r].line;
+      const Vec3 turn = W * (length * (meeting.is_child ? rows[r].turn_child : rows[r].turn_parent));
+      const size_t row = static_cast<size_t>(c.matrix.first_row(meeting.place) + r);
+      for (size_t i = 0; i < 3; ++i) {
+        m.rows[i * n + row] += line[static_cast<int>(i)];
+        m.rows[(3 + i) * n + row] += turn[static_cast<int>(i)];
+      }
+    }
+  }
+  m.answers = m.rows;
+  for (size_t i = 0; i < 6; ++i) {
+    if (c.dependent > 0) c.matrix.project(&m.answers[i * n]);
+    c.matrix.solve(&m.answers[i * n]);
+  }
+  for (size_t i = 0; i < 6; ++i)
+    for (size_t j = 0; j <= i; ++j) {
+      double sum = 0, other = 0;
+      for (size_t r = 0; r < n; ++r) {
+        sum += m.rows[i * n + r] * m.answers[j * n + r];
+        other += m.rows[j * n + r] * m.answers[i * n + r];
+      }
+      m.less[6 * i + j] = m.less[6 * j + i] = 0.5 * (sum + other);
+    }
+  for (size_t i = 0; i < 6; ++i)
+    for (size_t j = 0; j < 6; ++j) {
+      const double own = i < 3 && j < 3     ? (i == j ? inverse_mass : 0)
+                         : i >= 3 && j >= 3 ? W(static_cast<int>(i) - 3, static_cast<int>(j) - 3)
+                                            : 0;
+      m.left[6 * i + j] = own - m.less[6 * i + j];
+    }
+  return at;
+}
+
+double System::calc_mobility_along(size_t b, int mobility, const Vec3& lever, const Vec3& axis) const {
+  if (b >= B || fixed[b]) return 0;
+  const Vec3 turn = cross(lever, axis);
+  if (mobility < 0) return calc_inverse_mass(static_cast<int>(b), axis, turn);
+  const double e[6] = {axis.x, axis.y, axis.z, turn.x, turn.y, turn.z};
+  const double* D = contact.mobility[static_cast<size_t>(mobility)].left;
+  double sum = 0;
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j) sum += e[i] * D[6 * i + j] * e[j];
+  return std::max(0.0, sum);
+}
+
+bool System::fit_points(size_t a, size_t b, const Vec3& n, size_t first, const ContactLaw& law, ContactGroup& g) {
+  const size_t body[2] = {a, b};
+  const int mobility[2] = {find_mobility(a), find_mobility(b)};
+  if (mobility[0] < 0 && mobility[1] < 0) return false;
+  const auto is_moving = [&](size_t i) { return body[i] < B && !fixed[body[i]]; };
+  const auto along = [&](size_t i, const Vec3& lever, const Vec3& axis) {
+    return is_moving(i) ? calc_mobility_along(body[i], mobility[i], lever, axis) : 0;
+  };
+  double least = 0, normal = 0, across = 0, own[2] = {0, 0};
+  for (size_t i = 0; i < 2; ++i) {
+    if (!is_moving(i)) continue;
+    least += kernel::kLeastMobility * state.body[body[i]].inverse_mass;
+    own[i] = std::max(along(i, {}, n), kernel::kLeastMobility * state.body[body[i]].inverse_mass);
+  }
+  normal = std::max(own[0] + own[1], least);
+  const Vec3 apart = is_moving(1) ? Vec3(state.p[a]) - Vec3(state.p[b]) : Vec3{};
+  for (size_t p = first; p < contact.point.size(); ++p) {
+    const Vec3 lever[2] = {contact.point[p].at, contact.point[p].at + apart};
+    double at_point = 0, all = 0;
+    for (size_t i = 0; i < 2; ++i) {
+      const double here = along(i, lever[i], n);
+      own[i] = std::max(own[i], here / kCornerOverCentre);
+      at_point += here;
+      for (const Vec3& axis : {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}}) all += along(i, lever[i], axis);
+    }
+    normal = std::max(normal, at_point / kCornerOverCentre);
+    across = std::max(across, (all - at_point) / kCornerOverCentre);
+  }
+  g.mobility_a = mobility[0] < 0 ? 0 : own[0], g.mobility_b = mobility[1] < 0 ? 0 : own[1];
+  if (law.stiffness > 0) {
+    g.stiffness = g.stick = law.stiffness;
+    return true;
+  }
+  // in the place of 1/(m_a⁻¹ + m_b⁻¹), by which the points have theirs
+  const double frequency2 = model.contact.contact_frequency * model.contact.contact_frequency;
+  double inverse_mass = 0;
+  for (size_t i = 0; i < 2; ++i)
+    if (is_moving(i)) inverse_mass += state.body[body[i]].inverse_mass;
+  for (size_t p = first; p < contact.point.size(); ++p) contact.point[p].stiffness *= inverse_mass / normal;
+  g.stiffness = frequency2 / normal;
+  g.stick = frequency2 / std::max(normal, across);
+  return true;
+}
+
+void System::keep_mobility(const ContactGroup& fitted) {
+  ContactGroup& g = state.touching.group.back();
+  g.stick = fitted.stick;
+  g.mobility_a = fitted.mobility_a, g.mobility_b = fitted.mobility_b;
+}
+
+void System::hold_contacts() {
+  Touching& t = state.touching;
+  contact.held_before.swap(t.held);
+  t.held.clear();
+  t.jointed_pairs.clear();
+  t.held_block.clear();
+  std::vector<int>& at = contact.held_at;
+  if (at.size() != B) at.assign(B, -1);
+  for (size_t i = 1; i < t.body.size(); ++i) {
+    const size_t b = static_cast<size_t>(t.body[i]);
+    if (!jointed[b]) continue;
+    at[b] = static_cast<int>(t.held.size());
+    t.held.push_back({t.body[i], static_cast<int>(i), {}, {}});
+  }
+  for (const JointedBody& before : contact.held_before) {
+    if (before.place < 0) continue;
+    int& now = at[static_cast<size_t>(before.body)];
+    if (now < 0) {
+      now = static_cast<int>(t.held.size());
+      t.held.push_back({before.body, -1, {}, {}});
+    }
+    JointedBody& h = t.held[static_cast<size_t>(now)];
+    h.push = before.push, h.turn = before.turn;
+  }
+  for (const JointedBody& h : t.held) at[static_cast<size_t>(h.body)] = -1;
+  if (t.held.empty()) return;
+
+  // pairs of those in one cluster
+  contact.first_of_cluster.assign(clusters.size(), -1);
+  contact.next_of_cluster.assign(t.held.size(), -1);
+  std::vector<int> mobility(t.held.size());
+  for (size_t i = t.held.size(); i-- > 0;) {
+    mobility[i] = find_mobility(static_cast<size_t>(t.held[i].body));
+    if (mobility[i] < 0) continue;
+    int& first =
+        contact.first_of_cluster[static_cast<size_t>(contact.mobility[static_cast<size_t>(mobility[i])].cluster)];
+    contact.next_of_cluster[i] = first;
+    first = static_cast<int>(i);
+  }
+  for (const int first : contact.first_of_cluster) {
+    if (first < 0) continue;
+    const auto next = [&](int i) { return contact.next_of_cluster[static_cast<size_t>(i)]; };
+    const auto mobility_of = [&](int i) -> const JointedMobility& {
+      return contact.mobility[static_cast<size_t>(mobility[static_cast<size_t>(i)])];
+    };
+    const auto factor_of = [&](int i) {
+      const size_t b = static_cast<size_t>(t.held[static_cast<size_t>(i)].body);
+      const Mat3& I = state.body[b].inertia;
+      return Factor(mobility_of(i).left,
+                    1 / std::sqrt(0.5 * state.body[b].inverse_mass * (I(0, 0) + I(1, 1) + I(2, 2))));
+    };
+    for (int i = first; i >= 0; i = next(i))
+      for (int j = first; j >= 0; j = next(j)) {
+        JointedPair& p = t.jointed_pairs.emplace_back();
+        p.to = i, p.from = j;
+        const JointedMobility &to = mobility_of(i), &from = mobility_of(j);
+        if (i == j) {
+          std::copy(std::begin(to.less), std::end(to.less), p.less);
+          continue;
+        }
+        const size_t n = to.rows.size() / 6;
+        double between[36];
+        for (size_t x = 0; x < 6; ++x)
+          for (size_t y = 0; y < 6; ++y) {
+            double sum = 0;
+            for (size_t r = 0; r < n; ++r) sum += to.rows[x * n + r] * from.answers[y * n + r];
+            p.less[6 * x + y] = sum;
+            between[6 * x + y] = -sum;
+          }
+        p.coupling = calc_coupling(factor_of(i), factor_of(j), between);
+      }
+  }
+}
+
+void System::fill_held_blocks() {
+  Touching& t = state.touching;
+  // the groups of bodies that feel each other share their mass
+  const auto place_of = [&](int held) { return t.held[static_cast<size_t>(held)].place; };
+  for (const JointedPair& p : t.jointed_pairs)
+    if (p.to != p.from && place_of(p.to) >= 0 && place_of(p.from) >= 0)
+      t.share[static_cast<size_t>(place_of(p.to))] +=
+          p.coupling * contact.groups[static_cast<size_t>(place_of(p.from))];
+  const size_t W = kernel::lanes();
+  size_t blocks = 0;
+  const auto write = [&](const ContactGroup& g, int touched, size_t side) {
+    if (touched == 0) return;
+    const int mobility = find_mobility(static_cast<size_t>(t.body[static_cast<size_t>(touched)]));
+    if (mobility < 0) return;
+    if (t.held_block.empty()) t.held_block.assign(t.rows.size() - 1, -1);
+    int& block = t.held_block[g.slot / W];
+    if (block < 0) {
+      block = static_cast<int>(blocks++);
+      t.held_fields.resize(blocks * kernel::kHeldFields * W);
+      std::fill(t.held_fields.end() - static_cast<std::ptrdiff_t>(kernel::kHeldFields * W), t.held_fields.end(), 0.0);
+    }
+    double* to = t.held_fields.data() +
+                 (static_cast<size_t>(block) * kernel::kHeldFields + side * kernel::kHeldBody) * W + g.slot % W;
+    const double* C = contact.mobility[static_cast<size_t>(mobility)].less;
+    const auto put = [&](int i, int j) { *to = C[6 * i + j], to += W; };
+    for (int i = 0; i < 3; ++i)
+      for (int j = i; j < 3; ++j) put(i, j);
+    for (int i = 0; i < 3; ++i)
+      for (int j = 3; j < 6; ++j) put(i, j);
+    for (int i = 3; i < 6; ++i)
+      for (int j = i; j < 6; ++j) put(i, j);
+  };
+  if (t.jointed_pairs.empty()) return;
+  for (const ContactGroup& g : t.group) write(g, g.a, 0), write(g, g.b, 1);
+}
+
+void System::hold_changes(double h) {
+  // joints' forces are those of the step before, with what they then answered to contact
+  const Touching& t = state.touching;
+  for (const JointedPair& p : t.jointed_pairs) {
+    const int place = t.held[static_cast<size_t>(p.to)].place;
+    if (place < 0) continue;
+    const JointedBody& from = t.held[static_cast<size_t>(p.from)];
+    double more[6] = {from.push.x, from.push.y, from.push.z, from.turn.x, from.turn.y, from.turn.z};
+    if (from.place >= 0) {
+      const double* sum = contact.sums.data() + static_cast<size_t>(from.place) * kernel::kWrenchRow;
+      for (int i = 0; i < 6; ++i) more[i] -= sum[i];
+    }
+    double* change = contact.changes.data() + static_cast<size_t>(place) * kernel::kWrenchRow;
+    for (int i = 0; i < 6; ++i) {
+      double less = 0;
+      for (int j = 0; j < 6; ++j) less += p.less[6 * i + j] * more[j];
+      change[i] += h * less;
+    }
+  }
+}
+
+void System::keep_pushes() {
+  for (JointedBody& h : state.touching.held) {
+    h.push = h.turn = {};
+    if (h.place < 0) continue;
+    const double* sum = contact.sums.data() + static_cast<size_t>(h.place) * kernel::kWrenchRow;
+    h.push = {sum[0], sum[1], sum[2]};
+    h.turn = {sum[3], sum[4], sum[5]};
+  }
+}
+
+}  // namespace topple::mbs
