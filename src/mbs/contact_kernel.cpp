@@ -411,7 +411,8 @@ HWY_NOINLINE Wrench<D> calc_lack(const ContactJob& job, size_t block, const Moti
   const Num<D> zero = num<D>(0), h = num<D>(job.h), mean = load<D>(g, kMean);
   const double* held = held_of(job, block, W);
   Wrench<D> lack{zeros<D>(), zeros<D>()};
-  const Num<D> h_a = h, h_b = h;
+  // as if the other groups of both bodies did alike
+  const Num<D> h_a = h * load<D>(g, kGroupsA), h_b = h * load<D>(g, kGroupsB);
   for (int turn = 0; turn < kLackTurns; ++turn) {
     const V3<D> torque_b = lack.torque + cross(apart, lack.force);
     V3<D> turn_a = times<D>(g, kInertiaA, h_a * lack.torque), turn_b = times<D>(g, kInertiaB, h_b * torque_b);
