@@ -90,6 +90,7 @@ int System::calc_contact_interval() const {
 
 void System::evaluate_contact(double h) {
   add_travel(h);
+  if (options.tells_lost_contact && model.contact.ground && !model.contact.bodies) note_sunk_boxes();
   if (!has_other_contacts()) return;
   Touching& t = state.touching;
   const bool follows = h > 0 && !is_look_due();

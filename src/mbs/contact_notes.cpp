@@ -65,6 +65,49 @@ void System::note_lost_contact(const PairDue& due, double depth, double interval
                                            way, state.time, thickness)));
 }
 
+void System::note_sunk(size_t b, const CompiledShape& shape, double depth) {
+  const double thickness = thickness_of(shape);
+  if (!(depth > kMostSunken * thickness)) return;
+  const std::pair<int, int> pair{kGround.index, static_cast<int>(b)};
+  if (noted_pairs.size() >= kMostNoted || std::find(noted_pairs.begin(), noted_pairs.end(), pair) != noted_pairs.end())
+    return;
+  noted_pairs.push_back(pair);
+  const std::string start = fmt::format("body {}: it has sunk ", name_of(model, b));
+  std::vector<std::string>& notes = summary.notes;
+  if (std::any_of(notes.begin(), notes.end(), [&](const std::string& note) { return note.starts_with(start); })) return;
+  notes.push_back(start +
+                  fmt::format("{:.3g} m into the ground at {:.4g} s, more than half of its {:.3g} m, which contact is "
+                              "not made for; stiffer contact (a pair's \"stiffness\", \"contact_frequency\") holds it",
+                              depth, state.time, thickness));
+}
+
+void System::note_sunk_boxes() {
+  const LaneLayout layout = lanes->body_layout(lane);
+  for (size_t b = 0; b < B; ++b) {
+    if (!is_ground_box(b)) continue;
+    const double pressed = lanes->ground_states[layout.at(b, kernel::kPressed, kernel::kGroundFields)];
+    if (!(pressed > 0)) continue;
+    const auto constant = [&](int f) {
+      return lanes->ground_constants[layout.at(b, static_cast<size_t>(f), kernel::kGroundConstants)];
+    };
+    // no corner is deeper than if it had all of the energy
+    const double k = constant(kernel::kGroundMean) * constant(kernel::kCornerStiffness);
+    const CompiledShape& shape = state.shapes[static_cast<size_t>(state.body[b].first_shape)];
+    if (!(std::sqrt(2 * pressed / k) > kMostSunken * thickness_of(shape))) continue;
+    const Mat3 R = state.R[b];
+    const Vec3 centre = state.p[b] + R * shape.p_BS;
+    const GroundBox box = state.ground_box[b];
+    double deepest = 0;
+    for (int i = 0; i < 8; ++i) {
+      const Vec3 corner{i & 1 ? shape.half.x : -shape.half.x, i & 2 ? shape.half.y : -shape.half.y,
+                        i & 4 ? shape.half.z : -shape.half.z};
+      const double height = dot(model.contact.normal, centre + R * (shape.R_BS * corner)) - model.contact.offset;
+      deepest = std::max(deepest, -height - std::max(0.0, box.born[i]));
+    }
+    note_sunk(b, shape, deepest);
+  }
+}
+
 void System::note_overlaps_at_start() {
   const State& s = state;
   size_t pairs = 0, sunken = 0;

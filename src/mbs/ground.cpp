@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "mbs/contact_kernel.h"
@@ -189,6 +190,12 @@ void System::find_ground_points(double h) {
       if (!shape.is_touching && !s.touched_ground[b]) {
         s.touched_ground[b] = 1;
         say_landing(b, -dot(n, now.v[b] + cross(now.w[b], contact.point[first].at)));
+      }
+      if (options.tells_lost_contact) {
+        double deepest = 0;
+        for (const ContactPoint& point : std::span(contact.point).subspan(first))
+          deepest = std::max(deepest, point.depth);
+        note_sunk(b, shape, deepest);
       }
       ContactGroup fitted;
       const bool is_held = fit_points(b, B, -n, first, law, fitted);

@@ -541,6 +541,10 @@ class System {
   ///   depth     of the deepest point, or minus the gap [m]
   ///   interval  time between looks [s]
   void note_lost_contact(const PairDue&, double depth, double interval);
+  /// The same of a body that has sunk into the ground.
+  void note_sunk(size_t body, const CompiledShape&, double depth);
+  /// Of boxes that the kernel has on the ground.
+  void note_sunk_boxes();
   /// Of bodies that overlap, and of such that reach below the ground, where contact begins.
   void note_overlaps_at_start();
   /// Of the shape at its thinnest, infinite for a plane [m].
