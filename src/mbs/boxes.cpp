@@ -52,7 +52,7 @@ void sphere_box(const Solid& sphere, const Solid& box, bool flipped, BoxContact&
   }
   const Vec3 n_W = box.R * n;
   out.normal = flipped ? -n_W : n_W;
-  out.p[0] = box.p + box.R * nearest;
+  out.p[0] = sphere.p + sphere.radius * n_W;
   out.depth[0] = depth;
   out.weight[0] = 1;
   out.count = 1;

@@ -23,8 +23,10 @@ struct Solid {
 struct BoxContact {
   static constexpr int kMostPoints = 32;
   int count = 0;
-  Vec3 normal;                // unit, from the first to the second
-  Vec3 p[kMostPoints];        // in W, halfway between the surfaces [m]
+  Vec3 normal;  // unit, from the first to the second
+  // in W: halfway between the surfaces of two boxes, polyhedra or spheres, else on the surface of the sphere, or of
+  // what lies on a plane [m]
+  Vec3 p[kMostPoints];
   double depth[kMostPoints];  // > 0 [m]
   /// Share of each point in the stiffness: half of the length of the edges that meet there over that of all edges of
   /// the polygon in which the faces overlap, times 4, so that a corner of a box has 1 and no point is lost or won by a

@@ -192,7 +192,7 @@ void sphere_hull(const Solid& sphere, const Solid& solid, bool flipped, BoxConta
   const Vec3 n_W = solid.R * n;
   out.normal = flipped ? n_W : -n_W;
   out.depth[0] = sphere.radius - distance;
-  out.p[0] = solid.p + solid.R * nearest - (0.5 * out.depth[0]) * n_W;
+  out.p[0] = sphere.p - sphere.radius * n_W;
   out.weight[0] = 1;
   out.count = 1;
 }
@@ -216,7 +216,7 @@ void plane_solid(const Solid& plane, const Solid& other, bool flipped, BoxContac
     } else {
       ++out.count;
     }
-    out.p[at] = p - (0.5 * height) * n;
+    out.p[at] = p;
     out.depth[at] = -height;
     out.weight[at] = weight;
   };
