@@ -766,7 +766,9 @@ Model Reader::read_model(RunSettings* run) {
       if (run) *run = settings;
     });
   attempt([&] {
-    if (root_["bodies"].items().empty()) root_["bodies"].fail("is empty: a model has at least one body");
+    const bool is_known_to_fail = root_.has("bodies") && !root_["bodies"].is_list();  // told with the items
+    if (!is_known_to_fail && root_["bodies"].items().empty())
+      root_["bodies"].fail("is empty: a model has at least one body");
   });
   // the others' places are worked out from the bodies' poses
   each("bodies", m.bodies, [](const Node& n) { return body_from(n); });
