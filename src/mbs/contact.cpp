@@ -129,6 +129,7 @@ void System::find_contacts(double h) {
   hold_contacts();
   fill_contact_blocks();
   fill_held_blocks();
+  find_together();
 }
 
 Earnings System::calc_earnings(const ContactGroup& g, double h) const {
@@ -268,6 +269,7 @@ void System::fill_contact_blocks() {
     double* earnings = t.groups.data() + (block * kernel::kGroupFields + kernel::kEarned) * W + place;
     earnings[0] = g.earnings.stored, earnings[W] = g.earnings.spent;
     static_assert(kernel::kSpent == kernel::kEarned + 1);
+    t.groups[(block * kernel::kGroupFields + kernel::kTogether) * W + place] = -1;
     double* to = t.groups.data() + block * kernel::kGroupFields * W + place;
     for (const double x : known) *to = x, to += W;
     for (int i = 0; i < g.count; ++i) {
@@ -338,6 +340,7 @@ void System::resolve_contacts(double h, bool follows) {
     kernel::read_touched(bodies);
     kernel::press_contacts(job);
     push();
+    if (!t.together.empty()) match_dashpots();
     kernel::damp_contacts(job);
     push();
     kernel::rub_contacts(job);

@@ -198,6 +198,7 @@ struct Touching {
   std::vector<std::uint32_t> rows, a, b;
   AlignedVector<double> groups, points;
   AlignedVector<double> share;  // groups of each body, filled up to blocks (T)
+  std::vector<int> together;    // groups that act as one have a number in common, -1: others; empty: none do
   // of bodies that joints hold
   std::vector<JointedBody> held;
   std::vector<JointedPair> jointed_pairs;
@@ -227,6 +228,9 @@ struct ContactScratch {
   std::vector<int> mobility_of, held_at;  // of each body, -1: none (B)
   std::vector<unsigned char> is_read;     // clusters, in this look
   std::vector<int> first_of_cluster, next_of_cluster;
+  std::vector<int> root, island;           // of touched bodies
+  std::vector<double> pulls, power, made;  // of dashpots: wrenches on the touched bodies, of each island their power
+                                           // and force times the speed that they make
   std::vector<JointedBody> held_before;
 };
 

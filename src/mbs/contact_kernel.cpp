@@ -351,8 +351,10 @@ HWY_INLINE void damp_block(const ContactJob& job, size_t block) {
     sum = sum + f;
     torque = fma(zero - f, la, torque);
   }
-  const Damper<D> damper(num<D>(job.h), calc_mobility<D>(g, held_of(job, block, W), apart, (zero - sum) * n, torque),
-                         power);
+  const Num<D> together = load<D>(g, kTogether);
+  const Num<D> mobility = select(hn::Ge(together.v, hn::Zero(d)), together * power,
+                                 calc_mobility<D>(g, held_of(job, block, W), apart, (zero - sum) * n, torque));
+  const Damper<D> damper(h, mobility, power);
   const Num<D> band = zero - load<D>(g, kBand), most = load<D>(g, kMost);
   Num<D> total = zero;
   sum = zero, torque = zeros<D>();

@@ -62,9 +62,11 @@ enum Group : int {
   kHeldTorque = 56,     // and its torque on a (3)
   kEarned = 59,         // energy of the pair's points before, and their work since; below 0: there were none [J]
   kSpent = 60,          // work of the pair's dashpots since points were looked for [J]
-  kLost = 61,   // of what was earned, that which the points that are found cannot store, less what they took [J]
-  kMeets = 62,  // 1: it has points that have just been met
-  kGroupFields = 63
+  kLost = 61,      // of what was earned, that which the points that are found cannot store, less what they took [J]
+  kMeets = 62,     // 1: it has points that have just been met
+  kTogether = 63,  // force times the speed that it makes over its power, of dashpots of several
+                   // groups that act as one [1/s]; below 0: they do not
+  kGroupFields = 64
 };
 
 /// Fields of a point; a place without a point has no stiffness.

@@ -463,6 +463,11 @@ class System {
   /// Makes the points from `first` on a group. Each takes over the friction spring of the nearest one of the step
   /// before.
   void add_contact_group(size_t a, size_t b, const Vec3& n, size_t first, int law, double stiffness, StickRange&);
+  // contact_together.cpp
+  /// Groups between the same two bodies that move, or one and the ground, bodies that joints make one counting as one.
+  void find_together();
+  /// How easily the dashpots of such groups move what they act on.
+  void match_dashpots();
   // contact_joints.cpp
   void begin_holding();
   /// What joints leave of a body's mobility, into ContactScratch::mobility; -1: none hold it.

@@ -1,0 +1,141 @@
+/// Groups of points whose dashpots act along one direction together (docs/theory/contact.md, "In the step").
+
+#include <algorithm>
+
+#include "mbs/contact_kernel.h"
+#include "mbs/system.h"
+
+namespace topple::mbs {
+
+namespace {
+
+constexpr double kAsOne = 0.999;  // coupling of two bodies from which on they count as one
+
+int root_of(std::vector<int>& root, int x) {
+  while (root[static_cast<size_t>(x)] != x)
+    x = root[static_cast<size_t>(x)] = root[static_cast<size_t>(root[static_cast<size_t>(x)])];
+  return x;
+}
+
+}  // namespace
+
+void System::find_together() {
+  Touching& t = state.touching;
+  t.together.clear();
+  if (t.group.size() < 2) return;
+  // units of bodies that move as one, then who touches whom; the ground is the first
+  std::vector<int>&root = contact.root, &island = contact.island;
+  root.resize(t.body.size());
+  for (size_t i = 0; i < root.size(); ++i) root[i] = static_cast<int>(i);
+  for (const JointedPair& p : t.jointed_pairs) {
+    const int to = t.held[static_cast<size_t>(p.to)].place, from = t.held[static_cast<size_t>(p.from)].place;
+    if (to < 0 || from < 0) continue;
+    if (p.coupling >= kAsOne) root[static_cast<size_t>(root_of(root, to))] = root_of(root, from);
+  }
+  // the one unit that each touches: -1 none yet, -2 several
+  island.assign(root.size(), -1);
+  const auto meet = [&](int unit, int other) {
+    int& known = island[static_cast<size_t>(unit)];
+    known = known == -1 || known == other ? other : -2;
+  };
+  for (const ContactGroup& g : t.group) {
+    const int a = root_of(root, g.a), b = root_of(root, g.b);
+    if (a != 0) meet(a, b);
+    if (b != 0) meet(b, a);
+  }
+  // bodies of a mechanism feel more than what they touch
+  for (const JointedPair& p : t.jointed_pairs) {
+    const int to = t.held[static_cast<size_t>(p.to)].place, from = t.held[static_cast<size_t>(p.from)].place;
+    if (to >= 0 && from >= 0 && p.coupling < kAsOne && root_of(root, to) != root_of(root, from))
+      island[static_cast<size_t>(root_of(root, to))] = island[static_cast<size_t>(root_of(root, from))] = -2;
+  }
+  const auto number_of = [&](const ContactGroup& g) {
+    const int a = root_of(root, g.a), b = root_of(root, g.b);
+    const auto is_met_alone = [&](int unit, int other) {
+      return unit == 0 || island[static_cast<size_t>(unit)] == other;
+    };
+    return a != b && is_met_alone(a, b) && is_met_alone(b, a) ? std::max(a, b) : -1;
+  };
+  std::vector<int> count(root.size(), 0);
+  for (const ContactGroup& g : t.group)
+    if (const int number = number_of(g); number >= 0) ++count[static_cast<size_t>(number)];
+  if (std::none_of(count.begin(), count.end(), [](int n) { return n > 1; })) return;
+  for (const ContactGroup& g : t.group) {
+    const int number = number_of(g);
+    t.together.push_back(number >= 0 && count[static_cast<size_t>(number)] > 1 ? number : -1);
+  }
+}
+
+void System::match_dashpots() {
+  Touching& t = state.touching;
+  const size_t W = kernel::lanes();
+  std::vector<double>&pulls = contact.pulls, &power = contact.power, &made = contact.made;
+  pulls.assign(6 * t.body.size(), 0);
+  power.assign(t.body.size(), 0);
+  made.assign(t.body.size(), 0);
+  // of each touched body, through its groups
+  std::vector<int>& island = contact.island;
+  island.assign(t.body.size(), -1);
+  const auto three = [W](const double* slot, int field) {
+    const double* at = slot + static_cast<size_t>(field) * W;
+    return Vec3{at[0], at[W], at[2 * W]};
+  };
+  for (size_t i = 0; i < t.group.size(); ++i) {
+    if (t.together[i] < 0) continue;
+    const ContactGroup& group = t.group[i];
+    const size_t block = group.slot / W, place = group.slot % W, number = static_cast<size_t>(t.together[i]);
+    const double* g = t.groups.data() + block * kernel::kGroupFields * W + place;
+    const Vec3 n = three(g, kernel::kNormal), apart = three(g, kernel::kApart);
+    const auto change = [&](int body, int field) {
+      const double* row = contact.changes.data() + static_cast<size_t>(body) * kernel::kWrenchRow + field;
+      return Vec3{row[0], row[1], row[2]};
+    };
+    const Vec3 w_b = change(group.b, 3), w = change(group.a, 3) - w_b,
+               v = change(group.a, 0) - change(group.b, 0) - cross(w_b, apart);
+    double sum = 0;
+    Vec3 turning;
+    for (int k = 0; k < group.count; ++k) {
+      const double* p = t.points.data() + (t.rows[block] + static_cast<size_t>(k)) * kernel::kPointFields * W + place;
+      const Vec3 lever = cross(three(p, kernel::kPlace), n);
+      const double speed = p[kernel::kApproach * W] + dot(n, v) + dot(lever, w), f = p[kernel::kRate * W] * speed;
+      power[number] += f * speed;
+      sum += f;
+      turning -= f * lever;
+    }
+    const Vec3 pressing = -sum * n;
+    const auto pull = [&](int body, const Vec3& on, const Vec3& turn) {
+      island[static_cast<size_t>(body)] = t.together[i];
+      double* to = &pulls[6 * static_cast<size_t>(body)];
+      for (int k = 0; k < 3; ++k) to[k] += on[k], to[3 + k] += turn[k];
+    };
+    pull(group.a, pressing, turning);
+    if (group.b != 0) pull(group.b, -pressing, -(turning + cross(apart, pressing)));
+  }
+  for (size_t i = 1; i < t.body.size(); ++i) {
+    if (island[i] < 0) continue;
+    const double *q = &pulls[6 * i], *row = contact.rows.data() + i * kernel::kTouchedRow;
+    const double* I = row + kernel::kRowInertia;  // xx xy xz yy yz zz
+    made[static_cast<size_t>(island[i])] +=
+        row[kernel::kRowMass] * (q[0] * q[0] + q[1] * q[1] + q[2] * q[2]) +
+        (q[3] * (I[0] * q[3] + I[1] * q[4] + I[2] * q[5]) + q[4] * (I[1] * q[3] + I[3] * q[4] + I[4] * q[5]) +
+         q[5] * (I[2] * q[3] + I[4] * q[4] + I[5] * q[5]));
+  }
+  for (const JointedPair& p : t.jointed_pairs) {
+    const int to = t.held[static_cast<size_t>(p.to)].place, from = t.held[static_cast<size_t>(p.from)].place;
+    if (to < 0 || from < 0 || island[static_cast<size_t>(to)] < 0 ||
+        island[static_cast<size_t>(to)] != island[static_cast<size_t>(from)])
+      continue;
+    double& less = made[static_cast<size_t>(island[static_cast<size_t>(to)])];
+    for (size_t x = 0; x < 6; ++x)
+      for (size_t y = 0; y < 6; ++y)
+        less -= pulls[6 * static_cast<size_t>(to) + x] * p.less[6 * x + y] * pulls[6 * static_cast<size_t>(from) + y];
+  }
+  for (size_t i = 0; i < t.group.size(); ++i) {
+    if (t.together[i] < 0) continue;
+    const size_t number = static_cast<size_t>(t.together[i]), slot = t.group[i].slot;
+    t.groups[(slot / W * kernel::kGroupFields + kernel::kTogether) * W + slot % W] =
+        power[number] > 0 ? std::max(0.0, made[number]) / power[number] : 0;
+  }
+}
+
+}  // namespace topple::mbs
