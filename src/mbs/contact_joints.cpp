@@ -23,22 +23,22 @@ struct Factor {
 
   Factor(const double* A, double length) {
     double trace = 0;
-    for (int i = 0; i < 6; ++i) {
+    for (size_t i = 0; i < 6; ++i) {
       scale[i] = i < 3 ? 1 : length;
       trace += scale[i] * scale[i] * A[7 * i];
     }
-    for (int i = 0; i < 6; ++i)
-      for (int j = 0; j <= i; ++j) {
+    for (size_t i = 0; i < 6; ++i)
+      for (size_t j = 0; j <= i; ++j) {
         double sum = scale[i] * scale[j] * A[6 * i + j] + (i == j ? kRidge * trace : 0);
-        for (int k = 0; k < j; ++k) sum -= L[6 * i + k] * L[6 * j + k];
+        for (size_t k = 0; k < j; ++k) sum -= L[6 * i + k] * L[6 * j + k];
         L[6 * i + j] = i == j ? std::sqrt(std::max(sum, kRidge * trace)) : L[7 * j] > 0 ? sum / L[7 * j] : 0;
       }
   }
   /// x = L⁻¹ x
-  void solve(double* x, int stride) const {
-    for (int i = 0; i < 6; ++i) {
+  void solve(double* x, size_t stride) const {
+    for (size_t i = 0; i < 6; ++i) {
       double sum = x[i * stride];
-      for (int k = 0; k < i; ++k) sum -= L[6 * i + k] * x[k * stride];
+      for (size_t k = 0; k < i; ++k) sum -= L[6 * i + k] * x[k * stride];
       x[i * stride] = L[7 * i] > 0 ? sum / L[7 * i] : 0;
     }
   }
@@ -47,10 +47,10 @@ struct Factor {
 /// Of the norm of L⁻¹ D L⁻ᵀ, which is 1 where two bodies move as one: no less than that, and at most 1.
 double calc_coupling(const Factor& to, const Factor& from, const double* between) {
   double x[36];
-  for (int i = 0; i < 6; ++i)
-    for (int j = 0; j < 6; ++j) x[6 * i + j] = to.scale[i] * from.scale[j] * between[6 * i + j];
-  for (int j = 0; j < 6; ++j) to.solve(x + j, 6);
-  for (int i = 0; i < 6; ++i) from.solve(x + 6 * i, 1);
+  for (size_t i = 0; i < 6; ++i)
+    for (size_t j = 0; j < 6; ++j) x[6 * i + j] = to.scale[i] * from.scale[j] * between[6 * i + j];
+  for (size_t j = 0; j < 6; ++j) to.solve(x + j, 6);
+  for (size_t i = 0; i < 6; ++i) from.solve(x + 6 * i, 1);
   double sum = 0;
   for (const double value : x) sum += value * value;
   return std::min(1.0, std::sqrt(sum));

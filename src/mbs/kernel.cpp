@@ -296,8 +296,8 @@ HWY_INLINE void evaluate_element_block(const ElementJob& job, size_t block) {
     const N along_x = (apart_x - at_a.lever_x) + at_b.lever_x, along_z = (apart_z - at_a.lever_z) + at_b.lever_z;
     lever_a = {at_a.lever_x, zero, at_a.lever_z};
     lever_b = {at_b.lever_x, zero, at_b.lever_z};
-    const auto across_of = [&] TOPPLE_INLINED { return fma(cosine, along_z, sine * along_x); };
-    const auto along_of = [&] TOPPLE_INLINED { return fms(cosine, along_x, sine * along_z); };
+    const auto across_of = [&]() TOPPLE_INLINED { return fma(cosine, along_z, sine * along_x); };
+    const auto along_of = [&]() TOPPLE_INLINED { return fms(cosine, along_x, sine * along_z); };
     sine = turned.sine(), cosine = turned.cosine();
     if constexpr (is_member) {
       measure_chord({along_of(), zero, across_of()});
