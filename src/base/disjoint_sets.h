@@ -10,8 +10,13 @@ namespace topple {
 /// Union-find with path halving (Tarjan & van Leeuwen, J. ACM 31 (1984) 245).
 class DisjointSets {
  public:
+  DisjointSets() = default;
   /// Each of 0 to `count` - 1 alone.
-  explicit DisjointSets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0); }
+  explicit DisjointSets(std::size_t count) { reset(count); }
+  void reset(std::size_t count) {
+    parent_.resize(count);
+    std::iota(parent_.begin(), parent_.end(), 0);
+  }
 
   /// The one that leads the set of `i`.
   int find(int i) {

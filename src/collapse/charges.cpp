@@ -9,6 +9,7 @@
 #include <set>
 
 #include "base/error.h"
+#include "base/words.h"
 #include "collapse/builder.h"
 
 namespace topple::collapse {
@@ -114,7 +115,7 @@ std::string tell_stage(const product::Stage& stage, size_t number) {
   const size_t charges = stage.charges.size();
   const auto failing = std::count_if(stage.charges.begin(), stage.charges.end(), [](const auto& c) { return c.fails; });
   std::string text =
-      fmt::format("stage {} \"{}\": {} {}", number, stage.name, charges, charges == 1 ? "charge" : "charges");
+      fmt::format("stage {} \"{}\": {}", number, stage.name, count_words(static_cast<long long>(charges), "charge"));
   if (failing > 0) text += fmt::format(", {} {}", failing, failing == 1 ? "fails" : "fail");
   return text;
 }

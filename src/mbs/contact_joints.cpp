@@ -226,6 +226,7 @@ void System::hold_contacts() {
     contact.next_of_cluster[i] = first;
     first = static_cast<int>(i);
   }
+  std::vector<Factor> factors;  // of a cluster's bodies
   for (const int first : contact.first_of_cluster) {
     if (first < 0) continue;
     const auto next = [&](int i) { return contact.next_of_cluster[static_cast<size_t>(i)]; };
@@ -238,8 +239,12 @@ void System::hold_contacts() {
       return Factor(mobility_of(i).left,
                     1 / std::sqrt(0.5 * state.body[b].inverse_mass * (I(0, 0) + I(1, 1) + I(2, 2))));
     };
-    for (int i = first; i >= 0; i = next(i))
-      for (int j = first; j >= 0; j = next(j)) {
+    factors.clear();
+    for (int i = first; i >= 0; i = next(i)) factors.push_back(factor_of(i));
+    size_t rank_i = 0;
+    for (int i = first; i >= 0; i = next(i), ++rank_i) {
+      size_t rank_j = 0;
+      for (int j = first; j >= 0; j = next(j), ++rank_j) {
         JointedPair& p = t.jointed_pairs.emplace_back();
         p.to = i, p.from = j;
         const JointedMobility &to = mobility_of(i), &from = mobility_of(j);
@@ -256,8 +261,9 @@ void System::hold_contacts() {
             p.less[6 * x + y] = sum;
             between[6 * x + y] = -sum;
           }
-        p.coupling = calc_coupling(factor_of(i), factor_of(j), between);
+        p.coupling = calc_coupling(factors[rank_i], factors[rank_j], between);
       }
+    }
   }
 }
 

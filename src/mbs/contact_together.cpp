@@ -11,12 +11,6 @@ namespace {
 
 constexpr double kAsOne = 0.999;  // coupling of two bodies from which on they count as one
 
-int root_of(std::vector<int>& root, int x) {
-  while (root[static_cast<size_t>(x)] != x)
-    x = root[static_cast<size_t>(x)] = root[static_cast<size_t>(root[static_cast<size_t>(x)])];
-  return x;
-}
-
 }  // namespace
 
 void System::find_together() {
@@ -24,39 +18,39 @@ void System::find_together() {
   t.together.clear();
   if (t.group.size() < 2) return;
   // units of bodies that move as one, then who touches whom; the ground is the first
-  std::vector<int>&root = contact.root, &island = contact.island;
-  root.resize(t.body.size());
-  for (size_t i = 0; i < root.size(); ++i) root[i] = static_cast<int>(i);
+  DisjointSets& units = contact.units;
+  std::vector<int>&island = contact.island, &count = contact.count;
+  units.reset(t.body.size());
   for (const JointedPair& p : t.jointed_pairs) {
     const int to = t.held[static_cast<size_t>(p.to)].place, from = t.held[static_cast<size_t>(p.from)].place;
     if (to < 0 || from < 0) continue;
-    if (p.coupling >= kAsOne) root[static_cast<size_t>(root_of(root, to))] = root_of(root, from);
+    if (p.coupling >= kAsOne) units.join(to, from);
   }
   // the one unit that each touches: -1 none yet, -2 several
-  island.assign(root.size(), -1);
+  island.assign(t.body.size(), -1);
   const auto meet = [&](int unit, int other) {
     int& known = island[static_cast<size_t>(unit)];
     known = known == -1 || known == other ? other : -2;
   };
   for (const ContactGroup& g : t.group) {
-    const int a = root_of(root, g.a), b = root_of(root, g.b);
+    const int a = units.find(g.a), b = units.find(g.b);
     if (a != 0) meet(a, b);
     if (b != 0) meet(b, a);
   }
   // bodies of a mechanism feel more than what they touch
   for (const JointedPair& p : t.jointed_pairs) {
     const int to = t.held[static_cast<size_t>(p.to)].place, from = t.held[static_cast<size_t>(p.from)].place;
-    if (to >= 0 && from >= 0 && p.coupling < kAsOne && root_of(root, to) != root_of(root, from))
-      island[static_cast<size_t>(root_of(root, to))] = island[static_cast<size_t>(root_of(root, from))] = -2;
+    if (to >= 0 && from >= 0 && p.coupling < kAsOne && units.find(to) != units.find(from))
+      island[static_cast<size_t>(units.find(to))] = island[static_cast<size_t>(units.find(from))] = -2;
   }
   const auto number_of = [&](const ContactGroup& g) {
-    const int a = root_of(root, g.a), b = root_of(root, g.b);
+    const int a = units.find(g.a), b = units.find(g.b);
     const auto is_met_alone = [&](int unit, int other) {
       return unit == 0 || island[static_cast<size_t>(unit)] == other;
     };
     return a != b && is_met_alone(a, b) && is_met_alone(b, a) ? std::max(a, b) : -1;
   };
-  std::vector<int> count(root.size(), 0);
+  count.assign(t.body.size(), 0);
   for (const ContactGroup& g : t.group)
     if (const int number = number_of(g); number >= 0) ++count[static_cast<size_t>(number)];
   if (std::none_of(count.begin(), count.end(), [](int n) { return n > 1; })) return;

@@ -824,7 +824,6 @@ export const german: readonly (readonly [string, string])[] = [
   ["stage {:d} \"{}\": {:d} charge, {:d} fails", "Zündstufe {} „{}“: {} Ladung, {} versagt"],
   ["stage {:d} \"{}\": {:d} charges, {:d} fails", "Zündstufe {} „{}“: {} Ladungen, {} versagt"],
   ["stage {:d} \"{}\": {:d} charges, {:d} fail", "Zündstufe {} „{}“: {} Ladungen, {} versagen"],
-  ["stage {:d} \"{}\": {:d} charge", "Zündstufe {} „{}“: {} Ladung"],
   ["Text of", "Text von"],
   ["Esc", "Esc"],
   // what the report hands over beside the findings
