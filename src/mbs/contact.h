@@ -190,6 +190,13 @@ struct JointedMobility {
   double less[36] = {}, left[36] = {};  // taken from the body's own, and what it has then
 };
 
+/// A group whose dashpots act as one with those of the others of its number.
+struct GroupTogether {
+  int group = 0,
+      number =
+          0;  // of Touching::group; the last of the touched bodies that they meet, or of those it moves as one with
+};
+
 /// What touches, as the last look found it. T touched bodies; the first stands for the ground and all fixed ones.
 struct Touching {
   int steps = 0;          // since then
@@ -198,8 +205,8 @@ struct Touching {
   // the kernel's blocks, groups of like counts of points together
   std::vector<std::uint32_t> rows, a, b;
   AlignedVector<double> groups, points;
-  AlignedVector<double> share;  // groups of each body, filled up to blocks (T)
-  std::vector<int> together;    // groups that act as one have a number in common, -1: others; empty: none do
+  AlignedVector<double> share;          // groups of each body, filled up to blocks (T)
+  std::vector<GroupTogether> together;  // in the order of groups
   // of bodies that joints hold
   std::vector<JointedBody> held;
   std::vector<JointedPair> jointed_pairs;
@@ -229,8 +236,8 @@ struct ContactScratch {
   std::vector<int> mobility_of, held_at;  // of each body, -1: none (B)
   std::vector<unsigned char> is_read;     // clusters, in this look
   std::vector<int> first_of_cluster, next_of_cluster;
-  DisjointSets units;                      // of touched bodies that move as one
-  std::vector<int> island, count;          // of touched bodies
+  DisjointSets units;                     // of touched bodies that move as one
+  std::vector<int> island, count;         // of touched bodies
   std::vector<double> pulls, power, made;  // of dashpots: wrenches on the touched bodies, of each island their power
                                            // and force times the speed that they make
   std::vector<JointedBody> held_before;

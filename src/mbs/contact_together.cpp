@@ -17,46 +17,45 @@ void System::find_together() {
   Touching& t = state.touching;
   t.together.clear();
   if (t.group.size() < 2) return;
-  // units of bodies that move as one, then who touches whom; the ground is the first
+  // units of bodies that move as one; the ground is the first
+  const size_t bodies = t.body.size();
   DisjointSets& units = contact.units;
   std::vector<int>&island = contact.island, &count = contact.count;
-  units.reset(t.body.size());
-  for (const JointedPair& p : t.jointed_pairs) {
-    const int to = t.held[static_cast<size_t>(p.to)].place, from = t.held[static_cast<size_t>(p.from)].place;
-    if (to < 0 || from < 0) continue;
-    if (p.coupling >= kAsOne) units.join(to, from);
-  }
-  // the one unit that each touches: -1 none yet, -2 several
-  island.assign(t.body.size(), -1);
+  const bool has_units = !t.jointed_pairs.empty();
+  if (has_units) units.reset(bodies);
+  const auto unit_of = [&](int place) { return has_units ? units.find(place) : place; };
+  const auto each_coupling = [&](auto&& f) {
+    for (const JointedPair& p : t.jointed_pairs) {
+      const int to = t.held[static_cast<size_t>(p.to)].place, from = t.held[static_cast<size_t>(p.from)].place;
+      if (to >= 0 && from >= 0 && to != from) f(to, from, p.coupling);
+    }
+  };
+  each_coupling([&](int to, int from, double coupling) {
+    if (coupling >= kAsOne) units.join(to, from);
+  });
+  // the one unit that each touches: -1 none yet, -2 several; and by how many groups
+  island.assign(bodies, -1);
+  count.assign(bodies, 0);
   const auto meet = [&](int unit, int other) {
+    if (unit == 0) return;
     int& known = island[static_cast<size_t>(unit)];
     known = known == -1 || known == other ? other : -2;
   };
   for (const ContactGroup& g : t.group) {
-    const int a = units.find(g.a), b = units.find(g.b);
-    if (a != 0) meet(a, b);
-    if (b != 0) meet(b, a);
+    const int a = unit_of(g.a), b = unit_of(g.b);
+    meet(a, b), meet(b, a);
+    ++count[static_cast<size_t>(std::max(a, b))];
   }
   // bodies of a mechanism feel more than what they touch
-  for (const JointedPair& p : t.jointed_pairs) {
-    const int to = t.held[static_cast<size_t>(p.to)].place, from = t.held[static_cast<size_t>(p.from)].place;
-    if (to >= 0 && from >= 0 && p.coupling < kAsOne && units.find(to) != units.find(from))
-      island[static_cast<size_t>(units.find(to))] = island[static_cast<size_t>(units.find(from))] = -2;
-  }
-  const auto number_of = [&](const ContactGroup& g) {
-    const int a = units.find(g.a), b = units.find(g.b);
-    const auto is_met_alone = [&](int unit, int other) {
-      return unit == 0 || island[static_cast<size_t>(unit)] == other;
-    };
-    return a != b && is_met_alone(a, b) && is_met_alone(b, a) ? std::max(a, b) : -1;
-  };
-  count.assign(t.body.size(), 0);
-  for (const ContactGroup& g : t.group)
-    if (const int number = number_of(g); number >= 0) ++count[static_cast<size_t>(number)];
-  if (std::none_of(count.begin(), count.end(), [](int n) { return n > 1; })) return;
-  for (const ContactGroup& g : t.group) {
-    const int number = number_of(g);
-    t.together.push_back(number >= 0 && count[static_cast<size_t>(number)] > 1 ? number : -1);
+  each_coupling([&](int to, int from, double) {
+    if (unit_of(to) != unit_of(from))
+      island[static_cast<size_t>(unit_of(to))] = island[static_cast<size_t>(unit_of(from))] = -2;
+  });
+  for (size_t i = 0; i < t.group.size(); ++i) {
+    const int a = unit_of(t.group[i].a), b = unit_of(t.group[i].b), last = std::max(a, b);
+    const auto is_alone = [&](int unit, int other) { return unit == 0 || island[static_cast<size_t>(unit)] == other; };
+    if (count[static_cast<size_t>(last)] > 1 && a != b && is_alone(a, b) && is_alone(b, a))
+      t.together.push_back({static_cast<int>(i), last});
   }
 }
 
@@ -74,10 +73,9 @@ void System::match_dashpots() {
     const double* at = slot + static_cast<size_t>(field) * W;
     return Vec3{at[0], at[W], at[2 * W]};
   };
-  for (size_t i = 0; i < t.group.size(); ++i) {
-    if (t.together[i] < 0) continue;
-    const ContactGroup& group = t.group[i];
-    const size_t block = group.slot / W, place = group.slot % W, number = static_cast<size_t>(t.together[i]);
+  for (const GroupTogether& one : t.together) {
+    const ContactGroup& group = t.group[static_cast<size_t>(one.group)];
+    const size_t block = group.slot / W, place = group.slot % W, number = static_cast<size_t>(one.number);
     const double* g = t.groups.data() + block * kernel::kGroupFields * W + place;
     const Vec3 n = three(g, kernel::kNormal), apart = three(g, kernel::kApart);
     const auto change = [&](int body, int field) {
@@ -98,7 +96,7 @@ void System::match_dashpots() {
     }
     const Vec3 pressing = -sum * n;
     const auto pull = [&](int body, const Vec3& on, const Vec3& turn) {
-      island[static_cast<size_t>(body)] = t.together[i];
+      island[static_cast<size_t>(body)] = one.number;
       double* to = &pulls[6 * static_cast<size_t>(body)];
       for (int k = 0; k < 3; ++k) to[k] += on[k], to[3 + k] += turn[k];
     };
@@ -124,9 +122,8 @@ void System::match_dashpots() {
       for (size_t y = 0; y < 6; ++y)
         less -= pulls[6 * static_cast<size_t>(to) + x] * p.less[6 * x + y] * pulls[6 * static_cast<size_t>(from) + y];
   }
-  for (size_t i = 0; i < t.group.size(); ++i) {
-    if (t.together[i] < 0) continue;
-    const size_t number = static_cast<size_t>(t.together[i]), slot = t.group[i].slot;
+  for (const GroupTogether& one : t.together) {
+    const size_t number = static_cast<size_t>(one.number), slot = t.group[static_cast<size_t>(one.group)].slot;
     t.groups[(slot / W * kernel::kGroupFields + kernel::kTogether) * W + slot % W] =
         power[number] > 0 ? std::max(0.0, made[number]) / power[number] : 0;
   }
