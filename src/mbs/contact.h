@@ -192,9 +192,8 @@ struct JointedMobility {
 
 /// A group whose dashpots act as one with those of the others of its number.
 struct GroupTogether {
-  int group = 0,
-      number =
-          0;  // of Touching::group; the last of the touched bodies that they meet, or of those it moves as one with
+  int group = 0;   // of Touching::group
+  int number = 0;  // the last of the touched bodies, or of those that move as one with it, that they meet
 };
 
 /// What touches, as the last look found it. T touched bodies; the first stands for the ground and all fixed ones.
