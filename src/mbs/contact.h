@@ -235,8 +235,8 @@ struct ContactScratch {
   std::vector<int> mobility_of, held_at;  // of each body, -1: none (B)
   std::vector<unsigned char> is_read;     // clusters, in this look
   std::vector<int> first_of_cluster, next_of_cluster;
-  DisjointSets units;                     // of touched bodies that move as one
-  std::vector<int> island, count;         // of touched bodies
+  DisjointSets units;                      // of touched bodies that move as one
+  std::vector<int> island, count;          // of touched bodies
   std::vector<double> pulls, power, made;  // of dashpots: wrenches on the touched bodies, of each island their power
                                            // and force times the speed that they make
   std::vector<JointedBody> held_before;
