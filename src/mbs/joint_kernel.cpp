@@ -276,9 +276,7 @@ HWY_INLINE void advance_weld(const PairJob& job, size_t block) {
   const V3<D> speed = fma(share, apart, a.v);
   const V3<D> H = (a.L + child_L) + reduced * cross(r0, apart);
   const S33<D> inverse = load6<D>(c, kInverseWhole);
-  const V3<D> w0 = R0 * (inverse * transpose_times(R0, H));
-  const V3<D> bend = R0 * (inverse * transpose_times(R0, cross(w0, H)));
-  const V3<D> w = fma(num<D>(-0.5) * h, bend, w0);
+  const V3<D> w = R0 * mid_spin<D>(inverse, transpose_times(R0, H), half_h);
   const V3<D> turned = h * w;
   const Num<D> half2 = num<D>(0.25) * dot(turned, turned);
   const auto slow = hn::Le(half2.v, hn::Set(d, kMostHalf2));
@@ -358,12 +356,6 @@ struct Mover {
   Num<D> inverse_mass;
 };
 
-template <class D>
-HWY_INLINE V3<D> mid_spin(const Mover<D>& m, const V3<D>& L, Num<D> h) {
-  const V3<D> w0 = m.W * L;
-  return fma(num<D>(-0.5) * h, m.W * cross(w0, L), w0);
-}
-
 /// Adds the matrix that gives the acceleration of a point at the lever by a force there.
 template <class D>
 HWY_INLINE void add_mobility(const Mover<D>& m, Num<D> (&a)[3][3]) {
@@ -409,7 +401,7 @@ HWY_INLINE void close_points(const PairJob& job, size_t block) {
       for (int k = 0; k <= i; ++k) A[i][k] = lines[i][k];
   }
   const V3<D> gap = (b.p + b.lever) - (a.p + a.lever);
-  const V3<D> wa = mid_spin(a, a.L, h), wb = mid_spin(b, b.L, h);
+  const V3<D> wa = mid_spin<D>(a.W, a.L, half_h), wb = mid_spin<D>(b.W, b.L, half_h);
   Num<D> x[n];
   {
     const V3<D> ra = cross(wa, a.lever), rb = cross(wb, b.lever);
@@ -451,7 +443,7 @@ HWY_INLINE void close_points(const PairJob& job, size_t block) {
   Num<D> widest = num<D>(0), cosine = num<D>(1), sine = num<D>(0);
   const auto move = [&](const Mover<D>& m, const V3<D>& v, const V3<D>& L, Moved<D>& out) {
     out.p = fma(h, v, m.p);
-    const V3<D> turned = h * mid_spin(m, L, h);
+    const V3<D> turned = h * mid_spin<D>(m.W, L, half_h);
     const Num<D> half2 = num<D>(0.25) * dot(turned, turned);
     slow = hn::And(slow, hn::Le(half2.v, hn::Set(d, kMostHalf2)));
     out.q = normalize(exp_rotation(turned, half2) * m.q);

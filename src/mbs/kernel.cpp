@@ -41,10 +41,8 @@ HWY_INLINE void advance_body_block(const BodyJob& job, size_t block, Num<D>& sum
                                {i0.y, load<D>(c, kInverseInertia + 3), load<D>(c, kInverseInertia + 4)},
                                {i0.z, load<D>(c, kInverseInertia + 4), load<D>(c, kInverseInertia + 5)}};
   const M33<D> R0{load3<D>(R, 0), load3<D>(R, 3), load3<D>(R, 6)};
-  // angular velocity in the middle of the step: the angular momentum is constant, the inertia turns with the body
-  const V3<D> w0 = R0 * (inverse_inertia * transpose_times(R0, spin));
-  const V3<D> bend = R0 * (inverse_inertia * transpose_times(R0, cross(w0, spin)));
-  const V3<D> turned = h * fma(num<D>(-0.5) * h, bend, w0);
+  // in the body's frame
+  const V3<D> turned = h * (R0 * mid_spin<D>(inverse_inertia, transpose_times(R0, spin), num<D>(0.5) * h));
   const Num<D> half2 = num<D>(0.25) * dot(turned, turned);
   const auto fast = hn::And(drifts, hn::Not(hn::Le(half2.v, hn::Set(d, kMostHalf2))));
   const Q4<D> q1 = normalize(exp_rotation(turned, half2) * load4<D>(q, 0));

@@ -153,6 +153,11 @@ enum BodyField : int {
 /// the centres of mass. In a plane all but forces along x and z and torques about y stay zero.
 inline constexpr int kForceFields = 9;
 
+/// The spin in the middle of a step is settled until (half the turn of the step)² times its last change is no more than
+/// this part of it: beyond that nothing is left of it in the turn.
+inline constexpr double kSpinTolerance = 1e-15;
+inline constexpr int kMostSpinRounds = 50;
+
 /// One step of all bodies: kick by the forces, then drift of those that nobody else moves.
 struct BodyJob {
   size_t blocks = 0;

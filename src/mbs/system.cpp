@@ -590,15 +590,32 @@ void System::drop_forces_across() {
   }
 }
 
+namespace {
+
+/// As kernel::mid_spin, of any turn.
+Vec3 calc_mid_spin(const Mat3& W, const Vec3& L, double half_h) {
+  const Vec3 w0 = W * L;
+  Vec3 change = half_h * (W * cross(w0, L)), w = w0 - change;
+  for (int round = 0; round < kernel::kMostSpinRounds; ++round) {
+    const double w2 = dot(w, w), turn2 = half_h * half_h * w2;
+    if (!(turn2 * turn2 * dot(change, change) > kernel::kSpinTolerance * kernel::kSpinTolerance * w2)) break;
+    const Mat3 R = to_matrix(exp_rotation(half_h * w));
+    const Vec3 next = R * (W * transpose_times(R, L));
+    change = next - w;
+    w = next;
+  }
+  return w;
+}
+
+}  // namespace
+
 void System::drift(size_t b, double h, const Vec3& p0, const Quat& q0, const Mat3& R0) {
   State& s = state;
   const Mat3& inverse_inertia = s.body[b].inverse_inertia;
   const Vec3& L = s.L[b];
   s.p[b] = p0 + h * s.v[b];
-  // angular velocity in the middle of the step: the angular momentum is constant, the inertia turns with the body
-  const Vec3 w0 = R0 * (inverse_inertia * transpose_times(R0, L));
-  const Vec3 w1 = w0 - (0.5 * h) * (R0 * (inverse_inertia * transpose_times(R0, cross(w0, L))));
-  const Quat q = exp_rotation(h * w1) * q0;
+  const Vec3 w = R0 * calc_mid_spin(inverse_inertia, transpose_times(R0, L), 0.5 * h);
+  const Quat q = exp_rotation(h * w) * q0;
   // one step of Newton's method for the length, which round-off alone has changed
   const double unit = 1.5 - 0.5 * (q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
   s.q[b] = {unit * q.w, unit * q.x, unit * q.y, unit * q.z};
