@@ -10,43 +10,9 @@ namespace topple::mbs {
 
 namespace {
 
-/// What a component stores when its element ends at the deformation x, forces falling to zero in this step.
-double calc_left(const ComponentState& c, double x) { return 0.5 * c.spring * (x - c.deformation); }
-double calc_last_damping(const ComponentState& c, double x) { return 0.5 * c.damper * (x - c.deformation); }
-
 void move_to(ComponentState& c, double x, bool has_been_evaluated) {
   c.before = has_been_evaluated ? c.deformation : x;
   c.deformation = x;
-}
-
-/// Ends a spring at the deformation x; returns what it stored.
-double end_spring(SpringState& s, double x) {
-  double left = s.energy;
-  if (s.has_been_evaluated) {
-    left += calc_left(s.component, x);
-    s.damping += calc_last_damping(s.component, x);
-  }
-  move_to(s.component, x, s.has_been_evaluated);
-  s.component.spring = s.component.damper = s.component.rate = 0;
-  s.energy = 0;
-  s.live = false;
-  return left;
-}
-
-double end_bushing(BushingState& s, const double x[6]) {
-  double left = s.energy;
-  for (int i = 0; i < 6; ++i) {
-    ComponentState& c = s.component[i];
-    if (s.has_been_evaluated) {
-      left += calc_left(c, x[i]);
-      s.damping += calc_last_damping(c, x[i]);
-    }
-    move_to(c, x[i], s.has_been_evaluated);
-    c.spring = c.damper = c.rate = 0;
-  }
-  s.energy = 0;
-  s.live = false;
-  return left;
 }
 
 /// The rotation vector of the same rotation nearest to the one before: it grows beyond a half turn, up to a full one.
@@ -263,8 +229,8 @@ void System::evaluate_springs(bool at_rest) {
     ForceRow row;
     const double x = measure_spring(k, row) - k.free_length, f = calc_force(k.spring, x);
     if (!at_rest && (f > k.tension_strength || -f > k.compression_strength)) {
-      s.plastic += end_spring(s, x);
-      mark_links_due();
+      const double strength = f > 0 ? k.tension_strength : -k.compression_strength;
+      s.plastic += end_spring(i, find_ending(s.component.spring, f, strength));
       say({Happening::Kind::SpringBroken, state.time, static_cast<int>(i), -1, f > 0 ? "tension" : "compression", 0});
       continue;
     }
@@ -288,8 +254,8 @@ void System::evaluate_springs(bool at_rest) {
     const double x = js.angle - k.free_angle, f = calc_force(k.spring, x);
     const bool is_loose = !js.live;  // its joint has been released
     if (is_loose || (!at_rest && std::abs(f) > k.strength)) {
-      s.plastic += end_spring(s, x);
-      mark_links_due();
+      s.plastic += end_torsion(
+          i, is_loose ? find_ending(js.ended) : find_ending(s.component.spring, f, f > 0 ? k.strength : -k.strength));
       say({Happening::Kind::RotationalSpringBroken, state.time, static_cast<int>(i), -1,
            is_loose ? "released" : "torsion", 0});
       continue;
@@ -315,14 +281,15 @@ void System::evaluate_bushing(size_t i, bool at_rest) {
   const double x[6] = {d.u.x, d.u.y, d.u.z, d.r.x, d.r.y, d.r.z};
   double f[6];
   const char* broken = nullptr;
+  Ending ending;
   for (int c = 0; c < 6; ++c) {
     f[c] = calc_force(k.spring[c], x[c]);
     if (at_rest || !(std::abs(f[c]) > k.strength[c]) || broken) continue;
+    ending = find_ending(s.component[c].spring, f[c], f[c] > 0 ? k.strength[c] : -k.strength[c]);
     broken = c == 0 ? (f[0] > 0 ? "tension" : "compression") : c < 3 ? "shear" : c == 3 ? "torsion" : "rotation";
   }
   if (broken) {
-    s.plastic += end_bushing(s, x);
-    mark_links_due();
+    s.plastic += end_bushing(i, ending);
     say({Happening::Kind::BushingBroken, state.time, static_cast<int>(i), -1, broken, 0});
     return;
   }
@@ -463,28 +430,16 @@ bool System::find_overload(std::string& message) const {
   return false;
 }
 
-void System::remove_spring(size_t i) {
-  if (!state.spring[i].live) return;
-  ForceRow row;
-  const double x = measure_spring(forces.springs[i], row) - forces.springs[i].free_length;
-  state.removed += end_spring(state.spring[i], x);
-  mark_links_due();
+void System::remove_spring(size_t i, double time) {
+  if (state.spring[i].live) state.removed += end_spring(i, find_ending(time));
 }
 
-void System::remove_torsion(size_t i) {
-  if (!state.torsion[i].live) return;
-  ForceRow row;
-  state.removed +=
-      end_spring(state.torsion[i], measure_torsion(forces.torsions[i], row) - forces.torsions[i].free_angle);
-  mark_links_due();
+void System::remove_torsion(size_t i, double time) {
+  if (state.torsion[i].live) state.removed += end_torsion(i, find_ending(time));
 }
 
-void System::remove_bushing(size_t i) {
-  if (!state.bushing[i].live) return;
-  const FrameDeformation d = measure_bushing(i);
-  const double x[6] = {d.u.x, d.u.y, d.u.z, d.r.x, d.r.y, d.r.z};
-  state.removed += end_bushing(state.bushing[i], x);
-  mark_links_due();
+void System::remove_bushing(size_t i, double time) {
+  if (state.bushing[i].live) state.removed += end_bushing(i, find_ending(time));
 }
 
 void System::add_energy_of_forces(Energy& e) const {

@@ -1,6 +1,6 @@
 #pragma once
 /// General force elements at work: springs and dampers between points, about joint axes and in six components, and
-/// loads (docs/theory/multibody.md, eq. F1 to F5). Constants and states; the functions are members of System in
+/// loads (docs/theory/multibody.md, eq. F1 to F6). Constants and states; the functions are members of System in
 /// forces.cpp, dampers.cpp and loads.cpp.
 
 #include <string>

@@ -605,6 +605,22 @@ void System::loosen_joint(size_t i) {
   begun_elements.push_back(E + r);
 }
 
+void System::release_joint(size_t i, double time) {
+  const Ending ending = find_ending(time);
+  end_joint(i, ending);
+  if (const int r = joints[i].rotational; r >= 0) {
+    if (is_loose(static_cast<size_t>(r))) {
+      unpack_element(E + static_cast<size_t>(r));
+      end_element(E + static_cast<size_t>(r), ending);
+      pack_element(E + static_cast<size_t>(r));
+    } else {
+      end_rotational(static_cast<size_t>(r), ending);
+    }
+  }
+  state.joint[i].ended = time;
+  release_joint(i, "released");
+}
+
 void System::release_joint(size_t i, const char* reason) {
   const size_t r = static_cast<size_t>(joints[i].rotational);
   const bool is_loosened = joints[i].rotational >= 0 && is_loose(r);

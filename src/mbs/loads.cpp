@@ -1,5 +1,5 @@
 /// Loads: forces and torques on bodies, constant or following a table, from the start or from an event on. The bodies
-/// get the impulse of each step exactly (docs/theory/multibody.md, eq. F5).
+/// get the impulse of each step exactly (docs/theory/multibody.md, eq. F6).
 
 #include <algorithm>
 #include <cmath>

@@ -354,38 +354,41 @@ void System::evaluate_rotationals(double h) {
   for (size_t i = 0; i < rotationals.size(); ++i) {
     ZoneState& z = state.rotational[i];
     if (!z.live) continue;
-    const CompiledRotational& c = rotationals[i];
-    const CompiledJoint& j = joints[static_cast<size_t>(c.joint)];
-    const JointState& js = state.joint[static_cast<size_t>(c.joint)];
-    const Mat3 R = rotation_of(j.parent);
-    const Vec3 axis = R * j.R_PF.column(2);
-    Six d;
-    d.c[0] = -dot(R * j.R_PF.column(0), js.force);
-    d.c[5] = js.angle;
-    const ZoneParameters& zone = c.zone;
-    const double elongated = z.axial, turned = z.station[0].reached;
-    if (ignores_limits) {
-      ZoneParameters elastic = zone;
-      elastic.stations = 0;
-      advance_zone(elastic, laws, d, state.time, h, z);
-    } else {
-      advance_zone(zone, laws, d, state.time, h, z);
-    }
-    tell_yield(E + i, z);
-    if (c.axial_element >= 0 && h > 0) {
-      const auto along = static_cast<size_t>(c.axial_element);
-      if (z.axial != elongated) elongate_element(along, z.axial - elongated);
-      const bool is_known = z.station[0].reached == turned && state.element[along].hinge_bears < kUnlimited;
-      if (z.live && turned > 0 && !is_known) limit_element(along, calc_hinge_bearing(zone, laws, state.time, z));
-    }
-    if (!z.live) {
-      break_element(E + i, z.reason);
-    } else {
-      const Vec3 t = z.resultant.c[5] * axis;
-      if (j.child >= 0) torque[static_cast<size_t>(j.child)] -= t;
-      if (j.parent >= 0) torque[static_cast<size_t>(j.parent)] += t;
-    }
+    evaluate_rotational(i, h);
+    if (!z.live) continue;
+    const CompiledJoint& j = joints[static_cast<size_t>(rotationals[i].joint)];
+    const Vec3 t = z.resultant.c[5] * (rotation_of(j.parent) * j.R_PF.column(2));
+    if (j.child >= 0) torque[static_cast<size_t>(j.child)] -= t;
+    if (j.parent >= 0) torque[static_cast<size_t>(j.parent)] += t;
   }
+}
+
+void System::evaluate_rotational(size_t i, double h) {
+  ZoneState& z = state.rotational[i];
+  const CompiledRotational& c = rotationals[i];
+  const CompiledJoint& j = joints[static_cast<size_t>(c.joint)];
+  const JointState& js = state.joint[static_cast<size_t>(c.joint)];
+  const Mat3 R = rotation_of(j.parent);
+  Six d;
+  d.c[0] = -dot(R * j.R_PF.column(0), js.force);
+  d.c[5] = js.angle;
+  const ZoneParameters& zone = c.zone;
+  const double elongated = z.axial, turned = z.station[0].reached;
+  if (ignores_limits) {
+    ZoneParameters elastic = zone;
+    elastic.stations = 0;
+    advance_zone(elastic, laws, d, state.time, h, z);
+  } else {
+    advance_zone(zone, laws, d, state.time, h, z);
+  }
+  tell_yield(E + i, z);
+  if (c.axial_element >= 0 && h > 0) {
+    const auto along = static_cast<size_t>(c.axial_element);
+    if (z.axial != elongated) elongate_element(along, z.axial - elongated);
+    const bool is_known = z.station[0].reached == turned && state.element[along].hinge_bears < kUnlimited;
+    if (z.live && turned > 0 && !is_known) limit_element(along, calc_hinge_bearing(zone, laws, state.time, z));
+  }
+  if (!z.live) break_element(E + i, z.reason);
 }
 
 void System::evaluate_cables(bool at_rest) {
@@ -400,12 +403,13 @@ void System::evaluate_cables(bool at_rest) {
     };
     const Vec3 p_A = point(k.a, k.p_A), p_B = point(k.b, k.p_B), d = p_B - p_A;
     const double length = norm(d), stretch = length - c.rest_length;
+    const double before = c.force;
     c.force = stretch > 0 ? k.stiffness * stretch : 0;
     c.energy = stretch > 0 ? 0.5 * c.force * stretch : 0;
     if (!at_rest && c.force > k.strength) {
-      c.plastic += c.energy;
-      c.force = c.energy = 0;
-      c.live = false;
+      const Ending ending = find_ending(before, c.force, k.strength);
+      c.force = before;
+      c.plastic += end_cable(i, p_A, p_B, ending);
       say({Happening::Kind::CableBroken, state.time, static_cast<int>(i), -1, "tension", 0});
       continue;
     }
@@ -426,38 +430,46 @@ void System::evaluate_cables(bool at_rest) {
 }
 
 void System::fire_events() {
-  std::vector<int>& due = due_events;
+  std::vector<DueEvent>& due = due_events;
   due.clear();
   while (state.next_event < event_order.size()) {
     const size_t index = event_order[state.next_event];
     if (model.events[index].time > state.time + 1e-9 * step) break;
     ++state.next_event;
-    (model.events[index].triggers.empty() ? due : state.waiting).push_back(static_cast<int>(index));
+    const Event& event = model.events[index];
+    if (event.triggers.empty()) {
+      due.push_back({static_cast<int>(index), event.time});
+    } else {
+      state.waiting.push_back(static_cast<int>(index));
+      state.trigger_values.resize(state.trigger_values.size() + event.triggers.size(), kUnlimited);
+    }
   }
   if (!state.waiting.empty()) find_triggered(due);
-  for (const int index : due) {
-    const Event& event = model.events[static_cast<size_t>(index)];
-    act(event);
+  for (const DueEvent& one : due) {
+    act(one);
     state.review_times.push_back(state.time);
-    say({Happening::Kind::EventFired, state.time, index, -1, event.name, 0});
+    say({Happening::Kind::EventFired, state.time, one.index, -1, model.events[static_cast<size_t>(one.index)].name, 0});
     state.quiet_steps = 0;
   }
   add_slots(begun_elements);
   begun_elements.clear();
 }
 
-void System::act(const Event& event) {
-  const double time = event.triggers.empty() ? event.time : state.time;
-  for (const Action& a : event.actions) {
+void System::act(const DueEvent& due) {
+  const double time = due.time;
+  for (const Action& a : model.events[static_cast<size_t>(due.index)].actions) {
     switch (a.kind) {
       case Action::Kind::RemoveElement: {
         const size_t e = static_cast<size_t>(a.element.index);
         ZoneState& z = state.element[e];
         if (!z.live) break;
         unpack_element(e);
-        state.removed += z.energy + z.damper_energy;
-        z.energy = z.damper_energy = 0;
-        break_zone(z, BreakReason::Removed);
+        end_element(e, find_ending(time));
+        if (z.live) {
+          state.removed += z.energy + z.damper_energy;
+          z.energy = z.damper_energy = 0;
+          break_zone(z, BreakReason::Removed);
+        }
         pack_element(e);
         mark_links_due();
         break;
@@ -477,7 +489,7 @@ void System::act(const Event& event) {
         break;
       }
       case Action::Kind::ReleaseJoint:
-        release_joint(static_cast<size_t>(a.joint.index), "released");
+        release_joint(static_cast<size_t>(a.joint.index), time);
         break;
       case Action::Kind::LoosenJoint:
         loosen_joint(static_cast<size_t>(a.joint.index));
@@ -486,20 +498,20 @@ void System::act(const Event& event) {
         replace_body(static_cast<size_t>(a.body.index), a.replacement);
         break;
       case Action::Kind::ReleaseCable: {
-        CableState& c = state.cable[static_cast<size_t>(a.cable)];
-        state.removed += c.energy;
-        c.energy = c.force = 0;
-        c.live = false;
+        const size_t i = static_cast<size_t>(a.cable);
+        const Cable& k = model.cables[i];
+        if (state.cable[i].live)
+          state.removed += end_cable(i, calc_point(k.a.index, k.p_A), calc_point(k.b.index, k.p_B), find_ending(time));
         break;
       }
       case Action::Kind::RemoveSpring:
-        remove_spring(static_cast<size_t>(a.index));
+        remove_spring(static_cast<size_t>(a.index), time);
         break;
       case Action::Kind::RemoveRotationalSpring:
-        remove_torsion(static_cast<size_t>(a.index));
+        remove_torsion(static_cast<size_t>(a.index), time);
         break;
       case Action::Kind::RemoveBushing:
-        remove_bushing(static_cast<size_t>(a.index));
+        remove_bushing(static_cast<size_t>(a.index), time);
         break;
       case Action::Kind::RemoveLoad:
         remove_load(static_cast<size_t>(a.index), time);

@@ -59,11 +59,18 @@ struct JointState {
   bool live = true;
   Vec3 force, moment;  // reaction on the child at the joint, in W [N, N·m]
   double angle = 0;    // of a revolute or cylindrical joint, continuous [rad]
+  double ended = 0;    // when an event released it [s]
   // the angle is followed from here as long as it is near: no arc tangent at each step
   double known_angle = 0, known_cosine = 1, known_sine = 0;
   unsigned char repeating = 0;  // rows that repeat those of other joints, bit r for row r
   bool is_examined = false;     // repeating is known
   double curvature[6] = {};     // the part of the last impulse that the linear step does not know [N·s, N·m·s]
+};
+
+/// An event that fires in this step.
+struct DueEvent {
+  int index = 0;    // into Model::events
+  double time = 0;  // its own, or when its trigger's limit was passed [s]
 };
 
 struct CableState {
@@ -86,6 +93,7 @@ struct State {
   bool set_step_doubted = false;  // it was too long at the last review
   size_t next_event = 0;
   std::vector<int> waiting;  // events whose time has come and that wait for a trigger, in the order of the model
+  std::vector<double> trigger_values;  // at the step before, of the triggers of those that wait, in their order
   // bodies (B)
   std::vector<BodyConstants> body;
   LaneArray<Vec3> p, v, L;  // place; velocity and angular momentum about the centre at the last half step
@@ -133,6 +141,10 @@ struct State {
   double largest_drift = 0;
   long quiet_steps = 0;
 };
+
+/// Of a quantity that was `before` a step ago and is `now`, in steps: how long ago it passed the limit, 0 if it was
+/// beyond it all the time.
+double find_passing(double before, double now, double limit);
 
 /// One constraint: direction of a force on the child (opposite on the parent) and the torques on both.
 struct JointRow {
@@ -270,7 +282,7 @@ class System {
   size_t other_on_ground = 0;          // moving bodies with shapes that are not the kernel's on the ground
   int contact_interval = 1;            // steps from one look for touching points to the next
   std::string trouble;                 // why the run cannot go on; empty: nothing
-  std::vector<int> due_events;         // of this step
+  std::vector<DueEvent> due_events;    // of this step
   std::vector<size_t> begun_elements;  // in it
   ContactScratch contact;
   View view;
@@ -306,9 +318,11 @@ class System {
   void evaluate_start();
   void start();
   void fire_events();
-  void act(const Event& event);
+  void act(const DueEvent&);
   /// Adds the waiting events whose trigger holds to those due and takes them off the list (triggers.cpp).
-  void find_triggered(std::vector<int>& due);
+  void find_triggered(std::vector<DueEvent>& due);
+  /// When a trigger that holds has passed its limit, between this step and the one before.
+  double find_passing_time(const Trigger&, double before, double now) const;
   double calc_component(const Quantity&, int component);
   // springs, bushings, loads (forces.cpp, dampers.cpp, loads.cpp); at rest nothing breaks and no time passes
   void compile_forces();
@@ -353,9 +367,31 @@ class System {
   double calc_inverse_mass(int body, const Vec3& line, const Vec3& turn) const;
   /// Rate of a row with the velocities of the last half step.
   double calc_row_rate(int a, int b, const ForceRow&) const;
-  void remove_spring(size_t);
-  void remove_torsion(size_t);
-  void remove_bushing(size_t);
+  void remove_spring(size_t, double time);
+  void remove_torsion(size_t, double time);
+  void remove_bushing(size_t, double time);
+  // endings.cpp
+  /// When a force ends: steps ago; and the time of its pull that the bodies have not had yet, counted from the middle
+  /// of the last step, where the last kick ended [s].
+  struct Ending {
+    double ago = 0, rest = 0;
+  };
+  Ending find_ending(double time) const;
+  /// When a quantity passed a limit, from its value at the step before and now; now if it was beyond it then.
+  Ending find_ending(double before, double now, double limit) const;
+  void impel(int body, const Vec3& impulse, const Vec3& turn);
+  /// Ends the pull of a row at the deformation x; returns what its spring stored then [J].
+  double end_row(int a, int b, const ForceRow&, const CompiledCharacteristic& spring,
+                 const CompiledCharacteristic& damper, ComponentState&, double x, const Ending&, double& damping);
+  double end_spring(size_t, const Ending&);
+  double end_torsion(size_t, const Ending&);
+  double end_bushing(size_t, const Ending&);
+  double end_cable(size_t, const Vec3& p_A, const Vec3& p_B, const Ending&);
+  /// Evaluates what is about to go for the last time, and gives its bodies the rest.
+  void end_element(size_t, const Ending&);
+  void end_rotational(size_t, const Ending&);
+  void end_joint(size_t, const Ending&);
+  void end_pull(int a, int b, const Vec3& on_a, const Vec3& torque_a, const Vec3& torque_b, const Ending&);
   void apply_load(size_t, double time);
   void remove_load(size_t, double time);
   double calc_last_load_change() const;
@@ -415,6 +451,7 @@ class System {
   void restore_elements(const std::vector<double>& history);
   void pack_body(size_t body);
   void evaluate_rotationals(double h);
+  void evaluate_rotational(size_t rotational, double h);
   /// Whether a rotational element has taken over from its joint and still holds.
   bool is_loose(size_t rotational) const { return state.element[E + rotational].live; }
   /// The same whether it still holds or not.
@@ -563,6 +600,7 @@ class System {
   /// Of those that have in lanes, where nobody was told; their states are unpacked.
   void tell_yields();
   void release_joint(size_t j, const char* reason);
+  void release_joint(size_t j, double time);  // by an event
   void replace_body(size_t b, const Body& replacement);
   /// Polyhedra of the model and of what events put in place of bodies.
   void compile_hulls();

@@ -14,6 +14,24 @@ namespace {
 double component_of(const Vec3& x, int component) { return component < 3 ? x[component] : norm(x); }
 double component_of(double x, int component) { return component < 3 ? x : std::abs(x); }
 
+bool is_force(Quantity::Kind kind) {
+  using enum Quantity::Kind;
+  switch (kind) {
+    case JointForce:
+    case JointMoment:
+    case ElementForce:
+    case ElementMoment:
+    case BushingForce:
+    case BushingMoment:
+    case SpringForce:
+    case TorsionTorque:
+    case CableForce:
+      return true;
+    default:
+      return false;
+  }
+}
+
 }  // namespace
 
 double System::calc_component(const Quantity& q, int component) {
@@ -89,30 +107,39 @@ double System::calc_component(const Quantity& q, int component) {
   return 0;
 }
 
-void System::find_triggered(std::vector<int>& due) {
-  size_t kept = 0;
+void System::find_triggered(std::vector<DueEvent>& due) {
+  size_t kept = 0, kept_values = 0, value = 0;
   const size_t timed = due.size();
   for (const int index : state.waiting) {
     const Event& event = model.events[static_cast<size_t>(index)];
-    const bool holds = std::any_of(event.triggers.begin(), event.triggers.end(), [&](const Trigger& t) {
-      const double x = calc_component(t.quantity, t.component);
-      return t.rising ? x >= t.limit : x <= t.limit;
-    });
-    if (holds) {
-      due.push_back(index);
+    double passed = kUnlimited;  // the first of those that hold
+    const size_t first = kept_values;
+    for (const Trigger& t : event.triggers) {
+      const double x = calc_component(t.quantity, t.component), before = state.trigger_values[value++];
+      if (t.rising ? x >= t.limit : x <= t.limit) passed = std::min(passed, find_passing_time(t, before, x));
+      state.trigger_values[kept_values++] = x;
+    }
+    if (passed < kUnlimited) {
+      due.push_back({index, passed});
+      kept_values = first;
     } else {
       state.waiting[kept++] = index;
     }
   }
   state.waiting.resize(kept);
+  state.trigger_values.resize(kept_values);
   if (due.size() == timed) return;
-  // what fires at the same time fires in the order of the model; a time event of within the step comes first
-  const auto time_of = [&](int index) {
-    const Event& e = model.events[static_cast<size_t>(index)];
-    return e.triggers.empty() ? std::min(e.time, state.time) : state.time;
-  };
-  std::sort(due.begin(), due.end(),
-            [&](int a, int b) { return time_of(a) != time_of(b) ? time_of(a) < time_of(b) : a < b; });
+  // what fires at the same time fires in the order of the model
+  std::sort(due.begin(), due.end(), [](const DueEvent& a, const DueEvent& b) {
+    return a.time != b.time ? a.time < b.time : a.index < b.index;
+  });
+}
+
+double System::find_passing_time(const Trigger& t, double before, double now) const {
+  // forces are those of the evaluation before
+  const double known = is_force(t.quantity.kind) ? state.time - state.last_kick : state.time;
+  if (state.first_kick || before == kUnlimited) return state.time;
+  return known - find_passing(before, now, t.limit) * state.last_kick;
 }
 
 }  // namespace topple::mbs
