@@ -291,6 +291,12 @@ class Manager {
     uncertainty::Asker asker([this](auto batch, auto out) { evaluate(batch, out); }, quiet, nullptr, budget.bounds);
     StudyResult r;
     ask_for_drivers(problem_, budget, asker);
+    // possibilities before the bounds of each outcome, for which a quarter of the runs is kept
+    options.before_classes = [&] {
+      asker.set_limit(budget.possibilities - (budget.possibilities - asker.asked()) / 4);
+      find_possibilities(r, asker);
+      asker.set_limit(std::max(budget.bounds, asker.asked() + (budget.possibilities - asker.asked()) / 2));
+    };
     uncertainty::AlphaSearch search(problem_.space, asker, options);
     r.alpha = search.run();
     const int asked_by_bounds = asker.asked();

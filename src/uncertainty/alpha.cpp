@@ -112,6 +112,11 @@ class Optimisation {
       recheck(false);
     }
     if (options_.search_classes) {
+      if (is_first && options_.before_classes && !make_goals(true).empty()) {
+        options_.before_classes();
+        note_new();
+        recheck(false);
+      }
       if (is_first) search_from_best(true);
       recheck(true);
     }

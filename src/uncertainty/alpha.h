@@ -108,6 +108,9 @@ struct AlphaOptions {
   /// Own searches for the bounds of each outcome class, for which a seventh of the limit is kept; without them these
   /// bounds are read off the archive.
   bool search_classes = true;
+  /// Called once, when the bounds of all runs are searched and before those of each class where there are several:
+  /// others may use the asker and set its limit.
+  std::function<void()> before_classes;
   /// A search has converged when less than this part of the output's width is left to gain.
   double tolerance = 1e-8;
   /// Bounds of outputs that are not looked for by searches, but still reported from the archive (by index).
