@@ -315,6 +315,7 @@ class Manager {
     }
     asker.set_limit(budget.limit);
     give_back(r, asker, search);
+    if (problem_.permissible.empty()) look_further(r, asker, search);
     review_boxes(r.insights, problem_, asker.archive(), options.levels, names_.outputs, names_.outcomes);
     if (asker.asked() > asked_by_bounds || has_classes()) {
       // further runs may have moved bounds
@@ -408,6 +409,19 @@ class Manager {
       if (part > 0 && r.alpha.classes.size() > 1) asker.set_limit(limit - asker.rest() / part);
       r.alpha = search.go_on();
       settle();
+    }
+  }
+
+  /// What is left goes into spread points, until half of all runs are such, and into searches from what they meet: of
+  /// an outcome in a small part of the support nothing is known before.
+  void look_further(StudyResult& r, uncertainty::Asker& asker, uncertainty::AlphaSearch& search) const {
+    const int axes = static_cast<int>(std::count_if(problem_.space.inputs.begin(), problem_.space.inputs.end(),
+                                                    [](const auto& f) { return f.width() > 0; }));
+    while (asker.can_go_on()) {
+      const int count = std::min(asker.limit() / 2 - r.alpha.coverage.front().space_points, asker.rest() / 2);
+      if (count < 10 * axes) break;
+      r.alpha = search.spread_on(count);
+      if (asker.can_go_on() && r.alpha.classes.size() > 1) find_possibilities(r, asker);
     }
   }
 

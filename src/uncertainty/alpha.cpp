@@ -80,6 +80,18 @@ class Optimisation {
     return search_on(false);
   }
 
+  AlphaResult spread_on(int count) {
+    note_new();
+    unfinished_ = false;
+    new_from_ = asker_.asked();
+    spread(count / count_spread());
+    if (!has_many_inputs()) search_dispersed();
+    recheck(false);
+    if (options_.search_classes) recheck(true);
+    ++rounds_;
+    return conclude();
+  }
+
  private:
   /// Rounds from other places, then classes, to the end.
   AlphaResult search_on(bool is_first) {
@@ -90,7 +102,7 @@ class Optimisation {
     if (has_last_steps) asker_.set_limit(asker_.limit() - asker_.rest() / 10);
     for (int idle = 0; asker_.can_go_on() && idle < (has_valleys() ? 2 : 1) * options_.patience;) {
       const std::vector<double> before = calc_bounds();
-      if (rounds_ > 0) spread(0.25);
+      if (rounds_ > 0) spread(limit_share(0.25));
       if (!has_many_inputs()) scan(), share_optima();
       for (int k = 0; k < 2; ++k) restart_faces(true);
       const bool has_starts = search_dispersed();
@@ -120,6 +132,10 @@ class Optimisation {
       if (is_first) search_from_best(true);
       recheck(true);
     }
+    return conclude();
+  }
+
+  AlphaResult conclude() {
     const bool is_cut = unfinished_;
     if (is_done_ && !has_many_inputs()) unfinished_ = !is_all_settled();
     show(true);
@@ -179,36 +195,48 @@ class Optimisation {
     }
     ask(points);
     space_points_.assign(levels_.size(), 0);
-    spread(1);
+    spread(limit_share(1));
   }
 
-  /// Spread points, `share` of the first time's number: a sequence over the inputs that have a width, continued.
+  /// Spread points of a level, the first time.
+  int count_spread(std::size_t level) const {
+    const int given = level == 0 ? options_.space_points : options_.inner_points;
+    const int n = static_cast<int>(regions_.front().axes.size());
+    return level > 0 && regions_[level].axes.empty() ? 0 : given > 0 ? given : (level == 0 ? 80 : 20) * n;
+  }
+  double count_spread() const {
+    double whole = 0;
+    for (std::size_t k = 0; k < regions_.size(); ++k) whole += count_spread(k);
+    return std::max(whole, 1.0);
+  }
+
+  /// Spread points, `share` of the first time's number: a sequence over the inputs that have a width, continued. Where
+  /// interaction leaves little of a box, it goes on until that has its number, or 20 times as many were tried.
   void spread(double share) {
     std::vector<Point> points;
     const auto& axes = regions_.front().axes;
     const int n = static_cast<int>(axes.size());
-    const auto wanted = [&](std::size_t k) {
-      const int given = k == 0 ? options_.space_points : options_.inner_points;
-      return k > 0 && regions_[k].axes.empty() ? 0 : given > 0 ? given : (k == 0 ? 80 : 20) * n;
-    };
-    double whole = 0;
-    for (std::size_t k = 0; k < regions_.size(); ++k) whole += wanted(k);
-    share *= std::min(1.0, asker_.limit() / 3.0 / std::max(whole, 1.0));
     for (std::size_t k = 0; n > 0 && k < regions_.size(); ++k) {
-      const int count = static_cast<int>(std::ceil(share * wanted(k)));
-      for (const auto& u : make_sobol_points(n, next_spread_, count, options_.seed)) {
-        Point fractions(space_.inputs.size(), 0.0);
-        for (int i = 0; i < n; ++i) fractions[axes[i]] = u[i];
-        Point x = place_in(regions_[k].box, fractions);
-        if (!space_.has_interaction() || regions_[k].contains(x)) points.push_back(std::move(x));
+      const int count = static_cast<int>(std::ceil(share * count_spread(k)));
+      for (int allowed = 0, pass = 0; allowed < count && pass < (space_.has_interaction() ? 20 : 1); ++pass) {
+        for (const auto& u : make_sobol_points(n, next_spread_, count, options_.seed)) {
+          Point fractions(space_.inputs.size(), 0.0);
+          for (int i = 0; i < n; ++i) fractions[axes[i]] = u[i];
+          Point x = place_in(regions_[k].box, fractions);
+          ++next_spread_;
+          if (space_.has_interaction() && !regions_[k].contains(x)) continue;
+          points.push_back(std::move(x));
+          if (++allowed == count) break;
+        }
       }
-      next_spread_ += count;
     }
     ask(points);
     for (const auto& x : points)
       if (asker_.archive().find(x) >= 0)
         for (int k = 0; k < count_levels(space_, levels_, boxes_, x); ++k) ++space_points_[k];
   }
+  /// The share that leaves two thirds of the runs to others.
+  double limit_share(double share) const { return share * std::min(1.0, asker_.limit() / 3.0 / count_spread()); }
 
   /// Along every axis from the best sample of each goal: the ends of the cut and places between. Finds other basins of
   /// mappings whose inputs act on their own.
@@ -392,8 +420,10 @@ class Optimisation {
       return nearer >= 2 * n;
     };
     for (const bool only_bottoms : {true, false}) {
-      if (only_bottoms ? has_many_inputs() : rounds_ >= options_.patience && !has_many_inputs()) continue;
+      if (only_bottoms ? has_many_inputs() : (new_from_ > 0 || rounds_ >= options_.patience) && !has_many_inputs())
+        continue;
       for (std::size_t k = 0; k < all.size() && static_cast<int>(starts.size()) < count; ++k) {
+        if (all[k].sample < new_from_) continue;
         bool is_apart = true;
         for (std::size_t j = 0; j < used.size() && is_apart; ++j)
           is_apart = distance_of(&used_at[j * n], &at[k * n]) > least;
@@ -934,6 +964,7 @@ class Optimisation {
   std::map<Key, Faces> faces_;
   std::map<Key, std::vector<int>> scanned_;  // samples through which lines led to no better basin
   int next_spread_ = 1;
+  int new_from_ = 0;  // older samples are no starts
   std::uint64_t searches_ = 0;
   int rechecks_ = 0, rounds_ = 0, shown_ = 0, restarts_ = 0, restart_rounds_ = 0;
   bool unfinished_ = false;
@@ -1024,6 +1055,7 @@ AlphaSearch::AlphaSearch(const Space& space, Asker& asker, const AlphaOptions& o
 AlphaSearch::~AlphaSearch() = default;
 AlphaResult AlphaSearch::run() { return parts_->optimisation.run(); }
 AlphaResult AlphaSearch::go_on() { return parts_->optimisation.go_on(); }
+AlphaResult AlphaSearch::spread_on(int count) { return parts_->optimisation.spread_on(count); }
 
 AlphaResult optimise(const Space& space, Asker& asker, const AlphaOptions& options) {
   return AlphaSearch(space, asker, options).run();

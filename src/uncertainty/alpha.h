@@ -149,6 +149,9 @@ class AlphaSearch {
   AlphaResult run();
   /// After `run`, with a higher limit: from the best samples that are there by now, whoever asked for them.
   AlphaResult go_on();
+  /// After `run`: at least so many further spread points, as far as there are runs, and searches from what stands out
+  /// among them.
+  AlphaResult spread_on(int count);
 
  private:
   struct Parts;

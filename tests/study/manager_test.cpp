@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "base/error.h"
 #include "server.h"
@@ -49,6 +50,73 @@ TEST(StudyReference, FindsBoundsAndPossibilityOfTheJump) {
   EXPECT_NEAR(r.possibilities.classes[1].possibility, .456598936, 1e-3);
   EXPECT_EQ(r.possibilities.classes[0].possibility, 1);
   EXPECT_LE(r.alpha.archive.size(), 10000u);
+}
+
+/// Runs of a mapping of all inputs: their sum, and whether an outcome happens.
+RunnerFactories make_sum_factories(std::function<bool(const Point&)> happens) {
+  return {{"small", [happens = std::move(happens)](const std::string&) -> Runner {
+             return [happens](auto points, const auto& give, const auto&) {
+               for (std::size_t i = 0; i < points.size(); ++i) {
+                 const double sum = std::accumulate(points[i].begin(), points[i].end(), 0.0);
+                 give(i, {Answer::Kind::Done, {{"y", sum}}, happens(points[i]) ? "in" : "out", {}, "", 0});
+               }
+             };
+           }}};
+}
+
+double find_possibility(const StudyResult& r, const std::string& outcome) {
+  for (const auto& c : r.possibilities.classes)
+    if (c.outcome >= 0 && r.outcomes.at(c.outcome) == outcome) return c.possibility;
+  return -1;
+}
+
+TEST(StudyReference, FindsThePossibilityBeforeBoundsOfOutcomesTakeAllRuns) {
+  // the box is touched at its corner x0 = -s, all others 2 s, with s = 1 - alpha
+  const Folder folder;
+  Problem p;
+  p.kind = "small";
+  for (int i = 0; i < 8; ++i) {
+    p.inputs.push_back({"x" + std::to_string(i), "", 1});
+    p.space.inputs.push_back(uncertainty::make_triangular(-1, 0, 2));
+  }
+  p.limit = 10000;
+  const StudyResult r = run(p, make_options(folder / "s"), make_sum_factories([](const Point& x) {
+                              return std::inner_product(x.begin(), x.end(), x.begin(), 0.0) - x[0] > 6;
+                            }));
+  const double s = (-1 + std::sqrt(1 + 4 * 29 * 6.0)) / (2 * 29);  // 29 s^2 + s = 6
+  EXPECT_NEAR(find_possibility(r, "in"), 1 - s, 1e-3);
+}
+
+TEST(StudyReference, SpreadsWhatSearchesLeaveForSmallIslands) {
+  // three discs; the most possible one takes 0.3 % of the support
+  const Folder folder;
+  Problem p;
+  p.kind = "small";
+  p.inputs = {{"x0", "", 1}, {"x1", "", 1}};
+  p.space.inputs = {uncertainty::make_triangular(0, 3, 10), uncertainty::make_triangular(0, 6, 10)};
+  p.limit = 10000;
+  for (const std::uint64_t seed : {1, 2}) {
+    p.seed = seed;
+    const StudyResult r = run(p, make_options(folder / std::to_string(seed)), make_sum_factories([](const Point& x) {
+                                const auto is_near = [&x](double a, double b, double radius) {
+                                  return std::hypot(x[0] - a, x[1] - b) <= radius;
+                                };
+                                return is_near(9, 9, 0.3) || is_near(8, 2, 0.3) || is_near(1, 1, 0.4);
+                              }));
+    EXPECT_NEAR(find_possibility(r, "in"), 2.3 / 7, 1e-3) << seed;
+    EXPECT_GE(r.alpha.coverage[0].space_points, 3000) << seed;
+    EXPECT_LE(r.alpha.coverage[0].space_points, 5000 + 100) << seed;
+    EXPECT_LE(r.alpha.archive.size(), 10000u) << seed;
+  }
+}
+
+TEST(Study, SpreadsAsMuchWhereConstraintsLeaveLittle) {
+  const Folder folder;
+  Problem p = make_small_problem(1500);
+  p.space.constraints = {[](const Point& x) { return x[0] - 26; }, [](const Point& x) { return 62 - x[1]; },
+                         [](const Point& x) { return x[1] - 70; }};
+  const StudyResult r = run(p, make_options(folder / "s"));
+  EXPECT_GE(r.alpha.coverage[0].space_points, 300);
 }
 
 TEST(StudyReplay, IsTheSameForAnyNumberOfWorkersAndBatches) {
