@@ -326,6 +326,7 @@ void ModelSearch::read_star(std::span<const Told> told) {
     axis.slope = axis.curvature = axis.reach = 0;
     const double fa = value_at(axis.at_a), fb = value_at(axis.at_b);
     const bool has_a = std::isfinite(fa), has_b = std::isfinite(fb);
+    axis.known = has_a || has_b;
     if (has_a && has_b) {
       axis.curvature = 2 * ((fb - value_) / axis.b - (fa - value_) / axis.a) / (axis.b - axis.a);
       axis.slope = (fb - value_) / axis.b - 0.5 * axis.curvature * axis.b;
@@ -344,6 +345,12 @@ void ModelSearch::read_star(std::span<const Told> told) {
     if (std::isfinite(mixed)) hessian_[p.i * n + p.j] = hessian_[p.j * n + p.i] = mixed / (p.di * p.dj);
   }
   read_aside(told);
+}
+
+/// Whether all places of the star along an axis belong to another outcome: its slope is not known.
+bool ModelSearch::is_blind() const {
+  return std::any_of(axes_.begin(), axes_.end(),
+                     [](const Axis& axis) { return !axis.known && (axis.at_a >= 0 || axis.at_b >= 0); });
 }
 
 /// Whether there is a kink in the valley along an axis: the curvature that a nearer star saw is much larger.
@@ -422,6 +429,7 @@ void ModelSearch::ask_trials() {
     // as near to the wall as its curvature lets
     for (const double part : {0.3, 0.1, 0.03, 0.01, 0.0}) steps.push_back(find_walled_step(part * radius_));
     promised_ = -calc_model(steps.back());
+    along_ = std::min(along_, promised_ / std::max(-calc_model(whole), options_.tolerance));
   } else if (region_.space->has_interaction()) {
     std::vector<double> allowed = whole;
     find_allowed_step(allowed);
@@ -457,13 +465,18 @@ void ModelSearch::finish_iteration() {
   if (next_outcome_ != outcome_) walls_.clear();
   best_ = next_, value_ = next_value_, outcome_ = next_outcome_;
   const bool walled = wall_ && wall_->found();
+  // a way along the boundary may be long
+  if (wall_ && (gained > 1e4 * options_.tolerance || gained > std::max(10 * options_.tolerance, 0.1 * promised_)))
+    --probes_;
+  if (gained > 1e4 * options_.tolerance) along_ = 1;
   const bool any_free = std::any_of(axes_.begin(), axes_.end(), [](const Axis& a) { return a.free; });
   // a plane is no more than the boundary's tangent
   const double tolerance = walled ? 1000 * options_.tolerance : options_.tolerance;
   const bool small = promised_ <= tolerance && gained <= tolerance;
-  const bool settled = small && radius_ <= (any_free ? 0.01 : 0.03);
+  const bool settled = small && !is_blind() && radius_ <= (any_free ? 0.01 : 0.03);
   if (settled || radius_ < (has_met_walls_ ? options_.smallest : std::max(options_.smallest, options_.edge))) {
-    converged_ = true;
+    // where a boundary stops it that is not located any more, the way along it may lead on
+    converged_ = settled || wall_ || probes_ < options_.probes || promised_ <= tolerance || along_ < 0.05;
     at_edge_ = !settled || is_bent();
     pending_.clear();
     return;

@@ -84,7 +84,7 @@ class ModelSearch : public LocalSearch {
     int at_a = -1, at_b = -1;  // among the pending points
     double slope = 0, curvature = 0;
     double reach = 0, before = 0, reach_before = 0;  // of the star; curvature and reach of the star before
-    bool free = false;
+    bool free = false, known = false;
   };
   struct Pair {
     int i = 0, j = 0;                   // axes
@@ -97,6 +97,7 @@ class ModelSearch : public LocalSearch {
   std::vector<double> find_walled_step(double distance) const;
   void note(std::span<const Told> told);
   bool is_bent() const;
+  bool is_blind() const;
   bool is_blocked(std::span<const Told> told) const;
   bool ask_probe();
   std::vector<double> to_widths(const std::vector<double>& step) const;
@@ -121,6 +122,7 @@ class ModelSearch : public LocalSearch {
   std::vector<double> hessian_;   // axes x axes
   double radius_, trust_;
   double promised_ = 0;
+  double along_ = 1;  // least part of what is promised here that a located boundary leaves
   int iteration_ = 0, probes_ = 0;
   bool at_edge_ = false, has_met_walls_ = false;
   enum class Stage { Star, Probe, Trial } stage_ = Stage::Star;

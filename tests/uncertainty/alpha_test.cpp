@@ -743,5 +743,23 @@ TEST(Alpha, SaysThatSearchesHaveNotConvergedWhereRunsAreLeft) {
   EXPECT_FALSE(all);
 }
 
+// Searches saw no run of a thin class around them and took that for a place where nothing is to be gained.
+TEST(AlphaOfClasses, FollowsAThinClass) {
+  const Evaluate model = make_evaluate([](const Point& x) {
+    const bool is_in = std::abs(std::hypot(x[0] - 3, x[1] - 6) - 3.5) < 0.02;
+    return Result{Result::State::Done, {x[0] + x[1]}, is_in ? 1 : 0, {}, ""};
+  });
+  const std::vector<FuzzyNumber> inputs = {make_triangular(0, 3, 10), make_triangular(0, 6, 10)};
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    AlphaOptions options;
+    options.seed = seed;
+    const AlphaResult r = optimise(inputs, model, options, {});
+    ASSERT_EQ(r.classes.size(), 2u);
+    const LevelBounds& l = r.classes[1].outputs[0].levels[0];
+    EXPECT_NEAR(l.lower.value, 9 - 3.52 * std::sqrt(2), 20 * (l.lower.converged ? 1e-4 : 1e-3)) << seed;
+    EXPECT_NEAR(l.upper.value, 9 + 3.52 * std::sqrt(2), 20 * (l.upper.converged ? 1e-4 : 1e-3)) << seed;
+  }
+}
+
 }  // namespace
 }  // namespace topple::uncertainty
