@@ -49,8 +49,10 @@ struct Reader {
     std::vector<double> numbers;
     for (const Node& item : node.items) {
       if ((item.kind != Node::Kind::Integer && item.kind != Node::Kind::Float) || !std::isfinite(item.number)) {
+        const bool has_unit =
+            item.kind == Node::Kind::String && item.text.find_first_of("0123456789") != std::string::npos;
         complaints.error("E202", item.place, label + ": a finite number without a unit is wanted",
-                         "give the unit beside it: unit = \"N/mm2\"");
+                         has_unit ? "give the unit beside it: unit = \"N/mm2\"" : "numbers alone, as in [10, 25, 45]");
         return std::nullopt;
       }
       numbers.push_back(item.number);

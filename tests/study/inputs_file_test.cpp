@@ -107,6 +107,11 @@ TEST(InputsFile, WantsInputs) {
     return Diagnostic{};
   };
   EXPECT_NE(complaint_of("title = \"x\"\n").message.find("missing table"), std::string::npos);
+  const auto hint_of = [&](const std::string& number) {
+    return complaint_of(("[inputs]\na = { triangular = [1, " + number + ", 3] }\n").c_str()).help;
+  };
+  EXPECT_EQ(hint_of("\"2 m\"").substr(0, 13), "give the unit");
+  for (const char* number : {"nan", "inf", "\"x\""}) EXPECT_EQ(hint_of(number).substr(0, 7), "numbers") << number;
   EXPECT_EQ(complaint_of("").message, "the file of fuzzy inputs is empty");
   const Diagnostic none = complaint_of("title = \"x\"\n[inputs]\n");
   EXPECT_EQ(none.message, "there is no input in [inputs]");
