@@ -95,10 +95,11 @@ std::string tell_outputs(const Problem& p, const StudyResult& r, const uncertain
     if (o >= core.result.values.size() || levels.empty() || levels.front().lower.sample < 0) continue;
     const Quantity q = find_output(p, r.outputs[o]);
     const double width = levels.front().upper.value - levels.front().lower.value;
-    text += fmt::format("{}With the core values {} is {}; over the whole support it lies between {} and {}.",
+    const bool is_found = levels.front().lower.converged && levels.front().upper.converged;
+    text += fmt::format("{}With the core values {} is {}; over the whole support it lies between {} and {}{}.",
                         text.empty() ? "" : " ", q.name, words_of_value(q, core.result.values[o], width),
                         words_of_number(levels.front().lower.value / q.unit_value, width / q.unit_value),
-                        words_of_value(q, levels.front().upper.value, width));
+                        words_of_value(q, levels.front().upper.value, width), is_found ? "" : ", as far as found");
   }
   if (r.outputs.size() > most) text += fmt::format(" And {} more outputs.", r.outputs.size() - most);
   return text;

@@ -619,9 +619,15 @@ TEST(Story, TellsOutputsWhereThereAreNoOutcomes) {
   EXPECT_EQ(told.front().id, "verdict");
   EXPECT_TRUE(
       told.front().text.starts_with("With the core values y is 1; over the whole support it lies between 0 "
-                                    "and 1."))
+                                    "and 1, as far as found."))
       << told.front().text;
   EXPECT_NE(told.front().text.find("z is -1000 mm"), std::string::npos) << told.front().text;
+  p.limit = 1000;
+  const StudyResult more = run(p, folder, "more", make_factories([](const Point& x) {
+                                 return done({{"y", x[0]}}, "");
+                               }));
+  EXPECT_TRUE(tell(p, more).front().text.ends_with("over the whole support it lies between 0 and 2."))
+      << tell(p, more).front().text;
 }
 
 TEST(Story, GuaranteesNothingOfABoxThatIsBroken) {
