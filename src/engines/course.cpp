@@ -175,13 +175,18 @@ Course::Verdict Course::accept(double time, const Motion& motion, const Work& wo
   bool jumped = false;
   measure_joints();
   if (is_started_) {
-    check_joints();
-    jumped |= fire_events();
     std::vector<Vec3> in_F;
     if (forces_.needs_joint_forces() && !reactions_.force.empty())
       for (size_t j = 0; j < model_.joints.size(); ++j)
         in_F.push_back(transpose_times(to_matrix(frames_of(model_.joints[j]).X_WF.q), reactions_.force[j]));
+    // what is released or removed leaves with the history and energy of this state
     jumped |= forces_.advance(time, motion_, in_F);
+    const bool is_released = check_joints();
+    if (fire_events() || is_released) {
+      forces_.renew(time, motion_);
+      is_viewed_ = false;
+      jumped = true;
+    }
     shorten_boxes();
   }
   is_started_ = true;

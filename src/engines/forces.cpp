@@ -264,8 +264,21 @@ void Forces::calc(double time, const Motion& motion, std::vector<Wrench>& on) co
     on = cached_;
     return;
   }
-  on.assign(model_.bodies.size(), {});
   const Vec3 ground_before = on_ground_;
+  evaluate(time, motion, on);
+  on_ground_ = ground_before;
+}
+
+void Forces::renew(double time, const Motion& motion) {
+  on_ground_ = {};
+  evaluate(time, motion, cached_);
+  is_cached_ = true;
+  cached_time_ = time;
+  cached_motion_ = motion;
+}
+
+void Forces::evaluate(double time, const Motion& motion, std::vector<Wrench>& on) const {
+  on.assign(model_.bodies.size(), {});
   // a history that has begun goes on from its damper's state even if no time has passed
   const double h = std::max(time - accepted_, std::numeric_limits<double>::min());
   const auto try_zone = [&](const Zone& z, const mbs::Six& d) {
@@ -299,7 +312,6 @@ void Forces::calc(double time, const Motion& motion, std::vector<Wrench>& on) co
     twist(j.parent, torque, on);
   }
   push_others(time, motion, on);
-  on_ground_ = ground_before;
 }
 
 void Forces::push_others(double time, const Motion& motion, std::vector<Wrench>& on) const {

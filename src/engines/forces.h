@@ -53,6 +53,8 @@ class Forces {
   /// Accepts a state: history goes on, what passes its strength breaks. True if a force has jumped.
   ///   joint_force  reactions in F, for rotational elements; empty: what they were (J)
   bool advance(double time, const Motion&, const std::vector<Vec3>& joint_force);
+  /// Forces at the accepted state anew, after events.
+  void renew(double time, const Motion&);
 
   // Events; they count from the next evaluation on.
   void remove_element(size_t);
@@ -125,6 +127,7 @@ class Forces {
     Vec3 r;
   };
 
+  void evaluate(double time, const Motion&, std::vector<Wrench>& on_body) const;
   void prepare(mbs::ZoneParameters&, double h) const;
   Pose pose_of(const Motion&, mbs::BodyId) const;
   Vec3 velocity_at(const Motion&, mbs::BodyId, const Vec3& p_W) const;
