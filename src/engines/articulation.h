@@ -25,6 +25,10 @@ struct Articulation {
 ///   joint_live  joints that are there (J)
 Articulation make_articulation(const mbs::Model&, const std::vector<unsigned char>& joint_live);
 
+/// Loops whose joints hold wherever the branches go, such as a door's second hinge on the line of the first, rising.
+///   distance  that distance joints keep (J) [m]
+std::vector<int> find_idle_loops(const mbs::Model&, const Articulation&, const std::vector<double>& distance);
+
 /// Whether a body never moves.
 inline bool is_ground(const mbs::Model& model, int body) {
   return body < 0 || model.bodies[static_cast<size_t>(body)].fixed;

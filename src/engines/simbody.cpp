@@ -14,6 +14,7 @@ std::unique_ptr<Engine> make_simbody_engine(const Accuracy&) { return nullptr; }
 #include <algorithm>
 #include <exception>
 #include <memory>
+#include <string>
 #include <utility>
 
 #include "engines/articulation.h"
@@ -77,6 +78,7 @@ class Built {
         articulation_(make_articulation(model_, course.joint_live())),
         mobilizer_(model_.bodies.size(), -1),
         motion_(course.motion()) {
+    leave_out_idle_loops();
     const simbody::Description description = describe();
     const Forces& forces = course.forces();
     simbody::PowerFunction power;
@@ -113,6 +115,8 @@ class Built {
   }
 
   simbody::System& system() { return *system_; }
+  /// Joints that are no constraints because others hold the same; their reactions are zero.
+  const std::vector<int>& left_out() const { return left_out_; }
 
   const Motion& motion() {
     read(system_->motion());
@@ -164,6 +168,15 @@ class Built {
   }
   int mobilizer_of(int body) const { return is_ground(model_, body) ? -1 : mobilizer_[static_cast<size_t>(body)]; }
 
+  /// Simbody gives up where no constraint holds anything.
+  void leave_out_idle_loops() {
+    std::vector<double> distance(model_.joints.size());
+    for (size_t j = 0; j < distance.size(); ++j) distance[j] = course_.distance(j);
+    left_out_ = find_idle_loops(model_, articulation_, distance);
+    std::erase_if(articulation_.loops,
+                  [&](int loop) { return std::binary_search(left_out_.begin(), left_out_.end(), loop); });
+  }
+
   simbody::Description describe() {
     simbody::Description d;
     d.gravity = to_three(model_.gravity);
@@ -208,6 +221,7 @@ class Built {
   const Ground& ground_;
   const mbs::Model& model_;
   Articulation articulation_;
+  std::vector<int> left_out_;
   std::vector<int> mobilizer_;  // of each body (B)
   Motion motion_;               // places of fixed bodies stay
   std::vector<Wrench> wrench_;
@@ -231,6 +245,18 @@ bool has_history(const mbs::Model& m) {
          breaks(m.joints, [](const auto& j) {
            return std::min({j.tension_limit, j.shear_limit, j.moment_limit, j.rotation_limit});
          });
+}
+
+/// Up to six joints by name.
+std::string list_joints(const mbs::Model& model, const std::vector<int>& list) {
+  constexpr size_t most = 6;
+  std::string out = list.size() == 1 ? "joint " : "joints ";
+  for (size_t i = 0; i < std::min(list.size(), most); ++i) {
+    const std::string& name = model.joints[static_cast<size_t>(list[i])].name;
+    out += (i > 0 ? ", " : "") + (name.empty() ? "number " + std::to_string(list[i]) : "\"" + name + "\"");
+  }
+  if (list.size() > most) out += " and " + std::to_string(list.size() - most) + " more";
+  return out;
 }
 
 class SimbodyEngine : public Engine {
@@ -280,6 +306,9 @@ class SimbodyEngine : public Engine {
                            Work& before, long& steps) {
     using Verdict = Course::Verdict;
     Built built(course, ground, settings);
+    if (!built.left_out().empty())
+      course.note(list_joints(course.model(), built.left_out()) +
+                  ": others hold the same wherever the bodies go; left out, with reactions of 0");
     simbody::System& system = built.system();
     std::vector<unsigned char> is_held;
     const auto find_held = [&] {

@@ -438,6 +438,65 @@ TEST_P(EnginesAlikeReference, WithoutAStepTheyFollowWhatEventsLeave) {
   EXPECT_LT(c.runs[1].position.value, 2e-3);  // of a swing of 10 mm
 }
 
+TEST_P(EnginesAlikeReference, ADoorOnMoreThanItNeeds) {
+  NEEDS_ENGINE();
+  // a hinge on z, and on its line another joint; or the first on a ball that the door hangs on
+  for (const Kind second : {Kind::Revolute, Kind::Cylindrical, Kind::Spherical, Kind::Distance})
+    for (const bool is_first : {true, false})
+      for (const bool is_free : {false, true}) {
+        if (is_first && second == Kind::Distance) continue;  // closes loops only
+        mbs::Model m = test::make_empty({0.5, -2, -9.81});
+        mbs::BodyId frame = mbs::kGround;
+        if (is_free) frame = mbs::add_body(m, test::make_body("frame", 20, {2, 3, 1}, {-0.3, 0, 1}));
+        const auto door = mbs::add_body(m, test::make_body("door", 10, {3.4, 4.2, 0.85}, {0.5, 0, 1}));
+        m.bodies.back().w_WB = {0, 0, 3};
+        m.bodies.back().v_WB = {0, 1.5, 0};
+        const auto hinge = [&] {
+          mbs::add_joint(m, test::make_joint(m, Kind::Revolute, frame, door, {{0, 0, 0.2}, {}}));
+        };
+        if (!is_first) hinge();
+        mbs::Joint j = test::make_joint(m, second, frame, door, {{0, 0, 1.8}, {}});
+        if (second == Kind::Distance) j.X_CM.p += Vec3{0.2, 0.3, 0};
+        mbs::add_joint(m, j);
+        if (is_first) hinge();
+        const std::string what = std::to_string(static_cast<int>(second)) + (is_first ? " first" : " second") +
+                                 (is_free ? " of a free frame" : "");
+        const EngineRun r = compare_with_native(m, 0.5);
+        EXPECT_LT(r.position.value, 2e-7) << what;
+        EXPECT_LT(r.orientation.value, 2e-7) << what;
+        EXPECT_LT(r.summary.joint_drift, 1e-7) << what;
+        // who bears what is the engine's own; in all they bear the same
+        const auto own = test::run(*make_engine(GetParam(), {1e-9}), m, test::make_options(0.5, 0.05, kStep));
+        const auto native = test::run(*make_engine("native"), m, test::make_options(0.5, 0.05, kStep));
+        ASSERT_EQ(own.frames.size(), native.frames.size()) << what;
+        for (size_t i = 1; i < own.frames.size() && second != Kind::Distance; ++i) {
+          const auto sum = [](const mbs::View& v) {
+            Vec3 f;
+            for (const Vec3& x : v.joint_force) f += x;
+            return f;
+          };
+          EXPECT_LT(norm(sum(own.frames[i]) - sum(native.frames[i])), 0.05) << what;  // N, of 140 N
+        }
+      }
+}
+
+TEST_P(EnginesAlikeReference, ADoorsSecondHingeHoldsItWhenTheFirstIsReleased) {
+  NEEDS_ENGINE();
+  mbs::Model m = test::make_empty({0, -2, -9.81});
+  const auto door = mbs::add_body(m, test::make_body("door", 10, {3.4, 4.2, 0.85}, {0.5, 0, 1}));
+  mbs::add_joint(m, test::make_joint(m, Kind::Revolute, mbs::kGround, door, {{0, 0, 0.2}, {}}));
+  mbs::add_joint(m, test::make_joint(m, Kind::Spherical, mbs::kGround, door, {{0, 0, 1.8}, {}}));
+  mbs::Event e;
+  e.time = 0.2;
+  e.actions.resize(1);
+  e.actions[0].kind = mbs::Action::Kind::ReleaseJoint;
+  e.actions[0].joint = {0};
+  m.events.push_back(e);
+  const EngineRun r = compare_with_native(m, 0.7);
+  EXPECT_LT(r.position.value, 5e-4);  // the native engine lets an event act from half a step before
+  EXPECT_LT(r.summary.joint_drift, 1e-7);
+}
+
 TEST_P(EnginesAlikeReference, JointThatIsPulledApart) {
   NEEDS_ENGINE();
   mbs::Model m = test::make_bar(Kind::Revolute, test::z_along_y());
