@@ -114,10 +114,6 @@ Hull make_hull(const std::vector<Vec3>& points) {
   for (size_t i = 0; i < points.size(); ++i)
     if (used[i]) hull.vertices.push_back(points[i]);
   complete(hull);
-  for (const Hull::Face& face : hull.faces)
-    if (face.loop.size() > static_cast<size_t>(kMostFaceCorners))
-      throw InputError("E603", "a face of a convex hull has " + std::to_string(face.loop.size()) +
-                                   " corners; at most " + std::to_string(kMostFaceCorners) + " are possible");
   return hull;
 }
 

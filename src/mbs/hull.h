@@ -25,11 +25,11 @@ struct Hull {
   double thickness = 0;                   // least width between a face and the vertex farthest behind it [m]
 };
 
-/// Most corners of one face.
-inline constexpr int kMostFaceCorners = 32;
+/// Most corners of one face in a model: looking for contact takes longer with the square of them.
+inline constexpr int kMostFaceCorners = 64;
 
-/// The convex hull of points; coplanar triangles are one face. Throws InputError if they lie in a plane, are fewer
-/// than four, or a face has more than kMostFaceCorners corners.
+/// The convex hull of points; coplanar triangles are one face. Throws InputError if they lie in a plane or are fewer
+/// than four.
 Hull make_hull(const std::vector<Vec3>& points);
 Hull make_box_hull(const Vec3& half);
 

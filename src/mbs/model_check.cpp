@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "mbs/hull.h"
 #include "mbs/quantity.h"
 #include "mbs/solver.h"
 
@@ -219,7 +220,12 @@ void Checker::hull(const Place& p, const Shape& s) {
     if (const Vec3 n = cross(line, v - first); norm(n) > norm(normal)) normal = n;
   if (norm(normal) > 0)
     for (const Vec3& v : s.vertices) thickness = std::max(thickness, std::abs(dot(normal, v - first)) / norm(normal));
-  if (!(thickness > 1e-6 * size)) fail(p, "hull", "its vertices lie in one plane");
+  if (!(thickness > 1e-6 * size)) return fail(p, "hull", "its vertices lie in one plane");
+  if (s.vertices.size() <= static_cast<size_t>(kMostFaceCorners)) return;
+  size_t most = 0;
+  for (const Hull::Face& face : make_hull(s.vertices).faces) most = std::max(most, face.loop.size());
+  if (most > static_cast<size_t>(kMostFaceCorners))
+    fail(p, "hull", fmt::format("a face has {} corners; at most {} are possible", most, kMostFaceCorners));
 }
 
 void Checker::shapes(const Place& p, const Body& b, bool fixed) {

@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 namespace topple::mbs {
 
 namespace {
 
-constexpr int kMostCorners = 2 * kMostFaceCorners;  // of two faces' overlap
+constexpr int kFewCorners = 64;  // of two faces' overlap, for which no memory is asked for
 constexpr int kMostPoints = BoxContact::kMostPoints;
 
 /// Largest dot(n, vertex) of a polyhedron about its own centre; n in W.
@@ -73,7 +74,19 @@ void overlap_points(const Solid& a, const Solid& b, const Vec3& n, BoxContact& o
   const Vec3 n_a = a.R * face_a.normal;
   const double along = dot(n_a, n);
   if (along < 1e-6) return;
-  Vec3 polygon[kMostCorners], cut[kMostCorners];
+  const size_t most = face_a.loop.size() + face_b.loop.size();
+  Vec3 few[2 * kFewCorners];
+  double few_lengths[kFewCorners];
+  std::vector<Vec3> many;
+  std::vector<double> many_lengths;
+  if (most > kFewCorners) {
+    many.resize(2 * most);
+    many_lengths.resize(most);
+  }
+  Vec3* const polygon = most > kFewCorners ? many.data() : few;
+  Vec3* const cut = polygon + (most > kFewCorners ? most : kFewCorners);
+  double* const length =
+      most > kFewCorners ? many_lengths.data() : few_lengths;  // of the edges that begin at each corner
   int count = 0;
   for (const int i : face_b.loop) polygon[count++] = b.p + b.R * b.hull->vertices[static_cast<size_t>(i)];
   const int corners = static_cast<int>(face_a.loop.size());
@@ -85,21 +98,19 @@ void overlap_points(const Solid& a, const Solid& b, const Vec3& n, BoxContact& o
     count = clip(polygon, count, outward, dot(outward, p), cut);
     std::copy(cut, cut + count, polygon);
   }
-  double length[kMostCorners];  // of the edges that begin at each corner
-  const auto measure = [&] {
-    double perimeter = 0;
-    for (int i = 0; i < count; ++i) perimeter += length[i] = norm(cross(n, polygon[(i + 1) % count] - polygon[i]));
-    return perimeter;
-  };
-  double perimeter = measure();
+  const auto measure = [&](int i) { length[i] = norm(cross(n, polygon[(i + 1) % count] - polygon[i])); };
+  for (int i = 0; i < count; ++i) measure(i);
   while (count > kMostPoints) {
     int least = 0;
     for (int i = 1; i < count; ++i)
       if (length[i] + length[(i + count - 1) % count] < length[least] + length[(least + count - 1) % count]) least = i;
     std::copy(polygon + least + 1, polygon + count, polygon + least);
+    std::copy(length + least + 1, length + count, length + least);
     --count;
-    perimeter = measure();
+    measure((least + count - 1) % count);
   }
+  double perimeter = 0;
+  for (int i = 0; i < count; ++i) perimeter += length[i];
   const double surface = face_a.offset + dot(n_a, a.p);
   for (int i = 0; i < count; ++i) {
     const double depth = (surface - dot(n_a, polygon[i])) / along;

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include "base/error.h"
@@ -150,6 +151,32 @@ TEST(HullContact, ManyCornersAreThinned) {
       weights += out.weight[i];
     }
     EXPECT_NEAR(weights, 4, 1e-12);
+  }
+}
+
+TEST(HullContact, DrumsOf64CornersMeet) {
+  std::vector<Vec3> points;
+  for (int i = 0; i < kMostFaceCorners; ++i)
+    for (const double z : {-0.5, 0.5})
+      points.push_back({std::cos(2 * std::numbers::pi * i / kMostFaceCorners),
+                        std::sin(2 * std::numbers::pi * i / kMostFaceCorners), z});
+  const Hull drum = make_hull(points);
+  EXPECT_EQ(drum.faces.size(), 66U);
+  for (const double turn : {0.0, std::numbers::pi / 64}) {  // 64 corners, and 128
+    BoxContact out;
+    int axis = -1;
+    hull_hull(make_solid(drum, {}), make_solid(drum, {0, 0, 0.99}, to_matrix(exp_rotation({0, 0, turn}))), axis, out);
+    ASSERT_EQ(out.count, 32);
+    double weights = 0;
+    Vec3 centre;
+    for (int i = 0; i < out.count; ++i) {
+      EXPECT_NEAR(out.depth[i], 0.01, 1e-12);
+      EXPECT_NEAR(norm(Vec3{out.p[i].x, out.p[i].y, 0}), 1, 2e-3);  // 1 - cos(pi / 64) less at most
+      weights += out.weight[i];
+      centre += (0.25 * out.weight[i]) * out.p[i];
+    }
+    EXPECT_NEAR(weights, 4, 1e-12);
+    EXPECT_LT(norm(Vec3{centre.x, centre.y, 0}), 0.02);
   }
 }
 

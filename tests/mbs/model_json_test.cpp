@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <functional>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -49,6 +50,22 @@ std::string complaints(const std::string& more, const std::string& bodies = "") 
 
 Pose pose_of(const Model& m, BodyId id) {
   return id == kGround ? Pose{} : m.bodies[static_cast<size_t>(id.index)].X_WB;
+}
+
+TEST(ModelJson, FacesWithTooManyCornersAreToldWithTheirPlace) {
+  const auto drum = [](int corners) {
+    std::string text =
+        ",\n  {\"name\": \"drum\", \"mass\": 1, \"inertia\": [1, 1, 1], \"X_WB\": {},\n   \"shapes\": [{\"hull\": [";
+    for (int i = 0; i < 2 * corners; ++i) {
+      const double angle = 2 * std::numbers::pi * (i / 2) / corners;
+      text += (i > 0 ? ", [" : "[") + std::to_string(std::cos(angle)) + ", " + std::to_string(std::sin(angle)) +
+              (i % 2 ? ", 0]" : ", 1]");
+    }
+    return text + "]}]}";
+  };
+  EXPECT_EQ(complaints("", drum(64)), "no complaint");
+  EXPECT_EQ(complaints("", drum(65)),
+            "6:16 bodies[2].shapes[0].hull \"drum\": a face has 65 corners; at most 64 are possible | \n");
 }
 
 TEST(ModelJson, NamesAndPlacesMeanTheSame) {
