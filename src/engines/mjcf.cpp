@@ -25,6 +25,14 @@ std::string contact_of(double frequency, double restitution, double friction, do
                      friction);
 }
 
+/// MuJoCo asks for A + B >= C of principal moments to the last bit, which flat bodies miss by round-off.
+Mat3 round_up(const Mat3& inertia) {
+  constexpr double margin = 1e-12;  // of their sum; more than MuJoCo's own round-off
+  const Vec3 I = calc_principal_moments(inertia);
+  const double lacking = I.z - I.x - I.y + margin * (I.x + I.y + I.z);
+  return lacking > 0 ? inertia + Mat3::diagonal({lacking, lacking, lacking}) : inertia;
+}
+
 class Writer {
  public:
   Writer(const Course& course, const Articulation& articulation, const Ties& ties)
@@ -171,7 +179,7 @@ class Writer {
     add(fmt::format("<body name=\"{}{}\" {}>", twin < 0 ? "b" : "t", twin < 0 ? b.body : twin, text_of(X_PB)));
     const BodyNow& now = course_.bodies()[body];
     const double share = 1.0 / copies_[body];
-    const Mat3 I = share * now.inertia;
+    const Mat3 I = round_up(share * now.inertia);
     add(fmt::format(
         "<inertial pos=\"{}\" mass=\"{:.17g}\" fullinertia=\"{:.17g} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g}\"/>",
         text_of(now.p_BBcm), share * now.mass, I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2)));

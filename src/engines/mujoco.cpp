@@ -11,6 +11,7 @@ std::unique_ptr<Engine> make_mujoco_engine() { return nullptr; }
 
 #else
 
+#include <fmt/format.h>
 #include <mujoco/mujoco.h>
 
 #include <algorithm>
@@ -522,6 +523,31 @@ class Built {
 
 Work sum(const Work& a, const Work& b) { return {a.damping + b.damping, a.loads + b.loads, a.contact + b.contact}; }
 
+/// Bodies of less mass or inertia than MuJoCo takes, of a body in loops of joints for each of its twins.
+std::vector<Unsupported> find_small_bodies(const mbs::Model& model) {
+  std::vector<Unsupported> out;
+  std::vector<double> copies(model.bodies.size(), 1);  // at most
+  for (const mbs::Joint& j : model.joints)
+    for (const mbs::BodyId id : {j.parent, j.child})
+      if (!is_ground(model, id.index)) ++copies[static_cast<size_t>(id.index)];
+  const auto look = [&](size_t body, const mbs::Body& b, const std::string& place) {
+    const double least = copies[body] * mjMINVAL;
+    if (!(b.mass > least))
+      out.push_back({place, fmt::format("a mass of {:g} kg; above {:g} kg it can", b.mass, least)});
+    const double moment = calc_principal_moments(b.inertia).x;
+    if (!(moment > least))
+      out.push_back({place, fmt::format("a principal moment of {:g} kg·m²; above {:g} kg·m² it can", moment, least)});
+  };
+  for (size_t i = 0; i < model.bodies.size(); ++i)
+    if (!model.bodies[i].fixed) look(i, model.bodies[i], place_of("bodies", i, model.bodies[i].name));
+  for (size_t i = 0; i < model.events.size(); ++i)
+    for (const mbs::Action& a : model.events[i].actions)
+      if (a.kind == mbs::Action::Kind::ReplaceBody)
+        look(static_cast<size_t>(a.body.index), a.replacement,
+             place_of("events", i, model.events[i].name) + ".replacement");
+  return out;
+}
+
 class MujocoEngine : public Engine {
  public:
   std::string name() const override { return "mujoco"; }
@@ -531,6 +557,7 @@ class MujocoEngine : public Engine {
     std::vector<Unsupported> out = find_impossible_inertias(model);
     for (Unsupported& u : find_opening_joints(model, options)) out.push_back(std::move(u));
     for (Unsupported& u : find_planes(model)) out.push_back(std::move(u));
+    for (Unsupported& u : find_small_bodies(model)) out.push_back(std::move(u));
     for (size_t i = 0; i < model.contact.pairs.size(); ++i)
       if (model.contact.pairs[i].touches)
         out.push_back({"contact.pairs[" + std::to_string(i) + "]", "rules of its own for a pair of bodies"});

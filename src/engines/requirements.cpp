@@ -14,15 +14,20 @@ namespace {
 constexpr double kSlack = 1e-10;  // of an inertia's trace; beyond round-off, below what anybody writes
 
 bool is_possible(const Mat3& inertia) {
+  const Vec3 I = calc_principal_moments(inertia);
+  return I.z <= I.x + I.y + kSlack * (I.x + I.y + I.z);
+}
+
+}  // namespace
+
+Vec3 calc_principal_moments(const Mat3& inertia) {
   Eigen::Matrix3d I;
   for (int i = 0; i < 3; ++i)
     for (int k = 0; k < 3; ++k) I(i, k) = inertia(i, k);
   const Eigen::Vector3d principal =
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(I, Eigen::EigenvaluesOnly).eigenvalues();
-  return principal[2] <= principal[0] + principal[1] + kSlack * principal.sum();
+  return {principal[0], principal[1], principal[2]};
 }
-
-}  // namespace
 
 std::vector<Unsupported> find_impossible_inertias(const mbs::Model& model) {
   std::vector<Unsupported> out;

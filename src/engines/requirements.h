@@ -7,6 +7,9 @@
 
 namespace topple::engines {
 
+/// Of an inertia, rising [kg·m²].
+Vec3 calc_principal_moments(const Mat3&);
+
 /// Inertias that no distribution of mass has: a principal moment larger than the sum of the two others.
 std::vector<Unsupported> find_impossible_inertias(const mbs::Model&);
 

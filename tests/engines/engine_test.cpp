@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
+#include <random>
 
 #include "ballistic.h"
 #include "base/error.h"
@@ -235,6 +237,47 @@ TEST(UnexpressedByMujoco, RulesOfPairs) {
   p.touches = true;
   m.contact.pairs.push_back(p);
   EXPECT_EQ(unsupported_by("mujoco", m), "contact.pairs[1]: rules of its own for a pair of bodies\n");
+}
+
+TEST(UnexpressedByMujoco, BodiesTooSmallForIt) {
+  TOPPLE_NEEDS_ENGINE("mujoco");
+  mbs::Model m = test::make_empty({0, 0, -9.81});
+  mbs::add_body(m, test::make_body("dust", 1e-16, {1, 1, 1}, {}));
+  mbs::add_body(m, test::make_body("needle", 1, {1e-16, 1, 1}, {}));
+  mbs::add_body(m, test::make_body("speck", 1e-14, {1e-14, 1e-14, 1e-14}, {}));
+  EXPECT_EQ(unsupported_by("mujoco", m),
+            "bodies[0] \"dust\": a mass of 1e-16 kg; above 1e-15 kg it can\n"
+            "bodies[1] \"needle\": a principal moment of 1e-16 kg·m²; above 1e-15 kg·m² it can\n");
+  m.bodies.erase(m.bodies.begin(), m.bodies.begin() + 2);
+  EXPECT_EQ(test::run(*make_engine("mujoco"), m, make_options(0.01, 0.01)).summary.ending,
+            mbs::Summary::Ending::TimeLimit);
+}
+
+/// Flat bodies: moments a, b and a + b, about the axes and turned.
+TEST(UnexpressedByNone, FlatBodiesWhoseMomentsAreRounded) {
+  mbs::Model m = test::make_empty({0, 0, 0});
+  std::mt19937 random(1);
+  const auto draw = [&] { return (1 + static_cast<double>(random())) / 4294967296.0; };
+  for (int i = 0; i < 400; ++i) {
+    const double size = std::pow(10, 12 * draw() - 4), a = size * draw(), b = size * draw() * std::pow(10, -4 * draw());
+    const Mat3 R = i % 2 ? to_matrix(exp_rotation({3 * draw(), 3 * draw(), 3 * draw()})) : Mat3::identity();
+    mbs::Body body = test::make_body("flat", 1, {1, 1, 1}, {5.0 * i, 0, 0});
+    body.inertia = R * Mat3::diagonal({a, b, a + b}) * transpose(R);
+    for (int k = 0; k < 3; ++k) body.inertia(k, (k + 1) % 3) = body.inertia((k + 1) % 3, k);
+    body.w_WB = {1, 2, 3};
+    mbs::add_body(m, body);
+  }
+  m.bodies[0].inertia = Mat3::diagonal({0.01, 0.09, 0.1});
+  ASSERT_LT(0.01 + 0.09, 0.1);
+  const auto native = test::run(*make_engine("native"), m, make_options(0.01, 0.01, 1e-5));
+  for (const char* engine : {"simbody", "mujoco"}) {
+    if (!test::is_available(engine)) continue;
+    const auto c = test::run(*make_engine(engine), m, make_options(0.01, 0.01, 1e-5));
+    ASSERT_EQ(c.summary.ending, mbs::Summary::Ending::TimeLimit) << engine << ": " << c.summary.message;
+    for (size_t b = 0; b < m.bodies.size(); ++b)
+      EXPECT_LT(norm(log_rotation(conjugate(c.frames.back().X_WB[b].q) * native.frames.back().X_WB[b].q)), 1e-7)
+          << engine << " " << b;
+  }
 }
 
 }  // namespace

@@ -164,7 +164,11 @@ TEST(Mujoco, BadNumbersEndTheRunInsteadOfResettingIt) {
 TEST(Mujoco, ErrorsOfTheLibraryEndTheRunInsteadOfTheProgram) {
   TOPPLE_NEEDS_ENGINE("mujoco");
   mbs::Model m = test::make_empty({0, 0, -9.81});
-  mbs::add_body(m, test::make_body("mote", 1e-17, {1e-17, 1e-17, 1e-17}, {}));  // below MuJoCo's least mass
+  mbs::Body b = test::make_body("moon", 1, {1, 1, 1}, {});
+  b.shapes.resize(1);
+  b.shapes[0].kind = mbs::Shape::Kind::Hull;
+  b.shapes[0].vertices = {{0, 0, 0}, {1e40, 0, 0}, {0, 1e40, 0}, {0, 0, 1e40}};  // beyond its single precision
+  mbs::add_body(m, b);
   const mbs::Summary s = make_engine("mujoco")->run(m, make_options(0.1, 0.1, 1e-3));
   EXPECT_EQ(s.ending, mbs::Summary::Ending::Diverged);
   EXPECT_NE(s.message.find("MuJoCo does not take the model"), std::string::npos) << s.message;
