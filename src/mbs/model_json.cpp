@@ -148,16 +148,22 @@ Body body_from(const Node& n) {
   return b;
 }
 
+std::vector<double> rows_from(const Node& n) {
+  for (const Node& x : n.items())
+    if (x.is_list()) x.fail("must be a number: the K x J values are one list, row by row of equal force");
+  return n.numbers();
+}
+
 MomentFamily family_from(const Node& n) {
   n.only(keys_of("family"));
   MomentFamily f{n["normal_force"].numbers(),
                  n["plastic_rotation"].numbers(),
-                 n["positive"].numbers(),
-                 n["negative"].numbers(),
+                 rows_from(n["positive"]),
+                 rows_from(n["negative"]),
                  {},
                  {}};
-  if (n.has("elongation_positive")) f.elongation_positive = n["elongation_positive"].numbers();
-  if (n.has("elongation_negative")) f.elongation_negative = n["elongation_negative"].numbers();
+  if (n.has("elongation_positive")) f.elongation_positive = rows_from(n["elongation_positive"]);
+  if (n.has("elongation_negative")) f.elongation_negative = rows_from(n["elongation_negative"]);
   return f;
 }
 

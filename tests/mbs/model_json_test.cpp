@@ -316,6 +316,18 @@ TEST(ModelJson, CharacteristicsReadNaturally) {
               HasSubstr("springs[0].spring.table.f[1]: must be a number"));
 }
 
+TEST(ModelJson, FamiliesHaveTheirRowsInOneList) {
+  const auto family = [](const std::string& positive) {
+    return complaints(
+        R"("laws": [{"moment_y": {"normal_force": [-1, 1], "plastic_rotation": [0, 1], "negative": [1, 2, 3, 4],
+    "positive": )" +
+        positive + "}}]");
+  };
+  EXPECT_EQ(family("[1, 2, 3, 4]"), "no complaint");
+  EXPECT_THAT(family("[[1, 2], [3, 4]]"),
+              HasSubstr("laws[0].moment_y.positive[0]: must be a number: the K x J values are one list, row by row"));
+}
+
 TEST(ModelJson, PairsFollowTheGeneralRulesWhereTheySayNothing) {
   const Model m = read(R"("contact": {"friction": 0.3, "restitution": 0, "body_friction": 0.2, "body_restitution": 0.5,
     "pairs": [{"a": "link1", "b": "ground"}, {"a": "link1", "b": "link2", "damping": 0}]})");
