@@ -269,7 +269,8 @@ TEST(UnexpressedByNone, FlatBodiesWhoseMomentsAreRounded) {
   }
   m.bodies[0].inertia = Mat3::diagonal({0.01, 0.09, 0.1});
   ASSERT_LT(0.01 + 0.09, 0.1);
-  const auto native = test::run(*make_engine("native"), m, make_options(0.01, 0.01, 1e-5));
+  // the thinnest one wobbles at 4e4 rad/s
+  const auto native = test::run(*make_engine("native"), m, make_options(0.01, 0.01, 2.5e-6));
   for (const char* engine : {"simbody", "mujoco"}) {
     if (!test::is_available(engine)) continue;
     const auto c = test::run(*make_engine(engine), m, make_options(0.01, 0.01, 1e-5));
