@@ -23,6 +23,7 @@ std::unique_ptr<Engine> make_simbody_engine(const Accuracy&) { return nullptr; }
 #include "engines/requirements.h"
 #include "engines/simbody_system.h"
 #include "engines/ties.h"
+#include "mbs/joint_notes.h"
 
 namespace topple::engines {
 
@@ -247,18 +248,6 @@ bool has_history(const mbs::Model& m) {
          });
 }
 
-/// Up to six joints by name.
-std::string list_joints(const mbs::Model& model, const std::vector<int>& list) {
-  constexpr size_t most = 6;
-  std::string out = list.size() == 1 ? "joint " : "joints ";
-  for (size_t i = 0; i < std::min(list.size(), most); ++i) {
-    const std::string& name = model.joints[static_cast<size_t>(list[i])].name;
-    out += (i > 0 ? ", " : "") + (name.empty() ? "number " + std::to_string(list[i]) : "\"" + name + "\"");
-  }
-  if (list.size() > most) out += " and " + std::to_string(list.size() - most) + " more";
-  return out;
-}
-
 class SimbodyEngine : public Engine {
  public:
   explicit SimbodyEngine(const Accuracy& accuracy) : accuracy_(accuracy) {}
@@ -307,7 +296,7 @@ class SimbodyEngine : public Engine {
     using Verdict = Course::Verdict;
     Built built(course, ground, settings);
     if (!built.left_out().empty())
-      course.note(list_joints(course.model(), built.left_out()) +
+      course.note(mbs::list_joints(course.model(), built.left_out()) +
                   ": others hold the same wherever the bodies go; left out, with reactions of 0");
     simbody::System& system = built.system();
     std::vector<unsigned char> is_held;

@@ -17,7 +17,9 @@ double find_passing(double before, double now, double limit) {
 
 System::Ending System::find_ending(double time) const {
   if (state.first_kick) return {};
-  const double ago = state.time - time;
+  // what was told later than that ends now
+  const double ago = state.time - time, longest = 2.001 * state.last_kick;
+  if (ago > longest) return find_ending(state.time);
   return {ago / state.last_kick, 0.5 * state.last_kick - ago};
 }
 
@@ -56,27 +58,27 @@ double System::end_row(int a, int b, const ForceRow& row, const CompiledCharacte
   return calc_integral(spring, end);
 }
 
-double System::end_spring(size_t i, const Ending& ending) {
-  SpringState& s = state.spring[i];
-  const CompiledSpring& k = forces.springs[i];
-  ForceRow row;
-  const double x = measure_spring(k, row) - k.free_length;
+double System::end_along(SpringState& s, int a, int b, const ForceRow& row, const CompiledCharacteristic& spring,
+                         const CompiledCharacteristic& damper, double x, const Ending& ending) {
   s.energy = 0;
   s.live = false;
   mark_links_due();
-  return end_row(k.a, k.b, row, k.spring, k.damper, s.component, x, ending, s.damping);
+  return end_row(a, b, row, spring, damper, s.component, x, ending, s.damping);
+}
+
+double System::end_spring(size_t i, const Ending& ending) {
+  const CompiledSpring& k = forces.springs[i];
+  ForceRow row;
+  const double x = measure_spring(k, row) - k.free_length;
+  return end_along(state.spring[i], k.a, k.b, row, k.spring, k.damper, x, ending);
 }
 
 double System::end_torsion(size_t i, const Ending& ending) {
-  SpringState& s = state.torsion[i];
   const CompiledTorsion& k = forces.torsions[i];
   const CompiledJoint& j = joints[static_cast<size_t>(k.joint)];
   ForceRow row;
   const double x = measure_torsion(k, row) - k.free_angle;
-  s.energy = 0;
-  s.live = false;
-  mark_links_due();
-  return end_row(j.parent, j.child, row, k.spring, k.damper, s.component, x, ending, s.damping);
+  return end_along(state.torsion[i], j.parent, j.child, row, k.spring, k.damper, x, ending);
 }
 
 double System::end_bushing(size_t i, const Ending& ending) {

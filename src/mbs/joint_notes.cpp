@@ -1,5 +1,7 @@
 /// What the summary tells about joints that repeat each other, singular positions and starts that do not fit.
 
+#include "mbs/joint_notes.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -9,18 +11,6 @@
 
 namespace topple::mbs {
 
-namespace {
-
-// situations; a positive number is that of the rows that repeat others
-constexpr int kSingular = -1, kOpen = -2, kSpeed = -3;
-
-std::string number(double x) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", x);
-  return text;
-}
-
-/// Up to six joints by name, in the order of the model.
 std::string list_joints(const Model& model, std::vector<int> list) {
   std::sort(list.begin(), list.end());
   constexpr size_t most = 6;
@@ -31,6 +21,17 @@ std::string list_joints(const Model& model, std::vector<int> list) {
   }
   if (list.size() > most) out += " and " + std::to_string(list.size() - most) + " more";
   return out;
+}
+
+namespace {
+
+// situations; a positive number is that of the rows that repeat others
+constexpr int kSingular = -1, kOpen = -2, kSpeed = -3;
+
+std::string number(double x) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", x);
+  return text;
 }
 
 /// The joints whose rows take part in repeating others.

@@ -584,6 +584,7 @@ void System::check_joints() {
 void System::drop_joint(size_t i) {
   JointState& js = state.joint[i];
   js.live = false;
+  js.ended = state.time - 0.5 * state.last_kick;
   js.force = js.moment = {};
   for (JointState& other : state.joint) {
     // of what they are joined to now nothing is known
@@ -617,8 +618,8 @@ void System::release_joint(size_t i, double time) {
       end_rotational(static_cast<size_t>(r), ending);
     }
   }
-  state.joint[i].ended = time;
   release_joint(i, "released");
+  state.joint[i].ended = time;
 }
 
 void System::release_joint(size_t i, const char* reason) {

@@ -59,7 +59,7 @@ struct JointState {
   bool live = true;
   Vec3 force, moment;  // reaction on the child at the joint, in W [N, N·m]
   double angle = 0;    // of a revolute or cylindrical joint, continuous [rad]
-  double ended = 0;    // when an event released it [s]
+  double ended = 0;    // when it was released; by its own limits half a step before [s]
   // the angle is followed from here as long as it is near: no arc tangent at each step
   double known_angle = 0, known_cosine = 1, known_sine = 0;
   unsigned char repeating = 0;  // rows that repeat those of other joints, bit r for row r
@@ -385,6 +385,8 @@ class System {
                  const CompiledCharacteristic& damper, ComponentState&, double x, const Ending&, double& damping);
   double end_spring(size_t, const Ending&);
   double end_torsion(size_t, const Ending&);
+  double end_along(SpringState&, int a, int b, const ForceRow&, const CompiledCharacteristic& spring,
+                   const CompiledCharacteristic& damper, double x, const Ending&);
   double end_bushing(size_t, const Ending&);
   double end_cable(size_t, const Vec3& p_A, const Vec3& p_B, const Ending&);
   /// Evaluates what is about to go for the last time, and gives its bodies the rest.

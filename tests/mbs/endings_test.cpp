@@ -5,6 +5,7 @@
 #include <functional>
 #include <string>
 
+#include "mbs/moment.h"
 #include "models.h"
 
 namespace topple::mbs {
@@ -68,6 +69,23 @@ Model make_zoned() {
   z.translational_stiffness = z.rotational_stiffness = {kRate, kRate, kRate};
   z.damping_ratio = 0;
   add_element(m, z);
+  return m;
+}
+
+/// A pendulum of reduced length 1.1 m, horizontal.
+Model make_pendulum() {
+  Model m;
+  m.contact.ground = m.contact.bodies = false;
+  Body bar = make_box("bar", 2, {0.1, 0.1, 0.1}, {1, 0, 0});
+  bar.inertia = Mat3::diagonal({0.1, 0.2, 0.2});
+  add_body(m, bar);
+  Joint j;
+  j.kind = Joint::Kind::Revolute;
+  j.name = "hinge";
+  j.parent = kGround, j.child = {0};
+  j.X_PF.q = j.X_CM.q = to_quat(Mat3::from_columns({1, 0, 0}, {0, 0, -1}, {0, 1, 0}));
+  j.X_CM.p = {-1, 0, 0};
+  add_joint(m, j);
   return m;
 }
 
@@ -190,31 +208,61 @@ TEST(Ending, OfAStrongDamperTurnsNothingRound) {
 }
 
 TEST(Ending, OfAJointIsOfSecondOrder) {
-  // a pendulum of reduced length 1.1 m let go from the horizontal, its hinge released after 0.5003 s: angle and speed
-  // computed independently to 1e-9
+  // let go from the horizontal, its hinge released after 0.5003 s: angle and speed computed independently to 1e-9
   const double late = 0.5003, angle = 1.072451754, speed = 3.958158176;
   const double flown = 1 - late;
   const Vec3 wanted{std::cos(angle) - speed * std::sin(angle) * flown, 0,
                     -std::sin(angle) - speed * std::cos(angle) * flown - 0.5 * 9.81 * flown * flown};
   double error[3];
   for (int i = 0; i < 3; ++i) {
-    Model m;
-    m.contact.ground = m.contact.bodies = false;
-    Body bar = make_box("bar", 2, {0.1, 0.1, 0.1}, {1, 0, 0});
-    bar.inertia = Mat3::diagonal({0.1, 0.2, 0.2});
-    add_body(m, bar);
-    Joint j;
-    j.kind = Joint::Kind::Revolute;
-    j.name = "hinge";
-    j.parent = kGround, j.child = {0};
-    j.X_PF.q = j.X_CM.q = to_quat(Mat3::from_columns({1, 0, 0}, {0, 0, -1}, {0, 1, 0}));
-    j.X_CM.p = {-1, 0, 0};
-    add_joint(m, j);
+    Model m = make_pendulum();
     m.events.push_back(make_event(late, Action::Kind::ReleaseJoint));
     error[i] = norm(run_to_one(m, 2e-3 / (1 << i)).place - wanted);
   }
   EXPECT_LT(error[1], 2e-5);  // half a step of the reaction makes 3e-3
   EXPECT_GT(error[0] / error[2], 12);
+}
+
+TEST(Ending, OfASpringWhoseJointComesOffAtItsLimitTurnsNothing) {
+  Model m = make_pendulum();
+  RotationalSpring r;
+  r.name = "torsion";
+  r.joint = {0};
+  r.spring.rate = 3;
+  m.rotational_springs.push_back(r);
+  m.joints[0].shear_limit = 25;
+  Options o;
+  o.duration = 1;
+  o.step = o.frame_interval = 1e-3;
+  o.equilibrium = false;
+  double spin = 0, largest = 0;
+  bool is_off = false;
+  o.on_frame = [&](const View& v) {
+    largest = std::max(largest, std::abs(v.w_WB[0].y - spin));
+    spin = v.w_WB[0].y;
+  };
+  o.on_happening = [&](const Happening& h) { is_off |= h.kind == Happening::Kind::RotationalSpringBroken; };
+  EXPECT_LT(run(m, o).energy_error, 2e-3);
+  EXPECT_TRUE(is_off);
+  EXPECT_LT(largest, 0.02);  // gravity makes 9 rad/s² at most
+}
+
+TEST(Ending, OfLongAgoIsNow) {
+  // the successor of a run has an event before the instant at which it takes over
+  const Model m = make_sprung();
+  Options o;
+  o.duration = 1;
+  o.step = 1e-3;
+  o.equilibrium = false;
+  Simulation before(m, o);
+  ASSERT_TRUE(before.begin());
+  while (before.time() < 0.4) ASSERT_TRUE(before.advance());
+  Simulation after(with(m, make_event(0.1, Action::Kind::RemoveSpring)), o, before.keep(), true);
+  const double speed = before.calc_view().v_WB[0].x;
+  ASSERT_TRUE(after.advance());
+  const View& now = after.calc_view();
+  EXPECT_EQ(now.spring_force[0], 0);
+  EXPECT_NEAR(now.v_WB[0].x, speed, 1e-2);  // the spring makes 6 m/s² at most
 }
 
 TEST(Ending, AtTheStartGivesNothing) {

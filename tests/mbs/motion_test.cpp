@@ -261,17 +261,23 @@ TEST(FreeBody, TheStepFollowsWhatIsSpunUp) {
   EXPECT_LT(s.energy_error, 1e-3);
 }
 
-TEST(FreeBody, TorqueFreeTopTurnsAsInTheReference) {
-  // I = (1, 2, 3), ω0 = (0.1, 1, 0.1) in the body's axes; angular velocity in body axes at t = 10 (computed
-  // independently)
+/// A body with the inertia (1, 2, 3), without weight.
+Model make_top(const Vec3& w) {
   Model m;
   m.gravity = {};
   m.contact.ground = m.contact.bodies = false;
   Body b;
   b.name = "top";
   b.inertia = Mat3::diagonal({1, 2, 3});
-  b.w_WB = {0.1, 1, 0.1};
+  b.w_WB = w;
   add_body(m, b);
+  return m;
+}
+
+TEST(FreeBody, TorqueFreeTopTurnsAsInTheReference) {
+  // I = (1, 2, 3), ω0 = (0.1, 1, 0.1) in the body's axes; angular velocity in body axes at t = 10 (computed
+  // independently)
+  const Model m = make_top({0.1, 1, 0.1});
   Vec3 w;
   const Vec3 wanted{-0.304543317, -0.957733454, 0.193861318};
   double off[2];
@@ -290,14 +296,8 @@ TEST(FreeBody, TurnsOverTwelveTimesAsInTheReference) {
   // free and held at its mass centre
   const double wanted[] = {1.280, 3.738, 6.196, 8.654, 11.112, 13.569, 16.027, 18.485, 20.943, 23.401, 25.859, 28.316};
   for (const bool is_held : {false, true}) {
-    Model m;
-    m.gravity = {};
-    m.contact.ground = m.contact.bodies = false;
-    Body b;
-    b.name = "top";
-    b.inertia = Mat3::diagonal({1, 2, 3});
-    b.w_WB = {0.01, 10, 0.02};
-    add_body(m, b);
+    Model m = make_top({0.01, 10, 0.02});
+    const Body b = m.bodies[0];
     Joint j;
     j.kind = Joint::Kind::Spherical;
     j.parent = kGround;
@@ -321,13 +321,8 @@ TEST(FreeBody, TurnsOverTwelveTimesAsInTheReference) {
 }
 
 TEST(FreeBody, KeepsItsAngularMomentumToRoundOff) {
-  Model m;
-  m.gravity = {};
-  m.contact.ground = m.contact.bodies = false;
-  Body b;
-  b.inertia = Mat3::diagonal({1, 2, 3});
-  b.w_WB = {0.3, 5, 0.1};
-  add_body(m, b);
+  const Model m = make_top({0.3, 5, 0.1});
+  const Body b = m.bodies[0];
   Vec3 first, last;
   Options o = options_of(5, 1e-3);
   bool begun = false;
