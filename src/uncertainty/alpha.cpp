@@ -19,7 +19,7 @@ namespace {
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr int any_class = -2;
-constexpr int most_in_vain = 5;           // searches along kinks that neither end nor gain
+constexpr int most_in_vain = 5;           // searches of one goal that neither end nor gain
 constexpr double least_edge_gain = 1e-6;  // along a kink, as a part of an output's width
 constexpr double least_line_gain = 1e-5;  // along an axis
 constexpr int most_line_places = 6;       // of an axis, that other ends of searches propose
@@ -897,6 +897,7 @@ class Optimisation {
   /// Every sample against every cut: a best one that no search ended at is a new start, until nothing changes.
   void recheck(bool of_classes) {
     std::set<std::pair<Key, int>> tried;
+    std::map<Key, std::pair<double, int>> in_vain;  // best value when it was last searched from, turns without gain
     while (asker_.can_go_on()) {
       check_faces(of_classes);
       std::vector<Running> all;
@@ -906,6 +907,10 @@ class Optimisation {
         const bool is_at_end = is_converged(goal, best) || is_noted(given_up_, goal, best);
         if (is_at_end && is_scanned(goal, best)) continue;
         if (!tried.insert({key_of(goal), is_at_end ? -1 - best.sample : best.sample}).second) continue;
+        auto& [last, turns] = in_vain.try_emplace(key_of(goal), infinite, 0).first->second;
+        turns = last - best.value > 2 * options_.tolerance * width_of(goal.output) ? 0 : turns + 1;
+        last = best.value;
+        if (turns > most_in_vain) continue;
         if (is_at_end) {
           all.push_back({goal, make_line_search(goal, best)});
           continue;

@@ -47,6 +47,7 @@ ModelSearch::ModelSearch(Region region, Point start, const Told& at_start, const
     axes_.push_back(axis);
   }
   converged_ = axes_.empty();
+  if (region_.space->has_interaction()) program_.emplace(*region_.space, region_.alpha, region_.scale, region_.axes);
   ask_star();
 }
 
@@ -123,7 +124,17 @@ void ModelSearch::ask_around_constraints() {
     for (const double sign : {-1.0, 1.0}) {
       std::vector<double> u = here;
       u[k] = sign * radius_;
-      Point x = slide(here, std::move(u), radius_);
+      const auto distance_to = [&](const Point& y) {
+        double square = 0;
+        for (std::size_t j = 0; j < axes_.size(); ++j) {
+          const int i = axes_[j].input;
+          square += std::pow((y[i] - best_[i]) / region_.scale[i] - (j == k ? sign * radius_ : 0), 2);
+        }
+        return square;
+      };
+      Point x = slide(here, u, radius_), target = best_;
+      target[axes_[k].input] += sign * radius_ * region_.scale[axes_[k].input];
+      if (Point y = program_->project_from(best_, target, radius_); distance_to(y) < distance_to(x)) x = std::move(y);
       double length = 0;
       for (const int i : region_.axes) length = std::max(length, std::abs(x[i] - best_[i]) / region_.scale[i]);
       if (length < 0.01 * radius_ || std::find(pending_.begin(), pending_.end(), x) != pending_.end()) continue;
@@ -207,6 +218,18 @@ std::vector<double> ModelSearch::to_widths(const std::vector<double>& step) cons
   return u;
 }
 
+/// The model by widths of the support.
+Quadratic ModelSearch::calc_quadratic() const {
+  const std::size_t n = axes_.size();
+  Quadratic q{std::vector<double>(n), hessian_};
+  for (std::size_t i = 0; i < n; ++i) {
+    const double width = region_.scale[axes_[i].input];
+    q.slope[i] = axes_[i].slope * width;
+    for (std::size_t j = 0; j < n; ++j) q.hessian[i * n + j] *= width * region_.scale[axes_[j].input];
+  }
+  return q;
+}
+
 std::vector<double> ModelSearch::find_step_to(const Point& x) const {
   std::vector<double> step(axes_.size());
   for (std::size_t k = 0; k < step.size(); ++k) step[k] = x[axes_[k].input] - best_[axes_[k].input];
@@ -281,6 +304,8 @@ void ModelSearch::find_allowed_step(std::vector<double>& step) {
   if (value > 0) std::fill(best.begin(), best.end(), 0.0), value = 0;
   std::vector<double> other(axes_.size(), 0.0);
   descend(best), descend(other);
+  if (calc_model(other) < calc_model(best)) best = other;
+  other = find_step_to(program_->minimise_from(best_, calc_quadratic(), trust_));
   if (calc_model(other) < calc_model(best)) best = other;
   value = calc_model(best);
   for (int trial = 0; trial < 4000 && width > 1e-9; ++trial) {
@@ -383,7 +408,11 @@ bool ModelSearch::ask_probe() {
   ++probes_;
   WallProbe::Allow allow;
   if (region_.space->has_interaction()) allow = [region = region_](const Point& x) { return region.contains(x); };
-  wall_.emplace(region_.box, region_.scale, region_.axes, best_, *nearest, radius_, std::move(allow));
+  WallProbe::Project project;
+  if (program_)
+    project = [this](const Point& from, const Point& to) { return program_->project_from(from, to, 10 * radius_); };
+  wall_.emplace(region_.box, region_.scale, region_.axes, best_, *nearest, radius_, std::move(allow),
+                std::move(project));
   pending_ = wall_->pending();
   stage_ = Stage::Probe;
   return !pending_.empty();
@@ -427,7 +456,13 @@ void ModelSearch::ask_trials() {
   std::vector<std::vector<double>> steps;
   if (wall_ && wall_->found()) {
     // as near to the wall as its curvature lets
-    for (const double part : {0.3, 0.1, 0.03, 0.01, 0.0}) steps.push_back(find_walled_step(part * radius_));
+    for (const double part : {0.3, 0.1, 0.03, 0.01, 0.0}) {
+      steps.push_back(find_walled_step(part * radius_));
+      if (!program_) continue;
+      // within the constraints, too
+      const HalfSpace side{wall_->normal(), wall_->calc_distance(best_) - part * radius_};
+      steps.push_back(find_step_to(program_->minimise_from(best_, calc_quadratic(), trust_, {side})));
+    }
     promised_ = -calc_model(steps.back());
     along_ = std::min(along_, promised_ / std::max(-calc_model(whole), options_.tolerance));
   } else if (region_.space->has_interaction()) {

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "uncertainty/cut_program.h"
 #include "uncertainty/random.h"
 #include "uncertainty/space.h"
 #include "uncertainty/wall.h"
@@ -102,6 +103,7 @@ class ModelSearch : public LocalSearch {
   bool ask_probe();
   std::vector<double> to_widths(const std::vector<double>& step) const;
   std::vector<double> find_step_to(const Point&) const;
+  Quadratic calc_quadratic() const;
   Point slide(const std::vector<double>& from, std::vector<double> u, double reach) const;
   void descend(std::vector<double>& step) const;
   void ask_around_constraints();
@@ -115,6 +117,7 @@ class ModelSearch : public LocalSearch {
   Region region_;
   Options options_;
   Random random_;
+  std::optional<CutProgram> program_;  // with interaction
   std::vector<Axis> axes_;
   std::vector<Pair> pairs_;
   std::vector<int> aside_;        // pending points beside constraints

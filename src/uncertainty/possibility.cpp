@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 
+#include "uncertainty/cut_program.h"
 #include "uncertainty/linear.h"
 #include "uncertainty/random.h"
+#include "uncertainty/wall.h"
 
 namespace topple::uncertainty {
 namespace {
@@ -48,7 +51,6 @@ Ray to_surface(Ray ray) {
 struct Bracket {
   Ray ray;
   double in = 1, out = 0;
-  bool found = true;  // whether `in` is known to be of the class
 };
 
 /// Runs that are more possible.
@@ -111,11 +113,11 @@ class Climb {
         case Stage::Bisect:
           points = ask_section();
           break;
-        case Stage::Slide:
-          points = ask_around();
+        case Stage::Wall:
+          points = ask_wall(archive);
           break;
-        case Stage::Try:
-          points = ask_candidates();
+        case Stage::Lead:
+          points = ask_along_wall();
           break;
         case Stage::Look:
           points = ask_look();
@@ -137,23 +139,21 @@ class Climb {
     refresh(archive);
     switch (stage_) {
       case Stage::Bisect:
-        if (narrow(archive)) {
-          resolution_ = brackets_[0].in - brackets_[0].out;
-          stage_ = axes_.size() > 1 ? Stage::Slide : Stage::Look;
-        }
+        if (narrow(archive)) leave_bisection();
         break;
-      case Stage::Slide:
-        if (narrow(archive)) stage_ = Stage::Try;
+      case Stage::Wall: {
+        std::vector<bool> inside;
+        for (const Point& x : wall_->pending()) inside.push_back(is_ours(archive, x));
+        wall_->tell(inside);
+        if (wall_->is_done()) stage_ = Stage::Lead;
         break;
-      case Stage::Try:
-        stage_ = best_ > before + options_.tolerance ? Stage::Start : Stage::Look;
+      }
+      case Stage::Lead:
+        learn(best_ - before);
         break;
       case Stage::Look:
         if (best_ > before || (sample_ >= 0 && !had_sample)) {
           stage_ = Stage::Start;
-          if (!had_sample) slide_ = 0.25;
-        } else if (slide_ > 0.02 && axes_.size() > 1) {
-          stage_ = Stage::Slide;  // once more, nearer
         } else {
           stage_ = Stage::Move;
         }
@@ -161,7 +161,6 @@ class Climb {
       case Stage::Move:
         stage_ = best_ > before || (sample_ >= 0 && !had_sample) ? Stage::Start : Stage::Done;
         converged_ = stage_ == Stage::Done && sample_ >= 0;
-        slide_ = 0.25;
         break;
       case Stage::Start:
       case Stage::Done:
@@ -170,7 +169,7 @@ class Climb {
   }
 
  private:
-  enum class Stage { Start, Bisect, Slide, Try, Look, Move, Done };
+  enum class Stage { Start, Bisect, Wall, Lead, Look, Move, Done };
 
   bool is_ours(const Archive& archive, const Point& x) const {
     const int i = archive.find(x);
@@ -184,119 +183,104 @@ class Climb {
       return;
     }
     const double t = 1 - best_;
-    brackets_ = {{find_ray(space_, best_x_, t), t, 0, true}};
+    bracket_ = {find_ray(space_, best_x_, t), t, 0};
     stage_ = Stage::Bisect;
   }
 
   static constexpr int sections = 8;
-  double at_section(const Bracket& b, int k) const { return b.out + (b.in - b.out) * k / sections; }
-  double width() const { return stage_ == Stage::Slide ? 0.1 * slide_ * (1 - best_) : 0.5 * options_.tolerance; }
+  double at_section(int k) const { return bracket_.out + (bracket_.in - bracket_.out) * k / sections; }
+  bool is_narrow() const { return bracket_.in - bracket_.out <= 0.5 * options_.tolerance; }
 
   std::vector<Point> ask_section() {
     std::vector<Point> points;
-    for (const auto& b : brackets_) {
-      if (b.in - b.out <= width()) continue;
-      for (int k = b.out == 0 ? 0 : 1; k <= (b.out == 0 ? sections : sections - 1); ++k)
-        add(points, calc_place(space_, b.ray, at_section(b, k)));
+    if (is_narrow()) {
+      leave_bisection();
+      return points;
     }
-    if (points.empty()) {
-      if (stage_ == Stage::Slide) {
-        stage_ = Stage::Try;
-      } else {
-        resolution_ = brackets_[0].in - brackets_[0].out;
-        stage_ = axes_.size() > 1 ? Stage::Slide : Stage::Look;
-      }
-    }
+    const bool from_core = bracket_.out == 0;
+    for (int k = from_core ? 0 : 1; k <= (from_core ? sections : sections - 1); ++k)
+      add(points, calc_place(space_, bracket_.ray, at_section(k)));
+    if (points.empty()) leave_bisection();
     return points;
   }
 
-  /// Keeps of each bracket the section in which the class begins, seen from the core. True when all are narrow.
+  /// Keeps the section in which the class begins, seen from the core. True when it is narrow.
   bool narrow(const Archive& archive) {
-    bool all = true;
-    for (auto& b : brackets_) {
-      if (b.in - b.out <= width()) continue;
-      const Bracket old = b;
-      int k = old.out == 0 ? 0 : 1;
-      while (k < sections && !is_ours(archive, calc_place(space_, b.ray, at_section(old, k)))) ++k;
-      if (old.out == 0 && k == sections) b.found = is_ours(archive, calc_place(space_, b.ray, old.in));
-      b.in = at_section(old, k);
-      b.out = k == 0 || !b.found ? b.in : at_section(old, k - 1);
-      all = all && b.in - b.out <= width();
-    }
-    return all;
+    const bool from_core = bracket_.out == 0;
+    int k = from_core ? 0 : 1;
+    while (k < sections && !is_ours(archive, calc_place(space_, bracket_.ray, at_section(k)))) ++k;
+    const bool found = k < sections || !from_core || is_ours(archive, calc_place(space_, bracket_.ray, bracket_.in));
+    const double in = at_section(k);
+    bracket_.out = k == 0 || !found ? in : at_section(k - 1);
+    bracket_.in = in;
+    return is_narrow();
   }
 
-  /// Boundary places on rays around the best one: first where the class begins on each.
-  std::vector<Point> ask_around() {
-    if (!around_) {
-      around_ = true;
-      const double t = 1 - best_;
-      const Ray centre = to_surface(find_ray(space_, best_x_, t));
-      brackets_.clear();
-      for (const int i : axes_) {
-        Ray r = centre;
-        // inwards from an end, so that the ray stays different
-        r.w[i] += r.w[i] > 0 ? -slide_ : slide_;
-        brackets_.push_back({to_surface(r), std::min(1.0, 1.5 * t), 0, true});
+  void leave_bisection() {
+    resolution_ = bracket_.in - bracket_.out;
+    stage_ = axes_.size() < 2 || sample_ < 0 || walled_ == best_ ? Stage::Look : Stage::Wall;
+    reach_ = largest_reach / 2, promised_ = 1, leads_ = 0, walled_from_ = best_;
+    wall_.reset();
+  }
+
+  /// The boundary of the class near the best place as a plane, seen from the nearest run of another class above.
+  std::vector<Point> ask_wall(const Archive& archive) {
+    if (!wall_) {
+      const Sample* nearest = nullptr;
+      double least = 0;
+      for (const Sample& s : archive.samples()) {
+        if (outcome_of(s.result) == outcome_ || !(calc_membership(space_, s.x) > best_)) continue;
+        double distance = 0;
+        for (const int i : axes_)
+          distance = std::max(distance, std::abs(s.x[i] - best_x_[i]) / space_.inputs[i].width());
+        if (nearest == nullptr || distance < least) least = distance, nearest = &s;
       }
+      const bool promises_nothing = reach_ < 0.02 && promised_ < 0.1 * options_.tolerance;
+      if (nearest == nullptr || promises_nothing || reach_ < smallest_reach || leads_++ >= most_leads) {
+        stage_ = best_ > walled_from_ + options_.tolerance ? Stage::Start : Stage::Look;
+        walled_ = best_;
+        return {};
+      }
+      wall_.emplace(support_, calc_scale(space_), axes_, best_x_, nearest->x, reach_,
+                    [this](const Point& x) { return calc_membership(space_, x) > 0; });
+      if (wall_->is_done()) stage_ = Stage::Lead;
     }
-    auto points = ask_section();
-    if (points.empty()) around_ = false;
-    return points;
+    return wall_->pending();
   }
 
-  /// The plane through the boundary places tells in which corner the smallest cut touches it.
-  std::vector<Point> ask_candidates() {
-    around_ = false;
-    const double t = 1 - best_;
-    const std::size_t n = axes_.size();
-    // in the inputs themselves, by widths of the support: a cut's box does not grow evenly from its middle
-    std::vector<Point> A;
-    Point slope(n, 1.0);
-    const Point centre = calc_centre(space_);
-    for (const auto& b : brackets_) {
-      if (!b.found) continue;
-      const Point x = calc_place(space_, b.ray, b.in);
-      A.emplace_back();
-      for (const int i : axes_) A.back().push_back((x[i] - centre[i]) / space_.inputs[i].width());
-    }
-    const Ray here = to_surface(find_ray(space_, best_x_, t));
-    std::vector<Ray> rays, ways;
-    if (A.size() == n && solve(A, slope)) {
-      double largest = 0;
-      for (const double a : slope) largest = std::max(largest, std::abs(a));
-      for (const double part : {1e-3, 0.1, 0.3, 1.0}) {
-        Ray corner = here;
-        for (std::size_t k = 0; k < n; ++k) corner.w[axes_[k]] = std::clamp(slope[k] / (part * largest), -1.0, 1.0);
-        rays.push_back(to_surface(corner));
-        // and part of the way
-        for (const double way : {0.5, 0.1}) {
-          Ray r = here;
-          for (const int i : axes_) r.w[i] += way * (corner.w[i] - r.w[i]);
-          ways.push_back(to_surface(r));
+  /// What is most possible on this side of the plane, and a little farther inside: a class may bend away.
+  std::vector<Point> ask_along_wall() {
+    std::vector<Point> points;
+    promised_ = 0;
+    if (wall_->found()) {
+      HalfSpace side{wall_->normal(), 0};
+      const double distance = wall_->calc_distance(best_x_);
+      for (const double part : {0.0, 0.01, 0.03, 0.1, 0.3}) {
+        side.b = distance - part * reach_;
+        const Point x = find_most_possible(space_, calc_scale(space_), axes_, best_x_, 2 * reach_, side);
+        if (part == 0) promised_ = calc_membership(space_, x) - best_;
+        for (const double way : {1.0, 0.5, 0.25}) {
+          Point y = best_x_;
+          for (const int i : axes_) y[i] += way * (x[i] - best_x_[i]);
+          if (calc_membership(space_, y) > best_) add(points, clip(support_, std::move(y)));
         }
       }
     }
-    // rays around the best place may all miss a small class: then the corners that it leans to
-    if (rays.empty())
-      for (const double part : {1e-3, 0.3, 0.6}) {
-        Ray corner = here;
-        for (const int i : axes_) corner.w[i] = std::clamp(corner.w[i] / part, -1.0, 1.0);
-        rays.push_back(std::move(corner));
-      }
-    std::vector<Point> points;
-    for (const auto& r : rays)
-      for (const double part : {0.5, 0.8, 0.93, 0.98, 0.995, 0.999}) add(points, calc_place(space_, r, part * t));
-    for (const auto& r : ways)
-      for (const double part : {0.8, 0.95, 0.99}) add(points, calc_place(space_, r, part * t));
-    if (points.empty()) stage_ = Stage::Look;
+    if (points.empty()) learn(0);
     return points;
+  }
+
+  /// Goes on farther or nearer, by what has come of what the plane promised.
+  void learn(double gained) {
+    const double part = promised_ > 0 ? gained / promised_ : 0;
+    reach_ = std::min(largest_reach, reach_ * (part > 0.5 ? 1.2 : part > 0.2 ? 0.5 : 0.25));
+    wall_.reset();
+    stage_ = Stage::Wall;
   }
 
   /// Above what was found: corners and axes of the cut that would be the next better one, places spread in it, places
   /// near the best one.
   std::vector<Point> ask_look() {
-    slide_ = std::max(0.25 * slide_, 0.01);
     const double t = std::max(1 - best_ - options_.tolerance, 0.0);
     const int n = static_cast<int>(axes_.size());
     std::vector<Point> points;
@@ -375,12 +359,18 @@ class Climb {
   Box support_;
   std::vector<int> axes_;
   Stage stage_ = Stage::Start;
-  std::vector<Bracket> brackets_;
+  Bracket bracket_;
   Point best_x_;
-  double best_ = 0, resolution_ = 1, slide_ = 0.25;
+  double best_ = 0, resolution_ = 1;
   double beside_ = -1;  // largest μ of runs outside the support, moved there, as long as none lies inside
   int sample_ = -1, seen_ = 0, round_ = 0;
-  bool around_ = false, converged_ = false;
+  bool converged_ = false;
+  std::optional<WallProbe> wall_;
+  static constexpr double largest_reach = 0.2, smallest_reach = 1e-4;  // of a plane, by widths
+  static constexpr int most_leads = 30;
+  double reach_ = 0, promised_ = 0;
+  double walled_ = -1, walled_from_ = 0;  // possibility at which walls have led no further; at which they began
+  int leads_ = 0;
 };
 
 }  // namespace

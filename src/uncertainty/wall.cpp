@@ -9,19 +9,20 @@
 namespace topple::uncertainty {
 namespace {
 
-constexpr int sections = 4, rounds = 4;
+constexpr int sections = 2, rounds = 8;
 
 }  // namespace
 
 WallProbe::WallProbe(const Box& box, std::vector<double> scale, std::vector<int> axes, Point inside, Point outside,
-                     double radius, Allow allow)
+                     double radius, Allow allow, Project project)
     : box_(box),
       scale_(std::move(scale)),
       axes_(std::move(axes)),
       anchor_(std::move(inside)),
       outside_(std::move(outside)),
       radius_(radius),
-      allow_(std::move(allow)) {
+      allow_(std::move(allow)),
+      project_(std::move(project)) {
   double length = 0;
   for (const int i : axes_) {
     direction_.push_back((outside_[i] - anchor_[i]) / scale_[i]);
@@ -47,59 +48,68 @@ Point WallProbe::blend(const Point& to, double t) const {
   return clip(box_, std::move(x));
 }
 
+/// Past the known outside, or there turned to or from an axis.
+WallProbe::Ray WallProbe::make_ray(int axis, bool is_mirrored) const {
+  Ray r{outside_};
+  r.axis = axis, r.is_mirrored = is_mirrored;
+  for (std::size_t k = 0; k < axes_.size(); ++k) {
+    double step = direction_[k];
+    if (axis >= 0)
+      step += (is_mirrored ? -1 : 1) * ((static_cast<int>(k) == axis ? 1.0 : 0.0) - direction_[axis] * direction_[k]);
+    r.to[axes_[k]] += radius_ * step * scale_[axes_[k]];
+  }
+  r.to = clip(box_, std::move(r.to));
+  if (project_ && !is_allowed(r.to)) r.to = project_(anchor_, r.to);
+  if (!is_allowed(r.to)) {
+    double in = 0, out = 1;
+    for (int k = 0; k < 40; ++k) (is_allowed(blend(r.to, 0.5 * (in + out))) ? in : out) = 0.5 * (in + out);
+    r.to = blend(r.to, in);
+  }
+  return r;
+}
+
 void WallProbe::ask_sections() {
   pending_.clear();
   for (auto& r : rays_) {
     r.asked = 0;
-    for (int k = 1; r.crosses && k <= (round_ == 0 ? sections : sections - 1); ++k) {
+    if (!r.crosses || r.round >= rounds) continue;
+    for (int k = 1; k <= (r.round == 0 ? sections : sections - 1); ++k) {
       Point x = blend(r.to, r.in + (r.out - r.in) * k / sections);
       if (!is_allowed(x)) break;
       pending_.push_back(std::move(x));
       ++r.asked;
     }
-    if (round_ == 0 && r.asked == 0) r.crosses = false;
+    if (r.round == 0 && r.asked == 0) r.crosses = false;
   }
 }
 
 void WallProbe::tell(const std::vector<bool>& is_inside) {
-  if (round_ < 0) {
+  if (!has_anchor_) {
+    has_anchor_ = true;
     for (std::size_t k = 0; k < pending_.size() && is_inside[k]; ++k) anchor_ = pending_[k];
-    // one ray past the known outside, one more per axis, turned towards it
-    for (int turn = -1; turn < static_cast<int>(axes_.size()); ++turn) {
-      Ray r{outside_};
-      for (std::size_t k = 0; k < axes_.size(); ++k) {
-        double step = direction_[k];
-        if (turn >= 0) {
-          const double along = direction_[turn];
-          step += (static_cast<int>(k) == turn ? 1.0 : 0.0) - along * direction_[k];
-        }
-        r.to[axes_[k]] += radius_ * step * scale_[axes_[k]];
-      }
-      r.to = clip(box_, std::move(r.to));
-      if (!is_allowed(r.to)) {
-        double in = 0, out = 1;
-        for (int k = 0; k < 40; ++k) (is_allowed(blend(r.to, 0.5 * (in + out))) ? in : out) = 0.5 * (in + out);
-        r.to = blend(r.to, in);
-      }
-      rays_.push_back(std::move(r));
-    }
+    for (int axis = -1; axis < static_cast<int>(axes_.size()); ++axis) rays_.push_back(make_ray(axis, false));
   } else {
     std::size_t next = 0;
     for (auto& r : rays_) {
-      if (!r.crosses) continue;
+      if (!r.crosses || r.round >= rounds) continue;
       int k = 1;
       while (k <= r.asked && is_inside[next + k - 1]) ++k;
       next += r.asked;
-      if (k > r.asked && round_ == 0) r.crosses = false;
+      if (k > r.asked && r.round == 0) r.crosses = false;
       const double width = r.out - r.in, from = r.in;
       r.in = from + width * (k - 1) / sections;
       r.out = from + width * k / sections;
+      ++r.round;
     }
   }
-  if (++round_ < rounds)
+  ask_sections();
+  // a plane that is not met this way is met the other way
+  if (std::any_of(rays_.begin(), rays_.end(),
+                  [](const Ray& r) { return !r.crosses && r.axis >= 0 && !r.is_mirrored; })) {
+    for (auto& r : rays_)
+      if (!r.crosses && r.axis >= 0 && !r.is_mirrored) r = make_ray(r.axis, true);
     ask_sections();
-  else
-    pending_.clear();
+  }
   if (pending_.empty()) fit();
 }
 

@@ -15,10 +15,12 @@ class WallProbe {
  public:
   /// Tells without a run whether a point counts at all; empty: all do.
   using Allow = std::function<bool(const Point&)>;
+  /// The place that counts and is nearest to `to`, seen from a place that counts; empty: on the way there.
+  using Project = std::function<Point(const Point& from, const Point& to)>;
   /// `inside` and `outside` are known; lengths are measured in parts of `scale`, one per input; `axes` may vary. Rays
   /// end where points no longer count.
   WallProbe(const Box& box, std::vector<double> scale, std::vector<int> axes, Point inside, Point outside,
-            double radius, Allow allow = {});
+            double radius, Allow allow = {}, Project project = {});
   const std::vector<Point>& pending() const { return pending_; }
   void tell(const std::vector<bool>& is_inside);
   bool is_done() const { return pending_.empty(); }
@@ -33,11 +35,14 @@ class WallProbe {
   struct Ray {
     Point to;
     double in = 0, out = 1;
-    bool crosses = true;
+    int axis = -1;  // towards which it is turned; -1: not
+    bool crosses = true, is_mirrored = false;
+    int round = 0;
     int asked = 0;  // sections, up to the first that does not count
   };
   bool is_allowed(const Point& x) const { return !allow_ || allow_(x); }
   Point blend(const Point& to, double t) const;
+  Ray make_ray(int axis, bool is_mirrored) const;
   void ask_sections();
   void fit();
 
@@ -48,11 +53,12 @@ class WallProbe {
   std::vector<double> direction_;
   double radius_;
   Allow allow_;
+  Project project_;
   std::vector<Ray> rays_;
   std::vector<Point> pending_;
   std::vector<double> normal_;
   double offset_ = 0;
-  int round_ = -1;  // -1: looking for an anchor
+  bool has_anchor_ = false;
 };
 
 }  // namespace topple::uncertainty

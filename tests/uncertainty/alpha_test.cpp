@@ -41,6 +41,29 @@ TEST_P(AlphaReference, BoundsAreExactWithFewEvaluations) {
 
 INSTANTIATE_TEST_SUITE_P(Seeds, AlphaReference, testing::Values(1, 2, 3, 4, 5, 6, 7, 8));
 
+// Under a joint membership with kinks bounds lie on edges and at corners of the cuts.
+TEST(InteractionReference, JointMembershipWithEdges) {
+  const Space space{
+      {make_triangular(0, 3, 10), make_triangular(0, 6, 10), make_triangular(0, 5, 10)}, {}, [](const Point& x) {
+        return std::max(0.0, 1 - std::max(std::abs(x[0] - x[1] + 3) / 4, std::abs(x[1] - x[2] - 1) / 3));
+      }};
+  const Evaluate model = make_evaluate_values([](const Point& x) {
+    return std::vector{x[0] * x[1] - x[2] * x[2], x[0] - x[1] + x[2]};
+  });
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    AlphaOptions options;
+    options.seed = seed;
+    const AlphaResult r = optimise(space, model, options, {});
+    EXPECT_EQ(r.ending, Ending::Complete);
+    EXPECT_LT(r.archive.size(), 7000u);
+    const LevelBounds& at = r.outputs[0].levels[3];
+    EXPECT_NEAR(at.upper.value, 4.75 * 6.75 - 25, 1e-8) << "x - y + 3 = 1, y - z - 1 = 0.75, x = 4.75";
+    // z - (y - x), of which y - x is 2 at least: with the end of z's cut
+    EXPECT_NEAR(r.outputs[1].levels[3].upper.value, 6.25 - 2, 1e-8);
+    EXPECT_TRUE(at.upper.converged);
+  }
+}
+
 // The paper's equation (1) on its Table 1: full interaction keeps the tensile strength a function of f_c.
 TEST(InteractionReference, TensileStrengthFollowsFromConcrete) {
   const Space space{{make_triangular(10, 25, 45)}, {}, {}};

@@ -216,6 +216,23 @@ TEST(Possibility, RespectsInteraction) {
   EXPECT_NEAR(b.possibilities.classes[1].possibility, 0.2, 1e-3);
 }
 
+// A joint membership with kinks: the most possible place lies on edges of cuts that are no boxes.
+TEST(PossibilityPhysics, UnderAJointMembershipWithEdges) {
+  Space space{
+      {make_triangular(0, 3, 10), make_triangular(0, 6, 10), make_triangular(0, 5, 10)}, {}, [](const Point& x) {
+        return std::max(0.0, 1 - std::max(std::abs(x[0] - x[1] + 3) / 4, std::abs(x[1] - x[2] - 1) / 3));
+      }};
+  const auto is_over = [](const Point& x) { return x[0] + 0.5 * x[1] - x[2] > 4 ? 1 : 0; };
+  const auto is_in_ball = [](const Point& x) {
+    return std::pow(x[0] - 6, 2) + std::pow(x[1] - 8, 2) + std::pow(x[2] - 4, 2) < 1.5 ? 1 : 0;
+  };
+  EXPECT_NEAR(find(space, make_classes(is_over)).possibilities.classes[1].possibility, 11.0 / 17, 1e-5);
+  // found by evolution with adapted covariances from 60 starts
+  EXPECT_NEAR(find(space, make_classes(is_in_ball)).possibilities.classes[1].possibility, 0.574146, 1e-5);
+  space.constraints.push_back([](const Point& x) { return x[0] + x[1] + x[2] - 17; });
+  EXPECT_NEAR(find(space, make_classes(is_over)).possibilities.classes[1].possibility, 26.0 / 41, 1e-5);
+}
+
 TEST(PossibilityReplay, ResumedEqualsUninterrupted) {
   const Space space{cases::make_jump_inputs(), {}, {}};
   const Progress progress;
