@@ -30,8 +30,8 @@ std::optional<Constraint> read_constraint(const Node& item, const std::string& l
 double calc_excess(const Interaction& interaction, size_t constraint, std::span<const double> values) {
   const Constraint& c = interaction.constraints[constraint];
   const double left = c.left.evaluate(values), right = c.right.evaluate(values);
-  const double g = (c.is_at_least ? right - left : left - right) -
-                   (interaction.slack > 0 ? interaction.slack * std::max(std::abs(left), std::abs(right)) : 0);
+  const double g =
+      (c.is_at_least ? right - left : left - right) - Interaction::slack * std::max(std::abs(left), std::abs(right));
   return std::isnan(g) ? std::numeric_limits<double>::infinity() : g;
 }
 
@@ -39,7 +39,7 @@ double calc_joint(const Interaction& interaction, std::span<const double> values
   if (!interaction.joint) return 1;
   const double mu = interaction.joint->evaluate(values);
   if (std::isnan(mu)) return 0;
-  return mu >= 1 - interaction.slack ? 1 : std::max(mu, 0.0);
+  return mu >= 1 - Interaction::slack ? 1 : std::max(mu, 0.0);
 }
 
 Interaction read_interaction(TableReader& parent, const std::vector<std::string>& names) {
@@ -76,7 +76,7 @@ void check_interaction(const Interaction& interaction, std::span<const double> v
                        "the most possible values must keep every constraint");
   if (!interaction.joint) return;
   const double mu = interaction.joint->evaluate(values);
-  if (!(std::abs(mu - 1) <= interaction.slack))
+  if (!(std::abs(mu - 1) <= Interaction::slack))
     complaints.error("E207", interaction.joint_place,
                      fmt::format("{}: membership: {} in the middle of {}; 1 is wanted", label, mu, middle),
                      "a joint membership lies between 0 and 1");

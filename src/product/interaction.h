@@ -23,7 +23,8 @@ struct Interaction {
   std::vector<Constraint> constraints;
   std::optional<Expression> joint;
   Place joint_place;
-  double slack = 0;  // round-off of values that were given in other units, in parts of them
+  /// Round-off of formulas and units, in parts of the sides: an equation as two constraints has places.
+  static constexpr double slack = 1e-12;
 
   bool is_empty() const { return constraints.empty() && !joint; }
 };

@@ -15,7 +15,6 @@ namespace topple::product {
 namespace {
 
 constexpr double accepted_difference = 1e-3;  // between a value of the plan and the core
-constexpr double accepted_roundoff = 1e-12;   // of units, in constraints
 
 /// A quantity of the plan and the ways to write its path.
 struct Target {
@@ -479,7 +478,6 @@ void FuzzyReader::read_interaction(TableReader& table) {
   for (size_t i = inputs; i < names.size(); ++i)
     if (std::count(own.begin(), own.end(), own[i]) > 1) names[i] = word_of(out.derived[i - inputs].path);
   out.interaction = product::read_interaction(table, names);
-  out.interaction.slack = accepted_roundoff;
 }
 
 /// The plan as it stands is a run of its own; the analysis has its own middle. Both should be the same building.

@@ -417,10 +417,13 @@ class Manager {
   void look_further(StudyResult& r, uncertainty::Asker& asker, uncertainty::AlphaSearch& search) const {
     const int axes = static_cast<int>(std::count_if(problem_.space.inputs.begin(), problem_.space.inputs.end(),
                                                     [](const auto& f) { return f.width() > 0; }));
-    while (asker.can_go_on()) {
-      const int count = std::min(asker.limit() / 2 - r.alpha.coverage.front().space_points, asker.rest() / 2);
+    while (axes > 0 && asker.can_go_on()) {
+      const int before = r.alpha.coverage.front().space_points;
+      const int count = std::min(asker.limit() / 2 - before, asker.rest() / 2);
       if (count < 10 * axes) break;
       r.alpha = search.spread_on(count);
+      // of a support without a width, as equations leave it, no place is met
+      if (r.alpha.coverage.front().space_points == before) break;
       if (asker.can_go_on() && r.alpha.classes.size() > 1) find_possibilities(r, asker);
     }
   }

@@ -263,7 +263,10 @@ class Design {
         support_, middle, [this](const std::vector<Point>& points) { return judge(points); },
         [this](const Point& x) { return is_possible(x); }, {coarse, smallest_, options_.rounds, 1});
     const int start = asker_.asked();
-    for (int seen = 0; !b.kept && asker_.can_go_on();) {
+    for (int seen = 0, last = -1; !b.kept && asker_.can_go_on();) {
+      // nothing was found that could be run: nor will it be
+      if (last == asker_.asked()) break;
+      last = asker_.asked();
       for (; seen < asker_.asked(); ++seen)
         if (is_violating(seen)) front.add(asker_.archive()[seen].x);
       const double spent = std::min(1.0, (asker_.asked() - start) / std::max(1.0, double(share - options_.fresh)));

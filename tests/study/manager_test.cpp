@@ -119,6 +119,38 @@ TEST(Study, SpreadsAsMuchWhereConstraintsLeaveLittle) {
   EXPECT_GE(r.alpha.coverage[0].space_points, 300);
 }
 
+// Inputs that leave nothing to choose from: a study of them ends, also with room for more runs.
+TEST(Study, EndsWhereNothingIsLeftToSpread) {
+  const Folder folder;
+  Problem p;
+  p.kind = "small";
+  p.inputs = {{"x0", "", 1}, {"x1", "", 1}};
+  p.space.inputs = {uncertainty::make_triangular(2, 2, 2), uncertainty::make_triangular(3, 3, 3)};
+  p.limit = 20;
+  const StudyResult crisp =
+      run(p, make_options(folder / "crisp"), make_sum_factories([](const Point&) { return true; }));
+  EXPECT_EQ(crisp.alpha.archive.size(), 1u);
+  EXPECT_EQ(crisp.ending, uncertainty::Ending::Complete);
+  EXPECT_EQ(crisp.alpha.outputs[0].levels[0].upper.value, 5);
+
+  // x0 + x1 = 3, as two constraints that leave round-off
+  p.space.inputs = {uncertainty::make_triangular(1, 2, 4), uncertainty::make_triangular(0, 1, 2)};
+  const auto calc_excess = [](double a, double b) { return a - b - 1e-12 * std::max(a, b); };
+  p.space.constraints = {[=](const Point& x) { return calc_excess(x[0] + x[1], 3); },
+                         [=](const Point& x) { return calc_excess(3, x[0] + x[1]); }};
+  p.limit = 300;
+  const StudyResult line =
+      run(p, make_options(folder / "line"),
+          RunnerFactories{{"small", [](const std::string&) -> Runner {
+                             return [](auto points, const auto& give, const auto&) {
+                               for (std::size_t i = 0; i < points.size(); ++i)
+                                 give(i, {Answer::Kind::Done, {{"y", points[i][0]}}, "", {}, "", 0});
+                             };
+                           }}});
+  EXPECT_NEAR(line.alpha.outputs[0].levels[0].lower.value, 1, 1e-8);
+  EXPECT_NEAR(line.alpha.outputs[0].levels[0].upper.value, 3, 1e-8);
+}
+
 TEST(StudyReplay, IsTheSameForAnyNumberOfWorkersAndBatches) {
   const Folder folder;
   const Problem p = make_small_problem();
