@@ -105,8 +105,7 @@ int start(const Arguments& a, const std::atomic<bool>& cancel) {
     if (code == "E823" || code == "E824" || code == "E827" || code == study::no_answer_code) {
       const auto refusal = study::Store(place.store).find_refusal(model);
       complain(e, refusal ? to_printable(study::read_refusal(*refusal).line) : "", a.json);
-      // also by earlier calls, which this one may not have come to read
-      const bool is_kept = answers > 0 || (!is_new && !study::Store(place.store).load_results(model).empty());
+      const bool is_kept = !study::Store(place.store).load_results(model).empty();
       std::fprintf(stderr, is_kept ? "The study stopped; what was run before is kept. Mend the evaluator and give "
                                      "the command again.\n"
                                    : "The study stopped. Mend the evaluator and give the command again.\n");

@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "commands.h"
 #include "refusal.h"
+#include "study/evaluator.h"
 #include "study/pool.h"
 #include "study_model.h"
 #include "terminal.h"
@@ -33,10 +34,18 @@ int run_worker(const Arguments& a, const std::atomic<bool>& cancel) {
     const study::RunnerFactories factories = make_factories();
     study::Pool pool(place.store, factories, options);
     ProgressLine line;
+    std::string told;  // what was wrong with the last answer that was refused
     std::string why = "interrupted; its runs went back to the store";
     while (!cancel) {
       pool.wait_for_news(0.5);
       pool.check();
+      if (const std::string refusal = pool.get_refusal(); refusal != told) {
+        told = refusal;
+        line.clear();
+        const study::Refusal r = study::read_refusal(refusal);
+        std::fputs(render(r.diagnostic, to_printable(r.line), has_colour(stderr)).c_str(), stderr);
+        std::fputs("The study it belongs to stops.\n", stderr);
+      }
       line.say(fmt::format("{} done, {} running", pool.finished(), pool.running()));
       if (pool.running() > 0) continue;
       if (idle > 0 && pool.calc_idle_time() > idle) {
@@ -50,14 +59,17 @@ int run_worker(const Arguments& a, const std::atomic<bool>& cancel) {
     }
     pool.stop();
     line.clear();
-    std::fprintf(stderr, "%ld runs done here%s; %s\n", pool.finished(),
-                 pool.refused() > 0 ? fmt::format(", {} came too late", pool.refused()).c_str() : "", why.c_str());
+    std::string others;
+    if (pool.refused() > 0) others += fmt::format(", {} not understood", pool.refused());
+    if (pool.too_late() > 0) others += fmt::format(", {} came too late", pool.too_late());
+    std::fprintf(stderr, "%ld runs done here%s; %s\n", pool.finished(), others.c_str(), why.c_str());
     if (a.json)
-      std::printf(
-          "%s\n",
-          dump(nlohmann::ordered_json{
-                   {"exit_code", kOk}, {"done", pool.finished()}, {"too_late", pool.refused()}, {"ending", why}})
-              .c_str());
+      std::printf("%s\n", dump(nlohmann::ordered_json{{"exit_code", kOk},
+                                                      {"done", pool.finished()},
+                                                      {"refused", pool.refused()},
+                                                      {"too_late", pool.too_late()},
+                                                      {"ending", why}})
+                              .c_str());
     return kOk;
   } catch (const study::ConnectionLost& e) {
     std::fprintf(stderr, "topple: the store is away: %s\n", e.what());

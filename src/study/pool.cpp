@@ -59,8 +59,13 @@ void Pool::wake() {
 void Pool::wait_for_news(double seconds) {
   std::unique_lock lock(mutex_);
   news_.wait_for(lock, std::chrono::duration<double>(seconds),
-                 [this] { return finished_ + refused_ != seen_ || failure_ || stop_; });
-  seen_ = finished_ + refused_;
+                 [this] { return news_count_ != seen_ || failure_ || stop_; });
+  seen_ = news_count_;
+}
+
+std::string Pool::get_refusal() const {
+  const std::lock_guard lock(mutex_);
+  return refusal_;
 }
 
 void Pool::check() {
@@ -136,10 +141,18 @@ void Pool::run_jobs(Store& store, const std::string& name, std::vector<Job> jobs
   std::vector<bool> is_given(jobs.size(), false);
   const auto finish = [&](std::size_t i, const Answer& a) {
     is_given[i] = true;
-    const bool is_kept = store.finish(jobs[i], name, compare(store, jobs[i].model, a));
+    const Answer compared = compare(store, jobs[i].model, a);
+    const bool is_kept = store.finish(jobs[i], name, compared);
     {
       const std::lock_guard lock(mutex_);
-      ++(is_kept ? finished_ : refused_);
+      ++news_count_;
+      if (!is_kept) {
+        ++too_late_;
+      } else if (Store::is_result(jobs[i], compared)) {
+        ++finished_;
+      } else if (compared.kind == Answer::Kind::Refused) {
+        ++refused_, refusal_ = compared.text;
+      }
     }
     news_.notify_all();
   };

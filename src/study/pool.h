@@ -42,7 +42,10 @@ class Pool {
   const std::string& name() const { return name_; }
   int running() const { return running_; }
   long finished() const { return finished_; }  // results written
-  long refused() const { return refused_; }    // results of jobs that others had taken over
+  long too_late() const { return too_late_; }  // results of jobs that others had taken over
+  /// Answers that were not understood, and stopped their studies; what is wrong with the last one.
+  long refused() const { return refused_; }
+  std::string get_refusal() const;
   /// Since a job was under way [s].
   double calc_idle_time() const;
 
@@ -60,11 +63,12 @@ class Pool {
   std::vector<std::string> names_;
   std::atomic<bool> stop_ = false;
   std::atomic<int> running_ = 0;
-  std::atomic<long> finished_ = 0, refused_ = 0;
+  std::atomic<long> finished_ = 0, too_late_ = 0, refused_ = 0, news_count_ = 0;
   std::atomic<double> last_work_ = 0;
   mutable std::mutex mutex_;
   std::condition_variable news_, wakes_;
   long seen_ = 0, wake_count_ = 0;
+  std::string refusal_;
   std::exception_ptr failure_;
   std::mutex forms_mutex_;
   std::map<std::string, AnswerForm> forms_;  // by model

@@ -387,12 +387,16 @@ std::vector<std::string> Store::list_workers() {
       true);
 }
 
-bool Store::finish(const Job& job, const std::string& worker, const Answer& answer) {
+bool Store::is_result(const Job& job, const Answer& answer) {
   using Kind = Answer::Kind;
   const bool is_lost = answer.kind == Kind::Crashed && job.attempt - job.vanished < most_attempts;
-  const bool is_result =
-      answer.kind == Kind::Done || answer.kind == Kind::Failed || (answer.kind == Kind::Crashed && !is_lost);
-  std::string state = answer.kind == Kind::Done ? "done" : is_result ? "failed" : "waiting";
+  return answer.kind == Kind::Done || answer.kind == Kind::Failed || (answer.kind == Kind::Crashed && !is_lost);
+}
+
+bool Store::finish(const Job& job, const std::string& worker, const Answer& answer) {
+  using Kind = Answer::Kind;
+  const bool counts = is_result(job, answer);
+  std::string state = answer.kind == Kind::Done ? "done" : counts ? "failed" : "waiting";
   if (answer.kind == Kind::Refused) state = "refused";
   const int attempt = answer.kind == Kind::Cancelled ? job.attempt - 1 : job.attempt;
   const std::vector<Value> change = {state,  std::to_string(attempt),    to_clean(answer.text), job.hash,
@@ -405,7 +409,7 @@ bool Store::finish(const Job& job, const std::string& worker, const Answer& answ
       "UPDATE job SET state = $1, attempt = $2, message = $3, lease_until = NULL, worker = $5 WHERE hash = $4 AND {} "
       "RETURNING hash, model",
       held);
-  if (!is_result) return transact([&](bool) { return !db_->run(update, change).empty(); }, true);
+  if (!counts) return transact([&](bool) { return !db_->run(update, change).empty(); }, true);
   if (!db_->dialect().writes_within) {
     return transact([&](bool) {
       const bool is_ours = !db_->run(update, change).empty();

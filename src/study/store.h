@@ -90,6 +90,8 @@ class Store {
   /// else counts only while the job is the worker's. Crashed: the job waits again, or failed after its last attempt.
   /// Refused: the job stops until `forget_refusals`. Cancelled: it waits again, not counted.
   bool finish(const Job&, const std::string& worker, const Answer&);
+  /// Whether an answer to a job is a result: all but what is tried again or stops the study.
+  static bool is_result(const Job&, const Answer&);
   /// Jobs whose workers vanished too often become failed results. Returns how many.
   ///   process  what workers of this name and a number hold does not count
   int quarantine(const std::string& process = {});

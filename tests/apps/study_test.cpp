@@ -216,6 +216,10 @@ TEST_F(StudyFaults, LeaveTheStoreToWorkersWhenTheStudyStops) {
   std::ofstream(folder / "mended") << "\n";
   EXPECT_EQ(run(manage), 0) << read(folder / "log");
   EXPECT_EQ(wait_for(worker), 0) << "it did the runs";
+  const std::string log = read(folder / "log");
+  EXPECT_NE(log.find("30 runs done here, "), std::string::npos) << log;
+  EXPECT_NE(log.find(" not understood; every study is finished"), std::string::npos) << log;
+  EXPECT_NE(log.find("The study it belongs to stops."), std::string::npos) << log;
 }
 
 // x2 is spread evenly between x1 and 90; the model crashes where x1 > 44 and x2 > 80.
