@@ -103,9 +103,11 @@ struct Outline {
   bool is_closed = false, is_on_paper = false, is_mesh = false, lacks_y = false;
   std::array<double, 3> extrusion{0, 0, 1};
   std::vector<std::array<double, 2>> corners;
-  std::vector<double> bulges;  // of the edge behind each corner: tan of a quarter of its arc's angle; 0: straight
+  std::vector<double> bulges;   // of the edge behind each corner: tan of a quarter of its arc's angle; 0: straight
+  std::vector<double> heights;  // of corners
 };
 
+constexpr double kFlat = 1e-3;                // largest difference of the heights of corners [m]
 constexpr double kArcError = 0.01;            // of chords of an arc [m]
 const double kFinest = std::acos(-1.0) / 36;  // angle of a chord where that would take more
 const double kCoarsest = std::acos(-1.0) / 4;
@@ -234,17 +236,18 @@ std::vector<Outline> find_outlines(const std::vector<Pair>& pairs, const std::st
       now.is_mesh = entity == "POLYLINE" && (flags & (16 | 64)) != 0;
     }
     if (p.code == 70 && in_vertex && (std::atoi(p.value.c_str()) & 16) != 0 && !now.corners.empty())
-      now.corners.pop_back(), now.bulges.pop_back();  // of the frame that a spline follows
+      now.corners.pop_back(), now.bulges.pop_back(), now.heights.pop_back();  // of the frame that a spline follows
     if (p.code == 10 && has_corner) {
       end_corner();
       now.corners.push_back({read_length(p, name), 0});
-      now.bulges.push_back(0);
+      now.bulges.push_back(0), now.heights.push_back(0);
       has_y = false;
     }
     if (p.code == 20 && has_corner && !now.corners.empty()) {
       now.corners.back()[1] = read_length(p, name);
       has_y = true;
     }
+    if (p.code == 30 && has_corner && !now.corners.empty()) now.heights.back() = read_length(p, name);
     if (p.code == 42 && has_corner && !now.corners.empty()) now.bulges.back() = read_length(p, name);
     if (entity == "CIRCLE" && (p.code == 10 || p.code == 20)) centre[p.code == 20] = read_length(p, name);
     if (entity == "CIRCLE" && p.code == 40) radius = std::abs(read_length(p, name));
@@ -258,12 +261,17 @@ std::vector<Outline> find_outlines(const std::vector<Pair>& pairs, const std::st
 
 namespace {
 
+bool is_level(const std::vector<double>& heights) {
+  const auto [low, high] = std::minmax_element(heights.begin(), heights.end());
+  return low == heights.end() || *high - *low < kFlat;
+}
+
 /// Why an outline is no footprint, as the kind that it is counted as; empty: it is one. Corners in metres.
 std::string why_not(const Outline& o) {
   const auto& [x, y, z] = o.extrusion;
   if (o.is_on_paper) return "outlines in paper space";
   if (o.is_mesh) return "polygon meshes";
-  if (!(std::hypot(x, y) < 1e-6 * std::abs(z))) return "outlines that do not lie flat";
+  if (!(std::hypot(x, y) < 1e-6 * std::abs(z)) || !is_level(o.heights)) return "outlines that do not lie flat";
   if (!o.is_closed) return "open polylines";
   if (o.lacks_y) return "outlines with a corner without y";
   if (o.corners.size() < 3) return "outlines of fewer than three corners";
@@ -314,6 +322,7 @@ Import make_site_text(const std::string& dxf, const std::string& file_name, doub
     };
     for (auto& corner : o.corners)
       for (double& x : corner) x *= unit;
+    for (double& z : o.heights) z *= unit;
     const bool is_arced = has_arcs(o);
     if (const auto near = [](double a, double b) { return std::abs(a - b) < 5e-4; };
         o.corners.size() > 1 && near(o.corners.front()[0], o.corners.back()[0]) &&

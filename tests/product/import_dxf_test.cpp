@@ -6,6 +6,7 @@
 #include <regex>
 #include <string>
 
+#include "base/error.h"
 #include "product/import.h"
 #include "product/layer_names.h"
 
@@ -157,6 +158,43 @@ TEST(ImportDxfArcs, KeepToTheCornersOfAPlanAndToPlanesSeenFromBelow) {
   const std::vector<Corner> half = corners_of(make_site_text(drawing(below), "s.dxf", 1).text);
   EXPECT_TRUE(holds(half, -4, -1.99));
   EXPECT_FALSE(holds(half, -4, 0.1));
+}
+
+/// A closed polyline in space over a square, whose third corner has this height.
+std::string polyline_in_space(const std::string& height, int frame_vertices = 0) {
+  std::string out = "0\nPOLYLINE\n8\nH\n66\n1\n10\n0\n20\n0\n30\n0\n70\n9\n";
+  for (const char* corner : {"10\n20\n20\n30\n30\n5\n", "10\n30\n20\n30\n30\n5\n", "10\n30\n20\n45\n30\n"}) {
+    out += std::string("0\nVERTEX\n8\nH\n") + corner;
+    if (std::string(corner).ends_with("30\n")) out += height + "\n";
+    out += "70\n32\n";
+  }
+  for (int i = 0; i < frame_vertices; ++i) out += "0\nVERTEX\n8\nH\n10\n40\n20\n40\n30\n9\n70\n48\n";
+  return out + "0\nVERTEX\n8\nH\n10\n20\n20\n45\n30\n5\n70\n32\n0\nSEQEND\n";
+}
+
+TEST(ImportDxfHeights, OfCornersThatDifferLeaveAnOutlineOut) {
+  const std::string flat = outline("H", kSquare);
+  for (const char* height : {"8", "4.998", "-5", "1e3"}) {
+    const Import made = make_site_text(drawing(flat + polyline_in_space(height)), "s.dxf", 1);
+    EXPECT_THAT(made.report.taken, Contains("1 closed outlines")) << height;
+    EXPECT_THAT(made.report.missing, Contains("1 outlines that do not lie flat are left out")) << height;
+  }
+  // within rounding, and what only guides a spline
+  for (const char* height : {"5", "5.0000000001", "5.0005"})
+    EXPECT_THAT(make_site_text(drawing(polyline_in_space(height, 1)), "s.dxf", 1).report.taken,
+                Contains("1 closed outlines"))
+        << height;
+  // in metres, not in the drawing's unit
+  EXPECT_THAT(make_site_text(drawing(polyline_in_space("5.005")), "s.dxf", 0.1).report.taken,
+              Contains("1 closed outlines"));
+  EXPECT_THAT(make_site_text(drawing(flat + polyline_in_space("5.005")), "s.dxf", 1).report.taken,
+              Contains("1 closed outlines"));
+  // the first corner again, above itself
+  std::string helix = polyline_in_space("5");
+  helix.insert(helix.find("0\nSEQEND"), "0\nVERTEX\n8\nH\n10\n20\n20\n30\n30\n8\n70\n32\n");
+  EXPECT_THAT(make_site_text(drawing(flat + helix), "s.dxf", 1).report.missing,
+              Contains("1 outlines that do not lie flat are left out"));
+  EXPECT_THROW((void)make_site_text(drawing(polyline_in_space("high")), "s.dxf", 1), InputError);
 }
 
 }  // namespace
