@@ -9,6 +9,7 @@
 
 #include "base/file.h"
 #include "commands.h"
+#include "product/foreign_text.h"
 #include "results.h"
 
 namespace topple::apps {
@@ -38,6 +39,7 @@ int import_file(const Arguments& a) {
     if (kind == ".ifc" && !a.unit.empty())
       throw InputError("E801", "--unit: is for drawings; an IFC file names its own", "leave it out");
     text = read_file(a.input);
+    if (kind == ".dxf") text = product::to_line_feeds(std::move(text));  // for complaints to show their line
     const std::string name = path.filename().string();
     const double unit = read_quantity(a.unit, Dimension::Length, "--unit");
     const product::Import made = kind == ".ifc" ? product::make_plan_text(product::read_ifc(text, a.input), name)

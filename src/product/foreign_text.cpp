@@ -1,5 +1,6 @@
 #include "product/foreign_text.h"
 
+#include <algorithm>
 #include <string_view>
 
 #include "base/error.h"
@@ -20,6 +21,13 @@ std::string clean_text(const std::string& text) {
     out += c;
   }
   return out;
+}
+
+std::string to_line_feeds(std::string text) {
+  const size_t first = std::min(text.find_first_of("\r\n"), text.size()),
+               next = std::min(text.find_first_not_of('\r', first), text.size());
+  if (next > first && (next == text.size() || text[next] != '\n')) std::replace(text.begin(), text.end(), '\r', '\n');
+  return text;
 }
 
 void check_import(const std::string& text, const char* code, const std::string& file) {

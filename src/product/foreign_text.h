@@ -9,6 +9,9 @@ namespace topple::product {
 /// and control characters. Bytes that are not UTF-8 are read as ISO 8859-1.
 std::string clean_text(const std::string&);
 
+/// Text whose lines end with CR alone, with LF instead; any other as it is.
+std::string to_line_feeds(std::string);
+
 /// The last look at a plan or site that was made: only its gaps may be wrong with it. Throws InputError `code` at
 /// `file`.
 void check_import(const std::string& text, const char* code, const std::string& file);

@@ -45,7 +45,7 @@ double read_length(const Pair& p, const std::string& name) {
 /// All pairs up to that of the end, `0 EOF`, which a file that was cut off does not have.
 std::vector<Pair> read_pairs(const std::string& text, const std::string& name) {
   std::vector<Pair> out;
-  std::istringstream in{std::string(without_mark(text))};
+  std::istringstream in{to_line_feeds(std::string(without_mark(text)))};
   std::string code, value;
   int line = 1;
   const auto trimmed = [](const std::string& s) {

@@ -289,6 +289,8 @@ import)
   expect 2 "$topple" import site.dxf -o site.toml --json; is_json out; has out '"code": "E802"'
   expect 0 "$topple" import site.dxf -o json.toml --json; is_json out; has out '"gaps": 1'; has out '"plan": "json.toml"'; has err "Guessed"
   cmp site.toml json.toml || failures=$((failures + 1))
+  tr '\n' '\r' <site.dxf >cr.dxf; expect 0 "$topple" import cr.dxf -o cr.toml; sed 's/cr.dxf/site.dxf/' cr.toml | cmp - site.toml || failures=$((failures + 1))
+  sed 's/^30$/3o/' site.dxf | tr '\n' '\r' >cr.dxf; expect 2 "$topple" import cr.dxf -o x.toml; has err "cr.dxf:16:1: error E113"; has err "16 | 3o"
   expect 2 "$topple" import site.dxf -o other.toml --unit "1 s"; has err "--unit"
   cat "$plan" site.toml >gaps.toml
   expect 2 "$topple" check gaps.toml; has err "E211"; has err "site.neighbour[1].clearance"; has err "^"

@@ -197,5 +197,28 @@ TEST(ImportDxfHeights, OfCornersThatDifferLeaveAnOutlineOut) {
   EXPECT_THROW((void)make_site_text(drawing(polyline_in_space("high")), "s.dxf", 1), InputError);
 }
 
+TEST(ImportDxfLines, EndInAnyOfThreeWays) {
+  const std::string text = drawing(outline("H", kSquare) + "0\nLINE\n8\nx\n");
+  const auto with = [](const std::string& lines, const std::string& end) {
+    return std::regex_replace(lines, std::regex("\n"), end);
+  };
+  const Import made = make_site_text(text, "s.dxf", 1);
+  for (const char* end : {"\r", "\r\n", "\r\r\n", " \n"})
+    for (const char* behind : {"", "\r", "\n", "\r\n"}) {
+      const Import other = make_site_text(with(text, end) + behind, "s.dxf", 1);
+      EXPECT_EQ(other.text, made.text);
+      EXPECT_EQ(other.report.missing, made.report.missing);
+    }
+  // lines are counted alike
+  const std::string wrong = with(drawing(outline("H", kSquare) + "0\nLWPOLYLINE\n10\nx\n"), "\r");
+  try {
+    (void)make_site_text(wrong, "s.dxf", 1);
+    FAIL() << "a word was taken for a coordinate";
+  } catch (const InputError& e) {
+    EXPECT_EQ(e.diagnostics()[0].where.line, 30);
+    EXPECT_EQ(e.diagnostics()[0].message, "a coordinate is wanted, there is \"x\"");
+  }
+}
+
 }  // namespace
 }  // namespace topple::product
